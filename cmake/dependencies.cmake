@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: Apache-2.0
+# Debian 12 packages only; packages.txt lists their names.
+find_package(Threads REQUIRED)
+find_package(Eigen3 REQUIRED)
+find_package(OpenCV 4 REQUIRED COMPONENTS core imgproc imgcodecs calib3d features2d video)
+find_package(fmt REQUIRED)
+find_package(spdlog REQUIRED)
+find_package(nlohmann_json REQUIRED)
+find_package(yaml-cpp REQUIRED)
+find_package(CLI11 REQUIRED)
+find_package(tl-expected REQUIRED)
+find_package(doctest REQUIRED)
+find_package(PkgConfig REQUIRED)
+pkg_check_modules(HWY REQUIRED IMPORTED_TARGET libhwy)
+pkg_check_modules(TINYXML2 REQUIRED IMPORTED_TARGET tinyxml2)
+find_package(iceoryx_posh CONFIG REQUIRED)
+find_package(iceoryx_hoofs CONFIG REQUIRED)
+
+add_library(takt_eigen INTERFACE)
+target_include_directories(takt_eigen SYSTEM INTERFACE ${EIGEN3_INCLUDE_DIRS} /usr/include/eigen3)
+add_library(takt_opencv INTERFACE)
+target_include_directories(takt_opencv SYSTEM INTERFACE ${OpenCV_INCLUDE_DIRS})
+target_link_libraries(takt_opencv INTERFACE ${OpenCV_LIBS})

@@ -1,0 +1,25 @@
+# SPDX-License-Identifier: Apache-2.0
+# Flags that every target of the project shares.
+
+find_program(TAKT_CCACHE ccache)
+if(TAKT_CCACHE)
+  set(CMAKE_C_COMPILER_LAUNCHER ${TAKT_CCACHE})
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${TAKT_CCACHE})
+endif()
+
+# Contraction off: results must not depend on whether the compiler found an FMA (bit-exact replay).
+add_compile_options(-Wall -Wextra -Wpedantic -Wconversion -Werror -ffp-contract=off -fno-math-errno)
+include_directories(${PROJECT_SOURCE_DIR})
+
+set(TAKT_SANITIZE "" CACHE STRING "Sanitizers to build with: address,undefined or thread")
+if(TAKT_SANITIZE)
+  add_compile_options(-fsanitize=${TAKT_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
+  add_link_options(-fsanitize=${TAKT_SANITIZE})
+endif()
+
+# One library per room: takt_room(stereo SOURCES a.cpp b.cpp USES takt_rt opencv_core)
+function(takt_room name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;USES" ${ARGN})
+  add_library(takt_${name} STATIC ${ARG_SOURCES})
+  target_link_libraries(takt_${name} PUBLIC ${ARG_USES})
+endfunction()

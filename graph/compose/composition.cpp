@@ -1,0 +1,201 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "graph/compose/composition.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+
+#include "graph/compose/plan_ports.hpp"
+#include "rt/sched/port_access.hpp"
+
+namespace takt::graph {
+namespace {
+
+constexpr int64_t kSecond = 1'000'000'000;
+
+/// Ports of the plan by name.
+using PortIndex = std::map<std::string, size_t>;
+
+template <class Ports>
+size_t index_of(const Ports& ports, std::string_view name) {
+  for (size_t i = 0; i < ports.size(); ++i) {
+    if (ports[i]->name() == name) return i;
+  }
+  return kNone;
+}
+
+class Composer {
+ public:
+  Composer(const GraphSpec& graph, const NodeTypes& types, const Clock& clock, const ComposeOptions& options)
+      : graph_(graph), types_(types), clock_(clock), options_(options) {}
+
+  tl::expected<Composition, ComposeError> compose(const DeviceFactory& make_device) {
+    if (auto made = make_devices(make_device); !made) return tl::make_unexpected(made.error());
+    make_nodes();
+    connect();
+    if (auto ready = set_up(); !ready) return tl::make_unexpected(ready.error());
+    for (auto& port : result_.plan.ports) port.capacity = output_of(port).capacity();
+    size_ports(result_.plan);
+    result_.plan.policy = graph_.schedule.policy;
+    result_.plan.cores = graph_.schedule.cores;
+    result_.plan.mode = graph_.mode;
+    return std::move(result_);
+  }
+
+ private:
+  tl::expected<void, ComposeError> make_devices(const DeviceFactory& make_device) {
+    for (const DeviceSpec& device : graph_.devices) {
+      auto node = make_device(device);
+      if (!node) return tl::make_unexpected(node.error());
+      add(device.id, std::move(*node), true, device.position);
+      if (auto& task = result_.plan.tasks.back(); !task.rate && task.on_task == kNone) task.rate = device.rate;
+    }
+    return {};
+  }
+
+  void make_nodes() {
+    for (const NodeSpec& spec : graph_.nodes) {
+      std::unique_ptr<Node> node = types_.find(spec.type)->make();
+      for (ParamBase* param : node->params()) {
+        // Ranges were checked when the graph was loaded; a refusal here is a bug in the checker.
+        if (const auto it = spec.params.find(std::string(param->name())); it != spec.params.end())
+          if (!param->set(it->second.value)) std::abort();
+      }
+      add(spec.id, std::move(node), false, spec.position);
+    }
+  }
+
+  void add(const std::string& id, std::unique_ptr<Node> node, bool device, const Position& position) {
+    TaskPlan task;
+    task.name = id;
+    task.node = node.get();
+    task.device = device;
+    if (const auto it = graph_.schedule.entries.find(id); it != graph_.schedule.entries.end()) fill(task, it->second);
+    for (const OutputPort* output : node->outputs()) {
+      port_index_[id + "." + std::string(output->name())] = result_.plan.ports.size();
+      task.ports.push_back(result_.plan.ports.size());
+      PortPlan port;
+      port.node = id;
+      port.port = output->name();
+      port.type = &output->type();
+      result_.plan.ports.push_back(port);
+    }
+    task_index_[id] = result_.plan.tasks.size();
+    positions_.push_back(position);
+    result_.plan.tasks.push_back(std::move(task));
+    result_.nodes.push_back(std::move(node));
+  }
+
+  static void fill(TaskPlan& task, const ScheduleEntry& entry) {
+    task.rate = entry.rate;
+    task.every = entry.every;
+    task.min_interval_ns = entry.min_interval_ns;
+    task.offset_ns = entry.offset_ns;
+    task.deadline_ns = entry.deadline_ns;
+    task.budget_ns = entry.budget_ns;
+    task.criticality = entry.criticality;
+    task.on_overrun = entry.on_overrun;
+    task.on_miss = entry.on_miss;
+    task.publish = entry.publish;
+  }
+
+  void connect() {
+    for (const NodeSpec& spec : graph_.nodes) connect_inputs(result_.plan.tasks[task_index_.at(spec.id)], spec);
+    for (auto& task : result_.plan.tasks) {
+      const auto it = graph_.schedule.entries.find(task.name);
+      if (it == graph_.schedule.entries.end() || !it->second.on) continue;
+      task.on_task = task_index_.at(it->second.on->node);
+      task.on_port = port_index_.at(it->second.on->text());
+    }
+    for (size_t t = 0; t < result_.plan.tasks.size(); ++t) {
+      TaskPlan& task = result_.plan.tasks[t];
+      if (task.deadline_ns > 0) continue;
+      const double rate = effective_rate_hz(result_.plan, t);
+      task.deadline_ns = rate > 0 ? static_cast<int64_t>(1e9 / rate) : kSecond;
+    }
+  }
+
+  void connect_inputs(TaskPlan& task, const NodeSpec& spec) {
+    for (const EdgeSpec& edge : spec.edges) {
+      const size_t input = index_of(task.node->inputs(), edge.input);
+      const size_t port = port_index_.at(edge.from.text());
+      task.edges.push_back({input, port, static_cast<uint32_t>(edge.depth), edge.max_age_ns.value_or(0)});
+      OutputPort& output = output_of(result_.plan.ports[port]);
+      PortAccess::mark_read(output);
+      result_.edge_names_from.push_back(edge.from.text());
+      result_.edge_names_to.push_back(spec.id + "." + edge.input);
+    }
+    for (const auto& group : spec.joins) {
+      std::vector<size_t> inputs;
+      for (const std::string& name : group) inputs.push_back(index_of(task.node->inputs(), name));
+      task.joins.push_back(std::move(inputs));
+    }
+  }
+
+  OutputPort& output_of(const PortPlan& port) {
+    Node& node = *result_.nodes[task_index_.at(port.node)];
+    return *node.outputs()[index_of(node.outputs(), port.port)];
+  }
+
+  /// Producers before consumers, so that an input's capacity is known when its node is set up; in a cycle, file order.
+  std::vector<size_t> setup_order() const {
+    std::vector<size_t> order;
+    std::vector<char> done(result_.plan.tasks.size(), 0);
+    const auto ready = [&](const TaskPlan& task) {
+      return std::all_of(task.edges.begin(), task.edges.end(), [&](const EdgePlan& edge) {
+        return done[task_index_.at(result_.plan.ports[edge.port].node)] != 0;
+      });
+    };
+    while (order.size() < result_.plan.tasks.size()) {
+      size_t next = kNone;
+      for (size_t t = 0; t < done.size(); ++t) {
+        if (done[t]) continue;
+        if (ready(result_.plan.tasks[t])) {
+          next = t;
+          break;
+        }
+        if (next == kNone) next = t;
+      }
+      done[next] = 1;
+      order.push_back(next);
+    }
+    return order;
+  }
+
+  tl::expected<void, ComposeError> set_up() {
+    ComposeError error;
+    for (const size_t t : setup_order()) {
+      TaskPlan& task = result_.plan.tasks[t];
+      for (const EdgePlan& edge : task.edges)
+        PortAccess::connect(*task.node->inputs()[edge.input], output_of(result_.plan.ports[edge.port]).capacity());
+      Setup setup{clock_, graph_.directory, options_.output, options_.seed + t, effective_rate_hz(result_.plan, t)};
+      try {
+        task.node->setup(setup);
+      } catch (const std::exception& problem) {
+        error.problems.push_back({positions_[t], fmt::format("{}: {}", task.name, problem.what())});
+      }
+    }
+    if (!error.problems.empty()) return tl::make_unexpected(std::move(error));
+    return {};
+  }
+
+  const GraphSpec& graph_;
+  const NodeTypes& types_;
+  const Clock& clock_;
+  const ComposeOptions& options_;
+  Composition result_;
+  PortIndex port_index_;
+  std::map<std::string, size_t> task_index_;
+  std::vector<Position> positions_;
+};
+
+}  // namespace
+
+tl::expected<Composition, ComposeError> compose(const GraphSpec& graph, const NodeTypes& types,
+                                                const DeviceFactory& make_device, const Clock& clock,
+                                                const ComposeOptions& options) {
+  return Composer(graph, types, clock, options).compose(make_device);
+}
+
+}  // namespace takt::graph

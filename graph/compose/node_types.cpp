@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+// The one place that names every processing node; a new node folder adds its line here.
+#include "graph/compose/composition.hpp"
+
+namespace takt {
+void register_stereo(NodeTypes& types);
+void register_ego_motion(NodeTypes& types);
+void register_mapping_3d(NodeTypes& types);
+void register_picture(NodeTypes& types);
+}  // namespace takt
+
+namespace takt::graph {
+
+NodeTypes node_types() {
+  NodeTypes types;
+  register_stereo(types);
+  register_ego_motion(types);
+  register_mapping_3d(types);
+  register_picture(types);
+  return types;
+}
+
+}  // namespace takt::graph

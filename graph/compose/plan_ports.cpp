@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "graph/compose/plan_ports.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace takt::graph {
+namespace {
+
+/// Messages a producer can publish within a span, at most.
+uint32_t messages_within(int64_t span_ns, double rate_hz) {
+  return static_cast<uint32_t>(std::ceil(static_cast<double>(span_ns) * 1e-9 * rate_hz)) + 1;
+}
+
+bool joined(const TaskPlan& task, const EdgePlan& edge) {
+  return std::any_of(task.joins.begin(), task.joins.end(), [&](const auto& group) {
+    return std::find(group.begin(), group.end(), edge.input) != group.end();
+  });
+}
+
+size_t producer_of(const Plan& plan, size_t port) {
+  for (size_t t = 0; t < plan.tasks.size(); ++t) {
+    const auto& ports = plan.tasks[t].ports;
+    if (std::find(ports.begin(), ports.end(), port) != ports.end()) return t;
+  }
+  return kNone;
+}
+
+}  // namespace
+
+double effective_rate_hz(const Plan& plan, size_t task) {
+  double divisor = 1;
+  for (size_t hops = 0; hops <= plan.tasks.size() && task != kNone; ++hops) {
+    const TaskPlan& t = plan.tasks[task];
+    if (t.rate) return t.rate->hz() / divisor;
+    divisor *= t.every;
+    task = t.on_task;
+  }
+  return 0;
+}
+
+void size_ports(Plan& plan) {
+  // A join looks for equal stamps among outputs of different latency: keep as many messages as the slowest of them may
+  // lag behind the fastest, here the longest deadline of any task.
+  int64_t longest_deadline = 0;
+  for (const TaskPlan& task : plan.tasks) longest_deadline = std::max(longest_deadline, task.deadline_ns);
+  for (const TaskPlan& task : plan.tasks) {
+    for (const EdgePlan& edge : task.edges) {
+      PortPlan& port = plan.ports[edge.port];
+      const size_t producer = producer_of(plan, edge.port);
+      const double rate = effective_rate_hz(plan, producer);
+      const int64_t not_yet_visible = plan.tasks[producer].deadline_ns;
+      uint32_t history = edge.depth + messages_within(task.deadline_ns, rate) + messages_within(not_yet_visible, rate);
+      if (joined(task, edge)) history += messages_within(std::min<int64_t>(longest_deadline, 500'000'000), rate);
+      port.history = std::max(port.history, history);
+      port.held += edge.depth;
+      ++port.readers;
+    }
+  }
+}
+
+}  // namespace takt::graph

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+// A YAML file as JSON plus the position of every key and value. The YAML subset is the one on which all YAML readers
+// agree: no anchors, aliases, tags, merge keys, second documents, no `010`, `0x10`, `1:30`, `yes`, `no`.
+#pragma once
+#include <filesystem>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <string_view>
+#include <tl/expected.hpp>
+#include <vector>
+
+#include "graph/language/graph.hpp"
+
+namespace takt::graph {
+
+/// Where one value stands and how it was written.
+struct Mark {
+  Position key;          ///< of its key; of the value itself for list items and the root
+  Position value;
+  std::string raw;       ///< a scalar as it stands in the file, before ${TAKT_DATA} is expanded
+};
+
+class Document {
+ public:
+  std::string file;
+  nlohmann::json root;                ///< null if the file could not be read at all
+  std::map<std::string, Mark> marks;  ///< by JSON pointer (RFC 6901)
+
+  /// Position of the value; of its nearest parent if there is none.
+  Position value_at(const std::string& pointer) const;
+  Position key_at(const std::string& pointer) const;
+  /// A scalar as it was written ("7.50"), "" for anything else.
+  std::string raw(const std::string& pointer) const;
+
+ private:
+  const Mark* mark_near(const std::string& pointer) const;
+};
+
+/// "/devices" + "a/b" -> "/devices/a~1b".
+std::string child(const std::string& pointer, std::string_view key);
+std::string child(const std::string& pointer, size_t index);
+
+/// Reads and parses; what is wrong is appended to `problems` (all that can be found), each with its position.
+/// `wanted_from` is where the file was asked for, for the error if it cannot be read.
+Document read_document(const std::filesystem::path& file, const Position& wanted_from, std::vector<Problem>& problems);
+/// The same for text already in memory; `name` stands in the positions, relative paths start at `directory`.
+Document parse_document(std::string_view text, const std::string& name, const std::filesystem::path& directory,
+                        std::vector<Problem>& problems);
+
+/// A plain (unquoted) scalar as JSON, or why YAML readers disagree about it.
+tl::expected<nlohmann::json, std::string> resolve_scalar(const std::string& text);
+
+/// Replaces ${TAKT_DATA} by the environment variable (which must be set) and ${TAKT_DATA:-path} by the variable or, if
+/// it is unset, by the path relative to `directory`.
+tl::expected<std::string, std::string> expand_variables(const std::string& text,
+                                                        const std::filesystem::path& directory);
+
+}  // namespace takt::graph

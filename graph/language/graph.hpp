@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: Apache-2.0
+// The graph language as plain data: what a graph file and its schedule say, with the position of each word.
+#pragma once
+#include <filesystem>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "rt/param.hpp"
+#include "rt/sched/plan.hpp"
+#include "rt/time/rate.hpp"
+
+namespace takt::graph {
+
+/// Where a word stands; line and column count from 1 (0: no position, e.g. the command line).
+struct Position {
+  std::string file;
+  int line = 0, column = 0;
+};
+
+/// One thing wrong with the input. `text` names the id at fault, the value and the valid choices.
+struct Problem {
+  Position position;
+  std::string text;
+};
+/// "file:line:column: error: text".
+std::string to_string(const Problem& problem);
+
+/// node.port or device.port.
+struct PortName {
+  std::string node, port;
+  bool operator==(const PortName&) const = default;
+  std::string text() const { return node + "." + port; }
+};
+
+struct EdgeSpec {
+  PortName from;
+  std::string input;
+  int depth = 1;
+  std::optional<int64_t> max_age_ns;
+  Position position;
+};
+
+struct ParamSpec {
+  ParamValue value;  ///< converted to the unit the parameter declares
+  Position position;
+};
+
+struct NodeSpec {
+  std::string id, type, subsystem;
+  std::vector<EdgeSpec> edges;
+  std::vector<std::vector<std::string>> joins;  ///< groups of input names
+  std::map<std::string, ParamSpec> params;
+  Position position;
+};
+
+/// A device with the driver and settings of the chosen profile. Settings are converted to SI units.
+struct DeviceSpec {
+  std::string id, kind, driver;
+  std::optional<Rate> rate;
+  nlohmann::json settings = nlohmann::json::object();
+  Position position;
+};
+
+using takt::Criticality;
+using takt::OnMiss;
+using takt::OnOverrun;
+using takt::Policy;
+using takt::PublishAt;
+
+/// What the schedule says of one node or device.
+struct ScheduleEntry {
+  std::optional<Rate> rate;
+  std::optional<PortName> on;
+  int every = 1;
+  int64_t min_interval_ns = 0;
+  int64_t offset_ns = 0;
+  int64_t deadline_ns = 0;  ///< 0: one period
+  int64_t budget_ns = 0;    ///< 0: not stated
+  Criticality criticality = Criticality::low;
+  OnOverrun on_overrun = OnOverrun::proceed;
+  OnMiss on_miss = OnMiss::proceed;
+  PublishAt publish = PublishAt::asap;
+  Position position;
+};
+
+struct ScheduleSpec {
+  std::string name, file;
+  Policy policy = Policy::deadline;
+  std::vector<int> cores;
+  std::map<std::string, ScheduleEntry> entries;  ///< by node or device id
+};
+
+struct ChainSpec {
+  std::string name;
+  PortName from, to;
+  int64_t max_age_ns = 0;
+  Position position;
+};
+
+struct ModeSpec {
+  std::string name;
+  std::vector<std::string> without;
+  Position position;
+};
+
+struct SubsystemSpec {
+  std::string name;
+  std::vector<PortName> exports;
+  Position position;
+};
+
+struct GraphSpec {
+  std::string name, file, profile, mode = "full";
+  std::filesystem::path directory;
+  std::string isolation = "none";  ///< none | subsystem
+  std::vector<DeviceSpec> devices;
+  std::vector<NodeSpec> nodes;
+  std::vector<SubsystemSpec> subsystems;
+  std::vector<ChainSpec> chains;
+  std::vector<ModeSpec> modes;
+  ScheduleSpec schedule;
+  std::vector<std::string> adjusted;  ///< what validation changed, for stderr and the report
+};
+
+/// What the command line adds to the files.
+struct LoadOptions {
+  std::string profile;                        ///< "": the graph's default_profile, else sim
+  std::optional<std::filesystem::path> schedule;
+  std::string policy;                         ///< "": the schedule's
+  std::string mode = "full";
+  std::vector<std::string> set;               ///< "node.param=value"
+};
+
+}  // namespace takt::graph
+
+namespace takt {
+class NodeTypes;
+}
+
+namespace takt::graph {
+
+struct Loaded {
+  std::optional<GraphSpec> graph;  ///< present exactly if there is no problem
+  std::vector<Problem> problems;
+};
+
+/// Reads the graph and its schedule, checks all of it (syntax, schema, ids, types, units, ranges, hierarchy, cycles) and
+/// returns every problem, not just the first. Never throws.
+Loaded load(const std::filesystem::path& file, const LoadOptions& options, const NodeTypes& types);
+
+}  // namespace takt::graph

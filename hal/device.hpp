@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <string>
+#include <tl/expected.hpp>
+
+namespace takt {
+
+/// Why a device could not be opened or started. `what` names the file (with its line where there is one) and the value
+/// at fault, `fix` the next step of the person who reads it.
+struct DeviceError {
+  std::string id;    ///< the device's id in the graph
+  std::string what;
+  std::string fix;
+  std::string text() const { return id + ": " + what + (fix.empty() ? "" : "\n  fix: " + fix); }
+};
+
+using DeviceResult = tl::expected<void, DeviceError>;
+
+inline tl::unexpected<DeviceError> device_error(std::string id, std::string what, std::string fix) {
+  return tl::unexpected(DeviceError{std::move(id), std::move(what), std::move(fix)});
+}
+
+/// What a read found. A read never throws and never blocks beyond its deadline.
+enum class ReadStatus : uint8_t {
+  ok,            ///< the views hold new data
+  no_data,       ///< nothing new before the deadline; the views are untouched
+  partial,       ///< data arrived damaged or short; the views hold what there was
+  disconnected,  ///< the device is gone; the driver goes on trying, a later read may succeed
+  end_of_data,   ///< a replayed source is exhausted; every later read says so too
+};
+
+inline const char* to_text(ReadStatus status) {
+  switch (status) {
+    case ReadStatus::ok: return "ok";
+    case ReadStatus::no_data: return "no_data";
+    case ReadStatus::partial: return "partial";
+    case ReadStatus::disconnected: return "disconnected";
+    case ReadStatus::end_of_data: return "end_of_data";
+  }
+  return "?";
+}
+
+/// The life of every device: constructed (settings only) -> open() (claims hardware or files, checks everything,
+/// allocates everything) -> start(epoch) -> read ... -> stop() -> close(). open, start, stop and close run on the thread
+/// that composes the graph, before and after jobs; reads, triggers and commands on the job thread of the one node that owns
+/// the device, and they neither allocate nor lock (drivers of real hardware: one bounded read of a descriptor). All
+/// stamps are CLOCK_MONOTONIC nanoseconds of the Clock that the driver was constructed with.
+class Device {
+ public:
+  Device() = default;
+  Device(const Device&) = delete;
+  Device& operator=(const Device&) = delete;
+  virtual ~Device() = default;
+
+  virtual DeviceResult open() = 0;
+  virtual void close() = 0;
+  /// `epoch_ns` is the first planned instant of the run: sources that own their time line (replay, sim) begin there.
+  virtual DeviceResult start(int64_t epoch_ns) = 0;
+  virtual void stop() = 0;
+};
+
+}  // namespace takt

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <array>
+#include <vector>
+
+#include "hal/sim/texture.hpp"
+
+namespace takt::sim {
+
+using Vec2 = Eigen::Vector2d;
+using Vec3 = Eigen::Vector3d;
+using Mat3 = Eigen::Matrix3d;
+
+/// Flat textured quadrilateral in the map frame, seen from the side its normal points to.
+/// Texture coordinates in metres: u = u_axis . P + u_offset, v likewise.
+struct Quad {
+  std::array<Vec3, 4> corner;  ///< counter-clockwise as seen from the front
+  Vec3 normal;
+  Vec3 u_axis, v_axis;
+  double u_offset = 0, v_offset = 0;
+  Material material = Material::plaster;
+  double gain = 1;  ///< illumination of the face
+};
+
+/// Cylinder with half-sphere ends, in the map frame.
+struct Capsule {
+  Vec3 a, b;
+  double radius = 0;
+  Material material = Material::cloth;
+};
+
+/// What the renderer draws.
+struct Scene {
+  std::vector<Quad> quads;
+  std::vector<Capsule> capsules;
+  std::shared_ptr<const TextureSet> textures;
+};
+
+/// Quad with its normal and texture axes (metres along the horizontal edge and along the other edge).
+Quad make_quad(const std::array<Vec3, 4>& corners, Material material, double offset = 0);
+/// The five visible faces of a box standing on height z.
+void add_box(Scene& scene, const Vec3& centre_on_ground, const Vec3& size, double yaw_rad, Material material);
+/// A standing person of `height` metres made of capsules; the right arm points to `pointing_rad` (map azimuth) if asked.
+void add_person(Scene& scene, const Vec2& position, double yaw_rad, double height, bool points, double pointing_rad);
+
+}  // namespace takt::sim

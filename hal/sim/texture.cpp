@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "hal/sim/texture.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "hal/sim/random.hpp"
+
+namespace takt::sim {
+namespace {
+
+struct Recipe {
+  std::string_view name;
+  int size;
+  double texels_per_m;
+  std::array<double, 3> bgr;   ///< mean colour
+  double contrast;             ///< of the luminance noise
+  double tint;                 ///< of the colour noise
+  int rectangles;
+};
+
+constexpr std::array<Recipe, kMaterials> kRecipes{{
+    {"sky", 16, 1, {200, 190, 180}, 0, 0, 0},
+    {"floor", 1024, 250, {95, 105, 112}, 46, 6, 0},
+    {"plaster", 1024, 250, {150, 165, 170}, 40, 10, 120},
+    {"ceiling", 512, 160, {190, 195, 195}, 30, 4, 0},
+    {"wood", 512, 300, {60, 100, 150}, 40, 10, 0},
+    {"cardboard", 512, 300, {90, 130, 160}, 44, 8, 30},
+    {"poster", 512, 300, {120, 120, 120}, 22, 30, 160},
+    {"cloth", 256, 250, {120, 70, 60}, 36, 14, 0},
+    {"skin", 256, 250, {130, 155, 205}, 22, 6, 0},
+}};
+
+/// Value noise of one octave with smooth interpolation; periodic with `cells`.
+void add_octave(std::vector<float>& field, int size, int cells, uint64_t seed, float amplitude) {
+  const int pitch = size / cells;
+  std::vector<float> lattice(static_cast<size_t>(cells) * static_cast<size_t>(cells));
+  for (size_t i = 0; i < lattice.size(); ++i) lattice[i] = static_cast<float>(uniform(mix(seed, i)) * 2.0 - 1.0) * amplitude;
+  const auto at = [&](int x, int y) { return lattice[static_cast<size_t>((y % cells) * cells + x % cells)]; };
+  for (int y = 0; y < size; ++y) {
+    const int cy = y / pitch;
+    const float ty = static_cast<float>(y % pitch) / static_cast<float>(pitch);
+    const float wy = ty * ty * (3 - 2 * ty);
+    for (int x = 0; x < size; ++x) {
+      const int cx = x / pitch;
+      const float tx = static_cast<float>(x % pitch) / static_cast<float>(pitch);
+      const float wx = tx * tx * (3 - 2 * tx);
+      const float top = at(cx, cy) + wx * (at(cx + 1, cy) - at(cx, cy));
+      const float bottom = at(cx, cy + 1) + wx * (at(cx + 1, cy + 1) - at(cx, cy + 1));
+      field[static_cast<size_t>(y * size + x)] += top + wy * (bottom - top);
+    }
+  }
+}
+
+std::vector<float> noise(int size, uint64_t seed, int coarsest_cells) {
+  std::vector<float> field(static_cast<size_t>(size) * static_cast<size_t>(size), 0.0f);
+  // Amplitudes fall slowly towards fine octaves: the camera sees other octaves at other distances, and each must do.
+  float amplitude = 1.0f;
+  for (int cells = coarsest_cells; cells <= size / 2; cells *= 2) {
+    add_octave(field, size, cells, mix(seed, static_cast<uint64_t>(cells)), amplitude);
+    amplitude *= 0.88f;
+  }
+  return field;
+}
+
+uint32_t pack(double b, double g, double r) {
+  const auto byte = [](double v) { return static_cast<uint32_t>(std::clamp(std::lround(v), 0l, 255l)); };
+  return byte(b) | byte(g) << 8 | byte(r) << 16;
+}
+
+/// Random coloured rectangles: strong corners for feature trackers.
+void add_rectangles(Texture& texture, int count, uint64_t seed) {
+  const int size = texture.size;
+  for (int k = 0; k < count; ++k) {
+    const auto draw = [&](uint64_t what, int limit) {
+      return static_cast<int>(mix(seed, static_cast<uint64_t>(k), what) % static_cast<uint64_t>(limit));
+    };
+    const int x0 = draw(1, size), y0 = draw(2, size), w = 8 + draw(3, size / 10), h = 8 + draw(4, size / 10);
+    const uint32_t colour = static_cast<uint32_t>(mix(seed, static_cast<uint64_t>(k), 5)) & 0xFFFFFF;
+    for (int y = y0; y < y0 + h; ++y) {
+      for (int x = x0; x < x0 + w; ++x) {
+        uint32_t& texel = texture.texels[static_cast<size_t>((y % size) * size + x % size)];
+        // Half the noise stays visible, so that the inside of a rectangle can still be matched.
+        texel = ((texel & 0xFEFEFE) >> 1) + ((colour & 0xFEFEFE) >> 1);
+      }
+    }
+  }
+}
+
+void build_levels(Texture& texture) {
+  int size = texture.size;
+  for (int level = 1; level < Texture::kLevels; ++level) {
+    const auto from = static_cast<size_t>(texture.offset[static_cast<size_t>(level - 1)]);
+    const int next = std::max(1, size / 2);
+    texture.offset[static_cast<size_t>(level)] = static_cast<int32_t>(texture.texels.size());
+    for (int y = 0; y < next; ++y) {
+      for (int x = 0; x < next; ++x) {
+        uint32_t mean = 0;
+        for (int channel = 0; channel < 24; channel += 8) {
+          uint32_t sum = 2;
+          for (int k = 0; k < 4; ++k) {
+            const int sx = std::min(2 * x + (k & 1), size - 1), sy = std::min(2 * y + (k >> 1), size - 1);
+            sum += texture.texels[from + static_cast<size_t>(sy * size + sx)] >> channel & 255;
+          }
+          mean |= (sum / 4) << channel;
+        }
+        texture.texels.push_back(mean);
+      }
+    }
+    size = next;
+  }
+}
+
+Texture make_texture(const Recipe& recipe, uint64_t seed) {
+  Texture texture;
+  texture.size = recipe.size;
+  texture.texels_per_m = recipe.texels_per_m;
+  const auto count = static_cast<size_t>(recipe.size) * static_cast<size_t>(recipe.size);
+  texture.texels.reserve(count * 3 / 2);
+  texture.texels.resize(count, pack(recipe.bgr[0], recipe.bgr[1], recipe.bgr[2]));
+  if (recipe.contrast > 0) {
+    const auto light = noise(recipe.size, mix(seed, 1), 8);
+    const auto tint = noise(recipe.size, mix(seed, 2), 4);
+    for (size_t i = 0; i < count; ++i) {
+      const double l = recipe.contrast * static_cast<double>(light[i]);
+      const double t = recipe.tint * static_cast<double>(tint[i]);
+      texture.texels[i] = pack(recipe.bgr[0] + l + t, recipe.bgr[1] + l, recipe.bgr[2] + l - t);
+    }
+    add_rectangles(texture, recipe.rectangles, mix(seed, 3));
+  }
+  build_levels(texture);
+  return texture;
+}
+
+}  // namespace
+
+bool material_from(std::string_view name, Material& material) {
+  for (size_t i = 0; i < kRecipes.size(); ++i) {
+    if (kRecipes[i].name != name) continue;
+    material = static_cast<Material>(i);
+    return true;
+  }
+  return false;
+}
+
+std::string_view material_names() { return "sky, floor, plaster, ceiling, wood, cardboard, poster, cloth, skin"; }
+
+std::shared_ptr<const TextureSet> make_textures(uint64_t seed) {
+  auto set = std::make_shared<TextureSet>();
+  for (size_t i = 0; i < kRecipes.size(); ++i) (*set)[i] = make_texture(kRecipes[i], mix(seed, i));
+  return set;
+}
+
+}  // namespace takt::sim

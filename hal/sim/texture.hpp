@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <string_view>
+#include <vector>
+
+namespace takt::sim {
+
+/// A square, periodic colour texture with its mip levels (each the 2 x 2 box mean of the one before), one BGR texel in
+/// the low three bytes of a word.
+struct Texture {
+  static constexpr int kLevels = 8;
+  int size = 0;  ///< of level 0, a power of two
+  double texels_per_m = 0;
+  std::array<int32_t, kLevels> offset{};
+  std::vector<uint32_t> texels;
+};
+
+enum class Material : uint8_t { sky, floor, plaster, ceiling, wood, cardboard, poster, cloth, skin };
+constexpr int kMaterials = 9;
+/// "wood" and the like; false if the name is unknown.
+bool material_from(std::string_view name, Material& material);
+std::string_view material_names();
+
+/// All materials of one seed: multi-octave hash noise (and random rectangles on posters), rich at every scale that a
+/// 640 x 480 camera resolves between 0.3 m and 15 m, so that a window of 15 px has texture to match.
+using TextureSet = std::array<Texture, kMaterials>;
+std::shared_ptr<const TextureSet> make_textures(uint64_t seed);
+
+}  // namespace takt::sim

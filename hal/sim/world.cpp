@@ -1,0 +1,230 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "hal/sim/world.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <sstream>
+
+namespace takt::sim {
+namespace {
+
+constexpr int kMaxSide = 4000;
+
+Quad wall(const Vec2& from, const Vec2& to, double height, Material material) {
+  const Vec3 a(from.x(), from.y(), 0), b(to.x(), to.y(), 0), up(0, 0, height);
+  // The offset depends on the place, so that parallel walls show different parts of the texture.
+  return make_quad({a, b, b + up, a + up}, material, 0.173 * (from.x() + 3.1 * from.y()));
+}
+
+/// Borders between free and occupied cells along one axis, merged to straight runs. A wall's front looks to the free side.
+void add_walls(const World& world, Scene& scene) {
+  const Bitmap& map = world.map;
+  const double cell = map.cell_m;
+  for (const bool horizontal : {true, false}) {
+    const int lines = horizontal ? map.height : map.width, length = horizontal ? map.width : map.height;
+    const auto occupied = [&](int along, int across) { return horizontal ? map.at(along, across) : map.at(across, along); };
+    for (int line = 0; line <= lines; ++line) {
+      for (const bool free_below : {true, false}) {
+        const auto border = [&](int along) {
+          return along < length && occupied(along, line) == free_below && occupied(along, line - 1) != free_below;
+        };
+        for (int start = 0; start < length; ++start) {
+          if (!border(start)) continue;
+          int end = start + 1;
+          while (border(end)) ++end;
+          const double s = start * cell, e = end * cell, at = line * cell;
+          const Vec2 p = horizontal ? Vec2(s, at) : Vec2(at, s), q = horizontal ? Vec2(e, at) : Vec2(at, e);
+          // Running along +x with up = +z, the normal of make_quad points to -y; along +y it points to +x.
+          const bool forward = horizontal == free_below;
+          scene.quads.push_back(forward ? wall(p, q, world.wall_height_m, world.wall) : wall(q, p, world.wall_height_m, world.wall));
+          start = end;
+        }
+      }
+    }
+  }
+}
+
+/// Distance to the 2-D outline of a box, negative inside the reach of the ray: slab test in the frame of the box.
+double cast_box(const WorldObject& object, const Vec2& origin, const Vec2& direction) {
+  const double c = std::cos(object.yaw_rad), s = std::sin(object.yaw_rad);
+  const Vec2 rel = origin - object.position;
+  const double o[2] = {c * rel.x() + s * rel.y(), -s * rel.x() + c * rel.y()};
+  const double d[2] = {c * direction.x() + s * direction.y(), -s * direction.x() + c * direction.y()};
+  const double half[2] = {object.box->width_m / 2, object.box->depth_m / 2};
+  double near = 0, far = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < 2; ++i) {
+    if (std::abs(d[i]) < 1e-12) {
+      if (std::abs(o[i]) > half[i]) return std::numeric_limits<double>::infinity();
+      continue;
+    }
+    const double t0 = (-half[i] - o[i]) / d[i], t1 = (half[i] - o[i]) / d[i];
+    near = std::max(near, std::min(t0, t1));
+    far = std::min(far, std::max(t0, t1));
+  }
+  return near <= far ? near : std::numeric_limits<double>::infinity();
+}
+
+double cast_sphere(const Vec3& centre, double radius, const Vec3& o, const Vec3& d) {
+  const Vec3 rel = o - centre;
+  const double b = rel.dot(d), h = b * b - rel.squaredNorm() + radius * radius;
+  const double t = -b - std::sqrt(std::max(h, 0.0));
+  return h >= 0 && t > 0 ? t : std::numeric_limits<double>::infinity();
+}
+
+double cast_capsule(const Capsule& capsule, const Vec3& o, const Vec3& d) {
+  const Vec3 axis = capsule.b - capsule.a, rel = o - capsule.a;
+  const double axx = axis.squaredNorm(), ad = axis.dot(d), ar = axis.dot(rel);
+  const double a = axx - ad * ad, b = axx * rel.dot(d) - ar * ad;
+  const double c = axx * rel.squaredNorm() - ar * ar - capsule.radius * capsule.radius * axx;
+  const double h = b * b - a * c;
+  double nearest = std::min(cast_sphere(capsule.a, capsule.radius, o, d), cast_sphere(capsule.b, capsule.radius, o, d));
+  if (h >= 0 && a > 1e-12) {
+    const double t = (-b - std::sqrt(h)) / a, along = ar + t * ad;
+    if (t > 0 && along > 0 && along < axx) nearest = std::min(nearest, t);
+  }
+  return nearest;
+}
+
+/// Exact traversal of the cells on the ray (Amanatides and Woo 1987).
+double cast_map(const Bitmap& map, const Vec2& origin, const Vec2& direction, double max_range) {
+  int column = static_cast<int>(std::floor(origin.x() / map.cell_m)), row = static_cast<int>(std::floor(origin.y() / map.cell_m));
+  if (map.at(column, row)) return 0;
+  const double infinity = std::numeric_limits<double>::infinity();
+  const auto first = [&](double o, double d, int cell) {
+    return d > 0 ? ((cell + 1) * map.cell_m - o) / d : d < 0 ? (cell * map.cell_m - o) / d : infinity;
+  };
+  double tx = first(origin.x(), direction.x(), column), ty = first(origin.y(), direction.y(), row);
+  const double step_x = direction.x() != 0 ? map.cell_m / std::abs(direction.x()) : infinity;
+  const double step_y = direction.y() != 0 ? map.cell_m / std::abs(direction.y()) : infinity;
+  for (;;) {
+    const bool along_x = tx < ty;
+    const double t = along_x ? tx : ty;
+    if (t >= max_range) return max_range;
+    if (along_x) {
+      column += direction.x() > 0 ? 1 : -1;
+      tx += step_x;
+    } else {
+      row += direction.y() > 0 ? 1 : -1;
+      ty += step_y;
+    }
+    if (map.at(column, row)) return t;
+  }
+}
+
+/// Next token of a PGM header, comments skipped.
+std::string token(std::istream& in) {
+  std::string word;
+  while (in >> word) {
+    if (word.front() != '#') return word;
+    std::string rest;
+    std::getline(in, rest);
+  }
+  return "";
+}
+
+}  // namespace
+
+tl::expected<Bitmap, std::string> load_pgm(const std::filesystem::path& file, double cell_m) {
+  std::ifstream in(file, std::ios::binary);
+  if (!in) return tl::unexpected("the map " + file.string() + " cannot be opened");
+  const std::string magic = token(in), width = token(in), height = token(in), peak = token(in);
+  Bitmap map;
+  map.cell_m = cell_m;
+  map.width = std::atoi(width.c_str());
+  map.height = std::atoi(height.c_str());
+  const int maximum = std::atoi(peak.c_str());
+  if ((magic != "P5" && magic != "P2") || map.width < 3 || map.height < 3 || map.width > kMaxSide || map.height > kMaxSide ||
+      maximum < 1 || maximum > 255) {
+    return tl::unexpected("the map " + file.string() + " is no 8-bit PGM of 3..4000 pixels a side");
+  }
+  in.get();
+  map.occupied.resize(static_cast<size_t>(map.width) * static_cast<size_t>(map.height));
+  for (int row = map.height - 1; row >= 0; --row) {
+    for (int column = 0; column < map.width; ++column) {
+      int value = -1;
+      if (magic == "P5") value = in.get();
+      else in >> value;
+      if (!in || value < 0) return tl::unexpected("the map " + file.string() + " ends early");
+      map.occupied[static_cast<size_t>(row * map.width + column)] = 2 * value < maximum ? 1 : 0;
+    }
+  }
+  return map;
+}
+
+tl::expected<Bitmap, std::string> parse_rows(const std::string& text, double cell_m) {
+  std::vector<std::string> rows;
+  std::istringstream in(text);
+  for (std::string row; in >> row;) rows.push_back(row);
+  if (rows.size() < 3 || rows.size() > kMaxSide || rows[0].size() < 3) return tl::unexpected(std::string("<rows> needs at least 3 x 3 cells"));
+  Bitmap map;
+  map.cell_m = cell_m;
+  map.width = static_cast<int>(rows[0].size());
+  map.height = static_cast<int>(rows.size());
+  for (size_t i = rows.size(); i-- > 0;) {
+    if (rows[i].size() != rows[0].size()) {
+      return tl::unexpected("row " + std::to_string(i + 1) + " of <rows> has " + std::to_string(rows[i].size()) + " cells, the first has " +
+                            std::to_string(rows[0].size()));
+    }
+    for (const char c : rows[i]) map.occupied.push_back(c == '#' ? 1 : 0);
+  }
+  return map;
+}
+
+Scene build_scene(const World& world, std::shared_ptr<const TextureSet> textures) {
+  Scene scene;
+  scene.textures = std::move(textures);
+  const double w = world.map.width * world.map.cell_m, h = world.map.height * world.map.cell_m, top = world.wall_height_m;
+  scene.quads.push_back(make_quad({Vec3(0, 0, 0), Vec3(w, 0, 0), Vec3(w, h, 0), Vec3(0, h, 0)}, world.floor));
+  scene.quads.push_back(make_quad({Vec3(0, h, top), Vec3(w, h, top), Vec3(w, 0, top), Vec3(0, 0, top)}, world.ceiling));
+  add_walls(world, scene);
+  for (const WorldObject& object : world.objects) {
+    if (object.box) {
+      add_box(scene, Vec3(object.position.x(), object.position.y(), object.box->z_m),
+              Vec3(object.box->width_m, object.box->depth_m, object.box->height_m), object.yaw_rad, object.box->material);
+    }
+    if (object.person) {
+      add_person(scene, object.position, object.yaw_rad, object.person->height_m, object.person->points, object.person->pointing_rad);
+    }
+  }
+  return scene;
+}
+
+double cast_ray(const World& world, const Scene& scene, const Vec2& origin, const Vec2& direction, double z, double max_range) {
+  double nearest = cast_map(world.map, origin, direction, max_range);
+  for (const WorldObject& object : world.objects) {
+    if (object.box && z >= object.box->z_m && z <= object.box->z_m + object.box->height_m) {
+      nearest = std::min(nearest, cast_box(object, origin, direction));
+    }
+  }
+  const Vec3 o(origin.x(), origin.y(), z), d(direction.x(), direction.y(), 0);
+  for (const Capsule& capsule : scene.capsules) nearest = std::min(nearest, cast_capsule(capsule, o, d));
+  return std::min(nearest, max_range);
+}
+
+bool collides(const World& world, const Vec2& centre, double radius) {
+  const Bitmap& map = world.map;
+  const int reach = static_cast<int>(std::ceil(radius / map.cell_m)) + 1;
+  const int column = static_cast<int>(std::floor(centre.x() / map.cell_m)), row = static_cast<int>(std::floor(centre.y() / map.cell_m));
+  for (int r = row - reach; r <= row + reach; ++r) {
+    for (int c = column - reach; c <= column + reach; ++c) {
+      if (!map.at(c, r)) continue;
+      const double dx = std::max({c * map.cell_m - centre.x(), centre.x() - (c + 1) * map.cell_m, 0.0});
+      const double dy = std::max({r * map.cell_m - centre.y(), centre.y() - (r + 1) * map.cell_m, 0.0});
+      if (dx * dx + dy * dy < radius * radius) return true;
+    }
+  }
+  for (const WorldObject& object : world.objects) {
+    if (object.person && (object.position - centre).norm() < radius + 0.3) return true;
+    if (!object.box || object.box->z_m > 1.8) continue;
+    const double cosine = std::cos(object.yaw_rad), sine = std::sin(object.yaw_rad);
+    const Vec2 rel = centre - object.position;
+    const double dx = std::max(std::abs(cosine * rel.x() + sine * rel.y()) - object.box->width_m / 2, 0.0);
+    const double dy = std::max(std::abs(-sine * rel.x() + cosine * rel.y()) - object.box->depth_m / 2, 0.0);
+    if (dx * dx + dy * dy < radius * radius) return true;
+  }
+  return false;
+}
+
+}  // namespace takt::sim

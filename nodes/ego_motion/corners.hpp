@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+// Shi-Tomasi "good features to track" (thesis Sec. 4.3, step 1): the smaller eigenvalue of the gradient matrix.
+#pragma once
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "nodes/ego_motion/plane.hpp"
+
+namespace takt::ego_motion {
+
+struct CornerParameters {
+  int maximum = 800;        ///< corners kept
+  double quality = 0.005;   ///< least eigenvalue as a share of the largest in the image
+  int distance_px = 5;      ///< least distance of two corners (Chebyshev)
+  int margin_px = 8;        ///< no corner nearer to the border
+  int tile_px = 64;         ///< a tile may hold at most twice its fair share, so that one bush cannot take all corners
+};
+
+struct Corner {
+  int16_t x = 0, y = 0;
+};
+
+/// Finds corners of images of one size. All memory is taken by the constructor; detect() allocates nothing.
+class CornerDetector {
+ public:
+  CornerDetector() = default;
+  CornerDetector(int width, int height, const CornerParameters& parameters);
+
+  /// Strongest corners first. A pixel whose `mask` value is negative cannot be a corner (no disparity there); an empty
+  /// view admits all. The result is valid until the next call.
+  std::span<const Corner> detect(const Plane& image, ImageView<const int16_t> mask = {});
+  /// Smaller eigenvalue of the summed gradient matrix (3 x 3 Sobel, 3 x 3 sum) at each pixel; 0 in a 2 px border.
+  std::span<const float> response() const { return response_; }
+
+  /// The slow, obvious response of one pixel: double loop, same arithmetic in the same order.
+  static float response_reference(const Plane& image, int x, int y);
+
+ private:
+  void gradient_row(const Plane& image, int y);
+  void response_row(int y);
+  void collect(ImageView<const int16_t> mask);
+  std::span<const Corner> select();
+
+  int width_ = 0, height_ = 0;
+  CornerParameters p_;
+  std::vector<float> xx_[3], xy_[3], yy_[3];  // products of the gradients, ring of three rows
+  std::vector<float> sum_xx_, sum_xy_, sum_yy_, peak_;
+  std::vector<float> response_;
+  std::vector<uint64_t> candidates_;  // response bits above, inverted pixel index below: one integer order, no ties
+  std::vector<uint8_t> taken_;        // pixels too near to a chosen corner
+  std::vector<int> in_tile_;
+  std::vector<Corner> corners_;
+  float largest_ = 0;
+};
+
+}  // namespace takt::ego_motion

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "nodes/stereo/image_kernels.hpp"
+
+#include <algorithm>
+
+#include "nodes/stereo/simd_targets.hpp"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "nodes/stereo/image_kernels.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace takt::stereo::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+constexpr hn::ScalableTag<uint8_t> kBytes;
+constexpr hn::ScalableTag<uint16_t> kWords;
+constexpr int kByteLanes = static_cast<int>(hn::MaxLanes(kBytes));
+using Bytes = hn::Vec<decltype(kBytes)>;
+using Words = hn::Vec<decltype(kWords)>;
+
+HWY_INLINE Words weighted(Words b, Words g, Words r) {
+  const Words sum = hn::Add(hn::Add(hn::Mul(b, hn::Set(kWords, 29)), hn::Mul(g, hn::Set(kWords, 150))),
+                            hn::Add(hn::Mul(r, hn::Set(kWords, 77)), hn::Set(kWords, 128)));
+  return hn::ShiftRight<8>(sum);
+}
+
+void grey(const uint8_t* bgr, int count, uint8_t* out) {
+  const Words low = hn::Set(kWords, 0xFF);
+  int i = 0;
+  for (; i + kByteLanes <= count; i += kByteLanes) {
+    Bytes b, g, r;
+    hn::LoadInterleaved3(kBytes, bgr + 3 * i, b, g, r);
+    const Words b16 = hn::BitCast(kWords, b), g16 = hn::BitCast(kWords, g), r16 = hn::BitCast(kWords, r);
+    const Words even = weighted(hn::And(b16, low), hn::And(g16, low), hn::And(r16, low));
+    const Words odd = weighted(hn::ShiftRight<8>(b16), hn::ShiftRight<8>(g16), hn::ShiftRight<8>(r16));
+    hn::StoreU(hn::BitCast(kBytes, hn::Or(even, hn::ShiftLeft<8>(odd))), kBytes, out + i);
+  }
+  for (; i < count; ++i)
+    out[i] = static_cast<uint8_t>((29 * bgr[3 * i] + 150 * bgr[3 * i + 1] + 77 * bgr[3 * i + 2] + 128) >> 8);
+}
+
+void derivative(const uint8_t* before, const uint8_t* after, int count, uint8_t* out) {
+  // (after - before + 256) >> 1 is the rounded mean of after and 255 - before.
+  const Bytes bias = hn::Set(kBytes, 0x80);
+  for (int i = 0; i < count; i += kByteLanes)
+    hn::StoreU(hn::Xor(hn::AverageRound(hn::LoadU(kBytes, after + i), hn::Not(hn::LoadU(kBytes, before + i))), bias), kBytes,
+               out + i);
+}
+
+void channel(const uint8_t* pixels, int channels, int channel, int count, uint8_t bias, uint8_t* out) {
+  for (int i = 0; i < count; ++i) out[i] = static_cast<uint8_t>(pixels[i * channels + channel] ^ bias);
+}
+
+void reverse(const uint8_t* in, int count, uint8_t* out) {
+  for (int i = 0; i < count; ++i) out[i] = in[count - 1 - i];
+}
+
+void spread(const uint8_t* in, int count, uint32_t* out) {
+  for (int i = 0; i < count; ++i) out[i] = in[i] * 0x01010101u;
+}
+
+void minimum_along(const uint32_t* in, int radius, int count, uint32_t* HWY_RESTRICT out) {
+  if (radius == 2) {  // the default, in one pass
+    for (int i = 0; i < count; ++i) {
+      const uint32_t a = in[i - 2] < in[i - 1] ? in[i - 2] : in[i - 1], b = in[i + 2] < in[i + 1] ? in[i + 2] : in[i + 1];
+      const uint32_t c = a < b ? a : b;
+      out[i] = c < in[i] ? c : in[i];
+    }
+    return;
+  }
+  for (int i = 0; i < count; ++i) out[i] = in[i];
+  for (int k = 1; k <= radius; ++k)
+    for (int i = 0; i < count; ++i) {
+      const uint32_t a = in[i - k] < in[i + k] ? in[i - k] : in[i + k];
+      out[i] = a < out[i] ? a : out[i];
+    }
+}
+
+void minimum_with(const uint32_t* HWY_RESTRICT in, int count, uint32_t* HWY_RESTRICT inout) {
+  for (int i = 0; i < count; ++i) inout[i] = in[i] < inout[i] ? in[i] : inout[i];
+}
+
+void decode(const uint32_t* keys, const uint8_t* confidence_table, int min_confidence, int count, int16_t* disparity,
+            uint8_t* confidence) {
+  for (int i = 0; i < count; ++i) {
+    const uint32_t key = keys[i];
+    const uint8_t zeta = confidence_table[key >> 16];
+    const bool reject = (key & 1) != 0 || zeta < min_confidence;
+    confidence[i] = zeta;
+    disparity[i] = reject ? int16_t{-1} : static_cast<int16_t>((key & 0xFFFF) >> 1);
+  }
+}
+
+const ImageKernels& target_image_kernels() {
+  static const ImageKernels table{grey, derivative, channel, reverse, spread, minimum_along, minimum_with, decode};
+  return table;
+}
+
+}  // namespace takt::stereo::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace takt::stereo {
+HWY_EXPORT(target_image_kernels);
+const ImageKernels& image_kernels() { return HWY_DYNAMIC_DISPATCH(target_image_kernels)(); }
+}  // namespace takt::stereo
+#endif

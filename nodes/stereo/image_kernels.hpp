@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+// Internal: vectorised row operations before and after the matching itself. Every row may be written and read up to
+// kRowPadding elements beyond its count.
+#pragma once
+#include <cstdint>
+
+namespace takt::stereo {
+
+constexpr int kRowPadding = 64;
+
+struct ImageKernels {
+  /// BGR to grey (grey_of).
+  void (*grey)(const uint8_t* bgr, int count, uint8_t* out);
+  /// derivative_of(before[i], after[i]) ^ 0x80.
+  void (*derivative)(const uint8_t* before, const uint8_t* after, int count, uint8_t* out);
+  /// Channel `channel` of interleaved pixels, every byte ^ bias.
+  void (*channel)(const uint8_t* pixels, int channels, int channel, int count, uint8_t bias, uint8_t* out);
+  void (*reverse)(const uint8_t* in, int count, uint8_t* out);
+  /// Every byte four times.
+  void (*spread)(const uint8_t* in, int count, uint32_t* out);
+  /// out[i] = min of in[i - radius .. i + radius].
+  void (*minimum_along)(const uint32_t* in, int radius, int count, uint32_t* out);
+  /// inout[i] = min(inout[i], in[i]).
+  void (*minimum_with)(const uint32_t* in, int count, uint32_t* inout);
+  /// Keys (sum << 16 | disparity << 1 | ambiguous) to disparities and confidences; `confidence_table` is indexed by sum.
+  void (*decode)(const uint32_t* keys, const uint8_t* confidence_table, int min_confidence, int count, int16_t* disparity,
+                 uint8_t* confidence);
+};
+
+const ImageKernels& image_kernels();
+
+}  // namespace takt::stereo

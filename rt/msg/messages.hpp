@@ -1,0 +1,221 @@
+// SPDX-License-Identifier: Apache-2.0
+// The message types of the ACE graph. Units are SI unless a name says otherwise. Frames (thesis Fig. 4.11): robot frame
+// x right, y forward, z up; camera frame x right, y down, z forward; map frame z up.
+#pragma once
+#include <array>
+
+#include "rt/msg/field.hpp"
+#include "rt/msg/image_view.hpp"
+
+namespace takt {
+
+/// Pinhole model of a rectified image; all zero while an image is not rectified.
+struct CameraModel {
+  double focal_px = 0, cu_px = 0, cv_px = 0;
+  double baseline_m = 0;  ///< distance of the two optical centres of a rectified stereo pair
+};
+
+/// Rigid transform as translation and unit quaternion: p_parent = R(q) p_child + t.
+struct Transform {
+  double x = 0, y = 0, z = 0;
+  double qw = 1, qx = 0, qy = 0, qz = 0;
+};
+
+/// What a camera driver found out about a frame at capture (bits of `health`).
+namespace image_health {
+constexpr uint32_t saturated = 1, dark = 2, blurred = 4, unchanging = 8, partial = 16;
+}
+
+/// One 8-bit image. Capacity: width, height, channels.
+struct Image {
+  static constexpr std::string_view type_name = "image";
+  int32_t width = 0, height = 0, channels = 0;
+  uint32_t health = 0;
+  CameraModel camera;
+  Array<uint8_t> pixels;  ///< interleaved, BGR if three channels
+
+  ImageView<uint8_t> view() { return {pixels.data(), width, height, channels}; }
+  ImageView<const uint8_t> view() const { return {pixels.data(), width, height, channels}; }
+  static std::span<const Field> fields();
+  static void capacities(const Capacity& c, std::span<uint32_t> a) { a[0] = static_cast<uint32_t>(c.pixels() * c.channels); }
+};
+
+/// Two 8-bit images of one exposure. Raw from a camera, rectified (camera.focal_px > 0) from the stereo node.
+/// Capacity: width, height, channels.
+struct StereoPair {
+  static constexpr std::string_view type_name = "stereo_pair";
+  int32_t width = 0, height = 0, channels = 0;
+  uint32_t health = 0;
+  uint32_t frame_number = 0;  ///< counted by the device; a gap is a frame lost before the host saw it
+  CameraModel camera;
+  Array<uint8_t> left, right;  ///< interleaved, BGR if three channels
+
+  ImageView<uint8_t> left_view() { return {left.data(), width, height, channels}; }
+  ImageView<uint8_t> right_view() { return {right.data(), width, height, channels}; }
+  ImageView<const uint8_t> left_view() const { return {left.data(), width, height, channels}; }
+  ImageView<const uint8_t> right_view() const { return {right.data(), width, height, channels}; }
+  static std::span<const Field> fields();
+  static void capacities(const Capacity& c, std::span<uint32_t> a) {
+    a[0] = a[1] = static_cast<uint32_t>(c.pixels() * c.channels);
+  }
+};
+
+/// Dense disparity of the left rectified image. Capacity: width, height.
+struct DisparityMap {
+  static constexpr std::string_view type_name = "disparity";
+  static constexpr int16_t invalid = -1;
+  int32_t width = 0, height = 0;
+  int32_t disparities = 0;  ///< search range: 0 .. disparities - 1
+  CameraModel camera;
+  Array<int16_t> disparity;   ///< px; left (x, y) is right (x - d, y); `invalid` where rejected
+  Array<uint8_t> confidence;  ///< 0..255 for zeta 0..1 (thesis Eq. 3.6, corrected)
+
+  ImageView<int16_t> view() { return {disparity.data(), width, height}; }
+  ImageView<const int16_t> view() const { return {disparity.data(), width, height}; }
+  ImageView<uint8_t> confidence_view() { return {confidence.data(), width, height}; }
+  ImageView<const uint8_t> confidence_view() const { return {confidence.data(), width, height}; }
+  static std::span<const Field> fields();
+  static void capacities(const Capacity& c, std::span<uint32_t> a) { a[0] = a[1] = static_cast<uint32_t>(c.pixels()); }
+};
+
+struct Point {
+  using scalar = float;
+  float x, y, z;
+};
+struct Colour {
+  using scalar = uint8_t;
+  uint8_t b, g, r;
+};
+
+/// Coloured points in the frame of the sensor. Capacity: count.
+struct PointCloud {
+  static constexpr std::string_view type_name = "point_cloud";
+  Transform sensor_in_robot;
+  CameraModel camera;  ///< of the image the cloud was triangulated from; zero for other sensors
+  Array<Point> points;
+  Array<Colour> colours;  ///< same size as points, or empty
+  static std::span<const Field> fields();
+  static void capacities(const Capacity& c, std::span<uint32_t> a) { a[0] = a[1] = c.count; }
+};
+
+/// One sweep of a laser scanner, in its own plane. Capacity: count (beams).
+struct LaserScan {
+  static constexpr std::string_view type_name = "laser_scan";
+  double first_angle_rad = 0;  ///< of range 0, counter-clockwise from the sensor's forward axis
+  double step_rad = 0;
+  double max_range_m = 0;
+  double sweep_s = 0;  ///< time from the first to the last beam
+  uint32_t scan_number = 0;
+  Transform sensor_in_robot;
+  Array<float> range_m;  ///< 0: no return
+  static std::span<const Field> fields();
+  static void capacities(const Capacity& c, std::span<uint32_t> a) { a[0] = c.count; }
+};
+
+/// State of the mobile base in its drifting odometry frame.
+struct Odometry {
+  static constexpr std::string_view type_name = "odometry";
+  double x_m = 0, y_m = 0, theta_rad = 0;  ///< theta: driving direction from the x axis
+  double speed_m_s = 0, turn_rad_s = 0;
+  static std::span<const Field> fields();
+  static void capacities(const Capacity&, std::span<uint32_t>) {}
+};
+
+/// A pose with its covariance (row-major, order x y z rx ry rz).
+struct Pose {
+  static constexpr std::string_view type_name = "pose";
+  Transform transform;
+  double covariance[36] = {};
+  static std::span<const Field> fields();
+  static void capacities(const Capacity&, std::span<uint32_t>) {}
+};
+
+/// Motion of the camera between two stamps: camera_in_previous maps current camera coordinates into the previous frame.
+struct Motion {
+  static constexpr std::string_view type_name = "motion";
+  int64_t from_stamp_ns = 0;  ///< stamp of the previous frame; the message's own stamp is the current one
+  Transform camera_in_previous;
+  Transform pose;  ///< accumulated since start: current camera in the first camera frame
+  double confidence = 0;
+  double rms_px = 0;
+  int32_t corners = 0, matched = 0, inliers = 0;
+  uint8_t valid = 0;      ///< 0: confidence too low, the motion was predicted instead of measured
+  uint8_t keyframe = 0;   ///< 1: first frame, nothing to compare with
+  static std::span<const Field> fields();
+  static void capacities(const Capacity&, std::span<uint32_t>) {}
+};
+
+struct Detection {
+  using scalar = float;
+  float class_id, x_px, y_px, width_px, height_px, score;
+};
+
+/// Boxes in an image. Capacity: count.
+struct Detections {
+  static constexpr std::string_view type_name = "detections";
+  int32_t image_width = 0, image_height = 0;
+  Array<Detection> boxes;
+  static std::span<const Field> fields();
+  static void capacities(const Capacity& c, std::span<uint32_t> a) { a[0] = c.count; }
+};
+
+/// Two-dimensional occupancy grid. Cell (column, row) covers origin + (column, row) * cell_m. Capacity: width, height.
+struct Grid {
+  static constexpr std::string_view type_name = "grid";
+  static constexpr int16_t unknown = -1;
+  int32_t width = 0, height = 0;
+  double cell_m = 0;
+  double origin_x_m = 0, origin_y_m = 0;
+  Transform grid_in_map;
+  Array<int16_t> cells;  ///< 0 free .. 1000 occupied, `unknown` = -1
+
+  ImageView<int16_t> view() { return {cells.data(), width, height}; }
+  ImageView<const int16_t> view() const { return {cells.data(), width, height}; }
+  static std::span<const Field> fields();
+  static void capacities(const Capacity& c, std::span<uint32_t> a) { a[0] = static_cast<uint32_t>(c.pixels()); }
+};
+
+/// State of the camera head: pan about z (left positive), tilt about x (up positive).
+struct HeadState {
+  static constexpr std::string_view type_name = "head_state";
+  double pan_rad = 0, tilt_rad = 0, roll_rad = 0;
+  double pan_rad_s = 0, tilt_rad_s = 0;
+  uint8_t moving = 0;
+  static std::span<const Field> fields();
+  static void capacities(const Capacity&, std::span<uint32_t>) {}
+};
+
+struct HeadCommand {
+  static constexpr std::string_view type_name = "head_command";
+  double pan_rad = 0, tilt_rad = 0;
+  static std::span<const Field> fields();
+  static void capacities(const Capacity&, std::span<uint32_t>) {}
+};
+
+struct VelocityCommand {
+  static constexpr std::string_view type_name = "velocity_command";
+  double speed_m_s = 0, turn_rad_s = 0;
+  static std::span<const Field> fields();
+  static void capacities(const Capacity&, std::span<uint32_t>) {}
+};
+
+/// Digital inputs, one bit a line (bit 0: line 0).
+struct DigitalState {
+  static constexpr std::string_view type_name = "digital_state";
+  uint32_t levels = 0, changed = 0;
+  static std::span<const Field> fields();
+  static void capacities(const Capacity&, std::span<uint32_t>) {}
+};
+
+/// Human-readable state. Capacity: count (characters).
+struct TextStatus {
+  static constexpr std::string_view type_name = "text_status";
+  Array<char> text;
+  static std::span<const Field> fields();
+  static void capacities(const Capacity& c, std::span<uint32_t> a) { a[0] = c.count; }
+};
+
+/// Every message type of this header, in the order above.
+std::span<const MessageType* const> message_types();
+
+}  // namespace takt

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "rt/node.hpp"
+
+namespace takt {
+
+InputPort::InputPort(Node* owner, std::string_view name, const MessageType& type, std::string_view doc, Need need)
+    : name_(name), doc_(doc), type_(&type), need_(need) {
+  owner->inputs_.push_back(this);
+}
+
+OutputPort::OutputPort(Node* owner, std::string_view name, const MessageType& type, std::string_view doc)
+    : name_(name), doc_(doc), type_(&type) {
+  owner->outputs_.push_back(this);
+}
+
+void* OutputPort::loan_message() {
+  if (loaned_ == nullptr && writer_ != nullptr) loaned_ = writer_->loan();
+  return loaned_ == nullptr ? nullptr : loaned_ + 1;
+}
+
+void OutputPort::send(int64_t stamp_ns) {
+  stamp_ns_ = stamp_ns;
+  sent_ = loaned_ != nullptr;
+}
+
+std::string_view to_string(Layer layer) {
+  switch (layer) {
+    case Layer::sensor: return "sensor";
+    case Layer::perception: return "perception";
+    case Layer::processing: return "processing";
+    case Layer::storage: return "storage";
+  }
+  return "";
+}
+
+const NodeType* NodeTypes::find(std::string_view name) const {
+  const auto it = types_.find(name);
+  return it == types_.end() ? nullptr : &it->second;
+}
+
+void NodeTypes::insert(NodeType type) {
+  const std::string name = type.name;
+  if (!types_.emplace(name, std::move(type)).second) throw std::logic_error("node type " + name + " registered twice");
+}
+
+}  // namespace takt

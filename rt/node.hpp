@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a node author needs: Node, Input<T>, Output<T>, Param<T>, Setup, Job. A node declares its ports and parameters as
+// members; the runtime calls setup() once before start, run() once per job on one thread at a time, finish() after the
+// last job.
+#pragma once
+#include <array>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "rt/msg/messages.hpp"
+#include "rt/param.hpp"
+#include "rt/shm/transport.hpp"
+#include "rt/time/clock.hpp"
+
+namespace takt {
+
+/// Thrown by Node::setup: what the node cannot work with. The graph adds file, line and id.
+struct SetupError : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+/// Given to Node::setup. Only here may a node allocate, read files and throw SetupError.
+struct Setup {
+  const Clock& clock;
+  std::filesystem::path directory;  ///< of the graph file; relative paths start here
+  std::filesystem::path output;     ///< where a node may write files in finish(); exists
+  uint64_t seed = 0;
+  double rate_hz = 0;               ///< planned rate; of the producer for `on` nodes, 0 if unknown
+};
+
+/// One activation of a node. All a job may observe besides its inputs comes from here (and is recorded).
+class Job {
+ public:
+  int64_t release_ns() const { return release_ns_; }    ///< planned release
+  int64_t deadline_ns() const { return deadline_ns_; }  ///< absolute
+  uint64_t index() const { return index_; }             ///< 0, 1, 2 ... per node, skipped releases counted
+  int64_t now_ns() const { return clock_->now_ns(); }
+  int64_t time_left_ns() const { return deadline_ns_ - now_ns(); }
+  int level() const { return level_; }  ///< 0 full quality; higher: the node should do less (on_overrun: degrade)
+  std::string_view mode() const { return mode_; }
+  /// Says that this device's recorded data are used up; the run ends after the jobs under way.
+  void end_of_data() { end_of_data_ = true; }
+  /// Says that the job could not do its work (device silent, input unusable); counted, the run goes on.
+  void no_result() { no_result_ = true; }
+
+  Job(const Clock& clock, uint64_t index, int64_t release_ns, int64_t deadline_ns, int level, std::string_view mode)
+      : clock_(&clock), index_(index), release_ns_(release_ns), deadline_ns_(deadline_ns), level_(level), mode_(mode) {}
+  bool ended() const { return end_of_data_; }
+  bool without_result() const { return no_result_; }
+
+ private:
+  const Clock* clock_;
+  uint64_t index_;
+  int64_t release_ns_, deadline_ns_;
+  int level_;
+  std::string_view mode_;
+  bool end_of_data_ = false, no_result_ = false;
+};
+
+enum class Need : uint8_t { required, optional };
+
+/// Type-erased input of a node. The runtime fills it before a job and empties it afterwards.
+class InputPort {
+ public:
+  static constexpr uint32_t kMaxDepth = 64;
+  InputPort(Node* owner, std::string_view name, const MessageType& type, std::string_view doc, Need need);
+  InputPort(const InputPort&) = delete;
+  InputPort& operator=(const InputPort&) = delete;
+
+  std::string_view name() const { return name_; }
+  std::string_view doc() const { return doc_; }
+  const MessageType& type() const { return *type_; }
+  Need need() const { return need_; }
+
+  bool connected() const { return connected_; }
+  /// In setup: how large the messages of this input can become.
+  const Capacity& capacity() const { return capacity_; }
+  /// In a job: number of latched messages, at most the edge's depth.
+  size_t size() const { return held_count_; }
+  bool empty() const { return held_count_ == 0; }
+  /// In a job: nothing latched, older than max_age, or no complete set of a join.
+  bool stale() const { return stale_; }
+  int64_t stamp_ns(size_t i) const { return held_[i].stamp_ns; }
+  int64_t stamp_ns() const { return held_[held_count_ - 1].stamp_ns; }  ///< of the newest; size() > 0
+  /// True if message i was not latched by an earlier job.
+  bool is_new(size_t i) const { return held_[i].sequence > last_seen_before_; }
+  bool is_new() const { return held_count_ > 0 && is_new(held_count_ - 1); }
+
+ protected:
+  const void* message(size_t i) const { return held_[i].message(); }
+
+ private:
+  friend class PortAccess;
+  std::string_view name_, doc_;
+  const MessageType* type_;
+  Need need_;
+  bool connected_ = false, stale_ = false;
+  Capacity capacity_;
+  std::array<Held, kMaxDepth> held_{};
+  size_t held_count_ = 0;
+  uint64_t last_seen_before_ = 0;
+};
+
+/// In a job: the newest `depth` messages visible at the job's release, oldest first. They do not change and stay valid
+/// until run() returns.
+template <class T>
+class Input final : public InputPort {
+ public:
+  Input(Node* owner, std::string_view name, std::string_view doc, Need need = Need::required)
+      : InputPort(owner, name, MessageType::of<T>(), doc, need) {}
+  const T& operator[](size_t i) const { return *static_cast<const T*>(message(i)); }
+  /// The newest message, null if there is none.
+  const T* newest() const { return empty() ? nullptr : static_cast<const T*>(message(size() - 1)); }
+};
+
+/// Type-erased output of a node.
+class OutputPort {
+ public:
+  OutputPort(Node* owner, std::string_view name, const MessageType& type, std::string_view doc);
+  OutputPort(const OutputPort&) = delete;
+  OutputPort& operator=(const OutputPort&) = delete;
+
+  std::string_view name() const { return name_; }
+  std::string_view doc() const { return doc_; }
+  const MessageType& type() const { return *type_; }
+  /// In setup: fixes how large the messages of this output can become. Types without arrays need no call.
+  void reserve(const Capacity& capacity) { capacity_ = capacity; }
+  const Capacity& capacity() const { return capacity_; }
+  /// False if nobody reads this output; a node may then save itself the work.
+  bool connected() const { return connected_; }
+  /// In a job: the loaned message is complete; the runtime publishes it when run() returns.
+  /// `stamp_ns` is the time of validity, carried over from the input the result belongs to.
+  void send(int64_t stamp_ns);
+
+ protected:
+  void* loan_message();
+
+ private:
+  friend class PortAccess;
+  std::string_view name_, doc_;
+  const MessageType* type_;
+  Capacity capacity_;
+  Writer* writer_ = nullptr;
+  MessageHeader* loaned_ = nullptr;
+  int64_t stamp_ns_ = 0;
+  bool sent_ = false, connected_ = false;
+};
+
+template <class T>
+class Output final : public OutputPort {
+ public:
+  Output(Node* owner, std::string_view name, std::string_view doc)
+      : OutputPort(owner, name, MessageType::of<T>(), doc) {}
+  /// In a job: an empty message to fill in place; null if every chunk is still held by consumers (counted).
+  /// A second call in one job returns the same message.
+  T* loan() { return static_cast<T*>(loan_message()); }
+};
+
+/// Base of all nodes. Constructed on the main thread; not copyable.
+class Node {
+ public:
+  Node() = default;
+  Node(const Node&) = delete;
+  Node& operator=(const Node&) = delete;
+  virtual ~Node() = default;
+
+  virtual void setup(Setup& setup) = 0;
+  /// One job. No allocation, lock, file or socket call, logging or exception in here.
+  virtual void run(Job& job) = 0;
+  /// After the last job, on the main thread. Files may be written.
+  virtual void finish() {}
+
+  const std::vector<InputPort*>& inputs() const { return inputs_; }
+  const std::vector<OutputPort*>& outputs() const { return outputs_; }
+  const std::vector<ParamBase*>& params() const { return params_; }
+
+ private:
+  friend class InputPort;
+  friend class OutputPort;
+  friend class ParamBase;
+  std::vector<InputPort*> inputs_;
+  std::vector<OutputPort*> outputs_;
+  std::vector<ParamBase*> params_;
+};
+
+/// Layers of the thesis (Sec. 2.2): an edge goes to the same, the next or the storage layer, or from storage to any.
+enum class Layer : uint8_t { sensor, perception, processing, storage };
+std::string_view to_string(Layer layer);
+
+/// A registered node class.
+struct NodeType {
+  std::string name;
+  Layer layer = Layer::perception;
+  std::string doc;
+  std::function<std::unique_ptr<Node>()> make;
+};
+
+/// The node types a graph may name.
+class NodeTypes {
+ public:
+  /// Registers T under `name`; throws std::logic_error if the name is taken.
+  template <class T>
+  void add(std::string name, Layer layer, std::string doc) {
+    insert({std::move(name), layer, std::move(doc), [] { return std::make_unique<T>(); }});
+  }
+  const NodeType* find(std::string_view name) const;
+  const std::map<std::string, NodeType, std::less<>>& all() const { return types_; }
+
+ private:
+  void insert(NodeType type);
+  std::map<std::string, NodeType, std::less<>> types_;
+};
+
+}  // namespace takt

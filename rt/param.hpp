@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include <tl/expected.hpp>
+
+namespace takt {
+
+class Node;
+
+/// A parameter value as it comes from outside, already in the unit the parameter declares (SI).
+using ParamValue = std::variant<bool, int64_t, double, std::string>;
+
+/// Name, default, unit, range and meaning of a parameter, declared once as a member of its node and used by the loader,
+/// `takt nodes` and the documentation.
+class ParamBase {
+ public:
+  ParamBase(Node* owner, std::string_view name, std::string_view unit, std::string_view doc);
+  ParamBase(const ParamBase&) = delete;
+  ParamBase& operator=(const ParamBase&) = delete;
+  virtual ~ParamBase() = default;
+
+  std::string_view name() const { return name_; }
+  std::string_view unit() const { return unit_; }  ///< "m", "rad", "s", "m/s"..., "px", "1", "" for text and flags
+  std::string_view doc() const { return doc_; }
+  /// Takes a value, or says what is wrong with it ("is 12, must lie in 1..10"). Before start only.
+  virtual tl::expected<void, std::string> set(const ParamValue& value) = 0;
+  virtual std::string value_text() const = 0;
+  virtual std::string range_text() const = 0;  ///< "1..512", "sad | ssd", "" if anything goes
+  virtual std::string kind() const = 0;        ///< "integer", "number", "flag", "text", "choice"
+
+ private:
+  std::string_view name_, unit_, doc_;
+};
+
+template <class T>
+struct Range {
+  T low, high;
+};
+
+/// An integer (int, int64_t), a number (double), a flag (bool) or a text (std::string).
+template <class T>
+class Param final : public ParamBase {
+ public:
+  Param(Node* owner, std::string_view name, T value, std::string_view unit, std::string_view doc)
+      : ParamBase(owner, name, unit, doc), value_(std::move(value)) {}
+  Param(Node* owner, std::string_view name, T value, Range<T> range, std::string_view unit, std::string_view doc)
+      : ParamBase(owner, name, unit, doc), value_(std::move(value)), range_(range) {}
+
+  const T& operator()() const { return value_; }
+  operator const T&() const { return value_; }
+  tl::expected<void, std::string> set(const ParamValue& value) override;
+  std::string value_text() const override;
+  std::string range_text() const override;
+  std::string kind() const override;
+
+ private:
+  T value_;
+  std::optional<Range<T>> range_;
+};
+
+/// One word out of a fixed list; operator() gives its index.
+class Choice final : public ParamBase {
+ public:
+  Choice(Node* owner, std::string_view name, std::string_view value, std::vector<std::string_view> words,
+         std::string_view doc);
+  size_t operator()() const { return index_; }
+  std::string_view word() const { return words_[index_]; }
+  tl::expected<void, std::string> set(const ParamValue& value) override;
+  std::string value_text() const override { return std::string(word()); }
+  std::string range_text() const override;
+  std::string kind() const override { return "choice"; }
+
+ private:
+  std::vector<std::string_view> words_;
+  size_t index_ = 0;
+};
+
+extern template class Param<int>;
+extern template class Param<double>;
+extern template class Param<bool>;
+extern template class Param<std::string>;
+
+}  // namespace takt

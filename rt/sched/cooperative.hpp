@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <condition_variable>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "rt/sched/lane.hpp"
+
+namespace takt {
+
+/// Non-preemptive earliest-deadline-first over any number of ordinary threads: each calls work(). A lane runs on one
+/// thread at a time. Needs no privilege.
+class CooperativeQueue {
+ public:
+  CooperativeQueue(const std::vector<std::unique_ptr<Lane>>& lanes, const Clock& clock, StopSignal& stop)
+      : clock_(clock), stop_(stop) {
+    for (const auto& lane : lanes) entries_.push_back({lane.get(), false});
+  }
+  /// Runs lanes until none has a release before the end.
+  void work();
+  /// After a stop: makes sleeping threads look again.
+  void wake();
+
+ private:
+  struct Entry {
+    Lane* lane;
+    bool busy;
+  };
+  Entry* earliest_deadline(int64_t now_ns);
+  int64_t next_release_ns() const;
+  bool any_busy() const;
+  void sleep(std::unique_lock<std::mutex>& lock, int64_t until_ns);
+
+  const Clock& clock_;
+  StopSignal& stop_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::vector<Entry> entries_;
+};
+
+}  // namespace takt

@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "rt/sched/executor.hpp"
+
+#include <pthread.h>
+
+#include <algorithm>
+#include <array>
+#include <barrier>
+#include <cstring>
+#include <numeric>
+#include <set>
+#include <thread>
+#include <tuple>
+
+#include "rt/sched/cooperative.hpp"
+
+namespace takt {
+namespace {
+
+constexpr int kHighestPriority = 80;  // below the kernel's own interrupt threads (50 by default) nothing is gained
+
+/// Touches the stack a job may use, so that no job takes the page fault.
+void prefault_stack() {
+  constexpr size_t kBytes = 512 * 1024;
+  std::array<char, kBytes> stack;
+  for (size_t i = 0; i < kBytes; i += 4096) *static_cast<volatile char*>(&stack[i]) = 1;
+}
+
+void name_thread(const std::string& name) { pthread_setname_np(pthread_self(), name.substr(0, 15).c_str()); }
+
+}  // namespace
+
+Executor::Executor(const Plan& plan, Transport& transport, Clock& clock, const Options& options)
+    : plan_(plan), clock_(clock), options_(options) {
+  for (const TaskPlan& task : plan_.tasks) tasks_.push_back(std::make_unique<Task>(task, transport, clock, plan_.mode));
+  lanes_ = make_lanes(tasks_);
+}
+
+Executor::~Executor() = default;
+
+RunResult Executor::run() {
+  RunResult result;
+  result.grants.resize(tasks_.size());
+  result.policy_granted = clock_.is_virtual() ? plan_.policy : Policy::cooperative;
+  if (clock_.is_virtual()) {
+    run_virtual(result);
+  } else if (plan_.policy == Policy::cooperative || !run_partitioned(plan_.policy, result)) {
+    if (!result.refused.empty() && options_.require_policy) throw PolicyRefused(result.refused.front());
+    result.grants.assign(tasks_.size(), apply(Reservation{}));
+    start_clockwork(result);
+    run_cooperative();
+  }
+  result.end_ns = stop_.end_ns();
+  count_released(result);
+  return result;
+}
+
+void Executor::start_clockwork(RunResult& result) {
+  result.epoch_ns = clock_.now_ns() + (clock_.is_virtual() ? 0 : options_.start_delay_ns);
+  if (options_.duration_ns > 0) stop_.set_planned_end(result.epoch_ns + options_.duration_ns);
+  for (auto& lane : lanes_) lane->set_epoch(result.epoch_ns);
+}
+
+std::vector<Reservation> Executor::reservations(Policy policy) const {
+  std::vector<Reservation> wanted(lanes_.size());
+  std::vector<size_t> order(lanes_.size());
+  std::iota(order.begin(), order.end(), size_t{0});
+  // Deadline monotonic: the shorter the span, the higher the priority.
+  std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) { return lanes_[a]->span_ns() < lanes_[b]->span_ns(); });
+  std::vector<double> load(std::max<size_t>(plan_.cores.size(), 1), 0.0);
+  for (size_t rank = 0; rank < order.size(); ++rank) {
+    const Lane& lane = *lanes_[order[rank]];
+    Reservation& r = wanted[order[rank]];
+    if (policy == Policy::deadline) {
+      r = deadline_reservation(lane.budget_ns(), lane.span_ns(), lane.rate().period_ns());
+      continue;
+    }
+    r.policy = policy;
+    r.priority = std::max(1, kHighestPriority - static_cast<int>(rank));
+    // Worst fit: the next lane goes to the core with the least work so far.
+    const auto core = static_cast<size_t>(std::min_element(load.begin(), load.end()) - load.begin());
+    load[core] += static_cast<double>(lane.budget_ns()) * lane.rate().hz();
+    r.core = plan_.cores.empty() ? -1 : plan_.cores[core];
+  }
+  return wanted;
+}
+
+bool Executor::run_partitioned(Policy policy, RunResult& result) {
+  const std::vector<Reservation> wanted = reservations(policy);
+  std::vector<Grant> grants(lanes_.size());
+  std::atomic<bool> go{false};
+  std::barrier ready(static_cast<ptrdiff_t>(lanes_.size()) + 1), started(static_cast<ptrdiff_t>(lanes_.size()) + 1);
+  std::vector<std::thread> workers;
+  for (size_t i = 0; i < lanes_.size(); ++i) {
+    workers.emplace_back([&, i] {
+      Lane& lane = *lanes_[i];
+      name_thread(lane.head().plan().name);
+      prefault_stack();
+      grants[i] = apply(wanted[i]);
+      ready.arrive_and_wait();
+      started.arrive_and_wait();
+      if (!go.load()) return;
+      while (lane.next_release_ns() < stop_.end_ns()) {
+        stop_.sleep_until(lane.next_release_ns());
+        if (lane.next_release_ns() >= stop_.end_ns()) break;
+        lane.run_next(clock_, stop_);
+      }
+    });
+  }
+  ready.arrive_and_wait();
+  for (size_t i = 0; i < lanes_.size(); ++i) {
+    if (!grants[i].refused.empty()) result.refused.push_back(lanes_[i]->head().plan().name + ": " + grants[i].refused);
+    for (const size_t member : lanes_[i]->members()) result.grants[member] = grants[i];
+  }
+  go.store(result.refused.empty());
+  if (go.load()) {
+    result.policy_granted = policy;
+    start_clockwork(result);
+  }
+  started.arrive_and_wait();
+  for (std::thread& worker : workers) worker.join();
+  return go.load();
+}
+
+void Executor::run_cooperative() {
+  CooperativeQueue queue(lanes_, clock_, stop_);
+  std::vector<std::thread> workers;
+  for (size_t i = 0; i < std::max<size_t>(plan_.cores.size(), 1); ++i) {
+    workers.emplace_back([&queue, i] {
+      name_thread("takt-worker-" + std::to_string(i));
+      prefault_stack();
+      apply(Reservation{});
+      queue.work();
+    });
+  }
+  stop_.sleep_until(stop_.end_ns());
+  queue.wake();
+  for (std::thread& worker : workers) worker.join();
+}
+
+void Executor::run_virtual(RunResult& result) {
+  auto& clock = dynamic_cast<VirtualClock&>(clock_);
+  start_clockwork(result);
+  // Ordered by instant, then deadline, then lane: the same order in every run.
+  using Event = std::tuple<int64_t, int64_t, size_t, size_t>;
+  std::multiset<Event> events;
+  const auto expect_head = [&](size_t lane) {
+    events.insert({lanes_[lane]->next_release_ns(), lanes_[lane]->next_deadline_ns(), lane, 0});
+  };
+  for (size_t i = 0; i < lanes_.size(); ++i) expect_head(i);
+  std::vector<Lane::Activation> released;
+  while (!events.empty()) {
+    const auto [instant, deadline, lane, member] = *events.begin();
+    events.erase(events.begin());
+    if (instant >= stop_.end_ns() && member == 0) continue;
+    clock.advance_to(instant);
+    released.clear();
+    if (member == 0) {
+      lanes_[lane]->run_head_modelled(stop_, released);
+      expect_head(lane);
+    } else {
+      lanes_[lane]->run_follower_modelled({member, instant}, released);
+    }
+    for (const auto& a : released) {
+      const int64_t relative = tasks_[lanes_[lane]->members()[a.member]]->plan().deadline_ns;
+      events.insert({a.release_ns, a.release_ns + relative, lane, a.member});
+    }
+  }
+}
+
+void Executor::count_released(RunResult& result) const {
+  for (const auto& task : tasks_) {
+    const TaskPlan& plan = task->plan();
+    result.released.push_back(plan.rate ? static_cast<uint64_t>(plan.rate->releases_before(
+                                              result.epoch_ns + plan.offset_ns, result.end_ns))
+                                        : task->statistics().released.load());
+  }
+}
+
+}  // namespace takt

@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "rt/sched/grant.hpp"
+
+#include <linux/sched.h>
+#include <sched.h>
+#include <sys/prctl.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <ctime>
+
+namespace takt {
+namespace {
+
+// The C library of Debian 12 has no wrapper and <linux/sched/types.h> clashes with <sched.h>.
+struct SchedulingAttributes {
+  uint32_t size = sizeof(SchedulingAttributes);
+  uint32_t policy = 0;
+  uint64_t flags = 0;
+  int32_t nice = 0;
+  uint32_t priority = 0;
+  uint64_t runtime = 0, deadline = 0, period = 0;
+};
+constexpr uint32_t kDeadline = 6;  // SCHED_DEADLINE
+constexpr uint64_t kResetOnFork = 1;
+
+int set_attributes(const SchedulingAttributes& a) { return static_cast<int>(syscall(SYS_sched_setattr, 0, &a, 0)); }
+int get_attributes(SchedulingAttributes& a) {
+  return static_cast<int>(syscall(SYS_sched_getattr, 0, &a, sizeof a, 0));
+}
+
+std::vector<int> current_cpus() {
+  cpu_set_t set;
+  CPU_ZERO(&set);
+  std::vector<int> cpus;
+  if (sched_getaffinity(0, sizeof set, &set) != 0) return cpus;
+  for (int cpu = 0; cpu < CPU_SETSIZE; ++cpu) {
+    if (CPU_ISSET(static_cast<size_t>(cpu), &set)) cpus.push_back(cpu);
+  }
+  return cpus;
+}
+
+std::string refusal(const char* what, int error) {
+  std::string text = std::string(what) + " was refused (" + std::strerror(error) + "); ";
+  if (error == EPERM) return text + "run as root, or grant CAP_SYS_NICE: sudo setcap cap_sys_nice,cap_ipc_lock+ep TAKT";
+  if (error == EBUSY) return text + "the budgets exceed what the kernel reserves; lower them in the schedule";
+  return text;
+}
+
+bool pin(int core, std::string& refused) {
+  cpu_set_t set;
+  CPU_ZERO(&set);
+  CPU_SET(static_cast<size_t>(core), &set);
+  if (sched_setaffinity(0, sizeof set, &set) == 0) return true;
+  refused = refusal(("CPU " + std::to_string(core)).c_str(), errno);
+  return false;
+}
+
+Grant apply_deadline(const Reservation& wanted, int64_t patience_ns) {
+  SchedulingAttributes a;
+  a.policy = kDeadline;
+  a.flags = kResetOnFork;
+  a.runtime = static_cast<uint64_t>(wanted.runtime_ns);
+  a.deadline = static_cast<uint64_t>(wanted.deadline_ns);
+  a.period = static_cast<uint64_t>(wanted.period_ns);
+  constexpr int64_t kStep = 5'000'000;
+  int error = 0;
+  for (int64_t waited = 0;; waited += kStep) {
+    error = set_attributes(a) == 0 ? 0 : errno;
+    if (error != EBUSY || waited >= patience_ns) break;
+    const timespec pause{0, kStep};
+    nanosleep(&pause, nullptr);
+  }
+  Grant grant;
+  if (error != 0) {
+    grant.refused = refusal("SCHED_DEADLINE", error);
+    return grant;
+  }
+  SchedulingAttributes got;
+  if (get_attributes(got) == 0 && got.policy == kDeadline) {
+    grant.policy = Policy::deadline;
+    grant.runtime_ms = static_cast<double>(got.runtime) / 1e6;
+    grant.deadline_ms = static_cast<double>(got.deadline) / 1e6;
+    grant.verified = got.runtime == a.runtime && got.deadline == a.deadline && got.period == a.period;
+  }
+  return grant;
+}
+
+Grant apply_fixed(const Reservation& wanted) {
+  Grant grant;
+  if (wanted.core >= 0 && !pin(wanted.core, grant.refused)) return grant;
+  const sched_param param{wanted.priority};
+  if (sched_setscheduler(0, SCHED_FIFO | SCHED_RESET_ON_FORK, &param) != 0) {
+    grant.refused = refusal("SCHED_FIFO", errno);
+    return grant;
+  }
+  SchedulingAttributes got;
+  if (get_attributes(got) == 0 && got.policy == SCHED_FIFO) {
+    grant.policy = Policy::fixed;
+    grant.priority = static_cast<int>(got.priority);
+    grant.verified = grant.priority == wanted.priority;
+  }
+  return grant;
+}
+
+}  // namespace
+
+Reservation deadline_reservation(int64_t budget_ns, int64_t deadline_ns, int64_t period_ns) {
+  Reservation r;
+  r.policy = Policy::deadline;
+  r.deadline_ns = r.period_ns = deadline_ns < period_ns ? deadline_ns : period_ns / 20 * 19;
+  r.runtime_ns = std::min(budget_ns, r.deadline_ns);
+  return r;
+}
+
+Grant apply(const Reservation& wanted, int64_t patience_ns) {
+  prctl(PR_SET_TIMERSLACK, 1UL);
+  Grant grant;
+  if (wanted.policy == Policy::deadline) grant = apply_deadline(wanted, patience_ns);
+  else if (wanted.policy == Policy::fixed) grant = apply_fixed(wanted);
+  else grant.verified = true;
+  grant.cpus = current_cpus();
+  if (wanted.policy == Policy::fixed && wanted.core >= 0)
+    grant.verified = grant.verified && grant.cpus == std::vector<int>{wanted.core};
+  return grant;
+}
+
+void apply_default() {
+  const sched_param param{0};
+  sched_setscheduler(0, SCHED_OTHER, &param);
+}
+
+}  // namespace takt

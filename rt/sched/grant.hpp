@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "rt/sched/plan.hpp"
+
+namespace takt {
+
+/// What a worker thread asks of the kernel.
+struct Reservation {
+  Policy policy = Policy::cooperative;
+  int64_t runtime_ns = 0, deadline_ns = 0, period_ns = 0;  ///< deadline
+  int priority = 0;                                        ///< fixed: SCHED_FIFO 1..99
+  int core = -1;                                           ///< fixed: the only CPU; -1: any
+};
+
+/// What the kernel says the thread has, read back after asking.
+struct Grant {
+  Policy policy = Policy::cooperative;
+  double runtime_ms = 0, deadline_ms = 0;
+  int priority = 0;
+  std::vector<int> cpus;
+  bool verified = false;    ///< read back and equal to what was asked
+  std::string refused;      ///< empty, or what was refused and the fix
+};
+
+/// SCHED_DEADLINE parameters for a lane of that budget, deadline and period. The reservation period is the deadline, or
+/// 0.95 of the period where they are equal: a longer one is replenished on a grid of its own and throttles releases
+/// that fall before it (measured: up to 27 ms late).
+Reservation deadline_reservation(int64_t budget_ns, int64_t deadline_ns, int64_t period_ns);
+
+/// Applies the reservation to the calling thread and reads it back. Waits up to `patience_ns` for bandwidth that a
+/// finished SCHED_DEADLINE thread gives back only at its 0-lag time.
+Grant apply(const Reservation& reservation, int64_t patience_ns = 100'000'000);
+
+/// Puts the calling thread back to the default policy on all CPUs.
+void apply_default();
+
+}  // namespace takt

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "rt/sched/lane.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+
+namespace takt {
+
+Lane::Lane(std::vector<size_t> members, const std::vector<std::unique_ptr<Task>>& tasks)
+    : members_(std::move(members)), followers_(members_.size()), visible_(members_.size()), ran_(members_.size()) {
+  for (const size_t index : members_) tasks_.push_back(tasks[index].get());
+  for (size_t m = 1; m < members_.size(); ++m) {
+    const auto producer = std::find(members_.begin(), members_.end(), tasks_[m]->plan().on_task);
+    followers_[m].producer = static_cast<size_t>(producer - members_.begin());
+    followers_[m].last_release_ns = std::numeric_limits<int64_t>::min() / 2;
+  }
+}
+
+bool Lane::activates(size_t member, int64_t visible_at_ns) {
+  const TaskPlan& plan = tasks_[member]->plan();
+  Follower& follower = followers_[member];
+  if (!tasks_[follower.producer]->published(plan.on_port)) return false;
+  if (follower.publications++ % plan.every != 0) return false;
+  if (visible_at_ns - follower.last_release_ns < plan.min_interval_ns) return false;
+  follower.last_release_ns = visible_at_ns;
+  tasks_[member]->statistics().released.fetch_add(1, std::memory_order_relaxed);
+  return true;
+}
+
+void Lane::run_next(const Clock& clock, StopSignal& stop) {
+  const int64_t release = next_release_ns();
+  const JobEnd end = head().run(static_cast<uint64_t>(next_), release);
+  if (end.end_of_data) {
+    stop.raise(release);
+    return;
+  }
+  ran_[0] = true;
+  visible_[0] = end.visible_at_ns;
+  for (size_t m = 1; m < tasks_.size(); ++m) {
+    const size_t producer = followers_[m].producer;
+    ran_[m] = ran_[producer] && activates(m, visible_[producer]);
+    if (!ran_[m]) continue;
+    if (visible_[producer] > clock.now_ns()) stop.sleep_until(visible_[producer]);
+    visible_[m] = tasks_[m]->run(followers_[m].index++, visible_[producer]).visible_at_ns;
+  }
+  ++next_;
+  skip_passed(clock.now_ns(), stop.end_ns());
+}
+
+void Lane::skip_passed(int64_t now_ns, int64_t end_ns) {
+  // `skip` drops every passed release; the other verbs leave one pending, so that a late job is followed at once.
+  const bool all = head().plan().on_miss == OnMiss::skip;
+  const int64_t pending = all ? 0 : 1;
+  while (rate().release_ns(origin_ns_, next_ + pending) <= now_ns && next_release_ns() < end_ns) {
+    ++next_;
+    head().statistics().skipped.fetch_add(1, std::memory_order_relaxed);
+  }
+}
+
+void Lane::run_head_modelled(StopSignal& stop, std::vector<Activation>& released) {
+  const int64_t release = next_release_ns();
+  const JobEnd end = head().run(static_cast<uint64_t>(next_), release, head().plan().budget_ns);
+  if (end.end_of_data) {
+    stop.raise(release);
+    return;
+  }
+  ++next_;
+  for (size_t m = 1; m < tasks_.size(); ++m) {
+    if (followers_[m].producer == 0 && activates(m, end.visible_at_ns)) released.push_back({m, end.visible_at_ns});
+  }
+}
+
+void Lane::run_follower_modelled(const Activation& activation, std::vector<Activation>& released) {
+  Task& task = *tasks_[activation.member];
+  const JobEnd end =
+      task.run(followers_[activation.member].index++, activation.release_ns, task.plan().budget_ns);
+  for (size_t m = 1; m < tasks_.size(); ++m) {
+    if (followers_[m].producer == activation.member && activates(m, end.visible_at_ns))
+      released.push_back({m, end.visible_at_ns});
+  }
+}
+
+int64_t Lane::budget_ns() const {
+  int64_t sum = 0;
+  for (const Task* task : tasks_) sum += task->plan().budget_ns > 0 ? task->plan().budget_ns : task->plan().deadline_ns / 4;
+  return sum;
+}
+
+int64_t Lane::span_ns() const {
+  if (tasks_.size() == 1) return head().plan().deadline_ns;
+  int64_t sum = 0;
+  for (const Task* task : tasks_) sum += task->plan().deadline_ns;
+  return std::min(sum, rate().period_ns());
+}
+
+std::vector<std::unique_ptr<Lane>> make_lanes(const std::vector<std::unique_ptr<Task>>& tasks) {
+  std::vector<std::vector<size_t>> lanes;
+  std::vector<size_t> lane_of(tasks.size(), kNone);
+  for (size_t i = 0; i < tasks.size(); ++i) {
+    if (!tasks[i]->plan().rate) continue;
+    lane_of[i] = lanes.size();
+    lanes.push_back({i});
+  }
+  // A follower joins once its producer has a lane; a pass without progress means a cycle, which the checker refuses.
+  for (bool progress = true; progress;) {
+    progress = false;
+    for (size_t i = 0; i < tasks.size(); ++i) {
+      const size_t producer = tasks[i]->plan().on_task;
+      if (lane_of[i] != kNone || producer == kNone || lane_of[producer] == kNone) continue;
+      lane_of[i] = lane_of[producer];
+      lanes[lane_of[i]].push_back(i);
+      progress = true;
+    }
+  }
+  if (std::find(lane_of.begin(), lane_of.end(), kNone) != lane_of.end())
+    throw std::logic_error("a task has neither a rate nor a producer with one");
+  std::vector<std::unique_ptr<Lane>> result;
+  for (auto& members : lanes) result.push_back(std::make_unique<Lane>(std::move(members), tasks));
+  return result;
+}
+
+}  // namespace takt

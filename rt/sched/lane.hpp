@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <vector>
+
+#include "rt/sched/stop_signal.hpp"
+#include "rt/sched/task.hpp"
+
+namespace takt {
+
+/// Tasks that follow one another: a head with a rate, and the tasks released by what it (or a follower) publishes. They
+/// run back to back on one worker, without a wake-up between them. One thread at a time.
+class Lane {
+ public:
+  /// `members`: head first, every follower after its producer; indexes into `tasks`.
+  Lane(std::vector<size_t> members, const std::vector<std::unique_ptr<Task>>& tasks);
+
+  void set_epoch(int64_t epoch_ns) { origin_ns_ = epoch_ns + head().plan().offset_ns; }
+  /// Planned instant of the next release.
+  int64_t next_release_ns() const { return rate().release_ns(origin_ns_, next_); }
+  int64_t next_deadline_ns() const { return next_release_ns() + head().plan().deadline_ns; }
+
+  /// Runs the next job of the head and the jobs it releases; afterwards moves on to the next release still wanted.
+  /// Raises `stop` at the head's release if a device's recorded data ended.
+  void run_next(const Clock& clock, StopSignal& stop);
+  /// The same in virtual time: each job finishes its budget after its release. Returns the followers' activations
+  /// instead of running them.
+  struct Activation {
+    size_t member;
+    int64_t release_ns;
+  };
+  void run_head_modelled(StopSignal& stop, std::vector<Activation>& released);
+  void run_follower_modelled(const Activation& activation, std::vector<Activation>& released);
+
+  Task& head() const { return *tasks_.front(); }
+  const std::vector<size_t>& members() const { return members_; }
+  int64_t budget_ns() const;
+  /// Longest time from the head's release to the last follower's deadline.
+  int64_t span_ns() const;
+  const Rate& rate() const { return *head().plan().rate; }
+
+ private:
+  struct Follower {
+    size_t producer = 0;  ///< member index
+    int64_t publications = 0, last_release_ns = 0;
+    uint64_t index = 0;
+  };
+
+  bool activates(size_t member, int64_t visible_at_ns);
+  void skip_passed(int64_t now_ns, int64_t end_ns);
+
+  std::vector<size_t> members_;
+  std::vector<Task*> tasks_;
+  std::vector<Follower> followers_;  ///< by member index; [0] unused
+  std::vector<int64_t> visible_;     ///< of the pass under way: when each member's output became visible
+  std::vector<char> ran_;
+  int64_t origin_ns_ = 0;
+  int64_t next_ = 0;
+};
+
+/// Groups tasks into lanes: each task with a rate heads one, each `on` task joins its producer's.
+std::vector<std::unique_ptr<Lane>> make_lanes(const std::vector<std::unique_ptr<Task>>& tasks);
+
+}  // namespace takt

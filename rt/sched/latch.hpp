@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <memory>
+#include <vector>
+
+#include "rt/sched/histogram.hpp"
+#include "rt/sched/plan.hpp"
+
+namespace takt {
+
+class InputPort;
+
+/// What one edge carried. Every message sent is received, superseded before a job latched it (dropped), or waiting.
+struct EdgeStatistics {
+  uint64_t received = 0, dropped = 0, stale = 0;
+  Histogram age;  ///< stamp to job start, of the newest latched message
+};
+
+/// The latch rule: per input the newest messages with visible_at <= release, or the newest set with equal stamps of a
+/// join. Belongs to one task; one thread at a time.
+class Latch {
+ public:
+  Latch(const TaskPlan& plan, Transport& transport);
+  /// Fills the node's inputs for a job released at `release_ns` that starts at `now_ns`; returns how many are stale.
+  size_t acquire(int64_t release_ns, int64_t now_ns);
+  /// Empties them again.
+  void release();
+  const EdgeStatistics& statistics(size_t edge) const { return edges_[edge].statistics; }
+
+ private:
+  struct Edge {
+    EdgePlan plan;
+    InputPort* input = nullptr;
+    std::unique_ptr<Reader> reader;
+    uint64_t last_seen = 0;
+    bool joined = false;
+    EdgeStatistics statistics;
+  };
+
+  void acquire_newest(Edge& edge, int64_t release_ns, int64_t now_ns);
+  void acquire_join(const std::vector<size_t>& group, int64_t release_ns, int64_t now_ns);
+  bool take_set(const std::vector<size_t>& group, int64_t stamp_ns, int64_t release_ns, int64_t now_ns);
+  void account(Edge& edge, size_t count, bool stale, int64_t now_ns);
+
+  std::vector<Edge> edges_;
+  std::vector<std::vector<size_t>> joins_;  ///< indexes into edges_
+  size_t stale_count_ = 0;
+};
+
+}  // namespace takt

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the executor is given: tasks with their times, ports with their pools. Plain data, made by the composition.
+#pragma once
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "rt/shm/transport.hpp"
+#include "rt/time/rate.hpp"
+
+namespace takt {
+
+class Node;
+
+enum class Policy : uint8_t { deadline, fixed, cooperative };
+enum class Criticality : uint8_t { low, high };
+/// Budget used up, job still running. Words: continue | degrade | safe_stop.
+enum class OnOverrun : uint8_t { proceed, degrade, safe_stop };
+/// Deadline passed. Words: continue | skip | reuse_last | safe_stop.
+enum class OnMiss : uint8_t { proceed, skip, reuse_last, safe_stop };
+/// When a message becomes visible: at its publish instant, or at the job's planned deadline.
+enum class PublishAt : uint8_t { asap, let };
+
+std::string_view to_string(Policy policy);
+std::string_view to_string(Criticality criticality);
+std::string_view to_string(OnOverrun verb);
+std::string_view to_string(OnMiss verb);
+
+inline constexpr size_t kNone = std::numeric_limits<size_t>::max();
+
+struct EdgePlan {
+  size_t input = 0;  ///< index into Node::inputs()
+  size_t port = 0;   ///< index into Plan::ports
+  uint32_t depth = 1;
+  int64_t max_age_ns = 0;  ///< 0: no bound
+};
+
+struct TaskPlan {
+  std::string name;
+  Node* node = nullptr;
+  bool device = false;  ///< a hardware node; its CPU time is accounted apart
+  std::optional<Rate> rate;
+  size_t on_task = kNone;  ///< producer whose publication releases this task
+  size_t on_port = kNone;  ///< ... of this port
+  int every = 1;
+  int64_t min_interval_ns = 0;
+  int64_t offset_ns = 0;
+  int64_t deadline_ns = 0;  ///< relative to the release, > 0
+  int64_t budget_ns = 0;    ///< 0: not stated, nothing enforced
+  Criticality criticality = Criticality::low;
+  OnOverrun on_overrun = OnOverrun::proceed;
+  OnMiss on_miss = OnMiss::proceed;
+  PublishAt publish = PublishAt::asap;
+  std::vector<EdgePlan> edges;
+  std::vector<std::vector<size_t>> joins;  ///< groups of indexes into Node::inputs()
+  std::vector<size_t> ports;               ///< per output of the node: index into Plan::ports
+};
+
+struct Plan {
+  Policy policy = Policy::cooperative;
+  std::vector<int> cores;
+  std::vector<TaskPlan> tasks;
+  std::vector<PortPlan> ports;
+  std::string mode = "full";
+};
+
+}  // namespace takt

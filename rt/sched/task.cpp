@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "rt/sched/task.hpp"
+
+#include <algorithm>
+
+#include "rt/sched/port_access.hpp"
+
+namespace takt {
+namespace {
+void count(std::atomic<uint64_t>& counter, uint64_t by = 1) { counter.fetch_add(by, std::memory_order_relaxed); }
+}  // namespace
+
+Task::Task(const TaskPlan& plan, Transport& transport, const Clock& clock, std::string mode)
+    : plan_(plan), clock_(clock), mode_(std::move(mode)), latch_(plan, transport), published_(plan.ports.size()) {
+  for (size_t i = 0; i < plan_.ports.size(); ++i) {
+    writers_.push_back(transport.make_writer(plan_.ports[i]));
+    PortAccess::attach(*plan_.node->outputs()[i], writers_.back().get());
+  }
+}
+
+Task::~Task() {
+  for (OutputPort* output : plan_.node->outputs()) PortAccess::attach(*output, nullptr);
+}
+
+JobEnd Task::run(uint64_t index, int64_t release_ns, int64_t modelled_ns) {
+  const bool modelled = modelled_ns >= 0;
+  const int64_t started = clock_.now_ns();
+  const int64_t deadline = release_ns + plan_.deadline_ns;
+  const MemoryUse memory_before = thread_memory_use();
+  const int64_t cpu_before = thread_cpu_ns();
+
+  count(statistics_.stale_inputs, latch_.acquire(release_ns, started));
+  if (!plan_.edges.empty() && plan_.node->inputs()[plan_.edges.front().input]->is_new()) count(statistics_.new_inputs);
+  Job job(clock_, index, release_ns, deadline, 0, mode_);
+  plan_.node->run(job);
+
+  JobEnd end;
+  end.end_of_data = job.ended();
+  const int64_t cpu = thread_cpu_ns() - cpu_before;
+  end.finished_ns = modelled ? std::max(started, release_ns) + modelled_ns : clock_.now_ns();
+  if (!end.end_of_data) {
+    statistics_.lateness.add(started - release_ns);
+    statistics_.exec.add(cpu);
+    statistics_.last_exec_ns.store(cpu, std::memory_order_relaxed);
+    statistics_.preempted_ns += modelled ? 0 : std::max<int64_t>(0, end.finished_ns - started - cpu);
+    if (plan_.budget_ns > 0 && cpu > plan_.budget_ns) count(statistics_.budget_overruns);
+    if (job.without_result()) count(statistics_.no_result);
+  }
+  publish(end, deadline, modelled);
+  latch_.release();
+  const MemoryUse memory_after = thread_memory_use();
+  statistics_.cpu_ns += cpu;
+  statistics_.allocations += memory_after.allocations - memory_before.allocations;
+  statistics_.page_faults += memory_after.page_faults - memory_before.page_faults;
+  return end;
+}
+
+void Task::publish(JobEnd& end, int64_t deadline_ns, bool modelled) {
+  // The instant of publication is read once per job: all outputs of a job become visible together.
+  const int64_t now = modelled ? end.finished_ns : clock_.now_ns();
+  end.late = now > deadline_ns;
+  end.visible_at_ns = plan_.publish == PublishAt::let ? std::max(now, deadline_ns) : now;
+  for (size_t i = 0; i < writers_.size(); ++i) settle_output(i, end.late, now, end.visible_at_ns);
+  if (end.end_of_data) return;
+  statistics_.publish.add(modelled ? 0 : clock_.now_ns() - end.finished_ns);
+  const int64_t response = now - (deadline_ns - plan_.deadline_ns);
+  statistics_.response.add(response);
+  statistics_.last_response_ns.store(response, std::memory_order_relaxed);
+  if (end.late) count(statistics_.deadline_misses);
+  if (end.late && plan_.on_miss == OnMiss::skip) count(statistics_.skipped);
+  else if (end.late && plan_.on_miss == OnMiss::reuse_last) count(statistics_.reused);
+  else count(statistics_.completed);
+}
+
+void Task::settle_output(size_t i, bool late, int64_t now_ns, int64_t visible_at_ns) {
+  OutputPort& output = *plan_.node->outputs()[i];
+  Writer& writer = *writers_[i];
+  published_[i] = false;
+  const bool withheld = late && (plan_.on_miss == OnMiss::skip || plan_.on_miss == OnMiss::reuse_last);
+  if (PortAccess::sent(output) && !withheld) {
+    writer.publish(PortAccess::stamp_ns(output), now_ns, visible_at_ns);
+    published_[i] = true;
+  } else {
+    writer.discard();
+    if (withheld && plan_.on_miss == OnMiss::reuse_last) published_[i] = writer.repeat(now_ns, visible_at_ns);
+  }
+  PortAccess::reset(output);
+}
+
+bool Task::published(size_t port) const {
+  const auto it = std::find(plan_.ports.begin(), plan_.ports.end(), port);
+  return it != plan_.ports.end() && published_[static_cast<size_t>(it - plan_.ports.begin())];
+}
+
+}  // namespace takt

@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "rt/shm/iceoryx_preflight.hpp"
+
+#include <fcntl.h>
+#include <grp.h>
+#include <pwd.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <sys/statvfs.h>
+#include <sys/sysmacros.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <vector>
+
+#include "rt/shm/transport_error.hpp"
+
+namespace takt {
+namespace {
+
+// Names compiled into iceoryx 2.0.
+constexpr const char* kLock = "iox-unique-roudi.lock";
+constexpr const char* kSocket = "roudi";
+constexpr const char* kManagement = "iceoryx_mgmt";
+
+std::string user_name(uid_t user) {
+  std::array<char, 1024> buffer{};
+  passwd entry{};
+  passwd* found = nullptr;
+  if (getpwuid_r(user, &entry, buffer.data(), buffer.size(), &found) == 0 && found != nullptr) return found->pw_name;
+  return "user " + std::to_string(user);
+}
+
+std::string process_name(pid_t pid) {
+  std::ifstream file("/proc/" + std::to_string(pid) + "/comm");
+  std::string name;
+  std::getline(file, name);
+  return name.empty() ? "?" : name;
+}
+
+std::string megabytes(uint64_t bytes) { return std::to_string((bytes + 999'999) / 1'000'000) + " MB"; }
+
+[[noreturn]] void daemon_running(const std::filesystem::path& lock, const std::filesystem::path& locks) {
+  const auto holder = lock_holder(lock, locks);
+  const std::string who = holder ? "process " + std::to_string(*holder) + " (" + process_name(*holder) + ")" : "another process";
+  throw TransportError("another iceoryx daemon is running: " + who + " holds " + lock.string() +
+                       "; there can be one on a machine. Stop it" +
+                       (holder ? " (kill " + std::to_string(*holder) + ")" : "") +
+                       " or run without --transport iceoryx");
+}
+
+[[noreturn]] void foreign(const std::filesystem::path& file, uid_t owner, uid_t user) {
+  throw TransportError(file.string() + " belongs to " + user_name(owner) + ", this process runs as " + user_name(user) +
+                       ": left behind by an iceoryx daemon of " + user_name(owner) + ". Remove it: sudo rm " + file.string());
+}
+
+/// A file we could not replace: another user's in a directory with the sticky bit.
+void check_owner(const std::filesystem::path& file, uid_t user) {
+  struct stat status {};
+  if (user == 0 || lstat(file.c_str(), &status) != 0) return;
+  if (status.st_uid != user) foreign(file, status.st_uid, user);
+}
+
+void check_lock(const std::filesystem::path& lock, const IceoryxPlaces& places) {
+  const int file = open(lock.c_str(), O_RDWR | O_CLOEXEC);
+  if (file < 0) {
+    if (errno == ENOENT) return;
+    const int reason = errno;
+    struct stat status {};
+    if (lstat(lock.c_str(), &status) == 0 && status.st_uid != places.user) foreign(lock, status.st_uid, places.user);
+    throw TransportError("cannot open " + lock.string() + ": " + std::strerror(reason) + ". Remove it: sudo rm " + lock.string());
+  }
+  const bool free = flock(file, LOCK_EX | LOCK_NB) == 0;
+  struct stat status {};
+  const bool known = fstat(file, &status) == 0;
+  close(file);
+  if (!free) daemon_running(lock, places.locks);
+  // Not even root can reuse another user's file here: fs.protected_regular refuses O_CREAT on it in a sticky directory.
+  if (known && status.st_uid != places.user) foreign(lock, status.st_uid, places.user);
+}
+
+}  // namespace
+
+IceoryxPlaces IceoryxPlaces::of_this_machine() {
+  IceoryxPlaces places;
+  places.user = geteuid();
+  std::array<char, 4096> buffer{};
+  group entry{};
+  group* found = nullptr;
+  if (getgrgid_r(getegid(), &entry, buffer.data(), buffer.size(), &found) == 0 && found != nullptr) places.segment = found->gr_name;
+  return places;
+}
+
+std::optional<pid_t> lock_holder(const std::filesystem::path& file, const std::filesystem::path& locks) {
+  struct stat status {};
+  if (stat(file.c_str(), &status) != 0) return std::nullopt;
+  std::array<char, 64> wanted{};
+  std::snprintf(wanted.data(), wanted.size(), "%02x:%02x:%lu", major(status.st_dev), minor(status.st_dev),
+                static_cast<unsigned long>(status.st_ino));
+  std::ifstream in(locks);
+  // 1: FLOCK  ADVISORY  WRITE 1234 fe:01:131090 0 EOF      ("->" after the number: one that waits)
+  for (std::string number, kind, advisory, access, place, rest; in >> number >> kind;) {
+    long pid = 0;
+    if (kind == "->") {
+      std::getline(in, rest);
+      continue;
+    }
+    if (!(in >> advisory >> access >> pid >> place)) break;
+    std::getline(in, rest);
+    if (kind == "FLOCK" && place == wanted.data() && pid > 0) return static_cast<pid_t>(pid);
+  }
+  return std::nullopt;
+}
+
+void iceoryx_preflight(const IceoryxPlaces& places, uint64_t needed_bytes) {
+  if (places.segment.empty())
+    throw TransportError("the group " + std::to_string(getegid()) + " of this process has no name, iceoryx needs one to name its "
+                         "shared memory. Add it: sudo groupadd --gid " + std::to_string(getegid()) + " takt");
+  check_lock(places.run / kLock, places);
+  check_owner(places.run / kSocket, places.user);
+  uint64_t reclaimed = 0;
+  for (const auto& file : {places.shm / kManagement, places.shm / places.segment}) {
+    check_owner(file, places.user);
+    struct stat status {};
+    if (stat(file.c_str(), &status) == 0) reclaimed += static_cast<uint64_t>(status.st_blocks) * 512;
+  }
+  struct statvfs room {};
+  if (statvfs(places.shm.c_str(), &room) != 0)
+    throw TransportError(places.shm.string() + ": " + std::strerror(errno) + ". Mount it: sudo mount -t tmpfs tmpfs " + places.shm.string());
+  const uint64_t available = uint64_t{room.f_bavail} * room.f_frsize + reclaimed;
+  if (available < needed_bytes)
+    throw TransportError(places.shm.string() + " has " + megabytes(available) + " free, the message pools of this graph need " +
+                         megabytes(needed_bytes) + ". Enlarge it: sudo mount -o remount,size=" +
+                         std::to_string((needed_bytes - available + uint64_t{room.f_blocks} * room.f_frsize + 1'048'575) / 1'048'576) +
+                         "M " + places.shm.string() + ", or lower image sizes or edge depths");
+}
+
+}  // namespace takt

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+// What must be true of the machine before an iceoryx daemon may start here. The daemon itself aborts the process where
+// one of these fails, so everything is tried first.
+#pragma once
+#include <sys/types.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+namespace takt {
+
+/// Places and identity, injectable for tests.
+struct IceoryxPlaces {
+  std::filesystem::path run = "/tmp";       ///< locks and sockets (compiled into iceoryx)
+  std::filesystem::path shm = "/dev/shm";
+  std::filesystem::path locks = "/proc/locks";
+  uid_t user;    ///< effective user of this process
+  std::string segment;  ///< file name of the pools in shm: iceoryx names it after the group of the process
+  static IceoryxPlaces of_this_machine();
+};
+
+/// Process that holds an flock on `file`, if the kernel tells.
+std::optional<pid_t> lock_holder(const std::filesystem::path& file, const std::filesystem::path& locks);
+
+/// Throws TransportError with the fix if a daemon runs already, if leftovers of another user are in the way, or if
+/// `needed_bytes` do not fit into shared memory. Leftovers of this user are harmless: the daemon replaces them.
+void iceoryx_preflight(const IceoryxPlaces& places, uint64_t needed_bytes);
+
+}  // namespace takt

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+// What iceoryx offers beyond make_iceoryx_transport(): other processes may join the graph.
+#pragma once
+#include <memory>
+#include <span>
+#include <string>
+
+#include "rt/shm/transport.hpp"
+
+namespace takt {
+
+/// Name under which the ports of the transport of process `daemon_pid` are found.
+std::string iceoryx_domain(int daemon_pid);
+
+/// Joins the ports of a transport that another process made with make_iceoryx_transport() from the same `ports`. Waits
+/// for its daemon, 60 s at most, then iceoryx ends the process. One transport in a process at a time (TransportError).
+std::unique_ptr<Transport> join_iceoryx_transport(std::span<const PortPlan> ports, const std::string& domain);
+
+}  // namespace takt

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+// The transport interface: how a message gets from one output to its inputs without being copied. Two back ends: local
+// (one process, no daemon) and iceoryx.
+#pragma once
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "rt/msg/field.hpp"
+
+namespace takt {
+
+/// In front of every message in its chunk; written by the runtime only.
+struct alignas(64) MessageHeader {
+  int64_t stamp_ns = 0;       ///< time of validity, set once by the device that captured the data
+  int64_t published_ns = 0;   ///< instant of publication
+  int64_t visible_at_ns = 0;  ///< consumers released before this instant must not see the message
+  uint64_t sequence = 0;      ///< 1, 2, 3 ... per output
+  uint64_t loan_offset = 0;   ///< where the chunk lay in shared memory when it was loaned; compared at each take
+};
+
+/// One listed but not yet held message of an edge.
+struct Candidate {
+  uint64_t sequence = 0;
+  int64_t stamp_ns = 0;
+  int64_t visible_at_ns = 0;
+};
+
+/// A message an input holds. `chunk` is the header's address; the message follows it.
+struct Held {
+  const MessageHeader* header = nullptr;
+  uint64_t sequence = 0;
+  int64_t stamp_ns = 0;
+  int64_t visible_at_ns = 0;
+  uint32_t chunk = 0;  ///< back end's own handle
+  const void* message() const { return header + 1; }
+  explicit operator bool() const { return header != nullptr; }
+};
+
+/// What an output or an edge has seen; read after the run or (approximately) during it.
+struct WriterStatistics {
+  uint64_t sent = 0, pool_empty = 0;
+  uint32_t chunks = 0, peak_in_use = 0, in_use = 0;
+  uint64_t bytes = 0;  ///< of the whole pool
+};
+
+/// Output side of a port. One thread at a time.
+class Writer {
+ public:
+  virtual ~Writer() = default;
+  /// A chunk to write into, placed and empty; null if none is free. At most one loan at a time.
+  virtual MessageHeader* loan() = 0;
+  /// Publishes the loaned chunk.
+  virtual void publish(int64_t stamp_ns, int64_t published_ns, int64_t visible_at_ns) = 0;
+  /// Gives the loaned chunk back unpublished.
+  virtual void discard() = 0;
+  /// Publishes the previous message again, with its old stamp; false if there is none.
+  virtual bool repeat(int64_t published_ns, int64_t visible_at_ns) = 0;
+  virtual WriterStatistics statistics() const = 0;
+};
+
+/// Input side of an edge. One thread at a time.
+class Reader {
+ public:
+  virtual ~Reader() = default;
+  /// The messages with visible_at <= limit that can still be taken, newest first; returns how many were listed.
+  virtual size_t list(int64_t limit_ns, std::span<Candidate> out) = 0;
+  /// Holds one of them; an empty Held if it was overwritten meanwhile.
+  virtual Held take(uint64_t sequence) = 0;
+  virtual void release(Held& held) = 0;
+};
+
+/// One output with its edges, as the graph fixes it before start.
+struct PortPlan {
+  std::string node, port;
+  const MessageType* type = nullptr;
+  Capacity capacity;
+  uint32_t history = 1;  ///< messages kept for consumers that start late
+  uint32_t held = 0;     ///< sum over consumers of the messages each may hold at once
+  uint32_t readers = 0;
+  uint32_t chunks() const { return history + held + 2; }  ///< + one loaned, + one being evicted
+  uint64_t chunk_bytes() const { return sizeof(MessageHeader) + type->bytes(capacity); }
+};
+
+/// Memory of all ports of one graph. Made before start, outlives all writers and readers.
+class Transport {
+ public:
+  virtual ~Transport() = default;
+  virtual std::unique_ptr<Writer> make_writer(size_t port) = 0;
+  virtual std::unique_ptr<Reader> make_reader(size_t port) = 0;
+  virtual uint64_t shared_memory_bytes() const = 0;
+  /// "local" or "iceoryx".
+  virtual const char* name() const = 0;
+};
+
+/// All pools in one anonymous shared-memory file, locked and prefaulted. Throws std::runtime_error with the fix if the
+/// machine has not enough memory. Nothing is left behind at exit, however it comes.
+std::unique_ptr<Transport> make_local_transport(std::span<const PortPlan> ports);
+
+/// The same over iceoryx with the daemon embedded in this process. Throws TransportError (exit 3) if another daemon
+/// holds the locks, naming its owner and the fix.
+std::unique_ptr<Transport> make_iceoryx_transport(std::span<const PortPlan> ports);
+
+}  // namespace takt
