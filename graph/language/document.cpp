@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "graph/language/document.hpp"
 
+#include <algorithm>
 #include <fstream>
 #include <iterator>
 #include <sstream>
@@ -52,11 +53,11 @@ class Builder final : public YAML::EventHandler {
   }
   void OnSequenceStart(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t,
                        YAML::EmitterStyle::value) override {
-    open(position(mark), tag, json::array());
+    open(mark, tag, json::array());
   }
   void OnSequenceEnd() override { close(); }
   void OnMapStart(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t, YAML::EmitterStyle::value) override {
-    open(position(mark), tag, json::object());
+    open(mark, tag, json::object());
   }
   void OnMapEnd() override { close(); }
 
@@ -86,7 +87,7 @@ class Builder final : public YAML::EventHandler {
   void text(const Position& at, const std::string& value) {
     const auto expanded = expand_variables(value, directory_);
     if (!expanded) {
-      problem(at, quoted(value) + " " + expanded.error());
+      problem(at, ticked(value) + " " + expanded.error());
       return scalar(at, json(value), value);
     }
     scalar(at, json(*expanded), value);
@@ -111,7 +112,7 @@ class Builder final : public YAML::EventHandler {
     if (level.value.contains(level.key) || seen(level, level.key)) {
       const std::string where =
           first == document_.marks.end() ? "" : "; the first stands in line " + std::to_string(first->second.key.line);
-      return problem(at, "duplicate key " + quoted(level.key) + where);
+      return problem(at, "duplicate key " + ticked(level.key) + where);
     }
     level.key_lost = level.lost;
     if (!level.lost) document_.marks[child(level.pointer, level.key)] = {at, at, ""};
@@ -137,6 +138,7 @@ class Builder final : public YAML::EventHandler {
       if (mark.key.line == 0) mark.key = at;
       mark.value = at;
       mark.raw = std::move(raw);
+      if (!known) document_.broken.insert(pointer);
     }
     if (levels_.empty()) {
       if (known) document_.root = std::move(value);
@@ -151,11 +153,11 @@ class Builder final : public YAML::EventHandler {
     }
   }
 
-  void open(const Position& at, const std::string& tag, json empty) {
+  void open(const YAML::Mark& mark_of_yaml, const std::string& tag, json empty) {
+    const Position at = position(mark_of_yaml);
     check_tag(at, tag);
     if (levels_.size() == kDeepest)
-      throw YAML::ParserException({}, "nested deeper than " + std::to_string(kDeepest) + " levels (near line " +
-                                          std::to_string(at.line) + ")");
+      throw YAML::ParserException(mark_of_yaml, "nested deeper than " + std::to_string(kDeepest) + " levels");
     Level level;
     level.lost = at_key() || next_lost();
     level.pointer = level.lost ? "" : next_pointer();
@@ -280,7 +282,7 @@ Document read_document(const std::filesystem::path& file, const Position& wanted
   Document nothing;
   nothing.file = file.string();
   const auto fail = [&](const std::string& why) {
-    problems.push_back({wanted_from, "cannot read " + quoted(file.string()) + ": " + why});
+    problems.push_back({wanted_from, "cannot read " + ticked(file.string()) + ": " + why});
     return nothing;
   };
   std::error_code error;

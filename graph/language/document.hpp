@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <string>
 #include <string_view>
 #include <tl/expected.hpp>
@@ -26,6 +27,7 @@ class Document {
   std::string file;
   nlohmann::json root;                ///< null if the file could not be read at all
   std::map<std::string, Mark> marks;  ///< by JSON pointer (RFC 6901)
+  std::set<std::string> broken;       ///< pointers whose value was reported already and is null or absent
 
   /// Position of the value; of its nearest parent if there is none.
   Position value_at(const std::string& pointer) const;

@@ -38,7 +38,7 @@ const Unit* find_unit(std::string_view word) {
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
 /// Digits from `at` on, appended to `value`; false beyond 18 digits in all, so that nothing overflows.
-bool take_digits(std::string_view text, size_t& at, __int128& value, int& digits) {
+bool take_digits(std::string_view text, size_t& at, Wide& value, int& digits) {
   while (at < text.size() && is_digit(text[at])) {
     value = value * 10 + (text[at++] - '0');
     if (++digits > 18) return false;
@@ -46,8 +46,8 @@ bool take_digits(std::string_view text, size_t& at, __int128& value, int& digits
   return true;
 }
 
-__int128 power_of_ten(int exponent) {
-  __int128 value = 1;
+Wide power_of_ten(int exponent) {
+  Wide value = 1;
   while (exponent-- > 0) value *= 10;
   return value;
 }
@@ -147,7 +147,7 @@ tl::expected<double, std::string> parse_in_unit(std::string_view text, std::stri
   const Unit *declared = find_unit(unit), *given = find_unit(q->unit);
   if (declared == nullptr || given == nullptr || declared->dimension != given->dimension)
     return tl::make_unexpected(fmt::format("is `{}`, but {} is no unit of it; it is in {} (units: {})", trim(text),
-                                           quoted(q->unit), unit, unit_hint(unit)));
+                                           ticked(q->unit), unit, unit_hint(unit)));
   return si_value(*q, *given) * static_cast<double>(declared->denominator) /
          (static_cast<double>(declared->numerator) * declared->irrational);
 }
@@ -160,11 +160,11 @@ tl::expected<int64_t, std::string> parse_duration_ns(std::string_view text) {
   const Unit* unit = find_unit(q->unit);
   if (unit == nullptr || unit->dimension != "s")
     return tl::make_unexpected(fmt::format("is `{}`, but {} is no unit of time (units: s | ms | us | ns)", trim(text),
-                                           quoted(q->unit)));
-  const __int128 scale = 1'000'000'000 / unit->denominator;
+                                           ticked(q->unit)));
+  const Wide scale = 1'000'000'000 / unit->denominator;
   if (std::abs(q->value()) * static_cast<double>(scale) > 1e17)
     return tl::make_unexpected("is `" + trim(text) + "`, longer than three years");
-  const __int128 twice = q->numerator * scale * 2 + (q->numerator < 0 ? -q->denominator : q->denominator);
+  const Wide twice = q->numerator * scale * 2 + (q->numerator < 0 ? -q->denominator : q->denominator);
   return static_cast<int64_t>(twice / (q->denominator * 2));
 }
 
@@ -178,9 +178,9 @@ tl::expected<Rate, std::string> parse_rate(std::string_view text) {
   if (q->numerator <= 0) return tl::make_unexpected("is `" + trim(text) + "`" + wanted);
   if (q->numerator > q->denominator * 100'000 || q->denominator > q->numerator * 86'400)
     return tl::make_unexpected("is `" + trim(text) + "`; a rate lies between once a day (1/86400) and 100000");
-  __int128 a = q->numerator, b = q->denominator;
+  Wide a = q->numerator, b = q->denominator;
   while (b != 0) std::swap(a %= b, b);
-  const __int128 numerator = q->numerator / a, denominator = q->denominator / a;
+  const Wide numerator = q->numerator / a, denominator = q->denominator / a;
   // Keeps numerator * k * period within 128 bits over any run.
   if (numerator > 1'000'000'000 || denominator > 1'000'000'000)
     return tl::make_unexpected("is `" + trim(text) + "`: at most nine digits above and below");

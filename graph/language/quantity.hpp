@@ -11,10 +11,13 @@
 
 namespace takt::graph {
 
+/// Wide enough for 18 digits times any unit.
+__extension__ typedef __int128 Wide;
+
 /// A number as written, exact: numerator / denominator, and the unit word behind it ("" if there is none).
 struct Quantity {
-  __int128 numerator = 0;
-  __int128 denominator = 1;  ///< > 0
+  Wide numerator = 0;
+  Wide denominator = 1;  ///< > 0
   std::string unit;
   double value() const { return static_cast<double>(numerator) / static_cast<double>(denominator); }
 };

@@ -59,17 +59,17 @@ tl::expected<json, std::string> resolve_scalar(const std::string& s) {
   if (s.empty() || s == "~" || s == "null" || s == "Null" || s == "NULL") return json();
   if (s == "true") return json(true);
   if (s == "false") return json(false);
-  if (const std::string why = trap(s); !why.empty()) return tl::make_unexpected(quoted(s) + " " + why);
+  if (const std::string why = trap(s); !why.empty()) return tl::make_unexpected(ticked(s) + " " + why);
   if (is_integer(s)) {
     int64_t value = 0;
     if (std::from_chars(s.data(), s.data() + s.size(), value).ec != std::errc{})
-      return tl::make_unexpected(quoted(s.substr(0, 40)) + " does not fit into 64 bits");
+      return tl::make_unexpected(ticked(s.substr(0, 40)) + " does not fit into 64 bits");
     return json(value);
   }
   if (is_decimal(s)) {
     double value = 0;
     if (std::from_chars(s.data(), s.data() + s.size(), value).ec != std::errc{})
-      return tl::make_unexpected(quoted(s) + " is out of the range of a number");
+      return tl::make_unexpected(ticked(s) + " is out of the range of a number");
     return json(value);
   }
   return json(s);
@@ -88,7 +88,7 @@ tl::expected<std::string, std::string> expand_variables(const std::string& text,
     const size_t colon = inside.find(":-");
     const std::string name = inside.substr(0, colon);
     if (name != "TAKT_DATA")
-      return tl::make_unexpected("names the variable " + quoted("${" + name + "}") +
+      return tl::make_unexpected("names the variable " + ticked("${" + name + "}") +
                                  "; only ${TAKT_DATA} and ${TAKT_DATA:-path} are expanded");
     const char* value = std::getenv("TAKT_DATA");
     std::error_code ignored;

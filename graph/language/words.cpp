@@ -60,10 +60,10 @@ std::string alternatives(std::string_view word, std::vector<std::string> candida
   candidates.erase(std::unique(candidates.begin(), candidates.end()), candidates.end());
   if (candidates.empty()) return "; " + std::string(what) + ": (none)";
   const std::string near = nearest(word, candidates);
-  return (near.empty() ? "; " : "; did you mean " + quoted(near) + "? ") + std::string(what) + ": " +
+  return (near.empty() ? "; " : "; did you mean " + ticked(near) + "? ") + std::string(what) + ": " +
          join_words(candidates);
 }
 
-std::string quoted(std::string_view word) { return "`" + std::string(word) + "`"; }
+std::string ticked(std::string_view word) { return "`" + std::string(word) + "`"; }
 
 }  // namespace takt::graph

@@ -21,6 +21,6 @@ std::string alternatives(std::string_view word, std::vector<std::string> candida
 std::string join_words(const std::vector<std::string>& words, std::string_view separator = ", ");
 
 /// "`word`"
-std::string quoted(std::string_view word);
+std::string ticked(std::string_view word);
 
 }  // namespace takt::graph

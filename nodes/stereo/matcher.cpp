@@ -193,12 +193,18 @@ void Matcher::State::search_block(const Planes& reference, const Planes& mirrore
     rows.roll(job);
   }
   for (int y = 0; y < height; ++y) {
+    const int enters = std::min(y + r, last), leaves = std::max(y - r - 1, 0);
     if (y > 0) {
-      job.new_row = y + r <= last;
-      job.ring_new = slot(std::min(y + r, last));
-      job.ring_old = slot(std::max(y - r - 1, 0));
-      if (job.new_row) load_row(reference, mirrored_other, y + r, job);
-      else rows.roll(job);
+      job.new_row = y + r <= last && r > 0;
+      job.ring_new = slot(enters);
+      job.ring_old = slot(leaves);
+      if (y + r <= last) load_row(reference, mirrored_other, enters, job);
+      if (r == 0) {  // one row is the whole window: nothing to roll
+        std::memset(columns.data(), 0, row_bytes * column_bytes(narrow));
+        job.ring_old = zeros.data();
+        rows.fill(job);
+      }
+      if (!job.new_row) rows.roll(job);
     }
     job.keys = keys.row(y) + job.x_begin;
     rows.decide(job);

@@ -10,6 +10,21 @@ namespace {
 void count(std::atomic<uint64_t>& counter, uint64_t by = 1) { counter.fetch_add(by, std::memory_order_relaxed); }
 }  // namespace
 
+void TaskStatistics::add_lateness(int64_t ns) {
+  const uint64_t index = lateness.count();
+  if (index < kWindow) first_[index] = ns;
+  last_[index % kWindow] = ns;
+  lateness.add(ns);
+}
+
+double TaskStatistics::drift_us() const {
+  const auto filled = static_cast<ptrdiff_t>(std::min<uint64_t>(lateness.count(), kWindow));
+  if (filled == 0) return 0;
+  const int64_t early = *std::min_element(first_.begin(), first_.begin() + filled);
+  const int64_t late = *std::min_element(last_.begin(), last_.begin() + filled);
+  return static_cast<double>(late - early) / 1e3;
+}
+
 Task::Task(const TaskPlan& plan, Transport& transport, const Clock& clock, std::string mode)
     : plan_(plan), clock_(clock), mode_(std::move(mode)), latch_(plan, transport), published_(plan.ports.size()) {
   for (size_t i = 0; i < plan_.ports.size(); ++i) {
@@ -39,7 +54,7 @@ JobEnd Task::run(uint64_t index, int64_t release_ns, int64_t modelled_ns) {
   const int64_t cpu = thread_cpu_ns() - cpu_before;
   end.finished_ns = modelled ? std::max(started, release_ns) + modelled_ns : clock_.now_ns();
   if (!end.end_of_data) {
-    statistics_.lateness.add(started - release_ns);
+    statistics_.add_lateness(started - release_ns);
     statistics_.exec.add(cpu);
     statistics_.last_exec_ns.store(cpu, std::memory_order_relaxed);
     statistics_.preempted_ns += modelled ? 0 : std::max<int64_t>(0, end.finished_ns - started - cpu);
@@ -80,6 +95,7 @@ void Task::settle_output(size_t i, bool late, int64_t now_ns, int64_t visible_at
   if (PortAccess::sent(output) && !withheld) {
     writer.publish(PortAccess::stamp_ns(output), now_ns, visible_at_ns);
     published_[i] = true;
+    statistics_.output_age.add(now_ns - PortAccess::stamp_ns(output));
   } else {
     writer.discard();
     if (withheld && plan_.on_miss == OnMiss::reuse_last) published_[i] = writer.repeat(now_ns, visible_at_ns);

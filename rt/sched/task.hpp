@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <array>
 #include <atomic>
 #include <memory>
 #include <vector>
@@ -20,6 +21,16 @@ struct TaskStatistics {
   uint64_t allocations = 0, page_faults = 0;
   int64_t cpu_ns = 0, preempted_ns = 0;
   Histogram lateness, exec, response, publish;
+  Histogram output_age;  ///< stamp of the newest message published to its publication
+
+  /// Drift of the release grid: least lateness of the last 100 jobs minus that of the first 100, us. Zero if releases
+  /// stay on the planned instants, however long the run.
+  double drift_us() const;
+  void add_lateness(int64_t ns);
+
+ private:
+  static constexpr size_t kWindow = 100;
+  std::array<int64_t, kWindow> first_{}, last_{};
 };
 
 /// How a job ended.
@@ -44,6 +55,7 @@ class Task {
 
   const TaskPlan& plan() const { return plan_; }
   TaskStatistics& statistics() { return statistics_; }
+  const TaskStatistics& statistics() const { return statistics_; }
   const Latch& latch() const { return latch_; }
   const Writer& writer(size_t output) const { return *writers_[output]; }
 

@@ -5,9 +5,11 @@
 #include <sched.h>
 #include <unistd.h>
 
+#include <array>
 #include <atomic>
 #include <deque>
 #include <filesystem>
+#include <iostream>
 #include <optional>
 
 #include "iceoryx_hoofs/log/logmanager.hpp"
@@ -74,6 +76,18 @@ class LowRealTime {
   bool changed_ = false;
 };
 
+/// The daemon greets on std::cout and std::clog; stdout belongs to our reports. Used before any job runs.
+class Quiet {
+ public:
+  Quiet() { for (std::ostream* stream : streams_) stream->setstate(std::ios::failbit); }
+  Quiet(const Quiet&) = delete;
+  Quiet& operator=(const Quiet&) = delete;
+  ~Quiet() { for (std::ostream* stream : streams_) stream->clear(); }
+
+ private:
+  std::array<std::ostream*, 2> streams_{&std::cout, &std::clog};
+};
+
 std::deque<IceoryxPort> ports_of(std::span<const PortPlan> plans, const IceoryxLayout& layout, const std::string& domain) {
   std::deque<IceoryxPort> ports;
   for (size_t i = 0; i < plans.size(); ++i) {
@@ -113,6 +127,7 @@ class IceoryxTransport final : public Transport {
     iceoryx_preflight(places, shared_memory_bytes());
     ports_ = ports_of(plans, layout_, iceoryx_domain(getpid()));
     const LowRealTime low;
+    const Quiet quiet;
     daemon_ = std::make_unique<Daemon>(configuration(layout_, places.segment));
     runtime_.emplace(unused_runtime_name());
   }
@@ -136,6 +151,7 @@ class JoinedTransport final : public Transport {
   JoinedTransport(std::span<const PortPlan> plans, const std::string& domain) : layout_(IceoryxLayout::of(plans)) {
     ports_ = ports_of(plans, layout_, domain);
     const LowRealTime low;
+    const Quiet quiet;
     iox::runtime::PoshRuntime::initRuntime(unused_runtime_name());
   }
   std::unique_ptr<Writer> make_writer(size_t port) override { return make_iceoryx_writer(ports_.at(port)); }

@@ -1,0 +1,8 @@
+# SPDX-License-Identifier: Apache-2.0
+# Writes OUTPUT with the commit of SOURCE, only if it changed, so that a report can name what was measured.
+execute_process(COMMAND git -C ${SOURCE} describe --always --dirty --abbrev=12 OUTPUT_VARIABLE commit
+  OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
+if(NOT commit)
+  set(commit unknown)
+endif()
+file(CONFIGURE OUTPUT ${OUTPUT} CONTENT "#pragma once\n#define TAKT_COMMIT \"@commit@\"\n" @ONLY)

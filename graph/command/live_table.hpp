@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <atomic>
+#include <thread>
+
+#include "rt/sched/executor.hpp"
+
+namespace takt::command {
+
+/// Shows what a run is doing, from a thread of the default policy that only reads atomics: a table that redraws itself
+/// in a terminal of at least 60 columns, otherwise one plain line every five seconds. Writes to stderr, so that stdout
+/// holds the summary alone.
+class LiveTable {
+ public:
+  LiveTable(const Executor& executor, std::string title);
+  ~LiveTable();
+  LiveTable(const LiveTable&) = delete;
+  LiveTable& operator=(const LiveTable&) = delete;
+
+ private:
+  void show();
+  void draw_table(int columns, int rows);
+  void print_line();
+
+  const Executor& executor_;
+  const std::string title_;
+  int drawn_lines_ = 0;
+  std::atomic<uint32_t> ended_{0};
+  std::thread thread_;
+};
+
+}  // namespace takt::command

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <nlohmann/json.hpp>
+
+namespace takt::command {
+
+/// What the figures were measured on: CPU model, cores, kernel, memory.
+nlohmann::ordered_json machine_facts();
+
+/// Whole-process readings; the difference of two of them goes into the report.
+struct ProcessReading {
+  int64_t cpu_ns = 0;    ///< all threads, user and system
+  int64_t steal_ms = 0;  ///< time the host took from this machine's CPUs
+  double rss_mb = 0;     ///< peak resident memory
+
+  static ProcessReading now();
+};
+
+}  // namespace takt::command

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <CLI/CLI.hpp>
+#include <cstdio>
+
+#include "graph/command/check_command.hpp"
+#include "graph/command/eval_command.hpp"
+#include "graph/command/run_command.hpp"
+
+namespace {
+
+/// "20s", "1.5min", "0s": a duration with its unit, in seconds.
+std::string duration(std::string& text) {
+  static const std::map<std::string, double> units{{"ms", 1e-3}, {"s", 1}, {"min", 60}, {"h", 3600}};
+  size_t used = 0;
+  double value = 0;
+  try {
+    value = std::stod(text, &used);
+  } catch (const std::exception&) {
+    return "is no duration; write for instance 20s";
+  }
+  const auto unit = units.find(text.substr(used));
+  if (unit == units.end() || value < 0) return "is no duration; write a number with ms, s, min or h, for instance 20s";
+  text = std::to_string(value * unit->second);
+  return "";
+}
+
+void add_load_options(CLI::App& app, takt::command::RunOptions& o) {
+  app.add_option("graph", o.graph, "graph file (default graph/ace.yaml)");
+  app.add_option("--profile", o.load.profile, "sim | replay | robot, as the graph defines them");
+  app.add_option("--schedule", o.load.schedule, "schedule file instead of the graph's");
+  app.add_option("--policy", o.load.policy, "deadline | fixed | cooperative instead of the schedule's");
+  app.add_option("--mode", o.load.mode, "a mode of the graph (default full)");
+  app.add_option("--set", o.load.set, "node.param=value, repeatable");
+}
+
+void add_run(CLI::App& app, takt::command::RunOptions& o, int& exit_code) {
+  CLI::App* run = app.add_subcommand("run", "runs a graph and reports what happened");
+  add_load_options(*run, o);
+  run->add_option("--for", o.duration_s, "how long, e.g. 20s; 0s: until stopped")->transform(CLI::Validator(duration, "DURATION"));
+  run->add_option("--clock", o.clock, "real | virtual")->check(CLI::IsMember({"real", "virtual"}));
+  run->add_option("--transport", o.transport, "local | iceoryx")->check(CLI::IsMember({"local", "iceoryx"}));
+  run->add_option("--isolate", o.isolate, "none (one process)")->check(CLI::IsMember({"none"}));
+  run->add_option("--report", o.report, "writes the report as JSON");
+  run->add_option("--output", o.output, "folder for pictures and other results (default out)");
+  run->add_option("--seed", o.seed, "seed of the simulated world");
+  run->add_flag("--unchecked", o.unchecked, "runs what the check refuses");
+  run->add_flag("--require-rt", o.require_rt, "exit 3 unless the policy and locked memory are granted");
+  run->callback([&] { exit_code = takt::command::run_graph(o); });
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{"Takt: a real-time dataflow runtime with a static task graph"};
+  app.require_subcommand(1);
+  takt::command::RunOptions run_options, check_options;
+  takt::command::EvalStereoOptions stereo;
+  takt::command::EvalEgoMotionOptions ego_motion;
+  std::string type;
+  bool check_json = false;
+  int exit_code = 0;
+
+  add_run(app, run_options, exit_code);
+  CLI::App* check = app.add_subcommand("check", "checks a graph and its schedule without running them");
+  add_load_options(*check, check_options);
+  check->add_flag("--json", check_json, "prints the result as JSON");
+  check->callback([&] { exit_code = takt::command::check_graph(check_options, check_json); });
+  CLI::App* nodes = app.add_subcommand("nodes", "lists node types, or one with its ports and parameters");
+  nodes->add_option("type", type, "node type");
+  nodes->callback([&] { exit_code = takt::command::print_nodes(type); });
+  CLI::App* eval = app.add_subcommand("eval", "measures quality against ground truth");
+  eval->require_subcommand(1);
+  takt::command::add_eval_stereo(*eval, stereo, exit_code);
+  takt::command::add_eval_ego_motion(*eval, ego_motion, exit_code);
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : takt::command::kBadInput;
+  }
+  return exit_code;
+}

@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "graph/command/report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "graph/compose/plan_ports.hpp"
+#include "takt_commit.hpp"
+
+namespace takt::command {
+namespace {
+
+using Json = nlohmann::ordered_json;
+constexpr uint64_t kSamplesForP999 = 1000;
+
+Json distribution(const Histogram& h, double ns_per_unit) {
+  const auto figure = [&](int64_t ns) { return h.count() ? Json(static_cast<double>(ns) / ns_per_unit) : Json(nullptr); };
+  return {{"p50", figure(h.quantile_ns(0.5))},
+          {"p99", figure(h.quantile_ns(0.99))},
+          {"p999", h.count() >= kSamplesForP999 ? figure(h.quantile_ns(0.999)) : Json(nullptr)},
+          {"max", figure(h.max_ns())}};
+}
+
+Json grant_json(const Grant& grant) {
+  return {{"policy", to_string(grant.policy)}, {"runtime_ms", grant.runtime_ms}, {"deadline_ms", grant.deadline_ms},
+          {"priority", grant.priority},        {"cpus", grant.cpus},             {"verified", grant.verified}};
+}
+
+Json node_json(const RunFacts& facts, size_t t) {
+  const Task& task = *facts.executor.tasks()[t];
+  const TaskPlan& plan = task.plan();
+  const TaskStatistics& s = task.statistics();
+  Json node;
+  node["name"] = plan.name;
+  node["rate_hz"] = plan.rate ? Json(plan.rate->hz()) : Json(nullptr);
+  node["active_s"] = facts.result.duration_s();
+  node["criticality"] = to_string(plan.criticality);
+  node["device"] = plan.device;
+  node["released"] = facts.result.released[t];
+  for (const auto& [key, counter] : std::initializer_list<std::pair<const char*, const std::atomic<uint64_t>*>>{
+           {"completed", &s.completed}, {"skipped", &s.skipped}, {"reused", &s.reused},
+           {"deadline_misses", &s.deadline_misses}, {"budget_overruns", &s.budget_overruns},
+           {"stale_inputs", &s.stale_inputs}, {"new_inputs", &s.new_inputs}, {"no_result", &s.no_result}})
+    node[key] = counter->load();
+  node["drift_us"] = s.drift_us();
+  node["quality"] = {{"0", s.exec.count()}};
+  node["granted"] = grant_json(facts.result.grants[t]);
+  node["lateness_us"] = distribution(s.lateness, 1e3);
+  node["exec_ms"] = distribution(s.exec, 1e6);
+  node["response_ms"] = distribution(s.response, 1e6);
+  node["publish_ms"] = distribution(s.publish, 1e6);
+  node["preempted_ms"] = static_cast<double>(s.preempted_ns) / 1e6;
+  node["samples"] = s.exec.count();
+  node["allocations"] = s.allocations;
+  node["page_faults"] = s.page_faults;
+  return node;
+}
+
+/// The writer of a port, found by its plan index.
+const Writer* writer_of(const Executor& executor, size_t port) {
+  for (const auto& task : executor.tasks()) {
+    const auto& ports = task->plan().ports;
+    for (size_t i = 0; i < ports.size(); ++i) {
+      if (ports[i] == port) return &task->writer(i);
+    }
+  }
+  return nullptr;
+}
+
+Json edges_json(const RunFacts& facts) {
+  Json edges = Json::array();
+  for (const auto& task : facts.executor.tasks()) {
+    for (size_t e = 0; e < task->plan().edges.size(); ++e) {
+      const EdgePlan& plan = task->plan().edges[e];
+      const PortPlan& port = facts.composition.plan.ports[plan.port];
+      const EdgeStatistics& s = task->latch().statistics(e);
+      edges.push_back({{"from", port.node + "." + port.port},
+                       {"to", task->plan().name + "." + std::string(task->plan().node->inputs()[plan.input]->name())},
+                       {"sent", writer_of(facts.executor, plan.port)->statistics().sent},
+                       {"received", s.received},
+                       {"dropped", s.dropped},
+                       {"stale", s.stale},
+                       {"age_ms", distribution(s.age, 1e6)}});
+    }
+  }
+  return edges;
+}
+
+Json pools_json(const RunFacts& facts) {
+  Json pools = Json::array();
+  for (size_t p = 0; p < facts.composition.plan.ports.size(); ++p) {
+    const PortPlan& port = facts.composition.plan.ports[p];
+    const WriterStatistics s = writer_of(facts.executor, p)->statistics();
+    pools.push_back({{"port", port.node + "." + port.port}, {"bytes", port.chunk_bytes()}, {"chunks", s.chunks},
+                     {"peak", s.peak_in_use}, {"in_use_at_end", s.in_use}, {"exhausted", s.pool_empty}});
+  }
+  return pools;
+}
+
+Json cpu_json(const RunFacts& facts) {
+  int64_t nodes = 0, devices = 0;
+  for (const auto& task : facts.executor.tasks())
+    (task->plan().device ? devices : nodes) += task->statistics().cpu_ns;
+  const double total = static_cast<double>(facts.after.cpu_ns - facts.before.cpu_ns);
+  const double wall = std::max(1.0, facts.result.duration_s() * 1e9);
+  const auto share = [&](double ns) { return ns / wall; };
+  const auto simulator = static_cast<double>(facts.simulator_cpu_ns);
+  const double runtime = std::max(0.0, total - static_cast<double>(nodes + devices) - simulator);
+  return {{"utilisation", share(total)},
+          {"by", {{"nodes", share(static_cast<double>(nodes))}, {"devices", share(static_cast<double>(devices))},
+                  {"simulator", share(simulator)}, {"runtime", share(runtime)}}}};
+}
+
+/// Age at the end of a chain: that of the message on its last edge, taken when the last node publishes.
+Json chains_json(const RunFacts& facts) {
+  Json chains = Json::array();
+  for (const graph::ChainSpec& chain : facts.graph.chains) {
+    Json entry = {{"name", chain.name}, {"age_ms", distribution(Histogram(), 1e6)},
+                  {"bound_ms", static_cast<double>(chain.max_age_ns) / 1e6}, {"within", nullptr}};
+    for (const auto& task : facts.executor.tasks()) {
+      if (task->plan().name != chain.to.node) continue;
+      const Histogram& age = task->statistics().output_age;
+      entry["age_ms"] = distribution(age, 1e6);
+      if (age.count() > 0) entry["within"] = age.max_ns() <= chain.max_age_ns;
+    }
+    chains.push_back(std::move(entry));
+  }
+  return chains;
+}
+
+bool kept_its_promises(const Json& nodes) {
+  return std::all_of(nodes.begin(), nodes.end(), [](const Json& node) {
+    const bool missed = node["criticality"] == "high" && node["deadline_misses"].get<uint64_t>() > 0;
+    const bool fell_behind = !node["rate_hz"].is_null() &&
+                             node["completed"].get<uint64_t>() + 1 < node["released"].get<uint64_t>();
+    return !missed && !fell_behind;
+  });
+}
+
+}  // namespace
+
+Json make_report(const RunFacts& facts) {
+  Json nodes = Json::array();
+  for (size_t t = 0; t < facts.executor.tasks().size(); ++t) nodes.push_back(node_json(facts, t));
+  Json report;
+  report["graph"] = facts.graph.name;
+  report["schedule"] = facts.graph.schedule.name;
+  report["profile"] = facts.graph.profile;
+  report["clock"] = facts.clock;
+  report["policy_asked"] = facts.policy_asked;
+  report["policy_granted"] = to_string(facts.result.policy_granted);
+  report["duration_s"] = facts.result.duration_s();
+  report["commit"] = TAKT_COMMIT;
+  report["machine"] = machine_facts();
+  report["ok"] = kept_its_promises(nodes);
+  report["modes"] = {facts.graph.mode};
+  report["transport"] = facts.transport.name();
+  report["nodes"] = std::move(nodes);
+  report["edges"] = edges_json(facts);
+  report["chains"] = chains_json(facts);
+  report["memory"] = {{"shm_mb", static_cast<double>(facts.transport.shared_memory_bytes()) / 1e6},
+                      {"rss_mb", facts.after.rss_mb},
+                      {"pools", pools_json(facts)}};
+  report["cpu"] = cpu_json(facts);
+  report["host_stall_ms"] = facts.after.steal_ms - facts.before.steal_ms;
+  report["recorder_lost"] = 0;
+  report["adjusted"] = facts.adjusted;
+  report["faults"] = Json::array();
+  return report;
+}
+
+}  // namespace takt::command

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <filesystem>
+#include <string>
+
+#include "graph/language/graph.hpp"
+
+namespace takt::command {
+
+/// Exit codes of every takt command.
+enum Exit : int { kOk = 0, kNotOk = 1, kBadInput = 2, kDeviceOrSystem = 3 };
+
+struct RunOptions {
+  std::filesystem::path graph = "graph/ace.yaml";
+  graph::LoadOptions load;
+  double duration_s = 20;  ///< 0: until stopped
+  bool unchecked = false, require_rt = false;
+  std::string clock = "real", transport = "local", isolate;
+  std::filesystem::path report, output = "out";
+  uint64_t seed = 1;
+};
+
+/// `takt run`: loads, checks, composes, runs, reports. Returns the exit code.
+int run_graph(const RunOptions& options);
+
+}  // namespace takt::command

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "rt/memory/memory_use.hpp"
+
+#include <sys/resource.h>
+
+// Defined by takt_allocation_counter where a program links it, null otherwise.
+extern "C" __attribute__((weak)) uint64_t takt_thread_allocations();
+
+namespace takt {
+
+bool counting_allocations() { return takt_thread_allocations != nullptr; }
+
+MemoryUse thread_memory_use() {
+  MemoryUse use;
+  if (counting_allocations()) use.allocations = takt_thread_allocations();
+  rusage usage{};
+  getrusage(RUSAGE_THREAD, &usage);
+  use.page_faults = static_cast<uint64_t>(usage.ru_minflt + usage.ru_majflt);
+  return use;
+}
+
+}  // namespace takt
