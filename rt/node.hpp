@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a node author needs: Node, Input<T>, Output<T>, Param<T>, Setup, Job. A node declares its ports and parameters as
-// members; the runtime calls setup() once before start, run() once per job on one thread at a time, finish() after the
-// last job.
+// members; the runtime calls setup() and start() once, run() once per job on one thread at a time, finish() after the last
+// job.
 #pragma once
 #include <array>
 #include <filesystem>
@@ -171,6 +171,9 @@ class Node {
   virtual ~Node() = default;
 
   virtual void setup(Setup& setup) = 0;
+  /// Once the epoch (first planned instant of the run, shortly ahead) is fixed, before the first job, on the main thread:
+  /// a hardware node starts its device here.
+  virtual void start(int64_t epoch_ns) { static_cast<void>(epoch_ns); }
   /// One job. No allocation, lock, file or socket call, logging or exception in here.
   virtual void run(Job& job) = 0;
   /// After the last job, on the main thread. Files may be written.

@@ -118,11 +118,12 @@ int run_graph(const RunOptions& options) {
   cv::setNumThreads(1);
 
   const auto memory = prepare_process_memory();
+  const CpuLatencyHold latency = hold_cpu_dma_latency();
   std::vector<std::string> adjusted = graph.adjusted;
   adjusted.insert(adjusted.end(), memory.lacks.begin(), memory.lacks.end());
   if (options.require_rt && !memory.lacks.empty()) return refuse("--require-rt: " + memory.lacks.front(), kDeviceOrSystem);
+  if (!latency.granted()) adjusted.push_back(latency.lacks());
   for (const std::string& line : adjusted) std::fprintf(stderr, "takt: adjusted: %s\n", line.c_str());
-  const CpuLatencyHold latency;
 
   MonotonicClock real;
   VirtualClock simulated(1'000'000'000);

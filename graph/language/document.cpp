@@ -185,6 +185,10 @@ class Builder final : public YAML::EventHandler {
   std::vector<Level> levels_;
 };
 
+void add(std::vector<Problem>& problems, Position at, std::string text) {
+  problems.push_back({std::move(at), std::move(text)});
+}
+
 /// Position of the first byte that is no UTF-8 or a control character, if there is one.
 std::optional<Position> bad_byte(std::string_view text, const std::string& name) {
   Position at{name, 1, 1};
@@ -243,10 +247,11 @@ std::string Document::raw(const std::string& pointer) const {
 
 Document parse_document(std::string_view text, const std::string& name, const std::filesystem::path& directory,
                         std::vector<Problem>& problems) {
+  const Position start{name, 1, 1};
   Document document;
   document.file = name;
   if (const auto at = bad_byte(text, name)) {
-    problems.push_back({*at, "this byte is no UTF-8 text; save the file as UTF-8 without control characters"});
+    add(problems, *at, "this byte is no UTF-8 text; save the file as UTF-8 without control characters");
     return document;
   }
   const size_t before = problems.size();
@@ -255,26 +260,26 @@ Document parse_document(std::string_view text, const std::string& name, const st
     YAML::Parser parser(stream);
     Builder builder(document, directory, problems);
     if (!parser.HandleNextDocument(builder)) {
-      problems.push_back({{name, 1, 1}, "the file is empty; it begins with `takt: 1`"});
+      add(problems, start, "the file is empty; it begins with `takt: 1`");
     } else if (parser) {
       Document rest;
       rest.file = name;
       std::vector<Problem> ignored;
       Builder second(rest, directory, ignored);
       if (parser.HandleNextDocument(second))
-        problems.push_back({rest.value_at(""), "a second YAML document (---); one file holds one graph or schedule"});
+        add(problems, rest.value_at(""), "a second YAML document (---); one file holds one graph or schedule");
     }
   } catch (const YAML::Exception& error) {
-    const Position at = error.mark.is_null() ? Position{name, 1, 1}
+    const Position at = error.mark.is_null() ? start
                                              : Position{name, error.mark.line + 1, error.mark.column + 1};
-    problems.push_back({at, "no valid YAML: " + error.msg});
+    add(problems, at, "no valid YAML: " + error.msg);
     document.root = json();
   } catch (const std::exception& error) {
-    problems.push_back({{name, 1, 1}, std::string("no valid YAML: ") + error.what()});
+    add(problems, start, std::string("no valid YAML: ") + error.what());
     document.root = json();
   }
   if (document.root.is_null() && problems.size() == before)
-    problems.push_back({document.value_at(""), "the file holds no value; it begins with `takt: 1`"});
+    add(problems, document.value_at(""), "the file holds no value; it begins with `takt: 1`");
   return document;
 }
 

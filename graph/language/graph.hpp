@@ -61,6 +61,7 @@ struct DeviceSpec {
   std::string id, kind, driver;
   std::optional<Rate> rate;
   nlohmann::json settings = nlohmann::json::object();
+  std::vector<EdgeSpec> edges;  ///< commands to the device, such as a velocity
   Position position;
 };
 

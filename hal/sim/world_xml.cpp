@@ -176,7 +176,7 @@ tl::expected<World, DeviceError> load_world(const std::string& device_id, const 
   tinyxml2::XMLDocument document;
   if (document.LoadFile(file.string().c_str()) != tinyxml2::XML_SUCCESS) {
     const bool missing = document.ErrorID() == tinyxml2::XML_ERROR_FILE_NOT_FOUND;
-    return device_error(device_id, file.string() + (missing ? ": the world file cannot be opened" : ":" + std::to_string(document.ErrorLineNum()) + ": no well-formed XML"),
+    return device_error(device_id, file.string() + (missing ? ": the world file cannot be opened" : std::string(":").append(std::to_string(document.ErrorLineNum())) + ": no well-formed XML"),
                         missing ? "correct `world:` of the device" : "correct the XML");
   }
   Loader loader{device_id, file.string(), {}, {}};

@@ -82,14 +82,18 @@ void minimum_with(const uint32_t* HWY_RESTRICT in, int count, uint32_t* HWY_REST
   for (int i = 0; i < count; ++i) inout[i] = in[i] < inout[i] ? in[i] : inout[i];
 }
 
-void decode(const uint32_t* keys, const uint8_t* confidence_table, int min_confidence, int count, int16_t* disparity,
-            uint8_t* confidence) {
+void decode(const uint32_t* HWY_RESTRICT keys, int max_sum, int min_confidence, int count, int16_t* HWY_RESTRICT disparity,
+            uint8_t* HWY_RESTRICT confidence) {
+  // confidence_of without an integer division: numerators stay below 2^24, and the quotient of two such floats never
+  // rounds up to the next integer (it lies at least 1 / 65534 below, more than half a unit in the last place of 255).
+  const auto divisor = static_cast<float>(max_sum);
   for (int i = 0; i < count; ++i) {
-    const uint32_t key = keys[i];
-    const uint8_t zeta = confidence_table[key >> 16];
-    const bool reject = (key & 1) != 0 || zeta < min_confidence;
-    confidence[i] = zeta;
-    disparity[i] = reject ? int16_t{-1} : static_cast<int16_t>((key & 0xFFFF) >> 1);
+    const int sum = static_cast<int>(keys[i] >> 16);
+    confidence[i] = static_cast<uint8_t>(static_cast<int>(static_cast<float>(255 * (max_sum - sum) + max_sum / 2) / divisor));
+  }
+  for (int i = 0; i < count; ++i) {
+    const bool reject = (keys[i] & 1) != 0 || confidence[i] < min_confidence;
+    disparity[i] = reject ? int16_t{-1} : static_cast<int16_t>((keys[i] & 0xFFFF) >> 1);
   }
 }
 

@@ -22,9 +22,8 @@ struct ImageKernels {
   void (*minimum_along)(const uint32_t* in, int radius, int count, uint32_t* out);
   /// inout[i] = min(inout[i], in[i]).
   void (*minimum_with)(const uint32_t* in, int count, uint32_t* inout);
-  /// Keys (sum << 16 | disparity << 1 | ambiguous) to disparities and confidences; `confidence_table` is indexed by sum.
-  void (*decode)(const uint32_t* keys, const uint8_t* confidence_table, int min_confidence, int count, int16_t* disparity,
-                 uint8_t* confidence);
+  /// Keys (sum << 16 | disparity << 1 | ambiguous) to disparities and confidences (confidence_of, max_sum <= 65534).
+  void (*decode)(const uint32_t* keys, int max_sum, int min_confidence, int count, int16_t* disparity, uint8_t* confidence);
 };
 
 const ImageKernels& image_kernels();

@@ -84,7 +84,7 @@ struct Matcher::State {
   Rows<uint8_t> grey;
   Planes left, right_mirrored;
   Rows<uint32_t> keys, along, left_keys, right_keys;
-  Buffer<uint8_t> scratch_row, ring, zeros, columns, outside, confidence_table;
+  Buffer<uint8_t> scratch_row, ring, zeros, columns, outside;
   std::array<Buffer<uint32_t>, kMaxPlanes> reference_row;
   std::array<Buffer<uint8_t>, kMaxPlanes> search_row;
   Buffer<uint16_t> no_tail, last_tail, sums;
@@ -135,8 +135,6 @@ Matcher::State::State(int width_, int height_, int channels_, const MatcherParam
   along = Rows<uint32_t>(height, width, 0, kNoKey);
   left_keys = Rows<uint32_t>(height, width, 0, kNoKey);
   if (p.left_right_check) right_keys = Rows<uint32_t>(height, width, 0, kNoKey);
-  confidence_table = Buffer<uint8_t>(65536);
-  for (int sum = 0; sum <= p.max_sum(); ++sum) confidence_table.data()[sum] = confidence_of(sum, p.max_sum());
 }
 
 void Matcher::State::make_grey(ImageView<const uint8_t> image) {
@@ -284,8 +282,7 @@ bool Matcher::match(ImageView<const uint8_t> left, ImageView<const uint8_t> righ
   // Seen in a mirror the right image is a left one, and the left image as it is stored is the mirrored right one.
   if (s.p.left_right_check) s.search(s.right_mirrored, s.left, s.right_keys);
   for (int y = 0; y < s.height; ++y) {
-    s.images->decode(s.left_keys.row(y), s.confidence_table.data(), s.p.min_confidence, s.width, disparity.row(y),
-                     confidence.row(y));
+    s.images->decode(s.left_keys.row(y), s.p.max_sum(), s.p.min_confidence, s.width, disparity.row(y), confidence.row(y));
     if (s.p.left_right_check) s.reject_inconsistent(y, disparity.row(y));
   }
   return true;

@@ -79,7 +79,7 @@ class Cost {
     return hn::TableLookupBytes(squares_, hn::Min(biased_distance(a, b), hn::Set(kBytes, 15)));
   }
 
-  const RowJob& job_;
+  const RowJob job_;  // a copy: stores of bytes could change the original for all that the compiler knows
   Bytes c_max_, squares_;
   Bytes left_[kPlanes];
   ptrdiff_t offset_ = 0;
@@ -240,12 +240,18 @@ class Rows {
     return (second - best) * 256 <= static_cast<uint32_t>(job_.uniqueness) * second ? 1 : 0;
   }
 
+  /// Smallest of all lanes; the machine's own minimum of eight words where it has one.
   static HWY_INLINE uint32_t smallest_lane(Words v) {
+#if HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_AVX2
+    const hn::FixedTag<uint16_t, 8> eight;
 #if HWY_TARGET == HWY_AVX3
-    const hn::Half<decltype(kWords)> half;
-    const hn::Half<decltype(half)> quarter;
-    const auto v256 = hn::Min(hn::LowerHalf(half, v), hn::UpperHalf(half, v));
-    return hn::GetLane(hn::MinOfLanes(quarter, hn::Min(hn::LowerHalf(quarter, v256), hn::UpperHalf(quarter, v256))));
+    const hn::FixedTag<uint16_t, 16> sixteen;
+    const auto halves = hn::Min(hn::LowerHalf(sixteen, v), hn::UpperHalf(sixteen, v));
+#else
+    const auto halves = v;
+#endif
+    const auto quarters = hn::Min(hn::LowerHalf(eight, halves), hn::UpperHalf(eight, halves));
+    return static_cast<uint16_t>(_mm_cvtsi128_si32(_mm_minpos_epu16(quarters.raw)));
 #else
     return hn::GetLane(hn::MinOfLanes(kWords, v));
 #endif
@@ -268,7 +274,7 @@ class Rows {
     }
   }
 
-  const RowJob& job_;
+  const RowJob job_;  // a copy, see Cost
   Cost<kKind> cost_;
   int scale_;
   Words tail_;

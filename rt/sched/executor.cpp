@@ -4,7 +4,6 @@
 #include <pthread.h>
 
 #include <algorithm>
-#include <array>
 #include <barrier>
 #include <cstring>
 #include <numeric>
@@ -12,19 +11,14 @@
 #include <thread>
 #include <tuple>
 
+#include "rt/memory/process_memory.hpp"
+#include "rt/node.hpp"
 #include "rt/sched/cooperative.hpp"
 
 namespace takt {
 namespace {
 
 constexpr int kHighestPriority = 80;  // below the kernel's own interrupt threads (50 by default) nothing is gained
-
-/// Touches the stack a job may use, so that no job takes the page fault.
-void prefault_stack() {
-  constexpr size_t kBytes = 512 * 1024;
-  std::array<char, kBytes> stack;
-  for (size_t i = 0; i < kBytes; i += 4096) *static_cast<volatile char*>(&stack[i]) = 1;
-}
 
 void name_thread(const std::string& name) { pthread_setname_np(pthread_self(), name.substr(0, 15).c_str()); }
 
@@ -59,6 +53,7 @@ void Executor::start_clockwork(RunResult& result) {
   result.epoch_ns = clock_.now_ns() + (clock_.is_virtual() ? 0 : options_.start_delay_ns);
   if (options_.duration_ns > 0) stop_.set_planned_end(result.epoch_ns + options_.duration_ns);
   for (auto& lane : lanes_) lane->set_epoch(result.epoch_ns);
+  for (const TaskPlan& task : plan_.tasks) task.node->start(result.epoch_ns);
 }
 
 std::vector<Reservation> Executor::reservations(Policy policy) const {

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+// A suite is one file in bench/suites with one function; suites.cpp lists them.
+#pragma once
+#include <span>
+#include <stdexcept>
+#include <string_view>
+#include <vector>
+
+#include "bench/statistics.hpp"
+
+namespace takt::bench {
+
+struct Options {
+  int rounds = 0;  ///< 0: the suite's own default, chosen so that it takes less than about two minutes
+  int rounds_or(int standard) const { return rounds > 0 ? rounds : standard; }
+};
+
+/// Thrown by a suite that cannot run here (exit 3).
+struct CannotRun : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+struct Suite {
+  std::string_view name, what;
+  std::vector<Row> (*run)(const Options&);
+};
+
+std::span<const Suite> suites();
+
+/// Rows of B against A, and of A against itself ("NAME_null"), from interleaved rounds.
+void add_pair(std::vector<Row>& rows, Row row, const std::string& reference, const Pairs& pairs);
+
+}  // namespace takt::bench

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <array>
+
+#include "bench/suite.hpp"
+
+namespace takt::bench {
+
+std::vector<Row> run_transport(const Options&);
+std::vector<Row> run_release(const Options&);
+#ifdef TAKT_BENCH_STEREO
+std::vector<Row> run_stereo(const Options&);
+#endif
+
+std::span<const Suite> suites() {
+  static const auto list = std::to_array<Suite>({
+      {"transport", "one message from output to input: one worker, threads, processes", run_transport},
+      {"release", "lateness of the five rates against clock_nanosleep, idle and under load", run_release},
+#ifdef TAKT_BENCH_STEREO
+      {"stereo", "dense disparity at 640x480, 150 disparities, against OpenCV's matchers", run_stereo},
+#endif
+  });
+  return list;
+}
+
+void add_pair(std::vector<Row>& rows, Row row, const std::string& reference, const Pairs& pairs) {
+  Row null{row.name + "_null", row.unit, 0, {}, reference, {}, {}, row.granted};
+  row.reference = reference;
+  if (const auto middle = pairs.middle()) {
+    row.value = middle->value;
+    row.reference_value = middle->reference;
+    row.ratio = middle->ratio;
+  }
+  rows.push_back(std::move(row));
+  if (const auto middle = pairs.null()) {
+    null.value = middle->value;
+    null.reference_value = middle->reference;
+    null.ratio = middle->ratio;
+    rows.push_back(std::move(null));
+  }
+}
+
+}  // namespace takt::bench

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+// The contestants of the transport suite: each carries one message from a sender to a listener that sleeps, and notes
+// when it arrived. Listeners live in this process or in a forked one.
+#pragma once
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "rt/sched/grant.hpp"
+#include "rt/shm/transport.hpp"
+
+namespace takt::bench {
+
+enum class Carrier : uint8_t { futex, takt, iceoryx };
+enum class Place : uint8_t { same_worker, threads, processes };
+
+/// What is to be carried, and how.
+struct HopPlan {
+  Carrier carrier = Carrier::futex;
+  Place place = Place::threads;
+  uint32_t bytes = 0;  ///< of the message; 0: only the wake-up
+  bool second = false; ///< null contestant: the same thing again under another name
+  std::string name() const;
+};
+
+/// Shared between sender and listener, across a fork.
+struct Line {
+  alignas(64) std::atomic<uint32_t> word{0};  ///< futex
+  std::atomic<int64_t> sent_ns{0}, arrived_ns{0};
+  std::atomic<uint32_t> sent{0}, answered{0};
+};
+
+inline constexpr size_t kMaxHops = 32;
+
+struct Board {
+  Line lines[kMaxHops];
+  std::atomic<uint32_t> daemon_up{0}, listening{0}, stop{0};
+  char domain[64] = {};
+};
+
+/// How sender and listeners are scheduled.
+struct Conditions {
+  std::string name;
+  Reservation reservation;
+};
+
+/// All hops under one set of conditions: forks the listening process, starts the daemon, the listeners; ends it all.
+class Course {
+ public:
+  /// The calling process must have no other threads. Throws CannotRun.
+  Course(std::vector<HopPlan> hops, const Conditions& conditions);
+  ~Course();
+  Course(const Course&) = delete;
+  Course& operator=(const Course&) = delete;
+
+  const std::vector<HopPlan>& hops() const { return hops_; }
+  /// Publishes one message, loaned before the time starts (a job loans early and publishes last). The caller then
+  /// sleeps, so that listeners on its own CPU get to run.
+  void send(size_t hop);
+  /// From publication until the listener has the message in its hands, ns. Waits for it, however late it is: nothing is
+  /// dropped. Throws CannotRun after two seconds.
+  int64_t taken_ns(size_t hop) const;
+
+ private:
+  class Sender;
+  void listen_in_child();
+
+  std::vector<HopPlan> hops_;
+  Conditions conditions_;
+  Board* board_ = nullptr;
+  int child_ = -1;
+  std::vector<PortPlan> ports_;
+  std::unique_ptr<Transport> local_, across_;
+  std::vector<std::unique_ptr<Sender>> senders_;
+  struct Listeners;
+  std::unique_ptr<Listeners> listeners_;
+};
+
+int64_t now_ns();
+void sleep_until(int64_t instant_ns);
+
+}  // namespace takt::bench

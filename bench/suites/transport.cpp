@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: Apache-2.0
+// One message from output to input: on one worker, between threads, between processes, at the graph's own rates (15 Hz,
+// caches cold) and at 1 kHz. References: a bare futex wake, and iceoryx as its own users would call it. At 15 Hz the
+// contestants take turns message by message, at 1 kHz in blocks of 100.
+#include <algorithm>
+#include <cstdio>
+#include <exception>
+#include <thread>
+
+#include "bench/large_copies.hpp"
+#include "bench/suite.hpp"
+#include "bench/suites/hops.hpp"
+#include "rt/msg/messages.hpp"
+
+namespace takt::bench {
+
+std::vector<Row> run_transport(const Options& options);
+
+namespace {
+
+constexpr uint32_t kSizes[] = {128, 921'600, 3'686'400};
+constexpr int kPerRound15 = 15, kPerRound1000 = 100;
+constexpr int kWarmUp = 20;  // every chunk of every pool once, so that its pages are mapped
+
+std::vector<HopPlan> contestants() {
+  std::vector<HopPlan> hops{{Carrier::futex, Place::threads, 0, false},
+                            {Carrier::futex, Place::threads, 0, true},
+                            {Carrier::futex, Place::processes, 0, false}};
+  for (uint32_t bytes : kSizes) {
+    hops.push_back({Carrier::takt, Place::same_worker, bytes, false});
+    hops.push_back({Carrier::takt, Place::threads, bytes, false});
+    hops.push_back({Carrier::takt, Place::processes, bytes, false});
+    hops.push_back({Carrier::iceoryx, Place::processes, bytes, false});
+  }
+  return hops;
+}
+
+/// Per contestant: all samples, and the median of each round (us).
+struct Measured {
+  std::vector<Samples> all;
+  std::vector<std::vector<double>> rounds;
+};
+
+void close_round(Measured& out, std::vector<Samples>& round) {
+  for (size_t i = 0; i < round.size(); ++i) {
+    out.all[i].add(round[i].values());
+    out.rounds[i].push_back(round[i].quantile(0.5).value_or(0));
+    round[i].clear();
+  }
+}
+
+Measured measure(Course& course, bool slow, int rounds) {
+  const size_t count = course.hops().size();
+  Measured out{std::vector<Samples>(count), std::vector<std::vector<double>>(count)};
+  std::vector<Samples> round(count);
+  for (int i = 0; i < kWarmUp; ++i)
+    for (size_t hop = 0; hop < count; ++hop) {
+      course.send(hop);
+      sleep_until(now_ns() + 500'000);
+      course.taken_ns(hop);
+    }
+  int64_t next = now_ns() + 20'000'000;
+  const int64_t step = slow ? 1'000'000'000 / 15 / static_cast<int64_t>(count) : 1'000'000;
+  for (int r = 0; r < rounds; ++r) {
+    for (int outer = 0; outer < (slow ? kPerRound15 : static_cast<int>(count)); ++outer) {
+      for (int inner = 0; inner < (slow ? static_cast<int>(count) : kPerRound1000); ++inner) {
+        const auto hop = static_cast<size_t>(slow ? inner : outer);
+        sleep_until(next);
+        course.send(hop);
+        next = std::max(next, now_ns() - step) + step;  // a late answer moves the rest
+        sleep_until(next - step / 4);
+        round[hop].add(static_cast<double>(course.taken_ns(hop)) * 1e-3);
+      }
+    }
+    close_round(out, round);
+  }
+  return out;
+}
+
+size_t find(const std::vector<HopPlan>& hops, Carrier carrier, Place place, uint32_t bytes, bool second = false) {
+  const auto at = std::find_if(hops.begin(), hops.end(), [&](const HopPlan& h) {
+    return h.carrier == carrier && h.place == place && h.bytes == bytes && h.second == second;
+  });
+  return static_cast<size_t>(at - hops.begin());
+}
+
+class Table {
+ public:
+  Table(const std::vector<HopPlan>& hops, const Measured& measured, std::string variant, std::string granted, std::vector<Row>& rows)
+      : hops_(hops), measured_(measured), variant_(std::move(variant)), granted_(std::move(granted)), rows_(rows) {}
+
+  void compare(const std::string& what, size_t hop, size_t reference) {
+    Row row{"transport/" + what + "/" + variant_, "us", 0, measured_.all[hop], {}, {}, {}, granted_};
+    Pairs pairs;
+    for (double v : measured_.rounds[reference]) pairs.add_a(v);
+    for (double v : measured_.rounds[hop]) pairs.add_b(v);
+    add_pair(rows_, std::move(row), hops_[reference].name(), pairs);
+  }
+
+  void add_all() {
+    const size_t threads = find(hops_, Carrier::futex, Place::threads, 0);
+    const size_t processes = find(hops_, Carrier::futex, Place::processes, 0);
+    compare("futex_threads_null", find(hops_, Carrier::futex, Place::threads, 0, true), threads);
+    for (uint32_t bytes : kSizes) {
+      const std::string size = std::to_string(bytes);
+      const size_t across = find(hops_, Carrier::takt, Place::processes, bytes);
+      compare("same_worker_" + size, find(hops_, Carrier::takt, Place::same_worker, bytes), threads);
+      compare("threads_" + size, find(hops_, Carrier::takt, Place::threads, bytes), threads);
+      compare("processes_" + size, across, processes);
+      compare("processes_" + size + "_to_iceoryx", across, find(hops_, Carrier::iceoryx, Place::processes, bytes));
+      compare("iceoryx_processes_" + size, find(hops_, Carrier::iceoryx, Place::processes, bytes), processes);
+    }
+    compare("processes_largest_to_smallest", find(hops_, Carrier::takt, Place::processes, kSizes[2]),
+            find(hops_, Carrier::takt, Place::processes, kSizes[0]));
+    compare("threads_largest_to_smallest", find(hops_, Carrier::takt, Place::threads, kSizes[2]),
+            find(hops_, Carrier::takt, Place::threads, kSizes[0]));
+  }
+
+ private:
+  const std::vector<HopPlan>& hops_;
+  const Measured& measured_;
+  const std::string variant_, granted_;
+  std::vector<Row>& rows_;
+};
+
+std::string granted_text(const Grant& grant) {
+  if (!grant.refused.empty()) return grant.refused;
+  if (grant.policy != Policy::fixed) return "default policy";
+  return "SCHED_FIFO " + std::to_string(grant.priority) + (grant.cpus.size() == 1 ? ", CPU " + std::to_string(grant.cpus[0]) : "");
+}
+
+Row count_row(const std::string& name, uint64_t count, const std::string& granted) {
+  return {"transport/" + name, "count", static_cast<double>(count), {}, {}, {}, {}, granted};
+}
+
+void run_conditions(const Conditions& conditions, int rounds, std::vector<Row>& rows) {
+  std::fprintf(stderr, "transport: %s\n", conditions.name.c_str());
+  Course course(contestants(), conditions);
+  const uint64_t copies_before = large_copies();
+  // A thread of its own: the policy must not outlast the course.
+  std::exception_ptr failure;
+  std::thread([&] {
+    try {
+      const std::string granted = granted_text(apply(conditions.reservation));
+      for (bool slow : {true, false}) {
+        const Measured measured = measure(course, slow, rounds);
+        Table(course.hops(), measured, (slow ? "15hz_" : "1khz_") + conditions.name, granted, rows).add_all();
+      }
+      rows.push_back(count_row("copies_above_64_KiB/" + conditions.name, large_copies() - copies_before, granted));
+    } catch (...) {
+      failure = std::current_exception();
+    }
+  }).join();
+  if (failure) std::rethrow_exception(failure);
+}
+
+/// From nothing to the first message in the reader's hands.
+Row start_row(const char* name, std::unique_ptr<Transport> (*make)(std::span<const PortPlan>), int times) {
+  Row row{std::string("transport/start_to_first_message/") + name, "ms", 0, {}, {}, {}, {}, {}};
+  for (int i = 0; i < times; ++i) {
+    const std::vector<PortPlan> ports{{"bench", "start", &MessageType::of<Image>(), {.width = 640, .height = 480, .channels = 3}, 2, 1, 1}};
+    const int64_t begin = now_ns();
+    const auto transport = make(ports);
+    const auto writer = transport->make_writer(0);
+    const auto reader = transport->make_reader(0);
+    writer->loan();
+    writer->publish(0, 0, 0);
+    Candidate candidate;
+    if (reader->list(0, {&candidate, 1}) != 1) throw CannotRun("the first message did not arrive");
+    Held held = reader->take(candidate.sequence);
+    row.samples.add(static_cast<double>(now_ns() - begin) * 1e-6);
+    reader->release(held);
+  }
+  row.value = row.samples.quantile(0.5).value_or(0);
+  return row;
+}
+
+}  // namespace
+
+std::vector<Row> run_transport(const Options& options) {
+  const int rounds = options.rounds_or(8);
+  std::vector<Row> rows{start_row("local", make_local_transport, rounds), start_row("iceoryx", make_iceoryx_transport, rounds)};
+  const auto fifo = [](int core) {
+    Reservation r;
+    r.policy = Policy::fixed;
+    r.priority = 50;
+    r.core = core;
+    return r;
+  };
+  run_conditions({"fifo_one_cpu", fifo(0)}, rounds, rows);
+  run_conditions({"fifo", fifo(-1)}, rounds, rows);
+  run_conditions({"default", {}}, rounds, rows);
+  return rows;
+}
+
+}  // namespace takt::bench

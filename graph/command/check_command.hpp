@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <string>
+
+#include "graph/command/run_command.hpp"
+
+namespace takt::command {
+
+/// `takt check`: 0 admitted, 1 infeasible, 2 invalid. Opens the devices' files but starts nothing.
+int check_graph(const RunOptions& options, bool json);
+/// `takt nodes [TYPE]`.
+int print_nodes(const std::string& type);
+
+}  // namespace takt::command

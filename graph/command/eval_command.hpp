@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+// `takt eval TASK`: quality against ground truth. stdout carries the table, or with --json one object and nothing else.
+#pragma once
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace takt::command {
+
+struct EvalStereoOptions {
+  std::filesystem::path left, right, truth;
+  double truth_scale = 1;  ///< disparity = value / scale
+  int disparities = 64;
+  std::vector<std::string> set;  ///< "param=value" of the stereo node
+  bool json = false;
+};
+void add_eval_stereo(CLI::App& eval, EvalStereoOptions& options, int& exit_code);
+
+struct EvalEgoMotionOptions {
+  std::filesystem::path data;  ///< image_l/, image_r/, calib.txt, poses.txt
+  int disparities = 128;
+  bool json = false;
+};
+void add_eval_ego_motion(CLI::App& eval, EvalEgoMotionOptions& options, int& exit_code);
+
+}  // namespace takt::command

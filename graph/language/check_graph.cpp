@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+// What spans more than one edge: chains and modes.
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "graph/language/loader.hpp"
+
+namespace takt::graph {
+
+void Loader::check_chains() {
+  for (const auto& chain : spec_.chains) {
+    const std::string pointer = child("/chains", chain.name);
+    const size_t before = problems_.size();
+    bool known = true;
+    for (const auto& [key, port] : {std::pair{"from", &chain.from}, std::pair{"to", &chain.to}}) {
+      const Position at = graph_.value_at(child(pointer, key));
+      const auto part = parts_.find(port->node);
+      if (part == parts_.end()) {
+        problem(at, fmt::format("{} of chain {} is {}, but there is no node or device {}{}", ticked(key),
+                                ticked(chain.name), ticked(port->text()), ticked(port->node),
+                                alternatives(port->node, ids())));
+        continue;
+      }
+      known = known && part->second.known;
+      const bool end = std::string_view(key) == "to";
+      if (!part->second.known || part->second.output(port->port) != nullptr ||
+          (end && part->second.input(port->port) != nullptr))
+        continue;
+      problem(at, fmt::format("{} of chain {} is {}, but {} has no {} {}{}", ticked(key), ticked(chain.name),
+                              ticked(port->text()), ticked(port->node), end ? "port" : "output", ticked(port->port),
+                              alternatives(port->port, part->second.output_names(), "outputs of " + ticked(port->node))));
+    }
+    if (!known || problems_.size() > before) continue;
+    // Parts that data of `from` reach, edge by edge; if `to` is an input, the last edge must be the one into it.
+    std::set<std::string> reached;
+    bool ends = false;
+    for (bool grew = true; grew;) {
+      grew = false;
+      for (const auto& [id, part] : parts_)
+        for (const auto& edge : *part.edges) {
+          if (!(edge.from == chain.from) && !reached.contains(edge.from.node)) continue;
+          grew = reached.insert(id).second || grew;
+          if (id == chain.to.node) ends = ends || part.output(chain.to.port) != nullptr || edge.input == chain.to.port;
+        }
+    }
+    if (ends) continue;
+    problem(chain.position,
+            fmt::format("chain {}: no path of edges leads from {} to {}; from {} edges lead to: {}", ticked(chain.name),
+                        ticked(chain.from.text()), ticked(chain.to.text()), ticked(chain.from.text()),
+                        reached.empty() ? "(nothing)" : join_words({reached.begin(), reached.end()})));
+  }
+}
+
+void Loader::check_modes() {
+  for (const auto& mode : spec_.modes) check_mode(mode);
+  if (options_.mode == "full" || options_.mode.empty()) return;
+  std::vector<std::string> names{"full"};
+  for (const auto& mode : spec_.modes) names.push_back(mode.name);
+  if (std::find(names.begin(), names.end(), options_.mode) == names.end())
+    return problem({"--mode", 0, 0},
+                   fmt::format("graph {} has no mode {}{}", ticked(spec_.name), ticked(options_.mode),
+                               alternatives(options_.mode, names, "modes")));
+  spec_.mode = options_.mode;
+}
+
+void Loader::check_mode(const ModeSpec& mode) {
+  const std::string pointer = child(child("/modes", mode.name), "without");
+  std::set<std::string> without;
+  for (const auto& id : mode.without) {
+    if (!parts_.contains(id))
+      problem(item_at(pointer, id), fmt::format("mode {} is without {}, which is no node or device{}", ticked(mode.name),
+                                                ticked(id), alternatives(id, ids())));
+    else if (!without.insert(id).second)
+      problem(item_at(pointer, id), fmt::format("mode {} names {} twice", ticked(mode.name), ticked(id)));
+  }
+  for (const auto& [id, part] : parts_) {
+    if (without.contains(id)) continue;
+    for (const auto& edge : *part.edges) {
+      const PortInfo* input = part.input(edge.input);
+      if (!without.contains(edge.from.node) || (input != nullptr && input->need == Need::optional)) continue;
+      if (!part.known) continue;
+      problem(mode.position, fmt::format("mode {} leaves input {} of {} unconnected: it is without {}; add {} to "
+                                         "`without`, or keep {}",
+                                         ticked(mode.name), ticked(edge.input), ticked(id), ticked(edge.from.node),
+                                         ticked(id), ticked(edge.from.node)));
+    }
+    const auto entry = spec_.schedule.entries.find(id);
+    if (entry == spec_.schedule.entries.end() || !entry->second.on || !without.contains(entry->second.on->node)) continue;
+    problem(mode.position,
+            fmt::format("mode {} is without {}, whose output {} releases {}; add {} to `without`, or give it a rate",
+                        ticked(mode.name), ticked(entry->second.on->node), ticked(entry->second.on->text()), ticked(id),
+                        ticked(id)));
+  }
+}
+
+}  // namespace takt::graph

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <tuple>
+
+#include "graph/language/loader.hpp"
+#include "graph/language/schema.hpp"
+
+namespace takt::graph {
+
+std::string to_string(const Problem& problem) {
+  const Position& at = problem.position;
+  std::string text = at.file;
+  if (at.line > 0) text += ":" + std::to_string(at.line) + ":" + std::to_string(at.column);
+  return text + ": error: " + problem.text;
+}
+
+Loaded Loader::load(const std::filesystem::path& file) {
+  spec_.file = file.string();
+  std::error_code ignored;
+  spec_.directory = std::filesystem::absolute(file, ignored).parent_path();
+  graph_ = read_document(file, {file.string(), 0, 0}, problems_);
+  if (!graph_.root.is_null()) validate(graph_, Schema::graph, problems_);
+  if (graph_.root.is_object()) {
+    read_graph();
+    make_instances();
+    read_set();
+    read_params();
+    read_devices();
+    read_schedule();
+    make_parts();
+    check_edges();
+    check_chains();
+    check_schedule();
+    check_modes();
+  }
+  // By file (the graph first), then by place; what two stages found alike is said once.
+  const auto key = [&](const Problem& p) {
+    return std::tuple(p.position.file != graph_.file, p.position.file, p.position.line, p.position.column, p.text);
+  };
+  std::sort(problems_.begin(), problems_.end(), [&](const Problem& a, const Problem& b) { return key(a) < key(b); });
+  problems_.erase(std::unique(problems_.begin(), problems_.end(),
+                              [&](const Problem& a, const Problem& b) { return key(a) == key(b); }),
+                  problems_.end());
+  Loaded result;
+  if (problems_.empty()) result.graph = std::move(spec_);
+  result.problems = std::move(problems_);
+  return result;
+}
+
+Loaded load(const std::filesystem::path& file, const LoadOptions& options, const NodeTypes& types,
+            const DeviceCatalogue& devices) {
+  try {
+    return Loader(options, types, devices).load(file);
+  } catch (const std::exception& error) {
+    Loaded result;
+    result.problems.push_back({{file.string(), 1, 1}, std::string("the loader failed (a bug of Takt): ") + error.what()});
+    return result;
+  }
+}
+
+Loaded load(const std::filesystem::path& file, const LoadOptions& options, const NodeTypes& types) {
+  return load(file, options, types, hal_catalogue());
+}
+
+}  // namespace takt::graph

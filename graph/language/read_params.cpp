@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "graph/language/loader.hpp"
+#include "graph/language/quantity.hpp"
+
+namespace takt::graph {
+namespace {
+
+using nlohmann::json;
+
+/// The value as the parameter wants it, or what is wrong.
+tl::expected<ParamValue, std::string> convert(const ParamBase& param, const Given& given) {
+  const std::string kind = param.kind();
+  if (given.value.is_boolean()) return ParamValue(given.value.get<bool>());
+  if (kind != "integer" && kind != "number") {
+    if (given.value.is_string()) return ParamValue(given.value.get<std::string>());
+    if (given.value.is_number_integer()) return ParamValue(given.value.get<int64_t>());
+    return ParamValue(given.value.get<double>());
+  }
+  if (given.value.is_number_integer() && carries_no_unit(param.unit())) return ParamValue(given.value.get<int64_t>());
+  const auto number = parse_in_unit(given.raw, param.unit());
+  if (!number) return tl::make_unexpected(number.error());
+  if (kind == "number") return ParamValue(*number);
+  // 0.3m in millimetres may miss 300 by one rounding.
+  const double whole = std::round(*number);
+  if (std::abs(whole - *number) > 1e-9 * std::max(1.0, std::abs(whole)) || std::abs(whole) > 9e15)
+    return tl::make_unexpected(fmt::format("is `{}`, an integer is wanted", given.raw));
+  return ParamValue(static_cast<int64_t>(whole));
+}
+
+std::vector<std::string> param_names(const Node& node) {
+  std::vector<std::string> names;
+  for (const auto* param : node.params()) names.emplace_back(param->name());
+  return names;
+}
+
+}  // namespace
+
+Given Loader::given(const std::string& pointer, const json& value) const {
+  Given result;
+  result.value = value;
+  result.raw = graph_.raw(pointer);
+  result.key = graph_.key_at(pointer);
+  result.position = graph_.value_at(pointer);
+  return result;
+}
+
+void Loader::make_instances() {
+  std::vector<std::string> names;
+  for (const auto& [name, type] : types_.all()) names.push_back(name);
+  for (const auto& node : spec_.nodes) {
+    if (node.type.empty()) continue;  // the schema has reported it
+    const Position at =
+        graph_.value_at(child(child(child("/subsystems", node.subsystem), node.id), "type"));
+    const NodeType* type = types_.find(node.type);
+    if (type == nullptr) {
+      problem(at, fmt::format("node {} has the unknown type {}{}", ticked(node.id), ticked(node.type),
+                              alternatives(node.type, names, "node types")));
+      continue;
+    }
+    try {
+      instances_[node.id] = type->make();
+    } catch (const std::exception& error) {
+      problem(at, fmt::format("node {}: type {} cannot be made: {}", ticked(node.id), ticked(node.type), error.what()));
+    }
+  }
+}
+
+void Loader::read_set() {
+  const Position at{"--set", 0, 0};
+  for (const auto& text : options_.set) {
+    const size_t equals = text.find('='), dot = text.find('.');
+    if (equals == std::string::npos || dot == std::string::npos || dot == 0 || dot + 1 >= equals) {
+      problem(at, ticked(text) + " is not understood; write --set node.param=value");
+      continue;
+    }
+    Setting setting;
+    setting.id = text.substr(0, dot);
+    setting.name = text.substr(dot + 1, equals - dot - 1);
+    setting.given.raw = text.substr(equals + 1);
+    setting.given.key = setting.given.position = at;
+    std::error_code ignored;
+    const auto expanded = expand_variables(setting.given.raw, std::filesystem::current_path(ignored));
+    const auto value = resolve_scalar(setting.given.raw);
+    if (!expanded || !value) {
+      problem(at, ticked(text) + ": " + (expanded ? value.error() : expanded.error()));
+      continue;
+    }
+    if (value->is_null()) {
+      problem(at, ticked(text) + " has no value; write --set node.param=value");
+      continue;
+    }
+    if (!claimed_.contains(setting.id)) {
+      problem(at, fmt::format("{}: unknown id {}{}", ticked(text), ticked(setting.id), alternatives(setting.id, ids())));
+      continue;
+    }
+    setting.given.value = value->is_string() ? json(*expanded) : *value;
+    set_.push_back(std::move(setting));
+  }
+}
+
+void Loader::read_params() {
+  for (auto& node : spec_.nodes) {
+    const auto instance = instances_.find(node.id);
+    if (instance == instances_.end()) continue;
+    const std::string pointer = child(child(child("/subsystems", node.subsystem), node.id), "params");
+    const json::json_pointer where(pointer);
+    if (graph_.root.contains(where) && graph_.root.at(where).is_object()) {
+      for (const auto& [name, value] : graph_.root.at(where).items())
+        if (value.is_primitive() && !value.is_null())
+          read_param(node, *instance->second, name, given(child(pointer, name), value));
+    }
+    for (const auto& setting : set_)
+      if (setting.id == node.id) read_param(node, *instance->second, setting.name, setting.given);
+  }
+}
+
+void Loader::read_param(NodeSpec& node, Node& instance, const std::string& name, const Given& given) {
+  for (auto* param : instance.params()) {
+    if (param->name() != name) continue;
+    auto value = convert(*param, given);
+    const auto taken = value ? param->set(*value) : tl::make_unexpected(value.error());
+    if (!taken) {
+      // Where a range is quoted the unit belongs to it.
+      const bool ranged = value.has_value() && !carries_no_unit(param->unit());
+      return problem(given.position, fmt::format("parameter {} of node {} {}{}", ticked(name), ticked(node.id),
+                                                 taken.error(), ranged ? fmt::format(" (in {})", param->unit()) : ""));
+    }
+    node.params[name] = {*value, given.position};
+    return;
+  }
+  problem(given.key, fmt::format("node {} (type {}) has no parameter {}{}", ticked(node.id), ticked(node.type),
+                                 ticked(name), alternatives(name, param_names(instance))));
+}
+
+}  // namespace takt::graph

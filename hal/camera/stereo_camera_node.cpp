@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "hal/camera/stereo_camera_node.hpp"
+
+#include <cmath>
+
+namespace takt {
+
+StereoCameraNode::StereoCameraNode(std::unique_ptr<StereoCamera> camera, HealthThresholds thresholds)
+    : camera_(std::move(camera)), thresholds_(thresholds) {}
+
+void StereoCameraNode::setup(Setup& setup) {
+  open_in_setup();
+  format_ = camera_->format();
+  Capacity capacity;
+  capacity.width = static_cast<uint32_t>(format_.width);
+  capacity.height = static_cast<uint32_t>(format_.height);
+  capacity.channels = static_cast<uint32_t>(format_.channels);
+  pair_.reserve(capacity);
+  previous_.assign(static_cast<size_t>(health_samples(format_.width, format_.height, thresholds_.step_px)), 0);
+  has_previous_ = false;
+  // The planned rate as a fraction, so that the instant of the next release can be told exactly (1/15 s is no whole number
+  // of nanoseconds).
+  for (int64_t denominator = 1; denominator <= 1001 && rate_.numerator == 0 && setup.rate_hz > 0; ++denominator) {
+    const double numerator = setup.rate_hz * static_cast<double>(denominator);
+    if (std::abs(numerator - std::round(numerator)) < 1e-9 * numerator) {
+      rate_ = {static_cast<int64_t>(std::llround(numerator)), denominator};
+    }
+  }
+}
+
+int64_t StereoCameraNode::next_release(const Job& job) const {
+  // release(k) = floor(origin + k T) with a whole origin, hence origin = release(k) - floor(k T).
+  const auto k = static_cast<int64_t>(job.index());
+  const int64_t origin = job.release_ns() - rate_.release_ns(0, k);
+  return rate_.release_ns(origin, k + 1);
+}
+
+void StereoCameraNode::run(Job& job) {
+  if (!running(job)) return job.no_result();
+  // Usually the job before has asked for this exposure already.
+  if (triggered_ns_ != job.release_ns()) camera_->trigger(job.release_ns());
+  triggered_ns_ = INT64_MIN;
+  StereoPair* message = pair_.loan();
+  if (message == nullptr) return job.no_result();
+  message->width = format_.width;
+  message->height = format_.height;
+  message->channels = format_.channels;
+  const size_t bytes = static_cast<size_t>(format_.width) * static_cast<size_t>(format_.height) * static_cast<size_t>(format_.channels);
+  message->left.resize(bytes);
+  message->right.resize(bytes);
+  const StereoFrame frame = camera_->read(message->left_view(), message->right_view(), job.deadline_ns());
+  if (accept(frame.status, job)) {
+    const HealthReading health = assess_health(message->left_view(), thresholds_, previous_, has_previous_);
+    has_previous_ = true;
+    message->health = health.flags | frame.health | (frame.status == ReadStatus::partial ? image_health::partial : 0);
+    message->frame_number = frame.frame_number;
+    message->camera = format_.camera;
+    pair_.send(frame.stamp_ns);
+  }
+  if (rate_.numerator > 0 && !job.ended()) {
+    triggered_ns_ = next_release(job);
+    camera_->trigger(triggered_ns_);
+  }
+}
+
+}  // namespace takt

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include "hal/device.hpp"
+#include "rt/node.hpp"
+
+namespace takt {
+
+/// A node that feeds a device's data into the graph. The composition calls start_device(epoch) on all device nodes
+/// before the first release, and stop_device() after the last job; if it does not, the first job starts the device with
+/// its own release as the epoch.
+class DeviceNode : public Node {
+ public:
+  DeviceResult start_device(int64_t epoch_ns) {
+    DeviceResult result = device().start(epoch_ns);
+    started_ = result.has_value();
+    return result;
+  }
+  void stop_device() {
+    device().stop();
+    started_ = false;
+  }
+  void finish() override { stop_device(); }
+  virtual Device& device() = 0;
+
+ protected:
+  /// In a job: false if the device cannot be started (the job then has no result).
+  bool running(const Job& job) { return started_ || start_device(job.release_ns()).has_value(); }
+  /// Says what a read without data means; true if there is something to send.
+  static bool accept(ReadStatus status, Job& job) {
+    if (status == ReadStatus::end_of_data) job.end_of_data();
+    else if (status != ReadStatus::ok && status != ReadStatus::partial) job.no_result();
+    return status == ReadStatus::ok || status == ReadStatus::partial;
+  }
+  void open_in_setup() {
+    if (const auto opened = device().open(); !opened) throw SetupError(opened.error().text());
+  }
+
+ private:
+  bool started_ = false;
+};
+
+}  // namespace takt

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <memory>
+
+#include "hal/device_node.hpp"
+#include "hal/head/camera_head.hpp"
+
+namespace takt {
+
+/// Device kind `camera_head`: its state per release; passes the newest command on.
+class HeadNode final : public DeviceNode {
+ public:
+  explicit HeadNode(std::unique_ptr<CameraHead> head) : head_(std::move(head)) {}
+  void setup(Setup&) override { open_in_setup(); }
+  void run(Job& job) override;
+  Device& device() override { return *head_; }
+
+ private:
+  Input<HeadCommand> command_{this, "command", "wanted pan and tilt", Need::optional};
+  Output<HeadState> state_{this, "state", "measured pan and tilt"};
+  std::unique_ptr<CameraHead> head_;
+};
+
+}  // namespace takt

@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "hal/sim/sim_camera.hpp"
+
+#include <sched.h>
+
+#include <cstring>
+
+#include "hal/sim/random.hpp"
+
+namespace takt::sim {
+namespace {
+
+bool same(const CameraPose& a, const CameraPose& b) { return a.rotation == b.rotation && a.position == b.position; }
+
+void copy(const std::vector<uint8_t>& from, ImageView<uint8_t> to) {
+  const size_t row = static_cast<size_t>(to.width) * static_cast<size_t>(to.channels);
+  for (int y = 0; y < to.height; ++y) std::memcpy(to.row(y), from.data() + static_cast<size_t>(y) * row, row);
+}
+
+}  // namespace
+
+SimCamera::SimCamera(std::string id, SimCameraSettings settings, Simulation& simulation, const Clock& clock)
+    : id_(std::move(id)), settings_(std::move(settings)), simulation_(simulation), clock_(clock) {}
+
+SimCamera::~SimCamera() {
+  stop();
+  close();
+}
+
+DeviceResult SimCamera::open() {
+  const StereoRig& rig = settings_.rig;
+  if (rig.channels != 1 && rig.channels != 3) {
+    return device_error(id_, "the rig has " + std::to_string(rig.channels) + " channels", "use 1 (grey) or 3 (BGR)");
+  }
+  lens_ = std::make_unique<Lens>(rig);
+  if (settings_.background && !clock_.is_virtual()) {
+    background_lens_ = std::make_unique<Lens>(rig);
+    for (auto& image : prepared_) {
+      image.assign(static_cast<size_t>(rig.width) * static_cast<size_t>(rig.height) * static_cast<size_t>(rig.channels), 0);
+    }
+  }
+  return {};
+}
+
+void SimCamera::close() {
+  lens_.reset();
+  background_lens_.reset();
+}
+
+DeviceResult SimCamera::start(int64_t epoch_ns) {
+  if (!lens_) return device_error(id_, "start before open", "call open() first");
+  simulation_.begin(epoch_ns);
+  has_trigger_ = ever_triggered_ = false;
+  triggers_ = 0;
+  next_free_frame_ = 0;
+  started_ = true;
+  if (background_lens_ && !worker_.joinable()) {
+    quit_.store(false);
+    worker_ = std::thread([this] { work(); });
+  }
+  return {};
+}
+
+void SimCamera::stop() {
+  started_ = false;
+  if (!worker_.joinable()) return;
+  quit_.store(true);
+  asked_.fetch_add(1);
+  asked_.notify_one();
+  worker_.join();
+  done_.store(0);
+  asked_.store(0);
+}
+
+StereoFormat SimCamera::format() const {
+  const StereoRig& rig = settings_.rig;
+  return {rig.width, rig.height, rig.channels, rig.rectified, rig.camera(), settings_.rate.hz()};
+}
+
+SimCamera::Request SimCamera::request_at(int64_t at_ns) const {
+  return {at_ns, {simulation_.camera_pose(settings_.rig, 0, at_ns), simulation_.camera_pose(settings_.rig, 1, at_ns)}};
+}
+
+void SimCamera::trigger(int64_t at_ns) {
+  triggered_ns_ = at_ns;
+  has_trigger_ = ever_triggered_ = true;
+  ++triggers_;
+  // While the background thread works on an older exposure its request must stay as it is: that frame is then rendered by
+  // read(), and the thread is free again for the next one.
+  if (!worker_.joinable() || done_.load(std::memory_order_acquire) != asked_.load(std::memory_order_relaxed)) return;
+  request_ = request_at(at_ns);
+  asked_.fetch_add(1, std::memory_order_release);
+  asked_.notify_one();
+}
+
+void SimCamera::work() {
+  pthread_setname_np(pthread_self(), "sim-render");
+  const sched_param ordinary{};
+  pthread_setschedparam(pthread_self(), SCHED_OTHER, &ordinary);
+  const StereoRig& rig = settings_.rig;
+  uint32_t seen = 0;
+  for (;;) {
+    asked_.wait(seen, std::memory_order_acquire);
+    if (quit_.load()) return;
+    seen = asked_.load(std::memory_order_acquire);
+    const int64_t before = thread_cpu_ns();
+    render(*background_lens_, request_, {prepared_[0].data(), rig.width, rig.height, rig.channels},
+           {prepared_[1].data(), rig.width, rig.height, rig.channels});
+    made_ = request_;
+    add_simulator_cpu_ns(thread_cpu_ns() - before);
+    done_.store(seen, std::memory_order_release);
+  }
+}
+
+void SimCamera::render(Lens& lens, const Request& request, ImageView<uint8_t> left, ImageView<uint8_t> right) const {
+  // Noise belongs to the exposure's place in the run, so that two runs of one seed see the same.
+  const uint64_t exposure = mix(simulation_.seed(), static_cast<uint64_t>(request.at_ns - simulation_.epoch_ns()));
+  lens.render(simulation_.scene(), request.pose[0], settings_.noise, mix(exposure, 1), left);
+  lens.render(simulation_.scene(), request.pose[1], settings_.noise, mix(exposure, 2), right);
+}
+
+StereoFrame SimCamera::read(ImageView<uint8_t> left, ImageView<uint8_t> right, int64_t deadline_ns) {
+  StereoFrame frame;
+  if (!started_) return frame;
+  int64_t at_ns = triggered_ns_;
+  if (has_trigger_) {
+    frame.frame_number = triggers_ - 1;
+    if (at_ns > deadline_ns) return frame;
+  } else {
+    const int64_t now = clock_.now_ns(), epoch = simulation_.epoch_ns();
+    if (ever_triggered_ || now < epoch) return frame;
+    const int64_t newest = settings_.rate.releases_before(epoch, now + 1) - 1;
+    if (newest < next_free_frame_) return frame;
+    at_ns = settings_.rate.release_ns(epoch, newest);
+    frame.frame_number = static_cast<uint32_t>(newest);
+    next_free_frame_ = newest + 1;
+  }
+  has_trigger_ = false;
+  const Request request = request_at(at_ns);
+  const bool ready = worker_.joinable() && done_.load(std::memory_order_acquire) == asked_.load(std::memory_order_relaxed) &&
+                     made_.at_ns == at_ns && same(made_.pose[0], request.pose[0]) && same(made_.pose[1], request.pose[1]) &&
+                     asked_.load(std::memory_order_relaxed) != 0;
+  if (ready) {
+    copy(prepared_[0], left);
+    copy(prepared_[1], right);
+    ++rendered_ahead_;
+  } else {
+    const int64_t before = thread_cpu_ns();
+    render(*lens_, request, left, right);
+    add_simulator_cpu_ns(thread_cpu_ns() - before);
+  }
+  ++delivered_;
+  frame.status = ReadStatus::ok;
+  frame.stamp_ns = at_ns;
+  return frame;
+}
+
+}  // namespace takt::sim

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <pthread.h>
+
+#include <atomic>
+#include <memory>
+#include <thread>
+
+#include "hal/camera/rig.hpp"
+#include "hal/camera/stereo_camera.hpp"
+#include "hal/sim/lens.hpp"
+#include "hal/sim/simulation.hpp"
+#include "rt/time/clock.hpp"
+#include "rt/time/rate.hpp"
+
+namespace takt::sim {
+
+struct SimCameraSettings {
+  StereoRig rig;
+  SensorNoise noise;
+  Rate rate{15, 1};      ///< of exposures while nobody triggers
+  bool background = true; ///< render ahead of time in a thread of its own; ignored with a virtual clock
+};
+
+/// A stereo camera that looks at the simulated world.
+///
+/// trigger(t) with t ahead of now starts the rendering of that exposure in the thread "sim-render" (SCHED_OTHER); read()
+/// then merely copies. If the frame is not ready, or the robot turned out to be elsewhere, or the clock is virtual, read()
+/// renders itself: what is delivered depends on the exposure's stamp alone, never on timing. Nobody triggered: the
+/// camera runs free at `rate` from the epoch, and a read gives the newest exposure that was not delivered.
+class SimCamera final : public StereoCamera {
+ public:
+  SimCamera(std::string id, SimCameraSettings settings, Simulation& simulation, const Clock& clock);
+  ~SimCamera() override;
+
+  DeviceResult open() override;
+  void close() override;
+  DeviceResult start(int64_t epoch_ns) override;
+  void stop() override;
+  StereoFormat format() const override;
+  void trigger(int64_t at_ns) override;
+  StereoFrame read(ImageView<uint8_t> left, ImageView<uint8_t> right, int64_t deadline_ns) override;
+
+  /// Reads that found their frame rendered in the background, and all reads that delivered.
+  uint64_t rendered_ahead() const { return rendered_ahead_; }
+  uint64_t delivered() const { return delivered_; }
+
+ private:
+  struct Request {
+    int64_t at_ns = 0;
+    CameraPose pose[2];
+  };
+  void work();
+  Request request_at(int64_t at_ns) const;
+  void render(Lens& lens, const Request& request, ImageView<uint8_t> left, ImageView<uint8_t> right) const;
+
+  std::string id_;
+  SimCameraSettings settings_;
+  Simulation& simulation_;
+  const Clock& clock_;
+  std::unique_ptr<Lens> lens_, background_lens_;
+  std::vector<uint8_t> prepared_[2];
+
+  int64_t triggered_ns_ = 0;
+  bool has_trigger_ = false, ever_triggered_ = false, started_ = false;
+  uint32_t triggers_ = 0;
+  int64_t next_free_frame_ = 0;
+  uint64_t rendered_ahead_ = 0, delivered_ = 0;
+
+  // Hand-over to the background thread: it reads `request_` after it saw a new `asked_`, and writes `prepared_` and
+  // `made_` before it publishes `done_`. The reader touches `prepared_` only while done_ == asked_.
+  Request request_, made_;
+  std::atomic<uint32_t> asked_{0}, done_{0};
+  std::atomic<bool> quit_{false};
+  std::thread worker_;
+};
+
+}  // namespace takt::sim

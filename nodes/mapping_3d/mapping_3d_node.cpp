@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "nodes/mapping_3d/obstacle_grid.hpp"
+#include "nodes/mapping_3d/pose.hpp"
+#include "rt/node.hpp"
+
+namespace takt {
+namespace {
+
+using namespace mapping_3d;
+
+class MappingNode final : public Node {
+ public:
+  void setup(Setup&) override {
+    if (range_min_ >= range_max_)
+      throw SetupError("range_min is " + range_min_.value_text() + " m, must lie below range_max = " + range_max_.value_text() + " m");
+    ObstacleParameters p;
+    p.voxel_m = voxel_;
+    p.robot_height_m = robot_height_;
+    p.z_floor_m = z_floor_;
+    p.share = share_;
+    p.n_abs = n_abs_;
+    p.range_min_m = range_min_;
+    p.range_max_m = range_max_;
+    p.step_px = step_;
+    p.evidence = evidence_;
+    grid_ = ObstacleGrid(p);
+    const auto side = static_cast<uint32_t>(grid_.shape().cells);
+    obstacles_.reserve({side, side, 1, 0});
+    mount_ = camera_mount(camera_x_, camera_y_, camera_height_, 0, camera_tilt_);
+  }
+
+  void run(Job& job) override {
+    const PointCloud* cloud = cloud_.newest();
+    if (!cloud || (has_stamp_ && cloud_.stamp_ns() <= last_stamp_ns_) || !(cloud->camera.focal_px > 0)) return job.no_result();
+    Grid* grid = obstacles_.loan();
+    if (!grid) return job.no_result();
+    last_stamp_ns_ = cloud_.stamp_ns();
+    has_stamp_ = true;
+
+    // Motion::pose is the camera's; conjugated with the mount it is the robot's (erratum E-25).
+    size_t poses = 0;
+    for (size_t i = 0; i < motion_.size(); ++i) poses_[poses++] = {motion_.stamp_ns(i), motion_[i].pose};
+    const Transform pose = pose_at(std::span(poses_).first(poses), last_stamp_ns_);
+    const Viewpoint viewpoint = viewpoint_of(*cloud);
+    const GridShape shape = grid_.shape();
+    grid->width = grid->height = shape.cells;
+    grid->cell_m = shape.cell_m;
+    grid->origin_x_m = grid->origin_y_m = shape.origin_m;
+    grid->grid_in_map = compose(compose(viewpoint.camera_in_robot, pose), inverse(viewpoint.camera_in_robot));
+    if (!grid->cells.resize(static_cast<size_t>(shape.cells) * static_cast<size_t>(shape.cells))) return job.no_result();
+    grid_.fill(cloud->points.items(), viewpoint, grid->view());
+    obstacles_.send(last_stamp_ns_);
+  }
+
+ private:
+  Viewpoint viewpoint_of(const PointCloud& cloud) const {
+    const Transform& t = cloud.sensor_in_robot;
+    const bool said = t.x != 0 || t.y != 0 || t.z != 0 || t.qx != 0 || t.qy != 0 || t.qz != 0;
+    const double half = view_ > 0 ? view_ / 2 : std::atan2(cloud.camera.cu_px, cloud.camera.focal_px);
+    return {said ? t : mount_, cloud.camera.focal_px, half};
+  }
+
+  Input<PointCloud> cloud_{this, "cloud", "points in the camera frame"};
+  Input<Motion> motion_{this, "motion", "camera poses around the cloud's stamp; depth 16", Need::optional};
+  Output<Grid> obstacles_{this, "obstacles", "0.20 m grid around the robot, robot frame at the cloud's stamp"};
+  Param<double> voxel_{this, "voxel", 0.20, {0.05, 1.0}, "m", "edge of a voxel and of a cell"};
+  Param<double> robot_height_{this, "robot_height", 1.78, {0.1, 5.0}, "m", "higher points are no obstacles"};
+  Param<double> z_floor_{this, "z_floor", 0.07, {-1.0, 1.0}, "m", "lower points are floor"};
+  Param<double> share_{this, "share", 0.15, {0.0, 1.0}, "1", "points of a blocked voxel, share of a fully covered face"};
+  Param<int> n_abs_{this, "n_abs", 5, {0, 100000}, "", "a blocked voxel has more points than this"};
+  Param<double> range_min_{this, "range_min", 0.8, {0.0, 100.0}, "m", "nearer cells are not seen"};
+  Param<double> range_max_{this, "range_max", 6.0, {0.5, 50.0}, "m", "farther cells are not seen"};
+  Param<double> step_{this, "step", 1.0, {1.0, 64.0}, "px", "the cloud holds one point per step x step pixels"};
+  Param<bool> evidence_{this, "evidence", false, "", "a cell is free only if its column holds a point"};
+  Param<double> view_{this, "view", 0.0, {0.0, 3.14}, "rad", "horizontal angle of view; 0: twice atan(cu / f)"};
+  Param<double> camera_x_{this, "camera_x", 0.0, {-5.0, 5.0}, "m", "camera to the right of the robot's centre, where the cloud does not say"};
+  Param<double> camera_y_{this, "camera_y", 0.0, {-5.0, 5.0}, "m", "camera before the robot's centre, where the cloud does not say"};
+  Param<double> camera_height_{this, "camera_height", 1.6, {0.0, 5.0}, "m", "camera above the floor, where the cloud does not say"};
+  Param<double> camera_tilt_{this, "camera_tilt", 0.0, {-1.6, 1.6}, "rad", "camera tilt, up positive, where the cloud does not say"};
+
+  ObstacleGrid grid_;
+  Transform mount_;
+  std::array<StampedPose, InputPort::kMaxDepth> poses_;
+  int64_t last_stamp_ns_ = 0;
+  bool has_stamp_ = false;
+};
+
+}  // namespace
+
+void register_mapping_3d(NodeTypes& types) {
+  types.add<MappingNode>("mapping_3d", Layer::processing, "Obstacle grid around the robot from a point cloud");
+}
+
+}  // namespace takt
