@@ -12,13 +12,14 @@ struct DeviceError {
   std::string id;    ///< the device's id in the graph
   std::string what;
   std::string fix;
+  bool bad_input = true;  ///< false: the settings and files are right, but the hardware fails
   std::string text() const { return id + ": " + what + (fix.empty() ? "" : "\n  fix: " + fix); }
 };
 
 using DeviceResult = tl::expected<void, DeviceError>;
 
 inline tl::unexpected<DeviceError> device_error(std::string id, std::string what, std::string fix) {
-  return tl::unexpected(DeviceError{std::move(id), std::move(what), std::move(fix)});
+  return tl::unexpected(DeviceError{std::move(id), std::move(what), std::move(fix), true});
 }
 
 /// What a read found. A read never throws and never blocks beyond its deadline.
@@ -53,6 +54,7 @@ class Device {
   Device& operator=(const Device&) = delete;
   virtual ~Device() = default;
 
+  /// Calling it again while open changes nothing.
   virtual DeviceResult open() = 0;
   virtual void close() = 0;
   /// `epoch_ns` is the first planned instant of the run: sources that own their time line (replay, sim) begin there.

@@ -5,9 +5,8 @@
 
 namespace takt {
 
-/// A node that feeds a device's data into the graph. The composition calls start_device(epoch) on all device nodes
-/// before the first release, and stop_device() after the last job; if it does not, the first job starts the device with
-/// its own release as the epoch.
+/// A node that feeds a device's data into the graph. The runtime starts the device at the epoch and stops it after the
+/// last job; a device that did not start then is tried again by each job.
 class DeviceNode : public Node {
  public:
   DeviceResult start_device(int64_t epoch_ns) {
@@ -19,6 +18,7 @@ class DeviceNode : public Node {
     device().stop();
     started_ = false;
   }
+  void start(int64_t epoch_ns) override { static_cast<void>(start_device(epoch_ns)); }
   void finish() override { stop_device(); }
   virtual Device& device() = 0;
 

@@ -10,6 +10,8 @@
 
 #include <array>
 #include <csignal>
+#include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <ctime>
 #include <limits>
@@ -185,12 +187,13 @@ Course::Course(std::vector<HopPlan> hops, const Conditions& conditions) : hops_(
   void* memory = mmap(nullptr, sizeof(Board), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
   if (memory == MAP_FAILED) throw CannotRun("no shared memory");
   board_ = ::new (memory) Board;
+  std::fflush(nullptr);
   child_ = fork();
   if (child_ < 0) throw CannotRun("fork failed");
   if (child_ == 0) {
     prctl(PR_SET_PDEATHSIG, SIGKILL);
     listen_in_child();
-    _exit(0);
+    std::exit(0);  // not _exit: iceoryx removes its socket and lock in a static destructor
   }
   local_ = make_local_transport(ports_);
   across_ = make_iceoryx_transport(ports_);

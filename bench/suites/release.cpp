@@ -5,8 +5,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
-#include <barrier>
 #include <csignal>
 #include <cstdio>
 #include <memory>
@@ -16,6 +16,7 @@
 #include "bench/suites/hops.hpp"
 #include "rt/node.hpp"
 #include "rt/sched/executor.hpp"
+#include "rt/sched/rendezvous.hpp"
 
 namespace takt::bench {
 
@@ -84,7 +85,7 @@ Round raw_round(Policy policy, std::string& granted) {
   std::vector<std::vector<double>> late(std::size(kRates));
   std::vector<Grant> grants(std::size(kRates));
   std::atomic<int64_t> epoch{0};
-  std::barrier ready(static_cast<std::ptrdiff_t>(std::size(kRates)) + 1), go(static_cast<std::ptrdiff_t>(std::size(kRates)) + 1);
+  Rendezvous ready(std::size(kRates) + 1), go(std::size(kRates) + 1);
   std::vector<std::thread> threads;
   for (size_t i = 0; i < std::size(kRates); ++i) {
     late[i].reserve(64);

@@ -28,7 +28,7 @@ int true_disparity(int x, int y) {
 }
 
 struct Scene {
-  cv::Mat left{kHeight, kWidth, CV_8UC3}, right{kHeight, kWidth, CV_8UC3}, left_grey, right_grey;
+  cv::Mat left = cv::Mat(kHeight, kWidth, CV_8UC3), right = left.clone(), left_grey, right_grey;
   Scene() {
     std::mt19937 random(1);
     for (auto at = right.begin<cv::Vec3b>(); at != right.end<cv::Vec3b>(); ++at)

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 
-#include "graph/compose/plan_ports.hpp"
 #include "takt_commit.hpp"
 
 namespace takt::command {

@@ -11,9 +11,8 @@
 #include "graph/check/check.hpp"
 #include "graph/command/live_table.hpp"
 #include "graph/command/report.hpp"
-#include "hal/drivers.hpp"
+#include "graph/command/prepare.hpp"
 #include "rt/memory/process_memory.hpp"
-#include "rt/shm/transport_error.hpp"
 
 namespace takt::command {
 namespace {
@@ -44,32 +43,6 @@ class StopOnSignal {
   struct sigaction old_int_ {}, old_term_ {};
 };
 
-int refuse(const std::vector<graph::Problem>& problems, Exit code) {
-  for (const auto& problem : problems) std::fprintf(stderr, "%s\n", graph::to_string(problem).c_str());
-  std::fprintf(stderr, "takt: %zu problem%s, nothing was started\n", problems.size(), problems.size() == 1 ? "" : "s");
-  return code;
-}
-
-int refuse(const std::string& text, Exit code) {
-  std::fprintf(stderr, "takt: error: %s\n", text.c_str());
-  return code;
-}
-
-struct Sources {
-  hal::Devices devices;
-  graph::DeviceFactory factory(const graph::GraphSpec& graph, const Clock& clock, uint64_t seed) {
-    return [this, &graph, &clock, seed](const graph::DeviceSpec& spec) -> tl::expected<std::unique_ptr<Node>, graph::ComposeError> {
-      hal::DeviceConfig config{spec.id, spec.kind, spec.driver, spec.settings, graph.directory, seed};
-      auto node = hal::make_device(config, devices, clock);
-      if (node) return std::move(*node);
-      graph::ComposeError error;
-      error.problems.push_back({spec.position, fmt::format("device {}: {}; {}", spec.id, node.error().what, node.error().fix)});
-      error.device_failed = !node.error().bad_input;
-      return tl::make_unexpected(std::move(error));
-    };
-  }
-};
-
 std::unique_ptr<Transport> make_transport(const std::string& name, const Plan& plan) {
   return name == "iceoryx" ? make_iceoryx_transport(plan.ports) : make_local_transport(plan.ports);
 }
@@ -81,12 +54,13 @@ bool write_report(const std::filesystem::path& file, const nlohmann::ordered_jso
 }
 
 /// Runs the composed graph; everything it needs exists and is checked.
-int execute(const RunOptions& options, const graph::GraphSpec& graph, graph::Composition& composition, Clock& clock,
-            Sources& sources, std::vector<std::string> adjusted) {
+int execute(const RunOptions& options, Prepared& prepared, std::vector<std::string> adjusted) {
+  const graph::GraphSpec& graph = *prepared.graph;
+  graph::Composition& composition = *prepared.composition;
   const auto transport = make_transport(options.transport, composition.plan);
   const Executor::Options run{static_cast<int64_t>(options.duration_s * 1e9), 50'000'000,
                               options.require_rt || !options.load.policy.empty()};
-  Executor executor(composition.plan, *transport, clock, run);
+  Executor executor(composition.plan, *transport, *prepared.clock, run);
   const ProcessReading before = ProcessReading::now();
   RunResult result;
   {
@@ -100,7 +74,7 @@ int execute(const RunOptions& options, const graph::GraphSpec& graph, graph::Com
   for (const std::string& refused : result.refused)
     adjusted.push_back(fmt::format("policy {} -> cooperative: {}", to_string(graph.schedule.policy), refused));
   const auto report = make_report({graph, composition, executor, result, *transport, before, after,
-                                   hal::simulator_cpu_ns(sources.devices), options.clock,
+                                   hal::simulator_cpu_ns(prepared.devices), options.clock,
                                    std::string(to_string(graph.schedule.policy)), adjusted});
   std::fputs(summary_text(report).c_str(), stdout);
   if (!options.report.empty() && !write_report(options.report, report))
@@ -108,43 +82,35 @@ int execute(const RunOptions& options, const graph::GraphSpec& graph, graph::Com
   return report["ok"].get<bool>() ? kOk : kNotOk;
 }
 
+/// Locked memory, short wake-ups: what is refused is said.
+std::vector<std::string> prepare_machine(const CpuLatencyHold& latency) {
+  cv::setNumThreads(1);
+  std::vector<std::string> lacks = prepare_process_memory().lacks;
+  if (!latency.granted()) lacks.push_back(latency.lacks());
+  return lacks;
+}
+
 }  // namespace
 
 int run_graph(const RunOptions& options) {
-  const NodeTypes types = graph::node_types();
-  const graph::Loaded loaded = graph::load(options.graph, options.load, types);
-  if (!loaded.graph) return refuse(loaded.problems, kBadInput);
-  const graph::GraphSpec& graph = *loaded.graph;
-  cv::setNumThreads(1);
-
-  const auto memory = prepare_process_memory();
-  const CpuLatencyHold latency = hold_cpu_dma_latency();
-  std::vector<std::string> adjusted = graph.adjusted;
-  adjusted.insert(adjusted.end(), memory.lacks.begin(), memory.lacks.end());
-  if (options.require_rt && !memory.lacks.empty()) return refuse("--require-rt: " + memory.lacks.front(), kDeviceOrSystem);
-  if (!latency.granted()) adjusted.push_back(latency.lacks());
-  for (const std::string& line : adjusted) std::fprintf(stderr, "takt: adjusted: %s\n", line.c_str());
-
-  MonotonicClock real;
-  VirtualClock simulated(1'000'000'000);
-  Clock& clock = options.clock == "virtual" ? static_cast<Clock&>(simulated) : real;
-  Sources sources;
-  std::error_code ignored;
-  std::filesystem::create_directories(options.output, ignored);
+  std::error_code error;
+  std::filesystem::create_directories(options.output, error);
+  if (error) return refuse(fmt::format("--output {}: {}; choose a writable folder", options.output.string(), error.message()), kBadInput);
+  Prepared prepared;
   try {
-    auto composition = graph::compose(graph, types, sources.factory(graph, clock, options.seed), clock,
-                                      {options.output, options.seed});
-    if (!composition)
-      return refuse(composition.error().problems, composition.error().device_failed ? kDeviceOrSystem : kBadInput);
-    const graph::CheckResult check = graph::check(graph, composition->plan);
-    if (!check.admitted && !options.unchecked) return refuse(check.text, kNotOk);
-    return execute(options, graph, *composition, clock, sources, std::move(adjusted));
-  } catch (const PolicyRefused& refused) {
-    return refuse(refused.what(), kDeviceOrSystem);
-  } catch (const TransportError& error) {
-    return refuse(error.what(), kDeviceOrSystem);
-  } catch (const std::exception& error) {
-    return refuse(error.what(), kDeviceOrSystem);
+    if (const int code = prepare(options, prepared); code != kOk) return code;
+    const graph::CheckResult check = graph::check(*prepared.graph, prepared.composition->plan);
+    if (!check.admitted && !options.unchecked) return refuse(check.text + "(--unchecked runs it all the same)", kNotOk);
+
+    const CpuLatencyHold latency = hold_cpu_dma_latency();
+    const std::vector<std::string> lacks = prepare_machine(latency);
+    if (options.require_rt && !lacks.empty()) return refuse("--require-rt: " + lacks.front(), kDeviceOrSystem);
+    std::vector<std::string> adjusted = prepared.graph->adjusted;
+    adjusted.insert(adjusted.end(), lacks.begin(), lacks.end());
+    for (const std::string& line : adjusted) std::fprintf(stderr, "takt: adjusted: %s\n", line.c_str());
+    return execute(options, prepared, std::move(adjusted));
+  } catch (const std::exception& problem) {  // PolicyRefused, TransportError, no memory
+    return refuse(problem.what(), kDeviceOrSystem);
   }
 }
 

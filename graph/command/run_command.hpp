@@ -11,7 +11,7 @@ namespace takt::command {
 enum Exit : int { kOk = 0, kNotOk = 1, kBadInput = 2, kDeviceOrSystem = 3 };
 
 struct RunOptions {
-  std::filesystem::path graph = "graph/ace.yaml";
+  std::filesystem::path graph;  ///< empty: graph/ace.yaml of the project
   graph::LoadOptions load;
   double duration_s = 20;  ///< 0: until stopped
   bool unchecked = false, require_rt = false;

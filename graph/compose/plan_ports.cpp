@@ -28,17 +28,6 @@ size_t producer_of(const Plan& plan, size_t port) {
 
 }  // namespace
 
-double effective_rate_hz(const Plan& plan, size_t task) {
-  double divisor = 1;
-  for (size_t hops = 0; hops <= plan.tasks.size() && task != kNone; ++hops) {
-    const TaskPlan& t = plan.tasks[task];
-    if (t.rate) return t.rate->hz() / divisor;
-    divisor *= t.every;
-    task = t.on_task;
-  }
-  return 0;
-}
-
 void size_ports(Plan& plan) {
   // A join looks for equal stamps among outputs of different latency: keep as many messages as the slowest of them may
   // lag behind the fastest, here the longest deadline of any task.

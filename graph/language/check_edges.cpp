@@ -84,9 +84,11 @@ void Loader::make_parts() {
 
 void Loader::check_edges() {
   check_exports();
-  for (const auto& [id, part] : parts_) {
+  for (auto& [id, part] : parts_) {
+    const size_t before = problems_.size();
     for (const auto& edge : *part.edges) check_edge(id, part, edge);
     if (part.known) check_unconnected(id, part);
+    part.sound = part.known && problems_.size() == before;
   }
   check_joins();
 }
@@ -116,6 +118,10 @@ void Loader::check_edge(const std::string& id, const Part& to, const EdgeSpec& e
   if (input != nullptr && input->type->name != output->type->name)
     problem(edge.position, fmt::format("type mismatch: {} gives {}, but input {} takes {}", ticked(edge.from.text()),
                                        ticked(output->type->name), what, ticked(input->type->name)));
+  check_layer_and_hierarchy(id, from, to, edge);
+}
+
+void Loader::check_layer_and_hierarchy(const std::string& id, const Part& from, const Part& to, const EdgeSpec& edge) {
   // Commands to devices have no layer (design 3).
   if (to.known && !to.device && !layers_fit(from.layer, to.layer))
     problem(edge.position,

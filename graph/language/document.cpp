@@ -35,7 +35,7 @@ class Builder final : public YAML::EventHandler {
   }
   void OnScalar(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t, const std::string& value) override {
     const Position at = position(mark);
-    check_tag(at, tag);
+    if (!check_tag(at, tag)) return scalar(at, json(), value, false);
     if (value.size() > kLongestScalar) {
       problem(at, "text of " + std::to_string(value.size()) + " characters; at most " +
                       std::to_string(kLongestScalar) + " are allowed");
@@ -79,9 +79,10 @@ class Builder final : public YAML::EventHandler {
   void problem(const Position& at, std::string text) { problems_.push_back({at, std::move(text)}); }
   bool at_key() const { return !levels_.empty() && levels_.back().expects_key; }
 
-  void check_tag(const Position& at, const std::string& tag) {
-    if (!tag.empty() && tag != "?" && tag != "!")
-      problem(at, "tags (" + tag + ") are not part of the graph language; leave it out");
+  bool check_tag(const Position& at, const std::string& tag) {
+    if (tag.empty() || tag == "?" || tag == "!") return true;
+    problem(at, "tags (" + tag + ") are not part of the graph language; leave it out");
+    return false;
   }
 
   void text(const Position& at, const std::string& value) {

@@ -1,8 +1,98 @@
 // SPDX-License-Identifier: Apache-2.0
+// The devices of hal/ as the loader sees them. Apart from the loader, so that its tests need no device.
 #include "graph/language/catalogue.hpp"
+#include "hal/base/base_node.hpp"
+#include "hal/camera/stereo_camera_node.hpp"
+#include "hal/drivers.hpp"
+#include "hal/gpio/lines_node.hpp"
+#include "hal/head/head_node.hpp"
+#include "hal/laser/laser_node.hpp"
 
 namespace takt::graph {
+namespace {
 
-DeviceCatalogue hal_catalogue() { return {}; }
+using Kind = DeviceSetting::Kind;
+
+/// Ports of a hardware node, asked of the node itself; it holds no device and is never set up.
+template <class HardwareNode>
+std::vector<DevicePort> ports_of() {
+  const HardwareNode node(nullptr);
+  std::vector<DevicePort> ports;
+  for (const auto* input : node.inputs())
+    ports.push_back({std::string(input->name()), &input->type(), true, std::string(input->doc())});
+  for (const auto* output : node.outputs())
+    ports.push_back({std::string(output->name()), &output->type(), false, std::string(output->doc())});
+  return ports;
+}
+
+std::vector<DevicePort> ports_of(std::string_view kind) {
+  if (kind == "stereo_camera") return ports_of<StereoCameraNode>();
+  if (kind == "laser_scanner") return ports_of<LaserNode>();
+  if (kind == "camera_head") return ports_of<HeadNode>();
+  if (kind == "mobile_base") return ports_of<BaseNode>();
+  if (kind == "digital_lines") return ports_of<LinesNode>();
+  throw std::logic_error("device kind " + std::string(kind) + " has no node in graph/language/hal_catalogue.cpp");
+}
+
+DeviceSetting plain(const hal::SettingInfo& info) {
+  DeviceSetting setting;
+  setting.name = info.name;
+  setting.required = info.required;
+  setting.doc = info.doc;
+  switch (info.kind) {
+    case hal::SettingKind::path: setting.kind = Kind::path; break;
+    case hal::SettingKind::length: setting.kind = Kind::number, setting.unit = "m"; break;
+    case hal::SettingKind::angle: setting.kind = Kind::number, setting.unit = "rad"; break;
+    case hal::SettingKind::speed: setting.kind = Kind::number, setting.unit = "m/s"; break;
+    case hal::SettingKind::turn_rate: setting.kind = Kind::number, setting.unit = "rad/s"; break;
+    case hal::SettingKind::time: setting.kind = Kind::number, setting.unit = "s"; break;
+    case hal::SettingKind::rate: setting.kind = Kind::number; break;
+    case hal::SettingKind::number: setting.kind = Kind::number; break;
+    case hal::SettingKind::count: setting.kind = Kind::integer, setting.low = 0; break;
+    case hal::SettingKind::flag: setting.kind = Kind::flag; break;
+    case hal::SettingKind::text: setting.kind = Kind::text; break;
+    case hal::SettingKind::map: break;
+  }
+  return setting;
+}
+
+void add(std::vector<DeviceSetting>& settings, const hal::SettingInfo& info) {
+  if (info.name == "rate") return;  // the loader's own, of every device
+  if (info.kind != hal::SettingKind::map) return settings.push_back(plain(info));
+  // The only map there is places the device on the robot.
+  for (const char* axis : {"x", "y", "z", "yaw", "pitch", "roll"}) {
+    DeviceSetting setting;
+    setting.name = std::string(info.name) + "." + axis;
+    setting.kind = Kind::number;
+    setting.unit = std::string_view(axis).size() == 1 ? "m" : "rad";
+    setting.doc = info.doc;
+    settings.push_back(std::move(setting));
+  }
+}
+
+}  // namespace
+
+DeviceCatalogue hal_catalogue() {
+  DeviceCatalogue catalogue;
+  for (const auto& info : hal::device_kinds()) {
+    DeviceKindEntry kind;
+    kind.name = info.name;
+    kind.doc = info.doc;
+    kind.ports = ports_of(info.name);
+    for (const auto& driver : info.drivers) kind.drivers.push_back({std::string(driver.name), std::string(driver.doc), {}});
+    for (const auto& setting : info.settings) {
+      if (setting.driver.empty()) add(kind.settings, setting);
+      for (auto& driver : kind.drivers)
+        if (driver.name == setting.driver) add(driver.settings, setting);
+    }
+    catalogue.kinds[kind.name] = std::move(kind);
+  }
+  return catalogue;
+}
+
+Loaded load(const std::filesystem::path& file, const LoadOptions& options, const NodeTypes& types) {
+  static const DeviceCatalogue devices = hal_catalogue();
+  return load(file, options, types, devices);
+}
 
 }  // namespace takt::graph

@@ -52,14 +52,13 @@ Loaded load(const std::filesystem::path& file, const LoadOptions& options, const
   try {
     return Loader(options, types, devices).load(file);
   } catch (const std::exception& error) {
+    const Position at{file.string(), 1, 1};
+    Problem bug{at, "the loader failed (a bug of Takt): "};
+    bug.text += error.what();
     Loaded result;
-    result.problems.push_back({{file.string(), 1, 1}, std::string("the loader failed (a bug of Takt): ") + error.what()});
+    result.problems.push_back(std::move(bug));
     return result;
   }
-}
-
-Loaded load(const std::filesystem::path& file, const LoadOptions& options, const NodeTypes& types) {
-  return load(file, options, types, hal_catalogue());
 }
 
 }  // namespace takt::graph

@@ -22,6 +22,7 @@ struct PortInfo {
 struct Part {
   bool device = false;
   bool known = false;  ///< its type (kind) exists, so that its ports are known
+  bool sound = true;   ///< none of its edges was reported, so that what follows from them may be
   std::string subsystem;
   Layer layer = Layer::sensor;
   std::vector<PortInfo> inputs, outputs;
@@ -98,6 +99,7 @@ class Loader {
   void make_parts();
   void check_edges();
   void check_edge(const std::string& id, const Part& to, const EdgeSpec& edge);
+  void check_layer_and_hierarchy(const std::string& id, const Part& from, const Part& to, const EdgeSpec& edge);
   void check_exports();
   void check_unconnected(const std::string& id, const Part& part);
   void check_joins();

@@ -209,7 +209,7 @@ void Loader::read_device(DeviceSpec& device, std::set<std::string>& unclaimed) {
     if (name == "driver") continue;
     if (name == "rate") {
       const auto rate = parse_rate(given.raw);
-      if (rate) device.rate = *rate;
+      if (rate) device.rate = *rate, device.settings["rate"] = rate->hz();
       else problem(given.position, fmt::format("`rate` of device {} {}", ticked(device.id), rate.error()));
       continue;
     }

@@ -213,8 +213,9 @@ void Loader::check_on(const std::string& id, const ScheduleEntry& entry) {
     if (edge.from == *entry.on) return;
     read.push_back(edge.from.text());
   }
-  problem(at, fmt::format("`on` of {} is {}, which none of its inputs reads{}", ticked(id), ticked(entry.on->text()),
-                          alternatives(entry.on->text(), read, "its inputs read")));
+  if (self->second.sound)
+    problem(at, fmt::format("`on` of {} is {}, which none of its inputs reads{}", ticked(id),
+                            ticked(entry.on->text()), alternatives(entry.on->text(), read, "its inputs read")));
 }
 
 void Loader::check_on_cycles() {

@@ -55,6 +55,7 @@ void DrawCapsule(const CameraCapsule& c, const CapsuleSpan& span, float* inverse
     const auto qb = hn::Sub(hn::Mul(axx, d_oa), hn::Mul(set(c.a_axis), d_axis));
     const auto qh = hn::Sub(hn::Mul(qb, qb), hn::Mul(qa, cc));
     const auto body_hit = hn::Ge(qh, zero);
+    if (hn::AllFalse(f, body_hit)) continue;  // what misses the infinite cylinder misses the capsule
     const auto t_body = hn::Div(hn::Sub(hn::Neg(qb), hn::Sqrt(hn::Max(qh, zero))), qa);
     const auto along = hn::Add(set(c.a_axis), hn::Mul(t_body, d_axis));
     const auto on_body = hn::And(body_hit, hn::And(hn::Gt(along, zero), hn::Lt(along, axx)));
@@ -118,7 +119,16 @@ void Shade(const ShadeRun& run, const float* inverse_depth, uint8_t* b, uint8_t*
   const hn::Rebind<uint8_t, F> u8;
   const int lanes = static_cast<int>(hn::Lanes(f));
   const auto set = [&](float v) { return hn::Set(f, v); };
-  const auto mask = hn::Set(i, run.size - 1), size = hn::Set(i, run.size), one = hn::Set(i, 1);
+  const auto mask = hn::Set(i, run.size - 1), pitch = hn::Set(i, 4 * run.size), one = hn::Set(i, 1), low = hn::Set(i, 3);
+  // Texels lie in tiles of 4 x 4, one cache line each: the address is a part of u plus a part of v.
+  const auto column = [&](hn::Vec<I> v) {
+    const auto wrapped = hn::And(v, mask);
+    return hn::Add(hn::ShiftLeft<4>(hn::ShiftRight<2>(wrapped)), hn::And(wrapped, low));
+  };
+  const auto line = [&](hn::Vec<I> v) {
+    const auto wrapped = hn::And(v, mask);
+    return hn::Add(hn::Mul(hn::ShiftRight<2>(wrapped), pitch), hn::ShiftLeft<2>(hn::And(wrapped, low)));
+  };
   const auto* texels = reinterpret_cast<const int32_t*>(run.level);
   for (int k = 0; k < run.count; k += lanes) {
     const int x = run.x0 + k;
@@ -128,8 +138,7 @@ void Shade(const ShadeRun& run, const float* inverse_depth, uint8_t* b, uint8_t*
     const auto tv = hn::Add(set(run.v0), hn::Mul(z, hn::Add(hn::Mul(px, set(run.va)), set(run.vb))));
     const auto fu = hn::Floor(tu), fv = hn::Floor(tv);
     const auto iu = hn::ConvertTo(i, fu), iv = hn::ConvertTo(i, fv);
-    const auto u_0 = hn::And(iu, mask), u_1 = hn::And(hn::Add(iu, one), mask);
-    const auto v_0 = hn::Mul(hn::And(iv, mask), size), v_1 = hn::Mul(hn::And(hn::Add(iv, one), mask), size);
+    const auto u_0 = column(iu), u_1 = column(hn::Add(iu, one)), v_0 = line(iv), v_1 = line(hn::Add(iv, one));
     Corners c;
     c.t00 = hn::BitCast(u, hn::GatherIndex(i, texels, hn::Add(v_0, u_0)));
     c.t01 = hn::BitCast(u, hn::GatherIndex(i, texels, hn::Add(v_0, u_1)));

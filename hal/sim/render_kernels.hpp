@@ -38,8 +38,8 @@ void draw_capsule(const CameraCapsule& capsule, const CapsuleSpan& span, float* 
 struct ShadeRun {
   int x0 = 0, count = 0;  ///< up to 16 pixels
   float ua = 0, ub = 0, u0 = 0, va = 0, vb = 0, v0 = 0;
-  const uint32_t* level = nullptr;
-  int32_t size = 0;  ///< of the level, a power of two
+  const uint32_t* level = nullptr;  ///< tiled as in Texture
+  int32_t size = 0;                 ///< of the level, a power of two, at least 4
   float gain = 1;
   const float* gain_row = nullptr;  ///< per-pixel factor, or null
   uint32_t noise_seed = 0;          ///< of this row of this frame

@@ -203,7 +203,7 @@ int Renderer::mip_level(const Surface& s, int x, int y) const {
   const double footprint = std::sqrt((ux * ux + vx * vx) * (uy * uy + vy * vy));
   int level = 0;
   // Level l fits footprints around 2^l texels; 4 = 2^2 because footprint is squared.
-  for (double limit = 2.0 * 2.0; footprint > limit && level < Texture::kLevels - 1; limit *= 4.0) ++level;
+  for (double limit = 2.0 * 2.0; footprint > limit && level < s.texture->levels - 1; limit *= 4.0) ++level;
   return level;
 }
 

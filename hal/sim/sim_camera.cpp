@@ -28,6 +28,7 @@ SimCamera::~SimCamera() {
 }
 
 DeviceResult SimCamera::open() {
+  if (lens_) return {};
   const StereoRig& rig = settings_.rig;
   if (rig.channels != 1 && rig.channels != 3) {
     return device_error(id_, "the rig has " + std::to_string(rig.channels) + " channels", "use 1 (grey) or 3 (BGR)");

@@ -44,6 +44,8 @@ class SimCamera final : public StereoCamera {
   /// Reads that found their frame rendered in the background, and all reads that delivered.
   uint64_t rendered_ahead() const { return rendered_ahead_; }
   uint64_t delivered() const { return delivered_; }
+  /// True if the background thread has nothing left to render.
+  bool idle() const { return done_.load(std::memory_order_acquire) == asked_.load(std::memory_order_acquire); }
 
  private:
   struct Request {

@@ -151,8 +151,9 @@ HeadReading Simulation::head(int64_t at_ns) const {
   HeadReading r;
   r.status = ReadStatus::ok;
   r.stamp_ns = at_ns;
-  r.pan_rad = s[0] + dt * s[2];
-  r.tilt_rad = s[1] + dt * s[3];
+  const HeadLimits limits = head_limits();
+  r.pan_rad = std::clamp(s[0] + dt * s[2], -limits.pan_rad, limits.pan_rad);
+  r.tilt_rad = std::clamp(s[1] + dt * s[3], -limits.tilt_rad, limits.tilt_rad);
   r.pan_rad_s = s[2];
   r.tilt_rad_s = s[3];
   r.moving = std::abs(s[2]) > 1e-3 || std::abs(s[3]) > 1e-3;
@@ -173,15 +174,18 @@ void Simulation::step_head(int64_t tick) {
   const HeadLimits limits = head_limits();
   const auto* command = in_force(head_commands_, head_command_count_, epoch_ns() + (tick - 1) * History<4>::kTickNs);
   const double target[2] = {command ? command->a : 0, command ? command->b : 0};
+  const double reach[2] = {limits.pan_rad, limits.tilt_rad};
   const double fastest[2] = {limits.pan_rad_s, limits.tilt_rad_s};
   for (size_t axis = 0; axis < 2; ++axis) {
-    s[axis] += s[axis + 2] * kTickS;
+    s[axis] = std::clamp(s[axis] + s[axis + 2] * kTickS, -reach[axis], reach[axis]);  // mechanical stop
     const double error = target[axis] - s[axis];
     // Fastest speed from which the rest of the way suffices to brake; close to the target one tick must not overshoot it.
     const double braking = std::sqrt(2 * limits.acceleration_rad_s2 * std::abs(error)) * 0.9;
     const double wanted = std::copysign(std::min({fastest[axis], braking, std::abs(error) / kTickS}), error);
     s[axis + 2] = towards(s[axis + 2], wanted, limits.acceleration_rad_s2 * kTickS);
-    if (std::abs(error) < 1e-4 && std::abs(s[axis + 2]) < 0.1) {
+    // Arrived: there, or just past it with a speed that one tick takes away.
+    const bool passed = error * s[axis + 2] < 0 && std::abs(error) < std::abs(s[axis + 2]) * kTickS;
+    if ((std::abs(error) < 1e-4 || passed) && std::abs(s[axis + 2]) < 2 * limits.acceleration_rad_s2 * kTickS) {
       s[axis] = target[axis];
       s[axis + 2] = 0;
     }

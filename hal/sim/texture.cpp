@@ -87,20 +87,21 @@ void add_rectangles(Texture& texture, int count, uint64_t seed) {
   }
 }
 
+/// Appends the coarser levels, all row by row.
 void build_levels(Texture& texture) {
   int size = texture.size;
-  for (int level = 1; level < Texture::kLevels; ++level) {
-    const auto from = static_cast<size_t>(texture.offset[static_cast<size_t>(level - 1)]);
-    const int next = std::max(1, size / 2);
-    texture.offset[static_cast<size_t>(level)] = static_cast<int32_t>(texture.texels.size());
+  texture.levels = 1;
+  for (; size > 4 && texture.levels < Texture::kMaxLevels; ++texture.levels) {
+    const auto from = static_cast<size_t>(texture.offset[static_cast<size_t>(texture.levels - 1)]);
+    const int next = size / 2;
+    texture.offset[static_cast<size_t>(texture.levels)] = static_cast<int32_t>(texture.texels.size());
     for (int y = 0; y < next; ++y) {
       for (int x = 0; x < next; ++x) {
         uint32_t mean = 0;
         for (int channel = 0; channel < 24; channel += 8) {
           uint32_t sum = 2;
           for (int k = 0; k < 4; ++k) {
-            const int sx = std::min(2 * x + (k & 1), size - 1), sy = std::min(2 * y + (k >> 1), size - 1);
-            sum += texture.texels[from + static_cast<size_t>(sy * size + sx)] >> channel & 255;
+            sum += texture.texels[from + static_cast<size_t>((2 * y + (k >> 1)) * size + 2 * x + (k & 1))] >> channel & 255;
           }
           mean |= (sum / 4) << channel;
         }
@@ -108,6 +109,19 @@ void build_levels(Texture& texture) {
       }
     }
     size = next;
+  }
+}
+
+/// Rows -> tiles, level by level.
+void tile_levels(Texture& texture) {
+  std::vector<uint32_t> rows;
+  for (int level = 0; level < texture.levels; ++level) {
+    const int size = texture.size >> level;
+    uint32_t* texels = texture.texels.data() + texture.offset[static_cast<size_t>(level)];
+    rows.assign(texels, texels + static_cast<size_t>(size) * static_cast<size_t>(size));
+    for (int v = 0; v < size; ++v) {
+      for (int u = 0; u < size; ++u) texels[Texture::tiled(size, u, v)] = rows[static_cast<size_t>(v * size + u)];
+    }
   }
 }
 
@@ -129,6 +143,7 @@ Texture make_texture(const Recipe& recipe, uint64_t seed) {
     add_rectangles(texture, recipe.rectangles, mix(seed, 3));
   }
   build_levels(texture);
+  tile_levels(texture);
   return texture;
 }
 

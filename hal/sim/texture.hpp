@@ -9,13 +9,18 @@
 namespace takt::sim {
 
 /// A square, periodic colour texture with its mip levels (each the 2 x 2 box mean of the one before), one BGR texel in
-/// the low three bytes of a word.
+/// the low three bytes of a word. Texels lie in tiles of 4 x 4, so that a step in any direction mostly stays in a cache
+/// line: texel (u, v) of a level of size s is at (v / 4) * 4 s + (u / 4) * 16 + (v % 4) * 4 + u % 4.
 struct Texture {
-  static constexpr int kLevels = 8;
+  static constexpr int kMaxLevels = 8;
   int size = 0;  ///< of level 0, a power of two
   double texels_per_m = 0;
-  std::array<int32_t, kLevels> offset{};
+  int levels = 0;
+  std::array<int32_t, kMaxLevels> offset{};
   std::vector<uint32_t> texels;
+  static size_t tiled(int size, int u, int v) {
+    return static_cast<size_t>((v >> 2) * 4 * size + (u >> 2) * 16 + (v & 3) * 4 + (u & 3));
+  }
 };
 
 enum class Material : uint8_t { sky, floor, plaster, ceiling, wood, cardboard, poster, cloth, skin };

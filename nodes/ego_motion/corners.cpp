@@ -20,6 +20,8 @@ CornerDetector::CornerDetector(int width, int height, const CornerParameters& pa
   const auto columns = static_cast<size_t>(width);
   const auto pixels = columns * static_cast<size_t>(height);
   for (int i = 0; i < 3; ++i) xx_[i].resize(columns), xy_[i].resize(columns), yy_[i].resize(columns);
+  smooth_.resize(columns);
+  step_.resize(columns);
   for (auto* line : {&sum_xx_, &sum_xy_, &sum_yy_, &peak_}) line->resize(columns);
   response_.resize(pixels);
   candidates_.reserve(pixels / 4 + 1);  // a 3 x 3 peak excludes its neighbours
@@ -33,13 +35,19 @@ void CornerDetector::gradient_row(const Plane& image, int y) {
   const uint8_t* a = image.row(y - 1);
   const uint8_t* b = image.row(y);
   const uint8_t* c = image.row(y + 1);
+  // Separable Sobel: smoothed down the column for gx, differenced for gy; 16 bits hold both.
+  int16_t* __restrict smooth = smooth_.data();
+  int16_t* __restrict step = step_.data();
+  for (int x = 0; x < width_; ++x) {
+    smooth[x] = static_cast<int16_t>(a[x] + 2 * b[x] + c[x]);
+    step[x] = static_cast<int16_t>(c[x] - a[x]);
+  }
   float* __restrict xx = xx_[y % 3].data();
   float* __restrict xy = xy_[y % 3].data();
   float* __restrict yy = yy_[y % 3].data();
   for (int x = 1; x < width_ - 1; ++x) {
-    const int gx = (a[x + 1] - a[x - 1]) + 2 * (b[x + 1] - b[x - 1]) + (c[x + 1] - c[x - 1]);
-    const int gy = (c[x - 1] - a[x - 1]) + 2 * (c[x] - a[x]) + (c[x + 1] - a[x + 1]);
-    const auto fx = static_cast<float>(gx), fy = static_cast<float>(gy);
+    const auto fx = static_cast<float>(static_cast<int16_t>(smooth[x + 1] - smooth[x - 1]));
+    const auto fy = static_cast<float>(static_cast<int16_t>(step[x - 1] + 2 * step[x] + step[x + 1]));
     xx[x] = fx * fx;
     xy[x] = fx * fy;
     yy[x] = fy * fy;

@@ -45,6 +45,7 @@ class CornerDetector {
   int width_ = 0, height_ = 0;
   CornerParameters p_;
   std::vector<float> xx_[3], xy_[3], yy_[3];  // products of the gradients, ring of three rows
+  std::vector<int16_t> smooth_, step_;
   std::vector<float> sum_xx_, sum_xy_, sum_yy_, peak_;
   std::vector<float> response_;
   std::vector<uint64_t> candidates_;  // response bits above, inverted pixel index below: one integer order, no ties

@@ -10,6 +10,7 @@ namespace takt::ego_motion {
 namespace {
 
 constexpr int kLevels = 4;
+constexpr int kCoarseHalf = 3;  // block at the coarsest level, where most positions are tested
 constexpr double kLongestGap = 10;  // constant velocity is not stretched further than this many intervals
 
 int round_int(double v) { return static_cast<int>(std::lround(v)); }
@@ -47,9 +48,9 @@ std::string Parameters::error() const {
 
 void EgoMotion::configure(int width, int height, const Parameters& parameters) {
   if (const std::string error = parameters.error(); !error.empty()) throw std::invalid_argument("ego_motion: " + error);
-  if (width < 64 || height < 64 || width > 16384 || height > 16384)
+  if (width < 128 || height < 128 || width > 16384 || height > 16384)
     throw std::invalid_argument("ego_motion: image of " + std::to_string(width) + " x " + std::to_string(height) +
-                                " px, each side must lie in 64..16384");
+                                " px, each side must lie in 128..16384");
   p_ = parameters;
   width_ = width;
   height_ = height;
@@ -150,10 +151,11 @@ BlockMatch EgoMotion::search_pyramid(const Tracked& from, int guess_x, int guess
   for (int l = top; l >= 0; --l) {
     const Plane& before = previous_.level(l);
     const Plane& now = current_.level(l);
-    const int x = std::clamp(from.corner.x >> l, half_, before.width() - 1 - half_);
-    const int y = std::clamp(from.corner.y >> l, half_, before.height() - 1 - half_);
+    const int half = l == top ? std::min(half_, kCoarseHalf) : half_;
+    const int x = std::clamp(from.corner.x >> l, half, before.width() - 1 - half);
+    const int y = std::clamp(from.corner.y >> l, half, before.height() - 1 - half);
     Patch patch;
-    patch.take(before, x, y, half_);
+    patch.take(before, x, y, half);
     const int radius = l == top ? static_cast<int>(range) >> l : l == 0 ? 1 : 2;
     best = block_search(patch, now, x + dx, y + dy, radius, radius);
     if (l == 1) {

@@ -67,7 +67,7 @@ struct Frame {
 class EgoMotion {
  public:
   EgoMotion() = default;
-  /// Takes all memory. Throws std::invalid_argument on parameters out of range or images under 64 x 64 px; before start only.
+  /// Takes all memory. Throws std::invalid_argument on parameters out of range or images under 128 x 128 px; before start only.
   void configure(int width, int height, const Parameters& parameters);
   /// Motion since the frame of the call before; the first call (and one after reset()) gives a keyframe.
   Result step(const Frame& frame);

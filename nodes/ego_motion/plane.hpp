@@ -7,10 +7,10 @@
 
 namespace takt::ego_motion {
 
-/// A grey image that owns its memory. Rows may be read 16 bytes past their end (vector loads of a patch row).
+/// A grey image that owns its memory. Rows may be read 32 bytes past their end (vector loads of patch rows).
 class Plane {
  public:
-  static constexpr int kPadding = 16;
+  static constexpr int kPadding = 32;
   Plane() = default;
   Plane(int width, int height)
       : width_(width), height_(height), stride_((width + kPadding + 63) / 64 * 64),

@@ -31,34 +31,40 @@ bool RefinePatch::take(const Plane& image, double x, double y, int half) {
   const int size = 2 * half + 1;
   const int x0 = static_cast<int>(std::floor(x)), y0 = static_cast<int>(std::floor(y));
   const Weights w = weights(x - x0, y - y0);
-  float sample[17][17];  // one more on each side for central differences
+  float sample[17][kRow + 2];  // one more on each side for central differences; columns beyond the patch are not used
   for (int v = 0; v < size + 2; ++v) {
     const uint8_t* p = image.row(y0 - half - 1 + v) + x0 - half - 1;
     const uint8_t* q = p + image.stride();
-    for (int u = 0; u < size + 2; ++u) sample[v][u] = w.a * p[u] + w.b * p[u + 1] + w.c * q[u] + w.d * q[u + 1];
+    for (int u = 0; u < kRow + 2; ++u) sample[v][u] = w.a * p[u] + w.b * p[u + 1] + w.c * q[u] + w.d * q[u + 1];
   }
-  float mean_x = 0, mean_y = 0;
+  float in[kRow];
+  for (int u = 0; u < kRow; ++u) in[u] = u < size ? 1.0f : 0.0f;
+  // Column-wise accumulators, as in sums().
+  float column_x[kRow] = {}, column_y[kRow] = {};
   for (int v = 0; v < size; ++v)
     for (int u = 0; u < kRow; ++u) {
-      const bool in = u < size;
-      value_[v][u] = in ? sample[v + 1][u + 1] : 0;
-      gx_[v][u] = in ? 0.5f * (sample[v + 1][u + 2] - sample[v + 1][u]) : 0;
-      gy_[v][u] = in ? 0.5f * (sample[v + 2][u + 1] - sample[v][u + 1]) : 0;
-      mean_x += gx_[v][u];
-      mean_y += gy_[v][u];
+      value_[v][u] = sample[v + 1][u + 1];
+      gx_[v][u] = 0.5f * in[u] * (sample[v + 1][u + 2] - sample[v + 1][u]);
+      gy_[v][u] = 0.5f * in[u] * (sample[v + 2][u + 1] - sample[v][u + 1]);
+      column_x[u] += gx_[v][u];
+      column_y[u] += gy_[v][u];
     }
-  const auto count = static_cast<float>(size * size);
-  mean_x /= count;
-  mean_y /= count;
-  xx_ = xy_ = yy_ = 0;
+  float mean_x = 0, mean_y = 0;
+  for (int u = 0; u < kRow; ++u) mean_x += column_x[u], mean_y += column_y[u];
+  mean_x /= static_cast<float>(size * size);
+  mean_y /= static_cast<float>(size * size);
+  float xx[kRow] = {}, xy[kRow] = {}, yy[kRow] = {};
   for (int v = 0; v < size; ++v)
-    for (int u = 0; u < size; ++u) {
-      gx_[v][u] -= mean_x;
-      gy_[v][u] -= mean_y;
-      xx_ += gx_[v][u] * gx_[v][u];
-      xy_ += gx_[v][u] * gy_[v][u];
-      yy_ += gy_[v][u] * gy_[v][u];
+    for (int u = 0; u < kRow; ++u) {
+      const float x_gradient = gx_[v][u] - in[u] * mean_x, y_gradient = gy_[v][u] - in[u] * mean_y;
+      gx_[v][u] = x_gradient;
+      gy_[v][u] = y_gradient;
+      xx[u] += x_gradient * x_gradient;
+      xy[u] += x_gradient * y_gradient;
+      yy[u] += y_gradient * y_gradient;
     }
+  xx_ = xy_ = yy_ = 0;
+  for (int u = 0; u < kRow; ++u) xx_ += xx[u], xy_ += xy[u], yy_ += yy[u];
   return true;
 }
 

@@ -31,7 +31,8 @@ class RefinePatch {
   bool sums(const Plane& image, double x, double y, Sums& out) const;
 
   int half_ = 0;
-  float value_[15][kRow], gx_[15][kRow], gy_[15][kRow];  // zero beyond the patch, so that sums need no tail
+  // Gradients are zero beyond the patch, so that sums need no tail.
+  float value_[15][kRow], gx_[15][kRow], gy_[15][kRow];
   float xx_ = 0, xy_ = 0, yy_ = 0;
 };
 

@@ -42,11 +42,11 @@ void grey(const uint8_t* bgr, int count, uint8_t* out) {
 }
 
 void derivative(const uint8_t* before, const uint8_t* after, int count, uint8_t* out) {
-  // (after - before + 256) >> 1 is the rounded mean of after and 255 - before.
-  const Bytes bias = hn::Set(kBytes, 0x80);
-  for (int i = 0; i < count; i += kByteLanes)
-    hn::StoreU(hn::Xor(hn::AverageRound(hn::LoadU(kBytes, after + i), hn::Not(hn::LoadU(kBytes, before + i))), bias), kBytes,
-               out + i);
+  const Bytes most = hn::Set(kBytes, 127), least = hn::Set(kBytes, 128);
+  for (int i = 0; i < count; i += kByteLanes) {
+    const Bytes a = hn::LoadU(kBytes, after + i), b = hn::LoadU(kBytes, before + i);
+    hn::StoreU(hn::Sub(hn::Min(hn::SaturatedSub(a, b), most), hn::Min(hn::SaturatedSub(b, a), least)), kBytes, out + i);
+  }
 }
 
 void channel(const uint8_t* pixels, int channels, int channel, int count, uint8_t bias, uint8_t* out) {

@@ -11,7 +11,7 @@ constexpr int kRowPadding = 64;
 struct ImageKernels {
   /// BGR to grey (grey_of).
   void (*grey)(const uint8_t* bgr, int count, uint8_t* out);
-  /// derivative_of(before[i], after[i]) ^ 0x80.
+  /// twice_derivative(before[i], after[i]), as bytes.
   void (*derivative)(const uint8_t* before, const uint8_t* after, int count, uint8_t* out);
   /// Channel `channel` of interleaved pixels, every byte ^ bias.
   void (*channel)(const uint8_t* pixels, int channels, int channel, int count, uint8_t bias, uint8_t* out);

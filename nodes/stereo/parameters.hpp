@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -8,7 +9,7 @@ namespace takt::stereo {
 
 /// What two pixels cost when they are said to show the same point.
 enum class CostKind : uint8_t {
-  gradient,  ///< min(c_max, |dGx| + |dGy|) on the grey image, G = central difference / 2
+  gradient,  ///< min(c_max, |dGx| + |dGy|) on the grey image, G = central difference / 2, the sum rounded up
   ssd,       ///< min(c_max, sum over channels of squared differences) (thesis Eq. 3.1, 3.3 with w = 1)
   sad        ///< min(c_max, sum over channels of absolute differences)
 };
@@ -41,7 +42,7 @@ inline uint8_t confidence_of(int sum, int max_sum) {
 /// Grey value of a BGR pixel: ITU-R BT.601 weights in 1/256.
 inline uint8_t grey_of(int b, int g, int r) { return static_cast<uint8_t>((29 * b + 150 * g + 77 * r + 128) >> 8); }
 
-/// Derivative of a grey image from the two neighbours: central difference / 2 (rounded up), plus 128.
-inline uint8_t derivative_of(int before, int after) { return static_cast<uint8_t>((after - before + 256) >> 1); }
+/// Twice the derivative of a grey image, from the two neighbours of a pixel, saturated to -128..127.
+inline int8_t twice_derivative(int before, int after) { return static_cast<int8_t>(std::clamp(after - before, -128, 127)); }
 
 }  // namespace takt::stereo

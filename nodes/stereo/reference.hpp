@@ -22,7 +22,7 @@ class PixelCost {
     if (xl < 0 || xr < 0 || xl >= left_.width || xr >= left_.width) return p_.truncation();
     int sum = 0;
     if (p_.cost == CostKind::gradient) {
-      sum = std::abs(dx(left_, xl, y) - dx(right_, xr, y)) + std::abs(dy(left_, xl, y) - dy(right_, xr, y));
+      sum = (std::abs(dx(left_, xl, y) - dx(right_, xr, y)) + std::abs(dy(left_, xl, y) - dy(right_, xr, y)) + 1) / 2;
     } else {
       for (int c = 0; c < left_.channels; ++c) {
         const int difference = left_.at(xl, y, c) - right_.at(xr, y, c);
@@ -38,8 +38,8 @@ class PixelCost {
     y = std::clamp(y, 0, image.height - 1);
     return image.channels == 1 ? image.at(x, y) : grey_of(image.at(x, y, 0), image.at(x, y, 1), image.at(x, y, 2));
   }
-  static int dx(Bytes image, int x, int y) { return derivative_of(grey(image, x - 1, y), grey(image, x + 1, y)); }
-  static int dy(Bytes image, int x, int y) { return derivative_of(grey(image, x, y - 1), grey(image, x, y + 1)); }
+  static int dx(Bytes image, int x, int y) { return twice_derivative(grey(image, x - 1, y), grey(image, x + 1, y)); }
+  static int dy(Bytes image, int x, int y) { return twice_derivative(grey(image, x, y - 1), grey(image, x, y + 1)); }
 
   Bytes left_, right_;
   MatcherParameters p_;

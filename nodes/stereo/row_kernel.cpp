@@ -37,8 +37,8 @@ HWY_INLINE Words scaled_bytes(Bytes v, Bytes factors) {
 #endif
 }
 
-/// |a - b| of biased bytes (x ^ 0x80), exact up to 127 and at least 127 beyond: enough below a truncation of 127.
-HWY_INLINE Bytes biased_distance(Bytes a, Bytes b) {
+/// |a - b| of signed bytes, exact up to 127 and at least 127 beyond; truncation takes the difference away.
+HWY_INLINE Bytes signed_distance(Bytes a, Bytes b) {
   return hn::BitCast(kBytes, hn::Abs(hn::SaturatedSub(hn::BitCast(kSigned, a), hn::BitCast(kSigned, b))));
 }
 
@@ -62,8 +62,11 @@ class Cost {
   HWY_INLINE Bytes at(int chunk) const {
     const ptrdiff_t offset = offset_ + ptrdiff_t{2} * kChunk * chunk;
     Bytes sum = distance(left_[0], hn::LoadU(kBytes, job_.right[0] + offset));
-    for (int p = 1; p < kPlanes; ++p)
-      sum = hn::SaturatedAdd(sum, distance(left_[p], hn::LoadU(kBytes, job_.right[p] + offset)));
+    for (int p = 1; p < kPlanes; ++p) {
+      const Bytes next = distance(left_[p], hn::LoadU(kBytes, job_.right[p] + offset));
+      // Planes of the gradient hold twice the derivative: the sum of the distances is the mean of those of the planes.
+      sum = kKind == CostKind::gradient ? hn::AverageRound(sum, next) : hn::SaturatedAdd(sum, next);
+    }
     sum = hn::Min(sum, c_max_);
     if (kOutside) sum = hn::Max(sum, hn::LoadU(kBytes, job_.outside + offset));
     return sum;
@@ -73,10 +76,10 @@ class Cost {
   static constexpr int kPlanes = kKind == CostKind::gradient ? 2 : 3;
 
   HWY_INLINE Bytes distance(Bytes a, Bytes b) const {
-    if constexpr (kKind == CostKind::gradient) return biased_distance(a, b);
+    if constexpr (kKind == CostKind::gradient) return signed_distance(a, b);
     if constexpr (kKind == CostKind::sad) return hn::Or(hn::SaturatedSub(a, b), hn::SaturatedSub(b, a));
-    // |difference| >= 15 costs 225, which is at least c_max (validated).
-    return hn::TableLookupBytes(squares_, hn::Min(biased_distance(a, b), hn::Set(kBytes, 15)));
+    // The bytes are biased by 0x80. |difference| >= 15 costs 225, which is at least c_max (validated).
+    return hn::TableLookupBytes(squares_, hn::Min(signed_distance(a, b), hn::Set(kBytes, 15)));
   }
 
   const RowJob job_;  // a copy: stores of bytes could change the original for all that the compiler knows

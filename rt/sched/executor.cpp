@@ -4,7 +4,6 @@
 #include <pthread.h>
 
 #include <algorithm>
-#include <barrier>
 #include <cstring>
 #include <numeric>
 #include <set>
@@ -14,6 +13,7 @@
 #include "rt/memory/process_memory.hpp"
 #include "rt/node.hpp"
 #include "rt/sched/cooperative.hpp"
+#include "rt/sched/rendezvous.hpp"
 
 namespace takt {
 namespace {
@@ -84,7 +84,7 @@ bool Executor::run_partitioned(Policy policy, RunResult& result) {
   const std::vector<Reservation> wanted = reservations(policy);
   std::vector<Grant> grants(lanes_.size());
   std::atomic<bool> go{false};
-  std::barrier ready(static_cast<ptrdiff_t>(lanes_.size()) + 1), started(static_cast<ptrdiff_t>(lanes_.size()) + 1);
+  Rendezvous ready(lanes_.size() + 1), started(lanes_.size() + 1);
   std::vector<std::thread> workers;
   for (size_t i = 0; i < lanes_.size(); ++i) {
     workers.emplace_back([&, i] {

@@ -33,4 +33,15 @@ std::string_view to_string(OnMiss verb) {
   return "";
 }
 
+double effective_rate_hz(const Plan& plan, size_t task) {
+  double divisor = 1;
+  for (size_t hops = 0; hops <= plan.tasks.size() && task != kNone; ++hops) {
+    const TaskPlan& t = plan.tasks[task];
+    if (t.rate) return t.rate->hz() / divisor;
+    divisor *= t.every;
+    task = t.on_task;
+  }
+  return 0;
+}
+
 }  // namespace takt

@@ -2,7 +2,6 @@
 // A message travels as a chunk that starts with our MessageHeader. iceoryx cannot publish a chunk twice, so a repeated
 // message travels as a *note* (a header and the sequence it stands for) over a second, tiny publisher of the same
 // output; notes can therefore never push messages out of a reader's queue. The reader merges both by sequence.
-#if __has_include(<iceoryx_posh/popo/untyped_publisher.hpp>)
 #include "rt/shm/iceoryx_ports.hpp"
 
 #include <algorithm>
@@ -344,4 +343,3 @@ std::unique_ptr<Reader> make_iceoryx_reader(const IceoryxPort& port) {
 }
 
 }  // namespace takt
-#endif

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#if __has_include(<iceoryx_posh/popo/untyped_publisher.hpp>)
 #include "rt/shm/iceoryx_transport.hpp"
 
 #include <sched.h>
@@ -79,10 +78,14 @@ class LowRealTime {
 /// The daemon greets on std::cout and std::clog; stdout belongs to our reports. Used before any job runs.
 class Quiet {
  public:
-  Quiet() { for (std::ostream* stream : streams_) stream->setstate(std::ios::failbit); }
+  Quiet() {
+    for (std::ostream* stream : streams_) stream->setstate(std::ios::failbit);
+  }
   Quiet(const Quiet&) = delete;
   Quiet& operator=(const Quiet&) = delete;
-  ~Quiet() { for (std::ostream* stream : streams_) stream->clear(); }
+  ~Quiet() {
+    for (std::ostream* stream : streams_) stream->clear();
+  }
 
  private:
   std::array<std::ostream*, 2> streams_{&std::cout, &std::clog};
@@ -178,4 +181,3 @@ std::unique_ptr<Transport> join_iceoryx_transport(std::span<const PortPlan> port
 }
 
 }  // namespace takt
-#endif

@@ -2,8 +2,8 @@
 #include "rt/transform/pose_math.hpp"
 
 #include <cmath>
-#include <eigen3/Eigen/Core>
-#include <eigen3/Eigen/Geometry>
+#include <Eigen/Core>
+#include <Eigen/Geometry>
 
 namespace takt {
 namespace {

@@ -67,7 +67,7 @@ MatcherParameters random_parameters(std::mt19937& random, int largest_disparity)
   p.cost = static_cast<CostKind>(pick(0, 2));
   p.n_square = 2 * pick(0, 5) + 1;
   p.n_min = std::min(p.n_square, 2 * pick(0, 3) + 1);
-  const int limit = p.cost == CostKind::gradient ? 127 : p.cost == CostKind::ssd ? 225 : 255;
+  const int limit = p.cost == CostKind::gradient ? 64 : p.cost == CostKind::ssd ? 225 : 255;
   if (pick(0, 2) > 0) p.c_max = pick(1, limit);
   if (pick(0, 3) == 0) p.min_confidence = pick(1, 255);
   if (pick(0, 2) == 0) p.uniqueness = pick(1, 255);

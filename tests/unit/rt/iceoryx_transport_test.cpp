@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#if __has_include(<iceoryx_posh/popo/untyped_publisher.hpp>)
 #include <doctest/doctest.h>
 #include <fcntl.h>
 #include <spawn.h>
@@ -112,4 +111,3 @@ TEST_CASE("leftovers of this user do not keep the transport from starting") {
   { const auto transport = make_iceoryx_transport(conformance_ports()); }
   for (const std::string& file : files_left()) FAIL_CHECK("left behind: ", file);
 }
-#endif

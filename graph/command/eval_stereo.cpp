@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "graph/command/eval_command.hpp"
+#include "graph/command/run_command.hpp"
+#include "nodes/stereo/evaluate.hpp"
+#include "nodes/stereo/evaluate_peers.hpp"
+#include "nodes/stereo/matcher.hpp"
+#include "rt/time/clock.hpp"
+
+namespace takt::command {
+namespace {
+
+using Json = nlohmann::ordered_json;
+constexpr int kRepeats = 7;
+
+struct BadData : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+cv::Mat read(const std::filesystem::path& file, int mode) {
+  cv::Mat image = cv::imread(file.string(), mode);
+  if (image.empty()) throw BadData(fmt::format("{}: cannot be read or decoded", file.string()));
+  return image;
+}
+
+ImageView<const uint8_t> view(const cv::Mat& m) {
+  return {m.data, m.cols, m.rows, m.channels(), static_cast<ptrdiff_t>(m.step)};
+}
+
+stereo::DisparityImage read_truth(const std::filesystem::path& file, double scale) {
+  const cv::Mat truth = read(file, cv::IMREAD_ANYDEPTH | cv::IMREAD_GRAYSCALE);
+  if (truth.depth() == CV_16U)
+    return stereo::ground_truth(ImageView<const uint16_t>{truth.ptr<uint16_t>(), truth.cols, truth.rows, 1,
+                                                          static_cast<ptrdiff_t>(truth.step1())}, scale);
+  return stereo::ground_truth(view(truth), scale);
+}
+
+int whole(const std::string& key, const std::string& value, int low, int high) {
+  size_t used = 0;
+  int number = low - 1;
+  try {
+    number = std::stoi(value, &used);
+  } catch (const std::exception&) {
+  }
+  if (used != value.size() || number < low || number > high)
+    throw BadData(fmt::format("--set {}={}: must be an integer in {}..{}", key, value, low, high));
+  return number;
+}
+
+/// The matcher parameters of the stereo node, by their names there.
+stereo::MatcherParameters parameters(const EvalStereoOptions& options) {
+  stereo::MatcherParameters p;
+  p.disparities = options.disparities;
+  for (const std::string& text : options.set) {
+    const size_t equals = text.find('=');
+    const std::string key = text.substr(0, equals), value = equals == std::string::npos ? "" : text.substr(equals + 1);
+    if (key == "cost") {
+      if (value == "gradient") p.cost = stereo::CostKind::gradient;
+      else if (value == "ssd") p.cost = stereo::CostKind::ssd;
+      else if (value == "sad") p.cost = stereo::CostKind::sad;
+      else throw BadData(fmt::format("--set cost={}: valid are gradient | ssd | sad", value));
+    } else if (key == "c_max") p.c_max = whole(key, value, 0, 255);
+    else if (key == "n_square") p.n_square = whole(key, value, 1, 31);
+    else if (key == "n_min") p.n_min = whole(key, value, 1, 31);
+    else if (key == "disparities") p.disparities = whole(key, value, 1, 512);
+    else throw BadData(fmt::format("--set {}: valid parameters are cost, c_max, n_square, n_min, disparities", key));
+  }
+  return p;
+}
+
+Json row(const stereo::StereoScore& score, double time_ms) {
+  return {{"bad_1px_pct", score.bad_1px_pct}, {"bad_1px_all_pct", score.bad_1px_all_pct},
+          {"density_pct", score.density_pct}, {"time_ms", time_ms}};
+}
+
+double median(std::vector<double> v) {
+  std::nth_element(v.begin(), v.begin() + static_cast<ptrdiff_t>(v.size() / 2), v.end());
+  return v[v.size() / 2];
+}
+
+Json run_ours(const cv::Mat& left, const cv::Mat& right, const stereo::DisparityImage& truth, const stereo::MatcherParameters& p) {
+  stereo::Matcher matcher(left.cols, left.rows, left.channels(), p);
+  cv::Mat disparity(left.size(), CV_16S), confidence(left.size(), CV_8U);
+  const ImageView<int16_t> d{disparity.ptr<int16_t>(), left.cols, left.rows};
+  std::vector<double> times;
+  for (int i = 0; i < kRepeats; ++i) {
+    const int64_t start = thread_cpu_ns();
+    if (!matcher.match(view(left), view(right), d, {confidence.data, left.cols, left.rows}))
+      throw BadData("left and right image differ in size or channels");
+    times.push_back(static_cast<double>(thread_cpu_ns() - start) / 1e6);
+  }
+  return row(stereo::score(stereo::to_disparity_image(d), truth), median(times));
+}
+
+Json run_peer(stereo::Peer peer, const cv::Mat& left, const cv::Mat& right, const stereo::DisparityImage& truth, int disparities) {
+  std::vector<double> times(kRepeats);
+  stereo::DisparityImage result;
+  for (double& time : times) result = stereo::run_peer(peer, view(left), view(right), disparities, &time);
+  return row(stereo::score(result, truth), median(times));
+}
+
+void print_row(const char* name, const Json& r) {
+  std::printf("%-34s %9.2f %9.2f %10.1f %9.2f\n", name, r["bad_1px_pct"].get<double>(), r["bad_1px_all_pct"].get<double>(),
+              r["density_pct"].get<double>(), r["time_ms"].get<double>());
+}
+
+Json measure(const EvalStereoOptions& options) {
+  const cv::Mat left = read(options.left, cv::IMREAD_COLOR), right = read(options.right, cv::IMREAD_COLOR);
+  if (left.size() != right.size())
+    throw BadData(fmt::format("{} and {} differ in size", options.left.string(), options.right.string()));
+  const stereo::DisparityImage truth = read_truth(options.truth, options.truth_scale);
+  if (truth.width != left.cols || truth.height != left.rows)
+    throw BadData(fmt::format("{}: {} x {}, the images are {} x {}", options.truth.string(), truth.width, truth.height, left.cols, left.rows));
+  const stereo::MatcherParameters p = parameters(options);
+  Json out = run_ours(left, right, truth, p);
+  stereo::DisparityImage middle = truth;
+  std::fill(middle.pixels.begin(), middle.pixels.end(), static_cast<float>(p.disparities) / 2);
+  out["baseline"] = row(stereo::score(middle, truth), 0);
+  out["baseline"]["name"] = "half the search range everywhere";
+  for (const auto peer : {stereo::Peer::block_matching, stereo::Peer::block_matching_unfiltered, stereo::Peer::semi_global})
+    out["peers"][stereo::to_string(peer)] = run_peer(peer, left, right, truth, p.disparities);
+  return out;
+}
+
+int evaluate(const EvalStereoOptions& options) {
+  try {
+    cv::setNumThreads(1);
+    const Json out = measure(options);
+    if (options.json) {
+      std::printf("%s\n", out.dump(2).c_str());
+      return kOk;
+    }
+    std::printf("%-34s %9s %9s %10s %9s\n", "method", "bad >1px", "bad, all", "density %", "CPU ms");
+    print_row("takt stereo", out);
+    for (const auto& [name, peer] : out["peers"].items()) print_row(name.c_str(), peer);
+    print_row("half the search range everywhere", out["baseline"]);
+    return kOk;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "takt: error: %s\n", error.what());
+    return kBadInput;
+  }
+}
+
+}  // namespace
+
+void add_eval_stereo(CLI::App& eval, EvalStereoOptions& o, int& exit_code) {
+  CLI::App* app = eval.add_subcommand("stereo", "bad pixels of dense stereo against ground truth, beside OpenCV");
+  app->add_option("--left", o.left, "left rectified image")->required();
+  app->add_option("--right", o.right, "right rectified image")->required();
+  app->add_option("--gt", o.truth, "ground truth of the left image, 0: unknown")->required();
+  app->add_option("--gt-scale", o.truth_scale, "disparity = value / scale (default 1)")->check(CLI::PositiveNumber);
+  app->add_option("--disparities", o.disparities, "search range, px (default 64)")->check(CLI::Range(1, 512));
+  app->add_option("--set", o.set, "parameter=value of the stereo node, repeatable");
+  app->add_flag("--json", o.json, "one JSON object on stdout");
+  app->callback([&] { exit_code = evaluate(o); });
+}
+
+}  // namespace takt::command

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <memory>
+#include <optional>
+
+#include "graph/command/run_command.hpp"
+#include "graph/compose/composition.hpp"
+#include "hal/drivers.hpp"
+
+namespace takt::command {
+
+/// A graph that is loaded, checked and composed, with everything it refers to. Order matters: nodes go before devices.
+struct Prepared {
+  std::optional<graph::GraphSpec> graph;
+  std::unique_ptr<Clock> clock;
+  hal::Devices devices;
+  std::optional<graph::Composition> composition;
+};
+
+/// Loads and composes; what is wrong is written to stderr and the exit code returned (kOk: all is well).
+int prepare(const RunOptions& options, Prepared& prepared);
+
+/// Writes one error to stderr and returns the code.
+int refuse(const std::string& text, Exit code);
+
+}  // namespace takt::command

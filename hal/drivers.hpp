@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+// The way from a graph's device entry to a hardware node.
+#pragma once
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "hal/device_node.hpp"
+#include "rt/time/clock.hpp"
+
+namespace takt::sim {
+class Simulation;
+}
+
+namespace takt::hal {
+
+/// What a device needs to exist.
+struct DeviceConfig {
+  std::string id, kind, driver;
+  nlohmann::json settings;          ///< one object; values with a unit as text ("0.24m") or as numbers in SI
+  std::filesystem::path directory;  ///< relative paths in the settings start here
+  uint64_t seed = 0;
+};
+
+/// What the devices of one process share: the simulated worlds, one per world file, client and seed. Must outlive the
+/// nodes. Composition thread only.
+class Devices {
+ public:
+  Devices();
+  ~Devices();
+  tl::expected<sim::Simulation*, DeviceError> world(const DeviceConfig& config);
+  /// The simulation of the first sim device (for ground truth, fault injection), or null.
+  sim::Simulation* first_world();
+
+ private:
+  std::map<std::string, std::unique_ptr<sim::Simulation>> worlds_;
+};
+
+enum class SettingKind : uint8_t { path, length, angle, speed, turn_rate, time, rate, count, number, flag, text, map };
+std::string_view to_text(SettingKind kind);
+
+/// One key that a device entry (or its profile entry) may have. `driver` empty: the same for every driver of the kind.
+struct SettingInfo {
+  std::string_view name, driver;
+  SettingKind kind;
+  bool required;
+  std::string_view doc;
+};
+struct DriverInfo {
+  std::string_view name, doc;
+};
+struct DeviceKind {
+  std::string_view name, doc;
+  std::span<const DriverInfo> drivers;
+  std::span<const SettingInfo> settings;
+};
+
+/// Every device kind with its drivers and settings, for the checker and `takt nodes`.
+std::span<const DeviceKind> device_kinds();
+
+/// Makes the node of a device and opens the device: everything that can be wrong with files and settings is told here.
+/// Errors list the valid alternatives.
+tl::expected<std::unique_ptr<DeviceNode>, DeviceError> make_device(const DeviceConfig& config, Devices& devices, const Clock& clock);
+
+/// CPU time that the simulator's rendering has used in this process so far, ns (0 without a simulated camera).
+int64_t simulator_cpu_ns(const Devices& devices);
+
+}  // namespace takt::hal

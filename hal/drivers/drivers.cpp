@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "hal/drivers.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "hal/base/base_node.hpp"
+#include "hal/camera/stereo_camera_node.hpp"
+#include "hal/gpio/lines_node.hpp"
+#include "hal/head/head_node.hpp"
+#include "hal/laser/laser_node.hpp"
+#include "hal/replay/replay_camera.hpp"
+#include "hal/settings/settings.hpp"
+#include "hal/sim/sim_camera.hpp"
+#include "hal/sim/sim_devices.hpp"
+
+namespace takt::hal {
+namespace {
+
+using NodeResult = tl::expected<std::unique_ptr<DeviceNode>, DeviceError>;
+
+template <class List>
+std::string names(const List& list) {
+  std::string all;
+  for (const auto& item : list) all.append(all.empty() ? "" : ", ").append(item.name);
+  return all;
+}
+
+Rate rate_of(Settings& settings) {
+  Rate rate{15, 1};
+  if (!settings.has("rate")) return rate;
+  // Back to the fraction that was meant: releases are planned exactly, never with a rounded period.
+  const double hz = settings.quantity("rate", Dimension::rate, 15.0);
+  for (int64_t denominator = 1; denominator <= 1001; ++denominator) {
+    const double numerator = hz * static_cast<double>(denominator);
+    if (std::abs(numerator - std::round(numerator)) < 1e-9 * numerator) return {std::llround(numerator), denominator};
+  }
+  settings.fail("`rate` is no fraction with a divisor up to 1001", "write it as n or n/m");
+  return rate;
+}
+
+HealthThresholds thresholds_of(Settings& settings) {
+  HealthThresholds t;
+  t.step_px = static_cast<int>(settings.count("health_step", t.step_px, 1, 64));
+  t.saturated_level = static_cast<int>(settings.count("saturated_level", t.saturated_level, 1, 256));
+  t.saturated_fraction = settings.quantity("saturated_fraction", Dimension::number, t.saturated_fraction);
+  t.dark_mean = settings.quantity("dark_mean", Dimension::number, t.dark_mean);
+  t.blurred_gradient = settings.quantity("blurred_gradient", Dimension::number, t.blurred_gradient);
+  t.unchanging_difference = settings.quantity("unchanging_difference", Dimension::number, t.unchanging_difference);
+  return t;
+}
+
+/// Opens the device; only then does it become a node.
+template <class NodeClass, class Interface, class... More>
+NodeResult opened(std::unique_ptr<Interface> device, const Settings& settings, More&&... more) {
+  if (settings.error()) return tl::unexpected(*settings.error());
+  if (const auto result = device->open(); !result) return tl::unexpected(result.error());
+  return std::make_unique<NodeClass>(std::move(device), std::forward<More>(more)...);
+}
+
+NodeResult make_sim_camera(const DeviceConfig& config, Settings& settings, sim::Simulation& world, const Clock& clock) {
+  sim::SimCameraSettings camera;
+  const auto file = settings.path("rig", true);
+  if (settings.error()) return tl::unexpected(*settings.error());
+  auto rig = load_rig(config.id, file);
+  if (!rig) return tl::unexpected(rig.error());
+  camera.rig = *rig;
+  camera.rate = rate_of(settings);
+  camera.background = settings.flag("background", true);
+  camera.noise.read_sigma = settings.quantity("read_noise", Dimension::number, camera.noise.read_sigma);
+  camera.noise.photon_variance = settings.quantity("photon_noise", Dimension::number, camera.noise.photon_variance);
+  if (camera.noise.read_sigma < 0 || camera.noise.photon_variance < 0) settings.fail("noise must not be negative", "correct read_noise and photon_noise");
+  std::unique_ptr<StereoCamera> device = std::make_unique<sim::SimCamera>(config.id, camera, world, clock);
+  return opened<StereoCameraNode>(std::move(device), settings, thresholds_of(settings));
+}
+
+NodeResult make_replay_camera(const DeviceConfig& config, Settings& settings, const Clock& clock) {
+  replay::ReplayCameraSettings camera;
+  camera.directory = settings.path("directory", false);
+  camera.left = settings.path("left", false);
+  camera.right = settings.path("right", false);
+  camera.camera = {settings.quantity("focal", Dimension::number, 0.0), settings.quantity("cu", Dimension::number, 0.0),
+                   settings.quantity("cv", Dimension::number, 0.0), settings.quantity("baseline", Dimension::length, 0.0)};
+  camera.frames = settings.count("frames", 1, 1, 1'000'000'000);
+  camera.channels = static_cast<int>(settings.count("channels", 0, 0, 3));
+  if (camera.channels == 2) settings.fail("setting `channels` is 2", "use 1 (grey) or 3 (BGR)");
+  camera.rate = rate_of(settings);
+  std::unique_ptr<StereoCamera> device = std::make_unique<replay::ReplayCamera>(config.id, camera, clock);
+  return opened<StereoCameraNode>(std::move(device), settings, thresholds_of(settings));
+}
+
+NodeResult make_sim_laser(const DeviceConfig& config, Settings& settings, sim::Simulation& world) {
+  sim::LaserModel model;
+  model.beams = static_cast<uint32_t>(settings.count("beams", model.beams, 2, 4096));
+  model.fov_rad = settings.quantity("fov", Dimension::angle, model.fov_rad);
+  model.max_range_m = settings.quantity("range", Dimension::length, model.max_range_m);
+  model.sigma_m = settings.quantity("noise", Dimension::length, model.sigma_m);
+  model.sensor_in_robot = settings.mount("mount");
+  if (!settings.has("mount")) model.sensor_in_robot.z = 0.25;
+  if (model.fov_rad <= 0 || model.fov_rad > 6.2832 || model.max_range_m <= 0 || model.sigma_m < 0) {
+    settings.fail("`fov`, `range` or `noise` is out of range", "fov in (0, 360deg], range positive, noise not negative");
+  }
+  std::unique_ptr<LaserScanner> device = std::make_unique<sim::SimLaser>(config.id, model, world);
+  return opened<LaserNode>(std::move(device), settings);
+}
+
+NodeResult make_sim_base(const DeviceConfig& config, Settings& settings, sim::Simulation& world) {
+  sim::OdometryModel model;
+  model.scale_error = settings.quantity("scale_error", Dimension::number, model.scale_error);
+  model.turn_scale_error = settings.quantity("turn_scale_error", Dimension::number, model.turn_scale_error);
+  model.turn_bias_rad_s = settings.quantity("turn_bias", Dimension::turn_rate, model.turn_bias_rad_s);
+  model.turn_bias_walk = settings.quantity("turn_bias_walk", Dimension::number, model.turn_bias_walk);
+  const std::string drive = settings.text("drive", world.path().empty() ? "command" : "path");
+  if (drive == "command") world.set_drive(sim::Drive::command);
+  else if (drive != "path") settings.fail("`drive` is `" + drive + "`", "use path or command");
+  else if (world.path().empty()) settings.fail("`drive: path`, but the world's client has no <path>", "add one, or use drive: command");
+  std::unique_ptr<MobileBase> device = std::make_unique<sim::SimBase>(config.id, model, world);
+  return opened<BaseNode>(std::move(device), settings);
+}
+
+NodeResult make_sim(const DeviceConfig& config, Settings& settings, Devices& devices, const Clock& clock) {
+  auto world = devices.world(config);
+  if (!world) return tl::unexpected(world.error());
+  if (config.kind == "stereo_camera") return make_sim_camera(config, settings, **world, clock);
+  if (config.kind == "laser_scanner") return make_sim_laser(config, settings, **world);
+  if (config.kind == "mobile_base") return make_sim_base(config, settings, **world);
+  if (config.kind == "camera_head") {
+    std::unique_ptr<CameraHead> device = std::make_unique<sim::SimHead>(config.id, **world);
+    return opened<HeadNode>(std::move(device), settings);
+  }
+  std::unique_ptr<DigitalLines> device = std::make_unique<sim::SimLines>(config.id, **world);
+  return opened<LinesNode>(std::move(device), settings);
+}
+
+/// Keys that no driver of the kind knows.
+DeviceResult check_keys(const DeviceConfig& config, const DeviceKind& kind) {
+  if (!config.settings.is_object() && !config.settings.is_null()) return device_error(config.id, "the settings are no map", "write key: value");
+  for (const auto& [key, value] : config.settings.items()) {
+    const bool known = key == "kind" || key == "driver" || std::any_of(kind.settings.begin(), kind.settings.end(), [&](const SettingInfo& s) {
+      return s.name == key && (s.driver.empty() || s.driver == config.driver);
+    });
+    if (known) continue;
+    std::string all;
+    for (const SettingInfo& s : kind.settings) {
+      if (s.driver.empty() || s.driver == config.driver) all.append(all.empty() ? "" : ", ").append(s.name);
+    }
+    return device_error(config.id, "unknown setting `" + key + "`", "driver `" + config.driver + "` knows: " + all);
+  }
+  return {};
+}
+
+}  // namespace
+
+Devices::Devices() = default;
+Devices::~Devices() = default;
+
+tl::expected<sim::Simulation*, DeviceError> Devices::world(const DeviceConfig& config) {
+  Settings settings(config.id, config.settings, config.directory);
+  const auto file = settings.path("world", true);
+  const std::string client = settings.text("client", "");
+  if (settings.error()) return tl::unexpected(*settings.error());
+  const std::string key = std::filesystem::weakly_canonical(file).string() + "\n" + client + "\n" + std::to_string(config.seed);
+  auto& slot = worlds_[key];
+  if (!slot) {
+    auto loaded = sim::Simulation::load(config.id, file, client, config.seed);
+    if (!loaded) {
+      worlds_.erase(key);
+      return tl::unexpected(loaded.error());
+    }
+    slot = std::move(*loaded);
+  }
+  return slot.get();
+}
+
+sim::Simulation* Devices::first_world() { return worlds_.empty() ? nullptr : worlds_.begin()->second.get(); }
+
+NodeResult make_device(const DeviceConfig& config, Devices& devices, const Clock& clock) {
+  const auto kinds = device_kinds();
+  const auto kind = std::find_if(kinds.begin(), kinds.end(), [&](const DeviceKind& k) { return k.name == config.kind; });
+  if (kind == kinds.end()) return device_error(config.id, "unknown device kind `" + config.kind + "`", "known kinds: " + names(kinds));
+  if (std::none_of(kind->drivers.begin(), kind->drivers.end(), [&](const DriverInfo& d) { return d.name == config.driver; })) {
+    return device_error(config.id, config.kind + " has no driver `" + config.driver + "`", "known drivers: " + names(kind->drivers));
+  }
+  if (const auto keys = check_keys(config, *kind); !keys) return tl::unexpected(keys.error());
+  Settings settings(config.id, config.settings, config.directory);
+  if (config.driver == "replay") return make_replay_camera(config, settings, clock);
+  return make_sim(config, settings, devices, clock);
+}
+
+int64_t simulator_cpu_ns(const Devices&) { return sim::simulator_cpu_ns(); }
+
+}  // namespace takt::hal

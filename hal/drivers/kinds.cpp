@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "hal/drivers.hpp"
+
+namespace takt::hal {
+namespace {
+
+using enum SettingKind;
+
+constexpr DriverInfo kSimOnly[] = {{"sim", "the simulated world"}};
+constexpr DriverInfo kCameraDrivers[] = {{"sim", "the simulated world"}, {"replay", "recorded images"}};
+
+#define COMMON_SETTINGS                                                                      \
+  {"rate", "", rate, false, "releases per second of the device's node"},                     \
+      {"model", "", text, false, "name of the hardware model, for the reader"},              \
+      {"world", "sim", path, true, "XML file of the simulated world"},                       \
+      {"client", "sim", text, false, "which <client> of the world is the robot; the first"}
+
+constexpr SettingInfo kCamera[] = {
+    COMMON_SETTINGS,
+    {"rig", "sim", path, true, "YAML file with lens, size, baseline and mount"},
+    {"background", "sim", flag, false, "render ahead in a thread of its own; true"},
+    {"read_noise", "sim", number, false, "standard deviation of the noise in darkness, levels; 1"},
+    {"photon_noise", "sim", number, false, "noise variance per level of brightness; 0.01"},
+    {"rig", "replay", path, false, "ignored: the recording brings its calibration"},
+    {"directory", "replay", path, false, "recording with image_l/, image_r/, calib.txt, optional times.txt"},
+    {"left", "replay", path, false, "left image of a single pair"},
+    {"right", "replay", path, false, "right image of a single pair"},
+    {"focal", "replay", number, false, "focal length of the single pair, px"},
+    {"cu", "replay", number, false, "principal point of the single pair, px; the image centre"},
+    {"cv", "replay", number, false, "principal point of the single pair, px; the image centre"},
+    {"baseline", "replay", length, false, "baseline of the single pair"},
+    {"frames", "replay", count, false, "how often the single pair is delivered; 1"},
+    {"channels", "replay", count, false, "1 grey, 3 BGR; as the files"},
+    {"health_step", "", count, false, "the health check looks at one pixel in n x n; 8"},
+    {"saturated_level", "", count, false, "level from which a pixel is saturated; 250"},
+    {"saturated_fraction", "", number, false, "share of saturated pixels that flags a frame; 0.05"},
+    {"dark_mean", "", number, false, "mean level below which a frame is dark; 20"},
+    {"blurred_gradient", "", number, false, "mean gradient below which a frame is blurred, levels per px; 1.5"},
+    {"unchanging_difference", "", number, false, "mean difference to the frame before, below which it repeats; 0.25"},
+};
+constexpr SettingInfo kLaser[] = {
+    COMMON_SETTINGS,
+    {"mount", "", map, false, "sensor in the robot frame: {x, y, z, yaw}"},
+    {"beams", "sim", count, false, "beams of a sweep; 181"},
+    {"fov", "sim", angle, false, "angle from the first to the last beam; 180deg"},
+    {"range", "sim", length, false, "largest distance; 8m"},
+    {"noise", "sim", length, false, "standard deviation of a range; 1cm"},
+};
+constexpr SettingInfo kHead[] = {COMMON_SETTINGS};
+constexpr SettingInfo kBase[] = {
+    COMMON_SETTINGS,
+    {"drive", "sim", text, false, "path (the world's) or command (velocity commands); path if the world has one"},
+    {"scale_error", "sim", number, false, "systematic error of the odometer's distance; 0.01"},
+    {"turn_scale_error", "sim", number, false, "systematic error of the odometer's turns; 0.01"},
+    {"turn_bias", "sim", turn_rate, false, "standard deviation of the yaw-rate bias at start; 0.0005rad/s"},
+    {"turn_bias_walk", "sim", number, false, "random walk of that bias, rad/s per square root of a second; 0.0002"},
+};
+constexpr SettingInfo kLines[] = {COMMON_SETTINGS};
+
+constexpr DeviceKind kKinds[] = {
+    {"stereo_camera", "gives `pair`", kCameraDrivers, kCamera},
+    {"laser_scanner", "gives `scan`", kSimOnly, kLaser},
+    {"camera_head", "gives `state`, takes `command`", kSimOnly, kHead},
+    {"mobile_base", "gives `odometry`, takes `velocity`", kSimOnly, kBase},
+    {"digital_lines", "gives `state`", kSimOnly, kLines},
+};
+
+}  // namespace
+
+std::span<const DeviceKind> device_kinds() { return kKinds; }
+
+std::string_view to_text(SettingKind kind) {
+  switch (kind) {
+    case path: return "path";
+    case length: return "length (m, cm, mm)";
+    case angle: return "angle (deg, rad)";
+    case speed: return "speed (m/s)";
+    case turn_rate: return "turn rate (deg/s, rad/s)";
+    case time: return "time (s, ms)";
+    case rate: return "rate (Hz)";
+    case count: return "count";
+    case number: return "number";
+    case flag: return "true or false";
+    case text: return "text";
+    case map: return "map";
+  }
+  return "";
+}
+
+}  // namespace takt::hal

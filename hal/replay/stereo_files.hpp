@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "hal/device.hpp"
+#include "rt/msg/messages.hpp"
+
+namespace takt::replay {
+
+/// A recorded sequence of stereo pairs: the list of its files and everything that is known before an image is decoded.
+struct StereoFiles {
+  std::vector<std::filesystem::path> left, right;
+  std::vector<int64_t> stamp_ns;  ///< since the first frame; empty without times.txt
+  CameraModel camera;             ///< zero: not rectified or unknown
+};
+
+/// KITTI layout: image_l/ and image_r/ (sorted by name, same number and same names), calib.txt with rows P0 and P1 (3 x 4,
+/// row-major; P1(0,3) = -f B), times.txt optional (seconds, one a line, rising).
+tl::expected<StereoFiles, DeviceError> list_directory(const std::string& device_id, const std::filesystem::path& directory);
+
+/// Refuses files that are not complete PNG (ends with IEND), JPEG (ends with EOI), PGM or PPM images; looks at the
+/// first and last bytes only.
+tl::expected<void, std::string> check_complete(const std::filesystem::path& file);
+
+}  // namespace takt::replay

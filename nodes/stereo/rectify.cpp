@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "nodes/stereo/rectify.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <opencv2/calib3d.hpp>
+#include <span>
+#include <stdexcept>
+#include <string>
+
+namespace takt::stereo {
+namespace {
+
+[[noreturn]] void refuse(const std::string& what) { throw std::invalid_argument("stereo calibration: " + what); }
+
+void check_finite(const char* name, std::span<const double> values) {
+  for (size_t i = 0; i < values.size(); ++i)
+    if (!std::isfinite(values[i]))
+      refuse(std::string(name) + "[" + std::to_string(i) + "] is " + std::to_string(values[i]) + ", must be finite; calibrate again");
+}
+
+void check(const StereoCalibration& c) {
+  if (c.width < 16 || c.width > 8192 || c.height < 16 || c.height > 8192)
+    refuse("image size is " + std::to_string(c.width) + " x " + std::to_string(c.height) + ", each must lie in 16..8192");
+  check_finite("left_matrix", c.left_matrix);
+  check_finite("right_matrix", c.right_matrix);
+  check_finite("left_distortion", c.left_distortion);
+  check_finite("right_distortion", c.right_distortion);
+  check_finite("rotation", c.rotation);
+  check_finite("translation_m", c.translation_m);
+  for (const auto* m : {&c.left_matrix, &c.right_matrix})
+    if (!((*m)[0] > 0) || !((*m)[4] > 0))
+      refuse("focal lengths are " + std::to_string((*m)[0]) + " and " + std::to_string((*m)[4]) + " px, must be positive");
+  for (size_t i = 0; i < 3; ++i)
+    for (size_t j = i; j < 3; ++j) {
+      double dot = 0;
+      for (size_t k = 0; k < 3; ++k) dot += c.rotation[3 * i + k] * c.rotation[3 * j + k];
+      if (std::abs(dot - (i == j ? 1 : 0)) > 1e-3)
+        refuse("rotation is not orthonormal: rows " + std::to_string(i) + " and " + std::to_string(j) + " have the product " +
+               std::to_string(dot));
+    }
+}
+
+cv::Mat matrix(std::span<const double> values, int rows) {
+  cv::Mat m(rows, static_cast<int>(values.size()) / rows, CV_64F);
+  std::memcpy(m.data, values.data(), values.size_bytes());
+  return m;
+}
+
+template <size_t kCount>
+void read(const cv::FileStorage& file, const std::string& path, const char* key, std::array<double, kCount>& out) {
+  const cv::FileNode node = file[key];
+  if (node.empty()) refuse(path + ": key " + key + " is missing; M1, D1, M2, D2, R, T and image_size are needed");
+  cv::Mat m;
+  node >> m;
+  if (m.total() != kCount)
+    refuse(path + ": key " + key + " has " + std::to_string(m.total()) + " numbers, must have " + std::to_string(kCount));
+  m.convertTo(m, CV_64F);
+  std::memcpy(out.data(), m.data, sizeof out);
+}
+
+}  // namespace
+
+StereoCalibration read_calibration(const std::filesystem::path& path) {
+  StereoCalibration c;
+  if (!std::filesystem::exists(path)) refuse(path.string() + ": no such file; check parameter `calibration`");
+  try {
+    const cv::FileStorage file(path.string(), cv::FileStorage::READ);
+    if (!file.isOpened()) refuse(path.string() + ": cannot be read as OpenCV YAML or XML");
+    read(file, path.string(), "M1", c.left_matrix);
+    read(file, path.string(), "D1", c.left_distortion);
+    read(file, path.string(), "M2", c.right_matrix);
+    read(file, path.string(), "D2", c.right_distortion);
+    read(file, path.string(), "R", c.rotation);
+    read(file, path.string(), "T", c.translation_m);
+    std::vector<int> size;
+    file["image_size"] >> size;
+    if (size.size() != 2) refuse(path.string() + ": key image_size must be [width, height]");
+    c.width = size[0];
+    c.height = size[1];
+  } catch (const cv::Exception& e) {
+    refuse(path.string() + ": " + e.err);
+  }
+  return c;
+}
+
+Rectifier::Rectifier(const StereoCalibration& c) : width_(c.width), height_(c.height) {
+  check(c);
+  build(c);
+}
+
+void Rectifier::build(const StereoCalibration& c) {
+  const cv::Mat k1 = matrix(c.left_matrix, 3), k2 = matrix(c.right_matrix, 3), d1 = matrix(c.left_distortion, 1),
+                d2 = matrix(c.right_distortion, 1);
+  const cv::Size size(width_, height_);
+  cv::Mat r1, r2, p1, p2, q;
+  cv::stereoRectify(k1, d1, k2, d2, size, matrix(c.rotation, 3), matrix(c.translation_m, 3), r1, r2, p1, p2, q,
+                    cv::CALIB_ZERO_DISPARITY, 0);
+  const double focal = p1.at<double>(0, 0), baseline = -p2.at<double>(0, 3) / focal;
+  if (!(focal > 0) || !(baseline > 0) || p2.at<double>(1, 3) != 0)
+    refuse("translation_m is " + std::to_string(c.translation_m[0]) + ", " + std::to_string(c.translation_m[1]) + ", " +
+           std::to_string(c.translation_m[2]) + "; the right camera must stand to the right of the left one (x < 0)");
+  camera_ = {focal, p1.at<double>(0, 2), p1.at<double>(1, 2), baseline};
+
+  const auto tables = [&](const cv::Mat& k, const cv::Mat& d, const cv::Mat& r, const cv::Mat& p, std::vector<RemapSource>& out) {
+    cv::Mat x, y;
+    cv::initUndistortRectifyMap(k, d, r, p, size, CV_32F, x, y);
+    out.resize(static_cast<size_t>(width_) * static_cast<size_t>(height_));
+    for (int j = 0; j < height_; ++j)
+      for (int i = 0; i < width_; ++i) {
+        const double sx = x.at<float>(j, i), sy = y.at<float>(j, i);
+        // !(>= 0) also catches what is not a number.
+        if (!(sx >= 0) || !(sy >= 0) || !(sx <= width_ - 1) || !(sy <= height_ - 1)) continue;
+        const int fx = static_cast<int>(std::lround(sx * 128)), fy = static_cast<int>(std::lround(sy * 128));
+        const int x0 = std::min(fx >> 7, width_ - 2), y0 = std::min(fy >> 7, height_ - 2);
+        out[static_cast<size_t>(j) * static_cast<size_t>(width_) + static_cast<size_t>(i)] = {
+            static_cast<int16_t>(x0), static_cast<int16_t>(y0), static_cast<uint8_t>(fx - 128 * x0),
+            static_cast<uint8_t>(fy - 128 * y0)};
+      }
+  };
+  tables(k1, d1, r1, p1, left_);
+  tables(k2, d2, r2, p2, right_);
+}
+
+void Rectifier::remap(const std::vector<RemapSource>& map, ImageView<const uint8_t> in, ImageView<uint8_t> out) const {
+  const RemapImage image{in.data, in.stride, width_, height_, in.channels};
+  for (int y = 0; y < height_; ++y) remap_row_(image, map.data() + ptrdiff_t{y} * width_, width_, out.row(y));
+}
+
+bool Rectifier::rectify(ImageView<const uint8_t> left, ImageView<const uint8_t> right, ImageView<uint8_t> left_out,
+                        ImageView<uint8_t> right_out) const {
+  const auto fits = [&](const auto& v) {
+    return v.data != nullptr && v.width == width_ && v.height == height_ && v.channels == left.channels;
+  };
+  if ((left.channels != 1 && left.channels != 3) || !fits(left) || !fits(right) || !fits(left_out) || !fits(right_out))
+    return false;
+  if (left_.empty()) {
+    const auto bytes = static_cast<size_t>(width_) * static_cast<size_t>(left.channels);
+    for (int y = 0; y < height_; ++y) {
+      std::memcpy(left_out.row(y), left.row(y), bytes);
+      std::memcpy(right_out.row(y), right.row(y), bytes);
+    }
+    return true;
+  }
+  remap(left_, left, left_out);
+  remap(right_, right, right_out);
+  return true;
+}
+
+}  // namespace takt::stereo

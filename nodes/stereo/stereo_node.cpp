@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "nodes/stereo/half_resolution.hpp"
+#include "nodes/stereo/matcher.hpp"
+#include "nodes/stereo/rectify.hpp"
+#include "nodes/stereo/triangulate.hpp"
+#include "rt/node.hpp"
+
+namespace takt {
+namespace {
+
+using namespace stereo;
+
+/// Everything that matching at half resolution needs besides the matcher.
+struct HalfImages {
+  std::vector<uint8_t> left, right, confidence;
+  std::vector<int16_t> disparity;
+};
+
+class StereoNode final : public Node {
+ public:
+  void setup(Setup& setup) override {
+    const Capacity& images = pair_.capacity();
+    width_ = static_cast<int>(images.width);
+    height_ = static_cast<int>(images.height);
+    channels_ = static_cast<int>(images.channels);
+    try {
+      matcher_.emplace(width_, height_, channels_, parameters(disparities_));
+      half_matcher_.emplace(half(width_), half(height_), channels_, parameters((disparities_ + 1) / 2));
+      if (!calibration_().empty()) load_calibration(setup.directory / calibration_());
+    } catch (const std::invalid_argument& error) {
+      throw SetupError(error.what());
+    }
+    const auto pixels = static_cast<size_t>(width_) * static_cast<size_t>(height_);
+    const auto half_pixels = static_cast<size_t>(half(width_)) * static_cast<size_t>(half(height_));
+    const size_t bytes = pixels * static_cast<size_t>(channels_), half_bytes = half_pixels * static_cast<size_t>(channels_);
+    left_.resize(bytes);
+    right_.resize(bytes);
+    disparity_scratch_.resize(pixels);
+    confidence_scratch_.resize(pixels);
+    half_ = {std::vector<uint8_t>(half_bytes), std::vector<uint8_t>(half_bytes), std::vector<uint8_t>(half_pixels),
+             std::vector<int16_t>(half_pixels)};
+    rectified_.reserve(images);
+    disparity_.reserve({images.width, images.height, 1, 0});
+    const auto step = static_cast<uint32_t>(cloud_step_());
+    cloud_.reserve({0, 0, 1, ((images.width + step - 1) / step) * ((images.height + step - 1) / step)});
+  }
+
+  void run(Job& job) override {
+    const StereoPair* in = pair_.newest();
+    if (!in || !pair_.is_new()) return job.no_result();  // nothing to match, or matched already
+    const bool is_rectified = in->camera.focal_px > 0;
+    if (in->width != width_ || in->height != height_ || in->channels != channels_ || (!is_rectified && !rectifier_))
+      return job.no_result();
+    stamp_ = pair_.stamp_ns();
+    camera_ = is_rectified ? in->camera : rectifier_->camera();
+    ImageView<const uint8_t> left = in->left_view(), right = in->right_view();
+    if (!rectify(*in, is_rectified, left, right)) return job.no_result();
+    if (disparity_.connected() || cloud_.connected()) match_and_send(job, left, right);
+  }
+
+ private:
+  MatcherParameters parameters(int disparities) const {
+    MatcherParameters p;
+    p.disparities = disparities;
+    p.cost = static_cast<CostKind>(cost_());
+    p.c_max = c_max_;
+    p.n_square = n_square_;
+    p.n_min = n_min_;
+    p.min_confidence = static_cast<int>(std::lround(min_confidence_ * 255));
+    p.uniqueness = static_cast<int>(std::lround(uniqueness_ * 255));
+    p.left_right_check = left_right_check_;
+    return p;
+  }
+
+  void load_calibration(const std::filesystem::path& path) {
+    const StereoCalibration calibration = read_calibration(path);
+    if (calibration.width != width_ || calibration.height != height_)
+      throw SetupError(path.string() + " is for " + std::to_string(calibration.width) + " x " +
+                       std::to_string(calibration.height) + " px but `pair` has " + std::to_string(width_) + " x " +
+                       std::to_string(height_) + "; give the calibration of this camera mode");
+    rectifier_.emplace(calibration);
+  }
+
+  /// Leaves the views on rectified images: in the input, in the message to send or in this node's own memory.
+  bool rectify(const StereoPair& in, bool is_rectified, ImageView<const uint8_t>& left, ImageView<const uint8_t>& right) {
+    StereoPair* out = rectified_.connected() ? rectified_.loan() : nullptr;
+    ImageView<uint8_t> left_out(left_.data(), width_, height_, channels_), right_out(right_.data(), width_, height_, channels_);
+    if (out != nullptr) {
+      out->width = width_;
+      out->height = height_;
+      out->channels = channels_;
+      out->health = in.health;
+      out->frame_number = in.frame_number;
+      out->camera = camera_;
+      out->left.resize(in.left.size);
+      out->right.resize(in.right.size);
+      left_out = out->left_view();
+      right_out = out->right_view();
+    }
+    if (is_rectified) {
+      if (out != nullptr && !Rectifier(width_, height_, camera_).rectify(left, right, left_out, right_out)) return false;
+    } else {
+      if (!rectifier_->rectify(left, right, left_out, right_out)) return false;
+      left = left_out;
+      right = right_out;
+    }
+    if (out != nullptr) rectified_.send(stamp_);
+    return true;
+  }
+
+  void match_and_send(Job& job, ImageView<const uint8_t> left, ImageView<const uint8_t> right) {
+    DisparityMap* map = disparity_.connected() ? disparity_.loan() : nullptr;
+    ImageView<int16_t> disparity(disparity_scratch_.data(), width_, height_);
+    ImageView<uint8_t> confidence(confidence_scratch_.data(), width_, height_);
+    if (map != nullptr) {
+      map->width = width_;
+      map->height = height_;
+      map->disparities = disparities_;
+      map->camera = camera_;
+      map->disparity.resize(disparity_scratch_.size());
+      map->confidence.resize(confidence_scratch_.size());
+      disparity = map->view();
+      confidence = map->confidence_view();
+    }
+    if (!match(job.level(), left, right, disparity, confidence)) return job.no_result();
+    if (map != nullptr) disparity_.send(stamp_);
+    PointCloud* cloud = cloud_.connected() ? cloud_.loan() : nullptr;
+    if (cloud != nullptr) {
+      cloud->camera = camera_;
+      cloud->points.resize(cloud->points.capacity);
+      cloud->colours.resize(cloud->colours.capacity);
+      const size_t count =
+          triangulate(disparity, left, camera_, cloud_step_, cloud->points.items(), cloud->colours.items());
+      cloud->points.resize(count);
+      cloud->colours.resize(count);
+      cloud_.send(stamp_);
+    }
+    if ((disparity_.connected() && map == nullptr) || (cloud_.connected() && cloud == nullptr)) job.no_result();
+  }
+
+  bool match(int level, ImageView<const uint8_t> left, ImageView<const uint8_t> right, ImageView<int16_t> disparity,
+             ImageView<uint8_t> confidence) {
+    if (level == 0) return matcher_->match(left, right, disparity, confidence);
+    const int w = half(width_), h = half(height_);
+    const ImageView<uint8_t> half_left(half_.left.data(), w, h, channels_), half_right(half_.right.data(), w, h, channels_);
+    const ImageView<int16_t> half_disparity(half_.disparity.data(), w, h);
+    const ImageView<uint8_t> half_confidence(half_.confidence.data(), w, h);
+    halve(left, half_left);
+    halve(right, half_right);
+    if (!half_matcher_->match(half_left, half_right, half_disparity, half_confidence)) return false;
+    enlarge(half_disparity, half_confidence, disparity, confidence);
+    return true;
+  }
+
+  Input<StereoPair> pair_{this, "pair", "raw or rectified pair; raw ones need a calibration"};
+  Output<StereoPair> rectified_{this, "rectified", "the pair with epipolar lines along rows"};
+  Output<DisparityMap> disparity_{this, "disparity", "disparity and confidence of the left rectified image"};
+  Output<PointCloud> cloud_{this, "cloud", "coloured points in the frame of the left camera (x right, y down, z forward)"};
+
+  Param<int> disparities_{this, "disparities", 150, {1, 512}, "px", "search range 0 .. disparities - 1"};
+  Choice cost_{this, "cost", "gradient", {"gradient", "ssd", "sad"}, "matching cost of two pixels"};
+  Param<int> c_max_{this, "c_max", 0, {0, 255}, "", "truncation of the cost; 0: 10 for gradient, 50 for ssd and sad"};
+  Param<int> n_square_{this, "n_square", 15, {1, 31}, "px", "edge of the summing window, odd"};
+  Param<int> n_min_{this, "n_min", 5, {1, 31}, "px", "edge of the minimum filter, odd, at most n_square"};
+  Param<double> min_confidence_{this, "min_confidence", 0.25, {0.0, 1.0}, "1", "smallest confidence of a valid pixel; 0 keeps all"};
+  Param<double> uniqueness_{this, "uniqueness", 0.0, {0.0, 1.0}, "1", "smallest (second - best) / second of a valid pixel; 0: off"};
+  Param<bool> left_right_check_{this, "left_right_check", false, "", "reject where left and right disagree by over 1 px; doubles the time"};
+  Param<int> cloud_step_{this, "cloud_step", 2, {1, 64}, "px", "distance of the pixels that become points"};
+  Param<std::string> calibration_{this, "calibration", "", "", "calibration file (M1 D1 M2 D2 R T image_size) for raw pairs"};
+
+  int width_ = 0, height_ = 0, channels_ = 0;
+  int64_t stamp_ = 0;
+  CameraModel camera_;
+  std::optional<Matcher> matcher_, half_matcher_;
+  std::optional<Rectifier> rectifier_;
+  std::vector<uint8_t> left_, right_, confidence_scratch_;
+  std::vector<int16_t> disparity_scratch_;
+  HalfImages half_;
+};
+
+}  // namespace
+
+void register_stereo(NodeTypes& types) {
+  types.add<StereoNode>("stereo", Layer::perception, "Rectification, dense disparity with confidence, coloured point cloud");
+}
+
+}  // namespace takt

@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: Apache-2.0
+// What every LaserScanner, CameraHead, MobileBase and DigitalLines must do. Each function takes a fresh closed device.
+#pragma once
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "hal/base/mobile_base.hpp"
+#include "hal/gpio/digital_lines.hpp"
+#include "hal/head/camera_head.hpp"
+#include "hal/laser/laser_scanner.hpp"
+
+namespace takt::test {
+
+constexpr int64_t kDeviceEpoch = 7'000'000'000;
+constexpr int64_t kDevicePeriod = 20'000'000;
+
+inline void check_laser_scanner(LaserScanner& laser) {
+  REQUIRE(laser.open().has_value());
+  const ScanFormat format = laser.format();
+  REQUIRE(format.beams >= 2);
+  CHECK(format.step_rad > 0);
+  CHECK(format.max_range_m > 0);
+  CHECK(format.sweep_s >= 0);
+  std::vector<float> range(format.beams + 8, -7.0f);
+  const std::span<float> beams(range.data(), format.beams);
+  CHECK(laser.read(beams, kDeviceEpoch, INT64_MAX).status == ReadStatus::no_data);  // not started
+  REQUIRE(laser.start(kDeviceEpoch).has_value());
+  CHECK(laser.read(beams, kDeviceEpoch + 1, kDeviceEpoch).status == ReadStatus::no_data);
+  CHECK(range[0] == -7.0f);
+  int64_t previous = INT64_MIN;
+  for (uint32_t k = 0; k < 5; ++k) {
+    const int64_t wanted = kDeviceEpoch + k * kDevicePeriod;
+    const ScanReading reading = laser.read(beams, wanted, INT64_MAX);
+    REQUIRE(reading.status == ReadStatus::ok);
+    CHECK(reading.stamp_ns <= wanted);
+    CHECK(reading.stamp_ns > previous);
+    CHECK(reading.scan_number == k);
+    previous = reading.stamp_ns;
+    for (const float r : beams) CHECK((r == 0.0f || (r > 0.0f && static_cast<double>(r) < format.max_range_m + 0.1)));
+  }
+  for (size_t i = format.beams; i < range.size(); ++i) CHECK(range[i] == -7.0f);
+  laser.stop();
+  CHECK(laser.read(beams, kDeviceEpoch, INT64_MAX).status == ReadStatus::no_data);
+  laser.close();
+}
+
+inline void check_camera_head(CameraHead& head) {
+  REQUIRE(head.open().has_value());
+  CHECK(head.read(kDeviceEpoch, INT64_MAX).status == ReadStatus::no_data);
+  REQUIRE(head.start(kDeviceEpoch).has_value());
+  const HeadLimits limits = head.limits();
+  CHECK(head.command(0.5, -0.2, kDeviceEpoch));
+  double fastest = 0, previous = head.read(kDeviceEpoch, INT64_MAX).pan_rad;
+  HeadReading reading;
+  for (int64_t k = 1; k <= 100; ++k) {
+    const int64_t at = kDeviceEpoch + k * kDevicePeriod;
+    head.command(0.5, -0.2, at);
+    reading = head.read(at, INT64_MAX);
+    REQUIRE(reading.status == ReadStatus::ok);
+    CHECK(reading.stamp_ns <= at);
+    fastest = std::max(fastest, std::abs(reading.pan_rad - previous) / 0.02);
+    previous = reading.pan_rad;
+  }
+  CHECK(reading.pan_rad == doctest::Approx(0.5).epsilon(0.01));
+  CHECK(reading.tilt_rad == doctest::Approx(-0.2).epsilon(0.01));
+  CHECK_FALSE(reading.moving);
+  CHECK(fastest > 0.1);
+  CHECK(fastest <= limits.pan_rad_s * 1.001);
+  // Beyond the limits: clamped, and said so.
+  CHECK_FALSE(head.command(limits.pan_rad + 1, 0, kDeviceEpoch + 101 * kDevicePeriod));
+  CHECK_FALSE(head.command(std::nan(""), 0, kDeviceEpoch + 101 * kDevicePeriod));
+  for (int64_t k = 102; k <= 400; ++k) {
+    reading = head.read(kDeviceEpoch + k * kDevicePeriod, INT64_MAX);
+    CHECK(reading.pan_rad <= limits.pan_rad + 1e-6);
+  }
+  head.stop();
+  CHECK(head.read(kDeviceEpoch + 401 * kDevicePeriod, INT64_MAX).status == ReadStatus::no_data);
+  head.close();
+}
+
+/// `obeys`: the base takes velocity commands (a simulated one may drive a path instead).
+inline void check_mobile_base(MobileBase& base, bool obeys) {
+  REQUIRE(base.open().has_value());
+  CHECK(base.read(kDeviceEpoch, INT64_MAX).status == ReadStatus::no_data);
+  REQUIRE(base.start(kDeviceEpoch).has_value());
+  const BaseLimits limits = base.limits();
+  BaseReading before = base.read(kDeviceEpoch, INT64_MAX);
+  REQUIRE(before.status == ReadStatus::ok);
+  const uint32_t epoch = before.epoch;
+  int64_t at = kDeviceEpoch;
+  const auto drive = [&](double speed, int jobs, bool repeat) {
+    for (int k = 0; k < jobs; ++k) {
+      at += kDevicePeriod;
+      if (repeat) CHECK(base.command(speed, 0.0, at) == obeys);
+      const BaseReading now = base.read(at, INT64_MAX);
+      REQUIRE(now.status == ReadStatus::ok);
+      CHECK(now.stamp_ns <= at);
+      CHECK(now.epoch == epoch);
+      CHECK(std::abs(now.speed_m_s) <= limits.speed_m_s * 1.02);
+      CHECK(std::abs(now.speed_m_s - before.speed_m_s) <= limits.acceleration_m_s2 * 0.02 * 1.05 + 1e-9);
+      CHECK(std::hypot(now.x_m - before.x_m, now.y_m - before.y_m) <= limits.speed_m_s * 0.02 * 1.05);
+      before = now;
+    }
+  };
+  drive(0.3, 75, true);
+  CHECK(before.speed_m_s > 0.1);
+  if (obeys) {
+    drive(0.0, 60, false);  // nobody repeats the command: the watchdog stops the base
+    CHECK(std::abs(before.speed_m_s) < 1e-6);
+    CHECK_FALSE(base.command(limits.speed_m_s * 2, 0, at));
+  }
+  base.stop();
+  CHECK(base.read(at, INT64_MAX).status == ReadStatus::no_data);
+  base.close();
+}
+
+/// `set` changes a line from now on.
+template <class Set>
+void check_digital_lines(DigitalLines& lines, uint32_t line, Set set) {
+  REQUIRE(lines.open().has_value());
+  REQUIRE(lines.count() > line);
+  CHECK(lines.read(kDeviceEpoch).status == ReadStatus::no_data);
+  REQUIRE(lines.start(kDeviceEpoch).has_value());
+  const LinesReading first = lines.read(kDeviceEpoch);
+  REQUIRE(first.status == ReadStatus::ok);
+  CHECK(first.changed == 0);
+  CHECK((first.levels >> lines.count()) == 0);
+  set(line, (first.levels >> line & 1) == 0);
+  const LinesReading second = lines.read(kDeviceEpoch + kDevicePeriod);
+  CHECK((second.levels ^ first.levels) == 1u << line);
+  CHECK(second.changed == 1u << line);
+  CHECK(lines.read(kDeviceEpoch + 2 * kDevicePeriod).changed == 0);
+  lines.stop();
+  CHECK(lines.read(kDeviceEpoch + 3 * kDevicePeriod).status == ReadStatus::no_data);
+  lines.close();
+}
+
+}  // namespace takt::test

@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: Apache-2.0
+# The main job, short: it counts its releases right, ends on a signal, and two runs live side by side. Deadlines are not
+# judged here: a shared machine would make that a coin toss.
+source "$(dirname "$0")/lib.sh" "$@"
+
+check_report() { # releases = ceil((duration - offset) * rate), every job accounted for, pools empty at the end
+  python3 - "$1" <<'PY' || fail "report $1"
+import json, sys
+report = json.load(open(sys.argv[1]))
+for node in report["nodes"]:
+    done = node["completed"] + node["skipped"] + node["reused"]
+    assert node["released"] == done, (node["name"], node["released"], done)
+    assert node["rate_hz"] is None or abs(node["released"] - node["rate_hz"] * report["duration_s"]) <= 1, node["name"]
+for edge in report["edges"]:
+    assert edge["received"] + edge["dropped"] <= edge["sent"], edge
+assert report["memory"]["pools"] and report["edges"]
+PY
+}
+
+run_ok() { # exit 0 or 1 (a deadline missed on this machine), nothing else
+  "$takt" run "$@" >"$work/stdout" 2>"$work/stderr"
+  local code=$?
+  cat "$work/stdout"
+  [ $code -le 1 ] || { cat "$work/stderr"; fail "exit $code: $*"; }
+}
+
+run_ok --for 3s --policy cooperative --report "$work/a.json" --output "$work/out"
+command -v python3 >/dev/null && check_report "$work/a.json"
+ls "$work"/out/*.png >/dev/null || fail "no picture was written"
+
+run_ok --clock virtual --for 3s --report "$work/v.json" --output "$work/out"
+run_ok --clock virtual --for 3s --report "$work/w.json" --output "$work/out"
+
+# Two runs beside one another, both stopped by a signal within a second.
+for signal in INT TERM; do
+  "$takt" run --for 0s --policy cooperative --output "$work/one" >"$work/1" 2>&1 & first=$!
+  "$takt" run --for 0s --policy cooperative --output "$work/two" >"$work/2" 2>&1 & second=$!
+  sleep 2
+  start=$(date +%s%N)
+  kill -$signal $first $second
+  wait $first; a=$?
+  wait $second; b=$?
+  took=$((($(date +%s%N) - start) / 1000000))
+  echo "SIG$signal ended both in $took ms, exit $a and $b"
+  [ $a -le 1 ] && [ $b -le 1 ] || fail "exit $a and $b after SIG$signal"
+  grep -q "CPU" "$work/1" || fail "no summary after SIG$signal"
+done
+finish

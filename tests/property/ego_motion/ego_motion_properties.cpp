@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include "nodes/ego_motion/block_search.hpp"
+#include "nodes/ego_motion/corners.hpp"
+#include "nodes/ego_motion/flow_filter.hpp"
+#include "nodes/ego_motion/refine.hpp"
+
+using namespace takt::ego_motion;
+
+namespace {
+
+/// Noise, smoothed `passes` times so that it has structure on several scales.
+Plane noise(std::mt19937& random, int width, int height, int passes) {
+  Plane image(width, height), copy(width, height);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) image.row(y)[x] = static_cast<uint8_t>(random() & 255);
+  for (int pass = 0; pass < passes; ++pass) {
+    for (int y = 0; y < height; ++y) std::copy_n(image.row(y), width, copy.row(y));
+    for (int y = 1; y < height - 1; ++y)
+      for (int x = 1; x < width - 1; ++x) {
+        int sum = 0;
+        for (int v = -1; v <= 1; ++v)
+          for (int u = -1; u <= 1; ++u) sum += copy.row(y + v)[x + u];
+        image.row(y)[x] = static_cast<uint8_t>(sum / 9);
+      }
+  }
+  return image;
+}
+
+int between(std::mt19937& random, int low, int high) { return std::uniform_int_distribution<int>(low, high)(random); }
+
+}  // namespace
+
+TEST_CASE("block_search equals three nested loops over pixels") {
+  std::mt19937 random(1);
+  for (int round = 0; round < 200; ++round) {
+    const int width = between(random, 33, 90), height = between(random, 33, 70), half = between(random, 1, 7);
+    const Plane a = noise(random, width, height, round % 3), b = noise(random, width, height, round % 3);
+    const int x = between(random, half, width - 1 - half), y = between(random, half, height - 1 - half);
+    const int cx = between(random, -5, width + 5), cy = between(random, -5, height + 5);
+    const int rx = between(random, 0, 12), ry = between(random, 0, 12);
+    Patch patch;
+    patch.take(a, x, y, half);
+    const BlockMatch fast = block_search(patch, b, cx, cy, rx, ry);
+    const BlockMatch slow = block_search_reference(a, x, y, half, b, cx, cy, rx, ry);
+    CHECK(fast.cost == slow.cost);
+    CHECK(fast.x == slow.x);
+    CHECK(fast.y == slow.y);
+  }
+}
+
+TEST_CASE("the corner response equals the double loop bit by bit") {
+  std::mt19937 random(2);
+  for (int round = 0; round < 20; ++round) {
+    const int width = between(random, 20, 80), height = between(random, 20, 60);
+    const Plane image = noise(random, width, height, round % 4);
+    CornerDetector detector(width, height, {});
+    detector.detect(image);
+    bool equal = true;
+    for (int y = 2; y < height - 2; ++y)
+      for (int x = 2; x < width - 2; ++x)
+        equal &= detector.response()[static_cast<size_t>(y * width + x)] == CornerDetector::response_reference(image, x, y);
+    CHECK(equal);
+  }
+}
+
+TEST_CASE("corners keep their distance, their margin and the mask, strongest first") {
+  std::mt19937 random(3);
+  for (int round = 0; round < 20; ++round) {
+    const int width = between(random, 64, 200), height = between(random, 64, 150);
+    const Plane image = noise(random, width, height, 2);
+    CornerParameters p;
+    p.maximum = between(random, 12, 300);
+    p.distance_px = between(random, 1, 9);
+    p.tile_px = between(random, 16, 300);
+    std::vector<int16_t> mask(static_cast<size_t>(width * height));
+    for (auto& m : mask) m = static_cast<int16_t>(random() % 3) > 0 ? 5 : -1;
+    CornerDetector detector(width, height, p);
+    const auto corners = detector.detect(image, {mask.data(), width, height});
+    CHECK(!corners.empty());
+    CHECK(corners.size() <= static_cast<size_t>(p.maximum));
+    const auto strength = [&](const Corner& c) { return detector.response()[static_cast<size_t>(c.y * width + c.x)]; };
+    bool good = true;
+    for (size_t i = 0; i < corners.size(); ++i) {
+      const Corner& c = corners[i];
+      good &= c.x >= p.margin_px && c.y >= p.margin_px && c.x < width - p.margin_px && c.y < height - p.margin_px;
+      good &= mask[static_cast<size_t>(c.y * width + c.x)] >= 0;
+      good &= i == 0 || strength(corners[i - 1]) >= strength(c);
+      for (size_t k = 0; k < i; ++k)
+        good &= std::max(std::abs(corners[k].x - c.x), std::abs(corners[k].y - c.y)) >= p.distance_px;
+    }
+    CHECK(good);
+  }
+}
+
+TEST_CASE("the flow filter decides like the quadratic one") {
+  std::mt19937 random(4);
+  for (int round = 0; round < 100; ++round) {
+    const int width = between(random, 64, 400), height = between(random, 64, 300);
+    FlowFilterParameters p{static_cast<double>(between(random, 2, 60)), 0.5 * between(random, 1, 10), between(random, 1, 6)};
+    std::vector<Flow> flows(static_cast<size_t>(between(random, 0, 300)));
+    for (Flow& f : flows)
+      f = {static_cast<float>(between(random, 0, width - 1)), static_cast<float>(between(random, 0, height - 1)),
+           0.25f * static_cast<float>(between(random, -20, 20)), 0.25f * static_cast<float>(between(random, -20, 20))};
+    std::vector<uint8_t> fast(flows.size(), 7), slow(flows.size(), 8);
+    FlowFilter(width, height, flows.size(), p).apply(flows, fast);
+    FlowFilter::apply_reference(flows, p, slow);
+    CHECK(fast == slow);
+  }
+}
+
+TEST_CASE("the pyramid halves by rounded means") {
+  std::mt19937 random(5);
+  const Plane image = noise(random, 101, 77, 0);
+  Pyramid pyramid(101, 77, 3);
+  pyramid.build(image.view());
+  for (int l = 1; l < 3; ++l) {
+    const Plane &fine = pyramid.level(l - 1), &coarse = pyramid.level(l);
+    CHECK(coarse.width() == fine.width() / 2);
+    bool equal = true;
+    for (int y = 0; y < coarse.height(); ++y)
+      for (int x = 0; x < coarse.width(); ++x) {
+        int sum = 2;
+        for (int v = 0; v < 2; ++v)
+          for (int u = 0; u < 2; ++u) sum += fine.row(2 * y + v)[2 * x + u];
+        equal &= coarse.row(y)[x] == sum / 4;
+      }
+    CHECK(equal);
+  }
+}
+
+TEST_CASE("sub-pixel refinement finds a shift of a smooth image to 0.03 px, with a brightness offset") {
+  const auto pattern = [](double x, double y) {
+    return 110 + 30 * std::sin(0.45 * x + 0.2 * y) + 30 * std::sin(0.35 * y - 0.15 * x) + 20 * std::sin(0.3 * x);
+  };
+  std::mt19937 random(6);
+  for (int round = 0; round < 50; ++round) {
+    const double sx = 0.01 * between(random, -90, 90), sy = 0.01 * between(random, -90, 90);
+    Plane a(60, 60), b(60, 60);
+    for (int y = 0; y < 60; ++y)
+      for (int x = 0; x < 60; ++x) {
+        a.row(y)[x] = static_cast<uint8_t>(std::lround(pattern(x, y)));
+        b.row(y)[x] = static_cast<uint8_t>(std::lround(pattern(x - sx, y - sy) + 12));
+      }
+    RefinePatch patch;
+    REQUIRE(patch.take(a, 30, 30, 5));
+    const SubPixel at = patch.refine(b, 30, 30, 1.5);
+    CHECK(at.converged);
+    CHECK(std::abs(at.x - 30 - sx) < 0.03);
+    CHECK(std::abs(at.y - 30 - sy) < 0.03);
+  }
+  RefinePatch patch;
+  CHECK_FALSE(patch.take(Plane(60, 60), 3, 30, 5));
+  REQUIRE(patch.take(Plane(60, 60), 30, 30, 5));
+  CHECK_FALSE(patch.refine(Plane(60, 60), 30, 30, 1.5).converged);  // no texture
+}

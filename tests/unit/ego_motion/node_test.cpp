@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <doctest/doctest.h>
+
+#include <cmath>
+
+#include "tests/unit/mapping_3d/node_harness.hpp"
+
+namespace takt {
+void register_ego_motion(NodeTypes& types);
+}
+
+using namespace takt;
+
+namespace {
+
+constexpr Capacity kSize{320, 240, 1, 0};
+
+/// A textured wall 4 m ahead, the camera moved to the right by `x_m`.
+void render(StereoPair& pair, DisparityMap& map, double x_m) {
+  pair.width = map.width = 320;
+  pair.height = map.height = 240;
+  pair.channels = 1;
+  pair.camera = map.camera = {250, 159.5, 119.5, 0.2};
+  pair.left.resize(320 * 240), pair.right.resize(320 * 240), map.disparity.resize(320 * 240);
+  const auto texture = [](double x, double y) {
+    return static_cast<uint8_t>(std::lround(120 + 40 * std::sin(9 * x + 2 * std::sin(5 * y)) + 40 * std::sin(11 * y + 3 * std::sin(4 * x))));
+  };
+  for (int v = 0; v < 240; ++v)
+    for (int u = 0; u < 320; ++u) {
+      const double x = (u - 159.5) * 4 / 250 + x_m, y = (v - 119.5) * 4 / 250;
+      pair.left_view().at(u, v) = texture(x, y);
+      pair.right_view().at(u, v) = texture(x + 0.2, y);
+      map.view().at(u, v) = 13;  // 12.5 px in truth
+    }
+}
+
+}  // namespace
+
+TEST_CASE("ego_motion: keyframe, then motion with both stamps; nothing for old or unequal stamps") {
+  NodeTypes types;
+  register_ego_motion(types);
+  const auto node = types.find("ego_motion")->make();
+  auto& pair_port = test::input(*node, "pair");
+  auto& map_port = test::input(*node, "disparity");
+  PortAccess::connect(pair_port, kSize);
+  PortAccess::connect(map_port, kSize);
+  test::set_up(*node);
+  test::BoxWriter<Motion> out(*node->outputs()[0]);
+  test::Box<StereoPair> pair(kSize);
+  test::Box<DisparityMap> map(kSize);
+  const auto step = [&](int64_t pair_stamp, int64_t map_stamp, uint64_t sequence) {
+    out.clear();
+    test::latch(pair_port, pair, pair_stamp, sequence);
+    test::latch(map_port, map, map_stamp, sequence);
+    return test::run(*node, sequence);
+  };
+  render(*pair, *map, 0);
+  CHECK(step(1'000, 1'000, 1));
+  REQUIRE(out.sent());
+  CHECK(out.message().keyframe == 1);
+  CHECK(out.message().from_stamp_ns == 1'000);
+
+  render(*pair, *map, 0.05);
+  CHECK(step(101'000, 101'000, 2));
+  REQUIRE(out.sent());
+  CHECK(out.stamp_ns() == 101'000);
+  CHECK(out.message().from_stamp_ns == 1'000);
+  CHECK(out.message().keyframe == 0);
+  CHECK(out.message().valid == 1);
+  CHECK(std::abs(out.message().camera_in_previous.x - 0.05) < 0.003);
+  CHECK(out.message().pose.x == out.message().camera_in_previous.x);
+  CHECK(out.message().inliers > 50);
+
+  CHECK_FALSE(step(101'000, 101'000, 3));
+  CHECK_FALSE(out.sent());
+  CHECK_FALSE(step(201'000, 101'000, 4));
+  CHECK_FALSE(out.sent());
+  pair->camera.focal_px = 0;  // not rectified
+  CHECK_FALSE(step(301'000, 301'000, 5));
+  CHECK_FALSE(out.sent());
+}
+
+TEST_CASE("ego_motion refuses a disparity of another size and an even block") {
+  NodeTypes types;
+  register_ego_motion(types);
+  const auto node = types.find("ego_motion")->make();
+  PortAccess::connect(test::input(*node, "pair"), {640, 480, 3, 0});
+  PortAccess::connect(test::input(*node, "disparity"), {320, 240, 1, 0});
+  CHECK_THROWS_WITH_AS(test::set_up(*node), doctest::Contains("640 x 480"), SetupError);
+  PortAccess::connect(test::input(*node, "disparity"), {640, 480, 1, 0});
+  for (ParamBase* p : node->params())
+    if (p->name() == "n_search") REQUIRE(p->set(int64_t{10}));
+  CHECK_THROWS_WITH_AS(test::set_up(*node), doctest::Contains("n_search is 10"), SetupError);
+}

@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "hal/drivers.hpp"
+
+#include <doctest/doctest.h>
+
+#include "rt/time/rate.hpp"
+#include "tests/conformance/fake_writer.hpp"
+
+using namespace takt;
+using namespace takt::hal;
+
+namespace {
+
+const std::filesystem::path kGraph = std::filesystem::path(TAKT_SOURCE_DIR) / "graph";
+
+DeviceConfig config(const std::string& kind, const std::string& driver, nlohmann::json settings) {
+  return {"thing", kind, driver, std::move(settings), kGraph, 1};
+}
+std::string error(const DeviceConfig& c) {
+  Devices devices;
+  VirtualClock clock;
+  const auto node = make_device(c, devices, clock);
+  return node ? "" : node.error().text();
+}
+bool has(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+const nlohmann::json kWorld = {{"world", "worlds/lab.xml"}};
+
+}  // namespace
+
+TEST_CASE("unknown kinds, drivers and settings list the valid ones") {
+  CHECK(has(error(config("radar", "sim", kWorld)), "stereo_camera, laser_scanner, camera_head, mobile_base, digital_lines"));
+  CHECK(has(error(config("stereo_camera", "v4l2", kWorld)), "known drivers: sim, replay"));
+  CHECK(has(error(config("laser_scanner", "sim", {{"world", "worlds/lab.xml"}, {"beans", 3}})), "unknown setting `beans`"));
+  CHECK(has(error(config("laser_scanner", "sim", nlohmann::json::object())), "`world` is missing"));
+  CHECK(has(error(config("laser_scanner", "sim", {{"world", "worlds/none.xml"}})), "worlds/none.xml"));
+  CHECK(has(error(config("stereo_camera", "sim", kWorld)), "`rig` is missing"));
+  CHECK(has(error(config("stereo_camera", "replay", nlohmann::json::object())), "`directory`"));
+  CHECK(has(error(config("mobile_base", "sim", {{"world", "worlds/lab.xml"}, {"drive", "walk"}})), "path or command"));
+}
+
+TEST_CASE("every kind can be made with every setting that its listing calls required, and no other") {
+  VirtualClock clock;
+  for (const DeviceKind& kind : device_kinds()) {
+    Devices devices;
+    nlohmann::json settings = nlohmann::json::object();
+    for (const SettingInfo& setting : kind.settings) {
+      if (!setting.required || setting.driver == "replay") continue;
+      settings[std::string(setting.name)] = setting.name == "world" ? "worlds/lab.xml" : "rigs/xb3.yaml";
+    }
+    const auto node = make_device(config(std::string(kind.name), "sim", settings), devices, clock);
+    CHECK_MESSAGE(node.has_value(), (node ? "" : node.error().text()));
+    for (const SettingInfo& setting : kind.settings) CHECK_FALSE(setting.doc.empty());
+  }
+}
+
+TEST_CASE("a job of the camera node sends one pair with the stamp of its release") {
+  VirtualClock clock(1'000'000'000);
+  Devices devices;
+  auto settings = kWorld;
+  settings["rig"] = "rigs/xb3.yaml";
+  auto made = make_device(config("stereo_camera", "sim", settings), devices, clock);
+  REQUIRE(made.has_value());
+  DeviceNode& node = **made;
+  Setup setup{clock, kGraph, {}, 1, 15.0};
+  node.setup(setup);
+  OutputPort& output = *node.outputs().at(0);
+  CHECK(output.name() == "pair");
+  CHECK(output.capacity().width == 640);
+  test::FakeWriter writer(output);
+  const Rate rate{15, 1};
+  for (uint64_t k = 0; k < 3; ++k) {
+    const int64_t release = rate.release_ns(1'000'000'000, static_cast<int64_t>(k));
+    clock.advance_to(release);
+    Job job(clock, k, release, release + 66'000'000, 0, "full");
+    PortAccess::reset(output);
+    node.run(job);
+    const auto* pair = writer.sent<StereoPair>();
+    REQUIRE(pair != nullptr);
+    CHECK(writer.stamp_ns() == release);
+    CHECK(pair->frame_number == k);
+    CHECK(pair->left.size == 640u * 480u * 3u);
+    CHECK(pair->camera.baseline_m == doctest::Approx(0.24));
+    CHECK(pair->health == 0);
+    CHECK_FALSE(job.without_result());
+  }
+  node.finish();
+}
+
+TEST_CASE("a replayed camera ends the run after its last frame") {
+  VirtualClock clock;
+  Devices devices;
+  const auto image = (kGraph / "worlds/lab.pgm").string();
+  auto made = make_device(config("stereo_camera", "replay", {{"left", image}, {"right", image}, {"focal", 100}, {"baseline", "0.1m"}, {"frames", 2}}), devices, clock);
+  REQUIRE_MESSAGE(made.has_value(), (made ? "" : made.error().text()));
+  DeviceNode& node = **made;
+  Setup setup{clock, kGraph, {}, 1, 15.0};
+  node.setup(setup);
+  test::FakeWriter writer(*node.outputs().at(0));
+  std::vector<bool> ended, sent;
+  for (uint64_t k = 0; k < 3; ++k) {
+    const int64_t release = Rate{15, 1}.release_ns(0, static_cast<int64_t>(k));
+    clock.advance_to(release);
+    Job job(clock, k, release, release + 66'000'000, 0, "full");
+    PortAccess::reset(*node.outputs()[0]);
+    node.run(job);
+    ended.push_back(job.ended());
+    sent.push_back(writer.sent<StereoPair>() != nullptr);
+  }
+  CHECK(ended == std::vector<bool>{false, false, true});
+  CHECK(sent == std::vector<bool>{true, true, false});
+}
+
+TEST_CASE("laser, head, base and line nodes send one message a job, and share one world") {
+  VirtualClock clock;
+  Devices devices;
+  for (const auto& [kind, port] : std::initializer_list<std::pair<const char*, const char*>>{
+           {"laser_scanner", "scan"}, {"camera_head", "state"}, {"mobile_base", "odometry"}, {"digital_lines", "state"}}) {
+    auto made = make_device(config(kind, "sim", kWorld), devices, clock);
+    REQUIRE_MESSAGE(made.has_value(), (made ? "" : made.error().text()));
+    DeviceNode& node = **made;
+    Setup setup{clock, kGraph, {}, 1, 15.0};
+    node.setup(setup);
+    CHECK(node.outputs().at(0)->name() == port);
+    test::FakeWriter writer(*node.outputs()[0]);
+    Job job(clock, 0, 0, 66'000'000, 0, "full");
+    node.run(job);
+    CHECK(PortAccess::sent(*node.outputs()[0]));
+    CHECK_FALSE(job.without_result());
+  }
+  CHECK(devices.first_world() != nullptr);
+}

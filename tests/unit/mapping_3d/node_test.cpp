@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <doctest/doctest.h>
+
+#include <cmath>
+
+#include "nodes/mapping_3d/pose.hpp"
+#include "tests/unit/mapping_3d/node_harness.hpp"
+
+namespace takt {
+void register_mapping_3d(NodeTypes& types);
+}
+
+using namespace takt;
+
+TEST_CASE("mapping_3d: one grid per cloud, with the cloud's stamp and the robot's pose at that stamp") {
+  NodeTypes types;
+  register_mapping_3d(types);
+  const auto node = types.find("mapping_3d")->make();
+  auto& cloud_port = test::input(*node, "cloud");
+  auto& motion_port = test::input(*node, "motion");
+  PortAccess::connect(cloud_port, {0, 0, 1, 1000});
+  PortAccess::connect(motion_port, {});
+  test::set_up(*node);
+  test::BoxWriter<Grid> out(*node->outputs()[0]);
+
+  CHECK_FALSE(test::run(*node));  // nothing latched
+
+  test::Box<PointCloud> cloud({0, 0, 1, 1000});
+  cloud->camera = {492.8, 319.5, 239.5, 0.24};
+  cloud->sensor_in_robot = mapping_3d::camera_mount(0, 0.3, 1.5, 0, 0);
+  for (int i = 0; i < 900; ++i) cloud->points.push_back({0.1f, 0.5f, 2.8f});  // robot frame (0.1, 3.1, 1.0)
+  test::latch(cloud_port, cloud, 150, 1);
+  test::Box<Motion> a, b;
+  b->pose.z = 1;  // one metre ahead
+  test::latch(motion_port, a, 100, 1, 0);
+  test::latch(motion_port, b, 200, 2, 1);
+  CHECK(test::run(*node));
+  REQUIRE(out.sent());
+  CHECK(out.stamp_ns() == 150);
+  Grid& grid = out.message();
+  CHECK(grid.grid_in_map.y == doctest::Approx(0.5));
+  CHECK(grid.grid_in_map.qw == doctest::Approx(1));
+  const auto at = [&](double x, double y) {
+    return grid.view().at(static_cast<int>((x - grid.origin_x_m) / grid.cell_m), static_cast<int>((y - grid.origin_y_m) / grid.cell_m));
+  };
+  CHECK(at(0.1, 3.1) == 1000);
+  CHECK(at(0.1, 2.1) == 0);
+  CHECK(at(0.1, -2.1) == Grid::unknown);
+
+  out.clear();
+  CHECK_FALSE(test::run(*node));  // the same cloud again
+  CHECK_FALSE(out.sent());
+}
+
+TEST_CASE("mapping_3d refuses a range that is empty") {
+  NodeTypes types;
+  register_mapping_3d(types);
+  const auto node = types.find("mapping_3d")->make();
+  for (ParamBase* p : node->params())
+    if (p->name() == "range_min") REQUIRE(p->set(7.0));
+  CHECK_THROWS_WITH_AS(test::set_up(*node), doctest::Contains("range_min is 7"), SetupError);
+}

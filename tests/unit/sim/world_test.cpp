@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <fstream>
+
+#include "hal/sim/sensors.hpp"
+#include "tests/unit/sim/small_world.hpp"
+
+using namespace takt;
+using namespace takt::sim;
+
+namespace {
+
+struct TemporaryFolder {
+  std::filesystem::path path;
+  TemporaryFolder() {
+    std::string name = (std::filesystem::temp_directory_path() / "takt-world-XXXXXX").string();
+    REQUIRE(mkdtemp(name.data()) != nullptr);
+    path = name;
+  }
+  ~TemporaryFolder() { std::filesystem::remove_all(path); }
+  std::filesystem::path write(const std::string& name, const std::string& text) const {
+    std::ofstream(path / name, std::ios::binary) << text;
+    return path / name;
+  }
+};
+
+const std::string kRows = "<rows>\n#######\n#.....#\n#.....#\n#.....#\n#.....#\n#######\n</rows>";
+
+std::string message(const std::string& xml) {
+  const TemporaryFolder folder;
+  const auto world = load_world("camera", folder.write("world.xml", xml));
+  return world ? "" : world.error().what + " | " + world.error().fix;
+}
+bool has(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+}  // namespace
+
+TEST_CASE("a world with rows loads; row 0 of the bitmap is the bottom") {
+  const TemporaryFolder folder;
+  const auto file = folder.write("w.xml", "<world resolution=\"0.5m\"><rows>\n#####\n#.###\n#...#\n#...#\n#####\n</rows>"
+                                          "<client name=\"ace\" x=\"1.2m\" y=\"1m\"/>"
+                                          "<action name=\"fill\" cost=\"4s\"><role name=\"v\" type=\"cup\"/><post role=\"v\" attr=\"content\" value=\"full\"/></action></world>");
+  const auto world = load_world("camera", file);
+  REQUIRE(world.has_value());
+  CHECK(world->map.at(2, 3));
+  CHECK_FALSE(world->map.at(1, 3));
+  CHECK_FALSE(world->map.at(3, 1));
+  CHECK(world->map.at(-1, 2));
+  CHECK(world->actions.at(0).post.at(0).value == "full");
+}
+
+TEST_CASE("mistakes in a world are told with file, line and the way out") {
+  CHECK(has(message("<world"), "world.xml:1"));
+  CHECK(has(message("<map/>"), "not <world>"));
+  CHECK(has(message("<world resolution=\"0.5\">" + kRows + "</world>"), "m, cm or mm"));
+  CHECK(has(message("<world resolution=\"0.5m\">" + kRows + "</world>"), "no <client>"));
+  CHECK(has(message("<world resolution=\"0.5m\">" + kRows + "\n<robot/></world>"), "client, object, line, action"));
+  CHECK(has(message("<world resolution=\"0.5m\" wall=\"marble\">" + kRows + "</world>"), "plaster"));
+  CHECK(has(message("<world resolution=\"0.5m\"><rows>###\n#.\n###</rows></world>"), "row 2"));
+  CHECK(has(message("<world resolution=\"0.5m\" map=\"absent.pgm\"/>"), "absent.pgm"));
+  CHECK(has(message("<world resolution=\"0.5m\">" + kRows + "<client name=\"ace\" x=\"0.1m\" y=\"1m\"/></world>"), "inside an obstacle"));
+  const auto missing = load_world("camera", "/nonexistent/world.xml");
+  REQUIRE_FALSE(missing.has_value());
+  CHECK(missing.error().id == "camera");
+  CHECK(has(missing.error().what, "/nonexistent/world.xml"));
+}
+
+TEST_CASE("truncated and foreign maps are refused") {
+  const TemporaryFolder folder;
+  CHECK(load_pgm(folder.write("good.pgm", std::string("P5\n# comment\n3 3\n255\n") + std::string(9, '\xff')), 0.1).has_value());
+  CHECK_FALSE(load_pgm(folder.write("short.pgm", std::string("P5\n3 3\n255\n") + std::string(8, '\xff')), 0.1).has_value());
+  CHECK_FALSE(load_pgm(folder.write("wide.pgm", "P5\n99999 3\n255\n"), 0.1).has_value());
+  CHECK_FALSE(load_pgm(folder.write("text.pgm", "hello"), 0.1).has_value());
+}
+
+TEST_CASE("the shipped world and rigs load, and the drive is free, slow and smooth") {
+  const std::filesystem::path graph = std::filesystem::path(TAKT_SOURCE_DIR) / "graph";
+  const auto s = Simulation::load("camera", graph / "worlds/lab.xml", "", 1);
+  REQUIRE_MESSAGE(s.has_value(), (s ? "" : s.error().text()));
+  for (const char* rig : {"xb3.yaml", "xb3_fine.yaml", "xb3_raw.yaml", "x2_wide.yaml"}) {
+    const auto loaded = load_rig("camera", graph / "rigs" / rig);
+    CHECK_MESSAGE(loaded.has_value(), (loaded ? "" : loaded.error().text()));
+  }
+  (*s)->begin(0);
+  RobotState previous = (*s)->robot(0);
+  CHECK(previous.speed_m_s == 0.0);
+  for (int64_t k = 1; k < 20'000; ++k) {
+    const RobotState now = (*s)->robot(k * 10'000'000);
+    CHECK(now.speed_m_s <= 0.4 + 1e-9);
+    CHECK(std::abs(now.turn_rad_s) <= 0.31);
+    CHECK(std::abs(now.speed_m_s - previous.speed_m_s) <= 1.35 * 0.01);
+    CHECK(std::abs(now.turn_rad_s - previous.turn_rad_s) <= 0.05);
+    CHECK(std::hypot(now.x_m - previous.x_m, now.y_m - previous.y_m) <= 0.0041);
+    CHECK_FALSE(collides((*s)->world(), Vec2(now.x_m, now.y_m), Simulation::kFootprintRadius));
+    previous = now;
+  }
+}
+
+TEST_CASE("speed and turn rate of the path are the derivatives of its pose") {
+  const Path path(test::small_path());
+  for (double t = 0.05; t < 40; t += 0.173) {
+    const double h = 1e-4;
+    const RobotState a = path.at(t - h), b = path.at(t + h), m = path.at(t);
+    CHECK(std::hypot(b.x_m - a.x_m, b.y_m - a.y_m) / (2 * h) == doctest::Approx(m.speed_m_s).epsilon(0.02));
+    CHECK(std::remainder(b.theta_rad - a.theta_rad, 6.283185307179586) / (2 * h) == doctest::Approx(m.turn_rad_s).epsilon(0.05));
+  }
+}
+
+TEST_CASE("an open path stops at its last waypoint") {
+  PathRequest request = test::small_path();
+  request.loop = false;
+  const Path path(request);
+  const RobotState end = path.at(1000);
+  CHECK(end.x_m == doctest::Approx(1.7).epsilon(1e-3));
+  CHECK(end.y_m == doctest::Approx(3.4).epsilon(1e-3));
+  CHECK(end.speed_m_s == doctest::Approx(0.0));
+}
+
+TEST_CASE("laser: mean and spread of the range to a wall at a known distance") {
+  const auto s = test::small_simulation();
+  s->begin(0);
+  std::vector<float> range(181);
+  double sum = 0, squares = 0;
+  const int n = 400;
+  for (int k = 0; k < n; ++k) {
+    scan(*s, {}, 20'000'000ll * k, range);
+    const double r = static_cast<double>(range[180]);  // +90 degrees: the upper wall, 4.9 - 2.5 m away
+    sum += r, squares += r * r;
+  }
+  CHECK(sum / n == doctest::Approx(2.4).epsilon(0.002));
+  CHECK(std::sqrt(squares / n - sum * sum / n / n) == doctest::Approx(0.01).epsilon(0.2));
+}
+
+TEST_CASE("objects are seen only in the field of view and unhidden") {
+  const auto s = test::small_simulation();
+  s->begin(0);
+  const auto seen = s->visible_objects(0);
+  CHECK(seen.size() == 2);
+  World turned = test::small_world();
+  turned.clients[0].theta_rad = 3.14;
+  Simulation away(std::move(turned), 0, 1);
+  away.begin(0);
+  CHECK(away.visible_objects(0).empty());
+}

@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <random>
+
+#include "nodes/stereo/rectify.hpp"
+#include "tests/test_data.hpp"
+
+using namespace takt;
+using namespace takt::stereo;
+
+namespace {
+
+/// Two cameras that differ a little, a few degrees apart.
+StereoCalibration crooked_pair() {
+  StereoCalibration c;
+  c.width = 320;
+  c.height = 240;
+  c.left_matrix = {250, 0, 158, 0, 251, 121, 0, 0, 1};
+  c.right_matrix = {253, 0, 163, 0, 252, 117, 0, 0, 1};
+  c.left_distortion = {-0.2, 0.05, 0.001, -0.001, 0};
+  c.right_distortion = {-0.18, 0.04, -0.001, 0.002, 0};
+  const double a = 0.03, b = -0.02;
+  c.rotation = {std::cos(a), 0, std::sin(a), std::sin(a) * std::sin(b), std::cos(b), -std::cos(a) * std::sin(b),
+                -std::sin(a) * std::cos(b), std::sin(b), std::cos(a) * std::cos(b)};
+  c.translation_m = {-0.12, 0.003, 0.002};
+  return c;
+}
+
+cv::Point2d project(const std::array<double, 9>& k, const std::array<double, 5>& d, const cv::Vec3d& p) {
+  std::vector<cv::Point2d> out;
+  cv::projectPoints(std::vector<cv::Point3d>{{p[0], p[1], p[2]}}, cv::Vec3d(), cv::Vec3d(),
+                    cv::Mat(3, 3, CV_64F, const_cast<double*>(k.data())), cv::Mat(1, 5, CV_64F, const_cast<double*>(d.data())),
+                    out);
+  return out[0];
+}
+
+/// Centre of the one bright spot of an image.
+cv::Point2d centre(const std::vector<uint8_t>& image, int width) {
+  double sum = 0, x = 0, y = 0;
+  for (size_t i = 0; i < image.size(); ++i) {
+    sum += image[i];
+    x += image[i] * static_cast<double>(i % static_cast<size_t>(width));
+    y += image[i] * static_cast<double>(i / static_cast<size_t>(width));
+  }
+  return {x / sum, y / sum};
+}
+
+std::vector<uint8_t> spot(int width, int height, cv::Point2d at) {
+  std::vector<uint8_t> image(static_cast<size_t>(width * height));
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x)
+      image[static_cast<size_t>(y * width + x)] =
+          static_cast<uint8_t>(std::lround(250 * std::exp(-(std::pow(x - at.x, 2) + std::pow(y - at.y, 2)) / 8)));
+  return image;
+}
+
+}  // namespace
+
+TEST_CASE("a point in space lies on one row of both rectified images, at the disparity of its depth") {
+  const StereoCalibration c = crooked_pair();
+  const Rectifier rectifier(c);
+  CHECK(rectifier.camera().baseline_m == doctest::Approx(std::sqrt(0.12 * 0.12 + 0.003 * 0.003 + 0.002 * 0.002)));
+  for (const cv::Vec3d& p : {cv::Vec3d{0, 0, 2}, cv::Vec3d{0.4, -0.3, 1.5}, cv::Vec3d{-0.5, 0.6, 3}}) {
+    const cv::Matx33d rotation(c.rotation.data());
+    const cv::Vec3d in_right = rotation * p + cv::Vec3d(c.translation_m.data());
+    const auto left = spot(c.width, c.height, project(c.left_matrix, c.left_distortion, p));
+    const auto right = spot(c.width, c.height, project(c.right_matrix, c.right_distortion, in_right));
+    std::vector<uint8_t> l(left.size()), r(right.size());
+    REQUIRE(rectifier.rectify({left.data(), c.width, c.height}, {right.data(), c.width, c.height},
+                              {l.data(), c.width, c.height}, {r.data(), c.width, c.height}));
+    const auto a = centre(l, c.width), b = centre(r, c.width);
+    CHECK(std::abs(a.y - b.y) < 0.15);
+    const double depth = rectifier.camera().focal_px * rectifier.camera().baseline_m / (a.x - b.x);
+    CHECK(depth == doctest::Approx(cv::norm(p)).epsilon(0.15));  // the rectified axis is turned by a few degrees
+  }
+}
+
+TEST_CASE("the remap agrees with OpenCV's within two grey levels, one and three channels") {
+  const StereoCalibration c = crooked_pair();
+  const Rectifier rectifier(c);
+  cv::Mat r1, r2, p1, p2, q, x, y;
+  cv::Mat k1(3, 3, CV_64F, const_cast<double*>(c.left_matrix.data())), k2(3, 3, CV_64F, const_cast<double*>(c.right_matrix.data()));
+  cv::Mat d1(1, 5, CV_64F, const_cast<double*>(c.left_distortion.data())), d2(1, 5, CV_64F, const_cast<double*>(c.right_distortion.data()));
+  cv::stereoRectify(k1, d1, k2, d2, {c.width, c.height}, cv::Mat(3, 3, CV_64F, const_cast<double*>(c.rotation.data())),
+                    cv::Mat(3, 1, CV_64F, const_cast<double*>(c.translation_m.data())), r1, r2, p1, p2, q,
+                    cv::CALIB_ZERO_DISPARITY, 0);
+  cv::initUndistortRectifyMap(k1, d1, r1, p1, {c.width, c.height}, CV_32F, x, y);
+  for (const int channels : {1, 3}) {
+    cv::Mat in(c.height, c.width, CV_8UC(channels)), expected;
+    cv::theRNG().state = 5;
+    cv::randu(in, 0, 256);
+    cv::GaussianBlur(in, in, {0, 0}, 2);  // OpenCV rounds positions to 1/32 px; smooth images forgive that
+    cv::remap(in, expected, x, y, cv::INTER_LINEAR);
+    cv::Mat left(in.size(), in.type()), right(in.size(), in.type());
+    REQUIRE(rectifier.rectify({in.data, c.width, c.height, channels}, {in.data, c.width, c.height, channels},
+                              {left.data, c.width, c.height, channels}, {right.data, c.width, c.height, channels}));
+    cv::Mat inner = (x >= 1) & (y >= 1) & (x < c.width - 2) & (y < c.height - 2);
+    CHECK(cv::countNonZero(inner) > c.width * c.height / 2);
+    cv::Mat difference;
+    cv::absdiff(left, expected, difference);
+    difference.setTo(cv::Scalar::all(0), inner == 0);
+    CHECK(cv::norm(difference, cv::NORM_INF) <= 2);
+    CHECK(cv::norm(left, cv::NORM_L1) > 0);
+  }
+}
+
+TEST_CASE("a rectified pair passes through unchanged") {
+  const Rectifier rectifier(5, 2, {100, 2, 1, 0.1});
+  const std::vector<uint8_t> left{1, 2, 3, 4, 5, 6, 7, 8, 9, 10}, right{9, 8, 7, 6, 5, 4, 3, 2, 1, 0};
+  std::vector<uint8_t> l(10), r(10);
+  REQUIRE(rectifier.rectify({left.data(), 5, 2}, {right.data(), 5, 2}, {l.data(), 5, 2}, {r.data(), 5, 2}));
+  CHECK(l == left);
+  CHECK(r == right);
+  CHECK_FALSE(rectifier.rectify({left.data(), 5, 1}, {right.data(), 5, 2}, {l.data(), 5, 2}, {r.data(), 5, 2}));
+}
+
+TEST_CASE("calibrations that cannot be used are refused with name and value") {
+  const auto message = [](auto change) {
+    StereoCalibration c = crooked_pair();
+    change(c);
+    try {
+      const Rectifier rectifier(c);
+    } catch (const std::invalid_argument& e) {
+      return std::string(e.what());
+    }
+    return std::string("accepted");
+  };
+  const double nan = std::numeric_limits<double>::quiet_NaN(), infinite = std::numeric_limits<double>::infinity();
+  CHECK(message([](auto&) {}) == "accepted");
+  CHECK(message([&](auto& c) { c.left_matrix[2] = nan; }).find("left_matrix[2] is nan") != std::string::npos);
+  CHECK(message([&](auto& c) { c.right_distortion[4] = infinite; }).find("right_distortion[4] is inf") != std::string::npos);
+  CHECK(message([&](auto& c) { c.translation_m[0] = -infinite; }).find("translation_m[0]") != std::string::npos);
+  CHECK(message([](auto& c) { c.right_matrix[0] = 0; }).find("focal") != std::string::npos);
+  CHECK(message([](auto& c) { c.rotation[0] = 0.5; }).find("orthonormal") != std::string::npos);
+  CHECK(message([](auto& c) { c.translation_m = {0.12, 0, 0}; }).find("to the right") != std::string::npos);
+  CHECK(message([](auto& c) { c.translation_m = {0, -0.12, 0}; }).find("to the right") != std::string::npos);
+  CHECK(message([](auto& c) { c.width = 4; }).find("4 x 240") != std::string::npos);
+  CHECK_THROWS_AS(read_calibration("no_such_file.yaml"), std::invalid_argument);
+}
+
+TEST_CASE("a real calibration file brings chessboard corners onto common rows") {
+  const auto folder = takt::test::recording("calibration/chessboard_stereo");
+  if (!folder) return;
+  // The recording has intrinsics only; the pose between the cameras comes from its own images.
+  const cv::FileStorage file((*folder / "intrinsics.yml").string(), cv::FileStorage::READ);
+  cv::Mat k1, d1, k2, d2, r, t, e, f;
+  file["M1"] >> k1, file["D1"] >> d1, file["M2"] >> k2, file["D2"] >> d2;
+  std::vector<std::vector<cv::Point3f>> board;
+  std::vector<std::vector<cv::Point2f>> corners[2];
+  for (const char* number : {"01", "02", "03", "04", "05", "06", "07", "08", "12", "14"}) {
+    std::vector<cv::Point2f> found[2];
+    bool both = true;
+    for (int side = 0; side < 2; ++side) {
+      const cv::Mat image = cv::imread((*folder / (std::string(side ? "right" : "left") + number + ".jpg")).string(), 0);
+      both = cv::findChessboardCorners(image, {9, 6}, found[side]) && both;
+      if (both) cv::cornerSubPix(image, found[side], {11, 11}, {-1, -1}, {cv::TermCriteria::EPS + cv::TermCriteria::COUNT, 30, 0.01});
+    }
+    if (!both) continue;
+    board.emplace_back();
+    for (int i = 0; i < 54; ++i) board.back().emplace_back(static_cast<float>(i % 9), static_cast<float>(i / 9), 0.0f);
+    for (int side = 0; side < 2; ++side) corners[side].push_back(found[side]);
+  }
+  REQUIRE(board.size() >= 4);
+  const double rms_px = cv::stereoCalibrate(board, corners[0], corners[1], k1, d1, k2, d2, {640, 480}, r, t, e, f,
+                                            cv::CALIB_USE_INTRINSIC_GUESS | cv::CALIB_FIX_K3);
+  REQUIRE(rms_px < 1.0);
+  const auto path = std::filesystem::temp_directory_path() / "takt_stereo_calibration_test.yaml";
+  {
+    cv::FileStorage out(path.string(), cv::FileStorage::WRITE);
+    out << "M1" << k1 << "D1" << d1 << "M2" << k2 << "D2" << d2 << "R" << r << "T" << t << "image_size" << std::vector<int>{640, 480};
+  }
+  const Rectifier rectifier(read_calibration(path));
+  std::filesystem::remove(path);
+  const cv::Mat left = cv::imread((*folder / "left01.jpg").string(), 0), right = cv::imread((*folder / "right01.jpg").string(), 0);
+  cv::Mat l(left.size(), CV_8U), rr(right.size(), CV_8U);
+  REQUIRE(rectifier.rectify({left.data, 640, 480}, {right.data, 640, 480}, {l.data, 640, 480}, {rr.data, 640, 480}));
+  std::vector<cv::Point2f> a, b;
+  REQUIRE(cv::findChessboardCorners(l, {9, 6}, a));
+  REQUIRE(cv::findChessboardCorners(rr, {9, 6}, b));
+  double worst = 0;
+  for (size_t i = 0; i < a.size(); ++i) worst = std::max<double>(worst, std::abs(a[i].y - b[i].y));
+  CHECK(worst < 1.0);
+}

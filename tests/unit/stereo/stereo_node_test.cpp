@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: Apache-2.0
+// The thin node: what it sends for rectified, raw and unusable pairs, and at a lower quality level.
+#include <doctest/doctest.h>
+
+#include <cstdlib>
+#include <memory>
+#include <vector>
+
+#include "rt/node.hpp"
+#include "rt/sched/port_access.hpp"
+
+namespace takt {
+void register_stereo(NodeTypes& types);
+}
+
+using namespace takt;
+
+namespace {
+
+struct Free {
+  void operator()(void* p) const { std::free(p); }
+};
+
+/// One message in its chunk, as a transport would hold it.
+struct Chunk {
+  std::unique_ptr<void, Free> memory;
+  Chunk(const MessageType& type, const Capacity& capacity) {
+    const size_t bytes = (sizeof(MessageHeader) + type.bytes(capacity) + 63) / 64 * 64;
+    memory.reset(std::aligned_alloc(64, bytes));
+    new (memory.get()) MessageHeader;
+    type.place(header() + 1, capacity);
+  }
+  MessageHeader* header() const { return static_cast<MessageHeader*>(memory.get()); }
+  template <class T>
+  T& as() const { return *reinterpret_cast<T*>(header() + 1); }
+};
+
+struct OneChunkWriter final : Writer {
+  Chunk chunk;
+  using Writer::Writer;
+  explicit OneChunkWriter(const OutputPort& port) : chunk(port.type(), port.capacity()) {}
+  MessageHeader* loan() override { return chunk.header(); }
+  void publish(int64_t, int64_t, int64_t) override {}
+  void discard() override {}
+  bool repeat(int64_t, int64_t) override { return false; }
+  WriterStatistics statistics() const override { return {}; }
+};
+
+/// The node with a 96 x 40 colour pair of noise in which the right image is the left one shifted by 12 px.
+class Bench {
+ public:
+  static constexpr int kWidth = 96, kHeight = 40, kShift = 12;
+  static constexpr Capacity kCapacity{kWidth, kHeight, 3, 0};
+
+  explicit Bench(const std::vector<std::pair<const char*, ParamValue>>& params = {}) : input_(MessageType::of<StereoPair>(), kCapacity) {
+    register_stereo(types_);
+    node_ = types_.find("stereo")->make();
+    for (const auto& [name, value] : params)
+      for (ParamBase* p : node_->params())
+        if (p->name() == name) REQUIRE(p->set(value).has_value());
+    PortAccess::connect(*node_->inputs()[0], kCapacity);
+    for (OutputPort* out : node_->outputs()) PortAccess::mark_read(*out);
+    StereoPair& pair = input_.as<StereoPair>();
+    pair.width = kWidth;
+    pair.height = kHeight;
+    pair.channels = 3;
+    pair.frame_number = 5;
+    pair.camera = {100, 48, 20, 0.24};
+    pair.left.resize(kWidth * kHeight * 3);
+    pair.right.resize(kWidth * kHeight * 3);
+    uint32_t state = 1;
+    for (uint8_t& v : pair.left.items()) v = static_cast<uint8_t>((state = state * 1664525 + 1013904223) >> 24);
+    for (int y = 0; y < kHeight; ++y)
+      for (int x = 0; x < kWidth; ++x)
+        for (int c = 0; c < 3; ++c) pair.right_view().at(x, y, c) = pair.left_view().at((x + kShift) % kWidth, y, c);
+  }
+
+  void setup() {
+    Setup setup{clock_, ".", ".", 0, 15};
+    node_->setup(setup);
+    for (OutputPort* out : node_->outputs()) {
+      writers_.push_back(std::make_unique<OneChunkWriter>(*out));
+      PortAccess::attach(*out, writers_.back().get());
+    }
+  }
+
+  /// True if the job had a result.
+  bool run(int level = 0, bool is_new = true) {
+    Held held;
+    held.header = input_.header();
+    held.sequence = 1;
+    held.stamp_ns = 777;
+    PortAccess::held(*node_->inputs()[0])[0] = held;
+    PortAccess::set_held(*node_->inputs()[0], 1, false, is_new ? 0 : 1);
+    for (OutputPort* out : node_->outputs()) PortAccess::reset(*out);
+    Job job(clock_, 0, 0, 1000, level, "full");
+    node_->run(job);
+    return !job.without_result();
+  }
+
+  StereoPair& pair() { return input_.as<StereoPair>(); }
+  bool sent(size_t i) const { return PortAccess::sent(*node_->outputs()[i]) && PortAccess::stamp_ns(*node_->outputs()[i]) == 777; }
+  template <class T>
+  T& output(size_t i) { return writers_[i]->chunk.as<T>(); }
+
+ private:
+  VirtualClock clock_;
+  NodeTypes types_;
+  std::unique_ptr<Node> node_;
+  Chunk input_;
+  std::vector<std::unique_ptr<OneChunkWriter>> writers_;
+};
+
+}  // namespace
+
+TEST_CASE("a rectified pair gives its copy, the disparity and a cloud, all with its stamp") {
+  Bench bench({{"disparities", int64_t{32}}, {"cloud_step", int64_t{3}}});
+  bench.setup();
+  REQUIRE(bench.run());
+  for (size_t i = 0; i < 3; ++i) CHECK(bench.sent(i));
+  const auto& rectified = bench.output<StereoPair>(0);
+  CHECK(rectified.frame_number == 5);
+  CHECK(rectified.camera.focal_px == 100);
+  CHECK(rectified.right[100] == bench.pair().right[100]);
+  const auto& map = bench.output<DisparityMap>(1);
+  CHECK(map.disparities == 32);
+  for (int y = 0; y < Bench::kHeight; ++y)
+    for (int x = Bench::kShift + 8; x < Bench::kWidth - 8; ++x) REQUIRE(map.view().at(x, y) == Bench::kShift);
+  const auto& cloud = bench.output<PointCloud>(2);
+  CHECK(cloud.points.size > 0);
+  CHECK(cloud.points.size == cloud.colours.size);
+  CHECK(cloud.points.size <= 32 * 14);
+  bool at_two_metres = false;  // 100 px * 0.24 m / 12 px
+  for (const Point& p : cloud.points.items()) at_two_metres = at_two_metres || p.z == doctest::Approx(2.0);
+  CHECK(at_two_metres);
+}
+
+TEST_CASE("a lower level matches at half resolution: even disparities of the same scene") {
+  Bench bench({{"disparities", int64_t{33}}});
+  bench.setup();
+  REQUIRE(bench.run(1));
+  const auto& map = bench.output<DisparityMap>(1);
+  int right = 0, all = 0;
+  for (int y = 0; y < Bench::kHeight; ++y)
+    for (int x = 40; x < 80; ++x, ++all) {
+      REQUIRE((map.view().at(x, y) == -1 || map.view().at(x, y) % 2 == 0));
+      right += map.view().at(x, y) == Bench::kShift;
+    }
+  CHECK(right > all * 9 / 10);
+}
+
+TEST_CASE("nothing new, another size, or a raw pair without calibration: no result, nothing sent") {
+  Bench bench({{"disparities", int64_t{16}}});
+  bench.setup();
+  CHECK_FALSE(bench.run(0, false));
+  bench.pair().camera = {};
+  CHECK_FALSE(bench.run());
+  bench.pair().camera.focal_px = 100;
+  bench.pair().width = 95;
+  CHECK_FALSE(bench.run());
+  for (size_t i = 0; i < 3; ++i) CHECK_FALSE(bench.sent(i));
+}
+
+TEST_CASE("settings that cannot work stop the start") {
+  CHECK_THROWS_AS(Bench({{"n_square", int64_t{4}}}).setup(), SetupError);
+  CHECK_THROWS_AS(Bench({{"calibration", std::string("no_such_file.yaml")}}).setup(), SetupError);
+  CHECK_THROWS_AS(Bench({{"cost", std::string("ssd")}, {"c_max", int64_t{226}}}).setup(), SetupError);
+}
