@@ -33,7 +33,7 @@ size_t edit_distance(std::string_view a, std::string_view b) {
 std::string nearest(std::string_view word, const std::vector<std::string>& candidates) {
   if (word.empty() || word.size() > kLongest) return "";
   std::string best;
-  size_t best_distance = std::max<size_t>(1, word.size() / 3) + 1;
+  size_t best_distance = (word.size() + 2) / 3 + 1;  // one edit in three letters
   for (const auto& candidate : candidates) {
     if (candidate.size() > kLongest || candidate == word) continue;
     const size_t distance = edit_distance(word, candidate);

@@ -28,7 +28,8 @@ void Decide(const Coordinates& p, const Run* runs, size_t run_count, Run queries
     for (size_t r = 0; r < run_count && count < needed; ++r) {
       uint32_t i = runs[r].first;
       const uint32_t last = runs[r].last;
-      for (; i + lanes <= last && count < needed; i += lanes) count += static_cast<uint32_t>(hn::CountTrue(d, within(i)));
+      for (; i + lanes <= last && count < needed; i += lanes)
+        count += static_cast<uint32_t>(hn::CountTrue(d, within(i)));
       if (i < last && count < needed)
         count += static_cast<uint32_t>(hn::CountTrue(d, hn::And(within(i), hn::FirstN(d, last - i))));
     }
@@ -44,7 +45,8 @@ namespace takt::cloud {
 
 HWY_EXPORT(Decide);
 
-void decide(const Coordinates& points, std::span<const Run> runs, Run queries, float radius2, uint32_t needed, uint8_t* pass) {
+void decide(const Coordinates& points, std::span<const Run> runs, Run queries, float radius2, uint32_t needed,
+            uint8_t* pass) {
   HWY_DYNAMIC_DISPATCH(Decide)(points, runs.data(), runs.size(), queries, radius2, needed, pass);
 }
 

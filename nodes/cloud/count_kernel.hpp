@@ -19,7 +19,8 @@ struct Coordinates {
 /// For each point of `queries`: pass[i] = 1 if at least `needed` points of the runs lie within the radius (itself
 /// included, if a run holds it). (dx dx + dy dy) + dz dz <= radius2, each operation rounded to float: every SIMD target
 /// decides alike. Stops counting at `needed`.
-void decide(const Coordinates& points, std::span<const Run> runs, Run queries, float radius2, uint32_t needed, uint8_t* pass);
+void decide(const Coordinates& points, std::span<const Run> runs, Run queries, float radius2, uint32_t needed,
+            uint8_t* pass);
 
 /// Name of the SIMD target in use, for reports.
 const char* simd_target();

@@ -27,13 +27,19 @@ int scaled_n_min(int n_min_full, size_t points, size_t points_full) {
 }
 
 OutlierFilter::OutlierFilter(size_t capacity)
-    : x_(capacity + kReadAhead), y_(capacity + kReadAhead), z_(capacity + kReadAhead), index_(capacity), bucket_(capacity),
+    : x_(capacity + kReadAhead),
+      y_(capacity + kReadAhead),
+      z_(capacity + kReadAhead),
+      index_(capacity),
+      bucket_(capacity),
       // 2^18 at least: the strides of a vast scene need the room.
-      start_(std::bit_ceil(std::max<size_t>(capacity / 2, size_t{1} << 18)) + 1), pass_(capacity) {}
+      start_(std::bit_ceil(std::max<size_t>(capacity / 2, size_t{1} << 18)) + 1),
+      pass_(capacity) {}
 
 uint32_t OutlierFilter::bucket_of(const Point& p) const {
   const auto cell = [&](float v, int axis) {  // never negative: the origin lies below all points
-    return static_cast<uint32_t>(static_cast<uint64_t>((static_cast<double>(v) - layout_.origin[axis]) * layout_.inverse_edge));
+    return static_cast<uint32_t>(
+        static_cast<uint64_t>((static_cast<double>(v) - layout_.origin[axis]) * layout_.inverse_edge));
   };
   return (cell(p.x, 0) + cell(p.y, 1) * layout_.row + cell(p.z, 2) * layout_.layer) & layout_.mask;
 }
@@ -93,7 +99,8 @@ size_t OutlierFilter::runs_around(uint32_t bucket, std::span<Run> runs) const {
   };
   for (const auto& o : kOrder) {  // the own row first: most likely to hold enough
     const uint32_t middle =
-        (bucket + static_cast<uint32_t>(o[0]) * layout_.row + static_cast<uint32_t>(o[1]) * layout_.layer) & layout_.mask;
+        (bucket + static_cast<uint32_t>(o[0]) * layout_.row + static_cast<uint32_t>(o[1]) * layout_.layer) &
+        layout_.mask;
     if (middle >= 1 && middle < layout_.mask) {
       add(middle - 1, middle + 1);
     } else {
@@ -106,7 +113,8 @@ size_t OutlierFilter::runs_around(uint32_t bucket, std::span<Run> runs) const {
   return n;
 }
 
-size_t OutlierFilter::filter(std::span<const Point> points, const OutlierParameters& parameters, std::span<uint8_t> keep) {
+size_t OutlierFilter::filter(std::span<const Point> points, const OutlierParameters& parameters,
+                             std::span<uint8_t> keep) {
   std::fill(keep.begin(), keep.end(), uint8_t{0});
   points = points.first(std::min(points.size(), capacity()));
   if (load(points, parameters.radius_m) == 0) return 0;
@@ -121,8 +129,10 @@ size_t OutlierFilter::filter(std::span<const Point> points, const OutlierParamet
     const size_t n = runs_around(b, runs);
     uint64_t candidates = 0;
     for (size_t r = 0; r < n; ++r) candidates += runs[r].size();
-    if (candidates < needed) std::fill_n(pass_.begin() + queries.first, queries.size(), uint8_t{0});
-    else decide(sorted, std::span(runs, n), queries, radius * radius, needed, pass_.data());
+    if (candidates < needed)
+      std::fill_n(pass_.begin() + queries.first, queries.size(), uint8_t{0});
+    else
+      decide(sorted, std::span(runs, n), queries, radius * radius, needed, pass_.data());
   }
   size_t kept = 0;
   for (size_t i = 0; i < start_.back(); ++i) {

@@ -38,8 +38,8 @@ class OutlierFilter {
 
  private:
   static constexpr size_t kReadAhead = 64;
-  /// Bucket of cell (x, y, z) = (x + y row + z layer) mod buckets. Cells of a small scene each get their own bucket; in a
-  /// vast one several may share it, which costs time but no exactness.
+  /// Bucket of cell (x, y, z) = (x + y row + z layer) mod buckets. Cells of a small scene each get their own bucket; in
+  /// a vast one several may share it, which costs time but no exactness.
   struct Layout {
     double inverse_edge = 1;
     double origin[3] = {};
@@ -51,8 +51,8 @@ class OutlierFilter {
   size_t runs_around(uint32_t bucket, std::span<Run> runs) const;
 
   Layout layout_;
-  std::vector<float> x_, y_, z_;         // sorted by bucket
-  std::vector<uint32_t> index_;          // where a sorted point came from
+  std::vector<float> x_, y_, z_;  // sorted by bucket
+  std::vector<uint32_t> index_;   // where a sorted point came from
   std::vector<uint32_t> bucket_, start_;
   std::vector<uint8_t> pass_;
 };

@@ -3,8 +3,8 @@
 
 namespace takt::ego_motion {
 
-BlockMatch block_search_reference(const Plane& previous, int from_x, int from_y, int half, const Plane& image, int x, int y,
-                                  int radius_x, int radius_y) {
+BlockMatch block_search_reference(const Plane& previous, int from_x, int from_y, int half, const Plane& image, int x,
+                                  int y, int radius_x, int radius_y) {
   BlockMatch best;
   for (int l = y - radius_y; l <= y + radius_y; ++l)
     for (int k = x - radius_x; k <= x + radius_x; ++k) {

@@ -56,8 +56,9 @@ struct BlockMatch {
   bool found() const { return cost != UINT32_MAX; }
 };
 
-/// Joint minimum over all positions within +-radius_x, +-radius_y of (x, y) whose square lies inside the image; of equal
-/// costs the first in row order. `candidates`, if given, is a map of the image's size: positions with 0 are skipped.
+/// Joint minimum over all positions within +-radius_x, +-radius_y of (x, y) whose square lies inside the image; of
+/// equal costs the first in row order. `candidates`, if given, is a map of the image's size: positions with 0 are
+/// skipped.
 inline BlockMatch block_search(const Patch& patch, const Plane& image, int x, int y, int radius_x, int radius_y,
                                const uint8_t* candidates = nullptr) {
   const int left = std::max(patch.half, x - radius_x), right = std::min(image.width() - 1 - patch.half, x + radius_x);
@@ -73,8 +74,8 @@ inline BlockMatch block_search(const Patch& patch, const Plane& image, int x, in
 }
 
 /// The slow, obvious block_search: three nested loops over single pixels.
-BlockMatch block_search_reference(const Plane& previous, int from_x, int from_y, int half, const Plane& image, int x, int y,
-                                  int radius_x, int radius_y);
+BlockMatch block_search_reference(const Plane& previous, int from_x, int from_y, int half, const Plane& image, int x,
+                                  int y, int radius_x, int radius_y);
 
 /// Minimum of the parabola through three equidistant costs, in -0.5..0.5 steps; 0 where it has none.
 inline double parabola_offset(double before, double at, double after) {

@@ -105,7 +105,8 @@ std::span<const Corner> CornerDetector::select() {
   const int quota = std::max(1, 2 * p_.maximum / static_cast<int>(in_tile_.size()));
   // Most candidates are never looked at: order them in portions instead of all at once.
   auto sorted_to = candidates_.begin();
-  for (auto it = candidates_.begin(); it != candidates_.end() && corners_.size() < static_cast<size_t>(p_.maximum); ++it) {
+  for (auto it = candidates_.begin(); it != candidates_.end() && corners_.size() < static_cast<size_t>(p_.maximum);
+       ++it) {
     if (it == sorted_to) {
       const auto portion = std::min<ptrdiff_t>(2 * p_.maximum, candidates_.end() - it);
       sorted_to = it + portion;

@@ -10,11 +10,11 @@
 namespace takt::ego_motion {
 
 struct CornerParameters {
-  int maximum = 800;        ///< corners kept
-  double quality = 0.005;   ///< least eigenvalue as a share of the largest in the image
-  int distance_px = 5;      ///< least distance of two corners (Chebyshev)
-  int margin_px = 8;        ///< no corner nearer to the border
-  int tile_px = 64;         ///< a tile may hold at most twice its fair share, so that one bush cannot take all corners
+  int maximum = 800;       ///< corners kept
+  double quality = 0.005;  ///< least eigenvalue as a share of the largest in the image
+  int distance_px = 5;     ///< least distance of two corners (Chebyshev)
+  int margin_px = 8;       ///< no corner nearer to the border
+  int tile_px = 64;        ///< a tile may hold at most twice its fair share, so that one bush cannot take all corners
 };
 
 struct Corner {

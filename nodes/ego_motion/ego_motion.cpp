@@ -10,7 +10,7 @@ namespace takt::ego_motion {
 namespace {
 
 constexpr int kLevels = 4;
-constexpr int kCoarseHalf = 3;  // block at the coarsest level, where most positions are tested
+constexpr int kCoarseHalf = 3;      // block at the coarsest level, where most positions are tested
 constexpr double kLongestGap = 10;  // constant velocity is not stretched further than this many intervals
 
 int round_int(double v) { return static_cast<int>(std::lround(v)); }
@@ -40,7 +40,8 @@ std::string Parameters::error() const {
   if (corners.tile_px < 8) return wrong("tile", corners.tile_px, "be at least 8 px");
   if (!(sigma >= 0 && sigma <= 10)) return wrong("sigma", sigma, "lie in 0..10");
   if (!(r_const >= 0 && r_const <= 500)) return wrong("r_const", r_const, "lie in 0..500 px");
-  if (pyramid_range_px < 8 || pyramid_range_px > 512) return wrong("pyramid_range", pyramid_range_px, "lie in 8..512 px");
+  if (pyramid_range_px < 8 || pyramid_range_px > 512)
+    return wrong("pyramid_range", pyramid_range_px, "lie in 8..512 px");
   if (!(flow.r_min_px > 0)) return wrong("r_min", flow.r_min_px, "be above 0 px");
   if (!(estimator.inlier_px > 0)) return wrong("inlier", estimator.inlier_px, "be above 0 px");
   return {};
@@ -96,7 +97,8 @@ double EgoMotion::measure_disparity(double x, double y, int first, int last) con
   if (p_.subpixel == Subpixel::parabola) {
     if (best == 0 || xi - best - 1 < half_ || xi - best + 1 >= width_ - half_) return best;
     // d grows to the left, so the cost of d + 1 lies one pixel to the left.
-    return best + parabola_offset(sad(patch, right_, xi - best + 1, yi), best_cost, sad(patch, right_, xi - best - 1, yi));
+    return best +
+           parabola_offset(sad(patch, right_, xi - best + 1, yi), best_cost, sad(patch, right_, xi - best - 1, yi));
   }
   RefinePatch fine;
   if (!fine.take(current_.level(0), x, y, half_)) return -1;
@@ -190,8 +192,8 @@ EgoMotion::Located EgoMotion::locate(const Tracked& from, const Optics& optics, 
   int guess_x = 0, guess_y = 0;
   if (p_.predict != Predict::none && has_motion_) {
     const double s = optics.baseline_m / static_cast<double>(from.disparity);
-    const Eigen::Vector3d p =
-        predicted * Eigen::Vector3d((from.corner.x - camera.cu_px) * s, (from.corner.y - camera.cv_px) * s, optics.focal_px * s);
+    const Eigen::Vector3d p = predicted * Eigen::Vector3d((from.corner.x - camera.cu_px) * s,
+                                                          (from.corner.y - camera.cv_px) * s, optics.focal_px * s);
     if (p.z() < 0.1) return {};  // will be behind the camera
     const double limit = width_;
     guess_x = round_int(std::clamp(optics.focal_px * p.x() / p.z() + camera.cu_px - from.corner.x, -limit, limit));

@@ -26,14 +26,15 @@ struct Parameters {
   CornerParameters corners;
   Predict predict = Predict::pyramid;
   Subpixel subpixel = Subpixel::lucas_kanade;
-  int n_search = 11;               ///< edge of the matching block, odd, 3..15 px
-  double sigma = 0.2;              ///< search window N = sigma d + r_const, px (thesis); not used by `pyramid`
+  int n_search = 11;   ///< edge of the matching block, odd, 3..15 px
+  double sigma = 0.2;  ///< search window N = sigma d + r_const, px (thesis); not used by `pyramid`
   double r_const = 10;
-  bool search_is_radius = false;   ///< window +-N instead of +-floor(N / 2)
-  bool corner_candidates = false;  ///< test only positions within 1 px of a current corner, if the window holds one (thesis)
-  int pyramid_range_px = 64;       ///< coarse search +-range, plus pyramid_share times the disparity
+  bool search_is_radius = false;  ///< window +-N instead of +-floor(N / 2)
+  bool corner_candidates =
+      false;                  ///< test only positions within 1 px of a current corner, if the window holds one (thesis)
+  int pyramid_range_px = 64;  ///< coarse search +-range, plus pyramid_share times the disparity
   double pyramid_share = 0.5;
-  bool flow_filter = false;        ///< needs dense corners of similar depth; sample consensus replaces it by default
+  bool flow_filter = false;  ///< needs dense corners of similar depth; sample consensus replaces it by default
   FlowFilterParameters flow;
   EstimatorParameters estimator;
   double confidence_minimum = 0.3;
@@ -52,22 +53,23 @@ struct Result {
   double confidence = 0;     ///< inliers / matched * exp(-rms / 1 px)
   double rms_px = 0;
   int corners = 0, matched = 0, inliers = 0;
-  bool valid = false;        ///< false: the motion was predicted at constant velocity, not measured
-  bool keyframe = false;     ///< first frame: nothing to compare with
+  bool valid = false;     ///< false: the motion was predicted at constant velocity, not measured
+  bool keyframe = false;  ///< first frame: nothing to compare with
 };
 
 /// One rectified frame; all views have the configured size.
 struct Frame {
-  ImageView<const uint8_t> left, right;      ///< 1 channel or 3 (BGR)
-  ImageView<const int16_t> disparity;        ///< whole px, negative: unknown
-  CameraModel camera;                        ///< rectified: focal_px and baseline_m above 0
+  ImageView<const uint8_t> left, right;  ///< 1 channel or 3 (BGR)
+  ImageView<const int16_t> disparity;    ///< whole px, negative: unknown
+  CameraModel camera;                    ///< rectified: focal_px and baseline_m above 0
   int64_t stamp_ns = 0;
 };
 
 class EgoMotion {
  public:
   EgoMotion() = default;
-  /// Takes all memory. Throws std::invalid_argument on parameters out of range or images under 128 x 128 px; before start only.
+  /// Takes all memory. Throws std::invalid_argument on parameters out of range or images under 128 x 128 px; before
+  /// start only.
   void configure(int width, int height, const Parameters& parameters);
   /// Motion since the frame of the call before; the first call (and one after reset()) gives a keyframe.
   Result step(const Frame& frame);

@@ -32,7 +32,8 @@ class EgoMotionNode final : public Node {
     const DisparityMap* map = disparity_.newest();
     if (!pair || !map || pair_.stamp_ns() != disparity_.stamp_ns()) return job.no_result();
     const int64_t stamp = pair_.stamp_ns();
-    if (has_stamp_ && stamp <= last_stamp_ns_) return job.no_result();  // nothing new: a second answer would be zero motion
+    if (has_stamp_ && stamp <= last_stamp_ns_)
+      return job.no_result();  // nothing new: a second answer would be zero motion
     const CameraModel& camera = pair->camera;
     if (pair->width != width_ || pair->height != height_ || map->width != width_ || map->height != height_ ||
         !(camera.focal_px > 0) || !(camera.baseline_m > 0))
@@ -88,20 +89,31 @@ class EgoMotionNode final : public Node {
   Input<DisparityMap> disparity_{this, "disparity", "disparity of that pair"};
   Output<Motion> motion_{this, "motion", "motion since the previous frame and accumulated pose, camera frame"};
   Param<int> corners_{this, "corners", 800, {12, 20000}, "", "most corners per image"};
-  Param<double> quality_{this, "quality", 0.005, {0.0, 0.99}, "1", "least corner response, share of the image's largest"};
+  Param<double> quality_{this,        "quality", 0.005,
+                         {0.0, 0.99}, "1",       "least corner response, share of the image's largest"};
   Param<int> distance_{this, "distance", 5, {1, 100}, "px", "least distance of two corners"};
   Param<int> tile_{this, "tile", 64, {8, 16384}, "px", "edge of the tiles that corners are spread over"};
-  Choice predict_{this, "predict", "pyramid", {"pyramid", "constant_velocity", "none"}, "where the search is centred; none: thesis"};
-  Choice subpixel_{this, "subpixel", "lucas_kanade", {"lucas_kanade", "parabola", "none"}, "fraction of a pixel; none: thesis"};
+  Choice predict_{this,
+                  "predict",
+                  "pyramid",
+                  {"pyramid", "constant_velocity", "none"},
+                  "where the search is centred; none: thesis"};
+  Choice subpixel_{
+      this, "subpixel", "lucas_kanade", {"lucas_kanade", "parabola", "none"}, "fraction of a pixel; none: thesis"};
   Param<int> n_search_{this, "n_search", 11, {3, 15}, "px", "edge of the matching block, odd"};
-  Param<double> sigma_{this, "sigma", 0.2, {0.0, 10.0}, "1", "growth of the search window with the disparity; not for pyramid"};
+  Param<double> sigma_{this,        "sigma", 0.2,
+                       {0.0, 10.0}, "1",     "growth of the search window with the disparity; not for pyramid"};
   Param<double> r_const_{this, "r_const", 10.0, {0.0, 500.0}, "px", "search window at disparity 0; not for pyramid"};
   Param<bool> search_is_radius_{this, "search_is_radius", false, "", "search window +-N instead of +-N/2"};
-  Param<bool> corner_candidates_{this, "corner_candidates", false, "", "test only positions within 1 px of a current corner"};
-  Param<int> pyramid_range_{this, "pyramid_range", 64, {8, 512}, "px", "reach of the coarse search, plus half the disparity"};
-  Param<bool> flow_filter_{this, "flow_filter", false, "", "drop corners that disagree with their neighbours; thesis: true"};
+  Param<bool> corner_candidates_{this, "corner_candidates", false, "",
+                                 "test only positions within 1 px of a current corner"};
+  Param<int> pyramid_range_{
+      this, "pyramid_range", 64, {8, 512}, "px", "reach of the coarse search, plus half the disparity"};
+  Param<bool> flow_filter_{this, "flow_filter", false, "",
+                           "drop corners that disagree with their neighbours; thesis: true"};
   Param<double> r_min_{this, "r_min", 20.0, {1.0, 1000.0}, "px", "radius of the neighbourhood"};
-  Param<double> t_flow_{this, "t_flow", 2.0, {0.1, 100.0}, "px", "largest distance from the neighbourhood's median flow"};
+  Param<double> t_flow_{this,         "t_flow", 2.0,
+                        {0.1, 100.0}, "px",     "largest distance from the neighbourhood's median flow"};
   Param<int> n_flow_{this, "n_flow", 3, {1, 1000}, "", "fewest corners of a neighbourhood, the corner included"};
   Choice model_{this, "model", "six_dof", {"six_dof", "planar"}, "planar: turn about y, shift in x and z (thesis)"};
   Choice form_{this, "form", "multiplied", {"multiplied", "division"}, "planar, not robust: rows in px, or as printed"};
@@ -120,7 +132,8 @@ class EgoMotionNode final : public Node {
 }  // namespace
 
 void register_ego_motion(NodeTypes& types) {
-  types.add<EgoMotionNode>("ego_motion", Layer::perception, "Camera motion from a rectified stereo pair and its disparity");
+  types.add<EgoMotionNode>("ego_motion", Layer::perception,
+                           "Camera motion from a rectified stereo pair and its disparity");
 }
 
 }  // namespace takt

@@ -11,9 +11,9 @@
 namespace takt::ego_motion {
 
 struct Quality {
-  double drift_pct = 0;            ///< distance of the two end points / length of the true path
-  double deg_per_frame = 0;        ///< median error of the rotation between consecutive frames
-  double metres_per_frame = 0;     ///< median error of the translation between consecutive frames
+  double drift_pct = 0;         ///< distance of the two end points / length of the true path
+  double deg_per_frame = 0;     ///< median error of the rotation between consecutive frames
+  double metres_per_frame = 0;  ///< median error of the translation between consecutive frames
   double path_m = 0, end_error_m = 0;
 };
 

@@ -20,13 +20,15 @@ float lower_median(std::vector<float>& values) {
 
 bool agrees(const Flow& flow, std::vector<float>& dx, std::vector<float>& dy, const FlowFilterParameters& p) {
   if (dx.size() < static_cast<size_t>(std::max(1, p.n_flow))) return false;
-  const double ex = static_cast<double>(flow.dx) - lower_median(dx), ey = static_cast<double>(flow.dy) - lower_median(dy);
+  const double ex = static_cast<double>(flow.dx) - lower_median(dx),
+               ey = static_cast<double>(flow.dy) - lower_median(dy);
   return ex * ex + ey * ey <= p.t_flow_px * p.t_flow_px;
 }
 
 }  // namespace
 
-FlowFilter::FlowFilter(int width, int height, size_t capacity, const FlowFilterParameters& parameters) : p_(parameters) {
+FlowFilter::FlowFilter(int width, int height, size_t capacity, const FlowFilterParameters& parameters)
+    : p_(parameters) {
   const int edge = std::max(1, static_cast<int>(std::ceil(p_.r_min_px)));
   columns_ = width / edge + 1;
   rows_ = height / edge + 1;

@@ -18,8 +18,8 @@ struct FlowFilterParameters {
   int n_flow = 3;        ///< fewest members of the neighbourhood
 };
 
-/// keep[i] = 1 if flow i agrees with its neighbourhood (component-wise lower median). Decides for all first. Square grid of
-/// cells; scratch for `capacity` flows inside an image of the given size is taken by the constructor.
+/// keep[i] = 1 if flow i agrees with its neighbourhood (component-wise lower median). Decides for all first. Square
+/// grid of cells; scratch for `capacity` flows inside an image of the given size is taken by the constructor.
 class FlowFilter {
  public:
   FlowFilter() = default;
@@ -27,7 +27,8 @@ class FlowFilter {
   void apply(std::span<const Flow> flows, std::span<uint8_t> keep);
 
   /// Slow, obvious version: every flow against every other.
-  static void apply_reference(std::span<const Flow> flows, const FlowFilterParameters& parameters, std::span<uint8_t> keep);
+  static void apply_reference(std::span<const Flow> flows, const FlowFilterParameters& parameters,
+                              std::span<uint8_t> keep);
 
  private:
   int cell_of(const Flow& flow) const;

@@ -41,7 +41,11 @@ bool moved(const Observation& o, const Optics& c, const Rigid& T, Observation& o
   const double s = c.baseline_m / std::max(o.d, kMinimumDisparity);
   const Eigen::Vector3d p = T * Eigen::Vector3d(o.x * s, o.y * s, c.focal_px * s);
   if (p.z() < 0.05) return false;
-  out = {c.focal_px * p.x() / p.z(), c.focal_px * p.y() / p.z(), c.focal_px * c.baseline_m / p.z(), o.x_current, o.y_current,
+  out = {c.focal_px * p.x() / p.z(),
+         c.focal_px * p.y() / p.z(),
+         c.focal_px * c.baseline_m / p.z(),
+         o.x_current,
+         o.y_current,
          o.d_current};
   return true;
 }
@@ -94,11 +98,14 @@ class Random {
 
 }  // namespace
 
-std::optional<PlanarMotion> planar_least_squares(std::span<const Observation> observations, const Optics& optics, Form form) {
+std::optional<PlanarMotion> planar_least_squares(std::span<const Observation> observations, const Optics& optics,
+                                                 Form form) {
   Normal3 n;
   for (const Observation& o : observations) {
-    if (form == Form::multiplied) add_multiplied(n, o, optics.focal_px, optics.baseline_m);
-    else add_division(n, o, optics.focal_px, optics.baseline_m);
+    if (form == Form::multiplied)
+      add_multiplied(n, o, optics.focal_px, optics.baseline_m);
+    else
+      add_division(n, o, optics.focal_px, optics.baseline_m);
   }
   if (observations.size() < 2) return std::nullopt;
   const Eigen::LDLT<Eigen::Matrix3d> ldlt(n.A);
@@ -120,8 +127,8 @@ double residual_px(const Rigid& T, const Observation& o, const Optics& optics) {
   return std::sqrt(rx * rx + ry * ry + rd * rd);
 }
 
-bool MotionEstimator::solve(std::span<const Observation> observations, const Optics& optics, bool weighted, int iterations,
-                            Rigid& T) const {
+bool MotionEstimator::solve(std::span<const Observation> observations, const Optics& optics, bool weighted,
+                            int iterations, Rigid& T) const {
   for (int i = 0; i < iterations; ++i) {
     Normal6 n;
     for (const Observation& o : observations) add_rows(n, o, optics, T, weighted, 0.5 * p_.inlier_px);
@@ -192,7 +199,8 @@ void MotionEstimator::collect(std::span<const Observation> all, const Optics& op
     if (residual_px(T, o, optics) < limit_px) inliers_.push_back(o);
 }
 
-Estimate MotionEstimator::estimate(std::span<const Observation> all, const Optics& optics, const Rigid& start, uint64_t seed) {
+Estimate MotionEstimator::estimate(std::span<const Observation> all, const Optics& optics, const Rigid& start,
+                                   uint64_t seed) {
   Estimate e;
   if (all.size() < 4) return e;
   if (!p_.robust) {
@@ -201,7 +209,8 @@ Estimate MotionEstimator::estimate(std::span<const Observation> all, const Optic
       if (!planar) return e;
       e.T = to_rigid(*planar);
       // The linear T is off for large turns: finish with the exact rotation (algorithm reference, 8.2).
-      if (std::abs(planar->alpha_rad) > 0.05 && p_.form == Form::multiplied && !solve(all, optics, false, 2, e.T)) return e;
+      if (std::abs(planar->alpha_rad) > 0.05 && p_.form == Form::multiplied && !solve(all, optics, false, 2, e.T))
+        return e;
     } else if (!solve(all, optics, false, 10, e.T = start)) {
       return e;
     }

@@ -34,7 +34,8 @@ enum class Form : uint8_t { multiplied, division };
 
 /// Least squares over all observations with the linearised T of Sec. 4.3.2. Empty if fewer than two observations
 /// or if they do not determine the motion.
-std::optional<PlanarMotion> planar_least_squares(std::span<const Observation> observations, const Optics& optics, Form form);
+std::optional<PlanarMotion> planar_least_squares(std::span<const Observation> observations, const Optics& optics,
+                                                 Form form);
 
 /// The rigid motion with that rotation (exact) and translation.
 Rigid to_rigid(const PlanarMotion& motion);
@@ -48,31 +49,35 @@ enum class Model : uint8_t { six_dof, planar };
 struct EstimatorParameters {
   Model model = Model::six_dof;
   Form form = Form::multiplied;
-  bool robust = true;          ///< false: all observations count alike (thesis)
-  double inlier_px = 1.0;      ///< largest residual of an inlier
-  int iterations = 200;        ///< most random samples
-  double success = 0.999;      ///< stop sampling once the best sample was drawn with that probability
+  bool robust = true;      ///< false: all observations count alike (thesis)
+  double inlier_px = 1.0;  ///< largest residual of an inlier
+  int iterations = 200;    ///< most random samples
+  double success = 0.999;  ///< stop sampling once the best sample was drawn with that probability
 };
 
 struct Estimate {
-  Rigid T;                 ///< previous camera coordinates -> current
+  Rigid T;  ///< previous camera coordinates -> current
   int inliers = 0;
-  double rms_px = 0;       ///< of the inliers
+  double rms_px = 0;  ///< of the inliers
   bool solved = false;
 };
 
-/// Robust motion of up to `capacity` observations. No allocation after construction; the result depends on the arguments
-/// alone (own random numbers from `seed`).
+/// Robust motion of up to `capacity` observations. No allocation after construction; the result depends on the
+/// arguments alone (own random numbers from `seed`).
 class MotionEstimator {
  public:
   MotionEstimator() = default;
-  MotionEstimator(const EstimatorParameters& parameters, size_t capacity) : p_(parameters) { inliers_.reserve(capacity); }
+  MotionEstimator(const EstimatorParameters& parameters, size_t capacity) : p_(parameters) {
+    inliers_.reserve(capacity);
+  }
   /// `start` is a guess of T, e.g. the motion before.
   Estimate estimate(std::span<const Observation> observations, const Optics& optics, const Rigid& start, uint64_t seed);
 
  private:
-  bool solve(std::span<const Observation> observations, const Optics& optics, bool weighted, int iterations, Rigid& T) const;
-  Rigid sample_consensus(std::span<const Observation> observations, const Optics& optics, const Rigid& start, uint64_t seed);
+  bool solve(std::span<const Observation> observations, const Optics& optics, bool weighted, int iterations,
+             Rigid& T) const;
+  Rigid sample_consensus(std::span<const Observation> observations, const Optics& optics, const Rigid& start,
+                         uint64_t seed);
   void collect(std::span<const Observation> observations, const Optics& optics, const Rigid& T, double limit_px);
 
   EstimatorParameters p_;

@@ -13,7 +13,9 @@ class Plane {
   static constexpr int kPadding = 32;
   Plane() = default;
   Plane(int width, int height)
-      : width_(width), height_(height), stride_((width + kPadding + 63) / 64 * 64),
+      : width_(width),
+        height_(height),
+        stride_((width + kPadding + 63) / 64 * 64),
         pixels_(static_cast<size_t>(stride_) * static_cast<size_t>(height) + 64) {}
 
   int width() const { return width_; }

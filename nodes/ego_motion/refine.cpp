@@ -90,7 +90,8 @@ bool RefinePatch::sums(const Plane& image, double x, double y, Sums& out) const 
 SubPixel RefinePatch::refine(const Plane& image, double x, double y, double limit_px) const {
   SubPixel at{x, y, false};
   const double determinant = static_cast<double>(xx_) * yy_ - static_cast<double>(xy_) * xy_;
-  if (determinant < 1e-3 * (static_cast<double>(xx_) + yy_) * (static_cast<double>(xx_) + yy_) || xx_ + yy_ < 100) return at;
+  if (determinant < 1e-3 * (static_cast<double>(xx_) + yy_) * (static_cast<double>(xx_) + yy_) || xx_ + yy_ < 100)
+    return at;
   for (int i = 0; i < kIterations; ++i) {
     Sums s;
     if (!sums(image, at.x, at.y, s)) return at;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sub-pixel position of a patch: inverse compositional Lucas-Kanade for a pure shift. Brightness offsets between the two
-// images cancel because the gradients have their mean removed. More accurate than a parabola through SAD costs, which
-// is drawn towards whole pixels.
+// Sub-pixel position of a patch: inverse compositional Lucas-Kanade for a pure shift. Brightness offsets between the
+// two images cancel because the gradients have their mean removed. More accurate than a parabola through SAD costs,
+// which is drawn towards whole pixels.
 #pragma once
 #include "nodes/ego_motion/plane.hpp"
 
@@ -14,11 +14,11 @@ struct SubPixel {
 
 class RefinePatch {
  public:
-  /// Takes the patch of (2 half + 1)^2 samples centred on (x, y), bilinear; half <= 7. False (and unusable) if it or its
-  /// gradient leaves the image.
+  /// Takes the patch of (2 half + 1)^2 samples centred on (x, y), bilinear; half <= 7. False (and unusable) if it or
+  /// its gradient leaves the image.
   bool take(const Plane& image, double x, double y, int half);
-  /// Position near (x, y) in `image` that looks like the patch. Not converged: the patch has too little texture, left the
-  /// image or moved by more than `limit_px` from the start.
+  /// Position near (x, y) in `image` that looks like the patch. Not converged: the patch has too little texture, left
+  /// the image or moved by more than `limit_px` from the start.
   SubPixel refine(const Plane& image, double x, double y, double limit_px) const;
   /// The same along the row only (rectified stereo).
   SubPixel refine_in_row(const Plane& image, double x, double y, double limit_px) const;

@@ -16,7 +16,8 @@ class MappingNode final : public Node {
  public:
   void setup(Setup&) override {
     if (range_min_ >= range_max_)
-      throw SetupError("range_min is " + range_min_.value_text() + " m, must lie below range_max = " + range_max_.value_text() + " m");
+      throw SetupError("range_min is " + range_min_.value_text() +
+                       " m, must lie below range_max = " + range_max_.value_text() + " m");
     ObstacleParameters p;
     p.voxel_m = voxel_;
     p.robot_height_m = robot_height_;
@@ -35,7 +36,8 @@ class MappingNode final : public Node {
 
   void run(Job& job) override {
     const PointCloud* cloud = cloud_.newest();
-    if (!cloud || (has_stamp_ && cloud_.stamp_ns() <= last_stamp_ns_) || !(cloud->camera.focal_px > 0)) return job.no_result();
+    if (!cloud || (has_stamp_ && cloud_.stamp_ns() <= last_stamp_ns_) || !(cloud->camera.focal_px > 0))
+      return job.no_result();
     Grid* grid = obstacles_.loan();
     if (!grid) return job.no_result();
     last_stamp_ns_ = cloud_.stamp_ns();
@@ -51,7 +53,8 @@ class MappingNode final : public Node {
     grid->cell_m = shape.cell_m;
     grid->origin_x_m = grid->origin_y_m = shape.origin_m;
     grid->grid_in_map = compose(compose(viewpoint.camera_in_robot, pose), inverse(viewpoint.camera_in_robot));
-    if (!grid->cells.resize(static_cast<size_t>(shape.cells) * static_cast<size_t>(shape.cells))) return job.no_result();
+    if (!grid->cells.resize(static_cast<size_t>(shape.cells) * static_cast<size_t>(shape.cells)))
+      return job.no_result();
     grid_.fill(cloud->points.items(), viewpoint, grid->view());
     obstacles_.send(last_stamp_ns_);
   }
@@ -70,17 +73,23 @@ class MappingNode final : public Node {
   Param<double> voxel_{this, "voxel", 0.20, {0.05, 1.0}, "m", "edge of a voxel and of a cell"};
   Param<double> robot_height_{this, "robot_height", 1.78, {0.1, 5.0}, "m", "higher points are no obstacles"};
   Param<double> z_floor_{this, "z_floor", 0.07, {-1.0, 1.0}, "m", "lower points are floor"};
-  Param<double> share_{this, "share", 0.15, {0.0, 1.0}, "1", "points of a blocked voxel, share of a fully covered face"};
+  Param<double> share_{this,       "share", 0.15,
+                       {0.0, 1.0}, "1",     "points of a blocked voxel, share of a fully covered face"};
   Param<int> n_abs_{this, "n_abs", 5, {0, 100000}, "", "a blocked voxel has more points than this"};
   Param<double> range_min_{this, "range_min", 0.8, {0.0, 100.0}, "m", "nearer cells are not seen"};
   Param<double> range_max_{this, "range_max", 6.0, {0.5, 50.0}, "m", "farther cells are not seen"};
   Param<double> step_{this, "step", 1.0, {1.0, 64.0}, "px", "the cloud holds one point per step x step pixels"};
   Param<bool> evidence_{this, "evidence", false, "", "a cell is free only if its column holds a point"};
   Param<double> view_{this, "view", 0.0, {0.0, 3.14}, "rad", "horizontal angle of view; 0: twice atan(cu / f)"};
-  Param<double> camera_x_{this, "camera_x", 0.0, {-5.0, 5.0}, "m", "camera to the right of the robot's centre, where the cloud does not say"};
-  Param<double> camera_y_{this, "camera_y", 0.0, {-5.0, 5.0}, "m", "camera before the robot's centre, where the cloud does not say"};
-  Param<double> camera_height_{this, "camera_height", 1.6, {0.0, 5.0}, "m", "camera above the floor, where the cloud does not say"};
-  Param<double> camera_tilt_{this, "camera_tilt", 0.0, {-1.6, 1.6}, "rad", "camera tilt, up positive, where the cloud does not say"};
+  Param<double> camera_x_{this, "camera_x",
+                          0.0,  {-5.0, 5.0},
+                          "m",  "camera to the right of the robot's centre, where the cloud does not say"};
+  Param<double> camera_y_{this,        "camera_y", 0.0,
+                          {-5.0, 5.0}, "m",        "camera before the robot's centre, where the cloud does not say"};
+  Param<double> camera_height_{
+      this, "camera_height", 1.6, {0.0, 5.0}, "m", "camera above the floor, where the cloud does not say"};
+  Param<double> camera_tilt_{this,        "camera_tilt", 0.0,
+                             {-1.6, 1.6}, "rad",         "camera tilt, up positive, where the cloud does not say"};
 
   ObstacleGrid grid_;
   Transform mount_;

@@ -82,7 +82,8 @@ void ObstacleGrid::fill(std::span<const Point> points, const Viewpoint& viewpoin
       const double x = shape_.origin_m + (column + 0.5) * p_.voxel_m, y = shape_.origin_m + (row + 0.5) * p_.voxel_m;
       const auto index = static_cast<size_t>(row) * static_cast<size_t>(shape_.cells) + static_cast<size_t>(column);
       if (p_.evidence && seen_[index] == 0) continue;
-      if (in_view(x, y, camera, viewpoint.half_view_rad) && !hidden(column, row, camera, cells)) cells.at(column, row) = kFree;
+      if (in_view(x, y, camera, viewpoint.half_view_rad) && !hidden(column, row, camera, cells))
+        cells.at(column, row) = kFree;
     }
 }
 

@@ -12,28 +12,28 @@
 namespace takt::mapping_3d {
 
 struct ObstacleParameters {
-  double voxel_m = 0.20;       ///< edge of a voxel and of a grid cell
+  double voxel_m = 0.20;  ///< edge of a voxel and of a grid cell
   double robot_height_m = 1.78;
-  double z_floor_m = 0.07;     ///< lower points are floor and not counted
-  double share = 0.15;         ///< blocked: more points than this share of a fully covered face ...
-  int n_abs = 5;               ///< ... and more than this
+  double z_floor_m = 0.07;                      ///< lower points are floor and not counted
+  double share = 0.15;                          ///< blocked: more points than this share of a fully covered face ...
+  int n_abs = 5;                                ///< ... and more than this
   double range_min_m = 0.8, range_max_m = 6.0;  ///< a free cell lies between
-  double margin_m = 1.0;       ///< the grid reaches range_max + margin to each side of the robot
-  double step_px = 1;          ///< the cloud holds one point per step x step pixels
-  bool evidence = false;       ///< free only where the column holds at least one point (floor included)
+  double margin_m = 1.0;                        ///< the grid reaches range_max + margin to each side of the robot
+  double step_px = 1;                           ///< the cloud holds one point per step x step pixels
+  bool evidence = false;  ///< free only where the column holds at least one point (floor included)
 };
 
 /// Where the cloud was seen from.
 struct Viewpoint {
   Transform camera_in_robot;
-  double focal_px = 0;      ///< of the image the cloud was triangulated from
-  double half_view_rad = 0; ///< half the horizontal angle of view
+  double focal_px = 0;       ///< of the image the cloud was triangulated from
+  double half_view_rad = 0;  ///< half the horizontal angle of view
 };
 
 /// Size and place of a grid in the robot frame: the square of +-reach around the robot.
 struct GridShape {
-  int cells = 0;         ///< along each side
-  double origin_m = 0;   ///< x and y of the lower corner of cell (0, 0)
+  int cells = 0;        ///< along each side
+  double origin_m = 0;  ///< x and y of the lower corner of cell (0, 0)
   double cell_m = 0;
 };
 
@@ -46,9 +46,9 @@ class ObstacleGrid {
   explicit ObstacleGrid(const ObstacleParameters& parameters);
   GridShape shape() const { return shape_; }
 
-  /// Cells of the present cloud alone: kOccupied if a voxel of the column from the floor to the robot's height is blocked,
-  /// kFree if none is and the cell is in view, else kUnknown. `points` in the camera frame (x right, y down, z forward);
-  /// `cells` has shape().cells in both directions; column grows with x, row with y.
+  /// Cells of the present cloud alone: kOccupied if a voxel of the column from the floor to the robot's height is
+  /// blocked, kFree if none is and the cell is in view, else kUnknown. `points` in the camera frame (x right, y down, z
+  /// forward); `cells` has shape().cells in both directions; column grows with x, row with y.
   void fill(std::span<const Point> points, const Viewpoint& viewpoint, ImageView<int16_t> cells);
 
  private:
@@ -58,7 +58,8 @@ class ObstacleGrid {
   bool hidden(int column, int row, const Affine& camera, ImageView<int16_t> cells) const;
   size_t voxel(int column, int row, int layer) const {
     return (static_cast<size_t>(row) * static_cast<size_t>(shape_.cells) + static_cast<size_t>(column)) *
-               static_cast<size_t>(layers_) + static_cast<size_t>(layer);
+               static_cast<size_t>(layers_) +
+           static_cast<size_t>(layer);
   }
 
   ObstacleParameters p_;

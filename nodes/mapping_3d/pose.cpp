@@ -26,9 +26,10 @@ Transform make(double x, double y, double z, const Quaternion& q) { return {x, y
 
 Affine to_affine(const Transform& t) {
   const auto [w, x, y, z] = rotation_of(t);
-  return {{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y), 2 * (x * y + w * z), 1 - 2 * (x * x + z * z),
-           2 * (y * z - w * x), 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)},
-          {t.x, t.y, t.z}};
+  return {
+      {1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y), 2 * (x * y + w * z), 1 - 2 * (x * x + z * z),
+       2 * (y * z - w * x), 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)},
+      {t.x, t.y, t.z}};
 }
 
 Transform compose(const Transform& a, const Transform& b) {
@@ -74,7 +75,8 @@ Transform pose_at(std::span<const StampedPose> poses, int64_t stamp_ns) {
   for (size_t i = 1; i < poses.size(); ++i) {
     const StampedPose &a = poses[i - 1], &b = poses[i];
     if (stamp_ns > b.stamp_ns) continue;
-    return interpolate(a.pose, b.pose, static_cast<double>(stamp_ns - a.stamp_ns) / static_cast<double>(b.stamp_ns - a.stamp_ns));
+    return interpolate(a.pose, b.pose,
+                       static_cast<double>(stamp_ns - a.stamp_ns) / static_cast<double>(b.stamp_ns - a.stamp_ns));
   }
   return poses.back().pose;
 }

@@ -25,7 +25,8 @@ void line(Bgr out, double x0, double y0, double x1, double y1, Colour c) {
   const int steps = std::max(1, static_cast<int>(std::ceil(std::max(std::abs(x1 - x0), std::abs(y1 - y0)))));
   for (int i = 0; i <= steps; ++i) {
     const double share = static_cast<double>(i) / steps;
-    const int x = static_cast<int>(std::lround(x0 + share * (x1 - x0))), y = static_cast<int>(std::lround(y0 + share * (y1 - y0)));
+    const int x = static_cast<int>(std::lround(x0 + share * (x1 - x0))),
+              y = static_cast<int>(std::lround(y0 + share * (y1 - y0)));
     fill(out, x, y, 2, 2, c);
   }
 }
@@ -65,7 +66,8 @@ double draw_track(std::span<const TrackPoint> track, Bgr out) {
     left = std::min(left, p.right_m), right = std::max(right, p.right_m);
     bottom = std::min(bottom, p.forward_m), top = std::max(top, p.forward_m);
   }
-  const double margin = 20, scale = std::min((out.width - 2 * margin) / (right - left), (out.height - 2 * margin) / (top - bottom));
+  const double margin = 20,
+               scale = std::min((out.width - 2 * margin) / (right - left), (out.height - 2 * margin) / (top - bottom));
   const double middle_x = 0.5 * (left + right), middle_y = 0.5 * (bottom + top);
   const auto px = [&](double x) { return out.width / 2.0 + (x - middle_x) * scale; };
   const auto py = [&](double y) { return out.height / 2.0 - (y - middle_y) * scale; };
@@ -77,10 +79,12 @@ double draw_track(std::span<const TrackPoint> track, Bgr out) {
     for (int x = 0; x < out.width; ++x) set(out, x, static_cast<int>(std::lround(py(y))), {220, 220, 220});
   for (size_t i = 1; i < track.size(); ++i) {
     const TrackPoint &a = track[i - 1], &b = track[i];
-    line(out, px(a.right_m), py(a.forward_m), px(b.right_m), py(b.forward_m), b.measured ? Colour{160, 60, 0} : Colour{0, 0, 220});
+    line(out, px(a.right_m), py(a.forward_m), px(b.right_m), py(b.forward_m),
+         b.measured ? Colour{160, 60, 0} : Colour{0, 0, 220});
   }
   if (!track.empty())
-    fill(out, static_cast<int>(px(track[0].right_m)) - 4, static_cast<int>(py(track[0].forward_m)) - 4, 9, 9, {0, 160, 0});
+    fill(out, static_cast<int>(px(track[0].right_m)) - 4, static_cast<int>(py(track[0].forward_m)) - 4, 9, 9,
+         {0, 160, 0});
   return spacing;
 }
 

@@ -17,8 +17,8 @@ Colour heat(double share);
 /// Disparity 0 .. disparities - 1 from blue to red, negative black. `out` has the size of `map`.
 void draw_disparity(ImageView<const int16_t> map, int disparities, Bgr out);
 
-/// Cells as squares of `scale` px, row 0 at the bottom (y forward is up): unknown grey, free white, occupied black, values
-/// between on the way. `out` is scale times the grid's size.
+/// Cells as squares of `scale` px, row 0 at the bottom (y forward is up): unknown grey, free white, occupied black,
+/// values between on the way. `out` is scale times the grid's size.
 void draw_grid(ImageView<const int16_t> cells, int scale, Bgr out);
 
 /// A point of a path seen from above, m.
@@ -27,8 +27,8 @@ struct TrackPoint {
   bool measured = true;
 };
 
-/// The path from above, forward up, scaled to fit, on a metre grid; points that were not measured in red, the start as a
-/// green square. Returns the spacing of the grid's lines in m.
+/// The path from above, forward up, scaled to fit, on a metre grid; points that were not measured in red, the start as
+/// a green square. Returns the spacing of the grid's lines in m.
 double draw_track(std::span<const TrackPoint> track, Bgr out);
 
 }  // namespace takt::picture

@@ -27,14 +27,16 @@ class PictureNode final : public Node {
   void run(Job&) override {
     if (const DisparityMap* map = disparity_.newest(); map && disparity_.is_new()) {
       const auto items = map->disparity.items();
-      if (items.size() <= map_.capacity() && items.size() == static_cast<size_t>(map->width) * static_cast<size_t>(map->height)) {
+      if (items.size() <= map_.capacity() &&
+          items.size() == static_cast<size_t>(map->width) * static_cast<size_t>(map->height)) {
         map_.assign(items.begin(), items.end());
         map_width_ = map->width, map_height_ = map->height, disparities_ = map->disparities;
       }
     }
     if (const Grid* grid = obstacles_.newest(); grid && obstacles_.is_new()) {
       const auto items = grid->cells.items();
-      if (items.size() <= cells_.capacity() && items.size() == static_cast<size_t>(grid->width) * static_cast<size_t>(grid->height)) {
+      if (items.size() <= cells_.capacity() &&
+          items.size() == static_cast<size_t>(grid->width) * static_cast<size_t>(grid->height)) {
         cells_.assign(items.begin(), items.end());
         grid_width_ = grid->width, grid_height_ = grid->height;
       }
@@ -86,7 +88,8 @@ class PictureNode final : public Node {
       written = cv::imwrite(path, image);
     } catch (const cv::Exception&) {
     }
-    if (!written) std::cerr << "picture: cannot write " << path << ": check that the directory exists and is writable\n";
+    if (!written)
+      std::cerr << "picture: cannot write " << path << ": check that the directory exists and is writable\n";
   }
 
   Input<DisparityMap> disparity_{this, "disparity", "drawn as disparity.png", Need::optional};
@@ -105,7 +108,8 @@ class PictureNode final : public Node {
 }  // namespace
 
 void register_picture(NodeTypes& types) {
-  types.add<PictureNode>("picture", Layer::storage, "Sink: writes the last disparity, obstacle grid and the path as PNG at the end");
+  types.add<PictureNode>("picture", Layer::storage,
+                         "Sink: writes the last disparity, obstacle grid and the path as PNG at the end");
 }
 
 }  // namespace takt

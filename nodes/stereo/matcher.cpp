@@ -64,6 +64,8 @@ struct Matcher::State {
   bool fits(ImageView<const uint8_t> view) const {
     return view.width == width && view.height == height && view.channels == channels && view.data != nullptr;
   }
+  /// Groups of the next block when that many are left.
+  int block_size(int groups_left) const;
   /// The byte planes that the cost compares, in reading order or with the columns reversed.
   void make_planes(ImageView<const uint8_t> image, bool mirror, Planes& out);
   void make_grey(ImageView<const uint8_t> image);
@@ -97,15 +99,10 @@ Matcher::State::State(int width_, int height_, int channels_, const MatcherParam
   lanes = kernels->lanes;
   narrow = p.cost == CostKind::gradient && p.truncation() * p.n_square <= 255;
   all_groups = (p.disparities + lanes - 1) / lanes;
-  // Scaled by the number of groups the sums must stay below 65535. Blocks of nearly equal size, chunks whole if possible.
-  const int most = std::min(kMaxGroups, 65535 / (p.max_sum() + 1));
-  const int blocks = (all_groups + most - 1) / most;
-  block_groups = (all_groups + blocks - 1) / blocks;
-  if (blocks > 1 && block_groups % 2 != 0) block_groups = std::min(most, block_groups + 1);
-  if (p.uniqueness > 0) block_groups = all_groups;
+  block_groups = p.uniqueness > 0 ? all_groups : block_size(all_groups);
 
   const int n = p.n_square, strip = std::min(width, kStripWidth) + 2 * (n + 1);
-  const int depth = (all_groups + kMaxGroups) * lanes + 8 * lanes;
+  const int depth = (all_groups + 16) * lanes;
   const auto size = [](int count) { return static_cast<size_t>(count); };
   column_stride = size(round_up(block_groups, 2) * lanes);
   scratch_row = Buffer<uint8_t>(size(width + kRowPadding));
@@ -135,6 +132,14 @@ Matcher::State::State(int width_, int height_, int channels_, const MatcherParam
   along = Rows<uint32_t>(height, width, 0, kNoKey);
   left_keys = Rows<uint32_t>(height, width, 0, kNoKey);
   if (p.left_right_check) right_keys = Rows<uint32_t>(height, width, 0, kNoKey);
+}
+
+int Matcher::State::block_size(int groups_left) const {
+  // Sums are scaled by the number of groups and must stay below 65535.
+  const int most = std::min(groups_left, 65535 / (p.max_sum() + 1));
+  for (const int size : block_sizes(narrow))
+    if (size <= most) return size;
+  return 1;
 }
 
 void Matcher::State::make_grey(ImageView<const uint8_t> image) {
@@ -226,8 +231,8 @@ void Matcher::State::search(const Planes& reference, const Planes& mirrored_othe
     job.x_end = std::min(width, job.x_begin + kStripWidth);
     job.first_column = std::max(0, job.x_begin - job.radius - 1);
     job.last_column = std::min(width - 1, job.x_end - 1 + job.radius);
-    for (int group = 0; group < all_groups; group += block_groups) {
-      job.groups = std::min(block_groups, all_groups - group);
+    for (int group = 0; group < all_groups; group += job.groups) {
+      job.groups = p.uniqueness > 0 ? all_groups : block_size(all_groups - group);
       job.first_disparity = group * lanes;
       job.first_block = group == 0;
       job.outside = outside.data() + 2 * (width - 1 - job.last_column + job.first_disparity);

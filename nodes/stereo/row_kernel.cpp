@@ -291,16 +291,18 @@ RowFunctions functions() {
   return {R::fill, R::roll, R::decide};
 }
 
+/// `groups` is one of block_sizes(); 0 stands for any number with the uniqueness test.
 template <CostKind kKind, bool kNarrow>
 RowFunctions functions_of(int groups) {
+  if constexpr (kNarrow) {
+    if (groups == 4) return functions<kKind, kNarrow, 4>();
+    if (groups == 6) return functions<kKind, kNarrow, 6>();
+  }
   switch (groups) {
     case 0: return functions<kKind, kNarrow, 0>();
     case 1: return functions<kKind, kNarrow, 1>();
     case 2: return functions<kKind, kNarrow, 2>();
-    case 3: return functions<kKind, kNarrow, 3>();
-    case 4: return functions<kKind, kNarrow, 4>();
-    case 5: return functions<kKind, kNarrow, 5>();
-    default: return functions<kKind, kNarrow, 6>();
+    default: return functions<kKind, kNarrow, 5>();
   }
 }
 

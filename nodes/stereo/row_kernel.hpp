@@ -8,13 +8,20 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
+#include <span>
 
 #include "nodes/stereo/parameters.hpp"
 
 namespace takt::stereo {
 
 constexpr int kMaxPlanes = 3;
-constexpr int kMaxGroups = 6;  ///< 16-bit vectors whose sums stay in registers
+
+/// How many 16-bit vectors of sums a block may have so that they stay in registers, largest first. A search range is cut
+/// into such blocks; few sizes keep the compile time down.
+inline std::span<const int> block_sizes(bool narrow) {
+  static constexpr int kNarrow[] = {6, 5, 4, 2, 1}, kWide[] = {5, 2, 1};
+  return narrow ? std::span<const int>(kNarrow) : std::span<const int>(kWide);
+}
 
 struct RowJob {
   int first_column = 0, last_column = 0;  ///< inclusive; columns of the strip with its halo

@@ -11,7 +11,9 @@ using takt::Point;
 
 TEST_CASE("the grid decides like every point against every other") {
   std::mt19937 random(1);
-  const auto uniform = [&](double low, double high) { return static_cast<float>(std::uniform_real_distribution<>(low, high)(random)); };
+  const auto uniform = [&](double low, double high) {
+    return static_cast<float>(std::uniform_real_distribution<>(low, high)(random));
+  };
   OutlierFilter filter(3000);  // one object for all rounds: nothing may be left over from a round
   for (int round = 0; round < 150; ++round) {
     const auto count = static_cast<size_t>(std::uniform_int_distribution<>(0, 1500)(random));
@@ -28,7 +30,8 @@ TEST_CASE("the grid decides like every point against every other") {
     if (round % 7 == 0)  // on a lattice of the radius: distances equal to it, points on cell borders
       for (Point& p : points) {
         const auto r = static_cast<float>(radius);
-        p = {r * static_cast<float>(static_cast<int>(random() % 9)), r * static_cast<float>(static_cast<int>(random() % 9)), -r * static_cast<float>(random() % 5)};
+        p = {r * static_cast<float>(static_cast<int>(random() % 9)),
+             r * static_cast<float>(static_cast<int>(random() % 9)), -r * static_cast<float>(random() % 5)};
       }
     const OutlierParameters p{radius, std::uniform_int_distribution<>(0, 25)(random)};
     std::vector<uint8_t> fast(count, 7), slow(count, 8);

@@ -65,7 +65,8 @@ TEST_CASE("the corner response equals the double loop bit by bit") {
     bool equal = true;
     for (int y = 2; y < height - 2; ++y)
       for (int x = 2; x < width - 2; ++x)
-        equal &= detector.response()[static_cast<size_t>(y * width + x)] == CornerDetector::response_reference(image, x, y);
+        equal &=
+            detector.response()[static_cast<size_t>(y * width + x)] == CornerDetector::response_reference(image, x, y);
     CHECK(equal);
   }
 }
@@ -103,7 +104,8 @@ TEST_CASE("the flow filter decides like the quadratic one") {
   std::mt19937 random(4);
   for (int round = 0; round < 100; ++round) {
     const int width = between(random, 64, 400), height = between(random, 64, 300);
-    FlowFilterParameters p{static_cast<double>(between(random, 2, 60)), 0.5 * between(random, 1, 10), between(random, 1, 6)};
+    FlowFilterParameters p{static_cast<double>(between(random, 2, 60)), 0.5 * between(random, 1, 10),
+                           between(random, 1, 6)};
     std::vector<Flow> flows(static_cast<size_t>(between(random, 0, 300)));
     for (Flow& f : flows)
       f = {static_cast<float>(between(random, 0, width - 1)), static_cast<float>(between(random, 0, height - 1)),

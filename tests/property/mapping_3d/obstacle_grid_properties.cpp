@@ -26,13 +26,14 @@ std::map<std::pair<int, int>, bool> occupied_reference(const std::vector<Point>&
     if (r[2] < p.z_floor_m || r[2] < 0 || r[2] >= std::ceil(p.robot_height_m / p.voxel_m) * p.voxel_m) continue;
     const double inverse = 1 / p.voxel_m;
     ++voxels[{static_cast<int>(std::floor((r[0] - shape.origin_m) * inverse)),
-              static_cast<int>(std::floor((r[1] - shape.origin_m) * inverse)), static_cast<int>(std::floor(r[2] * inverse))}];
+              static_cast<int>(std::floor((r[1] - shape.origin_m) * inverse)),
+              static_cast<int>(std::floor(r[2] * inverse))}];
   }
   std::map<std::pair<int, int>, bool> occupied;
   for (const auto& [voxel, count] : voxels) {
     const auto [column, row, layer] = voxel;
-    const double centre[3] = {shape.origin_m + (column + 0.5) * p.voxel_m - m.t[0], shape.origin_m + (row + 0.5) * p.voxel_m - m.t[1],
-                              (layer + 0.5) * p.voxel_m - m.t[2]};
+    const double centre[3] = {shape.origin_m + (column + 0.5) * p.voxel_m - m.t[0],
+                              shape.origin_m + (row + 0.5) * p.voxel_m - m.t[1], (layer + 0.5) * p.voxel_m - m.t[2]};
     const double depth = std::max(0.5 * p.voxel_m, m.r[2] * centre[0] + m.r[5] * centre[1] + m.r[8] * centre[2]);
     const double expected = std::pow(p.voxel_m * view.focal_px / (depth * p.step_px), 2);
     if (count > p.n_abs && count > p.share * expected) occupied[{column, row}] = true;
@@ -52,12 +53,15 @@ TEST_CASE("occupied cells equal those of a map of voxels; a free cell is never o
     p.step_px = uniform(1, 6);
     ObstacleGrid grid(p);
     const GridShape shape = grid.shape();
-    const Viewpoint view{camera_mount(uniform(-0.3, 0.3), uniform(-0.3, 0.5), 1.6, uniform(-1, 1), uniform(-0.6, 0.2)), 492.8, 0.57};
+    const Viewpoint view{camera_mount(uniform(-0.3, 0.3), uniform(-0.3, 0.5), 1.6, uniform(-1, 1), uniform(-0.6, 0.2)),
+                         492.8, 0.57};
     std::vector<Point> points;
     for (int blob = 0; blob < 40; ++blob) {
-      const Point centre{static_cast<float>(uniform(-3, 3)), static_cast<float>(uniform(-1.5, 1.5)), static_cast<float>(uniform(0.5, 8))};
+      const Point centre{static_cast<float>(uniform(-3, 3)), static_cast<float>(uniform(-1.5, 1.5)),
+                         static_cast<float>(uniform(0.5, 8))};
       for (int i = static_cast<int>(uniform(1, 400)); i > 0; --i)
-        points.push_back({centre.x + static_cast<float>(uniform(-0.2, 0.2)), centre.y + static_cast<float>(uniform(-0.2, 0.2)),
+        points.push_back({centre.x + static_cast<float>(uniform(-0.2, 0.2)),
+                          centre.y + static_cast<float>(uniform(-0.2, 0.2)),
                           centre.z + static_cast<float>(uniform(-0.2, 0.2))});
     }
     std::vector<int16_t> cells(static_cast<size_t>(shape.cells * shape.cells), 77);

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "nodes/cloud/outlier_filter.hpp"
+
 #include <doctest/doctest.h>
 
 #include <limits>
 #include <vector>
 
-#include "nodes/cloud/outlier_filter.hpp"
 #include "tests/unit/cloud/allocation_counter.hpp"
 
 using namespace takt::cloud;
@@ -60,7 +61,9 @@ TEST_CASE("compact keeps order and colours; n_min scales with the points") {
 
 TEST_CASE("filter allocates nothing") {
   std::vector<Point> points;
-  for (int i = 0; i < 5000; ++i) points.push_back({0.01f * static_cast<float>(i % 71), 0.01f * static_cast<float>(i % 67), 0.02f * static_cast<float>(i % 61)});
+  for (int i = 0; i < 5000; ++i)
+    points.push_back(
+        {0.01f * static_cast<float>(i % 71), 0.01f * static_cast<float>(i % 67), 0.02f * static_cast<float>(i % 61)});
   std::vector<uint8_t> keep(points.size());
   OutlierFilter filter(points.size());
   const long before = allocations();

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "nodes/ego_motion/ego_motion.hpp"
+
 #include <doctest/doctest.h>
 
 #include <cmath>
@@ -9,7 +11,6 @@
 #include <sstream>
 #include <vector>
 
-#include "nodes/ego_motion/ego_motion.hpp"
 #include "nodes/ego_motion/evaluate.hpp"
 #include "rt/node.hpp"
 #include "tests/test_data.hpp"
@@ -32,7 +33,8 @@ struct Wall {
   std::vector<int16_t> disparity;
 
   static double texture(double x, double y) {
-    return 128 + 40 * std::sin(9 * x + 2 * std::sin(5 * y)) + 40 * std::sin(11 * y + 3 * std::sin(4 * x)) + 30 * std::sin(23 * x + 19 * y);
+    return 128 + 40 * std::sin(9 * x + 2 * std::sin(5 * y)) + 40 * std::sin(11 * y + 3 * std::sin(4 * x)) +
+           30 * std::sin(23 * x + 19 * y);
   }
   // Wall at depth z with a second one at half the depth in the lower part of the image, camera shifted by x.
   void render(double x_m, double z_m, int brightness = 0) {
@@ -51,7 +53,11 @@ struct Wall {
       }
   }
   Frame frame(int64_t stamp_ns) const {
-    return {{left.data(), width, height}, {right.data(), width, height}, {disparity.data(), width, height}, camera, stamp_ns};
+    return {{left.data(), width, height},
+            {right.data(), width, height},
+            {disparity.data(), width, height},
+            camera,
+            stamp_ns};
   }
 };
 
@@ -71,8 +77,8 @@ TEST_CASE("a known motion is measured from images, in each mode") {
   window.corner_candidates = true;
   window.r_const = 30;
   window.flow_filter = true;
-  for (const Mode& mode : {Mode{"default", {}, 0.003}, Mode{"constant velocity", velocity, 0.003}, Mode{"parabola", parabola, 0.008},
-                           Mode{"window", window, 0.003}}) {
+  for (const Mode& mode : {Mode{"default", {}, 0.003}, Mode{"constant velocity", velocity, 0.003},
+                           Mode{"parabola", parabola, 0.008}, Mode{"window", window, 0.003}}) {
     CAPTURE(mode.name);
     Wall wall;
     EgoMotion ego;
@@ -240,7 +246,8 @@ TEST_CASE("a recorded drive: drift and turn error stay below SIFT + SGBM + PnP (
     estimated.push_back(r.pose);
   }
   const Quality q = evaluate(estimated, truth);
-  MESSAGE("drift " << q.drift_pct << " %, " << q.deg_per_frame << " deg per frame, " << q.metres_per_frame << " m per frame");
+  MESSAGE("drift " << q.drift_pct << " %, " << q.deg_per_frame << " deg per frame, " << q.metres_per_frame
+                   << " m per frame");
   CHECK(q.drift_pct < 1.0);
   CHECK(q.deg_per_frame < 0.026);
 }

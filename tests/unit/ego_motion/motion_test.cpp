@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "nodes/ego_motion/motion.hpp"
+
 #include <doctest/doctest.h>
 
 #include <cmath>
@@ -6,7 +8,6 @@
 #include <vector>
 
 #include "nodes/ego_motion/evaluate.hpp"
-#include "nodes/ego_motion/motion.hpp"
 
 using namespace takt::ego_motion;
 
@@ -24,7 +25,8 @@ std::vector<Eigen::Vector3d> scene(int count) {
   std::mt19937 random(7);
   std::uniform_real_distribution<double> unit(0, 1);
   std::vector<Eigen::Vector3d> points;
-  for (int i = 0; i < count; ++i) points.emplace_back(-3 + 6 * unit(random), -1.5 + 3 * unit(random), 2 + 8 * unit(random));
+  for (int i = 0; i < count; ++i)
+    points.emplace_back(-3 + 6 * unit(random), -1.5 + 3 * unit(random), 2 + 8 * unit(random));
   return points;
 }
 

@@ -23,7 +23,8 @@ void render(StereoPair& pair, DisparityMap& map, double x_m) {
   pair.camera = map.camera = {250, 159.5, 119.5, 0.2};
   pair.left.resize(320 * 240), pair.right.resize(320 * 240), map.disparity.resize(320 * 240);
   const auto texture = [](double x, double y) {
-    return static_cast<uint8_t>(std::lround(120 + 40 * std::sin(9 * x + 2 * std::sin(5 * y)) + 40 * std::sin(11 * y + 3 * std::sin(4 * x))));
+    return static_cast<uint8_t>(
+        std::lround(120 + 40 * std::sin(9 * x + 2 * std::sin(5 * y)) + 40 * std::sin(11 * y + 3 * std::sin(4 * x))));
   };
   for (int v = 0; v < 240; ++v)
     for (int u = 0; u < 320; ++u) {

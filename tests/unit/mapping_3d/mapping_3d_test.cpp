@@ -31,7 +31,8 @@ std::vector<Point> look(const Transform& mount, int step, Scene&& range) {
       double d[3];
       for (int i = 0; i < 3; ++i) d[i] = m.r[3 * i] * ray[0] + m.r[3 * i + 1] * ray[1] + m.r[3 * i + 2];
       const double t = range(m.t, d);
-      if (t > 0) points.push_back({static_cast<float>(ray[0] * t), static_cast<float>(ray[1] * t), static_cast<float>(t)});
+      if (t > 0)
+        points.push_back({static_cast<float>(ray[0] * t), static_cast<float>(ray[1] * t), static_cast<float>(t)});
     }
   return points;
 }
@@ -56,7 +57,8 @@ struct Fixture {
   takt::ImageView<int16_t> view() { return {cells.data(), grid.shape().cells, grid.shape().cells}; }
   int at(double x, double y) {
     const GridShape s = grid.shape();
-    return view().at(static_cast<int>(std::floor((x - s.origin_m) / s.cell_m)), static_cast<int>(std::floor((y - s.origin_m) / s.cell_m)));
+    return view().at(static_cast<int>(std::floor((x - s.origin_m) / s.cell_m)),
+                     static_cast<int>(std::floor((y - s.origin_m) / s.cell_m)));
   }
 };
 
@@ -68,11 +70,13 @@ TEST_CASE("oracle 18: table top over free floor is occupied, floor alone is free
   f.grid.fill(look(mount, 1, floor_hit), f.viewpoint, f.view());
   CHECK(f.at(0, 3.1) == kFree);
   CHECK(f.at(0.5, 2.1) == kFree);
-  CHECK(f.at(0, -2) == kUnknown);    // behind
-  CHECK(f.at(3, 1) == kUnknown);     // beside the view
-  CHECK(f.at(0.1, 6.9) == kUnknown); // beyond the range
-  CHECK(f.at(0.1, 0.5) == kUnknown); // too near
-  const auto both = [](const double* from, const double* d) { return table_hit(from, d) > 0 ? table_hit(from, d) : floor_hit(from, d); };
+  CHECK(f.at(0, -2) == kUnknown);     // behind
+  CHECK(f.at(3, 1) == kUnknown);      // beside the view
+  CHECK(f.at(0.1, 6.9) == kUnknown);  // beyond the range
+  CHECK(f.at(0.1, 0.5) == kUnknown);  // too near
+  const auto both = [](const double* from, const double* d) {
+    return table_hit(from, d) > 0 ? table_hit(from, d) : floor_hit(from, d);
+  };
   f.grid.fill(look(mount, 1, both), f.viewpoint, f.view());
   CHECK(f.at(0, 3.1) == kOccupied);
   CHECK(f.at(0, 1.9) == kFree);
@@ -85,7 +89,9 @@ TEST_CASE("the threshold follows the subsampling of the cloud") {
   p.step_px = 4;
   p.n_abs = 2;
   Fixture coarse(p), wrong;
-  const auto both = [](const double* from, const double* d) { return table_hit(from, d) > 0 ? table_hit(from, d) : floor_hit(from, d); };
+  const auto both = [](const double* from, const double* d) {
+    return table_hit(from, d) > 0 ? table_hit(from, d) : floor_hit(from, d);
+  };
   const auto points = look(coarse.viewpoint.camera_in_robot, 4, both);
   coarse.grid.fill(points, coarse.viewpoint, coarse.view());
   wrong.grid.fill(points, wrong.viewpoint, wrong.view());
@@ -94,7 +100,8 @@ TEST_CASE("the threshold follows the subsampling of the cloud") {
 }
 
 TEST_CASE("a few stray points block nothing; a beam above the robot neither; a low one does") {
-  for (const auto& [height, points, expected] : {std::tuple{1.0, 5, kFree}, {1.0, 400, kOccupied}, {1.9, 400, kFree}, {0.03, 400, kFree}}) {
+  for (const auto& [height, points, expected] :
+       {std::tuple{1.0, 5, kFree}, {1.0, 400, kOccupied}, {1.9, 400, kFree}, {0.03, 400, kFree}}) {
     CAPTURE(height);
     CAPTURE(points);
     Fixture f;
@@ -104,7 +111,8 @@ TEST_CASE("a few stray points block nothing; a beam above the robot neither; a l
     Point p;
     float* out[3] = {&p.x, &p.y, &p.z};
     for (int i = 0; i < 3; ++i)
-      *out[i] = static_cast<float>(to_camera.r[3 * i] * r[0] + to_camera.r[3 * i + 1] * r[1] + to_camera.r[3 * i + 2] * r[2] + to_camera.t[i]);
+      *out[i] = static_cast<float>(to_camera.r[3 * i] * r[0] + to_camera.r[3 * i + 1] * r[1] +
+                                   to_camera.r[3 * i + 2] * r[2] + to_camera.t[i]);
     f.grid.fill(std::vector<Point>(static_cast<size_t>(points), p), f.viewpoint, f.view());
     CHECK(f.at(0.1, 4.1) == expected);
   }

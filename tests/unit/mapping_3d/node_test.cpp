@@ -41,7 +41,8 @@ TEST_CASE("mapping_3d: one grid per cloud, with the cloud's stamp and the robot'
   CHECK(grid.grid_in_map.y == doctest::Approx(0.5));
   CHECK(grid.grid_in_map.qw == doctest::Approx(1));
   const auto at = [&](double x, double y) {
-    return grid.view().at(static_cast<int>((x - grid.origin_x_m) / grid.cell_m), static_cast<int>((y - grid.origin_y_m) / grid.cell_m));
+    return grid.view().at(static_cast<int>((x - grid.origin_x_m) / grid.cell_m),
+                          static_cast<int>((y - grid.origin_y_m) / grid.cell_m));
   };
   CHECK(at(0.1, 3.1) == 1000);
   CHECK(at(0.1, 2.1) == 0);

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "nodes/picture/draw.hpp"
+
 #include <doctest/doctest.h>
 
 #include <array>
 #include <vector>
 
-#include "nodes/picture/draw.hpp"
 #include "rt/node.hpp"
 
 namespace takt {
