@@ -11,7 +11,8 @@ namespace {
 
 template <class T, class Convert>
 DisparityImage convert(ImageView<const T> in, Convert value) {
-  DisparityImage out{in.width, in.height, std::vector<float>(static_cast<size_t>(in.width) * static_cast<size_t>(in.height))};
+  DisparityImage out{in.width, in.height,
+                     std::vector<float>(static_cast<size_t>(in.width) * static_cast<size_t>(in.height))};
   for (int y = 0; y < in.height; ++y)
     for (int x = 0; x < in.width; ++x) out.at(x, y) = value(in.at(x, y));
   return out;
@@ -69,9 +70,9 @@ std::vector<uint8_t> visible_in_right(const DisparityImage& truth) {
 
 StereoScore score(const DisparityImage& disparity, const DisparityImage& truth) {
   if (disparity.width != truth.width || disparity.height != truth.height)
-    throw std::invalid_argument("disparity is " + std::to_string(disparity.width) + " x " + std::to_string(disparity.height) +
-                                ", ground truth " + std::to_string(truth.width) + " x " + std::to_string(truth.height) +
-                                " px; give images of one size");
+    throw std::invalid_argument("disparity is " + std::to_string(disparity.width) + " x " +
+                                std::to_string(disparity.height) + ", ground truth " + std::to_string(truth.width) +
+                                " x " + std::to_string(truth.height) + " px; give images of one size");
   const auto visible = visible_in_right(truth);
   StereoScore s;
   int64_t bad = 0, bad_all = 0, found = 0;

@@ -17,7 +17,9 @@ struct DisparityImage {
   float at(int x, int y) const { return pixels[index(x, y)]; }
 
  private:
-  size_t index(int x, int y) const { return static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x); }
+  size_t index(int x, int y) const {
+    return static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x);
+  }
 };
 
 struct StereoScore {
@@ -34,8 +36,8 @@ DisparityImage ground_truth(ImageView<const uint16_t> image, double scale);
 /// A matcher's result: -1 stays missing.
 DisparityImage to_disparity_image(ImageView<const int16_t> disparity);
 
-/// 1 where the ground truth is known and the right image sees the pixel: x - d >= 0, and no pixel of the same row that is
-/// more than half a pixel of disparity nearer lands on the same right pixel (within 0.5 to 1 px).
+/// 1 where the ground truth is known and the right image sees the pixel: x - d >= 0, and no pixel of the same row that
+/// is more than half a pixel of disparity nearer lands on the same right pixel (within 0.5 to 1 px).
 std::vector<uint8_t> visible_in_right(const DisparityImage& truth);
 
 /// Of equally large images; disparities below 0 or not a number are missing. Throws std::invalid_argument if the sizes

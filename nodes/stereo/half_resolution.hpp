@@ -23,8 +23,8 @@ inline void halve(ImageView<const uint8_t> in, ImageView<uint8_t> out) {
 }
 
 /// Nearest neighbour to full size; disparities double, rejected pixels stay -1.
-inline void enlarge(ImageView<const int16_t> disparity, ImageView<const uint8_t> confidence, ImageView<int16_t> disparity_out,
-                    ImageView<uint8_t> confidence_out) {
+inline void enlarge(ImageView<const int16_t> disparity, ImageView<const uint8_t> confidence,
+                    ImageView<int16_t> disparity_out, ImageView<uint8_t> confidence_out) {
   for (int y = 0; y < disparity_out.height; ++y) {
     const int from = std::min(y / 2, disparity.height - 1);
     for (int x = 0; x < disparity_out.width; ++x) {

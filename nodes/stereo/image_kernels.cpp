@@ -64,7 +64,8 @@ void spread(const uint8_t* in, int count, uint32_t* out) {
 void minimum_along(const uint32_t* in, int radius, int count, uint32_t* HWY_RESTRICT out) {
   if (radius == 2) {  // the default, in one pass
     for (int i = 0; i < count; ++i) {
-      const uint32_t a = in[i - 2] < in[i - 1] ? in[i - 2] : in[i - 1], b = in[i + 2] < in[i + 1] ? in[i + 2] : in[i + 1];
+      const uint32_t a = in[i - 2] < in[i - 1] ? in[i - 2] : in[i - 1],
+                     b = in[i + 2] < in[i + 1] ? in[i + 2] : in[i + 1];
       const uint32_t c = a < b ? a : b;
       out[i] = c < in[i] ? c : in[i];
     }
@@ -82,14 +83,15 @@ void minimum_with(const uint32_t* HWY_RESTRICT in, int count, uint32_t* HWY_REST
   for (int i = 0; i < count; ++i) inout[i] = in[i] < inout[i] ? in[i] : inout[i];
 }
 
-void decode(const uint32_t* HWY_RESTRICT keys, int max_sum, int min_confidence, int count, int16_t* HWY_RESTRICT disparity,
-            uint8_t* HWY_RESTRICT confidence) {
+void decode(const uint32_t* HWY_RESTRICT keys, int max_sum, int min_confidence, int count,
+            int16_t* HWY_RESTRICT disparity, uint8_t* HWY_RESTRICT confidence) {
   // confidence_of without an integer division: numerators stay below 2^24, and the quotient of two such floats never
   // rounds up to the next integer (it lies at least 1 / 65534 below, more than half a unit in the last place of 255).
   const auto divisor = static_cast<float>(max_sum);
   for (int i = 0; i < count; ++i) {
     const int sum = static_cast<int>(keys[i] >> 16);
-    confidence[i] = static_cast<uint8_t>(static_cast<int>(static_cast<float>(255 * (max_sum - sum) + max_sum / 2) / divisor));
+    confidence[i] =
+        static_cast<uint8_t>(static_cast<int>(static_cast<float>(255 * (max_sum - sum) + max_sum / 2) / divisor));
   }
   for (int i = 0; i < count; ++i) {
     const bool reject = (keys[i] & 1) != 0 || confidence[i] < min_confidence;

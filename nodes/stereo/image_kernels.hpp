@@ -23,7 +23,8 @@ struct ImageKernels {
   /// inout[i] = min(inout[i], in[i]).
   void (*minimum_with)(const uint32_t* in, int count, uint32_t* inout);
   /// Keys (sum << 16 | disparity << 1 | ambiguous) to disparities and confidences (confidence_of, max_sum <= 65534).
-  void (*decode)(const uint32_t* keys, int max_sum, int min_confidence, int count, int16_t* disparity, uint8_t* confidence);
+  void (*decode)(const uint32_t* keys, int max_sum, int min_confidence, int count, int16_t* disparity,
+                 uint8_t* confidence);
 };
 
 const ImageKernels& image_kernels();

@@ -94,7 +94,12 @@ struct Matcher::State {
 };
 
 Matcher::State::State(int width_, int height_, int channels_, const MatcherParameters& parameters)
-    : p(parameters), width(width_), height(height_), channels(channels_), kernels(&stereo::kernels()), images(&image_kernels()) {
+    : p(parameters),
+      width(width_),
+      height(height_),
+      channels(channels_),
+      kernels(&stereo::kernels()),
+      images(&image_kernels()) {
   planes = p.cost == CostKind::gradient ? 2 : 3;
   lanes = kernels->lanes;
   narrow = p.cost == CostKind::gradient && p.truncation() * p.n_square <= 255;
@@ -145,8 +150,10 @@ int Matcher::State::block_size(int groups_left) const {
 void Matcher::State::make_grey(ImageView<const uint8_t> image) {
   for (int y = 0; y < height; ++y) {
     uint8_t* row = grey.row(y);
-    if (channels == 3) images->grey(image.row(y), width, row);
-    else std::memcpy(row, image.row(y), static_cast<size_t>(width));
+    if (channels == 3)
+      images->grey(image.row(y), width, row);
+    else
+      std::memcpy(row, image.row(y), static_cast<size_t>(width));
     row[-1] = row[0];
     row[width] = row[width - 1];
   }
@@ -162,9 +169,12 @@ void Matcher::State::make_planes(ImageView<const uint8_t> image, bool mirror, Pl
     for (int y = 0; y < height; ++y) {
       uint8_t* target = out[static_cast<size_t>(i)].row(y);
       uint8_t* row = mirror ? scratch_row.data() : target;
-      if (!gradient) images->channel(image.row(y), channels, i, width, bias, row);
-      else if (i == 0) images->derivative(grey.row(y) - 1, grey.row(y) + 1, width, row);
-      else images->derivative(grey.row(std::max(0, y - 1)), grey.row(std::min(height - 1, y + 1)), width, row);
+      if (!gradient)
+        images->channel(image.row(y), channels, i, width, bias, row);
+      else if (i == 0)
+        images->derivative(grey.row(y) - 1, grey.row(y) + 1, width, row);
+      else
+        images->derivative(grey.row(std::max(0, y - 1)), grey.row(std::min(height - 1, y + 1)), width, row);
       if (mirror) images->reverse(row, width, target);
     }
 }
@@ -175,7 +185,8 @@ void Matcher::State::load_row(const Planes& reference, const Planes& mirrored_ot
   for (int i = 0; i < planes; ++i) {
     const auto at = static_cast<size_t>(i);
     images->spread(reference[at].row(y) + job.first_column, count, reference_row[at].data());
-    kernels->interleave(mirrored_other[at].row(y) + start, count + round_up(job.groups, 2) * lanes, search_row[at].data());
+    kernels->interleave(mirrored_other[at].row(y) + start, count + round_up(job.groups, 2) * lanes,
+                        search_row[at].data());
   }
 }
 
@@ -287,7 +298,8 @@ bool Matcher::match(ImageView<const uint8_t> left, ImageView<const uint8_t> righ
   // Seen in a mirror the right image is a left one, and the left image as it is stored is the mirrored right one.
   if (s.p.left_right_check) s.search(s.right_mirrored, s.left, s.right_keys);
   for (int y = 0; y < s.height; ++y) {
-    s.images->decode(s.left_keys.row(y), s.p.max_sum(), s.p.min_confidence, s.width, disparity.row(y), confidence.row(y));
+    s.images->decode(s.left_keys.row(y), s.p.max_sum(), s.p.min_confidence, s.width, disparity.row(y),
+                     confidence.row(y));
     if (s.p.left_right_check) s.reject_inconsistent(y, disparity.row(y));
   }
   return true;

@@ -11,9 +11,12 @@ std::string out_of_range(const char* name, int value, const std::string& range) 
 /// Largest c_max for which the saturating byte arithmetic of a cost kind is exact.
 int largest_truncation(CostKind kind) {
   switch (kind) {
-    case CostKind::gradient: return 64;
-    case CostKind::ssd: return 225;
-    case CostKind::sad: break;
+    case CostKind::gradient:
+      return 64;
+    case CostKind::ssd:
+      return 225;
+    case CostKind::sad:
+      break;
   }
   return 255;
 }
@@ -22,7 +25,8 @@ int largest_truncation(CostKind kind) {
 
 std::optional<std::string> problem(const MatcherParameters& p, int width, int height, int channels) {
   if (width < 1 || width > 8192 || height < 1 || height > 8192)
-    return "an image of " + std::to_string(width) + " x " + std::to_string(height) + " px cannot be matched; 1..8192 can";
+    return "an image of " + std::to_string(width) + " x " + std::to_string(height) +
+           " px cannot be matched; 1..8192 can";
   if (channels != 1 && channels != 3) return out_of_range("channels", channels, "1 (grey) or 3 (BGR)");
   if (p.disparities < 1 || p.disparities > 512) return out_of_range("disparities", p.disparities, "1..512");
   if (p.n_square < 1 || p.n_square > 31 || p.n_square % 2 == 0)

@@ -43,6 +43,8 @@ inline uint8_t confidence_of(int sum, int max_sum) {
 inline uint8_t grey_of(int b, int g, int r) { return static_cast<uint8_t>((29 * b + 150 * g + 77 * r + 128) >> 8); }
 
 /// Twice the derivative of a grey image, from the two neighbours of a pixel, saturated to -128..127.
-inline int8_t twice_derivative(int before, int after) { return static_cast<int8_t>(std::clamp(after - before, -128, 127)); }
+inline int8_t twice_derivative(int before, int after) {
+  return static_cast<int8_t>(std::clamp(after - before, -128, 127));
+}
 
 }  // namespace takt::stereo

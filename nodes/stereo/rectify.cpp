@@ -17,12 +17,14 @@ namespace {
 void check_finite(const char* name, std::span<const double> values) {
   for (size_t i = 0; i < values.size(); ++i)
     if (!std::isfinite(values[i]))
-      refuse(std::string(name) + "[" + std::to_string(i) + "] is " + std::to_string(values[i]) + ", must be finite; calibrate again");
+      refuse(std::string(name) + "[" + std::to_string(i) + "] is " + std::to_string(values[i]) +
+             ", must be finite; calibrate again");
 }
 
 void check(const StereoCalibration& c) {
   if (c.width < 16 || c.width > 8192 || c.height < 16 || c.height > 8192)
-    refuse("image size is " + std::to_string(c.width) + " x " + std::to_string(c.height) + ", each must lie in 16..8192");
+    refuse("image size is " + std::to_string(c.width) + " x " + std::to_string(c.height) +
+           ", each must lie in 16..8192");
   check_finite("left_matrix", c.left_matrix);
   check_finite("right_matrix", c.right_matrix);
   check_finite("left_distortion", c.left_distortion);
@@ -31,14 +33,15 @@ void check(const StereoCalibration& c) {
   check_finite("translation_m", c.translation_m);
   for (const auto* m : {&c.left_matrix, &c.right_matrix})
     if (!((*m)[0] > 0) || !((*m)[4] > 0))
-      refuse("focal lengths are " + std::to_string((*m)[0]) + " and " + std::to_string((*m)[4]) + " px, must be positive");
+      refuse("focal lengths are " + std::to_string((*m)[0]) + " and " + std::to_string((*m)[4]) +
+             " px, must be positive");
   for (size_t i = 0; i < 3; ++i)
     for (size_t j = i; j < 3; ++j) {
       double dot = 0;
       for (size_t k = 0; k < 3; ++k) dot += c.rotation[3 * i + k] * c.rotation[3 * j + k];
       if (std::abs(dot - (i == j ? 1 : 0)) > 1e-3)
-        refuse("rotation is not orthonormal: rows " + std::to_string(i) + " and " + std::to_string(j) + " have the product " +
-               std::to_string(dot));
+        refuse("rotation is not orthonormal: rows " + std::to_string(i) + " and " + std::to_string(j) +
+               " have the product " + std::to_string(dot));
     }
 }
 
@@ -55,7 +58,8 @@ void read(const cv::FileStorage& file, const std::string& path, const char* key,
   cv::Mat m;
   node >> m;
   if (m.total() != kCount)
-    refuse(path + ": key " + key + " has " + std::to_string(m.total()) + " numbers, must have " + std::to_string(kCount));
+    refuse(path + ": key " + key + " has " + std::to_string(m.total()) + " numbers, must have " +
+           std::to_string(kCount));
   m.convertTo(m, CV_64F);
   std::memcpy(out.data(), m.data, sizeof out);
 }
@@ -103,7 +107,8 @@ void Rectifier::build(const StereoCalibration& c) {
            std::to_string(c.translation_m[2]) + "; the right camera must stand to the right of the left one (x < 0)");
   camera_ = {focal, p1.at<double>(0, 2), p1.at<double>(1, 2), baseline};
 
-  const auto tables = [&](const cv::Mat& k, const cv::Mat& d, const cv::Mat& r, const cv::Mat& p, std::vector<RemapSource>& out) {
+  const auto tables = [&](const cv::Mat& k, const cv::Mat& d, const cv::Mat& r, const cv::Mat& p,
+                          std::vector<RemapSource>& out) {
     cv::Mat x, y;
     cv::initUndistortRectifyMap(k, d, r, p, size, CV_32F, x, y);
     out.resize(static_cast<size_t>(width_) * static_cast<size_t>(height_));

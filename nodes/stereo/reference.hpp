@@ -90,7 +90,9 @@ inline Choice winner(const int* sums, const MatcherParameters& p) {
 inline std::vector<Choice> choices(Bytes left, Bytes right, const MatcherParameters& p, bool right_is_reference) {
   const auto sums = window_sums(left, right, p, right_is_reference);
   const int w = left.width, h = left.height, r = p.n_min / 2;
-  const auto at = [&](int x, int y) { return (static_cast<size_t>(y) * static_cast<size_t>(w) + static_cast<size_t>(x)); };
+  const auto at = [&](int x, int y) {
+    return (static_cast<size_t>(y) * static_cast<size_t>(w) + static_cast<size_t>(x));
+  };
   std::vector<Choice> own(at(0, h)), out(at(0, h));
   for (size_t i = 0; i < own.size(); ++i) own[i] = winner(&sums[i * static_cast<size_t>(p.disparities)], p);
   for (int y = 0; y < h; ++y)
@@ -101,7 +103,8 @@ inline std::vector<Choice> choices(Bytes left, Bytes right, const MatcherParamet
         int smallest = 65536;
         for (int ny = std::max(0, y - r); ny <= std::min(h - 1, y + r); ++ny)
           for (int nx = std::max(0, x - r); nx <= std::min(w - 1, x + r); ++nx)
-            smallest = std::min(smallest, sums[at(nx, ny) * static_cast<size_t>(p.disparities) + static_cast<size_t>(d)]);
+            smallest =
+                std::min(smallest, sums[at(nx, ny) * static_cast<size_t>(p.disparities) + static_cast<size_t>(d)]);
         if (smallest < c.sum) c = {smallest, d, false};
       }
       // A winning window is ambiguous if every window that gives this winner is.
@@ -128,8 +131,9 @@ inline void match(Bytes left, Bytes right, const MatcherParameters& p, ImageView
       bool keep = confidence.at(x, y) >= p.min_confidence && !c.ambiguous;
       if (keep && p.left_right_check) {
         const int xr = x - c.disparity;
-        keep = xr >= 0 && std::abs(of_right[static_cast<size_t>(y) * static_cast<size_t>(w) + static_cast<size_t>(xr)].disparity -
-                                   c.disparity) <= 1;
+        keep = xr >= 0 &&
+               std::abs(of_right[static_cast<size_t>(y) * static_cast<size_t>(w) + static_cast<size_t>(xr)].disparity -
+                        c.disparity) <= 1;
       }
       disparity.at(x, y) = keep ? static_cast<int16_t>(c.disparity) : int16_t{-1};
     }

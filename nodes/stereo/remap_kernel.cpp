@@ -36,12 +36,13 @@ HWY_INLINE void resample_three(const RemapImage& in, const RemapSource& s, uint8
   const __m128i pixels = _mm_unpacklo_epi64(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(a)),
                                             _mm_loadl_epi64(reinterpret_cast<const __m128i*>(a + in.stride)));
   const __m128i pairs = _mm_shuffle_epi8(pixels, _mm_setr_epi8(0, 3, 8, 11, 1, 4, 9, 12, 2, 5, 10, 13, -1, -1, -1, -1));
-  const auto weights_x = static_cast<short>(128 + 255 * s.fraction_x);     // bytes 128 - f, f
+  const auto weights_x = static_cast<short>(128 + 255 * s.fraction_x);  // bytes 128 - f, f
   const auto weights_y = static_cast<int>(128 + 65535 * s.fraction_y);  // words 128 - f, f
   const __m128i rows = _mm_maddubs_epi16(pairs, _mm_set1_epi16(weights_x));
   const __m128i sums = _mm_madd_epi16(rows, _mm_set1_epi32(weights_y));
   const __m128i rounded = _mm_srli_epi32(_mm_add_epi32(sums, _mm_set1_epi32(8192)), 14);
-  const __m128i bytes = _mm_shuffle_epi8(rounded, _mm_setr_epi8(0, 4, 8, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1));
+  const __m128i bytes =
+      _mm_shuffle_epi8(rounded, _mm_setr_epi8(0, 4, 8, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1));
   const int word = _mm_cvtsi128_si32(bytes);
   std::memcpy(out, &word, sizeof word);
 }
@@ -55,8 +56,10 @@ void remap(const RemapImage& in, const RemapSource* sources, int count, uint8_t*
   for (; in.channels == 3 && i + 1 < count; ++i) {
     const RemapSource& s = sources[i];
     const bool wide = s.x >= 0 && (s.x < in.width - 3 || s.y < in.height - 2) && s.fraction_x > 0 && s.fraction_x < 128;
-    if (wide) resample_three(in, s, out + 3 * i);
-    else resample_one(in, s, out + 3 * i);
+    if (wide)
+      resample_three(in, s, out + 3 * i);
+    else
+      resample_one(in, s, out + 3 * i);
   }
 #endif
   for (; i < count; ++i) resample_one(in, sources[i], out + in.channels * i);

@@ -18,8 +18,8 @@ struct RemapImage {
   int width, height, channels;
 };
 
-/// out[i] = the four pixels of sources[i], weighted in 1/128 px, rounded: exact integer arithmetic, equal on all targets.
-/// Nothing outside the image or beyond `count` pixels of `out` is touched.
+/// out[i] = the four pixels of sources[i], weighted in 1/128 px, rounded: exact integer arithmetic, equal on all
+/// targets. Nothing outside the image or beyond `count` pixels of `out` is touched.
 using RemapRow = void (*)(const RemapImage& in, const RemapSource* sources, int count, uint8_t* out);
 
 RemapRow remap_row();

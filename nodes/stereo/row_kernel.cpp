@@ -33,7 +33,8 @@ HWY_INLINE Words scaled_bytes(Bytes v, Bytes factors) {
 #else
   const Words low_byte = hn::Set(kWords, 0xFF);
   const Words w = hn::BitCast(kWords, v), f = hn::BitCast(kWords, factors);
-  return hn::Add(hn::Mul(hn::And(w, low_byte), hn::And(f, low_byte)), hn::Mul(hn::ShiftRight<8>(w), hn::ShiftRight<8>(f)));
+  return hn::Add(hn::Mul(hn::And(w, low_byte), hn::And(f, low_byte)),
+                 hn::Mul(hn::ShiftRight<8>(w), hn::ShiftRight<8>(f)));
 #endif
 }
 
@@ -97,7 +98,8 @@ class Rows {
     Rows rows(job);
     for (int c = job.first_column; c <= job.last_column; ++c) {
       rows.cost_.select(c);
-      for (int j = 0; j < rows.chunks(); ++j) hn::Store(rows.cost_.template at<true>(j), kBytes, job.ring_new + rows.place(c, j));
+      for (int j = 0; j < rows.chunks(); ++j)
+        hn::Store(rows.cost_.template at<true>(j), kBytes, job.ring_new + rows.place(c, j));
     }
   }
 
@@ -128,7 +130,8 @@ class Rows {
   static constexpr bool kUnique = kGroups == 0;
   static constexpr int kRegisters = kUnique ? 1 : kGroups;
 
-  explicit Rows(const RowJob& job) : job_(job), cost_(job), scale_(kUnique ? 1 : kGroups), tail_(hn::LoadU(kWords, job.tail)) {
+  explicit Rows(const RowJob& job)
+      : job_(job), cost_(job), scale_(kUnique ? 1 : kGroups), tail_(hn::LoadU(kWords, job.tail)) {
     const Words factor = hn::Set(kWords, static_cast<uint16_t>(scale_));
     even_ = hn::BitCast(kBytes, factor);
     odd_ = hn::BitCast(kBytes, hn::ShiftLeft<8>(factor));
@@ -149,8 +152,10 @@ class Rows {
     } else {
       uint16_t* even = wide() + at;
       uint16_t* odd = even + kLanes;
-      hn::Store(hn::Sub(hn::Add(hn::Load(kWords, even), scaled_bytes(cost, even_)), scaled_bytes(old, even_)), kWords, even);
-      hn::Store(hn::Sub(hn::Add(hn::Load(kWords, odd), scaled_bytes(cost, odd_)), scaled_bytes(old, odd_)), kWords, odd);
+      hn::Store(hn::Sub(hn::Add(hn::Load(kWords, even), scaled_bytes(cost, even_)), scaled_bytes(old, even_)), kWords,
+                even);
+      hn::Store(hn::Sub(hn::Add(hn::Load(kWords, odd), scaled_bytes(cost, odd_)), scaled_bytes(old, odd_)), kWords,
+                odd);
     }
   }
 
@@ -178,15 +183,19 @@ class Rows {
     for (int g = 0; g < groups(); ++g) {
       Words sum = hn::Set(kWords, static_cast<uint16_t>(kUnique ? 0 : g));
       for (int k = -job_.radius - 1; k < job_.radius; ++k) sum = hn::Add(sum, column_sum(clamped(job_.x_begin + k), g));
-      if constexpr (kUnique) hn::StoreU(sum, kWords, job_.sums + g * kLanes);
-      else sums_[g] = sum;
+      if constexpr (kUnique)
+        hn::StoreU(sum, kWords, job_.sums + g * kLanes);
+      else
+        sums_[g] = sum;
     }
   }
 
   template <bool kNew, bool kOutside>
   HWY_INLINE void walk(int from, int to) {
-    if constexpr (kUnique) walk_unique<kNew, kOutside>(from, to);
-    else walk_registers<kNew, kOutside>(from, to);
+    if constexpr (kUnique)
+      walk_unique<kNew, kOutside>(from, to);
+    else
+      walk_registers<kNew, kOutside>(from, to);
   }
 
   template <bool kNew, bool kOutside>
@@ -196,11 +205,13 @@ class Rows {
     for (int x = from; x < to; ++x) {
       const int enters = std::min(x + job_.radius, job_.image_width - 1), leaves = std::max(x - job_.radius - 1, 0);
       if constexpr (kNew) new_column<kOutside>(enters);
-      for (int g = 0; g < kRegisters; ++g) sums[g] = hn::Sub(hn::Add(sums[g], column_sum(enters, g)), column_sum(leaves, g));
+      for (int g = 0; g < kRegisters; ++g)
+        sums[g] = hn::Sub(hn::Add(sums[g], column_sum(enters, g)), column_sum(leaves, g));
       Words best = hn::Or(sums[kRegisters - 1], tail_);
       for (int g = 0; g + 1 < kRegisters; ++g) best = hn::Min(best, sums[g]);
       const uint32_t smallest = smallest_lane(best);
-      const size_t lane = hn::FindKnownFirstTrue(kWords, hn::Eq(best, hn::Set(kWords, static_cast<uint16_t>(smallest))));
+      const size_t lane =
+          hn::FindKnownFirstTrue(kWords, hn::Eq(best, hn::Set(kWords, static_cast<uint16_t>(smallest))));
       job_.winners[x - job_.x_begin] = smallest << 8 | static_cast<uint32_t>(lane);
     }
     for (int g = 0; g < kRegisters; ++g) sums_[g] = sums[g];
@@ -213,7 +224,8 @@ class Rows {
       if constexpr (kNew) new_column<kOutside>(enters);
       for (int g = 0; g < groups(); ++g) {
         uint16_t* sums = job_.sums + g * kLanes;
-        hn::StoreU(hn::Sub(hn::Add(hn::LoadU(kWords, sums), column_sum(enters, g)), column_sum(leaves, g)), kWords, sums);
+        hn::StoreU(hn::Sub(hn::Add(hn::LoadU(kWords, sums), column_sum(enters, g)), column_sum(leaves, g)), kWords,
+                   sums);
       }
       const uint32_t best = smallest_sum();
       int d = 0;
@@ -299,18 +311,25 @@ RowFunctions functions_of(int groups) {
     if (groups == 6) return functions<kKind, kNarrow, 6>();
   }
   switch (groups) {
-    case 0: return functions<kKind, kNarrow, 0>();
-    case 1: return functions<kKind, kNarrow, 1>();
-    case 2: return functions<kKind, kNarrow, 2>();
-    default: return functions<kKind, kNarrow, 5>();
+    case 0:
+      return functions<kKind, kNarrow, 0>();
+    case 1:
+      return functions<kKind, kNarrow, 1>();
+    case 2:
+      return functions<kKind, kNarrow, 2>();
+    default:
+      return functions<kKind, kNarrow, 5>();
   }
 }
 
 RowFunctions rows(CostKind kind, bool narrow, int groups) {
   switch (kind) {
-    case CostKind::ssd: return functions_of<CostKind::ssd, false>(groups);
-    case CostKind::sad: return functions_of<CostKind::sad, false>(groups);
-    case CostKind::gradient: break;
+    case CostKind::ssd:
+      return functions_of<CostKind::ssd, false>(groups);
+    case CostKind::sad:
+      return functions_of<CostKind::sad, false>(groups);
+    case CostKind::gradient:
+      break;
   }
   return narrow ? functions_of<CostKind::gradient, true>(groups) : functions_of<CostKind::gradient, false>(groups);
 }
@@ -319,7 +338,8 @@ RowFunctions unique_rows(CostKind kind, bool narrow) { return rows(kind, narrow,
 
 void interleave(const uint8_t* reversed, int count, uint8_t* out) {
   for (int i = 0; i < count; i += kChunk)
-    hn::StoreInterleaved2(hn::LoadU(kBytes, reversed + i), hn::LoadU(kBytes, reversed + i + kLanes), kBytes, out + 2 * i);
+    hn::StoreInterleaved2(hn::LoadU(kBytes, reversed + i), hn::LoadU(kBytes, reversed + i + kLanes), kBytes,
+                          out + 2 * i);
 }
 
 const Kernels& target_kernels() {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Internal: the vectorised inner part of the matcher. One row of a strip of columns and a block of disparities.
 //
-// Disparity is the vector axis. The right row is stored reversed, so that the pixels x - d for rising d follow one another,
-// and pair-interleaved: byte 2i is pixel i of the reversed row, byte 2i + 1 is pixel i + lanes. The even bytes of a byte
-// vector then are one group of `lanes` consecutive disparities, the odd bytes the next group, and both widen to 16 bits
-// with one instruction. A chunk is one byte vector (2 * lanes disparities).
+// Disparity is the vector axis. The right row is stored reversed, so that the pixels x - d for rising d follow one
+// another, and pair-interleaved: byte 2i is pixel i of the reversed row, byte 2i + 1 is pixel i + lanes. The even bytes
+// of a byte vector then are one group of `lanes` consecutive disparities, the odd bytes the next group, and both widen
+// to 16 bits with one instruction. A chunk is one byte vector (2 * lanes disparities).
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -16,8 +16,8 @@ namespace takt::stereo {
 
 constexpr int kMaxPlanes = 3;
 
-/// How many 16-bit vectors of sums a block may have so that they stay in registers, largest first. A search range is cut
-/// into such blocks; few sizes keep the compile time down.
+/// How many 16-bit vectors of sums a block may have so that they stay in registers, largest first. A search range is
+/// cut into such blocks; few sizes keep the compile time down.
 inline std::span<const int> block_sizes(bool narrow) {
   static constexpr int kNarrow[] = {6, 5, 4, 2, 1}, kWide[] = {5, 2, 1};
   return narrow ? std::span<const int>(kNarrow) : std::span<const int>(kWide);
@@ -27,12 +27,12 @@ struct RowJob {
   int first_column = 0, last_column = 0;  ///< inclusive; columns of the strip with its halo
   int x_begin = 0, x_end = 0;             ///< pixels to decide
   int image_width = 0;
-  int radius = 0;       ///< of the summing window
-  int groups = 0;       ///< vectors of 16-bit sums in the block (all of the search range if uniqueness is on)
+  int radius = 0;  ///< of the summing window
+  int groups = 0;  ///< vectors of 16-bit sums in the block (all of the search range if uniqueness is on)
   int first_disparity = 0;
   int c_max = 0;
   int uniqueness = 0;
-  bool new_row = false;    ///< compute the costs of a row into ring_new and roll the column sums to it
+  bool new_row = false;      ///< compute the costs of a row into ring_new and roll the column sums to it
   bool first_block = false;  ///< keys are written; later blocks take the minimum with what is there
 
   const uint32_t* left[kMaxPlanes] = {};  ///< element column - first_column: the pixel's byte, four times
@@ -40,7 +40,7 @@ struct RowJob {
   const uint8_t* outside = nullptr;       ///< like right: c_max where the search pixel lies outside the image, else 0
   uint8_t* ring_new = nullptr;            ///< costs of one image row: column after column, chunk after chunk
   const uint8_t* ring_old = nullptr;      ///< costs of the row that leaves the window; may be ring_new
-  void* columns = nullptr;   ///< vertical sums, laid out as the ring; 8 bit (narrow) or 16 bit and scaled (wide)
+  void* columns = nullptr;         ///< vertical sums, laid out as the ring; 8 bit (narrow) or 16 bit and scaled (wide)
   const uint16_t* tail = nullptr;  ///< one vector: 0xFFFF for the lanes of the last group beyond the search range
   uint16_t* sums = nullptr;        ///< scratch, groups * lanes (uniqueness only)
   uint32_t* winners = nullptr;     ///< scratch, x_end - x_begin

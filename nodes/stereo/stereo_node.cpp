@@ -38,7 +38,8 @@ class StereoNode final : public Node {
     }
     const auto pixels = static_cast<size_t>(width_) * static_cast<size_t>(height_);
     const auto half_pixels = static_cast<size_t>(half(width_)) * static_cast<size_t>(half(height_));
-    const size_t bytes = pixels * static_cast<size_t>(channels_), half_bytes = half_pixels * static_cast<size_t>(channels_);
+    const size_t bytes = pixels * static_cast<size_t>(channels_),
+                 half_bytes = half_pixels * static_cast<size_t>(channels_);
     left_.resize(bytes);
     right_.resize(bytes);
     disparity_scratch_.resize(pixels);
@@ -88,9 +89,11 @@ class StereoNode final : public Node {
   }
 
   /// Leaves the views on rectified images: in the input, in the message to send or in this node's own memory.
-  bool rectify(const StereoPair& in, bool is_rectified, ImageView<const uint8_t>& left, ImageView<const uint8_t>& right) {
+  bool rectify(const StereoPair& in, bool is_rectified, ImageView<const uint8_t>& left,
+               ImageView<const uint8_t>& right) {
     StereoPair* out = rectified_.connected() ? rectified_.loan() : nullptr;
-    ImageView<uint8_t> left_out(left_.data(), width_, height_, channels_), right_out(right_.data(), width_, height_, channels_);
+    ImageView<uint8_t> left_out(left_.data(), width_, height_, channels_),
+        right_out(right_.data(), width_, height_, channels_);
     if (out != nullptr) {
       out->width = width_;
       out->height = height_;
@@ -104,7 +107,8 @@ class StereoNode final : public Node {
       right_out = out->right_view();
     }
     if (is_rectified) {
-      if (out != nullptr && !Rectifier(width_, height_, camera_).rectify(left, right, left_out, right_out)) return false;
+      if (out != nullptr && !Rectifier(width_, height_, camera_).rectify(left, right, left_out, right_out))
+        return false;
     } else {
       if (!rectifier_->rectify(left, right, left_out, right_out)) return false;
       left = left_out;
@@ -148,7 +152,8 @@ class StereoNode final : public Node {
              ImageView<uint8_t> confidence) {
     if (level == 0) return matcher_->match(left, right, disparity, confidence);
     const int w = half(width_), h = half(height_);
-    const ImageView<uint8_t> half_left(half_.left.data(), w, h, channels_), half_right(half_.right.data(), w, h, channels_);
+    const ImageView<uint8_t> half_left(half_.left.data(), w, h, channels_),
+        half_right(half_.right.data(), w, h, channels_);
     const ImageView<int16_t> half_disparity(half_.disparity.data(), w, h);
     const ImageView<uint8_t> half_confidence(half_.confidence.data(), w, h);
     halve(left, half_left);
@@ -161,18 +166,23 @@ class StereoNode final : public Node {
   Input<StereoPair> pair_{this, "pair", "raw or rectified pair; raw ones need a calibration"};
   Output<StereoPair> rectified_{this, "rectified", "the pair with epipolar lines along rows"};
   Output<DisparityMap> disparity_{this, "disparity", "disparity and confidence of the left rectified image"};
-  Output<PointCloud> cloud_{this, "cloud", "coloured points in the frame of the left camera (x right, y down, z forward)"};
+  Output<PointCloud> cloud_{this, "cloud",
+                            "coloured points in the frame of the left camera (x right, y down, z forward)"};
 
   Param<int> disparities_{this, "disparities", 150, {1, 512}, "px", "search range 0 .. disparities - 1"};
   Choice cost_{this, "cost", "gradient", {"gradient", "ssd", "sad"}, "matching cost of two pixels"};
   Param<int> c_max_{this, "c_max", 0, {0, 255}, "", "truncation of the cost; 0: 10 for gradient, 50 for ssd and sad"};
   Param<int> n_square_{this, "n_square", 15, {1, 31}, "px", "edge of the summing window, odd"};
   Param<int> n_min_{this, "n_min", 5, {1, 31}, "px", "edge of the minimum filter, odd, at most n_square"};
-  Param<double> min_confidence_{this, "min_confidence", 0.25, {0.0, 1.0}, "1", "smallest confidence of a valid pixel; 0 keeps all"};
-  Param<double> uniqueness_{this, "uniqueness", 0.0, {0.0, 1.0}, "1", "smallest (second - best) / second of a valid pixel; 0: off"};
-  Param<bool> left_right_check_{this, "left_right_check", false, "", "reject where left and right disagree by over 1 px; doubles the time"};
+  Param<double> min_confidence_{
+      this, "min_confidence", 0.25, {0.0, 1.0}, "1", "smallest confidence of a valid pixel; 0 keeps all"};
+  Param<double> uniqueness_{this,       "uniqueness", 0.0,
+                            {0.0, 1.0}, "1",          "smallest (second - best) / second of a valid pixel; 0: off"};
+  Param<bool> left_right_check_{this, "left_right_check", false, "",
+                                "reject where left and right disagree by over 1 px; doubles the time"};
   Param<int> cloud_step_{this, "cloud_step", 2, {1, 64}, "px", "distance of the pixels that become points"};
-  Param<std::string> calibration_{this, "calibration", "", "", "calibration file (M1 D1 M2 D2 R T image_size) for raw pairs"};
+  Param<std::string> calibration_{this, "calibration", "", "",
+                                  "calibration file (M1 D1 M2 D2 R T image_size) for raw pairs"};
 
   int width_ = 0, height_ = 0, channels_ = 0;
   int64_t stamp_ = 0;
@@ -187,7 +197,8 @@ class StereoNode final : public Node {
 }  // namespace
 
 void register_stereo(NodeTypes& types) {
-  types.add<StereoNode>("stereo", Layer::perception, "Rectification, dense disparity with confidence, coloured point cloud");
+  types.add<StereoNode>("stereo", Layer::perception,
+                        "Rectification, dense disparity with confidence, coloured point cloud");
 }
 
 }  // namespace takt

@@ -37,7 +37,8 @@ Picture shifted(std::mt19937& random, const Picture& left, int shift, int noise_
     for (int x = shift; x < left.width; ++x)
       if (percent(random) >= noise_percent)
         for (int c = 0; c < left.channels; ++c)
-          right.pixels[static_cast<size_t>(((y * left.width) + x - shift) * left.channels + c)] = left.view().at(x, y, c);
+          right.pixels[static_cast<size_t>(((y * left.width) + x - shift) * left.channels + c)] =
+              left.view().at(x, y, c);
   return right;
 }
 
@@ -53,8 +54,8 @@ void expect_equal(const Picture& left, const Picture& right, const MatcherParame
     REQUIRE(matcher.match(left.view(), right.view(), {fast.data(), left.width, left.height},
                           {fast_confidence.data(), left.width, left.height}));
     INFO(matcher.target(), " ", left.width, "x", left.height, "x", left.channels, " D ", p.disparities, " cost ",
-         static_cast<int>(p.cost), " c_max ", p.truncation(), " n ", p.n_square, " min ", p.n_min, " unique ", p.uniqueness,
-         " lr ", p.left_right_check);
+         static_cast<int>(p.cost), " c_max ", p.truncation(), " n ", p.n_square, " min ", p.n_min, " unique ",
+         p.uniqueness, " lr ", p.left_right_check);
     CHECK(slow == fast);
     CHECK(slow_confidence == fast_confidence);
   }

@@ -37,7 +37,8 @@ TEST_CASE("resampling equals the integer formula and touches nothing beyond the 
             const auto at = [&](int x, int y) { return image[static_cast<size_t>(((s.y + y) * w + s.x + x) * n + c)]; };
             const int fx = s.fraction_x, fy = s.fraction_y;
             expected = (at(0, 0) * (128 - fx) * (128 - fy) + at(1, 0) * fx * (128 - fy) + at(0, 1) * (128 - fx) * fy +
-                        at(1, 1) * fx * fy + 8192) >> 14;
+                        at(1, 1) * fx * fy + 8192) >>
+                       14;
           }
           REQUIRE(out[static_cast<size_t>(i * n + c)] == expected);
         }

@@ -87,7 +87,8 @@ TEST_CASE("oracle 5: a shifted random-dot pair gives the shift on every interior
       auto right = noise(left.size(), 6);
       for (int y = 0; y < h; ++y)
         for (int i = shift * channels; i < w * channels; ++i)
-          right[static_cast<size_t>(y * w * channels + i - shift * channels)] = left[static_cast<size_t>(y * w * channels + i)];
+          right[static_cast<size_t>(y * w * channels + i - shift * channels)] =
+              left[static_cast<size_t>(y * w * channels + i)];
       MatcherParameters p;
       p.cost = cost;
       const auto r = match(left, right, w, h, channels, p);
@@ -143,7 +144,8 @@ TEST_CASE("parameters and views that cannot work are refused with name and value
   Matcher matcher(8, 8, 1, {});
   std::vector<uint8_t> image(64), confidence(64);
   std::vector<int16_t> disparity(64, 77);
-  CHECK_FALSE(matcher.match({image.data(), 8, 7}, {image.data(), 8, 8}, {disparity.data(), 8, 8}, {confidence.data(), 8, 8}));
+  CHECK_FALSE(
+      matcher.match({image.data(), 8, 7}, {image.data(), 8, 8}, {disparity.data(), 8, 8}, {confidence.data(), 8, 8}));
   CHECK(disparity[0] == 77);
 }
 
@@ -153,7 +155,8 @@ TEST_CASE("views with a stride give the result of packed ones") {
   MatcherParameters p;
   p.disparities = 10;
   const auto packed = match(left, right, w, h, 1, p);
-  std::vector<uint8_t> wide_left(static_cast<size_t>(h) * 50, 1), wide_right(wide_left), confidence(static_cast<size_t>(h) * 40, 3);
+  std::vector<uint8_t> wide_left(static_cast<size_t>(h) * 50, 1), wide_right(wide_left),
+      confidence(static_cast<size_t>(h) * 40, 3);
   for (int y = 0; y < h; ++y)
     for (int x = 0; x < w; ++x) {
       wide_left[static_cast<size_t>(y * 50 + x)] = left[static_cast<size_t>(y * w + x)];
@@ -161,8 +164,8 @@ TEST_CASE("views with a stride give the result of packed ones") {
     }
   std::vector<int16_t> disparity(static_cast<size_t>(h) * 33, 99);
   Matcher matcher(w, h, 1, p);
-  REQUIRE(matcher.match({wide_left.data(), w, h, 1, 50}, {wide_right.data(), w, h, 1, 50}, {disparity.data(), w, h, 1, 33},
-                        {confidence.data(), w, h, 1, 40}));
+  REQUIRE(matcher.match({wide_left.data(), w, h, 1, 50}, {wide_right.data(), w, h, 1, 50},
+                        {disparity.data(), w, h, 1, 33}, {confidence.data(), w, h, 1, 40}));
   for (int y = 0; y < h; ++y) {
     for (int x = 0; x < w; ++x) {
       CHECK(disparity[static_cast<size_t>(y * 33 + x)] == packed.disparity[static_cast<size_t>(y * w + x)]);
@@ -188,7 +191,8 @@ TEST_CASE("half resolution: means of four, disparities doubled, rejected pixels 
 }
 
 TEST_CASE("the score counts missing pixels as bad and leaves hidden ones out") {
-  // Pixels 4 and 5 (d = 4) hide pixel 1 (d = 1, lands on 0) and one more that lands beside them; pixel 0 leaves the image.
+  // Pixels 4 and 5 (d = 4) hide pixel 1 (d = 1, lands on 0) and one more that lands beside them; pixel 0 leaves the
+  // image.
   const DisparityImage truth{8, 1, {2, 1, 0, 1, 4, 4, 1, 1}};
   CHECK(visible_in_right(truth) == std::vector<uint8_t>{0, 0, 0, 1, 1, 1, 1, 1});
   const DisparityImage found{8, 1, {2, 1, 7, 3, -1, 5, NAN, 1}};

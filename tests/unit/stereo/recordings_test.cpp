@@ -47,7 +47,8 @@ TEST_CASE("the default matcher beats StereoBM (block 15, no filters) on each rea
     p.disparities = r.disparities;
     const StereoScore ours = run(left, right, truth, p);
     const StereoScore peer = score(run_peer(Peer::block_matching_unfiltered, {left.data, left.cols, left.rows, 3},
-                                            {right.data, left.cols, left.rows, 3}, r.disparities), truth);
+                                            {right.data, left.cols, left.rows, 3}, r.disparities),
+                                   truth);
     INFO(r.folder, ": ", ours.bad_1px_pct, " % bad, StereoBM ", peer.bad_1px_pct, " %");
     CHECK(ours.density_pct == 100);
     CHECK(ours.bad_1px_pct <= r.most_bad_pct);

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "nodes/stereo/rectify.hpp"
+
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -10,7 +12,6 @@
 #include <opencv2/imgproc.hpp>
 #include <random>
 
-#include "nodes/stereo/rectify.hpp"
 #include "tests/test_data.hpp"
 
 using namespace takt;
@@ -28,8 +29,15 @@ StereoCalibration crooked_pair() {
   c.left_distortion = {-0.2, 0.05, 0.001, -0.001, 0};
   c.right_distortion = {-0.18, 0.04, -0.001, 0.002, 0};
   const double a = 0.03, b = -0.02;
-  c.rotation = {std::cos(a), 0, std::sin(a), std::sin(a) * std::sin(b), std::cos(b), -std::cos(a) * std::sin(b),
-                -std::sin(a) * std::cos(b), std::sin(b), std::cos(a) * std::cos(b)};
+  c.rotation = {std::cos(a),
+                0,
+                std::sin(a),
+                std::sin(a) * std::sin(b),
+                std::cos(b),
+                -std::cos(a) * std::sin(b),
+                -std::sin(a) * std::cos(b),
+                std::sin(b),
+                std::cos(a) * std::cos(b)};
   c.translation_m = {-0.12, 0.003, 0.002};
   return c;
 }
@@ -37,8 +45,8 @@ StereoCalibration crooked_pair() {
 cv::Point2d project(const std::array<double, 9>& k, const std::array<double, 5>& d, const cv::Vec3d& p) {
   std::vector<cv::Point2d> out;
   cv::projectPoints(std::vector<cv::Point3d>{{p[0], p[1], p[2]}}, cv::Vec3d(), cv::Vec3d(),
-                    cv::Mat(3, 3, CV_64F, const_cast<double*>(k.data())), cv::Mat(1, 5, CV_64F, const_cast<double*>(d.data())),
-                    out);
+                    cv::Mat(3, 3, CV_64F, const_cast<double*>(k.data())),
+                    cv::Mat(1, 5, CV_64F, const_cast<double*>(d.data())), out);
   return out[0];
 }
 
@@ -87,8 +95,10 @@ TEST_CASE("the remap agrees with OpenCV's within two grey levels, one and three 
   const StereoCalibration c = crooked_pair();
   const Rectifier rectifier(c);
   cv::Mat r1, r2, p1, p2, q, x, y;
-  cv::Mat k1(3, 3, CV_64F, const_cast<double*>(c.left_matrix.data())), k2(3, 3, CV_64F, const_cast<double*>(c.right_matrix.data()));
-  cv::Mat d1(1, 5, CV_64F, const_cast<double*>(c.left_distortion.data())), d2(1, 5, CV_64F, const_cast<double*>(c.right_distortion.data()));
+  cv::Mat k1(3, 3, CV_64F, const_cast<double*>(c.left_matrix.data())),
+      k2(3, 3, CV_64F, const_cast<double*>(c.right_matrix.data()));
+  cv::Mat d1(1, 5, CV_64F, const_cast<double*>(c.left_distortion.data())),
+      d2(1, 5, CV_64F, const_cast<double*>(c.right_distortion.data()));
   cv::stereoRectify(k1, d1, k2, d2, {c.width, c.height}, cv::Mat(3, 3, CV_64F, const_cast<double*>(c.rotation.data())),
                     cv::Mat(3, 1, CV_64F, const_cast<double*>(c.translation_m.data())), r1, r2, p1, p2, q,
                     cv::CALIB_ZERO_DISPARITY, 0);
@@ -136,7 +146,8 @@ TEST_CASE("calibrations that cannot be used are refused with name and value") {
   const double nan = std::numeric_limits<double>::quiet_NaN(), infinite = std::numeric_limits<double>::infinity();
   CHECK(message([](auto&) {}) == "accepted");
   CHECK(message([&](auto& c) { c.left_matrix[2] = nan; }).find("left_matrix[2] is nan") != std::string::npos);
-  CHECK(message([&](auto& c) { c.right_distortion[4] = infinite; }).find("right_distortion[4] is inf") != std::string::npos);
+  CHECK(message([&](auto& c) { c.right_distortion[4] = infinite; }).find("right_distortion[4] is inf") !=
+        std::string::npos);
   CHECK(message([&](auto& c) { c.translation_m[0] = -infinite; }).find("translation_m[0]") != std::string::npos);
   CHECK(message([](auto& c) { c.right_matrix[0] = 0; }).find("focal") != std::string::npos);
   CHECK(message([](auto& c) { c.rotation[0] = 0.5; }).find("orthonormal") != std::string::npos);
@@ -159,9 +170,12 @@ TEST_CASE("a real calibration file brings chessboard corners onto common rows") 
     std::vector<cv::Point2f> found[2];
     bool both = true;
     for (int side = 0; side < 2; ++side) {
-      const cv::Mat image = cv::imread((*folder / (std::string(side ? "right" : "left") + number + ".jpg")).string(), 0);
+      const cv::Mat image =
+          cv::imread((*folder / (std::string(side ? "right" : "left") + number + ".jpg")).string(), 0);
       both = cv::findChessboardCorners(image, {9, 6}, found[side]) && both;
-      if (both) cv::cornerSubPix(image, found[side], {11, 11}, {-1, -1}, {cv::TermCriteria::EPS + cv::TermCriteria::COUNT, 30, 0.01});
+      if (both)
+        cv::cornerSubPix(image, found[side], {11, 11}, {-1, -1},
+                         {cv::TermCriteria::EPS + cv::TermCriteria::COUNT, 30, 0.01});
     }
     if (!both) continue;
     board.emplace_back();
@@ -175,11 +189,13 @@ TEST_CASE("a real calibration file brings chessboard corners onto common rows") 
   const auto path = std::filesystem::temp_directory_path() / "takt_stereo_calibration_test.yaml";
   {
     cv::FileStorage out(path.string(), cv::FileStorage::WRITE);
-    out << "M1" << k1 << "D1" << d1 << "M2" << k2 << "D2" << d2 << "R" << r << "T" << t << "image_size" << std::vector<int>{640, 480};
+    out << "M1" << k1 << "D1" << d1 << "M2" << k2 << "D2" << d2 << "R" << r << "T" << t << "image_size"
+        << std::vector<int>{640, 480};
   }
   const Rectifier rectifier(read_calibration(path));
   std::filesystem::remove(path);
-  const cv::Mat left = cv::imread((*folder / "left01.jpg").string(), 0), right = cv::imread((*folder / "right01.jpg").string(), 0);
+  const cv::Mat left = cv::imread((*folder / "left01.jpg").string(), 0),
+                right = cv::imread((*folder / "right01.jpg").string(), 0);
   cv::Mat l(left.size(), CV_8U), rr(right.size(), CV_8U);
   REQUIRE(rectifier.rectify({left.data, 640, 480}, {right.data, 640, 480}, {l.data, 640, 480}, {rr.data, 640, 480}));
   std::vector<cv::Point2f> a, b;

@@ -32,7 +32,9 @@ struct Chunk {
   }
   MessageHeader* header() const { return static_cast<MessageHeader*>(memory.get()); }
   template <class T>
-  T& as() const { return *reinterpret_cast<T*>(header() + 1); }
+  T& as() const {
+    return *reinterpret_cast<T*>(header() + 1);
+  }
 };
 
 struct OneChunkWriter final : Writer {
@@ -52,7 +54,8 @@ class Bench {
   static constexpr int kWidth = 96, kHeight = 40, kShift = 12;
   static constexpr Capacity kCapacity{kWidth, kHeight, 3, 0};
 
-  explicit Bench(const std::vector<std::pair<const char*, ParamValue>>& params = {}) : input_(MessageType::of<StereoPair>(), kCapacity) {
+  explicit Bench(const std::vector<std::pair<const char*, ParamValue>>& params = {})
+      : input_(MessageType::of<StereoPair>(), kCapacity) {
     register_stereo(types_);
     node_ = types_.find("stereo")->make();
     for (const auto& [name, value] : params)
@@ -99,9 +102,13 @@ class Bench {
   }
 
   StereoPair& pair() { return input_.as<StereoPair>(); }
-  bool sent(size_t i) const { return PortAccess::sent(*node_->outputs()[i]) && PortAccess::stamp_ns(*node_->outputs()[i]) == 777; }
+  bool sent(size_t i) const {
+    return PortAccess::sent(*node_->outputs()[i]) && PortAccess::stamp_ns(*node_->outputs()[i]) == 777;
+  }
   template <class T>
-  T& output(size_t i) { return writers_[i]->chunk.as<T>(); }
+  T& output(size_t i) {
+    return writers_[i]->chunk.as<T>();
+  }
 
  private:
   VirtualClock clock_;
