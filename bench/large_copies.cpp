@@ -37,8 +37,12 @@ void* counted(Copy original, void* to, const void* from, size_t count) {
 
 }  // namespace
 
-extern "C" void* memcpy(void* to, const void* from, size_t count) { return counted(next_memcpy.load(std::memory_order_relaxed), to, from, count); }
-extern "C" void* memmove(void* to, const void* from, size_t count) { return counted(next_memmove.load(std::memory_order_relaxed), to, from, count); }
+extern "C" void* memcpy(void* to, const void* from, size_t count) {
+  return counted(next_memcpy.load(std::memory_order_relaxed), to, from, count);
+}
+extern "C" void* memmove(void* to, const void* from, size_t count) {
+  return counted(next_memmove.load(std::memory_order_relaxed), to, from, count);
+}
 
 namespace takt::bench {
 

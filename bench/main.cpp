@@ -16,7 +16,9 @@ namespace {
 
 using namespace takt::bench;
 
-nlohmann::json number(const std::optional<double>& value) { return value ? nlohmann::json(*value) : nlohmann::json(nullptr); }
+nlohmann::json number(const std::optional<double>& value) {
+  return value ? nlohmann::json(*value) : nlohmann::json(nullptr);
+}
 
 nlohmann::json to_json(const Row& row) {
   const Samples& s = row.samples;
@@ -57,7 +59,8 @@ void describe_machine() {
       model = line.substr(line.find(':') + 2);
       break;
     }
-  std::fprintf(stderr, "%s, %ld CPUs, %s %s%s\n", model.c_str(), sysconf(_SC_NPROCESSORS_ONLN), system.sysname, system.release,
+  std::fprintf(stderr, "%s, %ld CPUs, %s %s%s\n", model.c_str(), sysconf(_SC_NPROCESSORS_ONLN), system.sysname,
+               system.release,
                geteuid() == 0 ? "" : "; not root: real-time policies may be refused, see column granted");
 }
 
@@ -70,7 +73,8 @@ int main(int argc, char** argv) {
   for (const Suite& suite : suites()) list += "\n  " + std::string(suite.name) + ": " + std::string(suite.what);
   app.add_option("suite", suite_name, "what to measure:" + list)->required();
   app.add_option("--json", json_file, "write the rows to this file as one JSON array");
-  app.add_option("--rounds", options.rounds, "interleaved rounds (default: the suite's own)")->check(CLI::Range(1, 10000));
+  app.add_option("--rounds", options.rounds, "interleaved rounds (default: the suite's own)")
+      ->check(CLI::Range(1, 10000));
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -33,14 +33,15 @@ struct Row {
   std::string name;  ///< suite/what/variant
   std::string unit;
   double value = 0;
-  Samples samples;   ///< all rounds together
+  Samples samples;  ///< all rounds together
   std::string reference;
   std::optional<double> reference_value, ratio;
   std::string granted;
 };
 
-/// Rounds of two contestants A (reference) and B. Either measured A B A B ... A, one A more than B's: each B then stands
-/// against the mean of its two neighbours. Or both inside each round, sample by sample in turn: as many A's as B's.
+/// Rounds of two contestants A (reference) and B. Either measured A B A B ... A, one A more than B's: each B then
+/// stands against the mean of its two neighbours. Or both inside each round, sample by sample in turn: as many A's as
+/// B's.
 class Pairs {
  public:
   void add_a(double value) { a_.push_back(value); }

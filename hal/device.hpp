@@ -9,7 +9,7 @@ namespace takt {
 /// Why a device could not be opened or started. `what` names the file (with its line where there is one) and the value
 /// at fault, `fix` the next step of the person who reads it.
 struct DeviceError {
-  std::string id;    ///< the device's id in the graph
+  std::string id;  ///< the device's id in the graph
   std::string what;
   std::string fix;
   bool bad_input = true;  ///< false: the settings and files are right, but the hardware fails
@@ -43,10 +43,10 @@ inline const char* to_text(ReadStatus status) {
 }
 
 /// The life of every device: constructed (settings only) -> open() (claims hardware or files, checks everything,
-/// allocates everything) -> start(epoch) -> read ... -> stop() -> close(). open, start, stop and close run on the thread
-/// that composes the graph, before and after jobs; reads, triggers and commands on the job thread of the one node that owns
-/// the device, and they neither allocate nor lock (drivers of real hardware: one bounded read of a descriptor). All
-/// stamps are CLOCK_MONOTONIC nanoseconds of the Clock that the driver was constructed with.
+/// allocates everything) -> start(epoch) -> read ... -> stop() -> close(). open, start, stop and close run on the
+/// thread that composes the graph, before and after jobs; reads, triggers and commands on the job thread of the one
+/// node that owns the device, and they neither allocate nor lock (drivers of real hardware: one bounded read of a
+/// descriptor). All stamps are CLOCK_MONOTONIC nanoseconds of the Clock that the driver was constructed with.
 class Device {
  public:
   Device() = default;

@@ -64,7 +64,8 @@ std::span<const DeviceKind> device_kinds();
 
 /// Makes the node of a device and opens the device: everything that can be wrong with files and settings is told here.
 /// Errors list the valid alternatives.
-tl::expected<std::unique_ptr<DeviceNode>, DeviceError> make_device(const DeviceConfig& config, Devices& devices, const Clock& clock);
+tl::expected<std::unique_ptr<DeviceNode>, DeviceError> make_device(const DeviceConfig& config, Devices& devices,
+                                                                   const Clock& clock);
 
 /// CPU time that the simulator's rendering has used in this process so far, ns (0 without a simulated camera).
 int64_t simulator_cpu_ns(const Devices& devices);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a node author needs: Node, Input<T>, Output<T>, Param<T>, Setup, Job. A node declares its ports and parameters as
-// members; the runtime calls setup() and start() once, run() once per job on one thread at a time, finish() after the last
-// job.
+// What a node author needs: Node, Input<T>, Output<T>, Param<T>, Setup, Job. A node declares its ports and parameters
+// as members; the runtime calls setup() and start() once, run() once per job on one thread at a time, finish() after
+// the last job.
 #pragma once
 #include <array>
 #include <filesystem>
@@ -31,7 +31,7 @@ struct Setup {
   std::filesystem::path directory;  ///< of the graph file; relative paths start here
   std::filesystem::path output;     ///< where a node may write files in finish(); exists
   uint64_t seed = 0;
-  double rate_hz = 0;               ///< planned rate; of the producer for `on` nodes, 0 if unknown
+  double rate_hz = 0;  ///< planned rate; of the producer for `on` nodes, 0 if unknown
 };
 
 /// One activation of a node. All a job may observe besides its inputs comes from here (and is recorded).
@@ -171,8 +171,8 @@ class Node {
   virtual ~Node() = default;
 
   virtual void setup(Setup& setup) = 0;
-  /// Once the epoch (first planned instant of the run, shortly ahead) is fixed, before the first job, on the main thread:
-  /// a hardware node starts its device here.
+  /// Once the epoch (first planned instant of the run, shortly ahead) is fixed, before the first job, on the main
+  /// thread: a hardware node starts its device here.
   virtual void start(int64_t epoch_ns) { static_cast<void>(epoch_ns); }
   /// One job. No allocation, lock, file or socket call, logging or exception in here.
   virtual void run(Job& job) = 0;

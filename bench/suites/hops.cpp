@@ -124,8 +124,13 @@ std::string HopPlan::name() const {
 
 class Course::Sender {
  public:
-  Sender(const HopPlan& plan, Board& board, size_t hop, std::unique_ptr<Writer> writer, std::unique_ptr<Reader> reader, uint32_t raw_bytes)
-      : plan_(plan), line_(board.lines[hop]), writer_(std::move(writer)), reader_(std::move(reader)), raw_bytes_(raw_bytes) {
+  Sender(const HopPlan& plan, Board& board, size_t hop, std::unique_ptr<Writer> writer, std::unique_ptr<Reader> reader,
+         uint32_t raw_bytes)
+      : plan_(plan),
+        line_(board.lines[hop]),
+        writer_(std::move(writer)),
+        reader_(std::move(reader)),
+        raw_bytes_(raw_bytes) {
     if (plan.carrier == Carrier::iceoryx) raw_ = std::make_unique<iox::popo::UntypedPublisher>(raw_service(board, hop));
   }
 
@@ -181,7 +186,8 @@ struct Course::Listeners {
   }
 };
 
-Course::Course(std::vector<HopPlan> hops, const Conditions& conditions) : hops_(std::move(hops)), conditions_(conditions) {
+Course::Course(std::vector<HopPlan> hops, const Conditions& conditions)
+    : hops_(std::move(hops)), conditions_(conditions) {
   if (hops_.size() > kMaxHops) throw CannotRun("more than " + std::to_string(kMaxHops) + " contestants");
   for (const HopPlan& hop : hops_) ports_.push_back(port_of(hop));
   void* memory = mmap(nullptr, sizeof(Board), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
@@ -209,7 +215,8 @@ Course::Course(std::vector<HopPlan> hops, const Conditions& conditions) : hops_(
                                                 hop.place == Place::same_worker ? transport.make_reader(i) : nullptr,
                                                 layout.pools[layout.pool_of_port[i]].loan_bytes));
     expected += hop.place != Place::same_worker;
-    if (hop.place == Place::threads) listeners_->start(i, hop, conditions_, carries ? transport.make_reader(i) : nullptr);
+    if (hop.place == Place::threads)
+      listeners_->start(i, hop, conditions_, carries ? transport.make_reader(i) : nullptr);
   }
   board_->daemon_up.store(1);
   for (int tries = 0; board_->listening.load() < expected; ++tries) {
@@ -224,7 +231,8 @@ void Course::listen_in_child() {
   Listeners listeners(*board_);
   for (size_t i = 0; i < hops_.size(); ++i)
     if (hops_[i].place == Place::processes)
-      listeners.start(i, hops_[i], conditions_, hops_[i].carrier == Carrier::takt ? transport->make_reader(i) : nullptr);
+      listeners.start(i, hops_[i], conditions_,
+                      hops_[i].carrier == Carrier::takt ? transport->make_reader(i) : nullptr);
   while (board_->stop.load() == 0) sleep_until(now_ns() + 20'000'000);
 }
 
@@ -242,7 +250,8 @@ void Course::send(size_t hop) { senders_[hop]->send(); }
 
 int64_t Course::taken_ns(size_t hop) const {
   const Line& line = board_->lines[hop];
-  for (int tries = 0; line.answered.load(std::memory_order_acquire) != line.sent.load(std::memory_order_relaxed); ++tries) {
+  for (int tries = 0; line.answered.load(std::memory_order_acquire) != line.sent.load(std::memory_order_relaxed);
+       ++tries) {
     if (tries == 2000) throw CannotRun("a message of " + hops_[hop].name() + " never arrived");
     sleep_until(now_ns() + 1'000'000);
   }

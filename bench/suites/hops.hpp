@@ -20,8 +20,8 @@ enum class Place : uint8_t { same_worker, threads, processes };
 struct HopPlan {
   Carrier carrier = Carrier::futex;
   Place place = Place::threads;
-  uint32_t bytes = 0;  ///< of the message; 0: only the wake-up
-  bool second = false; ///< null contestant: the same thing again under another name
+  uint32_t bytes = 0;   ///< of the message; 0: only the wake-up
+  bool second = false;  ///< null contestant: the same thing again under another name
   std::string name() const;
 };
 

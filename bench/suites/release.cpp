@@ -171,7 +171,14 @@ void run_condition(Policy policy, bool loaded, int rounds, std::vector<Row>& row
   const std::string name = "clock_nanosleep" + (raw_granted.empty() ? "" : " (" + raw_granted + ")");
   add_pair(rows, {"release/lateness_p50/" + variant, "us", 0, all, {}, {}, {}, granted}, name, p50);
   add_pair(rows, {"release/lateness_p99/" + variant, "us", 0, all, {}, {}, {}, granted}, name, p99);
-  rows.push_back({"release/missed/" + variant, "count", static_cast<double>(released) - static_cast<double>(completed), {}, {}, {}, {}, granted});
+  rows.push_back({"release/missed/" + variant,
+                  "count",
+                  static_cast<double>(released) - static_cast<double>(completed),
+                  {},
+                  {},
+                  {},
+                  {},
+                  granted});
 }
 
 }  // namespace

@@ -50,7 +50,8 @@ double milliseconds(Work work) {
 }
 
 template <class A, class B>
-void compare(std::vector<Row>& rows, const std::string& what, const std::string& reference, const std::string& granted, int rounds, A a, B b) {
+void compare(std::vector<Row>& rows, const std::string& what, const std::string& reference, const std::string& granted,
+             int rounds, A a, B b) {
   std::fprintf(stderr, "stereo: %s against %s\n", what.c_str(), reference.c_str());
   Row row{"stereo/" + what + "/640x480x150", "ms", 0, {}, {}, {}, {}, granted};
   Pairs pairs;
@@ -84,14 +85,18 @@ std::vector<Row> run_stereo(const Options& options) {
   };
   // OpenCV wants a multiple of 16.
   const auto block = cv::StereoBM::create((kDisparities + 15) / 16 * 16, parameters.n_square);
-  const auto global = cv::StereoSGBM::create(0, (kDisparities + 15) / 16 * 16, 5, 200, 800, 1, 63, 10, 100, 2, cv::StereoSGBM::MODE_SGBM_3WAY);
+  const auto global = cv::StereoSGBM::create(0, (kDisparities + 15) / 16 * 16, 5, 200, 800, 1, 63, 10, 100, 2,
+                                             cv::StereoSGBM::MODE_SGBM_3WAY);
   const auto with_block = [&] { block->compute(scene.left_grey, scene.right_grey, theirs); };
   const auto with_global = [&] { global->compute(scene.left, scene.right, theirs); };
   const std::string granted = std::string("one thread, ") + colour.target();
   std::vector<Row> rows;
-  compare(rows, "match_grey", "cv::StereoBM", granted, rounds, with_block, [&] { run(grey, scene.left_grey, scene.right_grey); });
-  compare(rows, "match_colour", "cv::StereoBM on grey", granted, rounds, with_block, [&] { run(colour, scene.left, scene.right); });
-  compare(rows, "match_colour_to_sgbm", "cv::StereoSGBM 3-way", granted, rounds, with_global, [&] { run(colour, scene.left, scene.right); });
+  compare(rows, "match_grey", "cv::StereoBM", granted, rounds, with_block,
+          [&] { run(grey, scene.left_grey, scene.right_grey); });
+  compare(rows, "match_colour", "cv::StereoBM on grey", granted, rounds, with_block,
+          [&] { run(colour, scene.left, scene.right); });
+  compare(rows, "match_colour_to_sgbm", "cv::StereoSGBM 3-way", granted, rounds, with_global,
+          [&] { run(colour, scene.left, scene.right); });
   return rows;
 }
 

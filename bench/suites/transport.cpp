@@ -86,7 +86,8 @@ size_t find(const std::vector<HopPlan>& hops, Carrier carrier, Place place, uint
 
 class Table {
  public:
-  Table(const std::vector<HopPlan>& hops, const Measured& measured, std::string variant, std::string granted, std::vector<Row>& rows)
+  Table(const std::vector<HopPlan>& hops, const Measured& measured, std::string variant, std::string granted,
+        std::vector<Row>& rows)
       : hops_(hops), measured_(measured), variant_(std::move(variant)), granted_(std::move(granted)), rows_(rows) {}
 
   void compare(const std::string& what, size_t hop, size_t reference) {
@@ -126,7 +127,8 @@ class Table {
 std::string granted_text(const Grant& grant) {
   if (!grant.refused.empty()) return grant.refused;
   if (grant.policy != Policy::fixed) return "default policy";
-  return "SCHED_FIFO " + std::to_string(grant.priority) + (grant.cpus.size() == 1 ? ", CPU " + std::to_string(grant.cpus[0]) : "");
+  return "SCHED_FIFO " + std::to_string(grant.priority) +
+         (grant.cpus.size() == 1 ? ", CPU " + std::to_string(grant.cpus[0]) : "");
 }
 
 Row count_row(const std::string& name, uint64_t count, const std::string& granted) {
@@ -158,7 +160,8 @@ void run_conditions(const Conditions& conditions, int rounds, std::vector<Row>& 
 Row start_row(const char* name, std::unique_ptr<Transport> (*make)(std::span<const PortPlan>), int times) {
   Row row{std::string("transport/start_to_first_message/") + name, "ms", 0, {}, {}, {}, {}, {}};
   for (int i = 0; i < times; ++i) {
-    const std::vector<PortPlan> ports{{"bench", "start", &MessageType::of<Image>(), {.width = 640, .height = 480, .channels = 3}, 2, 1, 1}};
+    const std::vector<PortPlan> ports{
+        {"bench", "start", &MessageType::of<Image>(), {.width = 640, .height = 480, .channels = 3}, 2, 1, 1}};
     const int64_t begin = now_ns();
     const auto transport = make(ports);
     const auto writer = transport->make_writer(0);
@@ -179,7 +182,8 @@ Row start_row(const char* name, std::unique_ptr<Transport> (*make)(std::span<con
 
 std::vector<Row> run_transport(const Options& options) {
   const int rounds = options.rounds_or(8);
-  std::vector<Row> rows{start_row("local", make_local_transport, rounds), start_row("iceoryx", make_iceoryx_transport, rounds)};
+  std::vector<Row> rows{start_row("local", make_local_transport, rounds),
+                        start_row("iceoryx", make_iceoryx_transport, rounds)};
   const auto fifo = [](int core) {
     Reservation r;
     r.policy = Policy::fixed;

@@ -17,7 +17,8 @@ constexpr double kRounding = 1e-9;  // a sum of shares may miss the whole by thi
 double ms(int64_t ns) { return static_cast<double>(ns) / 1e6; }
 
 void add_tasks(const Plan& plan, CheckResult& result) {
-  result.text += fmt::format("{:<16} {:>7} {:>10} {:>11} {:>12}\n", "node", "Hz", "budget ms", "deadline ms", "utilisation");
+  result.text +=
+      fmt::format("{:<16} {:>7} {:>10} {:>11} {:>12}\n", "node", "Hz", "budget ms", "deadline ms", "utilisation");
   for (size_t t = 0; t < plan.tasks.size(); ++t) {
     const TaskPlan& task = plan.tasks[t];
     const double rate = effective_rate_hz(plan, t), share = static_cast<double>(task.budget_ns) * 1e-9 * rate;
@@ -25,8 +26,11 @@ void add_tasks(const Plan& plan, CheckResult& result) {
     result.utilisation += share;
     result.text += fmt::format("{:<16} {:>7.3g} {:>10.3f} {:>11.3f} {:>12.3f}\n", task.name, rate, ms(task.budget_ns),
                                ms(task.deadline_ns), share);
-    result.json["nodes"].push_back({{"name", task.name}, {"rate_hz", rate}, {"budget_ms", ms(task.budget_ns)},
-                                    {"deadline_ms", ms(task.deadline_ns)}, {"utilisation", share}});
+    result.json["nodes"].push_back({{"name", task.name},
+                                    {"rate_hz", rate},
+                                    {"budget_ms", ms(task.budget_ns)},
+                                    {"deadline_ms", ms(task.deadline_ns)},
+                                    {"utilisation", share}});
   }
 }
 
@@ -38,8 +42,10 @@ void add_pools(const Plan& plan, CheckResult& result) {
     result.text += fmt::format("{:<28} {:<14} {:>10} {:>7} {:>9.2f}\n", port.node + "." + port.port, port.type->name,
                                port.chunk_bytes(), port.chunks(), static_cast<double>(bytes) / 1e6);
     result.pools.push_back({port.node + "." + port.port, port.chunks(), bytes});
-    result.json["pools"].push_back({{"port", port.node + "." + port.port}, {"type", port.type->name},
-                                    {"bytes", port.chunk_bytes()}, {"chunks", port.chunks()}});
+    result.json["pools"].push_back({{"port", port.node + "." + port.port},
+                                    {"type", port.type->name},
+                                    {"bytes", port.chunk_bytes()},
+                                    {"chunks", port.chunks()}});
   }
 }
 
@@ -49,13 +55,15 @@ void find_impossible(const Plan& plan, CheckResult& result) {
     const TaskPlan& task = plan.tasks[t];
     const double rate = effective_rate_hz(plan, t);
     if (task.deadline_ns > 0 && task.budget_ns > task.deadline_ns)
-      result.problems.push_back(fmt::format("{}: its budget of {} ms is above its deadline of {} ms; give it a deadline from "
-                                            "{} ms on or a smaller budget",
-                                            task.name, ms(task.budget_ns), ms(task.deadline_ns), ms(task.budget_ns)));
+      result.problems.push_back(
+          fmt::format("{}: its budget of {} ms is above its deadline of {} ms; give it a deadline from "
+                      "{} ms on or a smaller budget",
+                      task.name, ms(task.budget_ns), ms(task.deadline_ns), ms(task.budget_ns)));
     else if (static_cast<double>(task.budget_ns) * 1e-9 * rate > 1 + kRounding)
-      result.problems.push_back(fmt::format("{}: its budget of {} ms at {:.4g} Hz is more than one core, and a job runs on "
-                                            "one; at most {:.4g} Hz would fit",
-                                            task.name, ms(task.budget_ns), rate, 1e9 / static_cast<double>(task.budget_ns)));
+      result.problems.push_back(
+          fmt::format("{}: its budget of {} ms at {:.4g} Hz is more than one core, and a job runs on "
+                      "one; at most {:.4g} Hz would fit",
+                      task.name, ms(task.budget_ns), rate, 1e9 / static_cast<double>(task.budget_ns)));
   }
 }
 
@@ -93,17 +101,19 @@ CheckResult check(const GraphSpec& graph, const Plan& plan) {
   find_impossible(plan, result);
   spread_over_cores(plan, result);
   if (result.utilisation > static_cast<double>(result.cores) + kRounding)
-    result.problems.push_back(fmt::format("budgets ask for {:.2f} of {} core{}; lower rates or budgets", result.utilisation,
-                                          result.cores, result.cores == 1 ? "" : "s"));
+    result.problems.push_back(fmt::format("budgets ask for {:.2f} of {} core{}; lower rates or budgets",
+                                          result.utilisation, result.cores, result.cores == 1 ? "" : "s"));
   result.admitted = result.problems.empty();
   result.verdict = graph.adjusted.empty() ? Verdict::valid : Verdict::adjusted;
-  std::string verdict = fmt::format("{}: budgets ask for {:.2f} of {} core{}, pools take {:.1f} MB: {}\n", graph.name,
-                                    result.utilisation, result.cores, result.cores == 1 ? "" : "s",
-                                    static_cast<double>(result.pool_bytes) / 1e6,
-                                    result.admitted ? "fits on average (response times are not analysed)" : "infeasible");
+  std::string verdict =
+      fmt::format("{}: budgets ask for {:.2f} of {} core{}, pools take {:.1f} MB: {}\n", graph.name, result.utilisation,
+                  result.cores, result.cores == 1 ? "" : "s", static_cast<double>(result.pool_bytes) / 1e6,
+                  result.admitted ? "fits on average (response times are not analysed)" : "infeasible");
   for (const std::string& problem : result.problems) verdict += problem + "\n";
   for (const std::string& name : result.unbudgeted)
-    verdict += fmt::format("{}: no budget stated, not counted; `takt run` under the policy deadline reserves a quarter of its deadline\n", name);
+    verdict += fmt::format(
+        "{}: no budget stated, not counted; `takt run` under the policy deadline reserves a quarter of its deadline\n",
+        name);
   result.text = verdict + result.text;
   result.json["verdict"] = to_string(result.verdict);
   result.json["problems"] = result.problems;

@@ -22,8 +22,8 @@ struct PoolUse {
   uint64_t bytes = 0;  ///< of the whole pool
 };
 
-/// Load of one core if the tasks are put on cores the largest first, each where most is free. An illustration where jobs
-/// may run on any core.
+/// Load of one core if the tasks are put on cores the largest first, each where most is free. An illustration where
+/// jobs may run on any core.
 struct CoreUse {
   int core = 0;
   double utilisation = 0;
@@ -41,7 +41,7 @@ struct CheckResult {
   std::vector<std::string> problems;    ///< why it is not admitted: the task, the value, what would make it fit
   std::vector<PoolUse> pools;
   std::vector<CoreUse> core_use;
-  std::string text;                     ///< table for people, the reason first if not admitted
+  std::string text;  ///< table for people, the reason first if not admitted
   nlohmann::ordered_json json;
 };
 

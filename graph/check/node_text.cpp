@@ -7,7 +7,8 @@ namespace takt::graph {
 
 std::string nodes_text(const NodeTypes& types) {
   std::string text;
-  for (const auto& [name, type] : types.all()) text += fmt::format("{:<14} {:<11} {}\n", name, to_string(type.layer), type.doc);
+  for (const auto& [name, type] : types.all())
+    text += fmt::format("{:<14} {:<11} {}\n", name, to_string(type.layer), type.doc);
   return text;
 }
 

@@ -26,7 +26,8 @@ int print_nodes(const std::string& type) {
     std::fputs(graph::node_text(*found).c_str(), stdout);
     return kOk;
   }
-  std::fprintf(stderr, "takt: error: node type \"%s\" is unknown; valid are:\n%s", type.c_str(), graph::nodes_text(types).c_str());
+  std::fprintf(stderr, "takt: error: node type \"%s\" is unknown; valid are:\n%s", type.c_str(),
+               graph::nodes_text(types).c_str());
   return kBadInput;
 }
 

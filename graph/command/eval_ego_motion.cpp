@@ -45,7 +45,8 @@ CameraModel read_calibration(const std::filesystem::path& file) {
     return p.size() == 12 && std::all_of(p.begin(), p.end(), [](double v) { return std::isfinite(v); });
   };
   if (!usable(p0) || !usable(p1) || p0[0] <= 0 || p1[3] >= 0)
-    throw BadData(fmt::format("{}: P0 and P1 must be 12 finite numbers each, with a baseline to the right", file.string()));
+    throw BadData(
+        fmt::format("{}: P0 and P1 must be 12 finite numbers each, with a baseline to the right", file.string()));
   return {p0[0], p0[2], p0[6], -p1[3] / p1[0]};
 }
 
@@ -56,7 +57,8 @@ std::vector<Rigid> read_poses(const std::filesystem::path& file) {
   for (std::string line; std::getline(in, line);) {
     const std::vector<double> v = numbers(line);
     if (v.empty()) continue;
-    if (v.size() != 12) throw BadData(fmt::format("{}:{}: {} numbers, 12 are wanted", file.string(), poses.size() + 1, v.size()));
+    if (v.size() != 12)
+      throw BadData(fmt::format("{}:{}: {} numbers, 12 are wanted", file.string(), poses.size() + 1, v.size()));
     Rigid pose;
     for (int r = 0; r < 3; ++r) {
       for (int c = 0; c < 3; ++c) pose.R(r, c) = v[static_cast<size_t>(4 * r + c)];
@@ -134,26 +136,32 @@ int evaluate(const EvalEgoMotionOptions& options) {
     const std::vector<Rigid> truth = read_poses(options.data / "poses.txt");
     const Track track = follow(options);
     if (truth.size() != track.poses.size())
-      throw BadData(fmt::format("{}: {} poses for {} images", (options.data / "poses.txt").string(), truth.size(), track.poses.size()));
+      throw BadData(fmt::format("{}: {} poses for {} images", (options.data / "poses.txt").string(), truth.size(),
+                                track.poses.size()));
     const auto q = ego_motion::evaluate(track.poses, truth);
     const std::vector<Rigid> standing(truth.size());
     const auto still = ego_motion::evaluate(standing, truth);
-    nlohmann::ordered_json out{{"drift_pct", q.drift_pct},
-                               {"deg_per_frame", q.deg_per_frame},
-                               {"metres_per_frame", q.metres_per_frame},
-                               {"path_m", q.path_m},
-                               {"frames", truth.size()},
-                               {"valid_frames", track.valid},
-                               {"time_ms", median(track.step_ms)},
-                               {"stereo_time_ms", median(track.stereo_ms)},
-                               {"baseline", {{"name", "standing still"}, {"drift_pct", still.drift_pct}, {"deg_per_frame", still.deg_per_frame}}}};
+    nlohmann::ordered_json out{
+        {"drift_pct", q.drift_pct},
+        {"deg_per_frame", q.deg_per_frame},
+        {"metres_per_frame", q.metres_per_frame},
+        {"path_m", q.path_m},
+        {"frames", truth.size()},
+        {"valid_frames", track.valid},
+        {"time_ms", median(track.step_ms)},
+        {"stereo_time_ms", median(track.stereo_ms)},
+        {"baseline",
+         {{"name", "standing still"}, {"drift_pct", still.drift_pct}, {"deg_per_frame", still.deg_per_frame}}}};
     if (options.json) {
       std::printf("%s\n", out.dump(2).c_str());
     } else {
       std::printf("%-18s %10s %14s %14s %9s\n", "method", "drift %", "deg per frame", "m per frame", "time ms");
-      std::printf("%-18s %10.2f %14.4f %14.4f %9.2f\n", "takt ego_motion", q.drift_pct, q.deg_per_frame, q.metres_per_frame, median(track.step_ms));
-      std::printf("%-18s %10.2f %14.4f %14.4f %9s\n", "standing still", still.drift_pct, still.deg_per_frame, still.metres_per_frame, "-");
-      std::printf("path %.1f m, %zu frames, %d with a valid motion; stereo %.2f ms a frame\n", q.path_m, truth.size(), track.valid, median(track.stereo_ms));
+      std::printf("%-18s %10.2f %14.4f %14.4f %9.2f\n", "takt ego_motion", q.drift_pct, q.deg_per_frame,
+                  q.metres_per_frame, median(track.step_ms));
+      std::printf("%-18s %10.2f %14.4f %14.4f %9s\n", "standing still", still.drift_pct, still.deg_per_frame,
+                  still.metres_per_frame, "-");
+      std::printf("path %.1f m, %zu frames, %d with a valid motion; stereo %.2f ms a frame\n", q.path_m, truth.size(),
+                  track.valid, median(track.stereo_ms));
     }
     return kOk;
   } catch (const std::exception& error) {

@@ -39,7 +39,8 @@ stereo::DisparityImage read_truth(const std::filesystem::path& file, double scal
   const cv::Mat truth = read(file, cv::IMREAD_ANYDEPTH | cv::IMREAD_GRAYSCALE);
   if (truth.depth() == CV_16U)
     return stereo::ground_truth(ImageView<const uint16_t>{truth.ptr<uint16_t>(), truth.cols, truth.rows, 1,
-                                                          static_cast<ptrdiff_t>(truth.step1())}, scale);
+                                                          static_cast<ptrdiff_t>(truth.step1())},
+                                scale);
   return stereo::ground_truth(view(truth), scale);
 }
 
@@ -77,8 +78,10 @@ stereo::MatcherParameters parameters(const EvalStereoOptions& options) {
 }
 
 Json row(const stereo::StereoScore& score, double time_ms) {
-  return {{"bad_1px_pct", score.bad_1px_pct}, {"bad_1px_all_pct", score.bad_1px_all_pct},
-          {"density_pct", score.density_pct}, {"time_ms", time_ms}};
+  return {{"bad_1px_pct", score.bad_1px_pct},
+          {"bad_1px_all_pct", score.bad_1px_all_pct},
+          {"density_pct", score.density_pct},
+          {"time_ms", time_ms}};
 }
 
 double median(std::vector<double> v) {
@@ -86,7 +89,8 @@ double median(std::vector<double> v) {
   return v[v.size() / 2];
 }
 
-Json run_ours(const cv::Mat& left, const cv::Mat& right, const stereo::DisparityImage& truth, const stereo::MatcherParameters& p) {
+Json run_ours(const cv::Mat& left, const cv::Mat& right, const stereo::DisparityImage& truth,
+              const stereo::MatcherParameters& p) {
   stereo::Matcher matcher(left.cols, left.rows, left.channels(), p);
   cv::Mat disparity(left.size(), CV_16S), confidence(left.size(), CV_8U);
   const ImageView<int16_t> d{disparity.ptr<int16_t>(), left.cols, left.rows};
@@ -100,7 +104,8 @@ Json run_ours(const cv::Mat& left, const cv::Mat& right, const stereo::Disparity
   return row(stereo::score(stereo::to_disparity_image(d), truth), median(times));
 }
 
-Json run_peer(stereo::Peer peer, const cv::Mat& left, const cv::Mat& right, const stereo::DisparityImage& truth, int disparities) {
+Json run_peer(stereo::Peer peer, const cv::Mat& left, const cv::Mat& right, const stereo::DisparityImage& truth,
+              int disparities) {
   std::vector<double> times(kRepeats);
   stereo::DisparityImage result;
   for (double& time : times) result = stereo::run_peer(peer, view(left), view(right), disparities, &time);
@@ -108,8 +113,8 @@ Json run_peer(stereo::Peer peer, const cv::Mat& left, const cv::Mat& right, cons
 }
 
 void print_row(const char* name, const Json& r) {
-  std::printf("%-34s %9.2f %9.2f %10.1f %9.2f\n", name, r["bad_1px_pct"].get<double>(), r["bad_1px_all_pct"].get<double>(),
-              r["density_pct"].get<double>(), r["time_ms"].get<double>());
+  std::printf("%-34s %9.2f %9.2f %10.1f %9.2f\n", name, r["bad_1px_pct"].get<double>(),
+              r["bad_1px_all_pct"].get<double>(), r["density_pct"].get<double>(), r["time_ms"].get<double>());
 }
 
 Json measure(const EvalStereoOptions& options) {
@@ -118,14 +123,16 @@ Json measure(const EvalStereoOptions& options) {
     throw BadData(fmt::format("{} and {} differ in size", options.left.string(), options.right.string()));
   const stereo::DisparityImage truth = read_truth(options.truth, options.truth_scale);
   if (truth.width != left.cols || truth.height != left.rows)
-    throw BadData(fmt::format("{}: {} x {}, the images are {} x {}", options.truth.string(), truth.width, truth.height, left.cols, left.rows));
+    throw BadData(fmt::format("{}: {} x {}, the images are {} x {}", options.truth.string(), truth.width, truth.height,
+                              left.cols, left.rows));
   const stereo::MatcherParameters p = parameters(options);
   Json out = run_ours(left, right, truth, p);
   stereo::DisparityImage middle = truth;
   std::fill(middle.pixels.begin(), middle.pixels.end(), static_cast<float>(p.disparities) / 2);
   out["baseline"] = row(stereo::score(middle, truth), 0);
   out["baseline"]["name"] = "half the search range everywhere";
-  for (const auto peer : {stereo::Peer::block_matching, stereo::Peer::block_matching_unfiltered, stereo::Peer::semi_global})
+  for (const auto peer :
+       {stereo::Peer::block_matching, stereo::Peer::block_matching_unfiltered, stereo::Peer::semi_global})
     out["peers"][stereo::to_string(peer)] = run_peer(peer, left, right, truth, p.disparities);
   return out;
 }

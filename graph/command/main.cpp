@@ -36,7 +36,8 @@ void add_load_options(CLI::App& app, takt::command::RunOptions& o) {
 void add_run(CLI::App& app, takt::command::RunOptions& o, int& exit_code) {
   CLI::App* run = app.add_subcommand("run", "runs a graph and reports what happened");
   add_load_options(*run, o);
-  run->add_option("--for", o.duration_s, "how long, e.g. 20s; 0s: until stopped")->transform(CLI::Validator(duration, "DURATION"));
+  run->add_option("--for", o.duration_s, "how long, e.g. 20s; 0s: until stopped")
+      ->transform(CLI::Validator(duration, "DURATION"));
   run->add_option("--clock", o.clock, "real | virtual")->check(CLI::IsMember({"real", "virtual"}));
   run->add_option("--transport", o.transport, "local | iceoryx")->check(CLI::IsMember({"local", "iceoryx"}));
   run->add_option("--isolate", o.isolate, "none (one process)")->check(CLI::IsMember({"none"}));

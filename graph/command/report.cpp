@@ -14,7 +14,9 @@ using Json = nlohmann::ordered_json;
 constexpr uint64_t kSamplesForP999 = 1000;
 
 Json distribution(const Histogram& h, double ns_per_unit) {
-  const auto figure = [&](int64_t ns) { return h.count() ? Json(static_cast<double>(ns) / ns_per_unit) : Json(nullptr); };
+  const auto figure = [&](int64_t ns) {
+    return h.count() ? Json(static_cast<double>(ns) / ns_per_unit) : Json(nullptr);
+  };
   return {{"p50", figure(h.quantile_ns(0.5))},
           {"p99", figure(h.quantile_ns(0.99))},
           {"p999", h.count() >= kSamplesForP999 ? figure(h.quantile_ns(0.999)) : Json(nullptr)},
@@ -22,8 +24,12 @@ Json distribution(const Histogram& h, double ns_per_unit) {
 }
 
 Json grant_json(const Grant& grant) {
-  return {{"policy", to_string(grant.policy)}, {"runtime_ms", grant.runtime_ms}, {"deadline_ms", grant.deadline_ms},
-          {"priority", grant.priority},        {"cpus", grant.cpus},             {"verified", grant.verified}};
+  return {{"policy", to_string(grant.policy)},
+          {"runtime_ms", grant.runtime_ms},
+          {"deadline_ms", grant.deadline_ms},
+          {"priority", grant.priority},
+          {"cpus", grant.cpus},
+          {"verified", grant.verified}};
 }
 
 Json node_json(const RunFacts& facts, size_t t) {
@@ -38,9 +44,14 @@ Json node_json(const RunFacts& facts, size_t t) {
   node["device"] = plan.device;
   node["released"] = facts.result.released[t];
   for (const auto& [key, counter] : std::initializer_list<std::pair<const char*, const std::atomic<uint64_t>*>>{
-           {"completed", &s.completed}, {"skipped", &s.skipped}, {"reused", &s.reused},
-           {"deadline_misses", &s.deadline_misses}, {"budget_overruns", &s.budget_overruns},
-           {"stale_inputs", &s.stale_inputs}, {"new_inputs", &s.new_inputs}, {"no_result", &s.no_result}})
+           {"completed", &s.completed},
+           {"skipped", &s.skipped},
+           {"reused", &s.reused},
+           {"deadline_misses", &s.deadline_misses},
+           {"budget_overruns", &s.budget_overruns},
+           {"stale_inputs", &s.stale_inputs},
+           {"new_inputs", &s.new_inputs},
+           {"no_result", &s.no_result}})
     node[key] = counter->load();
   node["drift_us"] = s.drift_us();
   node["quality"] = {{"0", s.exec.count()}};
@@ -91,32 +102,40 @@ Json pools_json(const RunFacts& facts) {
   for (size_t p = 0; p < facts.composition.plan.ports.size(); ++p) {
     const PortPlan& port = facts.composition.plan.ports[p];
     const WriterStatistics s = writer_of(facts.executor, p)->statistics();
-    pools.push_back({{"port", port.node + "." + port.port}, {"bytes", port.chunk_bytes()}, {"chunks", s.chunks},
-                     {"peak", s.peak_in_use}, {"in_use_at_end", s.in_use}, {"exhausted", s.pool_empty}});
+    pools.push_back({{"port", port.node + "." + port.port},
+                     {"bytes", port.chunk_bytes()},
+                     {"chunks", s.chunks},
+                     {"peak", s.peak_in_use},
+                     {"in_use_at_end", s.in_use},
+                     {"exhausted", s.pool_empty}});
   }
   return pools;
 }
 
 Json cpu_json(const RunFacts& facts) {
   int64_t nodes = 0, devices = 0;
-  for (const auto& task : facts.executor.tasks())
-    (task->plan().device ? devices : nodes) += task->statistics().cpu_ns;
+  for (const auto& task : facts.executor.tasks()) (task->plan().device ? devices : nodes) += task->statistics().cpu_ns;
   const double total = static_cast<double>(facts.after.cpu_ns - facts.before.cpu_ns);
   const double wall = std::max(1.0, facts.result.duration_s() * 1e9);
   const auto share = [&](double ns) { return ns / wall; };
   const auto simulator = static_cast<double>(facts.simulator_cpu_ns);
   const double runtime = std::max(0.0, total - static_cast<double>(nodes + devices) - simulator);
   return {{"utilisation", share(total)},
-          {"by", {{"nodes", share(static_cast<double>(nodes))}, {"devices", share(static_cast<double>(devices))},
-                  {"simulator", share(simulator)}, {"runtime", share(runtime)}}}};
+          {"by",
+           {{"nodes", share(static_cast<double>(nodes))},
+            {"devices", share(static_cast<double>(devices))},
+            {"simulator", share(simulator)},
+            {"runtime", share(runtime)}}}};
 }
 
 /// Age at the end of a chain: that of the message on its last edge, taken when the last node publishes.
 Json chains_json(const RunFacts& facts) {
   Json chains = Json::array();
   for (const graph::ChainSpec& chain : facts.graph.chains) {
-    Json entry = {{"name", chain.name}, {"age_ms", distribution(Histogram(), 1e6)},
-                  {"bound_ms", static_cast<double>(chain.max_age_ns) / 1e6}, {"within", nullptr}};
+    Json entry = {{"name", chain.name},
+                  {"age_ms", distribution(Histogram(), 1e6)},
+                  {"bound_ms", static_cast<double>(chain.max_age_ns) / 1e6},
+                  {"within", nullptr}};
     for (const auto& task : facts.executor.tasks()) {
       if (task->plan().name != chain.to.node) continue;
       const Histogram& age = task->statistics().output_age;
@@ -131,8 +150,8 @@ Json chains_json(const RunFacts& facts) {
 bool kept_its_promises(const Json& nodes) {
   return std::all_of(nodes.begin(), nodes.end(), [](const Json& node) {
     const bool missed = node["criticality"] == "high" && node["deadline_misses"].get<uint64_t>() > 0;
-    const bool fell_behind = !node["rate_hz"].is_null() &&
-                             node["completed"].get<uint64_t>() + 1 < node["released"].get<uint64_t>();
+    const bool fell_behind =
+        !node["rate_hz"].is_null() && node["completed"].get<uint64_t>() + 1 < node["released"].get<uint64_t>();
     return !missed && !fell_behind;
   });
 }

@@ -10,8 +10,8 @@
 
 #include "graph/check/check.hpp"
 #include "graph/command/live_table.hpp"
-#include "graph/command/report.hpp"
 #include "graph/command/prepare.hpp"
+#include "graph/command/report.hpp"
 #include "rt/memory/process_memory.hpp"
 
 namespace takt::command {
@@ -40,7 +40,8 @@ class StopOnSignal {
   }
 
  private:
-  struct sigaction old_int_ {}, old_term_ {};
+  struct sigaction old_int_ {
+  }, old_term_{};
 };
 
 std::unique_ptr<Transport> make_transport(const std::string& name, const Plan& plan) {
@@ -95,7 +96,9 @@ std::vector<std::string> prepare_machine(const CpuLatencyHold& latency) {
 int run_graph(const RunOptions& options) {
   std::error_code error;
   std::filesystem::create_directories(options.output, error);
-  if (error) return refuse(fmt::format("--output {}: {}; choose a writable folder", options.output.string(), error.message()), kBadInput);
+  if (error)
+    return refuse(fmt::format("--output {}: {}; choose a writable folder", options.output.string(), error.message()),
+                  kBadInput);
   Prepared prepared;
   try {
     if (const int code = prepare(options, prepared); code != kOk) return code;

@@ -25,29 +25,34 @@ std::string node_line(const Json& node) {
 }  // namespace
 
 std::string summary_text(const Json& report) {
-  std::string text = fmt::format(
-      "\n{} on {} ({} profile, {} clock): {:.1f} s, policy {} granted (asked {}), transport {}\n", report["graph"].get<std::string>(),
-      report["schedule"].get<std::string>(), report["profile"].get<std::string>(), report["clock"].get<std::string>(),
-      report["duration_s"].get<double>(), report["policy_granted"].get<std::string>(),
-      report["policy_asked"].get<std::string>(), report["transport"].get<std::string>());
+  std::string text =
+      fmt::format("\n{} on {} ({} profile, {} clock): {:.1f} s, policy {} granted (asked {}), transport {}\n",
+                  report["graph"].get<std::string>(), report["schedule"].get<std::string>(),
+                  report["profile"].get<std::string>(), report["clock"].get<std::string>(),
+                  report["duration_s"].get<double>(), report["policy_granted"].get<std::string>(),
+                  report["policy_asked"].get<std::string>(), report["transport"].get<std::string>());
   text += fmt::format("  {:<13} {:>5} {:>8} {:>9} {:>6} {:>7} {:>5}  {:>8} {:>8} {:>8}  {:>8} {:>8}\n", "node", "Hz",
-                      "released", "completed", "missed", "skipped", "stale", "exec p50", "p99 ms", "resp p99", "late p50",
-                      "p99 us");
+                      "released", "completed", "missed", "skipped", "stale", "exec p50", "p99 ms", "resp p99",
+                      "late p50", "p99 us");
   for (const Json& node : report["nodes"]) text += node_line(node);
   for (const Json& chain : report["chains"])
     text += fmt::format("  chain {}: age p50 {} ms, max {} ms, bound {} ms: {}\n", chain["name"].get<std::string>(),
                         figure(chain["age_ms"]["p50"], "{:.1f}"), figure(chain["age_ms"]["max"], "{:.1f}"),
                         figure(chain["bound_ms"], "{:.0f}"),
-                        chain["within"].is_null() ? "no sample" : chain["within"].get<bool>() ? "within" : "EXCEEDED");
+                        chain["within"].is_null()     ? "no sample"
+                        : chain["within"].get<bool>() ? "within"
+                                                      : "EXCEEDED");
   const Json& by = report["cpu"]["by"];
   text += fmt::format(
-      "  CPU {:.2f} cores: nodes {:.2f}, devices {:.2f}, simulator {:.2f}, runtime {:.2f}; memory {:.0f} MB shared, {:.0f} MB "
+      "  CPU {:.2f} cores: nodes {:.2f}, devices {:.2f}, simulator {:.2f}, runtime {:.2f}; memory {:.0f} MB shared, "
+      "{:.0f} MB "
       "resident; host stall {} ms\n",
       report["cpu"]["utilisation"].get<double>(), by["nodes"].get<double>(), by["devices"].get<double>(),
       by["simulator"].get<double>(), by["runtime"].get<double>(), report["memory"]["shm_mb"].get<double>(),
       report["memory"]["rss_mb"].get<double>(), report["host_stall_ms"].get<int64_t>());
   for (const Json& line : report["adjusted"]) text += "  adjusted: " + line.get<std::string>() + "\n";
-  text += report["ok"].get<bool>() ? "  ok\n" : "  NOT OK: a high-criticality deadline was missed or a node fell behind\n";
+  text +=
+      report["ok"].get<bool>() ? "  ok\n" : "  NOT OK: a high-criticality deadline was missed or a node fell behind\n";
   return text;
 }
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Ports, message types, layers, hierarchy and joins.
-#include <algorithm>
-
 #include <fmt/format.h>
+
+#include <algorithm>
 
 #include "graph/language/loader.hpp"
 
@@ -104,17 +104,17 @@ void Loader::check_edge(const std::string& id, const Part& to, const EdgeSpec& e
   }
   const auto producer = parts_.find(edge.from.node);
   if (producer == parts_.end())
-    return problem(edge.position, fmt::format("input {} reads {}, but there is no node or device {}{}", what,
-                                              ticked(edge.from.text()), ticked(edge.from.node),
-                                              alternatives(edge.from.node, ids())));
+    return problem(edge.position,
+                   fmt::format("input {} reads {}, but there is no node or device {}{}", what, ticked(edge.from.text()),
+                               ticked(edge.from.node), alternatives(edge.from.node, ids())));
   const Part& from = producer->second;
   if (!from.known) return;
   const PortInfo* output = from.output(edge.from.port);
   if (output == nullptr)
-    return problem(edge.position,
-                   fmt::format("input {} reads {}, but {} has no output {}{}", what, ticked(edge.from.text()),
-                               ticked(edge.from.node), ticked(edge.from.port),
-                               alternatives(edge.from.port, from.output_names(), "outputs of " + ticked(edge.from.node))));
+    return problem(edge.position, fmt::format("input {} reads {}, but {} has no output {}{}", what,
+                                              ticked(edge.from.text()), ticked(edge.from.node), ticked(edge.from.port),
+                                              alternatives(edge.from.port, from.output_names(),
+                                                           "outputs of " + ticked(edge.from.node))));
   if (input != nullptr && input->type->name != output->type->name)
     problem(edge.position, fmt::format("type mismatch: {} gives {}, but input {} takes {}", ticked(edge.from.text()),
                                        ticked(output->type->name), what, ticked(input->type->name)));
@@ -134,10 +134,11 @@ void Loader::check_layer_and_hierarchy(const std::string& id, const Part& from, 
   if (std::find(subsystem->exports.begin(), subsystem->exports.end(), edge.from) != subsystem->exports.end()) return;
   std::vector<std::string> exported;
   for (const auto& port : subsystem->exports) exported.push_back(port.text());
-  problem(edge.position, fmt::format("edge against the hierarchy: {} leaves subsystem {}, which does not export it; add "
-                                     "it to `exports` of {} (exported: {})",
-                                     ticked(edge.from.text()), ticked(from.subsystem), ticked(from.subsystem),
-                                     exported.empty() ? "nothing" : join_words(exported)));
+  problem(edge.position,
+          fmt::format("edge against the hierarchy: {} leaves subsystem {}, which does not export it; add "
+                      "it to `exports` of {} (exported: {})",
+                      ticked(edge.from.text()), ticked(from.subsystem), ticked(from.subsystem),
+                      exported.empty() ? "nothing" : join_words(exported)));
 }
 
 void Loader::check_exports() {
@@ -175,10 +176,10 @@ void Loader::check_unconnected(const std::string& id, const Part& part) {
     for (const auto& [other, from] : parts_)
       for (const auto& output : from.outputs)
         if (other != id && output.type->name == input.type->name) sources.push_back(other + "." + output.name);
-    problem(part.position, fmt::format("input {} of node {} is not connected; it takes {}, which {}", ticked(input.name),
-                                       ticked(id), ticked(input.type->name),
-                                       sources.empty() ? "nothing in this graph gives"
-                                                       : "these give: " + join_words(sources)));
+    problem(part.position,
+            fmt::format("input {} of node {} is not connected; it takes {}, which {}", ticked(input.name), ticked(id),
+                        ticked(input.type->name),
+                        sources.empty() ? "nothing in this graph gives" : "these give: " + join_words(sources)));
   }
 }
 
@@ -190,14 +191,16 @@ void Loader::check_joins() {
     std::set<std::string> joined;
     for (const auto& group : node.joins) {
       if (group.size() < 2)
-        problem(graph_.value_at(pointer), fmt::format("`join` of node {} names one input; a join takes at least two", ticked(node.id)));
+        problem(graph_.value_at(pointer),
+                fmt::format("`join` of node {} names one input; a join takes at least two", ticked(node.id)));
       for (const auto& name : group) {
         const Position at = item_at(pointer, name);
-        const bool connected = std::any_of(node.edges.begin(), node.edges.end(),
-                                           [&](const EdgeSpec& edge) { return edge.input == name; });
+        const bool connected =
+            std::any_of(node.edges.begin(), node.edges.end(), [&](const EdgeSpec& edge) { return edge.input == name; });
         if (part.input(name) == nullptr)
-          problem(at, fmt::format("`join` of node {} names {}, which is no input of it{}", ticked(node.id),
-                                  ticked(name), alternatives(name, part.input_names(), "inputs of " + ticked(node.id))));
+          problem(at,
+                  fmt::format("`join` of node {} names {}, which is no input of it{}", ticked(node.id), ticked(name),
+                              alternatives(name, part.input_names(), "inputs of " + ticked(node.id))));
         else if (!connected)
           problem(at, fmt::format("`join` of node {} names {}, which is not connected", ticked(node.id), ticked(name)));
         if (!joined.insert(name).second)

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // What spans more than one edge: chains and modes.
-#include <algorithm>
-
 #include <fmt/format.h>
+
+#include <algorithm>
 
 #include "graph/language/loader.hpp"
 
@@ -27,9 +27,10 @@ void Loader::check_chains() {
       if (!part->second.known || part->second.output(port->port) != nullptr ||
           (end && part->second.input(port->port) != nullptr))
         continue;
-      problem(at, fmt::format("{} of chain {} is {}, but {} has no {} {}{}", ticked(key), ticked(chain.name),
-                              ticked(port->text()), ticked(port->node), end ? "port" : "output", ticked(port->port),
-                              alternatives(port->port, part->second.output_names(), "outputs of " + ticked(port->node))));
+      problem(at,
+              fmt::format("{} of chain {} is {}, but {} has no {} {}{}", ticked(key), ticked(chain.name),
+                          ticked(port->text()), ticked(port->node), end ? "port" : "output", ticked(port->port),
+                          alternatives(port->port, part->second.output_names(), "outputs of " + ticked(port->node))));
     }
     if (!known || problems_.size() > before) continue;
     // Parts that data of `from` reach, edge by edge; if `to` is an input, the last edge must be the one into it.
@@ -45,7 +46,8 @@ void Loader::check_chains() {
         }
     }
     // A broken edge may be the missing one.
-    if (ends || std::any_of(parts_.begin(), parts_.end(), [](const auto& item) { return !item.second.sound; })) continue;
+    if (ends || std::any_of(parts_.begin(), parts_.end(), [](const auto& item) { return !item.second.sound; }))
+      continue;
     problem(chain.position,
             fmt::format("chain {}: no path of edges leads from {} to {}; from {} edges lead to: {}", ticked(chain.name),
                         ticked(chain.from.text()), ticked(chain.to.text()), ticked(chain.from.text()),
@@ -59,9 +61,8 @@ void Loader::check_modes() {
   std::vector<std::string> names{"full"};
   for (const auto& mode : spec_.modes) names.push_back(mode.name);
   if (std::find(names.begin(), names.end(), options_.mode) == names.end())
-    return problem({"--mode", 0, 0},
-                   fmt::format("graph {} has no mode {}{}", ticked(spec_.name), ticked(options_.mode),
-                               alternatives(options_.mode, names, "modes")));
+    return problem({"--mode", 0, 0}, fmt::format("graph {} has no mode {}{}", ticked(spec_.name), ticked(options_.mode),
+                                                 alternatives(options_.mode, names, "modes")));
   spec_.mode = options_.mode;
 }
 
@@ -71,8 +72,8 @@ void Loader::check_mode(const ModeSpec& mode) {
   const size_t before = problems_.size();
   for (const auto& id : mode.without) {
     if (!parts_.contains(id))
-      problem(item_at(pointer, id), fmt::format("mode {} is without {}, which is no node or device{}", ticked(mode.name),
-                                                ticked(id), alternatives(id, ids())));
+      problem(item_at(pointer, id), fmt::format("mode {} is without {}, which is no node or device{}",
+                                                ticked(mode.name), ticked(id), alternatives(id, ids())));
     else if (!without.insert(id).second)
       problem(item_at(pointer, id), fmt::format("mode {} names {} twice", ticked(mode.name), ticked(id)));
   }
@@ -89,7 +90,8 @@ void Loader::check_mode(const ModeSpec& mode) {
                                          ticked(id), ticked(edge.from.node)));
     }
     const auto entry = spec_.schedule.entries.find(id);
-    if (entry == spec_.schedule.entries.end() || !entry->second.on || !without.contains(entry->second.on->node)) continue;
+    if (entry == spec_.schedule.entries.end() || !entry->second.on || !without.contains(entry->second.on->node))
+      continue;
     problem(mode.position,
             fmt::format("mode {} is without {}, whose output {} releases {}; add {} to `without`, or give it a rate",
                         ticked(mode.name), ticked(entry->second.on->node), ticked(entry->second.on->text()), ticked(id),

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "graph/language/document.hpp"
 
+#include <yaml-cpp/eventhandler.h>
+#include <yaml-cpp/yaml.h>
+
 #include <algorithm>
 #include <fstream>
 #include <iterator>
 #include <sstream>
-
-#include <yaml-cpp/eventhandler.h>
-#include <yaml-cpp/yaml.h>
 
 #include "graph/language/words.hpp"
 
@@ -37,8 +37,8 @@ class Builder final : public YAML::EventHandler {
     const Position at = position(mark);
     if (!check_tag(at, tag)) return scalar(at, json(), value, false);
     if (value.size() > kLongestScalar) {
-      problem(at, "text of " + std::to_string(value.size()) + " characters; at most " +
-                      std::to_string(kLongestScalar) + " are allowed");
+      problem(at, "text of " + std::to_string(value.size()) + " characters; at most " + std::to_string(kLongestScalar) +
+                      " are allowed");
       return scalar(at, json(), "", false);
     }
     if (at_key()) return scalar(at, json(value), value);
@@ -107,8 +107,7 @@ class Builder final : public YAML::EventHandler {
     level.key_lost = true;
     if (!value.is_string()) return problem(at, "a key must be a word");
     level.key = value.get<std::string>();
-    if (level.key == "<<")
-      return problem(at, "merge keys (<<) are not part of the graph language; write the keys out");
+    if (level.key == "<<") return problem(at, "merge keys (<<) are not part of the graph language; write the keys out");
     const auto first = document_.marks.find(child(level.pointer, level.key));
     if (level.value.contains(level.key) || seen(level, level.key)) {
       const std::string where =
@@ -196,7 +195,11 @@ std::optional<Position> bad_byte(std::string_view text, const std::string& name)
   for (size_t i = 0; i < text.size();) {
     const auto byte = [&](size_t k) { return static_cast<unsigned char>(i + k < text.size() ? text[i + k] : '\0'); };
     const unsigned char c = byte(0);
-    const size_t length = c < 0x80 ? 1 : c >= 0xC2 && c < 0xE0 ? 2 : c >= 0xE0 && c < 0xF0 ? 3 : c >= 0xF0 && c < 0xF5 ? 4 : 0;
+    const size_t length = c < 0x80                ? 1
+                          : c >= 0xC2 && c < 0xE0 ? 2
+                          : c >= 0xE0 && c < 0xF0 ? 3
+                          : c >= 0xF0 && c < 0xF5 ? 4
+                                                  : 0;
     bool bad = length == 0 || c == 0x7F || (c < 0x20 && c != '\n' && c != '\t' && c != '\r');
     for (size_t k = 1; k < length; ++k) bad = bad || (byte(k) & 0xC0) != 0x80;
     // Overlong forms, surrogates and what lies beyond Unicode.
@@ -271,8 +274,7 @@ Document parse_document(std::string_view text, const std::string& name, const st
         add(problems, rest.value_at(""), "a second YAML document (---); one file holds one graph or schedule");
     }
   } catch (const YAML::Exception& error) {
-    const Position at = error.mark.is_null() ? start
-                                             : Position{name, error.mark.line + 1, error.mark.column + 1};
+    const Position at = error.mark.is_null() ? start : Position{name, error.mark.line + 1, error.mark.column + 1};
     add(problems, at, "no valid YAML: " + error.msg);
     document.root = json();
   } catch (const std::exception& error) {

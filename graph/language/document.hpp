@@ -17,9 +17,9 @@ namespace takt::graph {
 
 /// Where one value stands and how it was written.
 struct Mark {
-  Position key;          ///< of its key; of the value itself for list items and the root
+  Position key;  ///< of its key; of the value itself for list items and the root
   Position value;
-  std::string raw;       ///< a scalar as it stands in the file, before ${TAKT_DATA} is expanded
+  std::string raw;  ///< a scalar as it stands in the file, before ${TAKT_DATA} is expanded
 };
 
 class Document {

@@ -128,11 +128,11 @@ struct GraphSpec {
 
 /// What the command line adds to the files.
 struct LoadOptions {
-  std::string profile;                        ///< "": the graph's default_profile, else sim
+  std::string profile;  ///< "": the graph's default_profile, else sim
   std::optional<std::filesystem::path> schedule;
-  std::string policy;                         ///< "": the schedule's
+  std::string policy;  ///< "": the schedule's
   std::string mode = "full";
-  std::vector<std::string> set;               ///< "node.param=value"
+  std::vector<std::string> set;  ///< "node.param=value"
 };
 
 }  // namespace takt::graph
@@ -148,8 +148,8 @@ struct Loaded {
   std::vector<Problem> problems;
 };
 
-/// Reads the graph and its schedule, checks all of it (syntax, schema, ids, types, units, ranges, hierarchy, cycles) and
-/// returns every problem, not just the first. Never throws.
+/// Reads the graph and its schedule, checks all of it (syntax, schema, ids, types, units, ranges, hierarchy, cycles)
+/// and returns every problem, not just the first. Never throws.
 Loaded load(const std::filesystem::path& file, const LoadOptions& options, const NodeTypes& types);
 
 }  // namespace takt::graph

@@ -79,7 +79,8 @@ DeviceCatalogue hal_catalogue() {
     kind.name = info.name;
     kind.doc = info.doc;
     kind.ports = ports_of(info.name);
-    for (const auto& driver : info.drivers) kind.drivers.push_back({std::string(driver.name), std::string(driver.doc), {}});
+    for (const auto& driver : info.drivers)
+      kind.drivers.push_back({std::string(driver.name), std::string(driver.doc), {}});
     for (const auto& setting : info.settings) {
       if (setting.driver.empty()) add(kind.settings, setting);
       for (auto& driver : kind.drivers)

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "graph/language/quantity.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
 #include <optional>
-
-#include <fmt/format.h>
 
 #include "graph/language/words.hpp"
 
@@ -22,13 +22,23 @@ struct Unit {
 };
 
 constexpr double kDegree = std::numbers::pi / 180;
-constexpr std::array kUnits{
-    Unit{"m", "m", 1, 1, 1},          Unit{"cm", "m", 1, 100, 1},           Unit{"mm", "m", 1, 1000, 1},
-    Unit{"km", "m", 1000, 1, 1},      Unit{"s", "s", 1, 1, 1},              Unit{"ms", "s", 1, 1000, 1},
-    Unit{"us", "s", 1, 1'000'000, 1}, Unit{"ns", "s", 1, 1'000'000'000, 1}, Unit{"rad", "rad", 1, 1, 1},
-    Unit{"deg", "rad", 1, 1, kDegree}, Unit{"m/s", "m/s", 1, 1, 1},         Unit{"cm/s", "m/s", 1, 100, 1},
-    Unit{"mm/s", "m/s", 1, 1000, 1},  Unit{"rad/s", "rad/s", 1, 1, 1},      Unit{"deg/s", "rad/s", 1, 1, kDegree},
-    Unit{"Hz", "Hz", 1, 1, 1},        Unit{"kHz", "Hz", 1000, 1, 1}};
+constexpr std::array kUnits{Unit{"m", "m", 1, 1, 1},
+                            Unit{"cm", "m", 1, 100, 1},
+                            Unit{"mm", "m", 1, 1000, 1},
+                            Unit{"km", "m", 1000, 1, 1},
+                            Unit{"s", "s", 1, 1, 1},
+                            Unit{"ms", "s", 1, 1000, 1},
+                            Unit{"us", "s", 1, 1'000'000, 1},
+                            Unit{"ns", "s", 1, 1'000'000'000, 1},
+                            Unit{"rad", "rad", 1, 1, 1},
+                            Unit{"deg", "rad", 1, 1, kDegree},
+                            Unit{"m/s", "m/s", 1, 1, 1},
+                            Unit{"cm/s", "m/s", 1, 100, 1},
+                            Unit{"mm/s", "m/s", 1, 1000, 1},
+                            Unit{"rad/s", "rad/s", 1, 1, 1},
+                            Unit{"deg/s", "rad/s", 1, 1, kDegree},
+                            Unit{"Hz", "Hz", 1, 1, 1},
+                            Unit{"kHz", "Hz", 1000, 1, 1}};
 
 const Unit* find_unit(std::string_view word) {
   const auto it = std::find_if(kUnits.begin(), kUnits.end(), [&](const Unit& u) { return u.word == word; });
@@ -159,8 +169,8 @@ tl::expected<int64_t, std::string> parse_duration_ns(std::string_view text) {
     return tl::make_unexpected(fmt::format("is {0} without a unit; write {0}ms (units: s | ms | us | ns)", trim(text)));
   const Unit* unit = find_unit(q->unit);
   if (unit == nullptr || unit->dimension != "s")
-    return tl::make_unexpected(fmt::format("is `{}`, but {} is no unit of time (units: s | ms | us | ns)", trim(text),
-                                           ticked(q->unit)));
+    return tl::make_unexpected(
+        fmt::format("is `{}`, but {} is no unit of time (units: s | ms | us | ns)", trim(text), ticked(q->unit)));
   const Wide scale = 1'000'000'000 / unit->denominator;
   if (std::abs(q->value()) * static_cast<double>(scale) > 1e17)
     return tl::make_unexpected("is `" + trim(text) + "`, longer than three years");

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Devices: what the graph's entry, the profile and --set say together, checked against the driver's settings.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
-
-#include <fmt/format.h>
 
 #include "graph/language/loader.hpp"
 #include "graph/language/quantity.hpp"
@@ -42,8 +42,8 @@ tl::expected<json, std::string> convert(const DeviceSetting& setting, const Give
   const auto is_not = [&](const char* wanted) {
     return tl::make_unexpected(fmt::format("is `{}`, {} is wanted", given.raw, wanted));
   };
-  if (setting.kind == Kind::flag) return given.value.is_boolean() ? tl::expected<json, std::string>(given.value)
-                                                                  : is_not("true or false");
+  if (setting.kind == Kind::flag)
+    return given.value.is_boolean() ? tl::expected<json, std::string>(given.value) : is_not("true or false");
   if (setting.kind == Kind::number || setting.kind == Kind::integer) {
     if (given.value.is_boolean()) return is_not("a number");
     const auto number = parse_in_unit(given.raw, setting.unit);
@@ -51,14 +51,15 @@ tl::expected<json, std::string> convert(const DeviceSetting& setting, const Give
     if (setting.kind == Kind::integer && (*number != std::round(*number) || std::abs(*number) > 9e15))
       return is_not("an integer");
     if ((setting.low && *number < *setting.low) || (setting.high && *number > *setting.high))
-      return tl::make_unexpected(fmt::format(
-          "is {}, must lie in {}..{} {}", given.raw, setting.low ? fmt::format("{}", *setting.low) : "",
-          setting.high ? fmt::format("{}", *setting.high) : "", setting.unit));
+      return tl::make_unexpected(fmt::format("is {}, must lie in {}..{} {}", given.raw,
+                                             setting.low ? fmt::format("{}", *setting.low) : "",
+                                             setting.high ? fmt::format("{}", *setting.high) : "", setting.unit));
     return setting.kind == Kind::integer ? json(static_cast<int64_t>(*number)) : json(*number);
   }
   if (!given.value.is_string()) return is_not("a text (put it in quotes)");
   const auto text = given.value.get<std::string>();
-  if (setting.kind == Kind::choice && std::find(setting.words.begin(), setting.words.end(), text) == setting.words.end())
+  if (setting.kind == Kind::choice &&
+      std::find(setting.words.begin(), setting.words.end(), text) == setting.words.end())
     return tl::make_unexpected("is " + ticked(text) + alternatives(text, setting.words));
   if (setting.kind != Kind::path) return json(text);
   if (text.empty()) return is_not("a path");
@@ -138,9 +139,10 @@ std::map<std::string, Given> Loader::merge_settings(const DeviceSpec& device) {
       one.from_default = from_default;
       if (value.is_null() || value.is_array()) {
         if (!graph_.broken.contains(at))
-          problem(one.position, fmt::format("setting {} of device {} is {}; wanted: a number, a text, a truth value or a "
-                                            "map of them",
-                                            ticked(name), ticked(device.id), value.is_null() ? "empty" : "a list"));
+          problem(one.position,
+                  fmt::format("setting {} of device {} is {}; wanted: a number, a text, a truth value or a "
+                              "map of them",
+                              ticked(name), ticked(device.id), value.is_null() ? "empty" : "a list"));
         return;
       }
       merged[name] = std::move(one);
@@ -156,8 +158,7 @@ std::map<std::string, Given> Loader::merge_settings(const DeviceSpec& device) {
         if (inner_value.is_object())
           problem(graph_.value_at(child(at, inner)), fmt::format("setting {} of device {} is nested too deep",
                                                                  ticked(name + "." + inner), ticked(device.id)));
-        else
-          put(name + "." + inner, child(at, inner), inner_value);
+        else put(name + "." + inner, child(at, inner), inner_value);
       }
     }
   };
@@ -176,9 +177,9 @@ const DeviceDriver* Loader::choose_driver(const DeviceSpec& device, const Device
   for (const auto& driver : kind.drivers) drivers.push_back(driver.name);
   const auto named = settings.find("driver");
   if (named == settings.end()) {
-    problem(device.position, fmt::format("device {} has no driver in profile {}; name one (driver: WORD){}",
-                                         ticked(device.id), ticked(spec_.profile),
-                                         alternatives("", drivers, "drivers of " + ticked(device.kind))));
+    problem(device.position,
+            fmt::format("device {} has no driver in profile {}; name one (driver: WORD){}", ticked(device.id),
+                        ticked(spec_.profile), alternatives("", drivers, "drivers of " + ticked(device.kind))));
     return nullptr;
   }
   const std::string word = named->second.value.is_string() ? named->second.value.get<std::string>() : named->second.raw;
@@ -234,8 +235,9 @@ void Loader::read_device(DeviceSpec& device, std::set<std::string>& unclaimed) {
   for (const auto* list : {&kind->second.settings, &driver->settings})
     for (const auto& setting : *list)
       if (setting.required && !settings.contains(setting.name))
-        problem(device.position, fmt::format("device {} lacks the setting {} that driver {} needs: {}",
-                                             ticked(device.id), ticked(setting.name), ticked(driver->name), setting.doc));
+        problem(device.position,
+                fmt::format("device {} lacks the setting {} that driver {} needs: {}", ticked(device.id),
+                            ticked(setting.name), ticked(driver->name), setting.doc));
 }
 
 void Loader::fill_setting(DeviceSpec& device, const DeviceSetting& setting, const Given& given) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <cmath>
-
 #include <fmt/format.h>
+
+#include <cmath>
 
 #include "graph/language/loader.hpp"
 #include "graph/language/quantity.hpp"
@@ -53,8 +53,7 @@ void Loader::make_instances() {
   for (const auto& [name, type] : types_.all()) names.push_back(name);
   for (const auto& node : spec_.nodes) {
     if (node.type.empty()) continue;  // the schema has reported it
-    const Position at =
-        graph_.value_at(child(child(child("/subsystems", node.subsystem), node.id), "type"));
+    const Position at = graph_.value_at(child(child(child("/subsystems", node.subsystem), node.id), "type"));
     const NodeType* type = types_.find(node.type);
     if (type == nullptr) {
       problem(at, fmt::format("node {} has the unknown type {}{}", ticked(node.id), ticked(node.type),
@@ -94,7 +93,8 @@ void Loader::read_set() {
       continue;
     }
     if (!claimed_.contains(setting.id)) {
-      problem(at, fmt::format("{}: unknown id {}{}", ticked(text), ticked(setting.id), alternatives(setting.id, ids())));
+      problem(at,
+              fmt::format("{}: unknown id {}{}", ticked(text), ticked(setting.id), alternatives(setting.id, ids())));
       continue;
     }
     setting.given.value = value->is_string() ? json(*expanded) : *value;

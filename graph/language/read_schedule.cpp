@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
-
-#include <fmt/format.h>
 
 #include "graph/language/loader.hpp"
 #include "graph/language/quantity.hpp"
@@ -15,7 +15,8 @@ using nlohmann::json;
 
 /// Sets `value` to the enumerator of a word; a word that is none was reported by the schema.
 template <class Enum, size_t N>
-void read_word(const json& entry, const char* key, const std::array<std::pair<const char*, Enum>, N>& words, Enum& value) {
+void read_word(const json& entry, const char* key, const std::array<std::pair<const char*, Enum>, N>& words,
+               Enum& value) {
   if (!entry.contains(key) || !entry[key].is_string()) return;
   for (const auto& [word, enumerator] : words)
     if (entry[key] == word) value = enumerator;
@@ -69,8 +70,8 @@ void Loader::read_schedule() {
     std::vector<std::string> words;
     for (const auto& [word, policy] : kPolicies) words.emplace_back(word);
     if (std::find(words.begin(), words.end(), options_.policy) == words.end())
-      problem({"--policy", 0, 0}, fmt::format("there is no policy {}{}", ticked(options_.policy),
-                                              alternatives(options_.policy, words)));
+      problem({"--policy", 0, 0},
+              fmt::format("there is no policy {}{}", ticked(options_.policy), alternatives(options_.policy, words)));
     read_word(asked, "policy", kPolicies, spec_.schedule.policy);
   }
   const json cores = root.value("cores", json::array());
@@ -119,7 +120,8 @@ void Loader::read_release(ScheduleEntry& entry, const std::string& id, const jso
     if (const size_t dot = text.find('.'); dot != std::string::npos)
       entry.on = PortName{text.substr(0, dot), text.substr(dot + 1)};
   }
-  if (value.contains("every") && value["every"].is_number_integer() && value["every"] >= 1 && value["every"] <= 1'000'000)
+  if (value.contains("every") && value["every"].is_number_integer() && value["every"] >= 1 &&
+      value["every"] <= 1'000'000)
     entry.every = value["every"].get<int>();
   const bool rated = schedule_.marks.contains(rate), on = schedule_.marks.contains(child(pointer, "on"));
   if (rated && on)
@@ -127,24 +129,27 @@ void Loader::read_release(ScheduleEntry& entry, const std::string& id, const jso
             fmt::format("{} has both `rate` and `on`; keep one: `rate` releases it by the clock, `on` by a message",
                         ticked(id)));
   // A device may do without: its own rate in the graph then holds.
-  const auto device = std::find_if(spec_.devices.begin(), spec_.devices.end(), [&](const auto& d) { return d.id == id; });
+  const auto device =
+      std::find_if(spec_.devices.begin(), spec_.devices.end(), [&](const auto& d) { return d.id == id; });
   if (!rated && !on && device == spec_.devices.end())
-    problem(entry.position, fmt::format("{} has neither `rate` nor `on`; give it a rate in Hz (rate: 15) or a port that "
-                                        "releases it (on: id.port)",
-                                        ticked(id)));
+    problem(entry.position,
+            fmt::format("{} has neither `rate` nor `on`; give it a rate in Hz (rate: 15) or a port that "
+                        "releases it (on: id.port)",
+                        ticked(id)));
   for (const char* key : {"every", "min_interval"})
     if (value.contains(key) && !on)
       problem(schedule_.key_at(child(pointer, key)),
               fmt::format("{} of {} goes with `on` only; leave it out, or lower the rate", ticked(key), ticked(id)));
   if (value.contains("offset") && on && !rated)
-    problem(schedule_.key_at(child(pointer, "offset")),
-            fmt::format("`offset` of {} goes with `rate` only; an `on` node starts when the message is there", ticked(id)));
+    problem(
+        schedule_.key_at(child(pointer, "offset")),
+        fmt::format("`offset` of {} goes with `rate` only; an `on` node starts when the message is there", ticked(id)));
 }
 
 void Loader::check_times(const ScheduleEntry& entry, const std::string& id, const std::string& pointer) {
   const auto wrong = [&](const char* key, const char* rule) {
-    problem(schedule_at(id, key), fmt::format("{} of {} is {}; {}", ticked(key), ticked(id),
-                                              schedule_.raw(child(pointer, key)), rule));
+    problem(schedule_at(id, key),
+            fmt::format("{} of {} is {}; {}", ticked(key), ticked(id), schedule_.raw(child(pointer, key)), rule));
   };
   const auto given = [&](const char* key) { return schedule_.marks.contains(child(pointer, key)); };
   const auto readable = [&](const char* key) {
@@ -159,8 +164,8 @@ void Loader::check_times(const ScheduleEntry& entry, const std::string& id, cons
   if (entry.rate && entry.deadline_ns > entry.rate->period_ns())
     problem(schedule_at(id, "deadline"),
             fmt::format("`deadline` of {} is {}, longer than its period of {} ({}); shorten it or lower the rate",
-                        ticked(id), schedule_.raw(child(pointer, "deadline")),
-                        duration_text(entry.rate->period_ns()), rate_text(*entry.rate)));
+                        ticked(id), schedule_.raw(child(pointer, "deadline")), duration_text(entry.rate->period_ns()),
+                        rate_text(*entry.rate)));
 }
 
 void Loader::check_schedule() {
@@ -180,16 +185,18 @@ void Loader::check_schedule() {
   }
   for (const auto& node : spec_.nodes)
     if (!schedule_.marks.contains(entry_pointer(node.id)))
-      problem(node.position, fmt::format("node {} has no entry in the schedule {}; give it a rate in Hz (rate: 15) or a "
-                                         "port that releases it (on: id.port) there",
-                                         ticked(node.id), ticked(spec_.schedule.file)));
+      problem(node.position,
+              fmt::format("node {} has no entry in the schedule {}; give it a rate in Hz (rate: 15) or a "
+                          "port that releases it (on: id.port) there",
+                          ticked(node.id), ticked(spec_.schedule.file)));
   const bool high = std::any_of(spec_.nodes.begin(), spec_.nodes.end(), [&](const NodeSpec& node) {
     const auto entry = entries.find(node.id);
     return entry != entries.end() && entry->second.criticality == Criticality::high;
   });
   if (!high && !spec_.nodes.empty())
-    problem(schedule_.key_at("/nodes"), "no node has criticality high; name at least one that must never give way "
-                                        "(criticality: high)");
+    problem(schedule_.key_at("/nodes"),
+            "no node has criticality high; name at least one that must never give way "
+            "(criticality: high)");
   for (const auto& [id, entry] : entries)
     if (entry.on) check_on(id, entry);
   check_on_cycles();
@@ -199,9 +206,9 @@ void Loader::check_on(const std::string& id, const ScheduleEntry& entry) {
   const Position at = schedule_at(id, "on");
   const auto self = parts_.find(id), producer = parts_.find(entry.on->node);
   if (producer == parts_.end())
-    return problem(at, fmt::format("`on` of {} is {}, but there is no node or device {}{}", ticked(id),
-                                   ticked(entry.on->text()), ticked(entry.on->node),
-                                   alternatives(entry.on->node, ids())));
+    return problem(
+        at, fmt::format("`on` of {} is {}, but there is no node or device {}{}", ticked(id), ticked(entry.on->text()),
+                        ticked(entry.on->node), alternatives(entry.on->node, ids())));
   if (producer->second.known && producer->second.output(entry.on->port) == nullptr)
     return problem(at, fmt::format("`on` of {} is {}, but {} has no output {}{}", ticked(id), ticked(entry.on->text()),
                                    ticked(entry.on->node), ticked(entry.on->port),
@@ -214,8 +221,8 @@ void Loader::check_on(const std::string& id, const ScheduleEntry& entry) {
     read.push_back(edge.from.text());
   }
   if (self->second.sound)
-    problem(at, fmt::format("`on` of {} is {}, which none of its inputs reads{}", ticked(id),
-                            ticked(entry.on->text()), alternatives(entry.on->text(), read, "its inputs read")));
+    problem(at, fmt::format("`on` of {} is {}, which none of its inputs reads{}", ticked(id), ticked(entry.on->text()),
+                            alternatives(entry.on->text(), read, "its inputs read")));
 }
 
 void Loader::check_on_cycles() {

@@ -45,8 +45,8 @@ std::string trap(const std::string& s) {
   if (is(plus)) return "has a plus sign, which some YAML readers take for text; leave it out";
   if (is(not_finite)) return "is not a finite number";
   if (is(date)) return "is a date for some YAML readers; put it in quotes if it is text";
-  for (const char* word : {"yes", "Yes", "YES", "no", "No", "NO", "on", "On", "ON", "off", "Off", "OFF", "True", "TRUE",
-                           "False", "FALSE"})
+  for (const char* word :
+       {"yes", "Yes", "YES", "no", "No", "NO", "on", "On", "ON", "off", "Off", "OFF", "True", "TRUE", "False", "FALSE"})
     if (s == word)
       return "is a truth value for some YAML readers and text for others; write true or false, or \"" + s +
              "\" for the text";

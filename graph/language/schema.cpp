@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <regex>
-
 #include <valijson/adapters/nlohmann_json_adapter.hpp>
 #include <valijson/schema.hpp>
 #include <valijson/schema_parser.hpp>
@@ -49,7 +48,8 @@ bool type_fits(const json& schema, const json& value) {
   if (!schema.contains("type")) return true;
   const json& types = schema["type"];
   if (types.is_string()) return is_of_type(value, types.get<std::string>());
-  return std::any_of(types.begin(), types.end(), [&](const json& t) { return is_of_type(value, t.get<std::string>()); });
+  return std::any_of(types.begin(), types.end(),
+                     [&](const json& t) { return is_of_type(value, t.get<std::string>()); });
 }
 
 std::string shown(const json& value) {
@@ -72,7 +72,8 @@ class Explainer {
     if (document_.broken.contains(pointer)) return;
     if (schema.contains("anyOf")) return any_of(schema, value, pointer);
     if (!type_fits(schema, value)) return wrong(schema, value, pointer);
-    if (schema.contains("enum") && std::find(schema["enum"].begin(), schema["enum"].end(), value) == schema["enum"].end())
+    if (schema.contains("enum") &&
+        std::find(schema["enum"].begin(), schema["enum"].end(), value) == schema["enum"].end())
       return wrong_word(schema, value, pointer);
     if (value.is_string()) text(schema, value, pointer);
     if (value.is_number()) number(schema, value, pointer);
@@ -128,12 +129,13 @@ class Explainer {
 
   void list(const json& schema, const json& value, const std::string& pointer) {
     if (schema.contains("minItems") && value.size() < schema["minItems"].get<size_t>())
-      return problem(document_.value_at(pointer), place(pointer) + " has " + std::to_string(value.size()) +
-                                                      " entries; wanted: " + schema.value("description", std::string()));
+      return problem(document_.value_at(pointer),
+                     place(pointer) + " has " + std::to_string(value.size()) +
+                         " entries; wanted: " + schema.value("description", std::string()));
     for (size_t i = 0; i < value.size(); ++i) {
       if (schema.contains("items")) explain(schema["items"], value[i], child(pointer, i));
-      if (schema.value("uniqueItems", false) && std::find(value.begin(), value.begin() + static_cast<long>(i), value[i]) !=
-                                                    value.begin() + static_cast<long>(i))
+      if (schema.value("uniqueItems", false) && std::find(value.begin(), value.begin() + static_cast<long>(i),
+                                                          value[i]) != value.begin() + static_cast<long>(i))
         problem(document_.value_at(child(pointer, i)), place(pointer) + " names " + shown(value[i]) + " twice");
     }
   }
@@ -146,8 +148,8 @@ class Explainer {
     for (const auto& key : required) {
       const auto name = key.get<std::string>();
       if (!value.contains(name) && !document_.broken.contains(child(pointer, name)))
-        problem(document_.key_at(pointer), place(pointer) + " lacks " + ticked(name) + "; wanted: " +
-                                               description(properties.value(name, json::object())));
+        problem(document_.key_at(pointer), place(pointer) + " lacks " + ticked(name) +
+                                               "; wanted: " + description(properties.value(name, json::object())));
     }
     for (const auto& [key, entry] : value.items()) {
       const std::string below = child(pointer, key);
@@ -157,7 +159,8 @@ class Explainer {
       }
       const json rest = schema.value("additionalProperties", json(true));
       if (rest.is_boolean() && !rest.get<bool>()) {
-        problem(document_.key_at(below), "unknown key " + ticked(key) + " in " + place(pointer) + alternatives(key, keys));
+        problem(document_.key_at(below),
+                "unknown key " + ticked(key) + " in " + place(pointer) + alternatives(key, keys));
         continue;
       }
       if (schema.contains("propertyNames")) name(resolve(schema["propertyNames"]), key, below);
@@ -186,9 +189,9 @@ class Explainer {
     const std::string whole = which_ == Schema::graph ? "the graph" : "the schedule";
     if (words.empty()) return whole;
     if (words.size() == 1) return ticked(words[0]) + " of " + whole;
-    static const std::map<std::string, std::string> kinds{{"devices", "device "}, {"profiles", "profile "},
+    static const std::map<std::string, std::string> kinds{{"devices", "device "},       {"profiles", "profile "},
                                                           {"subsystems", "subsystem "}, {"chains", "chain "},
-                                                          {"modes", "mode "}, {"nodes", "the entry of "}};
+                                                          {"modes", "mode "},           {"nodes", "the entry of "}};
     const auto kind = kinds.find(words[0]);
     std::string text = (kind == kinds.end() ? words[0] + " " : kind->second) + ticked(words[1]);
     size_t next = 2;
@@ -226,7 +229,8 @@ bool validate(const Document& document, Schema schema, std::vector<Problem>& pro
   Explainer(document, schema, problems).explain(schema_json(schema), document.root, "");
   if (problems.size() > before || !document.broken.empty()) return false;
   // The walk above and valijson disagree: better its words than silence.
-  for (const auto& error : results) problems.push_back({document.value_at(""), "breaks the schema: " + error.description});
+  for (const auto& error : results)
+    problems.push_back({document.value_at(""), "breaks the schema: " + error.description});
   return false;
 }
 

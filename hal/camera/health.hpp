@@ -9,12 +9,12 @@ namespace takt {
 
 /// Thresholds of the health flags. Fractions are of the sampled pixels, levels 0..255.
 struct HealthThresholds {
-  int step_px = 8;                    ///< one pixel in step_px x step_px is looked at
-  int saturated_level = 250;          ///< a pixel at or above is saturated ...
-  double saturated_fraction = 0.05;   ///< ... and more than this makes the frame saturated (algorithms.md 15.4)
-  double dark_mean = 20.0;            ///< mean level below which the frame is dark
-  double blurred_gradient = 1.5;      ///< mean |I(x+1) - I(x-1)| / 2 below which the frame is blurred or featureless
-  double unchanging_difference = 0.25; ///< mean |I - previous I| below which the frame repeats (a sensor adds noise)
+  int step_px = 8;                      ///< one pixel in step_px x step_px is looked at
+  int saturated_level = 250;            ///< a pixel at or above is saturated ...
+  double saturated_fraction = 0.05;     ///< ... and more than this makes the frame saturated (algorithms.md 15.4)
+  double dark_mean = 20.0;              ///< mean level below which the frame is dark
+  double blurred_gradient = 1.5;        ///< mean |I(x+1) - I(x-1)| / 2 below which the frame is blurred or featureless
+  double unchanging_difference = 0.25;  ///< mean |I - previous I| below which the frame repeats (a sensor adds noise)
 };
 
 /// What was measured, and the flags that follow; bits of takt::image_health.
@@ -29,10 +29,10 @@ inline int health_samples(int width, int height, int step_px) {
   return width < 3 || step_px < 1 ? 0 : ((width - 2 + step_px - 1) / step_px) * ((height + step_px - 1) / step_px);
 }
 
-/// Looks at a subsampled image (8 bit, 1 or 3 channels; of three the middle one, green) at capture. `previous` holds the
-/// samples of the frame before and is overwritten with this frame's (health_samples(...) bytes);
-/// has_previous = false: unchanging is not judged. Pure: same input, same reading; no allocation; about 5,000 samples of a
-/// 640 x 480 image.
+/// Looks at a subsampled image (8 bit, 1 or 3 channels; of three the middle one, green) at capture. `previous` holds
+/// the samples of the frame before and is overwritten with this frame's (health_samples(...) bytes); has_previous =
+/// false: unchanging is not judged. Pure: same input, same reading; no allocation; about 5,000 samples of a 640 x 480
+/// image.
 HealthReading assess_health(ImageView<const uint8_t> image, const HealthThresholds& thresholds,
                             std::span<uint8_t> previous, bool has_previous);
 

@@ -29,13 +29,16 @@ struct Keys {
     }
     const auto parsed = node.IsScalar() ? parse_quantity(node.Scalar(), dimension) : std::nullopt;
     if (parsed) value = *parsed;
-    else fail(node, std::string("`") + name + "` must be a value in " + std::string(unit_names(dimension)), "correct the value");
+    else
+      fail(node, std::string("`") + name + "` must be a value in " + std::string(unit_names(dimension)),
+           "correct the value");
   }
   void integer(const char* name, int& value, int low, int high) {
     double number = value;
     quantity(name, Dimension::number, number);
     if (number != std::floor(number) || number < low || number > high) {
-      fail(map[name], std::string("`") + name + "` must be an integer in " + std::to_string(low) + ".." + std::to_string(high),
+      fail(map[name],
+           std::string("`") + name + "` must be an integer in " + std::to_string(low) + ".." + std::to_string(high),
            "correct the value");
     } else {
       value = static_cast<int>(number);
@@ -57,7 +60,8 @@ struct Keys {
       good = parsed.has_value();
       if (good) values[i] = *parsed;
     }
-    if (!good) fail(node, std::string("`") + name + "` must be a list of " + std::to_string(N) + " values", "correct the list");
+    if (!good)
+      fail(node, std::string("`") + name + "` must be a list of " + std::to_string(N) + " values", "correct the list");
   }
   void only(const std::set<std::string>& known) {
     for (const auto& entry : map) {
@@ -73,7 +77,8 @@ struct Keys {
 void read_mount(Keys& outer, StereoRig& rig) {
   const YAML::Node mount = outer.map["mount"];
   if (!mount) return;
-  if (!mount.IsMap()) return outer.fail(mount, "`mount` must be a map", "write mount: {x: 0m, y: 0.1m, z: 1.3m, tilt: -15deg}");
+  if (!mount.IsMap())
+    return outer.fail(mount, "`mount` must be a map", "write mount: {x: 0m, y: 0.1m, z: 1.3m, tilt: -15deg}");
   Keys keys{outer.file, outer.id, mount, {}};
   keys.only({"x", "y", "z", "pan", "tilt", "roll", "on_head"});
   keys.quantity("x", Dimension::length, rig.x_m);
@@ -104,7 +109,8 @@ StereoRig read_rig(Keys& keys) {
   if (keys.error.what.empty() && (rig.hfov_rad < 0.1 || rig.hfov_rad > 2.5)) {
     keys.fail(keys.map["hfov"], "`hfov` must lie in 6..143deg", "correct the value");
   }
-  if (keys.error.what.empty() && rig.baseline_m <= 0) keys.fail(keys.map["baseline"], "`baseline` must be positive", "correct the value");
+  if (keys.error.what.empty() && rig.baseline_m <= 0)
+    keys.fail(keys.map["baseline"], "`baseline` must be positive", "correct the value");
   rig.focal_px = rig.width / 2.0 / std::tan(rig.hfov_rad / 2.0);
   rig.cu_px = (rig.width - 1) / 2.0;
   rig.cv_px = (rig.height - 1) / 2.0;
@@ -120,23 +126,27 @@ tl::expected<StereoRig, DeviceError> load_rig(const std::string& device_id, cons
   } catch (const YAML::BadFile&) {
     return device_error(device_id, file.string() + ": the rig file cannot be opened", "correct `rig:` of the device");
   } catch (const YAML::Exception& e) {
-    return device_error(device_id, file.string() + ":" + std::to_string(e.mark.line + 1) + ": " + e.msg, "correct the YAML");
+    return device_error(device_id, file.string() + ":" + std::to_string(e.mark.line + 1) + ": " + e.msg,
+                        "correct the YAML");
   }
   if (!keys.map.IsMap()) return device_error(device_id, file.string() + ":1: not a map of keys", "see rigs/xb3.yaml");
   StereoRig rig;
   try {
     rig = read_rig(keys);
   } catch (const YAML::Exception& e) {
-    return device_error(device_id, file.string() + ":" + std::to_string(e.mark.line + 1) + ": " + e.msg, "correct the YAML");
+    return device_error(device_id, file.string() + ":" + std::to_string(e.mark.line + 1) + ": " + e.msg,
+                        "correct the YAML");
   }
   if (!keys.error.what.empty()) return tl::unexpected(keys.error);
   return rig;
 }
 
 Transform camera_in_robot(const StereoRig& rig, double head_pan, double head_tilt) {
-  const double pan = (rig.pan_rad + (rig.on_head ? head_pan : 0)) / 2, tilt = (rig.tilt_rad + (rig.on_head ? head_tilt : 0)) / 2;
+  const double pan = (rig.pan_rad + (rig.on_head ? head_pan : 0)) / 2,
+               tilt = (rig.tilt_rad + (rig.on_head ? head_tilt : 0)) / 2;
   const double roll = rig.roll_rad / 2;
-  const double cz = std::cos(pan), sz = std::sin(pan), cx = std::cos(tilt), sx = std::sin(tilt), cy = std::cos(roll), sy = std::sin(roll);
+  const double cz = std::cos(pan), sz = std::sin(pan), cx = std::cos(tilt), sx = std::sin(tilt), cy = std::cos(roll),
+               sy = std::sin(roll);
   // Rz(pan) Rx(tilt) Ry(roll), then the quarter turn from robot axes (x right, y forward, z up) to camera axes.
   const double w = cz * cx * cy - sz * sx * sy, x = cz * sx * cy - sz * cx * sy, y = cz * cx * sy + sz * sx * cy,
                z = sz * cx * cy + cz * sx * sy;

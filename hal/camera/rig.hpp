@@ -17,16 +17,15 @@ struct StereoRig {
   double baseline_m = 0;
   double focal_px = 0, cu_px = 0, cv_px = 0;  ///< f = (W / 2) / tan(hfov / 2); centre of the image (algorithms.md 0.3)
   bool rectified = true;
-  std::array<double, 5> distortion{};         ///< k1 k2 p1 p2 k3 (Brown); used only if not rectified
-  std::array<double, 3> right_rotation_rad{}; ///< misalignment of the right camera about its x, y, z; only if not rectified
-  double x_m = 0, y_m = 0, z_m = 0;           ///< left optical centre in the robot frame; also the pivot of the head
+  std::array<double, 5> distortion{};  ///< k1 k2 p1 p2 k3 (Brown); used only if not rectified
+  std::array<double, 3>
+      right_rotation_rad{};          ///< misalignment of the right camera about its x, y, z; only if not rectified
+  double x_m = 0, y_m = 0, z_m = 0;  ///< left optical centre in the robot frame; also the pivot of the head
   double pan_rad = 0, tilt_rad = 0, roll_rad = 0;  ///< mounting angles: pan left positive, tilt up positive
-  bool on_head = false;                       ///< pan and tilt of the head are added
+  bool on_head = false;                            ///< pan and tilt of the head are added
 
   /// Model of the rectified pair; zero if the rig delivers raw images.
-  CameraModel camera() const {
-    return rectified ? CameraModel{focal_px, cu_px, cv_px, baseline_m} : CameraModel{};
-  }
+  CameraModel camera() const { return rectified ? CameraModel{focal_px, cu_px, cv_px, baseline_m} : CameraModel{}; }
 };
 
 /// Errors name file:line and the key at fault.

@@ -9,10 +9,10 @@ namespace takt {
 /// What a stereo camera will deliver; fixed by open().
 struct StereoFormat {
   int width = 0, height = 0;
-  int channels = 0;       ///< 1 grey, 3 BGR interleaved
-  bool rectified = false; ///< rows of left and right correspond; `camera` is valid
-  CameraModel camera;     ///< zero unless rectified
-  double rate_hz = 0;     ///< 0: released by trigger() only
+  int channels = 0;        ///< 1 grey, 3 BGR interleaved
+  bool rectified = false;  ///< rows of left and right correspond; `camera` is valid
+  CameraModel camera;      ///< zero unless rectified
+  double rate_hz = 0;      ///< 0: released by trigger() only
 };
 
 /// One exposure as the device reports it.
@@ -35,8 +35,8 @@ class StereoCamera : public Device {
   virtual void trigger(int64_t at_ns) = 0;
 
   /// Moves the next exposure into the caller's views (the shared memory of the message: one copy, straight from
-  /// the capture buffer). Views must have the size of format(). Returns as soon as a frame is there and at the latest at
-  /// `deadline_ns`; a deadline in the past makes it a poll. Frames are delivered in order, each once.
+  /// the capture buffer). Views must have the size of format(). Returns as soon as a frame is there and at the latest
+  /// at `deadline_ns`; a deadline in the past makes it a poll. Frames are delivered in order, each once.
   virtual StereoFrame read(ImageView<uint8_t> left, ImageView<uint8_t> right, int64_t deadline_ns) = 0;
 };
 

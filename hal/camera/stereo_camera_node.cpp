@@ -18,8 +18,8 @@ void StereoCameraNode::setup(Setup& setup) {
   pair_.reserve(capacity);
   previous_.assign(static_cast<size_t>(health_samples(format_.width, format_.height, thresholds_.step_px)), 0);
   has_previous_ = false;
-  // The planned rate as a fraction, so that the instant of the next release can be told exactly (1/15 s is no whole number
-  // of nanoseconds).
+  // The planned rate as a fraction, so that the instant of the next release can be told exactly (1/15 s is no whole
+  // number of nanoseconds).
   for (int64_t denominator = 1; denominator <= 1001 && rate_.numerator == 0 && setup.rate_hz > 0; ++denominator) {
     const double numerator = setup.rate_hz * static_cast<double>(denominator);
     if (std::abs(numerator - std::round(numerator)) < 1e-9 * numerator) {
@@ -45,7 +45,8 @@ void StereoCameraNode::run(Job& job) {
   message->width = format_.width;
   message->height = format_.height;
   message->channels = format_.channels;
-  const size_t bytes = static_cast<size_t>(format_.width) * static_cast<size_t>(format_.height) * static_cast<size_t>(format_.channels);
+  const size_t bytes =
+      static_cast<size_t>(format_.width) * static_cast<size_t>(format_.height) * static_cast<size_t>(format_.channels);
   message->left.resize(bytes);
   message->right.resize(bytes);
   const StereoFrame frame = camera_->read(message->left_view(), message->right_view(), job.deadline_ns());

@@ -10,7 +10,8 @@
 
 namespace takt {
 
-/// Device kind `stereo_camera`: one StereoPair per release, stamped with its exposure, image health assessed at capture.
+/// Device kind `stereo_camera`: one StereoPair per release, stamped with its exposure, image health assessed at
+/// capture.
 class StereoCameraNode final : public DeviceNode {
  public:
   explicit StereoCameraNode(std::unique_ptr<StereoCamera> camera, HealthThresholds thresholds = {});

@@ -69,7 +69,8 @@ NodeResult make_sim_camera(const DeviceConfig& config, Settings& settings, sim::
   camera.background = settings.flag("background", true);
   camera.noise.read_sigma = settings.quantity("read_noise", Dimension::number, camera.noise.read_sigma);
   camera.noise.photon_variance = settings.quantity("photon_noise", Dimension::number, camera.noise.photon_variance);
-  if (camera.noise.read_sigma < 0 || camera.noise.photon_variance < 0) settings.fail("noise must not be negative", "correct read_noise and photon_noise");
+  if (camera.noise.read_sigma < 0 || camera.noise.photon_variance < 0)
+    settings.fail("noise must not be negative", "correct read_noise and photon_noise");
   std::unique_ptr<StereoCamera> device = std::make_unique<sim::SimCamera>(config.id, camera, world, clock);
   return opened<StereoCameraNode>(std::move(device), settings, thresholds_of(settings));
 }
@@ -80,7 +81,8 @@ NodeResult make_replay_camera(const DeviceConfig& config, Settings& settings, co
   camera.left = settings.path("left", false);
   camera.right = settings.path("right", false);
   camera.camera = {settings.quantity("focal", Dimension::number, 0.0), settings.quantity("cu", Dimension::number, 0.0),
-                   settings.quantity("cv", Dimension::number, 0.0), settings.quantity("baseline", Dimension::length, 0.0)};
+                   settings.quantity("cv", Dimension::number, 0.0),
+                   settings.quantity("baseline", Dimension::length, 0.0)};
   camera.frames = settings.count("frames", 1, 1, 1'000'000'000);
   camera.channels = static_cast<int>(settings.count("channels", 0, 0, 3));
   if (camera.channels == 2) settings.fail("setting `channels` is 2", "use 1 (grey) or 3 (BGR)");
@@ -98,7 +100,8 @@ NodeResult make_sim_laser(const DeviceConfig& config, Settings& settings, sim::S
   model.sensor_in_robot = settings.mount("mount");
   if (!settings.has("mount")) model.sensor_in_robot.z = 0.25;
   if (model.fov_rad <= 0 || model.fov_rad > 6.2832 || model.max_range_m <= 0 || model.sigma_m < 0) {
-    settings.fail("`fov`, `range` or `noise` is out of range", "fov in (0, 360deg], range positive, noise not negative");
+    settings.fail("`fov`, `range` or `noise` is out of range",
+                  "fov in (0, 360deg], range positive, noise not negative");
   }
   std::unique_ptr<LaserScanner> device = std::make_unique<sim::SimLaser>(config.id, model, world);
   return opened<LaserNode>(std::move(device), settings);
@@ -113,7 +116,8 @@ NodeResult make_sim_base(const DeviceConfig& config, Settings& settings, sim::Si
   const std::string drive = settings.text("drive", world.path().empty() ? "command" : "path");
   if (drive == "command") world.set_drive(sim::Drive::command);
   else if (drive != "path") settings.fail("`drive` is `" + drive + "`", "use path or command");
-  else if (world.path().empty()) settings.fail("`drive: path`, but the world's client has no <path>", "add one, or use drive: command");
+  else if (world.path().empty())
+    settings.fail("`drive: path`, but the world's client has no <path>", "add one, or use drive: command");
   std::unique_ptr<MobileBase> device = std::make_unique<sim::SimBase>(config.id, model, world);
   return opened<BaseNode>(std::move(device), settings);
 }
@@ -134,11 +138,13 @@ NodeResult make_sim(const DeviceConfig& config, Settings& settings, Devices& dev
 
 /// Keys that no driver of the kind knows.
 DeviceResult check_keys(const DeviceConfig& config, const DeviceKind& kind) {
-  if (!config.settings.is_object() && !config.settings.is_null()) return device_error(config.id, "the settings are no map", "write key: value");
+  if (!config.settings.is_object() && !config.settings.is_null())
+    return device_error(config.id, "the settings are no map", "write key: value");
   for (const auto& [key, value] : config.settings.items()) {
-    const bool known = key == "kind" || key == "driver" || std::any_of(kind.settings.begin(), kind.settings.end(), [&](const SettingInfo& s) {
-      return s.name == key && (s.driver.empty() || s.driver == config.driver);
-    });
+    const bool known = key == "kind" || key == "driver" ||
+                       std::any_of(kind.settings.begin(), kind.settings.end(), [&](const SettingInfo& s) {
+                         return s.name == key && (s.driver.empty() || s.driver == config.driver);
+                       });
     if (known) continue;
     std::string all;
     for (const SettingInfo& s : kind.settings) {
@@ -159,7 +165,8 @@ tl::expected<sim::Simulation*, DeviceError> Devices::world(const DeviceConfig& c
   const auto file = settings.path("world", true);
   const std::string client = settings.text("client", "");
   if (settings.error()) return tl::unexpected(*settings.error());
-  const std::string key = std::filesystem::weakly_canonical(file).string() + "\n" + client + "\n" + std::to_string(config.seed);
+  const std::string key =
+      std::filesystem::weakly_canonical(file).string() + "\n" + client + "\n" + std::to_string(config.seed);
   auto& slot = worlds_[key];
   if (!slot) {
     auto loaded = sim::Simulation::load(config.id, file, client, config.seed);
@@ -176,10 +183,14 @@ sim::Simulation* Devices::first_world() { return worlds_.empty() ? nullptr : wor
 
 NodeResult make_device(const DeviceConfig& config, Devices& devices, const Clock& clock) {
   const auto kinds = device_kinds();
-  const auto kind = std::find_if(kinds.begin(), kinds.end(), [&](const DeviceKind& k) { return k.name == config.kind; });
-  if (kind == kinds.end()) return device_error(config.id, "unknown device kind `" + config.kind + "`", "known kinds: " + names(kinds));
-  if (std::none_of(kind->drivers.begin(), kind->drivers.end(), [&](const DriverInfo& d) { return d.name == config.driver; })) {
-    return device_error(config.id, config.kind + " has no driver `" + config.driver + "`", "known drivers: " + names(kind->drivers));
+  const auto kind =
+      std::find_if(kinds.begin(), kinds.end(), [&](const DeviceKind& k) { return k.name == config.kind; });
+  if (kind == kinds.end())
+    return device_error(config.id, "unknown device kind `" + config.kind + "`", "known kinds: " + names(kinds));
+  if (std::none_of(kind->drivers.begin(), kind->drivers.end(),
+                   [&](const DriverInfo& d) { return d.name == config.driver; })) {
+    return device_error(config.id, config.kind + " has no driver `" + config.driver + "`",
+                        "known drivers: " + names(kind->drivers));
   }
   if (const auto keys = check_keys(config, *kind); !keys) return tl::unexpected(keys.error());
   Settings settings(config.id, config.settings, config.directory);

@@ -9,11 +9,12 @@ using enum SettingKind;
 constexpr DriverInfo kSimOnly[] = {{"sim", "the simulated world"}};
 constexpr DriverInfo kCameraDrivers[] = {{"sim", "the simulated world"}, {"replay", "recorded images"}};
 
-#define COMMON_SETTINGS                                                                      \
-  {"rate", "", rate, false, "releases per second of the device's node"},                     \
-      {"model", "", text, false, "name of the hardware model, for the reader"},              \
-      {"world", "sim", path, true, "XML file of the simulated world"},                       \
-      {"client", "sim", text, false, "which <client> of the world is the robot; the first"}
+#define COMMON_SETTINGS                                                                 \
+  {"rate", "", rate, false, "releases per second of the device's node"},                \
+      {"model", "", text, false, "name of the hardware model, for the reader"},         \
+      {"world", "sim", path, true, "XML file of the simulated world"}, {                \
+    "client", "sim", text, false, "which <client> of the world is the robot; the first" \
+  }
 
 constexpr SettingInfo kCamera[] = {
     COMMON_SETTINGS,

@@ -13,7 +13,7 @@ struct HeadLimits {
 
 struct HeadReading {
   ReadStatus status = ReadStatus::no_data;
-  int64_t stamp_ns = 0;  ///< when the angles were measured
+  int64_t stamp_ns = 0;                            ///< when the angles were measured
   double pan_rad = 0, tilt_rad = 0, roll_rad = 0;  ///< pan: left positive; tilt: up positive
   double pan_rad_s = 0, tilt_rad_s = 0;
   bool moving = false;
@@ -24,7 +24,8 @@ class CameraHead : public Device {
  public:
   virtual HeadLimits limits() const = 0;  ///< valid after open()
 
-  /// The newest state measured at or before `wanted_ns` (simulators: exactly then). Returns at the latest at `deadline_ns`.
+  /// The newest state measured at or before `wanted_ns` (simulators: exactly then). Returns at the latest at
+  /// `deadline_ns`.
   virtual HeadReading read(int64_t wanted_ns, int64_t deadline_ns) = 0;
 
   /// Sets the target. Angles beyond the limits are clamped, and false returned, so that the caller can report it.

@@ -55,10 +55,12 @@ DeviceResult ReplayCamera::find_files() {
     return {};
   }
   if (settings_.left.empty() || settings_.right.empty()) {
-    return device_error(id_, "neither `directory` nor `left` and `right` are given", "add `directory: PATH`, or `left: FILE, right: FILE, focal: N, baseline: 0.1m`");
+    return device_error(id_, "neither `directory` nor `left` and `right` are given",
+                        "add `directory: PATH`, or `left: FILE, right: FILE, focal: N, baseline: 0.1m`");
   }
   if (settings_.camera.focal_px <= 0 || settings_.camera.baseline_m <= 0) {
-    return device_error(id_, "`focal` (px) and `baseline` (m) of the pair must be positive", "give both; they belong to the calibration of the images");
+    return device_error(id_, "`focal` (px) and `baseline` (m) of the pair must be positive",
+                        "give both; they belong to the calibration of the images");
   }
   files_ = StereoFiles{{settings_.left}, {settings_.right}, {}, settings_.camera};
   return {};
@@ -87,15 +89,18 @@ DeviceResult ReplayCamera::decode_all() {
       const auto& file = side == 0 ? files_.left[i] : files_.right[i];
       pair[side] = decode(file, channels);
       if (pair[side].empty() || pair[side].depth() != CV_8U) {
-        return device_error(id_, file.string() + ": cannot be decoded as an 8-bit image", "record or copy the file again");
+        return device_error(id_, file.string() + ": cannot be decoded as an 8-bit image",
+                            "record or copy the file again");
       }
       if (i == 0 && side == 0) {
         size = pair[0].size();
         channels = pair[0].channels();
       }
       if (pair[side].size() != size) {
-        return device_error(id_, file.string() + ": is " + std::to_string(pair[side].cols) + " x " + std::to_string(pair[side].rows) + ", the first image is " +
-                                     std::to_string(size.width) + " x " + std::to_string(size.height),
+        return device_error(id_,
+                            file.string() + ": is " + std::to_string(pair[side].cols) + " x " +
+                                std::to_string(pair[side].rows) + ", the first image is " + std::to_string(size.width) +
+                                " x " + std::to_string(size.height),
                             "all images of a recording need one size");
       }
       bytes += pair[side].total() * pair[side].elemSize();
@@ -152,8 +157,8 @@ StereoFrame ReplayCamera::read(ImageView<uint8_t> left, ImageView<uint8_t> right
   frame.frame_number = static_cast<uint32_t>(next_);
   frame.stamp_ns = stamp_of(next_++);
   const cv::Size size(format_.width, format_.height);
-  const bool whole = decoded[0].size() == size && decoded[1].size() == size && decoded[0].channels() == format_.channels &&
-                     decoded[1].channels() == format_.channels;
+  const bool whole = decoded[0].size() == size && decoded[1].size() == size &&
+                     decoded[0].channels() == format_.channels && decoded[1].channels() == format_.channels;
   if (whole) {
     copy(decoded[0], left);
     copy(decoded[1], right);

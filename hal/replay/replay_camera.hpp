@@ -14,15 +14,15 @@ struct ReplayCameraSettings {
   std::filesystem::path left, right;  ///< one rectified pair, delivered `frames` times
   CameraModel camera;                 ///< of the single pair
   int64_t frames = 1;
-  int channels = 0;                   ///< 0: as the files; 1 or 3: converted
-  Rate rate{15, 1};                   ///< where no times.txt tells the stamps
+  int channels = 0;                      ///< 0: as the files; 1 or 3: converted
+  Rate rate{15, 1};                      ///< where no times.txt tells the stamps
   uint64_t memory_limit = 512ull << 20;  ///< decoded frames up to this size are held in memory from open() on
 };
 
 /// Recorded stereo pairs as a camera. Frame k has the stamp epoch + its recorded time (times.txt) or epoch + k / rate.
 /// trigger(t) asks for the next frame and is its exposure's instant only as a release: frames are never skipped, each
-/// trigger delivers the next one with its recorded stamp. Nobody triggers: a frame is delivered once the clock has reached
-/// its stamp. After the last frame: end_of_data.
+/// trigger delivers the next one with its recorded stamp. Nobody triggers: a frame is delivered once the clock has
+/// reached its stamp. After the last frame: end_of_data.
 class ReplayCamera final : public StereoCamera {
  public:
   ReplayCamera(std::string id, ReplayCameraSettings settings, const Clock& clock);

@@ -17,9 +17,10 @@ struct StereoFiles {
   CameraModel camera;             ///< zero: not rectified or unknown
 };
 
-/// KITTI layout: image_l/ and image_r/ (sorted by name, same number and same names), calib.txt with rows P0 and P1 (3 x 4,
-/// row-major; P1(0,3) = -f B), times.txt optional (seconds, one a line, rising).
-tl::expected<StereoFiles, DeviceError> list_directory(const std::string& device_id, const std::filesystem::path& directory);
+/// KITTI layout: image_l/ and image_r/ (sorted by name, same number and same names), calib.txt with rows P0 and P1 (3 x
+/// 4, row-major; P1(0,3) = -f B), times.txt optional (seconds, one a line, rising).
+tl::expected<StereoFiles, DeviceError> list_directory(const std::string& device_id,
+                                                      const std::filesystem::path& directory);
 
 /// Refuses files that are not complete PNG (ends with IEND), JPEG (ends with EOI), PGM or PPM images; looks at the
 /// first and last bytes only.

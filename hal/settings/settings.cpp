@@ -31,7 +31,7 @@ double Settings::quantity(const std::string& name, Dimension dimension) {
 int64_t Settings::count(const std::string& name, int64_t fallback, int64_t low, int64_t high) {
   if (!has(name)) return fallback;
   const nlohmann::json& value = values_[name];
-  const auto number = value.is_string() ? parse_quantity(value.get_ref<const std::string&>(), Dimension::number)
+  const auto number = value.is_string()   ? parse_quantity(value.get_ref<const std::string&>(), Dimension::number)
                       : value.is_number() ? std::optional<double>(value.get<double>())
                                           : std::nullopt;
   if (number && *number == std::floor(*number) && *number >= static_cast<double>(low) &&
@@ -79,7 +79,8 @@ Transform Settings::mount(const std::string& name) {
   transform.y = inner.quantity("y", Dimension::length, 0);
   transform.z = inner.quantity("z", Dimension::length, 0);
   // R = Rz(yaw) Rx(pitch) Ry(roll), algorithms.md 0.2.
-  const double yaw = inner.quantity("yaw", Dimension::angle, 0) / 2, pitch = inner.quantity("pitch", Dimension::angle, 0) / 2,
+  const double yaw = inner.quantity("yaw", Dimension::angle, 0) / 2,
+               pitch = inner.quantity("pitch", Dimension::angle, 0) / 2,
                roll = inner.quantity("roll", Dimension::angle, 0) / 2;
   const double cz = std::cos(yaw), sz = std::sin(yaw), cx = std::cos(pitch), sx = std::sin(pitch), cy = std::cos(roll),
                sy = std::sin(roll);

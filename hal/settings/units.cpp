@@ -15,11 +15,21 @@ struct Unit {
 };
 constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr Unit kUnits[] = {
-    {Dimension::length, "m", 1},          {Dimension::length, "cm", 0.01},      {Dimension::length, "mm", 0.001},
-    {Dimension::angle, "rad", 1},         {Dimension::angle, "deg", kDegree},   {Dimension::time, "s", 1},
-    {Dimension::time, "ms", 1e-3},        {Dimension::time, "us", 1e-6},        {Dimension::time, "ns", 1e-9},
-    {Dimension::speed, "m/s", 1},         {Dimension::speed, "mm/s", 1e-3},     {Dimension::turn_rate, "rad/s", 1},
-    {Dimension::turn_rate, "deg/s", kDegree}, {Dimension::rate, "", 1},         {Dimension::rate, "Hz", 1},
+    {Dimension::length, "m", 1},
+    {Dimension::length, "cm", 0.01},
+    {Dimension::length, "mm", 0.001},
+    {Dimension::angle, "rad", 1},
+    {Dimension::angle, "deg", kDegree},
+    {Dimension::time, "s", 1},
+    {Dimension::time, "ms", 1e-3},
+    {Dimension::time, "us", 1e-6},
+    {Dimension::time, "ns", 1e-9},
+    {Dimension::speed, "m/s", 1},
+    {Dimension::speed, "mm/s", 1e-3},
+    {Dimension::turn_rate, "rad/s", 1},
+    {Dimension::turn_rate, "deg/s", kDegree},
+    {Dimension::rate, "", 1},
+    {Dimension::rate, "Hz", 1},
     {Dimension::number, "", 1},
 };
 

@@ -8,8 +8,8 @@ namespace takt {
 
 enum class Dimension : uint8_t { number, length, angle, time, speed, turn_rate, rate };
 
-/// "0.24m", "24 cm", "66deg", "1.4 m/s", "15" -> SI (m, rad, s, m/s, rad/s, Hz, 1). A unit of another dimension, or no unit
-/// where one is needed, gives nothing; so do infinities and NaN.
+/// "0.24m", "24 cm", "66deg", "1.4 m/s", "15" -> SI (m, rad, s, m/s, rad/s, Hz, 1). A unit of another dimension, or no
+/// unit where one is needed, gives nothing; so do infinities and NaN.
 std::optional<double> parse_quantity(std::string_view text, Dimension dimension);
 /// "m, cm, mm" for messages.
 std::string_view unit_names(Dimension dimension);

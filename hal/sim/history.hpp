@@ -7,8 +7,8 @@
 
 namespace takt::sim {
 
-/// States of a commanded mechanism at fixed ticks. One thread appends; any thread reads without a lock. The newest `kSlots`
-/// ticks (164 s) are kept; who asks for older ones gets the oldest.
+/// States of a commanded mechanism at fixed ticks. One thread appends; any thread reads without a lock. The newest
+/// `kSlots` ticks (164 s) are kept; who asks for older ones gets the oldest.
 template <size_t N>
 class History {
  public:
@@ -35,7 +35,8 @@ class History {
     const int64_t oldest = last - kSlots + 2 > 0 ? last - kSlots + 2 : 0;
     const int64_t wanted = tick < oldest ? oldest : tick > last ? last : tick;
     State state;
-    for (size_t i = 0; i < N; ++i) state[i] = slots_[static_cast<size_t>(wanted % kSlots)][i].load(std::memory_order_relaxed);
+    for (size_t i = 0; i < N; ++i)
+      state[i] = slots_[static_cast<size_t>(wanted % kSlots)][i].load(std::memory_order_relaxed);
     return state;
   }
 

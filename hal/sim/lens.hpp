@@ -12,12 +12,13 @@ namespace takt::sim {
 class Lens {
  public:
   explicit Lens(const StereoRig& rig);
-  void render(const Scene& scene, const CameraPose& pose, const SensorNoise& noise, uint64_t noise_seed, ImageView<uint8_t> image);
+  void render(const Scene& scene, const CameraPose& pose, const SensorNoise& noise, uint64_t noise_seed,
+              ImageView<uint8_t> image);
 
  private:
   struct Tap {
-    uint32_t index;      ///< of the upper left neighbour in the wide image
-    uint8_t wx, wy;      ///< weights in 1/128
+    uint32_t index;  ///< of the upper left neighbour in the wide image
+    uint8_t wx, wy;  ///< weights in 1/128
   };
   Pinhole wide_;
   Renderer renderer_;

@@ -10,8 +10,8 @@ namespace {
 
 constexpr int kSamplesPerSegment = 256;
 
-/// Slopes at the knots of a cubic spline with uniform parameter: D[i-1] + 4 D[i] + D[i+1] = 3 (p[i+1] - p[i-1]), cyclic for
-/// a loop, natural at open ends. Paths have a handful of knots: a dense solve is fine.
+/// Slopes at the knots of a cubic spline with uniform parameter: D[i-1] + 4 D[i] + D[i+1] = 3 (p[i+1] - p[i-1]), cyclic
+/// for a loop, natural at open ends. Paths have a handful of knots: a dense solve is fine.
 Eigen::VectorXd slopes(const Eigen::VectorXd& p, bool loop) {
   const Eigen::Index n = p.size();
   Eigen::MatrixXd a = Eigen::MatrixXd::Zero(n, n);
@@ -129,7 +129,8 @@ RobotState Path::at(double t) const {
     profile = &lap_;
   }
   const auto& time = profile->time;
-  const size_t after = std::clamp<size_t>(static_cast<size_t>(std::upper_bound(time.begin(), time.end(), t) - time.begin()), 1, time.size() - 1);
+  const size_t after = std::clamp<size_t>(
+      static_cast<size_t>(std::upper_bound(time.begin(), time.end(), t) - time.begin()), 1, time.size() - 1);
   const size_t i = after - 1;
   const double span = time[after] - time[i], local = std::clamp(t - time[i], 0.0, span);
   // Constant acceleration between two samples.

@@ -14,8 +14,8 @@ struct RobotState {
   bool operator==(const RobotState&) const = default;
 };
 
-/// A drive along waypoints: a cubic spline with continuous curvature (closed for a loop), passed at the requested speed or
-/// slower where the turn rate or the acceleration limit asks for it. The state is a pure function of time.
+/// A drive along waypoints: a cubic spline with continuous curvature (closed for a loop), passed at the requested speed
+/// or slower where the turn rate or the acceleration limit asks for it. The state is a pure function of time.
 class Path {
  public:
   Path() = default;

@@ -47,7 +47,9 @@ void DrawCapsule(const CameraCapsule& c, const CapsuleSpan& span, float* inverse
   for (int x = span.x0; x < span.x1; x += lanes) {
     const auto px = pixel_x(f, x);
     const auto rx = hn::Add(hn::Mul(px, set(span.ray_x_step)), set(span.ray_x_start));
-    const auto dot = [&](const float* v) { return hn::Add(hn::Add(hn::Mul(rx, set(v[0])), hn::Mul(ry, set(v[1]))), set(v[2])); };
+    const auto dot = [&](const float* v) {
+      return hn::Add(hn::Add(hn::Mul(rx, set(v[0])), hn::Mul(ry, set(v[1]))), set(v[2]));
+    };
     const auto dd = hn::Add(hn::Add(hn::Mul(rx, rx), hn::Mul(ry, ry)), one);
     const auto d_axis = dot(c.axis);
     const auto d_oa = hn::Neg(dot(c.a));  // ray . (origin - a)
@@ -119,7 +121,8 @@ void Shade(const ShadeRun& run, const float* inverse_depth, uint8_t* b, uint8_t*
   const hn::Rebind<uint8_t, F> u8;
   const int lanes = static_cast<int>(hn::Lanes(f));
   const auto set = [&](float v) { return hn::Set(f, v); };
-  const auto mask = hn::Set(i, run.size - 1), pitch = hn::Set(i, 4 * run.size), one = hn::Set(i, 1), low = hn::Set(i, 3);
+  const auto mask = hn::Set(i, run.size - 1), pitch = hn::Set(i, 4 * run.size), one = hn::Set(i, 1),
+             low = hn::Set(i, 3);
   // Texels lie in tiles of 4 x 4, one cache line each: the address is a part of u plus a part of v.
   const auto column = [&](hn::Vec<I> v) {
     const auto wrapped = hn::And(v, mask);
@@ -194,7 +197,8 @@ HWY_EXPORT(StoreBgr);
 void draw_plane(const PlaneSpan& span, float* inverse_depth, int32_t* id) {
   HWY_DYNAMIC_DISPATCH(DrawPlane)(span, inverse_depth, id);
 }
-void draw_capsule(const CameraCapsule& capsule, const CapsuleSpan& span, float* inverse_depth, int32_t* id, float* gain) {
+void draw_capsule(const CameraCapsule& capsule, const CapsuleSpan& span, float* inverse_depth, int32_t* id,
+                  float* gain) {
   HWY_DYNAMIC_DISPATCH(DrawCapsule)(capsule, span, inverse_depth, id, gain);
 }
 void shade(const ShadeRun& run, const float* inverse_depth, uint8_t* b, uint8_t* g, uint8_t* r) {

@@ -32,7 +32,8 @@ struct CapsuleSpan {
   float ray_y = 0;
   int32_t id = 0;
 };
-void draw_capsule(const CameraCapsule& capsule, const CapsuleSpan& span, float* inverse_depth, int32_t* id, float* gain);
+void draw_capsule(const CameraCapsule& capsule, const CapsuleSpan& span, float* inverse_depth, int32_t* id,
+                  float* gain);
 
 /// Texturing of a run of pixels of one surface: u = u0 + z (ua x + ub), the same for v; all in texels of `level`.
 struct ShadeRun {

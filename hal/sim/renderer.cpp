@@ -193,8 +193,8 @@ void Renderer::draw_row(int y) {
   }
 }
 
-/// Level whose texels are nearest to the footprint of pixel (x, y): the geometric mean of the two screen derivatives, so
-/// that slanted surfaces are neither aliased nor blurred too much.
+/// Level whose texels are nearest to the footprint of pixel (x, y): the geometric mean of the two screen derivatives,
+/// so that slanted surfaces are neither aliased nor blurred too much.
 int Renderer::mip_level(const Surface& s, int x, int y) const {
   const double z = 1.0 / std::max(s.iz_x * x + s.iz_y * y + s.iz_0, 1e-3);
   const double lu = s.ua * x + s.ub * y + s.uc, lv = s.va * x + s.vb * y + s.vc;
@@ -215,7 +215,9 @@ void Renderer::shade_row(int y, const SensorNoise& noise, uint32_t row_seed) {
     int end = x + 1;
     while (end < camera_.width && id_[static_cast<size_t>(end)] == id) ++end;
     const bool round = id > planes;
-    const Surface& s = id == 0 ? sky_ : round ? rounds_[static_cast<size_t>(id - planes - 1)].surface : surfaces_[static_cast<size_t>(id - 1)];
+    const Surface& s = id == 0 ? sky_
+                       : round ? rounds_[static_cast<size_t>(id - planes - 1)].surface
+                               : surfaces_[static_cast<size_t>(id - 1)];
     ShadeRun run;
     run.gain = s.gain;
     run.gain_row = round ? gain_.data() : nullptr;

@@ -22,20 +22,20 @@ struct CameraPose {
 };
 
 struct SensorNoise {
-  double read_sigma = 1.0;       ///< levels, in darkness
-  double photon_variance = 0.01; ///< variance per level of brightness
+  double read_sigma = 1.0;        ///< levels, in darkness
+  double photon_variance = 0.01;  ///< variance per level of brightness
 };
 
-/// Renders one image of a scene by scan conversion with an inverse-depth buffer (1/z of a plane is linear in the image, so
-/// depth is exact, and every texture coordinate is one multiplication with z away from linear). Texturing is bilinear in the
-/// mip level nearest to the pixel's footprint. Not thread-safe; allocates nothing after construction unless the
-/// scene grows. Equal inputs give equal bytes on every machine.
+/// Renders one image of a scene by scan conversion with an inverse-depth buffer (1/z of a plane is linear in the image,
+/// so depth is exact, and every texture coordinate is one multiplication with z away from linear). Texturing is
+/// bilinear in the mip level nearest to the pixel's footprint. Not thread-safe; allocates nothing after construction
+/// unless the scene grows. Equal inputs give equal bytes on every machine.
 class Renderer {
  public:
   explicit Renderer(const Pinhole& camera);
 
-  /// `image` is width x height, 1 or 3 channels. `noise_seed` picks this exposure's noise. `depth` (m along the optical axis,
-  /// 0 where nothing is hit) may be null.
+  /// `image` is width x height, 1 or 3 channels. `noise_seed` picks this exposure's noise. `depth` (m along the optical
+  /// axis, 0 where nothing is hit) may be null.
   void render(const Scene& scene, const CameraPose& pose, const SensorNoise& noise, uint64_t noise_seed,
               ImageView<uint8_t> image, float* depth = nullptr);
 
@@ -44,7 +44,7 @@ class Renderer {
     double y0, y1, x0, slope;
   };
   struct Surface {
-    double iz_x = 0, iz_y = 0, iz_0 = 0;  ///< 1/z = iz_x x + iz_y y + iz_0
+    double iz_x = 0, iz_y = 0, iz_0 = 0;    ///< 1/z = iz_x x + iz_y y + iz_0
     double ua, ub, uc, u0, va, vb, vc, v0;  ///< texels of level 0: u = u0 + z (ua x + ub y + uc)
     double y_first = 0, y_last = 0;
     int edges = 0;

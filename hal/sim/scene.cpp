@@ -32,9 +32,9 @@ void add_box(Scene& scene, const Vec3& ground, const Vec3& size, double yaw, Mat
   for (size_t i = 0; i < 4; ++i) {
     const auto& p = ring[i];
     const auto& q = ring[(i + 1) % 4];
-    scene.quads.push_back(make_quad({corner(p[0], p[1], 0), corner(q[0], q[1], 0), corner(q[0], q[1], 1),
-                                     corner(p[0], p[1], 1)},
-                                    material, offset + 0.71 * static_cast<double>(i)));
+    scene.quads.push_back(
+        make_quad({corner(p[0], p[1], 0), corner(q[0], q[1], 0), corner(q[0], q[1], 1), corner(p[0], p[1], 1)},
+                  material, offset + 0.71 * static_cast<double>(i)));
   }
   scene.quads.push_back(
       make_quad({corner(-1, -1, 1), corner(1, -1, 1), corner(1, 1, 1), corner(-1, 1, 1)}, material, offset + 3));

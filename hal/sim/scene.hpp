@@ -42,7 +42,8 @@ struct Scene {
 Quad make_quad(const std::array<Vec3, 4>& corners, Material material, double offset = 0);
 /// The five visible faces of a box standing on height z.
 void add_box(Scene& scene, const Vec3& centre_on_ground, const Vec3& size, double yaw_rad, Material material);
-/// A standing person of `height` metres made of capsules; the right arm points to `pointing_rad` (map azimuth) if asked.
+/// A standing person of `height` metres made of capsules; the right arm points to `pointing_rad` (map azimuth) if
+/// asked.
 void add_person(Scene& scene, const Vec2& position, double yaw_rad, double height, bool points, double pointing_rad);
 
 }  // namespace takt::sim

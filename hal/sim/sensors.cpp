@@ -24,8 +24,10 @@ void scan(const Simulation& simulation, const LaserModel& model, int64_t first_n
     const double c = std::cos(s.theta_rad), n = std::sin(s.theta_rad);
     const Vec2 origin(s.x_m + n * t.x + c * t.y, s.y_m - c * t.x + n * t.y);
     const double angle = s.theta_rad + yaw - model.fov_rad / 2 + static_cast<double>(i) * step;
-    const double range = cast_ray(simulation.world(), simulation.scene(), origin, Vec2(std::cos(angle), std::sin(angle)), t.z, model.max_range_m);
-    const double noise = model.sigma_m * normal(simulation.seed() ^ 0x1A5E6, static_cast<uint64_t>(first_ns - simulation.epoch_ns()), i);
+    const double range = cast_ray(simulation.world(), simulation.scene(), origin,
+                                  Vec2(std::cos(angle), std::sin(angle)), t.z, model.max_range_m);
+    const double noise =
+        model.sigma_m * normal(simulation.seed() ^ 0x1A5E6, static_cast<uint64_t>(first_ns - simulation.epoch_ns()), i);
     range_m[i] = range >= model.max_range_m ? 0.0f : static_cast<float>(std::max(range + noise, 0.001));
   }
 }
@@ -47,9 +49,12 @@ void DriftingOdometry::step() {
   const RobotState now = simulation_.robot(simulation_.epoch_ns() + tick_ * kTickNs);
   const double dx = now.x_m - previous_.x_m, dy = now.y_m - previous_.y_m;
   // Distance along the heading (wheels do not slide), sign included.
-  const double middle = previous_.theta_rad + std::remainder(now.theta_rad - previous_.theta_rad, 2 * std::numbers::pi) / 2;
+  const double middle =
+      previous_.theta_rad + std::remainder(now.theta_rad - previous_.theta_rad, 2 * std::numbers::pi) / 2;
   const double distance = (dx * std::cos(middle) + dy * std::sin(middle)) * (1 + model_.scale_error);
-  const double turn = std::remainder(now.theta_rad - previous_.theta_rad, 2 * std::numbers::pi) * (1 + model_.turn_scale_error) + bias_ * 0.01;
+  const double turn =
+      std::remainder(now.theta_rad - previous_.theta_rad, 2 * std::numbers::pi) * (1 + model_.turn_scale_error) +
+      bias_ * 0.01;
   x_ += distance * std::cos(theta_ + turn / 2);
   y_ += distance * std::sin(theta_ + turn / 2);
   theta_ += turn;
@@ -70,7 +75,8 @@ BaseReading DriftingOdometry::at(int64_t at_ns) {
   r.x_m = x_;
   r.y_m = y_;
   r.theta_rad = theta_;
-  integrate_arc(r.speed_m_s, r.turn_rad_s, static_cast<double>(since - tick_ * kTickNs) * 1e-9, r.x_m, r.y_m, r.theta_rad);
+  integrate_arc(r.speed_m_s, r.turn_rad_s, static_cast<double>(since - tick_ * kTickNs) * 1e-9, r.x_m, r.y_m,
+                r.theta_rad);
   r.theta_rad = std::remainder(r.theta_rad, 2 * std::numbers::pi);
   r.blocked = simulation_.blocked();
   return r;

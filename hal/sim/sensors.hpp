@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sensor models: true state of the simulation -> what a sensor would report. Pure functions of the instant and the seed.
+// Sensor models: true state of the simulation -> what a sensor would report. Pure functions of the instant and the
+// seed.
 #pragma once
 #include <span>
 
@@ -22,9 +23,9 @@ struct LaserModel {
 void scan(const Simulation& simulation, const LaserModel& model, int64_t first_ns, std::span<float> range_m);
 
 struct OdometryModel {
-  double scale_error = 0.01;               ///< of distance, systematic
-  double turn_bias_rad_s = 0.0005;         ///< standard deviation of the start value of the yaw-rate bias
-  double turn_bias_walk = 0.0002;          ///< rad/s per sqrt(s): random walk of the bias
+  double scale_error = 0.01;        ///< of distance, systematic
+  double turn_bias_rad_s = 0.0005;  ///< standard deviation of the start value of the yaw-rate bias
+  double turn_bias_walk = 0.0002;   ///< rad/s per sqrt(s): random walk of the bias
   double turn_scale_error = 0.01;
 };
 

@@ -37,7 +37,8 @@ DeviceResult SimCamera::open() {
   if (settings_.background && !clock_.is_virtual()) {
     background_lens_ = std::make_unique<Lens>(rig);
     for (auto& image : prepared_) {
-      image.assign(static_cast<size_t>(rig.width) * static_cast<size_t>(rig.height) * static_cast<size_t>(rig.channels), 0);
+      image.assign(static_cast<size_t>(rig.width) * static_cast<size_t>(rig.height) * static_cast<size_t>(rig.channels),
+                   0);
     }
   }
   return {};
@@ -86,8 +87,8 @@ void SimCamera::trigger(int64_t at_ns) {
   triggered_ns_ = at_ns;
   has_trigger_ = ever_triggered_ = true;
   ++triggers_;
-  // While the background thread works on an older exposure its request must stay as it is: that frame is then rendered by
-  // read(), and the thread is free again for the next one.
+  // While the background thread works on an older exposure its request must stay as it is: that frame is then rendered
+  // by read(), and the thread is free again for the next one.
   if (!worker_.joinable() || done_.load(std::memory_order_acquire) != asked_.load(std::memory_order_relaxed)) return;
   request_ = request_at(at_ns);
   asked_.fetch_add(1, std::memory_order_release);
@@ -138,9 +139,10 @@ StereoFrame SimCamera::read(ImageView<uint8_t> left, ImageView<uint8_t> right, i
   }
   has_trigger_ = false;
   const Request request = request_at(at_ns);
-  const bool ready = worker_.joinable() && done_.load(std::memory_order_acquire) == asked_.load(std::memory_order_relaxed) &&
-                     made_.at_ns == at_ns && same(made_.pose[0], request.pose[0]) && same(made_.pose[1], request.pose[1]) &&
-                     asked_.load(std::memory_order_relaxed) != 0;
+  const bool ready = worker_.joinable() &&
+                     done_.load(std::memory_order_acquire) == asked_.load(std::memory_order_relaxed) &&
+                     made_.at_ns == at_ns && same(made_.pose[0], request.pose[0]) &&
+                     same(made_.pose[1], request.pose[1]) && asked_.load(std::memory_order_relaxed) != 0;
   if (ready) {
     copy(prepared_[0], left);
     copy(prepared_[1], right);

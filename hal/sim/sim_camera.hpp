@@ -18,16 +18,17 @@ namespace takt::sim {
 struct SimCameraSettings {
   StereoRig rig;
   SensorNoise noise;
-  Rate rate{15, 1};      ///< of exposures while nobody triggers
-  bool background = true; ///< render ahead of time in a thread of its own; ignored with a virtual clock
+  Rate rate{15, 1};        ///< of exposures while nobody triggers
+  bool background = true;  ///< render ahead of time in a thread of its own; ignored with a virtual clock
 };
 
 /// A stereo camera that looks at the simulated world.
 ///
-/// trigger(t) with t ahead of now starts the rendering of that exposure in the thread "sim-render" (SCHED_OTHER); read()
-/// then merely copies. If the frame is not ready, or the robot turned out to be elsewhere, or the clock is virtual, read()
-/// renders itself: what is delivered depends on the exposure's stamp alone, never on timing. Nobody triggered: the
-/// camera runs free at `rate` from the epoch, and a read gives the newest exposure that was not delivered.
+/// trigger(t) with t ahead of now starts the rendering of that exposure in the thread "sim-render" (SCHED_OTHER);
+/// read() then merely copies. If the frame is not ready, or the robot turned out to be elsewhere, or the clock is
+/// virtual, read() renders itself: what is delivered depends on the exposure's stamp alone, never on timing. Nobody
+/// triggered: the camera runs free at `rate` from the epoch, and a read gives the newest exposure that was not
+/// delivered.
 class SimCamera final : public StereoCamera {
  public:
   SimCamera(std::string id, SimCameraSettings settings, Simulation& simulation, const Clock& clock);

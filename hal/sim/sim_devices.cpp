@@ -19,7 +19,9 @@ DeviceResult SimLaser::start(int64_t epoch_ns) {
   return {};
 }
 ScanFormat SimLaser::format() const {
-  return {model_.beams, -model_.fov_rad / 2, model_.fov_rad / (model_.beams - 1), model_.max_range_m, model_.sweep_s, 0, model_.sensor_in_robot};
+  return {model_.beams,          -model_.fov_rad / 2, model_.fov_rad / (model_.beams - 1),
+          model_.max_range_m,    model_.sweep_s,      0,
+          model_.sensor_in_robot};
 }
 ScanReading SimLaser::read(std::span<float> range_m, int64_t wanted_ns, int64_t deadline_ns) {
   ScanReading reading;
@@ -44,7 +46,8 @@ HeadReading SimHead::read(int64_t wanted_ns, int64_t deadline_ns) {
 bool SimHead::command(double pan, double tilt, int64_t at_ns) {
   if (!std::isfinite(pan) || !std::isfinite(tilt)) return false;
   const HeadLimits limit = limits();
-  const double p = std::clamp(pan, -limit.pan_rad, limit.pan_rad), t = std::clamp(tilt, -limit.tilt_rad, limit.tilt_rad);
+  const double p = std::clamp(pan, -limit.pan_rad, limit.pan_rad),
+               t = std::clamp(tilt, -limit.tilt_rad, limit.tilt_rad);
   simulation_.command_head(p, t, at_ns);
   return p == pan && t == tilt;
 }
@@ -65,7 +68,8 @@ BaseReading SimBase::read(int64_t wanted_ns, int64_t deadline_ns) {
 bool SimBase::command(double speed, double turn, int64_t at_ns) {
   if (simulation_.drive() == Drive::path || !std::isfinite(speed) || !std::isfinite(turn)) return false;
   const BaseLimits limit = limits();
-  const double v = std::clamp(speed, -limit.speed_m_s, limit.speed_m_s), w = std::clamp(turn, -limit.turn_rad_s, limit.turn_rad_s);
+  const double v = std::clamp(speed, -limit.speed_m_s, limit.speed_m_s),
+               w = std::clamp(turn, -limit.turn_rad_s, limit.turn_rad_s);
   simulation_.command_base(v, w, at_ns);
   return v == speed && w == turn;
 }
@@ -81,7 +85,8 @@ LinesReading SimLines::read(int64_t wanted_ns) {
   if (!first_) {
     reading.changed = reading.levels ^ previous_;
     // Edges between the two reads whose level is back: looked for each millisecond, as the poll of a real line would.
-    for (int64_t t = previous_ns_ + 1'000'000; t < wanted_ns && wanted_ns - previous_ns_ < 2'000'000'000; t += 1'000'000) {
+    for (int64_t t = previous_ns_ + 1'000'000; t < wanted_ns && wanted_ns - previous_ns_ < 2'000'000'000;
+         t += 1'000'000) {
       reading.changed |= simulation_.lines(t) ^ previous_;
     }
   }

@@ -11,7 +11,8 @@ namespace takt::sim {
 /// Laser scanner of the simulated world; the sweep ends at the wanted instant.
 class SimLaser final : public LaserScanner {
  public:
-  SimLaser(std::string id, LaserModel model, Simulation& simulation) : id_(std::move(id)), model_(model), simulation_(simulation) {}
+  SimLaser(std::string id, LaserModel model, Simulation& simulation)
+      : id_(std::move(id)), model_(model), simulation_(simulation) {}
   DeviceResult open() override;
   void close() override {}
   DeviceResult start(int64_t epoch_ns) override;

@@ -53,9 +53,11 @@ tl::expected<std::unique_ptr<Simulation>, DeviceError> Simulation::load(const st
   if (!world) return tl::unexpected(world.error());
   size_t index = 0;
   if (!client.empty()) {
-    const auto found = std::find_if(world->clients.begin(), world->clients.end(), [&](const Client& c) { return c.name == client; });
+    const auto found =
+        std::find_if(world->clients.begin(), world->clients.end(), [&](const Client& c) { return c.name == client; });
     if (found == world->clients.end()) {
-      return device_error(device_id, file.string() + ": no client `" + client + "`", "name one of the <client> elements, e.g. `" + world->clients[0].name + "`");
+      return device_error(device_id, file.string() + ": no client `" + client + "`",
+                          "name one of the <client> elements, e.g. `" + world->clients[0].name + "`");
     }
     index = static_cast<size_t>(found - world->clients.begin());
   }
@@ -64,8 +66,10 @@ tl::expected<std::unique_ptr<Simulation>, DeviceError> Simulation::load(const st
   for (double t = 0; !path.empty() && t < path.lap_s() + 60; t += 0.1) {
     const RobotState s = path.at(t);
     if (collides(simulation->world_, Vec2(s.x_m, s.y_m), 0.3)) {
-      return device_error(device_id, file.string() + ": the path of `" + simulation->client_.name + "` hits an obstacle near x = " +
-                              std::to_string(s.x_m) + " m, y = " + std::to_string(s.y_m) + " m",
+      return device_error(device_id,
+                          file.string() + ": the path of `" + simulation->client_.name +
+                              "` hits an obstacle near x = " + std::to_string(s.x_m) +
+                              " m, y = " + std::to_string(s.y_m) + " m",
                           "move the waypoints (the curve between them is a cubic spline) or the obstacle");
     }
   }
@@ -73,8 +77,14 @@ tl::expected<std::unique_ptr<Simulation>, DeviceError> Simulation::load(const st
 }
 
 Simulation::Simulation(World world, size_t client, uint64_t seed)
-    : world_(std::move(world)), client_(world_.clients.at(client)), seed_(seed), scene_(build_scene(world_, make_textures(seed))),
-      path_(client_.path), epoch_ns_(kNoEpoch), base_({client_.x_m, client_.y_m, client_.theta_rad, 0, 0}), head_({0, 0, 0, 0}) {
+    : world_(std::move(world)),
+      client_(world_.clients.at(client)),
+      seed_(seed),
+      scene_(build_scene(world_, make_textures(seed))),
+      path_(client_.path),
+      epoch_ns_(kNoEpoch),
+      base_({client_.x_m, client_.y_m, client_.theta_rad, 0, 0}),
+      head_({0, 0, 0, 0}) {
   if (path_.empty()) set_drive(Drive::command);
 }
 
@@ -127,7 +137,8 @@ void Simulation::step_base(int64_t tick) {
   }
   double x = s[0], y = s[1], theta = s[2];
   integrate_arc(s[3], s[4], kTickS, x, y, theta);
-  const bool refuse = collides(world_, Vec2(x, y), kFootprintRadius) && !collides(world_, Vec2(s[0], s[1]), kFootprintRadius);
+  const bool refuse =
+      collides(world_, Vec2(x, y), kFootprintRadius) && !collides(world_, Vec2(s[0], s[1]), kFootprintRadius);
   blocked_.store(refuse || (blocked_.load() && s[3] == 0 && speed > 0), std::memory_order_relaxed);
   if (refuse) {
     // The step is refused; turning on the spot stays possible (round footprint).
@@ -179,7 +190,8 @@ void Simulation::step_head(int64_t tick) {
   for (size_t axis = 0; axis < 2; ++axis) {
     s[axis] = std::clamp(s[axis] + s[axis + 2] * kTickS, -reach[axis], reach[axis]);  // mechanical stop
     const double error = target[axis] - s[axis];
-    // Fastest speed from which the rest of the way suffices to brake; close to the target one tick must not overshoot it.
+    // Fastest speed from which the rest of the way suffices to brake; close to the target one tick must not overshoot
+    // it.
     const double braking = std::sqrt(2 * limits.acceleration_rad_s2 * std::abs(error)) * 0.9;
     const double wanted = std::copysign(std::min({fastest[axis], braking, std::abs(error) / kTickS}), error);
     s[axis + 2] = towards(s[axis + 2], wanted, limits.acceleration_rad_s2 * kTickS);
@@ -234,7 +246,8 @@ CameraPose Simulation::camera_pose(const StereoRig& rig, int which, const RobotS
     if (!rig.rectified) {
       const auto& r = rig.right_rotation_rad;
       pose.rotation = pose.rotation * (Eigen::AngleAxisd(r[2], Vec3::UnitZ()) * Eigen::AngleAxisd(r[1], Vec3::UnitY()) *
-                                       Eigen::AngleAxisd(r[0], Vec3::UnitX())).toRotationMatrix();
+                                       Eigen::AngleAxisd(r[0], Vec3::UnitX()))
+                                          .toRotationMatrix();
     }
   }
   return pose;
@@ -271,7 +284,8 @@ std::vector<const WorldObject*> Simulation::visible_objects(int64_t at_ns, doubl
     // The nearest thing on the way may be the object itself: allow for its own extent.
     const double extent = object.box ? std::hypot(object.box->width_m, object.box->depth_m) / 2 : 0.4;
     const double z = object.box ? object.box->z_m + object.box->height_m / 2 : 1.0;
-    if (cast_ray(world_, scene_, origin, offset / distance, z, distance) >= distance - extent - 1e-3) seen.push_back(&object);
+    if (cast_ray(world_, scene_, origin, offset / distance, z, distance) >= distance - extent - 1e-3)
+      seen.push_back(&object);
   }
   return seen;
 }

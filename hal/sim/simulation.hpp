@@ -19,8 +19,9 @@ struct PendingCommand {
   double a = 0, b = 0;
 };
 
-/// The world in time: what all sim drivers of a process share. Constant parts (map, scene, path) are immutable; the commanded
-/// parts (base in Drive::command, head, lines) have one writer each, the driver that owns them, and lock-free readers.
+/// The world in time: what all sim drivers of a process share. Constant parts (map, scene, path) are immutable; the
+/// commanded parts (base in Drive::command, head, lines) have one writer each, the driver that owns them, and lock-free
+/// readers.
 ///
 /// A command acts kLatencyNs after it was given. Everything up to that horizon is therefore settled before it
 /// happens, which lets a camera render its next exposure ahead of time and makes what is seen independent of how the
@@ -73,7 +74,8 @@ class Simulation {
 
   /// Pose of the left (0) or right (1) camera of a rig at an instant, in the map.
   CameraPose camera_pose(const StereoRig& rig, int which, int64_t at_ns) const;
-  static CameraPose camera_pose(const StereoRig& rig, int which, const RobotState& robot, double head_pan, double head_tilt);
+  static CameraPose camera_pose(const StereoRig& rig, int which, const RobotState& robot, double head_pan,
+                                double head_tilt);
   /// Ground truth for a rig: depth along the optical axis of the left camera, width x height, 0 where there is nothing.
   void true_depth(const StereoRig& rig, int64_t at_ns, float* depth_m) const;
   /// f B / depth, rectified left view.
@@ -101,8 +103,8 @@ class Simulation {
   std::atomic<uint64_t> forced_mask_{0}, forced_level_{0};
 };
 
-/// CPU time that rendering has used in this process, background threads included, ns: the cost of the simulator, which the
-/// report states apart from the cost of the devices.
+/// CPU time that rendering has used in this process, background threads included, ns: the cost of the simulator, which
+/// the report states apart from the cost of the devices.
 int64_t simulator_cpu_ns();
 void add_simulator_cpu_ns(int64_t ns);
 

@@ -13,9 +13,9 @@ struct Recipe {
   std::string_view name;
   int size;
   double texels_per_m;
-  std::array<double, 3> bgr;   ///< mean colour
-  double contrast;             ///< of the luminance noise
-  double tint;                 ///< of the colour noise
+  std::array<double, 3> bgr;  ///< mean colour
+  double contrast;            ///< of the luminance noise
+  double tint;                ///< of the colour noise
   int rectangles;
 };
 
@@ -35,7 +35,8 @@ constexpr std::array<Recipe, kMaterials> kRecipes{{
 void add_octave(std::vector<float>& field, int size, int cells, uint64_t seed, float amplitude) {
   const int pitch = size / cells;
   std::vector<float> lattice(static_cast<size_t>(cells) * static_cast<size_t>(cells));
-  for (size_t i = 0; i < lattice.size(); ++i) lattice[i] = static_cast<float>(uniform(mix(seed, i)) * 2.0 - 1.0) * amplitude;
+  for (size_t i = 0; i < lattice.size(); ++i)
+    lattice[i] = static_cast<float>(uniform(mix(seed, i)) * 2.0 - 1.0) * amplitude;
   const auto at = [&](int x, int y) { return lattice[static_cast<size_t>((y % cells) * cells + x % cells)]; };
   for (int y = 0; y < size; ++y) {
     const int cy = y / pitch;
@@ -101,7 +102,8 @@ void build_levels(Texture& texture) {
         for (int channel = 0; channel < 24; channel += 8) {
           uint32_t sum = 2;
           for (int k = 0; k < 4; ++k) {
-            sum += texture.texels[from + static_cast<size_t>((2 * y + (k >> 1)) * size + 2 * x + (k & 1))] >> channel & 255;
+            sum += texture.texels[from + static_cast<size_t>((2 * y + (k >> 1)) * size + 2 * x + (k & 1))] >> channel &
+                   255;
           }
           mean |= (sum / 4) << channel;
         }

@@ -18,13 +18,16 @@ Quad wall(const Vec2& from, const Vec2& to, double height, Material material) {
   return make_quad({a, b, b + up, a + up}, material, 0.173 * (from.x() + 3.1 * from.y()));
 }
 
-/// Borders between free and occupied cells along one axis, merged to straight runs. A wall's front looks to the free side.
+/// Borders between free and occupied cells along one axis, merged to straight runs. A wall's front looks to the free
+/// side.
 void add_walls(const World& world, Scene& scene) {
   const Bitmap& map = world.map;
   const double cell = map.cell_m;
   for (const bool horizontal : {true, false}) {
     const int lines = horizontal ? map.height : map.width, length = horizontal ? map.width : map.height;
-    const auto occupied = [&](int along, int across) { return horizontal ? map.at(along, across) : map.at(across, along); };
+    const auto occupied = [&](int along, int across) {
+      return horizontal ? map.at(along, across) : map.at(across, along);
+    };
     for (int line = 0; line <= lines; ++line) {
       for (const bool free_below : {true, false}) {
         const auto border = [&](int along) {
@@ -38,7 +41,8 @@ void add_walls(const World& world, Scene& scene) {
           const Vec2 p = horizontal ? Vec2(s, at) : Vec2(at, s), q = horizontal ? Vec2(e, at) : Vec2(at, e);
           // Running along +x with up = +z, the normal of make_quad points to -y; along +y it points to +x.
           const bool forward = horizontal == free_below;
-          scene.quads.push_back(forward ? wall(p, q, world.wall_height_m, world.wall) : wall(q, p, world.wall_height_m, world.wall));
+          scene.quads.push_back(forward ? wall(p, q, world.wall_height_m, world.wall)
+                                        : wall(q, p, world.wall_height_m, world.wall));
           start = end;
         }
       }
@@ -89,7 +93,8 @@ double cast_capsule(const Capsule& capsule, const Vec3& o, const Vec3& d) {
 
 /// Exact traversal of the cells on the ray (Amanatides and Woo 1987).
 double cast_map(const Bitmap& map, const Vec2& origin, const Vec2& direction, double max_range) {
-  int column = static_cast<int>(std::floor(origin.x() / map.cell_m)), row = static_cast<int>(std::floor(origin.y() / map.cell_m));
+  int column = static_cast<int>(std::floor(origin.x() / map.cell_m)),
+      row = static_cast<int>(std::floor(origin.y() / map.cell_m));
   if (map.at(column, row)) return 0;
   const double infinity = std::numeric_limits<double>::infinity();
   const auto first = [&](double o, double d, int cell) {
@@ -135,8 +140,8 @@ tl::expected<Bitmap, std::string> load_pgm(const std::filesystem::path& file, do
   map.width = std::atoi(width.c_str());
   map.height = std::atoi(height.c_str());
   const int maximum = std::atoi(peak.c_str());
-  if ((magic != "P5" && magic != "P2") || map.width < 3 || map.height < 3 || map.width > kMaxSide || map.height > kMaxSide ||
-      maximum < 1 || maximum > 255) {
+  if ((magic != "P5" && magic != "P2") || map.width < 3 || map.height < 3 || map.width > kMaxSide ||
+      map.height > kMaxSide || maximum < 1 || maximum > 255) {
     return tl::unexpected("the map " + file.string() + " is no 8-bit PGM of 3..4000 pixels a side");
   }
   in.get();
@@ -157,15 +162,16 @@ tl::expected<Bitmap, std::string> parse_rows(const std::string& text, double cel
   std::vector<std::string> rows;
   std::istringstream in(text);
   for (std::string row; in >> row;) rows.push_back(row);
-  if (rows.size() < 3 || rows.size() > kMaxSide || rows[0].size() < 3) return tl::unexpected(std::string("<rows> needs at least 3 x 3 cells"));
+  if (rows.size() < 3 || rows.size() > kMaxSide || rows[0].size() < 3)
+    return tl::unexpected(std::string("<rows> needs at least 3 x 3 cells"));
   Bitmap map;
   map.cell_m = cell_m;
   map.width = static_cast<int>(rows[0].size());
   map.height = static_cast<int>(rows.size());
   for (size_t i = rows.size(); i-- > 0;) {
     if (rows[i].size() != rows[0].size()) {
-      return tl::unexpected("row " + std::to_string(i + 1) + " of <rows> has " + std::to_string(rows[i].size()) + " cells, the first has " +
-                            std::to_string(rows[0].size()));
+      return tl::unexpected("row " + std::to_string(i + 1) + " of <rows> has " + std::to_string(rows[i].size()) +
+                            " cells, the first has " + std::to_string(rows[0].size()));
     }
     for (const char c : rows[i]) map.occupied.push_back(c == '#' ? 1 : 0);
   }
@@ -175,23 +181,27 @@ tl::expected<Bitmap, std::string> parse_rows(const std::string& text, double cel
 Scene build_scene(const World& world, std::shared_ptr<const TextureSet> textures) {
   Scene scene;
   scene.textures = std::move(textures);
-  const double w = world.map.width * world.map.cell_m, h = world.map.height * world.map.cell_m, top = world.wall_height_m;
+  const double w = world.map.width * world.map.cell_m, h = world.map.height * world.map.cell_m,
+               top = world.wall_height_m;
   scene.quads.push_back(make_quad({Vec3(0, 0, 0), Vec3(w, 0, 0), Vec3(w, h, 0), Vec3(0, h, 0)}, world.floor));
   scene.quads.push_back(make_quad({Vec3(0, h, top), Vec3(w, h, top), Vec3(w, 0, top), Vec3(0, 0, top)}, world.ceiling));
   add_walls(world, scene);
   for (const WorldObject& object : world.objects) {
     if (object.box) {
       add_box(scene, Vec3(object.position.x(), object.position.y(), object.box->z_m),
-              Vec3(object.box->width_m, object.box->depth_m, object.box->height_m), object.yaw_rad, object.box->material);
+              Vec3(object.box->width_m, object.box->depth_m, object.box->height_m), object.yaw_rad,
+              object.box->material);
     }
     if (object.person) {
-      add_person(scene, object.position, object.yaw_rad, object.person->height_m, object.person->points, object.person->pointing_rad);
+      add_person(scene, object.position, object.yaw_rad, object.person->height_m, object.person->points,
+                 object.person->pointing_rad);
     }
   }
   return scene;
 }
 
-double cast_ray(const World& world, const Scene& scene, const Vec2& origin, const Vec2& direction, double z, double max_range) {
+double cast_ray(const World& world, const Scene& scene, const Vec2& origin, const Vec2& direction, double z,
+                double max_range) {
   double nearest = cast_map(world.map, origin, direction, max_range);
   for (const WorldObject& object : world.objects) {
     if (object.box && z >= object.box->z_m && z <= object.box->z_m + object.box->height_m) {
@@ -206,7 +216,8 @@ double cast_ray(const World& world, const Scene& scene, const Vec2& origin, cons
 bool collides(const World& world, const Vec2& centre, double radius) {
   const Bitmap& map = world.map;
   const int reach = static_cast<int>(std::ceil(radius / map.cell_m)) + 1;
-  const int column = static_cast<int>(std::floor(centre.x() / map.cell_m)), row = static_cast<int>(std::floor(centre.y() / map.cell_m));
+  const int column = static_cast<int>(std::floor(centre.x() / map.cell_m)),
+            row = static_cast<int>(std::floor(centre.y() / map.cell_m));
   for (int r = row - reach; r <= row + reach; ++r) {
     for (int c = column - reach; c <= column + reach; ++c) {
       if (!map.at(c, r)) continue;

@@ -11,8 +11,8 @@
 
 namespace takt::sim {
 
-/// Occupancy bitmap. Cell (column, row) covers [column, column + 1) x [row, row + 1) cells of the map frame: row 0 is the
-/// bottom (smallest y), although an image file starts at the top.
+/// Occupancy bitmap. Cell (column, row) covers [column, column + 1) x [row, row + 1) cells of the map frame: row 0 is
+/// the bottom (smallest y), although an image file starts at the top.
 struct Bitmap {
   int width = 0, height = 0;
   double cell_m = 0;
@@ -20,7 +20,8 @@ struct Bitmap {
   bool inside(int column, int row) const { return column >= 0 && row >= 0 && column < width && row < height; }
   /// Outside the map everything is occupied.
   bool at(int column, int row) const {
-    return !inside(column, row) || occupied[static_cast<size_t>(row) * static_cast<size_t>(width) + static_cast<size_t>(column)] != 0;
+    return !inside(column, row) ||
+           occupied[static_cast<size_t>(row) * static_cast<size_t>(width) + static_cast<size_t>(column)] != 0;
   }
 };
 
@@ -102,7 +103,8 @@ Scene build_scene(const World& world, std::shared_ptr<const TextureSet> textures
 
 /// Distance from `origin` along `direction` (unit, horizontal) at height z to the first wall, box or person;
 /// `max_range` if nothing is nearer.
-double cast_ray(const World& world, const Scene& scene, const Vec2& origin, const Vec2& direction, double z, double max_range);
+double cast_ray(const World& world, const Scene& scene, const Vec2& origin, const Vec2& direction, double z,
+                double max_range);
 
 /// True if a circle touches a wall, a box or a person.
 bool collides(const World& world, const Vec2& centre, double radius);

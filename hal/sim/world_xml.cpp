@@ -19,17 +19,21 @@ struct Loader {
   }
   std::string text(const Element* e, const char* name, bool required, std::string fallback = "") {
     if (const char* value = e->Attribute(name)) return value;
-    if (required) fail(e, std::string("<") + e->Name() + "> lacks `" + name + "`", std::string("add ") + name + "=\"...\"");
+    if (required)
+      fail(e, std::string("<") + e->Name() + "> lacks `" + name + "`", std::string("add ") + name + "=\"...\"");
     return fallback;
   }
-  double quantity(const Element* e, const char* name, Dimension dimension, std::optional<double> fallback = std::nullopt) {
+  double quantity(const Element* e, const char* name, Dimension dimension,
+                  std::optional<double> fallback = std::nullopt) {
     const char* value = e->Attribute(name);
     if (value == nullptr) {
-      if (!fallback) fail(e, std::string("<") + e->Name() + "> lacks `" + name + "`", std::string("add ") + name + "=\"...\"");
+      if (!fallback)
+        fail(e, std::string("<") + e->Name() + "> lacks `" + name + "`", std::string("add ") + name + "=\"...\"");
       return fallback.value_or(0.0);
     }
     if (const auto parsed = parse_quantity(value, dimension)) return *parsed;
-    fail(e, std::string("`") + name + "` is \"" + value + "\", which is no value in " + std::string(unit_names(dimension)),
+    fail(e,
+         std::string("`") + name + "` is \"" + value + "\", which is no value in " + std::string(unit_names(dimension)),
          "give a number and its unit");
     return fallback.value_or(0.0);
   }
@@ -89,11 +93,13 @@ struct Loader {
         o.box = Box{quantity(c, "width", Dimension::length), quantity(c, "depth", Dimension::length),
                     quantity(c, "height", Dimension::length), quantity(c, "z", Dimension::length, 0.0),
                     material(c, "material", Material::wood)};
-        if (o.box->width_m <= 0 || o.box->depth_m <= 0 || o.box->height_m <= 0) fail(c, "a box needs positive sizes", "correct them");
+        if (o.box->width_m <= 0 || o.box->depth_m <= 0 || o.box->height_m <= 0)
+          fail(c, "a box needs positive sizes", "correct them");
       } else if (kind == "person") {
         o.person = Person{quantity(c, "height", Dimension::length, 1.75), c->Attribute("pointing") != nullptr,
                           quantity(c, "pointing", Dimension::angle, 0.0)};
-        if (o.person->height_m < 0.5 || o.person->height_m > 2.5) fail(c, "`height` must lie in 0.5..2.5 m", "correct it");
+        if (o.person->height_m < 0.5 || o.person->height_m > 2.5)
+          fail(c, "`height` must lie in 0.5..2.5 m", "correct it");
       } else {
         unknown(c, "attr, box, person");
       }
@@ -129,7 +135,8 @@ struct Loader {
     }
     for (const auto* list : {&a.pre, &a.post}) {
       for (const RoleCondition& condition : *list) {
-        if (a.roles.count(condition.role) == 0) fail(e, "action `" + a.name + "` has no role `" + condition.role + "`", "declare it with <role>");
+        if (a.roles.count(condition.role) == 0)
+          fail(e, "action `" + a.name + "` has no role `" + condition.role + "`", "declare it with <role>");
       }
     }
     world.actions.push_back(a);
@@ -165,7 +172,8 @@ struct Loader {
     }
     if (!error && world.clients.empty()) fail(e, "no <client>, so no robot", "add <client name=... x=... y=.../>");
     for (const Client& c : world.clients) {
-      if (!error && collides(world, Vec2(c.x_m, c.y_m), 0.3)) fail(e, "client `" + c.name + "` starts inside an obstacle", "move it");
+      if (!error && collides(world, Vec2(c.x_m, c.y_m), 0.3))
+        fail(e, "client `" + c.name + "` starts inside an obstacle", "move it");
     }
   }
 };
@@ -176,7 +184,10 @@ tl::expected<World, DeviceError> load_world(const std::string& device_id, const 
   tinyxml2::XMLDocument document;
   if (document.LoadFile(file.string().c_str()) != tinyxml2::XML_SUCCESS) {
     const bool missing = document.ErrorID() == tinyxml2::XML_ERROR_FILE_NOT_FOUND;
-    return device_error(device_id, file.string() + (missing ? ": the world file cannot be opened" : std::string(":").append(std::to_string(document.ErrorLineNum())) + ": no well-formed XML"),
+    return device_error(device_id,
+                        file.string() + (missing ? ": the world file cannot be opened"
+                                                 : std::string(":").append(std::to_string(document.ErrorLineNum())) +
+                                                       ": no well-formed XML"),
                         missing ? "correct `world:` of the device" : "correct the XML");
   }
   Loader loader{device_id, file.string(), {}, {}};

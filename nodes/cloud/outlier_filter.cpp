@@ -129,10 +129,8 @@ size_t OutlierFilter::filter(std::span<const Point> points, const OutlierParamet
     const size_t n = runs_around(b, runs);
     uint64_t candidates = 0;
     for (size_t r = 0; r < n; ++r) candidates += runs[r].size();
-    if (candidates < needed)
-      std::fill_n(pass_.begin() + queries.first, queries.size(), uint8_t{0});
-    else
-      decide(sorted, std::span(runs, n), queries, radius * radius, needed, pass_.data());
+    if (candidates < needed) std::fill_n(pass_.begin() + queries.first, queries.size(), uint8_t{0});
+    else decide(sorted, std::span(runs, n), queries, radius * radius, needed, pass_.data());
   }
   size_t kept = 0;
   for (size_t i = 0; i < start_.back(); ++i) {

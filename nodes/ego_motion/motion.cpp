@@ -102,10 +102,8 @@ std::optional<PlanarMotion> planar_least_squares(std::span<const Observation> ob
                                                  Form form) {
   Normal3 n;
   for (const Observation& o : observations) {
-    if (form == Form::multiplied)
-      add_multiplied(n, o, optics.focal_px, optics.baseline_m);
-    else
-      add_division(n, o, optics.focal_px, optics.baseline_m);
+    if (form == Form::multiplied) add_multiplied(n, o, optics.focal_px, optics.baseline_m);
+    else add_division(n, o, optics.focal_px, optics.baseline_m);
   }
   if (observations.size() < 2) return std::nullopt;
   const Eigen::LDLT<Eigen::Matrix3d> ldlt(n.A);

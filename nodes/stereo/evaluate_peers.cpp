@@ -40,12 +40,9 @@ cv::Ptr<cv::StereoMatcher> make(Peer peer, int range, int channels) {
 
 const char* to_string(Peer peer) {
   switch (peer) {
-    case Peer::block_matching:
-      return "stereo_bm_15";
-    case Peer::block_matching_unfiltered:
-      return "stereo_bm_15_unfiltered";
-    case Peer::semi_global:
-      break;
+    case Peer::block_matching: return "stereo_bm_15";
+    case Peer::block_matching_unfiltered: return "stereo_bm_15_unfiltered";
+    case Peer::semi_global: break;
   }
   return "stereo_sgbm_3way_5";
 }

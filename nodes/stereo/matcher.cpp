@@ -150,10 +150,8 @@ int Matcher::State::block_size(int groups_left) const {
 void Matcher::State::make_grey(ImageView<const uint8_t> image) {
   for (int y = 0; y < height; ++y) {
     uint8_t* row = grey.row(y);
-    if (channels == 3)
-      images->grey(image.row(y), width, row);
-    else
-      std::memcpy(row, image.row(y), static_cast<size_t>(width));
+    if (channels == 3) images->grey(image.row(y), width, row);
+    else std::memcpy(row, image.row(y), static_cast<size_t>(width));
     row[-1] = row[0];
     row[width] = row[width - 1];
   }
@@ -169,12 +167,9 @@ void Matcher::State::make_planes(ImageView<const uint8_t> image, bool mirror, Pl
     for (int y = 0; y < height; ++y) {
       uint8_t* target = out[static_cast<size_t>(i)].row(y);
       uint8_t* row = mirror ? scratch_row.data() : target;
-      if (!gradient)
-        images->channel(image.row(y), channels, i, width, bias, row);
-      else if (i == 0)
-        images->derivative(grey.row(y) - 1, grey.row(y) + 1, width, row);
-      else
-        images->derivative(grey.row(std::max(0, y - 1)), grey.row(std::min(height - 1, y + 1)), width, row);
+      if (!gradient) images->channel(image.row(y), channels, i, width, bias, row);
+      else if (i == 0) images->derivative(grey.row(y) - 1, grey.row(y) + 1, width, row);
+      else images->derivative(grey.row(std::max(0, y - 1)), grey.row(std::min(height - 1, y + 1)), width, row);
       if (mirror) images->reverse(row, width, target);
     }
 }

@@ -11,12 +11,9 @@ std::string out_of_range(const char* name, int value, const std::string& range) 
 /// Largest c_max for which the saturating byte arithmetic of a cost kind is exact.
 int largest_truncation(CostKind kind) {
   switch (kind) {
-    case CostKind::gradient:
-      return 64;
-    case CostKind::ssd:
-      return 225;
-    case CostKind::sad:
-      break;
+    case CostKind::gradient: return 64;
+    case CostKind::ssd: return 225;
+    case CostKind::sad: break;
   }
   return 255;
 }

@@ -56,10 +56,8 @@ void remap(const RemapImage& in, const RemapSource* sources, int count, uint8_t*
   for (; in.channels == 3 && i + 1 < count; ++i) {
     const RemapSource& s = sources[i];
     const bool wide = s.x >= 0 && (s.x < in.width - 3 || s.y < in.height - 2) && s.fraction_x > 0 && s.fraction_x < 128;
-    if (wide)
-      resample_three(in, s, out + 3 * i);
-    else
-      resample_one(in, s, out + 3 * i);
+    if (wide) resample_three(in, s, out + 3 * i);
+    else resample_one(in, s, out + 3 * i);
   }
 #endif
   for (; i < count; ++i) resample_one(in, sources[i], out + in.channels * i);

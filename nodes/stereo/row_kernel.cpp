@@ -183,19 +183,15 @@ class Rows {
     for (int g = 0; g < groups(); ++g) {
       Words sum = hn::Set(kWords, static_cast<uint16_t>(kUnique ? 0 : g));
       for (int k = -job_.radius - 1; k < job_.radius; ++k) sum = hn::Add(sum, column_sum(clamped(job_.x_begin + k), g));
-      if constexpr (kUnique)
-        hn::StoreU(sum, kWords, job_.sums + g * kLanes);
-      else
-        sums_[g] = sum;
+      if constexpr (kUnique) hn::StoreU(sum, kWords, job_.sums + g * kLanes);
+      else sums_[g] = sum;
     }
   }
 
   template <bool kNew, bool kOutside>
   HWY_INLINE void walk(int from, int to) {
-    if constexpr (kUnique)
-      walk_unique<kNew, kOutside>(from, to);
-    else
-      walk_registers<kNew, kOutside>(from, to);
+    if constexpr (kUnique) walk_unique<kNew, kOutside>(from, to);
+    else walk_registers<kNew, kOutside>(from, to);
   }
 
   template <bool kNew, bool kOutside>
@@ -311,25 +307,18 @@ RowFunctions functions_of(int groups) {
     if (groups == 6) return functions<kKind, kNarrow, 6>();
   }
   switch (groups) {
-    case 0:
-      return functions<kKind, kNarrow, 0>();
-    case 1:
-      return functions<kKind, kNarrow, 1>();
-    case 2:
-      return functions<kKind, kNarrow, 2>();
-    default:
-      return functions<kKind, kNarrow, 5>();
+    case 0: return functions<kKind, kNarrow, 0>();
+    case 1: return functions<kKind, kNarrow, 1>();
+    case 2: return functions<kKind, kNarrow, 2>();
+    default: return functions<kKind, kNarrow, 5>();
   }
 }
 
 RowFunctions rows(CostKind kind, bool narrow, int groups) {
   switch (kind) {
-    case CostKind::ssd:
-      return functions_of<CostKind::ssd, false>(groups);
-    case CostKind::sad:
-      return functions_of<CostKind::sad, false>(groups);
-    case CostKind::gradient:
-      break;
+    case CostKind::ssd: return functions_of<CostKind::ssd, false>(groups);
+    case CostKind::sad: return functions_of<CostKind::sad, false>(groups);
+    case CostKind::gradient: break;
   }
   return narrow ? functions_of<CostKind::gradient, true>(groups) : functions_of<CostKind::gradient, false>(groups);
 }

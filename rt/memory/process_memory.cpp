@@ -45,16 +45,14 @@ ProcessMemory prepare_process_memory() {
   const bool trim = mallopt(M_TRIM_THRESHOLD, -1) == 1;
   const bool arenas = mallopt(M_ARENA_MAX, 1) == 1;
   got.malloc = threshold && trim && arenas;
-  if (!got.malloc) got.lacks.emplace_back("mallopt: refused; this C library's heap cannot be kept from returning pages");
+  if (!got.malloc)
+    got.lacks.emplace_back("mallopt: refused; this C library's heap cannot be kept from returning pages");
   // A limited user would be granted MCL_FUTURE and then fail in every later allocation beyond the limit.
   rlimit limit{};
   getrlimit(RLIMIT_MEMLOCK, &limit);
-  if (geteuid() != 0 && limit.rlim_cur != RLIM_INFINITY)
-    got.lacks.push_back(mlock_refused(EPERM));
-  else if (mlockall(MCL_CURRENT | MCL_FUTURE) == 0)
-    got.mlock = true;
-  else
-    got.lacks.push_back(mlock_refused(errno));
+  if (geteuid() != 0 && limit.rlim_cur != RLIM_INFINITY) got.lacks.push_back(mlock_refused(EPERM));
+  else if (mlockall(MCL_CURRENT | MCL_FUTURE) == 0) got.mlock = true;
+  else got.lacks.push_back(mlock_refused(errno));
   return got;
 }
 

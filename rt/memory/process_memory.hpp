@@ -9,8 +9,8 @@
 namespace takt {
 
 struct ProcessMemory {
-  bool mlock = false;  ///< all pages, present and future, stay in memory
-  bool malloc = false; ///< the heap never gives pages back, never maps blocks of their own, and has one arena
+  bool mlock = false;   ///< all pages, present and future, stay in memory
+  bool malloc = false;  ///< the heap never gives pages back, never maps blocks of their own, and has one arena
   std::vector<std::string> lacks;  ///< what was refused, each with the fix
 };
 
@@ -18,15 +18,15 @@ struct ProcessMemory {
 /// faulted in page by page and unmapped again.
 ProcessMemory prepare_process_memory();
 
-/// Touches the next `bytes` of the calling thread's stack (at most half of what is left of it), so that no job takes the
-/// page fault. Returns the bytes touched.
+/// Touches the next `bytes` of the calling thread's stack (at most half of what is left of it), so that no job takes
+/// the page fault. Returns the bytes touched.
 size_t prefault_stack(size_t bytes = 256 * 1024);
 
 /// Bytes of stack between here and the end of the calling thread's stack.
 size_t stack_left();
 
-/// While it lives, the CPUs do not enter sleep states they need long to leave: wake-ups get 2-4 times faster, idle power
-/// rises.
+/// While it lives, the CPUs do not enter sleep states they need long to leave: wake-ups get 2-4 times faster, idle
+/// power rises.
 class CpuLatencyHold {
  public:
   CpuLatencyHold();

@@ -30,7 +30,8 @@ namespace detail {
 template <class T>
 constexpr Scalar scalar_of() {
   if constexpr (std::is_enum_v<T>) return scalar_of<std::underlying_type_t<T>>();
-  else if constexpr (std::is_same_v<T, uint8_t> || std::is_same_v<T, char> || std::is_same_v<T, bool>) return Scalar::u8;
+  else if constexpr (std::is_same_v<T, uint8_t> || std::is_same_v<T, char> || std::is_same_v<T, bool>)
+    return Scalar::u8;
   else if constexpr (std::is_same_v<T, int16_t>) return Scalar::i16;
   else if constexpr (std::is_same_v<T, uint16_t>) return Scalar::u16;
   else if constexpr (std::is_same_v<T, int32_t>) return Scalar::i32;
@@ -38,29 +39,44 @@ constexpr Scalar scalar_of() {
   else if constexpr (std::is_same_v<T, int64_t>) return Scalar::i64;
   else if constexpr (std::is_same_v<T, uint64_t>) return Scalar::u64;
   else if constexpr (std::is_same_v<T, float>) return Scalar::f32;
-  else { static_assert(std::is_same_v<T, double>, "a message field is a scalar, a C array of scalars or an Array"); return Scalar::f64; }
+  else {
+    static_assert(std::is_same_v<T, double>, "a message field is a scalar, a C array of scalars or an Array");
+    return Scalar::f64;
+  }
 }
 
 template <class T>
 struct Describe {
   using Base = std::remove_all_extents_t<T>;
   static constexpr Field field(std::string_view name, std::string_view unit, size_t offset) {
-    return {name, unit, scalar_of<Base>(), static_cast<uint32_t>(offset), static_cast<uint32_t>(sizeof(T) / sizeof(Base)),
+    return {name,
+            unit,
+            scalar_of<Base>(),
+            static_cast<uint32_t>(offset),
+            static_cast<uint32_t>(sizeof(T) / sizeof(Base)),
             static_cast<uint32_t>(sizeof(Base))};
   }
 };
 
 /// Elements of an Array are scalars, or structs of one scalar type (`using scalar = float;` inside the struct).
 template <class T>
-struct ElementScalar { using type = T; };
+struct ElementScalar {
+  using type = T;
+};
 template <class T>
-  requires requires { typename T::scalar; }
-struct ElementScalar<T> { using type = typename T::scalar; };
+requires requires { typename T::scalar; }
+struct ElementScalar<T> {
+  using type = typename T::scalar;
+};
 
 template <class T>
 struct Describe<Array<T>> {
   static constexpr Field field(std::string_view name, std::string_view unit, size_t offset) {
-    return {name, unit, scalar_of<typename ElementScalar<T>::type>(), static_cast<uint32_t>(offset), 0,
+    return {name,
+            unit,
+            scalar_of<typename ElementScalar<T>::type>(),
+            static_cast<uint32_t>(offset),
+            0,
             static_cast<uint32_t>(sizeof(T))};
   }
 };
@@ -70,9 +86,9 @@ struct Describe<Array<T>> {
 /// TAKT_FIELD(StereoPair, camera.focal_px, "px") describes one (possibly nested) member.
 #define TAKT_FIELD(Message, member, unit) \
   ::takt::detail::Describe<decltype(Message::member)>::field(#member, unit, offsetof(Message, member))
-#define TAKT_NESTED_FIELD(Message, outer, inner, unit)                                                  \
+#define TAKT_NESTED_FIELD(Message, outer, inner, unit)                                                \
   ::takt::detail::Describe<decltype(decltype(Message::outer)::inner)>::field(#outer "." #inner, unit, \
-                                                                            offsetof(Message, outer.inner))
+                                                                             offsetof(Message, outer.inner))
 
 /// How large a message may become on one port; what each number means is said by the message type.
 struct Capacity {

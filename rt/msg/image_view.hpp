@@ -5,8 +5,8 @@
 
 namespace takt {
 
-/// A non-owning window on an image: row-major, `channels` interleaved elements per pixel, `stride` elements from one row
-/// to the next. Pixel (x, y): x grows to the right, y downwards.
+/// A non-owning window on an image: row-major, `channels` interleaved elements per pixel, `stride` elements from one
+/// row to the next. Pixel (x, y): x grows to the right, y downwards.
 template <class T>
 struct ImageView {
   T* data = nullptr;

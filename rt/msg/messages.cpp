@@ -7,20 +7,22 @@
 namespace takt {
 namespace {
 template <size_t N>
-std::span<const Field> as_span(const std::array<Field, N>& fields) { return fields; }
+std::span<const Field> as_span(const std::array<Field, N>& fields) {
+  return fields;
+}
 }  // namespace
 
-#define CAMERA_FIELDS(M)                                                                              \
-  TAKT_NESTED_FIELD(M, camera, focal_px, "px"), TAKT_NESTED_FIELD(M, camera, cu_px, "px"),           \
+#define CAMERA_FIELDS(M)                                                                   \
+  TAKT_NESTED_FIELD(M, camera, focal_px, "px"), TAKT_NESTED_FIELD(M, camera, cu_px, "px"), \
       TAKT_NESTED_FIELD(M, camera, cv_px, "px"), TAKT_NESTED_FIELD(M, camera, baseline_m, "m")
-#define TRANSFORM_FIELDS(M, t)                                                                        \
-  TAKT_NESTED_FIELD(M, t, x, "m"), TAKT_NESTED_FIELD(M, t, y, "m"), TAKT_NESTED_FIELD(M, t, z, "m"), \
+#define TRANSFORM_FIELDS(M, t)                                                                              \
+  TAKT_NESTED_FIELD(M, t, x, "m"), TAKT_NESTED_FIELD(M, t, y, "m"), TAKT_NESTED_FIELD(M, t, z, "m"),        \
       TAKT_NESTED_FIELD(M, t, qw, "1"), TAKT_NESTED_FIELD(M, t, qx, "1"), TAKT_NESTED_FIELD(M, t, qy, "1"), \
       TAKT_NESTED_FIELD(M, t, qz, "1")
-#define FIELDS(M, ...)                                           \
-  std::span<const Field> M::fields() {                           \
+#define FIELDS(M, ...)                                                \
+  std::span<const Field> M::fields() {                                \
     static constexpr auto list = std::to_array<Field>({__VA_ARGS__}); \
-    return as_span(list);                                        \
+    return as_span(list);                                             \
   }
 #define F(M, member, unit) TAKT_FIELD(M, member, unit)
 
@@ -58,12 +60,21 @@ FIELDS(TextStatus, F(TextStatus, text, ""))
 #undef CAMERA_FIELDS
 
 std::span<const MessageType* const> message_types() {
-  static const std::array<const MessageType*, 15> types{
-      &MessageType::of<Image>(),      &MessageType::of<StereoPair>(),  &MessageType::of<DisparityMap>(),
-      &MessageType::of<PointCloud>(), &MessageType::of<LaserScan>(),   &MessageType::of<Odometry>(),
-      &MessageType::of<Pose>(),       &MessageType::of<Motion>(),      &MessageType::of<Detections>(),
-      &MessageType::of<Grid>(),       &MessageType::of<HeadState>(),   &MessageType::of<HeadCommand>(),
-      &MessageType::of<VelocityCommand>(), &MessageType::of<DigitalState>(), &MessageType::of<TextStatus>()};
+  static const std::array<const MessageType*, 15> types{&MessageType::of<Image>(),
+                                                        &MessageType::of<StereoPair>(),
+                                                        &MessageType::of<DisparityMap>(),
+                                                        &MessageType::of<PointCloud>(),
+                                                        &MessageType::of<LaserScan>(),
+                                                        &MessageType::of<Odometry>(),
+                                                        &MessageType::of<Pose>(),
+                                                        &MessageType::of<Motion>(),
+                                                        &MessageType::of<Detections>(),
+                                                        &MessageType::of<Grid>(),
+                                                        &MessageType::of<HeadState>(),
+                                                        &MessageType::of<HeadCommand>(),
+                                                        &MessageType::of<VelocityCommand>(),
+                                                        &MessageType::of<DigitalState>(),
+                                                        &MessageType::of<TextStatus>()};
   return types;
 }
 

@@ -37,7 +37,9 @@ struct Image {
   ImageView<uint8_t> view() { return {pixels.data(), width, height, channels}; }
   ImageView<const uint8_t> view() const { return {pixels.data(), width, height, channels}; }
   static std::span<const Field> fields();
-  static void capacities(const Capacity& c, std::span<uint32_t> a) { a[0] = static_cast<uint32_t>(c.pixels() * c.channels); }
+  static void capacities(const Capacity& c, std::span<uint32_t> a) {
+    a[0] = static_cast<uint32_t>(c.pixels() * c.channels);
+  }
 };
 
 /// Two 8-bit images of one exposure. Raw from a camera, rectified (camera.focal_px > 0) from the stereo node.
@@ -139,8 +141,8 @@ struct Motion {
   double confidence = 0;
   double rms_px = 0;
   int32_t corners = 0, matched = 0, inliers = 0;
-  uint8_t valid = 0;      ///< 0: confidence too low, the motion was predicted instead of measured
-  uint8_t keyframe = 0;   ///< 1: first frame, nothing to compare with
+  uint8_t valid = 0;     ///< 0: confidence too low, the motion was predicted instead of measured
+  uint8_t keyframe = 0;  ///< 1: first frame, nothing to compare with
   static std::span<const Field> fields();
   static void capacities(const Capacity&, std::span<uint32_t>) {}
 };

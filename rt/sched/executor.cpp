@@ -61,7 +61,8 @@ std::vector<Reservation> Executor::reservations(Policy policy) const {
   std::vector<size_t> order(lanes_.size());
   std::iota(order.begin(), order.end(), size_t{0});
   // Deadline monotonic: the shorter the span, the higher the priority.
-  std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) { return lanes_[a]->span_ns() < lanes_[b]->span_ns(); });
+  std::stable_sort(order.begin(), order.end(),
+                   [&](size_t a, size_t b) { return lanes_[a]->span_ns() < lanes_[b]->span_ns(); });
   std::vector<double> load(std::max<size_t>(plan_.cores.size(), 1), 0.0);
   for (size_t rank = 0; rank < order.size(); ++rank) {
     const Lane& lane = *lanes_[order[rank]];
@@ -166,9 +167,9 @@ void Executor::run_virtual(RunResult& result) {
 void Executor::count_released(RunResult& result) const {
   for (const auto& task : tasks_) {
     const TaskPlan& plan = task->plan();
-    result.released.push_back(plan.rate ? static_cast<uint64_t>(plan.rate->releases_before(
-                                              result.epoch_ns + plan.offset_ns, result.end_ns))
-                                        : task->statistics().released.load());
+    result.released.push_back(
+        plan.rate ? static_cast<uint64_t>(plan.rate->releases_before(result.epoch_ns + plan.offset_ns, result.end_ns))
+                  : task->statistics().released.load());
   }
 }
 

@@ -15,11 +15,11 @@ namespace takt {
 
 /// The outcome of a run, for the report.
 struct RunResult {
-  int64_t epoch_ns = 0, end_ns = 0;      ///< planned releases lie in [epoch, end)
+  int64_t epoch_ns = 0, end_ns = 0;  ///< planned releases lie in [epoch, end)
   Policy policy_granted = Policy::cooperative;
-  std::vector<Grant> grants;             ///< per task
-  std::vector<uint64_t> released;        ///< per task; computed from rate and window for those with a rate
-  std::vector<std::string> refused;      ///< what the kernel refused, with the fix
+  std::vector<Grant> grants;         ///< per task
+  std::vector<uint64_t> released;    ///< per task; computed from rate and window for those with a rate
+  std::vector<std::string> refused;  ///< what the kernel refused, with the fix
   bool end_of_data = false;
   double duration_s() const { return static_cast<double>(end_ns - epoch_ns) / 1e9; }
 };
@@ -29,9 +29,9 @@ struct RunResult {
 class Executor {
  public:
   struct Options {
-    int64_t duration_ns = 0;           ///< 0: until stop() or the end of the data
+    int64_t duration_ns = 0;              ///< 0: until stop() or the end of the data
     int64_t start_delay_ns = 50'000'000;  ///< from run() to the epoch
-    bool require_policy = false;       ///< a refused policy ends the run instead of falling back to cooperative
+    bool require_policy = false;          ///< a refused policy ends the run instead of falling back to cooperative
   };
 
   Executor(const Plan& plan, Transport& transport, Clock& clock, const Options& options);

@@ -28,9 +28,7 @@ constexpr uint32_t kDeadline = 6;  // SCHED_DEADLINE
 constexpr uint64_t kResetOnFork = 1;
 
 int set_attributes(const SchedulingAttributes& a) { return static_cast<int>(syscall(SYS_sched_setattr, 0, &a, 0)); }
-int get_attributes(SchedulingAttributes& a) {
-  return static_cast<int>(syscall(SYS_sched_getattr, 0, &a, sizeof a, 0));
-}
+int get_attributes(SchedulingAttributes& a) { return static_cast<int>(syscall(SYS_sched_getattr, 0, &a, sizeof a, 0)); }
 
 std::vector<int> current_cpus() {
   cpu_set_t set;

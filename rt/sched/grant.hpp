@@ -22,8 +22,8 @@ struct Grant {
   double runtime_ms = 0, deadline_ms = 0;
   int priority = 0;
   std::vector<int> cpus;
-  bool verified = false;    ///< read back and equal to what was asked
-  std::string refused;      ///< empty, or what was refused and the fix
+  bool verified = false;  ///< read back and equal to what was asked
+  std::string refused;    ///< empty, or what was refused and the fix
 };
 
 /// SCHED_DEADLINE parameters for a lane of that budget, deadline and period. The reservation period is the deadline, or

@@ -6,8 +6,8 @@
 
 namespace takt {
 
-/// Distribution of durations in ns, for runs of any length in fixed memory: buckets 1/128 of an octave wide (figures are
-/// right to 0.8 %), count and maximum exact. Nothing is ever dropped. Negative values count as 0. One writer.
+/// Distribution of durations in ns, for runs of any length in fixed memory: buckets 1/128 of an octave wide (figures
+/// are right to 0.8 %), count and maximum exact. Nothing is ever dropped. Negative values count as 0. One writer.
 class Histogram {
  public:
   Histogram() : buckets_(kBuckets) {}

@@ -72,8 +72,7 @@ void Lane::run_head_modelled(StopSignal& stop, std::vector<Activation>& released
 
 void Lane::run_follower_modelled(const Activation& activation, std::vector<Activation>& released) {
   Task& task = *tasks_[activation.member];
-  const JobEnd end =
-      task.run(followers_[activation.member].index++, activation.release_ns, task.plan().budget_ns);
+  const JobEnd end = task.run(followers_[activation.member].index++, activation.release_ns, task.plan().budget_ns);
   for (size_t m = 1; m < tasks_.size(); ++m) {
     if (followers_[m].producer == activation.member && activates(m, end.visible_at_ns))
       released.push_back({m, end.visible_at_ns});
@@ -82,7 +81,8 @@ void Lane::run_follower_modelled(const Activation& activation, std::vector<Activ
 
 int64_t Lane::budget_ns() const {
   int64_t sum = 0;
-  for (const Task* task : tasks_) sum += task->plan().budget_ns > 0 ? task->plan().budget_ns : task->plan().deadline_ns / 4;
+  for (const Task* task : tasks_)
+    sum += task->plan().budget_ns > 0 ? task->plan().budget_ns : task->plan().deadline_ns / 4;
   return sum;
 }
 

@@ -67,7 +67,8 @@ struct Plan {
   std::string mode = "full";
 };
 
-/// Rate at which a task runs: its own, or that of the producer whose output releases it (divided by `every`); 0 if none.
+/// Rate at which a task runs: its own, or that of the producer whose output releases it (divided by `every`); 0 if
+/// none.
 double effective_rate_hz(const Plan& plan, size_t task);
 
 }  // namespace takt

@@ -7,7 +7,8 @@
 namespace takt {
 
 /// A meeting point of a fixed number of threads, once. std::barrier will not do: it spins with sched_yield, which under
-/// SCHED_DEADLINE gives the whole budget away until the next replenishment (measured: first releases up to 420 ms late).
+/// SCHED_DEADLINE gives the whole budget away until the next replenishment (measured: first releases up to 420 ms
+/// late).
 class Rendezvous {
  public:
   explicit Rendezvous(size_t threads) : missing_(threads) {}

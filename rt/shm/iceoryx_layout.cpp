@@ -32,7 +32,8 @@ void check(std::span<const PortPlan> ports) {
   uint64_t readers = 0;
   for (const PortPlan& port : ports) {
     readers += port.readers;
-    if (port.history == 0) throw std::invalid_argument("output " + id(port) + " keeps no message; its history must be 1 or more");
+    if (port.history == 0)
+      throw std::invalid_argument("output " + id(port) + " keeps no message; its history must be 1 or more");
     if (uint64_t{port.history} + port.held >= queue)
       throw std::invalid_argument("output " + id(port) + ": history " + std::to_string(port.history) + " and " +
                                   std::to_string(port.held) + " held messages exceed the " + std::to_string(queue - 1) +
@@ -47,7 +48,8 @@ void check(std::span<const PortPlan> ports) {
 }
 
 /// Splits `sizes` (ascending) into at most `groups` runs, joining the neighbours whose union wastes least.
-std::vector<std::vector<size_t>> group(const std::vector<size_t>& order, std::span<const PortPlan> ports, size_t groups) {
+std::vector<std::vector<size_t>> group(const std::vector<size_t>& order, std::span<const PortPlan> ports,
+                                       size_t groups) {
   std::vector<std::vector<size_t>> runs;
   for (size_t port : order) runs.push_back({port});
   const auto waste = [&](const std::vector<size_t>& lower, const std::vector<size_t>& upper) {

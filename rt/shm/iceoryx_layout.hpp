@@ -31,7 +31,7 @@ struct IceoryxPool {
 /// gets a pool of its own by a size of its own (64 B more where two are equal), so that one greedy consumer cannot
 /// starve a foreign publisher. Only where there are more outputs than pools do neighbours in size share one.
 struct IceoryxLayout {
-  std::vector<IceoryxPool> pools;     ///< ascending; pools[0] carries the notes of repeated messages, for all outputs
+  std::vector<IceoryxPool> pools;  ///< ascending; pools[0] carries the notes of repeated messages, for all outputs
   std::vector<uint32_t> pool_of_port;
   uint64_t bytes() const;
 

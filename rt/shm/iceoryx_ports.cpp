@@ -74,8 +74,7 @@ using PortData = iox::popo::BasePortData* (iox::popo::BasePort::*)() noexcept;
 /// blocking, from whatever real-time thread asked.
 class Publisher : public iox::popo::UntypedPublisher {
  public:
-  Publisher(const iox::capro::ServiceDescription& name, uint64_t history)
-      : UntypedPublisher(name, options(history)) {}
+  Publisher(const iox::capro::ServiceDescription& name, uint64_t history) : UntypedPublisher(name, options(history)) {}
 
   iox::mepoo::MemPoolInfo pool(uint32_t index) {
     constexpr PortData members = &OpenPort::getMembers;
@@ -232,7 +231,8 @@ class IceoryxReader final : public Reader {
       const MessageHeader& header = *slots_[index].header;
       held = {&header, sequence, header.stamp_ns, header.visible_at_ns, index};
     } else {
-      const auto repeat = std::find_if(repeats_.begin(), repeats_.end(), [&](const Repeat& r) { return r.sequence == sequence; });
+      const auto repeat =
+          std::find_if(repeats_.begin(), repeats_.end(), [&](const Repeat& r) { return r.sequence == sequence; });
       if (repeat == repeats_.end() || (index = find(repeat->repeated)) == kNone) return {};
       held = {slots_[index].header, sequence, repeat->stamp_ns, repeat->visible_at_ns, index};
     }
@@ -300,7 +300,8 @@ class IceoryxReader final : public Reader {
         oldest.kept = false;
         if (oldest.holds == 0) give_back(oldest);
       }
-      const auto free = std::find_if(slots_.begin(), slots_.end(), [](const Slot& slot) { return slot.header == nullptr; });
+      const auto free =
+          std::find_if(slots_.begin(), slots_.end(), [](const Slot& slot) { return slot.header == nullptr; });
       if (free == slots_.end()) return;  // jobs hold more than the graph said; the queue drops its oldest meanwhile
       messages_.take().and_then([&](const void*& taken) { free->header = static_cast<const MessageHeader*>(taken); });
       if (free->header == nullptr) return;
@@ -319,16 +320,16 @@ class IceoryxReader final : public Reader {
   void check_never_copied(const MessageHeader& header) const {
     const uint64_t offset = segment_offset(&header);
     if (header.loan_offset == offset) return;
-    std::fprintf(stderr, "takt: bug: message of %s.%s was loaned at offset %lu and taken at %lu\n", port_.plan.node.c_str(),
-                 port_.plan.port.c_str(), header.loan_offset, offset);
+    std::fprintf(stderr, "takt: bug: message of %s.%s was loaned at offset %lu and taken at %lu\n",
+                 port_.plan.node.c_str(), port_.plan.port.c_str(), header.loan_offset, offset);
     std::abort();
   }
 
   const IceoryxPort& port_;
   const size_t history_;
   std::vector<Slot> slots_;
-  std::vector<uint32_t> kept_;    ///< slots of the newest messages, oldest first
-  std::vector<Repeat> repeats_;   ///< the newest notes, oldest first
+  std::vector<uint32_t> kept_;   ///< slots of the newest messages, oldest first
+  std::vector<Repeat> repeats_;  ///< the newest notes, oldest first
   iox::popo::UntypedSubscriber messages_, notes_;
 };
 
@@ -338,7 +339,8 @@ std::unique_ptr<Writer> make_iceoryx_writer(const IceoryxPort& port) { return st
 
 std::unique_ptr<Reader> make_iceoryx_reader(const IceoryxPort& port) {
   auto reader = std::make_unique<IceoryxReader>(port);
-  for (int tries = 0; tries < 1000 && !reader->connected(); ++tries) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  for (int tries = 0; tries < 1000 && !reader->connected(); ++tries)
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
   return reader;
 }
 

@@ -47,7 +47,8 @@ std::string megabytes(uint64_t bytes) { return std::to_string((bytes + 999'999) 
 
 [[noreturn]] void daemon_running(const std::filesystem::path& lock, const std::filesystem::path& locks) {
   const auto holder = lock_holder(lock, locks);
-  const std::string who = holder ? "process " + std::to_string(*holder) + " (" + process_name(*holder) + ")" : "another process";
+  const std::string who =
+      holder ? "process " + std::to_string(*holder) + " (" + process_name(*holder) + ")" : "another process";
   throw TransportError("another iceoryx daemon is running: " + who + " holds " + lock.string() +
                        "; there can be one on a machine. Stop it" +
                        (holder ? " (kill " + std::to_string(*holder) + ")" : "") +
@@ -56,7 +57,8 @@ std::string megabytes(uint64_t bytes) { return std::to_string((bytes + 999'999) 
 
 [[noreturn]] void foreign(const std::filesystem::path& file, uid_t owner, uid_t user) {
   throw TransportError(file.string() + " belongs to " + user_name(owner) + ", this process runs as " + user_name(user) +
-                       ": left behind by an iceoryx daemon of " + user_name(owner) + ". Remove it: sudo rm " + file.string());
+                       ": left behind by an iceoryx daemon of " + user_name(owner) + ". Remove it: sudo rm " +
+                       file.string());
 }
 
 /// A file we could not replace: another user's in a directory with the sticky bit.
@@ -73,7 +75,8 @@ void check_lock(const std::filesystem::path& lock, const IceoryxPlaces& places) 
     const int reason = errno;
     struct stat status {};
     if (lstat(lock.c_str(), &status) == 0 && status.st_uid != places.user) foreign(lock, status.st_uid, places.user);
-    throw TransportError("cannot open " + lock.string() + ": " + std::strerror(reason) + ". Remove it: sudo rm " + lock.string());
+    throw TransportError("cannot open " + lock.string() + ": " + std::strerror(reason) + ". Remove it: sudo rm " +
+                         lock.string());
   }
   const bool free = flock(file, LOCK_EX | LOCK_NB) == 0;
   struct stat status {};
@@ -92,7 +95,8 @@ IceoryxPlaces IceoryxPlaces::of_this_machine() {
   std::array<char, 4096> buffer{};
   group entry{};
   group* found = nullptr;
-  if (getgrgid_r(getegid(), &entry, buffer.data(), buffer.size(), &found) == 0 && found != nullptr) places.segment = found->gr_name;
+  if (getgrgid_r(getegid(), &entry, buffer.data(), buffer.size(), &found) == 0 && found != nullptr)
+    places.segment = found->gr_name;
   return places;
 }
 
@@ -119,8 +123,10 @@ std::optional<pid_t> lock_holder(const std::filesystem::path& file, const std::f
 
 void iceoryx_preflight(const IceoryxPlaces& places, uint64_t needed_bytes) {
   if (places.segment.empty())
-    throw TransportError("the group " + std::to_string(getegid()) + " of this process has no name, iceoryx needs one to name its "
-                         "shared memory. Add it: sudo groupadd --gid " + std::to_string(getegid()) + " takt");
+    throw TransportError("the group " + std::to_string(getegid()) +
+                         " of this process has no name, iceoryx needs one to name its "
+                         "shared memory. Add it: sudo groupadd --gid " +
+                         std::to_string(getegid()) + " takt");
   check_lock(places.run / kLock, places);
   check_owner(places.run / kSocket, places.user);
   uint64_t reclaimed = 0;
@@ -131,13 +137,15 @@ void iceoryx_preflight(const IceoryxPlaces& places, uint64_t needed_bytes) {
   }
   struct statvfs room {};
   if (statvfs(places.shm.c_str(), &room) != 0)
-    throw TransportError(places.shm.string() + ": " + std::strerror(errno) + ". Mount it: sudo mount -t tmpfs tmpfs " + places.shm.string());
+    throw TransportError(places.shm.string() + ": " + std::strerror(errno) + ". Mount it: sudo mount -t tmpfs tmpfs " +
+                         places.shm.string());
   const uint64_t available = uint64_t{room.f_bavail} * room.f_frsize + reclaimed;
   if (available < needed_bytes)
-    throw TransportError(places.shm.string() + " has " + megabytes(available) + " free, the message pools of this graph need " +
-                         megabytes(needed_bytes) + ". Enlarge it: sudo mount -o remount,size=" +
-                         std::to_string((needed_bytes - available + uint64_t{room.f_blocks} * room.f_frsize + 1'048'575) / 1'048'576) +
-                         "M " + places.shm.string() + ", or lower image sizes or edge depths");
+    throw TransportError(
+        places.shm.string() + " has " + megabytes(available) + " free, the message pools of this graph need " +
+        megabytes(needed_bytes) + ". Enlarge it: sudo mount -o remount,size=" +
+        std::to_string((needed_bytes - available + uint64_t{room.f_blocks} * room.f_frsize + 1'048'575) / 1'048'576) +
+        "M " + places.shm.string() + ", or lower image sizes or edge depths");
 }
 
 }  // namespace takt

@@ -13,10 +13,10 @@ namespace takt {
 
 /// Places and identity, injectable for tests.
 struct IceoryxPlaces {
-  std::filesystem::path run = "/tmp";       ///< locks and sockets (compiled into iceoryx)
+  std::filesystem::path run = "/tmp";  ///< locks and sockets (compiled into iceoryx)
   std::filesystem::path shm = "/dev/shm";
   std::filesystem::path locks = "/proc/locks";
-  uid_t user;    ///< effective user of this process
+  uid_t user;           ///< effective user of this process
   std::string segment;  ///< file name of the pools in shm: iceoryx names it after the group of the process
   static IceoryxPlaces of_this_machine();
 };

@@ -35,8 +35,10 @@ class Claim {
  public:
   Claim() {
     if (in_use.exchange(true))
-      throw TransportError("this process has an iceoryx transport already; iceoryx allows one in a process. End the other graph first");
-    iox::log::LogManager::GetLogManager().SetDefaultLogLevel(iox::log::LogLevel::kFatal, iox::log::LogLevelOutput::kHideLogLevel);
+      throw TransportError(
+          "this process has an iceoryx transport already; iceoryx allows one in a process. End the other graph first");
+    iox::log::LogManager::GetLogManager().SetDefaultLogLevel(iox::log::LogLevel::kFatal,
+                                                             iox::log::LogLevelOutput::kHideLogLevel);
   }
   Claim(const Claim&) = delete;
   Claim& operator=(const Claim&) = delete;
@@ -91,7 +93,8 @@ class Quiet {
   std::array<std::ostream*, 2> streams_{&std::cout, &std::clog};
 };
 
-std::deque<IceoryxPort> ports_of(std::span<const PortPlan> plans, const IceoryxLayout& layout, const std::string& domain) {
+std::deque<IceoryxPort> ports_of(std::span<const PortPlan> plans, const IceoryxLayout& layout,
+                                 const std::string& domain) {
   std::deque<IceoryxPort> ports;
   for (size_t i = 0; i < plans.size(); ++i) {
     const uint32_t pool = layout.pool_of_port[i];

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "rt/transform/pose_math.hpp"
 
-#include <cmath>
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <cmath>
 
 namespace takt {
 namespace {
@@ -70,8 +70,7 @@ UncertainPose inverse(const UncertainPose& child_in_parent) {
 
 UncertainPose interpolate(const UncertainPose& from, const UncertainPose& to, double fraction) {
   UncertainPose between;
-  const Eigen::Vector3d t =
-      (1 - fraction) * translation(from.transform) + fraction * translation(to.transform);
+  const Eigen::Vector3d t = (1 - fraction) * translation(from.transform) + fraction * translation(to.transform);
   between.transform = transform(t, rotation(from.transform).slerp(fraction, rotation(to.transform)).normalized());
   const Matrix6 covariance = (1 - fraction) * matrix(from.covariance) + fraction * matrix(to.covariance);
   store(covariance, between.covariance);

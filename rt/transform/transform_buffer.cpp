@@ -8,7 +8,8 @@
 namespace takt {
 namespace {
 
-tl::unexpected<TransformError> problem(TransformProblem what, int64_t asked_ns, int64_t oldest_ns = 0, int64_t newest_ns = 0) {
+tl::unexpected<TransformError> problem(TransformProblem what, int64_t asked_ns, int64_t oldest_ns = 0,
+                                       int64_t newest_ns = 0) {
   return tl::unexpected<TransformError>({what, 0, 0, asked_ns, oldest_ns, newest_ns});
 }
 
@@ -78,13 +79,16 @@ FrameId TransformBuffer::frame(std::string_view name) {
 }
 
 TransformBuffer::Frame& TransformBuffer::join(FrameId parent, FrameId child) {
-  if (parent >= frames_.size() || child >= frames_.size()) throw std::invalid_argument("frame number is not from frame()");
+  if (parent >= frames_.size() || child >= frames_.size())
+    throw std::invalid_argument("frame number is not from frame()");
   if (frames_[child].parent != kNoFrame)
-    throw std::invalid_argument("frame " + frames_[child].name + " has a parent already (" + frames_[frames_[child].parent].name +
-                                "), it cannot also lie in " + frames_[parent].name);
+    throw std::invalid_argument("frame " + frames_[child].name + " has a parent already (" +
+                                frames_[frames_[child].parent].name + "), it cannot also lie in " +
+                                frames_[parent].name);
   for (FrameId above = parent; above != kNoFrame; above = frames_[above].parent)
     if (above == child)
-      throw std::invalid_argument("frame " + frames_[child].name + " in " + frames_[parent].name + " would close a cycle");
+      throw std::invalid_argument("frame " + frames_[child].name + " in " + frames_[parent].name +
+                                  " would close a cycle");
   frames_[child].parent = parent;
   return frames_[child];
 }
@@ -96,7 +100,8 @@ void TransformBuffer::add(FrameId parent, FrameId child, size_t capacity, int64_
 }
 
 void TransformBuffer::add_fixed(FrameId parent, FrameId child, const UncertainPose& child_in_parent) {
-  if (!is_valid(child_in_parent)) throw std::invalid_argument("a fixed pose must be finite with a quaternion that is not zero");
+  if (!is_valid(child_in_parent))
+    throw std::invalid_argument("a fixed pose must be finite with a quaternion that is not zero");
   Frame& frame = join(parent, child);
   frame.fixed = true;
   frame.pose = normalised(child_in_parent);
@@ -135,7 +140,8 @@ size_t TransformBuffer::depth(FrameId frame) const {
   return levels;
 }
 
-tl::expected<UncertainPose, TransformError> TransformBuffer::lookup(FrameId target, FrameId source, int64_t stamp_ns) const {
+tl::expected<UncertainPose, TransformError> TransformBuffer::lookup(FrameId target, FrameId source,
+                                                                    int64_t stamp_ns) const {
   const tl::unexpected<TransformError> unknown({TransformProblem::unknown_frame, target, source, stamp_ns, 0, 0});
   if (target >= frames_.size() || source >= frames_.size()) return unknown;
   FrameId a = target, b = source;
@@ -161,7 +167,8 @@ std::string TransformBuffer::describe(const TransformError& error) const {
   switch (error.problem) {
     case TransformProblem::unknown_frame: return text + ", no chain of poses joins the two; declare the missing pair";
     case TransformProblem::empty: return text + ", no pose has arrived yet";
-    case TransformProblem::too_old: return text + ", the oldest kept pose is from " + seconds(error.oldest_ns) + "; raise the capacity";
+    case TransformProblem::too_old:
+      return text + ", the oldest kept pose is from " + seconds(error.oldest_ns) + "; raise the capacity";
     case TransformProblem::too_new: return text + ", the newest pose is from " + seconds(error.newest_ns);
     case TransformProblem::gap_too_long:
       return text + ", the poses around it are from " + seconds(error.oldest_ns) + " and " + seconds(error.newest_ns);

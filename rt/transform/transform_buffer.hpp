@@ -5,9 +5,8 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
-#include <vector>
-
 #include <tl/expected.hpp>
+#include <vector>
 
 #include "rt/transform/pose_math.hpp"
 
@@ -86,8 +85,8 @@ class TransformBuffer {
     std::string name;
     FrameId parent = kNoFrame;
     bool fixed = false;
-    UncertainPose pose;           ///< if fixed
-    std::vector<PoseTrack> track; ///< none or one
+    UncertainPose pose;            ///< if fixed
+    std::vector<PoseTrack> track;  ///< none or one
   };
 
   Frame& join(FrameId parent, FrameId child);

@@ -31,7 +31,9 @@ class FakeWriter final : public Writer {
   /// What the last job sent; null if it sent nothing.
   template <class T>
   const T* sent() const {
-    return PortAccess::sent(output_) ? reinterpret_cast<const T*>(reinterpret_cast<const MessageHeader*>(memory_.get()) + 1) : nullptr;
+    return PortAccess::sent(output_)
+               ? reinterpret_cast<const T*>(reinterpret_cast<const MessageHeader*>(memory_.get()) + 1)
+               : nullptr;
   }
   int64_t stamp_ns() const { return PortAccess::stamp_ns(output_); }
 

@@ -19,7 +19,8 @@ struct GuardedImage {
   int width, height, channels;
   std::vector<uint8_t> bytes;
   explicit GuardedImage(const StereoFormat& f) : width(f.width), height(f.height), channels(f.channels) {
-    bytes.assign(static_cast<size_t>((width + 2 * kMargin) * channels) * static_cast<size_t>(height + 2 * kMargin), kGuard);
+    bytes.assign(static_cast<size_t>((width + 2 * kMargin) * channels) * static_cast<size_t>(height + 2 * kMargin),
+                 kGuard);
   }
   ImageView<uint8_t> view() {
     const ptrdiff_t stride = ptrdiff_t{width + 2 * kMargin} * channels;

@@ -40,8 +40,8 @@ void check_result(const Loaded& loaded) {
   CHECK(loaded.graph.has_value() == loaded.problems.empty());
   for (const auto& problem : loaded.problems) {
     const std::string text = to_string(problem);
-    if (problem.position.line < 1 || problem.position.column < 1 || problem.position.file.empty() || problem.text.empty() ||
-        text.find("bug of Takt") != std::string::npos)
+    if (problem.position.line < 1 || problem.position.column < 1 || problem.position.file.empty() ||
+        problem.text.empty() || text.find("bug of Takt") != std::string::npos)
       FAIL_CHECK(text);
   }
 }
@@ -82,9 +82,14 @@ TEST_CASE("Random bytes and random YAML punctuation never crash") {
 }
 
 TEST_CASE("Deep nesting and aliases end in an error, not in a crash") {
-  const std::vector<std::string> texts{std::string(100'000, '['), std::string(100'000, '{'), "a: &a [*a]\n",
-                                       "a: &a {b: *a}\n", "? [a]: b\n: c\n", std::string(5000, '-') + "\n",
-                                       "a: " + std::string(2000, 'x') + "\n", "name: " + std::string(2000, '1') + "\n"};
+  const std::vector<std::string> texts{std::string(100'000, '['),
+                                       std::string(100'000, '{'),
+                                       "a: &a [*a]\n",
+                                       "a: &a {b: *a}\n",
+                                       "? [a]: b\n: c\n",
+                                       std::string(5000, '-') + "\n",
+                                       "a: " + std::string(2000, 'x') + "\n",
+                                       "name: " + std::string(2000, '1') + "\n"};
   for (const auto& text : texts) {
     const Loaded loaded = Files(text).load();
     CHECK(!loaded.graph);
@@ -117,9 +122,11 @@ TEST_CASE("Durations agree with arithmetic in long double") {
   for (int i = 0; i < 20'000; ++i) {
     const auto whole = static_cast<int64_t>(random() % 1'000'000), below = static_cast<int64_t>(1 + random() % 100'000);
     const bool fraction = i % 2 == 0;
-    const std::string text = fraction ? fmt::format("{}/{} ms", whole, below) : fmt::format("{}.{:03}us", whole, below % 1000);
-    const long double exact = fraction ? 1e6L * static_cast<long double>(whole) / static_cast<long double>(below)
-                                       : 1e3L * static_cast<long double>(whole) + static_cast<long double>(below % 1000);
+    const std::string text =
+        fraction ? fmt::format("{}/{} ms", whole, below) : fmt::format("{}.{:03}us", whole, below % 1000);
+    const long double exact = fraction
+                                  ? 1e6L * static_cast<long double>(whole) / static_cast<long double>(below)
+                                  : 1e3L * static_cast<long double>(whole) + static_cast<long double>(below % 1000);
     const auto ns = parse_duration_ns(text);
     REQUIRE(ns);
     CAPTURE(text);

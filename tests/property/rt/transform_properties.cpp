@@ -2,10 +2,10 @@
 // The transform buffer against an obvious reference: rotation matrices, linear search, numerical derivatives.
 #include <doctest/doctest.h>
 
-#include <cmath>
 #include <Eigen/Core>
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
+#include <cmath>
 #include <functional>
 #include <map>
 #include <random>
@@ -43,8 +43,8 @@ Eigen::Vector3d logarithm(const Eigen::Matrix3d& r) {
 Rigid rigid(const Transform& t) {
   const double w = t.qw, x = t.qx, y = t.qy, z = t.qz;
   Rigid out;
-  out.r << 1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y), 2 * (x * y + w * z), 1 - 2 * (x * x + z * z),
-      2 * (y * z - w * x), 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y);
+  out.r << 1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y), 2 * (x * y + w * z),
+      1 - 2 * (x * x + z * z), 2 * (y * z - w * x), 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y);
   out.t = {t.x, t.y, t.z};
   return out;
 }
@@ -83,7 +83,8 @@ struct Random {
   int64_t below(int64_t n) { return static_cast<int64_t>(engine() % static_cast<uint64_t>(n)); }
   UncertainPose pose() {
     UncertainPose p;
-    p.transform = {uniform(-5, 5), uniform(-5, 5), uniform(-5, 5), uniform(-1, 1), uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)};
+    p.transform = {uniform(-5, 5), uniform(-5, 5), uniform(-5, 5), uniform(-1, 1),
+                   uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)};
     Matrix6 a;
     for (int i = 0; i < 36; ++i) a.data()[i] = uniform(-0.1, 0.1);
     Eigen::Map<Matrix6>(p.covariance.data()) = a * a.transpose();
@@ -186,7 +187,8 @@ TEST_CASE("a track answers as a linear search over all it was given would") {
           CHECK(got.error().problem == TransformProblem::gap_too_long);
         } else {
           REQUIRE(got);
-          const UncertainPose expected = interpolate(kept[before], kept[after], static_cast<double>(asked - before) / static_cast<double>(after - before));
+          const UncertainPose expected = interpolate(
+              kept[before], kept[after], static_cast<double>(asked - before) / static_cast<double>(after - before));
           check_equal(*got, rigid(expected.transform), covariance(expected));
         }
       }

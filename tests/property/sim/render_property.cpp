@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // The scan-converting renderer against the obvious one: a ray per pixel, tested against everything.
 #include <doctest/doctest.h>
+#include <hwy/targets.h>
 
 #include <cmath>
-#include <hwy/targets.h>
 #include <limits>
 
 #include "hal/sim/random.hpp"
@@ -50,7 +50,9 @@ double reference_depth(const Scene& scene, const Vec3& origin, const Vec3& ray) 
   return nearest;
 }
 
-double random_in(uint64_t k, uint64_t what, double low, double high) { return low + (high - low) * uniform(mix(77, k, what)); }
+double random_in(uint64_t k, uint64_t what, double low, double high) {
+  return low + (high - low) * uniform(mix(77, k, what));
+}
 
 }  // namespace
 
@@ -72,8 +74,10 @@ TEST_CASE("depth agrees with a ray caster from random poses") {
     renderer.render(s->scene(), pose, {}, k, {image.data(), 64, 48, 1}, depth.data());
     for (int y = 0; y < 48; ++y) {
       for (int x = 0; x < 64; ++x) {
-        const Vec3 ray = pose.rotation * Vec3((x - camera.cu_px) / camera.focal_px, (y - camera.cv_px) / camera.focal_px, 1);
-        const double expected = reference_depth(s->scene(), pose.position, ray), got = static_cast<double>(depth[static_cast<size_t>(y * 64 + x)]);
+        const Vec3 ray =
+            pose.rotation * Vec3((x - camera.cu_px) / camera.focal_px, (y - camera.cv_px) / camera.focal_px, 1);
+        const double expected = reference_depth(s->scene(), pose.position, ray),
+                     got = static_cast<double>(depth[static_cast<size_t>(y * 64 + x)]);
         ++compared;
         if (std::abs(got - expected) > 1e-3 * expected + 1e-3) ++wrong;
       }
@@ -126,7 +130,8 @@ TEST_CASE("equal seeds give equal bytes, also for a renderer that has drawn othe
   std::vector<uint8_t> one(static_cast<size_t>(rig.width * rig.height * 3)), two(one.size());
   for (uint64_t k = 0; k < 10; ++k) {
     const RobotState robot{1.5, 2.5, random_in(k, 21, -3, 3), 0, 0};
-    used.render(a->scene(), Simulation::camera_pose(rig, 0, robot, 0, 0), {}, k, {one.data(), rig.width, rig.height, 3});
+    used.render(a->scene(), Simulation::camera_pose(rig, 0, robot, 0, 0), {}, k,
+                {one.data(), rig.width, rig.height, 3});
   }
   const CameraPose pose = Simulation::camera_pose(rig, 0, {1.5, 2.5, 0.2, 0, 0}, 0, 0);
   used.render(a->scene(), pose, {}, 4, {one.data(), rig.width, rig.height, 3});
@@ -144,7 +149,8 @@ TEST_CASE("every SIMD target of this machine gives the same bytes") {
   for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
     hwy::SetSupportedTargetsForTest(target);
     hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-    renderer.render(s->scene(), Simulation::camera_pose(rig, 0, {1.5, 2.5, 0.1, 0, 0}, 0, 0), {}, 4, {bytes.data(), rig.width, rig.height, 3}, depth.data());
+    renderer.render(s->scene(), Simulation::camera_pose(rig, 0, {1.5, 2.5, 0.1, 0, 0}, 0, 0), {}, 4,
+                    {bytes.data(), rig.width, rig.height, 3}, depth.data());
     if (targets++ == 0) {
       first = bytes;
       first_depth = depth;

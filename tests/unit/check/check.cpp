@@ -10,7 +10,8 @@ using namespace takt::graph;
 
 namespace {
 
-TaskPlan task(std::string name, int64_t hz, int64_t budget_ms, int64_t deadline_ms, Criticality criticality = Criticality::low) {
+TaskPlan task(std::string name, int64_t hz, int64_t budget_ms, int64_t deadline_ms,
+              Criticality criticality = Criticality::low) {
   TaskPlan plan;
   plan.name = std::move(name);
   plan.rate = Rate{hz, 1};
@@ -138,7 +139,8 @@ TEST_CASE("takt nodes shows ports and parameters with default, unit, range and m
   const std::string list = nodes_text(types);
   for (const char* words : {"mapper", "processing", "makes maps"}) CHECK(list.find(words) != std::string::npos);
   const std::string text = node_text(*types.find("mapper"));
-  for (const char* words : {"where it is (optional)", "grid", "farthest cell", " 8 m ", "1..20", "sum | max", "how cells grow"}) {
+  for (const char* words :
+       {"where it is (optional)", "grid", "farthest cell", " 8 m ", "1..20", "sum | max", "how cells grow"}) {
     CAPTURE(words);
     CHECK(text.find(words) != std::string::npos);
   }

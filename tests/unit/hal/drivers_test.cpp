@@ -28,9 +28,11 @@ const nlohmann::json kWorld = {{"world", "worlds/lab.xml"}};
 }  // namespace
 
 TEST_CASE("unknown kinds, drivers and settings list the valid ones") {
-  CHECK(has(error(config("radar", "sim", kWorld)), "stereo_camera, laser_scanner, camera_head, mobile_base, digital_lines"));
+  CHECK(has(error(config("radar", "sim", kWorld)),
+            "stereo_camera, laser_scanner, camera_head, mobile_base, digital_lines"));
   CHECK(has(error(config("stereo_camera", "v4l2", kWorld)), "known drivers: sim, replay"));
-  CHECK(has(error(config("laser_scanner", "sim", {{"world", "worlds/lab.xml"}, {"beans", 3}})), "unknown setting `beans`"));
+  CHECK(has(error(config("laser_scanner", "sim", {{"world", "worlds/lab.xml"}, {"beans", 3}})),
+            "unknown setting `beans`"));
   CHECK(has(error(config("laser_scanner", "sim", nlohmann::json::object())), "`world` is missing"));
   CHECK(has(error(config("laser_scanner", "sim", {{"world", "worlds/none.xml"}})), "worlds/none.xml"));
   CHECK(has(error(config("stereo_camera", "sim", kWorld)), "`rig` is missing"));
@@ -90,7 +92,10 @@ TEST_CASE("a replayed camera ends the run after its last frame") {
   VirtualClock clock;
   Devices devices;
   const auto image = (kGraph / "worlds/lab.pgm").string();
-  auto made = make_device(config("stereo_camera", "replay", {{"left", image}, {"right", image}, {"focal", 100}, {"baseline", "0.1m"}, {"frames", 2}}), devices, clock);
+  auto made =
+      make_device(config("stereo_camera", "replay",
+                         {{"left", image}, {"right", image}, {"focal", 100}, {"baseline", "0.1m"}, {"frames", 2}}),
+                  devices, clock);
   REQUIRE_MESSAGE(made.has_value(), (made ? "" : made.error().text()));
   DeviceNode& node = **made;
   Setup setup{clock, kGraph, {}, 1, 15.0};
@@ -113,8 +118,11 @@ TEST_CASE("a replayed camera ends the run after its last frame") {
 TEST_CASE("laser, head, base and line nodes send one message a job, and share one world") {
   VirtualClock clock;
   Devices devices;
-  for (const auto& [kind, port] : std::initializer_list<std::pair<const char*, const char*>>{
-           {"laser_scanner", "scan"}, {"camera_head", "state"}, {"mobile_base", "odometry"}, {"digital_lines", "state"}}) {
+  for (const auto& [kind, port] :
+       std::initializer_list<std::pair<const char*, const char*>>{{"laser_scanner", "scan"},
+                                                                  {"camera_head", "state"},
+                                                                  {"mobile_base", "odometry"},
+                                                                  {"digital_lines", "state"}}) {
     auto made = make_device(config(kind, "sim", kWorld), devices, clock);
     REQUIRE_MESSAGE(made.has_value(), (made ? "" : made.error().text()));
     DeviceNode& node = **made;

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // A small world for the loader's tests: fake node types, a fake device catalogue, files in a folder of their own.
 #pragma once
+#include <doctest/doctest.h>
 #include <unistd.h>
 
 #include <atomic>
 #include <cstdlib>
-#include <doctest/doctest.h>
 #include <filesystem>
 #include <fstream>
 #include <string>

@@ -28,9 +28,11 @@ TEST_CASE("Unknown node type, device kind, driver and profile") {
                {"node `stereo`", "unknown type `sterio`", "did you mean `stereo`?", "ego_motion, planner, stereo"});
   expect_graph("kind: mobile_base", "kind: mobile_bass", "mobile_bass",
                {"device `base`", "unknown kind", "did you mean `mobile_base`?", "stereo_camera"});
-  expect_graph("sim: {default: {driver: sim, world: lab.xml}}", "sim: {default: {driver: sim, world: lab.xml}, camera: {driver: v4l}}",
-               "v4l}", {"device `camera`", "unknown driver `v4l`", "did you mean `v4l2`?", "sim, v4l2"});
-  expect_graph("default_profile: sim", "default_profile: simm", "simm", {"no profile `simm`", "did you mean `sim`?", "robot"});
+  expect_graph("sim: {default: {driver: sim, world: lab.xml}}",
+               "sim: {default: {driver: sim, world: lab.xml}, camera: {driver: v4l}}", "v4l}",
+               {"device `camera`", "unknown driver `v4l`", "did you mean `v4l2`?", "sim, v4l2"});
+  expect_graph("default_profile: sim", "default_profile: simm", "simm",
+               {"no profile `simm`", "did you mean `sim`?", "robot"});
 }
 
 TEST_CASE("Unknown ids") {
@@ -40,24 +42,27 @@ TEST_CASE("Unknown ids") {
                {"subsystem `depth` exports `planner.velocity`", "no node `planner`", "ego_motion, stereo"});
   expect_graph("exports: [ego_motion.motion]", "exports: [ego_motion.motion, stereo.dispartiy]", "stereo.dispartiy",
                {"no output `dispartiy`", "did you mean `disparity`?"});
-  expect_graph("robot: {camera:", "robot: {kamera:", "kamera", {"profile `robot`", "`kamera`", "did you mean `camera`?"});
-  expect_schedule("  planner: {rate: 1/3}", "  planner: {rate: 1/3}\n  planer: {rate: 2}", "planer:",
-                  {"`planer`", "no such node or device", "did you mean `planner`?"});
+  expect_graph("robot: {camera:", "robot: {kamera:", "kamera",
+               {"profile `robot`", "`kamera`", "did you mean `camera`?"});
+  expect_schedule("  planner: {rate: 1/3}", "  planner: {rate: 1/3}\n  planer: {rate: 2}",
+                  "planer:", {"`planer`", "no such node or device", "did you mean `planner`?"});
 }
 
 TEST_CASE("Duplicate ids: in one map, across subsystems, with a device") {
-  expect_graph("chains:", "    planner: {type: planner, in: {motion: ego_motion.motion}}\nchains:", "planner: {type: planner, in: {motion: ego_motion.motion}}\nchains",
+  expect_graph("chains:", "    planner: {type: planner, in: {motion: ego_motion.motion}}\nchains:",
+               "planner: {type: planner, in: {motion: ego_motion.motion}}\nchains",
                {"duplicate key `planner`", "line 21"});
-  expect_graph("chains:", "    stereo: {type: stereo, in: {pair: camera.pair}}\nchains:", "stereo: {type: stereo, in: {pair: camera.pair}}\nchains",
-               {"duplicate id `stereo`", "graph.yaml:14:5"});
-  expect_graph("chains:", "    camera: {type: stereo, in: {pair: camera.pair}}\nchains:", "camera: {type: stereo, in: {pair: camera.pair}}\nchains",
-               {"duplicate id `camera`", "graph.yaml:6:3"});
+  expect_graph("chains:", "    stereo: {type: stereo, in: {pair: camera.pair}}\nchains:",
+               "stereo: {type: stereo, in: {pair: camera.pair}}\nchains", {"duplicate id `stereo`", "graph.yaml:14:5"});
+  expect_graph("chains:", "    camera: {type: stereo, in: {pair: camera.pair}}\nchains:",
+               "camera: {type: stereo, in: {pair: camera.pair}}\nchains", {"duplicate id `camera`", "graph.yaml:6:3"});
 }
 
 TEST_CASE("Parameters: unknown, wrong kind, out of range, missing unit, wrong unit") {
   expect_graph("disparities: 150", "disparitys: 150", "disparitys",
                {"node `stereo`", "no parameter `disparitys`", "did you mean `disparities`?"});
-  expect_graph("disparities: 150", "disparities: 1.5", "1.5", {"parameter `disparities` of node `stereo`", "an integer is wanted"});
+  expect_graph("disparities: 150", "disparities: 1.5", "1.5",
+               {"parameter `disparities` of node `stereo`", "an integer is wanted"});
   expect_graph("disparities: 150", "fill: 3", "3, max", {"parameter `fill`", "true or false is wanted"});
   expect_graph("disparities: 150", "disparities: true", "true", {"an integer is wanted"});
   expect_graph("disparities: 150", "table: 7", "7, max", {"a text is wanted"});
@@ -73,20 +78,24 @@ TEST_CASE("Parameters: unknown, wrong kind, out of range, missing unit, wrong un
 }
 
 TEST_CASE("Unknown keys and wrong types, with the valid ones") {
-  expect_graph("    planner: {type: planner, in:", "    planner: {type: planner, on: camera.pair, in:", "on: camera.pair",
-               {"unknown key `on` in node `planner`", "in, join, params, type"});
-  expect_graph("name: tiny", "name: tiny\nnmae: x", "nmae", {"unknown key `nmae` in the graph", "did you mean `name`?"});
+  expect_graph("    planner: {type: planner, in:", "    planner: {type: planner, on: camera.pair, in:",
+               "on: camera.pair", {"unknown key `on` in node `planner`", "in, join, params, type"});
+  expect_graph("name: tiny", "name: tiny\nnmae: x", "nmae",
+               {"unknown key `nmae` in the graph", "did you mean `name`?"});
   expect_graph("depth: 3", "depth: 65", "65", {"`depth` of input `disparity` of node `ego_motion`", "1 to 64"});
   expect_graph("depth: 3", "depth: three", "three", {"an integer from 1 to 64"});
   expect_graph("max_age: 150ms", "max_age: 150", "150}", {"`max_age` of input `disparity`", "write 150ms"});
   expect_graph("takt: 1", "takt: 2", "2", {"`takt` of the graph is `2`", "1"});
   expect_graph("name: tiny\n", "", "takt", {"the graph lacks `name`"});
-  expect_graph("blind: {without: [stereo, ego_motion, planner, base]}", "blind: {}", "blind", {"mode `blind` lacks `without`"});
-  expect_graph("sim: {default: {driver: sim, world: lab.xml}}", "sim: {default: {driver: sim, wrld: x, world: lab.xml}}", "wrld",
+  expect_graph("blind: {without: [stereo, ego_motion, planner, base]}", "blind: {}", "blind",
+               {"mode `blind` lacks `without`"});
+  expect_graph("sim: {default: {driver: sim, world: lab.xml}}",
+               "sim: {default: {driver: sim, wrld: x, world: lab.xml}}", "wrld",
                {"no device of profile `sim` takes the setting `wrld`", "did you mean `world`?"});
   expect_graph("rig: rigs/a.yaml", "rgi: rigs/a.yaml", "rgi", {"no setting `rgi`", "did you mean `rig`?"});
   expect_graph("x: 30cm", "x: 0.3", "0.3", {"`mount.x` of device `camera`", "write 0.3m"});
-  expect_schedule("policy: fixed", "policy: fixxed", "fixxed", {"did you mean `fixed`?", "cooperative, deadline, fixed"});
+  expect_schedule("policy: fixed", "policy: fixxed", "fixxed",
+                  {"did you mean `fixed`?", "cooperative, deadline, fixed"});
   expect_schedule("on_miss: skip", "on_miss: ignore", "ignore", {"`on_miss`", "continue, reuse_last, safe_stop, skip"});
   expect_schedule("on_overrun: degrade", "on_overun: degrade", "on_overun", {"did you mean `on_overrun`?"});
 }
@@ -118,7 +127,8 @@ TEST_CASE("Type mismatch") {
 TEST_CASE("An edge must go to the same, the next or the storage layer") {
   std::string text = with(kGraph, "in: {pair: stereo.rectified,", "in: {guess: planner.guess, pair: stereo.rectified,");
   text = with(text, "exports: [planner.velocity]", "exports: [planner.velocity, planner.guess]");
-  expect(Files(text).load(), "graph.yaml", 17, 19, {"`planner.guess` (layer processing)", "`ego_motion` (layer perception)"});
+  expect(Files(text).load(), "graph.yaml", 17, 19,
+         {"`planner.guess` (layer processing)", "`ego_motion` (layer perception)"});
 }
 
 TEST_CASE("An edge against the hierarchy") {
@@ -127,7 +137,8 @@ TEST_CASE("An edge against the hierarchy") {
 }
 
 TEST_CASE("Joins name inputs that are there and connected") {
-  expect_graph("join: [pair, disparity]", "join: [pair, disparityy]", "disparityy", {"`join` of node `ego_motion`", "did you mean `disparity`?"});
+  expect_graph("join: [pair, disparity]", "join: [pair, disparityy]", "disparityy",
+               {"`join` of node `ego_motion`", "did you mean `disparity`?"});
   expect_graph("join: [pair, disparity]", "join: [pair, guess]", "guess]", {"not connected"});
   expect_graph("join: [pair, disparity]", "join: [pair]", "[pair]", {"at least two"});
 }
@@ -174,16 +185,16 @@ TEST_CASE("The command line's words") {
   options = {};
   options.policy = "fifo";
   CHECK(at(options).find("cooperative, deadline, fixed") != std::string::npos);
-  for (const auto& [text, words] : std::vector<std::pair<std::string, std::string>>{
-           {"stereo.disparities", "write --set node.param=value"},
-           {"disparities=3", "write --set node.param=value"},
-           {"stereo.disparities=", "no value"},
-           {"stero.disparities=3", "did you mean `stereo`?"},
-           {"stereo.disparties=3", "did you mean `disparities`?"},
-           {"stereo.disparities=0", "must lie in 1..512"},
-           {"stereo.max_range=0.3", "write 0.3m"},
-           {"stereo.disparities=010", "leading zero"},
-           {"camera.rgi=x", "did you mean `rig`?"}}) {
+  for (const auto& [text, words] :
+       std::vector<std::pair<std::string, std::string>>{{"stereo.disparities", "write --set node.param=value"},
+                                                        {"disparities=3", "write --set node.param=value"},
+                                                        {"stereo.disparities=", "no value"},
+                                                        {"stero.disparities=3", "did you mean `stereo`?"},
+                                                        {"stereo.disparties=3", "did you mean `disparities`?"},
+                                                        {"stereo.disparities=0", "must lie in 1..512"},
+                                                        {"stereo.max_range=0.3", "write 0.3m"},
+                                                        {"stereo.disparities=010", "leading zero"},
+                                                        {"camera.rgi=x", "did you mean `rig`?"}}) {
     options = {};
     options.set = {text};
     CAPTURE(text);
@@ -199,7 +210,8 @@ TEST_CASE("Files that are not there") {
   const Loaded none = takt::graph::load("/nowhere/graph.yaml", {}, types, fake_devices());
   REQUIRE(none.problems.size() == 1);
   CHECK(none.problems[0].text.find("no such file") != std::string::npos);
-  expect_graph("schedule: schedule.yaml", "schedule: schedul.yaml", "schedul.yaml", {"cannot read", "schedul.yaml", "no such file"});
+  expect_graph("schedule: schedule.yaml", "schedule: schedul.yaml", "schedul.yaml",
+               {"cannot read", "schedul.yaml", "no such file"});
   expect_graph("schedule: schedule.yaml\n", "", "takt", {"names no schedule", "--schedule"});
 }
 
@@ -211,8 +223,11 @@ TEST_CASE("All problems at once, in the order of the file") {
   const Loaded loaded = Files(text, schedule).load();
   INFO(all(loaded));
   REQUIRE(loaded.problems.size() == 5);
-  const std::vector<std::tuple<std::string, int, int>> expected{{"graph.yaml", 14, 75}, {"graph.yaml", 17, 54},
-      {"graph.yaml", 21, 21}, {"schedule.yaml", 6, 30}, {"schedule.yaml", 10, 3}};
+  const std::vector<std::tuple<std::string, int, int>> expected{{"graph.yaml", 14, 75},
+                                                                {"graph.yaml", 17, 54},
+                                                                {"graph.yaml", 21, 21},
+                                                                {"schedule.yaml", 6, 30},
+                                                                {"schedule.yaml", 10, 3}};
   for (size_t i = 0; i < expected.size(); ++i) {
     const auto& [file, line, column] = expected[i];
     CHECK(std::filesystem::path(loaded.problems[i].position.file).filename().string() == file);

@@ -119,7 +119,9 @@ TEST_CASE("Options change what the files say") {
 }
 
 TEST_CASE("A cycle of sampled edges is no error") {
-  const Loaded loaded = Files(with(kGraph, "in: {pair: stereo.rectified,", "in: {guess: ego_motion.motion, pair: stereo.rectified,")).load();
+  const Loaded loaded =
+      Files(with(kGraph, "in: {pair: stereo.rectified,", "in: {guess: ego_motion.motion, pair: stereo.rectified,"))
+          .load();
   INFO(all(loaded));
   CHECK(loaded.graph.has_value());
 }

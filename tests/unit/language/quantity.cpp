@@ -33,8 +33,11 @@ TEST_CASE("A missing or wrong unit says what to write") {
   CHECK(parse_in_unit("0.3", "m").error().find("write 0.3m") != std::string::npos);
   CHECK(parse_in_unit("3s", "m").error().find("m | cm | mm | km") != std::string::npos);
   CHECK(parse_in_unit("150m", "px").error().find("carries no unit: write 150") != std::string::npos);
-  for (const char* text : {"", " ", "m", "--3m", "3..5m", ".5m", "5.m", "1/0 s", "1/-3 s", "3 4m", "0x10m", "1e99m", "nan",
-                           "inf", "9999999999999999999999m", "-", "1/", "/3", "3m/", "1e400", "1e-400"}) {
+  for (const char* text : {"",      " ",     "m",     "--3m",   "3..5m",
+                           ".5m",   "5.m",   "1/0 s", "1/-3 s", "3 4m",
+                           "0x10m", "1e99m", "nan",   "inf",    "9999999999999999999999m",
+                           "-",     "1/",    "/3",    "3m/",    "1e400",
+                           "1e-400"}) {
     CAPTURE(text);
     CHECK(!parse_in_unit(text, "m"));
   }

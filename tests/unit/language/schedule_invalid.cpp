@@ -13,7 +13,8 @@ TEST_CASE("A node has a rate or follows a port, not both and not neither") {
   expect_schedule("planner: {rate: 1/3}", "planner: {budget: 1ms}", "planner", {"neither `rate` nor `on`"});
   expect(Files(kGraph, with(kSchedule, "  planner: {rate: 1/3}\n", "")).load(), "graph.yaml", 21, 5,
          {"node `planner` has no entry in the schedule", "schedule.yaml"});
-  expect_schedule("planner: {rate: 1/3}", "planner: {rate: 1/3, every: 2}", "every: 2}", {"`every` of `planner` goes with `on` only"});
+  expect_schedule("planner: {rate: 1/3}", "planner: {rate: 1/3, every: 2}", "every: 2}",
+                  {"`every` of `planner` goes with `on` only"});
   expect_schedule("every: 2, ", "offset: 2ms, ", "offset: 2ms", {"`offset` of `ego_motion` goes with `rate` only"});
 }
 
@@ -50,13 +51,16 @@ TEST_CASE("A graph without a node of high criticality is invalid") {
 }
 
 TEST_CASE("`on` follows an output that the node reads") {
-  expect_schedule("on: stereo.disparity", "on: stereo.dispairty", "stereo.dispairty", {"no output `dispairty`", "did you mean `disparity`?"});
+  expect_schedule("on: stereo.disparity", "on: stereo.dispairty", "stereo.dispairty",
+                  {"no output `dispairty`", "did you mean `disparity`?"});
   expect_schedule("on: stereo.disparity", "on: sterio.disparity", "sterio.disparity", {"did you mean `stereo`?"});
-  expect_schedule("on: stereo.disparity", "on: camera.pair", "camera.pair", {"none of its inputs reads", "stereo.disparity, stereo.rectified"});
+  expect_schedule("on: stereo.disparity", "on: camera.pair", "camera.pair",
+                  {"none of its inputs reads", "stereo.disparity, stereo.rectified"});
 }
 
 TEST_CASE("A cycle of on edges") {
-  const std::string text = with(kGraph, "in: {pair: stereo.rectified,", "in: {guess: ego_motion.motion, pair: stereo.rectified,");
+  const std::string text =
+      with(kGraph, "in: {pair: stereo.rectified,", "in: {guess: ego_motion.motion, pair: stereo.rectified,");
   expect(Files(text, with(kSchedule, "on: stereo.disparity", "on: ego_motion.motion")).load(), "schedule.yaml", 9, 20,
          {"cycle of `on` edges: ego_motion -> ego_motion", "rate"});
 }
@@ -64,8 +68,9 @@ TEST_CASE("A cycle of on edges") {
 TEST_CASE("A cycle of on edges through several nodes") {
   std::string text = with(kGraph, "in: {pair: stereo.rectified,", "in: {guess: planner.guess, pair: stereo.rectified,");
   // One subsystem of one layer would need other node types: the layer error is there too, the cycle must be named.
-  const Loaded loaded = Files(text, with(with(kSchedule, "on: stereo.disparity", "on: planner.guess"), "planner: {rate: 1/3}",
-                                         "planner: {on: ego_motion.motion}")).load();
+  const Loaded loaded = Files(text, with(with(kSchedule, "on: stereo.disparity", "on: planner.guess"),
+                                         "planner: {rate: 1/3}", "planner: {on: ego_motion.motion}"))
+                            .load();
   INFO(all(loaded));
   CHECK(std::count_if(loaded.problems.begin(), loaded.problems.end(), [](const Problem& p) {
           return p.text.find("cycle of `on` edges: ego_motion -> planner -> ego_motion") != std::string::npos;

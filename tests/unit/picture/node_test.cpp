@@ -21,10 +21,8 @@ TEST_CASE("picture: writes what it has seen when the run ends, and nothing else"
     register_picture(types);
     const auto node = types.find("picture")->make();
     for (ParamBase* p : node->params())
-      if (p->name() == "directory")
-        REQUIRE(p->set(std::string("pictures")));
-      else if (p->name() == "track_points")
-        REQUIRE(p->set(int64_t{16}));
+      if (p->name() == "directory") REQUIRE(p->set(std::string("pictures")));
+      else if (p->name() == "track_points") REQUIRE(p->set(int64_t{16}));
     const Capacity size{40, 30, 1, 0};
     auto& map_port = test::input(*node, "disparity");
     auto& motion_port = test::input(*node, "motion");

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hal/replay/replay_camera.hpp"
-
 #include <doctest/doctest.h>
 
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
 
+#include "hal/replay/replay_camera.hpp"
 #include "tests/conformance/stereo_camera.hpp"
 #include "tests/test_data.hpp"
 
@@ -41,7 +40,9 @@ struct Recording {
     write("calib.txt", kCalibration);
   }
   ~Recording() { fs::remove_all(path); }
-  void write(const std::string& name, const std::string& text) const { std::ofstream(path / name, std::ios::binary) << text; }
+  void write(const std::string& name, const std::string& text) const {
+    std::ofstream(path / name, std::ios::binary) << text;
+  }
   ReplayCameraSettings settings() const {
     ReplayCameraSettings s;
     s.directory = path;
@@ -87,7 +88,8 @@ TEST_CASE("stamps are epoch + k / rate, or what times.txt says, then the data en
       camera.trigger(k * 1'000'000'000ll);
       const StereoFrame frame = camera.read(left.view(), right.view(), INT64_MAX);
       REQUIRE(frame.status == ReadStatus::ok);
-      const cv::Mat file = cv::imread((recording.path / "image_r" / ("00000" + std::to_string(k) + ".png")).string(), cv::IMREAD_UNCHANGED);
+      const cv::Mat file = cv::imread((recording.path / "image_r" / ("00000" + std::to_string(k) + ".png")).string(),
+                                      cv::IMREAD_UNCHANGED);
       CHECK(right.view().at(31, 23) == file.at<uint8_t>(23, 31));
       stamps.push_back(frame.stamp_ns);
     }

@@ -136,7 +136,8 @@ TEST_CASE("depth latches the newest n, oldest first, and tells which are new; ev
     CHECK(edge.received == 16);
     CHECK(sent == 30);
     CHECK(edge.received + edge.dropped == 30);
-    CHECK(executor.tasks()[0]->writer(0).statistics().in_use == 16);  // the ring keeps its history, nothing else is held
+    CHECK(executor.tasks()[0]->writer(0).statistics().in_use ==
+          16);  // the ring keeps its history, nothing else is held
   });
   REQUIRE(sink.seen.size() == 4);
   CHECK(sink.seen[0].a == std::vector<double>{4, 5, 6, 7});

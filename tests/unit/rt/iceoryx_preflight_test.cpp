@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "rt/shm/iceoryx_preflight.hpp"
+
 #include <doctest/doctest.h>
 #include <fcntl.h>
 #include <sys/file.h>
@@ -7,10 +9,9 @@
 #include <filesystem>
 #include <fstream>
 
-#include "rt/shm/iceoryx_layout.hpp"
-#include "rt/shm/iceoryx_preflight.hpp"
-#include "rt/shm/transport_error.hpp"
 #include "rt/msg/messages.hpp"
+#include "rt/shm/iceoryx_layout.hpp"
+#include "rt/shm/transport_error.hpp"
 
 using namespace takt;
 
@@ -43,7 +44,8 @@ std::string refusal(const IceoryxPlaces& places, uint64_t bytes = 0) {
 bool has(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 PortPlan port(uint32_t width, uint32_t history, uint32_t held, uint32_t readers) {
-  return {"node", "port", &MessageType::of<Image>(), {.width = width, .height = 1, .channels = 1}, history, held, readers};
+  return {"node", "port", &MessageType::of<Image>(), {.width = width, .height = 1, .channels = 1}, history,
+          held,   readers};
 }
 
 }  // namespace
@@ -71,8 +73,9 @@ TEST_CASE("a lock table with waiting processes is read") {
   const Directory directory;
   const auto lock = directory.path / "x";
   std::ofstream(lock) << "x";
-  std::ofstream(directory.path / "locks") << "1: POSIX  ADVISORY  WRITE 77 00:01:2 0 EOF\n1: -> POSIX  ADVISORY  WRITE 78 00:01:2 0 EOF\n"
-                                             "2: FLOCK  ADVISORY  WRITE 79 00:01:3 0 EOF\n";
+  std::ofstream(directory.path / "locks")
+      << "1: POSIX  ADVISORY  WRITE 77 00:01:2 0 EOF\n1: -> POSIX  ADVISORY  WRITE 78 00:01:2 0 EOF\n"
+         "2: FLOCK  ADVISORY  WRITE 79 00:01:3 0 EOF\n";
   CHECK_FALSE(lock_holder(lock, directory.path / "locks"));
   CHECK_FALSE(lock_holder(directory.path / "absent", directory.path / "locks"));
 }
@@ -108,7 +111,8 @@ TEST_CASE("each output has a pool of its own, large enough, in ascending order")
   const std::vector<PortPlan> ports{port(900, 4, 2, 2), port(100, 1, 0, 0), port(100, 2, 1, 1), port(921600, 3, 5, 3)};
   const IceoryxLayout layout = IceoryxLayout::of(ports);
   REQUIRE(layout.pools.size() == 5);
-  for (size_t i = 1; i < layout.pools.size(); ++i) CHECK(layout.pools[i].loan_bytes >= layout.pools[i - 1].loan_bytes + 64);
+  for (size_t i = 1; i < layout.pools.size(); ++i)
+    CHECK(layout.pools[i].loan_bytes >= layout.pools[i - 1].loan_bytes + 64);
   for (size_t i = 0; i < ports.size(); ++i) {
     const IceoryxPool& pool = layout.pools[layout.pool_of_port[i]];
     CHECK(pool.loan_bytes >= ports[i].chunk_bytes());

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "rt/shm/iceoryx_transport.hpp"
+
 #include <doctest/doctest.h>
 #include <fcntl.h>
 #include <spawn.h>
@@ -10,7 +12,6 @@
 #include <thread>
 
 #include "private_namespace.hpp"
-#include "rt/shm/iceoryx_transport.hpp"
 #include "rt/shm/transport_error.hpp"
 #include "transport_conformance.hpp"
 
@@ -53,7 +54,8 @@ TEST_CASE("peer: publishes from another process" * doctest::skip()) {
   const auto acknowledged = transport->make_reader(limits);
   for (uint64_t i = 1; i <= 50; ++i) {
     publish(*writer, i, static_cast<int64_t>(i), 0);
-    while (listed(*acknowledged, static_cast<int64_t>(i)).empty() || listed(*acknowledged, kEver)[0].sequence < i) std::this_thread::yield();
+    while (listed(*acknowledged, static_cast<int64_t>(i)).empty() || listed(*acknowledged, kEver)[0].sequence < i)
+      std::this_thread::yield();
   }
   CHECK(writer->statistics().pool_empty == 0);
 }
@@ -65,7 +67,8 @@ TEST_CASE("messages cross a process border without being copied") {
     const auto reader = transport->make_reader(basic);
     const auto writer = transport->make_writer(limits);
     setenv("TAKT_TEST_DOMAIN", iceoryx_domain(getpid()).c_str(), 1);
-    const char* arguments[] = {"peer", "--test-case=peer: publishes from another process", "--no-skip", "--minimal", nullptr};
+    const char* arguments[] = {"peer", "--test-case=peer: publishes from another process", "--no-skip", "--minimal",
+                               nullptr};
     pid_t child = 0;
     REQUIRE(posix_spawn(&child, "/proc/self/exe", nullptr, nullptr, const_cast<char**>(arguments), environ) == 0);
     for (uint64_t i = 1; i <= 50; ++i) {
@@ -107,7 +110,8 @@ TEST_CASE("a running daemon is named, with the way to stop it") {
 
 TEST_CASE("leftovers of this user do not keep the transport from starting") {
   if (!private_tmp_and_shm()) return;
-  for (const char* name : {"/tmp/iox-unique-roudi.lock", "/tmp/roudi", "/dev/shm/iceoryx_mgmt"}) close(open(name, O_CREAT | O_RDWR, 0600));
+  for (const char* name : {"/tmp/iox-unique-roudi.lock", "/tmp/roudi", "/dev/shm/iceoryx_mgmt"})
+    close(open(name, O_CREAT | O_RDWR, 0600));
   { const auto transport = make_iceoryx_transport(conformance_ports()); }
   for (const std::string& file : files_left()) FAIL_CHECK("left behind: ", file);
 }

@@ -85,7 +85,8 @@ TEST_CASE("a thread sees its own allocations only") {
 
 TEST_CASE("page faults of fresh pages are counted") {
   constexpr size_t kPages = 64;
-  auto* pages = static_cast<volatile char*>(mmap(nullptr, kPages * 4096, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0));
+  auto* pages = static_cast<volatile char*>(
+      mmap(nullptr, kPages * 4096, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0));
   REQUIRE(const_cast<char*>(pages) != MAP_FAILED);
   madvise(const_cast<char*>(pages), kPages * 4096, MADV_NOHUGEPAGE);
   const MemoryUse before = thread_memory_use();

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "rt/transform/transform_buffer.hpp"
+
 #include <doctest/doctest.h>
 
 #include <cmath>
 #include <limits>
 #include <stdexcept>
-
-#include "rt/transform/transform_buffer.hpp"
 
 using namespace takt;
 
@@ -97,7 +97,8 @@ TEST_CASE("rotation is interpolated along the shorter arc") {
 
 TEST_CASE("a chain is composed at one stamp, in both directions and sideways") {
   TransformBuffer buffer;
-  const FrameId map = buffer.frame("map"), robot = buffer.frame("robot"), head = buffer.frame("head"), laser = buffer.frame("laser");
+  const FrameId map = buffer.frame("map"), robot = buffer.frame("robot"), head = buffer.frame("head"),
+                laser = buffer.frame("laser");
   CHECK(buffer.frame("robot") == robot);
   buffer.add(map, robot, 8, 100);
   buffer.add(robot, head, 8, 100);
@@ -126,7 +127,8 @@ TEST_CASE("a chain is composed at one stamp, in both directions and sideways") {
 
 TEST_CASE("an error names the pair at fault") {
   TransformBuffer buffer;
-  const FrameId map = buffer.frame("map"), robot = buffer.frame("robot"), head = buffer.frame("head"), moon = buffer.frame("moon");
+  const FrameId map = buffer.frame("map"), robot = buffer.frame("robot"), head = buffer.frame("head"),
+                moon = buffer.frame("moon");
   buffer.add(map, robot, 8, 100);
   buffer.add(robot, head, 8, 100);
   buffer.insert(robot, 1'000'000'000, at_x(0));

@@ -21,7 +21,22 @@ namespace takt::test {
 constexpr int64_t kEver = std::numeric_limits<int64_t>::max();
 
 /// One output for each check, so that one transport (and one daemon start) serves them all.
-enum ConformancePort : size_t { basic, limits, eviction, slow, greedy, repeats, many_repeats, discarding, late, model_1, model_5, deep, stress, conformance_port_count };
+enum ConformancePort : size_t {
+  basic,
+  limits,
+  eviction,
+  slow,
+  greedy,
+  repeats,
+  many_repeats,
+  discarding,
+  late,
+  model_1,
+  model_5,
+  deep,
+  stress,
+  conformance_port_count
+};
 
 inline PortPlan conformance_port(const char* name, uint32_t history, uint32_t held, uint32_t readers) {
   return {"node", name, &MessageType::of<Image>(), {.width = 16, .height = 4, .channels = 3}, history, held, readers};

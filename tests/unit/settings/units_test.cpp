@@ -13,7 +13,8 @@ TEST_CASE("quantities carry their unit") {
   CHECK(*parse_quantity("-90deg", Dimension::angle) == doctest::Approx(-1.5707963));
   CHECK(*parse_quantity("30000/1001", Dimension::rate) == doctest::Approx(29.97003));
   CHECK(*parse_quantity("+3", Dimension::number) == 3);
-  for (const char* bad : {"", "0.24", "0.24deg", "m", "1e999m", "nanm", "infm", "0.2 4m"}) CHECK_FALSE(parse_quantity(bad, Dimension::length));
+  for (const char* bad : {"", "0.24", "0.24deg", "m", "1e999m", "nanm", "infm", "0.2 4m"})
+    CHECK_FALSE(parse_quantity(bad, Dimension::length));
   CHECK_FALSE(parse_quantity("15/0", Dimension::rate));
 }
 

@@ -40,7 +40,8 @@ TEST_CASE("sim camera conforms") {
   std::vector<std::unique_ptr<Simulation>> worlds;
   const auto make = [&](const Clock& clock) -> std::unique_ptr<StereoCamera> {
     worlds.push_back(std::make_unique<Simulation>(path_world(), 0, 3));
-    return std::make_unique<SimCamera>("camera", SimCameraSettings{test::small_rig(), {}, {15, 1}, true}, *worlds.back(), clock);
+    return std::make_unique<SimCamera>("camera", SimCameraSettings{test::small_rig(), {}, {15, 1}, true},
+                                       *worlds.back(), clock);
   };
   test::check_stereo_camera(make);
   test::check_free_running_camera(make);
@@ -91,7 +92,8 @@ TEST_CASE("a frame rendered in the background is used, and is the same") {
   SimCamera camera("camera", {test::small_rig(), {}, {15, 1}, true}, s, clock);
   REQUIRE(camera.open().has_value());
   REQUIRE(camera.start(0).has_value());
-  test::GuardedImage left(camera.format()), right(camera.format()), left_again(camera.format()), right_again(camera.format());
+  test::GuardedImage left(camera.format()), right(camera.format()), left_again(camera.format()),
+      right_again(camera.format());
   const int64_t cpu = simulator_cpu_ns();
   camera.trigger(500'000'000);
   while (!camera.idle()) std::this_thread::yield();
@@ -120,7 +122,8 @@ TEST_CASE("odometry drifts, but within what its model allows") {
     travelled += std::hypot(truth.x_m - previous.x_m, truth.y_m - previous.y_m);
     previous = truth;
     const double c = std::cos(start.theta_rad), n = std::sin(start.theta_rad);
-    const double tx = c * (truth.x_m - start.x_m) + n * (truth.y_m - start.y_m), ty = -n * (truth.x_m - start.x_m) + c * (truth.y_m - start.y_m);
+    const double tx = c * (truth.x_m - start.x_m) + n * (truth.y_m - start.y_m),
+                 ty = -n * (truth.x_m - start.x_m) + c * (truth.y_m - start.y_m);
     const BaseReading e = exact.at(t);
     CHECK(std::hypot(e.x_m - tx, e.y_m - ty) < 0.002 + 1e-3 * travelled);
     CHECK(std::abs(std::remainder(e.theta_rad - truth.theta_rad + start.theta_rad, 6.283185307179586)) < 1e-6);

@@ -62,7 +62,8 @@ TEST_CASE("a point seen at its true depth in the left image lies at x - f B / z 
       const Vec3 ray((x - rig.cu_px) / rig.focal_px, (y - rig.cv_px) / rig.focal_px, 1);
       const Vec3 point = lp.rotation * (z * ray) + lp.position;
       const Vec3 in_right = rp.rotation.transpose() * (point - rp.position);
-      const double u = rig.cu_px + rig.focal_px * in_right.x() / in_right.z(), v = rig.cv_px + rig.focal_px * in_right.y() / in_right.z();
+      const double u = rig.cu_px + rig.focal_px * in_right.x() / in_right.z(),
+                   v = rig.cv_px + rig.focal_px * in_right.y() / in_right.z();
       CHECK(v == doctest::Approx(y).epsilon(1e-9));
       CHECK(x - u == doctest::Approx(rig.focal_px * rig.baseline_m / z).epsilon(1e-6));
       const int u0 = static_cast<int>(std::floor(u));
@@ -90,7 +91,8 @@ TEST_CASE("true disparity is f B / depth") {
   std::vector<float> depth(static_cast<size_t>(rig.width * rig.height)), disparity(depth.size());
   s->true_depth(rig, 0, depth.data());
   s->true_disparity(rig, 0, disparity.data());
-  for (size_t i = 0; i < depth.size(); ++i) CHECK(disparity[i] * depth[i] == doctest::Approx(rig.focal_px * 0.24).epsilon(1e-5));
+  for (size_t i = 0; i < depth.size(); ++i)
+    CHECK(disparity[i] * depth[i] == doctest::Approx(rig.focal_px * 0.24).epsilon(1e-5));
 }
 
 TEST_CASE("a distorted lens shows a point where the Brown model puts it") {

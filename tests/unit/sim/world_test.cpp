@@ -39,9 +39,11 @@ bool has(const std::string& text, const std::string& part) { return text.find(pa
 
 TEST_CASE("a world with rows loads; row 0 of the bitmap is the bottom") {
   const TemporaryFolder folder;
-  const auto file = folder.write("w.xml", "<world resolution=\"0.5m\"><rows>\n#####\n#.###\n#...#\n#...#\n#####\n</rows>"
-                                          "<client name=\"ace\" x=\"1.2m\" y=\"1m\"/>"
-                                          "<action name=\"fill\" cost=\"4s\"><role name=\"v\" type=\"cup\"/><post role=\"v\" attr=\"content\" value=\"full\"/></action></world>");
+  const auto file = folder.write("w.xml",
+                                 "<world resolution=\"0.5m\"><rows>\n#####\n#.###\n#...#\n#...#\n#####\n</rows>"
+                                 "<client name=\"ace\" x=\"1.2m\" y=\"1m\"/>"
+                                 "<action name=\"fill\" cost=\"4s\"><role name=\"v\" type=\"cup\"/><post role=\"v\" "
+                                 "attr=\"content\" value=\"full\"/></action></world>");
   const auto world = load_world("camera", file);
   REQUIRE(world.has_value());
   CHECK(world->map.at(2, 3));
@@ -60,7 +62,8 @@ TEST_CASE("mistakes in a world are told with file, line and the way out") {
   CHECK(has(message("<world resolution=\"0.5m\" wall=\"marble\">" + kRows + "</world>"), "plaster"));
   CHECK(has(message("<world resolution=\"0.5m\"><rows>###\n#.\n###</rows></world>"), "row 2"));
   CHECK(has(message("<world resolution=\"0.5m\" map=\"absent.pgm\"/>"), "absent.pgm"));
-  CHECK(has(message("<world resolution=\"0.5m\">" + kRows + "<client name=\"ace\" x=\"0.1m\" y=\"1m\"/></world>"), "inside an obstacle"));
+  CHECK(has(message("<world resolution=\"0.5m\">" + kRows + "<client name=\"ace\" x=\"0.1m\" y=\"1m\"/></world>"),
+            "inside an obstacle"));
   const auto missing = load_world("camera", "/nonexistent/world.xml");
   REQUIRE_FALSE(missing.has_value());
   CHECK(missing.error().id == "camera");
@@ -69,8 +72,10 @@ TEST_CASE("mistakes in a world are told with file, line and the way out") {
 
 TEST_CASE("truncated and foreign maps are refused") {
   const TemporaryFolder folder;
-  CHECK(load_pgm(folder.write("good.pgm", std::string("P5\n# comment\n3 3\n255\n") + std::string(9, '\xff')), 0.1).has_value());
-  CHECK_FALSE(load_pgm(folder.write("short.pgm", std::string("P5\n3 3\n255\n") + std::string(8, '\xff')), 0.1).has_value());
+  CHECK(load_pgm(folder.write("good.pgm", std::string("P5\n# comment\n3 3\n255\n") + std::string(9, '\xff')), 0.1)
+            .has_value());
+  CHECK_FALSE(
+      load_pgm(folder.write("short.pgm", std::string("P5\n3 3\n255\n") + std::string(8, '\xff')), 0.1).has_value());
   CHECK_FALSE(load_pgm(folder.write("wide.pgm", "P5\n99999 3\n255\n"), 0.1).has_value());
   CHECK_FALSE(load_pgm(folder.write("text.pgm", "hello"), 0.1).has_value());
 }
@@ -104,7 +109,8 @@ TEST_CASE("speed and turn rate of the path are the derivatives of its pose") {
     const double h = 1e-4;
     const RobotState a = path.at(t - h), b = path.at(t + h), m = path.at(t);
     CHECK(std::hypot(b.x_m - a.x_m, b.y_m - a.y_m) / (2 * h) == doctest::Approx(m.speed_m_s).epsilon(0.02));
-    CHECK(std::remainder(b.theta_rad - a.theta_rad, 6.283185307179586) / (2 * h) == doctest::Approx(m.turn_rad_s).epsilon(0.05));
+    CHECK(std::remainder(b.theta_rad - a.theta_rad, 6.283185307179586) / (2 * h) ==
+          doctest::Approx(m.turn_rad_s).epsilon(0.05));
   }
 }
 
