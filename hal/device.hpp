@@ -22,6 +22,11 @@ inline tl::unexpected<DeviceError> device_error(std::string id, std::string what
   return tl::unexpected(DeviceError{std::move(id), std::move(what), std::move(fix), true});
 }
 
+/// Settings and files are right; the hardware is absent, busy or broken.
+inline tl::unexpected<DeviceError> device_failure(std::string id, std::string what, std::string fix) {
+  return tl::unexpected(DeviceError{std::move(id), std::move(what), std::move(fix), false});
+}
+
 /// What a read found. A read never throws and never blocks beyond its deadline.
 enum class ReadStatus : uint8_t {
   ok,            ///< the views hold new data

@@ -8,6 +8,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -17,6 +18,7 @@
 #include "rt/param.hpp"
 #include "rt/shm/transport.hpp"
 #include "rt/time/clock.hpp"
+#include "rt/time/rate.hpp"
 
 namespace takt {
 
@@ -31,7 +33,8 @@ struct Setup {
   std::filesystem::path directory;  ///< of the graph file; relative paths start here
   std::filesystem::path output;     ///< where a node may write files in finish(); exists
   uint64_t seed = 0;
-  double rate_hz = 0;  ///< planned rate; of the producer for `on` nodes, 0 if unknown
+  std::optional<Rate> rate;  ///< none: released by messages
+  int64_t offset_ns = 0;     ///< the first release comes this long after the epoch
 };
 
 /// One activation of a node. All a job may observe besides its inputs comes from here (and is recorded).

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <opencv2/core/utils/logger.hpp>
 
 #include "graph/command/check_command.hpp"
 #include "graph/command/eval_command.hpp"
@@ -40,7 +41,8 @@ void add_run(CLI::App& app, takt::command::RunOptions& o, int& exit_code) {
       ->transform(CLI::Validator(duration, "DURATION"));
   run->add_option("--clock", o.clock, "real | virtual")->check(CLI::IsMember({"real", "virtual"}));
   run->add_option("--transport", o.transport, "local | iceoryx")->check(CLI::IsMember({"local", "iceoryx"}));
-  run->add_option("--isolate", o.isolate, "none (one process)")->check(CLI::IsMember({"none"}));
+  run->add_option("--isolate", o.isolate, "none (one process) | subsystem")
+      ->check(CLI::IsMember({"none", "subsystem"}));
   run->add_option("--report", o.report, "writes the report as JSON");
   run->add_option("--output", o.output, "folder for pictures and other results (default out)");
   run->add_option("--seed", o.seed, "seed of the simulated world");
@@ -52,6 +54,8 @@ void add_run(CLI::App& app, takt::command::RunOptions& o, int& exit_code) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  // Files that cannot be read are reported by the commands themselves, with the next step.
+  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
   CLI::App app{"Takt: a real-time dataflow runtime with a static task graph"};
   app.require_subcommand(1);
   takt::command::RunOptions run_options, check_options;

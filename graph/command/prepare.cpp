@@ -23,8 +23,7 @@ graph::DeviceFactory device_factory(Prepared& prepared, uint64_t seed) {
     if (node) return std::move(*node);
     graph::ComposeError error;
     error.problems.push_back({spec.position, node.error().text()});
-    // Files are input; anything else that does not open is a device.
-    error.device_failed = spec.driver != "sim" && spec.driver != "replay";
+    error.device_failed = !node.error().bad_input;
     return tl::make_unexpected(std::move(error));
   };
 }

@@ -128,21 +128,27 @@ Json cpu_json(const RunFacts& facts) {
             {"runtime", share(runtime)}}}};
 }
 
-/// Age at the end of a chain: that of the message on its last edge, taken when the last node publishes.
+/// Age of what the node publishes on a port, at that instant; null if the mode leaves the node out.
+const Histogram* output_age(const RunFacts& facts, const graph::PortName& name) {
+  for (const auto& task : facts.executor.tasks()) {
+    const auto& ports = task->plan().ports;
+    for (size_t i = 0; i < ports.size(); ++i) {
+      const PortPlan& port = facts.composition.plan.ports[ports[i]];
+      if (port.node == name.node && port.port == name.port) return &task->statistics().output_age[i];
+    }
+  }
+  return nullptr;
+}
+
 Json chains_json(const RunFacts& facts) {
   Json chains = Json::array();
   for (const graph::ChainSpec& chain : facts.graph.chains) {
-    Json entry = {{"name", chain.name},
-                  {"age_ms", distribution(Histogram(), 1e6)},
-                  {"bound_ms", static_cast<double>(chain.max_age_ns) / 1e6},
-                  {"within", nullptr}};
-    for (const auto& task : facts.executor.tasks()) {
-      if (task->plan().name != chain.to.node) continue;
-      const Histogram& age = task->statistics().output_age;
-      entry["age_ms"] = distribution(age, 1e6);
-      if (age.count() > 0) entry["within"] = age.max_ns() <= chain.max_age_ns;
-    }
-    chains.push_back(std::move(entry));
+    const Histogram* age = output_age(facts, chain.to);
+    const bool sampled = age != nullptr && age->count() > 0;
+    chains.push_back({{"name", chain.name},
+                      {"age_ms", distribution(sampled ? *age : Histogram(), 1e6)},
+                      {"bound_ms", static_cast<double>(chain.max_age_ns) / 1e6},
+                      {"within", sampled ? Json(age->max_ns() <= chain.max_age_ns) : Json(nullptr)}});
   }
   return chains;
 }

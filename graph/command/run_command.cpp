@@ -94,6 +94,10 @@ std::vector<std::string> prepare_machine(const CpuLatencyHold& latency) {
 }  // namespace
 
 int run_graph(const RunOptions& options) {
+  if (options.isolate == "subsystem")
+    return refuse(
+        "--isolate subsystem: this version runs all subsystems in one process; leave it out, or --isolate none",
+        kDeviceOrSystem);
   std::error_code error;
   std::filesystem::create_directories(options.output, error);
   if (error)
@@ -112,6 +116,8 @@ int run_graph(const RunOptions& options) {
     adjusted.insert(adjusted.end(), lacks.begin(), lacks.end());
     for (const std::string& line : adjusted) std::fprintf(stderr, "takt: adjusted: %s\n", line.c_str());
     return execute(options, prepared, std::move(adjusted));
+  } catch (const std::invalid_argument& problem) {  // more ports or edges than the transport carries
+    return refuse(problem.what(), kBadInput);
   } catch (const std::exception& problem) {  // PolicyRefused, TransportError, no memory
     return refuse(problem.what(), kDeviceOrSystem);
   }

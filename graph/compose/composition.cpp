@@ -169,7 +169,7 @@ class Composer {
       TaskPlan& task = result_.plan.tasks[t];
       for (const EdgePlan& edge : task.edges)
         PortAccess::connect(*task.node->inputs()[edge.input], output_of(result_.plan.ports[edge.port]).capacity());
-      Setup setup{clock_, graph_.directory, options_.output, options_.seed + t, effective_rate_hz(result_.plan, t)};
+      Setup setup{clock_, graph_.directory, options_.output, options_.seed + t, task.rate, task.offset_ns};
       try {
         task.node->setup(setup);
       } catch (const std::exception& problem) {

@@ -66,6 +66,30 @@ void Loader::check_modes() {
   spec_.mode = options_.mode;
 }
 
+void Loader::apply_mode() {
+  const auto mode =
+      std::find_if(spec_.modes.begin(), spec_.modes.end(), [&](const ModeSpec& m) { return m.name == spec_.mode; });
+  if (mode == spec_.modes.end()) return;
+  const std::set<std::string> without(mode->without.begin(), mode->without.end());
+  std::erase_if(spec_.nodes, [&](const NodeSpec& node) { return without.contains(node.id); });
+  std::erase_if(spec_.devices, [&](const DeviceSpec& device) { return without.contains(device.id); });
+  std::erase_if(spec_.schedule.entries, [&](const auto& entry) { return without.contains(entry.first); });
+}
+
+void Loader::tell_what_is_not_enforced() {
+  const auto tell = [&](const std::string& id, const char* key, std::string_view verb, const char* instead) {
+    spec_.adjusted.push_back(
+        fmt::format("{} of {}: {} -> continue: this version counts {} and goes on", key, id, verb, instead));
+  };
+  if (spec_.isolation != "none")
+    spec_.adjusted.push_back("isolation: " + spec_.isolation +
+                             " -> none: this version runs all subsystems in one process");
+  for (const auto& [id, entry] : spec_.schedule.entries) {
+    if (entry.on_overrun != OnOverrun::proceed) tell(id, "on_overrun", to_string(entry.on_overrun), "overruns");
+    if (entry.on_miss == OnMiss::safe_stop) tell(id, "on_miss", to_string(entry.on_miss), "misses");
+  }
+}
+
 void Loader::check_mode(const ModeSpec& mode) {
   const std::string pointer = child(child("/modes", mode.name), "without");
   std::set<std::string> without;

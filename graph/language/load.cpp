@@ -32,6 +32,8 @@ Loaded Loader::load(const std::filesystem::path& file) {
     check_chains();
     check_schedule();
     check_modes();
+    apply_mode();
+    tell_what_is_not_enforced();
   }
   // By file (the graph first), then by place; what two stages found alike is said once.
   const auto key = [&](const Problem& p) {

@@ -107,6 +107,8 @@ class Loader {
   // check_graph.cpp
   void check_chains();
   void check_modes();
+  void tell_what_is_not_enforced();
+  void apply_mode();
   void check_mode(const ModeSpec& mode);
 
   void problem(const Position& at, std::string text) { problems_.push_back({at, std::move(text)}); }

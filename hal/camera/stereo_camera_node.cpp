@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "hal/camera/stereo_camera_node.hpp"
 
-#include <cmath>
-
 namespace takt {
 
 StereoCameraNode::StereoCameraNode(std::unique_ptr<StereoCamera> camera, HealthThresholds thresholds)
@@ -18,21 +16,23 @@ void StereoCameraNode::setup(Setup& setup) {
   pair_.reserve(capacity);
   previous_.assign(static_cast<size_t>(health_samples(format_.width, format_.height, thresholds_.step_px)), 0);
   has_previous_ = false;
-  // The planned rate as a fraction, so that the instant of the next release can be told exactly (1/15 s is no whole
-  // number of nanoseconds).
-  for (int64_t denominator = 1; denominator <= 1001 && rate_.numerator == 0 && setup.rate_hz > 0; ++denominator) {
-    const double numerator = setup.rate_hz * static_cast<double>(denominator);
-    if (std::abs(numerator - std::round(numerator)) < 1e-9 * numerator) {
-      rate_ = {static_cast<int64_t>(std::llround(numerator)), denominator};
-    }
-  }
+  rate_ = setup.rate;
+  offset_ns_ = setup.offset_ns;
+}
+
+void StereoCameraNode::start(int64_t epoch_ns) {
+  DeviceNode::start(epoch_ns);
+  if (!rate_) return;
+  // Ask for the first exposure before it is due, as each job does for the next one.
+  triggered_ns_ = epoch_ns + offset_ns_;
+  camera_->trigger(triggered_ns_);
 }
 
 int64_t StereoCameraNode::next_release(const Job& job) const {
   // release(k) = floor(origin + k T) with a whole origin, hence origin = release(k) - floor(k T).
   const auto k = static_cast<int64_t>(job.index());
-  const int64_t origin = job.release_ns() - rate_.release_ns(0, k);
-  return rate_.release_ns(origin, k + 1);
+  const int64_t origin = job.release_ns() - rate_->release_ns(0, k);
+  return rate_->release_ns(origin, k + 1);
 }
 
 void StereoCameraNode::run(Job& job) {
@@ -58,7 +58,7 @@ void StereoCameraNode::run(Job& job) {
     message->camera = format_.camera;
     pair_.send(frame.stamp_ns);
   }
-  if (rate_.numerator > 0 && !job.ended()) {
+  if (rate_ && !job.ended()) {
     triggered_ns_ = next_release(job);
     camera_->trigger(triggered_ns_);
   }

@@ -16,6 +16,7 @@ class StereoCameraNode final : public DeviceNode {
  public:
   explicit StereoCameraNode(std::unique_ptr<StereoCamera> camera, HealthThresholds thresholds = {});
   void setup(Setup& setup) override;
+  void start(int64_t epoch_ns) override;
   void run(Job& job) override;
   Device& device() override { return *camera_; }
   StereoCamera& camera() { return *camera_; }
@@ -27,7 +28,8 @@ class StereoCameraNode final : public DeviceNode {
   std::unique_ptr<StereoCamera> camera_;
   HealthThresholds thresholds_;
   StereoFormat format_;
-  Rate rate_{0, 1};
+  std::optional<Rate> rate_;
+  int64_t offset_ns_ = 0;
   std::vector<uint8_t> previous_;
   bool has_previous_ = false;
   int64_t triggered_ns_ = INT64_MIN;

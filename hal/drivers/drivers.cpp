@@ -26,6 +26,14 @@ std::string names(const List& list) {
   return all;
 }
 
+std::string built_names(std::span<const DriverInfo> drivers) {
+  std::string all;
+  for (const DriverInfo& driver : drivers) {
+    if (driver.built) all.append(all.empty() ? "" : ", ").append(driver.name);
+  }
+  return all;
+}
+
 Rate rate_of(Settings& settings) {
   Rate rate{15, 1};
   if (!settings.has("rate")) return rate;
@@ -84,6 +92,7 @@ NodeResult make_replay_camera(const DeviceConfig& config, Settings& settings, co
                    settings.quantity("cv", Dimension::number, 0.0),
                    settings.quantity("baseline", Dimension::length, 0.0)};
   camera.frames = settings.count("frames", 1, 1, 1'000'000'000);
+  camera.shrink = static_cast<int>(settings.count("shrink", 1, 1, 16));
   camera.channels = static_cast<int>(settings.count("channels", 0, 0, 3));
   if (camera.channels == 2) settings.fail("setting `channels` is 2", "use 1 (grey) or 3 (BGR)");
   camera.rate = rate_of(settings);
@@ -187,12 +196,15 @@ NodeResult make_device(const DeviceConfig& config, Devices& devices, const Clock
       std::find_if(kinds.begin(), kinds.end(), [&](const DeviceKind& k) { return k.name == config.kind; });
   if (kind == kinds.end())
     return device_error(config.id, "unknown device kind `" + config.kind + "`", "known kinds: " + names(kinds));
-  if (std::none_of(kind->drivers.begin(), kind->drivers.end(),
-                   [&](const DriverInfo& d) { return d.name == config.driver; })) {
+  const auto driver = std::find_if(kind->drivers.begin(), kind->drivers.end(),
+                                   [&](const DriverInfo& d) { return d.name == config.driver; });
+  if (driver == kind->drivers.end())
     return device_error(config.id, config.kind + " has no driver `" + config.driver + "`",
                         "known drivers: " + names(kind->drivers));
-  }
   if (const auto keys = check_keys(config, *kind); !keys) return tl::unexpected(keys.error());
+  if (!driver->built)
+    return device_failure(config.id, "this build cannot open the driver `" + config.driver + "`",
+                          "choose a profile whose devices use one of: " + built_names(kind->drivers));
   Settings settings(config.id, config.settings, config.directory);
   if (config.driver == "replay") return make_replay_camera(config, settings, clock);
   return make_sim(config, settings, devices, clock);

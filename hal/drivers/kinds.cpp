@@ -7,7 +7,12 @@ namespace {
 using enum SettingKind;
 
 constexpr DriverInfo kSimOnly[] = {{"sim", "the simulated world"}};
-constexpr DriverInfo kCameraDrivers[] = {{"sim", "the simulated world"}, {"replay", "recorded images"}};
+constexpr DriverInfo kCameraDrivers[] = {
+    {"sim", "the simulated world"}, {"replay", "recorded images"}, {"v4l2", "a Bumblebee behind Video4Linux", false}};
+constexpr DriverInfo kLaserDrivers[] = {{"sim", "the simulated world"},
+                                        {"lms200", "a SICK LMS 200 on a serial line", false}};
+constexpr DriverInfo kHeadDrivers[] = {{"sim", "the simulated world"}, {"can", "the camera head on a CAN bus", false}};
+constexpr DriverInfo kLinesDrivers[] = {{"sim", "the simulated world"}, {"gpio", "lines of a GPIO chip", false}};
 
 #define COMMON_SETTINGS                                                                 \
   {"rate", "", rate, false, "releases per second of the device's node"},                \
@@ -31,6 +36,9 @@ constexpr SettingInfo kCamera[] = {
     {"cv", "replay", number, false, "principal point of the single pair, px; the image centre"},
     {"baseline", "replay", length, false, "baseline of the single pair"},
     {"frames", "replay", count, false, "how often the single pair is delivered; 1"},
+    {"shrink", "replay", count, false, "images are made smaller by this whole factor when they are loaded; 1"},
+    {"path", "v4l2", path, true, "device file, for instance /dev/video0"},
+    {"rig", "v4l2", path, true, "YAML file with lens, size, baseline and mount"},
     {"channels", "replay", count, false, "1 grey, 3 BGR; as the files"},
     {"health_step", "", count, false, "the health check looks at one pixel in n x n; 8"},
     {"saturated_level", "", count, false, "level from which a pixel is saturated; 250"},
@@ -46,8 +54,13 @@ constexpr SettingInfo kLaser[] = {
     {"fov", "sim", angle, false, "angle from the first to the last beam; 180deg"},
     {"range", "sim", length, false, "largest distance; 8m"},
     {"noise", "sim", length, false, "standard deviation of a range; 1cm"},
+    {"port", "lms200", path, true, "serial line, for instance /dev/ttyS1"},
+    {"baud", "lms200", count, false, "9600, 19200, 38400 or 500000; 38400"},
 };
-constexpr SettingInfo kHead[] = {COMMON_SETTINGS};
+constexpr SettingInfo kHead[] = {
+    COMMON_SETTINGS,
+    {"interface", "can", text, true, "network interface, for instance can0"},
+};
 constexpr SettingInfo kBase[] = {
     COMMON_SETTINGS,
     {"drive", "sim", text, false, "path (the world's) or command (velocity commands); path if the world has one"},
@@ -56,14 +69,17 @@ constexpr SettingInfo kBase[] = {
     {"turn_bias", "sim", turn_rate, false, "standard deviation of the yaw-rate bias at start; 0.0005rad/s"},
     {"turn_bias_walk", "sim", number, false, "random walk of that bias, rad/s per square root of a second; 0.0002"},
 };
-constexpr SettingInfo kLines[] = {COMMON_SETTINGS};
+constexpr SettingInfo kLines[] = {
+    COMMON_SETTINGS,
+    {"chip", "gpio", path, true, "device file of the chip, for instance /dev/gpiochip0"},
+};
 
 constexpr DeviceKind kKinds[] = {
     {"stereo_camera", "gives `pair`", kCameraDrivers, kCamera},
-    {"laser_scanner", "gives `scan`", kSimOnly, kLaser},
-    {"camera_head", "gives `state`, takes `command`", kSimOnly, kHead},
+    {"laser_scanner", "gives `scan`", kLaserDrivers, kLaser},
+    {"camera_head", "gives `state`, takes `command`", kHeadDrivers, kHead},
     {"mobile_base", "gives `odometry`, takes `velocity`", kSimOnly, kBase},
-    {"digital_lines", "gives `state`", kSimOnly, kLines},
+    {"digital_lines", "gives `state`", kLinesDrivers, kLines},
 };
 
 }  // namespace

@@ -16,9 +16,24 @@ void copy(const cv::Mat& from, ImageView<uint8_t> to) {
   for (int y = 0; y < to.height; ++y) std::memcpy(to.row(y), from.ptr(y), row);
 }
 
-cv::Mat decode(const std::filesystem::path& file, int channels) {
+cv::Mat decode(const std::filesystem::path& file, int channels, int shrink) {
   const int mode = channels == 1 ? cv::IMREAD_GRAYSCALE : channels == 3 ? cv::IMREAD_COLOR : cv::IMREAD_ANYCOLOR;
-  return cv::imread(file.string(), mode);
+  cv::Mat image = cv::imread(file.string(), mode);
+  if (shrink == 1 || image.cols < shrink || image.rows < shrink) return image;
+  cv::Mat small;
+  // Whole blocks only, so that a pixel of the small image is the mean of shrink x shrink pixels.
+  const cv::Rect whole(0, 0, image.cols / shrink * shrink, image.rows / shrink * shrink);
+  cv::resize(image(whole), small, whole.size() / shrink, 0, 0, cv::INTER_AREA);
+  return small;
+}
+
+/// Focal length and principal point after shrinking: pixel centres lie at whole numbers.
+CameraModel shrunk(CameraModel camera, int by) {
+  const double factor = by;
+  camera.focal_px /= factor;
+  camera.cu_px = (camera.cu_px + 0.5) / factor - 0.5;
+  camera.cv_px = (camera.cv_px + 0.5) / factor - 0.5;
+  return camera;
 }
 
 }  // namespace
@@ -87,7 +102,7 @@ DeviceResult ReplayCamera::decode_all() {
     cv::Mat pair[2];
     for (int side = 0; side < 2; ++side) {
       const auto& file = side == 0 ? files_.left[i] : files_.right[i];
-      pair[side] = decode(file, channels);
+      pair[side] = decode(file, channels, settings_.shrink);
       if (pair[side].empty() || pair[side].depth() != CV_8U) {
         return device_error(id_, file.string() + ": cannot be decoded as an 8-bit image",
                             "record or copy the file again");
@@ -110,9 +125,10 @@ DeviceResult ReplayCamera::decode_all() {
       store_->right[i] = pair[1];
     }
   }
-  format_ = {size.width, size.height, channels, true, files_.camera, settings_.rate.hz()};
+  const bool centre_given = files_.camera.cu_px != 0 || files_.camera.cv_px != 0;
+  format_ = {size.width, size.height, channels, true, shrunk(files_.camera, settings_.shrink), settings_.rate.hz()};
   // A single pair names the centre of its image unless told otherwise.
-  if (format_.camera.cu_px == 0 && format_.camera.cv_px == 0) {
+  if (!centre_given) {
     format_.camera.cu_px = (size.width - 1) / 2.0;
     format_.camera.cv_px = (size.height - 1) / 2.0;
   }
@@ -151,8 +167,8 @@ StereoFrame ReplayCamera::read(ImageView<uint8_t> left, ImageView<uint8_t> right
   cv::Mat decoded[2] = {store_->left[index], store_->right[index]};
   if (decoded[0].empty()) {
     // Larger than memory_limit: the price is a file read and an allocation in the job, as the settings allow.
-    decoded[0] = decode(files_.left[index], format_.channels);
-    decoded[1] = decode(files_.right[index], format_.channels);
+    decoded[0] = decode(files_.left[index], format_.channels, settings_.shrink);
+    decoded[1] = decode(files_.right[index], format_.channels, settings_.shrink);
   }
   frame.frame_number = static_cast<uint32_t>(next_);
   frame.stamp_ns = stamp_of(next_++);

@@ -14,6 +14,7 @@ struct ReplayCameraSettings {
   std::filesystem::path left, right;  ///< one rectified pair, delivered `frames` times
   CameraModel camera;                 ///< of the single pair
   int64_t frames = 1;
+  int shrink = 1;                        ///< 1..16: images become smaller by this factor, the camera model with them
   int channels = 0;                      ///< 0: as the files; 1 or 3: converted
   Rate rate{15, 1};                      ///< where no times.txt tells the stamps
   uint64_t memory_limit = 512ull << 20;  ///< decoded frames up to this size are held in memory from open() on

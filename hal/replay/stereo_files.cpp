@@ -132,7 +132,7 @@ tl::expected<std::vector<int64_t>, DeviceError> read_times(const std::string& id
 tl::expected<StereoFiles, DeviceError> list_directory(const std::string& id, const fs::path& directory) {
   if (!fs::is_directory(directory))
     return device_error(id, directory.string() + ": no such directory",
-                        "correct `directory` (${TAKT_DATA} is expanded) ");
+                        "correct `directory`; a ${TAKT_DATA} in it is expanded");
   auto left = images(id, directory / "image_l"), right = images(id, directory / "image_r");
   if (!left) return tl::unexpected(left.error());
   if (!right) return tl::unexpected(right.error());

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <string>
 
+#include "nodes/cloud/outlier_filter.hpp"
 #include "nodes/mapping_3d/obstacle_grid.hpp"
 #include "nodes/mapping_3d/pose.hpp"
 #include "rt/node.hpp"
@@ -31,6 +32,11 @@ class MappingNode final : public Node {
     grid_ = ObstacleGrid(p);
     const auto side = static_cast<uint32_t>(grid_.shape().cells);
     obstacles_.reserve({side, side, 1, 0});
+    if (outlier_radius_ > 0) {
+      filter_.emplace(cloud_.capacity().count);
+      kept_.resize(cloud_.capacity().count);
+      keep_.resize(cloud_.capacity().count);
+    }
     mount_ = camera_mount(camera_x_, camera_y_, camera_height_, 0, camera_tilt_);
   }
 
@@ -55,11 +61,24 @@ class MappingNode final : public Node {
     grid->grid_in_map = compose(compose(viewpoint.camera_in_robot, pose), inverse(viewpoint.camera_in_robot));
     if (!grid->cells.resize(static_cast<size_t>(shape.cells) * static_cast<size_t>(shape.cells)))
       return job.no_result();
-    grid_.fill(cloud->points.items(), viewpoint, grid->view());
+    grid_.fill(without_outliers(cloud->points.items()), viewpoint, grid->view());
     obstacles_.send(last_stamp_ns_);
   }
 
  private:
+  std::span<const Point> without_outliers(std::span<const Point> points) {
+    if (!filter_) return points;
+    const cloud::OutlierParameters p{outlier_radius_, cloud::scaled_n_min(outlier_n_min_, points.size())};
+    const std::span<uint8_t> keep = std::span(keep_).first(points.size());
+    filter_->filter(points, p, keep);
+    size_t kept = 0;
+    for (size_t i = 0; i < points.size(); ++i) {
+      kept_[kept] = points[i];
+      kept += keep[i];
+    }
+    return std::span(kept_).first(kept);
+  }
+
   Viewpoint viewpoint_of(const PointCloud& cloud) const {
     const Transform& t = cloud.sensor_in_robot;
     const bool said = t.x != 0 || t.y != 0 || t.z != 0 || t.qx != 0 || t.qy != 0 || t.qz != 0;
@@ -70,6 +89,10 @@ class MappingNode final : public Node {
   Input<PointCloud> cloud_{this, "cloud", "points in the camera frame"};
   Input<Motion> motion_{this, "motion", "camera poses around the cloud's stamp; depth 16", Need::optional};
   Output<Grid> obstacles_{this, "obstacles", "0.20 m grid around the robot, robot frame at the cloud's stamp"};
+  Param<double> outlier_radius_{this, "outlier_radius", 0.20, {0.0, 1.0}, "m", "outlier removal; 0: none"};
+  Param<int> outlier_n_min_{this, "outlier_n_min",
+                            100,  {1, 100000},
+                            "",   "others within the radius that a point needs, for a cloud of 1.2 million points"};
   Param<double> voxel_{this, "voxel", 0.20, {0.05, 1.0}, "m", "edge of a voxel and of a cell"};
   Param<double> robot_height_{this, "robot_height", 1.78, {0.1, 5.0}, "m", "higher points are no obstacles"};
   Param<double> z_floor_{this, "z_floor", 0.07, {-1.0, 1.0}, "m", "lower points are floor"};
@@ -91,6 +114,9 @@ class MappingNode final : public Node {
   Param<double> camera_tilt_{this,        "camera_tilt", 0.0,
                              {-1.6, 1.6}, "rad",         "camera tilt, up positive, where the cloud does not say"};
 
+  std::optional<cloud::OutlierFilter> filter_;
+  std::vector<Point> kept_;
+  std::vector<uint8_t> keep_;
   ObstacleGrid grid_;
   Transform mount_;
   std::array<StampedPose, InputPort::kMaxDepth> poses_;

@@ -27,6 +27,7 @@ double TaskStatistics::drift_us() const {
 
 Task::Task(const TaskPlan& plan, Transport& transport, const Clock& clock, std::string mode)
     : plan_(plan), clock_(clock), mode_(std::move(mode)), latch_(plan, transport), published_(plan.ports.size()) {
+  statistics_.output_age.resize(plan_.ports.size());
   for (size_t i = 0; i < plan_.ports.size(); ++i) {
     writers_.push_back(transport.make_writer(plan_.ports[i]));
     PortAccess::attach(*plan_.node->outputs()[i], writers_.back().get());
@@ -95,7 +96,7 @@ void Task::settle_output(size_t i, bool late, int64_t now_ns, int64_t visible_at
   if (PortAccess::sent(output) && !withheld) {
     writer.publish(PortAccess::stamp_ns(output), now_ns, visible_at_ns);
     published_[i] = true;
-    statistics_.output_age.add(now_ns - PortAccess::stamp_ns(output));
+    statistics_.output_age[i].add(now_ns - PortAccess::stamp_ns(output));
   } else {
     writer.discard();
     if (withheld && plan_.on_miss == OnMiss::reuse_last) published_[i] = writer.repeat(now_ns, visible_at_ns);

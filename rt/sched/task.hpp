@@ -21,7 +21,7 @@ struct TaskStatistics {
   uint64_t allocations = 0, page_faults = 0;
   int64_t cpu_ns = 0, preempted_ns = 0;
   Histogram lateness, exec, response, publish;
-  Histogram output_age;  ///< stamp of the newest message published to its publication
+  std::vector<Histogram> output_age;  ///< per output: stamp of a message to its publication
 
   /// Drift of the release grid: least lateness of the last 100 jobs minus that of the first 100, us. Zero if releases
   /// stay on the planned instants, however long the run.

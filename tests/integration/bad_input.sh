@@ -9,7 +9,8 @@ graph() { # graph SED-EXPRESSION: a copy of the example with one thing wrong
   sed -E "$1" "$source/graph/ace.yaml" >"$work/graph/bad.yaml"
   cmp -s "$source/graph/ace.yaml" "$work/graph/bad.yaml" && fail "the edit $1 changed nothing"
 }
-before=$(ls /dev/shm /tmp | sort)
+left_behind() { ls /dev/shm /tmp | grep -E '^(takt|iox|roudi|iceoryx)' | sort; pgrep -af "^$takt run" | cut -d' ' -f2-; }
+before=$(left_behind)
 run() { expect "$1" "$2" "$takt" run "$work/graph/bad.yaml" --for 1s --output "$work/out"; }
 
 graph 's/stereo\.disparity, max_age/stereo.disparty, max_age/'; run 2 "did you mean"
@@ -23,7 +24,7 @@ graph 's/type: mapping_3d/typ: mapping_3d/';                    run 2 "typ"
 
 # A cycle of `on` edges.
 graph 's/name: ace/name: cyclic/'
-sed -i -E 's/  stereo: \{rate: 15, offset: 16ms/  stereo: {on: ego_motion.motion/; s/  ego_motion: \{rate: 10, offset: 20ms/  ego_motion: {on: stereo.disparity/' "$work/schedules/thesis.yaml"
+sed -i -E 's/  stereo: \{rate: 15, offset: 26ms/  stereo: {on: ego_motion.motion/; s/  ego_motion: \{rate: 10, offset: 20ms/  ego_motion: {on: stereo.disparity/' "$work/schedules/thesis.yaml"
 run 2 "cycle"
 cp "$source"/schedules/*.yaml "$work/schedules/"
 
@@ -34,8 +35,39 @@ grep -q "max_age" "$work/stderr" || fail "only the first problem was reported"
 
 expect 2 "does-not-exist" "$takt" run "$work/does-not-exist.yaml"
 expect 2 "--for" "$takt" run --for 5
-expect 2 "image_l" env TAKT_DATA="$work/nothing" "$takt" run "$source/graph/kitti.yaml"
-expect 2 "calib" "$takt" eval ego_motion --data "$work"
+expect 2 "no such directory" env TAKT_DATA="$work/nothing" "$takt" run "$source/graph/kitti.yaml"
+expect 2 "poses.txt" "$takt" eval ego_motion --data "$work"
+expect 2 "none.png" "$takt" eval stereo --left "$work/none.png" --right "$work/none.png" --gt "$work/none.png" --gt-scale 1 --disparities 16
 
-[ "$before" = "$(ls /dev/shm /tmp | sort)" ] || fail "something was left in /dev/shm or /tmp: $(diff <(echo "$before") <(ls /dev/shm /tmp | sort))"
+# A recording of our own, with one thing wrong at a time.
+"$takt" run --clock virtual --for 1s --output "$work/pictures" >/dev/null 2>&1 || fail "the run that makes the pictures"
+recording() {
+  rm -rf "$work/data" && mkdir -p "$work/data/stereo_sequence/kitti06"/image_{l,r}
+  for side in l r; do cp "$work/pictures/disparity.png" "$work/data/stereo_sequence/kitti06/image_$side/000000.png"; done
+  printf 'P0: 500 0 320 0 0 500 240 0 0 0 1 0\nP1: 500 0 320 -60 0 500 240 0 0 0 1 0\n' >"$work/data/stereo_sequence/kitti06/calib.txt"
+}
+replay() { expect "$1" "$2" env TAKT_DATA="$work/data" "$takt" run "$source/graph/kitti.yaml" --output "$work/out" --policy cooperative; }
+recording; expect 0 "" env TAKT_DATA="$work/data" "$takt" run "$source/graph/kitti.yaml" --output "$work/out" --clock virtual
+recording; rm -r "$work/data/stereo_sequence/kitti06/image_r"; replay 2 "image_r"
+recording; truncate -s 2000 "$work/data/stereo_sequence/kitti06/image_l/000000.png"; replay 2 "truncated PNG"
+recording; sed -i 's/P0: 500/P0: nan/' "$work/data/stereo_sequence/kitti06/calib.txt"; replay 2 "calib.txt:1"
+recording; rm "$work/data/stereo_sequence/kitti06/calib.txt"; replay 2 "calib.txt"
+
+# Devices and daemons: exit 3.
+graph 's#sim: \{default: .*#sim: {default: {driver: sim, world: worlds/lab.xml}, head_camera: {driver: v4l2, path: /dev/video99}}#'
+run 3 "v4l2"
+private() { unshare -m sh -c 'mount -t tmpfs tmpfs /tmp && mount -t tmpfs tmpfs /dev/shm && exec "$@"' private "$@"; }
+if private true 2>/dev/null; then
+  expect 3 "another iceoryx daemon is running" private sh -c '
+    "$1" run --for 0s --transport iceoryx --policy cooperative --output /tmp/one >/dev/null 2>&1 & first=$!
+    until [ -e /dev/shm/root ] || ! kill -0 $first; do sleep 0.1; done
+    "$1" run --for 1s --transport iceoryx --policy cooperative --output /tmp/two; code=$?
+    kill -INT $first; wait $first
+    exit $code' two "$takt"
+else
+  echo "NOT RUN: the lock of another daemon needs a private mount namespace; run as root"
+fi
+
+after=$(left_behind)
+[ "$before" = "$after" ] || fail "something was left behind: $(diff <(echo "$before") <(echo "$after"))"
 finish

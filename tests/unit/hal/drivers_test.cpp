@@ -63,7 +63,7 @@ TEST_CASE("a job of the camera node sends one pair with the stamp of its release
   auto made = make_device(config("stereo_camera", "sim", settings), devices, clock);
   REQUIRE(made.has_value());
   DeviceNode& node = **made;
-  Setup setup{clock, kGraph, {}, 1, 15.0};
+  Setup setup{clock, kGraph, {}, 1, Rate{15, 1}};
   node.setup(setup);
   OutputPort& output = *node.outputs().at(0);
   CHECK(output.name() == "pair");
@@ -98,7 +98,7 @@ TEST_CASE("a replayed camera ends the run after its last frame") {
                   devices, clock);
   REQUIRE_MESSAGE(made.has_value(), (made ? "" : made.error().text()));
   DeviceNode& node = **made;
-  Setup setup{clock, kGraph, {}, 1, 15.0};
+  Setup setup{clock, kGraph, {}, 1, Rate{15, 1}};
   node.setup(setup);
   test::FakeWriter writer(*node.outputs().at(0));
   std::vector<bool> ended, sent;
@@ -126,7 +126,7 @@ TEST_CASE("laser, head, base and line nodes send one message a job, and share on
     auto made = make_device(config(kind, "sim", kWorld), devices, clock);
     REQUIRE_MESSAGE(made.has_value(), (made ? "" : made.error().text()));
     DeviceNode& node = **made;
-    Setup setup{clock, kGraph, {}, 1, 15.0};
+    Setup setup{clock, kGraph, {}, 1, Rate{15, 1}};
     node.setup(setup);
     CHECK(node.outputs().at(0)->name() == port);
     test::FakeWriter writer(*node.outputs()[0]);

@@ -85,7 +85,7 @@ inline bool run(Node& node, uint64_t index = 0) {
 
 inline void set_up(Node& node, const std::filesystem::path& output = ".") {
   static const VirtualClock clock;
-  Setup setup{clock, ".", output};
+  Setup setup{clock, ".", output, 0, std::nullopt, 0};
   node.setup(setup);
 }
 

@@ -53,6 +53,38 @@ TEST_CASE("mapping_3d: one grid per cloud, with the cloud's stamp and the robot'
   CHECK_FALSE(out.sent());
 }
 
+TEST_CASE("mapping_3d: points without company are no obstacle, unless outlier_radius is 0") {
+  for (const double radius : {0.2, 0.0}) {
+    NodeTypes types;
+    register_mapping_3d(types);
+    const auto node = types.find("mapping_3d")->make();
+    for (ParamBase* p : node->params()) {
+      if (p->name() == "outlier_radius") REQUIRE(p->set(radius));
+      if (p->name() == "outlier_n_min") REQUIRE(p->set(100000));  // 80 of the 960 points below
+      if (p->name() == "share") REQUIRE(p->set(0.0));
+    }
+    auto& cloud_port = test::input(*node, "cloud");
+    PortAccess::connect(cloud_port, {0, 0, 1, 1000});
+    test::set_up(*node);
+    test::BoxWriter<Grid> out(*node->outputs()[0]);
+    test::Box<PointCloud> cloud({0, 0, 1, 1000});
+    cloud->camera = {492.8, 319.5, 239.5, 0.24};
+    cloud->sensor_in_robot = mapping_3d::camera_mount(0, 0.3, 1.5, 0, 0);
+    for (int i = 0; i < 900; ++i) cloud->points.push_back({0.1f, 0.5f, 2.8f});
+    for (int i = 0; i < 60; ++i) cloud->points.push_back({-0.9f, 0.5f, 2.8f});
+    test::latch(cloud_port, cloud, 150, 1);
+    CHECK(test::run(*node));
+    REQUIRE(out.sent());
+    Grid& grid = out.message();
+    const auto at = [&](double x, double y) {
+      return grid.view().at(static_cast<int>((x - grid.origin_x_m) / grid.cell_m),
+                            static_cast<int>((y - grid.origin_y_m) / grid.cell_m));
+    };
+    CHECK(at(0.1, 3.1) == 1000);
+    CHECK(at(-0.9, 3.1) == (radius > 0 ? 0 : 1000));
+  }
+}
+
 TEST_CASE("mapping_3d refuses a range that is empty") {
   NodeTypes types;
   register_mapping_3d(types);

@@ -79,7 +79,7 @@ class Bench {
   }
 
   void setup() {
-    Setup setup{clock_, ".", ".", 0, 15};
+    Setup setup{clock_, ".", ".", 0, Rate{15, 1}};
     node_->setup(setup);
     for (OutputPort* out : node_->outputs()) {
       writers_.push_back(std::make_unique<OneChunkWriter>(*out));
