@@ -38,6 +38,10 @@ class EmptyNode final : public Node {
 struct Round {
   Samples lateness_us;
   uint64_t released = 0, completed = 0;
+  double over_1ms() const {
+    const auto& values = lateness_us.values();
+    return static_cast<double>(std::count_if(values.begin(), values.end(), [](double us) { return us > 1000; }));
+  }
 };
 
 /// Child processes that never sleep.
@@ -152,9 +156,11 @@ void run_condition(Policy policy, bool loaded, int rounds, std::vector<Row>& row
   Pairs p50, p99;
   Samples all;
   uint64_t released = 0, completed = 0;
+  double late = 0, raw_late = 0;  // of as many raw rounds as Takt's: the last raw round is left out
   std::string granted, raw_granted;
   const auto reference = [&] {
     const Round round = raw_round(policy, raw_granted);
+    if (p50.rounds() < static_cast<size_t>(rounds)) raw_late += round.over_1ms();
     p50.add_a(round.lateness_us.quantile(0.5).value_or(0));
     p99.add_a(round.lateness_us.quantile(0.99).value_or(0));
   };
@@ -164,6 +170,7 @@ void run_condition(Policy policy, bool loaded, int rounds, std::vector<Row>& row
     p50.add_b(round.lateness_us.quantile(0.5).value_or(0));
     p99.add_b(round.lateness_us.quantile(0.99).value_or(0));
     all.add(round.lateness_us.values());
+    late += round.over_1ms();
     released += round.released;
     completed += round.completed;
     reference();
@@ -171,6 +178,14 @@ void run_condition(Policy policy, bool loaded, int rounds, std::vector<Row>& row
   const std::string name = "clock_nanosleep" + (raw_granted.empty() ? "" : " (" + raw_granted + ")");
   add_pair(rows, {"release/lateness_p50/" + variant, "us", 0, all, {}, {}, {}, granted}, name, p50);
   add_pair(rows, {"release/lateness_p99/" + variant, "us", 0, all, {}, {}, {}, granted}, name, p99);
+  rows.push_back({"release/over_1ms/" + variant,
+                  "count",
+                  late,
+                  {},
+                  name,
+                  raw_late,
+                  raw_late > 0 ? std::optional(late / raw_late) : std::nullopt,
+                  granted});
   rows.push_back({"release/missed/" + variant,
                   "count",
                   static_cast<double>(released) - static_cast<double>(completed),

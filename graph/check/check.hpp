@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "graph/language/graph.hpp"
+#include "hal/drivers.hpp"
 #include "rt/node.hpp"
 #include "rt/sched/plan.hpp"
 
@@ -49,6 +50,9 @@ CheckResult check(const GraphSpec& graph, const Plan& plan);
 /// The result for input that could not be loaded: Invalid, one line per problem.
 CheckResult check_failed(const std::vector<Problem>& problems);
 
+/// `takt nodes`: every device kind with its drivers; drivers and settings of one.
+std::string devices_text();
+std::string device_text(const hal::DeviceKind& kind);
 /// `takt nodes`: every type with its layer and purpose.
 std::string nodes_text(const NodeTypes& types);
 /// `takt nodes TYPE`: ports with message types, parameters with default, unit, range and meaning.

@@ -6,9 +6,9 @@
 namespace takt::graph {
 
 std::string nodes_text(const NodeTypes& types) {
-  std::string text;
+  std::string text = "node types\n";
   for (const auto& [name, type] : types.all())
-    text += fmt::format("{:<14} {:<11} {}\n", name, to_string(type.layer), type.doc);
+    text += fmt::format("  {:<14} {:<11} {}\n", name, to_string(type.layer), type.doc);
   return text;
 }
 
@@ -25,6 +25,28 @@ std::string node_text(const NodeType& type) {
   for (const ParamBase* param : node->params())
     text += fmt::format("  {:<19} {:>12} {:<5} {:<22} {}\n", param->name(), param->value_text(), param->unit(),
                         param->range_text(), param->doc());
+  return text;
+}
+
+std::string devices_text() {
+  std::string text = "device kinds\n";
+  for (const hal::DeviceKind& kind : hal::device_kinds()) {
+    std::string drivers;
+    for (const hal::DriverInfo& driver : kind.drivers)
+      drivers += fmt::format("{}{}{}", drivers.empty() ? "" : ", ", driver.name, driver.built ? "" : " (not built)");
+    text += fmt::format("  {:<14} {:<34} drivers: {}\n", kind.name, kind.doc, drivers);
+  }
+  return text;
+}
+
+std::string device_text(const hal::DeviceKind& kind) {
+  std::string text = fmt::format("{} (sensor layer): {}\n", kind.name, kind.doc);
+  for (const hal::DriverInfo& driver : kind.drivers)
+    text += fmt::format("  driver {:<12} {}{}\n", driver.name, driver.doc, driver.built ? "" : " (not built)");
+  text += fmt::format("  {:<22} {:<10} {:<24} {}\n", "setting", "driver", "value", "meaning; default");
+  for (const hal::SettingInfo& setting : kind.settings)
+    text += fmt::format("  {:<22} {:<10} {:<24} {}{}\n", setting.name, setting.driver.empty() ? "all" : setting.driver,
+                        hal::to_text(setting.kind), setting.doc, setting.required ? " (required)" : "");
   return text;
 }
 

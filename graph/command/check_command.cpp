@@ -1,16 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "graph/command/check_command.hpp"
 
+#include <algorithm>
 #include <cstdio>
 
 #include "graph/check/check.hpp"
 #include "graph/command/prepare.hpp"
+#include "hal/drivers.hpp"
 
 namespace takt::command {
 
 int check_graph(const RunOptions& options, bool json) {
   Prepared prepared;
-  if (const int code = prepare(options, prepared); code != kOk) return code;
+  if (const int code = prepare(options, prepared); code != kOk) {
+    if (json) std::printf("%s\n", graph::check_failed(prepared.problems).json.dump(2).c_str());
+    return code;
+  }
   const graph::CheckResult result = graph::check(*prepared.graph, prepared.composition->plan);
   std::fputs(json ? (result.json.dump(2) + "\n").c_str() : result.text.c_str(), stdout);
   return result.admitted ? kOk : kNotOk;
@@ -18,17 +23,18 @@ int check_graph(const RunOptions& options, bool json) {
 
 int print_nodes(const std::string& type) {
   const NodeTypes types = graph::node_types();
-  if (type.empty()) {
-    std::fputs(graph::nodes_text(types).c_str(), stdout);
-    return kOk;
+  const auto kinds = hal::device_kinds();
+  const auto kind = std::find_if(kinds.begin(), kinds.end(), [&](const hal::DeviceKind& k) { return k.name == type; });
+  const std::string all = graph::nodes_text(types) + graph::devices_text();
+  if (const NodeType* found = types.find(type)) std::fputs(graph::node_text(*found).c_str(), stdout);
+  else if (kind != kinds.end()) std::fputs(graph::device_text(*kind).c_str(), stdout);
+  else if (type.empty()) std::fputs(all.c_str(), stdout);
+  else {
+    std::fprintf(stderr, "takt: error: node type or device kind \"%s\" is unknown; valid are:\n%s", type.c_str(),
+                 all.c_str());
+    return kBadInput;
   }
-  if (const NodeType* found = types.find(type)) {
-    std::fputs(graph::node_text(*found).c_str(), stdout);
-    return kOk;
-  }
-  std::fprintf(stderr, "takt: error: node type \"%s\" is unknown; valid are:\n%s", type.c_str(),
-               graph::nodes_text(types).c_str());
-  return kBadInput;
+  return kOk;
 }
 
 }  // namespace takt::command

@@ -70,7 +70,8 @@ int main(int argc, char** argv) {
   add_load_options(*check, check_options);
   check->add_flag("--json", check_json, "prints the result as JSON");
   check->callback([&] { exit_code = takt::command::check_graph(check_options, check_json); });
-  CLI::App* nodes = app.add_subcommand("nodes", "lists node types, or one with its ports and parameters");
+  CLI::App* nodes =
+      app.add_subcommand("nodes", "lists node types and device kinds, or one with its ports and parameters");
   nodes->add_option("type", type, "node type");
   nodes->callback([&] { exit_code = takt::command::print_nodes(type); });
   CLI::App* eval = app.add_subcommand("eval", "measures quality against ground truth");

@@ -10,9 +10,10 @@
 namespace takt::command {
 namespace {
 
-int refuse(const std::vector<graph::Problem>& problems, Exit code) {
+int refuse(Prepared& prepared, std::vector<graph::Problem> problems, Exit code) {
   for (const auto& problem : problems) std::fprintf(stderr, "%s\n", graph::to_string(problem).c_str());
   std::fprintf(stderr, "takt: %zu problem%s, nothing was started\n", problems.size(), problems.size() == 1 ? "" : "s");
+  prepared.problems = std::move(problems);
   return code;
 }
 
@@ -48,14 +49,15 @@ int refuse(const std::string& text, Exit code) {
 int prepare(const RunOptions& options, Prepared& prepared) {
   const NodeTypes types = graph::node_types();
   graph::Loaded loaded = graph::load(graph_file(options.graph), options.load, types);
-  if (!loaded.graph) return refuse(loaded.problems, kBadInput);
+  if (!loaded.graph) return refuse(prepared, std::move(loaded.problems), kBadInput);
   prepared.graph = std::move(loaded.graph);
   if (options.clock == "virtual") prepared.clock = std::make_unique<VirtualClock>(1'000'000'000);
   else prepared.clock = std::make_unique<MonotonicClock>();
   auto composition = graph::compose(*prepared.graph, types, device_factory(prepared, options.seed), *prepared.clock,
                                     {options.output, options.seed});
   if (!composition)
-    return refuse(composition.error().problems, composition.error().device_failed ? kDeviceOrSystem : kBadInput);
+    return refuse(prepared, std::move(composition.error().problems),
+                  composition.error().device_failed ? kDeviceOrSystem : kBadInput);
   prepared.composition = std::move(*composition);
   return kOk;
 }

@@ -15,6 +15,7 @@ struct Prepared {
   std::unique_ptr<Clock> clock;
   hal::Devices devices;
   std::optional<graph::Composition> composition;
+  std::vector<graph::Problem> problems;  ///< why there is no composition
 };
 
 /// Loads and composes; what is wrong is written to stderr and the exit code returned (kOk: all is well).

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "graph/command/report.hpp"
 
 namespace takt::command {
@@ -25,12 +27,15 @@ std::string node_line(const Json& node) {
 }  // namespace
 
 std::string summary_text(const Json& report) {
-  std::string text =
-      fmt::format("\n{} on {} ({} profile, {} clock): {:.1f} s, policy {} granted (asked {}), transport {}\n",
-                  report["graph"].get<std::string>(), report["schedule"].get<std::string>(),
-                  report["profile"].get<std::string>(), report["clock"].get<std::string>(),
-                  report["duration_s"].get<double>(), report["policy_granted"].get<std::string>(),
-                  report["policy_asked"].get<std::string>(), report["transport"].get<std::string>());
+  const auto verified = std::count_if(report["nodes"].begin(), report["nodes"].end(),
+                                      [](const Json& node) { return node["granted"]["verified"].get<bool>(); });
+  std::string text = fmt::format(
+      "\n{} on {} ({} profile, {} clock): {:.1f} s, policy {} granted (asked {}; read back on {} of {} "
+      "nodes), transport {}\n",
+      report["graph"].get<std::string>(), report["schedule"].get<std::string>(), report["profile"].get<std::string>(),
+      report["clock"].get<std::string>(), report["duration_s"].get<double>(),
+      report["policy_granted"].get<std::string>(), report["policy_asked"].get<std::string>(), verified,
+      report["nodes"].size(), report["transport"].get<std::string>());
   text += fmt::format("  {:<13} {:>5} {:>8} {:>9} {:>6} {:>7} {:>5}  {:>8} {:>8} {:>8}  {:>8} {:>8}\n", "node", "Hz",
                       "released", "completed", "missed", "skipped", "stale", "exec p50", "p99 ms", "resp p99",
                       "late p50", "p99 us");

@@ -9,10 +9,11 @@ namespace takt {
 /// What a stereo camera will deliver; fixed by open().
 struct StereoFormat {
   int width = 0, height = 0;
-  int channels = 0;        ///< 1 grey, 3 BGR interleaved
-  bool rectified = false;  ///< rows of left and right correspond; `camera` is valid
-  CameraModel camera;      ///< zero unless rectified
-  double rate_hz = 0;      ///< 0: released by trigger() only
+  int channels = 0;           ///< 1 grey, 3 BGR interleaved
+  bool rectified = false;     ///< rows of left and right correspond; `camera` is valid
+  CameraModel camera;         ///< zero unless rectified
+  double rate_hz = 0;         ///< 0: released by trigger() only
+  Transform sensor_in_robot;  ///< left camera, head at rest; identity: unknown
 };
 
 /// One exposure as the device reports it.

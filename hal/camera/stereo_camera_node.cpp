@@ -56,6 +56,7 @@ void StereoCameraNode::run(Job& job) {
     message->health = health.flags | frame.health | (frame.status == ReadStatus::partial ? image_health::partial : 0);
     message->frame_number = frame.frame_number;
     message->camera = format_.camera;
+    message->sensor_in_robot = format_.sensor_in_robot;
     pair_.send(frame.stamp_ns);
   }
   if (rate_ && !job.ended()) {

@@ -126,7 +126,7 @@ DeviceResult ReplayCamera::decode_all() {
     }
   }
   const bool centre_given = files_.camera.cu_px != 0 || files_.camera.cv_px != 0;
-  format_ = {size.width, size.height, channels, true, shrunk(files_.camera, settings_.shrink), settings_.rate.hz()};
+  format_ = {size.width, size.height, channels, true, shrunk(files_.camera, settings_.shrink), settings_.rate.hz(), {}};
   // A single pair names the centre of its image unless told otherwise.
   if (!centre_given) {
     format_.camera.cu_px = (size.width - 1) / 2.0;

@@ -27,7 +27,6 @@ class MappingNode final : public Node {
     p.n_abs = n_abs_;
     p.range_min_m = range_min_;
     p.range_max_m = range_max_;
-    p.step_px = step_;
     p.evidence = evidence_;
     grid_ = ObstacleGrid(p);
     const auto side = static_cast<uint32_t>(grid_.shape().cells);
@@ -83,7 +82,8 @@ class MappingNode final : public Node {
     const Transform& t = cloud.sensor_in_robot;
     const bool said = t.x != 0 || t.y != 0 || t.z != 0 || t.qx != 0 || t.qy != 0 || t.qz != 0;
     const double half = view_ > 0 ? view_ / 2 : std::atan2(cloud.camera.cu_px, cloud.camera.focal_px);
-    return {said ? t : mount_, cloud.camera.focal_px, half};
+    const double step = std::max(1, cloud.step_px);
+    return {said ? t : mount_, cloud.camera.focal_px / step, half};
   }
 
   Input<PointCloud> cloud_{this, "cloud", "points in the camera frame"};
@@ -101,7 +101,6 @@ class MappingNode final : public Node {
   Param<int> n_abs_{this, "n_abs", 5, {0, 100000}, "", "a blocked voxel has more points than this"};
   Param<double> range_min_{this, "range_min", 0.8, {0.0, 100.0}, "m", "nearer cells are not seen"};
   Param<double> range_max_{this, "range_max", 6.0, {0.5, 50.0}, "m", "farther cells are not seen"};
-  Param<double> step_{this, "step", 1.0, {1.0, 64.0}, "px", "the cloud holds one point per step x step pixels"};
   Param<bool> evidence_{this, "evidence", false, "", "a cell is free only if its column holds a point"};
   Param<double> view_{this, "view", 0.0, {0.0, 3.14}, "rad", "horizontal angle of view; 0: twice atan(cu / f)"};
   Param<double> camera_x_{this, "camera_x",

@@ -42,7 +42,7 @@ bool ObstacleGrid::blocked(int column, int row, const Affine& camera, double foc
     const double dy = shape_.origin_m + (row + 0.5) * p_.voxel_m - camera.t[1];
     const double dz = (layer + 0.5) * p_.voxel_m - camera.t[2];
     const double depth = std::max(0.5 * p_.voxel_m, camera.r[2] * dx + camera.r[5] * dy + camera.r[8] * dz);
-    const double edge_px = p_.voxel_m * focal_px / (depth * p_.step_px);
+    const double edge_px = p_.voxel_m * focal_px / depth;
     if (n > p_.share * edge_px * edge_px) return true;
   }
   return false;

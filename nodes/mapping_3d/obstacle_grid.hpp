@@ -19,14 +19,13 @@ struct ObstacleParameters {
   int n_abs = 5;                                ///< ... and more than this
   double range_min_m = 0.8, range_max_m = 6.0;  ///< a free cell lies between
   double margin_m = 1.0;                        ///< the grid reaches range_max + margin to each side of the robot
-  double step_px = 1;                           ///< the cloud holds one point per step x step pixels
   bool evidence = false;  ///< free only where the column holds at least one point (floor included)
 };
 
 /// Where the cloud was seen from.
 struct Viewpoint {
   Transform camera_in_robot;
-  double focal_px = 0;       ///< of the image the cloud was triangulated from
+  double focal_px = 0;       ///< in pixels that became points: of an image as fine as the cloud
   double half_view_rad = 0;  ///< half the horizontal angle of view
 };
 

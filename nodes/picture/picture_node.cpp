@@ -19,28 +19,22 @@ class PictureNode final : public Node {
  public:
   void setup(Setup& setup) override {
     directory_ = setup.output / directory_name_();
+    left_.reserve(pair_.connected() ? pair_.capacity().pixels() * pair_.capacity().channels : 0);
     map_.reserve(disparity_.connected() ? disparity_.capacity().pixels() : 0);
     cells_.reserve(obstacles_.connected() ? obstacles_.capacity().pixels() : 0);
     if (motion_.connected()) track_.reserve(static_cast<size_t>(track_points_()));
   }
 
   void run(Job&) override {
-    if (const DisparityMap* map = disparity_.newest(); map && disparity_.is_new()) {
-      const auto items = map->disparity.items();
-      if (items.size() <= map_.capacity() &&
-          items.size() == static_cast<size_t>(map->width) * static_cast<size_t>(map->height)) {
-        map_.assign(items.begin(), items.end());
-        map_width_ = map->width, map_height_ = map->height, disparities_ = map->disparities;
-      }
-    }
-    if (const Grid* grid = obstacles_.newest(); grid && obstacles_.is_new()) {
-      const auto items = grid->cells.items();
-      if (items.size() <= cells_.capacity() &&
-          items.size() == static_cast<size_t>(grid->width) * static_cast<size_t>(grid->height)) {
-        cells_.assign(items.begin(), items.end());
-        grid_width_ = grid->width, grid_height_ = grid->height;
-      }
-    }
+    const StereoPair* pair = pair_.newest();
+    if (pair && pair_.is_new() && keep(pair->left.items(), pair->width, pair->height, pair->channels, left_))
+      left_width_ = pair->width, left_height_ = pair->height, left_channels_ = pair->channels;
+    const DisparityMap* map = disparity_.newest();
+    if (map && disparity_.is_new() && keep(map->disparity.items(), map->width, map->height, 1, map_))
+      map_width_ = map->width, map_height_ = map->height, disparities_ = map->disparities;
+    const Grid* grid = obstacles_.newest();
+    if (grid && obstacles_.is_new() && keep(grid->cells.items(), grid->width, grid->height, 1, cells_))
+      grid_width_ = grid->width, grid_height_ = grid->height;
     for (size_t i = 0; i < motion_.size(); ++i)
       if (motion_.is_new(i)) add({motion_[i].pose.x, motion_[i].pose.z, motion_[i].valid != 0});
   }
@@ -48,6 +42,7 @@ class PictureNode final : public Node {
   void finish() override {
     std::error_code ignored;
     std::filesystem::create_directories(directory_, ignored);  // imwrite says whether it worked
+    if (!left_.empty()) write("left.png", cv::Mat(left_height_, left_width_, CV_8UC(left_channels_), left_.data()));
     if (!map_.empty()) {
       cv::Mat image(map_height_, map_width_, CV_8UC3);
       draw_disparity({map_.data(), map_width_, map_height_}, disparities_, view(image));
@@ -67,6 +62,15 @@ class PictureNode final : public Node {
   }
 
  private:
+  /// Copies an array that is as long as its sizes say and fits the memory taken in setup.
+  template <class T>
+  static bool keep(std::span<const T> items, int width, int height, int channels, std::vector<T>& into) {
+    const size_t wanted = static_cast<size_t>(width) * static_cast<size_t>(height) * static_cast<size_t>(channels);
+    if (items.size() != wanted || items.size() > into.capacity()) return false;
+    into.assign(items.begin(), items.end());
+    return true;
+  }
+
   static Bgr view(cv::Mat& image) { return {image.data, image.cols, image.rows, 3}; }
 
   // A long run keeps every second point when the memory is full: the whole path stays visible.
@@ -92,6 +96,7 @@ class PictureNode final : public Node {
       std::cerr << "picture: cannot write " << path << ": check that the directory exists and is writable\n";
   }
 
+  Input<StereoPair> pair_{this, "pair", "its left image is written as left.png", Need::optional};
   Input<DisparityMap> disparity_{this, "disparity", "drawn as disparity.png", Need::optional};
   Input<Motion> motion_{this, "motion", "drawn as track.png: the camera's path from above", Need::optional};
   Input<Grid> obstacles_{this, "obstacles", "drawn as obstacles.png", Need::optional};
@@ -99,7 +104,9 @@ class PictureNode final : public Node {
   Param<int> track_points_{this, "track_points", 20000, {16, 10000000}, "", "points of the path kept in memory"};
 
   std::filesystem::path directory_;
+  std::vector<uint8_t> left_;
   std::vector<int16_t> map_, cells_;
+  int left_width_ = 0, left_height_ = 0, left_channels_ = 0;
   int map_width_ = 0, map_height_ = 0, disparities_ = 0, grid_width_ = 0, grid_height_ = 0;
   std::vector<TrackPoint> track_;
   int stride_ = 1, skip_ = 0;
@@ -109,7 +116,7 @@ class PictureNode final : public Node {
 
 void register_picture(NodeTypes& types) {
   types.add<PictureNode>("picture", Layer::storage,
-                         "Sink: writes the last disparity, obstacle grid and the path as PNG at the end");
+                         "Sink: writes the last image, disparity, obstacle grid and the path as PNG at the end");
 }
 
 }  // namespace takt

@@ -59,6 +59,7 @@ class StereoNode final : public Node {
     if (in->width != width_ || in->height != height_ || in->channels != channels_ || (!is_rectified && !rectifier_))
       return job.no_result();
     stamp_ = pair_.stamp_ns();
+    sensor_in_robot_ = in->sensor_in_robot;
     camera_ = is_rectified ? in->camera : rectifier_->camera();
     ImageView<const uint8_t> left = in->left_view(), right = in->right_view();
     if (!rectify(*in, is_rectified, left, right)) return job.no_result();
@@ -101,6 +102,7 @@ class StereoNode final : public Node {
       out->health = in.health;
       out->frame_number = in.frame_number;
       out->camera = camera_;
+      out->sensor_in_robot = sensor_in_robot_;
       out->left.resize(in.left.size);
       out->right.resize(in.right.size);
       left_out = out->left_view();
@@ -137,6 +139,8 @@ class StereoNode final : public Node {
     PointCloud* cloud = cloud_.connected() ? cloud_.loan() : nullptr;
     if (cloud != nullptr) {
       cloud->camera = camera_;
+      cloud->sensor_in_robot = sensor_in_robot_;
+      cloud->step_px = cloud_step_;
       cloud->points.resize(cloud->points.capacity);
       cloud->colours.resize(cloud->colours.capacity);
       const size_t count =
@@ -187,6 +191,7 @@ class StereoNode final : public Node {
   int width_ = 0, height_ = 0, channels_ = 0;
   int64_t stamp_ = 0;
   CameraModel camera_;
+  Transform sensor_in_robot_;
   std::optional<Matcher> matcher_, half_matcher_;
   std::optional<Rectifier> rectifier_;
   std::vector<uint8_t> left_, right_, confidence_scratch_;

@@ -46,7 +46,9 @@ ProcessMemory prepare_process_memory() {
   const bool arenas = mallopt(M_ARENA_MAX, 1) == 1;
   got.malloc = threshold && trim && arenas;
   if (!got.malloc)
-    got.lacks.emplace_back("mallopt: refused; this C library's heap cannot be kept from returning pages");
+    got.lacks.emplace_back(
+        "mallopt: refused; this heap cannot be kept from returning pages. Fix: use glibc's malloc (no sanitizer, no "
+        "other allocator)");
   // A limited user would be granted MCL_FUTURE and then fail in every later allocation beyond the limit.
   rlimit limit{};
   getrlimit(RLIMIT_MEMLOCK, &limit);

@@ -29,12 +29,12 @@ std::span<const Field> as_span(const std::array<Field, N>& fields) {
 FIELDS(Image, F(Image, width, "px"), F(Image, height, "px"), F(Image, channels, "1"), F(Image, health, ""),
        CAMERA_FIELDS(Image), F(Image, pixels, "1"))
 FIELDS(StereoPair, F(StereoPair, width, "px"), F(StereoPair, height, "px"), F(StereoPair, channels, "1"),
-       F(StereoPair, health, ""), F(StereoPair, frame_number, "1"), CAMERA_FIELDS(StereoPair), F(StereoPair, left, "1"),
-       F(StereoPair, right, "1"))
+       F(StereoPair, health, ""), F(StereoPair, frame_number, "1"), CAMERA_FIELDS(StereoPair),
+       TRANSFORM_FIELDS(StereoPair, sensor_in_robot), F(StereoPair, left, "1"), F(StereoPair, right, "1"))
 FIELDS(DisparityMap, F(DisparityMap, width, "px"), F(DisparityMap, height, "px"), F(DisparityMap, disparities, "px"),
        CAMERA_FIELDS(DisparityMap), F(DisparityMap, disparity, "px"), F(DisparityMap, confidence, "1"))
-FIELDS(PointCloud, TRANSFORM_FIELDS(PointCloud, sensor_in_robot), CAMERA_FIELDS(PointCloud), F(PointCloud, points, "m"),
-       F(PointCloud, colours, "1"))
+FIELDS(PointCloud, TRANSFORM_FIELDS(PointCloud, sensor_in_robot), CAMERA_FIELDS(PointCloud),
+       F(PointCloud, step_px, "px"), F(PointCloud, points, "m"), F(PointCloud, colours, "1"))
 FIELDS(LaserScan, F(LaserScan, first_angle_rad, "rad"), F(LaserScan, step_rad, "rad"), F(LaserScan, max_range_m, "m"),
        F(LaserScan, sweep_s, "s"), F(LaserScan, scan_number, "1"), TRANSFORM_FIELDS(LaserScan, sensor_in_robot),
        F(LaserScan, range_m, "m"))

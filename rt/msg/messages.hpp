@@ -50,6 +50,7 @@ struct StereoPair {
   uint32_t health = 0;
   uint32_t frame_number = 0;  ///< counted by the device; a gap is a frame lost before the host saw it
   CameraModel camera;
+  Transform sensor_in_robot;   ///< left camera, head at rest; identity: unknown
   Array<uint8_t> left, right;  ///< interleaved, BGR if three channels
 
   ImageView<uint8_t> left_view() { return {left.data(), width, height, channels}; }
@@ -93,7 +94,8 @@ struct Colour {
 struct PointCloud {
   static constexpr std::string_view type_name = "point_cloud";
   Transform sensor_in_robot;
-  CameraModel camera;  ///< of the image the cloud was triangulated from; zero for other sensors
+  CameraModel camera;   ///< of the image the cloud was triangulated from; zero for other sensors
+  int32_t step_px = 0;  ///< one point per step x step pixels of that image; 0 for other sensors
   Array<Point> points;
   Array<Colour> colours;  ///< same size as points, or empty
   static std::span<const Field> fields();

@@ -22,6 +22,16 @@ constexpr int kHighestPriority = 80;  // below the kernel's own interrupt thread
 
 void name_thread(const std::string& name) { pthread_setname_np(pthread_self(), name.substr(0, 15).c_str()); }
 
+/// One line per reason, whichever lanes it hit.
+void add_refusal(const std::string& lane, const std::string& reason, std::vector<std::string>& lines) {
+  for (std::string& line : lines) {
+    if (!line.ends_with(": " + reason)) continue;
+    line.insert(line.size() - reason.size() - 2, ", " + lane);
+    return;
+  }
+  lines.push_back(lane + ": " + reason);
+}
+
 }  // namespace
 
 Executor::Executor(const Plan& plan, Transport& transport, Clock& clock, const Options& options)
@@ -105,7 +115,7 @@ bool Executor::run_partitioned(Policy policy, RunResult& result) {
   }
   ready.arrive_and_wait();
   for (size_t i = 0; i < lanes_.size(); ++i) {
-    if (!grants[i].refused.empty()) result.refused.push_back(lanes_[i]->head().plan().name + ": " + grants[i].refused);
+    if (!grants[i].refused.empty()) add_refusal(lanes_[i]->head().plan().name, grants[i].refused, result.refused);
     for (const size_t member : lanes_[i]->members()) result.grants[member] = grants[i];
   }
   go.store(result.refused.empty());

@@ -35,7 +35,7 @@ std::map<std::pair<int, int>, bool> occupied_reference(const std::vector<Point>&
     const double centre[3] = {shape.origin_m + (column + 0.5) * p.voxel_m - m.t[0],
                               shape.origin_m + (row + 0.5) * p.voxel_m - m.t[1], (layer + 0.5) * p.voxel_m - m.t[2]};
     const double depth = std::max(0.5 * p.voxel_m, m.r[2] * centre[0] + m.r[5] * centre[1] + m.r[8] * centre[2]);
-    const double expected = std::pow(p.voxel_m * view.focal_px / (depth * p.step_px), 2);
+    const double expected = std::pow(p.voxel_m * view.focal_px / depth, 2);
     if (count > p.n_abs && count > p.share * expected) occupied[{column, row}] = true;
   }
   return occupied;
@@ -50,11 +50,11 @@ TEST_CASE("occupied cells equal those of a map of voxels; a free cell is never o
     ObstacleParameters p;
     p.voxel_m = uniform(0.1, 0.4);
     p.share = uniform(0.01, 0.3);
-    p.step_px = uniform(1, 6);
+    const double step_px = uniform(1, 6);
     ObstacleGrid grid(p);
     const GridShape shape = grid.shape();
     const Viewpoint view{camera_mount(uniform(-0.3, 0.3), uniform(-0.3, 0.5), 1.6, uniform(-1, 1), uniform(-0.6, 0.2)),
-                         492.8, 0.57};
+                         492.8 / step_px, 0.57};
     std::vector<Point> points;
     for (int blob = 0; blob < 40; ++blob) {
       const Point centre{static_cast<float>(uniform(-3, 3)), static_cast<float>(uniform(-1.5, 1.5)),

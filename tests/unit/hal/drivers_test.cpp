@@ -30,7 +30,7 @@ const nlohmann::json kWorld = {{"world", "worlds/lab.xml"}};
 TEST_CASE("unknown kinds, drivers and settings list the valid ones") {
   CHECK(has(error(config("radar", "sim", kWorld)),
             "stereo_camera, laser_scanner, camera_head, mobile_base, digital_lines"));
-  CHECK(has(error(config("stereo_camera", "v4l2", kWorld)), "known drivers: sim, replay"));
+  CHECK(has(error(config("stereo_camera", "v4l", kWorld)), "known drivers: sim, replay, v4l2"));
   CHECK(has(error(config("laser_scanner", "sim", {{"world", "worlds/lab.xml"}, {"beans", 3}})),
             "unknown setting `beans`"));
   CHECK(has(error(config("laser_scanner", "sim", nlohmann::json::object())), "`world` is missing"));
@@ -40,13 +40,24 @@ TEST_CASE("unknown kinds, drivers and settings list the valid ones") {
   CHECK(has(error(config("mobile_base", "sim", {{"world", "worlds/lab.xml"}, {"drive", "walk"}})), "path or command"));
 }
 
+TEST_CASE("a driver that this build lacks is a failing device, not bad input") {
+  VirtualClock clock;
+  Devices devices;
+  const auto node =
+      make_device(config("laser_scanner", "lms200", {{"port", "/dev/ttyS1"}, {"baud", 38400}}), devices, clock);
+  REQUIRE_FALSE(node);
+  CHECK_FALSE(node.error().bad_input);
+  CHECK(has(node.error().text(), "driver `lms200`"));
+  CHECK(has(node.error().fix, "use one of: sim"));
+}
+
 TEST_CASE("every kind can be made with every setting that its listing calls required, and no other") {
   VirtualClock clock;
   for (const DeviceKind& kind : device_kinds()) {
     Devices devices;
     nlohmann::json settings = nlohmann::json::object();
     for (const SettingInfo& setting : kind.settings) {
-      if (!setting.required || setting.driver == "replay") continue;
+      if (!setting.required || (!setting.driver.empty() && setting.driver != "sim")) continue;
       settings[std::string(setting.name)] = setting.name == "world" ? "worlds/lab.xml" : "rigs/xb3.yaml";
     }
     const auto node = make_device(config(std::string(kind.name), "sim", settings), devices, clock);

@@ -102,20 +102,42 @@ TEST_CASE("Options change what the files say") {
   LoadOptions options;
   options.schedule = files.folder() / "other.yaml";
   options.policy = "cooperative";
-  options.mode = "blind";
   options.set = {"stereo.disparities=64", "stereo.max_range=150cm", "stereo.cost=census", "camera.mount.x=1m"};
   const Loaded loaded = files.load(options);
   INFO(all(loaded));
   REQUIRE(loaded.graph);
   CHECK(loaded.graph->schedule.name == "other");
   CHECK(loaded.graph->schedule.policy == Policy::cooperative);
-  CHECK(loaded.graph->mode == "blind");
+  CHECK(loaded.graph->mode == "full");
   const auto& params = loaded.graph->nodes[0].params;
   CHECK(std::get<int64_t>(params.at("disparities").value) == 64);
   CHECK(params.at("disparities").position.file == "--set");
   CHECK(std::get<double>(params.at("max_range").value) == 1.5);
   CHECK(std::get<std::string>(params.at("cost").value) == "census");
   CHECK(loaded.graph->devices[0].settings["mount"]["x"].get<double>() == 1.0);
+}
+
+TEST_CASE("A mode leaves out the nodes and devices it names") {
+  LoadOptions options;
+  options.mode = "blind";
+  const Loaded loaded = Files().load(options);
+  INFO(all(loaded));
+  REQUIRE(loaded.graph);
+  CHECK(loaded.graph->mode == "blind");
+  CHECK(loaded.graph->nodes.empty());
+  REQUIRE(loaded.graph->devices.size() == 1);
+  CHECK(loaded.graph->devices[0].id == "camera");
+  CHECK(loaded.graph->schedule.entries.size() == 1);
+}
+
+TEST_CASE("What this version does not enforce is told") {
+  const std::string graph = with(kGraph, "default_profile: sim", "default_profile: sim\nisolation: subsystem");
+  const Loaded loaded = Files(graph, with(kSchedule, "on_overrun: degrade", "on_overrun: safe_stop")).load();
+  INFO(all(loaded));
+  REQUIRE(loaded.graph);
+  REQUIRE(loaded.graph->adjusted.size() == 2);
+  CHECK(loaded.graph->adjusted[0].find("isolation: subsystem -> none") == 0);
+  CHECK(loaded.graph->adjusted[1].find("on_overrun of stereo: safe_stop -> continue") == 0);
 }
 
 TEST_CASE("A cycle of sampled edges is no error") {

@@ -86,9 +86,9 @@ TEST_CASE("oracle 18: table top over free floor is occupied, floor alone is free
 
 TEST_CASE("the threshold follows the subsampling of the cloud") {
   ObstacleParameters p;
-  p.step_px = 4;
   p.n_abs = 2;
   Fixture coarse(p), wrong;
+  coarse.viewpoint.focal_px /= 4;
   const auto both = [](const double* from, const double* d) {
     return table_hit(from, d) > 0 ? table_hit(from, d) : floor_hit(from, d);
   };

@@ -28,12 +28,19 @@ TEST_CASE("picture: writes what it has seen when the run ends, and nothing else"
     auto& motion_port = test::input(*node, "motion");
     PortAccess::connect(map_port, size);
     PortAccess::connect(motion_port, {});
+    auto& pair_port = test::input(*node, "pair");
+    PortAccess::connect(pair_port, size);
     test::set_up(*node, folder);
     test::Box<DisparityMap> map(size);
     map->width = 40, map->height = 30, map->disparities = 20;
     map->disparity.resize(40 * 30);
     for (auto& d : map->disparity.items()) d = 19;
     test::latch(map_port, map, 1, 1);
+    test::Box<StereoPair> pair(size);
+    pair->width = 40, pair->height = 30, pair->channels = 1;
+    pair->left.resize(40 * 30);
+    for (auto& level : pair->left.items()) level = 77;
+    test::latch(pair_port, pair, 1, 1);
     test::Box<Motion> motion;
     motion->valid = 1;
     for (uint64_t i = 1; i <= 100; ++i) {  // more than the track holds
@@ -48,6 +55,9 @@ TEST_CASE("picture: writes what it has seen when the run ends, and nothing else"
   CHECK(disparity.cols == 40);
   CHECK(disparity.rows == 30);
   if (!disparity.empty()) CHECK(disparity.at<cv::Vec3b>(3, 3)[2] > disparity.at<cv::Vec3b>(3, 3)[0]);
+  const cv::Mat left = cv::imread((folder / "pictures/left.png").string(), cv::IMREAD_GRAYSCALE);
+  CHECK(left.cols == 40);
+  if (!left.empty()) CHECK(left.at<uint8_t>(29, 39) == 77);
   CHECK(!cv::imread((folder / "pictures/track.png").string()).empty());
   CHECK_FALSE(std::filesystem::exists(folder / "pictures/obstacles.png"));
   std::filesystem::remove_all(folder);
