@@ -3,6 +3,8 @@
 
 #include <sys/resource.h>
 
+#include "rt/time/clock.hpp"
+
 // Defined by takt_allocation_counter where a program links it, null otherwise.
 extern "C" __attribute__((weak)) uint64_t takt_thread_allocations();
 
@@ -17,6 +19,14 @@ MemoryUse thread_memory_use() {
   getrusage(RUSAGE_THREAD, &usage);
   use.page_faults = static_cast<uint64_t>(usage.ru_minflt + usage.ru_majflt);
   return use;
+}
+
+ThreadUse take_thread_use() {
+  thread_local ThreadUse last;
+  const ThreadUse now{thread_cpu_ns(), thread_memory_use()};
+  const ThreadUse used{now.cpu_ns - last.cpu_ns, now.memory - last.memory};
+  last = now;
+  return used;
 }
 
 }  // namespace takt

@@ -10,6 +10,7 @@
 #include <thread>
 #include <tuple>
 
+#include "rt/memory/memory_use.hpp"
 #include "rt/memory/process_memory.hpp"
 #include "rt/node.hpp"
 #include "rt/sched/cooperative.hpp"
@@ -106,6 +107,7 @@ bool Executor::run_partitioned(Policy policy, RunResult& result) {
       ready.arrive_and_wait();
       started.arrive_and_wait();
       if (!go.load()) return;
+      take_thread_use();  // what preparation cost is no job's
       while (lane.next_release_ns() < stop_.end_ns()) {
         stop_.sleep_until(lane.next_release_ns());
         if (lane.next_release_ns() >= stop_.end_ns()) break;
@@ -136,6 +138,7 @@ void Executor::run_cooperative() {
       name_thread("takt-worker-" + std::to_string(i));
       prefault_stack();
       apply(Reservation{});
+      take_thread_use();
       queue.work();
     });
   }
@@ -147,6 +150,7 @@ void Executor::run_cooperative() {
 void Executor::run_virtual(RunResult& result) {
   auto& clock = dynamic_cast<VirtualClock&>(clock_);
   start_clockwork(result);
+  take_thread_use();
   // Ordered by instant, then deadline, then lane: the same order in every run.
   using Event = std::tuple<int64_t, int64_t, size_t, size_t>;
   std::multiset<Event> events;

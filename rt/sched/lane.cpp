@@ -43,7 +43,7 @@ void Lane::run_next(const Clock& clock, StopSignal& stop) {
     if (visible_[producer] > clock.now_ns()) stop.sleep_until(visible_[producer]);
     visible_[m] = tasks_[m]->run(followers_[m].index++, visible_[producer]).visible_at_ns;
   }
-  ++next_;
+  go_to(next_ + 1);
   skip_passed(clock.now_ns(), stop.end_ns());
 }
 
@@ -52,7 +52,7 @@ void Lane::skip_passed(int64_t now_ns, int64_t end_ns) {
   const bool all = head().plan().on_miss == OnMiss::skip;
   const int64_t pending = all ? 0 : 1;
   while (rate().release_ns(origin_ns_, next_ + pending) <= now_ns && next_release_ns() < end_ns) {
-    ++next_;
+    go_to(next_ + 1);
     head().statistics().skipped.fetch_add(1, std::memory_order_relaxed);
   }
 }
@@ -64,7 +64,7 @@ void Lane::run_head_modelled(StopSignal& stop, std::vector<Activation>& released
     stop.raise(release);
     return;
   }
-  ++next_;
+  go_to(next_ + 1);
   for (size_t m = 1; m < tasks_.size(); ++m) {
     if (followers_[m].producer == 0 && activates(m, end.visible_at_ns)) released.push_back({m, end.visible_at_ns});
   }

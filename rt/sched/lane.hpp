@@ -14,10 +14,13 @@ class Lane {
   /// `members`: head first, every follower after its producer; indexes into `tasks`.
   Lane(std::vector<size_t> members, const std::vector<std::unique_ptr<Task>>& tasks);
 
-  void set_epoch(int64_t epoch_ns) { origin_ns_ = epoch_ns + head().plan().offset_ns; }
+  void set_epoch(int64_t epoch_ns) {
+    origin_ns_ = epoch_ns + head().plan().offset_ns;
+    go_to(0);
+  }
   /// Planned instant of the next release.
-  int64_t next_release_ns() const { return rate().release_ns(origin_ns_, next_); }
-  int64_t next_deadline_ns() const { return next_release_ns() + head().plan().deadline_ns; }
+  int64_t next_release_ns() const { return next_release_ns_; }
+  int64_t next_deadline_ns() const { return next_release_ns_ + head().plan().deadline_ns; }
 
   /// Runs the next job of the head and the jobs it releases; afterwards moves on to the next release still wanted.
   /// Raises `stop` at the head's release if a device's recorded data ended.
@@ -45,6 +48,11 @@ class Lane {
     uint64_t index = 0;
   };
 
+  /// The instant is worked out here, after a job, so that nothing need be divided between a release and its job.
+  void go_to(int64_t index) {
+    next_ = index;
+    next_release_ns_ = rate().release_ns(origin_ns_, index);
+  }
   bool activates(size_t member, int64_t visible_at_ns);
   void skip_passed(int64_t now_ns, int64_t end_ns);
 
@@ -54,7 +62,7 @@ class Lane {
   std::vector<int64_t> visible_;     ///< of the pass under way: when each member's output became visible
   std::vector<char> ran_;
   int64_t origin_ns_ = 0;
-  int64_t next_ = 0;
+  int64_t next_ = 0, next_release_ns_ = 0;
 };
 
 /// Groups tasks into lanes: each task with a rate heads one, each `on` task joins its producer's.

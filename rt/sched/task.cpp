@@ -42,8 +42,6 @@ JobEnd Task::run(uint64_t index, int64_t release_ns, int64_t modelled_ns) {
   const bool modelled = modelled_ns >= 0;
   const int64_t started = clock_.now_ns();
   const int64_t deadline = release_ns + plan_.deadline_ns;
-  const MemoryUse memory_before = thread_memory_use();
-  const int64_t cpu_before = thread_cpu_ns();
 
   count(statistics_.stale_inputs, latch_.acquire(release_ns, started));
   if (!plan_.edges.empty() && plan_.node->inputs()[plan_.edges.front().input]->is_new()) count(statistics_.new_inputs);
@@ -52,22 +50,21 @@ JobEnd Task::run(uint64_t index, int64_t release_ns, int64_t modelled_ns) {
 
   JobEnd end;
   end.end_of_data = job.ended();
-  const int64_t cpu = thread_cpu_ns() - cpu_before;
   end.finished_ns = modelled ? std::max(started, release_ns) + modelled_ns : clock_.now_ns();
-  if (!end.end_of_data) {
-    statistics_.add_lateness(started - release_ns);
-    statistics_.exec.add(cpu);
-    statistics_.last_exec_ns.store(cpu, std::memory_order_relaxed);
-    statistics_.preempted_ns += modelled ? 0 : std::max<int64_t>(0, end.finished_ns - started - cpu);
-    if (plan_.budget_ns > 0 && cpu > plan_.budget_ns) count(statistics_.budget_overruns);
-    if (job.without_result()) count(statistics_.no_result);
-  }
   publish(end, deadline, modelled);
   latch_.release();
-  const MemoryUse memory_after = thread_memory_use();
-  statistics_.cpu_ns += cpu;
-  statistics_.allocations += memory_after.allocations - memory_before.allocations;
-  statistics_.page_faults += memory_after.page_faults - memory_before.page_faults;
+  const ThreadUse used = take_thread_use();
+  statistics_.cpu_ns += used.cpu_ns;
+  statistics_.allocations += used.memory.allocations;
+  statistics_.page_faults += used.memory.page_faults;
+  if (!end.end_of_data) {
+    statistics_.add_lateness(started - release_ns);
+    statistics_.exec.add(used.cpu_ns);
+    statistics_.last_exec_ns.store(used.cpu_ns, std::memory_order_relaxed);
+    statistics_.preempted_ns += modelled ? 0 : std::max<int64_t>(0, end.finished_ns - started - used.cpu_ns);
+    if (plan_.budget_ns > 0 && used.cpu_ns > plan_.budget_ns) count(statistics_.budget_overruns);
+    if (job.without_result()) count(statistics_.no_result);
+  }
   return end;
 }
 
