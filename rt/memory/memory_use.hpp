@@ -22,9 +22,9 @@ struct ThreadUse {
   int64_t cpu_ns = 0;
   MemoryUse memory;
 };
-/// What the calling thread has used since it last asked (the first time: since its start). A job's cost is asked for once,
-/// at its end: so it contains the wake-up and the latching, which the kernel charges to a reservation too, and nothing
-/// but a reading of the clock stands between a release and the job.
+/// What the calling thread has used since it last asked (the first time: since its start). A job's cost is asked for
+/// once, at its end: so it contains the wake-up and the latching, which the kernel charges to a reservation too, and
+/// nothing but a reading of the clock stands between a release and the job.
 ThreadUse take_thread_use();
 
 /// True if this program counts allocations: it is linked with takt_allocation_counter and no sanitizer replaces malloc.

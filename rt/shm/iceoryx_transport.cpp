@@ -126,9 +126,25 @@ class Daemon {
   iox::roudi::RouDi roudi_;
 };
 
-class IceoryxTransport final : public Transport {
+/// What serving and joining a domain have in common. Derived classes fill the ports once they know the domain.
+class PortsOverIceoryx : public Transport {
  public:
-  explicit IceoryxTransport(std::span<const PortPlan> plans) : layout_(IceoryxLayout::of(plans)) {
+  explicit PortsOverIceoryx(std::span<const PortPlan> plans) : layout_(IceoryxLayout::of(plans)) {}
+  std::unique_ptr<Writer> make_writer(size_t port) override { return make_iceoryx_writer(ports_.at(port)); }
+  std::unique_ptr<Reader> make_reader(size_t port) override { return make_iceoryx_reader(ports_.at(port)); }
+  uint64_t shared_memory_bytes() const override { return kManagementBytes + layout_.bytes(); }
+  const char* name() const override { return "iceoryx"; }
+
+ protected:
+  Claim claim_;
+  IceoryxLayout layout_;
+  std::deque<IceoryxPort> ports_;
+};
+
+/// Brings the daemon along.
+class IceoryxTransport final : public PortsOverIceoryx {
+ public:
+  explicit IceoryxTransport(std::span<const PortPlan> plans) : PortsOverIceoryx(plans) {
     const IceoryxPlaces places = IceoryxPlaces::of_this_machine();
     iceoryx_preflight(places, shared_memory_bytes());
     ports_ = ports_of(plans, layout_, iceoryx_domain(getpid()));
@@ -138,37 +154,20 @@ class IceoryxTransport final : public Transport {
     runtime_.emplace(unused_runtime_name());
   }
 
-  std::unique_ptr<Writer> make_writer(size_t port) override { return make_iceoryx_writer(ports_.at(port)); }
-  std::unique_ptr<Reader> make_reader(size_t port) override { return make_iceoryx_reader(ports_.at(port)); }
-  uint64_t shared_memory_bytes() const override { return kManagementBytes + layout_.bytes(); }
-  const char* name() const override { return "iceoryx"; }
-
  private:
-  Claim claim_;
-  IceoryxLayout layout_;
-  std::deque<IceoryxPort> ports_;
   std::unique_ptr<Daemon> daemon_;
   std::optional<iox::runtime::PoshRuntimeSingleProcess> runtime_;
 };
 
 /// iceoryx never ends the runtime of a client before the process ends, so there is nothing to tear down here.
-class JoinedTransport final : public Transport {
+class JoinedTransport final : public PortsOverIceoryx {
  public:
-  JoinedTransport(std::span<const PortPlan> plans, const std::string& domain) : layout_(IceoryxLayout::of(plans)) {
+  JoinedTransport(std::span<const PortPlan> plans, const std::string& domain) : PortsOverIceoryx(plans) {
     ports_ = ports_of(plans, layout_, domain);
     const LowRealTime low;
     const Quiet quiet;
     iox::runtime::PoshRuntime::initRuntime(unused_runtime_name());
   }
-  std::unique_ptr<Writer> make_writer(size_t port) override { return make_iceoryx_writer(ports_.at(port)); }
-  std::unique_ptr<Reader> make_reader(size_t port) override { return make_iceoryx_reader(ports_.at(port)); }
-  uint64_t shared_memory_bytes() const override { return kManagementBytes + layout_.bytes(); }
-  const char* name() const override { return "iceoryx"; }
-
- private:
-  Claim claim_;
-  IceoryxLayout layout_;
-  std::deque<IceoryxPort> ports_;
 };
 
 }  // namespace
