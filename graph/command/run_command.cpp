@@ -2,7 +2,11 @@
 #include "graph/command/run_command.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <sched.h>
+#include <unistd.h>
 
+#include <array>
 #include <csignal>
 #include <cstdio>
 #include <fstream>
@@ -18,31 +22,68 @@ namespace takt::command {
 namespace {
 
 std::atomic<Executor*> g_running{nullptr};
+std::atomic<bool> g_stop_asked{false};
 
 extern "C" void stop_running(int) {
+  g_stop_asked.store(true);
   if (Executor* executor = g_running.load()) executor->stop();
 }
 
-/// While alive, SIGINT and SIGTERM end the run cleanly.
+/// While it lives SIGINT, SIGTERM and SIGHUP end the run cleanly; one that comes while the run is still being prepared
+/// ends it as soon as there is something to end. An ignored SIGHUP (nohup) stays
+/// ignored; SIGINT does not: shells ignore it for whatever a script starts in the background.
 class StopOnSignal {
  public:
-  explicit StopOnSignal(Executor& executor) {
-    g_running.store(&executor);
+  StopOnSignal() {
+    g_stop_asked.store(false);
     struct sigaction action {};
     action.sa_handler = stop_running;
-    sigaction(SIGINT, &action, &old_int_);
-    sigaction(SIGTERM, &action, &old_term_);
+    for (size_t i = 0; i < kSignals.size(); ++i) {
+      sigaction(kSignals[i], nullptr, &old_[i]);
+      if (kSignals[i] != SIGHUP || old_[i].sa_handler != SIG_IGN) sigaction(kSignals[i], &action, nullptr);
+    }
   }
   ~StopOnSignal() {
-    g_running.store(nullptr);
-    sigaction(SIGINT, &old_int_, nullptr);
-    sigaction(SIGTERM, &old_term_, nullptr);
+    for (size_t i = 0; i < kSignals.size(); ++i) sigaction(kSignals[i], &old_[i], nullptr);
   }
 
  private:
-  struct sigaction old_int_ {
-  }, old_term_{};
+  static constexpr std::array kSignals{SIGINT, SIGTERM, SIGHUP};
+  std::array<struct sigaction, kSignals.size()> old_{};
 };
+
+/// What a signal stops while this lives.
+class Stoppable {
+ public:
+  explicit Stoppable(Executor& executor) {
+    g_running.store(&executor);
+    if (g_stop_asked.load()) executor.stop();
+  }
+  ~Stoppable() { g_running.store(nullptr); }
+};
+
+/// Whether a file can be written there, without making it yet.
+bool writable(const std::filesystem::path& file) {
+  if (access(file.c_str(), F_OK) == 0) return access(file.c_str(), W_OK) == 0;
+  const auto folder = file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
+  return access(folder.c_str(), W_OK) == 0;
+}
+
+/// The cores of the schedule that this process may use; none of them: all it may use.
+void limit_cores(std::vector<int>& cores, std::vector<std::string>& adjusted) {
+  cpu_set_t allowed;
+  if (cores.empty() || sched_getaffinity(0, sizeof allowed, &allowed) != 0) return;
+  std::vector<int> usable, all;
+  for (int core = 0; core < CPU_SETSIZE; ++core)
+    if (CPU_ISSET(core, &allowed)) all.push_back(core);
+  for (const int core : cores)
+    if (core >= 0 && core < CPU_SETSIZE && CPU_ISSET(core, &allowed)) usable.push_back(core);
+  if (usable.size() == cores.size()) return;
+  if (usable.empty()) usable = all;
+  adjusted.push_back(fmt::format("cores [{}] -> [{}]: this process may use no others", fmt::join(cores, ", "),
+                                 fmt::join(usable, ", ")));
+  cores = usable;
+}
 
 std::unique_ptr<Transport> make_transport(const std::string& name, const Plan& plan) {
   return name == "iceoryx" ? make_iceoryx_transport(plan.ports) : make_local_transport(plan.ports);
@@ -65,7 +106,7 @@ int execute(const RunOptions& options, Prepared& prepared, std::vector<std::stri
   const ProcessReading before = ProcessReading::now();
   RunResult result;
   {
-    const StopOnSignal guard(executor);
+    const Stoppable stoppable(executor);
     const LiveTable live(executor, fmt::format("takt run {} ({}, policy {})", graph.name, graph.profile,
                                                to_string(graph.schedule.policy)));
     result = executor.run();
@@ -103,9 +144,16 @@ int run_graph(const RunOptions& options) {
   if (error)
     return refuse(fmt::format("--output {}: {}; choose a writable folder", options.output.string(), error.message()),
                   kBadInput);
+  if (!options.report.empty() && !writable(options.report))
+    return refuse("--report " + options.report.string() + ": cannot be written; choose another place", kBadInput);
+  const StopOnSignal guard;
   Prepared prepared;
   try {
     if (const int code = prepare(options, prepared); code != kOk) return code;
+    if (g_stop_asked.load()) {
+      std::fputs("takt: stopped before the run began\n", stderr);
+      return kOk;
+    }
     const graph::CheckResult check = graph::check(*prepared.graph, prepared.composition->plan);
     if (!check.admitted && !options.unchecked) return refuse(check.text + "(--unchecked runs it all the same)", kNotOk);
 
@@ -113,6 +161,7 @@ int run_graph(const RunOptions& options) {
     const std::vector<std::string> lacks = prepare_machine(latency);
     if (options.require_rt && !lacks.empty()) return refuse("--require-rt: " + lacks.front(), kDeviceOrSystem);
     std::vector<std::string> adjusted = prepared.graph->adjusted;
+    limit_cores(prepared.composition->plan.cores, adjusted);
     adjusted.insert(adjusted.end(), lacks.begin(), lacks.end());
     for (const std::string& line : adjusted) std::fprintf(stderr, "takt: adjusted: %s\n", line.c_str());
     return execute(options, prepared, std::move(adjusted));

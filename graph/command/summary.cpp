@@ -24,18 +24,23 @@ std::string node_line(const Json& node) {
                      figure(node["lateness_us"]["p50"], "{:.0f}"), figure(node["lateness_us"]["p99"], "{:.0f}"));
 }
 
+/// What was asked of the kernel, and what it says it gave.
+std::string policy_text(const Json& report) {
+  if (report["clock"] == "virtual") return "jobs take exactly their budgets";
+  const auto verified = std::count_if(report["nodes"].begin(), report["nodes"].end(),
+                                      [](const Json& node) { return node["granted"]["verified"].get<bool>(); });
+  return fmt::format("policy {} granted (asked {}), read back for {} of {} nodes",
+                     report["policy_granted"].get<std::string>(), report["policy_asked"].get<std::string>(), verified,
+                     report["nodes"].size());
+}
+
 }  // namespace
 
 std::string summary_text(const Json& report) {
-  const auto verified = std::count_if(report["nodes"].begin(), report["nodes"].end(),
-                                      [](const Json& node) { return node["granted"]["verified"].get<bool>(); });
-  std::string text = fmt::format(
-      "\n{} on {} ({} profile, {} clock): {:.1f} s, policy {} granted (asked {}; read back on {} of {} "
-      "nodes), transport {}\n",
-      report["graph"].get<std::string>(), report["schedule"].get<std::string>(), report["profile"].get<std::string>(),
-      report["clock"].get<std::string>(), report["duration_s"].get<double>(),
-      report["policy_granted"].get<std::string>(), report["policy_asked"].get<std::string>(), verified,
-      report["nodes"].size(), report["transport"].get<std::string>());
+  const auto word = [&](const char* key) { return report[key].get<std::string>(); };
+  std::string text = fmt::format("\n{} on {} ({} profile, {} clock, {} transport): {:.1f} s, {}\n", word("graph"),
+                                 word("schedule"), word("profile"), word("clock"), word("transport"),
+                                 report["duration_s"].get<double>(), policy_text(report));
   text += fmt::format("  {:<13} {:>5} {:>8} {:>9} {:>6} {:>7} {:>5}  {:>8} {:>8} {:>8}  {:>8} {:>8}\n", "node", "Hz",
                       "released", "completed", "missed", "skipped", "stale", "exec p50", "p99 ms", "resp p99",
                       "late p50", "p99 us");

@@ -38,17 +38,21 @@ void add_octave(std::vector<float>& field, int size, int cells, uint64_t seed, f
   for (size_t i = 0; i < lattice.size(); ++i)
     lattice[i] = static_cast<float>(uniform(mix(seed, i)) * 2.0 - 1.0) * amplitude;
   const auto at = [&](int x, int y) { return lattice[static_cast<size_t>((y % cells) * cells + x % cells)]; };
+  std::vector<float> weight(static_cast<size_t>(pitch));
+  for (int i = 0; i < pitch; ++i) {
+    const float t = static_cast<float>(i) / static_cast<float>(pitch);
+    weight[static_cast<size_t>(i)] = t * t * (3 - 2 * t);
+  }
+  float* out = field.data();
   for (int y = 0; y < size; ++y) {
     const int cy = y / pitch;
-    const float ty = static_cast<float>(y % pitch) / static_cast<float>(pitch);
-    const float wy = ty * ty * (3 - 2 * ty);
-    for (int x = 0; x < size; ++x) {
-      const int cx = x / pitch;
-      const float tx = static_cast<float>(x % pitch) / static_cast<float>(pitch);
-      const float wx = tx * tx * (3 - 2 * tx);
-      const float top = at(cx, cy) + wx * (at(cx + 1, cy) - at(cx, cy));
-      const float bottom = at(cx, cy + 1) + wx * (at(cx + 1, cy + 1) - at(cx, cy + 1));
-      field[static_cast<size_t>(y * size + x)] += top + wy * (bottom - top);
+    const float wy = weight[static_cast<size_t>(y % pitch)];
+    for (int cx = 0; cx < cells; ++cx) {
+      const float a = at(cx, cy), b = at(cx + 1, cy), c = at(cx, cy + 1), d = at(cx + 1, cy + 1);
+      for (const float wx : weight) {
+        const float top = a + wx * (b - a), bottom = c + wx * (d - c);
+        *out++ += top + wy * (bottom - top);
+      }
     }
   }
 }

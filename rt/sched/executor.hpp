@@ -21,7 +21,8 @@ struct RunResult {
   std::vector<uint64_t> released;    ///< per task; computed from rate and window for those with a rate
   std::vector<std::string> refused;  ///< what the kernel refused, with the fix
   bool end_of_data = false;
-  double duration_s() const { return static_cast<double>(end_ns - epoch_ns) / 1e9; }
+  /// 0 if it was stopped before it began.
+  double duration_s() const { return end_ns > epoch_ns ? static_cast<double>(end_ns - epoch_ns) / 1e9 : 0; }
 };
 
 /// Runs a plan: makes the tasks with their edges, groups them into lanes, keeps the releases. The nodes of the plan are

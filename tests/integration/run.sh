@@ -45,4 +45,16 @@ for signal in INT TERM; do
   [ $a -le 1 ] && [ $b -le 1 ] || fail "exit $a and $b after SIG$signal"
   grep -q "CPU" "$work/1" || fail "no summary after SIG$signal"
 done
+
+# A signal at any moment, also while the run is being prepared, ends it within a second; 143: before the program could install its handler.
+for delay in 0.01 0.05 0.1 0.2 0.3 0.5 0.8; do
+  "$takt" run --for 0s --policy cooperative --output "$work/one" >"$work/1" 2>&1 & first=$!
+  sleep $delay
+  start=$(date +%s%N)
+  kill -TERM $first
+  wait $first; code=$?
+  took=$((($(date +%s%N) - start) / 1000000))
+  echo "SIGTERM after $delay s ended it in $took ms, exit $code"
+  [ $code -le 1 ] || [ $code -eq 143 ] || fail "exit $code after SIGTERM at $delay s"
+done
 finish
