@@ -46,7 +46,6 @@ Executor::~Executor() = default;
 RunResult Executor::run() {
   RunResult result;
   result.grants.resize(tasks_.size());
-  result.policy_granted = clock_.is_virtual() ? plan_.policy : Policy::cooperative;
   if (clock_.is_virtual()) {
     run_virtual(result);
   } else if (plan_.policy == Policy::cooperative || !run_partitioned(plan_.policy, result)) {

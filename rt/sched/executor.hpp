@@ -16,7 +16,7 @@ namespace takt {
 /// The outcome of a run, for the report.
 struct RunResult {
   int64_t epoch_ns = 0, end_ns = 0;  ///< planned releases lie in [epoch, end)
-  Policy policy_granted = Policy::cooperative;
+  Policy policy_granted = Policy::cooperative;  ///< also in virtual time, which asks the kernel for nothing
   std::vector<Grant> grants;         ///< per task
   std::vector<uint64_t> released;    ///< per task; computed from rate and window for those with a rate
   std::vector<std::string> refused;  ///< what the kernel refused, with the fix

@@ -56,14 +56,20 @@ recording; rm "$work/data/stereo_sequence/kitti06/calib.txt"; replay 2 "calib.tx
 # Devices and daemons: exit 3.
 graph 's#sim: \{default: .*#sim: {default: {driver: sim, world: worlds/lab.xml}, head_camera: {driver: v4l2, path: /dev/video99}}#'
 run 3 "v4l2"
-private() { unshare -m sh -c 'mount -t tmpfs tmpfs /tmp && mount -t tmpfs tmpfs /dev/shm && exec "$@"' private "$@"; }
+# A /tmp and a /dev/shm of its own, so that no daemon of the user is disturbed; what runs there is copied there, because
+# the project itself may stand below /tmp.
+private() {
+  unshare -m sh -c 'mount -t tmpfs tmpfs /dev/shm && cp -r "$1" "$2/graph" "$2/schedules" /dev/shm/ &&
+    mount -t tmpfs tmpfs /tmp && shift 2 && TAKT_HOME=/dev/shm exec "$@"' private "$takt" "$source" "$@"
+}
 if private true 2>/dev/null; then
   expect 3 "another iceoryx daemon is running" private sh -c '
-    "$1" run --for 0s --transport iceoryx --policy cooperative --output /tmp/one >/dev/null 2>&1 & first=$!
+    takt=/dev/shm/takt
+    "$takt" run --for 0s --transport iceoryx --policy cooperative --output /tmp/one >/dev/null 2>&1 & first=$!
     until [ -e /dev/shm/root ] || ! kill -0 $first; do sleep 0.1; done
-    "$1" run --for 1s --transport iceoryx --policy cooperative --output /tmp/two; code=$?
-    kill -INT $first; wait $first
-    exit $code' two "$takt"
+    "$takt" run --for 1s --transport iceoryx --policy cooperative --output /tmp/two; code=$?
+    kill -TERM $first; wait $first
+    exit $code'
 else
   echo "NOT RUN: the lock of another daemon needs a private mount namespace; run as root"
 fi
