@@ -22,6 +22,11 @@ if(TAKT_SANITIZE)
   endif()
   add_link_options(-fsanitize=${TAKT_SANITIZE})
 endif()
+set(TAKT_TSAN_SUPPRESSIONS)  # linked into programs
+if(TAKT_SANITIZE MATCHES thread)
+  set(TAKT_TSAN_SUPPRESSIONS takt_tsan_suppressions)
+  add_library(takt_tsan_suppressions OBJECT ${PROJECT_SOURCE_DIR}/tests/tsan_suppressions.cpp)
+endif()
 
 # One library per room: takt_room(stereo SOURCES a.cpp b.cpp USES takt_rt opencv_core)
 function(takt_room name)

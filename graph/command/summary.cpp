@@ -14,12 +14,14 @@ std::string figure(const Json& value, const char* format) {
   return value.is_null() ? "-" : fmt::format(fmt::runtime(format), value.get<double>());
 }
 
+// Every line but those of `adjusted` fits a terminal of 80 columns.
+constexpr const char* kRow = "{:<11} {:>4} {:>5} {:>5} {:>4} {:>4} {:>5} {:>6} {:>6} {:>6} {:>6} {:>6}\n";
+
 std::string node_line(const Json& node) {
-  return fmt::format("  {:<13} {:>5} {:>8} {:>9} {:>6} {:>7} {:>5}  {:>8} {:>8} {:>8}  {:>8} {:>8}\n",
-                     node["name"].get<std::string>().substr(0, 13), figure(node["rate_hz"], "{:g}"),
-                     node["released"].get<uint64_t>(), node["completed"].get<uint64_t>(),
-                     node["deadline_misses"].get<uint64_t>(), node["skipped"].get<uint64_t>(),
-                     node["stale_inputs"].get<uint64_t>(), figure(node["exec_ms"]["p50"], "{:.2f}"),
+  const auto number = [&](const char* key) { return std::to_string(node[key].get<uint64_t>()); };
+  return fmt::format(fmt::runtime(kRow), node["name"].get<std::string>().substr(0, 11), figure(node["rate_hz"], "{:g}"),
+                     number("released"), number("completed"), number("deadline_misses"), number("skipped"),
+                     number("stale_inputs"), figure(node["exec_ms"]["p50"], "{:.2f}"),
                      figure(node["exec_ms"]["p99"], "{:.2f}"), figure(node["response_ms"]["p99"], "{:.2f}"),
                      figure(node["lateness_us"]["p50"], "{:.0f}"), figure(node["lateness_us"]["p99"], "{:.0f}"));
 }
@@ -38,31 +40,29 @@ std::string policy_text(const Json& report) {
 
 std::string summary_text(const Json& report) {
   const auto word = [&](const char* key) { return report[key].get<std::string>(); };
-  std::string text = fmt::format("\n{} on {} ({} profile, {} clock, {} transport): {:.1f} s, {}\n", word("graph"),
-                                 word("schedule"), word("profile"), word("clock"), word("transport"),
-                                 report["duration_s"].get<double>(), policy_text(report));
-  text += fmt::format("  {:<13} {:>5} {:>8} {:>9} {:>6} {:>7} {:>5}  {:>8} {:>8} {:>8}  {:>8} {:>8}\n", "node", "Hz",
-                      "released", "completed", "missed", "skipped", "stale", "exec p50", "p99 ms", "resp p99",
-                      "late p50", "p99 us");
+  std::string text = fmt::format("\n{} on {}, {:.1f} s ({} profile, {} clock, {} transport)\n{}\n", word("graph"),
+                                 word("schedule"), report["duration_s"].get<double>(), word("profile"), word("clock"),
+                                 word("transport"), policy_text(report));
+  text += fmt::format(fmt::runtime(kRow), "", "", "", "", "", "", "", "exec", "ms", "resp", "late", "us");
+  text += fmt::format(fmt::runtime(kRow), "node", "Hz", "rel", "done", "miss", "skip", "stale", "p50", "p99", "p99",
+                      "p50", "p99");
   for (const Json& node : report["nodes"]) text += node_line(node);
   for (const Json& chain : report["chains"])
-    text += fmt::format("  chain {}: age p50 {} ms, max {} ms, bound {} ms: {}\n", chain["name"].get<std::string>(),
+    text += fmt::format("chain {}: age p50 {} ms, max {} ms, bound {} ms: {}\n", chain["name"].get<std::string>(),
                         figure(chain["age_ms"]["p50"], "{:.1f}"), figure(chain["age_ms"]["max"], "{:.1f}"),
                         figure(chain["bound_ms"], "{:.0f}"),
                         chain["within"].is_null()     ? "no sample"
                         : chain["within"].get<bool>() ? "within"
                                                       : "EXCEEDED");
   const Json& by = report["cpu"]["by"];
-  text += fmt::format(
-      "  CPU {:.2f} cores: nodes {:.2f}, devices {:.2f}, simulator {:.2f}, runtime {:.2f}; memory {:.0f} MB shared, "
-      "{:.0f} MB "
-      "resident; host stall {} ms\n",
-      report["cpu"]["utilisation"].get<double>(), by["nodes"].get<double>(), by["devices"].get<double>(),
-      by["simulator"].get<double>(), by["runtime"].get<double>(), report["memory"]["shm_mb"].get<double>(),
-      report["memory"]["rss_mb"].get<double>(), report["host_stall_ms"].get<int64_t>());
-  for (const Json& line : report["adjusted"]) text += "  adjusted: " + line.get<std::string>() + "\n";
-  text +=
-      report["ok"].get<bool>() ? "  ok\n" : "  NOT OK: a high-criticality deadline was missed or a node fell behind\n";
+  text += fmt::format("CPU {:.2f} cores: nodes {:.2f}, devices {:.2f}, simulator {:.2f}, runtime {:.2f}\n",
+                      report["cpu"]["utilisation"].get<double>(), by["nodes"].get<double>(),
+                      by["devices"].get<double>(), by["simulator"].get<double>(), by["runtime"].get<double>());
+  text += fmt::format("memory {:.0f} MB shared, {:.0f} MB resident; host stall {} ms\n",
+                      report["memory"]["shm_mb"].get<double>(), report["memory"]["rss_mb"].get<double>(),
+                      report["host_stall_ms"].get<int64_t>());
+  for (const Json& line : report["adjusted"]) text += "adjusted: " + line.get<std::string>() + "\n";
+  text += report["ok"].get<bool>() ? "ok\n" : "NOT OK: a high-criticality deadline was missed or a node fell behind\n";
   return text;
 }
 

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the thread sanitizer must overlook, linked into every program of its preset. Only names of third parties may
+// stand here: none of these libraries is built with the sanitizer, so that their own synchronisation is invisible to it.
+extern "C" const char* __tsan_default_suppressions();  // NOLINT(bugprone-reserved-identifier): the sanitizer's name
+
+extern "C" const char* __tsan_default_suppressions() {
+  return  // iceoryx: lock-free queues, the daemon's threads
+      "race:iox::posix::PosixUser\n"
+      "race:libiceoryx_hoofs.so\n"
+      "race:libiceoryx_posh.so\n"
+      "race:libiceoryx_posh_roudi.so\n"
+      // OpenCV's thread pool
+      "race:libopencv_core.so\n"
+      // GDAL, which OpenCV's image reading brings, takes two locks of its own in either order when it is loaded
+      "deadlock:libgdal.so\n";
+}
