@@ -7,6 +7,7 @@
 #include "nodes/mapping_3d/obstacle_grid.hpp"
 #include "nodes/mapping_3d/pose.hpp"
 #include "rt/node.hpp"
+#include "rt/transform/transform_buffer.hpp"
 
 namespace takt {
 namespace {
@@ -40,24 +41,22 @@ class MappingNode final : public Node {
   }
 
   void run(Job& job) override {
-    const PointCloud* cloud = cloud_.newest();
-    if (!cloud || (has_stamp_ && cloud_.stamp_ns() <= last_stamp_ns_) || !(cloud->camera.focal_px > 0))
-      return job.no_result();
-    Grid* grid = obstacles_.loan();
+    for (size_t i = 0; i < motion_.size(); ++i) track_.insert(motion_.stamp_ns(i), {motion_[i].pose, {}});
+    UncertainPose camera_in_map;
+    const std::optional<size_t> chosen = choose(camera_in_map);
+    Grid* grid = chosen ? obstacles_.loan() : nullptr;
     if (!grid) return job.no_result();
-    last_stamp_ns_ = cloud_.stamp_ns();
-    has_stamp_ = true;
+    const PointCloud* cloud = &cloud_[*chosen];
+    last_stamp_ns_ = cloud_.stamp_ns(*chosen);
 
-    // Motion::pose is the camera's; conjugated with the mount it is the robot's (erratum E-25).
-    size_t poses = 0;
-    for (size_t i = 0; i < motion_.size(); ++i) poses_[poses++] = {motion_.stamp_ns(i), motion_[i].pose};
-    const Transform pose = pose_at(std::span(poses_).first(poses), last_stamp_ns_);
     const Viewpoint viewpoint = viewpoint_of(*cloud);
     const GridShape shape = grid_.shape();
     grid->width = grid->height = shape.cells;
     grid->cell_m = shape.cell_m;
     grid->origin_x_m = grid->origin_y_m = shape.origin_m;
-    grid->grid_in_map = compose(compose(viewpoint.camera_in_robot, pose), inverse(viewpoint.camera_in_robot));
+    // Motion::pose is the camera's; conjugated with the mount it is the robot's (erratum E-25).
+    const UncertainPose mount{viewpoint.camera_in_robot, {}};
+    grid->grid_in_map = compose(compose(mount, camera_in_map), inverse(mount)).transform;
     if (!grid->cells.resize(static_cast<size_t>(shape.cells) * static_cast<size_t>(shape.cells)))
       return job.no_result();
     grid_.fill(without_outliers(cloud->points.items()), viewpoint, grid->view());
@@ -65,6 +64,20 @@ class MappingNode final : public Node {
   }
 
  private:
+  /// The newest cloud that was not mapped yet and whose pose is known, at its stamp or between two: never the latest
+  /// pose for a later cloud. Without motions every cloud is seen from the origin.
+  std::optional<size_t> choose(UncertainPose& camera_in_map) const {
+    for (size_t i = cloud_.size(); i-- > 0 && cloud_.stamp_ns(i) > last_stamp_ns_;) {
+      if (!(cloud_[i].camera.focal_px > 0)) continue;
+      if (!motion_.connected()) return i;
+      const auto pose = track_.at(cloud_.stamp_ns(i));
+      if (!pose) continue;
+      camera_in_map = *pose;
+      return i;
+    }
+    return std::nullopt;
+  }
+
   std::span<const Point> without_outliers(std::span<const Point> points) {
     if (!filter_) return points;
     const cloud::OutlierParameters p{outlier_radius_, cloud::scaled_n_min(outlier_n_min_, points.size())};
@@ -86,7 +99,9 @@ class MappingNode final : public Node {
     return {said ? t : mount_, cloud.camera.focal_px / step, half};
   }
 
-  Input<PointCloud> cloud_{this, "cloud", "points in the camera frame"};
+  static constexpr int64_t kLongestGapNs = 500'000'000;  ///< between two poses that are interpolated
+
+  Input<PointCloud> cloud_{this, "cloud", "points in the camera frame; depth 4, so that one has its pose already"};
   Input<Motion> motion_{this, "motion", "camera poses around the cloud's stamp; depth 16", Need::optional};
   Output<Grid> obstacles_{this, "obstacles", "0.20 m grid around the robot, robot frame at the cloud's stamp"};
   Param<double> outlier_radius_{this, "outlier_radius", 0.20, {0.0, 1.0}, "m", "outlier removal; 0: none"};
@@ -118,9 +133,8 @@ class MappingNode final : public Node {
   std::vector<uint8_t> keep_;
   ObstacleGrid grid_;
   Transform mount_;
-  std::array<StampedPose, InputPort::kMaxDepth> poses_;
-  int64_t last_stamp_ns_ = 0;
-  bool has_stamp_ = false;
+  PoseTrack track_{InputPort::kMaxDepth, kLongestGapNs};
+  int64_t last_stamp_ns_ = INT64_MIN;
 };
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "nodes/mapping_3d/pose.hpp"
+#include "rt/transform/pose_math.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 
 namespace takt {
@@ -51,6 +52,40 @@ TEST_CASE("mapping_3d: one grid per cloud, with the cloud's stamp and the robot'
   out.clear();
   CHECK_FALSE(test::run(*node));  // the same cloud again
   CHECK_FALSE(out.sent());
+}
+
+TEST_CASE("mapping_3d: the newest cloud whose pose is known; a robot that turns on the spot stays on it (E-25)") {
+  NodeTypes types;
+  register_mapping_3d(types);
+  const auto node = types.find("mapping_3d")->make();
+  auto& cloud_port = test::input(*node, "cloud");
+  auto& motion_port = test::input(*node, "motion");
+  PortAccess::connect(cloud_port, {0, 0, 1, 10});
+  PortAccess::connect(motion_port, {});
+  test::set_up(*node);
+  test::BoxWriter<Grid> out(*node->outputs()[0]);
+
+  // The camera sits 0.5 m before the axis that the robot turns about, so it moves on a circle.
+  const UncertainPose mount{mapping_3d::camera_mount(0, 0.5, 1.6, 0, 0), {}},
+      turn{{0, 0, 0, std::cos(0.1), 0, 0, std::sin(0.1)}, {}};
+  test::Box<PointCloud> old({0, 0, 1, 10}), newer({0, 0, 1, 10});
+  for (auto* cloud : {&old, &newer}) {
+    (*cloud)->camera = {492.8, 319.5, 239.5, 0.24};
+    (*cloud)->sensor_in_robot = mount.transform;
+  }
+  test::Box<Motion> motion;
+  motion->pose = compose(compose(inverse(mount), turn), mount).transform;
+  CHECK(std::hypot(motion->pose.x, motion->pose.z) > 0.05);
+  test::latch(cloud_port, old, 200, 1, 0);
+  test::latch(cloud_port, newer, 300, 2, 1);
+  CHECK_FALSE(test::run(*node));  // no pose at all
+  test::latch(motion_port, motion, 200, 1);
+  CHECK(test::run(*node));
+  REQUIRE(out.sent());
+  CHECK(out.stamp_ns() == 200);  // nothing tells yet where the newer one was seen from
+  const Transform robot = out.message().grid_in_map;
+  CHECK(std::hypot(robot.x, robot.y) < 1e-12);
+  CHECK(std::abs(robot.qz) == doctest::Approx(std::sin(0.1)));
 }
 
 TEST_CASE("mapping_3d: points without company are no obstacle, unless outlier_radius is 0") {
