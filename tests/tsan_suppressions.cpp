@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the thread sanitizer must overlook, linked into every program of its preset. Only names of third parties may
 // stand here: none of these libraries is built with the sanitizer, so that their own synchronisation is invisible to it.
-extern "C" const char* __tsan_default_suppressions();  // NOLINT(bugprone-reserved-identifier): the sanitizer's name
+extern "C" const char* __tsan_default_suppressions();  // the sanitizer looks for this name
 
 extern "C" const char* __tsan_default_suppressions() {
   return  // iceoryx: lock-free queues, the daemon's threads

@@ -149,7 +149,8 @@ NodeResult make_sim(const DeviceConfig& config, Settings& settings, Devices& dev
 DeviceResult check_keys(const DeviceConfig& config, const DeviceKind& kind) {
   if (!config.settings.is_object() && !config.settings.is_null())
     return device_error(config.id, "the settings are no map", "write key: value");
-  for (const auto& [key, value] : config.settings.items()) {
+  for (const auto& item : config.settings.items()) {
+    const std::string& key = item.key();
     const bool known = key == "kind" || key == "driver" ||
                        std::any_of(kind.settings.begin(), kind.settings.end(), [&](const SettingInfo& s) {
                          return s.name == key && (s.driver.empty() || s.driver == config.driver);

@@ -88,10 +88,10 @@ void decode(const uint32_t* HWY_RESTRICT keys, int max_sum, int min_confidence, 
   // confidence_of without an integer division: numerators stay below 2^24, and the quotient of two such floats never
   // rounds up to the next integer (it lies at least 1 / 65534 below, more than half a unit in the last place of 255).
   const auto divisor = static_cast<float>(max_sum);
+  const int half = max_sum / 2;  // rounds to the nearest
   for (int i = 0; i < count; ++i) {
     const int sum = static_cast<int>(keys[i] >> 16);
-    confidence[i] =
-        static_cast<uint8_t>(static_cast<int>(static_cast<float>(255 * (max_sum - sum) + max_sum / 2) / divisor));
+    confidence[i] = static_cast<uint8_t>(static_cast<int>(static_cast<float>(255 * (max_sum - sum) + half) / divisor));
   }
   for (int i = 0; i < count; ++i) {
     const bool reject = (keys[i] & 1) != 0 || confidence[i] < min_confidence;

@@ -53,7 +53,7 @@ struct Describe {
             unit,
             scalar_of<Base>(),
             static_cast<uint32_t>(offset),
-            static_cast<uint32_t>(sizeof(T) / sizeof(Base)),
+            static_cast<uint32_t>(sizeof(T) / sizeof(Base)),  // NOLINT(bugprone-sizeof-expression): 1, or an array's
             static_cast<uint32_t>(sizeof(Base))};
   }
 };
