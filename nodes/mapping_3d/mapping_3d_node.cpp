@@ -64,18 +64,31 @@ class MappingNode final : public Node {
   }
 
  private:
-  /// The newest cloud that was not mapped yet and whose pose is known, at its stamp or between two: never the latest
-  /// pose for a later cloud. Without motions every cloud is seen from the origin.
+  /// The newest cloud that was not mapped yet and whose pose is known, at its stamp or between two; if no latched cloud
+  /// has one yet, the newest cloud with its pose predicted at constant motion: never simply the latest pose. Without
+  /// the input every cloud is seen from the origin.
   std::optional<size_t> choose(UncertainPose& camera_in_map) const {
+    std::optional<size_t> newest;
     for (size_t i = cloud_.size(); i-- > 0 && cloud_.stamp_ns(i) > last_stamp_ns_;) {
       if (!(cloud_[i].camera.focal_px > 0)) continue;
       if (!motion_.connected()) return i;
+      if (!newest) newest = i;
       const auto pose = track_.at(cloud_.stamp_ns(i));
       if (!pose) continue;
       camera_in_map = *pose;
       return i;
     }
-    return std::nullopt;
+    return newest && predict(cloud_.stamp_ns(*newest), camera_in_map) ? newest : std::nullopt;
+  }
+
+  bool predict(int64_t stamp_ns, UncertainPose& camera_in_map) const {
+    const size_t n = motion_.size();
+    if (n < 2) return false;
+    const int64_t last = motion_.stamp_ns(n - 1), step = last - motion_.stamp_ns(n - 2);
+    if (stamp_ns < last || stamp_ns - last > kLongestGapNs || step <= 0 || step > kLongestGapNs) return false;
+    const double fraction = 1 + static_cast<double>(stamp_ns - last) / static_cast<double>(step);
+    camera_in_map = interpolate({motion_[n - 2].pose, {}}, {motion_[n - 1].pose, {}}, fraction);
+    return true;
   }
 
   std::span<const Point> without_outliers(std::span<const Point> points) {
@@ -99,7 +112,7 @@ class MappingNode final : public Node {
     return {said ? t : mount_, cloud.camera.focal_px / step, half};
   }
 
-  static constexpr int64_t kLongestGapNs = 500'000'000;  ///< between two poses that are interpolated
+  static constexpr int64_t kLongestGapNs = 500'000'000;  ///< between two poses, and from the last to what is predicted
 
   Input<PointCloud> cloud_{this, "cloud", "points in the camera frame; depth 4, so that one has its pose already"};
   Input<Motion> motion_{this, "motion", "camera poses around the cloud's stamp; depth 16", Need::optional};

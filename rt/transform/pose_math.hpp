@@ -28,7 +28,8 @@ UncertainPose inverse(const UncertainPose& child_in_parent);
 
 /// Between two poses of the same pair of frames; fraction 0 gives `from`, 1 gives `to`. Translation is linear, rotation
 /// slerp along the shorter arc, covariance linear: an upper bound, however the errors of the two are correlated
-/// (E|(1-s)a + s b|^2 <= (1-s) E|a|^2 + s E|b|^2).
+/// (E|(1-s)a + s b|^2 <= (1-s) E|a|^2 + s E|b|^2). A fraction above 1 predicts at constant motion; its covariance is
+/// none.
 UncertainPose interpolate(const UncertainPose& from, const UncertainPose& to, double fraction);
 
 /// True if all numbers are finite and the quaternion is not zero.

@@ -86,6 +86,17 @@ TEST_CASE("mapping_3d: the newest cloud whose pose is known; a robot that turns 
   const Transform robot = out.message().grid_in_map;
   CHECK(std::hypot(robot.x, robot.y) < 1e-12);
   CHECK(std::abs(robot.qz) == doctest::Approx(std::sin(0.1)));
+
+  // Where the newer one is all there is, its pose is predicted: as far again as from the pose before.
+  out.clear();
+  test::Box<Motion> before;
+  test::latch(cloud_port, newer, 300, 2, 0);
+  test::latch(motion_port, before, 100, 1, 0);
+  test::latch(motion_port, motion, 200, 2, 1);
+  CHECK(test::run(*node));
+  REQUIRE(out.sent());
+  CHECK(out.stamp_ns() == 300);
+  CHECK(std::abs(out.message().grid_in_map.qz) == doctest::Approx(std::sin(0.2)).epsilon(0.01));
 }
 
 TEST_CASE("mapping_3d: points without company are no obstacle, unless outlier_radius is 0") {
