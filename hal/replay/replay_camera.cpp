@@ -63,6 +63,12 @@ void ReplayCamera::close() {
 }
 
 DeviceResult ReplayCamera::find_files() {
+  if (const auto pair = middlebury_pair(settings_.directory);
+      pair && !std::filesystem::exists(settings_.directory / "image_l")) {
+    settings_.left = pair->first;
+    settings_.right = pair->second;
+    settings_.directory.clear();
+  }
   if (!settings_.directory.empty()) {
     auto files = list_directory(id_, settings_.directory);
     if (!files) return tl::unexpected(files.error());

@@ -159,6 +159,17 @@ tl::expected<StereoFiles, DeviceError> list_directory(const std::string& id, con
   return files;
 }
 
+std::optional<std::pair<fs::path, fs::path>> middlebury_pair(const fs::path& directory) {
+  constexpr std::array<std::pair<const char*, const char*>, 4> kNames{
+      {{"im2", "im6"}, {"im3", "im4"}, {"im0", "im1"}, {"view1", "view5"}}};
+  for (const auto& [left, right] : kNames)
+    for (const char* extension : {".png", ".ppm", ".pgm", ".jpg"}) {
+      const fs::path a = directory / (std::string(left) + extension), b = directory / (std::string(right) + extension);
+      if (fs::exists(a) && fs::exists(b)) return std::pair(a, b);
+    }
+  return std::nullopt;
+}
+
 tl::expected<void, std::string> check_complete(const fs::path& file) {
   std::ifstream in(file, std::ios::binary);
   if (!in) return tl::unexpected(std::string("cannot be opened"));

@@ -2,7 +2,9 @@
 #pragma once
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "hal/device.hpp"
@@ -21,6 +23,11 @@ struct StereoFiles {
 /// 4, row-major; P1(0,3) = -f B), times.txt optional (seconds, one a line, rising).
 tl::expected<StereoFiles, DeviceError> list_directory(const std::string& device_id,
                                                       const std::filesystem::path& directory);
+
+/// Left and right image of a directory in Middlebury's layout: im2 and im6, im3 and im4, im0 and im1, or view1 and
+/// view5; nothing if it is none. Such a directory says nothing of the camera.
+std::optional<std::pair<std::filesystem::path, std::filesystem::path>> middlebury_pair(
+    const std::filesystem::path& directory);
 
 /// Refuses files that are not complete PNG (ends with IEND), JPEG (ends with EOI), PGM or PPM images; looks at the
 /// first and last bytes only.

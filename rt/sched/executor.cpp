@@ -55,6 +55,9 @@ RunResult Executor::run() {
     run_cooperative();
   }
   result.end_ns = stop_.end_ns();
+  // Followers count their own releases.
+  for (const auto& task : tasks_)
+    if (task->plan().rate) task->forget_from(result.end_ns);
   count_released(result);
   return result;
 }

@@ -80,9 +80,19 @@ void Task::publish(JobEnd& end, int64_t deadline_ns, bool modelled) {
   statistics_.response.add(response);
   statistics_.last_response_ns.store(response, std::memory_order_relaxed);
   if (end.late) count(statistics_.deadline_misses);
-  if (end.late && plan_.on_miss == OnMiss::skip) count(statistics_.skipped);
-  else if (end.late && plan_.on_miss == OnMiss::reuse_last) count(statistics_.reused);
-  else count(statistics_.completed);
+  const bool skip = end.late && plan_.on_miss == OnMiss::skip, reuse = end.late && plan_.on_miss == OnMiss::reuse_last;
+  std::atomic<uint64_t>& counter = skip ? statistics_.skipped : reuse ? statistics_.reused : statistics_.completed;
+  count(counter);
+  outcomes_[outcome_count_++ % outcomes_.size()] = {deadline_ns - plan_.deadline_ns, &counter, end.late};
+}
+
+void Task::forget_from(int64_t end_ns) {
+  for (Outcome& outcome : outcomes_) {
+    if (outcome.counter == nullptr || outcome.release_ns < end_ns) continue;
+    outcome.counter->fetch_sub(1);
+    if (outcome.late) statistics_.deadline_misses.fetch_sub(1);
+    outcome.counter = nullptr;
+  }
 }
 
 void Task::settle_output(size_t i, bool late, int64_t now_ns, int64_t visible_at_ns) {

@@ -50,6 +50,9 @@ class Task {
   /// Runs job `index` released at `release_ns`. With modelled_ns >= 0 (virtual time) the job is taken to finish that
   /// long after its release; otherwise the clock is read.
   JobEnd run(uint64_t index, int64_t release_ns, int64_t modelled_ns = -1);
+  /// Takes the jobs released at or after the end of the run out of the counts: a stop, or the end of recorded data, is
+  /// told by one job while others released at that very instant may be under way. After the run.
+  void forget_from(int64_t end_ns);
   /// True if the last job published (or repeated) this port.
   bool published(size_t port) const;
 
@@ -60,6 +63,13 @@ class Task {
   const Writer& writer(size_t output) const { return *writers_[output]; }
 
  private:
+  /// How one of the last jobs was counted.
+  struct Outcome {
+    int64_t release_ns = 0;
+    std::atomic<uint64_t>* counter = nullptr;
+    bool late = false;
+  };
+
   void publish(JobEnd& end, int64_t deadline_ns, bool modelled);
   void settle_output(size_t output, bool late, int64_t now_ns, int64_t visible_at_ns);
 
@@ -70,6 +80,8 @@ class Task {
   std::vector<std::unique_ptr<Writer>> writers_;
   std::vector<bool> published_;
   TaskStatistics statistics_;
+  std::array<Outcome, 16> outcomes_;  ///< ring of the last jobs; far more than fit into the moment of a stop
+  size_t outcome_count_ = 0;
 };
 
 }  // namespace takt

@@ -121,6 +121,22 @@ TEST_CASE("frames that do not fit the memory limit are decoded on reading, with 
   }
 }
 
+TEST_CASE("a directory in Middlebury's layout is a single pair") {
+  const Recording recording;
+  fs::copy_file(recording.path / "image_l/000000.png", recording.path / "im2.png");
+  fs::copy_file(recording.path / "image_r/000000.png", recording.path / "im6.png");
+  fs::remove_all(recording.path / "image_l");
+  VirtualClock clock;
+  ReplayCameraSettings settings = recording.settings();
+  CHECK(has(ReplayCamera("camera", settings, clock).open().error().what, "`focal`"));
+  settings.camera = {500, 0, 0, 0.16};
+  settings.frames = 3;
+  ReplayCamera camera("camera", settings, clock);
+  REQUIRE(camera.open());
+  CHECK(camera.frames() == 3);
+  CHECK(camera.format().camera.focal_px == 500);
+}
+
 TEST_CASE("bad recordings are refused before start, with the file at fault") {
   {
     ReplayCameraSettings s;

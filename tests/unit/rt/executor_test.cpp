@@ -212,6 +212,23 @@ TEST_CASE("the end of recorded data ends the run at that release, and jobs befor
   CHECK(result.released == std::vector<uint64_t>{5, 5});
 }
 
+TEST_CASE("a job released at the very instant at which the data end is not counted, even if it ran") {
+  Bench bench;
+  Source source;
+  Sink sink;
+  source.last_job = 4;
+  const size_t from = bench.add(source, "source", Rate{10, 1}, 0, kMs);
+  const size_t to = bench.add(sink, "sink", Rate{10, 1}, 0, kMs);
+  bench.plan.tasks[to].deadline_ns = 50 * kMs;  // earlier deadline: runs before the source finds out
+  bench.edge(from, to, 0);
+  const RunResult result = bench.run(2000 * kMs, [&](Executor& executor) {
+    CHECK(sink.seen.size() == 6);
+    CHECK(executor.tasks()[to]->statistics().completed.load() == 5);
+    CHECK(executor.tasks()[from]->statistics().completed.load() == 5);
+  });
+  CHECK(result.released == std::vector<uint64_t>{5, 5});
+}
+
 TEST_CASE("late jobs: continue publishes, skip withholds, reuse_last repeats the old message") {
   for (const OnMiss verb : {OnMiss::proceed, OnMiss::skip, OnMiss::reuse_last}) {
     Bench bench;
