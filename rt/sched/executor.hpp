@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <atomic>
-#include <functional>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -20,7 +19,6 @@ struct RunResult {
   std::vector<Grant> grants;         ///< per task
   std::vector<uint64_t> released;    ///< per task; computed from rate and window for those with a rate
   std::vector<std::string> refused;  ///< what the kernel refused, with the fix
-  bool end_of_data = false;
   /// 0 if it was stopped before it began.
   double duration_s() const { return end_ns > epoch_ns ? static_cast<double>(end_ns - epoch_ns) / 1e9 : 0; }
 };
