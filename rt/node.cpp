@@ -23,6 +23,11 @@ void OutputPort::send(int64_t stamp_ns) {
   sent_ = loaned_ != nullptr;
 }
 
+void Node::accept_requests() {
+  control_ =
+      std::make_unique<Input<Requests>>(this, "control", "requests to stop, start or pace this node", Need::optional);
+}
+
 std::string_view to_string(Layer layer) {
   switch (layer) {
     case Layer::sensor: return "sensor";

@@ -182,6 +182,11 @@ class Node {
   /// After the last job, on the main thread. Files may be written.
   virtual void finish() {}
 
+  /// Gives the node its last input, `control`: requests to stop, start or pace it, which the runtime obeys.
+  void accept_requests();
+  /// Null if the node takes no requests.
+  const Input<Requests>* control() const { return control_.get(); }
+
   const std::vector<InputPort*>& inputs() const { return inputs_; }
   const std::vector<OutputPort*>& outputs() const { return outputs_; }
   const std::vector<ParamBase*>& params() const { return params_; }
@@ -193,6 +198,7 @@ class Node {
   std::vector<InputPort*> inputs_;
   std::vector<OutputPort*> outputs_;
   std::vector<ParamBase*> params_;
+  std::unique_ptr<Input<Requests>> control_;
 };
 
 /// Layers of the thesis (Sec. 2.2): an edge goes to the same, the next or the storage layer, or from storage to any.
@@ -213,7 +219,11 @@ class NodeTypes {
   /// Registers T under `name`; throws std::logic_error if the name is taken.
   template <class T>
   void add(std::string name, Layer layer, std::string doc) {
-    insert({std::move(name), layer, std::move(doc), [] { return std::make_unique<T>(); }});
+    insert({std::move(name), layer, std::move(doc), [] {
+              auto node = std::make_unique<T>();
+              node->accept_requests();
+              return node;
+            }});
   }
   const NodeType* find(std::string_view name) const;
   const std::map<std::string, NodeType, std::less<>>& all() const { return types_; }

@@ -122,8 +122,8 @@ void Loader::check_edge(const std::string& id, const Part& to, const EdgeSpec& e
 }
 
 void Loader::check_layer_and_hierarchy(const std::string& id, const Part& from, const Part& to, const EdgeSpec& edge) {
-  // Commands to devices have no layer (design 3).
-  if (to.known && !to.device && !layers_fit(from.layer, to.layer))
+  // Commands to devices and requests have no layer (design 3).
+  if (to.known && !to.device && edge.input != "control" && !layers_fit(from.layer, to.layer))
     problem(edge.position,
             fmt::format("edge from {} (layer {}) to {} (layer {}): an edge goes to the same, the next or the storage "
                         "layer (sensor, perception, processing, storage)",

@@ -52,6 +52,8 @@ FIELDS(HeadState, F(HeadState, pan_rad, "rad"), F(HeadState, tilt_rad, "rad"), F
 FIELDS(HeadCommand, F(HeadCommand, pan_rad, "rad"), F(HeadCommand, tilt_rad, "rad"))
 FIELDS(VelocityCommand, F(VelocityCommand, speed_m_s, "m/s"), F(VelocityCommand, turn_rad_s, "rad/s"))
 FIELDS(DigitalState, F(DigitalState, levels, ""), F(DigitalState, changed, ""))
+FIELDS(StopCommand, F(StopCommand, reasons, ""), F(StopCommand, nearest_m, "m"), F(StopCommand, scan_age_s, "s"))
+FIELDS(Requests, F(Requests, wanted, ""))
 FIELDS(TextStatus, F(TextStatus, text, ""))
 
 #undef F
@@ -60,7 +62,7 @@ FIELDS(TextStatus, F(TextStatus, text, ""))
 #undef CAMERA_FIELDS
 
 std::span<const MessageType* const> message_types() {
-  static const std::array<const MessageType*, 15> types{&MessageType::of<Image>(),
+  static const std::array<const MessageType*, 17> types{&MessageType::of<Image>(),
                                                         &MessageType::of<StereoPair>(),
                                                         &MessageType::of<DisparityMap>(),
                                                         &MessageType::of<PointCloud>(),
@@ -74,6 +76,8 @@ std::span<const MessageType* const> message_types() {
                                                         &MessageType::of<HeadCommand>(),
                                                         &MessageType::of<VelocityCommand>(),
                                                         &MessageType::of<DigitalState>(),
+                                                        &MessageType::of<StopCommand>(),
+                                                        &MessageType::of<Requests>(),
                                                         &MessageType::of<TextStatus>()};
   return types;
 }

@@ -211,6 +211,39 @@ struct DigitalState {
   static void capacities(const Capacity&, std::span<uint32_t>) {}
 };
 
+/// Why a stop is commanded (bits of StopCommand::reasons); 0: drive on.
+namespace stop_reason {
+constexpr uint32_t obstacle = 1, line = 2, scan_lost = 4, line_lost = 8;
+}
+
+/// Stop or drive on, decided from lasers and lines alone; repeated every job, so that silence means stop.
+struct StopCommand {
+  static constexpr std::string_view type_name = "stop_command";
+  uint32_t reasons = 0;   ///< bits of takt::stop_reason; 0: drive on
+  double nearest_m = 0;   ///< of the returns in the protected area; 0: none
+  double scan_age_s = 0;  ///< of the oldest scan used, at the job's release
+  bool stop() const { return reasons != 0; }
+  static std::span<const Field> fields();
+  static void capacities(const Capacity&, std::span<uint32_t>) {}
+};
+
+/// What one node is asked to do: run at every n-th of its releases, or not at all.
+struct Request {
+  using scalar = uint8_t;
+  char node[30] = {};  ///< id in the graph, ended by 0
+  uint8_t run = 1;     ///< 0: stop
+  uint8_t every = 1;   ///< pace; 1: each release
+};
+
+/// The whole of what a clock generator asks for at present; a node that is not named runs at its full rate. State and
+/// not events, so that a message more or less changes nothing. Capacity: count.
+struct Requests {
+  static constexpr std::string_view type_name = "requests";
+  Array<Request> wanted;
+  static std::span<const Field> fields();
+  static void capacities(const Capacity& c, std::span<uint32_t> a) { a[0] = c.count; }
+};
+
 /// Human-readable state. Capacity: count (characters).
 struct TextStatus {
   static constexpr std::string_view type_name = "text_status";

@@ -202,7 +202,7 @@ TEST_CASE("the node type registers with its ports") {
   const auto* type = types.find("ego_motion");
   REQUIRE(type);
   const auto node = type->make();
-  REQUIRE(node->inputs().size() == 2);
+  REQUIRE(node->inputs().size() == 3);
   CHECK(node->inputs()[0]->name() == "pair");
   CHECK(node->inputs()[1]->name() == "disparity");
   REQUIRE(node->outputs().size() == 1);

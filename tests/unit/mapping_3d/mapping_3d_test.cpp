@@ -154,7 +154,7 @@ TEST_CASE("the node type registers with its ports") {
   const auto* type = types.find("mapping_3d");
   REQUIRE(type);
   const auto node = type->make();
-  REQUIRE(node->inputs().size() == 2);
+  REQUIRE(node->inputs().size() == 3);
   CHECK(node->inputs()[0]->name() == "cloud");
   CHECK(node->inputs()[1]->name() == "motion");
   CHECK(node->outputs()[0]->name() == "obstacles");

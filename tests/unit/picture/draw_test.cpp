@@ -79,7 +79,7 @@ TEST_CASE("the node type registers; every input is optional") {
   const auto* type = types.find("picture");
   REQUIRE(type);
   const auto node = type->make();
-  REQUIRE(node->inputs().size() == 4);
+  REQUIRE(node->inputs().size() == 5);
   for (const auto* input : node->inputs()) CHECK(input->need() == takt::Need::optional);
   CHECK(node->outputs().empty());
 }
