@@ -63,6 +63,10 @@ struct DeviceKind {
 /// Every device kind with its drivers and settings, for the checker and `takt nodes`.
 std::span<const DeviceKind> device_kinds();
 
+/// The node of a device kind without a device: ports to look at and to connect, never set up or run. Throws
+/// std::logic_error for a kind that device_kinds() does not have.
+std::unique_ptr<DeviceNode> make_shell(std::string_view kind);
+
 /// Makes the node of a device and opens the device: everything that can be wrong with files and settings is told here.
 /// Errors list the valid alternatives.
 tl::expected<std::unique_ptr<DeviceNode>, DeviceError> make_device(const DeviceConfig& config, Devices& devices,

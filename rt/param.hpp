@@ -27,14 +27,24 @@ class ParamBase {
   std::string_view name() const { return name_; }
   std::string_view unit() const { return unit_; }  ///< "m", "rad", "s", "m/s"..., "px", "1", "" for text and flags
   std::string_view doc() const { return doc_; }
-  /// Takes a value, or says what is wrong with it ("is 12, must lie in 1..10"). Before start only.
+  /// Takes a value, or says what is wrong with it ("is 12, must lie in 1..10"). Before start, and between jobs if live.
   virtual tl::expected<void, std::string> set(const ParamValue& value) = 0;
   virtual std::string value_text() const = 0;
   virtual std::string range_text() const = 0;  ///< "1..512", "sad | ssd", "" if anything goes
   virtual std::string kind() const = 0;        ///< "integer", "number", "flag", "text", "choice"
 
+  /// True if the node reads the value in its jobs and not in its setup: a new value then takes effect at once and
+  /// alone. Known once end_setup() was called.
+  bool live() const { return live_; }
+  void end_setup() { live_ = !used_; }
+
+ protected:
+  void use() const { used_ = true; }
+
  private:
   std::string_view name_, unit_, doc_;
+  mutable bool used_ = false;
+  bool live_ = false;
 };
 
 template <class T>
@@ -51,8 +61,11 @@ class Param final : public ParamBase {
   Param(Node* owner, std::string_view name, T value, Range<T> range, std::string_view unit, std::string_view doc)
       : ParamBase(owner, name, unit, doc), value_(std::move(value)), range_(range) {}
 
-  const T& operator()() const { return value_; }
-  operator const T&() const { return value_; }
+  const T& operator()() const {
+    use();
+    return value_;
+  }
+  operator const T&() const { return (*this)(); }
   tl::expected<void, std::string> set(const ParamValue& value) override;
   std::string value_text() const override;
   std::string range_text() const override;
@@ -68,7 +81,10 @@ class Choice final : public ParamBase {
  public:
   Choice(Node* owner, std::string_view name, std::string_view value, std::vector<std::string_view> words,
          std::string_view doc);
-  size_t operator()() const { return index_; }
+  size_t operator()() const {
+    use();
+    return index_;
+  }
   std::string_view word() const { return words_[index_]; }
   tl::expected<void, std::string> set(const ParamValue& value) override;
   std::string value_text() const override { return std::string(word()); }

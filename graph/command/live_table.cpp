@@ -31,8 +31,8 @@ double ms(const std::atomic<int64_t>& ns) { return static_cast<double>(ns.load(s
 
 }  // namespace
 
-LiveTable::LiveTable(const Executor& executor, std::string title)
-    : executor_(executor), title_(std::move(title)), thread_([this] { show(); }) {}
+LiveTable::LiveTable(const Plan& plan, const RunBoard& board, std::string title)
+    : plan_(plan), board_(board), title_(std::move(title)), thread_([this] { show(); }) {}
 
 LiveTable::~LiveTable() {
   ended_.store(1);
@@ -63,11 +63,11 @@ void LiveTable::draw_table(int columns, int rows) {
   line(fmt::format("  {:<14} {:>6} {:>9} {:>7} {:>7} {:>9} {:>10}", "node", "Hz", "completed", "missed", "skipped",
                    "CPU ms", "response ms"));
   const size_t fitting = static_cast<size_t>(std::max(rows - 4, 1));
-  for (size_t t = 0; t < std::min(fitting, executor_.tasks().size()); ++t) {
-    const Task& task = *executor_.tasks()[t];
-    const TaskStatistics& s = task.statistics();
-    line(fmt::format("  {:<14} {:>6} {:>9} {:>7} {:>7} {:>9.2f} {:>10.2f}", task.plan().name.substr(0, 14),
-                     task.plan().rate ? fmt::format("{:g}", task.plan().rate->hz()) : "on", s.completed.load(),
+  for (size_t t = 0; t < std::min(fitting, plan_.tasks.size()); ++t) {
+    const TaskPlan& task = plan_.tasks[t];
+    const TaskStatistics& s = board_.task(t);
+    line(fmt::format("  {:<14} {:>6} {:>9} {:>7} {:>7} {:>9.2f} {:>10.2f}", task.name.substr(0, 14),
+                     task.rate ? fmt::format("{:g}", task.rate->hz()) : "on", s.completed.load(),
                      s.deadline_misses.load(), s.skipped.load(), ms(s.last_exec_ns), ms(s.last_response_ns)));
   }
   std::fputs(text.c_str(), stderr);
@@ -76,9 +76,9 @@ void LiveTable::draw_table(int columns, int rows) {
 
 void LiveTable::print_line() {
   std::string text;
-  for (const auto& task : executor_.tasks()) {
-    const TaskStatistics& s = task->statistics();
-    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", task->plan().name, s.completed.load());
+  for (size_t t = 0; t < plan_.tasks.size(); ++t) {
+    const TaskStatistics& s = board_.task(t);
+    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", plan_.tasks[t].name, s.completed.load());
     if (const uint64_t missed = s.deadline_misses.load()) text += fmt::format(" ({} missed)", missed);
   }
   std::fprintf(stderr, "completed: %s\n", text.c_str());

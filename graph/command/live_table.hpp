@@ -3,7 +3,7 @@
 #include <atomic>
 #include <thread>
 
-#include "rt/sched/executor.hpp"
+#include "rt/sched/run_board.hpp"
 
 namespace takt::command {
 
@@ -12,7 +12,7 @@ namespace takt::command {
 /// holds the summary alone.
 class LiveTable {
  public:
-  LiveTable(const Executor& executor, std::string title);
+  LiveTable(const Plan& plan, const RunBoard& board, std::string title);
   ~LiveTable();
   LiveTable(const LiveTable&) = delete;
   LiveTable& operator=(const LiveTable&) = delete;
@@ -22,7 +22,8 @@ class LiveTable {
   void draw_table(int columns, int rows);
   void print_line();
 
-  const Executor& executor_;
+  const Plan& plan_;
+  const RunBoard& board_;
   const std::string title_;
   int drawn_lines_ = 0;
   std::atomic<uint32_t> ended_{0};

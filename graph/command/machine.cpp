@@ -5,6 +5,7 @@
 #include <sys/utsname.h>
 #include <unistd.h>
 
+#include <cstdlib>
 #include <fstream>
 #include <sstream>
 #include <string>
@@ -51,6 +52,10 @@ ProcessReading ProcessReading::now() {
   stat >> word;
   for (int i = 0; i < 8 && stat >> field; ++i) reading.steal_ms = i == 7 ? field * 1000 / sysconf(_SC_CLK_TCK) : 0;
   return reading;
+}
+
+double proportional_memory_mb() {
+  return std::strtod(proc_value("/proc/self/smaps_rollup", "Pss:").c_str(), nullptr) / 1024.0;
 }
 
 }  // namespace takt::command

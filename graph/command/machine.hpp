@@ -17,4 +17,7 @@ struct ProcessReading {
   static ProcessReading now();
 };
 
+/// Memory that this process alone accounts for, MB: pages it shares count by their share. 0 if the kernel does not say.
+double proportional_memory_mb();
+
 }  // namespace takt::command

@@ -12,7 +12,6 @@ namespace {
 
 int refuse(Prepared& prepared, std::vector<graph::Problem> problems, Exit code) {
   for (const auto& problem : problems) std::fprintf(stderr, "%s\n", graph::to_string(problem).c_str());
-  std::fprintf(stderr, "takt: %zu problem%s, nothing was started\n", problems.size(), problems.size() == 1 ? "" : "s");
   prepared.problems = std::move(problems);
   return code;
 }
@@ -46,20 +45,40 @@ int refuse(const std::string& text, Exit code) {
   return code;
 }
 
-int prepare(const RunOptions& options, Prepared& prepared) {
-  const NodeTypes types = graph::node_types();
-  graph::Loaded loaded = graph::load(graph_file(options.graph), options.load, types);
+void tell_problems(size_t count) {
+  std::fprintf(stderr, "takt: %zu problem%s, nothing was started\n", count, count == 1 ? "" : "s");
+}
+
+int load(const RunOptions& options, Prepared& prepared) {
+  graph::Loaded loaded = graph::load(graph_file(options.graph), options.load, graph::node_types());
   if (!loaded.graph) return refuse(prepared, std::move(loaded.problems), kBadInput);
   prepared.graph = std::move(loaded.graph);
   if (options.clock == "virtual") prepared.clock = std::make_unique<VirtualClock>(1'000'000'000);
   else prepared.clock = std::make_unique<MonotonicClock>();
-  auto composition = graph::compose(*prepared.graph, types, device_factory(prepared, options.seed), *prepared.clock,
-                                    {options.output, options.seed});
+  return kOk;
+}
+
+int compose(const RunOptions& options, const graph::ComposeOptions& how, Prepared& prepared) {
+  auto composition = graph::compose(*prepared.graph, graph::node_types(), device_factory(prepared, options.seed),
+                                    *prepared.clock, how);
   if (!composition)
     return refuse(prepared, std::move(composition.error().problems),
                   composition.error().device_failed ? kDeviceOrSystem : kBadInput);
   prepared.composition = std::move(*composition);
   return kOk;
+}
+
+int prepare(const RunOptions& options, Prepared& prepared) {
+  int code = load(options, prepared);
+  if (code == kOk) {
+    graph::ComposeOptions how;
+    how.output = options.output;
+    how.seed = options.seed;
+    how.taps = 1;
+    code = compose(options, how, prepared);
+  }
+  if (code != kOk) tell_problems(prepared.problems.size());
+  return code;
 }
 
 }  // namespace takt::command

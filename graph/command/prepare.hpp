@@ -18,8 +18,14 @@ struct Prepared {
   std::vector<graph::Problem> problems;  ///< why there is no composition
 };
 
-/// Loads and composes; what is wrong is written to stderr and the exit code returned (kOk: all is well).
+/// Loads the graph; what is wrong is written to stderr and the exit code returned (kOk: all is well).
+int load(const RunOptions& options, Prepared& prepared);
+/// Composes what is loaded, or the part of it that `compose` says; problems as above.
+int compose(const RunOptions& options, const graph::ComposeOptions& compose, Prepared& prepared);
+/// Both, for a run in one process.
 int prepare(const RunOptions& options, Prepared& prepared);
+/// "takt: n problems, nothing was started".
+void tell_problems(size_t count);
 
 /// Writes one error to stderr and returns the code.
 int refuse(const std::string& text, Exit code);

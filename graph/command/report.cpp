@@ -23,6 +23,25 @@ Json distribution(const Histogram& h, double ns_per_unit) {
           {"max", figure(h.max_ns())}};
 }
 
+/// [[upper edge, samples], ...] with edges at 1, 2, 5 of each decade: what a picture needs.
+Json coarse_histogram(const Histogram& h) {
+  Json bars = Json::array();
+  double edge_us = 1;
+  uint64_t samples = 0;
+  int step = 0;
+  const auto close = [&] {
+    if (samples > 0) bars.push_back({edge_us, samples});
+    samples = 0;
+    edge_us *= step++ % 3 == 1 ? 2.5 : 2;
+  };
+  h.for_each([&](int64_t upper_ns, uint64_t count) {
+    while (static_cast<double>(upper_ns) * 1e-3 > edge_us) close();
+    samples += count;
+  });
+  if (samples > 0) close();
+  return bars;
+}
+
 Json grant_json(const Grant& grant) {
   return {{"policy", to_string(grant.policy)},
           {"runtime_ms", grant.runtime_ms},
@@ -33,13 +52,13 @@ Json grant_json(const Grant& grant) {
 }
 
 Json node_json(const RunFacts& facts, size_t t) {
-  const Task& task = *facts.executor.tasks()[t];
-  const TaskPlan& plan = task.plan();
-  const TaskStatistics& s = task.statistics();
+  const TaskPlan& plan = facts.plan.tasks[t];
+  const TaskStatistics& s = facts.board.task(t);
   Json node;
   node["name"] = plan.name;
   node["rate_hz"] = plan.rate ? Json(plan.rate->hz()) : Json(nullptr);
-  node["active_s"] = facts.result.duration_s();
+  const double paused_s = plan.rate ? static_cast<double>(s.paused.load()) / plan.rate->hz() : 0;
+  node["active_s"] = std::max(0.0, facts.result.duration_s() - paused_s);
   node["criticality"] = to_string(plan.criticality);
   node["device"] = plan.device;
   node["released"] = facts.result.released[t];
@@ -50,13 +69,15 @@ Json node_json(const RunFacts& facts, size_t t) {
            {"deadline_misses", &s.deadline_misses},
            {"budget_overruns", &s.budget_overruns},
            {"stale_inputs", &s.stale_inputs},
+           {"paused", &s.paused},
            {"new_inputs", &s.new_inputs},
            {"no_result", &s.no_result}})
     node[key] = counter->load();
   node["drift_us"] = s.drift_us();
   node["quality"] = {{"0", s.exec.count()}};
-  node["granted"] = grant_json(facts.result.grants[t]);
+  node["granted"] = grant_json(facts.board.grant(t));
   node["lateness_us"] = distribution(s.lateness, 1e3);
+  node["lateness_histogram_us"] = coarse_histogram(s.lateness);
   node["exec_ms"] = distribution(s.exec, 1e6);
   node["response_ms"] = distribution(s.response, 1e6);
   node["publish_ms"] = distribution(s.publish, 1e6);
@@ -67,27 +88,16 @@ Json node_json(const RunFacts& facts, size_t t) {
   return node;
 }
 
-/// The writer of a port, found by its plan index.
-const Writer* writer_of(const Executor& executor, size_t port) {
-  for (const auto& task : executor.tasks()) {
-    const auto& ports = task->plan().ports;
-    for (size_t i = 0; i < ports.size(); ++i) {
-      if (ports[i] == port) return &task->writer(i);
-    }
-  }
-  return nullptr;
-}
-
 Json edges_json(const RunFacts& facts) {
   Json edges = Json::array();
-  for (const auto& task : facts.executor.tasks()) {
-    for (size_t e = 0; e < task->plan().edges.size(); ++e) {
-      const EdgePlan& plan = task->plan().edges[e];
-      const PortPlan& port = facts.composition.plan.ports[plan.port];
-      const EdgeStatistics& s = task->latch().statistics(e);
+  for (size_t t = 0; t < facts.plan.tasks.size(); ++t) {
+    const TaskPlan& task = facts.plan.tasks[t];
+    for (size_t e = 0; e < task.edges.size(); ++e) {
+      const PortPlan& port = facts.plan.ports[task.edges[e].port];
+      const EdgeStatistics& s = facts.board.edge(t, e);
       edges.push_back({{"from", port.node + "." + port.port},
-                       {"to", task->plan().name + "." + std::string(task->plan().node->inputs()[plan.input]->name())},
-                       {"sent", writer_of(facts.executor, plan.port)->statistics().sent},
+                       {"to", task.name + "." + std::string(task.node->inputs()[task.edges[e].input]->name())},
+                       {"sent", facts.board.port(task.edges[e].port).writer.sent},
                        {"received", s.received},
                        {"dropped", s.dropped},
                        {"stale", s.stale},
@@ -99,9 +109,9 @@ Json edges_json(const RunFacts& facts) {
 
 Json pools_json(const RunFacts& facts) {
   Json pools = Json::array();
-  for (size_t p = 0; p < facts.composition.plan.ports.size(); ++p) {
-    const PortPlan& port = facts.composition.plan.ports[p];
-    const WriterStatistics s = writer_of(facts.executor, p)->statistics();
+  for (size_t p = 0; p < facts.plan.ports.size(); ++p) {
+    const PortPlan& port = facts.plan.ports[p];
+    const WriterStatistics& s = facts.board.port(p).writer;
     pools.push_back({{"port", port.node + "." + port.port},
                      {"bytes", port.chunk_bytes()},
                      {"chunks", s.chunks},
@@ -112,13 +122,36 @@ Json pools_json(const RunFacts& facts) {
   return pools;
 }
 
+/// The jobs of the last whole second before the end.
+Json timeline_json(const RunFacts& facts) {
+  constexpr int64_t kSecond = 1'000'000'000;
+  const int64_t begin = std::max(facts.result.epoch_ns, facts.result.end_ns - kSecond);
+  const auto ms = [&](int64_t ns) { return static_cast<double>(ns - begin) / 1e6; };
+  Json timeline = Json::array();
+  for (size_t t = 0; t < facts.plan.tasks.size(); ++t) {
+    const TaskStatistics& s = facts.board.task(t);
+    const uint64_t count = s.job_count.load(), kept = std::min<uint64_t>(count, s.jobs.size());
+    for (uint64_t n = count - kept; n < count; ++n) {
+      const JobRecord& job = s.jobs[n % s.jobs.size()];
+      if (job.release_ns < begin || job.release_ns >= facts.result.end_ns) continue;
+      timeline.push_back({{"node", facts.plan.tasks[t].name},
+                          {"cpu", job.cpu},
+                          {"release_ms", ms(job.release_ns)},
+                          {"start_ms", ms(job.start_ns)},
+                          {"finish_ms", ms(job.finish_ns)}});
+    }
+  }
+  return timeline;
+}
+
 Json cpu_json(const RunFacts& facts) {
   int64_t nodes = 0, devices = 0;
-  for (const auto& task : facts.executor.tasks()) (task->plan().device ? devices : nodes) += task->statistics().cpu_ns;
-  const double total = static_cast<double>(facts.after.cpu_ns - facts.before.cpu_ns);
+  for (size_t t = 0; t < facts.plan.tasks.size(); ++t)
+    (facts.plan.tasks[t].device ? devices : nodes) += facts.board.task(t).cpu_ns;
+  const auto total = static_cast<double>(facts.use.cpu_ns);
   const double wall = std::max(1.0, facts.result.duration_s() * 1e9);
   const auto share = [&](double ns) { return ns / wall; };
-  const auto simulator = static_cast<double>(facts.simulator_cpu_ns);
+  const auto simulator = static_cast<double>(facts.use.simulator_cpu_ns);
   const double runtime = std::max(0.0, total - static_cast<double>(nodes + devices) - simulator);
   return {{"utilisation", share(total)},
           {"by",
@@ -130,13 +163,8 @@ Json cpu_json(const RunFacts& facts) {
 
 /// Age of what the node publishes on a port, at that instant; null if the mode leaves the node out.
 const Histogram* output_age(const RunFacts& facts, const graph::PortName& name) {
-  for (const auto& task : facts.executor.tasks()) {
-    const auto& ports = task->plan().ports;
-    for (size_t i = 0; i < ports.size(); ++i) {
-      const PortPlan& port = facts.composition.plan.ports[ports[i]];
-      if (port.node == name.node && port.port == name.port) return &task->statistics().output_age[i];
-    }
-  }
+  for (size_t p = 0; p < facts.plan.ports.size(); ++p)
+    if (facts.plan.ports[p].node == name.node && facts.plan.ports[p].port == name.port) return &facts.board.port(p).age;
   return nullptr;
 }
 
@@ -166,7 +194,7 @@ bool kept_its_promises(const Json& nodes) {
 
 Json make_report(const RunFacts& facts) {
   Json nodes = Json::array();
-  for (size_t t = 0; t < facts.executor.tasks().size(); ++t) nodes.push_back(node_json(facts, t));
+  for (size_t t = 0; t < facts.plan.tasks.size(); ++t) nodes.push_back(node_json(facts, t));
   Json report;
   report["graph"] = facts.graph.name;
   report["schedule"] = facts.graph.schedule.name;
@@ -180,17 +208,20 @@ Json make_report(const RunFacts& facts) {
   report["ok"] = kept_its_promises(nodes);
   report["modes"] = {facts.graph.mode};
   report["transport"] = facts.transport.name();
+  report["isolation"] = facts.isolation;
+  report["processes"] = facts.processes;
   report["nodes"] = std::move(nodes);
   report["edges"] = edges_json(facts);
   report["chains"] = chains_json(facts);
   report["memory"] = {{"shm_mb", static_cast<double>(facts.transport.shared_memory_bytes()) / 1e6},
-                      {"rss_mb", facts.after.rss_mb},
+                      {"rss_mb", facts.use.rss_mb},
                       {"pools", pools_json(facts)}};
   report["cpu"] = cpu_json(facts);
-  report["host_stall_ms"] = facts.after.steal_ms - facts.before.steal_ms;
+  report["host_stall_ms"] = facts.use.steal_ms;
   report["recorder_lost"] = 0;
   report["adjusted"] = facts.adjusted;
   report["faults"] = Json::array();
+  report["timeline"] = timeline_json(facts);
   return report;
 }
 

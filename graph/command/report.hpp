@@ -10,16 +10,22 @@
 
 namespace takt::command {
 
+/// What the run used of the machine, over all its processes.
+struct MachineUse {
+  int64_t cpu_ns = 0, simulator_cpu_ns = 0, steal_ms = 0;
+  double rss_mb = 0;
+};
+
 /// Everything a finished run can be reported from.
 struct RunFacts {
   const graph::GraphSpec& graph;
-  const graph::Composition& composition;
-  const Executor& executor;
+  const Plan& plan;
+  const RunBoard& board;
   const RunResult& result;
   const Transport& transport;
-  ProcessReading before, after;
-  int64_t simulator_cpu_ns = 0;
-  std::string clock, policy_asked;
+  MachineUse use;
+  std::string clock, policy_asked, isolation;
+  std::vector<std::string> processes;  ///< names, where there are several
   std::vector<std::string> adjusted;
 };
 

@@ -18,6 +18,8 @@ struct RunOptions {
   std::string clock = "real", transport = "local", isolate;
   std::filesystem::path report, output = "out";
   uint64_t seed = 1;
+  /// A policy named on the command line, or --require-rt: refused means exit 3, not another policy.
+  bool policy_required() const { return require_rt || !load.policy.empty(); }
 };
 
 /// `takt run`: loads, checks, composes, runs, reports. Returns the exit code.

@@ -7,6 +7,7 @@
 #include <map>
 
 #include "graph/compose/plan_ports.hpp"
+#include "hal/drivers.hpp"
 #include "rt/sched/port_access.hpp"
 
 namespace takt::graph {
@@ -35,23 +36,43 @@ class Composer {
     make_nodes();
     connect();
     if (auto ready = set_up(); !ready) return tl::make_unexpected(ready.error());
-    for (auto& port : result_.plan.ports) port.capacity = output_of(port).capacity();
-    size_ports(result_.plan);
-    result_.plan.policy = graph_.schedule.policy;
-    result_.plan.cores = graph_.schedule.cores;
-    result_.plan.mode = graph_.mode;
+    for (size_t p = 0; p < result_.plan.ports.size(); ++p) result_.plan.ports[p].capacity = capacity_of(p);
+    size_ports(result_.plan, options_.taps);
+    return std::move(result_);
+  }
+
+  Composition outline() {
+    for (const DeviceSpec& device : graph_.devices) add_device(device, hal::make_shell(device.kind));
+    make_nodes();
+    connect();
     return std::move(result_);
   }
 
  private:
   tl::expected<void, ComposeError> make_devices(const DeviceFactory& make_device) {
     for (const DeviceSpec& device : graph_.devices) {
+      if (!owns(device.id)) {
+        add_device(device, hal::make_shell(device.kind));
+        continue;
+      }
       auto node = make_device(device);
       if (!node) return tl::make_unexpected(node.error());
-      add(device.id, std::move(*node), true, device.position);
-      if (auto& task = result_.plan.tasks.back(); !task.rate && task.on_task == kNone) task.rate = device.rate;
+      add_device(device, std::move(*node));
     }
     return {};
+  }
+
+  void add_device(const DeviceSpec& device, std::unique_ptr<Node> node) {
+    add(device.id, std::move(node), true, device.position);
+    if (auto& task = result_.plan.tasks.back(); !task.rate && task.on_task == kNone) task.rate = device.rate;
+  }
+
+  bool owns(const std::string& id) const { return !options_.owns || options_.owns(id); }
+
+  /// Of an output of this process, or as its owner tells.
+  Capacity capacity_of(size_t port) {
+    const PortPlan& plan = result_.plan.ports[port];
+    return owns(plan.node) ? output_of(plan).capacity() : options_.exchange->wait_for(port);
   }
 
   void make_nodes() {
@@ -101,6 +122,10 @@ class Composer {
   }
 
   void connect() {
+    result_.plan.policy = graph_.schedule.policy;
+    result_.plan.cores = graph_.schedule.cores;
+    result_.plan.mode = graph_.mode;
+    for (const DeviceSpec& spec : graph_.devices) connect_inputs(result_.plan.tasks[task_index_.at(spec.id)], spec);
     for (const NodeSpec& spec : graph_.nodes) connect_inputs(result_.plan.tasks[task_index_.at(spec.id)], spec);
     for (auto& task : result_.plan.tasks) {
       const auto it = graph_.schedule.entries.find(task.name);
@@ -116,20 +141,24 @@ class Composer {
     }
   }
 
+  void connect_inputs(TaskPlan& task, const DeviceSpec& spec) { connect_edges(task, spec.edges); }
+
   void connect_inputs(TaskPlan& task, const NodeSpec& spec) {
-    for (const EdgeSpec& edge : spec.edges) {
+    connect_edges(task, spec.edges);
+    for (const auto& group : spec.joins) {
+      std::vector<size_t> inputs;
+      for (const std::string& name : group) inputs.push_back(index_of(task.node->inputs(), name));
+      task.joins.push_back(std::move(inputs));
+    }
+  }
+
+  void connect_edges(TaskPlan& task, const std::vector<EdgeSpec>& edges) {
+    for (const EdgeSpec& edge : edges) {
       const size_t input = index_of(task.node->inputs(), edge.input);
       const size_t port = port_index_.at(edge.from.text());
       task.edges.push_back({input, port, static_cast<uint32_t>(edge.depth), edge.max_age_ns.value_or(0)});
       OutputPort& output = output_of(result_.plan.ports[port]);
       PortAccess::mark_read(output);
-      result_.edge_names_from.push_back(edge.from.text());
-      result_.edge_names_to.push_back(spec.id + "." + edge.input);
-    }
-    for (const auto& group : spec.joins) {
-      std::vector<size_t> inputs;
-      for (const std::string& name : group) inputs.push_back(index_of(task.node->inputs(), name));
-      task.joins.push_back(std::move(inputs));
     }
   }
 
@@ -165,25 +194,37 @@ class Composer {
 
   tl::expected<void, ComposeError> set_up() {
     ComposeError error;
+    std::vector<char> done(result_.plan.tasks.size(), 0);
     for (const size_t t : setup_order()) {
-      TaskPlan& task = result_.plan.tasks[t];
-      for (const EdgePlan& edge : task.edges)
-        PortAccess::connect(*task.node->inputs()[edge.input], output_of(result_.plan.ports[edge.port]).capacity());
-      Setup setup{clock_, graph_.directory, options_.output, options_.seed + t, task.rate, task.offset_ns};
-      try {
-        task.node->setup(setup);
-      } catch (const std::exception& problem) {
-        error.problems.push_back({positions_[t], fmt::format("{}: {}", task.name, problem.what())});
-      }
+      if (owns(result_.plan.tasks[t].name)) set_up_node(t, done, error);
+      done[t] = 1;
     }
     if (!error.problems.empty()) return tl::make_unexpected(std::move(error));
     return {};
   }
 
+  void set_up_node(size_t t, const std::vector<char>& done, ComposeError& error) {
+    TaskPlan& task = result_.plan.tasks[t];
+    for (const EdgePlan& edge : task.edges) {
+      // In a cycle the producer may come later in the order: then its capacity is not known yet, here as elsewhere.
+      const bool known = done[task_index_.at(result_.plan.ports[edge.port].node)] != 0;
+      PortAccess::connect(*task.node->inputs()[edge.input], known ? capacity_of(edge.port) : Capacity{});
+    }
+    Setup setup{clock_, graph_.directory, options_.output, options_.seed + t, task.rate, task.offset_ns};
+    try {
+      task.node->setup(setup);
+    } catch (const std::exception& problem) {
+      error.problems.push_back({positions_[t], fmt::format("{}: {}", task.name, problem.what())});
+    }
+    for (ParamBase* param : task.node->params()) param->end_setup();
+    if (options_.exchange == nullptr) return;
+    for (const size_t port : task.ports) options_.exchange->tell(port, output_of(result_.plan.ports[port]).capacity());
+  }
+
   const GraphSpec& graph_;
   const NodeTypes& types_;
   const Clock& clock_;
-  const ComposeOptions& options_;
+  const ComposeOptions options_;
   Composition result_;
   PortIndex port_index_;
   std::map<std::string, size_t> task_index_;
@@ -191,6 +232,15 @@ class Composer {
 };
 
 }  // namespace
+
+Composition outline(const GraphSpec& graph, const NodeTypes& types, const Clock& clock) {
+  return Composer(graph, types, clock, {}).outline();
+}
+
+void complete(Plan& plan, CapacityExchange& exchange, uint32_t taps) {
+  for (size_t p = 0; p < plan.ports.size(); ++p) plan.ports[p].capacity = exchange.wait_for(p);
+  size_ports(plan, taps);
+}
 
 tl::expected<Composition, ComposeError> compose(const GraphSpec& graph, const NodeTypes& types,
                                                 const DeviceFactory& make_device, const Clock& clock,

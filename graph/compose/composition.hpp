@@ -20,21 +20,39 @@ struct ComposeError {
 /// Makes the hardware node of a device entry.
 using DeviceFactory = std::function<tl::expected<std::unique_ptr<Node>, ComposeError>(const DeviceSpec&)>;
 
+/// Where the processes of a run tell each other how large their outputs can become.
+class CapacityExchange {
+ public:
+  virtual ~CapacityExchange() = default;
+  virtual void tell(size_t port, const Capacity& capacity) = 0;
+  /// Waits for the process that owns the port. Throws std::runtime_error if that will never tell.
+  virtual Capacity wait_for(size_t port) = 0;
+};
+
 struct ComposeOptions {
   std::filesystem::path output;  ///< where nodes may write files at the end
   uint64_t seed = 1;
+  std::function<bool(const std::string& id)> owns = {};  ///< nodes and devices this process sets up; empty: all
+  CapacityExchange* exchange = nullptr;             ///< needed where not all are owned
+  uint32_t taps = 0;                                ///< readers beside the edges that an output may get while it runs
 };
 
 /// Nodes in the order of the plan's tasks; the plan points into them.
 struct Composition {
   std::vector<std::unique_ptr<Node>> nodes;
   Plan plan;
-  std::vector<std::string> edge_names_from, edge_names_to;  ///< per edge, in task and edge order
 };
 
+/// Every process of a run composes the same plan; what it does not own stays an empty shell with ports.
 tl::expected<Composition, ComposeError> compose(const GraphSpec& graph, const NodeTypes& types,
                                                 const DeviceFactory& make_device, const Clock& clock,
                                                 const ComposeOptions& options);
+
+/// The plan as far as it is known before any node is set up: tasks, edges, ports without capacities.
+Composition outline(const GraphSpec& graph, const NodeTypes& types, const Clock& clock);
+
+/// Adds to an outline what the owners of its outputs tell: capacities, hence pools.
+void complete(Plan& plan, CapacityExchange& exchange, uint32_t taps);
 
 /// All node types this build knows.
 NodeTypes node_types();

@@ -28,7 +28,11 @@ size_t producer_of(const Plan& plan, size_t port) {
 
 }  // namespace
 
-void size_ports(Plan& plan) {
+void size_ports(Plan& plan, uint32_t taps) {
+  for (PortPlan& port : plan.ports) {
+    port.held += taps;
+    port.readers += taps;
+  }
   // A join looks for equal stamps among outputs of different latency: keep as many messages as the slowest of them may
   // lag behind the fastest, here the longest deadline of any task.
   int64_t longest_deadline = 0;

@@ -81,9 +81,6 @@ void Loader::tell_what_is_not_enforced() {
     spec_.adjusted.push_back(
         fmt::format("{} of {}: {} -> continue: this version counts {} and goes on", key, id, verb, instead));
   };
-  if (spec_.isolation != "none")
-    spec_.adjusted.push_back("isolation: " + spec_.isolation +
-                             " -> none: this version runs all subsystems in one process");
   for (const auto& [id, entry] : spec_.schedule.entries) {
     if (entry.on_overrun != OnOverrun::proceed) tell(id, "on_overrun", to_string(entry.on_overrun), "overruns");
     if (entry.on_miss == OnMiss::safe_stop) tell(id, "on_miss", to_string(entry.on_miss), "misses");

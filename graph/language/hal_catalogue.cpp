@@ -1,37 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
 // The devices of hal/ as the loader sees them. Apart from the loader, so that its tests need no device.
 #include "graph/language/catalogue.hpp"
-#include "hal/base/base_node.hpp"
-#include "hal/camera/stereo_camera_node.hpp"
 #include "hal/drivers.hpp"
-#include "hal/gpio/lines_node.hpp"
-#include "hal/head/head_node.hpp"
-#include "hal/laser/laser_node.hpp"
 
 namespace takt::graph {
 namespace {
 
 using Kind = DeviceSetting::Kind;
 
-/// Ports of a hardware node, asked of the node itself; it holds no device and is never set up.
-template <class HardwareNode>
-std::vector<DevicePort> ports_of() {
-  const HardwareNode node(nullptr);
+/// Ports of a hardware node, asked of the node itself.
+std::vector<DevicePort> ports_of(std::string_view kind) {
+  const auto node = hal::make_shell(kind);
   std::vector<DevicePort> ports;
-  for (const auto* input : node.inputs())
+  for (const auto* input : node->inputs())
     ports.push_back({std::string(input->name()), &input->type(), true, std::string(input->doc())});
-  for (const auto* output : node.outputs())
+  for (const auto* output : node->outputs())
     ports.push_back({std::string(output->name()), &output->type(), false, std::string(output->doc())});
   return ports;
-}
-
-std::vector<DevicePort> ports_of(std::string_view kind) {
-  if (kind == "stereo_camera") return ports_of<StereoCameraNode>();
-  if (kind == "laser_scanner") return ports_of<LaserNode>();
-  if (kind == "camera_head") return ports_of<HeadNode>();
-  if (kind == "mobile_base") return ports_of<BaseNode>();
-  if (kind == "digital_lines") return ports_of<LinesNode>();
-  throw std::logic_error("device kind " + std::string(kind) + " has no node in graph/language/hal_catalogue.cpp");
 }
 
 DeviceSetting plain(const hal::SettingInfo& info) {

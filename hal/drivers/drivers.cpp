@@ -191,6 +191,15 @@ tl::expected<sim::Simulation*, DeviceError> Devices::world(const DeviceConfig& c
 
 sim::Simulation* Devices::first_world() { return worlds_.empty() ? nullptr : worlds_.begin()->second.get(); }
 
+std::unique_ptr<DeviceNode> make_shell(std::string_view kind) {
+  if (kind == "stereo_camera") return std::make_unique<StereoCameraNode>(nullptr);
+  if (kind == "laser_scanner") return std::make_unique<LaserNode>(nullptr);
+  if (kind == "camera_head") return std::make_unique<HeadNode>(nullptr);
+  if (kind == "mobile_base") return std::make_unique<BaseNode>(nullptr);
+  if (kind == "digital_lines") return std::make_unique<LinesNode>(nullptr);
+  throw std::logic_error("device kind " + std::string(kind) + " has no node in hal/drivers/drivers.cpp");
+}
+
 NodeResult make_device(const DeviceConfig& config, Devices& devices, const Clock& clock) {
   const auto kinds = device_kinds();
   const auto kind =

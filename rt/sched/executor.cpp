@@ -36,62 +36,84 @@ void add_refusal(const std::string& lane, const std::string& reason, std::vector
 }  // namespace
 
 Executor::Executor(const Plan& plan, Transport& transport, Clock& clock, const Options& options)
-    : plan_(plan), clock_(clock), options_(options) {
-  for (const TaskPlan& task : plan_.tasks) tasks_.push_back(std::make_unique<Task>(task, transport, clock, plan_.mode));
-  lanes_ = make_lanes(tasks_);
+    : plan_(plan),
+      clock_(clock),
+      options_(options),
+      own_board_(options.board == nullptr ? std::make_unique<RunBoard>(plan) : nullptr),
+      board_(options.board == nullptr ? *own_board_ : *options.board),
+      stop_(board_.stop()),
+      tasks_(plan.tasks.size()) {
+  const auto own = [&](size_t t) { return options_.own.empty() || options_.own[t]; };
+  for (size_t t = 0; t < plan_.tasks.size(); ++t)
+    if (own(t)) tasks_[t] = std::make_unique<Task>(plan_, t, transport, clock, board_);
+  for (const auto& members : lane_members(plan_))
+    if (own(members.front())) lanes_.push_back(std::make_unique<Lane>(members, tasks_));
 }
 
 Executor::~Executor() = default;
 
 RunResult Executor::run() {
   RunResult result;
-  result.grants.resize(tasks_.size());
   if (clock_.is_virtual()) {
     run_virtual(result);
   } else if (plan_.policy == Policy::cooperative || !run_partitioned(plan_.policy, result)) {
     if (!result.refused.empty() && options_.require_policy) throw PolicyRefused(result.refused.front());
-    result.grants.assign(tasks_.size(), apply(Reservation{}));
+    for (const auto& lane : lanes_) set_grants(*lane, apply(Reservation{}));
     start_clockwork(result);
     run_cooperative();
   }
   result.end_ns = stop_.end_ns();
-  // Followers count their own releases.
-  for (const auto& task : tasks_)
-    if (task->plan().rate) task->forget_from(result.end_ns);
-  count_released(result);
+  for (const auto& task : tasks_) {
+    if (!task) continue;
+    if (task->plan().rate) task->forget_from(result.end_ns);  // followers count their own releases
+    task->settle();
+  }
+  result.released = released_jobs(plan_, board_, result.epoch_ns, result.end_ns);
   return result;
 }
 
+void Executor::set_grants(const Lane& lane, const Grant& grant) {
+  for (const size_t member : lane.members()) board_.set_grant(member, grant);
+}
+
 void Executor::start_clockwork(RunResult& result) {
-  result.epoch_ns = clock_.now_ns() + (clock_.is_virtual() ? 0 : options_.start_delay_ns);
+  result.epoch_ns = options_.gate != nullptr ? options_.gate->epoch_ns()
+                                             : clock_.now_ns() + (clock_.is_virtual() ? 0 : options_.start_delay_ns);
   if (options_.duration_ns > 0) stop_.set_planned_end(result.epoch_ns + options_.duration_ns);
   for (auto& lane : lanes_) lane->set_epoch(result.epoch_ns);
-  for (const TaskPlan& task : plan_.tasks) task.node->start(result.epoch_ns);
+  for (const auto& task : tasks_)
+    if (task) task->plan().node->start(result.epoch_ns);
 }
 
 std::vector<Reservation> Executor::reservations(Policy policy) const {
-  std::vector<Reservation> wanted(lanes_.size());
-  std::vector<size_t> order(lanes_.size());
+  // Over all lanes of the plan, so that every process of a run comes to the same assignment.
+  const std::vector<std::vector<size_t>> lanes = lane_members(plan_);
+  std::vector<Reservation> wanted(lanes.size()), own;
+  std::vector<size_t> order(lanes.size());
   std::iota(order.begin(), order.end(), size_t{0});
   // Deadline monotonic: the shorter the span, the higher the priority.
   std::stable_sort(order.begin(), order.end(),
-                   [&](size_t a, size_t b) { return lanes_[a]->span_ns() < lanes_[b]->span_ns(); });
+                   [&](size_t a, size_t b) { return lane_span_ns(plan_, lanes[a]) < lane_span_ns(plan_, lanes[b]); });
   std::vector<double> load(std::max<size_t>(plan_.cores.size(), 1), 0.0);
   for (size_t rank = 0; rank < order.size(); ++rank) {
-    const Lane& lane = *lanes_[order[rank]];
+    const std::vector<size_t>& lane = lanes[order[rank]];
+    const Rate& rate = *plan_.tasks[lane.front()].rate;
+    const int64_t budget_ns = lane_budget_ns(plan_, lane);
     Reservation& r = wanted[order[rank]];
     if (policy == Policy::deadline) {
-      r = deadline_reservation(lane.budget_ns(), lane.span_ns(), lane.rate().period_ns());
+      r = deadline_reservation(budget_ns, lane_span_ns(plan_, lane), rate.period_ns());
       continue;
     }
     r.policy = policy;
     r.priority = std::max(1, kHighestPriority - static_cast<int>(rank));
     // Worst fit: the next lane goes to the core with the least work so far.
     const auto core = static_cast<size_t>(std::min_element(load.begin(), load.end()) - load.begin());
-    load[core] += static_cast<double>(lane.budget_ns()) * lane.rate().hz();
+    load[core] += static_cast<double>(budget_ns) * rate.hz();
     r.core = plan_.cores.empty() ? -1 : plan_.cores[core];
   }
-  return wanted;
+  for (size_t i = 0; i < lanes.size(); ++i)
+    if (tasks_[lanes[i].front()]) own.push_back(wanted[i]);
+  return own;
 }
 
 bool Executor::run_partitioned(Policy policy, RunResult& result) {
@@ -118,11 +140,9 @@ bool Executor::run_partitioned(Policy policy, RunResult& result) {
     });
   }
   ready.arrive_and_wait();
-  for (size_t i = 0; i < lanes_.size(); ++i) {
-    if (!grants[i].refused.empty()) add_refusal(lanes_[i]->head().plan().name, grants[i].refused, result.refused);
-    for (const size_t member : lanes_[i]->members()) result.grants[member] = grants[i];
-  }
-  go.store(result.refused.empty());
+  for (size_t i = 0; i < lanes_.size(); ++i) set_grants(*lanes_[i], grants[i]);
+  result.refused = refusals(plan_, board_);
+  go.store(options_.gate != nullptr ? options_.gate->all_granted(result.refused.empty()) : result.refused.empty());
   if (go.load()) {
     result.policy_granted = policy;
     start_clockwork(result);
@@ -180,13 +200,27 @@ void Executor::run_virtual(RunResult& result) {
   }
 }
 
-void Executor::count_released(RunResult& result) const {
-  for (const auto& task : tasks_) {
-    const TaskPlan& plan = task->plan();
-    result.released.push_back(
-        plan.rate ? static_cast<uint64_t>(plan.rate->releases_before(result.epoch_ns + plan.offset_ns, result.end_ns))
-                  : task->statistics().released.load());
+std::vector<uint64_t> released_jobs(const Plan& plan, const RunBoard& board, int64_t epoch_ns, int64_t end_ns) {
+  std::vector<uint64_t> released;
+  for (size_t t = 0; t < plan.tasks.size(); ++t) {
+    const TaskPlan& task = plan.tasks[t];
+    if (!task.rate) {
+      released.push_back(board.task(t).released.load() - board.task(t).paused.load());
+      continue;
+    }
+    const auto planned = static_cast<uint64_t>(task.rate->releases_before(epoch_ns + task.offset_ns, end_ns));
+    released.push_back(planned - std::min(planned, board.task(t).paused.load()));
   }
+  return released;
+}
+
+std::vector<std::string> refusals(const Plan& plan, const RunBoard& board) {
+  std::vector<std::string> lines;
+  for (const auto& members : lane_members(plan)) {
+    const Grant grant = board.grant(members.front());
+    if (!grant.refused.empty()) add_refusal(plan.tasks[members.front()].name, grant.refused, lines);
+  }
+  return lines;
 }
 
 }  // namespace takt

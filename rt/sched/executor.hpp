@@ -8,29 +8,48 @@
 
 #include "rt/sched/grant.hpp"
 #include "rt/sched/lane.hpp"
-#include "rt/sched/stop_signal.hpp"
+#include "rt/sched/run_board.hpp"
 
 namespace takt {
 
 /// The outcome of a run, for the report.
 struct RunResult {
-  int64_t epoch_ns = 0, end_ns = 0;  ///< planned releases lie in [epoch, end)
+  int64_t epoch_ns = 0, end_ns = 0;             ///< planned releases lie in [epoch, end)
   Policy policy_granted = Policy::cooperative;  ///< also in virtual time, which asks the kernel for nothing
-  std::vector<Grant> grants;         ///< per task
-  std::vector<uint64_t> released;    ///< per task; computed from rate and window for those with a rate
-  std::vector<std::string> refused;  ///< what the kernel refused, with the fix
+  std::vector<uint64_t> released;               ///< per task, see released_jobs()
+  std::vector<std::string> refused;             ///< what the kernel refused, with the fix
   /// 0 if it was stopped before it began.
   double duration_s() const { return end_ns > epoch_ns ? static_cast<double>(end_ns - epoch_ns) / 1e9 : 0; }
 };
 
-/// Runs a plan: makes the tasks with their edges, groups them into lanes, keeps the releases. The nodes of the plan are
-/// set up already and outlive the executor.
+/// Planned releases of every task in [epoch, end) while requests let it run; of `on` tasks, their activations. Computed
+/// from rate and window, outside the executor.
+std::vector<uint64_t> released_jobs(const Plan& plan, const RunBoard& board, int64_t epoch_ns, int64_t end_ns);
+
+/// One line per reason for which the policy was refused, whichever lanes it hit.
+std::vector<std::string> refusals(const Plan& plan, const RunBoard& board);
+
+/// Where the processes of one run agree before they start. A run in one process needs none.
+class StartGate {
+ public:
+  virtual ~StartGate() = default;
+  /// Says whether this process got its policy and waits for the others; true if all of them did.
+  virtual bool all_granted(bool mine) = 0;
+  /// Waits for the instant at which all of them start.
+  virtual int64_t epoch_ns() = 0;
+};
+
+/// Runs a plan, or the part of it that this process owns: makes the tasks with their edges, groups them into lanes,
+/// keeps the releases. The nodes it runs are set up already and outlive the executor.
 class Executor {
  public:
   struct Options {
     int64_t duration_ns = 0;              ///< 0: until stop() or the end of the data
     int64_t start_delay_ns = 50'000'000;  ///< from run() to the epoch
     bool require_policy = false;          ///< a refused policy ends the run instead of falling back to cooperative
+    RunBoard* board = nullptr;            ///< shared with other processes; null: one of its own
+    StartGate* gate = nullptr;            ///< where other processes are waited for
+    std::vector<bool> own = {};              ///< by task: this process runs it; empty: all
   };
 
   Executor(const Plan& plan, Transport& transport, Clock& clock, const Options& options);
@@ -41,23 +60,27 @@ class Executor {
   RunResult run();
   /// Ends the run cleanly: no release after this instant. Any thread, also a signal handler.
   void stop() { stop_.raise(clock_.now_ns()); }
+  /// By index into the plan's tasks; null where another process runs it.
   const std::vector<std::unique_ptr<Task>>& tasks() const { return tasks_; }
   const Plan& plan() const { return plan_; }
+  const RunBoard& board() const { return board_; }
 
  private:
   bool run_partitioned(Policy policy, RunResult& result);
   std::vector<Reservation> reservations(Policy policy) const;
+  void set_grants(const Lane& lane, const Grant& grant);
   void start_clockwork(RunResult& result);
   void run_cooperative();
   void run_virtual(RunResult& result);
-  void count_released(RunResult& result) const;
 
   const Plan plan_;
   Clock& clock_;
   const Options options_;
+  std::unique_ptr<RunBoard> own_board_;
+  RunBoard& board_;
+  StopSignal& stop_;
   std::vector<std::unique_ptr<Task>> tasks_;
   std::vector<std::unique_ptr<Lane>> lanes_;
-  StopSignal stop_;
 };
 
 struct PolicyRefused : std::runtime_error {

@@ -1,16 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <array>
 #include <cstddef>
 #include <cstdint>
-#include <vector>
-
 namespace takt {
 
 /// Distribution of durations in ns, for runs of any length in fixed memory: buckets 1/128 of an octave wide (figures
-/// are right to 0.8 %), count and maximum exact. Nothing is ever dropped. Negative values count as 0. One writer.
+/// are right to 0.8 %), count and maximum exact. Nothing is ever dropped. Negative values count as 0. One writer. Plain
+/// data: may lie in shared memory.
 class Histogram {
  public:
-  Histogram() : buckets_(kBuckets) {}
   void add(int64_t ns);
   void merge(const Histogram& other);
   uint64_t count() const { return count_; }
@@ -18,6 +17,12 @@ class Histogram {
   int64_t sum_ns() const { return sum_; }
   /// Smallest value that at least `fraction` (0..1) of the samples do not exceed; 0 without samples.
   int64_t quantile_ns(double fraction) const;
+  /// Calls visit(upper edge in ns, samples) for every bucket that is not empty, in ascending order.
+  template <class Visitor>
+  void for_each(const Visitor& visit) const {
+    for (size_t i = 0; i < buckets_.size(); ++i)
+      if (buckets_[i] > 0) visit(upper_edge(i), buckets_[i]);
+  }
 
  private:
   static constexpr int kSubBits = 7;
@@ -25,7 +30,7 @@ class Histogram {
   static size_t bucket_of(uint64_t value);
   static int64_t upper_edge(size_t bucket);
 
-  std::vector<uint64_t> buckets_;
+  std::array<uint64_t, kBuckets> buckets_{};
   uint64_t count_ = 0;
   int64_t max_ = 0, sum_ = 0;
 };

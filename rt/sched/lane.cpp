@@ -79,25 +79,29 @@ void Lane::run_follower_modelled(const Activation& activation, std::vector<Activ
   }
 }
 
-int64_t Lane::budget_ns() const {
+int64_t lane_budget_ns(const Plan& plan, const std::vector<size_t>& members) {
   int64_t sum = 0;
-  for (const Task* task : tasks_)
-    sum += task->plan().budget_ns > 0 ? task->plan().budget_ns : task->plan().deadline_ns / 4;
+  for (const size_t t : members) {
+    const TaskPlan& task = plan.tasks[t];
+    sum += task.budget_ns > 0 ? task.budget_ns : task.deadline_ns / 4;
+  }
   return sum;
 }
 
-int64_t Lane::span_ns() const {
-  if (tasks_.size() == 1) return head().plan().deadline_ns;
+int64_t lane_span_ns(const Plan& plan, const std::vector<size_t>& members) {
+  const TaskPlan& head = plan.tasks[members.front()];
+  if (members.size() == 1) return head.deadline_ns;
   int64_t sum = 0;
-  for (const Task* task : tasks_) sum += task->plan().deadline_ns;
-  return std::min(sum, rate().period_ns());
+  for (const size_t t : members) sum += plan.tasks[t].deadline_ns;
+  return std::min(sum, head.rate->period_ns());
 }
 
-std::vector<std::unique_ptr<Lane>> make_lanes(const std::vector<std::unique_ptr<Task>>& tasks) {
+std::vector<std::vector<size_t>> lane_members(const Plan& plan) {
+  const std::vector<TaskPlan>& tasks = plan.tasks;
   std::vector<std::vector<size_t>> lanes;
   std::vector<size_t> lane_of(tasks.size(), kNone);
   for (size_t i = 0; i < tasks.size(); ++i) {
-    if (!tasks[i]->plan().rate) continue;
+    if (!tasks[i].rate) continue;
     lane_of[i] = lanes.size();
     lanes.push_back({i});
   }
@@ -105,7 +109,7 @@ std::vector<std::unique_ptr<Lane>> make_lanes(const std::vector<std::unique_ptr<
   for (bool progress = true; progress;) {
     progress = false;
     for (size_t i = 0; i < tasks.size(); ++i) {
-      const size_t producer = tasks[i]->plan().on_task;
+      const size_t producer = tasks[i].on_task;
       if (lane_of[i] != kNone || producer == kNone || lane_of[producer] == kNone) continue;
       lane_of[i] = lane_of[producer];
       lanes[lane_of[i]].push_back(i);
@@ -114,9 +118,7 @@ std::vector<std::unique_ptr<Lane>> make_lanes(const std::vector<std::unique_ptr<
   }
   if (std::find(lane_of.begin(), lane_of.end(), kNone) != lane_of.end())
     throw std::logic_error("a task has neither a rate nor a producer with one");
-  std::vector<std::unique_ptr<Lane>> result;
-  for (auto& members : lanes) result.push_back(std::make_unique<Lane>(std::move(members), tasks));
-  return result;
+  return lanes;
 }
 
 }  // namespace takt

@@ -36,9 +36,6 @@ class Lane {
 
   Task& head() const { return *tasks_.front(); }
   const std::vector<size_t>& members() const { return members_; }
-  int64_t budget_ns() const;
-  /// Longest time from the head's release to the last follower's deadline.
-  int64_t span_ns() const;
   const Rate& rate() const { return *head().plan().rate; }
 
  private:
@@ -65,7 +62,12 @@ class Lane {
   int64_t next_ = 0, next_release_ns_ = 0;
 };
 
-/// Groups tasks into lanes: each task with a rate heads one, each `on` task joins its producer's.
-std::vector<std::unique_ptr<Lane>> make_lanes(const std::vector<std::unique_ptr<Task>>& tasks);
+/// Groups tasks into lanes: each task with a rate heads one, each `on` task joins its producer's. Indexes into the
+/// plan's tasks, heads first, followers after their producers.
+std::vector<std::vector<size_t>> lane_members(const Plan& plan);
+/// CPU time that one pass of a lane may use.
+int64_t lane_budget_ns(const Plan& plan, const std::vector<size_t>& members);
+/// Longest time from the head's release to the last follower's deadline.
+int64_t lane_span_ns(const Plan& plan, const std::vector<size_t>& members);
 
 }  // namespace takt

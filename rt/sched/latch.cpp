@@ -12,12 +12,14 @@ namespace {
 using Candidates = std::array<Candidate, InputPort::kMaxDepth>;
 }
 
-Latch::Latch(const TaskPlan& plan, Transport& transport) {
+Latch::Latch(const TaskPlan& plan, Transport& transport, RunBoard& board, size_t task) {
   for (const EdgePlan& edge : plan.edges) {
     Edge& e = edges_.emplace_back();
     e.plan = edge;
     e.input = plan.node->inputs()[edge.input];
     e.reader = transport.make_reader(edge.port);
+    e.requests = e.input == plan.node->control();
+    e.statistics = &board.edge(task, edges_.size() - 1);
   }
   for (const auto& group : plan.joins) {
     std::vector<size_t> members;
@@ -32,10 +34,16 @@ Latch::Latch(const TaskPlan& plan, Transport& transport) {
   }
 }
 
+void Latch::acquire_requests(int64_t release_ns, int64_t now_ns) {
+  for (Edge& edge : edges_) {
+    if (edge.requests) acquire_newest(edge, release_ns, now_ns);
+  }
+}
+
 size_t Latch::acquire(int64_t release_ns, int64_t now_ns) {
   stale_count_ = 0;
   for (Edge& edge : edges_) {
-    if (!edge.joined) acquire_newest(edge, release_ns, now_ns);
+    if (!edge.joined && !edge.requests) acquire_newest(edge, release_ns, now_ns);
   }
   for (const auto& group : joins_) acquire_join(group, release_ns, now_ns);
   return stale_count_;
@@ -94,16 +102,16 @@ bool Latch::take_set(const std::vector<size_t>& group, int64_t stamp_ns, int64_t
 void Latch::account(Edge& edge, size_t count, bool stale, int64_t now_ns) {
   PortAccess::set_held(*edge.input, count, stale, edge.last_seen);
   if (stale) {
-    ++edge.statistics.stale;
+    ++edge.statistics->stale;
     ++stale_count_;
   }
   if (count == 0) return;
   const auto& held = PortAccess::held(*edge.input);
-  edge.statistics.age.add(now_ns - held[count - 1].stamp_ns);
+  edge.statistics->age.add(now_ns - held[count - 1].stamp_ns);
   for (size_t i = 0; i < count; ++i) {
     if (held[i].sequence <= edge.last_seen) continue;
-    edge.statistics.dropped += held[i].sequence - edge.last_seen - 1;
-    ++edge.statistics.received;
+    edge.statistics->dropped += held[i].sequence - edge.last_seen - 1;
+    ++edge.statistics->received;
     edge.last_seen = held[i].sequence;
   }
 }

@@ -3,29 +3,26 @@
 #include <memory>
 #include <vector>
 
-#include "rt/sched/histogram.hpp"
-#include "rt/sched/plan.hpp"
+#include "rt/sched/run_board.hpp"
 
 namespace takt {
 
 class InputPort;
 
-/// What one edge carried. Every message sent is received, superseded before a job latched it (dropped), or waiting.
-struct EdgeStatistics {
-  uint64_t received = 0, dropped = 0, stale = 0;
-  Histogram age;  ///< stamp to job start, of the newest latched message
-};
-
 /// The latch rule: per input the newest messages with visible_at <= release, or the newest set with equal stamps of a
 /// join. Belongs to one task; one thread at a time.
 class Latch {
  public:
-  Latch(const TaskPlan& plan, Transport& transport);
-  /// Fills the node's inputs for a job released at `release_ns` that starts at `now_ns`; returns how many are stale.
+  /// Counts into the board's edges of task `task`.
+  Latch(const TaskPlan& plan, Transport& transport, RunBoard& board, size_t task);
+  /// Fills only the input `control`, where there is one: what decides whether a job takes place at all.
+  void acquire_requests(int64_t release_ns, int64_t now_ns);
+  /// Fills the node's other inputs for a job released at `release_ns` that starts at `now_ns`; returns how many are
+  /// stale.
   size_t acquire(int64_t release_ns, int64_t now_ns);
-  /// Empties them again.
+  /// Empties all of them again.
   void release();
-  const EdgeStatistics& statistics(size_t edge) const { return edges_[edge].statistics; }
+  const EdgeStatistics& statistics(size_t edge) const { return *edges_[edge].statistics; }
 
  private:
   struct Edge {
@@ -33,8 +30,8 @@ class Latch {
     InputPort* input = nullptr;
     std::unique_ptr<Reader> reader;
     uint64_t last_seen = 0;
-    bool joined = false;
-    EdgeStatistics statistics;
+    bool joined = false, requests = false;
+    EdgeStatistics* statistics = nullptr;
   };
 
   void acquire_newest(Edge& edge, int64_t release_ns, int64_t now_ns);

@@ -1,8 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "rt/sched/task.hpp"
 
-#include <algorithm>
+#include <sched.h>
 
+#include <algorithm>
+#include <cstring>
+
+#include "rt/memory/memory_use.hpp"
+#include "rt/sched/param_mail.hpp"
 #include "rt/sched/port_access.hpp"
 
 namespace takt {
@@ -25,17 +30,47 @@ double TaskStatistics::drift_us() const {
   return static_cast<double>(late - early) / 1e3;
 }
 
-Task::Task(const TaskPlan& plan, Transport& transport, const Clock& clock, std::string mode)
-    : plan_(plan), clock_(clock), mode_(std::move(mode)), latch_(plan, transport), published_(plan.ports.size()) {
-  statistics_.output_age.resize(plan_.ports.size());
+Task::Task(const Plan& plan, size_t index, Transport& transport, const Clock& clock, RunBoard& board)
+    : plan_(plan.tasks[index]),
+      clock_(clock),
+      mode_(plan.mode),
+      board_(board),
+      index_(index),
+      statistics_(board.task(index)),
+      latch_(plan_, transport, board, index),
+      published_(plan_.ports.size()) {
   for (size_t i = 0; i < plan_.ports.size(); ++i) {
     writers_.push_back(transport.make_writer(plan_.ports[i]));
     PortAccess::attach(*plan_.node->outputs()[i], writers_.back().get());
   }
+  size_t first = kNone;
+  for (const EdgePlan& edge : plan_.edges)
+    if (plan_.node->inputs()[edge.input] != plan_.node->control()) first = std::min(first, edge.input);
+  if (first != kNone) first_input_ = plan_.node->inputs()[first];
 }
 
 Task::~Task() {
   for (OutputPort* output : plan_.node->outputs()) PortAccess::attach(*output, nullptr);
+}
+
+void Task::settle() {
+  for (size_t i = 0; i < writers_.size(); ++i) board_.port(plan_.ports[i]).writer = writers_[i]->statistics();
+}
+
+bool Task::wanted(uint64_t index) const {
+  const Requests* requests = plan_.node->control() != nullptr ? plan_.node->control()->newest() : nullptr;
+  if (requests == nullptr) return true;
+  for (const Request& request : requests->wanted.items()) {
+    if (std::strncmp(request.node, plan_.name.c_str(), sizeof request.node) != 0) continue;
+    return request.run != 0 && (request.every <= 1 || index % request.every == 0);
+  }
+  return true;
+}
+
+void Task::take_mail() {
+  ParamMail& mail = board_.mail(index_);
+  if (mail.state.load(std::memory_order_acquire) != ParamMail::posted) return;
+  deliver(mail, *plan_.node);
 }
 
 JobEnd Task::run(uint64_t index, int64_t release_ns, int64_t modelled_ns) {
@@ -43,8 +78,19 @@ JobEnd Task::run(uint64_t index, int64_t release_ns, int64_t modelled_ns) {
   const int64_t started = clock_.now_ns();
   const int64_t deadline = release_ns + plan_.deadline_ns;
 
+  take_mail();
+  latch_.acquire_requests(release_ns, started);
+  if (!wanted(index)) {
+    latch_.release();
+    std::fill(published_.begin(), published_.end(), false);
+    count(statistics_.paused);
+    outcomes_[outcome_count_++ % outcomes_.size()] = {release_ns, &statistics_.paused, false};
+    JobEnd end;
+    end.finished_ns = end.visible_at_ns = started;
+    return end;
+  }
   count(statistics_.stale_inputs, latch_.acquire(release_ns, started));
-  if (!plan_.edges.empty() && plan_.node->inputs()[plan_.edges.front().input]->is_new()) count(statistics_.new_inputs);
+  if (first_input_ != nullptr && first_input_->is_new()) count(statistics_.new_inputs);
   Job job(clock_, index, release_ns, deadline, 0, mode_);
   plan_.node->run(job);
 
@@ -53,19 +99,26 @@ JobEnd Task::run(uint64_t index, int64_t release_ns, int64_t modelled_ns) {
   end.finished_ns = modelled ? std::max(started, release_ns) + modelled_ns : clock_.now_ns();
   publish(end, deadline, modelled);
   latch_.release();
+  record(end, job, started, modelled);
+  return end;
+}
+
+void Task::record(const JobEnd& end, const Job& job, int64_t started_ns, bool modelled) {
   const ThreadUse used = take_thread_use();
   statistics_.cpu_ns += used.cpu_ns;
   statistics_.allocations += used.memory.allocations;
   statistics_.page_faults += used.memory.page_faults;
-  if (!end.end_of_data) {
-    statistics_.add_lateness(started - release_ns);
-    statistics_.exec.add(used.cpu_ns);
-    statistics_.last_exec_ns.store(used.cpu_ns, std::memory_order_relaxed);
-    statistics_.preempted_ns += modelled ? 0 : std::max<int64_t>(0, end.finished_ns - started - used.cpu_ns);
-    if (plan_.budget_ns > 0 && used.cpu_ns > plan_.budget_ns) count(statistics_.budget_overruns);
-    if (job.without_result()) count(statistics_.no_result);
-  }
-  return end;
+  if (end.end_of_data) return;
+  statistics_.add_lateness(started_ns - job.release_ns());
+  statistics_.exec.add(used.cpu_ns);
+  statistics_.last_exec_ns.store(used.cpu_ns, std::memory_order_relaxed);
+  statistics_.preempted_ns += modelled ? 0 : std::max<int64_t>(0, end.finished_ns - started_ns - used.cpu_ns);
+  if (plan_.budget_ns > 0 && used.cpu_ns > plan_.budget_ns) count(statistics_.budget_overruns);
+  if (job.without_result()) count(statistics_.no_result);
+  const uint64_t n = statistics_.job_count.load(std::memory_order_relaxed);
+  statistics_.jobs[n % statistics_.jobs.size()] = {job.release_ns(), started_ns, end.finished_ns,
+                                                   modelled ? 0 : sched_getcpu()};
+  statistics_.job_count.store(n + 1, std::memory_order_release);
 }
 
 void Task::publish(JobEnd& end, int64_t deadline_ns, bool modelled) {
@@ -103,7 +156,7 @@ void Task::settle_output(size_t i, bool late, int64_t now_ns, int64_t visible_at
   if (PortAccess::sent(output) && !withheld) {
     writer.publish(PortAccess::stamp_ns(output), now_ns, visible_at_ns);
     published_[i] = true;
-    statistics_.output_age[i].add(now_ns - PortAccess::stamp_ns(output));
+    board_.port(plan_.ports[i]).age.add(now_ns - PortAccess::stamp_ns(output));
   } else {
     writer.discard();
     if (withheld && plan_.on_miss == OnMiss::reuse_last) published_[i] = writer.repeat(now_ns, visible_at_ns);

@@ -131,13 +131,11 @@ TEST_CASE("A mode leaves out the nodes and devices it names") {
 }
 
 TEST_CASE("What this version does not enforce is told") {
-  const std::string graph = with(kGraph, "default_profile: sim", "default_profile: sim\nisolation: subsystem");
-  const Loaded loaded = Files(graph, with(kSchedule, "on_overrun: degrade", "on_overrun: safe_stop")).load();
+  const Loaded loaded = Files(kGraph, with(kSchedule, "on_overrun: degrade", "on_overrun: safe_stop")).load();
   INFO(all(loaded));
   REQUIRE(loaded.graph);
-  REQUIRE(loaded.graph->adjusted.size() == 2);
-  CHECK(loaded.graph->adjusted[0].find("isolation: subsystem -> none") == 0);
-  CHECK(loaded.graph->adjusted[1].find("on_overrun of stereo: safe_stop -> continue") == 0);
+  REQUIRE(loaded.graph->adjusted.size() == 1);
+  CHECK(loaded.graph->adjusted[0].find("on_overrun of stereo: safe_stop -> continue") == 0);
 }
 
 TEST_CASE("A cycle of sampled edges is no error") {

@@ -1,0 +1,232 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "graph/command/isolated_run.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <cstring>
+
+#include "graph/check/check.hpp"
+#include "graph/command/live_table.hpp"
+#include "graph/command/member_process.hpp"
+#include "graph/command/prepare.hpp"
+#include "graph/command/report.hpp"
+#include "graph/command/run_support.hpp"
+#include "rt/sched/executor.hpp"
+#include "rt/shm/iceoryx_preflight.hpp"
+#include "rt/shm/transport_error.hpp"
+#include "rt/supervise/private_mounts.hpp"
+#include "rt/supervise/process_group.hpp"
+
+namespace takt::command {
+namespace {
+
+constexpr int64_t kStartDelayNs = 100'000'000;  // devices start between the agreement and the epoch
+constexpr int64_t kPatienceNs = 3'000'000'000;  // for the processes to end after the stop
+
+/// Ends the run with an exit code before it began.
+struct Refused {
+  int code;
+};
+
+/// A place for an iceoryx daemon, if need be a private one. Throws TransportError.
+void find_room_for_daemon(std::vector<std::string>& adjusted) {
+  try {
+    iceoryx_preflight(IceoryxPlaces::of_this_machine(), 0);
+  } catch (const TransportError& taken) {
+    const std::string refused = enter_private_mounts();
+    if (!refused.empty()) throw TransportError(fmt::format("{} ({} was refused)", taken.what(), refused));
+    iceoryx_preflight(IceoryxPlaces::of_this_machine(), 0);
+    adjusted.push_back("/tmp and /dev/shm -> private ones: another iceoryx daemon is running on this machine");
+  }
+}
+
+class IsolatedRun {
+ public:
+  IsolatedRun(const RunOptions& options, const graph::GraphSpec& graph, std::vector<std::string> adjusted)
+      : options_(options),
+        graph_(graph),
+        adjusted_(std::move(adjusted)),
+        plan_source_(graph::outline(graph, graph::node_types(), clock_)),
+        plan_(plan_source_.plan),
+        partition_(graph::partition(graph, adjusted_)),
+        board_(plan_, partition_.names.size()),
+        stoppable_(board_) {}
+
+  int run() {
+    limit_cores(plan_.cores, adjusted_);
+    for (size_t p = 0; p < partition_.names.size(); ++p)
+      group_.start(partition_.names[p], [this, p, supervisor = getpid()] {
+        return run_member(options_, graph_, partition_, p, supervisor, board_);
+      });
+    wait_for_all(ProcessRecord::composed);
+    if (StopOnSignal::asked()) {
+      std::fputs("takt: stopped before the run began\n", stderr);
+      return kOk;
+    }
+    BoardExchange exchange(board_);
+    graph::complete(plan_, exchange, 1);
+    admit();
+    const CpuLatencyHold latency = hold_cpu_dma_latency();
+    tell_lacks(latency);
+    const auto transport = make_iceoryx_transport(plan_.ports);
+    board_.transport_up().store(true);
+    agree_on_policy();
+    wait_for_all(ProcessRecord::running);
+    const int64_t steal_before_ms = ProcessReading::now().steal_ms, cpu_before_ns = ProcessReading::now().cpu_ns;
+    start();
+    {
+      const LiveTable live(plan_, board_,
+                           fmt::format("takt run {} ({}, policy {}, {} processes)", graph_.name, graph_.profile,
+                                       to_string(plan_.policy), group_.size()));
+      watch();
+    }
+    MachineUse use = use_of_all();
+    use.steal_ms -= steal_before_ms;
+    use.cpu_ns -= cpu_before_ns;
+    return report(*transport, use);
+  }
+
+ private:
+  /// Waits until every process has come that far. A process that ended instead has said why: exits with its code.
+  void wait_for_all(uint32_t state) {
+    const bool come = wait_until(
+        [&] {
+          for (size_t p = 0; p < group_.size(); ++p)
+            if (board_.process(p).state.load() < state) return false;
+          return true;
+        },
+        [&] { return collect_ends(); });
+    if (come) return;
+    // The others may have something to say, too.
+    const int64_t until = clock_.now_ns() + 300'000'000;
+    wait_until([&] { return clock_.now_ns() > until || (collect_ends(), group_.alive() == 0); });
+    size_t problems = 0;
+    for (size_t p = 0; p < group_.size(); ++p) problems += board_.process(p).problems.load();
+    if (problems > 0) tell_problems(problems);
+    throw Refused{code_};
+  }
+
+  /// Notes how processes ended; true if one ended that should not have.
+  bool collect_ends() {
+    while (const auto end = group_.reap()) {
+      if (end->code == 0) continue;
+      code_ = std::max(code_, end->signal != 0 ? static_cast<int>(kDeviceOrSystem) : end->code);
+      if (end->signal != 0)
+        faults_.push_back(fmt::format("process {} was ended by signal {} ({})", group_.name(end->process), end->signal,
+                                      strsignal(end->signal)));
+      else if (board_.process(end->process).problems.load() == 0)
+        faults_.push_back(fmt::format("process {} ended with code {}", group_.name(end->process), end->code));
+      for (; told_ < faults_.size(); ++told_) std::fprintf(stderr, "takt: error: %s\n", faults_[told_].c_str());
+    }
+    return code_ != 0;
+  }
+
+  void admit() {
+    const graph::CheckResult check = graph::check(graph_, plan_);
+    if (check.admitted || options_.unchecked) return;
+    throw Refused{refuse(check.text + "(--unchecked runs it all the same)", kNotOk)};
+  }
+
+  void tell_lacks(const CpuLatencyHold& latency) {
+    std::vector<std::string> lacks = prepare_process();
+    if (!latency.granted()) lacks.push_back(latency.lacks());
+    if (options_.require_rt && !lacks.empty()) throw Refused{refuse("--require-rt: " + lacks.front(), kDeviceOrSystem)};
+    adjusted_.insert(adjusted_.end(), lacks.begin(), lacks.end());
+    for (const std::string& line : adjusted_) std::fprintf(stderr, "takt: adjusted: %s\n", line.c_str());
+  }
+
+  void agree_on_policy() {
+    if (plan_.policy == Policy::cooperative) return;
+    wait_for_all(ProcessRecord::agreed);
+    bool refused = false;
+    for (size_t p = 0; p < group_.size(); ++p) refused = refused || board_.process(p).refused.load();
+    if (!refused) {
+      granted_ = plan_.policy;
+    } else {
+      const std::vector<std::string> lines = refusals(plan_, board_);
+      if (options_.policy_required()) throw Refused{refuse(lines.front(), kDeviceOrSystem)};
+      for (const std::string& line : lines)
+        adjusted_.push_back(fmt::format("policy {} -> cooperative: {}", to_string(plan_.policy), line));
+    }
+    board_.decision().store(refused ? RunBoard::cooperative : RunBoard::as_asked);
+  }
+
+  void start() {
+    const int64_t epoch = clock_.now_ns() + kStartDelayNs;
+    if (options_.duration_s > 0) board_.stop().set_planned_end(epoch + static_cast<int64_t>(options_.duration_s * 1e9));
+    board_.epoch_ns().store(epoch);
+  }
+
+  /// Until all processes have ended. One that dies ends the run of the others, in order.
+  void watch() {
+    int64_t give_up_ns = INT64_MAX;
+    wait_until([&] {
+      if (collect_ends()) board_.stop().raise(clock_.now_ns());
+      const int64_t now = clock_.now_ns(), end = board_.stop().end_ns();
+      if (give_up_ns == INT64_MAX && now > end) give_up_ns = now + kPatienceNs;
+      if (now <= give_up_ns || group_.alive() == 0) return group_.alive() == 0;
+      for (size_t p = 0; p < group_.size(); ++p)
+        if (group_.pid(p) != 0) faults_.push_back(fmt::format("process {} did not end and was killed", group_.name(p)));
+      group_.kill_all();
+      give_up_ns = now + kPatienceNs;
+      return false;
+    });
+  }
+
+  MachineUse use_of_all() const {
+    const ProcessReading own = ProcessReading::now();
+    MachineUse use{own.cpu_ns, 0, own.steal_ms, proportional_memory_mb()};
+    for (size_t p = 0; p < board_.process_count(); ++p) {
+      use.cpu_ns += board_.process(p).cpu_ns;
+      use.simulator_cpu_ns += board_.process(p).simulator_cpu_ns;
+      use.rss_mb += board_.process(p).rss_mb;
+    }
+    return use;
+  }
+
+  int report(const Transport& transport, const MachineUse& use) {
+    RunResult result;
+    result.epoch_ns = board_.epoch_ns().load();
+    result.end_ns = board_.stop().end_ns();
+    result.policy_granted = granted_;
+    result.released = released_jobs(plan_, board_, result.epoch_ns, result.end_ns);
+    auto report = make_report({graph_, plan_, board_, result, transport, use, options_.clock,
+                               std::string(to_string(plan_.policy)), "subsystem", partition_.names, adjusted_});
+    for (const std::string& fault : faults_) report["faults"].push_back({{"what", fault}});
+    if (!faults_.empty()) report["ok"] = false;
+    const int told = tell(options_, report);
+    return code_ != 0 ? code_ : told;
+  }
+
+  const RunOptions& options_;
+  const graph::GraphSpec& graph_;
+  std::vector<std::string> adjusted_, faults_;
+  MonotonicClock clock_;
+  graph::Composition plan_source_;  ///< shells of all nodes; the plan points into them
+  Plan& plan_;
+  const graph::Partition partition_;
+  RunBoard board_;
+  const Stoppable stoppable_;
+  Policy granted_ = Policy::cooperative;
+  int code_ = 0;
+  size_t told_ = 0;
+  ProcessGroup group_;  ///< last: its members end before what they share
+};
+
+}  // namespace
+
+IsolatedEnd run_isolated(const RunOptions& options, const graph::GraphSpec& graph, std::vector<std::string> adjusted) {
+  try {
+    find_room_for_daemon(adjusted);
+    return {IsolatedRun(options, graph, std::move(adjusted)).run(), ""};
+  } catch (const TransportError& refused) {
+    return {0, refused.what()};
+  } catch (const Refused& refused) {
+    return {refused.code, ""};
+  }
+}
+
+}  // namespace takt::command

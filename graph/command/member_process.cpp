@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "graph/command/member_process.hpp"
+
+#include <ctime>
+
+#include "graph/command/machine.hpp"
+#include "graph/command/prepare.hpp"
+#include "graph/command/run_support.hpp"
+#include "rt/sched/executor.hpp"
+#include "rt/shm/iceoryx_transport.hpp"
+
+namespace takt::command {
+namespace {
+
+class BoardGate final : public StartGate {
+ public:
+  BoardGate(RunBoard& board, size_t process) : board_(board), record_(board.process(process)) {}
+  bool all_granted(bool mine) override {
+    record_.refused.store(!mine);
+    record_.state.store(ProcessRecord::agreed);
+    wait_until([&] { return board_.decision().load() != RunBoard::undecided; });
+    return board_.decision().load() == RunBoard::as_asked;
+  }
+  int64_t epoch_ns() override {
+    record_.state.store(ProcessRecord::running);
+    wait_until([&] { return board_.epoch_ns().load() != 0; });
+    return board_.epoch_ns().load();
+  }
+
+ private:
+  RunBoard& board_;
+  ProcessRecord& record_;
+};
+
+std::vector<bool> owned(const Plan& plan, const graph::Partition& partition, size_t process) {
+  std::vector<bool> own;
+  for (const TaskPlan& task : plan.tasks) own.push_back(partition.process_of.at(task.name) == process);
+  return own;
+}
+
+}  // namespace
+
+void BoardExchange::tell(size_t port, const Capacity& capacity) {
+  board_.capacity(port).capacity = capacity;
+  board_.capacity(port).known.store(1, std::memory_order_release);
+}
+
+Capacity BoardExchange::wait_for(size_t port) {
+  wait_until([&] { return board_.capacity(port).known.load(std::memory_order_acquire) != 0; });
+  return board_.capacity(port).capacity;
+}
+
+bool wait_until(const std::function<bool()>& done, const std::function<bool()>& broken) {
+  while (!done()) {
+    if (broken && broken()) return false;
+    const timespec pause{0, 1'000'000};
+    nanosleep(&pause, nullptr);
+  }
+  return true;
+}
+
+int run_member(const RunOptions& options, const graph::GraphSpec& graph, const graph::Partition& partition,
+               size_t process, int supervisor, RunBoard& board) {
+  ProcessRecord& record = board.process(process);
+  Prepared prepared;
+  prepared.graph = graph;
+  prepared.clock = std::make_unique<MonotonicClock>();
+  BoardExchange exchange(board);
+  graph::ComposeOptions how;
+  how.output = options.output;
+  how.seed = options.seed;
+  how.taps = 1;
+  how.owns = [&](const std::string& id) { return partition.process_of.at(id) == process; };
+  how.exchange = &exchange;
+  if (const int code = compose(options, how, prepared); code != kOk) {
+    record.problems.store(static_cast<uint32_t>(prepared.problems.size()));
+    return code;
+  }
+  Plan& plan = prepared.composition->plan;
+  std::vector<std::string> told;  // the supervisor says it
+  limit_cores(plan.cores, told);
+  record.state.store(ProcessRecord::composed);
+  wait_until([&] { return board.transport_up().load(); });
+  prepare_process();
+  const auto transport = join_iceoryx_transport(plan.ports, iceoryx_domain(supervisor));
+  BoardGate gate(board, process);
+  Executor::Options run;
+  run.duration_ns = static_cast<int64_t>(options.duration_s * 1e9);
+  run.board = &board;
+  run.gate = &gate;
+  run.own = owned(plan, partition, process);
+  Executor executor(plan, *transport, *prepared.clock, run);
+  record.state.store(ProcessRecord::joined);
+  const ProcessReading before = ProcessReading::now();
+  executor.run();
+  record.cpu_ns = ProcessReading::now().cpu_ns - before.cpu_ns;
+  record.simulator_cpu_ns = hal::simulator_cpu_ns(prepared.devices);
+  record.rss_mb = proportional_memory_mb();
+  for (size_t t = 0; t < plan.tasks.size(); ++t)
+    if (run.own[t]) prepared.composition->nodes[t]->finish();
+  record.state.store(ProcessRecord::finished);
+  return kOk;
+}
+
+}  // namespace takt::command

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <functional>
+
+#include "graph/command/run_command.hpp"
+#include "graph/compose/composition.hpp"
+#include "graph/compose/partition.hpp"
+#include "rt/sched/run_board.hpp"
+
+namespace takt::command {
+
+/// Capacities over the board. wait_for() polls: it is used before the start only.
+class BoardExchange final : public graph::CapacityExchange {
+ public:
+  explicit BoardExchange(RunBoard& board) : board_(board) {}
+  void tell(size_t port, const Capacity& capacity) override;
+  Capacity wait_for(size_t port) override;
+
+ private:
+  RunBoard& board_;
+};
+
+/// Polls every millisecond until `done` or, where given, `broken`; true if done.
+bool wait_until(const std::function<bool()>& done, const std::function<bool()>& broken = {});
+
+/// One process of an isolated run, as the supervisor's fork enters it: composes its part, joins the daemon of process
+/// `supervisor`, runs until the board's stop. Returns the exit code.
+int run_member(const RunOptions& options, const graph::GraphSpec& graph, const graph::Partition& partition,
+               size_t process, int supervisor, RunBoard& board);
+
+}  // namespace takt::command

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "graph/command/run_support.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <sched.h>
+
+#include <array>
+#include <atomic>
+#include <csignal>
+#include <cstdio>
+#include <ctime>
+#include <fstream>
+#include <opencv2/core/utility.hpp>
+
+#include "graph/command/prepare.hpp"
+#include "graph/command/report.hpp"
+
+namespace takt::command {
+namespace {
+
+constexpr std::array kSignals{SIGINT, SIGTERM, SIGHUP};
+std::array<struct sigaction, kSignals.size()> g_old{};
+std::atomic<RunBoard*> g_running{nullptr};
+std::atomic<bool> g_stop_asked{false};
+
+void stop_now(RunBoard& board) {
+  timespec now{};
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  board.stop().raise(now.tv_sec * 1'000'000'000 + now.tv_nsec);
+}
+
+extern "C" void stop_running(int) {
+  g_stop_asked.store(true);
+  if (RunBoard* board = g_running.load()) stop_now(*board);
+}
+
+}  // namespace
+
+StopOnSignal::StopOnSignal() {
+  g_stop_asked.store(false);
+  struct sigaction action {};
+  action.sa_handler = stop_running;
+  for (size_t i = 0; i < kSignals.size(); ++i) {
+    sigaction(kSignals[i], nullptr, &g_old[i]);
+    if (kSignals[i] != SIGHUP || g_old[i].sa_handler != SIG_IGN) sigaction(kSignals[i], &action, nullptr);
+  }
+}
+
+StopOnSignal::~StopOnSignal() {
+  for (size_t i = 0; i < kSignals.size(); ++i) sigaction(kSignals[i], &g_old[i], nullptr);
+}
+
+bool StopOnSignal::asked() { return g_stop_asked.load(); }
+
+Stoppable::Stoppable(RunBoard& board) {
+  g_running.store(&board);
+  if (g_stop_asked.load()) stop_now(board);
+}
+
+Stoppable::~Stoppable() { g_running.store(nullptr); }
+
+void limit_cores(std::vector<int>& cores, std::vector<std::string>& adjusted) {
+  cpu_set_t allowed;
+  if (cores.empty() || sched_getaffinity(0, sizeof allowed, &allowed) != 0) return;
+  std::vector<int> usable, all;
+  for (int core = 0; core < CPU_SETSIZE; ++core)
+    if (CPU_ISSET(core, &allowed)) all.push_back(core);
+  for (const int core : cores)
+    if (core >= 0 && core < CPU_SETSIZE && CPU_ISSET(core, &allowed)) usable.push_back(core);
+  if (usable.size() == cores.size()) return;
+  if (usable.empty()) usable = all;
+  adjusted.push_back(fmt::format("cores [{}] -> [{}]: this process may use no others", fmt::join(cores, ", "),
+                                 fmt::join(usable, ", ")));
+  cores = usable;
+}
+
+std::vector<std::string> prepare_process() {
+  cv::setNumThreads(1);
+  return prepare_process_memory().lacks;
+}
+
+int tell(const RunOptions& options, const nlohmann::ordered_json& report) {
+  std::fputs(summary_text(report).c_str(), stdout);
+  if (!options.report.empty()) {
+    std::ofstream out(options.report);
+    if (!(out << report.dump(2) << "\n"))
+      return refuse("cannot write the report to " + options.report.string() + "; choose a writable --report",
+                    kBadInput);
+  }
+  return report["ok"].get<bool>() ? kOk : kNotOk;
+}
+
+}  // namespace takt::command

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a run in one process and a run in several have in common.
+#pragma once
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "graph/command/run_command.hpp"
+#include "rt/memory/process_memory.hpp"
+#include "rt/sched/run_board.hpp"
+
+namespace takt::command {
+
+/// While it lives SIGINT, SIGTERM and SIGHUP end the run cleanly; one that comes while the run is still being prepared
+/// ends it as soon as there is something to end. An ignored SIGHUP (nohup) stays ignored; SIGINT does not: shells
+/// ignore it for whatever a script starts in the background. One at a time.
+class StopOnSignal {
+ public:
+  StopOnSignal();
+  ~StopOnSignal();
+  StopOnSignal(const StopOnSignal&) = delete;
+  StopOnSignal& operator=(const StopOnSignal&) = delete;
+  static bool asked();
+};
+
+/// The run that a signal stops while this lives.
+class Stoppable {
+ public:
+  explicit Stoppable(RunBoard& board);
+  ~Stoppable();
+  Stoppable(const Stoppable&) = delete;
+  Stoppable& operator=(const Stoppable&) = delete;
+};
+
+/// The cores of the schedule that this process may use; none of them: all it may use. Says what it changed.
+void limit_cores(std::vector<int>& cores, std::vector<std::string>& adjusted);
+
+/// Memory locked, OpenCV's thread pool off; what was refused.
+std::vector<std::string> prepare_process();
+
+/// Prints the summary, writes the files that were asked for; the exit code of the run.
+int tell(const RunOptions& options, const nlohmann::ordered_json& report);
+
+}  // namespace takt::command

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <atomic>
+#include <cstddef>
+#include <string>
+
+#include "rt/sched/grant.hpp"
+#include "rt/sched/plan.hpp"
+#include "rt/sched/statistics.hpp"
+#include "rt/sched/stop_signal.hpp"
+
+namespace takt {
+
+/// A parameter value on its way to a running node. One at a time per task.
+struct ParamMail {
+  enum State : uint32_t { empty, posted, taken, refused };
+  enum Kind : uint8_t { flag, integer, number, text };
+  std::atomic<uint32_t> state{empty};
+  uint32_t param = 0;  ///< index into Node::params()
+  Kind kind = number;
+  int64_t whole = 0;
+  double real = 0;
+  std::array<char, 128> words{};    ///< ended by 0
+  std::array<char, 256> refusal{};  ///< why, if refused; ended by 0
+};
+
+/// How far one process of a run has come, and what it used.
+struct ProcessRecord {
+  enum State : uint32_t { starting, composed, joined, agreed, running, finished };
+  std::atomic<uint32_t> state{starting};
+  std::atomic<uint32_t> problems{0};  ///< why it could not be composed: how many, told on stderr
+  std::atomic<bool> refused{false};   ///< a policy was refused to one of its lanes
+  int64_t cpu_ns = 0, simulator_cpu_ns = 0;
+  double rss_mb = 0;
+};
+
+/// How large the messages of an output can become, once its node is set up.
+struct CapacityRecord {
+  std::atomic<uint32_t> known{0};
+  Capacity capacity;
+};
+
+/// What the processes of one run share: statistics, the end of the run, agreement before the start, parameters on their
+/// way. One anonymous shared mapping, made before the processes are; it is gone when the last of them is.
+class RunBoard {
+ public:
+  enum Decision : uint32_t { undecided, as_asked, cooperative };
+
+  /// Only the shape of the plan is used: tasks, edges, ports. Throws std::runtime_error if there is no memory.
+  explicit RunBoard(const Plan& plan, size_t processes = 1);
+  ~RunBoard();
+  RunBoard(const RunBoard&) = delete;
+  RunBoard& operator=(const RunBoard&) = delete;
+
+  TaskStatistics& task(size_t t) { return tasks_[t]; }
+  const TaskStatistics& task(size_t t) const { return tasks_[t]; }
+  EdgeStatistics& edge(size_t t, size_t e) { return edges_[first_edge_[t] + e]; }
+  const EdgeStatistics& edge(size_t t, size_t e) const { return edges_[first_edge_[t] + e]; }
+  PortStatistics& port(size_t p) { return ports_[p]; }
+  const PortStatistics& port(size_t p) const { return ports_[p]; }
+  void set_grant(size_t t, const Grant& grant);
+  Grant grant(size_t t) const;
+  ParamMail& mail(size_t t) { return mail_[t]; }
+  CapacityRecord& capacity(size_t p) { return capacities_[p]; }
+  ProcessRecord& process(size_t p) { return processes_[p]; }
+  const ProcessRecord& process(size_t p) const { return processes_[p]; }
+  size_t process_count() const { return process_count_; }
+
+  StopSignal& stop() { return shared_->stop; }
+  std::atomic<int64_t>& epoch_ns() { return shared_->epoch_ns; }  ///< 0: not fixed yet
+  std::atomic<uint32_t>& decision() { return shared_->decision; }
+  std::atomic<bool>& transport_up() { return shared_->transport_up; }
+
+ private:
+  struct Shared {
+    StopSignal stop;
+    std::atomic<int64_t> epoch_ns{0};
+    std::atomic<uint32_t> decision{undecided};
+    std::atomic<bool> transport_up{false};
+  };
+  template <class T>
+  T* place(std::byte*& at, size_t count);
+
+  std::byte* memory_ = nullptr;
+  size_t bytes_ = 0, process_count_ = 0;
+  std::vector<size_t> first_edge_;
+  Shared* shared_ = nullptr;
+  TaskStatistics* tasks_ = nullptr;
+  EdgeStatistics* edges_ = nullptr;
+  PortStatistics* ports_ = nullptr;
+  GrantRecord* grants_ = nullptr;
+  ParamMail* mail_ = nullptr;
+  CapacityRecord* capacities_ = nullptr;
+  ProcessRecord* processes_ = nullptr;
+};
+
+}  // namespace takt

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a run counts. Plain data without pointers: it lies in memory that the processes of a run share, so that nobody
+// has to be asked for it and a process that dies leaves its figures behind.
+#pragma once
+#include <array>
+#include <atomic>
+#include <cstdint>
+
+#include "rt/sched/histogram.hpp"
+#include "rt/sched/plan.hpp"
+
+namespace takt {
+
+/// One finished job, for timelines.
+struct JobRecord {
+  int64_t release_ns = 0, start_ns = 0, finish_ns = 0;
+  int32_t cpu = -1;  ///< where it finished
+};
+
+/// What the jobs of one task did. Written by the thread that runs the task; the atomics may be read at any time.
+struct TaskStatistics {
+  std::atomic<uint64_t> released{0};  ///< of `on` tasks only; a rate's releases are computed outside the executor
+  std::atomic<uint64_t> paused{0};    ///< releases at which requests did not let the task run
+  std::atomic<uint64_t> completed{0}, skipped{0}, reused{0}, deadline_misses{0}, budget_overruns{0}, stale_inputs{0};
+  std::atomic<uint64_t> new_inputs{0};  ///< jobs whose first input was new: distinct input stamps
+  std::atomic<uint64_t> no_result{0};
+  std::atomic<int64_t> last_exec_ns{0}, last_response_ns{0};
+  uint64_t allocations = 0, page_faults = 0;
+  int64_t cpu_ns = 0, preempted_ns = 0;
+  Histogram lateness, exec, response, publish;
+  std::array<JobRecord, 64> jobs{};    ///< ring of the last ones
+  std::atomic<uint64_t> job_count{0};  ///< written so far
+
+  /// Drift of the release grid: least lateness of the last 100 jobs minus that of the first 100, us. Zero if releases
+  /// stay on the planned instants, however long the run.
+  double drift_us() const;
+  void add_lateness(int64_t ns);
+
+ private:
+  static constexpr size_t kWindow = 100;
+  std::array<int64_t, kWindow> first_{}, last_{};
+};
+
+/// What one edge carried. Every message sent is received, superseded before a job latched it (dropped), or waiting.
+struct EdgeStatistics {
+  uint64_t received = 0, dropped = 0, stale = 0;
+  Histogram age;  ///< stamp to job start, of the newest latched message
+};
+
+/// What one output gave.
+struct PortStatistics {
+  Histogram age;            ///< stamp of a message to its publication
+  WriterStatistics writer;  ///< at the end of the run, before anything is torn down
+};
+
+/// What the kernel granted the thread that runs a task: Grant without pointers.
+struct GrantRecord {
+  Policy policy = Policy::cooperative;
+  bool verified = false;
+  int priority = 0;
+  double runtime_ms = 0, deadline_ms = 0;
+  std::array<uint64_t, 16> cpus{};  ///< one bit a CPU
+  std::array<char, 256> refused{};
+};
+
+}  // namespace takt

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <sys/types.h>
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace takt {
+
+/// The processes of one run, children of the supervisor. Made before the supervisor has any thread, because only the
+/// calling thread survives a fork. One thread at a time.
+class ProcessGroup {
+ public:
+  /// How a process ended: with an exit code, or by a signal (then the code is -1).
+  struct End {
+    size_t process = 0;
+    int code = -1, signal = 0;
+  };
+
+  ProcessGroup() = default;
+  ProcessGroup(const ProcessGroup&) = delete;
+  ProcessGroup& operator=(const ProcessGroup&) = delete;
+  /// Kills and buries whatever still lives.
+  ~ProcessGroup();
+
+  /// Forks a process that runs `body` and exits with its result. It ignores SIGINT and SIGHUP, which a terminal sends
+  /// to the whole group, and dies with the supervisor. Throws std::runtime_error if there can be no more processes.
+  void start(const std::string& name, const std::function<int()>& body);
+  /// The end of one of them that was not told yet, without waiting.
+  std::optional<End> reap();
+  void kill_all();
+  size_t alive() const;
+  size_t size() const { return members_.size(); }
+  const std::string& name(size_t process) const { return members_[process].name; }
+  pid_t pid(size_t process) const { return members_[process].pid; }  ///< 0: ended
+
+ private:
+  struct Member {
+    std::string name;
+    pid_t pid = 0;
+  };
+  std::vector<Member> members_;
+};
+
+}  // namespace takt
