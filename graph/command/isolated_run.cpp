@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <cstring>
 
+#include "graph/attach/server.hpp"
 #include "graph/check/check.hpp"
 #include "graph/command/live_table.hpp"
 #include "graph/command/member_process.hpp"
@@ -55,6 +56,14 @@ class IsolatedRun {
         board_(plan_, partition_.names.size()),
         stoppable_(board_) {}
 
+  ~IsolatedRun() {
+    ending_ = true;
+    group_.kill_all();
+    wait_until([&] { return collect_ends(), group_.alive() == 0; });
+  }
+  IsolatedRun(const IsolatedRun&) = delete;
+  IsolatedRun& operator=(const IsolatedRun&) = delete;
+
   int run() {
     limit_cores(plan_.cores, adjusted_);
     for (size_t p = 0; p < partition_.names.size(); ++p)
@@ -62,10 +71,6 @@ class IsolatedRun {
         return run_member(options_, graph_, partition_, p, supervisor, board_);
       });
     wait_for_all(ProcessRecord::composed);
-    if (StopOnSignal::asked()) {
-      std::fputs("takt: stopped before the run began\n", stderr);
-      return kOk;
-    }
     BoardExchange exchange(board_);
     graph::complete(plan_, exchange, 1);
     admit();
@@ -78,6 +83,8 @@ class IsolatedRun {
     const int64_t steal_before_ms = ProcessReading::now().steal_ms, cpu_before_ns = ProcessReading::now().cpu_ns;
     start();
     {
+      const attach::Server server({graph_, plan_, board_, *transport});
+      if (!server.lacks().empty()) adjusted_.push_back("nobody can attach: " + server.lacks());
       const LiveTable live(plan_, board_,
                            fmt::format("takt run {} ({}, policy {}, {} processes)", graph_.name, graph_.profile,
                                        to_string(plan_.policy), group_.size()));
@@ -98,8 +105,12 @@ class IsolatedRun {
             if (board_.process(p).state.load() < state) return false;
           return true;
         },
-        [&] { return collect_ends(); });
+        [&] { return StopOnSignal::asked() || collect_ends(); });
     if (come) return;
+    if (StopOnSignal::asked()) {
+      std::fputs("takt: stopped before the run began\n", stderr);
+      throw Refused{kOk};
+    }
     // The others may have something to say, too.
     const int64_t until = clock_.now_ns() + 300'000'000;
     wait_until([&] { return clock_.now_ns() > until || (collect_ends(), group_.alive() == 0); });
@@ -113,6 +124,8 @@ class IsolatedRun {
   bool collect_ends() {
     while (const auto end = group_.reap()) {
       if (end->code == 0) continue;
+      if (end->signal != 0) remove_iceoryx_leftovers(IceoryxPlaces::of_this_machine(), end->pid);
+      if (ending_) continue;
       code_ = std::max(code_, end->signal != 0 ? static_cast<int>(kDeviceOrSystem) : end->code);
       if (end->signal != 0)
         faults_.push_back(fmt::format("process {} was ended by signal {} ({})", group_.name(end->process), end->signal,
@@ -213,6 +226,7 @@ class IsolatedRun {
   Policy granted_ = Policy::cooperative;
   int code_ = 0;
   size_t told_ = 0;
+  bool ending_ = false;
   ProcessGroup group_;  ///< last: its members end before what they share
 };
 

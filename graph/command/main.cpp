@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <opencv2/core/utils/logger.hpp>
 
+#include "graph/command/attach_commands.hpp"
 #include "graph/command/check_command.hpp"
 #include "graph/command/eval_command.hpp"
 #include "graph/command/run_command.hpp"
@@ -61,6 +62,7 @@ int main(int argc, char** argv) {
   takt::command::RunOptions run_options, check_options;
   takt::command::EvalStereoOptions stereo;
   takt::command::EvalEgoMotionOptions ego_motion;
+  takt::command::AttachOptions attach;
   std::string type;
   bool check_json = false;
   int exit_code = 0;
@@ -74,6 +76,7 @@ int main(int argc, char** argv) {
       app.add_subcommand("nodes", "lists node types and device kinds, or one with its ports and parameters");
   nodes->add_option("type", type, "node type");
   nodes->callback([&] { exit_code = takt::command::print_nodes(type); });
+  takt::command::add_attach_commands(app, attach, exit_code);
   CLI::App* eval = app.add_subcommand("eval", "measures quality against ground truth");
   eval->require_subcommand(1);
   takt::command::add_eval_stereo(*eval, stereo, exit_code);

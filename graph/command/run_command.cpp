@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <fstream>
 
+#include "graph/attach/server.hpp"
 #include "graph/check/check.hpp"
 #include "graph/command/isolated_run.hpp"
 #include "graph/command/live_table.hpp"

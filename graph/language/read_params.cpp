@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "graph/language/loader.hpp"
+#include "graph/language/param_text.hpp"
 #include "graph/language/quantity.hpp"
 
 namespace takt::graph {
@@ -30,6 +31,19 @@ tl::expected<ParamValue, std::string> convert(const ParamBase& param, const Give
     return tl::make_unexpected(fmt::format("is `{}`, an integer is wanted", given.raw));
   return ParamValue(static_cast<int64_t>(whole));
 }
+
+}  // namespace
+
+tl::expected<ParamValue, std::string> parse_param(const ParamBase& param, const std::string& text) {
+  Given given;
+  given.raw = text;
+  const auto value = resolve_scalar(text);
+  if (!value) return tl::make_unexpected(value.error());
+  given.value = value->is_null() ? json("") : *value;
+  return convert(param, given);
+}
+
+namespace {
 
 std::vector<std::string> param_names(const Node& node) {
   std::vector<std::string> names;

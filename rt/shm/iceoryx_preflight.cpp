@@ -18,6 +18,7 @@
 #include <fstream>
 #include <vector>
 
+#include "rt/shm/iceoryx_transport.hpp"
 #include "rt/shm/transport_error.hpp"
 
 namespace takt {
@@ -146,6 +147,13 @@ void iceoryx_preflight(const IceoryxPlaces& places, uint64_t needed_bytes) {
         megabytes(needed_bytes) + ". Enlarge it: sudo mount -o remount,size=" +
         std::to_string((needed_bytes - available + uint64_t{room.f_blocks} * room.f_frsize + 1'048'575) / 1'048'576) +
         "M " + places.shm.string() + ", or lower image sizes or edge depths");
+}
+
+void remove_iceoryx_leftovers(const IceoryxPlaces& places, pid_t dead) {
+  const std::string name = iceoryx_runtime_prefix(dead);
+  std::error_code ignored;
+  for (const auto& entry : std::filesystem::directory_iterator(places.run, ignored))
+    if (entry.path().filename().string().rfind(name, 0) == 0) std::filesystem::remove(entry.path(), ignored);
 }
 
 }  // namespace takt

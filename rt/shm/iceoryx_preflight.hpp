@@ -24,6 +24,9 @@ struct IceoryxPlaces {
 /// Process that holds an flock on `file`, if the kernel tells.
 std::optional<pid_t> lock_holder(const std::filesystem::path& file, const std::filesystem::path& locks);
 
+/// Removes the socket and the lock of the iceoryx runtime of a process that was killed.
+void remove_iceoryx_leftovers(const IceoryxPlaces& places, pid_t dead);
+
 /// Throws TransportError with the fix if a daemon runs already, if leftovers of another user are in the way, or if
 /// `needed_bytes` do not fit into shared memory. Leftovers of this user are harmless: the daemon replaces them.
 void iceoryx_preflight(const IceoryxPlaces& places, uint64_t needed_bytes);

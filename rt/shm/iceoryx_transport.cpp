@@ -48,7 +48,7 @@ class Claim {
 /// A name no live or dead runtime of this machine has: a socket of that name in /tmp would be in the way.
 iox::RuntimeName_t unused_runtime_name() {
   for (;;) {
-    const std::string name = "takt-" + std::to_string(getpid()) + "-" + std::to_string(made++);
+    const std::string name = iceoryx_runtime_prefix(getpid()) + std::to_string(made++);
     if (std::filesystem::exists("/tmp/" + name) || std::filesystem::exists("/tmp/" + name + ".lock")) continue;
     return {iox::cxx::TruncateToCapacity, name.c_str()};
   }
@@ -171,6 +171,8 @@ class JoinedTransport final : public PortsOverIceoryx {
 };
 
 }  // namespace
+
+std::string iceoryx_runtime_prefix(int pid) { return "takt-" + std::to_string(pid) + "-"; }
 
 std::string iceoryx_domain(int daemon_pid) { return "graph-" + std::to_string(daemon_pid); }
 

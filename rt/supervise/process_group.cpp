@@ -12,6 +12,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <stdexcept>
+#include <utility>
 
 namespace takt {
 namespace {
@@ -53,9 +54,9 @@ std::optional<ProcessGroup::End> ProcessGroup::reap() {
   for (size_t i = 0; i < members_.size(); ++i) {
     int status = 0;
     if (members_[i].pid <= 0 || waitpid(members_[i].pid, &status, WNOHANG) != members_[i].pid) continue;
-    members_[i].pid = 0;
-    if (WIFSIGNALED(status)) return End{i, -1, WTERMSIG(status)};
-    return End{i, WEXITSTATUS(status), 0};
+    const pid_t pid = std::exchange(members_[i].pid, 0);
+    if (WIFSIGNALED(status)) return End{i, pid, -1, WTERMSIG(status)};
+    return End{i, pid, WEXITSTATUS(status), 0};
   }
   return std::nullopt;
 }

@@ -16,6 +16,7 @@ class ProcessGroup {
   /// How a process ended: with an exit code, or by a signal (then the code is -1).
   struct End {
     size_t process = 0;
+    pid_t pid = 0;
     int code = -1, signal = 0;
   };
 

@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "graph/attach/message_text.hpp"
+
+#include <algorithm>
+#include <cstring>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "nodes/picture/draw.hpp"
+#include "rt/msg/messages.hpp"
+
+namespace takt::attach {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr int kPixelsPerCell = 6;
+
+template <class T>
+Json number_at(const std::byte* at) {
+  T value;
+  std::memcpy(&value, at, sizeof value);
+  return value;
+}
+
+Json scalar_at(Scalar scalar, const std::byte* at) {
+  switch (scalar) {
+    case Scalar::u8: return number_at<uint8_t>(at);
+    case Scalar::i16: return number_at<int16_t>(at);
+    case Scalar::u16: return number_at<uint16_t>(at);
+    case Scalar::i32: return number_at<int32_t>(at);
+    case Scalar::u32: return number_at<uint32_t>(at);
+    case Scalar::i64: return number_at<int64_t>(at);
+    case Scalar::u64: return number_at<uint64_t>(at);
+    case Scalar::f32: return number_at<float>(at);
+    case Scalar::f64: return number_at<double>(at);
+  }
+  return nullptr;
+}
+
+size_t size_of(Scalar scalar) {
+  switch (scalar) {
+    case Scalar::u8: return 1;
+    case Scalar::i16:
+    case Scalar::u16: return 2;
+    case Scalar::i32:
+    case Scalar::u32:
+    case Scalar::f32: return 4;
+    case Scalar::i64:
+    case Scalar::u64:
+    case Scalar::f64: return 8;
+  }
+  return 1;
+}
+
+Json scalars(Scalar scalar, const std::byte* at, size_t count) {
+  if (count == 1) return scalar_at(scalar, at);
+  Json list = Json::array();
+  for (size_t i = 0; i < count; ++i) list.push_back(scalar_at(scalar, at + i * size_of(scalar)));
+  return list;
+}
+
+/// Every Array begins alike, whatever it holds.
+const Array<uint8_t>& array_at(const std::byte* at) { return *reinterpret_cast<const Array<uint8_t>*>(at); }
+
+Json array_json(const Field& field, const std::byte* at, size_t element_bytes, size_t items) {
+  const Array<uint8_t>& array = array_at(at);
+  const auto* data = reinterpret_cast<const std::byte*>(array.data());
+  Json first = Json::array();
+  for (size_t i = 0; i < std::min<size_t>(array.size, items); ++i)
+    first.push_back(scalars(field.scalar, data + i * element_bytes, element_bytes / size_of(field.scalar)));
+  return {{"size", array.size}, {"first", first}};
+}
+
+cv::Mat wrap(ImageView<const uint8_t> view) {
+  return {view.height, view.width, view.channels == 3 ? CV_8UC3 : CV_8UC1, const_cast<uint8_t*>(view.data)};
+}
+
+cv::Mat draw(const DisparityMap& map) {
+  cv::Mat out(map.height, map.width, CV_8UC3);
+  picture::draw_disparity(map.view(), map.disparities, {out.data, out.cols, out.rows, 3});
+  return out;
+}
+
+cv::Mat draw(const Grid& grid) {
+  cv::Mat out(grid.height * kPixelsPerCell, grid.width * kPixelsPerCell, CV_8UC3);
+  picture::draw_grid(grid.view(), kPixelsPerCell, {out.data, out.cols, out.rows, 3});
+  return out;
+}
+
+cv::Mat draw(const StereoPair& pair) {
+  cv::Mat both;
+  cv::hconcat(wrap(pair.left_view()), wrap(pair.right_view()), both);
+  return both;
+}
+
+cv::Mat picture_of(const MessageType& type, const void* message) {
+  if (type.name == Image::type_name) return wrap(static_cast<const Image*>(message)->view());
+  if (type.name == StereoPair::type_name) return draw(*static_cast<const StereoPair*>(message));
+  if (type.name == DisparityMap::type_name) return draw(*static_cast<const DisparityMap*>(message));
+  if (type.name == Grid::type_name) return draw(*static_cast<const Grid*>(message));
+  return {};
+}
+
+}  // namespace
+
+nlohmann::ordered_json message_json(const MessageType& type, const void* message, size_t items) {
+  Json json;
+  const auto* bytes = static_cast<const std::byte*>(message);
+  for (const Field& field : type.fields) {
+    const std::string name(field.name);
+    if (!field.is_array()) {
+      json[name] = scalars(field.scalar, bytes + field.offset, field.count);
+    } else if (type.name == TextStatus::type_name) {
+      const auto& text = *reinterpret_cast<const Array<char>*>(bytes + field.offset);
+      json[name] = std::string(text.data(), text.size);
+    } else {
+      json[name] = array_json(field, bytes + field.offset, field.element_bytes, items);
+    }
+  }
+  return json;
+}
+
+std::optional<std::string> message_png(const MessageType& type, const void* message) {
+  const cv::Mat image = picture_of(type, message);
+  std::vector<uint8_t> png;
+  if (image.empty() || !cv::imencode(".png", image, png, {cv::IMWRITE_PNG_COMPRESSION, 1})) return std::nullopt;
+  return std::string(png.begin(), png.end());
+}
+
+}  // namespace takt::attach

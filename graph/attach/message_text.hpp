@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+
+#include "rt/msg/field.hpp"
+
+namespace takt::attach {
+
+/// A message as one JSON object by its field descriptors: scalars as numbers, texts as text, of longer arrays the size
+/// and the first `items` elements.
+nlohmann::ordered_json message_json(const MessageType& type, const void* message, size_t items = 8);
+
+/// The message as a PNG file: images as they are, stereo pairs side by side, disparities and grids in false colours.
+/// Nothing if its type cannot be seen.
+std::optional<std::string> message_png(const MessageType& type, const void* message);
+
+}  // namespace takt::attach

@@ -1,0 +1,245 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "graph/attach/server.hpp"
+
+#include <fmt/format.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+
+#include "graph/attach/message_text.hpp"
+#include "graph/compose/composition.hpp"
+#include "graph/language/param_text.hpp"
+#include "graph/language/words.hpp"
+#include "rt/sched/param_mail.hpp"
+
+namespace takt::attach {
+namespace {
+
+using Json = nlohmann::ordered_json;
+constexpr size_t kMostClients = 8;
+constexpr int kLookAgainMs = 100;
+
+void pause_ms(int ms) { std::this_thread::sleep_for(std::chrono::milliseconds(ms)); }
+
+int64_t now_ns() { return MonotonicClock().now_ns(); }
+
+Json wrong(const std::string& text) { return {{"error", text}}; }
+
+/// True if the other side is this user or root.
+bool trusted(int descriptor) {
+  ucred peer{};
+  socklen_t size = sizeof peer;
+  return getsockopt(descriptor, SOL_SOCKET, SO_PEERCRED, &peer, &size) == 0 && (peer.uid == geteuid() || peer.uid == 0);
+}
+
+}  // namespace
+
+Server::Server(const Subject& subject) : subject_(subject) {
+  open();
+  if (lacks_.empty()) thread_ = std::thread([this] { accept_clients(); });
+}
+
+Server::~Server() {
+  ending_.store(true);
+  if (thread_.joinable()) thread_.join();
+  for (Client& client : clients_) client.thread.join();
+  if (listener_ >= 0) close(listener_);
+  std::error_code ignored;
+  if (!path_.empty()) std::filesystem::remove(path_, ignored);
+}
+
+void Server::open() {
+  const auto folder = socket_folder(lacks_);
+  if (!lacks_.empty()) return;
+  const auto path = folder / (std::to_string(getpid()) + ".sock");
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  std::strncpy(address.sun_path, path.c_str(), sizeof address.sun_path - 1);
+  std::error_code ignored;
+  std::filesystem::remove(path, ignored);  // of a dead process that had our number
+  listener_ = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+  if (listener_ < 0 || bind(listener_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
+      listen(listener_, static_cast<int>(kMostClients)) != 0) {
+    lacks_ = path.string() + ": " + std::strerror(errno);
+    return;
+  }
+  path_ = path;
+}
+
+void Server::accept_clients() {
+  pthread_setname_np(pthread_self(), "takt-attach");
+  while (!ending_.load()) {
+    pollfd wait{listener_, POLLIN, 0};
+    if (poll(&wait, 1, kLookAgainMs) <= 0) continue;
+    const int descriptor = accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC);
+    if (descriptor < 0) continue;
+    for (auto client = clients_.begin(); client != clients_.end();) {
+      if (client->done.load()) {
+        client->thread.join();
+        client = clients_.erase(client);
+      } else {
+        ++client;
+      }
+    }
+    if (clients_.size() >= kMostClients || !trusted(descriptor)) {
+      close(descriptor);
+      continue;
+    }
+    Client& client = clients_.emplace_back();
+    client.thread = std::thread([this, descriptor, &client] {
+      serve(descriptor);
+      client.done.store(true);
+    });
+  }
+}
+
+void Server::serve(int descriptor) {
+  // Short patience, so that a client that says nothing does not keep the run from ending.
+  while (!ending_.load()) {
+    pollfd wait{descriptor, POLLIN, 0};
+    const int ready = poll(&wait, 1, kLookAgainMs);
+    if (ready < 0 && errno != EINTR) break;
+    if (ready > 0) break;
+  }
+  Connection connection(descriptor, 1000);
+  while (!ending_.load()) {
+    const auto question = connection.read_line();
+    if (!question || !question->is_object() || !answer(*question, connection)) return;
+  }
+}
+
+bool Server::answer(const Json& question, Connection& connection) {
+  const std::string what = question.value("do", "");
+  if (what == "top") return connection.write(top());
+  if (what == "echo") return echo(question, connection);
+  if (what == "set") return connection.write(set(question.value("param", ""), question.value("value", "")));
+  if (what == "stop") {
+    subject_.board.stop().raise(now_ns());
+    return connection.write({{"ok", true}});
+  }
+  return connection.write(wrong("unknown question " + what + "; known: top, echo, set, stop"));
+}
+
+Json Server::top() const {
+  Json nodes = Json::array();
+  for (size_t t = 0; t < subject_.plan.tasks.size(); ++t) {
+    const TaskPlan& task = subject_.plan.tasks[t];
+    const TaskStatistics& s = subject_.board.task(t);
+    nodes.push_back({{"name", task.name},
+                     {"rate_hz", task.rate ? Json(task.rate->hz()) : Json(nullptr)},
+                     {"completed", s.completed.load()},
+                     {"deadline_misses", s.deadline_misses.load()},
+                     {"skipped", s.skipped.load()},
+                     {"paused", s.paused.load()},
+                     {"exec_ms", static_cast<double>(s.last_exec_ns.load()) / 1e6},
+                     {"response_ms", static_cast<double>(s.last_response_ns.load()) / 1e6}});
+  }
+  return {{"graph", subject_.graph.name},
+          {"profile", subject_.graph.profile},
+          {"transport", subject_.transport.name()},
+          {"running_s", static_cast<double>(now_ns() - subject_.board.epoch_ns().load()) / 1e9},
+          {"nodes", nodes}};
+}
+
+size_t Server::find_port(const std::string& name) const {
+  for (size_t p = 0; p < subject_.plan.ports.size(); ++p)
+    if (subject_.plan.ports[p].node + "." + subject_.plan.ports[p].port == name) return p;
+  return kNone;
+}
+
+bool Server::echo(const Json& question, Connection& connection) {
+  const std::string name = question.value("port", "");
+  const size_t port = find_port(name);
+  if (port == kNone) {
+    std::vector<std::string> known;
+    for (const PortPlan& plan : subject_.plan.ports) known.push_back(plan.node + "." + plan.port);
+    return connection.write(wrong(fmt::format("there is no output {}{}", graph::ticked(name),
+                                              graph::alternatives(name, known, "outputs of this graph"))));
+  }
+  {
+    const std::lock_guard lock(tapping_);
+    if (!tapped_.insert(port).second) return connection.write(wrong("somebody else listens to " + name + " already"));
+  }
+  const bool alive = stream(port, question.value("png", false), question.value("count", int64_t{1}), connection);
+  const std::lock_guard lock(tapping_);
+  tapped_.erase(port);
+  return alive;
+}
+
+bool Server::stream(size_t port, bool picture, int64_t count, Connection& connection) {
+  const PortPlan& plan = subject_.plan.ports[port];
+  const auto reader = subject_.transport.make_reader(port);
+  uint64_t seen = 0;
+  for (int64_t sent = 0; sent < count && !ending_.load();) {
+    Candidate newest;
+    const bool listed = reader->list(now_ns(), {&newest, 1}) == 1 && newest.sequence > seen;
+    Held held = listed ? reader->take(newest.sequence) : Held{};
+    if (!held) {
+      pause_ms(2);
+      continue;
+    }
+    Json line{{"type", plan.type->name},
+              {"sequence", held.sequence},
+              {"stamp_ns", held.stamp_ns},
+              {"age_ms", static_cast<double>(now_ns() - held.stamp_ns) / 1e6},
+              {"message", message_json(*plan.type, held.message())}};
+    const auto png = picture ? message_png(*plan.type, held.message()) : std::nullopt;
+    seen = held.sequence;
+    reader->release(held);
+    if (picture && !png)
+      return connection.write(
+          wrong(fmt::format("a message of type {} is no picture; leave --png out", plan.type->name)));
+    line["bytes"] = png ? png->size() : 0;
+    if (!connection.write(line, png.value_or(""))) return false;
+    ++sent;
+  }
+  return true;
+}
+
+Json Server::set(const std::string& name, const std::string& text) {
+  const size_t dot = name.find('.');
+  const std::string id = name.substr(0, dot), key = dot == std::string::npos ? "" : name.substr(dot + 1);
+  std::vector<std::string> ids, keys;
+  for (const graph::NodeSpec& spec : subject_.graph.nodes) ids.push_back(spec.id);
+  const auto spec = std::find_if(subject_.graph.nodes.begin(), subject_.graph.nodes.end(),
+                                 [&](const graph::NodeSpec& s) { return s.id == id; });
+  if (spec == subject_.graph.nodes.end())
+    return wrong(fmt::format("there is no node {}{}", graph::ticked(id), graph::alternatives(id, ids)));
+  const auto shell = graph::node_types().find(spec->type)->make();
+  const auto task = std::find_if(subject_.plan.tasks.begin(), subject_.plan.tasks.end(),
+                                 [&](const TaskPlan& t) { return t.name == id; });
+  for (size_t p = 0; p < shell->params().size(); ++p) {
+    ParamBase& param = *shell->params()[p];
+    keys.emplace_back(param.name());
+    if (param.name() != key) continue;
+    const auto value = graph::parse_param(param, text);
+    const auto fits = value ? param.set(*value) : tl::make_unexpected(value.error());
+    if (!fits) return wrong(fmt::format("parameter {} {}", graph::ticked(name), fits.error()));
+    return post_and_wait(static_cast<size_t>(task - subject_.plan.tasks.begin()), p, *value);
+  }
+  return wrong(fmt::format("node {} (type {}) has no parameter {}{}", graph::ticked(id), graph::ticked(spec->type),
+                           graph::ticked(key), graph::alternatives(key, keys)));
+}
+
+Json Server::post_and_wait(size_t task, size_t param, const ParamValue& value) {
+  const std::lock_guard lock(setting_);
+  ParamMail& mail = subject_.board.mail(task);
+  if (!post(mail, param, value)) return wrong("the node has not taken the last value yet, or the text is too long");
+  const TaskPlan& plan = subject_.plan.tasks[task];
+  const int64_t until = now_ns() + 2'000'000'000;
+  while (mail.state.load() == ParamMail::posted && now_ns() < until && !ending_.load()) pause_ms(1);
+  const uint32_t state = mail.state.load();
+  if (state == ParamMail::taken) return {{"ok", true}};
+  if (state == ParamMail::posted)
+    return wrong(plan.name + " ran no job within 2 s; it takes the value at its next one");
+  return wrong(fmt::format("parameter {} of {} {}", graph::ticked(plan.node->params()[param]->name()), plan.name,
+                           mail.refusal.data()));
+}
+
+}  // namespace takt::attach

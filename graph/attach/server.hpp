@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <atomic>
+#include <list>
+#include <mutex>
+#include <set>
+#include <string>
+#include <thread>
+
+#include "graph/attach/endpoint.hpp"
+#include "graph/language/graph.hpp"
+#include "rt/sched/run_board.hpp"
+#include "rt/shm/transport.hpp"
+
+namespace takt::attach {
+
+/// What a running graph lets others see and change. All of it outlives the server.
+struct Subject {
+  const graph::GraphSpec& graph;
+  const Plan& plan;  ///< composed with at least one tap
+  RunBoard& board;
+  Transport& transport;
+};
+
+/// Answers top, echo, set and stop for one run, from threads of the default policy that only read the board, hold one
+/// message of an output at a time, and post parameters to be taken between jobs. Only its own user (and root) is heard.
+class Server {
+ public:
+  explicit Server(const Subject& subject);
+  ~Server();
+  Server(const Server&) = delete;
+  Server& operator=(const Server&) = delete;
+  /// Why nobody can attach; empty if all is well.
+  const std::string& lacks() const { return lacks_; }
+
+ private:
+  struct Client {
+    std::thread thread;
+    std::atomic<bool> done{false};
+  };
+  void open();
+  void accept_clients();
+  void serve(int descriptor);
+  bool answer(const nlohmann::ordered_json& question, Connection& connection);
+  nlohmann::ordered_json top() const;
+  bool echo(const nlohmann::ordered_json& question, Connection& connection);
+  bool stream(size_t port, bool picture, int64_t count, Connection& connection);
+  nlohmann::ordered_json set(const std::string& name, const std::string& text);
+  nlohmann::ordered_json post_and_wait(size_t task, size_t param, const ParamValue& value);
+  size_t find_port(const std::string& name) const;
+
+  const Subject subject_;
+  std::string lacks_;
+  std::filesystem::path path_;
+  int listener_ = -1;
+  std::atomic<bool> ending_{false};
+  std::mutex setting_, tapping_;
+  std::set<size_t> tapped_;  ///< outputs that somebody listens to: one at a time each
+  std::list<Client> clients_;
+  std::thread thread_;
+};
+
+}  // namespace takt::attach

@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "graph/command/attach_commands.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdio>
+#include <fstream>
+#include <thread>
+
+#include "graph/attach/endpoint.hpp"
+#include "graph/command/prepare.hpp"
+
+namespace takt::command {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr auto kRefresh = std::chrono::milliseconds(500);
+
+/// To the run that was named, or to the only one; else nothing, and why is said.
+std::optional<attach::Connection> attached(const AttachOptions& options) {
+  const std::vector<int> runs = attach::running();
+  if (options.run == 0 && runs.size() != 1) {
+    if (runs.empty()) refuse("no graph of this user is running; start one with: takt run", kDeviceOrSystem);
+    else
+      refuse(fmt::format("several graphs are running; choose with --run: {}", fmt::join(runs, ", ")), kDeviceOrSystem);
+    return std::nullopt;
+  }
+  const int pid = options.run != 0 ? options.run : runs.front();
+  auto connection = attach::connect_to(pid);
+  if (!connection)
+    refuse(fmt::format("process {} is no running graph of this user (running: {})", pid, fmt::join(runs, ", ")),
+           kDeviceOrSystem);
+  return connection;
+}
+
+/// Asks once; an answer that is an error is said, and its exit code returned.
+int ask(attach::Connection& connection, const Json& question, Json& answer) {
+  if (!connection.write(question)) return refuse("the run has ended", kDeviceOrSystem);
+  const auto line = connection.read_line();
+  if (!line) return refuse("the run has ended, or does not answer", kDeviceOrSystem);
+  answer = *line;
+  return answer.contains("error") ? refuse(answer["error"].get<std::string>(), kBadInput) : kOk;
+}
+
+std::string top_text(const Json& top) {
+  std::string text = fmt::format("{} ({} profile, {} transport), running {:.0f} s\n", top["graph"].get<std::string>(),
+                                 top["profile"].get<std::string>(), top["transport"].get<std::string>(),
+                                 top["running_s"].get<double>());
+  text += fmt::format("{:<18} {:>5} {:>10} {:>7} {:>7} {:>7} {:>8} {:>8}\n", "node", "Hz", "completed", "missed",
+                      "skipped", "paused", "CPU ms", "resp ms");
+  for (const Json& node : top["nodes"])
+    text += fmt::format(
+        "{:<18} {:>5} {:>10} {:>7} {:>7} {:>7} {:>8.2f} {:>8.2f}\n", node["name"].get<std::string>().substr(0, 18),
+        node["rate_hz"].is_null() ? "on" : fmt::format("{:g}", node["rate_hz"].get<double>()),
+        node["completed"].get<uint64_t>(), node["deadline_misses"].get<uint64_t>(), node["skipped"].get<uint64_t>(),
+        node["paused"].get<uint64_t>(), node["exec_ms"].get<double>(), node["response_ms"].get<double>());
+  return text;
+}
+
+int run_top(const AttachOptions& options) {
+  auto connection = attached(options);
+  if (!connection) return kDeviceOrSystem;
+  const bool redraw = isatty(STDOUT_FILENO) != 0 && !options.once && !options.json;
+  for (bool first = true;; first = false) {
+    Json top;
+    if (!connection->write({{"do", "top"}})) return kOk;  // the run has ended, as runs do
+    const auto line = connection->read_line();
+    if (!line) return first ? refuse("the run does not answer", kDeviceOrSystem) : kOk;
+    if (redraw) std::fputs("\x1b[H\x1b[2J", stdout);
+    std::fputs(options.json ? (line->dump() + "\n").c_str() : top_text(*line).c_str(), stdout);
+    std::fflush(stdout);
+    if (options.once) return kOk;
+    std::this_thread::sleep_for(kRefresh);
+  }
+}
+
+int run_echo(const AttachOptions& options) {
+  auto connection = attached(options);
+  if (!connection) return kDeviceOrSystem;
+  const bool picture = !options.png.empty();
+  Json answer;
+  int code =
+      ask(*connection, {{"do", "echo"}, {"port", options.port}, {"png", picture}, {"count", options.count}}, answer);
+  for (int64_t shown = 0; code == kOk; ++shown) {
+    const size_t bytes = answer.value("bytes", size_t{0});
+    answer.erase("bytes");
+    std::printf("%s\n", answer.dump(2).c_str());
+    std::fflush(stdout);
+    if (bytes > 0) {
+      const auto png = connection->read_bytes(bytes);
+      std::ofstream out(options.png, std::ios::binary);
+      if (!png || !(out << *png))
+        return refuse(fmt::format("{} cannot be written; choose another --png", options.png.string()), kBadInput);
+    }
+    if (shown + 1 == options.count) return kOk;
+    const auto line = connection->read_line();
+    if (!line) return kOk;  // the run has ended
+    answer = *line;
+  }
+  return code;
+}
+
+int run_question(const AttachOptions& options, const Json& question) {
+  auto connection = attached(options);
+  if (!connection) return kDeviceOrSystem;
+  Json answer;
+  return ask(*connection, question, answer);
+}
+
+CLI::App* add(CLI::App& app, const char* name, const char* purpose, AttachOptions& o) {
+  CLI::App* command = app.add_subcommand(name, purpose);
+  command->add_option("--run", o.run, "process id of the run, where there are several");
+  return command;
+}
+
+}  // namespace
+
+void add_attach_commands(CLI::App& app, AttachOptions& o, int& exit_code) {
+  CLI::App* top = add(app, "top", "shows what a running graph does", o);
+  top->add_flag("--once", o.once, "shows it once");
+  top->add_flag("--json", o.json, "one JSON object a line");
+  top->callback([&] { exit_code = run_top(o); });
+  CLI::App* echo = add(app, "echo", "shows messages of a running graph", o);
+  echo->add_option("port", o.port, "NODE.PORT")->required();
+  echo->add_option("--png", o.png, "writes the message as a picture");
+  echo->add_option("--count", o.count, "how many messages")->check(CLI::PositiveNumber);
+  echo->callback([&] { exit_code = run_echo(o); });
+  CLI::App* set = add(app, "set", "sets a parameter of a running node, between two of its jobs", o);
+  set->add_option("param", o.param, "NODE.PARAM")->required();
+  set->add_option("value", o.value, "with its unit")->required();
+  set->callback([&] { exit_code = run_question(o, {{"do", "set"}, {"param", o.param}, {"value", o.value}}); });
+  CLI::App* stop = add(app, "stop", "ends a running graph cleanly", o);
+  stop->callback([&] { exit_code = run_question(o, {{"do", "stop"}}); });
+}
+
+}  // namespace takt::command

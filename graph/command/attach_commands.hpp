@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+// `takt top | echo | set | stop`: commands that speak to a graph that is running already.
+#pragma once
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <string>
+
+namespace takt::command {
+
+struct AttachOptions {
+  int run = 0;  ///< process id; 0: the only one that runs
+  bool once = false, json = false;
+  std::string port, param, value;
+  std::filesystem::path png;
+  int64_t count = 1;
+};
+
+/// Adds the four commands; each sets the exit code: 0 done, 2 refused or unknown, 3 nothing to attach to.
+void add_attach_commands(CLI::App& app, AttachOptions& options, int& exit_code);
+
+}  // namespace takt::command

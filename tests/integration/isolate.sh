@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: Apache-2.0
+# Runs in several processes: the same report as in one, attachable, one beside the other, and what a killed process
+# leaves behind. Deadlines are not judged here: a shared machine would make that a coin toss.
+source "$(dirname "$0")/lib.sh" "$@"
+export XDG_RUNTIME_DIR=$work/runtime
+mkdir "$XDG_RUNTIME_DIR"
+
+traces() { ls /dev/shm /tmp "$XDG_RUNTIME_DIR/takt" 2>/dev/null | grep -E '^(takt-[0-9]|roudi|iceoryx|iox|[0-9]+\.sock)' | grep -v '\.lock$'; }
+before=$(traces)
+unchanged() { [ "$(traces)" = "$before" ] || fail "$1 left behind: $(traces)"; }
+
+start_run() { # OUTPUT OPTIONS...
+  local name=$1
+  shift
+  "$takt" run --policy cooperative --output "$work/$name" "$@" >"$work/$name.out" 2>"$work/$name.err" &
+  run=$!
+  for _ in $(seq 200); do
+    "$takt" top --once --run $run >"$work/top" 2>/dev/null && return
+    sleep 0.1
+  done
+  cat "$work/$name.err"
+  fail "run $name cannot be attached to"
+}
+
+ended() { # NAME CODE...
+  wait $run
+  local got=$? name=$1
+  shift
+  for code in "$@"; do [ $got -eq "$code" ] && return; done
+  cat "$work/$name.err"
+  fail "run $name: exit $got instead of $*"
+}
+
+"$takt" run --isolate none --for 3s --policy cooperative --report "$work/one.json" --output "$work/out" >/dev/null 2>&1
+"$takt" run --isolate subsystem --for 3s --policy cooperative --report "$work/many.json" --output "$work/out" >"$work/stdout" 2>"$work/stderr"
+[ $? -le 1 ] || { cat "$work/stderr"; fail "the isolated run failed"; }
+cat "$work/stdout"
+unchanged "an isolated run"
+if command -v python3 >/dev/null; then
+  python3 - "$work/one.json" "$work/many.json" <<'PY' || fail "the two reports differ in kind"
+import json, sys
+one, many = (json.load(open(name)) for name in sys.argv[1:])
+assert many["isolation"] == "subsystem" and len(many["processes"]) >= 2, many["processes"]
+assert one["isolation"] == "none"
+shape = lambda r: [(n["name"], n["rate_hz"], n["released"]) for n in r["nodes"]]
+assert shape(one) == shape(many), (shape(one), shape(many))
+assert [(e["from"], e["to"]) for e in one["edges"]] == [(e["from"], e["to"]) for e in many["edges"]]
+for node in many["nodes"]:
+    assert node["released"] == node["completed"] + node["skipped"] + node["reused"], node
+PY
+fi
+
+start_run first --isolate subsystem --for 0s
+first=$run
+grep -q "stereo" "$work/top" || fail "top does not show stereo"
+expect 0 "" "$takt" echo stereo.disparity --png "$work/disparity.png" --run $first
+grep -q '"type": "disparity"' "$work/stdout" || fail "echo shows no disparity"
+head -c 4 "$work/disparity.png" | grep -q PNG || fail "echo wrote no PNG"
+expect 0 "" "$takt" echo ego_motion.motion --count 3 --run $first
+expect 2 "did you mean \`stereo.disparity\`" "$takt" echo stereo.disparty --run $first
+expect 2 "is no picture" "$takt" echo ego_motion.motion --png "$work/x.png" --run $first
+expect 2 "must lie in" "$takt" set mapping_3d.n_abs 100000000 --run $first
+expect 2 "without a unit" "$takt" set mapping_3d.voxel 0.3 --run $first
+expect 2 "only before the start" "$takt" set mapping_3d.n_abs 6 --run $first
+expect 2 "did you mean \`stereo\`" "$takt" set stere.disparities 6 --run $first
+expect 3 "no running graph" "$takt" top --once --run 1
+
+# A second one beside it: with a /tmp and /dev/shm of its own where that is permitted, else refused with the reason.
+if unshare -m true 2>/dev/null; then
+  start_run second --isolate subsystem --for 0s
+  grep -q "another iceoryx daemon is running" "$work/second.err" || fail "the second run does not say what it did"
+  expect 3 "several graphs are running" "$takt" top --once
+  expect 0 "" "$takt" stop --run $run
+  ended second 0 1
+else
+  expect 3 "another iceoryx daemon" "$takt" run --isolate subsystem --for 1s --output "$work/out"
+fi
+expect 0 "" "$takt" echo stereo.disparity --run $first
+expect 0 "" "$takt" stop --run $first
+run=$first
+ended first 0 1
+grep -q "CPU" "$work/first.out" || fail "no summary after stop"
+unchanged "a stopped run"
+
+# A process that is killed ends the run, which says so; nothing is left, and the next one works.
+start_run killed --isolate subsystem --for 0s
+member=$(pgrep -P $run | tail -n 1)
+kill -KILL "$member"
+ended killed 3
+grep -q "ended by signal 9" "$work/killed.err" || fail "the killed process is not named"
+pgrep -P $run >/dev/null && fail "processes are left behind"
+unchanged "a run with a killed process"
+for signal in INT TERM; do
+  start_run signal --isolate subsystem --for 0s
+  start=$(date +%s%N)
+  kill -$signal $run
+  ended signal 0 1
+  echo "SIG$signal ended it in $((($(date +%s%N) - start) / 1000000)) ms"
+done
+unchanged "a run ended by a signal"
+finish
