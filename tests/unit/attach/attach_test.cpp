@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: Apache-2.0
+// Speaking to a running graph: messages as text and pictures, the socket, its questions.
+#include <doctest/doctest.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+#include <opencv2/imgcodecs.hpp>
+
+#include "graph/attach/message_text.hpp"
+#include "graph/attach/server.hpp"
+#include "graph/compose/composition.hpp"
+#include "rt/msg/messages.hpp"
+
+namespace {
+
+using namespace takt;
+using Json = nlohmann::ordered_json;
+
+/// A message of a type in memory of its own.
+template <class T>
+struct Built {
+  explicit Built(const Capacity& capacity) : memory(MessageType::of<T>().bytes(capacity) + 64) {
+    void* start = memory.data();
+    size_t room = memory.size();
+    std::align(64, memory.size() - 64, start, room);
+    MessageType::of<T>().place(start, capacity);
+    message = static_cast<T*>(start);
+  }
+  std::vector<std::byte> memory;
+  T* message;
+};
+
+/// A folder for sockets that is ours alone, named by the environment as a session would.
+struct Folder {
+  Folder() {
+    char name[] = "/tmp/takt-attach-test-XXXXXX";
+    path = mkdtemp(name);
+    setenv("XDG_RUNTIME_DIR", path.c_str(), 1);
+  }
+  ~Folder() { std::filesystem::remove_all(path); }
+  std::filesystem::path path;
+};
+
+/// The shipped graph, as far as it is known without any device, with one output that this test writes.
+struct Scene {
+  Folder folder;
+  NodeTypes types = graph::node_types();
+  graph::GraphSpec spec;
+  Plan plan;
+  std::unique_ptr<RunBoard> board;
+  std::unique_ptr<Transport> transport;
+
+  Scene() {
+    spec.name = "test";
+    spec.nodes.push_back({"map", "mapping_3d", "depth", {}, {}, {}, {}});
+    TaskPlan task;
+    task.name = "map";
+    task.rate = Rate{2, 1};
+    plan.tasks.push_back(task);
+    plan.ports.push_back({"map", "obstacles", &MessageType::of<Grid>(), {.width = 4, .height = 3}, 2, 2, 2});
+    board = std::make_unique<RunBoard>(plan);
+    transport = make_local_transport(plan.ports);
+  }
+  Json ask(const Json& question) {
+    auto connection = attach::connect_to(getpid());
+    REQUIRE(connection);
+    REQUIRE(connection->write(question));
+    const auto answer = connection->read_line();
+    REQUIRE(answer);
+    return *answer;
+  }
+};
+
+}  // namespace
+
+TEST_CASE("a message becomes JSON by its field descriptors") {
+  Built<PointCloud> cloud({.count = 20});
+  for (int i = 0; i < 12; ++i) cloud.message->points.push_back({float(i), 0.5f, -1});
+  cloud.message->step_px = 2;
+  const Json json = attach::message_json(MessageType::of<PointCloud>(), cloud.message, 3);
+  CHECK(json["step_px"] == 2);
+  CHECK(json["sensor_in_robot.qw"] == 1.0);
+  CHECK(json["points"]["size"] == 12);
+  CHECK(json["points"]["first"].size() == 3);
+  CHECK(json["points"]["first"][2] == Json({2.0, 0.5, -1.0}));
+  Built<TextStatus> text({.count = 8});
+  for (const char c : std::string("hello")) text.message->text.push_back(c);
+  CHECK(attach::message_json(MessageType::of<TextStatus>(), text.message)["text"] == "hello");
+}
+
+TEST_CASE("every message type becomes JSON with one entry a field, and those that can be seen a picture") {
+  for (const MessageType* type : message_types()) {
+    const Capacity capacity{.width = 4, .height = 2, .channels = 1, .count = 3};
+    std::vector<std::byte> memory(type->bytes(capacity) + 64);
+    void* start = memory.data();
+    size_t room = memory.size();
+    std::align(64, memory.size() - 64, start, room);
+    type->place(start, capacity);
+    CHECK(attach::message_json(*type, start).size() == type->fields.size());
+  }
+  Built<Grid> grid({.width = 4, .height = 3});
+  grid.message->width = 4;
+  grid.message->height = 3;
+  grid.message->cells.resize(12);
+  const auto png = attach::message_png(MessageType::of<Grid>(), grid.message);
+  REQUIRE(png);
+  const cv::Mat image = cv::imdecode(std::vector<char>(png->begin(), png->end()), cv::IMREAD_COLOR);
+  CHECK(image.cols == 4 * 6);
+  CHECK(image.rows == 3 * 6);
+  Built<Odometry> odometry({});
+  CHECK_FALSE(attach::message_png(MessageType::of<Odometry>(), odometry.message));
+}
+
+TEST_CASE("top, stop and unknown questions over the socket") {
+  Scene scene;
+  scene.board->task(0).completed.store(17);
+  const attach::Server server({scene.spec, scene.plan, *scene.board, *scene.transport});
+  REQUIRE(server.lacks().empty());
+  CHECK(attach::running() == std::vector<int>{getpid()});
+  const Json top = scene.ask({{"do", "top"}});
+  CHECK(top["nodes"][0]["name"] == "map");
+  CHECK(top["nodes"][0]["completed"] == 17);
+  CHECK(scene.ask({{"do", "dance"}})["error"].get<std::string>().find("known: top, echo") != std::string::npos);
+  CHECK(scene.board->stop().end_ns() == INT64_MAX);
+  CHECK(scene.ask({{"do", "stop"}})["ok"] == true);
+  CHECK(scene.board->stop().end_ns() < INT64_MAX);
+}
+
+TEST_CASE("echo gives each new message once, and lets it go") {
+  Scene scene;
+  const auto writer = scene.transport->make_writer(0);
+  const auto publish = [&](int16_t value) {
+    auto* grid = reinterpret_cast<Grid*>(writer->loan() + 1);
+    grid->width = 4;
+    grid->height = 3;
+    grid->cells.resize(12);
+    grid->cells[0] = value;
+    writer->publish(1, 0, 0);
+  };
+  publish(500);
+  const attach::Server server({scene.spec, scene.plan, *scene.board, *scene.transport});
+  auto connection = attach::connect_to(getpid());
+  REQUIRE(connection);
+  REQUIRE(connection->write({{"do", "echo"}, {"port", "map.obstacles"}, {"png", true}, {"count", 2}}));
+  const auto first = connection->read_line();
+  REQUIRE(first);
+  CHECK((*first)["type"] == "grid");
+  CHECK((*first)["message"]["cells"]["first"][0] == 500);
+  CHECK(connection->read_bytes((*first)["bytes"].get<size_t>()));
+  publish(700);
+  const auto second = connection->read_line();
+  REQUIRE(second);
+  CHECK((*second)["sequence"] == 2);
+  CHECK((*second)["message"]["cells"]["first"][0] == 700);
+  CHECK(connection->read_bytes((*second)["bytes"].get<size_t>()));
+  CHECK(writer->statistics().in_use == 2);  // what the ring keeps, nothing else
+  const std::string wrong = scene.ask({{"do", "echo"}, {"port", "map.obstacle"}})["error"];
+  CHECK(wrong.find("did you mean `map.obstacles`") != std::string::npos);
+}
+
+TEST_CASE("set refuses what the parameter would refuse, before the node sees it") {
+  Scene scene;
+  const attach::Server server({scene.spec, scene.plan, *scene.board, *scene.transport});
+  const auto error = [&](const char* param, const char* value) {
+    return scene.ask({{"do", "set"}, {"param", param}, {"value", value}}).value("error", "");
+  };
+  CHECK(error("maps.voxel", "0.2m").find("did you mean `map`") != std::string::npos);
+  CHECK(error("map.voxl", "0.2m").find("did you mean `voxel`") != std::string::npos);
+  CHECK(error("map.voxel", "0.2").find("without a unit") != std::string::npos);
+  CHECK(error("map.voxel", "20m").find("must lie in") != std::string::npos);
+  CHECK(scene.board->mail(0).state.load() == ParamMail::empty);
+}
+
+TEST_CASE("a socket folder that is open to others is not used") {
+  Folder folder;
+  std::filesystem::create_directory(folder.path / "takt");
+  chmod((folder.path / "takt").c_str(), 0755);
+  std::string why;
+  CHECK(attach::socket_folder(why).empty());
+  CHECK(why.find("of this user alone") != std::string::npos);
+}

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+// Processes of a run and the board they share.
+#include <doctest/doctest.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <csignal>
+#include <thread>
+
+#include "rt/sched/run_board.hpp"
+#include "rt/supervise/process_group.hpp"
+
+namespace {
+
+using namespace takt;
+
+ProcessGroup::End wait_for_end(ProcessGroup& group) {
+  for (;;) {
+    if (const auto end = group.reap()) return *end;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+}
+
+Plan plan_of_two() {
+  Plan plan;
+  plan.tasks.resize(2);
+  plan.tasks[0].edges.resize(2);
+  plan.tasks[1].edges.resize(1);
+  plan.ports.resize(3);
+  return plan;
+}
+
+}  // namespace
+
+TEST_CASE("what a process writes onto the board stays there when it is killed") {
+  RunBoard board(plan_of_two(), 2);
+  ProcessGroup group;
+  group.start("writer", [&] {
+    board.task(1).completed.store(41);
+    board.task(1).exec.add(5'000'000);
+    board.edge(1, 0).received = 7;
+    board.port(2).writer.sent = 9;
+    Grant grant;
+    grant.policy = Policy::deadline;
+    grant.verified = true;
+    grant.cpus = {0, 65};
+    grant.refused = "not refused";
+    board.set_grant(1, grant);
+    board.process(1).state.store(ProcessRecord::running);
+    for (;;) pause();
+    return 0;
+  });
+  while (board.process(1).state.load() != ProcessRecord::running)
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  kill(group.pid(0), SIGKILL);
+  const ProcessGroup::End end = wait_for_end(group);
+  CHECK(end.signal == SIGKILL);
+  CHECK(end.code == -1);
+  CHECK(group.alive() == 0);
+  CHECK(board.task(1).completed.load() == 41);
+  CHECK(board.task(1).exec.count() == 1);
+  CHECK(board.edge(1, 0).received == 7);
+  CHECK(board.edge(0, 1).received == 0);
+  CHECK(board.port(2).writer.sent == 9);
+  CHECK(board.grant(1).policy == Policy::deadline);
+  CHECK(board.grant(1).verified);
+  CHECK(board.grant(1).cpus == std::vector<int>{0, 65});
+  CHECK(board.grant(1).refused == "not refused");
+}
+
+TEST_CASE("a process ends with the code of its body, with 1 if that throws, and ignores the terminal's signals") {
+  ProcessGroup group;
+  group.start("good", [] { return 0; });
+  group.start("bad", [] { return 3; });
+  group.start("broken", []() -> int { throw std::runtime_error("as the test wants it"); });
+  group.start("interrupted", [] {
+    raise(SIGINT);
+    raise(SIGHUP);
+    return 5;
+  });
+  int codes[4] = {};
+  for (int i = 0; i < 4; ++i) {
+    const ProcessGroup::End end = wait_for_end(group);
+    codes[end.process] = end.code;
+  }
+  CHECK(codes[0] == 0);
+  CHECK(codes[1] == 3);
+  CHECK(codes[2] == 1);
+  CHECK(codes[3] == 5);
+  CHECK_FALSE(group.reap());
+}
+
+TEST_CASE("no process outlives its group") {
+  pid_t pid = 0;
+  {
+    ProcessGroup group;
+    group.start("endless", [] {
+      for (;;) pause();
+      return 0;
+    });
+    pid = group.pid(0);
+    CHECK(kill(pid, 0) == 0);
+  }
+  CHECK(kill(pid, 0) != 0);
+}
