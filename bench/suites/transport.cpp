@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // One message from output to input: on one worker, between threads, between processes, at the graph's own rates (15 Hz,
 // caches cold) and at 1 kHz. References: a bare futex wake, and iceoryx as its own users would call it. At 15 Hz the
-// contestants take turns message by message, at 1 kHz in blocks of 100.
+// contestants take turns message by message, at 1 kHz in blocks of 100. Peers (bench/peers) take part at 15 Hz only.
 #include <algorithm>
 #include <cstdio>
 #include <exception>
@@ -32,6 +32,9 @@ std::vector<HopPlan> contestants() {
     hops.push_back({Carrier::takt, Place::processes, bytes, false});
     hops.push_back({Carrier::iceoryx, Place::processes, bytes, false});
   }
+  for (const Peer& peer : peers())
+    for (uint32_t bytes : kSizes)
+      if (peer.processes != nullptr) hops.push_back({Carrier::peer, Place::processes, bytes, false, peer});
   return hops;
 }
 
@@ -50,7 +53,7 @@ void close_round(Measured& out, std::vector<Samples>& round) {
 }
 
 Measured measure(Course& course, bool slow, int rounds) {
-  const size_t count = course.hops().size();
+  const size_t count = slow ? course.hops().size() : course.own();
   Measured out{std::vector<Samples>(count), std::vector<std::vector<double>>(count)};
   std::vector<Samples> round(count);
   for (int i = 0; i < kWarmUp; ++i)
@@ -69,7 +72,7 @@ Measured measure(Course& course, bool slow, int rounds) {
         course.send(hop);
         next = std::max(next, now_ns() - step) + step;  // a late answer moves the rest
         sleep_until(next - step / 4);
-        round[hop].add(static_cast<double>(course.taken_ns(hop)) * 1e-3);
+        if (const auto taken = course.taken_ns(hop)) round[hop].add(static_cast<double>(*taken) * 1e-3);
       }
     }
     close_round(out, round);
@@ -86,12 +89,18 @@ size_t find(const std::vector<HopPlan>& hops, Carrier carrier, Place place, uint
 
 class Table {
  public:
-  Table(const std::vector<HopPlan>& hops, const Measured& measured, std::string variant, std::string granted,
+  Table(const Course& course, const Measured& measured, std::string variant, std::string granted,
         std::vector<Row>& rows)
-      : hops_(hops), measured_(measured), variant_(std::move(variant)), granted_(std::move(granted)), rows_(rows) {}
+      : course_(course),
+        hops_(course.hops()),
+        measured_(measured),
+        variant_(std::move(variant)),
+        granted_(std::move(granted)),
+        rows_(rows) {}
 
   void compare(const std::string& what, size_t hop, size_t reference) {
-    Row row{"transport/" + what + "/" + variant_, "us", 0, measured_.all[hop], {}, {}, {}, granted_};
+    const std::string granted = hop < course_.own() ? granted_ : course_.granted(hop);
+    Row row{"transport/" + what + "/" + variant_, "us", 0, measured_.all[hop], {}, {}, {}, granted};
     Pairs pairs;
     for (double v : measured_.rounds[reference]) pairs.add_a(v);
     for (double v : measured_.rounds[hop]) pairs.add_b(v);
@@ -115,21 +124,16 @@ class Table {
             find(hops_, Carrier::takt, Place::processes, kSizes[0]));
     compare("threads_largest_to_smallest", find(hops_, Carrier::takt, Place::threads, kSizes[2]),
             find(hops_, Carrier::takt, Place::threads, kSizes[0]));
+    for (size_t hop = course_.own(); hop < measured_.all.size(); ++hop) compare(hops_[hop].name(), hop, processes);
   }
 
  private:
+  const Course& course_;
   const std::vector<HopPlan>& hops_;
   const Measured& measured_;
   const std::string variant_, granted_;
   std::vector<Row>& rows_;
 };
-
-std::string granted_text(const Grant& grant) {
-  if (!grant.refused.empty()) return grant.refused;
-  if (grant.policy != Policy::fixed) return "default policy";
-  return "SCHED_FIFO " + std::to_string(grant.priority) +
-         (grant.cpus.size() == 1 ? ", CPU " + std::to_string(grant.cpus[0]) : "");
-}
 
 Row count_row(const std::string& name, uint64_t count, const std::string& granted) {
   return {"transport/" + name, "count", static_cast<double>(count), {}, {}, {}, {}, granted};
@@ -146,7 +150,7 @@ void run_conditions(const Conditions& conditions, int rounds, std::vector<Row>& 
       const std::string granted = granted_text(apply(conditions.reservation));
       for (bool slow : {true, false}) {
         const Measured measured = measure(course, slow, rounds);
-        Table(course.hops(), measured, (slow ? "15hz_" : "1khz_") + conditions.name, granted, rows).add_all();
+        Table(course, measured, (slow ? "15hz_" : "1khz_") + conditions.name, granted, rows).add_all();
       }
       rows.push_back(count_row("copies_above_64_KiB/" + conditions.name, large_copies() - copies_before, granted));
     } catch (...) {
