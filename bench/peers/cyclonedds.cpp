@@ -86,25 +86,20 @@ class CycloneEnds final : public Ends {
   void publish() override {
     if (sample_ != nullptr) dds_write(writer_, sample_);
   }
-  void finish() override {
-    for (Input& input : inputs_) {
-      if (input.sample != nullptr) dds_return_loan(input.reader, &input.sample, 1);
-      input.sample = nullptr;
-    }
-  }
   std::string note() const override { return shared_ ? "shared memory" : "UDP loopback"; }
 
  private:
   struct Input {
     dds_entity_t reader = 0;
-    void* sample = nullptr;
+    std::vector<uint8_t> buffer;
   };
   dds_entity_t topic(size_t node) const {
     const std::string name = plan_.id + "_" + std::to_string(node);
     return check(dds_create_topic(participant_, type_of(plan_.bytes), name.c_str(), nullptr, nullptr));
   }
   void subscribe(size_t producer) {
-    inputs_.push_back({check(dds_create_reader(participant_, topic(producer), qos_, nullptr))});
+    inputs_.push_back(
+        {check(dds_create_reader(participant_, topic(producer), qos_, nullptr)), std::vector<uint8_t>(plan_.bytes)});
   }
   /// Until every edge of this node is matched, 10 s at most: what is written earlier is lost.
   void await_partners(size_t node) const {
@@ -121,9 +116,11 @@ class CycloneEnds final : public Ends {
       dds_sleepfor(DDS_MSECS(10));
     }
   }
+  /// Into memory of our own: this version copies out of shared memory anyway, and clears what it lends.
   static bool take(Input& input) {
+    void* sample = input.buffer.data();
     dds_sample_info_t info{};
-    return dds_take(input.reader, &input.sample, &info, 1, 1) == 1 && info.valid_data;
+    return dds_take(input.reader, &sample, &info, 1, 1) == 1 && info.valid_data;
   }
 
   const MediumPlan plan_;

@@ -7,6 +7,9 @@
 #include <algorithm>
 #include <cstdio>
 #include <memory>
+#include <numeric>
+#include <optional>
+#include <random>
 
 #include "bench/instants.hpp"
 #include "bench/peers/rung_graph.hpp"
@@ -44,17 +47,21 @@ struct Measured {
   }
 };
 
-/// Contestants that are rung, each at its own phase.
+/// Contestants that are rung, each once in a period.
 class Turns {
  public:
-  /// `first_slot` phases are left free. `locked`: somebody else keeps the same 15 Hz and must not be met, so a late
-  /// frame moves the rest by whole periods; otherwise by its lateness.
+  /// The period has as many slots as contestants and `first_slot` more, which are left free. `locked`: somebody else
+  /// keeps the same 15 Hz and must not be met, so a late frame moves the rest by whole periods; otherwise by its
+  /// lateness.
   Turns(std::vector<std::unique_ptr<RungGraph>>& graphs, size_t first_slot, bool locked, int64_t epoch_ns)
       : graphs_(graphs),
         first_slot_(first_slot),
         locked_(locked),
         step_ns_(kPeriodNs / static_cast<int64_t>(graphs.size() + first_slot)),
-        base_ns_(epoch_ns) {}
+        base_ns_(epoch_ns),
+        order_(graphs.size()) {
+    std::iota(order_.begin(), order_.end(), size_t{0});
+  }
 
   int64_t base_ns() const { return base_ns_; }
 
@@ -64,23 +71,25 @@ class Turns {
     std::vector<int64_t> cpu_ns;
     for (const auto& graph : graphs_) cpu_ns.push_back(graph->cpu_ns());
     for (int frame = 0; frame < kFramesPerRound; ++frame) {
-      for (size_t i = 0; i < graphs_.size(); ++i)
-        if (const auto taken = run_slot(i)) latencies_us[i].push_back(static_cast<double>(*taken) * 1e-3);
+      std::shuffle(order_.begin(), order_.end(), random_);
+      for (size_t slot = 0; slot < order_.size(); ++slot)
+        if (const auto taken = run_slot(slot)) latencies_us[order_[slot]].push_back(static_cast<double>(*taken) * 1e-3);
       base_ns_ += kPeriodNs;
     }
     for (size_t i = 0; i < graphs_.size(); ++i) out[i].add_round(latencies_us[i], graphs_[i]->cpu_ns() - cpu_ns[i]);
   }
 
  private:
-  std::optional<int64_t> run_slot(size_t i) {
-    if (graphs_[i]->given_up()) return std::nullopt;
-    const auto phase = static_cast<int64_t>(i + first_slot_) * step_ns_;
+  std::optional<int64_t> run_slot(size_t slot) {
+    RungGraph& graph = *graphs_[order_[slot]];
+    if (graph.given_up()) return std::nullopt;
+    const auto phase = static_cast<int64_t>(slot + first_slot_) * step_ns_;
     const int64_t late = now_ns() - base_ns_ - phase;
-    if (late > 0) base_ns_ += locked_ ? (late + kPeriodNs - 1) / kPeriodNs * kPeriodNs : late;
+    if (late > step_ns_ / 4) base_ns_ += locked_ ? (late + kPeriodNs - 1) / kPeriodNs * kPeriodNs : late;
     sleep_until(base_ns_ + phase);
-    graphs_[i]->send();
+    graph.send();
     sleep_until(base_ns_ + phase + step_ns_ * 3 / 4);  // off the CPU that the nodes may need
-    return graphs_[i]->taken_ns();
+    return graph.taken_ns();
   }
 
   std::vector<std::unique_ptr<RungGraph>>& graphs_;
@@ -88,6 +97,23 @@ class Turns {
   const bool locked_;
   const int64_t step_ns_;
   int64_t base_ns_;
+  std::vector<size_t> order_;
+  std::mt19937 random_{1};
+};
+
+/// The calling thread is the coordinator: it must be on time and is no part of any figure. Ends with the scope, since
+/// threads and processes would inherit it.
+class Punctual {
+ public:
+  Punctual() {
+    Reservation reservation;
+    reservation.policy = Policy::fixed;
+    reservation.priority = kPriority + 5;
+    apply(reservation);
+  }
+  Punctual(const Punctual&) = delete;
+  Punctual& operator=(const Punctual&) = delete;
+  ~Punctual() { apply_default(); }
 };
 
 /// Rows of one contestant against the reference of its course. `again` is the reference a second time: the null pair.
@@ -139,6 +165,7 @@ void in_process(uint32_t bytes, const Condition& condition, int rounds, std::vec
   TaktExecutor takt(shape, bytes, condition.reservation);
   constexpr int kWarmUpFrames = 20;
   Turns turns(graphs, 1, true, takt.start() + kWarmUpFrames * kPeriodNs);
+  auto punctual = std::make_optional<Punctual>();
   std::vector<Measured> measured(graphs.size());
   std::vector<int64_t> starts, cpu_ns;
   const auto note_boundary = [&] {
@@ -153,6 +180,7 @@ void in_process(uint32_t bytes, const Condition& condition, int rounds, std::vec
     turns.run_round(measured);
     note_boundary();
   }
+  punctual.reset();
   takt.stop();
   Measured ours;
   for (size_t round = 0; round + 1 < starts.size(); ++round)
@@ -192,7 +220,10 @@ void processes(uint32_t bytes, const Condition& condition, int rounds, std::vect
 
   Turns turns(graphs, 0, false, now_ns() + 20'000'000);
   std::vector<Measured> measured(graphs.size());
-  for (int round = 0; round < rounds; ++round) turns.run_round(measured);
+  {
+    const Punctual punctual;
+    for (int round = 0; round < rounds; ++round) turns.run_round(measured);
+  }
   for (size_t i = 1; i < graphs.size(); ++i)
     add_rows(rows, "chain10_processes/" + graphs[i]->name(), std::to_string(bytes) + "_" + condition.name, measured[i],
              graphs[0]->name(), measured[0], graphs[i]->granted());
