@@ -116,7 +116,7 @@ class Punctual {
   ~Punctual() { apply_default(); }
 };
 
-/// Rows of one contestant against the reference of its course. `again` is the reference a second time: the null pair.
+/// Rows of one contestant against the reference of its course.
 void add_rows(std::vector<Row>& rows, const std::string& what, const std::string& variant, const Measured& measured,
               const std::string& reference, const Measured& reference_measured, const std::string& granted) {
   const auto add = [&](const std::string& figure, Samples samples, const std::vector<double>& values,
