@@ -38,12 +38,12 @@ struct Measured {
   Samples latency_us;
   std::vector<double> median_us, cpu_us;
   void add_round(const std::vector<double>& latencies_us, int64_t cpu_ns) {
+    if (latencies_us.empty()) return;  // given up: no later round has any
     Samples round;
     round.add(latencies_us);
     latency_us.add(latencies_us);
-    const auto frames = static_cast<double>(std::max<size_t>(latencies_us.size(), 1));
-    median_us.push_back(round.quantile(0.5).value_or(0));
-    cpu_us.push_back(static_cast<double>(cpu_ns) * 1e-3 / frames);
+    median_us.push_back(*round.quantile(0.5));
+    cpu_us.push_back(static_cast<double>(cpu_ns) * 1e-3 / static_cast<double>(latencies_us.size()));
   }
 };
 
@@ -122,8 +122,10 @@ void add_rows(std::vector<Row>& rows, const std::string& what, const std::string
   const auto add = [&](const std::string& figure, Samples samples, const std::vector<double>& values,
                        const std::vector<double>& reference_values) {
     Pairs pairs;
-    for (double v : reference_values) pairs.add_a(v);
-    for (double v : values) pairs.add_b(v);
+    for (size_t round = 0; round < values.size() && round < reference_values.size(); ++round) {
+      pairs.add_a(reference_values[round]);
+      pairs.add_b(values[round]);
+    }
     add_pair(rows, {"graph/" + what + "/" + figure + "_" + variant, "us", 0, std::move(samples), {}, {}, {}, granted},
              reference, pairs);
   };

@@ -49,8 +49,9 @@ struct Measured {
 
 void close_round(Measured& out, std::vector<Samples>& round) {
   for (size_t i = 0; i < round.size(); ++i) {
+    if (round[i].size() == 0) continue;  // not in this pass; or a peer that was given up, in no later round either
     out.all[i].add(round[i].values());
-    out.rounds[i].push_back(round[i].quantile(0.5).value_or(0));
+    out.rounds[i].push_back(*round[i].quantile(0.5));
     round[i].clear();
   }
 }
@@ -130,8 +131,11 @@ class Table {
     const std::string granted = hop < course_.own() ? granted_ : course_.granted(hop);
     Row row{"transport/" + what + "/" + variant_, "us", 0, measured_.all[hop], {}, {}, {}, granted};
     Pairs pairs;
-    for (double v : measured_.rounds[reference]) pairs.add_a(v);
-    for (double v : measured_.rounds[hop]) pairs.add_b(v);
+    const std::vector<double>&a = measured_.rounds[reference], &b = measured_.rounds[hop];
+    for (size_t round = 0; round < a.size() && round < b.size(); ++round) {
+      pairs.add_a(a[round]);
+      pairs.add_b(b[round]);
+    }
     add_pair(rows_, std::move(row), hops_[reference].name(), pairs);
   }
 
