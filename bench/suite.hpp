@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "bench/statistics.hpp"
+#include "rt/sched/grant.hpp"
 
 namespace takt::bench {
 
@@ -26,6 +27,9 @@ struct Suite {
 };
 
 std::span<const Suite> suites();
+
+/// Column `granted`: policy, priority and CPU as read back, or the refusal.
+std::string granted_text(const Grant& grant);
 
 /// Rows of B against A, and of A against itself ("NAME_null"), from interleaved rounds.
 void add_pair(std::vector<Row>& rows, Row row, const std::string& reference, const Pairs& pairs);

@@ -7,6 +7,7 @@ namespace takt::bench {
 
 std::vector<Row> run_transport(const Options&);
 std::vector<Row> run_release(const Options&);
+std::vector<Row> run_graph(const Options&);
 #ifdef TAKT_BENCH_STEREO
 std::vector<Row> run_stereo(const Options&);
 #endif
@@ -15,11 +16,19 @@ std::span<const Suite> suites() {
   static const auto list = std::to_array<Suite>({
       {"transport", "one message from output to input: one worker, threads, processes", run_transport},
       {"release", "lateness of the five rates against clock_nanosleep, idle and under load", run_release},
+      {"graph", "ten nodes, seven hops: in one process, as ten processes, and over other libraries", run_graph},
 #ifdef TAKT_BENCH_STEREO
       {"stereo", "dense disparity at 640x480, 150 disparities, against OpenCV's matchers", run_stereo},
 #endif
   });
   return list;
+}
+
+std::string granted_text(const Grant& grant) {
+  if (!grant.refused.empty()) return grant.refused;
+  if (grant.policy != Policy::fixed) return "default policy";
+  return "SCHED_FIFO " + std::to_string(grant.priority) +
+         (grant.cpus.size() == 1 ? ", CPU " + std::to_string(grant.cpus[0]) : "");
 }
 
 void add_pair(std::vector<Row>& rows, Row row, const std::string& reference, const Pairs& pairs) {

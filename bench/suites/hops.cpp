@@ -1,28 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "bench/suites/hops.hpp"
 
-#include <linux/futex.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
-#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <ctime>
 #include <limits>
 #include <new>
 #include <thread>
 
+#include "bench/futex.hpp"
 #include "bench/suite.hpp"
 #include "iceoryx_posh/popo/untyped_publisher.hpp"
 #include "iceoryx_posh/popo/untyped_subscriber.hpp"
 #include "iceoryx_posh/popo/wait_set.hpp"
-#include "rt/msg/messages.hpp"
 #include "rt/shm/iceoryx_layout.hpp"
 #include "rt/shm/iceoryx_transport.hpp"
 
@@ -30,14 +28,6 @@ namespace takt::bench {
 namespace {
 
 constexpr int64_t kEver = std::numeric_limits<int64_t>::max();
-
-void wait_while(const std::atomic<uint32_t>& word, uint32_t value) {
-  syscall(SYS_futex, &word, FUTEX_WAIT, value, nullptr, nullptr, 0);
-}
-void wake(std::atomic<uint32_t>& word) {
-  word.fetch_add(1, std::memory_order_release);
-  syscall(SYS_futex, &word, FUTEX_WAKE, 1, nullptr, nullptr, 0);
-}
 
 void arrived(Line& line) {
   line.arrived_ns.store(now_ns(), std::memory_order_relaxed);
@@ -90,31 +80,14 @@ void listen_raw(Board& board, size_t hop) {
   }
 }
 
-/// A message of that many bytes: an Image with as many pixels.
-PortPlan port_of(const HopPlan& hop) {
-  const auto header = static_cast<uint32_t>((sizeof(Image) + 63) / 64 * 64);
-  const uint32_t pixels = hop.bytes > header ? hop.bytes - header : 1;
-  return {"bench", hop.name(), &MessageType::of<Image>(), {.width = pixels, .height = 1, .channels = 1}, 2, 1, 1};
-}
-
 }  // namespace
-
-int64_t now_ns() {
-  timespec t{};
-  clock_gettime(CLOCK_MONOTONIC, &t);
-  return t.tv_sec * 1'000'000'000 + t.tv_nsec;
-}
-
-void sleep_until(int64_t instant_ns) {
-  const timespec t{instant_ns / 1'000'000'000, instant_ns % 1'000'000'000};
-  while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &t, nullptr) != 0) {
-  }
-}
 
 std::string HopPlan::name() const {
   const char* where = place == Place::same_worker ? "same_worker" : place == Place::threads ? "threads" : "processes";
-  const char* what = carrier == Carrier::futex ? "futex" : carrier == Carrier::takt ? "takt" : "iceoryx";
-  std::string name = what;
+  std::string name = carrier == Carrier::futex     ? "futex"
+                     : carrier == Carrier::takt    ? "takt"
+                     : carrier == Carrier::iceoryx ? "iceoryx"
+                                                   : peer.name;
   name += '_';
   name += where;
   if (bytes > 0) name += '_' + std::to_string(bytes);
@@ -189,10 +162,14 @@ struct Course::Listeners {
 Course::Course(std::vector<HopPlan> hops, const Conditions& conditions)
     : hops_(std::move(hops)), conditions_(conditions) {
   if (hops_.size() > kMaxHops) throw CannotRun("more than " + std::to_string(kMaxHops) + " contestants");
-  for (const HopPlan& hop : hops_) ports_.push_back(port_of(hop));
+  own_ = static_cast<size_t>(
+      std::find_if(hops_.begin(), hops_.end(), [](const HopPlan& hop) { return hop.carrier == Carrier::peer; }) -
+      hops_.begin());
+  for (size_t i = 0; i < own_; ++i) ports_.push_back(pool_plan(hops_[i].name(), hops_[i].bytes + kPoolGap, 1));
   void* memory = mmap(nullptr, sizeof(Board), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
   if (memory == MAP_FAILED) throw CannotRun("no shared memory");
   board_ = ::new (memory) Board;
+  make_peers();
   std::fflush(nullptr);
   child_ = fork();
   if (child_ < 0) throw CannotRun("fork failed");
@@ -201,13 +178,13 @@ Course::Course(std::vector<HopPlan> hops, const Conditions& conditions)
     listen_in_child();
     std::exit(0);  // not _exit: iceoryx removes its socket and lock in a static destructor
   }
-  local_ = make_local_transport(ports_);
+  local_ = make_local_transport(std::span(ports_).first(own_));
   across_ = make_iceoryx_transport(ports_);
   std::strncpy(board_->domain, iceoryx_domain(getpid()).c_str(), sizeof board_->domain - 1);
   const IceoryxLayout layout = IceoryxLayout::of(ports_);
   listeners_ = std::make_unique<Listeners>(*board_);
   uint32_t expected = 0;
-  for (size_t i = 0; i < hops_.size(); ++i) {
+  for (size_t i = 0; i < own_; ++i) {
     const HopPlan& hop = hops_[i];
     Transport& transport = hop.place == Place::processes ? *across_ : *local_;
     const bool carries = hop.carrier == Carrier::takt;
@@ -223,13 +200,36 @@ Course::Course(std::vector<HopPlan> hops, const Conditions& conditions)
     if (tries > 5000) throw CannotRun("the listening process did not start");
     sleep_until(now_ns() + 1'000'000);
   }
+  start_peers();
+}
+
+void Course::make_peers() {
+  std::vector<std::unique_ptr<Medium>> media;
+  for (size_t i = own_; i < hops_.size(); ++i) {
+    const std::string id = hops_[i].name() + "_" + std::to_string(getpid());
+    media.push_back(hops_[i].peer.processes({one_hop(), hops_[i].bytes, id}));
+  }
+  ports_ = serve(media, ports_);
+  for (size_t i = own_; i < hops_.size(); ++i)
+    peers_.push_back(std::make_unique<RungGraph>(hops_[i].name(), std::move(media[i - own_]), one_hop(),
+                                                 RungGraph::Place::processes, conditions_.reservation));
+}
+
+void Course::start_peers() {
+  for (auto& peer : peers_) peer->start();
+  for (size_t i = peers_.size(); i-- > 0;) {
+    if (peers_[i]->settle()) continue;
+    std::fprintf(stderr, "peer %s: did not start here; left out\n", peers_[i]->name().c_str());
+    peers_.erase(peers_.begin() + static_cast<std::ptrdiff_t>(i));
+    hops_.erase(hops_.begin() + static_cast<std::ptrdiff_t>(own_ + i));
+  }
 }
 
 void Course::listen_in_child() {
   while (board_->daemon_up.load() == 0) sleep_until(now_ns() + 1'000'000);
   const auto transport = join_iceoryx_transport(ports_, board_->domain);
   Listeners listeners(*board_);
-  for (size_t i = 0; i < hops_.size(); ++i)
+  for (size_t i = 0; i < own_; ++i)
     if (hops_[i].place == Place::processes)
       listeners.start(i, hops_[i], conditions_,
                       hops_[i].carrier == Carrier::takt ? transport->make_reader(i) : nullptr);
@@ -241,14 +241,22 @@ Course::~Course() {
   waitpid(child_, nullptr, 0);
   listeners_.reset();
   senders_.clear();
+  peers_.clear();
   across_.reset();
   local_.reset();
   munmap(board_, sizeof(Board));
 }
 
-void Course::send(size_t hop) { senders_[hop]->send(); }
+void Course::send(size_t hop) {
+  if (hop < own_) senders_[hop]->send();
+  else if (!peers_[hop - own_]->given_up()) peers_[hop - own_]->send();
+}
 
-int64_t Course::taken_ns(size_t hop) const {
+std::optional<int64_t> Course::taken_ns(size_t hop) {
+  if (hop >= own_) {
+    RungGraph& peer = *peers_[hop - own_];
+    return peer.given_up() ? std::nullopt : peer.taken_ns();
+  }
   const Line& line = board_->lines[hop];
   for (int tries = 0; line.answered.load(std::memory_order_acquire) != line.sent.load(std::memory_order_relaxed);
        ++tries) {
@@ -257,5 +265,7 @@ int64_t Course::taken_ns(size_t hop) const {
   }
   return line.arrived_ns.load(std::memory_order_relaxed) - line.sent_ns.load(std::memory_order_relaxed);
 }
+
+std::string Course::granted(size_t hop) const { return hop < own_ ? std::string() : peers_[hop - own_]->granted(); }
 
 }  // namespace takt::bench

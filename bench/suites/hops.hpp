@@ -5,15 +5,18 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "bench/instants.hpp"
+#include "bench/peers/rung_graph.hpp"
 #include "rt/sched/grant.hpp"
 #include "rt/shm/transport.hpp"
 
 namespace takt::bench {
 
-enum class Carrier : uint8_t { futex, takt, iceoryx };
+enum class Carrier : uint8_t { futex, takt, iceoryx, peer };
 enum class Place : uint8_t { same_worker, threads, processes };
 
 /// What is to be carried, and how.
@@ -22,6 +25,7 @@ struct HopPlan {
   Place place = Place::threads;
   uint32_t bytes = 0;   ///< of the message; 0: only the wake-up
   bool second = false;  ///< null contestant: the same thing again under another name
+  Peer peer{};          ///< Carrier::peer: the library
   std::string name() const;
 };
 
@@ -49,36 +53,42 @@ struct Conditions {
 /// All hops under one set of conditions: forks the listening process, starts the daemon, the listeners; ends it all.
 class Course {
  public:
-  /// The calling process must have no other threads. Throws CannotRun.
+  /// Peers come last; one that does not start here is left out. The calling process must have no other threads. Throws
+  /// CannotRun.
   Course(std::vector<HopPlan> hops, const Conditions& conditions);
   ~Course();
   Course(const Course&) = delete;
   Course& operator=(const Course&) = delete;
 
   const std::vector<HopPlan>& hops() const { return hops_; }
+  /// Hops that are no peers'; they come first.
+  size_t own() const { return own_; }
   /// Publishes one message, loaned before the time starts (a job loans early and publishes last). The caller then
   /// sleeps, so that listeners on its own CPU get to run.
   void send(size_t hop);
   /// From publication until the listener has the message in its hands, ns. Waits for it, however late it is: nothing is
-  /// dropped. Throws CannotRun after two seconds.
-  int64_t taken_ns(size_t hop) const;
+  /// dropped. After two seconds it throws CannotRun; of a peer it is nothing then, and told by granted().
+  std::optional<int64_t> taken_ns(size_t hop);
+  /// What a peer says of itself beside its policy; empty for the others.
+  std::string granted(size_t hop) const;
 
  private:
   class Sender;
   void listen_in_child();
+  void make_peers();
+  void start_peers();
 
   std::vector<HopPlan> hops_;
   Conditions conditions_;
   Board* board_ = nullptr;
   int child_ = -1;
-  std::vector<PortPlan> ports_;
+  size_t own_ = 0;
+  std::vector<PortPlan> ports_;  ///< of the own hops, then what peers need
   std::unique_ptr<Transport> local_, across_;
+  std::vector<std::unique_ptr<RungGraph>> peers_;  ///< of hops own_, own_ + 1 ...; must end before the daemon
   std::vector<std::unique_ptr<Sender>> senders_;
   struct Listeners;
   std::unique_ptr<Listeners> listeners_;
 };
-
-int64_t now_ns();
-void sleep_until(int64_t instant_ns);
 
 }  // namespace takt::bench

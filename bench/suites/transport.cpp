@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // One message from output to input: on one worker, between threads, between processes, at the graph's own rates (15 Hz,
 // caches cold) and at 1 kHz. References: a bare futex wake, and iceoryx as its own users would call it. At 15 Hz the
-// contestants take turns message by message, at 1 kHz in blocks of 100.
+// contestants take turns message by message, at 1 kHz in blocks of 100. Peers (bench/peers) have a pass
+// of their own at 15 Hz, in an order drawn anew for each turn: they copy, and who comes next finds its caches empty.
 #include <algorithm>
 #include <cstdio>
 #include <exception>
+#include <numeric>
+#include <random>
 #include <thread>
 
 #include "bench/large_copies.hpp"
@@ -32,6 +35,9 @@ std::vector<HopPlan> contestants() {
     hops.push_back({Carrier::takt, Place::processes, bytes, false});
     hops.push_back({Carrier::iceoryx, Place::processes, bytes, false});
   }
+  for (const Peer& peer : peers())
+    for (uint32_t bytes : kSizes)
+      if (peer.processes != nullptr) hops.push_back({Carrier::peer, Place::processes, bytes, false, peer});
   return hops;
 }
 
@@ -43,33 +49,45 @@ struct Measured {
 
 void close_round(Measured& out, std::vector<Samples>& round) {
   for (size_t i = 0; i < round.size(); ++i) {
+    if (round[i].size() == 0) continue;  // not in this pass; or a peer that was given up, in no later round either
     out.all[i].add(round[i].values());
-    out.rounds[i].push_back(round[i].quantile(0.5).value_or(0));
+    out.rounds[i].push_back(*round[i].quantile(0.5));
     round[i].clear();
   }
 }
 
-Measured measure(Course& course, bool slow, int rounds) {
-  const size_t count = course.hops().size();
-  Measured out{std::vector<Samples>(count), std::vector<std::vector<double>>(count)};
-  std::vector<Samples> round(count);
+/// Everybody at 15 Hz in turns, or each at 1 kHz for a block.
+struct Pass {
+  std::vector<size_t> hops;
+  bool slow = true, shuffled = false;
+};
+
+Measured measure(Course& course, Pass pass, int rounds) {
+  std::vector<size_t>& order = pass.hops;
+  const size_t all = course.hops().size();
+  Measured out{std::vector<Samples>(all), std::vector<std::vector<double>>(all)};
+  std::vector<Samples> round(all);
   for (int i = 0; i < kWarmUp; ++i)
-    for (size_t hop = 0; hop < count; ++hop) {
+    for (size_t hop : order) {
       course.send(hop);
       sleep_until(now_ns() + 500'000);
       course.taken_ns(hop);
     }
+  std::mt19937 random(1);
   int64_t next = now_ns() + 20'000'000;
-  const int64_t step = slow ? 1'000'000'000 / 15 / static_cast<int64_t>(count) : 1'000'000;
+  const int64_t step = pass.slow ? 1'000'000'000 / 15 / static_cast<int64_t>(order.size()) : 1'000'000;
+  const size_t outer_count = pass.slow ? kPerRound15 : order.size();
+  const size_t inner_count = pass.slow ? order.size() : kPerRound1000;
   for (int r = 0; r < rounds; ++r) {
-    for (int outer = 0; outer < (slow ? kPerRound15 : static_cast<int>(count)); ++outer) {
-      for (int inner = 0; inner < (slow ? static_cast<int>(count) : kPerRound1000); ++inner) {
-        const auto hop = static_cast<size_t>(slow ? inner : outer);
+    for (size_t outer = 0; outer < outer_count; ++outer) {
+      if (pass.shuffled) std::shuffle(order.begin(), order.end(), random);
+      for (size_t inner = 0; inner < inner_count; ++inner) {
+        const size_t hop = order[pass.slow ? inner : outer];
         sleep_until(next);
         course.send(hop);
         next = std::max(next, now_ns() - step) + step;  // a late answer moves the rest
         sleep_until(next - step / 4);
-        round[hop].add(static_cast<double>(course.taken_ns(hop)) * 1e-3);
+        if (const auto taken = course.taken_ns(hop)) round[hop].add(static_cast<double>(*taken) * 1e-3);
       }
     }
     close_round(out, round);
@@ -84,17 +102,40 @@ size_t find(const std::vector<HopPlan>& hops, Carrier carrier, Place place, uint
   return static_cast<size_t>(at - hops.begin());
 }
 
+std::vector<size_t> own_hops(const Course& course) {
+  std::vector<size_t> hops(course.own());
+  std::iota(hops.begin(), hops.end(), size_t{0});
+  return hops;
+}
+
+/// The peers, Takt, and the reference of both.
+std::vector<size_t> beside_peers(const Course& course) {
+  std::vector<size_t> hops{find(course.hops(), Carrier::futex, Place::processes, 0)};
+  for (uint32_t bytes : kSizes) hops.push_back(find(course.hops(), Carrier::takt, Place::processes, bytes));
+  for (size_t hop = course.own(); hop < course.hops().size(); ++hop) hops.push_back(hop);
+  return hops;
+}
+
 class Table {
  public:
-  Table(const std::vector<HopPlan>& hops, const Measured& measured, std::string variant, std::string granted,
+  Table(const Course& course, const Measured& measured, std::string variant, std::string granted,
         std::vector<Row>& rows)
-      : hops_(hops), measured_(measured), variant_(std::move(variant)), granted_(std::move(granted)), rows_(rows) {}
+      : course_(course),
+        hops_(course.hops()),
+        measured_(measured),
+        variant_(std::move(variant)),
+        granted_(std::move(granted)),
+        rows_(rows) {}
 
   void compare(const std::string& what, size_t hop, size_t reference) {
-    Row row{"transport/" + what + "/" + variant_, "us", 0, measured_.all[hop], {}, {}, {}, granted_};
+    const std::string granted = hop < course_.own() ? granted_ : course_.granted(hop);
+    Row row{"transport/" + what + "/" + variant_, "us", 0, measured_.all[hop], {}, {}, {}, granted};
     Pairs pairs;
-    for (double v : measured_.rounds[reference]) pairs.add_a(v);
-    for (double v : measured_.rounds[hop]) pairs.add_b(v);
+    const std::vector<double>&a = measured_.rounds[reference], &b = measured_.rounds[hop];
+    for (size_t round = 0; round < a.size() && round < b.size(); ++round) {
+      pairs.add_a(a[round]);
+      pairs.add_b(b[round]);
+    }
     add_pair(rows_, std::move(row), hops_[reference].name(), pairs);
   }
 
@@ -117,19 +158,21 @@ class Table {
             find(hops_, Carrier::takt, Place::threads, kSizes[0]));
   }
 
+  void add_peers() {
+    const size_t processes = find(hops_, Carrier::futex, Place::processes, 0);
+    for (uint32_t bytes : kSizes)
+      compare("processes_" + std::to_string(bytes) + "_beside_peers",
+              find(hops_, Carrier::takt, Place::processes, bytes), processes);
+    for (size_t hop = course_.own(); hop < hops_.size(); ++hop) compare(hops_[hop].name(), hop, processes);
+  }
+
  private:
+  const Course& course_;
   const std::vector<HopPlan>& hops_;
   const Measured& measured_;
   const std::string variant_, granted_;
   std::vector<Row>& rows_;
 };
-
-std::string granted_text(const Grant& grant) {
-  if (!grant.refused.empty()) return grant.refused;
-  if (grant.policy != Policy::fixed) return "default policy";
-  return "SCHED_FIFO " + std::to_string(grant.priority) +
-         (grant.cpus.size() == 1 ? ", CPU " + std::to_string(grant.cpus[0]) : "");
-}
 
 Row count_row(const std::string& name, uint64_t count, const std::string& granted) {
   return {"transport/" + name, "count", static_cast<double>(count), {}, {}, {}, {}, granted};
@@ -145,8 +188,12 @@ void run_conditions(const Conditions& conditions, int rounds, std::vector<Row>& 
     try {
       const std::string granted = granted_text(apply(conditions.reservation));
       for (bool slow : {true, false}) {
-        const Measured measured = measure(course, slow, rounds);
-        Table(course.hops(), measured, (slow ? "15hz_" : "1khz_") + conditions.name, granted, rows).add_all();
+        const Measured measured = measure(course, {own_hops(course), slow, false}, rounds);
+        Table(course, measured, (slow ? "15hz_" : "1khz_") + conditions.name, granted, rows).add_all();
+      }
+      if (course.own() < course.hops().size()) {
+        const Measured measured = measure(course, {beside_peers(course), true, true}, rounds);
+        Table(course, measured, "15hz_" + conditions.name, granted, rows).add_peers();
       }
       rows.push_back(count_row("copies_above_64_KiB/" + conditions.name, large_copies() - copies_before, granted));
     } catch (...) {
