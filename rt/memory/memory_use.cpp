@@ -3,6 +3,8 @@
 
 #include <sys/resource.h>
 
+#include <utility>
+
 #include "rt/time/clock.hpp"
 
 // Defined by takt_allocation_counter where a program links it, null otherwise.
@@ -23,10 +25,16 @@ MemoryUse thread_memory_use() {
 
 ThreadUse take_thread_use() {
   thread_local ThreadUse last;
-  const ThreadUse now{thread_cpu_ns(), thread_memory_use()};
-  const ThreadUse used{now.cpu_ns - last.cpu_ns, now.memory - last.memory};
+  const ThreadUse now{thread_cpu_ns(), counting_allocations() ? takt_thread_allocations() : 0};
+  const ThreadUse used{now.cpu_ns - last.cpu_ns, now.allocations - last.allocations};
   last = now;
   return used;
+}
+
+uint64_t take_page_faults() {
+  thread_local uint64_t last = 0;
+  const uint64_t now = thread_memory_use().page_faults;
+  return now - std::exchange(last, now);
 }
 
 }  // namespace takt

@@ -20,12 +20,15 @@ MemoryUse thread_memory_use();
 /// What a job cost its thread.
 struct ThreadUse {
   int64_t cpu_ns = 0;
-  MemoryUse memory;
+  uint64_t allocations = 0;
 };
 /// What the calling thread has used since it last asked (the first time: since its start). A job's cost is asked for
 /// once, at its end: so it contains the wake-up and the latching, which the kernel charges to a reservation too, and
 /// nothing but a reading of the clock stands between a release and the job.
 ThreadUse take_thread_use();
+/// Page faults of the calling thread since it last asked. A system call of its own, which a lane makes once for all of
+/// its jobs.
+uint64_t take_page_faults();
 
 /// True if this program counts allocations: it is linked with takt_allocation_counter and no sanitizer replaces malloc.
 bool counting_allocations();

@@ -21,6 +21,12 @@ namespace {
 
 constexpr int kHighestPriority = 80;  // below the kernel's own interrupt threads (50 by default) nothing is gained
 
+/// What preparation has cost this thread is no job's.
+void start_counting() {
+  take_thread_use();
+  take_page_faults();
+}
+
 void name_thread(const std::string& name) { pthread_setname_np(pthread_self(), name.substr(0, 15).c_str()); }
 
 /// One line per reason, whichever lanes it hit.
@@ -131,7 +137,7 @@ bool Executor::run_partitioned(Policy policy, RunResult& result) {
       ready.arrive_and_wait();
       started.arrive_and_wait();
       if (!go.load()) return;
-      take_thread_use();  // what preparation cost is no job's
+      start_counting();
       while (lane.next_release_ns() < stop_.end_ns()) {
         stop_.sleep_until(lane.next_release_ns());
         if (lane.next_release_ns() >= stop_.end_ns()) break;
@@ -160,7 +166,7 @@ void Executor::run_cooperative() {
       name_thread("takt-worker-" + std::to_string(i));
       prefault_stack();
       apply(Reservation{});
-      take_thread_use();
+      start_counting();
       queue.work();
     });
   }
@@ -172,7 +178,7 @@ void Executor::run_cooperative() {
 void Executor::run_virtual(RunResult& result) {
   auto& clock = dynamic_cast<VirtualClock&>(clock_);
   start_clockwork(result);
-  take_thread_use();
+  start_counting();
   // Ordered by instant, then deadline, then lane: the same order in every run.
   using Event = std::tuple<int64_t, int64_t, size_t, size_t>;
   std::multiset<Event> events;

@@ -49,7 +49,7 @@ class Executor {
     bool require_policy = false;          ///< a refused policy ends the run instead of falling back to cooperative
     RunBoard* board = nullptr;            ///< shared with other processes; null: one of its own
     StartGate* gate = nullptr;            ///< where other processes are waited for
-    std::vector<bool> own = {};              ///< by task: this process runs it; empty: all
+    std::vector<bool> own = {};           ///< by task: this process runs it; empty: all
   };
 
   Executor(const Plan& plan, Transport& transport, Clock& clock, const Options& options);

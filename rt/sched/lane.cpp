@@ -31,6 +31,7 @@ void Lane::run_next(const Clock& clock, StopSignal& stop) {
   const int64_t release = next_release_ns();
   const JobEnd end = head().run(static_cast<uint64_t>(next_), release);
   if (end.end_of_data) {
+    head().count(take_page_faults());
     stop.raise(release);
     return;
   }
@@ -43,6 +44,9 @@ void Lane::run_next(const Clock& clock, StopSignal& stop) {
     if (visible_[producer] > clock.now_ns()) stop.sleep_until(visible_[producer]);
     visible_[m] = tasks_[m]->run(followers_[m].index++, visible_[producer]).visible_at_ns;
   }
+  // Page faults are asked for once a pass and stand with its head: asking costs more than an empty job.
+  for (size_t m = 0; m < tasks_.size(); ++m)
+    if (ran_[m]) tasks_[m]->count(m == 0 ? take_page_faults() : 0);
   go_to(next_ + 1);
   skip_passed(clock.now_ns(), stop.end_ns());
 }
@@ -60,6 +64,7 @@ void Lane::skip_passed(int64_t now_ns, int64_t end_ns) {
 void Lane::run_head_modelled(StopSignal& stop, std::vector<Activation>& released) {
   const int64_t release = next_release_ns();
   const JobEnd end = head().run(static_cast<uint64_t>(next_), release, head().plan().budget_ns);
+  head().count(take_page_faults());
   if (end.end_of_data) {
     stop.raise(release);
     return;
@@ -73,6 +78,7 @@ void Lane::run_head_modelled(StopSignal& stop, std::vector<Activation>& released
 void Lane::run_follower_modelled(const Activation& activation, std::vector<Activation>& released) {
   Task& task = *tasks_[activation.member];
   const JobEnd end = task.run(followers_[activation.member].index++, activation.release_ns, task.plan().budget_ns);
+  task.count(take_page_faults());
   for (size_t m = 1; m < tasks_.size(); ++m) {
     if (followers_[m].producer == activation.member && activates(m, end.visible_at_ns))
       released.push_back({m, end.visible_at_ns});

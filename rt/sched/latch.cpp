@@ -102,16 +102,16 @@ bool Latch::take_set(const std::vector<size_t>& group, int64_t stamp_ns, int64_t
 void Latch::account(Edge& edge, size_t count, bool stale, int64_t now_ns) {
   PortAccess::set_held(*edge.input, count, stale, edge.last_seen);
   if (stale) {
-    ++edge.statistics->stale;
+    ++edge.fresh.stale;
     ++stale_count_;
   }
   if (count == 0) return;
   const auto& held = PortAccess::held(*edge.input);
-  edge.statistics->age.add(now_ns - held[count - 1].stamp_ns);
+  edge.age_ns = now_ns - held[count - 1].stamp_ns;
   for (size_t i = 0; i < count; ++i) {
     if (held[i].sequence <= edge.last_seen) continue;
-    edge.statistics->dropped += held[i].sequence - edge.last_seen - 1;
-    ++edge.statistics->received;
+    edge.fresh.dropped += held[i].sequence - edge.last_seen - 1;
+    ++edge.fresh.received;
     edge.last_seen = held[i].sequence;
   }
 }
@@ -121,6 +121,18 @@ void Latch::release() {
     auto& held = PortAccess::held(*edge.input);
     for (size_t i = 0; i < PortAccess::held_count(*edge.input); ++i) edge.reader->release(held[i]);
     PortAccess::set_held(*edge.input, 0, true, edge.last_seen);
+  }
+}
+
+void Latch::count() {
+  for (Edge& edge : edges_) {
+    edge.statistics->received += edge.fresh.received;
+    edge.statistics->dropped += edge.fresh.dropped;
+    edge.statistics->stale += edge.fresh.stale;
+    edge.fresh = {};
+    if (edge.age_ns == kNoAge) continue;
+    edge.statistics->age.add(edge.age_ns);
+    edge.age_ns = kNoAge;
   }
 }
 

@@ -22,15 +22,23 @@ class Latch {
   size_t acquire(int64_t release_ns, int64_t now_ns);
   /// Empties all of them again.
   void release();
+  /// Counts what was latched since the last call: apart, so that counting stands in no job's way.
+  void count();
   const EdgeStatistics& statistics(size_t edge) const { return *edges_[edge].statistics; }
 
  private:
+  static constexpr int64_t kNoAge = INT64_MIN;
+  struct EdgeCounts {
+    uint64_t received = 0, dropped = 0, stale = 0;
+  };
   struct Edge {
     EdgePlan plan;
     InputPort* input = nullptr;
     std::unique_ptr<Reader> reader;
     uint64_t last_seen = 0;
     bool joined = false, requests = false;
+    EdgeCounts fresh;         ///< not yet in the statistics
+    int64_t age_ns = kNoAge;  ///< the same
     EdgeStatistics* statistics = nullptr;
   };
 

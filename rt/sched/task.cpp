@@ -6,13 +6,15 @@
 #include <algorithm>
 #include <cstring>
 
-#include "rt/memory/memory_use.hpp"
 #include "rt/sched/param_mail.hpp"
 #include "rt/sched/port_access.hpp"
 
 namespace takt {
 namespace {
-void count(std::atomic<uint64_t>& counter, uint64_t by = 1) { counter.fetch_add(by, std::memory_order_relaxed); }
+// One thread counts; the others only look.
+void add(std::atomic<uint64_t>& counter, uint64_t by = 1) {
+  counter.store(counter.load(std::memory_order_relaxed) + by, std::memory_order_relaxed);
+}
 }  // namespace
 
 void TaskStatistics::add_lateness(int64_t ns) {
@@ -38,7 +40,8 @@ Task::Task(const Plan& plan, size_t index, Transport& transport, const Clock& cl
       index_(index),
       statistics_(board.task(index)),
       latch_(plan_, transport, board, index),
-      published_(plan_.ports.size()) {
+      published_(plan_.ports.size()),
+      sent_stamps_ns_(plan_.ports.size(), kNothingSent) {
   for (size_t i = 0; i < plan_.ports.size(); ++i) {
     writers_.push_back(transport.make_writer(plan_.ports[i]));
     PortAccess::attach(*plan_.node->outputs()[i], writers_.back().get());
@@ -80,44 +83,74 @@ JobEnd Task::run(uint64_t index, int64_t release_ns, int64_t modelled_ns) {
 
   take_mail();
   latch_.acquire_requests(release_ns, started);
+  ended_ = {};
+  ended_.release_ns = release_ns;
+  ended_.started_ns = started;
+  ended_.modelled = modelled;
   if (!wanted(index)) {
     latch_.release();
     std::fill(published_.begin(), published_.end(), false);
-    count(statistics_.paused);
-    outcomes_[outcome_count_++ % outcomes_.size()] = {release_ns, &statistics_.paused, false};
-    JobEnd end;
-    end.finished_ns = end.visible_at_ns = started;
-    return end;
+    ended_.paused = true;
+    ended_.end.finished_ns = ended_.end.visible_at_ns = started;
+    return ended_.end;
   }
-  count(statistics_.stale_inputs, latch_.acquire(release_ns, started));
-  if (first_input_ != nullptr && first_input_->is_new()) count(statistics_.new_inputs);
+  ended_.stale = latch_.acquire(release_ns, started);
+  ended_.new_input = first_input_ != nullptr && first_input_->is_new();
   Job job(clock_, index, release_ns, deadline, 0, mode_);
   plan_.node->run(job);
 
-  JobEnd end;
+  JobEnd& end = ended_.end;
   end.end_of_data = job.ended();
   end.finished_ns = modelled ? std::max(started, release_ns) + modelled_ns : clock_.now_ns();
   publish(end, deadline, modelled);
   latch_.release();
-  record(end, job, started, modelled);
+  ended_.ran = true;
+  ended_.no_result = job.without_result();
+  ended_.cpu = modelled ? 0 : sched_getcpu();
+  ended_.used = take_thread_use();
   return end;
 }
 
-void Task::record(const JobEnd& end, const Job& job, int64_t started_ns, bool modelled) {
-  const ThreadUse used = take_thread_use();
+void Task::count(uint64_t page_faults) {
+  latch_.count();
+  statistics_.page_faults += page_faults;
+  if (ended_.paused) {
+    add(statistics_.paused);
+    outcomes_[outcome_count_++ % outcomes_.size()] = {ended_.release_ns, &statistics_.paused, false};
+  }
+  if (ended_.ran) count_end();
+  ended_ = {};
+}
+
+void Task::count_end() {
+  const JobEnd& end = ended_.end;
+  const ThreadUse& used = ended_.used;
+  add(statistics_.stale_inputs, ended_.stale);
+  if (ended_.new_input) add(statistics_.new_inputs);
+  for (size_t i = 0; i < sent_stamps_ns_.size(); ++i)
+    if (sent_stamps_ns_[i] != kNothingSent)
+      board_.port(plan_.ports[i]).age.add(ended_.published_ns - sent_stamps_ns_[i]);
   statistics_.cpu_ns += used.cpu_ns;
-  statistics_.allocations += used.memory.allocations;
-  statistics_.page_faults += used.memory.page_faults;
+  statistics_.allocations += used.allocations;
   if (end.end_of_data) return;
-  statistics_.add_lateness(started_ns - job.release_ns());
+  statistics_.add_lateness(ended_.started_ns - ended_.release_ns);
   statistics_.exec.add(used.cpu_ns);
   statistics_.last_exec_ns.store(used.cpu_ns, std::memory_order_relaxed);
-  statistics_.preempted_ns += modelled ? 0 : std::max<int64_t>(0, end.finished_ns - started_ns - used.cpu_ns);
-  if (plan_.budget_ns > 0 && used.cpu_ns > plan_.budget_ns) count(statistics_.budget_overruns);
-  if (job.without_result()) count(statistics_.no_result);
+  if (!ended_.modelled)
+    statistics_.preempted_ns += std::max<int64_t>(0, end.finished_ns - ended_.started_ns - used.cpu_ns);
+  statistics_.publish.add(ended_.publish_took_ns);
+  const int64_t response = ended_.published_ns - ended_.release_ns;
+  statistics_.response.add(response);
+  statistics_.last_response_ns.store(response, std::memory_order_relaxed);
+  if (plan_.budget_ns > 0 && used.cpu_ns > plan_.budget_ns) add(statistics_.budget_overruns);
+  if (ended_.no_result) add(statistics_.no_result);
+  if (end.late) add(statistics_.deadline_misses);
+  const bool skip = end.late && plan_.on_miss == OnMiss::skip, reuse = end.late && plan_.on_miss == OnMiss::reuse_last;
+  std::atomic<uint64_t>& counter = skip ? statistics_.skipped : reuse ? statistics_.reused : statistics_.completed;
+  add(counter);
+  outcomes_[outcome_count_++ % outcomes_.size()] = {ended_.release_ns, &counter, end.late};
   const uint64_t n = statistics_.job_count.load(std::memory_order_relaxed);
-  statistics_.jobs[n % statistics_.jobs.size()] = {job.release_ns(), started_ns, end.finished_ns,
-                                                   modelled ? 0 : sched_getcpu()};
+  statistics_.jobs[n % statistics_.jobs.size()] = {ended_.release_ns, ended_.started_ns, end.finished_ns, ended_.cpu};
   statistics_.job_count.store(n + 1, std::memory_order_release);
 }
 
@@ -127,16 +160,8 @@ void Task::publish(JobEnd& end, int64_t deadline_ns, bool modelled) {
   end.late = now > deadline_ns;
   end.visible_at_ns = plan_.publish == PublishAt::let ? std::max(now, deadline_ns) : now;
   for (size_t i = 0; i < writers_.size(); ++i) settle_output(i, end.late, now, end.visible_at_ns);
-  if (end.end_of_data) return;
-  statistics_.publish.add(modelled ? 0 : clock_.now_ns() - end.finished_ns);
-  const int64_t response = now - (deadline_ns - plan_.deadline_ns);
-  statistics_.response.add(response);
-  statistics_.last_response_ns.store(response, std::memory_order_relaxed);
-  if (end.late) count(statistics_.deadline_misses);
-  const bool skip = end.late && plan_.on_miss == OnMiss::skip, reuse = end.late && plan_.on_miss == OnMiss::reuse_last;
-  std::atomic<uint64_t>& counter = skip ? statistics_.skipped : reuse ? statistics_.reused : statistics_.completed;
-  count(counter);
-  outcomes_[outcome_count_++ % outcomes_.size()] = {deadline_ns - plan_.deadline_ns, &counter, end.late};
+  ended_.published_ns = now;
+  ended_.publish_took_ns = modelled ? 0 : clock_.now_ns() - end.finished_ns;
 }
 
 void Task::forget_from(int64_t end_ns) {
@@ -152,11 +177,12 @@ void Task::settle_output(size_t i, bool late, int64_t now_ns, int64_t visible_at
   OutputPort& output = *plan_.node->outputs()[i];
   Writer& writer = *writers_[i];
   published_[i] = false;
+  sent_stamps_ns_[i] = kNothingSent;
   const bool withheld = late && (plan_.on_miss == OnMiss::skip || plan_.on_miss == OnMiss::reuse_last);
   if (PortAccess::sent(output) && !withheld) {
     writer.publish(PortAccess::stamp_ns(output), now_ns, visible_at_ns);
     published_[i] = true;
-    board_.port(plan_.ports[i]).age.add(now_ns - PortAccess::stamp_ns(output));
+    sent_stamps_ns_[i] = PortAccess::stamp_ns(output);
   } else {
     writer.discard();
     if (withheld && plan_.on_miss == OnMiss::reuse_last) published_[i] = writer.repeat(now_ns, visible_at_ns);

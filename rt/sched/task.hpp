@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "rt/memory/memory_use.hpp"
 #include "rt/node.hpp"
 #include "rt/sched/latch.hpp"
 #include "rt/sched/run_board.hpp"
@@ -29,6 +30,9 @@ class Task {
   /// Runs job `index` released at `release_ns`. With modelled_ns >= 0 (virtual time) the job is taken to finish that
   /// long after its release; otherwise the clock is read.
   JobEnd run(uint64_t index, int64_t release_ns, int64_t modelled_ns = -1);
+  /// Counts the job that run() has just ended. Apart from it, so that in a lane no follower waits for the counting of
+  /// its producer; `page_faults` are those since the last count on this thread.
+  void count(uint64_t page_faults);
   /// Takes the jobs released at or after the end of the run out of the counts: a stop, or the end of recorded data, is
   /// told by one job while others released at that very instant may be under way. After the run.
   void forget_from(int64_t end_ns);
@@ -54,8 +58,8 @@ class Task {
   /// False if the requests visible at the release stop this task, or pace it past this job.
   bool wanted(uint64_t index) const;
   void take_mail();
-  void record(const JobEnd& end, const Job& job, int64_t started_ns, bool modelled);
   void publish(JobEnd& end, int64_t deadline_ns, bool modelled);
+  void count_end();
   void settle_output(size_t output, bool late, int64_t now_ns, int64_t visible_at_ns);
 
   const TaskPlan plan_;
@@ -67,6 +71,17 @@ class Task {
   Latch latch_;
   std::vector<std::unique_ptr<Writer>> writers_;
   std::vector<bool> published_;
+  /// The job that run() has ended and count() not yet counted.
+  struct Ended {
+    bool ran = false, paused = false, modelled = false, new_input = false, no_result = false;
+    size_t stale = 0;
+    int64_t release_ns = 0, started_ns = 0, published_ns = 0, publish_took_ns = 0;
+    int cpu = -1;
+    JobEnd end;
+    ThreadUse used;
+  } ended_;
+  std::vector<int64_t> sent_stamps_ns_;  ///< of the same job, per output; kNothingSent
+  static constexpr int64_t kNothingSent = INT64_MIN;
   const InputPort* first_input_ = nullptr;  ///< of those connected, `control` apart
   std::array<Outcome, 16> outcomes_;        ///< ring of the last jobs; far more than fit into the moment of a stop
   size_t outcome_count_ = 0;
