@@ -8,6 +8,7 @@ void register_ego_motion(NodeTypes& types);
 void register_mapping_3d(NodeTypes& types);
 void register_picture(NodeTypes& types);
 void register_obstacle_stop(NodeTypes& types);
+void register_semantic(NodeTypes& types);
 }  // namespace takt
 
 namespace takt::graph {
@@ -19,6 +20,7 @@ NodeTypes node_types() {
   register_mapping_3d(types);
   register_picture(types);
   register_obstacle_stop(types);
+  register_semantic(types);
   return types;
 }
 
