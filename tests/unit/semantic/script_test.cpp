@@ -40,7 +40,10 @@ TEST_CASE("a script is read in any order, with blanks and an empty end") {
 }
 
 TEST_CASE("a mistake in a script is quoted, with the valid forms") {
-  for (const auto& [script, piece, why] : std::initializer_list<std::tuple<const char*, const char*, const char*>>{
+  struct Mistake {
+    const char *script, *piece, *why;
+  };
+  for (const Mistake& m : std::initializer_list<Mistake>{
            {"1s stop a; 2s halt b", "\"2s halt b\"", "`halt` is no request"},
            {"5 stop a", "\"5 stop a\"", "`5` is no time"},
            {"-5s stop a", "\"-5s stop a\"", "no time"},
@@ -56,11 +59,11 @@ TEST_CASE("a mistake in a script is quoted, with the valid forms") {
            {"5s pace a 2x", "\"5s pace a 2x\"", "no N"},
            {"5s stop A", "\"5s stop A\"", "`A` is no node id"},
            {"5s stop abcdefghijklmnopqrstuvwxyz0123", "abcdefghijklmnopqrstuvwxyz0123", "longer than the 29"}}) {
-    CAPTURE(script);
-    const auto read = parse_script(script);
+    CAPTURE(m.script);
+    const auto read = parse_script(m.script);
     REQUIRE_FALSE(read.has_value());
-    CHECK_MESSAGE(read.error().find(piece) != std::string::npos, read.error());
-    CHECK_MESSAGE(read.error().find(why) != std::string::npos, read.error());
+    CHECK_MESSAGE(read.error().find(m.piece) != std::string::npos, read.error());
+    CHECK_MESSAGE(read.error().find(m.why) != std::string::npos, read.error());
     CHECK(read.error().find("\"TIME pace NODE N\"") != std::string::npos);
   }
   CHECK(parse_script("5s stop abcdefghijklmnopqrstuvwxyz012").has_value());
