@@ -54,7 +54,7 @@ enum class Poses { motion, odometry, none };
 /// mapping_3d with a camera 0.2 m before the robot's centre, driven through a world of posts.
 class Mapper {
  public:
-  Mapper(Poses poses, int64_t window, size_t capacity = 20000)
+  Mapper(Poses poses, int64_t window, size_t capacity = 30000)
       : poses_(poses), cloud_({0, 0, 1, static_cast<uint32_t>(capacity)}) {
     NodeTypes types;
     register_mapping_3d(types);
@@ -165,6 +165,37 @@ TEST_CASE("a moving window forgets what its clouds no longer show") {
       CHECK(cells.at(0.5, 4.1) == kOccupied);
     }
     CHECK(mapper.look({}, {}).at(0.5, 4.1) == kFree);
+  }
+}
+
+TEST_CASE("a remembered wall has no hole, whichever way the robot turns") {
+  std::vector<std::array<double, 2>> wall;
+  for (int i = 0; i <= 40; ++i) wall.push_back({-1.0 + 0.05 * i, 3.0 + 0.01 * i});
+  for (int k = 0; k < 60; ++k) {
+    CAPTURE(k);
+    Mapper mapper(Poses::odometry, 2);
+    mapper.look({}, wall);
+    const Cells cells = mapper.look({0.013 * k, 0, -3.0 + 0.1 * k}, {});
+    // Occupied cells reached from one of them by steps to the eight neighbours.
+    std::vector<size_t> open;
+    std::vector<bool> reached(cells.all.size());
+    const size_t occupied = static_cast<size_t>(std::count(cells.all.begin(), cells.all.end(), mapping_3d::kOccupied));
+    open.push_back(
+        static_cast<size_t>(std::find(cells.all.begin(), cells.all.end(), mapping_3d::kOccupied) - cells.all.begin()));
+    REQUIRE(occupied >= 9);  // 2 m of 0.2 m cells
+    CHECK(occupied <= 32);
+    reached[open[0]] = true;
+    size_t found = 0;
+    const auto width = static_cast<ptrdiff_t>(cells.width);
+    for (; found < open.size(); ++found)
+      for (const ptrdiff_t step :
+           {-width - 1, -width, -width + 1, ptrdiff_t{-1}, ptrdiff_t{1}, width - 1, width, width + 1}) {
+        const auto next = static_cast<size_t>(static_cast<ptrdiff_t>(open[found]) + step);
+        if (next >= cells.all.size() || reached[next] || cells.all[next] != mapping_3d::kOccupied) continue;
+        reached[next] = true;
+        open.push_back(next);
+      }
+    CHECK(found == occupied);
   }
 }
 
