@@ -2,6 +2,7 @@
 #include <doctest/doctest.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -15,20 +16,33 @@ namespace {
 
 /// The swept area the slow way: the robot is moved on in steps of at most a millimetre and half a milliradian, and each
 /// time asked whether it covers the point.
-bool covered(const Footprint& f, const Drive& d, double time_s, double x, double y) {
-  const int steps = 1 + static_cast<int>(std::max(std::abs(d.speed_m_s), 2 * std::abs(d.turn_rad_s)) * time_s / 1e-3);
-  const double dt = time_s / steps;
-  double px = 0, py = 0;
-  for (int i = 0; i <= steps; ++i) {
-    const double heading = d.turn_rad_s * dt * i, c = std::cos(heading), s = std::sin(heading);
-    const double across = c * (x - px) + s * (y - py), along = -s * (x - px) + c * (y - py);
-    if (std::abs(across) <= f.half_width_m && along >= -f.rear_m && along <= f.front_m) return true;
-    const double middle = heading + d.turn_rad_s * dt / 2;
-    px -= d.speed_m_s * dt * std::sin(middle);
-    py += d.speed_m_s * dt * std::cos(middle);
+class Way {
+ public:
+  Way(const Drive& d, double time_s) {
+    const int steps = 1 + static_cast<int>(std::max(std::abs(d.speed_m_s), 2 * std::abs(d.turn_rad_s)) * time_s / 1e-3);
+    const double dt = time_s / steps;
+    double x = 0, y = 0;
+    for (int i = 0; i <= steps; ++i) {
+      const double heading = d.turn_rad_s * dt * i, middle = heading + d.turn_rad_s * dt / 2;
+      poses_.push_back({x, y, std::cos(heading), std::sin(heading)});
+      x -= d.speed_m_s * dt * std::sin(middle);
+      y += d.speed_m_s * dt * std::cos(middle);
+    }
   }
-  return false;
-}
+  bool covers(const Footprint& f, double x, double y) const {
+    return std::any_of(poses_.begin(), poses_.end(), [&](const Pose& p) {
+      const double across = p.cosine * (x - p.x) + p.sine * (y - p.y);
+      const double along = -p.sine * (x - p.x) + p.cosine * (y - p.y);
+      return std::abs(across) <= f.half_width_m && along >= -f.rear_m && along <= f.front_m;
+    });
+  }
+
+ private:
+  struct Pose {
+    double x, y, cosine, sine;
+  };
+  std::vector<Pose> poses_;
+};
 
 Footprint grown(Footprint f, double by) { return {f.half_width_m + by, f.front_m + by, f.rear_m + by}; }
 
@@ -58,12 +72,13 @@ TEST_CASE("the protected field is the area that a robot moved step by step cover
     const Drive d = random.drive(round);
     const double time = random(0.05, 2.5);
     const ProtectedField field(f, d, time), larger(grown(f, kStep_m), d, time);
+    const Way way(d, time);
     for (int i = 0; i < 60; ++i) {
       const double x = random(-1, 1), y = random(-1, 2);
-      const bool slow = covered(f, d, time, x, y);
+      const bool slow = way.covers(f, x, y);
       (slow ? inside : outside) += 1;
       if (slow) CHECK(larger.contains(x, y));
-      if (field.contains(x, y)) CHECK(covered(grown(f, kStep_m), d, time, x, y));
+      if (field.contains(x, y)) CHECK(way.covers(grown(f, kStep_m), x, y));
     }
   }
   CHECK(inside > 1000);
