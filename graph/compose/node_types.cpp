@@ -7,6 +7,8 @@ void register_stereo(NodeTypes& types);
 void register_ego_motion(NodeTypes& types);
 void register_mapping_3d(NodeTypes& types);
 void register_picture(NodeTypes& types);
+void register_obstacle_stop(NodeTypes& types);
+void register_semantic(NodeTypes& types);
 }  // namespace takt
 
 namespace takt::graph {
@@ -17,6 +19,8 @@ NodeTypes node_types() {
   register_ego_motion(types);
   register_mapping_3d(types);
   register_picture(types);
+  register_obstacle_stop(types);
+  register_semantic(types);
   return types;
 }
 

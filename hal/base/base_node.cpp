@@ -5,8 +5,11 @@ namespace takt {
 
 void BaseNode::run(Job& job) {
   if (!running(job)) return job.no_result();
-  // A stale command is not repeated: the base's own watchdog then stops it.
-  if (const VelocityCommand* wanted = velocity_.newest(); wanted != nullptr && !velocity_.stale()) {
+  // A stop is commanded, not left to the base's watchdog, which acts later. A stale velocity is not repeated: the
+  // watchdog then stops the base.
+  if (stopped()) {
+    base_->command(0, 0, job.release_ns());
+  } else if (const VelocityCommand* wanted = velocity_.newest(); wanted != nullptr && !velocity_.stale()) {
     base_->command(wanted->speed_m_s, wanted->turn_rad_s, job.release_ns());
   }
   const BaseReading reading = base_->read(job.release_ns(), job.deadline_ns());

@@ -7,7 +7,8 @@
 
 namespace takt {
 
-/// Device kind `mobile_base`: odometry per release; passes the newest velocity command on.
+/// Device kind `mobile_base`: odometry per release; passes the newest velocity command on, or zero while a
+/// connected `stop` says stop or is silent.
 class BaseNode final : public DeviceNode {
  public:
   explicit BaseNode(std::unique_ptr<MobileBase> base) : base_(std::move(base)) {}
@@ -16,7 +17,11 @@ class BaseNode final : public DeviceNode {
   Device& device() override { return *base_; }
 
  private:
+  /// Silence means stop: a connected input without a command, or with one older than its edge allows.
+  bool stopped() const { return stop_.connected() && (stop_.empty() || stop_.stale() || stop_.newest()->stop()); }
+
   Input<VelocityCommand> velocity_{this, "velocity", "wanted speeds", Need::optional};
+  Input<StopCommand> stop_{this, "stop", "drive only while it says so", Need::optional};
   Output<Odometry> odometry_{this, "odometry", "pose and speeds in the drifting odometry frame"};
   std::unique_ptr<MobileBase> base_;
 };

@@ -79,7 +79,7 @@ constexpr DeviceKind kKinds[] = {
     {"stereo_camera", "gives `pair`", kCameraDrivers, kCamera},
     {"laser_scanner", "gives `scan`", kLaserDrivers, kLaser},
     {"camera_head", "gives `state`, takes `command`", kHeadDrivers, kHead},
-    {"mobile_base", "gives `odometry`, takes `velocity`", kSimOnly, kBase},
+    {"mobile_base", "gives `odometry`, takes `velocity` and `stop`", kSimOnly, kBase},
     {"digital_lines", "gives `state`", kLinesDrivers, kLines},
 };
 

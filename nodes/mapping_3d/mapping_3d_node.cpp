@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <string>
+#include <utility>
 
 #include "nodes/cloud/outlier_filter.hpp"
+#include "nodes/mapping_3d/grid_window.hpp"
 #include "nodes/mapping_3d/obstacle_grid.hpp"
 #include "nodes/mapping_3d/pose.hpp"
 #include "rt/node.hpp"
@@ -37,13 +40,17 @@ class MappingNode final : public Node {
       kept_.resize(cloud_.capacity().count);
       keep_.resize(cloud_.capacity().count);
     }
+    // Nothing says how views lie to each other without poses.
+    if (window_ > 1 && has_poses()) views_.emplace(window_, grid_.shape());
     mount_ = camera_mount(camera_x_, camera_y_, camera_height_, 0, camera_tilt_);
   }
 
   void run(Job& job) override {
-    for (size_t i = 0; i < motion_.size(); ++i) track_.insert(motion_.stamp_ns(i), {motion_[i].pose, {}});
-    UncertainPose camera_in_map;
-    const std::optional<size_t> chosen = choose(camera_in_map);
+    for (size_t i = 0; i < poses(); ++i) track_.insert(pose_stamp_ns(i), pose(i));
+    for (size_t i = 0; i < motion_.size(); ++i)
+      if (motion_.is_new(i) && motion_[i].keyframe && views_) views_->forget();  // poses begin anew, in another frame
+    UncertainPose found;
+    const std::optional<size_t> chosen = choose(found);
     Grid* grid = chosen ? obstacles_.loan() : nullptr;
     if (!grid) return job.no_result();
     const PointCloud* cloud = &cloud_[*chosen];
@@ -54,40 +61,57 @@ class MappingNode final : public Node {
     grid->width = grid->height = shape.cells;
     grid->cell_m = shape.cell_m;
     grid->origin_x_m = grid->origin_y_m = shape.origin_m;
-    // Motion::pose is the camera's; conjugated with the mount it is the robot's (erratum E-25).
-    const UncertainPose mount{viewpoint.camera_in_robot, {}};
-    grid->grid_in_map = compose(compose(mount, camera_in_map), inverse(mount)).transform;
+    grid->grid_in_map = robot_in_map(found, viewpoint);
     if (!grid->cells.resize(static_cast<size_t>(shape.cells) * static_cast<size_t>(shape.cells)))
       return job.no_result();
-    grid_.fill(without_outliers(cloud->points.items()), viewpoint, grid->view());
+    const std::span<const Point> points = without_outliers(cloud->points.items());
+    grid_.fill(points, viewpoint, grid->view());
+    if (views_) {
+      views_->keep(grid_, points, viewpoint, grid->grid_in_map, std::as_const(*grid).view());
+      views_->merge_older(grid->view());
+    }
     obstacles_.send(last_stamp_ns_);
   }
 
  private:
+  // Poses come from motion (of the camera) if it is connected, else from odometry (of the robot).
+  bool has_poses() const { return motion_.connected() || odometry_.connected(); }
+  size_t poses() const { return motion_.connected() ? motion_.size() : odometry_.size(); }
+  int64_t pose_stamp_ns(size_t i) const { return motion_.connected() ? motion_.stamp_ns(i) : odometry_.stamp_ns(i); }
+  UncertainPose pose(size_t i) const {
+    return {motion_.connected() ? motion_[i].pose : robot_in_odometry(odometry_[i]), {}};
+  }
+  Transform robot_in_map(const UncertainPose& found, const Viewpoint& viewpoint) const {
+    if (!motion_.connected() && odometry_.connected()) return found.transform;
+    // Motion::pose is the camera's; conjugated with the mount it is the robot's (erratum E-25).
+    const UncertainPose mount{viewpoint.camera_in_robot, {}};
+    return compose(compose(mount, found), inverse(mount)).transform;
+  }
+
   /// The newest cloud that was not mapped yet and whose pose is known, at its stamp or between two; if no latched cloud
   /// has one yet, the newest cloud with its pose predicted at constant motion: never simply the latest pose. Without
-  /// the input every cloud is seen from the origin.
-  std::optional<size_t> choose(UncertainPose& camera_in_map) const {
+  /// poses every cloud is seen from the origin.
+  std::optional<size_t> choose(UncertainPose& found) const {
     std::optional<size_t> newest;
     for (size_t i = cloud_.size(); i-- > 0 && cloud_.stamp_ns(i) > last_stamp_ns_;) {
       if (!(cloud_[i].camera.focal_px > 0)) continue;
-      if (!motion_.connected()) return i;
+      if (!has_poses()) return i;
       if (!newest) newest = i;
-      const auto pose = track_.at(cloud_.stamp_ns(i));
-      if (!pose) continue;
-      camera_in_map = *pose;
+      const auto known = track_.at(cloud_.stamp_ns(i));
+      if (!known) continue;
+      found = *known;
       return i;
     }
-    return newest && predict(cloud_.stamp_ns(*newest), camera_in_map) ? newest : std::nullopt;
+    return newest && predict(cloud_.stamp_ns(*newest), found) ? newest : std::nullopt;
   }
 
-  bool predict(int64_t stamp_ns, UncertainPose& camera_in_map) const {
-    const size_t n = motion_.size();
+  bool predict(int64_t stamp_ns, UncertainPose& found) const {
+    const size_t n = poses();
     if (n < 2) return false;
-    const int64_t last = motion_.stamp_ns(n - 1), step = last - motion_.stamp_ns(n - 2);
+    const int64_t last = pose_stamp_ns(n - 1), step = last - pose_stamp_ns(n - 2);
     if (stamp_ns < last || stamp_ns - last > kLongestGapNs || step <= 0 || step > kLongestGapNs) return false;
     const double fraction = 1 + static_cast<double>(stamp_ns - last) / static_cast<double>(step);
-    camera_in_map = interpolate({motion_[n - 2].pose, {}}, {motion_[n - 1].pose, {}}, fraction);
+    found = interpolate(pose(n - 2), pose(n - 1), fraction);
     return true;
   }
 
@@ -116,6 +140,9 @@ class MappingNode final : public Node {
 
   Input<PointCloud> cloud_{this, "cloud", "points in the camera frame; depth 4, so that one has its pose already"};
   Input<Motion> motion_{this, "motion", "camera poses around the cloud's stamp; depth 16", Need::optional};
+  Input<Odometry> odometry_{this, "odometry",
+                            "robot poses around the cloud's stamp, where motion is not connected; depth 16",
+                            Need::optional};
   Output<Grid> obstacles_{this, "obstacles", "0.20 m grid around the robot, robot frame at the cloud's stamp"};
   Param<double> outlier_radius_{this, "outlier_radius", 0.20, {0.0, 1.0}, "m", "outlier removal; 0: none"};
   Param<int> outlier_n_min_{this, "outlier_n_min",
@@ -141,10 +168,13 @@ class MappingNode final : public Node {
   Param<double> camera_tilt_{this,        "camera_tilt", 0.0,
                              {-1.6, 1.6}, "rad",         "camera tilt, up positive, where the cloud does not say"};
 
+  Param<int> window_{this, "window", 5, {1, 16}, "", "clouds that the grid is merged from; without poses always 1"};
+
   std::optional<cloud::OutlierFilter> filter_;
   std::vector<Point> kept_;
   std::vector<uint8_t> keep_;
   ObstacleGrid grid_;
+  std::optional<GridWindow> views_;
   Transform mount_;
   PoseTrack track_{InputPort::kMaxDepth, kLongestGapNs};
   int64_t last_stamp_ns_ = INT64_MIN;
@@ -153,7 +183,7 @@ class MappingNode final : public Node {
 }  // namespace
 
 void register_mapping_3d(NodeTypes& types) {
-  types.add<MappingNode>("mapping_3d", Layer::processing, "Obstacle grid around the robot from a point cloud");
+  types.add<MappingNode>("mapping_3d", Layer::perception, "Obstacle grid around the robot from a point cloud");
 }
 
 }  // namespace takt

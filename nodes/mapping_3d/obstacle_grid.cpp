@@ -12,40 +12,55 @@ ObstacleGrid::ObstacleGrid(const ObstacleParameters& parameters) : p_(parameters
   layers_ = std::max(1, static_cast<int>(std::ceil(p_.robot_height_m / p_.voxel_m - 1e-9)));
   const auto columns = static_cast<size_t>(shape_.cells) * static_cast<size_t>(shape_.cells);
   counts_.resize(columns * static_cast<size_t>(layers_));
+  blocked_.resize(counts_.size());
   seen_.resize(columns);
 }
 
 void ObstacleGrid::count(std::span<const Point> points, const Affine& camera) {
   std::fill(counts_.begin(), counts_.end(), 0u);
   std::fill(seen_.begin(), seen_.end(), 0u);
-  const double inverse = 1 / p_.voxel_m, cells = shape_.cells;
   const double* r = camera.r;
   for (const Point& p : points) {
     const double x = p.x, y = p.y, z = p.z;
-    const double column = (r[0] * x + r[1] * y + r[2] * z + camera.t[0] - shape_.origin_m) * inverse;
-    const double row = (r[3] * x + r[4] * y + r[5] * z + camera.t[1] - shape_.origin_m) * inverse;
-    const double height = r[6] * x + r[7] * y + r[8] * z + camera.t[2];
-    if (!(column >= 0 && column < cells && row >= 0 && row < cells)) continue;  // NaN fails as well
-    const int c = static_cast<int>(column), w = static_cast<int>(row);
-    ++seen_[static_cast<size_t>(w) * static_cast<size_t>(shape_.cells) + static_cast<size_t>(c)];
-    if (!(height >= p_.z_floor_m && height >= 0 && height < layers_ * p_.voxel_m)) continue;
-    ++counts_[voxel(c, w, std::min(layers_ - 1, static_cast<int>(height * inverse)))];
+    int column, row;
+    if (!shape_.cell_of(r[0] * x + r[1] * y + r[2] * z + camera.t[0], r[3] * x + r[4] * y + r[5] * z + camera.t[1],
+                        column, row))
+      continue;
+    ++seen_[static_cast<size_t>(row) * static_cast<size_t>(shape_.cells) + static_cast<size_t>(column)];
+    const int layer = layer_of(r[6] * x + r[7] * y + r[8] * z + camera.t[2]);
+    if (layer >= 0) ++counts_[voxel(column, row, layer)];
   }
 }
 
+int ObstacleGrid::layer_of(double z) const {
+  if (!(z >= p_.z_floor_m && z >= 0 && z < layers_ * p_.voxel_m)) return -1;
+  return std::min(layers_ - 1, static_cast<int>(z * (1 / p_.voxel_m)));
+}
+
+bool ObstacleGrid::blocked_at(double x, double y, double z) const {
+  int column, row;
+  if (!shape_.cell_of(x, y, column, row)) return false;
+  const int layer = layer_of(z);
+  return layer >= 0 && blocked_[voxel(column, row, layer)] != 0;
+}
+
 // Point density falls with 1/Z^2, so the threshold follows what a fully covered voxel face would give.
-bool ObstacleGrid::blocked(int column, int row, const Affine& camera, double focal_px) const {
+bool ObstacleGrid::mark_blocked(int column, int row, const Affine& camera, double focal_px) {
+  bool any = false;
   for (int layer = 0; layer < layers_; ++layer) {
     const uint32_t n = counts_[voxel(column, row, layer)];
+    uint8_t& blocked = blocked_[voxel(column, row, layer)];
+    blocked = 0;
     if (n <= static_cast<uint32_t>(p_.n_abs)) continue;
     const double dx = shape_.origin_m + (column + 0.5) * p_.voxel_m - camera.t[0];
     const double dy = shape_.origin_m + (row + 0.5) * p_.voxel_m - camera.t[1];
     const double dz = (layer + 0.5) * p_.voxel_m - camera.t[2];
     const double depth = std::max(0.5 * p_.voxel_m, camera.r[2] * dx + camera.r[5] * dy + camera.r[8] * dz);
     const double edge_px = p_.voxel_m * focal_px / depth;
-    if (n > p_.share * edge_px * edge_px) return true;
+    blocked = n > p_.share * edge_px * edge_px;
+    any |= blocked != 0;
   }
-  return false;
+  return any;
 }
 
 bool ObstacleGrid::in_view(double x, double y, const Affine& camera, double half_view_rad) const {
@@ -75,7 +90,7 @@ void ObstacleGrid::fill(std::span<const Point> points, const Viewpoint& viewpoin
   count(points, camera);
   for (int row = 0; row < shape_.cells; ++row)
     for (int column = 0; column < shape_.cells; ++column)
-      cells.at(column, row) = blocked(column, row, camera, viewpoint.focal_px) ? kOccupied : kUnknown;
+      cells.at(column, row) = mark_blocked(column, row, camera, viewpoint.focal_px) ? kOccupied : kUnknown;
   for (int row = 0; row < shape_.cells; ++row)
     for (int column = 0; column < shape_.cells; ++column) {
       if (cells.at(column, row) == kOccupied) continue;

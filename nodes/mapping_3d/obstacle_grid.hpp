@@ -34,6 +34,15 @@ struct GridShape {
   int cells = 0;        ///< along each side
   double origin_m = 0;  ///< x and y of the lower corner of cell (0, 0)
   double cell_m = 0;
+
+  /// The cell of a place; false if there is none (NaN as well).
+  bool cell_of(double x_m, double y_m, int& column, int& row) const {
+    const double inverse = 1 / cell_m, c = (x_m - origin_m) * inverse, r = (y_m - origin_m) * inverse;
+    if (!(c >= 0 && c < cells && r >= 0 && r < cells)) return false;
+    column = static_cast<int>(c);
+    row = static_cast<int>(r);
+    return true;
+  }
 };
 
 constexpr int16_t kFree = 0, kOccupied = 1000, kUnknown = Grid::unknown;
@@ -50,9 +59,14 @@ class ObstacleGrid {
   /// forward); `cells` has shape().cells in both directions; column grows with x, row with y.
   void fill(std::span<const Point> points, const Viewpoint& viewpoint, ImageView<int16_t> cells);
 
+  /// Whether a place in the robot frame lies in a voxel that the last fill() found blocked.
+  bool blocked_at(double x_m, double y_m, double z_m) const;
+
  private:
   void count(std::span<const Point> points, const Affine& camera);
-  bool blocked(int column, int row, const Affine& camera, double focal_px) const;
+  bool mark_blocked(int column, int row, const Affine& camera, double focal_px);
+  /// Layer of a voxel that an obstacle can block; -1 above, below and for the floor.
+  int layer_of(double z_m) const;
   bool in_view(double x, double y, const Affine& camera, double half_view_rad) const;
   bool hidden(int column, int row, const Affine& camera, ImageView<int16_t> cells) const;
   size_t voxel(int column, int row, int layer) const {
@@ -65,6 +79,7 @@ class ObstacleGrid {
   GridShape shape_;
   int layers_ = 0;
   std::vector<uint32_t> counts_;  // per voxel, layers of a column side by side
+  std::vector<uint8_t> blocked_;  // per voxel, of the last fill()
   std::vector<uint32_t> seen_;    // per column, floor and overhang included
 };
 

@@ -2,6 +2,7 @@
 #include "nodes/mapping_3d/pose.hpp"
 
 #include <Eigen/Geometry>
+#include <cmath>
 #include <numbers>
 
 namespace takt::mapping_3d {
@@ -20,6 +21,11 @@ Transform camera_mount(double x_m, double y_m, double height_m, double pan_rad, 
   const Eigen::Quaterniond q =
       AngleAxisd(pan_rad, Vector3d::UnitZ()) * AngleAxisd(tilt_rad - std::numbers::pi / 2, Vector3d::UnitX());
   return {x_m, y_m, height_m, q.w(), q.x(), q.y(), q.z()};
+}
+
+Transform robot_in_odometry(const Odometry& odometry) {
+  const double half = (odometry.theta_rad - std::numbers::pi / 2) / 2;
+  return {odometry.x_m, odometry.y_m, 0, std::cos(half), 0, 0, std::sin(half)};
 }
 
 }  // namespace takt::mapping_3d

@@ -17,4 +17,8 @@ Affine to_affine(const Transform& transform);
 /// about x (up positive); camera axes x right, y down, z forward.
 Transform camera_mount(double x_m, double y_m, double height_m, double pan_rad, double tilt_rad);
 
+/// The robot frame in the odometry frame: theta is the driving direction, which is the robot's y axis, so that its x
+/// axis points to theta - 90 degrees (algorithm reference 21.9).
+Transform robot_in_odometry(const Odometry& odometry);
+
 }  // namespace takt::mapping_3d

@@ -101,21 +101,24 @@ TEST_CASE("the threshold follows the subsampling of the cloud") {
 }
 
 TEST_CASE("a few stray points block nothing; a beam above the robot neither; a low one does") {
-  for (const auto& [height, points, expected] :
-       {std::tuple{1.0, 5, kFree}, {1.0, 400, kOccupied}, {1.9, 400, kFree}, {0.03, 400, kFree}}) {
-    CAPTURE(height);
-    CAPTURE(points);
+  struct Stray {
+    double height;
+    int points, expected;
+  };
+  for (const Stray& stray : {Stray{1.0, 5, kFree}, {1.0, 400, kOccupied}, {1.9, 400, kFree}, {0.03, 400, kFree}}) {
+    CAPTURE(stray.height);
+    CAPTURE(stray.points);
     Fixture f;
     // In the camera frame by the inverse mount.
     const Affine to_camera = to_affine(takt::inverse(takt::UncertainPose{f.viewpoint.camera_in_robot, {}}).transform);
-    const double r[3] = {0.1, 4.1, height};
+    const double r[3] = {0.1, 4.1, stray.height};
     Point p;
     float* out[3] = {&p.x, &p.y, &p.z};
     for (int i = 0; i < 3; ++i)
       *out[i] = static_cast<float>(to_camera.r[3 * i] * r[0] + to_camera.r[3 * i + 1] * r[1] +
                                    to_camera.r[3 * i + 2] * r[2] + to_camera.t[i]);
-    f.grid.fill(std::vector<Point>(static_cast<size_t>(points), p), f.viewpoint, f.view());
-    CHECK(f.at(0.1, 4.1) == expected);
+    f.grid.fill(std::vector<Point>(static_cast<size_t>(stray.points), p), f.viewpoint, f.view());
+    CHECK(f.at(0.1, 4.1) == stray.expected);
   }
 }
 
@@ -154,8 +157,9 @@ TEST_CASE("the node type registers with its ports") {
   const auto* type = types.find("mapping_3d");
   REQUIRE(type);
   const auto node = type->make();
-  REQUIRE(node->inputs().size() == 3);
+  REQUIRE(node->inputs().size() == 4);
   CHECK(node->inputs()[0]->name() == "cloud");
   CHECK(node->inputs()[1]->name() == "motion");
+  CHECK(node->inputs()[2]->name() == "odometry");
   CHECK(node->outputs()[0]->name() == "obstacles");
 }

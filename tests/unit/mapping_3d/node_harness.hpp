@@ -53,6 +53,7 @@ class BoxWriter final : public Writer {
   WriterStatistics statistics() const override { return {}; }
 
   T& message() { return *box_; }
+  const MessageHeader* loaned() { return &box_.header(); }
   bool sent() const { return PortAccess::sent(*port_); }
   int64_t stamp_ns() const { return PortAccess::stamp_ns(*port_); }
   void clear() { PortAccess::reset(*port_); }

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+// The last few views of the surroundings, and the grid that they make together. Each view was judged blocked, free or
+// unknown from where it was seen, since the point density that tells an obstacle is that of its own camera; what is
+// kept of it is the judgement, not the cloud.
+#pragma once
+#include <span>
+#include <vector>
+
+#include "nodes/mapping_3d/obstacle_grid.hpp"
+
+namespace takt::mapping_3d {
+
+/// A place in the map frame.
+struct Position {
+  double x_m = 0, y_m = 0, z_m = 0;
+};
+
+/// Memory is taken by the constructor (0.5 MB a view at 70 x 70 cells); nothing else allocates. One thread at a time.
+class GridWindow {
+ public:
+  GridWindow() = default;
+  /// Of `views` (>= 1) views at most, the newest included.
+  GridWindow(int views, const GridShape& shape);
+
+  /// After grid.fill(points, viewpoint, cells): keeps this view as the newest; the oldest makes room. Its points in
+  /// blocked voxels are reduced to their mean in each quarter of a cell (half a cell wide, half a cell deep).
+  void keep(const ObstacleGrid& grid, std::span<const Point> points, const Viewpoint& viewpoint,
+            const Transform& robot_in_map, ImageView<const int16_t> cells);
+
+  /// Adds the older views to the newest one's `cells`, as `merge` does: each is gridded anew from the newest pose. A
+  /// cell is occupied by a kept point in it, and free if its centre lies in a free cell of the old grid.
+  void merge_older(ImageView<int16_t> cells);
+
+  /// After the map frame has changed.
+  void forget() { views_ = 0; }
+
+ private:
+  struct View {
+    Transform robot_in_map;
+    std::vector<int16_t> cells;
+    std::vector<Position> points;
+  };
+  /// Sums of the points in one quarter of a cell, robot frame.
+  struct Quarter {
+    double x = 0, y = 0, z = 0;
+    uint32_t points = 0;
+  };
+  void reduce(const ObstacleGrid& grid, std::span<const Point> points, const Viewpoint& viewpoint, View& view);
+  void regrid(const View& old, const Transform& robot_in_map);
+
+  GridShape shape_, quarters_;
+  std::vector<View> ring_;
+  std::vector<Quarter> sums_;
+  std::vector<int16_t> regridded_;
+  size_t newest_ = 0, views_ = 0;
+};
+
+}  // namespace takt::mapping_3d

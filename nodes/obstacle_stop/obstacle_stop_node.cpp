@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+
+#include "nodes/obstacle_stop/protected_field.hpp"
+#include "nodes/obstacle_stop/stop_state.hpp"
+#include "rt/node.hpp"
+
+namespace takt {
+namespace {
+
+using namespace obstacle_stop;
+
+class ObstacleStopNode final : public Node {
+ public:
+  void setup(Setup&) override {
+    footprint_ = {width_ / 2 + margin_, length_ / 2 + margin_, length_ / 2 + margin_};
+    field_ = FieldState(stop_reason::scan_lost, nanoseconds(release_after_));
+    line_ = LineState(static_cast<uint32_t>(stop_line_()), nanoseconds(hold_));
+  }
+
+  void run(Job& job) override {
+    const int64_t now_ns = job.release_ns();
+    const LaserScan* scan = scan_.newest();
+    const int64_t stamp_ns = scan ? scan_.stamp_ns() : now_ns;
+    const bool lost = !scan || !has_geometry(*scan) || scan_.stale() || now_ns - stamp_ns > nanoseconds(scan_age_max_);
+    FieldReading seen;
+    if (scan) seen = look(*scan);
+    uint32_t reasons = lost ? stop_reason::scan_lost : 0;
+    if (seen.blocked) reasons |= stop_reason::obstacle;
+    reasons = field_.update(reasons, stamp_ns) | line_reasons(now_ns);
+
+    StopCommand* command = stop_.loan();
+    if (!command) return job.no_result();
+    command->reasons = reasons;
+    command->nearest_m = seen.nearest_m;
+    command->scan_age_s = static_cast<double>(now_ns - stamp_ns) * 1e-9;
+    stop_.send(stamp_ns);
+  }
+
+ private:
+  static int64_t nanoseconds(double seconds) { return std::llround(seconds * 1e9); }
+
+  /// Without it the beams lie nowhere, and an obstacle would be overlooked.
+  static bool has_geometry(const LaserScan& scan) {
+    const Transform& t = scan.sensor_in_robot;
+    return !scan.range_m.empty() && scan.step_rad > 0 && std::isfinite(scan.first_angle_rad + scan.step_rad) &&
+           std::isfinite(t.x + t.y + t.qw + t.qx + t.qy + t.qz);
+  }
+
+  FieldReading look(const LaserScan& scan) const {
+    const Drive drive = present_drive();
+    const ProtectedField field(footprint_, drive,
+                               stopping_time_s(drive, {deceleration_, turn_deceleration_, reaction_time_}));
+    return read_field({scan.first_angle_rad, scan.step_rad, scan.sensor_in_robot, scan.range_m.items()}, field,
+                      beams_min_);
+  }
+
+  /// What odometry says; straight ahead at the highest speed where it says nothing.
+  Drive present_drive() const {
+    const Odometry* odometry = odometry_.newest();
+    if (!odometry || odometry_.stale() || !std::isfinite(odometry->speed_m_s) || !std::isfinite(odometry->turn_rad_s))
+      return {speed_max_, 0};
+    return {odometry->speed_m_s, odometry->turn_rad_s};
+  }
+
+  uint32_t line_reasons(int64_t now_ns) {
+    if (!lines_.connected()) return 0;
+    for (size_t i = 0; i < lines_.size(); ++i)
+      if (lines_.is_new(i)) line_.see(lines_[i].levels, lines_[i].changed, now_ns);
+    const bool lost = lines_.empty() || lines_.stale() || now_ns - lines_.stamp_ns() > nanoseconds(line_age_max_);
+    return (line_.stops(now_ns) ? stop_reason::line : 0) | (lost ? stop_reason::line_lost : 0);
+  }
+
+  Input<LaserScan> scan_{this, "scan", "newest sweep of a level scanner that looks ahead"};
+  Input<DigitalState> lines_{this, "lines", "emergency-stop line; depth as many as come in a period", Need::optional};
+  Input<Odometry> odometry_{this, "odometry", "present speeds", Need::optional};
+  Output<StopCommand> stop_{this, "stop", "stop or drive on, each job, with the scan's stamp"};
+  Param<double> width_{this, "robot_width", 0.56, {0.1, 5.0}, "m", "across the driving direction"};
+  Param<double> length_{
+      this, "robot_length", 0.78, {0.1, 5.0}, "m", "along the driving direction, the robot's centre in its middle"};
+  Param<double> margin_{this, "margin", 0.10, {0.0, 1.0}, "m", "added to the robot on every side"};
+  Param<double> speed_max_{this, "speed_max", 1.4, {0.0, 10.0}, "m/s", "assumed where odometry says nothing"};
+  Param<double> deceleration_{this, "deceleration", 1.0, {0.05, 20.0}, "m/s2", "that the robot surely brakes with"};
+  Param<double> turn_deceleration_{
+      this, "turn_deceleration", 1.5, {0.05, 50.0}, "rad/s2", "that the robot surely ends a turn with"};
+  Param<double> reaction_time_{
+      this, "reaction_time", 0.35, {0.0, 3.0}, "s", "from the first beam of a scan until the robot brakes"};
+  Param<int> beams_min_{this, "beams_min", 2, {1, 64}, "", "neighbouring beams that an obstacle returns at least"};
+  Param<double> release_after_{
+      this, "release_after", 0.5, {0.0, 60.0}, "s", "the field must have been free before a stop ends"};
+  Param<double> scan_age_max_{this, "scan_age_max", 0.2, {0.01, 5.0}, "s", "a scan older than this counts as none"};
+  Param<int> stop_line_{this, "stop_line", 0, {0, 31}, "", "number of the emergency-stop line; level 0 stops"};
+  Param<double> hold_{this, "hold", 1.0, {0.0, 60.0}, "s", "a pulse on the line stops for this long"};
+  Param<double> line_age_max_{this, "line_age_max", 0.2, {0.01, 5.0}, "s", "an older line state counts as none"};
+
+  Footprint footprint_;
+  FieldState field_{stop_reason::scan_lost, 0};
+  LineState line_{0, 0};
+};
+
+}  // namespace
+
+void register_obstacle_stop(NodeTypes& types) {
+  types.add<ObstacleStopNode>("obstacle_stop", Layer::perception,
+                              "Stops the robot before what a laser scanner sees in its way");
+}
+
+}  // namespace takt

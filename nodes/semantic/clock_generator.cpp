@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "nodes/semantic/clock_generator.hpp"
+
+#include <algorithm>
+
+namespace takt::semantic {
+
+ClockGenerator::ClockGenerator(std::vector<TimedRequest> script, const std::vector<std::string>& idle,
+                               uint8_t idle_every)
+    : script_(std::move(script)), idle_every_(idle_every) {
+  for (const TimedRequest& request : script_) target_.push_back(index_of(request.node));
+  for (const std::string& id : idle) nodes_[index_of(id)].idles = true;
+  deviating_.resize(nodes_.size());
+}
+
+size_t ClockGenerator::index_of(const std::string& id) {
+  for (size_t i = 0; i < nodes_.size(); ++i)
+    if (id == nodes_[i].scripted.node) return i;
+  id.copy(nodes_.emplace_back().scripted.node, sizeof(Request::node) - 1);
+  return nodes_.size() - 1;
+}
+
+void ClockGenerator::update(int64_t elapsed_ns, bool robot_stopped) {
+  for (; next_ < script_.size() && script_[next_].after_ns <= elapsed_ns; ++next_) {
+    Request& node = nodes_[target_[next_]].scripted;
+    if (script_[next_].action == Action::pace) node.every = script_[next_].every;
+    else node.run = script_[next_].action == Action::start;
+  }
+  count_ = 0;
+  for (const NodeState& state : nodes_) {
+    Request wanted = state.scripted;
+    if (robot_stopped && state.idles) wanted.every = std::max(wanted.every, idle_every_);
+    if (!wanted.run || wanted.every > 1) deviating_[count_++] = wanted;
+  }
+}
+
+}  // namespace takt::semantic

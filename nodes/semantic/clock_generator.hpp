@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which nodes run at what pace at present (thesis Sec. 2.2, 5.3.2; algorithm reference 14.1, 14.2): the semantic
+// processing starts, stops and clocks the others. It asks; the runtime obeys at the nodes' own releases.
+#pragma once
+#include <span>
+#include <vector>
+
+#include "nodes/semantic/script.hpp"
+#include "rt/msg/messages.hpp"
+
+namespace takt::semantic {
+
+/// Memory is taken by the constructor; update() allocates nothing. One thread at a time.
+class ClockGenerator {
+ public:
+  ClockGenerator() = default;
+  /// `script` ascending in time; `idle` nodes run at every `idle_every`-th release while the robot is stopped.
+  ClockGenerator(std::vector<TimedRequest> script, const std::vector<std::string>& idle, uint8_t idle_every);
+
+  /// `elapsed_ns` since the first job, never less than in the call before.
+  void update(int64_t elapsed_ns, bool robot_stopped);
+
+  /// Of the nodes named in script and list: those that deviate from their full rate, in the order of their first
+  /// naming.
+  std::span<const Request> deviating() const { return {deviating_.data(), count_}; }
+  size_t nodes() const { return nodes_.size(); }
+
+ private:
+  struct NodeState {
+    Request scripted;  ///< as the script left it
+    bool idles = false;
+  };
+  size_t index_of(const std::string& id);  ///< in nodes_; added if it is new
+
+  std::vector<TimedRequest> script_;
+  std::vector<size_t> target_;  ///< index into nodes_ for each request of the script
+  std::vector<NodeState> nodes_;
+  std::vector<Request> deviating_;
+  size_t next_ = 0, count_ = 0;
+  uint8_t idle_every_ = 1;
+};
+
+}  // namespace takt::semantic

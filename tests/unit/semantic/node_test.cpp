@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <ctime>
+#include <vector>
+
+#include "rt/memory/memory_use.hpp"
+#include "tests/unit/mapping_3d/node_harness.hpp"
+
+namespace takt {
+void register_semantic(NodeTypes& types);
+}
+
+using namespace takt;
+
+namespace {
+
+constexpr int64_t kSecond = 1'000'000'000;
+
+int64_t cpu_ns() {
+  timespec t;
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return int64_t{t.tv_sec} * 1'000'000'000 + t.tv_nsec;
+}
+
+struct Fixture {
+  VirtualClock clock;
+  std::unique_ptr<Node> node;
+  std::unique_ptr<test::BoxWriter<Requests>> requests;
+  std::unique_ptr<test::BoxWriter<TextStatus>> status;
+  test::Box<StopCommand> stop;
+
+  Fixture() {
+    NodeTypes types;
+    register_semantic(types);
+    REQUIRE(types.find("semantic")->layer == Layer::processing);
+    node = types.find("semantic")->make();
+  }
+  void set(std::string_view name, const ParamValue& value) {
+    for (ParamBase* p : node->params())
+      if (p->name() == name) REQUIRE(p->set(value));
+  }
+  void set_up() {
+    Setup setup{clock, ".", ".", 0, std::nullopt, 0};
+    node->setup(setup);
+    requests = std::make_unique<test::BoxWriter<Requests>>(*node->outputs()[0]);
+    status = std::make_unique<test::BoxWriter<TextStatus>>(*node->outputs()[1]);
+  }
+  std::string job(int64_t release_ns) {
+    requests->clear(), status->clear();
+    Job job(clock, 0, release_ns, release_ns + 66'000'000, 0, "full");
+    const uint64_t before = thread_memory_use().allocations;
+    node->run(job);
+    if (counting_allocations()) CHECK(thread_memory_use().allocations == before);
+    REQUIRE(requests->sent());
+    REQUIRE(status->sent());
+    CHECK(requests->stamp_ns() == release_ns);
+    CHECK(status->stamp_ns() == release_ns);
+    const auto text = status->message().text.items();
+    return {text.begin(), text.end()};
+  }
+  std::span<const Request> wanted() { return requests->message().wanted.items(); }
+};
+
+}  // namespace
+
+TEST_CASE("semantic: the script counts from the first job, and its state is repeated by each") {
+  Fixture f;
+  f.set("script", std::string("5s stop object_detection; 8s start object_detection; 10s pace ground_map 2"));
+  f.set_up();
+  CHECK(f.job(100 * kSecond) == "all nodes at full rate");
+  CHECK(f.wanted().empty());
+  f.job(104 * kSecond);
+  CHECK(f.wanted().empty());
+  for (const int64_t at : {105, 106}) {
+    CHECK(f.job(at * kSecond) == "stopped: object_detection");
+    REQUIRE(f.wanted().size() == 1);
+    CHECK(f.wanted()[0].node == std::string_view("object_detection"));
+    CHECK(f.wanted()[0].run == 0);
+  }
+  f.job(108 * kSecond);
+  CHECK(f.wanted().empty());
+  CHECK(f.job(200 * kSecond) == "paced: ground_map/2");
+  REQUIRE(f.wanted().size() == 1);
+  CHECK(f.wanted()[0].run == 1);
+  CHECK(f.wanted()[0].every == 2);
+}
+
+TEST_CASE("semantic: idle nodes are paced while the robot is stopped or nobody says that it may drive") {
+  Fixture f;
+  f.set("idle", std::string("stereo, ground_map"));
+  f.set("idle_every", int64_t{5});
+  auto& port = test::input(*f.node, "stop");
+  PortAccess::connect(port, {});
+  f.set_up();
+  CHECK(f.job(0) == "robot stopped: no stop command | paced: stereo/5, ground_map/5");
+  test::latch(port, f.stop, 0, 1);
+  CHECK(f.job(kSecond) == "all nodes at full rate");
+  f.stop->reasons = stop_reason::obstacle;
+  CHECK(f.job(2 * kSecond) == "robot stopped: obstacle | paced: stereo/5, ground_map/5");
+  CHECK(f.wanted().size() == 2);
+  f.stop->reasons = 0;
+  f.job(3 * kSecond);
+  CHECK(f.wanted().empty());
+  PortAccess::set_held(port, 1, true, 0);
+  f.job(4 * kSecond);
+  CHECK(f.wanted().size() == 2);
+
+  Fixture unconnected;
+  unconnected.set("idle", std::string("stereo"));
+  unconnected.set("idle_every", int64_t{5});
+  unconnected.set_up();
+  unconnected.job(0);
+  CHECK(unconnected.wanted().empty());
+}
+
+TEST_CASE("semantic: tells objects and the way ahead, from fresh messages only") {
+  Fixture f;
+  auto& detections_port = test::input(*f.node, "detections");
+  auto& obstacles_port = test::input(*f.node, "obstacles");
+  auto& ground_port = test::input(*f.node, "ground");
+  PortAccess::connect(detections_port, {0, 0, 1, 4});
+  PortAccess::connect(obstacles_port, {2, 2, 1, 0});
+  PortAccess::connect(ground_port, {2, 2, 1, 0});
+  f.set_up();
+  CHECK(f.job(0) == "all nodes at full rate");
+  test::Box<Detections> detections({0, 0, 1, 4});
+  detections->boxes.resize(3);
+  test::Box<Grid> near({2, 2, 1, 0}), far({2, 2, 1, 0});
+  for (auto* grid : {&near, &far}) {
+    (*grid)->width = (*grid)->height = 2;
+    (*grid)->cell_m = 1;
+    (*grid)->origin_x_m = -1;
+    (*grid)->origin_y_m = grid == &near ? 2 : 3;
+    (*grid)->cells.resize(4);
+    for (auto& c : (*grid)->cells.items()) c = 1000;
+  }
+  test::latch(detections_port, detections, 0, 1);
+  test::latch(obstacles_port, near, 0, 1);
+  test::latch(ground_port, far, 0, 1);
+  CHECK(f.job(kSecond) == "objects: 3 | obstacle ahead: 2.0 m | ground ends ahead: 3.0 m");
+  PortAccess::set_held(obstacles_port, 1, true, 0);
+  far->width = 3;  // larger than what came with it
+  CHECK(f.job(kSecond) == "objects: 3");
+}
+
+TEST_CASE("semantic refuses a script and a list that it cannot read") {
+  Fixture f;
+  f.set("script", std::string("5s stop a; 6s stopp b"));
+  CHECK_THROWS_WITH_AS(f.set_up(), doctest::Contains("script: \"6s stopp b\": `stopp` is no request"), SetupError);
+  Fixture g;
+  g.set("idle", std::string("a; b"));
+  CHECK_THROWS_WITH_AS(g.set_up(), doctest::Contains("idle: \"a; b\": `a;` is no node id"), SetupError);
+}
+
+TEST_CASE("cost of a job" * doctest::skip()) {  // a figure and no check; run with --no-skip
+  Fixture f;
+  f.set("script", std::string("0s stop a; 0s pace b 2; 0s pace c 3"));
+  auto& obstacles_port = test::input(*f.node, "obstacles");
+  auto& ground_port = test::input(*f.node, "ground");
+  PortAccess::connect(obstacles_port, {70, 70, 1, 0});
+  PortAccess::connect(ground_port, {70, 70, 1, 0});
+  f.set_up();
+  test::Box<Grid> grid({70, 70, 1, 0});
+  grid->width = grid->height = 70;
+  grid->cell_m = 0.2;
+  grid->origin_x_m = grid->origin_y_m = -7;
+  grid->cells.resize(4900);
+  for (size_t i = 0; i < 4900; ++i) grid->cells[i] = i % 7 == 0 ? 1000 : 0;
+  test::latch(obstacles_port, grid, 0, 1);
+  test::latch(ground_port, grid, 0, 1);
+  std::vector<double> us;
+  for (int i = 0; i < 1000; ++i) {
+    const int64_t start = cpu_ns();
+    f.job(i);
+    us.push_back(static_cast<double>(cpu_ns() - start) * 1e-3);
+  }
+  std::sort(us.begin(), us.end());
+  MESSAGE(us[500] << " us median, " << us[990] << " us p99, with the harness's own");
+}

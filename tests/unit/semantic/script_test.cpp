@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "nodes/semantic/script.hpp"
+
+#include <doctest/doctest.h>
+
+#include "nodes/semantic/clock_generator.hpp"
+
+using namespace takt;
+using namespace takt::semantic;
+
+namespace {
+
+constexpr int64_t kSecond = 1'000'000'000;
+
+/// "a off, b/2" for what deviates.
+std::string text(const ClockGenerator& generator) {
+  std::string all;
+  for (const Request& r : generator.deviating())
+    all += (all.empty() ? "" : ", ") + std::string(r.node) + (r.run ? "/" + std::to_string(r.every) : " off");
+  return all;
+}
+
+}  // namespace
+
+TEST_CASE("a script is read in any order, with blanks and an empty end") {
+  const auto script = parse_script(" 10s pace ground_map 2;5s stop object_detection ;\n500ms start a1; ");
+  REQUIRE(script.has_value());
+  REQUIRE(script->size() == 3);
+  CHECK((*script)[0].after_ns == kSecond / 2);
+  CHECK((*script)[0].action == Action::start);
+  CHECK((*script)[0].node == "a1");
+  CHECK((*script)[1].after_ns == 5 * kSecond);
+  CHECK((*script)[1].action == Action::stop);
+  CHECK((*script)[2].action == Action::pace);
+  CHECK((*script)[2].node == "ground_map");
+  CHECK((*script)[2].every == 2);
+  CHECK(parse_script("")->empty());
+  CHECK(parse_script(" ; ;")->empty());
+  CHECK((*parse_script("1.25s stop a"))[0].after_ns == 1'250'000'000);
+}
+
+TEST_CASE("a mistake in a script is quoted, with the valid forms") {
+  struct Mistake {
+    const char *script, *piece, *why;
+  };
+  for (const Mistake& m : std::initializer_list<Mistake>{
+           {"1s stop a; 2s halt b", "\"2s halt b\"", "`halt` is no request"},
+           {"5 stop a", "\"5 stop a\"", "`5` is no time"},
+           {"-5s stop a", "\"-5s stop a\"", "no time"},
+           {"nans stop a", "\"nans stop a\"", "no time"},
+           {"5m stop a", "\"5m stop a\"", "no time"},
+           {"stop a", "\"stop a\"", "`stop` is no time"},
+           {"5s", "\"5s\"", "nothing is asked for"},
+           {"5s stop", "\"5s stop\"", "2 words instead of 3"},
+           {"5s stop a b", "\"5s stop a b\"", "4 words instead of 3"},
+           {"5s pace a", "\"5s pace a\"", "3 words instead of 4"},
+           {"5s pace a 0", "\"5s pace a 0\"", "`0` is no N of 1..255"},
+           {"5s pace a 256", "\"5s pace a 256\"", "no N"},
+           {"5s pace a 2x", "\"5s pace a 2x\"", "no N"},
+           {"5s stop A", "\"5s stop A\"", "`A` is no node id"},
+           {"5s stop abcdefghijklmnopqrstuvwxyz0123", "abcdefghijklmnopqrstuvwxyz0123", "longer than the 29"}}) {
+    CAPTURE(m.script);
+    const auto read = parse_script(m.script);
+    REQUIRE_FALSE(read.has_value());
+    CHECK_MESSAGE(read.error().find(m.piece) != std::string::npos, read.error());
+    CHECK_MESSAGE(read.error().find(m.why) != std::string::npos, read.error());
+    CHECK(read.error().find("\"TIME pace NODE N\"") != std::string::npos);
+  }
+  CHECK(parse_script("5s stop abcdefghijklmnopqrstuvwxyz012").has_value());
+}
+
+TEST_CASE("a list of nodes") {
+  CHECK(*parse_node_list(" a, b,c  a") == std::vector<std::string>{"a", "b", "c"});
+  CHECK(parse_node_list("")->empty());
+  CHECK(parse_node_list("a, B").error().find("`B` is no node id") != std::string::npos);
+}
+
+TEST_CASE("the clock generator names who deviates, and nobody else") {
+  ClockGenerator generator(
+      *parse_script("1s stop a; 2s pace b 3; 3s start a; 4s pace a 2; 5s stop a; 6s start a; 7s pace a 1; 7s pace b 1"),
+      {}, 1);
+  CHECK(generator.nodes() == 2);
+  const auto at = [&](int64_t ns) {
+    generator.update(ns, false);
+    return text(generator);
+  };
+  CHECK(at(0) == "");
+  CHECK(at(kSecond - 1) == "");
+  CHECK(at(kSecond) == "a off");
+  CHECK(at(2 * kSecond) == "a off, b/3");
+  CHECK(at(3 * kSecond) == "b/3");
+  CHECK(at(4 * kSecond) == "a/2, b/3");
+  CHECK(at(5 * kSecond) == "a off, b/3");
+  CHECK(at(6 * kSecond) == "a/2, b/3");  // a stop does not forget the pace
+  CHECK(at(60 * kSecond) == "");
+}
+
+TEST_CASE("idle nodes are paced while the robot is stopped; a slower pace of the script stays") {
+  ClockGenerator generator(*parse_script("1s pace a 5; 1s pace b 2; 1s stop c"), {"c", "b", "a", "d"}, 3);
+  generator.update(0, false);
+  CHECK(text(generator) == "");
+  generator.update(1, true);
+  CHECK(text(generator) == "a/3, b/3, c/3, d/3");
+  generator.update(kSecond, true);
+  CHECK(text(generator) == "a/5, b/3, c off, d/3");
+  generator.update(kSecond, false);
+  CHECK(text(generator) == "a/5, b/2, c off");
+}
