@@ -247,6 +247,6 @@ NodeResult make_device(const DeviceConfig& config, Devices& devices, const Clock
   return make_sim(config, settings, devices, clock);
 }
 
-int64_t simulator_cpu_ns(const Devices&) { return sim::simulator_cpu_ns(); }
+int64_t simulator_cpu_ns(const Devices&) { return sim::simulator_cost().total_ns(); }
 
 }  // namespace takt::hal
