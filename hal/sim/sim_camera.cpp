@@ -94,10 +94,8 @@ void SimCamera::trigger(int64_t at_ns) {
   triggered_ns_ = at_ns;
   has_trigger_ = ever_triggered_ = true;
   ++triggers_;
-  // While the background thread works on an older exposure it must not be asked for another: that frame is then
-  // rendered by read(), and the thread is free again for the next one.
-  if (!worker_.joinable() || done_.load(std::memory_order_acquire) != asked_.load(std::memory_order_relaxed)) return;
-  asked_at_ns_ = at_ns;
+  if (!worker_.joinable()) return;
+  asked_at_ns_.store(at_ns, std::memory_order_relaxed);
   asked_.fetch_add(1, std::memory_order_release);
   asked_.notify_one();
 }
@@ -112,10 +110,12 @@ void SimCamera::work() {
     asked_.wait(seen, std::memory_order_acquire);
     if (quit_.load()) return;
     seen = asked_.load(std::memory_order_acquire);
-    wait_until_settled(asked_at_ns_);
+    const int64_t at_ns = asked_at_ns_.load(std::memory_order_relaxed);
+    wait_until_settled(at_ns, seen);
     if (quit_.load()) return;
+    if (asked_.load() != seen) continue;
     const int64_t before = thread_cpu_ns();
-    made_ = request_at(asked_at_ns_);
+    made_ = request_at(at_ns);
     render(*background_lens_, made_, {prepared_[0].data(), rig.width, rig.height, rig.channels},
            {prepared_[1].data(), rig.width, rig.height, rig.channels});
     cost_.add({thread_cpu_ns() - before, 0});
@@ -125,8 +125,8 @@ void SimCamera::work() {
 
 /// A robot or head that is under way may still be sent elsewhere: drawn before that is settled, a frame is drawn in
 /// vain, and read() has to do it again within its job. A camera of 5 Hz is triggered long before.
-void SimCamera::wait_until_settled(int64_t at_ns) const {
-  while (!quit_.load() && !simulation_.settled(settings_.rig.on_head, at_ns) &&
+void SimCamera::wait_until_settled(int64_t at_ns, uint32_t asked) const {
+  while (asked_.load() == asked && !simulation_.settled(settings_.rig.on_head, at_ns) &&
          clock_.now_ns() < at_ns - kLatestStartNs) {
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
   }

@@ -58,7 +58,7 @@ class SimCamera final : public StereoCamera {
   /// Rendering begins at the latest this long before the exposure: several times what a pair costs.
   static constexpr int64_t kLatestStartNs = 50'000'000;
   void work();
-  void wait_until_settled(int64_t at_ns) const;
+  void wait_until_settled(int64_t at_ns, uint32_t asked) const;
   Request request_at(int64_t at_ns) const;
   void render(Lens& lens, const Request& request, ImageView<uint8_t> left, ImageView<uint8_t> right) const;
 
@@ -75,9 +75,10 @@ class SimCamera final : public StereoCamera {
   int64_t next_free_frame_ = 0;
   uint64_t rendered_ahead_ = 0, delivered_ = 0;
 
-  // Hand-over to the background thread: it reads `asked_at_ns_` after it saw a new `asked_`, and writes `prepared_` and
-  // `made_` before it publishes `done_`. The reader touches `prepared_` only while done_ == asked_.
-  int64_t asked_at_ns_ = 0;
+  // Hand-over to the background thread: it writes `prepared_` and `made_` only while done_ != asked_, the reader looks
+  // at them only while they are equal. Asked again while it draws, the thread goes on with the newest wish, so that a
+  // frame that came too late costs one read only.
+  std::atomic<int64_t> asked_at_ns_{0};
   Request made_;
   std::atomic<uint32_t> asked_{0}, done_{0};
   std::atomic<bool> quit_{false};

@@ -300,6 +300,23 @@ TEST_CASE("an exposure far ahead is rendered once, when no command can change it
   CHECK(camera.cost().in_read_ns == 0);
 }
 
+TEST_CASE("asked for another exposure, the thread lets go of the one it waits for") {
+  MonotonicClock clock;
+  const int64_t epoch = clock.now_ns() + 3'600'000'000'000;
+  const auto s = test::small_simulation();
+  SimBase base("base", {}, *s);
+  SimCamera camera("camera", {test::small_rig(), {}, {5, 1}, true}, *s, clock);
+  REQUIRE(camera.open().has_value());
+  REQUIRE(base.start(epoch).has_value());
+  REQUIRE(camera.start(epoch).has_value());
+  (void)base.read(epoch, INT64_MAX);
+  camera.trigger(epoch + 200'000'000);
+  camera.trigger(epoch + 50'000'000);
+  while (!camera.idle()) std::this_thread::yield();
+  CHECK(read(camera).frame.stamp_ns == epoch + 50'000'000);
+  CHECK(camera.rendered_ahead() == 1);
+}
+
 TEST_CASE("a camera that waits for the world to settle stops at once") {
   MonotonicClock clock;
   const int64_t epoch = clock.now_ns() + 3'600'000'000'000;
