@@ -9,7 +9,9 @@
 #include "hal/gpio/lines_node.hpp"
 #include "hal/head/head_node.hpp"
 #include "hal/laser/laser_node.hpp"
+#include "hal/replay/replay_base.hpp"
 #include "hal/replay/replay_camera.hpp"
+#include "hal/replay/replay_laser.hpp"
 #include "hal/settings/settings.hpp"
 #include "hal/sim/sim_camera.hpp"
 #include "hal/sim/sim_devices.hpp"
@@ -98,6 +100,40 @@ NodeResult make_replay_camera(const DeviceConfig& config, Settings& settings, co
   camera.rate = rate_of(settings);
   std::unique_ptr<StereoCamera> device = std::make_unique<replay::ReplayCamera>(config.id, camera, clock);
   return opened<StereoCameraNode>(std::move(device), settings, thresholds_of(settings));
+}
+
+replay::LogPace pace_of(Settings& settings) {
+  replay::LogPace pace;
+  pace.speed = settings.quantity("speed", Dimension::number, pace.speed);
+  const double start_s = settings.quantity("start", Dimension::time, 0.0);
+  if (std::abs(start_s) <= 4e9) pace.start_ns = std::llround(start_s * 1e9);
+  else settings.fail("`start` is beyond 4e9 s", "give a time of the log");
+  return pace;
+}
+
+NodeResult make_replay_laser(const DeviceConfig& config, Settings& settings) {
+  replay::ReplayLaserSettings laser;
+  laser.log = settings.path("log", true);
+  laser.pace = pace_of(settings);
+  if (settings.has("mount")) laser.sensor_in_robot = settings.mount("mount");
+  if (settings.has("range")) {
+    laser.max_range_m = settings.quantity("range", Dimension::length);
+    if (laser.max_range_m <= 0) settings.fail("`range` is not positive", "give the largest distance that counts");
+  }
+  std::unique_ptr<LaserScanner> device = std::make_unique<replay::ReplayLaser>(config.id, laser);
+  return opened<LaserNode>(std::move(device), settings);
+}
+
+NodeResult make_replay_base(const DeviceConfig& config, Settings& settings) {
+  const replay::ReplayBaseSettings base{settings.path("log", true), pace_of(settings)};
+  std::unique_ptr<MobileBase> device = std::make_unique<replay::ReplayBase>(config.id, base);
+  return opened<BaseNode>(std::move(device), settings);
+}
+
+NodeResult make_replay(const DeviceConfig& config, Settings& settings, const Clock& clock) {
+  if (config.kind == "laser_scanner") return make_replay_laser(config, settings);
+  if (config.kind == "mobile_base") return make_replay_base(config, settings);
+  return make_replay_camera(config, settings, clock);
 }
 
 NodeResult make_sim_laser(const DeviceConfig& config, Settings& settings, sim::Simulation& world) {
@@ -216,10 +252,10 @@ NodeResult make_device(const DeviceConfig& config, Devices& devices, const Clock
     return device_failure(config.id, "this build cannot open the driver `" + config.driver + "`",
                           "choose a profile whose devices use one of: " + built_names(kind->drivers));
   Settings settings(config.id, config.settings, config.directory);
-  if (config.driver == "replay") return make_replay_camera(config, settings, clock);
+  if (config.driver == "replay") return make_replay(config, settings, clock);
   return make_sim(config, settings, devices, clock);
 }
 
-int64_t simulator_cpu_ns(const Devices&) { return sim::simulator_cpu_ns(); }
+int64_t simulator_cpu_ns(const Devices&) { return sim::simulator_cost().total_ns(); }
 
 }  // namespace takt::hal

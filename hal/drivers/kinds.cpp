@@ -6,12 +6,13 @@ namespace {
 
 using enum SettingKind;
 
-constexpr DriverInfo kSimOnly[] = {{"sim", "the simulated world"}};
 constexpr DriverInfo kCameraDrivers[] = {
     {"sim", "the simulated world"}, {"replay", "recorded images"}, {"v4l2", "a Bumblebee behind Video4Linux", false}};
 constexpr DriverInfo kLaserDrivers[] = {{"sim", "the simulated world"},
+                                        {"replay", "the scans of a CARMEN log"},
                                         {"lms200", "a SICK LMS 200 on a serial line", false}};
 constexpr DriverInfo kHeadDrivers[] = {{"sim", "the simulated world"}, {"can", "the camera head on a CAN bus", false}};
+constexpr DriverInfo kBaseDrivers[] = {{"sim", "the simulated world"}, {"replay", "the odometry of a CARMEN log"}};
 constexpr DriverInfo kLinesDrivers[] = {{"sim", "the simulated world"}, {"gpio", "lines of a GPIO chip", false}};
 
 #define COMMON_SETTINGS                                                                 \
@@ -19,6 +20,12 @@ constexpr DriverInfo kLinesDrivers[] = {{"sim", "the simulated world"}, {"gpio",
       {"model", "", text, false, "name of the hardware model, for the reader"},         \
       {"world", "sim", path, true, "XML file of the simulated world"}, {                \
     "client", "sim", text, false, "which <client> of the world is the robot; the first" \
+  }
+
+#define CARMEN_SETTINGS                                                                      \
+  {"log", "replay", path, true, "CARMEN log"},                                               \
+      {"speed", "replay", number, false, "seconds of the log that pass in one second; 1"}, { \
+    "start", "replay", time, false, "time of the log at the beginning of the run; 0s"        \
   }
 
 constexpr SettingInfo kCamera[] = {
@@ -55,6 +62,8 @@ constexpr SettingInfo kLaser[] = {
     {"fov", "sim", angle, false, "angle from the first to the last beam; 180deg"},
     {"range", "sim", length, false, "largest distance; 8m"},
     {"noise", "sim", length, false, "standard deviation of a range; 1cm"},
+    CARMEN_SETTINGS,
+    {"range", "replay", length, false, "larger ranges are no return; as the log says, else 80m"},
     {"port", "lms200", path, true, "serial line, for instance /dev/ttyS1"},
     {"baud", "lms200", count, false, "9600, 19200, 38400 or 500000; 38400"},
 };
@@ -64,6 +73,7 @@ constexpr SettingInfo kHead[] = {
 };
 constexpr SettingInfo kBase[] = {
     COMMON_SETTINGS,
+    CARMEN_SETTINGS,
     {"drive", "sim", text, false, "path (the world's) or command (velocity commands); path if the world has one"},
     {"scale_error", "sim", number, false, "systematic error of the odometer's distance; 0.01"},
     {"turn_scale_error", "sim", number, false, "systematic error of the odometer's turns; 0.01"},
@@ -79,7 +89,7 @@ constexpr DeviceKind kKinds[] = {
     {"stereo_camera", "gives `pair`", kCameraDrivers, kCamera},
     {"laser_scanner", "gives `scan`", kLaserDrivers, kLaser},
     {"camera_head", "gives `state`, takes `command`", kHeadDrivers, kHead},
-    {"mobile_base", "gives `odometry`, takes `velocity` and `stop`", kSimOnly, kBase},
+    {"mobile_base", "gives `odometry`, takes `velocity` and `stop`", kBaseDrivers, kBase},
     {"digital_lines", "gives `state`", kLinesDrivers, kLines},
 };
 

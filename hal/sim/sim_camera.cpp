@@ -3,6 +3,7 @@
 
 #include <sched.h>
 
+#include <chrono>
 #include <cstring>
 
 #include "hal/sim/random.hpp"
@@ -93,16 +94,14 @@ void SimCamera::trigger(int64_t at_ns) {
   triggered_ns_ = at_ns;
   has_trigger_ = ever_triggered_ = true;
   ++triggers_;
-  // While the background thread works on an older exposure its request must stay as it is: that frame is then rendered
-  // by read(), and the thread is free again for the next one.
-  if (!worker_.joinable() || done_.load(std::memory_order_acquire) != asked_.load(std::memory_order_relaxed)) return;
-  request_ = request_at(at_ns);
+  if (!worker_.joinable()) return;
+  asked_at_ns_.store(at_ns, std::memory_order_relaxed);
   asked_.fetch_add(1, std::memory_order_release);
   asked_.notify_one();
 }
 
 void SimCamera::work() {
-  pthread_setname_np(pthread_self(), "sim-render");
+  pthread_setname_np(pthread_self(), ("sim:" + id_).substr(0, 15).c_str());
   const sched_param ordinary{};
   pthread_setschedparam(pthread_self(), SCHED_OTHER, &ordinary);
   const StereoRig& rig = settings_.rig;
@@ -111,12 +110,25 @@ void SimCamera::work() {
     asked_.wait(seen, std::memory_order_acquire);
     if (quit_.load()) return;
     seen = asked_.load(std::memory_order_acquire);
+    const int64_t at_ns = asked_at_ns_.load(std::memory_order_relaxed);
+    wait_until_settled(at_ns, seen);
+    if (quit_.load()) return;
+    if (asked_.load() != seen) continue;
     const int64_t before = thread_cpu_ns();
-    render(*background_lens_, request_, {prepared_[0].data(), rig.width, rig.height, rig.channels},
+    made_ = request_at(at_ns);
+    render(*background_lens_, made_, {prepared_[0].data(), rig.width, rig.height, rig.channels},
            {prepared_[1].data(), rig.width, rig.height, rig.channels});
-    made_ = request_;
-    add_simulator_cpu_ns(thread_cpu_ns() - before);
+    cost_.add({thread_cpu_ns() - before, 0});
     done_.store(seen, std::memory_order_release);
+  }
+}
+
+/// A robot or head that is under way may still be sent elsewhere: drawn before that is settled, a frame is drawn in
+/// vain, and read() has to do it again within its job. A camera of 5 Hz is triggered long before.
+void SimCamera::wait_until_settled(int64_t at_ns, uint32_t asked) const {
+  while (asked_.load() == asked && !simulation_.settled(settings_.rig.on_head, at_ns) &&
+         clock_.now_ns() < at_ns - kLatestStartNs) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
   }
 }
 
@@ -156,7 +168,7 @@ StereoFrame SimCamera::read(ImageView<uint8_t> left, ImageView<uint8_t> right, i
   } else {
     const int64_t before = thread_cpu_ns();
     render(*lens_, request, left, right);
-    add_simulator_cpu_ns(thread_cpu_ns() - before);
+    cost_.add({0, thread_cpu_ns() - before});
   }
   ++delivered_;
   frame.status = ReadStatus::ok;

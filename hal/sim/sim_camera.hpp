@@ -24,11 +24,11 @@ struct SimCameraSettings {
 
 /// A stereo camera that looks at the simulated world.
 ///
-/// trigger(t) with t ahead of now starts the rendering of that exposure in the thread "sim-render" (SCHED_OTHER);
-/// read() then merely copies. If the frame is not ready, or the robot turned out to be elsewhere, or the clock is
-/// virtual, read() renders itself: what is delivered depends on the exposure's stamp alone, never on timing. Nobody
-/// triggered: the camera runs free at `rate` from the epoch, and a read gives the newest exposure that was not
-/// delivered.
+/// trigger(t) with t ahead of now has that exposure rendered in the camera's own thread, "sim:" and its id (15 letters
+/// at most, SCHED_OTHER), as soon as no command can change what it shows; read() then merely copies. If the frame is
+/// not ready, or the robot turned out to be elsewhere, or the clock is virtual, read() renders itself: what is
+/// delivered depends on the exposure's stamp alone, never on timing. Nobody triggered: the camera runs free at `rate`
+/// from the epoch, and a read gives the newest exposure that was not delivered.
 class SimCamera final : public StereoCamera {
  public:
   SimCamera(std::string id, SimCameraSettings settings, Simulation& simulation, const Clock& clock);
@@ -45,6 +45,8 @@ class SimCamera final : public StereoCamera {
   /// Reads that found their frame rendered in the background, and all reads that delivered.
   uint64_t rendered_ahead() const { return rendered_ahead_; }
   uint64_t delivered() const { return delivered_; }
+  /// What this camera's share of simulator_cost() is.
+  SimulatorCost cost() const { return cost_.read(); }
   /// True if the background thread has nothing left to render.
   bool idle() const { return done_.load(std::memory_order_acquire) == asked_.load(std::memory_order_acquire); }
 
@@ -53,7 +55,10 @@ class SimCamera final : public StereoCamera {
     int64_t at_ns = 0;
     CameraPose pose[2];
   };
+  /// Rendering begins at the latest this long before the exposure: several times what a pair costs.
+  static constexpr int64_t kLatestStartNs = 50'000'000;
   void work();
+  void wait_until_settled(int64_t at_ns, uint32_t asked) const;
   Request request_at(int64_t at_ns) const;
   void render(Lens& lens, const Request& request, ImageView<uint8_t> left, ImageView<uint8_t> right) const;
 
@@ -70,12 +75,15 @@ class SimCamera final : public StereoCamera {
   int64_t next_free_frame_ = 0;
   uint64_t rendered_ahead_ = 0, delivered_ = 0;
 
-  // Hand-over to the background thread: it reads `request_` after it saw a new `asked_`, and writes `prepared_` and
-  // `made_` before it publishes `done_`. The reader touches `prepared_` only while done_ == asked_.
-  Request request_, made_;
+  // Hand-over to the background thread: it writes `prepared_` and `made_` only while done_ != asked_, the reader looks
+  // at them only while they are equal. Asked again while it draws, the thread goes on with the newest wish, so that a
+  // frame that came too late costs one read only.
+  std::atomic<int64_t> asked_at_ns_{0};
+  Request made_;
   std::atomic<uint32_t> asked_{0}, done_{0};
   std::atomic<bool> quit_{false};
   std::thread worker_;
+  CostCounter cost_;
 };
 
 }  // namespace takt::sim

@@ -14,7 +14,7 @@ constexpr int64_t kNoEpoch = std::numeric_limits<int64_t>::min();
 constexpr double kTickS = 0.01;
 constexpr double kMaxSpeed = 1.4, kMaxAcceleration = 1.35;    // algorithms.md 13
 constexpr double kMaxTurn = 1.2, kMaxTurnAcceleration = 2.5;  // our choice: not documented for the platform
-std::atomic<int64_t> g_cpu_ns{0};
+std::atomic<int64_t> g_ahead_ns{0}, g_in_read_ns{0};
 
 double towards(double value, double target, double step) { return value + std::clamp(target - value, -step, step); }
 
@@ -30,8 +30,16 @@ const PendingCommand* in_force(const std::array<PendingCommand, 64>& ring, uint3
 
 }  // namespace
 
-int64_t simulator_cpu_ns() { return g_cpu_ns.load(std::memory_order_relaxed); }
-void add_simulator_cpu_ns(int64_t ns) { g_cpu_ns.fetch_add(ns, std::memory_order_relaxed); }
+SimulatorCost simulator_cost() {
+  return {g_ahead_ns.load(std::memory_order_relaxed), g_in_read_ns.load(std::memory_order_relaxed)};
+}
+
+void CostCounter::add(const SimulatorCost& cost) {
+  ahead_ns_.fetch_add(cost.ahead_ns, std::memory_order_relaxed);
+  in_read_ns_.fetch_add(cost.in_read_ns, std::memory_order_relaxed);
+  g_ahead_ns.fetch_add(cost.ahead_ns, std::memory_order_relaxed);
+  g_in_read_ns.fetch_add(cost.in_read_ns, std::memory_order_relaxed);
+}
 
 void integrate_arc(double v, double w, double dt, double& x, double& y, double& theta) {
   if (std::abs(w) > 1e-6) {
@@ -203,6 +211,14 @@ void Simulation::step_head(int64_t tick) {
     }
   }
   head_.append(s);
+}
+
+bool Simulation::settled(bool with_head, int64_t at_ns) const {
+  const auto reaches = [&](int64_t last_tick, int64_t tick_ns) {
+    return last_tick == 0 || epoch_ns() + last_tick * tick_ns >= at_ns;
+  };
+  return (drive() == Drive::path || reaches(base_.last_tick(), History<5>::kTickNs)) &&
+         (!with_head || reaches(head_.last_tick(), History<4>::kTickNs));
 }
 
 uint32_t Simulation::line_count() const {

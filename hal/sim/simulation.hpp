@@ -66,6 +66,10 @@ class Simulation {
   void command_head(double pan_rad, double tilt_rad, int64_t at_ns);
   void advance_head(int64_t now_ns);
 
+  /// True if no command can change any more where the base, and the head if `with_head`, are at that instant. A
+  /// mechanism that nobody has advanced yet stands still.
+  bool settled(bool with_head, int64_t at_ns) const;
+
   /// Levels of the digital lines; without <line> elements line 0, the emergency stop, rests at 1 (free).
   uint32_t lines(int64_t at_ns) const;
   uint32_t line_count() const;
@@ -103,10 +107,26 @@ class Simulation {
   std::atomic<uint64_t> forced_mask_{0}, forced_level_{0};
 };
 
-/// CPU time that rendering has used in this process, background threads included, ns: the cost of the simulator, which
-/// the report states apart from the cost of the devices.
-int64_t simulator_cpu_ns();
-void add_simulator_cpu_ns(int64_t ns);
+/// CPU time that rendering has used, ns: the cost of the simulator, which no real device has.
+struct SimulatorCost {
+  int64_t ahead_ns = 0;    ///< in threads of the simulator
+  int64_t in_read_ns = 0;  ///< within reads, hence in the jobs of the device nodes: part of their CPU time too
+  int64_t total_ns() const { return ahead_ns + in_read_ns; }
+};
+/// Of all cameras of this process.
+SimulatorCost simulator_cost();
+
+/// One camera's cost; what is added counts for simulator_cost() as well. Any thread.
+class CostCounter {
+ public:
+  void add(const SimulatorCost& cost);
+  SimulatorCost read() const {
+    return {ahead_ns_.load(std::memory_order_relaxed), in_read_ns_.load(std::memory_order_relaxed)};
+  }
+
+ private:
+  std::atomic<int64_t> ahead_ns_{0}, in_read_ns_{0};
+};
 
 /// x, y, theta moved along an exact arc (algorithms.md 13).
 void integrate_arc(double speed_m_s, double turn_rad_s, double dt_s, double& x_m, double& y_m, double& theta_rad);

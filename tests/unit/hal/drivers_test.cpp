@@ -5,6 +5,7 @@
 
 #include "rt/time/rate.hpp"
 #include "tests/conformance/fake_writer.hpp"
+#include "tests/unit/replay/carmen_file.hpp"
 
 using namespace takt;
 using namespace takt::hal;
@@ -124,6 +125,60 @@ TEST_CASE("a replayed camera ends the run after its last frame") {
   }
   CHECK(ended == std::vector<bool>{false, false, true});
   CHECK(sent == std::vector<bool>{true, true, false});
+}
+
+TEST_CASE("laser and base nodes replay a CARMEN log and end with it") {
+  const test::CarmenFile log(test::odom_line(0, {}) + test::flaser_line(0, 181, 1) +
+                             test::odom_line(0.1, {0.05, 0, 0}) + test::flaser_line(0.1, 181, 2) +
+                             test::odom_line(0.2, {0.1, 0, 0}));
+  VirtualClock clock;
+  for (const auto& [kind, sends] : std::initializer_list<std::pair<const char*, std::vector<bool>>>{
+           {"laser_scanner", {true, false, true, false, false}}, {"mobile_base", {true, true, true, true, false}}}) {
+    Devices devices;
+    auto made = make_device(config(kind, "replay", {{"log", log.path.string()}, {"start", "0s"}}), devices, clock);
+    REQUIRE_MESSAGE(made.has_value(), (made ? "" : made.error().text()));
+    DeviceNode& node = **made;
+    Setup setup{clock, kGraph, {}, 1, Rate{15, 1}};
+    node.setup(setup);
+    node.start(0);
+    test::FakeWriter writer(*node.outputs().at(0));
+    std::vector<bool> sent;
+    bool ended = false;
+    for (uint64_t k = 0; k < 5; ++k) {  // 0, 67, 133, 200 and 267 ms
+      const int64_t release = Rate{15, 1}.release_ns(0, static_cast<int64_t>(k));
+      Job job(clock, k, release, release + 66'000'000, 0, "full");
+      PortAccess::reset(*node.outputs()[0]);
+      node.run(job);
+      sent.push_back(PortAccess::sent(*node.outputs()[0]));
+      CHECK(job.without_result() == (!sent.back() && !job.ended()));
+      CHECK_FALSE(ended);
+      ended = job.ended();
+    }
+    CHECK(sent == sends);
+    CHECK(ended);
+  }
+}
+
+TEST_CASE("settings of a replayed laser and base") {
+  const test::CarmenFile log(test::odom_line(0, {}) + test::flaser_line(0, 181, 1));
+  const auto with = [&](const char* kind, const std::string& name, const nlohmann::json& value) {
+    nlohmann::json settings = {{"log", log.path.string()}};
+    settings[name] = value;
+    return error(config(kind, "replay", settings));
+  };
+  CHECK(with("laser_scanner", "range", "5m") == "");
+  CHECK(with("laser_scanner", "mount", {{"y", "0.3m"}}) == "");
+  CHECK(has(with("laser_scanner", "range", "0m"), "`range` is not positive"));
+  for (const char* kind : {"laser_scanner", "mobile_base"}) {
+    CHECK(with(kind, "speed", 2) == "");
+    CHECK(has(with(kind, "speed", 0), "`speed`"));
+    CHECK(has(with(kind, "start", "5"), "`start`"));
+    CHECK(has(with(kind, "start", "1e300s"), "`start`"));
+    CHECK(has(with(kind, "start", "5s"), "at or after 5"));
+    CHECK(has(with(kind, "drive", "path"), "unknown setting `drive`"));
+    CHECK(has(error(config(kind, "replay", nlohmann::json::object())), "`log` is missing"));
+    CHECK(has(error(config(kind, "replay", {{"log", "none.log"}})), "none.log: cannot be opened"));
+  }
 }
 
 TEST_CASE("laser, head, base and line nodes send one message a job, and share one world") {

@@ -1,0 +1,289 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "hal/replay/carmen_log.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <numbers>
+#include <optional>
+#include <string_view>
+
+#include "hal/replay/late_stamps.hpp"
+
+namespace takt::replay {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+constexpr double kLmsRange_m = 80.0;     // what an LMS 200 can tell in its cm mode (devices.md 1.7)
+constexpr double kLatestStamp_s = 4e9;   // int64 ns hold twice as much
+constexpr double kLargestDelay_s = 5.0;  // of a late stamp; more is a clock that was set, or two logs in one file
+constexpr size_t kTrailer = 3;           // ipc_time host logger_time
+constexpr uint32_t kFewestBeams = 2, kMostBeams = 4096;
+
+bool parse_number(std::string_view word, double& value) {
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+  return error == std::errc{} && end == word.data() + word.size() && std::isfinite(value);
+}
+
+void split(std::string_view line, std::vector<std::string_view>& words) {
+  constexpr std::string_view kBlank = " \t\r";
+  words.clear();
+  for (size_t from = line.find_first_not_of(kBlank); from != std::string_view::npos;) {
+    const size_t to = std::min(line.find_first_of(kBlank, from), line.size());
+    words.push_back(line.substr(from, to - from));
+    from = line.find_first_not_of(kBlank, to);
+  }
+}
+
+/// Beams of a sweep in a line that tells only their number: 180 degrees, from the right. 181 beams reach the left end,
+/// of 180 the last one is left out.
+double flaser_step(uint32_t beams) { return kPi / static_cast<double>(beams % 2 == 1 ? beams - 1 : beams); }
+
+class Parser {
+ public:
+  Parser(std::string id, std::filesystem::path file) : id_(std::move(id)), file_(std::move(file)) {}
+
+  tl::expected<CarmenLog, DeviceError> parse(uint64_t largest_bytes) {
+    if (!readable(largest_bytes)) return tl::unexpected(*error_);
+    std::ifstream in(file_, std::ios::binary);
+    for (std::string text; std::getline(in, text);) {
+      ++line_;
+      split(text, words_);
+      if (!words_.empty() && words_[0][0] != '#' && !message()) return tl::unexpected(*error_);
+    }
+    if (!settle_odometry(false) || !set_times()) return tl::unexpected(*error_);
+    return std::move(log_);
+  }
+
+ private:
+  enum class Kind : uint8_t { odometry, scan };
+  struct Entry {
+    Kind kind;
+    int line;
+    double time_s;
+  };
+  /// An ODOM line whose meaning the next line decides.
+  struct Pending {
+    PlanarPose pose;
+    int line;
+    double time_s;
+    bool timed;  ///< time_s is a time
+  };
+
+  bool fail(int line, const std::string& what, std::string fix) {
+    const std::string where = line > 0 ? file_.string() + ":" + std::to_string(line) : file_.string();
+    error_ = DeviceError{id_, where + ": " + what, std::move(fix), true};
+    return false;
+  }
+  bool fail(const std::string& what) { return fail(line_, what, "delete the line, or record the log again"); }
+
+  bool readable(uint64_t largest_bytes) {
+    std::error_code failed;
+    const uint64_t bytes = std::filesystem::file_size(file_, failed);
+    std::ifstream in(file_, std::ios::binary);
+    if (failed || !in) return fail(0, "cannot be opened", "correct `log`; a ${TAKT_DATA} in it is expanded");
+    if (bytes > largest_bytes)
+      return fail(0, "has " + std::to_string(bytes) + " bytes, at most " + std::to_string(largest_bytes) + " are read",
+                  "cut the log into parts");
+    if (in.get() == 0x1f && in.get() == 0x8b) return fail(0, "is compressed", "unpack it with gunzip");
+    return true;
+  }
+
+  bool number(size_t word, double& value) {
+    if (parse_number(words_[word], value)) return true;
+    return fail("word " + std::to_string(word + 1) + " of " + std::string(words_[0]) + " is `" +
+                std::string(words_[word]) + "`, no finite number");
+  }
+  bool count(size_t word, uint32_t low, uint32_t high, uint32_t& value) {
+    double parsed = 0;
+    if (!number(word, parsed)) return false;
+    if (parsed != std::floor(parsed) || parsed < low || parsed > high)
+      return fail("word " + std::to_string(word + 1) + " of " + std::string(words_[0]) + " is " +
+                  std::string(words_[word]) + ", not a count from " + std::to_string(low) + " to " +
+                  std::to_string(high));
+    value = static_cast<uint32_t>(parsed);
+    return true;
+  }
+  bool has_words(size_t wanted) {
+    if (words_.size() == wanted) return true;
+    return fail(std::string(words_[0]) + " has " + std::to_string(words_.size()) + " words, needs " +
+                std::to_string(wanted));
+  }
+  bool pose(size_t first_word, PlanarPose& pose) {
+    return number(first_word, pose.x_m) && number(first_word + 1, pose.y_m) && number(first_word + 2, pose.theta_rad);
+  }
+  static bool is_time(double seconds) { return seconds >= 0 && seconds <= kLatestStamp_s; }
+
+  bool message() {
+    const std::string_view name = words_[0];
+    if (!settle_odometry(name == "NEFF")) return false;
+    const bool ok = name == "ODOM"        ? odometry()
+                    : name == "FLASER"    ? flaser()
+                    : name == "RAWLASER1" ? rawlaser()
+                    : name == "PARAM"     ? parameter()
+                                          : true;
+    after_scan_ = name == "FLASER" && name == scan_message_;
+    return ok;
+  }
+
+  bool odometry() {
+    Pending line{{}, line_, 0, false};
+    if (!has_words(7 + kTrailer) || !pose(1, line.pose)) return false;
+    line.timed = parse_number(words_.back(), line.time_s) && is_time(line.time_s);
+    pending_ = line;
+    pending_repeats_scan_ = after_scan_ && line.pose.x_m == log_.scans.back().logged.x_m &&
+                            line.pose.y_m == log_.scans.back().logged.y_m &&
+                            line.pose.theta_rad == log_.scans.back().logged.theta_rad;
+    return true;
+  }
+
+  /// Takes the pending ODOM line, if any, for odometry or, before a line NEFF, for the correction of the scan before.
+  bool settle_odometry(bool before_neff) {
+    if (!pending_) return true;
+    const Pending line = *pending_;
+    pending_.reset();
+    if (before_neff && pending_repeats_scan_) {
+      log_.scans.back().corrected = true;
+      logged_in_odometry_ = compose(odometry_, relative(line.pose, {}));
+      return true;
+    }
+    if (!line.timed) return fail(line.line, "ODOM ends with no time", "delete the line, or record the log again");
+    odometry_ = compose(logged_in_odometry_, line.pose);
+    log_.odometry.push_back({0, odometry_});
+    entries_.push_back({Kind::odometry, line.line, line.time_s});
+    return true;
+  }
+
+  bool flaser() {
+    if (scan_message_.empty()) scan_message_ = words_[0];
+    if (scan_message_ != words_[0]) return true;
+    uint32_t beams = 0;
+    CarmenScan scan;
+    if (words_.size() < 2) return fail("FLASER has no count of ranges");
+    if (!count(1, kFewestBeams, kMostBeams, beams) || !has_words(2 + beams + 6 + kTrailer)) return false;
+    return geometry(beams, -kPi / 2, flaser_step(beams), kLmsRange_m) && pose(2 + beams, scan.logged) && add(scan, 2);
+  }
+
+  bool rawlaser() {
+    if (scan_message_.empty()) scan_message_ = words_[0];
+    if (scan_message_ != words_[0]) return true;
+    if (words_.size() < 9) return fail("RAWLASER1 has no count of ranges");
+    uint32_t beams = 0, remissions = 0;
+    double first = 0, step = 0, range = 0;
+    if (!number(2, first) || !number(4, step) || !number(5, range) || !count(8, kFewestBeams, kMostBeams, beams))
+      return false;
+    if (step <= 0 || range <= 0) return fail("angular step and largest range of RAWLASER1 must be positive");
+    if (words_.size() <= 9 + beams) return fail("RAWLASER1 has fewer than " + std::to_string(beams) + " ranges");
+    if (!count(9 + beams, 0, kMostBeams, remissions) || !has_words(10 + beams + remissions + kTrailer)) return false;
+    return geometry(beams, first, step, range) && add({}, 9);
+  }
+
+  bool geometry(uint32_t beams, double first, double step, double range) {
+    if (log_.scans.empty()) {
+      log_.beams = beams;
+      log_.first_angle_rad = first;
+      log_.step_rad = step;
+      log_.max_range_m = range;
+    }
+    if (beams == log_.beams && first == log_.first_angle_rad && step == log_.step_rad && range == log_.max_range_m)
+      return true;
+    return fail("a scan of " + std::to_string(beams) + " beams unlike the first scan, which has " +
+                std::to_string(log_.beams) + ", or with another angle, step or range");
+  }
+
+  bool add(CarmenScan scan, size_t first_range) {
+    double time_s = 0, range = 0;
+    if (!number(words_.size() - 1, time_s)) return false;
+    if (!is_time(time_s)) return fail("the logger's time is " + std::string(words_.back()) + " s");
+    for (size_t i = 0; i < log_.beams; ++i) {
+      if (!number(first_range + i, range)) return false;
+      log_.range_m.push_back(static_cast<float>(range));
+    }
+    scan.odometry = odometry_;
+    log_.scans.push_back(scan);
+    entries_.push_back({Kind::scan, line_, time_s});
+    return true;
+  }
+
+  bool parameter() {
+    if (words_.size() < 3 || words_[1] != "robot_frontlaser_offset") return true;
+    return number(2, log_.laser_ahead_m);
+  }
+
+  /// An ODOM line and a scan next to it with the same stamp are one instant: the odometry was asked for that scan.
+  bool set_times() {
+    std::vector<double> seconds;
+    std::vector<size_t> instant_of(entries_.size());
+    double latest = 0;
+    for (size_t i = 0; i < entries_.size(); ++i) {
+      const Entry& entry = entries_[i];
+      if (latest - entry.time_s > kLargestDelay_s)
+        return fail(entry.line, "time goes back by " + std::to_string(latest - entry.time_s) + " s",
+                    "cut the log where its clock was set, or delete the line");
+      latest = std::max(latest, entry.time_s);
+      const bool together = i > 0 && entries_[i - 1].kind != entry.kind && entries_[i - 1].time_s == entry.time_s &&
+                            (i < 2 || instant_of[i - 2] != instant_of[i - 1]);
+      if (!together) seconds.push_back(entry.time_s);
+      instant_of[i] = seconds.size() - 1;
+    }
+    const LineTimes lines = repair_late_stamps(seconds);
+    log_.late_stamps = lines.late;
+    size_t odometry = 0, scan = 0, lost_odometry = 0, lost_scans = 0;
+    for (size_t i = 0; i < entries_.size(); ++i) {
+      const int64_t time_ns = lines.time_ns[instant_of[i]];
+      const bool known = instant_of[i] >= lines.first_known, is_scan = entries_[i].kind == Kind::scan;
+      (is_scan ? log_.scans[scan++].time_ns : log_.odometry[odometry++].time_ns) = time_ns;
+      if (!known) ++(is_scan ? lost_scans : lost_odometry);
+      log_.end_ns = time_ns;
+    }
+    log_.without_time = lost_scans + lost_odometry;
+    log_.scans.erase(log_.scans.begin(), log_.scans.begin() + static_cast<ptrdiff_t>(lost_scans));
+    log_.range_m.erase(log_.range_m.begin(), log_.range_m.begin() + static_cast<ptrdiff_t>(lost_scans * log_.beams));
+    log_.odometry.erase(log_.odometry.begin(), log_.odometry.begin() + static_cast<ptrdiff_t>(lost_odometry));
+    return true;
+  }
+
+  std::string id_;
+  std::filesystem::path file_;
+  int line_ = 0;
+  std::vector<std::string_view> words_;
+  std::optional<DeviceError> error_;
+
+  CarmenLog log_;
+  std::vector<Entry> entries_;
+  std::string scan_message_;
+  std::optional<Pending> pending_;
+  bool after_scan_ = false, pending_repeats_scan_ = false;
+  PlanarPose odometry_;            ///< newest
+  PlanarPose logged_in_odometry_;  ///< frame of the ODOM lines: moves with each correction
+};
+
+}  // namespace
+
+PlanarPose compose(const PlanarPose& frame, const PlanarPose& pose) {
+  const double c = std::cos(frame.theta_rad), s = std::sin(frame.theta_rad);
+  return {frame.x_m + c * pose.x_m - s * pose.y_m, frame.y_m + s * pose.x_m + c * pose.y_m,
+          std::remainder(frame.theta_rad + pose.theta_rad, 2 * kPi)};
+}
+
+PlanarPose relative(const PlanarPose& from, const PlanarPose& pose) {
+  const double c = std::cos(from.theta_rad), s = std::sin(from.theta_rad);
+  const double dx = pose.x_m - from.x_m, dy = pose.y_m - from.y_m;
+  return {c * dx + s * dy, c * dy - s * dx, std::remainder(pose.theta_rad - from.theta_rad, 2 * kPi)};
+}
+
+tl::expected<CarmenLog, DeviceError> load_carmen_log(const std::string& id, const std::filesystem::path& file,
+                                                     uint64_t largest_bytes) {
+  return Parser(id, file).parse(largest_bytes);
+}
+
+std::vector<TimedPose> corrected_poses(const CarmenLog& log) {
+  std::vector<TimedPose> poses;
+  for (const CarmenScan& scan : log.scans) {
+    if (scan.corrected) poses.push_back({scan.time_ns, scan.logged});
+  }
+  return poses;
+}
+
+}  // namespace takt::replay
