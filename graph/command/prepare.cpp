@@ -29,17 +29,15 @@ graph::DeviceFactory device_factory(Prepared& prepared, uint64_t seed) {
   };
 }
 
-/// The graph named, or the one the command ships with: beside the launcher, or in share/takt beside an installed bin/.
-std::filesystem::path graph_file(const std::filesystem::path& named) {
-  if (!named.empty()) return named;
-  if (const char* home = std::getenv("TAKT_HOME")) return std::filesystem::path(home) / "graph/ace.yaml";
+}  // namespace
+
+std::filesystem::path shipped(const std::filesystem::path& relative) {
+  if (const char* home = std::getenv("TAKT_HOME")) return std::filesystem::path(home) / relative;
   std::error_code error;
   const auto program = std::filesystem::read_symlink("/proc/self/exe", error);
-  const auto installed = program.parent_path().parent_path() / "share/takt/graph/ace.yaml";
-  return std::filesystem::exists(installed, error) ? installed : std::filesystem::path("graph/ace.yaml");
+  const auto installed = program.parent_path().parent_path() / "share/takt" / relative;
+  return std::filesystem::exists(installed, error) ? installed : relative;
 }
-
-}  // namespace
 
 int refuse(const std::string& text, Exit code) {
   std::fprintf(stderr, "takt: error: %s\n", text.c_str());
@@ -48,7 +46,8 @@ int refuse(const std::string& text, Exit code) {
 
 int prepare(const RunOptions& options, Prepared& prepared) {
   const NodeTypes types = graph::node_types();
-  graph::Loaded loaded = graph::load(graph_file(options.graph), options.load, types);
+  graph::Loaded loaded =
+      graph::load(options.graph.empty() ? shipped("graph/ace.yaml") : options.graph, options.load, types);
   if (!loaded.graph) return refuse(prepared, std::move(loaded.problems), kBadInput);
   prepared.graph = std::move(loaded.graph);
   if (options.clock == "virtual") prepared.clock = std::make_unique<VirtualClock>(1'000'000'000);

@@ -21,6 +21,9 @@ struct Prepared {
 /// Loads and composes; what is wrong is written to stderr and the exit code returned (kOk: all is well).
 int prepare(const RunOptions& options, Prepared& prepared);
 
+/// A file or folder that the command ships with: beside the launcher, or in share/takt beside an installed bin/.
+std::filesystem::path shipped(const std::filesystem::path& relative);
+
 /// Writes one error to stderr and returns the code.
 int refuse(const std::string& text, Exit code);
 

@@ -62,7 +62,7 @@ size_t Decision::passed_windows() const {
   return passed_.size() - static_cast<size_t>(std::count(passed_.begin(), passed_.end(), uint8_t{0}));
 }
 
-size_t Decision::detections(std::span<Detection> out) {
+size_t Decision::detections(double min_score, std::span<Detection> out) {
   size_t found = 0;
   for (size_t object = 0; object < limits_.size(); ++object) {
     const std::span<const float> errors = this->errors(object);
@@ -70,6 +70,7 @@ size_t Decision::detections(std::span<Detection> out) {
     for (size_t window = 0; window < errors.size(); ++window) {
       if (visited_[window] || errors[window] == kFailed) continue;
       const size_t best = best_of_group(errors, window);
+      if (1 - errors[best] < static_cast<float>(min_score)) continue;
       const int u = static_cast<int>(best) % grid_.columns, v = static_cast<int>(best) / grid_.columns;
       const auto size = static_cast<float>(grid_.window_px);
       const Detection detection{static_cast<float>(object),

@@ -38,9 +38,9 @@ class Decision {
 
   /// After decide(): one detection per object and group of touching windows that pass (8 neighbours), at the group's
   /// window with the smallest error; of equals the upper left one. class_id is the object's index, score 1 - error.
-  /// Fills `out` with the best of them, best first (equal scores: lower class, then upper left first); returns how
-  /// many.
-  size_t detections(std::span<Detection> out);
+  /// Those below `min_score` are left out: thresholds are loose, so that the next stage misses nothing. Fills `out`
+  /// with the best, best first (equal scores: lower class, then upper left first); returns how many.
+  size_t detections(double min_score, std::span<Detection> out);
 
  private:
   struct Limit {

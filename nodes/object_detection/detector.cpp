@@ -22,13 +22,15 @@ std::vector<std::vector<Histogram>> histograms(std::span<const DatabaseObject> d
 
 /// A view's own threshold goes before the object's, and that before the automatic one.
 std::vector<std::vector<ReferenceLimit>> limits_of(std::span<const DatabaseObject> database,
-                                                   std::span<const std::vector<Histogram>> references, double scale) {
+                                                   std::span<const std::vector<Histogram>> references,
+                                                   const DetectorParameters& p) {
   std::vector<std::vector<ReferenceLimit>> limits;
   for (size_t o = 0; o < database.size(); ++o) {
-    const double of_object = database[o].threshold ? *database[o].threshold : automatic_threshold(references[o]);
+    const double of_object =
+        database[o].threshold ? *database[o].threshold : automatic_threshold(references[o], p.tolerance);
     auto& object = limits.emplace_back();
     for (size_t r = 0; r < references[o].size(); ++r)
-      object.push_back({references[o][r].mass, scale * database[o].views[r].threshold.value_or(of_object)});
+      object.push_back({references[o][r].mass, p.threshold_scale * database[o].views[r].threshold.value_or(of_object)});
   }
   return limits;
 }
@@ -39,7 +41,7 @@ Detector::Detector(int image_width, int image_height, std::span<const DatabaseOb
                    const DetectorParameters& p)
     : grid_(grid_for(image_width, image_height, database, p.window_px)),
       references_(histograms(database, p.bins)),
-      limits_(limits_of(database, references_, p.threshold_scale)),
+      limits_(limits_of(database, references_, p)),
       colour_(grid_, p.bins, references_),
       decision_(grid_, limits_) {}
 

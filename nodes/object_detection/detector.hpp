@@ -10,8 +10,9 @@
 namespace takt::object_detection {
 
 struct DetectorParameters {
-  ColourBins bins = ColourBins::hsv_64x32x2;
+  ColourBins bins = ColourBins::hsv_64x64x1;
   int window_px = 64;
+  double tolerance = 0.36;  ///< added to automatic thresholds: 1 - 0.8^2, an object at 0.8 times its reference's size
   double threshold_scale = 1;  ///< factor on every threshold
 };
 

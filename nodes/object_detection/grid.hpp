@@ -22,9 +22,10 @@ struct SearchGrid {
   }
 };
 
-/// The fewest windows whose overlap is the reference's size: n = 1 + ceil((image - window) / (window - reference)).
-/// 640 x 480, references of 48 px, windows of 64 px: 37 x 27 at a stride of exactly 16. Throws std::invalid_argument
-/// unless 1 <= reference < window <= 255 (a window's pixels must fit 16-bit counters) and the window fits the image.
+/// The fewest windows that overlap by at least the reference's size: n = 1 + ceil((image - window) / (window -
+/// reference)). 640 x 480, references of 48 px, windows of 64 px: 37 x 27 at a stride of exactly 16. Throws
+/// std::invalid_argument unless 1 <= reference < window <= 255 (a window's pixels must fit 16-bit counters) and the
+/// window fits the image.
 SearchGrid make_search_grid(int image_width, int image_height, int reference_px, int window_px);
 
 }  // namespace takt::object_detection

@@ -30,7 +30,7 @@ double intersection_error(const Histogram& window, const Histogram& reference) {
   return static_cast<double>(missing_mass(window.count, reference.count)) / static_cast<double>(reference.mass);
 }
 
-double automatic_threshold(std::span<const Histogram> views) {
+double automatic_threshold(std::span<const Histogram> views, double tolerance) {
   std::vector<double> errors;
   for (size_t i = 0; i < views.size(); ++i)
     for (size_t k = 0; k < views.size(); ++k)
@@ -38,7 +38,7 @@ double automatic_threshold(std::span<const Histogram> views) {
   if (errors.empty()) return kThresholdCap;
   std::sort(errors.begin(), errors.end());
   const size_t rank = (9 * errors.size() + 9) / 10;  // ceil(0.9 n)
-  return std::min(kThresholdCap, 1.25 * errors[rank - 1]);
+  return std::min(kThresholdCap, 1.25 * errors[rank - 1] + tolerance);
 }
 
 }  // namespace takt::object_detection

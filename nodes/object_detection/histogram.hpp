@@ -30,7 +30,10 @@ double intersection_error(const Histogram& window, const Histogram& reference);
 /// Largest threshold that automatic_threshold gives (algorithm reference 21.7).
 constexpr double kThresholdCap = 0.75;
 /// Start value of an object's threshold: 1.25 times the 90 % quantile (nearest rank) of the error of every view against
-/// every other view of the object, at most kThresholdCap (algorithm reference 6.8, 21.7). kThresholdCap with one view.
-double automatic_threshold(std::span<const Histogram> views);
+/// every other view of the object (algorithm reference 6.8), and `tolerance` on top, at most kThresholdCap, which is
+/// also the value for a single view. The views say nothing of what a scene takes away: an occlusion of a share q takes
+/// about q of the reference's mass (6.8), an object at k < 1 times its reference's edge takes 1 - k^2; that is the
+/// tolerance.
+double automatic_threshold(std::span<const Histogram> views, double tolerance);
 
 }  // namespace takt::object_detection

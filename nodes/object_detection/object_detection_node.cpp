@@ -20,6 +20,7 @@ class ObjectDetectionNode final : public Node {
     DetectorParameters p;
     p.bins = static_cast<ColourBins>(bins_());
     p.window_px = window_;
+    p.tolerance = tolerance_;
     p.threshold_scale = threshold_scale_;
     try {
       const auto database = read_database(setup.directory / database_(), reference_, TestViews::skip);
@@ -42,7 +43,7 @@ class ObjectDetectionNode final : public Node {
       found->image_width = pair->width;
       found->image_height = pair->height;
       found->boxes.resize(static_cast<size_t>(max_detections_()));
-      found->boxes.resize(detector_->decision().detections(found->boxes.items()));
+      found->boxes.resize(detector_->decision().detections(min_score_, found->boxes.items()));
       detections_.send(pair_.stamp_ns());
     }
     Image* roi = roi_.connected() ? roi_.loan() : nullptr;
@@ -65,12 +66,18 @@ class ObjectDetectionNode final : public Node {
 
   Param<std::string> database_{this, "database", "objects", "",
                                "folder with objects.txt and the reference views it names"};
-  Choice bins_{this, "bins", "64x32x2", {"64x32x2", "64x64x1"}, "bins of hue x saturation x value"};
+  Choice bins_{this, "bins", "64x64x1", {"64x32x2", "64x64x1"}, "bins of hue x saturation x value"};
   Param<int> reference_{this, "reference", 48, {4, 254}, "px", "edge of the reference views"};
   Param<int> window_{this,     "window", 64,
                      {5, 255}, "px",     "edge of a search window; neighbours overlap by the reference's edge"};
+  Param<double> tolerance_{
+      this, "tolerance",
+      0.36, {0.0, 0.75},
+      "1",  "share of a reference that occlusion or distance may take; added to automatic thresholds"};
   Param<double> threshold_scale_{
       this, "threshold_scale", 1.0, {0.05, 4.0}, "1", "factor on the thresholds of the database"};
+  Param<double> min_score_{this,       "min_score", 0.5,
+                           {0.0, 1.0}, "1",         "smallest score (1 - error) of a detection; roi is not affected"};
   Param<int> max_detections_{this, "max_detections", 32, {1, 1000}, "", "the best are kept"};
 
   std::optional<Detector> detector_;
