@@ -1,2 +1,0 @@
-# SPDX-License-Identifier: Apache-2.0
-set(ROOM_TEST_LIBRARIES takt_object_detection_evaluate PkgConfig::HWY takt_opencv)
