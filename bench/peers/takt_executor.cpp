@@ -111,7 +111,7 @@ std::vector<double> TaktExecutor::latencies_us(int64_t from_ns, int64_t to_ns) c
 }
 
 std::string TaktExecutor::granted() const {
-  std::string text = result_.grants.empty() ? "" : granted_text(result_.grants.front());
+  std::string text = granted_text(executor_->board().grant(0));
   for (const std::string& refused : result_.refused) text += "; " + refused;
   const auto incomplete =
       std::count_if(frames_.begin(), frames_.end(), [](const Frame& frame) { return !frame.complete; });

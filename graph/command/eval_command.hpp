@@ -24,4 +24,13 @@ struct EvalEgoMotionOptions {
 };
 void add_eval_ego_motion(CLI::App& eval, EvalEgoMotionOptions& options, int& exit_code);
 
+struct EvalObjectsOptions {
+  std::filesystem::path database;  ///< empty: graph/objects of the project
+  std::string bins = "64x64x1";
+  uint64_t seed = 1;
+  int frames = 100;
+  bool json = false;
+};
+void add_eval_objects(CLI::App& eval, EvalObjectsOptions& options, int& exit_code);
+
 }  // namespace takt::command

@@ -63,6 +63,7 @@ int main(int argc, char** argv) {
   takt::command::EvalStereoOptions stereo;
   takt::command::EvalEgoMotionOptions ego_motion;
   takt::command::AttachOptions attach;
+  takt::command::EvalObjectsOptions objects;
   std::string type;
   bool check_json = false;
   int exit_code = 0;
@@ -81,6 +82,7 @@ int main(int argc, char** argv) {
   eval->require_subcommand(1);
   takt::command::add_eval_stereo(*eval, stereo, exit_code);
   takt::command::add_eval_ego_motion(*eval, ego_motion, exit_code);
+  takt::command::add_eval_objects(*eval, objects, exit_code);
 
   try {
     app.parse(argc, argv);

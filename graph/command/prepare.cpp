@@ -28,17 +28,15 @@ graph::DeviceFactory device_factory(Prepared& prepared, uint64_t seed) {
   };
 }
 
-/// The graph named, or the one the command ships with: beside the launcher, or in share/takt beside an installed bin/.
-std::filesystem::path graph_file(const std::filesystem::path& named) {
-  if (!named.empty()) return named;
-  if (const char* home = std::getenv("TAKT_HOME")) return std::filesystem::path(home) / "graph/ace.yaml";
+}  // namespace
+
+std::filesystem::path shipped(const std::filesystem::path& relative) {
+  if (const char* home = std::getenv("TAKT_HOME")) return std::filesystem::path(home) / relative;
   std::error_code error;
   const auto program = std::filesystem::read_symlink("/proc/self/exe", error);
-  const auto installed = program.parent_path().parent_path() / "share/takt/graph/ace.yaml";
-  return std::filesystem::exists(installed, error) ? installed : std::filesystem::path("graph/ace.yaml");
+  const auto installed = program.parent_path().parent_path() / "share/takt" / relative;
+  return std::filesystem::exists(installed, error) ? installed : relative;
 }
-
-}  // namespace
 
 int refuse(const std::string& text, Exit code) {
   std::fprintf(stderr, "takt: error: %s\n", text.c_str());
@@ -50,7 +48,8 @@ void tell_problems(size_t count) {
 }
 
 int load(const RunOptions& options, Prepared& prepared) {
-  graph::Loaded loaded = graph::load(graph_file(options.graph), options.load, graph::node_types());
+  const auto file = options.graph.empty() ? shipped("graph/ace.yaml") : options.graph;
+  graph::Loaded loaded = graph::load(file, options.load, graph::node_types());
   if (!loaded.graph) return refuse(prepared, std::move(loaded.problems), kBadInput);
   prepared.graph = std::move(loaded.graph);
   if (options.clock == "virtual") prepared.clock = std::make_unique<VirtualClock>(1'000'000'000);

@@ -27,6 +27,9 @@ int prepare(const RunOptions& options, Prepared& prepared);
 /// "takt: n problems, nothing was started".
 void tell_problems(size_t count);
 
+/// A file or folder that the command ships with: beside the launcher, or in share/takt beside an installed bin/.
+std::filesystem::path shipped(const std::filesystem::path& relative);
+
 /// Writes one error to stderr and returns the code.
 int refuse(const std::string& text, Exit code);
 

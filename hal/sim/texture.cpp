@@ -17,6 +17,8 @@ struct Recipe {
   double contrast;            ///< of the luminance noise
   double tint;                ///< of the colour noise
   int rectangles;
+  std::array<std::array<double, 3>, 3> bands{};  ///< colours in turn along v, heights 3 : 3 : 1, instead of the mean
+  int band_period = 0;                           ///< texels of one turn, divides size; 0: no bands
 };
 
 constexpr std::array<Recipe, kMaterials> kRecipes{{
@@ -29,7 +31,17 @@ constexpr std::array<Recipe, kMaterials> kRecipes{{
     {"poster", 512, 300, {120, 120, 120}, 22, 30, 160},
     {"cloth", 256, 250, {120, 70, 60}, 36, 14, 0},
     {"skin", 256, 250, {130, 155, 205}, 22, 6, 0},
+    {"red_stripes", 256, 300, {}, 20, 4, 0, {{{40, 30, 190}, {220, 220, 225}, {40, 190, 215}}}, 64},
+    {"blue_stripes", 256, 300, {}, 20, 4, 0, {{{185, 75, 25}, {35, 195, 225}, {40, 40, 45}}}, 64},
+    {"green_stripes", 256, 300, {}, 20, 4, 0, {{{45, 150, 30}, {30, 115, 235}, {225, 225, 220}}}, 64},
+    {"violet_stripes", 256, 300, {}, 20, 4, 0, {{{165, 35, 130}, {200, 190, 40}, {150, 60, 225}}}, 64},
 }};
+
+const std::array<double, 3>& colour_of_row(const Recipe& recipe, int row) {
+  if (recipe.band_period == 0) return recipe.bgr;
+  const int sevenths = 7 * (row % recipe.band_period) / recipe.band_period;
+  return recipe.bands[sevenths < 3 ? 0 : sevenths < 6 ? 1 : 2];
+}
 
 /// Value noise of one octave with smooth interpolation; periodic with `cells`.
 void add_octave(std::vector<float>& field, int size, int cells, uint64_t seed, float amplitude) {
@@ -144,7 +156,8 @@ Texture make_texture(const Recipe& recipe, uint64_t seed) {
     for (size_t i = 0; i < count; ++i) {
       const double l = recipe.contrast * static_cast<double>(light[i]);
       const double t = recipe.tint * static_cast<double>(tint[i]);
-      texture.texels[i] = pack(recipe.bgr[0] + l + t, recipe.bgr[1] + l, recipe.bgr[2] + l - t);
+      const std::array<double, 3>& bgr = colour_of_row(recipe, static_cast<int>(i) / recipe.size);
+      texture.texels[i] = pack(bgr[0] + l + t, bgr[1] + l, bgr[2] + l - t);
     }
     add_rectangles(texture, recipe.rectangles, mix(seed, 3));
   }
@@ -164,7 +177,10 @@ bool material_from(std::string_view name, Material& material) {
   return false;
 }
 
-std::string_view material_names() { return "sky, floor, plaster, ceiling, wood, cardboard, poster, cloth, skin"; }
+std::string_view material_names() {
+  return "sky, floor, plaster, ceiling, wood, cardboard, poster, cloth, skin, red_stripes, blue_stripes, "
+         "green_stripes, violet_stripes";
+}
 
 std::shared_ptr<const TextureSet> make_textures(uint64_t seed) {
   auto set = std::make_shared<TextureSet>();

@@ -23,14 +23,29 @@ struct Texture {
   }
 };
 
-enum class Material : uint8_t { sky, floor, plaster, ceiling, wood, cardboard, poster, cloth, skin };
-constexpr int kMaterials = 9;
+enum class Material : uint8_t {
+  sky,
+  floor,
+  plaster,
+  ceiling,
+  wood,
+  cardboard,
+  poster,
+  cloth,
+  skin,
+  red_stripes,
+  blue_stripes,
+  green_stripes,
+  violet_stripes
+};
+constexpr int kMaterials = 13;
 /// "wood" and the like; false if the name is unknown.
 bool material_from(std::string_view name, Material& material);
 std::string_view material_names();
 
 /// All materials of one seed: multi-octave hash noise (and random rectangles on posters), rich at every scale that a
-/// 640 x 480 camera resolves between 0.3 m and 15 m, so that a window of 15 px has texture to match.
+/// 640 x 480 camera resolves between 0.3 m and 15 m, so that a window of 15 px has texture to match. The striped ones
+/// carry bands of saturated colours: what stands out for a detector that looks at colours.
 using TextureSet = std::array<Texture, kMaterials>;
 std::shared_ptr<const TextureSet> make_textures(uint64_t seed);
 

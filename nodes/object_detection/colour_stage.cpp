@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "nodes/object_detection/colour_stage.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+#include <string>
+
+#include "nodes/object_detection/intersection_kernel.hpp"
+
+namespace takt::object_detection {
+namespace {
+
+bool used(const std::vector<Histogram>& views, size_t bin) {
+  return std::any_of(views.begin(), views.end(), [bin](const Histogram& view) { return view.count[bin] > 0; });
+}
+
+}  // namespace
+
+ColourStage::ColourStage(const SearchGrid& grid, ColourBins bins, std::span<const std::vector<Histogram>> objects)
+    : grid_(grid), bins_(bins), slot_of_bin_(kColourBins) {
+  uint16_t slots = 0;
+  std::vector<size_t> unused;
+  for (size_t bin = 0; bin < kColourBins; ++bin) {
+    if (std::any_of(objects.begin(), objects.end(), [bin](const auto& views) { return used(views, bin); }))
+      slot_of_bin_[bin] = slots++;
+    else unused.push_back(bin);
+  }
+  for (const size_t bin : unused) slot_of_bin_[bin] = slots;
+  size_t widest = 0;
+  for (const auto& views : objects) {
+    objects_.push_back(gather(views));
+    references_ += views.size();
+    widest = std::max(widest, objects_.back().slots.size());
+  }
+  windows_.emplace(grid, size_t{slots} + 1);
+  index_.resize(static_cast<size_t>(grid.image_width) * static_cast<size_t>(grid.image_height));
+  gathered_.resize(widest);
+  missing_.resize(static_cast<size_t>(grid.windows()) * references_);
+}
+
+ColourStage::ObjectBins ColourStage::gather(const std::vector<Histogram>& views) const {
+  ObjectBins object;
+  std::vector<size_t> bins;
+  for (size_t bin = 0; bin < kColourBins; ++bin)
+    if (used(views, bin)) bins.push_back(bin);
+  for (const size_t bin : bins) object.slots.push_back(slot_of_bin_[bin]);
+  object.slots.resize((bins.size() + kLaneBlock - 1) / kLaneBlock * kLaneBlock);  // a reference lacks nothing there
+  for (const Histogram& view : views) {
+    if (view.mass == 0 || view.mass > UINT16_MAX)
+      throw std::invalid_argument("a reference has " + std::to_string(view.mass) + " pixels, must have 1 .. 65535");
+    const size_t row = object.rows.size();
+    object.rows.resize(row + object.slots.size());
+    for (size_t i = 0; i < bins.size(); ++i) object.rows[row + i] = view.count[bins[i]];
+  }
+  object.references = views.size();
+  return object;
+}
+
+void ColourStage::index_image(ImageView<const uint8_t> bgr) {
+  const auto width = static_cast<size_t>(grid_.image_width);
+  for (int y = 0; y < grid_.image_height; ++y) {
+    uint16_t* row = index_.data() + static_cast<size_t>(y) * width;
+    colour_bins(bgr.row(y), width, bins_, row);
+    for (size_t x = 0; x < width; ++x) row[x] = slot_of_bin_[row[x]];
+  }
+}
+
+void ColourStage::run(ImageView<const uint8_t> bgr) {
+  index_image(bgr);
+  windows_->begin(index_.data());
+  uint16_t* out = missing_.data();
+  for (int window = 0; window < grid_.windows(); ++window) {
+    const std::span<const uint16_t> histogram = windows_->next();
+    for (const ObjectBins& object : objects_) {
+      const size_t count = object.slots.size();
+      for (size_t i = 0; i < count; ++i) gathered_[i] = histogram[object.slots[i]];
+      missing_masses(gathered_.data(), object.rows.data(), count, object.references, out);
+      out += object.references;
+    }
+  }
+}
+
+}  // namespace takt::object_detection

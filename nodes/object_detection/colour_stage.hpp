@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+// First stage of the histogram cascade: the colour histogram of every search window against those of all references
+// (thesis Sec. 3.4.2; algorithm reference 6.1, 6.2, 6.5).
+#pragma once
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "nodes/object_detection/histogram.hpp"
+#include "nodes/object_detection/window_histograms.hpp"
+
+namespace takt::object_detection {
+
+/// Equal, bit for bit, to counting each window's pixels and comparing all bins. Only bins that a reference of the
+/// object uses can add to its error, so only those are counted and compared. Memory is taken by the constructor; run()
+/// allocates nothing and does the same work for every image. One thread at a time.
+class ColourStage {
+ public:
+  /// `objects`: per object the histograms of its views; each must have mass. Throws std::invalid_argument otherwise.
+  ColourStage(const SearchGrid& grid, ColourBins bins, std::span<const std::vector<Histogram>> objects);
+
+  /// `bgr`: three channels, of the grid's image size (not checked).
+  void run(ImageView<const uint8_t> bgr);
+
+  size_t references() const { return references_; }
+  /// After run(): the missing mass of every reference, object by object, for window 0, 1 ... (row by row).
+  std::span<const uint16_t> missing() const { return missing_; }
+
+ private:
+  /// The bins that an object's references use: where they stand in a window's histogram, and the references' counts.
+  struct ObjectBins {
+    std::vector<uint16_t> slots;  ///< padded
+    std::vector<uint16_t> rows;   ///< references x slots.size()
+    size_t references = 0;
+  };
+  ObjectBins gather(const std::vector<Histogram>& views) const;
+  void index_image(ImageView<const uint8_t> bgr);
+
+  SearchGrid grid_;
+  ColourBins bins_;
+  size_t references_ = 0;
+  std::vector<uint16_t> slot_of_bin_;  ///< the last slot takes the bins that no reference uses
+  std::vector<ObjectBins> objects_;
+  std::optional<WindowHistograms> windows_;
+  std::vector<uint16_t> index_, gathered_, missing_;
+};
+
+}  // namespace takt::object_detection

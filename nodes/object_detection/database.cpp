@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "nodes/object_detection/database.hpp"
+
+#include <algorithm>
+#include <fstream>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <sstream>
+
+namespace takt::object_detection {
+namespace {
+
+constexpr const char* kWords = "valid are object, threshold, view, test_view";
+
+class Reader {
+ public:
+  Reader(const std::filesystem::path& folder, int side_px, TestViews test_views)
+      : folder_(folder), list_(folder / "objects.txt"), side_px_(side_px), test_views_(test_views) {}
+
+  std::vector<DatabaseObject> read() {
+    std::ifstream in(list_);
+    if (!in)
+      throw DatabaseError(list_.string() +
+                          ": cannot be read; an object database is a folder with this list of objects");
+    for (std::string line; std::getline(in, line);) {
+      ++line_;
+      std::istringstream text(line.substr(0, line.find('#')));
+      std::vector<std::string> words;
+      for (std::string word; text >> word;) words.push_back(word);
+      if (!words.empty()) take(words);
+    }
+    if (objects_.empty()) fail("names no object; write `object NAME` and its views");
+    complete();
+    return std::move(objects_);
+  }
+
+ private:
+  [[noreturn]] void fail(const std::string& what) const {
+    throw DatabaseError(list_.string() + ":" + std::to_string(line_) + ": " + what);
+  }
+
+  void take(const std::vector<std::string>& words) {
+    const std::string& key = words[0];
+    if (key != "object" && key != "threshold" && key != "view" && key != "test_view")
+      fail("unknown word `" + key + "`; " + kWords);
+    if (key != "object" && objects_.empty()) fail("`" + key + "` stands before the first `object NAME`");
+    if (words.size() < 2 || words.size() > (key == "view" ? 3u : 2u))
+      fail("`" + key + "` takes " + (key == "view" ? "a file and at most a threshold" : "exactly one word"));
+    if (key == "object") begin(words[1]);
+    else if (key == "threshold") threshold(words[1]);
+    else if (key == "view") add_view(words);
+    else if (test_views_ == TestViews::read) objects_.back().test_views.push_back(load(words[1]));
+  }
+
+  void begin(const std::string& name) {
+    complete();
+    for (const DatabaseObject& object : objects_)
+      if (object.name == name) fail("object `" + name + "` is there already; names must differ");
+    objects_.emplace_back().name = name;
+    threshold_given_ = false;
+  }
+
+  /// The object before must have views.
+  void complete() const {
+    if (!objects_.empty() && objects_.back().views.empty())
+      fail("object `" + objects_.back().name + "` has no view; write `view FILE` below it");
+  }
+
+  void threshold(const std::string& word) {
+    if (threshold_given_) fail("object `" + objects_.back().name + "` has a threshold already");
+    threshold_given_ = true;
+    if (word != "auto") objects_.back().threshold = number(word);
+  }
+
+  double number(const std::string& word) const {
+    size_t used = 0;
+    double value = 0;
+    try {
+      value = std::stod(word, &used);
+    } catch (const std::exception&) {
+    }
+    if (used != word.size() || !(value > 0 && value <= 1))
+      fail("the threshold is `" + word + "`, must be a number above 0 and at most 1, or auto for an object");
+    return value;
+  }
+
+  void add_view(const std::vector<std::string>& words) {
+    ReferenceView view = load(words[1]);
+    if (words.size() == 3) view.threshold = number(words[2]);
+    objects_.back().views.push_back(std::move(view));
+  }
+
+  ReferenceView load(const std::string& name) const {
+    ReferenceView view;
+    view.file = folder_ / name;
+    cv::Mat image;
+    try {
+      image = cv::imread(view.file.string(), cv::IMREAD_UNCHANGED);
+    } catch (const cv::Exception&) {
+    }
+    if (image.empty()) fail("view " + view.file.string() + " cannot be read or is no image");
+    if (image.type() != CV_8UC3)
+      fail("view " + view.file.string() + " must have three channels of 8 bit (no transparency; background is black)");
+    if (image.cols != side_px_ || image.rows != side_px_)
+      fail("view " + view.file.string() + " is " + std::to_string(image.cols) + " x " + std::to_string(image.rows) +
+           " px, must be " + std::to_string(side_px_) + " x " + std::to_string(side_px_) + " (parameter reference)");
+    view.side_px = side_px_;
+    for (int y = 0; y < image.rows; ++y)
+      view.pixels.insert(view.pixels.end(), image.ptr(y), image.ptr(y) + 3 * image.cols);
+    if (std::all_of(view.pixels.begin(), view.pixels.end(), [](uint8_t value) { return value == 0; }))
+      fail("view " + view.file.string() + " is background, (0, 0, 0), everywhere");
+    return view;
+  }
+
+  std::filesystem::path folder_, list_;
+  int side_px_;
+  TestViews test_views_;
+  int line_ = 0;
+  bool threshold_given_ = false;
+  std::vector<DatabaseObject> objects_;
+};
+
+}  // namespace
+
+std::vector<DatabaseObject> read_database(const std::filesystem::path& folder, int side_px, TestViews test_views) {
+  return Reader(folder, side_px, test_views).read();
+}
+
+}  // namespace takt::object_detection

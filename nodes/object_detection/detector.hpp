@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <span>
+#include <vector>
+
+#include "nodes/object_detection/colour_stage.hpp"
+#include "nodes/object_detection/database.hpp"
+#include "nodes/object_detection/decision.hpp"
+
+namespace takt::object_detection {
+
+struct DetectorParameters {
+  ColourBins bins = ColourBins::hsv_64x64x1;
+  int window_px = 64;
+  double tolerance = 0.36;  ///< added to automatic thresholds: 1 - 0.8^2, an object at 0.8 times its reference's size
+  double threshold_scale = 1;  ///< factor on every threshold
+};
+
+/// The cascade for images of one size: its colour stage, so far the only one, and the decision on what it found.
+/// Memory is taken by the constructor; run() allocates nothing. One thread at a time.
+class Detector {
+ public:
+  /// Throws std::invalid_argument if grid or database do not fit.
+  Detector(int image_width, int image_height, std::span<const DatabaseObject> database, const DetectorParameters& p);
+
+  const SearchGrid& grid() const { return grid_; }
+  /// Per object and view: mass and the threshold in force.
+  std::span<const std::vector<ReferenceLimit>> limits() const { return limits_; }
+
+  /// Searches an 8-bit BGR image. False, and nothing changed, if it has not the size or the channels.
+  bool run(ImageView<const uint8_t> bgr);
+  Decision& decision() { return decision_; }
+  std::span<const uint16_t> missing() const { return colour_.missing(); }
+
+ private:
+  SearchGrid grid_;
+  std::vector<std::vector<Histogram>> references_;
+  std::vector<std::vector<ReferenceLimit>> limits_;
+  ColourStage colour_;
+  Decision decision_;
+};
+
+}  // namespace takt::object_detection

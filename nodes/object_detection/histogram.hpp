@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+// Histograms of reference views and their comparison, in the obvious form (thesis Sec. 3.4.2; algorithm reference 6.2,
+// 6.5, 6.8). The search over all windows is in colour_stage.hpp.
+#pragma once
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "nodes/object_detection/colour_bins.hpp"
+#include "rt/msg/image_view.hpp"
+
+namespace takt::object_detection {
+
+/// Counts per bin and their sum, the mass.
+struct Histogram {
+  std::vector<uint16_t> count;
+  uint32_t mass = 0;
+};
+
+/// Colour histogram of a reference view: 8-bit BGR, at most 255 x 255 pixels; pixels of exactly (0, 0, 0) are
+/// background and not counted.
+Histogram colour_histogram(ImageView<const uint8_t> view, ColourBins bins);
+
+/// Mass of the reference that the window lacks: sum over bins of max(0, reference - window) (thesis Eq. 3.14). What the
+/// window has beyond the reference costs nothing.
+uint32_t missing_mass(std::span<const uint16_t> window, std::span<const uint16_t> reference);
+/// The same over the reference's mass: 0 = all found, 1 = nothing found. The reference must have mass.
+double intersection_error(const Histogram& window, const Histogram& reference);
+
+/// Largest threshold that automatic_threshold gives (algorithm reference 21.7).
+constexpr double kThresholdCap = 0.75;
+/// Start value of an object's threshold: 1.25 times the 90 % quantile (nearest rank) of the error of every view against
+/// every other view of the object (algorithm reference 6.8), and `tolerance` on top, at most kThresholdCap, which is
+/// also the value for a single view. The views say nothing of what a scene takes away: an occlusion of a share q takes
+/// about q of the reference's mass (6.8), an object at k < 1 times its reference's edge takes 1 - k^2; that is the
+/// tolerance.
+double automatic_threshold(std::span<const Histogram> views, double tolerance);
+
+}  // namespace takt::object_detection

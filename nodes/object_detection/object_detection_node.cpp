@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <optional>
+#include <string>
+
+#include "nodes/object_detection/detector.hpp"
+#include "rt/node.hpp"
+
+namespace takt {
+namespace {
+
+using namespace object_detection;
+
+class ObjectDetectionNode final : public Node {
+ public:
+  void setup(Setup& setup) override {
+    const Capacity& images = pair_.capacity();
+    if (images.channels != 3)
+      throw SetupError("`pair` has " + std::to_string(images.channels) +
+                       " channel(s), must have three: objects are found by their colour");
+    DetectorParameters p;
+    p.bins = static_cast<ColourBins>(bins_());
+    p.window_px = window_;
+    p.tolerance = tolerance_;
+    p.threshold_scale = threshold_scale_;
+    try {
+      const auto database = read_database(setup.directory / database_(), reference_, TestViews::skip);
+      detector_.emplace(static_cast<int>(images.width), static_cast<int>(images.height), database, p);
+    } catch (const DatabaseError& error) {
+      throw SetupError(error.what());
+    } catch (const std::invalid_argument& error) {
+      throw SetupError(error.what());
+    }
+    detections_.reserve({0, 0, 1, static_cast<uint32_t>(max_detections_())});
+    const SearchGrid& grid = detector_->grid();
+    roi_.reserve({static_cast<uint32_t>(grid.columns), static_cast<uint32_t>(grid.rows), 1, 0});
+  }
+
+  void run(Job& job) override {
+    const StereoPair* pair = pair_.newest();
+    if (!pair || !pair_.is_new() || !detector_->run(pair->left_view())) return job.no_result();
+    Detections* found = detections_.connected() ? detections_.loan() : nullptr;
+    if (found != nullptr) {
+      found->image_width = pair->width;
+      found->image_height = pair->height;
+      found->boxes.resize(static_cast<size_t>(max_detections_()));
+      found->boxes.resize(detector_->decision().detections(min_score_, found->boxes.items()));
+      detections_.send(pair_.stamp_ns());
+    }
+    Image* roi = roi_.connected() ? roi_.loan() : nullptr;
+    if (roi != nullptr) {
+      roi->width = detector_->grid().columns;
+      roi->height = detector_->grid().rows;
+      roi->channels = 1;
+      roi->health = pair->health;
+      roi->pixels.resize(static_cast<size_t>(detector_->grid().windows()));
+      detector_->decision().region_of_interest(roi->view());
+      roi_.send(pair_.stamp_ns());
+    }
+    if ((detections_.connected() && found == nullptr) || (roi_.connected() && roi == nullptr)) job.no_result();
+  }
+
+ private:
+  Input<StereoPair> pair_{this, "pair", "the left image is searched; three channels"};
+  Output<Detections> detections_{this, "detections", "class_id: index of the object in the database; best first"};
+  Output<Image> roi_{this, "roi", "one pixel per search window, 255 where it passed"};
+
+  Param<std::string> database_{this, "database", "objects", "",
+                               "folder with objects.txt and the reference views it names"};
+  Choice bins_{this, "bins", "64x64x1", {"64x32x2", "64x64x1"}, "bins of hue x saturation x value"};
+  Param<int> reference_{this, "reference", 48, {4, 254}, "px", "edge of the reference views"};
+  Param<int> window_{this,     "window", 64,
+                     {5, 255}, "px",     "edge of a search window; neighbours overlap by the reference's edge"};
+  Param<double> tolerance_{
+      this, "tolerance",
+      0.36, {0.0, 0.75},
+      "1",  "share of a reference that occlusion or distance may take; added to automatic thresholds"};
+  Param<double> threshold_scale_{
+      this, "threshold_scale", 1.0, {0.05, 4.0}, "1", "factor on the thresholds of the database"};
+  Param<double> min_score_{this,       "min_score", 0.5,
+                           {0.0, 1.0}, "1",         "smallest score (1 - error) of a detection; roi is not affected"};
+  Param<int> max_detections_{this, "max_detections", 32, {1, 1000}, "", "the best are kept"};
+
+  std::optional<Detector> detector_;
+};
+
+}  // namespace
+
+void register_object_detection(NodeTypes& types) {
+  types.add<ObjectDetectionNode>("object_detection", Layer::perception,
+                                 "Known objects by colour histograms on a grid of windows");
+}
+
+}  // namespace takt

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+// Generated scenes with known objects, for measurements.
+#pragma once
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "nodes/object_detection/database.hpp"
+
+namespace takt::object_detection {
+
+struct PlacedObject {
+  size_t object;   ///< index in the database
+  int x, y, side;  ///< square that the scaled view takes, px
+};
+
+struct Scene {
+  int width = 0, height = 0;
+  std::vector<uint8_t> pixels;  ///< BGR
+  std::vector<PlacedObject> objects;
+
+  ImageView<const uint8_t> view() const { return {pixels.data(), width, height, 3}; }
+};
+
+struct SceneParameters {
+  int width = 640, height = 480;
+  int most_objects = 3;  ///< 0 .. most_objects in each scene, apart from one another
+  double scale_min = 0.8, scale_max = 1.2;
+  double light_min = 0.5, light_max = 1.5;  ///< factor on the whole scene, cut off at 255
+  double noise_sigma = 3;
+};
+
+/// Scene number `index` of a seed: test views of random objects, cut out by their mask, scaled and put at random whole
+/// pixels on a background of coloured noise at several scales with rectangles of random colours; then the light, then
+/// noise. Equal arguments give equal scenes. Throws std::invalid_argument if an object has no test view.
+Scene make_scene(std::span<const DatabaseObject> database, const SceneParameters& parameters, uint64_t seed,
+                 uint64_t index);
+
+}  // namespace takt::object_detection

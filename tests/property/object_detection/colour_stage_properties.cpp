@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <doctest/doctest.h>
+#include <hwy/targets.h>
+
+#include <algorithm>
+#include <random>
+#include <vector>
+
+#include "nodes/object_detection/colour_stage.hpp"
+#include "nodes/object_detection/reference.hpp"
+
+using namespace takt;
+using namespace takt::object_detection;
+
+namespace {
+
+constexpr ColourBins kBoth[] = {ColourBins::hsv_64x32x2, ColourBins::hsv_64x64x1};
+
+/// Runs the body once with each SIMD target that this machine has, alone.
+template <class Body>
+void with_each_target(const Body& body) {
+  for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
+    hwy::SetSupportedTargetsForTest(target);
+    CAPTURE(hwy::TargetName(target));
+    body();
+  }
+  hwy::SetSupportedTargetsForTest(0);
+}
+
+class Random {
+ public:
+  explicit Random(uint32_t seed) : engine_(seed) {}
+  int in(int low, int high) { return low + static_cast<int>(engine_() % static_cast<uint32_t>(high - low + 1)); }
+  uint8_t byte() { return static_cast<uint8_t>(engine_()); }
+
+  /// Patches of few colours, some black: bins repeat, as in real images.
+  std::vector<uint8_t> image(int width, int height) {
+    std::vector<uint8_t> palette(3 * 12);
+    for (uint8_t& value : palette) value = byte();
+    std::fill_n(palette.begin(), 3, uint8_t{0});
+    std::vector<uint8_t> pixels;
+    const int patch = in(1, 9);
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < width; ++x) {
+        const auto colour = static_cast<size_t>((x / patch * 7 + y / patch * 5 + (in(0, 9) == 0)) % 12);
+        for (size_t c = 0; c < 3; ++c) pixels.push_back(palette[3 * colour + c]);
+      }
+    return pixels;
+  }
+
+ private:
+  std::mt19937 engine_;
+};
+
+/// References cut out of the image itself and, so that some bins are found nowhere, out of another one.
+std::vector<std::vector<Histogram>> references(Random& random, const std::vector<uint8_t>& image, int width, int height,
+                                               int side, ColourBins bins) {
+  std::vector<std::vector<Histogram>> objects(static_cast<size_t>(random.in(1, 4)));
+  const std::vector<uint8_t> other = random.image(width, height);
+  for (auto& views : objects)
+    for (int k = random.in(1, 5); k > 0; --k) {
+      const ImageView<const uint8_t> from(random.in(0, 2) ? image.data() : other.data(), width, height, 3);
+      const int x = random.in(0, width - side), y = random.in(0, height - side);
+      Histogram view = colour_histogram({&from.at(x, y), side, side, 3, from.stride}, bins);
+      if (view.mass == 0) view.count[5] = static_cast<uint16_t>(view.mass = 1);
+      views.push_back(std::move(view));
+    }
+  return objects;
+}
+
+}  // namespace
+
+TEST_CASE("all 16.7 million colours get the same bin from the vectorised form, with each SIMD target") {
+  std::vector<uint8_t> colours(3 * 65536);
+  std::vector<uint16_t> fast(65536);
+  for (const ColourBins bins : kBoth) {
+    for (int blue = 0; blue < 256; ++blue) {
+      for (size_t i = 0; i < 65536; ++i) {
+        colours[3 * i] = static_cast<uint8_t>(blue);
+        colours[3 * i + 1] = static_cast<uint8_t>(i >> 8);
+        colours[3 * i + 2] = static_cast<uint8_t>(i);
+      }
+      std::vector<uint16_t> slow;
+      for (size_t i = 0; i < 65536; ++i)
+        slow.push_back(colour_bin(colours[3 * i], colours[3 * i + 1], colours[3 * i + 2], bins));
+      with_each_target([&] {
+        colour_bins(colours.data(), 65535, bins, fast.data());  // an odd length: the rest is done one by one
+        fast[65535] = slow[65535];
+        REQUIRE(fast == slow);
+      });
+    }
+  }
+}
+
+TEST_CASE("the colour stage equals counting and comparing everything, for any grid, with each SIMD target") {
+  Random random(11);
+  for (int round = 0; round < 60; ++round) {
+    const int window = random.in(5, 70), reference = random.in(std::max(1, window / 3), window - 1);
+    const int width = random.in(window, 150), height = random.in(window, 130);
+    const ColourBins bins = kBoth[round % 2];
+    CAPTURE(width);
+    CAPTURE(height);
+    CAPTURE(window);
+    CAPTURE(reference);
+    const SearchGrid grid = make_search_grid(width, height, reference, window);
+    if (grid.windows() > 2500) continue;  // the slow form would take minutes
+    const std::vector<uint8_t> first = random.image(width, height), second = random.image(width, height);
+    const auto objects = references(random, first, width, height, reference, bins);
+    ColourStage stage(grid, bins, objects);
+    for (const auto* image : {&first, &second}) {  // the second run must not remember the first
+      const ImageView<const uint8_t> view(image->data(), width, height, 3);
+      const auto slow = colour_stage_reference(grid, bins, objects, view);
+      with_each_target([&] {
+        stage.run(view);
+        REQUIRE(std::equal(slow.begin(), slow.end(), stage.missing().begin(), stage.missing().end()));
+      });
+    }
+  }
+}
+
+TEST_CASE("the same at the size of the camera: 37 x 27 windows of 64 px over 640 x 480") {
+  Random random(5);
+  const SearchGrid grid = make_search_grid(640, 480, 48, 64);
+  const std::vector<uint8_t> image = random.image(640, 480);
+  const ImageView<const uint8_t> view(image.data(), 640, 480, 3);
+  for (const ColourBins bins : kBoth) {
+    const auto objects = references(random, image, 640, 480, 48, bins);
+    ColourStage stage(grid, bins, objects);
+    stage.run(view);
+    const auto slow = colour_stage_reference(grid, bins, objects, view);
+    CHECK(slow.size() == 999 * stage.references());
+    CHECK(std::equal(slow.begin(), slow.end(), stage.missing().begin(), stage.missing().end()));
+  }
+}

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "nodes/object_detection/database.hpp"
+
+#include <doctest/doctest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <string>
+
+using namespace takt::object_detection;
+
+namespace {
+
+struct Folder {
+  std::filesystem::path path;
+  Folder() {
+    std::string name = (std::filesystem::temp_directory_path() / "objects-XXXXXX").string();
+    path = mkdtemp(name.data());
+    image("good.png", cv::Mat(8, 8, CV_8UC3, cv::Scalar(10, 20, 200)));
+  }
+  ~Folder() { std::filesystem::remove_all(path); }
+  void image(const std::string& name, const cv::Mat& pixels) const { cv::imwrite((path / name).string(), pixels); }
+  void list(const std::string& text) const { std::ofstream(path / "objects.txt") << text; }
+  std::string error(const std::string& text) const {
+    list(text);
+    try {
+      read_database(path, 8, TestViews::read);
+    } catch (const DatabaseError& problem) {
+      return problem.what();
+    }
+    return "no error";
+  }
+};
+
+bool has(const std::string& text, const std::string& part) {
+  INFO(text);
+  CHECK(text.find(part) != std::string::npos);
+  return text.find(part) != std::string::npos;
+}
+
+}  // namespace
+
+TEST_CASE("objects in order, with their views and thresholds") {
+  const Folder folder;
+  folder.list(
+      "# two objects\nobject cup\nthreshold 0.5\nview good.png\nview good.png 0.25 # stricter\n\n"
+      "object bottle\nthreshold auto\nview good.png\ntest_view good.png\n");
+  const auto objects = read_database(folder.path, 8, TestViews::read);
+  REQUIRE(objects.size() == 2);
+  CHECK(objects[0].name == "cup");
+  CHECK(objects[0].threshold == 0.5);
+  REQUIRE(objects[0].views.size() == 2);
+  CHECK_FALSE(objects[0].views[0].threshold);
+  CHECK(objects[0].views[1].threshold == 0.25);
+  CHECK(objects[0].views[0].view().at(7, 7, 2) == 200);
+  CHECK_FALSE(objects[1].threshold);
+  CHECK(objects[1].test_views.size() == 1);
+  CHECK(read_database(folder.path, 8, TestViews::skip)[1].test_views.empty());
+}
+
+TEST_CASE("mistakes name file and line and what is valid") {
+  const Folder folder;
+  has(folder.error("object cup\nviews good.png\n"), "objects.txt:2: unknown word `views`; valid are object, threshold");
+  has(folder.error("view good.png\n"), "objects.txt:1: `view` stands before");
+  has(folder.error("object cup\n\nview absent.png\n"), "objects.txt:3: view ");
+  has(folder.error("object cup\nview absent.png\n"), "absent.png cannot be read");
+  has(folder.error("object cup\nview objects.txt\n"), "is no image");
+  has(folder.error("object cup\nobject can\nview good.png\n"), "objects.txt:2: object `cup` has no view");
+  has(folder.error("object cup\nview good.png\nobject can\n"), "objects.txt:3: object `can` has no view");
+  has(folder.error("object cup\nview good.png\nobject cup\n"), "objects.txt:3: object `cup` is there already");
+  has(folder.error("object cup\nthreshold 1.5\n"), "objects.txt:2: the threshold is `1.5`, must be");
+  has(folder.error("object cup\nthreshold 0\n"), "must be a number above 0");
+  has(folder.error("object cup\nthreshold nan\n"), "must be a number above 0");
+  has(folder.error("object cup\nthreshold 0.4x\n"), "`0.4x`");
+  has(folder.error("object cup\nthreshold auto\nthreshold 0.4\n"),
+      "objects.txt:3: object `cup` has a threshold already");
+  has(folder.error("object cup\nview good.png auto\n"), "`auto`");
+  has(folder.error("object\n"), "objects.txt:1: `object` takes exactly one word");
+  has(folder.error("object cup\nview good.png 0.4 0.5\n"), "at most a threshold");
+  has(folder.error("# nothing\n"), "names no object");
+  folder.image("large.png", cv::Mat(9, 8, CV_8UC3, cv::Scalar(1, 2, 3)));
+  has(folder.error("object cup\nview large.png\n"), "is 8 x 9 px, must be 8 x 8 (parameter reference)");
+  folder.image("grey.png", cv::Mat(8, 8, CV_8UC1, cv::Scalar(9)));
+  has(folder.error("object cup\nview grey.png\n"), "three channels of 8 bit");
+  folder.image("black.png", cv::Mat(8, 8, CV_8UC3, cv::Scalar(0, 0, 0)));
+  has(folder.error("object cup\nview black.png\n"), "background, (0, 0, 0), everywhere");
+  std::filesystem::remove(folder.path / "objects.txt");
+  try {
+    read_database(folder.path, 8, TestViews::skip);
+    FAIL("an absent list must be refused");
+  } catch (const DatabaseError& problem) {
+    has(problem.what(), "objects.txt: cannot be read");
+  }
+}

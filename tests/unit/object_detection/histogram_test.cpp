@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "nodes/object_detection/histogram.hpp"
+
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <vector>
+
+using namespace takt;
+using namespace takt::object_detection;
+
+namespace {
+
+constexpr ColourBins kBoth[] = {ColourBins::hsv_64x32x2, ColourBins::hsv_64x64x1};
+
+/// A row of single-colour pixels.
+struct Row {
+  std::vector<uint8_t> bytes;
+  void add(int count, uint8_t b, uint8_t g, uint8_t r) {
+    for (int i = 0; i < count; ++i)
+      for (const uint8_t value : {b, g, r}) bytes.push_back(value);
+  }
+  Histogram histogram(ColourBins bins = ColourBins::hsv_64x64x1) const {
+    return colour_histogram({bytes.data(), static_cast<int>(bytes.size() / 3), 1, 3}, bins);
+  }
+};
+
+}  // namespace
+
+TEST_CASE("colour bins of colours whose hue, saturation and value are plain") {
+  struct Known {
+    uint8_t b, g, r;
+    double hue_sixths, saturation;
+    int value;
+  };
+  for (const ColourBins bins : kBoth) {
+    const BinSplit n = split_of(bins);
+    CHECK(n.hue * n.saturation * n.value == kColourBins);
+    for (const Known& k : {Known{0, 0, 255, 0, 1, 255},
+                           {0, 255, 255, 1, 1, 255},
+                           {0, 255, 0, 2, 1, 255},
+                           {255, 255, 0, 3, 1, 255},
+                           {255, 0, 0, 4, 1, 255},
+                           {255, 0, 255, 5, 1, 255},
+                           {0, 0, 0, 0, 0, 0},
+                           {127, 127, 127, 0, 0, 127},
+                           {128, 128, 128, 0, 0, 128},
+                           {50, 50, 100, 0, 0.5, 100},
+                           {51, 50, 100, 5.98, 0.5, 100},
+                           {100, 50, 50, 4, 0.5, 100}}) {
+      const int h = static_cast<int>(n.hue * k.hue_sixths / 6),
+                s = std::min(n.saturation - 1, static_cast<int>(n.saturation * k.saturation)),
+                v = k.value * n.value / 256;
+      CHECK(colour_bin(k.b, k.g, k.r, bins) == (h * n.saturation + s) * n.value + v);
+    }
+  }
+}
+
+TEST_CASE("light alone moves a colour only along value") {
+  const BinSplit n = split_of(ColourBins::hsv_64x32x2);
+  const uint16_t bright = colour_bin(40, 80, 240, ColourBins::hsv_64x32x2),
+                 dark = colour_bin(20, 40, 120, ColourBins::hsv_64x32x2);
+  CHECK(bright != dark);
+  CHECK(bright / n.value == dark / n.value);
+  CHECK(colour_bin(40, 80, 240, ColourBins::hsv_64x64x1) == colour_bin(20, 40, 120, ColourBins::hsv_64x64x1));
+}
+
+TEST_CASE("a reference's background is not counted, a black object pixel stored as (1, 1, 1) is") {
+  Row row;
+  row.add(5, 0, 0, 0);
+  row.add(3, 1, 1, 1);
+  row.add(2, 0, 0, 200);
+  const Histogram h = row.histogram();
+  CHECK(h.mass == 5);
+  CHECK(h.count[colour_bin(1, 1, 1, ColourBins::hsv_64x64x1)] == 3);
+  CHECK(h.count[colour_bin(0, 0, 200, ColourBins::hsv_64x64x1)] == 2);
+}
+
+TEST_CASE("oracle 11: the error of a histogram with itself is 0, with an empty window the mass, normalised 1") {
+  Row row;
+  row.add(30, 0, 0, 200);
+  row.add(12, 0, 180, 10);
+  const Histogram h = row.histogram();
+  const Histogram empty{std::vector<uint16_t>(kColourBins), 0};
+  CHECK(missing_mass(h.count, h.count) == 0);
+  CHECK(intersection_error(h, h) == 0);
+  CHECK(missing_mass(empty.count, h.count) == 42);
+  CHECK(intersection_error(empty, h) == 1);
+}
+
+TEST_CASE("clutter in the window costs nothing; what lacks counts as a share of the reference") {
+  Row reference, window;
+  reference.add(40, 0, 0, 200);
+  reference.add(10, 200, 0, 0);
+  window.add(30, 0, 0, 200);
+  window.add(500, 90, 130, 60);
+  CHECK(missing_mass(window.histogram().count, reference.histogram().count) == 20);
+  CHECK(intersection_error(window.histogram(), reference.histogram()) == doctest::Approx(0.4));
+}
+
+TEST_CASE("automatic threshold: 1.25 times the 90 % quantile over all pairs, the tolerance on top, capped at 0.75") {
+  // Views with k blue pixels and 100 - k red ones: the error of view i against view k is |k_i - k_k| / 100.
+  const auto views = [](std::initializer_list<int> blue) {
+    std::vector<Histogram> out;
+    for (const int k : blue) {
+      Row row;
+      row.add(k, 200, 0, 0);
+      row.add(100 - k, 0, 0, 200);
+      out.push_back(row.histogram());
+    }
+    return out;
+  };
+  CHECK(automatic_threshold(views({10, 20, 40}), 0) == doctest::Approx(1.25 * 0.30));  // 6 pairs: rank 6 of 6
+  CHECK(automatic_threshold(views({10, 10, 10}), 0) == 0);
+  CHECK(automatic_threshold(views({10, 10, 10}), 0.36) == doctest::Approx(0.36));
+  CHECK(automatic_threshold(views({0, 90}), 0) == kThresholdCap);
+  CHECK(automatic_threshold(views({10, 20, 40}), 0.6) == kThresholdCap);
+  CHECK(automatic_threshold(views({10}), 0) == kThresholdCap);
+  // 5 views, 20 pairs: the rank is 18; only the two largest errors, of the pair 0 and 50, lie above it.
+  CHECK(automatic_threshold(views({0, 2, 4, 6, 50}), 0) == doctest::Approx(1.25 * 0.48));
+}

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <string>
+
+#include "nodes/object_detection/detector.hpp"
+#include "nodes/object_detection/scenes.hpp"
+#include "tests/unit/mapping_3d/node_harness.hpp"
+
+namespace takt {
+void register_object_detection(NodeTypes& types);
+}
+
+using namespace takt;
+using namespace takt::object_detection;
+
+namespace {
+
+const std::filesystem::path kObjects = std::filesystem::path(TAKT_SOURCE_DIR) / "graph/objects";
+
+std::unique_ptr<Node> make_node() {
+  NodeTypes types;
+  register_object_detection(types);
+  return types.find("object_detection")->make();
+}
+
+void set(Node& node, std::string_view name, const ParamValue& value) {
+  for (ParamBase* param : node.params())
+    if (param->name() == name) REQUIRE(param->set(value));
+}
+
+std::string setup_error(Node& node, const Capacity& images) {
+  PortAccess::connect(test::input(node, "pair"), images);
+  try {
+    test::set_up(node);
+  } catch (const SetupError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+}  // namespace
+
+TEST_CASE("object_detection: boxes and region of interest of the left image, with its stamp") {
+  const auto node = make_node();
+  auto& port = test::input(*node, "pair");
+  PortAccess::connect(port, {640, 480, 3, 0});
+  set(*node, "database", kObjects.string());
+  test::set_up(*node);
+  test::BoxWriter<Detections> boxes(*node->outputs()[0]);
+  test::BoxWriter<Image> roi(*node->outputs()[1]);
+  CHECK_FALSE(test::run(*node));  // nothing latched
+
+  // One object, well visible.
+  const auto database = read_database(kObjects, 48, TestViews::read);
+  SceneParameters p;
+  p.scale_min = p.scale_max = p.light_min = p.light_max = 1;
+  p.most_objects = 1;
+  Scene scene;
+  for (uint64_t i = 0; scene.objects.empty(); ++i) scene = make_scene(database, p, 5, i);
+  test::Box<StereoPair> pair({640, 480, 3, 0});
+  pair->width = 640, pair->height = 480, pair->channels = 3, pair->health = image_health::blurred;
+  pair->left.resize(scene.pixels.size());
+  std::copy(scene.pixels.begin(), scene.pixels.end(), pair->left.data());
+  test::latch(port, pair, 1234, 1);
+  CHECK(test::run(*node));
+  REQUIRE(boxes.sent());
+  REQUIRE(roi.sent());
+  CHECK(boxes.stamp_ns() == 1234);
+  CHECK(roi.stamp_ns() == 1234);
+  CHECK(boxes.message().image_width == 640);
+  CHECK(boxes.message().image_height == 480);
+  REQUIRE(boxes.message().boxes.size >= 1);
+  const Detection& best = boxes.message().boxes[0];
+  const PlacedObject& placed = scene.objects[0];
+  CHECK(best.class_id == static_cast<float>(placed.object));
+  CHECK(best.score > 0.6f);
+  CHECK(std::abs(best.x_px + best.width_px / 2 - static_cast<float>(placed.x + placed.side / 2)) <= 24);
+  CHECK(std::abs(best.y_px + best.height_px / 2 - static_cast<float>(placed.y + placed.side / 2)) <= 24);
+
+  // The picture shows just what the detector passes.
+  Detector detector(640, 480, database, {});
+  REQUIRE(detector.run(scene.view()));
+  REQUIRE(roi.message().width == 37);
+  REQUIRE(roi.message().height == 27);
+  CHECK(roi.message().channels == 1);
+  CHECK(roi.message().health == image_health::blurred);
+  std::vector<uint8_t> wanted(37 * 27);
+  detector.decision().region_of_interest({wanted.data(), 37, 27});
+  const auto got = roi.message().pixels.items();
+  CHECK(std::equal(wanted.begin(), wanted.end(), got.begin(), got.end()));
+  CHECK(std::count(got.begin(), got.end(), 255) > 0);
+
+  // The same pair again is no work; an image of another size is refused.
+  PortAccess::held(port)[0].sequence = 1;
+  PortAccess::set_held(port, 1, false, 1);
+  CHECK_FALSE(test::run(*node));
+  pair->width = 320;
+  test::latch(port, pair, 1300, 2);
+  CHECK_FALSE(test::run(*node));
+}
+
+TEST_CASE("object_detection: at most max_detections boxes") {
+  const auto node = make_node();
+  auto& port = test::input(*node, "pair");
+  PortAccess::connect(port, {640, 480, 3, 0});
+  set(*node, "database", kObjects.string());
+  set(*node, "max_detections", int64_t{2});
+  set(*node, "min_score", 0.0);  // so that there are many
+  test::set_up(*node);
+  test::BoxWriter<Detections> boxes(*node->outputs()[0]);
+  const auto database = read_database(kObjects, 48, TestViews::read);
+  const Scene scene = make_scene(database, {}, 3, 0);
+  test::Box<StereoPair> pair({640, 480, 3, 0});
+  pair->width = 640, pair->height = 480, pair->channels = 3;
+  pair->left.resize(scene.pixels.size());
+  std::copy(scene.pixels.begin(), scene.pixels.end(), pair->left.data());
+  test::latch(port, pair, 1, 1);
+  CHECK(test::run(*node));
+  REQUIRE(boxes.sent());
+  CHECK(boxes.message().boxes.size == 2);
+  CHECK(boxes.message().boxes[0].score >= boxes.message().boxes[1].score);
+}
+
+TEST_CASE("object_detection: what cannot work is said before start") {
+  const Capacity images{640, 480, 3, 0};
+  const auto error = [&](std::string_view name, const ParamValue& value, const Capacity& capacity) {
+    const auto node = make_node();
+    set(*node, "database", kObjects.string());
+    if (!name.empty()) set(*node, name, value);
+    return setup_error(*node, capacity);
+  };
+  CHECK(error("", int64_t{0}, images).empty());
+  CHECK(error("", int64_t{0}, {640, 480, 1, 0}).find("must have three") != std::string::npos);
+  CHECK(error("database", std::string("/nonexistent"), images).find("objects.txt: cannot be read") !=
+        std::string::npos);
+  CHECK(error("reference", int64_t{32}, images).find("must be 32 x 32") != std::string::npos);
+  CHECK(error("window", int64_t{48}, images).find("window - 1 = 47") != std::string::npos);
+  CHECK(error("", int64_t{0}, {60, 480, 3, 0}).find("at most 60") != std::string::npos);
+}
