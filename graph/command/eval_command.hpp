@@ -24,4 +24,16 @@ struct EvalEgoMotionOptions {
 };
 void add_eval_ego_motion(CLI::App& eval, EvalEgoMotionOptions& options, int& exit_code);
 
+struct EvalGroundOptions {
+  std::filesystem::path images, labels;  ///< all three, or none: a pavement is generated
+  std::vector<int> drivable;             ///< class ids
+  std::vector<int> ignore;
+  std::string learn;  ///< shell pattern of file names
+  uint64_t seed = 1;
+  int frames = 60;
+  std::string picture;
+  bool json = false;
+};
+void add_eval_ground(CLI::App& eval, EvalGroundOptions& options, int& exit_code);
+
 }  // namespace takt::command

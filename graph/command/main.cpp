@@ -61,6 +61,7 @@ int main(int argc, char** argv) {
   takt::command::RunOptions run_options, check_options;
   takt::command::EvalStereoOptions stereo;
   takt::command::EvalEgoMotionOptions ego_motion;
+  takt::command::EvalGroundOptions ground;
   std::string type;
   bool check_json = false;
   int exit_code = 0;
@@ -78,6 +79,7 @@ int main(int argc, char** argv) {
   eval->require_subcommand(1);
   takt::command::add_eval_stereo(*eval, stereo, exit_code);
   takt::command::add_eval_ego_motion(*eval, ego_motion, exit_code);
+  takt::command::add_eval_ground(*eval, ground, exit_code);
 
   try {
     app.parse(argc, argv);

@@ -6,6 +6,7 @@ namespace takt {
 void register_stereo(NodeTypes& types);
 void register_ego_motion(NodeTypes& types);
 void register_mapping_3d(NodeTypes& types);
+void register_ground_map(NodeTypes& types);
 void register_picture(NodeTypes& types);
 }  // namespace takt
 
@@ -16,6 +17,7 @@ NodeTypes node_types() {
   register_stereo(types);
   register_ego_motion(types);
   register_mapping_3d(types);
+  register_ground_map(types);
   register_picture(types);
   return types;
 }
