@@ -4,7 +4,18 @@
 #include <algorithm>
 #include <cmath>
 
+#include "nodes/ground_map/cell_kernel.hpp"
+
 namespace takt::ground_map {
+namespace {
+
+/// Whether no pixel of row y, nor of any row above it, sees the floor: the fall of a ray is linear in x and y.
+bool above_horizon(const FloorProjection& p, int y, int width) {
+  const double fall_left = p.h[7] * y + p.h[8], fall_right = fall_left + p.h[6] * (width - 1);
+  return p.h[7] >= 0 && std::max(fall_left, fall_right) <= FloorProjection::kHorizon;
+}
+
+}  // namespace
 
 GroundGrid::GroundGrid(int image_width, const GridParameters& parameters) : p_(parameters) {
   window_.cells = 2 * static_cast<int>(std::ceil(p_.window_m / 2 / p_.cell_m - 1e-9));
@@ -37,58 +48,56 @@ void GroundGrid::centre(const FloorPoint& robot) {
   }
 }
 
-// Cells that the pixels of one row see. Coordinates in cells, so that a cell is the whole part of both.
-void GroundGrid::project_row(const FloorProjection& to_cells, const FloorPoint& robot, int y, int width) {
-  const auto& h = to_cells.h;
-  const double x0 = h[1] * y + h[2], y0 = h[4] * y + h[5], w0 = h[7] * y + h[8];
-  const double n = window_.cells, range = p_.range_max_m / p_.cell_m, range2 = range * range;
-  for (int x = 0; x < width; ++x) {
-    const double w = h[6] * x + w0, inverse = 1 / w;
-    const double column = (h[0] * x + x0) * inverse, row = (h[3] * x + y0) * inverse;
-    const double dx = column - robot.x_m, dy = row - robot.y_m;
-    const bool seen = (w > FloorProjection::kHorizon) & (column >= 0) & (column < n) & (row >= 0) & (row < n) &
-                      (dx * dx + dy * dy <= range2);
-    row_cells_[static_cast<size_t>(x)] =
-        seen ? static_cast<int32_t>(row) * window_.cells + static_cast<int32_t>(column) : kNone;
-  }
-}
-
 /// The ground of a column leaves `cell`: it has run through it.
 void GroundGrid::close(int32_t& cell) {
   if (cell >= 0 && p_.votes == Votes::columns) ++tallies_[static_cast<size_t>(cell)].free;
-  cell = kNone;
+  cell = kNoCell;
 }
 
-bool GroundGrid::count_row(const uint8_t* mask, int width) {
-  bool open = false;
-  for (int x = 0; x < width; ++x) {
-    int32_t& last = column_[static_cast<size_t>(x)];
-    if (last == kEnded) continue;
-    open = true;
-    const int32_t cell = row_cells_[static_cast<size_t>(x)];
-    if (!mask[x]) {
-      if (cell != last) close(last);
-      if (cell >= 0) ++tallies_[static_cast<size_t>(cell)].blocked;
-      last = kEnded;
-    } else {
-      if (cell != last) close(last);
-      if (cell >= 0 && p_.votes == Votes::pixels) ++tallies_[static_cast<size_t>(cell)].free;
-      last = cell;
-    }
+// Most pixels are ground in the same cell as the one below: nothing to do for a whole block of them.
+bool GroundGrid::idle(const uint8_t* mask, int first) const {
+  int busy = 0;
+  for (int x = first; x < first + kBlock; ++x) {
+    const int32_t last = column_[static_cast<size_t>(x)], cell = row_cells_[static_cast<size_t>(x)];
+    busy |= static_cast<int>(last != kEnded) & (static_cast<int>(mask[x] == 0) | static_cast<int>(cell != last));
   }
-  return open;
+  return busy == 0;
+}
+
+void GroundGrid::count_row(const uint8_t* mask, int width) {
+  for (int x = 0; x < width;) {
+    if (p_.votes == Votes::columns && x + kBlock <= width && idle(mask, x)) {
+      x += kBlock;
+      continue;
+    }
+    for (const int end = std::min(x + kBlock, width); x < end; ++x) count(mask[x] != 0, x);
+  }
+}
+
+void GroundGrid::count(bool ground, int x) {
+  int32_t& last = column_[static_cast<size_t>(x)];
+  if (last == kEnded) return;
+  const int32_t cell = row_cells_[static_cast<size_t>(x)];
+  if (cell != last) close(last);
+  last = ground ? cell : kEnded;
+  open_ -= !ground;
+  if (cell == kNoCell) return;
+  Tally& tally = tallies_[static_cast<size_t>(cell)];
+  tally.blocked += !ground;
+  tally.free += ground && p_.votes == Votes::pixels;
 }
 
 void GroundGrid::observe(ImageView<const uint8_t> mask, const FloorProjection& projection, const FloorPoint& robot) {
   const FloorPoint origin = window_.origin();
-  const FloorProjection to_cells = projection.scaled(origin, p_.cell_m);
-  const FloorPoint robot_in_cells{(robot.x_m - origin.x_m) / p_.cell_m, (robot.y_m - origin.y_m) / p_.cell_m};
+  const double range = p_.range_max_m / p_.cell_m;
+  const CellRow row{projection.scaled(origin, p_.cell_m).h, (robot.x_m - origin.x_m) / p_.cell_m,
+                    (robot.y_m - origin.y_m) / p_.cell_m, range * range, window_.cells};
   std::fill(tallies_.begin(), tallies_.end(), Tally{});
-  std::fill(column_.begin(), column_.end(), kNone);
-  bool open = true;
-  for (int y = mask.height; open && y-- > 0;) {
-    project_row(to_cells, robot_in_cells, y, mask.width);
-    open = count_row(mask.row(y), mask.width);
+  std::fill(column_.begin(), column_.end(), kNoCell);
+  open_ = mask.width;
+  for (int y = mask.height; open_ > 0 && y-- > 0 && !above_horizon(projection, y, mask.width);) {
+    cells_of_row(row, y, mask.width, row_cells_.data());
+    count_row(mask.row(y), mask.width);
   }
   for (int32_t& cell : column_) close(cell);
   for (size_t i = 0; i < tallies_.size(); ++i) {

@@ -59,18 +59,20 @@ class GroundGrid {
   struct Tally {
     int32_t free = 0, blocked = 0;
   };
-  static constexpr int32_t kNone = -1, kEnded = -2;
-  void project_row(const FloorProjection& to_cells, const FloorPoint& robot_in_cells, int y, int width);
-  /// False once every column of the image has ended.
-  bool count_row(const uint8_t* mask, int width);
+  static constexpr int32_t kEnded = -2;
+  static constexpr int kBlock = 16;
+  bool idle(const uint8_t* mask, int first) const;
+  void count_row(const uint8_t* mask, int width);
+  void count(bool ground, int x);
   void close(int32_t& cell);
 
   GridParameters p_;
   Window window_;
   std::vector<int16_t> map_, observation_;
   std::vector<Tally> tallies_;
-  std::vector<int32_t> row_cells_;  ///< per pixel of a row: its cell, kNone outside window, range or floor
-  std::vector<int32_t> column_;     ///< per column of the image: cell of the last pixel, kNone, or kEnded
+  std::vector<int32_t> row_cells_;  ///< per pixel of a row: its cell or kNoCell
+  std::vector<int32_t> column_;     ///< per column of the image: cell of the last pixel, kNoCell, or kEnded
+  int open_ = 0;                    ///< columns that have not ended
 };
 
 }  // namespace takt::ground_map

@@ -25,13 +25,15 @@ class MaskCleaner {
     int32_t y, first, last;  ///< pixels first .. last - 1
   };
   void average(ImageView<const uint8_t> raw);
-  void reach(int x, int y, ImageView<uint8_t> mask);
-  const uint8_t* smooth_row(int y) const { return smooth_.data() + static_cast<ptrdiff_t>(y) * width_; }
+  void reach(const Run& along, ImageView<uint8_t> mask);
+  uint8_t* row(int y) { return waiting_ground_.data() + static_cast<ptrdiff_t>(y) * width_; }
 
   int width_, height_, radius_;
-  std::vector<uint8_t> smooth_;   ///< 1 ground, 0 not
-  std::vector<int32_t> columns_;  ///< ground pixels of each column within the window's rows
-  std::vector<Run> waiting_;      ///< runs that were marked and whose neighbours are still to be looked at
+  std::vector<uint8_t> waiting_ground_;  ///< 1: ground of the averaged image that was not reached yet
+  std::vector<int16_t> columns_;         ///< ground pixels of each column within the window's rows
+  std::vector<int16_t> sums_;            ///< of neighbouring columns
+  std::vector<int16_t> within_;          ///< columns of the window that lie in the image
+  std::vector<Run> runs_;                ///< reached, with rows above and below still to be looked at
 };
 
 }  // namespace takt::ground_map
