@@ -28,7 +28,8 @@ struct EvalGroundOptions {
   std::filesystem::path images, labels;  ///< all three, or none: a pavement is generated
   std::vector<int> drivable;             ///< class ids
   std::vector<int> ignore;
-  std::string learn;  ///< shell pattern of file names
+  std::string learn;             ///< shell pattern of file names
+  std::vector<std::string> set;  ///< "param=value" of the ground_map node
   uint64_t seed = 1;
   int frames = 60;
   std::string picture;

@@ -29,6 +29,34 @@ struct BadData : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+double number(const std::string& text, const std::string& value, double low, double high) {
+  size_t used = 0;
+  double v = low - 1;
+  try {
+    v = std::stod(value, &used);
+  } catch (const std::exception&) {
+  }
+  if (used != value.size() || !(v >= low && v <= high))
+    throw BadData(fmt::format("--set {}: must be a number in {}..{}", text, low, high));
+  return v;
+}
+
+/// The detector's parameters, by their names at the node.
+DetectorParameters parameters(const EvalGroundOptions& options) {
+  DetectorParameters p;
+  for (const std::string& text : options.set) {
+    const size_t equals = text.find('=');
+    const std::string key = text.substr(0, equals), value = equals == std::string::npos ? "" : text.substr(equals + 1);
+    if (key == "t_m") p.t_m = number(text, value, 0, 1e6);
+    else if (key == "n_b") p.memory_entries = static_cast<int>(number(text, value, 1, 10000));
+    else if (key == "t_w") p.t_w = number(text, value, 0, 5000);
+    else if (key == "mean_size") p.mean_size = static_cast<int>(number(text, value, 1, 31));
+    else throw BadData(fmt::format("--set {}: valid parameters are t_m, n_b, t_w, mean_size", key));
+  }
+  if (p.mean_size % 2 == 0) throw BadData(fmt::format("--set mean_size={}: must be odd", p.mean_size));
+  return p;
+}
+
 ImageView<const uint8_t> view(const cv::Mat& m) {
   return {m.data, m.cols, m.rows, m.channels(), static_cast<ptrdiff_t>(m.step)};
 }
@@ -36,17 +64,21 @@ ImageView<uint8_t> writable(cv::Mat& m) {
   return {m.data, m.cols, m.rows, m.channels(), static_cast<ptrdiff_t>(m.step)};
 }
 
-double median(std::vector<double> v) {
+double quantile(std::vector<double> v, double share) {
   if (v.empty()) return 0;
-  std::nth_element(v.begin(), v.begin() + static_cast<ptrdiff_t>(v.size() / 2), v.end());
-  return v[v.size() / 2];
+  const auto at = std::min(v.size() - 1, static_cast<size_t>(share * static_cast<double>(v.size())));
+  std::nth_element(v.begin(), v.begin() + static_cast<ptrdiff_t>(at), v.end());
+  return v[at];
 }
 
 double ms_since(int64_t cpu_ns) { return static_cast<double>(thread_cpu_ns() - cpu_ns) / 1e6; }
 
 Json row(const MaskScore& score, const std::vector<double>* border_errors, std::optional<double> time_ms) {
   Json out{{"precision_pct", score.precision_pct()}, {"recall_pct", score.recall_pct()}};
-  if (border_errors) out["border_error_m"] = median(*border_errors);
+  if (border_errors) {
+    out["border_error_m"] = quantile(*border_errors, 0.5);
+    out["border_error_p90_m"] = quantile(*border_errors, 0.9);
+  }
   if (time_ms) out["time_ms"] = *time_ms;
   return out;
 }
@@ -102,7 +134,7 @@ cv::Mat read_truth(const LabelledImage& file, const EvalGroundOptions& options, 
 Json measure_images(const EvalGroundOptions& options) {
   const std::vector<LabelledImage> files = labelled_images(options);
   const cv::Size size = read(files.front().image, cv::IMREAD_COLOR, {}).size();
-  GroundDetector detector(size.width, size.height, {});
+  GroundDetector detector(size.width, size.height, parameters(options));
   int learnt = 0;
   for (const LabelledImage& file : files)
     if (file.teaches) {
@@ -125,7 +157,7 @@ Json measure_images(const EvalGroundOptions& options) {
     bottom_is_ground(writable(mask));
     add(trivial, view(mask), view(truth));
   }
-  Json out = row(all, nullptr, median(times));
+  Json out = row(all, nullptr, quantile(times, 0.5));
   out["frames"] = files.size();
   out["learnt_frames"] = learnt;
   if (!options.learn.empty()) out["not_learnt"] = row(others, nullptr, std::nullopt);
@@ -194,7 +226,7 @@ Json measure_pavement(const EvalGroundOptions& options) {
   make.frames = options.frames;
   const PavementScene scene(make);
   const GridParameters p;
-  GroundDetector detector(make.width, make.height, {});
+  GroundDetector detector(make.width, make.height, parameters(options));
   GroundGrid grid(make.width, p);
   cv::Mat image(make.height, make.width, CV_8UC3), truth(image.size(), CV_8U), mask(image.size(), CV_8U);
   MaskScore score, trivial;
@@ -225,7 +257,7 @@ Json measure_pavement(const EvalGroundOptions& options) {
     add(trivial, view(mask), view(truth));
     add_border_errors(borders(mask, 255), true_borders, p.range_max_m, trivial_errors);
   }
-  Json out = row(score, &errors, median(times));
+  Json out = row(score, &errors, quantile(times, 0.5));
   out["frames"] = make.frames;
   out["grid"] = {{"free_wrong_pct", percent(cells.free_wrong, cells.free)},
                  {"blocked_wrong_pct", percent(cells.blocked_wrong, cells.blocked)}};
@@ -239,12 +271,12 @@ void print_row(const char* name, const Json& r) {
   const auto text = [&](const char* key, int digits) {
     return r.contains(key) ? fmt::format("{:.{}f}", r[key].get<double>(), digits) : std::string("-");
   };
-  std::printf("%-30s %12s %9s %9s %8s\n", name, text("precision_pct", 2).c_str(), text("recall_pct", 2).c_str(),
-              text("border_error_m", 3).c_str(), text("time_ms", 2).c_str());
+  std::printf("%-30s %12s %9s %9s %7s %8s\n", name, text("precision_pct", 2).c_str(), text("recall_pct", 2).c_str(),
+              text("border_error_m", 3).c_str(), text("border_error_p90_m", 3).c_str(), text("time_ms", 2).c_str());
 }
 
 void print(const Json& out) {
-  std::printf("%-30s %12s %9s %9s %8s\n", "method", "precision %", "recall %", "border m", "CPU ms");
+  std::printf("%-30s %12s %9s %9s %7s %8s\n", "method", "precision %", "recall %", "border m", "p90 m", "CPU ms");
   print_row("takt ground_map", out);
   if (out.contains("not_learnt")) print_row("  on images not learnt from", out["not_learnt"]);
   print_row("bottom 40 % is ground", out["baseline"]);
@@ -279,6 +311,7 @@ void add_eval_ground(CLI::App& eval, EvalGroundOptions& o, int& exit_code) {
       ->check(CLI::Range(0, 255));
   app->add_option("--ignore", o.ignore, "class ids that are not counted")->delimiter(',')->check(CLI::Range(0, 255));
   app->add_option("--learn", o.learn, "images that teach before all are tested, e.g. 'first*' (default: each in turn)");
+  app->add_option("--set", o.set, "parameter=value of the ground_map node, repeatable");
   app->add_option("--seed", o.seed, "seed of the generated pavement (default 1)");
   app->add_option("--frames", o.frames, "images along the generated drive (default 60)")->check(CLI::Range(1, 100000));
   app->add_option("--picture", o.picture, "PNG of the last generated image with its mask, and the grid");

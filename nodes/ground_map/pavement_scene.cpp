@@ -50,6 +50,22 @@ double brick_tone(uint64_t seed, double x, double y, double distance) {
          (joint ? 0.35 * visible(distance, 0.008) : 0.05);
 }
 
+/// What lens and sensor make of it: a blur of 1 2 1 along both axes, and noise of about 4 grey levels (a triangle).
+void expose(ImageView<const float> sharp, uint64_t seed, ImageView<uint8_t> bgr) {
+  for (int y = 0; y < bgr.height; ++y)
+    for (int x = 0; x < bgr.width; ++x)
+      for (int k = 0; k < 3; ++k) {
+        double sum = 0;
+        for (int dy = -1; dy <= 1; ++dy)
+          for (int dx = -1; dx <= 1; ++dx)
+            sum += static_cast<double>((2 - std::abs(dx)) * (2 - std::abs(dy))) *
+                   sharp.at(std::clamp(x + dx, 0, bgr.width - 1), std::clamp(y + dy, 0, bgr.height - 1), k);
+        const int64_t counter = (int64_t{y} * bgr.width + x) * 3 + k;
+        const double grain = 5 * (random(seed, counter, 1) + random(seed, counter, 2));
+        bgr.at(x, y, k) = static_cast<uint8_t>(std::clamp(sum / 16 + grain + 0.5, 0.0, 255.0));
+      }
+}
+
 }  // namespace
 
 PavementScene::PavementScene(const PavementOptions& options) : options_(options) {
@@ -117,16 +133,22 @@ bool PavementScene::in_shadow(double x, double y, double z, const std::vector<co
 PavementScene::Hit PavementScene::ground(double x, double y, double z, double distance) const {
   const auto shade = [](const Colour3& c, double k) { return Colour3{c.b * k, c.g * k, c.r * k}; };
   const uint64_t seed = options_.seed * 1000;
-  if (x < kGrass) {
+  if (x < kGrass) {  // with patches of dry earth, nearly of the colour of the bricks
     const double tone =
         1 + 0.25 * smooth_noise(seed + 5, x, y, 0.25) +
         0.35 * random(seed + 6, static_cast<int64_t>(x * 60), static_cast<int64_t>(y * 60)) * visible(distance, 0.02);
-    return {shade({45, 105, 70}, tone), Truth::other};
+    const bool dry = smooth_noise(seed + 4, x, y, 0.7) > 0.45;
+    return {shade(dry ? Colour3{72, 102, 136} : Colour3{45, 105, 70}, tone), Truth::other};
   }
+  const double dirt = 0.15 * smooth_noise(seed + 8, x, y, 0.3);
   if (z < -1e-6)
-    return {shade({72, 70, 68}, 1 + 0.12 * smooth_noise(seed + 7, x, y, 0.03) * visible(distance, 0.03)), Truth::other};
-  if (x >= kKerb) return {shade({178, 182, 184}, 1 + 0.05 * smooth_noise(seed + 8, x, y, 0.1)), Truth::other};
-  return {shade({92, 112, 142}, brick_tone(seed + 9, x, y, distance)), Truth::ground};
+    return {shade({72, 70, 68}, 1 + dirt + 0.12 * smooth_noise(seed + 7, x, y, 0.03) * visible(distance, 0.03)),
+            Truth::other};
+  if (x >= kKerb) return {shade({148, 157, 166}, 1 + dirt), Truth::other};
+  const auto i = static_cast<int64_t>(std::floor(x / 0.05)), j = static_cast<int64_t>(std::floor(y / 0.05));
+  if (random(seed + 12, i, j) > 0.985) return {shade({35, 95, 160}, 1 + 4 * dirt), Truth::ground};  // a leaf
+  const double tint = 0.05 * smooth_noise(seed + 13, x, y, 0.15);
+  return {shade({92 * (1 - tint), 112, 142 * (1 + tint)}, brick_tone(seed + 9, x, y, distance)), Truth::ground};
 }
 
 PavementScene::Hit PavementScene::trace(const Ray& ray, const std::vector<const Box*>& near) const {
@@ -165,7 +187,8 @@ void PavementScene::render(int frame, ImageView<uint8_t> bgr, ImageView<uint8_t>
     if (box.y1 > eye.y_m - 3 && box.y0 < eye.y_m + 20) near.push_back(&box);
   const double clouds = 0.93 + 0.17 * std::sin(0.11 * frame + static_cast<double>(options_.seed));  // light changes
   const double warm = 1 + 0.04 * std::sin(0.07 * frame);
-  const uint64_t noise = bits(options_.seed * 7919 + static_cast<uint64_t>(frame));
+  std::vector<float> colours(static_cast<size_t>(bgr.width) * static_cast<size_t>(bgr.height) * 3);
+  const ImageView<float> sharp(colours.data(), bgr.width, bgr.height, 3);
   for (int y = 0; y < bgr.height; ++y)
     for (int x = 0; x < bgr.width; ++x) {
       const double u = (x - camera_.cu_px) / camera_.focal_px, v = (y - camera_.cv_px) / camera_.focal_px;
@@ -173,14 +196,11 @@ void PavementScene::render(int frame, ImageView<uint8_t> bgr, ImageView<uint8_t>
       const Hit hit =
           trace({eye.x_m, eye.y_m, a.t[2], c * rx - s * ry, s * rx + c * ry, a.r[6] * u + a.r[7] * v + a.r[8]}, near);
       truth.at(x, y) = static_cast<uint8_t>(hit.truth);
-      const double colour[3] = {hit.colour.b / warm, hit.colour.g, hit.colour.r * warm};
-      for (int k = 0; k < 3; ++k) {
-        // Sum of two uniforms: a triangle of +-5 grey levels, standard deviation 2.
-        const int64_t counter = (int64_t{y} * bgr.width + x) * 3 + k;
-        const double grain = 2.5 * (random(noise, counter, 1) + random(noise, counter, 2));
-        bgr.at(x, y, k) = static_cast<uint8_t>(std::clamp(colour[k] * clouds + grain + 0.5, 0.0, 255.0));
-      }
+      sharp.at(x, y, 0) = static_cast<float>(hit.colour.b / warm * clouds);
+      sharp.at(x, y, 1) = static_cast<float>(hit.colour.g * clouds);
+      sharp.at(x, y, 2) = static_cast<float>(hit.colour.r * warm * clouds);
     }
+  expose(sharp, bits(options_.seed * 7919 + static_cast<uint64_t>(frame)), bgr);
 }
 
 }  // namespace takt::ground_map

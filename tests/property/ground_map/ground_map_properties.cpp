@@ -9,6 +9,7 @@
 #include <random>
 #include <vector>
 
+#include "nodes/ground_map/cell_kernel.hpp"
 #include "nodes/ground_map/ground_grid.hpp"
 #include "nodes/ground_map/mask_cleaner.hpp"
 #include "nodes/ground_map/saturation_value.hpp"
@@ -283,4 +284,33 @@ TEST_CASE("a drive: every observation, and the map it adds up to, equal a map of
       REQUIRE(differences(grid.window(), grid.map(), map) == 0);
     }
   }
+}
+
+TEST_CASE("the cells of a row equal the projection of each pixel on every SIMD target") {
+  for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
+    hwy::SetSupportedTargetsForTest(target);
+    Random random(5);
+    for (int round = 0; round < 60; ++round) {
+      const int width = random.pick(1, 70), side = random.pick(2, 90);
+      const double range = random.uniform(3, 40);
+      const FloorProjection to_cells =
+          floor_projection({random.uniform(20, 60), 0.5 * width, 30, 0},
+                           mapping_3d::camera_mount(0, 0, 1.2, random.uniform(-3, 3), random.uniform(-1, 0.5)))
+              .scaled({random.uniform(-9, 0), random.uniform(-9, 0)}, random.uniform(0.1, 0.5));
+      const CellRow row{to_cells.h, random.uniform(0, side), random.uniform(0, side), range * range, side};
+      for (int y = 0; y < 60; ++y) {
+        std::vector<int32_t> out(static_cast<size_t>(width) + 1, 77);
+        cells_of_row(row, y, width, out.data());
+        REQUIRE(out.back() == 77);
+        for (int x = 0; x < width; ++x) {
+          const auto p = to_cells.floor_at(x, y);
+          const bool seen = p && p->x_m >= 0 && p->y_m >= 0 && p->x_m < side && p->y_m < side &&
+                            std::hypot(p->x_m - row.robot_column, p->y_m - row.robot_row) <= range;
+          const int expected = seen ? static_cast<int>(p->y_m) * side + static_cast<int>(p->x_m) : kNoCell;
+          REQUIRE(out[static_cast<size_t>(x)] == expected);
+        }
+      }
+    }
+  }
+  hwy::SetSupportedTargetsForTest(0);
 }
