@@ -37,8 +37,10 @@ bool GroundDetector::learn() {
 }
 
 void GroundDetector::classify(ImageView<uint8_t> mask) {
-  const uint8_t* table = memory_.table();
-  for (size_t i = 0; i < raw_.size(); ++i) raw_[i] = table[size_t{value_[i]} * 256 + saturation_[i]];
+  // Pointers of its own: bytes that are written could otherwise be those of the vectors themselves.
+  const uint8_t *table = memory_.table(), *s = saturation_.data(), *v = value_.data();
+  uint8_t* out = raw_.data();
+  for (size_t i = 0, n = raw_.size(); i < n; ++i) out[i] = table[size_t{v[i]} * 256 + s[i]];
   cleaner_.clean(view(raw_), area_, mask);
 }
 

@@ -52,11 +52,10 @@ void MaskCleaner::average(ImageView<const uint8_t> raw) {
     for (int k = 1 - radius_; k <= radius_; ++k)
       for (int x = 0; x < width_; ++x)
         sums_[static_cast<size_t>(x)] = static_cast<int16_t>(sums_[static_cast<size_t>(x)] + columns[x + k]);
+    const int16_t *sums = sums_.data(), *within = within_.data();
     uint8_t* out = row(y);
-    for (int x = 0; x < width_; ++x) {
-      const auto i = static_cast<size_t>(x);
-      out[x] = static_cast<int16_t>(2 * sums_[i]) > static_cast<int16_t>(rows * within_[i]);
-    }
+    for (int x = 0, n = width_; x < n; ++x)
+      out[x] = static_cast<int16_t>(2 * sums[x]) > static_cast<int16_t>(rows * within[x]);
   }
 }
 
