@@ -41,9 +41,15 @@ double number(const std::string& text, const std::string& value, double low, dou
   return v;
 }
 
-/// The detector's parameters, by their names at the node.
-DetectorParameters parameters(const EvalGroundOptions& options) {
-  DetectorParameters p;
+struct Parameters {
+  DetectorParameters detector;
+  GridParameters grid;
+};
+
+/// By their names at the node.
+Parameters parameters(const EvalGroundOptions& options) {
+  Parameters all;
+  DetectorParameters& p = all.detector;
   for (const std::string& text : options.set) {
     const size_t equals = text.find('=');
     const std::string key = text.substr(0, equals), value = equals == std::string::npos ? "" : text.substr(equals + 1);
@@ -51,10 +57,14 @@ DetectorParameters parameters(const EvalGroundOptions& options) {
     else if (key == "n_b") p.memory_entries = static_cast<int>(number(text, value, 1, 10000));
     else if (key == "t_w") p.t_w = number(text, value, 0, 5000);
     else if (key == "mean_size") p.mean_size = static_cast<int>(number(text, value, 1, 31));
-    else throw BadData(fmt::format("--set {}: valid parameters are t_m, n_b, t_w, mean_size", key));
+    else if (text == "votes=columns") all.grid.votes = Votes::columns;
+    else if (text == "votes=pixels") all.grid.votes = Votes::pixels;
+    else
+      throw BadData(fmt::format(
+          "--set {}: valid are t_m, n_b, t_w and mean_size with a number, votes=columns and votes=pixels", text));
   }
   if (p.mean_size % 2 == 0) throw BadData(fmt::format("--set mean_size={}: must be odd", p.mean_size));
-  return p;
+  return all;
 }
 
 ImageView<const uint8_t> view(const cv::Mat& m) {
@@ -134,7 +144,7 @@ cv::Mat read_truth(const LabelledImage& file, const EvalGroundOptions& options, 
 Json measure_images(const EvalGroundOptions& options) {
   const std::vector<LabelledImage> files = labelled_images(options);
   const cv::Size size = read(files.front().image, cv::IMREAD_COLOR, {}).size();
-  GroundDetector detector(size.width, size.height, parameters(options));
+  GroundDetector detector(size.width, size.height, parameters(options).detector);
   int learnt = 0;
   for (const LabelledImage& file : files)
     if (file.teaches) {
@@ -225,9 +235,9 @@ Json measure_pavement(const EvalGroundOptions& options) {
   make.seed = options.seed;
   make.frames = options.frames;
   const PavementScene scene(make);
-  const GridParameters p;
-  GroundDetector detector(make.width, make.height, parameters(options));
-  GroundGrid grid(make.width, p);
+  const Parameters p = parameters(options);
+  GroundDetector detector(make.width, make.height, p.detector);
+  GroundGrid grid(make.width, p.grid);
   cv::Mat image(make.height, make.width, CV_8UC3), truth(image.size(), CV_8U), mask(image.size(), CV_8U);
   MaskScore score, trivial;
   CellScore cells;
@@ -235,7 +245,7 @@ Json measure_pavement(const EvalGroundOptions& options) {
   const FloorProjection in_robot = floor_projection(scene.camera(), scene.camera_in_robot());
   const FloorPoint foot{scene.camera_in_robot().x, scene.camera_in_robot().y};
   const auto borders = [&](const cv::Mat& m, uint8_t ground) {
-    return free_range(view(m), ground, in_robot, foot, p.range_max_m);
+    return free_range(view(m), ground, in_robot, foot, p.grid.range_max_m);
   };
   for (int frame = 0; frame < make.frames; ++frame) {
     scene.render(frame, writable(image), writable(truth));
@@ -250,12 +260,12 @@ Json measure_pavement(const EvalGroundOptions& options) {
     times.push_back(ms_since(start));
     const auto true_borders = borders(truth, static_cast<uint8_t>(Truth::ground));
     add(score, view(mask), view(truth));
-    add_border_errors(borders(mask, 255), true_borders, p.range_max_m, errors);
+    add_border_errors(borders(mask, 255), true_borders, p.grid.range_max_m, errors);
     add_cells(cells, scene, grid);
     if (!options.picture.empty() && frame + 1 == make.frames) write_picture(options.picture, image, mask, grid);
     bottom_is_ground(writable(mask));
     add(trivial, view(mask), view(truth));
-    add_border_errors(borders(mask, 255), true_borders, p.range_max_m, trivial_errors);
+    add_border_errors(borders(mask, 255), true_borders, p.grid.range_max_m, trivial_errors);
   }
   Json out = row(score, &errors, quantile(times, 0.5));
   out["frames"] = make.frames;

@@ -93,14 +93,14 @@ TEST_CASE("a laser return above the reference area means that something stands t
   scan->range_m[90] = 0;
   scan->range_m[180] = scan->range_m[0] = straight;  // to the left and right of the robot
   CHECK(area_is_free(*scan, projection, area));
-  // A return 20 degrees to the left lies to the left of the area's middle, where the area ends 0.5 m further.
+  // Angles are counter-clockwise: from a scanner on the right the area lies to the left.
   scan->range_m[180] = scan->range_m[0] = 0;
-  const auto left = projection.floor_at(250, 420);
-  const double angle = std::atan2(-left->x_m, left->y_m - 0.3);
+  scan->sensor_in_robot.x = 1;
+  const double angle = std::atan2(1 - seen->x_m, seen->y_m - 0.3);
   scan->first_angle_rad = angle;
-  scan->range_m[0] = static_cast<float>(std::hypot(left->x_m, left->y_m - 0.3));
+  scan->range_m[0] = static_cast<float>(std::hypot(1 - seen->x_m, seen->y_m - 0.3));
   CHECK_FALSE(area_is_free(*scan, projection, area));
-  scan->first_angle_rad = angle + 0.5;
+  scan->first_angle_rad = -angle;
   CHECK(area_is_free(*scan, projection, area));
 }
 
