@@ -299,6 +299,8 @@ int evaluate(const EvalGroundOptions& options) {
   try {
     if (options.images.empty() != options.labels.empty() || options.images.empty() != options.drivable.empty())
       throw BadData("--images, --labels and --drivable belong together; without them a pavement is generated");
+    if (options.images.empty() && !options.learn.empty())
+      throw BadData("--learn names images, so it wants --images; on a generated pavement each image teaches in turn");
     Json out = options.images.empty() ? measure_pavement(options) : measure_images(options);
     out["baseline"]["name"] = "bottom 40 % of the image is ground";
     if (options.json) std::printf("%s\n", out.dump(2).c_str());

@@ -26,6 +26,10 @@ class GroundMapNode final : public Node {
   void setup(Setup&) override {
     const Capacity& image = pair_.capacity();
     detector_.emplace(static_cast<int>(image.width), static_cast<int>(image.height), detector_parameters());
+    if (detector_->area().pixels() == 0)
+      throw SetupError("the reference area is empty: trapezoid_height = " + trapezoid_height_.value_text() +
+                       ", trapezoid_bottom = " + trapezoid_bottom_.value_text() +
+                       ", trapezoid_top = " + trapezoid_top_.value_text());
     ground_.resize(image.pixels());
     grid_cells_.emplace(static_cast<int>(image.width), grid_parameters());
     mask_.reserve({image.width, image.height, 1, 0});
@@ -55,7 +59,8 @@ class GroundMapNode final : public Node {
 
   bool usable(const StereoPair& pair) const {
     return pair.camera.focal_px > 0 && pair.width == detector_->width() && pair.height == detector_->height() &&
-           (pair.channels == 1 || pair.channels == 3);
+           (pair.channels == 1 || pair.channels == 3) &&
+           pair.left.size == ground_.size() * static_cast<size_t>(pair.channels);
   }
 
   /// The newest image, not mapped before, whose pose is known; else the newest with its pose predicted; else the newest

@@ -117,6 +117,10 @@ TEST_CASE("ground_map: images it cannot use give no result") {
   small->width = kWidth / 2;
   test::latch(bench.port("pair"), small, 200, 2);
   CHECK_FALSE(bench.run());
+  FloorPair cut(3);
+  cut->left.size -= 1;
+  test::latch(bench.port("pair"), cut, 300, 3);
+  CHECK_FALSE(bench.run());
   CHECK_FALSE(bench.mask->sent());
   CHECK_FALSE(bench.grid->sent());
 }
@@ -276,5 +280,6 @@ TEST_CASE("ground_map refuses parameters that cannot work") {
     CHECK_THROWS_WITH_AS(test::set_up(*node), doctest::Contains(text), SetupError);
   };
   refuses("mean_size", int64_t{4}, "mean_size is 4");
+  refuses("trapezoid_height", 0.0, "the reference area is empty");
   refuses("t_w", 300.0, "nothing would ever be ground");
 }
