@@ -40,6 +40,7 @@ class PavementScene {
     double x0, x1, y0, y1, height;
     Colour3 colour;
   };
+  /// A pixel's ray has 1 as its part along the optical axis: distances along it are depths.
   struct Ray {
     double ox, oy, oz, dx, dy, dz;
   };
