@@ -32,5 +32,17 @@ struct EvalObjectsOptions {
   bool json = false;
 };
 void add_eval_objects(CLI::App& eval, EvalObjectsOptions& options, int& exit_code);
+struct EvalGroundOptions {
+  std::filesystem::path images, labels;  ///< all three, or none: a pavement is generated
+  std::vector<int> drivable;             ///< class ids
+  std::vector<int> ignore;
+  std::string learn;             ///< shell pattern of file names
+  std::vector<std::string> set;  ///< "param=value" of the ground_map node
+  uint64_t seed = 1;
+  int frames = 60;
+  std::string picture;
+  bool json = false;
+};
+void add_eval_ground(CLI::App& eval, EvalGroundOptions& options, int& exit_code);
 
 }  // namespace takt::command

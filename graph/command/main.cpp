@@ -64,6 +64,7 @@ int main(int argc, char** argv) {
   takt::command::EvalEgoMotionOptions ego_motion;
   takt::command::AttachOptions attach;
   takt::command::EvalObjectsOptions objects;
+  takt::command::EvalGroundOptions ground;
   std::string type;
   bool check_json = false;
   int exit_code = 0;
@@ -83,6 +84,7 @@ int main(int argc, char** argv) {
   takt::command::add_eval_stereo(*eval, stereo, exit_code);
   takt::command::add_eval_ego_motion(*eval, ego_motion, exit_code);
   takt::command::add_eval_objects(*eval, objects, exit_code);
+  takt::command::add_eval_ground(*eval, ground, exit_code);
 
   try {
     app.parse(argc, argv);

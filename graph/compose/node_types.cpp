@@ -7,6 +7,7 @@ void register_stereo(NodeTypes& types);
 void register_ego_motion(NodeTypes& types);
 void register_mapping_3d(NodeTypes& types);
 void register_object_detection(NodeTypes& types);
+void register_ground_map(NodeTypes& types);
 void register_picture(NodeTypes& types);
 void register_obstacle_stop(NodeTypes& types);
 void register_semantic(NodeTypes& types);
@@ -20,6 +21,7 @@ NodeTypes node_types() {
   register_ego_motion(types);
   register_mapping_3d(types);
   register_object_detection(types);
+  register_ground_map(types);
   register_picture(types);
   register_obstacle_stop(types);
   register_semantic(types);

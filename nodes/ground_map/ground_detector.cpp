@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "nodes/ground_map/ground_detector.hpp"
+
+#include <algorithm>
+
+#include "nodes/ground_map/saturation_value.hpp"
+
+namespace takt::ground_map {
+
+GroundDetector::GroundDetector(int width, int height, const DetectorParameters& parameters)
+    : width_(width),
+      height_(height),
+      t_m_(parameters.t_m),
+      area_(width, height, parameters.trapezoid),
+      memory_(parameters.memory_entries, parameters.t_w),
+      cleaner_(width, height, parameters.mean_size) {
+  for (auto* plane : {&saturation_, &value_, &raw_})
+    plane->resize(static_cast<size_t>(width) * static_cast<size_t>(height));
+}
+
+void GroundDetector::analyse(ImageView<const uint8_t> image) {
+  for (int y = 0; y < height_; ++y) {
+    uint8_t *s = view(saturation_).row(y), *v = view(value_).row(y);
+    if (image.channels == 3) {
+      saturation_value_row(image.row(y), width_, s, v);
+    } else {
+      std::fill_n(s, width_, uint8_t{0});
+      std::copy_n(image.row(y), width_, v);
+    }
+  }
+}
+
+bool GroundDetector::learn() {
+  const auto descriptor = describe(view(saturation_), view(value_), area_, t_m_);
+  if (descriptor) memory_.add(*descriptor);
+  return descriptor.has_value();
+}
+
+void GroundDetector::classify(ImageView<uint8_t> mask) {
+  // Pointers of its own: bytes that are written could otherwise be those of the vectors themselves.
+  const uint8_t *table = memory_.table(), *s = saturation_.data(), *v = value_.data();
+  uint8_t* out = raw_.data();
+  for (size_t i = 0, n = raw_.size(); i < n; ++i) out[i] = table[size_t{v[i]} * 256 + s[i]];
+  cleaner_.clean(view(raw_), area_, mask);
+}
+
+}  // namespace takt::ground_map

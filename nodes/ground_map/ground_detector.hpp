@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which pixels of one image are floor: textures learnt in the reference area, tested everywhere (thesis Sec. 4.2.1).
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "nodes/ground_map/mask_cleaner.hpp"
+#include "nodes/ground_map/texture.hpp"
+#include "rt/msg/image_view.hpp"
+
+namespace takt::ground_map {
+
+struct DetectorParameters {
+  TrapezoidShares trapezoid;
+  double t_m = 80;           ///< px of a bin that counts, for a reference area of kDefaultAreaPx
+  int memory_entries = 500;  ///< N_b: 100 s of frames
+  double t_w = 0.9;          ///< weight above which a pixel is ground
+  int mean_size = 5;         ///< px, odd: edge of the box average
+};
+
+/// For images of one size. Allocates in the constructor only; one thread at a time.
+class GroundDetector {
+ public:
+  GroundDetector(int width, int height, const DetectorParameters& parameters);
+
+  /// Takes an image of the constructor's size, BGR or grey (saturation 0), for the two calls below.
+  void analyse(ImageView<const uint8_t> image);
+  /// Adds the texture of the reference area to the memory; false if no bin was full enough.
+  bool learn();
+  /// 255 ground, 0 not. Before the first entry nothing is ground.
+  void classify(ImageView<uint8_t> mask);
+
+  const ReferenceArea& area() const { return area_; }
+  const TextureMemory& memory() const { return memory_; }
+  int width() const { return width_; }
+  int height() const { return height_; }
+
+ private:
+  ImageView<uint8_t> view(std::vector<uint8_t>& plane) const { return {plane.data(), width_, height_}; }
+
+  int width_, height_;
+  double t_m_;
+  ReferenceArea area_;
+  TextureMemory memory_;
+  MaskCleaner cleaner_;
+  std::vector<uint8_t> saturation_, value_, raw_;
+};
+
+}  // namespace takt::ground_map

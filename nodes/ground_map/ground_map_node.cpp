@@ -1,0 +1,236 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "nodes/ground_map/ground_detector.hpp"
+#include "nodes/ground_map/ground_grid.hpp"
+#include "nodes/ground_map/laser_check.hpp"
+#include "nodes/ground_map/robot_track.hpp"
+#include "nodes/mapping_3d/pose.hpp"
+#include "rt/node.hpp"
+
+namespace takt {
+namespace {
+
+using namespace ground_map;
+
+/// Which image a job maps, and where the robot was.
+struct Chosen {
+  size_t image = 0;
+  std::optional<Transform> robot_in_map;  ///< none: not known
+};
+
+class GroundMapNode final : public Node {
+ public:
+  void setup(Setup&) override {
+    const Capacity& image = pair_.capacity();
+    detector_.emplace(static_cast<int>(image.width), static_cast<int>(image.height), detector_parameters());
+    if (detector_->area().pixels() == 0)
+      throw SetupError("the reference area is empty: trapezoid_height = " + trapezoid_height_.value_text() +
+                       ", trapezoid_bottom = " + trapezoid_bottom_.value_text() +
+                       ", trapezoid_top = " + trapezoid_top_.value_text());
+    ground_.resize(image.pixels());
+    grid_cells_.emplace(static_cast<int>(image.width), grid_parameters());
+    mask_.reserve({image.width, image.height, 1, 0});
+    const auto side = static_cast<uint32_t>(grid_cells_->window().cells);
+    grid_.reserve({side, side, 1, 0});
+    mount_ = mapping_3d::camera_mount(camera_x_, camera_y_, camera_height_, 0, camera_tilt_);
+    motion_mount_ =
+        mapping_3d::camera_mount(motion_camera_x_, motion_camera_y_, motion_camera_height_, 0, motion_camera_tilt_);
+  }
+
+  void run(Job& job) override {
+    const std::optional<Chosen> chosen = choose();
+    if (!chosen) return job.no_result();
+    const StereoPair& pair = pair_[chosen->image];
+    last_stamp_ns_ = pair_.stamp_ns(chosen->image);
+    const FloorProjection projection = floor_projection(pair.camera, mount_of(pair));
+    detector_->analyse(pair.left_view());
+    if (may_learn(pair, projection)) detector_->learn();
+    detector_->classify(ground());
+    const bool mask_given = give_mask(pair);
+    const bool grid_given = !chosen->robot_in_map || give_grid(projection, *chosen->robot_in_map);
+    if (!mask_given || !grid_given) job.no_result();
+  }
+
+ private:
+  bool has_pose_input() const { return motion_.connected() || odometry_.connected(); }
+
+  bool usable(const StereoPair& pair) const {
+    return pair.camera.focal_px > 0 && pair.width == detector_->width() && pair.height == detector_->height() &&
+           (pair.channels == 1 || pair.channels == 3) &&
+           pair.left.size == ground_.size() * static_cast<size_t>(pair.channels);
+  }
+
+  /// The newest image, not mapped before, whose pose is known; else the newest with its pose predicted; else the newest
+  /// without one: its mask is still worth having. Never simply the latest pose.
+  std::optional<Chosen> choose() {
+    std::optional<size_t> newest;
+    for (size_t i = pair_.size(); i-- > 0 && pair_.stamp_ns(i) > last_stamp_ns_;) {
+      if (!usable(pair_[i])) continue;
+      if (!has_pose_input()) return Chosen{i, Transform{}};
+      if (!newest) {
+        newest = i;
+        follow(mount_of(pair_[i]));
+      }
+      if (const auto pose = track_.at(pair_.stamp_ns(i))) return Chosen{i, pose};
+    }
+    if (!newest) return std::nullopt;
+    return Chosen{*newest, track_.predicted(pair_.stamp_ns(*newest))};
+  }
+
+  void follow(const Transform& mount) {
+    if (motion_.connected()) {
+      const Transform& camera = motion_camera_() == 0 ? mount : motion_mount_;
+      for (size_t i = 0; i < motion_.size(); ++i)
+        track_.insert(motion_.stamp_ns(i), robot_pose(motion_[i].pose, camera));
+    } else {
+      for (size_t i = 0; i < odometry_.size(); ++i) track_.insert(odometry_.stamp_ns(i), robot_pose(odometry_[i]));
+    }
+  }
+
+  /// A frame that the camera itself calls bad, or in whose reference area something stands or could stand unseen,
+  /// teaches nothing; it is classified all the same.
+  bool may_learn(const StereoPair& pair, const FloorProjection& projection) const {
+    constexpr uint32_t kBad = image_health::saturated | image_health::dark | image_health::blurred;
+    if ((pair.health & kBad) != 0) return false;
+    if (!scan_.connected()) return true;
+    const auto longest_ns = static_cast<int64_t>(scan_age_ * 1e9);
+    for (size_t i = scan_.size(); i-- > 0;)
+      if (std::abs(scan_.stamp_ns(i) - last_stamp_ns_) <= longest_ns)
+        return area_is_free(scan_[i], projection, detector_->area());
+    return false;
+  }
+
+  ImageView<uint8_t> ground() { return {ground_.data(), detector_->width(), detector_->height()}; }
+
+  /// False if no memory was to be had.
+  bool give_mask(const StereoPair& pair) {
+    if (!mask_.connected()) return true;
+    Image* out = mask_.loan();
+    if (!out || !out->pixels.resize(ground_.size())) return false;
+    out->width = pair.width;
+    out->height = pair.height;
+    out->channels = 1;
+    out->health = pair.health;
+    out->camera = pair.camera;
+    std::copy(ground_.begin(), ground_.end(), out->pixels.data());
+    mask_.send(last_stamp_ns_);
+    return true;
+  }
+
+  /// False if no memory was to be had.
+  bool give_grid(const FloorProjection& projection, const Transform& robot_in_map) {
+    if (!grid_.connected()) return true;
+    const PlanarPose robot = planar(robot_in_map);
+    GroundGrid& grid = *grid_cells_;
+    grid.centre({robot.x_m, robot.y_m});
+    const bool knows_ground = detector_->memory().size() > 0;  // before that "not ground" means nothing
+    if (knows_ground) {
+      grid.observe(ground(), projection.moved(robot), {robot.x_m, robot.y_m});
+      grid.accumulate();
+    }
+    Grid* out = grid_.loan();
+    if (!out) return false;
+    const Window& window = grid.window();
+    const double half_m = window.cells / 2 * window.cell_m;
+    out->width = out->height = window.cells;
+    out->cell_m = window.cell_m;
+    out->origin_x_m = out->origin_y_m = -half_m;
+    out->grid_in_map = {};
+    out->grid_in_map.x = window.origin().x_m + half_m;
+    out->grid_in_map.y = window.origin().y_m + half_m;
+    // Without poses images cannot be laid over one another: what one image shows is all there is.
+    const auto cells = has_pose_input() || !knows_ground ? grid.map() : grid.observation();
+    const size_t count = static_cast<size_t>(window.cells) * static_cast<size_t>(window.cells);
+    if (!out->cells.resize(count)) return false;
+    std::copy_n(cells.data, count, out->cells.data());
+    grid_.send(last_stamp_ns_);
+    return true;
+  }
+
+  const Transform& mount_of(const StereoPair& pair) const {
+    const Transform& t = pair.sensor_in_robot;
+    const bool said = t.x != 0 || t.y != 0 || t.z != 0 || t.qx != 0 || t.qy != 0 || t.qz != 0;
+    return said ? t : mount_;
+  }
+
+  DetectorParameters detector_parameters() const {
+    if (mean_size_ % 2 == 0) throw SetupError("mean_size is " + mean_size_.value_text() + " px, must be odd");
+    const double all = (n_b_ + 1) / 2.0;
+    if (t_w_ >= all)
+      throw SetupError("t_w is " + t_w_.value_text() + ", but the weights of n_b = " + n_b_.value_text() +
+                       " entries add up to " + std::to_string(all) + " only: nothing would ever be ground");
+    DetectorParameters p;
+    p.trapezoid = {trapezoid_bottom_, trapezoid_top_, trapezoid_height_, trapezoid_skip_};
+    p.t_m = t_m_;
+    p.memory_entries = n_b_;
+    p.t_w = t_w_;
+    p.mean_size = mean_size_;
+    return p;
+  }
+
+  GridParameters grid_parameters() const {
+    GridParameters p;
+    p.cell_m = cell_;
+    p.window_m = window_;
+    p.range_max_m = range_max_;
+    p.votes = votes_() == 0 ? Votes::columns : Votes::pixels;
+    p.votes_min = votes_min_;
+    p.up = static_cast<int>(std::lround(up_ * kOccupied));
+    p.down = static_cast<int>(std::lround(down_ * kOccupied));
+    return p;
+  }
+
+  Input<StereoPair> pair_{this, "pair", "rectified images, of which the left is used"};
+  Input<LaserScan> scan_{this, "scan", "low horizontal scan: guards what is learnt", Need::optional};
+  Input<Motion> motion_{this, "motion", "camera poses around the image's stamp; depth 16", Need::optional};
+  Input<Odometry> odometry_{this, "odometry", "used if motion is not connected; depth 16", Need::optional};
+  Output<Image> mask_{this, "mask", "255 ground, 0 not"};
+  Output<Grid> grid_{this, "grid", "cells of the map frame around the robot"};
+
+  Param<double> trapezoid_bottom_{this, "trapezoid_bottom", 0.5, {0.0, 1.0}, "1", "reference area, of the width"};
+  Param<double> trapezoid_top_{this, "trapezoid_top", 0.3, {0.0, 1.0}, "1", "reference area, of the width"};
+  Param<double> trapezoid_height_{this, "trapezoid_height", 0.2, {0.0, 1.0}, "1", "reference area, of the height"};
+  Param<double> trapezoid_skip_{this, "trapezoid_skip", 0.02, {0.0, 0.9}, "1", "lowest rows left out, of the height"};
+  Param<double> t_m_{this, "t_m", 80.0, {0.0, 1e6}, "px", "pixels of a bin that counts, for an area of 24576 px"};
+  Param<int> n_b_{this, "n_b", 500, {1, 10000}, "", "frames remembered; 100 s times the rate"};
+  Param<double> t_w_{this, "t_w", 0.9, {0.0, 5000.0}, "1", "sum of weights above which a pixel is ground"};
+  Param<int> mean_size_{this, "mean_size", 5, {1, 31}, "px", "edge of the box average, odd"};
+  Param<double> cell_{this, "cell", 0.30, {0.05, 1.0}, "m", "edge of a cell"};
+  Param<double> window_{this, "window", 18.0, {1.0, 100.0}, "m", "side of the grid around the robot"};
+  Param<double> range_max_{this, "range_max", 8.0, {0.5, 50.0}, "m", "farther floor is not looked at"};
+  Choice votes_{this, "votes", "columns", {"columns", "pixels"}, "what votes for a cell: image columns or pixels"};
+  Param<int> votes_min_{this, "votes_min", 5, {1, 100000}, "", "a cell with fewer votes in an image is not seen"};
+  Param<double> up_{this, "up", 0.2, {0.0, 1.0}, "1", "added to a cell that an image shows blocked"};
+  Param<double> down_{this, "down", 0.1, {0.0, 1.0}, "1", "taken off a cell that an image shows free"};
+  Param<double> scan_age_{this, "scan_age", 0.2, {0.0, 10.0}, "s", "between image and scan; none: nothing is learnt"};
+  Param<double> camera_x_{this, "camera_x", 0.0, {-5.0, 5.0}, "m", "camera to the right, where the pair does not say"};
+  Param<double> camera_y_{this, "camera_y", 0.0, {-5.0, 5.0}, "m", "camera ahead, where the pair does not say"};
+  Param<double> camera_height_{
+      this, "camera_height", 1.6, {0.0, 5.0}, "m", "above the floor, where the pair does not say"};
+  Param<double> camera_tilt_{this, "camera_tilt", 0.0, {-1.6, 1.6}, "rad", "up positive, where the pair does not say"};
+  Choice motion_camera_{
+      this, "motion_camera", "same", {"same", "other"}, "whose motion comes: of this camera or another"};
+  Param<double> motion_camera_x_{this, "motion_camera_x", 0.0, {-5.0, 5.0}, "m", "the other camera, to the right"};
+  Param<double> motion_camera_y_{this, "motion_camera_y", 0.0, {-5.0, 5.0}, "m", "the other camera, ahead"};
+  Param<double> motion_camera_height_{this, "motion_camera_height", 1.6, {0.0, 5.0}, "m", "the other camera"};
+  Param<double> motion_camera_tilt_{this,  "motion_camera_tilt",           0.0, {-1.6, 1.6},
+                                    "rad", "the other camera, up positive"};
+
+  std::optional<GroundDetector> detector_;
+  std::vector<uint8_t> ground_;  ///< mask of the present image
+  std::optional<GroundGrid> grid_cells_;
+  Transform mount_, motion_mount_;
+  RobotTrack track_{InputPort::kMaxDepth};
+  int64_t last_stamp_ns_ = INT64_MIN;
+};
+
+}  // namespace
+
+void register_ground_map(NodeTypes& types) {
+  types.add<GroundMapNode>("ground_map", Layer::perception, "Ground mask and 2-D occupancy grid from one camera");
+}
+
+}  // namespace takt
