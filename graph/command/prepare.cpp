@@ -10,9 +10,13 @@
 namespace takt::command {
 namespace {
 
-int refuse(Prepared& prepared, std::vector<graph::Problem> problems, Exit code) {
+void tell(const std::vector<graph::Problem>& problems) {
   for (const auto& problem : problems) std::fprintf(stderr, "%s\n", graph::to_string(problem).c_str());
   std::fprintf(stderr, "takt: %zu problem%s, nothing was started\n", problems.size(), problems.size() == 1 ? "" : "s");
+}
+
+int refuse(Prepared& prepared, std::vector<graph::Problem> problems, Exit code) {
+  tell(problems);
   prepared.problems = std::move(problems);
   return code;
 }
@@ -44,6 +48,12 @@ std::filesystem::path graph_file(const std::filesystem::path& named) {
 int refuse(const std::string& text, Exit code) {
   std::fprintf(stderr, "takt: error: %s\n", text.c_str());
   return code;
+}
+
+std::optional<graph::GraphSpec> load_graph(const std::filesystem::path& file, const graph::LoadOptions& options) {
+  graph::Loaded loaded = graph::load(graph_file(file), options, graph::node_types());
+  if (!loaded.graph) tell(loaded.problems);
+  return std::move(loaded.graph);
 }
 
 int prepare(const RunOptions& options, Prepared& prepared) {

@@ -18,6 +18,10 @@ struct Prepared {
   std::vector<graph::Problem> problems;  ///< why there is no composition
 };
 
+/// Loads only, no device is opened; nothing if the input is wrong, which is then written to stderr. An empty `file` is
+/// the default graph.
+std::optional<graph::GraphSpec> load_graph(const std::filesystem::path& file, const graph::LoadOptions& options);
+
 /// Loads and composes; what is wrong is written to stderr and the exit code returned (kOk: all is well).
 int prepare(const RunOptions& options, Prepared& prepared);
 
