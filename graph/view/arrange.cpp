@@ -12,7 +12,8 @@ constexpr double kCrossingCost = 80;  // px of edge length that one crossing is 
 constexpr double kPlainChannel = 90;
 
 Spacing plain_spacing(const Diagram& diagram, int columns) {
-  return {std::vector<double>(diagram.boxes.size(), 0), std::vector<double>(diagram.rooms.size(), 0),
+  const std::vector<double> none(diagram.rooms.size(), 0);
+  return {std::vector<double>(diagram.boxes.size(), 0), none, none,
           std::vector<double>(static_cast<size_t>(columns), kPlainChannel)};
 }
 

@@ -101,19 +101,31 @@ class Maker {
 
   void connect(const std::string& id, const std::vector<graph::EdgeSpec>& edges,
                const std::vector<std::vector<std::string>>& joins) {
+    std::vector<std::pair<DiagramEdge, const graph::EdgeSpec*>> found;
+    for (const auto& edge : edges)
+      if (const auto from = source_of(edge)) found.emplace_back(*from, &edge);
+    // Inputs in the order of their producers: fewer edges cross.
+    std::stable_sort(found.begin(), found.end(), [](const auto& a, const auto& b) {
+      return std::pair(a.first.from_box, a.first.output) < std::pair(b.first.from_box, b.first.output);
+    });
     const size_t to = index_.at(id);
-    for (const auto& edge : edges) {
-      const auto from = index_.find(edge.from.node);
-      if (from == index_.end()) continue;
-      auto& outputs = result_.boxes[from->second].outputs;
-      const auto output =
-          std::find_if(outputs.begin(), outputs.end(), [&](const auto& port) { return port.name == edge.from.port; });
-      if (output == outputs.end()) continue;
-      output->read = true;
-      auto& inputs = result_.boxes[to].inputs;
-      result_.edges.push_back({from->second, static_cast<size_t>(output - outputs.begin()), to, inputs.size()});
-      inputs.push_back(input_of(id, edge, joins));
+    for (auto& [edge, spec] : found) {
+      edge.to_box = to;
+      edge.input = result_.boxes[to].inputs.size();
+      result_.boxes[edge.from_box].outputs[edge.output].read = true;
+      result_.boxes[to].inputs.push_back(input_of(id, *spec, joins));
+      result_.edges.push_back(edge);
     }
+  }
+
+  /// Box and output that an edge comes from; nothing if the mode leaves the box out.
+  std::optional<DiagramEdge> source_of(const graph::EdgeSpec& edge) const {
+    const auto from = index_.find(edge.from.node);
+    if (from == index_.end()) return std::nullopt;
+    const auto& outputs = result_.boxes[from->second].outputs;
+    for (size_t output = 0; output < outputs.size(); ++output)
+      if (outputs[output].name == edge.from.port) return DiagramEdge{from->second, output, 0, 0};
+    return std::nullopt;
   }
 
   DiagramInput input_of(const std::string& id, const graph::EdgeSpec& edge,

@@ -35,7 +35,7 @@ struct DiagramBox {
   std::string times;     ///< "budget 25 ms, deadline 80 ms"
   bool device = false, high = false;
   size_t room = 0;
-  std::vector<DiagramInput> inputs;  ///< connected ones, in the order of the graph file
+  std::vector<DiagramInput> inputs;  ///< connected ones, in the order of their producers
   std::vector<DiagramOutput> outputs;
 };
 

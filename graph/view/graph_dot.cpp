@@ -29,7 +29,8 @@ std::string edge_line(const Diagram& diagram, const DiagramEdge& edge) {
   std::string label = output == type ? output : fmt::format("{} ({})", output, type);
   if (const std::string latch = input.latch_text(); !latch.empty()) label += "\n" + latch;
   return fmt::format("  {} -> {} [label={}{}];\n", dot_string(diagram.boxes[edge.from_box].id),
-                     dot_string(diagram.boxes[edge.to_box].id), dot_string(label), input.releases ? ", penwidth=2" : "");
+                     dot_string(diagram.boxes[edge.to_box].id), dot_string(label),
+                     input.releases ? ", penwidth=2" : "");
 }
 
 }  // namespace

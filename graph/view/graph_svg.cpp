@@ -14,6 +14,7 @@ namespace takt::view {
 namespace {
 
 constexpr double kPageMargin = 24, kHeading = 62, kLine = 20;
+constexpr double kLeastScale = 0.7;  // in a page narrower than this the picture scrolls, so that it stays legible
 
 // Each rule names its colour outright, because not every SVG viewer knows variables. Those of the edges (t0..t9, by
 // message type) are of middle lightness: they are legible on both backgrounds.
@@ -76,10 +77,11 @@ class Drawing {
                  height = text_bottom_ + 2 * kPageMargin;
     return fmt::format(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"takt-graph\" width=\"{0:.0f}\" height=\"{1:.0f}\" "
-        "viewBox=\"0 0 {0:.0f} {1:.0f}\" role=\"img\">\n<title>graph {2}</title>\n<style>{3}</style>\n"
+        "viewBox=\"0 0 {0:.0f} {1:.0f}\" role=\"img\" style=\"min-width:{6:.0f}px\">\n<title>graph "
+        "{2}</title>\n<style>{3}</style>\n"
         "<rect class=\"page\" width=\"100%\" height=\"100%\"/>\n<g transform=\"translate({4} "
         "{4})\">\n{5}</g>\n</svg>\n",
-        width, height, escape(diagram_.name), kStyle, kPageMargin, body);
+        width, height, escape(diagram_.name), kStyle, kPageMargin, body, kLeastScale * width);
   }
 
  private:

@@ -13,11 +13,27 @@ namespace {
 
 constexpr double kWidth = 360, kHeight = 150, kLeft = 34, kRight = 8, kTop = 8, kBottom = 30;
 
+constexpr double kBarsPerDecade = 10;  // finer buckets are drawn together
+
 struct Bucket {
   double low_us, high_us, count;
 };
 
-/// Buckets of one node, in ascending order; what is no [number, number] is left out.
+/// Buckets so fine that bars would be too thin are added up into bars of equal width.
+std::vector<Bucket> coarser(const std::vector<Bucket>& buckets) {
+  std::vector<Bucket> bars;
+  for (const Bucket& bucket : buckets) {
+    if (bucket.high_us <= 0) continue;
+    const double bar = std::ceil(std::log10(bucket.high_us) * kBarsPerDecade - 1e-9);
+    const Bucket wide{std::pow(10, (bar - 1) / kBarsPerDecade), std::pow(10, bar / kBarsPerDecade), bucket.count};
+    if (!bars.empty() && bars.back().high_us == wide.high_us) bars.back().count += bucket.count;
+    else bars.push_back(wide);
+  }
+  return bars;
+}
+
+/// Buckets of one node as they are drawn, in ascending order; what is no [number, number] is left out. Empty buckets
+/// may be missing in the report, so how wide a bucket is follows from the nearest two edges.
 std::vector<Bucket> buckets_of(const Json& node) {
   std::vector<Bucket> buckets;
   for (const Json& entry : at(node, "lateness_histogram_us")) {
@@ -26,7 +42,13 @@ std::vector<Bucket> buckets_of(const Json& node) {
     if (edge && count && *count >= 0) buckets.push_back({0, *edge, *count});
   }
   std::sort(buckets.begin(), buckets.end(), [](const Bucket& a, const Bucket& b) { return a.high_us < b.high_us; });
-  for (size_t i = 1; i < buckets.size(); ++i) buckets[i].low_us = buckets[i - 1].high_us;
+  double finest = 1e300;
+  for (size_t i = 1; i < buckets.size(); ++i)
+    if (buckets[i - 1].high_us > 0 && buckets[i].high_us > buckets[i - 1].high_us)
+      finest = std::min(finest, buckets[i].high_us / buckets[i - 1].high_us);
+  if (finest >= 1e300 || finest < std::pow(10, 1 / kBarsPerDecade)) return coarser(buckets);
+  for (size_t i = 0; i < buckets.size(); ++i)
+    buckets[i].low_us = std::max(i > 0 ? buckets[i - 1].high_us : 0, buckets[i].high_us / finest);
   std::erase_if(buckets, [](const Bucket& bucket) { return bucket.count == 0; });
   return buckets;
 }
@@ -64,9 +86,9 @@ Axes axes_of(const Json& nodes) {
 }
 
 std::string time_label(double us) {
-  if (us >= 1e6) return fmt::format("{:g} s", us / 1e6);
-  if (us >= 1e3) return fmt::format("{:g} ms", us / 1e3);
-  return fmt::format("{:g} µs", us);
+  if (us >= 1e6) return fmt::format("{:.3g} s", us / 1e6);
+  if (us >= 1e3) return fmt::format("{:.3g} ms", us / 1e3);
+  return fmt::format("{:.3g} µs", us);
 }
 
 std::string grid(const Axes& axes) {
@@ -86,8 +108,8 @@ std::string grid(const Axes& axes) {
     text += fmt::format("<text x=\"{}\" y=\"{:.1f}\" text-anchor=\"end\">{:g}</text>", kLeft - 5, y + 4,
                         std::pow(10, decade));
   }
-  return text +
-         fmt::format("<line class=\"axis\" x1=\"{0}\" x2=\"{1}\" y1=\"{2}\" y2=\"{2}\"/>", kLeft, kWidth - kRight, base);
+  return text + fmt::format("<line class=\"axis\" x1=\"{0}\" x2=\"{1}\" y1=\"{2}\" y2=\"{2}\"/>", kLeft,
+                            kWidth - kRight, base);
 }
 
 std::string bars(const Axes& axes, const std::vector<Bucket>& buckets) {

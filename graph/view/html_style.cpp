@@ -20,7 +20,7 @@ p { margin: 4px 0 8px; } .note { color: var(--soft); font-size: 13px; }
 dl { display: grid; grid-template-columns: max-content 1fr; gap: 3px 18px; margin: 12px 0; }
 dt { color: var(--soft); } dd { margin: 0; overflow-wrap: anywhere; } dd ul { margin: 0; padding-left: 18px; }
 .scroll { overflow-x: auto; max-width: 100%; }
-.scroll > svg { display: block; }
+.scroll > svg { display: block; } .scroll > .takt-graph { max-width: 100%; height: auto; }
 table { border-collapse: collapse; font-size: 13px; font-variant-numeric: tabular-nums; }
 th, td { padding: 3px 9px; text-align: left; white-space: nowrap; border-bottom: 1px solid var(--rule); }
 th { color: var(--soft); font-weight: normal; vertical-align: bottom; }
@@ -44,7 +44,7 @@ figure img { max-width: 100%; height: auto; display: block; margin: 0 auto; } fi
 @media (max-width: 600px) { body { padding: 10px 10px 40px; } h1 { font-size: 21px; }
   dl { grid-template-columns: 1fr; gap: 0; } dt { margin-top: 6px; } .charts { grid-template-columns: 1fr; } }
 @media print { @page { size: A4 landscape; margin: 12mm; } body { padding: 0; max-width: none; font-size: 11px; }
-  :root { color-scheme: light; } .scroll { overflow: visible; } .scroll > svg { max-width: 100%; height: auto; }
+  :root { color-scheme: light; } .scroll { overflow: visible; } .scroll > svg { max-width: 100%; min-width: 0 !important; height: auto; }
   table { font-size: 8.5px; } th, td { padding: 1px 4px; } figure, .chart, tr { break-inside: avoid; } h2 { break-after: avoid; }
   .charts { grid-template-columns: repeat(3, 1fr); }
   * { print-color-adjust: exact; -webkit-print-color-adjust: exact; } }

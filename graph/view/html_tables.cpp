@@ -22,12 +22,20 @@ std::string cores_text(const Json& cpus) {
 }
 
 std::string jobs_table(const Json& nodes) {
-  Table table({{"node", false}, {"criticality", false}, {"Hz"},           {"active s"},
-               {"released"},    {"completed"},          {"missed"},       {"skipped"},
-               {"reused"},      {"overruns"},           {"stale"},        {"new"},
-               {"no result"},   {"drift µs"},           {"preempted ms"}, {"allocations"},
-               {"page faults"}, {"policy", false},      {"cores", false}, {"read back", false}});
-  const auto above_zero = [](const Json& value) { return number(value).value_or(0) > 0; };
+  Table table({{"node", false},
+               {"criticality", false},
+               {"Hz"},
+               {"active s"},
+               {"released"},
+               {"completed"},
+               {"missed"},
+               {"skipped"},
+               {"reused"},
+               {"overruns"},
+               {"stale"},
+               {"new"},
+               {"no result"},
+               {"drift µs"}});
   for (const Json& node : nodes) {
     const auto released = number(at(node, "released")), completed = number(at(node, "completed"));
     const bool behind = number(at(node, "rate_hz")) && released && completed && *completed + 1 < *released;
@@ -39,15 +47,34 @@ std::string jobs_table(const Json& nodes) {
     table.cell(count_text(at(node, "released")));
     table.cell(count_text(at(node, "completed")), behind);
     for (const char* key : {"deadline_misses", "skipped", "reused", "budget_overruns"})
-      table.cell(count_text(at(node, key)), above_zero(at(node, key)));
+      table.cell(count_text(at(node, key)), number(at(node, key)).value_or(0) > 0);
     for (const char* key : {"stale_inputs", "new_inputs", "no_result"}) table.cell(count_text(at(node, key)));
     table.cell(figure(at(node, "drift_us"), "{:.1f}"));
+  }
+  return table.html();
+}
+
+std::string granted_table(const Json& nodes) {
+  Table table({{"node", false},
+               {"policy", false},
+               {"read back", false},
+               {"cores", false},
+               {"runtime ms"},
+               {"deadline ms"},
+               {"preempted ms"},
+               {"allocations"},
+               {"page faults"}});
+  for (const Json& node : nodes) {
+    const Json& granted = at(node, "granted");
+    const Json& verified = at(granted, "verified");
+    table.begin_row();
+    table.cell(words(at(node, "name")));
+    table.cell(words(at(granted, "policy")));
+    table.cell(verified.is_boolean() ? (verified.get<bool>() ? "yes" : "NO") : "–", verified == false);
+    table.cell(cores_text(at(granted, "cpus")));
+    for (const char* key : {"runtime_ms", "deadline_ms"}) table.cell(figure(at(granted, key), "{:.2f}"));
     table.cell(figure(at(node, "preempted_ms"), "{:.1f}"));
     for (const char* key : {"allocations", "page_faults"}) table.cell(count_text(at(node, key)));
-    const Json& verified = at(node, "granted", "verified");
-    table.cell(words(at(node, "granted", "policy")));
-    table.cell(cores_text(at(node, "granted", "cpus")));
-    table.cell(verified.is_boolean() ? (verified.get<bool>() ? "yes" : "NO") : "–", verified == false);
   }
   return table.html();
 }
@@ -84,11 +111,14 @@ std::string nodes_section(const Json& report) {
   if (!nodes.is_array()) return section("Nodes", not_recorded());
   return section("Nodes",
                  "<h3>Jobs</h3>\n" + jobs_table(nodes) +
-                     note("Missed, skipped, reused and overrun jobs and nodes that fell behind are marked. "
-                          "Drift: of the last release from plan.") +
+                     note("Marked: jobs missed, skipped, reused or overrun, and nodes that fell behind. Drift: of the "
+                          "last release from plan.") +
                      "<h3>Times</h3>\n" + times_table(nodes) +
-                     note("Lateness: planned release to start. Execution: CPU time of a job. Response: "
-                          "planned release to published output. Every job counts; p999 from 1000 samples on."));
+                     note("Lateness: planned release to start. Execution: CPU time of a job. Response: planned release "
+                          "to published output. Every job counts; p999 from 1000 samples on.") +
+                     "<h3>Granted and used</h3>\n" + granted_table(nodes) +
+                     note("Read back: what the kernel says of the thread agrees with what was asked. Preempted: time "
+                          "from start to finish in which the job had no CPU, over all jobs."));
 }
 
 std::string edges_section(const Json& report) {

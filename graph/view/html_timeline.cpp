@@ -14,8 +14,9 @@
 namespace takt::view {
 namespace {
 
-constexpr double kPxPerMs = 1.6, kTop = 24, kLane = 20, kLaneGap = 6, kNodeRow = 26;
+constexpr double kPxPerMs = 1.25, kTop = 24, kLane = 20, kLaneGap = 6, kNodeRow = 26;
 constexpr double kLeastPx = 1.5;     // a shorter job would not be seen
+constexpr double kClockMs = 0.001;   // a job may seem to begin this much before the last one ended
 constexpr double kLongestMs = 2000;  // what is recorded is one second and the jobs that began in it
 constexpr double kLatestMs = 1e12;   // no time of a run is beyond: 30 years
 
@@ -125,7 +126,7 @@ class Timeline {
     std::string text;
     for (const Bar* bar : bars) {
       size_t lane = 0;
-      while (lane < busy_until_ms.size() && busy_until_ms[lane] > bar->start_ms) ++lane;
+      while (lane < busy_until_ms.size() && busy_until_ms[lane] > bar->start_ms + kClockMs) ++lane;
       if (lane == busy_until_ms.size()) busy_until_ms.push_back(0);
       busy_until_ms[lane] = bar->finish_ms;
       text += draw_bar(*bar, y_ + static_cast<double>(lane) * kLane, kLane - 2, true);

@@ -68,7 +68,8 @@ double port_offset(size_t row) { return kHeaderHeight + 4 + (static_cast<double>
 
 Layout lay_out(const Diagram& diagram) {
   const Arrangement arrangement = arrange(diagram);
-  Spacing spacing{std::vector<double>(diagram.boxes.size(), 0), std::vector<double>(diagram.rooms.size(), 0),
+  const std::vector<double> none(diagram.rooms.size(), 0);
+  Spacing spacing{std::vector<double>(diagram.boxes.size(), 0), none, none,
                   std::vector<double>(static_cast<size_t>(arrangement.columns), 0)};
   // The first routing tells how many edges pass where, the second has room for them.
   spacing = route(diagram, arrangement, place(diagram, arrangement, spacing)).needed;

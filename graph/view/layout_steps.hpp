@@ -27,7 +27,8 @@ struct Arrangement {
 /// Room for the edges that pass.
 struct Spacing {
   std::vector<double> above_box;   ///< in addition to the usual gap, by box
-  std::vector<double> above_room;  ///< by room
+  std::vector<double> above_room;  ///< the same for rooms
+  std::vector<double> below_room;  ///< within a room below its boxes
   std::vector<double> channel;     ///< width of the channel right of each column
 };
 

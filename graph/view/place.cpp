@@ -58,19 +58,21 @@ class Placer {
     }
   }
 
+  double below(size_t room) const { return kRoomPadding + spacing_.below_room[room]; }
   double gap_above(size_t box) const { return kBoxGap + spacing_.above_box[box]; }
 
+  /// From the room's title to the lower side of the last box.
   double cell_height(size_t room, int column) const {
     double height = 0;
     for (const size_t box : cell(room, column))
-      height += (height > 0 ? gap_above(box) : 0) + box_height(diagram_.boxes[box]);
+      height += (height > 0 ? gap_above(box) : spacing_.above_box[box]) + box_height(diagram_.boxes[box]);
     return height;
   }
 
   double room_height(size_t room) const {
     double height = 0;
     for (int column = 0; column < arrangement_.columns; ++column) height = std::max(height, cell_height(room, column));
-    return kRoomTitleHeight + height + kRoomPadding;
+    return kRoomTitleHeight + height + below(room);
   }
 
   /// Each room as high up as the rooms before it leave free.
@@ -95,7 +97,7 @@ class Placer {
     const double right = result_.column_right[static_cast<size_t>(last_column(room))] + kRoomPadding;
     result_.rooms[room] = {left, top, right - left, height};
     for (int column = first_column(room); column <= last_column(room); ++column) {
-      const double slack = height - kRoomTitleHeight - kRoomPadding - cell_height(room, column);
+      const double slack = height - kRoomTitleHeight - below(room) - cell_height(room, column);
       set_tops(room, column, std::vector<double>(cell(room, column).size(), top + kRoomTitleHeight + slack / 2));
     }
   }
@@ -106,7 +108,8 @@ class Placer {
     std::vector<double> heights, gaps;
     for (const size_t box : boxes) heights.push_back(box_height(diagram_.boxes[box])), gaps.push_back(gap_above(box));
     const Rect& frame = result_.rooms[room];
-    const auto tops = stack(wanted, heights, gaps, frame.y + kRoomTitleHeight, frame.bottom() - kRoomPadding);
+    const double top = frame.y + kRoomTitleHeight + (boxes.empty() ? 0 : spacing_.above_box[boxes.front()]);
+    const auto tops = stack(wanted, heights, gaps, top, frame.bottom() - below(room));
     const auto c = static_cast<size_t>(column);
     for (size_t i = 0; i < boxes.size(); ++i)
       result_.boxes[boxes[i]] = {result_.column_left[c], tops[i], result_.column_right[c] - result_.column_left[c],

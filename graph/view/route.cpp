@@ -5,22 +5,23 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <optional>
 
 #include "graph/view/layout_steps.hpp"
-#include "graph/view/text_width.hpp"
 
 namespace takt::view {
 namespace {
 
 constexpr double kEndless = 1e6;
 constexpr double kChannelBase = 62, kChannelPerOutput = 5, kChannelMost = 170;
+constexpr double kFrameClearance = 6;  // from passing edges to the frame of a room
 constexpr double kTurnBase = 30, kTurnStep = 7;
 
-/// Free space in a column above `box` (none: below the last).
+/// Free space in a column: above a box, below the last box of a room, or between rooms. Its ends keep clear of boxes
+/// and of the rooms' frames.
 struct Gap {
+  enum class Where : uint8_t { above_box, below_room, above_room, open } where = Where::open;
+  size_t of = 0;  ///< the box or room that moves down if more edges pass than fit
   double low = -kEndless, high = kEndless;
-  std::optional<size_t> box;
 };
 
 using OutputKey = std::pair<size_t, size_t>;  ///< box, output
@@ -53,33 +54,44 @@ class Router {
   using Way = std::vector<TrackKey>;  ///< one per column passed, from the producer on
 
   std::vector<Gap> gaps_of(int column) const {
-    struct Obstacle {
-      double top, bottom;
-      size_t box;
-    };
-    std::vector<Obstacle> obstacles;
-    for (size_t box = 0; box < diagram_.boxes.size(); ++box) {
-      if (arrangement_.column[box] != column) continue;
-      double top = placement_.boxes[box].y;
-      if (under_title(box, column)) top = placement_.rooms[diagram_.boxes[box].room].y;
-      obstacles.push_back({top, placement_.boxes[box].bottom(), box});
+    std::vector<size_t> rooms;
+    for (size_t room = 0; room < diagram_.rooms.size(); ++room)
+      if (!cell(room, column).empty()) rooms.push_back(room);
+    std::sort(rooms.begin(), rooms.end(),
+              [&](size_t a, size_t b) { return placement_.rooms[a].y < placement_.rooms[b].y; });
+    std::vector<Gap> gaps;
+    double low = -kEndless;
+    for (const size_t room : rooms) {
+      const Rect& frame = placement_.rooms[room];
+      const bool topmost = gaps.empty();
+      gaps.push_back({topmost ? Gap::Where::open : Gap::Where::above_room, room, low, frame.y - kFrameClearance});
+      add_gaps_inside(gaps, room, column);
+      low = frame.bottom() + kFrameClearance;
     }
-    std::sort(obstacles.begin(), obstacles.end(), [](const auto& a, const auto& b) { return a.top < b.top; });
-    std::vector<Gap> gaps(obstacles.size() + 1);
-    for (size_t i = 0; i < obstacles.size(); ++i) {
-      gaps[i].high = obstacles[i].top - kTrackClearance;
-      gaps[i].box = obstacles[i].box;
-      gaps[i + 1].low = obstacles[i].bottom + kTrackClearance;
-    }
+    gaps.push_back({Gap::Where::open, 0, low, kEndless});
     return gaps;
   }
 
-  /// The first box of a room in the room's first column stands below the room's title.
-  bool under_title(size_t box, int column) const {
-    const auto& columns = arrangement_.cells[diagram_.boxes[box].room];
-    for (int c = 0; c < column; ++c)
-      if (!columns[static_cast<size_t>(c)].empty()) return false;
-    return columns[static_cast<size_t>(column)].front() == box;
+  void add_gaps_inside(std::vector<Gap>& gaps, size_t room, int column) const {
+    const Rect& frame = placement_.rooms[room];
+    double low = frame.y + kFrameClearance;
+    for (const size_t box : cell(room, column)) {
+      const Rect& rect = placement_.boxes[box];
+      // Where the room's title stands no edge passes.
+      const bool below_title = box == cell(room, column).front() && column == first_column(room);
+      if (!below_title) gaps.push_back({Gap::Where::above_box, box, low, rect.y - kTrackClearance});
+      low = rect.bottom() + kTrackClearance;
+    }
+    gaps.push_back({Gap::Where::below_room, room, low, frame.bottom() - kFrameClearance});
+  }
+
+  const std::vector<size_t>& cell(size_t room, int column) const {
+    return arrangement_.cells[room][static_cast<size_t>(column)];
+  }
+  int first_column(size_t room) const {
+    int column = 0;
+    while (cell(room, column).empty()) ++column;
+    return column;
   }
 
   /// Columns between producer and reader; an edge that does not go right also passes the columns of both.
@@ -134,20 +146,20 @@ class Router {
     }
   }
 
+  /// What moves down so that every gap holds the edges that chose it.
   Spacing spacing() const {
-    Spacing result{std::vector<double>(diagram_.boxes.size(), 0), std::vector<double>(diagram_.rooms.size(), 0), {}};
+    const std::vector<double> none(diagram_.rooms.size(), 0);
+    Spacing result{std::vector<double>(diagram_.boxes.size(), 0), none, none, channels()};
     std::map<std::pair<int, size_t>, int> count;
     for (const auto& [key, track] : tracks_) ++count[{std::get<0>(key), std::get<1>(key)}];
     for (const auto& [place, tracks] : count) {
       const Gap& gap = gaps_[static_cast<size_t>(place.first)][place.second];
-      if (!gap.box || gap.low <= -kEndless) continue;  // above the first and below the last there is room
-      const double need = 2 * kTrackClearance + (tracks - 1) * kTrackSpacing;
-      const size_t room = diagram_.boxes[*gap.box].room;
-      const bool first = arrangement_.cells[room][static_cast<size_t>(place.first)].front() == *gap.box;
-      double& extra = first ? result.above_room[room] : result.above_box[*gap.box];
-      extra = std::max(extra, need - (first ? kRoomPadding + kRoomGap : kBoxGap));
+      const double lacks = (tracks - 1) * kTrackSpacing - (gap.high - gap.low);
+      const auto widen = [&](double& extra) { extra = std::max(extra, lacks); };
+      if (gap.where == Gap::Where::above_box) widen(result.above_box[gap.of]);
+      if (gap.where == Gap::Where::above_room) widen(result.above_room[gap.of]);
+      if (gap.where == Gap::Where::below_room) widen(result.below_room[gap.of]);
     }
-    result.channel = channels();
     return result;
   }
 

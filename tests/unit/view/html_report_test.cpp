@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "graph/view/html_report.hpp"
 
+#include <cmath>
+
 #include "fixture.hpp"
 
 using namespace takt;
@@ -113,6 +115,22 @@ TEST_CASE("Histograms and timeline are drawn from the report") {
   CHECK(test::count(html_report(report, graph, folder.path()), "late deadline\" d=\"M") == 0);
 }
 
+TEST_CASE("Buckets too fine to be seen are added up, none is lost") {
+  const test::Folder folder;
+  Json report = full_report();
+  report["nodes"].erase(1);
+  Json fine = Json::array();
+  for (int i = 0; i < 700; ++i) fine.push_back({40 * std::pow(2, i / 128.0), i % 3});
+  report["nodes"][0]["lateness_histogram_us"] = fine;
+  const std::string page = html_report(report, test::load_ace(), folder.path());
+  int jobs = 0;
+  size_t bars = 0;
+  for (size_t at = page.find("<title>up to "); at != std::string::npos; at = page.find("<title>up to ", at + 1), ++bars)
+    jobs += std::stoi(page.substr(page.find(": ", at) + 2));
+  CHECK(jobs == 233 * 3);
+  CHECK(bars <= 18);  // 5.5 octaves are 1.65 decades
+}
+
 TEST_CASE("Jobs that overlap on one core stand in two lanes") {
   const test::Folder folder;
   const auto graph = test::load_ace();
@@ -144,11 +162,12 @@ TEST_CASE("Pictures of the output folder are inlined") {
 TEST_CASE("What the report lacks is said, key by key") {
   const test::Folder folder;
   const auto graph = test::load_ace();
-  for (const auto& [key, value] : full_report().items()) {
-    Json report = full_report();
+  const Json full = full_report();
+  for (const auto& [key, value] : full.items()) {
+    Json report = full;
     report.erase(key);
     CAPTURE(key);
-    const size_t with = test::count(html_report(full_report(), graph, folder.path()), "not recorded");
+    const size_t with = test::count(html_report(full, graph, folder.path()), "not recorded");
     const bool in_graph_too = key == "graph";
     CHECK(test::count(html_report(report, graph, folder.path()), "not recorded") >= with + (in_graph_too ? 0 : 1));
   }
@@ -173,21 +192,23 @@ TEST_CASE("A histogram or timeline that is missing is said; an empty one has no 
 TEST_CASE("Values of the wrong kind never throw") {
   const test::Folder folder;
   const auto graph = test::load_ace();
+  const Json full = full_report();
+  const auto survives = [&](const Json& report) { CHECK(has(html_report(report, graph, folder.path()), "</html>")); };
   for (const Json& wrong : {Json(nullptr), Json("text"), Json(-1.5), Json(1e300),
                             Json::array({1, "a", nullptr, Json::array()}), Json::object({{"a", 1}}), Json(true)}) {
-    CHECK(has(html_report(wrong, graph, folder.path()), "</html>"));
-    for (const auto& [key, value] : full_report().items()) {
-      Json report = full_report();
+    survives(wrong);
+    for (const auto& [key, value] : full.items()) {
+      Json report = full;
       report[key] = wrong;
-      CHECK(has(html_report(report, graph, folder.path()), "</html>"));
+      survives(report);
     }
-    for (const auto& [key, value] : full_report()["nodes"][0].items()) {
-      Json report = full_report();
+    for (const auto& [key, value] : full["nodes"][0].items()) {
+      Json report = full;
       report["nodes"][0][key] = wrong;
-      CHECK(has(html_report(report, graph, folder.path()), "</html>"));
+      survives(report);
     }
-    for (const auto& [key, value] : full_report()["timeline"][0].items()) {
-      Json report = full_report();
+    for (const auto& [key, value] : full["timeline"][0].items()) {
+      Json report = full;
       report["timeline"][0][key] = wrong;
       CHECK(html_report(report, graph, folder.path()).size() < 2'000'000);
     }

@@ -13,12 +13,16 @@ using namespace takt::view;
 
 namespace {
 
+using view::Point;  // rt has one, too
+
 bool overlap(const Rect& a, const Rect& b) {
   return a.x < b.right() && b.x < a.right() && a.y < b.bottom() && b.y < a.bottom();
 }
 
 bool inside(const Rect& inner, const Rect& outer) {
-  return inner.x >= outer.x && inner.right() <= outer.right() && inner.y >= outer.y && inner.bottom() <= outer.bottom();
+  constexpr double rounding = 1e-6;
+  return inner.x > outer.x - rounding && inner.right() < outer.right() + rounding && inner.y > outer.y - rounding &&
+         inner.bottom() < outer.bottom() + rounding;
 }
 
 Point on_curve(const Curve& c, double t) {
@@ -40,8 +44,8 @@ void check_boxes(const Diagram& diagram, const Layout& layout) {
     CAPTURE(diagram.boxes[a].id);
     CHECK(inside(layout.boxes[a], layout.rooms[diagram.boxes[a].room]));
     CHECK(inside(layout.boxes[a], {0, 0, layout.width, layout.height}));
-    CHECK(layout.boxes[a].width >= box_width(diagram.boxes[a]));
-    CHECK(layout.boxes[a].height >= box_height(diagram.boxes[a]));
+    CHECK(layout.boxes[a].width > box_width(diagram.boxes[a]) - 1e-6);
+    CHECK(layout.boxes[a].height > box_height(diagram.boxes[a]) - 1e-6);
     for (size_t b = 0; b < a; ++b) CHECK_FALSE(overlap(layout.boxes[a], layout.boxes[b]));
   }
   for (size_t a = 0; a < layout.rooms.size(); ++a)
