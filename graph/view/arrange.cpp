@@ -9,6 +9,7 @@ namespace {
 
 constexpr int kRounds = 12;           // far more than any graph seen needs; each round must improve to go on
 constexpr double kCrossingCost = 80;  // px of edge length that one crossing is worth
+constexpr double kHeightCost = 1;     // px of edge length that one px of height of the picture is worth
 constexpr double kPlainChannel = 90;
 
 Spacing plain_spacing(const Diagram& diagram, int columns) {
@@ -27,6 +28,7 @@ bool cross(Point a, Point b, Point c, Point d) {
 double cost_of(const Diagram& diagram, const Arrangement& arrangement) {
   const Placement placement = place(diagram, arrangement, plain_spacing(diagram, arrangement.columns));
   double cost = 0;
+  for (const Rect& room : placement.rooms) cost = std::max(cost, kHeightCost * room.bottom());
   for (size_t i = 0; i < diagram.edges.size(); ++i) {
     const Point a = start_of(placement, diagram.edges[i]), b = end_of(placement, diagram.edges[i]);
     cost += std::abs(a.y - b.y);
@@ -38,14 +40,16 @@ double cost_of(const Diagram& diagram, const Arrangement& arrangement) {
   return cost;
 }
 
-/// Exchanges neighbours in `order` wherever that makes the picture better.
+/// Exchanges two in `order` wherever that makes the picture better.
 bool improve(std::vector<size_t>& order, const Diagram& diagram, const Arrangement& arrangement, double& best) {
   bool better = false;
-  for (size_t i = 0; i + 1 < order.size(); ++i) {
-    std::swap(order[i], order[i + 1]);
-    const double cost = cost_of(diagram, arrangement);
-    if (cost < best - 1e-6) best = cost, better = true;
-    else std::swap(order[i], order[i + 1]);
+  for (size_t i = 0; i < order.size(); ++i) {
+    for (size_t k = i + 1; k < order.size(); ++k) {
+      std::swap(order[i], order[k]);
+      const double cost = cost_of(diagram, arrangement);
+      if (cost < best - 1e-6) best = cost, better = true;
+      else std::swap(order[i], order[k]);
+    }
   }
   return better;
 }

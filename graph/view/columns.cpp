@@ -11,7 +11,7 @@ class Columns {
  public:
   explicit Columns(const Diagram& diagram) : readers_(diagram.boxes.size()), state_(diagram.boxes.size()) {
     for (const DiagramEdge& edge : diagram.edges)
-      if (!diagram.boxes[edge.to_box].device) readers_[edge.from_box].push_back(edge.to_box);
+      if (gives_data(diagram, edge)) readers_[edge.from_box].push_back(edge.to_box);
     // Devices first: what they reach is entered the way the data go.
     for (size_t box = 0; box < diagram.boxes.size(); ++box)
       if (diagram.boxes[box].device) visit(box);
@@ -23,6 +23,11 @@ class Columns {
   const std::vector<std::vector<size_t>>& forward() const { return readers_; }
 
  private:
+  /// Commands to devices and requests to nodes go against the data.
+  static bool gives_data(const Diagram& diagram, const DiagramEdge& edge) {
+    return !diagram.boxes[edge.to_box].device && diagram.type_of(edge) != Requests::type_name;
+  }
+
   enum class State : uint8_t { fresh, under_way, done };
 
   void visit(size_t box) {

@@ -8,7 +8,7 @@
 namespace takt::view {
 
 /// Column of each box: 0 for devices, else one more than the longest path of edges from the left; edges that close a
-/// cycle do not count, nor do commands to devices.
+/// cycle do not count, nor do commands to devices and requests to nodes.
 std::vector<int> assign_columns(const Diagram& diagram);
 
 /// Tops y_i that are nearest to `wanted` (least squares) with y_i >= y_(i-1) + heights[i-1] + gaps[i] and all within
@@ -40,7 +40,7 @@ struct Placement {
 inline constexpr double kBoxGap = 26, kRoomGap = 22;
 inline constexpr double kTrackSpacing = 7, kTrackClearance = 8;  ///< between passing edges, and from them to boxes
 
-/// The order with short edges and few crossings, found by exchanging neighbours.
+/// The order with short edges, few crossings and little height, found by exchanging pairs.
 Arrangement arrange(const Diagram& diagram);
 Placement place(const Diagram& diagram, const Arrangement& arrangement, const Spacing& spacing);
 

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Edges pass a column on a track in a gap between its boxes: the gap that is nearest to the straight line. Edges of the
-// same output share their tracks. Between tracks they swing from one height to the other in the channel, where no box
-// is.
+// Edges pass a column on a track in a gap between its boxes, chosen so that they move up and down as little as
+// possible. Edges of the same output share their tracks. Between tracks they swing from one height to the other in the
+// channel, where no box is.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 
 #include "graph/view/layout_steps.hpp"
@@ -14,6 +15,8 @@ namespace {
 constexpr double kEndless = 1e6;
 constexpr double kChannelBase = 62, kChannelPerOutput = 5, kChannelMost = 170;
 constexpr double kFrameClearance = 6;  // from passing edges to the frame of a room
+constexpr double kShare = 40;          // edges of an output that pass within this height share a track
+constexpr double kBendCost = 12;       // px of movement that one bend more is worth
 constexpr double kTurnBase = 30, kTurnStep = 7;
 
 /// Free space in a column: above a box, below the last box of a room, or between rooms. Its ends keep clear of boxes
@@ -32,7 +35,7 @@ struct Track {
   int edges = 0;
   double y = 0;
 };
-using TrackKey = std::tuple<int, size_t, OutputKey>;  ///< column, gap, output
+using TrackKey = std::tuple<int, size_t, OutputKey, long>;  ///< column, gap, output, height in steps
 
 class Router {
  public:
@@ -56,7 +59,7 @@ class Router {
   std::vector<Gap> gaps_of(int column) const {
     std::vector<size_t> rooms;
     for (size_t room = 0; room < diagram_.rooms.size(); ++room)
-      if (!cell(room, column).empty()) rooms.push_back(room);
+      if (column >= first_column(room) && column <= last_column(room)) rooms.push_back(room);
     std::sort(rooms.begin(), rooms.end(),
               [&](size_t a, size_t b) { return placement_.rooms[a].y < placement_.rooms[b].y; });
     std::vector<Gap> gaps;
@@ -88,9 +91,15 @@ class Router {
   const std::vector<size_t>& cell(size_t room, int column) const {
     return arrangement_.cells[room][static_cast<size_t>(column)];
   }
+  /// Beyond the last column for a room without boxes.
   int first_column(size_t room) const {
     int column = 0;
-    while (cell(room, column).empty()) ++column;
+    while (column < arrangement_.columns && cell(room, column).empty()) ++column;
+    return column;
+  }
+  int last_column(size_t room) const {
+    int column = arrangement_.columns - 1;
+    while (column >= 0 && cell(room, column).empty()) --column;
     return column;
   }
 
@@ -105,22 +114,53 @@ class Router {
     return columns;
   }
 
+  /// A height at which an edge may pass a column, and the best way to it.
+  struct Stop {
+    size_t gap = 0;
+    double y = 0, cost = 0;
+    size_t before = 0;  ///< stop in the column passed before
+  };
+
+  /// Per gap the heights where an edge can go on level, from the start or to the end, and the gap's ends.
+  std::vector<Stop> stops_of(int column, double start, double end) const {
+    std::vector<Stop> stops;
+    const auto& gaps = gaps_[static_cast<size_t>(column)];
+    for (size_t gap = 0; gap < gaps.size(); ++gap)
+      for (const double y : {start, end, gaps[gap].low, gaps[gap].high})
+        stops.push_back({gap, std::clamp(y, gaps[gap].low, gaps[gap].high), 0, 0});
+    return stops;
+  }
+
+  static double move_cost(double from, double to) { return std::abs(from - to) + (from == to ? 0 : kBendCost); }
+
+  /// The way with the least movement up and down, and few bends: shortest path over the stops, column by column.
   Way find_way(const DiagramEdge& edge) {
     const double start = start_of(placement_, edge).y, end = end_of(placement_, edge).y;
     const std::vector<int> columns = columns_passed(edge);
+    std::vector<std::vector<Stop>> layers{{{0, start, 0, 0}}};
+    for (const int column : columns) {
+      std::vector<Stop> stops = stops_of(column, start, end);
+      for (Stop& stop : stops) {
+        stop.cost = std::numeric_limits<double>::infinity();
+        for (size_t i = 0; i < layers.back().size(); ++i)
+          if (const double cost = layers.back()[i].cost + move_cost(layers.back()[i].y, stop.y); cost < stop.cost)
+            stop.cost = cost, stop.before = i;
+      }
+      layers.push_back(std::move(stops));
+    }
+    const auto& last = layers.back();
+    auto at = static_cast<size_t>(std::min_element(last.begin(), last.end(),
+                                                   [&](const Stop& a, const Stop& b) {
+                                                     return a.cost + move_cost(a.y, end) < b.cost + move_cost(b.y, end);
+                                                   }) -
+                                  last.begin());
     Way way;
-    double y = start;
-    for (size_t i = 0; i < columns.size(); ++i) {
-      const auto left = static_cast<double>(columns.size() - i);
-      const double wanted = y + (end - y) / (left + 1);
-      const auto& gaps = gaps_[static_cast<size_t>(columns[i])];
-      const auto distance = [&](const Gap& gap) { return std::abs(std::clamp(wanted, gap.low, gap.high) - wanted); };
-      const auto best = std::min_element(gaps.begin(), gaps.end(),
-                                         [&](const Gap& a, const Gap& b) { return distance(a) < distance(b); });
-      y = std::clamp(wanted, best->low, best->high);
-      way.push_back({columns[i], static_cast<size_t>(best - gaps.begin()), {edge.from_box, edge.output}});
-      Track& track = tracks_[way.back()];
-      track.wanted_sum += y;
+    for (size_t layer = columns.size(); layer > 0; at = layers[layer][at].before, --layer) {
+      const Stop& stop = layers[layer][at];
+      way.insert(way.begin(),
+                 {columns[layer - 1], stop.gap, {edge.from_box, edge.output}, std::lround(stop.y / kShare)});
+      Track& track = tracks_[way.front()];
+      track.wanted_sum += stop.y;
       ++track.edges;
     }
     return way;
