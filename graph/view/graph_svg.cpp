@@ -200,7 +200,7 @@ class Drawing {
     if (!diagram_.chains.empty()) y += kLine + 8;
     for (const char* words : {"high: criticality high. Colour: message type, named at the output; grey outputs have no "
                               "reader.",
-                              "Thick edge: each message releases the reader; thin: latched at the reader's release. "
+                              "Thick edge: its messages release the reader; thin: latched at the reader's release. "
                               "Bracket: inputs joined by stamp."}) {
       text += line(0, y, kSmallPx, words, "class=\"soft\"");
       y += kLine - 3;

@@ -131,6 +131,15 @@ TEST_CASE("A cycle ends, and goes forward as far as it can") {
   CHECK(assign_columns(diagram) == std::vector<int>{0, 1, 2, 3});
 }
 
+TEST_CASE("Requests and commands go against the data and move nothing to the right") {
+  Diagram diagram = test::random_diagram(1, 1, 3, 0);
+  diagram.boxes[3].outputs[0].type = "requests";
+  diagram.edges = {{0, 0, 1, 0}, {0, 0, 2, 0}, {2, 0, 3, 0}, {3, 0, 1, 1}, {3, 0, 0, 0}};
+  CHECK(assign_columns(diagram) == std::vector<int>{0, 1, 1, 2});
+  diagram.boxes[3].outputs[0].type = "motion";
+  CHECK(assign_columns(diagram) == std::vector<int>{0, 3, 1, 2});
+}
+
 TEST_CASE("stack agrees with the minimax formula of isotonic regression") {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> value(0, 300);
