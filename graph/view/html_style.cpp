@@ -45,7 +45,8 @@ figure img { max-width: 100%; height: auto; display: block; margin: 0 auto; } fi
   dl { grid-template-columns: 1fr; gap: 0; } dt { margin-top: 6px; } .charts { grid-template-columns: 1fr; } }
 @media print { @page { size: A4 landscape; margin: 12mm; } body { padding: 0; max-width: none; font-size: 11px; }
   :root { color-scheme: light; } .scroll { overflow: visible; } .scroll > svg { max-width: 100%; min-width: 0 !important; height: auto; }
-  table { font-size: 8.5px; } th, td { padding: 1px 4px; } figure, .chart, tr { break-inside: avoid; } h2 { break-after: avoid; }
+  h2 { font-size: 15px; margin-top: 18px; } .note, figcaption { font-size: 10px; }
+  table { font-size: 10px; } th, td { padding: 1px 5px; } figure, .chart, tr { break-inside: avoid; } h2 { break-after: avoid; }
   .charts { grid-template-columns: repeat(3, 1fr); }
   * { print-color-adjust: exact; -webkit-print-color-adjust: exact; } }
 )";

@@ -166,7 +166,8 @@ TEST_CASE("What the report lacks is said, key by key") {
   for (const auto& [key, value] : full.items()) {
     Json report = full;
     report.erase(key);
-    CAPTURE(key);
+    const std::string erased = key;
+    CAPTURE(erased);
     const size_t with = test::count(html_report(full, graph, folder.path()), "not recorded");
     const bool in_graph_too = key == "graph";
     CHECK(test::count(html_report(report, graph, folder.path()), "not recorded") >= with + (in_graph_too ? 0 : 1));
