@@ -72,7 +72,11 @@ std::unique_ptr<DeviceNode> make_shell(std::string_view kind);
 tl::expected<std::unique_ptr<DeviceNode>, DeviceError> make_device(const DeviceConfig& config, Devices& devices,
                                                                    const Clock& clock);
 
-/// CPU time that the simulator's rendering has used in this process so far, ns (0 without a simulated camera).
-int64_t simulator_cpu_ns(const Devices& devices);
+/// CPU time that the simulator's rendering has used in this process so far (0 without a simulated camera).
+struct SimulatorUse {
+  int64_t cpu_ns = 0;
+  int64_t in_jobs_ns = 0;  ///< of it within jobs of device nodes, which count it as theirs, too
+};
+SimulatorUse simulator_use();
 
 }  // namespace takt::hal

@@ -191,10 +191,11 @@ class IsolatedRun {
 
   MachineUse use_of_all() const {
     const ProcessReading own = ProcessReading::now();
-    MachineUse use{own.cpu_ns, 0, own.steal_ms, proportional_memory_mb()};
+    MachineUse use{own.cpu_ns, 0, 0, own.steal_ms, proportional_memory_mb()};
     for (size_t p = 0; p < board_.process_count(); ++p) {
       use.cpu_ns += board_.process(p).cpu_ns;
       use.simulator_cpu_ns += board_.process(p).simulator_cpu_ns;
+      use.simulator_in_jobs_ns += board_.process(p).simulator_in_jobs_ns;
       use.rss_mb += board_.process(p).rss_mb;
     }
     return use;
@@ -210,7 +211,7 @@ class IsolatedRun {
                                std::string(to_string(plan_.policy)), "subsystem", partition_.names, adjusted_});
     for (const std::string& fault : faults_) report["faults"].push_back({{"what", fault}});
     if (!faults_.empty()) report["ok"] = false;
-    const int told = tell(options_, report);
+    const int told = tell(options_, graph_, report);
     return code_ != 0 ? code_ : told;
   }
 

@@ -7,6 +7,7 @@
 #include "graph/command/check_command.hpp"
 #include "graph/command/eval_command.hpp"
 #include "graph/command/run_command.hpp"
+#include "graph/command/show_command.hpp"
 
 namespace {
 
@@ -26,18 +27,36 @@ std::string duration(std::string& text) {
   return "";
 }
 
-void add_load_options(CLI::App& app, takt::command::RunOptions& o) {
-  app.add_option("graph", o.graph, "graph file (default graph/ace.yaml)");
-  app.add_option("--profile", o.load.profile, "sim | replay | robot, as the graph defines them");
-  app.add_option("--schedule", o.load.schedule, "schedule file instead of the graph's");
-  app.add_option("--policy", o.load.policy, "deadline | fixed | cooperative instead of the schedule's");
-  app.add_option("--mode", o.load.mode, "a mode of the graph (default full)");
-  app.add_option("--set", o.load.set, "node.param=value, repeatable");
+void add_load_options(CLI::App& app, std::filesystem::path& graph, takt::graph::LoadOptions& load) {
+  app.add_option("graph", graph, "graph file (default graph/ace.yaml)");
+  app.add_option("--profile", load.profile, "sim | replay | robot, as the graph defines them");
+  app.add_option("--schedule", load.schedule, "schedule file instead of the graph's");
+  app.add_option("--policy", load.policy, "deadline | fixed | cooperative instead of the schedule's");
+  app.add_option("--mode", load.mode, "a mode of the graph (default full)");
+  app.add_option("--set", load.set, "node.param=value, repeatable");
+}
+
+void add_show(CLI::App& app, takt::command::ShowOptions& o, int& exit_code) {
+  CLI::App* show = app.add_subcommand("show", "draws a graph, or lists what each node reads");
+  add_load_options(*show, o.graph, o.load);
+  CLI::Option* svg = show->add_option("--svg", o.svg, "writes the picture as an SVG file");
+  show->add_flag("--dot", o.dot, "prints Graphviz text")->excludes(svg);
+  show->callback([&] { exit_code = takt::command::show_graph(o); });
+}
+
+void add_report(CLI::App& app, takt::command::RenderOptions& o, int& exit_code) {
+  CLI::App* report = app.add_subcommand("report", "makes a page for people from the report of a run");
+  report->add_option("report", o.report, "what `takt run --report` wrote")->required();
+  report->add_option("graph", o.graph, "graph file of the run (default graph/ace.yaml)");
+  report->add_option("--schedule", o.schedule, "schedule file of the run, if it was not the graph's");
+  report->add_option("--html", o.html, "writes the page to this file")->required();
+  report->add_option("--output", o.output, "folder with the pictures of the run (default out)");
+  report->callback([&] { exit_code = takt::command::render_report(o); });
 }
 
 void add_run(CLI::App& app, takt::command::RunOptions& o, int& exit_code) {
   CLI::App* run = app.add_subcommand("run", "runs a graph and reports what happened");
-  add_load_options(*run, o);
+  add_load_options(*run, o.graph, o.load);
   run->add_option("--for", o.duration_s, "how long, e.g. 20s; 0s: until stopped")
       ->transform(CLI::Validator(duration, "DURATION"));
   run->add_option("--clock", o.clock, "real | virtual")->check(CLI::IsMember({"real", "virtual"}));
@@ -45,6 +64,7 @@ void add_run(CLI::App& app, takt::command::RunOptions& o, int& exit_code) {
   run->add_option("--isolate", o.isolate, "none (one process) | subsystem")
       ->check(CLI::IsMember({"none", "subsystem"}));
   run->add_option("--report", o.report, "writes the report as JSON");
+  run->add_option("--html", o.html, "writes the report as one page to be read offline");
   run->add_option("--output", o.output, "folder for pictures and other results (default out)");
   run->add_option("--seed", o.seed, "seed of the simulated world");
   run->add_flag("--unchecked", o.unchecked, "runs what the check refuses");
@@ -60,6 +80,8 @@ int main(int argc, char** argv) {
   CLI::App app{"Takt: a real-time dataflow runtime with a static task graph"};
   app.require_subcommand(1);
   takt::command::RunOptions run_options, check_options;
+  takt::command::ShowOptions show_options;
+  takt::command::RenderOptions render_options;
   takt::command::EvalStereoOptions stereo;
   takt::command::EvalEgoMotionOptions ego_motion;
   takt::command::AttachOptions attach;
@@ -71,9 +93,11 @@ int main(int argc, char** argv) {
 
   add_run(app, run_options, exit_code);
   CLI::App* check = app.add_subcommand("check", "checks a graph and its schedule without running them");
-  add_load_options(*check, check_options);
+  add_load_options(*check, check_options.graph, check_options.load);
   check->add_flag("--json", check_json, "prints the result as JSON");
   check->callback([&] { exit_code = takt::command::check_graph(check_options, check_json); });
+  add_show(app, show_options, exit_code);
+  add_report(app, render_options, exit_code);
   CLI::App* nodes =
       app.add_subcommand("nodes", "lists node types and device kinds, or one with its ports and parameters");
   nodes->add_option("type", type, "node type");

@@ -10,8 +10,12 @@
 namespace takt::command {
 namespace {
 
-int refuse(Prepared& prepared, std::vector<graph::Problem> problems, Exit code) {
+void tell(const std::vector<graph::Problem>& problems) {
   for (const auto& problem : problems) std::fprintf(stderr, "%s\n", graph::to_string(problem).c_str());
+}
+
+int refuse(Prepared& prepared, std::vector<graph::Problem> problems, Exit code) {
+  tell(problems);
   prepared.problems = std::move(problems);
   return code;
 }
@@ -45,6 +49,14 @@ int refuse(const std::string& text, Exit code) {
 
 void tell_problems(size_t count) {
   std::fprintf(stderr, "takt: %zu problem%s, nothing was started\n", count, count == 1 ? "" : "s");
+}
+
+std::optional<graph::GraphSpec> load_graph(const std::filesystem::path& file, const graph::LoadOptions& options) {
+  graph::Loaded loaded = graph::load(file.empty() ? shipped("graph/ace.yaml") : file, options, graph::node_types());
+  if (loaded.graph) return std::move(loaded.graph);
+  tell(loaded.problems);
+  tell_problems(loaded.problems.size());
+  return std::nullopt;
 }
 
 int load(const RunOptions& options, Prepared& prepared) {

@@ -18,7 +18,12 @@ struct Prepared {
   std::vector<graph::Problem> problems;  ///< why there is no composition
 };
 
-/// Loads the graph; what is wrong is written to stderr and the exit code returned (kOk: all is well).
+/// Loads only, no device is opened; nothing if the input is wrong, which is then written to stderr. An empty `file` is
+/// the default graph.
+std::optional<graph::GraphSpec> load_graph(const std::filesystem::path& file, const graph::LoadOptions& options);
+
+/// Loads the graph; what is wrong is written to stderr and the exit code returned (kOk: all is well). The caller tells
+/// how many problems there were.
 int load(const RunOptions& options, Prepared& prepared);
 /// Composes what is loaded, or the part of it that `compose` says; problems as above.
 int compose(const RunOptions& options, const graph::ComposeOptions& compose, Prepared& prepared);

@@ -148,6 +148,7 @@ Json cpu_json(const RunFacts& facts) {
   int64_t nodes = 0, devices = 0;
   for (size_t t = 0; t < facts.plan.tasks.size(); ++t)
     (facts.plan.tasks[t].device ? devices : nodes) += facts.board.task(t).cpu_ns;
+  devices -= std::min(devices, facts.use.simulator_in_jobs_ns);
   const auto total = static_cast<double>(facts.use.cpu_ns);
   const double wall = std::max(1.0, facts.result.duration_s() * 1e9);
   const auto share = [&](double ns) { return ns / wall; };

@@ -12,7 +12,9 @@ namespace takt::command {
 
 /// What the run used of the machine, over all its processes.
 struct MachineUse {
-  int64_t cpu_ns = 0, simulator_cpu_ns = 0, steal_ms = 0;
+  int64_t cpu_ns = 0;
+  int64_t simulator_cpu_ns = 0, simulator_in_jobs_ns = 0;  ///< the latter is part of the devices' jobs as well
+  int64_t steal_ms = 0;
   double rss_mb = 0;
 };
 

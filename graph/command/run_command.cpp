@@ -53,19 +53,21 @@ int execute(const RunOptions& options, Prepared& prepared, std::vector<std::stri
   for (auto& node : composition.nodes) node->finish();
   for (const std::string& refused : result.refused)
     adjusted.push_back(fmt::format("policy {} -> cooperative: {}", to_string(graph.schedule.policy), refused));
-  const MachineUse use{after.cpu_ns - before.cpu_ns, hal::simulator_cpu_ns(prepared.devices),
+  const hal::SimulatorUse simulator = hal::simulator_use();
+  const MachineUse use{after.cpu_ns - before.cpu_ns, simulator.cpu_ns, simulator.in_jobs_ns,
                        after.steal_ms - before.steal_ms, after.rss_mb};
-  return tell(options, make_report({graph,
-                                    composition.plan,
-                                    board,
-                                    result,
-                                    *transport,
-                                    use,
-                                    options.clock,
-                                    std::string(to_string(graph.schedule.policy)),
-                                    "none",
-                                    {},
-                                    std::move(adjusted)}));
+  return tell(options, graph,
+              make_report({graph,
+                           composition.plan,
+                           board,
+                           result,
+                           *transport,
+                           use,
+                           options.clock,
+                           std::string(to_string(graph.schedule.policy)),
+                           "none",
+                           {},
+                           std::move(adjusted)}));
 }
 
 int run_in_one_process(const RunOptions& options, Prepared& prepared, std::vector<std::string> adjusted) {
@@ -120,6 +122,8 @@ int run_graph(const RunOptions& options) {
                   kBadInput);
   if (!options.report.empty() && !writable(options.report))
     return refuse("--report " + options.report.string() + ": cannot be written; choose another place", kBadInput);
+  if (!options.html.empty() && !writable(options.html))
+    return refuse("--html " + options.html.string() + ": cannot be written; choose another place", kBadInput);
   const StopOnSignal guard;
   try {
     return run_as_asked(options);

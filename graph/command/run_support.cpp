@@ -15,6 +15,7 @@
 
 #include "graph/command/prepare.hpp"
 #include "graph/command/report.hpp"
+#include "graph/view/html_report.hpp"
 
 namespace takt::command {
 namespace {
@@ -80,14 +81,15 @@ std::vector<std::string> prepare_process() {
   return prepare_process_memory().lacks;
 }
 
-int tell(const RunOptions& options, const nlohmann::ordered_json& report) {
+int tell(const RunOptions& options, const graph::GraphSpec& graph, const nlohmann::ordered_json& report) {
   std::fputs(summary_text(report).c_str(), stdout);
-  if (!options.report.empty()) {
-    std::ofstream out(options.report);
-    if (!(out << report.dump(2) << "\n"))
-      return refuse("cannot write the report to " + options.report.string() + "; choose a writable --report",
-                    kBadInput);
-  }
+  const auto write = [](const std::filesystem::path& file, const std::string& text) {
+    return file.empty() || static_cast<bool>(std::ofstream(file) << text << std::flush);
+  };
+  if (!write(options.report, report.dump(2) + "\n"))
+    return refuse("cannot write the report to " + options.report.string() + "; choose a writable --report", kBadInput);
+  if (!options.html.empty() && !write(options.html, view::html_report(report, graph, options.output)))
+    return refuse("cannot write the page to " + options.html.string() + "; choose a writable --html", kBadInput);
   return report["ok"].get<bool>() ? kOk : kNotOk;
 }
 

@@ -39,6 +39,6 @@ void limit_cores(std::vector<int>& cores, std::vector<std::string>& adjusted);
 std::vector<std::string> prepare_process();
 
 /// Prints the summary, writes the files that were asked for; the exit code of the run.
-int tell(const RunOptions& options, const nlohmann::ordered_json& report);
+int tell(const RunOptions& options, const graph::GraphSpec& graph, const nlohmann::ordered_json& report);
 
 }  // namespace takt::command

@@ -256,6 +256,9 @@ NodeResult make_device(const DeviceConfig& config, Devices& devices, const Clock
   return make_sim(config, settings, devices, clock);
 }
 
-int64_t simulator_cpu_ns(const Devices&) { return sim::simulator_cost().total_ns(); }
+SimulatorUse simulator_use() {
+  const sim::SimulatorCost cost = sim::simulator_cost();
+  return {cost.total_ns(), cost.in_read_ns};
+}
 
 }  // namespace takt::hal
