@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <cstring>
+#include <memory>
 
 #include "graph/attach/server.hpp"
 #include "graph/check/check.hpp"
@@ -32,22 +33,29 @@ struct Refused {
   int code;
 };
 
-/// A place for an iceoryx daemon, if need be a private one. Throws TransportError.
-void find_room_for_daemon(std::vector<std::string>& adjusted) {
-  try {
+/// The claim on a place for an iceoryx daemon, if need be a private one. Throws TransportError.
+std::unique_ptr<DaemonClaim> find_room_for_daemon(std::vector<std::string>& adjusted) {
+  const auto claimed = [] {
+    auto claim = std::make_unique<DaemonClaim>(IceoryxPlaces::of_this_machine());
     iceoryx_preflight(IceoryxPlaces::of_this_machine(), 0);
+    return claim;
+  };
+  try {
+    return claimed();
   } catch (const TransportError& taken) {
     const std::string refused = enter_private_mounts();
     if (!refused.empty()) throw TransportError(fmt::format("{} ({} was refused)", taken.what(), refused));
-    iceoryx_preflight(IceoryxPlaces::of_this_machine(), 0);
     adjusted.push_back("/tmp and /dev/shm -> private ones: another iceoryx daemon is running on this machine");
+    return claimed();
   }
 }
 
 class IsolatedRun {
  public:
-  IsolatedRun(const RunOptions& options, const graph::GraphSpec& graph, std::vector<std::string> adjusted)
-      : options_(options),
+  IsolatedRun(const RunOptions& options, const graph::GraphSpec& graph, std::vector<std::string> adjusted,
+              std::unique_ptr<DaemonClaim> claim)
+      : claim_(std::move(claim)),
+        options_(options),
         graph_(graph),
         adjusted_(std::move(adjusted)),
         plan_source_(graph::outline(graph, graph::node_types(), clock_)),
@@ -77,6 +85,7 @@ class IsolatedRun {
     const CpuLatencyHold latency = hold_cpu_dma_latency();
     tell_lacks(latency);
     const auto transport = make_iceoryx_transport(plan_.ports);
+    claim_.reset();
     board_.transport_up().store(true);
     agree_on_policy();
     wait_for_all(ProcessRecord::running);
@@ -215,6 +224,7 @@ class IsolatedRun {
     return code_ != 0 ? code_ : told;
   }
 
+  std::unique_ptr<DaemonClaim> claim_;
   const RunOptions& options_;
   const graph::GraphSpec& graph_;
   std::vector<std::string> adjusted_, faults_;
@@ -235,8 +245,8 @@ class IsolatedRun {
 
 IsolatedEnd run_isolated(const RunOptions& options, const graph::GraphSpec& graph, std::vector<std::string> adjusted) {
   try {
-    find_room_for_daemon(adjusted);
-    return {IsolatedRun(options, graph, std::move(adjusted)).run(), ""};
+    auto claim = find_room_for_daemon(adjusted);
+    return {IsolatedRun(options, graph, std::move(adjusted), std::move(claim)).run(), ""};
   } catch (const TransportError& refused) {
     return {0, refused.what()};
   } catch (const Refused& refused) {

@@ -14,6 +14,7 @@
 #include "graph/command/prepare.hpp"
 #include "graph/command/report.hpp"
 #include "graph/command/run_support.hpp"
+#include "rt/shm/iceoryx_preflight.hpp"
 
 namespace takt::command {
 namespace {
@@ -26,7 +27,9 @@ bool writable(const std::filesystem::path& file) {
 }
 
 std::unique_ptr<Transport> make_transport(const std::string& name, const Plan& plan) {
-  return name == "iceoryx" ? make_iceoryx_transport(plan.ports) : make_local_transport(plan.ports);
+  if (name != "iceoryx") return make_local_transport(plan.ports);
+  const DaemonClaim claim(IceoryxPlaces::of_this_machine());
+  return make_iceoryx_transport(plan.ports);
 }
 
 /// Runs the composed graph in this process; everything it needs exists and is checked.

@@ -16,6 +16,7 @@
 #include <cstdio>
 #include <cstring>
 #include <fstream>
+#include <utility>
 #include <vector>
 
 #include "rt/shm/iceoryx_transport.hpp"
@@ -154,6 +155,20 @@ void remove_iceoryx_leftovers(const IceoryxPlaces& places, pid_t dead) {
   std::error_code ignored;
   for (const auto& entry : std::filesystem::directory_iterator(places.run, ignored))
     if (entry.path().filename().string().rfind(name, 0) == 0) std::filesystem::remove(entry.path(), ignored);
+}
+
+DaemonClaim::DaemonClaim(const IceoryxPlaces& places) : folder_(open(places.shm.c_str(), O_RDONLY | O_CLOEXEC)) {
+  // The folder itself is locked: it is there, everybody may read it, and each mount namespace has its own.
+  if (folder_ < 0 || flock(folder_, LOCK_EX | LOCK_NB) == 0) return;
+  close(std::exchange(folder_, -1));
+  throw TransportError(
+      "another iceoryx daemon is running: it is being started at this moment; there can be one on a machine");
+}
+
+void DaemonClaim::release() {
+  if (folder_ < 0) return;
+  flock(folder_, LOCK_UN);
+  close(std::exchange(folder_, -1));
 }
 
 }  // namespace takt

@@ -31,4 +31,19 @@ void remove_iceoryx_leftovers(const IceoryxPlaces& places, pid_t dead);
 /// `needed_bytes` do not fit into shared memory. Leftovers of this user are harmless: the daemon replaces them.
 void iceoryx_preflight(const IceoryxPlaces& places, uint64_t needed_bytes);
 
+/// The right to start a daemon in these places, from the preflight until the daemon's own lock is there: two runs that
+/// start at once would both find no daemon, and the second would abort. Throws TransportError if another process has
+/// it. Held by the processes that are forked meanwhile, too; release() ends it for all.
+class DaemonClaim {
+ public:
+  explicit DaemonClaim(const IceoryxPlaces& places);
+  ~DaemonClaim() { release(); }
+  DaemonClaim(const DaemonClaim&) = delete;
+  DaemonClaim& operator=(const DaemonClaim&) = delete;
+  void release();
+
+ private:
+  int folder_ = -1;
+};
+
 }  // namespace takt

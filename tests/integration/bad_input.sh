@@ -65,9 +65,9 @@ private() {
 if private true 2>/dev/null; then
   expect 3 "another iceoryx daemon is running" private sh -c '
     takt=/dev/shm/takt
-    "$takt" run --for 0s --transport iceoryx --policy cooperative --output /tmp/one >/dev/null 2>&1 & first=$!
+    "$takt" run --for 0s --isolate none --transport iceoryx --policy cooperative --output /tmp/one >/dev/null 2>&1 & first=$!
     until [ -e /dev/shm/root ] || ! kill -0 $first; do sleep 0.1; done
-    "$takt" run --for 1s --transport iceoryx --policy cooperative --output /tmp/two; code=$?
+    "$takt" run --for 1s --isolate none --transport iceoryx --policy cooperative --output /tmp/two; code=$?
     kill -TERM $first; wait $first
     exit $code'
 else

@@ -26,9 +26,12 @@ grep -q "max_age" "$work/stderr" || fail "only the first problem was reported"
 
 "$takt" run --clock virtual --for 1s --output "$work/out" --report "$work/report.json" >/dev/null 2>&1 || fail "the run to report"
 expect 0 "" "$takt" report "$work/report.json" --output "$work/out" --html "$work/report.html"
-for words in "ace on thesis" "<td>ego_motion</td>" "data:image/png;base64," "track.png" "not recorded"; do
+for words in "ace on thesis" "<td>ego_motion</td>" "data:image/png;base64," "track.png" "stop: front_laser.scan"; do
   grep -q "$words" "$work/report.html" || fail "the page lacks $words"
 done
+grep -q "not recorded" "$work/report.html" && fail "the page lacks something that runs record"
+"$takt" run --clock virtual --for 1s --output "$work/out" --html "$work/at_once.html" >/dev/null 2>&1
+grep -q "<td>ego_motion</td>" "$work/at_once.html" || fail "run --html wrote no page"
 expect 2 "of graph ace" "$takt" report <(sed 's/"profile": "sim"/"profile": "replay"/' "$work/report.json") "$source/graph/kitti.yaml" --html "$work/x.html"
 expect 2 "--schedule" "$takt" report <(sed 's/"schedule": "thesis"/"schedule": "other"/' "$work/report.json") --html "$work/x.html"
 expect 2 "no report of a run" "$takt" report "$source/README.md" --html "$work/x.html"

@@ -85,7 +85,7 @@ TEST_CASE("The SVG of ACE is well-formed and shows each node, device, edge and c
   CHECK(values(all, "data-to") == edges);
   for (const auto& chain : graph.chains) CHECK(svg.find(chain.name + ": " + chain.from.text()) != std::string::npos);
   check_frames_apart(all);
-  for (const char* words : {"stereo, 15 Hz", "budget 25 ms, deadline 80 ms", "depth 4", "max_age 150 ms", "stereo_pair",
+  for (const char* words : {"stereo, 15 Hz", "budget 20 ms, deadline 80 ms", "depth 4", "max_age 150 ms", "stereo_pair",
                             "age at most 700 ms", "criticality=\"high\"", "prefers-color-scheme: dark"}) {
     CAPTURE(words);
     CHECK(svg.find(words) != std::string::npos);
