@@ -84,7 +84,7 @@ class IsolatedRun {
     admit();
     const CpuLatencyHold latency = hold_cpu_dma_latency();
     tell_lacks(latency);
-    const auto transport = make_iceoryx_transport(plan_.ports);
+    transport_ = make_iceoryx_transport(plan_.ports);
     claim_.reset();
     board_.transport_up().store(true);
     agree_on_policy();
@@ -92,7 +92,7 @@ class IsolatedRun {
     const int64_t steal_before_ms = ProcessReading::now().steal_ms, cpu_before_ns = ProcessReading::now().cpu_ns;
     start();
     {
-      const attach::Server server({graph_, plan_, board_, *transport});
+      const attach::Server server({graph_, plan_, board_, *transport_});
       if (!server.lacks().empty()) adjusted_.push_back("nobody can attach: " + server.lacks());
       const LiveTable live(plan_, board_,
                            fmt::format("takt run {} ({}, policy {}, {} processes)", graph_.name, graph_.profile,
@@ -102,7 +102,7 @@ class IsolatedRun {
     MachineUse use = use_of_all();
     use.steal_ms -= steal_before_ms;
     use.cpu_ns -= cpu_before_ns;
-    return report(*transport, use);
+    return report(use);
   }
 
  private:
@@ -210,13 +210,13 @@ class IsolatedRun {
     return use;
   }
 
-  int report(const Transport& transport, const MachineUse& use) {
+  int report(const MachineUse& use) {
     RunResult result;
     result.epoch_ns = board_.epoch_ns().load();
     result.end_ns = board_.stop().end_ns();
     result.policy_granted = granted_;
     result.released = released_jobs(plan_, board_, result.epoch_ns, result.end_ns);
-    auto report = make_report({graph_, plan_, board_, result, transport, use, options_.clock,
+    auto report = make_report({graph_, plan_, board_, result, *transport_, use, options_.clock,
                                std::string(to_string(plan_.policy)), "subsystem", partition_.names, adjusted_});
     for (const std::string& fault : faults_) report["faults"].push_back({{"what", fault}});
     if (!faults_.empty()) report["ok"] = false;
@@ -238,7 +238,8 @@ class IsolatedRun {
   int code_ = 0;
   size_t told_ = 0;
   bool ending_ = false;
-  ProcessGroup group_;  ///< last: its members end before what they share
+  std::unique_ptr<Transport> transport_;  ///< the daemon: ends after all members
+  ProcessGroup group_;                    ///< last: its members end before what they share
 };
 
 }  // namespace
