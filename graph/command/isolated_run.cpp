@@ -90,6 +90,9 @@ class IsolatedRun {
     agree_on_policy();
     wait_for_all(ProcessRecord::running);
     const int64_t steal_before_ms = ProcessReading::now().steal_ms, cpu_before_ns = ProcessReading::now().cpu_ns;
+    // Now, with everything in place and locked: at the end they leave one after the other.
+    memory_mb_ = proportional_memory_mb(getpid());
+    for (size_t p = 0; p < group_.size(); ++p) memory_mb_ += proportional_memory_mb(group_.pid(p));
     start();
     {
       const attach::Server server({graph_, plan_, board_, *transport_});
@@ -200,12 +203,11 @@ class IsolatedRun {
 
   MachineUse use_of_all() const {
     const ProcessReading own = ProcessReading::now();
-    MachineUse use{own.cpu_ns, 0, 0, own.steal_ms, proportional_memory_mb()};
+    MachineUse use{own.cpu_ns, 0, 0, own.steal_ms, memory_mb_};
     for (size_t p = 0; p < board_.process_count(); ++p) {
       use.cpu_ns += board_.process(p).cpu_ns;
       use.simulator_cpu_ns += board_.process(p).simulator_cpu_ns;
       use.simulator_in_jobs_ns += board_.process(p).simulator_in_jobs_ns;
-      use.rss_mb += board_.process(p).rss_mb;
     }
     return use;
   }
@@ -238,6 +240,7 @@ class IsolatedRun {
   int code_ = 0;
   size_t told_ = 0;
   bool ending_ = false;
+  double memory_mb_ = 0;
   std::unique_ptr<Transport> transport_;  ///< the daemon: ends after all members
   ProcessGroup group_;                    ///< last: its members end before what they share
 };

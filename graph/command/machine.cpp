@@ -54,8 +54,9 @@ ProcessReading ProcessReading::now() {
   return reading;
 }
 
-double proportional_memory_mb() {
-  return std::strtod(proc_value("/proc/self/smaps_rollup", "Pss:").c_str(), nullptr) / 1024.0;
+double proportional_memory_mb(int pid) {
+  const std::string file = "/proc/" + std::to_string(pid) + "/smaps_rollup";
+  return std::strtod(proc_value(file.c_str(), "Pss:").c_str(), nullptr) / 1024.0;
 }
 
 }  // namespace takt::command

@@ -17,7 +17,8 @@ struct ProcessReading {
   static ProcessReading now();
 };
 
-/// Memory that this process alone accounts for, MB: pages it shares count by their share. 0 if the kernel does not say.
-double proportional_memory_mb();
+/// Memory of a process, MB, in which pages shared by n processes count 1/n: the sum over the processes of a run is what
+/// the run takes. 0 if the kernel does not say.
+double proportional_memory_mb(int pid);
 
 }  // namespace takt::command

@@ -96,7 +96,6 @@ int run_member(const RunOptions& options, const graph::GraphSpec& graph, const g
   record.cpu_ns = ProcessReading::now().cpu_ns - before.cpu_ns;
   record.simulator_cpu_ns = hal::simulator_use().cpu_ns;
   record.simulator_in_jobs_ns = hal::simulator_use().in_jobs_ns;
-  record.rss_mb = proportional_memory_mb();
   for (size_t t = 0; t < plan.tasks.size(); ++t)
     if (run.own[t]) prepared.composition->nodes[t]->finish();
   record.state.store(ProcessRecord::finished);

@@ -14,7 +14,7 @@ struct ProcessMemory {
   std::vector<std::string> lacks;  ///< what was refused, each with the fix
 };
 
-/// Once, before worker threads start. Without it, a large block that OpenCV takes and frees in every job is mapped,
+/// Once, before worker threads start; those get stacks of 2 MB. Without it, a large block that OpenCV takes and frees in every job is mapped,
 /// faulted in page by page and unmapped again.
 ProcessMemory prepare_process_memory();
 

@@ -31,7 +31,6 @@ struct ProcessRecord {
   std::atomic<uint32_t> problems{0};  ///< why it could not be composed: how many, told on stderr
   std::atomic<bool> refused{false};   ///< a policy was refused to one of its lanes
   int64_t cpu_ns = 0, simulator_cpu_ns = 0, simulator_in_jobs_ns = 0;
-  double rss_mb = 0;
 };
 
 /// How large the messages of an output can become, once its node is set up.
