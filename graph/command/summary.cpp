@@ -15,11 +15,11 @@ std::string figure(const Json& value, const char* format) {
 }
 
 // Every line but those of `adjusted` fits a terminal of 80 columns.
-constexpr const char* kRow = "{:<11} {:>4} {:>5} {:>5} {:>4} {:>4} {:>5} {:>6} {:>6} {:>6} {:>6} {:>6}\n";
+constexpr const char* kRow = "{:<16} {:>3} {:>4} {:>4} {:>4} {:>4} {:>5} {:>5} {:>6} {:>6} {:>5} {:>6}\n";
 
 std::string node_line(const Json& node) {
   const auto number = [&](const char* key) { return std::to_string(node[key].get<uint64_t>()); };
-  return fmt::format(fmt::runtime(kRow), node["name"].get<std::string>().substr(0, 11), figure(node["rate_hz"], "{:g}"),
+  return fmt::format(fmt::runtime(kRow), node["name"].get<std::string>().substr(0, 16), figure(node["rate_hz"], "{:g}"),
                      number("released"), number("completed"), number("deadline_misses"), number("skipped"),
                      number("stale_inputs"), figure(node["exec_ms"]["p50"], "{:.2f}"),
                      figure(node["exec_ms"]["p99"], "{:.2f}"), figure(node["response_ms"]["p99"], "{:.2f}"),
@@ -40,9 +40,11 @@ std::string policy_text(const Json& report) {
 
 std::string summary_text(const Json& report) {
   const auto word = [&](const char* key) { return report[key].get<std::string>(); };
-  std::string text = fmt::format("\n{} on {}, {:.1f} s ({} profile, {} clock, {} transport)\n{}\n", word("graph"),
-                                 word("schedule"), report["duration_s"].get<double>(), word("profile"), word("clock"),
-                                 word("transport"), policy_text(report));
+  std::string text =
+      fmt::format("\n{} on {}, {:.1f} s ({} profile, {} clock, {} transport{})\n{}\n", word("graph"), word("schedule"),
+                  report["duration_s"].get<double>(), word("profile"), word("clock"), word("transport"),
+                  report["processes"].empty() ? "" : fmt::format(", {} processes", report["processes"].size()),
+                  policy_text(report));
   text += fmt::format(fmt::runtime(kRow), "", "", "", "", "", "", "", "exec", "ms", "resp", "late", "us");
   text += fmt::format(fmt::runtime(kRow), "node", "Hz", "rel", "done", "miss", "skip", "stale", "p50", "p99", "p99",
                       "p50", "p99");
