@@ -85,6 +85,7 @@ void Executor::set_grants(const Lane& lane, const Grant& grant) {
 void Executor::start_clockwork(RunResult& result) {
   result.epoch_ns = options_.gate != nullptr ? options_.gate->epoch_ns()
                                              : clock_.now_ns() + (clock_.is_virtual() ? 0 : options_.start_delay_ns);
+  board_.epoch_ns().store(result.epoch_ns);
   if (options_.duration_ns > 0) stop_.set_planned_end(result.epoch_ns + options_.duration_ns);
   for (auto& lane : lanes_) lane->set_epoch(result.epoch_ns);
   for (const auto& task : tasks_)
