@@ -148,8 +148,10 @@ bool Executor::run_partitioned(Policy policy, RunResult& result) {
   }
   ready.arrive_and_wait();
   for (size_t i = 0; i < lanes_.size(); ++i) set_grants(*lanes_[i], grants[i]);
-  result.refused = refusals(plan_, board_);
-  go.store(options_.gate != nullptr ? options_.gate->all_granted(result.refused.empty()) : result.refused.empty());
+  const bool mine = std::all_of(grants.begin(), grants.end(), [](const Grant& grant) { return grant.refused.empty(); });
+  go.store(options_.gate != nullptr ? options_.gate->all_granted(mine) : mine);
+  // Of several processes only the supervisor reads them, while none of them writes: between agreement and decision.
+  if (options_.gate == nullptr) result.refused = refusals(plan_, board_);
   if (go.load()) {
     result.policy_granted = policy;
     start_clockwork(result);
