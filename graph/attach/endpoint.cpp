@@ -4,7 +4,6 @@
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/time.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -104,14 +103,32 @@ bool Connection::write(const nlohmann::ordered_json& line, const std::string& by
   return true;
 }
 
-std::optional<Connection> connect_to(int pid) {
-  std::string why;
-  const auto path = socket_folder(why) / (std::to_string(pid) + ".sock");
-  const int descriptor = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+bool Connection::gone() const {
+  char next = 0;
+  return recv(descriptor_, &next, 1, MSG_PEEK | MSG_DONTWAIT) == 0;
+}
+
+std::optional<sockaddr_un> address_of(const std::filesystem::path& folder, int pid, std::string& why) {
+  const std::string path = folder / (std::to_string(pid) + ".sock");
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
-  std::strncpy(address.sun_path, path.c_str(), sizeof address.sun_path - 1);
-  if (connect(descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
+  if (path.size() >= sizeof address.sun_path) {
+    why = path + " is too long for a socket; choose a shorter XDG_RUNTIME_DIR";
+    return std::nullopt;
+  }
+  std::memcpy(address.sun_path, path.c_str(), path.size());
+  return address;
+}
+
+std::optional<Connection> connect_to(int pid) {
+  std::string why;
+  const auto folder = socket_folder(why);
+  if (folder.empty()) return std::nullopt;
+  const auto address = address_of(folder, pid, why);
+  if (!address) return std::nullopt;
+  const int descriptor = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  if (descriptor < 0) return std::nullopt;
+  if (connect(descriptor, reinterpret_cast<const sockaddr*>(&*address), sizeof *address) != 0) {
     close(descriptor);
     return std::nullopt;
   }

@@ -2,6 +2,8 @@
 // Where a running graph can be spoken to: a local socket in a folder that belongs to its user alone. A question is one
 // line of JSON; an answer is one line of JSON, whose "bytes" says how many raw bytes follow it.
 #pragma once
+#include <sys/un.h>
+
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -33,12 +35,17 @@ class Connection {
   std::optional<nlohmann::ordered_json> read_line();
   std::optional<std::string> read_bytes(size_t count);
   bool write(const nlohmann::ordered_json& line, const std::string& bytes = "");
+  /// True if the other side has gone. Does not wait.
+  bool gone() const;
 
  private:
   bool fill();
   int descriptor_;
   std::string rest_;
 };
+
+/// Where the run with that process id listens, in `folder`; nothing with `why` if the path is too long for a socket.
+std::optional<sockaddr_un> address_of(const std::filesystem::path& folder, int pid, std::string& why);
 
 /// To the run with that process id.
 std::optional<Connection> connect_to(int pid);

@@ -4,13 +4,13 @@
 #include <fmt/format.h>
 #include <poll.h>
 #include <sys/socket.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <cstring>
+#include <system_error>
 
 #include "graph/attach/message_text.hpp"
 #include "graph/compose/composition.hpp"
@@ -57,14 +57,13 @@ Server::~Server() {
 void Server::open() {
   const auto folder = socket_folder(lacks_);
   if (!lacks_.empty()) return;
-  const auto path = folder / (std::to_string(getpid()) + ".sock");
-  sockaddr_un address{};
-  address.sun_family = AF_UNIX;
-  std::strncpy(address.sun_path, path.c_str(), sizeof address.sun_path - 1);
+  const auto address = address_of(folder, getpid(), lacks_);
+  if (!address) return;
+  const std::filesystem::path path = address->sun_path;
   std::error_code ignored;
   std::filesystem::remove(path, ignored);  // of a dead process that had our number
   listener_ = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  if (listener_ < 0 || bind(listener_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
+  if (listener_ < 0 || bind(listener_, reinterpret_cast<const sockaddr*>(&*address), sizeof *address) != 0 ||
       listen(listener_, static_cast<int>(kMostClients)) != 0) {
     lacks_ = path.string() + ": " + std::strerror(errno);
     return;
@@ -92,10 +91,15 @@ void Server::accept_clients() {
       continue;
     }
     Client& client = clients_.emplace_back();
-    client.thread = std::thread([this, descriptor, &client] {
-      serve(descriptor);
-      client.done.store(true);
-    });
+    try {
+      client.thread = std::thread([this, descriptor, &client] {
+        serve(descriptor);
+        client.done.store(true);
+      });
+    } catch (const std::system_error&) {  // no more threads: the run goes on unheard
+      clients_.pop_back();
+      close(descriptor);
+    }
   }
 }
 
@@ -110,7 +114,12 @@ void Server::serve(int descriptor) {
   Connection connection(descriptor, 1000);
   while (!ending_.load()) {
     const auto question = connection.read_line();
-    if (!question || !question->is_object() || !answer(*question, connection)) return;
+    if (!question || !question->is_object()) return;
+    try {
+      if (!answer(*question, connection)) return;
+    } catch (const std::exception& problem) {  // no question may end the run
+      if (!connection.write(wrong(std::string("this cannot be answered: ") + problem.what()))) return;
+    }
   }
 }
 
@@ -127,6 +136,7 @@ bool Server::answer(const Json& question, Connection& connection) {
 }
 
 Json Server::top() const {
+  const int64_t epoch_ns = subject_.board.epoch_ns().load();
   Json nodes = Json::array();
   for (size_t t = 0; t < subject_.plan.tasks.size(); ++t) {
     const TaskPlan& task = subject_.plan.tasks[t];
@@ -143,7 +153,7 @@ Json Server::top() const {
   return {{"graph", subject_.graph.name},
           {"profile", subject_.graph.profile},
           {"transport", subject_.transport.name()},
-          {"running_s", static_cast<double>(now_ns() - subject_.board.epoch_ns().load()) / 1e9},
+          {"running_s", epoch_ns > 0 ? static_cast<double>(std::max<int64_t>(0, now_ns() - epoch_ns)) / 1e9 : 0.0},
           {"nodes", nodes}};
 }
 
@@ -162,14 +172,20 @@ bool Server::echo(const Json& question, Connection& connection) {
     return connection.write(wrong(fmt::format("there is no output {}{}", graph::ticked(name),
                                               graph::alternatives(name, known, "outputs of this graph"))));
   }
-  {
-    const std::lock_guard lock(tapping_);
-    if (!tapped_.insert(port).second) return connection.write(wrong("somebody else listens to " + name + " already"));
-  }
-  const bool alive = stream(port, question.value("png", false), question.value("count", int64_t{1}), connection);
+  const bool picture = question.value("png", false);
+  const auto count = question.value("count", int64_t{1});
+  const auto tap = claim_tap(port);
+  if (!tap) return connection.write(wrong("somebody else listens to " + name + " already"));
+  return stream(port, picture, count, connection);
+}
+
+std::shared_ptr<void> Server::claim_tap(size_t port) {
   const std::lock_guard lock(tapping_);
-  tapped_.erase(port);
-  return alive;
+  if (!tapped_.insert(port).second) return nullptr;
+  return {this, [port](Server* server) {
+            const std::lock_guard last(server->tapping_);
+            server->tapped_.erase(port);
+          }};
 }
 
 bool Server::stream(size_t port, bool picture, int64_t count, Connection& connection) {
@@ -181,9 +197,12 @@ bool Server::stream(size_t port, bool picture, int64_t count, Connection& connec
     const bool listed = reader->list(now_ns(), {&newest, 1}) == 1 && newest.sequence > seen;
     Held held = listed ? reader->take(newest.sequence) : Held{};
     if (!held) {
+      if (connection.gone()) return false;
       pause_ms(2);
       continue;
     }
+    const auto let_go = [&reader](Held* message) { reader->release(*message); };
+    std::unique_ptr<Held, decltype(let_go)> holding(&held, let_go);
     Json line{{"type", plan.type->name},
               {"sequence", held.sequence},
               {"stamp_ns", held.stamp_ns},
@@ -191,7 +210,7 @@ bool Server::stream(size_t port, bool picture, int64_t count, Connection& connec
               {"message", message_json(*plan.type, held.message())}};
     const auto png = picture ? message_png(*plan.type, held.message()) : std::nullopt;
     seen = held.sequence;
-    reader->release(held);
+    holding.reset();
     if (picture && !png)
       return connection.write(
           wrong(fmt::format("a message of type {} is no picture; leave --png out", plan.type->name)));

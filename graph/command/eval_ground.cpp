@@ -186,9 +186,11 @@ struct CellScore {
 double drivable_share(const PavementScene& scene, const FloorPoint& corner, double cell_m) {
   constexpr int kSamples = 6;
   int drivable = 0;
-  for (int i = 0; i < kSamples * kSamples; ++i)
-    drivable += scene.drivable(
-        {corner.x_m + (i % kSamples + 0.5) * cell_m / kSamples, corner.y_m + (i / kSamples + 0.5) * cell_m / kSamples});
+  for (int i = 0; i < kSamples * kSamples; ++i) {
+    const int column = i % kSamples, row = i / kSamples;
+    drivable +=
+        scene.drivable({corner.x_m + (column + 0.5) * cell_m / kSamples, corner.y_m + (row + 0.5) * cell_m / kSamples});
+  }
   return static_cast<double>(drivable) / (kSamples * kSamples);
 }
 

@@ -75,8 +75,12 @@ class IsolatedRun {
   int run() {
     limit_cores(plan_.cores, adjusted_);
     for (size_t p = 0; p < partition_.names.size(); ++p)
-      group_.start(partition_.names[p], [this, p, supervisor = getpid()] {
-        return run_member(options_, graph_, partition_, p, supervisor, board_);
+      group_.start(partition_.names[p], [this, p, supervisor = getpid()]() -> int {
+        try {
+          return run_member(options_, graph_, partition_, p, supervisor, board_);
+        } catch (const std::exception& problem) {  // as in a run in one process: no memory, no daemon, no thread
+          return refuse(fmt::format("process {}: {}", partition_.names[p], problem.what()), kDeviceOrSystem);
+        }
       });
     wait_for_all(ProcessRecord::composed);
     BoardExchange exchange(board_);

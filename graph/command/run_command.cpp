@@ -5,7 +5,7 @@
 #include <unistd.h>
 
 #include <cstdio>
-#include <fstream>
+#include <optional>
 
 #include "graph/attach/server.hpp"
 #include "graph/check/check.hpp"
@@ -47,6 +47,9 @@ int execute(const RunOptions& options, Prepared& prepared, std::vector<std::stri
   RunResult result;
   {
     const Stoppable stoppable(board);
+    std::optional<attach::Server> server;  // virtual time passes too fast to speak to
+    if (!prepared.clock->is_virtual()) server.emplace(attach::Subject{graph, composition.plan, board, *transport});
+    if (server && !server->lacks().empty()) adjusted.push_back("nobody can attach: " + server->lacks());
     const LiveTable live(
         composition.plan, board,
         fmt::format("takt run {} ({}, policy {})", graph.name, graph.profile, to_string(graph.schedule.policy)));
@@ -99,7 +102,7 @@ int run_in_one_process(const RunOptions& options, Prepared& prepared, std::vecto
 }
 
 /// One process, or one per subsystem: as the command line says, else the graph.
-int run_as_asked(const RunOptions& options) {
+int run_as_asked(RunOptions options) {
   Prepared prepared;
   if (const int code = load(options, prepared); code != kOk) {
     tell_problems(prepared.problems.size());
@@ -108,6 +111,7 @@ int run_as_asked(const RunOptions& options) {
   std::vector<std::string> adjusted = prepared.graph->adjusted;
   const std::string wanted = options.isolate.empty() ? prepared.graph->isolation : options.isolate;
   if (wanted != "subsystem" || options.clock == "virtual") return run_in_one_process(options, prepared, adjusted);
+  const KeptPlace report(options.report), page(options.html);
   const IsolatedEnd end = run_isolated(options, *prepared.graph, adjusted);
   if (end.not_isolated.empty()) return end.code;
   if (options.isolate == "subsystem") return refuse("--isolate subsystem: " + end.not_isolated, kDeviceOrSystem);

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "graph/command/run_support.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <sched.h>
+#include <unistd.h>
 
 #include <array>
 #include <atomic>
@@ -60,6 +62,17 @@ Stoppable::Stoppable(RunBoard& board) {
 }
 
 Stoppable::~Stoppable() { g_running.store(nullptr); }
+
+KeptPlace::KeptPlace(std::filesystem::path& file) {
+  if (file.empty()) return;
+  const auto folder = file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
+  folder_ = open(folder.c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC);
+  if (folder_ >= 0) file = fmt::format("/proc/self/fd/{}/{}", folder_, file.filename().string());
+}
+
+KeptPlace::~KeptPlace() {
+  if (folder_ >= 0) close(folder_);
+}
 
 void limit_cores(std::vector<int>& cores, std::vector<std::string>& adjusted) {
   cpu_set_t allowed;

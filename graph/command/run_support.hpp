@@ -32,6 +32,19 @@ class Stoppable {
   Stoppable& operator=(const Stoppable&) = delete;
 };
 
+/// A file that is written at the end stays where it was asked for, even if this process gets another /tmp meanwhile:
+/// while this lives, `file` is named by the descriptor of its folder.
+class KeptPlace {
+ public:
+  explicit KeptPlace(std::filesystem::path& file);
+  ~KeptPlace();
+  KeptPlace(const KeptPlace&) = delete;
+  KeptPlace& operator=(const KeptPlace&) = delete;
+
+ private:
+  int folder_ = -1;
+};
+
 /// The cores of the schedule that this process may use; none of them: all it may use. Says what it changed.
 void limit_cores(std::vector<int>& cores, std::vector<std::string>& adjusted);
 

@@ -85,6 +85,7 @@ void Executor::set_grants(const Lane& lane, const Grant& grant) {
 void Executor::start_clockwork(RunResult& result) {
   result.epoch_ns = options_.gate != nullptr ? options_.gate->epoch_ns()
                                              : clock_.now_ns() + (clock_.is_virtual() ? 0 : options_.start_delay_ns);
+  board_.epoch_ns().store(result.epoch_ns);
   if (options_.duration_ns > 0) stop_.set_planned_end(result.epoch_ns + options_.duration_ns);
   for (auto& lane : lanes_) lane->set_epoch(result.epoch_ns);
   for (const auto& task : tasks_)
@@ -147,8 +148,10 @@ bool Executor::run_partitioned(Policy policy, RunResult& result) {
   }
   ready.arrive_and_wait();
   for (size_t i = 0; i < lanes_.size(); ++i) set_grants(*lanes_[i], grants[i]);
-  result.refused = refusals(plan_, board_);
-  go.store(options_.gate != nullptr ? options_.gate->all_granted(result.refused.empty()) : result.refused.empty());
+  const bool mine = std::all_of(grants.begin(), grants.end(), [](const Grant& grant) { return grant.refused.empty(); });
+  go.store(options_.gate != nullptr ? options_.gate->all_granted(mine) : mine);
+  // Of several processes only the supervisor reads them, while none of them writes: between agreement and decision.
+  if (options_.gate == nullptr) result.refused = refusals(plan_, board_);
   if (go.load()) {
     result.policy_granted = policy;
     start_clockwork(result);

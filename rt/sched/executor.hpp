@@ -17,7 +17,7 @@ struct RunResult {
   int64_t epoch_ns = 0, end_ns = 0;             ///< planned releases lie in [epoch, end)
   Policy policy_granted = Policy::cooperative;  ///< also in virtual time, which asks the kernel for nothing
   std::vector<uint64_t> released;               ///< per task, see released_jobs()
-  std::vector<std::string> refused;             ///< what the kernel refused, with the fix
+  std::vector<std::string> refused;             ///< what the kernel refused, with the fix; not where a gate decides
   /// 0 if it was stopped before it began.
   double duration_s() const { return end_ns > epoch_ns ? static_cast<double>(end_ns - epoch_ns) / 1e9 : 0; }
 };

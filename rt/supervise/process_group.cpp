@@ -29,6 +29,8 @@ namespace {
     code = body();
   } catch (const std::exception& problem) {
     std::fprintf(stderr, "takt: error: process %s: %s\n", name.c_str(), problem.what());
+  } catch (...) {  // else it would go on in the supervisor's code above the fork
+    std::fprintf(stderr, "takt: error: process %s: unknown exception\n", name.c_str());
   }
   std::fflush(nullptr);
   std::exit(code);  // not _exit: iceoryx removes its socket and lock in a static destructor
@@ -38,8 +40,11 @@ namespace {
 
 ProcessGroup::~ProcessGroup() {
   kill_all();
-  for (Member& member : members_)
-    if (member.pid > 0) waitpid(member.pid, nullptr, 0);
+  for (const Member& member : members_) {
+    if (member.pid <= 0) continue;
+    while (waitpid(member.pid, nullptr, 0) < 0 && errno == EINTR) {
+    }
+  }
 }
 
 void ProcessGroup::start(const std::string& name, const std::function<int()>& body) {

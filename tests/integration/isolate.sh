@@ -67,11 +67,14 @@ expect 3 "no running graph" "$takt" top --once --run 1
 
 # A second one beside it: with a /tmp and /dev/shm of its own where that is permitted, else refused with the reason.
 if unshare -m true 2>/dev/null; then
-  start_run second --isolate subsystem --for 0s
+  report=/tmp/takt-report-$$.json
+  start_run second --isolate subsystem --for 0s --report "$report"
   grep -q "another iceoryx daemon is running" "$work/second.err" || fail "the second run does not say what it did"
   expect 3 "several graphs are running" "$takt" top --once
   expect 0 "" "$takt" stop --run $run
   ended second 0 1
+  grep -q '"isolation": "subsystem"' "$report" || fail "the report of the second run is not where it was asked for"
+  rm -f "$report"
 else
   expect 3 "another iceoryx daemon" "$takt" run --isolate subsystem --for 1s --output "$work/out"
 fi
@@ -81,6 +84,13 @@ run=$first
 ended first 0 1
 grep -q "CPU" "$work/first.out" || fail "no summary after stop"
 unchanged "a stopped run"
+
+# One process can be spoken to as well.
+start_run alone --isolate none --for 0s
+expect 0 "" "$takt" echo stereo.disparity --run $run
+expect 0 "" "$takt" stop --run $run
+ended alone 0 1
+unchanged "a stopped run in one process"
 
 # A process that is killed ends the run, which says so; nothing is left, and the next one works.
 start_run killed --isolate subsystem --for 0s

@@ -182,3 +182,46 @@ TEST_CASE("a socket folder that is open to others is not used") {
   CHECK(attach::socket_folder(why).empty());
   CHECK(why.find("of this user alone") != std::string::npos);
 }
+
+TEST_CASE("a question of a wrong kind is refused, and the next one answered") {
+  Scene scene;
+  const attach::Server server({scene.spec, scene.plan, *scene.board, *scene.transport});
+  auto connection = attach::connect_to(getpid());
+  REQUIRE(connection);
+  for (const Json& question :
+       {Json{{"do", 5}}, Json{{"do", "set"}, {"param", 1}}, Json{{"do", "echo"}, {"port", nullptr}},
+        Json{{"do", "echo"}, {"port", "map.obstacles"}, {"count", "many"}}}) {
+    REQUIRE(connection->write(question));
+    const auto answer = connection->read_line();
+    REQUIRE(answer);
+    CHECK(answer->contains("error"));
+  }
+  REQUIRE(connection->write({{"do", "top"}}));
+  const auto top = connection->read_line();
+  REQUIRE(top);
+  CHECK((*top)["running_s"] == 0.0);  // no epoch yet
+}
+
+TEST_CASE("who listens and goes leaves the output to others, even if nothing is published") {
+  Scene scene;
+  const auto writer = scene.transport->make_writer(0);
+  writer->loan();
+  writer->publish(1, 0, 0);
+  const attach::Server server({scene.spec, scene.plan, *scene.board, *scene.transport});
+  {
+    auto first = attach::connect_to(getpid());
+    REQUIRE(first);
+    REQUIRE(first->write({{"do", "echo"}, {"port", "map.obstacles"}, {"count", 2}}));
+    REQUIRE(first->read_line());  // and now it waits for a second message
+    CHECK(scene.ask({{"do", "echo"}, {"port", "map.obstacles"}})["error"].get<std::string>().find("somebody else") !=
+          std::string::npos);
+  }
+  while (scene.ask({{"do", "echo"}, {"port", "map.obstacles"}}).contains("error")) usleep(1000);
+}
+
+TEST_CASE("a path too long for a socket is refused, not cut") {
+  std::string why;
+  CHECK(attach::address_of("/tmp", 7, why)->sun_path == std::string("/tmp/7.sock"));
+  CHECK_FALSE(attach::address_of("/tmp/" + std::string(100, 'x'), 7, why));
+  CHECK(why.find("shorter XDG_RUNTIME_DIR") != std::string::npos);
+}

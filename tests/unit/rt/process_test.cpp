@@ -78,8 +78,9 @@ TEST_CASE("a process ends with the code of its body, with 1 if that throws, and 
     raise(SIGHUP);
     return 5;
   });
-  int codes[4] = {};
-  for (int i = 0; i < 4; ++i) {
+  group.start("strange", []() -> int { throw 7; });
+  int codes[5] = {};
+  for (int i = 0; i < 5; ++i) {
     const ProcessGroup::End end = wait_for_end(group);
     codes[end.process] = end.code;
   }
@@ -87,6 +88,7 @@ TEST_CASE("a process ends with the code of its body, with 1 if that throws, and 
   CHECK(codes[1] == 3);
   CHECK(codes[2] == 1);
   CHECK(codes[3] == 5);
+  CHECK(codes[4] == 1);
   CHECK_FALSE(group.reap());
 }
 
