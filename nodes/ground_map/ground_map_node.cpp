@@ -134,7 +134,8 @@ class GroundMapNode final : public Node {
     Grid* out = grid_.loan();
     if (!out) return false;
     const Window& window = grid.window();
-    const double half_m = window.cells / 2 * window.cell_m;
+    const int half_cells = window.cells / 2;
+    const double half_m = half_cells * window.cell_m;
     out->width = out->height = window.cells;
     out->cell_m = window.cell_m;
     out->origin_x_m = out->origin_y_m = -half_m;
