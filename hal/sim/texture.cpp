@@ -33,7 +33,7 @@ struct Recipe {
 // saturation and value can tell them apart, although all of them are textured alike for stereo.
 constexpr std::array<Recipe, kMaterials> kRecipes{{
     {"sky", 16, 1, {200, 190, 180}, 0, 0, 0},
-    {"floor", 1024, 250, {62, 96, 128}, 40, 3, 0},
+    {"floor", 1024, 250, {62, 96, 128}, 28, 3, 0},
     {"plaster", 1024, 250, {158, 167, 172}, 40, 4, 120},
     {"ceiling", 512, 160, {190, 195, 195}, 30, 4, 0},
     {"wood", 512, 300, {120, 148, 168}, 40, 4, 0},
@@ -163,9 +163,10 @@ void tile_levels(Texture& texture) {
   }
 }
 
-/// A colour made lighter by `levels` of its green, and warmer or colder by `tint` in proportion.
+/// A colour made lighter by `levels` of its green, and warmer or colder by `tint` in proportion. Nothing gets so dark that
+/// the camera's noise would decide its saturation.
 uint32_t shade(const std::array<double, 3>& bgr, double levels, double tint) {
-  const double light = std::max(0.0, 1 + levels / bgr[1]), warmth = tint / bgr[1];
+  const double light = std::max(0.25, 1 + levels / bgr[1]), warmth = tint / bgr[1];
   return pack(bgr[0] * light * (1 + warmth), bgr[1] * light, bgr[2] * light * (1 - warmth));
 }
 
