@@ -163,8 +163,8 @@ void tile_levels(Texture& texture) {
   }
 }
 
-/// A colour made lighter by `levels` of its green, and warmer or colder by `tint` in proportion. Nothing gets so dark that
-/// the camera's noise would decide its saturation.
+/// A colour made lighter by `levels` of its green, and warmer or colder by `tint` in proportion. Nothing gets so dark
+/// that the camera's noise would decide its saturation.
 uint32_t shade(const std::array<double, 3>& bgr, double levels, double tint) {
   const double light = std::max(0.25, 1 + levels / bgr[1]), warmth = tint / bgr[1];
   return pack(bgr[0] * light * (1 + warmth), bgr[1] * light, bgr[2] * light * (1 - warmth));

@@ -55,7 +55,7 @@ PY
 
 maps() { # maps NAME: the edited graph runs, keeps every promise and yields its maps
   echo "=== $1"
-  expect 0 "" "$takt" run "$work/graph/edited.yaml" --clock virtual --isolate none --for 8s --output "$work/$1"
+  expect 0 "" "$takt" run "$work/graph/edited.yaml" --clock virtual --isolate none --for 5s --output "$work/$1"
   for picture in left disparity ground; do
     [ -s "$work/$1/$picture.png" ] || fail "$1: no $picture.png"
   done

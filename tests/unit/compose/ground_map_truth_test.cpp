@@ -167,7 +167,9 @@ double percent(int part, int whole) { return 100.0 * part / whole; }
 
 // Counted are cells of 0.3 m in the last grid that at least 3 of the mapped images saw, each in at least 5 columns.
 // Truly blocked: something stands in the cell where the floor of those columns ends. Truly free: seen as floor, and
-// nothing touches the circle around the cell. A cell that is still unknown counts against both.
+// nothing touches the circle around the cell. A cell that is still unknown counts against both. A border is counted
+// with the neighbouring cells too, because a face may stand a few centimetres from the next cell and the odometry
+// drifts by more than that. After 30 s its drift begins to be what is measured.
 TEST_CASE("the ground map of a drive through the lab agrees with the world") {
   hal::Devices devices;
   VirtualClock clock(1'000'000'000);
@@ -194,7 +196,7 @@ TEST_CASE("the ground map of a drive through the lab agrees with the world") {
   REQUIRE(s.blocked > 100);
   REQUIRE(s.free > 400);
   CHECK(percent(s.marked, s.blocked) > 50);
-  CHECK(percent(s.marked_near, s.blocked) > 90);
+  CHECK(percent(s.marked_near, s.blocked) > 95);
   CHECK(percent(s.called_free, s.free) > 90);
   CHECK(percent(s.called_occupied, s.free) < 5);
 }
