@@ -9,32 +9,51 @@
 namespace takt::sim {
 namespace {
 
+/// How noise and rectangles colour a material.
+enum class Paint : uint8_t {
+  shaded,    ///< noise lightens and darkens the colour, which keeps its saturation; rectangles are grey
+  colourful  ///< noise is added to each channel, so that saturation varies; rectangles have any colour
+};
+
 struct Recipe {
   std::string_view name;
   int size;
   double texels_per_m;
   std::array<double, 3> bgr;  ///< mean colour
-  double contrast;            ///< of the luminance noise
-  double tint;                ///< of the colour noise
+  double contrast;            ///< of the luminance noise, levels
+  double tint;                ///< of the colour noise, levels
   int rectangles;
+  Paint paint = Paint::shaded;
   std::array<std::array<double, 3>, 3> bands{};  ///< colours in turn along v, heights 3 : 3 : 1, instead of the mean
   int band_period = 0;                           ///< texels of one turn, divides size; 0: no bands
 };
 
+// The floor is saturated (S = 255 (max - min) / max about 130) and what stands on it either pale (S below 85: plaster,
+// wood, cardboard, cloth) or more saturated still (the stripes, S about 200): a ground detector that looks at
+// saturation and value can tell them apart, although all of them are textured alike for stereo.
 constexpr std::array<Recipe, kMaterials> kRecipes{{
     {"sky", 16, 1, {200, 190, 180}, 0, 0, 0},
-    {"floor", 1024, 250, {95, 105, 112}, 46, 6, 0},
-    {"plaster", 1024, 250, {150, 165, 170}, 40, 10, 120},
+    {"floor", 1024, 250, {62, 96, 128}, 28, 3, 0},
+    {"plaster", 1024, 250, {158, 167, 172}, 40, 4, 120},
     {"ceiling", 512, 160, {190, 195, 195}, 30, 4, 0},
-    {"wood", 512, 300, {60, 100, 150}, 40, 10, 0},
-    {"cardboard", 512, 300, {90, 130, 160}, 44, 8, 30},
-    {"poster", 512, 300, {120, 120, 120}, 22, 30, 160},
-    {"cloth", 256, 250, {120, 70, 60}, 36, 14, 0},
-    {"skin", 256, 250, {130, 155, 205}, 22, 6, 0},
-    {"red_stripes", 256, 300, {}, 20, 4, 0, {{{40, 30, 190}, {220, 220, 225}, {40, 190, 215}}}, 64},
-    {"blue_stripes", 256, 300, {}, 20, 4, 0, {{{185, 75, 25}, {35, 195, 225}, {40, 40, 45}}}, 64},
-    {"green_stripes", 256, 300, {}, 20, 4, 0, {{{45, 150, 30}, {30, 115, 235}, {225, 225, 220}}}, 64},
-    {"violet_stripes", 256, 300, {}, 20, 4, 0, {{{165, 35, 130}, {200, 190, 40}, {150, 60, 225}}}, 64},
+    {"wood", 512, 300, {120, 148, 168}, 40, 4, 0},
+    {"cardboard", 512, 300, {112, 138, 156}, 44, 4, 30},
+    {"poster", 512, 300, {120, 120, 120}, 22, 30, 160, Paint::colourful},
+    {"cloth", 256, 250, {92, 80, 72}, 36, 4, 0},
+    {"skin", 256, 250, {130, 155, 205}, 22, 6, 0, Paint::colourful},
+    {"red_stripes", 256, 300, {}, 20, 4, 0, Paint::colourful, {{{40, 30, 190}, {220, 220, 225}, {40, 190, 215}}}, 64},
+    {"blue_stripes", 256, 300, {}, 20, 4, 0, Paint::colourful, {{{185, 75, 25}, {35, 195, 225}, {40, 40, 45}}}, 64},
+    {"green_stripes", 256, 300, {}, 20, 4, 0, Paint::colourful, {{{45, 150, 30}, {30, 115, 235}, {225, 225, 220}}}, 64},
+    {"violet_stripes",
+     256,
+     300,
+     {},
+     20,
+     4,
+     0,
+     Paint::colourful,
+     {{{165, 35, 130}, {200, 190, 40}, {150, 60, 225}}},
+     64},
 }};
 
 const std::array<double, 3>& colour_of_row(const Recipe& recipe, int row) {
@@ -85,15 +104,16 @@ uint32_t pack(double b, double g, double r) {
   return byte(b) | byte(g) << 8 | byte(r) << 16;
 }
 
-/// Random coloured rectangles: strong corners for feature trackers.
-void add_rectangles(Texture& texture, int count, uint64_t seed) {
+/// Random rectangles: strong corners for feature trackers.
+void add_rectangles(Texture& texture, const Recipe& recipe, uint64_t seed) {
   const int size = texture.size;
-  for (int k = 0; k < count; ++k) {
+  for (int k = 0; k < recipe.rectangles; ++k) {
     const auto draw = [&](uint64_t what, int limit) {
       return static_cast<int>(mix(seed, static_cast<uint64_t>(k), what) % static_cast<uint64_t>(limit));
     };
     const int x0 = draw(1, size), y0 = draw(2, size), w = 8 + draw(3, size / 10), h = 8 + draw(4, size / 10);
-    const uint32_t colour = static_cast<uint32_t>(mix(seed, static_cast<uint64_t>(k), 5)) & 0xFFFFFF;
+    const uint32_t any = static_cast<uint32_t>(mix(seed, static_cast<uint64_t>(k), 5)) & 0xFFFFFF,
+                   colour = recipe.paint == Paint::colourful ? any : (any & 0xFF) * 0x010101;
     for (int y = y0; y < y0 + h; ++y) {
       for (int x = x0; x < x0 + w; ++x) {
         uint32_t& texel = texture.texels[static_cast<size_t>((y % size) * size + x % size)];
@@ -143,6 +163,13 @@ void tile_levels(Texture& texture) {
   }
 }
 
+/// A colour made lighter by `levels` of its green, and warmer or colder by `tint` in proportion. Nothing gets so dark
+/// that the camera's noise would decide its saturation.
+uint32_t shade(const std::array<double, 3>& bgr, double levels, double tint) {
+  const double light = std::max(0.25, 1 + levels / bgr[1]), warmth = tint / bgr[1];
+  return pack(bgr[0] * light * (1 + warmth), bgr[1] * light, bgr[2] * light * (1 - warmth));
+}
+
 Texture make_texture(const Recipe& recipe, uint64_t seed) {
   Texture texture;
   texture.size = recipe.size;
@@ -157,9 +184,10 @@ Texture make_texture(const Recipe& recipe, uint64_t seed) {
       const double l = recipe.contrast * static_cast<double>(light[i]);
       const double t = recipe.tint * static_cast<double>(tint[i]);
       const std::array<double, 3>& bgr = colour_of_row(recipe, static_cast<int>(i) / recipe.size);
-      texture.texels[i] = pack(bgr[0] + l + t, bgr[1] + l, bgr[2] + l - t);
+      texture.texels[i] =
+          recipe.paint == Paint::colourful ? pack(bgr[0] + l + t, bgr[1] + l, bgr[2] + l - t) : shade(bgr, l, t);
     }
-    add_rectangles(texture, recipe.rectangles, mix(seed, 3));
+    add_rectangles(texture, recipe, mix(seed, 3));
   }
   build_levels(texture);
   tile_levels(texture);

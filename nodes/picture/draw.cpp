@@ -2,7 +2,10 @@
 #include "nodes/picture/draw.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <string>
 
 namespace takt::picture {
 namespace {
@@ -57,6 +60,40 @@ void draw_grid(ImageView<const int16_t> cells, int scale, Bgr out) {
       const auto grey = static_cast<uint8_t>(v < 0 ? 128 : 255 - 255 * std::min(v, kOccupied) / kOccupied);
       fill(out, column * scale, (cells.height - 1 - row) * scale, scale, scale, {grey, grey, grey});
     }
+}
+
+void draw_image(ImageView<const uint8_t> image, Bgr out) {
+  const int green = image.channels == 3 ? 1 : 0, red = image.channels == 3 ? 2 : 0;
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x) set(out, x, y, {image.at(x, y), image.at(x, y, green), image.at(x, y, red)});
+}
+
+void draw_mask(ImageView<const uint8_t> mask, Bgr out) {
+  constexpr Colour kGreen{0, 220, 0};
+  const auto ground = [&](int x, int y) { return !mask.contains(x, y) || mask.at(x, y) != 0; };
+  for (int y = 0; y < mask.height; ++y)
+    for (int x = 0; x < mask.width; ++x) {
+      if (mask.at(x, y) == 0 || !out.contains(x, y)) continue;
+      const bool inside = ground(x - 1, y) && ground(x + 1, y) && ground(x, y - 1) && ground(x, y + 1);
+      const auto half = [&](int channel, uint8_t of) { return static_cast<uint8_t>((out.at(x, y, channel) + of) / 2); };
+      set(out, x, y, inside ? Colour{half(0, kGreen.b), half(1, kGreen.g), half(2, kGreen.r)} : kGreen);
+    }
+}
+
+void draw_detections(std::span<const Detection> boxes, Bgr out) {
+  static constexpr std::array<Colour, 6> kOfClass{
+      {{60, 60, 255}, {255, 140, 40}, {60, 230, 60}, {255, 70, 220}, {40, 220, 255}, {240, 240, 60}}};
+  cv::Mat image(out.height, out.width, CV_8UC3, out.data, static_cast<size_t>(out.stride));
+  for (const Detection& box : boxes) {
+    const Colour c = kOfClass[static_cast<size_t>(std::clamp(box.class_id, 0.0f, 1e6f)) % kOfClass.size()];
+    const cv::Scalar colour(c.b, c.g, c.r), black(0, 0, 0);
+    const cv::Rect2f frame(box.x_px, box.y_px, box.width_px, box.height_px);
+    cv::rectangle(image, frame, colour, 2);
+    const std::string number = std::to_string(std::lround(box.class_id));
+    const cv::Point foot(cv::Point2f(box.x_px + 4, box.y_px + 18));
+    cv::putText(image, number, foot, cv::FONT_HERSHEY_SIMPLEX, 0.55, black, 4);  // legible on any ground
+    cv::putText(image, number, foot, cv::FONT_HERSHEY_SIMPLEX, 0.55, colour, 1);
+  }
 }
 
 double draw_track(std::span<const TrackPoint> track, Bgr out) {

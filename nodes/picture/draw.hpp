@@ -21,6 +21,15 @@ void draw_disparity(ImageView<const int16_t> map, int disparities, Bgr out);
 /// values between on the way. `out` is scale times the grid's size.
 void draw_grid(ImageView<const int16_t> cells, int scale, Bgr out);
 
+/// An image of one or three channels in colour. `out` has its size.
+void draw_image(ImageView<const uint8_t> image, Bgr out);
+
+/// Over an image of the mask's size: what is not 0 in the mask turns half green, and its border all green.
+void draw_mask(ImageView<const uint8_t> mask, Bgr out);
+
+/// Over an image: each detection's box in a colour of its class, and the class number in its upper left corner.
+void draw_detections(std::span<const Detection> boxes, Bgr out);
+
 /// A point of a path seen from above, m.
 struct TrackPoint {
   double right_m = 0, forward_m = 0;

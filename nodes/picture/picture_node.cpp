@@ -4,10 +4,12 @@
 #include <iostream>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "nodes/picture/draw.hpp"
+#include "nodes/picture/kept.hpp"
 #include "rt/node.hpp"
 
 namespace takt {
@@ -19,70 +21,119 @@ class PictureNode final : public Node {
  public:
   void setup(Setup& setup) override {
     directory_ = setup.output / directory_name_();
-    left_.reserve(pair_.connected() ? pair_.capacity().pixels() * pair_.capacity().channels : 0);
-    map_.reserve(disparity_.connected() ? disparity_.capacity().pixels() : 0);
-    cells_.reserve(obstacles_.connected() ? obstacles_.capacity().pixels() : 0);
+    left_.reserve(elements_of(pair_));
+    ground_left_.reserve(elements_of(ground_pair_));
+    mask_kept_.reserve(elements_of(mask_));
+    map_.reserve(elements_of(disparity_));
+    obstacle_cells_.reserve(elements_of(obstacles_));
+    ground_cells_.reserve(elements_of(ground_));
+    if (detections_.connected()) boxes_.reserve(detections_.capacity().count);
     if (motion_.connected()) track_.reserve(static_cast<size_t>(track_points_()));
   }
 
   void run(Job&) override {
-    const StereoPair* pair = pair_.newest();
-    if (pair && pair_.is_new() && keep(pair->left.items(), pair->width, pair->height, pair->channels, left_))
-      left_width_ = pair->width, left_height_ = pair->height, left_channels_ = pair->channels;
+    keep_left();
+    keep_ground_mask();
     const DisparityMap* map = disparity_.newest();
-    if (map && disparity_.is_new() && keep(map->disparity.items(), map->width, map->height, 1, map_))
-      map_width_ = map->width, map_height_ = map->height, disparities_ = map->disparities;
-    const Grid* grid = obstacles_.newest();
-    if (grid && obstacles_.is_new() && keep(grid->cells.items(), grid->width, grid->height, 1, cells_))
-      grid_width_ = grid->width, grid_height_ = grid->height;
+    if (map && disparity_.is_new() && map_.keep(map->disparity.items(), map->width, map->height))
+      disparities_ = map->disparities;
+    keep_grid(obstacles_, obstacle_cells_);
+    keep_grid(ground_, ground_cells_);
     for (size_t i = 0; i < motion_.size(); ++i)
-      if (motion_.is_new(i)) add({motion_[i].pose.x, motion_[i].pose.z, motion_[i].valid != 0});
+      if (motion_.is_new(i)) track_.add({motion_[i].pose.x, motion_[i].pose.z, motion_[i].valid != 0});
   }
 
   void finish() override {
     std::error_code ignored;
     std::filesystem::create_directories(directory_, ignored);  // imwrite says whether it worked
-    if (!left_.empty()) write("left.png", cv::Mat(left_height_, left_width_, CV_8UC(left_channels_), left_.data()));
+    if (!left_.empty()) {
+      cv::Mat image = colour_image(left_.view());
+      draw_detections(boxes_, view(image));
+      write("left.png", image);
+    }
+    if (!mask_kept_.empty()) {
+      cv::Mat image = colour_image(ground_left_.view());
+      draw_mask(mask_kept_.view(), view(image));
+      write("ground.png", image);
+    }
     if (!map_.empty()) {
-      cv::Mat image(map_height_, map_width_, CV_8UC3);
-      draw_disparity({map_.data(), map_width_, map_height_}, disparities_, view(image));
+      cv::Mat image(map_.view().height, map_.view().width, CV_8UC3);
+      draw_disparity(map_.view(), disparities_, view(image));
       write("disparity.png", image);
     }
-    if (!cells_.empty()) {
-      const int scale = std::max(1, 600 / std::max(grid_width_, grid_height_));
-      cv::Mat image(grid_height_ * scale, grid_width_ * scale, CV_8UC3);
-      draw_grid({cells_.data(), grid_width_, grid_height_}, scale, view(image));
-      write("obstacles.png", image);
-    }
-    if (!track_.empty()) {
+    write_grid("obstacles.png", obstacle_cells_.view());
+    write_grid("ground_map.png", ground_cells_.view());
+    if (!track_.points().empty()) {
       cv::Mat image(600, 600, CV_8UC3);
-      draw_track(track_, view(image));
+      draw_track(track_.points(), view(image));
       write("track.png", image);
     }
   }
 
  private:
-  /// Copies an array that is as long as its sizes say and fits the memory taken in setup.
-  template <class T>
-  static bool keep(std::span<const T> items, int width, int height, int channels, std::vector<T>& into) {
-    const size_t wanted = static_cast<size_t>(width) * static_cast<size_t>(height) * static_cast<size_t>(channels);
-    if (items.size() != wanted || items.size() > into.capacity()) return false;
-    into.assign(items.begin(), items.end());
-    return true;
+  static size_t elements_of(const InputPort& port) {
+    return port.connected() ? port.capacity().pixels() * port.capacity().channels : 0;
+  }
+
+  /// The message with that stamp, if it is latched.
+  static std::optional<size_t> find(const InputPort& port, int64_t stamp_ns) {
+    for (size_t i = port.size(); i-- > 0;)
+      if (port.stamp_ns(i) == stamp_ns) return i;
+    return std::nullopt;
+  }
+
+  /// The newest image whose detections are latched with it, else the newest: boxes are never drawn on another image
+  /// than theirs.
+  void keep_left() {
+    if (!pair_.is_new()) return;
+    size_t image = pair_.size() - 1;
+    std::optional<size_t> boxes;
+    for (size_t i = pair_.size(); i-- > 0 && !boxes;)
+      if ((boxes = find(detections_, pair_.stamp_ns(i)))) image = i;
+    if (!keep(pair_[image], left_)) return;
+    boxes_.clear();
+    if (!boxes) return;
+    const auto found = detections_[*boxes].boxes.items();
+    boxes_.assign(found.begin(), found.begin() + static_cast<ptrdiff_t>(std::min(found.size(), boxes_.capacity())));
+  }
+
+  /// The newest mask whose image is latched with it.
+  void keep_ground_mask() {
+    for (size_t i = mask_.size(); i-- > 0 && mask_.stamp_ns(i) > mask_stamp_ns_;) {
+      const auto image = find(ground_pair_, mask_.stamp_ns(i));
+      if (!image || ground_pair_[*image].width != mask_[i].width || ground_pair_[*image].height != mask_[i].height ||
+          mask_[i].channels != 1)
+        continue;
+      if (keep(ground_pair_[*image], ground_left_) &&
+          mask_kept_.keep(mask_[i].pixels.items(), mask_[i].width, mask_[i].height))
+        mask_stamp_ns_ = mask_.stamp_ns(i);
+      return;
+    }
+  }
+
+  static bool keep(const StereoPair& pair, KeptImage<uint8_t>& into) {
+    return into.keep(pair.left.items(), pair.width, pair.height, pair.channels);
+  }
+
+  static void keep_grid(const Input<Grid>& port, KeptImage<int16_t>& into) {
+    const Grid* grid = port.newest();
+    if (grid && port.is_new()) into.keep(grid->cells.items(), grid->width, grid->height);
   }
 
   static Bgr view(cv::Mat& image) { return {image.data, image.cols, image.rows, 3}; }
 
-  // A long run keeps every second point when the memory is full: the whole path stays visible.
-  void add(const TrackPoint& point) {
-    if (skip_-- > 0) return;
-    skip_ = stride_ - 1;
-    if (track_.size() == track_.capacity()) {
-      for (size_t i = 0; 2 * i < track_.size(); ++i) track_[i] = track_[2 * i];
-      track_.resize((track_.size() + 1) / 2);
-      stride_ *= 2;
-    }
-    if (track_.size() < track_.capacity()) track_.push_back(point);
+  static cv::Mat colour_image(ImageView<const uint8_t> kept) {
+    cv::Mat image(kept.height, kept.width, CV_8UC3);
+    draw_image(kept, view(image));
+    return image;
+  }
+
+  void write_grid(const char* name, ImageView<const int16_t> cells) const {
+    if (!cells.data || cells.width == 0) return;
+    const int scale = std::max(1, 600 / std::max(cells.width, cells.height));
+    cv::Mat image(cells.height * scale, cells.width * scale, CV_8UC3);
+    draw_grid(cells, scale, view(image));
+    write(name, image);
   }
 
   void write(const char* name, const cv::Mat& image) const {
@@ -97,26 +148,31 @@ class PictureNode final : public Node {
   }
 
   Input<StereoPair> pair_{this, "pair", "its left image is written as left.png", Need::optional};
+  Input<Detections> detections_{this, "detections", "boxes on the left image of their stamp; depth 4, and 4 for pair",
+                                Need::optional};
   Input<DisparityMap> disparity_{this, "disparity", "drawn as disparity.png", Need::optional};
   Input<Motion> motion_{this, "motion", "drawn as track.png: the camera's path from above", Need::optional};
   Input<Grid> obstacles_{this, "obstacles", "drawn as obstacles.png", Need::optional};
+  Input<StereoPair> ground_pair_{this, "ground_pair", "images that mask belongs to; depth 4", Need::optional};
+  Input<Image> mask_{this, "mask", "ground: drawn over the left image of its stamp as ground.png", Need::optional};
+  Input<Grid> ground_{this, "ground", "drawn as ground_map.png", Need::optional};
   Param<std::string> directory_name_{this, "directory", ".", "", "where to write, below the run's output directory"};
   Param<int> track_points_{this, "track_points", 20000, {16, 10000000}, "", "points of the path kept in memory"};
 
   std::filesystem::path directory_;
-  std::vector<uint8_t> left_;
-  std::vector<int16_t> map_, cells_;
-  int left_width_ = 0, left_height_ = 0, left_channels_ = 0;
-  int map_width_ = 0, map_height_ = 0, disparities_ = 0, grid_width_ = 0, grid_height_ = 0;
-  std::vector<TrackPoint> track_;
-  int stride_ = 1, skip_ = 0;
+  KeptImage<uint8_t> left_, ground_left_, mask_kept_;
+  KeptImage<int16_t> map_, obstacle_cells_, ground_cells_;
+  std::vector<Detection> boxes_;
+  KeptTrack track_;
+  int disparities_ = 0;
+  int64_t mask_stamp_ns_ = INT64_MIN;
 };
 
 }  // namespace
 
 void register_picture(NodeTypes& types) {
   types.add<PictureNode>("picture", Layer::storage,
-                         "Sink: writes the last image, disparity, obstacle grid and the path as PNG at the end");
+                         "Sink: writes the last images, maps, ground mask, detections and the path as PNG at the end");
 }
 
 }  // namespace takt

@@ -5,20 +5,13 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
-#include <filesystem>
-#include <fstream>
 
-#include "graph/compose/composition.hpp"
 #include "hal/camera/rig.hpp"
-#include "hal/drivers.hpp"
-#include "hal/sim/simulation.hpp"
-#include "rt/sched/executor.hpp"
+#include "tests/unit/compose/drive.hpp"
 
 using namespace takt;
 
 namespace {
-
-const std::filesystem::path kGraph = std::filesystem::path(TAKT_SOURCE_DIR) / "graph";
 
 struct Seen {
   int64_t disparity_stamp = 0, motion_stamp = 0, grid_stamp = 0;
@@ -91,47 +84,6 @@ nodes:
   probe: {rate: 15, offset: 50ms, budget: 1ms}
 )";
 
-std::string with_folder(std::string text) {
-  for (size_t at; (at = text.find('@')) != std::string::npos;) text.replace(at, 1, kGraph.string());
-  return text;
-}
-
-/// A folder of the test's own with the two files.
-struct Files {
-  std::filesystem::path folder;
-  Files() {
-    std::string name = (std::filesystem::temp_directory_path() / "truth-XXXXXX").string();
-    folder = mkdtemp(name.data());
-    std::ofstream(folder / "graph.yaml") << with_folder(kGraphText);
-    std::ofstream(folder / "schedule.yaml") << kScheduleText;
-  }
-  ~Files() { std::filesystem::remove_all(folder); }
-};
-
-/// Runs the graph for a time and leaves the last messages in `seen`.
-void run_for(int64_t ns, hal::Devices& devices, VirtualClock& clock) {
-  seen = {};
-  const Files files;
-  NodeTypes types = graph::node_types();
-  types.add<ProbeNode>("probe", Layer::storage, "test");
-  graph::Loaded loaded = graph::load(files.folder / "graph.yaml", {}, types);
-  for (const auto& problem : loaded.problems) MESSAGE(graph::to_string(problem));
-  REQUIRE(loaded.graph);
-  const graph::DeviceFactory factory =
-      [&](const graph::DeviceSpec& spec) -> tl::expected<std::unique_ptr<Node>, graph::ComposeError> {
-    auto node =
-        hal::make_device({spec.id, spec.kind, spec.driver, spec.settings, loaded.graph->directory, 1}, devices, clock);
-    REQUIRE(node);
-    return std::move(*node);
-  };
-  auto composition = graph::compose(*loaded.graph, types, factory, clock, {files.folder, 1});
-  REQUIRE(composition);
-  const auto transport = make_local_transport(composition->plan.ports);
-  Executor executor(composition->plan, *transport, clock, {ns, 0, false});
-  executor.run();
-  for (auto& node : composition->nodes) node->finish();
-}
-
 Eigen::Isometry3d isometry(const Transform& t) {
   Eigen::Isometry3d out = Eigen::Isometry3d::Identity();
   out.linear() = Eigen::Quaterniond(t.qw, t.qx, t.qy, t.qz).normalized().toRotationMatrix();
@@ -151,9 +103,12 @@ Eigen::Isometry3d isometry(const sim::CameraPose& pose) {
 TEST_CASE("stereo, ego-motion and the obstacle grid agree with the simulated world") {
   hal::Devices devices;
   VirtualClock clock(1'000'000'000);
-  run_for(6'000'000'000, devices, clock);
+  NodeTypes types = graph::node_types();
+  types.add<ProbeNode>("probe", Layer::storage, "test");
+  seen = {};
+  test::drive(kGraphText, kScheduleText, types, 6'000'000'000, devices, clock);
   const sim::Simulation& world = *devices.first_world();
-  const StereoRig rig = *load_rig("head_camera", kGraph / "rigs/xb3.yaml");
+  const StereoRig rig = *load_rig("head_camera", test::graph_folder() / "rigs/xb3.yaml");
   const auto pixels = static_cast<size_t>(rig.width) * static_cast<size_t>(rig.height);
 
   // Disparity: integer disparities, so half a pixel off is perfect.

@@ -55,6 +55,48 @@ TEST_CASE("grid: row 0 lies at the bottom; unknown grey, free white, occupied bl
   CHECK(image.at(3, 0)[0] < 155);
 }
 
+TEST_CASE("image: one channel is grey, three are kept") {
+  const std::vector<uint8_t> grey{7, 200}, colour{1, 2, 3, 4, 5, 6};
+  Image image(2, 1);
+  draw_image({grey.data(), 2, 1}, image.view());
+  CHECK(image.at(1, 0) == std::array{200, 200, 200});
+  draw_image({colour.data(), 2, 1, 3}, image.view());
+  CHECK(image.at(0, 0) == std::array{1, 2, 3});
+  CHECK(image.at(1, 0) == std::array{4, 5, 6});
+}
+
+TEST_CASE("mask: ground is tinted, its border inside the image is plain green, the rest is untouched") {
+  std::vector<uint8_t> mask(10 * 10, 0);
+  for (int y = 4; y < 10; ++y)
+    for (int x = 0; x < 10; ++x) mask[static_cast<size_t>(10 * y + x)] = 255;
+  Image image(10, 10);
+  for (auto& byte : image.bytes) byte = 100;
+  draw_mask({mask.data(), 10, 10}, image.view());
+  for (int x = 0; x < 10; ++x) {
+    CHECK(image.at(x, 3) == std::array{100, 100, 100});
+    CHECK(image.at(x, 4) == std::array{0, 220, 0});
+    CHECK(image.at(x, 9) == std::array{50, 160, 50});
+  }
+}
+
+TEST_CASE("detections: a frame and a number in the colour of the class; what lies outside is cut off") {
+  const std::vector<takt::Detection> boxes{
+      {0, 20, 30, 40, 50, 0.9f}, {1, 190, 190, 40, 40, 0.9f}, {2, -90, -90, 9, 9, 1}};
+  Image image(200, 200);
+  draw_detections(boxes, image.view());
+  const auto frame = image.at(20, 55);
+  CHECK(frame != std::array{1, 1, 1});
+  CHECK(image.at(40, 30) == frame);
+  CHECK(image.at(190, 195) != frame);
+  CHECK(image.at(190, 195) != std::array{1, 1, 1});
+  CHECK(image.at(45, 65) == std::array{1, 1, 1});  // inside
+  CHECK(image.at(80, 100) == std::array{1, 1, 1});
+  int number = 0;
+  for (int y = 34; y < 52; ++y)
+    for (int x = 24; x < 38; ++x) number += image.at(x, y) == frame;
+  CHECK(number > 10);
+}
+
 TEST_CASE("track: forward is up, unmeasured parts are red, any length and place fits") {
   std::vector<TrackPoint> track{{0, 0}, {0, 10}, {5, 10, false}};
   Image image(200, 200);
@@ -79,7 +121,7 @@ TEST_CASE("the node type registers; every input is optional") {
   const auto* type = types.find("picture");
   REQUIRE(type);
   const auto node = type->make();
-  REQUIRE(node->inputs().size() == 5);
+  REQUIRE(node->inputs().size() == 9);  // with control
   for (const auto* input : node->inputs()) CHECK(input->need() == takt::Need::optional);
   CHECK(node->outputs().empty());
 }

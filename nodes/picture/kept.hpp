@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a job copies for the end of the run. Memory is taken once, in setup; keeping allocates nothing.
+#pragma once
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "nodes/picture/draw.hpp"
+#include "rt/msg/image_view.hpp"
+
+namespace takt::picture {
+
+/// The last array of an image, a map or a grid. One thread at a time.
+template <class T>
+class KeptImage {
+ public:
+  void reserve(size_t elements) { items_.reserve(elements); }
+
+  /// Copies an array that is as long as its sizes say and fits the memory taken; else the earlier one stays.
+  bool keep(std::span<const T> items, int width, int height, int channels = 1) {
+    if (width <= 0 || height <= 0 || channels <= 0) return false;
+    const size_t wanted = static_cast<size_t>(width) * static_cast<size_t>(height) * static_cast<size_t>(channels);
+    if (items.size() != wanted || items.size() > items_.capacity()) return false;
+    items_.assign(items.begin(), items.end());
+    width_ = width, height_ = height, channels_ = channels;
+    return true;
+  }
+
+  bool empty() const { return items_.empty(); }
+  ImageView<const T> view() const { return {items_.data(), width_, height_, channels_}; }
+
+ private:
+  std::vector<T> items_;
+  int width_ = 0, height_ = 0, channels_ = 1;
+};
+
+/// The whole of a path: when the memory is full every second point is dropped, and every second one kept from then on.
+class KeptTrack {
+ public:
+  void reserve(size_t points) { points_.reserve(points); }
+
+  void add(const TrackPoint& point) {
+    if (skip_-- > 0) return;
+    skip_ = stride_ - 1;
+    if (points_.size() == points_.capacity()) {
+      for (size_t i = 0; 2 * i < points_.size(); ++i) points_[i] = points_[2 * i];
+      points_.resize((points_.size() + 1) / 2);
+      stride_ *= 2;
+    }
+    if (points_.size() < points_.capacity()) points_.push_back(point);
+  }
+
+  std::span<const TrackPoint> points() const { return points_; }
+
+ private:
+  std::vector<TrackPoint> points_;
+  int stride_ = 1, skip_ = 0;
+};
+
+}  // namespace takt::picture
