@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the thread sanitizer must overlook, linked into every program of its preset. Only names of third parties may
-// stand here: none of these libraries is built with the sanitizer, so that their own synchronisation is invisible to it.
+// stand here: none of these libraries is built with the sanitizer, so that their own synchronisation is invisible to
+// it.
 extern "C" const char* __tsan_default_suppressions();  // the sanitizer looks for this name
 
 extern "C" const char* __tsan_default_suppressions() {

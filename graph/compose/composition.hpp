@@ -33,8 +33,8 @@ struct ComposeOptions {
   std::filesystem::path output;  ///< where nodes may write files at the end
   uint64_t seed = 1;
   std::function<bool(const std::string& id)> owns = {};  ///< nodes and devices this process sets up; empty: all
-  CapacityExchange* exchange = nullptr;             ///< needed where not all are owned
-  uint32_t taps = 0;                                ///< readers beside the edges that an output may get while it runs
+  CapacityExchange* exchange = nullptr;                  ///< needed where not all are owned
+  uint32_t taps = 0;  ///< readers beside the edges that an output may get while it runs
 };
 
 /// Nodes in the order of the plan's tasks; the plan points into them.
