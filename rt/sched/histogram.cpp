@@ -31,13 +31,6 @@ void Histogram::add(int64_t ns) {
   max_ = std::max(max_, value);
 }
 
-void Histogram::merge(const Histogram& other) {
-  for (size_t i = 0; i < buckets_.size(); ++i) buckets_[i] += other.buckets_[i];
-  count_ += other.count_;
-  sum_ += other.sum_;
-  max_ = std::max(max_, other.max_);
-}
-
 int64_t Histogram::quantile_ns(double fraction) const {
   if (count_ == 0) return 0;
   const auto wanted = std::max<uint64_t>(1, static_cast<uint64_t>(std::ceil(fraction * static_cast<double>(count_))));

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+
 namespace takt {
 
 /// Distribution of durations in ns, for runs of any length in fixed memory: buckets 1/128 of an octave wide (figures
@@ -11,7 +12,6 @@ namespace takt {
 class Histogram {
  public:
   void add(int64_t ns);
-  void merge(const Histogram& other);
   uint64_t count() const { return count_; }
   int64_t max_ns() const { return max_; }
   int64_t sum_ns() const { return sum_; }
