@@ -6,6 +6,7 @@
 #include "graph/compose/composition.hpp"
 #include "graph/compose/partition.hpp"
 #include "rt/sched/run_board.hpp"
+#include "rt/trace/rings.hpp"
 
 namespace takt::command {
 
@@ -24,8 +25,8 @@ class BoardExchange final : public graph::CapacityExchange {
 bool wait_until(const std::function<bool()>& done, const std::function<bool()>& broken = {});
 
 /// One process of an isolated run, as the supervisor's fork enters it: composes its part, joins the daemon of process
-/// `supervisor`, runs until the board's stop. Returns the exit code.
+/// `supervisor`, runs until the board's stop, traced into `rings` where there are any. Returns the exit code.
 int run_member(const RunOptions& options, const graph::GraphSpec& graph, const graph::Partition& partition,
-               size_t process, int supervisor, RunBoard& board);
+               size_t process, int supervisor, RunBoard& board, trace::Rings* rings);
 
 }  // namespace takt::command

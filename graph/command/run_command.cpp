@@ -14,6 +14,7 @@
 #include "graph/command/prepare.hpp"
 #include "graph/command/report.hpp"
 #include "graph/command/run_support.hpp"
+#include "graph/command/run_trace.hpp"
 #include "rt/shm/iceoryx_preflight.hpp"
 
 namespace takt::command {
@@ -38,10 +39,12 @@ int execute(const RunOptions& options, Prepared& prepared, std::vector<std::stri
   graph::Composition& composition = *prepared.composition;
   const auto transport = make_transport(options.transport, composition.plan);
   RunBoard board(composition.plan);
+  RunTrace trace(options, composition.plan);
   Executor::Options run;
   run.duration_ns = static_cast<int64_t>(options.duration_s * 1e9);
   run.require_policy = options.policy_required();
   run.board = &board;
+  run.trace = trace.rings();
   Executor executor(composition.plan, *transport, *prepared.clock, run);
   const ProcessReading before = ProcessReading::now();
   RunResult result;
@@ -53,27 +56,30 @@ int execute(const RunOptions& options, Prepared& prepared, std::vector<std::stri
     const LiveTable live(
         composition.plan, board,
         fmt::format("takt run {} ({}, policy {})", graph.name, graph.profile, to_string(graph.schedule.policy)));
+    trace.collect(composition.plan);
     result = executor.run();
   }
   const ProcessReading after = ProcessReading::now();
+  const std::string no_trace = trace.write(graph, composition.plan, result);
   for (auto& node : composition.nodes) node->finish();
   for (const std::string& refused : result.refused)
     adjusted.push_back(fmt::format("policy {} -> cooperative: {}", to_string(graph.schedule.policy), refused));
   const hal::SimulatorUse simulator = hal::simulator_use();
   const MachineUse use{after.cpu_ns - before.cpu_ns, simulator.cpu_ns, simulator.in_jobs_ns,
                        after.steal_ms - before.steal_ms, after.rss_mb};
-  return tell(options, graph,
-              make_report({graph,
-                           composition.plan,
-                           board,
-                           result,
-                           *transport,
-                           use,
-                           options.clock,
-                           std::string(to_string(graph.schedule.policy)),
-                           "none",
-                           {},
-                           std::move(adjusted)}));
+  const int code = tell(options, graph,
+                        make_report({graph,
+                                     composition.plan,
+                                     board,
+                                     result,
+                                     *transport,
+                                     use,
+                                     options.clock,
+                                     std::string(to_string(graph.schedule.policy)),
+                                     "none",
+                                     {},
+                                     std::move(adjusted)}));
+  return no_trace.empty() ? code : refuse(no_trace, kBadInput);
 }
 
 int run_in_one_process(const RunOptions& options, Prepared& prepared, std::vector<std::string> adjusted) {
@@ -111,7 +117,7 @@ int run_as_asked(RunOptions options) {
   std::vector<std::string> adjusted = prepared.graph->adjusted;
   const std::string wanted = options.isolate.empty() ? prepared.graph->isolation : options.isolate;
   if (wanted != "subsystem" || options.clock == "virtual") return run_in_one_process(options, prepared, adjusted);
-  const KeptPlace report(options.report), page(options.html);
+  const KeptPlace report(options.report), page(options.html), trace(options.trace);
   const IsolatedEnd end = run_isolated(options, *prepared.graph, adjusted);
   if (end.not_isolated.empty()) return end.code;
   if (options.isolate == "subsystem") return refuse("--isolate subsystem: " + end.not_isolated, kDeviceOrSystem);
@@ -131,6 +137,8 @@ int run_graph(const RunOptions& options) {
     return refuse("--report " + options.report.string() + ": cannot be written; choose another place", kBadInput);
   if (!options.html.empty() && !writable(options.html))
     return refuse("--html " + options.html.string() + ": cannot be written; choose another place", kBadInput);
+  if (!options.trace.empty() && !writable(options.trace))
+    return refuse("--trace " + options.trace.string() + ": cannot be written; choose another place", kBadInput);
   const StopOnSignal guard;
   try {
     return run_as_asked(options);

@@ -16,7 +16,8 @@ struct RunOptions {
   double duration_s = 20;  ///< 0: until stopped
   bool unchecked = false, require_rt = false;
   std::string clock = "real", transport = "local", isolate;
-  std::filesystem::path report, html, output = "out";
+  std::filesystem::path report, html, trace, output = "out";
+  std::string trace_source = "auto";  ///< of preemption: auto (the best there is), tracefs, perf, none
   uint64_t seed = 1;
   /// A policy named on the command line, or --require-rt: refused means exit 3, not another policy.
   bool policy_required() const { return require_rt || !load.policy.empty(); }

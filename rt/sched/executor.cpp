@@ -133,6 +133,7 @@ bool Executor::run_partitioned(Policy policy, RunResult& result) {
     workers.emplace_back([&, i] {
       Lane& lane = *lanes_[i];
       name_thread(lane.head().plan().name);
+      const trace::Thread traced(options_.trace, lane.head().plan().name);
       prefault_stack();
       grants[i] = apply(wanted[i]);
       ready.arrive_and_wait();
@@ -165,8 +166,9 @@ void Executor::run_cooperative() {
   CooperativeQueue queue(lanes_, clock_, stop_);
   std::vector<std::thread> workers;
   for (size_t i = 0; i < std::max<size_t>(plan_.cores.size(), 1); ++i) {
-    workers.emplace_back([&queue, i] {
+    workers.emplace_back([this, &queue, i] {
       name_thread("takt-worker-" + std::to_string(i));
+      const trace::Thread traced(options_.trace, "takt-worker-" + std::to_string(i));
       prefault_stack();
       apply(Reservation{});
       start_counting();
@@ -180,6 +182,7 @@ void Executor::run_cooperative() {
 
 void Executor::run_virtual(RunResult& result) {
   auto& clock = dynamic_cast<VirtualClock&>(clock_);
+  const trace::Thread traced(options_.trace, "takt-virtual");
   start_clockwork(result);
   start_counting();
   // Ordered by instant, then deadline, then lane: the same order in every run.

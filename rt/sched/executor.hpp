@@ -9,6 +9,7 @@
 #include "rt/sched/grant.hpp"
 #include "rt/sched/lane.hpp"
 #include "rt/sched/run_board.hpp"
+#include "rt/trace/rings.hpp"
 
 namespace takt {
 
@@ -50,6 +51,7 @@ class Executor {
     RunBoard* board = nullptr;            ///< shared with other processes; null: one of its own
     StartGate* gate = nullptr;            ///< where other processes are waited for
     std::vector<bool> own = {};           ///< by task: this process runs it; empty: all
+    trace::Rings* trace = nullptr;        ///< where the threads that run jobs note events; null: nowhere
   };
 
   Executor(const Plan& plan, Transport& transport, Clock& clock, const Options& options);

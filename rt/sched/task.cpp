@@ -8,6 +8,7 @@
 
 #include "rt/sched/param_mail.hpp"
 #include "rt/sched/port_access.hpp"
+#include "rt/trace/rings.hpp"
 
 namespace takt {
 namespace {
@@ -41,6 +42,7 @@ Task::Task(const Plan& plan, size_t index, Transport& transport, const Clock& cl
       statistics_(board.task(index)),
       latch_(plan_, transport, board, index),
       published_(plan_.ports.size()),
+      sequences_(plan_.ports.size()),
       sent_stamps_ns_(plan_.ports.size(), kNothingSent) {
   for (size_t i = 0; i < plan_.ports.size(); ++i) {
     writers_.push_back(transport.make_writer(plan_.ports[i]));
@@ -84,6 +86,7 @@ JobEnd Task::run(uint64_t index, int64_t release_ns, int64_t modelled_ns) {
   take_mail();
   latch_.acquire_requests(release_ns, started);
   ended_ = {};
+  ended_.index = index;
   ended_.release_ns = release_ns;
   ended_.started_ns = started;
   ended_.modelled = modelled;
@@ -94,6 +97,7 @@ JobEnd Task::run(uint64_t index, int64_t release_ns, int64_t modelled_ns) {
     ended_.end.finished_ns = ended_.end.visible_at_ns = started;
     return ended_.end;
   }
+  if (trace::on()) trace_start(index, release_ns, started, modelled);
   ended_.stale = latch_.acquire(release_ns, started);
   ended_.new_input = first_input_ != nullptr && first_input_->is_new();
   Job job(clock_, index, release_ns, deadline, 0, mode_);
@@ -123,6 +127,7 @@ void Task::count(uint64_t page_faults) {
 }
 
 void Task::count_end() {
+  if (trace::on()) trace_end();
   const JobEnd& end = ended_.end;
   const ThreadUse& used = ended_.used;
   add(statistics_.stale_inputs, ended_.stale);
@@ -152,6 +157,38 @@ void Task::count_end() {
   const uint64_t n = statistics_.job_count.load(std::memory_order_relaxed);
   statistics_.jobs[n % statistics_.jobs.size()] = {ended_.release_ns, ended_.started_ns, end.finished_ns, ended_.cpu};
   statistics_.job_count.store(n + 1, std::memory_order_release);
+}
+
+void Task::trace_start(uint64_t index, int64_t release_ns, int64_t started_ns, bool modelled) const {
+  const auto task = static_cast<uint16_t>(index_);
+  const auto job = static_cast<uint32_t>(index);
+  trace::record({release_ns, release_ns + plan_.deadline_ns, 0, job, task, trace::Kind::release, 0});
+  trace::record({started_ns, 0, modelled ? 0 : sched_getcpu(), job, task, trace::Kind::start, 0});
+}
+
+void Task::trace_skip(uint64_t index, int64_t release_ns) const {
+  trace::record({release_ns, 0, 0, static_cast<uint32_t>(index), static_cast<uint16_t>(index_), trace::Kind::skip, 0});
+}
+
+void Task::trace_end() const {
+  const JobEnd& end = ended_.end;
+  const int64_t deadline_ns = ended_.release_ns + plan_.deadline_ns;
+  const int64_t cpu_ns = ended_.modelled ? end.finished_ns - ended_.started_ns : ended_.used.cpu_ns;
+  const auto note = [&](trace::Kind kind, int64_t at_ns, int64_t value, int64_t extra = 0, size_t port = 0) {
+    trace::record({at_ns, value, extra, static_cast<uint32_t>(ended_.index), static_cast<uint16_t>(index_), kind,
+                   static_cast<uint8_t>(port)});
+  };
+  for (size_t e = 0; e < plan_.edges.size(); ++e)
+    if (const Latch::Newest newest = latch_.newest(e); newest.sequence > 0)
+      note(trace::Kind::latch, ended_.started_ns, static_cast<int64_t>(newest.sequence), newest.stamp_ns, e);
+  note(trace::Kind::finish, end.finished_ns, cpu_ns, ended_.cpu);
+  if (plan_.budget_ns > 0 && cpu_ns > plan_.budget_ns)
+    note(trace::Kind::overrun, end.finished_ns, cpu_ns, plan_.budget_ns);
+  if (end.late) note(trace::Kind::miss, deadline_ns, ended_.published_ns - deadline_ns);
+  for (size_t i = 0; i < sequences_.size(); ++i)
+    if (sent_stamps_ns_[i] != kNothingSent)
+      note(trace::Kind::publish, ended_.published_ns, static_cast<int64_t>(sequences_[i]), sent_stamps_ns_[i], i);
+  note(trace::Kind::publish, ended_.published_ns, 0);
 }
 
 void Task::publish(JobEnd& end, int64_t deadline_ns, bool modelled) {
@@ -187,6 +224,7 @@ void Task::settle_output(size_t i, bool late, int64_t now_ns, int64_t visible_at
     writer.discard();
     if (withheld && plan_.on_miss == OnMiss::reuse_last) published_[i] = writer.repeat(now_ns, visible_at_ns);
   }
+  if (published_[i]) ++sequences_[i];
   PortAccess::reset(output);
 }
 
