@@ -147,10 +147,18 @@ class Writer {
         mark.value, mark.extra);
   }
 
+  /// perf tells no names, but has slices of our own threads only.
+  std::string name_of(const Slice& slice) const {
+    if (!trace_.names[slice.name].empty()) return trace_.names[slice.name];
+    for (const trace::ThreadFacts& thread : trace_.threads)
+      if (thread.id == slice.thread) return thread.name;
+    return "";
+  }
+
   void write_slice(const Slice& slice) {
     event(
         R"({{"ph":"X","cat":"cpu","name":{},"pid":{},"tid":{},"ts":{},"dur":{},"args":{{"thread":{},"priority":{},"end":"{}")",
-        quoted(trace_.names[slice.name]), kCpus, slice.cpu + 1, us(slice.from_ns), us_long(slice.to_ns - slice.from_ns),
+        quoted(name_of(slice)), kCpus, slice.cpu + 1, us(slice.from_ns), us_long(slice.to_ns - slice.from_ns),
         slice.thread, slice.priority, to_string(slice.end));
     if (slice.woken_ns > 0) fmt::print(out_, R"(,"woken_us":{})", us(slice.woken_ns));
     out_ << "}}";

@@ -56,7 +56,7 @@ class Course {
       const int64_t comes = slice != nullptr ? slice->from_ns : to_ns;
       if (comes > at_) off_cpu(std::min(comes, to_ns), last, slice);
       if (slice == nullptr) return;
-      until(std::min(to_ns, slice->to_ns), started_ ? Cause::running : Cause::late, "", slice->cpu);
+      until(std::min(to_ns, slice->to_ns), started_ ? Cause::running : Cause::late, "", started_ ? slice->cpu : -1);
       last = slice;
     }
   }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <dirent.h>
 #include <fcntl.h>
+#include <sched.h>
 #include <signal.h>
 #include <sys/mount.h>
 #include <sys/stat.h>
@@ -116,6 +117,26 @@ class Instance {
   std::string name_;
 };
 
+/// The calling thread stays on that CPU while this lives.
+class OnCpu {
+ public:
+  explicit OnCpu(int cpu) {
+    cpu_set_t one;
+    CPU_ZERO(&one);
+    CPU_SET(static_cast<size_t>(cpu), &one);
+    moved_ = sched_getaffinity(0, sizeof before_, &before_) == 0 && sched_setaffinity(0, sizeof one, &one) == 0;
+  }
+  ~OnCpu() {
+    if (moved_) sched_setaffinity(0, sizeof before_, &before_);
+  }
+  OnCpu(const OnCpu&) = delete;
+  OnCpu& operator=(const OnCpu&) = delete;
+
+ private:
+  cpu_set_t before_;
+  bool moved_ = false;
+};
+
 struct Formats {
   uint16_t switch_id = 0, waking_id = 0;
   Field type, prev_pid, prev_state, next_comm, next_pid, next_prio, woken_pid;
@@ -160,6 +181,7 @@ class TracefsSource final : public SwitchSource {
       pipes_.push_back({File(openat(folder, path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC)), cpu});
       if (!pipes_.back().file) return why_not = problem("tracefs: " + path), false;
     }
+    if (pipes_.empty()) return why_not = "tracefs: no CPU to look at", false;
     page_.resize(formats_.page_bytes);
     return sees_itself(why_not);
   }
@@ -228,6 +250,7 @@ class TracefsSource final : public SwitchSource {
 
   /// Process ids in a container are not those of the kernel: then our threads would never be recognised.
   bool sees_itself(std::string& why_not) {
+    const OnCpu here(pipes_.front().cpu);
     Switches seen;
     for (int tries = 0; tries < 20; ++tries) {
       const timespec pause{0, 2'000'000};
@@ -236,7 +259,7 @@ class TracefsSource final : public SwitchSource {
       if (std::any_of(seen.slices.begin(), seen.slices.end(), [](const Slice& s) { return s.thread == gettid(); }))
         return true;
     }
-    why_not = "tracefs: it does not show this process (process ids of a container, or another CPU set)";
+    why_not = "tracefs: it does not show this process (a container with process ids of its own?)";
     return false;
   }
 
