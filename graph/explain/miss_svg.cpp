@@ -24,10 +24,10 @@ constexpr double kLeastPx = 0.75;  // a shorter stretch would not be seen
 const char* colour(Cause cause) {
   switch (cause) {
     case Cause::running: return "#4c78a8";
-    case Cause::late:
-    case Cause::behind: return "#f2c14e";
-    case Cause::lane:
-    case Cause::queue: return "#b79a20";
+    case Cause::late: return "#c9b27c";
+    case Cause::behind: return "#e0a526";
+    case Cause::lane: return "#a5801c";
+    case Cause::queue: return "#8a6d1a";
     case Cause::preempted: return "#e45756";
     case Cause::throttled: return "#9d5bb5";
     case Cause::asleep: return "#72b7b2";

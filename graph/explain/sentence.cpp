@@ -14,7 +14,8 @@ namespace {
 using trace::Cause;
 using trace::Part;
 
-constexpr size_t kNamedCulprits = 3;  // of one cause; the others are told together
+constexpr int64_t kWakeUpNs = 50'000;  // about what a switch of threads takes
+constexpr size_t kNamedCulprits = 3;   // of one cause; the others are told together
 
 /// One decimal for misses of 10 ms and more, two from 1 ms, else three.
 int decimals(int64_t miss_ns) { return std::abs(miss_ns) >= 10'000'000 ? 1 : std::abs(miss_ns) >= 1'000'000 ? 2 : 3; }
@@ -42,6 +43,19 @@ std::vector<Part> grouped(const std::vector<Part>& parts) {
     others.cpu = -1;
     result.push_back(others);
   }
+  return result;
+}
+
+/// Whoever left the CPU just as the job's thread woke up is no cause: the wake-up took that long.
+std::vector<Part> without_wake_ups(const std::vector<Part>& parts) {
+  std::vector<Part> result;
+  int64_t wake_up_ns = 0;
+  for (const Part& part : parts) {
+    const bool wake_up = part.cause == Cause::late || (part.cause == Cause::behind && part.ns < kWakeUpNs);
+    if (wake_up) wake_up_ns += part.ns;
+    else result.push_back(part);
+  }
+  if (wake_up_ns != 0) result.insert(result.begin(), {Cause::late, wake_up_ns});
   return result;
 }
 
@@ -103,7 +117,7 @@ std::string sentence(const trace::Trace& trace, const trace::JobSpan& job, const
   const int digits = decimals(blame.miss_ns);
   const int64_t miss = rounded(blame.miss_ns, digits);
   const std::string& node = trace.tasks[job.task].name;
-  const std::vector<Part> parts = grouped(blame.parts);
+  const std::vector<Part> parts = grouped(without_wake_ups(blame.parts));
   std::vector<int64_t> units;
   int64_t sum = 0;
   size_t largest = 0;
