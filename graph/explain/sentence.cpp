@@ -133,7 +133,8 @@ std::string sentence(const trace::Trace& trace, const trace::JobSpan& job, const
   std::string text = fmt::format("{} missed job {} by {} ms: {} ({})", node, job.job, ms(miss, digits),
                                  fmt::join(texts, ", "), source_text(trace.source));
   if (const size_t skipped = skipped_after(trace, job); skipped > 0)
-    text += fmt::format("; {} release{} after it skipped", skipped, skipped == 1 ? " was" : "s were");
+    text +=
+        fmt::format("; {} skipped after it", skipped == 1 ? "1 release was" : fmt::format("{} releases were", skipped));
   return text;
 }
 

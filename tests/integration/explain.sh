@@ -37,7 +37,7 @@ EOF
 # Every sentence of $work/stdout: the figures after the colon make up the miss, `less` counted off, to 5 %.
 adds_up() {
   awk '/ missed job / {
-    miss = $0; sub(/.* by /, "", miss); text = $0; sub(/^[^:]*: /, "", text); sub(/ \((switches|no source).*/, "", text)
+    miss = $0; sub(/^[^:]* by /, "", miss); text = $0; sub(/^[^:]*: /, "", text); sub(/ \((switches|no source).*/, "", text)
     n = split(text, parts, ", "); sum = 0
     for (i = 1; i <= n; i++) { match(parts[i], /[0-9]+\.[0-9]+/); v = substr(parts[i], RSTART, RLENGTH); sum += parts[i] ~ /^less/ ? -v : v }
     if (sum - miss > 0.05 * miss || miss - sum > 0.05 * miss) { print "parts make " sum ": " $0; bad = 1 }
