@@ -13,8 +13,9 @@ namespace takt::analysis {
 
 class Adversary {
  public:
-  /// Periods below 32, at most 4 tasks. `dispatch` any but global.
-  Adversary(const std::vector<TimedTask>& tasks, Dispatch dispatch) : tasks_(tasks), dispatch_(dispatch) {
+  /// Periods below 32, at most 3 tasks, blocking below 16. `dispatch` any but global.
+  Adversary(const std::vector<TimedTask>& tasks, Dispatch dispatch, size_t held = 4)
+      : tasks_(tasks), dispatch_(dispatch), held_(held) {
     for (const TimedTask& task : tasks_) {
       if (task.sporadic) continue;
       common_ = std::lcm(common_, task.period);
@@ -28,10 +29,12 @@ class Adversary {
       const State state = open_.back();
       open_.pop_back();
       arrive(state, 0);
+      hold(state);
     }
   }
 
-  bool late = false;
+  bool late = false;           ///< a job missed that counts
+  bool disturbed = false;      ///< one missed that does not see the blocking; what follows that was not searched
   std::vector<Ticks> longest;  ///< response per task, as long as nothing is late
   size_t states() const { return seen_.size(); }
 
@@ -43,9 +46,40 @@ class Adversary {
   };
   struct State {
     Ticks time = 0;
-    JobState jobs[4] = {};
-    size_t running = 4;  ///< a started job that is not preempted
+    JobState jobs[3] = {};
+    size_t running = 4;      ///< a started job that is not preempted
+    Ticks held = 0;          ///< the core is held so much longer
+    bool has_held = false;   ///< ... or has been
+    Ticks counts_until = 0;  ///< once it has been: the deadline picked, from now
   };
+
+  /// The held task's blocking begins, for every deadline ahead of which nothing is pending.
+  void hold(const State& state) {
+    if (held_ >= tasks_.size() || state.has_held || tasks_[held_].blocking == 0) return;
+    const bool priorities = dispatch_ == Dispatch::fixed_priority;
+    for (Ticks until = 1; until <= (priorities ? 1 : 48); ++until) {
+      bool idle = true;
+      for (size_t i = 0; i < tasks_.size(); ++i) {
+        const JobState& job = state.jobs[i];
+        const bool ahead =
+            priorities ? tasks_[i].priority >= tasks_[held_].priority : tasks_[i].deadline - job.since <= until;
+        idle = idle && !(job.left > 0 && job.ready && ahead);
+      }
+      if (!idle) continue;
+      State next = state;
+      next.held = tasks_[held_].blocking;
+      next.has_held = true;
+      next.counts_until = until;
+      arrive(next, 0);
+    }
+  }
+
+  bool counts(const State& state, size_t task) const {
+    if (!state.has_held) return true;
+    if (task != held_) return false;
+    return dispatch_ == Dispatch::fixed_priority ||
+           tasks_[task].deadline - state.jobs[task].since <= state.counts_until;
+  }
 
   /// What each task from `i` on may do at this instant: release or not, get ready or not.
   void arrive(const State& state, size_t i) {
@@ -77,6 +111,11 @@ class Adversary {
   }
 
   void dispatch(const State& state) {
+    if (state.held > 0) {
+      State next = state;
+      --next.held;
+      return advance(next);
+    }
     if (state.running < 4) return run(state, state.running);
     bool idle = true;
     for (size_t i = 0; i < tasks_.size(); ++i) {
@@ -97,19 +136,24 @@ class Adversary {
       if (dispatch_ == Dispatch::non_preemptive_edf) longer.running = chosen;
       advance(longer);
     }
-    longest[chosen] = std::max(longest[chosen], job.since + 1);
+    if (counts(state, chosen)) longest[chosen] = std::max(longest[chosen], job.since + 1);
     job = {job.since, 0, false};
     state.running = 4;
     advance(state);
   }
 
   void advance(State state) {
+    bool was_counted[3] = {}, misses_elsewhere = false;
+    for (size_t i = 0; i < tasks_.size(); ++i) was_counted[i] = counts(state, i);
     for (size_t i = 0; i < tasks_.size(); ++i) {
       JobState& job = state.jobs[i];
       job.since = std::min(job.since + 1, tasks_[i].period);
-      if (job.left > 0 && job.since >= tasks_[i].deadline) late = true;
+      if (job.left > 0 && job.since >= tasks_[i].deadline) (was_counted[i] ? late : misses_elsewhere) = true;
       if (job.left == 0 && !tasks_[i].sporadic) job.since = 0;  // its phase is the time's
     }
+    disturbed = disturbed || misses_elsewhere;
+    if (misses_elsewhere) return;
+    if (dispatch_ != Dispatch::fixed_priority && state.counts_until > 0 && --state.counts_until == 0) return;
     ++state.time;
     if (state.time >= steady_ + common_) state.time -= common_;
     if (!late && seen_.insert(key(state)).second) open_.push_back(state);
@@ -117,6 +161,8 @@ class Adversary {
 
   uint64_t key(const State& state) const {
     uint64_t key = static_cast<uint64_t>(state.time) * 8 + state.running;
+    key = (key * 16 + static_cast<uint64_t>(state.held)) * 64 + static_cast<uint64_t>(state.counts_until);
+    key = key * 2 + (state.has_held ? 1 : 0);
     for (size_t i = 0; i < tasks_.size(); ++i) {
       const JobState& job = state.jobs[i];
       key = key * 2048 + static_cast<uint64_t>(job.since * 64 + job.left * 2 + (job.ready ? 1 : 0));
@@ -126,6 +172,7 @@ class Adversary {
 
   std::vector<TimedTask> tasks_;
   Dispatch dispatch_;
+  size_t held_;
   Ticks common_ = 1, steady_ = 0;
   std::vector<State> open_;
   std::unordered_set<uint64_t> seen_;

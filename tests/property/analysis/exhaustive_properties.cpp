@@ -4,6 +4,7 @@
 
 #include "adversary.hpp"
 #include "random_sets.hpp"
+#include "rt/sched/analysis/edf.hpp"
 #include "rt/sched/analysis/per_core.hpp"
 
 namespace {
@@ -66,4 +67,46 @@ TEST_CASE("non-preemptive EDF of sporadic tasks against everything that can happ
 
 TEST_CASE("non-preemptive EDF with offsets: sound against everything that can happen") {
   compare(14, 10'000, kTiny, CorePolicy::non_preemptive_edf, Dispatch::non_preemptive_edf, false);
+}
+
+namespace {
+
+/// Bounds under blocking, task by task: each task's own blocking is what the others do not see.
+void compare_blocking(uint32_t seed, int sets, CorePolicy policy, Dispatch dispatch) {
+  std::mt19937 random(seed);
+  int bounds = 0, unscheduled = 0, not_compared = 0;
+  for (int n = 0; n < sets; ++n) {
+    TaskSet set = random_set(random, kTiny);
+    for (TimedTask& task : set.tasks) task.blocking = std::uniform_int_distribution<Ticks>(0, task.period / 3)(random);
+    CAPTURE(describe(set));
+    const CoreAnalysis found = analyse(set, policy);
+    bool late = false, clear = true;
+    for (size_t i = 0; i < set.tasks.size(); ++i) {
+      CAPTURE(i);
+      const Adversary all(set.tasks, dispatch, i);
+      late = late || all.late;
+      clear = clear && !all.disturbed;
+      if (all.late || all.disturbed) continue;
+      ++bounds;
+      REQUIRE(found.responses.bounds[i].has_value());
+      REQUIRE(*found.responses.bounds[i] == all.longest[i]);
+    }
+    unscheduled += late;
+    if (late) REQUIRE(found.verdict == Verdict::not_schedulable);
+    if (!late && clear) REQUIRE(found.verdict == Verdict::schedulable);
+    not_compared += !late && !clear;
+    if (policy == CorePolicy::edf) REQUIRE(edf_demand_test(set.tasks).verdict == found.verdict);
+  }
+  MESSAGE(bounds << " bounds attained; " << unscheduled << " sets not schedulable, " << not_compared
+                 << " not compared");
+}
+
+}  // namespace
+
+TEST_CASE("fixed priorities with blocking against everything that can happen") {
+  compare_blocking(15, 4'000, CorePolicy::fixed_priority, Dispatch::fixed_priority);
+}
+
+TEST_CASE("EDF with blocking against everything that can happen") {
+  compare_blocking(16, 200, CorePolicy::edf, Dispatch::edf);
 }
