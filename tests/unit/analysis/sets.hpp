@@ -3,7 +3,9 @@
 #pragma once
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <initializer_list>
+#include <string>
 #include <vector>
 
 #include "rt/sched/analysis/per_core.hpp"
