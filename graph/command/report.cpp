@@ -74,7 +74,12 @@ Json node_json(const RunFacts& facts, size_t t) {
            {"no_result", &s.no_result}})
     node[key] = counter->load();
   node["drift_us"] = s.drift_us();
-  node["quality"] = {{"0", s.exec.count()}};
+  node["quality"] = Json::object();
+  for (size_t l = 0; l < plan.node->levels().size(); ++l) {
+    node["quality"][std::to_string(l)] = s.at_level[l].load();
+    node["quality_levels"].push_back(plan.node->levels()[l].name);
+  }
+  node["quality_changes"] = s.level_changes.load();
   node["granted"] = grant_json(facts.board.grant(t));
   node["lateness_us"] = distribution(s.lateness, 1e3);
   node["lateness_histogram_us"] = coarse_histogram(s.lateness);

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <cstdint>
 
+#include "rt/level.hpp"
 #include "rt/sched/histogram.hpp"
 #include "rt/sched/plan.hpp"
 
@@ -24,6 +25,8 @@ struct TaskStatistics {
   std::atomic<uint64_t> completed{0}, skipped{0}, reused{0}, deadline_misses{0}, budget_overruns{0}, stale_inputs{0};
   std::atomic<uint64_t> new_inputs{0};  ///< jobs whose first input was new: distinct input stamps
   std::atomic<uint64_t> no_result{0};
+  std::array<std::atomic<uint64_t>, kMaxLevels> at_level{};  ///< jobs by quality level
+  std::atomic<uint64_t> level_changes{0};
   std::atomic<int64_t> last_exec_ns{0}, last_response_ns{0};
   uint64_t allocations = 0, page_faults = 0;
   int64_t cpu_ns = 0, preempted_ns = 0;
