@@ -2,12 +2,23 @@
 #include "nodes/stereo/half_resolution.hpp"
 
 #include <cstring>
+#include <stdexcept>
 
 namespace takt::stereo {
 namespace {
 
+/// Windows shrink with the image, to the next odd edge: they then see about as much of the scene as at full size.
 MatcherParameters halved(MatcherParameters p) {
+  const auto odd_half = [](int edge) { return (edge + 1) / 2 | 1; };
   p.disparities = (p.disparities + 1) / 2;
+  p.n_square = odd_half(p.n_square);
+  p.n_min = odd_half(p.n_min);
+  return p;
+}
+
+/// What is wrong is told of the parameters as they were given.
+const MatcherParameters& checked(const MatcherParameters& p, int width, int height, int channels) {
+  if (const auto wrong = problem(p, width, height, channels)) throw std::invalid_argument("stereo: " + *wrong);
   return p;
 }
 
@@ -57,7 +68,7 @@ HalfMatcher::HalfMatcher(int width, int height, int channels, const MatcherParam
     : width_(width),
       height_(height),
       channels_(channels),
-      matcher_(half(width), half(height), channels, halved(parameters)),
+      matcher_(half(width), half(height), channels, halved(checked(parameters, width, height, channels))),
       left_(pixels(width, height) * static_cast<size_t>(channels)),
       right_(left_.size()),
       confidence_(pixels(width, height)),

@@ -22,8 +22,9 @@ void enlarge(ImageView<const int16_t> disparity, ImageView<const uint8_t> confid
              ImageView<uint8_t> confidence_out);
 
 /// A matcher with the contract of Matcher::match whose answer comes from half resolution: the same size and the same
-/// unit (disparities in px of the full image, all of them even), and the confidence of the window that decided, which
-/// is twice as wide in the scene. Memory is taken by the constructor; match() allocates nothing. One thread at a time.
+/// unit (disparities in px of the full image, all of them even), and the confidence of the window that decided. Windows
+/// have half the edge in pixels, so they see as much of the scene. Memory is taken by the constructor; match()
+/// allocates nothing. One thread at a time.
 class HalfMatcher {
  public:
   /// For images of that full size. Throws std::invalid_argument for parameters that problem() objects to.

@@ -170,8 +170,13 @@ void Task::count_end() {
 
 void Task::count_level(int64_t exec_ns, int64_t response_ns) {
   add(statistics_.at_level[static_cast<size_t>(ended_.level)]);
-  if (quality_.observe({ended_.release_ns, exec_ns, response_ns, ended_.no_result}) != ended_.level)
-    add(statistics_.level_changes);
+  if (statistics_.last_level.load(std::memory_order_relaxed) != ended_.level) {
+    const uint64_t n = statistics_.level_changes.load(std::memory_order_relaxed);
+    statistics_.changes[n % statistics_.changes.size()] = {ended_.release_ns, ended_.level};
+    statistics_.level_changes.store(n + 1, std::memory_order_release);
+    statistics_.last_level.store(ended_.level, std::memory_order_relaxed);
+  }
+  quality_.observe({ended_.release_ns, exec_ns, response_ns, ended_.no_result});
 }
 
 void Task::publish(JobEnd& end, int64_t deadline_ns, bool modelled) {

@@ -84,6 +84,8 @@ TEST_CASE("degrade: the job after an overrun runs at level 1, its message says s
   CHECK(counted.at_level[0].load() == 1);
   CHECK(counted.at_level[1].load() == 19);
   CHECK(counted.level_changes.load() == 1);
+  CHECK(counted.changes[0].level == 1);
+  CHECK(counted.changes[0].release_ns == 1'100'000'000);
   CHECK(counted.deadline_misses.load() == 1);
 }
 
