@@ -22,7 +22,7 @@ int QualityControl::observe(const JobCost& job) {
 
   foreign_misses_ = missed && !overran ? foreign_misses_ + 1 : 0;
   ++quiet_jobs_;
-  note_fits(job, missed);
+  note_fits(job);
   const int64_t next_ns = forecast(job.exec_ns);
   if (next_ns > capacity_ns_ || foreign_misses_ >= 2) fail(job.release_ns, next_ns);
   else consider_raise(job.release_ns);
@@ -56,12 +56,12 @@ void QualityControl::fail(int64_t now_ns, int64_t forecast_ns) {
   change_to(next, now_ns);
 }
 
-void QualityControl::note_fits(const JobCost& job, bool missed) {
+void QualityControl::note_fits(const JobCost& job) {
   for (size_t l = 0; l < level_; ++l) {
     const double exec_ns = predicted_ns(l, job.exec_ns);
     const double response_ns = static_cast<double>(job.response_ns - job.exec_ns) + exec_ns;
-    const bool fits = !missed && exec_ns <= kRaiseAt * static_cast<double>(capacity_ns_) &&
-                      response_ns <= static_cast<double>(deadline_ns_);
+    const bool fits =
+        exec_ns <= kRaiseAt * static_cast<double>(capacity_ns_) && response_ns <= static_cast<double>(deadline_ns_);
     if (!fits) fits_[l] = {};
     else if (fits_[l].jobs++ == 0) fits_[l].since_ns = job.release_ns;
   }

@@ -77,7 +77,7 @@ class QualityControl {
   int64_t forecast(int64_t exec_ns);
   double predicted_ns(size_t level, int64_t exec_ns) const;
   void fail(int64_t now_ns, int64_t forecast_ns);
-  void note_fits(const JobCost& job, bool missed);
+  void note_fits(const JobCost& job);
   void consider_raise(int64_t now_ns);
   void change_to(size_t level, int64_t now_ns);
 

@@ -163,6 +163,18 @@ TEST_CASE("one missed deadline without an overrun is somebody else's doing, two 
   CHECK(job(70) == 1);
 }
 
+TEST_CASE("a level that fits its budget but not the deadline, because others run before it, is not taken back") {
+  QualityControl control(Drive().levels, kBudget, 66 * kMs);
+  int64_t k = 0;
+  const auto run = [&](int count, int64_t wait_ms) {
+    for (int i = 0; i < count; ++i) control.observe({++k * 66 * kMs, 3 * kMs, (3 + wait_ms) * kMs, false});
+    return control.level();
+  };
+  control.observe({0, 40 * kMs, 41 * kMs, false});
+  CHECK(run(200, 58) == 1);  // 10 + 58 would be late
+  CHECK(run(200, 50) == 0);
+}
+
 TEST_CASE("jobs that found nothing to do say nothing about the load") {
   QualityControl control(Drive().levels, kBudget, 66 * kMs);
   CHECK(control.observe({0, 40 * kMs, 41 * kMs, false}) == 1);
@@ -173,6 +185,8 @@ TEST_CASE("without a budget the deadline is the capacity; with one level nothing
   QualityControl no_budget(Drive().levels, 0, 66 * kMs);
   CHECK(no_budget.observe({0, 60 * kMs, 61 * kMs, false}) == 0);
   CHECK(no_budget.observe({66 * kMs, 67 * kMs, 68 * kMs, false}) == 1);
+  QualityControl long_budget(Drive().levels, 100 * kMs, 66 * kMs);
+  CHECK(long_budget.observe({0, 67 * kMs, 68 * kMs, false}) == 1);
   const std::vector<QualityLevel> one{{"full", 1.0}};
   QualityControl single(one, kBudget, 66 * kMs);
   CHECK(single.observe({0, 100 * kMs, 101 * kMs, false}) == 0);
