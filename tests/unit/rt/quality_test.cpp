@@ -12,7 +12,7 @@
 namespace {
 
 using namespace takt;
-constexpr int64_t kMs = 1'000'000, kSecond = QualityControl::kSecond;
+constexpr int64_t kMs = 1'000'000;
 constexpr int64_t kBudget = 20 * kMs;
 
 /// A node whose job at level l takes load(job) * cost(l), released at `hz`, alone on its machine.
