@@ -7,6 +7,7 @@
 #include "rt/memory/memory_use.hpp"
 #include "rt/node.hpp"
 #include "rt/sched/latch.hpp"
+#include "rt/sched/quality.hpp"
 #include "rt/sched/run_board.hpp"
 #include "rt/time/clock.hpp"
 
@@ -28,7 +29,7 @@ class Task {
   ~Task();
 
   /// Runs job `index` released at `release_ns`. With modelled_ns >= 0 (virtual time) the job is taken to finish that
-  /// long after its release; otherwise the clock is read.
+  /// long after its release, times the declared cost of its quality level; otherwise the clock is read.
   JobEnd run(uint64_t index, int64_t release_ns, int64_t modelled_ns = -1);
   /// Counts the job that run() has just ended. Apart from it, so that in a lane no follower waits for the counting of
   /// its producer; `page_faults` are those since the last count on this thread.
@@ -60,6 +61,7 @@ class Task {
   void take_mail();
   void publish(JobEnd& end, int64_t deadline_ns, bool modelled);
   void count_end();
+  void count_level(int64_t exec_ns, int64_t response_ns);
   void settle_output(size_t output, bool late, int64_t now_ns, int64_t visible_at_ns);
 
   const TaskPlan plan_;
@@ -69,6 +71,7 @@ class Task {
   const size_t index_;
   TaskStatistics& statistics_;
   Latch latch_;
+  QualityControl quality_;
   std::vector<std::unique_ptr<Writer>> writers_;
   std::vector<bool> published_;
   /// The job that run() has ended and count() not yet counted.
@@ -76,7 +79,8 @@ class Task {
     bool ran = false, paused = false, modelled = false, new_input = false, no_result = false;
     size_t stale = 0;
     int64_t release_ns = 0, started_ns = 0, published_ns = 0, publish_took_ns = 0;
-    int cpu = -1;
+    int64_t modelled_ns = 0;
+    int cpu = -1, level = 0;
     JobEnd end;
     ThreadUse used;
   } ended_;

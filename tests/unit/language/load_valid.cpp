@@ -138,6 +138,17 @@ TEST_CASE("What this version does not enforce is told") {
   CHECK(loaded.graph->adjusted[0].find("on_overrun of stereo: safe_stop -> continue") == 0);
 }
 
+TEST_CASE("A node with levels degrades; for one without the word is adjusted") {
+  const Loaded with_levels = Files().load();
+  REQUIRE(with_levels.graph);
+  CHECK(with_levels.graph->adjusted.empty());
+  const Loaded loaded = Files(kGraph, with(kSchedule, "ego_motion: {", "ego_motion: {on_overrun: degrade, ")).load();
+  INFO(all(loaded));
+  REQUIRE(loaded.graph);
+  REQUIRE(loaded.graph->adjusted.size() == 1);
+  CHECK(loaded.graph->adjusted[0].find("on_overrun of ego_motion: degrade -> continue: it has one quality level") == 0);
+}
+
 TEST_CASE("A cycle of sampled edges is no error") {
   const Loaded loaded =
       Files(with(kGraph, "in: {pair: stereo.rectified,", "in: {guess: ego_motion.motion, pair: stereo.rectified,"))
