@@ -108,5 +108,5 @@ TEST_CASE("fixed priorities with blocking against everything that can happen") {
 }
 
 TEST_CASE("EDF with blocking against everything that can happen") {
-  compare_blocking(16, 200, CorePolicy::edf, Dispatch::edf);
+  compare_blocking(16, 150, CorePolicy::edf, Dispatch::edf);
 }

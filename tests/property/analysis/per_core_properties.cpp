@@ -136,7 +136,7 @@ TEST_CASE("non-preemptive EDF, sporadic: a set fails exactly if a simulated job 
 TEST_CASE("non-preemptive EDF with offsets: nothing that it calls schedulable misses") {
   std::mt19937 random(4);
   int proven = 0, refused = 0, refused_without_miss = 0;
-  for (int i = 0; i < kSets; ++i) {
+  for (int i = 0; i < kSets / 2; ++i) {
     const TaskSet set = random_set(random, {.sporadic = 0.2});
     const bool fits = non_preemptive_edf_demand_test(set.tasks).verdict == Verdict::schedulable;
     const ResponseBounds bounds = non_preemptive_edf_responses(set.tasks);
@@ -150,6 +150,6 @@ TEST_CASE("non-preemptive EDF with offsets: nothing that it calls schedulable mi
   }
   MESSAGE("non-preemptive EDF with offsets: " << proven << " proven, " << refused << " refused, "
                                               << refused_without_miss << " of them without a miss in simulation");
-  CHECK(proven > 0.15 * kSets);
-  CHECK(refused > 0.15 * kSets);
+  CHECK(proven > 0.15 * kSets / 2);
+  CHECK(refused > 0.15 * kSets / 2);
 }
