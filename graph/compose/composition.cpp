@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <map>
 
+#include "graph/compose/plan_modes.hpp"
 #include "graph/compose/plan_ports.hpp"
 #include "hal/drivers.hpp"
 #include "rt/sched/port_access.hpp"
@@ -139,6 +140,7 @@ class Composer {
       const double rate = effective_rate_hz(result_.plan, t);
       task.deadline_ns = rate > 0 ? static_cast<int64_t>(1e9 / rate) : kSecond;
     }
+    add_modes(graph_, result_.plan);
   }
 
   void connect_inputs(TaskPlan& task, const DeviceSpec& spec) { connect_edges(task, spec.edges); }

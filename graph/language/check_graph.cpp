@@ -82,8 +82,7 @@ void Loader::tell_what_is_not_enforced() {
         fmt::format("{} of {}: {} -> continue: this version counts {} and goes on", key, id, verb, instead));
   };
   for (const auto& [id, entry] : spec_.schedule.entries) {
-    if (entry.on_overrun != OnOverrun::proceed) tell(id, "on_overrun", to_string(entry.on_overrun), "overruns");
-    if (entry.on_miss == OnMiss::safe_stop) tell(id, "on_miss", to_string(entry.on_miss), "misses");
+    if (entry.on_overrun == OnOverrun::degrade) tell(id, "on_overrun", to_string(entry.on_overrun), "overruns");
   }
 }
 

@@ -34,6 +34,9 @@ class Lane {
   void run_head_modelled(StopSignal& stop, std::vector<Activation>& released);
   void run_follower_modelled(const Activation& activation, std::vector<Activation>& released);
 
+  /// What the watchdog sees of the worker that runs this lane.
+  JobWatch& watch() { return *watch_; }
+
   Task& head() const { return *tasks_.front(); }
   const std::vector<size_t>& members() const { return members_; }
   const Rate& rate() const { return *head().plan().rate; }
@@ -49,11 +52,13 @@ class Lane {
   void go_to(int64_t index) {
     next_ = index;
     next_release_ns_ = rate().release_ns(origin_ns_, index);
+    watch_->expect(next_release_ns_);
   }
   bool activates(size_t member, int64_t visible_at_ns);
   void skip_passed(int64_t now_ns, int64_t end_ns);
 
   std::vector<size_t> members_;
+  std::unique_ptr<JobWatch> watch_ = std::make_unique<JobWatch>();
   std::vector<Task*> tasks_;
   std::vector<Follower> followers_;  ///< by member index; [0] unused
   std::vector<int64_t> visible_;     ///< of the pass under way: when each member's output became visible

@@ -59,12 +59,20 @@ struct TaskPlan {
   std::vector<size_t> ports;               ///< per output of the node: index into Plan::ports
 };
 
+/// A mode that the run can change to: the tasks it leaves out are paused and keep what they have reserved.
+struct ModePlan {
+  std::string name;
+  std::vector<char> runs;  ///< by task
+};
+
 struct Plan {
   Policy policy = Policy::cooperative;
   std::vector<int> cores;
   std::vector<TaskPlan> tasks;
   std::vector<PortPlan> ports;
-  std::string mode = "full";
+  std::string mode = "full";    ///< of the start
+  std::vector<ModePlan> modes;  ///< [0] is that of the start, with all tasks; empty: there is no other
+  size_t safe_stop = kNone;     ///< index into modes
 };
 
 /// Rate at which a task runs: its own, or that of the producer whose output releases it (divided by `every`); 0 if

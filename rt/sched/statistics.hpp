@@ -24,6 +24,7 @@ struct TaskStatistics {
   std::atomic<uint64_t> completed{0}, skipped{0}, reused{0}, deadline_misses{0}, budget_overruns{0}, stale_inputs{0};
   std::atomic<uint64_t> new_inputs{0};  ///< jobs whose first input was new: distinct input stamps
   std::atomic<uint64_t> no_result{0};
+  std::atomic<uint64_t> demoted{0};  ///< jobs that used up their budget and gave way to all others; by the watchdog
   std::atomic<int64_t> last_exec_ns{0}, last_response_ns{0};
   uint64_t allocations = 0, page_faults = 0;
   int64_t cpu_ns = 0, preempted_ns = 0;

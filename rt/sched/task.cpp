@@ -4,10 +4,13 @@
 #include <sched.h>
 
 #include <algorithm>
+#include <cstdio>
 #include <cstring>
+#include <exception>
 
 #include "rt/sched/param_mail.hpp"
 #include "rt/sched/port_access.hpp"
+#include "rt/sched/watch_rules.hpp"
 
 namespace takt {
 namespace {
@@ -35,13 +38,14 @@ double TaskStatistics::drift_us() const {
 Task::Task(const Plan& plan, size_t index, Transport& transport, const Clock& clock, RunBoard& board)
     : plan_(plan.tasks[index]),
       clock_(clock),
-      mode_(plan.mode),
       board_(board),
       index_(index),
       statistics_(board.task(index)),
       latch_(plan_, transport, board, index),
       published_(plan_.ports.size()),
       sent_stamps_ns_(plan_.ports.size(), kNothingSent) {
+  for (const ModePlan& mode : plan.modes) modes_.push_back({mode.name, mode.runs[index] != 0});
+  if (modes_.empty()) modes_.push_back({plan.mode, true});
   for (size_t i = 0; i < plan_.ports.size(); ++i) {
     writers_.push_back(transport.make_writer(plan_.ports[i]));
     PortAccess::attach(*plan_.node->outputs()[i], writers_.back().get());
@@ -81,23 +85,24 @@ JobEnd Task::run(uint64_t index, int64_t release_ns, int64_t modelled_ns) {
   const int64_t started = clock_.now_ns();
   const int64_t deadline = release_ns + plan_.deadline_ns;
 
+  const Mode& mode = mode_of(release_ns);
+
   take_mail();
-  latch_.acquire_requests(release_ns, started);
   ended_ = {};
   ended_.release_ns = release_ns;
   ended_.started_ns = started;
   ended_.modelled = modelled;
+  // Which releases a mode leaves out is known from outside, but for those that a producer causes.
+  if (!mode.runs) return pass_over(started, !plan_.rate);
+  latch_.acquire_requests(release_ns, started);
   if (!wanted(index)) {
     latch_.release();
-    std::fill(published_.begin(), published_.end(), false);
-    ended_.paused = true;
-    ended_.end.finished_ns = ended_.end.visible_at_ns = started;
-    return ended_.end;
+    return pass_over(started, true);
   }
   ended_.stale = latch_.acquire(release_ns, started);
   ended_.new_input = first_input_ != nullptr && first_input_->is_new();
-  Job job(clock_, index, release_ns, deadline, 0, mode_);
-  plan_.node->run(job);
+  Job job(clock_, index, release_ns, deadline, 0, mode.name);
+  work(job, release_ns);
 
   JobEnd& end = ended_.end;
   end.end_of_data = job.ended();
@@ -109,6 +114,36 @@ JobEnd Task::run(uint64_t index, int64_t release_ns, int64_t modelled_ns) {
   ended_.cpu = modelled ? 0 : sched_getcpu();
   ended_.used = take_thread_use();
   return end;
+}
+
+JobEnd Task::pass_over(int64_t now_ns, bool count) {
+  std::fill(published_.begin(), published_.end(), false);
+  ended_.paused = count;
+  ended_.end.finished_ns = ended_.end.visible_at_ns = now_ns;
+  return ended_.end;
+}
+
+void Task::work(Job& job, int64_t release_ns) {
+  if (watch_ != nullptr)
+    watch_->begin(member_, job.index(), release_ns, last_thread_use_ns() + enforced_budget_ns(plan_));
+  try {
+    plan_.node->run(job);
+  } catch (const std::exception& problem) {
+    tell_exception(job, problem.what());
+    job.no_result();
+  }
+  if (watch_ != nullptr) watch_->end();
+}
+
+void Task::tell_exception(const Job& job, const char* what) {
+  Fault fault;
+  fault.kind = Fault::exception;
+  fault.task = static_cast<uint32_t>(index_);
+  fault.job = job.index();
+  fault.at_ns = clock_.now_ns();
+  std::snprintf(fault.what.characters.data(), fault.what.characters.size(), "%s: job %llu threw: %s",
+                plan_.name.c_str(), static_cast<unsigned long long>(job.index()), what);
+  board_.faults().append(fault);
 }
 
 void Task::count(uint64_t page_faults) {
@@ -142,9 +177,12 @@ void Task::count_end() {
   const int64_t response = ended_.published_ns - ended_.release_ns;
   statistics_.response.add(response);
   statistics_.last_response_ns.store(response, std::memory_order_relaxed);
-  if (plan_.budget_ns > 0 && used.cpu_ns > plan_.budget_ns) add(statistics_.budget_overruns);
+  const bool over_budget = plan_.budget_ns > 0 && used.cpu_ns > plan_.budget_ns;
+  if (over_budget) add(statistics_.budget_overruns);
   if (ended_.no_result) add(statistics_.no_result);
   if (end.late) add(statistics_.deadline_misses);
+  if (end.late && plan_.on_miss == OnMiss::safe_stop) ask_for_safe_stop("deadline missed");
+  else if (over_budget && plan_.on_overrun == OnOverrun::safe_stop) ask_for_safe_stop("budget exceeded");
   const bool skip = end.late && plan_.on_miss == OnMiss::skip, reuse = end.late && plan_.on_miss == OnMiss::reuse_last;
   std::atomic<uint64_t>& counter = skip ? statistics_.skipped : reuse ? statistics_.reused : statistics_.completed;
   add(counter);
@@ -152,6 +190,13 @@ void Task::count_end() {
   const uint64_t n = statistics_.job_count.load(std::memory_order_relaxed);
   statistics_.jobs[n % statistics_.jobs.size()] = {ended_.release_ns, ended_.started_ns, end.finished_ns, ended_.cpu};
   statistics_.job_count.store(n + 1, std::memory_order_release);
+}
+
+void Task::ask_for_safe_stop(const char* why) {
+  char reason[120];
+  std::snprintf(reason, sizeof reason, "%s: %s", plan_.name.c_str(), why);
+  const int64_t lead_ns = ended_.modelled ? 0 : ModeLog::kLead_ns;
+  board_.safe_stop(ended_.end.finished_ns + lead_ns, reason);
 }
 
 void Task::publish(JobEnd& end, int64_t deadline_ns, bool modelled) {

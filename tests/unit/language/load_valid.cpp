@@ -131,11 +131,14 @@ TEST_CASE("A mode leaves out the nodes and devices it names") {
 }
 
 TEST_CASE("What this version does not enforce is told") {
-  const Loaded loaded = Files(kGraph, with(kSchedule, "on_overrun: degrade", "on_overrun: safe_stop")).load();
+  const Loaded loaded = Files(kGraph, kSchedule).load();
   INFO(all(loaded));
   REQUIRE(loaded.graph);
   REQUIRE(loaded.graph->adjusted.size() == 1);
-  CHECK(loaded.graph->adjusted[0].find("on_overrun of stereo: safe_stop -> continue") == 0);
+  CHECK(loaded.graph->adjusted[0].find("on_overrun of stereo: degrade -> continue") == 0);
+  const Loaded enforced = Files(kGraph, with(kSchedule, "on_overrun: degrade", "on_overrun: safe_stop")).load();
+  REQUIRE(enforced.graph);
+  CHECK(enforced.graph->adjusted.empty());
 }
 
 TEST_CASE("A cycle of sampled edges is no error") {
