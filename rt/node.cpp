@@ -23,6 +23,11 @@ void OutputPort::send(int64_t stamp_ns) {
   sent_ = loaned_ != nullptr;
 }
 
+void Node::may(uint32_t calls, std::string_view reason) {
+  allowed_calls_ |= calls;
+  reason_of_calls_ = reason;
+}
+
 void Node::accept_requests() {
   control_ =
       std::make_unique<Input<Requests>>(this, "control", "requests to stop, start or pace this node", Need::optional);

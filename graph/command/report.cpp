@@ -88,6 +88,7 @@ Json node_json(const RunFacts& facts, size_t t) {
   node["samples"] = s.exec.count();
   node["allocations"] = s.allocations;
   node["page_faults"] = s.page_faults;
+  node["rt_violations"] = violations_json(s);
   return node;
 }
 

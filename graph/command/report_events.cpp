@@ -29,6 +29,9 @@ std::string offences(const Json& node) {
   };
   count("budget_overruns", "budget overruns");
   count("demoted", "demoted");
+  if (node["rt_violations"].is_object())
+    for (const auto& [call, n] : node["rt_violations"].items())
+      add(fmt::format("{} in jobs {}", call, n.get<uint64_t>()));
   return text;
 }
 
@@ -65,6 +68,15 @@ Json faults_json(const RunFacts& facts) {
   if (const uint64_t lost = facts.board.faults().lost(); lost > 0)
     faults.push_back({{"what", fmt::format("{} more faults, not kept", lost)}});
   return faults;
+}
+
+Json violations_json(const TaskStatistics& statistics) {
+  if (!watching_job_calls()) return nullptr;
+  Json calls = Json::object();
+  for (size_t i = 0; i < kJobCalls; ++i)
+    if (const uint64_t count = statistics.rt_violations[i]; count > 0)
+      calls[std::string(takt::to_string(static_cast<JobCall>(i)))] = count;
+  return calls;
 }
 
 bool hung(const RunBoard& board) {

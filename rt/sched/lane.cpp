@@ -88,6 +88,22 @@ void Lane::run_follower_modelled(const Activation& activation, std::vector<Activ
   }
 }
 
+std::vector<std::pair<size_t, size_t>> low_before_high(const Plan& plan) {
+  const auto needs = [&](size_t task, size_t other) {
+    for (size_t producer = plan.tasks[task].on_task; producer != kNone; producer = plan.tasks[producer].on_task)
+      if (producer == other) return true;
+    return false;
+  };
+  std::vector<std::pair<size_t, size_t>> pairs;
+  for (const auto& members : lane_members(plan))
+    for (const size_t low : members)
+      for (const size_t high : members)
+        if (plan.tasks[low].criticality == Criticality::low && plan.tasks[high].criticality == Criticality::high &&
+            !needs(high, low))
+          pairs.emplace_back(low, high);
+  return pairs;
+}
+
 int64_t lane_budget_ns(const Plan& plan, const std::vector<size_t>& members) {
   int64_t sum = 0;
   for (const size_t t : members) {

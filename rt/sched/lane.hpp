@@ -70,6 +70,9 @@ class Lane {
 /// Groups tasks into lanes: each task with a rate heads one, each `on` task joins its producer's. Indexes into the
 /// plan's tasks, heads first, followers after their producers.
 std::vector<std::vector<size_t>> lane_members(const Plan& plan);
+/// Low-criticality tasks that a high one of the same lane waits for though it needs nothing of them: {low, high}. One
+/// that does not return would stop the high one as well.
+std::vector<std::pair<size_t, size_t>> low_before_high(const Plan& plan);
 /// CPU time that one pass of a lane may use.
 int64_t lane_budget_ns(const Plan& plan, const std::vector<size_t>& members);
 /// Longest time from the head's release to the last follower's deadline.

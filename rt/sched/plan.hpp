@@ -29,6 +29,7 @@ std::string_view to_string(Criticality criticality);
 std::string_view to_string(OnOverrun verb);
 std::string_view to_string(OnMiss verb);
 
+inline constexpr int64_t kDefaultMemory = 256'000'000;
 inline constexpr size_t kNone = std::numeric_limits<size_t>::max();
 
 struct EdgePlan {
@@ -54,6 +55,7 @@ struct TaskPlan {
   OnOverrun on_overrun = OnOverrun::proceed;
   OnMiss on_miss = OnMiss::proceed;
   PublishAt publish = PublishAt::asap;
+  int64_t memory_bytes = kDefaultMemory;  ///< what its jobs may take from the heap beyond what they give back
   std::vector<EdgePlan> edges;
   std::vector<std::vector<size_t>> joins;  ///< groups of indexes into Node::inputs()
   std::vector<size_t> ports;               ///< per output of the node: index into Plan::ports

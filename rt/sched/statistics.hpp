@@ -6,6 +6,7 @@
 #include <atomic>
 #include <cstdint>
 
+#include "rt/memory/job_calls.hpp"
 #include "rt/sched/histogram.hpp"
 #include "rt/sched/plan.hpp"
 
@@ -27,6 +28,7 @@ struct TaskStatistics {
   std::atomic<uint64_t> demoted{0};  ///< jobs that used up their budget and gave way to all others; by the watchdog
   std::atomic<int64_t> last_exec_ns{0}, last_response_ns{0};
   uint64_t allocations = 0, page_faults = 0;
+  std::array<uint64_t, kJobCalls> rt_violations{};  ///< by JobCall: calls that no job should make, once it is warm
   int64_t cpu_ns = 0, preempted_ns = 0;
   Histogram lateness, exec, response, publish;
   std::array<JobRecord, 64> jobs{};    ///< ring of the last ones

@@ -7,6 +7,8 @@
 #include <cstdio>
 #include <cstring>
 #include <exception>
+#include <optional>
+#include <utility>
 
 #include "rt/sched/param_mail.hpp"
 #include "rt/sched/port_access.hpp"
@@ -14,6 +16,8 @@
 
 namespace takt {
 namespace {
+constexpr uint64_t kWarmUpJobs = 3;  // they may set up what later ones use
+
 // One thread counts; the others only look.
 void add(std::atomic<uint64_t>& counter, uint64_t by = 1) {
   counter.store(counter.load(std::memory_order_relaxed) + by, std::memory_order_relaxed);
@@ -44,6 +48,11 @@ Task::Task(const Plan& plan, size_t index, Transport& transport, const Clock& cl
       latch_(plan_, transport, board, index),
       published_(plan_.ports.size()),
       sent_stamps_ns_(plan_.ports.size(), kNothingSent) {
+  calls_.node = plan_.name.c_str();
+  calls_.counts = statistics_.rt_violations.data();
+  calls_.allowed = plan_.node->allowed_calls();
+  calls_.strict = strict_job_calls();
+  calls_.heap_limit = plan_.memory_bytes;
   for (const ModePlan& mode : plan.modes) modes_.push_back({mode.name, mode.runs[index] != 0});
   if (modes_.empty()) modes_.push_back({plan.mode, true});
   for (size_t i = 0; i < plan_.ports.size(); ++i) {
@@ -99,6 +108,9 @@ JobEnd Task::run(uint64_t index, int64_t release_ns, int64_t modelled_ns) {
     latch_.release();
     return pass_over(started, true);
   }
+  calls_.job = index;
+  calls_.warm = jobs_run_++ < kWarmUpJobs;
+  std::optional<JobScope> scope(calls_);
   ended_.stale = latch_.acquire(release_ns, started);
   ended_.new_input = first_input_ != nullptr && first_input_->is_new();
   Job job(clock_, index, release_ns, deadline, 0, mode.name);
@@ -109,6 +121,8 @@ JobEnd Task::run(uint64_t index, int64_t release_ns, int64_t modelled_ns) {
   end.finished_ns = modelled ? std::max(started, release_ns) + modelled_ns : clock_.now_ns();
   publish(end, deadline, modelled);
   latch_.release();
+  scope.reset();
+  if (calls_.heap_refused > 0) tell_refused_memory();
   ended_.ran = true;
   ended_.no_result = job.without_result();
   ended_.cpu = modelled ? 0 : sched_getcpu();
@@ -143,6 +157,20 @@ void Task::tell_exception(const Job& job, const char* what) {
   fault.at_ns = clock_.now_ns();
   std::snprintf(fault.what.characters.data(), fault.what.characters.size(), "%s: job %llu threw: %s",
                 plan_.name.c_str(), static_cast<unsigned long long>(job.index()), what);
+  board_.faults().append(fault);
+}
+
+void Task::tell_refused_memory() {
+  const int64_t refused = std::exchange(calls_.heap_refused, INT64_MIN);  // once: never above 0 again
+  Fault fault;
+  fault.kind = Fault::memory;
+  fault.task = static_cast<uint32_t>(index_);
+  fault.job = calls_.job;
+  fault.at_ns = clock_.now_ns();
+  std::snprintf(fault.what.characters.data(), fault.what.characters.size(),
+                "%s: job %llu asked for %lld kB more than the %lld kB that the node may have; it got none",
+                plan_.name.c_str(), static_cast<unsigned long long>(calls_.job), static_cast<long long>(refused / 1000),
+                static_cast<long long>(plan_.memory_bytes / 1000));
   board_.faults().append(fault);
 }
 

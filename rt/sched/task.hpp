@@ -73,6 +73,8 @@ class Task {
   /// Lets the node work, under the eyes of the watchdog.
   void work(Job& job, int64_t release_ns);
   void tell_exception(const Job& job, const char* what);
+  /// Tells that a job asked for more memory than it may have; once.
+  void tell_refused_memory();
   /// False if the requests visible at the release stop this task, or pace it past this job.
   bool wanted(uint64_t index) const;
   void take_mail();
@@ -89,6 +91,8 @@ class Task {
   TaskStatistics& statistics_;
   JobWatch* watch_ = nullptr;
   uint32_t member_ = 0;
+  JobCalls calls_;
+  uint64_t jobs_run_ = 0;
   Latch latch_;
   std::vector<std::unique_ptr<Writer>> writers_;
   std::vector<bool> published_;
