@@ -148,6 +148,7 @@ Json Server::top() const {
                      {"deadline_misses", s.deadline_misses.load()},
                      {"skipped", s.skipped.load()},
                      {"paused", s.paused.load()},
+                     {"level", s.last_level.load()},
                      {"exec_ms", static_cast<double>(s.last_exec_ns.load()) / 1e6},
                      {"response_ms", static_cast<double>(s.last_response_ns.load()) / 1e6}});
   }
@@ -206,6 +207,7 @@ bool Server::stream(size_t port, bool picture, int64_t count, Connection& connec
     std::unique_ptr<Held, decltype(let_go)> holding(&held, let_go);
     Json line{{"type", plan.type->name},
               {"sequence", held.sequence},
+              {"level", held.header->level},
               {"stamp_ns", held.stamp_ns},
               {"age_ms", static_cast<double>(now_ns() - held.stamp_ns) / 1e6},
               {"message", message_json(*plan.type, held.message())}};

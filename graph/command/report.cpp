@@ -51,6 +51,22 @@ Json grant_json(const Grant& grant) {
           {"verified", grant.verified}};
 }
 
+/// Jobs by level, and since when each of the last changes held.
+void add_quality(Json& json, const Node& node, const TaskStatistics& s, int64_t epoch_ns) {
+  json["quality"] = Json::object();
+  for (size_t l = 0; l < node.levels().size(); ++l) {
+    json["quality"][std::to_string(l)] = s.at_level[l].load();
+    json["quality_levels"].push_back(node.levels()[l].name);
+  }
+  const uint64_t count = s.level_changes.load(), kept = std::min<uint64_t>(count, s.changes.size());
+  json["quality_changes"] = {{"count", count}, {"last", Json::array()}};
+  for (uint64_t n = count - kept; n < count; ++n) {
+    const LevelChange& change = s.changes[n % s.changes.size()];
+    json["quality_changes"]["last"].push_back(
+        {{"at_s", static_cast<double>(change.release_ns - epoch_ns) / 1e9}, {"level", change.level}});
+  }
+}
+
 Json node_json(const RunFacts& facts, size_t t) {
   const TaskPlan& plan = facts.plan.tasks[t];
   const TaskStatistics& s = facts.board.task(t);
@@ -77,7 +93,7 @@ Json node_json(const RunFacts& facts, size_t t) {
     node[key] = counter->load();
   node["paused"] = paused;
   node["drift_us"] = s.drift_us();
-  node["quality"] = {{"0", s.exec.count()}};
+  add_quality(node, *plan.node, s, facts.result.epoch_ns);
   node["granted"] = grant_json(facts.board.grant(t));
   node["lateness_us"] = distribution(s.lateness, 1e3);
   node["lateness_histogram_us"] = coarse_histogram(s.lateness);

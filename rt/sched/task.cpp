@@ -8,6 +8,7 @@
 #include <cstring>
 #include <exception>
 #include <optional>
+#include <span>
 #include <utility>
 
 #include "rt/sched/param_mail.hpp"
@@ -17,6 +18,11 @@
 namespace takt {
 namespace {
 constexpr uint64_t kWarmUpJobs = 3;  // they may set up what later ones use
+
+/// The levels that the controller may choose from.
+std::span<const QualityLevel> levels_of(const TaskPlan& plan) {
+  return std::span(plan.node->levels()).first(plan.on_overrun == OnOverrun::degrade ? plan.node->levels().size() : 1);
+}
 
 // One thread counts; the others only look.
 void add(std::atomic<uint64_t>& counter, uint64_t by = 1) {
@@ -46,6 +52,7 @@ Task::Task(const Plan& plan, size_t index, Transport& transport, const Clock& cl
       index_(index),
       statistics_(board.task(index)),
       latch_(plan_, transport, board, index),
+      quality_(levels_of(plan_), plan_.budget_ns, plan_.deadline_ns),
       published_(plan_.ports.size()),
       sent_stamps_ns_(plan_.ports.size(), kNothingSent) {
   calls_.node = plan_.name.c_str();
@@ -113,12 +120,18 @@ JobEnd Task::run(uint64_t index, int64_t release_ns, int64_t modelled_ns) {
   std::optional<JobScope> scope(calls_);
   ended_.stale = latch_.acquire(release_ns, started);
   ended_.new_input = first_input_ != nullptr && first_input_->is_new();
-  Job job(clock_, index, release_ns, deadline, 0, mode.name);
+  ended_.level = quality_.level();
+  const CpuBudget cpu{plan_.budget_ns, last_thread_use_ns(), modelled ? nullptr : &thread_cpu_ns};
+  Job job(clock_, index, release_ns, deadline, ended_.level, mode.name, cpu);
   work(job, release_ns);
 
   JobEnd& end = ended_.end;
   end.end_of_data = job.ended();
-  end.finished_ns = modelled ? std::max(started, release_ns) + modelled_ns : clock_.now_ns();
+  if (modelled) {
+    const double cost = plan_.node->levels()[static_cast<size_t>(ended_.level)].cost;
+    ended_.modelled_ns = static_cast<int64_t>(static_cast<double>(modelled_ns) * cost);
+  }
+  end.finished_ns = modelled ? std::max(started, release_ns) + ended_.modelled_ns : clock_.now_ns();
   publish(end, deadline, modelled);
   latch_.release();
   scope.reset();
@@ -207,6 +220,7 @@ void Task::count_end() {
   statistics_.last_response_ns.store(response, std::memory_order_relaxed);
   const bool over_budget = plan_.budget_ns > 0 && used.cpu_ns > plan_.budget_ns;
   if (over_budget) add(statistics_.budget_overruns);
+  count_level(ended_.modelled ? ended_.modelled_ns : used.cpu_ns, response);
   if (ended_.no_result) add(statistics_.no_result);
   if (end.late) add(statistics_.deadline_misses);
   if (end.late && plan_.on_miss == OnMiss::safe_stop) ask_for_safe_stop("deadline missed");
@@ -225,6 +239,17 @@ void Task::ask_for_safe_stop(const char* why) {
   std::snprintf(reason, sizeof reason, "%s: %s", plan_.name.c_str(), why);
   const int64_t lead_ns = ended_.modelled ? 0 : ModeLog::kLead_ns;
   board_.safe_stop(ended_.end.finished_ns + lead_ns, reason);
+}
+
+void Task::count_level(int64_t exec_ns, int64_t response_ns) {
+  add(statistics_.at_level[static_cast<size_t>(ended_.level)]);
+  if (statistics_.last_level.load(std::memory_order_relaxed) != ended_.level) {
+    const uint64_t n = statistics_.level_changes.load(std::memory_order_relaxed);
+    statistics_.changes[n % statistics_.changes.size()] = {ended_.release_ns, ended_.level};
+    statistics_.level_changes.store(n + 1, std::memory_order_release);
+    statistics_.last_level.store(ended_.level, std::memory_order_relaxed);
+  }
+  quality_.observe({ended_.release_ns, exec_ns, response_ns, ended_.no_result});
 }
 
 void Task::publish(JobEnd& end, int64_t deadline_ns, bool modelled) {
@@ -253,6 +278,7 @@ void Task::settle_output(size_t i, bool late, int64_t now_ns, int64_t visible_at
   sent_stamps_ns_[i] = kNothingSent;
   const bool withheld = late && (plan_.on_miss == OnMiss::skip || plan_.on_miss == OnMiss::reuse_last);
   if (PortAccess::sent(output) && !withheld) {
+    PortAccess::set_level(output, ended_.level);
     writer.publish(PortAccess::stamp_ns(output), now_ns, visible_at_ns);
     published_[i] = true;
     sent_stamps_ns_[i] = PortAccess::stamp_ns(output);

@@ -8,6 +8,7 @@
 #include "rt/node.hpp"
 #include "rt/sched/job_watch.hpp"
 #include "rt/sched/latch.hpp"
+#include "rt/sched/quality.hpp"
 #include "rt/sched/run_board.hpp"
 #include "rt/time/clock.hpp"
 
@@ -29,7 +30,7 @@ class Task {
   ~Task();
 
   /// Runs job `index` released at `release_ns`. With modelled_ns >= 0 (virtual time) the job is taken to finish that
-  /// long after its release; otherwise the clock is read.
+  /// long after its release, times the declared cost of its quality level; otherwise the clock is read.
   JobEnd run(uint64_t index, int64_t release_ns, int64_t modelled_ns = -1);
   /// Tells its jobs to the watchdog, as member `member` of its lane. Before the first job.
   void set_watch(JobWatch& watch, uint32_t member) {
@@ -81,6 +82,7 @@ class Task {
   void publish(JobEnd& end, int64_t deadline_ns, bool modelled);
   void count_end();
   void ask_for_safe_stop(const char* why);
+  void count_level(int64_t exec_ns, int64_t response_ns);
   void settle_output(size_t output, bool late, int64_t now_ns, int64_t visible_at_ns);
 
   const TaskPlan plan_;
@@ -94,6 +96,7 @@ class Task {
   JobCalls calls_;
   uint64_t jobs_run_ = 0;
   Latch latch_;
+  QualityControl quality_;
   std::vector<std::unique_ptr<Writer>> writers_;
   std::vector<bool> published_;
   /// The job that run() has ended and count() not yet counted.
@@ -101,7 +104,8 @@ class Task {
     bool ran = false, paused = false, modelled = false, new_input = false, no_result = false;
     size_t stale = 0;
     int64_t release_ns = 0, started_ns = 0, published_ns = 0, publish_took_ns = 0;
-    int cpu = -1;
+    int64_t modelled_ns = 0;
+    int cpu = -1, level = 0;
     JobEnd end;
     ThreadUse used;
   } ended_;
