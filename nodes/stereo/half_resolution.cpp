@@ -24,6 +24,17 @@ const MatcherParameters& checked(const MatcherParameters& p, int width, int heig
 
 size_t pixels(int width, int height) { return static_cast<size_t>(half(width)) * static_cast<size_t>(half(height)); }
 
+/// Elements from a pixel to its right neighbour: kStep, 0 in an image one pixel wide, where it is its own.
+template <int kChannels, int kStep>
+void halve_row(const uint8_t* a, const uint8_t* b, int count, uint8_t* out) {
+  constexpr int kNext = kStep == 0 ? kChannels : 2 * kChannels;
+  for (int x = 0; x < count; ++x)
+    for (int c = 0; c < kChannels; ++c) {
+      const int i = kNext * x + c;
+      out[kChannels * x + c] = static_cast<uint8_t>((a[i] + a[i + kStep] + b[i] + b[i + kStep] + 2) >> 2);
+    }
+}
+
 template <class T>
 void copy_row(const T* from, int count, T* to) {
   std::memcpy(to, from, static_cast<size_t>(count) * sizeof(T));
@@ -35,16 +46,15 @@ void halve(ImageView<const uint8_t> in, ImageView<uint8_t> out) {
   for (int y = 0; y < out.height; ++y) {
     const uint8_t* a = in.row(2 * y);
     const uint8_t* b = in.row(std::min(2 * y + 1, in.height - 1));
-    uint8_t* o = out.row(y);
-    const int n = in.channels, right = in.width > 1 ? n : 0;
-    for (int x = 0; x < out.width; ++x, a += 2 * n, b += 2 * n, o += n)
-      for (int c = 0; c < n; ++c) o[c] = static_cast<uint8_t>((a[c] + a[c + right] + b[c] + b[c + right] + 2) >> 2);
+    if (in.width < 2) halve_row<1, 0>(a, b, out.width * in.channels, out.row(y));
+    else if (in.channels == 3) halve_row<3, 3>(a, b, out.width, out.row(y));
+    else halve_row<1, 1>(a, b, out.width, out.row(y));
   }
 }
 
 void enlarge(ImageView<const int16_t> disparity, ImageView<const uint8_t> confidence, ImageView<int16_t> disparity_out,
              ImageView<uint8_t> confidence_out) {
-  const int width = disparity_out.width, last = disparity.width - 1;
+  const int width = disparity_out.width, pairs = std::min(disparity.width, width / 2);
   for (int y = 0; y < disparity_out.height; ++y) {
     int16_t* d_out = disparity_out.row(y);
     uint8_t* c_out = confidence_out.row(y);
@@ -56,10 +66,12 @@ void enlarge(ImageView<const int16_t> disparity, ImageView<const uint8_t> confid
     const int from = std::min(y / 2, disparity.height - 1);
     const int16_t* d = disparity.row(from);
     const uint8_t* c = confidence.row(from);
-    for (int x = 0; x < width; ++x) {
-      const int at = std::min(x / 2, last);
-      d_out[x] = static_cast<int16_t>(d[at] < 0 ? -1 : 2 * d[at]);
-      c_out[x] = c[at];
+    const auto doubled = [&](int x) { return static_cast<int16_t>(d[x] < 0 ? -1 : 2 * d[x]); };
+    for (int x = 0; x < pairs; ++x) d_out[2 * x] = d_out[2 * x + 1] = doubled(x);
+    for (int x = 0; x < pairs; ++x) c_out[2 * x] = c_out[2 * x + 1] = c[x];
+    for (int x = 2 * pairs; x < width; ++x) {  // an odd last column
+      d_out[x] = doubled(disparity.width - 1);
+      c_out[x] = c[disparity.width - 1];
     }
   }
 }

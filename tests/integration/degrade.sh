@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # A node that gets too dear while it runs lowers its quality and takes it back; without `degrade` it overruns on and on.
-# Judged by CPU time and by planned releases, which other work on the machine does not change; misses are not.
+# Judged by CPU time and planned releases. Deadlines are long, so that only a machine that lets the job wait for most of
+# a period, twice in a row, changes the outcome.
 source "$(dirname "$0")/lib.sh" "$@"
 
 cat >"$work/graph.yaml" <<'YAML'
@@ -13,7 +14,7 @@ subsystems:
 YAML
 
 run_with() { # VERB: 4 ms of 10 for a while, then 25 ms for 3 s, then 4 ms again
-  printf 'takt: 1\nname: %s\npolicy: cooperative\nnodes:\n  load: {rate: 15, budget: 10ms, deadline: 60ms, criticality: high, on_overrun: %s}\n' "$1" "$1" >"$work/schedule.yaml"
+  printf 'takt: 1\nname: %s\npolicy: deadline\nnodes:\n  load: {rate: 15, budget: 10ms, deadline: 1/15 s, criticality: high, on_overrun: %s}\n' "$1" "$1" >"$work/schedule.yaml"
   "$takt" run "$work/graph.yaml" --for 10s --output "$work/out" --report "$work/$1.json" >"$work/$1.log" 2>&1 & local run=$!
   until "$takt" top --once --run $run >/dev/null 2>&1; do sleep 0.1; kill -0 $run 2>/dev/null || break; done
   sleep 1
@@ -34,7 +35,7 @@ node = {verb: json.load(open(f"{sys.argv[1]}/{verb}.json"))["nodes"][0] for verb
 for verb, n in node.items():
     print(verb, n["budget_overruns"], "overruns in", n["samples"], "jobs;", n["quality"], n["quality_changes"])
     assert sum(n["quality"].values()) == n["samples"]
-assert node["continue"]["budget_overruns"] > 20 and node["continue"]["quality_changes"]["count"] == 0
+assert node["continue"]["budget_overruns"] > 10 and node["continue"]["quality_changes"]["count"] == 0
 changes = node["degrade"]["quality_changes"]
 assert node["degrade"]["budget_overruns"] <= 3, "25 ms overran a budget of 10 again and again"
 assert changes["count"] >= 2 and changes["last"][-1]["level"] == 0, "quality did not come back"
