@@ -23,6 +23,13 @@ std::vector<int> cpus_of(const Plan& plan) {
   return cpus;
 }
 
+/// Changes of mode belong to no thread; the board has them all.
+void add_modes(const RunBoard& board, trace::Trace& trace) {
+  for (size_t i = 0; i < board.modes().size(); ++i)
+    if (const ModeLog::Change* change = board.modes().change(i))
+      trace.marks.push_back({trace::Kind::mode, change->from_ns, change->mode});
+}
+
 trace::Source best_source(const RunOptions& options) {
   if (options.clock == "virtual" || options.trace_source == "none") return trace::Source::none;
   return options.trace_source == "perf" ? trace::Source::perf : trace::Source::tracefs;
@@ -42,7 +49,8 @@ void RunTrace::collect(const Plan& plan) {
         std::make_unique<trace::Collector>(*rings_, trace::Collector::Options{cpus_of(plan), best_source(options_)});
 }
 
-std::string RunTrace::write(const graph::GraphSpec& graph, const Plan& plan, const RunResult& result) {
+std::string RunTrace::write(const graph::GraphSpec& graph, const Plan& plan, const RunBoard& board,
+                            const RunResult& result) {
   if (!collector_) return "";
   const trace::Recording recording = collector_->finish();
   collector_.reset();
@@ -51,6 +59,7 @@ std::string RunTrace::write(const graph::GraphSpec& graph, const Plan& plan, con
   trace.epoch_ns = result.epoch_ns;
   trace.end_ns = result.end_ns;
   explain::describe(plan, trace);
+  add_modes(board, trace);
   explain::Json head{{"graph", graph.name},
                      {"schedule", graph.schedule.name},
                      {"profile", graph.profile},

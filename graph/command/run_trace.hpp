@@ -19,7 +19,7 @@ class RunTrace {
   /// Begins to collect, in the process that lasts longest.
   void collect(const Plan& plan);
   /// Ends collecting and writes the file; "" or why it could not be written.
-  std::string write(const graph::GraphSpec& graph, const Plan& plan, const RunResult& result);
+  std::string write(const graph::GraphSpec& graph, const Plan& plan, const RunBoard& board, const RunResult& result);
 
  private:
   const RunOptions& options_;

@@ -42,7 +42,8 @@ class LoadNode final : public Node {
  private:
   void spend(Job& job) {
     const bool long_one = (job.index() + 1) % static_cast<uint64_t>(every_()) == 0;
-    load::burn(nanoseconds(work_() + (long_one ? extra_() : 0)));
+    const double share = levels()[static_cast<size_t>(job.level())].cost;
+    load::burn(nanoseconds(share * (work_() + (long_one ? extra_() : 0))));
     if (sleep_() > 0) sleep_for(nanoseconds(sleep_()));
     if (!trouble_.due(job.release_ns(), nanoseconds(stuck_every_()))) return;
     load::burn(stuck_for_() > 0 ? nanoseconds(stuck_for_()) : std::numeric_limits<int64_t>::max() / 2);
@@ -71,6 +72,7 @@ class LoadNode final : public Node {
 
   Input<TextStatus> input_{this, "input", "output of another load; its stamp is carried on", Need::optional};
   Output<TextStatus> output_{this, "output", "number of the job; filled up to the capacity if it floods"};
+  Levels levels_{this, {{"full", 1.0, "all of the work"}, {"half", 0.5}, {"quarter", 0.25}}};
   Param<double> work_{this, "work", 0.001, {0.0, 60.0}, "s", "CPU time of each job"};
   Param<double> extra_{this, "extra", 0.0, {0.0, 60.0}, "s", "CPU time more in each `every`-th job"};
   Param<int> every_{this, "every", 1, {1, 1'000'000}, "1", "which jobs take `extra`"};

@@ -19,7 +19,7 @@ enum class Kind : uint8_t { release, latch, start, finish, publish, miss, skip, 
 /// | skip    | skipped release   | -                 | -                  | -               |
 /// | overrun | end of run()      | CPU time, ns      | budget, ns         | -               |
 /// | level   | change            | new level         | -                  | -               |
-/// | mode    | change            | number of mode    | -                  | - (and no task) |
+/// | mode    | change            | number of mode    | -                  | -, and no task  |
 ///
 /// Instants are CLOCK_MONOTONIC, ns. Every finished job gives one `publish` for its end, sequence 0 if nothing was
 /// sent.

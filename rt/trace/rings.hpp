@@ -56,10 +56,9 @@ class Thread {
   Thread& operator=(const Thread&) = delete;
 };
 
-/// The events that do not belong to one job's course.
+/// A node does less, or more again, from that job on.
 inline void level_change(uint16_t task, uint32_t job, int level, int64_t now_ns) {
   record({now_ns, level, 0, job, task, Kind::level, 0});
 }
-inline void mode_change(int mode, int64_t now_ns) { record({now_ns, mode, 0, 0, kNoTask, Kind::mode, 0}); }
 
 }  // namespace takt::trace

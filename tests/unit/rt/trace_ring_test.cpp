@@ -77,7 +77,7 @@ TEST_CASE("what a killed process noted is still there") {
   if (child == 0) {
     const Thread traced(&rings, "child");
     level_change(3, 8, 1, 1234);
-    mode_change(2, 1300);
+    record({1300, 2, 0, 0, kNoTask, Kind::mode, 0});
     raise(SIGKILL);
   }
   int status = 0;
