@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <sched.h>
 
+#include <algorithm>
 #include <fstream>
 
 #include "graph/explain/trace_file.hpp"
@@ -28,6 +29,8 @@ void add_modes(const RunBoard& board, trace::Trace& trace) {
   for (size_t i = 0; i < board.modes().size(); ++i)
     if (const ModeLog::Change* change = board.modes().change(i))
       trace.marks.push_back({trace::Kind::mode, change->from_ns, change->mode});
+  std::stable_sort(trace.marks.begin(), trace.marks.end(),
+                   [](const trace::Mark& a, const trace::Mark& b) { return a.at_ns < b.at_ns; });
 }
 
 trace::Source best_source(const RunOptions& options) {
