@@ -5,6 +5,7 @@
 
 #include "graph/command/attach_commands.hpp"
 #include "graph/command/check_command.hpp"
+#include "graph/command/doctor_command.hpp"
 #include "graph/command/eval_command.hpp"
 #include "graph/command/run_command.hpp"
 #include "graph/command/show_command.hpp"
@@ -85,6 +86,7 @@ int main(int argc, char** argv) {
   takt::command::EvalStereoOptions stereo;
   takt::command::EvalEgoMotionOptions ego_motion;
   takt::command::AttachOptions attach;
+  takt::command::DoctorOptions doctor;
   takt::command::EvalObjectsOptions objects;
   takt::command::EvalGroundOptions ground;
   std::string type;
@@ -103,6 +105,7 @@ int main(int argc, char** argv) {
   nodes->add_option("type", type, "node type");
   nodes->callback([&] { exit_code = takt::command::print_nodes(type); });
   takt::command::add_attach_commands(app, attach, exit_code);
+  takt::command::add_doctor(app, doctor, exit_code);
   CLI::App* eval = app.add_subcommand("eval", "measures quality against ground truth");
   eval->require_subcommand(1);
   takt::command::add_eval_stereo(*eval, stereo, exit_code);
