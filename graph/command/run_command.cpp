@@ -112,11 +112,7 @@ int run_as_asked(RunOptions options) {
   const std::string wanted = options.isolate.empty() ? prepared.graph->isolation : options.isolate;
   if (wanted != "subsystem" || options.clock == "virtual") return run_in_one_process(options, prepared, adjusted);
   const KeptPlace report(options.report), page(options.html);
-  const IsolatedEnd end = run_isolated(options, *prepared.graph, adjusted);
-  if (end.not_isolated.empty()) return end.code;
-  if (options.isolate == "subsystem") return refuse("--isolate subsystem: " + end.not_isolated, kDeviceOrSystem);
-  adjusted.push_back("isolation: subsystem -> none: " + end.not_isolated);
-  return run_in_one_process(options, prepared, std::move(adjusted));
+  return run_isolated(options, *prepared.graph, std::move(adjusted));
 }
 
 }  // namespace

@@ -44,6 +44,7 @@ struct CapacityRecord {
 class RunBoard {
  public:
   enum Decision : uint32_t { undecided, as_asked, cooperative };
+  enum Carrier : uint32_t { no_carrier, iceoryx, local };
 
   /// Only the shape of the plan is used: tasks, edges, ports. Throws std::runtime_error if there is no memory.
   explicit RunBoard(const Plan& plan, size_t processes = 1);
@@ -68,14 +69,14 @@ class RunBoard {
   StopSignal& stop() { return shared_->stop; }
   std::atomic<int64_t>& epoch_ns() { return shared_->epoch_ns; }  ///< 0: not fixed yet
   std::atomic<uint32_t>& decision() { return shared_->decision; }
-  std::atomic<bool>& transport_up() { return shared_->transport_up; }
+  std::atomic<uint32_t>& carrier() { return shared_->carrier; }  ///< the transport that is up and can be joined
 
  private:
   struct Shared {
     StopSignal stop;
     std::atomic<int64_t> epoch_ns{0};
     std::atomic<uint32_t> decision{undecided};
-    std::atomic<bool> transport_up{false};
+    std::atomic<uint32_t> carrier{no_carrier};
   };
   template <class T>
   T* place(std::byte*& at, size_t count);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The transport interface: how a message gets from one output to its inputs without being copied. Two back ends: local
-// (one process, no daemon) and iceoryx.
+// (one run's own memory, no daemon; between processes see local_transport.hpp) and iceoryx.
 #pragma once
 #include <cstdint>
 #include <memory>
