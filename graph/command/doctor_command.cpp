@@ -16,6 +16,9 @@ int run_doctor(const DoctorOptions& options) {
   const std::filesystem::path file = machine_file();
   if (options.measure && file.empty())
     return refuse("--measure: no place for the figures; set TAKT_MACHINE to a file, or HOME", kBadInput);
+  // Before half a minute of measuring.
+  if (const std::string why = options.measure ? cannot_write(file) : ""; !why.empty())
+    return refuse(file.string() + ": " + why + "; set TAKT_MACHINE to a file that can be written", kDeviceOrSystem);
   const machine::SystemFacts facts;
   const auto identity = machine::Identity::of(facts);
   const auto findings = machine::examine(facts, machine::try_machine());
@@ -39,9 +42,9 @@ int run_doctor(const DoctorOptions& options) {
 
 }  // namespace
 
-std::string lacks_text(Policy policy, bool several_processes) {
+std::string lacks_text(Policy policy, bool over_iceoryx) {
   const machine::SystemFacts facts;
-  return findings_text(machine::lacking(machine::examine(facts, machine::try_machine()), policy, several_processes));
+  return findings_text(machine::lacking(machine::examine(facts, machine::try_machine()), policy, over_iceoryx));
 }
 
 void add_doctor(CLI::App& app, DoctorOptions& o, int& exit_code) {

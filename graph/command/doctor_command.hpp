@@ -16,6 +16,6 @@ void add_doctor(CLI::App& app, DoctorOptions& options, int& exit_code);
 
 /// What a run under that policy lacks here, with the fixes, as `takt doctor` shows it; "" if nothing. For --require-rt.
 /// Before this process has any thread.
-std::string lacks_text(Policy policy, bool several_processes);
+std::string lacks_text(Policy policy, bool over_iceoryx);
 
 }  // namespace takt::command

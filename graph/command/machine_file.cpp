@@ -104,21 +104,24 @@ std::filesystem::path machine_file() {
 }
 
 Json measured_json(const machine::Identity& machine, const std::string& measured_at, const machine::Measured& m) {
+  Json json;
+  const auto set = [&](const char* key, const Json& value) {
+    if (!value.is_null()) json[key] = value;
+  };
   const auto charged = [](const std::optional<Spread>& spread) {
     return spread ? Json(spread->charged_us()) : Json(nullptr);
   };
-  Json json;
   json["machine"] = takt::command::to_json(machine);
   json["measured_at"] = measured_at;
-  json["policy"] = m.release ? Json(to_string(m.release->policy)) : Json(nullptr);
-  json["release_us"] = charged(m.release ? std::optional(m.release->lateness) : std::nullopt);
-  json["switch_us"] = charged(m.context_switch ? std::optional(m.context_switch->one_way) : std::nullopt);
-  json["publish_us"] = dearer(m, [](const TransferCosts& costs) { return costs[0].publish.charged_us(); });
-  json["take_us"] = dearer(m, [](const TransferCosts& costs) { return costs[0].take.charged_us(); });
-  json["per_mb_us"] = dearer(m, per_mb_us);
-  json["enforcement_us"] = m.reservation_overrun ? Json(m.reservation_overrun->max_us) : Json(nullptr);
-  json["tick_us"] = m.tick_us ? Json(*m.tick_us) : Json(nullptr);
-  json["deadline_bandwidth"] = m.bandwidth ? Json(m.bandwidth->accepted) : Json(nullptr);
+  set("policy", m.release ? Json(to_string(m.release->policy)) : Json(nullptr));
+  set("release_us", charged(m.release ? std::optional(m.release->lateness) : std::nullopt));
+  set("switch_us", charged(m.context_switch ? std::optional(m.context_switch->one_way) : std::nullopt));
+  set("publish_us", dearer(m, [](const TransferCosts& costs) { return costs[0].publish.charged_us(); }));
+  set("take_us", dearer(m, [](const TransferCosts& costs) { return costs[0].take.charged_us(); }));
+  set("per_mb_us", dearer(m, per_mb_us));
+  set("enforcement_us", m.reservation_overrun ? Json(m.reservation_overrun->max_us) : Json(nullptr));
+  set("tick_us", m.tick_us ? Json(*m.tick_us) : Json(nullptr));
+  set("deadline_bandwidth", m.bandwidth ? Json(m.bandwidth->accepted) : Json(nullptr));
   Json& details = json["details"];
   details["release_us"] = m.release ? to_json(m.release->lateness) : Json(nullptr);
   details["switch_us"] = m.context_switch ? to_json(m.context_switch->one_way) : Json(nullptr);
@@ -161,14 +164,22 @@ std::string measured_text(const machine::Measured& m) {
   return text;
 }
 
-std::string write_whole(const std::filesystem::path& file, const std::string& text) {
+std::string cannot_write(const std::filesystem::path& file) {
   std::error_code error;
-  if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path(), error);
+  const auto folder = file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
+  std::filesystem::create_directories(folder, error);
+  if (error) return error.message();
+  return access(folder.c_str(), W_OK) == 0 ? "" : std::strerror(errno);
+}
+
+std::string write_whole(const std::filesystem::path& file, const std::string& text) {
+  if (std::string why = cannot_write(file); !why.empty()) return why;
+  std::error_code error;
   const std::filesystem::path part = file.string() + "." + std::to_string(getpid());
   errno = 0;
   std::ofstream out(part);
   if (!out || !(out << text << std::flush)) {
-    const std::string why = error ? error.message() : std::strerror(errno);
+    const std::string why = std::strerror(errno);
     std::filesystem::remove(part, error);
     return why;
   }

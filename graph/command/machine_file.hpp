@@ -20,12 +20,15 @@ std::filesystem::path machine_file();
 ///  "enforcement_us", "tick_us", "deadline_bandwidth", "details": {...}}. The figures to be charged are plain numbers:
 /// 99th percentiles of release, switch, publish and take (those of 128 bytes, the dearer of the transports measured);
 /// per_mb_us what publish and take together grow by with each megabyte; enforcement_us the largest overrun seen of a
-/// SCHED_DEADLINE reservation. null: could not be measured with these rights. `details` has medians, tails and samples.
+/// SCHED_DEADLINE reservation. a key is
+/// absent where these rights did not allow to measure it. `details` has medians, tails and samples.
 nlohmann::ordered_json measured_json(const machine::Identity& machine, const std::string& measured_at,
                                      const machine::Measured& measured);
 /// The same for people.
 std::string measured_text(const machine::Measured& measured);
 
+/// Makes the folder of the file; "" or why the file cannot be written there.
+std::string cannot_write(const std::filesystem::path& file);
 /// Replaces the file as a whole, making its folder; "" or why not.
 std::string write_whole(const std::filesystem::path& file, const std::string& text);
 

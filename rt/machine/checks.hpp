@@ -43,7 +43,7 @@ Finding check_iceoryx(const DaemonTrial& trial);
 std::vector<Finding> examine(const Facts& facts, const Trials& trials);
 
 /// Those that a run cannot do without: status lacks, and needed by every run, by a run under `policy` or, with
-/// `iceoryx`, by a run in several processes.
+/// `iceoryx`, by a run over iceoryx.
 std::vector<Finding> lacking(const std::vector<Finding>& findings, Policy policy, bool iceoryx);
 
 }  // namespace takt::machine

@@ -33,9 +33,9 @@ Finding check_mlockall(const Facts& facts, const LockTrial& trial) {
 }
 
 Finding check_dev_shm(const SharedMemoryTrial& trial) {
-  constexpr int64_t kUsual = 500;  // the ACE graph in several processes
+  constexpr int64_t kUsual = 500;  // the ACE graph over iceoryx
   Finding f{"memory", "dev_shm", Need::iceoryx, Status::lacks, "", ""};
-  f.meaning = "runs in several processes keep all messages there (ace: 480 MB)";
+  f.meaning = "`--transport iceoryx` keeps all messages there (ace: 480 MB)";
   if (!trial.answered) return not_answered(f), f;
   f.found = std::to_string(trial.free_mb) + " of " + std::to_string(trial.size_mb) + " MB free";
   if (trial.error != 0) {

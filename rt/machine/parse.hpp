@@ -66,7 +66,7 @@ void for_each_line(std::string_view text, const Visitor& visit) {
   }
 }
 
-/// Words of a line, separated by blanks.
+/// Words of a line, separated by blanks; they point into it.
 std::vector<std::string_view> words_of(std::string_view line);
 
 }  // namespace takt::machine

@@ -109,7 +109,7 @@ Finding check_rt_runtime(const Facts& facts) {
   if (*runtime < 0) {
     f.status = Status::warn;
     f.found = "no limit";
-    f.meaning = "the kernel admits any sum of reservations and throttles nothing: an endless loop hangs a CPU";
+    f.meaning = "nothing is limited: an endless loop under `fixed` hangs a CPU";
   } else {
     f.found = microseconds_as_ms(*runtime) + " of " + microseconds_as_ms(*period);
     f.status = *runtime == 0 ? Status::lacks : *runtime * 10 >= *period * 9 ? Status::ok : Status::warn;

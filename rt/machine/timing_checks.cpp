@@ -119,7 +119,8 @@ Finding check_clocksource(const Facts& facts) {
     f.found = "cannot be read";
   } else if (std::find(kFast.begin(), kFast.end(), f.found) == kFast.end()) {
     f.status = Status::warn;
-    const auto available = words_of(facts.text(folder + "available_clocksource").value_or(""));
+    const std::string text = facts.text(folder + "available_clocksource").value_or("");
+    const auto available = words_of(text);
     f.fixes = {boot("clocksource=tsc tsc=reliable")};
     if (std::find(available.begin(), available.end(), "tsc") != available.end())
       f.fixes.insert(f.fixes.begin(), shell("echo tsc | sudo tee " + folder + "current_clocksource"));

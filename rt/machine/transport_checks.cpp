@@ -6,7 +6,7 @@ namespace takt::machine {
 
 Finding check_iceoryx(const DaemonTrial& trial) {
   Finding f{"transport", "iceoryx", Need::iceoryx, Status::lacks, "", ""};
-  f.meaning = "runs in several processes start one; a machine has room for one";
+  f.meaning = "`--transport iceoryx` starts one; a machine has room for one";
   if (!trial.answered) return not_answered(f), f;
   const std::string refused = trial.refused.data();
   if (refused.empty()) {

@@ -96,6 +96,7 @@ size_t prefault_stack(size_t bytes) {
 CpuLatencyHold::CpuLatencyHold() : file_(open(kLatencyFile, O_WRONLY | O_CLOEXEC)) {
   const int32_t microseconds = 0;
   if (file_ >= 0 && write(file_, &microseconds, sizeof microseconds) == sizeof microseconds) return;
+  absent_ = errno == ENOENT;
   lacks_ = std::string(kLatencyFile) + ": " + std::strerror(errno) +
            ": CPUs may sleep deeply between jobs. Fix: run as root, or sudo chmod 666 " + kLatencyFile;
   if (file_ >= 0) close(file_);
@@ -103,7 +104,7 @@ CpuLatencyHold::CpuLatencyHold() : file_(open(kLatencyFile, O_WRONLY | O_CLOEXEC
 }
 
 CpuLatencyHold::CpuLatencyHold(CpuLatencyHold&& other) noexcept
-    : file_(std::exchange(other.file_, -1)), lacks_(std::move(other.lacks_)) {}
+    : file_(std::exchange(other.file_, -1)), absent_(other.absent_), lacks_(std::move(other.lacks_)) {}
 
 CpuLatencyHold::~CpuLatencyHold() {
   if (file_ >= 0) close(file_);
