@@ -73,6 +73,10 @@ int pass(const RunOptions& options, const char* name, const Change& change, cons
   Executor executor(plan, *transport, *prepared.clock, run);
   const Stoppable stoppable(board);
   const RunResult result = executor.run();
+  if (!result.stuck.empty()) {  // its thread still uses what would now be taken down
+    refuse(fmt::format("a job of {} never returned", plan.tasks[result.stuck.front()].name), kDeviceOrSystem);
+    end_process(kDeviceOrSystem, "local");
+  }
   for (const std::string& refused : result.refused)
     adjusted.push_back(fmt::format("policy {} -> cooperative: {}", to_string(plan.policy), refused));
   for (const std::string& line : adjusted) std::fprintf(stderr, "takt: adjusted: %s\n", line.c_str());
