@@ -9,6 +9,7 @@
 
 #include "graph/attach/server.hpp"
 #include "graph/check/check.hpp"
+#include "graph/command/doctor_command.hpp"
 #include "graph/command/isolated_run.hpp"
 #include "graph/command/live_table.hpp"
 #include "graph/command/prepare.hpp"
@@ -103,8 +104,10 @@ int run_in_one_process(const RunOptions& options, Prepared& prepared, std::vecto
   if (!check.admitted && !options.unchecked) return refuse(check.text + "(--unchecked runs it all the same)", kNotOk);
   const CpuLatencyHold latency = hold_cpu_dma_latency();
   std::vector<std::string> lacks = prepare_process();
+  const bool locked = lacks.empty();
   if (!latency.granted()) lacks.push_back(latency.lacks());
-  if (options.require_rt && !lacks.empty()) return refuse("--require-rt: " + lacks.front(), kDeviceOrSystem);
+  if (options.require_rt && (!locked || latency.refused()))
+    return refuse("--require-rt: " + lacks.front(), kDeviceOrSystem);
   limit_cores(prepared.composition->plan.cores, adjusted);
   adjusted.insert(adjusted.end(), lacks.begin(), lacks.end());
   for (const std::string& line : adjusted) std::fprintf(stderr, "takt: adjusted: %s\n", line.c_str());
@@ -120,6 +123,11 @@ int run_as_asked(RunOptions options) {
   }
   std::vector<std::string> adjusted = prepared.graph->adjusted;
   const std::string wanted = options.isolate.empty() ? prepared.graph->isolation : options.isolate;
+  if (options.require_rt) {
+    const std::string lacks = lacks_text(prepared.graph->schedule.policy, options.transport == "iceoryx");
+    if (!lacks.empty())
+      return refuse("--require-rt: this machine lacks (see `takt doctor`)\n" + lacks, kDeviceOrSystem);
+  }
   if (wanted != "subsystem" || options.clock == "virtual") return run_in_one_process(options, prepared, adjusted);
   const KeptPlace report(options.report), page(options.html), trace(options.trace);
   return run_isolated(options, *prepared.graph, std::move(adjusted));
