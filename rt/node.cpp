@@ -23,6 +23,11 @@ void OutputPort::send(int64_t stamp_ns) {
   sent_ = loaned_ != nullptr;
 }
 
+void Node::may(uint32_t calls, std::string_view reason) {
+  allowed_calls_ |= calls;
+  reason_of_calls_ = reason;
+}
+
 Levels::Levels(Node* owner, std::initializer_list<QualityLevel> levels) {
   if (levels.size() == 0 || levels.size() > kMaxLevels || levels.begin()->cost != 1.0)
     throw std::logic_error("a node has 1 to " + std::to_string(kMaxLevels) + " quality levels, the first of cost 1");

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "rt/level.hpp"
+#include "rt/memory/job_calls.hpp"
 #include "rt/msg/messages.hpp"
 #include "rt/param.hpp"
 #include "rt/shm/transport.hpp"
@@ -214,6 +215,12 @@ class Node {
   /// Null if the node takes no requests.
   const Input<Requests>* control() const { return control_.get(); }
 
+  /// In the constructor or in setup: jobs of this node make calls that no job should, and why. They are not counted as
+  /// violations.
+  void may(uint32_t calls, std::string_view reason);                     ///< bits of JobCall
+  uint32_t allowed_calls() const { return allowed_calls_; }              ///< bits of JobCall
+  std::string_view reason_of_calls() const { return reason_of_calls_; }  ///< empty if it declares none
+
   const std::vector<InputPort*>& inputs() const { return inputs_; }
   const std::vector<OutputPort*>& outputs() const { return outputs_; }
   const std::vector<ParamBase*>& params() const { return params_; }
@@ -230,6 +237,8 @@ class Node {
   std::vector<ParamBase*> params_;
   std::vector<QualityLevel> levels_{{"full", 1.0}};
   std::unique_ptr<Input<Requests>> control_;
+  uint32_t allowed_calls_ = 0;
+  std::string_view reason_of_calls_;
 };
 
 /// Layers of the thesis (Sec. 2.2): an edge goes to the same, the next or the storage layer, or from storage to any.

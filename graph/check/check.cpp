@@ -7,6 +7,8 @@
 #include <functional>
 #include <numeric>
 
+#include "rt/sched/lane.hpp"
+
 namespace takt::graph {
 namespace {
 
@@ -114,9 +116,17 @@ CheckResult check(const GraphSpec& graph, const Plan& plan) {
     verdict += fmt::format(
         "{}: no budget stated, not counted; `takt run` under the policy deadline reserves a quarter of its deadline\n",
         name);
+  for (const auto& [low, high] : low_before_high(plan)) {
+    result.notes.push_back(fmt::format(
+        "{} (low criticality) runs on the worker of {} (high), which waits for it: a job of it that does not end would "
+        "stop both; give {} a `rate`, or `criticality: high`",
+        plan.tasks[low].name, plan.tasks[high].name, plan.tasks[low].name));
+    verdict += result.notes.back() + "\n";
+  }
   result.text = verdict + result.text;
   result.json["verdict"] = to_string(result.verdict);
   result.json["problems"] = result.problems;
+  result.json["notes"] = result.notes;
   result.json["admitted"] = result.admitted;
   result.json["utilisation"] = result.utilisation;
   result.json["cores"] = result.cores;

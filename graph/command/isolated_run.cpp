@@ -247,7 +247,7 @@ class IsolatedRun {
                                std::string(to_string(plan_.policy)), "subsystem", partition_.names, adjusted_});
     for (const std::string& fault : faults_) report["faults"].push_back({{"what", fault}});
     if (!faults_.empty()) report["ok"] = false;
-    const int told = tell(options_, graph_, report);
+    const int told = tell_faults(options_, graph_, board_, granted_, report);
     return code_ != 0 ? code_ : told;
   }
 

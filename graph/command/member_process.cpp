@@ -94,13 +94,15 @@ int run_member(const RunOptions& options, const graph::GraphSpec& graph, const g
   Executor executor(plan, *transport, *prepared.clock, run);
   record.state.store(ProcessRecord::joined);
   const ProcessReading before = ProcessReading::now();
-  executor.run();
+  const RunResult result = executor.run();
   record.cpu_ns = ProcessReading::now().cpu_ns - before.cpu_ns;
   record.simulator_cpu_ns = hal::simulator_use().cpu_ns;
   record.simulator_in_jobs_ns = hal::simulator_use().in_jobs_ns;
   for (size_t t = 0; t < plan.tasks.size(); ++t)
-    if (run.own[t]) prepared.composition->nodes[t]->finish();
+    if (run.own[t] && !is_stuck(result, t)) prepared.composition->nodes[t]->finish();
   record.state.store(ProcessRecord::finished);
+  // A job that never returns still uses what would now be taken down.
+  if (!result.stuck.empty()) end_process(kOk, "iceoryx");
   return kOk;
 }
 

@@ -73,7 +73,9 @@ Json node_json(const RunFacts& facts, size_t t) {
   Json node;
   node["name"] = plan.name;
   node["rate_hz"] = plan.rate ? Json(plan.rate->hz()) : Json(nullptr);
-  const double paused_s = plan.rate ? static_cast<double>(s.paused.load()) / plan.rate->hz() : 0;
+  const uint64_t paused =
+      s.paused.load() + left_out_jobs(facts.plan, facts.board, t, facts.result.epoch_ns, facts.result.end_ns);
+  const double paused_s = plan.rate ? static_cast<double>(paused) / plan.rate->hz() : 0;
   node["active_s"] = std::max(0.0, facts.result.duration_s() - paused_s);
   node["criticality"] = to_string(plan.criticality);
   node["device"] = plan.device;
@@ -85,10 +87,11 @@ Json node_json(const RunFacts& facts, size_t t) {
            {"deadline_misses", &s.deadline_misses},
            {"budget_overruns", &s.budget_overruns},
            {"stale_inputs", &s.stale_inputs},
-           {"paused", &s.paused},
+           {"demoted", &s.demoted},
            {"new_inputs", &s.new_inputs},
            {"no_result", &s.no_result}})
     node[key] = counter->load();
+  node["paused"] = paused;
   node["drift_us"] = s.drift_us();
   add_quality(node, *plan.node, s, facts.result.epoch_ns);
   node["granted"] = grant_json(facts.board.grant(t));
@@ -101,6 +104,7 @@ Json node_json(const RunFacts& facts, size_t t) {
   node["samples"] = s.exec.count();
   node["allocations"] = s.allocations;
   node["page_faults"] = s.page_faults;
+  node["rt_violations"] = violations_json(s);
   return node;
 }
 
@@ -223,7 +227,7 @@ Json make_report(const RunFacts& facts) {
   report["commit"] = TAKT_COMMIT;
   report["machine"] = machine_facts();
   report["ok"] = kept_its_promises(nodes);
-  report["modes"] = {facts.graph.mode};
+  report["modes"] = modes_json(facts);
   report["transport"] = facts.transport.name();
   report["isolation"] = facts.isolation;
   report["processes"] = facts.processes;
@@ -237,7 +241,7 @@ Json make_report(const RunFacts& facts) {
   report["host_stall_ms"] = facts.use.steal_ms;
   report["recorder_lost"] = 0;
   report["adjusted"] = facts.adjusted;
-  report["faults"] = Json::array();
+  report["faults"] = faults_json(facts);
   report["timeline"] = timeline_json(facts);
   return report;
 }

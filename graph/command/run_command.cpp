@@ -56,24 +56,28 @@ int execute(const RunOptions& options, Prepared& prepared, std::vector<std::stri
     result = executor.run();
   }
   const ProcessReading after = ProcessReading::now();
-  for (auto& node : composition.nodes) node->finish();
+  for (size_t t = 0; t < composition.nodes.size(); ++t)
+    if (!is_stuck(result, t)) composition.nodes[t]->finish();
   for (const std::string& refused : result.refused)
     adjusted.push_back(fmt::format("policy {} -> cooperative: {}", to_string(graph.schedule.policy), refused));
   const hal::SimulatorUse simulator = hal::simulator_use();
   const MachineUse use{after.cpu_ns - before.cpu_ns, simulator.cpu_ns, simulator.in_jobs_ns,
                        after.steal_ms - before.steal_ms, after.rss_mb};
-  return tell(options, graph,
-              make_report({graph,
-                           composition.plan,
-                           board,
-                           result,
-                           *transport,
-                           use,
-                           options.clock,
-                           std::string(to_string(graph.schedule.policy)),
-                           "none",
-                           {},
-                           std::move(adjusted)}));
+  auto report = make_report({graph,
+                             composition.plan,
+                             board,
+                             result,
+                             *transport,
+                             use,
+                             options.clock,
+                             std::string(to_string(graph.schedule.policy)),
+                             "none",
+                             {},
+                             std::move(adjusted)});
+  const int code = tell_faults(options, graph, board, result.policy_granted, report);
+  // A job that never returns still uses what would now be taken down.
+  if (!result.stuck.empty()) end_process(code, options.transport);
+  return code;
 }
 
 int run_in_one_process(const RunOptions& options, Prepared& prepared, std::vector<std::string> adjusted) {

@@ -75,6 +75,7 @@ std::string summary_text(const Json& report) {
   text += fmt::format("memory {:.0f} MB shared, {:.0f} MB resident; host stall {} ms\n",
                       report["memory"]["shm_mb"].get<double>(), report["memory"]["rss_mb"].get<double>(),
                       report["host_stall_ms"].get<int64_t>());
+  text += events_text(report);
   for (const Json& line : report["adjusted"]) text += "adjusted: " + line.get<std::string>() + "\n";
   text += report["ok"].get<bool>() ? "ok\n" : "NOT OK: a high-criticality deadline was missed or a node fell behind\n";
   return text;
