@@ -67,7 +67,7 @@ class Executor {
 
  private:
   bool run_partitioned(Policy policy, RunResult& result);
-  std::vector<Reservation> reservations(Policy policy) const;
+  std::vector<Reservation> own_reservations(Policy policy) const;
   void set_grants(const Lane& lane, const Grant& grant);
   void start_clockwork(RunResult& result);
   void run_cooperative();
