@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+// The exact tests of one core against simulation, both ways: what they call schedulable shows no miss, what they do not
+// is witnessed by one, and each worst response happens.
+#include <doctest/doctest.h>
+
+#include <map>
+
+#include "random_sets.hpp"
+#include "rt/sched/analysis/edf.hpp"
+#include "rt/sched/analysis/fixed_priority.hpp"
+
+namespace {
+
+using namespace takt::analysis;
+constexpr int kSets = 10'000;
+
+struct Seen {
+  std::vector<Ticks> longest;  ///< response per task
+  bool late = false;
+
+  explicit Seen(const TaskSet& set) : longest(set.tasks.size(), 0) {}
+  void add(const std::vector<SimulatedJob>& jobs) {
+    for (const SimulatedJob& job : jobs) {
+      longest[job.task] = std::max(longest[job.task], job.response());
+      late = late || job.late();
+    }
+  }
+};
+
+/// The worst patterns from every instant of a hyperperiod, not only those that the analyses pick.
+Seen simulate_all_starts(const TaskSet& set, Dispatch dispatch) {
+  Seen seen(set);
+  const Ticks steady = steady_from(set), common = *common_period(set.tasks);
+  for (Ticks start = steady; start < steady + common_period_of_fixed(set); ++start) {
+    seen.add(simulate(set, dispatch, worst_from(set, start, start + 2 * common + 24)));
+  }
+  return seen;
+}
+
+void attack_at_random(const TaskSet& set, Dispatch dispatch, std::mt19937& random, Seen& seen) {
+  SimulationHooks hooks;
+  hooks.duration = [&](const SimulatedJob& job) {
+    return std::uniform_int_distribution<Ticks>(random() % 2 ? set.tasks[job.task].budget : 1,
+                                                set.tasks[job.task].budget)(random);
+  };
+  seen.add(simulate(set, dispatch, random_arrivals(set, 100, random), hooks));
+}
+
+struct Count {
+  int schedulable = 0, not_schedulable = 0;
+  void add(bool fits) { ++(fits ? schedulable : not_schedulable); }
+  void report(const char* what) const {
+    MESSAGE(std::string(what) << ": " << schedulable << " schedulable, " << not_schedulable << " not");
+    CHECK(schedulable > 0.15 * (schedulable + not_schedulable));
+    CHECK(not_schedulable > 0.15 * (schedulable + not_schedulable));
+  }
+};
+
+}  // namespace
+
+TEST_CASE("fixed priorities: every response bound is the longest simulated response") {
+  std::mt19937 random(1);
+  Count count;
+  for (int i = 0; i < kSets; ++i) {
+    const TaskSet set = random_set(random);
+    const ResponseBounds bounds = fixed_priority_responses(set.tasks);
+    const Seen seen = simulate_all_starts(set, Dispatch::fixed_priority);
+    CAPTURE(describe(set));
+    REQUIRE(bounds.exact);
+    for (size_t task = 0; task < set.tasks.size(); ++task) {
+      CAPTURE(task);
+      REQUIRE(bounds.bounds[task].has_value());
+      REQUIRE(*bounds.bounds[task] == seen.longest[task]);
+    }
+    const bool fits = verdict_of(set.tasks, bounds) == Verdict::schedulable;
+    REQUIRE(fits == !seen.late);
+    count.add(fits);
+    Seen attacked(set);
+    attack_at_random(set, Dispatch::fixed_priority, random, attacked);
+    for (size_t task = 0; task < set.tasks.size(); ++task) REQUIRE(attacked.longest[task] <= *bounds.bounds[task]);
+  }
+  count.report("fixed priorities");
+}
+
+TEST_CASE("EDF: a set fails the demand test exactly if a simulated job misses") {
+  std::mt19937 random(2);
+  Count count;
+  for (int i = 0; i < kSets; ++i) {
+    const TaskSet set = random_set(random, {.least_load = 0.75, .tight = 0.9});
+    const DemandAnswer answer = edf_demand_test(set.tasks);
+    Seen seen = simulate_all_starts(set, Dispatch::edf);
+    CAPTURE(describe(set));
+    REQUIRE(answer.verdict == (seen.late ? Verdict::not_schedulable : Verdict::schedulable));
+    REQUIRE(answer.overload.has_value() == seen.late);
+    count.add(!seen.late);
+    const ResponseBounds bounds = edf_responses(set.tasks);
+    REQUIRE(bounds.exact);
+    REQUIRE(verdict_of(set.tasks, bounds) == answer.verdict);
+    attack_at_random(set, Dispatch::edf, random, seen);
+    for (size_t task = 0; task < set.tasks.size(); ++task) REQUIRE(seen.longest[task] <= *bounds.bounds[task]);
+  }
+  count.report("EDF");
+}
