@@ -155,13 +155,14 @@ class Admitting {
         continue;
       }
       set.tasks[l].period = std::min(set.tasks[l].period, reserved[l].period_ns * set.ticks_per_ns);
+      set.tasks[l].sporadic = true;  // it is filled up when it was used up, not at releases
+      set.tasks[l].offset = 0;
       if (excess == 0) continue;
       analysis::TimedTask late = set.tasks[l];
       constexpr int64_t kOnce = 1000;  // longer than any window that the tests look at
       late.name += " beyond its budget";
       late.budget = excess;
       late.period *= kOnce;
-      late.offset = 0;
       set.tasks.push_back(late);
     }
     return set;

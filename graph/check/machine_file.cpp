@@ -127,13 +127,15 @@ CheckMachine read_machine_file(const std::filesystem::path& file, const MachineN
     machine.overheads_from =
         fmt::format("overheads measured{}", when.is_string() ? " " + when.get<std::string>() : std::string());
     if (where != here)
-      machine.warnings.push_back(fmt::format(
-          "{}: its overheads were measured on another machine ({}, {} cores, Linux {}; this is {}, {} cores, Linux {}); "
-          "call `takt doctor --measure` here",
-          file.string(), where.cpu, where.cores, where.kernel, here.cpu, here.cores, here.kernel));
+      machine.warnings.push_back(
+          fmt::format("{}: its overheads were measured on another machine ({}, {} cores, Linux {}; this is {}, {} "
+                      "cores, Linux {}); "
+                      "call `takt doctor --measure` here",
+                      file.string(), where.cpu, where.cores, where.kernel, here.cpu, here.cores, here.kernel));
   } catch (const std::exception& problem) {
-    machine.warnings.push_back(fmt::format("{}: no overheads can be read from it ({}); call `takt doctor --measure` again",
-                                           file.string(), problem.what()));
+    machine.warnings.push_back(
+        fmt::format("{}: no overheads can be read from it ({}); call `takt doctor --measure` again", file.string(),
+                    problem.what()));
   }
   return machine;
 }

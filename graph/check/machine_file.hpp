@@ -36,8 +36,8 @@ std::filesystem::path machine_file();
 CheckMachine read_machine_file(const std::filesystem::path& file, const MachineName& here,
                                const analysis::Overheads& assumed);
 
-/// Figures for a machine that nobody measured: generous ones for a virtual machine of two cores, a budget enforced on the
-/// kernel's tick, and the bandwidth that the kernel's settings allow SCHED_DEADLINE on `cores` CPUs
+/// Figures for a machine that nobody measured: generous ones for a virtual machine of two cores, a budget enforced on
+/// the kernel's tick, and the bandwidth that the kernel's settings allow SCHED_DEADLINE on `cores` CPUs
 /// (sched_rt_runtime_us / sched_rt_period_us, from Linux 6.12 on less 5 % for the fair server).
 analysis::Overheads assumed_overheads(size_t cores);
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "rt/sched/analysis/global_edf.hpp"
+#include "rt/sched/analysis/global_non_preemptive.hpp"
 #include "rt/sched/analysis/per_core.hpp"
 
 namespace takt::graph {
@@ -13,23 +14,47 @@ namespace {
 
 using analysis::TaskSet;
 
+double ms(const TaskSet& set, analysis::Ticks ticks) {
+  return static_cast<double>(ticks) / static_cast<double>(set.ticks_per_ns) / 1e6;
+}
+
 /// What no scheduler can do on that many cores.
 std::string impossible(const TaskSet& set) {
-  const double ms = 1e-6 / static_cast<double>(set.ticks_per_ns);
   for (const auto& t : set.tasks)
     if (t.budget + t.jitter > t.deadline)
       return fmt::format("{} needs up to {:.3f} ms with overheads, and has {:.3f} ms", t.name,
-                         static_cast<double>(t.budget + t.jitter) * ms, static_cast<double>(t.deadline) * ms);
+                         ms(set, t.budget + t.jitter), ms(set, t.deadline));
   constexpr double kRounding = 1e-9;
   if (const double all = set.utilisation(); all > set.cores + kRounding)
     return fmt::format("budgets and overheads ask for {:.2f} of {} core{}", all, set.cores, set.cores == 1 ? "" : "s");
   return "";
 }
 
+/// The first task whose response bound is missing or late, in ms.
+std::string late_one(const TaskSet& set, const std::vector<std::optional<analysis::Ticks>>& bounds) {
+  for (size_t t = 0; t < bounds.size(); ++t) {
+    const analysis::TimedTask& task = set.tasks[t];
+    if (!bounds[t]) return fmt::format("no bound on the response of {} is found", task.name);
+    if (*bounds[t] > task.deadline)
+      return fmt::format("{} may take {:.3f} ms from its release and has {:.3f} ms", task.name, ms(set, *bounds[t]),
+                         ms(set, task.deadline));
+  }
+  return "";
+}
+
 SetAnswer per_core(const TaskSet& set, analysis::CorePolicy policy, const char* by) {
   const analysis::CoreAnalysis found = analysis::analyse(set, policy);
-  SetAnswer result{Answer::not_proven, by, found.why, found.responses.bounds};
-  if (found.verdict == analysis::Verdict::schedulable) result.answer = Answer::admitted;
+  SetAnswer result{Answer::not_proven, by, "", found.responses.bounds};
+  result.response.resize(set.tasks.size());
+  if (found.verdict == analysis::Verdict::schedulable) {
+    result.answer = Answer::admitted;
+    for (size_t t = 0; t < set.tasks.size(); ++t)
+      if (!result.response[t] || *result.response[t] > set.tasks[t].deadline)
+        result.response[t] = set.tasks[t].deadline;
+    return result;
+  }
+  result.why = late_one(set, result.response);
+  if (result.why.empty()) result.why = found.why;
   // Exact for this assignment to cores; another one might fit.
   if (found.verdict == analysis::Verdict::not_schedulable && set.cores == 1) result.answer = Answer::infeasible;
   return result;
@@ -54,6 +79,18 @@ SetAnswer global(const TaskSet& set) {
   return result;
 }
 
+SetAnswer cooperative(const TaskSet& set) {
+  SetAnswer one;
+  if (set.cores == 1) {
+    one = per_core(set, analysis::CorePolicy::non_preemptive_edf, "non-preemptive EDF on one core");
+    if (one.answer != Answer::not_proven) return one;
+  }
+  const analysis::CoreAnalysis found = analysis::global_non_preemptive_edf(set);
+  SetAnswer result{Answer::not_proven, "non-preemptive EDF, all schedules explored", found.why, found.responses.bounds};
+  if (found.verdict == analysis::Verdict::schedulable) result.answer = Answer::admitted;
+  return result;
+}
+
 }  // namespace
 
 std::string_view to_string(Answer answer) {
@@ -73,8 +110,7 @@ SetAnswer analyse_set(const TaskSet& set, Policy policy) {
     case Policy::fixed: return per_core(set, analysis::CorePolicy::fixed_priority, "fixed priorities per core, exact");
     case Policy::cooperative: break;
   }
-  if (set.cores > 1) return {Answer::not_proven, "none", "no analysis of several cooperative workers", {}};
-  return per_core(set, analysis::CorePolicy::non_preemptive_edf, "non-preemptive EDF on one core");
+  return cooperative(set);
 }
 
 }  // namespace takt::graph

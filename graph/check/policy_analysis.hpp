@@ -23,7 +23,7 @@ struct SetAnswer {
 };
 
 /// deadline: global EDF, or exact EDF on one core. fixed: exact response times per core; tasks carry core and priority.
-/// cooperative: non-preemptive EDF. `with_responses` false may leave responses out.
+/// cooperative: non-preemptive EDF of one worker per core.
 SetAnswer analyse_set(const analysis::TaskSet& set, Policy policy);
 
 }  // namespace takt::graph

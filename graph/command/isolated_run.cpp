@@ -10,7 +10,6 @@
 #include <memory>
 
 #include "graph/attach/server.hpp"
-#include "graph/check/check.hpp"
 #include "graph/command/live_table.hpp"
 #include "graph/command/member_process.hpp"
 #include "graph/command/prepare.hpp"
@@ -85,7 +84,7 @@ class IsolatedRun {
     wait_for_all(ProcessRecord::composed);
     BoardExchange exchange(board_);
     graph::complete(plan_, exchange, 1);
-    admit();
+    if (const int code = admit(options_, graph_, plan_, adjusted_); code != kOk) throw Refused{code};
     const CpuLatencyHold latency = hold_cpu_dma_latency();
     tell_lacks(latency);
     transport_ = make_iceoryx_transport(plan_.ports);
@@ -151,12 +150,6 @@ class IsolatedRun {
       for (; told_ < faults_.size(); ++told_) std::fprintf(stderr, "takt: error: %s\n", faults_[told_].c_str());
     }
     return code_ != 0;
-  }
-
-  void admit() {
-    const graph::CheckResult check = graph::check(graph_, plan_);
-    if (check.admitted || options_.unchecked) return;
-    throw Refused{refuse(check.text + "(--unchecked runs it all the same)", kNotOk)};
   }
 
   void tell_lacks(const CpuLatencyHold& latency) {

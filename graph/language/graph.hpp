@@ -91,6 +91,7 @@ struct ScheduleSpec {
   std::string name, file;
   Policy policy = Policy::deadline;
   std::vector<int> cores;
+  Position cores_position;
   std::map<std::string, ScheduleEntry> entries;  ///< by node or device id
 };
 
