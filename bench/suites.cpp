@@ -7,6 +7,7 @@ namespace takt::bench {
 
 std::vector<Row> run_transport(const Options&);
 std::vector<Row> run_release(const Options&);
+std::vector<Row> run_release_loads(const Options&);
 std::vector<Row> run_graph(const Options&);
 #ifdef TAKT_BENCH_STEREO
 std::vector<Row> run_stereo(const Options&);
@@ -16,6 +17,7 @@ std::span<const Suite> suites() {
   static const auto list = std::to_array<Suite>({
       {"transport", "one message from output to input: one worker, threads, processes", run_transport},
       {"release", "lateness of the five rates against clock_nanosleep, idle and under load", run_release},
+      {"release_loads", "the same per rate, policy and load, beside cyclictest; seven minutes", run_release_loads},
       {"graph", "ten nodes, seven hops: in one process, as ten processes, and over other libraries", run_graph},
 #ifdef TAKT_BENCH_STEREO
       {"stereo", "dense disparity at 640x480, 150 disparities, against OpenCV's matchers", run_stereo},

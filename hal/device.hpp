@@ -2,7 +2,10 @@
 #pragma once
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <tl/expected.hpp>
+
+#include "rt/memory/job_calls.hpp"
 
 namespace takt {
 
@@ -47,6 +50,12 @@ inline const char* to_text(ReadStatus status) {
   return "?";
 }
 
+/// Bits of JobCall with the reason for them.
+struct DeclaredCalls {
+  uint32_t calls = 0;
+  std::string_view reason;
+};
+
 /// The life of every device: constructed (settings only) -> open() (claims hardware or files, checks everything,
 /// allocates everything) -> start(epoch) -> read ... -> stop() -> close(). open, start, stop and close run on the
 /// thread that composes the graph, before and after jobs; reads, triggers and commands on the job thread of the one
@@ -65,6 +74,8 @@ class Device {
   /// `epoch_ns` is the first planned instant of the run: sources that own their time line (replay, sim) begin there.
   virtual DeviceResult start(int64_t epoch_ns) = 0;
   virtual void stop() = 0;
+  /// Calls that reads, triggers and commands make although no job should, and why; known once the device is open.
+  virtual DeclaredCalls declared_calls() const { return {}; }
 };
 
 }  // namespace takt

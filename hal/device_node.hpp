@@ -36,6 +36,8 @@ class DeviceNode : public Node {
   }
   void open_in_setup() {
     if (const auto opened = device().open(); !opened) throw SetupError(opened.error().text());
+    const DeclaredCalls declared = device().declared_calls();
+    if (declared.calls != 0) may(declared.calls, declared.reason);
   }
 
  private:

@@ -23,6 +23,20 @@ void OutputPort::send(int64_t stamp_ns) {
   sent_ = loaned_ != nullptr;
 }
 
+void Node::may(uint32_t calls, std::string_view reason) {
+  allowed_calls_ |= calls;
+  reason_of_calls_ = reason;
+}
+
+Levels::Levels(Node* owner, std::initializer_list<QualityLevel> levels) {
+  if (levels.size() == 0 || levels.size() > kMaxLevels || levels.begin()->cost != 1.0)
+    throw std::logic_error("a node has 1 to " + std::to_string(kMaxLevels) + " quality levels, the first of cost 1");
+  for (const QualityLevel* level = levels.begin() + 1; level < levels.end(); ++level)
+    if (!(level->cost > 0) || !(level->cost < (level - 1)->cost))
+      throw std::logic_error("quality level " + std::string(level->name) + " must cost less than the one before it");
+  owner->levels_ = levels;
+}
+
 void Node::accept_requests() {
   control_ =
       std::make_unique<Input<Requests>>(this, "control", "requests to stop, start or pace this node", Need::optional);

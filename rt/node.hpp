@@ -3,6 +3,7 @@
 // as members; the runtime calls setup() and start() once, run() once per job on one thread at a time, finish() after
 // the last job.
 #pragma once
+#include <algorithm>
 #include <array>
 #include <filesystem>
 #include <functional>
@@ -14,6 +15,8 @@
 #include <string_view>
 #include <vector>
 
+#include "rt/level.hpp"
+#include "rt/memory/job_calls.hpp"
 #include "rt/msg/messages.hpp"
 #include "rt/param.hpp"
 #include "rt/shm/transport.hpp"
@@ -37,6 +40,14 @@ struct Setup {
   int64_t offset_ns = 0;     ///< the first release comes this long after the epoch
 };
 
+/// CPU time that a job may use.
+struct CpuBudget {
+  int64_t budget_ns = 0;           ///< 0: not stated
+  int64_t used_before_ns = 0;      ///< reading of `used_ns` from which on this job is charged
+  int64_t (*used_ns)() = nullptr;  ///< CPU clock of the calling thread; null: this job has used nothing yet
+  int64_t left_ns() const { return budget_ns - (used_ns != nullptr ? used_ns() - used_before_ns : 0); }
+};
+
 /// One activation of a node. All a job may observe besides its inputs comes from here (and is recorded).
 class Job {
  public:
@@ -44,16 +55,30 @@ class Job {
   int64_t deadline_ns() const { return deadline_ns_; }  ///< absolute
   uint64_t index() const { return index_; }             ///< 0, 1, 2 ... per node, skipped releases counted
   int64_t now_ns() const { return clock_->now_ns(); }
-  int64_t time_left_ns() const { return deadline_ns_ - now_ns(); }
-  int level() const { return level_; }  ///< 0 full quality; higher: the node should do less (on_overrun: degrade)
+  /// How long the job may go on: to its deadline, and if the schedule gives it a budget, until that is used up,
+  /// whichever comes first. Negative once it is over. In virtual time nothing has been used while a job runs. An
+  /// anytime node asks between two portions of its work and publishes the best so far; each question costs a system
+  /// call where there is a budget (0.2 us), so portions should take longer than that.
+  int64_t time_left_ns() const {
+    const int64_t to_deadline = deadline_ns_ - now_ns();
+    return cpu_.budget_ns > 0 ? std::min(to_deadline, cpu_.left_ns()) : to_deadline;
+  }
+  int level() const { return level_; }  ///< index into the node's Levels; 0 full quality (on_overrun: degrade)
   std::string_view mode() const { return mode_; }
   /// Says that this device's recorded data are used up; the run ends after the jobs under way.
   void end_of_data() { end_of_data_ = true; }
   /// Says that the job could not do its work (device silent, input unusable); counted, the run goes on.
   void no_result() { no_result_ = true; }
 
-  Job(const Clock& clock, uint64_t index, int64_t release_ns, int64_t deadline_ns, int level, std::string_view mode)
-      : clock_(&clock), index_(index), release_ns_(release_ns), deadline_ns_(deadline_ns), level_(level), mode_(mode) {}
+  Job(const Clock& clock, uint64_t index, int64_t release_ns, int64_t deadline_ns, int level, std::string_view mode,
+      const CpuBudget& cpu = {})
+      : clock_(&clock),
+        index_(index),
+        release_ns_(release_ns),
+        deadline_ns_(deadline_ns),
+        cpu_(cpu),
+        level_(level),
+        mode_(mode) {}
   bool ended() const { return end_of_data_; }
   bool without_result() const { return no_result_; }
 
@@ -61,6 +86,7 @@ class Job {
   const Clock* clock_;
   uint64_t index_;
   int64_t release_ns_, deadline_ns_;
+  CpuBudget cpu_;
   int level_;
   std::string_view mode_;
   bool end_of_data_ = false, no_result_ = false;
@@ -94,6 +120,8 @@ class InputPort {
   /// True if message i was not latched by an earlier job.
   bool is_new(size_t i) const { return held_[i].sequence > last_seen_before_; }
   bool is_new() const { return held_count_ > 0 && is_new(held_count_ - 1); }
+  /// Quality level of the job that made message i.
+  int level(size_t i) const { return held_[i].header->level; }
 
  protected:
   const void* message(size_t i) const { return held_[i].message(); }
@@ -187,18 +215,30 @@ class Node {
   /// Null if the node takes no requests.
   const Input<Requests>* control() const { return control_.get(); }
 
+  /// In the constructor or in setup: jobs of this node make calls that no job should, and why. They are not counted as
+  /// violations.
+  void may(uint32_t calls, std::string_view reason);                     ///< bits of JobCall
+  uint32_t allowed_calls() const { return allowed_calls_; }              ///< bits of JobCall
+  std::string_view reason_of_calls() const { return reason_of_calls_; }  ///< empty if it declares none
+
   const std::vector<InputPort*>& inputs() const { return inputs_; }
   const std::vector<OutputPort*>& outputs() const { return outputs_; }
   const std::vector<ParamBase*>& params() const { return params_; }
+  /// Best first, at least one.
+  const std::vector<QualityLevel>& levels() const { return levels_; }
 
  private:
   friend class InputPort;
   friend class OutputPort;
   friend class ParamBase;
+  friend class Levels;
   std::vector<InputPort*> inputs_;
   std::vector<OutputPort*> outputs_;
   std::vector<ParamBase*> params_;
+  std::vector<QualityLevel> levels_{{"full", 1.0}};
   std::unique_ptr<Input<Requests>> control_;
+  uint32_t allowed_calls_ = 0;
+  std::string_view reason_of_calls_;
 };
 
 /// Layers of the thesis (Sec. 2.2): an edge goes to the same, the next or the storage layer, or from storage to any.

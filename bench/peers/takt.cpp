@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Takt's transport between processes: chunks through iceoryx, the wake-up by a doorbell in shared memory.
+// Takt's transports between processes, iceoryx and local; the wake-up by a doorbell in shared memory.
 #include <sys/mman.h>
 
 #include <array>
@@ -12,6 +12,7 @@
 #include "bench/suite.hpp"
 #include "rt/msg/messages.hpp"
 #include "rt/shm/iceoryx_transport.hpp"
+#include "rt/shm/local_transport.hpp"
 
 namespace takt::bench {
 namespace {
@@ -24,9 +25,9 @@ using Doorbells = std::array<Doorbell, kMaxNodes>;
 
 class TaktEnds final : public Ends {
  public:
-  TaktEnds(const GraphShape& shape, size_t node, std::span<const PortPlan> all, size_t first, const std::string& domain,
-           Doorbells& bells)
-      : bell_(bells[node].word), transport_(join_iceoryx_transport(all, domain)) {
+  /// `first`: the port of node 0.
+  TaktEnds(const GraphShape& shape, size_t node, std::unique_ptr<Transport> transport, size_t first, Doorbells& bells)
+      : bell_(bells[node].word), transport_(std::move(transport)) {
     if (node != shape.sink()) writer_ = transport_->make_writer(first + node);
     if (const auto producer = shape.trigger(node)) inputs_.push_back({transport_->make_reader(first + *producer)});
     for (size_t producer : shape.sides(node)) inputs_.push_back({transport_->make_reader(first + producer)});
@@ -73,7 +74,7 @@ class TaktEnds final : public Ends {
   bool loaned_ = false;
 };
 
-class Takt final : public Medium {
+class Takt : public Medium {
  public:
   explicit Takt(const MediumPlan& plan) : plan_(plan) {
     if (plan.shape.nodes > kMaxNodes) throw CannotRun("a graph of more than " + std::to_string(kMaxNodes) + " nodes");
@@ -85,28 +86,50 @@ class Takt final : public Medium {
   Takt(const Takt&) = delete;
   Takt& operator=(const Takt&) = delete;
 
-  std::vector<PortPlan> pools() const override {
+ protected:
+  std::vector<PortPlan> ports() const {
     std::vector<PortPlan> pools;
     for (size_t node = 0; node < plan_.shape.sink(); ++node)
       pools.push_back(pool_plan(plan_.id + std::to_string(node), plan_.bytes + kPoolGap,
                                 static_cast<uint32_t>(plan_.shape.leaving(node).size())));
     return pools;
   }
+  std::unique_ptr<Ends> open(size_t node, std::unique_ptr<Transport> transport, size_t first) {
+    return std::make_unique<TaktEnds>(plan_.shape, node, std::move(transport), first, *bells_);
+  }
+
+ private:
+  const MediumPlan plan_;
+  Doorbells* bells_ = nullptr;
+};
+
+class TaktOverIceoryx final : public Takt {
+ public:
+  using Takt::Takt;
+  std::vector<PortPlan> pools() const override { return ports(); }
   void served(std::span<const PortPlan> all, size_t first, const std::string& domain) override {
     all_.assign(all.begin(), all.end());
     first_ = first;
     domain_ = domain;
   }
   std::unique_ptr<Ends> open(size_t node) override {
-    return std::make_unique<TaktEnds>(plan_.shape, node, all_, first_, domain_, *bells_);
+    return Takt::open(node, join_iceoryx_transport(all_, domain_), first_);
   }
 
  private:
-  const MediumPlan plan_;
-  Doorbells* bells_ = nullptr;
   std::vector<PortPlan> all_;
   size_t first_ = 0;
   std::string domain_;
+};
+
+class TaktLocal final : public Takt {
+ public:
+  explicit TaktLocal(const MediumPlan& plan) : Takt(plan), made_(make_local_transport(ports(), file_)) {}
+  std::unique_ptr<Ends> open(size_t node) override { return Takt::open(node, join_local_transport(ports(), file_), 0); }
+
+ private:
+  const PoolFile file_;
+  const std::unique_ptr<Transport> made_;
 };
 
 }  // namespace
@@ -117,6 +140,8 @@ PortPlan pool_plan(const std::string& name, uint32_t bytes, uint32_t readers) {
   return {"bench", name, &MessageType::of<Image>(), {.width = pixels, .height = 1, .channels = 1}, 2, readers, readers};
 }
 
-std::unique_ptr<Medium> make_takt(const MediumPlan& plan) { return std::make_unique<Takt>(plan); }
+std::unique_ptr<Medium> make_takt(const MediumPlan& plan) { return std::make_unique<TaktOverIceoryx>(plan); }
+
+std::unique_ptr<Medium> make_takt_local(const MediumPlan& plan) { return std::make_unique<TaktLocal>(plan); }
 
 }  // namespace takt::bench

@@ -197,7 +197,7 @@ void in_process(uint32_t bytes, const Condition& condition, int rounds, std::vec
 
 void processes(uint32_t bytes, const Condition& condition, int rounds, std::vector<Row>& rows) {
   const GraphShape shape = chain10();
-  std::vector<std::string> names{"iceoryx", "iceoryx_null", "takt"};
+  std::vector<std::string> names{"iceoryx", "iceoryx_null", "takt", "takt_local"};
   std::vector<std::unique_ptr<Medium>> media;
   const auto plan = [&](const std::string& name) {
     return MediumPlan{shape, bytes, name + "_" + std::to_string(getpid()) + "_" + std::to_string(bytes)};
@@ -205,6 +205,7 @@ void processes(uint32_t bytes, const Condition& condition, int rounds, std::vect
   media.push_back(make_iceoryx(plan("iox_a")));
   media.push_back(make_iceoryx(plan("iox_b")));
   media.push_back(make_takt(plan("takt")));
+  media.push_back(make_takt_local(plan("takt_local")));
   for (const Peer& peer : peers()) {
     if (peer.processes == nullptr) continue;
     names.push_back(peer.name);
@@ -218,7 +219,7 @@ void processes(uint32_t bytes, const Condition& condition, int rounds, std::vect
                                                  condition.reservation));
   daemon = make_iceoryx_transport(pools);
   for (auto& graph : graphs) graph->start();
-  drop_failed(graphs, 3);
+  drop_failed(graphs, 4);
 
   Turns turns(graphs, 0, false, now_ns() + 20'000'000);
   std::vector<Measured> measured(graphs.size());

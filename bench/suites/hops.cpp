@@ -84,10 +84,11 @@ void listen_raw(Board& board, size_t hop) {
 
 std::string HopPlan::name() const {
   const char* where = place == Place::same_worker ? "same_worker" : place == Place::threads ? "threads" : "processes";
-  std::string name = carrier == Carrier::futex     ? "futex"
-                     : carrier == Carrier::takt    ? "takt"
-                     : carrier == Carrier::iceoryx ? "iceoryx"
-                                                   : peer.name;
+  std::string name = carrier == Carrier::futex        ? "futex"
+                     : carrier == Carrier::takt       ? "takt"
+                     : carrier == Carrier::takt_local ? "takt_local"
+                     : carrier == Carrier::iceoryx    ? "iceoryx"
+                                                      : peer.name;
   name += '_';
   name += where;
   if (bytes > 0) name += '_' + std::to_string(bytes);
@@ -115,9 +116,9 @@ class Course::Sender {
       });
       return;
     }
-    if (plan_.carrier == Carrier::takt && writer_->loan() == nullptr) return;
+    if (by_takt(plan_.carrier) && writer_->loan() == nullptr) return;
     start();
-    if (plan_.carrier == Carrier::takt) writer_->publish(0, 0, 0);
+    if (by_takt(plan_.carrier)) writer_->publish(0, 0, 0);
     if (plan_.place == Place::same_worker) take_newest(*reader_, &line_);
     else wake(line_.word);
   }
@@ -178,7 +179,7 @@ Course::Course(std::vector<HopPlan> hops, const Conditions& conditions)
     listen_in_child();
     std::exit(0);  // not _exit: iceoryx removes its socket and lock in a static destructor
   }
-  local_ = make_local_transport(std::span(ports_).first(own_));
+  local_ = make_local_transport(std::span(ports_).first(own_), pools_);
   across_ = make_iceoryx_transport(ports_);
   std::strncpy(board_->domain, iceoryx_domain(getpid()).c_str(), sizeof board_->domain - 1);
   const IceoryxLayout layout = IceoryxLayout::of(ports_);
@@ -186,8 +187,9 @@ Course::Course(std::vector<HopPlan> hops, const Conditions& conditions)
   uint32_t expected = 0;
   for (size_t i = 0; i < own_; ++i) {
     const HopPlan& hop = hops_[i];
-    Transport& transport = hop.place == Place::processes ? *across_ : *local_;
-    const bool carries = hop.carrier == Carrier::takt;
+    const bool over_iceoryx = hop.place == Place::processes && hop.carrier != Carrier::takt_local;
+    Transport& transport = over_iceoryx ? *across_ : *local_;
+    const bool carries = by_takt(hop.carrier);
     senders_.push_back(std::make_unique<Sender>(hop, *board_, i, carries ? transport.make_writer(i) : nullptr,
                                                 hop.place == Place::same_worker ? transport.make_reader(i) : nullptr,
                                                 layout.pools[layout.pool_of_port[i]].loan_bytes));
@@ -227,12 +229,17 @@ void Course::start_peers() {
 
 void Course::listen_in_child() {
   while (board_->daemon_up.load() == 0) sleep_until(now_ns() + 1'000'000);
-  const auto transport = join_iceoryx_transport(ports_, board_->domain);
+  const auto across = join_iceoryx_transport(ports_, board_->domain);
+  const auto local = join_local_transport(std::span(ports_).first(own_), pools_);
   Listeners listeners(*board_);
-  for (size_t i = 0; i < own_; ++i)
-    if (hops_[i].place == Place::processes)
-      listeners.start(i, hops_[i], conditions_,
-                      hops_[i].carrier == Carrier::takt ? transport->make_reader(i) : nullptr);
+  for (size_t i = 0; i < own_; ++i) {
+    const Carrier carrier = hops_[i].carrier;
+    if (hops_[i].place != Place::processes) continue;
+    listeners.start(i, hops_[i], conditions_,
+                    carrier == Carrier::takt         ? across->make_reader(i)
+                    : carrier == Carrier::takt_local ? local->make_reader(i)
+                                                     : nullptr);
+  }
   while (board_->stop.load() == 0) sleep_until(now_ns() + 20'000'000);
 }
 

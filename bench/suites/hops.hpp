@@ -12,12 +12,16 @@
 #include "bench/instants.hpp"
 #include "bench/peers/rung_graph.hpp"
 #include "rt/sched/grant.hpp"
-#include "rt/shm/transport.hpp"
+#include "rt/shm/local_transport.hpp"
 
 namespace takt::bench {
 
-enum class Carrier : uint8_t { futex, takt, iceoryx, peer };
+/// takt: as a run has it, local within a process and iceoryx between processes; takt_local: local between them, too.
+enum class Carrier : uint8_t { futex, takt, takt_local, iceoryx, peer };
 enum class Place : uint8_t { same_worker, threads, processes };
+
+/// True if messages are carried by a transport of Takt.
+constexpr bool by_takt(Carrier carrier) { return carrier == Carrier::takt || carrier == Carrier::takt_local; }
 
 /// What is to be carried, and how.
 struct HopPlan {
@@ -84,6 +88,7 @@ class Course {
   int child_ = -1;
   size_t own_ = 0;
   std::vector<PortPlan> ports_;  ///< of the own hops, then what peers need
+  PoolFile pools_;               ///< behind local_, for the listening process
   std::unique_ptr<Transport> local_, across_;
   std::vector<std::unique_ptr<RungGraph>> peers_;  ///< of hops own_, own_ + 1 ...; must end before the daemon
   std::vector<std::unique_ptr<Sender>> senders_;

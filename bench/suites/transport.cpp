@@ -33,6 +33,7 @@ std::vector<HopPlan> contestants() {
     hops.push_back({Carrier::takt, Place::same_worker, bytes, false});
     hops.push_back({Carrier::takt, Place::threads, bytes, false});
     hops.push_back({Carrier::takt, Place::processes, bytes, false});
+    hops.push_back({Carrier::takt_local, Place::processes, bytes, false});
     hops.push_back({Carrier::iceoryx, Place::processes, bytes, false});
   }
   for (const Peer& peer : peers())
@@ -149,11 +150,14 @@ class Table {
       compare("same_worker_" + size, find(hops_, Carrier::takt, Place::same_worker, bytes), threads);
       compare("threads_" + size, find(hops_, Carrier::takt, Place::threads, bytes), threads);
       compare("processes_" + size, across, processes);
+      compare("processes_local_" + size, find(hops_, Carrier::takt_local, Place::processes, bytes), processes);
       compare("processes_" + size + "_to_iceoryx", across, find(hops_, Carrier::iceoryx, Place::processes, bytes));
       compare("iceoryx_processes_" + size, find(hops_, Carrier::iceoryx, Place::processes, bytes), processes);
     }
     compare("processes_largest_to_smallest", find(hops_, Carrier::takt, Place::processes, kSizes[2]),
             find(hops_, Carrier::takt, Place::processes, kSizes[0]));
+    compare("processes_local_largest_to_smallest", find(hops_, Carrier::takt_local, Place::processes, kSizes[2]),
+            find(hops_, Carrier::takt_local, Place::processes, kSizes[0]));
     compare("threads_largest_to_smallest", find(hops_, Carrier::takt, Place::threads, kSizes[2]),
             find(hops_, Carrier::takt, Place::threads, kSizes[0]));
   }
@@ -225,12 +229,13 @@ Row start_row(const char* name, std::unique_ptr<Transport> (*make)(std::span<con
   return row;
 }
 
+std::unique_ptr<Transport> make_local(std::span<const PortPlan> ports) { return make_local_transport(ports); }
+
 }  // namespace
 
 std::vector<Row> run_transport(const Options& options) {
   const int rounds = options.rounds_or(8);
-  std::vector<Row> rows{start_row("local", make_local_transport, rounds),
-                        start_row("iceoryx", make_iceoryx_transport, rounds)};
+  std::vector<Row> rows{start_row("local", make_local, rounds), start_row("iceoryx", make_iceoryx_transport, rounds)};
   const auto fifo = [](int core) {
     Reservation r;
     r.policy = Policy::fixed;

@@ -127,12 +127,13 @@ bool Server::answer(const Json& question, Connection& connection) {
   const std::string what = question.value("do", "");
   if (what == "top") return connection.write(top());
   if (what == "echo") return echo(question, connection);
+  if (what == "mode") return connection.write(change_mode(question.value("mode", "")));
   if (what == "set") return connection.write(set(question.value("param", ""), question.value("value", "")));
   if (what == "stop") {
     subject_.board.stop().raise(now_ns());
     return connection.write({{"ok", true}});
   }
-  return connection.write(wrong("unknown question " + what + "; known: top, echo, set, stop"));
+  return connection.write(wrong("unknown question " + what + "; known: top, echo, set, mode, stop"));
 }
 
 Json Server::top() const {
@@ -147,6 +148,7 @@ Json Server::top() const {
                      {"deadline_misses", s.deadline_misses.load()},
                      {"skipped", s.skipped.load()},
                      {"paused", s.paused.load()},
+                     {"level", s.last_level.load()},
                      {"exec_ms", static_cast<double>(s.last_exec_ns.load()) / 1e6},
                      {"response_ms", static_cast<double>(s.last_response_ns.load()) / 1e6}});
   }
@@ -205,6 +207,7 @@ bool Server::stream(size_t port, bool picture, int64_t count, Connection& connec
     std::unique_ptr<Held, decltype(let_go)> holding(&held, let_go);
     Json line{{"type", plan.type->name},
               {"sequence", held.sequence},
+              {"level", held.header->level},
               {"stamp_ns", held.stamp_ns},
               {"age_ms", static_cast<double>(now_ns() - held.stamp_ns) / 1e6},
               {"message", message_json(*plan.type, held.message())}};
@@ -219,6 +222,21 @@ bool Server::stream(size_t port, bool picture, int64_t count, Connection& connec
     ++sent;
   }
   return true;
+}
+
+Json Server::change_mode(const std::string& name) {
+  const Plan& plan = subject_.plan;
+  std::vector<std::string> names;
+  for (const ModePlan& mode : plan.modes) names.push_back(mode.name);
+  const auto mode = std::find(names.begin(), names.end(), name);
+  if (mode == names.end())
+    return wrong(fmt::format("this run, started in mode {}, cannot change to {}{}", graph::ticked(plan.mode),
+                             graph::ticked(name), graph::alternatives(name, names, "its modes")));
+  const auto index = static_cast<uint32_t>(mode - names.begin());
+  const int64_t from_ns = now_ns() + ModeLog::kLead_ns;
+  if (!subject_.board.modes().request(index, from_ns, "asked for by takt mode", true))
+    return wrong("the mode of this run has been changed too often; stop it and start it anew");
+  return {{"ok", true}};
 }
 
 Json Server::set(const std::string& name, const std::string& text) {

@@ -23,8 +23,9 @@ struct Subject {
   Transport& transport;
 };
 
-/// Answers top, echo, set and stop for one run, from threads of the default policy that only read the board, hold one
-/// message of an output at a time, and post parameters to be taken between jobs. Only its own user (and root) is heard.
+/// Answers top, echo, set, mode and stop for one run, from threads of the default policy that only read the board, hold
+/// one message of an output at a time, and post parameters to be taken between jobs. Only its own user (and root) is
+/// heard.
 class Server {
  public:
   explicit Server(const Subject& subject);
@@ -48,6 +49,7 @@ class Server {
   /// The right to listen to an output, given back when it is dropped; null while somebody else has it.
   std::shared_ptr<void> claim_tap(size_t port);
   bool stream(size_t port, bool picture, int64_t count, Connection& connection);
+  nlohmann::ordered_json change_mode(const std::string& name);
   nlohmann::ordered_json set(const std::string& name, const std::string& text);
   nlohmann::ordered_json post_and_wait(size_t task, size_t param, const ParamValue& value);
   size_t find_port(const std::string& name) const;

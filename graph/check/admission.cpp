@@ -52,6 +52,12 @@ class Admitting {
 
   Admission run() {
     result_.answer = Answer::admitted;
+    for (const auto& [low, high] : low_before_high(plan_))
+      result_.notes.push_back(
+          fmt::format("{} (low criticality) runs on the worker of {} (high), which waits for it: a job of it that does "
+                      "not end would "
+                      "stop both; give {} a `rate`, or `criticality: high`",
+                      plan_.tasks[low].name, plan_.tasks[high].name, plan_.tasks[low].name));
     for (std::string& reason : impossible(plan_)) refuse(Answer::infeasible, std::move(reason));
     if (result_.answer == Answer::infeasible) return std::move(result_);
     for (const TaskPlan& task : plan_.tasks)
@@ -172,16 +178,6 @@ class Admitting {
     if (plan_.policy == Policy::cooperative) {
       result_.notes.push_back("cooperative: nothing is enforced, a node that overruns its budget delays the others");
       return;
-    }
-    for (const auto& lane : lanes_.lanes) {
-      const auto low = std::find_if(lane.begin(), lane.end(),
-                                    [&](size_t t) { return plan_.tasks[t].criticality == Criticality::low; });
-      const auto high = std::find_if(lane.begin(), lane.end(),
-                                     [&](size_t t) { return plan_.tasks[t].criticality == Criticality::high; });
-      if (low != lane.end() && high != lane.end())
-        result_.notes.push_back(
-            fmt::format("{} (high) shares the thread of a lane with {} (low) and is late if that overruns",
-                        plan_.tasks[*high].name, plan_.tasks[*low].name));
     }
     const SetAnswer answer = analyse_set(with_overruns(), plan_.policy);
     if (answer.answer == Answer::admitted || high_ones_keep_up(answer)) return;

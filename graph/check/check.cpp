@@ -178,6 +178,7 @@ CheckResult check(const GraphSpec& graph, const Plan& plan, const CheckOptions& 
     result.problems.push_back(to_string(Problem{graph.schedule.cores_position, wrong}));
   }
   check_modes(graph, plan, options, result);
+  result.notes = result.modes.front().admission.notes;
   result.admitted = result.answer == Answer::admitted && result.verdict != Verdict::invalid;
   result.text = check_text(graph, plan, options, result);
   result.json = check_json(plan, options, result);

@@ -53,6 +53,7 @@ struct CheckResult {
   size_t cores = 0;
   uint64_t pool_bytes = 0;
   std::vector<std::string> unbudgeted;  ///< tasks whose budget is not stated: not counted
+  std::vector<std::string> notes;       ///< what is admitted and yet a risk
   std::vector<std::string> problems;    ///< why it is not admitted: the task, the value, what would make it fit
   std::vector<PoolUse> pools;
   std::vector<CoreUse> core_use;

@@ -30,7 +30,7 @@ std::string head_text(const GraphSpec& graph, const Plan& plan, const CheckOptio
   for (const std::string& problem : result.problems) text += problem + "\n";
   for (const ModeCheck& mode : result.modes)
     if (!mode.change.empty()) text += (mode.mode == plan.mode ? "" : "mode " + mode.mode + ": ") + mode.change + "\n";
-  for (const std::string& note : admission.notes) text += "note: " + note + "\n";
+  for (const std::string& note : result.notes) text += "note: " + note + "\n";
   for (const std::string& warning : options.machine.warnings) text += "warning: " + warning + "\n";
   text += fmt::format("budgets ask for {:.2f} of {} core{}, pools take {:.1f} MB\n", result.utilisation, result.cores,
                       result.cores == 1 ? "" : "s", static_cast<double>(result.pool_bytes) / 1e6);
@@ -150,6 +150,7 @@ Json check_json(const Plan& plan, const CheckOptions& options, const CheckResult
   json["policy"] = to_string(plan.policy);
   json["analysis"] = whole.admission.by;
   json["problems"] = result.problems;
+  json["notes"] = result.notes;
   if (!whole.change.empty()) json["change"] = whole.change;
   json["utilisation"] = result.utilisation;
   json["cores"] = result.cores;

@@ -20,6 +20,10 @@ std::string node_text(const NodeType& type) {
                         input->need() == Need::optional ? " (optional)" : "");
   for (const OutputPort* output : node->outputs())
     text += fmt::format("  out  {:<14} {:<14} {}\n", output->name(), output->type().name, output->doc());
+  if (node->levels().size() > 1)
+    for (size_t l = 0; l < node->levels().size(); ++l)
+      text += fmt::format("  level {:<12} {:<14} {} (about {:g} of the CPU time)\n", l, node->levels()[l].name,
+                          node->levels()[l].doc, node->levels()[l].cost);
   if (!node->params().empty())
     text += fmt::format("  {:<19} {:>12} {:<5} {:<22} {}\n", "parameter", "default", "unit", "valid", "meaning");
   for (const ParamBase* param : node->params())

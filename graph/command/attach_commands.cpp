@@ -133,6 +133,9 @@ void add_attach_commands(CLI::App& app, AttachOptions& o, int& exit_code) {
   set->add_option("param", o.param, "NODE.PARAM")->required();
   set->add_option("value", o.value, "with its unit")->required();
   set->callback([&] { exit_code = run_question(o, {{"do", "set"}, {"param", o.param}, {"value", o.value}}); });
+  CLI::App* mode = add(app, "mode", "changes the mode of a running graph", o);
+  mode->add_option("mode", o.mode, "a mode of the graph, full or safe_stop")->required();
+  mode->callback([&] { exit_code = run_question(o, {{"do", "mode"}, {"mode", o.mode}}); });
   CLI::App* stop = add(app, "stop", "ends a running graph cleanly", o);
   stop->callback([&] { exit_code = run_question(o, {{"do", "stop"}}); });
 }

@@ -10,7 +10,7 @@ namespace takt::command {
 struct AttachOptions {
   int run = 0;  ///< process id; 0: the only one that runs
   bool once = false, json = false;
-  std::string port, param, value;
+  std::string port, param, value, mode;
   std::filesystem::path png;
   int64_t count = 1;
 };

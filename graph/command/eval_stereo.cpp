@@ -12,6 +12,7 @@
 #include "graph/command/run_command.hpp"
 #include "nodes/stereo/evaluate.hpp"
 #include "nodes/stereo/evaluate_peers.hpp"
+#include "nodes/stereo/half_resolution.hpp"
 #include "nodes/stereo/matcher.hpp"
 #include "rt/time/clock.hpp"
 
@@ -89,9 +90,11 @@ double median(std::vector<double> v) {
   return v[v.size() / 2];
 }
 
+/// AnyMatcher: one of the node's quality levels.
+template <class AnyMatcher>
 Json run_ours(const cv::Mat& left, const cv::Mat& right, const stereo::DisparityImage& truth,
               const stereo::MatcherParameters& p) {
-  stereo::Matcher matcher(left.cols, left.rows, left.channels(), p);
+  AnyMatcher matcher(left.cols, left.rows, left.channels(), p);
   cv::Mat disparity(left.size(), CV_16S), confidence(left.size(), CV_8U);
   const ImageView<int16_t> d{disparity.ptr<int16_t>(), left.cols, left.rows};
   std::vector<double> times;
@@ -126,7 +129,8 @@ Json measure(const EvalStereoOptions& options) {
     throw BadData(fmt::format("{}: {} x {}, the images are {} x {}", options.truth.string(), truth.width, truth.height,
                               left.cols, left.rows));
   const stereo::MatcherParameters p = parameters(options);
-  Json out = run_ours(left, right, truth, p);
+  Json out = run_ours<stereo::Matcher>(left, right, truth, p);
+  out["levels"]["half"] = run_ours<stereo::HalfMatcher>(left, right, truth, p);
   stereo::DisparityImage middle = truth;
   std::fill(middle.pixels.begin(), middle.pixels.end(), static_cast<float>(p.disparities) / 2);
   out["baseline"] = row(stereo::score(middle, truth), 0);
@@ -147,6 +151,7 @@ int evaluate(const EvalStereoOptions& options) {
     }
     std::printf("%-34s %9s %9s %10s %9s\n", "method", "bad >1px", "bad, all", "density %", "CPU ms");
     print_row("takt stereo", out);
+    print_row("takt stereo, level half", out["levels"]["half"]);
     for (const auto& [name, peer] : out["peers"].items()) print_row(name.c_str(), peer);
     print_row("half the search range everywhere", out["baseline"]);
     return kOk;

@@ -17,6 +17,7 @@
 #include "graph/command/run_support.hpp"
 #include "rt/sched/executor.hpp"
 #include "rt/shm/iceoryx_preflight.hpp"
+#include "rt/shm/local_transport.hpp"
 #include "rt/shm/transport_error.hpp"
 #include "rt/supervise/private_mounts.hpp"
 #include "rt/supervise/process_group.hpp"
@@ -49,6 +50,12 @@ std::unique_ptr<DaemonClaim> find_room_for_daemon(std::vector<std::string>& adju
   }
 }
 
+/// Throws `refused` on if the command line asks for iceoryx.
+void note_local_instead(const RunOptions& options, const TransportError& refused, std::vector<std::string>& adjusted) {
+  if (options.transport == "iceoryx") throw refused;
+  adjusted.push_back(fmt::format("transport iceoryx -> local: {}", refused.what()));
+}
+
 class IsolatedRun {
  public:
   IsolatedRun(const RunOptions& options, const graph::GraphSpec& graph, std::vector<std::string> adjusted,
@@ -76,7 +83,7 @@ class IsolatedRun {
     for (size_t p = 0; p < partition_.names.size(); ++p)
       group_.start(partition_.names[p], [this, p, supervisor = getpid()]() -> int {
         try {
-          return run_member(options_, graph_, partition_, p, supervisor, board_);
+          return run_member(options_, graph_, partition_, p, supervisor, board_, pools_);
         } catch (const std::exception& problem) {  // as in a run in one process: no memory, no daemon, no thread
           return refuse(fmt::format("process {}: {}", partition_.names[p], problem.what()), kDeviceOrSystem);
         }
@@ -87,9 +94,7 @@ class IsolatedRun {
     if (const int code = admit(options_, graph_, plan_, adjusted_); code != kOk) throw Refused{code};
     const CpuLatencyHold latency = hold_cpu_dma_latency();
     tell_lacks(latency);
-    transport_ = make_iceoryx_transport(plan_.ports);
-    claim_.reset();
-    board_.transport_up().store(true);
+    board_.carrier().store(bring_up_transport());
     agree_on_policy();
     wait_for_all(ProcessRecord::running);
     const int64_t steal_before_ms = ProcessReading::now().steal_ms, cpu_before_ns = ProcessReading::now().cpu_ns;
@@ -150,6 +155,22 @@ class IsolatedRun {
       for (; told_ < faults_.size(); ++told_) std::fprintf(stderr, "takt: error: %s\n", faults_[told_].c_str());
     }
     return code_ != 0;
+  }
+
+  /// iceoryx if there is room for its daemon; otherwise the local one, if the command line does not forbid it.
+  RunBoard::Carrier bring_up_transport() {
+    if (claim_) {
+      try {
+        transport_ = make_iceoryx_transport(plan_.ports);
+        claim_.reset();
+        return RunBoard::iceoryx;
+      } catch (const TransportError& refused) {
+        note_local_instead(options_, refused, adjusted_);
+        std::fprintf(stderr, "takt: adjusted: %s\n", adjusted_.back().c_str());
+      }
+    }
+    transport_ = make_local_transport(plan_.ports, pools_);
+    return RunBoard::local;
   }
 
   void tell_lacks(const CpuLatencyHold& latency) {
@@ -219,7 +240,7 @@ class IsolatedRun {
                                std::string(to_string(plan_.policy)), "subsystem", partition_.names, adjusted_});
     for (const std::string& fault : faults_) report["faults"].push_back({{"what", fault}});
     if (!faults_.empty()) report["ok"] = false;
-    const int told = tell(options_, graph_, report);
+    const int told = tell_faults(options_, graph_, board_, granted_, report);
     return code_ != 0 ? code_ : told;
   }
 
@@ -233,6 +254,7 @@ class IsolatedRun {
   const graph::Partition partition_;
   RunBoard board_;
   const Stoppable stoppable_;
+  const PoolFile pools_;  ///< of the local transport
   Policy granted_ = Policy::cooperative;
   int code_ = 0;
   size_t told_ = 0;
@@ -244,14 +266,19 @@ class IsolatedRun {
 
 }  // namespace
 
-IsolatedEnd run_isolated(const RunOptions& options, const graph::GraphSpec& graph, std::vector<std::string> adjusted) {
+int run_isolated(const RunOptions& options, const graph::GraphSpec& graph, std::vector<std::string> adjusted) {
+  std::unique_ptr<DaemonClaim> claim;
+  if (options.transport != "local") {
+    try {
+      claim = find_room_for_daemon(adjusted);
+    } catch (const TransportError& refused) {
+      note_local_instead(options, refused, adjusted);
+    }
+  }
   try {
-    auto claim = find_room_for_daemon(adjusted);
-    return {IsolatedRun(options, graph, std::move(adjusted), std::move(claim)).run(), ""};
-  } catch (const TransportError& refused) {
-    return {0, refused.what()};
+    return IsolatedRun(options, graph, std::move(adjusted), std::move(claim)).run();
   } catch (const Refused& refused) {
-    return {refused.code, ""};
+    return refused.code;
   }
 }
 

@@ -7,14 +7,10 @@
 
 namespace takt::command {
 
-/// How a run in several processes ended, or why there can be none on this machine (nothing was started then).
-struct IsolatedEnd {
-  int code = 0;
-  std::string not_isolated;
-};
-
-/// Supervises a run with one process for the devices and one per subsystem: owns the iceoryx daemon, the epoch, the
-/// report, and the order in which everything ends. Before this process has any other thread.
-IsolatedEnd run_isolated(const RunOptions& options, const graph::GraphSpec& graph, std::vector<std::string> adjusted);
+/// Supervises a run with one process for the devices and one per subsystem: owns the transport (with the iceoryx
+/// daemon), the epoch, the report, and the order in which everything ends; returns the exit code. Before this process
+/// has any other thread. Throws TransportError if the command line asks for iceoryx and there is no room for its
+/// daemon.
+int run_isolated(const RunOptions& options, const graph::GraphSpec& graph, std::vector<std::string> adjusted);
 
 }  // namespace takt::command

@@ -60,7 +60,7 @@ bool wait_until(const std::function<bool()>& done, const std::function<bool()>& 
 }
 
 int run_member(const RunOptions& options, const graph::GraphSpec& graph, const graph::Partition& partition,
-               size_t process, int supervisor, RunBoard& board) {
+               size_t process, int supervisor, RunBoard& board, const PoolFile& pools) {
   ProcessRecord& record = board.process(process);
   Prepared prepared;
   prepared.graph = graph;
@@ -80,9 +80,11 @@ int run_member(const RunOptions& options, const graph::GraphSpec& graph, const g
   std::vector<std::string> told;  // the supervisor says it
   limit_cores(plan.cores, told);
   record.state.store(ProcessRecord::composed);
-  wait_until([&] { return board.transport_up().load(); });
+  wait_until([&] { return board.carrier().load() != RunBoard::no_carrier; });
   prepare_process();
-  const auto transport = join_iceoryx_transport(plan.ports, iceoryx_domain(supervisor));
+  const auto transport = board.carrier().load() == RunBoard::local
+                             ? join_local_transport(plan.ports, pools)
+                             : join_iceoryx_transport(plan.ports, iceoryx_domain(supervisor));
   BoardGate gate(board, process);
   Executor::Options run;
   run.duration_ns = static_cast<int64_t>(options.duration_s * 1e9);
@@ -92,13 +94,15 @@ int run_member(const RunOptions& options, const graph::GraphSpec& graph, const g
   Executor executor(plan, *transport, *prepared.clock, run);
   record.state.store(ProcessRecord::joined);
   const ProcessReading before = ProcessReading::now();
-  executor.run();
+  const RunResult result = executor.run();
   record.cpu_ns = ProcessReading::now().cpu_ns - before.cpu_ns;
   record.simulator_cpu_ns = hal::simulator_use().cpu_ns;
   record.simulator_in_jobs_ns = hal::simulator_use().in_jobs_ns;
   for (size_t t = 0; t < plan.tasks.size(); ++t)
-    if (run.own[t]) prepared.composition->nodes[t]->finish();
+    if (run.own[t] && !is_stuck(result, t)) prepared.composition->nodes[t]->finish();
   record.state.store(ProcessRecord::finished);
+  // A job that never returns still uses what would now be taken down.
+  if (!result.stuck.empty()) end_process(kOk, "iceoryx");
   return kOk;
 }
 

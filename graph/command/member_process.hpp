@@ -6,6 +6,7 @@
 #include "graph/compose/composition.hpp"
 #include "graph/compose/partition.hpp"
 #include "rt/sched/run_board.hpp"
+#include "rt/shm/local_transport.hpp"
 
 namespace takt::command {
 
@@ -23,9 +24,9 @@ class BoardExchange final : public graph::CapacityExchange {
 /// Polls every millisecond until `done` or, where given, `broken`; true if done.
 bool wait_until(const std::function<bool()>& done, const std::function<bool()>& broken = {});
 
-/// One process of an isolated run, as the supervisor's fork enters it: composes its part, joins the daemon of process
-/// `supervisor`, runs until the board's stop. Returns the exit code.
+/// One process of an isolated run, as the supervisor's fork enters it: composes its part, joins the transport that the
+/// board names (the daemon of process `supervisor`, or `pools`), runs until the board's stop. Returns the exit code.
 int run_member(const RunOptions& options, const graph::GraphSpec& graph, const graph::Partition& partition,
-               size_t process, int supervisor, RunBoard& board);
+               size_t process, int supervisor, RunBoard& board, const PoolFile& pools);
 
 }  // namespace takt::command

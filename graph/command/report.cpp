@@ -51,13 +51,31 @@ Json grant_json(const Grant& grant) {
           {"verified", grant.verified}};
 }
 
+/// Jobs by level, and since when each of the last changes held.
+void add_quality(Json& json, const Node& node, const TaskStatistics& s, int64_t epoch_ns) {
+  json["quality"] = Json::object();
+  for (size_t l = 0; l < node.levels().size(); ++l) {
+    json["quality"][std::to_string(l)] = s.at_level[l].load();
+    json["quality_levels"].push_back(node.levels()[l].name);
+  }
+  const uint64_t count = s.level_changes.load(), kept = std::min<uint64_t>(count, s.changes.size());
+  json["quality_changes"] = {{"count", count}, {"last", Json::array()}};
+  for (uint64_t n = count - kept; n < count; ++n) {
+    const LevelChange& change = s.changes[n % s.changes.size()];
+    json["quality_changes"]["last"].push_back(
+        {{"at_s", static_cast<double>(change.release_ns - epoch_ns) / 1e9}, {"level", change.level}});
+  }
+}
+
 Json node_json(const RunFacts& facts, size_t t) {
   const TaskPlan& plan = facts.plan.tasks[t];
   const TaskStatistics& s = facts.board.task(t);
   Json node;
   node["name"] = plan.name;
   node["rate_hz"] = plan.rate ? Json(plan.rate->hz()) : Json(nullptr);
-  const double paused_s = plan.rate ? static_cast<double>(s.paused.load()) / plan.rate->hz() : 0;
+  const uint64_t paused =
+      s.paused.load() + left_out_jobs(facts.plan, facts.board, t, facts.result.epoch_ns, facts.result.end_ns);
+  const double paused_s = plan.rate ? static_cast<double>(paused) / plan.rate->hz() : 0;
   node["active_s"] = std::max(0.0, facts.result.duration_s() - paused_s);
   node["criticality"] = to_string(plan.criticality);
   node["device"] = plan.device;
@@ -69,12 +87,13 @@ Json node_json(const RunFacts& facts, size_t t) {
            {"deadline_misses", &s.deadline_misses},
            {"budget_overruns", &s.budget_overruns},
            {"stale_inputs", &s.stale_inputs},
-           {"paused", &s.paused},
+           {"demoted", &s.demoted},
            {"new_inputs", &s.new_inputs},
            {"no_result", &s.no_result}})
     node[key] = counter->load();
+  node["paused"] = paused;
   node["drift_us"] = s.drift_us();
-  node["quality"] = {{"0", s.exec.count()}};
+  add_quality(node, *plan.node, s, facts.result.epoch_ns);
   node["granted"] = grant_json(facts.board.grant(t));
   node["lateness_us"] = distribution(s.lateness, 1e3);
   node["lateness_histogram_us"] = coarse_histogram(s.lateness);
@@ -85,6 +104,7 @@ Json node_json(const RunFacts& facts, size_t t) {
   node["samples"] = s.exec.count();
   node["allocations"] = s.allocations;
   node["page_faults"] = s.page_faults;
+  node["rt_violations"] = violations_json(s);
   return node;
 }
 
@@ -207,7 +227,7 @@ Json make_report(const RunFacts& facts) {
   report["commit"] = TAKT_COMMIT;
   report["machine"] = machine_facts();
   report["ok"] = kept_its_promises(nodes);
-  report["modes"] = {facts.graph.mode};
+  report["modes"] = modes_json(facts);
   report["transport"] = facts.transport.name();
   report["isolation"] = facts.isolation;
   report["processes"] = facts.processes;
@@ -221,7 +241,7 @@ Json make_report(const RunFacts& facts) {
   report["host_stall_ms"] = facts.use.steal_ms;
   report["recorder_lost"] = 0;
   report["adjusted"] = facts.adjusted;
-  report["faults"] = Json::array();
+  report["faults"] = faults_json(facts);
   report["timeline"] = timeline_json(facts);
   return report;
 }

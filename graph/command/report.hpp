@@ -34,6 +34,17 @@ struct RunFacts {
 /// The report of design section 6: times in the unit the key says, null where there are no samples.
 nlohmann::ordered_json make_report(const RunFacts& facts);
 
+/// The mode over time: [{name, from_s, to_s, reason}], the first being that of the start; seconds since the epoch.
+nlohmann::ordered_json modes_json(const RunFacts& facts);
+/// What nodes did and should not have done: [{what, kind, node, job, at_s}].
+nlohmann::ordered_json faults_json(const RunFacts& facts);
+/// {call: count} of what jobs called and should not have; null if this program cannot see it.
+nlohmann::ordered_json violations_json(const TaskStatistics& statistics);
+/// True if a job did not return.
+bool hung(const RunBoard& board);
+/// Lines of the summary: changes of mode, who overran, faults.
+std::string events_text(const nlohmann::ordered_json& report);
+
 /// One screen of text from the report: what ran, what was granted, what was missed.
 std::string summary_text(const nlohmann::ordered_json& report);
 

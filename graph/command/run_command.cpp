@@ -55,24 +55,28 @@ int execute(const RunOptions& options, Prepared& prepared, std::vector<std::stri
     result = executor.run();
   }
   const ProcessReading after = ProcessReading::now();
-  for (auto& node : composition.nodes) node->finish();
+  for (size_t t = 0; t < composition.nodes.size(); ++t)
+    if (!is_stuck(result, t)) composition.nodes[t]->finish();
   for (const std::string& refused : result.refused)
     adjusted.push_back(fmt::format("policy {} -> cooperative: {}", to_string(graph.schedule.policy), refused));
   const hal::SimulatorUse simulator = hal::simulator_use();
   const MachineUse use{after.cpu_ns - before.cpu_ns, simulator.cpu_ns, simulator.in_jobs_ns,
                        after.steal_ms - before.steal_ms, after.rss_mb};
-  return tell(options, graph,
-              make_report({graph,
-                           composition.plan,
-                           board,
-                           result,
-                           *transport,
-                           use,
-                           options.clock,
-                           std::string(to_string(graph.schedule.policy)),
-                           "none",
-                           {},
-                           std::move(adjusted)}));
+  auto report = make_report({graph,
+                             composition.plan,
+                             board,
+                             result,
+                             *transport,
+                             use,
+                             options.clock,
+                             std::string(to_string(graph.schedule.policy)),
+                             "none",
+                             {},
+                             std::move(adjusted)});
+  const int code = tell_faults(options, graph, board, result.policy_granted, report);
+  // A job that never returns still uses what would now be taken down.
+  if (!result.stuck.empty()) end_process(code, options.transport);
+  return code;
 }
 
 int run_in_one_process(const RunOptions& options, Prepared& prepared, std::vector<std::string> adjusted) {
@@ -110,11 +114,7 @@ int run_as_asked(RunOptions options) {
   const std::string wanted = options.isolate.empty() ? prepared.graph->isolation : options.isolate;
   if (wanted != "subsystem" || options.clock == "virtual") return run_in_one_process(options, prepared, adjusted);
   const KeptPlace report(options.report), page(options.html);
-  const IsolatedEnd end = run_isolated(options, *prepared.graph, adjusted);
-  if (end.not_isolated.empty()) return end.code;
-  if (options.isolate == "subsystem") return refuse("--isolate subsystem: " + end.not_isolated, kDeviceOrSystem);
-  adjusted.push_back("isolation: subsystem -> none: " + end.not_isolated);
-  return run_in_one_process(options, prepared, std::move(adjusted));
+  return run_isolated(options, *prepared.graph, std::move(adjusted));
 }
 
 }  // namespace

@@ -15,7 +15,8 @@ struct RunOptions {
   graph::LoadOptions load;
   double duration_s = 20;  ///< 0: until stopped
   bool unchecked = false, require_rt = false;
-  std::string clock = "real", transport = "local", isolate;
+  std::string clock = "real", isolate;
+  std::string transport;  ///< local | iceoryx; empty: local within a process, iceoryx between processes
   std::filesystem::path report, html, output = "out";
   uint64_t seed = 1;
   /// A policy named on the command line, or --require-rt: refused means exit 3, not another policy.

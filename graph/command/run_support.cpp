@@ -7,10 +7,12 @@
 #include <sched.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <ctime>
 #include <fstream>
 #include <opencv2/core/utility.hpp>
@@ -19,6 +21,7 @@
 #include "graph/command/prepare.hpp"
 #include "graph/command/report.hpp"
 #include "graph/view/html_report.hpp"
+#include "rt/shm/iceoryx_preflight.hpp"
 
 namespace takt::command {
 namespace {
@@ -120,6 +123,24 @@ int tell(const RunOptions& options, const graph::GraphSpec& graph, const nlohman
   if (!options.html.empty() && !write(options.html, view::html_report(report, graph, options.output)))
     return refuse("cannot write the page to " + options.html.string() + "; choose a writable --html", kBadInput);
   return report["ok"].get<bool>() ? kOk : kNotOk;
+}
+
+int tell_faults(const RunOptions& options, const graph::GraphSpec& graph, const RunBoard& board, Policy granted,
+                nlohmann::ordered_json& report) {
+  const bool failed = granted == Policy::cooperative && hung(board);
+  if (failed) report["ok"] = false;
+  const int told = tell(options, graph, report);
+  return failed ? static_cast<int>(kDeviceOrSystem) : told;
+}
+
+bool is_stuck(const RunResult& result, size_t task) {
+  return std::find(result.stuck.begin(), result.stuck.end(), task) != result.stuck.end();
+}
+
+void end_process(int code, const std::string& transport) {
+  std::fflush(nullptr);
+  if (transport == "iceoryx") remove_iceoryx_leftovers(IceoryxPlaces::of_this_machine(), getpid());
+  std::_Exit(code);
 }
 
 }  // namespace takt::command

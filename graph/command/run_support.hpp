@@ -7,6 +7,7 @@
 
 #include "graph/command/run_command.hpp"
 #include "rt/memory/process_memory.hpp"
+#include "rt/sched/executor.hpp"
 #include "rt/sched/run_board.hpp"
 
 namespace takt::command {
@@ -61,5 +62,16 @@ std::vector<std::string> prepare_process();
 
 /// Prints the summary, writes the files that were asked for; the exit code of the run.
 int tell(const RunOptions& options, const graph::GraphSpec& graph, const nlohmann::ordered_json& report);
+
+/// The same of a run in which nodes may have done what they must not. A job that hung under `cooperative` is a failure
+/// of the run, exit 3.
+int tell_faults(const RunOptions& options, const graph::GraphSpec& graph, const RunBoard& board, Policy granted,
+                nlohmann::ordered_json& report);
+
+/// True if that task has a job that never returned.
+bool is_stuck(const RunResult& result, size_t task);
+
+/// Ends this process at once, without taking down what a stuck job still uses.
+[[noreturn]] void end_process(int code, const std::string& transport);
 
 }  // namespace takt::command

@@ -49,8 +49,8 @@ graph::LoadOptions load_options(const Json& report, const RenderOptions& options
   load.schedule = options.schedule;
   if (report.contains("profile") && report["profile"].is_string()) load.profile = report["profile"];
   if (report.contains("modes") && report["modes"].is_array() && !report["modes"].empty() &&
-      report["modes"][0].is_string())
-    load.mode = report["modes"][0];
+      report["modes"][0].is_object() && report["modes"][0].contains("name") && report["modes"][0]["name"].is_string())
+    load.mode = report["modes"][0]["name"];
   if (report.contains("policy_asked") && report["policy_asked"].is_string()) load.policy = report["policy_asked"];
   return load;
 }

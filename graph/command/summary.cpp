@@ -26,6 +26,17 @@ std::string node_line(const Json& node) {
                      figure(node["lateness_us"]["p50"], "{:.0f}"), figure(node["lateness_us"]["p99"], "{:.0f}"));
 }
 
+/// Which quality levels a node worked at; nothing if it never left the first.
+std::string quality_line(const Json& node) {
+  const auto changes = node["quality_changes"]["count"].get<uint64_t>();
+  if (changes == 0) return "";
+  std::string text = fmt::format("quality {}:", node["name"].get<std::string>());
+  for (size_t l = 0; l < node["quality_levels"].size(); ++l)
+    text += fmt::format("{} {} {}", l == 0 ? "" : ",", node["quality_levels"][l].get<std::string>(),
+                        node["quality"][std::to_string(l)].get<uint64_t>());
+  return text + fmt::format(" jobs; {} changes\n", changes);
+}
+
 /// What was asked of the kernel, and what it says it gave.
 std::string policy_text(const Json& report) {
   if (report["clock"] == "virtual") return "jobs take exactly their budgets";
@@ -56,6 +67,7 @@ std::string summary_text(const Json& report) {
                         chain["within"].is_null()     ? "no sample"
                         : chain["within"].get<bool>() ? "within"
                                                       : "EXCEEDED");
+  for (const Json& node : report["nodes"]) text += quality_line(node);
   const Json& by = report["cpu"]["by"];
   text += fmt::format("CPU {:.2f} cores: nodes {:.2f}, devices {:.2f}, simulator {:.2f}, runtime {:.2f}\n",
                       report["cpu"]["utilisation"].get<double>(), by["nodes"].get<double>(),
@@ -63,6 +75,7 @@ std::string summary_text(const Json& report) {
   text += fmt::format("memory {:.0f} MB shared, {:.0f} MB resident; host stall {} ms\n",
                       report["memory"]["shm_mb"].get<double>(), report["memory"]["rss_mb"].get<double>(),
                       report["host_stall_ms"].get<int64_t>());
+  text += events_text(report);
   for (const Json& line : report["adjusted"]) text += "adjusted: " + line.get<std::string>() + "\n";
   text += report["ok"].get<bool>() ? "ok\n" : "NOT OK: a high-criticality deadline was missed or a node fell behind\n";
   return text;

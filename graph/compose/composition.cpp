@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <map>
 
+#include "graph/compose/plan_modes.hpp"
 #include "graph/compose/plan_ports.hpp"
 #include "hal/drivers.hpp"
 #include "rt/sched/port_access.hpp"
@@ -119,6 +120,7 @@ class Composer {
     task.on_overrun = entry.on_overrun;
     task.on_miss = entry.on_miss;
     task.publish = entry.publish;
+    task.memory_bytes = entry.memory_bytes;
   }
 
   void connect() {
@@ -139,6 +141,7 @@ class Composer {
       const double rate = effective_rate_hz(result_.plan, t);
       task.deadline_ns = rate > 0 ? static_cast<int64_t>(1e9 / rate) : kSecond;
     }
+    add_modes(graph_, result_.plan);
   }
 
   void connect_inputs(TaskPlan& task, const DeviceSpec& spec) { connect_edges(task, spec.edges); }

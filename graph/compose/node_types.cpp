@@ -11,6 +11,7 @@ void register_ground_map(NodeTypes& types);
 void register_picture(NodeTypes& types);
 void register_obstacle_stop(NodeTypes& types);
 void register_semantic(NodeTypes& types);
+void register_load(NodeTypes& types);
 }  // namespace takt
 
 namespace takt::graph {
@@ -25,6 +26,7 @@ NodeTypes node_types() {
   register_picture(types);
   register_obstacle_stop(types);
   register_semantic(types);
+  register_load(types);
   return types;
 }
 

@@ -77,13 +77,12 @@ void Loader::apply_mode() {
 }
 
 void Loader::tell_what_is_not_enforced() {
-  const auto tell = [&](const std::string& id, const char* key, std::string_view verb, const char* instead) {
-    spec_.adjusted.push_back(
-        fmt::format("{} of {}: {} -> continue: this version counts {} and goes on", key, id, verb, instead));
-  };
   for (const auto& [id, entry] : spec_.schedule.entries) {
-    if (entry.on_overrun != OnOverrun::proceed) tell(id, "on_overrun", to_string(entry.on_overrun), "overruns");
-    if (entry.on_miss == OnMiss::safe_stop) tell(id, "on_miss", to_string(entry.on_miss), "misses");
+    const auto instance = instances_.find(id);
+    const size_t levels = instance == instances_.end() ? 1 : instance->second->levels().size();
+    if (entry.on_overrun == OnOverrun::degrade && levels == 1)
+      spec_.adjusted.push_back(fmt::format(
+          "on_overrun of {}: degrade -> continue: it has one quality level (takt nodes TYPE lists them)", id));
   }
 }
 

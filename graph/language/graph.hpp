@@ -84,6 +84,7 @@ struct ScheduleEntry {
   OnOverrun on_overrun = OnOverrun::proceed;
   OnMiss on_miss = OnMiss::proceed;
   PublishAt publish = PublishAt::asap;
+  int64_t memory_bytes = kDefaultMemory;
   Position position;
 };
 

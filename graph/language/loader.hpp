@@ -88,6 +88,8 @@ class Loader {
   void read_schedule();
   std::optional<std::filesystem::path> schedule_path(Position& wanted_from);
   void read_entry(const std::string& id, const nlohmann::json& value, const std::string& pointer);
+  void read_memory(ScheduleEntry& entry, const std::string& id, const nlohmann::json& value,
+                   const std::string& pointer);
   void read_release(ScheduleEntry& entry, const std::string& id, const nlohmann::json& value,
                     const std::string& pointer);
   void check_times(const ScheduleEntry& entry, const std::string& id, const std::string& pointer);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "graph/language/loader.hpp"
 #include "graph/language/quantity.hpp"
@@ -106,7 +107,19 @@ void Loader::read_entry(const std::string& id, const json& value, const std::str
   read_word(value, "on_overrun", kOnOverrun, entry.on_overrun);
   read_word(value, "on_miss", kOnMiss, entry.on_miss);
   read_word(value, "publish", kPublish, entry.publish);
+  read_memory(entry, id, value, pointer);
   if (claimed_.contains(id)) spec_.schedule.entries[id] = std::move(entry);
+}
+
+void Loader::read_memory(ScheduleEntry& entry, const std::string& id, const json& value, const std::string& pointer) {
+  if (!value.contains("memory") || !value["memory"].is_primitive()) return;
+  const std::string at = child(pointer, "memory");
+  const auto megabytes = parse_in_unit(schedule_.raw(at), "MB");
+  if (megabytes && *megabytes >= 0 && *megabytes <= 1e6) entry.memory_bytes = std::llround(*megabytes * 1e6);
+  else
+    problem(schedule_.value_at(at),
+            fmt::format("`memory` of {} {}", ticked(id),
+                        megabytes ? "must lie between 0 MB and 1000000 MB" : megabytes.error()));
 }
 
 void Loader::read_release(ScheduleEntry& entry, const std::string& id, const json& value, const std::string& pointer) {

@@ -36,13 +36,18 @@ std::string list_text(const Json& lines, const char* none) {
   if (!lines.is_array()) return "not recorded";
   if (lines.empty()) return none;
   std::string text = "<ul>";
-  for (const Json& line : lines) text += "<li>" + escape(line.is_string() ? words(line) : line.dump()) + "</li>";
+  for (const Json& line : lines)
+    text += "<li>" + escape(line.is_object() ? words(at(line, "what")) : words(line)) + "</li>";
   return text + "</ul>";
 }
 
 std::string modes_text(const Json& modes) {
   std::string text;
-  for (const Json& mode : modes) text += (text.empty() ? "" : ", ") + words(mode);
+  for (const Json& mode : modes) {
+    const double from_s = number(at(mode, "from_s")).value_or(0);
+    text += (text.empty() ? "" : ", ") + words(mode.is_object() ? at(mode, "name") : mode);
+    if (from_s > 0) text += fmt::format(" from {:.3f} s ({})", from_s, words(at(mode, "reason")));
+  }
   return or_not_recorded(text);
 }
 

@@ -160,6 +160,12 @@ void ReplayCamera::trigger(int64_t at_ns) {
   has_trigger_ = ever_triggered_ = true;
 }
 
+DeclaredCalls ReplayCamera::declared_calls() const {
+  if (!store_ || store_->left.empty() || !store_->left.back().empty()) return {};
+  return {bit(JobCall::malloc) | bit(JobCall::mmap) | bit(JobCall::file) | bit(JobCall::stdio),
+          "the recording is larger than `memory_limit`: frames are decoded as they are read"};
+}
+
 StereoFrame ReplayCamera::read(ImageView<uint8_t> left, ImageView<uint8_t> right, int64_t deadline_ns) {
   StereoFrame frame;
   if (!started_) return frame;

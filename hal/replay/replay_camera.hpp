@@ -33,6 +33,7 @@ class ReplayCamera final : public StereoCamera {
   void close() override;
   DeviceResult start(int64_t epoch_ns) override;
   void stop() override { started_ = false; }
+  DeclaredCalls declared_calls() const override;
   StereoFormat format() const override { return format_; }
   void trigger(int64_t at_ns) override;
   StereoFrame read(ImageView<uint8_t> left, ImageView<uint8_t> right, int64_t deadline_ns) override;

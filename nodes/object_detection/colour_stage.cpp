@@ -66,10 +66,21 @@ void ColourStage::index_image(ImageView<const uint8_t> bgr) {
 }
 
 void ColourStage::run(ImageView<const uint8_t> bgr) {
+  begin(bgr, 0);
+  for (int row = 0; row < grid_.rows; ++row) search_row();
+}
+
+void ColourStage::begin(ImageView<const uint8_t> bgr, int first_row) {
   index_image(bgr);
-  windows_->begin(index_.data());
-  uint16_t* out = missing_.data();
-  for (int window = 0; window < grid_.windows(); ++window) {
+  std::fill(missing_.begin(), missing_.end(), kNotSearched);
+  row_ = first_row;
+  windows_->begin(index_.data(), row_);
+}
+
+void ColourStage::search_row() {
+  if (row_ == grid_.rows) windows_->begin(index_.data(), row_ = 0);
+  uint16_t* out = missing_.data() + static_cast<size_t>(row_ * grid_.columns) * references_;
+  for (int u = 0; u < grid_.columns; ++u) {
     const std::span<const uint16_t> histogram = windows_->next();
     for (const ObjectBins& object : objects_) {
       const size_t count = object.slots.size();
@@ -78,6 +89,7 @@ void ColourStage::run(ImageView<const uint8_t> bgr) {
       out += object.references;
     }
   }
+  ++row_;
 }
 
 }  // namespace takt::object_detection

@@ -13,18 +13,24 @@
 namespace takt::object_detection {
 
 /// Equal, bit for bit, to counting each window's pixels and comparing all bins. Only bins that a reference of the
-/// object uses can add to its error, so only those are counted and compared. Memory is taken by the constructor; run()
-/// allocates nothing and does the same work for every image. One thread at a time.
+/// object uses can add to its error, so only those are counted and compared. Memory is taken by the constructor; the
+/// rest allocates nothing and does the same work for every image. One thread at a time.
 class ColourStage {
  public:
+  static constexpr uint16_t kNotSearched = UINT16_MAX;  ///< missing mass in a window that was left out
+
   /// `objects`: per object the histograms of its views; each must have mass. Throws std::invalid_argument otherwise.
   ColourStage(const SearchGrid& grid, ColourBins bins, std::span<const std::vector<Histogram>> objects);
 
-  /// `bgr`: three channels, of the grid's image size (not checked).
+  /// `bgr`: three channels, of the grid's image size (not checked). All windows.
   void run(ImageView<const uint8_t> bgr);
+  /// The same in portions: no window is searched yet, and search_row() begins at that row of windows.
+  void begin(ImageView<const uint8_t> bgr, int first_row);
+  /// Searches the next row of windows, after the last one row 0; at most once per row.
+  void search_row();
 
   size_t references() const { return references_; }
-  /// After run(): the missing mass of every reference, object by object, for window 0, 1 ... (row by row).
+  /// The missing mass of every reference, object by object, for window 0, 1 ... (row by row).
   std::span<const uint16_t> missing() const { return missing_; }
 
  private:
@@ -40,6 +46,7 @@ class ColourStage {
   SearchGrid grid_;
   ColourBins bins_;
   size_t references_ = 0;
+  int row_ = 0;                        ///< that search_row() comes to next
   std::vector<uint16_t> slot_of_bin_;  ///< the last slot takes the bins that no reference uses
   std::vector<ObjectBins> objects_;
   std::optional<WindowHistograms> windows_;

@@ -45,11 +45,15 @@ Detector::Detector(int image_width, int image_height, std::span<const DatabaseOb
       colour_(grid_, p.bins, references_),
       decision_(grid_, limits_) {}
 
-bool Detector::run(ImageView<const uint8_t> bgr) {
+bool Detector::begin(ImageView<const uint8_t> bgr) {
   if (bgr.width != grid_.image_width || bgr.height != grid_.image_height || bgr.channels != 3) return false;
-  colour_.run(bgr);
-  decision_.decide(colour_.missing());
+  colour_.begin(bgr, first_row_);
   return true;
+}
+
+void Detector::end() {
+  first_row_ = searched_rows_ == grid_.rows ? 0 : (first_row_ + searched_rows_) % grid_.rows;
+  decision_.decide(colour_.missing());
 }
 
 }  // namespace takt::object_detection

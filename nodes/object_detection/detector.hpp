@@ -28,16 +28,34 @@ class Detector {
   std::span<const std::vector<ReferenceLimit>> limits() const { return limits_; }
 
   /// Searches an 8-bit BGR image. False, and nothing changed, if it has not the size or the channels.
-  bool run(ImageView<const uint8_t> bgr);
+  bool run(ImageView<const uint8_t> bgr) {
+    return run(bgr, [] { return true; });
+  }
+  /// The same as far as `may_go_on()` allows, which is asked before each row of windows: windows beyond that do not
+  /// pass. The next image is searched from the row at which this one was left, so that none is left out for long; after
+  /// a whole image from the top. The result depends on images and answers alone.
+  template <class MayGoOn>
+  bool run(ImageView<const uint8_t> bgr, MayGoOn may_go_on) {
+    if (!begin(bgr)) return false;
+    for (searched_rows_ = 0; searched_rows_ < grid_.rows && may_go_on(); ++searched_rows_) colour_.search_row();
+    end();
+    return true;
+  }
+  /// Share of the windows that the last run() searched, 0..1.
+  float searched() const { return static_cast<float>(searched_rows_) / static_cast<float>(grid_.rows); }
   Decision& decision() { return decision_; }
   std::span<const uint16_t> missing() const { return colour_.missing(); }
 
  private:
+  bool begin(ImageView<const uint8_t> bgr);
+  void end();
+
   SearchGrid grid_;
   std::vector<std::vector<Histogram>> references_;
   std::vector<std::vector<ReferenceLimit>> limits_;
   ColourStage colour_;
   Decision decision_;
+  int first_row_ = 0, searched_rows_ = 0;
 };
 
 }  // namespace takt::object_detection

@@ -37,11 +37,15 @@ class ObjectDetectionNode final : public Node {
 
   void run(Job& job) override {
     const StereoPair* pair = pair_.newest();
-    if (!pair || !pair_.is_new() || !detector_->run(pair->left_view())) return job.no_result();
+    if (!pair || !pair_.is_new()) return job.no_result();
+    const auto reserve_ns = static_cast<int64_t>(reserve_() * 1e9);
+    const auto may_go_on = [&] { return job.time_left_ns() > reserve_ns; };
+    if (!detector_->run(pair->left_view(), may_go_on)) return job.no_result();
     Detections* found = detections_.connected() ? detections_.loan() : nullptr;
     if (found != nullptr) {
       found->image_width = pair->width;
       found->image_height = pair->height;
+      found->searched = detector_->searched();
       found->boxes.resize(static_cast<size_t>(max_detections_()));
       found->boxes.resize(detector_->decision().detections(min_score_, found->boxes.items()));
       detections_.send(pair_.stamp_ns());
@@ -78,6 +82,8 @@ class ObjectDetectionNode final : public Node {
       this, "threshold_scale", 1.0, {0.05, 4.0}, "1", "factor on the thresholds of the database"};
   Param<double> min_score_{this,       "min_score", 0.5,
                            {0.0, 1.0}, "1",         "smallest score (1 - error) of a detection; roi is not affected"};
+  Param<double> reserve_{this,       "reserve", 0.001,
+                         {0.0, 1.0}, "s",       "with less time left than this the search ends and its best is sent"};
   Param<int> max_detections_{this, "max_detections", 32, {1, 1000}, "", "the best are kept"};
 
   std::optional<Detector> detector_;

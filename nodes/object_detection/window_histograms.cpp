@@ -23,11 +23,12 @@ WindowHistograms::WindowHistograms(const SearchGrid& grid, size_t slots) : grid_
   window_.resize(slots);
 }
 
-void WindowHistograms::begin(const uint16_t* index) {
+void WindowHistograms::begin(const uint16_t* index, int row) {
   index_ = index;
-  u_ = v_ = 0;
+  u_ = 0;
+  v_ = row;
   std::fill(strips_.begin(), strips_.end(), uint16_t{0});
-  count_rows(0, grid_.window_px, 1);
+  count_rows(grid_.y0(row), grid_.y0(row) + grid_.window_px, 1);
 }
 
 std::span<const uint16_t> WindowHistograms::next() {

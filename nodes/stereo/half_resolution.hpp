@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Matching at half resolution: a quarter of the pixels and half of the disparities, about an eighth of the time.
+// Matching at half resolution over the same range: a quarter of the pixels and half of the disparities, about an eighth
+// of the work of matching.
 #pragma once
 #include <algorithm>
+#include <vector>
 
+#include "nodes/stereo/matcher.hpp"
 #include "rt/msg/image_view.hpp"
 
 namespace takt::stereo {
@@ -11,28 +14,33 @@ namespace takt::stereo {
 inline int half(int size) { return std::max(1, size / 2); }
 
 /// Rounded mean of 2 x 2 pixels; `out` has half(width) x half(height) pixels and the channels of `in`.
-inline void halve(ImageView<const uint8_t> in, ImageView<uint8_t> out) {
-  for (int y = 0; y < out.height; ++y) {
-    const uint8_t* a = in.row(2 * y);
-    const uint8_t* b = in.row(std::min(2 * y + 1, in.height - 1));
-    uint8_t* o = out.row(y);
-    const int n = in.channels, right = in.width > 1 ? n : 0;
-    for (int x = 0; x < out.width; ++x, a += 2 * n, b += 2 * n, o += n)
-      for (int c = 0; c < n; ++c) o[c] = static_cast<uint8_t>((a[c] + a[c + right] + b[c] + b[c + right] + 2) >> 2);
-  }
-}
+void halve(ImageView<const uint8_t> in, ImageView<uint8_t> out);
 
-/// Nearest neighbour to full size; disparities double, rejected pixels stay -1.
-inline void enlarge(ImageView<const int16_t> disparity, ImageView<const uint8_t> confidence,
-                    ImageView<int16_t> disparity_out, ImageView<uint8_t> confidence_out) {
-  for (int y = 0; y < disparity_out.height; ++y) {
-    const int from = std::min(y / 2, disparity.height - 1);
-    for (int x = 0; x < disparity_out.width; ++x) {
-      const int at = std::min(x / 2, disparity.width - 1), d = disparity.at(at, from);
-      disparity_out.at(x, y) = static_cast<int16_t>(d < 0 ? -1 : 2 * d);
-      confidence_out.at(x, y) = confidence.at(at, from);
-    }
-  }
-}
+/// Nearest neighbour to full size: half pixel i stands for 2 i and 2 i + 1. Disparities double, for a shift of d pixels
+/// there is one of 2 d here; rejected pixels stay -1.
+void enlarge(ImageView<const int16_t> disparity, ImageView<const uint8_t> confidence, ImageView<int16_t> disparity_out,
+             ImageView<uint8_t> confidence_out);
+
+/// A matcher with the contract of Matcher::match whose answer comes from half resolution: the same size and the same
+/// unit (disparities in px of the full image, all of them even), and the confidence of the window that decided. Windows
+/// have half the edge in pixels, so they see as much of the scene. Memory is taken by the constructor; match()
+/// allocates nothing. One thread at a time.
+class HalfMatcher {
+ public:
+  /// For images of that full size. Throws std::invalid_argument for parameters that problem() objects to.
+  HalfMatcher(int width, int height, int channels, const MatcherParameters& parameters);
+
+  /// As Matcher::match, with views of the full size.
+  [[nodiscard]] bool match(ImageView<const uint8_t> left, ImageView<const uint8_t> right, ImageView<int16_t> disparity,
+                           ImageView<uint8_t> confidence);
+  /// As Matcher::limit_search, in px of the full image.
+  void limit_search(int disparities) { matcher_.limit_search((disparities + 1) / 2); }
+
+ private:
+  int width_, height_, channels_;
+  Matcher matcher_;
+  std::vector<uint8_t> left_, right_, confidence_;
+  std::vector<int16_t> disparity_;
+};
 
 }  // namespace takt::stereo

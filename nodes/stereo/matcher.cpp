@@ -64,6 +64,8 @@ struct Matcher::State {
   bool fits(ImageView<const uint8_t> view) const {
     return view.width == width && view.height == height && view.channels == channels && view.data != nullptr;
   }
+  /// Searches 0 .. disparities - 1, not more than memory was taken for.
+  void set_range(int disparities);
   /// Groups of the next block when that many are left.
   int block_size(int groups_left) const;
   /// The byte planes that the cost compares, in reading order or with the columns reversed.
@@ -77,6 +79,7 @@ struct Matcher::State {
   void reject_inconsistent(int y, int16_t* disparity) const;
 
   MatcherParameters p;
+  const int most_disparities;
   int width, height, channels, planes, lanes, all_groups, block_groups;
   bool narrow;
   const Kernels* kernels;
@@ -95,6 +98,7 @@ struct Matcher::State {
 
 Matcher::State::State(int width_, int height_, int channels_, const MatcherParameters& parameters)
     : p(parameters),
+      most_disparities(parameters.disparities),
       width(width_),
       height(height_),
       channels(channels_),
@@ -130,13 +134,19 @@ Matcher::State::State(int width_, int height_, int channels_, const MatcherParam
       outside.data()[2 * i + odd] = static_cast<uint8_t>(i + odd * lanes >= width ? p.truncation() : 0);
   no_tail = Buffer<uint16_t>(size(lanes));
   last_tail = Buffer<uint16_t>(size(lanes));
-  for (int i = 0; i < lanes; ++i)
-    if ((all_groups - 1) * lanes + i >= p.disparities) last_tail.data()[i] = 0xFFFF;
+  set_range(p.disparities);
 
   keys = Rows<uint32_t>(height, width, 0, kNoKey);
   along = Rows<uint32_t>(height, width, 0, kNoKey);
   left_keys = Rows<uint32_t>(height, width, 0, kNoKey);
   if (p.left_right_check) right_keys = Rows<uint32_t>(height, width, 0, kNoKey);
+}
+
+void Matcher::State::set_range(int disparities) {
+  p.disparities = std::clamp(disparities, 1, most_disparities);
+  all_groups = (p.disparities + lanes - 1) / lanes;
+  for (int i = 0; i < lanes; ++i)
+    last_tail.data()[i] = (all_groups - 1) * lanes + i >= p.disparities ? uint16_t{0xFFFF} : uint16_t{0};
 }
 
 int Matcher::State::block_size(int groups_left) const {
@@ -278,6 +288,8 @@ Matcher::Matcher(int width, int height, int channels, const MatcherParameters& p
 Matcher::~Matcher() = default;
 Matcher::Matcher(Matcher&&) noexcept = default;
 Matcher& Matcher::operator=(Matcher&&) noexcept = default;
+
+void Matcher::limit_search(int disparities) { state_->set_range(disparities); }
 
 const MatcherParameters& Matcher::parameters() const { return state_->p; }
 const char* Matcher::target() const { return state_->kernels->target; }

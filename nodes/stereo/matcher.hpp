@@ -26,6 +26,10 @@ class Matcher {
   [[nodiscard]] bool match(ImageView<const uint8_t> left, ImageView<const uint8_t> right, ImageView<int16_t> disparity,
                            ImageView<uint8_t> confidence);
 
+  /// From the next match() on only disparities 0 .. n - 1 are searched, n = `disparities` brought into 1 .. those given
+  /// at construction; the result is that of a matcher made for n. Allocates nothing.
+  void limit_search(int disparities);
+
   const MatcherParameters& parameters() const;
   /// Name of the SIMD target in use ("AVX3", "AVX2", ...).
   const char* target() const;

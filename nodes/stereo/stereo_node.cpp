@@ -16,11 +16,7 @@ namespace {
 
 using namespace stereo;
 
-/// Everything that matching at half resolution needs besides the matcher.
-struct HalfImages {
-  std::vector<uint8_t> left, right, confidence;
-  std::vector<int16_t> disparity;
-};
+constexpr double kHalfCost = 0.35; // README.md, measured cost
 
 class StereoNode final : public Node {
  public:
@@ -29,23 +25,20 @@ class StereoNode final : public Node {
     width_ = static_cast<int>(images.width);
     height_ = static_cast<int>(images.height);
     channels_ = static_cast<int>(images.channels);
+    range_ = most_ = disparities_;
     try {
       matcher_.emplace(width_, height_, channels_, parameters(disparities_));
-      half_matcher_.emplace(half(width_), half(height_), channels_, parameters((disparities_ + 1) / 2));
+      half_matcher_.emplace(width_, height_, channels_, parameters(disparities_));
       if (!calibration_().empty()) load_calibration(setup.directory / calibration_());
     } catch (const std::invalid_argument& error) {
       throw SetupError(error.what());
     }
     const auto pixels = static_cast<size_t>(width_) * static_cast<size_t>(height_);
-    const auto half_pixels = static_cast<size_t>(half(width_)) * static_cast<size_t>(half(height_));
-    const size_t bytes = pixels * static_cast<size_t>(channels_),
-                 half_bytes = half_pixels * static_cast<size_t>(channels_);
+    const size_t bytes = pixels * static_cast<size_t>(channels_);
     left_.resize(bytes);
     right_.resize(bytes);
     disparity_scratch_.resize(pixels);
     confidence_scratch_.resize(pixels);
-    half_ = {std::vector<uint8_t>(half_bytes), std::vector<uint8_t>(half_bytes), std::vector<uint8_t>(half_pixels),
-             std::vector<int16_t>(half_pixels)};
     rectified_.reserve(images);
     disparity_.reserve({images.width, images.height, 1, 0});
     const auto step = static_cast<uint32_t>(cloud_step_());
@@ -63,6 +56,7 @@ class StereoNode final : public Node {
     camera_ = is_rectified ? in->camera : rectifier_->camera();
     ImageView<const uint8_t> left = in->left_view(), right = in->right_view();
     if (!rectify(*in, is_rectified, left, right)) return job.no_result();
+    set_range();
     if (disparity_.connected() || cloud_.connected()) match_and_send(job, left, right);
   }
 
@@ -127,7 +121,7 @@ class StereoNode final : public Node {
     if (map != nullptr) {
       map->width = width_;
       map->height = height_;
-      map->disparities = disparities_;
+      map->disparities = range_;
       map->camera = camera_;
       map->disparity.resize(disparity_scratch_.size());
       map->confidence.resize(confidence_scratch_.size());
@@ -154,17 +148,17 @@ class StereoNode final : public Node {
 
   bool match(int level, ImageView<const uint8_t> left, ImageView<const uint8_t> right, ImageView<int16_t> disparity,
              ImageView<uint8_t> confidence) {
-    if (level == 0) return matcher_->match(left, right, disparity, confidence);
-    const int w = half(width_), h = half(height_);
-    const ImageView<uint8_t> half_left(half_.left.data(), w, h, channels_),
-        half_right(half_.right.data(), w, h, channels_);
-    const ImageView<int16_t> half_disparity(half_.disparity.data(), w, h);
-    const ImageView<uint8_t> half_confidence(half_.confidence.data(), w, h);
-    halve(left, half_left);
-    halve(right, half_right);
-    if (!half_matcher_->match(half_left, half_right, half_disparity, half_confidence)) return false;
-    enlarge(half_disparity, half_confidence, disparity, confidence);
-    return true;
+    return level == 0 ? matcher_->match(left, right, disparity, confidence)
+                      : half_matcher_->match(left, right, disparity, confidence);
+  }
+
+  /// `search` may have been changed between two jobs.
+  void set_range() {
+    const int wanted = search_ > 0 ? std::min(search_(), most_) : most_;
+    if (wanted == range_) return;
+    range_ = wanted;
+    matcher_->limit_search(range_);
+    half_matcher_->limit_search(range_);
   }
 
   Input<StereoPair> pair_{this, "pair", "raw or rectified pair; raw ones need a calibration"};
@@ -173,7 +167,13 @@ class StereoNode final : public Node {
   Output<PointCloud> cloud_{this, "cloud",
                             "coloured points in the frame of the left camera (x right, y down, z forward)"};
 
+  Levels levels_{this,
+                 {{"full", 1.0, "every pixel, every disparity"},
+                  {"half", kHalfCost, "half resolution over the same range; disparities are even"}}};
+
   Param<int> disparities_{this, "disparities", 150, {1, 512}, "px", "search range 0 .. disparities - 1"};
+  Param<int> search_{this,     "search", 0,
+                     {0, 512}, "px",     "of that range, how much is searched; 0: all of it. May change during a run"};
   Choice cost_{this, "cost", "gradient", {"gradient", "ssd", "sad"}, "matching cost of two pixels"};
   Param<int> c_max_{this, "c_max", 0, {0, 255}, "", "truncation of the cost; 0: 10 for gradient, 50 for ssd and sad"};
   Param<int> n_square_{this, "n_square", 15, {1, 31}, "px", "edge of the summing window, odd"};
@@ -189,14 +189,15 @@ class StereoNode final : public Node {
                                   "calibration file (M1 D1 M2 D2 R T image_size) for raw pairs"};
 
   int width_ = 0, height_ = 0, channels_ = 0;
+  int most_ = 0, range_ = 0;  ///< disparities that memory was taken for, that are searched
   int64_t stamp_ = 0;
   CameraModel camera_;
   Transform sensor_in_robot_;
-  std::optional<Matcher> matcher_, half_matcher_;
+  std::optional<Matcher> matcher_;
+  std::optional<HalfMatcher> half_matcher_;
   std::optional<Rectifier> rectifier_;
   std::vector<uint8_t> left_, right_, confidence_scratch_;
   std::vector<int16_t> disparity_scratch_;
-  HalfImages half_;
 };
 
 }  // namespace

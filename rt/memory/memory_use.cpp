@@ -23,8 +23,13 @@ MemoryUse thread_memory_use() {
   return use;
 }
 
+namespace {
+thread_local ThreadUse last;
+}
+
+int64_t last_thread_use_ns() { return last.cpu_ns; }
+
 ThreadUse take_thread_use() {
-  thread_local ThreadUse last;
   const ThreadUse now{thread_cpu_ns(), counting_allocations() ? takt_thread_allocations() : 0};
   const ThreadUse used{now.cpu_ns - last.cpu_ns, now.allocations - last.allocations};
   last = now;

@@ -26,6 +26,8 @@ struct ThreadUse {
 /// once, at its end: so it contains the wake-up and the latching, which the kernel charges to a reservation too, and
 /// nothing but a reading of the clock stands between a release and the job.
 ThreadUse take_thread_use();
+/// Reading of the calling thread's CPU clock when it last asked, ns.
+int64_t last_thread_use_ns();
 /// Page faults of the calling thread since it last asked. A system call of its own, which a lane makes once for all of
 /// its jobs.
 uint64_t take_page_faults();

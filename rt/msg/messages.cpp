@@ -44,7 +44,8 @@ FIELDS(Pose, TRANSFORM_FIELDS(Pose, transform), F(Pose, covariance, ""))
 FIELDS(Motion, F(Motion, from_stamp_ns, "ns"), TRANSFORM_FIELDS(Motion, camera_in_previous),
        TRANSFORM_FIELDS(Motion, pose), F(Motion, confidence, "1"), F(Motion, rms_px, "px"), F(Motion, corners, "1"),
        F(Motion, matched, "1"), F(Motion, inliers, "1"), F(Motion, valid, ""), F(Motion, keyframe, ""))
-FIELDS(Detections, F(Detections, image_width, "px"), F(Detections, image_height, "px"), F(Detections, boxes, "px"))
+FIELDS(Detections, F(Detections, image_width, "px"), F(Detections, image_height, "px"), F(Detections, searched, "1"),
+       F(Detections, boxes, "px"))
 FIELDS(Grid, F(Grid, width, "1"), F(Grid, height, "1"), F(Grid, cell_m, "m"), F(Grid, origin_x_m, "m"),
        F(Grid, origin_y_m, "m"), TRANSFORM_FIELDS(Grid, grid_in_map), F(Grid, cells, "1"))
 FIELDS(HeadState, F(HeadState, pan_rad, "rad"), F(HeadState, tilt_rad, "rad"), F(HeadState, roll_rad, "rad"),

@@ -158,6 +158,7 @@ struct Detection {
 struct Detections {
   static constexpr std::string_view type_name = "detections";
   int32_t image_width = 0, image_height = 0;
+  float searched = 1;  ///< share of the image, 0..1: less if the job's time ran out
   Array<Detection> boxes;
   static std::span<const Field> fields();
   static void capacities(const Capacity& c, std::span<uint32_t> a) { a[0] = c.count; }

@@ -27,10 +27,6 @@ int64_t CooperativeQueue::next_release_ns() const {
   return next;
 }
 
-bool CooperativeQueue::any_busy() const {
-  return std::any_of(entries_.begin(), entries_.end(), [](const Entry& e) { return e.busy; });
-}
-
 void CooperativeQueue::sleep(std::unique_lock<std::mutex>& lock, int64_t until_ns) {
   // steady_clock is CLOCK_MONOTONIC here, the runtime's own clock.
   changed_.wait_until(lock, std::chrono::steady_clock::time_point(std::chrono::nanoseconds(until_ns)));
@@ -42,6 +38,7 @@ void CooperativeQueue::work() {
     if (Entry* entry = earliest_deadline(clock_.now_ns())) {
       entry->busy = true;
       lock.unlock();
+      entry->lane->watch().bind(Reservation{});
       entry->lane->run_next(clock_, stop_);
       lock.lock();
       entry->busy = false;
@@ -49,9 +46,10 @@ void CooperativeQueue::work() {
       continue;
     }
     const int64_t next = next_release_ns();
-    if (next < stop_.end_ns()) sleep(lock, next);
-    else if (any_busy()) changed_.wait(lock);
-    else return changed_.notify_all();
+    // What a busy lane has still to do is done by the worker that is at it: nobody need wait for a job that may never
+    // return.
+    if (next >= stop_.end_ns()) return changed_.notify_all();
+    sleep(lock, next);
   }
 }
 

@@ -29,7 +29,6 @@ class CooperativeQueue {
   };
   Entry* earliest_deadline(int64_t now_ns);
   int64_t next_release_ns() const;
-  bool any_busy() const;
   void sleep(std::unique_lock<std::mutex>& lock, int64_t until_ns);
 
   const Clock& clock_;

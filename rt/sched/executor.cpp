@@ -15,6 +15,7 @@
 #include "rt/sched/cooperative.hpp"
 #include "rt/sched/lane_tasks.hpp"
 #include "rt/sched/rendezvous.hpp"
+#include "rt/sched/worker_threads.hpp"
 
 namespace takt {
 namespace {
@@ -64,7 +65,7 @@ RunResult Executor::run() {
     if (!result.refused.empty() && options_.require_policy) throw PolicyRefused(result.refused.front());
     for (const auto& lane : lanes_) set_grants(*lane, apply(Reservation{}));
     start_clockwork(result);
-    run_cooperative();
+    run_cooperative(result);
   }
   result.end_ns = stop_.end_ns();
   for (const auto& task : tasks_) {
@@ -100,21 +101,29 @@ std::vector<Reservation> Executor::own_reservations(Policy policy) const {
   return own;
 }
 
+/// What the workers of a run share. It lives as long as the executor: a job that never returns may still use it.
+struct Executor::Crew {
+  explicit Crew(size_t lanes) : ready(lanes + 1), started(lanes + 1), grants(lanes) {}
+  std::atomic<bool> go{false};
+  Rendezvous ready, started;
+  std::vector<Grant> grants;
+  std::unique_ptr<CooperativeQueue> queue;
+  std::unique_ptr<Watchdog> watchdog;
+  WorkerThreads workers;
+};
+
 bool Executor::run_partitioned(Policy policy, RunResult& result) {
   const std::vector<Reservation> wanted = own_reservations(policy);
-  std::vector<Grant> grants(lanes_.size());
-  std::atomic<bool> go{false};
-  Rendezvous ready(lanes_.size() + 1), started(lanes_.size() + 1);
-  std::vector<std::thread> workers;
+  crew_ = std::make_unique<Crew>(lanes_.size());
   for (size_t i = 0; i < lanes_.size(); ++i) {
-    workers.emplace_back([&, i] {
-      Lane& lane = *lanes_[i];
+    crew_->workers.start([this, &crew = *crew_, &lane = *lanes_[i], mine = wanted[i], i] {
       name_thread(lane.head().plan().name);
       prefault_stack();
-      grants[i] = apply(wanted[i]);
-      ready.arrive_and_wait();
-      started.arrive_and_wait();
-      if (!go.load()) return;
+      crew.grants[i] = apply(mine);
+      lane.watch().bind(mine);
+      crew.ready.arrive_and_wait();
+      crew.started.arrive_and_wait();
+      if (!crew.go.load()) return;
       start_counting();
       while (lane.next_release_ns() < stop_.end_ns()) {
         stop_.sleep_until(lane.next_release_ns());
@@ -123,26 +132,30 @@ bool Executor::run_partitioned(Policy policy, RunResult& result) {
       }
     });
   }
-  ready.arrive_and_wait();
+  const std::vector<Grant>& grants = crew_->grants;
+  crew_->ready.arrive_and_wait();
   for (size_t i = 0; i < lanes_.size(); ++i) set_grants(*lanes_[i], grants[i]);
   const bool mine = std::all_of(grants.begin(), grants.end(), [](const Grant& grant) { return grant.refused.empty(); });
-  go.store(options_.gate != nullptr ? options_.gate->all_granted(mine) : mine);
+  const bool go = options_.gate != nullptr ? options_.gate->all_granted(mine) : mine;
+  crew_->go.store(go);
   // Of several processes only the supervisor reads them, while none of them writes: between agreement and decision.
   if (options_.gate == nullptr) result.refused = refusals(plan_, board_);
-  if (go.load()) {
+  if (go) {
     result.policy_granted = policy;
     start_clockwork(result);
+    watch(policy);
   }
-  started.arrive_and_wait();
-  for (std::thread& worker : workers) worker.join();
-  return go.load();
+  crew_->started.arrive_and_wait();
+  join(result);
+  return go;
 }
 
-void Executor::run_cooperative() {
-  CooperativeQueue queue(lanes_, clock_, stop_);
-  std::vector<std::thread> workers;
+void Executor::run_cooperative(RunResult& result) {
+  crew_ = std::make_unique<Crew>(0);
+  crew_->queue = std::make_unique<CooperativeQueue>(lanes_, clock_, stop_);
+  watch(Policy::cooperative);
   for (size_t i = 0; i < std::max<size_t>(plan_.cores.size(), 1); ++i) {
-    workers.emplace_back([&queue, i] {
+    crew_->workers.start([&queue = *crew_->queue, i] {
       name_thread("takt-worker-" + std::to_string(i));
       prefault_stack();
       apply(Reservation{});
@@ -151,8 +164,41 @@ void Executor::run_cooperative() {
     });
   }
   stop_.sleep_until(stop_.end_ns());
-  queue.wake();
-  for (std::thread& worker : workers) worker.join();
+  crew_->queue->wake();
+  join(result);
+}
+
+void Executor::watch(Policy granted) {
+  std::vector<Watchdog::Worker> workers;
+  for (const auto& lane : lanes_) workers.push_back({&lane->watch(), lane->members()});
+  Watchdog::Options options;
+  options.granted = granted;
+  options.patience_ns = options_.hang_patience_ns;
+  options.priority = granted == Policy::cooperative ? 0 : kHighestPriority + 1;
+  crew_->watchdog = std::make_unique<Watchdog>(plan_, board_, clock_, std::move(workers), options);
+}
+
+void Executor::join(RunResult& result) {
+  const Watchdog* watchdog = crew_->watchdog.get();
+  std::vector<size_t> hanging;
+  crew_->workers.join([&](const std::vector<size_t>& at_work) {
+    hanging.clear();
+    for (size_t i = 0; watchdog != nullptr && i < lanes_.size(); ++i)
+      if (watchdog->hangs(i)) hanging.push_back(i);
+    return hanging.size() >= at_work.size();
+  });
+  for (const size_t i : hanging) {
+    const JobWatch::Running job = lanes_[i]->watch().running();
+    result.stuck.push_back(lanes_[i]->members()[job.member]);
+    // It may have come back this moment, or have been released at the very end.
+    if (job.serial == 0 || job.release_ns >= stop_.end_ns()) continue;
+    TaskStatistics& statistics = board_.task(result.stuck.back());
+    statistics.deadline_misses.fetch_add(1);
+    const int64_t over_ns = lanes_[i]->watch().cpu_ns() - job.cpu_limit_ns;
+    if (over_ns > 0) statistics.budget_overruns.fetch_add(1);
+    statistics.cpu_ns += over_ns + enforced_budget_ns(plan_.tasks[result.stuck.back()]);
+  }
+  if (result.stuck.empty()) crew_->watchdog.reset();
 }
 
 void Executor::run_virtual(RunResult& result) {
@@ -186,6 +232,29 @@ void Executor::run_virtual(RunResult& result) {
   }
 }
 
+uint64_t left_out_jobs(const Plan& plan, const RunBoard& board, size_t task, int64_t epoch_ns, int64_t end_ns) {
+  const TaskPlan& t = plan.tasks[task];
+  if (!t.rate) return 0;
+  const int64_t origin = epoch_ns + t.offset_ns;
+  uint64_t jobs = 0;
+  const auto add = [&](uint32_t mode, int64_t from_ns, int64_t to_ns) {
+    if (mode < plan.modes.size() && !plan.modes[mode].runs[task] && to_ns > from_ns)
+      jobs += static_cast<uint64_t>(t.rate->releases_before(origin, to_ns) - t.rate->releases_before(origin, from_ns));
+  };
+  uint32_t mode = 0;
+  int64_t from = epoch_ns;
+  for (size_t i = 0; i < board.modes().size(); ++i) {
+    const ModeLog::Change* change = board.modes().change(i);
+    if (change == nullptr) continue;
+    const int64_t to = std::clamp(change->from_ns, from, std::max(from, end_ns));
+    add(mode, from, to);
+    mode = change->mode;
+    from = to;
+  }
+  add(mode, from, end_ns);
+  return jobs;
+}
+
 std::vector<uint64_t> released_jobs(const Plan& plan, const RunBoard& board, int64_t epoch_ns, int64_t end_ns) {
   std::vector<uint64_t> released;
   for (size_t t = 0; t < plan.tasks.size(); ++t) {
@@ -195,7 +264,8 @@ std::vector<uint64_t> released_jobs(const Plan& plan, const RunBoard& board, int
       continue;
     }
     const auto planned = static_cast<uint64_t>(task.rate->releases_before(epoch_ns + task.offset_ns, end_ns));
-    released.push_back(planned - std::min(planned, board.task(t).paused.load()));
+    const uint64_t passed = board.task(t).paused.load() + left_out_jobs(plan, board, t, epoch_ns, end_ns);
+    released.push_back(planned - std::min(planned, passed));
   }
   return released;
 }

@@ -126,6 +126,17 @@ Grant apply(const Reservation& wanted, int64_t patience_ns) {
   return grant;
 }
 
+bool demote_thread(int thread) {
+  const sched_param param{0};
+  return sched_setscheduler(thread, SCHED_IDLE | SCHED_RESET_ON_FORK, &param) == 0;
+}
+
+void restore_thread(const Reservation& had) {
+  if (had.policy != Policy::fixed) return;
+  const sched_param param{had.priority};
+  sched_setscheduler(0, SCHED_FIFO | SCHED_RESET_ON_FORK, &param);
+}
+
 void apply_default() {
   const sched_param param{0};
   sched_setscheduler(0, SCHED_OTHER, &param);

@@ -8,7 +8,10 @@ namespace takt {
 
 Lane::Lane(std::vector<size_t> members, const std::vector<std::unique_ptr<Task>>& tasks)
     : members_(std::move(members)), followers_(members_.size()), visible_(members_.size()), ran_(members_.size()) {
-  for (const size_t index : members_) tasks_.push_back(tasks[index].get());
+  for (const size_t index : members_) {
+    tasks[index]->set_watch(*watch_, static_cast<uint32_t>(tasks_.size()));
+    tasks_.push_back(tasks[index].get());
+  }
   for (size_t m = 1; m < members_.size(); ++m) {
     const auto producer = std::find(members_.begin(), members_.end(), tasks_[m]->plan().on_task);
     followers_[m].producer = static_cast<size_t>(producer - members_.begin());
@@ -56,8 +59,8 @@ void Lane::skip_passed(int64_t now_ns, int64_t end_ns) {
   const bool all = head().plan().on_miss == OnMiss::skip;
   const int64_t pending = all ? 0 : 1;
   while (rate().release_ns(origin_ns_, next_ + pending) <= now_ns && next_release_ns() < end_ns) {
+    if (head().in_mode(next_release_ns_)) head().statistics().skipped.fetch_add(1, std::memory_order_relaxed);
     go_to(next_ + 1);
-    head().statistics().skipped.fetch_add(1, std::memory_order_relaxed);
   }
 }
 
@@ -83,6 +86,22 @@ void Lane::run_follower_modelled(const Activation& activation, std::vector<Activ
     if (followers_[m].producer == activation.member && activates(m, end.visible_at_ns))
       released.push_back({m, end.visible_at_ns});
   }
+}
+
+std::vector<std::pair<size_t, size_t>> low_before_high(const Plan& plan) {
+  const auto needs = [&](size_t task, size_t other) {
+    for (size_t producer = plan.tasks[task].on_task; producer != kNone; producer = plan.tasks[producer].on_task)
+      if (producer == other) return true;
+    return false;
+  };
+  std::vector<std::pair<size_t, size_t>> pairs;
+  for (const auto& members : lane_members(plan))
+    for (const size_t low : members)
+      for (const size_t high : members)
+        if (plan.tasks[low].criticality == Criticality::low && plan.tasks[high].criticality == Criticality::high &&
+            !needs(high, low))
+          pairs.emplace_back(low, high);
+  return pairs;
 }
 
 int64_t lane_budget_ns(const Plan& plan, const std::vector<size_t>& members) {

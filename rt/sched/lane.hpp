@@ -20,7 +20,8 @@ class Lane {
   }
   /// Planned instant of the next release.
   int64_t next_release_ns() const { return next_release_ns_; }
-  int64_t next_deadline_ns() const { return next_release_ns_ + head().plan().deadline_ns; }
+  /// Instant by which the whole pass is due (lane_span_ns).
+  int64_t next_deadline_ns() const { return next_release_ns_ + span_ns_; }
 
   /// Runs the next job of the head and the jobs it releases; afterwards moves on to the next release still wanted.
   /// Raises `stop` at the head's release if a device's recorded data ended.
@@ -33,6 +34,9 @@ class Lane {
   };
   void run_head_modelled(StopSignal& stop, std::vector<Activation>& released);
   void run_follower_modelled(const Activation& activation, std::vector<Activation>& released);
+
+  /// What the watchdog sees of the worker that runs this lane.
+  JobWatch& watch() { return *watch_; }
 
   Task& head() const { return *tasks_.front(); }
   const std::vector<size_t>& members() const { return members_; }
@@ -49,22 +53,27 @@ class Lane {
   void go_to(int64_t index) {
     next_ = index;
     next_release_ns_ = rate().release_ns(origin_ns_, index);
+    watch_->expect(next_release_ns_);
   }
   bool activates(size_t member, int64_t visible_at_ns);
   void skip_passed(int64_t now_ns, int64_t end_ns);
 
   std::vector<size_t> members_;
+  std::unique_ptr<JobWatch> watch_ = std::make_unique<JobWatch>();
   std::vector<Task*> tasks_;
   std::vector<Follower> followers_;  ///< by member index; [0] unused
   std::vector<int64_t> visible_;     ///< of the pass under way: when each member's output became visible
   std::vector<char> ran_;
-  int64_t origin_ns_ = 0;
+  int64_t origin_ns_ = 0, span_ns_ = 0;
   int64_t next_ = 0, next_release_ns_ = 0;
 };
 
 /// Groups tasks into lanes: each task with a rate heads one, each `on` task joins its producer's. Indexes into the
 /// plan's tasks, heads first, followers after their producers.
 std::vector<std::vector<size_t>> lane_members(const Plan& plan);
+/// Low-criticality tasks that a high one of the same lane waits for though it needs nothing of them: {low, high}. One
+/// that does not return would stop the high one as well.
+std::vector<std::pair<size_t, size_t>> low_before_high(const Plan& plan);
 /// CPU time that one pass of a lane may use.
 int64_t lane_budget_ns(const Plan& plan, const std::vector<size_t>& members);
 /// Longest time from the head's release to the last follower's deadline.

@@ -17,7 +17,6 @@ using analysis::Ticks;
 using analysis::Wide;
 
 constexpr Wide kSecond = 1'000'000'000;
-constexpr int kHighestPriority = 80;  // below the kernel's own interrupt threads (50 by default) nothing is gained
 
 /// Ticks to a nanosecond that make every period whole; 1 where that is too fine: periods are then rounded down.
 int64_t ticks_per_ns(const Plan& plan, const std::vector<std::vector<size_t>>& lanes) {

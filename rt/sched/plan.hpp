@@ -29,6 +29,7 @@ std::string_view to_string(Criticality criticality);
 std::string_view to_string(OnOverrun verb);
 std::string_view to_string(OnMiss verb);
 
+inline constexpr int64_t kDefaultMemory = 256'000'000;
 inline constexpr size_t kNone = std::numeric_limits<size_t>::max();
 
 struct EdgePlan {
@@ -54,9 +55,16 @@ struct TaskPlan {
   OnOverrun on_overrun = OnOverrun::proceed;
   OnMiss on_miss = OnMiss::proceed;
   PublishAt publish = PublishAt::asap;
+  int64_t memory_bytes = kDefaultMemory;  ///< what its jobs may take from the heap beyond what they give back
   std::vector<EdgePlan> edges;
   std::vector<std::vector<size_t>> joins;  ///< groups of indexes into Node::inputs()
   std::vector<size_t> ports;               ///< per output of the node: index into Plan::ports
+};
+
+/// A mode that the run can change to: the tasks it leaves out are paused and keep what they have reserved.
+struct ModePlan {
+  std::string name;
+  std::vector<char> runs;  ///< by task
 };
 
 struct Plan {
@@ -64,7 +72,9 @@ struct Plan {
   std::vector<int> cores;
   std::vector<TaskPlan> tasks;
   std::vector<PortPlan> ports;
-  std::string mode = "full";
+  std::string mode = "full";    ///< of the start
+  std::vector<ModePlan> modes;  ///< [0] is that of the start, with all tasks; empty: there is no other
+  size_t safe_stop = kNone;     ///< index into modes
 };
 
 /// Rate at which a task runs: its own, or that of the producer whose output releases it (divided by `every`); 0 if

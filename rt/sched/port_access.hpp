@@ -23,6 +23,7 @@ class PortAccess {
   }
 
   static bool sent(const OutputPort& output) { return output.sent_; }
+  static void set_level(OutputPort& output, int level) { output.loaned_->level = level; }  ///< of a sent message
   static int64_t stamp_ns(const OutputPort& output) { return output.stamp_ns_; }
   static void reset(OutputPort& output) {
     output.sent_ = false;

@@ -30,7 +30,7 @@ T* RunBoard::place(std::byte*& at, size_t count) {
   return first;
 }
 
-RunBoard::RunBoard(const Plan& plan, size_t processes) : process_count_(processes) {
+RunBoard::RunBoard(const Plan& plan, size_t processes) : process_count_(processes), safe_stop_mode_(plan.safe_stop) {
   size_t edges = 0;
   for (const TaskPlan& task : plan.tasks) {
     first_edge_.push_back(edges);
@@ -55,6 +55,10 @@ RunBoard::RunBoard(const Plan& plan, size_t processes) : process_count_(processe
 }
 
 RunBoard::~RunBoard() { munmap(memory_, bytes_); }
+
+void RunBoard::safe_stop(int64_t from_ns, std::string_view reason) {
+  if (safe_stop_mode_ != kNone) modes().request(static_cast<uint32_t>(safe_stop_mode_), from_ns, reason);
+}
 
 void RunBoard::set_grant(size_t t, const Grant& grant) {
   GrantRecord& record = grants_[t];

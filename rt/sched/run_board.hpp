@@ -4,7 +4,9 @@
 #include <cstddef>
 #include <string>
 
+#include "rt/sched/fault_log.hpp"
 #include "rt/sched/grant.hpp"
+#include "rt/sched/mode_log.hpp"
 #include "rt/sched/plan.hpp"
 #include "rt/sched/statistics.hpp"
 #include "rt/sched/stop_signal.hpp"
@@ -44,6 +46,7 @@ struct CapacityRecord {
 class RunBoard {
  public:
   enum Decision : uint32_t { undecided, as_asked, cooperative };
+  enum Carrier : uint32_t { no_carrier, iceoryx, local };
 
   /// Only the shape of the plan is used: tasks, edges, ports. Throws std::runtime_error if there is no memory.
   explicit RunBoard(const Plan& plan, size_t processes = 1);
@@ -65,23 +68,33 @@ class RunBoard {
   const ProcessRecord& process(size_t p) const { return processes_[p]; }
   size_t process_count() const { return process_count_; }
 
+  ModeLog& modes() { return shared_->modes; }
+  const ModeLog& modes() const { return shared_->modes; }
+  /// Asks for the mode `safe_stop`; nothing happens if the run is in it, or the plan has none. Any thread, does not
+  /// wait.
+  void safe_stop(int64_t from_ns, std::string_view reason);
+  FaultLog& faults() { return shared_->faults; }
+  const FaultLog& faults() const { return shared_->faults; }
+
   StopSignal& stop() { return shared_->stop; }
   std::atomic<int64_t>& epoch_ns() { return shared_->epoch_ns; }  ///< 0: not fixed yet
   std::atomic<uint32_t>& decision() { return shared_->decision; }
-  std::atomic<bool>& transport_up() { return shared_->transport_up; }
+  std::atomic<uint32_t>& carrier() { return shared_->carrier; }  ///< the transport that is up and can be joined
 
  private:
   struct Shared {
     StopSignal stop;
+    ModeLog modes;
+    FaultLog faults;
     std::atomic<int64_t> epoch_ns{0};
     std::atomic<uint32_t> decision{undecided};
-    std::atomic<bool> transport_up{false};
+    std::atomic<uint32_t> carrier{no_carrier};
   };
   template <class T>
   T* place(std::byte*& at, size_t count);
 
   std::byte* memory_ = nullptr;
-  size_t bytes_ = 0, process_count_ = 0;
+  size_t bytes_ = 0, process_count_ = 0, safe_stop_mode_ = kNone;
   std::vector<size_t> first_edge_;
   Shared* shared_ = nullptr;
   TaskStatistics* tasks_ = nullptr;

@@ -6,6 +6,8 @@
 #include <atomic>
 #include <cstdint>
 
+#include "rt/level.hpp"
+#include "rt/memory/job_calls.hpp"
 #include "rt/sched/histogram.hpp"
 #include "rt/sched/plan.hpp"
 
@@ -17,6 +19,12 @@ struct JobRecord {
   int32_t cpu = -1;  ///< where it finished
 };
 
+/// From the job released then on, the level is that one.
+struct LevelChange {
+  int64_t release_ns = 0;
+  int32_t level = 0;
+};
+
 /// What the jobs of one task did. Written by the thread that runs the task; the atomics may be read at any time.
 struct TaskStatistics {
   std::atomic<uint64_t> released{0};  ///< of `on` tasks only; a rate's releases are computed outside the executor
@@ -24,12 +32,18 @@ struct TaskStatistics {
   std::atomic<uint64_t> completed{0}, skipped{0}, reused{0}, deadline_misses{0}, budget_overruns{0}, stale_inputs{0};
   std::atomic<uint64_t> new_inputs{0};  ///< jobs whose first input was new: distinct input stamps
   std::atomic<uint64_t> no_result{0};
+  std::atomic<uint64_t> demoted{0};  ///< jobs that used up their budget and gave way to all others; by the watchdog
+  std::array<std::atomic<uint64_t>, kMaxLevels> at_level{};  ///< jobs by quality level
+  std::atomic<int32_t> last_level{0};
   std::atomic<int64_t> last_exec_ns{0}, last_response_ns{0};
   uint64_t allocations = 0, page_faults = 0;
+  std::array<uint64_t, kJobCalls> rt_violations{};  ///< by JobCall: calls that no job should make, once it is warm
   int64_t cpu_ns = 0, preempted_ns = 0;
   Histogram lateness, exec, response, publish;
-  std::array<JobRecord, 64> jobs{};    ///< ring of the last ones
-  std::atomic<uint64_t> job_count{0};  ///< written so far
+  std::array<JobRecord, 64> jobs{};        ///< ring of the last ones
+  std::atomic<uint64_t> job_count{0};      ///< written so far
+  std::array<LevelChange, 64> changes{};   ///< ring of the last ones
+  std::atomic<uint64_t> level_changes{0};  ///< written so far
 
   /// Drift of the release grid: least lateness of the last 100 jobs minus that of the first 100, us. Zero if releases
   /// stay on the planned instants, however long the run.

@@ -4,13 +4,26 @@
 #include <sched.h>
 
 #include <algorithm>
+#include <cstdio>
 #include <cstring>
+#include <exception>
+#include <optional>
+#include <span>
+#include <utility>
 
 #include "rt/sched/param_mail.hpp"
 #include "rt/sched/port_access.hpp"
+#include "rt/sched/watch_rules.hpp"
 
 namespace takt {
 namespace {
+constexpr uint64_t kWarmUpJobs = 3;  // they may set up what later ones use
+
+/// The levels that the controller may choose from.
+std::span<const QualityLevel> levels_of(const TaskPlan& plan) {
+  return std::span(plan.node->levels()).first(plan.on_overrun == OnOverrun::degrade ? plan.node->levels().size() : 1);
+}
+
 // One thread counts; the others only look.
 void add(std::atomic<uint64_t>& counter, uint64_t by = 1) {
   counter.store(counter.load(std::memory_order_relaxed) + by, std::memory_order_relaxed);
@@ -35,13 +48,20 @@ double TaskStatistics::drift_us() const {
 Task::Task(const Plan& plan, size_t index, Transport& transport, const Clock& clock, RunBoard& board)
     : plan_(plan.tasks[index]),
       clock_(clock),
-      mode_(plan.mode),
       board_(board),
       index_(index),
       statistics_(board.task(index)),
       latch_(plan_, transport, board, index),
+      quality_(levels_of(plan_), plan_.budget_ns, plan_.deadline_ns),
       published_(plan_.ports.size()),
       sent_stamps_ns_(plan_.ports.size(), kNothingSent) {
+  calls_.node = plan_.name.c_str();
+  calls_.counts = statistics_.rt_violations.data();
+  calls_.allowed = plan_.node->allowed_calls();
+  calls_.strict = strict_job_calls();
+  calls_.heap_limit = plan_.memory_bytes;
+  for (const ModePlan& mode : plan.modes) modes_.push_back({mode.name, mode.runs[index] != 0});
+  if (modes_.empty()) modes_.push_back({plan.mode, true});
   for (size_t i = 0; i < plan_.ports.size(); ++i) {
     writers_.push_back(transport.make_writer(plan_.ports[i]));
     PortAccess::attach(*plan_.node->outputs()[i], writers_.back().get());
@@ -81,34 +101,90 @@ JobEnd Task::run(uint64_t index, int64_t release_ns, int64_t modelled_ns) {
   const int64_t started = clock_.now_ns();
   const int64_t deadline = release_ns + plan_.deadline_ns;
 
+  const Mode& mode = mode_of(release_ns);
+
   take_mail();
-  latch_.acquire_requests(release_ns, started);
   ended_ = {};
   ended_.release_ns = release_ns;
   ended_.started_ns = started;
   ended_.modelled = modelled;
+  // Which releases a mode leaves out is known from outside, but for those that a producer causes.
+  if (!mode.runs) return pass_over(started, !plan_.rate);
+  latch_.acquire_requests(release_ns, started);
   if (!wanted(index)) {
     latch_.release();
-    std::fill(published_.begin(), published_.end(), false);
-    ended_.paused = true;
-    ended_.end.finished_ns = ended_.end.visible_at_ns = started;
-    return ended_.end;
+    return pass_over(started, true);
   }
+  calls_.job = index;
+  calls_.warm = jobs_run_++ < kWarmUpJobs;
+  std::optional<JobScope> scope(calls_);
   ended_.stale = latch_.acquire(release_ns, started);
   ended_.new_input = first_input_ != nullptr && first_input_->is_new();
-  Job job(clock_, index, release_ns, deadline, 0, mode_);
-  plan_.node->run(job);
+  ended_.level = quality_.level();
+  const CpuBudget cpu{plan_.budget_ns, last_thread_use_ns(), modelled ? nullptr : &thread_cpu_ns};
+  Job job(clock_, index, release_ns, deadline, ended_.level, mode.name, cpu);
+  work(job, release_ns);
 
   JobEnd& end = ended_.end;
   end.end_of_data = job.ended();
-  end.finished_ns = modelled ? std::max(started, release_ns) + modelled_ns : clock_.now_ns();
+  if (modelled) {
+    const double cost = plan_.node->levels()[static_cast<size_t>(ended_.level)].cost;
+    ended_.modelled_ns = static_cast<int64_t>(static_cast<double>(modelled_ns) * cost);
+  }
+  end.finished_ns = modelled ? std::max(started, release_ns) + ended_.modelled_ns : clock_.now_ns();
   publish(end, deadline, modelled);
   latch_.release();
+  scope.reset();
+  if (calls_.heap_refused > 0) tell_refused_memory();
   ended_.ran = true;
   ended_.no_result = job.without_result();
   ended_.cpu = modelled ? 0 : sched_getcpu();
   ended_.used = take_thread_use();
   return end;
+}
+
+JobEnd Task::pass_over(int64_t now_ns, bool count) {
+  std::fill(published_.begin(), published_.end(), false);
+  ended_.paused = count;
+  ended_.end.finished_ns = ended_.end.visible_at_ns = now_ns;
+  return ended_.end;
+}
+
+void Task::work(Job& job, int64_t release_ns) {
+  if (watch_ != nullptr)
+    watch_->begin(member_, job.index(), release_ns, last_thread_use_ns() + enforced_budget_ns(plan_));
+  try {
+    plan_.node->run(job);
+  } catch (const std::exception& problem) {
+    tell_exception(job, problem.what());
+    job.no_result();
+  }
+  if (watch_ != nullptr) watch_->end();
+}
+
+void Task::tell_exception(const Job& job, const char* what) {
+  Fault fault;
+  fault.kind = Fault::exception;
+  fault.task = static_cast<uint32_t>(index_);
+  fault.job = job.index();
+  fault.at_ns = clock_.now_ns();
+  std::snprintf(fault.what.characters.data(), fault.what.characters.size(), "%s: job %llu threw: %s",
+                plan_.name.c_str(), static_cast<unsigned long long>(job.index()), what);
+  board_.faults().append(fault);
+}
+
+void Task::tell_refused_memory() {
+  const int64_t refused = std::exchange(calls_.heap_refused, INT64_MIN);  // once: never above 0 again
+  Fault fault;
+  fault.kind = Fault::memory;
+  fault.task = static_cast<uint32_t>(index_);
+  fault.job = calls_.job;
+  fault.at_ns = clock_.now_ns();
+  std::snprintf(fault.what.characters.data(), fault.what.characters.size(),
+                "%s: job %llu asked for %lld kB more than the %lld kB that the node may have; it got none",
+                plan_.name.c_str(), static_cast<unsigned long long>(calls_.job), static_cast<long long>(refused / 1000),
+                static_cast<long long>(plan_.memory_bytes / 1000));
+  board_.faults().append(fault);
 }
 
 void Task::count(uint64_t page_faults) {
@@ -142,9 +218,13 @@ void Task::count_end() {
   const int64_t response = ended_.published_ns - ended_.release_ns;
   statistics_.response.add(response);
   statistics_.last_response_ns.store(response, std::memory_order_relaxed);
-  if (plan_.budget_ns > 0 && used.cpu_ns > plan_.budget_ns) add(statistics_.budget_overruns);
+  const bool over_budget = plan_.budget_ns > 0 && used.cpu_ns > plan_.budget_ns;
+  if (over_budget) add(statistics_.budget_overruns);
+  count_level(ended_.modelled ? ended_.modelled_ns : used.cpu_ns, response);
   if (ended_.no_result) add(statistics_.no_result);
   if (end.late) add(statistics_.deadline_misses);
+  if (end.late && plan_.on_miss == OnMiss::safe_stop) ask_for_safe_stop("deadline missed");
+  else if (over_budget && plan_.on_overrun == OnOverrun::safe_stop) ask_for_safe_stop("budget exceeded");
   const bool skip = end.late && plan_.on_miss == OnMiss::skip, reuse = end.late && plan_.on_miss == OnMiss::reuse_last;
   std::atomic<uint64_t>& counter = skip ? statistics_.skipped : reuse ? statistics_.reused : statistics_.completed;
   add(counter);
@@ -152,6 +232,24 @@ void Task::count_end() {
   const uint64_t n = statistics_.job_count.load(std::memory_order_relaxed);
   statistics_.jobs[n % statistics_.jobs.size()] = {ended_.release_ns, ended_.started_ns, end.finished_ns, ended_.cpu};
   statistics_.job_count.store(n + 1, std::memory_order_release);
+}
+
+void Task::ask_for_safe_stop(const char* why) {
+  char reason[120];
+  std::snprintf(reason, sizeof reason, "%s: %s", plan_.name.c_str(), why);
+  const int64_t lead_ns = ended_.modelled ? 0 : ModeLog::kLead_ns;
+  board_.safe_stop(ended_.end.finished_ns + lead_ns, reason);
+}
+
+void Task::count_level(int64_t exec_ns, int64_t response_ns) {
+  add(statistics_.at_level[static_cast<size_t>(ended_.level)]);
+  if (statistics_.last_level.load(std::memory_order_relaxed) != ended_.level) {
+    const uint64_t n = statistics_.level_changes.load(std::memory_order_relaxed);
+    statistics_.changes[n % statistics_.changes.size()] = {ended_.release_ns, ended_.level};
+    statistics_.level_changes.store(n + 1, std::memory_order_release);
+    statistics_.last_level.store(ended_.level, std::memory_order_relaxed);
+  }
+  quality_.observe({ended_.release_ns, exec_ns, response_ns, ended_.no_result});
 }
 
 void Task::publish(JobEnd& end, int64_t deadline_ns, bool modelled) {
@@ -180,6 +278,7 @@ void Task::settle_output(size_t i, bool late, int64_t now_ns, int64_t visible_at
   sent_stamps_ns_[i] = kNothingSent;
   const bool withheld = late && (plan_.on_miss == OnMiss::skip || plan_.on_miss == OnMiss::reuse_last);
   if (PortAccess::sent(output) && !withheld) {
+    PortAccess::set_level(output, ended_.level);
     writer.publish(PortAccess::stamp_ns(output), now_ns, visible_at_ns);
     published_[i] = true;
     sent_stamps_ns_[i] = PortAccess::stamp_ns(output);

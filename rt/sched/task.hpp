@@ -6,7 +6,9 @@
 
 #include "rt/memory/memory_use.hpp"
 #include "rt/node.hpp"
+#include "rt/sched/job_watch.hpp"
 #include "rt/sched/latch.hpp"
+#include "rt/sched/quality.hpp"
 #include "rt/sched/run_board.hpp"
 #include "rt/time/clock.hpp"
 
@@ -28,8 +30,15 @@ class Task {
   ~Task();
 
   /// Runs job `index` released at `release_ns`. With modelled_ns >= 0 (virtual time) the job is taken to finish that
-  /// long after its release; otherwise the clock is read.
+  /// long after its release, times the declared cost of its quality level; otherwise the clock is read.
   JobEnd run(uint64_t index, int64_t release_ns, int64_t modelled_ns = -1);
+  /// Tells its jobs to the watchdog, as member `member` of its lane. Before the first job.
+  void set_watch(JobWatch& watch, uint32_t member) {
+    watch_ = &watch;
+    member_ = member;
+  }
+  /// False if the mode of that release leaves this task out.
+  bool in_mode(int64_t release_ns) const { return mode_of(release_ns).runs; }
   /// Counts the job that run() has just ended. Apart from it, so that in a lane no follower waits for the counting of
   /// its producer; `page_faults` are those since the last count on this thread.
   void count(uint64_t page_faults);
@@ -55,20 +64,39 @@ class Task {
     bool late = false;
   };
 
+  struct Mode {
+    std::string name;
+    bool runs = true;
+  };
+  const Mode& mode_of(int64_t release_ns) const { return modes_[board_.modes().at(release_ns)]; }
+  /// The release passes without a job.
+  JobEnd pass_over(int64_t now_ns, bool count);
+  /// Lets the node work, under the eyes of the watchdog.
+  void work(Job& job, int64_t release_ns);
+  void tell_exception(const Job& job, const char* what);
+  /// Tells that a job asked for more memory than it may have; once.
+  void tell_refused_memory();
   /// False if the requests visible at the release stop this task, or pace it past this job.
   bool wanted(uint64_t index) const;
   void take_mail();
   void publish(JobEnd& end, int64_t deadline_ns, bool modelled);
   void count_end();
+  void ask_for_safe_stop(const char* why);
+  void count_level(int64_t exec_ns, int64_t response_ns);
   void settle_output(size_t output, bool late, int64_t now_ns, int64_t visible_at_ns);
 
   const TaskPlan plan_;
   const Clock& clock_;
-  const std::string mode_;
+  std::vector<Mode> modes_;  ///< as Plan::modes
   RunBoard& board_;
   const size_t index_;
   TaskStatistics& statistics_;
+  JobWatch* watch_ = nullptr;
+  uint32_t member_ = 0;
+  JobCalls calls_;
+  uint64_t jobs_run_ = 0;
   Latch latch_;
+  QualityControl quality_;
   std::vector<std::unique_ptr<Writer>> writers_;
   std::vector<bool> published_;
   /// The job that run() has ended and count() not yet counted.
@@ -76,7 +104,8 @@ class Task {
     bool ran = false, paused = false, modelled = false, new_input = false, no_result = false;
     size_t stale = 0;
     int64_t release_ns = 0, started_ns = 0, published_ns = 0, publish_took_ns = 0;
-    int cpu = -1;
+    int64_t modelled_ns = 0;
+    int cpu = -1, level = 0;
     JobEnd end;
     ThreadUse used;
   } ended_;

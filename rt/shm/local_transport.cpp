@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// The transport inside one process. A port is an array of chunks with a reference count each, and a ring of slots, one
-// per kept message. A count of 0 is a free chunk, so there is no free list to corrupt and nothing to lock: the writer
-// looks for a zero, a reader raises a count that is not zero and then checks that the slot still names that message.
+// A port is an array of chunks with a reference count each, and a ring of slots, one per kept message; all of it,
+// counts and slots included, lies in one shared-memory file, so that several processes can map it. A count of 0 is a
+// free chunk, so there is no free list to corrupt and nothing to lock: the writer looks for a zero, a reader raises a
+// count that is not zero and then checks that the slot still names that message.
+#include "rt/shm/local_transport.hpp"
+
 #include <sys/mman.h>
 #include <unistd.h>
 
@@ -9,10 +12,9 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <new>
 #include <stdexcept>
 #include <vector>
-
-#include "rt/shm/transport.hpp"
 
 namespace takt {
 namespace {
@@ -27,27 +29,69 @@ struct Slot {
   std::atomic<int64_t> visible_at_ns{0};
 };
 
+// What another process finds in the mapping must mean the same there: no pointers, and no lock behind an atomic.
+static_assert(std::atomic<uint64_t>::is_always_lock_free && std::atomic<uint32_t>::is_always_lock_free);
+
+/// One per port, in the file.
+struct alignas(64) PortState {
+  std::atomic<uint64_t> newest{0};
+};
+
+constexpr uint64_t round_up(uint64_t bytes, uint64_t to) { return (bytes + to - 1) / to * to; }
+
+/// Places arrays one after the other; without memory it only counts.
+class Carver {
+ public:
+  explicit Carver(std::byte* memory) : memory_(memory) {}
+  template <class T>
+  T* array(uint64_t count) {
+    T* at = memory_ == nullptr ? nullptr : reinterpret_cast<T*>(memory_ + used_);
+    used_ += round_up(sizeof(T) * count, 64);
+    return at;
+  }
+  void to_next_page() { used_ = round_up(used_, kPage); }
+  uint64_t used() const { return used_; }
+
+ private:
+  std::byte* memory_;
+  uint64_t used_ = 0;
+};
+
+/// A port as this process sees it.
 struct Channel {
   PortPlan plan;
+  uint64_t chunk_bytes;
+  uint32_t chunks, slots;
+  PortState* state = nullptr;
+  std::atomic<uint32_t>* references = nullptr;
+  Slot* ring = nullptr;
   std::byte* base = nullptr;
-  uint64_t chunk_bytes = 0;
-  std::vector<std::atomic<uint32_t>> references;
-  std::vector<Slot> ring;
-  std::atomic<uint64_t> newest{0};
 
   explicit Channel(const PortPlan& plan_)
-      : plan(plan_),
-        chunk_bytes((plan_.chunk_bytes() + 63) / 64 * 64),
-        references(plan_.chunks()),
-        ring(plan_.history) {}
+      : plan(plan_), chunk_bytes(round_up(plan_.chunk_bytes(), 64)), chunks(plan_.chunks()), slots(plan_.history) {}
 
-  uint64_t bytes() const { return chunk_bytes * references.size(); }
+  void carve_control(Carver& carver) {
+    state = carver.array<PortState>(1);
+    references = carver.array<std::atomic<uint32_t>>(chunks);
+    ring = carver.array<Slot>(slots);
+  }
+  void carve_chunks(Carver& carver) {
+    carver.to_next_page();
+    base = carver.array<std::byte>(bytes());
+  }
+  void construct() {
+    ::new (state) PortState;
+    for (uint32_t i = 0; i < chunks; ++i) ::new (references + i) std::atomic<uint32_t>(0);
+    for (uint32_t i = 0; i < slots; ++i) ::new (ring + i) Slot;
+  }
+
+  uint64_t bytes() const { return chunk_bytes * chunks; }
   MessageHeader* header(uint32_t chunk) const { return reinterpret_cast<MessageHeader*>(base + chunk * chunk_bytes); }
-  Slot& slot(uint64_t sequence) { return ring[sequence % ring.size()]; }
-  void drop(uint32_t chunk) { references[chunk].fetch_sub(1, std::memory_order_acq_rel); }
+  Slot& slot(uint64_t sequence) const { return ring[sequence % slots]; }
+  void drop(uint32_t chunk) const { references[chunk].fetch_sub(1, std::memory_order_acq_rel); }
   uint32_t in_use() const {
     uint32_t count = 0;
-    for (const auto& r : references) count += r.load(std::memory_order_relaxed) != 0;
+    for (uint32_t i = 0; i < chunks; ++i) count += references[i].load(std::memory_order_relaxed) != 0;
     return count;
   }
 };
@@ -57,14 +101,13 @@ class LocalWriter final : public Writer {
   explicit LocalWriter(Channel& channel) : channel_(channel) {}
   ~LocalWriter() override {
     discard();
-    for (uint64_t s = 1; s <= channel_.ring.size(); ++s) evict(channel_.slot(s));
+    for (uint64_t s = 1; s <= channel_.slots; ++s) evict(channel_.slot(s));
   }
 
   MessageHeader* loan() override {
     if (loaned_ != kNoChunk) return channel_.header(loaned_);
-    const auto count = static_cast<uint32_t>(channel_.references.size());
-    for (uint32_t i = 0; i < count; ++i) {
-      const uint32_t chunk = (next_ + i) % count;
+    for (uint32_t i = 0; i < channel_.chunks; ++i) {
+      const uint32_t chunk = (next_ + i) % channel_.chunks;
       uint32_t free = 0;
       if (!channel_.references[chunk].compare_exchange_strong(free, 1, std::memory_order_acq_rel)) continue;
       next_ = chunk + 1;
@@ -86,7 +129,7 @@ class LocalWriter final : public Writer {
     header->stamp_ns = stamp_ns;
     header->published_ns = published_ns;
     header->visible_at_ns = visible_at_ns;
-    header->sequence = channel_.newest.load(std::memory_order_relaxed) + 1;
+    header->sequence = channel_.state->newest.load(std::memory_order_relaxed) + 1;
     announce(loaned_, stamp_ns, visible_at_ns);
     loaned_ = kNoChunk;
   }
@@ -97,7 +140,7 @@ class LocalWriter final : public Writer {
   }
 
   bool repeat(int64_t, int64_t visible_at_ns) override {
-    const uint64_t newest = channel_.newest.load(std::memory_order_relaxed);
+    const uint64_t newest = channel_.state->newest.load(std::memory_order_relaxed);
     if (newest == 0) return false;
     const Slot& last = channel_.slot(newest);
     const uint32_t chunk = last.chunk.load(std::memory_order_relaxed);
@@ -108,8 +151,8 @@ class LocalWriter final : public Writer {
 
   WriterStatistics statistics() const override {
     WriterStatistics s = statistics_;
-    s.sent = channel_.newest.load(std::memory_order_acquire);
-    s.chunks = static_cast<uint32_t>(channel_.references.size());
+    s.sent = channel_.state->newest.load(std::memory_order_acquire);
+    s.chunks = channel_.chunks;
     s.in_use = channel_.in_use();
     s.bytes = channel_.bytes();
     return s;
@@ -118,14 +161,14 @@ class LocalWriter final : public Writer {
  private:
   /// Takes over one reference to the chunk.
   void announce(uint32_t chunk, int64_t stamp_ns, int64_t visible_at_ns) {
-    const uint64_t sequence = channel_.newest.load(std::memory_order_relaxed) + 1;
+    const uint64_t sequence = channel_.state->newest.load(std::memory_order_relaxed) + 1;
     Slot& slot = channel_.slot(sequence);
     evict(slot);
     slot.chunk.store(chunk);
     slot.stamp_ns.store(stamp_ns);
     slot.visible_at_ns.store(visible_at_ns);
     slot.sequence.store(sequence);
-    channel_.newest.store(sequence);
+    channel_.state->newest.store(sequence);
   }
 
   void evict(Slot& slot) {
@@ -144,8 +187,8 @@ class LocalReader final : public Reader {
 
   size_t list(int64_t limit_ns, std::span<Candidate> out) override {
     size_t count = 0;
-    const uint64_t newest = channel_.newest.load();
-    const uint64_t oldest = newest > channel_.ring.size() ? newest - channel_.ring.size() + 1 : 1;
+    const uint64_t newest = channel_.state->newest.load();
+    const uint64_t oldest = newest > channel_.slots ? newest - channel_.slots + 1 : 1;
     for (uint64_t s = newest; s >= oldest && count < out.size(); --s) {
       Slot& slot = channel_.slot(s);
       if (slot.sequence.load() != s) continue;
@@ -190,54 +233,74 @@ class LocalReader final : public Reader {
 
 class LocalTransport final : public Transport {
  public:
-  explicit LocalTransport(std::span<const PortPlan> ports) {
-    for (const PortPlan& port : ports) {
-      channels_.push_back(std::make_unique<Channel>(port));
-      bytes_ += (channels_.back()->bytes() + kPage - 1) / kPage * kPage;
-    }
+  /// `fresh`: sizes the file and puts empty ports into it; otherwise another process has.
+  LocalTransport(std::span<const PortPlan> ports, const PoolFile& file, bool fresh) {
+    for (const PortPlan& port : ports) channels_.emplace_back(port);
+    bytes_ = carve(nullptr);
     if (bytes_ == 0) return;
-    map();
-    std::byte* at = memory_;
-    for (auto& channel : channels_) {
-      channel->base = at;
-      at += (channel->bytes() + kPage - 1) / kPage * kPage;
-    }
+    if (fresh) file.resize(bytes_);
+    map(file);
+    carve(memory_);
+    if (!fresh) return;
+    for (Channel& channel : channels_) channel.construct();
   }
 
   ~LocalTransport() override {
     if (memory_ != nullptr) munmap(memory_, bytes_);
   }
 
-  std::unique_ptr<Writer> make_writer(size_t port) override { return std::make_unique<LocalWriter>(*channels_[port]); }
-  std::unique_ptr<Reader> make_reader(size_t port) override { return std::make_unique<LocalReader>(*channels_[port]); }
+  std::unique_ptr<Writer> make_writer(size_t port) override { return std::make_unique<LocalWriter>(channels_[port]); }
+  std::unique_ptr<Reader> make_reader(size_t port) override { return std::make_unique<LocalReader>(channels_[port]); }
   uint64_t shared_memory_bytes() const override { return bytes_; }
   const char* name() const override { return "local"; }
 
  private:
-  void map() {
-    const int file = memfd_create("takt", MFD_CLOEXEC);
-    if (file < 0 || ftruncate(file, static_cast<off_t>(bytes_)) != 0) {
-      if (file >= 0) close(file);
-      throw std::runtime_error("shared memory of " + std::to_string(bytes_) + " bytes: " + std::strerror(errno));
-    }
+  /// Every process places the ports of the same plan at the same offsets.
+  uint64_t carve(std::byte* memory) {
+    Carver carver(memory);
+    for (Channel& channel : channels_) channel.carve_control(carver);
+    for (Channel& channel : channels_) channel.carve_chunks(carver);
+    carver.to_next_page();
+    return carver.used();
+  }
+
+  void map(const PoolFile& file) {
     // Populated now, so that no job takes the page fault.
-    void* memory = mmap(nullptr, bytes_, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_POPULATE, file, 0);
-    close(file);
+    void* memory = mmap(nullptr, bytes_, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_POPULATE, file.descriptor(), 0);
     if (memory == MAP_FAILED)
       throw std::runtime_error("cannot map " + std::to_string(bytes_ / 1'000'000) + " MB of message pools: " +
                                std::strerror(errno) + "; lower image sizes or edge depths, or free memory");
     memory_ = static_cast<std::byte*>(memory);
   }
 
-  std::vector<std::unique_ptr<Channel>> channels_;
+  std::vector<Channel> channels_;
   std::byte* memory_ = nullptr;
   uint64_t bytes_ = 0;
 };
 
 }  // namespace
 
+PoolFile::PoolFile() : descriptor_(memfd_create("takt", MFD_CLOEXEC)) {
+  if (descriptor_ < 0) throw std::runtime_error(std::string("shared memory: ") + std::strerror(errno));
+}
+
+PoolFile::~PoolFile() { close(descriptor_); }
+
+void PoolFile::resize(uint64_t bytes) const {
+  if (ftruncate(descriptor_, static_cast<off_t>(bytes)) != 0)
+    throw std::runtime_error("shared memory of " + std::to_string(bytes) + " bytes: " + std::strerror(errno));
+}
+
 std::unique_ptr<Transport> make_local_transport(std::span<const PortPlan> ports) {
-  return std::make_unique<LocalTransport>(ports);
+  return std::make_unique<LocalTransport>(ports, PoolFile(), true);
+}
+
+std::unique_ptr<Transport> make_local_transport(std::span<const PortPlan> ports, const PoolFile& file) {
+  return std::make_unique<LocalTransport>(ports, file, true);
+}
+
+std::unique_ptr<Transport> join_local_transport(std::span<const PortPlan> ports, const PoolFile& file) {
+  return std::make_unique<LocalTransport>(ports, file, false);
 }
 
 }  // namespace takt

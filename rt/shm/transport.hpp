@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The transport interface: how a message gets from one output to its inputs without being copied. Two back ends: local
-// (one process, no daemon) and iceoryx.
+// (one run's own memory, no daemon; between processes see local_transport.hpp) and iceoryx.
 #pragma once
 #include <cstdint>
 #include <memory>
@@ -18,6 +18,7 @@ struct alignas(64) MessageHeader {
   int64_t visible_at_ns = 0;  ///< consumers released before this instant must not see the message
   uint64_t sequence = 0;      ///< 1, 2, 3 ... per output
   uint64_t loan_offset = 0;   ///< where the chunk lay in shared memory when it was loaned; compared at each take
+  int32_t level = 0;          ///< quality level of the job that made it
 };
 
 /// One listed but not yet held message of an edge.

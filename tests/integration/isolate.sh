@@ -2,25 +2,10 @@
 # Runs in several processes: the same report as in one, attachable, one beside the other, and what a killed process
 # leaves behind. Deadlines are not judged here: a shared machine would make that a coin toss.
 source "$(dirname "$0")/lib.sh" "$@"
-export XDG_RUNTIME_DIR=$work/runtime
-mkdir "$XDG_RUNTIME_DIR"
 
 traces() { ls /dev/shm /tmp "$XDG_RUNTIME_DIR/takt" 2>/dev/null | grep -E '^(takt-[0-9]|roudi|iceoryx|iox|[0-9]+\.sock)' | grep -v '\.lock$'; }
 before=$(traces)
 unchanged() { [ "$(traces)" = "$before" ] || fail "$1 left behind: $(traces)"; }
-
-start_run() { # OUTPUT OPTIONS...
-  local name=$1
-  shift
-  "$takt" run --policy cooperative --output "$work/$name" "$@" >"$work/$name.out" 2>"$work/$name.err" &
-  run=$!
-  for _ in $(seq 200); do
-    "$takt" top --once --run $run >"$work/top" 2>/dev/null && return
-    sleep 0.1
-  done
-  cat "$work/$name.err"
-  fail "run $name cannot be attached to"
-}
 
 ended() { # NAME CODE...
   wait $run
@@ -76,7 +61,11 @@ if unshare -m true 2>/dev/null; then
   grep -q '"isolation": "subsystem"' "$report" || fail "the report of the second run is not where it was asked for"
   rm -f "$report"
 else
-  expect 3 "another iceoryx daemon" "$takt" run --isolate subsystem --for 1s --output "$work/out"
+  expect 3 "another iceoryx daemon" "$takt" run --isolate subsystem --transport iceoryx --for 1s --output "$work/out"
+  start_run second --isolate subsystem --for 0s
+  grep -q "transport iceoryx -> local" "$work/second.err" || fail "the second run does not say what it did"
+  expect 0 "" "$takt" stop --run $run
+  ended second 0 1
 fi
 expect 0 "" "$takt" echo stereo.disparity --run $first
 expect 0 "" "$takt" stop --run $first
@@ -84,6 +73,16 @@ run=$first
 ended first 0 1
 grep -q "CPU" "$work/first.out" || fail "no summary after stop"
 unchanged "a stopped run"
+
+# Without iceoryx: the same processes over the local transport, no daemon.
+start_run local --isolate subsystem --transport local --for 0s --report "$work/local.json"
+pgrep -P $run -a | grep -q . || fail "no processes under --transport local"
+ls /dev/shm | grep -q iceoryx && fail "a daemon under --transport local"
+expect 0 "" "$takt" echo stereo.disparity --run $run
+expect 0 "" "$takt" stop --run $run
+ended local 0 1
+grep -q '"transport": "local"' "$work/local.json" || fail "the report does not name the transport"
+unchanged "a run over the local transport"
 
 # One process can be spoken to as well.
 start_run alone --isolate none --for 0s

@@ -5,6 +5,8 @@ source=$2
 export TAKT_HOME=$source
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
+export XDG_RUNTIME_DIR=$work/runtime
+mkdir "$XDG_RUNTIME_DIR"
 failures=0
 
 fail() {
@@ -21,6 +23,21 @@ expect() {
   head -n 12 "$work/stderr"
   [ $got -eq "$code" ] || fail "exit $got instead of $code: $*"
   [ -z "$text" ] || grep -qF -- "$text" "$work/stderr" || fail "stderr lacks '$text': $*"
+}
+
+# start_run NAME OPTIONS... : in the background, its process in $run; returns once it can be attached to. However long
+# that takes: under a sanitizer it is many seconds.
+start_run() {
+  local name=$1
+  shift
+  "$takt" run --policy cooperative --output "$work/$name" "$@" >"$work/$name.out" 2>"$work/$name.err" &
+  run=$!
+  while kill -0 $run 2>/dev/null; do
+    "$takt" top --once --run $run >"$work/top" 2>/dev/null && return
+    sleep 0.1
+  done
+  cat "$work/$name.err"
+  fail "run $name ended before it could be attached to"
 }
 
 finish() {

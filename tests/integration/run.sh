@@ -38,9 +38,8 @@ command -v python3 >/dev/null && check_report "$work/v.json"
 
 # Two runs beside one another, both stopped by a signal within a second.
 for signal in INT TERM; do
-  "$takt" run --for 0s --policy cooperative --output "$work/one" >"$work/1" 2>&1 & first=$!
-  "$takt" run --for 0s --policy cooperative --output "$work/two" >"$work/2" 2>&1 & second=$!
-  sleep 2
+  start_run one --for 0s; first=$run
+  start_run two --for 0s; second=$run
   start=$(date +%s%N)
   kill -$signal $first $second
   wait $first; a=$?
@@ -48,7 +47,7 @@ for signal in INT TERM; do
   took=$((($(date +%s%N) - start) / 1000000))
   echo "SIG$signal ended both in $took ms, exit $a and $b"
   [ $a -le 1 ] && [ $b -le 1 ] || fail "exit $a and $b after SIG$signal"
-  grep -q "CPU" "$work/1" || fail "no summary after SIG$signal"
+  grep -q "CPU" "$work/one.out" || fail "no summary after SIG$signal"
 done
 
 # A signal at any moment, also while the run is being prepared, ends it within a second; 143: before the program could install its handler.

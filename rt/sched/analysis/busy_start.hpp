@@ -35,7 +35,7 @@ struct BusyStart {
 
 /// Work that an analysis may still do, so that it ends on any input: one unit per task looked at.
 struct Effort {
-  int64_t left = 400'000'000;
+  int64_t left = 20'000'000;
   bool spend(size_t units) { return (left -= static_cast<int64_t>(units)) > 0; }
 };
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <limits>
-#include <set>
+#include <map>
 
 #include "rt/sched/analysis/busy_start.hpp"
 #include "rt/sched/analysis/edf.hpp"
@@ -9,11 +9,11 @@
 namespace takt::analysis {
 namespace {
 
-/// One question to the demand: can deadlines before `before` (of one blocking value, or all) be met with this in front?
+/// One question to the demand: can the deadlines in [from, before) be met with this in front?
 struct Query {
   Ticks blocking = 0;
+  Ticks from = 0;
   Ticks before = 0;
-  std::optional<Ticks> only_tasks_with = {};  ///< this blocking
 };
 
 std::optional<Ticks> latest_deadline(const std::vector<TimedTask>& tasks, const BusyStart& busy, const Query& query,
@@ -21,11 +21,10 @@ std::optional<Ticks> latest_deadline(const std::vector<TimedTask>& tasks, const 
   std::optional<Ticks> latest;
   for (size_t i = 0; i < tasks.size(); ++i) {
     const TimedTask& task = tasks[i];
-    if (query.only_tasks_with && *query.only_tasks_with != task.blocking) continue;
     const Ticks room = before - 1 - task.deadline - busy.first[i];
     if (room < 0) continue;
     const Ticks due = busy.first[i] + room / task.period * task.period + task.deadline;
-    if (!latest || due > *latest) latest = due;
+    if (due >= query.from && (!latest || due > *latest)) latest = due;
   }
   return latest;
 }
@@ -51,21 +50,23 @@ bool look_down(const std::vector<TimedTask>& tasks, const BusyStart& busy, const
 /// Everything that has to be asked of one start. `slack`: see blocks_deadlines_before.
 std::optional<std::vector<Query>> queries(const std::vector<TimedTask>& tasks, const BusyStart& busy, bool preemptive,
                                           Ticks slack, Effort& effort) {
-  std::set<Ticks> values;
+  std::map<Ticks, Ticks> from;  // by blocking: a task that has it may be due at any instant this long after the start
   Ticks longest = 0;
   for (const TimedTask& task : tasks) {
-    values.insert(task.blocking);
+    const auto [least, is_new] = from.try_emplace(task.blocking, task.deadline - task.jitter);
+    if (!is_new) least->second = std::min(least->second, task.deadline - task.jitter);
     longest = std::max({longest, task.blocking, preemptive ? 0 : task.budget - 1});
   }
   const std::optional<Ticks> length = busy_length(tasks, busy, longest, effort);
   if (!length) return std::nullopt;
   const Ticks end = busy.start + *length + 1;
   std::vector<Query> all;
-  for (const Ticks value : values) all.push_back({value, end, value});
+  for (const auto& [blocking, due] : from) all.push_back({blocking, busy.start + due, end});
   if (preemptive) return all;
   for (const TimedTask& task : tasks) {
     if (task.budget > 1) {
-      all.push_back({task.budget - 1, std::min(end, blocks_deadlines_before(task, busy.start, slack)), {}});
+      all.push_back(
+          {task.budget - 1, busy.start - kLongest, std::min(end, blocks_deadlines_before(task, busy.start, slack))});
     }
   }
   return all;

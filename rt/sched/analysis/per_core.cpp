@@ -82,6 +82,11 @@ Verdict verdict_of(const std::vector<TimedTask>& tasks, const ResponseBounds& re
   return responses.exact ? Verdict::not_schedulable : Verdict::not_proven;
 }
 
+Verdict core_verdict(const std::vector<TimedTask>& tasks, CorePolicy policy) {
+  const Verdict demanded = demand(tasks, policy).verdict;
+  return demanded != Verdict::not_proven ? demanded : verdict_of(tasks, responses(tasks, policy));
+}
+
 CoreAnalysis analyse(const TaskSet& set, CorePolicy policy) {
   CoreAnalysis answer;
   answer.responses.bounds.resize(set.tasks.size());

@@ -52,6 +52,9 @@ struct CoreAnalysis {
 /// What the deadlines say of response bounds of the same tasks.
 Verdict verdict_of(const std::vector<TimedTask>& tasks, const ResponseBounds& responses);
 
+/// The verdict alone, of tasks that share one core: without responses where the policy does not need them.
+Verdict core_verdict(const std::vector<TimedTask>& tasks, CorePolicy policy);
+
 /// Every core by itself with its policy; bounds in the order of the set. A task without core counts as on core 0 of a
 /// set with one core. A set with a `defect` or an unbound task among several cores: not proven, `why` names it.
 CoreAnalysis analyse(const TaskSet& set, CorePolicy policy);

@@ -16,12 +16,14 @@ using Ticks = int64_t;
 /// One task as an analysis sees it. Constrained deadlines: 0 < deadline <= period.
 struct TimedTask {
   std::string name = {};
-  Ticks period = 0;       ///< exact distance of two releases; of a sporadic task the least distance of two arrivals
-  Ticks deadline = 0;     ///< from the planned release
-  Ticks budget = 0;       ///< longest execution time, overheads included
-  Ticks offset = 0;       ///< of the first release; sporadic tasks have none
-  Ticks jitter = 0;       ///< a job may become ready this long after its planned release
-  Ticks blocking = 0;     ///< longest time it waits for something of lower priority that cannot be preempted
+  Ticks period = 0;    ///< exact distance of two releases; of a sporadic task the least distance of two arrivals
+  Ticks deadline = 0;  ///< from the planned release
+  Ticks budget = 0;    ///< longest execution time, overheads included
+  Ticks offset = 0;    ///< of the first release; sporadic tasks have none
+  Ticks jitter = 0;    ///< a job may become ready this long after its planned release
+  /// Longest time it waits for something of lower priority that cannot be preempted: once in front of a busy interval
+  /// that ends with its job, so what holds up those ahead of it (push-through) is in it.
+  Ticks blocking = 0;
   bool sporadic = false;  ///< arrivals at any instants not closer than a period
   int priority = 0;       ///< fixed priorities: the larger wins; distinct on one core
   int core = -1;          ///< -1: any

@@ -46,6 +46,18 @@ void attack_at_random(const TaskSet& set, Dispatch dispatch, std::mt19937& rando
   seen.add(simulate(set, dispatch, random_arrivals(set, 100, random), hooks));
 }
 
+/// Sporadic tasks under non-preemptive EDF: all arrive at 1, or one of them a tick earlier and holds the core.
+Seen simulate_blockers(const TaskSet& set) {
+  Seen seen(set);
+  const Ticks end = 3 * *common_period(set.tasks);
+  for (size_t blocker = 0; blocker <= set.tasks.size(); ++blocker) {
+    auto arrivals = worst_from(set, 1, end);
+    if (blocker < set.tasks.size()) arrivals[blocker] = periodic_arrivals(set.tasks[blocker], end);
+    seen.add(simulate(set, Dispatch::non_preemptive_edf, arrivals));
+  }
+  return seen;
+}
+
 struct Count {
   int schedulable = 0, not_schedulable = 0;
   void add(bool fits) { ++(fits ? schedulable : not_schedulable); }
@@ -100,4 +112,44 @@ TEST_CASE("EDF: a set fails the demand test exactly if a simulated job misses") 
     for (size_t task = 0; task < set.tasks.size(); ++task) REQUIRE(seen.longest[task] <= *bounds.bounds[task]);
   }
   count.report("EDF");
+}
+
+TEST_CASE("non-preemptive EDF, sporadic: a set fails exactly if a simulated job misses") {
+  std::mt19937 random(3);
+  Count count;
+  for (int i = 0; i < kSets; ++i) {
+    const TaskSet set = random_set(random, {.offsets = false});
+    const DemandAnswer answer = non_preemptive_edf_demand_test(set.tasks);
+    Seen seen = simulate_blockers(set);
+    CAPTURE(describe(set));
+    REQUIRE(answer.verdict == (seen.late ? Verdict::not_schedulable : Verdict::schedulable));
+    count.add(!seen.late);
+    const ResponseBounds bounds = non_preemptive_edf_responses(set.tasks);
+    REQUIRE(bounds.exact);
+    REQUIRE(verdict_of(set.tasks, bounds) == answer.verdict);
+    attack_at_random(set, Dispatch::non_preemptive_edf, random, seen);
+    for (size_t task = 0; task < set.tasks.size(); ++task) REQUIRE(seen.longest[task] <= *bounds.bounds[task]);
+  }
+  count.report("non-preemptive EDF, sporadic");
+}
+
+TEST_CASE("non-preemptive EDF with offsets: nothing that it calls schedulable misses") {
+  std::mt19937 random(4);
+  int proven = 0, refused = 0, refused_without_miss = 0;
+  for (int i = 0; i < kSets / 2; ++i) {
+    const TaskSet set = random_set(random, {.sporadic = 0.2});
+    const bool fits = non_preemptive_edf_demand_test(set.tasks).verdict == Verdict::schedulable;
+    const ResponseBounds bounds = non_preemptive_edf_responses(set.tasks);
+    Seen seen = simulate_all_starts(set, Dispatch::non_preemptive_edf);
+    for (int k = 0; k < 3; ++k) attack_at_random(set, Dispatch::non_preemptive_edf, random, seen);
+    CAPTURE(describe(set));
+    if (fits) REQUIRE(!seen.late);
+    for (size_t task = 0; task < set.tasks.size(); ++task) REQUIRE(seen.longest[task] <= *bounds.bounds[task]);
+    ++(fits ? proven : refused);
+    refused_without_miss += !fits && !seen.late;
+  }
+  MESSAGE("non-preemptive EDF with offsets: " << proven << " proven, " << refused << " refused, "
+                                              << refused_without_miss << " of them without a miss in simulation");
+  CHECK(proven > 0.15 * kSets / 2);
+  CHECK(refused > 0.15 * kSets / 2);
 }

@@ -118,6 +118,33 @@ TEST_CASE("the colour stage equals counting and comparing everything, for any gr
   }
 }
 
+TEST_CASE("in portions: the searched rows of windows equal the reference, from any row on, the others say so") {
+  Random random(23);
+  for (int round = 0; round < 40; ++round) {
+    const int window = random.in(5, 40), reference = random.in(std::max(1, window / 3), window - 1);
+    const int width = random.in(window, 120), height = random.in(window, 120);
+    const SearchGrid grid = make_search_grid(width, height, reference, window);
+    if (grid.windows() > 1500) continue;
+    const std::vector<uint8_t> image = random.image(width, height);
+    const ImageView<const uint8_t> view(image.data(), width, height, 3);
+    const ColourBins bins = kBoth[round % 2];
+    const auto objects = references(random, image, width, height, reference, bins);
+    ColourStage stage(grid, bins, objects);
+    const auto slow = colour_stage_reference(grid, bins, objects, view);
+    const int first = random.in(0, grid.rows - 1), searched = random.in(0, grid.rows);
+    stage.begin(view, first);
+    for (int i = 0; i < searched; ++i) stage.search_row();
+    const size_t row_size = static_cast<size_t>(grid.columns) * stage.references();
+    for (int row = 0; row < grid.rows; ++row) {
+      const bool done = (row - first + grid.rows) % grid.rows < searched;
+      for (size_t i = 0; i < row_size; ++i) {
+        const size_t at = static_cast<size_t>(row) * row_size + i;
+        REQUIRE(stage.missing()[at] == (done ? slow[at] : ColourStage::kNotSearched));
+      }
+    }
+  }
+}
+
 TEST_CASE("the same at the size of the camera: 37 x 27 windows of 64 px over 640 x 480") {
   Random random(5);
   const SearchGrid grid = make_search_grid(640, 480, 48, 64);

@@ -42,13 +42,17 @@ Picture shifted(std::mt19937& random, const Picture& left, int shift, int noise_
   return right;
 }
 
-void expect_equal(const Picture& left, const Picture& right, const MatcherParameters& p) {
+/// `room`: disparities that the matcher takes memory for, of which it then searches those of `p`.
+void expect_equal(const Picture& left, const Picture& right, const MatcherParameters& p, int room = 0) {
   const auto count = static_cast<size_t>(left.width * left.height);
   std::vector<int16_t> slow(count), fast(count);
   std::vector<uint8_t> slow_confidence(count), fast_confidence(count);
   reference::match(left.view(), right.view(), p, {slow.data(), left.width, left.height},
                    {slow_confidence.data(), left.width, left.height});
-  Matcher matcher(left.width, left.height, left.channels, p);
+  MatcherParameters largest = p;
+  largest.disparities = std::max(room, p.disparities);
+  Matcher matcher(left.width, left.height, left.channels, largest);
+  matcher.limit_search(p.disparities);
   for (int run = 0; run < 2; ++run) {  // the second run finds used scratch memory
     std::fill(fast.begin(), fast.end(), int16_t{-7});
     REQUIRE(matcher.match(left.view(), right.view(), {fast.data(), left.width, left.height},
@@ -102,6 +106,18 @@ TEST_CASE("random pairs, sizes, costs: equal to the reference on every SIMD targ
     }
   });
   CHECK(targets >= 1);
+}
+
+TEST_CASE("a search limited after construction: equal to the reference of the smaller range") {
+  on_each_target([&] {
+    std::mt19937 random(19);
+    for (int round = 0; round < 30; ++round) {
+      const auto pick = [&](int low, int high) { return std::uniform_int_distribution<int>(low, high)(random); };
+      const Picture left = random_picture(random, pick(1, 45), pick(1, 33), 1, 256);
+      const Picture right = shifted(random, left, pick(0, left.width - 1), pick(0, 100));
+      expect_equal(left, right, random_parameters(random, 200), pick(1, 512));
+    }
+  });
 }
 
 TEST_CASE("search ranges of several register blocks and strips of columns: equal to the reference") {

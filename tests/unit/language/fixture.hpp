@@ -18,6 +18,7 @@ struct FakeStereo : Node {
   Input<StereoPair> pair{this, "pair", "raw images"};
   Output<StereoPair> rectified{this, "rectified", "rectified images"};
   Output<DisparityMap> disparity{this, "disparity", "disparities"};
+  Levels levels{this, {{"full", 1.0}, {"half", 0.3}}};
   Param<int> disparities{this, "disparities", 64, {1, 512}, "px", "number of disparities"};
   Param<double> max_range{this, "max_range", 10.0, {0.5, 50.0}, "m", "farthest point"};
   Param<double> window{this, "window", 0.1, {0.0, 1.0}, "s", "time window"};

@@ -130,12 +130,26 @@ TEST_CASE("A mode leaves out the nodes and devices it names") {
   CHECK(loaded.graph->schedule.entries.size() == 1);
 }
 
-TEST_CASE("What this version does not enforce is told") {
-  const Loaded loaded = Files(kGraph, with(kSchedule, "on_overrun: degrade", "on_overrun: safe_stop")).load();
+TEST_CASE("safe_stop and a bound on memory are taken as they stand") {
+  const Loaded loaded =
+      Files(kGraph, with(kSchedule, "on_overrun: degrade", "memory: 64MB, on_overrun: safe_stop")).load();
+  INFO(all(loaded));
+  REQUIRE(loaded.graph);
+  CHECK(loaded.graph->adjusted.empty());
+  CHECK(loaded.graph->schedule.entries.at("stereo").on_overrun == OnOverrun::safe_stop);
+  CHECK(loaded.graph->schedule.entries.at("stereo").memory_bytes == 64'000'000);
+  CHECK(loaded.graph->schedule.entries.at("ego_motion").memory_bytes == kDefaultMemory);
+}
+
+TEST_CASE("A node with levels degrades; for one without the word is adjusted") {
+  const Loaded with_levels = Files().load();
+  REQUIRE(with_levels.graph);
+  CHECK(with_levels.graph->adjusted.empty());
+  const Loaded loaded = Files(kGraph, with(kSchedule, "ego_motion: {", "ego_motion: {on_overrun: degrade, ")).load();
   INFO(all(loaded));
   REQUIRE(loaded.graph);
   REQUIRE(loaded.graph->adjusted.size() == 1);
-  CHECK(loaded.graph->adjusted[0].find("on_overrun of stereo: safe_stop -> continue") == 0);
+  CHECK(loaded.graph->adjusted[0].find("on_overrun of ego_motion: degrade -> continue: it has one quality level") == 0);
 }
 
 TEST_CASE("A cycle of sampled edges is no error") {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <string>
+#include <vector>
 
 #include "nodes/object_detection/detector.hpp"
 #include "nodes/object_detection/scenes.hpp"
@@ -99,6 +100,64 @@ TEST_CASE("object_detection: boxes and region of interest of the left image, wit
   pair->width = 320;
   test::latch(port, pair, 1300, 2);
   CHECK_FALSE(test::run(*node));
+}
+
+TEST_CASE("object_detection: with little time the best so far is sent; the next image goes on where this one ended") {
+  const auto database = read_database(kObjects, 48, TestViews::skip);
+  DetectorParameters p;
+  p.threshold_scale = 4;  // every window passes, so that those which were searched show
+  Detector detector(640, 480, database, p);
+  const std::vector<uint8_t> grey(640 * 480 * 3, 100);
+  const ImageView<const uint8_t> image(grey.data(), 640, 480, 3);
+  const SearchGrid& grid = detector.grid();
+  std::vector<uint8_t> roi(static_cast<size_t>(grid.windows()));
+  const auto searched_rows = [&](int portions) {
+    REQUIRE(detector.run(image, [&, asked = 0]() mutable { return asked++ < portions; }));
+    detector.decision().region_of_interest({roi.data(), grid.columns, grid.rows});
+    std::vector<int> rows;
+    for (int row = 0; row < grid.rows; ++row)
+      if (roi[static_cast<size_t>(row * grid.columns)] == 255) rows.push_back(row);
+    return rows;
+  };
+  REQUIRE(grid.rows == 27);
+  const auto range = [](int from, int to) {
+    std::vector<int> v;
+    for (int i = from; i < to; ++i) v.push_back(i);
+    return v;
+  };
+  CHECK(searched_rows(10) == range(0, 10));
+  CHECK(detector.searched() == doctest::Approx(10.0 / 27));
+  CHECK(searched_rows(10) == range(10, 20));
+  CHECK(searched_rows(0).empty());
+  const auto wrapped = searched_rows(10);  // 20 .. 26, then 0 .. 2
+  CHECK(wrapped.size() == 10);
+  CHECK(wrapped[2] == 2);
+  CHECK(wrapped[3] == 20);
+  CHECK(searched_rows(100) == range(0, 27));
+  CHECK(detector.searched() == 1.0f);
+  CHECK(searched_rows(5) == range(0, 5));
+}
+
+TEST_CASE("object_detection: out of time it sends what it has and says how much was searched") {
+  const auto node = make_node();
+  auto& port = test::input(*node, "pair");
+  PortAccess::connect(port, {640, 480, 3, 0});
+  set(*node, "database", kObjects.string());
+  test::set_up(*node);
+  test::BoxWriter<Detections> boxes(*node->outputs()[0]);
+  test::Box<StereoPair> pair({640, 480, 3, 0});
+  pair->width = 640, pair->height = 480, pair->channels = 3;
+  pair->left.resize(640 * 480 * 3);
+  test::latch(port, pair, 1234, 1);
+  VirtualClock late(99'500'000);  // half a millisecond before the deadline, less than `reserve`
+  Job job(late, 0, 0, 100'000'000, 0, "full");
+  node->run(job);
+  REQUIRE(boxes.sent());
+  CHECK(boxes.message().searched == 0.0f);
+  CHECK(boxes.message().boxes.size == 0);
+  test::latch(port, pair, 1235, 2);
+  CHECK(test::run(*node));
+  CHECK(boxes.message().searched == 1.0f);
 }
 
 TEST_CASE("object_detection: at most max_detections boxes") {

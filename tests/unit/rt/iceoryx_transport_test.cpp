@@ -9,7 +9,6 @@
 #include <unistd.h>
 
 #include <array>
-#include <thread>
 
 #include "private_namespace.hpp"
 #include "rt/shm/transport_error.hpp"
@@ -49,39 +48,19 @@ TEST_CASE("a second iceoryx transport in the process is refused, one after the o
 TEST_CASE("peer: publishes from another process" * doctest::skip()) {
   const char* domain = std::getenv("TAKT_TEST_DOMAIN");
   if (domain == nullptr) return;
-  const auto transport = join_iceoryx_transport(conformance_ports(), domain);
-  const auto writer = transport->make_writer(basic);
-  const auto acknowledged = transport->make_reader(limits);
-  for (uint64_t i = 1; i <= 50; ++i) {
-    publish(*writer, i, static_cast<int64_t>(i), 0);
-    while (listed(*acknowledged, static_cast<int64_t>(i)).empty() || listed(*acknowledged, kEver)[0].sequence < i)
-      std::this_thread::yield();
-  }
-  CHECK(writer->statistics().pool_empty == 0);
+  publish_until_acknowledged(*join_iceoryx_transport(conformance_ports(), domain));
 }
 
 TEST_CASE("messages cross a process border without being copied") {
   if (!private_tmp_and_shm()) return;
   {
     const auto transport = make_iceoryx_transport(conformance_ports());
-    const auto reader = transport->make_reader(basic);
-    const auto writer = transport->make_writer(limits);
     setenv("TAKT_TEST_DOMAIN", iceoryx_domain(getpid()).c_str(), 1);
     const char* arguments[] = {"peer", "--test-case=peer: publishes from another process", "--no-skip", "--minimal",
                                nullptr};
     pid_t child = 0;
     REQUIRE(posix_spawn(&child, "/proc/self/exe", nullptr, nullptr, const_cast<char**>(arguments), environ) == 0);
-    for (uint64_t i = 1; i <= 50; ++i) {
-      Held held;
-      while (!held) {
-        std::array<Candidate, 1> newest;
-        if (reader->list(kEver, newest) == 1 && newest[0].sequence == i) held = reader->take(i);
-        if (!held) std::this_thread::yield();
-      }
-      CHECK(intact(held, i));  // take() has compared its place in shared memory with that of the loan
-      reader->release(held);
-      publish(*writer, i, 0, 0);
-    }
+    const auto acknowledgements = take_and_acknowledge(*transport);
     int status = 0;
     REQUIRE(waitpid(child, &status, 0) == child);
     CHECK(WIFEXITED(status));

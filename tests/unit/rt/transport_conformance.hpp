@@ -102,6 +102,38 @@ inline std::vector<uint64_t> sequences(Reader& reader, int64_t limit_ns, size_t 
 
 using Sequences = std::vector<uint64_t>;
 
+constexpr uint64_t kAcrossProcesses = 50;
+
+/// One side of a test with two processes: publishes 50 messages, each after the one before was acknowledged.
+inline void publish_until_acknowledged(Transport& transport) {
+  const auto writer = transport.make_writer(basic);
+  const auto acknowledged = transport.make_reader(limits);
+  for (uint64_t i = 1; i <= kAcrossProcesses; ++i) {
+    publish(*writer, i, static_cast<int64_t>(i), 0);
+    while (listed(*acknowledged, kEver).empty() || listed(*acknowledged, kEver)[0].sequence < i)
+      std::this_thread::yield();
+  }
+  CHECK(writer->statistics().pool_empty == 0);
+}
+
+/// The other side. What a writer has published goes with it, so the one returned must outlive the other process.
+[[nodiscard]] inline std::unique_ptr<Writer> take_and_acknowledge(Transport& transport) {
+  const auto reader = transport.make_reader(basic);
+  auto writer = transport.make_writer(limits);
+  for (uint64_t i = 1; i <= kAcrossProcesses; ++i) {
+    Held held;
+    while (!held) {
+      std::array<Candidate, 1> newest;
+      if (reader->list(kEver, newest) == 1 && newest[0].sequence == i) held = reader->take(i);
+      if (!held) std::this_thread::yield();
+    }
+    CHECK(intact(held, i));  // take() has compared its place in shared memory with that of the loan
+    reader->release(held);
+    publish(*writer, i, 0, 0);
+  }
+  return writer;
+}
+
 inline void check_basic(Transport& transport) {
   auto writer = transport.make_writer(basic);
   auto reader = transport.make_reader(basic);

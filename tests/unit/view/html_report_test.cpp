@@ -41,7 +41,7 @@ Json full_report() {
   report["duration_s"] = 20.0;
   report["machine"] = {{"cpu", "Some CPU"}, {"cores", 2}};
   report["ok"] = false;
-  report["modes"] = {"full"};
+  report["modes"] = Json::array({{{"name", "full"}, {"from_s", 0.0}, {"to_s", 20.0}, {"reason", "start"}}});
   report["nodes"] = {node("stereo", 300, 300, 0), node("ego_motion", 200, 150, 7)};
   report["edges"] = {{{"from", "stereo.disparity"}, {"to", "ego_motion.disparity"}, {"sent", 299}, {"dropped", 98}}};
   report["chains"] = {

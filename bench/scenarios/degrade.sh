@@ -1,0 +1,63 @@
+#!/bin/bash
+# SPDX-License-Identifier: Apache-2.0
+# What `on_overrun: degrade` is worth: degrade.sh [SECONDS OF THE CAUSE]. The stereo node of the simulated robot is slowed
+# while it runs: it is asked to search more disparities (`takt set stereo.search`), so that a job at full quality takes over
+# twice its budget, and told to search the usual number again. The same run twice, with `continue` and with `degrade`; the
+# rest of the graph is the thesis's. Prints deadline misses while the cause lasts, and how soon after its end level 0 is back.
+set -eu
+root=$(readlink -f "$(dirname "$0")/../..")
+takt=${TAKT:-$root/takt}
+cause=${1:-20}
+before=6 after=10
+usual=96 many=512
+work=$(mktemp -d)
+trap 'rm -rf "$work"; kill $(jobs -p) 2>/dev/null || true' EXIT
+
+one_run() { # VERB
+  # A budget that the usual search fits into and the long one exceeds twice; the other nodes keep theirs.
+  sed -E -e "s/(stereo: \{rate: 15, offset: 26ms, budget: )20ms(.*on_overrun: )degrade/\1${budget}\2$1/" \
+    "$root/schedules/thesis.yaml" >"$work/$1.yaml"
+  grep -q "on_overrun: $1" "$work/$1.yaml"
+  "$takt" run --for "$((before + cause + after))s" --schedule "$work/$1.yaml" --set "stereo.disparities=$many" \
+    --set "stereo.search=$usual" --output "$work/out" --report "$work/$1.json" >"$work/$1.log" 2>&1 & local run=$!
+  until "$takt" top --once >/dev/null 2>&1; do sleep 0.2; done
+  "$takt" top --json >"$work/$1.top" 2>/dev/null & local top=$!
+  wait_until() { # until the run is that old, s
+    until awk -v t="$1" 'END { exit !(match($0, /"running_s":[0-9.]+/) && substr($0, RSTART + 12, RLENGTH - 12) + 0 >= t) }' "$work/$verb.top"
+    do sleep 0.1; done
+  }
+  local verb=$1
+  wait_until $before
+  "$takt" set stereo.search $many
+  wait_until $((before + cause))
+  "$takt" set stereo.search $usual
+  wait $run || true
+  kill $top 2>/dev/null || true
+  wait $top 2>/dev/null || true
+}
+
+budget=${BUDGET:-13ms}
+for verb in continue degrade; do one_run $verb; done
+python3 - "$work" "$before" "$cause" "$budget" <<'PY'
+import json, sys
+work, before, cause, budget = sys.argv[1], float(sys.argv[2]), float(sys.argv[3]), sys.argv[4]
+for verb in ("continue", "degrade"):
+    report = json.load(open(f"{work}/{verb}.json"))
+    stereo = next(n for n in report["nodes"] if n["name"] == "stereo")
+    tops = [(t["running_s"], next(n for n in t["nodes"] if n["name"] == "stereo"))
+            for t in map(json.loads, open(f"{work}/{verb}.top"))]
+    def at(second): return min(tops, key=lambda t: abs(t[0] - second))[1]
+    begin, end = at(before), at(before + cause)
+    jobs = sum(end[k] - begin[k] for k in ("completed", "skipped"))
+    misses = end["deadline_misses"] - begin["deadline_misses"]
+    slow = [n["exec_ms"] for s, n in tops if before + 1 < s < before + cause and n["level"] == 0]
+    others = sum(n["deadline_misses"] for n in report["nodes"] if n["criticality"] == "high" and n is not stereo)
+    print(f"{verb:<9} budget {budget}, stereo {stereo['released']} releases, {stereo['completed']} done, {stereo['skipped']} skipped; "
+          f"exec max {stereo['exec_ms']['max']:.1f} ms; misses {stereo['deadline_misses']} ({100 * stereo['deadline_misses'] / stereo['released']:.1f} % of the run's releases), "
+          f"while slowed {misses} of about {jobs} jobs; misses of other high-criticality nodes {others}; levels {stereo['quality']}; policy {report['policy_granted']}, "
+          f"host stall {report['host_stall_ms']} ms")
+    changes = [(c["at_s"], c["level"]) for c in stereo["quality_changes"]["last"]]
+    if changes: print("          level changes: " + ", ".join(f"{l} at {s:.2f} s" for s, l in changes))
+    back = [s for s, l in changes if l == 0 and s > before + cause]
+    if back: print(f"          slowed from {before:.1f} to {before + cause:.1f} s (+ up to 0.6 s until told); level 0 back {back[-1] - before - cause:.2f} s after")
+PY

@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+// The whole table of releases: rate x policy x load, beside clock_nanosleep and cyclictest in the same minutes. Rounds
+// of one second in turns: Takt, clock_nanosleep, cyclictest (15 Hz), and again.
+#include <array>
+#include <cstdio>
+
+#include "bench/load.hpp"
+#include "bench/suite.hpp"
+#include "bench/suites/release_rounds.hpp"
+
+namespace takt::bench {
+
+std::vector<Row> run_release_loads(const Options& options);
+
+namespace {
+
+constexpr size_t kRates = std::size(kReleaseRates);
+
+/// All rounds under one policy and load.
+class Condition {
+ public:
+  Condition(Policy policy, Load load)
+      : policy_(policy), variant_(std::string(to_string(policy)) + "_" + std::string(to_string(load))) {}
+
+  void add_round() {
+    const ReleaseRound ours = takt_round(policy_, granted_), raw = nanosleep_round(policy_, raw_refused_);
+    released_ += ours.released;
+    completed_ += ours.completed;
+    for (size_t rate = 0; rate < kRates; ++rate) {
+      takt_[rate].add(ours.lateness_us[rate].values());
+      raw_[rate].add(raw.lateness_us[rate].values());
+      add(by_rate_[rate], raw.lateness_us[rate], ours.lateness_us[rate], 0.5);
+    }
+    add(p50_, raw.all(), ours.all(), 0.5);
+    add(p99_, raw.all(), ours.all(), 0.99);
+    // SCHED_DEADLINE is none of cyclictest's policies; SCHED_FIFO is the nearest.
+    const auto theirs = cyclictest_round(policy_ == Policy::deadline ? Policy::fixed : policy_);
+    if (!theirs) return;
+    cyclictest_.add(theirs->values());
+    add(to_cyclictest_, *theirs, ours.lateness_us[0], 0.5);
+  }
+
+  void report(std::vector<Row>& rows) const {
+    const std::string raw = "clock_nanosleep" + (raw_refused_.empty() ? "" : " (" + raw_refused_ + ")");
+    Samples all, raw_all;
+    for (size_t rate = 0; rate < kRates; ++rate) {
+      all.add(takt_[rate].values());
+      raw_all.add(raw_[rate].values());
+    }
+    add_pair(rows, row("p50", all), raw, p50_);
+    add_pair(rows, row("p99", all), raw, p99_);
+    add_pair(rows, row("clock_nanosleep", raw_all), "", {});
+    for (size_t rate = 0; rate < kRates; ++rate)
+      add_pair(rows, row(std::to_string(kReleaseRates[rate]) + "hz", takt_[rate]), raw, by_rate_[rate]);
+    if (cyclictest_.size() > 0) {
+      const std::string name = policy_ == Policy::deadline ? "cyclictest (SCHED_FIFO)" : "cyclictest";
+      add_pair(rows, row("15hz_to_cyclictest", takt_[0]), name, to_cyclictest_);
+      add_pair(rows, row("cyclictest_15hz", cyclictest_), "", {});
+    }
+    Row missed = row("missed", {});
+    missed.unit = "count";
+    missed.value = static_cast<double>(released_) - static_cast<double>(completed_);
+    rows.push_back(missed);
+  }
+
+ private:
+  static void add(Pairs& pairs, const Samples& reference, const Samples& ours, double fraction) {
+    pairs.add_a(reference.quantile(fraction).value_or(0));
+    pairs.add_b(ours.quantile(fraction).value_or(0));
+  }
+  Row row(const std::string& what, const Samples& samples) const {
+    return {"release_loads/" + what + "/" + variant_,
+            "us",
+            samples.quantile(0.5).value_or(0),
+            samples,
+            {},
+            {},
+            {},
+            granted_};
+  }
+
+  const Policy policy_;
+  const std::string variant_;
+  std::array<Samples, kRates> takt_, raw_;
+  std::array<Pairs, kRates> by_rate_;
+  Pairs p50_, p99_, to_cyclictest_;
+  Samples cyclictest_;
+  uint64_t released_ = 0, completed_ = 0;
+  std::string granted_, raw_refused_;
+};
+
+}  // namespace
+
+std::vector<Row> run_release_loads(const Options& options) {
+  const int rounds = options.rounds_or(10);
+  std::vector<Row> rows;
+  if (!cyclictest_round(Policy::cooperative))
+    std::fputs("release_loads: cyclictest is not installed; its rows are left out (apt install rt-tests)\n", stderr);
+  for (const Policy policy : {Policy::deadline, Policy::fixed, Policy::cooperative})
+    for (const Load load : {Load::idle, Load::cpu, Load::memory, Load::disk}) {
+      std::fprintf(stderr, "release_loads: %s, %s\n", std::string(to_string(policy)).c_str(),
+                   std::string(to_string(load)).c_str());
+      const Burden burden(load);
+      Condition condition(policy, load);
+      for (int round = 0; round < rounds; ++round) condition.add_round();
+      burden.check();
+      condition.report(rows);
+    }
+  return rows;
+}
+
+}  // namespace takt::bench

@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "bench/suites/release_rounds.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cstdio>
+#include <memory>
+#include <thread>
+
+#include "bench/instants.hpp"
+#include "rt/node.hpp"
+#include "rt/sched/executor.hpp"
+#include "rt/sched/grant.hpp"
+#include "rt/sched/rendezvous.hpp"
+
+namespace takt::bench {
+namespace {
+
+constexpr int64_t kRoundNs = 1'000'000'000, kBudgetNs = 5'000'000;
+
+/// Does nothing but note when it was run.
+class EmptyNode final : public Node {
+ public:
+  void setup(Setup&) override {}
+  void run(Job& job) override { lateness_us.push_back(static_cast<double>(job.now_ns() - job.release_ns()) * 1e-3); }
+  std::vector<double> lateness_us;
+};
+
+int64_t deadline_of(const Rate& rate) { return rate.period_ns(); }
+
+/// The same reservation that the executor gives a lane of that rate.
+Reservation reservation(Policy policy, size_t rank, const Rate& rate) {
+  if (policy == Policy::deadline) return deadline_reservation(kBudgetNs, deadline_of(rate), rate.period_ns());
+  Reservation r;
+  r.policy = policy;
+  if (policy == Policy::fixed) {
+    r.priority = 80 - static_cast<int>(rank);
+    r.core = static_cast<int>(rank % 2) % static_cast<int>(std::max(1L, sysconf(_SC_NPROCESSORS_ONLN)));
+  }
+  return r;
+}
+
+}  // namespace
+
+ReleaseRound nanosleep_round(Policy policy, std::string& refused) {
+  ReleaseRound round;
+  std::vector<std::vector<double>> late(std::size(kReleaseRates));
+  std::vector<Grant> grants(std::size(kReleaseRates));
+  std::atomic<int64_t> epoch{0};
+  Rendezvous ready(std::size(kReleaseRates) + 1), go(std::size(kReleaseRates) + 1);
+  std::vector<std::thread> threads;
+  for (size_t i = 0; i < std::size(kReleaseRates); ++i) {
+    late[i].reserve(64);
+    threads.emplace_back([&, i] {
+      const Rate rate{kReleaseRates[i], 1};
+      grants[i] = apply(reservation(policy, i, rate));
+      ready.arrive_and_wait();
+      go.arrive_and_wait();
+      for (int64_t k = 0; rate.release_ns(epoch, k) < epoch + kRoundNs; ++k) {
+        sleep_until(rate.release_ns(epoch, k));
+        late[i].push_back(static_cast<double>(now_ns() - rate.release_ns(epoch, k)) * 1e-3);
+      }
+    });
+  }
+  ready.arrive_and_wait();
+  epoch = now_ns() + 50'000'000;
+  go.arrive_and_wait();
+  for (std::thread& thread : threads) thread.join();
+  for (const auto& l : late) round.lateness_us.emplace_back().add(l);
+  refused.clear();
+  for (const Grant& grant : grants)
+    if (!grant.refused.empty()) refused = grant.refused;
+  return round;
+}
+
+ReleaseRound takt_round(Policy policy, std::string& granted) {
+  std::vector<std::unique_ptr<EmptyNode>> nodes;
+  Plan plan;
+  plan.policy = policy;
+  for (int cpu = 0; cpu < std::min(2L, sysconf(_SC_NPROCESSORS_ONLN)); ++cpu) plan.cores.push_back(cpu);
+  for (int64_t hz : kReleaseRates) {
+    nodes.push_back(std::make_unique<EmptyNode>());
+    nodes.back()->lateness_us.reserve(64);
+    TaskPlan task;
+    task.name = std::to_string(hz) + "hz";
+    task.node = nodes.back().get();
+    task.rate = Rate{hz, 1};
+    task.deadline_ns = deadline_of(*task.rate);
+    task.budget_ns = kBudgetNs;
+    task.criticality = Criticality::high;
+    plan.tasks.push_back(task);
+  }
+  MonotonicClock clock;
+  const auto transport = make_local_transport({});
+  Executor::Options options;
+  options.duration_ns = kRoundNs;
+  Executor executor(plan, *transport, clock, options);
+  const RunResult result = executor.run();
+  ReleaseRound round;
+  for (const auto& node : nodes) {
+    round.lateness_us.emplace_back().add(node->lateness_us);
+    round.completed += node->lateness_us.size();
+  }
+  for (uint64_t released : result.released) round.released += released;
+  granted = to_string(result.policy_granted);
+  for (const std::string& refused : result.refused) granted += "; " + refused;
+  return round;
+}
+
+std::optional<Samples> cyclictest_round(Policy policy) {
+  const std::string how = policy == Policy::fixed ? "--policy=fifo --priority=80 --affinity=0" : "--policy=other";
+  std::FILE* pipe =
+      popen(("cyclictest --verbose --threads=1 --interval=66667 --loops=15 " + how + " 2>&1").c_str(), "r");
+  if (pipe == nullptr) return std::nullopt;
+  Samples samples;
+  char line[256];
+  while (std::fgets(line, sizeof line, pipe) != nullptr) {
+    unsigned thread = 0, loop = 0;
+    double late_us = 0;
+    if (std::sscanf(line, " %u: %u: %lf", &thread, &loop, &late_us) == 3) samples.add(late_us);
+  }
+  if (pclose(pipe) != 0 || samples.size() == 0) return std::nullopt;
+  return samples;
+}
+
+Samples ReleaseRound::all() const {
+  Samples all;
+  for (const Samples& rate : lateness_us) all.add(rate.values());
+  return all;
+}
+
+double ReleaseRound::over_1ms() const {
+  double count = 0;
+  for (const Samples& rate : lateness_us)
+    count += static_cast<double>(
+        std::count_if(rate.values().begin(), rate.values().end(), [](double us) { return us > 1000; }));
+  return count;
+}
+
+}  // namespace takt::bench

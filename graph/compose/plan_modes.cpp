@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "graph/compose/plan_modes.hpp"
+
+#include <algorithm>
+#include <set>
+
+#include "rt/node.hpp"
+
+namespace takt::graph {
+namespace {
+
+constexpr const char* kSafeStop = "safe_stop";
+
+std::set<std::string> without(const GraphSpec& graph, const std::string& mode) {
+  for (const ModeSpec& spec : graph.modes)
+    if (spec.name == mode) return {spec.without.begin(), spec.without.end()};
+  return {};
+}
+
+ModePlan with_all_but(const Plan& plan, const std::string& name, const std::set<std::string>& left_out) {
+  ModePlan mode{name, {}};
+  for (const TaskPlan& task : plan.tasks) mode.runs.push_back(!left_out.contains(task.name));
+  return mode;
+}
+
+/// Tasks whose output this one cannot do without: required inputs, and what releases it.
+std::set<std::string> needs(const Plan& plan, const TaskPlan& task) {
+  std::set<std::string> producers;
+  for (const EdgePlan& edge : task.edges)
+    if (task.node->inputs()[edge.input]->need() == Need::required) producers.insert(plan.ports[edge.port].node);
+  if (task.on_task != kNone) producers.insert(plan.tasks[task.on_task].name);
+  return producers;
+}
+
+ModePlan implied_safe_stop(const Plan& plan) {
+  ModePlan mode{kSafeStop, {}};
+  for (const TaskPlan& task : plan.tasks) mode.runs.push_back(task.device || task.criticality == Criticality::high);
+  for (bool grew = true; grew;) {
+    grew = false;
+    for (size_t t = 0; t < plan.tasks.size(); ++t) {
+      if (!mode.runs[t]) continue;
+      const std::set<std::string> needed = needs(plan, plan.tasks[t]);
+      for (size_t p = 0; p < plan.tasks.size(); ++p)
+        if (!mode.runs[p] && needed.contains(plan.tasks[p].name)) mode.runs[p] = grew = true;
+    }
+  }
+  return mode;
+}
+
+}  // namespace
+
+void add_modes(const GraphSpec& graph, Plan& plan) {
+  const std::set<std::string> missing = without(graph, graph.mode);
+  plan.modes = {with_all_but(plan, graph.mode, {})};
+  const auto add = [&](const std::string& name) {
+    const std::set<std::string> left_out = without(graph, name);
+    const bool reachable =
+        name == kSafeStop || std::includes(left_out.begin(), left_out.end(), missing.begin(), missing.end());
+    if (name != graph.mode && reachable) plan.modes.push_back(with_all_but(plan, name, left_out));
+  };
+  add("full");
+  for (const ModeSpec& mode : graph.modes) add(mode.name);
+  const auto named = [&] {
+    return std::find_if(plan.modes.begin(), plan.modes.end(), [](const ModePlan& m) { return m.name == kSafeStop; });
+  };
+  if (named() == plan.modes.end()) plan.modes.push_back(implied_safe_stop(plan));
+  plan.safe_stop = static_cast<size_t>(named() - plan.modes.begin());
+}
+
+}  // namespace takt::graph

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "nodes/stereo/half_resolution.hpp"
+
+#include <cstring>
+#include <stdexcept>
+
+namespace takt::stereo {
+namespace {
+
+/// Windows shrink with the image, to the next odd edge: they then see about as much of the scene as at full size.
+MatcherParameters halved(MatcherParameters p) {
+  const auto odd_half = [](int edge) { return (edge + 1) / 2 | 1; };
+  p.disparities = (p.disparities + 1) / 2;
+  p.n_square = odd_half(p.n_square);
+  p.n_min = odd_half(p.n_min);
+  return p;
+}
+
+/// What is wrong is told of the parameters as they were given.
+const MatcherParameters& checked(const MatcherParameters& p, int width, int height, int channels) {
+  if (const auto wrong = problem(p, width, height, channels)) throw std::invalid_argument("stereo: " + *wrong);
+  return p;
+}
+
+size_t pixels(int width, int height) { return static_cast<size_t>(half(width)) * static_cast<size_t>(half(height)); }
+
+/// Elements from a pixel to its right neighbour: kStep, 0 in an image one pixel wide, where it is its own.
+template <int kChannels, int kStep>
+void halve_row(const uint8_t* a, const uint8_t* b, int count, uint8_t* out) {
+  constexpr int kNext = kStep == 0 ? kChannels : 2 * kChannels;
+  for (int x = 0; x < count; ++x)
+    for (int c = 0; c < kChannels; ++c) {
+      const int i = kNext * x + c;
+      out[kChannels * x + c] = static_cast<uint8_t>((a[i] + a[i + kStep] + b[i] + b[i + kStep] + 2) >> 2);
+    }
+}
+
+template <class T>
+void copy_row(const T* from, int count, T* to) {
+  std::memcpy(to, from, static_cast<size_t>(count) * sizeof(T));
+}
+
+}  // namespace
+
+void halve(ImageView<const uint8_t> in, ImageView<uint8_t> out) {
+  for (int y = 0; y < out.height; ++y) {
+    const uint8_t* a = in.row(2 * y);
+    const uint8_t* b = in.row(std::min(2 * y + 1, in.height - 1));
+    if (in.width < 2) halve_row<1, 0>(a, b, out.width * in.channels, out.row(y));
+    else if (in.channels == 3) halve_row<3, 3>(a, b, out.width, out.row(y));
+    else halve_row<1, 1>(a, b, out.width, out.row(y));
+  }
+}
+
+void enlarge(ImageView<const int16_t> disparity, ImageView<const uint8_t> confidence, ImageView<int16_t> disparity_out,
+             ImageView<uint8_t> confidence_out) {
+  const int width = disparity_out.width, pairs = std::min(disparity.width, width / 2);
+  for (int y = 0; y < disparity_out.height; ++y) {
+    int16_t* d_out = disparity_out.row(y);
+    uint8_t* c_out = confidence_out.row(y);
+    if (y % 2 == 1) {
+      copy_row(disparity_out.row(y - 1), width, d_out);
+      copy_row(confidence_out.row(y - 1), width, c_out);
+      continue;
+    }
+    const int from = std::min(y / 2, disparity.height - 1);
+    const int16_t* d = disparity.row(from);
+    const uint8_t* c = confidence.row(from);
+    const auto doubled = [&](int x) { return static_cast<int16_t>(d[x] < 0 ? -1 : 2 * d[x]); };
+    for (int x = 0; x < pairs; ++x) d_out[2 * x] = d_out[2 * x + 1] = doubled(x);
+    for (int x = 0; x < pairs; ++x) c_out[2 * x] = c_out[2 * x + 1] = c[x];
+    for (int x = 2 * pairs; x < width; ++x) {  // an odd last column
+      d_out[x] = doubled(disparity.width - 1);
+      c_out[x] = c[disparity.width - 1];
+    }
+  }
+}
+
+HalfMatcher::HalfMatcher(int width, int height, int channels, const MatcherParameters& parameters)
+    : width_(width),
+      height_(height),
+      channels_(channels),
+      matcher_(half(width), half(height), channels, halved(checked(parameters, width, height, channels))),
+      left_(pixels(width, height) * static_cast<size_t>(channels)),
+      right_(left_.size()),
+      confidence_(pixels(width, height)),
+      disparity_(pixels(width, height)) {}
+
+bool HalfMatcher::match(ImageView<const uint8_t> left, ImageView<const uint8_t> right, ImageView<int16_t> disparity,
+                        ImageView<uint8_t> confidence) {
+  const auto fits = [&](const auto& view, int channels) {
+    return view.width == width_ && view.height == height_ && view.channels == channels && view.data != nullptr;
+  };
+  if (!fits(left, channels_) || !fits(right, channels_) || !fits(disparity, 1) || !fits(confidence, 1)) return false;
+  const int w = half(width_), h = half(height_);
+  const ImageView<uint8_t> half_left(left_.data(), w, h, channels_), half_right(right_.data(), w, h, channels_);
+  const ImageView<int16_t> half_disparity(disparity_.data(), w, h);
+  const ImageView<uint8_t> half_confidence(confidence_.data(), w, h);
+  halve(left, half_left);
+  halve(right, half_right);
+  if (!matcher_.match(half_left, half_right, half_disparity, half_confidence)) return false;
+  enlarge(half_disparity, half_confidence, disparity, confidence);
+  return true;
+}
+
+}  // namespace takt::stereo

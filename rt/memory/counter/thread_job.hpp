@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+// Shared by the files of takt_allocation_counter: the job of the calling thread.
+#pragma once
+#include <stddef.h>
+
+#include "rt/memory/job_calls.hpp"
+
+#if defined(__has_feature)
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer) || __has_feature(memory_sanitizer)
+#define TAKT_SANITIZED 1
+#endif
+#endif
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define TAKT_SANITIZED 1
+#endif
+
+namespace takt::counter {
+
+// Initial-exec: reading it must not itself allocate, as a lazily made thread-local block would.
+extern __attribute__((tls_model("initial-exec"))) thread_local JobCalls* job;
+
+/// Counts the call, or ends the process. Only if `job` is not null.
+void note(JobCall call, const char* function);
+
+/// One that any thread may make outside of jobs.
+inline void see(JobCall call, const char* function) {
+  if (job != nullptr) note(call, function);
+}
+
+}  // namespace takt::counter

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include "rt/sched/append_log.hpp"
+
+namespace takt {
+
+/// Something that a node did and should not have done, beyond what counters tell.
+struct Fault {
+  enum Kind : uint32_t {
+    hang,       ///< a job did not return
+    exception,  ///< a job threw
+    memory,     ///< a job asked for more memory than its node may have, and got none
+  };
+  Kind kind = hang;
+  uint32_t task = 0;  ///< index into Plan::tasks
+  uint64_t job = 0;   ///< its index
+  int64_t at_ns = 0;
+  BoundedText<200> what;
+};
+
+using FaultLog = AppendLog<Fault, 64>;
+
+}  // namespace takt

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "rt/sched/job_watch.hpp"
+
+#include <pthread.h>
+#include <unistd.h>
+
+namespace takt {
+
+void JobWatch::bind(const Reservation& has) {
+  thread_local const int thread = gettid();
+  has_ = has;
+  clockid_t clock{};
+  if (pthread_getcpuclockid(pthread_self(), &clock) == 0) clock_.store(clock, std::memory_order_release);
+  thread_.store(thread, std::memory_order_release);
+}
+
+void JobWatch::begin(uint32_t member, uint64_t index, int64_t release_ns, int64_t cpu_limit_ns) {
+  // Release stores: who reads one of them also sees that the job before has ended, and so takes no action on it.
+  member_.store(member, std::memory_order_release);
+  index_.store(index, std::memory_order_release);
+  release_ns_.store(release_ns, std::memory_order_release);
+  cpu_limit_ns_.store(cpu_limit_ns, std::memory_order_release);
+  const uint64_t serial = state_.load(std::memory_order_relaxed) / kPhases + 1;
+  state_.store(serial * kPhases + at_work, std::memory_order_release);
+}
+
+bool JobWatch::end() {
+  uint64_t state = state_.load(std::memory_order_relaxed);
+  const uint64_t serial = state / kPhases;
+  state = serial * kPhases + at_work;
+  const auto ended = serial * kPhases + idle;
+  if (state_.compare_exchange_strong(state, ended, std::memory_order_acq_rel)) return false;
+  // The watchdog is at it: it has the highest priority and is through in microseconds.
+  while (state % kPhases == acting) state = state_.load(std::memory_order_acquire);
+  state_.store(ended, std::memory_order_release);
+  if (state % kPhases != demoted) return false;
+  restore_thread(has_);
+  return true;
+}
+
+JobWatch::Running JobWatch::running() const {
+  Running seen;
+  const uint64_t state = state_.load(std::memory_order_acquire);
+  if (state % kPhases == idle) return seen;
+  seen.serial = state / kPhases;
+  seen.acted = state % kPhases != at_work;
+  seen.member = member_.load(std::memory_order_acquire);
+  seen.index = index_.load(std::memory_order_acquire);
+  seen.release_ns = release_ns_.load(std::memory_order_acquire);
+  seen.cpu_limit_ns = cpu_limit_ns_.load(std::memory_order_acquire);
+  // If that was another job already, nothing fits together.
+  if (state_.load(std::memory_order_acquire) / kPhases != seen.serial) return Running{};
+  return seen;
+}
+
+int64_t JobWatch::cpu_ns() const {
+  timespec used{};
+  if (clock_gettime(clock_.load(std::memory_order_acquire), &used) != 0) return -1;
+  return int64_t{used.tv_sec} * 1'000'000'000 + used.tv_nsec;
+}
+
+bool JobWatch::act(uint64_t serial, Phase phase) {
+  uint64_t state = serial * kPhases + at_work;
+  if (!state_.compare_exchange_strong(state, serial * kPhases + acting, std::memory_order_acq_rel)) return false;
+  const bool done = phase != demoted || demote_thread(thread_.load(std::memory_order_acquire));
+  state_.store(serial * kPhases + (done ? phase : told), std::memory_order_release);
+  return done;
+}
+
+bool JobWatch::demote(uint64_t serial) { return act(serial, demoted); }
+bool JobWatch::tell(uint64_t serial) { return act(serial, told); }
+
+}  // namespace takt

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <sys/types.h>
+
+#include <atomic>
+#include <cstdint>
+#include <ctime>
+
+#include "rt/sched/grant.hpp"
+
+namespace takt {
+
+/// Between one worker and the watchdog: what the worker runs, and what was done to it. The worker writes a few words at
+/// the begin and the end of a job and makes no system call; only a worker that was demoted makes one, to get back what
+/// it had.
+class JobWatch {
+ public:
+  struct Running {
+    uint64_t serial = 0;  ///< of the job on this worker; 0: none runs
+    uint32_t member = 0;  ///< of the lane
+    uint64_t index = 0;
+    int64_t release_ns = 0, cpu_limit_ns = 0;
+    bool acted = false;  ///< demoted, or its overrun was told
+  };
+
+  // The worker's side.
+  /// By the thread that will run the jobs, before the first: what it has, and is given back after a demotion.
+  void bind(const Reservation& has);
+  /// No job begins before this instant.
+  void expect(int64_t release_ns) { expected_ns_.store(release_ns, std::memory_order_release); }
+  /// `cpu_limit_ns`: reading of the thread's CPU clock at which the budget is used up.
+  void begin(uint32_t member, uint64_t index, int64_t release_ns, int64_t cpu_limit_ns);
+  /// After the node returned, before anything is published. True if the job had been demoted: the thread has its own
+  /// priority back.
+  bool end();
+
+  // The watchdog's side.
+  Running running() const;
+  int64_t expected_ns() const { return expected_ns_.load(std::memory_order_acquire); }
+  /// CPU clock of the worker, ns; -1 if it cannot be read.
+  int64_t cpu_ns() const;
+  /// Puts the worker behind everybody else until its job ends; false if job `serial` ended before.
+  bool demote(uint64_t serial);
+  /// Notes that the overrun of job `serial` was told; false if the job ended before.
+  bool tell(uint64_t serial);
+
+ private:
+  enum Phase : uint64_t { idle, at_work, acting, demoted, told };
+  static constexpr uint64_t kPhases = 8;  // state = serial * kPhases + phase
+  bool act(uint64_t serial, Phase phase);
+
+  std::atomic<uint64_t> state_{idle};
+  std::atomic<uint32_t> member_{0};
+  std::atomic<uint64_t> index_{0};
+  std::atomic<int64_t> release_ns_{0}, cpu_limit_ns_{0}, expected_ns_{0};
+  std::atomic<int> thread_{0};
+  std::atomic<clockid_t> clock_{0};
+  Reservation has_;
+};
+
+}  // namespace takt

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include "rt/sched/append_log.hpp"
+
+namespace takt {
+
+/// The mode of a run over time. A change holds for every job released at or after its instant: each task looks it up
+/// at its own planned release, as it latches messages, and nobody is interrupted. What a mode leaves out keeps its
+/// reservation, so a change asks nothing of the kernel and cannot be refused.
+///
+/// Bound: a job released before the instant ends by its deadline; the first job of the new mode comes at most one
+/// period after it. So a change is complete, for each task, `lead + max(deadline, period)` after it was asked for.
+class ModeLog {
+ public:
+  static constexpr size_t kMost = 128;
+  /// A request made while the run goes on takes effect this much later, so that it is on the board before the first
+  /// release it is to hold for.
+  static constexpr int64_t kLead_ns = 1'000'000;
+
+  struct Change {
+    uint32_t mode = 0;  ///< index into Plan::modes
+    int64_t from_ns = 0;
+    BoundedText<120> reason;
+  };
+
+  /// Mode of a job released then; 0, the mode of the start, before the first change.
+  uint32_t at(int64_t release_ns) const {
+    for (size_t i = log_.size(); i-- > 0;)
+      if (const Change* change = log_.at(i); change != nullptr && change->from_ns <= release_ns) return change->mode;
+    return 0;
+  }
+  /// The mode that will be in force once all requests have taken effect.
+  uint32_t newest() const { return at(INT64_MAX); }
+  /// Nothing happens if that mode is the newest one already. False if there were too many changes; those that a person
+  /// asks for are refused earlier, so that a safe stop always has its place.
+  bool request(uint32_t mode, int64_t from_ns, std::string_view reason, bool by_hand = false) {
+    if (newest() == mode) return true;
+    if (by_hand && log_.size() + 8 > kMost) return false;
+    for (size_t i = log_.size(); i-- > 0;)  // instants never go back
+      if (const Change* change = log_.at(i)) from_ns = std::max(from_ns, change->from_ns);
+    return log_.append({mode, from_ns, BoundedText<120>(reason)});
+  }
+  size_t size() const { return log_.size(); }
+  /// In the order of their instants; null while it is being written.
+  const Change* change(size_t i) const { return log_.at(i); }
+
+ private:
+  AppendLog<Change, kMost> log_;
+};
+
+}  // namespace takt

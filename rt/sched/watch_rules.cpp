@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "rt/sched/watch_rules.hpp"
+
+#include <algorithm>
+
+namespace takt {
+
+int64_t enforced_budget_ns(const TaskPlan& task) { return task.budget_ns > 0 ? task.budget_ns : task.deadline_ns / 4; }
+
+WatchRules watch_rules(const TaskPlan& task, Policy granted, int64_t patience_ns) {
+  WatchRules rules;
+  rules.budget_ns = std::max<int64_t>(enforced_budget_ns(task), 1);
+  rules.deadline_ns = task.deadline_ns;
+  rules.patience_ns = patience_ns;
+  rules.demote = granted == Policy::fixed && task.criticality == Criticality::low;
+  rules.stop_on_overrun = task.on_overrun == OnOverrun::safe_stop;
+  rules.stop_on_miss = task.on_miss == OnMiss::safe_stop;
+  return rules;
+}
+
+WatchVerdict judge(const WatchRules& rules, const WatchSight& sight) {
+  const int64_t missed_ns = sight.release_ns + rules.deadline_ns + 1, hung_ns = missed_ns + rules.patience_ns;
+  WatchVerdict verdict;
+  verdict.look_again_ns = std::numeric_limits<int64_t>::max();
+  const auto expect = [&](int64_t instant_ns) { verdict.look_again_ns = std::min(verdict.look_again_ns, instant_ns); };
+  if (rules.minds_overrun() && !(sight.running && sight.overrun_told)) {
+    // A job that is still to come begins at its release, or any moment if that has passed.
+    if (!sight.running) expect(std::max(sight.release_ns, sight.now_ns) + rules.budget_ns);
+    else if (sight.cpu_left_ns <= 0) verdict.overrun = true;
+    else expect(sight.now_ns + std::max(sight.cpu_left_ns, kWatchGrain_ns));
+  }
+  const auto by_the_clock = [&](bool minds, bool told, int64_t instant_ns, bool& due) {
+    if (!minds || (sight.running && told)) return;
+    due = sight.running && sight.now_ns >= instant_ns;
+    // A job that begins after that instant is seen within a deadline, or tells it itself when it ends.
+    if (!due) expect(instant_ns > sight.now_ns ? instant_ns : sight.now_ns + rules.deadline_ns);
+  };
+  by_the_clock(rules.stop_on_miss, sight.miss_told, missed_ns, verdict.miss);
+  by_the_clock(true, sight.hang_told, hung_ns, verdict.hang);
+  return verdict;
+}
+
+}  // namespace takt

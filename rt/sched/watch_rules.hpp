@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the watchdog decides, as plain arithmetic: no thread, no clock.
+#pragma once
+#include <cstdint>
+
+#include "rt/sched/plan.hpp"
+
+namespace takt {
+
+/// What is to happen to the jobs of one task while they run. Times in ns.
+struct WatchRules {
+  int64_t budget_ns = 0;    ///< CPU time of a job; > 0
+  int64_t deadline_ns = 0;  ///< relative to the release
+  int64_t patience_ns = 0;  ///< a job that has not returned this long after its deadline hangs
+  bool demote = false;      ///< budget used up: it goes on with what the others leave
+  bool stop_on_overrun = false, stop_on_miss = false;  ///< on_overrun, on_miss: safe_stop
+
+  bool minds_overrun() const { return demote || stop_on_overrun; }
+};
+
+/// Rules of a task under the policy that was granted. The kernel itself enforces budgets under `deadline`.
+WatchRules watch_rules(const TaskPlan& task, Policy granted, int64_t patience_ns);
+
+/// What is enforced where no budget is stated: a quarter of the deadline, as it is reserved.
+int64_t enforced_budget_ns(const TaskPlan& task);
+
+/// One worker as the watchdog sees it at an instant.
+struct WatchSight {
+  int64_t now_ns = 0;
+  bool running = false;
+  int64_t release_ns = 0;                                           ///< of the job that runs; else of the next one
+  int64_t cpu_left_ns = 0;                                          ///< running: until the budget is used up
+  bool overrun_told = false, miss_told = false, hang_told = false;  ///< of this job already
+};
+
+struct WatchVerdict {
+  bool overrun = false, miss = false, hang = false;  ///< to be acted on now
+  int64_t look_again_ns = 0;                         ///< nothing can happen before
+};
+
+/// A job cannot have used a budget before that much time has passed: so the next look is due when the earliest thing
+/// can have happened. A running job is looked at no more than once in kWatchGrain_ns, so that one that was preempted
+/// just before its budget ended costs nothing: the enforcement error, beside the watchdog's own wake-up.
+WatchVerdict judge(const WatchRules& rules, const WatchSight& sight);
+
+constexpr int64_t kWatchGrain_ns = 100'000;
+
+}  // namespace takt

@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "rt/sched/watchdog.hpp"
+
+#include <pthread.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cinttypes>
+#include <cstdio>
+
+#include "rt/memory/process_memory.hpp"
+
+namespace takt {
+
+Watchdog::Watchdog(const Plan& plan, RunBoard& board, const Clock& clock, std::vector<Worker> workers,
+                   const Options& options)
+    : plan_(plan), board_(board), clock_(clock), options_(options), watched_(workers.size()) {
+  for (size_t w = 0; w < workers.size(); ++w) {
+    for (const size_t task : workers[w].tasks)
+      watched_[w].rules.push_back(watch_rules(plan.tasks[task], options.granted, options.patience_ns));
+    watched_[w].worker = std::move(workers[w]);
+  }
+  thread_ = std::thread([this] { watch(); });
+}
+
+Watchdog::~Watchdog() {
+  {
+    const std::lock_guard lock(mutex_);
+    end_ = true;
+  }
+  ending_.notify_all();
+  thread_.join();
+}
+
+size_t Watchdog::hanging_task(size_t worker) const {
+  const Watched& watched = watched_[worker];
+  return watched.worker.tasks[watched.worker.watch->running().member];
+}
+
+void Watchdog::watch() {
+  pthread_setname_np(pthread_self(), "takt-watchdog");
+  prefault_stack();
+  Reservation wanted;
+  if (options_.priority > 0) wanted.policy = Policy::fixed, wanted.priority = options_.priority;
+  apply(wanted);
+  std::unique_lock lock(mutex_);
+  while (!end_) {
+    lock.unlock();
+    const int64_t next_ns = look(clock_.now_ns());
+    lock.lock();
+    // steady_clock is CLOCK_MONOTONIC here, the runtime's own clock.
+    if (!end_) ending_.wait_until(lock, std::chrono::steady_clock::time_point(std::chrono::nanoseconds(next_ns)));
+  }
+}
+
+int64_t Watchdog::look(int64_t now_ns) {
+  // Never: a year, which the arithmetic of timed waits survives.
+  int64_t next_ns = now_ns + 31'536'000'000'000'000;
+  for (Watched& watched : watched_) next_ns = std::min(next_ns, look_at(watched, now_ns));
+  return next_ns;
+}
+
+int64_t Watchdog::look_at(Watched& watched, int64_t now_ns) {
+  const JobWatch& watch = *watched.worker.watch;
+  const JobWatch::Running job = watch.running();
+  WatchSight sight;
+  sight.now_ns = now_ns;
+  if (job.serial == 0) {
+    watched.hangs.store(false);
+    sight.release_ns = watch.expected_ns();
+    int64_t next_ns = std::numeric_limits<int64_t>::max();
+    for (const WatchRules& rules : watched.rules) next_ns = std::min(next_ns, judge(rules, sight).look_again_ns);
+    return next_ns;
+  }
+  const WatchRules& rules = watched.rules[job.member];
+  sight.running = true;
+  sight.release_ns = job.release_ns;
+  sight.overrun_told = job.acted;
+  sight.miss_told = watched.miss_told == job.serial;
+  sight.hang_told = watched.hang_told == job.serial;
+  if (!sight.hang_told) watched.hangs.store(false);
+  if (rules.minds_overrun() && !job.acted) {
+    const int64_t used_ns = watch.cpu_ns();
+    sight.cpu_left_ns = used_ns < 0 ? 0 : job.cpu_limit_ns - used_ns;
+  }
+  const WatchVerdict verdict = judge(rules, sight);
+  act(watched, job, verdict, now_ns);
+  // Acted on: what comes next is known only at another look.
+  return verdict.overrun || verdict.miss || verdict.hang ? now_ns + kWatchGrain_ns : verdict.look_again_ns;
+}
+
+void Watchdog::act(Watched& watched, const JobWatch::Running& job, const WatchVerdict& verdict, int64_t now_ns) {
+  const WatchRules& rules = watched.rules[job.member];
+  const size_t task = watched.worker.tasks[job.member];
+  if (verdict.overrun) {
+    JobWatch& watch = *watched.worker.watch;
+    if (rules.demote && watch.demote(job.serial)) board_.task(task).demoted.fetch_add(1, std::memory_order_relaxed);
+    if (!rules.demote) watch.tell(job.serial);
+    if (rules.stop_on_overrun) safe_stop(task, job.index, "budget used up", now_ns);
+  }
+  if (verdict.miss) {
+    watched.miss_told = job.serial;
+    safe_stop(task, job.index, "deadline passed", now_ns);
+  }
+  if (verdict.hang) {
+    watched.hang_told = job.serial;
+    watched.hangs.store(true);
+    tell_hang(task, job, now_ns);
+  }
+}
+
+void Watchdog::safe_stop(size_t task, uint64_t job, const char* why, int64_t now_ns) {
+  char reason[120];
+  std::snprintf(reason, sizeof reason, "%s: %s, job %" PRIu64 " still running", plan_.tasks[task].name.c_str(), why,
+                job);
+  board_.safe_stop(now_ns + ModeLog::kLead_ns, reason);
+}
+
+void Watchdog::tell_hang(size_t task, const JobWatch::Running& job, int64_t now_ns) {
+  Fault fault;
+  fault.kind = Fault::hang;
+  fault.task = static_cast<uint32_t>(task);
+  fault.job = job.index;
+  fault.at_ns = now_ns;
+  std::snprintf(fault.what.characters.data(), fault.what.characters.size(),
+                "%s: job %" PRIu64 " has not returned %" PRId64 " ms after its release%s",
+                plan_.tasks[task].name.c_str(), job.index, (now_ns - job.release_ns) / 1'000'000,
+                options_.granted == Policy::cooperative ? "; without real-time policies that ends the run" : "");
+  board_.faults().append(fault);
+  if (options_.granted != Policy::cooperative) return;  // no writing here: a full pipe would stop all enforcement
+  std::fprintf(stderr, "takt: error: %s\n", fault.what.c_str());
+  board_.stop().raise(now_ns);
+}
+
+}  // namespace takt

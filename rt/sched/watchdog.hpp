@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <condition_variable>
+#include <memory>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include "rt/sched/job_watch.hpp"
+#include "rt/sched/run_board.hpp"
+#include "rt/sched/watch_rules.hpp"
+#include "rt/time/clock.hpp"
+
+namespace takt {
+
+/// A thread that looks after the running jobs of one process. The kernel charges budgets at its tick (4 ms at 250 Hz),
+/// this thread sleeps on a timer until the earliest instant at which a job can have used up its budget and reads the
+/// job's own CPU clock then.
+///
+/// - Under `fixed`, a low-criticality job that has used its budget goes on with what the others leave (SCHED_IDLE)
+/// until
+///   it ends; counted `demoted`. High-criticality jobs keep their priority, whatever they use.
+/// - `safe_stop` is asked for the moment a budget or a deadline has passed, not when the job ends.
+/// - A job that has not returned `patience` after its deadline hangs: told once, by name. Under `cooperative` that ends
+///   the run.
+///
+/// Cost: at most one wake-up a job that is minded, none for the others but one a job's deadline and patience.
+class Watchdog {
+ public:
+  struct Worker {
+    JobWatch* watch = nullptr;
+    std::vector<size_t> tasks;  ///< members of its lane: indexes into Plan::tasks
+  };
+  struct Options {
+    Policy granted = Policy::cooperative;
+    int64_t patience_ns = 1'000'000'000;
+    int priority = 0;  ///< SCHED_FIFO; 0: none
+  };
+
+  Watchdog(const Plan& plan, RunBoard& board, const Clock& clock, std::vector<Worker> workers, const Options& options);
+  ~Watchdog();
+  Watchdog(const Watchdog&) = delete;
+  Watchdog& operator=(const Watchdog&) = delete;
+
+  /// True while that worker is in a job that hangs. Any thread.
+  bool hangs(size_t worker) const { return watched_[worker].hangs.load(); }
+  /// The task whose job that is.
+  size_t hanging_task(size_t worker) const;
+
+ private:
+  struct Watched {
+    Worker worker;
+    std::vector<WatchRules> rules;  ///< by member
+    uint64_t miss_told = 0, hang_told = 0;
+    std::atomic<bool> hangs{false};
+  };
+  void watch();
+  int64_t look(int64_t now_ns);
+  int64_t look_at(Watched& watched, int64_t now_ns);
+  void act(Watched& watched, const JobWatch::Running& job, const WatchVerdict& verdict, int64_t now_ns);
+  void safe_stop(size_t task, uint64_t job, const char* why, int64_t now_ns);
+  void tell_hang(size_t task, const JobWatch::Running& job, int64_t now_ns);
+
+  const Plan& plan_;
+  RunBoard& board_;
+  const Clock& clock_;
+  const Options options_;
+  std::vector<Watched> watched_;
+  std::mutex mutex_;
+  std::condition_variable ending_;
+  bool end_ = false;
+  std::thread thread_;  ///< last: it uses all of the above
+};
+
+}  // namespace takt

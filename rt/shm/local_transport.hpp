@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// The local transport where one run has several processes: no daemon, no lock, nothing to clean up.
+#pragma once
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "rt/shm/transport.hpp"
+
+namespace takt {
+
+/// The anonymous shared-memory file behind the pools. Processes forked while it exists can map it, too; it is gone when
+/// the last of them is.
+class PoolFile {
+ public:
+  /// Throws std::runtime_error if the kernel refuses.
+  PoolFile();
+  ~PoolFile();
+  PoolFile(const PoolFile&) = delete;
+  PoolFile& operator=(const PoolFile&) = delete;
+
+  int descriptor() const { return descriptor_; }
+  /// Throws std::runtime_error.
+  void resize(uint64_t bytes) const;
+
+ private:
+  int descriptor_ = -1;
+};
+
+/// Pools in `file`, empty. One process makes them, before any other joins. Throws as make_local_transport(ports) does.
+std::unique_ptr<Transport> make_local_transport(std::span<const PortPlan> ports, const PoolFile& file);
+/// The pools that another process made for the same ports.
+std::unique_ptr<Transport> join_local_transport(std::span<const PortPlan> ports, const PoolFile& file);
+
+}  // namespace takt

@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the watchdog decides against a job that is followed microsecond by microsecond.
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <random>
+#include <vector>
+
+#include "rt/sched/watch_rules.hpp"
+
+namespace {
+
+using namespace takt;
+constexpr int64_t kUs = 1'000;
+
+/// A job in steps of a microsecond: when it runs and when it is preempted, until it returns.
+struct JobTrace {
+  int64_t release_ns = 0, start_ns = 0;
+  std::vector<char> runs;  ///< from start on, by microsecond
+
+  int64_t end_ns() const { return start_ns + static_cast<int64_t>(runs.size()) * kUs; }
+  int64_t cpu_ns(int64_t now_ns) const {
+    const auto steps = static_cast<ptrdiff_t>(std::clamp<int64_t>((now_ns - start_ns) / kUs, 0, std::ssize(runs)));
+    int64_t used = std::count(runs.begin(), runs.begin() + steps, 1) * kUs;
+    if (steps < std::ssize(runs) && now_ns > start_ns && runs[static_cast<size_t>(steps)])
+      used += (now_ns - start_ns) % kUs;
+    return used;
+  }
+  /// First microsecond at whose end the budget is used up; end of the job if never.
+  int64_t exhausted_ns(int64_t budget_ns) const {
+    int64_t used = 0;
+    for (size_t i = 0; i < runs.size(); ++i) {
+      used += runs[i] ? kUs : 0;
+      if (used >= budget_ns) return start_ns + static_cast<int64_t>(i + 1) * kUs;
+    }
+    return end_ns() + 1;
+  }
+};
+
+JobTrace random_job(std::mt19937& random) {
+  const auto draw = [&](int low, int high) { return std::uniform_int_distribution(low, high)(random); };
+  JobTrace job;
+  job.release_ns = draw(0, 3000) * kUs;
+  job.start_ns = job.release_ns + draw(0, 1) * draw(0, 2000) * kUs;
+  for (int piece = draw(1, 8); piece > 0; --piece) {
+    job.runs.insert(job.runs.end(), static_cast<size_t>(draw(1, 1500)), 1);
+    job.runs.insert(job.runs.end(), static_cast<size_t>(draw(0, 1) * draw(0, 1500)), 0);
+  }
+  return job;
+}
+
+}  // namespace
+
+TEST_CASE("an overrun is seen when it happens and at most a grain later, a miss and a hang at their instant") {
+  std::mt19937 random(5);
+  const auto draw = [&](int low, int high) { return std::uniform_int_distribution(low, high)(random); };
+  int overruns = 0, misses = 0, hangs = 0;
+  for (int round = 0; round < 3000; ++round) {
+    CAPTURE(round);
+    const JobTrace job = random_job(random);
+    WatchRules rules;
+    rules.budget_ns = draw(1, 6000) * kUs;
+    rules.deadline_ns = draw(1, 8000) * kUs;
+    rules.patience_ns = draw(0, 3000) * kUs;
+    rules.demote = draw(0, 2) != 0;
+    rules.stop_on_overrun = draw(0, 2) == 0;
+    rules.stop_on_miss = draw(0, 1) != 0;
+    const int64_t exhausted = job.exhausted_ns(rules.budget_ns);
+    const int64_t missed = job.release_ns + rules.deadline_ns + 1, hung = missed + rules.patience_ns;
+    WatchSight sight;
+    int64_t overrun_at = -1, miss_at = -1, hang_at = -1;
+    int looks = 0;
+    for (sight.now_ns = 0; sight.now_ns < job.end_ns(); ++looks) {
+      REQUIRE(looks < 1000);
+      sight.running = sight.now_ns >= job.start_ns;
+      sight.release_ns = job.release_ns;
+      sight.cpu_left_ns = rules.budget_ns - job.cpu_ns(sight.now_ns);
+      const WatchVerdict verdict = judge(rules, sight);
+      if (verdict.overrun) overrun_at = sight.now_ns;
+      if (verdict.miss) miss_at = sight.now_ns;
+      if (verdict.hang) hang_at = sight.now_ns;
+      sight.overrun_told = sight.overrun_told || verdict.overrun;
+      sight.miss_told = sight.miss_told || verdict.miss;
+      sight.hang_told = sight.hang_told || verdict.hang;
+      if (verdict.overrun || verdict.miss || verdict.hang) continue;  // what comes next is asked for once more
+      REQUIRE(verdict.look_again_ns > sight.now_ns);
+      sight.now_ns = std::min(verdict.look_again_ns, job.end_ns());
+    }
+    if (rules.minds_overrun() && exhausted + kWatchGrain_ns < job.end_ns()) {
+      CHECK(overrun_at >= exhausted);
+      CHECK(overrun_at <= exhausted + kWatchGrain_ns);
+      ++overruns;
+    } else if (!rules.minds_overrun() || exhausted > job.end_ns()) {
+      CHECK(overrun_at == -1);
+    }
+    const auto by_the_clock = [&](bool minds, int64_t due_ns, int64_t seen_ns, int& count) {
+      if (minds && due_ns < job.end_ns() && due_ns <= job.start_ns) {  // begun too late
+        CHECK(seen_ns <= job.start_ns + rules.deadline_ns);
+        CHECK((seen_ns >= job.start_ns || seen_ns == -1));
+        return;
+      }
+      const bool due = minds && due_ns < job.end_ns();
+      CHECK(seen_ns == (due ? due_ns : -1));
+      count += due;
+    };
+    by_the_clock(rules.stop_on_miss, missed, miss_at, misses);
+    by_the_clock(true, hung, hang_at, hangs);
+  }
+  CHECK(overruns > 300);
+  CHECK(misses > 300);
+  CHECK(hangs > 300);
+}
+
+TEST_CASE("nobody looks at a job that none of the rules minds before it hangs") {
+  WatchRules rules;
+  rules.budget_ns = 1;
+  rules.deadline_ns = 100;
+  rules.patience_ns = 1000;
+  CHECK(judge(rules, {50, false, 200, 0}).look_again_ns == 1301);
+  CHECK(judge(rules, {250, false, 200, 0}).look_again_ns == 1301);
+  CHECK(judge(rules, {1400, false, 200, 0}).look_again_ns == 1500);
+  CHECK(judge(rules, {250, true, 200, 0}).look_again_ns == 1301);
+}

@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: Apache-2.0
+// Changes of mode while a run goes on, in virtual time; safe_stop; exceptions in jobs.
+#include <doctest/doctest.h>
+
+#include <functional>
+#include <stdexcept>
+#include <thread>
+
+#include "rt/node.hpp"
+#include "rt/sched/executor.hpp"
+#include "rt/sched/job_watch.hpp"
+
+namespace {
+
+using namespace takt;
+constexpr int64_t kMs = 1'000'000, kEpoch = 1000 * kMs;
+
+struct Notes final : Node {
+  Output<Odometry> out{this, "out", ""};
+  std::vector<int64_t> releases_ms;
+  std::vector<std::string> modes;
+  std::function<void(const Job&)> act;
+  void setup(Setup&) override {}
+  void run(Job& job) override {
+    releases_ms.push_back((job.release_ns() - kEpoch) / kMs);
+    modes.emplace_back(job.mode());
+    if (act) act(job);
+    if (out.loan() != nullptr) out.send(job.release_ns());
+  }
+};
+
+/// Two nodes at 10 Hz; the mode `safe_stop` leaves the second one out.
+struct Scene {
+  Notes first, second;
+  Plan plan;
+  VirtualClock clock{kEpoch};
+  std::unique_ptr<RunBoard> board;
+
+  Scene() {
+    add(first, "first", 0);
+    add(second, "second", 50 * kMs);
+    plan.modes = {{"full", {1, 1}}, {"half", {0, 1}}, {"safe_stop", {1, 0}}};
+    plan.safe_stop = 2;
+  }
+  void add(Notes& node, const char* name, int64_t offset_ns) {
+    TaskPlan task;
+    task.name = name;
+    task.node = &node;
+    task.rate = Rate{10, 1};
+    task.offset_ns = offset_ns;
+    task.budget_ns = kMs;
+    task.deadline_ns = 100 * kMs;
+    task.ports.push_back(plan.ports.size());
+    PortPlan port;
+    port.node = name;
+    port.type = &node.outputs()[0]->type();
+    port.history = 4;
+    plan.ports.push_back(port);
+    plan.tasks.push_back(task);
+  }
+  RunResult run(const std::function<void(RunBoard&)>& before = {}) {
+    const auto transport = make_local_transport(plan.ports);
+    board = std::make_unique<RunBoard>(plan);
+    if (before) before(*board);
+    Executor::Options options;
+    options.duration_ns = 1000 * kMs;
+    options.board = board.get();
+    Executor executor(plan, *transport, clock, options);
+    return executor.run();
+  }
+};
+
+}  // namespace
+
+TEST_CASE("a change of mode holds for releases at or after its instant, and released counts honour it") {
+  Scene scene;
+  const RunResult result = scene.run([](RunBoard& board) {
+    CHECK(board.modes().request(1, kEpoch + 300 * kMs, "a test"));
+    CHECK(board.modes().request(0, kEpoch + 600 * kMs + 1, "a test"));
+    CHECK(board.modes().request(0, kEpoch + 700 * kMs, "is it already"));
+  });
+  CHECK(scene.board->modes().size() == 2);
+  CHECK(scene.first.releases_ms == std::vector<int64_t>{0, 100, 200, 700, 800, 900});
+  CHECK(result.released[0] == 6);
+  CHECK(scene.board->task(0).completed.load() == 6);
+  CHECK(result.released[1] == 10);
+  CHECK(left_out_jobs(scene.plan, *scene.board, 0, result.epoch_ns, result.end_ns) == 4);
+  REQUIRE(scene.second.modes.size() == 10);
+  CHECK(scene.second.modes[2] == "full");
+  CHECK(scene.second.modes[3] == "half");
+  CHECK(scene.second.modes[5] == "half");
+  CHECK(scene.second.modes[6] == "full");
+}
+
+TEST_CASE("instants of changes never go back") {
+  ModeLog log;
+  CHECK(log.request(1, 100, ""));
+  CHECK(log.request(2, 50, ""));
+  CHECK(log.at(99) == 0);
+  CHECK(log.at(100) == 2);
+  CHECK(log.newest() == 2);
+}
+
+TEST_CASE("a person cannot use up all changes: a safe stop has its place") {
+  ModeLog log;
+  uint32_t asked = 0;
+  while (asked < 1000 && log.request(asked % 2 + 1, asked, "", true)) ++asked;
+  CHECK(asked < ModeLog::kMost);
+  CHECK(log.request(7, asked, "safe_stop"));
+  CHECK(log.newest() == 7);
+}
+
+TEST_CASE("on_miss: safe_stop changes the mode when the first deadline is missed, and says why") {
+  Scene scene;
+  scene.plan.tasks[0].on_miss = OnMiss::safe_stop;
+  scene.plan.tasks[0].deadline_ns = kMs / 2;  // the budget is 1 ms
+  scene.run();
+  CHECK(scene.second.releases_ms.empty());
+  CHECK(scene.first.releases_ms.size() == 10);
+  CHECK(scene.first.modes.front() == "full");
+  CHECK(scene.first.modes.back() == "safe_stop");
+  REQUIRE(scene.board->modes().size() == 1);
+  CHECK(std::string(scene.board->modes().change(0)->reason.c_str()) == "first: deadline missed");
+  CHECK(scene.board->modes().change(0)->from_ns == kEpoch + kMs);
+}
+
+TEST_CASE("on_overrun: safe_stop changes the mode") {
+  Scene scene;
+  scene.plan.tasks[1].on_overrun = OnOverrun::safe_stop;
+  scene.plan.tasks[1].budget_ns = 1;  // any job uses more
+  scene.run();
+  CHECK(scene.second.releases_ms == std::vector<int64_t>{50});
+  CHECK(scene.first.modes.back() == "safe_stop");
+}
+
+TEST_CASE("a job that throws loses its result and is told; the run goes on") {
+  Scene scene;
+  scene.first.act = [](const Job& job) {
+    if (job.index() == 3) throw std::runtime_error("out of luck");
+  };
+  scene.run();
+  CHECK(scene.first.releases_ms.size() == 10);
+  CHECK(scene.board->task(0).no_result.load() == 1);
+  REQUIRE(scene.board->faults().size() == 1);
+  CHECK(std::string(scene.board->faults().at(0)->what.c_str()) == "first: job 3 threw: out of luck");
+}
+
+TEST_CASE("events beyond the room of a log are counted") {
+  AppendLog<int, 3> log;
+  for (int i = 0; i < 3; ++i) CHECK(log.append(i));
+  CHECK_FALSE(log.append(3));
+  CHECK(log.size() == 3);
+  CHECK(log.lost() == 1);
+  CHECK(*log.at(2) == 2);
+}
+
+TEST_CASE("the watchdog never acts on a job that has ended, and an ending job waits for it") {
+  JobWatch watch;
+  watch.bind(Reservation{});
+  watch.begin(2, 7, 100, 200);
+  const JobWatch::Running job = watch.running();
+  CHECK(job.member == 2);
+  CHECK(job.index == 7);
+  CHECK(job.release_ns == 100);
+  CHECK(job.cpu_limit_ns == 200);
+  CHECK_FALSE(job.acted);
+  CHECK(watch.tell(job.serial));
+  CHECK(watch.running().acted);
+  CHECK_FALSE(watch.tell(job.serial));
+  CHECK_FALSE(watch.end());
+  CHECK(watch.running().serial == 0);
+  watch.begin(0, 8, 100, 200);
+  CHECK_FALSE(watch.tell(job.serial));
+  watch.end();
+  // Both at once: every job is told of at most once, and none hangs.
+  std::atomic<bool> done{false};
+  uint64_t told = 0, last = 0;
+  std::thread other([&] {
+    while (!done.load()) {
+      const JobWatch::Running now = watch.running();
+      if (now.serial == 0 || now.acted || !watch.tell(now.serial)) continue;
+      CHECK(now.serial > last);
+      last = now.serial;
+      ++told;
+    }
+  });
+  for (uint64_t i = 0; i < 20'000; ++i) {
+    watch.begin(0, i, 0, 0);
+    watch.end();
+  }
+  done.store(true);
+  other.join();
+  CHECK(told <= 20'000);
+}
