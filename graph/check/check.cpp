@@ -9,6 +9,7 @@
 
 #include "graph/check/check_text.hpp"
 #include "graph/check/margins.hpp"
+#include "graph/check/measured.hpp"
 #include "rt/sched/lane.hpp"
 #include "rt/sched/lane_tasks.hpp"
 
@@ -170,6 +171,11 @@ CheckResult check(const GraphSpec& graph, const Plan& plan, const CheckOptions& 
   for (size_t t = 0; t < plan.tasks.size(); ++t) {
     result.utilisation += static_cast<double>(plan.tasks[t].budget_ns) * 1e-9 * effective_rate_hz(plan, t);
     if (plan.tasks[t].budget_ns == 0) result.unbudgeted.push_back(plan.tasks[t].name);
+  }
+  result.warnings = options.machine.warnings;
+  if (options.machine.identity.cores > 0) {
+    const std::string elsewhere = measured_elsewhere(graph.schedule, options.machine.identity);
+    if (!elsewhere.empty()) result.warnings.push_back(elsewhere);
   }
   add_pools(plan, result);
   spread_over_cores(plan, result);

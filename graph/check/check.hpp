@@ -7,7 +7,7 @@
 
 #include "graph/check/admission.hpp"
 #include "graph/check/ages.hpp"
-#include "graph/check/machine_file.hpp"
+#include "graph/check/check_machine.hpp"
 #include "graph/language/graph.hpp"
 #include "hal/drivers.hpp"
 #include "rt/node.hpp"
@@ -54,6 +54,7 @@ struct CheckResult {
   uint64_t pool_bytes = 0;
   std::vector<std::string> unbudgeted;  ///< tasks whose budget is not stated: not counted
   std::vector<std::string> notes;       ///< what is admitted and yet a risk
+  std::vector<std::string> warnings;    ///< figures that were measured elsewhere
   std::vector<std::string> problems;    ///< why it is not admitted: the task, the value, what would make it fit
   std::vector<PoolUse> pools;
   std::vector<CoreUse> core_use;

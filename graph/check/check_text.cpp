@@ -31,7 +31,7 @@ std::string head_text(const GraphSpec& graph, const Plan& plan, const CheckOptio
   for (const ModeCheck& mode : result.modes)
     if (!mode.change.empty()) text += (mode.mode == plan.mode ? "" : "mode " + mode.mode + ": ") + mode.change + "\n";
   for (const std::string& note : result.notes) text += "note: " + note + "\n";
-  for (const std::string& warning : options.machine.warnings) text += "warning: " + warning + "\n";
+  for (const std::string& warning : result.warnings) text += "warning: " + warning + "\n";
   text += fmt::format("budgets ask for {:.2f} of {} core{}, pools take {:.1f} MB\n", result.utilisation, result.cores,
                       result.cores == 1 ? "" : "s", static_cast<double>(result.pool_bytes) / 1e6);
   if (!options.machine.overheads_from.empty()) {
@@ -155,7 +155,7 @@ Json check_json(const Plan& plan, const CheckOptions& options, const CheckResult
   json["utilisation"] = result.utilisation;
   json["cores"] = result.cores;
   json["overheads"] = overheads_json(options.machine);
-  json["warnings"] = options.machine.warnings;
+  json["warnings"] = result.warnings;
   json["nodes"] = Json::array();
   for (size_t t = 0; t < plan.tasks.size(); ++t) {
     const TaskPlan& task = plan.tasks[t];

@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "graph/check/check.hpp"
+#include "graph/command/machine_file.hpp"
 #include "graph/command/prepare.hpp"
 #include "hal/drivers.hpp"
 
@@ -17,7 +18,8 @@ int check_graph(const RunOptions& options, bool json) {
     return code;
   }
   const graph::CheckResult result =
-      graph::check(*prepared.graph, prepared.composition->plan, {graph::this_machine(), true, true});
+      graph::check(*prepared.graph, prepared.composition->plan,
+                   {graph::check_machine(machine::SystemFacts(), machine_file()), true, true});
   std::fputs(json ? (result.json.dump(2) + "\n").c_str() : result.text.c_str(), stdout);
   if (result.verdict == graph::Verdict::invalid) return kBadInput;
   return result.admitted ? kOk : kNotOk;

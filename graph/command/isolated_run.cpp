@@ -175,8 +175,10 @@ class IsolatedRun {
 
   void tell_lacks(const CpuLatencyHold& latency) {
     std::vector<std::string> lacks = prepare_process();
+    const bool locked = lacks.empty();
     if (!latency.granted()) lacks.push_back(latency.lacks());
-    if (options_.require_rt && !lacks.empty()) throw Refused{refuse("--require-rt: " + lacks.front(), kDeviceOrSystem)};
+    if (options_.require_rt && (!locked || latency.refused()))
+      throw Refused{refuse("--require-rt: " + lacks.front(), kDeviceOrSystem)};
     adjusted_.insert(adjusted_.end(), lacks.begin(), lacks.end());
     for (const std::string& line : adjusted_) std::fprintf(stderr, "takt: adjusted: %s\n", line.c_str());
   }

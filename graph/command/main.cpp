@@ -5,7 +5,9 @@
 
 #include "graph/command/attach_commands.hpp"
 #include "graph/command/check_command.hpp"
+#include "graph/command/doctor_command.hpp"
 #include "graph/command/eval_command.hpp"
+#include "graph/command/profile_command.hpp"
 #include "graph/command/run_command.hpp"
 #include "graph/command/show_command.hpp"
 
@@ -69,8 +71,26 @@ void add_run(CLI::App& app, takt::command::RunOptions& o, int& exit_code) {
   run->add_option("--output", o.output, "folder for pictures and other results (default out)");
   run->add_option("--seed", o.seed, "seed of the simulated world");
   run->add_flag("--unchecked", o.unchecked, "runs what the check refuses");
-  run->add_flag("--require-rt", o.require_rt, "exit 3 unless the policy and locked memory are granted");
+  run->add_flag("--require-rt", o.require_rt,
+                "exit 3 where the machine lacks what `takt doctor` checks for such a run");
   run->callback([&] { exit_code = takt::command::run_graph(o); });
+}
+
+void add_profile(CLI::App& app, takt::command::ProfileOptions& o, int& exit_code) {
+  CLI::App* profile = app.add_subcommand("profile", "measures execution times and writes budgets into a schedule");
+  add_load_options(*profile, o.run.graph, o.run.load);
+  profile->add_option("--for", o.run.duration_s, "how long each of the two passes lasts, e.g. 20s")
+      ->transform(CLI::Validator(duration, "DURATION"));
+  profile->add_option("--seed", o.run.seed, "seed of the simulated world");
+  profile->add_option("--quantile", o.quantile, "of the execution times (default 0.99)")->check(CLI::Range(0.01, 1.0));
+  profile->add_option("--margin", o.margin, "budget = margin x quantile (default 1.2)")->check(CLI::Range(0.1, 100.0));
+  CLI::Option* write = profile->add_option("--write", o.write, "writes the schedule with the budgets to this file");
+  CLI::Option* in_place = profile->add_flag("--in-place", o.in_place, "writes them into the schedule itself");
+  CLI::Option* compare = profile->add_option("--compare", o.compare, "compares with this schedule: exit 1 if above");
+  profile->add_option("--tolerance", o.tolerance, "by how much a node may be above (default 20%)")->needs(compare);
+  in_place->excludes(write)->excludes(compare);
+  write->excludes(compare);
+  profile->callback([&] { exit_code = takt::command::profile_graph(o); });
 }
 
 }  // namespace
@@ -86,6 +106,8 @@ int main(int argc, char** argv) {
   takt::command::EvalStereoOptions stereo;
   takt::command::EvalEgoMotionOptions ego_motion;
   takt::command::AttachOptions attach;
+  takt::command::DoctorOptions doctor;
+  takt::command::ProfileOptions profile;
   takt::command::EvalObjectsOptions objects;
   takt::command::EvalGroundOptions ground;
   std::string type;
@@ -104,6 +126,8 @@ int main(int argc, char** argv) {
   nodes->add_option("type", type, "node type");
   nodes->callback([&] { exit_code = takt::command::print_nodes(type); });
   takt::command::add_attach_commands(app, attach, exit_code);
+  takt::command::add_doctor(app, doctor, exit_code);
+  add_profile(app, profile, exit_code);
   CLI::App* eval = app.add_subcommand("eval", "measures quality against ground truth");
   eval->require_subcommand(1);
   takt::command::add_eval_stereo(*eval, stereo, exit_code);

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "graph/attach/server.hpp"
+#include "graph/command/doctor_command.hpp"
 #include "graph/command/isolated_run.hpp"
 #include "graph/command/live_table.hpp"
 #include "graph/command/prepare.hpp"
@@ -96,8 +97,10 @@ int run_in_one_process(const RunOptions& options, Prepared& prepared, std::vecto
   if (const int code = admit(options, *prepared.graph, prepared.composition->plan, adjusted); code != kOk) return code;
   const CpuLatencyHold latency = hold_cpu_dma_latency();
   std::vector<std::string> lacks = prepare_process();
+  const bool locked = lacks.empty();
   if (!latency.granted()) lacks.push_back(latency.lacks());
-  if (options.require_rt && !lacks.empty()) return refuse("--require-rt: " + lacks.front(), kDeviceOrSystem);
+  if (options.require_rt && (!locked || latency.refused()))
+    return refuse("--require-rt: " + lacks.front(), kDeviceOrSystem);
   adjusted.insert(adjusted.end(), lacks.begin(), lacks.end());
   for (const std::string& line : adjusted) std::fprintf(stderr, "takt: adjusted: %s\n", line.c_str());
   return execute(options, prepared, std::move(adjusted));
@@ -112,6 +115,11 @@ int run_as_asked(RunOptions options) {
   }
   std::vector<std::string> adjusted = prepared.graph->adjusted;
   const std::string wanted = options.isolate.empty() ? prepared.graph->isolation : options.isolate;
+  if (options.require_rt) {
+    const std::string lacks = lacks_text(prepared.graph->schedule.policy, options.transport == "iceoryx");
+    if (!lacks.empty())
+      return refuse("--require-rt: this machine lacks (see `takt doctor`)\n" + lacks, kDeviceOrSystem);
+  }
   if (wanted != "subsystem" || options.clock == "virtual") return run_in_one_process(options, prepared, adjusted);
   const KeptPlace report(options.report), page(options.html);
   return run_isolated(options, *prepared.graph, std::move(adjusted));

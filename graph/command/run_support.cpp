@@ -18,6 +18,7 @@
 #include <opencv2/core/utility.hpp>
 
 #include "graph/check/check.hpp"
+#include "graph/command/machine_file.hpp"
 #include "graph/command/prepare.hpp"
 #include "graph/command/report.hpp"
 #include "graph/view/html_report.hpp"
@@ -96,7 +97,7 @@ void limit_cores(std::vector<int>& cores, std::vector<std::string>& adjusted) {
 int admit(const RunOptions& options, const graph::GraphSpec& graph, const Plan& plan,
           std::vector<std::string>& adjusted) {
   graph::CheckOptions how;
-  how.machine = graph::this_machine();
+  how.machine = graph::check_machine(machine::SystemFacts(), machine_file());
   how.real_time = options.clock != "virtual";
   const graph::CheckResult check = graph::check(graph, plan, how);
   if (check.verdict == graph::Verdict::invalid) return refuse(check.text, kBadInput);

@@ -11,8 +11,8 @@
 
 namespace takt {
 
-/// Of the lane with the shortest span under `fixed`. Below the kernel's own interrupt threads (50 by default) nothing is
-/// gained.
+/// Of the lane with the shortest span under `fixed`. Below the kernel's own interrupt threads (50 by default) nothing
+/// is gained.
 inline constexpr int kHighestPriority = 80;
 
 struct LaneTasks {
