@@ -10,7 +10,6 @@
 #include <memory>
 
 #include "graph/attach/server.hpp"
-#include "graph/check/check.hpp"
 #include "graph/command/live_table.hpp"
 #include "graph/command/member_process.hpp"
 #include "graph/command/prepare.hpp"
@@ -94,7 +93,7 @@ class IsolatedRun {
     wait_for_all(ProcessRecord::composed);
     BoardExchange exchange(board_);
     graph::complete(plan_, exchange, 1);
-    admit();
+    if (const int code = admit(options_, graph_, plan_, adjusted_); code != kOk) throw Refused{code};
     const CpuLatencyHold latency = hold_cpu_dma_latency();
     tell_lacks(latency);
     board_.carrier().store(bring_up_transport());
@@ -175,12 +174,6 @@ class IsolatedRun {
     }
     transport_ = make_local_transport(plan_.ports, pools_);
     return RunBoard::local;
-  }
-
-  void admit() {
-    const graph::CheckResult check = graph::check(graph_, plan_);
-    if (check.admitted || options_.unchecked) return;
-    throw Refused{refuse(check.text + "(--unchecked runs it all the same)", kNotOk)};
   }
 
   void tell_lacks(const CpuLatencyHold& latency) {

@@ -8,7 +8,6 @@
 #include <optional>
 
 #include "graph/attach/server.hpp"
-#include "graph/check/check.hpp"
 #include "graph/command/doctor_command.hpp"
 #include "graph/command/isolated_run.hpp"
 #include "graph/command/live_table.hpp"
@@ -100,15 +99,14 @@ int run_in_one_process(const RunOptions& options, Prepared& prepared, std::vecto
     std::fputs("takt: stopped before the run began\n", stderr);
     return kOk;
   }
-  const graph::CheckResult check = graph::check(*prepared.graph, prepared.composition->plan);
-  if (!check.admitted && !options.unchecked) return refuse(check.text + "(--unchecked runs it all the same)", kNotOk);
+  limit_cores(prepared.composition->plan.cores, adjusted);
+  if (const int code = admit(options, *prepared.graph, prepared.composition->plan, adjusted); code != kOk) return code;
   const CpuLatencyHold latency = hold_cpu_dma_latency();
   std::vector<std::string> lacks = prepare_process();
   const bool locked = lacks.empty();
   if (!latency.granted()) lacks.push_back(latency.lacks());
   if (options.require_rt && (!locked || latency.refused()))
     return refuse("--require-rt: " + lacks.front(), kDeviceOrSystem);
-  limit_cores(prepared.composition->plan.cores, adjusted);
   adjusted.insert(adjusted.end(), lacks.begin(), lacks.end());
   for (const std::string& line : adjusted) std::fprintf(stderr, "takt: adjusted: %s\n", line.c_str());
   return execute(options, prepared, std::move(adjusted));

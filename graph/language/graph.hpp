@@ -107,6 +107,7 @@ struct ScheduleSpec {
   std::string name, file;
   Policy policy = Policy::deadline;
   std::vector<int> cores;
+  Position cores_position;
   std::map<std::string, ScheduleEntry> entries;  ///< by node or device id
   std::optional<MeasuredSpec> measured;          ///< nothing: the budgets are estimates
 };

@@ -75,6 +75,7 @@ void Loader::read_schedule() {
               fmt::format("there is no policy {}{}", ticked(options_.policy), alternatives(options_.policy, words)));
     read_word(asked, "policy", kPolicies, spec_.schedule.policy);
   }
+  spec_.schedule.cores_position = schedule_.value_at("/cores");
   const json cores = root.value("cores", json::array());
   if (cores.is_array())
     for (const auto& core : cores)

@@ -80,7 +80,7 @@ class Executor {
   void watch(Policy granted);
   /// Waits for all workers but those whose job never returns: that was late and used more than it may.
   void join(RunResult& result);
-  std::vector<Reservation> reservations(Policy policy) const;
+  std::vector<Reservation> own_reservations(Policy policy) const;
   void set_grants(const Lane& lane, const Grant& grant);
   void start_clockwork(RunResult& result);
   void run_cooperative(RunResult& result);
