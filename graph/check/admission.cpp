@@ -45,8 +45,8 @@ std::vector<std::string> impossible(const Plan& plan) {
 
 class Admitting {
  public:
-  Admitting(const Plan& plan, const Overheads& overheads)
-      : plan_(plan), overheads_(overheads), lanes_(lane_tasks(plan, plan.policy, overheads)) {
+  Admitting(const Plan& plan, const Overheads& overheads, bool bounds)
+      : plan_(plan), overheads_(overheads), bounds_(bounds), lanes_(lane_tasks(plan, plan.policy, overheads)) {
     result_.nodes.resize(plan.tasks.size());
   }
 
@@ -123,12 +123,27 @@ class Admitting {
     return found ? std::optional(ns(*found)) : std::nullopt;
   }
 
+  /// Of a head: as if it had only to begin. A follower begins when the member before it is done, or is waited for.
+  std::optional<int64_t> start_of(size_t l, size_t position, Ticks response) const {
+    const std::vector<size_t>& lane = lanes_.lanes[l];
+    if (position > 0) {
+      const TaskPlan& producer = plan_.tasks[plan_.tasks[lane[position]].on_task];
+      return producer.publish == PublishAt::asap ? result_.nodes[lane[position - 1]].finish_ns
+                                                 : finish_of(l, position, response);
+    }
+    if (plan_.policy == Policy::cooperative)
+      return ns(response) - ns(lanes_.set.tasks[l].budget) + overheads_.release_ns + overheads_.switch_ns;
+    const auto found = response_of(l, overheads_.release_ns + overheads_.switch_ns + 1);
+    return found ? std::optional(ns(*found)) : std::nullopt;
+  }
+
   void judge_members(size_t l, Ticks response) {
     const std::vector<size_t>& lane = lanes_.lanes[l];
     for (size_t m = 0; m < lane.size(); ++m) {
       const TaskPlan& task = plan_.tasks[lane[m]];
       NodeAdmission& node = result_.nodes[lane[m]];
       node.finish_ns = finish_of(l, m, response);
+      if (bounds_) node.start_ns = start_of(l, m, response);
       node.response_ns = m == 0 ? node.finish_ns : response_of_member(l, m);
       // The lane is in time as a whole; a member's own deadline may be tighter.
       if (node.response_ns && *node.response_ns <= task.deadline_ns) continue;
@@ -196,15 +211,16 @@ class Admitting {
 
   const Plan& plan_;
   const Overheads& overheads_;
+  const bool bounds_;
   const LaneTasks lanes_;
   Admission result_;
 };
 
 }  // namespace
 
-Admission admit(const Plan& plan, const Overheads& overheads) {
+Admission admit(const Plan& plan, const Overheads& overheads, bool bounds) {
   if (plan.tasks.empty()) return {Answer::admitted, "nothing to do", {}, {}, {}};
-  return Admitting(plan, overheads).run();
+  return Admitting(plan, overheads, bounds).run();
 }
 
 }  // namespace takt::graph

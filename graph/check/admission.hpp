@@ -12,9 +12,10 @@
 namespace takt::graph {
 
 struct NodeAdmission {
-  std::optional<int64_t> response_ns;  ///< bound, from its planned release to its published output
-  /// Bound from the planned release of its lane's head; its own response if it heads the lane.
-  std::optional<int64_t> finish_ns;
+  std::optional<int64_t> response_ns = {};  ///< bound, from its planned release to its published output
+  /// Bounds from the planned release of its lane's head: of the instant at which it takes its inputs, and of its
+  /// publication (its response if it heads the lane).
+  std::optional<int64_t> start_ns = {}, finish_ns = {};
 };
 
 struct Admission {
@@ -28,6 +29,7 @@ struct Admission {
 /// Two questions, each answered by the analysis of the policy: does every job meet its deadline if all keep their
 /// budgets; and do those of high criticality if every one of low criticality runs on until it is stopped, which happens
 /// `enforcement_ns` after its budget? The second is not asked under `cooperative`, where nothing is enforced.
-Admission admit(const Plan& plan, const analysis::Overheads& overheads);
+/// `bounds` false leaves out what only the ages need.
+Admission admit(const Plan& plan, const analysis::Overheads& overheads, bool bounds = true);
 
 }  // namespace takt::graph

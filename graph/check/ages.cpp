@@ -121,8 +121,8 @@ class Ages {
         m.depth = as_input && i + 1 == path.size() ? 1 : edge.depth;  // an edge's max_age asks for the newest
         check_join(task, path[i], bound);
       }
-      if (as_input && i + 1 == path.size() && nodes_[path[i].task].finish_ns)
-        m.visible = *nodes_[path[i].task].finish_ns * ticks_;
+      if (as_input && i + 1 == path.size() && nodes_[path[i].task].start_ns)
+        m.visible = *nodes_[path[i].task].start_ns * ticks_;
       chain.push_back(m);
     }
     const TaskPlan& device = plan_.tasks[path.front().task];

@@ -62,7 +62,7 @@ void read_file(const json& root, const std::filesystem::path& file, const machin
   where.cpu = machine.at("cpu").get<std::string>();
   where.cores = machine.at("cores").get<int>();
   where.kernel = machine.at("kernel").get<std::string>();
-  found.overheads = read_figures(root, found.overheads);
+  found.overheads = read_figures(root, found.overheads);  // whole or not at all
   found.measured = true;
   const json when = root.value("measured_at", json());
   found.overheads_from = "overheads measured" + (when.is_string() ? " " + when.get<std::string>() : std::string());

@@ -39,7 +39,8 @@ std::string head_text(const GraphSpec& graph, const Plan& plan, const CheckOptio
     text += fmt::format("{}\n  a job {:.0f} us + {:.1f} us per input or output, enforcement {:.2f} ms",
                         options.machine.overheads_from, static_cast<double>(o.release_ns + 2 * o.switch_ns) / 1e3,
                         static_cast<double>(std::max(o.take_ns, o.publish_ns)) / 1e3, ms(o.enforcement_ns));
-    if (plan.policy == Policy::deadline) text += fmt::format(", SCHED_DEADLINE {:.2f} cores", o.deadline_bandwidth);
+    if (plan.policy == Policy::deadline)
+      text += fmt::format("\n  SCHED_DEADLINE has {:.2f} cores", o.deadline_bandwidth);
     text += "\n";
   }
   return text;

@@ -17,7 +17,7 @@ constexpr int64_t kMicrosecond = 1'000;
 double ms(int64_t ns) { return static_cast<double>(ns) / 1e6; }
 
 bool admitted(const Plan& plan, const Overheads& overheads) {
-  return admit(plan, overheads).answer == Answer::admitted;
+  return admit(plan, overheads, false).answer == Answer::admitted;
 }
 
 /// The plan with one figure changed by `edit`, asked again.
