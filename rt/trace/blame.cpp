@@ -7,7 +7,7 @@
 namespace takt::trace {
 namespace {
 
-constexpr int64_t kTimerNs = 200'000;  // a timer that is later than this on an idle CPU did not just take its time
+constexpr int64_t kTimerNs = 200'000;  // a timer that is later than this did not just take its time
 
 /// Builds the course of one job, front to back.
 class Course {
@@ -68,17 +68,18 @@ class Course {
       if (next == nullptr) return until(to_ns, started_ ? Cause::unattributed : Cause::late);
       // A source that does not tell wake-ups counts the wait for a CPU after one as sleep.
       const int64_t woken = next->woken_ns > 0 ? next->woken_ns : next->from_ns;
-      asleep(std::min(to_ns, woken), next->cpu);
+      asleep(std::min(to_ns, woken), last, *next);
     }
     if (at_ < to_ns)
       wait_for_cpu(to_ns, preempted ? last->cpu : next->cpu, preempted ? last->priority : next->priority);
   }
 
-  void asleep(int64_t to_ns, int cpu) {
+  void asleep(int64_t to_ns, const Slice* last, const Slice& next) {
     if (started_) return until(to_ns, Cause::asleep);
-    // The timer was late. If the CPU had nothing else to do, it was not there.
-    const bool idle = evidence_.occupants(cpu, at_, to_ns).empty() && evidence_.trace().source == Source::tracefs;
-    const bool stall = idle && to_ns - at_ > kTimerNs && evidence_.stolen(cpu, at_, to_ns);
+    // A timer interrupts whoever runs. If it was late, and the host took time from the CPU it was set on, that CPU was
+    // not there.
+    const int cpu = last != nullptr ? last->cpu : next.cpu;
+    const bool stall = next.woken_ns > 0 && to_ns - at_ > kTimerNs && evidence_.stolen(cpu, at_, to_ns);
     until(to_ns, stall ? Cause::stall : Cause::late, "", stall ? cpu : -1);
   }
 
