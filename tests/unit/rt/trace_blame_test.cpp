@@ -81,6 +81,9 @@ TEST_CASE("SCHED_DEADLINE: an idle CPU, or an ordinary thread on it, means throt
   trace.slices = {slice(12, 1, 0, 5'000, kPreempted, 0, -1), slice(99, 1, 6'000, 9'000, kPreempted, 0, 120),
                   slice(12, 1, 17'000, 20'000, kAsleep, 0, -1)};
   CHECK(part_us(blame_last(trace), Cause::throttled) == 12'000);
+  trace.steals = {{0, 20'000 * kUs, 10'000 * kUs, 1}};  // but of the 8 ms of idle CPU the host had most
+  CHECK(part_us(blame_last(trace), Cause::stall) == 8'000 + 3'000 + 1'000);
+  trace.steals.clear();
   trace.slices[1].priority = -1;  // but another deadline thread preempts
   CHECK(part_us(blame_last(trace), Cause::preempted, "cc1plus") == 3'000);
 }
