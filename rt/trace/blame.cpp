@@ -7,7 +7,7 @@
 namespace takt::trace {
 namespace {
 
-constexpr int64_t kTimerNs = 200'000;  // a timer that is later than this on an idle CPU did not just take its time
+constexpr int64_t kTimerNs = 200'000;  // a timer that is later than this did not just take its time
 
 /// Builds the course of one job, front to back.
 class Course {
@@ -68,36 +68,43 @@ class Course {
       if (next == nullptr) return until(to_ns, started_ ? Cause::unattributed : Cause::late);
       // A source that does not tell wake-ups counts the wait for a CPU after one as sleep.
       const int64_t woken = next->woken_ns > 0 ? next->woken_ns : next->from_ns;
-      asleep(std::min(to_ns, woken), next->cpu);
+      asleep(std::min(to_ns, woken), last, *next);
     }
     if (at_ < to_ns)
       wait_for_cpu(to_ns, preempted ? last->cpu : next->cpu, preempted ? last->priority : next->priority);
   }
 
-  void asleep(int64_t to_ns, int cpu) {
+  void asleep(int64_t to_ns, const Slice* last, const Slice& next) {
     if (started_) return until(to_ns, Cause::asleep);
-    // The timer was late. If the CPU had nothing else to do, it was not there.
-    const bool idle = evidence_.occupants(cpu, at_, to_ns).empty() && evidence_.trace().source == Source::tracefs;
-    const bool stall = idle && to_ns - at_ > kTimerNs && evidence_.stolen(cpu, at_, to_ns);
-    until(to_ns, stall ? Cause::stall : Cause::late, "", stall ? cpu : -1);
+    // A timer interrupts whoever runs. If it was late, and the host took time from the CPU it was set on, that CPU was
+    // not there.
+    const int cpu = last != nullptr ? last->cpu : next.cpu;
+    const bool stall = next.woken_ns > 0 && to_ns - at_ > kTimerNs && evidence_.stolen_ns(cpu, at_, to_ns) > 0;
+    until(to_ns, stall ? Cause::stall : Cause::late);
   }
 
   void wait_for_cpu(int64_t to_ns, int cpu, int priority) {
     if (evidence_.trace().source != Source::tracefs)
       return until(to_ns, started_ ? Cause::preempted : Cause::late, "", started_ ? cpu : -1);
     for (const Piece& occupant : evidence_.occupants(cpu, at_, to_ns)) {
-      nobody_ran(occupant.from_ns, priority);
+      nobody_ran(occupant.from_ns, cpu, priority);
       // A thread of SCHED_DEADLINE yields to nobody but its like, unless the kernel holds it back.
-      if (priority < 0 && evidence_.left_to_others(cpu, occupant.from_ns)) until(occupant.to_ns, Cause::throttled);
+      if (priority < 0 && evidence_.left_to_others(cpu, occupant.from_ns)) held_back(occupant.to_ns, cpu);
       else until(occupant.to_ns, started_ ? Cause::preempted : Cause::behind, occupant.who, cpu);
     }
-    nobody_ran(to_ns, priority);
+    nobody_ran(to_ns, cpu, priority);
+  }
+
+  /// Of SCHED_DEADLINE, runnable, and its CPU did nothing more urgent.
+  void held_back(int64_t to_ns, int cpu) {
+    const bool stall = evidence_.stolen_ns(cpu, at_, to_ns) > (to_ns - at_) / 2;  // most of what it waited for
+    until(to_ns, stall ? Cause::stall : Cause::throttled);
   }
 
   /// It could have run and its CPU was free.
-  void nobody_ran(int64_t to_ns, int priority) {
+  void nobody_ran(int64_t to_ns, int cpu, int priority) {
     const bool long_wait = to_ns - at_ > kTimerNs;  // less is the way through the scheduler
-    if (priority < 0 && long_wait) until(to_ns, Cause::throttled);
+    if (priority < 0 && long_wait) held_back(to_ns, cpu);
     else until(to_ns, started_ ? Cause::unattributed : Cause::late);
   }
 

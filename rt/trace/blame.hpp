@@ -57,8 +57,8 @@ class Evidence {
   std::vector<const JobSpan*> ahead_of(const JobSpan& job, int64_t from_ns, int64_t to_ns) const;
   /// Stretches in which that thread had a CPU, by time; null if the source saw none.
   const std::vector<const Slice*>* slices_of(int32_t thread) const;
-  /// True if the host took time from that CPU about then.
-  bool stolen(int cpu, int64_t from_ns, int64_t to_ns) const;
+  /// Time that the host took from that CPU about then.
+  int64_t stolen_ns(int cpu, int64_t from_ns, int64_t to_ns) const;
   /// True if a thread other than one of SCHED_DEADLINE had that CPU at that instant, or nobody had.
   bool left_to_others(int cpu, int64_t at_ns) const;
 

@@ -83,10 +83,11 @@ const std::vector<const Slice*>* Evidence::slices_of(int32_t thread) const {
   return found != by_thread_.end() ? &found->second : nullptr;
 }
 
-bool Evidence::stolen(int cpu, int64_t from_ns, int64_t to_ns) const {
-  return std::any_of(trace_.steals.begin(), trace_.steals.end(), [&](const Steal& steal) {
-    return steal.cpu == cpu && steal.stolen_ns > 0 && steal.from_ns < to_ns && steal.to_ns + kStealSpreadNs > from_ns;
-  });
+int64_t Evidence::stolen_ns(int cpu, int64_t from_ns, int64_t to_ns) const {
+  int64_t sum = 0;
+  for (const Steal& steal : trace_.steals)
+    if (steal.cpu == cpu && steal.from_ns < to_ns && steal.to_ns + kStealSpreadNs > from_ns) sum += steal.stolen_ns;
+  return sum;
 }
 
 bool Evidence::left_to_others(int cpu, int64_t at_ns) const {

@@ -81,6 +81,9 @@ TEST_CASE("SCHED_DEADLINE: an idle CPU, or an ordinary thread on it, means throt
   trace.slices = {slice(12, 1, 0, 5'000, kPreempted, 0, -1), slice(99, 1, 6'000, 9'000, kPreempted, 0, 120),
                   slice(12, 1, 17'000, 20'000, kAsleep, 0, -1)};
   CHECK(part_us(blame_last(trace), Cause::throttled) == 12'000);
+  trace.steals = {{0, 20'000 * kUs, 10'000 * kUs, 1}};  // but of the 8 ms of idle CPU the host had most
+  CHECK(part_us(blame_last(trace), Cause::stall) == 8'000 + 3'000 + 1'000);
+  trace.steals.clear();
   trace.slices[1].priority = -1;  // but another deadline thread preempts
   CHECK(part_us(blame_last(trace), Cause::preempted, "cc1plus") == 3'000);
 }
@@ -94,12 +97,15 @@ TEST_CASE("the CPU clock stood still while the thread had the CPU: the host, whe
   CHECK(part_us(blame_last(trace), Cause::stall) == 7'000);
 }
 
-TEST_CASE("a late timer on an idle CPU from which the host took time is a host stall") {
+TEST_CASE("a late timer on a CPU from which the host took time is a host stall, whoever ran there") {
   Trace trace = two_lanes();
   trace.jobs = {job(1, 1, 0, 4'000, 11'000, 7'000)};
-  trace.slices = {slice(12, 1, 3'990, 11'000, kAsleep, 3'980)};
-  CHECK(part_us(blame_last(trace), Cause::late) == 4'000);
+  // The timer was set on CPU 0, where the thread ran last; it runs on CPU 1 now.
+  trace.slices = {slice(12, 0, -900, -500, kAsleep), slice(99, 0, -400, 3'000, kPreempted),
+                  slice(12, 1, 3'990, 11'000, kAsleep, 3'980)};
   trace.steals = {{0, 100'000 * kUs, 10'000 * kUs, 1}};
+  CHECK(part_us(blame_last(trace), Cause::late) == 4'000);
+  trace.steals[0].cpu = 0;
   const Blame result = blame_last(trace);
   CHECK(part_us(result, Cause::stall) == 3'980);
   CHECK(part_us(result, Cause::late) == 20);
