@@ -65,7 +65,7 @@ class Admitting {
         refuse(Answer::not_proven,
                fmt::format("{}: no budget stated; give it one (`takt profile` measures it)", task.name));
     ask_kernel();
-    const SetAnswer answer = analyse_set(lanes_.set, plan_.policy);
+    const SetAnswer answer = analyse_set(lanes_.set, plan_.policy, bounds_);
     result_.by = answer.by;
     if (answer.answer != Answer::admitted) {
       refuse(answer.answer, answer.why);
@@ -133,7 +133,8 @@ class Admitting {
     }
     if (plan_.policy == Policy::cooperative)
       return ns(response) - ns(lanes_.set.tasks[l].budget) + overheads_.release_ns + overheads_.switch_ns;
-    const auto found = response_of(l, overheads_.release_ns + overheads_.switch_ns + 1);
+    constexpr int64_t kMicrosecond = 1'000;
+    const auto found = response_of(l, overheads_.release_ns + overheads_.switch_ns + kMicrosecond);
     return found ? std::optional(ns(*found)) : std::nullopt;
   }
 
@@ -194,7 +195,7 @@ class Admitting {
       result_.notes.push_back("cooperative: nothing is enforced, a node that overruns its budget delays the others");
       return;
     }
-    const SetAnswer answer = analyse_set(with_overruns(), plan_.policy);
+    const SetAnswer answer = analyse_set(with_overruns(), plan_.policy, false);
     if (answer.answer == Answer::admitted || high_ones_keep_up(answer)) return;
     refuse(Answer::not_proven,
            fmt::format("with every node of low criticality running on to {:.1f} ms over its budget: {}",

@@ -60,8 +60,8 @@ SetAnswer per_core(const TaskSet& set, analysis::CorePolicy policy, const char* 
   return result;
 }
 
-SetAnswer global(const TaskSet& set) {
-  const analysis::GlobalEdfResult found = analysis::global_edf(set);
+SetAnswer global(const TaskSet& set, bool responses) {
+  const analysis::GlobalEdfResult found = analysis::global_edf(set, responses);
   SetAnswer result{Answer::not_proven, fmt::format("global EDF, {} test", to_string(found.proven_by)), "", {}};
   for (const analysis::Ticks response : found.response)
     result.response.push_back(response < 0 ? std::nullopt : std::optional(response));
@@ -102,11 +102,12 @@ std::string_view to_string(Answer answer) {
   return "";
 }
 
-SetAnswer analyse_set(const TaskSet& set, Policy policy) {
+SetAnswer analyse_set(const TaskSet& set, Policy policy, bool responses) {
   if (const std::string why = impossible(set); !why.empty()) return {Answer::infeasible, "arithmetic", why, {}};
   switch (policy) {
     case Policy::deadline:
-      return set.cores == 1 ? per_core(set, analysis::CorePolicy::edf, "EDF on one core, exact") : global(set);
+      return set.cores == 1 ? per_core(set, analysis::CorePolicy::edf, "EDF on one core, exact")
+                            : global(set, responses);
     case Policy::fixed: return per_core(set, analysis::CorePolicy::fixed_priority, "fixed priorities per core, exact");
     case Policy::cooperative: break;
   }

@@ -24,6 +24,7 @@ struct SetAnswer {
 
 /// deadline: global EDF, or exact EDF on one core. fixed: exact response times per core; tasks carry core and priority.
 /// cooperative: non-preemptive EDF of one worker per core.
-SetAnswer analyse_set(const analysis::TaskSet& set, Policy policy);
+/// Without `responses` deadlines may stand in for them, which is faster.
+SetAnswer analyse_set(const analysis::TaskSet& set, Policy policy, bool responses = true);
 
 }  // namespace takt::graph

@@ -43,6 +43,7 @@ struct GlobalEdfResult {
   bool schedulable() const { return proven_by != GlobalTest::none; }
 };
 /// All tests in turn. A set with a budget above its deadline, or with more work than cores, is not schedulable.
-GlobalEdfResult global_edf(const TaskSet& set);
+/// Without `responses` the deadlines stand in for them, which is faster.
+GlobalEdfResult global_edf(const TaskSet& set, bool responses = true);
 
 }  // namespace takt::analysis
