@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # Debian 12 packages only; packages.txt lists their names.
 find_package(Threads REQUIRED)
+find_package(ZLIB REQUIRED)
 find_package(Eigen3 REQUIRED)
 find_package(OpenCV 4 REQUIRED COMPONENTS core imgproc imgcodecs calib3d features2d video)
 find_package(fmt REQUIRED)

@@ -21,6 +21,9 @@ class DeviceNode : public Node {
   void start(int64_t epoch_ns) override { static_cast<void>(start_device(epoch_ns)); }
   void finish() override { stop_device(); }
   virtual Device& device() = 0;
+  /// After setup: how long before the planned release of a job the stamp of its message may lie, ns. 0 for a device
+  /// that captures when asked.
+  virtual int64_t stamp_lag_ns() const { return 0; }
 
  protected:
   /// In a job: false if the device cannot be started (the job then has no result).

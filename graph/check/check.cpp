@@ -2,86 +2,127 @@
 #include "graph/check/check.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <functional>
-#include <numeric>
 
+#include "graph/check/check_text.hpp"
+#include "graph/check/margins.hpp"
+#include "graph/check/measured.hpp"
 #include "rt/sched/lane.hpp"
+#include "rt/sched/lane_tasks.hpp"
 
 namespace takt::graph {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
-constexpr double kRounding = 1e-9;  // a sum of shares may miss the whole by this much
-
 double ms(int64_t ns) { return static_cast<double>(ns) / 1e6; }
 
-void add_tasks(const Plan& plan, CheckResult& result) {
-  result.text +=
-      fmt::format("{:<16} {:>7} {:>10} {:>11} {:>12}\n", "node", "Hz", "budget ms", "deadline ms", "utilisation");
-  for (size_t t = 0; t < plan.tasks.size(); ++t) {
-    const TaskPlan& task = plan.tasks[t];
-    const double rate = effective_rate_hz(plan, t), share = static_cast<double>(task.budget_ns) * 1e-9 * rate;
-    if (task.budget_ns == 0) result.unbudgeted.push_back(task.name);
-    result.utilisation += share;
-    result.text += fmt::format("{:<16} {:>7.3g} {:>10.3f} {:>11.3f} {:>12.3f}\n", task.name, rate, ms(task.budget_ns),
-                               ms(task.deadline_ns), share);
-    result.json["nodes"].push_back({{"name", task.name},
-                                    {"rate_hz", rate},
-                                    {"budget_ms", ms(task.budget_ns)},
-                                    {"deadline_ms", ms(task.deadline_ns)},
-                                    {"utilisation", share}});
-  }
-}
-
 void add_pools(const Plan& plan, CheckResult& result) {
-  result.text += fmt::format("{:<28} {:<14} {:>10} {:>7} {:>9}\n", "pool", "type", "bytes", "chunks", "MB");
   for (const PortPlan& port : plan.ports) {
     const uint64_t bytes = port.chunk_bytes() * port.chunks();
     result.pool_bytes += bytes;
-    result.text += fmt::format("{:<28} {:<14} {:>10} {:>7} {:>9.2f}\n", port.node + "." + port.port, port.type->name,
-                               port.chunk_bytes(), port.chunks(), static_cast<double>(bytes) / 1e6);
     result.pools.push_back({port.node + "." + port.port, port.chunks(), bytes});
-    result.json["pools"].push_back({{"port", port.node + "." + port.port},
-                                    {"type", port.type->name},
-                                    {"bytes", port.chunk_bytes()},
-                                    {"chunks", port.chunks()}});
   }
 }
 
-/// What no schedule can do, task by task (design 4: a budget above its deadline is infeasible, not invalid).
-void find_impossible(const Plan& plan, CheckResult& result) {
-  for (size_t t = 0; t < plan.tasks.size(); ++t) {
-    const TaskPlan& task = plan.tasks[t];
-    const double rate = effective_rate_hz(plan, t);
-    if (task.deadline_ns > 0 && task.budget_ns > task.deadline_ns)
-      result.problems.push_back(
-          fmt::format("{}: its budget of {} ms is above its deadline of {} ms; give it a deadline from "
-                      "{} ms on or a smaller budget",
-                      task.name, ms(task.budget_ns), ms(task.deadline_ns), ms(task.budget_ns)));
-    else if (static_cast<double>(task.budget_ns) * 1e-9 * rate > 1 + kRounding)
-      result.problems.push_back(
-          fmt::format("{}: its budget of {} ms at {:.4g} Hz is more than one core, and a job runs on "
-                      "one; at most {:.4g} Hz would fit",
-                      task.name, ms(task.budget_ns), rate, 1e9 / static_cast<double>(task.budget_ns)));
-  }
-}
-
+/// Under `fixed` as placed; else the largest first, each where most is free.
 void spread_over_cores(const Plan& plan, CheckResult& result) {
   for (const int core : plan.cores) result.core_use.push_back({core, 0});
   if (result.core_use.empty()) result.core_use.push_back({0, 0});
+  const auto share = [&](size_t t) {
+    return static_cast<double>(plan.tasks[t].budget_ns) * 1e-9 * effective_rate_hz(plan, t);
+  };
+  if (plan.policy == Policy::fixed) {
+    const auto lanes = lane_members(plan);
+    const Placement placement = place_fixed(plan);
+    for (size_t l = 0; l < lanes.size(); ++l)
+      for (const size_t t : lanes[l])
+        result.core_use[static_cast<size_t>(std::max(placement.core[l], 0))].utilisation += share(t);
+    return;
+  }
   std::vector<double> shares;
-  for (size_t t = 0; t < plan.tasks.size(); ++t)
-    shares.push_back(static_cast<double>(plan.tasks[t].budget_ns) * 1e-9 * effective_rate_hz(plan, t));
+  for (size_t t = 0; t < plan.tasks.size(); ++t) shares.push_back(share(t));
   std::sort(shares.begin(), shares.end(), std::greater<>());
-  for (const double share : shares)
+  for (const double s : shares)
     std::min_element(result.core_use.begin(), result.core_use.end(), [](const CoreUse& a, const CoreUse& b) {
       return a.utilisation < b.utilisation;
-    })->utilisation += share;
-  for (const CoreUse& use : result.core_use)
-    result.json["core_use"].push_back({{"core", use.core}, {"utilisation", use.utilisation}});
+    })->utilisation += s;
+}
+
+/// SCHED_DEADLINE takes no affinity: its threads run on all CPUs of their cpuset. Empty if that is what is asked for.
+std::string wrong_cores(const GraphSpec& graph, const Plan& plan, const CheckMachine& machine) {
+  if (plan.policy != Policy::deadline || machine.online.empty()) return "";
+  // What the schedule says; a plan may have been limited to what the process may use.
+  const std::vector<int>& asked = graph.schedule.cores.empty() ? plan.cores : graph.schedule.cores;
+  const std::vector<int>& all = machine.exclusive.empty() ? machine.online : machine.exclusive;
+  const auto wanted = [&](int cpu) { return std::find(asked.begin(), asked.end(), cpu) != asked.end(); };
+  if (std::all_of(all.begin(), all.end(), wanted)) return "";
+  return fmt::format(
+      "`cores` is [{}], but threads under the policy deadline run on all of [{}]: SCHED_DEADLINE takes no affinity. "
+      "Write `cores: [{}]`, start takt in an exclusive cpuset of the cores wanted (cgroup v2: cpuset.cpus and "
+      "cpuset.cpus.partition = root), or choose `policy: fixed`",
+      fmt::join(asked, ", "), fmt::join(all, ", "), fmt::join(all, ", "));
+}
+
+void judge_ages(ModeCheck& mode, CheckResult& result) {
+  for (const AgeBound& age : mode.ages) {
+    const std::string name = age.edge ? "edge " + age.name : "chain " + age.name;
+    if (!age.possible()) {
+      result.verdict = Verdict::invalid;
+      mode.problems.push_back(
+          fmt::format("{}: max_age is {} ms, but with these rates and offsets its data is up to {:.3f} "
+                      "ms old even if every job took no time; raise it, or a rate",
+                      name, ms(age.max_age_ns), ms(age.least_ns)));
+    } else if (mode.admission.answer == Answer::admitted && !age.proven()) {
+      mode.problems.push_back(age.bound_ns ? fmt::format("{}: max_age is {} ms, and the bound on its age is {:.3f} ms",
+                                                         name, ms(age.max_age_ns), ms(*age.bound_ns))
+                                           : fmt::format("{}: no bound on its age: {}", name, age.why));
+    }
+  }
+}
+
+ModeCheck check_mode(const GraphSpec& graph, const Plan& plan, const std::string& name, const CheckOptions& options,
+                     CheckResult& result) {
+  ModeCheck mode;
+  mode.mode = name;
+  mode.admission = admit(plan, options.machine.overheads);
+  for (const TaskPlan& task : plan.tasks) mode.tasks.push_back(task.name);
+  mode.problems = mode.admission.reasons;
+  mode.ages = age_bounds(graph, plan, mode.admission.nodes);
+  if (mode.admission.answer != Answer::admitted) {
+    if (const auto change = smallest_change(plan, options.machine.overheads))
+      mode.change = fmt::format("the smallest single change that makes it fit: {} ({:.1f} %)", to_string(*change, plan),
+                                100 * change->relative);
+  } else if (options.margins) {
+    mode.margins_ns = margins(plan, options.machine.overheads);
+  }
+  judge_ages(mode, result);
+  return mode;
+}
+
+Answer answer_of(const ModeCheck& mode) {
+  if (mode.admission.answer != Answer::admitted) return mode.admission.answer;
+  return mode.problems.empty() ? Answer::admitted : Answer::not_proven;
+}
+
+void check_modes(const GraphSpec& graph, const Plan& plan, const CheckOptions& options, CheckResult& result) {
+  result.modes.push_back(check_mode(graph, plan, plan.mode, options, result));
+  if (plan.mode == "full") {
+    for (const ModeSpec& mode : graph.modes)
+      result.modes.push_back(check_mode(graph, without(plan, mode.without), mode.name, options, result));
+  }
+  result.answer = Answer::admitted;
+  for (const ModeCheck& mode : result.modes) {
+    const Answer answer = answer_of(mode);
+    if (answer == Answer::infeasible || (answer == Answer::not_proven && result.answer == Answer::admitted))
+      result.answer = answer;
+    for (const std::string& problem : mode.problems) {
+      const std::string text = mode.mode == plan.mode ? problem : "mode " + mode.mode + ": " + problem;
+      if (std::find(result.problems.begin(), result.problems.end(), problem) == result.problems.end())
+        result.problems.push_back(text);
+    }
+  }
 }
 
 }  // namespace
@@ -95,43 +136,58 @@ std::string_view to_string(Verdict verdict) {
   return "";
 }
 
-CheckResult check(const GraphSpec& graph, const Plan& plan) {
+Plan without(const Plan& plan, const std::vector<std::string>& names) {
+  Plan result = plan;
+  result.tasks.clear();
+  std::vector<size_t> index(plan.tasks.size(), kNone);
+  std::vector<char> out(plan.tasks.size(), 0);
+  for (size_t t = 0; t < out.size(); ++t)
+    out[t] = std::find(names.begin(), names.end(), plan.tasks[t].name) != names.end();
+  for (size_t hops = 0; hops < out.size(); ++hops)
+    for (size_t t = 0; t < out.size(); ++t)
+      if (plan.tasks[t].on_task != kNone && out[plan.tasks[t].on_task]) out[t] = 1;
+  for (size_t t = 0; t < out.size(); ++t) {
+    if (out[t]) continue;
+    index[t] = result.tasks.size();
+    result.tasks.push_back(plan.tasks[t]);
+  }
+  const auto gone = [&](const EdgePlan& edge) {
+    return std::any_of(plan.tasks.begin(), plan.tasks.end(), [&](const TaskPlan& task) {
+      return out[static_cast<size_t>(&task - plan.tasks.data())] &&
+             std::find(task.ports.begin(), task.ports.end(), edge.port) != task.ports.end();
+    });
+  };
+  for (TaskPlan& task : result.tasks) {
+    if (task.on_task != kNone) task.on_task = index[task.on_task];
+    std::erase_if(task.edges, gone);
+  }
+  return result;
+}
+
+CheckResult check(const GraphSpec& graph, const Plan& plan, const CheckOptions& options) {
   CheckResult result;
   result.cores = std::max<size_t>(plan.cores.size(), 1);
-  add_tasks(plan, result);
-  add_pools(plan, result);
-  find_impossible(plan, result);
-  spread_over_cores(plan, result);
-  if (result.utilisation > static_cast<double>(result.cores) + kRounding)
-    result.problems.push_back(fmt::format("budgets ask for {:.2f} of {} core{}; lower rates or budgets",
-                                          result.utilisation, result.cores, result.cores == 1 ? "" : "s"));
-  result.admitted = result.problems.empty();
   result.verdict = graph.adjusted.empty() ? Verdict::valid : Verdict::adjusted;
-  std::string verdict =
-      fmt::format("{}: budgets ask for {:.2f} of {} core{}, pools take {:.1f} MB: {}\n", graph.name, result.utilisation,
-                  result.cores, result.cores == 1 ? "" : "s", static_cast<double>(result.pool_bytes) / 1e6,
-                  result.admitted ? "fits on average (response times are not analysed)" : "infeasible");
-  for (const std::string& problem : result.problems) verdict += problem + "\n";
-  for (const std::string& name : result.unbudgeted)
-    verdict += fmt::format(
-        "{}: no budget stated, not counted; `takt run` under the policy deadline reserves a quarter of its deadline\n",
-        name);
-  for (const auto& [low, high] : low_before_high(plan)) {
-    result.notes.push_back(fmt::format(
-        "{} (low criticality) runs on the worker of {} (high), which waits for it: a job of it that does not end would "
-        "stop both; give {} a `rate`, or `criticality: high`",
-        plan.tasks[low].name, plan.tasks[high].name, plan.tasks[low].name));
-    verdict += result.notes.back() + "\n";
+  for (size_t t = 0; t < plan.tasks.size(); ++t) {
+    result.utilisation += static_cast<double>(plan.tasks[t].budget_ns) * 1e-9 * effective_rate_hz(plan, t);
+    if (plan.tasks[t].budget_ns == 0) result.unbudgeted.push_back(plan.tasks[t].name);
   }
-  result.text = verdict + result.text;
-  result.json["verdict"] = to_string(result.verdict);
-  result.json["problems"] = result.problems;
-  result.json["notes"] = result.notes;
-  result.json["admitted"] = result.admitted;
-  result.json["utilisation"] = result.utilisation;
-  result.json["cores"] = result.cores;
-  result.json["pool_bytes"] = result.pool_bytes;
-  result.json["unbudgeted"] = result.unbudgeted;
+  result.warnings = options.machine.warnings;
+  if (options.machine.identity.cores > 0) {
+    const std::string elsewhere = measured_elsewhere(graph.schedule, options.machine.identity);
+    if (!elsewhere.empty()) result.warnings.push_back(elsewhere);
+  }
+  add_pools(plan, result);
+  spread_over_cores(plan, result);
+  if (const std::string wrong = options.real_time ? wrong_cores(graph, plan, options.machine) : ""; !wrong.empty()) {
+    result.verdict = Verdict::invalid;
+    result.problems.push_back(to_string(Problem{graph.schedule.cores_position, wrong}));
+  }
+  check_modes(graph, plan, options, result);
+  result.notes = result.modes.front().admission.notes;
+  result.admitted = result.answer == Answer::admitted && result.verdict != Verdict::invalid;
+  result.text = check_text(graph, plan, options, result);
+  result.json = check_json(plan, options, result);
   return result;
 }
 

@@ -5,6 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "graph/check/admission.hpp"
+#include "graph/check/ages.hpp"
+#include "graph/check/check_machine.hpp"
 #include "graph/language/graph.hpp"
 #include "hal/drivers.hpp"
 #include "rt/node.hpp"
@@ -30,24 +33,46 @@ struct CoreUse {
   double utilisation = 0;
 };
 
-/// Load and memory of a plan. Utilisation is sum(budget * rate) over the cores of the schedule; response times are not
-/// analysed yet, so `admitted` says that the work fits on average, not that every deadline is proven.
+/// What is found out of one mode: the whole plan, or what is left of it.
+struct ModeCheck {
+  std::string mode;
+  Admission admission;
+  std::vector<std::string> tasks;   ///< names, in the order of the admission's nodes
+  std::vector<int64_t> margins_ns;  ///< by task if admitted and asked for
+  std::string change;               ///< the smallest single one that would make it fit; "" if none or admitted
+  std::vector<AgeBound> ages;
+  std::vector<std::string> problems;  ///< why it is refused, ages included
+};
+
+/// What is known of a plan before it starts. Invalid: the files ask for something that no run could do (exit 2).
 struct CheckResult {
   Verdict verdict = Verdict::valid;
+  Answer answer = Answer::not_proven;  ///< the worst of all modes
   bool admitted = false;
-  double utilisation = 0;  ///< cores wanted
+  double utilisation = 0;  ///< cores wanted: sum of budget * rate
   size_t cores = 0;
   uint64_t pool_bytes = 0;
   std::vector<std::string> unbudgeted;  ///< tasks whose budget is not stated: not counted
   std::vector<std::string> notes;       ///< what is admitted and yet a risk
+  std::vector<std::string> warnings;    ///< figures that were measured elsewhere
   std::vector<std::string> problems;    ///< why it is not admitted: the task, the value, what would make it fit
   std::vector<PoolUse> pools;
   std::vector<CoreUse> core_use;
-  std::string text;  ///< table for people, the reason first if not admitted
+  std::vector<ModeCheck> modes;  ///< that of the plan first; the graph's others if the plan is that of all nodes
+  std::string text;              ///< for people, the reason first if not admitted
   nlohmann::ordered_json json;
 };
 
-CheckResult check(const GraphSpec& graph, const Plan& plan);
+struct CheckOptions {
+  CheckMachine machine = {};
+  bool margins = false;   ///< costs some hundred admissions
+  bool real_time = true;  ///< false: virtual time, in which the machine's cores do not matter
+};
+
+/// Admission, ages and memory of a plan in each of its modes.
+CheckResult check(const GraphSpec& graph, const Plan& plan, const CheckOptions& options = {});
+/// The plan without these tasks; who followed one of them is left out as well.
+Plan without(const Plan& plan, const std::vector<std::string>& names);
 /// The result for input that could not be loaded: Invalid, one line per problem.
 CheckResult check_failed(const std::vector<Problem>& problems);
 

@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "graph/check/check.hpp"
+#include "graph/command/machine_file.hpp"
 #include "graph/command/prepare.hpp"
 #include "hal/drivers.hpp"
 
@@ -16,8 +17,11 @@ int check_graph(const RunOptions& options, bool json) {
     if (json) std::printf("%s\n", graph::check_failed(prepared.problems).json.dump(2).c_str());
     return code;
   }
-  const graph::CheckResult result = graph::check(*prepared.graph, prepared.composition->plan);
+  const graph::CheckResult result =
+      graph::check(*prepared.graph, prepared.composition->plan,
+                   {graph::check_machine(machine::SystemFacts(), machine_file()), true, true});
   std::fputs(json ? (result.json.dump(2) + "\n").c_str() : result.text.c_str(), stdout);
+  if (result.verdict == graph::Verdict::invalid) return kBadInput;
   return result.admitted ? kOk : kNotOk;
 }
 

@@ -2,13 +2,14 @@
 #include "graph/command/machine.hpp"
 
 #include <sys/resource.h>
-#include <sys/utsname.h>
 #include <unistd.h>
 
 #include <cstdlib>
 #include <fstream>
 #include <sstream>
 #include <string>
+
+#include "rt/machine/identity.hpp"
 
 namespace takt::command {
 namespace {
@@ -31,11 +32,10 @@ int64_t ns_of(const timeval& t) { return int64_t{t.tv_sec} * 1'000'000'000 + int
 }  // namespace
 
 nlohmann::ordered_json machine_facts() {
-  utsname kernel{};
-  uname(&kernel);
-  return {{"cpu", proc_value("/proc/cpuinfo", "model name")},
-          {"cores", sysconf(_SC_NPROCESSORS_ONLN)},
-          {"kernel", std::string(kernel.release) + " " + kernel.version},
+  const auto identity = machine::Identity::of(machine::SystemFacts());
+  return {{"cpu", identity.cpu},
+          {"cores", identity.cores},
+          {"kernel", identity.kernel},
           {"memory", proc_value("/proc/meminfo", "MemTotal")}};
 }
 

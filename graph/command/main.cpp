@@ -5,7 +5,10 @@
 
 #include "graph/command/attach_commands.hpp"
 #include "graph/command/check_command.hpp"
+#include "graph/command/doctor_command.hpp"
 #include "graph/command/eval_command.hpp"
+#include "graph/command/explain_command.hpp"
+#include "graph/command/profile_command.hpp"
 #include "graph/command/run_command.hpp"
 #include "graph/command/show_command.hpp"
 
@@ -54,6 +57,14 @@ void add_report(CLI::App& app, takt::command::RenderOptions& o, int& exit_code) 
   report->callback([&] { exit_code = takt::command::render_report(o); });
 }
 
+void add_explain(CLI::App& app, takt::command::ExplainOptions& o, int& exit_code) {
+  CLI::App* explain = app.add_subcommand("explain", "says why jobs missed their deadlines, one sentence each");
+  explain->add_option("file", o.file, "what `takt run --trace` wrote (or --report, which says less)")->required();
+  explain->add_option("node", o.node, "only this node");
+  explain->add_option("--svg", o.svg, "draws the largest of the misses told");
+  explain->callback([&] { exit_code = takt::command::explain_misses(o); });
+}
+
 void add_run(CLI::App& app, takt::command::RunOptions& o, int& exit_code) {
   CLI::App* run = app.add_subcommand("run", "runs a graph and reports what happened");
   add_load_options(*run, o.graph, o.load);
@@ -66,11 +77,33 @@ void add_run(CLI::App& app, takt::command::RunOptions& o, int& exit_code) {
       ->check(CLI::IsMember({"none", "subsystem"}));
   run->add_option("--report", o.report, "writes the report as JSON");
   run->add_option("--html", o.html, "writes the report as one page to be read offline");
+  run->add_option("--trace", o.trace, "writes a trace for https://ui.perfetto.dev and `takt explain`");
+  run->add_option("--trace-source", o.trace_source,
+                  "how preemption is seen: auto (the best granted) | tracefs | perf | none")
+      ->check(CLI::IsMember({"auto", "tracefs", "perf", "none"}));
   run->add_option("--output", o.output, "folder for pictures and other results (default out)");
   run->add_option("--seed", o.seed, "seed of the simulated world");
   run->add_flag("--unchecked", o.unchecked, "runs what the check refuses");
-  run->add_flag("--require-rt", o.require_rt, "exit 3 unless the policy and locked memory are granted");
+  run->add_flag("--require-rt", o.require_rt,
+                "exit 3 where the machine lacks what `takt doctor` checks for such a run");
   run->callback([&] { exit_code = takt::command::run_graph(o); });
+}
+
+void add_profile(CLI::App& app, takt::command::ProfileOptions& o, int& exit_code) {
+  CLI::App* profile = app.add_subcommand("profile", "measures execution times and writes budgets into a schedule");
+  add_load_options(*profile, o.run.graph, o.run.load);
+  profile->add_option("--for", o.run.duration_s, "how long each of the two passes lasts, e.g. 20s")
+      ->transform(CLI::Validator(duration, "DURATION"));
+  profile->add_option("--seed", o.run.seed, "seed of the simulated world");
+  profile->add_option("--quantile", o.quantile, "of the execution times (default 0.99)")->check(CLI::Range(0.01, 1.0));
+  profile->add_option("--margin", o.margin, "budget = margin x quantile (default 1.2)")->check(CLI::Range(0.1, 100.0));
+  CLI::Option* write = profile->add_option("--write", o.write, "writes the schedule with the budgets to this file");
+  CLI::Option* in_place = profile->add_flag("--in-place", o.in_place, "writes them into the schedule itself");
+  CLI::Option* compare = profile->add_option("--compare", o.compare, "compares with this schedule: exit 1 if above");
+  profile->add_option("--tolerance", o.tolerance, "by how much a node may be above (default 20%)")->needs(compare);
+  in_place->excludes(write)->excludes(compare);
+  write->excludes(compare);
+  profile->callback([&] { exit_code = takt::command::profile_graph(o); });
 }
 
 }  // namespace
@@ -83,9 +116,12 @@ int main(int argc, char** argv) {
   takt::command::RunOptions run_options, check_options;
   takt::command::ShowOptions show_options;
   takt::command::RenderOptions render_options;
+  takt::command::ExplainOptions explain_options;
   takt::command::EvalStereoOptions stereo;
   takt::command::EvalEgoMotionOptions ego_motion;
   takt::command::AttachOptions attach;
+  takt::command::DoctorOptions doctor;
+  takt::command::ProfileOptions profile;
   takt::command::EvalObjectsOptions objects;
   takt::command::EvalGroundOptions ground;
   std::string type;
@@ -99,11 +135,14 @@ int main(int argc, char** argv) {
   check->callback([&] { exit_code = takt::command::check_graph(check_options, check_json); });
   add_show(app, show_options, exit_code);
   add_report(app, render_options, exit_code);
+  add_explain(app, explain_options, exit_code);
   CLI::App* nodes =
       app.add_subcommand("nodes", "lists node types and device kinds, or one with its ports and parameters");
   nodes->add_option("type", type, "node type");
   nodes->callback([&] { exit_code = takt::command::print_nodes(type); });
   takt::command::add_attach_commands(app, attach, exit_code);
+  takt::command::add_doctor(app, doctor, exit_code);
+  add_profile(app, profile, exit_code);
   CLI::App* eval = app.add_subcommand("eval", "measures quality against ground truth");
   eval->require_subcommand(1);
   takt::command::add_eval_stereo(*eval, stereo, exit_code);

@@ -17,6 +17,8 @@
 #include <fstream>
 #include <opencv2/core/utility.hpp>
 
+#include "graph/check/check.hpp"
+#include "graph/command/machine_file.hpp"
 #include "graph/command/prepare.hpp"
 #include "graph/command/report.hpp"
 #include "graph/view/html_report.hpp"
@@ -90,6 +92,21 @@ void limit_cores(std::vector<int>& cores, std::vector<std::string>& adjusted) {
   adjusted.push_back(fmt::format("cores [{}] -> [{}]: this process may use no others", fmt::join(cores, ", "),
                                  fmt::join(usable, ", ")));
   cores = usable;
+}
+
+int admit(const RunOptions& options, const graph::GraphSpec& graph, const Plan& plan,
+          std::vector<std::string>& adjusted) {
+  graph::CheckOptions how;
+  how.machine = graph::check_machine(machine::SystemFacts(), machine_file());
+  how.real_time = options.clock != "virtual";
+  const graph::CheckResult check = graph::check(graph, plan, how);
+  if (check.verdict == graph::Verdict::invalid) return refuse(check.text, kBadInput);
+  if (check.admitted || options.unchecked) return kOk;
+  if (plan.policy != Policy::cooperative || check.answer != graph::Answer::not_proven)
+    return refuse(check.text + "(--unchecked runs it all the same)", kNotOk);
+  adjusted.push_back(
+      "admission -> none: under the policy cooperative the deadlines are not proven (takt check says why)");
+  return kOk;
 }
 
 std::vector<std::string> prepare_process() {

@@ -49,6 +49,14 @@ class KeptPlace {
 /// The cores of the schedule that this process may use; none of them: all it may use. Says what it changed.
 void limit_cores(std::vector<int>& cores, std::vector<std::string>& adjusted);
 
+/// Asks the check. kOk: the run may go on; else what was refused is on stderr and this is the exit code. --unchecked
+/// goes on in spite of everything but Invalid input. So does `cooperative` in spite of an answer that is not proven,
+/// and says so in `adjusted`: it promises no deadline, and no proof would hold among ordinary threads. The policy that
+/// was asked for is the one that is checked; what the kernel refuses and replaces by `cooperative` later is not asked
+/// again.
+int admit(const RunOptions& options, const graph::GraphSpec& graph, const Plan& plan,
+          std::vector<std::string>& adjusted);
+
 /// Memory locked, OpenCV's thread pool off; what was refused.
 std::vector<std::string> prepare_process();
 

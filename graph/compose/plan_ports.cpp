@@ -18,6 +18,13 @@ bool joined(const TaskPlan& task, const EdgePlan& edge) {
   });
 }
 
+/// How long after its release a job of this task may still latch: a late job keeps the next release pending for up to a
+/// period, unless passed releases are dropped.
+int64_t latest_start_ns(const TaskPlan& task) {
+  const bool pends = task.rate && task.on_miss != OnMiss::skip;
+  return pends ? std::max(task.rate->period_ns(), task.deadline_ns) : task.deadline_ns;
+}
+
 size_t producer_of(const Plan& plan, size_t port) {
   for (size_t t = 0; t < plan.tasks.size(); ++t) {
     const auto& ports = plan.tasks[t].ports;
@@ -43,7 +50,8 @@ void size_ports(Plan& plan, uint32_t taps) {
       const size_t producer = producer_of(plan, edge.port);
       const double rate = effective_rate_hz(plan, producer);
       const int64_t not_yet_visible = plan.tasks[producer].deadline_ns;
-      uint32_t history = edge.depth + messages_within(task.deadline_ns, rate) + messages_within(not_yet_visible, rate);
+      uint32_t history =
+          edge.depth + messages_within(latest_start_ns(task), rate) + messages_within(not_yet_visible, rate);
       if (joined(task, edge)) history += messages_within(std::min<int64_t>(longest_deadline, 500'000'000), rate);
       port.history = std::max(port.history, history);
       port.held += edge.depth;

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "rt/machine/identity.hpp"
 #include "rt/param.hpp"
 #include "rt/sched/plan.hpp"
 #include "rt/time/rate.hpp"
@@ -88,11 +89,27 @@ struct ScheduleEntry {
   Position position;
 };
 
+/// How the budgets of a schedule were measured: its block `measured`, which `takt profile` writes.
+struct MeasuredSpec {
+  struct Exec {
+    int64_t exec_ns = 0;  ///< the quantile of the execution time
+    int64_t samples = 0;
+  };
+  machine::Identity machine;
+  std::string at, policy;  ///< UTC; the policy that was granted when all nodes ran together
+  double quantile = 0;     ///< 0..1
+  double margin = 0;       ///< budget = margin * quantile of the execution time
+  std::map<std::string, Exec> nodes;
+  Position position;
+};
+
 struct ScheduleSpec {
   std::string name, file;
   Policy policy = Policy::deadline;
   std::vector<int> cores;
+  Position cores_position;
   std::map<std::string, ScheduleEntry> entries;  ///< by node or device id
+  std::optional<MeasuredSpec> measured;          ///< nothing: the budgets are estimates
 };
 
 struct ChainSpec {

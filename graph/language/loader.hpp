@@ -68,6 +68,9 @@ class Loader {
   void read_modes(const nlohmann::json& value);
   bool claim_id(const std::string& id, const Position& at);
 
+  // read_measured.cpp
+  void read_measured(const nlohmann::json& value);
+
   // read_params.cpp: node types, parameters of nodes, --set
   void make_instances();
   void read_set();

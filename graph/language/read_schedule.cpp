@@ -75,11 +75,13 @@ void Loader::read_schedule() {
               fmt::format("there is no policy {}{}", ticked(options_.policy), alternatives(options_.policy, words)));
     read_word(asked, "policy", kPolicies, spec_.schedule.policy);
   }
+  spec_.schedule.cores_position = schedule_.value_at("/cores");
   const json cores = root.value("cores", json::array());
   if (cores.is_array())
     for (const auto& core : cores)
       if (core.is_number_integer() && core >= 0 && core <= 1023) spec_.schedule.cores.push_back(core.get<int>());
   if (!root.contains("cores")) spec_.schedule.cores = {0};
+  if (root.contains("measured") && root["measured"].is_object()) read_measured(root["measured"]);
   const json nodes = root.value("nodes", json::object());
   if (!nodes.is_object()) return;
   for (const auto& [id, value] : nodes.items())

@@ -13,8 +13,12 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdint>
+#include <cstdlib>
 #include <cstring>
 #include <utility>
+
+#include "rt/machine/facts.hpp"
+#include "rt/machine/parse.hpp"
 
 namespace takt {
 namespace {
@@ -30,6 +34,13 @@ std::string mlock_refused(int reason) {
       limit.rlim_cur == RLIM_INFINITY ? "unlimited" : std::to_string(limit.rlim_cur / 1024) + " KiB";
   return std::string("mlockall: ") + std::strerror(reason) + " (RLIMIT_MEMLOCK " + allowed +
          "): pages may be swapped out. Fix: ulimit -l unlimited, or 'memlock unlimited' in /etc/security/limits.conf";
+}
+
+/// CAP_IPC_LOCK, which root has and `setcap` gives.
+bool may_lock_without_limit() {
+  constexpr int kIpcLock = 14;
+  const std::string status = machine::SystemFacts().text("/proc/self/status").value_or("");
+  return (std::strtoull(machine::line_value(status, "CapEff").c_str(), nullptr, 16) >> kIpcLock & 1) != 0;
 }
 
 __attribute__((noinline)) void touch(size_t bytes) {
@@ -58,7 +69,7 @@ ProcessMemory prepare_process_memory() {
   // A limited user would be granted MCL_FUTURE and then fail in every later allocation beyond the limit.
   rlimit limit{};
   getrlimit(RLIMIT_MEMLOCK, &limit);
-  if (geteuid() != 0 && limit.rlim_cur != RLIM_INFINITY) got.lacks.push_back(mlock_refused(EPERM));
+  if (!may_lock_without_limit() && limit.rlim_cur != RLIM_INFINITY) got.lacks.push_back(mlock_refused(EPERM));
   else if (mlockall(MCL_CURRENT | MCL_FUTURE) == 0) got.mlock = true;
   else got.lacks.push_back(mlock_refused(errno));
   return got;
@@ -85,6 +96,7 @@ size_t prefault_stack(size_t bytes) {
 CpuLatencyHold::CpuLatencyHold() : file_(open(kLatencyFile, O_WRONLY | O_CLOEXEC)) {
   const int32_t microseconds = 0;
   if (file_ >= 0 && write(file_, &microseconds, sizeof microseconds) == sizeof microseconds) return;
+  absent_ = errno == ENOENT;
   lacks_ = std::string(kLatencyFile) + ": " + std::strerror(errno) +
            ": CPUs may sleep deeply between jobs. Fix: run as root, or sudo chmod 666 " + kLatencyFile;
   if (file_ >= 0) close(file_);
@@ -92,7 +104,7 @@ CpuLatencyHold::CpuLatencyHold() : file_(open(kLatencyFile, O_WRONLY | O_CLOEXEC
 }
 
 CpuLatencyHold::CpuLatencyHold(CpuLatencyHold&& other) noexcept
-    : file_(std::exchange(other.file_, -1)), lacks_(std::move(other.lacks_)) {}
+    : file_(std::exchange(other.file_, -1)), absent_(other.absent_), lacks_(std::move(other.lacks_)) {}
 
 CpuLatencyHold::~CpuLatencyHold() {
   if (file_ >= 0) close(file_);

@@ -35,10 +35,13 @@ class CpuLatencyHold {
   CpuLatencyHold(const CpuLatencyHold&) = delete;
   ~CpuLatencyHold();
   bool granted() const { return file_ >= 0; }
+  /// Not granted although the kernel has it. A kernel without idle control has nothing to grant.
+  bool refused() const { return !granted() && !absent_; }
   const std::string& lacks() const { return lacks_; }
 
  private:
   int file_ = -1;
+  bool absent_ = false;
   std::string lacks_;
 };
 [[nodiscard]] CpuLatencyHold hold_cpu_dma_latency();

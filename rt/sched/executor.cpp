@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cstring>
-#include <numeric>
 #include <set>
 #include <thread>
 #include <tuple>
@@ -14,13 +13,12 @@
 #include "rt/memory/process_memory.hpp"
 #include "rt/node.hpp"
 #include "rt/sched/cooperative.hpp"
+#include "rt/sched/lane_tasks.hpp"
 #include "rt/sched/rendezvous.hpp"
 #include "rt/sched/worker_threads.hpp"
 
 namespace takt {
 namespace {
-
-constexpr int kHighestPriority = 80;  // below the kernel's own interrupt threads (50 by default) nothing is gained
 
 /// What preparation has cost this thread is no job's.
 void start_counting() {
@@ -93,34 +91,13 @@ void Executor::start_clockwork(RunResult& result) {
     if (task) task->plan().node->start(result.epoch_ns);
 }
 
-std::vector<Reservation> Executor::reservations(Policy policy) const {
+std::vector<Reservation> Executor::own_reservations(Policy policy) const {
   // Over all lanes of the plan, so that every process of a run comes to the same assignment.
   const std::vector<std::vector<size_t>> lanes = lane_members(plan_);
-  std::vector<Reservation> wanted(lanes.size()), own;
-  std::vector<size_t> order(lanes.size());
-  std::iota(order.begin(), order.end(), size_t{0});
-  // Deadline monotonic: the shorter the span, the higher the priority.
-  std::stable_sort(order.begin(), order.end(),
-                   [&](size_t a, size_t b) { return lane_span_ns(plan_, lanes[a]) < lane_span_ns(plan_, lanes[b]); });
-  std::vector<double> load(std::max<size_t>(plan_.cores.size(), 1), 0.0);
-  for (size_t rank = 0; rank < order.size(); ++rank) {
-    const std::vector<size_t>& lane = lanes[order[rank]];
-    const Rate& rate = *plan_.tasks[lane.front()].rate;
-    const int64_t budget_ns = lane_budget_ns(plan_, lane);
-    Reservation& r = wanted[order[rank]];
-    if (policy == Policy::deadline) {
-      r = deadline_reservation(budget_ns, lane_span_ns(plan_, lane), rate.period_ns());
-      continue;
-    }
-    r.policy = policy;
-    r.priority = std::max(1, kHighestPriority - static_cast<int>(rank));
-    // Worst fit: the next lane goes to the core with the least work so far.
-    const auto core = static_cast<size_t>(std::min_element(load.begin(), load.end()) - load.begin());
-    load[core] += static_cast<double>(budget_ns) * rate.hz();
-    r.core = plan_.cores.empty() ? -1 : plan_.cores[core];
-  }
+  const std::vector<Reservation> all = reservations(plan_, policy);
+  std::vector<Reservation> own;
   for (size_t i = 0; i < lanes.size(); ++i)
-    if (tasks_[lanes[i].front()]) own.push_back(wanted[i]);
+    if (tasks_[lanes[i].front()]) own.push_back(all[i]);
   return own;
 }
 
@@ -136,11 +113,12 @@ struct Executor::Crew {
 };
 
 bool Executor::run_partitioned(Policy policy, RunResult& result) {
-  const std::vector<Reservation> wanted = reservations(policy);
+  const std::vector<Reservation> wanted = own_reservations(policy);
   crew_ = std::make_unique<Crew>(lanes_.size());
   for (size_t i = 0; i < lanes_.size(); ++i) {
     crew_->workers.start([this, &crew = *crew_, &lane = *lanes_[i], mine = wanted[i], i] {
       name_thread(lane.head().plan().name);
+      const trace::Thread traced(options_.trace, lane.head().plan().name);
       prefault_stack();
       crew.grants[i] = apply(mine);
       lane.watch().bind(mine);
@@ -178,8 +156,9 @@ void Executor::run_cooperative(RunResult& result) {
   crew_->queue = std::make_unique<CooperativeQueue>(lanes_, clock_, stop_);
   watch(Policy::cooperative);
   for (size_t i = 0; i < std::max<size_t>(plan_.cores.size(), 1); ++i) {
-    crew_->workers.start([&queue = *crew_->queue, i] {
+    crew_->workers.start([this, &queue = *crew_->queue, i] {
       name_thread("takt-worker-" + std::to_string(i));
+      const trace::Thread traced(options_.trace, "takt-worker-" + std::to_string(i));
       prefault_stack();
       apply(Reservation{});
       start_counting();
@@ -226,6 +205,7 @@ void Executor::join(RunResult& result) {
 
 void Executor::run_virtual(RunResult& result) {
   auto& clock = dynamic_cast<VirtualClock&>(clock_);
+  const trace::Thread traced(options_.trace, "takt-virtual");
   start_clockwork(result);
   start_counting();
   // Ordered by instant, then deadline, then lane: the same order in every run.

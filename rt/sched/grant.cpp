@@ -48,12 +48,13 @@ std::string refusal(const char* what, int error) {
   return text;
 }
 
-bool pin(int core, std::string& refused) {
+bool pin(int core, Grant& grant) {
   cpu_set_t set;
   CPU_ZERO(&set);
   CPU_SET(static_cast<size_t>(core), &set);
   if (sched_setaffinity(0, sizeof set, &set) == 0) return true;
-  refused = refusal(("CPU " + std::to_string(core)).c_str(), errno);
+  grant.error = errno;
+  grant.refused = refusal(("CPU " + std::to_string(core)).c_str(), grant.error);
   return false;
 }
 
@@ -74,6 +75,7 @@ Grant apply_deadline(const Reservation& wanted, int64_t patience_ns) {
   }
   Grant grant;
   if (error != 0) {
+    grant.error = error;
     grant.refused = refusal("SCHED_DEADLINE", error);
     return grant;
   }
@@ -89,10 +91,11 @@ Grant apply_deadline(const Reservation& wanted, int64_t patience_ns) {
 
 Grant apply_fixed(const Reservation& wanted) {
   Grant grant;
-  if (wanted.core >= 0 && !pin(wanted.core, grant.refused)) return grant;
+  if (wanted.core >= 0 && !pin(wanted.core, grant)) return grant;
   const sched_param param{wanted.priority};
   if (sched_setscheduler(0, SCHED_FIFO | SCHED_RESET_ON_FORK, &param) != 0) {
-    grant.refused = refusal("SCHED_FIFO", errno);
+    grant.error = errno;
+    grant.refused = refusal("SCHED_FIFO", grant.error);
     return grant;
   }
   SchedulingAttributes got;

@@ -23,6 +23,7 @@ struct Grant {
   int priority = 0;
   std::vector<int> cpus;
   bool verified = false;  ///< read back and equal to what was asked
+  int error = 0;          ///< errno of what was refused; 0: nothing was
   std::string refused;    ///< empty, or what was refused and the fix
 };
 

@@ -11,7 +11,9 @@ Lane::Lane(std::vector<size_t> members, const std::vector<std::unique_ptr<Task>>
   for (const size_t index : members_) {
     tasks[index]->set_watch(*watch_, static_cast<uint32_t>(tasks_.size()));
     tasks_.push_back(tasks[index].get());
+    span_ns_ += tasks_.back()->plan().deadline_ns;
   }
+  if (members_.size() > 1) span_ns_ = std::min(span_ns_, rate().period_ns());
   for (size_t m = 1; m < members_.size(); ++m) {
     const auto producer = std::find(members_.begin(), members_.end(), tasks_[m]->plan().on_task);
     followers_[m].producer = static_cast<size_t>(producer - members_.begin());
@@ -59,7 +61,10 @@ void Lane::skip_passed(int64_t now_ns, int64_t end_ns) {
   const bool all = head().plan().on_miss == OnMiss::skip;
   const int64_t pending = all ? 0 : 1;
   while (rate().release_ns(origin_ns_, next_ + pending) <= now_ns && next_release_ns() < end_ns) {
-    if (head().in_mode(next_release_ns_)) head().statistics().skipped.fetch_add(1, std::memory_order_relaxed);
+    if (head().in_mode(next_release_ns_)) {
+      head().statistics().skipped.fetch_add(1, std::memory_order_relaxed);
+      head().trace_skip(static_cast<uint64_t>(next_), next_release_ns_);
+    }
     go_to(next_ + 1);
   }
 }

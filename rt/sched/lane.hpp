@@ -20,7 +20,8 @@ class Lane {
   }
   /// Planned instant of the next release.
   int64_t next_release_ns() const { return next_release_ns_; }
-  int64_t next_deadline_ns() const { return next_release_ns_ + head().plan().deadline_ns; }
+  /// Instant by which the whole pass is due (lane_span_ns).
+  int64_t next_deadline_ns() const { return next_release_ns_ + span_ns_; }
 
   /// Runs the next job of the head and the jobs it releases; afterwards moves on to the next release still wanted.
   /// Raises `stop` at the head's release if a device's recorded data ended.
@@ -63,7 +64,7 @@ class Lane {
   std::vector<Follower> followers_;  ///< by member index; [0] unused
   std::vector<int64_t> visible_;     ///< of the pass under way: when each member's output became visible
   std::vector<char> ran_;
-  int64_t origin_ns_ = 0;
+  int64_t origin_ns_ = 0, span_ns_ = 0;
   int64_t next_ = 0, next_release_ns_ = 0;
 };
 

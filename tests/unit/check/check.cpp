@@ -81,9 +81,13 @@ TEST_CASE("Utilisation is the sum of budget times rate, spread over the cores") 
 TEST_CASE("Exactly full cores are admitted") {
   Plan plan = two_tasks();
   plan.cores = {0};
+  plan.policy = Policy::fixed;
   plan.tasks.clear();
   for (int i = 0; i < 10; ++i) plan.tasks.push_back(task("n" + std::to_string(i), 10, 10, 100, Criticality::high));
   CHECK(check({}, plan).admitted);
+  // SCHED_DEADLINE reserves over 0.95 of a period: a full core does not fit.
+  plan.policy = Policy::deadline;
+  CHECK(!check({}, plan).admitted);
 }
 
 TEST_CASE("A budget above its deadline is infeasible") {
@@ -109,11 +113,13 @@ TEST_CASE("More work than cores, or than one core for one task, is infeasible") 
   CHECK(says(check({}, plan), "at most 6.667 Hz would fit"));
 }
 
-TEST_CASE("A task without a budget is named, not counted") {
+TEST_CASE("A task without a budget is named, not counted, and nothing is proven") {
   Plan plan = two_tasks();
   plan.tasks[1].budget_ns = 0;
   const CheckResult result = check({}, plan);
-  CHECK(result.admitted);
+  CHECK(!result.admitted);
+  CHECK(result.answer == Answer::not_proven);
+  CHECK(says(result, "picture: no budget stated"));
   CHECK(result.unbudgeted == std::vector<std::string>{"picture"});
   CHECK(result.utilisation == doctest::Approx(0.5));
 }

@@ -1,0 +1,226 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "graph/check/admission.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "rt/sched/lane.hpp"
+#include "rt/sched/lane_tasks.hpp"
+
+namespace takt::graph {
+namespace {
+
+using analysis::Overheads;
+using analysis::Ticks;
+
+double ms(int64_t ns) { return static_cast<double>(ns) / 1e6; }
+
+/// What no schedule can do, task by task and together.
+std::vector<std::string> impossible(const Plan& plan) {
+  constexpr double kRounding = 1e-9;  // a sum of shares may miss the whole by this much
+  std::vector<std::string> reasons;
+  double all = 0;
+  for (size_t t = 0; t < plan.tasks.size(); ++t) {
+    const TaskPlan& task = plan.tasks[t];
+    const double rate = effective_rate_hz(plan, t), share = static_cast<double>(task.budget_ns) * 1e-9 * rate;
+    all += share;
+    if (task.deadline_ns > 0 && task.budget_ns > task.deadline_ns)
+      reasons.push_back(
+          fmt::format("{}: its budget of {} ms is above its deadline of {} ms; give it a deadline from {} ms "
+                      "on or a smaller budget",
+                      task.name, ms(task.budget_ns), ms(task.deadline_ns), ms(task.budget_ns)));
+    else if (share > 1 + kRounding)
+      reasons.push_back(
+          fmt::format("{}: its budget of {} ms at {:.4g} Hz is more than one core, and a job runs on one; at "
+                      "most {:.4g} Hz would fit",
+                      task.name, ms(task.budget_ns), rate, 1e9 / static_cast<double>(task.budget_ns)));
+  }
+  const size_t cores = std::max<size_t>(plan.cores.size(), 1);
+  if (all > static_cast<double>(cores) + kRounding)
+    reasons.push_back(
+        fmt::format("budgets ask for {:.2f} of {} core{}; lower rates or budgets", all, cores, cores == 1 ? "" : "s"));
+  return reasons;
+}
+
+class Admitting {
+ public:
+  Admitting(const Plan& plan, const Overheads& overheads, bool bounds)
+      : plan_(plan), overheads_(overheads), bounds_(bounds), lanes_(lane_tasks(plan, plan.policy, overheads)) {
+    result_.nodes.resize(plan.tasks.size());
+  }
+
+  Admission run() {
+    result_.answer = Answer::admitted;
+    for (const auto& [low, high] : low_before_high(plan_))
+      result_.notes.push_back(
+          fmt::format("{} (low criticality) runs on the worker of {} (high), which waits for it: a job of it that does "
+                      "not end would "
+                      "stop both; give {} a `rate`, or `criticality: high`",
+                      plan_.tasks[low].name, plan_.tasks[high].name, plan_.tasks[low].name));
+    for (std::string& reason : impossible(plan_)) refuse(Answer::infeasible, std::move(reason));
+    if (result_.answer == Answer::infeasible) return std::move(result_);
+    for (const TaskPlan& task : plan_.tasks)
+      if (task.budget_ns == 0)
+        refuse(Answer::not_proven,
+               fmt::format("{}: no budget stated; give it one (`takt profile` measures it)", task.name));
+    ask_kernel();
+    const SetAnswer answer = analyse_set(lanes_.set, plan_.policy);
+    result_.by = answer.by;
+    if (answer.answer != Answer::admitted) {
+      refuse(answer.answer, answer.why);
+      return std::move(result_);
+    }
+    for (size_t l = 0; l < lanes_.lanes.size(); ++l) judge_members(l, *answer.response[l]);
+    ask_about_overruns();
+    return std::move(result_);
+  }
+
+ private:
+  int64_t ns(Ticks ticks) const { return (ticks + lanes_.set.ticks_per_ns - 1) / lanes_.set.ticks_per_ns; }
+
+  void refuse(Answer answer, std::string reason) {
+    if (result_.answer != Answer::infeasible) result_.answer = answer;
+    result_.reasons.push_back(std::move(reason));
+  }
+
+  /// The kernel's own admission, with the figures that the executor reserves.
+  void ask_kernel() {
+    if (plan_.policy != Policy::deadline || overheads_.deadline_bandwidth <= 0) return;
+    double sum = 0;
+    for (const Reservation& r : reservations(plan_, plan_.policy))
+      sum += static_cast<double>(r.runtime_ns) / static_cast<double>(r.period_ns);
+    constexpr double kKernelStep = 1.0 / (1 << 20);  // it counts bandwidth in these
+    if (sum > overheads_.deadline_bandwidth + kKernelStep)
+      refuse(Answer::infeasible, fmt::format("the reservations add up to {:.3f} cores, and the kernel gives {:.3f} to "
+                                             "SCHED_DEADLINE; a budget counts over its deadline there",
+                                             sum, overheads_.deadline_bandwidth));
+  }
+
+  /// Response of lane `l` if its own work were only that long.
+  std::optional<Ticks> response_of(size_t l, int64_t work_ns) const {
+    analysis::TaskSet set = lanes_.set;
+    set.tasks[l].budget = work_ns * set.ticks_per_ns;
+    const SetAnswer answer = analyse_set(set, plan_.policy);
+    return answer.answer == Answer::admitted ? answer.response[l] : std::nullopt;
+  }
+
+  /// From the head's release, with the work of the lane up to there. A lane that is not preempted has begun its
+  /// last job at `response` minus what was left to do.
+  std::optional<int64_t> finish_of(size_t l, size_t position, Ticks response) const {
+    const std::vector<size_t>& lane = lanes_.lanes[l];
+    if (position + 1 == lane.size()) return ns(response);
+    const int64_t work = prefix_ns(plan_, lane, position, overheads_);
+    if (plan_.policy == Policy::cooperative) return ns(response) - ns(lanes_.set.tasks[l].budget) + work;
+    const auto found = response_of(l, work);
+    return found ? std::optional(ns(*found)) : std::nullopt;
+  }
+
+  std::optional<int64_t> response_of_member(size_t l, size_t position) const {
+    const int64_t work = segment_ns(plan_, lanes_.lanes[l], position, overheads_);
+    if (plan_.policy == Policy::cooperative) return work;
+    const auto found = response_of(l, work);
+    return found ? std::optional(ns(*found)) : std::nullopt;
+  }
+
+  /// Of a head: as if it had only to begin. A follower begins when the member before it is done, or is waited for.
+  std::optional<int64_t> start_of(size_t l, size_t position, Ticks response) const {
+    const std::vector<size_t>& lane = lanes_.lanes[l];
+    if (position > 0) {
+      const TaskPlan& producer = plan_.tasks[plan_.tasks[lane[position]].on_task];
+      return producer.publish == PublishAt::asap ? result_.nodes[lane[position - 1]].finish_ns
+                                                 : finish_of(l, position, response);
+    }
+    if (plan_.policy == Policy::cooperative)
+      return ns(response) - ns(lanes_.set.tasks[l].budget) + overheads_.release_ns + overheads_.switch_ns;
+    const auto found = response_of(l, overheads_.release_ns + overheads_.switch_ns + 1);
+    return found ? std::optional(ns(*found)) : std::nullopt;
+  }
+
+  void judge_members(size_t l, Ticks response) {
+    const std::vector<size_t>& lane = lanes_.lanes[l];
+    for (size_t m = 0; m < lane.size(); ++m) {
+      const TaskPlan& task = plan_.tasks[lane[m]];
+      NodeAdmission& node = result_.nodes[lane[m]];
+      node.finish_ns = finish_of(l, m, response);
+      if (bounds_) node.start_ns = start_of(l, m, response);
+      node.response_ns = m == 0 ? node.finish_ns : response_of_member(l, m);
+      // The lane is in time as a whole; a member's own deadline may be tighter.
+      if (node.response_ns && *node.response_ns <= task.deadline_ns) continue;
+      if (!node.response_ns && lane.size() == 1) continue;
+      refuse(Answer::not_proven,
+             fmt::format("{}: its deadline of {} ms is not proven within the lane of {}{}", task.name,
+                         ms(task.deadline_ns), plan_.tasks[lane.front()].name,
+                         node.response_ns ? fmt::format(" (bound {:.3f} ms)", ms(*node.response_ns)) : ""));
+    }
+  }
+
+  bool high(size_t lane) const {
+    const auto& members = lanes_.lanes[lane];
+    return std::any_of(members.begin(), members.end(),
+                       [&](size_t t) { return plan_.tasks[t].criticality == Criticality::high; });
+  }
+
+  /// A lane of low criticality that is stopped late. Under `deadline` its reservation is filled up every reservation
+  /// period, and what it ran too long it pays back: the excess comes once in any window, here as a task of its own.
+  /// Under `fixed` it is demoted until the job has ended, so the excess may come with every job.
+  analysis::TaskSet with_overruns() const {
+    analysis::TaskSet set = lanes_.set;
+    const Ticks excess = overheads_.enforcement_ns * set.ticks_per_ns;
+    const std::vector<Reservation> reserved = reservations(plan_, plan_.policy);
+    for (size_t l = 0; l < lanes_.lanes.size(); ++l) {
+      if (high(l)) continue;
+      if (plan_.policy == Policy::fixed) {
+        set.tasks[l].budget += excess;
+        set.tasks[l].deadline = set.tasks[l].period;  // its own fault
+        continue;
+      }
+      set.tasks[l].period = std::min(set.tasks[l].period, reserved[l].period_ns * set.ticks_per_ns);
+      set.tasks[l].sporadic = true;  // it is filled up when it was used up, not at releases
+      set.tasks[l].offset = 0;
+      if (excess == 0) continue;
+      analysis::TimedTask late = set.tasks[l];
+      constexpr int64_t kOnce = 1000;  // longer than any window that the tests look at
+      late.name += " beyond its budget";
+      late.budget = excess;
+      late.period *= kOnce;
+      set.tasks.push_back(late);
+    }
+    return set;
+  }
+
+  void ask_about_overruns() {
+    if (plan_.policy == Policy::cooperative) {
+      result_.notes.push_back("cooperative: nothing is enforced, a node that overruns its budget delays the others");
+      return;
+    }
+    const SetAnswer answer = analyse_set(with_overruns(), plan_.policy);
+    if (answer.answer == Answer::admitted || high_ones_keep_up(answer)) return;
+    refuse(Answer::not_proven,
+           fmt::format("with every node of low criticality running on to {:.1f} ms over its budget: {}",
+                       ms(overheads_.enforcement_ns), answer.why));
+  }
+
+  /// Under `fixed` the low ones may miss then; the high ones must not.
+  bool high_ones_keep_up(const SetAnswer& answer) const {
+    if (plan_.policy != Policy::fixed || answer.response.size() != lanes_.lanes.size()) return false;
+    for (size_t l = 0; l < lanes_.lanes.size(); ++l)
+      if (high(l) && (!answer.response[l] || *answer.response[l] > lanes_.set.tasks[l].deadline)) return false;
+    return true;
+  }
+
+  const Plan& plan_;
+  const Overheads& overheads_;
+  const bool bounds_;
+  const LaneTasks lanes_;
+  Admission result_;
+};
+
+}  // namespace
+
+Admission admit(const Plan& plan, const Overheads& overheads, bool bounds) {
+  if (plan.tasks.empty()) return {Answer::admitted, "nothing to do", {}, {}, {}};
+  return Admitting(plan, overheads, bounds).run();
+}
+
+}  // namespace takt::graph

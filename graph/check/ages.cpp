@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "graph/check/ages.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <numeric>
+
+#include "hal/device_node.hpp"
+#include "rt/node.hpp"
+#include "rt/sched/analysis/chain_age.hpp"
+#include "rt/sched/analysis/integers.hpp"
+#include "rt/sched/lane.hpp"
+
+namespace takt::graph {
+namespace {
+
+using analysis::ChainTask;
+using analysis::Ticks;
+using analysis::Wide;
+
+/// One step of a path: a task, and the edge by which the data came to it (kNone at the device).
+struct Step {
+  size_t task = kNone, edge = kNone;
+};
+using Path = std::vector<Step>;
+
+class Ages {
+ public:
+  Ages(const Plan& plan, const std::vector<NodeAdmission>& nodes) : plan_(plan), nodes_(nodes) {
+    for (size_t t = 0; t < plan.tasks.size(); ++t)
+      for (const size_t port : plan.tasks[t].ports) producer_.at_port(port) = t;
+    for (const auto& lane : lane_members(plan)) ticks_ = std::lcm(ticks_, plan.tasks[lane.front()].rate->numerator);
+    if (ticks_ > 1'000'000) ticks_ = 1;
+  }
+
+  /// Worst over the paths from a device to that task whose last edge is `edge` (kNone: any), and that pass `through`
+  /// (kNone: any port). `as_input`: the age where the job has taken the message, else where its output is visible.
+  void judge(size_t task, size_t edge, size_t through, bool as_input, AgeBound& bound) {
+    std::vector<Path> paths;
+    Path walk;
+    collect(task, edge, through, through == kNone, walk, paths);
+    if (paths.empty()) bound.why = "no path from a device leads there";
+    if (paths.size() >= kMostPaths) bound.why = "too many paths lead there";
+    bound.bound_ns = bound.oldest_ns = 0;
+    for (const Path& path : paths) add(path, as_input, bound);
+    if (!bound.why.empty()) bound.bound_ns = bound.oldest_ns = std::nullopt;
+  }
+
+ private:
+  static constexpr size_t kMostPaths = 10'000;
+
+  bool carries_stamp(const TaskPlan& task, size_t edge) const {
+    return task.node == nullptr || task.node->inputs()[task.edges[edge].input] != task.node->control();
+  }
+
+  /// Backwards from a task to devices; no task twice.
+  void collect(size_t t, size_t only_edge, size_t through, bool passed, Path& walk, std::vector<Path>& paths) const {
+    if (paths.size() >= kMostPaths) return;
+    const TaskPlan& task = plan_.tasks[t];
+    const auto again = [&](size_t producer) {
+      return std::any_of(walk.begin(), walk.end(), [&](const Step& s) { return s.task == producer; });
+    };
+    const bool device_output = task.device && (!walk.empty() || only_edge == kNone);
+    if (device_output || task.edges.empty()) {  // a device's stamps are its own, whatever it reads
+      if (!passed) return;
+      walk.push_back({t, kNone});
+      paths.emplace_back(walk.rbegin(), walk.rend());
+      walk.pop_back();
+      return;
+    }
+    for (size_t e = 0; e < task.edges.size(); ++e) {
+      if ((only_edge != kNone && e != only_edge) || !carries_stamp(task, e)) continue;
+      const size_t producer = producer_.find(task.edges[e].port);
+      if (producer == kNone || producer == t || again(producer)) continue;
+      walk.push_back({t, e});
+      collect(producer, kNone, through, passed || task.edges[e].port == through, walk, paths);
+      walk.pop_back();
+    }
+  }
+
+  /// The task as the analysis of chains sees it, without the edge it reads.
+  ChainTask model(size_t t, bool with_bounds) {
+    size_t head = t;
+    Wide every = 1;
+    int64_t apart = 0;
+    for (; plan_.tasks[head].on_task != kNone && !plan_.tasks[head].rate; head = plan_.tasks[head].on_task) {
+      every *= plan_.tasks[head].every;
+      apart = std::max(apart, plan_.tasks[head].min_interval_ns);
+    }
+    const Rate& rate = *plan_.tasks[head].rate;
+    ChainTask model;
+    const Wide period = Wide{rate.denominator} * 1'000'000'000 * ticks_ / rate.numerator * every;
+    model.period = static_cast<Ticks>(std::min<Wide>(period, analysis::kLongest));
+    model.offset = plan_.tasks[head].offset_ns * ticks_;
+    if (apart > 0) {
+      model.phased = false;
+      model.period += (apart * ticks_ + model.period - 1) / model.period * model.period;
+    }
+    if (with_bounds && nodes_[t].finish_ns) model.visible = visible_ns(t, *nodes_[t].finish_ns) * ticks_;
+    return model;
+  }
+
+  /// With `let` the output waits for the deadline, which the lane counts from the release of this very task.
+  int64_t visible_ns(size_t t, int64_t finish_ns) const {
+    const TaskPlan& task = plan_.tasks[t];
+    if (task.publish == PublishAt::asap) return finish_ns;
+    const int64_t released = task.on_task == kNone ? 0 : visible_ns(task.on_task, *nodes_[task.on_task].finish_ns);
+    return std::max(finish_ns, released + task.deadline_ns);
+  }
+
+  void add(const Path& path, bool as_input, AgeBound& bound) {
+    std::vector<ChainTask> chain, least;
+    for (size_t i = 0; i < path.size(); ++i) {
+      const TaskPlan& task = plan_.tasks[path[i].task];
+      ChainTask m = model(path[i].task, true);
+      if (!nodes_[path[i].task].finish_ns) bound.why = fmt::format("no response of {} is bounded", task.name);
+      if (i > 0) {
+        const EdgePlan& edge = task.edges[path[i].edge];
+        m.follows = task.on_task == path[i - 1].task && task.on_port == edge.port;
+        m.depth = as_input && i + 1 == path.size() ? 1 : edge.depth;  // an edge's max_age asks for the newest
+        check_join(task, path[i], bound);
+      }
+      if (as_input && i + 1 == path.size() && nodes_[path[i].task].start_ns)
+        m.visible = *nodes_[path[i].task].start_ns * ticks_;
+      chain.push_back(m);
+    }
+    const TaskPlan& device = plan_.tasks[path.front().task];
+    const auto* hardware = dynamic_cast<const DeviceNode*>(device.node);
+    const int64_t lag = hardware != nullptr ? hardware->stamp_lag_ns() : 0;
+    const analysis::ChainAge age = analysis::chain_age(chain);
+    bound.least_ns = std::max(bound.least_ns, lag + analysis::least_chain_age(chain) / ticks_);
+    if (!bound.bound_ns) return;
+    bound.bound_ns = std::max(*bound.bound_ns, lag + (age.newest + ticks_ - 1) / ticks_);
+    bound.oldest_ns = std::max(*bound.oldest_ns, lag + (age.oldest + ticks_ - 1) / ticks_);
+  }
+
+  /// Of a join of equal stamps the slowest input decides, if the others only wait for it: if what they read lies on
+  /// the way of the slowest. Its path is then among those judged.
+  void check_join(const TaskPlan& task, const Step& step, AgeBound& bound) const {
+    for (const auto& group : task.joins) {
+      const auto joined = [&](size_t input) { return std::find(group.begin(), group.end(), input) != group.end(); };
+      if (!joined(task.edges[step.edge].input)) continue;
+      const size_t own = producer_.find(task.edges[step.edge].port);
+      for (const EdgePlan& other : task.edges) {
+        if (!joined(other.input)) continue;
+        const size_t producer = producer_.find(other.port);
+        if (producer == own || upstream(own, producer, 0) || upstream(producer, own, 0)) continue;
+        bound.why = fmt::format("{} joins outputs of {} and {}, and how often their stamps meet is not known",
+                                task.name, plan_.tasks[own].name, plan_.tasks[producer].name);
+      }
+    }
+  }
+
+  bool upstream(size_t above, size_t below, size_t hops) const {
+    if (above == below) return true;
+    if (below == kNone || hops > plan_.tasks.size()) return false;
+    for (const EdgePlan& edge : plan_.tasks[below].edges)
+      if (!plan_.tasks[below].device && upstream(above, producer_.find(edge.port), hops + 1)) return true;
+    return false;
+  }
+
+  struct Producers {
+    std::vector<size_t> by_port;
+    size_t& at_port(size_t port) {
+      if (by_port.size() <= port) by_port.resize(port + 1, kNone);
+      return by_port[port];
+    }
+    size_t find(size_t port) const { return port < by_port.size() ? by_port[port] : kNone; }
+  };
+
+  const Plan& plan_;
+  const std::vector<NodeAdmission>& nodes_;
+  Producers producer_;
+  int64_t ticks_ = 1;
+};
+
+size_t port_of(const Plan& plan, const PortName& name) {
+  for (size_t p = 0; p < plan.ports.size(); ++p)
+    if (plan.ports[p].node == name.node && plan.ports[p].port == name.port) return p;
+  return kNone;
+}
+
+size_t task_of(const Plan& plan, const std::string& name) {
+  for (size_t t = 0; t < plan.tasks.size(); ++t)
+    if (plan.tasks[t].name == name) return t;
+  return kNone;
+}
+
+size_t edge_of(const TaskPlan& task, const std::string& input) {
+  for (size_t e = 0; e < task.edges.size(); ++e)
+    if (task.node != nullptr && task.node->inputs()[task.edges[e].input]->name() == input) return e;
+  return kNone;
+}
+
+}  // namespace
+
+std::vector<AgeBound> age_bounds(const GraphSpec& graph, const Plan& plan, const std::vector<NodeAdmission>& nodes) {
+  std::vector<AgeBound> result;
+  Ages ages(plan, nodes);
+  for (const ChainSpec& chain : graph.chains) {
+    const size_t to = task_of(plan, chain.to.node), from = task_of(plan, chain.from.node);
+    if (to == kNone || from == kNone) continue;  // left out by the mode
+    const size_t edge = edge_of(plan.tasks[to], chain.to.port);
+    AgeBound bound{chain.name, false, chain.max_age_ns, {}, {}, 0, {}};
+    ages.judge(to, edge, port_of(plan, chain.from), edge != kNone, bound);
+    result.push_back(std::move(bound));
+  }
+  for (size_t t = 0; t < plan.tasks.size(); ++t) {
+    const TaskPlan& task = plan.tasks[t];
+    for (size_t e = 0; e < task.edges.size(); ++e) {
+      if (task.edges[e].max_age_ns == 0) continue;
+      const PortPlan& port = plan.ports[task.edges[e].port];
+      const std::string input =
+          task.node != nullptr ? "." + std::string(task.node->inputs()[task.edges[e].input]->name()) : "";
+      AgeBound bound{
+          port.node + "." + port.port + " -> " + task.name + input, true, task.edges[e].max_age_ns, {}, {}, 0, {}};
+      ages.judge(t, e, kNone, true, bound);
+      result.push_back(std::move(bound));
+    }
+  }
+  return result;
+}
+
+}  // namespace takt::graph

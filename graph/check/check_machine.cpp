@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "graph/check/check_machine.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <ctime>
+#include <nlohmann/json.hpp>
+
+#include "rt/machine/check_support.hpp"
+#include "rt/machine/parse.hpp"
+
+namespace takt::graph {
+namespace {
+
+using nlohmann::json;
+
+/// CPUs of the cpuset of this process if no other shares them and it is a scheduling domain of its own: SCHED_DEADLINE
+/// is admitted within it (cgroup v2: a partition; v1: exclusive below a parent that does not balance).
+std::vector<int> exclusive_cpus(const machine::Facts& facts) {
+  const std::string groups = facts.text("/proc/self/cgroup").value_or(""),
+                    mounts = facts.text("/proc/self/mounts").value_or("");
+  const auto value = [&](const std::string& file) { return machine::trimmed(facts.text(file).value_or("")); };
+  for (const char* controller : {"", "cpuset"}) {
+    const auto path = machine::cgroup_path(groups, controller), mount = machine::cgroup_mount(mounts, controller);
+    if (!path || !mount || *path == "/") continue;
+    const std::string folder = *mount + *path, above = folder.substr(0, folder.rfind('/'));
+    const std::string partition = value(folder + "/cpuset.cpus.partition");
+    if (partition == "root" || partition == "isolated")
+      return machine::parse_cpu_list(value(folder + "/cpuset.cpus.effective"));
+    if (value(folder + "/cpuset.cpu_exclusive") == "1" && value(above + "/cpuset.sched_load_balance") == "0")
+      return machine::parse_cpu_list(value(folder + "/cpuset.cpus"));
+  }
+  return {};
+}
+
+/// Microseconds of the file as ns; `ns` stays if there is no figure.
+void read_us(const json& root, const char* key, int64_t& ns) {
+  if (!root.contains(key) || root.at(key).is_null()) return;
+  const double us = root.at(key).get<double>();
+  if (!(us >= 0 && us < 1e9)) throw std::invalid_argument(fmt::format("`{}` is {}", key, us));
+  ns = static_cast<int64_t>(us * 1e3);
+}
+
+analysis::Overheads read_figures(const json& root, analysis::Overheads o) {
+  read_us(root, "release_us", o.release_ns);
+  read_us(root, "switch_us", o.switch_ns);
+  read_us(root, "publish_us", o.publish_ns);
+  read_us(root, "take_us", o.take_ns);
+  read_us(root, "per_mb_us", o.per_mb_ns);
+  read_us(root, "enforcement_us", o.enforcement_ns);
+  read_us(root, "tick_us", o.tick_ns);
+  if (root.contains("deadline_bandwidth") && !root["deadline_bandwidth"].is_null())
+    o.deadline_bandwidth = root["deadline_bandwidth"].get<double>();
+  return o;
+}
+
+void read_file(const json& root, const std::filesystem::path& file, const machine::Identity& here,
+               CheckMachine& found) {
+  const json& machine = root.at("machine");
+  machine::Identity where;
+  where.cpu = machine.at("cpu").get<std::string>();
+  where.cores = machine.at("cores").get<int>();
+  where.kernel = machine.at("kernel").get<std::string>();
+  found.overheads = read_figures(root, found.overheads);  // whole or not at all
+  found.measured = true;
+  const json when = root.value("measured_at", json());
+  found.overheads_from = "overheads measured" + (when.is_string() ? " " + when.get<std::string>() : std::string());
+  if (where == here) return;
+  found.warnings.push_back(fmt::format(
+      "{}: its overheads were measured on another machine ({}, {} cores, Linux {}; this is {}, {} cores, Linux "
+      "{}); call `takt doctor --measure` here",
+      file.string(), where.cpu, where.cores, where.kernel, here.cpu, here.cores, here.kernel));
+}
+
+}  // namespace
+
+analysis::Overheads assumed_overheads(const machine::Facts& facts) {
+  analysis::Overheads o;
+  o.release_ns = 100'000;
+  o.switch_ns = 5'000;
+  o.publish_ns = o.take_ns = 2'000;
+  timespec tick{};
+  o.tick_ns = clock_getres(CLOCK_MONOTONIC_COARSE, &tick) == 0 ? tick.tv_nsec : 4'000'000;
+  o.enforcement_ns = o.tick_ns;
+  const auto setting = [&](const char* name) {
+    return static_cast<double>(
+        machine::parse_number(facts.text(std::string("/proc/sys/kernel/") + name).value_or("")).value_or(0));
+  };
+  const double runtime = setting("sched_rt_runtime_us"), period = setting("sched_rt_period_us");
+  double share = runtime > 0 && period > 0 ? runtime / period : 1;
+  if (machine::parse_release(machine::kernel_release(facts)).at_least(6, 12)) share -= 0.05;
+  o.deadline_bandwidth = share * static_cast<double>(machine::online_cpus(facts).size());
+  return o;
+}
+
+CheckMachine check_machine(const machine::Facts& facts, const std::filesystem::path& file) {
+  CheckMachine found;
+  found.overheads = assumed_overheads(facts);
+  found.overheads_from = "overheads assumed, not measured here; `takt doctor --measure` finds them";
+  found.online = machine::online_cpus(facts);
+  found.exclusive = exclusive_cpus(facts);
+  found.identity = machine::Identity::of(facts);
+  const auto text = file.empty() ? std::nullopt : facts.text(file.string());
+  if (!text) return found;
+  try {
+    read_file(json::parse(*text), file, found.identity, found);
+  } catch (const std::exception& problem) {
+    found.warnings.push_back(
+        fmt::format("{}: no overheads can be read from it ({}); call `takt doctor --measure` again", file.string(),
+                    problem.what()));
+  }
+  return found;
+}
+
+}  // namespace takt::graph

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a check knows of the machine: its CPUs, and what `takt doctor --measure` found there.
+#pragma once
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "rt/machine/facts.hpp"
+#include "rt/machine/identity.hpp"
+#include "rt/sched/analysis/overheads.hpp"
+
+namespace takt::graph {
+
+struct CheckMachine {
+  analysis::Overheads overheads;      ///< charged in every analysis
+  bool measured = false;              ///< else assumed
+  std::string overheads_from;         ///< one line: where the figures come from
+  std::vector<std::string> warnings;  ///< measured elsewhere, a file that cannot be read
+  std::vector<int> online;            ///< CPUs; empty: not known, nothing is concluded from it
+  machine::Identity identity;         ///< no cores: not known
+  /// CPUs of the exclusive cpuset that this process runs in; empty: it runs in none.
+  std::vector<int> exclusive;
+};
+
+/// Figures for a machine that nobody measured: generous ones for a virtual machine of two cores, a budget enforced on
+/// the kernel's tick, and the bandwidth that the kernel's settings allow SCHED_DEADLINE on all CPUs
+/// (sched_rt_runtime_us / sched_rt_period_us, from Linux 6.12 on less 5 % for the fair server).
+analysis::Overheads assumed_overheads(const machine::Facts& facts);
+
+/// The machine, with the overheads that `takt doctor --measure` left in `file`: {"machine", "measured_at",
+/// "release_us", "switch_us", "publish_us", "take_us", "per_mb_us", "enforcement_us", "tick_us", "deadline_bandwidth"}.
+/// A key that is missing or null stays as assumed; so does everything if there is no such file, or none that can be
+/// read (a warning).
+CheckMachine check_machine(const machine::Facts& facts, const std::filesystem::path& file);
+
+}  // namespace takt::graph

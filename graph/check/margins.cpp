@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "graph/check/margins.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+namespace takt::graph {
+namespace {
+
+using analysis::Overheads;
+
+constexpr int64_t kMicrosecond = 1'000;
+
+double ms(int64_t ns) { return static_cast<double>(ns) / 1e6; }
+
+bool admitted(const Plan& plan, const Overheads& overheads) {
+  return admit(plan, overheads, false).answer == Answer::admitted;
+}
+
+/// The plan with one figure changed by `edit`, asked again.
+class Asking {
+ public:
+  using Edit = std::function<void(Plan&, int64_t)>;
+  Asking(const Plan& plan, const Overheads& overheads, Edit edit)
+      : plan_(plan), overheads_(overheads), edit_(std::move(edit)) {}
+  bool operator()(int64_t value) const {
+    Plan changed = plan_;
+    edit_(changed, value);
+    return admitted(changed, overheads_);
+  }
+
+ private:
+  const Plan& plan_;
+  const Overheads& overheads_;
+  Edit edit_;
+};
+
+/// Between a value that is admitted and one that is refused: the two moved together to `step` or 0.1 % of their
+/// distance from `base`. Returns the admitted one.
+int64_t edge(const Asking& admits, int64_t good, int64_t bad, int64_t base, int64_t step) {
+  while (std::abs(bad - good) > std::max(step, std::abs(good - base) / 1000)) {
+    const int64_t middle = good + (bad - good) / 2;
+    (admits(middle) ? good : bad) = middle;
+  }
+  return good;
+}
+
+int64_t margin_of(const Plan& plan, size_t t, const Overheads& overheads) {
+  const int64_t budget = plan.tasks[t].budget_ns;
+  int64_t good = budget, bad = std::max(plan.tasks[t].deadline_ns, budget) + kMicrosecond;
+  const Asking admits(plan, overheads, [t](Plan& p, int64_t ns) { p.tasks[t].budget_ns = ns; });
+  // Where cores are assigned anew for every budget an admitted one may lie beyond a refused one: look around the edge.
+  for (int again = 0; again < 16; ++again) {
+    good = edge(admits, good, bad, budget, kMicrosecond);
+    const int64_t margin = good - budget, below = budget + margin * 99 / 100, above = budget + margin * 101 / 100 + 1;
+    if (!admits(below)) {
+      bad = below;
+      good = budget;
+    } else if (above < plan.tasks[t].deadline_ns && admits(above)) {
+      good = above;
+      bad = plan.tasks[t].deadline_ns + kMicrosecond;
+    } else {
+      break;
+    }
+  }
+  return good - budget;
+}
+
+class Smallest {
+ public:
+  Smallest(const Plan& plan, const Overheads& overheads) : plan_(plan), overheads_(overheads) {}
+
+  std::optional<Change> find() {
+    try_core();
+    for (size_t t = 0; t < plan_.tasks.size(); ++t) {
+      try_budget(t);
+      try_deadline(t);
+      try_rate(t);
+    }
+    return best_;
+  }
+
+ private:
+  void offer(Change::What what, size_t task, double from, double to) {
+    const double relative = std::abs(to - from) / from;
+    if (!best_ || relative < best_->relative) best_ = Change{what, task, from, to, relative};
+  }
+
+  /// Nearest admitted value to the present one, on the way to `far` and no farther than the best change so far.
+  std::optional<int64_t> nearest(const Asking& admits, int64_t from, int64_t far, int64_t step) const {
+    if (best_) {
+      const auto reach = static_cast<int64_t>(best_->relative * static_cast<double>(from));
+      far = far < from ? std::max(far, from - reach) : std::min(far, from + reach);
+    }
+    if (far == from || !admits(far)) return std::nullopt;
+    return edge(admits, far, from, from, step);
+  }
+
+  void try_core() {
+    Plan more = plan_;
+    if (more.cores.empty()) more.cores.push_back(0);
+    more.cores.push_back(*std::max_element(more.cores.begin(), more.cores.end()) + 1);
+    const auto cores = static_cast<double>(more.cores.size());
+    if (admitted(more, overheads_)) offer(Change::What::cores, kNone, cores - 1, cores);
+  }
+
+  void try_budget(size_t t) {
+    const int64_t budget = plan_.tasks[t].budget_ns;
+    if (budget <= kMicrosecond) return;
+    const Asking admits(plan_, overheads_, [t](Plan& p, int64_t ns) { p.tasks[t].budget_ns = ns; });
+    if (const auto found = nearest(admits, budget, kMicrosecond, kMicrosecond))
+      offer(Change::What::budget, t, ms(budget), ms(*found));
+  }
+
+  void try_deadline(size_t t) {
+    const int64_t deadline = plan_.tasks[t].deadline_ns;
+    const double rate = effective_rate_hz(plan_, t);
+    const auto period = rate > 0 ? static_cast<int64_t>(1e9 / rate) : deadline;
+    if (period <= deadline) return;
+    const Asking admits(plan_, overheads_, [t](Plan& p, int64_t ns) { p.tasks[t].deadline_ns = ns; });
+    if (const auto found = nearest(admits, deadline, period, kMicrosecond))
+      offer(Change::What::deadline, t, ms(deadline), ms(*found));
+  }
+
+  void try_rate(size_t t) {
+    if (!plan_.tasks[t].rate) return;
+    const double hz = plan_.tasks[t].rate->hz();
+    const auto tenths = static_cast<int64_t>(hz * 10);
+    const Asking admits(plan_, overheads_, [t](Plan& p, int64_t n) { p.tasks[t].rate = Rate{n, 10}; });
+    if (tenths < 2) return;
+    if (const auto found = nearest(admits, tenths, std::max<int64_t>(1, tenths / 10), 1))
+      offer(Change::What::rate, t, hz, static_cast<double>(*found) / 10);
+  }
+
+  const Plan& plan_;
+  const Overheads& overheads_;
+  std::optional<Change> best_;
+};
+
+}  // namespace
+
+std::vector<int64_t> margins(const Plan& plan, const Overheads& overheads) {
+  std::vector<int64_t> result;
+  for (size_t t = 0; t < plan.tasks.size(); ++t) result.push_back(margin_of(plan, t, overheads));
+  return result;
+}
+
+std::optional<Change> smallest_change(const Plan& plan, const Overheads& overheads) {
+  return Smallest(plan, overheads).find();
+}
+
+std::string to_string(const Change& change, const Plan& plan) {
+  const auto of = [&](const char* verb, const char* what, const char* unit) {
+    return fmt::format("{} the {} of {} from {:.6g} {} to {:.6g} {}", verb, what, plan.tasks[change.task].name,
+                       change.from, unit, change.to, unit);
+  };
+  switch (change.what) {
+    case Change::What::budget: return of("lower", "budget", "ms");
+    case Change::What::deadline: return of("raise", "deadline", "ms");
+    case Change::What::rate: return of("lower", "rate", "Hz");
+    case Change::What::cores: break;
+  }
+  return fmt::format("give it {:.0f} cores instead of {:.0f}", change.to, change.from);
+}
+
+}  // namespace takt::graph

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+// How far a plan is from the edge of what is admitted, found by asking the same admission again with changed figures.
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "graph/check/admission.hpp"
+
+namespace takt::graph {
+
+/// By task of an admitted plan: how much its budget alone may grow before the plan is refused, to 0.1 % of itself or a
+/// microsecond. With 0.99 of it added the plan is admitted, with 1.01 of it refused.
+std::vector<int64_t> margins(const Plan& plan, const analysis::Overheads& overheads);
+
+/// One figure of the schedule that would make a refused plan fit.
+struct Change {
+  enum class What : uint8_t { budget, deadline, rate, cores } what = What::budget;
+  size_t task = kNone;
+  double from = 0, to = 0;  ///< ms, Hz or a number of cores
+  double relative = 0;      ///< |to - from| / from
+};
+/// The smallest by `relative` of: one budget lowered, one deadline raised (to the period at most), one rate lowered (in
+/// steps of 0.1 Hz), one core more. Each was tried: with it the plan is admitted. Nothing if no single change does it.
+std::optional<Change> smallest_change(const Plan& plan, const analysis::Overheads& overheads);
+/// "lower the budget of stereo from 20 ms to 18.25 ms".
+std::string to_string(const Change& change, const Plan& plan);
+
+}  // namespace takt::graph

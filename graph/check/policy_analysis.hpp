@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which analysis answers for which policy.
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "rt/sched/analysis/task_set.hpp"
+#include "rt/sched/plan.hpp"
+
+namespace takt::graph {
+
+/// infeasible: no scheduler could, or an exact analysis found a legal pattern of arrivals that misses.
+enum class Answer : uint8_t { admitted, infeasible, not_proven };
+std::string_view to_string(Answer answer);
+
+struct SetAnswer {
+  Answer answer = Answer::not_proven;
+  std::string by;   ///< the analysis that decided
+  std::string why;  ///< one sentence if not admitted
+  /// By task, from the planned release, ticks; nothing where none was found. Valid if admitted.
+  std::vector<std::optional<analysis::Ticks>> response;
+};
+
+/// deadline: global EDF, or exact EDF on one core. fixed: exact response times per core; tasks carry core and priority.
+/// cooperative: non-preemptive EDF of one worker per core.
+SetAnswer analyse_set(const analysis::TaskSet& set, Policy policy);
+
+}  // namespace takt::graph

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "graph/command/doctor_command.hpp"
+
+#include <cstdio>
+
+#include "graph/command/doctor_text.hpp"
+#include "graph/command/machine_file.hpp"
+#include "graph/command/prepare.hpp"
+#include "rt/machine/checks.hpp"
+#include "rt/machine/measure.hpp"
+
+namespace takt::command {
+namespace {
+
+int run_doctor(const DoctorOptions& options) {
+  const std::filesystem::path file = machine_file();
+  if (options.measure && file.empty())
+    return refuse("--measure: no place for the figures; set TAKT_MACHINE to a file, or HOME", kBadInput);
+  // Before half a minute of measuring.
+  if (const std::string why = options.measure ? cannot_write(file) : ""; !why.empty())
+    return refuse(file.string() + ": " + why + "; set TAKT_MACHINE to a file that can be written", kDeviceOrSystem);
+  const machine::SystemFacts facts;
+  const auto identity = machine::Identity::of(facts);
+  const auto findings = machine::examine(facts, machine::try_machine());
+  auto json = doctor_json(identity, findings);
+  if (!options.json) std::fputs(doctor_text(identity, findings).c_str(), stdout);
+  std::string refused;
+  if (options.measure) {
+    std::fflush(stdout);
+    const auto measured = machine::measure_all(
+        [](const std::string& what) { std::fprintf(stderr, "takt doctor: measuring %s\n", what.c_str()); });
+    const auto figures = measured_json(identity, utc_now(), measured);
+    json["measured"] = figures;
+    refused = write_whole(file, figures.dump(2) + "\n");
+    if (!options.json) std::printf("\n%s", measured_text(measured).c_str());
+    if (!options.json && refused.empty()) std::printf("  written to %s for `takt check`\n", file.c_str());
+  }
+  if (options.json) std::printf("%s\n", json.dump(2).c_str());
+  if (refused.empty()) return kOk;
+  return refuse(file.string() + ": " + refused + "; set TAKT_MACHINE to a file that can be written", kDeviceOrSystem);
+}
+
+}  // namespace
+
+std::string lacks_text(Policy policy, bool over_iceoryx) {
+  const machine::SystemFacts facts;
+  return findings_text(machine::lacking(machine::examine(facts, machine::try_machine()), policy, over_iceoryx));
+}
+
+void add_doctor(CLI::App& app, DoctorOptions& o, int& exit_code) {
+  CLI::App* doctor = app.add_subcommand("doctor", "tries what Takt asks of this machine, and says what to change");
+  doctor->add_flag("--measure", o.measure, "measures what the checks of a schedule charge (about 25 s)");
+  doctor->add_flag("--json", o.json, "prints the result as JSON");
+  doctor->callback([&] { exit_code = run_doctor(o); });
+}
+
+}  // namespace takt::command

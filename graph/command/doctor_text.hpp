@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "rt/machine/finding.hpp"
+#include "rt/machine/identity.hpp"
+
+namespace takt::command {
+
+/// The findings for people, at most 80 columns wide but for a file name that is longer itself. A command that is longer
+/// than a line goes on behind a backslash, so that it can be copied as it stands.
+std::string doctor_text(const machine::Identity& machine, const std::vector<machine::Finding>& findings);
+/// The findings alone, each with its fixes, as doctor_text() shows them.
+std::string findings_text(const std::vector<machine::Finding>& findings);
+
+/// {"machine", "checks": [{"group", "name", "status", "found", "meaning", "fixes": [{"where", "text"}]}], "counts"}.
+nlohmann::ordered_json doctor_json(const machine::Identity& machine, const std::vector<machine::Finding>& findings);
+nlohmann::ordered_json to_json(const machine::Identity& machine);
+
+}  // namespace takt::command

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+// What `takt doctor --measure` leaves for `takt check`: the figures of this machine, as a file of the user.
+#pragma once
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "rt/machine/identity.hpp"
+#include "rt/machine/measure.hpp"
+
+namespace takt::command {
+
+/// $TAKT_MACHINE, else $XDG_CACHE_HOME/takt/machine.json, else ~/.cache/takt/machine.json; an unset or empty variable
+/// is passed over. Empty if none of them is set.
+std::filesystem::path machine_file(const char* takt_machine, const char* cache_home, const char* home);
+/// The same from the environment of this process.
+std::filesystem::path machine_file();
+
+/// {"machine", "measured_at", "policy", "release_us", "switch_us", "publish_us", "take_us", "per_mb_us",
+///  "enforcement_us", "tick_us", "deadline_bandwidth", "details": {...}}. The figures to be charged are plain numbers:
+/// 99th percentiles of release, switch, publish and take (those of 128 bytes, the dearer of the transports measured);
+/// per_mb_us what publish and take together grow by with each megabyte; enforcement_us the largest overrun seen of a
+/// SCHED_DEADLINE reservation. a key is
+/// absent where these rights did not allow to measure it. `details` has medians, tails and samples.
+nlohmann::ordered_json measured_json(const machine::Identity& machine, const std::string& measured_at,
+                                     const machine::Measured& measured);
+/// The same for people.
+std::string measured_text(const machine::Measured& measured);
+
+/// Makes the folder of the file; "" or why the file cannot be written there.
+std::string cannot_write(const std::filesystem::path& file);
+/// Replaces the file as a whole, making its folder; "" or why not.
+std::string write_whole(const std::filesystem::path& file, const std::string& text);
+
+/// "2026-11-21T22:45:00Z".
+std::string utc_now();
+
+}  // namespace takt::command

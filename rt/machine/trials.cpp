@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "rt/machine/trials.hpp"
+
+#include <fcntl.h>
+#include <sched.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/statvfs.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <ctime>
+
+#include "rt/machine/child.hpp"
+#include "rt/machine/facts.hpp"
+#include "rt/machine/parse.hpp"
+#include "rt/sched/grant.hpp"
+#include "rt/shm/transport_error.hpp"
+#include "rt/supervise/private_mounts.hpp"
+
+namespace takt::machine {
+namespace {
+
+constexpr int64_t kMs = 1'000'000;
+constexpr size_t kMore = 64 << 20;
+constexpr const char* kShm = "/dev/shm";
+constexpr const char* kLatencyFile = "/dev/cpu_dma_latency";
+
+int64_t monotonic_ns(clockid_t clock) {
+  timespec now{};
+  clock_gettime(clock, &now);
+  return int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
+}
+
+PolicyTrial try_policy(Policy policy) {
+  Reservation wanted;
+  wanted.policy = policy;
+  wanted.priority = 50;
+  wanted.runtime_ns = kMs;
+  wanted.deadline_ns = wanted.period_ns = 10 * kMs;
+  const Grant grant = apply(wanted);
+  PolicyTrial trial;
+  trial.answered = true;
+  trial.error = grant.error;
+  trial.verified = grant.policy == policy && grant.verified;
+  trial.priority = grant.priority;
+  trial.runtime_ns = static_cast<int64_t>(grant.runtime_ms * 1e6);
+  trial.period_ns = policy == Policy::deadline ? wanted.period_ns : 0;
+  return trial;
+}
+
+LockTrial try_lock() {
+  LockTrial trial;
+  trial.answered = true;
+  rlimit limit{};
+  getrlimit(RLIMIT_MEMLOCK, &limit);
+  trial.limit_kb = limit.rlim_cur == RLIM_INFINITY ? -1 : static_cast<int64_t>(limit.rlim_cur / 1024);
+  if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0) trial.error = errno;
+  const std::string status = SystemFacts().text("/proc/self/status").value_or("");
+  trial.locked_kb = parse_number(line_value(status, "VmLck")).value_or(0);
+  trial.size_kb = parse_number(line_value(status, "VmSize")).value_or(0);
+  if (trial.error == 0) {
+    void* more = mmap(nullptr, kMore, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    trial.more_error = more == MAP_FAILED ? errno : 0;
+  }
+  return trial;
+}
+
+LatencyTrial try_latency() {
+  LatencyTrial trial;
+  trial.answered = true;
+  // As a run does it: opened for writing only.
+  const int file = open(kLatencyFile, O_WRONLY | O_CLOEXEC);
+  const int32_t wanted_us = 0;
+  if (file < 0 || write(file, &wanted_us, sizeof wanted_us) != sizeof wanted_us) {
+    trial.error = errno;
+    return trial;
+  }
+  const int reader = open(kLatencyFile, O_RDONLY | O_CLOEXEC);
+  int32_t effective_us = 0;
+  if (reader >= 0 && read(reader, &effective_us, sizeof effective_us) == sizeof effective_us)
+    trial.effective_us = effective_us;
+  return trial;
+}
+
+SlackTrial try_slack() {
+  SlackTrial trial;
+  trial.answered = true;
+  if (prctl(PR_SET_TIMERSLACK, 1UL, 0UL, 0UL, 0UL) != 0) trial.error = errno;
+  trial.slack_ns = prctl(PR_GET_TIMERSLACK, 0UL, 0UL, 0UL, 0UL);
+  return trial;
+}
+
+int make_and_map(size_t bytes) {
+  const int file = open(kShm, O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
+  if (file < 0) return errno;
+  if (const int error = posix_fallocate(file, 0, static_cast<off_t>(bytes)); error != 0) return error;
+  auto* memory = static_cast<volatile char*>(mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_SHARED, file, 0));
+  if (memory == MAP_FAILED) return errno;
+  memory[0] = 1;
+  return 0;
+}
+
+SharedMemoryTrial try_shared_memory() {
+  SharedMemoryTrial trial;
+  trial.answered = true;
+  struct statvfs room {};
+  if (statvfs(kShm, &room) != 0) {
+    trial.error = errno;
+    return trial;
+  }
+  trial.size_mb = static_cast<int64_t>(uint64_t{room.f_blocks} * room.f_frsize / 1'000'000);
+  trial.free_mb = static_cast<int64_t>(uint64_t{room.f_bavail} * room.f_frsize / 1'000'000);
+  trial.error = make_and_map(1 << 20);
+  return trial;
+}
+
+TickTrial try_tick() {
+  TickTrial trial;
+  timespec resolution{};
+  trial.answered = clock_getres(CLOCK_MONOTONIC_COARSE, &resolution) == 0;
+  trial.tick_ns = resolution.tv_nsec;
+  const int64_t end = monotonic_ns(CLOCK_MONOTONIC) + 40 * kMs;
+  int64_t last = monotonic_ns(CLOCK_MONOTONIC_COARSE);
+  while (monotonic_ns(CLOCK_MONOTONIC) < end) {
+    const int64_t coarse = monotonic_ns(CLOCK_MONOTONIC_COARSE);
+    if (coarse != last && (trial.step_ns == 0 || coarse - last < trial.step_ns)) trial.step_ns = coarse - last;
+    last = coarse;
+  }
+  return trial;
+}
+
+DaemonTrial try_daemon() {
+  constexpr uint64_t kDaemonBytes = 70'000'000;  // what iceoryx takes for itself, without any pool
+  DaemonTrial trial;
+  trial.answered = true;
+  try {
+    const DaemonClaim claim(IceoryxPlaces::of_this_machine());
+    iceoryx_preflight(IceoryxPlaces::of_this_machine(), kDaemonBytes);
+  } catch (const TransportError& refused) {
+    std::strncpy(trial.refused.data(), refused.what(), trial.refused.size() - 1);
+    trial.private_room = enter_private_mounts().empty();
+  }
+  return trial;
+}
+
+template <class Trial>
+Trial tried(Trial (*body)()) {
+  return in_child<Trial>(body).value_or(Trial{});
+}
+
+}  // namespace
+
+Trials try_machine() {
+  Trials trials;
+  trials.deadline = tried<PolicyTrial>([] { return try_policy(Policy::deadline); });
+  trials.fixed = tried<PolicyTrial>([] { return try_policy(Policy::fixed); });
+  trials.lock = tried(try_lock);
+  trials.latency = tried(try_latency);
+  trials.slack = tried(try_slack);
+  trials.shared_memory = tried(try_shared_memory);
+  trials.tick = tried(try_tick);
+  trials.daemon = tried(try_daemon);
+  return trials;
+}
+
+}  // namespace takt::machine

@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "rt/sched/lane_tasks.hpp"
+
+#include <algorithm>
+#include <numeric>
+#include <optional>
+
+#include "rt/node.hpp"
+#include "rt/sched/analysis/integers.hpp"
+#include "rt/sched/lane.hpp"
+
+namespace takt {
+namespace {
+
+using analysis::Overheads;
+using analysis::Ticks;
+using analysis::Wide;
+
+constexpr Wide kSecond = 1'000'000'000;
+
+/// Ticks to a nanosecond that make every period whole; 1 where that is too fine: periods are then rounded down.
+int64_t ticks_per_ns(const Plan& plan, const std::vector<std::vector<size_t>>& lanes) {
+  constexpr int64_t kFinest = 1'000'000;  // times up to 11 days fit
+  int64_t ticks = 1;
+  for (const auto& lane : lanes) {
+    const Rate& rate = *plan.tasks[lane.front()].rate;
+    const auto whole = static_cast<int64_t>(Wide{rate.denominator} * kSecond % rate.numerator);
+    const int64_t needed = rate.numerator / std::gcd(whole, rate.numerator);
+    ticks = std::lcm(ticks, needed);
+    if (ticks > kFinest) return 1;
+  }
+  return ticks;
+}
+
+int64_t port_bytes(const PortPlan& port) {
+  return port.type == nullptr ? 0 : static_cast<int64_t>(port.type->bytes(port.capacity));
+}
+
+/// What the runtime adds to one job of a task.
+int64_t transport_ns(const Plan& plan, const TaskPlan& task, const Overheads& o) {
+  int64_t bytes = 0;
+  for (const EdgePlan& edge : task.edges) bytes += port_bytes(plan.ports[edge.port]) * edge.depth;
+  for (const size_t port : task.ports) bytes += port_bytes(plan.ports[port]);
+  return o.take_ns * static_cast<int64_t>(task.edges.size()) + o.publish_ns * static_cast<int64_t>(task.ports.size()) +
+         static_cast<int64_t>(static_cast<double>(o.per_mb_ns) * static_cast<double>(bytes) * 1e-6);
+}
+
+/// What a member costs: a quarter of its deadline where no budget is stated, as the executor reserves.
+int64_t member_ns(const Plan& plan, size_t t, const Overheads& o) {
+  return lane_budget_ns(plan, {t}) + transport_ns(plan, plan.tasks[t], o);
+}
+
+/// Longest occupation of the thread from the start of member `first` to the publication of member `last`, without
+/// what others take from it. Members in between run too; whoever follows a `let` output waits for its instant.
+int64_t occupied_ns(const Plan& plan, const std::vector<size_t>& lane, size_t first, size_t last, const Overheads& o) {
+  int64_t at = 0;
+  std::vector<int64_t> visible(lane.size(), 0);
+  for (size_t m = first; m <= last; ++m) {
+    const TaskPlan& task = plan.tasks[lane[m]];
+    const auto producer = std::find(lane.begin(), lane.end(), task.on_task);
+    const auto p = static_cast<size_t>(producer - lane.begin());
+    const int64_t release = m > 0 && p >= first && p < m ? visible[p] : 0;
+    at = std::max(at, release) + member_ns(plan, lane[m], o);
+    visible[m] = task.publish == PublishAt::let ? std::max(at, release + task.deadline_ns) : at;
+  }
+  return at;
+}
+
+/// Response-time analysis (Joseph and Pandya 1986) of the last task, all others having the higher priority.
+bool last_fits(const std::vector<analysis::TimedTask>& tasks) {
+  const analysis::TimedTask& task = tasks.back();
+  for (Ticks response = task.budget; response <= task.deadline;) {
+    Ticks next = task.budget;
+    for (size_t i = 0; i + 1 < tasks.size(); ++i)
+      next += (response + tasks[i].period - 1) / tasks[i].period * tasks[i].budget;
+    if (next == response) return true;
+    response = next;
+  }
+  return false;
+}
+
+/// All lanes under `fixed`, not placed yet and without overheads or offsets.
+LaneTasks unplaced(const Plan& plan, const Overheads& o) {
+  LaneTasks result;
+  result.lanes = lane_members(plan);
+  result.set.cores = static_cast<int>(std::max<size_t>(plan.cores.size(), 1));
+  const int64_t ticks = result.set.ticks_per_ns = ticks_per_ns(plan, result.lanes);
+  for (const auto& lane : result.lanes) {
+    const TaskPlan& head = plan.tasks[lane.front()];
+    analysis::TimedTask task;
+    task.name = head.name;
+    task.period = static_cast<Ticks>(Wide{head.rate->denominator} * kSecond * ticks / head.rate->numerator);
+    task.deadline = std::min(task.period, lane_span_ns(plan, lane) * ticks);
+    task.budget = prefix_ns(plan, lane, lane.size() - 1, o) * ticks;
+    task.offset = head.offset_ns * ticks;
+    result.set.tasks.push_back(std::move(task));
+  }
+  return result;
+}
+
+}  // namespace
+
+LaneTasks lane_tasks(const Plan& plan, Policy policy, const Overheads& overheads) {
+  LaneTasks result = unplaced(plan, overheads);
+  if (policy == Policy::fixed) {
+    const Placement placement = place_fixed(plan);
+    for (size_t i = 0; i < result.lanes.size(); ++i) {
+      result.set.tasks[i].core = std::max(placement.core[i], 0);
+      result.set.tasks[i].priority = placement.priority[i];
+    }
+  }
+  if (policy == Policy::deadline) {
+    const std::vector<Reservation> reserved = reservations(plan, policy);
+    for (size_t i = 0; i < result.lanes.size(); ++i)
+      result.set.tasks[i].deadline =
+          std::min(result.set.tasks[i].deadline, reserved[i].deadline_ns * result.set.ticks_per_ns);
+  }
+  return result;
+}
+
+int64_t prefix_ns(const Plan& plan, const std::vector<size_t>& lane, size_t position, const Overheads& overheads) {
+  return occupied_ns(plan, lane, 0, position, overheads) + overheads.release_ns + 2 * overheads.switch_ns;
+}
+
+int64_t segment_ns(const Plan& plan, const std::vector<size_t>& lane, size_t position, const Overheads& overheads) {
+  if (position == 0) return prefix_ns(plan, lane, 0, overheads);
+  const auto producer = std::find(lane.begin(), lane.end(), plan.tasks[lane[position]].on_task);
+  return occupied_ns(plan, lane, static_cast<size_t>(producer - lane.begin()) + 1, position, overheads);
+}
+
+Placement place_fixed(const Plan& plan) {
+  const LaneTasks lanes = unplaced(plan, {});
+  const size_t count = lanes.lanes.size(), cores = std::max<size_t>(plan.cores.size(), 1);
+  std::vector<size_t> order(count);
+  std::iota(order.begin(), order.end(), size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](size_t a, size_t b) { return lanes.set.tasks[a].deadline < lanes.set.tasks[b].deadline; });
+  Placement result{std::vector<int>(count, -1), std::vector<int>(count, 1)};
+  std::vector<std::vector<analysis::TimedTask>> placed(cores);
+  std::vector<double> load(cores, 0.0);
+  for (size_t rank = 0; rank < count; ++rank) {
+    analysis::TimedTask task = lanes.set.tasks[order[rank]];
+    task.priority = std::max(1, kHighestPriority - static_cast<int>(rank));
+    task.offset = 0;  // wherever the phases lie
+    std::optional<size_t> chosen;
+    for (size_t core = 0; core < cores; ++core) {
+      if (chosen && load[core] >= load[*chosen]) continue;
+      placed[core].push_back(task);
+      if (last_fits(placed[core])) chosen = core;
+      placed[core].pop_back();
+    }
+    if (!chosen) chosen = static_cast<size_t>(std::min_element(load.begin(), load.end()) - load.begin());
+    placed[*chosen].push_back(task);
+    load[*chosen] += static_cast<double>(task.budget) / static_cast<double>(task.period);
+    result.priority[order[rank]] = task.priority;
+    if (!plan.cores.empty()) result.core[order[rank]] = static_cast<int>(*chosen);
+  }
+  return result;
+}
+
+std::vector<Reservation> reservations(const Plan& plan, Policy policy) {
+  const std::vector<std::vector<size_t>> lanes = lane_members(plan);
+  std::vector<Reservation> wanted(lanes.size());
+  const Placement placement = policy == Policy::fixed ? place_fixed(plan) : Placement{};
+  for (size_t i = 0; i < lanes.size(); ++i) {
+    const int64_t budget_ns = lane_budget_ns(plan, lanes[i]);
+    if (policy == Policy::deadline)
+      wanted[i] =
+          deadline_reservation(budget_ns, lane_span_ns(plan, lanes[i]), plan.tasks[lanes[i].front()].rate->period_ns());
+    wanted[i].policy = policy;
+    if (policy != Policy::fixed) continue;
+    wanted[i].priority = placement.priority[i];
+    wanted[i].core = placement.core[i] < 0 ? -1 : plan.cores[static_cast<size_t>(placement.core[i])];
+  }
+  return wanted;
+}
+
+}  // namespace takt

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+// The lanes of a plan as the tasks that the analyses look at, and what each lane asks of the kernel. The executor and
+// the admission use the same functions, so that what was proven is what runs.
+#pragma once
+#include <vector>
+
+#include "rt/sched/analysis/overheads.hpp"
+#include "rt/sched/analysis/task_set.hpp"
+#include "rt/sched/grant.hpp"
+#include "rt/sched/plan.hpp"
+
+namespace takt {
+
+/// Of the lane with the shortest span under `fixed`. Below the kernel's own interrupt threads (50 by default) nothing
+/// is gained.
+inline constexpr int kHighestPriority = 80;
+
+struct LaneTasks {
+  std::vector<std::vector<size_t>> lanes;  ///< as lane_members() gives them
+  analysis::TaskSet set;                   ///< one task per lane in the same order, with the name of its head
+};
+
+/// One task per lane: the head's rate and offset, the lane's span as deadline, the sum of the members' budgets and the
+/// overheads of their jobs. A lane that waits within (`publish: let` before a follower) occupies its thread meanwhile,
+/// so the wait counts as budget. Under `deadline` the deadline is that of the reservation. Under `fixed` every task has
+/// its core (an index into Plan::cores) and priority. Throws std::logic_error as lane_members() does.
+LaneTasks lane_tasks(const Plan& plan, Policy policy, const analysis::Overheads& overheads = {});
+
+/// Occupation of the thread, overheads included, from the lane's release to the publication of its member at
+/// `position`, without what other lanes take from it.
+int64_t prefix_ns(const Plan& plan, const std::vector<size_t>& lane, size_t position,
+                  const analysis::Overheads& overheads = {});
+/// The same from the publication that releases this member; for a head from its release.
+int64_t segment_ns(const Plan& plan, const std::vector<size_t>& lane, size_t position,
+                   const analysis::Overheads& overheads = {});
+
+/// Core (index into Plan::cores, -1 without any) and SCHED_FIFO priority of each lane under `fixed`. Deadline
+/// monotonic: the shorter a lane's span, the higher its priority. Each lane in that order goes to the core with the
+/// least work among those where response-time analysis still finds it and all before it in time; if there is none, to
+/// the one with the least work. Depends on the plan alone, so that every process of a run comes to the same.
+struct Placement {
+  std::vector<int> core, priority;
+};
+Placement place_fixed(const Plan& plan);
+
+/// What each lane asks of the kernel under that policy, in the order of lane_members().
+std::vector<Reservation> reservations(const Plan& plan, Policy policy);
+
+}  // namespace takt

@@ -1,0 +1,271 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "graph/check/admission.hpp"
+
+#include <doctest/doctest.h>
+
+#include <random>
+
+#include "graph/check/check.hpp"
+#include "graph/check/margins.hpp"
+#include "rt/sched/lane_tasks.hpp"
+
+using namespace takt;
+using namespace takt::graph;
+
+namespace {
+
+constexpr int64_t kMs = 1'000'000;
+
+TaskPlan task(std::string name, int64_t hz, double budget_ms, double deadline_ms,
+              Criticality criticality = Criticality::high) {
+  TaskPlan plan;
+  plan.name = std::move(name);
+  plan.rate = Rate{hz, 1};
+  plan.budget_ns = static_cast<int64_t>(budget_ms * 1e6);
+  plan.deadline_ns = static_cast<int64_t>(deadline_ms * 1e6);
+  plan.criticality = criticality;
+  return plan;
+}
+
+Plan plan_of(Policy policy, std::vector<int> cores, std::vector<TaskPlan> tasks) {
+  Plan plan;
+  plan.policy = policy;
+  plan.cores = std::move(cores);
+  plan.tasks = std::move(tasks);
+  return plan;
+}
+
+/// `follower` runs when `producer` has published.
+void follow(Plan& plan, size_t follower, size_t producer) {
+  plan.tasks[follower].rate.reset();
+  plan.tasks[follower].on_task = producer;
+}
+
+Answer answer(const Plan& plan, const analysis::Overheads& o = {}) { return admit(plan, o).answer; }
+
+bool says(const Admission& admission, const std::string& words) {
+  for (const auto& reason : admission.reasons)
+    if (reason.find(words) != std::string::npos) return true;
+  return false;
+}
+
+Plan random_plan(std::mt19937& random) {
+  const auto uniform = [&](int low, int high) { return std::uniform_int_distribution(low, high)(random); };
+  constexpr int kRates[] = {15, 10, 7, 5, 2};
+  Plan plan = plan_of(static_cast<Policy>(uniform(0, 1)), {0, 1}, {});
+  for (int i = 0, n = uniform(3, 8); i < n; ++i) {
+    const int hz = kRates[uniform(0, 4)];
+    const double period = 1000.0 / hz, budget = period * uniform(1, 30) / 100;
+    plan.tasks.push_back(task("n" + std::to_string(i), hz, budget, budget + (period - budget) * uniform(1, 10) / 10,
+                              uniform(0, 1) == 0 ? Criticality::low : Criticality::high));
+    plan.tasks.back().offset_ns = uniform(0, 40) * kMs;
+  }
+  return plan;
+}
+
+}  // namespace
+
+TEST_CASE("admission: each policy has its analysis") {
+  const std::vector<TaskPlan> tasks{task("a", 10, 20, 50), task("b", 10, 20, 60), task("c", 5, 50, 200)};
+  for (const Policy policy : {Policy::deadline, Policy::fixed, Policy::cooperative}) {
+    const Admission one = admit(plan_of(policy, {0}, tasks), {});
+    CAPTURE(to_string(policy));
+    CAPTURE(one.by);
+    // A job of c that has started keeps a waiting for up to 50 ms where nothing is preempted.
+    CHECK(one.answer == (policy == Policy::cooperative ? Answer::infeasible : Answer::admitted));
+  }
+  const Admission fixed = admit(plan_of(Policy::fixed, {0}, tasks), {});
+  CHECK(fixed.nodes[0].response_ns == 20 * kMs);
+  CHECK(fixed.nodes[1].response_ns == 40 * kMs);
+  CHECK(fixed.nodes[2].response_ns == 90 * kMs);
+}
+
+TEST_CASE("admission: under deadline a job has the deadline of its reservation") {
+  Plan plan = plan_of(Policy::deadline, {0}, {task("a", 10, 95, 100)});
+  CHECK(answer(plan) == Answer::admitted);
+  plan.tasks[0].budget_ns = 96 * kMs;  // the reservation ends at 95
+  CHECK(answer(plan) == Answer::infeasible);
+}
+
+TEST_CASE("admission: the kernel's own limit counts budgets over deadlines") {
+  Plan plan = plan_of(Policy::deadline, {0, 1}, {task("a", 2, 50, 100), task("b", 2, 60, 100), task("c", 2, 70, 100)});
+  CHECK(answer(plan) == Answer::not_proven);
+  plan.tasks[2].budget_ns = 30 * kMs;
+  CHECK(answer(plan) == Answer::admitted);
+  analysis::Overheads kernel;
+  kernel.deadline_bandwidth = 1.40;
+  CHECK(answer(plan, kernel) == Answer::admitted);
+  kernel.deadline_bandwidth = 1.39;
+  CHECK(says(admit(plan, kernel), "the reservations add up to 1.400 cores"));
+}
+
+TEST_CASE("admission: overheads are charged to every job") {
+  Plan plan = plan_of(Policy::fixed, {0}, {task("a", 10, 99.98, 100)});
+  CHECK(answer(plan) == Answer::admitted);
+  analysis::Overheads o;
+  o.release_ns = 10'000;
+  o.switch_ns = 5'000;
+  CHECK(answer(plan, o) == Answer::admitted);
+  o.switch_ns = 5'001;
+  CHECK(answer(plan, o) == Answer::infeasible);
+}
+
+TEST_CASE("admission: members of a lane have their own deadlines") {
+  Plan plan =
+      plan_of(Policy::fixed, {0}, {task("head", 10, 10, 20), task("middle", 10, 20, 30), task("tail", 10, 5, 25)});
+  follow(plan, 1, 0);
+  follow(plan, 2, 0);  // runs after `middle`, on the same thread
+  const Admission found = admit(plan, {});
+  CHECK(found.answer == Answer::admitted);
+  CHECK(found.nodes[0].response_ns == 10 * kMs);
+  CHECK(found.nodes[1].response_ns == 20 * kMs);
+  CHECK(found.nodes[1].finish_ns == 30 * kMs);
+  CHECK(found.nodes[2].response_ns == 25 * kMs);
+  CHECK(found.nodes[2].finish_ns == 35 * kMs);
+  plan.tasks[2].deadline_ns = 24 * kMs;
+  CHECK(says(admit(plan, {}), "tail: its deadline of 24 ms is not proven"));
+}
+
+TEST_CASE("admission: a lane that waits for an instant occupies its thread meanwhile") {
+  Plan plan =
+      plan_of(Policy::fixed, {0}, {task("head", 10, 10, 40), task("tail", 10, 10, 30), task("other", 10, 55, 100)});
+  follow(plan, 1, 0);
+  CHECK(answer(plan) == Answer::admitted);
+  plan.tasks[0].publish = PublishAt::let;  // tail begins at 40: 40 + 10 + 55 do not fit
+  CHECK(answer(plan) == Answer::infeasible);
+}
+
+TEST_CASE("admission: a low node that is stopped late must not make a high one late") {
+  Plan plan = plan_of(Policy::fixed, {0}, {task("noise", 10, 5, 10, Criticality::low), task("guard", 10, 5, 20)});
+  analysis::Overheads o;
+  o.enforcement_ns = 10 * kMs;
+  CHECK(answer(plan, o) == Answer::admitted);
+  o.enforcement_ns = 11 * kMs;
+  CHECK(says(admit(plan, o), "running on to 11.0 ms over its budget"));
+  plan.tasks[0].criticality = Criticality::high;  // nobody to be guarded against
+  CHECK(answer(plan, o) == Answer::admitted);
+  plan.tasks[0].criticality = Criticality::low;
+  plan.policy = Policy::deadline;
+  plan.cores = {0, 1};
+  CHECK(answer(plan, o) == Answer::admitted);
+  o.enforcement_ns = 40 * kMs;
+  CHECK(answer(plan, o) == Answer::not_proven);
+}
+
+TEST_CASE("admission: fixed priorities are spread over the cores so that each fits") {
+  // By load alone the third would go beside the first.
+  const Plan plan = plan_of(Policy::fixed, {3, 5}, {task("a", 10, 5, 10), task("b", 10, 6, 11), task("c", 10, 6, 12)});
+  CHECK(answer(plan) != Answer::admitted);  // three short deadlines on two cores
+  const Plan fits = plan_of(Policy::fixed, {3, 5},
+                            {task("a", 10, 5, 10), task("b", 10, 7, 11), task("c", 10, 3, 12), task("d", 10, 40, 100)});
+  CHECK(answer(fits) == Answer::admitted);
+  const std::vector<Reservation> asked = reservations(fits, Policy::fixed);
+  CHECK(asked[0].core == 3);
+  CHECK(asked[1].core == 5);
+  CHECK(asked[0].priority > asked[1].priority);
+}
+
+TEST_CASE("admission: one percent below the margin is admitted, one above is refused") {
+  std::mt19937 random(5);
+  int seen = 0;
+  for (int round = 0; round < 60; ++round) {
+    CAPTURE(round);
+    const Plan plan = random_plan(random);
+    analysis::Overheads o;
+    o.enforcement_ns = 4 * kMs;
+    if (answer(plan, o) != Answer::admitted) continue;
+    const std::vector<int64_t> found = margins(plan, o);
+    for (size_t t = 0; t < plan.tasks.size(); ++t) {
+      CAPTURE(t);
+      Plan changed = plan;
+      changed.tasks[t].budget_ns = plan.tasks[t].budget_ns + found[t] * 99 / 100;
+      CHECK(answer(changed, o) == Answer::admitted);
+      changed.tasks[t].budget_ns = plan.tasks[t].budget_ns + found[t] * 101 / 100 + 2'000;
+      CHECK(answer(changed, o) != Answer::admitted);
+      ++seen;
+    }
+  }
+  CHECK(seen > 100);
+}
+
+TEST_CASE("admission: the smallest change makes it fit, and is the smallest of its kind") {
+  std::mt19937 random(6);
+  int seen = 0;
+  for (int round = 0; round < 60; ++round) {
+    CAPTURE(round);
+    const Plan plan = random_plan(random);
+    if (answer(plan) == Answer::admitted) continue;
+    const auto change = smallest_change(plan, {});
+    if (!change) continue;
+    ++seen;
+    CAPTURE(to_string(*change, plan));
+    const auto with = [&](double share) {  // `share` of the change
+      Plan changed = plan;
+      const double value = change->from + share * (change->to - change->from);
+      switch (change->what) {
+        case Change::What::budget: changed.tasks[change->task].budget_ns = static_cast<int64_t>(value * 1e6); break;
+        case Change::What::deadline:
+          changed.tasks[change->task].deadline_ns = static_cast<int64_t>(value * 1e6 + 0.5);
+          break;
+        case Change::What::rate:
+          changed.tasks[change->task].rate = Rate{static_cast<int64_t>(value * 10 + 0.5), 10};
+          break;
+        case Change::What::cores: changed.cores.resize(static_cast<size_t>(value), 7); break;
+      }
+      return answer(changed);
+    };
+    CHECK(with(1) == Answer::admitted);
+    if (change->what == Change::What::budget || change->what == Change::What::deadline)
+      CHECK(with(0.99) != Answer::admitted);
+  }
+  CHECK(seen > 10);
+}
+
+TEST_CASE("check: modes are checked as well, without what they leave out") {
+  Plan plan = plan_of(Policy::deadline, {0}, {task("a", 10, 20, 50), task("b", 10, 20, 60), task("c", 10, 30, 90)});
+  follow(plan, 1, 0);
+  CHECK(without(plan, {"a"}).tasks.size() == 1);
+  CHECK(without(plan, {"c"}).tasks[1].on_task == 0);
+  GraphSpec graph;
+  graph.modes = {{"short", {"c"}, {}}};
+  CheckOptions options;
+  options.margins = true;
+  const CheckResult result = check(graph, plan, options);
+  REQUIRE(result.modes.size() == 2);
+  CHECK(result.modes[1].tasks == std::vector<std::string>{"a", "b"});
+  CHECK(result.modes[1].margins_ns[0] > result.modes[0].margins_ns[0]);
+  CHECK(result.json["modes"][1]["name"] == "short");
+}
+
+TEST_CASE("check: deadline on some of the cores needs an exclusive cpuset") {
+  const Plan plan = plan_of(Policy::deadline, {0}, {task("a", 10, 20, 50)});
+  CheckOptions options;
+  CHECK(check({}, plan, options).admitted);
+  options.machine.online = {0, 1};
+  const CheckResult refused = check({}, plan, options);
+  CHECK(refused.verdict == Verdict::invalid);
+  CHECK(!refused.admitted);
+  CHECK(refused.text.find("exclusive cpuset") != std::string::npos);
+  options.machine.exclusive = {0};
+  CHECK(check({}, plan, options).admitted);
+  options.machine.exclusive.clear();
+  options.real_time = false;
+  CHECK(check({}, plan, options).admitted);
+  options.real_time = true;
+  Plan fixed = plan;
+  fixed.policy = Policy::fixed;
+  CHECK(check({}, fixed, options).admitted);
+}
+
+TEST_CASE("check: lines stay within 80 columns, and every node has its bound and margin") {
+  CheckOptions options;
+  options.margins = true;
+  const CheckResult result =
+      check({}, plan_of(Policy::fixed, {0}, {task("object_detection", 10, 20.125, 50)}), options);
+  size_t begin = 0;
+  for (size_t end; (end = result.text.find('\n', begin)) != std::string::npos; begin = end + 1)
+    CHECK(end - begin <= 80);
+  const auto& node = result.json["nodes"][0];
+  CHECK(node["response_ms"] == doctest::Approx(20.125));
+  CHECK(node["margin_ms"] == doctest::Approx(29.875).epsilon(0.001));
+}

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "graph/check/check_machine.hpp"
+
+#include <doctest/doctest.h>
+
+#include "tests/unit/rt/fake_facts.hpp"
+
+using namespace takt;
+using namespace takt::graph;
+
+namespace {
+
+test::FakeFacts machine_six() {
+  test::FakeFacts facts;
+  facts.files["/proc/cpuinfo"] = "processor\t: 0\nmodel name\t: Six\n";
+  facts.files["/proc/sys/kernel/osrelease"] = "6.18.1\n";
+  facts.files["/proc/sys/kernel/version"] = "#1 SMP\n";
+  facts.files["/proc/sys/kernel/sched_rt_runtime_us"] = "950000\n";
+  facts.files["/proc/sys/kernel/sched_rt_period_us"] = "1000000\n";
+  return facts;
+}
+
+constexpr const char* kMeasured =
+    R"({"machine": {"cpu": "Six", "cores": 2, "kernel": "6.18.1 #1 SMP"}, "measured_at": "2026-11-21T22:45:00Z",
+        "release_us": 60.5, "switch_us": 3, "publish_us": 1, "take_us": 0.5, "per_mb_us": 10,
+        "enforcement_us": null, "deadline_bandwidth": 1.8})";
+
+}  // namespace
+
+TEST_CASE("overheads: assumed where nobody measured, with the bandwidth of the kernel's settings") {
+  test::FakeFacts facts = machine_six();
+  const CheckMachine found = check_machine(facts, "/m.json");
+  CHECK(!found.measured);
+  CHECK(found.warnings.empty());
+  CHECK(found.overheads_from.find("assumed") != std::string::npos);
+  CHECK(found.overheads.deadline_bandwidth == doctest::Approx(1.8));  // 2 * (0.95 - 0.05)
+  CHECK(found.overheads.enforcement_ns == found.overheads.tick_ns);
+  facts.files["/proc/sys/kernel/osrelease"] = "6.1.0-18-amd64\n";  // before the fair server
+  CHECK(assumed_overheads(facts).deadline_bandwidth == doctest::Approx(1.9));
+}
+
+TEST_CASE("overheads: of the file, null as assumed") {
+  test::FakeFacts facts = machine_six();
+  facts.files["/m.json"] = kMeasured;
+  const CheckMachine found = check_machine(facts, "/m.json");
+  CHECK(found.measured);
+  CHECK(found.warnings.empty());
+  CHECK(found.overheads.release_ns == 60'500);
+  CHECK(found.overheads.take_ns == 500);
+  CHECK(found.overheads.enforcement_ns == assumed_overheads(facts).enforcement_ns);
+  CHECK(found.overheads_from == "overheads measured 2026-11-21T22:45:00Z");
+}
+
+TEST_CASE("overheads: measured on another machine, or not to be read, is a warning") {
+  test::FakeFacts facts = machine_six();
+  facts.files["/m.json"] = kMeasured;
+  facts.files["/proc/sys/kernel/osrelease"] = "6.19.0\n";
+  const CheckMachine elsewhere = check_machine(facts, "/m.json");
+  REQUIRE(elsewhere.warnings.size() == 1);
+  CHECK(elsewhere.warnings[0].find("measured on another machine (Six, 2 cores, Linux 6.18.1") != std::string::npos);
+  CHECK(elsewhere.overheads.switch_ns == 3'000);
+  for (const char* text :
+       {"", "[]", "{\"release_us\": 1}", "{\"machine\": 3}", R"({"machine": {"cpu": "Six", "cores": 2,
+       "kernel": "6.19.0 #1 SMP"}, "release_us": -1})"}) {
+    CAPTURE(text);
+    facts.files["/m.json"] = text;
+    const CheckMachine broken = check_machine(facts, "/m.json");
+    CHECK(!broken.measured);
+    REQUIRE(broken.warnings.size() == 1);
+    CHECK(broken.warnings[0].find("no overheads can be read") != std::string::npos);
+    CHECK(broken.overheads.release_ns == assumed_overheads(facts).release_ns);
+  }
+}
+
+TEST_CASE("exclusive cpusets of both hierarchies are seen") {
+  test::FakeFacts facts = machine_six();
+  CHECK(check_machine(facts, "").exclusive.empty());
+  facts.files["/proc/self/cgroup"] = "0::/robot\n";
+  facts.files["/proc/self/mounts"] = "cgroup2 /sys/fs/cgroup cgroup2 rw 0 0\n";
+  facts.files["/sys/fs/cgroup/robot/cpuset.cpus.partition"] = "member\n";
+  facts.files["/sys/fs/cgroup/robot/cpuset.cpus.effective"] = "1\n";
+  CHECK(check_machine(facts, "").exclusive.empty());
+  facts.files["/sys/fs/cgroup/robot/cpuset.cpus.partition"] = "root\n";
+  CHECK(check_machine(facts, "").exclusive == std::vector<int>{1});
+  facts.files["/proc/self/cgroup"] = "9:cpuset:/robot\n0::/\n";
+  facts.files["/proc/self/mounts"] = "cgroup /sys/fs/cgroup/cpuset cgroup rw,cpuset 0 0\n";
+  facts.files["/sys/fs/cgroup/cpuset/robot/cpuset.cpus"] = "0\n";
+  facts.files["/sys/fs/cgroup/cpuset/robot/cpuset.cpu_exclusive"] = "1\n";
+  facts.files["/sys/fs/cgroup/cpuset/cpuset.sched_load_balance"] = "1\n";
+  CHECK(check_machine(facts, "").exclusive.empty());
+  facts.files["/sys/fs/cgroup/cpuset/cpuset.sched_load_balance"] = "0\n";
+  CHECK(check_machine(facts, "").exclusive == std::vector<int>{0});
+}

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+// A machine made of text, for the checks.
+#pragma once
+#include <map>
+#include <string>
+#include <vector>
+
+#include "rt/machine/facts.hpp"
+
+namespace takt::test {
+
+struct FakeFacts final : machine::Facts {
+  std::map<std::string, std::string> files;
+  std::vector<int> cpus{0, 1};
+  bool root = false;
+
+  FakeFacts() { files["/sys/devices/system/cpu/online"] = "0-1\n"; }
+  std::optional<std::string> text(const std::string& path) const override {
+    const auto it = files.find(path);
+    return it == files.end() ? std::nullopt : std::optional(it->second);
+  }
+  std::vector<std::string> list(const std::string& folder) const override {
+    const std::string prefix = folder.back() == '/' ? folder : folder + "/";
+    std::vector<std::string> names;
+    for (const auto& [path, unused] : files) {
+      if (path.rfind(prefix, 0) != 0) continue;
+      const std::string name = path.substr(prefix.size(), path.find('/', prefix.size()) - prefix.size());
+      if (names.empty() || names.back() != name) names.push_back(name);
+    }
+    return names;
+  }
+  std::vector<int> allowed_cpus() const override { return cpus; }
+  bool is_root() const override { return root; }
+  std::string user() const override { return root ? "root" : "ada"; }
+  std::string program() const override { return "/opt/takt"; }
+};
+
+}  // namespace takt::test

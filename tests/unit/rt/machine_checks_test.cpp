@@ -1,0 +1,306 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <doctest/doctest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+
+#include "rt/machine/checks.hpp"
+#include "rt/machine/child.hpp"
+#include "tests/unit/rt/fake_facts.hpp"
+
+using namespace takt;
+using namespace takt::machine;
+using takt::test::FakeFacts;
+
+namespace {
+
+bool has_fix(const Finding& finding, const std::string& words) {
+  return std::any_of(finding.fixes.begin(), finding.fixes.end(),
+                     [&](const Fix& fix) { return (fix.where + ": " + fix.text).find(words) != std::string::npos; });
+}
+bool says(const Finding& finding, const std::string& words) { return finding.found.find(words) != std::string::npos; }
+
+PolicyTrial refused(int error) {
+  PolicyTrial trial;
+  trial.answered = true;
+  trial.error = error;
+  return trial;
+}
+
+}  // namespace
+
+TEST_CASE("SCHED_DEADLINE: granted, refused for each of the reasons, no answer") {
+  FakeFacts facts;
+  PolicyTrial granted;
+  granted.answered = granted.verified = true;
+  granted.runtime_ns = 1'000'000;
+  granted.period_ns = 10'000'000;
+  CHECK(check_sched_deadline(facts, granted).status == Status::ok);
+  CHECK(says(check_sched_deadline(facts, granted), "1 ms every 10 ms"));
+  granted.verified = false;
+  CHECK(check_sched_deadline(facts, granted).status == Status::warn);
+
+  const Finding no_right = check_sched_deadline(facts, refused(EPERM));
+  CHECK(no_right.status == Status::lacks);
+  CHECK(has_fix(no_right, "setcap cap_sys_nice,cap_ipc_lock+ep /opt/takt"));
+  CHECK(has_fix(no_right, "AmbientCapabilities"));
+  CHECK(has_fix(check_sched_deadline(facts, refused(EBUSY)), "sched_rt_runtime_us"));
+  facts.cpus = {1};
+  const Finding pinned = check_sched_deadline(facts, refused(EPERM));
+  CHECK(says(pinned, "only CPUs 1 of 0-1"));
+  CHECK(has_fix(pinned, "taskset"));
+  CHECK(check_sched_deadline(facts, {}).status == Status::unknown);
+}
+
+TEST_CASE("SCHED_FIFO: a control group without a real-time share is named") {
+  FakeFacts facts;
+  CHECK(has_fix(check_sched_fifo(facts, refused(EPERM)), "ada - rtprio 99"));
+  facts.files["/proc/self/cgroup"] = "3:cpu:/jobs\n";
+  facts.files["/proc/self/mounts"] = "cgroup /cg/cpu cgroup rw,cpu 0 0\n";
+  facts.files["/cg/cpu/jobs/cpu.rt_runtime_us"] = "0\n";
+  facts.files["/cg/cpu/jobs/cpu.rt_period_us"] = "1000000\n";
+  CHECK(has_fix(check_sched_fifo(facts, refused(EPERM)), "/cg/cpu/jobs/cpu.rt_runtime_us"));
+  CHECK(check_cgroup_rt(facts).status == Status::lacks);
+  facts.files["/cg/cpu/jobs/cpu.rt_runtime_us"] = "950000\n";
+  CHECK(check_cgroup_rt(facts).status == Status::ok);
+  CHECK(says(check_cgroup_rt(facts), "950 ms of 1000 ms"));
+}
+
+TEST_CASE("control groups v2 have no share; RT_GROUP_SCHED then refuses all but the root group") {
+  FakeFacts facts;
+  facts.files["/proc/self/cgroup"] = "0::/user.slice\n";
+  facts.files["/proc/config.gz"] = "CONFIG_RT_GROUP_SCHED=y\n";
+  CHECK(check_cgroup_rt(facts).status == Status::warn);
+  facts.files["/proc/cmdline"] = "rt_group_sched=0";
+  CHECK(check_cgroup_rt(facts).status == Status::ok);
+  facts.files["/proc/cmdline"] = "";
+  facts.files["/proc/self/cgroup"] = "0::/\n";
+  CHECK(check_cgroup_rt(facts).status == Status::ok);
+}
+
+TEST_CASE("the kernel's share for real-time policies") {
+  FakeFacts facts;
+  CHECK(check_rt_runtime(facts).status == Status::unknown);
+  facts.files["/proc/sys/kernel/sched_rt_period_us"] = "1000000\n";
+  for (const auto& one : {std::pair{"950000\n", Status::ok}, std::pair{"-1\n", Status::warn},
+                          std::pair{"500000\n", Status::warn}, std::pair{"0\n", Status::lacks}}) {
+    const std::string runtime = one.first;
+    const Status status = one.second;
+    facts.files["/proc/sys/kernel/sched_rt_runtime_us"] = runtime;
+    CAPTURE(runtime);
+    CHECK(check_rt_runtime(facts).status == status);
+    CHECK(check_rt_runtime(facts).fixes.empty() == (status == Status::ok));
+  }
+}
+
+TEST_CASE("the fair server exists since Linux 6.12 and shows itself in debugfs only") {
+  FakeFacts facts;
+  facts.files["/proc/sys/kernel/osrelease"] = "6.1.0\n";
+  CHECK(check_fair_server(facts).status == Status::ok);
+  facts.files["/proc/sys/kernel/osrelease"] = "6.12.0\n";
+  CHECK(check_fair_server(facts).status == Status::unknown);
+  facts.files["/sys/kernel/debug/sched/fair_server/cpu0/runtime"] = "50000000\n";
+  facts.files["/sys/kernel/debug/sched/fair_server/cpu0/period"] = "1000000000\n";
+  CHECK(check_fair_server(facts).status == Status::warn);
+  CHECK(says(check_fair_server(facts), "50 ms of 1000 ms"));
+  facts.files["/sys/kernel/debug/sched/fair_server/cpu0/runtime"] = "0\n";
+  CHECK(check_fair_server(facts).status == Status::ok);
+}
+
+TEST_CASE("mlockall counts only if the pages are locked and more can be") {
+  FakeFacts facts;
+  LockTrial trial{true, 0, 200'000, 210'000, 0, -1};
+  CHECK(check_mlockall(facts, trial).status == Status::ok);
+  trial.more_error = ENOMEM;
+  CHECK(check_mlockall(facts, trial).status == Status::lacks);
+  trial.more_error = 0;
+  trial.locked_kb = 100;
+  CHECK(check_mlockall(facts, trial).status == Status::lacks);
+  trial.error = EPERM;
+  trial.limit_kb = 8192;
+  CHECK(says(check_mlockall(facts, trial), "limit 8192 KiB"));
+  CHECK(has_fix(check_mlockall(facts, trial), "ada - memlock unlimited"));
+}
+
+TEST_CASE("shared memory, huge pages, swap") {
+  SharedMemoryTrial shm{true, 0, 2000, 1500};
+  CHECK(check_dev_shm(shm).status == Status::ok);
+  shm.free_mb = 64;
+  CHECK(check_dev_shm(shm).status == Status::warn);
+  shm.error = EACCES;
+  CHECK(check_dev_shm(shm).status == Status::lacks);
+  CHECK(has_fix(check_dev_shm(shm), "chmod"));
+  shm = {true, ENOENT, 0, 0};
+  CHECK(has_fix(check_dev_shm(shm), "mount -t tmpfs"));
+
+  FakeFacts facts;
+  CHECK(check_transparent_hugepage(facts).status == Status::ok);
+  facts.files["/sys/kernel/mm/transparent_hugepage/enabled"] = "[always] madvise never\n";
+  CHECK(check_transparent_hugepage(facts).status == Status::warn);
+  CHECK(has_fix(check_transparent_hugepage(facts), "kernel command line: transparent_hugepage=madvise"));
+  CHECK(check_swap(facts).status == Status::unknown);
+  facts.files["/proc/swaps"] = "Filename Type Size Used Priority\n/swap file 1 0 -2\n";
+  CHECK(check_swap(facts).status == Status::warn);
+  CHECK(says(check_swap(facts), "/swap"));
+}
+
+TEST_CASE("idle states: refused is a lack, absent is not") {
+  FakeFacts facts;
+  CHECK(check_cpu_dma_latency(facts, {true, EACCES, -1}).status == Status::lacks);
+  CHECK(check_cpu_dma_latency(facts, {true, ENOENT, -1}).status == Status::warn);
+  CHECK(check_cpu_dma_latency(facts, {true, 0, 0}).status == Status::ok);
+  CHECK(check_cpu_dma_latency(facts, {true, 0, 20}).status == Status::warn);
+  CHECK(check_timer_slack({true, 0, 1}).status == Status::ok);
+  CHECK(check_timer_slack({true, 0, 50'000}).status == Status::lacks);
+}
+
+TEST_CASE("the tick, as the clock and the configuration tell it") {
+  FakeFacts facts;
+  facts.files["/proc/config.gz"] = "CONFIG_HZ=250\n";
+  CHECK(check_tick(facts, {true, 4'000'000, 4'000'000}).status == Status::warn);
+  CHECK(says(check_tick(facts, {true, 4'000'000, 8'000'000}), "250 Hz by the clock's resolution, steps of 8000 us"));
+  CHECK(check_tick(facts, {true, 1'000'000, 0}).status == Status::ok);
+  CHECK(check_tick(facts, {}).status == Status::unknown);
+}
+
+TEST_CASE("the preemption model, from whoever tells it") {
+  FakeFacts facts;
+  CHECK(check_preemption(facts).status == Status::unknown);
+  facts.files["/proc/sys/kernel/version"] = "#1 SMP PREEMPT_DYNAMIC Debian\n";
+  facts.files["/proc/config.gz"] = "CONFIG_PREEMPT_NONE=y\nCONFIG_PREEMPT_DYNAMIC=y\n";
+  CHECK(says(check_preemption(facts), "none (kernel configuration)"));
+  CHECK(has_fix(check_preemption(facts), "preempt=full"));
+  facts.files["/proc/cmdline"] = "preempt=full quiet";
+  CHECK(check_preemption(facts).status == Status::ok);
+  facts.files["/sys/kernel/debug/sched/preempt"] = "none (voluntary) full\n";
+  CHECK(says(check_preemption(facts), "voluntary (debugfs)"));
+  facts.files["/sys/kernel/realtime"] = "1\n";
+  CHECK(says(check_preemption(facts), "rt"));
+  FakeFacts old;
+  old.files["/proc/sys/kernel/osrelease"] = "5.10.0\n";
+  old.files["/boot/config-5.10.0"] = "CONFIG_PREEMPT_VOLUNTARY=y\n";
+  CHECK(has_fix(check_preemption(old), "linux-image-rt"));
+}
+
+TEST_CASE("clock and frequency") {
+  FakeFacts facts;
+  CHECK(check_clocksource(facts).status == Status::unknown);
+  const std::string folder = "/sys/devices/system/clocksource/clocksource0/";
+  facts.files[folder + "current_clocksource"] = "tsc\n";
+  CHECK(check_clocksource(facts).status == Status::ok);
+  facts.files[folder + "current_clocksource"] = "hpet\n";
+  facts.files[folder + "available_clocksource"] = "hpet tsc acpi_pm\n";
+  CHECK(check_clocksource(facts).status == Status::warn);
+  CHECK(has_fix(check_clocksource(facts), "echo tsc"));
+  CHECK(check_governor(facts).status == Status::unknown);
+  facts.files["/sys/devices/system/cpu/cpufreq/policy0/scaling_governor"] = "performance\n";
+  CHECK(check_governor(facts).status == Status::ok);
+  facts.files["/sys/devices/system/cpu/cpufreq/policy1/scaling_governor"] = "powersave\n";
+  CHECK(check_governor(facts).status == Status::warn);
+  CHECK(says(check_governor(facts), "performance, powersave"));
+}
+
+TEST_CASE("CPUs that a process may use, shared or of its own") {
+  FakeFacts facts;
+  CHECK(check_cpusets(facts).status == Status::ok);
+  facts.cpus = {1};
+  CHECK(check_cpusets(facts).status == Status::warn);
+  CHECK(has_fix(check_cpusets(facts), "echo 1 | sudo tee takt/cpuset.cpus"));
+  facts.files["/proc/self/cgroup"] = "0::/takt\n";
+  facts.files["/proc/self/mounts"] = "cgroup2 /sys/fs/cgroup cgroup2 rw 0 0\n";
+  facts.files["/sys/fs/cgroup/takt/cpuset.cpus.partition"] = "root\n";
+  CHECK(check_cpusets(facts).status == Status::ok);
+  facts.files["/sys/fs/cgroup/takt/cpuset.cpus.partition"] = "root invalid (no CPU)\n";
+  CHECK(check_cpusets(facts).status == Status::warn);
+  facts.files["/sys/devices/system/cpu/isolated"] = "1\n";
+  CHECK(says(check_cpusets(facts), "isolated: 1"));
+}
+
+TEST_CASE("interrupts and stolen time") {
+  FakeFacts facts;
+  CHECK(check_irq_affinity(facts).status == Status::unknown);
+  facts.files["/proc/irq/24/smp_affinity_list"] = "0-1\n";
+  facts.files["/proc/irq/default_smp_affinity"] = "3\n";
+  CHECK(check_irq_affinity(facts).status == Status::warn);
+  facts.files["/proc/irq/24/smp_affinity_list"] = "0\n";
+  CHECK(check_irq_affinity(facts).status == Status::ok);
+  CHECK(says(check_irq_affinity(facts), "1 interrupts; CPUs without any: 1"));
+  CHECK(check_host_stall(facts).status == Status::unknown);
+  facts.files["/proc/stat"] = "cpu  500 0 0 485 0 0 0 15 0 0\n";
+  CHECK(says(check_host_stall(facts), "1.50 %"));
+  CHECK(check_host_stall(facts).status == Status::warn);
+  facts.files["/proc/stat"] = "cpu  500 0 0 500 0 0 0 0 0 0\n";
+  CHECK(check_host_stall(facts).status == Status::ok);
+}
+
+TEST_CASE("a run lacks what every run needs and what its own policy needs, and nothing else") {
+  const auto finding = [](const char* name, Need need, Status status) {
+    return Finding{"group", name, need, status, "", ""};
+  };
+  const std::vector<Finding> findings{
+      finding("deadline", Need::deadline, Status::lacks), finding("fixed", Need::fixed, Status::lacks),
+      finding("lock", Need::every_run, Status::lacks),    finding("slack", Need::every_run, Status::warn),
+      finding("shm", Need::iceoryx, Status::lacks),       finding("tick", Need::advice, Status::lacks)};
+  const auto names = [&](Policy policy, bool iceoryx) {
+    std::string text;
+    for (const Finding& f : lacking(findings, policy, iceoryx)) text += f.name + " ";
+    return text;
+  };
+  CHECK(names(Policy::deadline, false) == "deadline lock ");
+  CHECK(names(Policy::fixed, true) == "fixed lock shm ");
+  CHECK(names(Policy::cooperative, false) == "lock ");
+}
+
+TEST_CASE("every check names itself, what it found and what it means; a lack always has a fix") {
+  Trials trials;
+  trials.deadline = trials.fixed = refused(EPERM);
+  trials.lock = {true, EPERM, 0, 1000, 0, 64};
+  trials.latency = {true, EACCES, -1};
+  trials.slack = {true, EPERM, 50'000};
+  trials.shared_memory = {true, EACCES, 10, 10};
+  trials.daemon.answered = true;
+  std::strcpy(trials.daemon.refused.data(), "another iceoryx daemon is running");
+  for (const bool root : {false, true}) {
+    FakeFacts facts;
+    facts.root = root;
+    for (const Trials& tried : {trials, Trials{}}) {
+      for (const Finding& finding : examine(facts, tried)) {
+        CAPTURE(finding.name);
+        CHECK(!finding.name.empty());
+        CHECK(!finding.found.empty());
+        CHECK(!finding.meaning.empty());
+        CHECK(finding.meaning.size() <= 70);  // one line of the table
+        if (finding.status == Status::lacks) CHECK(!finding.fixes.empty());
+        if (finding.status == Status::ok) CHECK(finding.fixes.empty());
+      }
+    }
+  }
+}
+
+TEST_CASE("this machine is tried without a trace: neither policy nor locked memory stays") {
+  const std::string before = SystemFacts().text("/proc/self/status").value_or("");
+  const Trials trials = try_machine();
+  CHECK(trials.deadline.answered);
+  CHECK(trials.lock.answered);
+  CHECK(trials.tick.answered);
+  const auto locked = [](const std::string& status) { return status.substr(status.find("VmLck"), 24); };
+  CHECK(locked(SystemFacts().text("/proc/self/status").value_or("VmLck")) == locked(before));
+}
+
+TEST_CASE("a trial that hangs or dies is no answer") {
+  struct Answer {
+    int value = 0;
+  };
+  const auto answer = in_child<Answer>([] { return Answer{7}; });
+  REQUIRE(answer);
+  CHECK(answer->value == 7);
+  CHECK(!in_child<Answer>([]() -> Answer { throw std::runtime_error("no"); }));
+  CHECK(!in_child<Answer>([]() -> Answer { _exit(3); }));
+  CHECK(!in_child<Answer>(
+      []() -> Answer {
+        while (true) pause();
+      },
+      10'000'000));
+}
