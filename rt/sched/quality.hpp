@@ -42,7 +42,7 @@ struct JobCost {
 ///    raise: (1 - a) / kRaiseAt >= 1 + 2 a up to a = 0.055. With more noise the bar limits it to once in kLongestBar.
 ///  - After a cause's end level 0 is back within max(kLongestBar, kHold + P, kHoldJobs P) + 2 P, if it takes at most
 ///    kRaiseAt of the capacity and its declared cost is right: 4.2 s at 15 Hz, 5 s at 2 Hz, 6 s at 1 Hz. If that cost
-///    is wrong, but the execution time at the lower level falls by a fifth, within max(kLongestBar, 2 (kHold + P), 2
+///    is wrong, but the execution time at the lower level falls by 30 %, within max(kLongestBar, 2 (kHold + P), 2
 ///    kHoldJobs P) + 2 P for one level: 4.2 s at 15 Hz, 5 s at 2 Hz, 8 s at 1 Hz. Else within max(kBlind, kBlindJobs P)
 ///    + 2 P for each level.
 ///  - While a cause lasts that the lower level shows, only blind raises overrun: one job in max(kBlind, kBlindJobs P).
@@ -54,7 +54,7 @@ class QualityControl {
   static constexpr double kRaiseAt = 0.85;
   static constexpr int kHoldJobs = 3;
   static constexpr int64_t kHold = kSecond * 3 / 4;
-  static constexpr double kFall = 0.8;
+  static constexpr double kFall = 0.7;
   static constexpr int64_t kFirstBar = kSecond, kLongestBar = 4 * kSecond;
   static constexpr int64_t kSettled = 10 * kSecond;
   static constexpr int64_t kBlind = 30 * kSecond;
