@@ -20,12 +20,12 @@ struct Steady final : Node {
   void run(Job&) override {}
 };
 
-/// Job 3 spins until it is let go.
+/// From job 3 on (on a busy machine that one may be skipped) it spins until it is let go.
 struct Spinner final : Node {
   std::atomic<bool> let_go{false};
   void setup(Setup&) override {}
   void run(Job& job) override {
-    if (job.index() != 3) return;
+    if (job.index() < 3) return;
     while (!let_go.load()) {
     }
   }
@@ -94,9 +94,10 @@ TEST_CASE("without real-time policies a job that does not return is named and en
   REQUIRE(scene.board->faults().size() == 1);
   CHECK(scene.board->faults().at(0)->kind == Fault::hang);
   CHECK(scene.board->faults().at(0)->task == 1);
-  CHECK(scene.board->faults().at(0)->job == 3);
-  CHECK(scene.board->task(1).deadline_misses.load() == 1);
-  CHECK(scene.board->task(1).completed.load() == 3);
+  CHECK(scene.board->faults().at(0)->job >= 3);
+  CHECK(scene.board->task(1).deadline_misses.load() >= 1);
+  CHECK(scene.board->task(1).completed.load() + scene.board->task(1).skipped.load() ==
+        scene.board->faults().at(0)->job);
 }
 
 TEST_CASE("under fixed a job that does not return is demoted, and the run goes on to its planned end") {
@@ -118,18 +119,21 @@ TEST_CASE("under fixed a job that does not return is demoted, and the run goes o
 }
 
 TEST_CASE("a demoted job that returns gets its priority back, and its node runs on") {
+  bool granted = false;
+  std::thread([&] { granted = apply({Policy::fixed, 0, 0, 0, 1, -1}).refused.empty(); }).join();
+  if (!granted) {
+    MESSAGE("NOT RUN: SCHED_FIFO is refused to this user");
+    return;
+  }
   Scene& scene = new_scene(Policy::fixed);
   std::thread friendly([&] {
-    while (scene.board->task(1).demoted.load() == 0 && scene.board->faults().size() == 0) std::this_thread::yield();
+    while (scene.board->task(1).demoted.load() == 0) std::this_thread::yield();
     scene.spinner.let_go.store(true);
   });
   // What is demoted waits for everybody on this machine: no patience would be sure to be long enough.
   const RunResult result = scene.run(1'500 * kMs, 3'600'000 * kMs);
   friendly.join();
-  if (result.policy_granted != Policy::fixed) {
-    MESSAGE("NOT RUN: SCHED_FIFO is refused to this user");
-    return;
-  }
+  REQUIRE(result.policy_granted == Policy::fixed);
   CHECK(result.stuck.empty());
   CHECK(scene.board->task(1).completed.load() >= 4);
   CHECK(scene.board->task(1).demoted.load() == 1);
