@@ -187,7 +187,8 @@ void Executor::join(RunResult& result) {
     hanging.clear();
     for (size_t i = 0; watchdog != nullptr && i < lanes_.size(); ++i)
       if (watchdog->hangs(i)) hanging.push_back(i);
-    return hanging.size() >= at_work.size();
+    // Not before the end: a job that hangs now may still come back.
+    return hanging.size() >= at_work.size() && clock_.now_ns() >= stop_.end_ns();
   });
   for (const size_t i : hanging) {
     const JobWatch::Running job = lanes_[i]->watch().running();
