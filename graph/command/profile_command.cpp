@@ -36,7 +36,7 @@ void let_jobs_finish(Plan& plan) {
 
 void alone(Plan& plan) {
   plan.policy = Policy::cooperative;
-  if (plan.cores.size() > 1) plan.cores.resize(1);
+  if (plan.cores.size() > 1) plan.cores = {plan.cores.front()};
 }
 
 /// Budgets that do not throttle: what the largest job alone took, and a half more.
