@@ -52,7 +52,7 @@ void spread_over_cores(const Plan& plan, CheckResult& result) {
 
 /// SCHED_DEADLINE takes no affinity: its threads run on all CPUs of their cpuset. Empty if that is what is asked for.
 std::string wrong_cores(const GraphSpec& graph, const Plan& plan, const CheckMachine& machine) {
-  if (plan.policy != Policy::deadline || machine.online.empty()) return "";
+  if (plan.policy != Policy::deadline || machine.online.empty() || !graph.schedule.cores_named) return "";
   // What the schedule says; a plan may have been limited to what the process may use.
   const std::vector<int>& asked = graph.schedule.cores.empty() ? plan.cores : graph.schedule.cores;
   const std::vector<int>& all = machine.exclusive.empty() ? machine.online : machine.exclusive;

@@ -16,9 +16,10 @@ PY
 }
 untouched='all(nodes[n]["deadline_misses"] == 0 and nodes[n]["completed"] >= nodes[n]["released"] - 1 for n in ("fast", "steady", "slow"))'
 
+# Unchecked: that five saboteurs, each stopped a tick late, leave the others in time under deadline is seen here, not proven.
 for policy in deadline fixed; do
   report=$work/$policy.json
-  timeout 60 "$takt" run "$graph" --policy $policy --for 5s --output "$work/out" --report "$report" >"$work/stdout" 2>"$work/stderr"
+  timeout 60 "$takt" run "$graph" --unchecked --policy $policy --for 5s --output "$work/out" --report "$report" >"$work/stdout" 2>"$work/stderr"
   code=$?
   if [ $code -eq 3 ]; then
     echo "NOT RUN under $policy: $(tail -n 1 "$work/stderr")"
