@@ -126,7 +126,7 @@ int write_budgets(const ProfileOptions& options, const Profile& profile) {
   if (!edited) return refuse(graph::to_string(edited.error()) + "; nothing was written", kBadInput);
   if (const std::string why = write_whole(to, *edited); !why.empty())
     return refuse(fmt::format("{}: {}; choose another --write", to.string(), why), kBadInput);
-  std::printf("written to %s; see `takt check GRAPH --schedule %s`\n", to.c_str(), to.c_str());
+  std::printf("written to %s\nsee `takt check GRAPH --schedule` of it\n", to.c_str());
   return kOk;
 }
 
