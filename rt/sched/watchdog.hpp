@@ -18,8 +18,7 @@ namespace takt {
 /// job's own CPU clock then.
 ///
 /// - Under `fixed`, a low-criticality job that has used its budget goes on with what the others leave (SCHED_IDLE)
-/// until
-///   it ends; counted `demoted`. High-criticality jobs keep their priority, whatever they use.
+///   until it ends; counted `demoted`. High-criticality jobs keep their priority, whatever they use.
 /// - `safe_stop` is asked for the moment a budget or a deadline has passed, not when the job ends.
 /// - A job that has not returned `patience` after its deadline hangs: told once, by name. Under `cooperative` that ends
 ///   the run.

@@ -21,9 +21,8 @@ namespace takt::analysis {
 ///    early as possible from s on. Task i itself, if sporadic, has its q-th job finish at the same instant whenever
 ///    before it arrived in the busy period, so the earliest arrival gives the longest response.
 /// 2. s may be taken as the latest ready instant (release + jitter) of a job with offset. Otherwise move s, all
-/// sporadic
-///    arrivals, and the delayed jobs by d to the right until it is: no job drops out, each comes no later relative to
-///    s, so the busy period is no shorter and ends at f + d or later. The response grows or stays.
+///    sporadic arrivals, and the delayed jobs by d to the right until it is: no job drops out, each comes no later
+///    relative to s, so the busy period is no shorter and ends at f + d or later. The response grows or stays.
 /// 3. Conversely the jobs of each such s are a legal pattern (older pending work could only add to it), so that what is
 ///    computed happens. Releases before the last first release add nothing: the same pattern with at least those jobs
 ///    comes one hyperperiod later.
