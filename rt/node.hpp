@@ -48,6 +48,9 @@ struct CpuBudget {
   int64_t left_ns() const { return budget_ns - (used_ns != nullptr ? used_ns() - used_before_ns : 0); }
 };
 
+/// The mode in which the robot stands and stays where it is; `on_miss: safe_stop` and `on_overrun: safe_stop` enter it.
+inline constexpr std::string_view kSafeStopMode = "safe_stop";
+
 /// One activation of a node. All a job may observe besides its inputs comes from here (and is recorded).
 class Job {
  public:

@@ -9,8 +9,6 @@
 namespace takt::graph {
 namespace {
 
-constexpr const char* kSafeStop = "safe_stop";
-
 std::set<std::string> without(const GraphSpec& graph, const std::string& mode) {
   for (const ModeSpec& spec : graph.modes)
     if (spec.name == mode) return {spec.without.begin(), spec.without.end()};
@@ -33,7 +31,7 @@ std::set<std::string> needs(const Plan& plan, const TaskPlan& task) {
 }
 
 ModePlan implied_safe_stop(const Plan& plan) {
-  ModePlan mode{kSafeStop, {}};
+  ModePlan mode{std::string(kSafeStopMode), {}};
   for (const TaskPlan& task : plan.tasks) mode.runs.push_back(task.device || task.criticality == Criticality::high);
   for (bool grew = true; grew;) {
     grew = false;
@@ -55,13 +53,14 @@ void add_modes(const GraphSpec& graph, Plan& plan) {
   const auto add = [&](const std::string& name) {
     const std::set<std::string> left_out = without(graph, name);
     const bool reachable =
-        name == kSafeStop || std::includes(left_out.begin(), left_out.end(), missing.begin(), missing.end());
+        name == kSafeStopMode || std::includes(left_out.begin(), left_out.end(), missing.begin(), missing.end());
     if (name != graph.mode && reachable) plan.modes.push_back(with_all_but(plan, name, left_out));
   };
   add("full");
   for (const ModeSpec& mode : graph.modes) add(mode.name);
   const auto named = [&] {
-    return std::find_if(plan.modes.begin(), plan.modes.end(), [](const ModePlan& m) { return m.name == kSafeStop; });
+    return std::find_if(plan.modes.begin(), plan.modes.end(),
+                        [](const ModePlan& m) { return m.name == kSafeStopMode; });
   };
   if (named() == plan.modes.end()) plan.modes.push_back(implied_safe_stop(plan));
   plan.safe_stop = static_cast<size_t>(named() - plan.modes.begin());

@@ -29,6 +29,7 @@ class ObstacleStopNode final : public Node {
     uint32_t reasons = lost ? stop_reason::scan_lost : 0;
     if (seen.blocked) reasons |= stop_reason::obstacle;
     reasons = field_.update(reasons, stamp_ns) | line_reasons(now_ns);
+    if (job.mode() == kSafeStopMode) reasons |= stop_reason::safe_stop;
 
     StopCommand* command = stop_.loan();
     if (!command) return job.no_result();

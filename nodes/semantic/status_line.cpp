@@ -55,7 +55,8 @@ void add_stop(const Status& status, Line& line) {
   constexpr std::pair<uint32_t, const char*> kWords[] = {{stop_reason::obstacle, "obstacle"},
                                                          {stop_reason::line, "line"},
                                                          {stop_reason::scan_lost, "scan lost"},
-                                                         {stop_reason::line_lost, "line lost"}};
+                                                         {stop_reason::line_lost, "line lost"},
+                                                         {stop_reason::safe_stop, "safe stop"}};
   for (const auto& reason : kWords)
     if ((status.stop_reasons & reason.first) != 0) line.item(reason.second);
 }

@@ -214,10 +214,10 @@ struct DigitalState {
 
 /// Why a stop is commanded (bits of StopCommand::reasons); 0: drive on.
 namespace stop_reason {
-constexpr uint32_t obstacle = 1, line = 2, scan_lost = 4, line_lost = 8;
+constexpr uint32_t obstacle = 1, line = 2, scan_lost = 4, line_lost = 8, safe_stop = 16;
 }
 
-/// Stop or drive on, decided from lasers and lines alone; repeated every job, so that silence means stop.
+/// Stop or drive on, decided from lasers, lines and the mode alone; repeated every job, so that silence means stop.
 struct StopCommand {
   static constexpr std::string_view type_name = "stop_command";
   uint32_t reasons = 0;   ///< bits of takt::stop_reason; 0: drive on

@@ -77,8 +77,8 @@ TEST_CASE("base: a stop command makes the velocity zero, and silence stops as we
   test::latch(f.stop, f.command, 0, 1);
   f.job();
   CHECK(f.drives());
-  for (const uint32_t reason :
-       {stop_reason::obstacle, stop_reason::line, stop_reason::scan_lost, stop_reason::line_lost}) {
+  for (const uint32_t reason : {stop_reason::obstacle, stop_reason::line, stop_reason::scan_lost,
+                                stop_reason::line_lost, stop_reason::safe_stop}) {
     f.command->reasons = reason;
     f.job();
     CHECK(f.halts());

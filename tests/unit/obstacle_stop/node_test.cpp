@@ -66,9 +66,9 @@ struct Fixture {
   void give(const char* port, test::Box<T>& box, int64_t age_ns = 0) {
     test::latch(test::input(*node, port), box, now_ns - age_ns, ++sequence);
   }
-  StopCommand job() {
+  StopCommand job(std::string_view mode = "full") {
     out->clear();
-    Job job(clock, 0, now_ns, now_ns + 66 * kMs, 0, "full");
+    Job job(clock, 0, now_ns, now_ns + 66 * kMs, 0, mode);
     node->run(job);
     REQUIRE(out->sent());
     CHECK_FALSE(job.without_result());
@@ -89,6 +89,13 @@ struct Fixture {
 };
 
 }  // namespace
+
+TEST_CASE("obstacle_stop: in the mode safe_stop the robot stands, however free its way; afterwards it drives on") {
+  Fixture f;
+  CHECK(f.drive_on().reasons == 0);
+  CHECK(f.job(kSafeStopMode).reasons == stop_reason::safe_stop);
+  CHECK(f.job().reasons == 0);
+}
 
 TEST_CASE(
     "obstacle_stop: silent until a scan has been free for a while, then drive on; the command has the scan's stamp") {

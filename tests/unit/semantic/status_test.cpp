@@ -57,9 +57,10 @@ TEST_CASE("the status is one line, and is cut off where it does not fit") {
   char memory[200];
   CHECK(write_status({}, memory) == "all nodes at full rate");
   const Request requests[] = {request("a", 0, 1), request("b", 1, 3), request("c", 0, 2)};
-  Status status{stop_reason::obstacle | stop_reason::line_lost, false, requests, 4, 1.26, 0.0};
+  Status status{stop_reason::obstacle | stop_reason::line_lost | stop_reason::safe_stop, false, requests, 4, 1.26, 0.0};
   const std::string whole =
-      "robot stopped: obstacle, line lost | stopped: a, c | paced: b/3 | objects: 4 | obstacle ahead: 1.3 m | ground "
+      "robot stopped: obstacle, line lost, safe stop | stopped: a, c | paced: b/3 | objects: 4 | obstacle ahead: 1.3 m "
+      "| ground "
       "ends ahead: 0.0 m";
   CHECK(write_status(status, memory) == whole);
   for (const size_t size : {0u, 1u, 20u, 60u})
