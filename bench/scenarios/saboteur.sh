@@ -26,6 +26,8 @@ for node in report["nodes"]:
     for key in ("budget_overruns", "demoted"):
         if node[key]:
             text += f", {key} {node[key]}"
+    if node["enforcement_error_us"] is not None:
+        text += f" at most {node['enforcement_error_us']:.0f} us late"
     if node["rt_violations"]:
         text += f", calls in jobs {node['rt_violations']}"
     print(text)

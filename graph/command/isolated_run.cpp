@@ -15,6 +15,7 @@
 #include "graph/command/prepare.hpp"
 #include "graph/command/report.hpp"
 #include "graph/command/run_support.hpp"
+#include "graph/command/run_trace.hpp"
 #include "rt/sched/executor.hpp"
 #include "rt/shm/iceoryx_preflight.hpp"
 #include "rt/shm/local_transport.hpp"
@@ -68,6 +69,7 @@ class IsolatedRun {
         plan_(plan_source_.plan),
         partition_(graph::partition(graph, adjusted_)),
         board_(plan_, partition_.names.size()),
+        trace_(options, plan_),
         stoppable_(board_) {}
 
   ~IsolatedRun() {
@@ -83,7 +85,7 @@ class IsolatedRun {
     for (size_t p = 0; p < partition_.names.size(); ++p)
       group_.start(partition_.names[p], [this, p, supervisor = getpid()]() -> int {
         try {
-          return run_member(options_, graph_, partition_, p, supervisor, board_, pools_);
+          return run_member(options_, graph_, partition_, p, supervisor, board_, pools_, trace_.rings());
         } catch (const std::exception& problem) {  // as in a run in one process: no memory, no daemon, no thread
           return refuse(fmt::format("process {}: {}", partition_.names[p], problem.what()), kDeviceOrSystem);
         }
@@ -96,6 +98,7 @@ class IsolatedRun {
     tell_lacks(latency);
     board_.carrier().store(bring_up_transport());
     agree_on_policy();
+    trace_.collect(plan_);
     wait_for_all(ProcessRecord::running);
     const int64_t steal_before_ms = ProcessReading::now().steal_ms, cpu_before_ns = ProcessReading::now().cpu_ns;
     // Now, with everything in place and locked: at the end they leave one after the other.
@@ -242,7 +245,9 @@ class IsolatedRun {
                                std::string(to_string(plan_.policy)), "subsystem", partition_.names, adjusted_});
     for (const std::string& fault : faults_) report["faults"].push_back({{"what", fault}});
     if (!faults_.empty()) report["ok"] = false;
+    const std::string no_trace = trace_.write(graph_, plan_, board_, result);
     const int told = tell_faults(options_, graph_, board_, granted_, report);
+    if (!no_trace.empty()) return refuse(no_trace, kBadInput);
     return code_ != 0 ? code_ : told;
   }
 
@@ -255,6 +260,7 @@ class IsolatedRun {
   Plan& plan_;
   const graph::Partition partition_;
   RunBoard board_;
+  RunTrace trace_;
   const Stoppable stoppable_;
   const PoolFile pools_;  ///< of the local transport
   Policy granted_ = Policy::cooperative;

@@ -142,7 +142,7 @@ std::string measured_text(const machine::Measured& m) {
   std::string missing;
   const auto add = [&](const std::string& name, const std::optional<Spread>& spread) {
     if (spread) text += row(name, *spread);
-    else missing += (missing.empty() ? "" : ", ") + name;
+    else missing += "    " + name + "\n";
   };
   if (m.release) text += row(fmt::format("release under {}", to_string(m.release->policy)), m.release->lateness);
   else add("release", std::nullopt);
@@ -158,9 +158,9 @@ std::string measured_text(const machine::Measured& m) {
     text +=
         fmt::format("  SCHED_DEADLINE reservations accepted: {:.4f} cores{}\n", m.bandwidth->accepted,
                     m.bandwidth->others == 0 ? "" : fmt::format(" beside those of {} threads", m.bandwidth->others));
-  else missing += std::string(missing.empty() ? "" : ", ") + "SCHED_DEADLINE bandwidth";
+  else missing += "    SCHED_DEADLINE bandwidth\n";
   if (m.stalls) text += stalls_text(*m.stalls);
-  if (!missing.empty()) text += "  not measured with these rights: " + missing + "\n";
+  if (!missing.empty()) text += "  not measured with these rights:\n" + missing;
   return text;
 }
 

@@ -7,6 +7,7 @@
 #include "graph/command/check_command.hpp"
 #include "graph/command/doctor_command.hpp"
 #include "graph/command/eval_command.hpp"
+#include "graph/command/explain_command.hpp"
 #include "graph/command/profile_command.hpp"
 #include "graph/command/run_command.hpp"
 #include "graph/command/show_command.hpp"
@@ -56,6 +57,14 @@ void add_report(CLI::App& app, takt::command::RenderOptions& o, int& exit_code) 
   report->callback([&] { exit_code = takt::command::render_report(o); });
 }
 
+void add_explain(CLI::App& app, takt::command::ExplainOptions& o, int& exit_code) {
+  CLI::App* explain = app.add_subcommand("explain", "says why jobs missed their deadlines, one sentence each");
+  explain->add_option("file", o.file, "what `takt run --trace` wrote (or --report, which says less)")->required();
+  explain->add_option("node", o.node, "only this node");
+  explain->add_option("--svg", o.svg, "draws the largest of the misses told");
+  explain->callback([&] { exit_code = takt::command::explain_misses(o); });
+}
+
 void add_run(CLI::App& app, takt::command::RunOptions& o, int& exit_code) {
   CLI::App* run = app.add_subcommand("run", "runs a graph and reports what happened");
   add_load_options(*run, o.graph, o.load);
@@ -68,6 +77,10 @@ void add_run(CLI::App& app, takt::command::RunOptions& o, int& exit_code) {
       ->check(CLI::IsMember({"none", "subsystem"}));
   run->add_option("--report", o.report, "writes the report as JSON");
   run->add_option("--html", o.html, "writes the report as one page to be read offline");
+  run->add_option("--trace", o.trace, "writes a trace for https://ui.perfetto.dev and `takt explain`");
+  run->add_option("--trace-source", o.trace_source,
+                  "how preemption is seen: auto (the best granted) | tracefs | perf | none")
+      ->check(CLI::IsMember({"auto", "tracefs", "perf", "none"}));
   run->add_option("--output", o.output, "folder for pictures and other results (default out)");
   run->add_option("--seed", o.seed, "seed of the simulated world");
   run->add_flag("--unchecked", o.unchecked, "runs what the check refuses");
@@ -103,6 +116,7 @@ int main(int argc, char** argv) {
   takt::command::RunOptions run_options, check_options;
   takt::command::ShowOptions show_options;
   takt::command::RenderOptions render_options;
+  takt::command::ExplainOptions explain_options;
   takt::command::EvalStereoOptions stereo;
   takt::command::EvalEgoMotionOptions ego_motion;
   takt::command::AttachOptions attach;
@@ -121,6 +135,7 @@ int main(int argc, char** argv) {
   check->callback([&] { exit_code = takt::command::check_graph(check_options, check_json); });
   add_show(app, show_options, exit_code);
   add_report(app, render_options, exit_code);
+  add_explain(app, explain_options, exit_code);
   CLI::App* nodes =
       app.add_subcommand("nodes", "lists node types and device kinds, or one with its ports and parameters");
   nodes->add_option("type", type, "node type");

@@ -60,7 +60,7 @@ bool wait_until(const std::function<bool()>& done, const std::function<bool()>& 
 }
 
 int run_member(const RunOptions& options, const graph::GraphSpec& graph, const graph::Partition& partition,
-               size_t process, int supervisor, RunBoard& board, const PoolFile& pools) {
+               size_t process, int supervisor, RunBoard& board, const PoolFile& pools, trace::Rings* rings) {
   ProcessRecord& record = board.process(process);
   Prepared prepared;
   prepared.graph = graph;
@@ -89,6 +89,7 @@ int run_member(const RunOptions& options, const graph::GraphSpec& graph, const g
   Executor::Options run;
   run.duration_ns = static_cast<int64_t>(options.duration_s * 1e9);
   run.board = &board;
+  run.trace = rings;
   run.gate = &gate;
   run.own = owned(plan, partition, process);
   Executor executor(plan, *transport, *prepared.clock, run);

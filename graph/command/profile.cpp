@@ -20,6 +20,19 @@ std::string change(int64_t now_ns, int64_t before_ns) {
   return fmt::format("{:+.0f} %", 100 * (static_cast<double>(now_ns) / static_cast<double>(before_ns) - 1));
 }
 
+/// `title`, then the names behind it, broken between them into lines of 80 columns.
+std::string list_text(const std::string& title, const std::vector<std::string>& names) {
+  std::string text = title, line;
+  for (const std::string& name : names) {
+    if (line.empty() || line.size() + name.size() + 1 > 80) {
+      text += line + "\n";
+      line = " ";
+    }
+    line += " " + name;
+  }
+  return names.empty() ? "" : text + line + "\n";
+}
+
 }  // namespace
 
 int64_t NodeProfile::quantile_ns(double quantile) const {
@@ -71,7 +84,7 @@ std::string profile_text(const std::vector<NodeProfile>& nodes, double quantile,
                                  "together", "largest", "budget", "new budget");
   text += fmt::format("{:<18} {:>8} {:>9} {:>9} {:>9} {:>9} {:>10}\n", "node", "", q, q, "", "stated",
                       fmt::format("{} x {:g}", q, margin));
-  std::string few, none;
+  std::vector<std::string> few, none;
   const auto budgets = budgets_of(nodes, quantile, margin);
   for (const NodeProfile& node : nodes) {
     const auto budget = budgets.find(node.name);
@@ -79,12 +92,11 @@ std::string profile_text(const std::vector<NodeProfile>& nodes, double quantile,
                         ms(node.alone.quantile_ns(quantile)), ms(node.together.quantile_ns(quantile)),
                         ms(std::max(node.alone.max_ns(), node.together.max_ns())), ms(node.budget_ns),
                         budget == budgets.end() ? "-" : graph::budget_text(budget->second));
-    if (node.samples() == 0) none += (none.empty() ? "" : ", ") + node.name;
-    else if (!node.enough_for(quantile)) few += (few.empty() ? "" : ", ") + node.name;
+    if (node.samples() == 0) none.push_back(node.name);
+    else if (!node.enough_for(quantile)) few.push_back(node.name);
   }
-  if (!few.empty()) text += fmt::format("too few jobs for {}, so the largest counts: {}\n", q, few);
-  if (!none.empty()) text += fmt::format("no job ran, so the budget stays: {}\n", none);
-  return text;
+  return text + list_text(fmt::format("too few jobs for {}, so the largest counts:", q), few) +
+         list_text("no job ran, so the budget stays:", none);
 }
 
 std::string drift_text(const std::vector<Drift>& drifts, double tolerance) {

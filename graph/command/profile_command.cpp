@@ -73,6 +73,10 @@ int pass(const RunOptions& options, const char* name, const Change& change, cons
   Executor executor(plan, *transport, *prepared.clock, run);
   const Stoppable stoppable(board);
   const RunResult result = executor.run();
+  if (!result.stuck.empty()) {  // its thread still uses what would now be taken down
+    refuse(fmt::format("a job of {} never returned", plan.tasks[result.stuck.front()].name), kDeviceOrSystem);
+    end_process(kDeviceOrSystem, "local");
+  }
   for (const std::string& refused : result.refused)
     adjusted.push_back(fmt::format("policy {} -> cooperative: {}", to_string(plan.policy), refused));
   for (const std::string& line : adjusted) std::fprintf(stderr, "takt: adjusted: %s\n", line.c_str());
@@ -122,7 +126,7 @@ int write_budgets(const ProfileOptions& options, const Profile& profile) {
   if (!edited) return refuse(graph::to_string(edited.error()) + "; nothing was written", kBadInput);
   if (const std::string why = write_whole(to, *edited); !why.empty())
     return refuse(fmt::format("{}: {}; choose another --write", to.string(), why), kBadInput);
-  std::printf("written to %s; see `takt check GRAPH --schedule %s`\n", to.c_str(), to.c_str());
+  std::printf("written to %s\nsee `takt check GRAPH --schedule` of it\n", to.c_str());
   return kOk;
 }
 

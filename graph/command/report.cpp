@@ -92,6 +92,8 @@ Json node_json(const RunFacts& facts, size_t t) {
            {"no_result", &s.no_result}})
     node[key] = counter->load();
   node["paused"] = paused;
+  node["enforcement_error_us"] =
+      s.demoted.load() > 0 ? Json(static_cast<double>(s.enforcement_error_ns.load()) / 1e3) : Json(nullptr);
   node["drift_us"] = s.drift_us();
   add_quality(node, *plan.node, s, facts.result.epoch_ns);
   node["granted"] = grant_json(facts.board.grant(t));

@@ -28,7 +28,8 @@ std::string offences(const Json& node) {
     if (const auto n = node.value(key, uint64_t{0}); n > 0) add(fmt::format("{} {}", what, n));
   };
   count("budget_overruns", "budget overruns");
-  count("demoted", "demoted");
+  if (const auto n = node.value("demoted", uint64_t{0}); n > 0)
+    add(fmt::format("demoted {} (at most {:.0f} us late)", n, node["enforcement_error_us"].get<double>()));
   if (node["rt_violations"].is_object())
     for (const auto& [call, n] : node["rt_violations"].items())
       add(fmt::format("{} in jobs {}", call, n.get<uint64_t>()));

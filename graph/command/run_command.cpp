@@ -14,6 +14,7 @@
 #include "graph/command/prepare.hpp"
 #include "graph/command/report.hpp"
 #include "graph/command/run_support.hpp"
+#include "graph/command/run_trace.hpp"
 #include "rt/shm/iceoryx_preflight.hpp"
 
 namespace takt::command {
@@ -38,10 +39,12 @@ int execute(const RunOptions& options, Prepared& prepared, std::vector<std::stri
   graph::Composition& composition = *prepared.composition;
   const auto transport = make_transport(options.transport, composition.plan);
   RunBoard board(composition.plan);
+  RunTrace trace(options, composition.plan);
   Executor::Options run;
   run.duration_ns = static_cast<int64_t>(options.duration_s * 1e9);
   run.require_policy = options.policy_required();
   run.board = &board;
+  run.trace = trace.rings();
   Executor executor(composition.plan, *transport, *prepared.clock, run);
   const ProcessReading before = ProcessReading::now();
   RunResult result;
@@ -53,9 +56,11 @@ int execute(const RunOptions& options, Prepared& prepared, std::vector<std::stri
     const LiveTable live(
         composition.plan, board,
         fmt::format("takt run {} ({}, policy {})", graph.name, graph.profile, to_string(graph.schedule.policy)));
+    trace.collect(composition.plan);
     result = executor.run();
   }
   const ProcessReading after = ProcessReading::now();
+  const std::string no_trace = trace.write(graph, composition.plan, board, result);
   for (size_t t = 0; t < composition.nodes.size(); ++t)
     if (!is_stuck(result, t)) composition.nodes[t]->finish();
   for (const std::string& refused : result.refused)
@@ -74,7 +79,8 @@ int execute(const RunOptions& options, Prepared& prepared, std::vector<std::stri
                              "none",
                              {},
                              std::move(adjusted)});
-  const int code = tell_faults(options, graph, board, result.policy_granted, report);
+  int code = tell_faults(options, graph, board, result.policy_granted, report);
+  if (!no_trace.empty()) code = refuse(no_trace, kBadInput);
   // A job that never returns still uses what would now be taken down.
   if (!result.stuck.empty()) end_process(code, options.transport);
   return code;
@@ -121,7 +127,7 @@ int run_as_asked(RunOptions options) {
       return refuse("--require-rt: this machine lacks (see `takt doctor`)\n" + lacks, kDeviceOrSystem);
   }
   if (wanted != "subsystem" || options.clock == "virtual") return run_in_one_process(options, prepared, adjusted);
-  const KeptPlace report(options.report), page(options.html);
+  const KeptPlace report(options.report), page(options.html), trace(options.trace);
   return run_isolated(options, *prepared.graph, std::move(adjusted));
 }
 
@@ -137,6 +143,8 @@ int run_graph(const RunOptions& options) {
     return refuse("--report " + options.report.string() + ": cannot be written; choose another place", kBadInput);
   if (!options.html.empty() && !writable(options.html))
     return refuse("--html " + options.html.string() + ": cannot be written; choose another place", kBadInput);
+  if (!options.trace.empty() && !writable(options.trace))
+    return refuse("--trace " + options.trace.string() + ": cannot be written; choose another place", kBadInput);
   const StopOnSignal guard;
   try {
     return run_as_asked(options);

@@ -108,7 +108,7 @@ struct ScheduleSpec {
   Policy policy = Policy::deadline;
   std::vector<int> cores;
   Position cores_position;
-  bool cores_named = true;  ///< false: the schedule has no `cores`, and one is taken
+  bool cores_named = true;                       ///< false: the schedule has no `cores`, and one is taken
   std::map<std::string, ScheduleEntry> entries;  ///< by node or device id
   std::optional<MeasuredSpec> measured;          ///< nothing: the budgets are estimates
 };

@@ -12,7 +12,7 @@ struct StereoFormat {
   int channels = 0;           ///< 1 grey, 3 BGR interleaved
   bool rectified = false;     ///< rows of left and right correspond; `camera` is valid
   CameraModel camera;         ///< zero unless rectified
-  double rate_hz = 0;         ///< 0: released by trigger() only
+  double rate_hz = 0;         ///< 0: exposes at the instant of trigger(); else at a rate of its own
   Transform sensor_in_robot;  ///< left camera, head at rest; identity: unknown
 };
 

@@ -13,7 +13,7 @@ struct ScanFormat {
   double first_angle_rad = 0, step_rad = 0;
   double max_range_m = 0;
   double sweep_s = 0;  ///< from the first to the last beam
-  double rate_hz = 0;
+  double rate_hz = 0;  ///< as it comes, on average
   Transform sensor_in_robot;
 };
 

@@ -25,7 +25,8 @@ DeviceResult ReplayLaser::open() {
   time_ns_.clear();
   for (auto scan = first; scan != log->scans.end(); ++scan) time_ns_.push_back(scan->time_ns);
   if (const int64_t lasts_ns = time_ns_.back() - time_ns_.front(); lasts_ns > 0)
-    format_.rate_hz = static_cast<double>(time_ns_.size() - 1) * 1e9 / static_cast<double>(lasts_ns);
+    format_.rate_hz =
+        settings_.pace.speed * static_cast<double>(time_ns_.size() - 1) * 1e9 / static_cast<double>(lasts_ns);
   range_m_.assign(log->range_m.end() - static_cast<ptrdiff_t>(time_ns_.size() * log->beams), log->range_m.end());
   for (float& range : range_m_) {
     if (range <= 0 || static_cast<double>(range) > format_.max_range_m) range = 0;

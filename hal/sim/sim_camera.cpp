@@ -77,13 +77,7 @@ void SimCamera::stop() {
 
 StereoFormat SimCamera::format() const {
   const StereoRig& rig = settings_.rig;
-  return {rig.width,
-          rig.height,
-          rig.channels,
-          rig.rectified,
-          rig.camera(),
-          settings_.rate.hz(),
-          camera_in_robot(rig, 0, 0)};
+  return {rig.width, rig.height, rig.channels, rig.rectified, rig.camera(), 0, camera_in_robot(rig, 0, 0)};
 }
 
 SimCamera::Request SimCamera::request_at(int64_t at_ns) const {

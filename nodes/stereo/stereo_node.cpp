@@ -16,7 +16,7 @@ namespace {
 
 using namespace stereo;
 
-constexpr double kHalfCost = 0.35; // README.md, measured cost
+constexpr double kHalfCost = 0.35;  // README.md, measured cost
 
 class StereoNode final : public Node {
  public:

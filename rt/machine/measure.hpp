@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What this machine costs a schedule, measured by doing it: the analyses of `takt check` charge these figures. Each
 // measurement runs in a forked process with locked memory and gives nothing where these rights do not allow it. The
-// calling process must have one thread. About 25 s in all.
+// calling process must have one thread. About 20 s in all.
 #pragma once
 #include <array>
 #include <cstdint>

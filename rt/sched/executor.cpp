@@ -118,6 +118,7 @@ bool Executor::run_partitioned(Policy policy, RunResult& result) {
   for (size_t i = 0; i < lanes_.size(); ++i) {
     crew_->workers.start([this, &crew = *crew_, &lane = *lanes_[i], mine = wanted[i], i] {
       name_thread(lane.head().plan().name);
+      const trace::Thread traced(options_.trace, lane.head().plan().name);
       prefault_stack();
       crew.grants[i] = apply(mine);
       lane.watch().bind(mine);
@@ -155,8 +156,9 @@ void Executor::run_cooperative(RunResult& result) {
   crew_->queue = std::make_unique<CooperativeQueue>(lanes_, clock_, stop_);
   watch(Policy::cooperative);
   for (size_t i = 0; i < std::max<size_t>(plan_.cores.size(), 1); ++i) {
-    crew_->workers.start([&queue = *crew_->queue, i] {
+    crew_->workers.start([this, &queue = *crew_->queue, i] {
       name_thread("takt-worker-" + std::to_string(i));
+      const trace::Thread traced(options_.trace, "takt-worker-" + std::to_string(i));
       prefault_stack();
       apply(Reservation{});
       start_counting();
@@ -185,7 +187,8 @@ void Executor::join(RunResult& result) {
     hanging.clear();
     for (size_t i = 0; watchdog != nullptr && i < lanes_.size(); ++i)
       if (watchdog->hangs(i)) hanging.push_back(i);
-    return hanging.size() >= at_work.size();
+    // Not before the end: a job that hangs now may still come back.
+    return hanging.size() >= at_work.size() && clock_.now_ns() >= stop_.end_ns();
   });
   for (const size_t i : hanging) {
     const JobWatch::Running job = lanes_[i]->watch().running();
@@ -203,6 +206,7 @@ void Executor::join(RunResult& result) {
 
 void Executor::run_virtual(RunResult& result) {
   auto& clock = dynamic_cast<VirtualClock&>(clock_);
+  const trace::Thread traced(options_.trace, "takt-virtual");
   start_clockwork(result);
   start_counting();
   // Ordered by instant, then deadline, then lane: the same order in every run.

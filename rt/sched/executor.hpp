@@ -10,6 +10,7 @@
 #include "rt/sched/lane.hpp"
 #include "rt/sched/run_board.hpp"
 #include "rt/sched/watchdog.hpp"
+#include "rt/trace/rings.hpp"
 
 namespace takt {
 
@@ -56,6 +57,7 @@ class Executor {
     StartGate* gate = nullptr;                 ///< where other processes are waited for
     std::vector<bool> own = {};                ///< by task: this process runs it; empty: all
     int64_t hang_patience_ns = 1'000'000'000;  ///< a job that has not returned this long after its deadline hangs
+    trace::Rings* trace = nullptr;             ///< where the threads that run jobs note events; null: nowhere
   };
 
   Executor(const Plan& plan, Transport& transport, Clock& clock, const Options& options);

@@ -61,7 +61,10 @@ void Lane::skip_passed(int64_t now_ns, int64_t end_ns) {
   const bool all = head().plan().on_miss == OnMiss::skip;
   const int64_t pending = all ? 0 : 1;
   while (rate().release_ns(origin_ns_, next_ + pending) <= now_ns && next_release_ns() < end_ns) {
-    if (head().in_mode(next_release_ns_)) head().statistics().skipped.fetch_add(1, std::memory_order_relaxed);
+    if (head().in_mode(next_release_ns_)) {
+      head().statistics().skipped.fetch_add(1, std::memory_order_relaxed);
+      head().trace_skip(static_cast<uint64_t>(next_), next_release_ns_);
+    }
     go_to(next_ + 1);
   }
 }

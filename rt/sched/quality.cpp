@@ -23,6 +23,7 @@ int QualityControl::observe(const JobCost& job) {
   foreign_misses_ = missed && !overran ? foreign_misses_ + 1 : 0;
   ++quiet_jobs_;
   note_fits(job);
+  note_fall(job);
   const int64_t next_ns = forecast(job.exec_ns);
   if (next_ns > capacity_ns_ || foreign_misses_ >= 2) fail(job.release_ns, next_ns);
   else consider_raise(job.release_ns);
@@ -67,21 +68,36 @@ void QualityControl::note_fits(const JobCost& job) {
   }
 }
 
+void QualityControl::note_fall(const JobCost& job) {
+  if (windows_.jobs++ == 0) windows_.since_ns = job.release_ns;
+  windows_.sum_ns += job.exec_ns;
+  if (windows_.jobs < kHoldJobs || job.release_ns - windows_.since_ns < kHold) return;
+  const int64_t mean_ns = windows_.sum_ns / windows_.jobs;
+  windows_.fallen = static_cast<double>(mean_ns) <= kFall * static_cast<double>(windows_.largest_mean_ns);
+  windows_.largest_mean_ns = std::max(windows_.largest_mean_ns, mean_ns);
+  windows_.jobs = 0;
+  windows_.sum_ns = 0;
+}
+
 void QualityControl::consider_raise(int64_t now_ns) {
-  for (size_t l = 0; l < level_; ++l) {
-    if (fits_[l].jobs < kHoldJobs || now_ns - fits_[l].since_ns < kHold || now_ns < barred_until_ns_[l]) continue;
-    raised_ns_ = now_ns;
-    return change_to(l, now_ns);
+  size_t next = level_;
+  for (size_t l = level_; l-- > 0;) {
+    if (now_ns < barred_until_ns_[l]) break;  // and so are all better ones
+    const bool fits = fits_[l].jobs >= kHoldJobs && now_ns - fits_[l].since_ns >= kHold;
+    if (fits || (windows_.fallen && l + 1 == level_)) next = l;
   }
-  if (level_ == 0 || quiet_jobs_ < kBlindJobs || now_ns - quiet_since_ns_ < kBlind) return;
+  if (next == level_ && level_ > 0 && quiet_jobs_ >= kBlindJobs && now_ns - quiet_since_ns_ >= kBlind)
+    next = level_ - 1;
+  if (next == level_) return;
   raised_ns_ = now_ns;
-  change_to(level_ - 1, now_ns);
+  change_to(next, now_ns);
 }
 
 void QualityControl::change_to(size_t level, int64_t now_ns) {
   level_ = level;
   earlier_ = 0;
   fits_.fill({});
+  windows_ = {};
   quiet_since_ns_ = now_ns;
   quiet_jobs_ = 0;
 }

@@ -32,6 +32,7 @@ struct TaskStatistics {
   std::atomic<uint64_t> completed{0}, skipped{0}, reused{0}, deadline_misses{0}, budget_overruns{0}, stale_inputs{0};
   std::atomic<uint64_t> new_inputs{0};  ///< jobs whose first input was new: distinct input stamps
   std::atomic<uint64_t> no_result{0};
+  std::atomic<int64_t> enforcement_error_ns{0};  ///< most CPU time beyond its budget that a job had when it was demoted
   std::atomic<uint64_t> demoted{0};  ///< jobs that used up their budget and gave way to all others; by the watchdog
   std::array<std::atomic<uint64_t>, kMaxLevels> at_level{};  ///< jobs by quality level
   std::atomic<int32_t> last_level{0};

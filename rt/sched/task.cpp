@@ -14,6 +14,7 @@
 #include "rt/sched/param_mail.hpp"
 #include "rt/sched/port_access.hpp"
 #include "rt/sched/watch_rules.hpp"
+#include "rt/trace/rings.hpp"
 
 namespace takt {
 namespace {
@@ -54,6 +55,7 @@ Task::Task(const Plan& plan, size_t index, Transport& transport, const Clock& cl
       latch_(plan_, transport, board, index),
       quality_(levels_of(plan_), plan_.budget_ns, plan_.deadline_ns),
       published_(plan_.ports.size()),
+      sequences_(plan_.ports.size()),
       sent_stamps_ns_(plan_.ports.size(), kNothingSent) {
   calls_.node = plan_.name.c_str();
   calls_.counts = statistics_.rt_violations.data();
@@ -105,6 +107,7 @@ JobEnd Task::run(uint64_t index, int64_t release_ns, int64_t modelled_ns) {
 
   take_mail();
   ended_ = {};
+  ended_.index = index;
   ended_.release_ns = release_ns;
   ended_.started_ns = started;
   ended_.modelled = modelled;
@@ -121,6 +124,7 @@ JobEnd Task::run(uint64_t index, int64_t release_ns, int64_t modelled_ns) {
   ended_.stale = latch_.acquire(release_ns, started);
   ended_.new_input = first_input_ != nullptr && first_input_->is_new();
   ended_.level = quality_.level();
+  if (trace::on()) trace_start();
   const CpuBudget cpu{plan_.budget_ns, last_thread_use_ns(), modelled ? nullptr : &thread_cpu_ns};
   Job job(clock_, index, release_ns, deadline, ended_.level, mode.name, cpu);
   work(job, release_ns);
@@ -199,6 +203,7 @@ void Task::count(uint64_t page_faults) {
 }
 
 void Task::count_end() {
+  if (trace::on()) trace_end();
   const JobEnd& end = ended_.end;
   const ThreadUse& used = ended_.used;
   add(statistics_.stale_inputs, ended_.stale);
@@ -248,6 +253,8 @@ void Task::count_level(int64_t exec_ns, int64_t response_ns) {
     statistics_.changes[n % statistics_.changes.size()] = {ended_.release_ns, ended_.level};
     statistics_.level_changes.store(n + 1, std::memory_order_release);
     statistics_.last_level.store(ended_.level, std::memory_order_relaxed);
+    trace::level_change(static_cast<uint16_t>(index_), static_cast<uint32_t>(ended_.index), ended_.level,
+                        ended_.started_ns);
   }
   quality_.observe({ended_.release_ns, exec_ns, response_ns, ended_.no_result});
 }
@@ -286,6 +293,7 @@ void Task::settle_output(size_t i, bool late, int64_t now_ns, int64_t visible_at
     writer.discard();
     if (withheld && plan_.on_miss == OnMiss::reuse_last) published_[i] = writer.repeat(now_ns, visible_at_ns);
   }
+  if (published_[i]) ++sequences_[i];
   PortAccess::reset(output);
 }
 

@@ -48,6 +48,9 @@ class Task {
   /// True if the last job published (or repeated) this port.
   bool published(size_t port) const;
 
+  /// Notes in the trace that this release was skipped.
+  void trace_skip(uint64_t index, int64_t release_ns) const;
+
   const TaskPlan& plan() const { return plan_; }
   TaskStatistics& statistics() { return statistics_; }
   const TaskStatistics& statistics() const { return statistics_; }
@@ -81,6 +84,8 @@ class Task {
   void take_mail();
   void publish(JobEnd& end, int64_t deadline_ns, bool modelled);
   void count_end();
+  void trace_start() const;
+  void trace_end() const;
   void ask_for_safe_stop(const char* why);
   void count_level(int64_t exec_ns, int64_t response_ns);
   void settle_output(size_t output, bool late, int64_t now_ns, int64_t visible_at_ns);
@@ -99,10 +104,12 @@ class Task {
   QualityControl quality_;
   std::vector<std::unique_ptr<Writer>> writers_;
   std::vector<bool> published_;
+  std::vector<uint64_t> sequences_;  ///< of the newest message of each output
   /// The job that run() has ended and count() not yet counted.
   struct Ended {
     bool ran = false, paused = false, modelled = false, new_input = false, no_result = false;
     size_t stale = 0;
+    uint64_t index = 0;
     int64_t release_ns = 0, started_ns = 0, published_ns = 0, publish_took_ns = 0;
     int64_t modelled_ns = 0;
     int cpu = -1, level = 0;

@@ -94,7 +94,12 @@ void Watchdog::act(Watched& watched, const JobWatch::Running& job, const WatchVe
   const size_t task = watched.worker.tasks[job.member];
   if (verdict.overrun) {
     JobWatch& watch = *watched.worker.watch;
-    if (rules.demote && watch.demote(job.serial)) board_.task(task).demoted.fetch_add(1, std::memory_order_relaxed);
+    if (rules.demote && watch.demote(job.serial)) {
+      TaskStatistics& statistics = board_.task(task);
+      statistics.demoted.fetch_add(1, std::memory_order_relaxed);
+      const int64_t error_ns = std::max(statistics.enforcement_error_ns.load(), watch.cpu_ns() - job.cpu_limit_ns);
+      statistics.enforcement_error_ns.store(error_ns, std::memory_order_relaxed);
+    }
     if (!rules.demote) watch.tell(job.serial);
     if (rules.stop_on_overrun) safe_stop(task, job.index, "budget used up", now_ns);
   }

@@ -41,14 +41,16 @@ class ResponseSearch {
     const std::optional<Ticks> common = common_period(tasks_with_offsets(tasks_));
     if (!common) return false;
     for (Ticks planned = floor_mod(task().offset, task().period); planned < *common; planned += task().period) {
-      for (const Ticks start : starts_for(planned)) {
+      const auto starts = starts_for(planned);
+      if (!starts) return false;
+      for (const Ticks start : *starts) {
         if (!try_job(BusyStart(tasks_, start), planned, 0)) return false;
       }
     }
     return true;
   }
 
-  std::vector<Ticks> starts_for(Ticks planned) const {
+  std::optional<std::vector<Ticks>> starts_for(Ticks planned) {
     const Ticks from = planned - window_;
     const Ticks to = planned + task().jitter;
     const Ticks due = planned + task().deadline;
@@ -58,7 +60,10 @@ class ResponseSearch {
       const Ticks phase = other.sporadic ? due - other.deadline + other.jitter : other.offset + other.jitter;
       Ticks last = to - floor_mod(to - phase, other.period);
       if (other.sporadic) last = std::min(last, phase);
-      for (Ticks start = last; start >= from; start -= other.period) starts.push_back(start);
+      for (Ticks start = last; start >= from; start -= other.period) {
+        if (!effort_.spend(1)) return std::nullopt;
+        starts.push_back(start);
+      }
     }
     std::sort(starts.begin(), starts.end());
     starts.erase(std::unique(starts.begin(), starts.end()), starts.end());
@@ -80,7 +85,6 @@ class ResponseSearch {
           if (!try_job(busy, planned, slack)) return false;
         }
       }
-      if (!try_job(busy, earliest, slack)) return false;
     }
     return true;
   }

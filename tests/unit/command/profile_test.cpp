@@ -46,8 +46,8 @@ TEST_CASE("too few jobs for a quantile are told, and the largest counts") {
   std::vector<NodeProfile> nodes{few};
   nodes.emplace_back().name = "idle";
   const std::string text = profile_text(nodes, 0.99, 1.2);
-  CHECK(text.find("so the largest counts: few") != std::string::npos);
-  CHECK(text.find("the budget stays: idle") != std::string::npos);
+  CHECK(text.find("so the largest counts:\n  few\n") != std::string::npos);
+  CHECK(text.find("the budget stays:\n  idle\n") != std::string::npos);
   machine::for_each_line(text, [](std::string_view line) { CHECK(line.size() <= 80); });
 }
 

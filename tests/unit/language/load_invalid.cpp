@@ -96,7 +96,7 @@ TEST_CASE("Unknown keys and wrong types, with the valid ones") {
   expect_graph("x: 30cm", "x: 0.3", "0.3", {"`mount.x` of device `camera`", "write 0.3m"});
   expect_schedule("policy: fixed", "policy: fixxed", "fixxed",
                   {"did you mean `fixed`?", "cooperative, deadline, fixed"});
-  expect_schedule("on_miss: skip", "memory: 64", "memory: 64", {"`memory` of", "64 without a unit", "MB"});
+  expect_schedule("on_miss: skip", "memory: 64", "64, publish", {"`memory` of", "64 without a unit", "MB"});
   expect_schedule("on_miss: skip", "on_miss: ignore", "ignore", {"`on_miss`", "continue, reuse_last, safe_stop, skip"});
   expect_schedule("on_overrun: degrade", "on_overun: degrade", "on_overun", {"did you mean `on_overrun`?"});
 }

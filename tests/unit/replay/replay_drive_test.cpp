@@ -60,6 +60,15 @@ TEST_CASE("replayed laser and base conform") {
   }
 }
 
+TEST_CASE("the rate of a replayed laser is that of the run, not of the log") {
+  std::string text;
+  for (const double t : {1.0, 1.1, 1.2, 2.0}) text += flaser_line(t, 4, t);
+  const CarmenFile file(text + odom_line(3, {}));
+  ReplayLaser laser("laser", {file.path, pace(10, 0), {}, 0});
+  REQUIRE(laser.open().has_value());
+  CHECK(laser.format().rate_hz == doctest::Approx(30));
+}
+
 TEST_CASE("a read gives the newest scan that was not delivered, with its recorded stamp; then the data end") {
   std::string text;
   for (const double t : {1.0, 1.1, 1.2, 2.0}) text += flaser_line(t, 4, t);

@@ -120,14 +120,39 @@ TEST_CASE("a cause that the lower level does not show is tried for, ever more ra
   CHECK(trace.level.back() == 0);
 }
 
-TEST_CASE("declared costs that are too dear delay the return, they do not prevent it") {
-  Drive drive;  // level 1 is said to take 0.3, and really takes 0.6 of level 0
+TEST_CASE("a lower level that is declared too cheap: its fall at the cause's end brings level 0 back in time") {
+  for (const double hz : {2.0, 7.0, 15.0, 100.0}) {
+    Drive drive;  // level 1 is said to take 0.3, and really takes 0.6 of level 0
+    drive.hz = hz;
+    const auto begin = static_cast<int64_t>(5 * hz), end = static_cast<int64_t>(25 * hz);
+    drive.exec_ms = [=](int64_t k, int level) {
+      return (k >= begin && k < end ? 30.0 : 15.0) * (level == 0 ? 1.0 : 0.6);
+    };
+    const auto trace = drive.run(static_cast<int64_t>(60 * hz));
+    CAPTURE(hz);
+    CHECK(trace.overruns == 1);
+    CHECK(trace.changes == 2);
+    CHECK(drive.seconds(jobs_until_full(trace, end)) <= 5);
+  }
+}
+
+TEST_CASE("declared too cheap, and the end of the cause hardly shows: late, but level 0 comes back") {
+  Drive drive;
   constexpr int64_t begin = 75, end = begin + 5 * 15;
-  drive.exec_ms = [](int64_t k, int level) { return (k >= begin && k < end ? 30.0 : 15.0) * (level == 0 ? 1.0 : 0.6); };
+  drive.exec_ms = [](int64_t k, int level) { return (k >= begin && k < end ? 21.0 : 18.0) * (level == 0 ? 1.0 : 0.6); };
   const auto trace = drive.run(end + 60 * 15);
   CHECK(trace.overruns == 1);
   CHECK(trace.level.back() == 0);
+  CHECK(drive.seconds(jobs_until_full(trace, end)) > 10);
   CHECK(drive.seconds(jobs_until_full(trace, end)) <= 31);
+}
+
+TEST_CASE("a cause that weakens, but not enough, costs one attempt") {
+  Drive drive;
+  drive.exec_ms = drive.scaled([](int64_t k) { return k < 75 ? 9.0 : k < 225 ? 60.0 : 30.0; });
+  const auto trace = drive.run(500);
+  CHECK(trace.overruns == 2);
+  CHECK(trace.level.back() == 1);
 }
 
 TEST_CASE("while a visible cause lasts for minutes, only blind raises overrun") {

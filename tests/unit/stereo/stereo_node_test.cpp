@@ -2,8 +2,10 @@
 // The thin node: what it sends for rectified, raw and unusable pairs, and at a lower quality level.
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "rt/node.hpp"
@@ -81,10 +83,18 @@ class Bench {
   void setup() {
     Setup setup{clock_, ".", ".", 0, Rate{15, 1}};
     node_->setup(setup);
+    for (ParamBase* param : node_->params()) param->end_setup();
     for (OutputPort* out : node_->outputs()) {
       writers_.push_back(std::make_unique<OneChunkWriter>(*out));
       PortAccess::attach(*out, writers_.back().get());
     }
+  }
+
+  /// As `takt set` does between two jobs; false where the parameter cannot change any more.
+  bool set(std::string_view name, const ParamValue& value) {
+    for (ParamBase* p : node_->params())
+      if (p->name() == name) return p->live() && p->set(value).has_value();
+    return false;
   }
 
   /// True if the job had a result.
@@ -154,6 +164,27 @@ TEST_CASE("a lower level matches at half resolution: even disparities of the sam
       right += map.view().at(x, y) == Bench::kShift;
     }
   CHECK(right > all * 9 / 10);
+}
+
+TEST_CASE("`search` narrows the range between two jobs, at both levels, and gives it back") {
+  Bench bench({{"disparities", int64_t{32}}});
+  bench.setup();
+  const auto largest = [&](int level) {
+    REQUIRE(bench.run(level));
+    const auto& map = bench.output<DisparityMap>(1);
+    int most = -1;
+    for (const int16_t d : map.disparity.items()) most = std::max(most, int{d});
+    return std::pair(map.disparities, most);
+  };
+  CHECK(largest(0).first == 32);
+  CHECK(bench.set("search", int64_t{10}));
+  for (const int level : {0, 1}) {
+    CHECK(largest(level).first == 10);
+    CHECK(largest(level).second < 10);
+  }
+  CHECK(bench.set("search", int64_t{500}));  // not beyond what memory was taken for
+  CHECK(largest(0).first == 32);
+  CHECK(largest(0).second >= Bench::kShift);
 }
 
 TEST_CASE("nothing new, another size, or a raw pair without calibration: no result, nothing sent") {

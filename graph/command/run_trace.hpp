@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <memory>
+#include <string>
+
+#include "graph/command/run_command.hpp"
+#include "rt/sched/executor.hpp"
+#include "rt/trace/collector.hpp"
+
+namespace takt::command {
+
+/// The trace of a run, if one was asked for (`--trace`); else every call does nothing.
+class RunTrace {
+ public:
+  /// Before the processes of the run are made: they share what is made here. Only the shape of the plan is used.
+  RunTrace(const RunOptions& options, const Plan& plan);
+  /// Where threads note events; null: there is no trace.
+  trace::Rings* rings() const { return rings_.get(); }
+  /// Begins to collect, in the process that lasts longest.
+  void collect(const Plan& plan);
+  /// Ends collecting and writes the file; "" or why it could not be written.
+  std::string write(const graph::GraphSpec& graph, const Plan& plan, const RunBoard& board, const RunResult& result);
+
+ private:
+  const RunOptions& options_;
+  std::unique_ptr<trace::Rings> rings_;
+  std::unique_ptr<trace::Collector> collector_;
+};
+
+}  // namespace takt::command

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a task notes where its thread is traced.
+#include <sched.h>
+
+#include "rt/sched/task.hpp"
+#include "rt/trace/rings.hpp"
+
+namespace takt {
+
+void Task::trace_start() const {
+  const auto task = static_cast<uint16_t>(index_);
+  const auto job = static_cast<uint32_t>(ended_.index);
+  trace::record({ended_.release_ns, ended_.release_ns + plan_.deadline_ns, 0, job, task, trace::Kind::release, 0});
+  trace::record({ended_.started_ns, 0, ended_.modelled ? 0 : sched_getcpu(), job, task, trace::Kind::start,
+                 static_cast<uint8_t>(ended_.level)});
+}
+
+void Task::trace_skip(uint64_t index, int64_t release_ns) const {
+  trace::record({release_ns, 0, 0, static_cast<uint32_t>(index), static_cast<uint16_t>(index_), trace::Kind::skip, 0});
+}
+
+void Task::trace_end() const {
+  const JobEnd& end = ended_.end;
+  const int64_t deadline_ns = ended_.release_ns + plan_.deadline_ns;
+  const int64_t cpu_ns = ended_.modelled ? end.finished_ns - ended_.started_ns : ended_.used.cpu_ns;
+  const auto note = [&](trace::Kind kind, int64_t at_ns, int64_t value, int64_t extra = 0, size_t port = 0) {
+    trace::record({at_ns, value, extra, static_cast<uint32_t>(ended_.index), static_cast<uint16_t>(index_), kind,
+                   static_cast<uint8_t>(port)});
+  };
+  for (size_t e = 0; e < plan_.edges.size(); ++e)
+    if (const Latch::Newest newest = latch_.newest(e); newest.sequence > 0)
+      note(trace::Kind::latch, ended_.started_ns, static_cast<int64_t>(newest.sequence), newest.stamp_ns, e);
+  note(trace::Kind::finish, end.finished_ns, cpu_ns, ended_.cpu);
+  if (plan_.budget_ns > 0 && cpu_ns > plan_.budget_ns)
+    note(trace::Kind::overrun, end.finished_ns, cpu_ns, plan_.budget_ns);
+  if (end.late) note(trace::Kind::miss, deadline_ns, ended_.published_ns - deadline_ns);
+  for (size_t i = 0; i < sequences_.size(); ++i)
+    if (sent_stamps_ns_[i] != kNothingSent)
+      note(trace::Kind::publish, ended_.published_ns, static_cast<int64_t>(sequences_[i]), sent_stamps_ns_[i], i);
+  note(trace::Kind::publish, ended_.published_ns, 0);
+}
+
+}  // namespace takt

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <atomic>
+#include <thread>
+
+#include "rt/trace/rings.hpp"
+#include "rt/trace/switch_source.hpp"
+
+namespace takt::trace {
+
+struct ThreadEvent {
+  int32_t thread = 0;
+  Event event;
+};
+
+/// All that a run noted, as it came.
+struct Recording {
+  Source source = Source::none;
+  std::string source_note;  ///< why no better source
+  std::vector<ThreadEvent> events;
+  Switches switches;
+  std::vector<Steal> steals;
+  std::vector<ThreadFacts> threads;
+  Losses losses;
+  int64_t first_ns = 0, last_ns = 0;
+  int64_t collector_cpu_ns = 0;  ///< what collecting cost, the kernel's part in each switch apart
+};
+
+/// Empties the rings of a run every 20 ms, and the kernel's record of switches with them, on an ordinary thread.
+class Collector {
+ public:
+  struct Options {
+    std::vector<int> cpus = {};       ///< whose switches are recorded
+    Source best = Source::tracefs;    ///< nothing better is tried
+    size_t records_kept = 4'000'000;  ///< of each kind, about 160 MB; beyond that the oldest go, counted
+  };
+  /// In the process that outlives the others, after they were forked. Opens the best source that is granted.
+  Collector(Rings& rings, Options options);
+  ~Collector();
+  Collector(const Collector&) = delete;
+  Collector& operator=(const Collector&) = delete;
+
+  /// Ends collecting. Once.
+  Recording finish();
+
+ private:
+  void collect();
+  void drain();
+  void follow_new_threads();
+  void read_steal(int64_t now_ns);
+  void keep_within_limit();
+
+  Rings& rings_;
+  const Options options_;
+  Recording recording_;
+  std::unique_ptr<SwitchSource> source_;
+  std::vector<int64_t> steal_ticks_;  ///< per CPU of the options
+  int64_t steal_read_ns_ = 0;
+  std::atomic<bool> ended_{false};
+  std::thread thread_;
+};
+
+/// Jobs, slices and marks from what was noted: `tasks`, `ports`, policy, epoch and end are for the caller to add.
+Trace assemble(const Recording& recording);
+
+}  // namespace takt::trace

@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: Apache-2.0
+# `takt explain` on causes that were injected: 5 ms over the budget, 9 ms of preemption by a named node, a release 3 ms late
+# behind another. Each must be named, its middle figure within 0.5 ms of what was injected, and the figures of every sentence
+# must add up to its miss. What else happens on this machine (host stalls) is told as parts of its own.
+source "$(dirname "$0")/lib.sh" "$@"
+
+cat >"$work/injected.yaml" <<'EOF'
+takt: 1
+name: injected
+schedule: schedule.yaml
+subsystems:
+  work:
+    long_one: {type: load, params: {work: 5ms, extra: 5ms, every: 2}}
+    victim: {type: load, params: {work: 6ms}}
+    culprit: {type: load, params: {work: 9ms}}
+    late_one: {type: load, params: {work: 5ms}}
+    blocker: {type: load, params: {work: 3ms}}
+    sleeper: {type: load, params: {work: 1ms, sleep: 4ms}}
+profiles:
+  sim: {}
+EOF
+core=$(taskset -pc $$ | sed 's/.*[ ,-]//')  # the last CPU we may use
+cat >"$work/schedule.yaml" <<EOF
+takt: 1
+name: injected
+policy: fixed
+cores: [$core]
+nodes:
+  long_one: {rate: 2, budget: 5ms, deadline: 7ms, criticality: high}
+  victim: {rate: 2, offset: 100ms, budget: 7ms, deadline: 10ms}
+  culprit: {rate: 2, offset: 103ms, budget: 10ms, deadline: 9.5ms}
+  late_one: {rate: 2, offset: 200ms, budget: 6ms, deadline: 6ms}
+  blocker: {rate: 2, offset: 200ms, budget: 4ms, deadline: 4ms}
+  sleeper: {rate: 2, offset: 300ms, budget: 2ms, deadline: 3ms}
+EOF
+
+# Every sentence of $work/stdout: the figures after the colon make up the miss, `less` counted off, to 5 %.
+adds_up() {
+  awk '/ missed job / {
+    miss = $0; sub(/^[^:]* by /, "", miss); text = $0; sub(/^[^:]*: /, "", text); sub(/ \((switches|no source).*/, "", text)
+    n = split(text, parts, ", "); sum = 0
+    for (i = 1; i <= n; i++) { match(parts[i], /[0-9]+\.[0-9]+/); v = substr(parts[i], RSTART, RLENGTH); sum += parts[i] ~ /^less/ ? -v : v }
+    if (sum - miss > 0.05 * miss || miss - sum > 0.05 * miss) { print "parts make " sum ": " $0; bad = 1 }
+    lines++ } END { exit bad || !lines }' "$work/stdout" || fail "figures that do not add up"
+}
+
+# named NODE WORDS-BEFORE WORDS-AFTER MS: the middle figure between those words.
+named() {
+  local middle
+  middle=$(sed -nE "s/^$1 missed .*$2([0-9]+\.[0-9]+)$3.*/\1/p" "$work/stdout" | sort -n | awk '{v[NR] = $1} END {if (NR) print v[int((NR + 1) / 2)]}')
+  echo "$1: injected $4 ms, told ${middle:-nothing}"
+  awk -v got="${middle:-99}" -v wanted="$4" 'BEGIN {exit got - wanted > 0.5 || wanted - got > 0.5}' || fail "$1: '${middle:-nothing}' instead of $4 ms"
+}
+
+run() { "$takt" run "$work/injected.yaml" --unchecked --output "$work/out" "$@" >"$work/run.stdout" 2>"$work/run.stderr"; }
+
+if run --for 8s --isolate none --trace "$work/t.json" --report "$work/r.json" --require-rt || [ $? -eq 1 ]; then
+  expect 0 "" "$takt" explain "$work/t.json"
+  cat "$work/stdout"
+  adds_up
+  named long_one ' ' ' over its own budget' 5
+  named sleeper 'asleep ' ' in the job' 4
+  if grep -q "switches from tracefs" "$work/stdout"; then
+    named victim 'preempted ' " by culprit on cpu $core" 9
+    named late_one 'released late ' " behind blocker on cpu $core" 3
+  else
+    echo "NOT RUN: who preempted whom needs tracefs: $(grep note: "$work/stdout")"
+  fi
+  grep -q '"preempted\|"asleep' "$work/t.json" || fail "the trace holds no switches"
+  expect 0 "" "$takt" explain "$work/t.json" victim --svg "$work/victim.svg"
+  grep -q "^late_one" "$work/stdout" && fail "another node was explained"
+  grep -q "victim job" "$work/victim.svg" || fail "no picture of the victim"
+  expect 0 "" "$takt" explain "$work/r.json"
+  grep -q "victim missed .* no cause is attributed" "$work/stdout" || fail "the report says too little, or too much"
+
+  # Two processes: the same causes through rings that they share. Less privilege: nobody is named.
+  if run --for 3s --isolate subsystem --trace "$work/t2.json" --require-rt || [ $? -eq 1 ]; then
+    expect 0 "" "$takt" explain "$work/t2.json"
+    adds_up
+    named long_one ' ' ' over its own budget' 5
+  fi
+  run --for 3s --isolate none --trace "$work/t3.json" --trace-source perf
+  expect 0 "" "$takt" explain "$work/t3.json"
+  adds_up
+  grep -q "switches from perf" "$work/stdout" && named victim 'preempted ' ' by unnamed others' 9
+  run --for 3s --isolate none --trace "$work/t4.json" --trace-source none
+  expect 0 "" "$takt" explain "$work/t4.json" victim
+  adds_up
+  named victim ' ' ' unattributed' 9
+else
+  echo "NOT RUN: injected causes need SCHED_FIFO and locked memory; run as root"
+fi
+
+# In virtual time everything is known exactly, and nobody preempts.
+run --clock virtual --for 1s --trace "$work/v.json"
+expect 0 "" "$takt" explain "$work/v.json" blocker
+grep -q "no job of blocker missed" "$work/stdout" || fail "a job that was in time is said to have missed"
+expect 2 "valid are: long_one" "$takt" explain "$work/v.json" nobody
+expect 2 "cannot be read" "$takt" explain "$work/none.json"
+expect 2 "is no trace" "$takt" explain "$source/README.md"
+head -c 2000 "$work/v.json" >"$work/cut.json"
+expect 2 "is no trace" "$takt" explain "$work/cut.json"
+expect 2 "choose another place" "$takt" run "$work/injected.yaml" --trace "$work/none/t.json"
+finish

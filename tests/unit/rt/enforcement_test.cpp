@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+// Jobs that do not return, in real time: who is told, who is demoted, and that the run ends. Counts only, no times.
+#include <doctest/doctest.h>
+
+#include <atomic>
+#include <memory>
+#include <thread>
+#include <vector>
+
+#include "rt/node.hpp"
+#include "rt/sched/executor.hpp"
+
+namespace {
+
+using namespace takt;
+constexpr int64_t kMs = 1'000'000;
+
+struct Steady final : Node {
+  void setup(Setup&) override {}
+  void run(Job&) override {}
+};
+
+/// From job 3 on (on a busy machine that one may be skipped) it spins until it is let go.
+struct Spinner final : Node {
+  std::atomic<bool> let_go{false};
+  void setup(Setup&) override {}
+  void run(Job& job) override {
+    if (job.index() < 3) return;
+    while (!let_go.load()) {
+    }
+  }
+};
+
+struct Scene {
+  Steady steady;
+  Spinner spinner;
+  Plan plan;
+  MonotonicClock clock;
+  std::unique_ptr<Transport> transport;
+  std::unique_ptr<RunBoard> board;
+  std::unique_ptr<Executor> executor;
+
+  explicit Scene(Policy policy) {
+    plan.policy = policy;
+    plan.cores = {0, 1};
+    add(steady, "steady", Criticality::high, 90 * kMs);
+    add(spinner, "spinner", Criticality::low, 50 * kMs);
+    board = std::make_unique<RunBoard>(plan);
+  }
+  void add(Node& node, const char* name, Criticality criticality, int64_t deadline_ns) {
+    TaskPlan task;
+    task.name = name;
+    task.node = &node;
+    task.rate = Rate{10, 1};
+    task.budget_ns = 5 * kMs;
+    task.deadline_ns = deadline_ns;
+    task.criticality = criticality;
+    plan.tasks.push_back(task);
+  }
+  RunResult run(int64_t duration_ns, int64_t patience_ns = 100 * kMs) {
+    transport = make_local_transport(plan.ports);
+    Executor::Options options;
+    options.duration_ns = duration_ns;
+    options.board = board.get();
+    options.hang_patience_ns = patience_ns;
+    executor = std::make_unique<Executor>(plan, *transport, clock, options);
+    return executor->run();
+  }
+};
+
+std::vector<std::unique_ptr<Scene>>& kept_scenes() {
+  static auto& scenes = *new std::vector<std::unique_ptr<Scene>>;
+  return scenes;
+}
+
+/// Kept for ever: a thread that was given up may use it until the process ends.
+Scene& new_scene(Policy policy) { return *kept_scenes().emplace_back(std::make_unique<Scene>(policy)); }
+
+/// The spinner need not spin through all other tests.
+struct LetGo {
+  Spinner& spinner;
+  ~LetGo() { spinner.let_go.store(true); }
+};
+
+}  // namespace
+
+TEST_CASE("without real-time policies a job that does not return is named and ends the run") {
+  Scene& scene = new_scene(Policy::cooperative);
+  const LetGo let_go{scene.spinner};
+  const RunResult result = scene.run(3'600'000 * kMs);
+  REQUIRE(result.stuck.size() == 1);
+  CHECK(result.stuck[0] == 1);
+  CHECK(result.duration_s() < 3600);
+  REQUIRE(scene.board->faults().size() == 1);
+  CHECK(scene.board->faults().at(0)->kind == Fault::hang);
+  CHECK(scene.board->faults().at(0)->task == 1);
+  CHECK(scene.board->faults().at(0)->job >= 3);
+  CHECK(scene.board->task(1).deadline_misses.load() >= 1);
+  CHECK(scene.board->task(1).completed.load() + scene.board->task(1).skipped.load() ==
+        scene.board->faults().at(0)->job);
+}
+
+TEST_CASE("under fixed a job that does not return is demoted, and the run goes on to its planned end") {
+  Scene& scene = new_scene(Policy::fixed);
+  const LetGo let_go{scene.spinner};
+  const RunResult result = scene.run(1'500 * kMs);
+  if (result.policy_granted != Policy::fixed) {
+    MESSAGE("NOT RUN: SCHED_FIFO is refused to this user");
+    return;
+  }
+  REQUIRE(result.stuck.size() == 1);
+  CHECK(result.stuck[0] == 1);
+  CHECK(scene.board->task(1).demoted.load() == 1);
+  CHECK(scene.board->task(1).budget_overruns.load() == 1);
+  CHECK(result.released[0] == 15);
+  CHECK(scene.board->task(0).completed.load() + scene.board->task(0).skipped.load() == 15);
+  CHECK(scene.board->task(0).demoted.load() == 0);
+  MESSAGE("demoted with " << scene.board->task(1).enforcement_error_ns.load() / 1000 << " us beyond its budget");
+}
+
+TEST_CASE("a demoted job that returns gets its priority back, and its node runs on") {
+  bool granted = false;
+  std::thread([&] { granted = apply({Policy::fixed, 0, 0, 0, 1, -1}).refused.empty(); }).join();
+  if (!granted) {
+    MESSAGE("NOT RUN: SCHED_FIFO is refused to this user");
+    return;
+  }
+  Scene& scene = new_scene(Policy::fixed);
+  std::thread friendly([&] {
+    while (scene.board->task(1).demoted.load() == 0) std::this_thread::yield();
+    scene.spinner.let_go.store(true);
+  });
+  // What is demoted waits for everybody on this machine: no patience would be sure to be long enough.
+  const RunResult result = scene.run(1'500 * kMs, 3'600'000 * kMs);
+  friendly.join();
+  REQUIRE(result.policy_granted == Policy::fixed);
+  CHECK(result.stuck.empty());
+  CHECK(scene.board->task(1).completed.load() >= 4);
+  CHECK(scene.board->task(1).demoted.load() == 1);
+  CHECK(scene.board->faults().size() == 0);
+}
