@@ -144,7 +144,8 @@ class Admitting {
       const TaskPlan& task = plan_.tasks[lane[m]];
       NodeAdmission& node = result_.nodes[lane[m]];
       node.finish_ns = finish_of(l, m, response);
-      if (bounds_) node.start_ns = start_of(l, m, response);
+      const auto aged = [](const EdgePlan& edge) { return edge.max_age_ns > 0; };
+      if (bounds_ && std::any_of(task.edges.begin(), task.edges.end(), aged)) node.start_ns = start_of(l, m, response);
       node.response_ns = m == 0 ? node.finish_ns : response_of_member(l, m);
       // The lane is in time as a whole; a member's own deadline may be tighter.
       if (node.response_ns && *node.response_ns <= task.deadline_ns) continue;

@@ -94,8 +94,6 @@ ModeCheck check_mode(const GraphSpec& graph, const Plan& plan, const std::string
     if (const auto change = smallest_change(plan, options.machine.overheads))
       mode.change = fmt::format("the smallest single change that makes it fit: {} ({:.1f} %)", to_string(*change, plan),
                                 100 * change->relative);
-  } else if (options.margins) {
-    mode.margins_ns = margins(plan, options.machine.overheads);
   }
   judge_ages(mode, result);
   return mode;
@@ -122,6 +120,33 @@ void check_modes(const GraphSpec& graph, const Plan& plan, const CheckOptions& o
       if (std::find(result.problems.begin(), result.problems.end(), problem) == result.problems.end())
         result.problems.push_back(text);
     }
+  }
+}
+
+/// What the check asks of one mode, without saying why not.
+bool holds(const GraphSpec& graph, const Plan& plan, const analysis::Overheads& overheads) {
+  const Admission admission = admit(plan, overheads);
+  if (admission.answer != Answer::admitted) return false;
+  const std::vector<AgeBound> ages = age_bounds(graph, plan, admission.nodes);
+  return std::all_of(ages.begin(), ages.end(), [](const AgeBound& age) { return age.possible() && age.proven(); });
+}
+
+/// Margins of each mode; a budget of the whole plan counts in the others as well.
+void add_margins(const GraphSpec& graph, const Plan& plan, const analysis::Overheads& overheads, CheckResult& result) {
+  const auto plan_of = [&](const Plan& whole, const ModeCheck& mode) {
+    const auto spec =
+        std::find_if(graph.modes.begin(), graph.modes.end(), [&](const ModeSpec& m) { return m.name == mode.mode; });
+    return &mode == &result.modes.front() || spec == graph.modes.end() ? whole : without(whole, spec->without);
+  };
+  const auto all_hold = [&](const Plan& changed) {
+    return std::all_of(result.modes.begin(), result.modes.end(),
+                       [&](const ModeCheck& mode) { return holds(graph, plan_of(changed, mode), overheads); });
+  };
+  for (ModeCheck& mode : result.modes) {
+    const bool whole = &mode == &result.modes.front();
+    mode.margins_ns = margins(
+        plan_of(plan, mode), overheads,
+        whole ? Accepts(all_hold) : [&](const Plan& changed) { return holds(graph, changed, overheads); });
   }
 }
 
@@ -186,6 +211,7 @@ CheckResult check(const GraphSpec& graph, const Plan& plan, const CheckOptions& 
   check_modes(graph, plan, options, result);
   result.notes = result.modes.front().admission.notes;
   result.admitted = result.answer == Answer::admitted && result.verdict != Verdict::invalid;
+  if (result.admitted && options.margins) add_margins(graph, plan, options.machine.overheads, result);
   result.text = check_text(graph, plan, options, result);
   result.json = check_json(plan, options, result);
   return result;

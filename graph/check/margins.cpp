@@ -24,19 +24,23 @@ bool admitted(const Plan& plan, const Overheads& overheads) {
 class Asking {
  public:
   using Edit = std::function<void(Plan&, int64_t)>;
-  Asking(const Plan& plan, const Overheads& overheads, Edit edit)
-      : plan_(plan), overheads_(overheads), edit_(std::move(edit)) {}
+  Asking(const Plan& plan, Accepts accepts, Edit edit)
+      : plan_(plan), accepts_(std::move(accepts)), edit_(std::move(edit)) {}
   bool operator()(int64_t value) const {
     Plan changed = plan_;
     edit_(changed, value);
-    return admitted(changed, overheads_);
+    return accepts_(changed);
   }
 
  private:
   const Plan& plan_;
-  const Overheads& overheads_;
+  Accepts accepts_;
   Edit edit_;
 };
+
+Accepts admission_with(const Overheads& overheads) {
+  return [&overheads](const Plan& plan) { return admitted(plan, overheads); };
+}
 
 /// Between a value that is admitted and one that is refused: the two moved together to `step` or 0.1 % of their
 /// distance from `base`. Returns the admitted one.
@@ -48,10 +52,10 @@ int64_t edge(const Asking& admits, int64_t good, int64_t bad, int64_t base, int6
   return good;
 }
 
-int64_t margin_of(const Plan& plan, size_t t, const Overheads& overheads) {
+int64_t margin_within(const Plan& plan, size_t t, const Accepts& accepts, int64_t most) {
   const int64_t budget = plan.tasks[t].budget_ns;
-  int64_t good = budget, bad = std::max(plan.tasks[t].deadline_ns, budget) + kMicrosecond;
-  const Asking admits(plan, overheads, [t](Plan& p, int64_t ns) { p.tasks[t].budget_ns = ns; });
+  int64_t good = budget, bad = budget + most + kMicrosecond;
+  const Asking admits(plan, accepts, [t](Plan& p, int64_t ns) { p.tasks[t].budget_ns = ns; });
   // Where cores are assigned anew for every budget an admitted one may lie beyond a refused one: look around the edge.
   for (int again = 0; again < 16; ++again) {
     good = edge(admits, good, bad, budget, kMicrosecond);
@@ -59,9 +63,9 @@ int64_t margin_of(const Plan& plan, size_t t, const Overheads& overheads) {
     if (!admits(below)) {
       bad = below;
       good = budget;
-    } else if (above < plan.tasks[t].deadline_ns && admits(above)) {
+    } else if (above < budget + most && admits(above)) {
       good = above;
-      bad = plan.tasks[t].deadline_ns + kMicrosecond;
+      bad = budget + most + kMicrosecond;
     } else {
       break;
     }
@@ -110,7 +114,7 @@ class Smallest {
   void try_budget(size_t t) {
     const int64_t budget = plan_.tasks[t].budget_ns;
     if (budget <= kMicrosecond) return;
-    const Asking admits(plan_, overheads_, [t](Plan& p, int64_t ns) { p.tasks[t].budget_ns = ns; });
+    const Asking admits(plan_, admission_with(overheads_), [t](Plan& p, int64_t ns) { p.tasks[t].budget_ns = ns; });
     if (const auto found = nearest(admits, budget, kMicrosecond, kMicrosecond))
       offer(Change::What::budget, t, ms(budget), ms(*found));
   }
@@ -120,7 +124,7 @@ class Smallest {
     const double rate = effective_rate_hz(plan_, t);
     const auto period = rate > 0 ? static_cast<int64_t>(1e9 / rate) : deadline;
     if (period <= deadline) return;
-    const Asking admits(plan_, overheads_, [t](Plan& p, int64_t ns) { p.tasks[t].deadline_ns = ns; });
+    const Asking admits(plan_, admission_with(overheads_), [t](Plan& p, int64_t ns) { p.tasks[t].deadline_ns = ns; });
     if (const auto found = nearest(admits, deadline, period, kMicrosecond))
       offer(Change::What::deadline, t, ms(deadline), ms(*found));
   }
@@ -129,7 +133,7 @@ class Smallest {
     if (!plan_.tasks[t].rate) return;
     const double hz = plan_.tasks[t].rate->hz();
     const auto tenths = static_cast<int64_t>(hz * 10);
-    const Asking admits(plan_, overheads_, [t](Plan& p, int64_t n) { p.tasks[t].rate = Rate{n, 10}; });
+    const Asking admits(plan_, admission_with(overheads_), [t](Plan& p, int64_t n) { p.tasks[t].rate = Rate{n, 10}; });
     if (tenths < 2) return;
     if (const auto found = nearest(admits, tenths, std::max<int64_t>(1, tenths / 10), 1))
       offer(Change::What::rate, t, hz, static_cast<double>(*found) / 10);
@@ -142,9 +146,17 @@ class Smallest {
 
 }  // namespace
 
-std::vector<int64_t> margins(const Plan& plan, const Overheads& overheads) {
+std::vector<int64_t> margins(const Plan& plan, const Overheads& overheads, const Accepts& accepts) {
   std::vector<int64_t> result;
-  for (size_t t = 0; t < plan.tasks.size(); ++t) result.push_back(margin_of(plan, t, overheads));
+  for (size_t t = 0; t < plan.tasks.size(); ++t) {
+    const int64_t most = std::max<int64_t>(plan.tasks[t].deadline_ns - plan.tasks[t].budget_ns, 0);
+    int64_t margin = margin_within(plan, t, admission_with(overheads), most);
+    // The rest is asked where it may matter: it takes longer.
+    Plan grown = plan;
+    grown.tasks[t].budget_ns += margin * 99 / 100;
+    if (accepts && !accepts(grown)) margin = margin_within(plan, t, accepts, margin);
+    result.push_back(margin);
+  }
   return result;
 }
 

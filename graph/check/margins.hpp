@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // How far a plan is from the edge of what is admitted, found by asking the same admission again with changed figures.
 #pragma once
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -9,9 +10,12 @@
 
 namespace takt::graph {
 
-/// By task of an admitted plan: how much its budget alone may grow before the plan is refused, to 0.1 % of itself or a
-/// microsecond. With 0.99 of it added the plan is admitted, with 1.01 of it refused.
-std::vector<int64_t> margins(const Plan& plan, const analysis::Overheads& overheads);
+/// What is asked of a plan beside its admission, such as its ages and its other modes; includes the admission.
+using Accepts = std::function<bool(const Plan&)>;
+
+/// By task of an accepted plan: how much its budget alone may grow before the plan is refused, to 0.1 % of itself or a
+/// microsecond. With 0.99 of it added the plan is accepted, with 1.01 of it refused.
+std::vector<int64_t> margins(const Plan& plan, const analysis::Overheads& overheads, const Accepts& accepts = {});
 
 /// One figure of the schedule that would make a refused plan fit.
 struct Change {

@@ -18,10 +18,6 @@ class StereoCameraNode final : public DeviceNode {
   void setup(Setup& setup) override;
   void start(int64_t epoch_ns) override;
   void run(Job& job) override;
-  /// A camera with a rate of its own may have exposed up to a period ago.
-  int64_t stamp_lag_ns() const override {
-    return format_.rate_hz > 0 ? static_cast<int64_t>(1e9 / format_.rate_hz) : 0;
-  }
   Device& device() override { return *camera_; }
   StereoCamera& camera() { return *camera_; }
 

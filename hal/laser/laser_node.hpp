@@ -13,11 +13,8 @@ class LaserNode final : public DeviceNode {
   explicit LaserNode(std::unique_ptr<LaserScanner> scanner) : scanner_(std::move(scanner)) {}
   void setup(Setup& setup) override;
   void run(Job& job) override;
-  /// The stamp is that of the first beam: a sweep before its end, and of a scanner with a rate of its own a period
-  /// more.
-  int64_t stamp_lag_ns() const override {
-    return static_cast<int64_t>(1e9 * (format_.sweep_s + (format_.rate_hz > 0 ? 1 / format_.rate_hz : 0)));
-  }
+  /// The stamp is that of the first beam, a sweep before its end.
+  int64_t stamp_lag_ns() const override { return static_cast<int64_t>(1e9 * format_.sweep_s); }
   Device& device() override { return *scanner_; }
 
  private:
