@@ -101,6 +101,8 @@ int admit(const RunOptions& options, const graph::GraphSpec& graph, const Plan& 
   how.real_time = options.clock != "virtual";
   const graph::CheckResult check = graph::check(graph, plan, how);
   if (check.verdict == graph::Verdict::invalid) return refuse(check.text, kBadInput);
+  if (check.verdict == graph::Verdict::adjusted)
+    adjusted.insert(adjusted.end(), check.warnings.begin(), check.warnings.end());
   if (check.admitted || options.unchecked) return kOk;
   if (plan.policy != Policy::cooperative || check.answer != graph::Answer::not_proven)
     return refuse(check.text + "(--unchecked runs it all the same)", kNotOk);
