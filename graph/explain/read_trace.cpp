@@ -19,6 +19,7 @@ struct Wrong : std::runtime_error {
 };
 
 constexpr int64_t kLatestNs = 4'000'000'000'000'000'000;  // instants beyond would overflow when subtracted
+constexpr size_t kMostCpus = 8192;                        // the most that Linux is built for
 
 /// Reads what write_trace wrote. Json's own exceptions (a key that is missing, of another kind) become Wrong.
 class Reader {
@@ -39,8 +40,13 @@ class Reader {
   }
 
  private:
+  static int64_t whole(const Json& value) {
+    if (!value.is_number_integer()) throw Wrong(fmt::format("has {} where a whole number belongs", value.dump()));
+    return value.get<int64_t>();
+  }
+
   static int64_t instant(const Json& value) {
-    const auto ns = value.get<int64_t>();
+    const int64_t ns = whole(value);
     if (ns > kLatestNs || ns < -kLatestNs) throw Wrong(fmt::format("has an instant out of range: {}", ns));
     return ns;
   }
@@ -52,10 +58,18 @@ class Reader {
     return std::llround(ns);
   }
 
-  size_t index(const Json& value, size_t size, const char* what) const {
-    const auto i = value.get<uint64_t>();
-    if (i >= size) throw Wrong(fmt::format("names {} {} of {}", what, i, size));
+  static size_t index(const Json& value, size_t size, const char* what) {
+    const int64_t i = whole(value);
+    if (i < 0 || static_cast<uint64_t>(i) >= size) throw Wrong(fmt::format("names {} {} of {}", what, i, size));
     return static_cast<size_t>(i);
+  }
+
+  /// Tracks are counted from 1: track k is entry k - 1.
+  static size_t track_index(const Json& event, size_t size, const char* what) {
+    const int64_t track = whole(event.at("tid"));
+    if (track < 1 || static_cast<uint64_t>(track) > size)
+      throw Wrong(fmt::format("has an event on track {}, which is no {}'s (1 to {})", track, what, size));
+    return static_cast<size_t>(track - 1);
   }
 
   void read_facts(const Json& head) {
@@ -68,7 +82,7 @@ class Reader {
     trace.policy = head.at("policy_granted");
     trace.epoch_ns = instant(head.at("epoch_ns"));
     trace.end_ns = instant(head.at("end_ns"));
-    trace.first_ns = head.at("first_ns").get<int64_t>();
+    trace.first_ns = instant(head.at("first_ns"));
     const Json& lost = head.at("lost");
     trace.losses = {lost.at("events"), lost.at("switches"), lost.at("forgotten"), lost.at("threads")};
     trace.ports = head.at("ports").get<std::vector<std::string>>();
@@ -104,8 +118,7 @@ class Reader {
     trace::Trace& trace = result_.trace;
     const Json& args = event.at("args");
     trace::JobSpan job;
-    if (event.at("tid").get<int64_t>() < 1) throw Wrong("has a job on no node's track");
-    job.task = static_cast<uint16_t>(index(event.at("tid").get<uint64_t>() - 1, trace.tasks.size(), "node"));
+    job.task = static_cast<uint16_t>(track_index(event, trace.tasks.size(), "node"));
     job.job = args.at("job");
     job.release_ns = instant(args.at("release_ns"));
     job.deadline_ns = instant(args.at("deadline_ns"));
@@ -137,8 +150,8 @@ class Reader {
     const auto kind = kinds.find(event.at("name").get<std::string>());
     if (kind == kinds.end()) return;
     const Json& args = event.at("args");
-    const auto track = event.at("tid").get<uint64_t>();
-    const size_t task = track == 0 ? trace::kNoTask : index(track - 1, result_.trace.tasks.size(), "node");
+    const size_t task =
+        whole(event.at("tid")) == 0 ? trace::kNoTask : track_index(event, result_.trace.tasks.size(), "node");
     result_.trace.marks.push_back({kind->second, instant(args.at("at_ns")), args.at("value"), args.at("extra"),
                                    args.at("job"), static_cast<uint16_t>(task)});
   }
@@ -152,7 +165,7 @@ class Reader {
     slice.woken_ns = args.contains("woken_us") ? from_us(args.at("woken_us")) : 0;
     slice.thread = args.at("thread");
     slice.priority = args.at("priority");
-    slice.cpu = event.at("tid").get<int32_t>() - 1;
+    slice.cpu = static_cast<int32_t>(track_index(event, kMostCpus, "CPU"));
     const std::string end = args.at("end");
     slice.end = end == "preempted" ? Slice::End::preempted : end == "asleep" ? Slice::End::asleep : Slice::End::open;
     slice.name = name(event.at("name"));
