@@ -40,7 +40,8 @@ constexpr size_t kCopied = 64 << 20, kWritten = 16 << 20;
   _exit(1);
 }
 
-[[noreturn]] void run(Load load) {
+/// noexcept: a child that runs out of memory must end here, and not go on with what its parent does.
+[[noreturn]] void run(Load load) noexcept {
   if (load == Load::memory) copy();
   if (load == Load::disk) write_and_sync();
   spin();
@@ -61,7 +62,10 @@ std::string_view to_string(Load load) {
 Burden::Burden(Load load) {
   for (int i = 0; i < 2 && load != Load::idle; ++i) {
     const pid_t pid = fork();
-    if (pid < 0) throw CannotRun("fork failed");
+    if (pid < 0) {
+      end();
+      throw CannotRun("fork failed");
+    }
     if (pid == 0) {
       prctl(PR_SET_PDEATHSIG, SIGKILL);
       run(load);
@@ -71,11 +75,17 @@ Burden::Burden(Load load) {
 }
 
 void Burden::check() const {
-  for (const pid_t pid : pids_)
-    if (waitpid(pid, nullptr, WNOHANG) != 0) throw CannotRun("a load process ended; is the current folder writable?");
+  for (const pid_t pid : pids_) {
+    // Not reaped here: until the end of this object the id must not become that of somebody else's process.
+    siginfo_t ended{};
+    if (waitid(P_PID, static_cast<id_t>(pid), &ended, WEXITED | WNOHANG | WNOWAIT) != 0 || ended.si_pid != 0)
+      throw CannotRun("a load process ended; is there memory, and is the current folder writable?");
+  }
 }
 
-Burden::~Burden() {
+Burden::~Burden() { end(); }
+
+void Burden::end() {
   for (const pid_t pid : pids_) {
     kill(pid, SIGKILL);
     waitpid(pid, nullptr, 0);

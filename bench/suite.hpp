@@ -12,7 +12,7 @@
 namespace takt::bench {
 
 struct Options {
-  int rounds = 0;  ///< 0: the suite's own default, chosen so that it takes less than about two minutes
+  int rounds = 0;  ///< interleaved; 0: the suite's own default, for about two minutes (release_loads: seven)
   int rounds_or(int standard) const { return rounds > 0 ? rounds : standard; }
 };
 

@@ -50,7 +50,7 @@ inline const char* to_text(ReadStatus status) {
   return "?";
 }
 
-/// Bits of JobCall with the reason for them.
+/// Bits of JobCall with the reason for them. `reason` must outlive the device: a literal.
 struct DeclaredCalls {
   uint32_t calls = 0;
   std::string_view reason;
@@ -60,7 +60,8 @@ struct DeclaredCalls {
 /// allocates everything) -> start(epoch) -> read ... -> stop() -> close(). open, start, stop and close run on the
 /// thread that composes the graph, before and after jobs; reads, triggers and commands on the job thread of the one
 /// node that owns the device, and they neither allocate nor lock (drivers of real hardware: one bounded read of a
-/// descriptor). All stamps are CLOCK_MONOTONIC nanoseconds of the Clock that the driver was constructed with.
+/// descriptor), except for what declared_calls() says. All stamps are CLOCK_MONOTONIC nanoseconds of the Clock that the
+/// driver was constructed with.
 class Device {
  public:
   Device() = default;

@@ -55,9 +55,9 @@ class Medium {
   }
 };
 
-std::unique_ptr<Medium> make_futex(const MediumPlan& plan);  ///< threads only; the bare wake-up, no messages
-std::unique_ptr<Medium> make_takt(const MediumPlan& plan);   ///< over iceoryx, as processes of a run have it
-std::unique_ptr<Medium> make_takt_local(const MediumPlan& plan);
+std::unique_ptr<Medium> make_futex(const MediumPlan& plan);       ///< threads only; the bare wake-up, no messages
+std::unique_ptr<Medium> make_takt(const MediumPlan& plan);        ///< over iceoryx, as processes of a run have it
+std::unique_ptr<Medium> make_takt_local(const MediumPlan& plan);  ///< over the runtime's own pools
 std::unique_ptr<Medium> make_iceoryx(const MediumPlan& plan);
 std::unique_ptr<Medium> make_zeromq_ipc(const MediumPlan& plan);
 std::unique_ptr<Medium> make_zeromq_inproc(const MediumPlan& plan);

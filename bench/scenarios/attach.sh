@@ -12,10 +12,10 @@ trap 'rm -rf "$work"; kill $(jobs -p) 2>/dev/null || true' EXIT
 one_run() { # NAME ATTENDED
   "$takt" run --for "${seconds}s" --output "$work/out" --report "$work/$1.json" >/dev/null 2>&1 & local run=$!
   if [ "$2" = yes ]; then
-    until "$takt" top --once >/dev/null 2>&1; do sleep 0.1; done
+    until "$takt" top --once >/dev/null 2>&1; do kill -0 $run 2>/dev/null || { echo "the run $1 did not start"; exit 3; }; sleep 0.1; done
     "$takt" top --json >/dev/null 2>&1 & local top=$!
     (while "$takt" echo stereo.disparity --png "$work/d.png" --count 5 &&
-      "$takt" echo ego_motion.motion --count 20 && "$takt" set obstacle_stop.margin 0.1m; do :; done) >/dev/null 2>&1 & local echoes=$!
+      "$takt" echo ego_motion.motion --count 20 && "$takt" set obstacle_stop.scan_age_max 200ms; do :; done) >/dev/null 2>&1 & local echoes=$!
   fi
   wait $run || true
   [ "$2" = yes ] && { kill $top $echoes 2>/dev/null || true; wait $top $echoes 2>/dev/null || true; }

@@ -17,16 +17,23 @@ one_run() { # VERB
   # A budget that the usual search fits into and the long one exceeds twice; the other nodes keep theirs.
   sed -E -e "s/(stereo: \{rate: 15, offset: 26ms, budget: )20ms(.*on_overrun: )degrade/\1${budget}\2$1/" \
     "$root/schedules/thesis.yaml" >"$work/$1.yaml"
-  grep -q "on_overrun: $1" "$work/$1.yaml"
+  grep -q "stereo: .*budget: $budget,.*on_overrun: $1" "$work/$1.yaml" || { echo "schedules/thesis.yaml has changed: mend this script"; exit 1; }
   "$takt" run --for "$((before + cause + after))s" --schedule "$work/$1.yaml" --set "stereo.disparities=$many" \
     --set "stereo.search=$usual" --output "$work/out" --report "$work/$1.json" >"$work/$1.log" 2>&1 & local run=$!
-  until "$takt" top --once >/dev/null 2>&1; do sleep 0.2; done
+  running() { kill -0 $run 2>/dev/null || { tail -n 2 "$work/$verb.log"; exit 3; }; }
+  local verb=$1
+  until "$takt" top --once >/dev/null 2>&1; do
+    running
+    sleep 0.2
+  done
   "$takt" top --json >"$work/$1.top" 2>/dev/null & local top=$!
   wait_until() { # until the run is that old, s
     until awk -v t="$1" 'END { exit !(match($0, /"running_s":[0-9.]+/) && substr($0, RSTART + 12, RLENGTH - 12) + 0 >= t) }' "$work/$verb.top"
-    do sleep 0.1; done
+    do
+      running
+      sleep 0.1
+    done
   }
-  local verb=$1
   wait_until $before
   "$takt" set stereo.search $many
   wait_until $((before + cause))

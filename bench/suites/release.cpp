@@ -21,9 +21,9 @@ void run_condition(Policy policy, Load load, int rounds, std::vector<Row>& rows)
   Samples all;
   uint64_t released = 0, completed = 0;
   double late = 0, raw_late = 0;  // of as many raw rounds as Takt's: the last raw round is left out
-  std::string granted, raw_granted;
+  std::string granted, raw_refused;
   const auto reference = [&] {
-    const ReleaseRound round = nanosleep_round(policy, raw_granted);
+    const ReleaseRound round = nanosleep_round(policy, raw_refused);
     if (p50.rounds() < static_cast<size_t>(rounds)) raw_late += round.over_1ms();
     p50.add_a(round.all().quantile(0.5).value_or(0));
     p99.add_a(round.all().quantile(0.99).value_or(0));
@@ -40,7 +40,7 @@ void run_condition(Policy policy, Load load, int rounds, std::vector<Row>& rows)
     reference();
   }
   burden.check();
-  const std::string name = "clock_nanosleep" + (raw_granted.empty() ? "" : " (" + raw_granted + ")");
+  const std::string name = "clock_nanosleep" + (raw_refused.empty() ? "" : " (" + raw_refused + ")");
   add_pair(rows, {"release/lateness_p50/" + variant, "us", 0, all, {}, {}, {}, granted}, name, p50);
   add_pair(rows, {"release/lateness_p99/" + variant, "us", 0, all, {}, {}, {}, granted}, name, p99);
   rows.push_back({"release/over_1ms/" + variant,

@@ -47,17 +47,19 @@ class Condition {
       all.add(takt_[rate].values());
       raw_all.add(raw_[rate].values());
     }
-    add_pair(rows, row("p50", all), raw, p50_);
-    add_pair(rows, row("p99", all), raw, p99_);
-    add_pair(rows, row("clock_nanosleep", raw_all), "", {});
+    add_pair(rows, row("p50", all, granted_), raw, p50_);
+    add_pair(rows, row("p99", all, granted_), raw, p99_);
+    add_pair(rows,
+             row("clock_nanosleep", raw_all, raw_refused_.empty() ? std::string(to_string(policy_)) : raw_refused_), "",
+             {});
     for (size_t rate = 0; rate < kRates; ++rate)
-      add_pair(rows, row(std::to_string(kReleaseRates[rate]) + "hz", takt_[rate]), raw, by_rate_[rate]);
+      add_pair(rows, row(std::to_string(kReleaseRates[rate]) + "hz", takt_[rate], granted_), raw, by_rate_[rate]);
     if (cyclictest_.size() > 0) {
       const std::string name = policy_ == Policy::deadline ? "cyclictest (SCHED_FIFO)" : "cyclictest";
-      add_pair(rows, row("15hz_to_cyclictest", takt_[0]), name, to_cyclictest_);
-      add_pair(rows, row("cyclictest_15hz", cyclictest_), "", {});
+      add_pair(rows, row("15hz_to_cyclictest", takt_[0], granted_), name, to_cyclictest_);
+      add_pair(rows, row("cyclictest_15hz", cyclictest_, "not read back"), "", {});
     }
-    Row missed = row("missed", {});
+    Row missed = row("missed", {}, granted_);
     missed.unit = "count";
     missed.value = static_cast<double>(released_) - static_cast<double>(completed_);
     rows.push_back(missed);
@@ -68,7 +70,7 @@ class Condition {
     pairs.add_a(reference.quantile(fraction).value_or(0));
     pairs.add_b(ours.quantile(fraction).value_or(0));
   }
-  Row row(const std::string& what, const Samples& samples) const {
+  Row row(const std::string& what, const Samples& samples, const std::string& granted) const {
     return {"release_loads/" + what + "/" + variant_,
             "us",
             samples.quantile(0.5).value_or(0),
@@ -76,7 +78,7 @@ class Condition {
             {},
             {},
             {},
-            granted_};
+            granted};
   }
 
   const Policy policy_;

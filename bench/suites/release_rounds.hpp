@@ -10,20 +10,21 @@
 
 namespace takt::bench {
 
-inline constexpr int64_t kReleaseRates[] = {15, 10, 7, 5, 2};
+inline constexpr int64_t kReleaseRates[] = {15, 10, 7, 5, 2};  ///< Hz
 
 struct ReleaseRound {
-  std::vector<Samples> lateness_us;  ///< per rate
-  uint64_t released = 0, completed = 0;
-  Samples all() const;
-  double over_1ms() const;
+  std::vector<Samples> lateness_us;      ///< from planned release to start, one entry per rate of kReleaseRates
+  uint64_t released = 0, completed = 0;  ///< jobs of all rates; 0 where no executor counts them
+  Samples all() const;                   ///< of all rates together, us
+  double over_1ms() const;               ///< how many of them exceed 1 ms
 };
 
 /// Takt's executor. `granted`: what the kernel gave, or why not.
 ReleaseRound takt_round(Policy policy, std::string& granted);
 /// A thread per rate that calls clock_nanosleep, each with the reservation that the executor asks for such a node.
+/// `refused`: why one of them did not get it; empty if all did.
 ReleaseRound nanosleep_round(Policy policy, std::string& refused);
-/// cyclictest at 15 Hz under the same policy (fixed or cooperative); nothing where it is not installed.
+/// cyclictest at 15 Hz under the same policy (fixed or cooperative), us; nothing where it is not installed or fails.
 std::optional<Samples> cyclictest_round(Policy policy);
 
 }  // namespace takt::bench

@@ -71,12 +71,13 @@ struct Ring {
   }
 };
 
-/// us per job of the second node, over a batch; `rings`: traced.
+/// Jobs of two neighbours of the ring in turn, without executor. They are traced while the thread has a ring of events.
 class JobLoop {
  public:
   JobLoop() : ring_(Policy::cooperative), transport_(make_local_transport(ring_.plan.ports)), board_(ring_.plan) {
     for (size_t i = 0; i < 2; ++i) tasks_[i].emplace(ring_.plan, i, *transport_, clock_, board_);
   }
+  /// us per job, mean over a batch.
   double batch_us() {
     const int64_t begin = clock_.now_ns();
     for (size_t i = 0; i < kJobsPerBatch; ++i) {
@@ -98,36 +99,52 @@ class JobLoop {
   uint64_t index_ = 0;
 };
 
+/// Figures of rounds A B A B ... A, A not traced and B traced.
+struct Compared {
+  Pairs pairs;
+  Samples traced, cost;  ///< B, and by how much each B exceeds the mean of its two neighbours
+};
+
+template <class Plain, class Traced>
+Compared compare(size_t rounds, Plain plain, Traced traced) {
+  Compared out;
+  double before = plain();
+  out.pairs.add_a(before);
+  for (size_t i = 0; i < rounds; ++i) {
+    const double on = traced();
+    const double after = plain();
+    out.pairs.add_b(on);
+    out.pairs.add_a(after);
+    out.traced.add(on);
+    out.cost.add(on - (before + after) / 2);
+    before = after;
+  }
+  return out;
+}
+
 void measure_burst(std::vector<Row>& rows) {
   std::fprintf(stderr, "trace: cost of a job's events\n");
   JobLoop loop;
   trace::Rings rings(1);
   trace::Ring* ring = rings.claim("bench");
-  Pairs pairs;
-  Samples traced, cost;
   uint64_t events = 0;
-  loop.batch_us();
-  double before = loop.batch_us();
-  pairs.add_a(before);
-  for (size_t i = 0; i < kBatches; ++i) {
-    trace::detail::thread_ring = ring;
-    const double on = loop.batch_us();
-    trace::detail::thread_ring = nullptr;
-    ring->drain([&](const trace::Event&) { ++events; });
-    const double after = loop.batch_us();
-    pairs.add_b(on);
-    pairs.add_a(after);
-    traced.add(on);
-    cost.add(on - (before + after) / 2);
-    before = after;
-  }
+  loop.batch_us();  // caches
+  const Compared figures = compare(
+      kBatches, [&] { return loop.batch_us(); },
+      [&] {
+        trace::detail::thread_ring = ring;
+        const double us = loop.batch_us();
+        trace::detail::thread_ring = nullptr;
+        ring->drain([&](const trace::Event&) { ++events; });
+        return us;
+      });
   const std::string lost = ring->lost() > 0 ? std::to_string(ring->lost()) + " events lost" : "no event lost";
-  add_pair(rows, {"trace/job/traced", "us", 0, traced, {}, {}, {}, lost}, "the same job, not traced", pairs);
-  const double median = cost.quantile(0.5).value_or(0);
+  add_pair(rows, {"trace/job/traced", "us", 0, figures.traced, {}, {}, {}, lost}, "the same job, not traced",
+           figures.pairs);
   rows.push_back({"trace/job_burst/cost",
                   "us",
-                  median,
-                  cost,
+                  figures.cost.quantile(0.5).value_or(0),
+                  figures.cost,
                   {},
                   {},
                   {},
@@ -143,7 +160,8 @@ double process_cpu_ms() {
   return ms(use.ru_utime) + ms(use.ru_stime);
 }
 
-/// CPU time of this process over a run of 14 empty nodes at 15 Hz, in percent of one CPU.
+/// CPU time of this process over a run of 14 empty nodes at 15 Hz, in percent of one CPU. `granted`: what the kernel
+/// gave; of a traced run also where its switches came from and what was lost.
 double run_pct(bool traced, std::string& granted) {
   Ring ring(Policy::fixed);
   MonotonicClock clock;
@@ -174,21 +192,12 @@ double run_pct(bool traced, std::string& granted) {
 void measure_run(int rounds, std::vector<Row>& rows) {
   std::fprintf(stderr, "trace: CPU time of a run\n");
   std::string granted, plain;
-  Pairs pairs;
-  Samples traced, cost;
-  double before = run_pct(false, plain);
-  pairs.add_a(before);
-  for (int i = 0; i < rounds; ++i) {
-    const double on = run_pct(true, granted);
-    const double after = run_pct(false, plain);
-    pairs.add_b(on);
-    pairs.add_a(after);
-    traced.add(on);
-    cost.add(on - (before + after) / 2);
-    before = after;
-  }
-  add_pair(rows, {"trace/cpu/traced", "% of a CPU", 0, traced, {}, {}, {}, granted}, "the same run, not traced", pairs);
-  rows.push_back({"trace/cpu/cost", "% of a CPU", cost.quantile(0.5).value_or(0), cost, {}, {}, {}, granted});
+  const Compared figures = compare(
+      static_cast<size_t>(rounds), [&] { return run_pct(false, plain); }, [&] { return run_pct(true, granted); });
+  add_pair(rows, {"trace/cpu/traced", "% of a CPU", 0, figures.traced, {}, {}, {}, granted}, "the same run, not traced",
+           figures.pairs);
+  rows.push_back(
+      {"trace/cpu/cost", "% of a CPU", figures.cost.quantile(0.5).value_or(0), figures.cost, {}, {}, {}, granted});
 }
 
 }  // namespace

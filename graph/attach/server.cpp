@@ -175,10 +175,11 @@ bool Server::echo(const Json& question, Connection& connection) {
                                               graph::alternatives(name, known, "outputs of this graph"))));
   }
   const bool picture = question.value("png", false);
-  const auto count = question.value("count", int64_t{1});
+  const Json count = question.value("count", Json(1));
+  if (!count.is_number_integer()) return connection.write(wrong("count is no whole number"));
   const auto tap = claim_tap(port);
   if (!tap) return connection.write(wrong("somebody else listens to " + name + " already"));
-  return stream(port, picture, count, connection);
+  return stream(port, picture, count.get<int64_t>(), connection);
 }
 
 std::shared_ptr<void> Server::claim_tap(size_t port) {

@@ -185,7 +185,7 @@ class Admitting {
       constexpr int64_t kOnce = 1000;  // longer than any window that the tests look at
       late.name += " beyond its budget";
       late.budget = excess;
-      late.period *= kOnce;
+      late.period = std::min(late.period, analysis::kLongest / kOnce) * kOnce;
       set.tasks.push_back(late);
     }
     return set;

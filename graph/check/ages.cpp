@@ -30,8 +30,7 @@ class Ages {
   Ages(const Plan& plan, const std::vector<NodeAdmission>& nodes) : plan_(plan), nodes_(nodes) {
     for (size_t t = 0; t < plan.tasks.size(); ++t)
       for (const size_t port : plan.tasks[t].ports) producer_.at_port(port) = t;
-    for (const auto& lane : lane_members(plan)) ticks_ = std::lcm(ticks_, plan.tasks[lane.front()].rate->numerator);
-    if (ticks_ > 1'000'000) ticks_ = 1;
+    ticks_ = ticks_per_ns();
   }
 
   /// Worst over the paths from a device to that task whose last edge is `edge` (kNone: any), and that pass `through`
@@ -49,6 +48,19 @@ class Ages {
 
  private:
   static constexpr size_t kMostPaths = 10'000;
+
+  /// As many as make every period whole; 1 where that is too fine.
+  int64_t ticks_per_ns() const {
+    constexpr int64_t kFinest = 1'000'000;
+    int64_t ticks = 1, longest_ns = 0;
+    for (const auto& lane : lane_members(plan_)) {
+      const Rate& rate = *plan_.tasks[lane.front()].rate;
+      ticks = std::lcm(ticks, rate.numerator);
+      if (ticks > kFinest) return 1;
+      longest_ns = std::max(longest_ns, rate.period_ns());
+    }
+    return Wide{longest_ns} * ticks > analysis::kLongest ? 1 : ticks;
+  }
 
   bool carries_stamp(const TaskPlan& task, size_t edge) const {
     return task.node == nullptr || task.node->inputs()[task.edges[edge].input] != task.node->control();
@@ -80,7 +92,7 @@ class Ages {
   }
 
   /// The task as the analysis of chains sees it, without the edge it reads.
-  ChainTask model(size_t t, bool with_bounds) {
+  ChainTask model(size_t t) const {
     size_t head = t;
     Wide every = 1;
     int64_t apart = 0;
@@ -97,24 +109,26 @@ class Ages {
       model.phased = false;
       model.period += (apart * ticks_ + model.period - 1) / model.period * model.period;
     }
-    if (with_bounds && nodes_[t].finish_ns) model.visible = visible_ns(t, *nodes_[t].finish_ns) * ticks_;
+    model.visible = visible_ns(t).value_or(0) * ticks_;
     return model;
   }
 
-  /// With `let` the output waits for the deadline, which the lane counts from the release of this very task.
-  int64_t visible_ns(size_t t, int64_t finish_ns) const {
+  /// With `let` the output waits for the deadline, which the lane counts from the release of this very task. Nothing if
+  /// a response that it depends on has no bound.
+  std::optional<int64_t> visible_ns(size_t t) const {
     const TaskPlan& task = plan_.tasks[t];
-    if (task.publish == PublishAt::asap) return finish_ns;
-    const int64_t released = task.on_task == kNone ? 0 : visible_ns(task.on_task, *nodes_[task.on_task].finish_ns);
-    return std::max(finish_ns, released + task.deadline_ns);
+    const std::optional<int64_t>& finish_ns = nodes_[t].finish_ns;
+    if (!finish_ns || task.publish == PublishAt::asap) return finish_ns;
+    const auto released = task.on_task == kNone ? std::optional<int64_t>(0) : visible_ns(task.on_task);
+    return released ? std::optional(std::max(*finish_ns, *released + task.deadline_ns)) : std::nullopt;
   }
 
   void add(const Path& path, bool as_input, AgeBound& bound) {
-    std::vector<ChainTask> chain, least;
+    std::vector<ChainTask> chain;
     for (size_t i = 0; i < path.size(); ++i) {
       const TaskPlan& task = plan_.tasks[path[i].task];
-      ChainTask m = model(path[i].task, true);
-      if (!nodes_[path[i].task].finish_ns) bound.why = fmt::format("no response of {} is bounded", task.name);
+      ChainTask m = model(path[i].task);
+      if (!visible_ns(path[i].task)) bound.why = fmt::format("no response of {} is bounded", task.name);
       if (i > 0) {
         const EdgePlan& edge = task.edges[path[i].edge];
         m.follows = task.on_task == path[i - 1].task && task.on_port == edge.port;
@@ -145,18 +159,27 @@ class Ages {
       for (const EdgePlan& other : task.edges) {
         if (!joined(other.input)) continue;
         const size_t producer = producer_.find(other.port);
-        if (producer == own || upstream(own, producer, 0) || upstream(producer, own, 0)) continue;
+        if (producer == own || upstream(own, producer) || upstream(producer, own)) continue;
         bound.why = fmt::format("{} joins outputs of {} and {}, and how often their stamps meet is not known",
                                 task.name, plan_.tasks[own].name, plan_.tasks[producer].name);
       }
     }
   }
 
-  bool upstream(size_t above, size_t below, size_t hops) const {
-    if (above == below) return true;
-    if (below == kNone || hops > plan_.tasks.size()) return false;
-    for (const EdgePlan& edge : plan_.tasks[below].edges)
-      if (!plan_.tasks[below].device && upstream(above, producer_.find(edge.port), hops + 1)) return true;
+  /// True if data of `above` reaches `below`, not through a device.
+  bool upstream(size_t above, size_t below) const {
+    if (below == kNone) return false;
+    std::vector<size_t> todo{below};
+    std::vector<char> seen(plan_.tasks.size(), 0);
+    while (!todo.empty()) {
+      const size_t t = todo.back();
+      todo.pop_back();
+      if (t == above) return true;
+      if (seen[t] || plan_.tasks[t].device) continue;
+      seen[t] = 1;
+      for (const EdgePlan& edge : plan_.tasks[t].edges)
+        if (const size_t producer = producer_.find(edge.port); producer != kNone) todo.push_back(producer);
+    }
     return false;
   }
 

@@ -52,15 +52,16 @@ void spread_over_cores(const Plan& plan, CheckResult& result) {
 
 /// SCHED_DEADLINE takes no affinity: its threads run on all CPUs of their cpuset. Empty if that is what is asked for.
 std::string wrong_cores(const GraphSpec& graph, const Plan& plan, const CheckMachine& machine) {
-  if (plan.policy != Policy::deadline || machine.online.empty() || !graph.schedule.cores_named) return "";
-  // What the schedule says; a plan may have been limited to what the process may use.
-  const std::vector<int>& asked = graph.schedule.cores.empty() ? plan.cores : graph.schedule.cores;
+  // What the schedule says: the plan may have been limited to what the process may use.
+  const std::vector<int>& asked = graph.schedule.cores;
+  if (plan.policy != Policy::deadline || machine.online.empty() || asked.empty()) return "";
   const std::vector<int>& all = machine.exclusive.empty() ? machine.online : machine.exclusive;
   const auto wanted = [&](int cpu) { return std::find(asked.begin(), asked.end(), cpu) != asked.end(); };
   if (std::all_of(all.begin(), all.end(), wanted)) return "";
   return fmt::format(
       "`cores` is [{}], but threads under the policy deadline run on all of [{}]: SCHED_DEADLINE takes no affinity. "
-      "Write `cores: [{}]`, start takt in an exclusive cpuset of the cores wanted (cgroup v2: cpuset.cpus and "
+      "Leave `cores` out, write `cores: [{}]`, start takt in an exclusive cpuset of the cores wanted (cgroup v2: "
+      "cpuset.cpus and "
       "cpuset.cpus.partition = root), or choose `policy: fixed`",
       fmt::join(asked, ", "), fmt::join(all, ", "), fmt::join(all, ", "));
 }
@@ -205,9 +206,8 @@ CheckResult check(const GraphSpec& graph, const Plan& plan, const CheckOptions& 
   add_pools(plan, result);
   spread_over_cores(plan, result);
   if (const std::string wrong = options.real_time ? wrong_cores(graph, plan, options.machine) : ""; !wrong.empty()) {
-    // What is proven for some CPUs holds on more of them, too: each sufficient test grows with their number.
-    result.verdict = Verdict::adjusted;
-    result.warnings.push_back(to_string(Problem{graph.schedule.cores_position, wrong}));
+    result.verdict = Verdict::invalid;
+    result.problems.push_back(to_string(Problem{graph.schedule.cores_position, wrong}));
   }
   check_modes(graph, plan, options, result);
   result.notes = result.modes.front().admission.notes;

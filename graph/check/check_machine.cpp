@@ -3,10 +3,10 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <ctime>
 #include <nlohmann/json.hpp>
 
+#include "graph/check/machine_figures.hpp"
 #include "rt/machine/check_support.hpp"
 #include "rt/machine/parse.hpp"
 
@@ -34,38 +34,13 @@ std::vector<int> exclusive_cpus(const machine::Facts& facts) {
   return {};
 }
 
-/// Microseconds of the file as ns; `ns` stays if there is no figure.
-void read_us(const json& root, const char* key, int64_t& ns) {
-  if (!root.contains(key) || root.at(key).is_null()) return;
-  const double us = root.at(key).get<double>();
-  if (!(us >= 0 && us < 1e9)) throw std::invalid_argument(fmt::format("`{}` is {}", key, us));
-  ns = static_cast<int64_t>(us * 1e3);
-}
-
-analysis::Overheads read_figures(const json& root, analysis::Overheads o) {
-  read_us(root, "release_us", o.release_ns);
-  read_us(root, "switch_us", o.switch_ns);
-  read_us(root, "publish_us", o.publish_ns);
-  read_us(root, "take_us", o.take_ns);
-  read_us(root, "per_mb_us", o.per_mb_ns);
-  read_us(root, "enforcement_us", o.enforcement_ns);
-  read_us(root, "tick_us", o.tick_ns);
-  if (root.contains("deadline_bandwidth") && !root["deadline_bandwidth"].is_null())
-    o.deadline_bandwidth = root["deadline_bandwidth"].get<double>();
-  return o;
-}
-
-void read_file(const json& root, const std::filesystem::path& file, const machine::Identity& here,
-               CheckMachine& found) {
-  const json& machine = root.at("machine");
-  machine::Identity where;
-  where.cpu = machine.at("cpu").get<std::string>();
-  where.cores = machine.at("cores").get<int>();
-  where.kernel = machine.at("kernel").get<std::string>();
-  found.overheads = read_figures(root, found.overheads);  // whole or not at all
+void read_file(const json& root, const std::filesystem::path& file, CheckMachine& found) {
+  const MeasuredMachine measured = read_measured_machine(root);  // whole or not at all
+  const machine::Identity &where = measured.machine, &here = found.identity;
+  found.overheads = overheads_of(measured.figures, found.overheads);
   found.measured = true;
-  const json when = root.value("measured_at", json());
-  found.overheads_from = "overheads measured" + (when.is_string() ? " " + when.get<std::string>() : std::string());
+  found.overheads_from = "overheads measured";
+  if (!measured.measured_at.empty()) found.overheads_from += " " + measured.measured_at;
   if (where == here) return;
   found.warnings.push_back(fmt::format(
       "{}: its overheads were measured on another machine ({}, {} cores, Linux {}; this is {}, {} cores, Linux "
@@ -104,7 +79,7 @@ CheckMachine check_machine(const machine::Facts& facts, const std::filesystem::p
   const auto text = file.empty() ? std::nullopt : facts.text(file.string());
   if (!text) return found;
   try {
-    read_file(json::parse(*text), file, found.identity, found);
+    read_file(json::parse(*text), file, found);
   } catch (const std::exception& problem) {
     found.warnings.push_back(
         fmt::format("{}: no overheads can be read from it ({}); call `takt doctor --measure` again", file.string(),

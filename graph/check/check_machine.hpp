@@ -27,10 +27,8 @@ struct CheckMachine {
 /// (sched_rt_runtime_us / sched_rt_period_us, from Linux 6.12 on less 5 % for the fair server).
 analysis::Overheads assumed_overheads(const machine::Facts& facts);
 
-/// The machine, with the overheads that `takt doctor --measure` left in `file`: {"machine", "measured_at",
-/// "release_us", "switch_us", "publish_us", "take_us", "per_mb_us", "enforcement_us", "tick_us", "deadline_bandwidth"}.
-/// A key that is missing or null stays as assumed; so does everything if there is no such file, or none that can be
-/// read (a warning).
+/// The machine, with the overheads that `takt doctor --measure` left in `file` (machine_figures.hpp). What was not
+/// measured stays as assumed; so does everything if there is no such file, or none that can be read (a warning).
 CheckMachine check_machine(const machine::Facts& facts, const std::filesystem::path& file);
 
 }  // namespace takt::graph

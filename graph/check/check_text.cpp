@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include "graph/check/machine_figures.hpp"
+
 namespace takt::graph {
 namespace {
 
@@ -120,20 +122,6 @@ Json mode_json(const ModeCheck& mode) {
   return row;
 }
 
-Json overheads_json(const CheckMachine& machine) {
-  const analysis::Overheads& o = machine.overheads;
-  const auto us = [](int64_t ns) { return static_cast<double>(ns) / 1e3; };
-  return {{"measured", machine.measured},
-          {"release_us", us(o.release_ns)},
-          {"switch_us", us(o.switch_ns)},
-          {"publish_us", us(o.publish_ns)},
-          {"take_us", us(o.take_ns)},
-          {"per_mb_us", us(o.per_mb_ns)},
-          {"enforcement_us", us(o.enforcement_ns)},
-          {"tick_us", us(o.tick_ns)},
-          {"deadline_bandwidth", o.deadline_bandwidth}};
-}
-
 }  // namespace
 
 std::string check_text(const GraphSpec& graph, const Plan& plan, const CheckOptions& options,
@@ -155,7 +143,8 @@ Json check_json(const Plan& plan, const CheckOptions& options, const CheckResult
   if (!whole.change.empty()) json["change"] = whole.change;
   json["utilisation"] = result.utilisation;
   json["cores"] = result.cores;
-  json["overheads"] = overheads_json(options.machine);
+  json["overheads"] = {{"measured", options.machine.measured}};
+  json["overheads"].update(overheads_json(options.machine.overheads));
   json["warnings"] = result.warnings;
   json["nodes"] = Json::array();
   for (size_t t = 0; t < plan.tasks.size(); ++t) {

@@ -80,9 +80,8 @@ SetAnswer global(const TaskSet& set, bool responses) {
 }
 
 SetAnswer cooperative(const TaskSet& set) {
-  SetAnswer one;
   if (set.cores == 1) {
-    one = per_core(set, analysis::CorePolicy::non_preemptive_edf, "non-preemptive EDF on one core");
+    SetAnswer one = per_core(set, analysis::CorePolicy::non_preemptive_edf, "non-preemptive EDF on one core");
     if (one.answer != Answer::not_proven) return one;
   }
   const analysis::CoreAnalysis found = analysis::global_non_preemptive_edf(set);

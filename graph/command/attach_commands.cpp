@@ -46,18 +46,33 @@ int ask(attach::Connection& connection, const Json& question, Json& answer) {
   return answer.contains("error") ? refuse(answer["error"].get<std::string>(), kBadInput) : kOk;
 }
 
+/// The exit code of `command`, also where the answer of the run is of another kind than it expects.
+template <class Command>
+int understood(const Command& command) {
+  try {
+    return command();
+  } catch (const Json::exception& problem) {
+    return refuse(
+        fmt::format("the answer of the run is not understood ({}); use the takt that runs it", problem.what()),
+        kDeviceOrSystem);
+  }
+}
+
+/// Throws Json::exception for an answer that is none, as a run of another version may give.
 std::string top_text(const Json& top) {
-  std::string text = fmt::format("{} ({} profile, {} transport), running {:.0f} s\n", top["graph"].get<std::string>(),
-                                 top["profile"].get<std::string>(), top["transport"].get<std::string>(),
-                                 top["running_s"].get<double>());
+  std::string text = fmt::format("{} ({} profile, {} transport), running {:.0f} s\n",
+                                 top.at("graph").get<std::string>(), top.at("profile").get<std::string>(),
+                                 top.at("transport").get<std::string>(), top.at("running_s").get<double>());
   text += fmt::format("{:<18} {:>5} {:>10} {:>7} {:>7} {:>7} {:>8} {:>8}\n", "node", "Hz", "completed", "missed",
                       "skipped", "paused", "CPU ms", "resp ms");
-  for (const Json& node : top["nodes"])
+  for (const Json& node : top.at("nodes")) {
+    const auto count = [&](const char* key) { return node.at(key).get<uint64_t>(); };
+    const Json& rate = node.at("rate_hz");
     text += fmt::format(
-        "{:<18} {:>5} {:>10} {:>7} {:>7} {:>7} {:>8.2f} {:>8.2f}\n", node["name"].get<std::string>().substr(0, 18),
-        node["rate_hz"].is_null() ? "on" : fmt::format("{:g}", node["rate_hz"].get<double>()),
-        node["completed"].get<uint64_t>(), node["deadline_misses"].get<uint64_t>(), node["skipped"].get<uint64_t>(),
-        node["paused"].get<uint64_t>(), node["exec_ms"].get<double>(), node["response_ms"].get<double>());
+        "{:<18} {:>5} {:>10} {:>7} {:>7} {:>7} {:>8.2f} {:>8.2f}\n", node.at("name").get<std::string>().substr(0, 18),
+        rate.is_null() ? "on" : fmt::format("{:g}", rate.get<double>()), count("completed"), count("deadline_misses"),
+        count("skipped"), count("paused"), node.at("exec_ms").get<double>(), node.at("response_ms").get<double>());
+  }
   return text;
 }
 
@@ -66,7 +81,6 @@ int run_top(const AttachOptions& options) {
   if (!connection) return kDeviceOrSystem;
   const bool redraw = isatty(STDOUT_FILENO) != 0 && !options.once && !options.json;
   for (bool first = true;; first = false) {
-    Json top;
     if (!connection->write({{"do", "top"}})) return kOk;  // the run has ended, as runs do
     const auto line = connection->read_line();
     if (!line) return first ? refuse("the run does not answer", kDeviceOrSystem) : kOk;
@@ -123,21 +137,23 @@ void add_attach_commands(CLI::App& app, AttachOptions& o, int& exit_code) {
   CLI::App* top = add(app, "top", "shows what a running graph does", o);
   top->add_flag("--once", o.once, "shows it once");
   top->add_flag("--json", o.json, "one JSON object a line");
-  top->callback([&] { exit_code = run_top(o); });
+  top->callback([&] { exit_code = understood([&] { return run_top(o); }); });
   CLI::App* echo = add(app, "echo", "shows messages of a running graph", o);
   echo->add_option("port", o.port, "NODE.PORT")->required();
   echo->add_option("--png", o.png, "writes the message as a picture");
   echo->add_option("--count", o.count, "how many messages")->check(CLI::PositiveNumber);
-  echo->callback([&] { exit_code = run_echo(o); });
+  echo->callback([&] { exit_code = understood([&] { return run_echo(o); }); });
   CLI::App* set = add(app, "set", "sets a parameter of a running node, between two of its jobs", o);
   set->add_option("param", o.param, "NODE.PARAM")->required();
   set->add_option("value", o.value, "with its unit")->required();
-  set->callback([&] { exit_code = run_question(o, {{"do", "set"}, {"param", o.param}, {"value", o.value}}); });
+  set->callback([&] {
+    exit_code = understood([&] { return run_question(o, {{"do", "set"}, {"param", o.param}, {"value", o.value}}); });
+  });
   CLI::App* mode = add(app, "mode", "changes the mode of a running graph", o);
   mode->add_option("mode", o.mode, "a mode of the graph, full or safe_stop")->required();
-  mode->callback([&] { exit_code = run_question(o, {{"do", "mode"}, {"mode", o.mode}}); });
+  mode->callback([&] { exit_code = understood([&] { return run_question(o, {{"do", "mode"}, {"mode", o.mode}}); }); });
   CLI::App* stop = add(app, "stop", "ends a running graph cleanly", o);
-  stop->callback([&] { exit_code = run_question(o, {{"do", "stop"}}); });
+  stop->callback([&] { exit_code = understood([&] { return run_question(o, {{"do", "stop"}}); }); });
 }
 
 }  // namespace takt::command

@@ -7,6 +7,7 @@
 #include "graph/check/check.hpp"
 #include "graph/command/machine_file.hpp"
 #include "graph/command/prepare.hpp"
+#include "graph/command/run_support.hpp"
 #include "hal/drivers.hpp"
 
 namespace takt::command {
@@ -17,6 +18,7 @@ int check_graph(const RunOptions& options, bool json) {
     if (json) std::printf("%s\n", graph::check_failed(prepared.problems).json.dump(2).c_str());
     return code;
   }
+  choose_cores(prepared.composition->plan.cores, prepared.graph->adjusted);
   const graph::CheckResult result =
       graph::check(*prepared.graph, prepared.composition->plan,
                    {graph::check_machine(machine::SystemFacts(), machine_file()), true, true});

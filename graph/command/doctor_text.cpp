@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 
+#include "graph/check/machine_figures.hpp"
 #include "rt/machine/parse.hpp"
 
 namespace takt::command {
@@ -86,10 +87,6 @@ std::string doctor_text(const machine::Identity& machine, const std::vector<Find
   return text + "\n";
 }
 
-Json to_json(const machine::Identity& machine) {
-  return {{"cpu", machine.cpu}, {"cores", machine.cores}, {"kernel", machine.kernel}};
-}
-
 Json doctor_json(const machine::Identity& machine, const std::vector<Finding>& findings) {
   Json checks = Json::array(), counts;
   for (const Finding& finding : findings) {
@@ -103,7 +100,7 @@ Json doctor_json(const machine::Identity& machine, const std::vector<Finding>& f
                       {"fixes", std::move(fixes)}});
   }
   for (const Status status : kStatuses) counts[std::string(machine::to_string(status))] = count(findings, status);
-  return {{"machine", to_json(machine)}, {"checks", std::move(checks)}, {"counts", std::move(counts)}};
+  return {{"machine", graph::identity_json(machine)}, {"checks", std::move(checks)}, {"counts", std::move(counts)}};
 }
 
 }  // namespace takt::command

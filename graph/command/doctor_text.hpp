@@ -17,6 +17,5 @@ std::string findings_text(const std::vector<machine::Finding>& findings);
 
 /// {"machine", "checks": [{"group", "name", "status", "found", "meaning", "fixes": [{"where", "text"}]}], "counts"}.
 nlohmann::ordered_json doctor_json(const machine::Identity& machine, const std::vector<machine::Finding>& findings);
-nlohmann::ordered_json to_json(const machine::Identity& machine);
 
 }  // namespace takt::command

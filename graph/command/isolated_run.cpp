@@ -81,7 +81,7 @@ class IsolatedRun {
   IsolatedRun& operator=(const IsolatedRun&) = delete;
 
   int run() {
-    limit_cores(plan_.cores, adjusted_);
+    choose_cores(plan_.cores, adjusted_);
     for (size_t p = 0; p < partition_.names.size(); ++p)
       group_.start(partition_.names[p], [this, p, supervisor = getpid()]() -> int {
         try {

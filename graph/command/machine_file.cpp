@@ -11,7 +11,7 @@
 #include <ctime>
 #include <fstream>
 
-#include "graph/command/doctor_text.hpp"
+#include "graph/check/machine_figures.hpp"
 
 namespace takt::command {
 namespace {
@@ -59,10 +59,10 @@ double per_mb_us(const TransferCosts& costs) {
 
 /// The dearer of the two transports, as far as they were measured.
 template <class Figure>
-Json dearer(const machine::Measured& m, const Figure& figure) {
-  Json result = nullptr;
+std::optional<double> dearer(const machine::Measured& m, const Figure& figure) {
+  std::optional<double> result;
   for (const auto* costs : {&m.local, &m.iceoryx})
-    if (*costs) result = std::max(result.is_null() ? 0.0 : result.get<double>(), figure(**costs));
+    if (*costs) result = std::max(result.value_or(0), figure(**costs));
   return result;
 }
 
@@ -104,28 +104,21 @@ std::filesystem::path machine_file() {
 }
 
 Json measured_json(const machine::Identity& machine, const std::string& measured_at, const machine::Measured& m) {
-  Json json;
-  const auto set = [&](const char* key, const Json& value) {
-    if (!value.is_null()) json[key] = value;
-  };
-  const auto charged = [](const std::optional<Spread>& spread) {
-    return spread ? Json(spread->charged_us()) : Json(nullptr);
-  };
-  json["machine"] = takt::command::to_json(machine);
-  json["measured_at"] = measured_at;
-  set("policy", m.release ? Json(to_string(m.release->policy)) : Json(nullptr));
-  set("release_us", charged(m.release ? std::optional(m.release->lateness) : std::nullopt));
-  set("switch_us", charged(m.context_switch ? std::optional(m.context_switch->one_way) : std::nullopt));
-  set("publish_us", dearer(m, [](const TransferCosts& costs) { return costs[0].publish.charged_us(); }));
-  set("take_us", dearer(m, [](const TransferCosts& costs) { return costs[0].take.charged_us(); }));
-  set("per_mb_us", dearer(m, per_mb_us));
-  set("enforcement_us", m.reservation_overrun ? Json(m.reservation_overrun->max_us) : Json(nullptr));
-  set("tick_us", m.tick_us ? Json(*m.tick_us) : Json(nullptr));
-  set("deadline_bandwidth", m.bandwidth ? Json(m.bandwidth->accepted) : Json(nullptr));
+  graph::MachineFigures figures;
+  if (m.release) figures.release = m.release->lateness.charged_us();
+  if (m.context_switch) figures.context_switch = m.context_switch->one_way.charged_us();
+  figures.publish = dearer(m, [](const TransferCosts& costs) { return costs[0].publish.charged_us(); });
+  figures.take = dearer(m, [](const TransferCosts& costs) { return costs[0].take.charged_us(); });
+  figures.per_mb = dearer(m, per_mb_us);
+  if (m.reservation_overrun) figures.enforcement = m.reservation_overrun->max_us;
+  figures.tick = m.tick_us;
+  if (m.bandwidth) figures.deadline_bandwidth = m.bandwidth->accepted;
+  Json json = graph::measured_machine_json({machine, measured_at, figures});
+  if (m.release) json["policy"] = to_string(m.release->policy);
   Json& details = json["details"];
   details["release_us"] = m.release ? to_json(m.release->lateness) : Json(nullptr);
   details["switch_us"] = m.context_switch ? to_json(m.context_switch->one_way) : Json(nullptr);
-  details["switch_policy"] = m.context_switch && m.context_switch->fixed ? "fixed" : "cooperative";
+  if (m.context_switch) details["switch_policy"] = m.context_switch->fixed ? "fixed" : "cooperative";
   details["local"] = to_json(m.local);
   details["iceoryx"] = to_json(m.iceoryx);
   details["overrun_us"] = {{"budget", static_cast<double>(machine::kEnforcedBudget_ns) / 1e3},
@@ -148,6 +141,7 @@ std::string measured_text(const machine::Measured& m) {
   else add("release", std::nullopt);
   add("context switch", m.context_switch ? std::optional(m.context_switch->one_way) : std::nullopt);
   if (m.local) text += rows("local", *m.local);
+  else add("local", std::nullopt);
   if (m.iceoryx) text += rows("iceoryx", *m.iceoryx);
   else add("iceoryx", std::nullopt);
   add("1 ms reservation overrun by", m.reservation_overrun);
@@ -185,7 +179,10 @@ std::string write_whole(const std::filesystem::path& file, const std::string& te
   }
   out.close();
   std::filesystem::rename(part, file, error);
-  return error ? error.message() : "";
+  if (!error) return "";
+  const std::string why = error.message();
+  std::filesystem::remove(part, error);
+  return why;
 }
 
 std::string utc_now() {

@@ -16,12 +16,11 @@ std::filesystem::path machine_file(const char* takt_machine, const char* cache_h
 /// The same from the environment of this process.
 std::filesystem::path machine_file();
 
-/// {"machine", "measured_at", "policy", "release_us", "switch_us", "publish_us", "take_us", "per_mb_us",
-///  "enforcement_us", "tick_us", "deadline_bandwidth", "details": {...}}. The figures to be charged are plain numbers:
-/// 99th percentiles of release, switch, publish and take (those of 128 bytes, the dearer of the transports measured);
-/// per_mb_us what publish and take together grow by with each megabyte; enforcement_us the largest overrun seen of a
-/// SCHED_DEADLINE reservation. a key is
-/// absent where these rights did not allow to measure it. `details` has medians, tails and samples.
+/// graph::measured_machine_json(), which `takt check` reads, with "policy" (the one that `release_us` was measured
+/// under) and "details": medians, tails and samples. Charged are the 99th percentiles of release, switch, publish and
+/// take (of 128 bytes, the dearer of the transports measured; the largest where samples are too few for one); per_mb_us
+/// is what publish and take together grow by with each megabyte, enforcement_us the largest overrun seen of a
+/// SCHED_DEADLINE reservation. A key is absent where these rights did not allow to measure it.
 nlohmann::ordered_json measured_json(const machine::Identity& machine, const std::string& measured_at,
                                      const machine::Measured& measured);
 /// The same for people.

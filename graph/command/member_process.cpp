@@ -78,7 +78,7 @@ int run_member(const RunOptions& options, const graph::GraphSpec& graph, const g
   }
   Plan& plan = prepared.composition->plan;
   std::vector<std::string> told;  // the supervisor says it
-  limit_cores(plan.cores, told);
+  choose_cores(plan.cores, told);
   record.state.store(ProcessRecord::composed);
   wait_until([&] { return board.carrier().load() != RunBoard::no_carrier; });
   prepare_process();

@@ -26,8 +26,8 @@ class BoardExchange final : public graph::CapacityExchange {
 bool wait_until(const std::function<bool()>& done, const std::function<bool()>& broken = {});
 
 /// One process of an isolated run, as the supervisor's fork enters it: composes its part, joins the transport that the
-/// board names (the daemon of process `supervisor`, or `pools`), runs until the board's stop,
-/// traced into `rings` where there are any. Returns the exit code.
+/// board names (the daemon of process `supervisor`, or `pools`), runs until the board's stop, traced into `rings` if it
+/// is not null. Returns the exit code.
 int run_member(const RunOptions& options, const graph::GraphSpec& graph, const graph::Partition& partition,
                size_t process, int supervisor, RunBoard& board, const PoolFile& pools, trace::Rings* rings);
 

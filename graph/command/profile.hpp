@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What `takt profile` makes of measured execution times. Pure; the measuring itself is in profile_run.hpp.
+// What `takt profile` makes of measured execution times. Pure; the measuring itself is in profile_command.cpp.
 #pragma once
 #include <cstdint>
 #include <map>

@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <fstream>
 #include <iterator>
+#include <stdexcept>
 
 #include "graph/check/measured.hpp"
 #include "graph/command/machine_file.hpp"
@@ -41,6 +42,7 @@ void alone(Plan& plan) {
 
 /// Budgets that do not throttle: what the largest job alone took, and a half more.
 void unthrottled(Plan& plan, const std::vector<NodeProfile>& nodes) {
+  if (plan.tasks.size() != nodes.size()) throw std::invalid_argument("the graph was changed meanwhile; measure again");
   for (size_t t = 0; t < plan.tasks.size(); ++t) {
     const int64_t seen = nodes[t].alone.max_ns() / 2 * 3;
     if (plan.tasks[t].budget_ns > 0 && seen > plan.tasks[t].budget_ns)
@@ -60,7 +62,7 @@ int pass(const RunOptions& options, const char* name, const Change& change, cons
     return tell_problems(prepared.problems.size()), code;
   Plan& plan = prepared.composition->plan;
   std::vector<std::string> adjusted;
-  limit_cores(plan.cores, adjusted);
+  choose_cores(plan.cores, adjusted);
   let_jobs_finish(plan);
   change(plan);
   std::fprintf(stderr, "takt profile: %s, %g s\n", name, options.duration_s);
@@ -149,6 +151,9 @@ int profile_graph(const ProfileOptions& options) {
   if (!options.compare.empty() && options.run.load.schedule)
     return refuse("--compare names the schedule; leave --schedule out", kBadInput);
   if (options.run.duration_s <= 0) return refuse("--for: a profile needs an end; write for instance 20s", kBadInput);
+  // Before both passes; --in-place names its file only once the graph is loaded.
+  if (const std::string why = options.write.empty() ? "" : cannot_write(options.write); !why.empty())
+    return refuse(fmt::format("{}: {}; choose another --write", options.write.string(), why), kBadInput);
   RunOptions run = options.run;
   if (!options.compare.empty()) run.load.schedule = options.compare;
   const StopOnSignal guard;

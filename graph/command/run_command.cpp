@@ -99,7 +99,7 @@ int run_in_one_process(const RunOptions& options, Prepared& prepared, std::vecto
     std::fputs("takt: stopped before the run began\n", stderr);
     return kOk;
   }
-  limit_cores(prepared.composition->plan.cores, adjusted);
+  choose_cores(prepared.composition->plan.cores, adjusted);
   if (const int code = admit(options, *prepared.graph, prepared.composition->plan, adjusted); code != kOk) return code;
   const CpuLatencyHold latency = hold_cpu_dma_latency();
   std::vector<std::string> lacks = prepare_process();

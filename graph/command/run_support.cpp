@@ -79,18 +79,20 @@ KeptPlace::~KeptPlace() {
   if (folder_ >= 0) close(folder_);
 }
 
-void limit_cores(std::vector<int>& cores, std::vector<std::string>& adjusted) {
+void choose_cores(std::vector<int>& cores, std::vector<std::string>& adjusted) {
   cpu_set_t allowed;
-  if (cores.empty() || sched_getaffinity(0, sizeof allowed, &allowed) != 0) return;
+  if (sched_getaffinity(0, sizeof allowed, &allowed) != 0) return;
   std::vector<int> usable, all;
   for (int core = 0; core < CPU_SETSIZE; ++core)
     if (CPU_ISSET(core, &allowed)) all.push_back(core);
   for (const int core : cores)
     if (core >= 0 && core < CPU_SETSIZE && CPU_ISSET(core, &allowed)) usable.push_back(core);
-  if (usable.size() == cores.size()) return;
+  const bool named = !cores.empty();
+  if (named && usable.size() == cores.size()) return;
   if (usable.empty()) usable = all;
-  adjusted.push_back(fmt::format("cores [{}] -> [{}]: this process may use no others", fmt::join(cores, ", "),
-                                 fmt::join(usable, ", ")));
+  if (named)
+    adjusted.push_back(fmt::format("cores [{}] -> [{}]: this process may use no others", fmt::join(cores, ", "),
+                                   fmt::join(usable, ", ")));
   cores = usable;
 }
 
@@ -101,8 +103,6 @@ int admit(const RunOptions& options, const graph::GraphSpec& graph, const Plan& 
   how.real_time = options.clock != "virtual";
   const graph::CheckResult check = graph::check(graph, plan, how);
   if (check.verdict == graph::Verdict::invalid) return refuse(check.text, kBadInput);
-  if (check.verdict == graph::Verdict::adjusted)
-    adjusted.insert(adjusted.end(), check.warnings.begin(), check.warnings.end());
   if (check.admitted || options.unchecked) return kOk;
   if (plan.policy != Policy::cooperative || check.answer != graph::Answer::not_proven)
     return refuse(check.text + "(--unchecked runs it all the same)", kNotOk);

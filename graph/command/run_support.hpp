@@ -46,8 +46,9 @@ class KeptPlace {
   int folder_ = -1;
 };
 
-/// The cores of the schedule that this process may use; none of them: all it may use. Says what it changed.
-void limit_cores(std::vector<int>& cores, std::vector<std::string>& adjusted);
+/// The cores of the schedule that this process may use; all it may use if the schedule names none, or none of those.
+/// Says what it changed of cores that the schedule names.
+void choose_cores(std::vector<int>& cores, std::vector<std::string>& adjusted);
 
 /// Asks the check. kOk: the run may go on; else what was refused is on stderr and this is the exit code. --unchecked
 /// goes on in spite of everything but Invalid input. So does `cooperative` in spite of an answer that is not proven,

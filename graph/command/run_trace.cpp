@@ -2,12 +2,12 @@
 #include "graph/command/run_trace.hpp"
 
 #include <fmt/format.h>
-#include <sched.h>
 
 #include <algorithm>
 #include <fstream>
 
 #include "graph/explain/trace_file.hpp"
+#include "rt/machine/facts.hpp"
 #include "takt_commit.hpp"
 
 namespace takt::command {
@@ -16,12 +16,8 @@ namespace {
 /// The CPUs on which jobs may run: those of the schedule where threads are pinned to them, else all that are allowed.
 std::vector<int> cpus_of(const Plan& plan) {
   if (plan.policy == Policy::fixed && !plan.cores.empty()) return plan.cores;
-  std::vector<int> cpus;
-  cpu_set_t allowed;
-  if (sched_getaffinity(0, sizeof allowed, &allowed) != 0) return plan.cores;
-  for (int cpu = 0; cpu < CPU_SETSIZE; ++cpu)
-    if (CPU_ISSET(static_cast<size_t>(cpu), &allowed)) cpus.push_back(cpu);
-  return cpus;
+  const std::vector<int> allowed = machine::SystemFacts().allowed_cpus();
+  return allowed.empty() ? plan.cores : allowed;
 }
 
 /// Changes of mode belong to no thread; the board has them all.

@@ -14,7 +14,7 @@ std::string figure(const Json& value, const char* format) {
   return value.is_null() ? "-" : fmt::format(fmt::runtime(format), value.get<double>());
 }
 
-// Every line but those of `adjusted` fits a terminal of 80 columns.
+// The table fits a terminal of 80 columns; lines of events and of `adjusted` may be longer.
 constexpr const char* kRow = "{:<16} {:>3} {:>4} {:>4} {:>4} {:>4} {:>5} {:>5} {:>6} {:>6} {:>5} {:>6}\n";
 
 std::string node_line(const Json& node) {

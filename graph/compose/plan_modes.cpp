@@ -9,7 +9,7 @@
 namespace takt::graph {
 namespace {
 
-std::set<std::string> without(const GraphSpec& graph, const std::string& mode) {
+std::set<std::string> left_out_by(const GraphSpec& graph, const std::string& mode) {
   for (const ModeSpec& spec : graph.modes)
     if (spec.name == mode) return {spec.without.begin(), spec.without.end()};
   return {};
@@ -48,10 +48,10 @@ ModePlan implied_safe_stop(const Plan& plan) {
 }  // namespace
 
 void add_modes(const GraphSpec& graph, Plan& plan) {
-  const std::set<std::string> missing = without(graph, graph.mode);
+  const std::set<std::string> missing = left_out_by(graph, graph.mode);
   plan.modes = {with_all_but(plan, graph.mode, {})};
   const auto add = [&](const std::string& name) {
-    const std::set<std::string> left_out = without(graph, name);
+    const std::set<std::string> left_out = left_out_by(graph, name);
     const bool reachable =
         name == kSafeStopMode || std::includes(left_out.begin(), left_out.end(), missing.begin(), missing.end());
     if (name != graph.mode && reachable) plan.modes.push_back(with_all_but(plan, name, left_out));

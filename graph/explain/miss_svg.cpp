@@ -44,8 +44,7 @@ class MissPicture {
     const int64_t margin = std::max<int64_t>((end - begin) / 12, 100'000);
     first_ns_ = begin - margin;
     last_ns_ = end + margin;
-    label_px_ = view::text_width_px(node(), 12) + 24;
-    label_px_ = std::max(label_px_, 70.0);
+    label_px_ = std::max(view::text_width_px(node(), 12) + 24, 70.0);
   }
 
   std::string draw() {
@@ -77,9 +76,12 @@ class MissPicture {
   }
 
   double x(int64_t ns) const {
-    return label_px_ + static_cast<double>(ns - first_ns_) / static_cast<double>(last_ns_ - first_ns_) *
-                           (kWidth - label_px_ - kRight);
+    return label_px_ +
+           (static_cast<double>(ns) - static_cast<double>(first_ns_)) / span_ns() * (kWidth - label_px_ - kRight);
   }
+
+  /// In double: a file may hold any instants.
+  double span_ns() const { return static_cast<double>(last_ns_) - static_cast<double>(first_ns_); }
 
   std::string draw_bar(const Piece& piece, bool of_job) {
     const double left = x(piece.from_ns), width = std::max(kLeastPx, x(piece.to_ns) - left);
@@ -115,7 +117,7 @@ class MissPicture {
 
   /// Times after the release, at steps of 1, 2 or 5 of a decade.
   std::string draw_axis() const {
-    const double span_ms = static_cast<double>(last_ns_ - first_ns_) / 1e6;
+    const double span_ms = span_ns() / 1e6;
     double step_ms = std::pow(10, std::floor(std::log10(span_ms / 8)));
     while (span_ms / step_ms > 16) step_ms *= 2;
     std::string text;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 #include <stdexcept>
+#include <utility>
 
 #include "graph/explain/trace_file.hpp"
 
@@ -41,17 +42,24 @@ class Reader {
 
  private:
   static int64_t whole(const Json& value) {
-    if (!value.is_number_integer()) throw Wrong(fmt::format("has {} where a whole number belongs", value.dump()));
+    if (!value.is_number_integer()) throw Wrong(fmt::format("has {} where a whole number belongs", value.type_name()));
     return value.get<int64_t>();
   }
 
-  static int64_t instant(const Json& value) {
-    const int64_t ns = whole(value);
+  template <class T>
+  static T number(const Json& value) {
+    const int64_t number = whole(value);
+    if (!std::in_range<T>(number)) throw Wrong(fmt::format("has a number out of range: {}", number));
+    return static_cast<T>(number);
+  }
+
+  static int64_t instant(const Json& value) { return instant(whole(value)); }
+  static int64_t instant(int64_t ns) {
     if (ns > kLatestNs || ns < -kLatestNs) throw Wrong(fmt::format("has an instant out of range: {}", ns));
     return ns;
   }
 
-  int64_t from_us(const Json& value) const { return span_us(value) + result_.trace.epoch_ns; }
+  int64_t from_us(const Json& value) const { return instant(span_us(value) + result_.trace.epoch_ns); }
   static int64_t span_us(const Json& value) {
     const double ns = value.get<double>() * 1e3;
     if (!(std::abs(ns) < 1e18)) throw Wrong("has an instant out of range");
@@ -84,12 +92,15 @@ class Reader {
     trace.end_ns = instant(head.at("end_ns"));
     trace.first_ns = instant(head.at("first_ns"));
     const Json& lost = head.at("lost");
-    trace.losses = {lost.at("events"), lost.at("switches"), lost.at("forgotten"), lost.at("threads")};
+    trace.losses = {number<uint64_t>(lost.at("events")), number<uint64_t>(lost.at("switches")),
+                    number<uint64_t>(lost.at("forgotten")), number<uint64_t>(lost.at("threads"))};
     trace.ports = head.at("ports").get<std::vector<std::string>>();
     for (const Json& task : head.at("tasks")) read_task(task);
-    for (const Json& thread : head.at("threads")) trace.threads.push_back({thread.at(0), thread.at(1)});
+    for (const Json& thread : head.at("threads"))
+      trace.threads.push_back({number<int32_t>(thread.at(0)), thread.at(1)});
     for (const Json& steal : head.at("steals"))
-      trace.steals.push_back({instant(steal.at(0)), instant(steal.at(1)), instant(steal.at(2)), steal.at(3)});
+      trace.steals.push_back(
+          {instant(steal.at(0)), instant(steal.at(1)), instant(steal.at(2)), number<int>(steal.at(3))});
   }
 
   void read_task(const Json& json) {
@@ -119,7 +130,7 @@ class Reader {
     const Json& args = event.at("args");
     trace::JobSpan job;
     job.task = static_cast<uint16_t>(track_index(event, trace.tasks.size(), "node"));
-    job.job = args.at("job");
+    job.job = number<uint32_t>(args.at("job"));
     job.release_ns = instant(args.at("release_ns"));
     job.deadline_ns = instant(args.at("deadline_ns"));
     job.start_ns = instant(args.at("start_ns"));
@@ -127,18 +138,18 @@ class Reader {
     job.published_ns = instant(args.at("published_ns"));
     job.cpu_ns = instant(args.at("cpu_ns"));
     if (job.published_ns < job.start_ns) throw Wrong(fmt::format("has job {} that ends before it starts", job.job));
-    job.thread = args.at("thread");
-    job.start_cpu = args.at("start_cpu");
-    job.cpu = args.at("cpu");
-    job.level = args.at("level");
+    job.thread = number<int32_t>(args.at("thread"));
+    job.start_cpu = number<int>(args.at("start_cpu"));
+    job.cpu = number<int>(args.at("cpu"));
+    job.level = number<int>(args.at("level"));
     job.late = args.at("late");
     const trace::TaskFacts& task = trace.tasks[job.task];
     for (const Json& l : args.at("latched"))
-      job.latched.push_back(
-          {static_cast<uint8_t>(index(l.at(0), task.edges.size(), "edge")), l.at(1), instant(l.at(2))});
+      job.latched.push_back({static_cast<uint8_t>(index(l.at(0), task.edges.size(), "edge")), number<uint64_t>(l.at(1)),
+                             instant(l.at(2))});
     for (const Json& p : args.at("published"))
-      job.published.push_back(
-          {static_cast<uint8_t>(index(p.at(0), task.ports.size(), "output")), p.at(1), instant(p.at(2))});
+      job.published.push_back({static_cast<uint8_t>(index(p.at(0), task.ports.size(), "output")),
+                               number<uint64_t>(p.at(1)), instant(p.at(2))});
     trace.jobs.push_back(std::move(job));
   }
 
@@ -152,19 +163,20 @@ class Reader {
     const Json& args = event.at("args");
     const size_t task =
         whole(event.at("tid")) == 0 ? trace::kNoTask : track_index(event, result_.trace.tasks.size(), "node");
-    result_.trace.marks.push_back({kind->second, instant(args.at("at_ns")), args.at("value"), args.at("extra"),
-                                   args.at("job"), static_cast<uint16_t>(task)});
+    result_.trace.marks.push_back({kind->second, instant(args.at("at_ns")), instant(args.at("value")),
+                                   instant(args.at("extra")), number<uint32_t>(args.at("job")),
+                                   static_cast<uint16_t>(task)});
   }
 
   void read_slice(const Json& event) {
     const Json& args = event.at("args");
     Slice slice;
     slice.from_ns = from_us(event.at("ts"));
-    slice.to_ns = slice.from_ns + span_us(event.at("dur"));
+    slice.to_ns = instant(slice.from_ns + span_us(event.at("dur")));
     if (slice.to_ns < slice.from_ns) throw Wrong("has a stretch on a CPU that ends before it starts");
     slice.woken_ns = args.contains("woken_us") ? from_us(args.at("woken_us")) : 0;
-    slice.thread = args.at("thread");
-    slice.priority = args.at("priority");
+    slice.thread = number<int32_t>(args.at("thread"));
+    slice.priority = number<int32_t>(args.at("priority"));
     slice.cpu = static_cast<int32_t>(track_index(event, kMostCpus, "CPU"));
     const std::string end = args.at("end");
     slice.end = end == "preempted" ? Slice::End::preempted : end == "asleep" ? Slice::End::asleep : Slice::End::open;

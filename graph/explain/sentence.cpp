@@ -21,7 +21,7 @@ constexpr size_t kNamedCulprits = 3;   // of one cause; the others are told toge
 int decimals(int64_t miss_ns) { return std::abs(miss_ns) >= 10'000'000 ? 1 : std::abs(miss_ns) >= 1'000'000 ? 2 : 3; }
 
 int64_t rounded(int64_t ns, int digits) {
-  const auto unit = static_cast<double>(1e6 / std::pow(10, digits));
+  const double unit = 1e6 / std::pow(10, digits);
   return std::llround(static_cast<double>(ns) / unit);
 }
 
@@ -34,7 +34,7 @@ std::vector<Part> grouped(const std::vector<Part>& parts) {
   std::vector<Part> result;
   for (size_t first = 0, last = 0; first < parts.size(); first = last) {
     while (last < parts.size() && parts[last].cause == parts[first].cause) ++last;
-    const size_t named = std::min(last, first + (last - first > kNamedCulprits + 1 ? kNamedCulprits : last - first));
+    const size_t named = last - first > kNamedCulprits + 1 ? first + kNamedCulprits : last;
     for (size_t i = first; i < named; ++i) result.push_back(parts[i]);
     if (named == last) continue;
     Part others = parts[named];

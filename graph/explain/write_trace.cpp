@@ -17,7 +17,9 @@ using trace::Slice;
 
 constexpr int kNodes = 1, kCpus = 2;  // the two groups of tracks ("processes" of the format)
 
-std::string quoted(const std::string& text) { return Json(text).dump(-1, ' ', false, Json::error_handler_t::replace); }
+/// A name that the kernel cut within a letter costs that letter, not the trace.
+std::string json_text(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
+std::string quoted(const std::string& text) { return json_text(text); }
 
 const char* to_string(Slice::End end) {
   return end == Slice::End::preempted ? "preempted" : end == Slice::End::asleep ? "asleep" : "open";
@@ -28,7 +30,7 @@ class Writer {
   Writer(std::ostream& out, const trace::Trace& trace) : out_(out), trace_(trace) {}
 
   void write(const Json& head) {
-    fmt::print(out_, "{{\"displayTimeUnit\":\"ms\",\"otherData\":{},\n\"traceEvents\":[\n", facts(head).dump());
+    fmt::print(out_, "{{\"displayTimeUnit\":\"ms\",\"otherData\":{},\n\"traceEvents\":[\n", json_text(facts(head)));
     name_tracks();
     for (const JobSpan& job : trace_.jobs) write_job(job);
     write_messages();

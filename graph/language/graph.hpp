@@ -106,9 +106,8 @@ struct MeasuredSpec {
 struct ScheduleSpec {
   std::string name, file;
   Policy policy = Policy::deadline;
-  std::vector<int> cores;
+  std::vector<int> cores;  ///< empty: all that the process may use
   Position cores_position;
-  bool cores_named = true;                       ///< false: the schedule has no `cores`, and one is taken
   std::map<std::string, ScheduleEntry> entries;  ///< by node or device id
   std::optional<MeasuredSpec> measured;          ///< nothing: the budgets are estimates
 };

@@ -86,10 +86,13 @@ std::string trim(std::string_view text) {
   return std::string(text.substr(first, text.find_last_not_of(' ') - first + 1));
 }
 
-/// The value of `q` in SI units, rounded once if the unit is rational.
+/// The value of `q` in SI units, rounded once if the unit is rational; twice where the product is too large for Wide.
 double si_value(const Quantity& q, const Unit& unit) {
-  return static_cast<double>(q.numerator * unit.numerator) / static_cast<double>(q.denominator * unit.denominator) *
-         unit.irrational;
+  Wide above = 0;
+  const double numerator = __builtin_mul_overflow(q.numerator, Wide{unit.numerator}, &above)
+                               ? static_cast<double>(q.numerator) * static_cast<double>(unit.numerator)
+                               : static_cast<double>(above);
+  return numerator / static_cast<double>(q.denominator * unit.denominator) * unit.irrational;
 }
 
 std::string unit_hint(std::string_view unit) { return join_words(units_like(unit), " | "); }

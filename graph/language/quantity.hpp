@@ -11,7 +11,7 @@
 
 namespace takt::graph {
 
-/// Wide enough for 18 digits times any unit.
+/// Wide enough for 18 digits times any unit; digits with an exponent and a unit may exceed it.
 __extension__ typedef __int128 Wide;
 
 /// A number as written, exact: numerator / denominator, and the unit word behind it ("" if there is none).

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
+#include <limits>
+
 #include "graph/language/loader.hpp"
 
 namespace takt::graph {
@@ -8,15 +10,21 @@ namespace {
 
 using nlohmann::json;
 
-/// What is missing or of another type was reported by the schema.
-template <class Value>
-void read(const json& map, const char* key, Value& value) {
-  if (!map.contains(key)) return;
-  if constexpr (std::is_same_v<Value, std::string>) {
-    if (map[key].is_string()) value = map[key].template get<std::string>();
-  } else {
-    if (map[key].is_number()) value = map[key].template get<Value>();
-  }
+// What is missing, of another type or out of range was reported by the schema, and is passed over here.
+
+void read(const json& map, const char* key, std::string& value) {
+  if (map.contains(key) && map[key].is_string()) value = map[key].get<std::string>();
+}
+
+void read(const json& map, const char* key, double& value) {
+  if (map.contains(key) && map[key].is_number()) value = map[key].get<double>();
+}
+
+template <class Whole>
+void read(const json& map, const char* key, Whole& value) {
+  if (map.contains(key) && map[key].is_number_integer() && map[key] >= 0 &&
+      map[key] <= std::numeric_limits<Whole>::max())
+    value = map[key].template get<Whole>();
 }
 
 }  // namespace

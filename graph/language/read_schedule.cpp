@@ -80,8 +80,6 @@ void Loader::read_schedule() {
   if (cores.is_array())
     for (const auto& core : cores)
       if (core.is_number_integer() && core >= 0 && core <= 1023) spec_.schedule.cores.push_back(core.get<int>());
-  spec_.schedule.cores_named = root.contains("cores");
-  if (!spec_.schedule.cores_named) spec_.schedule.cores = {0};
   if (root.contains("measured") && root["measured"].is_object()) read_measured(root["measured"]);
   const json nodes = root.value("nodes", json::object());
   if (!nodes.is_object()) return;

@@ -49,8 +49,10 @@ DiagramBox box_of(const GraphSpec& graph, const std::string& id, std::string typ
 }
 
 std::string subtitle_of(const GraphSpec& graph) {
+  const std::string cores =
+      graph.schedule.cores.empty() ? "all" : fmt::format("{}", fmt::join(graph.schedule.cores, " "));
   return fmt::format("schedule {}, profile {}, mode {}, policy {}, cores {}", graph.schedule.name, graph.profile,
-                     graph.mode, to_string(graph.schedule.policy), fmt::join(graph.schedule.cores, " "));
+                     graph.mode, to_string(graph.schedule.policy), cores);
 }
 
 class Maker {

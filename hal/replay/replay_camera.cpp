@@ -163,7 +163,7 @@ void ReplayCamera::trigger(int64_t at_ns) {
 DeclaredCalls ReplayCamera::declared_calls() const {
   if (!store_ || store_->left.empty() || !store_->left.back().empty()) return {};
   return {bit(JobCall::malloc) | bit(JobCall::mmap) | bit(JobCall::file) | bit(JobCall::stdio),
-          "the recording is larger than `memory_limit`: frames are decoded as they are read"};
+          "the recording is larger than what is held in memory: its frames are decoded as they are read"};
 }
 
 StereoFrame ReplayCamera::read(ImageView<uint8_t> left, ImageView<uint8_t> right, int64_t deadline_ns) {

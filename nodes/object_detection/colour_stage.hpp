@@ -24,7 +24,7 @@ class ColourStage {
 
   /// `bgr`: three channels, of the grid's image size (not checked). All windows.
   void run(ImageView<const uint8_t> bgr);
-  /// The same in portions: no window is searched yet, and search_row() begins at that row of windows.
+  /// The same in portions: no window is searched yet, and search_row() begins at that row of windows, 0 .. rows - 1.
   void begin(ImageView<const uint8_t> bgr, int first_row);
   /// Searches the next row of windows, after the last one row 0; at most once per row.
   void search_row();

@@ -20,8 +20,8 @@ class WindowHistograms {
   /// `slots`: indices run from 0 to slots - 1.
   WindowHistograms(const SearchGrid& grid, size_t slots);
 
-  /// Starts at the first window of a row of windows. `index`: image_width x image_height slots, row by row; must stay
-  /// until the last next().
+  /// Starts at the first window of that row of windows, 0 .. rows - 1. `index`: image_width x image_height slots, row
+  /// by row; must stay until the last next().
   void begin(const uint16_t* index, int row = 0);
   /// Histogram of the next window, row by row to the lower right; valid until the next call. At most as often as there
   /// are windows from there on.

@@ -13,11 +13,13 @@ namespace takt::stereo {
 /// Size of the halved image: an odd last column or row is dropped, one pixel at least stays.
 inline int half(int size) { return std::max(1, size / 2); }
 
-/// Rounded mean of 2 x 2 pixels; `out` has half(width) x half(height) pixels and the channels of `in`.
+/// Rounded mean of 2 x 2 pixels; `out` has half(width) x half(height) pixels and the channels of `in`, 1 or 3. In an
+/// image one pixel wide or high a pixel is its own neighbour. Sizes are not checked.
 void halve(ImageView<const uint8_t> in, ImageView<uint8_t> out);
 
 /// Nearest neighbour to full size: half pixel i stands for 2 i and 2 i + 1. Disparities double, for a shift of d pixels
-/// there is one of 2 d here; rejected pixels stay -1.
+/// there is one of 2 d here; rejected pixels stay -1. An odd last row or column repeats the one before. Sizes are not
+/// checked.
 void enlarge(ImageView<const int16_t> disparity, ImageView<const uint8_t> confidence, ImageView<int16_t> disparity_out,
              ImageView<uint8_t> confidence_out);
 

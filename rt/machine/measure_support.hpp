@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Internal to the measurements.
+// Internal to the trials and measurements.
 #pragma once
 #include <linux/futex.h>
 #include <sys/syscall.h>

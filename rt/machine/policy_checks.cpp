@@ -45,6 +45,11 @@ bool group_scheduling(const Facts& facts) {
          boot_option(facts.text("/proc/cmdline").value_or(""), "rt_group_sched") != "0";
 }
 
+void was_granted(Finding& f, const PolicyTrial& trial, const std::string& what) {
+  f.status = trial.verified ? Status::ok : Status::warn;
+  f.found = std::string("granted, ") + (trial.verified ? "read back: " : "but read back otherwise: ") + what;
+}
+
 }  // namespace
 
 Finding check_sched_deadline(const Facts& facts, const PolicyTrial& trial) {
@@ -52,9 +57,8 @@ Finding check_sched_deadline(const Facts& facts, const PolicyTrial& trial) {
   f.meaning = "policy `deadline`: the kernel reserves and enforces each lane's budget";
   if (!trial.answered) return not_answered(f), f;
   if (trial.error == 0) {
-    f.status = trial.verified ? Status::ok : Status::warn;
-    f.found = "granted" + std::string(trial.verified ? ", read back: " : ", but read back otherwise: ") +
-              microseconds_as_ms(trial.runtime_ns / 1000) + " every " + microseconds_as_ms(trial.period_ns / 1000);
+    was_granted(f, trial,
+                microseconds_as_ms(trial.runtime_ns / 1000) + " every " + microseconds_as_ms(trial.period_ns / 1000));
     return f;
   }
   f.found = std::string("refused: ") + std::strerror(trial.error);
@@ -79,9 +83,7 @@ Finding check_sched_fifo(const Facts& facts, const PolicyTrial& trial) {
   f.meaning = "policy `fixed`: shorter deadlines preempt longer ones";
   if (!trial.answered) return not_answered(f), f;
   if (trial.error == 0) {
-    f.status = trial.verified ? Status::ok : Status::warn;
-    f.found = "granted" + std::string(trial.verified ? ", read back: " : ", but read back otherwise: ") + "priority " +
-              std::to_string(trial.priority);
+    was_granted(f, trial, "priority " + std::to_string(trial.priority));
     return f;
   }
   f.found = std::string("refused: ") + std::strerror(trial.error);

@@ -15,6 +15,7 @@
 
 #include "rt/machine/child.hpp"
 #include "rt/machine/facts.hpp"
+#include "rt/machine/measure_support.hpp"
 #include "rt/machine/parse.hpp"
 #include "rt/sched/grant.hpp"
 #include "rt/shm/transport_error.hpp"
@@ -27,12 +28,6 @@ constexpr int64_t kMs = 1'000'000;
 constexpr size_t kMore = 64 << 20;
 constexpr const char* kShm = "/dev/shm";
 constexpr const char* kLatencyFile = "/dev/cpu_dma_latency";
-
-int64_t monotonic_ns(clockid_t clock) {
-  timespec now{};
-  clock_gettime(clock, &now);
-  return int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
-}
 
 PolicyTrial try_policy(Policy policy) {
   Reservation wanted;
@@ -122,10 +117,10 @@ TickTrial try_tick() {
   timespec resolution{};
   trial.answered = clock_getres(CLOCK_MONOTONIC_COARSE, &resolution) == 0;
   trial.tick_ns = resolution.tv_nsec;
-  const int64_t end = monotonic_ns(CLOCK_MONOTONIC) + 40 * kMs;
-  int64_t last = monotonic_ns(CLOCK_MONOTONIC_COARSE);
-  while (monotonic_ns(CLOCK_MONOTONIC) < end) {
-    const int64_t coarse = monotonic_ns(CLOCK_MONOTONIC_COARSE);
+  const int64_t end = now_ns() + 40 * kMs;
+  int64_t last = read_ns(CLOCK_MONOTONIC_COARSE);
+  while (now_ns() < end) {
+    const int64_t coarse = read_ns(CLOCK_MONOTONIC_COARSE);
     if (coarse != last && (trial.step_ns == 0 || coarse - last < trial.step_ns)) trial.step_ns = coarse - last;
     last = coarse;
   }

@@ -3,6 +3,7 @@
 
 #include <alloca.h>
 #include <fcntl.h>
+#include <linux/capability.h>
 #include <malloc.h>
 #include <pthread.h>
 #include <sys/mman.h>
@@ -13,12 +14,10 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdint>
-#include <cstdlib>
 #include <cstring>
 #include <utility>
 
-#include "rt/machine/facts.hpp"
-#include "rt/machine/parse.hpp"
+#include "rt/capability.hpp"
 
 namespace takt {
 namespace {
@@ -34,13 +33,6 @@ std::string mlock_refused(int reason) {
       limit.rlim_cur == RLIM_INFINITY ? "unlimited" : std::to_string(limit.rlim_cur / 1024) + " KiB";
   return std::string("mlockall: ") + std::strerror(reason) + " (RLIMIT_MEMLOCK " + allowed +
          "): pages may be swapped out. Fix: ulimit -l unlimited, or 'memlock unlimited' in /etc/security/limits.conf";
-}
-
-/// CAP_IPC_LOCK, which root has and `setcap` gives.
-bool may_lock_without_limit() {
-  constexpr int kIpcLock = 14;
-  const std::string status = machine::SystemFacts().text("/proc/self/status").value_or("");
-  return (std::strtoull(machine::line_value(status, "CapEff").c_str(), nullptr, 16) >> kIpcLock & 1) != 0;
 }
 
 __attribute__((noinline)) void touch(size_t bytes) {
@@ -69,7 +61,7 @@ ProcessMemory prepare_process_memory() {
   // A limited user would be granted MCL_FUTURE and then fail in every later allocation beyond the limit.
   rlimit limit{};
   getrlimit(RLIMIT_MEMLOCK, &limit);
-  if (!may_lock_without_limit() && limit.rlim_cur != RLIM_INFINITY) got.lacks.push_back(mlock_refused(EPERM));
+  if (!has_capability(CAP_IPC_LOCK) && limit.rlim_cur != RLIM_INFINITY) got.lacks.push_back(mlock_refused(EPERM));
   else if (mlockall(MCL_CURRENT | MCL_FUTURE) == 0) got.mlock = true;
   else got.lacks.push_back(mlock_refused(errno));
   return got;

@@ -133,29 +133,38 @@ bool Executor::run_partitioned(Policy policy, RunResult& result) {
       }
     });
   }
-  const std::vector<Grant>& grants = crew_->grants;
   crew_->ready.arrive_and_wait();
-  for (size_t i = 0; i < lanes_.size(); ++i) set_grants(*lanes_[i], grants[i]);
-  const bool mine = std::all_of(grants.begin(), grants.end(), [](const Grant& grant) { return grant.refused.empty(); });
-  const bool go = options_.gate != nullptr ? options_.gate->all_granted(mine) : mine;
-  crew_->go.store(go);
-  // Of several processes only the supervisor reads them, while none of them writes: between agreement and decision.
-  if (options_.gate == nullptr) result.refused = refusals(plan_, board_);
-  if (go) {
-    result.policy_granted = policy;
-    start_clockwork(result);
-    watch(policy);
+  try {
+    agree(policy, result);
+  } catch (...) {  // a device that cannot start: the workers must not wait for ever
+    crew_->started.arrive_and_wait();
+    throw;
   }
   crew_->started.arrive_and_wait();
   join(result);
-  return go;
+  return crew_->go.load();
+}
+
+void Executor::agree(Policy policy, RunResult& result) {
+  const std::vector<Grant>& grants = crew_->grants;
+  for (size_t i = 0; i < lanes_.size(); ++i) set_grants(*lanes_[i], grants[i]);
+  const bool mine = std::all_of(grants.begin(), grants.end(), [](const Grant& grant) { return grant.refused.empty(); });
+  const bool go = options_.gate != nullptr ? options_.gate->all_granted(mine) : mine;
+  // Of several processes only the supervisor reads them, while none of them writes: between agreement and decision.
+  if (options_.gate == nullptr) result.refused = refusals(plan_, board_);
+  if (!go) return;
+  result.policy_granted = policy;
+  start_clockwork(result);
+  watch(policy);
+  crew_->go.store(true);
 }
 
 void Executor::run_cooperative(RunResult& result) {
   crew_ = std::make_unique<Crew>(0);
   crew_->queue = std::make_unique<CooperativeQueue>(lanes_, clock_, stop_);
   watch(Policy::cooperative);
-  for (size_t i = 0; i < std::max<size_t>(plan_.cores.size(), 1); ++i) {
+  const size_t workers = std::clamp<size_t>(plan_.cores.size(), 1, std::max<size_t>(lanes_.size(), 1));
+  for (size_t i = 0; i < workers; ++i) {
     crew_->workers.start([this, &queue = *crew_->queue, i] {
       name_thread("takt-worker-" + std::to_string(i));
       const trace::Thread traced(options_.trace, "takt-worker-" + std::to_string(i));
@@ -183,13 +192,14 @@ void Executor::watch(Policy granted) {
 void Executor::join(RunResult& result) {
   const Watchdog* watchdog = crew_->watchdog.get();
   std::vector<size_t> hanging;
-  crew_->workers.join([&](const std::vector<size_t>& at_work) {
+  const size_t given_up = crew_->workers.join([&](const std::vector<size_t>& at_work) {
     hanging.clear();
     for (size_t i = 0; watchdog != nullptr && i < lanes_.size(); ++i)
       if (watchdog->hangs(i)) hanging.push_back(i);
     // Not before the end: a job that hangs now may still come back.
     return hanging.size() >= at_work.size() && clock_.now_ns() >= stop_.end_ns();
   });
+  if (given_up == 0) hanging.clear();  // what hung when it was last asked has come back
   for (const size_t i : hanging) {
     const JobWatch::Running job = lanes_[i]->watch().running();
     result.stuck.push_back(lanes_[i]->members()[job.member]);

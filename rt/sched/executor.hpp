@@ -76,7 +76,10 @@ class Executor {
   const RunBoard& board() const { return board_; }
 
  private:
+  /// False if the kernel refused the policy to a lane, here or in another process.
   bool run_partitioned(Policy policy, RunResult& result);
+  /// While the workers wait, with what they were granted: lets them go if everybody got the policy.
+  void agree(Policy policy, RunResult& result);
   void watch(Policy granted);
   /// Waits for all workers but those whose job never returns: that was late and used more than it may.
   void join(RunResult& result);

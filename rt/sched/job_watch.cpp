@@ -30,7 +30,8 @@ bool JobWatch::end() {
   state = serial * kPhases + at_work;
   const auto ended = serial * kPhases + idle;
   if (state_.compare_exchange_strong(state, ended, std::memory_order_acq_rel)) return false;
-  // The watchdog is at it: it has the highest priority and is through in microseconds.
+  // The watchdog demotes this thread. That happens under `fixed` only, where it has the highest priority and is through
+  // in microseconds.
   while (state % kPhases == acting) state = state_.load(std::memory_order_acquire);
   state_.store(ended, std::memory_order_release);
   if (state % kPhases != demoted) return false;
@@ -48,9 +49,9 @@ JobWatch::Running JobWatch::running() const {
   seen.index = index_.load(std::memory_order_acquire);
   seen.release_ns = release_ns_.load(std::memory_order_acquire);
   seen.cpu_limit_ns = cpu_limit_ns_.load(std::memory_order_acquire);
-  // If that was another job already, nothing fits together.
-  if (state_.load(std::memory_order_acquire) / kPhases != seen.serial) return Running{};
-  return seen;
+  // If it has ended, the words above may be the next job's already, though that one has no serial yet.
+  const uint64_t after = state_.load(std::memory_order_acquire);
+  return after / kPhases == seen.serial && after % kPhases != idle ? seen : Running{};
 }
 
 int64_t JobWatch::cpu_ns() const {
@@ -59,15 +60,20 @@ int64_t JobWatch::cpu_ns() const {
   return int64_t{used.tv_sec} * 1'000'000'000 + used.tv_nsec;
 }
 
-bool JobWatch::act(uint64_t serial, Phase phase) {
+bool JobWatch::advance(uint64_t serial, Phase to) {
   uint64_t state = serial * kPhases + at_work;
-  if (!state_.compare_exchange_strong(state, serial * kPhases + acting, std::memory_order_acq_rel)) return false;
-  const bool done = phase != demoted || demote_thread(thread_.load(std::memory_order_acquire));
-  state_.store(serial * kPhases + (done ? phase : told), std::memory_order_release);
+  return state_.compare_exchange_strong(state, serial * kPhases + to, std::memory_order_acq_rel);
+}
+
+bool JobWatch::demote(uint64_t serial) {
+  if (!advance(serial, acting)) return false;
+  const bool done = demote_thread(thread_.load(std::memory_order_acquire));
+  state_.store(serial * kPhases + (done ? demoted : at_work), std::memory_order_release);
   return done;
 }
 
-bool JobWatch::demote(uint64_t serial) { return act(serial, demoted); }
-bool JobWatch::tell(uint64_t serial) { return act(serial, told); }
+// In one step: nobody ever waits for a watchdog that only tells. Under `deadline` the workers go before it, so a wait
+// could last as long as their budget does.
+bool JobWatch::tell(uint64_t serial) { return advance(serial, told); }
 
 }  // namespace takt

@@ -39,15 +39,17 @@ class JobWatch {
   int64_t expected_ns() const { return expected_ns_.load(std::memory_order_acquire); }
   /// CPU clock of the worker, ns; -1 if it cannot be read.
   int64_t cpu_ns() const;
-  /// Puts the worker behind everybody else until its job ends; false if job `serial` ended before.
+  /// Puts the worker behind everybody else until its job ends; false if job `serial` ended before, or the kernel
+  /// refuses.
   bool demote(uint64_t serial);
-  /// Notes that the overrun of job `serial` was told; false if the job ended before.
+  /// Notes that the overrun of job `serial` was told; false if the job ended before, was demoted or told already.
   bool tell(uint64_t serial);
 
  private:
   enum Phase : uint64_t { idle, at_work, acting, demoted, told };
   static constexpr uint64_t kPhases = 8;  // state = serial * kPhases + phase
-  bool act(uint64_t serial, Phase phase);
+  /// From `at_work` to that phase; false if job `serial` is in another one.
+  bool advance(uint64_t serial, Phase to);
 
   std::atomic<uint64_t> state_{idle};
   std::atomic<uint32_t> member_{0};

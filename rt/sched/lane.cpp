@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "rt/sched/watch_rules.hpp"
+
 namespace takt {
 
 Lane::Lane(std::vector<size_t> members, const std::vector<std::unique_ptr<Task>>& tasks)
@@ -111,10 +113,7 @@ std::vector<std::pair<size_t, size_t>> low_before_high(const Plan& plan) {
 
 int64_t lane_budget_ns(const Plan& plan, const std::vector<size_t>& members) {
   int64_t sum = 0;
-  for (const size_t t : members) {
-    const TaskPlan& task = plan.tasks[t];
-    sum += task.budget_ns > 0 ? task.budget_ns : task.deadline_ns / 4;
-  }
+  for (const size_t t : members) sum += enforced_budget_ns(plan.tasks[t]);
   return sum;
 }
 

@@ -18,16 +18,29 @@ using analysis::Wide;
 
 constexpr Wide kSecond = 1'000'000'000;
 
+/// The longest time that the plan states, ns.
+int64_t longest_ns(const Plan& plan) {
+  int64_t longest = 0;
+  for (const TaskPlan& task : plan.tasks) {
+    const int64_t period =
+        task.rate ? static_cast<int64_t>(Wide{task.rate->denominator} * kSecond / task.rate->numerator) : 0;
+    longest = std::max({longest, period, task.offset_ns, task.deadline_ns, task.budget_ns, task.min_interval_ns});
+  }
+  return longest;
+}
+
 /// Ticks to a nanosecond that make every period whole; 1 where that is too fine: periods are then rounded down.
 int64_t ticks_per_ns(const Plan& plan, const std::vector<std::vector<size_t>>& lanes) {
-  constexpr int64_t kFinest = 1'000'000;  // times up to 11 days fit
+  // With room for sums of a few of the plan's times.
+  const int64_t finest =
+      std::clamp<int64_t>(analysis::kLongest / 8 / std::max<int64_t>(longest_ns(plan), 1), 1, 1'000'000);
   int64_t ticks = 1;
   for (const auto& lane : lanes) {
     const Rate& rate = *plan.tasks[lane.front()].rate;
     const auto whole = static_cast<int64_t>(Wide{rate.denominator} * kSecond % rate.numerator);
     const int64_t needed = rate.numerator / std::gcd(whole, rate.numerator);
     ticks = std::lcm(ticks, needed);
-    if (ticks > kFinest) return 1;
+    if (ticks > finest) return 1;
   }
   return ticks;
 }

@@ -162,6 +162,9 @@ void Task::work(Job& job, int64_t release_ns) {
   } catch (const std::exception& problem) {
     tell_exception(job, problem.what());
     job.no_result();
+  } catch (...) {
+    tell_exception(job, "something that is no std::exception");
+    job.no_result();
   }
   if (watch_ != nullptr) watch_->end();
 }

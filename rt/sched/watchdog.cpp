@@ -32,9 +32,9 @@ Watchdog::~Watchdog() {
   thread_.join();
 }
 
-size_t Watchdog::hanging_task(size_t worker) const {
-  const Watched& watched = watched_[worker];
-  return watched.worker.tasks[watched.worker.watch->running().member];
+bool Watchdog::hangs(size_t worker) const {
+  const uint64_t told = watched_[worker].hang_told.load();
+  return told != 0 && watched_[worker].worker.watch->running().serial == told;
 }
 
 void Watchdog::watch() {
@@ -66,7 +66,6 @@ int64_t Watchdog::look_at(Watched& watched, int64_t now_ns) {
   WatchSight sight;
   sight.now_ns = now_ns;
   if (job.serial == 0) {
-    watched.hangs.store(false);
     sight.release_ns = watch.expected_ns();
     int64_t next_ns = std::numeric_limits<int64_t>::max();
     for (const WatchRules& rules : watched.rules) next_ns = std::min(next_ns, judge(rules, sight).look_again_ns);
@@ -77,8 +76,7 @@ int64_t Watchdog::look_at(Watched& watched, int64_t now_ns) {
   sight.release_ns = job.release_ns;
   sight.overrun_told = job.acted;
   sight.miss_told = watched.miss_told == job.serial;
-  sight.hang_told = watched.hang_told == job.serial;
-  if (!sight.hang_told) watched.hangs.store(false);
+  sight.hang_told = watched.hang_told.load() == job.serial;
   if (rules.minds_overrun() && !job.acted) {
     const int64_t used_ns = watch.cpu_ns();
     sight.cpu_left_ns = used_ns < 0 ? 0 : job.cpu_limit_ns - used_ns;
@@ -89,27 +87,30 @@ int64_t Watchdog::look_at(Watched& watched, int64_t now_ns) {
   return verdict.overrun || verdict.miss || verdict.hang ? now_ns + kWatchGrain_ns : verdict.look_again_ns;
 }
 
-void Watchdog::act(Watched& watched, const JobWatch::Running& job, const WatchVerdict& verdict, int64_t now_ns) {
+void Watchdog::overrun(Watched& watched, const JobWatch::Running& job, int64_t now_ns) {
   const WatchRules& rules = watched.rules[job.member];
   const size_t task = watched.worker.tasks[job.member];
-  if (verdict.overrun) {
-    JobWatch& watch = *watched.worker.watch;
-    if (rules.demote && watch.demote(job.serial)) {
-      TaskStatistics& statistics = board_.task(task);
-      statistics.demoted.fetch_add(1, std::memory_order_relaxed);
-      const int64_t error_ns = std::max(statistics.enforcement_error_ns.load(), watch.cpu_ns() - job.cpu_limit_ns);
-      statistics.enforcement_error_ns.store(error_ns, std::memory_order_relaxed);
-    }
-    if (!rules.demote) watch.tell(job.serial);
-    if (rules.stop_on_overrun) safe_stop(task, job.index, "budget used up", now_ns);
+  JobWatch& watch = *watched.worker.watch;
+  const bool demoted = rules.demote && watch.demote(job.serial);
+  if (demoted) {
+    TaskStatistics& statistics = board_.task(task);
+    statistics.demoted.fetch_add(1, std::memory_order_relaxed);
+    const int64_t error_ns = std::max(statistics.enforcement_error_ns.load(), watch.cpu_ns() - job.cpu_limit_ns);
+    statistics.enforcement_error_ns.store(error_ns, std::memory_order_relaxed);
   }
+  if ((demoted || watch.tell(job.serial)) && rules.stop_on_overrun)
+    safe_stop(task, job.index, "budget used up", now_ns);
+}
+
+void Watchdog::act(Watched& watched, const JobWatch::Running& job, const WatchVerdict& verdict, int64_t now_ns) {
+  const size_t task = watched.worker.tasks[job.member];
+  if (verdict.overrun) overrun(watched, job, now_ns);
   if (verdict.miss) {
     watched.miss_told = job.serial;
     safe_stop(task, job.index, "deadline passed", now_ns);
   }
   if (verdict.hang) {
-    watched.hang_told = job.serial;
-    watched.hangs.store(true);
+    watched.hang_told.store(job.serial);
     tell_hang(task, job, now_ns);
   }
 }

@@ -17,8 +17,8 @@ namespace takt {
 /// this thread sleeps on a timer until the earliest instant at which a job can have used up its budget and reads the
 /// job's own CPU clock then.
 ///
-/// - Under `fixed`, a low-criticality job that has used its budget goes on with what the others leave (SCHED_IDLE)
-///   until it ends; counted `demoted`. High-criticality jobs keep their priority, whatever they use.
+/// - Under `fixed`, a low-criticality job that has used its budget goes on with what the others leave (SCHED_IDLE, see
+///   demote_thread) until it ends; counted `demoted`. High-criticality jobs keep their priority, whatever they use.
 /// - `safe_stop` is asked for the moment a budget or a deadline has passed, not when the job ends.
 /// - A job that has not returned `patience` after its deadline hangs: told once, by name. Under `cooperative` that ends
 ///   the run.
@@ -42,20 +42,20 @@ class Watchdog {
   Watchdog& operator=(const Watchdog&) = delete;
 
   /// True while that worker is in a job that hangs. Any thread.
-  bool hangs(size_t worker) const { return watched_[worker].hangs.load(); }
-  /// The task whose job that is.
-  size_t hanging_task(size_t worker) const;
+  bool hangs(size_t worker) const;
 
  private:
   struct Watched {
     Worker worker;
-    std::vector<WatchRules> rules;  ///< by member
-    uint64_t miss_told = 0, hang_told = 0;
-    std::atomic<bool> hangs{false};
+    std::vector<WatchRules> rules;       ///< by member
+    uint64_t miss_told = 0;              ///< serial of the last job it was told of; 0: none
+    std::atomic<uint64_t> hang_told{0};  ///< the same
   };
   void watch();
   int64_t look(int64_t now_ns);
   int64_t look_at(Watched& watched, int64_t now_ns);
+  /// The job may have ended since it was seen: nothing is done to one that has.
+  void overrun(Watched& watched, const JobWatch::Running& job, int64_t now_ns);
   void act(Watched& watched, const JobWatch::Running& job, const WatchVerdict& verdict, int64_t now_ns);
   void safe_stop(size_t task, uint64_t job, const char* why, int64_t now_ns);
   void tell_hang(size_t task, const JobWatch::Running& job, int64_t now_ns);

@@ -6,9 +6,12 @@
 #include "rt/shm/local_transport.hpp"
 
 #include <sys/mman.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
+#include <cerrno>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -141,8 +144,9 @@ class LocalWriter final : public Writer {
 
   bool repeat(int64_t, int64_t visible_at_ns) override {
     const uint64_t newest = channel_.state->newest.load(std::memory_order_relaxed);
-    if (newest == 0) return false;
     const Slot& last = channel_.slot(newest);
+    // None yet; or an earlier writer of this port has gone, or was killed, and its chunk is free or about to be.
+    if (newest == 0 || last.sequence.load() != newest) return false;
     const uint32_t chunk = last.chunk.load(std::memory_order_relaxed);
     channel_.references[chunk].fetch_add(1, std::memory_order_acq_rel);
     announce(chunk, last.stamp_ns.load(std::memory_order_relaxed), visible_at_ns);
@@ -239,6 +243,8 @@ class LocalTransport final : public Transport {
     bytes_ = carve(nullptr);
     if (bytes_ == 0) return;
     if (fresh) file.resize(bytes_);
+    // Of another size, the same offsets would mean something else, and what lies behind its end would end this process.
+    else if (file.bytes() != bytes_) throw std::logic_error("the message pools were made for other ports");
     map(file);
     carve(memory_);
     if (!fresh) return;
@@ -289,6 +295,12 @@ PoolFile::~PoolFile() { close(descriptor_); }
 void PoolFile::resize(uint64_t bytes) const {
   if (ftruncate(descriptor_, static_cast<off_t>(bytes)) != 0)
     throw std::runtime_error("shared memory of " + std::to_string(bytes) + " bytes: " + std::strerror(errno));
+}
+
+uint64_t PoolFile::bytes() const {
+  struct stat status {};
+  if (fstat(descriptor_, &status) != 0) throw std::runtime_error(std::string("shared memory: ") + std::strerror(errno));
+  return static_cast<uint64_t>(status.st_size);
 }
 
 std::unique_ptr<Transport> make_local_transport(std::span<const PortPlan> ports) {

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The local transport where one run has several processes: no daemon, no lock, nothing to clean up.
+// The local transport where one run has several processes: no daemon, no lock, nothing to clean up. Nobody ever waits
+// for a process that was killed. The chunks that it held at that moment (one loaned or on its way, the messages its
+// inputs had latched) stay taken until the run ends.
 #pragma once
 #include <cstdint>
 #include <memory>
@@ -22,6 +24,8 @@ class PoolFile {
   int descriptor() const { return descriptor_; }
   /// Throws std::runtime_error.
   void resize(uint64_t bytes) const;
+  /// Its size. Throws std::runtime_error.
+  uint64_t bytes() const;
 
  private:
   int descriptor_ = -1;
@@ -29,7 +33,8 @@ class PoolFile {
 
 /// Pools in `file`, empty. One process makes them, before any other joins. Throws as make_local_transport(ports) does.
 std::unique_ptr<Transport> make_local_transport(std::span<const PortPlan> ports, const PoolFile& file);
-/// The pools that another process made for the same ports.
+/// The pools that another process made for the same ports. Throws std::logic_error if they were made for others (seen
+/// by their size), std::runtime_error if they cannot be mapped.
 std::unique_ptr<Transport> join_local_transport(std::span<const PortPlan> ports, const PoolFile& file);
 
 }  // namespace takt

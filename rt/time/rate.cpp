@@ -8,6 +8,7 @@ namespace takt {
 namespace {
 __extension__ using Wide = __int128;
 constexpr Wide kSecond = 1'000'000'000;
+constexpr int64_t kMost = 1'000'000'000;  // of a numerator or denominator: then a period fits into int64
 
 std::optional<int64_t> whole(std::string_view text) {
   int64_t value = 0;
@@ -40,7 +41,8 @@ std::optional<Rate> Rate::parse(std::string_view text) {
   } else if (const size_t dot = text.find('.'); dot != std::string_view::npos) {
     const std::string_view decimals = text.substr(dot + 1);
     const auto n = whole(text.substr(0, dot)), f = whole(decimals);
-    if (!n || !f || decimals.size() > 9 || decimals.front() == '-') return std::nullopt;
+    if (!n || !f || *n > kMost || decimals.size() > 9 || decimals.front() == '-' || text.front() == '-')
+      return std::nullopt;
     int64_t scale = 1;
     for (size_t i = 0; i < decimals.size(); ++i) scale *= 10;
     rate = {*n * scale + *f, scale};
@@ -49,7 +51,8 @@ std::optional<Rate> Rate::parse(std::string_view text) {
     if (!n) return std::nullopt;
     rate = {*n, 1};
   }
-  if (rate.numerator <= 0 || rate.denominator <= 0 || rate.numerator > 1'000'000'000) return std::nullopt;
+  if (rate.numerator <= 0 || rate.denominator <= 0 || rate.numerator > kMost || rate.denominator > kMost)
+    return std::nullopt;
   const int64_t divisor = std::gcd(rate.numerator, rate.denominator);
   return Rate{rate.numerator / divisor, rate.denominator / divisor};
 }

@@ -2,6 +2,7 @@
 // The kernel's trace buffer as it comes out of trace_pipe_raw. Layout: Documentation/trace/ring-buffer-map.rst and the
 // files events/header_page, events/header_event of tracefs; field offsets of an event: its file `format`.
 #pragma once
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>

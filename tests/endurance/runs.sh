@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # Repeats the main job and looks for what is lost or left: runs.sh [RUNS] [SECONDS] [takt run options...]
 # Not part of `takt test`: ten runs of a minute take ten minutes. Prints one line a run; exit 1 if anything was lost or
-# left. Deadline misses are told and not judged.
+# left. Deadline misses, and chunks that are still in use when a run ends, are told and not judged.
 set -u
 # In a /tmp and /dev/shm of its own where that is permitted: what other programs make and remove there is not ours.
 if [ -z "${TAKT_OWN_TMP:-}" ] && unshare --mount true 2>/dev/null; then

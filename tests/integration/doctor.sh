@@ -16,7 +16,7 @@ as_nobody() { # COMMAND...
 
 narrow() { awk 'length > 80 {print "too wide: " $0; bad = 1} END {exit bad}' "$1" || fail "$1 is wider than 80 columns"; }
 
-check_findings() { # JSON: every check has a status, a value and a meaning; a lack has a fix; prints what is lacking
+check_findings() { # JSON: every check has a status, a value and a meaning; a lack has a fix
   python3 - "$1" <<'PY' || fail "findings of $1"
 import json, sys
 report = json.load(open(sys.argv[1]))

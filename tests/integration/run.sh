@@ -36,7 +36,7 @@ for picture in left disparity track obstacles; do
 done
 command -v python3 >/dev/null && check_report "$work/v.json"
 
-# Two runs beside one another, both stopped by a signal within a second.
+# Two runs beside one another, both stopped by a signal; how long that takes is told, not judged.
 for signal in INT TERM; do
   start_run one --for 0s; first=$run
   start_run two --for 0s; second=$run
@@ -50,7 +50,8 @@ for signal in INT TERM; do
   grep -q "CPU" "$work/one.out" || fail "no summary after SIG$signal"
 done
 
-# A signal at any moment, also while the run is being prepared, ends it within a second; 143: before the program could install its handler.
+# A signal at any moment, also while the run is being prepared, ends it; 143: before the program could install its
+# handler.
 for delay in 0.01 0.05 0.1 0.2 0.3 0.5 0.8; do
   "$takt" run --for 0s --policy cooperative --output "$work/one" >"$work/1" 2>&1 & first=$!
   sleep $delay

@@ -44,9 +44,10 @@ bool allowed(size_t bytes, JobCall call, const char* function) {
   ++allocations;
   if (job == nullptr) return true;
   takt::counter::note(call, function);
-  // Compared so that no sum can overflow.
-  if (bytes <= INT64_MAX && static_cast<int64_t>(bytes) <= job->heap_limit - job->heap_bytes) return true;
-  job->heap_refused += static_cast<int64_t>(bytes < INT64_MAX / 4 ? bytes : INT64_MAX / 4);
+  // Compared so that nothing can overflow: heap_bytes is negative where jobs free what was taken outside of them.
+  if (bytes <= INT64_MAX && job->heap_bytes <= job->heap_limit - static_cast<int64_t>(bytes)) return true;
+  constexpr int64_t kMostNoted = int64_t{1} << 40;  // a job may ask, and be refused, any number of times
+  job->heap_refused += bytes < kMostNoted ? static_cast<int64_t>(bytes) : kMostNoted;
   errno = ENOMEM;
   return false;
 }

@@ -13,6 +13,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/epoll.h>
+#include <sys/select.h>
 #include <sys/socket.h>
 #include <sys/syscall.h>
 #include <sys/uio.h>
@@ -130,6 +132,11 @@ TAKT_SEE(int, pthread_join, wait, (pthread_t thread, void** result), (thread, re
 TAKT_SEE(int, sem_wait, wait, (sem_t * semaphore), (semaphore))
 TAKT_SEE(int, sem_timedwait, wait, (sem_t * semaphore, const timespec* until), (semaphore, until))
 TAKT_SEE(int, poll, wait, (pollfd * files, nfds_t count, int timeout), (files, count, timeout))
+TAKT_SEE(int, ppoll, wait, (pollfd * files, nfds_t count, const timespec* timeout, const sigset_t* blocked),
+         (files, count, timeout, blocked))
+TAKT_SEE(int, select, wait, (int files, fd_set* read, fd_set* write, fd_set* other, timeval* timeout),
+         (files, read, write, other, timeout))
+TAKT_SEE(int, epoll_wait, wait, (int epoll, epoll_event* events, int size, int timeout), (epoll, events, size, timeout))
 
 // Condition variables changed their layout once; the old functions are still there under the old version.
 #define TAKT_SEE_CONDITION(name, parameters, arguments)        \
@@ -160,7 +167,9 @@ TAKT_SEE(int, fputs, stdio, (const char* text, FILE* file), (text, file))
 TAKT_SEE(int, fputc, stdio, (int character, FILE* file), (character, file))
 TAKT_SEE(int, fflush, stdio, (FILE * file), (file))
 TAKT_SEE(size_t, fwrite, stdio, (const void* data, size_t size, size_t count, FILE* file), (data, size, count, file))
+TAKT_SEE(size_t, fread, stdio, (void* data, size_t size, size_t count, FILE* file), (data, size, count, file))
 TAKT_SEE(FILE*, fopen, stdio, (const char* path, const char* mode), (path, mode))
+TAKT_SEE(FILE*, fopen64, stdio, (const char* path, const char* mode), (path, mode))
 TAKT_SEE(int, vfprintf, stdio, (FILE * file, const char* format, va_list arguments), (file, format, arguments))
 
 int printf(const char* format, ...) {
@@ -193,15 +202,18 @@ int fprintf(FILE* file, const char* format, ...) {
 TAKT_SEE_OPEN(open)
 TAKT_SEE_OPEN(open64)
 
-int openat(int folder, const char* path, int flags, ...) {
-  static Next<int (*)(int, const char*, int, ...)> next("openat");
-  see(JobCall::file, "openat");
-  va_list arguments;
-  va_start(arguments, flags);
-  const unsigned mode = va_arg(arguments, unsigned);
-  va_end(arguments);
-  return next.get()(folder, path, flags, mode);
-}
+#define TAKT_SEE_OPENAT(name)                                     \
+  int name(int folder, const char* path, int flags, ...) {        \
+    static Next<int (*)(int, const char*, int, ...)> next(#name); \
+    see(JobCall::file, #name);                                    \
+    va_list arguments;                                            \
+    va_start(arguments, flags);                                   \
+    const unsigned mode = va_arg(arguments, unsigned);            \
+    va_end(arguments);                                            \
+    return next.get()(folder, path, flags, mode);                 \
+  }
+TAKT_SEE_OPENAT(openat)
+TAKT_SEE_OPENAT(openat64)
 
 }  // extern "C"
 

@@ -58,13 +58,13 @@ Ticks urgent_workload(const Sporadic& i, Ticks response, Ticks window) {
 /// sum(min(I_i, x)) = m * x, in whole ticks. Sorts `interference`.
 Ticks all_cores_busy(std::vector<Ticks>& interference, Ticks m) {
   std::sort(interference.begin(), interference.end(), std::greater<>());
-  Ticks rest = std::accumulate(interference.begin(), interference.end(), Ticks{0});
-  Ticks busy = rest / m;
+  Wide rest = std::accumulate(interference.begin(), interference.end(), Wide{0});
+  Wide busy = rest / m;
   for (Ticks alone = 1; alone < m && alone <= static_cast<Ticks>(interference.size()); ++alone) {
     rest -= interference[static_cast<size_t>(alone - 1)];
     busy = std::min(busy, rest / (m - alone));
   }
-  return busy;
+  return static_cast<Ticks>(std::min(busy, Wide{kLongest}));
 }
 
 /// Response bound of task k given those of the others; -1 beyond its deadline.
@@ -123,7 +123,8 @@ class CarryIn {
       late += static_cast<double>(budgets[i]);
     const double free = static_cast<double>(m_) - utilisation;
     if (free <= 1e-9) return -1;
-    const double extra = (late + static_cast<double>(m_ * job_.budget)) / free - static_cast<double>(job_.deadline);
+    const double extra =
+        (late + static_cast<double>(m_) * static_cast<double>(job_.budget)) / free - static_cast<double>(job_.deadline);
     return extra < 0 ? 0 : static_cast<Ticks>(std::min(extra * (1 + 1e-6) + 1, 4e18));
   }
 

@@ -175,7 +175,7 @@ CoreAnalysis global_non_preemptive_edf(const TaskSet& set, size_t max_states) {
     jobs_a_tick += 1 / static_cast<double>(task.period);
   }
   const std::optional<Ticks> period = set.hyperperiod();
-  if (!period || static_cast<double>(2 * *period + last_offset) * jobs_a_tick > kMostJobs)
+  if (!period || (2 * static_cast<double>(*period) + static_cast<double>(last_offset)) * jobs_a_tick > kMostJobs)
     return answer.why = "too many jobs until everything repeats", answer;
   std::vector<TimedJob> jobs = jobs_until(set, last_offset + 2 * *period);
   std::string unknown;

@@ -7,8 +7,8 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <random>
 
+#include "random.hpp"
 #include "rt/sched/analysis/global_edf.hpp"
 
 using namespace takt::analysis;
@@ -50,12 +50,6 @@ Outcome simulate(const TaskSet& set, std::vector<SimulatedJob> jobs) {
   }
   return outcome;
 }
-
-struct Random {
-  std::mt19937 engine;
-  Ticks uniform(Ticks low, Ticks high) { return std::uniform_int_distribution<Ticks>(low, high)(engine); }
-  double real(double low, double high) { return std::uniform_real_distribution<double>(low, high)(engine); }
-};
 
 TaskSet random_set(Random& random) {
   TaskSet set;

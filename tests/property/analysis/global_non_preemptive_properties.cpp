@@ -5,18 +5,13 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <random>
 
+#include "random.hpp"
 #include "rt/sched/analysis/global_non_preemptive.hpp"
 
 using namespace takt::analysis;
 
 namespace {
-
-struct Random {
-  std::mt19937 engine;
-  Ticks uniform(Ticks low, Ticks high) { return std::uniform_int_distribution<Ticks>(low, high)(engine); }
-};
 
 enum class Lengths { full, random, none_or_full };
 

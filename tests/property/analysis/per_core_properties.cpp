@@ -3,7 +3,10 @@
 // is witnessed by one, and each worst response happens.
 #include <doctest/doctest.h>
 
-#include <map>
+#include <algorithm>
+#include <random>
+#include <string>
+#include <vector>
 
 #include "random_sets.hpp"
 #include "rt/sched/analysis/edf.hpp"
@@ -44,6 +47,16 @@ void attack_at_random(const TaskSet& set, Dispatch dispatch, std::mt19937& rando
                                                 set.tasks[job.task].budget)(random);
   };
   seen.add(simulate(set, dispatch, random_arrivals(set, 100, random), hooks));
+}
+
+/// Both exact tests say what the simulation `seen` says, and no random attack gets beyond the bounds.
+void require_agreement(const TaskSet& set, Dispatch dispatch, const DemandAnswer& answer, const ResponseBounds& bounds,
+                       std::mt19937& random, Seen& seen) {
+  REQUIRE(answer.verdict == (seen.late ? Verdict::not_schedulable : Verdict::schedulable));
+  REQUIRE(bounds.exact);
+  REQUIRE(verdict_of(set.tasks, bounds) == answer.verdict);
+  attack_at_random(set, dispatch, random, seen);
+  for (size_t task = 0; task < set.tasks.size(); ++task) REQUIRE(seen.longest[task] <= *bounds.bounds[task]);
 }
 
 /// Sporadic tasks under non-preemptive EDF: all arrive at 1, or one of them a tick earlier and holds the core.
@@ -102,14 +115,9 @@ TEST_CASE("EDF: a set fails the demand test exactly if a simulated job misses") 
     const DemandAnswer answer = edf_demand_test(set.tasks);
     Seen seen = simulate_all_starts(set, Dispatch::edf);
     CAPTURE(describe(set));
-    REQUIRE(answer.verdict == (seen.late ? Verdict::not_schedulable : Verdict::schedulable));
     REQUIRE(answer.overload.has_value() == seen.late);
     count.add(!seen.late);
-    const ResponseBounds bounds = edf_responses(set.tasks);
-    REQUIRE(bounds.exact);
-    REQUIRE(verdict_of(set.tasks, bounds) == answer.verdict);
-    attack_at_random(set, Dispatch::edf, random, seen);
-    for (size_t task = 0; task < set.tasks.size(); ++task) REQUIRE(seen.longest[task] <= *bounds.bounds[task]);
+    require_agreement(set, Dispatch::edf, answer, edf_responses(set.tasks), random, seen);
   }
   count.report("EDF");
 }
@@ -119,16 +127,11 @@ TEST_CASE("non-preemptive EDF, sporadic: a set fails exactly if a simulated job 
   Count count;
   for (int i = 0; i < kSets; ++i) {
     const TaskSet set = random_set(random, {.offsets = false});
-    const DemandAnswer answer = non_preemptive_edf_demand_test(set.tasks);
     Seen seen = simulate_blockers(set);
     CAPTURE(describe(set));
-    REQUIRE(answer.verdict == (seen.late ? Verdict::not_schedulable : Verdict::schedulable));
     count.add(!seen.late);
-    const ResponseBounds bounds = non_preemptive_edf_responses(set.tasks);
-    REQUIRE(bounds.exact);
-    REQUIRE(verdict_of(set.tasks, bounds) == answer.verdict);
-    attack_at_random(set, Dispatch::non_preemptive_edf, random, seen);
-    for (size_t task = 0; task < set.tasks.size(); ++task) REQUIRE(seen.longest[task] <= *bounds.bounds[task]);
+    require_agreement(set, Dispatch::non_preemptive_edf, non_preemptive_edf_demand_test(set.tasks),
+                      non_preemptive_edf_responses(set.tasks), random, seen);
   }
   count.report("non-preemptive EDF, sporadic");
 }

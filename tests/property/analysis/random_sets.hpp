@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <numeric>
 #include <random>
+#include <string>
 #include <vector>
 
 #include "rt/sched/analysis/simulate.hpp"
@@ -51,22 +52,20 @@ inline TaskSet random_set(std::mt19937& random, const SetStyle& style = {}) {
   }
 }
 
-/// When the tasks with offsets have reached their steady state, as a multiple of their common period.
-inline Ticks steady_from(const TaskSet& set) {
-  Ticks common = 1, latest = 0;
-  for (const TimedTask& task : set.tasks) {
-    if (!task.sporadic) common = std::lcm(common, task.period);
-    latest = std::max(latest, task.offset + task.jitter);
-  }
-  return (latest + common) / common * common;
-}
-
+/// Common period of the tasks with offsets; 1 if there are none.
 inline Ticks common_period_of_fixed(const TaskSet& set) {
   Ticks common = 1;
-  for (const TimedTask& task : set.tasks) {
+  for (const TimedTask& task : set.tasks)
     if (!task.sporadic) common = std::lcm(common, task.period);
-  }
   return common;
+}
+
+/// When the tasks with offsets have reached their steady state, as a multiple of their common period.
+inline Ticks steady_from(const TaskSet& set) {
+  const Ticks common = common_period_of_fixed(set);
+  Ticks latest = 0;
+  for (const TimedTask& task : set.tasks) latest = std::max(latest, task.offset + task.jitter);
+  return (latest + common) / common * common;
 }
 
 /// A legal pattern: nothing that can be delayed until `start` is ready before; everything as early as possible from

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <initializer_list>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,7 +17,7 @@ struct Row {
   Ticks budget, deadline, period, offset = 0, jitter = 0;
 };
 
-/// All sporadic unless a row has an offset; the first row has the highest priority.
+/// All `sporadic`, or none of them (only then may a row have an offset); the first row has the highest priority.
 inline std::vector<TimedTask> tasks_of(std::initializer_list<Row> rows, bool sporadic = true) {
   std::vector<TimedTask> tasks;
   for (const Row& row : rows) {

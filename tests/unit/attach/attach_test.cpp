@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Speaking to a running graph: messages as text and pictures, the socket, its questions.
 #include <doctest/doctest.h>
+#include <sys/socket.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -13,35 +14,36 @@
 #include "graph/attach/server.hpp"
 #include "graph/compose/composition.hpp"
 #include "rt/msg/messages.hpp"
+#include "tests/temporary_folder.hpp"
 
 namespace {
 
 using namespace takt;
 using Json = nlohmann::ordered_json;
 
-/// A message of a type in memory of its own.
-template <class T>
-struct Built {
-  explicit Built(const Capacity& capacity) : memory(MessageType::of<T>().bytes(capacity) + 64) {
-    void* start = memory.data();
+/// An empty message of a type in memory of its own.
+struct Placed {
+  Placed(const MessageType& type, const Capacity& capacity) : memory(type.bytes(capacity) + 64), start(memory.data()) {
     size_t room = memory.size();
-    std::align(64, memory.size() - 64, start, room);
-    MessageType::of<T>().place(start, capacity);
-    message = static_cast<T*>(start);
+    REQUIRE(std::align(64, memory.size() - 64, start, room) != nullptr);
+    type.place(start, capacity);
   }
+  Placed(const Placed&) = delete;
+  Placed& operator=(const Placed&) = delete;
   std::vector<std::byte> memory;
+  void* start;
+};
+
+template <class T>
+struct Built : Placed {
+  explicit Built(const Capacity& capacity) : Placed(MessageType::of<T>(), capacity), message(static_cast<T*>(start)) {}
   T* message;
 };
 
-/// A folder for sockets that is ours alone, named by the environment as a session would.
-struct Folder {
-  Folder() {
-    char name[] = "/tmp/takt-attach-test-XXXXXX";
-    path = mkdtemp(name);
-    setenv("XDG_RUNTIME_DIR", path.c_str(), 1);
-  }
-  ~Folder() { std::filesystem::remove_all(path); }
-  std::filesystem::path path;
+/// A folder for sockets that is ours alone, named by the environment as at a login. In /tmp, because the path of a
+/// socket must be short.
+struct Folder : test::TemporaryFolder {
+  Folder() : TemporaryFolder("/tmp") { setenv("XDG_RUNTIME_DIR", path.c_str(), 1); }
 };
 
 /// The shipped graph, as far as it is known without any device, with one output that this test writes.
@@ -93,13 +95,8 @@ TEST_CASE("a message becomes JSON by its field descriptors") {
 
 TEST_CASE("every message type becomes JSON with one entry a field, and those that can be seen a picture") {
   for (const MessageType* type : message_types()) {
-    const Capacity capacity{.width = 4, .height = 2, .channels = 1, .count = 3};
-    std::vector<std::byte> memory(type->bytes(capacity) + 64);
-    void* start = memory.data();
-    size_t room = memory.size();
-    std::align(64, memory.size() - 64, start, room);
-    type->place(start, capacity);
-    CHECK(attach::message_json(*type, start).size() == type->fields.size());
+    const Placed placed(*type, {.width = 4, .height = 2, .channels = 1, .count = 3});
+    CHECK(attach::message_json(*type, placed.start).size() == type->fields.size());
   }
   Built<Grid> grid({.width = 4, .height = 3});
   grid.message->width = 4;
@@ -208,15 +205,19 @@ TEST_CASE("who listens and goes leaves the output to others, even if nothing is 
   writer->loan();
   writer->publish(1, 0, 0);
   const attach::Server server({scene.spec, scene.plan, *scene.board, *scene.transport});
-  {
-    auto first = attach::connect_to(getpid());
-    REQUIRE(first);
-    REQUIRE(first->write({{"do", "echo"}, {"port", "map.obstacles"}, {"count", 2}}));
-    REQUIRE(first->read_line());  // and now it waits for a second message
-    CHECK(scene.ask({{"do", "echo"}, {"port", "map.obstacles"}})["error"].get<std::string>().find("somebody else") !=
-          std::string::npos);
-  }
-  while (scene.ask({{"do", "echo"}, {"port", "map.obstacles"}}).contains("error")) usleep(1000);
+  std::string why;
+  const auto address = attach::address_of(attach::socket_folder(why), getpid(), why);
+  REQUIRE(address);
+  const int descriptor = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  REQUIRE(connect(descriptor, reinterpret_cast<const sockaddr*>(&*address), sizeof *address) == 0);
+  attach::Connection first(descriptor, 3'600'000);  // the end is waited for, however long it takes
+  const Json echo{{"do", "echo"}, {"port", "map.obstacles"}};
+  REQUIRE(first.write({{"do", "echo"}, {"port", "map.obstacles"}, {"count", 2}}));
+  REQUIRE(first.read_line());  // and now it waits for a second message
+  CHECK(scene.ask(echo)["error"].get<std::string>().find("somebody else") != std::string::npos);
+  shutdown(descriptor, SHUT_WR);
+  CHECK_FALSE(first.read_line());  // the server hangs up after it has given the output back
+  CHECK_FALSE(scene.ask(echo).contains("error"));
 }
 
 TEST_CASE("a path too long for a socket is refused, not cut") {

@@ -4,20 +4,16 @@
 #include <doctest/doctest.h>
 
 #include <cmath>
-#include <fstream>
+
+#include "tests/temporary_folder.hpp"
 
 using namespace takt;
 
 namespace {
 
 tl::expected<StereoRig, DeviceError> load(const std::string& yaml) {
-  std::string name = (std::filesystem::temp_directory_path() / "takt-rig-XXXXXX").string();
-  const int descriptor = mkstemp(name.data());
-  REQUIRE(descriptor >= 0);
-  std::ofstream(name) << yaml;
-  auto rig = load_rig("camera", name);
-  std::filesystem::remove(name);
-  return rig;
+  const test::TemporaryFolder folder;
+  return load_rig("camera", folder.write("rig.yaml", yaml));
 }
 std::string message(const std::string& yaml) {
   const auto rig = load(yaml);
@@ -44,7 +40,7 @@ TEST_CASE("mistakes in a rig name the line and the key") {
   CHECK(has(message("hfov: 66deg\nbaseline: .nan\n"), "`baseline`"));
   CHECK(has(message("hfov: 66deg\nbaseline: 0.1m\nwidth: 12.5\n"), "integer"));
   CHECK(has(message("hfov: 66deg\nbaseline: 0.1m\nmount: {x: 1}\n"), ":3: `x`"));
-  CHECK(has(message("hfov: [\n"), "takt-rig-"));
+  CHECK(has(message("hfov: [\n"), "rig.yaml:"));
   CHECK(has(message("hfov: {a: 1}\nbaseline: 0.1m\n"), "`hfov`"));
   CHECK_FALSE(load_rig("camera", "/nonexistent.yaml").has_value());
 }

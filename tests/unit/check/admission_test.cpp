@@ -242,27 +242,27 @@ TEST_CASE("check: modes are checked as well, without what they leave out") {
   CHECK(result.json["modes"][1]["name"] == "short");
 }
 
-TEST_CASE("check: deadline on some of the cores is adjusted to all, and says what would keep it there") {
+TEST_CASE("check: deadline on some of the cores needs an exclusive cpuset") {
+  GraphSpec graph;
+  graph.schedule.cores = {0};
   const Plan plan = plan_of(Policy::deadline, {0}, {task("a", 10, 20, 50)});
   CheckOptions options;
-  CHECK(check({}, plan, options).admitted);
+  CHECK(check(graph, plan, options).admitted);
   options.machine.online = {0, 1};
-  const CheckResult adjusted = check({}, plan, options);
-  CHECK(adjusted.verdict == Verdict::adjusted);
-  CHECK(adjusted.admitted);
-  CHECK(adjusted.text.find("exclusive cpuset") != std::string::npos);
-  GraphSpec unnamed;  // no `cores` in the schedule: nothing to contradict
-  unnamed.schedule.cores_named = false;
-  CHECK(check(unnamed, plan, options).admitted);
+  const CheckResult refused = check(graph, plan, options);
+  CHECK(refused.verdict == Verdict::invalid);
+  CHECK(!refused.admitted);
+  CHECK(refused.text.find("exclusive cpuset") != std::string::npos);
+  CHECK(check({}, plan, options).admitted);  // no `cores` in the schedule: nothing to contradict
   options.machine.exclusive = {0};
-  CHECK(check({}, plan, options).admitted);
+  CHECK(check(graph, plan, options).admitted);
   options.machine.exclusive.clear();
   options.real_time = false;
-  CHECK(check({}, plan, options).admitted);
+  CHECK(check(graph, plan, options).admitted);
   options.real_time = true;
   Plan fixed = plan;
   fixed.policy = Policy::fixed;
-  CHECK(check({}, fixed, options).admitted);
+  CHECK(check(graph, fixed, options).admitted);
 }
 
 TEST_CASE("check: lines stay within 80 columns, and every node has its bound and margin") {

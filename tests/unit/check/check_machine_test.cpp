@@ -12,11 +12,11 @@ namespace {
 
 test::FakeFacts machine_six() {
   test::FakeFacts facts;
-  facts.files["/proc/cpuinfo"] = "processor\t: 0\nmodel name\t: Six\n";
-  facts.files["/proc/sys/kernel/osrelease"] = "6.18.1\n";
-  facts.files["/proc/sys/kernel/version"] = "#1 SMP\n";
-  facts.files["/proc/sys/kernel/sched_rt_runtime_us"] = "950000\n";
-  facts.files["/proc/sys/kernel/sched_rt_period_us"] = "1000000\n";
+  facts.write({{"/proc/cpuinfo", "processor\t: 0\nmodel name\t: Six\n"},
+               {"/proc/sys/kernel/osrelease", "6.18.1\n"},
+               {"/proc/sys/kernel/version", "#1 SMP\n"},
+               {"/proc/sys/kernel/sched_rt_runtime_us", "950000\n"},
+               {"/proc/sys/kernel/sched_rt_period_us", "1000000\n"}});
   return facts;
 }
 
@@ -61,7 +61,10 @@ TEST_CASE("overheads: measured on another machine, or not to be read, is a warni
   CHECK(elsewhere.overheads.switch_ns == 3'000);
   for (const char* text :
        {"", "[]", "{\"release_us\": 1}", "{\"machine\": 3}", R"({"machine": {"cpu": "Six", "cores": 2,
-       "kernel": "6.19.0 #1 SMP"}, "release_us": -1})"}) {
+       "kernel": "6.19.0 #1 SMP"}, "release_us": -1})",
+        R"({"machine": {"cpu": "Six", "cores": 1e300, "kernel": "6.19.0 #1 SMP"}})",
+        R"({"machine": {"cpu": "Six", "cores": 2.5, "kernel": "6.19.0 #1 SMP"}})",
+        R"({"machine": {"cpu": "Six", "cores": 2, "kernel": "6.19.0 #1 SMP"}, "deadline_bandwidth": -1})"}) {
     CAPTURE(text);
     facts.files["/m.json"] = text;
     const CheckMachine broken = check_machine(facts, "/m.json");
@@ -74,20 +77,23 @@ TEST_CASE("overheads: measured on another machine, or not to be read, is a warni
 
 TEST_CASE("exclusive cpusets of both hierarchies are seen") {
   test::FakeFacts facts = machine_six();
-  CHECK(check_machine(facts, "").exclusive.empty());
-  facts.files["/proc/self/cgroup"] = "0::/robot\n";
-  facts.files["/proc/self/mounts"] = "cgroup2 /sys/fs/cgroup cgroup2 rw 0 0\n";
-  facts.files["/sys/fs/cgroup/robot/cpuset.cpus.partition"] = "member\n";
-  facts.files["/sys/fs/cgroup/robot/cpuset.cpus.effective"] = "1\n";
-  CHECK(check_machine(facts, "").exclusive.empty());
-  facts.files["/sys/fs/cgroup/robot/cpuset.cpus.partition"] = "root\n";
-  CHECK(check_machine(facts, "").exclusive == std::vector<int>{1});
-  facts.files["/proc/self/cgroup"] = "9:cpuset:/robot\n0::/\n";
-  facts.files["/proc/self/mounts"] = "cgroup /sys/fs/cgroup/cpuset cgroup rw,cpuset 0 0\n";
-  facts.files["/sys/fs/cgroup/cpuset/robot/cpuset.cpus"] = "0\n";
-  facts.files["/sys/fs/cgroup/cpuset/robot/cpuset.cpu_exclusive"] = "1\n";
-  facts.files["/sys/fs/cgroup/cpuset/cpuset.sched_load_balance"] = "1\n";
-  CHECK(check_machine(facts, "").exclusive.empty());
-  facts.files["/sys/fs/cgroup/cpuset/cpuset.sched_load_balance"] = "0\n";
-  CHECK(check_machine(facts, "").exclusive == std::vector<int>{0});
+  const auto exclusive = [&](const std::map<std::string, std::string>& files) {
+    facts.write(files);
+    return check_machine(facts, "").exclusive;
+  };
+  CHECK(exclusive({}).empty());
+  const std::string second = "/sys/fs/cgroup/robot/cpuset.cpus.", first = "/sys/fs/cgroup/cpuset/";
+  CHECK(exclusive({{"/proc/self/cgroup", "0::/robot\n"},
+                   {"/proc/self/mounts", "cgroup2 /sys/fs/cgroup cgroup2 rw 0 0\n"},
+                   {second + "partition", "member\n"},
+                   {second + "effective", "1\n"}})
+            .empty());
+  CHECK(exclusive({{second + "partition", "root\n"}}) == std::vector<int>{1});
+  CHECK(exclusive({{"/proc/self/cgroup", "9:cpuset:/robot\n0::/\n"},
+                   {"/proc/self/mounts", "cgroup /sys/fs/cgroup/cpuset cgroup rw,cpuset 0 0\n"},
+                   {first + "robot/cpuset.cpus", "0\n"},
+                   {first + "robot/cpuset.cpu_exclusive", "1\n"},
+                   {first + "cpuset.sched_load_balance", "1\n"}})
+            .empty());
+  CHECK(exclusive({{first + "cpuset.sched_load_balance", "0\n"}}) == std::vector<int>{0});
 }

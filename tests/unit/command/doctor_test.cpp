@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
-#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
@@ -9,6 +8,7 @@
 #include "graph/command/doctor_text.hpp"
 #include "graph/command/machine_file.hpp"
 #include "rt/machine/parse.hpp"
+#include "tests/temporary_folder.hpp"
 
 using namespace takt;
 using namespace takt::command;
@@ -111,14 +111,14 @@ TEST_CASE(
 }
 
 TEST_CASE("a file is replaced as a whole, its folder made; where that fails the reason is told") {
-  const auto folder = std::filesystem::temp_directory_path() / ("takt_doctor_" + std::to_string(getpid()));
-  CHECK(write_whole(folder / "deep/file.json", "one") == "");
-  CHECK(write_whole(folder / "deep/file.json", "two") == "");
-  std::ifstream in(folder / "deep/file.json");
+  const test::TemporaryFolder folder;
+  const auto file = folder.path / "deep/file.json";
+  CHECK(write_whole(file, "one") == "");
+  CHECK(write_whole(file, "two") == "");
+  std::ifstream in(file);
   std::stringstream text;
   text << in.rdbuf();
   CHECK(text.str() == "two");
-  CHECK(write_whole(folder / "deep/file.json/below", "three") != "");
-  CHECK(std::distance(std::filesystem::directory_iterator(folder / "deep"), {}) == 1);
-  std::filesystem::remove_all(folder);
+  CHECK(write_whole(file / "below", "three") != "");
+  CHECK(std::distance(std::filesystem::directory_iterator(file.parent_path()), {}) == 1);
 }

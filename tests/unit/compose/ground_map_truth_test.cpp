@@ -3,12 +3,11 @@
 #include <doctest/doctest.h>
 
 #include <Eigen/Geometry>
-#include <array>
 #include <cmath>
 #include <map>
 #include <set>
+#include <vector>
 
-#include "hal/camera/rig.hpp"
 #include "tests/unit/compose/drive.hpp"
 
 using namespace takt;
@@ -171,14 +170,10 @@ double percent(int part, int whole) { return 100.0 * part / whole; }
 // with the neighbouring cells too, because a face may stand a few centimetres from the next cell and the odometry
 // drifts by more than that. After 30 s its drift begins to be what is measured.
 TEST_CASE("the ground map of a drive through the lab agrees with the world") {
-  hal::Devices devices;
-  VirtualClock clock(1'000'000'000);
-  NodeTypes types = graph::node_types();
-  types.add<GridProbe>("probe", Layer::storage, "test");
   seen = {};
-  test::drive(kGraphText, kScheduleText, types, 30'000'000'000, devices, clock);
-  const sim::Simulation& world = *devices.first_world();
-  const StereoRig rig = *load_rig("ground_camera", test::graph_folder() / "rigs/x2_wide.yaml");
+  auto drive = test::Drive::with<GridProbe>(kGraphText, kScheduleText, 30'000'000'000);
+  const sim::Simulation& world = drive.world();
+  const StereoRig rig = test::rig_of("ground_camera", "x2_wide.yaml");
   REQUIRE(seen.stamps.size() > 145);
   REQUIRE(seen.cell_m == doctest::Approx(kCellM));
 

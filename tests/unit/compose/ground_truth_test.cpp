@@ -6,7 +6,6 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
-#include "hal/camera/rig.hpp"
 #include "tests/unit/compose/drive.hpp"
 
 using namespace takt;
@@ -101,14 +100,10 @@ Eigen::Isometry3d isometry(const sim::CameraPose& pose) {
 }  // namespace
 
 TEST_CASE("stereo, ego-motion and the obstacle grid agree with the simulated world") {
-  hal::Devices devices;
-  VirtualClock clock(1'000'000'000);
-  NodeTypes types = graph::node_types();
-  types.add<ProbeNode>("probe", Layer::storage, "test");
   seen = {};
-  test::drive(kGraphText, kScheduleText, types, 6'000'000'000, devices, clock);
-  const sim::Simulation& world = *devices.first_world();
-  const StereoRig rig = *load_rig("head_camera", test::graph_folder() / "rigs/xb3.yaml");
+  auto drive = test::Drive::with<ProbeNode>(kGraphText, kScheduleText, 6'000'000'000);
+  const sim::Simulation& world = drive.world();
+  const StereoRig rig = test::rig_of("head_camera", "xb3.yaml");
   const auto pixels = static_cast<size_t>(rig.width) * static_cast<size_t>(rig.height);
 
   // Disparity: integer disparities, so half a pixel off is perfect.

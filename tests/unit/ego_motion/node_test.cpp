@@ -89,7 +89,6 @@ TEST_CASE("ego_motion refuses a disparity of another size and an even block") {
   PortAccess::connect(test::input(*node, "disparity"), {320, 240, 1, 0});
   CHECK_THROWS_WITH_AS(test::set_up(*node), doctest::Contains("640 x 480"), SetupError);
   PortAccess::connect(test::input(*node, "disparity"), {640, 480, 1, 0});
-  for (ParamBase* p : node->params())
-    if (p->name() == "n_search") REQUIRE(p->set(int64_t{10}));
+  test::set(*node, "n_search", int64_t{10});
   CHECK_THROWS_WITH_AS(test::set_up(*node), doctest::Contains("n_search is 10"), SetupError);
 }

@@ -150,7 +150,8 @@ TEST_CASE("files that are no traces are refused with words, never with a crash")
   std::vector<std::string> places;
   for (const auto& [place, value] : flat.items()) places.push_back(place);
   for (const std::string& place : places) {
-    for (const Json& other : {Json(nullptr), Json("words"), Json(-1), Json(1e300), Json(99999), Json::array()}) {
+    for (const Json& other : {Json(nullptr), Json("words"), Json(-1), Json(1e300), Json(99999), Json::array(),
+                              Json(INT64_MIN), Json(INT64_MAX), Json(UINT64_MAX), Json(INT32_MIN)}) {
       Json damaged = file;
       damaged[Json::json_pointer(place)] = other;
       if (const auto read = explain::read_trace(damaged)) {

@@ -41,7 +41,7 @@ struct FloorPair : test::Box<StereoPair> {
         const bool floor = p && p->y_m < wall_y_m;
         uint8_t* pixel = &pair.left_view().at(x, y);
         pixel[0] = floor ? static_cast<uint8_t>(floor_value / 2) : 200;
-        pixel[1] = pixel[2] = floor ? floor_value : 60;
+        pixel[1] = pixel[2] = static_cast<uint8_t>(floor ? floor_value : 60);
       }
   }
 };
@@ -56,8 +56,7 @@ struct Bench {
     NodeTypes types;
     register_ground_map(types);
     node = types.find("ground_map")->make();
-    for (ParamBase* p : node->params())
-      if (p->name() == "motion_camera") REQUIRE(p->set(std::string(motion_camera)));
+    test::set(*node, "motion_camera", std::string(motion_camera));
     PortAccess::connect(port("pair"), kImage);
     for (const char* name : connected) PortAccess::connect(port(name), {0, 0, 1, 181});
     test::set_up(*node);
@@ -274,8 +273,7 @@ TEST_CASE("ground_map refuses parameters that cannot work") {
     NodeTypes types;
     register_ground_map(types);
     const auto node = types.find("ground_map")->make();
-    for (ParamBase* p : node->params())
-      if (p->name() == name) REQUIRE(p->set(value));
+    test::set(*node, name, value);
     PortAccess::connect(test::input(*node, "pair"), kImage);
     CHECK_THROWS_WITH_AS(test::set_up(*node), doctest::Contains(text), SetupError);
   };

@@ -147,9 +147,7 @@ TEST_CASE("a wrong block `measured` is reported with its place") {
   const auto wrong = [&](const std::string& from, const std::string& to, const std::string& at,
                          const std::vector<std::string>& words) {
     const std::string text = kSchedule + with(block, from, to);
-    const size_t where = text.find(at, kSchedule.size()), line_start = text.rfind('\n', where) + 1;
-    const auto line = 1 + static_cast<int>(std::count(text.begin(), text.begin() + static_cast<long>(where), '\n'));
-    expect(Files(kGraph, text).load(), "schedule.yaml", line, static_cast<int>(where - line_start) + 1, words);
+    expect_at(Files(kGraph, text).load(), "schedule.yaml", text, at, words, kSchedule.size());
   };
   wrong("stereo: {exec", "stere: {exec", "stere: {exec", {"stere", "did you mean `stereo`"});
   wrong("exec: 5ms", "exec: 5", "5, samples", {"exec", "stereo", "unit"});

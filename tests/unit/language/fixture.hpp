@@ -2,15 +2,13 @@
 // A small world for the loader's tests: fake node types, a fake device catalogue, files in a folder of their own.
 #pragma once
 #include <doctest/doctest.h>
-#include <unistd.h>
 
-#include <atomic>
-#include <cstdlib>
+#include <algorithm>
 #include <filesystem>
-#include <fstream>
 #include <string>
 
 #include "graph/language/catalogue.hpp"
+#include "tests/temporary_folder.hpp"
 
 namespace takt::test {
 
@@ -130,31 +128,19 @@ nodes:
 class Files {
  public:
   Files(const std::string& graph = kGraph, const std::string& schedule = kSchedule) {
-    static std::atomic<int> count{0};
-    folder_ = std::filesystem::temp_directory_path() /
-              ("takt_language_" + std::to_string(::getpid()) + "_" + std::to_string(count++));
-    std::filesystem::create_directories(folder_);
     write("graph.yaml", graph);
     write("schedule.yaml", schedule);
   }
-  Files(const Files&) = delete;
-  Files& operator=(const Files&) = delete;
-  ~Files() {
-    std::error_code ignored;
-    std::filesystem::remove_all(folder_, ignored);
-  }
-  void write(const std::string& name, const std::string& text) const {
-    std::ofstream(folder_ / name, std::ios::binary) << text;
-  }
-  std::filesystem::path folder() const { return folder_; }
+  void write(const std::string& name, const std::string& text) const { folder_.write(name, text); }
+  std::filesystem::path folder() const { return folder_.path; }
   graph::Loaded load(const graph::LoadOptions& options = {}) const {
     static const NodeTypes types = fake_types();
     static const graph::DeviceCatalogue devices = fake_devices();
-    return graph::load(folder_ / "graph.yaml", options, types, devices);
+    return graph::load(folder() / "graph.yaml", options, types, devices);
   }
 
  private:
-  std::filesystem::path folder_;
+  TemporaryFolder folder_;
 };
 
 /// `text` with its only occurrence of `from` replaced.
@@ -187,24 +173,26 @@ inline void expect(const graph::Loaded& loaded, const std::string& file, int lin
   }
 }
 
-/// The same for kGraph (or kSchedule) with one place changed; line and column are those of `at` in the changed text.
-inline void expect_graph(const std::string& from, const std::string& to, const std::string& at,
-                         const std::vector<std::string>& words, const graph::LoadOptions& options = {}) {
-  const std::string text = with(kGraph, from, to);
-  const size_t where = text.find(at);
+/// The same, at the first `at` in that file's text from `begin` on.
+inline void expect_at(const graph::Loaded& loaded, const std::string& file, const std::string& text,
+                      const std::string& at, const std::vector<std::string>& words, size_t begin = 0) {
+  const size_t where = text.find(at, begin);
   REQUIRE_MESSAGE(where != std::string::npos, at);
   const size_t line_start = text.rfind('\n', where) + 1;
   const auto line = 1 + static_cast<int>(std::count(text.begin(), text.begin() + static_cast<long>(where), '\n'));
-  expect(Files(text).load(options), "graph.yaml", line, static_cast<int>(where - line_start) + 1, words);
+  expect(loaded, file, line, static_cast<int>(where - line_start) + 1, words);
+}
+
+/// The same for kGraph (or kSchedule) with one place changed, to which `at` refers.
+inline void expect_graph(const std::string& from, const std::string& to, const std::string& at,
+                         const std::vector<std::string>& words, const graph::LoadOptions& options = {}) {
+  const std::string text = with(kGraph, from, to);
+  expect_at(Files(text).load(options), "graph.yaml", text, at, words);
 }
 inline void expect_schedule(const std::string& from, const std::string& to, const std::string& at,
                             const std::vector<std::string>& words, const graph::LoadOptions& options = {}) {
   const std::string text = with(kSchedule, from, to);
-  const size_t where = text.find(at);
-  REQUIRE_MESSAGE(where != std::string::npos, at);
-  const size_t line_start = text.rfind('\n', where) + 1;
-  const auto line = 1 + static_cast<int>(std::count(text.begin(), text.begin() + static_cast<long>(where), '\n'));
-  expect(Files(kGraph, text).load(options), "schedule.yaml", line, static_cast<int>(where - line_start) + 1, words);
+  expect_at(Files(kGraph, text).load(options), "schedule.yaml", text, at, words);
 }
 
 }  // namespace takt::test

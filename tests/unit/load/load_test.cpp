@@ -29,9 +29,7 @@ struct Fixture {
     NodeTypes types;
     register_load(types);
     node = types.find("load")->make();
-    for (const auto& [name, value] : params)
-      for (ParamBase* param : node->params())
-        if (param->name() == name) REQUIRE(param->set(value));
+    for (const auto& [name, value] : params) test::set(*node, name, value);
     const Clock& clock = real_time ? static_cast<const Clock&>(real) : imagined;
     Setup setup{clock, ".", ".", 0, std::nullopt, 0};
     node->setup(setup);

@@ -2,7 +2,10 @@
 // Runs one node without a graph: places messages in plain memory and hands them to its ports.
 #pragma once
 #include <cstdlib>
+#include <filesystem>
 #include <memory>
+#include <stdexcept>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -68,6 +71,16 @@ inline InputPort& input(Node& node, std::string_view name) {
   for (InputPort* port : node.inputs())
     if (port->name() == name) return *port;
   throw std::logic_error("the node has no input " + std::string(name));
+}
+
+/// Sets a parameter, as the graph file would before start.
+inline void set(Node& node, std::string_view name, const ParamValue& value) {
+  for (ParamBase* param : node.params()) {
+    if (param->name() != name) continue;
+    if (const auto done = param->set(value); !done) throw std::logic_error(std::string(name) + " " + done.error());
+    return;
+  }
+  throw std::logic_error("the node has no parameter " + std::string(name));
 }
 
 /// Latches one message; `sequence` above the last one makes it new.

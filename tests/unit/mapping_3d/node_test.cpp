@@ -104,11 +104,9 @@ TEST_CASE("mapping_3d: points without company are no obstacle, unless outlier_ra
     NodeTypes types;
     register_mapping_3d(types);
     const auto node = types.find("mapping_3d")->make();
-    for (ParamBase* p : node->params()) {
-      if (p->name() == "outlier_radius") REQUIRE(p->set(radius));
-      if (p->name() == "outlier_n_min") REQUIRE(p->set(100000));  // 80 of the 960 points below
-      if (p->name() == "share") REQUIRE(p->set(0.0));
-    }
+    test::set(*node, "outlier_radius", radius);
+    test::set(*node, "outlier_n_min", int64_t{100000});  // 80 of the 960 points below
+    test::set(*node, "share", 0.0);
     auto& cloud_port = test::input(*node, "cloud");
     PortAccess::connect(cloud_port, {0, 0, 1, 1000});
     test::set_up(*node);
@@ -135,7 +133,6 @@ TEST_CASE("mapping_3d refuses a range that is empty") {
   NodeTypes types;
   register_mapping_3d(types);
   const auto node = types.find("mapping_3d")->make();
-  for (ParamBase* p : node->params())
-    if (p->name() == "range_min") REQUIRE(p->set(7.0));
+  test::set(*node, "range_min", 7.0);
   CHECK_THROWS_WITH_AS(test::set_up(*node), doctest::Contains("range_min is 7"), SetupError);
 }

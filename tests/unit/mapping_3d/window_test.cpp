@@ -60,8 +60,7 @@ class Mapper {
     register_mapping_3d(types);
     CHECK(types.find("mapping_3d")->layer == Layer::perception);  // odometry comes from a sensor
     node_ = types.find("mapping_3d")->make();
-    for (ParamBase* p : node_->params())
-      if (p->name() == "window") REQUIRE(p->set(window));
+    test::set(*node_, "window", window);
     PortAccess::connect(port("cloud"), {0, 0, 1, static_cast<uint32_t>(capacity)});
     if (poses == Poses::motion) PortAccess::connect(port("motion"), {});
     if (poses == Poses::odometry) PortAccess::connect(port("odometry"), {});

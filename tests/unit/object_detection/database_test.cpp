@@ -3,26 +3,20 @@
 
 #include <doctest/doctest.h>
 
-#include <filesystem>
-#include <fstream>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <string>
+
+#include "tests/temporary_folder.hpp"
 
 using namespace takt::object_detection;
 
 namespace {
 
-struct Folder {
-  std::filesystem::path path;
-  Folder() {
-    std::string name = (std::filesystem::temp_directory_path() / "objects-XXXXXX").string();
-    path = mkdtemp(name.data());
-    image("good.png", cv::Mat(8, 8, CV_8UC3, cv::Scalar(10, 20, 200)));
-  }
-  ~Folder() { std::filesystem::remove_all(path); }
+struct Folder : takt::test::TemporaryFolder {
+  Folder() { image("good.png", cv::Mat(8, 8, CV_8UC3, cv::Scalar(10, 20, 200))); }
   void image(const std::string& name, const cv::Mat& pixels) const { cv::imwrite((path / name).string(), pixels); }
-  void list(const std::string& text) const { std::ofstream(path / "objects.txt") << text; }
+  void list(const std::string& text) const { write("objects.txt", text); }
   std::string error(const std::string& text) const {
     list(text);
     try {

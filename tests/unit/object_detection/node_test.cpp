@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "nodes/object_detection/detector.hpp"
@@ -26,15 +27,36 @@ std::unique_ptr<Node> make_node() {
   return types.find("object_detection")->make();
 }
 
-void set(Node& node, std::string_view name, const ParamValue& value) {
-  for (ParamBase* param : node.params())
-    if (param->name() == name) REQUIRE(param->set(value));
-}
+constexpr Capacity kImages{640, 480, 3, 0};
 
-std::string setup_error(Node& node, const Capacity& images) {
-  PortAccess::connect(test::input(node, "pair"), images);
+/// The node, set up with the shipped objects, and a pair for it.
+struct Bench {
+  std::unique_ptr<Node> node = make_node();
+  InputPort& port = test::input(*node, "pair");
+  test::Box<StereoPair> pair{kImages};
+
+  explicit Bench(const std::vector<std::pair<std::string, ParamValue>>& params = {}) {
+    PortAccess::connect(port, kImages);
+    test::set(*node, "database", kObjects.string());
+    for (const auto& [name, value] : params) test::set(*node, name, value);
+    test::set_up(*node);
+    pair->width = 640, pair->height = 480, pair->channels = 3;
+    pair->left.resize(640 * 480 * 3);
+  }
+  void show(const Scene& scene) {
+    REQUIRE(scene.pixels.size() == pair->left.items().size());
+    std::copy(scene.pixels.begin(), scene.pixels.end(), pair->left.data());
+  }
+};
+
+/// The error of the set-up; empty if there is none.
+std::string setup_error(const Capacity& images, const std::vector<std::pair<std::string, ParamValue>>& params = {}) {
+  const auto node = make_node();
+  test::set(*node, "database", kObjects.string());
+  for (const auto& [name, value] : params) test::set(*node, name, value);
+  PortAccess::connect(test::input(*node, "pair"), images);
   try {
-    test::set_up(node);
+    test::set_up(*node);
   } catch (const SetupError& error) {
     return error.what();
   }
@@ -44,11 +66,8 @@ std::string setup_error(Node& node, const Capacity& images) {
 }  // namespace
 
 TEST_CASE("object_detection: boxes and region of interest of the left image, with its stamp") {
-  const auto node = make_node();
-  auto& port = test::input(*node, "pair");
-  PortAccess::connect(port, {640, 480, 3, 0});
-  set(*node, "database", kObjects.string());
-  test::set_up(*node);
+  Bench bench;
+  auto& [node, port, pair] = bench;
   test::BoxWriter<Detections> boxes(*node->outputs()[0]);
   test::BoxWriter<Image> roi(*node->outputs()[1]);
   CHECK_FALSE(test::run(*node));  // nothing latched
@@ -60,10 +79,8 @@ TEST_CASE("object_detection: boxes and region of interest of the left image, wit
   p.most_objects = 1;
   Scene scene;
   for (uint64_t i = 0; scene.objects.empty(); ++i) scene = make_scene(database, p, 5, i);
-  test::Box<StereoPair> pair({640, 480, 3, 0});
-  pair->width = 640, pair->height = 480, pair->channels = 3, pair->health = image_health::blurred;
-  pair->left.resize(scene.pixels.size());
-  std::copy(scene.pixels.begin(), scene.pixels.end(), pair->left.data());
+  pair->health = image_health::blurred;
+  bench.show(scene);
   test::latch(port, pair, 1234, 1);
   CHECK(test::run(*node));
   REQUIRE(boxes.sent());
@@ -139,15 +156,9 @@ TEST_CASE("object_detection: with little time the best so far is sent; the next 
 }
 
 TEST_CASE("object_detection: out of time it sends what it has and says how much was searched") {
-  const auto node = make_node();
-  auto& port = test::input(*node, "pair");
-  PortAccess::connect(port, {640, 480, 3, 0});
-  set(*node, "database", kObjects.string());
-  test::set_up(*node);
+  Bench bench;
+  auto& [node, port, pair] = bench;
   test::BoxWriter<Detections> boxes(*node->outputs()[0]);
-  test::Box<StereoPair> pair({640, 480, 3, 0});
-  pair->width = 640, pair->height = 480, pair->channels = 3;
-  pair->left.resize(640 * 480 * 3);
   test::latch(port, pair, 1234, 1);
   VirtualClock late(99'500'000);  // half a millisecond before the deadline, less than `reserve`
   Job job(late, 0, 0, 100'000'000, 0, "full");
@@ -161,20 +172,11 @@ TEST_CASE("object_detection: out of time it sends what it has and says how much 
 }
 
 TEST_CASE("object_detection: at most max_detections boxes") {
-  const auto node = make_node();
-  auto& port = test::input(*node, "pair");
-  PortAccess::connect(port, {640, 480, 3, 0});
-  set(*node, "database", kObjects.string());
-  set(*node, "max_detections", int64_t{2});
-  set(*node, "min_score", 0.0);  // so that there are many
-  test::set_up(*node);
+  Bench bench({{"max_detections", int64_t{2}}, {"min_score", 0.0}});  // so that there are many
+  auto& [node, port, pair] = bench;
   test::BoxWriter<Detections> boxes(*node->outputs()[0]);
   const auto database = read_database(kObjects, 48, TestViews::read);
-  const Scene scene = make_scene(database, {}, 3, 0);
-  test::Box<StereoPair> pair({640, 480, 3, 0});
-  pair->width = 640, pair->height = 480, pair->channels = 3;
-  pair->left.resize(scene.pixels.size());
-  std::copy(scene.pixels.begin(), scene.pixels.end(), pair->left.data());
+  bench.show(make_scene(database, {}, 3, 0));
   test::latch(port, pair, 1, 1);
   CHECK(test::run(*node));
   REQUIRE(boxes.sent());
@@ -183,18 +185,11 @@ TEST_CASE("object_detection: at most max_detections boxes") {
 }
 
 TEST_CASE("object_detection: what cannot work is said before start") {
-  const Capacity images{640, 480, 3, 0};
-  const auto error = [&](std::string_view name, const ParamValue& value, const Capacity& capacity) {
-    const auto node = make_node();
-    set(*node, "database", kObjects.string());
-    if (!name.empty()) set(*node, name, value);
-    return setup_error(*node, capacity);
-  };
-  CHECK(error("", int64_t{0}, images).empty());
-  CHECK(error("", int64_t{0}, {640, 480, 1, 0}).find("must have three") != std::string::npos);
-  CHECK(error("database", std::string("/nonexistent"), images).find("objects.txt: cannot be read") !=
-        std::string::npos);
-  CHECK(error("reference", int64_t{32}, images).find("must be 32 x 32") != std::string::npos);
-  CHECK(error("window", int64_t{48}, images).find("window - 1 = 47") != std::string::npos);
-  CHECK(error("", int64_t{0}, {60, 480, 3, 0}).find("at most 60") != std::string::npos);
+  const auto says = [](const std::string& error, const char* words) { return error.find(words) != std::string::npos; };
+  CHECK(setup_error(kImages).empty());
+  CHECK(says(setup_error({640, 480, 1, 0}), "must have three"));
+  CHECK(says(setup_error(kImages, {{"database", std::string("/nonexistent")}}), "objects.txt: cannot be read"));
+  CHECK(says(setup_error(kImages, {{"reference", int64_t{32}}}), "must be 32 x 32"));
+  CHECK(says(setup_error(kImages, {{"window", int64_t{48}}}), "window - 1 = 47"));
+  CHECK(says(setup_error({60, 480, 3, 0}), "at most 60"));
 }

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
-#include <unistd.h>
 
 #include <filesystem>
 #include <initializer_list>
 #include <opencv2/imgcodecs.hpp>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "rt/memory/memory_use.hpp"
+#include "tests/temporary_folder.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 
 namespace takt {
@@ -21,21 +24,21 @@ constexpr Capacity kSize{40, 30, 1, 0};
 
 /// The node with some inputs connected, writing to a folder of the test's own.
 struct Bench {
-  std::filesystem::path folder;
+  test::TemporaryFolder folder;
   std::unique_ptr<Node> node;
 
-  explicit Bench(std::initializer_list<const char*> connected) {
-    std::string name = (std::filesystem::temp_directory_path() / "picture-XXXXXX").string();
-    folder = mkdtemp(name.data());
+  explicit Bench(std::initializer_list<const char*> connected,
+                 const std::vector<std::pair<std::string, ParamValue>>& params = {}) {
     NodeTypes types;
     register_picture(types);
     node = types.find("picture")->make();
+    for (const auto& [name, value] : params) test::set(*node, name, value);
     for (const char* port : connected) PortAccess::connect(test::input(*node, port), {kSize.width, kSize.height, 1, 8});
-    test::set_up(*node, folder);
+    test::set_up(*node, folder.path);
   }
-  ~Bench() { std::filesystem::remove_all(folder); }
   InputPort& port(std::string_view name) { return test::input(*node, name); }
-  cv::Mat read(const char* name) const { return cv::imread((folder / name).string()); }
+  cv::Mat read(const char* name) const { return cv::imread((folder.path / name).string()); }
+  bool wrote(const char* name) const { return std::filesystem::exists(folder.path / name); }
 };
 
 struct GreyPair : test::Box<StereoPair> {
@@ -46,6 +49,13 @@ struct GreyPair : test::Box<StereoPair> {
   }
 };
 
+struct OneDetection : test::Box<Detections> {
+  OneDetection() : Box({0, 0, 1, 8}) {
+    (*this)->boxes.resize(1);
+    (*this)->boxes[0] = {3, 10, 5, 25, 20, 0.8f};
+  }
+};
+
 cv::Vec3b grey(uint8_t level) { return {level, level, level}; }
 
 }  // namespace
@@ -53,9 +63,7 @@ cv::Vec3b grey(uint8_t level) { return {level, level, level}; }
 TEST_CASE("picture: boxes are drawn on the image of their stamp, not on a newer one") {
   Bench bench({"pair", "detections"});
   GreyPair older(50), newer(90);
-  test::Box<Detections> boxes({0, 0, 1, 8});
-  boxes->boxes.resize(1);
-  boxes->boxes[0] = {3, 10, 5, 25, 20, 0.8f};
+  OneDetection boxes;
   test::latch(bench.port("detections"), boxes, 100, 1);
   test::latch(bench.port("pair"), older, 100, 1, 0);
   test::latch(bench.port("pair"), newer, 200, 2, 1);
@@ -70,9 +78,7 @@ TEST_CASE("picture: boxes are drawn on the image of their stamp, not on a newer 
 TEST_CASE("picture: without detections of any latched image the newest one is written, without boxes") {
   Bench bench({"pair", "detections"});
   GreyPair first(50), second(90);
-  test::Box<Detections> boxes({0, 0, 1, 8});
-  boxes->boxes.resize(1);
-  boxes->boxes[0] = {3, 10, 5, 25, 20, 0.8f};
+  OneDetection boxes;
   test::latch(bench.port("detections"), boxes, 100, 1);
   test::latch(bench.port("pair"), first, 100, 1);
   test::run(*bench.node);
@@ -110,7 +116,7 @@ TEST_CASE("picture: the ground mask lies over the image of its stamp; one withou
   REQUIRE(map.cols == 600);
   CHECK(map.at<cv::Vec3b>(0, 0) == grey(255));
   CHECK(map.at<cv::Vec3b>(0, 599) == grey(0));
-  CHECK_FALSE(std::filesystem::exists(bench.folder / "left.png"));
+  CHECK_FALSE(bench.wrote("left.png"));
 }
 
 TEST_CASE("picture: a job allocates nothing") {
@@ -130,51 +136,30 @@ TEST_CASE("picture: a job allocates nothing") {
 }
 
 TEST_CASE("picture: writes what it has seen when the run ends, and nothing else") {
-  const auto folder = std::filesystem::temp_directory_path() / ("takt_picture_" + std::to_string(getpid()));
-  std::filesystem::create_directories(folder);
-  {
-    NodeTypes types;
-    register_picture(types);
-    const auto node = types.find("picture")->make();
-    for (ParamBase* p : node->params())
-      if (p->name() == "directory") REQUIRE(p->set(std::string("pictures")));
-      else if (p->name() == "track_points") REQUIRE(p->set(int64_t{16}));
-    const Capacity size{40, 30, 1, 0};
-    auto& map_port = test::input(*node, "disparity");
-    auto& motion_port = test::input(*node, "motion");
-    PortAccess::connect(map_port, size);
-    PortAccess::connect(motion_port, {});
-    auto& pair_port = test::input(*node, "pair");
-    PortAccess::connect(pair_port, size);
-    test::set_up(*node, folder);
-    test::Box<DisparityMap> map(size);
-    map->width = 40, map->height = 30, map->disparities = 20;
-    map->disparity.resize(40 * 30);
-    for (auto& d : map->disparity.items()) d = 19;
-    test::latch(map_port, map, 1, 1);
-    test::Box<StereoPair> pair(size);
-    pair->width = 40, pair->height = 30, pair->channels = 1;
-    pair->left.resize(40 * 30);
-    for (auto& level : pair->left.items()) level = 77;
-    test::latch(pair_port, pair, 1, 1);
-    test::Box<Motion> motion;
-    motion->valid = 1;
-    for (uint64_t i = 1; i <= 100; ++i) {  // more than the track holds
-      motion->pose.z = 0.1 * static_cast<double>(i);
-      test::latch(motion_port, motion, static_cast<int64_t>(i), i);
-      test::run(*node, i);
-    }
-    CHECK_FALSE(std::filesystem::exists(folder / "pictures"));  // no file before the end
-    node->finish();
+  Bench bench({"disparity", "motion", "pair"}, {{"directory", std::string("pictures")}, {"track_points", int64_t{16}}});
+  test::Box<DisparityMap> map(kSize);
+  map->width = 40, map->height = 30, map->disparities = 20;
+  map->disparity.resize(40 * 30);
+  for (auto& d : map->disparity.items()) d = 19;
+  test::latch(bench.port("disparity"), map, 1, 1);
+  GreyPair pair(77);
+  test::latch(bench.port("pair"), pair, 1, 1);
+  test::Box<Motion> motion;
+  motion->valid = 1;
+  for (uint64_t i = 1; i <= 100; ++i) {  // more than the track holds
+    motion->pose.z = 0.1 * static_cast<double>(i);
+    test::latch(bench.port("motion"), motion, static_cast<int64_t>(i), i);
+    test::run(*bench.node, i);
   }
-  const cv::Mat disparity = cv::imread((folder / "pictures/disparity.png").string());
-  CHECK(disparity.cols == 40);
+  CHECK_FALSE(bench.wrote("pictures"));  // no file before the end
+  bench.node->finish();
+  const cv::Mat disparity = bench.read("pictures/disparity.png"), left = bench.read("pictures/left.png");
+  REQUIRE(disparity.cols == 40);
   CHECK(disparity.rows == 30);
-  if (!disparity.empty()) CHECK(disparity.at<cv::Vec3b>(3, 3)[2] > disparity.at<cv::Vec3b>(3, 3)[0]);
-  const cv::Mat left = cv::imread((folder / "pictures/left.png").string(), cv::IMREAD_GRAYSCALE);
-  CHECK(left.cols == 40);
-  if (!left.empty()) CHECK(left.at<uint8_t>(29, 39) == 77);
-  CHECK(!cv::imread((folder / "pictures/track.png").string()).empty());
-  CHECK_FALSE(std::filesystem::exists(folder / "pictures/obstacles.png"));
-  std::filesystem::remove_all(folder);
+  CHECK(disparity.at<cv::Vec3b>(3, 3)[2] > disparity.at<cv::Vec3b>(3, 3)[0]);
+  REQUIRE(left.cols == 40);
+  CHECK(left.at<cv::Vec3b>(29, 39) == grey(77));
+  CHECK(bench.wrote("pictures/track.png"));
+  CHECK_FALSE(bench.read("pictures/track.png").empty());
+  CHECK_FALSE(bench.wrote("pictures/obstacles.png"));
 }

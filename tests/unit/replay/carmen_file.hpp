@@ -1,37 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 // CARMEN logs made up for a test.
 #pragma once
-#include <doctest/doctest.h>
-
 #include <cstdio>
-#include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <string>
 
 #include "hal/replay/carmen_log.hpp"
+#include "tests/temporary_folder.hpp"
 
 namespace takt::test {
 
 /// A file that lives as long as the object.
 struct CarmenFile {
+  TemporaryFolder folder;
   std::filesystem::path path;
-  explicit CarmenFile(const std::string& text) {
-    std::string name = (std::filesystem::temp_directory_path() / "takt-carmen-XXXXXX").string();
-    const int descriptor = mkstemp(name.data());
-    REQUIRE(descriptor >= 0);
-    close_descriptor(descriptor);
-    path = name;
-    std::ofstream(path, std::ios::binary) << text;
-  }
-  CarmenFile(const CarmenFile&) = delete;
-  CarmenFile& operator=(const CarmenFile&) = delete;
-  ~CarmenFile() { std::filesystem::remove(path); }
-
- private:
-  static void close_descriptor(int descriptor) {
-    if (std::FILE* file = fdopen(descriptor, "w")) std::fclose(file);
-  }
+  explicit CarmenFile(const std::string& text) : path(folder.write("carmen.log", text)) {}
 };
 
 inline std::string number(double value) {

@@ -6,6 +6,7 @@
 
 #include "hal/replay/replay_camera.hpp"
 #include "tests/conformance/stereo_camera.hpp"
+#include "tests/temporary_folder.hpp"
 #include "tests/test_data.hpp"
 
 using namespace takt;
@@ -19,12 +20,8 @@ const char* const kCalibration =
     "P1: 70 0 15.5 -7 0 70 11.5 0 0 0 1 0\n";
 
 /// A recording of small random images in the KITTI layout.
-struct Recording {
-  fs::path path;
+struct Recording : takt::test::TemporaryFolder {
   explicit Recording(int frames = 4, int channels = 1) {
-    std::string name = (fs::temp_directory_path() / "takt-replay-XXXXXX").string();
-    REQUIRE(mkdtemp(name.data()) != nullptr);
-    path = name;
     uint32_t state = 1;
     for (const char* side : {"image_l", "image_r"}) {
       fs::create_directory(path / side);
@@ -38,10 +35,6 @@ struct Recording {
       }
     }
     write("calib.txt", kCalibration);
-  }
-  ~Recording() { fs::remove_all(path); }
-  void write(const std::string& name, const std::string& text) const {
-    std::ofstream(path / name, std::ios::binary) << text;
   }
   ReplayCameraSettings settings() const {
     ReplayCameraSettings s;

@@ -2,6 +2,7 @@
 // A machine made of text, for the checks.
 #pragma once
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,10 @@ struct FakeFacts final : machine::Facts {
   bool root = false;
 
   FakeFacts() { files["/sys/devices/system/cpu/online"] = "0-1\n"; }
+  /// Adds files, or puts them in the place of those of the same path.
+  void write(const std::map<std::string, std::string>& more) {
+    for (const auto& [path, text] : more) files[path] = text;
+  }
   std::optional<std::string> text(const std::string& path) const override {
     const auto it = files.find(path);
     return it == files.end() ? std::nullopt : std::optional(it->second);

@@ -12,18 +12,17 @@
 #include "rt/msg/messages.hpp"
 #include "rt/shm/iceoryx_layout.hpp"
 #include "rt/shm/transport_error.hpp"
+#include "tests/temporary_folder.hpp"
 
 using namespace takt;
 
 namespace {
 
-struct Directory {
-  std::filesystem::path path = std::filesystem::temp_directory_path() / ("takt-preflight-" + std::to_string(getpid()));
+struct Directory : test::TemporaryFolder {
   Directory() {
     std::filesystem::create_directories(path / "run");
     std::filesystem::create_directories(path / "shm");
   }
-  ~Directory() { std::filesystem::remove_all(path); }
   IceoryxPlaces places() const {
     IceoryxPlaces places = IceoryxPlaces::of_this_machine();
     places.run = path / "run";

@@ -9,6 +9,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <array>
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <csignal>
@@ -18,15 +20,12 @@
 #include <mutex>
 #include <thread>
 
+#include "tests/unit/rt/opaque_malloc.hpp"
+
 using namespace takt;
+using namespace takt::test;
 
 namespace {
-
-// Through volatile pointers: the compiler may otherwise drop an allocation it sees to be unused.
-void* (*volatile call_malloc)(size_t) = std::malloc;
-void* (*volatile call_calloc)(size_t, size_t) = std::calloc;
-void* (*volatile call_realloc)(void*, size_t) = std::realloc;
-void (*volatile call_free)(void*) = std::free;
 
 struct Watched {
   std::array<uint64_t, kJobCalls> counts{};
@@ -185,6 +184,7 @@ TEST_CASE("a strict job ends the process at the first call") {
   if (cannot_watch()) return;
   std::fflush(nullptr);
   const pid_t child = fork();
+  REQUIRE(child >= 0);
   if (child == 0) {
     signal(SIGABRT, SIG_DFL);
     const int null = open("/dev/null", O_WRONLY);

@@ -5,6 +5,9 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <map>
+#include <stdexcept>
+#include <string>
 
 #include "rt/machine/checks.hpp"
 #include "rt/machine/child.hpp"
@@ -21,6 +24,14 @@ bool has_fix(const Finding& finding, const std::string& words) {
                      [&](const Fix& fix) { return (fix.where + ": " + fix.text).find(words) != std::string::npos; });
 }
 bool says(const Finding& finding, const std::string& words) { return finding.found.find(words) != std::string::npos; }
+
+using Files = std::map<std::string, std::string>;
+
+/// Writes files and tells what a check finds then.
+Finding after(FakeFacts& facts, const Files& files, Finding (*check)(const Facts&)) {
+  facts.write(files);
+  return check(facts);
+}
 
 PolicyTrial refused(int error) {
   PolicyTrial trial;
@@ -57,27 +68,24 @@ TEST_CASE("SCHED_DEADLINE: granted, refused for each of the reasons, no answer")
 TEST_CASE("SCHED_FIFO: a control group without a real-time share is named") {
   FakeFacts facts;
   CHECK(has_fix(check_sched_fifo(facts, refused(EPERM)), "ada - rtprio 99"));
-  facts.files["/proc/self/cgroup"] = "3:cpu:/jobs\n";
-  facts.files["/proc/self/mounts"] = "cgroup /cg/cpu cgroup rw,cpu 0 0\n";
-  facts.files["/cg/cpu/jobs/cpu.rt_runtime_us"] = "0\n";
-  facts.files["/cg/cpu/jobs/cpu.rt_period_us"] = "1000000\n";
+  facts.write({{"/proc/self/cgroup", "3:cpu:/jobs\n"},
+               {"/proc/self/mounts", "cgroup /cg/cpu cgroup rw,cpu 0 0\n"},
+               {"/cg/cpu/jobs/cpu.rt_runtime_us", "0\n"},
+               {"/cg/cpu/jobs/cpu.rt_period_us", "1000000\n"}});
   CHECK(has_fix(check_sched_fifo(facts, refused(EPERM)), "/cg/cpu/jobs/cpu.rt_runtime_us"));
   CHECK(check_cgroup_rt(facts).status == Status::lacks);
-  facts.files["/cg/cpu/jobs/cpu.rt_runtime_us"] = "950000\n";
-  CHECK(check_cgroup_rt(facts).status == Status::ok);
-  CHECK(says(check_cgroup_rt(facts), "950 ms of 1000 ms"));
+  const Finding granted = after(facts, {{"/cg/cpu/jobs/cpu.rt_runtime_us", "950000\n"}}, check_cgroup_rt);
+  CHECK(granted.status == Status::ok);
+  CHECK(says(granted, "950 ms of 1000 ms"));
 }
 
 TEST_CASE("control groups v2 have no share; RT_GROUP_SCHED then refuses all but the root group") {
   FakeFacts facts;
-  facts.files["/proc/self/cgroup"] = "0::/user.slice\n";
-  facts.files["/proc/config.gz"] = "CONFIG_RT_GROUP_SCHED=y\n";
-  CHECK(check_cgroup_rt(facts).status == Status::warn);
-  facts.files["/proc/cmdline"] = "rt_group_sched=0";
-  CHECK(check_cgroup_rt(facts).status == Status::ok);
-  facts.files["/proc/cmdline"] = "";
-  facts.files["/proc/self/cgroup"] = "0::/\n";
-  CHECK(check_cgroup_rt(facts).status == Status::ok);
+  const auto status = [&](const Files& files) { return after(facts, files, check_cgroup_rt).status; };
+  CHECK(status({{"/proc/self/cgroup", "0::/user.slice\n"}, {"/proc/config.gz", "CONFIG_RT_GROUP_SCHED=y\n"}}) ==
+        Status::warn);
+  CHECK(status({{"/proc/cmdline", "rt_group_sched=0"}}) == Status::ok);
+  CHECK(status({{"/proc/cmdline", ""}, {"/proc/self/cgroup", "0::/\n"}}) == Status::ok);
 }
 
 TEST_CASE("the kernel's share for real-time policies") {
@@ -97,16 +105,14 @@ TEST_CASE("the kernel's share for real-time policies") {
 
 TEST_CASE("the fair server exists since Linux 6.12 and shows itself in debugfs only") {
   FakeFacts facts;
-  facts.files["/proc/sys/kernel/osrelease"] = "6.1.0\n";
-  CHECK(check_fair_server(facts).status == Status::ok);
-  facts.files["/proc/sys/kernel/osrelease"] = "6.12.0\n";
-  CHECK(check_fair_server(facts).status == Status::unknown);
-  facts.files["/sys/kernel/debug/sched/fair_server/cpu0/runtime"] = "50000000\n";
-  facts.files["/sys/kernel/debug/sched/fair_server/cpu0/period"] = "1000000000\n";
-  CHECK(check_fair_server(facts).status == Status::warn);
-  CHECK(says(check_fair_server(facts), "50 ms of 1000 ms"));
-  facts.files["/sys/kernel/debug/sched/fair_server/cpu0/runtime"] = "0\n";
-  CHECK(check_fair_server(facts).status == Status::ok);
+  const auto found = [&](const Files& files) { return after(facts, files, check_fair_server); };
+  const std::string folder = "/sys/kernel/debug/sched/fair_server/cpu0/";
+  CHECK(found({{"/proc/sys/kernel/osrelease", "6.1.0\n"}}).status == Status::ok);
+  CHECK(found({{"/proc/sys/kernel/osrelease", "6.12.0\n"}}).status == Status::unknown);
+  const Finding served = found({{folder + "runtime", "50000000\n"}, {folder + "period", "1000000000\n"}});
+  CHECK(served.status == Status::warn);
+  CHECK(says(served, "50 ms of 1000 ms"));
+  CHECK(found({{folder + "runtime", "0\n"}}).status == Status::ok);
 }
 
 TEST_CASE("mlockall counts only if the pages are locked and more can be") {
@@ -137,13 +143,15 @@ TEST_CASE("shared memory, huge pages, swap") {
 
   FakeFacts facts;
   CHECK(check_transparent_hugepage(facts).status == Status::ok);
-  facts.files["/sys/kernel/mm/transparent_hugepage/enabled"] = "[always] madvise never\n";
-  CHECK(check_transparent_hugepage(facts).status == Status::warn);
-  CHECK(has_fix(check_transparent_hugepage(facts), "kernel command line: transparent_hugepage=madvise"));
+  const Finding always = after(facts, {{"/sys/kernel/mm/transparent_hugepage/enabled", "[always] madvise never\n"}},
+                               check_transparent_hugepage);
+  CHECK(always.status == Status::warn);
+  CHECK(has_fix(always, "kernel command line: transparent_hugepage=madvise"));
   CHECK(check_swap(facts).status == Status::unknown);
-  facts.files["/proc/swaps"] = "Filename Type Size Used Priority\n/swap file 1 0 -2\n";
-  CHECK(check_swap(facts).status == Status::warn);
-  CHECK(says(check_swap(facts), "/swap"));
+  const Finding swaps =
+      after(facts, {{"/proc/swaps", "Filename Type Size Used Priority\n/swap file 1 0 -2\n"}}, check_swap);
+  CHECK(swaps.status == Status::warn);
+  CHECK(says(swaps, "/swap"));
 }
 
 TEST_CASE("idle states: refused is a lack, absent is not") {
@@ -167,39 +175,37 @@ TEST_CASE("the tick, as the clock and the configuration tell it") {
 
 TEST_CASE("the preemption model, from whoever tells it") {
   FakeFacts facts;
-  CHECK(check_preemption(facts).status == Status::unknown);
-  facts.files["/proc/sys/kernel/version"] = "#1 SMP PREEMPT_DYNAMIC Debian\n";
-  facts.files["/proc/config.gz"] = "CONFIG_PREEMPT_NONE=y\nCONFIG_PREEMPT_DYNAMIC=y\n";
-  CHECK(says(check_preemption(facts), "none (kernel configuration)"));
-  CHECK(has_fix(check_preemption(facts), "preempt=full"));
-  facts.files["/proc/cmdline"] = "preempt=full quiet";
-  CHECK(check_preemption(facts).status == Status::ok);
-  facts.files["/sys/kernel/debug/sched/preempt"] = "none (voluntary) full\n";
-  CHECK(says(check_preemption(facts), "voluntary (debugfs)"));
-  facts.files["/sys/kernel/realtime"] = "1\n";
-  CHECK(says(check_preemption(facts), "rt"));
-  FakeFacts old;
-  old.files["/proc/sys/kernel/osrelease"] = "5.10.0\n";
-  old.files["/boot/config-5.10.0"] = "CONFIG_PREEMPT_VOLUNTARY=y\n";
-  CHECK(has_fix(check_preemption(old), "linux-image-rt"));
+  const auto found = [&](const Files& files) { return after(facts, files, check_preemption); };
+  CHECK(found({}).status == Status::unknown);
+  const Finding configured = found({{"/proc/sys/kernel/version", "#1 SMP PREEMPT_DYNAMIC Debian\n"},
+                                    {"/proc/config.gz", "CONFIG_PREEMPT_NONE=y\nCONFIG_PREEMPT_DYNAMIC=y\n"}});
+  CHECK(says(configured, "none (kernel configuration)"));
+  CHECK(has_fix(configured, "preempt=full"));
+  CHECK(found({{"/proc/cmdline", "preempt=full quiet"}}).status == Status::ok);
+  CHECK(says(found({{"/sys/kernel/debug/sched/preempt", "none (voluntary) full\n"}}), "voluntary (debugfs)"));
+  CHECK(says(found({{"/sys/kernel/realtime", "1\n"}}), "rt"));
+  facts = FakeFacts();
+  CHECK(has_fix(
+      found({{"/proc/sys/kernel/osrelease", "5.10.0\n"}, {"/boot/config-5.10.0", "CONFIG_PREEMPT_VOLUNTARY=y\n"}}),
+      "linux-image-rt"));
 }
 
 TEST_CASE("clock and frequency") {
   FakeFacts facts;
   CHECK(check_clocksource(facts).status == Status::unknown);
   const std::string folder = "/sys/devices/system/clocksource/clocksource0/";
-  facts.files[folder + "current_clocksource"] = "tsc\n";
-  CHECK(check_clocksource(facts).status == Status::ok);
-  facts.files[folder + "current_clocksource"] = "hpet\n";
-  facts.files[folder + "available_clocksource"] = "hpet tsc acpi_pm\n";
-  CHECK(check_clocksource(facts).status == Status::warn);
-  CHECK(has_fix(check_clocksource(facts), "echo tsc"));
+  CHECK(after(facts, {{folder + "current_clocksource", "tsc\n"}}, check_clocksource).status == Status::ok);
+  const Finding slow = after(
+      facts, {{folder + "current_clocksource", "hpet\n"}, {folder + "available_clocksource", "hpet tsc acpi_pm\n"}},
+      check_clocksource);
+  CHECK(slow.status == Status::warn);
+  CHECK(has_fix(slow, "echo tsc"));
   CHECK(check_governor(facts).status == Status::unknown);
-  facts.files["/sys/devices/system/cpu/cpufreq/policy0/scaling_governor"] = "performance\n";
-  CHECK(check_governor(facts).status == Status::ok);
-  facts.files["/sys/devices/system/cpu/cpufreq/policy1/scaling_governor"] = "powersave\n";
-  CHECK(check_governor(facts).status == Status::warn);
-  CHECK(says(check_governor(facts), "performance, powersave"));
+  const std::string policies = "/sys/devices/system/cpu/cpufreq/policy";
+  CHECK(after(facts, {{policies + "0/scaling_governor", "performance\n"}}, check_governor).status == Status::ok);
+  const Finding mixed = after(facts, {{policies + "1/scaling_governor", "powersave\n"}}, check_governor);
+  CHECK(mixed.status == Status::warn);
+  CHECK(says(mixed, "performance, powersave"));
 }
 
 TEST_CASE("CPUs that a process may use, shared or of its own") {
@@ -208,31 +214,30 @@ TEST_CASE("CPUs that a process may use, shared or of its own") {
   facts.cpus = {1};
   CHECK(check_cpusets(facts).status == Status::warn);
   CHECK(has_fix(check_cpusets(facts), "echo 1 | sudo tee takt/cpuset.cpus"));
-  facts.files["/proc/self/cgroup"] = "0::/takt\n";
-  facts.files["/proc/self/mounts"] = "cgroup2 /sys/fs/cgroup cgroup2 rw 0 0\n";
-  facts.files["/sys/fs/cgroup/takt/cpuset.cpus.partition"] = "root\n";
-  CHECK(check_cpusets(facts).status == Status::ok);
-  facts.files["/sys/fs/cgroup/takt/cpuset.cpus.partition"] = "root invalid (no CPU)\n";
-  CHECK(check_cpusets(facts).status == Status::warn);
-  facts.files["/sys/devices/system/cpu/isolated"] = "1\n";
-  CHECK(says(check_cpusets(facts), "isolated: 1"));
+  const auto found = [&](const Files& files) { return after(facts, files, check_cpusets); };
+  const std::string partition = "/sys/fs/cgroup/takt/cpuset.cpus.partition";
+  CHECK(found({{"/proc/self/cgroup", "0::/takt\n"},
+               {"/proc/self/mounts", "cgroup2 /sys/fs/cgroup cgroup2 rw 0 0\n"},
+               {partition, "root\n"}})
+            .status == Status::ok);
+  CHECK(found({{partition, "root invalid (no CPU)\n"}}).status == Status::warn);
+  CHECK(says(found({{"/sys/devices/system/cpu/isolated", "1\n"}}), "isolated: 1"));
 }
 
 TEST_CASE("interrupts and stolen time") {
   FakeFacts facts;
   CHECK(check_irq_affinity(facts).status == Status::unknown);
-  facts.files["/proc/irq/24/smp_affinity_list"] = "0-1\n";
-  facts.files["/proc/irq/default_smp_affinity"] = "3\n";
-  CHECK(check_irq_affinity(facts).status == Status::warn);
-  facts.files["/proc/irq/24/smp_affinity_list"] = "0\n";
-  CHECK(check_irq_affinity(facts).status == Status::ok);
-  CHECK(says(check_irq_affinity(facts), "1 interrupts; CPUs without any: 1"));
+  const auto interrupts = [&](const Files& files) { return after(facts, files, check_irq_affinity); };
+  CHECK(interrupts({{"/proc/irq/24/smp_affinity_list", "0-1\n"}, {"/proc/irq/default_smp_affinity", "3\n"}}).status ==
+        Status::warn);
+  const Finding apart = interrupts({{"/proc/irq/24/smp_affinity_list", "0\n"}});
+  CHECK(apart.status == Status::ok);
+  CHECK(says(apart, "1 interrupts; CPUs without any: 1"));
   CHECK(check_host_stall(facts).status == Status::unknown);
-  facts.files["/proc/stat"] = "cpu  500 0 0 485 0 0 0 15 0 0\n";
-  CHECK(says(check_host_stall(facts), "1.50 %"));
-  CHECK(check_host_stall(facts).status == Status::warn);
-  facts.files["/proc/stat"] = "cpu  500 0 0 500 0 0 0 0 0 0\n";
-  CHECK(check_host_stall(facts).status == Status::ok);
+  const Finding stolen = after(facts, {{"/proc/stat", "cpu  500 0 0 485 0 0 0 15 0 0\n"}}, check_host_stall);
+  CHECK(stolen.status == Status::warn);
+  CHECK(says(stolen, "1.50 %"));
+  CHECK(after(facts, {{"/proc/stat", "cpu  500 0 0 500 0 0 0 0 0 0\n"}}, check_host_stall).status == Status::ok);
 }
 
 TEST_CASE("a run lacks what every run needs and what its own policy needs, and nothing else") {

@@ -10,16 +10,13 @@
 
 #include "rt/memory/memory_use.hpp"
 #include "rt/memory/process_memory.hpp"
+#include "tests/unit/rt/opaque_malloc.hpp"
 
 using namespace takt;
+using namespace takt::test;
 
 namespace {
 
-// Through volatile pointers: the compiler may otherwise drop an allocation it sees to be unused.
-void* (*volatile call_malloc)(size_t) = std::malloc;
-void* (*volatile call_calloc)(size_t, size_t) = std::calloc;
-void* (*volatile call_realloc)(void*, size_t) = std::realloc;
-void (*volatile call_free)(void*) = std::free;
 int (*volatile call_posix_memalign)(void**, size_t, size_t) = posix_memalign;
 void* (*volatile call_aligned_alloc)(size_t, size_t) = std::aligned_alloc;
 void* (*volatile call_memalign)(size_t, size_t) = memalign;

@@ -2,6 +2,7 @@
 // Changes of mode while a run goes on, in virtual time; safe_stop; exceptions in jobs.
 #include <doctest/doctest.h>
 
+#include <atomic>
 #include <functional>
 #include <stdexcept>
 #include <thread>
@@ -9,6 +10,7 @@
 #include "rt/node.hpp"
 #include "rt/sched/executor.hpp"
 #include "rt/sched/job_watch.hpp"
+#include "tests/unit/rt/plans.hpp"
 
 namespace {
 
@@ -37,26 +39,10 @@ struct Scene {
   std::unique_ptr<RunBoard> board;
 
   Scene() {
-    add(first, "first", 0);
-    add(second, "second", 50 * kMs);
+    test::add_task(plan, first, "first", 0);
+    test::add_task(plan, second, "second", 50 * kMs);
     plan.modes = {{"full", {1, 1}}, {"half", {0, 1}}, {"safe_stop", {1, 0}}};
     plan.safe_stop = 2;
-  }
-  void add(Notes& node, const char* name, int64_t offset_ns) {
-    TaskPlan task;
-    task.name = name;
-    task.node = &node;
-    task.rate = Rate{10, 1};
-    task.offset_ns = offset_ns;
-    task.budget_ns = kMs;
-    task.deadline_ns = 100 * kMs;
-    task.ports.push_back(plan.ports.size());
-    PortPlan port;
-    port.node = name;
-    port.type = &node.outputs()[0]->type();
-    port.history = 4;
-    plan.ports.push_back(port);
-    plan.tasks.push_back(task);
   }
   RunResult run(const std::function<void(RunBoard&)>& before = {}) {
     const auto transport = make_local_transport(plan.ports);

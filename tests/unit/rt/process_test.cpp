@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Processes of a run and the board they share.
 #include <doctest/doctest.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
-#include <chrono>
+#include <array>
+#include <cerrno>
 #include <csignal>
-#include <thread>
+#include <stdexcept>
 
 #include "rt/sched/run_board.hpp"
 #include "rt/supervise/process_group.hpp"
@@ -16,10 +18,35 @@ using namespace takt;
 
 ProcessGroup::End wait_for_end(ProcessGroup& group) {
   for (;;) {
+    siginfo_t ended;  // waited for, but left for the group to reap
+    const int waited = waitid(P_ALL, 0, &ended, WEXITED | WNOWAIT);
+    REQUIRE((waited == 0 || errno == EINTR));
     if (const auto end = group.reap()) return *end;
-    std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
 }
+
+/// Lets one process wait for what another has done, or for its end.
+struct Bell {
+  std::array<int, 2> ends{};
+  Bell() { REQUIRE(pipe(ends.data()) == 0); }
+  ~Bell() {
+    close(ends[0]);
+    close(ends[1]);
+  }
+  Bell(const Bell&) = delete;
+  Bell& operator=(const Bell&) = delete;
+  bool ring() const { return write(ends[1], "", 1) == 1; }
+  /// In the process that made it: false if the other has ended without a ring.
+  bool wait() {
+    close(ends[1]);
+    ends[1] = -1;
+    char rung = 1;
+    ssize_t got;
+    while ((got = read(ends[0], &rung, 1)) < 0 && errno == EINTR) {
+    }
+    return got == 1;
+  }
+};
 
 Plan plan_of_two() {
   Plan plan;
@@ -34,6 +61,7 @@ Plan plan_of_two() {
 
 TEST_CASE("what a process writes onto the board stays there when it is killed") {
   RunBoard board(plan_of_two(), 2);
+  Bell bell;
   ProcessGroup group;
   group.start("writer", [&] {
     board.task(1).completed.store(41);
@@ -47,11 +75,12 @@ TEST_CASE("what a process writes onto the board stays there when it is killed") 
     grant.refused = "not refused";
     board.set_grant(1, grant);
     board.process(1).state.store(ProcessRecord::running);
+    if (!bell.ring()) return 1;
     for (;;) pause();
     return 0;
   });
-  while (board.process(1).state.load() != ProcessRecord::running)
-    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  REQUIRE(bell.wait());
+  CHECK(board.process(1).state.load() == ProcessRecord::running);
   kill(group.pid(0), SIGKILL);
   const ProcessGroup::End end = wait_for_end(group);
   CHECK(end.signal == SIGKILL);

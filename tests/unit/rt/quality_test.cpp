@@ -42,7 +42,7 @@ struct Drive {
     }
     return trace;
   }
-  /// Execution time if the whole node got `load` ms dear at level 0.
+  /// Execution times of a node that takes load(job) ms at level 0.
   std::function<double(int64_t, int)> scaled(std::function<double(int64_t)> load) const {
     return [load = std::move(load), this](int64_t k, int level) {
       return load(k) * levels[static_cast<size_t>(level)].cost;
@@ -85,7 +85,7 @@ TEST_CASE("a load that grows steadily is lowered before its first overrun") {
   Drive drive;
   for (const double step : {0.05, 0.3, 1.0, 2.0, 4.0}) {
     drive.exec_ms = drive.scaled([step](int64_t k) { return std::min(50.0, 6 + step * static_cast<double>(k)); });
-    const auto trace = drive.run(1000 * 45 / 100);
+    const auto trace = drive.run(450);
     CAPTURE(step);
     CHECK(trace.overruns == 0);
     CHECK(trace.level.back() == 1);

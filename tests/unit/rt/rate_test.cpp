@@ -31,6 +31,6 @@ TEST_CASE("rates are read as exact fractions") {
   CHECK(Rate::parse("7.5") == Rate{15, 2});
   CHECK(Rate::parse("30000/1001") == Rate{30000, 1001});
   CHECK(Rate::parse("4/2") == Rate{2, 1});
-  for (const char* bad : {"", "0", "-1", "1/0", "a", "1/", "7.", ".5", "1e3", "15Hz", "7.-5"})
+  for (const char* bad : {"", "0", "-1", "1/0", "a", "1/", "7.", ".5", "1e3", "15Hz", "7.-5", "-0.5", "99999999999.9"})
     CHECK_FALSE(Rate::parse(bad));
 }

@@ -9,6 +9,7 @@
 #include "rt/sched/executor.hpp"
 #include "rt/sched/param_mail.hpp"
 #include "rt/sched/port_access.hpp"
+#include "tests/unit/rt/plans.hpp"
 
 namespace {
 
@@ -65,27 +66,10 @@ struct Scene {
 
   Scene() {
     worker.accept_requests();
-    add(generator, "generator", 0, {0, 0, 1, 4});
-    add(worker, "worker", 50 * kMs, {});
+    test::add_task(plan, generator, "generator", 0, {0, 0, 1, 4});
+    test::add_task(plan, worker, "worker", 50 * kMs);
     plan.tasks[1].edges.push_back({worker.inputs().size() - 1, 0, 1, 0});
     plan.ports[0].held = 1;
-  }
-  void add(Node& node, const char* name, int64_t offset_ns, const Capacity& capacity) {
-    TaskPlan task;
-    task.name = name;
-    task.node = &node;
-    task.rate = Rate{10, 1};
-    task.offset_ns = offset_ns;
-    task.budget_ns = kMs;
-    task.deadline_ns = 100 * kMs;
-    task.ports.push_back(plan.ports.size());
-    PortPlan port;
-    port.node = name;
-    port.type = &node.outputs()[0]->type();
-    port.capacity = capacity;
-    port.history = 4;
-    plan.ports.push_back(port);
-    plan.tasks.push_back(task);
   }
   RunResult run(int64_t duration_ns) {
     const auto transport = make_local_transport(plan.ports);

@@ -3,6 +3,10 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
+#include <csignal>
+#include <memory>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -74,6 +78,7 @@ TEST_CASE("a thread without a ring notes nothing; one too many is counted") {
 TEST_CASE("what a killed process noted is still there") {
   Rings rings(2);
   const pid_t child = fork();
+  REQUIRE(child >= 0);
   if (child == 0) {
     const Thread traced(&rings, "child");
     level_change(3, 8, 1, 1234);
@@ -82,6 +87,7 @@ TEST_CASE("what a killed process noted is still there") {
   }
   int status = 0;
   REQUIRE(waitpid(child, &status, 0) == child);
+  CHECK(WIFSIGNALED(status));
   REQUIRE(rings.claimed() == 1);
   CHECK(rings.ring(0).writer.load() == child);
   std::vector<Event> events;

@@ -37,10 +37,7 @@ struct Fixture {
     REQUIRE(types.find("semantic")->layer == Layer::processing);
     node = types.find("semantic")->make();
   }
-  void set(std::string_view name, const ParamValue& value) {
-    for (ParamBase* p : node->params())
-      if (p->name() == name) REQUIRE(p->set(value));
-  }
+  void set(std::string_view name, const ParamValue& value) { test::set(*node, name, value); }
   void set_up() {
     Setup setup{clock, ".", ".", 0, std::nullopt, 0};
     node->setup(setup);

@@ -5,26 +5,14 @@
 #include <fstream>
 
 #include "hal/sim/sensors.hpp"
+#include "tests/temporary_folder.hpp"
 #include "tests/unit/sim/small_world.hpp"
 
 using namespace takt;
 using namespace takt::sim;
+using takt::test::TemporaryFolder;
 
 namespace {
-
-struct TemporaryFolder {
-  std::filesystem::path path;
-  TemporaryFolder() {
-    std::string name = (std::filesystem::temp_directory_path() / "takt-world-XXXXXX").string();
-    REQUIRE(mkdtemp(name.data()) != nullptr);
-    path = name;
-  }
-  ~TemporaryFolder() { std::filesystem::remove_all(path); }
-  std::filesystem::path write(const std::string& name, const std::string& text) const {
-    std::ofstream(path / name, std::ios::binary) << text;
-    return path / name;
-  }
-};
 
 const std::string kRows = "<rows>\n#######\n#.....#\n#.....#\n#.....#\n#.....#\n#######\n</rows>";
 

@@ -12,6 +12,7 @@
 #include <opencv2/imgproc.hpp>
 #include <random>
 
+#include "tests/temporary_folder.hpp"
 #include "tests/test_data.hpp"
 
 using namespace takt;
@@ -186,14 +187,14 @@ TEST_CASE("a real calibration file brings chessboard corners onto common rows") 
   const double rms_px = cv::stereoCalibrate(board, corners[0], corners[1], k1, d1, k2, d2, {640, 480}, r, t, e, f,
                                             cv::CALIB_USE_INTRINSIC_GUESS | cv::CALIB_FIX_K3);
   REQUIRE(rms_px < 1.0);
-  const auto path = std::filesystem::temp_directory_path() / "takt_stereo_calibration_test.yaml";
+  const takt::test::TemporaryFolder temporary;
+  const auto path = temporary.path / "calibration.yaml";
   {
     cv::FileStorage out(path.string(), cv::FileStorage::WRITE);
     out << "M1" << k1 << "D1" << d1 << "M2" << k2 << "D2" << d2 << "R" << r << "T" << t << "image_size"
         << std::vector<int>{640, 480};
   }
   const Rectifier rectifier(read_calibration(path));
-  std::filesystem::remove(path);
   const cv::Mat left = cv::imread((*folder / "left01.jpg").string(), 0),
                 right = cv::imread((*folder / "right01.jpg").string(), 0);
   cv::Mat l(left.size(), CV_8U), rr(right.size(), CV_8U);

@@ -4,7 +4,6 @@
 #include <doctest/doctest.h>
 
 #include <filesystem>
-#include <fstream>
 #include <random>
 #include <string>
 
@@ -52,28 +51,6 @@ inline view::Diagram random_diagram(unsigned seed, size_t devices, size_t nodes,
   }
   return diagram;
 }
-
-/// A folder of its own that goes with the object.
-class Folder {
- public:
-  Folder() : path_(std::filesystem::temp_directory_path() / ("takt_view_" + std::to_string(std::random_device()()))) {
-    std::filesystem::create_directories(path_);
-  }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-  ~Folder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  std::filesystem::path write(const std::string& name, const std::string& bytes) const {
-    std::ofstream(path_ / name, std::ios::binary) << bytes;
-    return path_ / name;
-  }
-  const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
 
 inline size_t count(const std::string& text, const std::string& part) {
   size_t n = 0;
