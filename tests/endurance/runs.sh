@@ -5,7 +5,8 @@
 # left. Deadline misses, and chunks that are still in use when a run ends, are told and not judged.
 set -u
 # In a /tmp and /dev/shm of its own where that is permitted: what other programs make and remove there is not ours.
-if [ -z "${TAKT_OWN_TMP:-}" ] && unshare --mount true 2>/dev/null; then
+# Not where the checkout itself lies below /tmp.
+if [ -z "${TAKT_OWN_TMP:-}" ] && [[ $(readlink -f "$0") != /tmp/* ]] && unshare --mount true 2>/dev/null; then
   TAKT_OWN_TMP=1 exec unshare --mount bash -c 'mount -t tmpfs none /tmp && mount -t tmpfs none /dev/shm && exec bash "$@"' - "$0" "$@"
 fi
 takt=$(readlink -f "$(dirname "$0")/../../takt")

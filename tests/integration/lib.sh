@@ -3,6 +3,7 @@
 takt=$1
 source=$2
 export TAKT_HOME=$source
+export TAKT_RT_STRICT=1  # a job that allocates, blocks or writes ends its run: exit by a signal, with its name
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 export XDG_RUNTIME_DIR=$work/runtime

@@ -49,6 +49,18 @@ TEST_CASE("Buttazzo: processor demand criterion, table 4.4") {
   CHECK(answer.overload->demand == 7);
 }
 
+TEST_CASE("Zhang & Burns 2009: the eight tasks on which QPA is shown, utilisation 0.803") {
+  CHECK(edf_demand_test(tasks_of({{6000, 18000, 31000},
+                                  {2000, 9000, 9800},
+                                  {1000, 12000, 17000},
+                                  {90, 3000, 4200},
+                                  {8, 78, 96},
+                                  {2, 16, 12},
+                                  {10, 120, 280},
+                                  {26, 160, 660}}))
+            .verdict == Verdict::schedulable);
+}
+
 // The figures that come with the implementation of Bozhko & Brandenburg, "Abstract Response-Time Analysis" (ECRTS
 // 2020), crate response-time-analysis 0.3.2. Some deadlines there exceed the period.
 TEST_CASE("Bozhko & Brandenburg: EDF responses") {
