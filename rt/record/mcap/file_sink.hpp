@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <tl/expected.hpp>
+
+#include "rt/record/mcap/bytes.hpp"
+
+namespace takt::mcap {
+
+/// Where a file grows. One thread at a time.
+class Sink {
+ public:
+  virtual ~Sink() = default;
+  /// Whole or not at all: after an error (its text) the file ends where it ended before.
+  virtual tl::expected<void, std::string> append(Bytes data) = 0;
+};
+
+class FileSink final : public Sink {
+ public:
+  /// Creates the file, or empties it. Error: why it cannot be written.
+  static tl::expected<FileSink, std::string> open(const std::filesystem::path& file);
+  FileSink(FileSink&& other) noexcept;
+  FileSink& operator=(FileSink&&) = delete;
+  ~FileSink() override;
+  tl::expected<void, std::string> append(Bytes data) override;
+
+ private:
+  explicit FileSink(int descriptor) : descriptor_(descriptor) {}
+  int descriptor_ = -1;
+  uint64_t size_ = 0;
+};
+
+}  // namespace takt::mcap

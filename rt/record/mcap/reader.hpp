@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <tl/expected.hpp>
+#include <vector>
+
+#include "rt/record/mcap/format.hpp"
+
+namespace takt::mcap {
+
+/// A chunk in a file.
+struct Chunk {
+  uint64_t at = 0;  ///< of its record in the file
+  uint64_t start_ns = 0, end_ns = 0, uncompressed_size = 0;
+  uint32_t crc = 0;
+  std::string compression;
+  Bytes stored;
+};
+
+/// An MCAP file, whole or cut off anywhere: what is there is read record by record, so nothing depends on its summary.
+/// Chunks and attachments are checked against their CRCs. Const members from any thread. The file stays mapped; it must
+/// not be made shorter meanwhile.
+class Reader {
+ public:
+  /// Error: the file cannot be opened, or is none of this format. A file that lacks its end is no error.
+  static tl::expected<Reader, std::string> open(const std::filesystem::path& file);
+  Reader(Reader&& other) noexcept;
+  Reader& operator=(Reader&&) = delete;
+  ~Reader();
+
+  const std::string& profile() const { return profile_; }
+  const std::string& library() const { return library_; }
+  const std::vector<Schema>& schemas() const { return schemas_; }
+  const std::vector<Channel>& channels() const { return channels_; }
+  const std::vector<Chunk>& chunks() const { return chunks_; }
+  const std::vector<Attachment>& attachments() const { return attachments_; }
+  struct Named {
+    std::string name;
+    Metadata map;
+  };
+  const std::vector<Named>& metadata() const { return metadata_; }
+
+  /// Empty if the file is whole: footer, summary and CRCs of both sections fit. Else what is wrong, in a sentence.
+  const std::string& missing() const { return missing_; }
+
+  /// The records of a chunk. Error: damaged, or compressed in a way this build does not know.
+  tl::expected<std::vector<std::byte>, std::string> unpack(const Chunk& chunk) const;
+
+  /// Every message, in the order of the file; stops if `each` answers false. The data is valid during the call. Error:
+  /// a chunk that is damaged; the messages before it were given.
+  tl::expected<void, std::string> for_each(const std::function<bool(const Message&)>& each) const;
+
+ private:
+  explicit Reader(Bytes file) : file_(file) {}
+  void scan();
+  void take(Op op, Bytes fields, uint64_t at);
+  /// `summary_at`: behind the record that ends the data section.
+  std::string check_end(uint64_t data_end_at, uint64_t summary_at) const;
+
+  Bytes file_;
+  std::string profile_, library_, missing_;
+  std::vector<Schema> schemas_;
+  std::vector<Channel> channels_;
+  std::vector<Chunk> chunks_;
+  std::vector<Attachment> attachments_;
+  std::vector<Named> metadata_;
+};
+
+}  // namespace takt::mcap

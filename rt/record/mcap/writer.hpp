@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <map>
+#include <string>
+#include <string_view>
+#include <tl/expected.hpp>
+#include <utility>
+#include <vector>
+
+#include "rt/record/mcap/file_sink.hpp"
+#include "rt/record/mcap/format.hpp"
+
+namespace takt::mcap {
+
+/// Writes an MCAP file: messages in chunks, with CRCs, message and chunk indexes, and a summary at the end. What was
+/// handed to the sink can be read without the rest, to the last complete chunk.
+///
+/// Every call answers whether the sink took it. After a refusal nothing is lost but the chunk or record in hand: `lost`
+/// counts its messages, and the next call tries again. One thread at a time.
+class Writer {
+ public:
+  struct Options {
+    size_t chunk_bytes = 1 << 20;  ///< a chunk ends with the message that makes it as large, before compression
+    Compression compression = Compression::zstd;
+    int level = 1;  ///< of zstd
+  };
+  using Done = tl::expected<void, std::string>;
+
+  Writer(Sink& sink, const Options& options);
+
+  Done begin(std::string_view profile, std::string_view library);
+  /// Ids count from 1. A schema or channel that the sink refused is written before the next chunk.
+  uint16_t add_schema(std::string name, std::string encoding, std::string data);
+  uint16_t add_channel(uint16_t schema, std::string topic, std::string encoding, Metadata metadata);
+  Done write(const Message& message);
+  Done attach(const Attachment& attachment);
+  Done metadata(std::string_view name, const Metadata& map);
+  /// Ends the chunk in hand, however small.
+  Done flush();
+  /// Ends the file with summary and footer. Nothing may be written afterwards.
+  Done finish();
+
+  uint64_t written_bytes() const { return size_; }
+  const Statistics& statistics() const { return statistics_; }
+  uint64_t lost() const { return lost_; }  ///< messages in chunks that the sink refused
+
+ private:
+  Done append(const std::vector<std::byte>& data);
+  Done write_definitions();
+  void add_indexes(std::vector<std::byte>& to, ChunkIndex& index, uint64_t at);
+  void count_chunk(ChunkIndex index);
+  void drop_chunk();
+  std::vector<std::byte> summary();
+
+  Sink& sink_;
+  Options options_;
+  uint64_t size_ = 0;
+  uint32_t crc_ = 0;  ///< of all bytes so far
+  std::vector<Schema> schemas_;
+  std::vector<Channel> channels_;
+  size_t schemas_written_ = 0, channels_written_ = 0;
+  struct Indexed {
+    uint64_t log_ns, offset;
+  };
+  std::vector<std::byte> chunk_;                      ///< records of the chunk in hand
+  std::map<uint16_t, std::vector<Indexed>> indexed_;  ///< its messages
+  uint64_t chunk_start_ns_ = 0, chunk_end_ns_ = 0, chunk_messages_ = 0, lost_ = 0;
+  std::vector<ChunkIndex> chunks_;
+  std::vector<std::byte> attachment_indexes_, metadata_indexes_;  ///< records for the summary
+  Statistics statistics_;
+};
+
+}  // namespace takt::mcap

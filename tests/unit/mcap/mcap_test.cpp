@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: Apache-2.0
+// The container: what is written is read back, whole, cut off anywhere, or damaged.
+#include <doctest/doctest.h>
+
+#include <fstream>
+#include <iterator>
+#include <random>
+
+#include "rt/record/mcap/reader.hpp"
+#include "rt/record/mcap/records.hpp"
+#include "rt/record/mcap/writer.hpp"
+#include "tests/temporary_folder.hpp"
+
+using namespace takt;
+using namespace takt::mcap;
+
+namespace {
+
+/// Keeps all in memory; refuses once it would hold more than `room` bytes.
+struct MemorySink final : Sink {
+  std::vector<std::byte> bytes;
+  size_t room = SIZE_MAX;
+  tl::expected<void, std::string> append(Bytes data) override {
+    if (bytes.size() + data.size() > room) return tl::unexpected(std::string("No space left on device"));
+    bytes.insert(bytes.end(), data.begin(), data.end());
+    return {};
+  }
+};
+
+struct Kept {
+  uint16_t channel;
+  uint32_t sequence;
+  uint64_t log_ns, publish_ns;
+  std::vector<std::byte> data;
+  bool operator==(const Kept&) const = default;
+};
+
+Kept message_of(uint32_t i) {
+  std::mt19937 random(i);
+  Kept message{static_cast<uint16_t>(1 + i % 3), i, 1'000'000ull * i, 1'000'000ull * i + 5, {}};
+  message.data.resize(random() % 400);
+  for (std::byte& byte : message.data) byte = static_cast<std::byte>(i % 2 == 0 ? random() : 7);
+  return message;
+}
+
+Message as_message(const Kept& kept) { return {kept.channel, kept.sequence, kept.log_ns, kept.publish_ns, kept.data}; }
+
+void begin(Writer& writer) {
+  REQUIRE(writer.begin("takt", "test"));
+  const uint16_t schema = writer.add_schema("pose", "jsonschema", R"({"type":"object"})");
+  for (const char* topic : {"stereo.cloud", "ego_motion.motion", "mapping_3d.obstacles"})
+    writer.add_channel(schema, topic, "takt", {{"node", topic}});
+}
+
+std::vector<std::byte> sample(uint32_t messages, Compression compression) {
+  MemorySink sink;
+  Writer writer(sink, {4096, compression, 1});
+  begin(writer);
+  REQUIRE(writer.metadata("machine", {{"cpu", "Six"}, {"kernel", "6.1"}}));
+  REQUIRE(writer.attach({3, 4, "graph.yaml", "application/yaml", bytes_of("takt: 1\n")}));
+  for (uint32_t i = 0; i < messages; ++i) REQUIRE(writer.write(as_message(message_of(i))));
+  REQUIRE(writer.finish());
+  CHECK(writer.written_bytes() == sink.bytes.size());
+  CHECK(writer.lost() == 0);
+  return sink.bytes;
+}
+
+std::filesystem::path written(const test::TemporaryFolder& folder, Bytes bytes) {
+  return folder.write("log.mcap", {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+}
+
+std::vector<Kept> messages_of(const Reader& reader, std::string* error = nullptr) {
+  std::vector<Kept> all;
+  const auto done = reader.for_each([&](const Message& m) {
+    all.push_back({m.channel, m.sequence, m.log_ns, m.publish_ns, {m.data.begin(), m.data.end()}});
+    return true;
+  });
+  if (error != nullptr) *error = done ? "" : done.error();
+  else CHECK(done.has_value());
+  return all;
+}
+
+}  // namespace
+
+TEST_CASE("mcap: what is written is read back") {
+  const test::TemporaryFolder folder;
+  for (const Compression compression : {Compression::none, Compression::zstd}) {
+    const auto bytes = sample(200, compression);
+    const auto reader = Reader::open(written(folder, bytes));
+    REQUIRE(reader);
+    CHECK(reader->missing() == "");
+    CHECK(reader->profile() == "takt");
+    REQUIRE(reader->schemas().size() == 1);
+    CHECK(reader->schemas()[0] == Schema{1, "pose", "jsonschema", R"({"type":"object"})"});
+    REQUIRE(reader->channels().size() == 3);
+    CHECK(reader->channels()[1] == Channel{2, 1, "ego_motion.motion", "takt", {{"node", "ego_motion.motion"}}});
+    REQUIRE(reader->metadata().size() == 1);
+    CHECK(reader->metadata()[0].map.at("cpu") == "Six");
+    REQUIRE(reader->attachments().size() == 1);
+    CHECK(reader->attachments()[0].data.size() == 8);
+    CHECK(reader->chunks().size() > 5);
+    const auto all = messages_of(*reader);
+    REQUIRE(all.size() == 200);
+    for (uint32_t i = 0; i < 200; ++i) CHECK(all[i] == message_of(i));
+  }
+}
+
+TEST_CASE("mcap: a file cut off anywhere gives whole chunks, and says what is missing") {
+  const test::TemporaryFolder folder;
+  const auto bytes = sample(60, Compression::zstd);
+  const auto whole = messages_of(*Reader::open(written(folder, bytes)));
+  size_t before = 0;
+  for (size_t size = 0; size < bytes.size(); size += size < 300 ? 1 : 37) {
+    CAPTURE(size);
+    const auto reader = Reader::open(written(folder, Bytes(bytes).first(size)));
+    if (size < kMagic.size()) {
+      CHECK_FALSE(reader);
+      continue;
+    }
+    REQUIRE(reader);
+    CHECK_FALSE(reader->missing().empty());
+    const auto some = messages_of(*reader);
+    CHECK(some.size() >= before);
+    REQUIRE(some.size() <= whole.size());
+    CHECK(std::equal(some.begin(), some.end(), whole.begin()));
+    before = some.size();
+  }
+  CHECK(before > 40);
+}
+
+TEST_CASE("mcap: a changed byte is noticed, or changes no message") {
+  const test::TemporaryFolder folder;
+  const auto bytes = sample(30, Compression::zstd);
+  const auto whole = messages_of(*Reader::open(written(folder, bytes)));
+  std::mt19937 random(3);
+  for (int round = 0; round < 2'000; ++round) {
+    auto damaged = bytes;
+    const size_t at = random() % damaged.size();
+    CAPTURE(at);
+    damaged[at] ^= static_cast<std::byte>(1 + random() % 255);
+    const auto reader = Reader::open(written(folder, damaged));
+    if (!reader) continue;
+    CHECK_FALSE(reader->missing().empty());
+    std::string error;
+    const auto some = messages_of(*reader, &error);
+    REQUIRE(some.size() <= whole.size());
+  }
+}
+
+TEST_CASE("mcap: a full disk loses the chunk in hand, says so, and what is there stays readable") {
+  const test::TemporaryFolder folder;
+  MemorySink sink;
+  Writer writer(sink, {2048, Compression::none, 1});
+  begin(writer);
+  sink.room = 9'000;
+  uint32_t i = 0;
+  while (writer.write(as_message(message_of(i)))) ++i;
+  const uint64_t lost = writer.lost();
+  CHECK(lost > 0);
+  const size_t kept = messages_of(*Reader::open(written(folder, sink.bytes))).size();
+  CHECK(kept + lost == i + 1);
+  sink.room = SIZE_MAX;  // room again: it goes on
+  for (uint32_t k = 0; k < 20; ++k) CHECK(writer.write(as_message(message_of(500 + k))));
+  REQUIRE(writer.finish());
+  const auto reader = Reader::open(written(folder, sink.bytes));
+  REQUIRE(reader);
+  CHECK(reader->missing() == "");
+  const auto all = messages_of(*reader);
+  CHECK(all.size() == kept + 20);
+  CHECK(all.back() == message_of(519));
+  CHECK(writer.statistics().messages == all.size());
+}
+
+TEST_CASE("mcap: files that are none are refused with words") {
+  const test::TemporaryFolder folder;
+  CHECK(Reader::open(folder.path / "none").error().find("No such file") != std::string::npos);
+  CHECK(Reader::open(folder.write("empty", "")).error().find("is empty") != std::string::npos);
+  CHECK(Reader::open(folder.write("text", "takt: 1, some text\n")).error().find("no MCAP file") != std::string::npos);
+  auto sink = FileSink::open(folder.path / "none" / "file");
+  REQUIRE_FALSE(sink);
+  CHECK(sink.error().find("No such file") != std::string::npos);
+}
+
+TEST_CASE("mcap: a file on disk is what memory would hold") {
+  const test::TemporaryFolder folder;
+  {
+    auto sink = FileSink::open(folder.path / "log.mcap");
+    REQUIRE(sink);
+    Writer writer(*sink, {4096, Compression::zstd, 1});
+    begin(writer);
+    REQUIRE(writer.metadata("machine", {{"cpu", "Six"}, {"kernel", "6.1"}}));
+    REQUIRE(writer.attach({3, 4, "graph.yaml", "application/yaml", bytes_of("takt: 1\n")}));
+    for (uint32_t i = 0; i < 50; ++i) REQUIRE(writer.write(as_message(message_of(i))));
+    REQUIRE(writer.finish());
+  }
+  std::ifstream file(folder.path / "log.mcap", std::ios::binary);
+  const std::string text(std::istreambuf_iterator<char>(file), {});
+  const auto bytes = sample(50, Compression::zstd);
+  CHECK(text == std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
+}
