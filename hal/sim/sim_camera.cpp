@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "hal/sim/sim_camera.hpp"
 
+#include <linux/sched.h>
+#include <pthread.h>
 #include <sched.h>
 
 #include <chrono>
@@ -16,6 +18,20 @@ bool same(const CameraPose& a, const CameraPose& b) { return a.rotation == b.rot
 void copy(const std::vector<uint8_t>& from, ImageView<uint8_t> to) {
   const size_t row = static_cast<size_t>(to.width) * static_cast<size_t>(to.channels);
   for (int y = 0; y < to.height; ++y) std::memcpy(to.row(y), from.data() + static_cast<size_t>(y) * row, row);
+}
+
+/// Of the calling thread.
+bool in_real_time() {
+  const int policy = sched_getscheduler(0) & ~SCHED_RESET_ON_FORK;
+  return policy == SCHED_FIFO || policy == SCHED_DEADLINE;
+}
+
+/// Of the calling thread: the lowest real-time priority, or an ordinary one. Where the kernel refuses it stays as it
+/// is: frames then come late, and read() draws them.
+void take_priority(bool real_time) {
+  sched_param wanted{};
+  if (real_time) wanted.sched_priority = sched_get_priority_min(SCHED_FIFO);
+  pthread_setschedparam(pthread_self(), real_time ? SCHED_FIFO : SCHED_OTHER, &wanted);
 }
 
 }  // namespace
@@ -86,6 +102,7 @@ SimCamera::Request SimCamera::request_at(int64_t at_ns) const {
 
 void SimCamera::trigger(int64_t at_ns) {
   triggered_ns_ = at_ns;
+  if (!real_time_.load(std::memory_order_relaxed) && in_real_time()) real_time_.store(true, std::memory_order_relaxed);
   has_trigger_ = ever_triggered_ = true;
   ++triggers_;
   if (!worker_.joinable()) return;
@@ -96,14 +113,15 @@ void SimCamera::trigger(int64_t at_ns) {
 
 void SimCamera::work() {
   pthread_setname_np(pthread_self(), ("sim:" + id_).substr(0, 15).c_str());
-  const sched_param ordinary{};
-  pthread_setschedparam(pthread_self(), SCHED_OTHER, &ordinary);
+  take_priority(false);
+  bool raised = false;
   const StereoRig& rig = settings_.rig;
   uint32_t seen = 0;
   for (;;) {
     asked_.wait(seen, std::memory_order_acquire);
     if (quit_.load()) return;
     seen = asked_.load(std::memory_order_acquire);
+    if (!raised && real_time_.load(std::memory_order_relaxed)) take_priority(raised = true);
     const int64_t at_ns = asked_at_ns_.load(std::memory_order_relaxed);
     wait_until_settled(at_ns, seen);
     if (quit_.load()) return;

@@ -25,10 +25,12 @@ struct SimCameraSettings {
 /// A stereo camera that looks at the simulated world.
 ///
 /// trigger(t) with t ahead of now has that exposure rendered in the camera's own thread, "sim:" and its id (15 letters
-/// at most, SCHED_OTHER), as soon as no command can change what it shows; read() then merely copies. If the frame is
-/// not ready, or the robot turned out to be elsewhere, or the clock is virtual, read() renders itself: what is
-/// delivered depends on the exposure's stamp alone, never on timing. Nobody triggered: the camera runs free at `rate`
-/// from the epoch, and a read gives the newest exposure that was not delivered.
+/// at most), as soon as no command can change what it shows; read() then merely copies. The thread is an ordinary one;
+/// once a real-time thread triggers, it takes the lowest real-time priority, behind every worker: a camera's hardware
+/// is not slowed by what else the machine does. If the frame is not ready, or the robot turned out to be elsewhere, or
+/// the clock is virtual, read() renders itself: what is delivered depends on the exposure's stamp alone, never on
+/// timing. Nobody triggered: the camera runs free at `rate` from the epoch, and a read gives the newest exposure that
+/// was not delivered.
 class SimCamera final : public StereoCamera {
  public:
   SimCamera(std::string id, SimCameraSettings settings, Simulation& simulation, const Clock& clock);
@@ -81,7 +83,7 @@ class SimCamera final : public StereoCamera {
   std::atomic<int64_t> asked_at_ns_{0};
   Request made_;
   std::atomic<uint32_t> asked_{0}, done_{0};
-  std::atomic<bool> quit_{false};
+  std::atomic<bool> quit_{false}, real_time_{false};
   std::thread worker_;
   CostCounter cost_;
 };

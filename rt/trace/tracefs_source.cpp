@@ -24,6 +24,7 @@ namespace takt::trace {
 namespace {
 
 constexpr const char* kBufferKb = "2048";                     // per CPU: some seconds of switches
+constexpr int kBufferPages = 512;                             // the same, in pages of 4 kB
 constexpr size_t kLargestFilter = 3500;                       // the kernel takes a page of text
 constexpr int64_t kStateMask = 0xff, kPreemptedFlag = 0x200;  // TASK_REPORT, TASK_REPORT_MAX << 1
 
@@ -200,7 +201,9 @@ class TracefsSource final : public SwitchSource {
 
   void drain(Switches& into) override {
     for (Pipe& pipe : pipes_) {
-      for (ssize_t got = 0; (got = read(pipe.file.get(), page_.data(), page_.size())) > 0;) {
+      // No more than a full buffer: where reading itself makes switches (a debugger), there would be no end.
+      int pages = kBufferPages;
+      for (ssize_t got = 0; pages-- > 0 && (got = read(pipe.file.get(), page_.data(), page_.size())) > 0;) {
         lost_ += for_each_record(std::span(page_.data(), static_cast<size_t>(got)), formats_.data_offset,
                                  [&](int64_t at, std::span<const std::byte> record) { take(pipe, at, record, into); });
       }
@@ -248,18 +251,30 @@ class TracefsSource final : public SwitchSource {
     pipe.running = {};
   }
 
-  /// Process ids in a container are not those of the kernel: then our threads would never be recognised.
+  /// Process ids in a container are not those of the kernel: then our threads would never be recognised. Some kernels
+  /// also stop recording what an idle CPU switches to (after a fault in a tracer, until the next boot): then no stretch
+  /// on that CPU has a beginning.
   bool sees_itself(std::string& why_not) {
-    const OnCpu here(pipes_.front().cpu);
+    for (const Pipe& pipe : pipes_) {
+      if (sees_itself_on(pipe.cpu)) continue;
+      why_not = "tracefs: it does not show this process on cpu " + std::to_string(pipe.cpu) +
+                " (a container with process ids of its own, or a kernel that drops what an idle CPU switches to?)";
+      return false;
+    }
+    return true;
+  }
+
+  bool sees_itself_on(int cpu) {
+    const OnCpu here(cpu);
     Switches seen;
     for (int tries = 0; tries < 20; ++tries) {
       const timespec pause{0, 2'000'000};
       nanosleep(&pause, nullptr);
       drain(seen);
-      if (std::any_of(seen.slices.begin(), seen.slices.end(), [](const Slice& s) { return s.thread == gettid(); }))
+      if (std::any_of(seen.slices.begin(), seen.slices.end(),
+                      [&](const Slice& s) { return s.thread == gettid() && s.cpu == cpu; }))
         return true;
     }
-    why_not = "tracefs: it does not show this process (a container with process ids of its own?)";
     return false;
   }
 
