@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "rt/record/packed_message.hpp"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <charconv>
+#include <cstdint>
+#include <cstring>
+#include <utility>
+
+#include "rt/msg/array.hpp"
+
+namespace takt::record {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "scalars are copied as they lie in memory");
+
+using Bytes = std::span<const std::byte>;
+using AnyArray = Array<std::byte>;  // every Array has the same layout
+
+const AnyArray& array_at(const void* message, const Field& field) {
+  return *reinterpret_cast<const AnyArray*>(static_cast<const std::byte*>(message) + field.offset);
+}
+
+uint64_t field_bytes(const void* message, const Field& field) {
+  if (!field.is_array()) return uint64_t{field.count} * field.element_bytes;
+  return sizeof(uint32_t) + uint64_t{array_at(message, field).size} * field.element_bytes;
+}
+
+uint32_t scalar_bytes(Scalar scalar) {
+  switch (scalar) {
+    case Scalar::u8: return 1;
+    case Scalar::i16:
+    case Scalar::u16: return 2;
+    case Scalar::i32:
+    case Scalar::u32:
+    case Scalar::f32: return 4;
+    default: return 8;
+  }
+}
+
+template <class T>
+std::string number_text(Bytes at) {
+  T value;
+  std::memcpy(&value, at.data(), sizeof value);
+  std::array<char, 32> text;  // the shortest that is read back as the same number
+  const auto end = std::to_chars(text.data(), text.data() + text.size(), +value).ptr;
+  return {text.data(), end};
+}
+
+std::string scalar_text(Scalar scalar, Bytes at) {
+  switch (scalar) {
+    case Scalar::u8: return number_text<uint8_t>(at);
+    case Scalar::i16: return number_text<int16_t>(at);
+    case Scalar::u16: return number_text<uint16_t>(at);
+    case Scalar::i32: return number_text<int32_t>(at);
+    case Scalar::u32: return number_text<uint32_t>(at);
+    case Scalar::i64: return number_text<int64_t>(at);
+    case Scalar::u64: return number_text<uint64_t>(at);
+    case Scalar::f32: return number_text<float>(at);
+    case Scalar::f64: return number_text<double>(at);
+  }
+  return "";
+}
+
+/// The scalar at that byte of both, as text.
+std::string values_at(const Field& field, Bytes reference, Bytes other, uint64_t scalar_at) {
+  const uint32_t size = scalar_bytes(field.scalar);
+  return scalar_text(field.scalar, other.subspan(scalar_at, size)) + " instead of " +
+         scalar_text(field.scalar, reference.subspan(scalar_at, size));
+}
+
+/// Walks two packed messages side by side.
+class Comparison {
+ public:
+  Comparison(Bytes reference, Bytes other) : reference_(reference), other_(other) {}
+
+  std::optional<Difference> field(const Field& field) {
+    if (!field.is_array())
+      return scalars(field, std::string(field.name), uint64_t{field.count} * field.element_bytes, field.count > 1);
+    if (const auto ends = short_of(sizeof(uint32_t))) return difference(std::string(field.name) + ".size", *ends);
+    const std::string name(field.name);
+    const uint32_t size = count(reference_), others = count(other_);
+    if (size != others)
+      return Difference{name + ".size", at_, std::to_string(others) + " instead of " + std::to_string(size)};
+    at_ += sizeof(uint32_t);
+    return scalars(field, name, uint64_t{size} * field.element_bytes, true);
+  }
+
+  std::optional<Difference> rest() const {
+    if (reference_.size() == other_.size()) return std::nullopt;
+    return difference("length", at_);
+  }
+
+ private:
+  uint32_t count(Bytes from) const {
+    uint32_t value = 0;
+    std::memcpy(&value, from.data() + at_, sizeof value);
+    return value;
+  }
+
+  /// Where the shorter one ends, if it holds no `bytes` more.
+  std::optional<uint64_t> short_of(uint64_t bytes) const {
+    const uint64_t shorter = std::min(reference_.size(), other_.size());
+    return shorter - at_ < bytes ? std::optional(shorter) : std::nullopt;
+  }
+
+  Difference difference(const std::string& what, uint64_t at) const {
+    return {what, at, std::to_string(other_.size()) + " bytes instead of " + std::to_string(reference_.size())};
+  }
+
+  std::optional<Difference> scalars(const Field& field, const std::string& name, uint64_t bytes, bool indexed) {
+    if (const auto ends = short_of(bytes)) return difference(name, *ends);
+    const Bytes a = reference_.subspan(at_, bytes), b = other_.subspan(at_, bytes);
+    const uint64_t from = std::exchange(at_, at_ + bytes);
+    if (bytes == 0 || std::memcmp(a.data(), b.data(), bytes) == 0) return std::nullopt;
+    const auto part = static_cast<uint64_t>(std::mismatch(a.begin(), a.end(), b.begin()).first - a.begin());
+    const uint64_t scalar = part / scalar_bytes(field.scalar) * scalar_bytes(field.scalar);
+    const std::string index = indexed ? "[" + std::to_string(part / field.element_bytes) + "]" : "";
+    return Difference{name + index, from + part, values_at(field, a, b, scalar)};
+  }
+
+  Bytes reference_, other_;
+  uint64_t at_ = 0;
+};
+
+}  // namespace
+
+uint64_t packed_bytes(const MessageType& type, const void* message) {
+  uint64_t bytes = 0;
+  for (const Field& field : type.fields) bytes += field_bytes(message, field);
+  return bytes;
+}
+
+void pack(const MessageType& type, const void* message, std::vector<std::byte>& to) {
+  const auto append = [&](const void* data, uint64_t bytes) {
+    const auto* first = static_cast<const std::byte*>(data);
+    to.insert(to.end(), first, first + bytes);
+  };
+  for (const Field& field : type.fields) {
+    if (!field.is_array()) {
+      append(static_cast<const std::byte*>(message) + field.offset, uint64_t{field.count} * field.element_bytes);
+      continue;
+    }
+    const AnyArray& array = array_at(message, field);
+    append(&array.size, sizeof array.size);
+    append(array.data(), uint64_t{array.size} * field.element_bytes);
+  }
+}
+
+tl::expected<void, std::string> unpack(const MessageType& type, Bytes packed, void* message) {
+  uint64_t at = 0;
+  const auto take = [&](void* to, uint64_t bytes) {
+    if (packed.size() - at < bytes) return false;
+    if (bytes > 0) std::memcpy(to, packed.data() + at, bytes);
+    at += bytes;
+    return true;
+  };
+  const auto wrong = [&](const Field& field, const std::string& what) {
+    return tl::unexpected(std::string(type.name) + "." + std::string(field.name) + " " + what);
+  };
+  for (const Field& field : type.fields) {
+    auto* place = static_cast<std::byte*>(message) + field.offset;
+    if (!field.is_array()) {
+      if (!take(place, uint64_t{field.count} * field.element_bytes)) return wrong(field, "is cut off");
+      continue;
+    }
+    auto& array = *reinterpret_cast<AnyArray*>(place);
+    uint32_t size = 0;
+    if (!take(&size, sizeof size)) return wrong(field, "is cut off");
+    if (size > array.capacity)
+      return wrong(field, "has " + std::to_string(size) + " elements, and there is room for " +
+                              std::to_string(array.capacity));
+    if (!take(array.data(), uint64_t{size} * field.element_bytes)) return wrong(field, "is cut off");
+    array.size = size;
+  }
+  if (at != packed.size())
+    return tl::unexpected(std::string(type.name) + ": " + std::to_string(packed.size() - at) + " bytes too many");
+  return {};
+}
+
+std::optional<Difference> first_difference(const MessageType& type, Bytes reference, Bytes other) {
+  Comparison comparison(reference, other);
+  for (const Field& field : type.fields)
+    if (auto found = comparison.field(field)) return found;
+  return comparison.rest();
+}
+
+}  // namespace takt::record
