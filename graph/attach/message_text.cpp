@@ -2,12 +2,12 @@
 #include "graph/attach/message_text.hpp"
 
 #include <algorithm>
-#include <cstring>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
 #include "nodes/picture/draw.hpp"
 #include "rt/msg/messages.hpp"
+#include "rt/msg/scalar.hpp"
 
 namespace takt::attach {
 namespace {
@@ -16,59 +16,22 @@ using Json = nlohmann::ordered_json;
 
 constexpr int kPixelsPerCell = 6;
 
-template <class T>
-Json number_at(const std::byte* at) {
-  T value;
-  std::memcpy(&value, at, sizeof value);
-  return value;
-}
-
-Json scalar_at(Scalar scalar, const std::byte* at) {
-  switch (scalar) {
-    case Scalar::u8: return number_at<uint8_t>(at);
-    case Scalar::i16: return number_at<int16_t>(at);
-    case Scalar::u16: return number_at<uint16_t>(at);
-    case Scalar::i32: return number_at<int32_t>(at);
-    case Scalar::u32: return number_at<uint32_t>(at);
-    case Scalar::i64: return number_at<int64_t>(at);
-    case Scalar::u64: return number_at<uint64_t>(at);
-    case Scalar::f32: return number_at<float>(at);
-    case Scalar::f64: return number_at<double>(at);
-  }
-  return nullptr;
-}
-
-size_t size_of(Scalar scalar) {
-  switch (scalar) {
-    case Scalar::u8: return 1;
-    case Scalar::i16:
-    case Scalar::u16: return 2;
-    case Scalar::i32:
-    case Scalar::u32:
-    case Scalar::f32: return 4;
-    case Scalar::i64:
-    case Scalar::u64:
-    case Scalar::f64: return 8;
-  }
-  return 1;
-}
-
 Json scalars(Scalar scalar, const std::byte* at, size_t count) {
-  if (count == 1) return scalar_at(scalar, at);
+  const auto value_at = [&](size_t i) {
+    return visit_scalar(scalar, at + i * scalar_bytes(scalar), [](auto value) { return Json(value); });
+  };
+  if (count == 1) return value_at(0);
   Json list = Json::array();
-  for (size_t i = 0; i < count; ++i) list.push_back(scalar_at(scalar, at + i * size_of(scalar)));
+  for (size_t i = 0; i < count; ++i) list.push_back(value_at(i));
   return list;
 }
 
-/// Every Array begins alike, whatever it holds.
-const Array<uint8_t>& array_at(const std::byte* at) { return *reinterpret_cast<const Array<uint8_t>*>(at); }
-
 Json array_json(const Field& field, const std::byte* at, size_t element_bytes, size_t items) {
-  const Array<uint8_t>& array = array_at(at);
-  const auto* data = reinterpret_cast<const std::byte*>(array.data());
+  const Array<std::byte>& array = any_array(at);
+  const std::byte* data = array.data();
   Json first = Json::array();
   for (size_t i = 0; i < std::min<size_t>(array.size, items); ++i)
-    first.push_back(scalars(field.scalar, data + i * element_bytes, element_bytes / size_of(field.scalar)));
+    first.push_back(scalars(field.scalar, data + i * element_bytes, element_bytes / scalar_bytes(field.scalar)));
   return {{"size", array.size}, {"first", first}};
 }
 

@@ -4,7 +4,6 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <sched.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -22,6 +21,7 @@
 #include "graph/command/prepare.hpp"
 #include "graph/command/report.hpp"
 #include "graph/view/html_report.hpp"
+#include "rt/machine/facts.hpp"
 #include "rt/shm/iceoryx_preflight.hpp"
 
 namespace takt::command {
@@ -80,16 +80,14 @@ KeptPlace::~KeptPlace() {
 }
 
 void choose_cores(std::vector<int>& cores, std::vector<std::string>& adjusted) {
-  cpu_set_t allowed;
-  if (sched_getaffinity(0, sizeof allowed, &allowed) != 0) return;
-  std::vector<int> usable, all;
-  for (int core = 0; core < CPU_SETSIZE; ++core)
-    if (CPU_ISSET(core, &allowed)) all.push_back(core);
+  const std::vector<int> allowed = machine::SystemFacts().allowed_cpus();
+  if (allowed.empty()) return;  // not known
+  std::vector<int> usable;
   for (const int core : cores)
-    if (core >= 0 && core < CPU_SETSIZE && CPU_ISSET(core, &allowed)) usable.push_back(core);
+    if (std::find(allowed.begin(), allowed.end(), core) != allowed.end()) usable.push_back(core);
   const bool named = !cores.empty();
   if (named && usable.size() == cores.size()) return;
-  if (usable.empty()) usable = all;
+  if (usable.empty()) usable = allowed;
   if (named)
     adjusted.push_back(fmt::format("cores [{}] -> [{}]: this process may use no others", fmt::join(cores, ", "),
                                    fmt::join(usable, ", ")));

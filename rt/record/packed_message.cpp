@@ -9,7 +9,7 @@
 #include <cstring>
 #include <utility>
 
-#include "rt/msg/array.hpp"
+#include "rt/msg/scalar.hpp"
 
 namespace takt::record {
 namespace {
@@ -17,10 +17,9 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "scalars are copied as they lie in memory");
 
 using Bytes = std::span<const std::byte>;
-using AnyArray = Array<std::byte>;  // every Array has the same layout
 
-const AnyArray& array_at(const void* message, const Field& field) {
-  return *reinterpret_cast<const AnyArray*>(static_cast<const std::byte*>(message) + field.offset);
+const Array<std::byte>& array_at(const void* message, const Field& field) {
+  return any_array(static_cast<const std::byte*>(message) + field.offset);
 }
 
 uint64_t field_bytes(const void* message, const Field& field) {
@@ -28,47 +27,18 @@ uint64_t field_bytes(const void* message, const Field& field) {
   return sizeof(uint32_t) + uint64_t{array_at(message, field).size} * field.element_bytes;
 }
 
-uint32_t scalar_bytes(Scalar scalar) {
-  switch (scalar) {
-    case Scalar::u8: return 1;
-    case Scalar::i16:
-    case Scalar::u16: return 2;
-    case Scalar::i32:
-    case Scalar::u32:
-    case Scalar::f32: return 4;
-    default: return 8;
-  }
-}
-
-template <class T>
-std::string number_text(Bytes at) {
-  T value;
-  std::memcpy(&value, at.data(), sizeof value);
-  std::array<char, 32> text;  // the shortest that is read back as the same number
-  const auto end = std::to_chars(text.data(), text.data() + text.size(), +value).ptr;
-  return {text.data(), end};
-}
-
-std::string scalar_text(Scalar scalar, Bytes at) {
-  switch (scalar) {
-    case Scalar::u8: return number_text<uint8_t>(at);
-    case Scalar::i16: return number_text<int16_t>(at);
-    case Scalar::u16: return number_text<uint16_t>(at);
-    case Scalar::i32: return number_text<int32_t>(at);
-    case Scalar::u32: return number_text<uint32_t>(at);
-    case Scalar::i64: return number_text<int64_t>(at);
-    case Scalar::u64: return number_text<uint64_t>(at);
-    case Scalar::f32: return number_text<float>(at);
-    case Scalar::f64: return number_text<double>(at);
-  }
-  return "";
+std::string scalar_text(Scalar scalar, const std::byte* at) {
+  return visit_scalar(scalar, at, [](auto value) {
+    std::array<char, 32> text;  // the shortest that is read back as the same number
+    const auto end = std::to_chars(text.data(), text.data() + text.size(), +value).ptr;
+    return std::string(text.data(), end);
+  });
 }
 
 /// The scalar at that byte of both, as text.
 std::string values_at(const Field& field, Bytes reference, Bytes other, uint64_t scalar_at) {
-  const uint32_t size = scalar_bytes(field.scalar);
-  return scalar_text(field.scalar, other.subspan(scalar_at, size)) + " instead of " +
-         scalar_text(field.scalar, reference.subspan(scalar_at, size));
+  return scalar_text(field.scalar, other.data() + scalar_at) + " instead of " +
+         scalar_text(field.scalar, reference.data() + scalar_at);
 }
 
 /// Walks two packed messages side by side.
@@ -143,7 +113,7 @@ void pack(const MessageType& type, const void* message, std::vector<std::byte>& 
       append(static_cast<const std::byte*>(message) + field.offset, uint64_t{field.count} * field.element_bytes);
       continue;
     }
-    const AnyArray& array = array_at(message, field);
+    const Array<std::byte>& array = array_at(message, field);
     append(&array.size, sizeof array.size);
     append(array.data(), uint64_t{array.size} * field.element_bytes);
   }
@@ -166,12 +136,12 @@ tl::expected<void, std::string> unpack(const MessageType& type, Bytes packed, vo
       if (!take(place, uint64_t{field.count} * field.element_bytes)) return wrong(field, "is cut off");
       continue;
     }
-    auto& array = *reinterpret_cast<AnyArray*>(place);
+    auto& array = *reinterpret_cast<Array<std::byte>*>(place);
     uint32_t size = 0;
     if (!take(&size, sizeof size)) return wrong(field, "is cut off");
     if (size > array.capacity)
-      return wrong(field, "has " + std::to_string(size) + " elements, and there is room for " +
-                              std::to_string(array.capacity));
+      return wrong(
+          field, "has " + std::to_string(size) + " elements, and there is room for " + std::to_string(array.capacity));
     if (!take(array.data(), uint64_t{size} * field.element_bytes)) return wrong(field, "is cut off");
     array.size = size;
   }

@@ -68,7 +68,7 @@ tl::expected<Reader, std::string> Reader::open(const std::filesystem::path& file
 Reader::Reader(Reader&& other) noexcept
     : file_(std::exchange(other.file_, {})),
       profile_(std::move(other.profile_)),
-      library_(std::move(other.library_)),
+      written_by_(std::move(other.written_by_)),
       missing_(std::move(other.missing_)),
       schemas_(std::move(other.schemas_)),
       channels_(std::move(other.channels_)),
@@ -107,7 +107,7 @@ void Reader::take(Op op, Bytes fields, uint64_t at) {
   if (op == Op::header) {
     ByteReader head(fields);
     profile_ = head.text();
-    library_ = head.text();
+    written_by_ = head.text();
   }
   if (op == Op::schema) keep_once(schemas_, get_schema(fields));
   if (op == Op::channel) keep_once(channels_, get_channel(fields));

@@ -32,7 +32,7 @@ class Reader {
   ~Reader();
 
   const std::string& profile() const { return profile_; }
-  const std::string& library() const { return library_; }
+  const std::string& written_by() const { return written_by_; }
   const std::vector<Schema>& schemas() const { return schemas_; }
   const std::vector<Channel>& channels() const { return channels_; }
   const std::vector<Chunk>& chunks() const { return chunks_; }
@@ -61,7 +61,7 @@ class Reader {
   std::string check_end(uint64_t data_end_at, uint64_t summary_at) const;
 
   Bytes file_;
-  std::string profile_, library_, missing_;
+  std::string profile_, written_by_, missing_;
   std::vector<Schema> schemas_;
   std::vector<Channel> channels_;
   std::vector<Chunk> chunks_;

@@ -112,25 +112,6 @@ void put(std::vector<std::byte>& to, const ChunkIndex& index) {
   });
 }
 
-ChunkIndex get_chunk_index(Bytes from) {
-  ByteReader fields(from);
-  ChunkIndex index;
-  index.start_ns = fields.number<uint64_t>();
-  index.end_ns = fields.number<uint64_t>();
-  index.offset = fields.number<uint64_t>();
-  index.length = fields.number<uint64_t>();
-  ByteReader offsets(fields.bytes(fields.number<uint32_t>()));
-  while (offsets.left() > 0) {
-    const auto channel = offsets.number<uint16_t>();
-    index.message_index_offsets[channel] = offsets.number<uint64_t>();
-  }
-  index.message_index_length = fields.number<uint64_t>();
-  index.compression = fields.text();
-  index.compressed_size = fields.number<uint64_t>();
-  index.uncompressed_size = fields.number<uint64_t>();
-  return index;
-}
-
 void put(std::vector<std::byte>& to, const Statistics& statistics, size_t schemas, size_t channels) {
   put_record(to, Op::statistics, [&](ByteWriter& fields) {
     fields.number(statistics.messages);
@@ -145,24 +126,6 @@ void put(std::vector<std::byte>& to, const Statistics& statistics, size_t schema
       for (const auto& [channel, count] : statistics.channel_messages) fields.number(channel), fields.number(count);
     });
   });
-}
-
-Statistics get_statistics(Bytes from) {
-  ByteReader fields(from);
-  Statistics statistics;
-  statistics.messages = fields.number<uint64_t>();
-  fields.bytes(sizeof(uint16_t) + sizeof(uint32_t));  // how many schemas and channels
-  statistics.attachments = fields.number<uint32_t>();
-  statistics.metadata = fields.number<uint32_t>();
-  statistics.chunks = fields.number<uint32_t>();
-  statistics.start_ns = fields.number<uint64_t>();
-  statistics.end_ns = fields.number<uint64_t>();
-  ByteReader counts(fields.bytes(fields.number<uint32_t>()));
-  while (counts.left() > 0) {
-    const auto channel = counts.number<uint16_t>();
-    statistics.channel_messages[channel] = counts.number<uint64_t>();
-  }
-  return statistics;
 }
 
 void put_footer(std::vector<std::byte>& to, uint64_t summary_at, uint64_t offsets_at) {

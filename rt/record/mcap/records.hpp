@@ -34,8 +34,6 @@ void put_footer(std::vector<std::byte>& to, uint64_t summary_at, uint64_t offset
 Schema get_schema(Bytes fields);
 Channel get_channel(Bytes fields);
 Message get_message(Bytes fields);  ///< `data` lies in `fields`
-ChunkIndex get_chunk_index(Bytes fields);
-Statistics get_statistics(Bytes fields);
 /// Also throws std::runtime_error if its CRC is wrong. `data` lies in `fields`.
 Attachment get_attachment(Bytes fields);
 
