@@ -85,8 +85,14 @@ TEST_CASE("The SVG of ACE is well-formed and shows each node, device, edge and c
   CHECK(values(all, "data-to") == edges);
   for (const auto& chain : graph.chains) CHECK(svg.find(chain.name + ": " + chain.from.text()) != std::string::npos);
   check_frames_apart(all);
-  for (const char* words : {"stereo, 15 Hz", "budget 20 ms, deadline 80 ms", "depth 4", "max_age 150 ms", "stereo_pair",
-                            "age at most 700 ms", "criticality=\"high\"", "prefers-color-scheme: dark"}) {
+  for (const auto& [id, entry] : graph.schedule.entries) {
+    const std::string words = "budget " + time_text(entry.budget_ns);
+    CAPTURE(id);
+    CAPTURE(words);
+    CHECK(svg.find(words) != std::string::npos);
+  }
+  for (const char* words : {"stereo, 15 Hz", "depth 4", "max_age 150 ms", "stereo_pair", "age at most 700 ms",
+                            "criticality=\"high\"", "prefers-color-scheme: dark"}) {
     CAPTURE(words);
     CHECK(svg.find(words) != std::string::npos);
   }
