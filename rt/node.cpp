@@ -1,7 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "rt/node.hpp"
 
+#include "rt/trace/rings.hpp"
+
 namespace takt {
+namespace {
+
+void note_answer(Question question, int64_t value, uint32_t job) {
+  trace::record({0, value, static_cast<int64_t>(question), job, trace::kNoTask, trace::Kind::answer, 0});
+}
+
+}  // namespace
+
+int64_t Job::answer(Question question, int64_t value) const {
+  if (recorded_ != nullptr) return recorded_->next(question);
+  note_answer(question, value, static_cast<uint32_t>(index_));
+  return value;
+}
 
 InputPort::InputPort(Node* owner, std::string_view name, const MessageType& type, std::string_view doc, Need need)
     : name_(name), doc_(doc), type_(&type), need_(need) {
@@ -14,7 +29,10 @@ OutputPort::OutputPort(Node* owner, std::string_view name, const MessageType& ty
 }
 
 void* OutputPort::loan_message() {
-  if (loaned_ == nullptr && writer_ != nullptr) loaned_ = writer_->loan();
+  if (loaned_ == nullptr && writer_ != nullptr) {
+    loaned_ = writer_->loan();
+    if (loaned_ == nullptr) note_answer(Question::chunk, 0, 0);
+  }
   return loaned_ == nullptr ? nullptr : loaned_ + 1;
 }
 

@@ -48,6 +48,18 @@ struct CpuBudget {
   int64_t left_ns() const { return budget_ns - (used_ns != nullptr ? used_ns() - used_before_ns : 0); }
 };
 
+/// What a job may ask the runtime, and what it was told: recorded, so that a replay can tell it again.
+enum class Question : uint8_t {
+  now,
+  time_left,
+  chunk
+};  ///< chunk: whether there is one to loan, asked where there is none
+class RecordedAnswers {
+ public:
+  virtual ~RecordedAnswers() = default;
+  virtual int64_t next(Question question) = 0;
+};
+
 /// The mode in which the robot stands and stays where it is; `on_miss: safe_stop` and `on_overrun: safe_stop` enter it.
 inline constexpr std::string_view kSafeStopMode = "safe_stop";
 
@@ -57,14 +69,14 @@ class Job {
   int64_t release_ns() const { return release_ns_; }    ///< planned release
   int64_t deadline_ns() const { return deadline_ns_; }  ///< absolute
   uint64_t index() const { return index_; }             ///< 0, 1, 2 ... per node, skipped releases counted
-  int64_t now_ns() const { return clock_->now_ns(); }
+  int64_t now_ns() const { return answer(Question::now, clock_->now_ns()); }
   /// How long the job may go on: to its deadline, and if the schedule gives it a budget, until that is used up,
   /// whichever comes first. Negative once it is over. In virtual time nothing has been used while a job runs. An
   /// anytime node asks between two portions of its work and publishes the best so far; each question costs a system
   /// call where there is a budget (0.2 us), so portions should take longer than that.
   int64_t time_left_ns() const {
-    const int64_t to_deadline = deadline_ns_ - now_ns();
-    return cpu_.budget_ns > 0 ? std::min(to_deadline, cpu_.left_ns()) : to_deadline;
+    const int64_t to_deadline = deadline_ns_ - clock_->now_ns();
+    return answer(Question::time_left, cpu_.budget_ns > 0 ? std::min(to_deadline, cpu_.left_ns()) : to_deadline);
   }
   int level() const { return level_; }  ///< index into the node's Levels; 0 full quality (on_overrun: degrade)
   std::string_view mode() const { return mode_; }
@@ -84,14 +96,19 @@ class Job {
         mode_(mode) {}
   bool ended() const { return end_of_data_; }
   bool without_result() const { return no_result_; }
+  /// In a replay.
+  void answer_from(RecordedAnswers& recorded) { recorded_ = &recorded; }
 
  private:
+  int64_t answer(Question question, int64_t value) const;
+
   const Clock* clock_;
   uint64_t index_;
   int64_t release_ns_, deadline_ns_;
   CpuBudget cpu_;
   int level_;
   std::string_view mode_;
+  RecordedAnswers* recorded_ = nullptr;
   bool end_of_data_ = false, no_result_ = false;
 };
 

@@ -15,6 +15,10 @@ class Node;
 /// A parameter value as it comes from outside, already in the unit the parameter declares (SI).
 using ParamValue = std::variant<bool, int64_t, double, std::string>;
 
+/// Instead of a unit: the text names a file or folder that the node reads, relative to the graph; part of what a record
+/// must be replayed with.
+inline constexpr std::string_view kPath = "path";
+
 /// Name, default, unit, range and meaning of a parameter, declared once as a member of its node and used by the loader,
 /// `takt nodes` and the documentation.
 class ParamBase {
@@ -25,7 +29,7 @@ class ParamBase {
   virtual ~ParamBase() = default;
 
   std::string_view name() const { return name_; }
-  std::string_view unit() const { return unit_; }  ///< "m", "rad", "s", "m/s"..., "px", "1", "" for text and flags
+  std::string_view unit() const { return unit_; }  ///< "m", "rad", "s", "m/s"..., "px", "1", kPath, else ""
   std::string_view doc() const { return doc_; }
   /// Takes a value, or says what is wrong with it ("is 12, must lie in 1..10"). Before start, and between jobs if live.
   virtual tl::expected<void, std::string> set(const ParamValue& value) = 0;

@@ -69,8 +69,9 @@ class IsolatedRun {
         plan_(plan_source_.plan),
         partition_(graph::partition(graph, adjusted_)),
         board_(plan_, partition_.names.size()),
-        trace_(options, plan_),
-        stoppable_(board_) {}
+        stoppable_(board_),
+        record_(options),
+        trace_(options, plan_) {}
 
   ~IsolatedRun() {
     ending_ = true;
@@ -92,13 +93,14 @@ class IsolatedRun {
       });
     wait_for_all(ProcessRecord::composed);
     BoardExchange exchange(board_);
-    graph::complete(plan_, exchange, 1);
+    graph::complete(plan_, exchange, observers(options_));
     if (const int code = admit(options_, graph_, plan_, adjusted_); code != kOk) throw Refused{code};
     const CpuLatencyHold latency = hold_cpu_dma_latency();
     tell_lacks(latency);
     board_.carrier().store(bring_up_transport());
     agree_on_policy();
-    trace_.collect(plan_);
+    record_.begin(graph_, plan_, board_, *transport_, "subsystem");
+    trace_.collect(plan_, record_);
     wait_for_all(ProcessRecord::running);
     const int64_t steal_before_ms = ProcessReading::now().steal_ms, cpu_before_ns = ProcessReading::now().cpu_ns;
     // Now, with everything in place and locked: at the end they leave one after the other.
@@ -241,11 +243,13 @@ class IsolatedRun {
     result.end_ns = board_.stop().end_ns();
     result.policy_granted = granted_;
     result.released = released_jobs(plan_, board_, result.epoch_ns, result.end_ns);
+    const std::string no_trace = trace_.write(graph_, plan_, board_, result);
+    record_.finish(result);
     auto report = make_report({graph_, plan_, board_, result, *transport_, use, options_.clock,
                                std::string(to_string(plan_.policy)), "subsystem", partition_.names, adjusted_});
     for (const std::string& fault : faults_) report["faults"].push_back({{"what", fault}});
     if (!faults_.empty()) report["ok"] = false;
-    const std::string no_trace = trace_.write(graph_, plan_, board_, result);
+    record_.tell(report);
     const int told = tell_faults(options_, graph_, board_, granted_, report);
     if (!no_trace.empty()) return refuse(no_trace, kBadInput);
     return code_ != 0 ? code_ : told;
@@ -260,7 +264,6 @@ class IsolatedRun {
   Plan& plan_;
   const graph::Partition partition_;
   RunBoard board_;
-  RunTrace trace_;
   const Stoppable stoppable_;
   const PoolFile pools_;  ///< of the local transport
   Policy granted_ = Policy::cooperative;
@@ -269,6 +272,8 @@ class IsolatedRun {
   bool ending_ = false;
   double memory_mb_ = 0;
   std::unique_ptr<Transport> transport_;  ///< the daemon: ends after all members
+  RunRecord record_;                      ///< reads from the transport
+  RunTrace trace_;                        ///< speaks to the record
   ProcessGroup group_;                    ///< last: its members end before what they share
 };
 

@@ -8,7 +8,9 @@
 #include "graph/command/doctor_command.hpp"
 #include "graph/command/eval_command.hpp"
 #include "graph/command/explain_command.hpp"
+#include "graph/command/log_commands.hpp"
 #include "graph/command/profile_command.hpp"
+#include "graph/command/replay_command.hpp"
 #include "graph/command/run_command.hpp"
 #include "graph/command/show_command.hpp"
 
@@ -81,6 +83,9 @@ void add_run(CLI::App& app, takt::command::RunOptions& o, int& exit_code) {
   run->add_option("--trace-source", o.trace_source,
                   "how preemption is seen: auto (the best granted) | tracefs | perf | none")
       ->check(CLI::IsMember({"auto", "tracefs", "perf", "none"}));
+  run->add_option("--record", o.record, "writes an MCAP record for `takt replay` and `takt log`");
+  run->add_option("--record-port", o.record_ports,
+                  "NODE.PORT (or all): its messages whole, as those of devices and small ones are; repeatable");
   run->add_option("--output", o.output, "folder for pictures and other results (default out)");
   run->add_option("--seed", o.seed, "seed of the simulated world");
   run->add_flag("--unchecked", o.unchecked, "runs what the check refuses");
@@ -124,6 +129,8 @@ int main(int argc, char** argv) {
   takt::command::ProfileOptions profile;
   takt::command::EvalObjectsOptions objects;
   takt::command::EvalGroundOptions ground;
+  takt::command::ReplayOptions replay;
+  takt::command::LogOptions log;
   std::string type;
   bool check_json = false;
   int exit_code = 0;
@@ -143,6 +150,8 @@ int main(int argc, char** argv) {
   takt::command::add_attach_commands(app, attach, exit_code);
   takt::command::add_doctor(app, doctor, exit_code);
   add_profile(app, profile, exit_code);
+  takt::command::add_replay(app, replay, exit_code);
+  takt::command::add_log(app, log, exit_code);
   CLI::App* eval = app.add_subcommand("eval", "measures quality against ground truth");
   eval->require_subcommand(1);
   takt::command::add_eval_stereo(*eval, stereo, exit_code);

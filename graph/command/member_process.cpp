@@ -5,6 +5,7 @@
 
 #include "graph/command/machine.hpp"
 #include "graph/command/prepare.hpp"
+#include "graph/command/run_record.hpp"
 #include "graph/command/run_support.hpp"
 #include "rt/sched/executor.hpp"
 #include "rt/shm/iceoryx_transport.hpp"
@@ -69,7 +70,7 @@ int run_member(const RunOptions& options, const graph::GraphSpec& graph, const g
   graph::ComposeOptions how;
   how.output = options.output;
   how.seed = options.seed;
-  how.taps = 1;
+  how.observers = observers(options);
   how.owns = [&](const std::string& id) { return partition.process_of.at(id) == process; };
   how.exchange = &exchange;
   if (const int code = compose(options, how, prepared); code != kOk) {

@@ -7,6 +7,8 @@
 #include <cstdio>
 #include <cstdlib>
 
+#include "graph/command/run_record.hpp"
+
 namespace takt::command {
 namespace {
 
@@ -85,7 +87,7 @@ int prepare(const RunOptions& options, Prepared& prepared) {
     graph::ComposeOptions how;
     how.output = options.output;
     how.seed = options.seed;
-    how.taps = 1;
+    how.observers = observers(options);
     code = compose(options, how, prepared);
   }
   if (code != kOk) tell_problems(prepared.problems.size());

@@ -241,7 +241,7 @@ Json make_report(const RunFacts& facts) {
                       {"pools", pools_json(facts)}};
   report["cpu"] = cpu_json(facts);
   report["host_stall_ms"] = facts.use.steal_ms;
-  report["recorder_lost"] = 0;
+  report["recorder_lost"] = 0;  // RunRecord::tell knows better
   report["adjusted"] = facts.adjusted;
   report["faults"] = faults_json(facts);
   report["timeline"] = timeline_json(facts);

@@ -39,12 +39,18 @@ int execute(const RunOptions& options, Prepared& prepared, std::vector<std::stri
   graph::Composition& composition = *prepared.composition;
   const auto transport = make_transport(options.transport, composition.plan);
   RunBoard board(composition.plan);
-  RunTrace trace(options, composition.plan);
+  RunRecord record(options);
+  RunTrace trace(options, composition.plan);  // ends first: it speaks to the record
   Executor::Options run;
   run.duration_ns = static_cast<int64_t>(options.duration_s * 1e9);
   run.require_policy = options.policy_required();
   run.board = &board;
   run.trace = trace.rings();
+  if (prepared.clock->is_virtual())
+    run.after_job = [&] {
+      trace.drain();
+      record.capture();
+    };
   Executor executor(composition.plan, *transport, *prepared.clock, run);
   const ProcessReading before = ProcessReading::now();
   RunResult result;
@@ -56,11 +62,13 @@ int execute(const RunOptions& options, Prepared& prepared, std::vector<std::stri
     const LiveTable live(
         composition.plan, board,
         fmt::format("takt run {} ({}, policy {})", graph.name, graph.profile, to_string(graph.schedule.policy)));
-    trace.collect(composition.plan);
+    record.begin(graph, composition.plan, board, *transport, "none");
+    trace.collect(composition.plan, record);
     result = executor.run();
   }
   const ProcessReading after = ProcessReading::now();
   const std::string no_trace = trace.write(graph, composition.plan, board, result);
+  record.finish(result);
   for (size_t t = 0; t < composition.nodes.size(); ++t)
     if (!is_stuck(result, t)) composition.nodes[t]->finish();
   for (const std::string& refused : result.refused)
@@ -79,6 +87,7 @@ int execute(const RunOptions& options, Prepared& prepared, std::vector<std::stri
                              "none",
                              {},
                              std::move(adjusted)});
+  record.tell(report);
   int code = tell_faults(options, graph, board, result.policy_granted, report);
   if (!no_trace.empty()) code = refuse(no_trace, kBadInput);
   // A job that never returns still uses what would now be taken down.
@@ -90,7 +99,7 @@ int run_in_one_process(const RunOptions& options, Prepared& prepared, std::vecto
   graph::ComposeOptions how;
   how.output = options.output;
   how.seed = options.seed;
-  how.taps = 1;
+  how.observers = observers(options);
   if (const int code = compose(options, how, prepared); code != kOk) {
     tell_problems(prepared.problems.size());
     return code;
@@ -127,7 +136,7 @@ int run_as_asked(RunOptions options) {
       return refuse("--require-rt: this machine lacks (see `takt doctor`)\n" + lacks, kDeviceOrSystem);
   }
   if (wanted != "subsystem" || options.clock == "virtual") return run_in_one_process(options, prepared, adjusted);
-  const KeptPlace report(options.report), page(options.html), trace(options.trace);
+  const KeptPlace report(options.report), page(options.html), trace(options.trace), record(options.record);
   return run_isolated(options, *prepared.graph, std::move(adjusted));
 }
 
@@ -145,6 +154,8 @@ int run_graph(const RunOptions& options) {
     return refuse("--html " + options.html.string() + ": cannot be written; choose another place", kBadInput);
   if (!options.trace.empty() && !writable(options.trace))
     return refuse("--trace " + options.trace.string() + ": cannot be written; choose another place", kBadInput);
+  if (!options.record.empty() && !writable(options.record))
+    return refuse("--record " + options.record.string() + ": cannot be written; choose another place", kBadInput);
   const StopOnSignal guard;
   try {
     return run_as_asked(options);

@@ -17,8 +17,9 @@ struct RunOptions {
   bool unchecked = false, require_rt = false;
   std::string clock = "real", isolate;
   std::string transport;  ///< local | iceoryx; empty: local within a process, iceoryx between processes
-  std::filesystem::path report, html, trace, output = "out";
-  std::string trace_source = "auto";  ///< of preemption: auto (the best there is), tracefs, perf, none
+  std::filesystem::path report, html, trace, record, output = "out";
+  std::vector<std::string> record_ports;  ///< NODE.PORT: with all fields, beside devices and small ones; "all"
+  std::string trace_source = "auto";      ///< of preemption: auto (the best there is), tracefs, perf, none
   uint64_t seed = 1;
   /// A policy named on the command line, or --require-rt: refused means exit 3, not another policy.
   bool policy_required() const { return require_rt || !load.policy.empty(); }

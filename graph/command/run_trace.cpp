@@ -30,7 +30,7 @@ void add_modes(const RunBoard& board, trace::Trace& trace) {
 }
 
 trace::Source best_source(const RunOptions& options) {
-  if (options.clock == "virtual" || options.trace_source == "none") return trace::Source::none;
+  if (options.clock == "virtual" || options.trace.empty() || options.trace_source == "none") return trace::Source::none;
   return options.trace_source == "perf" ? trace::Source::perf : trace::Source::tracefs;
 }
 
@@ -39,13 +39,20 @@ trace::Source best_source(const RunOptions& options) {
 RunTrace::RunTrace(const RunOptions& options, const Plan& plan) : options_(options) {
   // One for each lane and, if the policy is refused after all, one for each cooperative worker; some for what watches.
   constexpr size_t kSpare = 8;
-  if (!options.trace.empty()) rings_ = std::make_unique<trace::Rings>(plan.tasks.size() + plan.cores.size() + kSpare);
+  if (!options.trace.empty() || !options.record.empty())
+    rings_ = std::make_unique<trace::Rings>(plan.tasks.size() + plan.cores.size() + kSpare);
 }
 
-void RunTrace::collect(const Plan& plan) {
-  if (rings_)
-    collector_ =
-        std::make_unique<trace::Collector>(*rings_, trace::Collector::Options{cpus_of(plan), best_source(options_)});
+void RunTrace::collect(const Plan& plan, RunRecord& record) {
+  if (!rings_) return;
+  trace::Collector::Options how;
+  how.cpus = cpus_of(plan);
+  how.best = best_source(options_);
+  how.by_caller = options_.clock == "virtual";
+  if (options_.trace.empty()) how.records_kept = 0;
+  if (record.wanted())
+    how.listener = [&record](int32_t thread, const trace::Event& event) { record.take(thread, event); };
+  collector_ = std::make_unique<trace::Collector>(*rings_, std::move(how));
 }
 
 std::string RunTrace::write(const graph::GraphSpec& graph, const Plan& plan, const RunBoard& board,
@@ -53,6 +60,7 @@ std::string RunTrace::write(const graph::GraphSpec& graph, const Plan& plan, con
   if (!collector_) return "";
   const trace::Recording recording = collector_->finish();
   collector_.reset();
+  if (options_.trace.empty()) return "";
   trace::Trace trace = trace::assemble(recording);
   trace.policy = to_string(result.policy_granted);
   trace.epoch_ns = result.epoch_ns;

@@ -4,21 +4,26 @@
 #include <string>
 
 #include "graph/command/run_command.hpp"
+#include "graph/command/run_record.hpp"
 #include "rt/sched/executor.hpp"
 #include "rt/trace/collector.hpp"
 
 namespace takt::command {
 
-/// The trace of a run, if one was asked for (`--trace`); else every call does nothing.
+/// What the jobs of a run note, if a trace (`--trace`) or a record was asked for; else every call does nothing.
 class RunTrace {
  public:
   /// Before the processes of the run are made: they share what is made here. Only the shape of the plan is used.
   RunTrace(const RunOptions& options, const Plan& plan);
-  /// Where threads note events; null: there is no trace.
+  /// Where threads note events; null: nowhere.
   trace::Rings* rings() const { return rings_.get(); }
-  /// Begins to collect, in the process that lasts longest.
-  void collect(const Plan& plan);
-  /// Ends collecting and writes the file; "" or why it could not be written.
+  /// Begins to collect, in the process that lasts longest, and tells every event to the record.
+  void collect(const Plan& plan, RunRecord& record);
+  /// Virtual time: after every job.
+  void drain() {
+    if (collector_) collector_->drain();
+  }
+  /// Ends collecting and writes the trace, if one was asked for; "" or why it could not be written.
   std::string write(const graph::GraphSpec& graph, const Plan& plan, const RunBoard& board, const RunResult& result);
 
  private:

@@ -47,6 +47,19 @@ std::string policy_text(const Json& report) {
                      report["nodes"].size());
 }
 
+std::string record_line(const Json& record, uint64_t lost) {
+  std::string text =
+      fmt::format("record {}: {} messages, {} jobs, {:.1f} MB, ", record["file"].get<std::string>(),
+                  record["messages"].get<uint64_t>(), record["jobs"].get<uint64_t>(), record["mb"].get<double>());
+  if (lost == 0) return text + "nothing lost\n";
+  const Json& why = record["lost"];
+  text += fmt::format("LOST {}: {} overwritten, {} found the queue full, {} not written, {} jobs incomplete", lost,
+                      why["overwritten"].get<uint64_t>(), why["no_room"].get<uint64_t>(),
+                      why["not_written"].get<uint64_t>(), why["jobs"].get<uint64_t>());
+  const auto refused = record["refused"].get<std::string>();
+  return text + (refused.empty() ? "" : " (" + refused + ")") + "\n";
+}
+
 }  // namespace
 
 std::string summary_text(const Json& report) {
@@ -75,6 +88,7 @@ std::string summary_text(const Json& report) {
   text += fmt::format("memory {:.0f} MB shared, {:.0f} MB resident; host stall {} ms\n",
                       report["memory"]["shm_mb"].get<double>(), report["memory"]["rss_mb"].get<double>(),
                       report["host_stall_ms"].get<int64_t>());
+  if (report.contains("record")) text += record_line(report["record"], report["recorder_lost"].get<uint64_t>());
   text += events_text(report);
   for (const Json& line : report["adjusted"]) text += "adjusted: " + line.get<std::string>() + "\n";
   text += report["ok"].get<bool>() ? "ok\n" : "NOT OK: a high-criticality deadline was missed or a node fell behind\n";

@@ -7,7 +7,6 @@
 #include <map>
 
 #include "graph/compose/plan_modes.hpp"
-#include "graph/compose/plan_ports.hpp"
 #include "hal/drivers.hpp"
 #include "rt/sched/port_access.hpp"
 
@@ -38,7 +37,7 @@ class Composer {
     connect();
     if (auto ready = set_up(); !ready) return tl::make_unexpected(ready.error());
     for (size_t p = 0; p < result_.plan.ports.size(); ++p) result_.plan.ports[p].capacity = capacity_of(p);
-    size_ports(result_.plan, options_.taps);
+    size_ports(result_.plan, options_.observers);
     return std::move(result_);
   }
 
@@ -240,9 +239,9 @@ Composition outline(const GraphSpec& graph, const NodeTypes& types, const Clock&
   return Composer(graph, types, clock, {}).outline();
 }
 
-void complete(Plan& plan, CapacityExchange& exchange, uint32_t taps) {
+void complete(Plan& plan, CapacityExchange& exchange, const Observers& observers) {
   for (size_t p = 0; p < plan.ports.size(); ++p) plan.ports[p].capacity = exchange.wait_for(p);
-  size_ports(plan, taps);
+  size_ports(plan, observers);
 }
 
 tl::expected<Composition, ComposeError> compose(const GraphSpec& graph, const NodeTypes& types,

@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "graph/compose/plan_ports.hpp"
 #include "graph/language/graph.hpp"
 #include "rt/node.hpp"
 #include "rt/sched/plan.hpp"
@@ -34,7 +35,7 @@ struct ComposeOptions {
   uint64_t seed = 1;
   std::function<bool(const std::string& id)> owns = {};  ///< nodes and devices this process sets up; empty: all
   CapacityExchange* exchange = nullptr;                  ///< needed where not all are owned
-  uint32_t taps = 0;  ///< readers beside the edges that an output may get while it runs
+  Observers observers = {};
 };
 
 /// Nodes in the order of the plan's tasks; the plan points into them.
@@ -52,7 +53,7 @@ tl::expected<Composition, ComposeError> compose(const GraphSpec& graph, const No
 Composition outline(const GraphSpec& graph, const NodeTypes& types, const Clock& clock);
 
 /// Adds to an outline what the owners of its outputs tell: capacities, hence pools.
-void complete(Plan& plan, CapacityExchange& exchange, uint32_t taps);
+void complete(Plan& plan, CapacityExchange& exchange, const Observers& observers);
 
 /// All node types this build knows.
 NodeTypes node_types();

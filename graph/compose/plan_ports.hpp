@@ -4,9 +4,14 @@
 
 namespace takt::graph {
 
+/// Who reads outputs beside the edges of the graph.
+struct Observers {
+  uint32_t taps = 0;        ///< may join each output while it runs, each holding one message
+  int64_t recorded_ns = 0;  ///< > 0: one more, which must find every message even if it looks only that often
+};
+
 /// Fills history, held and readers of every port from the edges, deadlines and rates of the tasks, so that no message a
-/// job must latch is overwritten while that job is late within its deadline. `taps` readers more may join each output
-/// while it runs, each holding one message.
-void size_ports(Plan& plan, uint32_t taps = 0);
+/// job must latch is overwritten while that job is late within its deadline, and for those that look on.
+void size_ports(Plan& plan, const Observers& observers = {});
 
 }  // namespace takt::graph

@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "graph/language/words.hpp"
+#include "rt/param.hpp"
 
 namespace takt::graph {
 namespace {
@@ -136,7 +137,7 @@ tl::expected<Quantity, std::string> parse_quantity(std::string_view whole) {
   return q;
 }
 
-bool carries_no_unit(std::string_view unit) { return unit.empty() || unit == "1" || unit == "px"; }
+bool carries_no_unit(std::string_view unit) { return unit.empty() || unit == "1" || unit == "px" || unit == kPath; }
 
 std::vector<std::string> units_like(std::string_view unit) {
   std::vector<std::string> words{std::string(unit)};

@@ -68,7 +68,7 @@ class ObjectDetectionNode final : public Node {
   Output<Detections> detections_{this, "detections", "class_id: index of the object in the database; best first"};
   Output<Image> roi_{this, "roi", "one pixel per search window, 255 where it passed"};
 
-  Param<std::string> database_{this, "database", "objects", "",
+  Param<std::string> database_{this, "database", "objects", kPath,
                                "folder with objects.txt and the reference views it names"};
   Choice bins_{this, "bins", "64x64x1", {"64x32x2", "64x64x1"}, "bins of hue x saturation x value"};
   Param<int> reference_{this, "reference", 48, {4, 254}, "px", "edge of the reference views"};

@@ -185,7 +185,7 @@ class StereoNode final : public Node {
   Param<bool> left_right_check_{this, "left_right_check", false, "",
                                 "reject where left and right disagree by over 1 px; doubles the time"};
   Param<int> cloud_step_{this, "cloud_step", 2, {1, 64}, "px", "distance of the pixels that become points"};
-  Param<std::string> calibration_{this, "calibration", "", "",
+  Param<std::string> calibration_{this, "calibration", "", kPath,
                                   "calibration file (M1 D1 M2 D2 R T image_size) for raw pairs"};
 
   int width_ = 0, height_ = 0, channels_ = 0;

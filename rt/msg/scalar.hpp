@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <string_view>
 
 #include "rt/msg/field.hpp"
 
@@ -33,6 +34,11 @@ auto visit_scalar(Scalar scalar, const std::byte* at, const Visit& visit) {
 inline size_t scalar_bytes(Scalar scalar) {
   constexpr std::byte none[sizeof(uint64_t)]{};
   return visit_scalar(scalar, none, [](auto value) { return sizeof value; });
+}
+
+constexpr std::string_view name_of(Scalar scalar) {
+  constexpr std::string_view names[]{"u8", "i16", "u16", "i32", "u32", "i64", "u64", "f32", "f64"};
+  return names[static_cast<size_t>(scalar)];
 }
 
 /// The Array at `at`, whatever it holds: every one begins alike.

@@ -243,6 +243,7 @@ void Executor::run_virtual(RunResult& result) {
       const int64_t relative = tasks_[lanes_[lane]->members()[a.member]]->plan().deadline_ns;
       events.insert({a.release_ns, a.release_ns + relative, lane, a.member});
     }
+    if (options_.after_job) options_.after_job();
   }
 }
 

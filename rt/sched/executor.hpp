@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <atomic>
+#include <functional>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -57,6 +58,7 @@ class Executor {
     StartGate* gate = nullptr;                 ///< where other processes are waited for
     std::vector<bool> own = {};                ///< by task: this process runs it; empty: all
     int64_t hang_patience_ns = 1'000'000'000;  ///< a job that has not returned this long after its deadline hangs
+    std::function<void()> after_job = {};      ///< virtual time: called after each job
     trace::Rings* trace = nullptr;             ///< where the threads that run jobs note events; null: nowhere
   };
 

@@ -105,10 +105,8 @@ void Latch::account(Edge& edge, size_t count, bool stale, int64_t now_ns) {
     ++edge.fresh.stale;
     ++stale_count_;
   }
-  edge.newest = {};
   if (count == 0) return;
   const auto& held = PortAccess::held(*edge.input);
-  edge.newest = {held[count - 1].sequence, held[count - 1].stamp_ns};
   edge.age_ns = now_ns - held[count - 1].stamp_ns;
   for (size_t i = 0; i < count; ++i) {
     if (held[i].sequence <= edge.last_seen) continue;

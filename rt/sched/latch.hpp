@@ -24,12 +24,6 @@ class Latch {
   void release();
   /// Counts what was latched since the last call: apart, so that counting stands in no job's way.
   void count();
-  /// The newest message that the last job latched from that edge; sequence 0: none.
-  struct Newest {
-    uint64_t sequence = 0;
-    int64_t stamp_ns = 0;
-  };
-  const Newest& newest(size_t edge) const { return edges_[edge].newest; }
   const EdgeStatistics& statistics(size_t edge) const { return *edges_[edge].statistics; }
 
  private:
@@ -43,7 +37,6 @@ class Latch {
     std::unique_ptr<Reader> reader;
     uint64_t last_seen = 0;
     bool joined = false, requests = false;
-    Newest newest;
     EdgeCounts fresh;         ///< not yet in the statistics
     int64_t age_ns = kNoAge;  ///< the same
     EdgeStatistics* statistics = nullptr;

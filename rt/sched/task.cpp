@@ -96,6 +96,7 @@ void Task::take_mail() {
   ParamMail& mail = board_.mail(index_);
   if (mail.state.load(std::memory_order_acquire) != ParamMail::posted) return;
   deliver(mail, *plan_.node);
+  if (trace::on() && mail.state.load(std::memory_order_relaxed) == ParamMail::taken) trace_param(mail);
 }
 
 JobEnd Task::run(uint64_t index, int64_t release_ns, int64_t modelled_ns) {
@@ -105,12 +106,12 @@ JobEnd Task::run(uint64_t index, int64_t release_ns, int64_t modelled_ns) {
 
   const Mode& mode = mode_of(release_ns);
 
-  take_mail();
   ended_ = {};
   ended_.index = index;
   ended_.release_ns = release_ns;
   ended_.started_ns = started;
   ended_.modelled = modelled;
+  take_mail();
   // Which releases a mode leaves out is known from outside, but for those that a producer causes.
   if (!mode.runs) return pass_over(started, !plan_.rate);
   latch_.acquire_requests(release_ns, started);
@@ -124,7 +125,10 @@ JobEnd Task::run(uint64_t index, int64_t release_ns, int64_t modelled_ns) {
   ended_.stale = latch_.acquire(release_ns, started);
   ended_.new_input = first_input_ != nullptr && first_input_->is_new();
   ended_.level = quality_.level();
-  if (trace::on()) trace_start();
+  if (trace::on()) {
+    trace_start();
+    trace_inputs();
+  }
   const CpuBudget cpu{plan_.budget_ns, last_thread_use_ns(), modelled ? nullptr : &thread_cpu_ns};
   Job job(clock_, index, release_ns, deadline, ended_.level, mode.name, cpu);
   work(job, release_ns);

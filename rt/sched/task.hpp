@@ -84,7 +84,9 @@ class Task {
   void take_mail();
   void publish(JobEnd& end, int64_t deadline_ns, bool modelled);
   void count_end();
+  void trace_param(const ParamMail& mail) const;
   void trace_start() const;
+  void trace_inputs() const;
   void trace_end() const;
   void ask_for_safe_stop(const char* why);
   void count_level(int64_t exec_ns, int64_t response_ns);

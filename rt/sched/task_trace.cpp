@@ -2,6 +2,10 @@
 // What a task notes where its thread is traced.
 #include <sched.h>
 
+#include <bit>
+#include <cstring>
+
+#include "rt/sched/port_access.hpp"
 #include "rt/sched/task.hpp"
 #include "rt/trace/rings.hpp"
 
@@ -13,6 +17,43 @@ void Task::trace_start() const {
   trace::record({ended_.release_ns, ended_.release_ns + plan_.deadline_ns, 0, job, task, trace::Kind::release, 0});
   trace::record({ended_.started_ns, 0, ended_.modelled ? 0 : sched_getcpu(), job, task, trace::Kind::start,
                  static_cast<uint8_t>(ended_.level)});
+}
+
+void Task::trace_param(const ParamMail& mail) const {
+  const auto note = [&](int64_t value) {
+    trace::record({ended_.started_ns, value, mail.kind, static_cast<uint32_t>(ended_.index),
+                   static_cast<uint16_t>(index_), trace::Kind::param, static_cast<uint8_t>(mail.param)});
+  };
+  switch (mail.kind) {
+    case ParamMail::number: return note(std::bit_cast<int64_t>(mail.real));
+    case ParamMail::flag:
+    case ParamMail::integer: return note(mail.whole);
+    case ParamMail::text: break;
+  }
+  for (size_t at = 0; at == 0 || std::memchr(mail.words.data() + at - 8, 0, 8) == nullptr; at += 8) {
+    int64_t piece = 0;
+    std::memcpy(&piece, mail.words.data() + at, sizeof piece);
+    note(piece);
+  }
+}
+
+void Task::trace_inputs() const {
+  const auto note = [&](trace::Kind kind, size_t edge, uint64_t value, int64_t extra) {
+    trace::record({ended_.started_ns, static_cast<int64_t>(value), extra, static_cast<uint32_t>(ended_.index),
+                   static_cast<uint16_t>(index_), kind, static_cast<uint8_t>(edge)});
+  };
+  for (size_t e = 0; e < plan_.edges.size(); ++e) {
+    InputPort& input = *plan_.node->inputs()[plan_.edges[e].input];
+    if (input.stale()) note(trace::Kind::stale, e, 0, 0);
+    const size_t count = PortAccess::held_count(input);
+    if (count == 0) continue;
+    const auto& held = PortAccess::held(input);
+    note(trace::Kind::latch, e, held[count - 1].sequence, held[count - 1].stamp_ns);
+    for (size_t from = 0, to = 1; count > 1 && from < count; from = to++) {
+      while (to < count && held[to].sequence == held[to - 1].sequence + 1) ++to;
+      note(trace::Kind::held, e, held[from].sequence, static_cast<int64_t>(to - from));
+    }
+  }
 }
 
 void Task::trace_skip(uint64_t index, int64_t release_ns) const {
@@ -27,17 +68,16 @@ void Task::trace_end() const {
     trace::record({at_ns, value, extra, static_cast<uint32_t>(ended_.index), static_cast<uint16_t>(index_), kind,
                    static_cast<uint8_t>(port)});
   };
-  for (size_t e = 0; e < plan_.edges.size(); ++e)
-    if (const Latch::Newest newest = latch_.newest(e); newest.sequence > 0)
-      note(trace::Kind::latch, ended_.started_ns, static_cast<int64_t>(newest.sequence), newest.stamp_ns, e);
   note(trace::Kind::finish, end.finished_ns, cpu_ns, ended_.cpu);
   if (plan_.budget_ns > 0 && cpu_ns > plan_.budget_ns)
     note(trace::Kind::overrun, end.finished_ns, cpu_ns, plan_.budget_ns);
   if (end.late) note(trace::Kind::miss, deadline_ns, ended_.published_ns - deadline_ns);
-  for (size_t i = 0; i < sequences_.size(); ++i)
+  for (size_t i = 0; i < sequences_.size(); ++i) {
     if (sent_stamps_ns_[i] != kNothingSent)
       note(trace::Kind::publish, ended_.published_ns, static_cast<int64_t>(sequences_[i]), sent_stamps_ns_[i], i);
-  note(trace::Kind::publish, ended_.published_ns, 0);
+    else if (published_[i]) note(trace::Kind::repeat, ended_.published_ns, static_cast<int64_t>(sequences_[i]), 0, i);
+  }
+  note(trace::Kind::publish, ended_.published_ns, 0, static_cast<int64_t>(trace::lost()));
 }
 
 }  // namespace takt

@@ -53,7 +53,7 @@ void assemble_jobs(const Recording& recording, Trace& trace) {
     const Event& event = noted.event;
     if (is_mark(event.kind))
       trace.marks.push_back({event.kind, event.at_ns, event.value, event.extra, event.job, event.task});
-    else add_to(jobs[{event.task, event.job}], noted);
+    else if (event.task != kNoTask) add_to(jobs[{event.task, event.job}], noted);
   }
   for (auto& [key, job] : jobs) {
     if (!job.started || !job.ended) continue;  // it never ended, or its beginning is lost

@@ -48,7 +48,7 @@ Collector::Collector(Rings& rings, Options options) : rings_(rings), options_(st
   recording_.source_note = why_not;
   recording_.first_ns = steal_read_ns_ = now_ns();
   steal_ticks_ = steal_ticks(options_.cpus);
-  thread_ = std::thread([this] { collect(); });
+  if (!options_.by_caller) thread_ = std::thread([this] { collect(); });
 }
 
 Collector::~Collector() {
@@ -58,7 +58,8 @@ Collector::~Collector() {
 
 Recording Collector::finish() {
   ended_.store(true);
-  thread_.join();
+  if (options_.by_caller) drain();
+  else thread_.join();
   recording_.last_ns = now_ns();
   if (source_) {
     source_->finish(recording_.last_ns, recording_.switches);
@@ -84,7 +85,10 @@ void Collector::collect() {
 void Collector::drain() {
   follow_new_threads();
   for (size_t i = 0; i < recording_.threads.size(); ++i)
-    rings_.ring(i).drain([&](const Event& event) { recording_.events.push_back({recording_.threads[i].id, event}); });
+    rings_.ring(i).drain([&, thread = recording_.threads[i].id](const Event& event) {
+      if (options_.listener) options_.listener(thread, event);
+      recording_.events.push_back({thread, event});
+    });
   if (source_) source_->drain(recording_.switches);
   if (const int64_t now = now_ns(); now - steal_read_ns_ >= kStealPeriodNs) read_steal(now);
   keep_within_limit();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <atomic>
+#include <functional>
 #include <thread>
 
 #include "rt/trace/rings.hpp"
@@ -33,6 +34,9 @@ class Collector {
     std::vector<int> cpus = {};       ///< whose switches are recorded
     Source best = Source::tracefs;    ///< nothing better is tried
     size_t records_kept = 4'000'000;  ///< of each kind, about 160 MB; beyond that the oldest go, counted
+    bool by_caller = false;           ///< virtual time: events are taken in drain() only, on the caller's thread
+    /// Hears every event as it is taken, thread and event.
+    std::function<void(int32_t, const Event&)> listener = {};
   };
   /// In the process that outlives the others, after they were forked. Opens the best source that is granted.
   Collector(Rings& rings, Options options);
@@ -40,12 +44,13 @@ class Collector {
   Collector(const Collector&) = delete;
   Collector& operator=(const Collector&) = delete;
 
+  /// Empties the rings now. Only with `by_caller`.
+  void drain();
   /// Ends collecting. Once.
   Recording finish();
 
  private:
   void collect();
-  void drain();
   void follow_new_threads();
   void read_steal(int64_t now_ns);
   void keep_within_limit();

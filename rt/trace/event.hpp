@@ -5,7 +5,23 @@
 
 namespace takt::trace {
 
-enum class Kind : uint8_t { release, latch, start, finish, publish, miss, skip, overrun, level, mode };
+enum class Kind : uint8_t {
+  release,
+  latch,
+  start,
+  finish,
+  publish,
+  miss,
+  skip,
+  overrun,
+  level,
+  mode,
+  held,
+  stale,
+  repeat,
+  answer,
+  param
+};
 
 /// One event of one job. `value` and `extra` by kind:
 ///
@@ -20,9 +36,16 @@ enum class Kind : uint8_t { release, latch, start, finish, publish, miss, skip, 
 /// | overrun | end of run()      | CPU time, ns      | budget, ns         | -               |
 /// | level   | change            | new level         | -                  | -               |
 /// | mode    | change            | number of mode    | -                  | -, and no task  |
+/// | held    | start             | first sequence    | how many           | index of edge   |
+/// | stale   | start             | -                 | -                  | index of edge   |
+/// | repeat  | publication       | sequence          | -                  | index of output |
+/// | answer  | -                 | answer            | Question           | -, and no task  |
+/// | param   | start             | 8 bytes of value  | ParamMail::Kind    | index           |
 ///
-/// Instants are CLOCK_MONOTONIC, ns. Every finished job gives one `publish` for its end, sequence 0 if nothing was
-/// sent.
+/// Instants are CLOCK_MONOTONIC, ns. `latch` tells the newest message of an edge, `held` each run of consecutive ones
+/// where there are several. Every finished job gives one more `publish` for its end, with sequence 0 and as `extra` the
+/// events that its thread has lost so far: none may lack between two of them. What a job was given (`param` before its
+/// release) comes first, then its answers, then the rest. A text is as many `param` events as it fills, to its final 0.
 struct Event {
   int64_t at_ns = 0, value = 0, extra = 0;
   uint32_t job = 0;

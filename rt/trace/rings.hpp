@@ -40,6 +40,9 @@ inline constinit thread_local Ring* thread_ring = nullptr;
 /// True if the calling thread is traced.
 inline bool on() { return detail::thread_ring != nullptr; }
 
+/// Events that the calling thread found no room for.
+inline uint64_t lost() { return on() ? detail::thread_ring->lost() : 0; }
+
 /// Notes an event if the calling thread is traced. No lock, no allocation, no system call.
 inline void record(const Event& event) {
   if (Ring* ring = detail::thread_ring) ring->push(event);

@@ -168,19 +168,26 @@ tl::expected<std::vector<std::byte>, std::string> Reader::unpack(const Chunk& ch
   return records;
 }
 
+tl::expected<bool, std::string> Reader::for_each_in(Bytes records, const std::function<bool(const Message&)>& each) {
+  try {
+    for (ByteReader rest(records); rest.left() > 0;) {
+      const auto op = static_cast<Op>(rest.number<uint8_t>());
+      const Bytes fields = rest.bytes(rest.number<uint64_t>());
+      if (op == Op::message && !each(get_message(fields))) return false;
+    }
+  } catch (const TooShort& problem) {
+    return tl::unexpected(std::string(problem.what()));
+  }
+  return true;
+}
+
 tl::expected<void, std::string> Reader::for_each(const std::function<bool(const Message&)>& each) const {
   for (const Chunk& chunk : chunks_) {
     const auto records = unpack(chunk);
     if (!records) return tl::unexpected(records.error());
-    try {
-      for (ByteReader rest(*records); rest.left() > 0;) {
-        const auto op = static_cast<Op>(rest.number<uint8_t>());
-        const Bytes fields = rest.bytes(rest.number<uint64_t>());
-        if (op == Op::message && !each(get_message(fields))) return {};
-      }
-    } catch (const TooShort& problem) {
-      return tl::unexpected("the chunk at byte " + std::to_string(chunk.at) + ": " + problem.what());
-    }
+    const auto go_on = for_each_in(*records, each);
+    if (!go_on) return tl::unexpected("the chunk at byte " + std::to_string(chunk.at) + ": " + go_on.error());
+    if (!*go_on) break;
   }
   return {};
 }

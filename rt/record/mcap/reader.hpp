@@ -49,6 +49,10 @@ class Reader {
   /// The records of a chunk. Error: damaged, or compressed in a way this build does not know.
   tl::expected<std::vector<std::byte>, std::string> unpack(const Chunk& chunk) const;
 
+  /// Every message among the records of a chunk; stops if `each` answers false, and then answers so. The data lies in
+  /// `records`. Error: they end too early.
+  static tl::expected<bool, std::string> for_each_in(Bytes records, const std::function<bool(const Message&)>& each);
+
   /// Every message, in the order of the file; stops if `each` answers false. The data is valid during the call. Error:
   /// a chunk that is damaged; the messages before it were given.
   tl::expected<void, std::string> for_each(const std::function<bool(const Message&)>& each) const;

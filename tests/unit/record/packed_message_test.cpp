@@ -23,7 +23,7 @@ class Placed {
   explicit Placed(const Capacity& capacity, int poison = 0) {
     const MessageType& type = MessageType::of<T>();
     const size_t bytes = (type.bytes(capacity) + 63) / 64 * 64;
-    memory_.reset(static_cast<std::byte*>(::operator new(bytes, std::align_val_t{64})));
+    memory_.reset(static_cast<std::byte*>(::operator new (bytes, std::align_val_t{64})));
     std::memset(memory_.get(), poison, bytes);
     type.place(memory_.get(), capacity);
   }
@@ -38,7 +38,7 @@ class Placed {
 
  private:
   struct Free {
-    void operator()(std::byte* memory) const { ::operator delete(memory, std::align_val_t{64}); }
+    void operator()(std::byte* memory) const { ::operator delete (memory, std::align_val_t{64}); }
   };
   std::unique_ptr<std::byte, Free> memory_;
 };

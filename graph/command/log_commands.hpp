@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <CLI/CLI.hpp>
+#include <filesystem>
+
+namespace takt::command {
+
+struct LogOptions {
+  std::filesystem::path file, other;
+  bool json = false;
+};
+
+/// `takt log info FILE`: what a record holds and lacks. Exit 0, 2 if it is none.
+int log_info(const LogOptions& options);
+/// `takt log diff A B`. Exit 0 if they hold the same, 1 if not, 2 if one is no record.
+int log_diff(const LogOptions& options);
+
+void add_log(CLI::App& app, LogOptions& options, int& exit_code);
+
+}  // namespace takt::command

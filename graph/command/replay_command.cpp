@@ -1,0 +1,241 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "graph/command/replay_command.hpp"
+
+#include <fmt/format.h>
+#include <hwy/highway.h>
+
+#include <cstdio>
+#include <ctime>
+#include <fstream>
+#include <iterator>
+#include <optional>
+#include <sstream>
+
+#include "graph/command/prepare.hpp"
+#include "graph/command/run_support.hpp"
+#include "graph/compose/composition.hpp"
+#include "graph/log/recorded_plan.hpp"
+#include "rt/record/replayer.hpp"
+#include "takt_commit.hpp"
+
+namespace takt::command {
+namespace {
+
+using log::Json;
+
+/// Ends the command with a reason.
+struct Refused {
+  std::string why;
+};
+
+std::string fact(const mcap::Metadata& facts, const std::string& name) {
+  const auto found = facts.find(name);
+  return found == facts.end() ? "" : found->second;
+}
+
+std::string text_of(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+Json attached_json(const record::LogFile& file, const char* name) {
+  const auto text = file.attached(name);
+  Json json = text ? Json::parse(*text, nullptr, false) : Json();
+  if (json.is_discarded() || !json.is_object()) throw Refused{fmt::format("the record holds no readable {}", name)};
+  return json;
+}
+
+/// The outputs of the devices as the record has them; everything else is made here.
+class RecordedCapacities final : public graph::CapacityExchange {
+ public:
+  explicit RecordedCapacities(const Json& plan) : plan_(plan) {}
+  void tell(size_t, const Capacity&) override {}
+  Capacity wait_for(size_t port) override { return log::capacity_of(plan_, port); }
+
+ private:
+  const Json& plan_;
+};
+
+/// SIMD code of another width may round differently: the target of the record, or none.
+void force_simd(const std::string& recorded) {
+  const int64_t best = hwy::SupportedTargets() & -hwy::SupportedTargets();
+  if (recorded.empty() || recorded == hwy::TargetName(best)) return;
+  for (int64_t left = hwy::SupportedTargets(); left != 0; left &= left - 1) {
+    const int64_t target = left & -left;
+    if (recorded != hwy::TargetName(target)) continue;
+    hwy::DisableTargets(target - 1);  // a lower bit is a better target
+    std::fprintf(stderr, "takt: SIMD target %s as in the record, not this machine's %s\n", recorded.c_str(),
+                 hwy::TargetName(best));
+    return;
+  }
+  throw Refused{fmt::format("the record was made with the SIMD target {}, which this CPU (best: {}) does not have",
+                            recorded, hwy::TargetName(best))};
+}
+
+class Replay {
+ public:
+  explicit Replay(const ReplayOptions& options) : options_(options) {}
+
+  int run() {
+    auto file = record::LogFile::open(options_.log);
+    if (!file) throw Refused{file.error()};
+    file_.emplace(std::move(*file));
+    for (const std::string& damage : file_->damages())
+      std::fprintf(stderr, "takt: the record is not whole: %s\n", damage.c_str());
+    force_simd(fact(file_->facts(), "simd"));
+    if (const int code = compose(); code != kOk) return code;
+    check_sameness();
+    const record::ReplayResult result = replay();
+    for (const TaskPlan& task : prepared_.composition->plan.tasks)
+      if (!task.device) task.node->finish();
+    return tell(result);
+  }
+
+ private:
+  int compose() {
+    const mcap::Metadata& facts = file_->facts();
+    RunOptions run;
+    run.graph = options_.graph.empty() ? std::filesystem::path(fact(facts, "graph")) : options_.graph;
+    if (!std::filesystem::exists(run.graph))
+      throw Refused{fmt::format("the graph {} of the record is not there; name it: takt replay {} GRAPH",
+                                run.graph.string(), options_.log.string())};
+    if (options_.graph.empty()) run.load.schedule = fact(facts, "schedule");
+    run.load.profile = fact(facts, "profile");
+    run.load.mode = fact(facts, "mode");
+    run.load.policy = fact(facts, "policy_option");
+    std::istringstream settings(fact(facts, "set"));
+    for (std::string line; std::getline(settings, line);) run.load.set.push_back(line);
+    run.clock = fact(facts, "clock");
+    run.output = options_.output;
+    run.seed = std::strtoull(fact(facts, "seed").c_str(), nullptr, 10);
+    recorded_ = attached_json(*file_, "plan.json");
+    int code = load(run, prepared_);
+    if (code == kOk) {
+      RecordedCapacities capacities(recorded_);
+      graph::ComposeOptions how;
+      how.output = options_.output;
+      how.seed = run.seed;
+      how.exchange = &capacities;
+      how.owns = [&](const std::string& id) {
+        return std::none_of(prepared_.graph->devices.begin(), prepared_.graph->devices.end(),
+                            [&](const graph::DeviceSpec& device) { return device.id == id; });
+      };
+      code = command::compose(run, how, prepared_);
+    }
+    if (code != kOk) tell_problems(prepared_.problems.size());
+    return code;
+  }
+
+  /// Says what is not as it was; throws where that makes a replay impossible.
+  void check_sameness() {
+    const graph::GraphSpec& graph = *prepared_.graph;
+    const Json plan = log::plan_json(prepared_.composition->plan);
+    if (const auto differs = log::structure_differs(recorded_, plan))
+      throw Refused{"this graph cannot run the jobs of the record: " + *differs};
+    const Json assets = attached_json(*file_, "assets.json");
+    const Json hashes = log::asset_hashes(prepared_.composition->plan, graph.directory);
+    for (const auto& [path, hash] : assets.items())
+      if (hashes.value(path, "") != hash)
+        throw Refused{fmt::format("{} is not what it was when the record was made", (graph.directory / path).string())};
+    if (text_of(graph.file) != file_->attached("graph.yaml"))
+      std::fprintf(stderr, "takt: %s has changed since the record was made\n", graph.file.c_str());
+    for (const std::string& param : log::changed_params(recorded_, plan))
+      std::fprintf(stderr, "takt: %s\n", param.c_str());
+    if (fact(file_->facts(), "program") != log::file_hash("/proc/self/exe"))
+      std::fprintf(stderr, "takt: this is another program (commit %s) than the one that recorded (commit %s)\n",
+                   TAKT_COMMIT, fact(file_->facts(), "commit").c_str());
+  }
+
+  record::ReplayResult replay() {
+    const int64_t epoch_ns = this->epoch_ns();
+    for (const TaskPlan& task : prepared_.composition->plan.tasks)
+      if (!task.device) task.node->start(epoch_ns);
+    record::Replayer::Options how;
+    if (options_.from_s > 0) how.from_ns = epoch_ns + static_cast<int64_t>(options_.from_s * 1e9);
+    if (options_.recorded_pace) how.pace = pace(how.from_ns);
+    record::Replayer replayer(prepared_.composition->plan, *file_, how);
+    const int64_t before_ns = clock_.now_ns();
+    auto result = replayer.run([] { return StopOnSignal::asked(); });
+    took_ns_ = clock_.now_ns() - before_ns;
+    return result;
+  }
+
+  /// That of the run; of a record without an end, the first release.
+  int64_t epoch_ns() const {
+    if (const std::string told = fact(file_->end(), "epoch_ns"); !told.empty())
+      return std::strtoll(told.c_str(), nullptr, 10);
+    int64_t first = INT64_MAX;
+    for (const record::RecordedJob& job : file_->jobs()) first = std::min(first, job.release_ns);
+    return first == INT64_MAX ? 0 : first;
+  }
+
+  /// Waits until as much time has passed as in the record; what was before `from_ns` is not waited for.
+  std::function<void(int64_t)> pace(int64_t from_ns) const {
+    return [this, from_ns, origin_ns = int64_t{0}](int64_t release_ns) mutable {
+      if (release_ns < from_ns) return;
+      if (origin_ns == 0) origin_ns = clock_.now_ns() - release_ns;
+      const int64_t until_ns = origin_ns + release_ns;
+      const timespec until{until_ns / 1'000'000'000, until_ns % 1'000'000'000};
+      while (!StopOnSignal::asked() && clock_.now_ns() < until_ns)
+        clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr);
+    };
+  }
+
+  int tell(const record::ReplayResult& result) const {
+    const double recorded_s = static_cast<double>(result.recorded_ns) / 1e9;
+    const double took_s = static_cast<double>(took_ns_) / 1e9;
+    fmt::print("replayed {} jobs of {} nodes, {:.1f} s in {:.1f} s ({:.1f}x real time)\n", result.jobs,
+               prepared_.graph->nodes.size(), recorded_s, took_s, took_s > 0 ? recorded_s / took_s : 0.0);
+    if (result.lacking > 0) fmt::print("{} jobs were not run: the record lost what they were given\n", result.lacking);
+    if (!options_.compare) return result.lacking > 0 ? kNotOk : kOk;
+    fmt::print("compared {} of {} messages: {} field by field, {} by hash; {} differ\n", result.compared,
+               result.messages, result.whole, result.compared - result.whole, result.different);
+    if (result.first) {
+      const record::Divergence& first = *result.first;
+      fmt::print("first difference: {}{}{}, job {} (released {:.3f} s after the epoch): {}\n", first.node,
+                 first.port.empty() ? "" : ".", first.port, first.job,
+                 static_cast<double>(first.release_ns - epoch_ns()) / 1e9, first.what);
+      for (const auto& [node, count] : result.different_of) fmt::print("  {}: {} differ\n", node, count);
+    }
+    return result.different + result.lacking > 0 ? kNotOk : kOk;
+  }
+
+  const ReplayOptions& options_;
+  MonotonicClock clock_;
+  std::optional<record::LogFile> file_;
+  Json recorded_;
+  Prepared prepared_;
+  int64_t took_ns_ = 0;
+};
+
+}  // namespace
+
+int replay(const ReplayOptions& options) {
+  std::error_code error;
+  std::filesystem::create_directories(options.output, error);
+  if (error)
+    return refuse(fmt::format("--output {}: {}; choose a writable folder", options.output.string(), error.message()),
+                  kBadInput);
+  const StopOnSignal guard;
+  try {
+    return Replay(options).run();
+  } catch (const Refused& refused) {
+    return refuse(refused.why, kBadInput);
+  } catch (const Json::exception& problem) {
+    return refuse(fmt::format("{}: what it says of its graph cannot be read: {}", options.log.string(), problem.what()),
+                  kBadInput);
+  }
+}
+
+void add_replay(CLI::App& app, ReplayOptions& o, int& exit_code) {
+  CLI::App* replay = app.add_subcommand("replay", "runs the jobs of a record again, with what they were given");
+  replay->add_option("log", o.log, "what `takt run --record` wrote")->required();
+  replay->add_option("graph", o.graph, "graph file instead of that of the record");
+  replay->add_flag("--compare", o.compare, "bit by bit with the record; exit 1 on the first message that differs");
+  replay->add_option("--from", o.from_s, "tells and paces only what was released so many seconds into the run");
+  replay->add_flag("--recorded-pace", o.recorded_pace, "as fast as it was, instead of as fast as possible");
+  replay->add_option("--output", o.output, "folder for pictures and other results (default out)");
+  replay->callback([&] { exit_code = command::replay(o); });
+}
+
+}  // namespace takt::command

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+namespace takt::command {
+
+struct ReplayOptions {
+  std::filesystem::path log;
+  std::filesystem::path graph;  ///< empty: that of the record
+  std::filesystem::path output = "out";
+  bool compare = false, recorded_pace = false;
+  double from_s = 0;  ///< since the epoch of the run
+};
+
+/// `takt replay LOG [GRAPH]`: runs every job of a record again, with the inputs and answers that it had. Exit 1 if
+/// --compare finds a message that is not bit by bit the recorded one, or the record lacks what a job was given; 2 if
+/// the record, its graph or a file that the graph names cannot be used.
+int replay(const ReplayOptions& options);
+
+void add_replay(CLI::App& app, ReplayOptions& options, int& exit_code);
+
+}  // namespace takt::command

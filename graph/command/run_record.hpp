@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+
+#include "graph/command/run_command.hpp"
+#include "graph/compose/plan_ports.hpp"
+#include "rt/record/mcap/file_sink.hpp"
+#include "rt/record/recorder.hpp"
+#include "rt/sched/executor.hpp"
+
+namespace takt::command {
+
+/// Who reads the outputs of a run beside its edges: `takt echo`, and the recorder if there is one.
+graph::Observers observers(const RunOptions& options);
+
+/// The record of a run, if one was asked for (`--record`); else every call does nothing.
+class RunRecord {
+ public:
+  explicit RunRecord(const RunOptions& options) : options_(options) {}
+  bool wanted() const { return !options_.record.empty(); }
+  /// Before the first job, once the ports have their memory. Throws std::runtime_error if the file cannot be made.
+  void begin(const graph::GraphSpec& graph, const Plan& plan, const RunBoard& board, Transport& transport,
+             const std::string& isolation);
+  void take(int32_t thread, const trace::Event& event) {
+    if (recorder_) recorder_->take(thread, event);
+  }
+  /// Virtual time: after every job.
+  void capture() {
+    if (recorder_) recorder_->capture();
+  }
+  /// After the last event was taken. Adds "record" and "recorder_lost" to the report.
+  void finish(const RunResult& result);
+  void tell(nlohmann::ordered_json& report) const;
+
+ private:
+  const RunOptions& options_;
+  std::optional<mcap::FileSink> file_;
+  std::unique_ptr<record::Recorder> recorder_;
+  record::RecordResult written_;
+};
+
+}  // namespace takt::command

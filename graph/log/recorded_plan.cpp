@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "graph/log/recorded_plan.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+#include <map>
+
+#include "rt/node.hpp"
+#include "rt/record/message_record.hpp"
+
+namespace takt::log {
+namespace {
+
+Json task_json(const Plan& plan, const TaskPlan& task) {
+  Json edges = Json::array(), outputs = Json::array(), params = Json::object();
+  for (const EdgePlan& edge : task.edges)
+    edges.push_back({{"input", task.node->inputs()[edge.input]->name()},
+                     {"from", plan.ports[edge.port].node + "." + plan.ports[edge.port].port},
+                     {"depth", edge.depth}});
+  for (const size_t port : task.ports) outputs.push_back(plan.ports[port].port);
+  for (const ParamBase* param : task.node->params()) params[std::string(param->name())] = param->value_text();
+  return {{"name", task.name}, {"device", task.device}, {"edges", edges}, {"outputs", outputs}, {"params", params}};
+}
+
+std::string text_of(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+std::string hash_text(const std::string& text) {
+  return fmt::format("{:016x}", record::hash_of(std::as_bytes(std::span(text.data(), text.size()))));
+}
+
+std::string folder_hash(const std::filesystem::path& folder) {
+  std::map<std::string, std::string> files;  // in an order that does not depend on the file system
+  std::error_code error;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder, error))
+    if (entry.is_regular_file(error)) files[entry.path().lexically_relative(folder).string()] = file_hash(entry.path());
+  std::string all;
+  for (const auto& [name, hash] : files) all += name + " " + hash + "\n";
+  return hash_text(all);
+}
+
+/// The task without what may differ.
+Json structure_of(Json task) {
+  task.erase("params");
+  return task;
+}
+
+}  // namespace
+
+Json plan_json(const Plan& plan) {
+  Json tasks = Json::array(), ports = Json::array(), modes = Json::array();
+  for (const TaskPlan& task : plan.tasks) tasks.push_back(task_json(plan, task));
+  for (const PortPlan& port : plan.ports)
+    ports.push_back(
+        {{"name", port.node + "." + port.port},
+         {"type", port.type->name},
+         {"capacity", {port.capacity.width, port.capacity.height, port.capacity.channels, port.capacity.count}}});
+  for (const ModePlan& mode : plan.modes) modes.push_back(mode.name);
+  return {{"tasks", tasks}, {"ports", ports}, {"mode", plan.mode}, {"modes", modes}};
+}
+
+std::optional<std::string> structure_differs(const Json& recorded, const Json& plan) {
+  for (const char* list : {"tasks", "ports"}) {
+    const Json &then = recorded.at(list), &now = plan.at(list);
+    for (size_t i = 0; i < std::min(then.size(), now.size()); ++i)
+      if (structure_of(then[i]) != structure_of(now[i]))
+        return fmt::format("{} in the record is {}, in the graph {}", then[i].at("name").get<std::string>(),
+                           structure_of(then[i]).dump(), structure_of(now[i]).dump());
+    if (then.size() != now.size())
+      return fmt::format("the record has {} {}, the graph {}", then.size(), list, now.size());
+  }
+  if (recorded.at("modes") != plan.at("modes") || recorded.at("mode") != plan.at("mode"))
+    return fmt::format("the modes of the record are {}, those of the graph {}", recorded.at("modes").dump(),
+                       plan.at("modes").dump());
+  return std::nullopt;
+}
+
+std::vector<std::string> changed_params(const Json& recorded, const Json& plan) {
+  std::vector<std::string> changed;
+  for (size_t t = 0; t < plan.at("tasks").size(); ++t) {
+    const Json &then = recorded.at("tasks")[t].at("params"), &now = plan.at("tasks")[t].at("params");
+    for (const auto& [name, value] : now.items()) {
+      const std::string before = then.value(name, "nothing");
+      if (value == before) continue;
+      changed.push_back(fmt::format("{}.{} is {} instead of {}", plan.at("tasks")[t].at("name").get<std::string>(),
+                                    name, value.get<std::string>(), before));
+    }
+  }
+  return changed;
+}
+
+Capacity capacity_of(const Json& recorded, size_t index) {
+  const Json& numbers = recorded.at("ports").at(index).at("capacity");
+  return {numbers.at(0), numbers.at(1), numbers.at(2), numbers.at(3)};
+}
+
+Json asset_hashes(const Plan& plan, const std::filesystem::path& directory) {
+  Json hashes = Json::object();
+  std::error_code error;
+  for (const TaskPlan& task : plan.tasks) {
+    for (const ParamBase* param : task.node->params()) {
+      if (param->unit() != kPath || param->value_text().empty()) continue;
+      const auto path = directory / param->value_text();
+      if (std::filesystem::is_directory(path, error)) hashes[param->value_text()] = folder_hash(path);
+      else if (std::filesystem::is_regular_file(path, error)) hashes[param->value_text()] = file_hash(path);
+    }
+  }
+  return hashes;
+}
+
+std::string file_hash(const std::filesystem::path& file) { return hash_text(text_of(file)); }
+
+}  // namespace takt::log

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a record says of the graph it was made of, beside the text of its files: enough to see whether a graph of today
+// is still the same one.
+#pragma once
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "rt/sched/plan.hpp"
+
+namespace takt::log {
+
+using Json = nlohmann::ordered_json;
+
+/// Tasks with edges, outputs and parameters, ports with types and capacities, modes.
+Json plan_json(const Plan& plan);
+
+/// Why jobs of the recorded plan cannot be run by this one: the first thing in which they differ, parameters apart.
+/// Nothing if they can.
+std::optional<std::string> structure_differs(const Json& recorded, const Json& plan);
+
+/// Parameters that are not as they were: "stereo.window is 9 instead of 15".
+std::vector<std::string> changed_params(const Json& recorded, const Json& plan);
+
+/// Capacity of port `index` in a recorded plan. Throws nlohmann's exception if the record does not say.
+Capacity capacity_of(const Json& recorded, size_t index);
+
+/// Hash of each file or folder that a parameter of the plan's nodes names (kPath), as hexadecimal digits, by the path
+/// as it stands there. A folder is all files below it, by name.
+Json asset_hashes(const Plan& plan, const std::filesystem::path& directory);
+
+/// Hash of a file, as hexadecimal digits; empty if it cannot be read.
+std::string file_hash(const std::filesystem::path& file);
+
+}  // namespace takt::log

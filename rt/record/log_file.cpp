@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "rt/record/log_file.hpp"
+
+#include <algorithm>
+
+#include "rt/record/recorder.hpp"
+
+namespace takt::record {
+
+tl::expected<LogFile, std::string> LogFile::open(const std::filesystem::path& file) {
+  auto container = mcap::Reader::open(file);
+  if (!container) return tl::make_unexpected(container.error());
+  LogFile log(std::move(*container));
+  for (const auto& named : log.container_.metadata()) {
+    if (named.name == Recorder::kFacts) log.facts_ = named.map;
+    if (named.name == Recorder::kEnd) log.end_ = named.map;
+  }
+  if (log.facts_.empty()) return tl::make_unexpected(file.string() + " is no record of takt run --record");
+  log.jobs_channel_ = log.channel(Recorder::kJobs);
+  log.index();
+  return log;
+}
+
+void LogFile::index() {
+  if (!container_.missing().empty()) damages_.push_back(container_.missing());
+  const std::vector<mcap::Chunk>& chunks = container_.chunks();
+  for (uint32_t number = 0; number < chunks.size(); ++number) {
+    const auto records = container_.unpack(chunks[number]);
+    if (!records) {
+      damages_.push_back(records.error());
+      continue;
+    }
+    const auto walked = mcap::Reader::for_each_in(*records, [&](const mcap::Message& message) {
+      const auto offset = static_cast<uint64_t>(message.data.data() - records->data());
+      index(message, {0, 0, false, number, static_cast<uint32_t>(message.data.size()), offset});
+      return true;
+    });
+    if (!walked) damages_.push_back("chunk " + std::to_string(number) + ": " + walked.error());
+  }
+}
+
+void LogFile::index(const mcap::Message& message, Known known) {
+  if (message.channel == jobs_channel_) {
+    auto job = unpack_job(message.data);
+    if (job) jobs_.push_back(std::move(*job));
+    else damages_.push_back("a job: " + job.error());
+    return;
+  }
+  const auto record = unpack_message(message.data);
+  if (!record) {
+    damages_.push_back("a message: " + record.error());
+    return;
+  }
+  known.stamp_ns = record->stamp_ns;
+  known.hash = record->hash;
+  known.whole = record->whole;
+  messages_[message.channel][record->sequence] = known;
+}
+
+std::optional<std::string_view> LogFile::attached(std::string_view name) const {
+  for (const mcap::Attachment& attachment : container_.attachments())
+    if (attachment.name == name)
+      return std::string_view(reinterpret_cast<const char*>(attachment.data.data()), attachment.data.size());
+  return std::nullopt;
+}
+
+uint16_t LogFile::channel(std::string_view port) const {
+  for (const mcap::Channel& channel : container_.channels())
+    if (channel.topic == port) return channel.id;
+  return 0;
+}
+
+const std::map<uint64_t, LogFile::Known>& LogFile::messages(uint16_t channel) const {
+  static const std::map<uint64_t, Known> none;
+  const auto found = messages_.find(channel);
+  return found == messages_.end() ? none : found->second;
+}
+
+const std::vector<std::byte>* LogFile::chunk(uint32_t number) {
+  if (const auto there = unpacked_.find(number); there != unpacked_.end()) return &there->second;
+  auto records = container_.unpack(container_.chunks()[number]);
+  if (!records) return nullptr;
+  if (order_.size() == kChunksKept) {
+    unpacked_.erase(order_.front());
+    order_.pop_front();
+  }
+  order_.push_back(number);
+  return &(unpacked_[number] = std::move(*records));
+}
+
+std::optional<MessageRecord> LogFile::message(uint16_t channel, uint64_t sequence) {
+  const std::map<uint64_t, Known>& all = messages(channel);
+  const auto known = all.find(sequence);
+  if (known == all.end()) return std::nullopt;
+  const std::vector<std::byte>* records = chunk(known->second.chunk);
+  if (records == nullptr) return std::nullopt;
+  const auto record =
+      unpack_message(std::span(*records).subspan(static_cast<size_t>(known->second.offset), known->second.size));
+  return record ? std::optional(*record) : std::nullopt;
+}
+
+}  // namespace takt::record

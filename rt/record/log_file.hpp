@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <deque>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <tl/expected.hpp>
+#include <unordered_map>
+#include <vector>
+
+#include "rt/record/mcap/reader.hpp"
+#include "rt/record/message_record.hpp"
+#include "rt/record/recorded_job.hpp"
+
+namespace takt::record {
+
+/// A record that was opened: what the Recorder wrote, found by port and sequence. One thread at a time.
+class LogFile {
+ public:
+  /// Error: not a record of Takt, or not readable. One that lacks its end is opened as far as it goes.
+  static tl::expected<LogFile, std::string> open(const std::filesystem::path& file);
+
+  const mcap::Reader& container() const { return container_; }
+  /// What the head and the end of the record state; empty without an end.
+  const mcap::Metadata& facts() const { return facts_; }
+  const mcap::Metadata& end() const { return end_; }
+  /// An attachment as text; nothing if there is none of that name.
+  std::optional<std::string_view> attached(std::string_view name) const;
+
+  /// In the order of the file.
+  const std::vector<RecordedJob>& jobs() const { return jobs_; }
+  /// Channel of "NODE.PORT"; 0 if the record has none.
+  uint16_t channel(std::string_view port) const;
+  /// A message that is there, without its fields.
+  struct Known {
+    int64_t stamp_ns = 0;
+    uint64_t hash = 0;
+    bool whole = false;
+    uint32_t chunk = 0, size = 0;  ///< where it lies: bytes at `offset` among the records of the chunk
+    uint64_t offset = 0;
+  };
+  /// Of a channel by sequence; empty if there is none.
+  const std::map<uint64_t, Known>& messages(uint16_t channel) const;
+  /// Nothing if it is not there. Its data is valid until the next call.
+  std::optional<MessageRecord> message(uint16_t channel, uint64_t sequence);
+  /// What is damaged or missing in the file; empty if it is whole.
+  const std::vector<std::string>& damages() const { return damages_; }
+
+ private:
+  explicit LogFile(mcap::Reader container) : container_(std::move(container)) {}
+  void index();
+  void index(const mcap::Message& message, Known known);
+  const std::vector<std::byte>* chunk(uint32_t number);
+
+  mcap::Reader container_;
+  mcap::Metadata facts_, end_;
+  uint16_t jobs_channel_ = 0;
+  std::vector<RecordedJob> jobs_;
+  std::map<uint16_t, std::map<uint64_t, Known>> messages_;  ///< by channel and sequence
+  std::vector<std::string> damages_;
+  static constexpr size_t kChunksKept = 48;
+  std::unordered_map<uint32_t, std::vector<std::byte>> unpacked_;
+  std::deque<uint32_t> order_;  ///< of the chunks in hand, oldest first
+};
+
+}  // namespace takt::record

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "rt/record/message_record.hpp"
+
+#include <xxhash.h>
+
+#include "rt/msg/scalar.hpp"
+#include "rt/record/mcap/bytes.hpp"
+
+namespace takt::record {
+
+uint64_t hash_of(std::span<const std::byte> packed) { return XXH3_64bits(packed.data(), packed.size()); }
+
+void pack(const MessageType& type, const Held& held, bool whole, std::vector<std::byte>& scratch,
+          std::vector<std::byte>& to) {
+  scratch.clear();
+  scratch.reserve(packed_bytes(type, held.message()));
+  pack(type, held.message(), scratch);
+  mcap::ByteWriter out(to);
+  out.number(held.header->sequence);
+  out.number(static_cast<uint64_t>(held.header->stamp_ns));
+  out.number(static_cast<uint64_t>(held.header->published_ns));
+  out.number(static_cast<uint64_t>(held.header->visible_at_ns));
+  out.number(static_cast<uint32_t>(held.header->level));
+  out.number(static_cast<uint8_t>(whole));
+  out.number(hash_of(scratch));
+  if (whole) out.bytes(scratch);
+}
+
+tl::expected<MessageRecord, std::string> unpack_message(std::span<const std::byte> packed) {
+  MessageRecord record;
+  mcap::ByteReader in(packed);
+  try {
+    record.sequence = in.number<uint64_t>();
+    record.stamp_ns = static_cast<int64_t>(in.number<uint64_t>());
+    record.published_ns = static_cast<int64_t>(in.number<uint64_t>());
+    record.visible_at_ns = static_cast<int64_t>(in.number<uint64_t>());
+    record.level = static_cast<int32_t>(in.number<uint32_t>());
+    record.whole = in.number<uint8_t>() != 0;
+    record.hash = in.number<uint64_t>();
+    record.data = in.bytes(in.left());
+  } catch (const mcap::TooShort& problem) {
+    return tl::make_unexpected(std::string(problem.what()));
+  }
+  return record;
+}
+
+std::string layout_of(const MessageType& type) {
+  std::string text =
+      R"({"header": "u64 sequence, i64 stamp_ns, i64 published_ns, i64 visible_at_ns, i32 level, u8 whole, u64 xxh3",)"
+      R"( "fields": [)";
+  for (const Field& field : type.fields) {
+    const size_t scalar = scalar_bytes(field.scalar);
+    if (&field != type.fields.data()) text += ", ";
+    text += R"({"name": ")" + std::string(field.name) + R"(", "unit": ")" + std::string(field.unit) +
+            R"(", "scalar": ")" + std::string(name_of(field.scalar)) + R"(", )";
+    // An array is its number of elements (u32) and the elements, each of some scalars.
+    if (field.is_array()) text += R"("array_of": )" + std::to_string(field.element_bytes / scalar) + "}";
+    else text += R"("count": )" + std::to_string(field.count) + "}";
+  }
+  return text + "]}";
+}
+
+}  // namespace takt::record

@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "rt/record/recorder.hpp"
+
+#include <pthread.h>
+
+#include <array>
+#include <ctime>
+#include <limits>
+#include <utility>
+
+#include "rt/record/message_record.hpp"
+#include "rt/time/clock.hpp"
+
+namespace takt::record {
+namespace {
+
+/// Ports keep more messages than pass in this time (see ComposeOptions::recorded_ns).
+constexpr timespec kPause{0, 5'000'000};
+/// So much of a run is lost at most with a process that is killed.
+constexpr int64_t kChunkNs = 1'000'000'000;
+
+}  // namespace
+
+Recorder::Recorder(const Plan& plan, const RunBoard& board, Transport& transport, mcap::Sink& sink, const Head& head,
+                   Options options)
+    : options_(std::move(options)),
+      board_(board),
+      file_(sink, options_.file),
+      queue_(options_.queue_bytes),
+      jobs_([this](const RecordedJob& job) { take_job(job); }) {
+  note(file_.begin("", "takt"));
+  note(file_.metadata(kFacts, head.facts));
+  for (const mcap::Attachment& attached : head.files) note(file_.attach(attached));
+  add_channels(plan);
+  for (size_t p = 0; p < plan.ports.size(); ++p) ports_[p].reader = transport.make_reader(p);
+  writing_ = std::thread([this] { write_on(); });
+  if (!options_.by_caller) capturing_ = std::thread([this] { capture_on(); });
+}
+
+Recorder::~Recorder() {
+  if (writing_.joinable()) finish({});
+}
+
+void Recorder::add_channels(const Plan& plan) {
+  jobs_channel_ = file_.add_channel(file_.add_schema("takt.Job", "text", job_layout()), kJobs, kEncoding, {});
+  std::map<std::string_view, uint16_t> schemas;
+  for (size_t p = 0; p < plan.ports.size(); ++p) {
+    const PortPlan& port = plan.ports[p];
+    Port& mine = ports_.emplace_back();
+    mine.type = port.type;
+    mine.whole = options_.whole.empty() || options_.whole[p] != 0;
+    const auto [schema, added] = schemas.try_emplace(port.type->name, uint16_t{0});
+    if (added) schema->second = file_.add_schema("takt." + std::string(port.type->name), "json", layout_of(*port.type));
+    mine.channel = file_.add_channel(schema->second, port.node + "." + port.port, kEncoding,
+                                     {{"fields", mine.whole ? "all" : "hash"}});
+  }
+}
+
+void Recorder::capture_on() {
+  pthread_setname_np(pthread_self(), "takt-record");
+  while (!ending_.load()) {
+    for (Port& port : ports_) take_port(port);
+    nanosleep(&kPause, nullptr);
+  }
+  for (Port& port : ports_) take_port(port);
+  result_.capture_cpu_ns = thread_cpu_ns();
+}
+
+void Recorder::capture() {
+  for (Port& port : ports_) take_port(port);
+}
+
+void Recorder::take_port(Port& port) {
+  std::array<Candidate, InputPort::kMaxDepth> candidates;
+  size_t fresh = port.reader->list(std::numeric_limits<int64_t>::max(), candidates);
+  while (fresh > 0 && candidates[fresh - 1].sequence <= port.seen) --fresh;  // the oldest stand last
+  for (size_t i = fresh; i-- > 0;) {
+    const uint64_t sequence = candidates[i].sequence;
+    if (sequence <= port.seen) continue;
+    result_.overwritten += sequence - port.seen - 1;
+    port.seen = sequence;
+    Held held = port.reader->take(sequence);
+    if (!held) {
+      ++result_.overwritten;
+      continue;
+    }
+    std::vector<std::byte> data = queue_.buffer();
+    pack(*port.type, held, port.whole, scratch_, data);
+    const int64_t at_ns = held.header->published_ns;
+    port.reader->release(held);
+    push(port.channel, sequence, at_ns, std::move(data));
+  }
+}
+
+void Recorder::take_job(const RecordedJob& job) {
+  RecordedJob told = job;
+  told.mode = board_.modes().at(job.release_ns);
+  std::vector<std::byte> data = queue_.buffer();
+  pack(told, data);
+  push(jobs_channel_, job.index, job.published_ns, std::move(data));
+}
+
+void Recorder::push(uint16_t channel, uint64_t sequence, int64_t at_ns, std::vector<std::byte> data) {
+  if (!queue_.push({channel, sequence, at_ns, std::move(data)}, options_.by_caller)) no_room_.fetch_add(1);
+}
+
+void Recorder::write_on() {
+  pthread_setname_np(pthread_self(), "takt-write");
+  int64_t chunk_began_ns = 0;
+  while (auto entry = queue_.pop()) {
+    const auto at_ns = static_cast<uint64_t>(entry->at_ns);
+    note(file_.write({entry->channel, static_cast<uint32_t>(entry->sequence), at_ns, at_ns, entry->data}));
+    // In the run's own time, so that a virtual run always gives the same chunks.
+    if (entry->at_ns - chunk_began_ns >= kChunkNs) {
+      note(file_.flush());
+      chunk_began_ns = entry->at_ns;
+    }
+    queue_.recycle(std::move(entry->data));
+  }
+  note(file_.flush());
+  result_.write_cpu_ns = thread_cpu_ns();
+}
+
+void Recorder::note(const mcap::Writer::Done& done) {
+  if (!done && result_.refused.empty()) result_.refused = done.error();
+}
+
+RecordResult Recorder::finish(mcap::Metadata facts) {
+  ending_.store(true);
+  if (capturing_.joinable()) capturing_.join();
+  else capture();
+  queue_.close();
+  writing_.join();
+  result_.no_room = no_room_.load();
+  result_.incomplete_jobs = jobs_.incomplete();
+  result_.not_written = file_.lost();
+  const auto& written = file_.statistics();
+  const auto jobs = written.channel_messages.find(jobs_channel_);
+  result_.jobs = jobs == written.channel_messages.end() ? 0 : jobs->second;
+  result_.messages = written.messages - result_.jobs;
+  facts["lost_overwritten"] = std::to_string(result_.overwritten);
+  facts["lost_no_room"] = std::to_string(result_.no_room);
+  facts["lost_not_written"] = std::to_string(result_.not_written);
+  facts["lost_jobs"] = std::to_string(result_.incomplete_jobs);
+  note(file_.metadata(kEnd, facts));
+  note(file_.finish());
+  result_.bytes = file_.written_bytes();
+  return result_;
+}
+
+}  // namespace takt::record

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <atomic>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "rt/record/job_assembler.hpp"
+#include "rt/record/mcap/writer.hpp"
+#include "rt/record/write_queue.hpp"
+#include "rt/sched/run_board.hpp"
+#include "rt/shm/transport.hpp"
+
+namespace takt::record {
+
+/// What stands in a record before its first message.
+struct Head {
+  mcap::Metadata facts;
+  std::vector<mcap::Attachment> files;  ///< their data must live until the recorder is made
+};
+
+/// What a record lacks, and what it cost.
+struct RecordResult {
+  uint64_t messages = 0, jobs = 0;  ///< written
+  uint64_t overwritten = 0;         ///< messages that were gone before they were read
+  uint64_t no_room = 0;             ///< messages and jobs that found the queue full
+  uint64_t not_written = 0;         ///< ... that the file did not take
+  uint64_t incomplete_jobs = 0;     ///< of which an event was lost
+  uint64_t bytes = 0;               ///< of the file
+  int64_t capture_cpu_ns = 0, write_cpu_ns = 0;
+  std::string refused;  ///< why the file did not take something; empty: it took all
+  uint64_t lost() const { return overwritten + no_room + not_written + incomplete_jobs; }
+};
+
+/// Writes the messages of all ports and what each job was given into an MCAP file, as well as it can: it reads beside
+/// the consumers of a port and holds a message only while it copies it; no job ever waits for it. What it could not
+/// keep up with is counted.
+///
+/// Every message stands in the file with its header and hash, those of the chosen ports with all fields. Channels:
+/// "NODE.PORT" for the ports, kJobs for the jobs.
+class Recorder {
+ public:
+  static constexpr const char* kJobs = "takt/jobs";
+  static constexpr const char* kEncoding = "takt";
+  static constexpr const char* kFacts = "takt";    ///< metadata: those of the head
+  static constexpr const char* kEnd = "takt end";  ///< metadata: those given at the end, and what was lost
+
+  struct Options {
+    std::vector<char> whole = {};  ///< by port: with all fields
+    size_t queue_bytes = 128 << 20;
+    bool by_caller = false;  ///< virtual time: nothing is done but in capture(), which waits for the file
+    mcap::Writer::Options file = {};
+  };
+
+  /// Before the first job, after the ports have their memory. The sink must live until finish().
+  Recorder(const Plan& plan, const RunBoard& board, Transport& transport, mcap::Sink& sink, const Head& head,
+           Options options);
+  ~Recorder();
+  Recorder(const Recorder&) = delete;
+  Recorder& operator=(const Recorder&) = delete;
+
+  /// The next event of a thread that runs jobs. One thread at a time.
+  void take(int32_t thread, const trace::Event& event) { jobs_.add(thread, event); }
+  /// Copies what has been published since. Only with `by_caller`; after every job.
+  void capture();
+  /// After the last job, and after the last event was given: ends the file. `facts` are what is known only now.
+  RecordResult finish(mcap::Metadata facts);
+
+ private:
+  struct Port {
+    std::unique_ptr<Reader> reader;
+    const MessageType* type = nullptr;
+    uint16_t channel = 0;
+    bool whole = false;
+    uint64_t seen = 0;
+  };
+  void add_channels(const Plan& plan);
+  void take_port(Port& port);
+  void take_job(const RecordedJob& job);
+  void push(uint16_t channel, uint64_t sequence, int64_t at_ns, std::vector<std::byte> data);
+  void capture_on();
+  void write_on();
+  void note(const mcap::Writer::Done& done);
+
+  const Options options_;
+  const RunBoard& board_;
+  mcap::Writer file_;
+  WriteQueue queue_;
+  JobAssembler jobs_;
+  std::vector<Port> ports_;
+  uint16_t jobs_channel_ = 0;
+  std::vector<std::byte> scratch_;
+  std::atomic<uint64_t> no_room_{0};
+  RecordResult result_;
+  std::atomic<bool> ending_{false};
+  std::thread capturing_, writing_;
+};
+
+}  // namespace takt::record

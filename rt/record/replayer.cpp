@@ -1,0 +1,344 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "rt/record/replayer.hpp"
+
+#include <algorithm>
+#include <cstring>
+#include <exception>
+#include <new>
+#include <utility>
+
+#include "rt/sched/port_access.hpp"
+
+namespace takt::record {
+namespace {
+
+constexpr std::align_val_t kAlignment{64};
+
+struct FreeAligned {
+  void operator()(std::byte* memory) const { ::operator delete[](memory, kAlignment); }
+};
+
+/// By start; a job that starts when another publishes may hold what that one made.
+std::vector<const RecordedJob*> in_order(const std::vector<RecordedJob>& jobs) {
+  std::vector<const RecordedJob*> order;
+  for (const RecordedJob& job : jobs) order.push_back(&job);
+  std::stable_sort(order.begin(), order.end(), [](const RecordedJob* a, const RecordedJob* b) {
+    return std::pair(a->start_ns, a->published_ns) < std::pair(b->start_ns, b->published_ns);
+  });
+  return order;
+}
+
+template <class Each>
+void for_each_held(const RecordedJob& record, const Each& each) {
+  for (const RecordedJob::Input& input : record.inputs)
+    for (const RecordedJob::Run& run : input.held)
+      for (uint64_t sequence = run.first; sequence < run.first + run.count; ++sequence) each(input.edge, sequence);
+}
+
+const char* to_string(Question question) {
+  switch (question) {
+    case Question::now: return "now";
+    case Question::time_left: return "time_left";
+    case Question::chunk: break;
+  }
+  return "chunk";
+}
+
+}  // namespace
+
+/// A message in memory of its own.
+struct Replayer::Stored {
+  explicit Stored(const PortPlan& port)
+      : bytes(port.chunk_bytes()), memory(static_cast<std::byte*>(::operator new[](bytes, kAlignment))) {
+    place(port);
+  }
+  /// Empty again. What a node does not write itself is no zero by chance.
+  void place(const PortPlan& port) {
+    std::memset(memory.get(), 0xA5, bytes);
+    header = ::new (memory.get()) MessageHeader{};
+    port.type->place(memory.get() + sizeof(MessageHeader), port.capacity);
+  }
+  void* message() { return header + 1; }
+  const void* message() const { return header + 1; }
+
+  size_t bytes;
+  std::unique_ptr<std::byte[], FreeAligned> memory;
+  MessageHeader* header = nullptr;
+};
+
+struct Replayer::Port {
+  uint16_t channel = 0;
+  bool replayed = false;              ///< made anew
+  std::map<uint64_t, uint64_t> uses;  ///< jobs that are still to hold it, by sequence
+  std::map<uint64_t, std::shared_ptr<Stored>> messages;
+  std::shared_ptr<Stored> newest;
+  std::vector<std::shared_ptr<Stored>> spare;
+  std::unique_ptr<PortWriter> writer;
+  std::vector<std::byte> packed;
+};
+
+class Replayer::Answers final : public RecordedAnswers {
+ public:
+  void begin(const std::vector<RecordedJob::Answer>& answers) {
+    answers_ = &answers;
+    next_ = 0;
+    strange_.clear();
+  }
+  int64_t next(Question question) override {
+    const bool there = next_ < answers_->size();
+    if (there && (*answers_)[next_].question == question) return (*answers_)[next_++].value;
+    if (strange_.empty())
+      strange_ = std::string("asked for ") + to_string(question) + " where the record has " +
+                 (there ? to_string((*answers_)[next_].question) : "nothing more asked");
+    return 0;
+  }
+  /// A loan that found no chunk.
+  bool refused_loan() {
+    if (next_ == answers_->size() || (*answers_)[next_].question != Question::chunk) return false;
+    ++next_;
+    return true;
+  }
+  /// Empty if the job asked what it had asked before.
+  std::string strange() const {
+    if (!strange_.empty() || next_ == answers_->size()) return strange_;
+    return std::string("did not ask for ") + to_string((*answers_)[next_].question) + " as in the record";
+  }
+
+ private:
+  const std::vector<RecordedJob::Answer>* answers_ = nullptr;
+  size_t next_ = 0;
+  std::string strange_;
+};
+
+class Replayer::PortWriter final : public Writer {
+ public:
+  PortWriter(Replayer& replayer, size_t port) : replayer_(replayer), port_(port) {}
+  MessageHeader* loan() override {
+    if (replayer_.answers_->refused_loan()) return nullptr;
+    loaned_ = replayer_.buffer(port_);
+    return loaned_->header;
+  }
+  std::shared_ptr<Stored> take() { return std::exchange(loaned_, nullptr); }
+  void publish(int64_t, int64_t, int64_t) override {}
+  void discard() override {}
+  bool repeat(int64_t, int64_t) override { return false; }
+  WriterStatistics statistics() const override { return {}; }
+
+ private:
+  Replayer& replayer_;
+  const size_t port_;
+  std::shared_ptr<Stored> loaned_;
+};
+
+Replayer::Replayer(const Plan& plan, LogFile& log, const Options& options)
+    : plan_(plan), log_(log), options_(options), answers_(std::make_unique<Answers>()), ports_(plan.ports.size()) {
+  for (size_t p = 0; p < ports_.size(); ++p)
+    ports_[p].channel = log_.channel(plan_.ports[p].node + "." + plan_.ports[p].port);
+  for (const TaskPlan& task : plan_.tasks) {
+    last_seen_.emplace_back(task.edges.size(), uint64_t{0});
+    if (task.device) continue;
+    for (size_t i = 0; i < task.ports.size(); ++i) {
+      Port& port = ports_[task.ports[i]];
+      port.replayed = true;
+      port.writer = std::make_unique<PortWriter>(*this, task.ports[i]);
+      PortAccess::attach(*task.node->outputs()[i], port.writer.get());
+    }
+  }
+  count_uses();
+}
+
+Replayer::~Replayer() {
+  for (const TaskPlan& task : plan_.tasks)
+    for (OutputPort* output : task.node->outputs()) PortAccess::attach(*output, nullptr);
+}
+
+void Replayer::count_uses() {
+  for (const RecordedJob& job : log_.jobs()) {
+    if (plan_.tasks[job.task].device) continue;
+    for_each_held(job, [&](uint16_t edge, uint64_t sequence) {
+      ++ports_[plan_.tasks[job.task].edges[edge].port].uses[sequence];
+    });
+  }
+}
+
+ReplayResult Replayer::run(const std::function<bool()>& stop) {
+  int64_t first = INT64_MAX, last = INT64_MIN;
+  for (const RecordedJob* record : in_order(log_.jobs())) {
+    if (stop && stop()) break;
+    if (plan_.tasks[record->task].device) continue;
+    if (options_.pace) options_.pace(record->release_ns);
+    first = std::min(first, record->release_ns);
+    last = std::max(last, record->published_ns);
+    run_job(*record);
+  }
+  if (last > first) result_.recorded_ns = last - first;
+  return result_;
+}
+
+void Replayer::run_job(const RecordedJob& record) {
+  const TaskPlan& task = plan_.tasks[record.task];
+  clock_.advance_to(record.start_ns);
+  for (const RecordedJob::Param& changed : record.params)
+    if (auto done = task.node->params()[changed.param]->set(changed.value); !done)
+      tell(record, kNone, "a parameter of the record is refused: " + done.error());
+  if (fill_inputs(record)) {
+    const std::string& mode = record.mode < plan_.modes.size() ? plan_.modes[record.mode].name : plan_.mode;
+    Job job(clock_, record.index, record.release_ns, record.deadline_ns, record.level, mode);
+    answers_->begin(record.answers);
+    job.answer_from(*answers_);
+    try {
+      task.node->run(job);
+    } catch (const std::exception& problem) {  // as in the run, which counts it
+    }
+    ++result_.jobs;
+    settle(record);
+  } else {
+    ++result_.lacking;
+  }
+  let_go(record);
+}
+
+bool Replayer::fill_inputs(const RecordedJob& record) {
+  const TaskPlan& task = plan_.tasks[record.task];
+  std::vector<uint64_t>& seen = last_seen_[record.task];
+  for (const EdgePlan& edge : task.edges) PortAccess::set_held(*task.node->inputs()[edge.input], 0, false, 0);
+  bool whole = true;
+  for (const RecordedJob::Input& told : record.inputs) {
+    const EdgePlan& edge = task.edges[told.edge];
+    InputPort& input = *task.node->inputs()[edge.input];
+    auto& held = PortAccess::held(input);
+    size_t count = 0;
+    for (const RecordedJob::Run& run : told.held) {
+      for (uint64_t sequence = run.first; sequence < run.first + run.count && count < held.size(); ++sequence) {
+        const Stored* message = stored(edge.port, sequence);
+        if (message == nullptr) {
+          whole = false;
+          continue;
+        }
+        const MessageHeader& header = *message->header;
+        held[count++] = {&header, sequence, header.stamp_ns, header.visible_at_ns, 0};
+      }
+    }
+    PortAccess::set_held(input, count, told.stale, seen[told.edge]);
+    if (count > 0) seen[told.edge] = std::max(seen[told.edge], held[count - 1].sequence);
+  }
+  return whole;
+}
+
+Replayer::Stored* Replayer::stored(size_t p, uint64_t sequence) {
+  const auto there = ports_[p].messages.find(sequence);
+  if (there != ports_[p].messages.end()) return there->second.get();
+  return ports_[p].replayed ? nullptr : load(p, sequence);
+}
+
+Replayer::Stored* Replayer::load(size_t p, uint64_t sequence) {
+  const auto record = log_.message(ports_[p].channel, sequence);
+  if (!record || !record->whole) return nullptr;
+  auto message = buffer(p);
+  if (!unpack(*plan_.ports[p].type, record->data, message->message())) return nullptr;
+  *message->header = {};
+  message->header->stamp_ns = record->stamp_ns;
+  message->header->published_ns = record->published_ns;
+  message->header->visible_at_ns = record->visible_at_ns;
+  message->header->sequence = sequence;
+  message->header->level = record->level;
+  return (ports_[p].messages[sequence] = std::move(message)).get();
+}
+
+std::shared_ptr<Replayer::Stored> Replayer::buffer(size_t p) {
+  Port& port = ports_[p];
+  if (port.spare.empty()) return std::make_shared<Stored>(plan_.ports[p]);
+  auto buffer = std::move(port.spare.back());
+  port.spare.pop_back();
+  buffer->place(plan_.ports[p]);
+  return buffer;
+}
+
+void Replayer::let_go(const RecordedJob& record) {
+  const TaskPlan& task = plan_.tasks[record.task];
+  for (const EdgePlan& edge : task.edges) PortAccess::set_held(*task.node->inputs()[edge.input], 0, true, 0);
+  for_each_held(record, [&](uint16_t edge, uint64_t sequence) {
+    Port& port = ports_[task.edges[edge].port];
+    if (--port.uses[sequence] > 0) return;
+    port.uses.erase(sequence);
+    const auto message = port.messages.find(sequence);
+    if (message == port.messages.end()) return;
+    if (message->second.use_count() == 1) port.spare.push_back(std::move(message->second));
+    port.messages.erase(message);
+  });
+}
+
+void Replayer::settle(const RecordedJob& record) {
+  if (const std::string strange = answers_->strange(); !strange.empty()) tell(record, kNone, strange);
+  const TaskPlan& task = plan_.tasks[record.task];
+  for (size_t i = 0; i < task.ports.size(); ++i) {
+    const auto told = std::find_if(record.outputs.begin(), record.outputs.end(),
+                                   [&](const RecordedJob::Output& output) { return output.output == i; });
+    settle_output(record, told == record.outputs.end() ? nullptr : &*told, i);
+  }
+}
+
+void Replayer::settle_output(const RecordedJob& record, const RecordedJob::Output* told, size_t i) {
+  const TaskPlan& task = plan_.tasks[record.task];
+  const size_t p = task.ports[i];
+  Port& port = ports_[p];
+  OutputPort& output = *task.node->outputs()[i];
+  const bool sent = PortAccess::sent(output);
+  const int64_t stamp_ns = PortAccess::stamp_ns(output);
+  std::shared_ptr<Stored> made = port.writer->take();
+  PortAccess::reset(output);
+  const bool withheld = record.late && (task.on_miss == OnMiss::skip || task.on_miss == OnMiss::reuse_last);
+  if (told != nullptr && told->repeated) {
+    made = port.newest;
+    if (made == nullptr) return;
+  } else if (told == nullptr) {
+    if (sent && !withheld) tell(record, p, "was sent; in the record nothing is");
+    return;
+  } else if (!sent) {
+    return tell(record, p, "was not sent; in the record it is");
+  } else {
+    MessageHeader& header = *made->header;
+    header.stamp_ns = stamp_ns;
+    header.published_ns = record.published_ns;
+    header.visible_at_ns =
+        task.publish == PublishAt::let ? std::max(record.published_ns, record.deadline_ns) : record.published_ns;
+    header.sequence = told->sequence;
+    header.level = record.level;
+    ++result_.messages;
+    compare(record, p, *made, told->sequence);
+    if (port.newest != nullptr && port.newest.use_count() == 1) port.spare.push_back(std::move(port.newest));
+    port.newest = made;
+  }
+  if (port.uses.contains(told->sequence)) port.messages[told->sequence] = made;
+}
+
+void Replayer::compare(const RecordedJob& record, size_t p, const Stored& made, uint64_t sequence) {
+  const auto told = log_.message(ports_[p].channel, sequence);
+  if (!told) return;
+  ++result_.compared;
+  std::vector<std::byte>& packed = ports_[p].packed;
+  packed.clear();
+  pack(*plan_.ports[p].type, made.message(), packed);
+  if (told->stamp_ns != made.header->stamp_ns)
+    return tell(record, p,
+                "stamp is " + std::to_string(made.header->stamp_ns) + " instead of " + std::to_string(told->stamp_ns));
+  if (!told->whole) {
+    if (hash_of(packed) != told->hash) tell(record, p, "differs (the record has only its hash)");
+    return;
+  }
+  ++result_.whole;
+  if (const auto difference = first_difference(*plan_.ports[p].type, told->data, packed))
+    tell(record, p, difference->field + " (byte " + std::to_string(difference->byte) + ") is " + difference->values);
+}
+
+void Replayer::tell(const RecordedJob& record, size_t port, std::string what) {
+  if (record.release_ns < options_.from_ns) return;
+  ++result_.different;
+  const std::string& node = plan_.tasks[record.task].name;
+  ++result_.different_of[node];
+  if (result_.first) return;
+  result_.first =
+      Divergence{node, port == kNone ? "" : plan_.ports[port].port, record.index, record.release_ns, std::move(what)};
+}
+
+}  // namespace takt::record

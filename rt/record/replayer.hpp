@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "rt/record/log_file.hpp"
+#include "rt/sched/plan.hpp"
+#include "rt/time/clock.hpp"
+
+namespace takt::record {
+
+/// Where a replay parts from its record.
+struct Divergence {
+  std::string node, port;  ///< port empty: the job as such
+  uint32_t job = 0;
+  int64_t release_ns = 0;
+  std::string what;  ///< "points[17].x (byte 212) is 0.25 instead of 0.5"
+};
+
+struct ReplayResult {
+  uint64_t jobs = 0, messages = 0;  ///< run, and made by them
+  uint64_t compared = 0;            ///< messages that were in the record, whole or as hash
+  uint64_t whole = 0;               ///< of them, field by field
+  uint64_t different = 0;           ///< messages, or jobs that sent something else than in the record
+  uint64_t lacking = 0;             ///< jobs without all that they were given: lost in the record; they were not run
+  std::optional<Divergence> first;  ///< of the differences
+  std::map<std::string, uint64_t> different_of;  ///< by node
+  int64_t recorded_ns = 0;                       ///< from the first release to the last publication
+};
+
+/// Runs the jobs of a record again, one after the other, in the order in which they started: each with the inputs and
+/// the answers that it had. Messages of devices come from the record, all others from the jobs that are run. One
+/// thread.
+class Replayer {
+ public:
+  struct Options {
+    int64_t from_ns = INT64_MIN;  ///< differences of earlier jobs are not told; they run, for what they leave behind
+    /// Called before each job with its planned release: where a replay at the recorded pace waits. May be empty.
+    std::function<void(int64_t)> pace = {};
+  };
+  /// `plan` is that of the record, with nodes set up (devices: shells); both must live as long as this.
+  Replayer(const Plan& plan, LogFile& log, const Options& options);
+  ~Replayer();
+  Replayer(const Replayer&) = delete;
+  Replayer& operator=(const Replayer&) = delete;
+
+  /// Once. Stops early if `stop` answers true.
+  ReplayResult run(const std::function<bool()>& stop = {});
+
+ private:
+  struct Port;
+  class Answers;
+  class PortWriter;
+  struct Stored;
+
+  void count_uses();
+  void run_job(const RecordedJob& record);
+  bool fill_inputs(const RecordedJob& record);
+  Stored* stored(size_t port, uint64_t sequence);
+  Stored* load(size_t port, uint64_t sequence);
+  std::shared_ptr<Stored> buffer(size_t port);
+  void let_go(const RecordedJob& record);
+  void settle(const RecordedJob& record);
+  void settle_output(const RecordedJob& record, const RecordedJob::Output* told, size_t output);
+  void compare(const RecordedJob& record, size_t port, const Stored& made, uint64_t sequence);
+  void tell(const RecordedJob& record, size_t port, std::string what);
+
+  const Plan& plan_;
+  LogFile& log_;
+  const Options options_;
+  VirtualClock clock_;
+  const std::unique_ptr<Answers> answers_;
+  std::vector<Port> ports_;
+  std::vector<std::vector<uint64_t>> last_seen_;  ///< by task and edge
+  ReplayResult result_;
+};
+
+}  // namespace takt::record

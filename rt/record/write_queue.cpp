@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "rt/record/write_queue.hpp"
+
+#include <utility>
+
+namespace takt::record {
+
+std::vector<std::byte> WriteQueue::buffer() {
+  const std::lock_guard lock(mutex_);
+  if (spare_.empty()) return {};
+  std::vector<std::byte> buffer = std::move(spare_.back());
+  spare_.pop_back();
+  buffer.clear();
+  return buffer;
+}
+
+bool WriteQueue::push(Entry entry, bool wait) {
+  std::unique_lock lock(mutex_);
+  if (wait) emptied_.wait(lock, [&] { return entries_.empty() || bytes_ + entry.data.size() <= most_bytes_; });
+  if (!wait && bytes_ + entry.data.size() > most_bytes_) return false;
+  bytes_ += entry.data.size();
+  entries_.push_back(std::move(entry));
+  filled_.notify_one();
+  return true;
+}
+
+std::optional<WriteQueue::Entry> WriteQueue::pop() {
+  std::unique_lock lock(mutex_);
+  filled_.wait(lock, [&] { return closed_ || !entries_.empty(); });
+  if (entries_.empty()) return std::nullopt;
+  Entry entry = std::move(entries_.front());
+  entries_.pop_front();
+  bytes_ -= entry.data.size();
+  emptied_.notify_one();
+  return entry;
+}
+
+void WriteQueue::recycle(std::vector<std::byte> buffer) {
+  const std::lock_guard lock(mutex_);
+  if (spare_.size() < kBuffersKept) spare_.push_back(std::move(buffer));
+}
+
+void WriteQueue::close() {
+  const std::lock_guard lock(mutex_);
+  closed_ = true;
+  filled_.notify_all();
+}
+
+}  // namespace takt::record

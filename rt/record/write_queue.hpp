@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <mutex>
+#include <optional>
+#include <vector>
+
+namespace takt::record {
+
+/// What waits to be written, bounded by its bytes: who finds no room goes on without. One thread pushes, one pops.
+class WriteQueue {
+ public:
+  struct Entry {
+    uint16_t channel = 0;
+    uint64_t sequence = 0;
+    int64_t at_ns = 0;
+    std::vector<std::byte> data;
+  };
+
+  explicit WriteQueue(size_t most_bytes) : most_bytes_(most_bytes) {}
+
+  /// A buffer to fill, empty, with the memory of an earlier one where there is one.
+  std::vector<std::byte> buffer();
+  /// False if there is no room: the entry is lost. With `wait` there always is, sooner or later. Any thread.
+  bool push(Entry entry, bool wait);
+  /// The oldest entry; waits for one. Nothing once the queue was closed and is empty.
+  std::optional<Entry> pop();
+  /// Gives the memory of a popped entry back.
+  void recycle(std::vector<std::byte> buffer);
+  void close();
+
+ private:
+  static constexpr size_t kBuffersKept = 64;
+  const size_t most_bytes_;
+  std::mutex mutex_;
+  std::condition_variable filled_, emptied_;
+  std::deque<Entry> entries_;
+  std::vector<std::vector<std::byte>> spare_;
+  size_t bytes_ = 0;
+  bool closed_ = false;
+};
+
+}  // namespace takt::record

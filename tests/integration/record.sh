@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: Apache-2.0
+# Records: the same run on virtual time gives the same record; a replay gives the same bytes, of one process or several;
+# a changed parameter is named; a killed run and a full disk leave a record that says what it lacks.
+source "$(dirname "$0")/lib.sh" "$@"
+
+tells() { # tells EXIT TEXT COMMAND...: as expect, with what it prints on stdout
+  local code=$1 text=$2
+  shift 2
+  expect "$code" "$text" bash -c '"$@" >&2' takt "$@"
+}
+
+echo "=== virtual time: two runs, one content"
+for i in 1 2; do
+  tells 0 "nothing lost" "$takt" run --clock virtual --isolate none --for 3s --record "$work/$i.mcap" --output "$work/out"
+  "$takt" log info "$work/$i.mcap" >"$work/$i.txt" || fail "log info of record $i"
+done
+[ "$(grep ^content "$work/1.txt")" = "$(grep ^content "$work/2.txt")" ] || fail "two virtual runs differ"
+tells 0 "the same" "$takt" log diff "$work/1.mcap" "$work/2.mcap"
+
+echo "=== real time, one process and several: every byte again"
+for isolate in none subsystem; do
+  # No deadline is judged here: a missed one is exit 1, and is replayed as well.
+  "$takt" run --isolate "$isolate" --for 3s --record "$work/$isolate.mcap" --output "$work/out" >"$work/run.txt" 2>&1
+  [ $? -le 1 ] || fail "the run: $(cat "$work/run.txt")"
+  grep -q "nothing lost" "$work/run.txt" || { echo "the recorder lost something on this machine:"; grep LOST "$work/run.txt"; }
+  tells 0 " 0 differ" "$takt" replay "$work/$isolate.mcap" --compare --output "$work/replayed"
+done
+[ -s "$work/replayed/disparity.png" ] || fail "the replay wrote no pictures"
+
+echo "=== a changed parameter is named"
+rm -rf "$work/graph" "$work/schedules"
+mkdir -p "$work/graph" "$work/schedules"
+cp -r "$source"/graph/{worlds,rigs,objects,ace.yaml} "$work/graph/"
+cp "$source/schedules/thesis.yaml" "$work/schedules/"
+tells 0 "nothing lost" "$takt" run "$work/graph/ace.yaml" --clock virtual --isolate none --for 2s \
+  --record "$work/edited.mcap" --output "$work/out"
+tells 0 " 0 differ" "$takt" replay "$work/edited.mcap" --compare --output "$work/out"
+sed -i -E 's/^( +)type: mapping_3d/&\n\1params: {share: 0.6}/' "$work/graph/ace.yaml"
+grep -q "share: 0.6" "$work/graph/ace.yaml" || fail "the edit of the graph changed nothing"
+tells 1 "first difference: mapping_3d.obstacles, job" "$takt" replay "$work/edited.mcap" --compare --output "$work/out"
+tells 1 "mapping_3d.share is 0.6 instead of 0.15" "$takt" replay "$work/edited.mcap" --compare --output "$work/out"
+
+echo "=== a killed run"
+"$takt" run --isolate none --policy cooperative --for 20s --record "$work/killed.mcap" --output "$work/out" >/dev/null 2>&1 &
+run=$!
+until [ "$(stat -c %s "$work/killed.mcap" 2>/dev/null || echo 0)" -gt 20000000 ]; do
+  kill -0 "$run" 2>/dev/null || fail "the run ended before it was killed"
+  read -rt 0.1 <> <(:) || true
+done
+kill -9 "$run"
+wait "$run" 2>/dev/null
+tells 0 "the record has no end" "$takt" log info "$work/killed.mcap"
+"$takt" replay "$work/killed.mcap" --compare --output "$work/out" >"$work/replay.txt" 2>&1
+grep -q " 0 differ" "$work/replay.txt" || fail "a cut record has other bytes: $(cat "$work/replay.txt")"
+
+echo "=== a full disk"
+if mkdir "$work/small" && mount -t tmpfs -o size=20m none "$work/small" 2>/dev/null; then
+  "$takt" run --isolate none --policy cooperative --for 3s --record "$work/small/run.mcap" --output "$work/out" >"$work/run.txt" 2>&1
+  code=$?
+  cp "$work/small/run.mcap" "$work/full.mcap"
+  umount "$work/small"
+  [ $code -le 1 ] || fail "the run did not go on with a full disk: $(cat "$work/run.txt")"
+  grep -q "not written.*No space left on device" "$work/run.txt" || fail "the loss is not stated: $(grep record "$work/run.txt")"
+  "$takt" log info "$work/full.mcap" >/dev/null || fail "the record on the full disk cannot be read"
+else
+  echo "NOT RUN: a full disk needs the right to mount a tmpfs"
+fi
+
+echo "=== bad input"
+expect 2 "cannot be written" "$takt" run --record /nowhere/run.mcap
+expect 2 "no such output" "$takt" run --isolate none --for 1s --record "$work/x.mcap" --record-port stereo.depth
+expect 2 "is no MCAP file" "$takt" replay "$source/README.md"
+expect 2 "nothing.mcap" "$takt" log info "$work/nothing.mcap"
+finish

@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "rt/record/recorded_job.hpp"
+
+#include <doctest/doctest.h>
+
+#include <bit>
+#include <cmath>
+#include <cstring>
+
+#include "rt/record/job_assembler.hpp"
+#include "rt/sched/run_board.hpp"
+
+using namespace takt;
+using namespace takt::record;
+using trace::Event;
+using trace::Kind;
+
+namespace {
+
+RecordedJob full_job() {
+  RecordedJob job;
+  job.task = 3;
+  job.index = 70'000;
+  job.release_ns = 5'000;
+  job.deadline_ns = 9'000;
+  job.start_ns = 5'100;
+  job.finish_ns = 6'000;
+  job.published_ns = 6'100;
+  job.cpu_ns = 850;
+  job.level = 1;
+  job.mode = 2;
+  job.late = true;
+  job.params = {{0, true}, {1, int64_t{-4}}, {2, -0.0}, {3, std::string("half a word")}};
+  job.inputs = {{0, false, {{7, 3}, {12, 1}}}, {2, true, {}}};
+  job.answers = {{Question::time_left, -17}, {Question::chunk, 0}, {Question::now, INT64_MAX}};
+  job.outputs = {{0, false, 9}, {1, true, 11}};
+  return job;
+}
+
+struct Heard {
+  std::vector<RecordedJob> jobs;
+  JobAssembler assembler{[this](const RecordedJob& job) { jobs.push_back(job); }};
+  void add(int32_t thread, Kind kind, int64_t at_ns, int64_t value = 0, int64_t extra = 0, uint8_t port = 0,
+           uint32_t job = 1, uint16_t task = 4) {
+    assembler.add(thread, Event{at_ns, value, extra, job, task, kind, port});
+  }
+  void whole_job(int32_t thread, uint32_t job, int64_t lost = 0) {
+    add(thread, Kind::release, 100, 200, 0, 0, job);
+    add(thread, Kind::start, 110, 0, 0, 0, job);
+    add(thread, Kind::finish, 120, 9, 0, 0, job);
+    add(thread, Kind::publish, 125, 0, lost, 0, job);
+  }
+};
+
+}  // namespace
+
+TEST_CASE("A job that is packed and unpacked is the same") {
+  for (const RecordedJob& job : {RecordedJob{}, full_job()}) {
+    std::vector<std::byte> packed;
+    pack(job, packed);
+    const auto again = unpack_job(packed);
+    REQUIRE(again);
+    CHECK(*again == job);
+    CHECK(std::signbit(job.params.empty() ? -0.0 : std::get<double>(again->params[2].value)));
+  }
+}
+
+TEST_CASE("Bytes that are no job are refused, wherever they end") {
+  std::vector<std::byte> packed;
+  pack(full_job(), packed);
+  for (size_t length = 0; length < packed.size(); ++length) CHECK_FALSE(unpack_job(std::span(packed).first(length)));
+  packed.push_back({});
+  CHECK_FALSE(unpack_job(packed));
+  // A number of elements that no memory could hold is no reason to ask for it.
+  std::vector<std::byte> claims(51 + 4, std::byte{0xff});
+  CHECK_FALSE(unpack_job(claims));
+}
+
+TEST_CASE("The events of a job make its record") {
+  Heard heard;
+  heard.add(1, Kind::param, 100, std::bit_cast<int64_t>(2.5), ParamMail::number, 2);
+  heard.add(1, Kind::release, 100, 200);
+  heard.add(1, Kind::start, 110, 0, 0, 1);
+  heard.add(1, Kind::stale, 110, 0, 0, 1);
+  heard.add(1, Kind::latch, 110, 8, 77, 0);
+  heard.add(1, Kind::held, 110, 5, 2, 0);
+  heard.add(1, Kind::held, 110, 8, 1, 0);
+  heard.add(1, Kind::latch, 110, 3, 70, 2);
+  heard.add(1, Kind::answer, 0, 40, static_cast<int64_t>(Question::time_left), 0, 1, trace::kNoTask);
+  heard.add(1, Kind::answer, 0, 0, static_cast<int64_t>(Question::chunk), 0, 0, trace::kNoTask);
+  heard.add(1, Kind::finish, 150, 33, 0);
+  heard.add(1, Kind::miss, 200, 5);
+  heard.add(1, Kind::publish, 205, 6, 77, 1);
+  heard.add(1, Kind::repeat, 205, 4, 0, 0);
+  CHECK(heard.jobs.empty());
+  heard.add(1, Kind::publish, 205);
+  REQUIRE(heard.jobs.size() == 1);
+  const RecordedJob& job = heard.jobs[0];
+  CHECK(job.task == 4);
+  CHECK(job.index == 1);
+  CHECK(job.release_ns == 100);
+  CHECK(job.deadline_ns == 200);
+  CHECK(job.start_ns == 110);
+  CHECK(job.finish_ns == 150);
+  CHECK(job.published_ns == 205);
+  CHECK(job.cpu_ns == 33);
+  CHECK(job.level == 1);
+  CHECK(job.late);
+  CHECK(job.params == std::vector<RecordedJob::Param>{{2, 2.5}});
+  CHECK(job.inputs ==
+        std::vector<RecordedJob::Input>{{1, true, {}}, {0, false, {{5, 2}, {8, 1}}}, {2, false, {{3, 1}}}});
+  CHECK(job.answers == std::vector<RecordedJob::Answer>{{Question::time_left, 40}, {Question::chunk, 0}});
+  CHECK(job.outputs == std::vector<RecordedJob::Output>{{1, false, 6}, {0, true, 4}});
+  CHECK(heard.assembler.incomplete() == 0);
+}
+
+TEST_CASE("A parameter of text comes in pieces of eight characters") {
+  for (const std::string text : {"", "seven77", "eight888", "a text of more than sixteen"}) {
+    Heard heard;
+    for (size_t at = 0; at <= text.size(); at += 8) {
+      int64_t piece = 0;
+      std::memcpy(&piece, text.data() + at, std::min<size_t>(8, text.size() - at));
+      heard.add(1, Kind::param, 100, piece, ParamMail::text, 3);
+    }
+    heard.whole_job(1, 1);
+    REQUIRE(heard.jobs.size() == 1);
+    CHECK(heard.jobs[0].params == std::vector<RecordedJob::Param>{{3, text}});
+  }
+}
+
+TEST_CASE("Jobs of several threads are told apart; a job of which an event was lost is counted, not told") {
+  Heard heard;
+  heard.add(1, Kind::release, 100, 200, 0, 0, 1);
+  heard.add(2, Kind::release, 101, 201, 0, 0, 2);
+  heard.add(1, Kind::publish, 125, 0, 0, 0, 1);
+  heard.add(2, Kind::publish, 126, 0, 0, 0, 2);
+  CHECK(heard.jobs.size() == 2);
+  SUBCASE("within") {
+    heard.whole_job(1, 3, 2);
+    CHECK(heard.jobs.size() == 2);
+    CHECK(heard.assembler.incomplete() == 1);
+    heard.whole_job(1, 4, 2);
+    CHECK(heard.jobs.size() == 3);
+  }
+  SUBCASE("at its end") {
+    heard.add(1, Kind::release, 100, 200, 0, 0, 3);
+    heard.whole_job(1, 4, 1);
+    CHECK(heard.jobs.size() == 2);
+    CHECK(heard.assembler.incomplete() == 2);  // the second, too, lacks an event as far as is known
+    heard.whole_job(1, 5, 1);
+    CHECK(heard.jobs.size() == 3);
+  }
+  SUBCASE("at its beginning") {
+    heard.add(1, Kind::finish, 120, 9, 0, 0, 3);
+    heard.add(1, Kind::publish, 125, 0, 1, 0, 3);
+    CHECK(heard.jobs.size() == 2);
+    CHECK(heard.assembler.incomplete() == 1);
+    heard.whole_job(1, 4, 1);
+    CHECK(heard.jobs.size() == 3);
+  }
+  SUBCASE("a skipped release is no job") {
+    heard.add(1, Kind::skip, 130, 0, 0, 0, 3);
+    heard.whole_job(1, 4);
+    CHECK(heard.jobs.size() == 3);
+    CHECK(heard.assembler.incomplete() == 0);
+  }
+}
