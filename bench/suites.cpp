@@ -10,6 +10,7 @@ std::vector<Row> run_release(const Options&);
 std::vector<Row> run_release_loads(const Options&);
 std::vector<Row> run_graph(const Options&);
 std::vector<Row> run_trace(const Options&);
+std::vector<Row> run_record(const Options&);
 #ifdef TAKT_BENCH_STEREO
 std::vector<Row> run_stereo(const Options&);
 #endif
@@ -21,6 +22,7 @@ std::span<const Suite> suites() {
       {"release_loads", "the same per rate, policy and load, beside cyclictest; seven minutes", run_release_loads},
       {"graph", "ten nodes, seven hops: in one process, as ten processes, and over other libraries", run_graph},
       {"trace", "what tracing costs a job and a run, against the same without", run_trace},
+      {"record", "what recording two stereo cameras of 1280x960 costs, against the same run without", run_record},
 #ifdef TAKT_BENCH_STEREO
       {"stereo", "dense disparity at 640x480, 150 disparities, against OpenCV's matchers", run_stereo},
 #endif

@@ -13,7 +13,7 @@ sed -E -e 's/(head_camera: \{rate: )15, budget: 8ms, deadline: 25ms/\130, budget
   -e 's/(stereo: \{rate: )15, offset: 26ms, budget: 20ms/\150, offset: 26ms, budget: 20ms/' \
   -e 's/(ego_motion: \{rate: )10/\150/; s/(object_detection: \{rate: )7/\140/; s/(ground_map: \{rate: )5/\150/' \
   -e 's/(mapping_3d: \{rate: )2/\140/; s/deadline: (1\/15 s|80ms|1\/7 s|100ms|400ms|450ms)/deadline: 20ms/' \
-  -e 's/budget: (20|12|6|30)ms, deadline: 20ms/budget: 3ms, deadline: 20ms/' "$root/schedules/thesis.yaml" >"$work/overload.yaml"
+  -e 's/budget: ([0-9]{2}|6)ms, deadline: 20ms/budget: 3ms, deadline: 20ms/' "$root/schedules/thesis.yaml" >"$work/overload.yaml"
 for row in 'head_camera: {rate: 30' 'ground_camera: {rate: 15' 'stereo: {rate: 50' 'ego_motion: {rate: 50' 'object_detection: {rate: 40' \
   'ground_map: {rate: 50' 'mapping_3d: {rate: 40'; do
   grep -qF "$row" "$work/overload.yaml" || { echo "schedules/thesis.yaml has changed: no row \`$row\`; mend this script"; exit 1; }

@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 
+#include "bench/interleaved.hpp"
 #include "bench/suite.hpp"
 #include "rt/node.hpp"
 #include "rt/sched/executor.hpp"
@@ -99,29 +100,6 @@ class JobLoop {
   uint64_t index_ = 0;
 };
 
-/// Figures of rounds A B A B ... A, A not traced and B traced.
-struct Compared {
-  Pairs pairs;
-  Samples traced, cost;  ///< B, and by how much each B exceeds the mean of its two neighbours
-};
-
-template <class Plain, class Traced>
-Compared compare(size_t rounds, Plain plain, Traced traced) {
-  Compared out;
-  double before = plain();
-  out.pairs.add_a(before);
-  for (size_t i = 0; i < rounds; ++i) {
-    const double on = traced();
-    const double after = plain();
-    out.pairs.add_b(on);
-    out.pairs.add_a(after);
-    out.traced.add(on);
-    out.cost.add(on - (before + after) / 2);
-    before = after;
-  }
-  return out;
-}
-
 void measure_burst(std::vector<Row>& rows) {
   std::fprintf(stderr, "trace: cost of a job's events\n");
   JobLoop loop;
@@ -139,7 +117,7 @@ void measure_burst(std::vector<Row>& rows) {
         return us;
       });
   const std::string lost = ring->lost() > 0 ? std::to_string(ring->lost()) + " events lost" : "no event lost";
-  add_pair(rows, {"trace/job/traced", "us", 0, figures.traced, {}, {}, {}, lost}, "the same job, not traced",
+  add_pair(rows, {"trace/job/traced", "us", 0, figures.changed, {}, {}, {}, lost}, "the same job, not traced",
            figures.pairs);
   rows.push_back({"trace/job_burst/cost",
                   "us",
@@ -194,8 +172,8 @@ void measure_run(int rounds, std::vector<Row>& rows) {
   std::string granted, plain;
   const Compared figures = compare(
       static_cast<size_t>(rounds), [&] { return run_pct(false, plain); }, [&] { return run_pct(true, granted); });
-  add_pair(rows, {"trace/cpu/traced", "% of a CPU", 0, figures.traced, {}, {}, {}, granted}, "the same run, not traced",
-           figures.pairs);
+  add_pair(rows, {"trace/cpu/traced", "% of a CPU", 0, figures.changed, {}, {}, {}, granted},
+           "the same run, not traced", figures.pairs);
   rows.push_back(
       {"trace/cpu/cost", "% of a CPU", figures.cost.quantile(0.5).value_or(0), figures.cost, {}, {}, {}, granted});
 }

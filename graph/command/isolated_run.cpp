@@ -70,7 +70,7 @@ class IsolatedRun {
         partition_(graph::partition(graph, adjusted_)),
         board_(plan_, partition_.names.size()),
         stoppable_(board_),
-        record_(options),
+        record_(options, plan_),
         trace_(options, plan_) {}
 
   ~IsolatedRun() {

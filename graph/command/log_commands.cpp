@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "graph/command/prepare.hpp"
+#include "graph/log/export_log.hpp"
 #include "graph/log/log_content.hpp"
 
 namespace takt::command {
@@ -50,6 +51,23 @@ int log_diff(const LogOptions& options) {
   });
 }
 
+int log_export(const LogOptions& options) {
+  return guarded([&]() -> int {
+    auto log = open(options.file);
+    if (!log) return kBadInput;
+    auto sink = mcap::FileSink::open(options.output);
+    if (!sink) return refuse("--output " + sink.error() + "; choose another place", kBadInput);
+    const auto exported = log::export_log(*log, *sink);
+    if (!exported) return refuse(options.output.string() + ": " + exported.error(), kBadInput);
+    std::printf("%llu messages, %.1f MB\n", static_cast<unsigned long long>(exported->messages),
+                static_cast<double>(exported->bytes) / 1e6);
+    if (exported->hash_only > 0)
+      std::printf("%llu messages were recorded by their hash only; record them whole with --record-port\n",
+                  static_cast<unsigned long long>(exported->hash_only));
+    return kOk;
+  });
+}
+
 void add_log(CLI::App& app, LogOptions& o, int& exit_code) {
   CLI::App* log = app.add_subcommand("log", "looks into records");
   log->require_subcommand(1);
@@ -61,6 +79,10 @@ void add_log(CLI::App& app, LogOptions& o, int& exit_code) {
   diff->add_option("from", o.file, "a record")->required();
   diff->add_option("to", o.other, "another one")->required();
   diff->callback([&] { exit_code = log_diff(o); });
+  CLI::App* exported = log->add_subcommand("export", "as MCAP with JSON in Foxglove's schemas");
+  exported->add_option("file", o.file, "a record")->required();
+  exported->add_option("-o,--output", o.output, "the file to write")->required();
+  exported->callback([&] { exit_code = log_export(o); });
 }
 
 }  // namespace takt::command

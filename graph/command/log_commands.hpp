@@ -6,7 +6,7 @@
 namespace takt::command {
 
 struct LogOptions {
-  std::filesystem::path file, other;
+  std::filesystem::path file, other, output;
   bool json = false;
 };
 
@@ -14,6 +14,10 @@ struct LogOptions {
 int log_info(const LogOptions& options);
 /// `takt log diff A B`. Exit 0 if they hold the same, 1 if not, 2 if one is no record.
 int log_diff(const LogOptions& options);
+
+/// `takt log export FILE -o OUT`: for programs that know Foxglove's schemas. Exit 0, 2 if FILE is no record or OUT
+/// cannot be written.
+int log_export(const LogOptions& options);
 
 void add_log(CLI::App& app, LogOptions& options, int& exit_code);
 

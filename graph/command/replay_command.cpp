@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <hwy/highway.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <ctime>
 #include <fstream>
@@ -14,6 +15,7 @@
 #include "graph/command/prepare.hpp"
 #include "graph/command/run_support.hpp"
 #include "graph/compose/composition.hpp"
+#include "graph/language/words.hpp"
 #include "graph/log/recorded_plan.hpp"
 #include "rt/record/replayer.hpp"
 #include "takt_commit.hpp"
@@ -105,6 +107,7 @@ class Replay {
     run.load.policy = fact(facts, "policy_option");
     std::istringstream settings(fact(facts, "set"));
     for (std::string line; std::getline(settings, line);) run.load.set.push_back(line);
+    run.load.set.insert(run.load.set.end(), options_.set.begin(), options_.set.end());
     run.clock = fact(facts, "clock");
     run.output = options_.output;
     run.seed = std::strtoull(fact(facts, "seed").c_str(), nullptr, 10);
@@ -151,6 +154,7 @@ class Replay {
     for (const TaskPlan& task : prepared_.composition->plan.tasks)
       if (!task.device) task.node->start(epoch_ns);
     record::Replayer::Options how;
+    how.run = live_tasks();
     if (options_.from_s > 0) how.from_ns = epoch_ns + static_cast<int64_t>(options_.from_s * 1e9);
     if (options_.recorded_pace) how.pace = pace(how.from_ns);
     record::Replayer replayer(prepared_.composition->plan, *file_, how);
@@ -158,6 +162,47 @@ class Replay {
     auto result = replayer.run([] { return StopOnSignal::asked(); });
     took_ns_ = clock_.now_ns() - before_ns;
     return result;
+  }
+
+  /// By task: the nodes of --live, and those that must run because their messages are in the record by hash only.
+  std::vector<char> live_tasks() const {
+    const Plan& plan = prepared_.composition->plan;
+    if (options_.live.empty()) return {};
+    std::vector<char> runs(plan.tasks.size(), 0);
+    std::vector<std::string> names;
+    for (const TaskPlan& task : plan.tasks)
+      if (!task.device) names.push_back(task.name);
+    for (const std::string& id : options_.live) {
+      const auto task = std::find_if(plan.tasks.begin(), plan.tasks.end(),
+                                     [&](const TaskPlan& t) { return t.name == id && !t.device; });
+      if (task == plan.tasks.end())
+        throw Refused{fmt::format("--live {}: there is no such node{}", graph::ticked(id),
+                                  graph::alternatives(id, names, "nodes of the graph"))};
+      runs[static_cast<size_t>(task - plan.tasks.begin())] = 1;
+    }
+    for (size_t t = 0; t < runs.size(); ++t)
+      if (runs[t] != 0 && add_producers(t, runs)) t = SIZE_MAX;  // from the first one again
+    return runs;
+  }
+
+  /// True if a producer had to be added.
+  bool add_producers(size_t task, std::vector<char>& runs) const {
+    const Plan& plan = prepared_.composition->plan;
+    bool added = false;
+    for (const EdgePlan& edge : plan.tasks[task].edges) {
+      const PortPlan& port = plan.ports[edge.port];
+      const auto& messages = file_->messages(file_->channel(port.node + "." + port.port));
+      const bool whole = std::all_of(messages.begin(), messages.end(), [](const auto& m) { return m.second.whole; });
+      for (size_t t = 0; t < runs.size(); ++t) {
+        const auto& ports = plan.tasks[t].ports;
+        if (whole || runs[t] != 0 || std::find(ports.begin(), ports.end(), edge.port) == ports.end()) continue;
+        std::fprintf(stderr, "takt: %s runs, too: its %s is in the record by hash only\n", port.node.c_str(),
+                     port.port.c_str());
+        runs[t] = 1;
+        added = true;
+      }
+    }
+    return added;
   }
 
   /// That of the run; of a record without an end, the first release.
@@ -184,8 +229,8 @@ class Replay {
   int tell(const record::ReplayResult& result) const {
     const double recorded_s = static_cast<double>(result.recorded_ns) / 1e9;
     const double took_s = static_cast<double>(took_ns_) / 1e9;
-    fmt::print("replayed {} jobs of {} nodes, {:.1f} s in {:.1f} s ({:.1f}x real time)\n", result.jobs,
-               prepared_.graph->nodes.size(), recorded_s, took_s, took_s > 0 ? recorded_s / took_s : 0.0);
+    fmt::print("replayed {} jobs, {:.1f} s in {:.1f} s ({:.1f}x real time)\n", result.jobs, recorded_s, took_s,
+               took_s > 0 ? recorded_s / took_s : 0.0);
     if (result.lacking > 0) fmt::print("{} jobs were not run: the record lost what they were given\n", result.lacking);
     if (!options_.compare) return result.lacking > 0 ? kNotOk : kOk;
     fmt::print("compared {} of {} messages: {} field by field, {} by hash; {} differ\n", result.compared,
@@ -232,6 +277,8 @@ void add_replay(CLI::App& app, ReplayOptions& o, int& exit_code) {
   replay->add_option("log", o.log, "what `takt run --record` wrote")->required();
   replay->add_option("graph", o.graph, "graph file instead of that of the record");
   replay->add_flag("--compare", o.compare, "bit by bit with the record; exit 1 on the first message that differs");
+  replay->add_option("--live", o.live, "runs only these nodes, with the rest from the record")->delimiter(',');
+  replay->add_option("--set", o.set, "node.param=value, repeatable");
   replay->add_option("--from", o.from_s, "tells and paces only what was released so many seconds into the run");
   replay->add_flag("--recorded-pace", o.recorded_pace, "as fast as it was, instead of as fast as possible");
   replay->add_option("--output", o.output, "folder for pictures and other results (default out)");

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 namespace takt::command {
 
@@ -12,7 +13,9 @@ struct ReplayOptions {
   std::filesystem::path graph;  ///< empty: that of the record
   std::filesystem::path output = "out";
   bool compare = false, recorded_pace = false;
-  double from_s = 0;  ///< since the epoch of the run
+  std::vector<std::string> live;  ///< nodes that run; empty: all. What the others made comes from the record
+  std::vector<std::string> set;   ///< "node.param=value", after those of the record
+  double from_s = 0;              ///< since the epoch of the run
 };
 
 /// `takt replay LOG [GRAPH]`: runs every job of a record again, with the inputs and answers that it had. Exit 1 if

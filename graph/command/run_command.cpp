@@ -39,7 +39,7 @@ int execute(const RunOptions& options, Prepared& prepared, std::vector<std::stri
   graph::Composition& composition = *prepared.composition;
   const auto transport = make_transport(options.transport, composition.plan);
   RunBoard board(composition.plan);
-  RunRecord record(options);
+  RunRecord record(options, composition.plan);
   RunTrace trace(options, composition.plan);  // ends first: it speaks to the record
   Executor::Options run;
   run.duration_ns = static_cast<int64_t>(options.duration_s * 1e9);

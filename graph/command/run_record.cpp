@@ -11,6 +11,7 @@
 #include <stdexcept>
 
 #include "graph/command/machine.hpp"
+#include "graph/language/words.hpp"
 #include "graph/log/recorded_plan.hpp"
 #include "takt_commit.hpp"
 
@@ -48,13 +49,18 @@ std::string absolute(const std::filesystem::path& file) {
 
 graph::Observers observers(const RunOptions& options) { return {1, options.record.empty() ? 0 : kUndisturbedNs}; }
 
+RunRecord::RunRecord(const RunOptions& options, const Plan& plan) : options_(options) {
+  std::vector<std::string> names;
+  for (const PortPlan& port : plan.ports) names.push_back(port.node + "." + port.port);
+  for (const std::string& name : options_.record_ports)
+    if (name != "all" && std::find(names.begin(), names.end(), name) == names.end())
+      throw std::invalid_argument(fmt::format("--record-port {}: there is no such output{}", graph::ticked(name),
+                                              graph::alternatives(name, names, "outputs of this graph")));
+}
+
 void RunRecord::begin(const graph::GraphSpec& graph, const Plan& plan, const RunBoard& board, Transport& transport,
                       const std::string& isolation) {
   if (!wanted()) return;
-  for (const std::string& name : options_.record_ports)
-    if (name != "all" && std::none_of(plan.ports.begin(), plan.ports.end(),
-                                      [&](const PortPlan& port) { return port.node + "." + port.port == name; }))
-      throw std::invalid_argument("--record-port " + name + ": the graph has no such output (takt show lists them)");
   auto file = mcap::FileSink::open(options_.record);
   if (!file) throw std::runtime_error("--record " + file.error() + "; choose another place");
   file_.emplace(std::move(*file));

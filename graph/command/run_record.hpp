@@ -19,7 +19,8 @@ graph::Observers observers(const RunOptions& options);
 /// The record of a run, if one was asked for (`--record`); else every call does nothing.
 class RunRecord {
  public:
-  explicit RunRecord(const RunOptions& options) : options_(options) {}
+  /// Throws std::invalid_argument if --record-port names an output that the plan does not have.
+  RunRecord(const RunOptions& options, const Plan& plan);
   bool wanted() const { return !options_.record.empty(); }
   /// Before the first job, once the ports have their memory. Throws std::runtime_error if the file cannot be made.
   void begin(const graph::GraphSpec& graph, const Plan& plan, const RunBoard& board, Transport& transport,

@@ -13,22 +13,6 @@ namespace {
 
 constexpr std::string_view kSignature = "\x89PNG\r\n\x1a\n";
 
-/// RFC 4648.
-std::string base64(std::string_view bytes) {
-  constexpr std::string_view alphabet = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  const auto byte = [&](size_t i) {
-    return i < bytes.size() ? static_cast<uint32_t>(static_cast<uint8_t>(bytes[i])) : 0U;
-  };
-  std::string text;
-  text.reserve((bytes.size() + 2) / 3 * 4);
-  for (size_t i = 0; i < bytes.size(); i += 3) {
-    const uint32_t three = byte(i) << 16U | byte(i + 1) << 8U | byte(i + 2);
-    for (const uint32_t shift : {18U, 12U, 6U, 0U}) text += alphabet[three >> shift & 63U];
-    for (size_t missing = i + 3; missing > bytes.size(); --missing) text[text.size() - (missing - bytes.size())] = '=';
-  }
-  return text;
-}
-
 std::vector<std::filesystem::path> png_files(const std::filesystem::path& folder) {
   std::vector<std::filesystem::path> files;
   std::error_code error;

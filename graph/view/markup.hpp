@@ -9,4 +9,7 @@ namespace takt::view {
 /// bytes that are no UTF-8 replaced.
 std::string escape(std::string_view text);
 
+/// Bytes as text (RFC 4648).
+std::string base64(std::string_view bytes);
+
 }  // namespace takt::view

@@ -17,9 +17,9 @@ uint32_t arithmetic(uint32_t x) {
 
 void burn(int64_t cpu_ns) {
   if (cpu_ns <= 0) return;
-  const int64_t until = thread_cpu_ns() + cpu_ns;
+  const int64_t until = thread_cpu_ns() + cpu_ns;  // replay: how long it takes is in no message
   volatile uint32_t sink = 1;
-  while (thread_cpu_ns() < until) sink = arithmetic(sink);
+  while (thread_cpu_ns() < until) sink = arithmetic(sink);  // replay: as above
 }
 
 bool Trouble::due(int64_t release_ns, int64_t every_ns) {

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cstring>
-#include <exception>
 #include <new>
 #include <utility>
 
@@ -79,8 +78,9 @@ struct Replayer::Port {
 
 class Replayer::Answers final : public RecordedAnswers {
  public:
-  void begin(const std::vector<RecordedJob::Answer>& answers) {
-    answers_ = &answers;
+  void begin(const RecordedJob& job) {
+    job_ = &job;
+    answers_ = &job.answers;
     next_ = 0;
     strange_.clear();
   }
@@ -90,7 +90,7 @@ class Replayer::Answers final : public RecordedAnswers {
     if (strange_.empty())
       strange_ = std::string("asked for ") + to_string(question) + " where the record has " +
                  (there ? to_string((*answers_)[next_].question) : "nothing more asked");
-    return 0;
+    return question == Question::now ? job_->start_ns : job_->deadline_ns - job_->start_ns;
   }
   /// A loan that found no chunk.
   bool refused_loan() {
@@ -105,6 +105,7 @@ class Replayer::Answers final : public RecordedAnswers {
   }
 
  private:
+  const RecordedJob* job_ = nullptr;
   const std::vector<RecordedJob::Answer>* answers_ = nullptr;
   size_t next_ = 0;
   std::string strange_;
@@ -134,9 +135,10 @@ Replayer::Replayer(const Plan& plan, LogFile& log, const Options& options)
     : plan_(plan), log_(log), options_(options), answers_(std::make_unique<Answers>()), ports_(plan.ports.size()) {
   for (size_t p = 0; p < ports_.size(); ++p)
     ports_[p].channel = log_.channel(plan_.ports[p].node + "." + plan_.ports[p].port);
-  for (const TaskPlan& task : plan_.tasks) {
+  for (size_t t = 0; t < plan_.tasks.size(); ++t) {
+    const TaskPlan& task = plan_.tasks[t];
     last_seen_.emplace_back(task.edges.size(), uint64_t{0});
-    if (task.device) continue;
+    if (!runs(t)) continue;
     for (size_t i = 0; i < task.ports.size(); ++i) {
       Port& port = ports_[task.ports[i]];
       port.replayed = true;
@@ -152,9 +154,13 @@ Replayer::~Replayer() {
     for (OutputPort* output : task.node->outputs()) PortAccess::attach(*output, nullptr);
 }
 
+bool Replayer::runs(size_t task) const {
+  return !plan_.tasks[task].device && (options_.run.empty() || options_.run[task] != 0);
+}
+
 void Replayer::count_uses() {
   for (const RecordedJob& job : log_.jobs()) {
-    if (plan_.tasks[job.task].device) continue;
+    if (!runs(job.task)) continue;
     for_each_held(job, [&](uint16_t edge, uint64_t sequence) {
       ++ports_[plan_.tasks[job.task].edges[edge].port].uses[sequence];
     });
@@ -165,7 +171,7 @@ ReplayResult Replayer::run(const std::function<bool()>& stop) {
   int64_t first = INT64_MAX, last = INT64_MIN;
   for (const RecordedJob* record : in_order(log_.jobs())) {
     if (stop && stop()) break;
-    if (plan_.tasks[record->task].device) continue;
+    if (!runs(record->task)) continue;
     if (options_.pace) options_.pace(record->release_ns);
     first = std::min(first, record->release_ns);
     last = std::max(last, record->published_ns);
@@ -184,11 +190,11 @@ void Replayer::run_job(const RecordedJob& record) {
   if (fill_inputs(record)) {
     const std::string& mode = record.mode < plan_.modes.size() ? plan_.modes[record.mode].name : plan_.mode;
     Job job(clock_, record.index, record.release_ns, record.deadline_ns, record.level, mode);
-    answers_->begin(record.answers);
+    answers_->begin(record);
     job.answer_from(*answers_);
     try {
       task.node->run(job);
-    } catch (const std::exception& problem) {  // as in the run, which counts it
+    } catch (...) {  // as in the run, which has told of it
     }
     ++result_.jobs;
     settle(record);

@@ -34,11 +34,13 @@ struct ReplayResult {
 };
 
 /// Runs the jobs of a record again, one after the other, in the order in which they started: each with the inputs and
-/// the answers that it had. Messages of devices come from the record, all others from the jobs that are run. One
-/// thread.
+/// the answers that it had; a job that asks something else is told its start, and the time from there to its deadline.
+/// Messages of devices come from the record, others from the jobs that are run. One thread.
 class Replayer {
  public:
   struct Options {
+    /// By task: its jobs are run; empty: those of all nodes. What the others made comes from the record.
+    std::vector<char> run = {};
     int64_t from_ns = INT64_MIN;  ///< differences of earlier jobs are not told; they run, for what they leave behind
     /// Called before each job with its planned release: where a replay at the recorded pace waits. May be empty.
     std::function<void(int64_t)> pace = {};
@@ -58,6 +60,7 @@ class Replayer {
   class PortWriter;
   struct Stored;
 
+  bool runs(size_t task) const;
   void count_uses();
   void run_job(const RecordedJob& record);
   bool fill_inputs(const RecordedJob& record);

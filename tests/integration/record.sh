@@ -40,6 +40,33 @@ grep -q "share: 0.6" "$work/graph/ace.yaml" || fail "the edit of the graph chang
 tells 1 "first difference: mapping_3d.obstacles, job" "$takt" replay "$work/edited.mcap" --compare --output "$work/out"
 tells 1 "mapping_3d.share is 0.6 instead of 0.15" "$takt" replay "$work/edited.mcap" --compare --output "$work/out"
 
+echo "=== the reference reader of the format"
+tells 0 "messages" "$takt" log export "$work/edited.mcap" -o "$work/export.mcap"
+if command -v node >/dev/null && command -v npm >/dev/null && cp -r "$source/tests/tools/mcap_reader" "$work/reader" &&
+  (cd "$work/reader" && npm install --no-audit --no-fund >"$work/npm.txt" 2>&1); then
+  "$takt" log info "$work/edited.mcap" --json >"$work/info.json"
+  for file in edited export; do
+    (cd "$work/reader" && node read.mjs "$work/$file.mcap") >"$work/$file.json" || fail "the reference reader refuses $file.mcap"
+  done
+  python3 - "$work" <<'PY' || fail "the reference reader sees something else"
+import json, sys
+work = sys.argv[1]
+info, read, exported = (json.load(open(f"{work}/{name}.json")) for name in ("info", "edited", "export"))
+ports = {port["port"]: port["messages"] for port in info["ports"]}
+jobs = sum(node["jobs"] for node in info["nodes"])
+assert {c: v["messages"] for c, v in read["channels"].items()} == ports | {"takt/jobs": jobs}, read["channels"]
+assert read["attachments"].keys() == {"graph.yaml", "schedule.yaml", "plan.json", "assets.json"}, read["attachments"]
+assert read["metadata"].keys() == {"takt", "takt end"}, read["metadata"]
+schemas = {c: v["schema"] for c, v in exported["channels"].items()}
+assert schemas["head_camera.pair.left"] == "foxglove.RawImage" and schemas["front_laser.scan"] == "foxglove.LaserScan", schemas
+assert schemas["mapping_3d.obstacles"] == "foxglove.Grid" and schemas["semantic.status"] == "foxglove.Log", schemas
+assert exported["channels"]["front_laser.scan"]["messages"] == ports["front_laser.scan"]
+print(f"{len(ports) + 1} channels, {sum(ports.values()) + jobs} messages, every CRC; export: {len(schemas)} channels")
+PY
+else
+  echo "NOT RUN: the reference reader needs node, npm and its registry: $(tail -n 1 "$work/npm.txt" 2>/dev/null)"
+fi
+
 echo "=== a killed run"
 "$takt" run --isolate none --policy cooperative --for 20s --record "$work/killed.mcap" --output "$work/out" >/dev/null 2>&1 &
 run=$!
@@ -68,7 +95,7 @@ fi
 
 echo "=== bad input"
 expect 2 "cannot be written" "$takt" run --record /nowhere/run.mcap
-expect 2 "no such output" "$takt" run --isolate none --for 1s --record "$work/x.mcap" --record-port stereo.depth
+expect 2 "did you mean \`stereo.cloud\`" "$takt" run --for 1s --record "$work/x.mcap" --record-port stereo.clod
 expect 2 "is no MCAP file" "$takt" replay "$source/README.md"
 expect 2 "nothing.mcap" "$takt" log info "$work/nothing.mcap"
 finish

@@ -8,6 +8,7 @@
 #include "recorded_run.hpp"
 #include "rt/record/log_file.hpp"
 #include "rt/record/replayer.hpp"
+#include "rt/sched/param_mail.hpp"
 #include "tests/temporary_folder.hpp"
 
 using namespace takt;
@@ -22,7 +23,8 @@ struct Record {
   explicit Record(Recorder::Options how = {}, int64_t seconds = 3) {
     auto sink = mcap::FileSink::open(file);
     REQUIRE(sink);
-    result = test::record_run(*sink, seconds, std::move(how));
+    test::SmallGraph graph;
+    result = test::record_run(graph, *sink, seconds, std::move(how));
   }
   LogFile open() const {
     auto log = LogFile::open(file);
@@ -115,6 +117,46 @@ TEST_CASE("A changed constant is found, with node, job, field and byte") {
   CHECK(end.different_of.at("filter") == 5);
 }
 
+TEST_CASE("A parameter that is set while the run goes on is set again before the same job") {
+  const test::TemporaryFolder folder;
+  test::SmallGraph recorded, again;
+  {
+    auto sink = mcap::FileSink::open(folder.path / "run.mcap");
+    REQUIRE(sink);
+    int jobs = 0;
+    test::record_run(recorded, *sink, 3, {}, {}, [&](RunBoard& board) {
+      if (++jobs == 60) CHECK(post(board.mail(1), 1, ParamValue(0.25)));
+    });
+  }
+  CHECK(recorded.filter.bias() == 0.25);
+  auto log = LogFile::open(folder.path / "run.mcap");
+  REQUIRE(log);
+  CHECK(Replayer(again.plan, *log, {}).run().different == 0);
+  CHECK(again.filter.bias() == 0.25);
+}
+
+TEST_CASE("Some nodes run anew, the rest comes from the record") {
+  const Record record;
+  test::SmallGraph graph;
+  REQUIRE(graph.filter.gain.set(2.5));
+  SUBCASE("the changed one") {
+    const ReplayResult result = replay(record, graph, {.run = {0, 1, 0}});
+    CHECK(result.jobs == 30);
+    CHECK(result.different == 29);
+  }
+  SUBCASE("its reader, which has the grids of the record") {
+    const ReplayResult result = replay(record, graph, {.run = {0, 0, 1}});
+    CHECK(result.jobs == 30);
+    CHECK(result.different == 0);
+  }
+  SUBCASE("its reader, but the grids are known by their hash only") {
+    const Record hashes({.whole = {1, 0, 1}});
+    const ReplayResult result = replay(hashes, graph, {.run = {0, 0, 1}});
+    CHECK(result.jobs == 0);
+    CHECK(result.lacking == 30);
+  }
+}
+
 TEST_CASE("Two runs on virtual time give the same file, byte by byte") {
   const Record a, b;
   CHECK(bytes_of(a.file) == bytes_of(b.file));
@@ -163,7 +205,8 @@ TEST_CASE("A file that takes no more, or a queue without room: the run goes on a
       return {};
     }
   } full;
-  const RecordResult result = test::record_run(full, 3, {.file = {.chunk_bytes = 1000, .level = 1}});
+  test::SmallGraph graph;
+  const RecordResult result = test::record_run(graph, full, 3, {.file = {.chunk_bytes = 1000, .level = 1}});
   CHECK(result.not_written > 0);
   CHECK(result.lost() == result.not_written);
   CHECK(result.refused == "No space left on device");

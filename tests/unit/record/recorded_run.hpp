@@ -32,6 +32,7 @@ struct Filter final : Node {
   Input<Odometry> odometry{this, "odometry", ""};
   Output<Grid> grid{this, "grid", ""};
   Param<double> gain{this, "gain", 2.0, "1", ""};
+  Param<double> bias{this, "bias", 0.0, "1", ""};  ///< may be set while it runs
   double sum = 0;
   void setup(Setup&) override {
     grid.reserve({4, 2, 1, 0});
@@ -44,7 +45,7 @@ struct Filter final : Node {
     if (message == nullptr) return;
     message->width = 4;
     message->height = 2;
-    message->cell_m = sum;
+    message->cell_m = sum + bias();
     message->origin_x_m = static_cast<double>(job.now_ns() % 1000);
     message->origin_y_m = static_cast<double>(job.time_left_ns());
     message->cells.resize(8);
@@ -89,22 +90,27 @@ struct SmallGraph {
     }
     const VirtualClock clock;
     Setup setup{clock, {}, {}, 1, std::nullopt, 0};
-    for (Node* node : {static_cast<Node*>(&device), static_cast<Node*>(&filter), static_cast<Node*>(&reader)})
+    for (Node* node : {static_cast<Node*>(&device), static_cast<Node*>(&filter), static_cast<Node*>(&reader)}) {
       node->setup(setup);
+      for (ParamBase* param : node->params()) param->end_setup();
+    }
     for (const TaskPlan& task : plan.tasks)
       for (const EdgePlan& edge : task.edges)
         PortAccess::connect(*task.node->inputs()[edge.input], plan.ports[edge.port].capacity);
   }
 };
 
-/// Runs a fresh graph for `seconds` of virtual time and records it.
-inline record::RecordResult record_run(mcap::Sink& sink, int64_t seconds, record::Recorder::Options how = {}) {
-  SmallGraph graph;
+/// Runs the graph for `seconds` of virtual time and records it.
+inline record::RecordResult record_run(SmallGraph& graph, mcap::Sink& sink, int64_t seconds,
+                                       record::Recorder::Options how = {}, const record::Head& head = {},
+                                       const std::function<void(RunBoard&)>& meanwhile = {}) {
   RunBoard board(graph.plan);
   VirtualClock clock(1'000'000'000);
   const auto transport = make_local_transport(graph.plan.ports);
   how.by_caller = true;
-  record::Recorder recorder(graph.plan, board, *transport, sink, {{{"format", "1"}}, {}}, std::move(how));
+  record::Head told = head;
+  told.facts["format"] = "1";
+  record::Recorder recorder(graph.plan, board, *transport, sink, told, std::move(how));
   trace::Rings rings(4);
   trace::Collector::Options heard;
   heard.best = trace::Source::none;
@@ -118,6 +124,7 @@ inline record::RecordResult record_run(mcap::Sink& sink, int64_t seconds, record
   run.after_job = [&] {
     collector.drain();
     recorder.capture();
+    if (meanwhile) meanwhile(board);
   };
   Executor executor(graph.plan, *transport, clock, run);
   executor.run();

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <string>
+#include <tl/expected.hpp>
+
+#include "rt/record/log_file.hpp"
+#include "rt/record/mcap/file_sink.hpp"
+
+namespace takt::log {
+
+struct Exported {
+  uint64_t messages = 0;   ///< written
+  uint64_t hash_only = 0;  ///< of which the record does not have the fields: a replay can make them
+  uint64_t bytes = 0;
+};
+
+/// Writes what the record holds with all fields as MCAP with messages in JSON that other programs show: images, clouds,
+/// scans, grids, poses and texts in Foxglove's well-known schemas (a pair as `NODE.PORT.left` and `.right`, where a
+/// sensor sits on the robot as a transform on `/tf`), everything else by its own fields. Stamps are those of the data.
+/// Error: the file takes no more, or the record does not hold its plan.
+tl::expected<Exported, std::string> export_log(record::LogFile& log, mcap::Sink& sink);
+
+}  // namespace takt::log
