@@ -7,8 +7,6 @@
 #include <algorithm>
 #include <cstdio>
 #include <ctime>
-#include <fstream>
-#include <iterator>
 #include <optional>
 #include <sstream>
 
@@ -33,11 +31,6 @@ struct Refused {
 std::string fact(const mcap::Metadata& facts, const std::string& name) {
   const auto found = facts.find(name);
   return found == facts.end() ? "" : found->second;
-}
-
-std::string text_of(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
 }
 
 Json attached_json(const record::LogFile& file, const char* name) {
@@ -140,7 +133,7 @@ class Replay {
     for (const auto& [path, hash] : assets.items())
       if (hashes.value(path, "") != hash)
         throw Refused{fmt::format("{} is not what it was when the record was made", (graph.directory / path).string())};
-    if (text_of(graph.file) != file_->attached("graph.yaml"))
+    if (log::file_text(graph.file) != file_->attached("graph.yaml"))
       std::fprintf(stderr, "takt: %s has changed since the record was made\n", graph.file.c_str());
     for (const std::string& param : log::changed_params(recorded_, plan))
       std::fprintf(stderr, "takt: %s\n", param.c_str());

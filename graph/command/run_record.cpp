@@ -6,7 +6,6 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
-#include <fstream>
 #include <iterator>
 #include <stdexcept>
 
@@ -33,11 +32,6 @@ std::vector<char> whole_ports(const Plan& plan, const std::vector<std::string>& 
   for (const TaskPlan& task : plan.tasks)
     for (const size_t port : task.ports) whole[port] |= static_cast<char>(task.device);
   return whole;
-}
-
-std::string text_of(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
 }
 
 std::string absolute(const std::filesystem::path& file) {
@@ -81,8 +75,8 @@ void RunRecord::begin(const graph::GraphSpec& graph, const Plan& plan, const Run
                 {"program", log::file_hash("/proc/self/exe")},
                 {"simd", hwy::TargetName(hwy::SupportedTargets() & -hwy::SupportedTargets())},
                 {"machine", machine_facts().dump()}};
-  const std::string texts[]{text_of(graph.file), text_of(graph.schedule.file), log::plan_json(plan).dump(),
-                            log::asset_hashes(plan, graph.directory).dump()};
+  const std::string texts[]{log::file_text(graph.file), log::file_text(graph.schedule.file),
+                            log::plan_json(plan).dump(), log::asset_hashes(plan, graph.directory).dump()};
   const char* names[]{"graph.yaml", "schedule.yaml", "plan.json", "assets.json"};
   for (size_t i = 0; i < std::size(texts); ++i)
     head.files.push_back({0, 0, names[i], i < 2 ? "application/yaml" : "application/json", mcap::bytes_of(texts[i])});

@@ -5,12 +5,11 @@
 #include <cstring>
 #include <functional>
 #include <map>
-#include <memory>
-#include <new>
 
 #include "graph/attach/message_text.hpp"
 #include "graph/log/recorded_plan.hpp"
 #include "graph/view/markup.hpp"
+#include "rt/memory/aligned_bytes.hpp"
 #include "rt/msg/messages.hpp"
 #include "rt/record/mcap/writer.hpp"
 
@@ -227,16 +226,6 @@ Json schema_of(const Json& value, const std::string& name = "") {
   return {{"type", value.is_number_integer() ? "integer" : "number"}};
 }
 
-const MessageType* type_named(const std::string& name) {
-  for (const MessageType* type : message_types())
-    if (type->name == name) return type;
-  return nullptr;
-}
-
-struct FreeAligned {
-  void operator()(std::byte* memory) const { ::operator delete[](memory, std::align_val_t{64}); }
-};
-
 class Export {
  public:
   Export(record::LogFile& log, mcap::Sink& sink) : log_(log), file_(sink, {}) {}
@@ -258,8 +247,7 @@ class Export {
 
  private:
   void export_port(const std::string& port, const MessageType& type, const Capacity& capacity) {
-    const std::unique_ptr<std::byte[], FreeAligned> memory(
-        static_cast<std::byte*>(::operator new[](type.bytes(capacity), std::align_val_t{64})));
+    const AlignedBytes memory = aligned_bytes(type.bytes(capacity));
     const uint16_t channel = log_.channel(port);
     const std::vector<Form> forms = forms_of(type);
     for (const auto& [sequence, known] : log_.messages(channel)) {

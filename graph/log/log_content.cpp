@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cstddef>
 
-#include "rt/msg/messages.hpp"
 #include "rt/record/recorder.hpp"
 
 namespace takt::log {
@@ -101,12 +100,6 @@ std::vector<std::pair<std::string, NodeFigures>> figures(const LogFile& log) {
   return all;
 }
 
-const MessageType* type_named(const std::string& name) {
-  for (const MessageType* type : message_types())
-    if (name == "takt." + std::string(type->name)) return type;
-  return nullptr;
-}
-
 std::string schema_name(const LogFile& log, const mcap::Channel& channel) {
   for (const mcap::Schema& schema : log.container().schemas())
     if (schema.id == channel.schema) return schema.name;
@@ -115,7 +108,8 @@ std::string schema_name(const LogFile& log, const mcap::Channel& channel) {
 
 /// The first field in which two messages of one channel differ, where both are there with all fields.
 std::string where_they_part(LogFile& from, LogFile& to, const mcap::Channel& channel, uint64_t sequence) {
-  const MessageType* type = type_named(schema_name(from, channel));
+  const std::string schema = schema_name(from, channel), prefix = "takt.";
+  const MessageType* type = schema.starts_with(prefix) ? type_named(schema.substr(prefix.size())) : nullptr;
   const auto reference = from.message(channel.id, sequence), other = to.message(to.channel(channel.topic), sequence);
   if (type == nullptr || !reference || !other) return "";
   if (reference->stamp_ns != other->stamp_ns)

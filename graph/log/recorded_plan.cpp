@@ -8,6 +8,7 @@
 #include <iterator>
 #include <map>
 
+#include "rt/msg/messages.hpp"
 #include "rt/node.hpp"
 #include "rt/record/message_record.hpp"
 
@@ -23,11 +24,6 @@ Json task_json(const Plan& plan, const TaskPlan& task) {
   for (const size_t port : task.ports) outputs.push_back(plan.ports[port].port);
   for (const ParamBase* param : task.node->params()) params[std::string(param->name())] = param->value_text();
   return {{"name", task.name}, {"device", task.device}, {"edges", edges}, {"outputs", outputs}, {"params", params}};
-}
-
-std::string text_of(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
 }
 
 std::string hash_text(const std::string& text) {
@@ -113,6 +109,17 @@ Json asset_hashes(const Plan& plan, const std::filesystem::path& directory) {
   return hashes;
 }
 
-std::string file_hash(const std::filesystem::path& file) { return hash_text(text_of(file)); }
+std::string file_hash(const std::filesystem::path& file) { return hash_text(file_text(file)); }
+
+std::string file_text(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+const MessageType* type_named(std::string_view name) {
+  for (const MessageType* type : message_types())
+    if (type->name == name) return type;
+  return nullptr;
+}
 
 }  // namespace takt::log

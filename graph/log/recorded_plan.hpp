@@ -31,7 +31,13 @@ Capacity capacity_of(const Json& recorded, size_t index);
 /// as it stands there. A folder is all files below it, by name.
 Json asset_hashes(const Plan& plan, const std::filesystem::path& directory);
 
-/// Hash of a file, as hexadecimal digits; empty if it cannot be read.
+/// Hash of a file, as hexadecimal digits; that of nothing if it cannot be read.
 std::string file_hash(const std::filesystem::path& file);
+
+/// All of a file; empty if it cannot be read.
+std::string file_text(const std::filesystem::path& file);
+
+/// By the name that a record has for it; null if this program does not know it.
+const MessageType* type_named(std::string_view name);
 
 }  // namespace takt::log

@@ -6,16 +6,11 @@
 #include <new>
 #include <utility>
 
+#include "rt/memory/aligned_bytes.hpp"
 #include "rt/sched/port_access.hpp"
 
 namespace takt::record {
 namespace {
-
-constexpr std::align_val_t kAlignment{64};
-
-struct FreeAligned {
-  void operator()(std::byte* memory) const { ::operator delete[](memory, kAlignment); }
-};
 
 /// By start; a job that starts when another publishes may hold what that one made.
 std::vector<const RecordedJob*> in_order(const std::vector<RecordedJob>& jobs) {
@@ -47,10 +42,7 @@ const char* to_string(Question question) {
 
 /// A message in memory of its own.
 struct Replayer::Stored {
-  explicit Stored(const PortPlan& port)
-      : bytes(port.chunk_bytes()), memory(static_cast<std::byte*>(::operator new[](bytes, kAlignment))) {
-    place(port);
-  }
+  explicit Stored(const PortPlan& port) : bytes(port.chunk_bytes()), memory(aligned_bytes(bytes)) { place(port); }
   /// Empty again. What a node does not write itself is no zero by chance.
   void place(const PortPlan& port) {
     std::memset(memory.get(), 0xA5, bytes);
@@ -61,7 +53,7 @@ struct Replayer::Stored {
   const void* message() const { return header + 1; }
 
   size_t bytes;
-  std::unique_ptr<std::byte[], FreeAligned> memory;
+  AlignedBytes memory;
   MessageHeader* header = nullptr;
 };
 
