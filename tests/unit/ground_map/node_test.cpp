@@ -40,7 +40,7 @@ struct FloorPair : test::Box<StereoPair> {
         const auto p = projection.floor_at(x, y);
         const bool floor = p && p->y_m < wall_y_m;
         uint8_t* pixel = &pair.left_view().at(x, y);
-        pixel[0] = floor ? static_cast<uint8_t>(floor_value / 2) : 200;
+        pixel[0] = floor ? static_cast<uint8_t>(floor_value / 2) : uint8_t{200};
         pixel[1] = pixel[2] = static_cast<uint8_t>(floor ? floor_value : 60);
       }
   }
