@@ -48,12 +48,11 @@ struct CpuBudget {
   int64_t left_ns() const { return budget_ns - (used_ns != nullptr ? used_ns() - used_before_ns : 0); }
 };
 
-/// What a job may ask the runtime, and what it was told: recorded, so that a replay can tell it again.
-enum class Question : uint8_t {
-  now,
-  time_left,
-  chunk
-};  ///< chunk: whether there is one to loan, asked where there is none
+/// What a job may ask the runtime, beside its inputs: Job::now_ns, Job::time_left_ns, and a chunk to loan (noted only
+/// where there was none).
+enum class Question : uint8_t { now, time_left, chunk };
+
+/// The answers that a job was given, in the same order, for its replay.
 class RecordedAnswers {
  public:
   virtual ~RecordedAnswers() = default;

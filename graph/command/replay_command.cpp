@@ -14,6 +14,7 @@
 #include "graph/command/run_support.hpp"
 #include "graph/compose/composition.hpp"
 #include "graph/language/words.hpp"
+#include "graph/log/log_content.hpp"
 #include "graph/log/recorded_plan.hpp"
 #include "rt/record/replayer.hpp"
 #include "takt_commit.hpp"
@@ -21,17 +22,13 @@
 namespace takt::command {
 namespace {
 
+using log::fact;
 using log::Json;
 
 /// Ends the command with a reason.
 struct Refused {
   std::string why;
 };
-
-std::string fact(const mcap::Metadata& facts, const std::string& name) {
-  const auto found = facts.find(name);
-  return found == facts.end() ? "" : found->second;
-}
 
 Json attached_json(const record::LogFile& file, const char* name) {
   const auto text = file.attached(name);

@@ -17,13 +17,8 @@ using record::Recorder;
 
 Json plan_of(const LogFile& log) { return Json::parse(log.attached("plan.json").value_or("")); }
 
-std::string text(const mcap::Metadata& facts, const char* name) {
-  const auto found = facts.find(name);
-  return found == facts.end() ? "" : found->second;
-}
-
 uint64_t count(const mcap::Metadata& facts, const char* name) {
-  return std::strtoull(text(facts, name).c_str(), nullptr, 10);
+  return std::strtoull(fact(facts, name).c_str(), nullptr, 10);
 }
 
 /// Channels of ports by topic.
@@ -163,6 +158,11 @@ void compare_jobs(const LogFile& from, const LogFile& to, LogDifference& result)
 }
 
 }  // namespace
+
+std::string fact(const mcap::Metadata& facts, const std::string& name) {
+  const auto found = facts.find(name);
+  return found == facts.end() ? "" : found->second;
+}
 
 std::string content_hash(const LogFile& log) {
   std::vector<std::byte> all;

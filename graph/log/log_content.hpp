@@ -10,6 +10,9 @@
 
 namespace takt::log {
 
+/// One of the facts at the head or end of a record; empty if it does not state it.
+std::string fact(const mcap::Metadata& facts, const std::string& name);
+
 /// Everything that a reader asks first: what was run, for how long, what each channel holds, what is lost or damaged,
 /// the hash of the content. Throws nlohmann's exception if the record does not hold its plan.
 Json content_json(record::LogFile& log);

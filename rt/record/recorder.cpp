@@ -14,7 +14,7 @@
 namespace takt::record {
 namespace {
 
-/// Ports keep more messages than pass in this time (see ComposeOptions::recorded_ns).
+/// Far less than the time whose messages the ports keep for a recorder (250 ms in `takt run`).
 constexpr timespec kPause{0, 5'000'000};
 /// So much of a run is lost at most with a process that is killed.
 constexpr int64_t kChunkNs = 1'000'000'000;
@@ -59,14 +59,14 @@ void Recorder::add_channels(const Plan& plan) {
 void Recorder::capture_on() {
   pthread_setname_np(pthread_self(), "takt-record");
   while (!ending_.load()) {
-    for (Port& port : ports_) take_port(port);
+    take_ports();
     nanosleep(&kPause, nullptr);
   }
-  for (Port& port : ports_) take_port(port);
+  take_ports();
   result_.capture_cpu_ns = thread_cpu_ns();
 }
 
-void Recorder::capture() {
+void Recorder::take_ports() {
   for (Port& port : ports_) take_port(port);
 }
 
@@ -128,7 +128,7 @@ void Recorder::note(const mcap::Writer::Done& done) {
 RecordResult Recorder::finish(mcap::Metadata facts) {
   ending_.store(true);
   if (capturing_.joinable()) capturing_.join();
-  else capture();
+  else take_ports();
   queue_.close();
   writing_.join();
   result_.no_room = no_room_.load();

@@ -63,7 +63,7 @@ class Recorder {
   /// The next event of a thread that runs jobs. One thread at a time.
   void take(int32_t thread, const trace::Event& event) { jobs_.add(thread, event); }
   /// Copies what has been published since. Only with `by_caller`; after every job.
-  void capture();
+  void capture() { take_ports(); }
   /// After the last job, and after the last event was given: ends the file. `facts` are what is known only now.
   RecordResult finish(mcap::Metadata facts);
 
@@ -76,6 +76,7 @@ class Recorder {
     uint64_t seen = 0;
   };
   void add_channels(const Plan& plan);
+  void take_ports();
   void take_port(Port& port);
   void take_job(const RecordedJob& job);
   void push(uint16_t channel, uint64_t sequence, int64_t at_ns, std::vector<std::byte> data);

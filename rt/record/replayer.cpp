@@ -150,9 +150,25 @@ bool Replayer::runs(size_t task) const {
   return !plan_.tasks[task].device && (options_.run.empty() || options_.run[task] != 0);
 }
 
+bool Replayer::fits(const RecordedJob& job) const {
+  if (job.task >= plan_.tasks.size()) return false;
+  const TaskPlan& task = plan_.tasks[job.task];
+  const auto& inputs = job.inputs;
+  return std::all_of(inputs.begin(), inputs.end(),
+                     [&](const RecordedJob::Input& input) {
+                       return input.edge < task.edges.size() &&
+                              std::all_of(input.held.begin(), input.held.end(), [](const RecordedJob::Run& run) {
+                                return run.count <= InputPort::kMaxDepth;
+                              });
+                     }) &&
+         std::all_of(job.params.begin(), job.params.end(),
+                     [&](const RecordedJob::Param& param) { return param.param < task.node->params().size(); }) &&
+         job.level >= 0 && static_cast<size_t>(job.level) < task.node->levels().size();
+}
+
 void Replayer::count_uses() {
   for (const RecordedJob& job : log_.jobs()) {
-    if (!runs(job.task)) continue;
+    if (!fits(job) || !runs(job.task)) continue;
     for_each_held(job, [&](uint16_t edge, uint64_t sequence) {
       ++ports_[plan_.tasks[job.task].edges[edge].port].uses[sequence];
     });
@@ -163,6 +179,10 @@ ReplayResult Replayer::run(const std::function<bool()>& stop) {
   int64_t first = INT64_MAX, last = INT64_MIN;
   for (const RecordedJob* record : in_order(log_.jobs())) {
     if (stop && stop()) break;
+    if (!fits(*record)) {
+      ++result_.lacking;
+      continue;
+    }
     if (!runs(record->task)) continue;
     if (options_.pace) options_.pace(record->release_ns);
     first = std::min(first, record->release_ns);

@@ -27,7 +27,7 @@ struct ReplayResult {
   uint64_t compared = 0;            ///< messages that were in the record, whole or as hash
   uint64_t whole = 0;               ///< of them, field by field
   uint64_t different = 0;           ///< messages, or jobs that sent something else than in the record
-  uint64_t lacking = 0;             ///< jobs without all that they were given: lost in the record; they were not run
+  uint64_t lacking = 0;             ///< jobs without all that they were given: lost or damaged in the record; not run
   std::optional<Divergence> first;  ///< of the differences
   std::map<std::string, uint64_t> different_of;  ///< by node
   int64_t recorded_ns = 0;                       ///< from the first release to the last publication
@@ -61,6 +61,8 @@ class Replayer {
   struct Stored;
 
   bool runs(size_t task) const;
+  /// False if a damaged record names what the plan does not have.
+  bool fits(const RecordedJob& job) const;
   void count_uses();
   void run_job(const RecordedJob& record);
   bool fill_inputs(const RecordedJob& record);

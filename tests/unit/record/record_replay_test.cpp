@@ -179,6 +179,16 @@ TEST_CASE("A job that asks or sends something else than in the record is told") 
   CHECK(result.lacking == 30);  // the reader's jobs had grids that nobody makes now
 }
 
+TEST_CASE("Jobs that name what the plan does not have are not run") {
+  const Record record;
+  test::SmallGraph smaller;
+  smaller.plan.tasks[2].edges.clear();  // as if the reader's jobs named an edge too many
+  const ReplayResult result = replay(record, smaller);
+  CHECK(result.lacking == 30);
+  CHECK(result.jobs == 30);
+  CHECK(result.different == 0);
+}
+
 TEST_CASE("A record that is cut off anywhere replays as far as it goes") {
   const Record record({.file = {.chunk_bytes = 2000, .compression = mcap::Compression::zstd, .level = 1}});
   const std::string whole = bytes_of(record.file);
