@@ -221,6 +221,7 @@ class TracefsSource final : public SwitchSource {
     File file;
     int cpu = -1;
     Slice running = {};  ///< thread 0: nobody, or not known
+    bool seen = false;   ///< any switch so far: whom the next one comes from is then known
   };
 
   void take(Pipe& pipe, int64_t at, std::span<const std::byte> record, Switches& into) {
@@ -234,6 +235,8 @@ class TracefsSource final : public SwitchSource {
     const int64_t state = read_field(record, formats_.prev_state);
     const bool preempted = (state & kStateMask) == 0 || (state & kPreemptedFlag) != 0;
     const bool known = pipe.running.thread == static_cast<int32_t>(read_field(record, formats_.prev_pid));
+    if (!known && pipe.seen) ++lost_;  // at least one switch in between was not shown
+    pipe.seen = true;
     if (known) close_slice(pipe, at, preempted ? Slice::End::preempted : Slice::End::asleep, into);
     Slice& slice = pipe.running = {};
     slice.thread = static_cast<int32_t>(read_field(record, formats_.next_pid));
@@ -253,7 +256,7 @@ class TracefsSource final : public SwitchSource {
 
   /// Process ids in a container are not those of the kernel: then our threads would never be recognised. Some kernels
   /// also stop recording what an idle CPU switches to (after a fault in a tracer, until the next boot): then no stretch
-  /// on that CPU has a beginning.
+  /// on that CPU has a beginning. On a CPU that others keep busy the latter shows only later, in `lost`.
   bool sees_itself(std::string& why_not) {
     for (const Pipe& pipe : pipes_) {
       if (sees_itself_on(pipe.cpu)) continue;
@@ -265,17 +268,18 @@ class TracefsSource final : public SwitchSource {
   }
 
   bool sees_itself_on(int cpu) {
+    constexpr int kWakes = 5, kMostWakes = 20;  // the fewer, the likelier that the CPU was never idle before one
     const OnCpu here(cpu);
     Switches seen;
-    for (int tries = 0; tries < 20; ++tries) {
+    bool itself = false;
+    for (int wake = 0; wake < (itself ? kWakes : kMostWakes) && lost_ == 0; ++wake) {
       const timespec pause{0, 2'000'000};
       nanosleep(&pause, nullptr);
       drain(seen);
-      if (std::any_of(seen.slices.begin(), seen.slices.end(),
-                      [&](const Slice& s) { return s.thread == gettid() && s.cpu == cpu; }))
-        return true;
+      itself = std::any_of(seen.slices.begin(), seen.slices.end(),
+                           [&](const Slice& s) { return s.thread == gettid() && s.cpu == cpu; });
     }
-    return false;
+    return itself && lost_ == 0;
   }
 
   Instance instance_;  ///< goes after the files in it

@@ -50,7 +50,8 @@ named() {
   local middle
   middle=$(sed -nE "s/^$1 missed .*$2([0-9]+\.[0-9]+)$3.*/\1/p" "$work/stdout" | sort -n | awk '{v[NR] = $1} END {if (NR) print v[int((NR + 1) / 2)]}')
   echo "$1: injected $4 ms, told ${middle:-nothing}"
-  awk -v got="${middle:-99}" -v wanted="$4" 'BEGIN {exit got - wanted > 0.5 || wanted - got > 0.5}' || fail "$1: '${middle:-nothing}' instead of $4 ms"
+  awk -v got="${middle:-99}" -v wanted="$4" 'BEGIN {exit got - wanted > 0.5 || wanted - got > 0.5}' ||
+    fail "$1: '${middle:-nothing}' instead of $4 ms:"$'\n'"$(cat "$work/stdout" "$work/stderr")"
 }
 
 run() { "$takt" run "$work/injected.yaml" --unchecked --output "$work/out" "$@" >"$work/run.stdout" 2>"$work/run.stderr"; }
