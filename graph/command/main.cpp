@@ -73,6 +73,8 @@ void add_run(CLI::App& app, takt::command::RunOptions& o, int& exit_code) {
   run->add_option("--for", o.duration_s, "how long, e.g. 20s; 0s: until stopped")
       ->transform(CLI::Validator(duration, "DURATION"));
   run->add_option("--clock", o.clock, "real | virtual")->check(CLI::IsMember({"real", "virtual"}));
+  run->add_option("--durations", o.durations,
+                  "what jobs take in virtual time: budgets | random (half a budget to a whole one) | a record");
   run->add_option("--transport", o.transport, "local | iceoryx (default: local within a process, iceoryx between)")
       ->check(CLI::IsMember({"local", "iceoryx"}));
   run->add_option("--isolate", o.isolate, "none (one process) | subsystem")

@@ -10,6 +10,7 @@
 #include "graph/attach/server.hpp"
 #include "graph/command/doctor_command.hpp"
 #include "graph/command/isolated_run.hpp"
+#include "graph/command/job_durations.hpp"
 #include "graph/command/live_table.hpp"
 #include "graph/command/prepare.hpp"
 #include "graph/command/report.hpp"
@@ -37,6 +38,8 @@ std::unique_ptr<Transport> make_transport(const std::string& name, const Plan& p
 int execute(const RunOptions& options, Prepared& prepared, std::vector<std::string> adjusted) {
   const graph::GraphSpec& graph = *prepared.graph;
   graph::Composition& composition = *prepared.composition;
+  const auto durations = job_durations(options.durations, composition.plan, options.seed);
+  if (!durations) return refuse(durations.error(), kBadInput);
   const auto transport = make_transport(options.transport, composition.plan);
   RunBoard board(composition.plan);
   RunRecord record(options, composition.plan);
@@ -46,11 +49,14 @@ int execute(const RunOptions& options, Prepared& prepared, std::vector<std::stri
   run.require_policy = options.policy_required();
   run.board = &board;
   run.trace = trace.rings();
-  if (prepared.clock->is_virtual())
-    run.after_job = [&] {
+  if (prepared.clock->is_virtual()) {
+    run.after_step = [&] {
       trace.drain();
       record.capture();
     };
+    run.job_duration_ns = *durations;
+    run.ran = [&](const trace::Slice& slice) { trace.ran(slice); };
+  }
   Executor executor(composition.plan, *transport, *prepared.clock, run);
   const ProcessReading before = ProcessReading::now();
   RunResult result;
@@ -87,6 +93,10 @@ int execute(const RunOptions& options, Prepared& prepared, std::vector<std::stri
                              "none",
                              {},
                              std::move(adjusted)});
+  if (prepared.clock->is_virtual())
+    report["simulated"] = {{"policy", to_string(composition.plan.policy)},
+                           {"cores", composition.plan.cores.size()},
+                           {"durations", options.durations}};
   record.tell(report);
   int code = tell_faults(options, graph, board, result.policy_granted, report);
   if (!no_trace.empty()) code = refuse(no_trace, kBadInput);
@@ -108,7 +118,9 @@ int run_in_one_process(const RunOptions& options, Prepared& prepared, std::vecto
     std::fputs("takt: stopped before the run began\n", stderr);
     return kOk;
   }
-  choose_cores(prepared.composition->plan.cores, adjusted);
+  // In virtual time the cores of the schedule need not be there.
+  std::vector<int>& cores = prepared.composition->plan.cores;
+  if (!prepared.clock->is_virtual() || cores.empty()) choose_cores(cores, adjusted);
   if (const int code = admit(options, *prepared.graph, prepared.composition->plan, adjusted); code != kOk) return code;
   const CpuLatencyHold latency = hold_cpu_dma_latency();
   std::vector<std::string> lacks = prepare_process();
@@ -156,6 +168,8 @@ int run_graph(const RunOptions& options) {
     return refuse("--trace " + options.trace.string() + ": cannot be written; choose another place", kBadInput);
   if (!options.record.empty() && !writable(options.record))
     return refuse("--record " + options.record.string() + ": cannot be written; choose another place", kBadInput);
+  if (options.durations != "budgets" && options.clock != "virtual")
+    return refuse("--durations: only jobs in virtual time take what they are told; add --clock virtual", kBadInput);
   const StopOnSignal guard;
   try {
     return run_as_asked(options);

@@ -19,7 +19,11 @@ class RunTrace {
   trace::Rings* rings() const { return rings_.get(); }
   /// Begins to collect, in the process that lasts longest, and tells every event to the record.
   void collect(const Plan& plan, RunRecord& record);
-  /// Virtual time: after every job.
+  /// Virtual time: each stretch in which a lane had a core.
+  void ran(const trace::Slice& slice) {
+    if (collector_ && !options_.trace.empty()) collector_->add(slice);
+  }
+  /// Virtual time: after every half of a job.
   void drain() {
     if (collector_) collector_->drain();
   }

@@ -39,7 +39,9 @@ std::string quality_line(const Json& node) {
 
 /// What was asked of the kernel, and what it says it gave.
 std::string policy_text(const Json& report) {
-  if (report["clock"] == "virtual") return "jobs take exactly their budgets";
+  if (report.contains("simulated"))
+    return fmt::format("simulated: policy {}, cores {}, durations {}", report["simulated"]["policy"].get<std::string>(),
+                       report["simulated"]["cores"].get<int>(), report["simulated"]["durations"].get<std::string>());
   const auto verified = std::count_if(report["nodes"].begin(), report["nodes"].end(),
                                       [](const Json& node) { return node["granted"]["verified"].get<bool>(); });
   return fmt::format("policy {} granted (asked {}), read back for {} of {} nodes",

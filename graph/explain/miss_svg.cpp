@@ -50,7 +50,7 @@ class MissPicture {
   std::string draw() {
     std::string body = draw_row(node(), pieces_, true);
     std::set<int> cpus;
-    if (trace_.source == trace::Source::tracefs)
+    if (trace::knows_every_cpu(trace_.source))
       for (const trace::Slice& slice : trace_.slices) cpus.insert(slice.cpu);
     for (const int cpu : cpus)
       body += draw_row(fmt::format("CPU {}", cpu), evidence_.occupants(cpu, first_ns_, last_ns_), false);

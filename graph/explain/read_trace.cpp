@@ -83,9 +83,8 @@ class Reader {
   void read_facts(const Json& head) {
     trace::Trace& trace = result_.trace;
     const std::string source = head.at("source_of_preemption");
-    trace.source = source == "tracefs" ? trace::Source::tracefs
-                   : source == "perf"  ? trace::Source::perf
-                                       : trace::Source::none;
+    for (const auto known : {trace::Source::tracefs, trace::Source::perf, trace::Source::simulation})
+      if (source == trace::to_string(known)) trace.source = known;
     trace.source_note = head.at("source_note");
     trace.policy = head.at("policy_granted");
     trace.epoch_ns = instant(head.at("epoch_ns"));

@@ -88,6 +88,7 @@ const char* source_text(trace::Source source) {
   switch (source) {
     case trace::Source::tracefs: return "switches from tracefs";
     case trace::Source::perf: return "switches from perf, which names no culprit";
+    case trace::Source::simulation: return "switches as simulated";
     case trace::Source::none: break;
   }
   return "no source of switches, thread CPU clock only";

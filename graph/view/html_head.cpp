@@ -15,7 +15,9 @@ std::string or_not_recorded(const std::string& text) { return text.empty() ? "no
 std::string policy_text(const Json& report) {
   const std::string granted = words(at(report, "policy_granted")), asked = words(at(report, "policy_asked"));
   if (granted.empty()) return "not recorded";
-  if (words(at(report, "clock")) == "virtual") return "jobs take exactly their budgets (virtual clock)";
+  if (words(at(report, "clock")) == "virtual")
+    return fmt::format("{} simulated, durations {}", words(at(report, "simulated", "policy")),
+                       or_not_recorded(words(at(report, "simulated", "durations"))));
   const Json& nodes = at(report, "nodes");
   const auto verified = std::count_if(nodes.begin(), nodes.end(),
                                       [](const Json& node) { return at(node, "granted", "verified") == true; });

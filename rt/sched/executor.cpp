@@ -5,9 +5,7 @@
 
 #include <algorithm>
 #include <cstring>
-#include <set>
 #include <thread>
-#include <tuple>
 
 #include "rt/memory/memory_use.hpp"
 #include "rt/memory/process_memory.hpp"
@@ -15,6 +13,7 @@
 #include "rt/sched/cooperative.hpp"
 #include "rt/sched/lane_tasks.hpp"
 #include "rt/sched/rendezvous.hpp"
+#include "rt/sched/virtual_run.hpp"
 #include "rt/sched/worker_threads.hpp"
 
 namespace takt {
@@ -215,36 +214,11 @@ void Executor::join(RunResult& result) {
 }
 
 void Executor::run_virtual(RunResult& result) {
-  auto& clock = dynamic_cast<VirtualClock&>(clock_);
-  const trace::Thread traced(options_.trace, "takt-virtual");
   start_clockwork(result);
   start_counting();
-  // Ordered by instant, then deadline, then lane: the same order in every run.
-  using Event = std::tuple<int64_t, int64_t, size_t, size_t>;
-  std::multiset<Event> events;
-  const auto expect_head = [&](size_t lane) {
-    events.insert({lanes_[lane]->next_release_ns(), lanes_[lane]->next_deadline_ns(), lane, 0});
-  };
-  for (size_t i = 0; i < lanes_.size(); ++i) expect_head(i);
-  std::vector<Lane::Activation> released;
-  while (!events.empty()) {
-    const auto [instant, deadline, lane, member] = *events.begin();
-    events.erase(events.begin());
-    if (instant >= stop_.end_ns() && member == 0) continue;
-    clock.advance_to(instant);
-    released.clear();
-    if (member == 0) {
-      lanes_[lane]->run_head_modelled(stop_, released);
-      expect_head(lane);
-    } else {
-      lanes_[lane]->run_follower_modelled({member, instant}, released);
-    }
-    for (const auto& a : released) {
-      const int64_t relative = tasks_[lanes_[lane]->members()[a.member]]->plan().deadline_ns;
-      events.insert({a.release_ns, a.release_ns + relative, lane, a.member});
-    }
-    if (options_.after_job) options_.after_job();
-  }
+  VirtualRun(plan_, lanes_, dynamic_cast<VirtualClock&>(clock_), stop_,
+             {options_.job_duration_ns, options_.after_step, options_.ran, options_.trace})
+      .run();
 }
 
 uint64_t left_out_jobs(const Plan& plan, const RunBoard& board, size_t task, int64_t epoch_ns, int64_t end_ns) {

@@ -7,18 +7,20 @@
 #include <string>
 #include <vector>
 
+#include "rt/memory/sanitized.hpp"
 #include "rt/sched/grant.hpp"
 #include "rt/sched/lane.hpp"
 #include "rt/sched/run_board.hpp"
 #include "rt/sched/watchdog.hpp"
 #include "rt/trace/rings.hpp"
+#include "rt/trace/trace.hpp"
 
 namespace takt {
 
 /// The outcome of a run, for the report.
 struct RunResult {
   int64_t epoch_ns = 0, end_ns = 0;             ///< planned releases lie in [epoch, end)
-  Policy policy_granted = Policy::cooperative;  ///< also in virtual time, which asks the kernel for nothing
+  Policy policy_granted = Policy::cooperative;  ///< so too in virtual time, which asks the kernel for nothing
   std::vector<uint64_t> released;               ///< per task, see released_jobs()
   std::vector<size_t> stuck = {};               ///< tasks with a job that never returned, see Executor::run
   std::vector<std::string> refused;             ///< what the kernel refused, with the fix; not where a gate decides
@@ -51,15 +53,19 @@ class StartGate {
 class Executor {
  public:
   struct Options {
-    int64_t duration_ns = 0;                   ///< 0: until stop() or the end of the data
-    int64_t start_delay_ns = 50'000'000;       ///< from run() to the epoch
-    bool require_policy = false;               ///< a refused policy ends the run instead of falling back to cooperative
-    RunBoard* board = nullptr;                 ///< shared with other processes; null: one of its own
-    StartGate* gate = nullptr;                 ///< where other processes are waited for
-    std::vector<bool> own = {};                ///< by task: this process runs it; empty: all
-    int64_t hang_patience_ns = 1'000'000'000;  ///< a job that has not returned this long after its deadline hangs
-    std::function<void()> after_job = {};      ///< virtual time: called after each job
-    trace::Rings* trace = nullptr;             ///< where the threads that run jobs note events; null: nowhere
+    int64_t duration_ns = 0;              ///< 0: until stop() or the end of the data
+    int64_t start_delay_ns = 50'000'000;  ///< from run() to the epoch
+    bool require_policy = false;          ///< a refused policy ends the run instead of falling back to cooperative
+    RunBoard* board = nullptr;            ///< shared with other processes; null: one of its own
+    StartGate* gate = nullptr;            ///< where other processes are waited for
+    std::vector<bool> own = {};           ///< by task: this process runs it; empty: all
+    /// A job that has not returned this long after its deadline hangs.
+    int64_t hang_patience_ns = kSanitized ? 20'000'000'000 : 1'000'000'000;
+    // Virtual time: see VirtualRun::Options.
+    std::function<int64_t(size_t task, uint64_t job)> job_duration_ns = {};
+    std::function<void()> after_step = {};
+    std::function<void(const trace::Slice&)> ran = {};
+    trace::Rings* trace = nullptr;  ///< where the threads that run jobs note events; null: nowhere
   };
 
   Executor(const Plan& plan, Transport& transport, Clock& clock, const Options& options);

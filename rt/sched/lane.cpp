@@ -54,8 +54,12 @@ void Lane::run_next(const Clock& clock, StopSignal& stop) {
   // Page faults are asked for once a pass and stand with its head: asking costs more than an empty job.
   for (size_t m = 0; m < tasks_.size(); ++m)
     if (ran_[m]) tasks_[m]->count(m == 0 ? take_page_faults() : 0);
+  go_on(clock.now_ns(), stop.end_ns());
+}
+
+void Lane::go_on(int64_t now_ns, int64_t end_ns) {
   go_to(next_ + 1);
-  skip_passed(clock.now_ns(), stop.end_ns());
+  skip_passed(now_ns, end_ns);
 }
 
 void Lane::skip_passed(int64_t now_ns, int64_t end_ns) {
@@ -71,28 +75,20 @@ void Lane::skip_passed(int64_t now_ns, int64_t end_ns) {
   }
 }
 
-void Lane::run_head_modelled(StopSignal& stop, std::vector<Activation>& released) {
-  const int64_t release = next_release_ns();
-  const JobEnd end = head().run(static_cast<uint64_t>(next_), release, head().plan().budget_ns);
-  head().count(take_page_faults());
-  if (end.end_of_data) {
-    stop.raise(release);
-    return;
-  }
-  go_to(next_ + 1);
-  for (size_t m = 1; m < tasks_.size(); ++m) {
-    if (followers_[m].producer == 0 && activates(m, end.visible_at_ns)) released.push_back({m, end.visible_at_ns});
-  }
+int64_t Lane::begin(const Activation& job, int64_t duration_ns) {
+  return tasks_[job.member]->begin(index(job.member), job.release_ns, duration_ns);
 }
 
-void Lane::run_follower_modelled(const Activation& activation, std::vector<Activation>& released) {
-  Task& task = *tasks_[activation.member];
-  const JobEnd end = task.run(followers_[activation.member].index++, activation.release_ns, task.plan().budget_ns);
+JobEnd Lane::finish(const Activation& job, int core, std::vector<Activation>& released) {
+  Task& task = *tasks_[job.member];
+  const JobEnd end = task.finish(core);
   task.count(take_page_faults());
-  for (size_t m = 1; m < tasks_.size(); ++m) {
-    if (followers_[m].producer == activation.member && activates(m, end.visible_at_ns))
+  if (job.member > 0) ++followers_[job.member].index;
+  if (end.end_of_data) return end;
+  for (size_t m = 1; m < tasks_.size(); ++m)
+    if (followers_[m].producer == job.member && activates(m, end.visible_at_ns))
       released.push_back({m, end.visible_at_ns});
-  }
+  return end;
 }
 
 std::vector<std::pair<size_t, size_t>> low_before_high(const Plan& plan) {

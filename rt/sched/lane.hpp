@@ -26,14 +26,19 @@ class Lane {
   /// Runs the next job of the head and the jobs it releases; afterwards moves on to the next release still wanted.
   /// Raises `stop` at the head's release if a device's recorded data ended.
   void run_next(const Clock& clock, StopSignal& stop);
-  /// The same in virtual time: each job finishes its budget after its release. Returns the followers' activations
-  /// instead of running them.
+  /// In virtual time, job by job: the member to run, and its release.
   struct Activation {
-    size_t member;
-    int64_t release_ns;
+    size_t member = 0;
+    int64_t release_ns = 0;
   };
-  void run_head_modelled(StopSignal& stop, std::vector<Activation>& released);
-  void run_follower_modelled(const Activation& activation, std::vector<Activation>& released);
+  /// Latches and works; the time that the job is taken to need, `duration_ns` being that at full quality.
+  int64_t begin(const Activation& job, int64_t duration_ns);
+  /// Publishes and counts; adds the followers that this releases.
+  JobEnd finish(const Activation& job, int core, std::vector<Activation>& released);
+  /// After the last job of a pass: moves on to the next release still wanted.
+  void go_on(int64_t now_ns, int64_t end_ns);
+  /// Number of the job that this member begins next.
+  uint64_t index(size_t member) const { return member == 0 ? static_cast<uint64_t>(next_) : followers_[member].index; }
 
   /// What the watchdog sees of the worker that runs this lane.
   JobWatch& watch() { return *watch_; }

@@ -7,7 +7,6 @@
 #include <cstdio>
 #include <cstring>
 #include <exception>
-#include <optional>
 #include <span>
 #include <utility>
 
@@ -49,6 +48,7 @@ double TaskStatistics::drift_us() const {
 Task::Task(const Plan& plan, size_t index, Transport& transport, const Clock& clock, RunBoard& board)
     : plan_(plan.tasks[index]),
       clock_(clock),
+      modelled_(clock.is_virtual()),
       board_(board),
       index_(index),
       statistics_(board.task(index)),
@@ -99,29 +99,24 @@ void Task::take_mail() {
   if (trace::on() && mail.state.load(std::memory_order_relaxed) == ParamMail::taken) trace_param(mail);
 }
 
-JobEnd Task::run(uint64_t index, int64_t release_ns, int64_t modelled_ns) {
-  const bool modelled = modelled_ns >= 0;
+int64_t Task::begin(uint64_t index, int64_t release_ns, int64_t duration_ns) {
   const int64_t started = clock_.now_ns();
-  const int64_t deadline = release_ns + plan_.deadline_ns;
-
   const Mode& mode = mode_of(release_ns);
-
   ended_ = {};
   ended_.index = index;
   ended_.release_ns = release_ns;
   ended_.started_ns = started;
-  ended_.modelled = modelled;
   take_mail();
   // Which releases a mode leaves out is known from outside, but for those that a producer causes.
-  if (!mode.runs) return pass_over(started, !plan_.rate);
+  if (!mode.runs) return pass_over(started, !plan_.rate), 0;
   latch_.acquire_requests(release_ns, started);
   if (!wanted(index)) {
     latch_.release();
-    return pass_over(started, true);
+    return pass_over(started, true), 0;
   }
   calls_.job = index;
   calls_.warm = jobs_run_++ < kWarmUpJobs;
-  std::optional<JobScope> scope(calls_);
+  const JobScope scope(calls_);
   ended_.stale = latch_.acquire(release_ns, started);
   ended_.new_input = first_input_ != nullptr && first_input_->is_new();
   ended_.level = quality_.level();
@@ -129,33 +124,40 @@ JobEnd Task::run(uint64_t index, int64_t release_ns, int64_t modelled_ns) {
     trace_start();
     trace_inputs();
   }
-  const CpuBudget cpu{plan_.budget_ns, last_thread_use_ns(), modelled ? nullptr : &thread_cpu_ns};
-  Job job(clock_, index, release_ns, deadline, ended_.level, mode.name, cpu);
+  const CpuBudget cpu{plan_.budget_ns, last_thread_use_ns(), modelled_ ? nullptr : &thread_cpu_ns};
+  Job job(clock_, index, release_ns, release_ns + plan_.deadline_ns, ended_.level, mode.name, cpu);
   work(job, release_ns);
-
-  JobEnd& end = ended_.end;
-  end.end_of_data = job.ended();
-  if (modelled) {
-    const double cost = plan_.node->levels()[static_cast<size_t>(ended_.level)].cost;
-    ended_.modelled_ns = static_cast<int64_t>(static_cast<double>(modelled_ns) * cost);
-  }
-  end.finished_ns = modelled ? std::max(started, release_ns) + ended_.modelled_ns : clock_.now_ns();
-  publish(end, deadline, modelled);
-  latch_.release();
-  scope.reset();
-  if (calls_.heap_refused > 0) tell_refused_memory();
   ended_.ran = true;
+  ended_.end.end_of_data = job.ended();
   ended_.no_result = job.without_result();
-  ended_.cpu = modelled ? 0 : sched_getcpu();
+  if (!modelled_) return 0;
   ended_.used = take_thread_use();
+  const double cost = plan_.node->levels()[static_cast<size_t>(ended_.level)].cost;
+  return ended_.exec_ns = static_cast<int64_t>(static_cast<double>(duration_ns) * cost);
+}
+
+JobEnd Task::finish(int modelled_cpu) {
+  JobEnd& end = ended_.end;
+  if (!ended_.ran) return end;
+  {
+    const JobScope scope(calls_);
+    end.finished_ns = clock_.now_ns();
+    publish(end, ended_.release_ns + plan_.deadline_ns);
+    latch_.release();
+  }
+  if (calls_.heap_refused > 0) tell_refused_memory();
+  ended_.cpu = modelled_ ? modelled_cpu : sched_getcpu();
+  const ThreadUse used = take_thread_use();
+  ended_.used.cpu_ns += used.cpu_ns;
+  ended_.used.allocations += used.allocations;
+  if (!modelled_) ended_.exec_ns = used.cpu_ns;
   return end;
 }
 
-JobEnd Task::pass_over(int64_t now_ns, bool count) {
+void Task::pass_over(int64_t now_ns, bool count) {
   std::fill(published_.begin(), published_.end(), false);
   ended_.paused = count;
   ended_.end.finished_ns = ended_.end.visible_at_ns = now_ns;
-  return ended_.end;
 }
 
 void Task::work(Job& job, int64_t release_ns) {
@@ -222,17 +224,17 @@ void Task::count_end() {
   statistics_.allocations += used.allocations;
   if (end.end_of_data) return;
   statistics_.add_lateness(ended_.started_ns - ended_.release_ns);
-  statistics_.exec.add(used.cpu_ns);
-  statistics_.last_exec_ns.store(used.cpu_ns, std::memory_order_relaxed);
-  if (!ended_.modelled)
-    statistics_.preempted_ns += std::max<int64_t>(0, end.finished_ns - ended_.started_ns - used.cpu_ns);
+  const int64_t exec_ns = ended_.exec_ns;
+  statistics_.exec.add(exec_ns);
+  statistics_.last_exec_ns.store(exec_ns, std::memory_order_relaxed);
+  statistics_.preempted_ns += std::max<int64_t>(0, end.finished_ns - ended_.started_ns - exec_ns);
   statistics_.publish.add(ended_.publish_took_ns);
   const int64_t response = ended_.published_ns - ended_.release_ns;
   statistics_.response.add(response);
   statistics_.last_response_ns.store(response, std::memory_order_relaxed);
-  const bool over_budget = plan_.budget_ns > 0 && used.cpu_ns > plan_.budget_ns;
+  const bool over_budget = plan_.budget_ns > 0 && exec_ns > plan_.budget_ns;
   if (over_budget) add(statistics_.budget_overruns);
-  count_level(ended_.modelled ? ended_.modelled_ns : used.cpu_ns, response);
+  count_level(response);
   if (ended_.no_result) add(statistics_.no_result);
   if (end.late) add(statistics_.deadline_misses);
   if (end.late && plan_.on_miss == OnMiss::safe_stop) ask_for_safe_stop("deadline missed");
@@ -249,11 +251,11 @@ void Task::count_end() {
 void Task::ask_for_safe_stop(const char* why) {
   char reason[120];
   std::snprintf(reason, sizeof reason, "%s: %s", plan_.name.c_str(), why);
-  const int64_t lead_ns = ended_.modelled ? 0 : ModeLog::kLead_ns;
+  const int64_t lead_ns = modelled_ ? 0 : ModeLog::kLead_ns;
   board_.safe_stop(ended_.end.finished_ns + lead_ns, reason);
 }
 
-void Task::count_level(int64_t exec_ns, int64_t response_ns) {
+void Task::count_level(int64_t response_ns) {
   add(statistics_.at_level[static_cast<size_t>(ended_.level)]);
   if (statistics_.last_level.load(std::memory_order_relaxed) != ended_.level) {
     const uint64_t n = statistics_.level_changes.load(std::memory_order_relaxed);
@@ -263,17 +265,17 @@ void Task::count_level(int64_t exec_ns, int64_t response_ns) {
     trace::level_change(static_cast<uint16_t>(index_), static_cast<uint32_t>(ended_.index), ended_.level,
                         ended_.started_ns);
   }
-  quality_.observe({ended_.release_ns, exec_ns, response_ns, ended_.no_result});
+  quality_.observe({ended_.release_ns, ended_.exec_ns, response_ns, ended_.no_result});
 }
 
-void Task::publish(JobEnd& end, int64_t deadline_ns, bool modelled) {
+void Task::publish(JobEnd& end, int64_t deadline_ns) {
   // The instant of publication is read once per job: all outputs of a job become visible together.
-  const int64_t now = modelled ? end.finished_ns : clock_.now_ns();
+  const int64_t now = clock_.now_ns();
   end.late = now > deadline_ns;
   end.visible_at_ns = plan_.publish == PublishAt::let ? std::max(now, deadline_ns) : now;
   for (size_t i = 0; i < writers_.size(); ++i) settle_output(i, end.late, now, end.visible_at_ns);
   ended_.published_ns = now;
-  ended_.publish_took_ns = modelled ? 0 : clock_.now_ns() - end.finished_ns;
+  ended_.publish_took_ns = clock_.now_ns() - end.finished_ns;
 }
 
 void Task::forget_from(int64_t end_ns) {

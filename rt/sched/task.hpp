@@ -29,9 +29,16 @@ class Task {
   Task(const Plan& plan, size_t index, Transport& transport, const Clock& clock, RunBoard& board);
   ~Task();
 
-  /// Runs job `index` released at `release_ns`. With modelled_ns >= 0 (virtual time) the job is taken to finish that
-  /// long after its release, times the declared cost of its quality level; otherwise the clock is read.
-  JobEnd run(uint64_t index, int64_t release_ns, int64_t modelled_ns = -1);
+  /// Runs job `index` released at `release_ns`.
+  JobEnd run(uint64_t index, int64_t release_ns) {
+    begin(index, release_ns);
+    return finish();
+  }
+  /// Its first half: latches and works. In virtual time a job is taken to need `duration_ns` at full quality; the time
+  /// it needs at its level is the answer.
+  int64_t begin(uint64_t index, int64_t release_ns, int64_t duration_ns = 0);
+  /// Its second half: publishes, on the CPU that the job is taken to run on (virtual time), and gives back its inputs.
+  JobEnd finish(int modelled_cpu = 0);
   /// Tells its jobs to the watchdog, as member `member` of its lane. Before the first job.
   void set_watch(JobWatch& watch, uint32_t member) {
     watch_ = &watch;
@@ -73,7 +80,7 @@ class Task {
   };
   const Mode& mode_of(int64_t release_ns) const { return modes_[board_.modes().at(release_ns)]; }
   /// The release passes without a job.
-  JobEnd pass_over(int64_t now_ns, bool count);
+  void pass_over(int64_t now_ns, bool count);
   /// Lets the node work, under the eyes of the watchdog.
   void work(Job& job, int64_t release_ns);
   void tell_exception(const Job& job, const char* what);
@@ -82,18 +89,19 @@ class Task {
   /// False if the requests visible at the release stop this task, or pace it past this job.
   bool wanted(uint64_t index) const;
   void take_mail();
-  void publish(JobEnd& end, int64_t deadline_ns, bool modelled);
+  void publish(JobEnd& end, int64_t deadline_ns);
   void count_end();
   void trace_param(const ParamMail& mail) const;
   void trace_start() const;
   void trace_inputs() const;
   void trace_end() const;
   void ask_for_safe_stop(const char* why);
-  void count_level(int64_t exec_ns, int64_t response_ns);
+  void count_level(int64_t response_ns);
   void settle_output(size_t output, bool late, int64_t now_ns, int64_t visible_at_ns);
 
   const TaskPlan plan_;
   const Clock& clock_;
+  const bool modelled_;      ///< on virtual time
   std::vector<Mode> modes_;  ///< as Plan::modes
   RunBoard& board_;
   const size_t index_;
@@ -109,11 +117,11 @@ class Task {
   std::vector<uint64_t> sequences_;  ///< of the newest message of each output
   /// The job that run() has ended and count() not yet counted.
   struct Ended {
-    bool ran = false, paused = false, modelled = false, new_input = false, no_result = false;
+    bool ran = false, paused = false, new_input = false, no_result = false;
     size_t stale = 0;
     uint64_t index = 0;
     int64_t release_ns = 0, started_ns = 0, published_ns = 0, publish_took_ns = 0;
-    int64_t modelled_ns = 0;
+    int64_t exec_ns = 0;  ///< what counts against the budget: CPU time, or what the job was taken to need
     int cpu = -1, level = 0;
     JobEnd end;
     ThreadUse used;

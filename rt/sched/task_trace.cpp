@@ -15,7 +15,7 @@ void Task::trace_start() const {
   const auto task = static_cast<uint16_t>(index_);
   const auto job = static_cast<uint32_t>(ended_.index);
   trace::record({ended_.release_ns, ended_.release_ns + plan_.deadline_ns, 0, job, task, trace::Kind::release, 0});
-  trace::record({ended_.started_ns, 0, ended_.modelled ? 0 : sched_getcpu(), job, task, trace::Kind::start,
+  trace::record({ended_.started_ns, 0, modelled_ ? 0 : sched_getcpu(), job, task, trace::Kind::start,
                  static_cast<uint8_t>(ended_.level)});
 }
 
@@ -63,7 +63,7 @@ void Task::trace_skip(uint64_t index, int64_t release_ns) const {
 void Task::trace_end() const {
   const JobEnd& end = ended_.end;
   const int64_t deadline_ns = ended_.release_ns + plan_.deadline_ns;
-  const int64_t cpu_ns = ended_.modelled ? end.finished_ns - ended_.started_ns : ended_.used.cpu_ns;
+  const int64_t cpu_ns = ended_.exec_ns;
   const auto note = [&](trace::Kind kind, int64_t at_ns, int64_t value, int64_t extra = 0, size_t port = 0) {
     trace::record({at_ns, value, extra, static_cast<uint32_t>(ended_.index), static_cast<uint16_t>(index_), kind,
                    static_cast<uint8_t>(port)});

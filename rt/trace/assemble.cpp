@@ -94,6 +94,7 @@ const char* to_string(Source source) {
   switch (source) {
     case Source::tracefs: return "tracefs";
     case Source::perf: return "perf";
+    case Source::simulation: return "simulation";
     case Source::none: break;
   }
   return "none";

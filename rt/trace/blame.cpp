@@ -84,7 +84,7 @@ class Course {
   }
 
   void wait_for_cpu(int64_t to_ns, int cpu, int priority) {
-    if (evidence_.trace().source != Source::tracefs)
+    if (!knows_every_cpu(evidence_.trace().source))
       return until(to_ns, started_ ? Cause::preempted : Cause::late, "", started_ ? cpu : -1);
     for (const Piece& occupant : evidence_.occupants(cpu, at_, to_ns)) {
       nobody_ran(occupant.from_ns, cpu, priority);

@@ -4,6 +4,7 @@
 #include <pthread.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <ctime>
 #include <fstream>
 #include <sstream>
@@ -46,9 +47,10 @@ Collector::Collector(Rings& rings, Options options) : rings_(rings), options_(st
   }
   recording_.source = source_ ? source_->kind() : Source::none;
   recording_.source_note = why_not;
+  if (options_.by_caller) return;
   recording_.first_ns = steal_read_ns_ = now_ns();
   steal_ticks_ = steal_ticks(options_.cpus);
-  if (!options_.by_caller) thread_ = std::thread([this] { collect(); });
+  thread_ = std::thread([this] { collect(); });
 }
 
 Collector::~Collector() {
@@ -60,7 +62,7 @@ Recording Collector::finish() {
   ended_.store(true);
   if (options_.by_caller) drain();
   else thread_.join();
-  recording_.last_ns = now_ns();
+  recording_.last_ns = now_ns();  // of a run in virtual time, whoever assembles it knows better
   if (source_) {
     source_->finish(recording_.last_ns, recording_.switches);
     recording_.losses.switches = source_->lost();
@@ -90,8 +92,17 @@ void Collector::drain() {
       recording_.events.push_back({thread, event});
     });
   if (source_) source_->drain(recording_.switches);
-  if (const int64_t now = now_ns(); now - steal_read_ns_ >= kStealPeriodNs) read_steal(now);
+  if (const int64_t now = options_.by_caller ? 0 : now_ns(); now - steal_read_ns_ >= kStealPeriodNs) read_steal(now);
   keep_within_limit();
+}
+
+void Collector::add(const Slice& slice) {
+  recording_.source = Source::simulation;
+  const auto thread = std::find_if(recording_.threads.begin(), recording_.threads.end(),
+                                   [&](const ThreadFacts& t) { return t.id == slice.thread; });
+  recording_.switches.slices.push_back(slice);
+  recording_.switches.slices.back().name =
+      recording_.switches.name(thread != recording_.threads.end() ? thread->name : "");
 }
 
 void Collector::follow_new_threads() {

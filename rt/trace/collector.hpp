@@ -34,7 +34,8 @@ class Collector {
     std::vector<int> cpus = {};       ///< whose switches are recorded
     Source best = Source::tracefs;    ///< nothing better is tried
     size_t records_kept = 4'000'000;  ///< of each kind, about 160 MB; beyond that the oldest go, counted
-    bool by_caller = false;           ///< virtual time: events are taken in drain() only, on the caller's thread
+    bool by_caller =
+        false;  ///< virtual time: events are taken in drain() only, on the caller's thread; no clock is read
     /// Hears every event as it is taken, thread and event.
     std::function<void(int32_t, const Event&)> listener = {};
   };
@@ -46,6 +47,8 @@ class Collector {
 
   /// Empties the rings now. Only with `by_caller`.
   void drain();
+  /// Who had a core, where nobody but a simulation knows. Only with `by_caller`.
+  void add(const Slice& slice);
   /// Ends collecting. Once.
   Recording finish();
 

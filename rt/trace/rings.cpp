@@ -25,12 +25,12 @@ Rings::Rings(size_t count) : count_(count), bytes_(sizeof(Ring) * (count + 1)) {
 
 Rings::~Rings() { munmap(shared_, bytes_); }
 
-Ring* Rings::claim(std::string_view name) {
+Ring* Rings::claim(std::string_view name, int32_t imagined) {
   const size_t index = shared_->next.fetch_add(1);
   if (index >= count_) return nullptr;
   Ring& ring = rings_[index];
   std::copy_n(name.data(), std::min(name.size(), ring.name.size() - 1), ring.name.data());
-  ring.writer.store(gettid(), std::memory_order_release);
+  ring.writer.store(imagined > 0 ? imagined : gettid(), std::memory_order_release);
   return &ring;
 }
 

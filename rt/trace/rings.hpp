@@ -17,8 +17,9 @@ class Rings {
   Rings(const Rings&) = delete;
   Rings& operator=(const Rings&) = delete;
 
-  /// A ring for the calling thread; null if all are taken (counted). Not in a job.
-  Ring* claim(std::string_view name);
+  /// A ring for the calling thread, or for one that is only imagined, under a number of its own (virtual time); null if
+  /// all are taken (counted). Not in a job.
+  Ring* claim(std::string_view name, int32_t imagined = 0);
   size_t claimed() const;
   Ring& ring(size_t i) { return rings_[i]; }
   /// Threads that came when every ring was taken: their events are not in the trace.
@@ -57,6 +58,15 @@ class Thread {
   ~Thread() { detail::thread_ring = nullptr; }
   Thread(const Thread&) = delete;
   Thread& operator=(const Thread&) = delete;
+};
+
+/// The calling thread notes into `ring` while this lives, as if it were another thread.
+class As {
+ public:
+  explicit As(Ring* ring) { detail::thread_ring = ring; }
+  ~As() { detail::thread_ring = nullptr; }
+  As(const As&) = delete;
+  As& operator=(const As&) = delete;
 };
 
 /// A node does less, or more again, from that job on.

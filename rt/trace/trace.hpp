@@ -12,11 +12,14 @@ namespace takt::trace {
 
 /// Where the knowledge of who had a CPU comes from.
 enum class Source : uint8_t {
-  tracefs,  ///< sched_switch of every CPU: names who ran instead
-  perf,     ///< PERF_RECORD_SWITCH of our own threads: when they did not run, not who did
-  none      ///< the CPU clock of each thread alone: how long they did not run
+  tracefs,     ///< sched_switch of every CPU: names who ran instead
+  perf,        ///< PERF_RECORD_SWITCH of our own threads: when they did not run, not who did
+  simulation,  ///< the schedule of a run in virtual time: everything
+  none         ///< the CPU clock of each thread alone: how long they did not run
 };
 const char* to_string(Source source);
+/// True if the slices of every CPU are known, not only those of our own threads.
+inline bool knows_every_cpu(Source source) { return source == Source::tracefs || source == Source::simulation; }
 
 struct Latched {
   uint8_t edge = 0;  ///< index into the task's edges

@@ -93,8 +93,11 @@ else
   echo "NOT RUN: injected causes need SCHED_FIFO and locked memory; run as root"
 fi
 
-# In virtual time everything is known exactly, and nobody preempts.
+# In virtual time everything is known exactly.
 run --clock virtual --for 1s --trace "$work/v.json"
+expect 0 "" "$takt" explain "$work/v.json" victim
+grep -q "^victim missed job 0 by 7.00 ms: preempted 10.00 by culprit on cpu $core, less 3.00 of slack (switches as sim" \
+  "$work/stdout" || fail "what was simulated is not what is told: $(cat "$work/stdout")"
 expect 0 "" "$takt" explain "$work/v.json" blocker
 grep -q "no job of blocker missed" "$work/stdout" || fail "a job that was in time is said to have missed"
 expect 2 "valid are: long_one" "$takt" explain "$work/v.json" nobody

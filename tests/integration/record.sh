@@ -16,6 +16,18 @@ for i in 1 2; do
 done
 [ "$(grep ^content "$work/1.txt")" = "$(grep ^content "$work/2.txt")" ] || fail "two virtual runs differ"
 tells 0 "the same" "$takt" log diff "$work/1.mcap" "$work/2.mcap"
+for seed in 5 5 6; do  # what jobs take is drawn, or taken from a record: the same again for the same seed or record
+  for how in random "$work/1.mcap"; do
+    tells 0 "nothing lost" "$takt" run --clock virtual --durations "$how" --seed $seed --for 1s --record "$work/d.mcap" --output "$work/out"
+    "$takt" log info "$work/d.mcap" | grep ^content >>"$work/$(basename "$how").$seed"
+  done
+done
+for same in random 1.mcap; do
+  [ "$(sort -u "$work/$same.5" | wc -l)" = 1 ] || fail "two runs with durations of $same differ"
+done
+[ "$(head -n 1 "$work/random.5")" != "$(cat "$work/random.6")" ] || fail "two seeds gave the same"
+expect 2 "add --clock virtual" "$takt" run --durations random --for 1s
+expect 2 "no_such.mcap" "$takt" run --clock virtual --durations "$work/no_such.mcap" --for 1s --output "$work/out"
 
 echo "=== real time, one process and several: every byte again"
 for isolate in none subsystem; do

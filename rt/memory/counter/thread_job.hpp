@@ -4,15 +4,7 @@
 #include <stddef.h>
 
 #include "rt/memory/job_calls.hpp"
-
-#if defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer) || __has_feature(memory_sanitizer)
-#define TAKT_SANITIZED 1
-#endif
-#endif
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define TAKT_SANITIZED 1
-#endif
+#include "rt/memory/sanitized.hpp"
 
 namespace takt::counter {
 

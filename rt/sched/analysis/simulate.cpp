@@ -69,6 +69,7 @@ void Simulator::finish_jobs() {
     core.job.reset();
     left_[done] = 0;
     jobs_[done].finish = now_;
+    if (hooks_.ran) hooks_.ran(jobs_[done], core.since, now_);
     std::vector<size_t>& queue = pending_[jobs_[done].task];
     queue.erase(std::find(queue.begin(), queue.end(), done));
     if (hooks_.finished) hooks_.finished(SimulatedJob(jobs_[done]));  // a copy: the hook may add jobs
@@ -111,6 +112,7 @@ void Simulator::choose(const Group& group) {
 void Simulator::stop(Core& core) {
   left_[*core.job] -= now_ - core.since;
   ++jobs_[*core.job].preemptions;
+  if (hooks_.ran) hooks_.ran(jobs_[*core.job], core.since, now_);
   core.job.reset();
 }
 

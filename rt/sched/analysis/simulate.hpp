@@ -42,6 +42,9 @@ struct SimulationHooks {
   std::function<Ticks(const SimulatedJob&)> duration = {};
   /// Called when a job has finished, before anything else happens at that instant; may add jobs.
   std::function<void(const SimulatedJob&)> finished = {};
+  /// Called when a job leaves its core, with the stretch that it had it: preempted, or finished (then before
+  /// `finished`).
+  std::function<void(const SimulatedJob&, Ticks from, Ticks to)> ran = {};
 };
 
 /// The schedule of a task set. Jobs of one task run one after another, in the order of getting ready (then of being

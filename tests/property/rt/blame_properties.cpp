@@ -3,6 +3,7 @@
 // reference that asks at every instant anew what was going on.
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <map>
 #include <random>
 
@@ -20,7 +21,7 @@ struct Random {
 /// Some threads that take turns on two CPUs, instant by instant, and jobs anywhere on them: one unit is one ns.
 Trace random_trace(Random& random) {
   Trace trace;
-  trace.source = static_cast<Source>(random(0, 2));
+  trace.source = static_cast<Source>(random(0, 3));
   for (size_t t = 0; t < 4; ++t)
     trace.tasks.push_back({"n" + std::to_string(t), t / 2, 1, random(0, 3) == 0 ? 0 : random(1, 60), false, {}, {}});
   trace.threads = {{10, "t10"}, {11, "t11"}};
@@ -74,7 +75,9 @@ bool other_ran(const Trace& trace, const JobSpan& job, int64_t at) {
 }
 
 bool may_hold(const Trace& trace, const JobSpan& job, const Piece& piece, int64_t at) {
-  const bool known = trace.source != Source::none;
+  const bool known = trace.source != Source::none &&
+                     std::any_of(trace.slices.begin(), trace.slices.end(),
+                                 [&](const Slice& slice) { return slice.thread == job.thread; });
   const bool before = at < job.start_ns, ahead = before && other_ran(trace, job, at);
   const bool on_cpu = known && had_cpu(trace, job, at);
   switch (piece.cause) {
@@ -82,12 +85,12 @@ bool may_hold(const Trace& trace, const JobSpan& job, const Piece& piece, int64_
     case Cause::queue: return ahead;
     case Cause::running: return !before && (on_cpu || !known);
     case Cause::late: return before && !ahead;
-    case Cause::behind: return before && !ahead && !on_cpu && trace.source == Source::tracefs;
+    case Cause::behind: return before && !ahead && !on_cpu && knows_every_cpu(trace.source);
     case Cause::stall: return !ahead && !on_cpu && !trace.steals.empty();
     case Cause::preempted:
     case Cause::asleep: return !before && !on_cpu && known;
     case Cause::unattributed: return !before && !on_cpu;
-    case Cause::throttled: return !ahead && !on_cpu && trace.source == Source::tracefs;
+    case Cause::throttled: return !ahead && !on_cpu && knows_every_cpu(trace.source);
     default: return false;
   }
 }

@@ -62,7 +62,7 @@ Scene random_scene(std::mt19937& random) {
   for (TaskPlan* task : {&scene.producer, &scene.consumer}) {
     task->rate = Rate{uniform(1, 40), uniform(1, 3)};
     task->offset_ns = uniform(0, 200 * kMs);
-    task->budget_ns = uniform(0, 60 * kMs);
+    task->budget_ns = uniform(0, std::min(60 * kMs, task->rate->period_ns()));  // no release is passed over
     task->deadline_ns = uniform(60, 120) * kMs;
   }
   scene.producer.publish = uniform(0, 1) == 0 ? PublishAt::asap : PublishAt::let;

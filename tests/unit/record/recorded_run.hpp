@@ -121,7 +121,7 @@ inline record::RecordResult record_run(SmallGraph& graph, mcap::Sink& sink, int6
   run.duration_ns = seconds * 1'000'000'000;
   run.board = &board;
   run.trace = &rings;
-  run.after_job = [&] {
+  run.after_step = [&] {
     collector.drain();
     recorder.capture();
     if (meanwhile) meanwhile(board);

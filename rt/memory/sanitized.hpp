@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+// Whether this build runs under a sanitizer, which slows it down many times and has a malloc of its own.
+#pragma once
+
+#if defined(__has_feature)
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer) || __has_feature(memory_sanitizer)
+#define TAKT_SANITIZED 1
+#endif
+#endif
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define TAKT_SANITIZED 1
+#endif
+
+namespace takt {
+#if defined(TAKT_SANITIZED)
+inline constexpr bool kSanitized = true;
+#else
+inline constexpr bool kSanitized = false;
+#endif
+}  // namespace takt
