@@ -47,16 +47,16 @@ std::map<std::string, std::vector<int64_t>> recorded(const record::LogFile& log,
 
 tl::expected<JobDurations, std::string> recorded(const std::filesystem::path& file, const Plan& plan) {
   const auto log = record::LogFile::open(file);
-  if (!log) return tl::unexpected("--durations: " + log.error());
+  if (!log) return tl::make_unexpected("--durations: " + log.error());
   const log::Json json = log::Json::parse(log->attached("plan.json").value_or(""), nullptr, false);
   if (!json.is_object() || !json.contains("tasks") || !json["tasks"].is_array())
-    return tl::unexpected(fmt::format("--durations {}: the record holds no readable plan.json", file.string()));
+    return tl::make_unexpected(fmt::format("--durations {}: the record holds no readable plan.json", file.string()));
   const auto by_name = recorded(*log, json["tasks"], plan);
   std::vector<std::vector<int64_t>> times;
   for (const TaskPlan& task : plan.tasks) {
     const auto found = by_name.find(task.name);
     if (found == by_name.end())
-      return tl::unexpected(fmt::format("--durations {}: the record has no job of {}", file.string(), task.name));
+      return tl::make_unexpected(fmt::format("--durations {}: the record has no job of {}", file.string(), task.name));
     times.push_back(found->second);
   }
   return [times = std::move(times)](size_t task, uint64_t job) { return times[task][job % times[task].size()]; };

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "graph/command/prepare.hpp"
+#include "graph/log/cut_log.hpp"
 #include "graph/log/export_log.hpp"
 #include "graph/log/log_content.hpp"
 
@@ -68,6 +69,24 @@ int log_export(const LogOptions& options) {
   });
 }
 
+int log_cut(const LogOptions& options) {
+  return guarded([&]() -> int {
+    auto log = open(options.file);
+    if (!log) return kBadInput;
+    std::error_code none;
+    if (std::filesystem::equivalent(options.file, options.output, none))
+      return refuse(options.output.string() + ": is the record itself; choose another file", kBadInput);
+    auto sink = mcap::FileSink::open(options.output);
+    if (!sink) return refuse("--output " + sink.error() + "; choose another place", kBadInput);
+    const auto instant = [&](double s) { return log::epoch_ns(*log) + static_cast<int64_t>(s * 1e9); };
+    const auto cut = log::cut_log(*log, instant(options.from_s), instant(options.to_s), *sink);
+    if (!cut) return refuse(options.output.string() + ": " + cut.error(), kBadInput);
+    std::printf("%llu jobs, %llu messages, %.1f MB\n", static_cast<unsigned long long>(cut->jobs),
+                static_cast<unsigned long long>(cut->messages), static_cast<double>(cut->bytes) / 1e6);
+    return kOk;
+  });
+}
+
 void add_log(CLI::App& app, LogOptions& o, int& exit_code) {
   CLI::App* log = app.add_subcommand("log", "looks into records");
   log->require_subcommand(1);
@@ -82,6 +101,12 @@ void add_log(CLI::App& app, LogOptions& o, int& exit_code) {
   CLI::App* exported = log->add_subcommand("export", "as MCAP with JSON in Foxglove's schemas");
   exported->add_option("file", o.file, "a record")->required();
   exported->add_option("-o,--output", o.output, "the file to write")->required();
+  CLI::App* cut = log->add_subcommand("cut", "a shorter record: the jobs of some seconds and what they held");
+  cut->add_option("file", o.file, "a record")->required();
+  cut->add_option("-o,--output", o.output, "the file to write")->required();
+  cut->add_option("--from", o.from_s, "seconds into the run of the first release");
+  cut->add_option("--to", o.to_s, "seconds into the run, behind the last release");
+  cut->callback([&] { exit_code = log_cut(o); });
   exported->callback([&] { exit_code = log_export(o); });
 }
 

@@ -8,6 +8,7 @@ namespace takt::command {
 struct LogOptions {
   std::filesystem::path file, other, output;
   bool json = false;
+  double from_s = 0, to_s = 1e9;  ///< since the epoch of the run
 };
 
 /// `takt log info FILE`: what a record holds and lacks. Exit 0, 2 if it is none.
@@ -18,6 +19,9 @@ int log_diff(const LogOptions& options);
 /// `takt log export FILE -o OUT`: for programs that know Foxglove's schemas. Exit 0, 2 if FILE is no record or OUT
 /// cannot be written.
 int log_export(const LogOptions& options);
+
+/// `takt log cut FILE -o OUT [--from S] [--to S]`: a shorter record that can be replayed. Exit 0, 2 as above.
+int log_cut(const LogOptions& options);
 
 void add_log(CLI::App& app, LogOptions& options, int& exit_code);
 

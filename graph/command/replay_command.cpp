@@ -10,10 +10,13 @@
 #include <optional>
 #include <sstream>
 
+#include "graph/command/isolated_replay.hpp"
 #include "graph/command/prepare.hpp"
 #include "graph/command/run_support.hpp"
 #include "graph/compose/composition.hpp"
+#include "graph/compose/partition.hpp"
 #include "graph/language/words.hpp"
+#include "graph/log/cut_log.hpp"
 #include "graph/log/log_content.hpp"
 #include "graph/log/recorded_plan.hpp"
 #include "rt/record/replayer.hpp"
@@ -78,8 +81,6 @@ class Replay {
     if (const int code = compose(); code != kOk) return code;
     check_sameness();
     const record::ReplayResult result = replay();
-    for (const TaskPlan& task : prepared_.composition->plan.tasks)
-      if (!task.device) task.node->finish();
     return tell(result);
   }
 
@@ -130,6 +131,8 @@ class Replay {
     for (const auto& [path, hash] : assets.items())
       if (hashes.value(path, "") != hash)
         throw Refused{fmt::format("{} is not what it was when the record was made", (graph.directory / path).string())};
+    if (const std::string cut = fact(file_->facts(), "cut"); !cut.empty())
+      std::fprintf(stderr, "takt: this is %s; nodes begin here without what they remembered\n", cut.c_str());
     if (log::file_text(graph.file) != file_->attached("graph.yaml"))
       std::fprintf(stderr, "takt: %s has changed since the record was made\n", graph.file.c_str());
     for (const std::string& param : log::changed_params(recorded_, plan))
@@ -140,21 +143,53 @@ class Replay {
   }
 
   record::ReplayResult replay() {
-    const int64_t epoch_ns = this->epoch_ns();
-    for (const TaskPlan& task : prepared_.composition->plan.tasks)
-      if (!task.device) task.node->start(epoch_ns);
-    record::Replayer::Options how;
-    how.run = live_tasks();
-    if (options_.from_s > 0) how.from_ns = epoch_ns + static_cast<int64_t>(options_.from_s * 1e9);
-    if (options_.recorded_pace) how.pace = pace(how.from_ns);
-    record::Replayer replayer(prepared_.composition->plan, *file_, how);
+    const std::vector<ReplayPart> parts = this->parts();
     const int64_t before_ns = clock_.now_ns();
-    auto result = replayer.run([] { return StopOnSignal::asked(); });
+    const auto run_part = [&](const ReplayPart& part) { return replay(part.how); };
+    processes_ = parts.size();
+    auto result = options_.isolate == "subsystem" ? replay_isolated(parts, run_part) : run_part(parts.front());
     took_ns_ = clock_.now_ns() - before_ns;
     return result;
   }
 
-  /// By task: the nodes of --live, and those that must run because their messages are in the record by hash only.
+  /// Runs the jobs of some nodes, in this process.
+  record::ReplayResult replay(const record::Replayer::Options& how) {
+    const std::vector<TaskPlan>& tasks = prepared_.composition->plan.tasks;
+    const int64_t epoch_ns = log::epoch_ns(*file_);
+    for (const TaskPlan& task : tasks)
+      if (!task.device) task.node->start(epoch_ns);
+    record::Replayer replayer(prepared_.composition->plan, *file_, how);
+    auto result = replayer.run([] { return StopOnSignal::asked(); });
+    for (size_t t = 0; t < tasks.size(); ++t)  // pictures: each by one process
+      if (!tasks[t].device && (how.told.empty() || how.told[t] != 0)) tasks[t].node->finish();
+    return result;
+  }
+
+  /// One for each process.
+  std::vector<ReplayPart> parts() const {
+    record::Replayer::Options how;
+    if (options_.from_s > 0) how.from_ns = log::epoch_ns(*file_) + static_cast<int64_t>(options_.from_s * 1e9);
+    if (options_.recorded_pace) how.pace = pace(how.from_ns);
+    const std::vector<char> live = live_tasks();
+    how.run = live;
+    if (options_.isolate != "subsystem") return {{"all", how}};
+    const std::vector<TaskPlan>& tasks = prepared_.composition->plan.tasks;
+    std::vector<std::string> adjusted;
+    const graph::Partition partition = graph::partition(*prepared_.graph, adjusted);
+    std::vector<ReplayPart> parts;
+    for (size_t process = 0; process < partition.names.size(); ++process) {
+      how.told.assign(tasks.size(), 0);
+      for (size_t t = 0; t < tasks.size(); ++t)
+        how.told[t] =
+            !tasks[t].device && (live.empty() || live[t] != 0) && partition.process_of.at(tasks[t].name) == process;
+      if (std::count(how.told.begin(), how.told.end(), 1) == 0) continue;  // the devices'
+      how.run = with_producers(how.told);
+      parts.push_back({partition.names[process], how});
+    }
+    return parts;
+  }
+
+  /// By task: the nodes of --live with_producers(); empty: all.
   std::vector<char> live_tasks() const {
     const Plan& plan = prepared_.composition->plan;
     if (options_.live.empty()) return {};
@@ -170,6 +205,11 @@ class Replay {
                                   graph::alternatives(id, names, "nodes of the graph"))};
       runs[static_cast<size_t>(task - plan.tasks.begin())] = 1;
     }
+    return with_producers(runs);
+  }
+
+  /// And those that must run because their messages are in the record by hash only.
+  std::vector<char> with_producers(std::vector<char> runs) const {
     for (size_t t = 0; t < runs.size(); ++t)
       if (runs[t] != 0 && add_producers(t, runs)) t = SIZE_MAX;  // from the first one again
     return runs;
@@ -186,22 +226,14 @@ class Replay {
       for (size_t t = 0; t < runs.size(); ++t) {
         const auto& ports = plan.tasks[t].ports;
         if (whole || runs[t] != 0 || std::find(ports.begin(), ports.end(), edge.port) == ports.end()) continue;
-        std::fprintf(stderr, "takt: %s runs, too: its %s is in the record by hash only\n", port.node.c_str(),
-                     port.port.c_str());
+        if (options_.isolate != "subsystem")  // there each process runs what it needs
+          std::fprintf(stderr, "takt: %s runs, too: its %s is in the record by hash only\n", port.node.c_str(),
+                       port.port.c_str());
         runs[t] = 1;
         added = true;
       }
     }
     return added;
-  }
-
-  /// That of the run; of a record without an end, the first release.
-  int64_t epoch_ns() const {
-    if (const std::string told = fact(file_->end(), "epoch_ns"); !told.empty())
-      return std::strtoll(told.c_str(), nullptr, 10);
-    int64_t first = INT64_MAX;
-    for (const record::RecordedJob& job : file_->jobs()) first = std::min(first, job.release_ns);
-    return first == INT64_MAX ? 0 : first;
   }
 
   /// Waits until as much time has passed as in the record; what was before `from_ns` is not waited for.
@@ -219,8 +251,8 @@ class Replay {
   int tell(const record::ReplayResult& result) const {
     const double recorded_s = static_cast<double>(result.recorded_ns) / 1e9;
     const double took_s = static_cast<double>(took_ns_) / 1e9;
-    fmt::print("replayed {} jobs, {:.1f} s in {:.1f} s ({:.1f}x real time)\n", result.jobs, recorded_s, took_s,
-               took_s > 0 ? recorded_s / took_s : 0.0);
+    fmt::print("replayed {} jobs in {} process{}, {:.1f} s in {:.1f} s ({:.1f}x real time)\n", result.jobs, processes_,
+               processes_ == 1 ? "" : "es", recorded_s, took_s, took_s > 0 ? recorded_s / took_s : 0.0);
     if (result.lacking > 0) fmt::print("{} jobs were not run: the record lost what they were given\n", result.lacking);
     if (!options_.compare) return result.lacking > 0 ? kNotOk : kOk;
     fmt::print("compared {} of {} messages: {} field by field, {} by hash; {} differ\n", result.compared,
@@ -229,7 +261,7 @@ class Replay {
       const record::Divergence& first = *result.first;
       fmt::print("first difference: {}{}{}, job {} (released {:.3f} s after the epoch): {}\n", first.node,
                  first.port.empty() ? "" : ".", first.port, first.job,
-                 static_cast<double>(first.release_ns - epoch_ns()) / 1e9, first.what);
+                 static_cast<double>(first.release_ns - log::epoch_ns(*file_)) / 1e9, first.what);
       for (const auto& [node, count] : result.different_of) fmt::print("  {}: {} differ\n", node, count);
     }
     return result.different + result.lacking > 0 ? kNotOk : kOk;
@@ -241,6 +273,7 @@ class Replay {
   Json recorded_;
   Prepared prepared_;
   int64_t took_ns_ = 0;
+  size_t processes_ = 1;
 };
 
 }  // namespace
@@ -256,6 +289,8 @@ int replay(const ReplayOptions& options) {
     return Replay(options).run();
   } catch (const Refused& refused) {
     return refuse(refused.why, kBadInput);
+  } catch (const std::runtime_error& problem) {  // processes
+    return refuse(problem.what(), kDeviceOrSystem);
   } catch (const Json::exception& problem) {
     return refuse(fmt::format("{}: what it says of its graph cannot be read: {}", options.log.string(), problem.what()),
                   kBadInput);
@@ -270,6 +305,8 @@ void add_replay(CLI::App& app, ReplayOptions& o, int& exit_code) {
   replay->add_option("--live", o.live, "runs only these nodes, with the rest from the record")->delimiter(',');
   replay->add_option("--set", o.set, "node.param=value, repeatable");
   replay->add_option("--from", o.from_s, "tells and paces only what was released so many seconds into the run");
+  replay->add_option("--isolate", o.isolate, "none (one process) | subsystem: as many as the run had")
+      ->check(CLI::IsMember({"none", "subsystem"}));
   replay->add_flag("--recorded-pace", o.recorded_pace, "as fast as it was, instead of as fast as possible");
   replay->add_option("--output", o.output, "folder for pictures and other results (default out)");
   replay->callback([&] { exit_code = command::replay(o); });

@@ -13,6 +13,7 @@ struct ReplayOptions {
   std::filesystem::path graph;  ///< empty: that of the record
   std::filesystem::path output = "out";
   bool compare = false, recorded_pace = false;
+  std::string isolate = "none";   ///< none | subsystem: a process for each, as in a run
   std::vector<std::string> live;  ///< nodes that run; empty: all. What the others made comes from the record
   std::vector<std::string> set;   ///< "node.param=value", after those of the record
   double from_s = 0;              ///< since the epoch of the run

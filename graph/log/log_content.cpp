@@ -216,6 +216,7 @@ std::string content_text(const Json& content) {
                                  word("graph"), word("schedule"), word("profile"), word("clock"),
                                  word("isolation") == "none" ? "one process" : "a process per subsystem",
                                  word("commit"), word("simd"), content["duration_s"].get<double>());
+  if (facts.contains("cut")) text += "cut: " + word("cut") + "\n";
   text += fmt::format("\n{:<34}{:<24}{:>9}{:>9}{:>10}  {}\n", "port", "type", "messages", "missing", "MB", "fields");
   for (const Json& port : content["ports"])
     text += fmt::format("{:<34}{:<24}{:>9}{:>9}{:>10.1f}  {}\n", port["port"].get<std::string>(),

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstring>
 #include <new>
+#include <set>
 #include <utility>
 
 #include "rt/memory/aligned_bytes.hpp"
@@ -59,7 +60,7 @@ struct Replayer::Stored {
 
 struct Replayer::Port {
   uint16_t channel = 0;
-  bool replayed = false;              ///< made anew
+  std::set<uint64_t> remade;          ///< sequences that the jobs to be run published in the record
   std::map<uint64_t, uint64_t> uses;  ///< jobs that are still to hold it, by sequence
   std::map<uint64_t, std::shared_ptr<Stored>> messages;
   std::shared_ptr<Stored> newest;
@@ -133,7 +134,6 @@ Replayer::Replayer(const Plan& plan, LogFile& log, const Options& options)
     if (!runs(t)) continue;
     for (size_t i = 0; i < task.ports.size(); ++i) {
       Port& port = ports_[task.ports[i]];
-      port.replayed = true;
       port.writer = std::make_unique<PortWriter>(*this, task.ports[i]);
       PortAccess::attach(*task.node->outputs()[i], port.writer.get());
     }
@@ -172,6 +172,9 @@ void Replayer::count_uses() {
     for_each_held(job, [&](uint16_t edge, uint64_t sequence) {
       ++ports_[plan_.tasks[job.task].edges[edge].port].uses[sequence];
     });
+    const std::vector<size_t>& ports = plan_.tasks[job.task].ports;
+    for (const RecordedJob::Output& output : job.outputs)
+      if (output.output < ports.size()) ports_[ports[output.output]].remade.insert(output.sequence);
   }
 }
 
@@ -180,7 +183,7 @@ ReplayResult Replayer::run(const std::function<bool()>& stop) {
   for (const RecordedJob* record : in_order(log_.jobs())) {
     if (stop && stop()) break;
     if (!fits(*record)) {
-      ++result_.lacking;
+      result_.lacking += record->task >= plan_.tasks.size() || told(record->task);
       continue;
     }
     if (!runs(record->task)) continue;
@@ -208,10 +211,10 @@ void Replayer::run_job(const RecordedJob& record) {
       task.node->run(job);
     } catch (...) {  // as in the run, which has told of it
     }
-    ++result_.jobs;
+    result_.jobs += told(record.task);
     settle(record);
   } else {
-    ++result_.lacking;
+    result_.lacking += told(record.task);
   }
   let_go(record);
 }
@@ -246,7 +249,7 @@ bool Replayer::fill_inputs(const RecordedJob& record) {
 Replayer::Stored* Replayer::stored(size_t p, uint64_t sequence) {
   const auto there = ports_[p].messages.find(sequence);
   if (there != ports_[p].messages.end()) return there->second.get();
-  return ports_[p].replayed ? nullptr : load(p, sequence);
+  return ports_[p].remade.contains(sequence) ? nullptr : load(p, sequence);
 }
 
 Replayer::Stored* Replayer::load(size_t p, uint64_t sequence) {
@@ -322,8 +325,8 @@ void Replayer::settle_output(const RecordedJob& record, const RecordedJob::Outpu
         task.publish == PublishAt::let ? std::max(record.published_ns, record.deadline_ns) : record.published_ns;
     header.sequence = told->sequence;
     header.level = record.level;
-    ++result_.messages;
-    compare(record, p, *made, told->sequence);
+    result_.messages += this->told(record.task);
+    if (this->told(record.task)) compare(record, p, *made, told->sequence);
     if (port.newest != nullptr && port.newest.use_count() == 1) port.spare.push_back(std::move(port.newest));
     port.newest = made;
   }
@@ -350,7 +353,7 @@ void Replayer::compare(const RecordedJob& record, size_t p, const Stored& made, 
 }
 
 void Replayer::tell(const RecordedJob& record, size_t port, std::string what) {
-  if (record.release_ns < options_.from_ns) return;
+  if (record.release_ns < options_.from_ns || !told(record.task)) return;
   ++result_.different;
   const std::string& node = plan_.tasks[record.task].name;
   ++result_.different_of[node];

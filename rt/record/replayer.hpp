@@ -35,12 +35,15 @@ struct ReplayResult {
 
 /// Runs the jobs of a record again, one after the other, in the order in which they started: each with the inputs and
 /// the answers that it had; a job that asks something else is told its start, and the time from there to its deadline.
-/// Messages of devices come from the record, others from the jobs that are run. One thread.
+/// Messages of devices, and of jobs that the record does not have, come from the record, others from the jobs that are
+/// run. One thread.
 class Replayer {
  public:
   struct Options {
     /// By task: its jobs are run; empty: those of all nodes. What the others made comes from the record.
     std::vector<char> run = {};
+    /// By task: counts and differences are of these; empty: of all that run.
+    std::vector<char> told = {};
     int64_t from_ns = INT64_MIN;  ///< differences of earlier jobs are not told; they run, for what they leave behind
     /// Called before each job with its planned release: where a replay at the recorded pace waits. May be empty.
     std::function<void(int64_t)> pace = {};
@@ -61,6 +64,7 @@ class Replayer {
   struct Stored;
 
   bool runs(size_t task) const;
+  bool told(size_t task) const { return options_.told.empty() || options_.told[task] != 0; }
   /// False if a damaged record names what the plan does not have.
   bool fits(const RecordedJob& job) const;
   void count_uses();

@@ -37,7 +37,14 @@ for isolate in none subsystem; do
   grep -q "nothing lost" "$work/run.txt" || { echo "the recorder lost something on this machine:"; grep LOST "$work/run.txt"; }
   tells 0 " 0 differ" "$takt" replay "$work/$isolate.mcap" --compare --output "$work/replayed"
 done
+tells 0 " 0 differ" "$takt" replay "$work/subsystem.mcap" --compare --isolate subsystem --output "$work/replayed"
 [ -s "$work/replayed/disparity.png" ] || fail "the replay wrote no pictures"
+
+echo "=== a part of it: jobs that remember nothing make the same"
+tells 0 "jobs" "$takt" log cut "$work/none.mcap" --from 1 --to 2 -o "$work/cut.mcap"
+tells 0 "cut: 1.000 s to 2.000 s" "$takt" log info "$work/cut.mcap"
+tells 0 " 0 differ" "$takt" replay "$work/cut.mcap" --compare --live stereo,object_detection --output "$work/out"
+expect 2 "is the record itself" "$takt" log cut "$work/cut.mcap" -o "$work/cut.mcap"
 
 echo "=== a changed parameter is named"
 rm -rf "$work/graph" "$work/schedules"
