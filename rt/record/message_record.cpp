@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "rt/record/message_record.hpp"
 
+#define XXH_STATIC_LINKING_ONLY  // a state that lies on the stack
 #include <xxhash.h>
 
 #include "rt/msg/scalar.hpp"
@@ -10,11 +11,20 @@ namespace takt::record {
 
 uint64_t hash_of(std::span<const std::byte> packed) { return XXH3_64bits(packed.data(), packed.size()); }
 
-void pack(const MessageType& type, const Held& held, bool whole, std::vector<std::byte>& scratch,
-          std::vector<std::byte>& to) {
-  scratch.clear();
-  scratch.reserve(packed_bytes(type, held.message()));
-  pack(type, held.message(), scratch);
+namespace {
+
+/// hash_of() without packing: what is recorded by its hash only is not copied.
+uint64_t hash_in_place(const MessageType& type, const void* message) {
+  XXH3_state_t state;
+  XXH3_64bits_reset(&state);
+  for_each_piece(type, message,
+                 [&](std::span<const std::byte> piece) { XXH3_64bits_update(&state, piece.data(), piece.size()); });
+  return XXH3_64bits_digest(&state);
+}
+
+}  // namespace
+
+void pack(const MessageType& type, const Held& held, bool whole, std::vector<std::byte>& to) {
   mcap::ByteWriter out(to);
   out.number(held.header->sequence);
   out.number(static_cast<uint64_t>(held.header->stamp_ns));
@@ -22,8 +32,10 @@ void pack(const MessageType& type, const Held& held, bool whole, std::vector<std
   out.number(static_cast<uint64_t>(held.header->visible_at_ns));
   out.number(static_cast<uint32_t>(held.header->level));
   out.number(static_cast<uint8_t>(whole));
-  out.number(hash_of(scratch));
-  if (whole) out.bytes(scratch);
+  out.number(hash_in_place(type, held.message()));
+  if (!whole) return;
+  to.reserve(to.size() + packed_bytes(type, held.message()));
+  pack(type, held.message(), to);
 }
 
 tl::expected<MessageRecord, std::string> unpack_message(std::span<const std::byte> packed) {

@@ -25,9 +25,8 @@ struct MessageRecord {
 /// Hash of the bytes that pack() gives for a message.
 uint64_t hash_of(std::span<const std::byte> packed);
 
-/// Appends header, hash and, if `whole`, fields of a message that is held. `scratch` saves allocations.
-void pack(const MessageType& type, const Held& held, bool whole, std::vector<std::byte>& scratch,
-          std::vector<std::byte>& to);
+/// Appends header, hash and, if `whole`, fields of a message that is held.
+void pack(const MessageType& type, const Held& held, bool whole, std::vector<std::byte>& to);
 /// `data` points into `packed`. Error: too short.
 tl::expected<MessageRecord, std::string> unpack_message(std::span<const std::byte> packed);
 

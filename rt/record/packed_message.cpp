@@ -103,20 +103,20 @@ uint64_t packed_bytes(const MessageType& type, const void* message) {
   return bytes;
 }
 
-void pack(const MessageType& type, const void* message, std::vector<std::byte>& to) {
-  const auto append = [&](const void* data, uint64_t bytes) {
-    const auto* first = static_cast<const std::byte*>(data);
-    to.insert(to.end(), first, first + bytes);
-  };
+void for_each_piece(const MessageType& type, const void* message, const std::function<void(Bytes)>& each) {
   for (const Field& field : type.fields) {
     if (!field.is_array()) {
-      append(static_cast<const std::byte*>(message) + field.offset, uint64_t{field.count} * field.element_bytes);
+      each({static_cast<const std::byte*>(message) + field.offset, size_t{field.count} * field.element_bytes});
       continue;
     }
     const Array<std::byte>& array = array_at(message, field);
-    append(&array.size, sizeof array.size);
-    append(array.data(), uint64_t{array.size} * field.element_bytes);
+    each(std::as_bytes(std::span(&array.size, 1)));
+    each({array.data(), size_t{array.size} * field.element_bytes});
   }
+}
+
+void pack(const MessageType& type, const void* message, std::vector<std::byte>& to) {
+  for_each_piece(type, message, [&](Bytes piece) { to.insert(to.end(), piece.begin(), piece.end()); });
 }
 
 tl::expected<void, std::string> unpack(const MessageType& type, Bytes packed, void* message) {

@@ -4,6 +4,7 @@
 // elements (u32) and the elements. So equal messages have equal bytes wherever they lay.
 #pragma once
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -16,6 +17,10 @@ namespace takt::record {
 
 /// Bytes that pack() appends for this message.
 uint64_t packed_bytes(const MessageType& type, const void* message);
+
+/// The packed bytes piece by piece, in their order, where they lie.
+void for_each_piece(const MessageType& type, const void* message,
+                    const std::function<void(std::span<const std::byte>)>& each);
 
 /// Appends the message. No allocation if `to` has room for packed_bytes().
 void pack(const MessageType& type, const void* message, std::vector<std::byte>& to);

@@ -85,7 +85,7 @@ void Recorder::take_port(Port& port) {
       continue;
     }
     std::vector<std::byte> data = queue_.buffer();
-    pack(*port.type, held, port.whole, scratch_, data);
+    pack(*port.type, held, port.whole, data);
     const int64_t at_ns = held.header->published_ns;
     port.reader->release(held);
     push(port.channel, sequence, at_ns, std::move(data));

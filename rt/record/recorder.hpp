@@ -91,7 +91,6 @@ class Recorder {
   JobAssembler jobs_;
   std::vector<Port> ports_;
   uint16_t jobs_channel_ = 0;
-  std::vector<std::byte> scratch_;
   std::atomic<uint64_t> no_room_{0};
   RecordResult result_;
   std::atomic<bool> ending_{false};

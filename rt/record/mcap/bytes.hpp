@@ -26,6 +26,10 @@ class ByteWriter {
   explicit ByteWriter(std::vector<std::byte>& to) : to_(to) {}
   void bytes(Bytes data) {
     if (data.empty()) return;
+    if (data.size() > kSmall) {  // an image need not be zeroed first
+      to_.insert(to_.end(), data.begin(), data.end());
+      return;
+    }
     const size_t at = to_.size();
     to_.resize(at + data.size());
     std::memcpy(to_.data() + at, data.data(), data.size());
@@ -55,6 +59,7 @@ class ByteWriter {
   }
 
  private:
+  static constexpr size_t kSmall = 1024;
   std::vector<std::byte>& to_;
 };
 

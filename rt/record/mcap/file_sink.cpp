@@ -23,19 +23,21 @@ FileSink::~FileSink() {
   if (descriptor_ >= 0) close(descriptor_);
 }
 
-tl::expected<void, std::string> FileSink::append(Bytes data) {
+tl::expected<void, std::string> FileSink::append(std::span<const Bytes> parts) {
   uint64_t at = size_;
-  for (Bytes rest = data; !rest.empty();) {
-    const ssize_t written = pwrite(descriptor_, rest.data(), rest.size(), static_cast<off_t>(at));
-    if (written < 0 && errno == EINTR) continue;
-    if (written <= 0) {
-      const int reason = written < 0 ? errno : ENOSPC;
-      // What cannot be taken back is cut off by readers: the record is not complete.
-      if (ftruncate(descriptor_, static_cast<off_t>(size_)) != 0) return tl::unexpected(std::strerror(errno));
-      return tl::unexpected(std::strerror(reason));
+  for (const Bytes part : parts) {
+    for (Bytes rest = part; !rest.empty();) {
+      const ssize_t written = pwrite(descriptor_, rest.data(), rest.size(), static_cast<off_t>(at));
+      if (written < 0 && errno == EINTR) continue;
+      if (written <= 0) {
+        const int reason = written < 0 ? errno : ENOSPC;
+        // What cannot be taken back is cut off by readers: the record is not complete.
+        if (ftruncate(descriptor_, static_cast<off_t>(size_)) != 0) return tl::unexpected(std::strerror(errno));
+        return tl::unexpected(std::strerror(reason));
+      }
+      rest = rest.subspan(static_cast<size_t>(written));
+      at += static_cast<uint64_t>(written);
     }
-    rest = rest.subspan(static_cast<size_t>(written));
-    at += static_cast<uint64_t>(written);
   }
   size_ = at;
   return {};

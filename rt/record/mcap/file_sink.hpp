@@ -2,6 +2,7 @@
 #pragma once
 #include <cstdint>
 #include <filesystem>
+#include <span>
 #include <string>
 #include <tl/expected.hpp>
 
@@ -13,8 +14,8 @@ namespace takt::mcap {
 class Sink {
  public:
   virtual ~Sink() = default;
-  /// Whole or not at all: after an error (its text) the file ends where it ended before.
-  virtual tl::expected<void, std::string> append(Bytes data) = 0;
+  /// The parts one after the other, all of them or none: after an error (its text) the file ends where it ended before.
+  virtual tl::expected<void, std::string> append(std::span<const Bytes> parts) = 0;
 };
 
 class FileSink final : public Sink {
@@ -24,7 +25,7 @@ class FileSink final : public Sink {
   FileSink(FileSink&& other) noexcept;
   FileSink& operator=(FileSink&&) = delete;
   ~FileSink() override;
-  tl::expected<void, std::string> append(Bytes data) override;
+  tl::expected<void, std::string> append(std::span<const Bytes> parts) override;
 
  private:
   explicit FileSink(int descriptor) : descriptor_(descriptor) {}

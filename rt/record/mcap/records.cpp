@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "rt/record/mcap/records.hpp"
 
-#include <zlib.h>
+#include <libdeflate.h>
 
 namespace takt::mcap {
 
-uint32_t crc_of(uint32_t before, Bytes data) {
-  return static_cast<uint32_t>(crc32_z(before, reinterpret_cast<const Bytef*>(data.data()), data.size()));
-}
+uint32_t crc_of(uint32_t before, Bytes data) { return libdeflate_crc32(before, data.data(), data.size()); }
 
 void put(std::vector<std::byte>& to, const Schema& schema) {
   put_record(to, Op::schema, [&](ByteWriter& fields) {
@@ -94,6 +92,21 @@ Attachment get_attachment(Bytes from) {
   const auto crc = fields.number<uint32_t>();
   if (crc != 0 && crc != crc_of(0, covered)) throw std::runtime_error("attachment " + attachment.name + " is damaged");
   return attachment;
+}
+
+void put_chunk_head(std::vector<std::byte>& to, const ChunkIndex& index, uint32_t uncompressed_crc) {
+  const size_t at = to.size();
+  put_record(to, Op::chunk, [&](ByteWriter& fields) {
+    fields.number(index.start_ns);
+    fields.number(index.end_ns);
+    fields.number(index.uncompressed_size);
+    fields.number(uncompressed_crc);
+    fields.text(index.compression);
+    fields.number(index.compressed_size);
+  });
+  // The length of the record takes in what will lie behind.
+  const uint64_t length = to.size() - at - sizeof(Op) - sizeof(uint64_t) + index.compressed_size;
+  std::memcpy(to.data() + at + sizeof(Op), &length, sizeof length);
 }
 
 void put(std::vector<std::byte>& to, const ChunkIndex& index) {

@@ -26,6 +26,8 @@ void put(std::vector<std::byte>& to, const Message& message);
 void put(std::vector<std::byte>& to, const Attachment& attachment);
 void put(std::vector<std::byte>& to, const ChunkIndex& index);
 void put(std::vector<std::byte>& to, const Statistics& statistics, size_t schemas, size_t channels);
+/// A chunk record up to the stored bytes of the chunk, which lie behind it in the file.
+void put_chunk_head(std::vector<std::byte>& to, const ChunkIndex& index, uint32_t uncompressed_crc);
 /// Behind the summary section that `to` is, which begins at `summary_at` in the file: CRC over both.
 void put_footer(std::vector<std::byte>& to, uint64_t summary_at, uint64_t offsets_at);
 

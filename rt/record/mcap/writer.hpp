@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <cstdint>
+#include <initializer_list>
 #include <map>
 #include <string>
 #include <string_view>
@@ -22,8 +23,8 @@ class Writer {
  public:
   struct Options {
     size_t chunk_bytes = 1 << 20;  ///< a chunk ends with the message that makes it as large, before compression
-    Compression compression = Compression::zstd;
-    int level = 1;  ///< of zstd
+    Compression compression = Compression::zstd;  ///< of chunks that it makes a fifth smaller, by samples
+    int level = 1;                                ///< of zstd
   };
   using Done = tl::expected<void, std::string>;
 
@@ -46,9 +47,9 @@ class Writer {
   uint64_t lost() const { return lost_; }  ///< messages in chunks that the sink refused
 
  private:
-  Done append(const std::vector<std::byte>& data);
+  Done append(std::initializer_list<Bytes> parts);
   Done write_definitions();
-  void add_indexes(std::vector<std::byte>& to, ChunkIndex& index, uint64_t at);
+  std::vector<std::byte> indexes(ChunkIndex& index, uint64_t at) const;
   void count_chunk(ChunkIndex index);
   void drop_chunk();
   std::vector<std::byte> summary();

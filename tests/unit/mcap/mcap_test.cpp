@@ -20,9 +20,11 @@ namespace {
 struct MemorySink final : Sink {
   std::vector<std::byte> bytes;
   size_t room = SIZE_MAX;
-  tl::expected<void, std::string> append(Bytes data) override {
-    if (bytes.size() + data.size() > room) return tl::unexpected(std::string("No space left on device"));
-    bytes.insert(bytes.end(), data.begin(), data.end());
+  tl::expected<void, std::string> append(std::span<const Bytes> parts) override {
+    size_t size = bytes.size();
+    for (const Bytes part : parts) size += part.size();
+    if (size > room) return tl::unexpected(std::string("No space left on device"));
+    for (const Bytes part : parts) bytes.insert(bytes.end(), part.begin(), part.end());
     return {};
   }
 };
@@ -103,6 +105,32 @@ TEST_CASE("mcap: what is written is read back") {
     REQUIRE(all.size() == 200);
     for (uint32_t i = 0; i < 200; ++i) CHECK(all[i] == message_of(i));
   }
+}
+
+TEST_CASE("mcap: a chunk of noise is stored as it is, one that shrinks is compressed") {
+  MemorySink sink;
+  Writer writer(sink, {});
+  begin(writer);
+  std::mt19937 random(1);
+  std::vector<std::byte> noise(1 << 20), pattern(1 << 20);
+  for (size_t i = 0; i < noise.size(); ++i) {
+    noise[i] = static_cast<std::byte>(random());
+    pattern[i] = static_cast<std::byte>(i / 1000);
+  }
+  REQUIRE(writer.write({1, 1, 1, 1, noise}));
+  REQUIRE(writer.write({1, 2, 2, 2, pattern}));
+  REQUIRE(writer.finish());
+  const test::TemporaryFolder folder;
+  const auto reader = Reader::open(written(folder, sink.bytes));
+  REQUIRE(reader);
+  REQUIRE(reader->chunks().size() == 2);
+  CHECK(reader->chunks()[0].compression == "");
+  CHECK(reader->chunks()[1].compression == "zstd");
+  CHECK(reader->chunks()[1].stored.size() < pattern.size() / 10);
+  const auto all = messages_of(*reader);
+  REQUIRE(all.size() == 2);
+  CHECK(all[0].data == noise);
+  CHECK(all[1].data == pattern);
 }
 
 TEST_CASE("mcap: a file cut off anywhere gives whole chunks, and says what is missing") {

@@ -209,9 +209,11 @@ TEST_CASE("A record that is cut off anywhere replays as far as it goes") {
 TEST_CASE("A file that takes no more, or a queue without room: the run goes on and the loss is stated") {
   struct Full final : mcap::Sink {
     size_t room = 6000;
-    tl::expected<void, std::string> append(mcap::Bytes data) override {
-      if (data.size() > room) return tl::make_unexpected(std::string("No space left on device"));
-      room -= data.size();
+    tl::expected<void, std::string> append(std::span<const mcap::Bytes> parts) override {
+      size_t size = 0;
+      for (const mcap::Bytes part : parts) size += part.size();
+      if (size > room) return tl::make_unexpected(std::string("No space left on device"));
+      room -= size;
       return {};
     }
   } full;
