@@ -16,6 +16,7 @@
 #include "graph/compose/composition.hpp"
 #include "graph/language/param_text.hpp"
 #include "graph/language/words.hpp"
+#include "rt/memory/sanitized.hpp"
 #include "rt/sched/param_mail.hpp"
 
 namespace takt::attach {
@@ -270,7 +271,7 @@ Json Server::post_and_wait(size_t task, size_t param, const ParamValue& value) {
   ParamMail& mail = subject_.board.mail(task);
   if (!post(mail, param, value)) return wrong("the node has not taken the last value yet, or the text is too long");
   const TaskPlan& plan = subject_.plan.tasks[task];
-  const int64_t until = now_ns() + 2'000'000'000;
+  const int64_t until = now_ns() + kSlowdown * 2'000'000'000LL;
   while (mail.state.load() == ParamMail::posted && now_ns() < until && !ending_.load()) pause_ms(1);
   const uint32_t state = mail.state.load();
   if (state == ParamMail::taken) return {{"ok", true}};

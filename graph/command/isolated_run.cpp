@@ -17,6 +17,7 @@
 #include "graph/command/run_support.hpp"
 #include "graph/command/run_trace.hpp"
 #include "rt/sched/executor.hpp"
+#include "rt/memory/sanitized.hpp"
 #include "rt/shm/iceoryx_preflight.hpp"
 #include "rt/shm/local_transport.hpp"
 #include "rt/shm/transport_error.hpp"
@@ -27,7 +28,7 @@ namespace takt::command {
 namespace {
 
 constexpr int64_t kStartDelayNs = 100'000'000;  // devices start between the agreement and the epoch
-constexpr int64_t kPatienceNs = 3'000'000'000;  // for the processes to end after the stop
+constexpr int64_t kPatienceNs = kSlowdown * 3'000'000'000LL;  // for the processes to end after the stop
 
 /// Ends the run with an exit code before it began.
 struct Refused {

@@ -60,7 +60,7 @@ class Executor {
     StartGate* gate = nullptr;            ///< where other processes are waited for
     std::vector<bool> own = {};           ///< by task: this process runs it; empty: all
     /// A job that has not returned this long after its deadline hangs.
-    int64_t hang_patience_ns = kSanitized ? 20'000'000'000 : 1'000'000'000;
+    int64_t hang_patience_ns = kSlowdown * 1'000'000'000LL;
     // Virtual time: see VirtualRun::Options.
     std::function<int64_t(size_t task, uint64_t job)> job_duration_ns = {};
     std::function<void()> after_step = {};

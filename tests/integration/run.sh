@@ -46,7 +46,7 @@ for signal in INT TERM; do
   wait $second; b=$?
   took=$((($(date +%s%N) - start) / 1000000))
   echo "SIG$signal ended both in $took ms, exit $a and $b"
-  [ $a -le 1 ] && [ $b -le 1 ] || fail "exit $a and $b after SIG$signal"
+  [ $a -le 1 ] && [ $b -le 1 ] || fail "exit $a and $b after SIG$signal: $(cat "$work/one.err" "$work/two.err")"
   grep -q "CPU" "$work/one.out" || fail "no summary after SIG$signal"
 done
 
