@@ -45,9 +45,10 @@ PY
 code=0
 replay() {
   echo "--- replayed $1"
-  "$takt" replay "$work/run.mcap" --compare --output "$work/replayed" || code=1
+  "$takt" replay "$work/run.mcap" --compare "${@:2}" --output "$work/replayed" || code=1
 }
 replay alone
+replay "in processes as the run" --isolate subsystem
 stress-ng --cpu 4 --quiet & stress=$!
 replay "beside stress-ng --cpu 4"
 kill $stress
