@@ -88,6 +88,7 @@ Json node_json(const RunFacts& facts, size_t t) {
            {"budget_overruns", &s.budget_overruns},
            {"stale_inputs", &s.stale_inputs},
            {"demoted", &s.demoted},
+           {"lifted", &s.lifted},
            {"new_inputs", &s.new_inputs},
            {"no_result", &s.no_result}})
     node[key] = counter->load();

@@ -184,6 +184,7 @@ void Executor::watch(Policy granted) {
   Watchdog::Options options;
   options.granted = granted;
   options.patience_ns = options_.hang_patience_ns;
+  options.stolen_ns = options_.stolen_ns;
   options.priority = granted == Policy::cooperative ? 0 : kHighestPriority + 1;
   crew_->watchdog = std::make_unique<Watchdog>(plan_, board_, clock_, std::move(workers), options);
 }

@@ -31,7 +31,10 @@ struct SchedulingAttributes {
 constexpr uint32_t kDeadline = 6;  // SCHED_DEADLINE
 constexpr uint64_t kResetOnFork = 1;
 
-int set_attributes(const SchedulingAttributes& a) { return static_cast<int>(syscall(SYS_sched_setattr, 0, &a, 0)); }
+/// Of the calling thread (0), or another one.
+int set_attributes(const SchedulingAttributes& a, int thread = 0) {
+  return static_cast<int>(syscall(SYS_sched_setattr, thread, &a, 0));
+}
 int get_attributes(SchedulingAttributes& a) { return static_cast<int>(syscall(SYS_sched_getattr, 0, &a, sizeof a, 0)); }
 
 std::vector<int> current_cpus() {
@@ -62,13 +65,18 @@ bool pin(int core, Grant& grant) {
   return false;
 }
 
-Grant apply_deadline(const Reservation& wanted, int64_t patience_ns) {
+SchedulingAttributes attributes_of(const Reservation& wanted) {
   SchedulingAttributes a;
   a.policy = kDeadline;
   a.flags = kResetOnFork;
   a.runtime = static_cast<uint64_t>(wanted.runtime_ns);
   a.deadline = static_cast<uint64_t>(wanted.deadline_ns);
   a.period = static_cast<uint64_t>(wanted.period_ns);
+  return a;
+}
+
+Grant apply_deadline(const Reservation& wanted, int64_t patience_ns) {
+  const SchedulingAttributes a = attributes_of(wanted);
   constexpr int64_t kStep = 5'000'000;
   int error = 0;
   for (int64_t waited = 0;; waited += kStep) {
@@ -148,10 +156,18 @@ bool demote_thread(int thread) {
   return sched_setscheduler(thread, behind | SCHED_RESET_ON_FORK, &param) == 0;
 }
 
-void restore_thread(const Reservation& had) {
-  if (had.policy != Policy::fixed) return;
+bool lift_thread(int thread) {
+  const sched_param param{kHighestPriority};
+  return sched_setscheduler(thread, SCHED_FIFO | SCHED_RESET_ON_FORK, &param) == 0;
+}
+
+bool drop_thread(int thread, const Reservation& had) { return set_attributes(attributes_of(had), thread) == 0; }
+
+bool restore_thread(const Reservation& had) {
+  if (had.policy == Policy::deadline) return set_attributes(attributes_of(had)) == 0;
+  if (had.policy != Policy::fixed) return true;
   const sched_param param{had.priority};
-  sched_setscheduler(0, SCHED_FIFO | SCHED_RESET_ON_FORK, &param);
+  return sched_setscheduler(0, SCHED_FIFO | SCHED_RESET_ON_FORK, &param) == 0;
 }
 
 void apply_default() {

@@ -8,6 +8,10 @@
 
 namespace takt {
 
+/// SCHED_FIFO priority of the lane with the shortest span under `fixed`. Below the kernel's own interrupt threads (50
+/// by default) nothing is gained.
+inline constexpr int kHighestPriority = 80;
+
 /// What a worker thread asks of the kernel.
 struct Reservation {
   Policy policy = Policy::cooperative;
@@ -40,8 +44,13 @@ Grant apply(const Reservation& reservation, int64_t patience_ns = 100'000'000);
 /// right to come back from there (neither CAP_SYS_NICE nor RLIMIT_NICE of 20) only behind all of SCHED_FIFO
 /// (SCHED_OTHER). False if the kernel refuses.
 bool demote_thread(int thread);
-/// Gives the calling thread its place back after a demotion, if it had one under `fixed`.
-void restore_thread(const Reservation& had);
+/// Lets another thread of this process run before all of the default policy (SCHED_FIFO, highest priority of a worker).
+/// False if the kernel refuses.
+bool lift_thread(int thread);
+/// Puts such a thread back into its reservation. False if the kernel refuses.
+bool drop_thread(int thread, const Reservation& had);
+/// Gives the calling thread back what it had under `fixed` or `deadline`. False if the kernel refuses.
+bool restore_thread(const Reservation& had);
 
 /// Puts the calling thread back to the default policy on all CPUs.
 void apply_default();

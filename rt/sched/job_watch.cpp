@@ -4,6 +4,8 @@
 #include <pthread.h>
 #include <unistd.h>
 
+#include <algorithm>
+
 namespace takt {
 
 void JobWatch::bind(const Reservation& has) {
@@ -25,6 +27,7 @@ void JobWatch::begin(uint32_t member, uint64_t index, int64_t release_ns, int64_
 }
 
 bool JobWatch::end() {
+  if (lifted_until_ns_.load(std::memory_order_relaxed) != 0) settle_down();
   uint64_t state = state_.load(std::memory_order_relaxed);
   const uint64_t serial = state / kPhases;
   state = serial * kPhases + at_work;
@@ -37,6 +40,15 @@ bool JobWatch::end() {
   if (state % kPhases != demoted) return false;
   restore_thread(has_);
   return true;
+}
+
+/// Takes the reservation back once nothing is owed any more. Refused while the kernel has not given its bandwidth back:
+/// then after the next job.
+void JobWatch::settle_down() {
+  timespec now{};
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  if (int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec < lifted_until_ns_.load(std::memory_order_relaxed)) return;
+  if (restore_thread(has_)) lifted_until_ns_.store(0, std::memory_order_release);
 }
 
 JobWatch::Running JobWatch::running() const {
@@ -70,6 +82,19 @@ bool JobWatch::demote(uint64_t serial) {
   const bool done = demote_thread(thread_.load(std::memory_order_acquire));
   state_.store(serial * kPhases + (done ? demoted : at_work), std::memory_order_release);
   return done;
+}
+
+bool JobWatch::lift(int64_t now_ns, int64_t stolen_ns) {
+  if (has_.runtime_ns <= 0 || !lift_thread(thread_.load(std::memory_order_acquire))) return false;
+  // One period for each budget that is owed, the one under way, and one to be sure.
+  constexpr int64_t kLongest_ns = 30'000'000'000;
+  const int64_t owed_ns = (stolen_ns / has_.runtime_ns + 2) * has_.period_ns;
+  lifted_until_ns_.store(now_ns + std::min(owed_ns, kLongest_ns), std::memory_order_release);
+  return true;
+}
+
+void JobWatch::drop() {
+  if (drop_thread(thread_.load(std::memory_order_acquire), has_)) lifted_until_ns_.store(0, std::memory_order_release);
 }
 
 // In one step: nobody ever waits for a watchdog that only tells. Under `deadline` the workers go before it, so a wait

@@ -42,12 +42,22 @@ class JobWatch {
   /// Puts the worker behind everybody else until its job ends; false if job `serial` ended before, or the kernel
   /// refuses.
   bool demote(uint64_t serial);
+  /// Lets the worker, which has a reservation, go on under SCHED_FIFO: what it owes the kernel, at most for
+  /// `stolen_ns`, is forgotten only with time (measured: the kernel keeps it for a thread that leaves and comes back).
+  /// After the first job that ends when that has passed, the worker takes its reservation back. False if the kernel
+  /// refuses.
+  bool lift(int64_t now_ns, int64_t stolen_ns);
+  /// Puts a lifted worker back into its reservation.
+  void drop();
+  /// The worker was lifted and has not taken its reservation back.
+  bool lifted() const { return lifted_until_ns_.load(std::memory_order_acquire) != 0; }
   /// Notes that the overrun of job `serial` was told; false if the job ended before, was demoted or told already.
   bool tell(uint64_t serial);
 
  private:
   enum Phase : uint64_t { idle, at_work, acting, demoted, told };
   static constexpr uint64_t kPhases = 8;  // state = serial * kPhases + phase
+  void settle_down();
   /// From `at_work` to that phase; false if job `serial` is in another one.
   bool advance(uint64_t serial, Phase to);
 
@@ -55,6 +65,7 @@ class JobWatch {
   std::atomic<uint32_t> member_{0};
   std::atomic<uint64_t> index_{0};
   std::atomic<int64_t> release_ns_{0}, cpu_limit_ns_{0}, expected_ns_{0};
+  std::atomic<int64_t> lifted_until_ns_{0};  ///< 0: it is not
   std::atomic<int> thread_{0};
   std::atomic<clockid_t> clock_{0};
   Reservation has_;

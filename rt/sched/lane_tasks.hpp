@@ -11,10 +11,6 @@
 
 namespace takt {
 
-/// Of the lane with the shortest span under `fixed`. Below the kernel's own interrupt threads (50 by default) nothing
-/// is gained.
-inline constexpr int kHighestPriority = 80;
-
 struct LaneTasks {
   std::vector<std::vector<size_t>> lanes;  ///< as lane_members() gives them
   analysis::TaskSet set;                   ///< one task per lane in the same order, with the name of its head

@@ -13,6 +13,7 @@ WatchRules watch_rules(const TaskPlan& task, Policy granted, int64_t patience_ns
   rules.deadline_ns = task.deadline_ns;
   rules.patience_ns = patience_ns;
   rules.demote = granted == Policy::fixed && task.criticality == Criticality::low;
+  rules.lift = granted == Policy::deadline;
   rules.stop_on_overrun = task.on_overrun == OnOverrun::safe_stop;
   rules.stop_on_miss = task.on_miss == OnMiss::safe_stop;
   return rules;
@@ -37,6 +38,9 @@ WatchVerdict judge(const WatchRules& rules, const WatchSight& sight) {
   };
   by_the_clock(rules.stop_on_miss, sight.miss_told, missed_ns, verdict.miss);
   by_the_clock(true, sight.hang_told, hung_ns, verdict.hang);
+  verdict.drop = sight.running && sight.lifted && -sight.cpu_left_ns > sight.stolen_ns;
+  verdict.lift = rules.lift && sight.running && !sight.lifted && sight.stolen_ns > 0 && sight.now_ns >= missed_ns &&
+                 -sight.cpu_left_ns <= sight.stolen_ns;
   return verdict;
 }
 

@@ -14,6 +14,7 @@ struct WatchRules {
   int64_t patience_ns = 0;  ///< a job that has not returned this long after its deadline hangs
   bool demote = false;      ///< budget used up: it goes on with what the others leave
   bool stop_on_overrun = false, stop_on_miss = false;  ///< on_overrun, on_miss: safe_stop
+  bool lift = false;  ///< late through what the host took: it goes on beside its reservation
 
   bool minds_overrun() const { return demote || stop_on_overrun; }
 };
@@ -31,13 +32,20 @@ struct WatchSight {
   int64_t release_ns = 0;                                           ///< of the job that runs; else of the next one
   int64_t cpu_left_ns = 0;                                          ///< running: until the budget is used up
   bool overrun_told = false, miss_told = false, hang_told = false;  ///< of this job already
+  int64_t stolen_ns = 0;  ///< what the host took lately; cpu_left_ns must be told of a job that is late then, or lifted
+  bool lifted = false;    ///< the worker is, still
 };
 
 struct WatchVerdict {
-  bool overrun = false, miss = false, hang = false;  ///< to be acted on now
-  int64_t look_again_ns = 0;                         ///< nothing can happen before
+  bool overrun = false, miss = false, hang = false, lift = false, drop = false;  ///< to be acted on now
+  int64_t look_again_ns = 0;                                                     ///< nothing can happen before
 };
 
+/// The kernel charges a reservation for time that the host took from its CPU, and holds the thread back until that is
+/// paid off, one budget a period: a job that is late and has used no more beyond its budget than the host took is
+/// lifted out of that, and dropped again once it has used more than that. Both are seen when somebody looks: they make
+/// no look_again.
+///
 /// A job cannot have used a budget before that much time has passed: so the next look is due when the earliest thing
 /// can have happened. A running job is looked at no more than once in kWatchGrain_ns, so that one that was preempted
 /// just before its budget ended costs nothing: the enforcement error, beside the watchdog's own wake-up.

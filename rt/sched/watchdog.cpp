@@ -11,10 +11,18 @@
 #include "rt/memory/process_memory.hpp"
 
 namespace takt {
+namespace {
+constexpr int64_t kStallGrain_ns = 5'000'000;  // between two looks while the host takes time
+}  // namespace
 
 Watchdog::Watchdog(const Plan& plan, RunBoard& board, const Clock& clock, std::vector<Worker> workers,
                    const Options& options)
-    : plan_(plan), board_(board), clock_(clock), options_(options), watched_(workers.size()) {
+    : plan_(plan),
+      board_(board),
+      clock_(clock),
+      options_(options),
+      watched_(workers.size()),
+      stolen_(options.stolen_ns) {
   for (size_t w = 0; w < workers.size(); ++w) {
     for (const size_t task : workers[w].tasks)
       watched_[w].rules.push_back(watch_rules(plan.tasks[task], options.granted, options.patience_ns));
@@ -56,6 +64,12 @@ void Watchdog::watch() {
 int64_t Watchdog::look(int64_t now_ns) {
   // Never: a year, which the arithmetic of timed waits survives.
   int64_t next_ns = now_ns + 31'536'000'000'000'000;
+  if (options_.granted == Policy::deadline) {
+    stolen_.look(now_ns);
+    const bool lifted = std::any_of(watched_.begin(), watched_.end(),
+                                    [](const Watched& watched) { return watched.worker.watch->lifted(); });
+    next_ns = now_ns + (lifted || stolen_.recent_ns() > 0 ? kStallGrain_ns : StolenTime::kStep_ns);
+  }
   for (Watched& watched : watched_) next_ns = std::min(next_ns, look_at(watched, now_ns));
   return next_ns;
 }
@@ -77,7 +91,10 @@ int64_t Watchdog::look_at(Watched& watched, int64_t now_ns) {
   sight.overrun_told = job.acted;
   sight.miss_told = watched.miss_told == job.serial;
   sight.hang_told = watched.hang_told.load() == job.serial;
-  if (rules.minds_overrun() && !job.acted) {
+  sight.stolen_ns = rules.lift ? stolen_.recent_ns() : 0;
+  sight.lifted = watch.lifted();
+  const bool may_lift = sight.stolen_ns > 0 && now_ns > job.release_ns + rules.deadline_ns;
+  if ((rules.minds_overrun() && !job.acted) || may_lift || sight.lifted) {
     const int64_t used_ns = watch.cpu_ns();
     sight.cpu_left_ns = used_ns < 0 ? 0 : job.cpu_limit_ns - used_ns;
   }
@@ -105,6 +122,8 @@ void Watchdog::overrun(Watched& watched, const JobWatch::Running& job, int64_t n
 void Watchdog::act(Watched& watched, const JobWatch::Running& job, const WatchVerdict& verdict, int64_t now_ns) {
   const size_t task = watched.worker.tasks[job.member];
   if (verdict.overrun) overrun(watched, job, now_ns);
+  if (verdict.lift) lift(watched, job, now_ns);
+  if (verdict.drop) watched.worker.watch->drop();
   if (verdict.miss) {
     watched.miss_told = job.serial;
     safe_stop(task, job.index, "deadline passed", now_ns);
@@ -113,6 +132,11 @@ void Watchdog::act(Watched& watched, const JobWatch::Running& job, const WatchVe
     watched.hang_told.store(job.serial);
     tell_hang(task, job, now_ns);
   }
+}
+
+void Watchdog::lift(Watched& watched, const JobWatch::Running& job, int64_t now_ns) {
+  if (!watched.worker.watch->lift(now_ns, stolen_.recent_ns())) return;
+  board_.task(watched.worker.tasks[job.member]).lifted.fetch_add(1, std::memory_order_relaxed);
 }
 
 void Watchdog::safe_stop(size_t task, uint64_t job, const char* why, int64_t now_ns) {

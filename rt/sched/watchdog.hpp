@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <condition_variable>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <thread>
@@ -8,6 +9,7 @@
 
 #include "rt/sched/job_watch.hpp"
 #include "rt/sched/run_board.hpp"
+#include "rt/sched/stolen_time.hpp"
 #include "rt/sched/watch_rules.hpp"
 #include "rt/time/clock.hpp"
 
@@ -19,11 +21,15 @@ namespace takt {
 ///
 /// - Under `fixed`, a low-criticality job that has used its budget goes on with what the others leave (SCHED_IDLE, see
 ///   demote_thread) until it ends; counted `demoted`. High-criticality jobs keep their priority, whatever they use.
+/// - Under `deadline` a job that is late because its reservation pays for time that the host took (see judge()) goes on
+///   under SCHED_FIFO, as its node's next ones, until the kernel has forgotten that debt; counted `lifted`. One that
+///   uses more than that goes back into the reservation.
 /// - `safe_stop` is asked for the moment a budget or a deadline has passed, not when the job ends.
 /// - A job that has not returned `patience` after its deadline hangs: told once, by name. Under `cooperative` that ends
 ///   the run.
 ///
-/// Cost: at most one wake-up a job that is minded, none for the others but one a job's deadline and patience.
+/// Cost: at most one wake-up a job that is minded, none for the others but one a job's deadline and patience; under
+/// `deadline` one every 50 ms, 5 ms while the host takes time.
 class Watchdog {
  public:
   struct Worker {
@@ -34,6 +40,7 @@ class Watchdog {
     Policy granted = Policy::cooperative;
     int64_t patience_ns = 1'000'000'000;
     int priority = 0;  ///< SCHED_FIFO; 0: none
+    std::function<int64_t()> stolen_ns = read_stolen_ns;
   };
 
   Watchdog(const Plan& plan, RunBoard& board, const Clock& clock, std::vector<Worker> workers, const Options& options);
@@ -58,6 +65,7 @@ class Watchdog {
   void overrun(Watched& watched, const JobWatch::Running& job, int64_t now_ns);
   void act(Watched& watched, const JobWatch::Running& job, const WatchVerdict& verdict, int64_t now_ns);
   void safe_stop(size_t task, uint64_t job, const char* why, int64_t now_ns);
+  void lift(Watched& watched, const JobWatch::Running& job, int64_t now_ns);
   void tell_hang(size_t task, const JobWatch::Running& job, int64_t now_ns);
 
   const Plan& plan_;
@@ -65,6 +73,7 @@ class Watchdog {
   const Clock& clock_;
   const Options options_;
   std::vector<Watched> watched_;
+  StolenTime stolen_;
   std::mutex mutex_;
   std::condition_variable ending_;
   bool end_ = false;

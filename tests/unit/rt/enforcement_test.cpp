@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Jobs that do not return, in real time: who is told, who is demoted, and that the run ends. Counts only, no times.
 #include <doctest/doctest.h>
+#include <sched.h>
 
+#include <algorithm>
 #include <atomic>
 #include <memory>
 #include <thread>
@@ -138,4 +140,57 @@ TEST_CASE("a demoted job that returns gets its priority back, and its node runs 
   CHECK(scene.board->task(1).completed.load() >= 4);
   CHECK(scene.board->task(1).demoted.load() == 1);
   CHECK(scene.board->faults().size() == 0);
+}
+
+namespace {
+
+/// Job 3 takes far more than its budget, as if the host had taken it; the others nothing.
+struct Stalled final : Node {
+  std::vector<int> policies;  ///< after each job, as the kernel says
+  void setup(Setup&) override { policies.reserve(100); }
+  void run(Job& job) override {
+    const int64_t until_ns = thread_cpu_ns() + (job.index() == 3 ? 60 * kMs : 0);
+    while (thread_cpu_ns() < until_ns) {
+    }
+    policies.push_back(sched_getscheduler(0) & ~SCHED_RESET_ON_FORK);
+  }
+};
+
+}  // namespace
+
+TEST_CASE("under deadline a job that pays for time of the host is lifted, and its thread takes its reservation back") {
+  constexpr int kDeadline = 6;  // SCHED_DEADLINE
+  bool host_takes = false;
+  SUBCASE("the host took it") { host_takes = true; }
+  SUBCASE("the job used it itself") {}
+  CAPTURE(host_takes);
+  Plan plan;
+  plan.policy = Policy::deadline;
+  Stalled node;
+  node.policies.reserve(100);
+  TaskPlan task;
+  task.name = "stalled";
+  task.node = &node;
+  task.rate = Rate{20, 1};
+  task.budget_ns = 4 * kMs;
+  task.deadline_ns = 50 * kMs;
+  plan.tasks.push_back(task);
+  RunBoard board(plan);
+  const auto transport = make_local_transport(plan.ports);
+  MonotonicClock clock;
+  Executor::Options options;
+  options.duration_ns = 6'000 * kMs;
+  options.board = &board;
+  // The machine's own counter would decide otherwise. For a second, in which the long job falls.
+  options.stolen_ns = [&, reads = 0]() mutable { return host_takes ? std::min(++reads, 20) * 10 * kMs : 0; };
+  const RunResult result = Executor(plan, *transport, clock, options).run();
+  if (result.policy_granted != Policy::deadline) {
+    MESSAGE("NOT RUN: SCHED_DEADLINE is refused to this user");
+    return;
+  }
+  CHECK((board.task(0).lifted.load() > 0) == host_takes);
+  const bool was_lifted = std::count(node.policies.begin(), node.policies.end(), SCHED_FIFO) > 0;
+  CHECK(was_lifted == host_takes);
+  REQUIRE_FALSE(node.policies.empty());
+  CHECK(node.policies.back() == kDeadline);
 }

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the host took lately, and what follows for a late job.
+#include "rt/sched/stolen_time.hpp"
+
+#include <doctest/doctest.h>
+
+#include "rt/sched/watch_rules.hpp"
+
+using namespace takt;
+
+namespace {
+constexpr int64_t kMs = 1'000'000;
+}
+
+TEST_CASE("stolen time: the window moves on, readings are as rare as they may be") {
+  int64_t total = 500 * kMs;
+  int reads = 0;
+  StolenTime stolen([&] { return ++reads, total; });
+  CHECK(stolen.recent_ns() == 0);
+  stolen.look(1000 * kMs);
+  CHECK(stolen.recent_ns() == 0);  // how much of the total is recent is not known
+  total += 30 * kMs;
+  stolen.look(1010 * kMs);
+  CHECK(reads == 1);
+  CHECK(stolen.recent_ns() == 0);
+  stolen.look(1050 * kMs);
+  CHECK(stolen.recent_ns() == 30 * kMs);
+  for (int64_t at = 1100; at <= 2950; at += 50) stolen.look(at * kMs);
+  CHECK(stolen.recent_ns() == 30 * kMs);
+  for (int64_t at = 3000; at <= 3100; at += 50) stolen.look(at * kMs);
+  CHECK(stolen.recent_ns() == 0);
+}
+
+TEST_CASE("stolen time: this machine's counter never goes back") {
+  const int64_t first = read_stolen_ns();
+  CHECK(first >= 0);
+  CHECK(read_stolen_ns() >= first);
+}
+
+TEST_CASE("a late job is lifted only for what the host took, and dropped if it uses more") {
+  TaskPlan task;
+  task.budget_ns = 5 * kMs;
+  task.deadline_ns = 50 * kMs;
+  WatchSight sight;
+  sight.now_ns = 60 * kMs;
+  sight.running = true;
+  sight.stolen_ns = 20 * kMs;
+  sight.cpu_left_ns = -20 * kMs;
+  const auto judged = [&](Policy granted) { return judge(watch_rules(task, granted, 1000 * kMs), sight); };
+  CHECK(judged(Policy::deadline).lift);
+  CHECK_FALSE(judged(Policy::fixed).lift);
+  CHECK_FALSE(judged(Policy::cooperative).lift);
+  SUBCASE("its own overrun") {
+    sight.cpu_left_ns = -21 * kMs;
+    CHECK_FALSE(judged(Policy::deadline).lift);
+    sight.lifted = true;
+    CHECK(judged(Policy::deadline).drop);
+  }
+  SUBCASE("in time still") {
+    sight.now_ns = 50 * kMs;
+    CHECK_FALSE(judged(Policy::deadline).lift);
+  }
+  SUBCASE("nothing stolen") {
+    sight.stolen_ns = 0;
+    sight.cpu_left_ns = 1 * kMs;
+    CHECK_FALSE(judged(Policy::deadline).lift);
+  }
+  SUBCASE("once") {
+    sight.lifted = true;
+    CHECK_FALSE(judged(Policy::deadline).lift);
+    CHECK_FALSE(judged(Policy::deadline).drop);
+  }
+}
