@@ -42,6 +42,18 @@ bool JobWatch::end() {
   return true;
 }
 
+void JobWatch::overran(int64_t by_ns, int64_t at_ns) {
+  const int64_t before_ns = owed_ns(at_ns);
+  owed_ns_.store(before_ns + by_ns, std::memory_order_relaxed);
+  owed_at_ns_.store(at_ns, std::memory_order_release);
+}
+
+int64_t JobWatch::owed_ns(int64_t now_ns) const {
+  constexpr int64_t kRemembered_ns = 2'000'000'000;
+  const int64_t at_ns = owed_at_ns_.load(std::memory_order_acquire);
+  return now_ns - at_ns > kRemembered_ns ? 0 : owed_ns_.load(std::memory_order_relaxed);
+}
+
 /// Takes the reservation back once nothing is owed any more. Refused while the kernel has not given its bandwidth back:
 /// then after the next job.
 void JobWatch::settle_down() {
@@ -84,12 +96,12 @@ bool JobWatch::demote(uint64_t serial) {
   return done;
 }
 
-bool JobWatch::lift(int64_t now_ns, int64_t stolen_ns) {
+bool JobWatch::lift(int64_t now_ns, int64_t owed_ns) {
   if (has_.runtime_ns <= 0 || !lift_thread(thread_.load(std::memory_order_acquire))) return false;
   // One period for each budget that is owed, the one under way, and one to be sure.
   constexpr int64_t kLongest_ns = 30'000'000'000;
-  const int64_t owed_ns = (stolen_ns / has_.runtime_ns + 2) * has_.period_ns;
-  lifted_until_ns_.store(now_ns + std::min(owed_ns, kLongest_ns), std::memory_order_release);
+  const int64_t lapse_ns = (owed_ns / has_.runtime_ns + 2) * has_.period_ns;
+  lifted_until_ns_.store(now_ns + std::min(lapse_ns, kLongest_ns), std::memory_order_release);
   return true;
 }
 

@@ -34,6 +34,9 @@ class JobWatch {
   /// priority back.
   bool end();
 
+  /// After a job that used that much more than its budget: a reservation owes it to the kernel.
+  void overran(int64_t by_ns, int64_t at_ns);
+
   // The watchdog's side.
   Running running() const;
   int64_t expected_ns() const { return expected_ns_.load(std::memory_order_acquire); }
@@ -46,9 +49,11 @@ class JobWatch {
   /// `stolen_ns`, is forgotten only with time (measured: the kernel keeps it for a thread that leaves and comes back).
   /// After the first job that ends when that has passed, the worker takes its reservation back. False if the kernel
   /// refuses.
-  bool lift(int64_t now_ns, int64_t stolen_ns);
+  bool lift(int64_t now_ns, int64_t owed_ns);
   /// Puts a lifted worker back into its reservation.
   void drop();
+  /// By how much jobs that ended in the last 2 s overran.
+  int64_t owed_ns(int64_t now_ns) const;
   /// The worker was lifted and has not taken its reservation back.
   bool lifted() const { return lifted_until_ns_.load(std::memory_order_acquire) != 0; }
   /// Notes that the overrun of job `serial` was told; false if the job ended before, was demoted or told already.
@@ -66,6 +71,7 @@ class JobWatch {
   std::atomic<uint64_t> index_{0};
   std::atomic<int64_t> release_ns_{0}, cpu_limit_ns_{0}, expected_ns_{0};
   std::atomic<int64_t> lifted_until_ns_{0};  ///< 0: it is not
+  std::atomic<int64_t> owed_ns_{0}, owed_at_ns_{0};
   std::atomic<int> thread_{0};
   std::atomic<clockid_t> clock_{0};
   Reservation has_;

@@ -234,6 +234,7 @@ void Task::count_end() {
   statistics_.last_response_ns.store(response, std::memory_order_relaxed);
   const bool over_budget = plan_.budget_ns > 0 && exec_ns > plan_.budget_ns;
   if (over_budget) add(statistics_.budget_overruns);
+  if (over_budget && watch_ != nullptr) watch_->overran(exec_ns - plan_.budget_ns, end.finished_ns);
   count_level(response);
   if (ended_.no_result) add(statistics_.no_result);
   if (end.late) add(statistics_.deadline_misses);

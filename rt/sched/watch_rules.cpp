@@ -38,9 +38,10 @@ WatchVerdict judge(const WatchRules& rules, const WatchSight& sight) {
   };
   by_the_clock(rules.stop_on_miss, sight.miss_told, missed_ns, verdict.miss);
   by_the_clock(true, sight.hang_told, hung_ns, verdict.hang);
-  verdict.drop = sight.running && sight.lifted && -sight.cpu_left_ns > sight.stolen_ns;
-  verdict.lift = rules.lift && sight.running && !sight.lifted && sight.stolen_ns > 0 && sight.now_ns >= missed_ns &&
-                 -sight.cpu_left_ns <= sight.stolen_ns;
+  const int64_t owed_ns = sight.owed_ns + std::max<int64_t>(0, -sight.cpu_left_ns);
+  verdict.drop = sight.running && sight.lifted && owed_ns > sight.stolen_ns && sight.cpu_left_ns < 0;
+  verdict.lift = rules.lift && sight.running && !sight.lifted && sight.now_ns >= missed_ns && owed_ns > 0 &&
+                 owed_ns <= sight.stolen_ns;
   return verdict;
 }
 

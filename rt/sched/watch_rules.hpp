@@ -33,6 +33,7 @@ struct WatchSight {
   int64_t cpu_left_ns = 0;                                          ///< running: until the budget is used up
   bool overrun_told = false, miss_told = false, hang_told = false;  ///< of this job already
   int64_t stolen_ns = 0;  ///< what the host took lately; cpu_left_ns must be told of a job that is late then, or lifted
+  int64_t owed_ns = 0;    ///< by how much jobs of the worker overran lately, this one apart
   bool lifted = false;    ///< the worker is, still
 };
 
@@ -42,9 +43,9 @@ struct WatchVerdict {
 };
 
 /// The kernel charges a reservation for time that the host took from its CPU, and holds the thread back until that is
-/// paid off, one budget a period: a job that is late and has used no more beyond its budget than the host took is
-/// lifted out of that, and dropped again once it has used more than that. Both are seen when somebody looks: they make
-/// no look_again.
+/// paid off, one budget a period: a job that is late while its worker owes something, and no more than the host took,
+/// is lifted out of that, and dropped again once it has used more than that. Both are seen when somebody looks: they
+/// make no look_again.
 ///
 /// A job cannot have used a budget before that much time has passed: so the next look is due when the earliest thing
 /// can have happened. A running job is looked at no more than once in kWatchGrain_ns, so that one that was preempted

@@ -93,6 +93,7 @@ int64_t Watchdog::look_at(Watched& watched, int64_t now_ns) {
   sight.hang_told = watched.hang_told.load() == job.serial;
   sight.stolen_ns = rules.lift ? stolen_.recent_ns() : 0;
   sight.lifted = watch.lifted();
+  sight.owed_ns = watch.owed_ns(now_ns);
   const bool may_lift = sight.stolen_ns > 0 && now_ns > job.release_ns + rules.deadline_ns;
   if ((rules.minds_overrun() && !job.acted) || may_lift || sight.lifted) {
     const int64_t used_ns = watch.cpu_ns();
@@ -135,7 +136,9 @@ void Watchdog::act(Watched& watched, const JobWatch::Running& job, const WatchVe
 }
 
 void Watchdog::lift(Watched& watched, const JobWatch::Running& job, int64_t now_ns) {
-  if (!watched.worker.watch->lift(now_ns, stolen_.recent_ns())) return;
+  JobWatch& watch = *watched.worker.watch;
+  const int64_t owed_ns = watch.owed_ns(now_ns) + std::max<int64_t>(0, watch.cpu_ns() - job.cpu_limit_ns);
+  if (!watch.lift(now_ns, owed_ns)) return;
   board_.task(watched.worker.tasks[job.member]).lifted.fetch_add(1, std::memory_order_relaxed);
 }
 

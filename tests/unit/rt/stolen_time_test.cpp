@@ -65,6 +65,12 @@ TEST_CASE("a late job is lifted only for what the host took, and dropped if it u
     sight.cpu_left_ns = 1 * kMs;
     CHECK_FALSE(judged(Policy::deadline).lift);
   }
+  SUBCASE("late without owing anything") {
+    sight.cpu_left_ns = 1 * kMs;
+    CHECK_FALSE(judged(Policy::deadline).lift);
+    sight.owed_ns = 3 * kMs;  // from the job before
+    CHECK(judged(Policy::deadline).lift);
+  }
   SUBCASE("once") {
     sight.lifted = true;
     CHECK_FALSE(judged(Policy::deadline).lift);
