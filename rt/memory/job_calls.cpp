@@ -4,6 +4,8 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "rt/hot.hpp"
+
 // Where the calling thread's job is noted; defined by takt_allocation_counter where a program links it, null otherwise.
 extern "C" __attribute__((weak)) takt::JobCalls** takt_thread_job_calls();
 
@@ -15,11 +17,11 @@ std::string_view to_string(JobCall call) {
   return names[static_cast<size_t>(call)];
 }
 
-JobScope::JobScope(JobCalls& calls) {
+TAKT_HOT JobScope::JobScope(JobCalls& calls) {
   if (takt_thread_job_calls != nullptr) *takt_thread_job_calls() = &calls;
 }
 
-JobScope::~JobScope() {
+TAKT_HOT JobScope::~JobScope() {
   if (takt_thread_job_calls != nullptr) *takt_thread_job_calls() = nullptr;
 }
 

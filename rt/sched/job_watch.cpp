@@ -6,6 +6,8 @@
 
 #include <algorithm>
 
+#include "rt/hot.hpp"
+
 namespace takt {
 
 void JobWatch::bind(const Reservation& has) {
@@ -16,7 +18,7 @@ void JobWatch::bind(const Reservation& has) {
   thread_.store(thread, std::memory_order_release);
 }
 
-void JobWatch::begin(uint32_t member, uint64_t index, int64_t release_ns, int64_t cpu_limit_ns) {
+TAKT_HOT void JobWatch::begin(uint32_t member, uint64_t index, int64_t release_ns, int64_t cpu_limit_ns) {
   // Release stores: who reads one of them also sees that the job before has ended, and so takes no action on it.
   member_.store(member, std::memory_order_release);
   index_.store(index, std::memory_order_release);
@@ -26,7 +28,7 @@ void JobWatch::begin(uint32_t member, uint64_t index, int64_t release_ns, int64_
   state_.store(serial * kPhases + at_work, std::memory_order_release);
 }
 
-bool JobWatch::end() {
+TAKT_HOT bool JobWatch::end() {
   if (lifted_until_ns_.load(std::memory_order_relaxed) != 0) settle_down();
   uint64_t state = state_.load(std::memory_order_relaxed);
   const uint64_t serial = state / kPhases;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "rt/hot.hpp"
 #include "rt/sched/watch_rules.hpp"
 
 namespace takt {
@@ -34,7 +35,7 @@ bool Lane::activates(size_t member, int64_t visible_at_ns) {
   return true;
 }
 
-void Lane::run_next(const Clock& clock, StopSignal& stop) {
+TAKT_HOT void Lane::run_next(const Clock& clock, StopSignal& stop) {
   const int64_t release = next_release_ns();
   const JobEnd end = head().run(static_cast<uint64_t>(next_), release);
   if (end.end_of_data) {

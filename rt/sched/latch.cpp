@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 
+#include "rt/hot.hpp"
 #include "rt/sched/port_access.hpp"
 
 namespace takt {
@@ -34,13 +35,13 @@ Latch::Latch(const TaskPlan& plan, Transport& transport, RunBoard& board, size_t
   }
 }
 
-void Latch::acquire_requests(int64_t release_ns, int64_t now_ns) {
+TAKT_HOT void Latch::acquire_requests(int64_t release_ns, int64_t now_ns) {
   for (Edge& edge : edges_) {
     if (edge.requests) acquire_newest(edge, release_ns, now_ns);
   }
 }
 
-size_t Latch::acquire(int64_t release_ns, int64_t now_ns) {
+TAKT_HOT size_t Latch::acquire(int64_t release_ns, int64_t now_ns) {
   stale_count_ = 0;
   for (Edge& edge : edges_) {
     if (!edge.joined && !edge.requests) acquire_newest(edge, release_ns, now_ns);

@@ -4,6 +4,8 @@
 #include <cerrno>
 #include <ctime>
 
+#include "rt/hot.hpp"
+
 namespace takt {
 
 void StopSignal::lower(int64_t end_ns) {
@@ -17,7 +19,7 @@ void StopSignal::raise(int64_t now_ns) {
   raised_.store(true);
 }
 
-void StopSignal::sleep_until(int64_t instant_ns) const {
+TAKT_HOT void StopSignal::sleep_until(int64_t instant_ns) const {
   // clock_nanosleep in slices: a futex that a stop could wake costs 3 us more at every release (queue and hash bucket,
   // both cold), and a slice of a long period costs next to nothing. The last slice ends at the instant itself.
   timespec now{};

@@ -10,6 +10,7 @@
 #include <span>
 #include <utility>
 
+#include "rt/hot.hpp"
 #include "rt/sched/param_mail.hpp"
 #include "rt/sched/port_access.hpp"
 #include "rt/sched/watch_rules.hpp"
@@ -82,7 +83,7 @@ void Task::settle() {
   for (size_t i = 0; i < writers_.size(); ++i) board_.port(plan_.ports[i]).writer = writers_[i]->statistics();
 }
 
-bool Task::wanted(uint64_t index) const {
+TAKT_HOT bool Task::wanted(uint64_t index) const {
   const Requests* requests = plan_.node->control() != nullptr ? plan_.node->control()->newest() : nullptr;
   if (requests == nullptr) return true;
   for (const Request& request : requests->wanted.items()) {
@@ -92,14 +93,14 @@ bool Task::wanted(uint64_t index) const {
   return true;
 }
 
-void Task::take_mail() {
+TAKT_HOT void Task::take_mail() {
   ParamMail& mail = board_.mail(index_);
   if (mail.state.load(std::memory_order_acquire) != ParamMail::posted) return;
   deliver(mail, *plan_.node);
   if (trace::on() && mail.state.load(std::memory_order_relaxed) == ParamMail::taken) trace_param(mail);
 }
 
-int64_t Task::begin(uint64_t index, int64_t release_ns, int64_t duration_ns) {
+TAKT_HOT int64_t Task::begin(uint64_t index, int64_t release_ns, int64_t duration_ns) {
   const int64_t started = clock_.now_ns();
   const Mode& mode = mode_of(release_ns);
   ended_ = {};
@@ -136,7 +137,7 @@ int64_t Task::begin(uint64_t index, int64_t release_ns, int64_t duration_ns) {
   return ended_.exec_ns = static_cast<int64_t>(static_cast<double>(duration_ns) * cost);
 }
 
-JobEnd Task::finish(int modelled_cpu) {
+TAKT_HOT JobEnd Task::finish(int modelled_cpu) {
   JobEnd& end = ended_.end;
   if (!ended_.ran) return end;
   {
@@ -160,7 +161,7 @@ void Task::pass_over(int64_t now_ns, bool count) {
   ended_.end.finished_ns = ended_.end.visible_at_ns = now_ns;
 }
 
-void Task::work(Job& job, int64_t release_ns) {
+TAKT_HOT void Task::work(Job& job, int64_t release_ns) {
   if (watch_ != nullptr)
     watch_->begin(member_, job.index(), release_ns, last_thread_use_ns() + enforced_budget_ns(plan_));
   try {
@@ -269,7 +270,7 @@ void Task::count_level(int64_t response_ns) {
   quality_.observe({ended_.release_ns, ended_.exec_ns, response_ns, ended_.no_result});
 }
 
-void Task::publish(JobEnd& end, int64_t deadline_ns) {
+TAKT_HOT void Task::publish(JobEnd& end, int64_t deadline_ns) {
   // The instant of publication is read once per job: all outputs of a job become visible together.
   const int64_t now = clock_.now_ns();
   end.late = now > deadline_ns;

@@ -3,6 +3,8 @@
 
 #include <ctime>
 
+#include "rt/hot.hpp"
+
 namespace takt {
 namespace {
 int64_t read(clockid_t id) {
@@ -12,7 +14,7 @@ int64_t read(clockid_t id) {
 }
 }  // namespace
 
-int64_t MonotonicClock::now_ns() const { return read(CLOCK_MONOTONIC); }
+TAKT_HOT int64_t MonotonicClock::now_ns() const { return read(CLOCK_MONOTONIC); }
 int64_t thread_cpu_ns() { return read(CLOCK_THREAD_CPUTIME_ID); }
 
 }  // namespace takt
