@@ -104,8 +104,8 @@ void add_log(CLI::App& app, LogOptions& o, int& exit_code) {
   CLI::App* cut = log->add_subcommand("cut", "a shorter record: the jobs of some seconds and what they held");
   cut->add_option("file", o.file, "a record")->required();
   cut->add_option("-o,--output", o.output, "the file to write")->required();
-  cut->add_option("--from", o.from_s, "seconds into the run of the first release");
-  cut->add_option("--to", o.to_s, "seconds into the run, behind the last release");
+  cut->add_option("--from", o.from_s, "seconds into the run of the first release")->check(CLI::Range(0.0, 1e9));
+  cut->add_option("--to", o.to_s, "seconds into the run, behind the last release")->check(CLI::Range(0.0, 1e9));
   cut->callback([&] { exit_code = log_cut(o); });
   exported->callback([&] { exit_code = log_export(o); });
 }

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "graph/command/machine.hpp"
 
+#include <fcntl.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <array>
 #include <string>
 
 #include "graph/check/machine_figures.hpp"
@@ -28,14 +30,22 @@ nlohmann::ordered_json machine_facts() {
   return facts;
 }
 
+int64_t stolen_ns() {
+  static const int file = open("/proc/stat", O_RDONLY | O_CLOEXEC);
+  static const int64_t tick_ns = 1'000'000'000 / sysconf(_SC_CLK_TCK);
+  std::array<char, 256> line{};  // the first one is the sum
+  const ssize_t size = file < 0 ? -1 : pread(file, line.data(), line.size(), 0);
+  const auto times = machine::parse_cpu_times({line.data(), size > 0 ? static_cast<size_t>(size) : 0});
+  return times ? times->steal * tick_ns : 0;
+}
+
 ProcessReading ProcessReading::now() {
   ProcessReading reading;
   rusage use{};
   getrusage(RUSAGE_SELF, &use);
   reading.cpu_ns = ns_of(use.ru_utime) + ns_of(use.ru_stime);
   reading.rss_mb = static_cast<double>(use.ru_maxrss) / 1024.0;
-  if (const auto times = machine::parse_cpu_times(machine::SystemFacts().text("/proc/stat").value_or("")))
-    reading.steal_ms = times->steal * 1000 / sysconf(_SC_CLK_TCK);
+  reading.steal_ms = stolen_ns() / 1'000'000;
   return reading;
 }
 

@@ -8,6 +8,10 @@ namespace takt::command {
 /// What the figures were measured on: CPU model, cores, kernel, memory.
 nlohmann::ordered_json machine_facts();
 
+/// CPU time that the host has taken from this machine since its start, over all CPUs, ns, in ticks of 10 ms; 0 on a
+/// machine of its own. A system call that reads a line; not in a job.
+int64_t stolen_ns();
+
 /// Whole-process readings; the difference of two of them goes into the report.
 struct ProcessReading {
   int64_t cpu_ns = 0;    ///< all threads, user and system

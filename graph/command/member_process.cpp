@@ -90,6 +90,7 @@ int run_member(const RunOptions& options, const graph::GraphSpec& graph, const g
   Executor::Options run;
   run.duration_ns = static_cast<int64_t>(options.duration_s * 1e9);
   run.board = &board;
+  run.stolen_ns = stolen_ns;
   run.trace = rings;
   run.gate = &gate;
   run.own = owned(plan, partition, process);

@@ -48,6 +48,7 @@ int execute(const RunOptions& options, Prepared& prepared, std::vector<std::stri
   run.duration_ns = static_cast<int64_t>(options.duration_s * 1e9);
   run.require_policy = options.policy_required();
   run.board = &board;
+  run.stolen_ns = stolen_ns;
   run.trace = trace.rings();
   if (prepared.clock->is_virtual()) {
     run.after_step = [&] {

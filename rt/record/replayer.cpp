@@ -183,7 +183,7 @@ ReplayResult Replayer::run(const std::function<bool()>& stop) {
   for (const RecordedJob* record : in_order(log_.jobs())) {
     if (stop && stop()) break;
     if (!fits(*record)) {
-      result_.lacking += record->task >= plan_.tasks.size() || told(record->task);
+      result_.lacking += record->task >= plan_.tasks.size() || counts(record->task);
       continue;
     }
     if (!runs(record->task)) continue;
@@ -211,10 +211,10 @@ void Replayer::run_job(const RecordedJob& record) {
       task.node->run(job);
     } catch (...) {  // as in the run, which has told of it
     }
-    result_.jobs += told(record.task);
+    result_.jobs += counts(record.task);
     settle(record);
   } else {
-    result_.lacking += told(record.task);
+    result_.lacking += counts(record.task);
   }
   let_go(record);
 }
@@ -325,8 +325,8 @@ void Replayer::settle_output(const RecordedJob& record, const RecordedJob::Outpu
         task.publish == PublishAt::let ? std::max(record.published_ns, record.deadline_ns) : record.published_ns;
     header.sequence = told->sequence;
     header.level = record.level;
-    result_.messages += this->told(record.task);
-    if (this->told(record.task)) compare(record, p, *made, told->sequence);
+    result_.messages += counts(record.task);
+    if (counts(record.task)) compare(record, p, *made, told->sequence);
     if (port.newest != nullptr && port.newest.use_count() == 1) port.spare.push_back(std::move(port.newest));
     port.newest = made;
   }
@@ -353,7 +353,7 @@ void Replayer::compare(const RecordedJob& record, size_t p, const Stored& made, 
 }
 
 void Replayer::tell(const RecordedJob& record, size_t port, std::string what) {
-  if (record.release_ns < options_.from_ns || !told(record.task)) return;
+  if (record.release_ns < options_.from_ns || !counts(record.task)) return;
   ++result_.different;
   const std::string& node = plan_.tasks[record.task].name;
   ++result_.different_of[node];

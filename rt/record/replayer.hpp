@@ -64,7 +64,7 @@ class Replayer {
   struct Stored;
 
   bool runs(size_t task) const;
-  bool told(size_t task) const { return options_.told.empty() || options_.told[task] != 0; }
+  bool counts(size_t task) const { return options_.told.empty() || options_.told[task] != 0; }
   /// False if a damaged record names what the plan does not have.
   bool fits(const RecordedJob& job) const;
   void count_uses();

@@ -61,7 +61,7 @@ class Executor {
     std::vector<bool> own = {};           ///< by task: this process runs it; empty: all
     /// A job that has not returned this long after its deadline hangs.
     int64_t hang_patience_ns = kSlowdown * 1'000'000'000LL;
-    std::function<int64_t()> stolen_ns = read_stolen_ns;  ///< see Watchdog::Options
+    std::function<int64_t()> stolen_ns = {};  ///< see StolenTime; empty: no job is lifted
     // Virtual time: see VirtualRun::Options.
     std::function<int64_t(size_t task, uint64_t job)> job_duration_ns = {};
     std::function<void()> after_step = {};

@@ -7,6 +7,8 @@
 #include <algorithm>
 
 #include "rt/hot.hpp"
+#include "rt/sched/stolen_time.hpp"
+#include "rt/time/clock.hpp"
 
 namespace takt {
 
@@ -51,17 +53,14 @@ void JobWatch::overran(int64_t by_ns, int64_t at_ns) {
 }
 
 int64_t JobWatch::owed_ns(int64_t now_ns) const {
-  constexpr int64_t kRemembered_ns = 2'000'000'000;
   const int64_t at_ns = owed_at_ns_.load(std::memory_order_acquire);
-  return now_ns - at_ns > kRemembered_ns ? 0 : owed_ns_.load(std::memory_order_relaxed);
+  return now_ns - at_ns > StolenTime::kWindow_ns ? 0 : owed_ns_.load(std::memory_order_relaxed);
 }
 
 /// Takes the reservation back once nothing is owed any more. Refused while the kernel has not given its bandwidth back:
 /// then after the next job.
 void JobWatch::settle_down() {
-  timespec now{};
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  if (int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec < lifted_until_ns_.load(std::memory_order_relaxed)) return;
+  if (MonotonicClock().now_ns() < lifted_until_ns_.load(std::memory_order_relaxed)) return;
   if (restore_thread(has_)) lifted_until_ns_.store(0, std::memory_order_release);
 }
 

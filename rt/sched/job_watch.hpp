@@ -45,14 +45,13 @@ class JobWatch {
   /// Puts the worker behind everybody else until its job ends; false if job `serial` ended before, or the kernel
   /// refuses.
   bool demote(uint64_t serial);
-  /// Lets the worker, which has a reservation, go on under SCHED_FIFO: what it owes the kernel, at most for
-  /// `stolen_ns`, is forgotten only with time (measured: the kernel keeps it for a thread that leaves and comes back).
-  /// After the first job that ends when that has passed, the worker takes its reservation back. False if the kernel
-  /// refuses.
+  /// Lets the worker, which has a reservation, go on under SCHED_FIFO: the `owed_ns` that it owes the kernel are
+  /// forgotten only with time (measured: the kernel keeps the debt of a thread that leaves and comes back). After the
+  /// first job that ends when that has passed, the worker takes its reservation back. False if the kernel refuses.
   bool lift(int64_t now_ns, int64_t owed_ns);
   /// Puts a lifted worker back into its reservation.
   void drop();
-  /// By how much jobs that ended in the last 2 s overran.
+  /// By how much jobs that ended within StolenTime::kWindow_ns overran.
   int64_t owed_ns(int64_t now_ns) const;
   /// The worker was lifted and has not taken its reservation back.
   bool lifted() const { return lifted_until_ns_.load(std::memory_order_acquire) != 0; }

@@ -7,16 +7,14 @@
 
 namespace takt {
 
-/// Total CPU time that the host has taken from this machine since its start, ns: `steal` of /proc/stat, over all CPUs,
-/// in ticks of 10 ms. 0 on a machine of its own. A system call or three; not in a job.
-int64_t read_stolen_ns();
-
 /// How much the host took lately. One thread at a time.
 class StolenTime {
  public:
   static constexpr int64_t kWindow_ns = 2'000'000'000, kStep_ns = 50'000'000;
 
+  /// `read`: CPU time that the host has taken since some instant, ns. Empty: it takes none.
   explicit StolenTime(std::function<int64_t()> read) : read_(std::move(read)) {}
+  bool counted() const { return static_cast<bool>(read_); }
   /// Reads the counter if the last reading is older than kStep_ns.
   void look(int64_t now_ns);
   /// Taken in the window before the last reading; 0 before the second one.

@@ -64,7 +64,7 @@ void Watchdog::watch() {
 int64_t Watchdog::look(int64_t now_ns) {
   // Never: a year, which the arithmetic of timed waits survives.
   int64_t next_ns = now_ns + 31'536'000'000'000'000;
-  if (options_.granted == Policy::deadline) {
+  if (options_.granted == Policy::deadline && stolen_.counted()) {
     stolen_.look(now_ns);
     const bool lifted = std::any_of(watched_.begin(), watched_.end(),
                                     [](const Watched& watched) { return watched.worker.watch->lifted(); });

@@ -39,8 +39,8 @@ class Watchdog {
   struct Options {
     Policy granted = Policy::cooperative;
     int64_t patience_ns = 1'000'000'000;
-    int priority = 0;  ///< SCHED_FIFO; 0: none
-    std::function<int64_t()> stolen_ns = read_stolen_ns;
+    int priority = 0;                         ///< SCHED_FIFO; 0: none
+    std::function<int64_t()> stolen_ns = {};  ///< see StolenTime
   };
 
   Watchdog(const Plan& plan, RunBoard& board, const Clock& clock, std::vector<Worker> workers, const Options& options);
