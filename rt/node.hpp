@@ -190,6 +190,7 @@ class OutputPort {
 
  protected:
   void* loan_message();
+  const void* handed_over_ = nullptr;
 
  private:
   friend class PortAccess;
@@ -210,6 +211,9 @@ class Output final : public OutputPort {
   /// In a job: an empty message to fill in place; null if every chunk is still held by consumers (counted).
   /// A second call in one job returns the same message.
   T* loan() { return static_cast<T*>(loan_message()); }
+  /// In start: what this output published last, before the process of this node died and was started again; null at an
+  /// ordinary start. So what a node needs to go on (a pose, a map) it gives as an output, which nobody need read.
+  const T* handed_over() const { return static_cast<const T*>(handed_over_); }
 };
 
 /// Base of all nodes. Constructed on the main thread; not copyable.
@@ -222,7 +226,7 @@ class Node {
 
   virtual void setup(Setup& setup) = 0;
   /// Once the epoch (first planned instant of the run, shortly ahead) is fixed, before the first job, on the main
-  /// thread: a hardware node starts its device here.
+  /// thread: a hardware node starts its device here, a node that was restarted takes up what Output::handed_over() has.
   virtual void start(int64_t epoch_ns) { static_cast<void>(epoch_ns); }
   /// One job. No allocation, lock, file or socket call, logging or exception in here.
   virtual void run(Job& job) = 0;

@@ -8,26 +8,29 @@
 #include <cstdio>
 #include <cstring>
 #include <memory>
+#include <optional>
 
 #include "graph/attach/server.hpp"
 #include "graph/command/live_table.hpp"
 #include "graph/command/member_process.hpp"
+#include "graph/command/outages.hpp"
 #include "graph/command/prepare.hpp"
 #include "graph/command/report.hpp"
 #include "graph/command/run_support.hpp"
 #include "graph/command/run_trace.hpp"
-#include "rt/sched/executor.hpp"
 #include "rt/memory/sanitized.hpp"
+#include "rt/sched/executor.hpp"
 #include "rt/shm/iceoryx_preflight.hpp"
 #include "rt/shm/local_transport.hpp"
 #include "rt/shm/transport_error.hpp"
 #include "rt/supervise/private_mounts.hpp"
 #include "rt/supervise/process_group.hpp"
+#include "rt/supervise/supervisor.hpp"
 
 namespace takt::command {
 namespace {
 
-constexpr int64_t kStartDelayNs = 100'000'000;  // devices start between the agreement and the epoch
+constexpr int64_t kStartDelayNs = 100'000'000;                // devices start between the agreement and the epoch
 constexpr int64_t kPatienceNs = kSlowdown * 3'000'000'000LL;  // for the processes to end after the stop
 
 /// Ends the run with an exit code before it began.
@@ -52,10 +55,11 @@ std::unique_ptr<DaemonClaim> find_room_for_daemon(std::vector<std::string>& adju
   }
 }
 
-/// Throws `refused` on if the command line asks for iceoryx.
-void note_local_instead(const RunOptions& options, const TransportError& refused, std::vector<std::string>& adjusted) {
-  if (options.transport == "iceoryx") throw refused;
-  adjusted.push_back(fmt::format("transport iceoryx -> local: {}", refused.what()));
+/// By process, the tasks that it runs.
+std::vector<std::vector<size_t>> tasks_of(const Plan& plan, const graph::Partition& partition) {
+  std::vector<std::vector<size_t>> tasks(partition.names.size());
+  for (size_t t = 0; t < plan.tasks.size(); ++t) tasks[partition.process_of.at(plan.tasks[t].name)].push_back(t);
+  return tasks;
 }
 
 class IsolatedRun {
@@ -92,13 +96,14 @@ class IsolatedRun {
           return refuse(fmt::format("process {}: {}", partition_.names[p], problem.what()), kDeviceOrSystem);
         }
       });
+    group_.prepare_restarts();
     wait_for_all(ProcessRecord::composed);
     BoardExchange exchange(board_);
     graph::complete(plan_, exchange, observers(options_));
     if (const int code = admit(options_, graph_, plan_, adjusted_); code != kOk) throw Refused{code};
     const CpuLatencyHold latency = hold_cpu_dma_latency();
     tell_lacks(latency);
-    board_.carrier().store(bring_up_transport());
+    bring_up_transport();
     agree_on_policy();
     record_.begin(graph_, plan_, board_, *transport_, "subsystem");
     trace_.collect(plan_, record_);
@@ -107,6 +112,7 @@ class IsolatedRun {
     // Now, with everything in place and locked: at the end they leave one after the other.
     memory_mb_ = proportional_memory_mb(getpid());
     for (size_t p = 0; p < group_.size(); ++p) memory_mb_ += proportional_memory_mb(group_.pid(p));
+    memory_mb_ += proportional_memory_mb(group_.nursery());
     start();
     {
       const attach::Server server({graph_, plan_, board_, *transport_});
@@ -163,20 +169,14 @@ class IsolatedRun {
     return code_ != 0;
   }
 
-  /// iceoryx if there is room for its daemon; otherwise the local one, if the command line does not forbid it.
-  RunBoard::Carrier bring_up_transport() {
+  void bring_up_transport() {
     if (claim_) {
-      try {
-        transport_ = make_iceoryx_transport(plan_.ports);
-        claim_.reset();
-        return RunBoard::iceoryx;
-      } catch (const TransportError& refused) {
-        note_local_instead(options_, refused, adjusted_);
-        std::fprintf(stderr, "takt: adjusted: %s\n", adjusted_.back().c_str());
-      }
+      transport_ = make_iceoryx_transport(plan_.ports);
+      claim_.reset();
+    } else {
+      transport_ = make_local_transport(plan_.ports, pools_, static_cast<uint32_t>(group_.size()) + 1);
     }
-    transport_ = make_local_transport(plan_.ports, pools_);
-    return RunBoard::local;
+    board_.carrier().store(options_.transport == "iceoryx" ? RunBoard::iceoryx : RunBoard::local);
   }
 
   void tell_lacks(const CpuLatencyHold& latency) {
@@ -211,13 +211,20 @@ class IsolatedRun {
     board_.epoch_ns().store(epoch);
   }
 
-  /// Until all processes have ended. One that dies ends the run of the others, in order.
+  /// Until all processes have ended. One that dies is started again beside the others, until the end of the run.
   void watch() {
+    Supervisor::Options how;
+    how.clean_up = [](pid_t pid) { remove_iceoryx_leftovers(IceoryxPlaces::of_this_machine(), pid); };
+    how.say = [](const std::string& what) { std::fprintf(stderr, "takt: %s\n", what.c_str()); };
+    supervisor_.emplace(plan_, board_, group_, *transport_, clock_, tasks_of(plan_, partition_), how);
     int64_t give_up_ns = INT64_MAX;
     wait_until([&] {
-      if (collect_ends()) board_.stop().raise(clock_.now_ns());
+      supervisor_->look();
       const int64_t now = clock_.now_ns(), end = board_.stop().end_ns();
-      if (give_up_ns == INT64_MAX && now > end) give_up_ns = now + kPatienceNs;
+      if (give_up_ns == INT64_MAX && now > end) {
+        supervisor_->let_end();
+        give_up_ns = now + kPatienceNs;
+      }
       if (now <= give_up_ns || group_.alive() == 0) return group_.alive() == 0;
       for (size_t p = 0; p < group_.size(); ++p)
         if (group_.pid(p) != 0) faults_.push_back(fmt::format("process {} did not end and was killed", group_.name(p)));
@@ -229,7 +236,7 @@ class IsolatedRun {
 
   MachineUse use_of_all() const {
     const ProcessReading own = ProcessReading::now();
-    MachineUse use{own.cpu_ns, 0, 0, own.steal_ms, memory_mb_};
+    MachineUse use{own.cpu_ns + supervisor_->lost_cpu_ns(), 0, 0, own.steal_ms, memory_mb_};
     for (size_t p = 0; p < board_.process_count(); ++p) {
       use.cpu_ns += board_.process(p).cpu_ns;
       use.simulator_cpu_ns += board_.process(p).simulator_cpu_ns;
@@ -249,9 +256,11 @@ class IsolatedRun {
     auto report = make_report({graph_, plan_, board_, result, *transport_, use, options_.clock,
                                std::string(to_string(plan_.policy)), "subsystem", partition_.names, adjusted_});
     for (const std::string& fault : faults_) report["faults"].push_back({{"what", fault}});
-    if (!faults_.empty()) report["ok"] = false;
+    add_outages(supervisor_->outages(), partition_.names, plan_, tasks_of(plan_, partition_), result, report);
+    if (!faults_.empty() || !supervisor_->outages().empty()) report["ok"] = false;
+    if (supervisor_->gave_up()) code_ = kDeviceOrSystem;
     record_.tell(report);
-    const int told = tell_faults(options_, graph_, board_, granted_, report);
+    const int told = tell(options_, graph_, report);
     if (!no_trace.empty()) return refuse(no_trace, kBadInput);
     return code_ != 0 ? code_ : told;
   }
@@ -272,23 +281,18 @@ class IsolatedRun {
   size_t told_ = 0;
   bool ending_ = false;
   double memory_mb_ = 0;
-  std::unique_ptr<Transport> transport_;  ///< the daemon: ends after all members
+  std::unique_ptr<Transport> transport_;  ///< of iceoryx with the daemon: ends after all members
   RunRecord record_;                      ///< reads from the transport
   RunTrace trace_;                        ///< speaks to the record
-  ProcessGroup group_;                    ///< last: its members end before what they share
+  ProcessGroup group_;                    ///< its members end before what they share
+  std::optional<Supervisor> supervisor_;  ///< of the group
 };
 
 }  // namespace
 
 int run_isolated(const RunOptions& options, const graph::GraphSpec& graph, std::vector<std::string> adjusted) {
   std::unique_ptr<DaemonClaim> claim;
-  if (options.transport != "local") {
-    try {
-      claim = find_room_for_daemon(adjusted);
-    } catch (const TransportError& refused) {
-      note_local_instead(options, refused, adjusted);
-    }
-  }
+  if (options.transport == "iceoryx") claim = find_room_for_daemon(adjusted);
   try {
     return IsolatedRun(options, graph, std::move(adjusted), std::move(claim)).run();
   } catch (const Refused& refused) {

@@ -75,7 +75,7 @@ void add_run(CLI::App& app, takt::command::RunOptions& o, int& exit_code) {
   run->add_option("--clock", o.clock, "real | virtual")->check(CLI::IsMember({"real", "virtual"}));
   run->add_option("--durations", o.durations,
                   "what jobs take in virtual time: budgets | random (half a budget to a whole one) | a record");
-  run->add_option("--transport", o.transport, "local | iceoryx (default: local within a process, iceoryx between)")
+  run->add_option("--transport", o.transport, "local | iceoryx (default: local)")
       ->check(CLI::IsMember({"local", "iceoryx"}));
   run->add_option("--isolate", o.isolate, "none (one process) | subsystem")
       ->check(CLI::IsMember({"none", "subsystem"}));

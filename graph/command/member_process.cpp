@@ -17,6 +17,8 @@ class BoardGate final : public StartGate {
  public:
   BoardGate(RunBoard& board, size_t process) : board_(board), record_(board.process(process)) {}
   bool all_granted(bool mine) override {
+    if (record_.restarts.load() > 0 && !mine)  // the others will not wait: whoever looks after us tries again
+      throw std::runtime_error("the kernel refused a policy that it had granted before the restart");
     record_.refused.store(!mine);
     record_.state.store(ProcessRecord::agreed);
     wait_until([&] { return board_.decision().load() != RunBoard::undecided; });
@@ -63,6 +65,7 @@ bool wait_until(const std::function<bool()>& done, const std::function<bool()>& 
 int run_member(const RunOptions& options, const graph::GraphSpec& graph, const graph::Partition& partition,
                size_t process, int supervisor, RunBoard& board, const PoolFile& pools, trace::Rings* rings) {
   ProcessRecord& record = board.process(process);
+  obey_orders(&record.kill);
   Prepared prepared;
   prepared.graph = graph;
   prepared.clock = std::make_unique<MonotonicClock>();
@@ -84,7 +87,7 @@ int run_member(const RunOptions& options, const graph::GraphSpec& graph, const g
   wait_until([&] { return board.carrier().load() != RunBoard::no_carrier; });
   prepare_process();
   const auto transport = board.carrier().load() == RunBoard::local
-                             ? join_local_transport(plan.ports, pools)
+                             ? join_local_transport(plan.ports, pools, static_cast<uint32_t>(process) + 1)
                              : join_iceoryx_transport(plan.ports, iceoryx_domain(supervisor));
   BoardGate gate(board, process);
   Executor::Options run;
@@ -93,14 +96,16 @@ int run_member(const RunOptions& options, const graph::GraphSpec& graph, const g
   run.stolen_ns = stolen_ns;
   run.trace = rings;
   run.gate = &gate;
+  run.rejoin = record.restarts.load() > 0;
+  run.life = &record.life;
   run.own = owned(plan, partition, process);
   Executor executor(plan, *transport, *prepared.clock, run);
   record.state.store(ProcessRecord::joined);
   const ProcessReading before = ProcessReading::now();
   const RunResult result = executor.run();
   record.cpu_ns = ProcessReading::now().cpu_ns - before.cpu_ns;
-  record.simulator_cpu_ns = hal::simulator_use().cpu_ns;
-  record.simulator_in_jobs_ns = hal::simulator_use().in_jobs_ns;
+  record.simulator_cpu_ns += hal::simulator_use().cpu_ns;
+  record.simulator_in_jobs_ns += hal::simulator_use().in_jobs_ns;
   for (size_t t = 0; t < plan.tasks.size(); ++t)
     if (run.own[t] && !is_stuck(result, t)) prepared.composition->nodes[t]->finish();
   record.state.store(ProcessRecord::finished);

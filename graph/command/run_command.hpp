@@ -17,7 +17,7 @@ struct RunOptions {
   bool unchecked = false, require_rt = false;
   std::string clock = "real", isolate;
   std::string durations = "budgets";  ///< of jobs in virtual time, see job_durations()
-  std::string transport;              ///< local | iceoryx; empty: local within a process, iceoryx between processes
+  std::string transport = "local";    ///< local | iceoryx
   std::filesystem::path report, html, trace, record, output = "out";
   std::vector<std::string> record_ports;  ///< NODE.PORT: with all fields, beside devices and small ones; "all"
   std::string trace_source = "auto";      ///< of preemption: auto (the best there is), tracefs, perf, none

@@ -73,8 +73,14 @@ void EgoMotion::configure(int width, int height, const Parameters& parameters) {
   reset();
 }
 
+void EgoMotion::resume(const Rigid& pose) {
+  reset();
+  pose_ = pose;
+  resumed_ = true;
+}
+
 void EgoMotion::reset() {
-  has_previous_ = has_motion_ = false;
+  has_previous_ = has_motion_ = resumed_ = false;
   steps_ = 0;
   last_T_ = pose_ = {};
   tracked_.clear();
@@ -239,7 +245,9 @@ Result EgoMotion::step(const Frame& frame) {
   find_corners(frame);
   if (p_.corner_candidates) mark_candidates();
   result.corners = static_cast<int>(found_.size());
-  if (!has_previous_) {
+  if (resumed_) {
+    resumed_ = false;
+  } else if (!has_previous_) {
     result.keyframe = result.valid = true;
     result.confidence = 1;
   } else {

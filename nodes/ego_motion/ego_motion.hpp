@@ -73,6 +73,9 @@ class EgoMotion {
   void configure(int width, int height, const Parameters& parameters);
   /// Motion since the frame of the call before; the first call (and one after reset()) gives a keyframe.
   Result step(const Frame& frame);
+  /// Goes on from a pose that an earlier process had reached: the next call gives it with valid = false, since nobody
+  /// saw the motion in between, and no keyframe.
+  void resume(const Rigid& pose);
   /// Forgets the previous frame and the pose.
   void reset();
   /// Matches of the last step that entered the estimate.
@@ -109,7 +112,7 @@ class EgoMotion {
   std::vector<Observation> observations_;
   std::vector<Flow> flows_;
   std::vector<uint8_t> keep_, candidates_;
-  bool has_previous_ = false, has_motion_ = false;
+  bool has_previous_ = false, has_motion_ = false, resumed_ = false;
   int64_t stamp_ns_ = 0, interval_ns_ = 0;
   uint64_t steps_ = 0;
   Rigid last_T_, pose_;

@@ -27,6 +27,10 @@ class EgoMotionNode final : public Node {
     }
   }
 
+  void start(int64_t) override {
+    if (const Motion* known = motion_.handed_over()) ego_.resume(from_transform(known->pose));
+  }
+
   void run(Job& job) override {
     const StereoPair* pair = pair_.newest();
     const DisparityMap* map = disparity_.newest();

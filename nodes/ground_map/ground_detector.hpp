@@ -30,6 +30,9 @@ class GroundDetector {
   /// 255 ground, 0 not. Before the first entry nothing is ground.
   void classify(ImageView<uint8_t> mask);
 
+  /// Adds a texture that an earlier process learnt.
+  void recall(const Descriptor& descriptor) { memory_.add(descriptor); }
+
   const ReferenceArea& area() const { return area_; }
   const TextureMemory& memory() const { return memory_; }
   int width() const { return width_; }

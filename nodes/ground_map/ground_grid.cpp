@@ -29,6 +29,14 @@ GroundGrid::GroundGrid(int image_width, const GridParameters& parameters) : p_(p
   column_.resize(static_cast<size_t>(image_width));
 }
 
+bool GroundGrid::resume(std::span<const int16_t> cells, const FloorPoint& origin) {
+  if (cells.size() != map_.size()) return false;
+  window_.column = std::llround(origin.x_m / p_.cell_m);
+  window_.row = std::llround(origin.y_m / p_.cell_m);
+  std::copy(cells.begin(), cells.end(), map_.begin());
+  return true;
+}
+
 void GroundGrid::centre(const FloorPoint& robot) {
   const int n = window_.cells;
   const auto column = static_cast<int64_t>(std::floor(robot.x_m / p_.cell_m)) - n / 2;

@@ -3,6 +3,7 @@
 // reference 7.5).
 #pragma once
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "nodes/ground_map/floor_projection.hpp"
@@ -50,6 +51,10 @@ class GroundGrid {
   void observe(ImageView<const uint8_t> mask, const FloorProjection& projection, const FloorPoint& robot);
   /// Adds the observation to the map: unknown starts at 500, blocked + up, free - down, within 0..1000.
   void accumulate();
+
+  /// Takes up the map that an earlier process gave: cells row by row, of the window whose first cell lies at `origin`
+  /// of the map frame. False if it is of another size.
+  bool resume(std::span<const int16_t> cells, const FloorPoint& origin);
 
   const Window& window() const { return window_; }
   ImageView<const int16_t> observation() const { return {observation_.data(), window_.cells, window_.cells}; }

@@ -33,11 +33,24 @@ class GroundMapNode final : public Node {
     ground_.resize(image.pixels());
     grid_cells_.emplace(static_cast<int>(image.width), grid_parameters());
     mask_.reserve({image.width, image.height, 1, 0});
+    textures_.reserve({sizeof(Descriptor), static_cast<uint32_t>(n_b_()), 1, 0});
     const auto side = static_cast<uint32_t>(grid_cells_->window().cells);
     grid_.reserve({side, side, 1, 0});
     mount_ = mapping_3d::camera_mount(camera_x_, camera_y_, camera_height_, 0, camera_tilt_);
     motion_mount_ =
         mapping_3d::camera_mount(motion_camera_x_, motion_camera_y_, motion_camera_height_, 0, motion_camera_tilt_);
+  }
+
+  void start(int64_t) override {
+    if (const Image* known = textures_.handed_over())
+      for (int i = 0; i < known->height; ++i) {
+        const uint8_t* row = known->view().row(i);
+        detector_->recall({row[0], row[1], row[2], row[3]});
+      }
+    const Grid* map = grid_.handed_over();
+    if (map != nullptr && has_pose_input())
+      grid_cells_->resume(map->cells.items(),
+                          {map->grid_in_map.x + map->origin_x_m, map->grid_in_map.y + map->origin_y_m});
   }
 
   void run(Job& job) override {
@@ -51,7 +64,8 @@ class GroundMapNode final : public Node {
     detector_->classify(ground());
     const bool mask_given = give_mask(pair);
     const bool grid_given = !chosen->robot_in_map || give_grid(projection, *chosen->robot_in_map);
-    if (!mask_given || !grid_given) job.no_result();
+    const bool textures_given = give_textures();
+    if (!mask_given || !grid_given || !textures_given) job.no_result();
   }
 
  private:
@@ -63,8 +77,9 @@ class GroundMapNode final : public Node {
            pair.left.size == ground_.size() * static_cast<size_t>(pair.channels);
   }
 
-  /// The newest image, not mapped before, whose pose is known; else the newest with its pose predicted; else the newest
-  /// without one: its mask is still worth having. Never simply the latest pose.
+  /// The newest image that was not mapped before, with its pose known or predicted; else an older one with its pose
+  /// known; else the newest without one: its mask is still worth having. Never simply the latest pose. (Were a known pose
+  /// preferred to a predicted one, one job left out would make every later one map the image before the newest.)
   std::optional<Chosen> choose() {
     std::optional<size_t> newest;
     for (size_t i = pair_.size(); i-- > 0 && pair_.stamp_ns(i) > last_stamp_ns_;) {
@@ -75,9 +90,10 @@ class GroundMapNode final : public Node {
         follow(mount_of(pair_[i]));
       }
       if (const auto pose = track_.at(pair_.stamp_ns(i))) return Chosen{i, pose};
+      if (const auto pose = track_.predicted(pair_.stamp_ns(i)); pose && i == *newest) return Chosen{i, pose};
     }
     if (!newest) return std::nullopt;
-    return Chosen{*newest, track_.predicted(pair_.stamp_ns(*newest))};
+    return Chosen{*newest, std::nullopt};
   }
 
   void follow(const Transform& mount) {
@@ -117,6 +133,23 @@ class GroundMapNode final : public Node {
     out->camera = pair.camera;
     std::copy(ground_.begin(), ground_.end(), out->pixels.data());
     mask_.send(last_stamp_ns_);
+    return true;
+  }
+
+  /// What was learnt, for a process that takes this one's place. False if no memory was to be had.
+  bool give_textures() {
+    Image* out = textures_.loan();
+    const TextureMemory& memory = detector_->memory();
+    if (!out || !out->pixels.resize(sizeof(Descriptor) * static_cast<size_t>(memory.size()))) return false;
+    out->width = sizeof(Descriptor);
+    out->height = memory.size();
+    out->channels = 1;
+    for (int i = 0; i < memory.size(); ++i) {
+      const Descriptor& d = memory.by_age(i);
+      const uint8_t row[] = {d.s_min, d.s_max, d.v_min, d.v_max};
+      std::copy(std::begin(row), std::end(row), out->view().row(i));
+    }
+    textures_.send(last_stamp_ns_);
     return true;
   }
 
@@ -190,6 +223,8 @@ class GroundMapNode final : public Node {
   Input<Odometry> odometry_{this, "odometry", "used if motion is not connected; depth 16", Need::optional};
   Output<Image> mask_{this, "mask", "255 ground, 0 not"};
   Output<Grid> grid_{this, "grid", "cells of the map frame around the robot"};
+  Output<Image> textures_{this, "textures",
+                          "texture memory, a row each, oldest first: least and most saturation, least and most value"};
 
   Param<double> trapezoid_bottom_{this, "trapezoid_bottom", 0.5, {0.0, 1.0}, "1", "reference area, of the width"};
   Param<double> trapezoid_top_{this, "trapezoid_top", 0.3, {0.0, 1.0}, "1", "reference area, of the width"};

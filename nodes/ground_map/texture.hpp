@@ -66,6 +66,11 @@ class TextureMemory {
   /// N_b - a_k of entry k of the ring: capacity for the newest, one less for each step of age; 0 if not filled.
   int weight(int k) const;
   const Descriptor& entry(int k) const { return ring_[static_cast<size_t>(k)]; }
+  /// The i-th oldest, i < size().
+  const Descriptor& by_age(int i) const {
+    const int capacity = static_cast<int>(ring_.size());
+    return entry((newest_ + 1 - filled_ + i + capacity) % capacity);
+  }
   /// Sum of those weights over the entries that hold (s, v).
   int32_t sum(uint8_t s, uint8_t v) const { return sums_[(size_t{v} + 1) * kStride + s + 1]; }
   /// Table of 256 x 256 bytes, index 256 v + s: 1 ground, 0 not.

@@ -63,6 +63,22 @@ void GridWindow::reduce(const ObstacleGrid& grid, std::span<const Point> points,
   }
 }
 
+void GridWindow::resume(std::span<const int16_t> cells, const Transform& robot_in_map) {
+  newest_ = (newest_ + 1) % ring_.size();
+  views_ = std::min(views_ + 1, ring_.size());
+  View& view = ring_[newest_];
+  view.robot_in_map = robot_in_map;
+  std::copy(cells.begin(), cells.end(), view.cells.begin());
+  view.points.clear();
+  const Affine to_map = to_affine(robot_in_map);
+  for (int row = 0; row < quarters_.cells; ++row)
+    for (int column = 0; column < quarters_.cells; ++column)
+      if (cells[static_cast<size_t>(row / 2) * static_cast<size_t>(shape_.cells) + static_cast<size_t>(column / 2)] ==
+          kOccupied)
+        view.points.push_back(transformed(to_map, quarters_.origin_m + (column + 0.5) * quarters_.cell_m,
+                                          quarters_.origin_m + (row + 0.5) * quarters_.cell_m, 0));
+}
+
 void GridWindow::regrid(const View& old, const Transform& robot_in_map) {
   const UncertainPose from_map = inverse({robot_in_map, {}});
   const Affine to_robot = to_affine(from_map.transform);

@@ -31,6 +31,10 @@ class GridWindow {
   /// cell is occupied by a kept point in it, and free if its centre lies in a free cell of the old grid.
   void merge_older(ImageView<int16_t> cells);
 
+  /// Takes a merged grid (row by row, `shape` of the constructor) as the newest view, for what an earlier process knew:
+  /// its occupied cells stand for the points in them.
+  void resume(std::span<const int16_t> cells, const Transform& robot_in_map);
+
   /// After the map frame has changed.
   void forget() { views_ = 0; }
 

@@ -45,6 +45,12 @@ class MappingNode final : public Node {
     mount_ = camera_mount(camera_x_, camera_y_, camera_height_, 0, camera_tilt_);
   }
 
+  void start(int64_t) override {
+    const Grid* known = obstacles_.handed_over();
+    if (known != nullptr && views_ && known->width == grid_.shape().cells)
+      views_->resume(known->cells.items(), known->grid_in_map);
+  }
+
   void run(Job& job) override {
     for (size_t i = 0; i < poses(); ++i) track_.insert(pose_stamp_ns(i), pose(i));
     for (size_t i = 0; i < motion_.size(); ++i)

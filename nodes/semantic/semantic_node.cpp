@@ -12,7 +12,8 @@ using namespace semantic;
 
 class SemanticNode final : public Node {
  public:
-  void setup(Setup&) override {
+  void setup(Setup& setup) override {
+    offset_ns_ = setup.offset_ns;
     auto script = parse_script(script_());
     if (!script) throw SetupError("script: " + script.error());
     const auto idle = parse_node_list(idle_());
@@ -20,6 +21,10 @@ class SemanticNode final : public Node {
     generator_ = ClockGenerator(std::move(*script), *idle, static_cast<uint8_t>(idle_every_()));
     requests_.reserve({0, 0, 1, static_cast<uint32_t>(std::max<size_t>(1, generator_.nodes()))});
     status_.reserve({0, 0, 1, kStatusCharacters});
+  }
+
+  void start(int64_t epoch_ns) override {
+    if (requests_.handed_over()) first_ns_ = epoch_ns + offset_ns_;  // the script goes on, it does not begin anew
   }
 
   void run(Job& job) override {
@@ -76,6 +81,7 @@ class SemanticNode final : public Node {
   Param<double> strip_{this, "strip", 0.8, {0.1, 5.0}, "m", "width of the way ahead that the status tells of"};
 
   ClockGenerator generator_;
+  int64_t offset_ns_ = 0;
   std::optional<int64_t> first_ns_;
 };
 

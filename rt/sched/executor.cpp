@@ -41,6 +41,7 @@ void add_refusal(const std::string& lane, const std::string& reason, std::vector
 
 Executor::Executor(const Plan& plan, Transport& transport, Clock& clock, const Options& options)
     : plan_(plan),
+      transport_(transport),
       clock_(clock),
       options_(options),
       own_board_(options.board == nullptr ? std::make_unique<RunBoard>(plan) : nullptr),
@@ -85,9 +86,12 @@ void Executor::start_clockwork(RunResult& result) {
                                              : clock_.now_ns() + (clock_.is_virtual() ? 0 : options_.start_delay_ns);
   board_.epoch_ns().store(result.epoch_ns);
   if (options_.duration_ns > 0) stop_.set_planned_end(result.epoch_ns + options_.duration_ns);
-  for (auto& lane : lanes_) lane->set_epoch(result.epoch_ns);
   for (const auto& task : tasks_)
-    if (task) task->plan().node->start(result.epoch_ns);
+    if (task) task->start(result.epoch_ns, options_.rejoin ? &transport_ : nullptr);
+  for (auto& lane : lanes_) {
+    if (options_.rejoin) lane->join(result.epoch_ns, clock_.now_ns());
+    else lane->set_epoch(result.epoch_ns);
+  }
 }
 
 std::vector<Reservation> Executor::own_reservations(Policy policy) const {
@@ -185,6 +189,7 @@ void Executor::watch(Policy granted) {
   options.granted = granted;
   options.patience_ns = options_.hang_patience_ns;
   options.stolen_ns = options_.stolen_ns;
+  options.life = options_.life;
   options.priority = granted == Policy::cooperative ? 0 : kHighestPriority + 1;
   crew_->watchdog = std::make_unique<Watchdog>(plan_, board_, clock_, std::move(workers), options);
 }

@@ -59,6 +59,8 @@ class Executor {
     RunBoard* board = nullptr;            ///< shared with other processes; null: one of its own
     StartGate* gate = nullptr;            ///< where other processes are waited for
     std::vector<bool> own = {};           ///< by task: this process runs it; empty: all
+    bool rejoin = false;                  ///< a process before this one ran the same tasks, and died
+    LifeSigns* life = nullptr;            ///< of a process that somebody looks after, see Watchdog::Options
     /// A job that has not returned this long after its deadline hangs.
     int64_t hang_patience_ns = kSlowdown * 1'000'000'000LL;
     std::function<int64_t()> stolen_ns = {};  ///< see StolenTime; empty: no job is lifted
@@ -99,6 +101,7 @@ class Executor {
   void run_virtual(RunResult& result);
 
   const Plan plan_;
+  Transport& transport_;
   Clock& clock_;
   const Options options_;
   std::unique_ptr<RunBoard> own_board_;

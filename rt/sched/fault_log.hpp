@@ -18,6 +18,6 @@ struct Fault {
   BoundedText<200> what;
 };
 
-using FaultLog = AppendLog<Fault, 64>;
+using FaultLog = AppendLog<Fault, 256>;
 
 }  // namespace takt

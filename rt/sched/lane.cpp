@@ -24,6 +24,12 @@ Lane::Lane(std::vector<size_t> members, const std::vector<std::unique_ptr<Task>>
   }
 }
 
+void Lane::join(int64_t epoch_ns, int64_t now_ns) {
+  set_epoch(epoch_ns);
+  go_to(rate().releases_before(origin_ns_, now_ns));
+  for (size_t m = 1; m < tasks_.size(); ++m) followers_[m].index = tasks_[m]->statistics().released.load();
+}
+
 bool Lane::activates(size_t member, int64_t visible_at_ns) {
   const TaskPlan& plan = tasks_[member]->plan();
   Follower& follower = followers_[member];

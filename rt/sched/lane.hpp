@@ -18,6 +18,8 @@ class Lane {
     origin_ns_ = epoch_ns + head().plan().offset_ns;
     go_to(0);
   }
+  /// Instead, if others began at that epoch long ago: with the first release after `now_ns`.
+  void join(int64_t epoch_ns, int64_t now_ns);
   /// Planned instant of the next release.
   int64_t next_release_ns() const { return next_release_ns_; }
   /// Instant by which the whole pass is due (lane_span_ns).

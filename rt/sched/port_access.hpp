@@ -22,6 +22,7 @@ class PortAccess {
     input.last_seen_before_ = last_seen_before;
   }
 
+  static void hand_over(OutputPort& output, const void* message) { output.handed_over_ = message; }
   static bool sent(const OutputPort& output) { return output.sent_; }
   static void set_level(OutputPort& output, int level) { output.loaned_->level = level; }  ///< of a sent message
   static int64_t stamp_ns(const OutputPort& output) { return output.stamp_ns_; }

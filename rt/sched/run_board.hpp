@@ -10,6 +10,7 @@
 #include "rt/sched/plan.hpp"
 #include "rt/sched/statistics.hpp"
 #include "rt/sched/stop_signal.hpp"
+#include "rt/shm/kill_order.hpp"
 
 namespace takt {
 
@@ -26,12 +27,22 @@ struct ParamMail {
   std::array<char, 256> refusal{};  ///< why, if refused; ended by 0
 };
 
-/// How far one process of a run has come, and what it used.
+/// What a process shows of itself to whoever looks after it.
+struct LifeSigns {
+  std::atomic<int64_t> heartbeat_ns{0};      ///< when its watchdog last looked; 0: not yet
+  std::atomic<int64_t> hanging_since_ns{0};  ///< release of that job
+  std::atomic<uint32_t> hanging{0};          ///< 1 + index of a task with a job that does not return; 0: none
+};
+
+/// How far one process of a run has come, and what it used. A restarted one goes on with the record of the one before.
 struct ProcessRecord {
   enum State : uint32_t { starting, composed, joined, agreed, running, finished };
   std::atomic<uint32_t> state{starting};
   std::atomic<uint32_t> problems{0};  ///< why it could not be composed: how many, told on stderr
   std::atomic<bool> refused{false};   ///< a policy was refused to one of its lanes
+  std::atomic<uint32_t> restarts{0};  ///< it is not the first of its name
+  LifeSigns life;
+  KillOrder kill;
   int64_t cpu_ns = 0, simulator_cpu_ns = 0, simulator_in_jobs_ns = 0;
 };
 

@@ -79,6 +79,23 @@ Task::~Task() {
   for (OutputPort* output : plan_.node->outputs()) PortAccess::attach(*output, nullptr);
 }
 
+void Task::start(int64_t epoch_ns, Transport* restarted) {
+  std::vector<std::unique_ptr<Reader>> readers;
+  std::vector<Held> held;
+  for (size_t i = 0; restarted != nullptr && i < plan_.ports.size(); ++i) {
+    readers.push_back(restarted->make_reader(plan_.ports[i]));
+    Candidate newest;
+    const bool any = readers.back()->list(INT64_MAX, std::span(&newest, 1)) > 0;
+    held.push_back(any ? readers.back()->take(newest.sequence) : Held{});
+    if (held.back()) PortAccess::hand_over(*plan_.node->outputs()[i], held.back().message());
+  }
+  plan_.node->start(epoch_ns);
+  for (size_t i = 0; i < held.size(); ++i) {
+    PortAccess::hand_over(*plan_.node->outputs()[i], nullptr);
+    readers[i]->release(held[i]);
+  }
+}
+
 void Task::settle() {
   for (size_t i = 0; i < writers_.size(); ++i) board_.port(plan_.ports[i]).writer = writers_[i]->statistics();
 }

@@ -61,6 +61,8 @@ class Task {
   const TaskPlan& plan() const { return plan_; }
   TaskStatistics& statistics() { return statistics_; }
   const TaskStatistics& statistics() const { return statistics_; }
+  /// Starts the node. In a process that was restarted, with the newest message of each of its outputs.
+  void start(int64_t epoch_ns, Transport* restarted);
   /// After the run: what the writers counted goes onto the board.
   void settle();
   const Latch& latch() const { return latch_; }

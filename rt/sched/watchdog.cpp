@@ -71,6 +71,10 @@ int64_t Watchdog::look(int64_t now_ns) {
     next_ns = now_ns + (lifted || stolen_.recent_ns() > 0 ? kStallGrain_ns : StolenTime::kStep_ns);
   }
   for (Watched& watched : watched_) next_ns = std::min(next_ns, look_at(watched, now_ns));
+  if (options_.life != nullptr) {
+    options_.life->heartbeat_ns.store(now_ns, std::memory_order_relaxed);
+    next_ns = std::min(next_ns, now_ns + options_.heartbeat_period_ns);
+  }
   return next_ns;
 }
 
@@ -150,6 +154,7 @@ void Watchdog::safe_stop(size_t task, uint64_t job, const char* why, int64_t now
 }
 
 void Watchdog::tell_hang(size_t task, const JobWatch::Running& job, int64_t now_ns) {
+  const bool ends_run = options_.granted == Policy::cooperative && options_.life == nullptr;
   Fault fault;
   fault.kind = Fault::hang;
   fault.task = static_cast<uint32_t>(task);
@@ -158,9 +163,13 @@ void Watchdog::tell_hang(size_t task, const JobWatch::Running& job, int64_t now_
   std::snprintf(fault.what.characters.data(), fault.what.characters.size(),
                 "%s: job %" PRIu64 " has not returned %" PRId64 " ms after its release%s",
                 plan_.tasks[task].name.c_str(), job.index, (now_ns - job.release_ns) / 1'000'000,
-                options_.granted == Policy::cooperative ? "; without real-time policies that ends the run" : "");
+                ends_run ? "; without real-time policies that ends the run" : "");
   board_.faults().append(fault);
-  if (options_.granted != Policy::cooperative) return;  // no writing here: a full pipe would stop all enforcement
+  if (options_.life != nullptr) {
+    options_.life->hanging_since_ns.store(job.release_ns);
+    options_.life->hanging.store(static_cast<uint32_t>(task) + 1);
+  }
+  if (!ends_run) return;  // no writing here: a full pipe would stop all enforcement
   std::fprintf(stderr, "takt: error: %s\n", fault.what.c_str());
   board_.stop().raise(now_ns);
 }

@@ -26,7 +26,7 @@ namespace takt {
 ///   uses more than that goes back into the reservation.
 /// - `safe_stop` is asked for the moment a budget or a deadline has passed, not when the job ends.
 /// - A job that has not returned `patience` after its deadline hangs: told once, by name. Under `cooperative` that ends
-///   the run.
+///   the run, unless somebody looks after this process.
 ///
 /// Cost: at most one wake-up a job that is minded, none for the others but one a job's deadline and patience; under
 /// `deadline` one every 50 ms, 5 ms while the host takes time.
@@ -41,6 +41,10 @@ class Watchdog {
     int64_t patience_ns = 1'000'000'000;
     int priority = 0;                         ///< SCHED_FIFO; 0: none
     std::function<int64_t()> stolen_ns = {};  ///< see StolenTime
+    /// Where somebody outside looks after this process: at least every `heartbeat_period` the instant of a look is left
+    /// there, and a hang is for him to end. Null: nobody does.
+    LifeSigns* life = nullptr;
+    int64_t heartbeat_period_ns = 200'000'000;
   };
 
   Watchdog(const Plan& plan, RunBoard& board, const Clock& clock, std::vector<Worker> workers, const Options& options);

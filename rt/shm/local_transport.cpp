@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A port is an array of chunks with a reference count each, and a ring of slots, one per kept message; all of it,
-// counts and slots included, lies in one shared-memory file, so that several processes can map it. A count of 0 is a
-// free chunk, so there is no free list to corrupt and nothing to lock: the writer looks for a zero, a reader raises a
-// count that is not zero and then checks that the slot still names that message.
+// Writers and readers over the pools of local_pool.hpp: the writer looks for a free chunk, a reader adds its bit to the
+// holders of one that is not free and then checks that the slot still names that message.
 #include "rt/shm/local_transport.hpp"
 
 #include <sys/mman.h>
@@ -10,191 +8,130 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cerrno>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <new>
 #include <stdexcept>
 #include <vector>
+
+#include "rt/shm/kill_order.hpp"
+#include "rt/shm/local_pool.hpp"
 
 namespace takt {
 namespace {
 
 constexpr uint32_t kNoChunk = 0xffffffff;
-constexpr uint64_t kPage = 4096;
 
-struct Slot {
-  std::atomic<uint64_t> sequence{0};  ///< 0 while empty or being changed
-  std::atomic<uint32_t> chunk{kNoChunk};
-  std::atomic<int64_t> stamp_ns{0};
-  std::atomic<int64_t> visible_at_ns{0};
-};
-
-// What another process finds in the mapping must mean the same there: no pointers, and no lock behind an atomic.
-static_assert(std::atomic<uint64_t>::is_always_lock_free && std::atomic<uint32_t>::is_always_lock_free);
-
-/// One per port, in the file.
-struct alignas(64) PortState {
-  std::atomic<uint64_t> newest{0};
-};
-
-constexpr uint64_t round_up(uint64_t bytes, uint64_t to) { return (bytes + to - 1) / to * to; }
-
-/// Places arrays one after the other; without memory it only counts.
+/// Places parts one after the other, each on a cache line of its own; without memory it only counts.
 class Carver {
  public:
   explicit Carver(std::byte* memory) : memory_(memory) {}
-  template <class T>
-  T* array(uint64_t count) {
-    T* at = memory_ == nullptr ? nullptr : reinterpret_cast<T*>(memory_ + used_);
-    used_ += round_up(sizeof(T) * count, 64);
+  std::byte* operator()(uint64_t bytes) {
+    std::byte* at = memory_ == nullptr ? nullptr : memory_ + used_;
+    used_ = round_up(used_ + bytes, 64);
     return at;
   }
-  void to_next_page() { used_ = round_up(used_, kPage); }
+  void to_next_page() { used_ = round_up(used_, 4096); }
   uint64_t used() const { return used_; }
 
  private:
+  static constexpr uint64_t round_up(uint64_t bytes, uint64_t to) { return (bytes + to - 1) / to * to; }
   std::byte* memory_;
   uint64_t used_ = 0;
 };
 
-/// A port as this process sees it.
-struct Channel {
-  PortPlan plan;
-  uint64_t chunk_bytes;
-  uint32_t chunks, slots;
-  PortState* state = nullptr;
-  std::atomic<uint32_t>* references = nullptr;
-  Slot* ring = nullptr;
-  std::byte* base = nullptr;
-
-  explicit Channel(const PortPlan& plan_)
-      : plan(plan_), chunk_bytes(round_up(plan_.chunk_bytes(), 64)), chunks(plan_.chunks()), slots(plan_.history) {}
-
-  void carve_control(Carver& carver) {
-    state = carver.array<PortState>(1);
-    references = carver.array<std::atomic<uint32_t>>(chunks);
-    ring = carver.array<Slot>(slots);
-  }
-  void carve_chunks(Carver& carver) {
-    carver.to_next_page();
-    base = carver.array<std::byte>(bytes());
-  }
-  void construct() {
-    ::new (state) PortState;
-    for (uint32_t i = 0; i < chunks; ++i) ::new (references + i) std::atomic<uint32_t>(0);
-    for (uint32_t i = 0; i < slots; ++i) ::new (ring + i) Slot;
-  }
-
-  uint64_t bytes() const { return chunk_bytes * chunks; }
-  MessageHeader* header(uint32_t chunk) const { return reinterpret_cast<MessageHeader*>(base + chunk * chunk_bytes); }
-  Slot& slot(uint64_t sequence) const { return ring[sequence % slots]; }
-  void drop(uint32_t chunk) const { references[chunk].fetch_sub(1, std::memory_order_acq_rel); }
-  uint32_t in_use() const {
-    uint32_t count = 0;
-    for (uint32_t i = 0; i < chunks; ++i) count += references[i].load(std::memory_order_relaxed) != 0;
-    return count;
-  }
-};
-
 class LocalWriter final : public Writer {
  public:
-  explicit LocalWriter(Channel& channel) : channel_(channel) {}
+  LocalWriter(const LocalPool& pool, uint32_t process) : pool_(pool) { pool.state().writer.store(process); }
   ~LocalWriter() override {
     discard();
-    for (uint64_t s = 1; s <= channel_.slots; ++s) evict(channel_.slot(s));
+    for (uint64_t s = 1; s <= pool_.slots(); ++s) pool_.evict(pool_.slot(s));
   }
 
   MessageHeader* loan() override {
-    if (loaned_ != kNoChunk) return channel_.header(loaned_);
-    for (uint32_t i = 0; i < channel_.chunks; ++i) {
-      const uint32_t chunk = (next_ + i) % channel_.chunks;
-      uint32_t free = 0;
-      if (!channel_.references[chunk].compare_exchange_strong(free, 1, std::memory_order_acq_rel)) continue;
+    if (loaned_ != kNoChunk) return pool_.header(loaned_);
+    for (uint32_t i = 0; i < pool_.chunks(); ++i) {
+      const uint32_t chunk = (next_ + i) % pool_.chunks();
+      if (!pool_.loan(chunk)) continue;
       next_ = chunk + 1;
       loaned_ = chunk;
-      statistics_.peak_in_use = std::max(statistics_.peak_in_use, channel_.in_use());
-      MessageHeader* header = channel_.header(chunk);
-      *header = MessageHeader{};
-      header->loan_offset = static_cast<uint64_t>(reinterpret_cast<std::byte*>(header) - channel_.base);
-      channel_.plan.type->place(header + 1, channel_.plan.capacity);
-      return header;
+      const uint32_t in_use = pool_.in_use();
+      if (in_use > pool_.state().peak_in_use.load(std::memory_order_relaxed)) pool_.state().peak_in_use.store(in_use);
+      return begin(pool_.header(chunk));
     }
-    ++statistics_.pool_empty;
+    pool_.state().pool_empty.fetch_add(1, std::memory_order_relaxed);
     return nullptr;
   }
 
   void publish(int64_t stamp_ns, int64_t published_ns, int64_t visible_at_ns) override {
     if (loaned_ == kNoChunk) return;
-    MessageHeader* header = channel_.header(loaned_);
+    MessageHeader* header = pool_.header(loaned_);
     header->stamp_ns = stamp_ns;
     header->published_ns = published_ns;
     header->visible_at_ns = visible_at_ns;
-    header->sequence = channel_.state->newest.load(std::memory_order_relaxed) + 1;
-    announce(loaned_, stamp_ns, visible_at_ns);
+    header->sequence = pool_.state().newest.load(std::memory_order_relaxed) + 1;
+    pool_.announce(loaned_, stamp_ns, visible_at_ns);
     loaned_ = kNoChunk;
   }
 
   void discard() override {
-    if (loaned_ != kNoChunk) channel_.drop(loaned_);
+    if (loaned_ != kNoChunk) pool_.drop(loaned_, PoolState::kWriter);
     loaned_ = kNoChunk;
   }
 
   bool repeat(int64_t, int64_t visible_at_ns) override {
-    const uint64_t newest = channel_.state->newest.load(std::memory_order_relaxed);
-    const Slot& last = channel_.slot(newest);
-    // None yet; or an earlier writer of this port has gone, or was killed, and its chunk is free or about to be.
+    const uint64_t newest = pool_.state().newest.load(std::memory_order_relaxed);
+    const PoolSlot& last = pool_.slot(newest);
+    // None yet; or an earlier writer of this port has gone and took its messages along.
     if (newest == 0 || last.sequence.load() != newest) return false;
     const uint32_t chunk = last.chunk.load(std::memory_order_relaxed);
-    channel_.references[chunk].fetch_add(1, std::memory_order_acq_rel);
-    announce(chunk, last.stamp_ns.load(std::memory_order_relaxed), visible_at_ns);
+    pool_.hold(chunk, PoolState::kWriter);
+    pool_.announce(chunk, last.stamp_ns.load(std::memory_order_relaxed), visible_at_ns);
     return true;
   }
 
   WriterStatistics statistics() const override {
-    WriterStatistics s = statistics_;
-    s.sent = channel_.state->newest.load(std::memory_order_acquire);
-    s.chunks = channel_.chunks;
-    s.in_use = channel_.in_use();
-    s.bytes = channel_.bytes();
+    WriterStatistics s;
+    s.sent = pool_.state().newest.load(std::memory_order_acquire);
+    s.pool_empty = pool_.state().pool_empty.load();
+    s.chunks = pool_.chunks();
+    s.peak_in_use = pool_.state().peak_in_use.load();
+    s.in_use = pool_.in_use();
+    s.bytes = pool_.bytes();
     return s;
   }
 
  private:
-  /// Takes over one reference to the chunk.
-  void announce(uint32_t chunk, int64_t stamp_ns, int64_t visible_at_ns) {
-    const uint64_t sequence = channel_.state->newest.load(std::memory_order_relaxed) + 1;
-    Slot& slot = channel_.slot(sequence);
-    evict(slot);
-    slot.chunk.store(chunk);
-    slot.stamp_ns.store(stamp_ns);
-    slot.visible_at_ns.store(visible_at_ns);
-    slot.sequence.store(sequence);
-    channel_.state->newest.store(sequence);
+  MessageHeader* begin(MessageHeader* header) {
+    reached(MessageStep::after_loan, pool_.index());
+    *header = MessageHeader{};
+    header->loan_offset = pool_.offset(header);
+    pool_.plan().type->place(header + 1, pool_.plan().capacity);
+    reached(MessageStep::half_written, pool_.index(), header, pool_.chunk_bytes());
+    return header;
   }
 
-  void evict(Slot& slot) {
-    if (slot.sequence.exchange(0) == 0) return;
-    channel_.drop(slot.chunk.load());
-  }
-
-  Channel& channel_;
+  const LocalPool& pool_;
   uint32_t loaned_ = kNoChunk, next_ = 0;
-  WriterStatistics statistics_;
 };
 
 class LocalReader final : public Reader {
  public:
-  explicit LocalReader(Channel& channel) : channel_(channel) {}
+  LocalReader(const LocalPool& pool, uint32_t process)
+      : pool_(pool), holder_(pool.claim_reader(process)), holds_(pool.chunks()) {}
+  ~LocalReader() override {
+    for (uint32_t chunk = 0; chunk < holds_.size(); ++chunk)
+      if (holds_[chunk] > 0) pool_.drop(chunk, holder_);
+    pool_.return_reader(holder_);
+  }
 
   size_t list(int64_t limit_ns, std::span<Candidate> out) override {
     size_t count = 0;
-    const uint64_t newest = channel_.state->newest.load();
-    const uint64_t oldest = newest > channel_.slots ? newest - channel_.slots + 1 : 1;
+    const uint64_t newest = pool_.state().newest.load();
+    const uint64_t oldest = newest > pool_.slots() ? newest - pool_.slots() + 1 : 1;
     for (uint64_t s = newest; s >= oldest && count < out.size(); --s) {
-      Slot& slot = channel_.slot(s);
+      const PoolSlot& slot = pool_.slot(s);
       if (slot.sequence.load() != s) continue;
       const Candidate candidate{s, slot.stamp_ns.load(), slot.visible_at_ns.load()};
       if (slot.sequence.load() != s) continue;  // overwritten while we read it
@@ -204,42 +141,51 @@ class LocalReader final : public Reader {
   }
 
   Held take(uint64_t sequence) override {
-    Slot& slot = channel_.slot(sequence);
+    const PoolSlot& slot = pool_.slot(sequence);
     if (slot.sequence.load() != sequence) return {};
     const uint32_t chunk = slot.chunk.load();
     Held held{nullptr, sequence, slot.stamp_ns.load(), slot.visible_at_ns.load(), chunk};
-    uint32_t references = channel_.references[chunk].load();
-    do {
-      if (references == 0) return {};
-    } while (!channel_.references[chunk].compare_exchange_weak(references, references + 1));
+    if (!pool_.hold(chunk, holder_)) return {};
+    ++holds_[chunk];
     if (slot.sequence.load() != sequence) {  // the chunk may already be somebody else's
-      channel_.drop(chunk);
+      let_go(chunk);
       return {};
     }
-    held.header = channel_.header(chunk);
-    const auto offset = static_cast<uint64_t>(reinterpret_cast<const std::byte*>(held.header) - channel_.base);
+    held.header = pool_.header(chunk);
+    const uint64_t offset = pool_.offset(held.header);
     if (held.header->loan_offset != offset) {
       std::fprintf(stderr, "takt: bug: message of %s.%s was loaned at offset %lu and taken at %lu\n",
-                   channel_.plan.node.c_str(), channel_.plan.port.c_str(), held.header->loan_offset, offset);
+                   pool_.plan().node.c_str(), pool_.plan().port.c_str(), held.header->loan_offset, offset);
       std::abort();
     }
+    reached(MessageStep::while_held, pool_.index());
     return held;
   }
 
   void release(Held& held) override {
-    if (held) channel_.drop(held.chunk);
+    if (held) let_go(held.chunk);
     held = {};
   }
 
  private:
-  Channel& channel_;
+  /// A reader may hold one chunk for several messages, which repeat each other.
+  void let_go(uint32_t chunk) {
+    if (--holds_[chunk] > 0) return;
+    reached(MessageStep::inside_release, pool_.index());
+    pool_.drop(chunk, holder_);
+  }
+
+  const LocalPool& pool_;
+  const uint32_t holder_;
+  std::vector<uint32_t> holds_;  ///< by chunk
 };
 
 class LocalTransport final : public Transport {
  public:
   /// `fresh`: sizes the file and puts empty ports into it; otherwise another process has.
-  LocalTransport(std::span<const PortPlan> ports, const PoolFile& file, bool fresh) {
-    for (const PortPlan& port : ports) channels_.emplace_back(port);
+  LocalTransport(std::span<const PortPlan> ports, const PoolFile& file, uint32_t process, bool fresh)
+      : process_(process) {
+    for (const PortPlan& port : ports) pools_.emplace_back(port, pools_.size());
     bytes_ = carve(nullptr);
     if (bytes_ == 0) return;
     if (fresh) file.resize(bytes_);
@@ -248,15 +194,29 @@ class LocalTransport final : public Transport {
     map(file);
     carve(memory_);
     if (!fresh) return;
-    for (Channel& channel : channels_) channel.construct();
+    for (LocalPool& pool : pools_) pool.construct();
   }
 
   ~LocalTransport() override {
     if (memory_ != nullptr) munmap(memory_, bytes_);
   }
 
-  std::unique_ptr<Writer> make_writer(size_t port) override { return std::make_unique<LocalWriter>(channels_[port]); }
-  std::unique_ptr<Reader> make_reader(size_t port) override { return std::make_unique<LocalReader>(channels_[port]); }
+  std::unique_ptr<Writer> make_writer(size_t port) override {
+    return std::make_unique<LocalWriter>(pools_[port], process_);
+  }
+  std::unique_ptr<Reader> make_reader(size_t port) override {
+    return std::make_unique<LocalReader>(pools_[port], process_);
+  }
+  uint32_t reclaim(uint32_t process) override {
+    uint32_t freed = 0;
+    for (const LocalPool& pool : pools_) freed += pool.reclaim(process);
+    return freed;
+  }
+  uint32_t chunks_in_use() const override {
+    uint32_t in_use = 0;
+    for (const LocalPool& pool : pools_) in_use += pool.in_use();
+    return in_use;
+  }
   uint64_t shared_memory_bytes() const override { return bytes_; }
   const char* name() const override { return "local"; }
 
@@ -264,8 +224,11 @@ class LocalTransport final : public Transport {
   /// Every process places the ports of the same plan at the same offsets.
   uint64_t carve(std::byte* memory) {
     Carver carver(memory);
-    for (Channel& channel : channels_) channel.carve_control(carver);
-    for (Channel& channel : channels_) channel.carve_chunks(carver);
+    for (LocalPool& pool : pools_) pool.lay_out_control(carver);
+    for (LocalPool& pool : pools_) {
+      carver.to_next_page();
+      pool.lay_out_chunks(carver);
+    }
     carver.to_next_page();
     return carver.used();
   }
@@ -279,7 +242,8 @@ class LocalTransport final : public Transport {
     memory_ = static_cast<std::byte*>(memory);
   }
 
-  std::vector<Channel> channels_;
+  const uint32_t process_;
+  std::vector<LocalPool> pools_;
   std::byte* memory_ = nullptr;
   uint64_t bytes_ = 0;
 };
@@ -304,15 +268,17 @@ uint64_t PoolFile::bytes() const {
 }
 
 std::unique_ptr<Transport> make_local_transport(std::span<const PortPlan> ports) {
-  return std::make_unique<LocalTransport>(ports, PoolFile(), true);
+  return std::make_unique<LocalTransport>(ports, PoolFile(), 1, true);
 }
 
-std::unique_ptr<Transport> make_local_transport(std::span<const PortPlan> ports, const PoolFile& file) {
-  return std::make_unique<LocalTransport>(ports, file, true);
+std::unique_ptr<Transport> make_local_transport(std::span<const PortPlan> ports, const PoolFile& file,
+                                                uint32_t process) {
+  return std::make_unique<LocalTransport>(ports, file, process, true);
 }
 
-std::unique_ptr<Transport> join_local_transport(std::span<const PortPlan> ports, const PoolFile& file) {
-  return std::make_unique<LocalTransport>(ports, file, false);
+std::unique_ptr<Transport> join_local_transport(std::span<const PortPlan> ports, const PoolFile& file,
+                                                uint32_t process) {
+  return std::make_unique<LocalTransport>(ports, file, process, false);
 }
 
 }  // namespace takt

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The local transport where one run has several processes: no daemon, no lock, nothing to clean up. Nobody ever waits
-// for a process that was killed. The chunks that it held at that moment (one loaned or on its way, the messages its
-// inputs had latched) stay taken until the run ends.
+// for a process that was killed; what it held is taken back with Transport::reclaim().
 #pragma once
 #include <cstdint>
 #include <memory>
@@ -31,10 +30,14 @@ class PoolFile {
   int descriptor_ = -1;
 };
 
-/// Pools in `file`, empty. One process makes them, before any other joins. Throws as make_local_transport(ports) does.
-std::unique_ptr<Transport> make_local_transport(std::span<const PortPlan> ports, const PoolFile& file);
+/// Pools in `file`, empty. One process makes them, before any other joins. `process` is the number, from 1, under which
+/// its writers and readers hold chunks; no two processes that live at one time share one. Throws as
+/// make_local_transport(ports) does.
+std::unique_ptr<Transport> make_local_transport(std::span<const PortPlan> ports, const PoolFile& file,
+                                                uint32_t process = 1);
 /// The pools that another process made for the same ports. Throws std::logic_error if they were made for others (seen
 /// by their size), std::runtime_error if they cannot be mapped.
-std::unique_ptr<Transport> join_local_transport(std::span<const PortPlan> ports, const PoolFile& file);
+std::unique_ptr<Transport> join_local_transport(std::span<const PortPlan> ports, const PoolFile& file,
+                                                uint32_t process = 2);
 
 }  // namespace takt

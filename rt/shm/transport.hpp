@@ -93,6 +93,11 @@ class Transport {
   virtual uint64_t shared_memory_bytes() const = 0;
   /// "local" or "iceoryx".
   virtual const char* name() const = 0;
+  /// Takes back what a dead process of that number held; the number of chunks that became free. A back end that does so
+  /// by itself, or has one process only, answers 0.
+  virtual uint32_t reclaim(uint32_t process) { return static_cast<void>(process), 0; }
+  /// Of all ports together; 0 where only writers know.
+  virtual uint32_t chunks_in_use() const { return 0; }
 };
 
 /// All pools in one anonymous shared-memory file, locked and prefaulted. Throws std::runtime_error with the fix if the

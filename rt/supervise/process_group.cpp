@@ -2,6 +2,7 @@
 #include "rt/supervise/process_group.hpp"
 
 #include <sys/prctl.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -17,9 +18,7 @@
 namespace takt {
 namespace {
 
-[[noreturn]] void become_member(const std::string& name, pid_t supervisor, const std::function<int()>& body) {
-  prctl(PR_SET_PDEATHSIG, SIGKILL);
-  if (getppid() != supervisor) _exit(1);  // it died before the line above
+int run_member(const std::string& name, const std::function<int()>& body) {
   prctl(PR_SET_NAME, name.substr(0, 15).c_str());
   signal(SIGINT, SIG_IGN);
   signal(SIGHUP, SIG_IGN);
@@ -34,6 +33,13 @@ namespace {
   }
   std::fflush(nullptr);
   std::exit(code);  // not _exit: iceoryx removes its socket and lock in a static destructor
+}
+
+int64_t nanoseconds(const timeval& time) { return time.tv_sec * 1'000'000'000 + time.tv_usec * 1'000; }
+
+void die_with(pid_t supervisor) {
+  prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (getppid() != supervisor) _exit(1);  // it died before the line above
 }
 
 }  // namespace
@@ -51,17 +57,36 @@ void ProcessGroup::start(const std::string& name, const std::function<int()>& bo
   std::fflush(nullptr);  // or both processes write what is buffered
   const pid_t supervisor = getpid(), pid = fork();
   if (pid < 0) throw std::runtime_error("process " + name + ": fork: " + std::strerror(errno));
-  if (pid == 0) become_member(name, supervisor, body);
-  members_.push_back({name, pid});
+  if (pid == 0) {
+    die_with(supervisor);
+    run_member(name, body);
+  }
+  members_.push_back({name, pid, body});
+}
+
+void ProcessGroup::prepare_restarts() {
+  std::fflush(nullptr);
+  nursery_ = std::make_unique<Nursery>([this, supervisor = getpid()](size_t process) {
+    die_with(supervisor);
+    return run_member(members_[process].name, members_[process].body);
+  });
+}
+
+bool ProcessGroup::restart(size_t process) {
+  if (!nursery_ || members_[process].pid != 0) return false;
+  members_[process].pid = nursery_->fork_child(process);
+  return members_[process].pid > 0;
 }
 
 std::optional<ProcessGroup::End> ProcessGroup::reap() {
   for (size_t i = 0; i < members_.size(); ++i) {
     int status = 0;
-    if (members_[i].pid <= 0 || waitpid(members_[i].pid, &status, WNOHANG) != members_[i].pid) continue;
+    rusage used{};
+    if (members_[i].pid <= 0 || wait4(members_[i].pid, &status, WNOHANG, &used) != members_[i].pid) continue;
     const pid_t pid = std::exchange(members_[i].pid, 0);
-    if (WIFSIGNALED(status)) return End{i, pid, -1, WTERMSIG(status)};
-    return End{i, pid, WEXITSTATUS(status), 0};
+    const int64_t cpu_ns = nanoseconds(used.ru_utime) + nanoseconds(used.ru_stime);
+    if (WIFSIGNALED(status)) return End{i, pid, -1, WTERMSIG(status), cpu_ns};
+    return End{i, pid, WEXITSTATUS(status), 0, cpu_ns};
   }
   return std::nullopt;
 }

@@ -3,14 +3,17 @@
 #include <sys/types.h>
 
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "rt/supervise/nursery.hpp"
+
 namespace takt {
 
 /// The processes of one run, children of the supervisor. Made before the supervisor has any thread, because only the
-/// calling thread survives a fork. One thread at a time.
+/// calling thread survives a fork; restarted at any time. One thread at a time.
 class ProcessGroup {
  public:
   /// How a process ended: with an exit code, or by a signal (then the code is -1).
@@ -18,6 +21,7 @@ class ProcessGroup {
     size_t process = 0;
     pid_t pid = 0;
     int code = -1, signal = 0;
+    int64_t cpu_ns = 0;  ///< that it has used
   };
 
   ProcessGroup() = default;
@@ -29,6 +33,11 @@ class ProcessGroup {
   /// Forks a process that runs `body` and exits with its result. It ignores SIGINT and SIGHUP, which a terminal sends
   /// to the whole group, and dies with the supervisor. Throws std::runtime_error if there can be no more processes.
   void start(const std::string& name, const std::function<int()>& body);
+  /// After the last start and before the first thread: makes restart() possible. Throws std::runtime_error.
+  void prepare_restarts();
+  /// Runs the body of an ended process again, with what this process's memory held at prepare_restarts(). False if
+  /// there can be no more processes.
+  bool restart(size_t process);
   /// The end of one of them that was not told yet, without waiting.
   std::optional<End> reap();
   void kill_all();
@@ -36,13 +45,16 @@ class ProcessGroup {
   size_t size() const { return members_.size(); }
   const std::string& name(size_t process) const { return members_[process].name; }
   pid_t pid(size_t process) const { return members_[process].pid; }  ///< 0: ended
+  pid_t nursery() const { return nursery_ ? nursery_->pid() : 0; }   ///< the process that makes restarts possible
 
  private:
   struct Member {
     std::string name;
     pid_t pid = 0;
+    std::function<int()> body;
   };
   std::vector<Member> members_;
+  std::unique_ptr<Nursery> nursery_;
 };
 
 }  // namespace takt

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <csignal>
 #include <cstring>
 #include <new>
 #include <stdexcept>
@@ -26,6 +27,12 @@ Rings::Rings(size_t count) : count_(count), bytes_(sizeof(Ring) * (count + 1)) {
 Rings::~Rings() { munmap(shared_, bytes_); }
 
 Ring* Rings::claim(std::string_view name, int32_t imagined) {
+  for (size_t i = 0; imagined == 0 && i < claimed(); ++i) {
+    int32_t dead = rings_[i].writer.load();
+    if (dead <= 0 || name.substr(0, rings_[i].name.size() - 1) != rings_[i].name.data()) continue;
+    if (kill(dead, 0) != 0 && errno == ESRCH && rings_[i].writer.compare_exchange_strong(dead, gettid()))
+      return &rings_[i];
+  }
   const size_t index = shared_->next.fetch_add(1);
   if (index >= count_) return nullptr;
   Ring& ring = rings_[index];

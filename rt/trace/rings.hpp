@@ -18,7 +18,8 @@ class Rings {
   Rings& operator=(const Rings&) = delete;
 
   /// A ring for the calling thread, or for one that is only imagined, under a number of its own (virtual time); null if
-  /// all are taken (counted). Not in a job.
+  /// all are taken (counted). Who takes the place of a thread of the same name that died with its process goes on with
+  /// its ring. Not in a job.
   Ring* claim(std::string_view name, int32_t imagined = 0);
   size_t claimed() const;
   Ring& ring(size_t i) { return rings_[i]; }

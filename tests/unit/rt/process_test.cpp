@@ -7,7 +7,9 @@
 #include <array>
 #include <cerrno>
 #include <csignal>
+#include <future>
 #include <stdexcept>
+#include <thread>
 
 #include "rt/sched/run_board.hpp"
 #include "rt/supervise/process_group.hpp"
@@ -133,4 +135,51 @@ TEST_CASE("no process outlives its group") {
     CHECK(kill(pid, 0) == 0);
   }
   CHECK(kill(pid, 0) != 0);
+}
+
+TEST_CASE("a process is started again although its supervisor has threads by now, with what was there before them") {
+  RunBoard board(plan_of_two(), 1);
+  ProcessGroup group;
+  int told = 7;
+  group.start("phoenix", [&] {
+    board.task(0).completed.fetch_add(1);
+    return told + static_cast<int>(board.process(0).restarts.load());
+  });
+  group.prepare_restarts();
+  CHECK(wait_for_end(group).code == 7);
+  told = 100;  // after the nursery was made
+  std::promise<void> end;
+  std::thread other([&] { end.get_future().wait(); });
+  for (uint32_t again = 1; again <= 3; ++again) {
+    board.process(0).restarts.store(again);
+    REQUIRE(group.restart(0));
+    CHECK(group.pid(0) > 0);
+    CHECK_FALSE(group.restart(0));  // it lives
+    CHECK(wait_for_end(group).code == 7 + static_cast<int>(again));
+  }
+  CHECK(board.task(0).completed.load() == 4);
+  end.set_value();
+  other.join();
+}
+
+TEST_CASE("a process that was started again does not outlive its group, and none is started without a nursery") {
+  pid_t pid = 0;
+  {
+    ProcessGroup group;
+    group.start("endless", [] {
+      for (;;) pause();
+      return 0;
+    });
+    group.prepare_restarts();
+    kill(group.pid(0), SIGKILL);
+    CHECK(wait_for_end(group).signal == SIGKILL);
+    REQUIRE(group.restart(0));
+    pid = group.pid(0);
+    CHECK(kill(pid, 0) == 0);
+  }
+  CHECK(kill(pid, 0) != 0);
+  ProcessGroup without;
+  without.start("mayfly", [] { return 0; });
+  wait_for_end(without);
+  CHECK_FALSE(without.restart(0));
 }

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "rt/shm/kill_order.hpp"
+
+#include <array>
+#include <csignal>
+#include <cstring>
+
+namespace takt {
+namespace {
+constexpr std::array<std::string_view, kMessageSteps> kNames = {
+    "none", "after_loan", "half_written", "inside_publish", "after_publish", "while_held", "inside_release"};
+}  // namespace
+
+std::string_view to_string(MessageStep step) { return kNames[static_cast<size_t>(step)]; }
+
+std::optional<MessageStep> message_step(std::string_view name) {
+  for (size_t i = 1; i < kNames.size(); ++i)
+    if (kNames[i] == name) return static_cast<MessageStep>(i);
+  return std::nullopt;
+}
+
+void detail::obey(KillOrder& order, std::byte* message, size_t bytes) {
+  const MessageStep step = order.step.load();
+  for (uint32_t left = order.passes.load(); left > 0;)
+    if (order.passes.compare_exchange_weak(left, left - 1)) return;
+  order.step.store(MessageStep::none);  // whoever takes this process's place has no such order
+  if (step == MessageStep::half_written && message != nullptr) std::memset(message, 0xA5, bytes / 2);
+  raise(SIGKILL);
+}
+
+}  // namespace takt

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// The end of a process at an exact step in the life of a message: what a kill at a random instant meets only once in a
+// long while. For tests and fault scenarios; without an order it costs a comparison.
+#pragma once
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string_view>
+
+namespace takt {
+
+enum class MessageStep : uint32_t {
+  none,
+  after_loan,      ///< the writer has a chunk and has written nothing
+  half_written,    ///< ... and has written half of it
+  inside_publish,  ///< the message is on its way: readers may or may not find it
+  after_publish,   ///< it is out
+  while_held,      ///< a reader has it
+  inside_release,  ///< a reader is giving it back
+};
+inline constexpr size_t kMessageSteps = 7;
+std::string_view to_string(MessageStep step);
+/// None if there is no step of that name.
+std::optional<MessageStep> message_step(std::string_view name);
+
+/// "Kill yourself (SIGKILL) when you come to that step of that port." In memory that processes may share; `step` is
+/// stored last.
+struct KillOrder {
+  std::atomic<uint32_t> port{0};
+  std::atomic<uint32_t> passes{0};  ///< times that the step is passed before
+  std::atomic<MessageStep> step{MessageStep::none};
+};
+
+namespace detail {
+inline constinit std::atomic<KillOrder*> kill_order{nullptr};
+void obey(KillOrder& order, std::byte* message, size_t bytes);
+}  // namespace detail
+
+/// The order that this process obeys from now on; null: none. It must live until the process ends.
+inline void obey_orders(KillOrder* order) { detail::kill_order.store(order, std::memory_order_release); }
+
+/// A writer or reader of `port` is at `step`. `message` and `bytes`: what half_written scribbles over. Any thread.
+inline void reached(MessageStep step, size_t port, void* message = nullptr, size_t bytes = 0) {
+  KillOrder* order = detail::kill_order.load(std::memory_order_relaxed);
+  if (order == nullptr || order->step.load(std::memory_order_acquire) != step) return;
+  if (order->port.load(std::memory_order_relaxed) == port)
+    detail::obey(*order, static_cast<std::byte*>(message), bytes);
+}
+
+}  // namespace takt
