@@ -58,7 +58,7 @@ Server::~Server() {
 void Server::open() {
   const auto folder = socket_folder(lacks_);
   if (!lacks_.empty()) return;
-  const auto address = address_of(folder, getpid(), lacks_);
+  const auto address = address_of(folder, subject_.run, lacks_);
   if (!address) return;
   const std::filesystem::path path = address->sun_path;
   std::error_code ignored;

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <unistd.h>
+
 #include <atomic>
 #include <list>
 #include <memory>
@@ -21,6 +23,7 @@ struct Subject {
   const Plan& plan;  ///< composed with at least one tap
   RunBoard& board;
   Transport& transport;
+  pid_t run = getpid();  ///< the process that stands for the run
 };
 
 /// Answers top, echo, set, mode and stop for one run, from threads of the default policy that only read the board, hold

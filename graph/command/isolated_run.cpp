@@ -7,8 +7,10 @@
 #include <algorithm>
 #include <cstdio>
 #include <cstring>
+#include <ctime>
 #include <memory>
 #include <optional>
+#include <thread>
 
 #include "graph/attach/server.hpp"
 #include "graph/command/live_table.hpp"
@@ -23,6 +25,7 @@
 #include "rt/shm/iceoryx_preflight.hpp"
 #include "rt/shm/local_transport.hpp"
 #include "rt/shm/transport_error.hpp"
+#include "rt/supervise/group_keeper.hpp"
 #include "rt/supervise/private_mounts.hpp"
 #include "rt/supervise/process_group.hpp"
 #include "rt/supervise/supervisor.hpp"
@@ -55,6 +58,23 @@ std::unique_ptr<DaemonClaim> find_room_for_daemon(std::vector<std::string>& adju
   }
 }
 
+/// Asks the daemon of the transport again and again, and leaves a sign of life each time it has answered.
+class DaemonProbe {
+ public:
+  DaemonProbe(Transport& transport, GroupSigns& signs, const Clock& clock)
+      : thread_([&](const std::stop_token& end) {
+          while (!end.stop_requested()) {
+            transport.ask_daemon();
+            signs.heartbeat_ns.store(clock.now_ns());
+            const timespec pause{0, 200'000'000};
+            nanosleep(&pause, nullptr);
+          }
+        }) {}
+
+ private:
+  std::jthread thread_;
+};
+
 /// By process, the tasks that it runs.
 std::vector<std::vector<size_t>> tasks_of(const Plan& plan, const graph::Partition& partition) {
   std::vector<std::vector<size_t>> tasks(partition.names.size());
@@ -64,10 +84,8 @@ std::vector<std::vector<size_t>> tasks_of(const Plan& plan, const graph::Partiti
 
 class IsolatedRun {
  public:
-  IsolatedRun(const RunOptions& options, const graph::GraphSpec& graph, std::vector<std::string> adjusted,
-              std::unique_ptr<DaemonClaim> claim)
-      : claim_(std::move(claim)),
-        options_(options),
+  IsolatedRun(const RunOptions& options, const graph::GraphSpec& graph, std::vector<std::string> adjusted)
+      : options_(options),
         graph_(graph),
         adjusted_(std::move(adjusted)),
         plan_source_(graph::outline(graph, graph::node_types(), clock_)),
@@ -78,16 +96,15 @@ class IsolatedRun {
         record_(options, plan_),
         trace_(options, plan_) {}
 
-  ~IsolatedRun() {
-    ending_ = true;
-    group_.kill_all();
-    wait_until([&] { return collect_ends(), group_.alive() == 0; });
-  }
+  ~IsolatedRun() { take_down(); }
   IsolatedRun(const IsolatedRun&) = delete;
   IsolatedRun& operator=(const IsolatedRun&) = delete;
 
-  int run() {
+  /// Runs the graph with this process as supervisor, which has no thread yet. `run`: the process that stands for it.
+  int run(pid_t run) {
+    if (options_.transport == "iceoryx") claim_ = find_room_for_daemon(adjusted_);
     choose_cores(plan_.cores, adjusted_);
+    if (again()) forget_processes();
     for (size_t p = 0; p < partition_.names.size(); ++p)
       group_.start(partition_.names[p], [this, p, supervisor = getpid()]() -> int {
         try {
@@ -100,12 +117,13 @@ class IsolatedRun {
     wait_for_all(ProcessRecord::composed);
     BoardExchange exchange(board_);
     graph::complete(plan_, exchange, observers(options_));
-    if (const int code = admit(options_, graph_, plan_, adjusted_); code != kOk) throw Refused{code};
+    if (const int code = again() ? kOk : admit(options_, graph_, plan_, adjusted_); code != kOk) throw Refused{code};
     const CpuLatencyHold latency = hold_cpu_dma_latency();
     tell_lacks(latency);
     bring_up_transport();
     agree_on_policy();
-    record_.begin(graph_, plan_, board_, *transport_, "subsystem");
+    if (!again()) record_.begin(graph_, plan_, board_, *transport_, "subsystem");
+    else if (record_.wanted()) adjusted_.push_back("the record ends where the group of processes was lost");
     trace_.collect(plan_, record_);
     wait_for_all(ProcessRecord::running);
     const int64_t steal_before_ms = ProcessReading::now().steal_ms, cpu_before_ns = ProcessReading::now().cpu_ns;
@@ -115,11 +133,12 @@ class IsolatedRun {
     memory_mb_ += proportional_memory_mb(group_.nursery());
     start();
     {
-      const attach::Server server({graph_, plan_, board_, *transport_});
+      const attach::Server server({graph_, plan_, board_, *transport_, run});
       if (!server.lacks().empty()) adjusted_.push_back("nobody can attach: " + server.lacks());
       const LiveTable live(plan_, board_,
                            fmt::format("takt run {} ({}, policy {}, {} processes)", graph_.name, graph_.profile,
                                        to_string(plan_.policy), group_.size()));
+      const DaemonProbe probe(*transport_, board_.group(), clock_);
       watch();
     }
     MachineUse use = use_of_all();
@@ -128,7 +147,28 @@ class IsolatedRun {
     return report(use);
   }
 
+  RunBoard& board() { return board_; }
+  /// Ends whatever still lives of the run.
+  void take_down() {
+    ending_ = true;
+    group_.kill_all();
+    wait_until([&] { return collect_ends(), group_.alive() == 0; });
+    transport_.reset();
+  }
+
  private:
+  /// An earlier supervisor was lost with all processes; board and epoch are still what they were.
+  bool again() const { return board_.group().losses.size() > 0; }
+  void forget_processes() {
+    board_.carrier().store(RunBoard::no_carrier);
+    for (size_t p = 0; p < board_.process_count(); ++p) {
+      ProcessRecord& record = board_.process(p);
+      record.state.store(ProcessRecord::starting);
+      record.life.heartbeat_ns.store(0);
+      record.life.hanging.store(0);
+      record.restarts.fetch_add(1);
+    }
+  }
   /// Waits until every process has come that far. A process that ended instead has said why: exits with its code.
   void wait_for_all(uint32_t state) {
     const bool come = wait_until(
@@ -191,6 +231,10 @@ class IsolatedRun {
 
   void agree_on_policy() {
     if (plan_.policy == Policy::cooperative) return;
+    if (again()) {
+      granted_ = board_.decision().load() == RunBoard::as_asked ? plan_.policy : Policy::cooperative;
+      return;
+    }
     wait_for_all(ProcessRecord::agreed);
     bool refused = false;
     for (size_t p = 0; p < group_.size(); ++p) refused = refused || board_.process(p).refused.load();
@@ -206,6 +250,7 @@ class IsolatedRun {
   }
 
   void start() {
+    if (board_.epoch_ns().load() != 0) return;
     const int64_t epoch = clock_.now_ns() + kStartDelayNs;
     if (options_.duration_s > 0) board_.stop().set_planned_end(epoch + static_cast<int64_t>(options_.duration_s * 1e9));
     board_.epoch_ns().store(epoch);
@@ -217,6 +262,7 @@ class IsolatedRun {
     how.clean_up = [](pid_t pid) { remove_iceoryx_leftovers(IceoryxPlaces::of_this_machine(), pid); };
     how.say = [](const std::string& what) { std::fprintf(stderr, "takt: %s\n", what.c_str()); };
     supervisor_.emplace(plan_, board_, group_, *transport_, clock_, tasks_of(plan_, partition_), how);
+    if (again()) supervisor_->all_were_lost(*board_.group().losses.at(board_.group().losses.size() - 1));
     int64_t give_up_ns = INT64_MAX;
     wait_until([&] {
       supervisor_->look();
@@ -256,8 +302,8 @@ class IsolatedRun {
     auto report = make_report({graph_, plan_, board_, result, *transport_, use, options_.clock,
                                std::string(to_string(plan_.policy)), "subsystem", partition_.names, adjusted_});
     for (const std::string& fault : faults_) report["faults"].push_back({{"what", fault}});
-    add_outages(supervisor_->outages(), partition_.names, plan_, tasks_of(plan_, partition_), result, report);
-    if (!faults_.empty() || !supervisor_->outages().empty()) report["ok"] = false;
+    add_outages(board_.outages(), partition_.names, plan_, tasks_of(plan_, partition_), result, report);
+    if (!faults_.empty() || board_.outages().size() > 0) report["ok"] = false;
     if (supervisor_->gave_up()) code_ = kDeviceOrSystem;
     record_.tell(report);
     const int told = tell(options_, graph_, report);
@@ -265,7 +311,7 @@ class IsolatedRun {
     return code_ != 0 ? code_ : told;
   }
 
-  std::unique_ptr<DaemonClaim> claim_;
+  std::unique_ptr<DaemonClaim> claim_;  ///< of iceoryx, until its daemon is there
   const RunOptions& options_;
   const graph::GraphSpec& graph_;
   std::vector<std::string> adjusted_, faults_;
@@ -291,13 +337,32 @@ class IsolatedRun {
 }  // namespace
 
 int run_isolated(const RunOptions& options, const graph::GraphSpec& graph, std::vector<std::string> adjusted) {
-  std::unique_ptr<DaemonClaim> claim;
-  if (options.transport == "iceoryx") claim = find_room_for_daemon(adjusted);
-  try {
-    return IsolatedRun(options, graph, std::move(adjusted), std::move(claim)).run();
-  } catch (const Refused& refused) {
-    return refused.code;
-  }
+  IsolatedRun run(options, graph, std::move(adjusted));
+  const auto as_supervisor = [&, keeper = getpid()] {
+    try {
+      return run.run(keeper);
+    } catch (const Refused& refused) {
+      return refused.code;
+    }
+  };
+  // Nothing of the runtime's own pools can be left locked: there is nobody to be kept alive but the members.
+  if (options.transport != "iceoryx") return as_supervisor();
+  GroupKeeper::Options how;
+  how.stop_asked = StopOnSignal::asked;
+  how.clean_up = [](pid_t pid) { remove_iceoryx_leftovers(IceoryxPlaces::of_this_machine(), pid); };
+  how.say = [](const std::string& what) { std::fprintf(stderr, "takt: %s\n", what.c_str()); };
+  const MonotonicClock clock;
+  const auto code = GroupKeeper(run.board().group(), clock, how).keep([&] {
+    int code = kDeviceOrSystem;
+    try {
+      code = as_supervisor();
+    } catch (const std::exception& problem) {  // as in a run without a keeper
+      refuse(problem.what(), kDeviceOrSystem);
+    }
+    run.take_down();  // this process ends without leaving the scope that owns the run
+    return code;
+  });
+  return code ? *code : refuse("the group of processes was lost too often", kDeviceOrSystem);
 }
 
 }  // namespace takt::command

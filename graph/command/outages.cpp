@@ -18,13 +18,13 @@ int64_t end_of(const Outage& outage, const RunResult& result) {
 Json told(const Outage& outage, const std::string& process, const RunResult& result) {
   const auto seconds = [&](int64_t ns) { return static_cast<double>(ns - result.epoch_ns) / 1e9; };
   const double down_s = static_cast<double>(end_of(outage, result) - outage.from_ns) / 1e9;
-  std::string what = fmt::format("process {} {} at {:.2f} s, ", process, outage.cause, seconds(outage.from_ns));
+  std::string what = fmt::format("process {} {} at {:.2f} s, ", process, outage.cause.c_str(), seconds(outage.from_ns));
   if (outage.back_ns > 0) what += fmt::format("back after {:.2f} s", down_s);
   else what += outage.start_ns > 0 ? "not back by the end" : "given up";
   Json entry = {{"what", what},
                 {"kind", "outage"},
                 {"process", process},
-                {"cause", outage.cause},
+                {"cause", outage.cause.c_str()},
                 {"at_s", seconds(outage.from_ns)},
                 {"back_s", nullptr},
                 {"down_s", down_s},
@@ -34,11 +34,12 @@ Json told(const Outage& outage, const std::string& process, const RunResult& res
 }
 
 /// Releases of a task within the outages of its process, none counted twice.
-uint64_t missed(const TaskPlan& task, size_t process, const std::deque<Outage>& outages, const RunResult& result) {
+uint64_t missed(const TaskPlan& task, size_t process, const OutageLog& outages, const RunResult& result) {
   if (!task.rate) return 0;
   const int64_t origin_ns = result.epoch_ns + task.offset_ns;
   int64_t counted_to = 0, jobs = 0;
-  for (const Outage& outage : outages) {
+  for (size_t i = 0; i < outages.size(); ++i) {
+    const Outage& outage = outages[i];
     if (outage.process != process) continue;
     const int64_t from = std::max(counted_to, task.rate->releases_before(origin_ns, outage.from_ns));
     counted_to = std::max(from, task.rate->releases_before(origin_ns, end_of(outage, result)));
@@ -49,9 +50,12 @@ uint64_t missed(const TaskPlan& task, size_t process, const std::deque<Outage>& 
 
 }  // namespace
 
-void add_outages(const std::deque<Outage>& outages, const std::vector<std::string>& processes, const Plan& plan,
+void add_outages(const OutageLog& outages, const std::vector<std::string>& processes, const Plan& plan,
                  const std::vector<std::vector<size_t>>& tasks_of, const RunResult& result, Json& report) {
-  for (const Outage& outage : outages) report["faults"].push_back(told(outage, processes[outage.process], result));
+  for (size_t i = 0; i < outages.size(); ++i)
+    report["faults"].push_back(told(outages[i], processes[outages[i].process], result));
+  if (outages.lost() > 0)
+    report["faults"].push_back({{"what", fmt::format("{} more outages, not kept", outages.lost())}});
   for (size_t p = 0; p < tasks_of.size(); ++p)
     for (const size_t t : tasks_of[p])
       for (Json& node : report["nodes"])

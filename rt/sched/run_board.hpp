@@ -11,6 +11,7 @@
 #include "rt/sched/statistics.hpp"
 #include "rt/sched/stop_signal.hpp"
 #include "rt/shm/kill_order.hpp"
+#include "rt/sched/outage_log.hpp"
 
 namespace takt {
 
@@ -87,6 +88,11 @@ class RunBoard {
   FaultLog& faults() { return shared_->faults; }
   const FaultLog& faults() const { return shared_->faults; }
 
+  OutageLog& outages() { return shared_->outages; }
+  const OutageLog& outages() const { return shared_->outages; }
+  GroupSigns& group() { return shared_->group; }
+  const GroupSigns& group() const { return shared_->group; }
+
   StopSignal& stop() { return shared_->stop; }
   std::atomic<int64_t>& epoch_ns() { return shared_->epoch_ns; }  ///< 0: not fixed yet
   std::atomic<uint32_t>& decision() { return shared_->decision; }
@@ -97,6 +103,8 @@ class RunBoard {
     StopSignal stop;
     ModeLog modes;
     FaultLog faults;
+    OutageLog outages;
+    GroupSigns group;
     std::atomic<int64_t> epoch_ns{0};
     std::atomic<uint32_t> decision{undecided};
     std::atomic<uint32_t> carrier{no_carrier};

@@ -15,6 +15,7 @@
 #include "iceoryx_hoofs/internal/relocatable_pointer/base_relative_pointer.hpp"
 #include "iceoryx_posh/popo/untyped_publisher.hpp"
 #include "iceoryx_posh/popo/untyped_subscriber.hpp"
+#include "rt/shm/kill_order.hpp"
 
 #if defined(__SANITIZE_THREAD__)
 extern "C" void __tsan_acquire(void*);
@@ -82,6 +83,14 @@ class Publisher : public iox::popo::UntypedPublisher {
     return data->m_chunkSenderData.m_memoryMgr->getMemPoolInfo(index);
   }
 
+  /// Dies, if it is ordered to, with the lock in hand that publishing takes: no mutex of iceoryx is robust.
+  void die_inside_publish(size_t port) {
+    constexpr PortData members = &OpenPort::getMembers;
+    if (about_to_die(MessageStep::inside_publish, port))
+      static_cast<iox::popo::PublisherPortData*>((UntypedPublisher::port().*members)())->m_chunkSenderData.lock();
+    reached(MessageStep::inside_publish, port);
+  }
+
   /// Null if the pool is empty.
   void* try_loan(const IceoryxPool& pool_plan, uint32_t index) {
     const iox::mepoo::MemPoolInfo info = pool(index);
@@ -117,7 +126,9 @@ class IceoryxWriter final : public Writer {
     }
     loaned_ = ::new (chunk) MessageHeader;
     loaned_->loan_offset = segment_offset(loaned_);
+    reached(MessageStep::after_loan, port_.index);
     port_.plan.type->place(loaned_ + 1, port_.plan.capacity);
+    reached(MessageStep::half_written, port_.index, loaned_, port_.plan.chunk_bytes());
     return loaned_;
   }
 
@@ -130,8 +141,10 @@ class IceoryxWriter final : public Writer {
     last_message_ = sequence_;
     last_stamp_ns_ = stamp_ns;
     hand_over(loaned_);
+    messages_.die_inside_publish(port_.index);
     messages_.publish(loaned_);
     loaned_ = nullptr;
+    reached(MessageStep::after_publish, port_.index);
   }
 
   void discard() override {
@@ -238,6 +251,7 @@ class IceoryxReader final : public Reader {
     }
     check_never_copied(*held.header);
     ++slots_[index].holds;
+    reached(MessageStep::while_held, port_.index);
     return held;
   }
 
@@ -312,6 +326,7 @@ class IceoryxReader final : public Reader {
   }
 
   void give_back(Slot& slot) {
+    reached(MessageStep::inside_release, port_.index);
     hand_over(slot.header);
     messages_.release(slot.header);
     slot = {};

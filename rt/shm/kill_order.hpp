@@ -40,6 +40,13 @@ void obey(KillOrder& order, std::byte* message, size_t bytes);
 /// The order that this process obeys from now on; null: none. It must live until the process ends.
 inline void obey_orders(KillOrder* order) { detail::kill_order.store(order, std::memory_order_release); }
 
+/// Whether this process dies the next time it comes to that step of that port.
+inline bool about_to_die(MessageStep step, size_t port) {
+  const KillOrder* order = detail::kill_order.load(std::memory_order_relaxed);
+  return order != nullptr && order->step.load(std::memory_order_acquire) == step &&
+         order->port.load(std::memory_order_relaxed) == port && order->passes.load(std::memory_order_relaxed) == 0;
+}
+
 /// A writer or reader of `port` is at `step`. `message` and `bytes`: what half_written scribbles over. Any thread.
 inline void reached(MessageStep step, size_t port, void* message = nullptr, size_t bytes = 0) {
   KillOrder* order = detail::kill_order.load(std::memory_order_relaxed);

@@ -96,6 +96,9 @@ class Transport {
   /// Takes back what a dead process of that number held; the number of chunks that became free. A back end that does so
   /// by itself, or has one process only, answers 0.
   virtual uint32_t reclaim(uint32_t process) { return static_cast<void>(process), 0; }
+  /// Asks the daemon that the transport depends on, and returns when it has answered: never if it hangs. At once where
+  /// there is none. Not in a job.
+  virtual void ask_daemon() {}
   /// Of all ports together; 0 where only writers know.
   virtual uint32_t chunks_in_use() const { return 0; }
 };

@@ -32,6 +32,7 @@ Supervisor::Supervisor(const Plan& plan, RunBoard& board, ProcessGroup& group, T
       transport_(transport),
       clock_(clock),
       options_(std::move(options)),
+      outages_(board.outages()),
       last_look_ns_(clock.now_ns()) {
   for (std::vector<size_t>& tasks : tasks_of) {
     Member& member = members_.emplace_back();
@@ -66,19 +67,32 @@ void Supervisor::note_end(const ProcessGroup::End& end, int64_t now_ns) {
   const int64_t from_ns = member.killed_for.empty() ? now_ns : member.away_since_ns;
   const std::string cause = text_of(end) + std::exchange(member.killed_for, "");
   Outage outage;
-  outage.process = end.process;
-  outage.cause = cause;
+  outage.process = static_cast<uint32_t>(end.process);
+  outage.cause = BoundedText<200>(cause);
   outage.from_ns = from_ns;
+  outage.freed = transport_.reclaim(static_cast<uint32_t>(end.process) + 1);
   // Dead again before it was back: one more outage, though the first goes on.
-  member.outage = outages_.size();
-  outages_.push_back(outage);
-  outages_.back().freed = transport_.reclaim(static_cast<uint32_t>(end.process) + 1);
+  member.outage = outages_.add(outage);
   const auto again = member.policy.ended(now_ns);
   if (!again) return give_up(end.process, now_ns, cause);
   outages_[member.outage].start_ns = *again;
   if (options_.say)
     options_.say("process " + group_.name(end.process) + " " + cause + "; it is started again" +
                  (*again > now_ns ? " in " + seconds(*again - now_ns) : ""));
+}
+
+void Supervisor::all_were_lost(const GroupSigns::Loss& loss) {
+  for (size_t p = 0; p < members_.size(); ++p) {
+    Member& member = members_[p];
+    Outage outage;
+    outage.process = static_cast<uint32_t>(p);
+    outage.cause = loss.cause;
+    outage.from_ns = loss.from_ns;
+    outage.start_ns = clock_.now_ns();
+    outage.started = true;
+    member.outage = outages_.add(outage);
+    for (const size_t t : member.tasks) member.jobs_before.push_back(board_.task(t).job_count.load());
+  }
 }
 
 void Supervisor::give_up(size_t process, int64_t now_ns, const std::string& cause) {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include <deque>
 #include <functional>
 #include <string>
 #include <vector>
@@ -13,17 +12,6 @@
 #include "rt/time/clock.hpp"
 
 namespace takt {
-
-/// A process of a run that was away.
-struct Outage {
-  size_t process = 0;
-  std::string cause;     ///< "was ended by signal 9 (Killed)"
-  int64_t from_ns = 0;   ///< seen to have ended; of one that hung: since when it did
-  int64_t start_ns = 0;  ///< when it is, or was, started again; 0: it is given up
-  bool started = false;
-  int64_t back_ns = 0;  ///< every task of it with a rate has run a job again; 0: not yet
-  uint32_t freed = 0;   ///< chunks that the dead process had held
-};
 
 /// Keeps the processes of a run alive. One that dies, or that hangs and is killed for it, is started again as its
 /// restart policy says, and joins the others, which go on meanwhile: nobody holds a lock that another one could wait
@@ -50,9 +38,10 @@ class Supervisor {
 
   /// Sees who has ended, hangs or is back, and does what is due. Every few milliseconds from the start of the run on.
   void look();
+  /// Everybody was lost together with the supervisor before this one, and was started again with it.
+  void all_were_lost(const GroupSigns::Loss& loss);
   /// From now on ends are in order, and nobody is started again.
   void let_end() { ending_ = true; }
-  const std::deque<Outage>& outages() const { return outages_; }
   /// A process was given up.
   bool gave_up() const { return gave_up_; }
   /// CPU time of processes that have died, ns.
@@ -86,7 +75,7 @@ class Supervisor {
   const Clock& clock_;
   const Options options_;
   std::vector<Member> members_;
-  std::deque<Outage> outages_;
+  OutageLog& outages_;  ///< on the board
   int64_t last_look_ns_ = 0, lost_cpu_ns_ = 0;
   bool ending_ = false, gave_up_ = false;
 };

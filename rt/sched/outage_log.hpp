@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+// What became of processes that were away: plain data in the memory that the processes of a run share, so that it is
+// there even if the process that noted it is not.
+#pragma once
+#include <array>
+#include <atomic>
+#include <cstdint>
+
+#include "rt/sched/append_log.hpp"
+
+namespace takt {
+
+/// A process of a run that was away.
+struct Outage {
+  uint32_t process = 0;
+  uint32_t freed = 0;    ///< chunks that the dead process had held
+  int64_t from_ns = 0;   ///< seen to have ended; of one that hung: since when it did
+  int64_t start_ns = 0;  ///< when it is, or was, started again; 0: it is given up
+  int64_t back_ns = 0;   ///< every task of it with a rate has run a job again; 0: not yet
+  bool started = false;
+  BoundedText<200> cause;  ///< "was ended by signal 9 (Killed)"
+};
+
+/// In the order of their ends. One writer.
+class OutageLog {
+ public:
+  static constexpr size_t kMost = 512;
+  size_t size() const { return count_.load(std::memory_order_acquire); }
+  Outage& operator[](size_t i) { return outages_[i]; }
+  const Outage& operator[](size_t i) const { return outages_[i]; }
+  /// Its place. When the log is full the last place is taken again and again, and the ones before it are counted.
+  size_t add(const Outage& outage) {
+    const size_t count = size(), place = count < kMost ? count : kMost - 1;
+    outages_[place] = outage;
+    if (count < kMost) count_.store(count + 1, std::memory_order_release);
+    else lost_.fetch_add(1);
+    return place;
+  }
+  /// Outages that are no longer in it.
+  uint64_t lost() const { return lost_.load(); }
+
+ private:
+  std::atomic<size_t> count_{0};
+  std::atomic<uint64_t> lost_{0};
+  std::array<Outage, kMost> outages_{};
+};
+
+/// What a group of processes, a supervisor with its members, shows to the one who keeps it.
+struct GroupSigns {
+  struct Loss {
+    int64_t from_ns = 0;
+    BoundedText<200> cause;
+  };
+  std::atomic<int64_t> heartbeat_ns{0};  ///< when the daemon of its transport last answered; 0: not yet
+  AppendLog<Loss, 32> losses;            ///< groups that were lost
+};
+
+}  // namespace takt

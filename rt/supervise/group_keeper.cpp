@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "rt/supervise/group_keeper.hpp"
+
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <cstring>
+#include <ctime>
+#include <stdexcept>
+#include <utility>
+
+namespace takt {
+namespace {
+
+constexpr int64_t kStep_ns = 5'000'000;
+constexpr int64_t kAwakeStep_ns = 50'000'000;  // longer between two looks: this process, too, did not run
+
+void wait_a_step(int64_t ns = kStep_ns) {
+  const timespec pause{ns / 1'000'000'000, ns % 1'000'000'000};
+  nanosleep(&pause, nullptr);
+}
+
+pid_t fork_group(const std::function<int()>& group) {
+  std::fflush(nullptr);  // or both processes write what is buffered
+  const pid_t keeper = getpid(), pid = fork();
+  if (pid < 0) throw std::runtime_error(std::string("the group's process: fork: ") + std::strerror(errno));
+  if (pid > 0) return pid;
+  prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (getppid() != keeper) _exit(1);
+  const int code = group();
+  std::fflush(nullptr);
+  std::exit(code);
+}
+
+}  // namespace
+
+GroupKeeper::GroupKeeper(GroupSigns& signs, const Clock& clock, Options options)
+    : signs_(signs), clock_(clock), options_(std::move(options)) {}
+
+std::optional<int> GroupKeeper::keep(const std::function<int()>& group) {
+  RestartPolicy policy(options_.restarts);
+  while (true) {
+    policy.started(clock_.now_ns());
+    if (const auto code = watch(group)) return code;
+    const auto again = policy.ended(clock_.now_ns());
+    if (!again) return std::nullopt;
+    wait_a_step(*again - clock_.now_ns());
+  }
+}
+
+bool GroupKeeper::silent(int64_t now_ns) {
+  const int64_t heartbeat_ns = signs_.heartbeat_ns.load(), awake_ns = std::min(now_ns - last_look_ns_, kAwakeStep_ns);
+  last_look_ns_ = now_ns;
+  silent_ns_ = heartbeat_ns == 0 || heartbeat_ns != heartbeat_ns_ ? 0 : silent_ns_ + awake_ns;
+  heartbeat_ns_ = heartbeat_ns;
+  return silent_ns_ > options_.silence_ns;
+}
+
+std::optional<int> GroupKeeper::watch(const std::function<int()>& group) {
+  signs_.heartbeat_ns.store(0);
+  last_look_ns_ = clock_.now_ns();
+  silent_ns_ = 0;
+  const pid_t pid = fork_group(group);
+  GroupSigns::Loss loss;
+  bool told = false;
+  int status = 0;
+  pid_t ended = 0;
+  while ((ended = waitpid(pid, &status, WNOHANG)) == 0 || (ended < 0 && errno == EINTR)) {
+    wait_a_step();
+    if (!told && options_.stop_asked && options_.stop_asked()) {
+      kill(pid, SIGTERM);
+      told = true;
+    }
+    if (!silent(clock_.now_ns()) || loss.from_ns != 0) continue;
+    loss.from_ns = heartbeat_ns_;
+    loss.cause = BoundedText<200>("the transport's daemon gave no sign of life");
+    kill(pid, SIGKILL);  // its members go with it
+  }
+  if (!WIFSIGNALED(status)) return WEXITSTATUS(status);
+  if (options_.clean_up) options_.clean_up(pid);
+  if (loss.from_ns == 0) {
+    loss.from_ns = clock_.now_ns();
+    loss.cause = BoundedText<200>(std::string("the supervisor was ended by signal ") +
+                                  std::to_string(WTERMSIG(status)) + " (" + strsignal(WTERMSIG(status)) + ")");
+  }
+  if (told) return 128 + WTERMSIG(status);  // it was to end anyway
+  signs_.losses.append(loss);
+  if (options_.say) options_.say(std::string(loss.cause.c_str()) + "; all processes are started again");
+  return std::nullopt;
+}
+
+}  // namespace takt
