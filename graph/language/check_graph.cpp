@@ -86,6 +86,16 @@ void Loader::apply_mode() {
   std::erase_if(spec_.nodes, [&](const NodeSpec& node) { return without.contains(node.id); });
   std::erase_if(spec_.devices, [&](const DeviceSpec& device) { return without.contains(device.id); });
   std::erase_if(spec_.schedule.entries, [&](const auto& entry) { return without.contains(entry.first); });
+  // Optional inputs, as check_mode has seen to, and the groups that they were joined in.
+  for (DeviceSpec& device : spec_.devices)
+    std::erase_if(device.edges, [&](const EdgeSpec& edge) { return without.contains(edge.from.node); });
+  for (NodeSpec& node : spec_.nodes) {
+    for (const EdgeSpec& edge : node.edges)
+      for (auto& group : node.joins)
+        if (without.contains(edge.from.node)) std::erase(group, edge.input);
+    std::erase_if(node.joins, [](const auto& group) { return group.size() < 2; });
+    std::erase_if(node.edges, [&](const EdgeSpec& edge) { return without.contains(edge.from.node); });
+  }
 }
 
 void Loader::tell_what_is_not_enforced() {
