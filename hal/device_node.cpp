@@ -35,7 +35,8 @@ bool DeviceNode::accept(ReadStatus status, Job& job, bool marks_damage, bool rep
   }
   if (status == ReadStatus::disconnected && started_) {
     started_ = false;
-    retry_.failed(job.release_ns());
+    // Gone in the very job that got it back: that is the try which failed.
+    if (retry_.due(job.release_ns())) retry_.failed(job.release_ns());
   }
   const bool usable = status == ReadStatus::ok || (status == ReadStatus::partial && marks_damage);
   if (!usable) job.no_result();
