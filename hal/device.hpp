@@ -35,7 +35,7 @@ enum class ReadStatus : uint8_t {
   ok,            ///< the views hold new data
   no_data,       ///< nothing new before the deadline; the views are untouched
   partial,       ///< data arrived damaged or short; the views hold what there was
-  disconnected,  ///< the device is gone; the driver goes on trying, a later read may succeed
+  disconnected,  ///< the device is gone, until restart() succeeds
   end_of_data,   ///< a replayed source is exhausted; every later read says so too
 };
 
@@ -75,6 +75,13 @@ class Device {
   /// `epoch_ns` is the first planned instant of the run: sources that own their time line (replay, sim) begin there.
   virtual DeviceResult start(int64_t epoch_ns) = 0;
   virtual void stop() = 0;
+  /// On the job thread, after a read said `disconnected` or start() failed: one try to get the device going again, on
+  /// the time line it had. Neither waits nor allocates in drivers that can say `disconnected`; true if reads may
+  /// succeed again.
+  virtual bool restart(int64_t now_ns) {
+    stop();
+    return start(now_ns).has_value();
+  }
   /// Calls that reads, triggers and commands make although no job should, and why; known once the device is open.
   virtual DeclaredCalls declared_calls() const { return {}; }
 };

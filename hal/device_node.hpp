@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include "hal/device.hpp"
+#include "hal/device_health.hpp"
 #include "rt/node.hpp"
 
 namespace takt {
 
 /// A node that feeds a device's data into the graph. The runtime starts the device at the epoch and stops it after the
-/// last job; a device that did not start then is tried again by each job.
+/// last job. Each job judges the device by what it read, and says so to the runtime. A device that did not start, or
+/// that says it is gone, is tried again by the jobs, ever more seldom (RetryDelay).
 class DeviceNode : public Node {
  public:
   DeviceResult start_device(int64_t epoch_ns) {
@@ -24,24 +26,27 @@ class DeviceNode : public Node {
   /// After setup: how long before the planned release of a job the stamp of its message may lie, ns. 0 for a device
   /// that captures when asked.
   virtual int64_t stamp_lag_ns() const { return 0; }
+  /// Before setup: what the graph says of the device's health.
+  void set_health(const DeviceHealthSettings& settings) { health_settings_ = settings; }
 
  protected:
-  /// In a job: false if the device cannot be started (the job then has no result).
-  bool running(const Job& job) { return started_ || start_device(job.release_ns()).has_value(); }
-  /// Says what a read without data means; true if there is something to send.
-  static bool accept(ReadStatus status, Job& job) {
-    if (status == ReadStatus::end_of_data) job.end_of_data();
-    else if (status != ReadStatus::ok && status != ReadStatus::partial) job.no_result();
-    return status == ReadStatus::ok || status == ReadStatus::partial;
-  }
-  void open_in_setup() {
-    if (const auto opened = device().open(); !opened) throw SetupError(opened.error().text());
-    const DeclaredCalls declared = device().declared_calls();
-    if (declared.calls != 0) may(declared.calls, declared.reason);
-  }
+  /// In setup: opens the device.
+  void open_in_setup(const Setup& setup);
+  /// In a job: false if the device is not there, and was not to be had back now (the job then has no result).
+  bool running(Job& job);
+  /// In a job: judges a read and says what one without data means; true if there is something to send. Of damaged data
+  /// only what can be marked as such is sent: `marks_damage` says that the message has a place for it. `repeated`: the
+  /// data are those of the job before.
+  bool accept(ReadStatus status, Job& job, bool marks_damage = false, bool repeated = false);
 
  private:
+  void judge(ReadStatus status, Job& job, bool repeated);
+
   bool started_ = false;
+  DeviceHealthSettings health_settings_;
+  DeviceHealth health_{health_settings_};
+  RetryDelay retry_;
+  uint64_t reopen_tries_ = 0;
 };
 
 }  // namespace takt

@@ -20,6 +20,7 @@
 #include "rt/msg/messages.hpp"
 #include "rt/param.hpp"
 #include "rt/shm/transport.hpp"
+#include "rt/source_state.hpp"
 #include "rt/time/clock.hpp"
 #include "rt/time/rate.hpp"
 
@@ -83,6 +84,9 @@ class Job {
   void end_of_data() { end_of_data_ = true; }
   /// Says that the job could not do its work (device silent, input unusable); counted, the run goes on.
   void no_result() { no_result_ = true; }
+  /// Says how what this job reads from outside the run stands; the mode of the run may depend on it. Said by each job
+  /// that knows; without a word the state stays as it was.
+  void source_state(const SourceReport& report) { source_ = report; }
 
   Job(const Clock& clock, uint64_t index, int64_t release_ns, int64_t deadline_ns, int level, std::string_view mode,
       const CpuBudget& cpu = {})
@@ -95,6 +99,7 @@ class Job {
         mode_(mode) {}
   bool ended() const { return end_of_data_; }
   bool without_result() const { return no_result_; }
+  const std::optional<SourceReport>& source_report() const { return source_; }
   /// In a replay.
   void answer_from(RecordedAnswers& recorded) { recorded_ = &recorded; }
 
@@ -109,6 +114,7 @@ class Job {
   std::string_view mode_;
   RecordedAnswers* recorded_ = nullptr;
   bool end_of_data_ = false, no_result_ = false;
+  std::optional<SourceReport> source_;
 };
 
 enum class Need : uint8_t { required, optional };

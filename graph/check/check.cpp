@@ -109,7 +109,8 @@ void check_modes(const GraphSpec& graph, const Plan& plan, const CheckOptions& o
   result.modes.push_back(check_mode(graph, plan, plan.mode, options, result));
   if (plan.mode == "full") {
     for (const ModeSpec& mode : graph.modes)
-      result.modes.push_back(check_mode(graph, without(plan, mode.without), mode.name, options, result));
+      if (mode.defined)
+        result.modes.push_back(check_mode(graph, without(plan, mode.pauses()), mode.name, options, result));
   }
   result.answer = Answer::admitted;
   for (const ModeCheck& mode : result.modes) {
@@ -137,7 +138,7 @@ void add_margins(const GraphSpec& graph, const Plan& plan, const analysis::Overh
   const auto plan_of = [&](const Plan& whole, const ModeCheck& mode) {
     const auto spec =
         std::find_if(graph.modes.begin(), graph.modes.end(), [&](const ModeSpec& m) { return m.name == mode.mode; });
-    return &mode == &result.modes.front() || spec == graph.modes.end() ? whole : without(whole, spec->without);
+    return &mode == &result.modes.front() || spec == graph.modes.end() ? whole : without(whole, spec->pauses());
   };
   const auto all_hold = [&](const Plan& changed) {
     return std::all_of(result.modes.begin(), result.modes.end(),

@@ -90,6 +90,10 @@ void add_run(CLI::App& app, takt::command::RunOptions& o, int& exit_code) {
                   "NODE.PORT (or all): its messages whole, as those of devices and small ones are; repeatable");
   run->add_option("--output", o.output, "folder for pictures and other results (default out)");
   run->add_option("--seed", o.seed, "seed of the simulated world");
+  run->add_option("--watchdog", o.watchdog,
+                  "device (/dev/watchdog) that resets the machine unless all high-criticality nodes are well");
+  run->add_option("--watchdog-timeout", o.watchdog_timeout_s, "seconds until it does (default 10)")
+      ->check(CLI::Range(1, 3600));
   run->add_flag("--unchecked", o.unchecked, "runs what the check refuses");
   run->add_flag("--require-rt", o.require_rt,
                 "exit 3 where the machine lacks what `takt doctor` checks for such a run");

@@ -235,6 +235,7 @@ Json make_report(const RunFacts& facts) {
   report["isolation"] = facts.isolation;
   report["processes"] = facts.processes;
   report["nodes"] = std::move(nodes);
+  report["devices"] = devices_json(facts);
   report["edges"] = edges_json(facts);
   report["chains"] = chains_json(facts);
   report["memory"] = {{"shm_mb", static_cast<double>(facts.transport.shared_memory_bytes()) / 1e6},

@@ -38,11 +38,13 @@ nlohmann::ordered_json make_report(const RunFacts& facts);
 nlohmann::ordered_json modes_json(const RunFacts& facts);
 /// What nodes did and should not have done: [{what, kind, node, job, at_s}].
 nlohmann::ordered_json faults_json(const RunFacts& facts);
+/// Each device and whether it was lost: [{name, state, losses, lost_s, reopen_tries}].
+nlohmann::ordered_json devices_json(const RunFacts& facts);
 /// {call: count} of what jobs called and should not have; null if this program cannot see it.
 nlohmann::ordered_json violations_json(const TaskStatistics& statistics);
 /// True if a job did not return.
 bool hung(const RunBoard& board);
-/// Lines of the summary: changes of mode, who overran, faults.
+/// Lines of the summary: changes of mode, devices that were lost, who overran, faults.
 std::string events_text(const nlohmann::ordered_json& report);
 
 /// One screen of text from the report: what ran, what was granted, what was missed.

@@ -16,6 +16,8 @@ std::string_view to_string(uint32_t kind) {
     case Fault::hang: return "hang";
     case Fault::exception: return "exception";
     case Fault::memory: return "memory";
+    case Fault::lost: return "lost";
+    case Fault::back: return "back";
   }
   return "";
 }
@@ -72,6 +74,20 @@ Json faults_json(const RunFacts& facts) {
   return faults;
 }
 
+Json devices_json(const RunFacts& facts) {
+  Json devices = Json::array();
+  for (size_t t = 0; t < facts.plan.tasks.size(); ++t) {
+    if (!facts.plan.tasks[t].device) continue;
+    const SourceRecord& source = facts.board.source(t);
+    devices.push_back({{"name", facts.plan.tasks[t].name},
+                       {"state", to_text(source.state.load())},
+                       {"losses", source.losses.load()},
+                       {"lost_s", static_cast<double>(source.lost_until_ns(facts.result.end_ns)) / 1e9},
+                       {"reopen_tries", source.reopen_tries.load()}});
+  }
+  return devices;
+}
+
 Json violations_json(const TaskStatistics& statistics) {
   if (!watching_job_calls()) return nullptr;
   Json calls = Json::object();
@@ -94,6 +110,12 @@ std::string events_text(const Json& report) {
     text += fmt::format("mode {} from {:.3f} s to {:.3f} s: {}\n", modes[i]["name"].get<std::string>(),
                         modes[i]["from_s"].get<double>(), modes[i]["to_s"].get<double>(),
                         modes[i]["reason"].get<std::string>());
+  for (const Json& device : report["devices"])
+    if (const auto losses = device["losses"].get<uint64_t>(); losses > 0)
+      text +=
+          fmt::format("device {}: lost {} time{}, {:.1f} s; {} tries to reopen it; now {}\n",
+                      device["name"].get<std::string>(), losses, losses == 1 ? "" : "s", device["lost_s"].get<double>(),
+                      device["reopen_tries"].get<uint64_t>(), device["state"].get<std::string>());
   for (const Json& node : report["nodes"])
     if (const std::string what = offences(node); !what.empty())
       text += fmt::format("{}: {}\n", node["name"].get<std::string>(), what);

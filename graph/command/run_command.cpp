@@ -16,6 +16,7 @@
 #include "graph/command/report.hpp"
 #include "graph/command/run_support.hpp"
 #include "graph/command/run_trace.hpp"
+#include "graph/command/run_watchdog.hpp"
 #include "rt/shm/iceoryx_preflight.hpp"
 
 namespace takt::command {
@@ -60,6 +61,7 @@ int execute(const RunOptions& options, Prepared& prepared, std::vector<std::stri
   }
   Executor executor(composition.plan, *transport, *prepared.clock, run);
   const ProcessReading before = ProcessReading::now();
+  RunWatchdog watchdog(options, composition.plan, board);
   RunResult result;
   {
     const Stoppable stoppable(board);
@@ -71,7 +73,9 @@ int execute(const RunOptions& options, Prepared& prepared, std::vector<std::stri
         fmt::format("takt run {} ({}, policy {})", graph.name, graph.profile, to_string(graph.schedule.policy)));
     record.begin(graph, composition.plan, board, *transport, "none");
     trace.collect(composition.plan, record);
+    watchdog.start();
     result = executor.run();
+    if (result.stuck.empty()) watchdog.end();
   }
   const ProcessReading after = ProcessReading::now();
   const std::string no_trace = trace.write(graph, composition.plan, board, result);
@@ -171,6 +175,9 @@ int run_graph(const RunOptions& options) {
     return refuse("--record " + options.record.string() + ": cannot be written; choose another place", kBadInput);
   if (options.durations != "budgets" && options.clock != "virtual")
     return refuse("--durations: only jobs in virtual time take what they are told; add --clock virtual", kBadInput);
+  if (!options.watchdog.empty() && options.clock == "virtual")
+    return refuse("--watchdog: a run in virtual time keeps no deadline that a watchdog could guard; leave one out",
+                  kBadInput);
   const StopOnSignal guard;
   try {
     return run_as_asked(options);

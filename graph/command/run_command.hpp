@@ -22,6 +22,8 @@ struct RunOptions {
   std::vector<std::string> record_ports;  ///< NODE.PORT: with all fields, beside devices and small ones; "all"
   std::string trace_source = "auto";      ///< of preemption: auto (the best there is), tracefs, perf, none
   uint64_t seed = 1;
+  std::filesystem::path watchdog;  ///< device that resets the machine unless the run is well; empty: none
+  int watchdog_timeout_s = 10;     ///< asked of it
   /// A policy named on the command line, or --require-rt: refused means exit 3, not another policy.
   bool policy_required() const { return require_rt || !load.policy.empty(); }
 };

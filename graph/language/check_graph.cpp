@@ -56,10 +56,22 @@ void Loader::check_chains() {
 }
 
 void Loader::check_modes() {
-  for (const auto& mode : spec_.modes) check_mode(mode);
+  std::set<std::string> losable;
+  for (const auto& mode : spec_.modes) {
+    if (mode.defined) check_mode(mode);
+    else if (mode.name != kSafeStopMode || mode.lost.empty())
+      problem(mode.position, fmt::format("mode {} lacks `without`: a list of node and device ids", ticked(mode.name)));
+    check_lost(mode);
+    losable.insert(mode.lost.begin(), mode.lost.end());
+    if (losable.size() <= ModeRules::kMostSources) continue;
+    problem(mode.position, fmt::format("mode {}: `lost` of all modes names more than {} devices", ticked(mode.name),
+                                       ModeRules::kMostSources));
+    break;
+  }
   if (options_.mode == "full" || options_.mode.empty()) return;
   std::vector<std::string> names{"full"};
-  for (const auto& mode : spec_.modes) names.push_back(mode.name);
+  for (const auto& mode : spec_.modes)
+    if (mode.defined) names.push_back(mode.name);
   if (std::find(names.begin(), names.end(), options_.mode) == names.end())
     return problem({"--mode", 0, 0}, fmt::format("graph {} has no mode {}{}", ticked(spec_.name), ticked(options_.mode),
                                                  alternatives(options_.mode, names, "modes")));
@@ -74,6 +86,16 @@ void Loader::apply_mode() {
   std::erase_if(spec_.nodes, [&](const NodeSpec& node) { return without.contains(node.id); });
   std::erase_if(spec_.devices, [&](const DeviceSpec& device) { return without.contains(device.id); });
   std::erase_if(spec_.schedule.entries, [&](const auto& entry) { return without.contains(entry.first); });
+  // Optional inputs, as check_mode has seen to, and the groups that they were joined in.
+  for (DeviceSpec& device : spec_.devices)
+    std::erase_if(device.edges, [&](const EdgeSpec& edge) { return without.contains(edge.from.node); });
+  for (NodeSpec& node : spec_.nodes) {
+    for (const EdgeSpec& edge : node.edges)
+      for (auto& group : node.joins)
+        if (without.contains(edge.from.node)) std::erase(group, edge.input);
+    std::erase_if(node.joins, [](const auto& group) { return group.size() < 2; });
+    std::erase_if(node.edges, [&](const EdgeSpec& edge) { return without.contains(edge.from.node); });
+  }
 }
 
 void Loader::tell_what_is_not_enforced() {
@@ -83,6 +105,20 @@ void Loader::tell_what_is_not_enforced() {
     if (entry.on_overrun == OnOverrun::degrade && levels == 1)
       spec_.adjusted.push_back(fmt::format(
           "on_overrun of {}: degrade -> continue: it has one quality level (takt nodes TYPE lists them)", id));
+  }
+}
+
+void Loader::check_lost(const ModeSpec& mode) {
+  const std::string pointer = child(child("/modes", mode.name), "lost");
+  std::vector<std::string> devices;
+  for (const auto& device : spec_.devices) devices.push_back(device.id);
+  std::set<std::string> lost;
+  for (const auto& id : mode.lost) {
+    if (std::find(devices.begin(), devices.end(), id) == devices.end())
+      problem(item_at(pointer, id), fmt::format("mode {} is for the loss of {}, which is no device{}",
+                                                ticked(mode.name), ticked(id), alternatives(id, devices, "devices")));
+    else if (!lost.insert(id).second)
+      problem(item_at(pointer, id), fmt::format("`lost` of mode {} names {} twice", ticked(mode.name), ticked(id)));
   }
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The graph language as plain data: what a graph file and its schedule say, with the position of each word.
 #pragma once
+#include <algorithm>
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -123,6 +124,16 @@ struct ModeSpec {
   std::string name;
   std::vector<std::string> without;
   Position position;
+  std::vector<std::string> lost = {};  ///< devices whose loss leads to this mode
+  bool defined = true;                 ///< false: only a rule for the implied safe_stop, which has no `without`
+
+  /// What does not run while the mode is entered by a change: not the lost devices, whose jobs try to get them back.
+  std::vector<std::string> pauses() const {
+    std::vector<std::string> paused;
+    for (const std::string& id : without)
+      if (std::find(lost.begin(), lost.end(), id) == lost.end()) paused.push_back(id);
+    return paused;
+  }
 };
 
 struct SubsystemSpec {

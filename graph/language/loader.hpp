@@ -115,6 +115,7 @@ class Loader {
   void tell_what_is_not_enforced();
   void apply_mode();
   void check_mode(const ModeSpec& mode);
+  void check_lost(const ModeSpec& mode);
 
   void problem(const Position& at, std::string text) { problems_.push_back({at, std::move(text)}); }
   std::vector<std::string> ids() const;

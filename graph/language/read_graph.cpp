@@ -181,8 +181,15 @@ void Loader::read_modes(const json& value) {
       problem(spec.position, "mode `full` is the whole graph and cannot be redefined; choose another name");
     for (const auto& id : list_at(mode, "without"))
       if (id.is_string()) spec.without.push_back(id.get<std::string>());
+    for (const auto& id : list_at(mode, "lost"))
+      if (id.is_string()) spec.lost.push_back(id.get<std::string>());
+    spec.defined = !mode.is_object() || mode.contains("without");
     spec_.modes.push_back(std::move(spec));
   }
+  // The first of the file that covers a loss is taken.
+  std::sort(spec_.modes.begin(), spec_.modes.end(), [](const ModeSpec& a, const ModeSpec& b) {
+    return std::pair(a.position.line, a.position.column) < std::pair(b.position.line, b.position.column);
+  });
 }
 
 }  // namespace takt::graph

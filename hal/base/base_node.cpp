@@ -7,7 +7,7 @@ void BaseNode::run(Job& job) {
   if (!running(job)) return job.no_result();
   // A stop is commanded, not left to the base's watchdog, which acts later. A stale velocity is not repeated: the
   // watchdog then stops the base.
-  if (stopped()) {
+  if (stopped() || stands(job.mode())) {
     base_->command(0, 0, job.release_ns());
   } else if (const VelocityCommand* wanted = velocity_.newest(); wanted != nullptr && !velocity_.stale()) {
     base_->command(wanted->speed_m_s, wanted->turn_rad_s, job.release_ns());

@@ -8,15 +8,17 @@
 namespace takt {
 
 /// Device kind `mobile_base`: odometry per release; passes the newest velocity command on, or zero while a
-/// connected `stop` says stop or is silent.
+/// connected `stop` says stop or is silent, and always in the mode safe_stop.
 class BaseNode final : public DeviceNode {
  public:
   explicit BaseNode(std::unique_ptr<MobileBase> base) : base_(std::move(base)) {}
-  void setup(Setup&) override { open_in_setup(); }
+  void setup(Setup& setup) override { open_in_setup(setup); }
   void run(Job& job) override;
   Device& device() override { return *base_; }
 
  private:
+  /// In the mode in which the robot stays where it is; in a mode without a name nobody has said that it may drive.
+  static bool stands(std::string_view mode) { return mode.empty() || mode == kSafeStopMode; }
   /// Silence means stop: a connected input without a command, or with one older than its edge allows.
   bool stopped() const { return stop_.connected() && (stop_.empty() || stop_.stale() || stop_.newest()->stop()); }
 

@@ -7,7 +7,7 @@ StereoCameraNode::StereoCameraNode(std::unique_ptr<StereoCamera> camera, HealthT
     : camera_(std::move(camera)), thresholds_(thresholds) {}
 
 void StereoCameraNode::setup(Setup& setup) {
-  open_in_setup();
+  open_in_setup(setup);
   format_ = camera_->format();
   Capacity capacity;
   capacity.width = static_cast<uint32_t>(format_.width);
@@ -50,9 +50,11 @@ void StereoCameraNode::run(Job& job) {
   message->left.resize(bytes);
   message->right.resize(bytes);
   const StereoFrame frame = camera_->read(message->left_view(), message->right_view(), job.deadline_ns());
-  if (accept(frame.status, job)) {
-    const HealthReading health = assess_health(message->left_view(), thresholds_, previous_, has_previous_);
-    has_previous_ = true;
+  const bool data = frame.status == ReadStatus::ok || frame.status == ReadStatus::partial;
+  HealthReading health;
+  if (data) health = assess_health(message->left_view(), thresholds_, previous_, has_previous_);
+  has_previous_ = has_previous_ || data;
+  if (accept(frame.status, job, true, (health.flags & image_health::unchanging) != 0)) {
     message->health = health.flags | frame.health | (frame.status == ReadStatus::partial ? image_health::partial : 0);
     message->frame_number = frame.frame_number;
     message->camera = format_.camera;

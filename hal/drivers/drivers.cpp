@@ -13,6 +13,7 @@
 #include "hal/replay/replay_camera.hpp"
 #include "hal/replay/replay_laser.hpp"
 #include "hal/settings/settings.hpp"
+#include "hal/sim/failing_devices.hpp"
 #include "hal/sim/sim_camera.hpp"
 #include "hal/sim/sim_devices.hpp"
 
@@ -60,6 +61,30 @@ HealthThresholds thresholds_of(Settings& settings) {
   return t;
 }
 
+DeviceHealthSettings health_of(const DeviceConfig& config, Settings& settings) {
+  DeviceHealthSettings health;
+  const auto time = [&](const char* name, int64_t fallback_ns) {
+    const double seconds = settings.quantity(name, Dimension::time, static_cast<double>(fallback_ns) * 1e-9);
+    if (settings.has(name) && !(seconds > 0 && seconds < 1e6))
+      settings.fail("`" + std::string(name) + "` is not in 0s..1000000s", "give the time after which a device counts");
+    return std::llround(seconds * 1e9);
+  };
+  health.silent_after_ns = time("silent_after", 0);
+  health.recovers_after_ns = time("recovers_after", health.recovers_after_ns);
+  health.judges_frozen = config.driver != "replay";  // one image may be recorded, and is given again and again
+  return health;
+}
+
+/// The device as it is, or behind one that fails as the setting `failures` says.
+template <class Failing, class Interface, class... More>
+std::unique_ptr<Interface> with_failures(std::unique_ptr<Interface> device, Settings& settings, More&&... more) {
+  auto windows = sim::parse_failures(settings.text("failures", ""));
+  if (!windows) settings.fail("`failures`: " + windows.error(), "correct `failures`");
+  if (!windows || windows->empty()) return device;
+  return std::make_unique<Failing>(std::move(device), sim::FailureSchedule(std::move(*windows)),
+                                   std::forward<More>(more)...);
+}
+
 /// Opens the device; only then does it become a node.
 template <class NodeClass, class Interface, class... More>
 NodeResult opened(std::unique_ptr<Interface> device, const Settings& settings, More&&... more) {
@@ -82,6 +107,7 @@ NodeResult make_sim_camera(const DeviceConfig& config, Settings& settings, sim::
   if (camera.noise.read_sigma < 0 || camera.noise.photon_variance < 0)
     settings.fail("noise must not be negative", "correct read_noise and photon_noise");
   std::unique_ptr<StereoCamera> device = std::make_unique<sim::SimCamera>(config.id, camera, world, clock);
+  device = with_failures<sim::FailingCamera>(std::move(device), settings, clock);
   return opened<StereoCameraNode>(std::move(device), settings, thresholds_of(settings));
 }
 
@@ -149,6 +175,7 @@ NodeResult make_sim_laser(const DeviceConfig& config, Settings& settings, sim::S
                   "fov in (0, 360deg], range positive, noise not negative");
   }
   std::unique_ptr<LaserScanner> device = std::make_unique<sim::SimLaser>(config.id, model, world);
+  device = with_failures<sim::FailingLaser>(std::move(device), settings);
   return opened<LaserNode>(std::move(device), settings);
 }
 
@@ -164,6 +191,7 @@ NodeResult make_sim_base(const DeviceConfig& config, Settings& settings, sim::Si
   else if (world.path().empty())
     settings.fail("`drive: path`, but the world's client has no <path>", "add one, or use drive: command");
   std::unique_ptr<MobileBase> device = std::make_unique<sim::SimBase>(config.id, model, world);
+  device = with_failures<sim::FailingBase>(std::move(device), settings);
   return opened<BaseNode>(std::move(device), settings);
 }
 
@@ -175,9 +203,11 @@ NodeResult make_sim(const DeviceConfig& config, Settings& settings, Devices& dev
   if (config.kind == "mobile_base") return make_sim_base(config, settings, **world);
   if (config.kind == "camera_head") {
     std::unique_ptr<CameraHead> device = std::make_unique<sim::SimHead>(config.id, **world);
+    device = with_failures<sim::FailingHead>(std::move(device), settings);
     return opened<HeadNode>(std::move(device), settings);
   }
   std::unique_ptr<DigitalLines> device = std::make_unique<sim::SimLines>(config.id, **world);
+  device = with_failures<sim::FailingLines>(std::move(device), settings);
   return opened<LinesNode>(std::move(device), settings);
 }
 
@@ -252,8 +282,11 @@ NodeResult make_device(const DeviceConfig& config, Devices& devices, const Clock
     return device_failure(config.id, "this build cannot open the driver `" + config.driver + "`",
                           "choose a profile whose devices use one of: " + built_names(kind->drivers));
   Settings settings(config.id, config.settings, config.directory);
-  if (config.driver == "replay") return make_replay(config, settings, clock);
-  return make_sim(config, settings, devices, clock);
+  const DeviceHealthSettings health = health_of(config, settings);
+  NodeResult node =
+      config.driver == "replay" ? make_replay(config, settings, clock) : make_sim(config, settings, devices, clock);
+  if (node) (*node)->set_health(health);
+  return node;
 }
 
 SimulatorUse simulator_use() {

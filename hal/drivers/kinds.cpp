@@ -15,11 +15,15 @@ constexpr DriverInfo kHeadDrivers[] = {{"sim", "the simulated world"}, {"can", "
 constexpr DriverInfo kBaseDrivers[] = {{"sim", "the simulated world"}, {"replay", "the odometry of a CARMEN log"}};
 constexpr DriverInfo kLinesDrivers[] = {{"sim", "the simulated world"}, {"gpio", "lines of a GPIO chip", false}};
 
-#define COMMON_SETTINGS                                                                 \
-  {"rate", "", rate, false, "releases per second of the device's node"},                \
-      {"model", "", text, false, "name of the hardware model, for the reader"},         \
-      {"world", "sim", path, true, "XML file of the simulated world"}, {                \
-    "client", "sim", text, false, "which <client> of the world is the robot; the first" \
+#define COMMON_SETTINGS                                                                                                \
+  {"rate", "", rate, false, "releases per second of the device's node"},                                               \
+      {"model", "", text, false, "name of the hardware model, for the reader"},                                        \
+      {"silent_after", "", time, false, "without good data for so long it counts as lost; 3 periods, at least 300ms"}, \
+      {"recovers_after", "", time, false, "good data for so long bring a lost device back; 500ms"},                    \
+      {"failures", "sim", text, false,                                                                                 \
+       "when it fails: silent, unplugged, garbage or frozen, such as unplugged 2s..4s, frozen 6s..7s"},                \
+      {"world", "sim", path, true, "XML file of the simulated world"}, {                                               \
+    "client", "sim", text, false, "which <client> of the world is the robot; the first"                                \
   }
 
 #define CARMEN_SETTINGS                                                                      \

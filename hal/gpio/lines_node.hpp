@@ -11,7 +11,7 @@ namespace takt {
 class LinesNode final : public DeviceNode {
  public:
   explicit LinesNode(std::unique_ptr<DigitalLines> lines) : lines_(std::move(lines)) {}
-  void setup(Setup&) override { open_in_setup(); }
+  void setup(Setup& setup) override { open_in_setup(setup); }
   void run(Job& job) override;
   Device& device() override { return *lines_; }
 

@@ -11,7 +11,7 @@ namespace takt {
 class HeadNode final : public DeviceNode {
  public:
   explicit HeadNode(std::unique_ptr<CameraHead> head) : head_(std::move(head)) {}
-  void setup(Setup&) override { open_in_setup(); }
+  void setup(Setup& setup) override { open_in_setup(setup); }
   void run(Job& job) override;
   Device& device() override { return *head_; }
 

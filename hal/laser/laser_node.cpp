@@ -3,8 +3,8 @@
 
 namespace takt {
 
-void LaserNode::setup(Setup&) {
-  open_in_setup();
+void LaserNode::setup(Setup& setup) {
+  open_in_setup(setup);
   format_ = scanner_->format();
   Capacity capacity;
   capacity.count = format_.beams;
@@ -13,6 +13,7 @@ void LaserNode::setup(Setup&) {
 
 void LaserNode::run(Job& job) {
   LaserScan* message = running(job) ? scan_.loan() : nullptr;
+  // Of a damaged scan nothing is sent: beams that are missing would look like a free way.
   if (message == nullptr) return job.no_result();
   message->range_m.resize(format_.beams);
   const ScanReading reading = scanner_->read(message->range_m.items(), job.release_ns(), job.deadline_ns());

@@ -10,6 +10,8 @@ struct Fault {
     hang,       ///< a job did not return
     exception,  ///< a job threw
     memory,     ///< a job asked for more memory than its node may have, and got none
+    lost,       ///< what the task reads from outside gives no good data any more
+    back,       ///< it does again
   };
   Kind kind = hang;
   uint32_t task = 0;  ///< index into Plan::tasks
@@ -18,6 +20,7 @@ struct Fault {
   BoundedText<200> what;
 };
 
-using FaultLog = AppendLog<Fault, 256>;
+inline constexpr size_t kMostFaults = 256;
+using FaultLog = AppendLog<Fault, kMostFaults>;
 
 }  // namespace takt

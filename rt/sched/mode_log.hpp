@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include "rt/sched/append_log.hpp"
+#include "rt/sched/mode_rules.hpp"
 
 namespace takt {
 
@@ -12,7 +13,7 @@ namespace takt {
 /// period after it. So a change is complete, for each task, `lead + max(deadline, period)` after it was asked for.
 class ModeLog {
  public:
-  static constexpr size_t kMost = 128;
+  static constexpr size_t kMost = 512;
   /// A request made while the run goes on takes effect this much later, so that it is on the board before the first
   /// release it is to hold for.
   static constexpr int64_t kLead_ns = 1'000'000;
@@ -21,6 +22,7 @@ class ModeLog {
     uint32_t mode = 0;  ///< index into Plan::modes
     int64_t from_ns = 0;
     BoundedText<120> reason;
+    ModeOrigin origin = ModeOrigin::other;
   };
 
   /// Mode of a job released then; 0, the mode of the start, before the first change.
@@ -31,20 +33,46 @@ class ModeLog {
   }
   /// The mode that will be in force once all requests have taken effect.
   uint32_t newest() const { return at(INT64_MAX); }
-  /// Nothing happens if that mode is the newest one already. False if there were too many changes; those that a person
-  /// asks for are refused earlier, so that a safe stop always has its place.
+  /// ... with who entered it, and the newest mode that no rule did.
+  ModeInForce in_force() const {
+    ModeInForce now;
+    bool found = false;
+    for (size_t i = log_.size(); i-- > 0;) {
+      const Change* change = log_.at(i);
+      if (change == nullptr) continue;
+      if (!found) now = {change->mode, change->origin, 0};
+      found = true;
+      if (change->origin == ModeOrigin::rule) continue;
+      now.before = change->mode;
+      break;
+    }
+    return now;
+  }
+  /// Nothing happens if that mode is the newest one already, unless a rule entered it. False if there were too many
+  /// changes; those that a person asks for are refused earlier, so that a safe stop always has its place.
   bool request(uint32_t mode, int64_t from_ns, std::string_view reason, bool by_hand = false) {
+    // A mode that a rule entered is taken over: the rule will not leave it then.
+    if (const ModeInForce now = in_force(); now.mode == mode && now.origin == ModeOrigin::other) return true;
+    if (by_hand && !has_room()) return false;
+    return append(mode, from_ns, reason, ModeOrigin::other);
+  }
+  /// The same, asked for by a rule; refused as early as what a person asks for.
+  bool request_by_rule(uint32_t mode, int64_t from_ns, std::string_view reason) {
     if (newest() == mode) return true;
-    if (by_hand && log_.size() + 8 > kMost) return false;
-    for (size_t i = log_.size(); i-- > 0;)  // instants never go back
-      if (const Change* change = log_.at(i)) from_ns = std::max(from_ns, change->from_ns);
-    return log_.append({mode, from_ns, BoundedText<120>(reason)});
+    return has_room() && append(mode, from_ns, reason, ModeOrigin::rule);
   }
   size_t size() const { return log_.size(); }
   /// In the order of their instants; null while it is being written.
   const Change* change(size_t i) const { return log_.at(i); }
 
  private:
+  bool has_room() const { return log_.size() + 8 <= kMost; }
+  bool append(uint32_t mode, int64_t from_ns, std::string_view reason, ModeOrigin origin) {
+    for (size_t i = log_.size(); i-- > 0;)  // instants never go back
+      if (const Change* change = log_.at(i)) from_ns = std::max(from_ns, change->from_ns);
+    return log_.append({mode, from_ns, BoundedText<120>(reason), origin});
+  }
+
   AppendLog<Change, kMost> log_;
 };
 

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "rt/sched/mode_rules.hpp"
 #include "rt/shm/transport.hpp"
 #include "rt/time/rate.hpp"
 
@@ -75,6 +76,7 @@ struct Plan {
   std::string mode = "full";    ///< of the start
   std::vector<ModePlan> modes;  ///< [0] is that of the start, with all tasks; empty: there is no other
   size_t safe_stop = kNone;     ///< index into modes
+  ModeRules mode_rules = {};    ///< which mode the loss of sources leads to; without rules it leads to none
 };
 
 /// Rate at which a task runs: its own, or that of the producer whose output releases it (divided by `every`); 0 if

@@ -2,12 +2,14 @@
 #pragma once
 #include <atomic>
 #include <cstddef>
+#include <span>
 #include <string>
 
 #include "rt/sched/fault_log.hpp"
 #include "rt/sched/grant.hpp"
 #include "rt/sched/mode_log.hpp"
 #include "rt/sched/plan.hpp"
+#include "rt/sched/source_record.hpp"
 #include "rt/sched/statistics.hpp"
 #include "rt/sched/stop_signal.hpp"
 #include "rt/shm/kill_order.hpp"
@@ -60,7 +62,8 @@ class RunBoard {
   enum Decision : uint32_t { undecided, as_asked, cooperative };
   enum Carrier : uint32_t { no_carrier, iceoryx, local };
 
-  /// Only the shape of the plan is used: tasks, edges, ports. Throws std::runtime_error if there is no memory.
+  /// Only the shape of the plan is used: tasks, edges, ports, and its modes with their rules. Throws std::runtime_error
+  /// if there is no memory.
   explicit RunBoard(const Plan& plan, size_t processes = 1);
   ~RunBoard();
   RunBoard(const RunBoard&) = delete;
@@ -78,6 +81,7 @@ class RunBoard {
   CapacityRecord& capacity(size_t p) { return capacities_[p]; }
   ProcessRecord& process(size_t p) { return processes_[p]; }
   const ProcessRecord& process(size_t p) const { return processes_[p]; }
+  const SourceRecord& source(size_t t) const { return sources_[t]; }
   size_t process_count() const { return process_count_; }
 
   ModeLog& modes() { return shared_->modes; }
@@ -85,6 +89,14 @@ class RunBoard {
   /// Asks for the mode `safe_stop`; nothing happens if the run is in it, or the plan has none. Any thread, does not
   /// wait.
   void safe_stop(int64_t from_ns, std::string_view reason);
+
+  /// What job `job` of a task says of its source, at `at_ns`. A loss or a return becomes a fault, and changes the mode
+  /// from `from_ns` on as the plan's rules want it. On the thread that runs the task; does not wait.
+  void tell_source(size_t t, uint64_t job, const SourceReport& report, int64_t at_ns, int64_t from_ns);
+  /// The sources of a process that is dead: what reads from outside among these tasks is lost (`unattended`) until a
+  /// job says otherwise. By the supervisor, once nothing of that process runs any more; does not wait.
+  void lose_sources(std::span<const size_t> tasks, int64_t at_ns, int64_t from_ns);
+
   FaultLog& faults() { return shared_->faults; }
   const FaultLog& faults() const { return shared_->faults; }
 
@@ -111,10 +123,16 @@ class RunBoard {
   };
   template <class T>
   T* place(std::byte*& at, size_t count);
+  void note_source(size_t t, uint64_t job, SourceState state, int64_t at_ns);
+  SourceSet lost_sources() const;
+  void follow_mode_rules(bool newly_lost, int64_t from_ns, const char* reason);
 
   std::byte* memory_ = nullptr;
   size_t bytes_ = 0, process_count_ = 0, safe_stop_mode_ = kNone;
   std::vector<size_t> first_edge_;
+  std::vector<std::string> task_names_;
+  std::vector<char> has_source_;  ///< by task: a hardware node
+  ModeRules mode_rules_;
   Shared* shared_ = nullptr;
   TaskStatistics* tasks_ = nullptr;
   EdgeStatistics* edges_ = nullptr;
@@ -123,6 +141,7 @@ class RunBoard {
   ParamMail* mail_ = nullptr;
   CapacityRecord* capacities_ = nullptr;
   ProcessRecord* processes_ = nullptr;
+  SourceRecord* sources_ = nullptr;
 };
 
 }  // namespace takt

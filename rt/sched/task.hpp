@@ -127,6 +127,7 @@ class Task {
     int cpu = -1, level = 0;
     JobEnd end;
     ThreadUse used;
+    std::optional<SourceReport> source;
   } ended_;
   std::vector<int64_t> sent_stamps_ns_;  ///< of the same job, per output; kNothingSent
   static constexpr int64_t kNothingSent = INT64_MIN;

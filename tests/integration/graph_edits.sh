@@ -75,6 +75,7 @@ edit '
   /^        scan: \{from: front_laser/d
   /^        stop: \{from: obstacle_stop/d
   /^  stop: \{from: front_laser/d
+  s/lost: \[front_laser, /lost: [/
 ' '
   /^  front_laser: /d
   /^  obstacle_stop: /d
@@ -99,6 +100,7 @@ edit '
   /^  ground_camera: /d
   s/ground_camera\.pair/head_camera.pair/
   s/head_camera, ground_camera, /head_camera, /
+  s/lost: \[head_camera, ground_camera\]/lost: [head_camera]/
 ' '
   /^  ground_camera: /d
 '

@@ -50,11 +50,11 @@ struct Fixture {
     wanted->turn_rad_s = 0.2;
     test::latch(velocity, wanted, 0, 1);
   }
-  void job() {
+  void job(std::string_view mode = "full") {
     base->speed_m_s = base->turn_rad_s = -1;
     base->commands = 0;
     PortAccess::reset(*node.outputs()[0]);
-    Job job(clock, 0, 0, 66'000'000, 0, "full");
+    Job job(clock, 0, 0, 66'000'000, 0, mode);
     node.run(job);
     CHECK(PortAccess::sent(*node.outputs()[0]));  // odometry goes on, whatever the command
   }
@@ -101,4 +101,25 @@ TEST_CASE("base: a stop is commanded also where there is no velocity, which alon
   f.command->reasons = 0;
   f.job();
   CHECK(f.base->commands == 0);
+}
+
+TEST_CASE("base: in safe_stop, and in a mode that has no name, zero is commanded each job whatever the inputs say") {
+  for (const bool with_stop : {false, true}) {
+    Fixture f(with_stop);
+    if (with_stop) test::latch(f.stop, f.command, 0, 1);  // it says: drive
+    f.job("no_stereo");
+    CHECK(f.drives());
+    for (const std::string_view mode : {kSafeStopMode, std::string_view()}) {
+      f.job(mode);
+      CHECK(f.halts());
+      f.job(mode);
+      CHECK(f.halts());
+      PortAccess::set_held(f.velocity, 0, true, 0);  // nobody wants to drive: zero is commanded all the same
+      f.job(mode);
+      CHECK(f.halts());
+      test::latch(f.velocity, f.wanted, 0, 1);
+    }
+    f.job("full");
+    CHECK(f.drives());
+  }
 }

@@ -169,6 +169,24 @@ TEST_CASE("A mode that cuts a needed input off is refused, an optional one is no
                {"mode `blind` leaves input `motion` of `planner` unconnected", "without `ego_motion`"});
 }
 
+TEST_CASE("What a mode can do without is a device, named once; safe_stop needs nothing else") {
+  const std::string blind = "blind: {without: [stereo, ego_motion, planner, base]}";
+  const auto lost = [&](const std::string& devices) {
+    return "blind: {without: [stereo, ego_motion, planner, base], lost: [" + devices + "]}";
+  };
+  expect_graph(blind, lost("camra"), "camra", {"mode `blind`", "`camra`", "did you mean `camera`?"});
+  expect_graph(blind, lost("stereo"), "stereo]", {"mode `blind`", "`stereo`, which is no device", "base, camera"});
+  expect_graph(blind, lost("base, camera, camera"), "camera]}", {"`lost` of mode `blind` names `camera` twice"});
+  expect_graph(blind, "blind: {lost: [camera]}", "blind", {"mode `blind` lacks `without`"});
+  expect_graph(blind, "safe_stop: {}", "safe_stop", {"mode `safe_stop` lacks `without`"});
+  expect_graph(blind, "safe_stop: {lost: []}", "safe_stop", {"mode `safe_stop` lacks `without`"});
+  LoadOptions options;
+  options.mode = "safe_stop";
+  const Loaded loaded = Files(with(kGraph, blind, "safe_stop: {lost: [camera]}")).load(options);
+  INFO(all(loaded));
+  CHECK_FALSE(loaded.graph);  // as little a mode to start in as without the rule
+}
+
 TEST_CASE("The command line's words") {
   const auto at = [](const LoadOptions& options) {
     const Loaded loaded = Files().load(options);

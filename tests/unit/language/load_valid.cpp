@@ -184,3 +184,35 @@ TEST_CASE("TAKT_DATA is expanded, falls back to a path relative to the file, or 
          {"${HOME}", "${TAKT_DATA}"});
   if (before != nullptr) ::setenv("TAKT_DATA", saved.c_str(), 1);
 }
+
+TEST_CASE("Modes come in the order of the file, with the devices that they can do without") {
+  const Loaded loaded = Files(with(kGraph, "blind: {without: [stereo, ego_motion, planner, base]}",
+                                   "still: {without: [stereo, ego_motion, planner, base], lost: [base]}\n"
+                                   "  blind: {without: [stereo, ego_motion, planner, base], lost: [camera, base]}\n"
+                                   "  safe_stop: {lost: [camera]}"))
+                            .load();
+  INFO(all(loaded));
+  REQUIRE(loaded.graph);
+  const auto& modes = loaded.graph->modes;
+  REQUIRE(modes.size() == 3);
+  CHECK(modes[0].name == "still");
+  CHECK(modes[0].pauses() == std::vector<std::string>{"stereo", "ego_motion", "planner"});
+  CHECK(modes[1].lost == std::vector<std::string>{"camera", "base"});
+  CHECK(modes[1].defined);
+  CHECK(modes[2].name == "safe_stop");
+  CHECK_FALSE(modes[2].defined);
+}
+
+TEST_CASE("A graph in a mode lacks what the mode leaves out, and the edges from there") {
+  LoadOptions options;
+  options.mode = "undriven";
+  const Loaded loaded =
+      Files(with(kGraph, "blind: {without: [stereo, ego_motion, planner, base]}", "undriven: {without: [planner]}"))
+          .load(options);
+  INFO(all(loaded));
+  REQUIRE(loaded.graph);
+  CHECK(loaded.graph->nodes.size() == 2);
+  REQUIRE(loaded.graph->devices.size() == 2);
+  CHECK(loaded.graph->devices[1].id == "base");
+  CHECK(loaded.graph->devices[1].edges.empty());  // its velocity came from the planner
+}

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "hal/device_node.hpp"
+
+namespace takt {
+
+void DeviceNode::open_in_setup(const Setup& setup) {
+  if (const auto opened = device().open(); !opened) throw SetupError(opened.error().text());
+  const DeclaredCalls declared = device().declared_calls();
+  if (declared.calls != 0) may(declared.calls, declared.reason);
+  if (health_settings_.silent_after_ns == 0)
+    health_settings_.silent_after_ns = default_silent_after_ns(setup.rate ? setup.rate->release_ns(0, 1) : 0);
+  health_ = DeviceHealth(health_settings_);
+  retry_ = {};
+  reopen_tries_ = 0;
+}
+
+bool DeviceNode::running(Job& job) {
+  if (started_) return true;
+  const int64_t now_ns = job.release_ns();
+  if (retry_.due(now_ns)) {
+    ++reopen_tries_;
+    // Not forgotten when it works: a device that comes for one read and goes again is not tried at every job.
+    retry_.failed(now_ns);
+    started_ = device().restart(now_ns);
+  }
+  if (!started_) judge(ReadStatus::disconnected, job, false);
+  return started_;
+}
+
+bool DeviceNode::accept(ReadStatus status, Job& job, bool marks_damage, bool repeated) {
+  judge(status, job, repeated);
+  if (status == ReadStatus::end_of_data) {
+    job.end_of_data();
+    return false;
+  }
+  if (status == ReadStatus::disconnected && started_) {
+    started_ = false;
+    // Gone in the very job that got it back: that is the try which failed.
+    if (retry_.due(job.release_ns())) retry_.failed(job.release_ns());
+  }
+  const bool usable = status == ReadStatus::ok || (status == ReadStatus::partial && marks_damage);
+  if (!usable) job.no_result();
+  return usable;
+}
+
+void DeviceNode::judge(ReadStatus status, Job& job, bool repeated) {
+  health_.observe(job.release_ns(), status, repeated);
+  const auto state = health_.state();
+  if (!state) return;
+  if (*state == SourceState::ok) retry_.works();
+  job.source_state({*state, reopen_tries_});
+}
+
+}  // namespace takt
