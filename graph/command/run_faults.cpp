@@ -15,6 +15,7 @@ int RunFaults::load(const graph::GraphSpec& graph, const Clock& clock) {
   const graph::Composition outline = graph::outline(graph, graph::node_types(), clock);
   graph::RunKind kind;
   kind.virtual_time = clock.is_virtual();
+  kind.iceoryx = options_.transport == "iceoryx";
   kind.records = !options_.record.empty();
   auto loaded = graph::load_scenario(options_.faults, graph, outline.plan, kind);
   for (const auto& problem : loaded.problems) std::fprintf(stderr, "%s\n", graph::to_string(problem).c_str());

@@ -93,6 +93,10 @@ class ScenarioReader {
     if (!run_.virtual_time && !run_.processes && !kind.in_one_process)
       problem(at, fmt::format("{} needs a process to strike; run with --isolate subsystem{}", ticked(kind.name),
                               kind.in_virtual_time ? ", or with --clock virtual" : ""));
+    if (run_.iceoryx && kind.kind == FaultKind::exhausted_pool)
+      problem(at, fmt::format("{} cannot strike over iceoryx, which lets no reader hold more than its share of a pool; "
+                              "run with --transport local",
+                              ticked(kind.name)));
     if (kind.needs_record && !run_.records)
       problem(at, fmt::format("{} strikes the record of the run; run with --record FILE", ticked(kind.name)));
   }
@@ -102,16 +106,16 @@ class ScenarioReader {
     std::vector<std::string> valid;
     const char* what = "";
     switch (kind.target) {
-      case FaultTarget::output: valid = outputs(), what = "output"; break;
-      case FaultTarget::node: valid = nodes(false), what = "node or device"; break;
-      case FaultTarget::device: valid = nodes(true), what = "device"; break;
+      case FaultTarget::output: valid = outputs(), what = "an output"; break;
+      case FaultTarget::node: valid = nodes(false), what = "a node or device"; break;
+      case FaultTarget::device: valid = nodes(true), what = "a device"; break;
       default:
-        valid = processes_of(graph_), what = "subsystem, node or device";
+        valid = processes_of(graph_), what = "a subsystem, node or device";
         if (!process_of(graph_, fault.target).empty()) return;
         if (fault.kind == FaultKind::kill) valid.emplace_back("any");
     }
     if (std::find(valid.begin(), valid.end(), fault.target) == valid.end())
-      return problem(at, fmt::format("{} strikes a {}, but graph {} has no {}{}", ticked(kind.name), what,
+      return problem(at, fmt::format("{} strikes {}, but graph {} has no {}{}", ticked(kind.name), what,
                                      ticked(graph_.name), ticked(fault.target), alternatives(fault.target, valid)));
     if (fault.kind == FaultKind::truncate && !has_arrays(fault.target))
       problem(at, fmt::format("messages of {} have no array that could be truncated", ticked(fault.target)));

@@ -66,6 +66,7 @@ struct RunKind {
   bool virtual_time = false;
   bool processes = false;  ///< one per subsystem
   bool records = false;
+  bool iceoryx = false;  ///< carries the messages
 };
 
 struct LoadedScenario {

@@ -50,11 +50,14 @@ expect 1 '' "$takt" log diff "$work/again1.mcap" "$work/other.mcap"
 
 # What cannot be run is refused before anything starts, with the place and the way out.
 expect 2 'no such file' "$takt" run tests/faults/loads.yaml --clock virtual --faults "$work/none.yaml"
-expect 2 'real_cpu_hog.yaml:5:12: error: `cpu_hog` exists in real time only' \
+expect 2 'real_cpu_hog.yaml:6:12: error: `cpu_hog` exists in real time only' \
   "$takt" run tests/faults/loads.yaml --clock virtual --faults tests/faults/real_cpu_hog.yaml
 expect 2 '`kill` needs a process to strike' \
   "$takt" run tests/faults/loads.yaml --isolate none --faults tests/faults/kill_front.yaml
 expect 2 'run with --record FILE' "$takt" run tests/faults/loads.yaml --clock virtual --faults tests/faults/full_disk.yaml
+expect 2 'processes cannot be given faults yet; add --isolate none' "$takt" run graph/ace.yaml --faults tests/faults/ace_laser_lost.yaml
+printf 'takt: 1\nname: blind\nfaults: [{kind: silent, target: front_laser}]\n' >"$work/blind.yaml"
+expect 2 'no driver of this build can be told to fail' "$takt" run graph/ace.yaml --clock virtual --faults "$work/blind.yaml"
 printf 'takt: 1\nname: typo\nfaults: [{kind: drop, target: front_lazer.scan}]\n' >"$work/typo.yaml"
 expect 2 'did you mean `front_laser.scan`?' "$takt" run graph/ace.yaml --clock virtual --faults "$work/typo.yaml"
 finish

@@ -99,7 +99,7 @@ TEST_CASE("every kind has the place of its name in the schema and in the table")
 TEST_CASE("unknown kinds, targets and keys, each with what was meant") {
   expect_problem(scenario_text("{kind: dropp, target: camera.pair}"), 4, 12, {"dropp", "did you mean `drop`?"});
   expect_problem(scenario_text("{kind: drop, target: camera.pear}"), 4, 26,
-                 {"`drop` strikes a output", "no `camera.pear`", "did you mean `camera.pair`?", "planner.motion"});
+                 {"`drop` strikes an output", "no `camera.pear`", "did you mean `camera.pair`?", "planner.motion"});
   expect_problem(scenario_text("{kind: hang, target: sterio, at: 1s, for: 0s}"), 4, 26, {"did you mean `stereo`?"});
   expect_problem(scenario_text("{kind: silent, target: stereo}"), 4, 28, {"strikes a device", "camera"});
   expect_problem(scenario_text("{kind: kill, target: deepth, at: 1s}"), 4, 26,
@@ -146,6 +146,8 @@ TEST_CASE("faults that such a run cannot have") {
   expect_problem(scenario_text("{kind: stop_process, target: depth, at: 1s, for: 1s}"), 4, 12, {"--isolate subsystem"},
                  one_process);
   expect_problem(scenario_text("{kind: full_disk, megabytes: 1}"), 4, 12, {"--record FILE"}, virtual_time);
+  expect_problem(scenario_text("{kind: exhausted_pool, target: camera.pair}"), 4, 12, {"iceoryx", "--transport local"},
+                 {true, false, false, true});
   sound(scenario_text("{kind: kill, target: depth, at: 1s}"), processes);
   sound(scenario_text("{kind: cpu_hog, threads: 2, policy: fixed}"), one_process);
 }

@@ -258,6 +258,8 @@ TEST_CASE("no fault allocates while it strikes") {
     all.push_back(fault(kind));
     all.back().to_ns = kForever;
     all.back().probability = 0.5;
+    all.back().seed = all.size();
+    if (kind == MessageFaultKind::exhaust) all.back().from_ns = 1'000 * kMs;  // nothing is published after it
   }
   Bench bench(all);
   take_thread_use();
