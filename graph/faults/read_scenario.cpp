@@ -16,6 +16,7 @@ namespace {
 
 using nlohmann::json;
 
+constexpr int64_t kMostStrikes = 10'000;      ///< of one fault
 constexpr int64_t kRestart_ns = 300'000'000;  ///< of a killed process in virtual time, where `for` does not say any
 
 std::vector<std::string> words(const std::vector<std::string_view>& keys) { return {keys.begin(), keys.end()}; }
@@ -73,7 +74,7 @@ class ScenarioReader {
     std::vector<std::string> valid = words(kind.required);
     for (const auto key : kind.optional) valid.emplace_back(key);
     if (kind.target != FaultTarget::none) valid.emplace_back("target");
-    const json schema = json::parse(schema_text(Schema::faults))["definitions"]["fault"]["properties"];
+    static const json schema = json::parse(schema_text(Schema::faults))["definitions"]["fault"]["properties"];
     for (const auto& [key, ignored] : value.items())
       if (key != "kind" && schema.contains(key) && std::find(valid.begin(), valid.end(), key) == valid.end())
         problem(document_.key_at(child(pointer, key)),
@@ -155,14 +156,17 @@ class ScenarioReader {
     read("by", fault.by_ns, fault.kind == FaultKind::clock_step ? INT64_MIN : 1);
     if (fault.to_ns <= fault.from_ns)
       problem(document_.value_at(child(pointer, "to")), "`to` is not after `from`: the fault would never strike");
-    if (fault.kind == FaultKind::kill) check_kill(value, pointer);
+    if (fault.kind == FaultKind::kill) check_kill(fault, value, pointer);
   }
 
-  void check_kill(const json& value, const std::string& pointer) {
+  void check_kill(const FaultSpec& fault, const json& value, const std::string& pointer) {
     const Position& at = document_.value_at(pointer);
     if (value.contains("at") == value.contains("every"))
       return problem(at, "`kill` takes either `at`, or `every` with `to` (and `from`)");
-    if (value.contains("every") && !value.contains("to")) problem(at, "`kill` with `every` lacks `to`");
+    if (value.contains("every") && !value.contains("to")) return problem(at, "`kill` with `every` lacks `to`");
+    if (fault.every_ns > 0 && (fault.to_ns - fault.from_ns) / fault.every_ns > kMostStrikes)
+      problem(document_.value_at(child(pointer, "every")),
+              fmt::format("`kill` would strike more than {} times; shorten the window", kMostStrikes));
     if (value.contains("at") && (value.contains("from") || value.contains("to")))
       problem(at, "`kill` with `at` takes no `from` and `to`: they go with `every`");
   }

@@ -121,6 +121,7 @@ TEST_CASE("wrong times and amounts") {
   expect_problem(scenario_text("{kind: drop, target: camera.pair, probability: 2}"), 4, 52, {"from 0 to 1"});
   expect_problem(scenario_text("{kind: kill, target: depth}"), 4, 5, {"either `at`, or `every`"});
   expect_problem(scenario_text("{kind: kill, target: depth, every: 1s}"), 4, 5, {"lacks `to`"});
+  expect_problem(scenario_text("{kind: kill, target: depth, every: 1ms, to: 11s}"), 4, 40, {"more than 10000 times"});
   expect_problem(scenario_text("{kind: kill, target: depth, at: 1s, to: 3s}"), 4, 5, {"no `from` and `to`"});
 }
 
