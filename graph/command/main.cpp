@@ -88,6 +88,7 @@ void add_run(CLI::App& app, takt::command::RunOptions& o, int& exit_code) {
   run->add_option("--record", o.record, "writes an MCAP record for `takt replay` and `takt log`");
   run->add_option("--record-port", o.record_ports,
                   "NODE.PORT (or all): its messages whole, as those of devices and small ones are; repeatable");
+  run->add_option("--faults", o.faults, "a scenario: injects its faults and exits 0 exactly if what it expects is met");
   run->add_option("--output", o.output, "folder for pictures and other results (default out)");
   run->add_option("--seed", o.seed, "seed of the simulated world");
   run->add_option("--watchdog", o.watchdog,

@@ -14,6 +14,7 @@
 #include "graph/command/live_table.hpp"
 #include "graph/command/prepare.hpp"
 #include "graph/command/report.hpp"
+#include "graph/command/run_faults.hpp"
 #include "graph/command/run_support.hpp"
 #include "graph/command/run_trace.hpp"
 #include "graph/command/run_watchdog.hpp"
@@ -36,14 +37,15 @@ std::unique_ptr<Transport> make_transport(const std::string& name, const Plan& p
 }
 
 /// Runs the composed graph in this process; everything it needs exists and is checked.
-int execute(const RunOptions& options, Prepared& prepared, std::vector<std::string> adjusted) {
+int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, std::vector<std::string> adjusted) {
   const graph::GraphSpec& graph = *prepared.graph;
   graph::Composition& composition = *prepared.composition;
   const auto durations = job_durations(options.durations, composition.plan, options.seed);
   if (!durations) return refuse(durations.error(), kBadInput);
-  const auto transport = make_transport(options.transport, composition.plan);
   RunBoard board(composition.plan);
   RunRecord record(options, composition.plan);
+  const auto transport = faults.inject(make_transport(options.transport, composition.plan), composition.plan,
+                                       *prepared.clock, board, record);
   RunTrace trace(options, composition.plan);  // ends first: it speaks to the record
   Executor::Options run;
   run.duration_ns = static_cast<int64_t>(options.duration_s * 1e9);
@@ -55,8 +57,9 @@ int execute(const RunOptions& options, Prepared& prepared, std::vector<std::stri
     run.after_step = [&] {
       trace.drain();
       record.capture();
+      faults.look();
     };
-    run.job_duration_ns = *durations;
+    run.job_duration_ns = faults.durations(*durations, composition.plan);
     run.ran = [&](const trace::Slice& slice) { trace.ran(slice); };
   }
   Executor executor(composition.plan, *transport, *prepared.clock, run);
@@ -74,7 +77,9 @@ int execute(const RunOptions& options, Prepared& prepared, std::vector<std::stri
     record.begin(graph, composition.plan, board, *transport, "none");
     trace.collect(composition.plan, record);
     watchdog.start();
+    faults.begin(composition.plan, *prepared.clock, board);
     result = executor.run();
+    faults.end();
     if (result.stuck.empty()) watchdog.end();
   }
   const ProcessReading after = ProcessReading::now();
@@ -103,7 +108,9 @@ int execute(const RunOptions& options, Prepared& prepared, std::vector<std::stri
                            {"cores", composition.plan.cores.size()},
                            {"durations", options.durations}};
   record.tell(report);
+  faults.judge(result, board, run_exit(board, result.policy_granted, report), report);
   int code = tell_faults(options, graph, board, result.policy_granted, report);
+  code = faults.exit_code(code, report);
   if (!no_trace.empty()) code = refuse(no_trace, kBadInput);
   // A job that never returns still uses what would now be taken down.
   if (!result.stuck.empty()) end_process(code, options.transport);
@@ -111,6 +118,8 @@ int execute(const RunOptions& options, Prepared& prepared, std::vector<std::stri
 }
 
 int run_in_one_process(const RunOptions& options, Prepared& prepared, std::vector<std::string> adjusted) {
+  RunFaults faults(options);
+  if (const int code = faults.load(*prepared.graph, *prepared.clock); code != kOk) return code;
   graph::ComposeOptions how;
   how.output = options.output;
   how.seed = options.seed;
@@ -123,6 +132,7 @@ int run_in_one_process(const RunOptions& options, Prepared& prepared, std::vecto
     std::fputs("takt: stopped before the run began\n", stderr);
     return kOk;
   }
+  faults.make_room(prepared.composition->plan);
   // In virtual time the cores of the schedule need not be there.
   std::vector<int>& cores = prepared.composition->plan.cores;
   if (!prepared.clock->is_virtual() || cores.empty()) choose_cores(cores, adjusted);
@@ -135,7 +145,7 @@ int run_in_one_process(const RunOptions& options, Prepared& prepared, std::vecto
     return refuse("--require-rt: " + lacks.front(), kDeviceOrSystem);
   adjusted.insert(adjusted.end(), lacks.begin(), lacks.end());
   for (const std::string& line : adjusted) std::fprintf(stderr, "takt: adjusted: %s\n", line.c_str());
-  return execute(options, prepared, std::move(adjusted));
+  return execute(options, prepared, faults, std::move(adjusted));
 }
 
 /// One process, or one per subsystem: as the command line says, else the graph.
@@ -153,6 +163,8 @@ int run_as_asked(RunOptions options) {
       return refuse("--require-rt: this machine lacks (see `takt doctor`)\n" + lacks, kDeviceOrSystem);
   }
   if (wanted != "subsystem" || options.clock == "virtual") return run_in_one_process(options, prepared, adjusted);
+  if (!options.faults.empty())
+    return refuse("--faults: processes cannot be given faults yet; add --isolate none or --clock virtual", kBadInput);
   const KeptPlace report(options.report), page(options.html), trace(options.trace), record(options.record);
   return run_isolated(options, *prepared.graph, std::move(adjusted));
 }

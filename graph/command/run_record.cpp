@@ -58,6 +58,8 @@ void RunRecord::begin(const graph::GraphSpec& graph, const Plan& plan, const Run
   auto file = mcap::FileSink::open(options_.record);
   if (!file) throw std::runtime_error("--record " + file.error() + "; choose another place");
   file_.emplace(std::move(*file));
+  if (make_disk_) disk_ = make_disk_(*file_);
+  mcap::Sink& sink = disk_ ? *disk_ : *file_;
   record::Head head;
   head.facts = {{"format", "1"},
                 {"graph", absolute(graph.file)},
@@ -83,7 +85,7 @@ void RunRecord::begin(const graph::GraphSpec& graph, const Plan& plan, const Run
   record::Recorder::Options how;
   how.whole = whole_ports(plan, options_.record_ports);
   how.by_caller = options_.clock == "virtual";
-  recorder_ = std::make_unique<record::Recorder>(plan, board, transport, *file_, head, std::move(how));
+  recorder_ = std::make_unique<record::Recorder>(plan, board, transport, sink, head, std::move(how));
 }
 
 void RunRecord::finish(const RunResult& result) {

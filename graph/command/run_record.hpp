@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -25,6 +26,9 @@ class RunRecord {
   /// Before the first job, once the ports have their memory. Throws std::runtime_error if the file cannot be made.
   void begin(const graph::GraphSpec& graph, const Plan& plan, const RunBoard& board, Transport& transport,
              const std::string& isolation);
+  /// What stands between recorder and file, made once that is open; null: nothing. Before begin().
+  using Disk = std::function<std::unique_ptr<mcap::Sink>(mcap::Sink& file)>;
+  void on_disk(Disk disk) { make_disk_ = std::move(disk); }
   void take(int32_t thread, const trace::Event& event) {
     if (recorder_) recorder_->take(thread, event);
   }
@@ -39,6 +43,8 @@ class RunRecord {
  private:
   const RunOptions& options_;
   std::optional<mcap::FileSink> file_;
+  Disk make_disk_;
+  std::unique_ptr<mcap::Sink> disk_;
   std::unique_ptr<record::Recorder> recorder_;
   record::RecordResult written_;
 };

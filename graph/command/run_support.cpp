@@ -128,10 +128,15 @@ int tell(const RunOptions& options, const graph::GraphSpec& graph, const nlohman
 
 int tell_faults(const RunOptions& options, const graph::GraphSpec& graph, const RunBoard& board, Policy granted,
                 nlohmann::ordered_json& report) {
-  const bool failed = granted == Policy::cooperative && hung(board);
-  if (failed) report["ok"] = false;
+  const bool failed = run_exit(board, granted, report) == kDeviceOrSystem;
   const int told = tell(options, graph, report);
   return failed ? static_cast<int>(kDeviceOrSystem) : told;
+}
+
+int run_exit(const RunBoard& board, Policy granted, nlohmann::ordered_json& report) {
+  const bool failed = granted == Policy::cooperative && hung(board);
+  if (failed) report["ok"] = false;
+  return failed ? kDeviceOrSystem : report["ok"].get<bool>() ? kOk : kNotOk;
 }
 
 bool is_stuck(const RunResult& result, size_t task) {

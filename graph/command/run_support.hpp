@@ -69,6 +69,9 @@ int tell(const RunOptions& options, const graph::GraphSpec& graph, const nlohman
 int tell_faults(const RunOptions& options, const graph::GraphSpec& graph, const RunBoard& board, Policy granted,
                 nlohmann::ordered_json& report);
 
+/// The exit code of such a run if everything can be written; corrects "ok" in the report.
+int run_exit(const RunBoard& board, Policy granted, nlohmann::ordered_json& report);
+
 /// True if that task has a job that never returned.
 bool is_stuck(const RunResult& result, size_t task);
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "graph/command/report.hpp"
+#include "graph/faults/verdict.hpp"
 
 namespace takt::command {
 namespace {
@@ -94,6 +95,7 @@ std::string summary_text(const Json& report) {
   text += events_text(report);
   for (const Json& line : report["adjusted"]) text += "adjusted: " + line.get<std::string>() + "\n";
   text += report["ok"].get<bool>() ? "ok\n" : "NOT OK: a high-criticality deadline was missed or a node fell behind\n";
+  if (report.contains("scenario")) text += graph::scenario_text(report["scenario"]);
   return text;
 }
 

@@ -2,6 +2,7 @@
 #include "graph/language/schema.hpp"
 
 #include <algorithm>
+#include <array>
 #include <regex>
 #include <valijson/adapters/nlohmann_json_adapter.hpp>
 #include <valijson/schema.hpp>
@@ -17,9 +18,10 @@ namespace {
 using nlohmann::json;
 
 const json& schema_json(Schema schema) {
-  static const json graph = json::parse(schema_text(Schema::graph));
-  static const json schedule = json::parse(schema_text(Schema::schedule));
-  return schema == Schema::graph ? graph : schedule;
+  static const std::array<json, kSchemas> parsed{json::parse(schema_text(Schema::graph)),
+                                                 json::parse(schema_text(Schema::schedule)),
+                                                 json::parse(schema_text(Schema::faults))};
+  return parsed[static_cast<size_t>(schema)];
 }
 
 const valijson::Schema& compiled(Schema schema) {
@@ -30,8 +32,8 @@ const valijson::Schema& compiled(Schema schema) {
     parser.populateSchema(adapter, *result);
     return result;
   };
-  static const auto graph = compile(Schema::graph), schedule = compile(Schema::schedule);
-  return schema == Schema::graph ? *graph : *schedule;
+  static const std::array compiled{compile(Schema::graph), compile(Schema::schedule), compile(Schema::faults)};
+  return *compiled[static_cast<size_t>(schema)];
 }
 
 bool is_of_type(const json& value, const std::string& type) {
@@ -186,12 +188,15 @@ class Explainer {
       words.push_back(pointer.substr(at + 1, end - at - 1));
       at = end;
     }
-    const std::string whole = which_ == Schema::graph ? "the graph" : "the schedule";
+    static constexpr std::array kWholes{"the graph", "the schedule", "the scenario"};
+    const std::string whole = kWholes[static_cast<size_t>(which_)];
     if (words.empty()) return whole;
     if (words.size() == 1) return ticked(words[0]) + " of " + whole;
     static const std::map<std::string, std::string> kinds{{"devices", "device "},       {"profiles", "profile "},
                                                           {"subsystems", "subsystem "}, {"chains", "chain "},
-                                                          {"modes", "mode "},           {"nodes", "the entry of "}};
+                                                          {"modes", "mode "},           {"nodes", "the entry of "},
+                                                          {"expect", "expectation "},    {"faults", ""}};
+    if (words[0] == "faults") words[1] = "faults[" + words[1] + "]";
     const auto kind = kinds.find(words[0]);
     std::string text = (kind == kinds.end() ? words[0] + " " : kind->second) + ticked(words[1]);
     size_t next = 2;

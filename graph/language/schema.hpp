@@ -8,7 +8,8 @@
 
 namespace takt::graph {
 
-enum class Schema : uint8_t { graph, schedule };
+enum class Schema : uint8_t { graph, schedule, faults };
+inline constexpr size_t kSchemas = 3;
 
 /// The schema's text as it is shipped to editors.
 std::string_view schema_text(Schema schema);

@@ -14,7 +14,19 @@
 
 namespace takt {
 
+class Job;
 class Node;
+
+/// What may come between the runtime and the jobs of one node when faults are injected (rt/faults). Called by the
+/// thread that runs the job: it keeps the rules of a job, but for the time it takes.
+class Disturbance {
+ public:
+  virtual ~Disturbance() = default;
+  /// False: the job released then does not take place, as if its process were gone: released, never completed.
+  virtual bool admits(int64_t release_ns) = 0;
+  /// Right before Node::run; what it takes is part of the job.
+  virtual void before_run(const Job& job) = 0;
+};
 
 enum class Policy : uint8_t { deadline, fixed, cooperative };
 enum class Criticality : uint8_t { low, high };
@@ -60,6 +72,7 @@ struct TaskPlan {
   std::vector<EdgePlan> edges;
   std::vector<std::vector<size_t>> joins;  ///< groups of indexes into Node::inputs()
   std::vector<size_t> ports;               ///< per output of the node: index into Plan::ports
+  Disturbance* disturbance = nullptr;      ///< null: none
 };
 
 /// A mode that the run can change to: the tasks it leaves out are paused and keep what they have reserved.

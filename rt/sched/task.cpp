@@ -127,6 +127,7 @@ TAKT_HOT int64_t Task::begin(uint64_t index, int64_t release_ns, int64_t duratio
   take_mail();
   // Which releases a mode leaves out is known from outside, but for those that a producer causes.
   if (!mode.runs) return pass_over(started, !plan_.rate), 0;
+  if (plan_.disturbance != nullptr && !plan_.disturbance->admits(release_ns)) return pass_over(started, false), 0;
   latch_.acquire_requests(release_ns, started);
   if (!wanted(index)) {
     latch_.release();
@@ -183,6 +184,7 @@ TAKT_HOT void Task::work(Job& job, int64_t release_ns) {
   if (watch_ != nullptr)
     watch_->begin(member_, job.index(), release_ns, last_thread_use_ns() + enforced_budget_ns(plan_));
   try {
+    if (plan_.disturbance != nullptr) plan_.disturbance->before_run(job);
     plan_.node->run(job);
   } catch (const std::exception& problem) {
     tell_exception(job, problem.what());

@@ -2,7 +2,9 @@
 // Damaged files: nothing crashes, every failure stands somewhere, and our words agree with the JSON Schema library.
 #include <fmt/format.h>
 
+#include <array>
 #include <random>
+#include <utility>
 
 #include "../../unit/language/fixture.hpp"
 #include "graph/language/quantity.hpp"
@@ -97,12 +99,30 @@ TEST_CASE("Deep nesting and aliases end in an error, not in a crash") {
   }
 }
 
+const std::string kScenario = R"(takt: 1
+name: go
+seed: 7
+faults:
+  - {kind: drop, target: camera.pair, from: 2s, to: 4s, probability: 0.5}
+  - {kind: cpu_hog, threads: 2, policy: fixed}
+  - {kind: full_disk, megabytes: 2}
+expect:
+  modes: [full, no_stereo]
+  rates: {stereo: 14.5, planner: {at_least: 1, at_most: 2}}
+  ages: {reaction: 300ms}
+  recovery: 2s
+  lost: 0
+  exit: 0
+)";
+
 TEST_CASE("Our explanation and the JSON Schema library agree on what is valid") {
   std::mt19937 random(13);
   size_t valid = 0, invalid = 0;
-  for (int i = 0; i < 2500; ++i) {
-    const Schema schema = i % 2 == 0 ? Schema::graph : Schema::schedule;
-    const std::string text = mutated(schema == Schema::graph ? kGraph : kSchedule, random);
+  for (int i = 0; i < 3750; ++i) {
+    const std::array sources{std::pair(Schema::graph, kGraph), std::pair(Schema::schedule, kSchedule),
+                             std::pair(Schema::faults, kScenario)};
+    const auto& [schema, sound] = sources[static_cast<size_t>(i) % sources.size()];
+    const std::string text = mutated(sound, random);
     CAPTURE(text);
     std::vector<Problem> reading, problems;
     const Document document = parse_document(text, "f.yaml", ".", reading);

@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "rt/faults/faulty_writer.hpp"
+
+#include <algorithm>
+
+#include "rt/faults/damage.hpp"
+#include "rt/msg/scalar.hpp"
+
+namespace takt::faults {
+namespace {
+
+constexpr size_t kMostListed = 64;
+
+void add(std::atomic<uint64_t>& counter) { counter.fetch_add(1, std::memory_order_relaxed); }
+
+}  // namespace
+
+KeptMessage::KeptMessage(const PortPlan& port)
+    : type_(port.type), memory_(aligned_bytes(port.type->bytes(port.capacity))) {
+  type_->place(memory_.get(), port.capacity);
+}
+
+void KeptMessage::keep(const void* message, int64_t stamp_ns) {
+  copy_used(*type_, message, memory_.get());
+  stamp_ns_ = stamp_ns;
+  full_ = true;
+}
+
+void KeptMessage::write_to(void* message) const { copy_used(*type_, memory_.get(), message); }
+
+Hoard::Hoard(std::unique_ptr<Reader> reader, uint32_t chunks)
+    : reader_(std::move(reader)), listed_(kMostListed), held_(chunks) {}
+
+void Hoard::grab() {
+  const size_t listed = reader_->list(kForever, listed_);
+  for (size_t i = listed; i-- > 0 && count_ < held_.size();) {
+    if (listed_[i].sequence <= newest_) continue;
+    newest_ = listed_[i].sequence;
+    if (const Held held = reader_->take(newest_)) held_[count_++] = held;
+  }
+}
+
+void Hoard::let_go() {
+  while (count_ > 0) reader_->release(held_[--count_]);
+}
+
+FaultyWriter::FaultyWriter(std::unique_ptr<Writer> inner, std::vector<Strike> strikes, const Clock& clock,
+                           const std::atomic<int64_t>& epoch_ns, std::atomic<uint64_t>& offered)
+    : inner_(std::move(inner)), strikes_(std::move(strikes)), clock_(clock), epoch_ns_(epoch_ns), offered_(offered) {}
+
+FaultyWriter::~FaultyWriter() {
+  for (Strike& strike : strikes_) strike.hoard.let_go();
+}
+
+bool FaultyWriter::covers(const Strike& strike, int64_t now_ns) const {
+  const int64_t epoch = epoch_ns_.load(std::memory_order_relaxed);
+  return epoch != 0 && strike.fault.covers(now_ns - epoch);
+}
+
+void FaultyWriter::hoard(int64_t now_ns) {
+  for (Strike& strike : strikes_) {
+    if (strike.fault.kind != MessageFaultKind::exhaust) continue;
+    if (covers(strike, now_ns)) strike.hoard.grab();
+    else strike.hoard.let_go();
+  }
+}
+
+MessageHeader* FaultyWriter::loan() {
+  const int64_t now = clock_.now_ns();
+  hoard(now);
+  loaned_ = inner_->loan();
+  if (loaned_ != nullptr) return loaned_;
+  for (Strike& strike : strikes_)
+    if (strike.fault.kind == MessageFaultKind::exhaust && covers(strike, now)) add(strike.count->struck);
+  return nullptr;
+}
+
+void FaultyWriter::publish(int64_t stamp_ns, int64_t published_ns, int64_t visible_at_ns) {
+  if (loaned_ == nullptr) return;
+  Draft draft;
+  draft.number = offered_.fetch_add(1, std::memory_order_relaxed) + 1;
+  draft.stamp_ns = stamp_ns;
+  draft.published_ns = published_ns;
+  draft.visible_at_ns = visible_at_ns;
+  for (Strike& strike : strikes_)
+    if (!draft.withheld) apply(strike, draft);
+  send(draft);
+  hoard(published_ns);
+}
+
+void FaultyWriter::apply(Strike& strike, Draft& draft) {
+  const MessageFault& fault = strike.fault;
+  const bool covered = covers(strike, draft.published_ns);
+  if (fault.kind == MessageFaultKind::freeze && !covered) strike.kept.forget();
+  const bool struck = covered && strikes(fault, draft.number);
+  if (fault.kind == MessageFaultKind::reorder) return swap(strike, draft, struck);
+  if (!struck) return;
+  const uint64_t seed = mixed(fault.seed, fault.port, ~draft.number);
+  const MessageType& type = *strike.type;
+  switch (fault.kind) {
+    case MessageFaultKind::drop: draft.withheld = true; break;
+    case MessageFaultKind::delay: draft.visible_at_ns += fault.by_ns; break;
+    case MessageFaultKind::duplicate: draft.twice = &strike; break;
+    case MessageFaultKind::clock_step: draft.stamp_ns += fault.by_ns; break;
+    case MessageFaultKind::freeze: return freeze(strike, draft);
+    case MessageFaultKind::corrupt:
+      if (!corrupt(type, loaned_ + 1, seed)) return;
+      break;
+    case MessageFaultKind::truncate:
+      if (!truncate(type, loaned_ + 1, seed)) return;
+      break;
+    case MessageFaultKind::reorder:
+    case MessageFaultKind::exhaust: return;  // strikes elsewhere
+  }
+  add(strike.count->struck);
+  if (fault.kind == MessageFaultKind::drop) add(strike.count->withheld);
+}
+
+void FaultyWriter::freeze(Strike& strike, Draft& draft) {
+  if (!strike.kept.full()) return strike.kept.keep(loaned_ + 1, draft.stamp_ns);
+  strike.kept.write_to(loaned_ + 1);
+  add(strike.count->struck);
+}
+
+void FaultyWriter::swap(Strike& strike, Draft& draft, bool struck) {
+  if (strike.kept.full()) {
+    draft.released_after = &strike;
+    return;
+  }
+  if (!struck) return;
+  strike.kept.keep(loaned_ + 1, draft.stamp_ns);
+  draft.withheld = true;
+  add(strike.count->struck);
+  add(strike.count->withheld);
+}
+
+void FaultyWriter::send(const Draft& draft) {
+  MessageHeader* const loaned = loaned_;
+  loaned_ = nullptr;
+  if (draft.withheld) return inner_->discard();
+  const int32_t level = loaned->level;
+  inner_->publish(draft.stamp_ns, draft.published_ns, draft.visible_at_ns);
+  if (draft.twice != nullptr && inner_->repeat(draft.published_ns, draft.visible_at_ns)) add(draft.twice->count->added);
+  if (draft.released_after != nullptr) follow_up(*draft.released_after, draft, level);
+}
+
+void FaultyWriter::follow_up(Strike& strike, const Draft& draft, int32_t level) {
+  strike.kept.forget();
+  MessageHeader* header = inner_->loan();
+  if (header == nullptr) return;  // it stays withheld, and is counted so
+  strike.kept.write_to(header + 1);
+  header->level = level;
+  inner_->publish(strike.kept.stamp_ns(), draft.published_ns, draft.visible_at_ns);
+  add(strike.count->added);
+}
+
+void FaultyWriter::discard() {
+  loaned_ = nullptr;
+  inner_->discard();
+}
+
+bool FaultyWriter::repeat(int64_t published_ns, int64_t visible_at_ns) {
+  // A message that is not the node's own work: the windows that keep messages away hold for it, too.
+  const uint64_t number = offered_.load(std::memory_order_relaxed) + 1;
+  bool repeated = false;
+  MessageFaultCount* dropped = nullptr;
+  for (Strike& strike : strikes_) {
+    if (!covers(strike, published_ns) || !strikes(strike.fault, number)) continue;
+    if (strike.fault.kind == MessageFaultKind::delay) visible_at_ns += strike.fault.by_ns;
+    if (strike.fault.kind == MessageFaultKind::drop) dropped = strike.count;
+  }
+  if (dropped == nullptr) repeated = inner_->repeat(published_ns, visible_at_ns);
+  if (dropped == nullptr && !repeated) return false;
+  offered_.fetch_add(1, std::memory_order_relaxed);
+  if (dropped == nullptr) return true;
+  add(dropped->struck);
+  add(dropped->withheld);
+  return false;
+}
+
+}  // namespace takt::faults

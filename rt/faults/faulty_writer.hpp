@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+// Internal to rt/faults: the writer of an output that faults strike.
+#pragma once
+#include <vector>
+
+#include "rt/faults/faulty_transport.hpp"
+#include "rt/memory/aligned_bytes.hpp"
+
+namespace takt::faults {
+
+/// A message kept outside of the pools; its memory is there before the first job.
+class KeptMessage {
+ public:
+  KeptMessage() = default;
+  explicit KeptMessage(const PortPlan& port);
+  void keep(const void* message, int64_t stamp_ns);
+  /// Writes the kept content over a message of the same port.
+  void write_to(void* message) const;
+  void forget() { full_ = false; }
+  bool full() const { return full_; }
+  int64_t stamp_ns() const { return stamp_ns_; }
+
+ private:
+  const MessageType* type_ = nullptr;
+  AlignedBytes memory_;
+  int64_t stamp_ns_ = 0;
+  bool full_ = false;
+};
+
+/// Holds what it can get of an output, as a consumer does that takes messages and never gives them back.
+class Hoard {
+ public:
+  Hoard() = default;
+  Hoard(std::unique_ptr<Reader> reader, uint32_t chunks);
+  /// Takes every message that can be had.
+  void grab();
+  void let_go();
+
+ private:
+  std::unique_ptr<Reader> reader_;
+  std::vector<Candidate> listed_;
+  std::vector<Held> held_;
+  size_t count_ = 0;
+  uint64_t newest_ = 0;
+};
+
+class FaultyWriter final : public Writer {
+ public:
+  /// One fault with what it needs to remember.
+  struct Strike {
+    MessageFault fault;
+    const MessageType* type = nullptr;
+    MessageFaultCount* count = nullptr;
+    KeptMessage kept;  ///< of freeze and reorder
+    Hoard hoard;       ///< of exhaust
+  };
+
+  FaultyWriter(std::unique_ptr<Writer> inner, std::vector<Strike> strikes, const Clock& clock,
+               const std::atomic<int64_t>& epoch_ns, std::atomic<uint64_t>& offered);
+  ~FaultyWriter() override;
+
+  MessageHeader* loan() override;
+  void publish(int64_t stamp_ns, int64_t published_ns, int64_t visible_at_ns) override;
+  void discard() override;
+  bool repeat(int64_t published_ns, int64_t visible_at_ns) override;
+  WriterStatistics statistics() const override { return inner_->statistics(); }
+
+ private:
+  /// A message on its way, and what the faults have made of it.
+  struct Draft {
+    uint64_t number = 0;  ///< from 1 on
+    int64_t stamp_ns = 0, published_ns = 0, visible_at_ns = 0;
+    bool withheld = false;             ///< not published
+    Strike* twice = nullptr;           ///< ... by this fault
+    Strike* released_after = nullptr;  ///< the message it holds back follows this one
+  };
+  bool covers(const Strike& strike, int64_t now_ns) const;
+  void apply(Strike& strike, Draft& draft);
+  void swap(Strike& strike, Draft& draft, bool struck);
+  void freeze(Strike& strike, Draft& draft);
+  void send(const Draft& draft);
+  void follow_up(Strike& strike, const Draft& draft, int32_t level);
+  void hoard(int64_t now_ns);
+
+  const std::unique_ptr<Writer> inner_;
+  std::vector<Strike> strikes_;
+  const Clock& clock_;
+  const std::atomic<int64_t>& epoch_ns_;
+  std::atomic<uint64_t>& offered_;
+  MessageHeader* loaned_ = nullptr;
+};
+
+}  // namespace takt::faults
