@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <csignal>
 #include <cstdio>
 #include <cstring>
 #include <ctime>
@@ -20,6 +21,7 @@
 #include "graph/command/report.hpp"
 #include "graph/command/run_support.hpp"
 #include "graph/command/run_trace.hpp"
+#include "graph/command/run_watchdog.hpp"
 #include "rt/memory/sanitized.hpp"
 #include "rt/sched/executor.hpp"
 #include "rt/shm/iceoryx_preflight.hpp"
@@ -84,9 +86,11 @@ std::vector<std::vector<size_t>> tasks_of(const Plan& plan, const graph::Partiti
 
 class IsolatedRun {
  public:
-  IsolatedRun(const RunOptions& options, const graph::GraphSpec& graph, std::vector<std::string> adjusted)
+  IsolatedRun(const RunOptions& options, const graph::GraphSpec& graph, RunFaults& faults,
+              std::vector<std::string> adjusted)
       : options_(options),
         graph_(graph),
+        faults_(faults),
         adjusted_(std::move(adjusted)),
         plan_source_(graph::outline(graph, graph::node_types(), clock_)),
         plan_(plan_source_.plan),
@@ -108,7 +112,7 @@ class IsolatedRun {
     for (size_t p = 0; p < partition_.names.size(); ++p)
       group_.start(partition_.names[p], [this, p, supervisor = getpid()]() -> int {
         try {
-          return run_member(options_, graph_, partition_, p, supervisor, board_, pools_, trace_.rings());
+          return run_member({options_, graph_, partition_, p, supervisor, board_, pools_, trace_.rings(), faults_});
         } catch (const std::exception& problem) {  // as in a run in one process: no memory, no daemon, no thread
           return refuse(fmt::format("process {}: {}", partition_.names[p], problem.what()), kDeviceOrSystem);
         }
@@ -117,11 +121,13 @@ class IsolatedRun {
     wait_for_all(ProcessRecord::composed);
     BoardExchange exchange(board_);
     graph::complete(plan_, exchange, observers(options_));
+    faults_.make_room(plan_);
     if (const int code = again() ? kOk : admit(options_, graph_, plan_, adjusted_); code != kOk) throw Refused{code};
     const CpuLatencyHold latency = hold_cpu_dma_latency();
     tell_lacks(latency);
     bring_up_transport();
     agree_on_policy();
+    faults_.disturb_disk(record_, clock_, board_);
     if (!again()) record_.begin(graph_, plan_, board_, *transport_, "subsystem");
     else if (record_.wanted()) adjusted_.push_back("the record ends where the group of processes was lost");
     trace_.collect(plan_, record_);
@@ -139,7 +145,10 @@ class IsolatedRun {
                            fmt::format("takt run {} ({}, policy {}, {} processes)", graph_.name, graph_.profile,
                                        to_string(plan_.policy), group_.size()));
       const DaemonProbe probe(*transport_, board_.group(), clock_);
+      watchdog_.emplace(options_, plan_, board_);
+      faults_.begin(plan_, clock_, board_);
       watch();
+      faults_.end();
     }
     MachineUse use = use_of_all();
     use.steal_ms -= steal_before_ms;
@@ -200,11 +209,11 @@ class IsolatedRun {
       if (ending_) continue;
       code_ = std::max(code_, end->signal != 0 ? static_cast<int>(kDeviceOrSystem) : end->code);
       if (end->signal != 0)
-        faults_.push_back(fmt::format("process {} was ended by signal {} ({})", group_.name(end->process), end->signal,
-                                      strsignal(end->signal)));
+        problems_.push_back(fmt::format("process {} was ended by signal {} ({})", group_.name(end->process),
+                                        end->signal, strsignal(end->signal)));
       else if (board_.process(end->process).problems.load() == 0)
-        faults_.push_back(fmt::format("process {} ended with code {}", group_.name(end->process), end->code));
-      for (; told_ < faults_.size(); ++told_) std::fprintf(stderr, "takt: error: %s\n", faults_[told_].c_str());
+        problems_.push_back(fmt::format("process {} ended with code {}", group_.name(end->process), end->code));
+      for (; told_ < problems_.size(); ++told_) std::fprintf(stderr, "takt: error: %s\n", problems_[told_].c_str());
     }
     return code_ != 0;
   }
@@ -267,16 +276,35 @@ class IsolatedRun {
     wait_until([&] {
       supervisor_->look();
       const int64_t now = clock_.now_ns(), end = board_.stop().end_ns();
+      if (now < end) strike(now);
+      watchdog_->tick(now);
       if (give_up_ns == INT64_MAX && now > end) {
         supervisor_->let_end();
         give_up_ns = now + kPatienceNs;
       }
       if (now <= give_up_ns || group_.alive() == 0) return group_.alive() == 0;
       for (size_t p = 0; p < group_.size(); ++p)
-        if (group_.pid(p) != 0) faults_.push_back(fmt::format("process {} did not end and was killed", group_.name(p)));
+        if (group_.pid(p) != 0)
+          problems_.push_back(fmt::format("process {} did not end and was killed", group_.name(p)));
       group_.kill_all();
       give_up_ns = now + kPatienceNs;
       return false;
+    });
+  }
+
+  /// What a scenario has in store for the processes.
+  void strike(int64_t now_ns) {
+    for (const graph::ProcessStrike& strike : faults_.due(now_ns)) {
+      const auto named = std::find(partition_.names.begin(), partition_.names.end(), strike.process);
+      const auto p = static_cast<size_t>(named - partition_.names.begin());
+      if (p == partition_.names.size() || group_.pid(p) == 0) continue;  // away already
+      const bool kills = strike.kind == graph::FaultKind::kill;
+      kill(group_.pid(p), kills ? SIGKILL : SIGSTOP);
+      faults_.count(strike);
+      if (!kills) stopped_.push_back({group_.pid(p), now_ns + strike.for_ns});
+    }
+    std::erase_if(stopped_, [&](const auto& stopped) {
+      return now_ns >= stopped.second && (kill(stopped.first, SIGCONT), true);
     });
   }
 
@@ -301,20 +329,25 @@ class IsolatedRun {
     record_.finish(result);
     auto report = make_report({graph_, plan_, board_, result, *transport_, use, options_.clock,
                                std::string(to_string(plan_.policy)), "subsystem", partition_.names, adjusted_});
-    for (const std::string& fault : faults_) report["faults"].push_back({{"what", fault}});
+    for (const std::string& problem : problems_) report["faults"].push_back({{"what", problem}});
     add_outages(board_.outages(), partition_.names, plan_, tasks_of(plan_, partition_), result, report);
-    if (!faults_.empty() || board_.outages().size() > 0) report["ok"] = false;
+    if (!problems_.empty() || board_.outages().size() > 0) report["ok"] = false;
     if (supervisor_->gave_up()) code_ = kDeviceOrSystem;
     record_.tell(report);
-    const int told = tell(options_, graph_, report);
+    const int exit = code_ != 0 ? code_ : report["ok"].get<bool>() ? kOk : kNotOk;
+    faults_.judge(result, board_, exit, partition_.names, report);
+    watchdog_->end();
+    tell(options_, graph_, report);
     if (!no_trace.empty()) return refuse(no_trace, kBadInput);
-    return code_ != 0 ? code_ : told;
+    return faults_.exit_code(exit, report);
   }
 
   std::unique_ptr<DaemonClaim> claim_;  ///< of iceoryx, until its daemon is there
   const RunOptions& options_;
   const graph::GraphSpec& graph_;
-  std::vector<std::string> adjusted_, faults_;
+  RunFaults& faults_;
+  std::vector<std::string> adjusted_, problems_;
+  std::vector<std::pair<pid_t, int64_t>> stopped_;  ///< processes, and when they go on
   MonotonicClock clock_;
   graph::Composition plan_source_;  ///< shells of all nodes; the plan points into them
   Plan& plan_;
@@ -332,12 +365,14 @@ class IsolatedRun {
   RunTrace trace_;                        ///< speaks to the record
   ProcessGroup group_;                    ///< its members end before what they share
   std::optional<Supervisor> supervisor_;  ///< of the group
+  std::optional<RunWatchdog> watchdog_;
 };
 
 }  // namespace
 
-int run_isolated(const RunOptions& options, const graph::GraphSpec& graph, std::vector<std::string> adjusted) {
-  IsolatedRun run(options, graph, std::move(adjusted));
+int run_isolated(const RunOptions& options, const graph::GraphSpec& graph, RunFaults& faults,
+                 std::vector<std::string> adjusted) {
+  IsolatedRun run(options, graph, faults, std::move(adjusted));
   const auto as_supervisor = [&, keeper = getpid()] {
     try {
       return run.run(keeper);

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "graph/command/run_command.hpp"
+#include "graph/command/run_faults.hpp"
 
 namespace takt::command {
 
@@ -11,6 +12,7 @@ namespace takt::command {
 /// daemon), the epoch, the report, and the order in which everything ends; returns the exit code. Before this process
 /// has any other thread. Throws TransportError if the command line asks for iceoryx and there is no room for its
 /// daemon.
-int run_isolated(const RunOptions& options, const graph::GraphSpec& graph, std::vector<std::string> adjusted);
+int run_isolated(const RunOptions& options, const graph::GraphSpec& graph, RunFaults& faults,
+                 std::vector<std::string> adjusted);
 
 }  // namespace takt::command

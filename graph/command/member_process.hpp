@@ -3,6 +3,7 @@
 #include <functional>
 
 #include "graph/command/run_command.hpp"
+#include "graph/command/run_faults.hpp"
 #include "graph/compose/composition.hpp"
 #include "graph/compose/partition.hpp"
 #include "rt/sched/run_board.hpp"
@@ -25,10 +26,21 @@ class BoardExchange final : public graph::CapacityExchange {
 /// Polls every millisecond until `done` or, where given, `broken`; true if done.
 bool wait_until(const std::function<bool()>& done, const std::function<bool()>& broken = {});
 
+/// What one process of an isolated run is given.
+struct MemberPart {
+  const RunOptions& options;
+  const graph::GraphSpec& graph;
+  const graph::Partition& partition;
+  size_t process = 0;  ///< index into partition.names
+  int supervisor = 0;  ///< the process whose daemon it may have to join
+  RunBoard& board;
+  const PoolFile& pools;
+  trace::Rings* rings = nullptr;  ///< null: not traced
+  RunFaults& faults;
+};
+
 /// One process of an isolated run, as the supervisor's fork enters it: composes its part, joins the transport that the
-/// board names (the daemon of process `supervisor`, or `pools`), runs until the board's stop, traced into `rings` if it
-/// is not null. Returns the exit code.
-int run_member(const RunOptions& options, const graph::GraphSpec& graph, const graph::Partition& partition,
-               size_t process, int supervisor, RunBoard& board, const PoolFile& pools, trace::Rings* rings);
+/// board names, runs until the board's stop. Returns the exit code.
+int run_member(const MemberPart& part);
 
 }  // namespace takt::command

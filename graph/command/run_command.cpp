@@ -44,8 +44,9 @@ int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, st
   if (!durations) return refuse(durations.error(), kBadInput);
   RunBoard board(composition.plan);
   RunRecord record(options, composition.plan);
-  const auto transport = faults.inject(make_transport(options.transport, composition.plan), composition.plan,
-                                       *prepared.clock, board, record);
+  faults.disturb_disk(record, *prepared.clock, board);
+  const auto transport =
+      faults.inject(make_transport(options.transport, composition.plan), composition.plan, *prepared.clock, board);
   RunTrace trace(options, composition.plan);  // ends first: it speaks to the record
   Executor::Options run;
   run.duration_ns = static_cast<int64_t>(options.duration_s * 1e9);
@@ -108,7 +109,7 @@ int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, st
                            {"cores", composition.plan.cores.size()},
                            {"durations", options.durations}};
   record.tell(report);
-  faults.judge(result, board, run_exit(board, result.policy_granted, report), report);
+  faults.judge(result, board, run_exit(board, result.policy_granted, report), {}, report);
   int code = tell_faults(options, graph, board, result.policy_granted, report);
   code = faults.exit_code(code, report);
   if (!no_trace.empty()) code = refuse(no_trace, kBadInput);
@@ -117,9 +118,8 @@ int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, st
   return code;
 }
 
-int run_in_one_process(const RunOptions& options, Prepared& prepared, std::vector<std::string> adjusted) {
-  RunFaults faults(options);
-  if (const int code = faults.load(*prepared.graph, *prepared.clock); code != kOk) return code;
+int run_in_one_process(const RunOptions& options, Prepared& prepared, RunFaults& faults,
+                       std::vector<std::string> adjusted) {
   graph::ComposeOptions how;
   how.output = options.output;
   how.seed = options.seed;
@@ -162,11 +162,12 @@ int run_as_asked(RunOptions options) {
     if (!lacks.empty())
       return refuse("--require-rt: this machine lacks (see `takt doctor`)\n" + lacks, kDeviceOrSystem);
   }
-  if (wanted != "subsystem" || options.clock == "virtual") return run_in_one_process(options, prepared, adjusted);
-  if (!options.faults.empty())
-    return refuse("--faults: processes cannot be given faults yet; add --isolate none or --clock virtual", kBadInput);
+  const bool processes = wanted == "subsystem" && options.clock != "virtual";
+  RunFaults faults(options);
+  if (const int code = faults.load(*prepared.graph, *prepared.clock, processes); code != kOk) return code;
+  if (!processes) return run_in_one_process(options, prepared, faults, adjusted);
   const KeptPlace report(options.report), page(options.html), trace(options.trace), record(options.record);
-  return run_isolated(options, *prepared.graph, std::move(adjusted));
+  return run_isolated(options, *prepared.graph, faults, std::move(adjusted));
 }
 
 }  // namespace

@@ -1,20 +1,59 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "graph/command/run_faults.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <chrono>
 #include <condition_variable>
 #include <cstdio>
 #include <mutex>
+#include <utility>
 
 #include "graph/command/prepare.hpp"
 
 namespace takt::command {
 
-int RunFaults::load(const graph::GraphSpec& graph, const Clock& clock) {
+namespace {
+
+/// Writes the failures of devices into their settings, as their simulated drivers read them.
+int fail_devices(const graph::Scenario& scenario, graph::GraphSpec& graph) {
+  for (const graph::DeviceFailure& failure : graph::device_failures(scenario)) {
+    const auto device = std::find_if(graph.devices.begin(), graph.devices.end(),
+                                     [&](const graph::DeviceSpec& d) { return d.id == failure.device; });
+    if (device->driver != "sim")
+      return refuse(fmt::format("--faults: device {} has the driver {}, which cannot be told to fail; only `sim` can",
+                                failure.device, device->driver),
+                    kBadInput);
+    // Beyond any run, and still a time that can be added to.
+    constexpr int64_t kNever = 1'000'000'000LL * 86'400 * 365;
+    const std::string more = fmt::format("{} {}ms..{}ms", graph::info(failure.kind).name, failure.from_ns / 1'000'000,
+                                         std::min(failure.to_ns, kNever) / 1'000'000);
+    const std::string had = device->settings.value("failures", "");
+    device->settings["failures"] = had.empty() ? more : had + ", " + more;
+  }
+  return kOk;
+}
+
+std::vector<graph::Restart> restarts_of(const OutageLog& outages, const std::vector<std::string>& processes,
+                                        const RunResult& result) {
+  std::vector<graph::Restart> restarts;
+  for (size_t i = 0; i < outages.size(); ++i) {
+    const int64_t back_ns = outages[i].back_ns > 0 ? outages[i].back_ns : result.end_ns;
+    restarts.push_back(
+        {processes[outages[i].process], outages[i].from_ns - result.epoch_ns, back_ns - result.epoch_ns});
+  }
+  return restarts;
+}
+
+}  // namespace
+
+int RunFaults::load(graph::GraphSpec& graph, const Clock& clock, bool processes) {
   if (!wanted()) return kOk;
   const graph::Composition outline = graph::outline(graph, graph::node_types(), clock);
   graph::RunKind kind;
   kind.virtual_time = clock.is_virtual();
+  kind.processes = processes;
   kind.iceoryx = options_.transport == "iceoryx";
   kind.records = !options_.record.empty();
   auto loaded = graph::load_scenario(options_.faults, graph, outline.plan, kind);
@@ -23,11 +62,9 @@ int RunFaults::load(const graph::GraphSpec& graph, const Clock& clock) {
     tell_problems(loaded.problems.size());
     return kBadInput;
   }
-  if (const auto failures = graph::device_failures(*loaded.scenario); !failures.empty())
-    return refuse(
-        "--faults: no driver of this build can be told to fail; take the fault of " + failures[0].device + " out",
-        kBadInput);
-  injection_ = std::make_unique<graph::Injection>(std::move(*loaded.scenario), graph);
+  if (const int code = fail_devices(*loaded.scenario, graph); code != kOk) return code;
+  injection_ =
+      std::make_unique<graph::Injection>(std::move(*loaded.scenario), graph, outline.plan.ports.size(), processes);
   return kOk;
 }
 
@@ -36,11 +73,26 @@ void RunFaults::make_room(Plan& plan) const {
 }
 
 std::unique_ptr<Transport> RunFaults::inject(std::unique_ptr<Transport> transport, Plan& plan, const Clock& clock,
-                                             RunBoard& board, RunRecord& record) {
+                                             RunBoard& board) {
   if (!injection_) return transport;
   injection_->disturb(plan, clock, board.epoch_ns());
-  record.on_disk([this, &clock, &board](mcap::Sink& file) { return injection_->disk(file, clock, board.epoch_ns()); });
   return injection_->wrap(std::move(transport), plan, clock, board.epoch_ns());
+}
+
+void RunFaults::disturb_disk(RunRecord& record, const Clock& clock, RunBoard& board) {
+  if (!injection_) return;
+  record.on_disk([this, &clock, &board](mcap::Sink& file) { return injection_->disk(file, clock, board.epoch_ns()); });
+}
+
+std::vector<graph::ProcessStrike> RunFaults::due(int64_t now_ns) {
+  if (!injection_ || board_ == nullptr) return {};
+  const int64_t epoch_ns = board_->epoch_ns().load();
+  std::vector<graph::ProcessStrike> due = injection_->due(now_ns - epoch_ns);
+  if (!std::exchange(asked_, true)) {  // a supervisor that took another one's place
+    constexpr int64_t kPast_ns = 500'000'000;
+    std::erase_if(due, [&](const graph::ProcessStrike& s) { return s.at_ns < now_ns - epoch_ns - kPast_ns; });
+  }
+  return due;
 }
 
 std::function<int64_t(size_t, uint64_t)> RunFaults::durations(std::function<int64_t(size_t, uint64_t)> inner,
@@ -79,7 +131,8 @@ void RunFaults::end() {
   injection_->end_loads();
 }
 
-void RunFaults::judge(const RunResult& result, const RunBoard& board, int exit, nlohmann::ordered_json& report) const {
+void RunFaults::judge(const RunResult& result, const RunBoard& board, int exit,
+                      const std::vector<std::string>& processes, nlohmann::ordered_json& report) const {
   if (!injection_) return;
   graph::RunEvents events;
   events.struck = injection_->struck();
@@ -88,8 +141,9 @@ void RunFaults::judge(const RunResult& result, const RunBoard& board, int exit, 
   events.end_ns = result.end_ns - result.epoch_ns;
   events.exit = exit;
   events.unaccounted = injection_->unaccounted([&](size_t port) { return board.port(port).writer.sent; });
-  for (const graph::ProcessStrike& strike : injection_->process_strikes())  // there are some in virtual time only
-    if (strike.at_ns < events.end_ns)
+  events.restarts = restarts_of(board.outages(), processes, result);
+  for (const graph::ProcessStrike& strike : injection_->process_strikes())
+    if (clock_->is_virtual() && strike.at_ns < events.end_ns)  // where a process only seems to be gone
       events.restarts.push_back({strike.process, strike.at_ns, strike.at_ns + strike.for_ns});
   const graph::Scenario& scenario = injection_->scenario();
   report["scenario"] = graph::scenario_json(scenario, events, graph::verdict(scenario, report, events));

@@ -18,14 +18,16 @@ class RunFaults {
  public:
   explicit RunFaults(const RunOptions& options) : options_(options) {}
   bool wanted() const { return !options_.faults.empty(); }
-  /// Before anything is opened. What is wrong is on stderr and the exit code returned.
-  int load(const graph::GraphSpec& graph, const Clock& clock);
-  /// Once the plan is composed, before it is admitted.
+  /// Before anything is opened and before there are other processes: devices that are to fail are told so in the graph.
+  /// What is wrong is on stderr and the exit code returned. `processes`: one per subsystem.
+  int load(graph::GraphSpec& graph, const Clock& clock, bool processes);
+  /// In every process: once the plan is composed, before the pools are made.
   void make_room(Plan& plan) const;
-
-  /// Before the executor is made: faults of jobs, of messages (the transport to be used), of the record's disk.
+  /// In every process, before the executor is made: faults of jobs and of messages; the transport to be used.
   std::unique_ptr<Transport> inject(std::unique_ptr<Transport> transport, Plan& plan, const Clock& clock,
-                                    RunBoard& board, RunRecord& record);
+                                    RunBoard& board);
+  /// Of the record's disk. Before it begins.
+  void disturb_disk(RunRecord& record, const Clock& clock, RunBoard& board);
   /// Virtual time: how long jobs are taken to need.
   std::function<int64_t(size_t, uint64_t)> durations(std::function<int64_t(size_t, uint64_t)> inner,
                                                      const Plan& plan) const;
@@ -33,9 +35,14 @@ class RunFaults {
   void begin(const Plan& plan, const Clock& clock, RunBoard& board);
   void look();
   void end();
+  /// Processes to be struck now, each told once; those of the past are passed over at the first call.
+  std::vector<graph::ProcessStrike> due(int64_t now_ns);
+  void count(const graph::ProcessStrike& strike) { injection_->count_strike(strike.fault); }
 
-  /// Judges the run and adds "scenario" to the report; `exit` is that of the run, had it no scenario.
-  void judge(const RunResult& result, const RunBoard& board, int exit, nlohmann::ordered_json& report) const;
+  /// Judges the run and adds "scenario" to the report; `exit` is that of the run, had it no scenario. `processes`:
+  /// names of those that the board's outages number.
+  void judge(const RunResult& result, const RunBoard& board, int exit, const std::vector<std::string>& processes,
+             nlohmann::ordered_json& report) const;
   /// The exit code of the run: `told`, unless a scenario decides it.
   int exit_code(int told, const nlohmann::ordered_json& report) const;
 
@@ -45,6 +52,7 @@ class RunFaults {
   std::optional<graph::HealthWatch> health_;
   const Clock* clock_ = nullptr;
   RunBoard* board_ = nullptr;
+  bool asked_ = false;  ///< due() has been called
   std::jthread looking_;
 };
 

@@ -42,13 +42,22 @@ std::vector<MessageFault> message_faults(const Scenario& scenario, const Plan& p
   return all;
 }
 
+/// Indexes into Scenario::faults.
+std::vector<size_t> faults_of_messages(const Scenario& scenario) {
+  std::vector<size_t> indexes;
+  for (size_t f = 0; f < scenario.faults.size(); ++f)
+    if (strikes_messages(scenario.faults[f].kind)) indexes.push_back(f);
+  return indexes;
+}
+
 }  // namespace
 
-Injection::Injection(Scenario scenario, const GraphSpec& graph)
-    : scenario_(std::move(scenario)), graph_(graph), struck_(scenario_.faults.size()) {
-  for (size_t f = 0; f < scenario_.faults.size(); ++f)
-    if (strikes_messages(scenario_.faults[f].kind)) message_faults_.push_back(f);
-  message_counts_ = std::vector<faults::MessageFaultCount>(message_faults_.size());
+Injection::Injection(Scenario scenario, const GraphSpec& graph, size_t ports, bool processes)
+    : scenario_(std::move(scenario)),
+      graph_(graph),
+      processes_(processes),
+      message_faults_(faults_of_messages(scenario_)),
+      counts_(scenario_.faults.size(), message_faults_.size(), ports) {
   plan_process_strikes();
   for (const FaultSpec& fault : scenario_.faults)
     for (const std::string& node : nodes_of(fault))
@@ -78,6 +87,13 @@ void Injection::plan_process_strikes() {
                    [](const ProcessStrike& a, const ProcessStrike& b) { return a.at_ns < b.at_ns; });
 }
 
+void Injection::add_all_of(const std::string& process, std::vector<std::string>& nodes) const {
+  for (const NodeSpec& node : graph_.nodes)
+    if (node.subsystem == process) nodes.push_back(node.id);
+  for (const DeviceSpec& device : graph_.devices)
+    if (process_of(graph_, device.id) == process) nodes.push_back(device.id);
+}
+
 std::vector<std::string> Injection::nodes_of(const FaultSpec& fault) const {
   std::vector<std::string> nodes;
   switch (info(fault.kind).target) {
@@ -86,24 +102,24 @@ std::vector<std::string> Injection::nodes_of(const FaultSpec& fault) const {
       if (fault.kind == FaultKind::exhausted_pool) nodes.push_back(fault.target.substr(0, fault.target.find('.')));
       break;
     case FaultTarget::node:
-    case FaultTarget::device: nodes.push_back(fault.target); break;
+    case FaultTarget::device:
+      if (fault.kind == FaultKind::hang && processes_) add_all_of(process_of(graph_, fault.target), nodes);
+      else nodes.push_back(fault.target);
+      break;
     case FaultTarget::process:
-      for (const ProcessStrike& strike : strikes_) {
-        if (&scenario_.faults[strike.fault] != &fault) continue;
-        for (const NodeSpec& node : graph_.nodes)
-          if (node.subsystem == strike.process) nodes.push_back(node.id);
-        for (const DeviceSpec& device : graph_.devices)
-          if (process_of(graph_, device.id) == strike.process) nodes.push_back(device.id);
-      }
+      for (const ProcessStrike& strike : strikes_)
+        if (&scenario_.faults[strike.fault] == &fault) add_all_of(strike.process, nodes);
   }
   return nodes;
 }
 
-void Injection::make_room(Plan& plan) const {
+void Injection::make_room(Plan& plan) {
   std::vector<double> rates(plan.ports.size());
   for (size_t t = 0; t < plan.tasks.size(); ++t)
     for (const size_t port : plan.tasks[t].ports) rates[port] = effective_rate_hz(plan, t);
   std::vector<MessageFault> known = message_faults(scenario_, plan);
+  ports_.clear();
+  for (const MessageFault& fault : known) ports_.push_back(fault.port);
   std::erase_if(known, [&](const MessageFault& fault) { return fault.port >= plan.ports.size(); });
   faults::make_room(plan.ports, known, rates);
 }
@@ -114,7 +130,7 @@ void Injection::disturb(Plan& plan, const Clock& clock, const std::atomic<int64_
   std::map<size_t, std::pair<std::vector<NodeFault>, std::vector<std::atomic<uint64_t>*>>> by_task;
   const auto add = [&](size_t task, size_t f, NodeFaultKind kind, int64_t from_ns, int64_t to_ns, int64_t by_ns) {
     by_task[task].first.push_back({kind, task, from_ns, to_ns, by_ns});
-    by_task[task].second.push_back(&struck_[f]);
+    by_task[task].second.push_back(&counts_.faults()[f]);
   };
   for (size_t t = 0; t < plan.tasks.size(); ++t) {
     for (size_t f = 0; f < scenario_.faults.size(); ++f) {
@@ -141,12 +157,8 @@ std::unique_ptr<Transport> Injection::wrap(std::unique_ptr<Transport> transport,
                                            const std::atomic<int64_t>& epoch_ns) {
   if (message_faults_.empty()) return transport;
   std::vector<MessageFault> all = message_faults(scenario_, plan);
-  ports_.clear();
-  for (const MessageFault& fault : all) ports_.push_back(fault.port);
-  auto wrapped = std::make_unique<faults::FaultyTransport>(std::move(transport), plan.ports, std::move(all), clock,
-                                                           epoch_ns, message_counts_);
-  transport_ = wrapped.get();
-  return wrapped;
+  return std::make_unique<faults::FaultyTransport>(std::move(transport), plan.ports, std::move(all), clock, epoch_ns,
+                                                   counts_.messages(), counts_.offered());
 }
 
 std::function<int64_t(size_t, uint64_t)> Injection::durations(std::function<int64_t(size_t, uint64_t)> inner,
@@ -172,7 +184,7 @@ std::unique_ptr<mcap::Sink> Injection::disk(mcap::Sink& inner, const Clock& cloc
     if (fault.kind == FaultKind::slow_disk) disk.bytes_per_s = fault.bytes_per_s;
     else disk.room_bytes = fault.bytes;
     disks.push_back(disk);
-    struck.push_back(&struck_[f]);
+    struck.push_back(&counts_.faults()[f]);
   }
   if (disks.empty()) return nullptr;
   const auto wait = [](int64_t ns) { std::this_thread::sleep_for(std::chrono::nanoseconds(ns)); };
@@ -193,7 +205,7 @@ void Injection::begin_loads(const std::atomic<int64_t>& epoch_ns) {
     load.fixed_priority = fault.fixed_policy;
     load.bytes = fault.bytes;
     loads.push_back(load);
-    struck.push_back(&struck_[f]);
+    struck.push_back(&counts_.faults()[f]);
   }
   if (!loads.empty()) loads_ = std::make_unique<faults::Loads>(std::move(loads), epoch_ns, std::move(struck));
 }
@@ -206,19 +218,18 @@ std::vector<ProcessStrike> Injection::due(int64_t until_ns) {
 
 std::vector<uint64_t> Injection::struck() const {
   std::vector<uint64_t> counts;
-  for (const auto& count : struck_) counts.push_back(count.load());
-  for (size_t m = 0; m < message_faults_.size(); ++m) counts[message_faults_[m]] += message_counts_[m].struck.load();
+  for (const auto& count : counts_.faults()) counts.push_back(count.load());
+  for (size_t m = 0; m < message_faults_.size(); ++m) counts[message_faults_[m]] += counts_.messages()[m].struck.load();
   return counts;
 }
 
 uint64_t Injection::unaccounted(const std::function<uint64_t(size_t port)>& sent) const {
-  if (transport_ == nullptr) return 0;
   std::map<size_t, std::pair<uint64_t, uint64_t>> balance;  // by port: came, went
   for (size_t m = 0; m < ports_.size(); ++m) {
     if (ports_[m] == kNone) continue;
-    balance.try_emplace(ports_[m], transport_->offered(ports_[m]), sent(ports_[m]));
-    balance[ports_[m]].first += message_counts_[m].added.load();
-    balance[ports_[m]].second += message_counts_[m].withheld.load();
+    balance.try_emplace(ports_[m], counts_.offered()[ports_[m]].load(), sent(ports_[m]));
+    balance[ports_[m]].first += counts_.messages()[m].added.load();
+    balance[ports_[m]].second += counts_.messages()[m].withheld.load();
   }
   uint64_t messages = 0;
   for (const auto& [port, sides] : balance) {

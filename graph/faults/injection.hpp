@@ -11,6 +11,7 @@
 #include "rt/faults/faulty_transport.hpp"
 #include "rt/faults/load.hpp"
 #include "rt/faults/node_faults.hpp"
+#include "rt/faults/strike_counts.hpp"
 #include "rt/record/faulty_sink.hpp"
 #include "rt/time/clock.hpp"
 
@@ -27,7 +28,9 @@ struct ProcessStrike {
 
 class Injection {
  public:
-  Injection(Scenario scenario, const GraphSpec& graph);
+  /// `ports` of the plan; `processes`: each subsystem is one, so that a node that hangs takes the others of its own
+  /// along. Before other processes of the run are forked: they share the counts.
+  Injection(Scenario scenario, const GraphSpec& graph, size_t ports, bool processes);
   ~Injection();
   Injection(const Injection&) = delete;
   Injection& operator=(const Injection&) = delete;
@@ -35,7 +38,7 @@ class Injection {
   const Scenario& scenario() const { return scenario_; }
 
   /// Once the ports are sized, before the pools are made: room for what the faults add to them.
-  void make_room(Plan& plan) const;
+  void make_room(Plan& plan);
   /// Puts the faults of jobs into the plan, to be called before the executor copies it. In virtual time so, too, the
   /// absence of killed processes. Clock, epoch (0: not known yet) and this outlive the run.
   void disturb(Plan& plan, const Clock& clock, const std::atomic<int64_t>& epoch_ns);
@@ -59,7 +62,7 @@ class Injection {
   /// How often each fault struck, by index; what that means is said by its kind. A process that was struck by somebody
   /// else is told here.
   std::vector<uint64_t> struck() const;
-  void count_strike(size_t fault) { struck_[fault].fetch_add(1); }
+  void count_strike(size_t fault) { counts_.faults()[fault].fetch_add(1); }
   /// Messages that nodes handed over and that were neither published nor withheld by a fault, and the other way round.
   uint64_t unaccounted(const std::function<uint64_t(size_t port)>& sent) const;
   /// Nodes whose own jobs the faults strike: nothing is promised for them.
@@ -67,18 +70,18 @@ class Injection {
 
  private:
   std::vector<std::string> nodes_of(const FaultSpec& fault) const;
+  void add_all_of(const std::string& process, std::vector<std::string>& nodes) const;
   void plan_process_strikes();
 
   const Scenario scenario_;
   const GraphSpec& graph_;
+  const bool processes_;
   std::vector<ProcessStrike> strikes_;
   size_t given_ = 0;
   std::vector<std::string> struck_nodes_;
-  std::vector<std::atomic<uint64_t>> struck_;  ///< by fault; those of messages count below
-  std::vector<size_t> message_faults_;         ///< index into Scenario::faults of each
-  std::vector<faults::MessageFaultCount> message_counts_;
-  const faults::FaultyTransport* transport_ = nullptr;
-  std::vector<size_t> ports_;                                          ///< of each message fault
+  std::vector<size_t> message_faults_;  ///< index into Scenario::faults of each
+  faults::StrikeCounts counts_;
+  std::vector<size_t> ports_;  ///< of each message fault; kNone: the plan does not have it
   std::map<size_t, std::unique_ptr<faults::NodeFaults>> node_faults_;  ///< by task
   std::unique_ptr<faults::Loads> loads_;
 };

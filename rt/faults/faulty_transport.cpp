@@ -30,14 +30,15 @@ void make_room(std::span<PortPlan> ports, std::span<const MessageFault> faults, 
 
 FaultyTransport::FaultyTransport(std::unique_ptr<Transport> inner, std::span<const PortPlan> ports,
                                  std::vector<MessageFault> faults, const Clock& clock,
-                                 const std::atomic<int64_t>& epoch_ns, std::span<MessageFaultCount> counts)
+                                 const std::atomic<int64_t>& epoch_ns, std::span<MessageFaultCount> counts,
+                                 std::span<std::atomic<uint64_t>> offered)
     : inner_(std::move(inner)),
       ports_(ports.begin(), ports.end()),
       faults_(std::move(faults)),
       clock_(clock),
       epoch_ns_(epoch_ns),
       counts_(counts),
-      offered_(ports.size()) {}
+      offered_(offered) {}
 
 FaultyTransport::~FaultyTransport() = default;
 

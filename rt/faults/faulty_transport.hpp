@@ -28,18 +28,20 @@ void make_room(std::span<PortPlan> ports, std::span<const MessageFault> faults, 
 class FaultyTransport final : public Transport {
  public:
   /// Several faults of one output strike in their order. `ports` are those of `inner`. `epoch_ns` is 0 until the run
-  /// has one: nothing strikes before. `counts` has one entry per fault. Clock, epoch and counts outlive this.
+  /// has one: nothing strikes before. `counts` has one entry per fault, `offered` one per port, where the messages that
+  /// nodes hand over are counted if a fault may strike them. Clock, epoch and counts outlive this.
   FaultyTransport(std::unique_ptr<Transport> inner, std::span<const PortPlan> ports, std::vector<MessageFault> faults,
-                  const Clock& clock, const std::atomic<int64_t>& epoch_ns, std::span<MessageFaultCount> counts);
+                  const Clock& clock, const std::atomic<int64_t>& epoch_ns, std::span<MessageFaultCount> counts,
+                  std::span<std::atomic<uint64_t>> offered);
   ~FaultyTransport() override;
 
   std::unique_ptr<Writer> make_writer(size_t port) override;
   std::unique_ptr<Reader> make_reader(size_t port) override { return inner_->make_reader(port); }
   uint64_t shared_memory_bytes() const override { return inner_->shared_memory_bytes(); }
   const char* name() const override { return inner_->name(); }
-
-  /// Messages that the node has handed over on that port; of ports without a fault, 0.
-  uint64_t offered(size_t port) const { return offered_[port].load(); }
+  uint32_t reclaim(uint32_t process) override { return inner_->reclaim(process); }
+  void ask_daemon() override { inner_->ask_daemon(); }
+  uint32_t chunks_in_use() const override { return inner_->chunks_in_use(); }
 
  private:
   const std::unique_ptr<Transport> inner_;
@@ -48,7 +50,7 @@ class FaultyTransport final : public Transport {
   const Clock& clock_;
   const std::atomic<int64_t>& epoch_ns_;
   const std::span<MessageFaultCount> counts_;
-  std::vector<std::atomic<uint64_t>> offered_;  ///< by port
+  const std::span<std::atomic<uint64_t>> offered_;
 };
 
 }  // namespace takt::faults

@@ -70,6 +70,7 @@ void Supervisor::note_end(const ProcessGroup::End& end, int64_t now_ns) {
   outage.process = static_cast<uint32_t>(end.process);
   outage.cause = BoundedText<200>(cause);
   outage.from_ns = from_ns;
+  board_.lose_sources(member.tasks, now_ns, now_ns + ModeLog::kLead_ns);
   outage.freed = transport_.reclaim(static_cast<uint32_t>(end.process) + 1);
   // Dead again before it was back: one more outage, though the first goes on.
   member.outage = outages_.add(outage);

@@ -52,12 +52,12 @@ TEST_CASE("any: every process has its turn, the same for the same seed") {
 
 TEST_CASE("whose jobs the faults strike: not the producers of struck messages") {
   const GraphSpec graph = small_graph();
-  CHECK(Injection(sound(many("{kind: drop, target: stereo.disparity}")), graph).struck_nodes().empty());
-  CHECK(Injection(sound(many("{kind: exhausted_pool, target: stereo.disparity}")), graph).struck_nodes() ==
+  CHECK(Injection(sound(many("{kind: drop, target: stereo.disparity}")), graph, 0, false).struck_nodes().empty());
+  CHECK(Injection(sound(many("{kind: exhausted_pool, target: stereo.disparity}")), graph, 0, false).struck_nodes() ==
         std::vector<std::string>{"stereo"});
-  CHECK(Injection(sound(many("{kind: hang, target: planner, at: 1s, for: 0s}")), graph).struck_nodes() ==
+  CHECK(Injection(sound(many("{kind: hang, target: planner, at: 1s, for: 0s}")), graph, 0, false).struck_nodes() ==
         std::vector<std::string>{"planner"});
-  CHECK(Injection(sound(many("{kind: frozen, target: camera}")), graph).struck_nodes() ==
+  CHECK(Injection(sound(many("{kind: frozen, target: camera}")), graph, 0, false).struck_nodes() ==
         std::vector<std::string>{"camera"});
 }
 
