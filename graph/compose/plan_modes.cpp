@@ -97,8 +97,6 @@ void add_modes(const GraphSpec& graph, Plan& plan) {
   if (named() == plan.modes.end()) plan.modes.push_back(implied_safe_stop(plan));
   plan.safe_stop = static_cast<size_t>(named() - plan.modes.begin());
   plan.mode_rules = rules_of(graph, plan);
-  // Nobody else would notice that the device is back.
-  for (const size_t source : plan.mode_rules.sources) plan.modes[plan.safe_stop].runs[source] = 1;
 }
 
 }  // namespace takt::graph

@@ -7,6 +7,18 @@
 #include "graph/language/loader.hpp"
 
 namespace takt::graph {
+namespace {
+
+/// Any loss may end in safe_stop: what it leaves out must not be a device whose return is waited for.
+void keep_in_safe_stop(std::vector<ModeSpec>& modes) {
+  for (ModeSpec& stop : modes) {
+    if (stop.name != kSafeStopMode) continue;
+    for (const ModeSpec& mode : modes)
+      for (const std::string& device : mode.lost) std::erase(stop.without, device);
+  }
+}
+
+}  // namespace
 
 void Loader::check_chains() {
   for (const auto& chain : spec_.chains) {
@@ -79,6 +91,7 @@ void Loader::check_modes() {
 }
 
 void Loader::apply_mode() {
+  keep_in_safe_stop(spec_.modes);
   const auto mode =
       std::find_if(spec_.modes.begin(), spec_.modes.end(), [&](const ModeSpec& m) { return m.name == spec_.mode; });
   if (mode == spec_.modes.end()) return;

@@ -24,7 +24,7 @@ size_t mode_without(const ModeRules& rules, SourceSet lost, size_t safe_stop) {
 std::optional<size_t> change_of_mode(const ModeRules& rules, SourceSet lost, bool newly_lost, const ModeInForce& now,
                                      size_t safe_stop) {
   const bool by_rule = now.origin == ModeOrigin::rule;
-  if (!by_rule && (!newly_lost || now.mode == safe_stop || mode_covers(rules, now.mode, lost))) return std::nullopt;
+  if (!by_rule && (!newly_lost || now.mode == safe_stop)) return std::nullopt;
   size_t wanted = now.before;
   // What the mode of before can do without needs no other mode: it may have been asked for because of that.
   if (lost != 0 && !mode_covers(rules, now.before, lost)) wanted = mode_without(rules, lost, safe_stop);

@@ -71,6 +71,14 @@ virtual both 0 --for 3s --set "front_laser.failures=silent 1s..9s" --set "head_c
 judge both "modes" 'names == ["full", "no_stereo", "safe_stop"]'
 judge both "still lost" 'devices["front_laser"]["state"] == "silent" and devices["front_laser"]["lost_s"] > 1.5'
 
+# Between processes, on the real clock: what the process of the devices sees changes the mode of the others. Times are not judged.
+timeout 120 "$takt" run --policy cooperative --isolate subsystem --for 5s --output "$work/out" --report "$work/processes.json" \
+  --set "front_laser.failures=unplugged 1s..2s" >"$work/processes.out" 2>"$work/processes.err"
+[ $? -le 1 ] || { tail -n 5 "$work/processes.err"; fail "processes: the run failed"; }
+grep -E '^(mode|device)' "$work/processes.out"
+judge processes "modes" 'names == ["full", "safe_stop", "full"] and devices["front_laser"]["state"] == "ok"'
+judge processes "mapping_3d, of another process, paused" 'nodes["mapping_3d"]["active_s"] < 5 and nodes["obstacle_stop"]["active_s"] == 5'
+
 # The head is named by no rule: it is reported, and changes nothing.
 virtual head 0 --for 3s --set "head.failures=unplugged 1s..2s"
 judge head "no mode" 'names == ["full"] and devices["head"]["losses"] == 1'

@@ -86,6 +86,21 @@ TEST_CASE("a break starts the wait anew: a loose plug stays lost") {
   CHECK(device.until(SourceState::ok, ReadStatus::ok) == 11);
 }
 
+TEST_CASE("one bad read is a break for a device that comes back, and so are jobs that were paused") {
+  for (const ReadStatus bad : {ReadStatus::partial, ReadStatus::ok}) {
+    Reads device;
+    device.read(ReadStatus::disconnected);
+    device.read(ReadStatus::ok, 8);
+    device.read(bad, 1, true);
+    CHECK(device.until(SourceState::ok, ReadStatus::ok) == 11);
+  }
+  Reads paused;
+  paused.read(ReadStatus::disconnected);
+  paused.read(ReadStatus::ok, 8);
+  paused.now_ms += 300;
+  CHECK(paused.until(SourceState::ok, ReadStatus::ok) == 11);
+}
+
 TEST_CASE("a device slower than its jobs is well, and comes back: a read without data is no break") {
   Reads device;
   for (int i = 0; i < 20; ++i) {
@@ -104,7 +119,7 @@ TEST_CASE("a device slower than its jobs is well, and comes back: a read without
 
 TEST_CASE("what is connected again but gives nothing is silent, and the end of a recording is no reading") {
   Reads device;
-  device.read(ReadStatus::disconnected);
+  device.read(ReadStatus::disconnected, 4);
   CHECK(device.read(ReadStatus::no_data, 5) == SourceState::disconnected);
   CHECK(device.read(ReadStatus::no_data) == SourceState::silent);
   CHECK(device.read(ReadStatus::end_of_data, 50) == SourceState::silent);

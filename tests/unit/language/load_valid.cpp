@@ -216,3 +216,14 @@ TEST_CASE("A graph in a mode lacks what the mode leaves out, and the edges from 
   CHECK(loaded.graph->devices[1].id == "base");
   CHECK(loaded.graph->devices[1].edges.empty());  // its velocity came from the planner
 }
+
+TEST_CASE("A safe_stop of the graph's own keeps every device that could be lost, whichever mode names it") {
+  const Loaded loaded = Files(with(kGraph, "blind: {without: [stereo, ego_motion, planner, base]}",
+                                   "blind: {without: [stereo, ego_motion, planner], lost: [camera]}\n"
+                                   "  safe_stop: {without: [camera, stereo, ego_motion, planner]}"))
+                            .load();
+  INFO(all(loaded));
+  REQUIRE(loaded.graph);
+  REQUIRE(loaded.graph->modes.size() == 2);
+  CHECK(loaded.graph->modes[1].pauses() == std::vector<std::string>{"stereo", "ego_motion", "planner"});
+}
