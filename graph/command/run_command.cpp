@@ -74,9 +74,8 @@ int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, st
         fmt::format("takt run {} ({}, policy {})", graph.name, graph.profile, to_string(graph.schedule.policy)));
     record.begin(graph, composition.plan, board, *transport, "none");
     trace.collect(composition.plan, record);
-    faults.begin(composition.plan, *prepared.clock, board);
+    const RunFaults::Active faulty(faults, composition.plan, *prepared.clock, board);
     result = executor.run();
-    faults.end();
   }
   const ProcessReading after = ProcessReading::now();
   const std::string no_trace = trace.write(graph, composition.plan, board, result);
