@@ -146,9 +146,8 @@ class IsolatedRun {
                                        to_string(plan_.policy), group_.size()));
       const DaemonProbe probe(*transport_, board_.group(), clock_);
       watchdog_.emplace(options_, plan_, board_);
-      faults_.begin(plan_, clock_, board_);
+      const RunFaults::Active faulty(faults_, plan_, clock_, board_);
       watch();
-      faults_.end();
     }
     MachineUse use = use_of_all();
     use.steal_ms -= steal_before_ms;

@@ -78,9 +78,10 @@ int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, st
     record.begin(graph, composition.plan, board, *transport, "none");
     trace.collect(composition.plan, record);
     watchdog.start();
-    faults.begin(composition.plan, *prepared.clock, board);
-    result = executor.run();
-    faults.end();
+    {
+      const RunFaults::Active faulty(faults, composition.plan, *prepared.clock, board);
+      result = executor.run();
+    }
     if (result.stuck.empty()) watchdog.end();
   }
   const ProcessReading after = ProcessReading::now();

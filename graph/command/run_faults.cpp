@@ -100,6 +100,12 @@ std::function<int64_t(size_t, uint64_t)> RunFaults::durations(std::function<int6
   return injection_ ? injection_->durations(std::move(inner), plan) : inner;
 }
 
+RunFaults::Active::Active(RunFaults& faults, const Plan& plan, const Clock& clock, RunBoard& board) : faults_(faults) {
+  faults_.begin(plan, clock, board);
+}
+
+RunFaults::Active::~Active() { faults_.end(); }
+
 void RunFaults::begin(const Plan& plan, const Clock& clock, RunBoard& board) {
   if (!injection_) return;
   clock_ = &clock;

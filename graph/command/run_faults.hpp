@@ -31,10 +31,19 @@ class RunFaults {
   /// Virtual time: how long jobs are taken to need.
   std::function<int64_t(size_t, uint64_t)> durations(std::function<int64_t(size_t, uint64_t)> inner,
                                                      const Plan& plan) const;
-  /// Around the run: loads, and somebody who looks after the nodes (virtual time: in look()).
-  void begin(const Plan& plan, const Clock& clock, RunBoard& board);
+  /// While it lives: loads, and somebody who looks after the nodes. Goes before plan, clock and board do.
+  class Active {
+   public:
+    Active(RunFaults& faults, const Plan& plan, const Clock& clock, RunBoard& board);
+    ~Active();
+    Active(const Active&) = delete;
+    Active& operator=(const Active&) = delete;
+
+   private:
+    RunFaults& faults_;
+  };
+  /// Virtual time: looks after the nodes, after every job.
   void look();
-  void end();
   /// Processes to be struck now, each told once; those of the past are passed over at the first call.
   std::vector<graph::ProcessStrike> due(int64_t now_ns);
   void count(const graph::ProcessStrike& strike) { injection_->count_strike(strike.fault); }
@@ -47,6 +56,9 @@ class RunFaults {
   int exit_code(int told, const nlohmann::ordered_json& report) const;
 
  private:
+  void begin(const Plan& plan, const Clock& clock, RunBoard& board);
+  void end();
+
   const RunOptions& options_;
   std::unique_ptr<graph::Injection> injection_;
   std::optional<graph::HealthWatch> health_;

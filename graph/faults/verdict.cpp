@@ -23,6 +23,11 @@ std::string bound_text(const Bound& bound, const char* unit) {
 
 std::string seconds_text(int64_t ns) { return fmt::format("{:.3f} s", static_cast<double>(ns) * 1e-9); }
 
+/// "drop head_camera.pair"
+std::string fault_text(std::string_view kind, std::string_view target) {
+  return fmt::format("{}{}{}", kind, target.empty() ? "" : " ", target);
+}
+
 class Judge {
  public:
   Judge(const Scenario& scenario, const Json& report, const RunEvents& events)
@@ -140,8 +145,7 @@ class Judge {
     std::vector<std::string> idle;
     for (size_t f = 0; f < scenario_.faults.size(); ++f) {
       const FaultSpec& fault = scenario_.faults[f];
-      if (events_.struck[f] == 0)
-        idle.push_back(fmt::format("{}{}{}", info(fault.kind).name, fault.target.empty() ? "" : " ", fault.target));
+      if (events_.struck[f] == 0) idle.push_back(fault_text(info(fault.kind).name, fault.target));
     }
     add("faults", "each strikes", idle.empty() ? "each struck" : fmt::format("never: {}", fmt::join(idle, ", ")),
         idle.empty());
@@ -209,7 +213,8 @@ std::string scenario_text(const Json& scenario) {
   std::string text =
       fmt::format("scenario {} (seed {})\n", scenario["name"].get<std::string>(), scenario["seed"].get<uint64_t>());
   for (const Json& fault : scenario["faults"])
-    text += fmt::format("  {} {}: struck {}\n", fault["kind"].get<std::string>(), fault["target"].get<std::string>(),
+    text += fmt::format("  {}: struck {}\n",
+                        fault_text(fault["kind"].get<std::string>(), fault["target"].get<std::string>()),
                         fault["struck"].get<uint64_t>());
   constexpr const char* kRow = "  {:<3} {:<26} {:<24} {}\n";
   text += fmt::format(fmt::runtime(kRow), "", "", "expected", "observed");

@@ -192,10 +192,9 @@ class Explainer {
     const std::string whole = kWholes[static_cast<size_t>(which_)];
     if (words.empty()) return whole;
     if (words.size() == 1) return ticked(words[0]) + " of " + whole;
-    static const std::map<std::string, std::string> kinds{{"devices", "device "},       {"profiles", "profile "},
-                                                          {"subsystems", "subsystem "}, {"chains", "chain "},
-                                                          {"modes", "mode "},           {"nodes", "the entry of "},
-                                                          {"expect", "expectation "},    {"faults", ""}};
+    static const std::map<std::string, std::string> kinds{
+        {"devices", "device "}, {"profiles", "profile "},   {"subsystems", "subsystem "}, {"chains", "chain "},
+        {"modes", "mode "},     {"nodes", "the entry of "}, {"expect", "expectation "},   {"faults", ""}};
     if (words[0] == "faults") words[1] = "faults[" + words[1] + "]";
     const auto kind = kinds.find(words[0]);
     std::string text = (kind == kinds.end() ? words[0] + " " : kind->second) + ticked(words[1]);
