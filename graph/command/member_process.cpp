@@ -2,6 +2,7 @@
 #include "graph/command/member_process.hpp"
 
 #include <ctime>
+#include <stdexcept>
 
 #include "graph/command/machine.hpp"
 #include "graph/command/prepare.hpp"
@@ -63,78 +64,45 @@ bool wait_until(const std::function<bool()>& done, const std::function<bool()>& 
 }
 
 int run_member(const MemberPart& part) {
-  const auto& [options, graph, partition, process, supervisor, board, pools, rings, faults] = part;
-  ProcessRecord& record_;
-};
-
-std::vector<bool> owned(const Plan& plan, const graph::Partition& partition, size_t process) {
-  std::vector<bool> own;
-  for (const TaskPlan& task : plan.tasks) own.push_back(partition.process_of.at(task.name) == process);
-  return own;
-}
-
-}  // namespace
-
-void BoardExchange::tell(size_t port, const Capacity& capacity) {
-  board_.capacity(port).capacity = capacity;
-  board_.capacity(port).known.store(1, std::memory_order_release);
-}
-
-Capacity BoardExchange::wait_for(size_t port) {
-  wait_until([&] { return board_.capacity(port).known.load(std::memory_order_acquire) != 0; });
-  return board_.capacity(port).capacity;
-}
-
-bool wait_until(const std::function<bool()>& done, const std::function<bool()>& broken) {
-  while (!done()) {
-    if (broken && broken()) return false;
-    const timespec pause{0, 1'000'000};
-    nanosleep(&pause, nullptr);
-  }
-  return true;
-}
-
-int run_member(const RunOptions& options, const graph::GraphSpec& graph, const graph::Partition& partition,
-               size_t process, int supervisor, RunBoard& board, const PoolFile& pools, trace::Rings* rings) {
-  ProcessRecord& record = board.process(process);
+  const RunOptions& options = part.options;
+  RunBoard& board = part.board;
+  ProcessRecord& record = board.process(part.process);
   obey_orders(&record.kill);
   Prepared prepared;
-  prepared.graph = graph;
+  prepared.graph = part.graph;
   prepared.clock = std::make_unique<MonotonicClock>();
   BoardExchange exchange(board);
   graph::ComposeOptions how;
   how.output = options.output;
   how.seed = options.seed;
   how.observers = observers(options);
-  how.owns = [&, &partition = part.partition, process = part.process](const std::string& id) {
-    return partition.process_of.at(id) == process;
-  };
+  how.owns = [&](const std::string& id) { return part.partition.process_of.at(id) == part.process; };
   how.exchange = &exchange;
   if (const int code = compose(options, how, prepared); code != kOk) {
     record.problems.store(static_cast<uint32_t>(prepared.problems.size()));
     return code;
   }
   Plan& plan = prepared.composition->plan;
-  faults.make_room(plan);
+  part.faults.make_room(plan);
   std::vector<std::string> told;  // the supervisor says it
   choose_cores(plan.cores, told);
   record.state.store(ProcessRecord::composed);
   wait_until([&] { return board.carrier().load() != RunBoard::no_carrier; });
   prepare_process();
-  const auto transport = faults.inject(board.carrier().load() == RunBoard::local
-                                           ? join_local_transport(plan.ports, pools, static_cast<uint32_t>(process) + 1)
-                                           : join_iceoryx_transport(plan.ports, iceoryx_domain(supervisor)),
-                                       plan, *prepared.clock, board);
-  BoardGate gate(board, process);
+  auto joined = board.carrier().load() == RunBoard::local
+                    ? join_local_transport(plan.ports, part.pools, static_cast<uint32_t>(part.process) + 1)
+                    : join_iceoryx_transport(plan.ports, iceoryx_domain(part.supervisor));
+  const auto transport = part.faults.inject(std::move(joined), plan, *prepared.clock, board);
+  BoardGate gate(board, part.process);
   Executor::Options run;
   run.duration_ns = static_cast<int64_t>(options.duration_s * 1e9);
   run.board = &board;
   run.stolen_ns = stolen_ns;
-  run.trace = rings;
+  run.trace = part.rings;
   run.gate = &gate;
   run.rejoin = record.restarts.load() > 0;
   run.life = &record.life;
-  run.own = owned(plan, partition, process);
+  run.own = owned(plan, part.partition, part.process);
   Executor executor(plan, *transport, *prepared.clock, run);
   record.state.store(ProcessRecord::joined);
   const ProcessReading before = ProcessReading::now();

@@ -35,6 +35,16 @@ int fail_devices(const graph::Scenario& scenario, graph::GraphSpec& graph) {
   return kOk;
 }
 
+/// How often that device was found to be lost; where it never was for long enough, its jobs without a result.
+uint64_t losses_of(const std::vector<TaskPlan>& tasks, const std::string& device, const RunBoard& board) {
+  for (size_t t = 0; t < tasks.size(); ++t) {
+    if (tasks[t].name != device) continue;
+    const uint64_t losses = board.source(t).losses.load();
+    return losses > 0 ? losses : board.task(t).no_result.load();
+  }
+  return 0;
+}
+
 std::vector<graph::Restart> restarts_of(const OutageLog& outages, const std::vector<std::string>& processes,
                                         const RunResult& result) {
   std::vector<graph::Restart> restarts;
@@ -110,6 +120,7 @@ void RunFaults::begin(const Plan& plan, const Clock& clock, RunBoard& board) {
   if (!injection_) return;
   clock_ = &clock;
   board_ = &board;
+  plan_ = &plan;
   health_.emplace(plan, board);
   if (clock.is_virtual()) return;
   injection_->begin_loads(board.epoch_ns());
@@ -142,6 +153,11 @@ void RunFaults::judge(const RunResult& result, const RunBoard& board, int exit,
   if (!injection_) return;
   graph::RunEvents events;
   events.struck = injection_->struck();
+  for (size_t f = 0; f < injection_->scenario().faults.size(); ++f) {
+    const graph::FaultSpec& fault = injection_->scenario().faults[f];
+    if (graph::info(fault.kind).target == graph::FaultTarget::device)
+      events.struck[f] = losses_of(plan_->tasks, fault.target, board);
+  }
   events.struck_nodes = injection_->struck_nodes();
   events.unwell = health_->unwell();
   events.end_ns = result.end_ns - result.epoch_ns;

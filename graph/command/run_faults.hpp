@@ -64,6 +64,7 @@ class RunFaults {
   std::optional<graph::HealthWatch> health_;
   const Clock* clock_ = nullptr;
   RunBoard* board_ = nullptr;
+  const Plan* plan_ = nullptr;
   bool asked_ = false;  ///< due() has been called
   std::jthread looking_;
 };
