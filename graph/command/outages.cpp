@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 namespace takt::command {
 namespace {
@@ -15,7 +16,7 @@ int64_t end_of(const Outage& outage, const RunResult& result) {
   return outage.back_ns > 0 ? std::min(outage.back_ns, result.end_ns) : result.end_ns;
 }
 
-Json told(const Outage& outage, const std::string& process, const RunResult& result) {
+Json told(const Outage& outage, const std::string& process, std::vector<std::string> nodes, const RunResult& result) {
   const auto seconds = [&](int64_t ns) { return static_cast<double>(ns - result.epoch_ns) / 1e9; };
   const double down_s = static_cast<double>(end_of(outage, result) - outage.from_ns) / 1e9;
   std::string what = fmt::format("process {} {} at {:.2f} s, ", process, outage.cause.c_str(), seconds(outage.from_ns));
@@ -24,6 +25,7 @@ Json told(const Outage& outage, const std::string& process, const RunResult& res
   Json entry = {{"what", what},
                 {"kind", "outage"},
                 {"process", process},
+                {"nodes", std::move(nodes)},
                 {"cause", outage.cause.c_str()},
                 {"at_s", seconds(outage.from_ns)},
                 {"back_s", nullptr},
@@ -52,8 +54,11 @@ uint64_t missed(const TaskPlan& task, size_t process, const OutageLog& outages, 
 
 void add_outages(const OutageLog& outages, const std::vector<std::string>& processes, const Plan& plan,
                  const std::vector<std::vector<size_t>>& tasks_of, const RunResult& result, Json& report) {
-  for (size_t i = 0; i < outages.size(); ++i)
-    report["faults"].push_back(told(outages[i], processes[outages[i].process], result));
+  for (size_t i = 0; i < outages.size(); ++i) {
+    std::vector<std::string> nodes;
+    for (const size_t t : tasks_of[outages[i].process]) nodes.push_back(plan.tasks[t].name);
+    report["faults"].push_back(told(outages[i], processes[outages[i].process], std::move(nodes), result));
+  }
   if (outages.lost() > 0)
     report["faults"].push_back({{"what", fmt::format("{} more outages, not kept", outages.lost())}});
   for (size_t p = 0; p < tasks_of.size(); ++p)

@@ -65,7 +65,7 @@ TEST_CASE("damaged scenarios") {
     Plan plan = small_plan();
     VirtualClock clock(1);
     const std::atomic<int64_t> epoch{1};
-    Injection injection(std::move(*loaded.scenario), graph);
+    Injection injection(std::move(*loaded.scenario), graph, plan.ports.size(), false);
     injection.make_room(plan);
     injection.disturb(plan, clock, epoch);
   }

@@ -75,9 +75,9 @@ bool other_ran(const Trace& trace, const JobSpan& job, int64_t at) {
 }
 
 bool may_hold(const Trace& trace, const JobSpan& job, const Piece& piece, int64_t at) {
-  const bool known = trace.source != Source::none &&
-                     std::any_of(trace.slices.begin(), trace.slices.end(),
-                                 [&](const Slice& slice) { return slice.thread == job.thread; });
+  const bool known =
+      trace.source != Source::none && std::any_of(trace.slices.begin(), trace.slices.end(),
+                                                  [&](const Slice& slice) { return slice.thread == job.thread; });
   const bool before = at < job.start_ns, ahead = before && other_ran(trace, job, at);
   const bool on_cpu = known && had_cpu(trace, job, at);
   switch (piece.cause) {

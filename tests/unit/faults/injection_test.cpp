@@ -12,6 +12,7 @@ using namespace takt::test;
 namespace {
 
 constexpr int64_t kMs = 1'000'000, kEpoch = 1'000 * kMs;
+constexpr size_t kPorts = 8;  // more than the plan has
 
 std::string many(const std::string& faults) { return "takt: 1\nname: t\nseed: 3\nfaults: [" + faults + "]\n"; }
 
@@ -21,7 +22,7 @@ TEST_CASE("strikes on processes are due once, in order, until an instant") {
   const GraphSpec graph = small_graph();
   Injection injection(sound(many("{kind: kill, target: stereo, every: 2s, from: 1s, to: 6s, for: 50ms},"
                                  "{kind: kill, target: plan, at: 2s}")),
-                      graph);
+                      graph, kPorts, false);
   auto due = injection.due(3'000 * kMs);
   REQUIRE(due.size() == 2);
   CHECK(due[0].process == "depth");
@@ -40,7 +41,7 @@ TEST_CASE("strikes on processes are due once, in order, until an instant") {
 TEST_CASE("any: every process has its turn, the same for the same seed") {
   const GraphSpec graph = small_graph();
   const std::string text = many("{kind: kill, target: any, every: 100ms, to: 10s}");
-  const Injection one(sound(text), graph), other(sound(text), graph);
+  const Injection one(sound(text), graph, kPorts, false), other(sound(text), graph, kPorts, false);
   std::map<std::string, int> strikes;
   for (size_t i = 0; i < one.process_strikes().size(); ++i) {
     CHECK(one.process_strikes()[i].process == other.process_strikes()[i].process);
@@ -52,12 +53,13 @@ TEST_CASE("any: every process has its turn, the same for the same seed") {
 
 TEST_CASE("whose jobs the faults strike: not the producers of struck messages") {
   const GraphSpec graph = small_graph();
-  CHECK(Injection(sound(many("{kind: drop, target: stereo.disparity}")), graph, 0, false).struck_nodes().empty());
-  CHECK(Injection(sound(many("{kind: exhausted_pool, target: stereo.disparity}")), graph, 0, false).struck_nodes() ==
-        std::vector<std::string>{"stereo"});
-  CHECK(Injection(sound(many("{kind: hang, target: planner, at: 1s, for: 0s}")), graph, 0, false).struck_nodes() ==
+  CHECK(Injection(sound(many("{kind: drop, target: stereo.disparity}")), graph, kPorts, false).struck_nodes().empty());
+  CHECK(
+      Injection(sound(many("{kind: exhausted_pool, target: stereo.disparity}")), graph, kPorts, false).struck_nodes() ==
+      std::vector<std::string>{"stereo"});
+  CHECK(Injection(sound(many("{kind: hang, target: planner, at: 1s, for: 0s}")), graph, kPorts, false).struck_nodes() ==
         std::vector<std::string>{"planner"});
-  CHECK(Injection(sound(many("{kind: frozen, target: camera}")), graph, 0, false).struck_nodes() ==
+  CHECK(Injection(sound(many("{kind: frozen, target: camera}")), graph, kPorts, false).struck_nodes() ==
         std::vector<std::string>{"camera"});
 }
 
@@ -66,7 +68,7 @@ TEST_CASE("jobs are disturbed where the scenario says, and only there") {
   Plan plan = small_plan();
   Injection injection(sound(many("{kind: slow_consumer, target: stereo, from: 1s, to: 2s, by: 5ms},"
                                  "{kind: kill, target: plan, at: 3s, for: 100ms}")),
-                      graph);
+                      graph, kPorts, false);
   VirtualClock clock(kEpoch);
   const std::atomic<int64_t> epoch{kEpoch};
   injection.disturb(plan, clock, epoch);
@@ -93,7 +95,7 @@ TEST_CASE("message faults reach the transport of the plan, with room for them, a
   Injection injection(sound(many("{kind: hang, target: planner, at: 1s, for: 0s},"
                                  "{kind: drop, target: planner.motion, from: 0s, to: 1s},"
                                  "{kind: delay, target: stereo.disparity, by: 500ms}")),
-                      graph);
+                      graph, kPorts, false);
   injection.make_room(plan);
   CHECK(plan.ports[1].history == 4 + 5);
   CHECK(plan.ports[2].history == 4);
@@ -111,7 +113,7 @@ TEST_CASE("message faults reach the transport of the plan, with room for them, a
 TEST_CASE("a scenario without message faults leaves the transport as it is") {
   const GraphSpec graph = small_graph();
   const Plan plan = small_plan();
-  Injection injection(sound(many("{kind: kill, target: plan, at: 3s}")), graph);
+  Injection injection(sound(many("{kind: kill, target: plan, at: 3s}")), graph, kPorts, false);
   auto inner = make_local_transport(plan.ports);
   const Transport* before = inner.get();
   VirtualClock clock(kEpoch);
