@@ -64,8 +64,8 @@ class GroundMapNode final : public Node {
     detector_->classify(ground());
     const bool mask_given = give_mask(pair);
     const bool grid_given = !chosen->robot_in_map || give_grid(projection, *chosen->robot_in_map);
-    const bool textures_given = give_textures();
-    if (!mask_given || !grid_given || !textures_given) job.no_result();
+    give_textures();
+    if (!mask_given || !grid_given) job.no_result();
   }
 
  private:
@@ -78,8 +78,8 @@ class GroundMapNode final : public Node {
   }
 
   /// The newest image that was not mapped before, with its pose known or predicted; else an older one with its pose
-  /// known; else the newest without one: its mask is still worth having. Never simply the latest pose. (Were a known pose
-  /// preferred to a predicted one, one job left out would make every later one map the image before the newest.)
+  /// known; else the newest without one: its mask is still worth having. Never simply the latest pose. (Were a known
+  /// pose preferred to a predicted one, one job left out would make every later one map the image before the newest.)
   std::optional<Chosen> choose() {
     std::optional<size_t> newest;
     for (size_t i = pair_.size(); i-- > 0 && pair_.stamp_ns(i) > last_stamp_ns_;) {
@@ -136,11 +136,11 @@ class GroundMapNode final : public Node {
     return true;
   }
 
-  /// What was learnt, for a process that takes this one's place. False if no memory was to be had.
-  bool give_textures() {
+  /// What was learnt, for a process that takes this one's place; not with this job if no memory is to be had.
+  void give_textures() {
     Image* out = textures_.loan();
     const TextureMemory& memory = detector_->memory();
-    if (!out || !out->pixels.resize(sizeof(Descriptor) * static_cast<size_t>(memory.size()))) return false;
+    if (!out || !out->pixels.resize(sizeof(Descriptor) * static_cast<size_t>(memory.size()))) return;
     out->width = sizeof(Descriptor);
     out->height = memory.size();
     out->channels = 1;
@@ -150,7 +150,6 @@ class GroundMapNode final : public Node {
       std::copy(std::begin(row), std::end(row), out->view().row(i));
     }
     textures_.send(last_stamp_ns_);
-    return true;
   }
 
   /// False if no memory was to be had.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "rt/supervise/nursery.hpp"
 
+#include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
@@ -67,21 +68,25 @@ void Nursery::serve() {
   signal(SIGHUP, SIG_IGN);
   signal(SIGTERM, SIG_IGN);
   close(asks_);
+  void* box = mmap(nullptr, sizeof(pid_t), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  if (box == MAP_FAILED) _exit(1);
+  auto& pid = *static_cast<volatile pid_t*>(box);
   for (size_t child = 0; getppid() == maker_ && receive_one(answers_, child);) {
+    pid = 0;
     const pid_t in_between = fork();
-    if (in_between == 0) fork_once(child);
-    if (in_between < 0) send_one(answers_, pid_t{0});
-    else
-      while (waitpid(in_between, nullptr, 0) < 0 && errno == EINTR) {
-      }
+    if (in_between == 0) fork_once(child, pid);
+    // Once that one is gone, the child is the maker's, who may wait for it from the answer on.
+    while (in_between > 0 && waitpid(in_between, nullptr, 0) < 0 && errno == EINTR) {
+    }
+    send_one(answers_, pid_t{pid});
   }
   _exit(0);
 }
 
-void Nursery::fork_once(size_t child) const {
-  const pid_t in_between = getpid(), pid = fork();
-  if (pid != 0) {
-    send_one(answers_, pid > 0 ? pid : pid_t{0});
+void Nursery::fork_once(size_t child, volatile pid_t& pid) const {
+  const pid_t in_between = getpid(), forked = fork();
+  if (forked != 0) {
+    if (forked > 0) pid = forked;
     _exit(0);
   }
   close(answers_);

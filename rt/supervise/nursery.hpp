@@ -27,7 +27,8 @@ class Nursery {
 
  private:
   [[noreturn]] void serve();
-  void fork_once(size_t child) const;
+  /// In a process of its own, which ends at once: leaves the child's number in `pid`.
+  [[noreturn]] void fork_once(size_t child, volatile pid_t& pid) const;
 
   const Body body_;
   const pid_t maker_;
