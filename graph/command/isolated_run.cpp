@@ -297,14 +297,23 @@ class IsolatedRun {
       const auto named = std::find(partition_.names.begin(), partition_.names.end(), strike.process);
       const auto p = static_cast<size_t>(named - partition_.names.begin());
       if (p == partition_.names.size() || group_.pid(p) == 0) continue;  // away already
-      const bool kills = strike.kind == graph::FaultKind::kill;
-      kill(group_.pid(p), kills ? SIGKILL : SIGSTOP);
       faults_.count(strike);
-      if (!kills) stopped_.push_back({group_.pid(p), now_ns + strike.for_ns});
+      if (strike.kind == graph::FaultKind::kill_at_step) order(p, strike);
+      else kill(group_.pid(p), strike.kind == graph::FaultKind::kill ? SIGKILL : SIGSTOP);
+      if (strike.kind == graph::FaultKind::stop_process) stopped_.push_back({group_.pid(p), now_ns + strike.for_ns});
     }
     std::erase_if(stopped_, [&](const auto& stopped) {
       return now_ns >= stopped.second && (kill(stopped.first, SIGCONT), true);
     });
+  }
+
+  /// Orders a process to die when it comes to that step.
+  void order(size_t process, const graph::ProcessStrike& strike) {
+    KillOrder& order = board_.process(process).kill;
+    for (size_t port = 0; port < plan_.ports.size(); ++port)
+      if (plan_.ports[port].node + "." + plan_.ports[port].port == strike.output)
+        order.port.store(static_cast<uint32_t>(port));
+    order.step.store(strike.step);
   }
 
   MachineUse use_of_all() const {
@@ -383,7 +392,17 @@ int run_isolated(const RunOptions& options, const graph::GraphSpec& graph, RunFa
   if (options.transport != "iceoryx") return as_supervisor();
   GroupKeeper::Options how;
   how.stop_asked = StopOnSignal::asked;
-  how.clean_up = [](pid_t pid) { remove_iceoryx_leftovers(IceoryxPlaces::of_this_machine(), pid); };
+  how.clean_up = [&](pid_t supervisor) {
+    const IceoryxPlaces places = IceoryxPlaces::of_this_machine();
+    remove_iceoryx_leftovers(places, supervisor);
+    for (size_t p = 0; p < run.board().process_count(); ++p) {
+      const pid_t member = run.board().process(p).pid.load();
+      // It dies with its supervisor, and may be about to.
+      int looks = 0;
+      wait_until([&] { return member <= 0 || kill(member, 0) != 0 || ++looks > 1000; });
+      if (member > 0) remove_iceoryx_leftovers(places, member);
+    }
+  };
   how.say = [](const std::string& what) { std::fprintf(stderr, "takt: %s\n", what.c_str()); };
   const MonotonicClock clock;
   const auto code = GroupKeeper(run.board().group(), clock, how).keep([&] {

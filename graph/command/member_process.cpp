@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "graph/command/member_process.hpp"
 
+#include <unistd.h>
+
 #include <ctime>
 #include <stdexcept>
 
@@ -67,6 +69,7 @@ int run_member(const MemberPart& part) {
   const RunOptions& options = part.options;
   RunBoard& board = part.board;
   ProcessRecord& record = board.process(part.process);
+  record.pid.store(getpid());
   obey_orders(&record.kill);
   Prepared prepared;
   prepared.graph = part.graph;

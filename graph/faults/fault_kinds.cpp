@@ -29,6 +29,7 @@ std::vector<FaultKindInfo> make_kinds() {
       {slow_consumer, "slow_consumer", kNode, {"by"}, window, true, true, false},
       {hang, "hang", kNode, {"at", "for"}, none, true, true, false},
       {kill, "kill", kProcess, none, repeated, true, false, false},
+      {kill_at_step, "kill_at_step", kOutput, {"step"}, {"reader", "at", "every", "from", "to"}, false, false, false},
       {stop_process, "stop_process", kProcess, {"at", "for"}, none, false, false, false},
       {cpu_hog, "cpu_hog", kNothing, none, {"from", "to", "threads", "policy"}, false, true, false},
       {memory_hog, "memory_hog", kNothing, {"megabytes"}, window, false, true, false},
@@ -56,6 +57,12 @@ const FaultKindInfo* find_fault_kind(std::string_view name) {
   return found == kinds.end() ? nullptr : &*found;
 }
 
-bool strikes_messages(FaultKind kind) { return info(kind).target == FaultTarget::output; }
+bool strikes_messages(FaultKind kind) {
+  return info(kind).target == FaultTarget::output && kind != FaultKind::kill_at_step;
+}
+
+bool strikes_processes(FaultKind kind) {
+  return kind == FaultKind::kill || kind == FaultKind::kill_at_step || kind == FaultKind::stop_process;
+}
 
 }  // namespace takt::graph

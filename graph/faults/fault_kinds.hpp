@@ -23,6 +23,7 @@ enum class FaultKind : uint8_t {
   slow_consumer,
   hang,
   kill,
+  kill_at_step,
   stop_process,
   // of the machine
   cpu_hog,
@@ -55,5 +56,7 @@ const FaultKindInfo& info(FaultKind kind);
 const FaultKindInfo* find_fault_kind(std::string_view name);
 /// Strikes messages on their way from a node to its output.
 bool strikes_messages(FaultKind kind);
+/// Ends or stops a process.
+bool strikes_processes(FaultKind kind);
 
 }  // namespace takt::graph

@@ -71,13 +71,15 @@ void Injection::plan_process_strikes() {
   const std::vector<std::string> all = processes_of(graph_);
   for (size_t f = 0; f < scenario_.faults.size(); ++f) {
     const FaultSpec& fault = scenario_.faults[f];
-    if (fault.kind != FaultKind::kill && fault.kind != FaultKind::stop_process) continue;
+    if (!strikes_processes(fault.kind)) continue;
     uint64_t number = 0;
     const auto add = [&](int64_t at_ns) {
       const bool any = fault.target == "any";
-      const std::string process =
-          any ? all[faults::mixed(scenario_.seed, f, number++) % all.size()] : process_of(graph_, fault.target);
-      strikes_.push_back({fault.kind, process, at_ns, fault.for_ns, f});
+      const std::string at_step = fault.reader.empty() ? fault.target.substr(0, fault.target.find('.')) : fault.reader;
+      const std::string process = any ? all[faults::mixed(scenario_.seed, f, number++) % all.size()]
+                                      : process_of(graph_, fault.step == MessageStep::none ? fault.target : at_step);
+      strikes_.push_back({fault.kind, process, at_ns, fault.for_ns, f, fault.step,
+                          fault.step == MessageStep::none ? std::string() : fault.target});
     };
     if (fault.every_ns == 0) add(fault.at_ns);
     else
@@ -94,11 +96,17 @@ void Injection::add_all_of(const std::string& process, std::vector<std::string>&
     if (process_of(graph_, device.id) == process) nodes.push_back(device.id);
 }
 
+void Injection::add_all_struck_by(const FaultSpec& fault, std::vector<std::string>& nodes) const {
+  for (const ProcessStrike& strike : strikes_)
+    if (&scenario_.faults[strike.fault] == &fault) add_all_of(strike.process, nodes);
+}
+
 std::vector<std::string> Injection::nodes_of(const FaultSpec& fault) const {
   std::vector<std::string> nodes;
   switch (info(fault.kind).target) {
     case FaultTarget::none: break;
     case FaultTarget::output:
+      add_all_struck_by(fault, nodes);  // at a step of its messages
       if (fault.kind == FaultKind::exhausted_pool) nodes.push_back(fault.target.substr(0, fault.target.find('.')));
       break;
     case FaultTarget::node:
@@ -106,9 +114,7 @@ std::vector<std::string> Injection::nodes_of(const FaultSpec& fault) const {
       if (fault.kind == FaultKind::hang && processes_) add_all_of(process_of(graph_, fault.target), nodes);
       else nodes.push_back(fault.target);
       break;
-    case FaultTarget::process:
-      for (const ProcessStrike& strike : strikes_)
-        if (&scenario_.faults[strike.fault] == &fault) add_all_of(strike.process, nodes);
+    case FaultTarget::process: add_all_struck_by(fault, nodes);
   }
   return nodes;
 }

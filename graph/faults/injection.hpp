@@ -19,11 +19,13 @@ namespace takt::graph {
 
 /// A process is due to be struck.
 struct ProcessStrike {
-  FaultKind kind = FaultKind::kill;  ///< kill or stop_process
-  std::string process;               ///< subsystem, or "devices"
-  int64_t at_ns = 0;                 ///< since the epoch
-  int64_t for_ns = 0;                ///< stopped, or (in virtual time) gone, for so long
-  size_t fault = 0;                  ///< index into Scenario::faults
+  FaultKind kind = FaultKind::kill;      ///< kill, kill_at_step or stop_process
+  std::string process;                   ///< subsystem, or "devices"
+  int64_t at_ns = 0;                     ///< since the epoch
+  int64_t for_ns = 0;                    ///< stopped, or (in virtual time) gone, for so long
+  size_t fault = 0;                      ///< index into Scenario::faults
+  MessageStep step = MessageStep::none;  ///< of kill_at_step, with the output
+  std::string output = {};
 };
 
 class Injection {
@@ -70,6 +72,7 @@ class Injection {
 
  private:
   std::vector<std::string> nodes_of(const FaultSpec& fault) const;
+  void add_all_struck_by(const FaultSpec& fault, std::vector<std::string>& nodes) const;
   void add_all_of(const std::string& process, std::vector<std::string>& nodes) const;
   void plan_process_strikes();
 

@@ -67,6 +67,7 @@ class ScenarioReader {
     check_target(*kind, fault, document_.value_at(child(pointer, "target")));
     read_times(fault, value, pointer);
     read_amounts(fault, value);
+    if (fault.kind == FaultKind::kill_at_step) read_step(fault, value, pointer);
     scenario_.faults.push_back(std::move(fault));
   }
 
@@ -147,7 +148,7 @@ class ScenarioReader {
     const auto read = [&](const char* key, int64_t& ns, int64_t low) {
       if (const auto time = read_time(value, pointer, key, low)) ns = *time;
     };
-    fault.for_ns = fault.kind == FaultKind::kill ? kRestart_ns : 0;
+    fault.for_ns = fault.kind == FaultKind::kill || fault.kind == FaultKind::kill_at_step ? kRestart_ns : 0;
     read("from", fault.from_ns, 0);
     read("to", fault.to_ns, 1);
     read("at", fault.at_ns, 0);
@@ -156,19 +157,47 @@ class ScenarioReader {
     read("by", fault.by_ns, fault.kind == FaultKind::clock_step ? INT64_MIN : 1);
     if (fault.to_ns <= fault.from_ns)
       problem(document_.value_at(child(pointer, "to")), "`to` is not after `from`: the fault would never strike");
-    if (fault.kind == FaultKind::kill) check_kill(fault, value, pointer);
+    if (fault.kind == FaultKind::kill || fault.kind == FaultKind::kill_at_step) check_kill(fault, value, pointer);
   }
 
   void check_kill(const FaultSpec& fault, const json& value, const std::string& pointer) {
     const Position& at = document_.value_at(pointer);
+    const std::string kind = ticked(info(fault.kind).name);
     if (value.contains("at") == value.contains("every"))
-      return problem(at, "`kill` takes either `at`, or `every` with `to` (and `from`)");
-    if (value.contains("every") && !value.contains("to")) return problem(at, "`kill` with `every` lacks `to`");
+      return problem(at, fmt::format("{} takes either `at`, or `every` with `to` (and `from`)", kind));
+    if (value.contains("every") && !value.contains("to"))
+      return problem(at, fmt::format("{} with `every` lacks `to`", kind));
     if (fault.every_ns > 0 && (fault.to_ns - fault.from_ns) / fault.every_ns > kMostStrikes)
       problem(document_.value_at(child(pointer, "every")),
-              fmt::format("`kill` would strike more than {} times; shorten the window", kMostStrikes));
+              fmt::format("{} would strike more than {} times; shorten the window", kind, kMostStrikes));
     if (value.contains("at") && (value.contains("from") || value.contains("to")))
-      problem(at, "`kill` with `at` takes no `from` and `to`: they go with `every`");
+      problem(at, fmt::format("{} with `at` takes no `from` and `to`: they go with `every`", kind));
+  }
+
+  /// Who reads: an edge of the plan from the output to a node.
+  std::vector<std::string> readers_of(const std::string& output) const {
+    std::vector<std::string> readers;
+    for (const TaskPlan& task : plan_.tasks)
+      for (const EdgePlan& edge : task.edges)
+        if (plan_.ports[edge.port].node + "." + plan_.ports[edge.port].port == output) readers.push_back(task.name);
+    return readers;
+  }
+
+  void read_step(FaultSpec& fault, const json& value, const std::string& pointer) {
+    if (!value.contains("step") || !value["step"].is_string()) return;
+    fault.step = message_step(value["step"].get<std::string>()).value_or(MessageStep::none);
+    const bool of_reader = fault.step == MessageStep::while_held || fault.step == MessageStep::inside_release;
+    if (of_reader != value.contains("reader"))
+      return problem(document_.value_at(child(pointer, "step")),
+                     fmt::format("{} is a step of {}", ticked(to_string(fault.step)),
+                                 of_reader ? "a reader: name it as `reader`" : "the writer: leave `reader` out"));
+    if (!of_reader) return;
+    fault.reader = value["reader"].is_string() ? value["reader"].get<std::string>() : "";
+    const std::vector<std::string> readers = readers_of(fault.target);
+    if (std::find(readers.begin(), readers.end(), fault.reader) == readers.end())
+      problem(document_.value_at(child(pointer, "reader")),
+              fmt::format("{} does not read {}{}", ticked(fault.reader), ticked(fault.target),
+                          alternatives(fault.reader, readers, "its readers")));
   }
 
   void read_amounts(FaultSpec& fault, const json& value) const {

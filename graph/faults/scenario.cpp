@@ -11,14 +11,14 @@ constexpr const char* kDevices = "devices";
 }  // namespace
 
 int64_t FaultSpec::begins_ns() const {
-  const bool instant = kind == FaultKind::hang || kind == FaultKind::kill || kind == FaultKind::stop_process;
+  const bool instant = kind == FaultKind::hang || strikes_processes(kind);
   return instant && every_ns == 0 ? at_ns : from_ns;
 }
 
 int64_t FaultSpec::ends_ns() const {
   if (kind == FaultKind::hang) return for_ns == 0 ? faults::kForever : at_ns + for_ns;
-  if (kind == FaultKind::kill && every_ns > 0) return to_ns + for_ns;
-  if (kind == FaultKind::kill || kind == FaultKind::stop_process) return at_ns + for_ns;
+  if (strikes_processes(kind) && every_ns > 0) return to_ns + for_ns;
+  if (strikes_processes(kind)) return at_ns + for_ns;
   return to_ns;
 }
 

@@ -11,6 +11,7 @@
 #include "graph/faults/fault_kinds.hpp"
 #include "graph/language/graph.hpp"
 #include "rt/faults/message_fault.hpp"
+#include "rt/shm/kill_order.hpp"
 
 namespace takt::graph {
 
@@ -19,9 +20,11 @@ struct FaultSpec {
   FaultKind kind = FaultKind::drop;
   std::string target;                             ///< "" where the kind has none
   int64_t from_ns = 0, to_ns = faults::kForever;  ///< [from, to)
-  int64_t at_ns = 0;                              ///< of hang, kill, stop_process
-  int64_t every_ns = 0;                           ///< of kill: > 0: at from, from + every ... before to, instead of at
-  int64_t for_ns = 0;                             ///< of hang (0: never returns), kill, stop_process
+  MessageStep step = MessageStep::none;           ///< of kill_at_step
+  std::string reader;    ///< of kill_at_step: the node whose process it is, if not the writer's
+  int64_t at_ns = 0;     ///< of hang, kill, kill_at_step, stop_process
+  int64_t every_ns = 0;  ///< of kill: > 0: at from, from + every ... before to, instead of at
+  int64_t for_ns = 0;    ///< of hang (0: never returns), kill, stop_process
   int64_t by_ns = 0;
   double probability = 1;
   uint32_t threads = 1;

@@ -43,6 +43,7 @@ struct ProcessRecord {
   std::atomic<uint32_t> state{starting};
   std::atomic<uint32_t> problems{0};  ///< why it could not be composed: how many, told on stderr
   std::atomic<bool> refused{false};   ///< a policy was refused to one of its lanes
+  std::atomic<int32_t> pid{0};
   std::atomic<uint32_t> restarts{0};  ///< it is not the first of its name
   LifeSigns life;
   KillOrder kill;

@@ -26,7 +26,7 @@ for file in tests/faults/*.yaml; do
   [ $got -eq $wanted ] || { cat "$work/$name.err"; fail "$name: exit $got instead of $wanted"; }
 done
 echo "$scenarios scenarios"
-[ $scenarios -ge 30 ] || fail "only $scenarios scenarios were found"
+[ $scenarios -ge 60 ] || fail "only $scenarios scenarios were found"
 
 python3 - "$work/wrong_expectation.json" <<'PY' || fail "the report of wrong_expectation does not say what was unmet"
 import json, sys
@@ -55,9 +55,9 @@ expect 2 'real_cpu_hog.yaml:6:12: error: `cpu_hog` exists in real time only' \
 expect 2 '`kill` needs a process to strike' \
   "$takt" run tests/faults/loads.yaml --isolate none --faults tests/faults/kill_front.yaml
 expect 2 'run with --record FILE' "$takt" run tests/faults/loads.yaml --clock virtual --faults tests/faults/full_disk.yaml
-expect 2 'processes cannot be given faults yet; add --isolate none' "$takt" run graph/ace.yaml --faults tests/faults/ace_laser_lost.yaml
-printf 'takt: 1\nname: blind\nfaults: [{kind: silent, target: front_laser}]\n' >"$work/blind.yaml"
-expect 2 'no driver of this build can be told to fail' "$takt" run graph/ace.yaml --clock virtual --faults "$work/blind.yaml"
+printf 'takt: 1\nname: blind\nfaults: [{kind: silent, target: head_camera}]\n' >"$work/blind.yaml"
+expect 2 'has the driver replay, which cannot be told to fail' \
+  "$takt" run graph/ace.yaml --profile replay --clock virtual --faults "$work/blind.yaml"
 printf 'takt: 1\nname: typo\nfaults: [{kind: drop, target: front_lazer.scan}]\n' >"$work/typo.yaml"
 expect 2 'did you mean `front_laser.scan`?' "$takt" run graph/ace.yaml --clock virtual --faults "$work/typo.yaml"
 finish
