@@ -37,6 +37,15 @@ pid_t fork_group(const std::function<int()>& group) {
   std::exit(code);
 }
 
+/// They die with their supervisor and then belong to this process; waits until the last one is gone.
+void bury_members() {
+  pid_t buried = 0;
+  for (int tries = 0; tries < 1000 && (buried >= 0 || errno != ECHILD); ++tries) {
+    buried = waitpid(-1, nullptr, WNOHANG);
+    if (buried == 0) wait_a_step();
+  }
+}
+
 }  // namespace
 
 GroupKeeper::GroupKeeper(GroupSigns& signs, const Clock& clock, Options options)
@@ -62,6 +71,7 @@ bool GroupKeeper::silent(int64_t now_ns) {
 }
 
 std::optional<int> GroupKeeper::watch(const std::function<int()>& group) {
+  prctl(PR_SET_CHILD_SUBREAPER, 1);
   signs_.heartbeat_ns.store(0);
   last_look_ns_ = clock_.now_ns();
   silent_ns_ = 0;
@@ -82,6 +92,7 @@ std::optional<int> GroupKeeper::watch(const std::function<int()>& group) {
     kill(pid, SIGKILL);  // its members go with it
   }
   if (!WIFSIGNALED(status)) return WEXITSTATUS(status);
+  bury_members();
   if (options_.clean_up) options_.clean_up(pid);
   if (loss.from_ns == 0) {
     loss.from_ns = clock_.now_ns();

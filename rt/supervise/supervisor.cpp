@@ -89,9 +89,14 @@ void Supervisor::all_were_lost(const GroupSigns::Loss& loss) {
     outage.process = static_cast<uint32_t>(p);
     outage.cause = loss.cause;
     outage.from_ns = loss.from_ns;
-    outage.start_ns = clock_.now_ns();
-    outage.started = true;
-    member.outage = outages_.add(outage);
+    for (size_t i = 0; i < outages_.size(); ++i)  // it was away already
+      if (outages_[i].process == p && outages_[i].back_ns == 0) member.outage = i;
+    if (member.outage == kNoOutage) member.outage = outages_.add(outage);
+    Outage& away = outages_[member.outage];
+    if (away.from_ns != loss.from_ns)
+      away.cause = BoundedText<200>(std::string(away.cause.c_str()) + "; then " + loss.cause.c_str());
+    away.start_ns = clock_.now_ns();
+    away.started = true;
     for (const size_t t : member.tasks) member.jobs_before.push_back(board_.task(t).job_count.load());
   }
 }
