@@ -51,7 +51,7 @@ def bandwidth():
         os.kill(pid, signal.SIGKILL)
         os.waitpid(pid, 0)
     time.sleep(0.2)
-    return (len(held) - 1) * 50 + low / 1000  # ms of 100
+    return round((len(held) - 1) * 50 + low / 1000, 1)  # ms of 100
 
 
 def traces():

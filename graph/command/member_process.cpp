@@ -20,7 +20,8 @@ class BoardGate final : public StartGate {
  public:
   BoardGate(RunBoard& board, size_t process) : board_(board), record_(board.process(process)) {}
   bool all_granted(bool mine) override {
-    if (record_.restarts.load() > 0 && !mine)  // the others will not wait: whoever looks after us tries again
+    // After a restart the others will not wait: whoever looks after us tries again.
+    if (record_.restarts.load() > 0 && !mine && board_.decision().load() == RunBoard::as_asked)
       throw std::runtime_error("the kernel refused a policy that it had granted before the restart");
     record_.refused.store(!mine);
     record_.state.store(ProcessRecord::agreed);

@@ -21,7 +21,7 @@ Json told(const Outage& outage, const std::string& process, std::vector<std::str
   const double down_s = static_cast<double>(end_of(outage, result) - outage.from_ns) / 1e9;
   std::string what = fmt::format("process {} {} at {:.2f} s, ", process, outage.cause.c_str(), seconds(outage.from_ns));
   if (outage.back_ns > 0) what += fmt::format("back after {:.2f} s", down_s);
-  else what += outage.start_ns > 0 ? "not back by the end" : "given up";
+  else what += outage.start_ns > 0 || outage.from_ns >= result.end_ns ? "not back by the end" : "given up";
   Json entry = {{"what", what},
                 {"kind", "outage"},
                 {"process", process},

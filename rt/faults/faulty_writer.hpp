@@ -64,6 +64,7 @@ class FaultyWriter final : public Writer {
   void discard() override;
   bool repeat(int64_t published_ns, int64_t visible_at_ns) override;
   WriterStatistics statistics() const override { return inner_->statistics(); }
+  uint64_t go_on_after(uint64_t noted) override { return inner_->go_on_after(noted); }
 
  private:
   /// A message on its way, and what the faults have made of it.

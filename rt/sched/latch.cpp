@@ -21,6 +21,7 @@ Latch::Latch(const TaskPlan& plan, Transport& transport, RunBoard& board, size_t
     e.reader = transport.make_reader(edge.port);
     e.requests = e.input == plan.node->control();
     e.statistics = &board.edge(task, edges_.size() - 1);
+    e.last_seen = e.statistics->last_seen;
   }
   for (const auto& group : plan.joins) {
     std::vector<size_t> members;
@@ -130,6 +131,7 @@ void Latch::count() {
     edge.statistics->received += edge.fresh.received;
     edge.statistics->dropped += edge.fresh.dropped;
     edge.statistics->stale += edge.fresh.stale;
+    edge.statistics->last_seen = edge.last_seen;
     edge.fresh = {};
     if (edge.age_ns == kNoAge) continue;
     edge.statistics->age.add(edge.age_ns);

@@ -8,12 +8,12 @@
 #include "rt/sched/fault_log.hpp"
 #include "rt/sched/grant.hpp"
 #include "rt/sched/mode_log.hpp"
+#include "rt/sched/outage_log.hpp"
 #include "rt/sched/plan.hpp"
 #include "rt/sched/source_record.hpp"
 #include "rt/sched/statistics.hpp"
 #include "rt/sched/stop_signal.hpp"
 #include "rt/shm/kill_order.hpp"
-#include "rt/sched/outage_log.hpp"
 
 namespace takt {
 

@@ -60,13 +60,16 @@ struct TaskStatistics {
 /// What one edge carried. Every message sent is received, superseded before a job latched it (dropped), or waiting.
 struct EdgeStatistics {
   uint64_t received = 0, dropped = 0, stale = 0;
+  uint64_t last_seen =
+      0;          ///< sequence of the newest message latched: whoever takes a dead reader's place goes on there
   Histogram age;  ///< stamp to job start, of the newest latched message
 };
 
 /// What one output gave.
 struct PortStatistics {
-  Histogram age;            ///< stamp of a message to its publication
-  WriterStatistics writer;  ///< at the end of the run, before anything is torn down
+  std::atomic<uint64_t> published{0};  ///< sequence of the newest message, stored before it is out
+  Histogram age;                       ///< stamp of a message to its publication
+  WriterStatistics writer;             ///< at the end of the run, before anything is torn down
 };
 
 /// What the kernel granted the thread that runs a task: Grant without pointers.

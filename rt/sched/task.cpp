@@ -67,6 +67,7 @@ Task::Task(const Plan& plan, size_t index, Transport& transport, const Clock& cl
   if (modes_.empty()) modes_.push_back({plan.mode, true});
   for (size_t i = 0; i < plan_.ports.size(); ++i) {
     writers_.push_back(transport.make_writer(plan_.ports[i]));
+    sequences_[i] = writers_.back()->go_on_after(board.port(plan_.ports[i]).published.load());
     PortAccess::attach(*plan_.node->outputs()[i], writers_.back().get());
   }
   size_t first = kNone;
@@ -316,15 +317,20 @@ void Task::settle_output(size_t i, bool late, int64_t now_ns, int64_t visible_at
   Writer& writer = *writers_[i];
   published_[i] = false;
   sent_stamps_ns_[i] = kNothingSent;
+  const auto count_publication = [&] {
+    board_.port(plan_.ports[i]).published.store(sequences_[i] + 1, std::memory_order_relaxed);
+  };
   const bool withheld = late && (plan_.on_miss == OnMiss::skip || plan_.on_miss == OnMiss::reuse_last);
   if (PortAccess::sent(output) && !withheld) {
     PortAccess::set_level(output, ended_.level);
+    count_publication();
     writer.publish(PortAccess::stamp_ns(output), now_ns, visible_at_ns);
     published_[i] = true;
     sent_stamps_ns_[i] = PortAccess::stamp_ns(output);
   } else {
     writer.discard();
     if (withheld && plan_.on_miss == OnMiss::reuse_last) published_[i] = writer.repeat(now_ns, visible_at_ns);
+    if (published_[i]) count_publication();
   }
   if (published_[i]) ++sequences_[i];
   PortAccess::reset(output);

@@ -171,6 +171,8 @@ class IceoryxWriter final : public Writer {
     return true;
   }
 
+  uint64_t go_on_after(uint64_t noted) override { return sequence_ = noted; }
+
   WriterStatistics statistics() const override {
     const iox::mepoo::MemPoolInfo info = const_cast<Publisher&>(messages_).pool(port_.pool_index);
     WriterStatistics s;

@@ -91,6 +91,8 @@ class LocalWriter final : public Writer {
     return true;
   }
 
+  uint64_t go_on_after(uint64_t) override { return pool_.state().newest.load(); }
+
   WriterStatistics statistics() const override {
     WriterStatistics s;
     s.sent = pool_.state().newest.load(std::memory_order_acquire);

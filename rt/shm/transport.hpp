@@ -59,6 +59,9 @@ class Writer {
   /// Publishes the previous message again, with its old stamp; false if there is none.
   virtual bool repeat(int64_t published_ns, int64_t visible_at_ns) = 0;
   virtual WriterStatistics statistics() const = 0;
+  /// Before the first publication: where an earlier writer of this output, which died, came to. `noted` is what others
+  /// noted of that, for back ends that do not know better.
+  virtual uint64_t go_on_after(uint64_t noted) { return noted; }
 };
 
 /// Input side of an edge. One thread at a time.

@@ -60,20 +60,26 @@ void Supervisor::look() {
 }
 
 void Supervisor::note_end(const ProcessGroup::End& end, int64_t now_ns) {
-  if (ending_ || (end.code == 0 && end.signal == 0)) return;  // it came to the end of the run
+  const bool finished = board_.process(end.process).state.load() == ProcessRecord::finished;
+  if (end.code == 0 && (finished || ending_)) return;
   Member& member = members_[end.process];
   lost_cpu_ns_ += end.cpu_ns;
   if (end.signal != 0 && options_.clean_up) options_.clean_up(end.pid);
   const int64_t from_ns = member.killed_for.empty() ? now_ns : member.away_since_ns;
   const std::string cause = text_of(end) + std::exchange(member.killed_for, "");
-  Outage outage;
-  outage.process = static_cast<uint32_t>(end.process);
-  outage.cause = BoundedText<200>(cause);
-  outage.from_ns = from_ns;
   board_.lose_sources(member.tasks, now_ns, now_ns + ModeLog::kLead_ns);
-  outage.freed = transport_.reclaim(static_cast<uint32_t>(end.process) + 1);
-  // Dead again before it was back: one more outage, though the first goes on.
-  member.outage = outages_.add(outage);
+  if (member.outage == kNoOutage) {
+    Outage outage;
+    outage.process = static_cast<uint32_t>(end.process);
+    outage.cause = BoundedText<200>(cause);
+    outage.from_ns = from_ns;
+    member.outage = outages_.add(outage);
+  }  // else it has died again before it was back: the outage goes on
+  Outage& outage = outages_[member.outage];
+  outage.freed += transport_.reclaim(static_cast<uint32_t>(end.process) + 1);
+  outage.started = false;
+  outage.start_ns = 0;
+  if (ending_) return;
   const auto again = member.policy.ended(now_ns);
   if (!again) return give_up(end.process, now_ns, cause);
   outages_[member.outage].start_ns = *again;
@@ -97,7 +103,7 @@ void Supervisor::all_were_lost(const GroupSigns::Loss& loss) {
       away.cause = BoundedText<200>(std::string(away.cause.c_str()) + "; then " + loss.cause.c_str());
     away.start_ns = clock_.now_ns();
     away.started = true;
-    for (const size_t t : member.tasks) member.jobs_before.push_back(board_.task(t).job_count.load());
+    for (const size_t t : member.tasks) member.releases_before.push_back(releases_seen(t));
   }
 }
 
@@ -120,8 +126,8 @@ void Supervisor::start_again(size_t process, int64_t now_ns) {
   record.life.heartbeat_ns.store(0);
   record.life.hanging.store(0);
   record.restarts.fetch_add(1);
-  member.jobs_before.clear();
-  for (const size_t t : member.tasks) member.jobs_before.push_back(board_.task(t).job_count.load());
+  member.releases_before.clear();
+  for (const size_t t : member.tasks) member.releases_before.push_back(releases_seen(t));
   Outage& outage = outages_[member.outage];
   outage.started = group_.restart(process);
   outage.start_ns = now_ns;
@@ -129,13 +135,16 @@ void Supervisor::start_again(size_t process, int64_t now_ns) {
   if (!outage.started) give_up(process, now_ns, "could not be started again"), outage.start_ns = 0;
 }
 
+uint64_t Supervisor::releases_seen(size_t task) const {
+  return board_.task(task).job_count.load() + board_.task(task).paused.load();
+}
+
 bool Supervisor::all_ran(const Member& member) const {
   const uint32_t mode = board_.modes().at(clock_.now_ns());
   for (size_t i = 0; i < member.tasks.size(); ++i) {
     const size_t t = member.tasks[i];
     const bool waits = !plan_.tasks[t].rate || (mode < plan_.modes.size() && !plan_.modes[mode].runs[t]);
-    const uint64_t paused = board_.task(t).paused.load();  // a request may keep it from working
-    if (!waits && board_.task(t).job_count.load() + paused <= member.jobs_before[i]) return false;
+    if (!waits && releases_seen(t) <= member.releases_before[i]) return false;
   }
   return true;
 }

@@ -52,12 +52,12 @@ class Supervisor {
   struct Member {
     std::vector<size_t> tasks;
     RestartPolicy policy;
-    size_t outage = kNoOutage;          ///< under way
-    std::vector<uint64_t> jobs_before;  ///< of each task, when it was started again
-    int64_t heartbeat_ns = 0;           ///< last one seen
-    int64_t silent_ns = 0;              ///< since then, as far as this process was awake itself
-    std::string killed_for;             ///< why it was killed by us
-    int64_t away_since_ns = 0;          ///< ... and since when it had not been there
+    size_t outage = kNoOutage;              ///< under way
+    std::vector<uint64_t> releases_before;  ///< of each task, when it was started again
+    int64_t heartbeat_ns = 0;               ///< last one seen
+    int64_t silent_ns = 0;                  ///< since then, as far as this process was awake itself
+    std::string killed_for;                 ///< why it was killed by us
+    int64_t away_since_ns = 0;              ///< ... and since when it had not been there
   };
 
   void note_end(const ProcessGroup::End& end, int64_t now_ns);
@@ -67,6 +67,8 @@ class Supervisor {
   void watch_life(size_t process, int64_t awake_ns);
   void end(size_t process, int64_t since_ns, const std::string& why);
   bool all_ran(const Member& member) const;
+  /// At which the task ran a job, or would have, had requests let it.
+  uint64_t releases_seen(size_t task) const;
 
   const Plan& plan_;
   RunBoard& board_;

@@ -44,6 +44,8 @@ assert down["stereo"] > 0 and down["object_detection"] > 0 and down["obstacle_st
 for n in report["nodes"]:
     lost = n["released"] - n["completed"] - n["skipped"] - n["reused"]
     assert 0 <= lost <= n["down"] + 1, n  # one: under way at the kill
+for e in report["edges"]:  # a restarted reader sees nothing twice, a restarted writer begins no new count
+    assert e["received"] + e["dropped"] <= e["sent"], e
 assert not report["ok"]
 PY
 done

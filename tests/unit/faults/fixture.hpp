@@ -40,6 +40,7 @@ inline Plan small_plan() {
   add("camera", "pair", MessageType::of<StereoPair>(), {.width = 8, .height = 4});
   add("stereo", "disparity", MessageType::of<DisparityMap>(), {.width = 8, .height = 4});
   add("planner", "motion", MessageType::of<Motion>(), {});
+  plan.tasks[2].edges.push_back({.port = 1});
   return plan;
 }
 

@@ -139,6 +139,20 @@ TEST_CASE("expectations of what the graph does not have") {
                  {"unknown key `missed`", "did you mean `misses`?"});
 }
 
+TEST_CASE("a step of a message's life belongs to its writer or to a reader of it") {
+  const RunKind processes{false, true, false};
+  const auto step = [](const std::string& keys) {
+    return scenario_text("{kind: kill_at_step, target: stereo.disparity, at: 1s, " + keys + "}");
+  };
+  const auto sound = load(step("step: inside_publish"), processes);
+  REQUIRE(sound.scenario);
+  CHECK(sound.scenario->faults[0].step == MessageStep::inside_publish);
+  CHECK(load(step("step: while_held, reader: planner"), processes).scenario);
+  expect_problem(step("step: while_held"), 4, 66, {"`while_held`", "name it as `reader`"}, processes);
+  expect_problem(step("step: after_loan, reader: planner"), 4, 66, {"`after_loan`", "leave `reader` out"}, processes);
+  expect_problem(step("step: while_held, reader: stereo"), 4, 86, {"`stereo` does not read", "planner"}, processes);
+}
+
 TEST_CASE("faults that such a run cannot have") {
   const RunKind virtual_time{true, false, false}, one_process{false, false, true}, processes{false, true, true};
   expect_problem(scenario_text("{kind: cpu_hog}"), 4, 12, {"real time only", "--clock real"}, virtual_time);

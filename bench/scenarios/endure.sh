@@ -1,0 +1,83 @@
+#!/bin/bash
+# SPDX-License-Identifier: Apache-2.0
+# A run with a fault every ten seconds, of all kinds in turn: endure.sh [MINUTES] [SEED] [takt run options...]
+# Default: 30 minutes. obstacle_stop must not miss a deadline; memory must stay flat: resident memory of the supervisor
+# and its members is sampled and the last tenth compared with the second. Exit 1 if either is broken.
+root=$(readlink -f "$(dirname "$0")/../..")
+exec python3 - "${TAKT:-$root/takt}" "$root" "$@" <<'PY'
+import json, os, random, subprocess, sys, tempfile, time
+
+takt, root, args = sys.argv[1], sys.argv[2], sys.argv[3:]
+minutes = float(args[0]) if args else 30
+chance = random.Random(int(args[1]) if len(args) > 1 else 1)
+options = args[2:]
+seconds = int(minutes * 60)
+kinds = [  # {t}: when it begins; {u}: three seconds later
+    "{{kind: kill, target: mapping, at: {t}s}}",
+    "{{kind: unplugged, target: head_camera, from: {t}s, to: {u}s}}",
+    "{{kind: corrupt, target: stereo.disparity, from: {t}s, to: {u}s}}",
+    "{{kind: hang, target: object_detection, at: {t}s, for: 0s}}",
+    "{{kind: cpu_hog, from: {t}s, to: {u}s, threads: 2}}",
+    "{{kind: drop, target: head_camera.pair, from: {t}s, to: {u}s, probability: 0.5}}",
+    "{{kind: stop_process, target: detection, at: {t}s, for: 5s}}",
+    "{{kind: silent, target: front_laser, from: {t}s, to: {u}s}}",
+    "{{kind: memory_hog, megabytes: 200, from: {t}s, to: {u}s}}",
+    "{{kind: kill_at_step, target: stereo.cloud, step: inside_publish, at: {t}s}}",
+    "{{kind: slow_consumer, target: mapping_3d, by: 150ms, from: {t}s, to: {u}s}}",
+    "{{kind: exhausted_pool, target: ego_motion.motion, from: {t}s, to: {u}s}}",
+    "{{kind: kill, target: mind, at: {t}s}}",
+    "{{kind: frozen, target: head_camera, from: {t}s, to: {u}s}}",
+    "{{kind: delay, target: front_laser.scan, by: 50ms, from: {t}s, to: {u}s}}",
+    "{{kind: kill, target: devices, at: {t}s}}",
+    "{{kind: garbage, target: front_laser, from: {t}s, to: {u}s}}",
+    "{{kind: kill, target: detection, at: {t}s}}",
+]
+chance.shuffle(kinds)
+with tempfile.TemporaryDirectory(prefix="endure-") as work:
+    with open(f"{work}/scenario.yaml", "w") as f:
+        f.write("takt: 1\nname: endure\nseed: 1\nfaults:\n")
+        for i, t in enumerate(range(10, seconds - 10, 10)):
+            f.write("  - " + kinds[i % len(kinds)].format(t=t, u=t + 3) + "\n")
+        f.write("expect:\n  misses: {obstacle_stop: 0}\n")
+    log = open(f"{work}/log", "w")
+    run = subprocess.Popen([takt, "run", f"{root}/graph/ace.yaml", "--isolate", "subsystem", "--for", f"{seconds}s", "--faults", f"{work}/scenario.yaml",
+                            "--output", f"{work}/out", "--report", f"{work}/report.json", *options], stdout=log, stderr=log)
+
+    def resident_mb():
+        """Proportional set size of all processes of the run."""
+        pids, total = [run.pid], 0
+        for task in os.listdir(f"/proc/{run.pid}/task"):
+            try: pids += open(f"/proc/{run.pid}/task/{task}/children").read().split()
+            except OSError: pass
+        for pid in pids:
+            try: total += int(next(l for l in open(f"/proc/{pid}/smaps_rollup") if l.startswith("Pss:")).split()[1])
+            except (OSError, StopIteration): pass
+        return total / 1024
+
+    samples = []
+    while run.poll() is None:
+        time.sleep(5)
+        try: samples.append(resident_mb())
+        except OSError: pass
+    if not os.path.exists(f"{work}/report.json"): sys.exit("no report:\n" + open(log.name).read()[-2000:])
+    report = json.load(open(f"{work}/report.json"))
+tenth = max(1, len(samples) // 10)
+middle = lambda part: sorted(part)[len(part) // 2]
+early, late = middle(samples[tenth:2 * tenth] or samples), middle(samples[-tenth - 1:-1] or samples)
+outages = [f for f in report["faults"] if f.get("kind") == "outage"]
+back = sorted(f["down_s"] for f in outages if f["back_s"] is not None)
+faults = report["scenario"]["faults"]
+print(f"{report['duration_s']:.0f} s, policy {report['policy_granted']}, host stall {report['host_stall_ms']} ms: {len(faults)} faults, "
+      f"{sum(f['struck'] > 0 for f in faults)} struck; {len(outages)} outages, {len(outages) - len(back)} not back"
+      + (f", away p50 {back[len(back) // 2]:.2f} s, max {back[-1]:.2f} s" if back else ""))
+print(f"modes {len(report['modes']) - 1} changes; resident memory {early:.0f} MB in the second tenth, {late:.0f} MB in the last")
+for n in report["nodes"]:
+    print(f"{n['name']:18}{n['criticality']:>6} released {n['released']:6} down {n.get('down', 0):5} done {n['completed']:6} miss {n['deadline_misses']:4}")
+stop = next(n for n in report["nodes"] if n["name"] == "obstacle_stop")
+bad = []
+if stop["deadline_misses"]: bad.append(f"obstacle_stop missed {stop['deadline_misses']}")
+if len(outages) != len(back): bad.append("a process did not come back")
+if late > 1.05 * early + 5: bad.append(f"memory grew from {early:.0f} to {late:.0f} MB")
+for what in bad: print("FAILED:", what)
+sys.exit(bool(bad))
+PY
