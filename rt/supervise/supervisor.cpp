@@ -82,7 +82,7 @@ void Supervisor::note_end(const ProcessGroup::End& end, int64_t now_ns) {
   if (ending_) return;
   const auto again = member.policy.ended(now_ns);
   if (!again) return give_up(end.process, now_ns, cause);
-  outages_[member.outage].start_ns = *again;
+  outage.start_ns = *again;
   if (options_.say)
     options_.say("process " + group_.name(end.process) + " " + cause + "; it is started again" +
                  (*again > now_ns ? " in " + seconds(*again - now_ns) : ""));
