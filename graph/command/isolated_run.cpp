@@ -144,7 +144,8 @@ class IsolatedRun {
       const LiveTable live(plan_, board_,
                            fmt::format("takt run {} ({}, policy {}, {} processes)", graph_.name, graph_.profile,
                                        to_string(plan_.policy), group_.size()));
-      const DaemonProbe probe(*transport_, board_.group(), clock_);
+      std::optional<DaemonProbe> probe;
+      if (options_.transport == "iceoryx") probe.emplace(*transport_, board_.group(), clock_);
       watchdog_.emplace(options_, plan_, board_);
       const RunFaults::Active faulty(faults_, plan_, clock_, board_);
       watch();
@@ -344,7 +345,7 @@ class IsolatedRun {
     record_.tell(report);
     const int exit = code_ != 0 ? code_ : report["ok"].get<bool>() ? kOk : kNotOk;
     faults_.judge(result, board_, exit, partition_.names, report);
-    watchdog_->end();
+    if (code_ == 0) watchdog_->end();  // else nobody says that all is well
     tell(options_, graph_, report);
     if (!no_trace.empty()) return refuse(no_trace, kBadInput);
     return faults_.exit_code(exit, report);

@@ -8,7 +8,7 @@
 
 namespace takt::command {
 
-/// Supervises a run with one process for the devices and one per subsystem: owns the transport (with the iceoryx
+/// Supervises a run with one process for the devices and one per subsystem: owns the transport (over iceoryx with its
 /// daemon), the epoch, the report, and the order in which everything ends; returns the exit code. Before this process
 /// has any other thread. Throws TransportError if the command line asks for iceoryx and there is no room for its
 /// daemon.
