@@ -5,7 +5,6 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
@@ -18,7 +17,6 @@ namespace takt {
 namespace {
 
 constexpr int64_t kStep_ns = 5'000'000;
-constexpr int64_t kAwakeStep_ns = 50'000'000;  // longer between two looks: this process, too, did not run
 
 void wait_a_step(int64_t ns = kStep_ns) {
   const timespec pause{ns / 1'000'000'000, ns % 1'000'000'000};
@@ -62,19 +60,10 @@ std::optional<int> GroupKeeper::keep(const std::function<int()>& group) {
   }
 }
 
-bool GroupKeeper::silent(int64_t now_ns) {
-  const int64_t heartbeat_ns = signs_.heartbeat_ns.load(), awake_ns = std::min(now_ns - last_look_ns_, kAwakeStep_ns);
-  last_look_ns_ = now_ns;
-  silent_ns_ = heartbeat_ns == 0 || heartbeat_ns != heartbeat_ns_ ? 0 : silent_ns_ + awake_ns;
-  heartbeat_ns_ = heartbeat_ns;
-  return silent_ns_ > options_.silence_ns;
-}
-
 std::optional<int> GroupKeeper::watch(const std::function<int()>& group) {
   prctl(PR_SET_CHILD_SUBREAPER, 1);
   signs_.heartbeat_ns.store(0);
-  last_look_ns_ = clock_.now_ns();
-  silent_ns_ = 0;
+  Silence silence;
   const pid_t pid = fork_group(group);
   GroupSigns::Loss loss;
   bool told = false;
@@ -86,8 +75,9 @@ std::optional<int> GroupKeeper::watch(const std::function<int()>& group) {
       kill(pid, SIGTERM);
       told = true;
     }
-    if (!silent(clock_.now_ns()) || loss.from_ns != 0) continue;
-    loss.from_ns = heartbeat_ns_;
+    const int64_t heartbeat_ns = signs_.heartbeat_ns.load();
+    if (silence.look(heartbeat_ns, clock_.now_ns()) <= options_.silence_ns || loss.from_ns != 0) continue;
+    loss.from_ns = heartbeat_ns;
     loss.cause = BoundedText<200>("the transport's daemon gave no sign of life");
     kill(pid, SIGKILL);  // its members go with it
   }

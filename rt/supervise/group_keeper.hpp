@@ -9,6 +9,7 @@
 #include "rt/memory/sanitized.hpp"
 #include "rt/sched/outage_log.hpp"
 #include "rt/supervise/restart_policy.hpp"
+#include "rt/supervise/silence.hpp"
 #include "rt/time/clock.hpp"
 
 namespace takt {
@@ -34,13 +35,10 @@ class GroupKeeper {
  private:
   /// Starts a group and waits for its end: its exit code, or nothing if it was lost, which is then noted.
   std::optional<int> watch(const std::function<int()>& group);
-  /// True if it gives no sign any more.
-  bool silent(int64_t now_ns);
 
   GroupSigns& signs_;
   const Clock& clock_;
   const Options options_;
-  int64_t last_look_ns_ = 0, heartbeat_ns_ = 0, silent_ns_ = 0;
 };
 
 }  // namespace takt

@@ -9,8 +9,6 @@
 namespace takt {
 namespace {
 
-constexpr int64_t kAwakeStep_ns = 50'000'000;  // longer between two looks: this process, too, did not run
-
 std::string text_of(const ProcessGroup::End& end) {
   if (end.signal == 0) return "ended with code " + std::to_string(end.code);
   return "was ended by signal " + std::to_string(end.signal) + " (" + strsignal(end.signal) + ")";
@@ -32,25 +30,23 @@ Supervisor::Supervisor(const Plan& plan, RunBoard& board, ProcessGroup& group, T
       transport_(transport),
       clock_(clock),
       options_(std::move(options)),
-      outages_(board.outages()),
-      last_look_ns_(clock.now_ns()) {
+      outages_(board.outages()) {
   for (std::vector<size_t>& tasks : tasks_of) {
     Member& member = members_.emplace_back();
     member.tasks = std::move(tasks);
     member.policy = RestartPolicy(options_.restarts);
-    member.policy.started(last_look_ns_);
+    member.policy.started(clock.now_ns());
   }
 }
 
 void Supervisor::look() {
-  const int64_t now_ns = clock_.now_ns(), awake_ns = std::min(now_ns - last_look_ns_, kAwakeStep_ns);
-  last_look_ns_ = now_ns;
+  const int64_t now_ns = clock_.now_ns();
   while (const auto end = group_.reap()) note_end(*end, now_ns);
   if (ending_) return;
   for (size_t p = 0; p < members_.size(); ++p) {
     Member& member = members_[p];
     if (member.outage == kNoOutage) {
-      watch_life(p, awake_ns);
+      watch_life(p, now_ns);
       continue;
     }
     const Outage& outage = outages_[member.outage];
@@ -156,7 +152,7 @@ void Supervisor::watch_return(size_t process, int64_t now_ns) {
   if (running && all_ran(member)) {
     outage.back_ns = now_ns;
     member.outage = kNoOutage;
-    member.silent_ns = 0;
+    member.silence = {};
     if (options_.say)
       options_.say("process " + group_.name(process) + " is back after " + seconds(now_ns - outage.from_ns));
   } else if (now_ns - outage.start_ns > options_.start_patience_ns) {
@@ -165,17 +161,14 @@ void Supervisor::watch_return(size_t process, int64_t now_ns) {
   }
 }
 
-void Supervisor::watch_life(size_t process, int64_t awake_ns) {
+void Supervisor::watch_life(size_t process, int64_t now_ns) {
   Member& member = members_[process];
   const LifeSigns& life = board_.process(process).life;
   if (const uint32_t hanging = life.hanging.load(); hanging > 0)
     return end(process, life.hanging_since_ns.load(),
                ", because a job of " + plan_.tasks[hanging - 1].name + " did not return");
   const int64_t heartbeat_ns = life.heartbeat_ns.load();
-  if (heartbeat_ns == 0) return;
-  member.silent_ns = heartbeat_ns == member.heartbeat_ns ? member.silent_ns + awake_ns : 0;
-  member.heartbeat_ns = heartbeat_ns;
-  if (member.silent_ns > options_.silence_ns)
+  if (member.silence.look(heartbeat_ns, now_ns) > options_.silence_ns)
     end(process, heartbeat_ns, ", because it gave no sign of life for " + seconds(options_.silence_ns));
 }
 

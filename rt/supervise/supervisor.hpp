@@ -9,6 +9,7 @@
 #include "rt/shm/transport.hpp"
 #include "rt/supervise/process_group.hpp"
 #include "rt/supervise/restart_policy.hpp"
+#include "rt/supervise/silence.hpp"
 #include "rt/time/clock.hpp"
 
 namespace takt {
@@ -54,17 +55,16 @@ class Supervisor {
     RestartPolicy policy;
     size_t outage = kNoOutage;              ///< under way
     std::vector<uint64_t> releases_before;  ///< of each task, when it was started again
-    int64_t heartbeat_ns = 0;               ///< last one seen
-    int64_t silent_ns = 0;                  ///< since then, as far as this process was awake itself
-    std::string killed_for;                 ///< why it was killed by us
-    int64_t away_since_ns = 0;              ///< ... and since when it had not been there
+    Silence silence;
+    std::string killed_for;     ///< why it was killed by us
+    int64_t away_since_ns = 0;  ///< ... and since when it had not been there
   };
 
   void note_end(const ProcessGroup::End& end, int64_t now_ns);
   void start_again(size_t process, int64_t now_ns);
   void give_up(size_t process, int64_t now_ns, const std::string& cause);
   void watch_return(size_t process, int64_t now_ns);
-  void watch_life(size_t process, int64_t awake_ns);
+  void watch_life(size_t process, int64_t now_ns);
   void end(size_t process, int64_t since_ns, const std::string& why);
   bool all_ran(const Member& member) const;
   /// At which the task ran a job, or would have, had requests let it.
@@ -78,7 +78,7 @@ class Supervisor {
   const Options options_;
   std::vector<Member> members_;
   OutageLog& outages_;  ///< on the board
-  int64_t last_look_ns_ = 0, lost_cpu_ns_ = 0;
+  int64_t lost_cpu_ns_ = 0;
   bool ending_ = false, gave_up_ = false;
 };
 
