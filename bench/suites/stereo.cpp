@@ -75,13 +75,14 @@ std::vector<Row> run_stereo(const Options& options) {
   const Scene scene;
   stereo::MatcherParameters parameters;
   parameters.disparities = kDisparities;
-  stereo::Matcher colour(kWidth, kHeight, 3, parameters), grey(kWidth, kHeight, 1, parameters);
+  const auto colour = stereo::make_matcher(kWidth, kHeight, 3, parameters),
+             grey = stereo::make_matcher(kWidth, kHeight, 1, parameters);
   cv::Mat disparity(kHeight, kWidth, CV_16S), confidence(kHeight, kWidth, CV_8U), theirs;
   const auto view = [](const cv::Mat& m) { return ImageView<const uint8_t>{m.data, m.cols, m.rows, m.channels()}; };
   const ImageView<int16_t> out{disparity.ptr<int16_t>(), kWidth, kHeight};
   const ImageView<uint8_t> sure{confidence.data, kWidth, kHeight};
   const auto run = [&](stereo::Matcher& matcher, const cv::Mat& left, const cv::Mat& right) {
-    if (!matcher.match(view(left), view(right), out, sure)) throw CannotRun("the matcher refused its input");
+    if (!matcher.match(view(left), view(right), {out, sure})) throw CannotRun("the matcher refused its input");
   };
   // OpenCV wants a multiple of 16.
   const auto block = cv::StereoBM::create((kDisparities + 15) / 16 * 16, parameters.n_square);
@@ -89,14 +90,14 @@ std::vector<Row> run_stereo(const Options& options) {
                                              cv::StereoSGBM::MODE_SGBM_3WAY);
   const auto with_block = [&] { block->compute(scene.left_grey, scene.right_grey, theirs); };
   const auto with_global = [&] { global->compute(scene.left, scene.right, theirs); };
-  const std::string granted = std::string("one thread, ") + colour.target();
+  const std::string granted = std::string("one thread, ") + colour->target();
   std::vector<Row> rows;
   compare(rows, "match_grey", "cv::StereoBM", granted, rounds, with_block,
-          [&] { run(grey, scene.left_grey, scene.right_grey); });
+          [&] { run(*grey, scene.left_grey, scene.right_grey); });
   compare(rows, "match_colour", "cv::StereoBM on grey", granted, rounds, with_block,
-          [&] { run(colour, scene.left, scene.right); });
+          [&] { run(*colour, scene.left, scene.right); });
   compare(rows, "match_colour_to_sgbm", "cv::StereoSGBM 3-way", granted, rounds, with_global,
-          [&] { run(colour, scene.left, scene.right); });
+          [&] { run(*colour, scene.left, scene.right); });
   return rows;
 }
 

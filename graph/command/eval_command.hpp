@@ -13,6 +13,7 @@ struct EvalStereoOptions {
   double truth_scale = 1;  ///< disparity = value / scale
   int disparities = 64;
   std::vector<std::string> set;  ///< "param=value" of the stereo node
+  bool variants = false;
   bool json = false;
 };
 void add_eval_stereo(CLI::App& eval, EvalStereoOptions& options, int& exit_code);

@@ -110,7 +110,7 @@ Track follow(const EvalEgoMotionOptions& options) {
   const cv::Mat first = read_grey(left.front());
   stereo::MatcherParameters match;
   match.disparities = options.disparities;
-  stereo::Matcher matcher(first.cols, first.rows, 1, match);
+  const auto matcher = stereo::make_matcher(first.cols, first.rows, 1, match);
   ego_motion::EgoMotion ego;
   ego.configure(first.cols, first.rows, {});
   cv::Mat disparity(first.size(), CV_16S), confidence(first.size(), CV_8U);
@@ -119,7 +119,7 @@ Track follow(const EvalEgoMotionOptions& options) {
     const cv::Mat l = read_grey(left[i]), r = read_grey(right[i]);
     auto start = std::chrono::steady_clock::now();
     const ImageView<int16_t> d{disparity.ptr<int16_t>(), first.cols, first.rows};
-    if (!matcher.match(view(l), view(r), d, {confidence.data, first.cols, first.rows}))
+    if (!matcher->match(view(l), view(r), {d, {confidence.data, first.cols, first.rows}}))
       throw BadData(fmt::format("{}: size differs from the first image", left[i].string()));
     track.stereo_ms.push_back(ms_since(start));
     start = std::chrono::steady_clock::now();

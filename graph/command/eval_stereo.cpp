@@ -10,6 +10,7 @@
 
 #include "graph/command/eval_command.hpp"
 #include "graph/command/run_command.hpp"
+#include "graph/command/stereo_parameters.hpp"
 #include "nodes/stereo/evaluate.hpp"
 #include "nodes/stereo/evaluate_peers.hpp"
 #include "nodes/stereo/half_resolution.hpp"
@@ -45,42 +46,10 @@ stereo::DisparityImage read_truth(const std::filesystem::path& file, double scal
   return stereo::ground_truth(view(truth), scale);
 }
 
-int whole(const std::string& key, const std::string& value, int low, int high) {
-  size_t used = 0;
-  int number = low - 1;
-  try {
-    number = std::stoi(value, &used);
-  } catch (const std::exception&) {
-  }
-  if (used != value.size() || number < low || number > high)
-    throw BadData(fmt::format("--set {}={}: must be an integer in {}..{}", key, value, low, high));
-  return number;
-}
-
-/// The matcher parameters of the stereo node, by their names there.
-stereo::MatcherParameters parameters(const EvalStereoOptions& options) {
-  stereo::MatcherParameters p;
-  p.disparities = options.disparities;
-  for (const std::string& text : options.set) {
-    const size_t equals = text.find('=');
-    const std::string key = text.substr(0, equals), value = equals == std::string::npos ? "" : text.substr(equals + 1);
-    if (key == "cost") {
-      if (value == "gradient") p.cost = stereo::CostKind::gradient;
-      else if (value == "ssd") p.cost = stereo::CostKind::ssd;
-      else if (value == "sad") p.cost = stereo::CostKind::sad;
-      else throw BadData(fmt::format("--set cost={}: valid are gradient | ssd | sad", value));
-    } else if (key == "c_max") p.c_max = whole(key, value, 0, 255);
-    else if (key == "n_square") p.n_square = whole(key, value, 1, 31);
-    else if (key == "n_min") p.n_min = whole(key, value, 1, 31);
-    else if (key == "disparities") p.disparities = whole(key, value, 1, 512);
-    else throw BadData(fmt::format("--set {}: valid parameters are cost, c_max, n_square, n_min, disparities", key));
-  }
-  return p;
-}
-
 Json row(const stereo::StereoScore& score, double time_ms) {
   return {{"bad_1px_pct", score.bad_1px_pct},
           {"bad_1px_all_pct", score.bad_1px_all_pct},
+          {"bad_half_px_pct", score.bad_half_px_pct},
           {"density_pct", score.density_pct},
           {"time_ms", time_ms}};
 }
@@ -90,21 +59,29 @@ double median(std::vector<double> v) {
   return v[v.size() / 2];
 }
 
-/// AnyMatcher: one of the node's quality levels.
-template <class AnyMatcher>
-Json run_ours(const cv::Mat& left, const cv::Mat& right, const stereo::DisparityImage& truth,
-              const stereo::MatcherParameters& p) {
-  AnyMatcher matcher(left.cols, left.rows, left.channels(), p);
-  cv::Mat disparity(left.size(), CV_16S), confidence(left.size(), CV_8U);
-  const ImageView<int16_t> d{disparity.ptr<int16_t>(), left.cols, left.rows};
+Json run_ours(const cv::Mat& left, const cv::Mat& right, const stereo::DisparityImage& truth, stereo::Matcher& matcher,
+              int repeats) {
+  cv::Mat disparity(left.size(), CV_16S), confidence(left.size(), CV_8U), fraction(left.size(), CV_8U);
+  const stereo::DisparityViews out{{disparity.ptr<int16_t>(), left.cols, left.rows},
+                                   {confidence.data, left.cols, left.rows},
+                                   {fraction.data, left.cols, left.rows}};
   std::vector<double> times;
-  for (int i = 0; i < kRepeats; ++i) {
+  for (int i = 0; i < repeats; ++i) {
     const int64_t start = thread_cpu_ns();
-    if (!matcher.match(view(left), view(right), d, {confidence.data, left.cols, left.rows}))
-      throw BadData("left and right image differ in size or channels");
+    if (!matcher.match(view(left), view(right), out)) throw BadData("left and right image differ in size or channels");
     times.push_back(static_cast<double>(thread_cpu_ns() - start) / 1e6);
   }
-  return row(stereo::score(stereo::to_disparity_image(d), truth), median(times));
+  return row(stereo::score(stereo::to_disparity_image(out), truth), median(times));
+}
+
+Json run_variants(const cv::Mat& left, const cv::Mat& right, const stereo::DisparityImage& truth, int disparities) {
+  Json rows = Json::object();
+  for (const StereoVariant& variant : stereo_variants(disparities)) {
+    const auto matcher = stereo::make_matcher(left.cols, left.rows, left.channels(), variant.parameters);
+    const bool slow = std::string_view(matcher->target()) == "scalar";  // seconds: once is enough
+    rows[variant.name] = run_ours(left, right, truth, *matcher, slow ? 1 : kRepeats);
+  }
+  return rows;
 }
 
 Json run_peer(stereo::Peer peer, const cv::Mat& left, const cv::Mat& right, const stereo::DisparityImage& truth,
@@ -116,8 +93,9 @@ Json run_peer(stereo::Peer peer, const cv::Mat& left, const cv::Mat& right, cons
 }
 
 void print_row(const char* name, const Json& r) {
-  std::printf("%-34s %9.2f %9.2f %10.1f %9.2f\n", name, r["bad_1px_pct"].get<double>(),
-              r["bad_1px_all_pct"].get<double>(), r["density_pct"].get<double>(), r["time_ms"].get<double>());
+  std::printf("%-34s %9.2f %9.2f %9.2f %10.1f %9.2f\n", name, r["bad_1px_pct"].get<double>(),
+              r["bad_1px_all_pct"].get<double>(), r["bad_half_px_pct"].get<double>(), r["density_pct"].get<double>(),
+              r["time_ms"].get<double>());
 }
 
 Json measure(const EvalStereoOptions& options) {
@@ -128,9 +106,14 @@ Json measure(const EvalStereoOptions& options) {
   if (truth.width != left.cols || truth.height != left.rows)
     throw BadData(fmt::format("{}: {} x {}, the images are {} x {}", options.truth.string(), truth.width, truth.height,
                               left.cols, left.rows));
-  const stereo::MatcherParameters p = parameters(options);
-  Json out = run_ours<stereo::Matcher>(left, right, truth, p);
-  out["levels"]["half"] = run_ours<stereo::HalfMatcher>(left, right, truth, p);
+  stereo::MatcherParameters p;
+  p.disparities = options.disparities;
+  set_stereo_parameters(options.set, p);
+  const auto matcher = stereo::make_matcher(left.cols, left.rows, left.channels(), p);
+  Json out = run_ours(left, right, truth, *matcher, kRepeats);
+  stereo::HalfMatcher half(left.cols, left.rows, left.channels(), p);
+  out["levels"]["half"] = run_ours(left, right, truth, half, kRepeats);
+  if (options.variants) out["variants"] = run_variants(left, right, truth, p.disparities);
   stereo::DisparityImage middle = truth;
   std::fill(middle.pixels.begin(), middle.pixels.end(), static_cast<float>(p.disparities) / 2);
   out["baseline"] = row(stereo::score(middle, truth), 0);
@@ -149,9 +132,11 @@ int evaluate(const EvalStereoOptions& options) {
       std::printf("%s\n", out.dump(2).c_str());
       return kOk;
     }
-    std::printf("%-34s %9s %9s %10s %9s\n", "method", "bad >1px", "bad, all", "density %", "CPU ms");
+    std::printf("%-34s %9s %9s %9s %10s %9s\n", "method", "bad >1px", "bad, all", "bad >0.5", "density %", "CPU ms");
     print_row("takt stereo", out);
     print_row("takt stereo, level half", out["levels"]["half"]);
+    if (out.contains("variants"))
+      for (const auto& [name, variant] : out["variants"].items()) print_row(name.c_str(), variant);
     for (const auto& [name, peer] : out["peers"].items()) print_row(name.c_str(), peer);
     print_row("half the search range everywhere", out["baseline"]);
     return kOk;
@@ -171,6 +156,7 @@ void add_eval_stereo(CLI::App& eval, EvalStereoOptions& o, int& exit_code) {
   app->add_option("--gt-scale", o.truth_scale, "disparity = value / scale (default 1)")->check(CLI::PositiveNumber);
   app->add_option("--disparities", o.disparities, "search range, px (default 64)")->check(CLI::Range(1, 512));
   app->add_option("--set", o.set, "parameter=value of the stereo node, repeatable");
+  app->add_flag("--variants", o.variants, "every way of matching, too: costs, windows, selections");
   app->add_flag("--json", o.json, "one JSON object on stdout");
   app->callback([&] { exit_code = evaluate(o); });
 }

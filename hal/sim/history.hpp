@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstdint>
@@ -24,10 +25,18 @@ class History {
     append(start);
   }
   void append(const State& state) {
-    const int64_t n = count_.load(std::memory_order_relaxed);
-    Slot& slot = slots_[static_cast<size_t>(n % kSlots)];
-    for (size_t i = 0; i < N; ++i) slot[i].store(state[i], std::memory_order_relaxed);
-    count_.store(n + 1, std::memory_order_release);
+    const int64_t tick = count_.load(std::memory_order_relaxed);
+    write(tick, state);
+    count_.store(tick + 1, std::memory_order_release);
+  }
+  /// The newest state once more for every tick up to that one, at the cost of at most kSlots of them. Appender only,
+  /// and only while all states kept are the same: readers may still look at the slots that are written.
+  void stay_until(int64_t tick) {
+    const State state = at_tick(last_tick());
+    const int64_t first = count_.load(std::memory_order_relaxed);
+    if (tick < first) return;
+    for (int64_t t = std::max(first, tick + 1 - kSlots); t <= tick; ++t) write(t, state);
+    count_.store(tick + 1, std::memory_order_release);
   }
   int64_t last_tick() const { return count_.load(std::memory_order_acquire) - 1; }
   State at_tick(int64_t tick) const {
@@ -41,6 +50,11 @@ class History {
   }
 
  private:
+  void write(int64_t tick, const State& state) {
+    Slot& slot = slots_[static_cast<size_t>(tick % kSlots)];
+    for (size_t i = 0; i < N; ++i) slot[i].store(state[i], std::memory_order_relaxed);
+  }
+
   using Slot = std::array<std::atomic<double>, N>;
   std::unique_ptr<Slot[]> slots_;
   std::atomic<int64_t> count_{0};

@@ -130,6 +130,8 @@ void Simulation::command_base(double speed, double turn, int64_t at_ns) {
 void Simulation::advance_base(int64_t now_ns) {
   if (drive() == Drive::path) return;
   const int64_t last = (now_ns + kLatencyNs - epoch_ns()) / History<5>::kTickNs;
+  // Nobody has moved it yet: a driver that was started again in a long run need not live through all of it.
+  if (base_command_count_ == 0) return base_.stay_until(last);
   for (int64_t tick = base_.last_tick() + 1; tick <= last; ++tick) step_base(tick);
 }
 
@@ -185,6 +187,7 @@ void Simulation::command_head(double pan, double tilt, int64_t at_ns) {
 
 void Simulation::advance_head(int64_t now_ns) {
   const int64_t last = (now_ns + kLatencyNs - epoch_ns()) / History<4>::kTickNs;
+  if (head_command_count_ == 0) return head_.stay_until(last);
   for (int64_t tick = head_.last_tick() + 1; tick <= last; ++tick) step_head(tick);
 }
 

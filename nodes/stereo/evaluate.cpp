@@ -43,6 +43,16 @@ DisparityImage to_disparity_image(ImageView<const int16_t> disparity) {
   return convert(disparity, [](int16_t d) { return static_cast<float>(d); });
 }
 
+DisparityImage to_disparity_image(const DisparityViews& views) {
+  DisparityImage out = to_disparity_image(views.disparity);
+  if (views.fraction.data == nullptr) return out;
+  for (int y = 0; y < out.height; ++y)
+    for (int x = 0; x < out.width; ++x)
+      if (out.at(x, y) >= 0)
+        out.at(x, y) += static_cast<float>(views.fraction.at(x, y) - kNoFraction) / static_cast<float>(kFractions);
+  return out;
+}
+
 std::vector<uint8_t> visible_in_right(const DisparityImage& truth) {
   const int w = truth.width;
   std::vector<uint8_t> visible(truth.pixels.size());
@@ -75,19 +85,21 @@ StereoScore score(const DisparityImage& disparity, const DisparityImage& truth) 
                                 " x " + std::to_string(truth.height) + " px; give images of one size");
   const auto visible = visible_in_right(truth);
   StereoScore s;
-  int64_t bad = 0, bad_all = 0, found = 0;
+  int64_t bad = 0, bad_all = 0, bad_half = 0, found = 0;
   for (size_t i = 0; i < truth.pixels.size(); ++i) {
     const float t = truth.pixels[i], d = disparity.pixels[i];
     if (!(t > 0)) continue;
-    const bool present = d >= 0, wrong = !present || !(std::abs(d - t) <= 1);
+    const bool present = d >= -0.5f, wrong = !present || !(std::abs(d - t) <= 1);
     ++s.known;
     s.visible += visible[i];
     found += present;
     bad_all += wrong;
     bad += wrong && visible[i] != 0;
+    bad_half += visible[i] != 0 && (!present || !(std::abs(d - t) <= 0.5f));
   }
   s.bad_1px_pct = percent(bad, s.visible);
   s.bad_1px_all_pct = percent(bad_all, s.known);
+  s.bad_half_px_pct = percent(bad_half, s.visible);
   s.density_pct = percent(found, s.known);
   return s;
 }

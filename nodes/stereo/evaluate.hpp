@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "nodes/stereo/matcher.hpp"
 #include "rt/msg/image_view.hpp"
 
 namespace takt::stereo {
@@ -25,6 +26,7 @@ struct DisparityImage {
 struct StereoScore {
   double bad_1px_pct = 0;      ///< known and visible in the right image: missing, or wrong by more than 1 px
   double bad_1px_all_pct = 0;  ///< the same over all known pixels
+  double bad_half_px_pct = 0;  ///< as bad_1px_pct, by more than half a pixel
   double density_pct = 0;      ///< share of the known pixels that have a disparity
   int64_t known = 0, visible = 0;
 };
@@ -33,8 +35,9 @@ struct StereoScore {
 DisparityImage ground_truth(ImageView<const uint8_t> image, double scale);
 DisparityImage ground_truth(ImageView<const uint16_t> image, double scale);
 
-/// A matcher's result: -1 stays missing.
+/// A matcher's result, with its fractions if there are any: -1 stays missing.
 DisparityImage to_disparity_image(ImageView<const int16_t> disparity);
+DisparityImage to_disparity_image(const DisparityViews& views);
 
 /// 1 where the ground truth is known and the right image sees the pixel: x - d >= 0, and no pixel of the same row that
 /// is more than half a pixel of disparity nearer lands on the same right pixel (within 0.5 to 1 px).

@@ -4,6 +4,8 @@
 #include <cstring>
 #include <stdexcept>
 
+#include "nodes/stereo/post_process.hpp"
+
 namespace takt::stereo {
 namespace {
 
@@ -40,6 +42,14 @@ void copy_row(const T* from, int count, T* to) {
   std::memcpy(to, from, static_cast<size_t>(count) * sizeof(T));
 }
 
+/// out[x] = value(x / 2), `last` being the last argument that value has.
+template <class T, class Value>
+void twice(int width, int last, T* out, Value value) {
+  const int pairs = std::min(last + 1, width / 2);
+  for (int x = 0; x < pairs; ++x) out[2 * x] = out[2 * x + 1] = value(x);
+  for (int x = 2 * pairs; x < width; ++x) out[x] = value(last);  // an odd last column
+}
+
 }  // namespace
 
 void halve(ImageView<const uint8_t> in, ImageView<uint8_t> out) {
@@ -52,27 +62,31 @@ void halve(ImageView<const uint8_t> in, ImageView<uint8_t> out) {
   }
 }
 
-void enlarge(ImageView<const int16_t> disparity, ImageView<const uint8_t> confidence, ImageView<int16_t> disparity_out,
-             ImageView<uint8_t> confidence_out) {
-  const int width = disparity_out.width, pairs = std::min(disparity.width, width / 2);
-  for (int y = 0; y < disparity_out.height; ++y) {
-    int16_t* d_out = disparity_out.row(y);
-    uint8_t* c_out = confidence_out.row(y);
+void enlarge(const DisparityViews& in, const DisparityViews& out) {
+  const int width = out.disparity.width;
+  const bool fine = in.fraction.data != nullptr && out.fraction.data != nullptr;
+  for (int y = 0; y < out.disparity.height; ++y) {
+    int16_t* d_out = out.disparity.row(y);
+    uint8_t* c_out = out.confidence.row(y);
+    uint8_t* f_out = fine ? out.fraction.row(y) : nullptr;
     if (y % 2 == 1) {
-      copy_row(disparity_out.row(y - 1), width, d_out);
-      copy_row(confidence_out.row(y - 1), width, c_out);
+      copy_row(out.disparity.row(y - 1), width, d_out);
+      copy_row(out.confidence.row(y - 1), width, c_out);
+      if (fine) copy_row(out.fraction.row(y - 1), width, f_out);
       continue;
     }
-    const int from = std::min(y / 2, disparity.height - 1);
-    const int16_t* d = disparity.row(from);
-    const uint8_t* c = confidence.row(from);
-    const auto doubled = [&](int x) { return static_cast<int16_t>(d[x] < 0 ? -1 : 2 * d[x]); };
-    for (int x = 0; x < pairs; ++x) d_out[2 * x] = d_out[2 * x + 1] = doubled(x);
-    for (int x = 0; x < pairs; ++x) c_out[2 * x] = c_out[2 * x + 1] = c[x];
-    for (int x = 2 * pairs; x < width; ++x) {  // an odd last column
-      d_out[x] = doubled(disparity.width - 1);
-      c_out[x] = c[disparity.width - 1];
+    const int from = std::min(y / 2, in.disparity.height - 1), last = in.disparity.width - 1;
+    const int16_t* d = in.disparity.row(from);
+    const uint8_t* f = fine ? in.fraction.row(from) : nullptr;
+    const uint8_t* c = in.confidence.row(from);
+    twice(width, last, c_out, [&](int x) { return c[x]; });
+    if (!fine) {
+      twice(width, last, d_out, [&](int x) { return static_cast<int16_t>(d[x] < 0 ? -1 : 2 * d[x]); });
+      continue;
     }
+    const auto doubled = [&](int x) { return std::max(0, 2 * (d[x] * kFractions + f[x]) - kNoFraction); };
+    twice(width, last, d_out, [&](int x) { return static_cast<int16_t>(d[x] < 0 ? -1 : doubled(x) / kFractions); });
+    twice(width, last, f_out, [&](int x) { return static_cast<uint8_t>(doubled(x) % kFractions); });
   }
 }
 
@@ -80,26 +94,22 @@ HalfMatcher::HalfMatcher(int width, int height, int channels, const MatcherParam
     : width_(width),
       height_(height),
       channels_(channels),
-      matcher_(half(width), half(height), channels, halved(checked(parameters, width, height, channels))),
+      matcher_(make_matcher(half(width), half(height), channels, halved(checked(parameters, width, height, channels)))),
       left_(pixels(width, height) * static_cast<size_t>(channels)),
       right_(left_.size()),
       confidence_(pixels(width, height)),
+      fraction_(pixels(width, height)),
       disparity_(pixels(width, height)) {}
 
-bool HalfMatcher::match(ImageView<const uint8_t> left, ImageView<const uint8_t> right, ImageView<int16_t> disparity,
-                        ImageView<uint8_t> confidence) {
-  const auto fits = [&](const auto& view, int channels) {
-    return view.width == width_ && view.height == height_ && view.channels == channels && view.data != nullptr;
-  };
-  if (!fits(left, channels_) || !fits(right, channels_) || !fits(disparity, 1) || !fits(confidence, 1)) return false;
+bool HalfMatcher::match(ImageView<const uint8_t> left, ImageView<const uint8_t> right, const DisparityViews& out) {
+  if (!fit(left, right, out, width_, height_, channels_)) return false;
   const int w = half(width_), h = half(height_);
   const ImageView<uint8_t> half_left(left_.data(), w, h, channels_), half_right(right_.data(), w, h, channels_);
-  const ImageView<int16_t> half_disparity(disparity_.data(), w, h);
-  const ImageView<uint8_t> half_confidence(confidence_.data(), w, h);
+  const DisparityViews halved{{disparity_.data(), w, h}, {confidence_.data(), w, h}, {fraction_.data(), w, h}};
   halve(left, half_left);
   halve(right, half_right);
-  if (!matcher_.match(half_left, half_right, half_disparity, half_confidence)) return false;
-  enlarge(half_disparity, half_confidence, disparity, confidence);
+  if (!matcher_->match(half_left, half_right, halved)) return false;
+  enlarge(halved, out);
   return true;
 }
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "nodes/stereo/parameters.hpp"
 #include "nodes/stereo/simd_targets.hpp"
 
 #undef HWY_TARGET_INCLUDE
@@ -46,6 +47,24 @@ void derivative(const uint8_t* before, const uint8_t* after, int count, uint8_t*
   for (int i = 0; i < count; i += kByteLanes) {
     const Bytes a = hn::LoadU(kBytes, after + i), b = hn::LoadU(kBytes, before + i);
     hn::StoreU(hn::Sub(hn::Min(hn::SaturatedSub(a, b), most), hn::Min(hn::SaturatedSub(b, a), least)), kBytes, out + i);
+  }
+}
+
+void census(const uint8_t* const rows[7], int plane, int count, uint8_t* out) {
+  const uint8_t* neighbours[8];
+  for (int i = 0; i < 8; ++i) {
+    const CensusOffset o = census_offset(8 * plane + i);
+    neighbours[i] = rows[kCensusRadius + o.y] + o.x;
+  }
+  for (int i = 0; i < count; i += kByteLanes) {
+    const Bytes centre = hn::LoadU(kBytes, rows[kCensusRadius] + i);
+    Bytes bits = hn::Zero(kBytes);
+    for (int bit = 0; bit < 8; ++bit) {
+      const auto not_darker =
+          hn::Eq(hn::SaturatedSub(centre, hn::LoadU(kBytes, neighbours[bit] + i)), hn::Zero(kBytes));
+      bits = hn::Or(bits, hn::IfThenZeroElse(not_darker, hn::Set(kBytes, static_cast<uint8_t>(1u << bit))));
+    }
+    hn::StoreU(bits, kBytes, out + i);
   }
 }
 
@@ -95,12 +114,13 @@ void decode(const uint32_t* HWY_RESTRICT keys, int max_sum, int min_confidence, 
   }
   for (int i = 0; i < count; ++i) {
     const bool reject = (keys[i] & 1) != 0 || confidence[i] < min_confidence;
-    disparity[i] = reject ? int16_t{-1} : static_cast<int16_t>((keys[i] & 0xFFFF) >> 1);
+    disparity[i] = reject ? int16_t{-1} : static_cast<int16_t>((keys[i] & 0xFFFF) >> 7);
   }
 }
 
 const ImageKernels& target_image_kernels() {
-  static const ImageKernels table{grey, derivative, channel, reverse, spread, minimum_along, minimum_with, decode};
+  static const ImageKernels table{grey,   derivative,    census,       channel, reverse,
+                                  spread, minimum_along, minimum_with, decode};
   return table;
 }
 

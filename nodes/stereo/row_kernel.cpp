@@ -10,6 +10,8 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#include "nodes/stereo/count_ones-inl.hpp"
+
 HWY_BEFORE_NAMESPACE();
 namespace takt::stereo::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
@@ -62,25 +64,29 @@ class Cost {
   template <bool kOutside>
   HWY_INLINE Bytes at(int chunk) const {
     const ptrdiff_t offset = offset_ + ptrdiff_t{2} * kChunk * chunk;
-    Bytes sum = distance(left_[0], hn::LoadU(kBytes, job_.right[0] + offset));
-    for (int p = 1; p < kPlanes; ++p) {
-      const Bytes next = distance(left_[p], hn::LoadU(kBytes, job_.right[p] + offset));
-      // Planes of the gradient hold twice the derivative: the sum of the distances is the mean of those of the planes.
-      sum = kKind == CostKind::gradient ? hn::AverageRound(sum, next) : hn::SaturatedAdd(sum, next);
-    }
-    sum = hn::Min(sum, c_max_);
+    Bytes differences[kPlanes];
+    for (int p = 0; p < kPlanes; ++p) differences[p] = distance(left_[p], hn::LoadU(kBytes, job_.right[p] + offset));
+    Bytes sum = hn::Min(total(differences), c_max_);
     if (kOutside) sum = hn::Max(sum, hn::LoadU(kBytes, job_.outside + offset));
     return sum;
   }
 
  private:
-  static constexpr int kPlanes = kKind == CostKind::gradient ? 2 : 3;
+  static constexpr int kPlanes = planes_of(kKind);
 
   HWY_INLINE Bytes distance(Bytes a, Bytes b) const {
     if constexpr (kKind == CostKind::gradient) return signed_distance(a, b);
+    if constexpr (kKind == CostKind::census) return hn::Xor(a, b);
     if constexpr (kKind == CostKind::sad) return hn::Or(hn::SaturatedSub(a, b), hn::SaturatedSub(b, a));
     // The bytes are biased by 0x80. |difference| >= 15 costs 225, which is at least c_max (validated).
     return hn::TableLookupBytes(squares_, hn::Min(signed_distance(a, b), hn::Set(kBytes, 15)));
+  }
+
+  static HWY_INLINE Bytes total(const Bytes* differences) {
+    if constexpr (kKind == CostKind::census) return ones_of_six(differences);
+    // Planes of the gradient hold twice the derivative: the sum of the distances is the mean of those of the planes.
+    if constexpr (kKind == CostKind::gradient) return hn::AverageRound(differences[0], differences[1]);
+    return hn::SaturatedAdd(hn::SaturatedAdd(differences[0], differences[1]), differences[2]);
   }
 
   const RowJob job_;  // a copy: stores of bytes could change the original for all that the compiler knows
@@ -89,7 +95,7 @@ class Cost {
   ptrdiff_t offset_ = 0;
 };
 
-/// kGroups vectors of sums in registers, or (0) as many as the job says, in memory, with the uniqueness test.
+/// kGroups vectors of sums in registers, or (0) as many as the job says, in memory, with uniqueness and sub-pixel fit.
 /// Sums are scaled by the number of groups and carry the group in the remainder, so that one minimum finds both.
 template <CostKind kKind, bool kNarrow, int kGroups>
 class Rows {
@@ -127,17 +133,17 @@ class Rows {
   }
 
  private:
-  static constexpr bool kUnique = kGroups == 0;
-  static constexpr int kRegisters = kUnique ? 1 : kGroups;
+  static constexpr bool kInMemory = kGroups == 0;
+  static constexpr int kRegisters = kInMemory ? 1 : kGroups;
 
   explicit Rows(const RowJob& job)
-      : job_(job), cost_(job), scale_(kUnique ? 1 : kGroups), tail_(hn::LoadU(kWords, job.tail)) {
+      : job_(job), cost_(job), scale_(kInMemory ? 1 : kGroups), tail_(hn::LoadU(kWords, job.tail)) {
     const Words factor = hn::Set(kWords, static_cast<uint16_t>(scale_));
     even_ = hn::BitCast(kBytes, factor);
     odd_ = hn::BitCast(kBytes, hn::ShiftLeft<8>(factor));
   }
 
-  HWY_INLINE int groups() const { return kUnique ? job_.groups : kGroups; }
+  HWY_INLINE int groups() const { return kInMemory ? job_.groups : kGroups; }
   HWY_INLINE int chunks() const { return (groups() + 1) / 2; }
   HWY_INLINE ptrdiff_t place(int column, int chunk) const {
     return ptrdiff_t{kChunk} * (ptrdiff_t{column - job_.first_column} * chunks() + chunk);
@@ -181,16 +187,16 @@ class Rows {
   /// Window sums of the pixel left of x_begin (replicated border), from which walk() goes on.
   HWY_INLINE void start_sums() {
     for (int g = 0; g < groups(); ++g) {
-      Words sum = hn::Set(kWords, static_cast<uint16_t>(kUnique ? 0 : g));
+      Words sum = hn::Set(kWords, static_cast<uint16_t>(kInMemory ? 0 : g));
       for (int k = -job_.radius - 1; k < job_.radius; ++k) sum = hn::Add(sum, column_sum(clamped(job_.x_begin + k), g));
-      if constexpr (kUnique) hn::StoreU(sum, kWords, job_.sums + g * kLanes);
+      if constexpr (kInMemory) hn::StoreU(sum, kWords, job_.sums + g * kLanes);
       else sums_[g] = sum;
     }
   }
 
   template <bool kNew, bool kOutside>
   HWY_INLINE void walk(int from, int to) {
-    if constexpr (kUnique) walk_unique<kNew, kOutside>(from, to);
+    if constexpr (kInMemory) walk_in_memory<kNew, kOutside>(from, to);
     else walk_registers<kNew, kOutside>(from, to);
   }
 
@@ -214,7 +220,7 @@ class Rows {
   }
 
   template <bool kNew, bool kOutside>
-  HWY_INLINE void walk_unique(int from, int to) {
+  HWY_INLINE void walk_in_memory(int from, int to) {
     for (int x = from; x < to; ++x) {
       const int enters = std::min(x + job_.radius, job_.image_width - 1), leaves = std::max(x - job_.radius - 1, 0);
       if constexpr (kNew) new_column<kOutside>(enters);
@@ -228,7 +234,8 @@ class Rows {
       const Words wanted = hn::Set(kWords, static_cast<uint16_t>(best));
       while (hn::AllFalse(kWords, hn::Eq(hn::LoadU(kWords, job_.sums + d), wanted))) d += kLanes;
       d += static_cast<int>(hn::FindKnownFirstTrue(kWords, hn::Eq(hn::LoadU(kWords, job_.sums + d), wanted)));
-      job_.winners[x - job_.x_begin] = best << 16 | static_cast<uint32_t>(d) << 1 | ambiguous(best, d);
+      job_.winners[x - job_.x_begin] = best << 16 | static_cast<uint32_t>(d) << 7 | fraction(best, d) << 1 |
+                                       (job_.uniqueness > 0 ? ambiguous(best, d) : 0);
     }
   }
 
@@ -236,6 +243,12 @@ class Rows {
     Words best = hn::Or(hn::LoadU(kWords, job_.sums + (groups() - 1) * kLanes), tail_);
     for (int g = 0; g + 1 < groups(); ++g) best = hn::Min(best, hn::LoadU(kWords, job_.sums + g * kLanes));
     return smallest_lane(best);
+  }
+
+  HWY_INLINE uint32_t fraction(uint32_t best, int d) const {
+    const uint16_t* at = job_.sums + d;
+    if (!job_.subpixel || d == 0 || d + 1 >= job_.disparities) return kNoFraction;
+    return static_cast<uint32_t>(fraction_of(at[-1], static_cast<int>(best), at[1]));
   }
 
   /// Second best sum at more than one pixel from d is not far enough above the best (algorithm reference 1.6).
@@ -277,9 +290,9 @@ class Rows {
     const uint32_t reciprocal = ((1u << shift) + scale - 1) / scale;
     for (int i = 0; i < count; ++i) {
       uint32_t key = job_.winners[i];
-      if constexpr (!kUnique) {
+      if constexpr (!kInMemory) {
         const uint32_t value = key >> 8, sum = (value * reciprocal) >> shift, group = value - sum * scale;
-        key = sum << 16 | (first + group * kLanes + (key & 0xFF)) << 1;
+        key = sum << 16 | (first + group * kLanes + (key & 0xFF)) << 7 | kNoFraction << 1;
       }
       job_.keys[i] = job_.first_block || key < job_.keys[i] ? key : job_.keys[i];
     }
@@ -299,7 +312,7 @@ RowFunctions functions() {
   return {R::fill, R::roll, R::decide};
 }
 
-/// `groups` is one of block_sizes(); 0 stands for any number with the uniqueness test.
+/// `groups` is one of block_sizes(); 0 stands for any number, in memory.
 template <CostKind kKind, bool kNarrow>
 RowFunctions functions_of(int groups) {
   if constexpr (kNarrow) {
@@ -314,16 +327,16 @@ RowFunctions functions_of(int groups) {
   }
 }
 
+/// For the costs that PlaneMaker serves.
 RowFunctions rows(CostKind kind, bool narrow, int groups) {
-  switch (kind) {
-    case CostKind::ssd: return functions_of<CostKind::ssd, false>(groups);
-    case CostKind::sad: return functions_of<CostKind::sad, false>(groups);
-    case CostKind::gradient: break;
-  }
+  if (kind == CostKind::ssd) return functions_of<CostKind::ssd, false>(groups);
+  if (kind == CostKind::sad) return functions_of<CostKind::sad, false>(groups);
+  if (kind == CostKind::census)
+    return narrow ? functions_of<CostKind::census, true>(groups) : functions_of<CostKind::census, false>(groups);
   return narrow ? functions_of<CostKind::gradient, true>(groups) : functions_of<CostKind::gradient, false>(groups);
 }
 
-RowFunctions unique_rows(CostKind kind, bool narrow) { return rows(kind, narrow, 0); }
+RowFunctions rows_in_memory(CostKind kind, bool narrow) { return rows(kind, narrow, 0); }
 
 void interleave(const uint8_t* reversed, int count, uint8_t* out) {
   for (int i = 0; i < count; i += kChunk)
@@ -332,7 +345,7 @@ void interleave(const uint8_t* reversed, int count, uint8_t* out) {
 }
 
 const Kernels& target_kernels() {
-  static const Kernels table{hwy::TargetName(HWY_TARGET), kLanes, rows, unique_rows, interleave};
+  static const Kernels table{hwy::TargetName(HWY_TARGET), kLanes, rows, rows_in_memory, interleave};
   return table;
 }
 

@@ -10,11 +10,13 @@
 #include <cstdint>
 #include <span>
 
+#include "nodes/stereo/cost_planes.hpp"
 #include "nodes/stereo/parameters.hpp"
 
 namespace takt::stereo {
 
-constexpr int kMaxPlanes = 3;
+/// Costs whose column sums may fit 8 bits.
+constexpr bool may_be_narrow(CostKind kind) { return kind == CostKind::gradient || kind == CostKind::census; }
 
 /// How many 16-bit vectors of sums a block may have so that they stay in registers, largest first. A search range is
 /// cut into such blocks; few sizes keep the compile time down.
@@ -28,10 +30,12 @@ struct RowJob {
   int x_begin = 0, x_end = 0;             ///< pixels to decide
   int image_width = 0;
   int radius = 0;  ///< of the summing window
-  int groups = 0;  ///< vectors of 16-bit sums in the block (all of the search range if uniqueness is on)
+  int groups = 0;  ///< vectors of 16-bit sums in the block (all of the search range if they stay in memory)
   int first_disparity = 0;
+  int disparities = 0;  ///< of the whole search range
   int c_max = 0;
-  int uniqueness = 0;
+  int uniqueness = 0;        ///< sums in memory only
+  bool subpixel = false;     ///< the same
   bool new_row = false;      ///< compute the costs of a row into ring_new and roll the column sums to it
   bool first_block = false;  ///< keys are written; later blocks take the minimum with what is there
 
@@ -42,9 +46,9 @@ struct RowJob {
   const uint8_t* ring_old = nullptr;      ///< costs of the row that leaves the window; may be ring_new
   void* columns = nullptr;         ///< vertical sums, laid out as the ring; 8 bit (narrow) or 16 bit and scaled (wide)
   const uint16_t* tail = nullptr;  ///< one vector: 0xFFFF for the lanes of the last group beyond the search range
-  uint16_t* sums = nullptr;        ///< scratch, groups * lanes (uniqueness only)
+  uint16_t* sums = nullptr;        ///< scratch, groups * lanes (sums in memory only)
   uint32_t* winners = nullptr;     ///< scratch, x_end - x_begin
-  uint32_t* keys = nullptr;        ///< element x - x_begin: sum << 16 | disparity << 1 | ambiguous
+  uint32_t* keys = nullptr;        ///< element x - x_begin: sum << 16 | disparity << 7 | fraction << 1 | ambiguous
 };
 
 struct RowFunctions {
@@ -57,9 +61,11 @@ struct RowFunctions {
 struct Kernels {
   const char* target;
   int lanes;  ///< 16-bit lanes of one vector
-  /// 8-bit column sums: possible if c_max * n_square <= 255 and offered for the gradient cost.
+  /// `narrow`: 8-bit column sums, possible if c_max * n_square <= 255 and may_be_narrow(kind).
   RowFunctions (*rows)(CostKind kind, bool narrow, int groups);
-  RowFunctions (*unique_rows)(CostKind kind, bool narrow);
+  /// The same with all sums of a pixel in memory, for what looks at more than the smallest: uniqueness and sub-pixel
+  /// fit.
+  RowFunctions (*rows_in_memory)(CostKind kind, bool narrow);
   /// out[2 i] = reversed[i], out[2 i + 1] = reversed[i + lanes] for i < count; writes up to 2 * lanes elements more.
   void (*interleave)(const uint8_t* reversed, int count, uint8_t* out);
 };

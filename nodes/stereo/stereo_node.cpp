@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
+#include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -27,7 +28,7 @@ class StereoNode final : public Node {
     channels_ = static_cast<int>(images.channels);
     range_ = most_ = disparities_;
     try {
-      matcher_.emplace(width_, height_, channels_, parameters(disparities_));
+      matcher_ = make_matcher(width_, height_, channels_, parameters(disparities_));
       half_matcher_.emplace(width_, height_, channels_, parameters(disparities_));
       if (!calibration_().empty()) load_calibration(setup.directory / calibration_());
     } catch (const std::invalid_argument& error) {
@@ -39,6 +40,7 @@ class StereoNode final : public Node {
     right_.resize(bytes);
     disparity_scratch_.resize(pixels);
     confidence_scratch_.resize(pixels);
+    if (subpixel_) fraction_scratch_.resize(pixels);
     rectified_.reserve(images);
     disparity_.reserve({images.width, images.height, 1, 0});
     const auto step = static_cast<uint32_t>(cloud_step_());
@@ -71,6 +73,17 @@ class StereoNode final : public Node {
     p.min_confidence = static_cast<int>(std::lround(min_confidence_ * 255));
     p.uniqueness = static_cast<int>(std::lround(uniqueness_ * 255));
     p.left_right_check = left_right_check_;
+    p.intensity_weight = intensity_weight_;
+    p.aggregation = static_cast<Aggregation>(aggregation_());
+    p.combination = static_cast<Combination>(combination_());
+    p.edge_threshold = edge_threshold_;
+    p.gamma_distance = gamma_distance_;
+    p.gamma_colour = gamma_colour_;
+    p.selection = static_cast<Selection>(selection_());
+    p.p1 = p1_;
+    p.p2 = p2_;
+    p.median = median_;
+    p.subpixel = subpixel_;
     return p;
   }
 
@@ -116,8 +129,8 @@ class StereoNode final : public Node {
 
   void match_and_send(Job& job, ImageView<const uint8_t> left, ImageView<const uint8_t> right) {
     DisparityMap* map = disparity_.connected() ? disparity_.loan() : nullptr;
-    ImageView<int16_t> disparity(disparity_scratch_.data(), width_, height_);
-    ImageView<uint8_t> confidence(confidence_scratch_.data(), width_, height_);
+    DisparityViews views{{disparity_scratch_.data(), width_, height_}, {confidence_scratch_.data(), width_, height_}};
+    if (subpixel_) views.fraction = {fraction_scratch_.data(), width_, height_};
     if (map != nullptr) {
       map->width = width_;
       map->height = height_;
@@ -125,10 +138,13 @@ class StereoNode final : public Node {
       map->camera = camera_;
       map->disparity.resize(disparity_scratch_.size());
       map->confidence.resize(confidence_scratch_.size());
-      disparity = map->view();
-      confidence = map->confidence_view();
+      map->fraction.resize(fraction_scratch_.size());
+      views.disparity = map->view();
+      views.confidence = map->confidence_view();
+      if (subpixel_) views.fraction = map->fraction_view();
     }
-    if (!match(job.level(), left, right, disparity, confidence)) return job.no_result();
+    Matcher& matcher = job.level() == 0 ? *matcher_ : *half_matcher_;
+    if (!matcher.match(left, right, views)) return job.no_result();
     if (map != nullptr) disparity_.send(stamp_);
     PointCloud* cloud = cloud_.connected() ? cloud_.loan() : nullptr;
     if (cloud != nullptr) {
@@ -138,18 +154,12 @@ class StereoNode final : public Node {
       cloud->points.resize(cloud->points.capacity);
       cloud->colours.resize(cloud->colours.capacity);
       const size_t count =
-          triangulate(disparity, left, camera_, cloud_step_, cloud->points.items(), cloud->colours.items());
+          triangulate(views, left, camera_, cloud_step_, cloud->points.items(), cloud->colours.items());
       cloud->points.resize(count);
       cloud->colours.resize(count);
       cloud_.send(stamp_);
     }
     if ((disparity_.connected() && map == nullptr) || (cloud_.connected() && cloud == nullptr)) job.no_result();
-  }
-
-  bool match(int level, ImageView<const uint8_t> left, ImageView<const uint8_t> right, ImageView<int16_t> disparity,
-             ImageView<uint8_t> confidence) {
-    return level == 0 ? matcher_->match(left, right, disparity, confidence)
-                      : half_matcher_->match(left, right, disparity, confidence);
   }
 
   /// `search` may have been changed between two jobs.
@@ -174,10 +184,34 @@ class StereoNode final : public Node {
   Param<int> disparities_{this, "disparities", 150, {1, 512}, "px", "search range 0 .. disparities - 1"};
   Param<int> search_{this,     "search", 0,
                      {0, 512}, "px",     "of that range, how much is searched; 0: all of it. May change during a run"};
-  Choice cost_{this, "cost", "gradient", {"gradient", "ssd", "sad"}, "matching cost of two pixels"};
-  Param<int> c_max_{this, "c_max", 0, {0, 255}, "", "truncation of the cost; 0: 10 for gradient, 50 for ssd and sad"};
+  Choice cost_{
+      this, "cost", "gradient", {"gradient", "ssd", "sad", "census", "rss", "mixed"}, "matching cost of two pixels"};
+  Param<int> c_max_{this,     "c_max", 0,
+                    {0, 255}, "",      "truncation of the cost; 0: 10 for gradient, 24 for census, 50 for the others"};
+  Param<double> intensity_weight_{this, "intensity_weight",
+                                  1.0,  {0.0, 1.0},
+                                  "1",  "w of cost mixed: share of the intensities beside the derivatives"};
+  Choice aggregation_{this,
+                      "aggregation",
+                      "square",
+                      {"square", "adaptive_window", "boundary", "adaptive_weight"},
+                      "which costs around a pixel count; all but square take many times as long"};
+  Choice combination_{this, "combination", "min", {"min", "max", "mean"}, "of the three sizes of an adaptive window"};
   Param<int> n_square_{this, "n_square", 15, {1, 31}, "px", "edge of the summing window, odd"};
   Param<int> n_min_{this, "n_min", 5, {1, 31}, "px", "edge of the minimum filter, odd, at most n_square"};
+  Param<double> edge_threshold_{this, "edge_threshold",
+                                30.0, {0.0, 361.0},
+                                "1",  "gradient magnitude of an edge that bounds a window, grey levels"};
+  Param<double> gamma_distance_{
+      this, "gamma_distance", 7.5, {0.1, 100.0}, "px", "distance at which an adaptive weight has fallen to 1/e"};
+  Param<double> gamma_colour_{this, "gamma_colour",
+                              20.0, {0.1, 442.0},
+                              "1",  "difference of colour at which an adaptive weight has fallen to 1/e"};
+  Choice selection_{this, "selection", "winner", {"winner", "scanline", "semi_global"}, "how costs become a disparity"};
+  Param<int> p1_{this, "p1", 0, {0, 255}, "", "cost of a step by 1 px along a path; 0: 0.1 c_max, semi_global 14"};
+  Param<int> p2_{this, "p2", 0, {0, 255}, "", "cost of a larger step; 0: 0.6 c_max, semi_global 60"};
+  Param<bool> median_{this, "median", false, "", "3 x 3 median filter on the disparities"};
+  Param<bool> subpixel_{this, "subpixel", false, "", "disparities to 1/64 px"};
   Param<double> min_confidence_{
       this, "min_confidence", 0.25, {0.0, 1.0}, "1", "smallest confidence of a valid pixel; 0 keeps all"};
   Param<double> uniqueness_{this,       "uniqueness", 0.0,
@@ -193,10 +227,10 @@ class StereoNode final : public Node {
   int64_t stamp_ = 0;
   CameraModel camera_;
   Transform sensor_in_robot_;
-  std::optional<Matcher> matcher_;
+  std::unique_ptr<Matcher> matcher_;
   std::optional<HalfMatcher> half_matcher_;
   std::optional<Rectifier> rectifier_;
-  std::vector<uint8_t> left_, right_, confidence_scratch_;
+  std::vector<uint8_t> left_, right_, confidence_scratch_, fraction_scratch_;
   std::vector<int16_t> disparity_scratch_;
 };
 

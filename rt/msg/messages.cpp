@@ -32,7 +32,8 @@ FIELDS(StereoPair, F(StereoPair, width, "px"), F(StereoPair, height, "px"), F(St
        F(StereoPair, health, ""), F(StereoPair, frame_number, "1"), CAMERA_FIELDS(StereoPair),
        TRANSFORM_FIELDS(StereoPair, sensor_in_robot), F(StereoPair, left, "1"), F(StereoPair, right, "1"))
 FIELDS(DisparityMap, F(DisparityMap, width, "px"), F(DisparityMap, height, "px"), F(DisparityMap, disparities, "px"),
-       CAMERA_FIELDS(DisparityMap), F(DisparityMap, disparity, "px"), F(DisparityMap, confidence, "1"))
+       CAMERA_FIELDS(DisparityMap), F(DisparityMap, disparity, "px"), F(DisparityMap, confidence, "1"),
+       F(DisparityMap, fraction, "1/64 px"))
 FIELDS(PointCloud, TRANSFORM_FIELDS(PointCloud, sensor_in_robot), CAMERA_FIELDS(PointCloud),
        F(PointCloud, step_px, "px"), F(PointCloud, points, "m"), F(PointCloud, colours, "1"))
 FIELDS(LaserScan, F(LaserScan, first_angle_rad, "rad"), F(LaserScan, step_rad, "rad"), F(LaserScan, max_range_m, "m"),

@@ -72,13 +72,18 @@ struct DisparityMap {
   CameraModel camera;
   Array<int16_t> disparity;   ///< px; left (x, y) is right (x - d, y); `invalid` where rejected
   Array<uint8_t> confidence;  ///< 0..255 for zeta 0..1 (thesis Eq. 3.6, corrected)
+  Array<uint8_t> fraction;    ///< 1/64 px to add to the disparity, plus 32; empty: whole pixels only
 
   ImageView<int16_t> view() { return {disparity.data(), width, height}; }
   ImageView<const int16_t> view() const { return {disparity.data(), width, height}; }
   ImageView<uint8_t> confidence_view() { return {confidence.data(), width, height}; }
   ImageView<const uint8_t> confidence_view() const { return {confidence.data(), width, height}; }
+  ImageView<uint8_t> fraction_view() { return {fraction.data(), width, height}; }
+  ImageView<const uint8_t> fraction_view() const { return {fraction.data(), width, height}; }
   static std::span<const Field> fields();
-  static void capacities(const Capacity& c, std::span<uint32_t> a) { a[0] = a[1] = static_cast<uint32_t>(c.pixels()); }
+  static void capacities(const Capacity& c, std::span<uint32_t> a) {
+    a[0] = a[1] = a[2] = static_cast<uint32_t>(c.pixels());
+  }
 };
 
 struct Point {

@@ -27,9 +27,24 @@ int64_t CooperativeQueue::next_release_ns() const {
   return next;
 }
 
+int64_t CooperativeQueue::next_uncovered_release_ns() {
+  releases_.clear();
+  for (const Entry& entry : entries_)
+    if (!entry.busy) releases_.push_back(entry.lane->next_release_ns());
+  std::sort(releases_.begin(), releases_.end());
+  const int64_t end = stop_.end_ns();
+  for (size_t i = 0; i < releases_.size() && releases_[i] < end; ++i) {
+    const auto in_time = std::count_if(wakes_.begin(), wakes_.end(), [&](int64_t at) { return at <= releases_[i]; });
+    if (static_cast<size_t>(in_time) <= i) return releases_[i];
+  }
+  return end;
+}
+
 void CooperativeQueue::sleep(std::unique_lock<std::mutex>& lock, int64_t until_ns) {
+  wakes_.push_back(until_ns);
   // steady_clock is CLOCK_MONOTONIC here, the runtime's own clock.
   changed_.wait_until(lock, std::chrono::steady_clock::time_point(std::chrono::nanoseconds(until_ns)));
+  wakes_.erase(std::find(wakes_.begin(), wakes_.end(), until_ns));
 }
 
 void CooperativeQueue::work() {
@@ -42,14 +57,12 @@ void CooperativeQueue::work() {
       entry->lane->run_next(clock_, stop_);
       lock.lock();
       entry->busy = false;
-      changed_.notify_all();
       continue;
     }
-    const int64_t next = next_release_ns();
     // What a busy lane has still to do is done by the worker that is at it: nobody need wait for a job that may never
     // return.
-    if (next >= stop_.end_ns()) return changed_.notify_all();
-    sleep(lock, next);
+    if (next_release_ns() >= stop_.end_ns()) return changed_.notify_all();
+    sleep(lock, next_uncovered_release_ns());
   }
 }
 

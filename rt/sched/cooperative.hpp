@@ -10,12 +10,15 @@
 namespace takt {
 
 /// Non-preemptive earliest-deadline-first over any number of ordinary threads: each calls work(). A lane runs on one
-/// thread at a time. Needs no privilege.
+/// thread at a time. For each release that comes one thread sleeps, not all for the same: two that woke together would
+/// delay each other at the lock. Needs no privilege.
 class CooperativeQueue {
  public:
   CooperativeQueue(const std::vector<std::unique_ptr<Lane>>& lanes, const Clock& clock, StopSignal& stop)
       : clock_(clock), stop_(stop) {
     for (const auto& lane : lanes) entries_.push_back({lane.get(), false});
+    wakes_.reserve(lanes.size() + 1);
+    releases_.reserve(lanes.size());
   }
   /// Runs lanes until none has a release before the end.
   void work();
@@ -29,6 +32,8 @@ class CooperativeQueue {
   };
   Entry* earliest_deadline(int64_t now_ns);
   int64_t next_release_ns() const;
+  /// First release for which no sleeping thread wakes in time; the end if there is none.
+  int64_t next_uncovered_release_ns();
   void sleep(std::unique_lock<std::mutex>& lock, int64_t until_ns);
 
   const Clock& clock_;
@@ -36,6 +41,7 @@ class CooperativeQueue {
   std::mutex mutex_;
   std::condition_variable changed_;
   std::vector<Entry> entries_;
+  std::vector<int64_t> wakes_, releases_;  ///< of the sleeping threads; scratch
 };
 
 }  // namespace takt

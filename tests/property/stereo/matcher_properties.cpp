@@ -7,8 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "nodes/stereo/matcher.hpp"
+#include "nodes/stereo/general_matcher.hpp"
 #include "nodes/stereo/reference.hpp"
+#include "nodes/stereo/semi_global_matcher.hpp"
+#include "nodes/stereo/window_matcher.hpp"
 
 using namespace takt;
 using namespace takt::stereo;
@@ -42,41 +44,62 @@ Picture shifted(std::mt19937& random, const Picture& left, int shift, int noise_
   return right;
 }
 
+struct Output {
+  std::vector<int16_t> disparity;
+  std::vector<uint8_t> confidence, fraction;
+  explicit Output(const Picture& p)
+      : disparity(static_cast<size_t>(p.width * p.height), -7),
+        confidence(disparity.size()),
+        fraction(disparity.size()) {}
+  DisparityViews views(const Picture& p) {
+    return {{disparity.data(), p.width, p.height},
+            {confidence.data(), p.width, p.height},
+            {fraction.data(), p.width, p.height}};
+  }
+  bool operator==(const Output&) const = default;
+};
+
+void expect_equal(Matcher& matcher, const Picture& left, const Picture& right, const MatcherParameters& p,
+                  const Output& expected) {
+  for (int run = 0; run < 2; ++run) {  // the second run finds used scratch memory
+    Output out(left);
+    REQUIRE(matcher.match(left.view(), right.view(), out.views(left)));
+    INFO(matcher.target(), " ", left.width, "x", left.height, "x", left.channels, " D ", p.disparities, " cost ",
+         static_cast<int>(p.cost), " c_max ", p.truncation(), " n ", p.n_square, " min ", p.n_min, " selection ",
+         static_cast<int>(p.selection), " p ", p.step_once(), "/", p.step_twice(), " unique ", p.uniqueness, " lr ",
+         p.left_right_check, " median ", p.median, " subpixel ", p.subpixel);
+    CHECK(expected.disparity == out.disparity);
+    CHECK(expected.confidence == out.confidence);
+    CHECK(expected.fraction == out.fraction);
+  }
+}
+
 /// `room`: disparities that the matcher takes memory for, of which it then searches those of `p`.
 void expect_equal(const Picture& left, const Picture& right, const MatcherParameters& p, int room = 0) {
-  const auto count = static_cast<size_t>(left.width * left.height);
-  std::vector<int16_t> slow(count), fast(count);
-  std::vector<uint8_t> slow_confidence(count), fast_confidence(count);
-  reference::match(left.view(), right.view(), p, {slow.data(), left.width, left.height},
-                   {slow_confidence.data(), left.width, left.height});
+  Output slow(left);
+  reference::match(left.view(), right.view(), p, slow.views(left));
   MatcherParameters largest = p;
   largest.disparities = std::max(room, p.disparities);
-  Matcher matcher(left.width, left.height, left.channels, largest);
+  WindowMatcher matcher(left.width, left.height, left.channels, largest);
   matcher.limit_search(p.disparities);
-  for (int run = 0; run < 2; ++run) {  // the second run finds used scratch memory
-    std::fill(fast.begin(), fast.end(), int16_t{-7});
-    REQUIRE(matcher.match(left.view(), right.view(), {fast.data(), left.width, left.height},
-                          {fast_confidence.data(), left.width, left.height}));
-    INFO(matcher.target(), " ", left.width, "x", left.height, "x", left.channels, " D ", p.disparities, " cost ",
-         static_cast<int>(p.cost), " c_max ", p.truncation(), " n ", p.n_square, " min ", p.n_min, " unique ",
-         p.uniqueness, " lr ", p.left_right_check);
-    CHECK(slow == fast);
-    CHECK(slow_confidence == fast_confidence);
-  }
+  expect_equal(matcher, left, right, p, slow);
 }
 
 MatcherParameters random_parameters(std::mt19937& random, int largest_disparity) {
   const auto pick = [&](int low, int high) { return std::uniform_int_distribution<int>(low, high)(random); };
   MatcherParameters p;
   p.disparities = pick(1, largest_disparity);
-  p.cost = static_cast<CostKind>(pick(0, 2));
+  p.cost = static_cast<CostKind>(pick(0, 3));
   p.n_square = 2 * pick(0, 5) + 1;
   p.n_min = std::min(p.n_square, 2 * pick(0, 3) + 1);
-  const int limit = p.cost == CostKind::gradient ? 64 : p.cost == CostKind::ssd ? 225 : 255;
+  constexpr int kLargest[] = {64, 225, 255, 48};
+  const int limit = kLargest[static_cast<int>(p.cost)];
   if (pick(0, 2) > 0) p.c_max = pick(1, limit);
   if (pick(0, 3) == 0) p.min_confidence = pick(1, 255);
   if (pick(0, 2) == 0) p.uniqueness = pick(1, 255);
   if (pick(0, 2) == 0) p.left_right_check = true;
+  if (pick(0, 2) == 0) p.subpixel = true;
+  if (pick(0, 2) == 0) p.median = true;
   return p;
 }
 
@@ -124,7 +147,7 @@ TEST_CASE("search ranges of several register blocks and strips of columns: equal
   on_each_target([&] {
     std::mt19937 random(11);
     for (const int disparities : {129, 150, 193, 300, 512})
-      for (const auto cost : {CostKind::gradient, CostKind::ssd, CostKind::sad}) {
+      for (const auto cost : {CostKind::gradient, CostKind::ssd, CostKind::sad, CostKind::census}) {
         const Picture left = random_picture(random, 347, 3, 3, 256);
         MatcherParameters p;
         p.disparities = disparities;
@@ -143,7 +166,7 @@ TEST_CASE("window of 15, minimum filter of 5, the defaults: equal to the referen
   std::mt19937 random(13);
   MatcherParameters p;
   p.disparities = 40;
-  for (const auto cost : {CostKind::gradient, CostKind::ssd, CostKind::sad})
+  for (const auto cost : {CostKind::gradient, CostKind::ssd, CostKind::sad, CostKind::census})
     for (const int channels : {1, 3}) {
       p.cost = cost;
       const Picture left = random_picture(random, 71, 31, channels, 256);
@@ -158,4 +181,56 @@ TEST_CASE("flat images, where every disparity ties: the smallest wins") {
   expect_equal(flat, flat, p);
   p.uniqueness = 1;  // and is rejected once ambiguity counts
   expect_equal(flat, flat, p);
+}
+
+TEST_CASE("semi-global matching of random pairs: equal to the reference on every SIMD target") {
+  on_each_target([&] {
+    std::mt19937 random(23);
+    for (int round = 0; round < 30; ++round) {
+      const auto pick = [&](int low, int high) { return std::uniform_int_distribution<int>(low, high)(random); };
+      const int channels = pick(0, 1) ? 3 : 1;
+      const Picture left = random_picture(random, pick(1, 60), pick(1, 20), channels, round % 3 ? 256 : 3);
+      const Picture right = shifted(random, left, pick(0, left.width - 1), pick(0, 100));
+      MatcherParameters p = random_parameters(random, 140);
+      p.cost = CostKind::census;
+      p.selection = Selection::semi_global;
+      p.n_square = p.n_min = 1;
+      p.c_max = pick(1, 48);
+      p.p2 = pick(1, std::min(85 - p.c_max, 60));
+      p.p1 = pick(1, p.p2);
+      Output slow(left);
+      reference::semi_global(left.view(), right.view(), p, slow.views(left));
+      MatcherParameters largest = p;
+      largest.disparities = std::max(p.disparities, pick(1, 512));
+      SemiGlobalMatcher matcher(left.width, left.height, channels, largest);
+      matcher.limit_search(p.disparities);
+      expect_equal(matcher, left, right, p, slow);
+    }
+  });
+}
+
+TEST_CASE("the general matcher agrees with the fast ones where both serve") {
+  std::mt19937 random(29);
+  for (int round = 0; round < 40; ++round) {
+    const auto pick = [&](int low, int high) { return std::uniform_int_distribution<int>(low, high)(random); };
+    const int channels = pick(0, 1) ? 3 : 1;
+    const Picture left = random_picture(random, pick(1, 45), pick(1, 33), channels, round % 3 ? 256 : 3);
+    const Picture right = shifted(random, left, pick(0, left.width - 1), pick(0, 100));
+    MatcherParameters p = random_parameters(random, 60);
+    if (p.n_min > 1) {  // after the minimum filter the general matcher no longer knows the window that won
+      p.uniqueness = 0;
+      p.subpixel = false;
+    }
+    if (round % 2 == 1) {
+      p = MatcherParameters::quality();
+      p.disparities = pick(1, 60);
+      p.left_right_check = round % 4 == 1;
+      p.subpixel = round % 3 == 1;
+    }
+    const auto fast = make_matcher(left.width, left.height, channels, p);
+    Output expected(left);
+    REQUIRE(fast->match(left.view(), right.view(), expected.views(left)));
+    GeneralMatcher general(left.width, left.height, channels, p);
+    expect_equal(general, left, right, p, expected);
+  }
 }

@@ -174,3 +174,25 @@ TEST_CASE("a pulse of a digital line between two reads is not lost") {
   CHECK(after.levels == 1);
   CHECK(after.changed == 1);
 }
+
+TEST_CASE("a world that nobody moves stands still however long nobody looks, and then obeys") {
+  const auto s = test::small_simulation();
+  s->set_drive(Drive::command);
+  s->begin(0);
+  const RobotState start = s->robot(0);
+  constexpr int64_t kHour = 3'600'000'000'000;
+  s->advance_base(kHour);
+  s->advance_head(kHour);
+  for (const int64_t at : {int64_t{0}, kHour - 1'000'000'000, kHour}) {
+    CHECK(s->robot(at).x_m == start.x_m);
+    CHECK(s->robot(at).theta_rad == start.theta_rad);
+    CHECK(s->head(at).pan_rad == 0);
+  }
+  CHECK(s->settled(true, kHour));
+  s->command_base(0, 0.5, kHour);
+  s->command_head(0.3, 0, kHour);
+  s->advance_base(kHour + 1'000'000'000);
+  s->advance_head(kHour + 1'000'000'000);
+  CHECK(s->robot(kHour + 300'000'000).theta_rad > start.theta_rad);
+  CHECK(s->head(kHour + 1'000'000'000).pan_rad > 0.1);
+}

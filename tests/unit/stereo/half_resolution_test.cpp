@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "nodes/stereo/evaluate.hpp"
+#include "nodes/stereo/window_matcher.hpp"
 #include "tests/test_data.hpp"
 
 using namespace takt;
@@ -65,14 +66,13 @@ struct Result {
   std::vector<uint8_t> confidence;
 };
 
-template <class AnyMatcher>
-Result run(AnyMatcher& matcher, ImageView<const uint8_t> left, ImageView<const uint8_t> right,
+Result run(Matcher& matcher, ImageView<const uint8_t> left, ImageView<const uint8_t> right,
            const DisparityImage& truth) {
   Result r;
   r.disparity.resize(truth.pixels.size());
   r.confidence.resize(truth.pixels.size());
   const ImageView<int16_t> disparity(r.disparity.data(), left.width, left.height);
-  REQUIRE(matcher.match(left, right, disparity, {r.confidence.data(), left.width, left.height}));
+  REQUIRE(matcher.match(left, right, {disparity, {r.confidence.data(), left.width, left.height}}));
   r.score = score(to_disparity_image(disparity), truth);
   const auto visible = visible_in_right(truth);
   double sum = 0;
@@ -89,7 +89,7 @@ TEST_CASE(
   const Scene s = made_scene(320, 240);
   MatcherParameters p;
   p.disparities = 64;
-  Matcher full(s.width, s.height, 1, p);
+  WindowMatcher full(s.width, s.height, 1, p);
   HalfMatcher half_matcher(s.width, s.height, 1, p);
   const ImageView<const uint8_t> left(s.left.data(), s.width, s.height), right(s.right.data(), s.width, s.height);
   const Result best = run(full, left, right, s.truth), worse = run(half_matcher, left, right, s.truth);
@@ -146,9 +146,9 @@ TEST_CASE("odd sizes keep their size; views that do not fit are refused and unto
   p.disparities = 9;
   HalfMatcher matcher(w, h, 1, p);
   const ImageView<const uint8_t> view(image.data(), w, h);
-  CHECK_FALSE(matcher.match(view, {image.data(), w - 1, h}, {disparity.data(), w, h}, {confidence.data(), w, h}));
+  CHECK_FALSE(matcher.match(view, {image.data(), w - 1, h}, {{disparity.data(), w, h}, {confidence.data(), w, h}}));
   CHECK(disparity[0] == 99);
-  REQUIRE(matcher.match(view, view, {disparity.data(), w, h}, {confidence.data(), w, h}));
+  REQUIRE(matcher.match(view, view, {{disparity.data(), w, h}, {confidence.data(), w, h}}));
   for (const int16_t d : disparity) REQUIRE(d == 0);  // no texture: the smallest of equals
 }
 

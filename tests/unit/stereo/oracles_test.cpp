@@ -33,9 +33,9 @@ Result match(const std::vector<uint8_t>& left, const std::vector<uint8_t>& right
              const MatcherParameters& p) {
   const auto count = static_cast<size_t>(width * height);
   Result r{std::vector<int16_t>(count, -9), std::vector<uint8_t>(count)};
-  Matcher matcher(width, height, channels, p);
-  REQUIRE(matcher.match({left.data(), width, height, channels}, {right.data(), width, height, channels},
-                        {r.disparity.data(), width, height}, {r.confidence.data(), width, height}));
+  const auto matcher = make_matcher(width, height, channels, p);
+  REQUIRE(matcher->match({left.data(), width, height, channels}, {right.data(), width, height, channels},
+                         {{r.disparity.data(), width, height}, {r.confidence.data(), width, height}}));
   return r;
 }
 
@@ -108,7 +108,7 @@ TEST_CASE("oracle 6: f = 492.8 px, B = 0.24 m, d = 24 px is 4.928 m away") {
   const std::vector<uint8_t> image{1, 2, 3, 4, 5, 6, 7, 8, 9};
   std::vector<Point> points(9);
   std::vector<Colour> colours(9);
-  const ImageView<const int16_t> map(d.data(), 3, 3);
+  const DisparityViews map{{d.data(), 3, 3}, {}};
   REQUIRE(triangulate(map, {image.data(), 3, 3}, camera, 1, points, colours) == 6);
   CHECK(points[0].z == doctest::Approx(4.928));  // pixel (2, 0): right of and above the principal point
   CHECK(points[0].x == doctest::Approx(0.01));
@@ -139,13 +139,13 @@ TEST_CASE("parameters and views that cannot work are refused with name and value
   CHECK(problem({}, 64, 48, 4).has_value());
   CHECK(problem({}, 0, 48, 3).has_value());
   CHECK_FALSE(problem({}, 1, 1, 1).has_value());
-  CHECK_THROWS_AS(Matcher(64, 48, 2, {}), std::invalid_argument);
+  CHECK_THROWS_AS(make_matcher(64, 48, 2, {}), std::invalid_argument);
 
-  Matcher matcher(8, 8, 1, {});
+  const auto matcher = make_matcher(8, 8, 1, {});
   std::vector<uint8_t> image(64), confidence(64);
   std::vector<int16_t> disparity(64, 77);
-  CHECK_FALSE(
-      matcher.match({image.data(), 8, 7}, {image.data(), 8, 8}, {disparity.data(), 8, 8}, {confidence.data(), 8, 8}));
+  CHECK_FALSE(matcher->match({image.data(), 8, 7}, {image.data(), 8, 8},
+                             {{disparity.data(), 8, 8}, {confidence.data(), 8, 8}}));
   CHECK(disparity[0] == 77);
 }
 
@@ -163,9 +163,9 @@ TEST_CASE("views with a stride give the result of packed ones") {
       wide_right[static_cast<size_t>(y * 50 + x)] = right[static_cast<size_t>(y * w + x)];
     }
   std::vector<int16_t> disparity(static_cast<size_t>(h) * 33, 99);
-  Matcher matcher(w, h, 1, p);
-  REQUIRE(matcher.match({wide_left.data(), w, h, 1, 50}, {wide_right.data(), w, h, 1, 50},
-                        {disparity.data(), w, h, 1, 33}, {confidence.data(), w, h, 1, 40}));
+  const auto matcher = make_matcher(w, h, 1, p);
+  REQUIRE(matcher->match({wide_left.data(), w, h, 1, 50}, {wide_right.data(), w, h, 1, 50},
+                         {{disparity.data(), w, h, 1, 33}, {confidence.data(), w, h, 1, 40}}));
   for (int y = 0; y < h; ++y) {
     for (int x = 0; x < w; ++x) {
       CHECK(disparity[static_cast<size_t>(y * 33 + x)] == packed.disparity[static_cast<size_t>(y * w + x)]);
@@ -181,11 +181,11 @@ TEST_CASE("half resolution: means of four, disparities doubled, rejected pixels 
   std::vector<uint8_t> out(1);
   halve({image.data(), 3, 3}, {out.data(), 1, 1});
   CHECK(out[0] == 4);  // mean 4.25
-  const std::vector<int16_t> d{3, -1};
-  const std::vector<uint8_t> c{10, 20};
+  std::vector<int16_t> d{3, -1};
+  std::vector<uint8_t> c{10, 20};
   std::vector<int16_t> d2(10);
   std::vector<uint8_t> c2(10);
-  enlarge({d.data(), 2, 1}, {c.data(), 2, 1}, {d2.data(), 5, 2}, {c2.data(), 5, 2});
+  enlarge({{d.data(), 2, 1}, {c.data(), 2, 1}}, {{d2.data(), 5, 2}, {c2.data(), 5, 2}});
   CHECK(d2 == std::vector<int16_t>{6, 6, -1, -1, -1, 6, 6, -1, -1, -1});
   CHECK(c2 == std::vector<uint8_t>{10, 10, 20, 20, 20, 10, 10, 20, 20, 20});
 }

@@ -21,11 +21,11 @@ struct Recording {
 };
 
 StereoScore run(const cv::Mat& left, const cv::Mat& right, const DisparityImage& truth, const MatcherParameters& p) {
-  Matcher matcher(left.cols, left.rows, 3, p);
+  const auto matcher = make_matcher(left.cols, left.rows, 3, p);
   std::vector<int16_t> d(left.total());
   std::vector<uint8_t> c(left.total());
-  REQUIRE(matcher.match({left.data, left.cols, left.rows, 3}, {right.data, left.cols, left.rows, 3},
-                        {d.data(), left.cols, left.rows}, {c.data(), left.cols, left.rows}));
+  REQUIRE(matcher->match({left.data, left.cols, left.rows, 3}, {right.data, left.cols, left.rows, 3},
+                         {{d.data(), left.cols, left.rows}, {c.data(), left.cols, left.rows}}));
   return score(to_disparity_image({d.data(), left.cols, left.rows}), truth);
 }
 

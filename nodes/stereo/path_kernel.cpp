@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "nodes/stereo/path_kernel.hpp"
+
+#include <algorithm>
+#include <cstring>
+
+#include "nodes/stereo/simd_targets.hpp"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "nodes/stereo/path_kernel.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include "nodes/stereo/count_ones-inl.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace takt::stereo::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+constexpr int kByteLanes = static_cast<int>(hn::MaxLanes(kByteTag));
+
+/// Every lane moved up by one; the last lane of `before` enters.
+HWY_INLINE Vec8 one_up(Vec8 v, Vec8 before) {
+#if HWY_TARGET == HWY_AVX3
+  const __m512i carry = _mm512_alignr_epi64(v.raw, before.raw, 6);
+  return Vec8{_mm512_alignr_epi8(v.raw, carry, 15)};
+#elif HWY_TARGET == HWY_AVX2
+  const __m256i carry = _mm256_permute2x128_si256(before.raw, v.raw, 0x21);
+  return Vec8{_mm256_alignr_epi8(v.raw, carry, 15)};
+#else
+  return hn::CombineShiftRightBytes<kByteLanes - 1>(kByteTag, v, before);
+#endif
+}
+
+/// Every lane moved down by one; the first lane of `after` enters.
+HWY_INLINE Vec8 one_down(Vec8 v, Vec8 after) {
+#if HWY_TARGET == HWY_AVX3
+  const __m512i carry = _mm512_alignr_epi64(after.raw, v.raw, 2);
+  return Vec8{_mm512_alignr_epi8(carry, v.raw, 1)};
+#elif HWY_TARGET == HWY_AVX2
+  const __m256i carry = _mm256_permute2x128_si256(v.raw, after.raw, 0x21);
+  return Vec8{_mm256_alignr_epi8(carry, v.raw, 1)};
+#else
+  return hn::CombineShiftRightBytes<1>(kByteTag, after, v);
+#endif
+}
+
+/// Smallest of all lanes.
+HWY_INLINE uint8_t smallest_lane(Vec8 v) {
+  const hn::FixedTag<uint16_t, 8> eight;
+#if HWY_TARGET == HWY_AVX3
+  const hn::FixedTag<uint8_t, 32> half;
+  const hn::FixedTag<uint8_t, 16> quarter;
+  const auto halves = hn::Min(hn::LowerHalf(half, v), hn::UpperHalf(half, v));
+  const auto bytes = hn::Min(hn::LowerHalf(quarter, halves), hn::UpperHalf(quarter, halves));
+#elif HWY_TARGET == HWY_AVX2
+  const hn::FixedTag<uint8_t, 16> quarter;
+  const auto bytes = hn::Min(hn::LowerHalf(quarter, v), hn::UpperHalf(quarter, v));
+#else
+  const auto bytes = v;
+#endif
+  const auto words = hn::BitCast(eight, bytes);
+  const auto low = hn::And(words, hn::Set(eight, 0xFF)), high = hn::ShiftRight<8>(words);
+#if HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_AVX2
+  return static_cast<uint8_t>(_mm_cvtsi128_si32(_mm_minpos_epu16(hn::Min(low, high).raw)));
+#else
+  return static_cast<uint8_t>(hn::GetLane(hn::MinOfLanes(eight, hn::Min(low, high))));
+#endif
+}
+
+/// One path through a pixel: takes its costs at the pixel before, vector by vector, and leaves those here.
+class Path {
+ public:
+  HWY_INLINE Path(uint8_t* costs, uint8_t least, const PathRow& row)
+      : costs_(costs),
+        p1_(hn::Set(kByteTag, row.p1)),
+        subtract_(hn::Set(kByteTag, least)),
+        jump_(hn::Set(kByteTag, static_cast<uint8_t>(least + row.p2))),
+        before_(hn::Set(kByteTag, 255)),
+        here_(hn::Load(kByteTag, costs)),
+        least_(before_) {}
+
+  /// Vector j of `last` + 1 in rising order.
+  HWY_INLINE Vec8 advance(int j, int last, Vec8 cost) {
+    const Vec8 after = j < last ? hn::Load(kByteTag, costs_ + (j + 1) * kByteLanes) : hn::Set(kByteTag, 255);
+    const Vec8 step = hn::SaturatedAdd(hn::Min(one_up(here_, before_), one_down(here_, after)), p1_);
+    const Vec8 way = hn::Sub(hn::Min(hn::Min(here_, step), jump_), subtract_);
+    const Vec8 total = hn::SaturatedAdd(cost, way);
+    hn::Store(total, kByteTag, costs_ + j * kByteLanes);
+    before_ = here_;
+    here_ = after;
+    least_ = hn::Min(least_, total);
+    return total;
+  }
+  HWY_INLINE uint8_t least() const { return smallest_lane(least_); }
+
+ private:
+  uint8_t* costs_;
+  Vec8 p1_, subtract_, jump_, before_, here_, least_;
+};
+
+/// Hamming distances of pixel x to the pixels x - d.
+class CensusCost {
+ public:
+  HWY_INLINE CensusCost(const PathRow& row, int x)
+      : row_(row), offset_(row.width - 1 - x), c_max_(hn::Set(kByteTag, row.c_max)) {
+    for (int p = 0; p < kPlanes; ++p) left_[p] = hn::Set(kByteTag, row.left[p][x]);
+  }
+  HWY_INLINE Vec8 at(int j) const {
+    const ptrdiff_t d = ptrdiff_t{j} * kByteLanes;
+    Vec8 differences[kPlanes];
+    for (int p = 0; p < kPlanes; ++p)
+      differences[p] = hn::Xor(left_[p], hn::LoadU(kByteTag, row_.right[p] + offset_ + d));
+    const Vec8 cost =
+        hn::Max(hn::Min(ones_of_six(differences), c_max_), hn::LoadU(kByteTag, row_.outside + offset_ + d));
+    return hn::Max(cost, hn::Load(kByteTag, row_.beyond + d));
+  }
+
+ private:
+  static constexpr int kPlanes = planes_of(CostKind::census);
+  const PathRow& row_;
+  ptrdiff_t offset_;
+  Vec8 c_max_;
+  Vec8 left_[kPlanes];
+};
+
+void forward(const PathRow& row) {
+  const int last = row.vectors - 1;
+  const ptrdiff_t stride = ptrdiff_t{row.vectors} * kByteLanes;
+  std::memset(row.beside, 0, static_cast<size_t>(stride));
+  uint8_t beside_least = 0;
+  for (int x = 0; x < row.width; ++x) {
+    const CensusCost cost(row, x);
+    Path beside(row.beside, beside_least, row), above(row.above + x * stride, row.above_least[x], row);
+    for (int j = 0; j <= last; ++j) {
+      const Vec8 c = cost.at(j);
+      hn::Store(c, kByteTag, row.costs + x * stride + j * kByteLanes);
+      hn::Store(hn::SaturatedAdd(beside.advance(j, last, c), above.advance(j, last, c)), kByteTag,
+                row.sums + x * stride + j * kByteLanes);
+    }
+    beside_least = beside.least();
+    row.above_least[x] = above.least();
+  }
+}
+
+/// The first lane of the totals that holds the value.
+HWY_INLINE int find(const uint8_t* totals, uint8_t value) {
+  const Vec8 wanted = hn::Set(kByteTag, value);
+  for (int d = 0;; d += kByteLanes) {
+    const auto found = hn::FindFirstTrue(kByteTag, hn::Eq(hn::Load(kByteTag, totals + d), wanted));
+    if (found >= 0) return d + static_cast<int>(found);
+  }
+}
+
+/// Second best total at more than one pixel from d is not far enough above the best (algorithm reference 1.6).
+bool ambiguous(const PathRow& row, int best, int d) {
+  auto second = static_cast<uint8_t>(3 * (row.c_max + row.p2));
+  for (int e = 0; e < row.disparities; ++e)
+    if (e < d - 1 || e > d + 1) second = std::min(second, row.totals[e]);
+  return (second - best) * 256 <= row.uniqueness * second;
+}
+
+void backward(const PathRow& row) {
+  const int last = row.vectors - 1;
+  const ptrdiff_t stride = ptrdiff_t{row.vectors} * kByteLanes;
+  std::memset(row.beside, 0, static_cast<size_t>(stride));
+  uint8_t beside_least = 0;
+  for (int x = row.width - 1; x >= 0; --x) {
+    Path beside(row.beside, beside_least, row);
+    Vec8 smallest = hn::Set(kByteTag, 255);
+    for (int j = 0; j <= last; ++j) {
+      const ptrdiff_t at = x * stride + j * kByteLanes;
+      const Vec8 total = hn::SaturatedAdd(hn::Load(kByteTag, row.sums + at),
+                                          beside.advance(j, last, hn::Load(kByteTag, row.costs + at)));
+      hn::Store(total, kByteTag, row.totals + j * kByteLanes);
+      smallest = hn::Min(smallest, total);
+    }
+    beside_least = beside.least();
+    const uint8_t best = smallest_lane(smallest);
+    const int d = find(row.totals, best);
+    const bool fits = row.subpixel && d > 0 && d + 1 < row.disparities;
+    const int fraction = fits ? fraction_of(row.totals[d - 1], best, row.totals[d + 1]) : kNoFraction;
+    row.fine[x] = static_cast<int16_t>(d * kFractions + fraction);
+    row.least[x] = best;
+    if (row.uniqueness > 0) row.ambiguous[x] = ambiguous(row, best, d);
+  }
+}
+
+void run_row(const PathRow& row) {
+  forward(row);
+  backward(row);
+}
+
+const PathKernels& target_path_kernels() {
+  static const PathKernels table{hwy::TargetName(HWY_TARGET), kByteLanes, run_row};
+  return table;
+}
+
+}  // namespace takt::stereo::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace takt::stereo {
+HWY_EXPORT(target_path_kernels);
+const PathKernels& path_kernels() { return HWY_DYNAMIC_DISPATCH(target_path_kernels)(); }
+}  // namespace takt::stereo
+#endif
