@@ -10,6 +10,7 @@
 
 #include "bench/suite.hpp"
 #include "bench/suites/hops.hpp"
+#include "nodes/stereo/band_matcher.hpp"
 #include "nodes/stereo/matcher.hpp"
 
 namespace takt::bench {
@@ -49,11 +50,12 @@ double milliseconds(Work work) {
   return static_cast<double>(now_ns() - begin) * 1e-6;
 }
 
+/// Rounds of the reference a and of b, one after the other in one process.
 template <class A, class B>
-void compare(std::vector<Row>& rows, const std::string& what, const std::string& reference, const std::string& granted,
+void compare(std::vector<Row>& rows, const std::string& name, const std::string& reference, const std::string& granted,
              int rounds, A a, B b) {
-  std::fprintf(stderr, "stereo: %s against %s\n", what.c_str(), reference.c_str());
-  Row row{"stereo/" + what + "/640x480x150", "ms", 0, {}, {}, {}, {}, granted};
+  std::fprintf(stderr, "%s against %s\n", name.c_str(), reference.c_str());
+  Row row{name, "ms", 0, {}, {}, {}, {}, granted};
   Pairs pairs;
   a();
   b();
@@ -79,25 +81,38 @@ std::vector<Row> run_stereo(const Options& options) {
              grey = stereo::make_matcher(kWidth, kHeight, 1, parameters);
   cv::Mat disparity(kHeight, kWidth, CV_16S), confidence(kHeight, kWidth, CV_8U), theirs;
   const auto view = [](const cv::Mat& m) { return ImageView<const uint8_t>{m.data, m.cols, m.rows, m.channels()}; };
-  const ImageView<int16_t> out{disparity.ptr<int16_t>(), kWidth, kHeight};
-  const ImageView<uint8_t> sure{confidence.data, kWidth, kHeight};
-  const auto run = [&](stereo::Matcher& matcher, const cv::Mat& left, const cv::Mat& right) {
-    if (!matcher.match(view(left), view(right), {out, sure})) throw CannotRun("the matcher refused its input");
+  const stereo::DisparityViews out{{disparity.ptr<int16_t>(), kWidth, kHeight}, {confidence.data, kWidth, kHeight}};
+  const auto with = [&](stereo::Matcher& matcher, const cv::Mat& left, const cv::Mat& right) {
+    return [&] {
+      if (!matcher.match(view(left), view(right), out)) throw CannotRun("the matcher refused its input");
+    };
   };
-  // OpenCV wants a multiple of 16.
-  const auto block = cv::StereoBM::create((kDisparities + 15) / 16 * 16, parameters.n_square);
-  const auto global = cv::StereoSGBM::create(0, (kDisparities + 15) / 16 * 16, 5, 200, 800, 1, 63, 10, 100, 2,
-                                             cv::StereoSGBM::MODE_SGBM_3WAY);
+  // OpenCV wants a multiple of 16. No rejection, so that all search alike; its matchers leave as many columns out.
+  constexpr int kRange = (kDisparities + 15) / 16 * 16;
+  const auto block = cv::StereoBM::create(kRange, parameters.n_square);
+  block->setTextureThreshold(0);
+  block->setUniquenessRatio(0);
+  const auto global = cv::StereoSGBM::create(0, kRange, 5, 600, 2400, 1, 0, 0, 0, 0, cv::StereoSGBM::MODE_SGBM_3WAY);
   const auto with_block = [&] { block->compute(scene.left_grey, scene.right_grey, theirs); };
   const auto with_global = [&] { global->compute(scene.left, scene.right, theirs); };
-  const std::string granted = std::string("one thread, ") + colour->target();
+  auto quality_parameters = stereo::MatcherParameters::quality();
+  quality_parameters.disparities = kDisparities;
+  const auto quality = stereo::make_matcher(kWidth, kHeight, 3, quality_parameters);
+  stereo::BandMatcher bands(kWidth, kHeight, 3, parameters, 2);
+
+  const std::string one = std::string("one thread, ") + colour->target();
+  const std::string name = "stereo/640x480x150";
   std::vector<Row> rows;
-  compare(rows, "match_grey", "cv::StereoBM", granted, rounds, with_block,
-          [&] { run(*grey, scene.left_grey, scene.right_grey); });
-  compare(rows, "match_colour", "cv::StereoBM on grey", granted, rounds, with_block,
-          [&] { run(*colour, scene.left, scene.right); });
-  compare(rows, "match_colour_to_sgbm", "cv::StereoSGBM 3-way", granted, rounds, with_global,
-          [&] { run(*colour, scene.left, scene.right); });
+  compare(rows, name + "/1-thread", "cv::StereoBM unfiltered, on grey", one, rounds, with_block,
+          with(*colour, scene.left, scene.right));
+  compare(rows, name + "/1-thread-grey", "cv::StereoBM unfiltered", one, rounds, with_block,
+          with(*grey, scene.left_grey, scene.right_grey));
+  compare(rows, name + "/1-thread-to-sgbm", "cv::StereoSGBM 3-way", one, rounds, with_global,
+          with(*colour, scene.left, scene.right));
+  compare(rows, name + "/quality", "cv::StereoSGBM 3-way", one, rounds, with_global,
+          with(*quality, scene.left, scene.right));
+  compare(rows, name + "/2-bands", "the same on one thread", std::string("two threads, ") + colour->target(), rounds,
+          with(*colour, scene.left, scene.right), with(bands, scene.left, scene.right));
   return rows;
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstring>
 
+#define TAKT_STEREO_COUNTS_ONES
 #include "nodes/stereo/simd_targets.hpp"
 
 #undef HWY_TARGET_INCLUDE
@@ -21,7 +22,13 @@ constexpr int kByteLanes = static_cast<int>(hn::MaxLanes(kByteTag));
 
 /// Every lane moved up by one; the last lane of `before` enters.
 HWY_INLINE Vec8 one_up(Vec8 v, Vec8 before) {
-#if HWY_TARGET == HWY_AVX3
+#if HWY_TARGET == HWY_AVX3_DL
+  HWY_ALIGN static constexpr uint8_t kFrom[64] = {127, 0,  1,  2,  3,  4,  5,  6,  7,  8,  9,  10, 11, 12, 13, 14,
+                                                  15,  16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30,
+                                                  31,  32, 33, 34, 35, 36, 37, 38, 39, 40, 41, 42, 43, 44, 45, 46,
+                                                  47,  48, 49, 50, 51, 52, 53, 54, 55, 56, 57, 58, 59, 60, 61, 62};
+  return Vec8{_mm512_permutex2var_epi8(v.raw, _mm512_load_si512(kFrom), before.raw)};
+#elif HWY_TARGET == HWY_AVX3
   const __m512i carry = _mm512_alignr_epi64(v.raw, before.raw, 6);
   return Vec8{_mm512_alignr_epi8(v.raw, carry, 15)};
 #elif HWY_TARGET == HWY_AVX2
@@ -34,7 +41,13 @@ HWY_INLINE Vec8 one_up(Vec8 v, Vec8 before) {
 
 /// Every lane moved down by one; the first lane of `after` enters.
 HWY_INLINE Vec8 one_down(Vec8 v, Vec8 after) {
-#if HWY_TARGET == HWY_AVX3
+#if HWY_TARGET == HWY_AVX3_DL
+  HWY_ALIGN static constexpr uint8_t kFrom[64] = {1,  2,  3,  4,  5,  6,  7,  8,  9,  10, 11, 12, 13, 14, 15, 16,
+                                                  17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30, 31, 32,
+                                                  33, 34, 35, 36, 37, 38, 39, 40, 41, 42, 43, 44, 45, 46, 47, 48,
+                                                  49, 50, 51, 52, 53, 54, 55, 56, 57, 58, 59, 60, 61, 62, 63, 64};
+  return Vec8{_mm512_permutex2var_epi8(v.raw, _mm512_load_si512(kFrom), after.raw)};
+#elif HWY_TARGET == HWY_AVX3
   const __m512i carry = _mm512_alignr_epi64(after.raw, v.raw, 2);
   return Vec8{_mm512_alignr_epi8(carry, v.raw, 1)};
 #elif HWY_TARGET == HWY_AVX2
@@ -48,7 +61,7 @@ HWY_INLINE Vec8 one_down(Vec8 v, Vec8 after) {
 /// Smallest of all lanes.
 HWY_INLINE uint8_t smallest_lane(Vec8 v) {
   const hn::FixedTag<uint16_t, 8> eight;
-#if HWY_TARGET == HWY_AVX3
+#if HWY_TARGET <= HWY_AVX3
   const hn::FixedTag<uint8_t, 32> half;
   const hn::FixedTag<uint8_t, 16> quarter;
   const auto halves = hn::Min(hn::LowerHalf(half, v), hn::UpperHalf(half, v));
@@ -61,7 +74,7 @@ HWY_INLINE uint8_t smallest_lane(Vec8 v) {
 #endif
   const auto words = hn::BitCast(eight, bytes);
   const auto low = hn::And(words, hn::Set(eight, 0xFF)), high = hn::ShiftRight<8>(words);
-#if HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_AVX2
+#if HWY_TARGET <= HWY_AVX2
   return static_cast<uint8_t>(_mm_cvtsi128_si32(_mm_minpos_epu16(hn::Min(low, high).raw)));
 #else
   return static_cast<uint8_t>(hn::GetLane(hn::MinOfLanes(eight, hn::Min(low, high))));
@@ -124,9 +137,12 @@ class CensusCost {
   Vec8 left_[kPlanes];
 };
 
-void forward(const PathRow& row) {
-  const int last = row.vectors - 1;
-  const ptrdiff_t stride = ptrdiff_t{row.vectors} * kByteLanes;
+/// kVectors: of one pixel, known to the compiler; 0: as many as the row says.
+template <int kVectors>
+void forward(const PathRow& given) {
+  const PathRow row = given;  // a copy: stores of bytes could change the original for all that the compiler knows
+  const int last = (kVectors > 0 ? kVectors : row.vectors) - 1;
+  const ptrdiff_t stride = ptrdiff_t{last + 1} * kByteLanes;
   std::memset(row.beside, 0, static_cast<size_t>(stride));
   uint8_t beside_least = 0;
   for (int x = 0; x < row.width; ++x) {
@@ -160,9 +176,11 @@ bool ambiguous(const PathRow& row, int best, int d) {
   return (second - best) * 256 <= row.uniqueness * second;
 }
 
-void backward(const PathRow& row) {
-  const int last = row.vectors - 1;
-  const ptrdiff_t stride = ptrdiff_t{row.vectors} * kByteLanes;
+template <int kVectors>
+void backward(const PathRow& given) {
+  const PathRow row = given;  // see forward()
+  const int last = (kVectors > 0 ? kVectors : row.vectors) - 1;
+  const ptrdiff_t stride = ptrdiff_t{last + 1} * kByteLanes;
   std::memset(row.beside, 0, static_cast<size_t>(stride));
   uint8_t beside_least = 0;
   for (int x = row.width - 1; x >= 0; --x) {
@@ -186,9 +204,21 @@ void backward(const PathRow& row) {
   }
 }
 
+template <int kVectors>
+void run(const PathRow& row) {
+  forward<kVectors>(row);
+  backward<kVectors>(row);
+}
+
 void run_row(const PathRow& row) {
-  forward(row);
-  backward(row);
+  switch (row.vectors) {
+    case 1: return run<1>(row);
+    case 2: return run<2>(row);
+    case 3: return run<3>(row);
+    case 4: return run<4>(row);
+    case 5: return run<5>(row);
+    default: return run<0>(row);
+  }
 }
 
 const PathKernels& target_path_kernels() {

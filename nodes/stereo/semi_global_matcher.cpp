@@ -2,6 +2,7 @@
 #include "nodes/stereo/semi_global_matcher.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <stdexcept>
 
@@ -16,7 +17,6 @@ struct SemiGlobalMatcher::State {
   void set_range(int disparities);
   void search(const Planes& reference, const Planes& mirrored_other, const Rows<int16_t>& fine);
   void write(int y, const DisparityViews& out) const;
-  int max_sum() const { return 3 * (p.truncation() + p.step_twice()); }
 
   MatcherParameters p;
   const int most_disparities;
@@ -27,6 +27,7 @@ struct SemiGlobalMatcher::State {
   Buffer<uint8_t> outside, beyond, costs, above, above_least, sums, beside, totals;
   Rows<int16_t> left_fine, right_fine, smooth;  ///< the right one's columns are reversed
   Rows<uint8_t> least, ambiguous;
+  std::array<uint8_t, 256> confidences{};  ///< of a sum of three paths
 };
 
 SemiGlobalMatcher::State::State(int width_, int height_, int channels_, const MatcherParameters& parameters)
@@ -54,6 +55,8 @@ SemiGlobalMatcher::State::State(int width_, int height_, int channels_, const Ma
   left_fine = Rows<int16_t>(height, width);
   if (p.left_right_check) right_fine = Rows<int16_t>(height, width);
   if (p.median) smooth = Rows<int16_t>(height, width);
+  const int largest = 3 * (p.truncation() + p.step_twice());
+  for (int sum = 0; sum <= largest; ++sum) confidences[size(sum)] = confidence_of(sum, largest);
   least = Rows<uint8_t>(height, width);
   ambiguous = Rows<uint8_t>(height, width);
 }
@@ -102,7 +105,7 @@ void SemiGlobalMatcher::State::write(int y, const DisparityViews& out) const {
   int16_t* disparity = out.disparity.row(y);
   uint8_t* confidence = out.confidence.row(y);
   for (int x = 0; x < width; ++x) {
-    confidence[x] = confidence_of(least.row(y)[x], max_sum());
+    confidence[x] = confidences[least.row(y)[x]];
     disparity[x] = confidence[x] < p.min_confidence || ambiguous.row(y)[x] != 0 ? int16_t{-1} : int16_t{0};
   }
   take_fine((p.median ? smooth : left_fine).row(y), width, disparity,

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "nodes/stereo/band_matcher.hpp"
 #include "nodes/stereo/general_matcher.hpp"
 #include "nodes/stereo/reference.hpp"
 #include "nodes/stereo/semi_global_matcher.hpp"
@@ -232,5 +233,20 @@ TEST_CASE("the general matcher agrees with the fast ones where both serve") {
     REQUIRE(fast->match(left.view(), right.view(), expected.views(left)));
     GeneralMatcher general(left.width, left.height, channels, p);
     expect_equal(general, left, right, p, expected);
+  }
+}
+
+TEST_CASE("bands of rows on threads give the result of one matcher") {
+  std::mt19937 random(31);
+  for (int round = 0; round < 25; ++round) {
+    const auto pick = [&](int low, int high) { return std::uniform_int_distribution<int>(low, high)(random); };
+    const int channels = pick(0, 1) ? 3 : 1, height = pick(32, 90);
+    const Picture left = random_picture(random, pick(1, 60), height, channels, round % 3 ? 256 : 3);
+    const Picture right = shifted(random, left, pick(0, left.width - 1), pick(0, 100));
+    const MatcherParameters p = random_parameters(random, 60);
+    Output expected(left);
+    REQUIRE(make_matcher(left.width, height, channels, p)->match(left.view(), right.view(), expected.views(left)));
+    BandMatcher bands(left.width, height, channels, p, pick(1, std::min(4, height / 16)));
+    expect_equal(bands, left, right, p, expected);
   }
 }
