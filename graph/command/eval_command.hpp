@@ -14,8 +14,11 @@ struct EvalStereoOptions {
   int disparities = 64;
   std::vector<std::string> set;  ///< "param=value" of the stereo node
   bool variants = false;
+  std::string sweep, picture;  ///< "noise" or "window"; PNG of its curves
   bool json = false;
 };
+/// Error and time on generated pairs against the sensor's noise, or the edge of the window.
+int sweep_stereo(const EvalStereoOptions& options);
 void add_eval_stereo(CLI::App& eval, EvalStereoOptions& options, int& exit_code);
 
 struct EvalEgoMotionOptions {

@@ -150,15 +150,24 @@ int evaluate(const EvalStereoOptions& options) {
 
 void add_eval_stereo(CLI::App& eval, EvalStereoOptions& o, int& exit_code) {
   CLI::App* app = eval.add_subcommand("stereo", "bad pixels of dense stereo against ground truth, beside OpenCV");
-  app->add_option("--left", o.left, "left rectified image")->required();
-  app->add_option("--right", o.right, "right rectified image")->required();
-  app->add_option("--gt", o.truth, "ground truth of the left image, 0: unknown")->required();
+  auto* left = app->add_option("--left", o.left, "left rectified image");
+  auto* right = app->add_option("--right", o.right, "right rectified image")->needs(left);
+  auto* truth = app->add_option("--gt", o.truth, "ground truth of the left image, 0: unknown")->needs(right);
+  left->needs(truth);
+  app->add_option("--sweep", o.sweep, "on generated pairs: error against noise, or against the window's edge")
+      ->check(CLI::IsMember({"noise", "window"}))
+      ->excludes(left);
+  app->add_option("--picture", o.picture, "PNG of the sweep's curves")->needs("--sweep");
   app->add_option("--gt-scale", o.truth_scale, "disparity = value / scale (default 1)")->check(CLI::PositiveNumber);
   app->add_option("--disparities", o.disparities, "search range, px (default 64)")->check(CLI::Range(1, 512));
   app->add_option("--set", o.set, "parameter=value of the stereo node, repeatable");
   app->add_flag("--variants", o.variants, "every way of matching, too: costs, windows, selections");
   app->add_flag("--json", o.json, "one JSON object on stdout");
-  app->callback([&] { exit_code = evaluate(o); });
+  app->callback([&] {
+    if (o.left.empty() && o.sweep.empty())
+      throw CLI::RequiredError("--left, --right and --gt of a recorded pair, or --sweep,");
+    exit_code = o.sweep.empty() ? evaluate(o) : sweep_stereo(o);
+  });
 }
 
 }  // namespace takt::command

@@ -57,15 +57,23 @@ inline std::vector<int> window_sums(Bytes left, Bytes right, const MatcherParame
   const PixelCost cost(left, right, p);
   const int w = left.width, h = left.height, m = p.n_square / 2;
   std::vector<int> sums(static_cast<size_t>(w) * static_cast<size_t>(h) * static_cast<size_t>(p.disparities));
-  size_t i = 0;
-  for (int y = 0; y < h; ++y)
-    for (int x = 0; x < w; ++x)
-      for (int d = 0; d < p.disparities; ++d, ++i)
-        for (int l = -m; l <= m; ++l)
-          for (int k = -m; k <= m; ++k) {
-            const int cx = std::clamp(x + k, 0, w - 1), cy = std::clamp(y + l, 0, h - 1);
-            sums[i] += right_is_reference ? cost(cx + d, cx, cy) : cost(cx, cx - d, cy);
-          }
+  std::vector<int> costs(sums.size());
+  const auto at = [&](int x, int y, int d) {
+    return (static_cast<size_t>(y) * static_cast<size_t>(w) + static_cast<size_t>(x)) *
+               static_cast<size_t>(p.disparities) +
+           static_cast<size_t>(d);
+  };
+  const auto each = [&](auto body) {
+    for (int y = 0; y < h; ++y)
+      for (int x = 0; x < w; ++x)
+        for (int d = 0; d < p.disparities; ++d) body(x, y, d);
+  };
+  each([&](int x, int y, int d) { costs[at(x, y, d)] = right_is_reference ? cost(x + d, x, y) : cost(x, x - d, y); });
+  each([&](int x, int y, int d) {
+    for (int l = -m; l <= m; ++l)
+      for (int k = -m; k <= m; ++k)
+        sums[at(x, y, d)] += costs[at(std::clamp(x + k, 0, w - 1), std::clamp(y + l, 0, h - 1), d)];
+  });
   return sums;
 }
 

@@ -204,3 +204,31 @@ TEST_CASE("settings that cannot work stop the start") {
   CHECK_THROWS_AS(Bench({{"calibration", std::string("no_such_file.yaml")}}).setup(), SetupError);
   CHECK_THROWS_AS(Bench({{"cost", std::string("ssd")}, {"c_max", int64_t{226}}}).setup(), SetupError);
 }
+
+TEST_CASE("sub-pixel fractions come with the disparities if they are asked for, by every matcher, at every level") {
+  for (const char* selection : {"winner", "semi_global", "scanline"}) {
+    const bool paths = std::string_view(selection) == "semi_global";
+    Bench bench({{"disparities", int64_t{32}},
+                 {"selection", std::string(selection)},
+                 {"cost", std::string(paths ? "census" : "gradient")},
+                 {"n_square", int64_t{paths ? 1 : 9}},
+                 {"n_min", int64_t{1}},
+                 {"subpixel", true}});
+    bench.setup();
+    for (const int level : {0, 1}) {
+      CAPTURE(selection);
+      REQUIRE(bench.run(level));
+      const auto& map = bench.output<DisparityMap>(1);
+      REQUIRE(map.fraction.size == map.disparity.size);
+      int near = 0, all = 0;
+      for (int y = 4; y < Bench::kHeight - 4; ++y)
+        for (int x = 44; x < 76; ++x, ++all)
+          near += std::abs(map.view().at(x, y) + (map.fraction_view().at(x, y) - 32) / 64.0 - Bench::kShift) < 0.6;
+      CHECK(near > all * 9 / 10);
+    }
+  }
+  Bench whole;
+  whole.setup();
+  REQUIRE(whole.run());
+  CHECK(whole.output<DisparityMap>(1).fraction.size == 0);
+}
