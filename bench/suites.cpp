@@ -13,6 +13,7 @@ std::vector<Row> run_trace(const Options&);
 std::vector<Row> run_record(const Options&);
 #ifdef TAKT_BENCH_STEREO
 std::vector<Row> run_stereo(const Options&);
+std::vector<Row> run_rectify(const Options&);
 #endif
 
 std::span<const Suite> suites() {
@@ -25,6 +26,7 @@ std::span<const Suite> suites() {
       {"record", "what recording two stereo cameras of 1280x960 costs, against the same run without", run_record},
 #ifdef TAKT_BENCH_STEREO
       {"stereo", "dense disparity at 640x480, 150 disparities, against OpenCV's matchers", run_stereo},
+      {"rectify", "debayering and rectification of a 640x480 pair, against OpenCV's", run_rectify},
 #endif
   });
   return list;

@@ -19,6 +19,7 @@
 #include "rt/memory/job_calls.hpp"
 #include "rt/msg/messages.hpp"
 #include "rt/param.hpp"
+#include "rt/sched/append_log.hpp"
 #include "rt/shm/transport.hpp"
 #include "rt/source_state.hpp"
 #include "rt/time/clock.hpp"
@@ -60,6 +61,12 @@ class RecordedAnswers {
   virtual int64_t next(Question question) = 0;
 };
 
+/// What a job says of the results of its node.
+struct ResultNotice {
+  bool wrong = false;  ///< else doubtful
+  BoundedText<160> why;
+};
+
 /// The mode in which the robot stands and stays where it is; `on_miss: safe_stop` and `on_overrun: safe_stop` enter it.
 inline constexpr std::string_view kSafeStopMode = "safe_stop";
 
@@ -87,6 +94,10 @@ class Job {
   /// Says how what this job reads from outside the run stands; the mode of the run may depend on it. Said by each job
   /// that knows; without a word the state stays as it was.
   void source_state(const SourceReport& report) { source_ = report; }
+  /// Says that what this node publishes is worse than it looks, or wrong, and why: kept among the faults of the run.
+  /// Once when it begins, not in each job. One word a job, cut at 160 characters.
+  void results_doubtful(std::string_view why) { notice_.emplace(ResultNotice{false, BoundedText<160>(why)}); }
+  void results_wrong(std::string_view why) { notice_.emplace(ResultNotice{true, BoundedText<160>(why)}); }
 
   Job(const Clock& clock, uint64_t index, int64_t release_ns, int64_t deadline_ns, int level, std::string_view mode,
       const CpuBudget& cpu = {})
@@ -100,6 +111,7 @@ class Job {
   bool ended() const { return end_of_data_; }
   bool without_result() const { return no_result_; }
   const std::optional<SourceReport>& source_report() const { return source_; }
+  const std::optional<ResultNotice>& result_notice() const { return notice_; }
   /// In a replay.
   void answer_from(RecordedAnswers& recorded) { recorded_ = &recorded; }
 
@@ -115,6 +127,7 @@ class Job {
   RecordedAnswers* recorded_ = nullptr;
   bool end_of_data_ = false, no_result_ = false;
   std::optional<SourceReport> source_;
+  std::optional<ResultNotice> notice_;
 };
 
 enum class Need : uint8_t { required, optional };

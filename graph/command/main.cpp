@@ -4,6 +4,7 @@
 #include <opencv2/core/utils/logger.hpp>
 
 #include "graph/command/attach_commands.hpp"
+#include "graph/command/calibrate_command.hpp"
 #include "graph/command/check_command.hpp"
 #include "graph/command/doctor_command.hpp"
 #include "graph/command/eval_command.hpp"
@@ -129,6 +130,7 @@ int main(int argc, char** argv) {
   takt::command::ShowOptions show_options;
   takt::command::RenderOptions render_options;
   takt::command::ExplainOptions explain_options;
+  takt::command::CalibrateOptions calibrate;
   takt::command::EvalStereoOptions stereo;
   takt::command::EvalEgoMotionOptions ego_motion;
   takt::command::AttachOptions attach;
@@ -159,6 +161,7 @@ int main(int argc, char** argv) {
   add_profile(app, profile, exit_code);
   takt::command::add_replay(app, replay, exit_code);
   takt::command::add_log(app, log, exit_code);
+  takt::command::add_calibrate(app, calibrate, exit_code);
   CLI::App* eval = app.add_subcommand("eval", "measures quality against ground truth");
   eval->require_subcommand(1);
   takt::command::add_eval_stereo(*eval, stereo, exit_code);

@@ -18,6 +18,8 @@ std::string_view to_string(uint32_t kind) {
     case Fault::memory: return "memory";
     case Fault::lost: return "lost";
     case Fault::back: return "back";
+    case Fault::doubtful: return "doubtful";
+    case Fault::wrong: return "wrong";
   }
   return "";
 }

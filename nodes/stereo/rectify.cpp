@@ -64,18 +64,52 @@ void read(const cv::FileStorage& file, const std::string& path, const char* key,
   std::memcpy(out.data(), m.data, sizeof out);
 }
 
-}  // namespace
+void read_cameras(const cv::FileStorage& file, const std::string& path, StereoCalibration& c) {
+  read(file, path, "M1", c.left_matrix);
+  read(file, path, "D1", c.left_distortion);
+  read(file, path, "M2", c.right_matrix);
+  read(file, path, "D2", c.right_distortion);
+}
 
-StereoCalibration read_calibration(const std::filesystem::path& path) {
+template <class Keys>
+StereoCalibration read_file(const std::filesystem::path& path, const Keys& read_keys) {
   StereoCalibration c;
   if (!std::filesystem::exists(path)) refuse(path.string() + ": no such file; check parameter `calibration`");
   try {
     const cv::FileStorage file(path.string(), cv::FileStorage::READ);
     if (!file.isOpened()) refuse(path.string() + ": cannot be read as OpenCV YAML or XML");
-    read(file, path.string(), "M1", c.left_matrix);
-    read(file, path.string(), "D1", c.left_distortion);
-    read(file, path.string(), "M2", c.right_matrix);
-    read(file, path.string(), "D2", c.right_distortion);
+    read_keys(file, c);
+  } catch (const cv::Exception& e) {
+    refuse(path.string() + ": " + e.err);
+  }
+  return c;
+}
+
+/// Sources of the pixels of one rectified image, as OpenCV computes them.
+std::vector<RemapSource> sources(const cv::Mat& matrix, const cv::Mat& distortion, const cv::Mat& rotation,
+                                 const cv::Mat& projection, cv::Size size) {
+  cv::Mat x, y;
+  cv::initUndistortRectifyMap(matrix, distortion, rotation, projection, size, CV_32F, x, y);
+  std::vector<RemapSource> out(static_cast<size_t>(size.area()));
+  size_t i = 0;
+  for (int row = 0; row < size.height; ++row)
+    for (int column = 0; column < size.width; ++column, ++i) {
+      const double sx = x.at<float>(row, column), sy = y.at<float>(row, column);
+      // !(>= 0) also catches what is not a number.
+      if (!(sx >= 0) || !(sy >= 0) || !(sx <= size.width - 1) || !(sy <= size.height - 1)) continue;
+      const int fx = static_cast<int>(std::lround(sx * 128)), fy = static_cast<int>(std::lround(sy * 128));
+      const int x0 = std::min(fx >> 7, size.width - 2), y0 = std::min(fy >> 7, size.height - 2);
+      out[i] = {static_cast<int16_t>(x0), static_cast<int16_t>(y0), static_cast<uint8_t>(fx - 128 * x0),
+                static_cast<uint8_t>(fy - 128 * y0)};
+    }
+  return out;
+}
+
+}  // namespace
+
+StereoCalibration read_calibration(const std::filesystem::path& path) {
+  return read_file(path, [&](const cv::FileStorage& file, StereoCalibration& c) {
+    read_cameras(file, path.string(), c);
     read(file, path.string(), "R", c.rotation);
     read(file, path.string(), "T", c.translation_m);
     std::vector<int> size;
@@ -83,73 +117,78 @@ StereoCalibration read_calibration(const std::filesystem::path& path) {
     if (size.size() != 2) refuse(path.string() + ": key image_size must be [width, height]");
     c.width = size[0];
     c.height = size[1];
+  });
+}
+
+StereoCalibration read_intrinsics(const std::filesystem::path& path) {
+  return read_file(path,
+                   [&](const cv::FileStorage& file, StereoCalibration& c) { read_cameras(file, path.string(), c); });
+}
+
+void write_calibration(const std::filesystem::path& path, const StereoCalibration& c, const std::string& comment) {
+  const std::string extension = path.extension().string();
+  if (extension != ".yaml" && extension != ".yml" && extension != ".xml")
+    refuse(path.string() + ": must end in .yaml, .yml or .xml");
+  try {
+    cv::FileStorage file(path.string(), cv::FileStorage::WRITE);
+    if (!file.isOpened()) refuse(path.string() + ": cannot be written; choose another place");
+    file.writeComment(comment);
+    file << "image_size" << std::vector<int>{c.width, c.height};
+    file << "M1" << matrix(c.left_matrix, 3) << "D1" << matrix(c.left_distortion, 1);
+    file << "M2" << matrix(c.right_matrix, 3) << "D2" << matrix(c.right_distortion, 1);
+    file << "R" << matrix(c.rotation, 3) << "T" << matrix(c.translation_m, 3);
   } catch (const cv::Exception& e) {
     refuse(path.string() + ": " + e.err);
   }
-  return c;
 }
 
-Rectifier::Rectifier(const StereoCalibration& c) : width_(c.width), height_(c.height) {
+RectificationTables rectification_tables(const StereoCalibration& c) {
   check(c);
-  build(c);
-}
-
-void Rectifier::build(const StereoCalibration& c) {
   const cv::Mat k1 = matrix(c.left_matrix, 3), k2 = matrix(c.right_matrix, 3), d1 = matrix(c.left_distortion, 1),
                 d2 = matrix(c.right_distortion, 1);
-  const cv::Size size(width_, height_);
+  const cv::Size size(c.width, c.height);
   cv::Mat r1, r2, p1, p2, q;
   cv::stereoRectify(k1, d1, k2, d2, size, matrix(c.rotation, 3), matrix(c.translation_m, 3), r1, r2, p1, p2, q,
                     cv::CALIB_ZERO_DISPARITY, 0);
   const double focal = p1.at<double>(0, 0), baseline = -p2.at<double>(0, 3) / focal;
   if (!(focal > 0) || !(baseline > 0) || p2.at<double>(1, 3) != 0)
     refuse("translation_m is " + std::to_string(c.translation_m[0]) + ", " + std::to_string(c.translation_m[1]) + ", " +
-           std::to_string(c.translation_m[2]) + "; the right camera must stand to the right of the left one (x < 0)");
-  camera_ = {focal, p1.at<double>(0, 2), p1.at<double>(1, 2), baseline};
-
-  const auto tables = [&](const cv::Mat& k, const cv::Mat& d, const cv::Mat& r, const cv::Mat& p,
-                          std::vector<RemapSource>& out) {
-    cv::Mat x, y;
-    cv::initUndistortRectifyMap(k, d, r, p, size, CV_32F, x, y);
-    out.resize(static_cast<size_t>(width_) * static_cast<size_t>(height_));
-    for (int j = 0; j < height_; ++j)
-      for (int i = 0; i < width_; ++i) {
-        const double sx = x.at<float>(j, i), sy = y.at<float>(j, i);
-        // !(>= 0) also catches what is not a number.
-        if (!(sx >= 0) || !(sy >= 0) || !(sx <= width_ - 1) || !(sy <= height_ - 1)) continue;
-        const int fx = static_cast<int>(std::lround(sx * 128)), fy = static_cast<int>(std::lround(sy * 128));
-        const int x0 = std::min(fx >> 7, width_ - 2), y0 = std::min(fy >> 7, height_ - 2);
-        out[static_cast<size_t>(j) * static_cast<size_t>(width_) + static_cast<size_t>(i)] = {
-            static_cast<int16_t>(x0), static_cast<int16_t>(y0), static_cast<uint8_t>(fx - 128 * x0),
-            static_cast<uint8_t>(fy - 128 * y0)};
-      }
-  };
-  tables(k1, d1, r1, p1, left_);
-  tables(k2, d2, r2, p2, right_);
+           std::to_string(c.translation_m[2]) +
+           "; the right camera must stand to the right of the left one (x < 0); are they swapped?");
+  RectificationTables tables;
+  tables.camera = {focal, p1.at<double>(0, 2), p1.at<double>(1, 2), baseline};
+  tables.left = sources(k1, d1, r1, p1, size);
+  tables.right = sources(k2, d2, r2, p2, size);
+  return tables;
 }
 
-void Rectifier::remap(const std::vector<RemapSource>& map, ImageView<const uint8_t> in, ImageView<uint8_t> out) const {
-  const RemapImage image{in.data, in.stride, width_, height_, in.channels};
-  for (int y = 0; y < height_; ++y) remap_row_(image, map.data() + ptrdiff_t{y} * width_, width_, out.row(y));
+Rectifier::Rectifier(const StereoCalibration& c, BayerPattern pattern)
+    : width_(c.width), height_(c.height), pattern_(pattern) {
+  const RectificationTables tables = rectification_tables(c);
+  camera_ = tables.camera;
+  left_ = Remap(width_, height_, tables.left);
+  right_ = Remap(width_, height_, tables.right);
+  window_.resize(std::max(left_.window_bytes(), right_.window_bytes()));
 }
 
 bool Rectifier::rectify(ImageView<const uint8_t> left, ImageView<const uint8_t> right, ImageView<uint8_t> left_out,
-                        ImageView<uint8_t> right_out) const {
-  const auto fits = [&](const auto& v) {
-    return v.data != nullptr && v.width == width_ && v.height == height_ && v.channels == left.channels;
+                        ImageView<uint8_t> right_out) {
+  const auto fits = [&](const auto& v, int channels) {
+    return v.data != nullptr && v.width == width_ && v.height == height_ && v.channels == channels;
   };
-  if ((left.channels != 1 && left.channels != 3) || !fits(left) || !fits(right) || !fits(left_out) || !fits(right_out))
-    return false;
-  if (left_.empty()) {
-    const auto bytes = static_cast<size_t>(width_) * static_cast<size_t>(left.channels);
+  const int in = pattern_ == BayerPattern::none && left.channels == 3 ? 3 : 1;
+  const int out = pattern_ == BayerPattern::none ? in : 3;
+  if (!fits(left, in) || !fits(right, in) || !fits(left_out, out) || !fits(right_out, out)) return false;
+  if (window_.empty()) {
+    const auto bytes = static_cast<size_t>(width_) * static_cast<size_t>(in);
     for (int y = 0; y < height_; ++y) {
       std::memcpy(left_out.row(y), left.row(y), bytes);
       std::memcpy(right_out.row(y), right.row(y), bytes);
     }
     return true;
   }
-  remap(left_, left, left_out);
-  remap(right_, right, right_out);
+  left_.run(left, pattern_, window_, left_out);
+  right_.run(right, pattern_, window_, right_out);
   return true;
 }
 

@@ -3,9 +3,11 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <string>
 #include <vector>
 
-#include "nodes/stereo/remap_kernel.hpp"
+#include "nodes/stereo/debayer.hpp"
+#include "nodes/stereo/remap.hpp"
 #include "rt/msg/messages.hpp"
 
 namespace takt::stereo {
@@ -23,13 +25,30 @@ struct StereoCalibration {
 /// (metres) and image_size [width, height]. Throws std::invalid_argument naming file, key and value.
 StereoCalibration read_calibration(const std::filesystem::path& file);
 
-/// Undistorts and rectifies a pair so that epipolar lines are rows of equal number (thesis Sec. 3.5.2).
+/// The matrices and distortions alone (M1, D1, M2, D2), as OpenCV's samples keep them in a file of their own.
+StereoCalibration read_intrinsics(const std::filesystem::path& file);
+
+/// Writes it in the same form, with one line of comment. Throws std::invalid_argument naming the file.
+void write_calibration(const std::filesystem::path& file, const StereoCalibration& calibration,
+                       const std::string& comment);
+
+/// Model of the rectified images, and where each of their pixels comes from (width x height, row by row).
+struct RectificationTables {
+  CameraModel camera;
+  std::vector<RemapSource> left, right;
+};
+
+/// The tables that bring epipolar lines onto rows (thesis Sec. 3.5.2). Throws std::invalid_argument for values that are
+/// not finite, sizes outside 16..8192, focal lengths that are not positive, a rotation that is none, or cameras that do
+/// not stand left and right of each other.
+RectificationTables rectification_tables(const StereoCalibration& calibration);
+
+/// Undistorts and rectifies pairs so that epipolar lines are rows of equal number. Memory is taken by the constructor;
+/// one thread at a time.
 class Rectifier {
  public:
-  /// Builds the remap tables. Throws std::invalid_argument for values that are not finite, sizes outside 16..8192,
-  /// focal lengths that are not positive, a rotation that is none, or cameras that do not stand left and right of each
-  /// other.
-  explicit Rectifier(const StereoCalibration& calibration);
+  /// For raw pairs; with a pattern they are mosaics of one channel and become BGR. Throws as rectification_tables().
+  explicit Rectifier(const StereoCalibration& calibration, BayerPattern pattern = BayerPattern::none);
   /// For pairs that are rectified already: rectify() copies.
   Rectifier(int width, int height, const CameraModel& camera) : width_(width), height_(height), camera_(camera) {}
 
@@ -38,19 +57,18 @@ class Rectifier {
   int width() const { return width_; }
   int height() const { return height_; }
 
-  /// Bilinear, 1/128 px; pixels that see nothing become 0. All views have the calibrated size and 1 or 3 channels
-  /// alike; in and out do not overlap. Returns false, and writes nothing, if they do not fit.
+  /// Bilinear, 1/128 px, of the debayered images if there is a pattern; pixels that see nothing become 0. All views
+  /// have the calibrated size and 1 or 3 channels alike, with a pattern 1 in and 3 out; in and out do not overlap.
+  /// Returns false, and writes nothing, if they do not fit.
   [[nodiscard]] bool rectify(ImageView<const uint8_t> left, ImageView<const uint8_t> right, ImageView<uint8_t> left_out,
-                             ImageView<uint8_t> right_out) const;
+                             ImageView<uint8_t> right_out);
 
  private:
-  void build(const StereoCalibration& calibration);
-  void remap(const std::vector<RemapSource>& map, ImageView<const uint8_t> in, ImageView<uint8_t> out) const;
-
   int width_ = 0, height_ = 0;
   CameraModel camera_;
-  RemapRow remap_row_ = remap_row();
-  std::vector<RemapSource> left_, right_;  ///< empty: pass through
+  BayerPattern pattern_ = BayerPattern::none;
+  Remap left_, right_;
+  std::vector<int8_t> window_;  ///< of both, one after the other; empty: pass through
 };
 
 }  // namespace takt::stereo

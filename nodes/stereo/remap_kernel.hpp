@@ -1,27 +1,29 @@
 // SPDX-License-Identifier: Apache-2.0
-// Internal: bilinear resampling of one row.
+// Internal: bilinear resampling of one row from a window of source rows. Source bytes are signed (value - 128): weights
+// of 0..128 are then the unsigned operand of a byte multiply-add.
 #pragma once
 #include <cstddef>
 #include <cstdint>
 
 namespace takt::stereo {
 
-/// Where a rectified pixel comes from: top left of the four source pixels and the fractions in 1/128 px (0..128).
-struct RemapSource {
-  int16_t x = -1, y = -1;  ///< -1: outside, gives 0
-  uint8_t fraction_x = 0, fraction_y = 0;
+/// Pixels that are made at once at most; offsets and fractions are padded to a multiple of it.
+constexpr int kRemapGroup = 16;
+
+struct RemapRow {
+  const int8_t* window;       ///< pixels of 4 bytes (blue, green, red, anything) or of 1
+  ptrdiff_t stride;           ///< bytes from one source row to the next
+  const uint32_t* offsets;    ///< pixels from `window` to the upper left of the four
+  const uint16_t* fractions;  ///< 1/128 px: along x, and along y in the high byte
+  int count;                  ///< pixels to be made
 };
 
-struct RemapImage {
-  const uint8_t* data;
-  ptrdiff_t stride;
-  int width, height, channels;
+struct RemapKernels {
+  /// out[i] = the four pixels at offsets[i], weighted, rounded. Nothing beyond `count` pixels of `out` is touched.
+  void (*bgr)(const RemapRow& row, uint8_t* out);
+  void (*grey)(const RemapRow& row, uint8_t* out);
 };
 
-/// out[i] = the four pixels of sources[i], weighted in 1/128 px, rounded: exact integer arithmetic, equal on all
-/// targets. Nothing outside the image or beyond `count` pixels of `out` is touched.
-using RemapRow = void (*)(const RemapImage& in, const RemapSource* sources, int count, uint8_t* out);
-
-RemapRow remap_row();
+const RemapKernels& remap_kernels();
 
 }  // namespace takt::stereo

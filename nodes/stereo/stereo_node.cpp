@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
+#include <cstdio>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -8,6 +9,7 @@
 
 #include "nodes/stereo/half_resolution.hpp"
 #include "nodes/stereo/matcher.hpp"
+#include "nodes/stereo/rectification_monitor.hpp"
 #include "nodes/stereo/rectify.hpp"
 #include "nodes/stereo/triangulate.hpp"
 #include "rt/node.hpp"
@@ -25,7 +27,9 @@ class StereoNode final : public Node {
     const Capacity& images = pair_.capacity();
     width_ = static_cast<int>(images.width);
     height_ = static_cast<int>(images.height);
-    channels_ = static_cast<int>(images.channels);
+    channels_ = input_channels_ = static_cast<int>(images.channels);
+    pattern_ = static_cast<BayerPattern>(bayer_());
+    if (pattern_ != BayerPattern::none) check_mosaic();
     range_ = most_ = disparities_;
     try {
       matcher_ = make_matcher(width_, height_, channels_, parameters(disparities_));
@@ -41,7 +45,8 @@ class StereoNode final : public Node {
     disparity_scratch_.resize(pixels);
     confidence_scratch_.resize(pixels);
     if (subpixel_) fraction_scratch_.resize(pixels);
-    rectified_.reserve(images);
+    rectified_.reserve({images.width, images.height, static_cast<uint32_t>(channels_), 0});
+    monitor_.emplace(width_, height_);
     disparity_.reserve({images.width, images.height, 1, 0});
     const auto step = static_cast<uint32_t>(cloud_step_());
     cloud_.reserve({0, 0, 1, ((images.width + step - 1) / step) * ((images.height + step - 1) / step)});
@@ -51,7 +56,8 @@ class StereoNode final : public Node {
     const StereoPair* in = pair_.newest();
     if (!in || !pair_.is_new()) return job.no_result();  // nothing to match, or matched already
     const bool is_rectified = in->camera.focal_px > 0;
-    if (in->width != width_ || in->height != height_ || in->channels != channels_ || (!is_rectified && !rectifier_))
+    if (in->width != width_ || in->height != height_ || in->channels != (is_rectified ? channels_ : input_channels_) ||
+        (!is_rectified && !rectifier_))
       return job.no_result();
     stamp_ = pair_.stamp_ns();
     sensor_in_robot_ = in->sensor_in_robot;
@@ -87,13 +93,23 @@ class StereoNode final : public Node {
     return p;
   }
 
+  void check_mosaic() {
+    if (channels_ != 1)
+      throw SetupError("bayer is " + std::string(bayer_.word()) + " but `pair` has " + std::to_string(channels_) +
+                       " channels; mosaics have 1");
+    if (calibration_().empty())
+      throw SetupError("bayer is " + std::string(bayer_.word()) +
+                       " but there is no `calibration`; raw pairs are debayered where they are rectified");
+    channels_ = 3;
+  }
+
   void load_calibration(const std::filesystem::path& path) {
     const StereoCalibration calibration = read_calibration(path);
     if (calibration.width != width_ || calibration.height != height_)
       throw SetupError(path.string() + " is for " + std::to_string(calibration.width) + " x " +
                        std::to_string(calibration.height) + " px but `pair` has " + std::to_string(width_) + " x " +
                        std::to_string(height_) + "; give the calibration of this camera mode");
-    rectifier_.emplace(calibration);
+    rectifier_.emplace(calibration, pattern_);
   }
 
   /// Leaves the views on rectified images: in the input, in the message to send or in this node's own memory.
@@ -110,8 +126,8 @@ class StereoNode final : public Node {
       out->frame_number = in.frame_number;
       out->camera = camera_;
       out->sensor_in_robot = sensor_in_robot_;
-      out->left.resize(in.left.size);
-      out->right.resize(in.right.size);
+      out->left.resize(left_.size());
+      out->right.resize(right_.size());
       left_out = out->left_view();
       right_out = out->right_view();
     }
@@ -146,6 +162,7 @@ class StereoNode final : public Node {
     Matcher& matcher = job.level() == 0 ? *matcher_ : *half_matcher_;
     if (!matcher.match(left, right, views)) return job.no_result();
     if (map != nullptr) disparity_.send(stamp_);
+    if (row_check_) check_rows(job, left, right, views.disparity);
     PointCloud* cloud = cloud_.connected() ? cloud_.loan() : nullptr;
     if (cloud != nullptr) {
       cloud->camera = camera_;
@@ -160,6 +177,20 @@ class StereoNode final : public Node {
       cloud_.send(stamp_);
     }
     if ((disparity_.connected() && map == nullptr) || (cloud_.connected() && cloud == nullptr)) job.no_result();
+  }
+
+  void check_rows(Job& job, ImageView<const uint8_t> left, ImageView<const uint8_t> right,
+                  ImageView<const int16_t> disparity) {
+    monitor_->observe(left, right, disparity);
+    const auto error_px = monitor_->row_error_px();
+    const auto trust = error_px ? alarm_.update(*error_px) : std::nullopt;
+    if (!trust) return;
+    char text[120];
+    std::snprintf(text, sizeof text,
+                  "rows of the rectified pair differ by %.2f px (median of %zu points); calibrate again", *error_px,
+                  monitor_->points());
+    if (*trust == RowTrust::wrong) job.results_wrong(text);
+    else job.results_doubtful(text);
   }
 
   /// `search` may have been changed between two jobs.
@@ -221,8 +252,17 @@ class StereoNode final : public Node {
   Param<int> cloud_step_{this, "cloud_step", 2, {1, 64}, "px", "distance of the pixels that become points"};
   Param<std::string> calibration_{this, "calibration", "", kPath,
                                   "calibration file (M1 D1 M2 D2 R T image_size) for raw pairs"};
+  Choice bayer_{this,
+                "bayer",
+                "none",
+                {"none", "rggb", "bggr", "grbg", "gbrg"},
+                "colour filter of raw pairs of one channel, from the upper left corner; they become BGR"};
+  Param<bool> row_check_{this, "row_check", true, "",
+                         "tell where matched points of the rectified pair lie on different rows"};
 
-  int width_ = 0, height_ = 0, channels_ = 0;
+  int width_ = 0, height_ = 0;
+  int channels_ = 0, input_channels_ = 0;  ///< of what is matched, of the input; they differ for mosaics
+  BayerPattern pattern_ = BayerPattern::none;
   int most_ = 0, range_ = 0;  ///< disparities that memory was taken for, that are searched
   int64_t stamp_ = 0;
   CameraModel camera_;
@@ -230,6 +270,8 @@ class StereoNode final : public Node {
   std::unique_ptr<Matcher> matcher_;
   std::optional<HalfMatcher> half_matcher_;
   std::optional<Rectifier> rectifier_;
+  std::optional<RectificationMonitor> monitor_;
+  RowErrorAlarm alarm_;
   std::vector<uint8_t> left_, right_, confidence_scratch_, fraction_scratch_;
   std::vector<int16_t> disparity_scratch_;
 };

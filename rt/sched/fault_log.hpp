@@ -12,6 +12,8 @@ struct Fault {
     memory,     ///< a job asked for more memory than its node may have, and got none
     lost,       ///< what the task reads from outside gives no good data any more
     back,       ///< it does again
+    doubtful,   ///< a job said that the results of its node are worse than they look
+    wrong,      ///< a job said that they are wrong
   };
   Kind kind = hang;
   uint32_t task = 0;  ///< index into Plan::tasks

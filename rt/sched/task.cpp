@@ -147,6 +147,7 @@ TAKT_HOT int64_t Task::begin(uint64_t index, int64_t release_ns, int64_t duratio
   const CpuBudget cpu{plan_.budget_ns, last_thread_use_ns(), modelled_ ? nullptr : &thread_cpu_ns};
   Job job(clock_, index, release_ns, release_ns + plan_.deadline_ns, ended_.level, mode.name, cpu);
   work(job, release_ns);
+  if (job.result_notice()) tell_notice(job);
   ended_.ran = true;
   ended_.end.end_of_data = job.ended();
   ended_.no_result = job.without_result();
@@ -197,24 +198,33 @@ TAKT_HOT void Task::work(Job& job, int64_t release_ns) {
   if (watch_ != nullptr) watch_->end();
 }
 
-void Task::tell_exception(const Job& job, const char* what) {
+Fault Task::fault_now(Fault::Kind kind, uint64_t job) const {
   Fault fault;
-  fault.kind = Fault::exception;
+  fault.kind = kind;
   fault.task = static_cast<uint32_t>(index_);
-  fault.job = job.index();
+  fault.job = job;
   fault.at_ns = clock_.now_ns();
+  return fault;
+}
+
+void Task::tell_exception(const Job& job, const char* what) {
+  Fault fault = fault_now(Fault::exception, job.index());
   std::snprintf(fault.what.characters.data(), fault.what.characters.size(), "%s: job %llu threw: %s",
                 plan_.name.c_str(), static_cast<unsigned long long>(job.index()), what);
   board_.faults().append(fault);
 }
 
+void Task::tell_notice(const Job& job) {
+  const ResultNotice& notice = *job.result_notice();
+  Fault fault = fault_now(notice.wrong ? Fault::wrong : Fault::doubtful, job.index());
+  std::snprintf(fault.what.characters.data(), fault.what.characters.size(), "%s: %s", plan_.name.c_str(),
+                notice.why.c_str());
+  board_.faults().append(fault);
+}
+
 void Task::tell_refused_memory() {
   const int64_t refused = std::exchange(calls_.heap_refused, INT64_MIN);  // once: never above 0 again
-  Fault fault;
-  fault.kind = Fault::memory;
-  fault.task = static_cast<uint32_t>(index_);
-  fault.job = calls_.job;
-  fault.at_ns = clock_.now_ns();
+  Fault fault = fault_now(Fault::memory, calls_.job);
   std::snprintf(fault.what.characters.data(), fault.what.characters.size(),
                 "%s: job %llu asked for %lld kB more than the %lld kB that the node may have; it got none",
                 plan_.name.c_str(), static_cast<unsigned long long>(calls_.job), static_cast<long long>(refused / 1000),

@@ -85,7 +85,9 @@ class Task {
   void pass_over(int64_t now_ns, bool count);
   /// Lets the node work, under the eyes of the watchdog.
   void work(Job& job, int64_t release_ns);
+  Fault fault_now(Fault::Kind kind, uint64_t job) const;
   void tell_exception(const Job& job, const char* what);
+  void tell_notice(const Job& job);
   /// Tells that a job asked for more memory than it may have; once.
   void tell_refused_memory();
   /// False if the requests visible at the release stop this task, or pace it past this job.

@@ -38,6 +38,7 @@ expect 2 "--for" "$takt" run --for 5
 expect 2 "no such directory" env TAKT_DATA="$work/nothing" "$takt" run "$source/graph/kitti.yaml"
 expect 2 "poses.txt" "$takt" eval ego_motion --data "$work"
 expect 2 "none.png" "$takt" eval stereo --left "$work/none.png" --right "$work/none.png" --gt "$work/none.png" --gt-scale 1 --disparities 16
+expect 2 "no file is named like left*.jpg" "$takt" calibrate stereo "$work"
 
 # A recording of our own, with one thing wrong at a time.
 "$takt" run --clock virtual --for 1s --output "$work/pictures" >/dev/null 2>&1 || fail "the run that makes the pictures"

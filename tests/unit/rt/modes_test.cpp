@@ -21,7 +21,7 @@ struct Notes final : Node {
   Output<Odometry> out{this, "out", ""};
   std::vector<int64_t> releases_ms;
   std::vector<std::string> modes;
-  std::function<void(const Job&)> act;
+  std::function<void(Job&)> act;
   void setup(Setup&) override {}
   void run(Job& job) override {
     releases_ms.push_back((job.release_ns() - kEpoch) / kMs);
@@ -129,6 +129,25 @@ TEST_CASE("a job that throws loses its result and is told; the run goes on") {
   CHECK(scene.board->task(0).no_result.load() == 1);
   REQUIRE(scene.board->faults().size() == 1);
   CHECK(std::string(scene.board->faults().at(0)->what.c_str()) == "first: job 3 threw: out of luck");
+}
+
+TEST_CASE("a job that says that its results are doubtful or wrong is told, and they count all the same") {
+  Scene scene;
+  scene.first.act = [](Job& job) {
+    if (job.index() == 2) job.results_doubtful("blurred");
+    if (job.index() == 5) job.results_wrong(std::string(300, 'x'));
+  };
+  scene.run();
+  CHECK(scene.board->task(0).no_result.load() == 0);
+  CHECK(scene.board->task(0).completed.load() == 10);
+  REQUIRE(scene.board->faults().size() == 2);
+  const Fault &doubtful = *scene.board->faults().at(0), &wrong = *scene.board->faults().at(1);
+  CHECK(doubtful.kind == Fault::doubtful);
+  CHECK(doubtful.job == 2);
+  CHECK(doubtful.at_ns == kEpoch + 200 * kMs);
+  CHECK(std::string(doubtful.what.c_str()) == "first: blurred");
+  CHECK(wrong.kind == Fault::wrong);
+  CHECK(std::string(wrong.what.c_str()) == "first: " + std::string(159, 'x'));
 }
 
 TEST_CASE("events beyond the room of a log are counted") {

@@ -12,6 +12,7 @@
 #include <opencv2/imgproc.hpp>
 #include <random>
 
+#include "nodes/stereo/remap_reference.hpp"
 #include "tests/temporary_folder.hpp"
 #include "tests/test_data.hpp"
 
@@ -75,7 +76,7 @@ std::vector<uint8_t> spot(int width, int height, cv::Point2d at) {
 
 TEST_CASE("a point in space lies on one row of both rectified images, at the disparity of its depth") {
   const StereoCalibration c = crooked_pair();
-  const Rectifier rectifier(c);
+  Rectifier rectifier(c);
   CHECK(rectifier.camera().baseline_m == doctest::Approx(std::sqrt(0.12 * 0.12 + 0.003 * 0.003 + 0.002 * 0.002)));
   for (const cv::Vec3d& p : {cv::Vec3d{0, 0, 2}, cv::Vec3d{0.4, -0.3, 1.5}, cv::Vec3d{-0.5, 0.6, 3}}) {
     const cv::Matx33d rotation(c.rotation.data());
@@ -94,7 +95,7 @@ TEST_CASE("a point in space lies on one row of both rectified images, at the dis
 
 TEST_CASE("the remap agrees with OpenCV's within two grey levels, one and three channels") {
   const StereoCalibration c = crooked_pair();
-  const Rectifier rectifier(c);
+  Rectifier rectifier(c);
   cv::Mat r1, r2, p1, p2, q, x, y;
   cv::Mat k1(3, 3, CV_64F, const_cast<double*>(c.left_matrix.data())),
       k2(3, 3, CV_64F, const_cast<double*>(c.right_matrix.data()));
@@ -123,8 +124,66 @@ TEST_CASE("the remap agrees with OpenCV's within two grey levels, one and three 
   }
 }
 
+TEST_CASE("the debayering is OpenCV's, but for the outermost pixels") {
+  // OpenCV names a filter by its second row and column.
+  const std::pair<BayerPattern, int> patterns[] = {{BayerPattern::rggb, cv::COLOR_BayerBG2BGR},
+                                                   {BayerPattern::bggr, cv::COLOR_BayerRG2BGR},
+                                                   {BayerPattern::grbg, cv::COLOR_BayerGB2BGR},
+                                                   {BayerPattern::gbrg, cv::COLOR_BayerGR2BGR}};
+  cv::Mat mosaic(38, 71, CV_8U), theirs;
+  cv::theRNG().state = 6;
+  cv::randu(mosaic, 0, 256);
+  for (const auto& [pattern, code] : patterns) {
+    cv::cvtColor(mosaic, theirs, code);
+    cv::Mat ours(mosaic.size(), CV_8UC3);
+    reference::debayer({mosaic.data, 71, 38}, pattern, {ours.data, 71, 38, 3});
+    const cv::Rect inner(1, 1, 69, 36);
+    CHECK(cv::norm(ours(inner), theirs(inner), cv::NORM_INF) == 0);
+  }
+}
+
+TEST_CASE("a mosaic gives what its debayered image gives") {
+  const StereoCalibration c = crooked_pair();
+  cv::Mat mosaic(c.height, c.width, CV_8U), colour(mosaic.size(), CV_8UC3);
+  cv::theRNG().state = 7;
+  cv::randu(mosaic, 0, 256);
+  reference::debayer({mosaic.data, c.width, c.height}, BayerPattern::grbg, {colour.data, c.width, c.height, 3});
+  Rectifier from_colour(c), from_mosaic(c, BayerPattern::grbg);
+  cv::Mat out[4];
+  for (cv::Mat& m : out) m.create(mosaic.size(), CV_8UC3);
+  const auto view = [](cv::Mat& m) { return ImageView<uint8_t>{m.data, m.cols, m.rows, m.channels()}; };
+  REQUIRE(from_colour.rectify(view(colour), view(colour), view(out[0]), view(out[1])));
+  REQUIRE(from_mosaic.rectify(view(mosaic), view(mosaic), view(out[2]), view(out[3])));
+  CHECK(cv::norm(out[0], out[2], cv::NORM_INF) == 0);
+  CHECK(cv::norm(out[1], out[3], cv::NORM_INF) == 0);
+  CHECK_FALSE(from_mosaic.rectify(view(colour), view(colour), view(out[2]), view(out[3])));
+  CHECK_FALSE(from_mosaic.rectify(view(mosaic), view(mosaic), view(mosaic), view(mosaic)));
+}
+
+TEST_CASE("a calibration that was written is read again, by OpenCV as well") {
+  const StereoCalibration c = crooked_pair();
+  const takt::test::TemporaryFolder temporary;
+  const auto path = temporary.path / "rig.yaml";
+  write_calibration(path, c, "made by a test");
+  const StereoCalibration again = read_calibration(path);
+  CHECK(again.width == c.width);
+  CHECK(again.height == c.height);
+  CHECK(again.left_matrix == c.left_matrix);
+  CHECK(again.right_distortion == c.right_distortion);
+  CHECK(again.rotation == c.rotation);
+  CHECK(again.translation_m == c.translation_m);
+  CHECK(read_intrinsics(path).right_matrix == c.right_matrix);
+  const cv::FileStorage file(path.string(), cv::FileStorage::READ);
+  cv::Mat r, t;
+  file["R"] >> r, file["T"] >> t;
+  CHECK(r.size() == cv::Size(3, 3));
+  CHECK(t.size() == cv::Size(1, 3));
+  CHECK_THROWS_AS(write_calibration(temporary.path / "none" / "rig.yaml", c, ""), std::invalid_argument);
+  CHECK_THROWS_AS(write_calibration(temporary.path / "rig.json", c, ""), std::invalid_argument);
+}
+
 TEST_CASE("a rectified pair passes through unchanged") {
-  const Rectifier rectifier(5, 2, {100, 2, 1, 0.1});
+  Rectifier rectifier(5, 2, {100, 2, 1, 0.1});
   const std::vector<uint8_t> left{1, 2, 3, 4, 5, 6, 7, 8, 9, 10}, right{9, 8, 7, 6, 5, 4, 3, 2, 1, 0};
   std::vector<uint8_t> l(10), r(10);
   REQUIRE(rectifier.rectify({left.data(), 5, 2}, {right.data(), 5, 2}, {l.data(), 5, 2}, {r.data(), 5, 2}));
@@ -138,7 +197,7 @@ TEST_CASE("calibrations that cannot be used are refused with name and value") {
     StereoCalibration c = crooked_pair();
     change(c);
     try {
-      const Rectifier rectifier(c);
+      Rectifier rectifier(c);
     } catch (const std::invalid_argument& e) {
       return std::string(e.what());
     }
@@ -189,12 +248,12 @@ TEST_CASE("a real calibration file brings chessboard corners onto common rows") 
   REQUIRE(rms_px < 1.0);
   const takt::test::TemporaryFolder temporary;
   const auto path = temporary.path / "calibration.yaml";
-  {
+  {  // as OpenCV's own sample writes it
     cv::FileStorage out(path.string(), cv::FileStorage::WRITE);
     out << "M1" << k1 << "D1" << d1 << "M2" << k2 << "D2" << d2 << "R" << r << "T" << t << "image_size"
         << std::vector<int>{640, 480};
   }
-  const Rectifier rectifier(read_calibration(path));
+  Rectifier rectifier(read_calibration(path));
   const cv::Mat left = cv::imread((*folder / "left01.jpg").string(), 0),
                 right = cv::imread((*folder / "right01.jpg").string(), 0);
   cv::Mat l(left.size(), CV_8U), rr(right.size(), CV_8U);
