@@ -13,11 +13,11 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace takt::stereo::HWY_NAMESPACE {
-namespace hn = hwy::HWY_NAMESPACE;
 
 constexpr int kHalf = 8192;  // of 128 * 128
 
 #if HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_SSE4
+namespace hn = hwy::HWY_NAMESPACE;
 
 constexpr hn::ScalableTag<uint8_t> kBytes;
 constexpr hn::ScalableTag<int8_t> kSigned;
