@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "graph/command/ego_motion_picture.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+namespace takt::command {
+namespace {
+
+using namespace ego_motion;
+
+const cv::Scalar kBlue(255, 140, 60), kGreen(60, 220, 60), kRed(60, 60, 255), kInk(40, 40, 40), kGrid(220, 220, 220);
+
+void write(const std::string& file, const cv::Mat& image) {
+  bool written = false;
+  try {
+    written = cv::imwrite(file, image);
+  } catch (const cv::Exception&) {
+  }
+  if (!written) throw BadData(fmt::format("--picture {}: cannot be written; it wants a name that ends in .png", file));
+}
+
+void put_text(cv::Mat& image, const std::string& text, cv::Point at) {
+  cv::putText(image, text, at, cv::FONT_HERSHEY_SIMPLEX, 0.42, kInk, 1, cv::LINE_AA);
+}
+
+}  // namespace
+
+void write_flow_picture(const std::string& file, const Drive& drive, const Parameters& parameters) {
+  EgoMotion ego;
+  const cv::Size size = drive.frames.front().left.size();
+  ego.configure(size.width, size.height, parameters);
+  const size_t middle = drive.frames.size() / 2;
+  Result result;
+  for (size_t i = 0; i <= middle; ++i) result = ego.step(frame_of(drive, i));
+  cv::Mat image;
+  cv::cvtColor(drive.frames[middle].left, image, cv::COLOR_GRAY2BGR);
+  for (const TrackedCorner& c : ego.corners()) cv::circle(image, {c.corner.x, c.corner.y}, 1, kBlue, cv::FILLED);
+  const auto draw = [&](double x, double y, double dx, double dy, const cv::Scalar& colour) {
+    cv::line(image, cv::Point2d(x, y), cv::Point2d(x + dx, y + dy), colour, 1, cv::LINE_AA);
+  };
+  // Red first: what agrees is drawn over it, what a filter took out stays.
+  for (const Flow& f : ego.flows()) draw(f.x, f.y, f.dx, f.dy, kRed);
+  const CameraModel& camera = drive.camera;
+  const Rigid T = from_transform(result.camera_in_previous.transform).inverse();
+  for (const Observation& o : ego.observations())
+    if (residual_px(T, o, {camera.focal_px, camera.baseline_m}) < parameters.estimator.inlier_px)
+      draw(o.x + camera.cu_px, o.y + camera.cv_px, o.x_current - o.x, o.y_current - o.y, kGreen);
+  write(file, image);
+}
+
+void write_curves(const std::string& file, const std::string& parameter, const std::vector<double>& values,
+                  const std::vector<Curve>& curves) {
+  constexpr int kLeft = 60, kTop = 30, kPanel = 150, kGap = 34, kStep = 84;
+  const int count = static_cast<int>(values.size()), width = kLeft + kStep * count;
+  const int height = kTop + static_cast<int>(curves.size()) * (kPanel + kGap) + 20;
+  cv::Mat image(height, width, CV_8UC3, cv::Scalar::all(255));
+  int top = kTop;
+  for (const Curve& curve : curves) {
+    const double most = std::max(1e-9, *std::max_element(curve.values.begin(), curve.values.end()));
+    const auto at = [&](int i) {
+      const double share = curve.values[static_cast<size_t>(i)] / most;
+      return cv::Point(kLeft + kStep * i, top + kPanel - static_cast<int>(share * (kPanel - 20)));
+    };
+    put_text(image, curve.label, {kLeft, top - 8});
+    cv::line(image, {kLeft, top + kPanel}, {width - 20, top + kPanel}, kGrid);
+    for (int i = 0; i < count; ++i) {
+      if (i > 0) cv::line(image, at(i - 1), at(i), kBlue, 2, cv::LINE_AA);
+      cv::circle(image, at(i), 3, kBlue, cv::FILLED, cv::LINE_AA);
+      put_text(image, fmt::format("{:.3g}", curve.values[static_cast<size_t>(i)]), at(i) + cv::Point(4, -6));
+    }
+    top += kPanel + kGap;
+  }
+  for (int i = 0; i < count; ++i)
+    put_text(image, fmt::format("{:g}", values[static_cast<size_t>(i)]), {kLeft + kStep * i - 6, height - 18});
+  put_text(image, parameter, {4, height - 18});
+  write(file, image);
+}
+
+}  // namespace takt::command
