@@ -14,6 +14,9 @@ std::vector<Row> run_record(const Options&);
 #ifdef TAKT_BENCH_STEREO
 std::vector<Row> run_stereo(const Options&);
 #endif
+#ifdef TAKT_BENCH_EGO_MOTION
+std::vector<Row> run_ego_motion(const Options&);
+#endif
 
 std::span<const Suite> suites() {
   static const auto list = std::to_array<Suite>({
@@ -25,6 +28,9 @@ std::span<const Suite> suites() {
       {"record", "what recording two stereo cameras of 1280x960 costs, against the same run without", run_record},
 #ifdef TAKT_BENCH_STEREO
       {"stereo", "dense disparity at 640x480, 150 disparities, against OpenCV's matchers", run_stereo},
+#endif
+#ifdef TAKT_BENCH_EGO_MOTION
+      {"ego_motion", "a step at 640x480, against OpenCV's corners and optical flow", run_ego_motion},
 #endif
   });
   return list;
