@@ -15,6 +15,9 @@ std::vector<Row> run_record(const Options&);
 std::vector<Row> run_stereo(const Options&);
 std::vector<Row> run_rectify(const Options&);
 #endif
+#ifdef TAKT_BENCH_EGO_MOTION
+std::vector<Row> run_ego_motion(const Options&);
+#endif
 
 std::span<const Suite> suites() {
   static const auto list = std::to_array<Suite>({
@@ -27,6 +30,9 @@ std::span<const Suite> suites() {
 #ifdef TAKT_BENCH_STEREO
       {"stereo", "dense disparity at 640x480, 150 disparities, against OpenCV's matchers", run_stereo},
       {"rectify", "debayering and rectification of a 640x480 pair, against OpenCV's", run_rectify},
+#endif
+#ifdef TAKT_BENCH_EGO_MOTION
+      {"ego_motion", "a step at 640x480, against OpenCV's corners and optical flow", run_ego_motion},
 #endif
   });
   return list;

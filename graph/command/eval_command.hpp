@@ -22,8 +22,14 @@ int sweep_stereo(const EvalStereoOptions& options);
 void add_eval_stereo(CLI::App& eval, EvalStereoOptions& options, int& exit_code);
 
 struct EvalEgoMotionOptions {
-  std::filesystem::path data;  ///< image_l/, image_r/, calib.txt, poses.txt
+  std::filesystem::path data;  ///< image_l/, image_r/, calib.txt, poses.txt; empty: drives are generated
+  bool generated = false;
+  double scale = 1;  ///< of the images in `data`
   int disparities = 128;
+  uint64_t seed = 1;
+  int frames = 60;  ///< of each generated drive
+  std::string sweep;
+  std::string picture;
   bool json = false;
 };
 void add_eval_ego_motion(CLI::App& eval, EvalEgoMotionOptions& options, int& exit_code);

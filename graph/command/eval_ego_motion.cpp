@@ -2,180 +2,133 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
-#include <fstream>
 #include <nlohmann/json.hpp>
-#include <opencv2/imgcodecs.hpp>
-#include <sstream>
+#include <opencv2/core.hpp>
 
+#include "graph/command/ego_motion_drive.hpp"
+#include "graph/command/ego_motion_picture.hpp"
+#include "graph/command/ego_motion_score.hpp"
+#include "graph/command/ego_motion_sweep.hpp"
 #include "graph/command/eval_command.hpp"
-#include "graph/command/run_command.hpp"
-#include "nodes/ego_motion/ego_motion.hpp"
+#include "graph/command/prepare.hpp"
 #include "nodes/ego_motion/evaluate.hpp"
-#include "nodes/stereo/matcher.hpp"
 
 namespace takt::command {
 namespace {
 
-using ego_motion::Rigid;
+using namespace ego_motion;
+using Json = nlohmann::ordered_json;
 
-/// What is wrong with the data, with the file and the next step.
-struct BadData : std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
+// A recorded drive -------------------------------------------------------------------------------------------------
 
-std::vector<double> numbers(const std::string& line) {
-  std::istringstream in(line);
-  std::vector<double> values;
-  for (double v; in >> v;) values.push_back(v);
-  return values;
+Json measure_recorded(const EvalEgoMotionOptions& options) {
+  const Drive drive = recorded_drive(options);
+  const Track track = follow(drive, {});
+  std::vector<Rigid> truth;
+  for (const DriveFrame& frame : drive.frames) truth.push_back(frame.pose);
+  const Quality q = ego_motion::evaluate(track.poses(), truth);
+  const Quality still = ego_motion::evaluate(std::vector<Rigid>(truth.size()), truth);
+  if (!options.picture.empty()) write_flow_picture(options.picture, drive, {});
+  return {{"drift_pct", q.drift_pct},
+          {"deg_per_frame", q.deg_per_frame},
+          {"metres_per_frame", q.metres_per_frame},
+          {"path_m", q.path_m},
+          {"frames", truth.size()},
+          {"valid_frames", std::count_if(track.results.begin(), track.results.end(), [](auto& r) { return r.valid; })},
+          {"time_ms", track.step_ms},
+          {"stereo_time_ms", drive.stereo_ms},
+          {"baseline",
+           {{"name", "standing still"},
+            {"drift_pct", still.drift_pct},
+            {"deg_per_frame", still.deg_per_frame},
+            {"metres_per_frame", still.metres_per_frame}}}};
 }
 
-/// P0 and P1 of a KITTI calib.txt: 3x4 row-major projection matrices.
-CameraModel read_calibration(const std::filesystem::path& file) {
-  std::ifstream in(file);
-  if (!in) throw BadData(fmt::format("{}: cannot be read; --data wants calib.txt with P0: and P1:", file.string()));
-  std::vector<double> p0, p1;
-  for (std::string line; std::getline(in, line);) {
-    if (line.rfind("P0:", 0) == 0) p0 = numbers(line.substr(3));
-    if (line.rfind("P1:", 0) == 0) p1 = numbers(line.substr(3));
+void print_recorded(const Json& out) {
+  const auto number = [](const Json& row, const char* key) { return row[key].get<double>(); };
+  std::printf("%-18s %10s %14s %14s %9s\n", "method", "drift %", "deg per frame", "m per frame", "CPU ms");
+  std::printf("%-18s %10.2f %14.4f %14.4f %9.2f\n", "takt ego_motion", number(out, "drift_pct"),
+              number(out, "deg_per_frame"), number(out, "metres_per_frame"), number(out, "time_ms"));
+  const Json& still = out["baseline"];
+  std::printf("%-18s %10.2f %14.4f %14.4f %9s\n", "standing still", number(still, "drift_pct"),
+              number(still, "deg_per_frame"), number(still, "metres_per_frame"), "-");
+  std::printf("path %.1f m, %.0f frames, %.0f with a valid motion; stereo %.2f ms a frame\n", number(out, "path_m"),
+              number(out, "frames"), number(out, "valid_frames"), number(out, "stereo_time_ms"));
+}
+
+// Generated drives -------------------------------------------------------------------------------------------------
+
+Json measure_generated(const EvalEgoMotionOptions& options) {
+  Json out{{"seed", options.seed}, {"frames", options.frames}};
+  for (const DriveCondition& condition : drive_conditions()) {
+    const Drive drive = generate_drive(condition, options.seed, options.frames, options.disparities);
+    Json row{{"condition", condition.name}};
+    row.update(score(drive, follow(drive, {})));
+    out["conditions"].push_back(row);
+    if (!options.picture.empty() && condition.movers) write_flow_picture(options.picture, drive, {});
   }
-  const auto usable = [](const std::vector<double>& p) {
-    return p.size() == 12 && std::all_of(p.begin(), p.end(), [](double v) { return std::isfinite(v); });
-  };
-  if (!usable(p0) || !usable(p1) || p0[0] <= 0 || p1[3] >= 0)
-    throw BadData(
-        fmt::format("{}: P0 and P1 must be 12 finite numbers each, with a baseline to the right", file.string()));
-  return {p0[0], p0[2], p0[6], -p1[3] / p1[0]};
+  return out;
 }
 
-std::vector<Rigid> read_poses(const std::filesystem::path& file) {
-  std::ifstream in(file);
-  if (!in) throw BadData(fmt::format("{}: cannot be read; --data wants poses.txt, a 3x4 matrix a line", file.string()));
-  std::vector<Rigid> poses;
-  for (std::string line; std::getline(in, line);) {
-    const std::vector<double> v = numbers(line);
-    if (v.empty()) continue;
-    if (v.size() != 12)
-      throw BadData(fmt::format("{}:{}: {} numbers, 12 are wanted", file.string(), poses.size() + 1, v.size()));
-    Rigid pose;
-    for (int r = 0; r < 3; ++r) {
-      for (int c = 0; c < 3; ++c) pose.R(r, c) = v[static_cast<size_t>(4 * r + c)];
-      pose.t(r) = v[static_cast<size_t>(4 * r + 3)];
-    }
-    poses.push_back(pose);
+void print_row(const std::string& condition, const std::string& method, const Json& row) {
+  std::printf("%-22s %-18s %7s %7s %6s %7s %7s %9s %9s %9s %8s\n", condition.c_str(), method.c_str(),
+              text(row, "median_mm", 2).c_str(), text(row, "p95_mm", 2).c_str(), text(row, "median_pct", 2).c_str(),
+              text(row, "median_deg", 3).c_str(), text(row, "p95_deg", 3).c_str(), text(row, "refused_pct", 1).c_str(),
+              text(row, "refused_rightly_pct", 0).c_str(), text(row, "accepted_wrong_pct", 1).c_str(),
+              text(row, "within_95_pct", 0).c_str());
+}
+
+void print_generated(const Json& out) {
+  std::printf("%-22s %-18s %7s %7s %6s %7s %7s %9s %9s %9s %8s\n", "condition", "method", "mm p50", "p95", "% p50",
+              "deg p50", "p95", "refused %", "rightly %", "wrong %", "in 95 %");
+  for (const Json& condition : out["conditions"]) {
+    print_row(condition["condition"], "takt ego_motion", condition);
+    for (const auto& [name, row] : condition["baseline"].items()) print_row("", name, row);
   }
-  return poses;
-}
-
-std::vector<std::filesystem::path> images(const std::filesystem::path& folder) {
-  std::vector<std::filesystem::path> files;
-  std::error_code error;
-  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) files.push_back(entry.path());
-  if (files.empty()) throw BadData(fmt::format("{}: no images; --data wants image_l/ and image_r/", folder.string()));
-  std::sort(files.begin(), files.end());
-  return files;
-}
-
-cv::Mat read_grey(const std::filesystem::path& file) {
-  cv::Mat image = cv::imread(file.string(), cv::IMREAD_GRAYSCALE);
-  if (image.empty()) throw BadData(fmt::format("{}: cannot be decoded", file.string()));
-  return image;
-}
-
-ImageView<const uint8_t> view(const cv::Mat& m) { return {m.data, m.cols, m.rows, 1, static_cast<ptrdiff_t>(m.step)}; }
-
-struct Track {
-  std::vector<Rigid> poses;
-  std::vector<double> stereo_ms, step_ms;
-  int valid = 0;
-};
-
-double ms_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-}
-
-double median(std::vector<double> v) {
-  if (v.empty()) return 0;
-  std::nth_element(v.begin(), v.begin() + static_cast<ptrdiff_t>(v.size() / 2), v.end());
-  return v[v.size() / 2];
-}
-
-Track follow(const EvalEgoMotionOptions& options) {
-  const CameraModel camera = read_calibration(options.data / "calib.txt");
-  const auto left = images(options.data / "image_l"), right = images(options.data / "image_r");
-  if (left.size() != right.size())
-    throw BadData(fmt::format("{}: {} left and {} right images", options.data.string(), left.size(), right.size()));
-  const cv::Mat first = read_grey(left.front());
-  stereo::MatcherParameters match;
-  match.disparities = options.disparities;
-  const auto matcher = stereo::make_matcher(first.cols, first.rows, 1, match);
-  ego_motion::EgoMotion ego;
-  ego.configure(first.cols, first.rows, {});
-  cv::Mat disparity(first.size(), CV_16S), confidence(first.size(), CV_8U);
-  Track track;
-  for (size_t i = 0; i < left.size(); ++i) {
-    const cv::Mat l = read_grey(left[i]), r = read_grey(right[i]);
-    auto start = std::chrono::steady_clock::now();
-    const ImageView<int16_t> d{disparity.ptr<int16_t>(), first.cols, first.rows};
-    if (!matcher->match(view(l), view(r), {d, {confidence.data, first.cols, first.rows}}))
-      throw BadData(fmt::format("{}: size differs from the first image", left[i].string()));
-    track.stereo_ms.push_back(ms_since(start));
-    start = std::chrono::steady_clock::now();
-    const auto result = ego.step({view(l), view(r), d, camera, static_cast<int64_t>(i) * 100'000'000});
-    track.step_ms.push_back(ms_since(start));
-    track.poses.push_back(result.pose);
-    track.valid += result.valid || result.keyframe;
-  }
-  return track;
+  std::printf(
+      "error per step; wrong: an accepted estimate off by more than %.0f mm + %.0f %% of the step or %.1f deg; "
+      "rightly: a refused one is\nin 95 %%: steps whose error lies within the 95 %% ellipsoid of the stated "
+      "covariance\n",
+      1000 * kWrong_m, 100 * kWrongShare, kWrong_deg);
 }
 
 int evaluate(const EvalEgoMotionOptions& options) {
   try {
-    const std::vector<Rigid> truth = read_poses(options.data / "poses.txt");
-    const Track track = follow(options);
-    if (truth.size() != track.poses.size())
-      throw BadData(fmt::format("{}: {} poses for {} images", (options.data / "poses.txt").string(), truth.size(),
-                                track.poses.size()));
-    const auto q = ego_motion::evaluate(track.poses, truth);
-    const std::vector<Rigid> standing(truth.size());
-    const auto still = ego_motion::evaluate(standing, truth);
-    nlohmann::ordered_json out{
-        {"drift_pct", q.drift_pct},
-        {"deg_per_frame", q.deg_per_frame},
-        {"metres_per_frame", q.metres_per_frame},
-        {"path_m", q.path_m},
-        {"frames", truth.size()},
-        {"valid_frames", track.valid},
-        {"time_ms", median(track.step_ms)},
-        {"stereo_time_ms", median(track.stereo_ms)},
-        {"baseline",
-         {{"name", "standing still"}, {"drift_pct", still.drift_pct}, {"deg_per_frame", still.deg_per_frame}}}};
-    if (options.json) {
-      std::printf("%s\n", out.dump(2).c_str());
-    } else {
-      std::printf("%-18s %10s %14s %14s %9s\n", "method", "drift %", "deg per frame", "m per frame", "time ms");
-      std::printf("%-18s %10.2f %14.4f %14.4f %9.2f\n", "takt ego_motion", q.drift_pct, q.deg_per_frame,
-                  q.metres_per_frame, median(track.step_ms));
-      std::printf("%-18s %10.2f %14.4f %14.4f %9s\n", "standing still", still.drift_pct, still.deg_per_frame,
-                  still.metres_per_frame, "-");
-      std::printf("path %.1f m, %zu frames, %d with a valid motion; stereo %.2f ms a frame\n", q.path_m, truth.size(),
-                  track.valid, median(track.stereo_ms));
+    if (options.generated != options.data.empty())
+      throw BadData("takt eval ego_motion wants either --data DIR or --generated");
+    if (options.generated && options.scale != 1)
+      throw BadData("--scale makes recorded images smaller: it wants --data");
+    cv::setNumThreads(1);
+    if (!options.sweep.empty()) {
+      const Json out = measure_sweep(options);
+      if (options.json) std::printf("%s\n", out.dump(2).c_str());
+      else print_sweep(out);
+      return kOk;
     }
+    const Json out = options.generated ? measure_generated(options) : measure_recorded(options);
+    if (options.json) std::printf("%s\n", out.dump(2).c_str());
+    else if (options.generated) print_generated(out);
+    else print_recorded(out);
     return kOk;
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "takt: error: %s\n", error.what());
-    return kBadInput;
+    return refuse(error.what(), kBadInput);
   }
 }
 
 }  // namespace
 
 void add_eval_ego_motion(CLI::App& eval, EvalEgoMotionOptions& o, int& exit_code) {
-  CLI::App* app = eval.add_subcommand("ego_motion", "drift and rotation error of stereo ego-motion against poses");
-  app->add_option("--data", o.data, "folder with image_l/, image_r/, calib.txt, poses.txt")->required();
-  app->add_option("--disparities", o.disparities, "search range, px (default 128)")->check(CLI::Range(16, 512));
+  CLI::App* app = eval.add_subcommand("ego_motion", "errors of stereo ego-motion against true poses");
+  app->add_option("--data", o.data, "folder with image_l/, image_r/, calib.txt, poses.txt");
+  app->add_flag("--generated", o.generated, "drives through a room that is rendered, in several conditions");
+  app->add_option("--scale", o.scale, "size of the recorded images (default 1)")->check(CLI::Range(0.1, 1.0));
+  app->add_option("--disparities", o.disparities, "search range at scale 1, px (default 128)")
+      ->check(CLI::Range(16, 512));
+  app->add_option("--seed", o.seed, "seed of the generated drives (default 1)");
+  app->add_option("--frames", o.frames, "of each generated drive (default 60)")->check(CLI::Range(3, 100000));
+  app->add_option("--sweep", o.sweep, "parameter to try values of")->check(CLI::IsMember(sweep_names()));
+  app->add_option("--picture", o.picture, "PNG: matched corners of the last frame, or the curves of a sweep");
   app->add_flag("--json", o.json, "one JSON object on stdout");
   app->callback([&] { exit_code = evaluate(o); });
 }

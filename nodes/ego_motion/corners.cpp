@@ -4,6 +4,10 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstdlib>
+#include <utility>
+
+#include "nodes/ego_motion/corner_kernel.hpp"
 
 namespace takt::ego_motion {
 namespace {
@@ -16,14 +20,14 @@ float smaller_eigenvalue(float xx, float xy, float yy) {
 }  // namespace
 
 CornerDetector::CornerDetector(int width, int height, const CornerParameters& parameters)
-    : width_(width), height_(height), p_(parameters) {
-  const auto columns = static_cast<size_t>(width);
-  const auto pixels = columns * static_cast<size_t>(height);
-  for (int i = 0; i < 3; ++i) xx_[i].resize(columns), xy_[i].resize(columns), yy_[i].resize(columns);
+    : width_(width), height_(height), p_(parameters), stride_(width + kRowPadding) {
+  const auto columns = static_cast<size_t>(stride_);
+  const auto pixels = static_cast<size_t>(width) * static_cast<size_t>(height);
   smooth_.resize(columns);
   step_.resize(columns);
-  for (auto* line : {&sum_xx_, &sum_xy_, &sum_yy_, &peak_}) line->resize(columns);
-  response_.resize(pixels);
+  products_.resize(4 * 3 * columns);
+  response_.resize(columns * static_cast<size_t>(height));
+  peaks_.resize(columns);
   candidates_.reserve(pixels / 4 + 1);  // a 3 x 3 peak excludes its neighbours
   taken_.resize(pixels);
   const int tiles = ((width + p_.tile_px - 1) / p_.tile_px) * ((height + p_.tile_px - 1) / p_.tile_px);
@@ -31,68 +35,37 @@ CornerDetector::CornerDetector(int width, int height, const CornerParameters& pa
   corners_.reserve(static_cast<size_t>(p_.maximum));
 }
 
-void CornerDetector::gradient_row(const Plane& image, int y) {
-  const uint8_t* a = image.row(y - 1);
-  const uint8_t* b = image.row(y);
-  const uint8_t* c = image.row(y + 1);
-  // Separable Sobel: smoothed down the column for gx, differenced for gy; 16 bits hold both.
-  int16_t* __restrict smooth = smooth_.data();
-  int16_t* __restrict step = step_.data();
-  for (int x = 0; x < width_; ++x) {
-    smooth[x] = static_cast<int16_t>(a[x] + 2 * b[x] + c[x]);
-    step[x] = static_cast<int16_t>(c[x] - a[x]);
+/// The largest response.
+float CornerDetector::fill_response(const Plane& image) {
+  const CornerKernels& kernels = corner_kernels();
+  const auto gradient_row = [&](int i) {
+    float* first = products_.data() + 3 * i * stride_;
+    return GradientRow{first, first + stride_, first + 2 * stride_};
+  };
+  const GradientRow rows[3] = {gradient_row(0), gradient_row(1), gradient_row(2)}, sums = gradient_row(3);
+  float largest = 0;
+  for (int y = 1; y < height_ - 1; ++y) {
+    kernels.gradients(image.row(y - 1), image.row(y), image.row(y + 1), width_, smooth_.data(), step_.data(),
+                      rows[y % 3]);
+    if (y >= 3) largest = kernels.response(rows, width_, sums, largest, response_.data() + (y - 1) * stride_);
   }
-  float* __restrict xx = xx_[y % 3].data();
-  float* __restrict xy = xy_[y % 3].data();
-  float* __restrict yy = yy_[y % 3].data();
-  for (int x = 1; x < width_ - 1; ++x) {
-    const auto fx = static_cast<float>(static_cast<int16_t>(smooth[x + 1] - smooth[x - 1]));
-    const auto fy = static_cast<float>(static_cast<int16_t>(step[x - 1] + 2 * step[x] + step[x + 1]));
-    xx[x] = fx * fx;
-    xy[x] = fx * fy;
-    yy[x] = fy * fy;
-  }
+  return largest;
 }
 
-// Sums of squares of Sobel values stay below 2^24, so float sums are exact and their order does not matter.
-void CornerDetector::response_row(int y) {
-  float* __restrict sxx = sum_xx_.data();
-  float* __restrict sxy = sum_xy_.data();
-  float* __restrict syy = sum_yy_.data();
-  for (int x = 1; x < width_ - 1; ++x) {
-    sxx[x] = xx_[0][static_cast<size_t>(x)] + xx_[1][static_cast<size_t>(x)] + xx_[2][static_cast<size_t>(x)];
-    sxy[x] = xy_[0][static_cast<size_t>(x)] + xy_[1][static_cast<size_t>(x)] + xy_[2][static_cast<size_t>(x)];
-    syy[x] = yy_[0][static_cast<size_t>(x)] + yy_[1][static_cast<size_t>(x)] + yy_[2][static_cast<size_t>(x)];
-  }
-  float* __restrict out = response_.data() + static_cast<ptrdiff_t>(y) * width_;
-  float largest = largest_;
-  for (int x = 2; x < width_ - 2; ++x)
-    out[x] = smaller_eigenvalue(sxx[x - 1] + sxx[x] + sxx[x + 1], sxy[x - 1] + sxy[x] + sxy[x + 1],
-                                syy[x - 1] + syy[x] + syy[x + 1]);
-  for (int x = 2; x < width_ - 2; ++x) largest = out[x] > largest ? out[x] : largest;
-  largest_ = largest;
-}
-
-void CornerDetector::collect(ImageView<const int16_t> mask) {
+void CornerDetector::collect(float largest, ImageView<const int16_t> mask) {
   candidates_.clear();
-  const float threshold = std::max(1.0f, static_cast<float>(p_.quality) * largest_);
+  const float threshold = std::max(1.0f, static_cast<float>(p_.quality) * largest);
   const int margin = std::max(3, p_.margin_px);
   for (int y = margin; y < height_ - margin; ++y) {
-    const float* above = response_.data() + static_cast<ptrdiff_t>(y - 1) * width_;
-    const float* here = above + width_;
-    const float* below = here + width_;
-    float* __restrict peak = peak_.data();
-    for (int x = 0; x < width_; ++x) {
-      const float m = above[x] > below[x] ? above[x] : below[x];
-      peak[x] = m > here[x] ? m : here[x];
-    }
-    for (int x = margin; x < width_ - margin; ++x) {
-      const float r = here[x];
-      if (r < threshold || r < peak[x] || r < peak[x - 1] || r < peak[x + 1]) continue;
+    const float* row = response_.data() + y * stride_;
+    const int count =
+        corner_kernels().peaks(row - stride_, row, row + stride_, threshold, margin, width_ - margin, peaks_.data());
+    for (int i = 0; i < count; ++i) {
+      const int x = peaks_[static_cast<size_t>(i)];
       if (mask.data && mask.at(x, y) < 0) continue;
       if (candidates_.size() == candidates_.capacity()) return;  // only plateaus can fill it
       const auto index = static_cast<uint32_t>(y * width_ + x);
-      candidates_.push_back(uint64_t{std::bit_cast<uint32_t>(r)} << 32 | ~index);
+      candidates_.push_back(uint64_t{std::bit_cast<uint32_t>(row[x])} << 32 | ~index);
     }
   }
 }
@@ -128,12 +101,7 @@ std::span<const Corner> CornerDetector::select() {
 }
 
 std::span<const Corner> CornerDetector::detect(const Plane& image, ImageView<const int16_t> mask) {
-  largest_ = 0;
-  for (int y = 1; y < height_ - 1; ++y) {
-    gradient_row(image, y);
-    if (y >= 3) response_row(y - 1);
-  }
-  collect(mask);
+  collect(fill_response(image), mask);
   return select();
 }
 
@@ -149,6 +117,35 @@ float CornerDetector::response_reference(const Plane& image, int x, int y) {
       yy += static_cast<float>(gy * gy);
     }
   return smaller_eigenvalue(xx, xy, yy);
+}
+
+std::vector<Corner> CornerDetector::select_reference(ImageView<const float> response, const CornerParameters& p,
+                                                     ImageView<const int16_t> mask) {
+  float largest = 0;
+  for (int y = 0; y < response.height; ++y)
+    for (int x = 0; x < response.width; ++x) largest = std::max(largest, response.at(x, y));
+  const float threshold = std::max(1.0f, static_cast<float>(p.quality) * largest);
+  const int margin = std::max(3, p.margin_px);
+  std::vector<Corner> peaks, chosen;
+  for (int y = margin; y < response.height - margin; ++y)
+    for (int x = margin; x < response.width - margin; ++x) {
+      bool peak = response.at(x, y) >= threshold && (!mask.data || mask.at(x, y) >= 0);
+      for (int v = y - 1; v <= y + 1; ++v)
+        for (int u = x - 1; u <= x + 1; ++u) peak &= response.at(x, y) >= response.at(u, v);
+      if (peak) peaks.push_back({static_cast<int16_t>(x), static_cast<int16_t>(y)});
+    }
+  std::stable_sort(peaks.begin(), peaks.end(),
+                   [&](Corner a, Corner b) { return response.at(a.x, a.y) > response.at(b.x, b.y); });
+  const auto tile = [&](Corner c) { return std::pair{c.x / p.tile_px, c.y / p.tile_px}; };
+  const int tiles = ((response.width + p.tile_px - 1) / p.tile_px) * ((response.height + p.tile_px - 1) / p.tile_px);
+  for (const Corner& c : peaks) {
+    if (chosen.size() == static_cast<size_t>(p.maximum)) break;
+    const auto near = [&](Corner o) { return std::max(std::abs(c.x - o.x), std::abs(c.y - o.y)) < p.distance_px; };
+    const auto beside = std::count_if(chosen.begin(), chosen.end(), [&](Corner o) { return tile(o) == tile(c); });
+    if (std::none_of(chosen.begin(), chosen.end(), near) && beside < std::max(1, 2 * p.maximum / tiles))
+      chosen.push_back(c);
+  }
+  return chosen;
 }
 
 }  // namespace takt::ego_motion

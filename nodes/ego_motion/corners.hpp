@@ -30,29 +30,32 @@ class CornerDetector {
   /// Strongest corners first. A pixel whose `mask` value is negative cannot be a corner (no disparity there); an empty
   /// view admits all. The result is valid until the next call.
   std::span<const Corner> detect(const Plane& image, ImageView<const int16_t> mask = {});
-  /// Smaller eigenvalue of the summed gradient matrix (3 x 3 Sobel, 3 x 3 sum) at each pixel; 0 in a 2 px border.
-  std::span<const float> response() const { return response_; }
+  /// Smaller eigenvalue of the summed gradient matrix (3 x 3 Sobel, 3 x 3 sum) at each pixel of the last image; 0 in a
+  /// border of 2 px.
+  ImageView<const float> response() const { return {response_.data(), width_, height_, 1, stride_}; }
 
   /// The slow, obvious response of one pixel: double loop, same arithmetic in the same order.
   static float response_reference(const Plane& image, int x, int y);
+  /// The slow, obvious choice of corners by their response: every peak against all that were chosen before.
+  static std::vector<Corner> select_reference(ImageView<const float> response, const CornerParameters& parameters,
+                                              ImageView<const int16_t> mask = {});
 
  private:
-  void gradient_row(const Plane& image, int y);
-  void response_row(int y);
-  void collect(ImageView<const int16_t> mask);
+  float fill_response(const Plane& image);
+  void collect(float largest, ImageView<const int16_t> mask);
   std::span<const Corner> select();
 
   int width_ = 0, height_ = 0;
   CornerParameters p_;
-  std::vector<float> xx_[3], xy_[3], yy_[3];  // products of the gradients, ring of three rows
+  ptrdiff_t stride_ = 0;
   std::vector<int16_t> smooth_, step_;
-  std::vector<float> sum_xx_, sum_xy_, sum_yy_, peak_;
+  std::vector<float> products_;  // gradient rows: a ring of three, and their sum
   std::vector<float> response_;
+  std::vector<int32_t> peaks_;
   std::vector<uint64_t> candidates_;  // response bits above, inverted pixel index below: one integer order, no ties
   std::vector<uint8_t> taken_;        // pixels too near to a chosen corner
   std::vector<int> in_tile_;
   std::vector<Corner> corners_;
-  float largest_ = 0;
 };
 
 }  // namespace takt::ego_motion

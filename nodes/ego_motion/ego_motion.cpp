@@ -5,13 +5,15 @@
 #include <cmath>
 #include <stdexcept>
 #include <string>
+#include <utility>
+
+#include "nodes/ego_motion/block_kernel.hpp"
 
 namespace takt::ego_motion {
 namespace {
 
 constexpr int kLevels = 4;
-constexpr int kCoarseHalf = 3;      // block at the coarsest level, where most positions are tested
-constexpr double kLongestGap = 10;  // constant velocity is not stretched further than this many intervals
+constexpr int kCoarseHalf = 3;  // block at the coarsest level, where most positions are tested
 
 int round_int(double v) { return static_cast<int>(std::lround(v)); }
 
@@ -22,6 +24,7 @@ Parameters Parameters::faithful() {
   p.corners = {1500, 0.01, 5, 8, 1 << 14};
   p.predict = Predict::none;
   p.subpixel = Subpixel::none;
+  p.brightness = false;
   p.flow_filter = true;
   p.estimator.model = Model::planar;
   p.estimator.robust = false;
@@ -44,6 +47,10 @@ std::string Parameters::error() const {
     return wrong("pyramid_range", pyramid_range_px, "lie in 8..512 px");
   if (!(flow.r_min_px > 0)) return wrong("r_min", flow.r_min_px, "be above 0 px");
   if (!(estimator.inlier_px > 0)) return wrong("inlier", estimator.inlier_px, "be above 0 px");
+  for (const auto& [name, value] : {std::pair{"acceleration", expectation.acceleration_m_s2},
+                                    {"turn_acceleration", expectation.turn_acceleration_rad_s2},
+                                    {"odometry_error", expectation.odometry_error}})
+    if (!(value > 0)) return wrong(name, value, "be above 0");
   return {};
 }
 
@@ -60,7 +67,8 @@ void EgoMotion::configure(int width, int height, const Parameters& parameters) {
   const auto capacity = static_cast<size_t>(p_.corners.maximum);
   previous_ = Pyramid(width, height, kLevels);
   current_ = Pyramid(width, height, kLevels);
-  right_ = Plane(width, height);
+  right_ = Level(width, height);
+  mean_sums_.resize(static_cast<size_t>(width + Plane::kPadding));
   detector_ = CornerDetector(width, height, p_.corners);
   flow_filter_ = FlowFilter(width, height, capacity, p_.flow);
   estimator_ = MotionEstimator(p_.estimator, capacity);
@@ -73,42 +81,44 @@ void EgoMotion::configure(int width, int height, const Parameters& parameters) {
   reset();
 }
 
-void EgoMotion::resume(const Rigid& pose) {
+void EgoMotion::resume(const UncertainPose& pose, int64_t stamp_ns) {
   reset();
   pose_ = pose;
-  resumed_ = true;
+  stamp_ns_ = stamp_ns;
+  has_previous_ = resumed_ = true;
 }
 
 void EgoMotion::reset() {
-  has_previous_ = has_motion_ = resumed_ = false;
+  has_previous_ = resumed_ = false;
   steps_ = 0;
-  last_T_ = pose_ = {};
+  pose_ = {};
+  expectation_ = Expectation(p_.expectation);
   tracked_.clear();
   observations_.clear();
+  flows_.clear();
 }
 
 // Disparity at (x, y) of the current left image, searched between whole disparities first..last; negative: not found.
 double EgoMotion::measure_disparity(double x, double y, int first, int last) const {
+  const Level& left = current_.level(0);
   const int xi = round_int(x), yi = round_int(y);
   if (xi < half_ || yi < half_ || xi >= width_ - half_ || yi >= height_ - half_) return -1;
+  first = std::max(0, first);
+  last = std::min(last, xi - half_);
+  if (first > last) return -1;
   Patch patch;
-  patch.take(current_.level(0), xi, yi, half_);
-  uint32_t best_cost = UINT32_MAX;
-  int best = -1;
-  for (int d = std::max(0, first); d <= last && xi - d >= half_; ++d) {
-    const uint32_t cost = sad(patch, right_, xi - d, yi);
-    if (cost < best_cost) best_cost = cost, best = d;
-  }
-  if (best < 0 || p_.subpixel == Subpixel::none) return best;
+  patch.take(left, xi, yi, half_);
+  const BlockMatch m = search_blocks(patch, right_, {xi - last, xi - first, yi, yi});
+  const int best = xi - m.x;
+  if (p_.subpixel == Subpixel::none) return best;
   if (p_.subpixel == Subpixel::parabola) {
-    if (best == 0 || xi - best - 1 < half_ || xi - best + 1 >= width_ - half_) return best;
+    if (best == 0 || m.x - 1 < half_ || m.x + 1 >= width_ - half_) return best;
     // d grows to the left, so the cost of d + 1 lies one pixel to the left.
-    return best +
-           parabola_offset(sad(patch, right_, xi - best + 1, yi), best_cost, sad(patch, right_, xi - best - 1, yi));
+    return best + parabola_offset(sad(patch, right_, m.x + 1, yi), m.cost, sad(patch, right_, m.x - 1, yi));
   }
   RefinePatch fine;
-  if (!fine.take(current_.level(0), x, y, half_)) return -1;
-  const SubPixel at = fine.refine_in_row(right_, x - best, y, 1.5);
+  if (!fine.take(left.image, x, y, half_)) return -1;
+  const SubPixel at = fine.refine_in_row(right_.image, x - best, y, 1.5);
   return at.converged ? std::max(0.0, x - at.x) : -1;
 }
 
@@ -124,7 +134,7 @@ double EgoMotion::current_disparity(const Frame& frame, double x, double y, doub
 
 void EgoMotion::find_corners(const Frame& frame) {
   found_.clear();
-  for (const Corner& c : detector_.detect(current_.level(0), frame.disparity)) {
+  for (const Corner& c : detector_.detect(current_.level(0).image, frame.disparity)) {
     const int known = frame.disparity.at(c.x, c.y);
     const double d = p_.subpixel == Subpixel::none ? known : measure_disparity(c.x, c.y, known - 2, known + 2);
     if (d > 0.25) found_.push_back({c, static_cast<float>(d)});
@@ -133,35 +143,36 @@ void EgoMotion::find_corners(const Frame& frame) {
 
 void EgoMotion::mark_candidates() {
   std::fill(candidates_.begin(), candidates_.end(), uint8_t{0});
-  for (const Tracked& t : found_)
+  for (const TrackedCorner& t : found_)
     for (int v = t.corner.y - 1; v <= t.corner.y + 1; ++v)
       for (int u = t.corner.x - 1; u <= t.corner.x + 1; ++u)
         candidates_[static_cast<size_t>(v) * static_cast<size_t>(width_) + static_cast<size_t>(u)] = 1;
 }
 
 // The thesis's search: a window that grows with the disparity (near points move further).
-BlockMatch EgoMotion::search_window(const Patch& patch, const Tracked& from, int centre_x, int centre_y) const {
+BlockMatch EgoMotion::search_window(const Patch& patch, const TrackedCorner& from, int centre_x, int centre_y) const {
   const int n = static_cast<int>(p_.sigma * static_cast<double>(from.disparity) + p_.r_const);
   const int radius = p_.search_is_radius ? n : n / 2;
   if (p_.corner_candidates) {
-    const BlockMatch m = block_search(patch, current_.level(0), centre_x, centre_y, radius, radius, candidates_.data());
+    const BlockMatch m =
+        block_search_among(patch, current_.level(0), centre_x, centre_y, radius, radius, candidates_.data());
     if (m.found()) return m;
   }
   return block_search(patch, current_.level(0), centre_x, centre_y, radius, radius);
 }
 
-// Coarse to fine; level l has pixels 2^l wide. The guess (from the last motion) competes at level 1.
-BlockMatch EgoMotion::search_pyramid(const Tracked& from, int guess_x, int guess_y) const {
+// Coarse to fine; level l has pixels 2^l wide. The guess (from the expected motion) competes at level 1.
+BlockMatch EgoMotion::search_pyramid(const TrackedCorner& from, int guess_x, int guess_y) const {
   const int top = current_.levels() - 1;
   const double range = p_.pyramid_range_px + p_.pyramid_share * static_cast<double>(from.disparity);
   int dx = 0, dy = 0;
   BlockMatch best;
   for (int l = top; l >= 0; --l) {
-    const Plane& before = previous_.level(l);
-    const Plane& now = current_.level(l);
+    const Level& before = previous_.level(l);
+    const Level& now = current_.level(l);
     const int half = l == top ? std::min(half_, kCoarseHalf) : half_;
-    const int x = std::clamp(from.corner.x >> l, half, before.width() - 1 - half);
-    const int y = std::clamp(from.corner.y >> l, half, before.height() - 1 - half);
+    const int x = std::clamp(from.corner.x >> l, half, before.image.width() - 1 - half);
+    const int y = std::clamp(from.corner.y >> l, half, before.image.height() - 1 - half);
     Patch patch;
     patch.take(before, x, y, half);
     const int radius = l == top ? static_cast<int>(range) >> l : l == 0 ? 1 : 2;
@@ -177,8 +188,8 @@ BlockMatch EgoMotion::search_pyramid(const Tracked& from, int guess_x, int guess
   return best;
 }
 
-EgoMotion::Located EgoMotion::sharpen(const Patch& patch, const Tracked& from, const BlockMatch& m) const {
-  const Plane& now = current_.level(0);
+EgoMotion::Located EgoMotion::sharpen(const Patch& patch, const TrackedCorner& from, const BlockMatch& m) const {
+  const Level& now = current_.level(0);
   Located at{static_cast<double>(m.x), static_cast<double>(m.y), true};
   if (p_.subpixel == Subpixel::parabola) {
     if (m.x - 1 < half_ || m.y - 1 < half_ || m.x + 1 >= width_ - half_ || m.y + 1 >= height_ - half_) return at;
@@ -186,24 +197,24 @@ EgoMotion::Located EgoMotion::sharpen(const Patch& patch, const Tracked& from, c
     at.y += parabola_offset(sad(patch, now, m.x, m.y - 1), m.cost, sad(patch, now, m.x, m.y + 1));
   } else if (p_.subpixel == Subpixel::lucas_kanade) {
     RefinePatch fine;
-    if (!fine.take(previous_.level(0), from.corner.x, from.corner.y, half_)) return {};
-    const SubPixel s = fine.refine(now, at.x, at.y, 1.5);
+    if (!fine.take(previous_.level(0).image, from.corner.x, from.corner.y, half_)) return {};
+    const SubPixel s = fine.refine(now.image, at.x, at.y, 1.5);
     at = {s.x, s.y, s.converged};
   }
   return at;
 }
 
-EgoMotion::Located EgoMotion::locate(const Tracked& from, const Optics& optics, const CameraModel& camera,
-                                     const Rigid& predicted) {
+EgoMotion::Located EgoMotion::locate(const TrackedCorner& from, const CameraModel& camera,
+                                     const std::optional<Rigid>& centre) const {
   int guess_x = 0, guess_y = 0;
-  if (p_.predict != Predict::none && has_motion_) {
-    const double s = optics.baseline_m / static_cast<double>(from.disparity);
-    const Eigen::Vector3d p = predicted * Eigen::Vector3d((from.corner.x - camera.cu_px) * s,
-                                                          (from.corner.y - camera.cv_px) * s, optics.focal_px * s);
+  if (centre) {
+    const double s = camera.baseline_m / static_cast<double>(from.disparity);
+    const Eigen::Vector3d p = *centre * Eigen::Vector3d((from.corner.x - camera.cu_px) * s,
+                                                        (from.corner.y - camera.cv_px) * s, camera.focal_px * s);
     if (p.z() < 0.1) return {};  // will be behind the camera
     const double limit = width_;
-    guess_x = round_int(std::clamp(optics.focal_px * p.x() / p.z() + camera.cu_px - from.corner.x, -limit, limit));
-    guess_y = round_int(std::clamp(optics.focal_px * p.y() / p.z() + camera.cv_px - from.corner.y, -limit, limit));
+    guess_x = round_int(std::clamp(camera.focal_px * p.x() / p.z() + camera.cu_px - from.corner.x, -limit, limit));
+    guess_y = round_int(std::clamp(camera.focal_px * p.y() / p.z() + camera.cv_px - from.corner.y, -limit, limit));
   }
   Patch patch;
   patch.take(previous_.level(0), from.corner.x, from.corner.y, half_);
@@ -214,13 +225,12 @@ EgoMotion::Located EgoMotion::locate(const Tracked& from, const Optics& optics, 
   return sharpen(patch, from, m);
 }
 
-void EgoMotion::match_all(const Frame& frame, const Rigid& predicted) {
+void EgoMotion::match_all(const Frame& frame, const std::optional<Rigid>& centre) {
   observations_.clear();
   flows_.clear();
   const CameraModel& c = frame.camera;
-  const Optics optics{c.focal_px, c.baseline_m};
-  for (const Tracked& from : tracked_) {
-    const Located at = locate(from, optics, c, predicted);
+  for (const TrackedCorner& from : tracked_) {
+    const Located at = locate(from, c, centre);
     if (!at.found) continue;
     const double d = current_disparity(frame, at.x, at.y, static_cast<double>(from.disparity));
     observations_.push_back({from.corner.x - c.cu_px, from.corner.y - c.cv_px, static_cast<double>(from.disparity),
@@ -238,44 +248,59 @@ void EgoMotion::filter_flow() {
   observations_.resize(kept);
 }
 
+bool EgoMotion::measure(const Frame& frame, const Rigid& expected, Result& result) {
+  const int64_t interval = frame.stamp_ns - stamp_ns_;
+  std::optional<Rigid> centre;  // maps previous coordinates into current ones
+  if (p_.predict == Predict::constant_velocity) centre = expectation_.continued(interval);
+  else if (p_.predict != Predict::none && (frame.odometry || expectation_.continued(interval))) centre = expected;
+  if (centre) centre = centre->inverse();
+  match_all(frame, centre);
+  if (p_.flow_filter) filter_flow();
+  const Optics optics{frame.camera.focal_px, frame.camera.baseline_m};
+  const Estimate e = estimator_.estimate(observations_, optics, expected.inverse(), steps_);
+  result.matched = static_cast<int>(observations_.size());
+  if (!e.solved) return false;
+  result.estimate = e.T.inverse();
+  result.inliers = e.inliers;
+  result.rms_px = e.rms_px;
+  result.confidence = e.inliers * std::exp(-e.rms_px) / result.matched;
+  if (result.confidence < p_.confidence_minimum || e.inliers < p_.inliers_minimum) return false;
+  result.camera_in_previous = camera_in_previous(e);
+  return true;
+}
+
 Result EgoMotion::step(const Frame& frame) {
   Result result;
-  current_.build(frame.left);
-  to_grey(frame.right, right_);
+  current_.build(frame.left, p_.brightness);
+  to_grey(frame.right, right_.image);
+  if (p_.brightness) fill_means(right_, mean_sums_);
   find_corners(frame);
   if (p_.corner_candidates) mark_candidates();
   result.corners = static_cast<int>(found_.size());
-  if (resumed_) {
-    resumed_ = false;
-  } else if (!has_previous_) {
+  if (!has_previous_) {
     result.keyframe = result.valid = true;
     result.confidence = 1;
   } else {
+    // Motion is per actual stamp difference.
     const int64_t interval = frame.stamp_ns - stamp_ns_;
-    // Motion is per actual stamp difference: stretch the last one to the present interval.
-    const double share = interval_ns_ > 0 ? static_cast<double>(interval) / static_cast<double>(interval_ns_) : 1;
-    const Rigid predicted = has_motion_ ? scaled(last_T_, std::clamp(share, 0.0, kLongestGap)) : Rigid{};
-    match_all(frame, predicted);
-    if (p_.flow_filter) filter_flow();
-    const Optics optics{frame.camera.focal_px, frame.camera.baseline_m};
-    const Estimate e = estimator_.estimate(observations_, optics, predicted, steps_);
-    result.matched = static_cast<int>(observations_.size());
-    result.inliers = e.inliers;
-    result.rms_px = e.rms_px;
-    result.confidence = result.matched ? e.inliers * std::exp(-e.rms_px) / result.matched : 0;
-    result.valid = e.solved && result.confidence >= p_.confidence_minimum && e.inliers >= p_.inliers_minimum;
-    const Rigid T = result.valid ? e.T : predicted;
-    result.camera_in_previous = T.inverse();
-    pose_ = pose_ * result.camera_in_previous;
-    last_T_ = T;
-    interval_ns_ = interval;
-    has_motion_ = has_motion_ || result.valid;
+    const UncertainPose expected = expectation_.motion(interval, frame.odometry);
+    // In an image without texture every block looks the same everywhere.
+    const bool sees = result.corners >= p_.inliers_minimum;
+    result.valid = sees && !resumed_ && measure(frame, from_transform(expected.transform), result);
+    if (result.valid) {
+      expectation_.measured(*result.estimate, interval);
+    } else {
+      result.camera_in_previous = expected;
+      expectation_.unmeasured(interval, frame.odometry);
+    }
+    pose_ = compose(pose_, result.camera_in_previous);
   }
   result.pose = pose_;
   previous_.swap(current_);
   tracked_.swap(found_);
   stamp_ns_ = frame.stamp_ns;
   has_previous_ = true;
+  resumed_ = false;
   ++steps_;
   return result;
 }

@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <optional>
 #include <span>
-#include <vector>
 
 #include "nodes/ego_motion/rigid.hpp"
 
@@ -22,6 +21,9 @@ struct Observation {
 struct Optics {
   double focal_px = 0, baseline_m = 0;
 };
+
+/// The point in previous camera coordinates.
+Eigen::Vector3d point(const Observation& observation, const Optics& optics);
 
 /// Planar small-angle motion: rotation alpha about the y axis, translation in the x-z plane.
 struct PlanarMotion {
@@ -40,48 +42,12 @@ std::optional<PlanarMotion> planar_least_squares(std::span<const Observation> ob
 /// The rigid motion with that rotation (exact) and translation.
 Rigid to_rigid(const PlanarMotion& motion);
 
-/// Residual of one observation under T in px: the length of (x, y, d) errors, the disparity error weighted 1/sqrt(2)
-/// because it holds the noise of two disparities. Infinite behind the camera.
+constexpr double kNearestDepth = 0.05;                    ///< m; what a motion brings nearer is behind the camera
+constexpr double kLeastDisparity = 0.1;                   ///< px; below it depth is noise
+constexpr double kDisparityWeight = 0.70710678118654752;  ///< 1/sqrt(2): a difference of disparities has two noises
+
+/// Residual of one observation under T in px: the length of (x, y, d) errors, the disparity error times
+/// kDisparityWeight. Infinite behind the camera.
 double residual_px(const Rigid& T, const Observation& o, const Optics& optics);
-
-enum class Model : uint8_t { six_dof, planar };
-
-struct EstimatorParameters {
-  Model model = Model::six_dof;
-  Form form = Form::multiplied;
-  bool robust = true;      ///< false: all observations count alike (thesis)
-  double inlier_px = 1.0;  ///< largest residual of an inlier
-  int iterations = 200;    ///< most random samples
-  double success = 0.999;  ///< stop sampling once the best sample was drawn with that probability
-};
-
-struct Estimate {
-  Rigid T;  ///< previous camera coordinates -> current
-  int inliers = 0;
-  double rms_px = 0;  ///< of the inliers
-  bool solved = false;
-};
-
-/// Robust motion of up to `capacity` observations. No allocation after construction; the result depends on the
-/// arguments alone (own random numbers from `seed`).
-class MotionEstimator {
- public:
-  MotionEstimator() = default;
-  MotionEstimator(const EstimatorParameters& parameters, size_t capacity) : p_(parameters) {
-    inliers_.reserve(capacity);
-  }
-  /// `start` is a guess of T, e.g. the motion before.
-  Estimate estimate(std::span<const Observation> observations, const Optics& optics, const Rigid& start, uint64_t seed);
-
- private:
-  bool solve(std::span<const Observation> observations, const Optics& optics, bool weighted, int iterations,
-             Rigid& T) const;
-  Rigid sample_consensus(std::span<const Observation> observations, const Optics& optics, const Rigid& start,
-                         uint64_t seed);
-  void collect(std::span<const Observation> observations, const Optics& optics, const Rigid& T, double limit_px);
-
-  EstimatorParameters p_;
-  std::vector<Observation> inliers_;
-};
 
 }  // namespace takt::ego_motion

@@ -1,41 +1,55 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "nodes/ego_motion/plane.hpp"
 
+#include <algorithm>
 #include <cstring>
+
+#include "nodes/ego_motion/image_kernel.hpp"
+#include "nodes/stereo/image_kernels.hpp"
 
 namespace takt::ego_motion {
 
 void to_grey(ImageView<const uint8_t> image, Plane& out) {
-  const int width = out.width();
-  for (int y = 0; y < out.height(); ++y) {
-    const uint8_t* in = image.row(y);
-    uint8_t* to = out.row(y);
-    if (image.channels == 1) {
-      std::memcpy(to, in, static_cast<size_t>(width));
-      continue;
-    }
-    for (int x = 0; x < width; ++x)
-      to[x] = static_cast<uint8_t>((29u * in[3 * x] + 150u * in[3 * x + 1] + 77u * in[3 * x + 2] + 128u) >> 8);
-  }
+  const auto count = out.width();
+  for (int y = 0; y < out.height(); ++y)
+    if (image.channels == 1) std::memcpy(out.row(y), image.row(y), static_cast<size_t>(count));
+    else stereo::image_kernels().grey(image.row(y), count, out.row(y));
 }
 
 void halve(const Plane& in, Plane& out) {
-  for (int y = 0; y < out.height(); ++y) {
-    const uint8_t* a = in.row(2 * y);
-    const uint8_t* b = in.row(2 * y + 1);
-    uint8_t* to = out.row(y);
-    for (int x = 0; x < out.width(); ++x)
-      to[x] = static_cast<uint8_t>((a[2 * x] + a[2 * x + 1] + b[2 * x] + b[2 * x + 1] + 2) >> 2);
-  }
+  for (int y = 0; y < out.height(); ++y)
+    image_kernels().halve(in.row(2 * y), in.row(2 * y + 1), out.width(), out.row(y));
 }
 
-Pyramid::Pyramid(int width, int height, int levels) {
+void fill_means(Level& level, std::vector<uint16_t>& sums) {
+  constexpr int kHalf = Level::kWindow / 2;
+  const Plane& image = level.image;
+  const ImageKernels& kernels = image_kernels();
+  const int width = image.width(), height = image.height();
+  std::fill(sums.begin(), sums.end(), uint16_t{0});
+  for (int y = 0; y < Level::kWindow - 1; ++y) kernels.roll(image.row(y), nullptr, width, sums.data());
+  for (int y = kHalf; y <= height - kHalf; ++y) {
+    kernels.roll(image.row(y + kHalf - 1), y > kHalf ? image.row(y - kHalf - 1) : nullptr, width, sums.data());
+    uint8_t* out = level.mean.row(y);
+    kernels.mean_of_8(sums.data(), width - Level::kWindow + 1, out + kHalf);
+    std::fill_n(out, kHalf, out[kHalf]);
+    std::fill_n(out + width - kHalf + 1, kHalf - 1, out[width - kHalf]);
+  }
+  const auto columns = static_cast<size_t>(width);
+  for (int y = 0; y < kHalf; ++y) std::memcpy(level.mean.row(y), level.mean.row(kHalf), columns);
+  for (int y = height - kHalf + 1; y < height; ++y)
+    std::memcpy(level.mean.row(y), level.mean.row(height - kHalf), columns);
+}
+
+Pyramid::Pyramid(int width, int height, int levels) : sums_(static_cast<size_t>(width + Plane::kPadding)) {
   for (int l = 0; l < levels; ++l) levels_.emplace_back(width >> l, height >> l);
 }
 
-void Pyramid::build(ImageView<const uint8_t> image) {
-  to_grey(image, levels_[0]);
-  for (size_t l = 1; l < levels_.size(); ++l) halve(levels_[l - 1], levels_[l]);
+void Pyramid::build(ImageView<const uint8_t> image, bool means) {
+  to_grey(image, levels_[0].image);
+  for (size_t l = 1; l < levels_.size(); ++l) halve(levels_[l - 1].image, levels_[l].image);
+  if (!means) return;
+  for (Level& level : levels_) fill_means(level, sums_);
 }
 
 }  // namespace takt::ego_motion

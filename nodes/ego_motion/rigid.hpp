@@ -18,6 +18,7 @@ struct Rigid {
 };
 
 using Twist = Eigen::Matrix<double, 6, 1>;  ///< translation (m), then rotation vector (rad)
+using Matrix6 = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
 
 inline Eigen::Matrix3d skew(const Eigen::Vector3d& w) {
   Eigen::Matrix3d m;

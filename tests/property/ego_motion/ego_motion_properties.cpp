@@ -3,15 +3,19 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "nodes/ego_motion/block_search.hpp"
 #include "nodes/ego_motion/corners.hpp"
 #include "nodes/ego_motion/flow_filter.hpp"
 #include "nodes/ego_motion/refine.hpp"
+#include "tests/property/ego_motion/on_each_target.hpp"
 
 using namespace takt::ego_motion;
+using takt::test::on_each_target;
 
 namespace {
 
@@ -37,38 +41,79 @@ int between(std::mt19937& random, int low, int high) { return std::uniform_int_d
 
 }  // namespace
 
-TEST_CASE("block_search equals three nested loops over pixels") {
-  std::mt19937 random(1);
-  for (int round = 0; round < 200; ++round) {
-    const int width = between(random, 33, 90), height = between(random, 33, 70), half = between(random, 1, 7);
-    const Plane a = noise(random, width, height, round % 3), b = noise(random, width, height, round % 3);
-    const int x = between(random, half, width - 1 - half), y = between(random, half, height - 1 - half);
-    const int cx = between(random, -5, width + 5), cy = between(random, -5, height + 5);
-    const int rx = between(random, 0, 12), ry = between(random, 0, 12);
-    Patch patch;
-    patch.take(a, x, y, half);
-    const BlockMatch fast = block_search(patch, b, cx, cy, rx, ry);
-    const BlockMatch slow = block_search_reference(a, x, y, half, b, cx, cy, rx, ry);
-    CHECK(fast.cost == slow.cost);
-    CHECK(fast.x == slow.x);
-    CHECK(fast.y == slow.y);
-  }
+Level with_means(Plane image) {
+  Level level(image.width(), image.height());
+  std::vector<uint16_t> sums(static_cast<size_t>(image.width() + Plane::kPadding));
+  level.image = std::move(image);
+  fill_means(level, sums);
+  return level;
 }
 
-TEST_CASE("the corner response equals the double loop bit by bit") {
-  std::mt19937 random(2);
-  for (int round = 0; round < 20; ++round) {
-    const int width = between(random, 20, 80), height = between(random, 20, 60);
-    const Plane image = noise(random, width, height, round % 4);
-    CornerDetector detector(width, height, {});
-    detector.detect(image);
-    bool equal = true;
-    for (int y = 2; y < height - 2; ++y)
-      for (int x = 2; x < width - 2; ++x)
-        equal &=
-            detector.response()[static_cast<size_t>(y * width + x)] == CornerDetector::response_reference(image, x, y);
-    CHECK(equal);
-  }
+TEST_CASE(
+    "block_search equals three nested loops over pixels on every SIMD target, with equal brightness or as it is") {
+  on_each_target([] {
+    std::mt19937 random(1);
+    for (int round = 0; round < 300; ++round) {
+      const int width = between(random, 33, 90), height = between(random, 33, 70), half = between(random, 1, 7);
+      Level a(width, height), b(width, height);
+      a.image = noise(random, width, height, round % 3);
+      b.image = noise(random, width, height, round % 3);
+      if (round % 2 == 0) a = with_means(a.image), b = with_means(b.image);
+      const int x = between(random, half, width - 1 - half), y = between(random, half, height - 1 - half);
+      const int cx = between(random, -5, width + 5), cy = between(random, -5, height + 5);
+      const int rx = between(random, 0, 20), ry = between(random, 0, 12);
+      Patch patch;
+      patch.take(a, x, y, half);
+      const BlockMatch fast = block_search(patch, b, cx, cy, rx, ry);
+      const BlockMatch slow = block_search_reference(a, x, y, half, b, cx, cy, rx, ry);
+      CHECK(fast.cost == slow.cost);
+      CHECK(fast.x == slow.x);
+      CHECK(fast.y == slow.y);
+      if (slow.found()) CHECK(sad(patch, b, slow.x, slow.y) == slow.cost);
+    }
+  });
+}
+
+TEST_CASE("the corner response equals the double loop bit by bit on every SIMD target") {
+  on_each_target([] {
+    std::mt19937 random(2);
+    for (int round = 0; round < 20; ++round) {
+      const int width = between(random, 20, 150), height = between(random, 20, 60);
+      const Plane image = noise(random, width, height, round % 4);
+      CornerDetector detector(width, height, {});
+      detector.detect(image);
+      bool equal = true;
+      for (int y = 0; y < height; ++y)
+        for (int x = 0; x < width; ++x) {
+          const bool border = x < 2 || y < 2 || x >= width - 2 || y >= height - 2;
+          equal &= detector.response().at(x, y) == (border ? 0 : CornerDetector::response_reference(image, x, y));
+        }
+      CHECK(equal);
+    }
+  });
+}
+
+TEST_CASE("corners are the same on every SIMD target, the best of a quadratic search") {
+  on_each_target([] {
+    std::mt19937 random(13);
+    for (int round = 0; round < 20; ++round) {
+      const int width = between(random, 64, 200), height = between(random, 64, 150);
+      const Plane image = noise(random, width, height, round % 3);
+      CornerParameters p;
+      p.maximum = between(random, 12, 300);
+      p.distance_px = between(random, 1, 9);
+      p.tile_px = between(random, 16, 300);
+      p.margin_px = between(random, 3, 12);
+      CornerDetector detector(width, height, p);
+      const auto fast = detector.detect(image);
+      const auto slow = CornerDetector::select_reference(detector.response(), p, {});
+      REQUIRE(fast.size() == slow.size());
+      for (size_t i = 0; i < slow.size(); ++i) {
+        CHECK(fast[i].x == slow[i].x);
+        CHECK(fast[i].y == slow[i].y);
+      }
+    }
+  });
 }
 
 TEST_CASE("corners keep their distance, their margin and the mask, strongest first") {
@@ -86,7 +131,7 @@ TEST_CASE("corners keep their distance, their margin and the mask, strongest fir
     const auto corners = detector.detect(image, {mask.data(), width, height});
     CHECK(!corners.empty());
     CHECK(corners.size() <= static_cast<size_t>(p.maximum));
-    const auto strength = [&](const Corner& c) { return detector.response()[static_cast<size_t>(c.y * width + c.x)]; };
+    const auto strength = [&](const Corner& c) { return detector.response().at(c.x, c.y); };
     bool good = true;
     for (size_t i = 0; i < corners.size(); ++i) {
       const Corner& c = corners[i];
@@ -117,38 +162,81 @@ TEST_CASE("the flow filter decides like the quadratic one") {
   }
 }
 
-TEST_CASE("the pyramid halves by rounded means") {
-  std::mt19937 random(5);
-  const Plane image = noise(random, 101, 77, 0);
-  Pyramid pyramid(101, 77, 3);
-  pyramid.build(image.view());
-  for (int l = 1; l < 3; ++l) {
-    const Plane &fine = pyramid.level(l - 1), &coarse = pyramid.level(l);
-    CHECK(coarse.width() == fine.width() / 2);
-    bool equal = true;
-    for (int y = 0; y < coarse.height(); ++y)
-      for (int x = 0; x < coarse.width(); ++x) {
-        int sum = 2;
-        for (int v = 0; v < 2; ++v)
-          for (int u = 0; u < 2; ++u) sum += fine.row(2 * y + v)[2 * x + u];
-        equal &= coarse.row(y)[x] == sum / 4;
-      }
-    CHECK(equal);
-  }
+TEST_CASE("the pyramid halves by rounded means and knows the mean around each pixel, on every SIMD target") {
+  on_each_target([] {
+    std::mt19937 random(5);
+    const int width = between(random, 64, 180), height = between(random, 64, 100);
+    const Plane image = noise(random, width, height, 0);
+    Pyramid pyramid(width, height, 3);
+    pyramid.build(image.view(), true);
+    for (int l = 1; l < 3; ++l) {
+      const Plane &fine = pyramid.level(l - 1).image, &coarse = pyramid.level(l).image;
+      CHECK(coarse.width() == fine.width() / 2);
+      bool equal = true;
+      for (int y = 0; y < coarse.height(); ++y)
+        for (int x = 0; x < coarse.width(); ++x) {
+          int sum = 2;
+          for (int v = 0; v < 2; ++v)
+            for (int u = 0; u < 2; ++u) sum += fine.row(2 * y + v)[2 * x + u];
+          equal &= coarse.row(y)[x] == sum / 4;
+        }
+      CHECK(equal);
+    }
+    for (int l = 0; l < 3; ++l) {
+      const Plane &of = pyramid.level(l).image, &mean = pyramid.level(l).mean;
+      bool equal = true;
+      for (int y = 0; y < of.height(); ++y)
+        for (int x = 0; x < of.width(); ++x) {
+          const int cx = std::clamp(x, 4, of.width() - 4), cy = std::clamp(y, 4, of.height() - 4);
+          int sum = 32;
+          for (int v = cy - 4; v < cy + 4; ++v)
+            for (int u = cx - 4; u < cx + 4; ++u) sum += of.row(v)[u];
+          equal &= mean.row(y)[x] == sum / 64;
+        }
+      CHECK(equal);
+    }
+  });
 }
 
-TEST_CASE("sub-pixel refinement finds a shift of a smooth image to 0.03 px, with a brightness offset") {
+TEST_CASE("sub-pixel refinement equals loops over pixels bit by bit on every SIMD target") {
+  on_each_target([] {
+    std::mt19937 random(12);
+    for (int round = 0; round < 200; ++round) {
+      const int half = between(random, 1, 7);
+      const Plane a = noise(random, 60, 50, round % 4), b = round % 5 == 0 ? a : noise(random, 60, 50, round % 4);
+      const double x = between(random, 4, 55) + 0.125 * between(random, 0, 7);
+      const double y = between(random, 4, 45) + (round % 2 ? 0.3 : 0.0);
+      RefinePatch fast, slow(refine_references());
+      const bool taken = fast.take(a, x, y, half);
+      CHECK(taken == slow.take(a, x, y, half));
+      if (!taken) continue;
+      const auto rows = static_cast<size_t>(2 * half + 1) * sizeof fast.samples().value[0];
+      CHECK(std::memcmp(fast.samples().value, slow.samples().value, rows) == 0);
+      for (const bool row : {false, true}) {
+        const SubPixel f = row ? fast.refine_in_row(b, x + 0.4, y, 2) : fast.refine(b, x + 0.4, y - 0.3, 2);
+        const SubPixel s = row ? slow.refine_in_row(b, x + 0.4, y, 2) : slow.refine(b, x + 0.4, y - 0.3, 2);
+        CHECK(f.converged == s.converged);
+        CHECK(f.x == s.x);
+        CHECK(f.y == s.y);
+      }
+    }
+  });
+}
+
+TEST_CASE(
+    "sub-pixel refinement finds a shift of a smooth image to 0.03 px, whatever gain and offset of the brightness") {
   const auto pattern = [](double x, double y) {
     return 110 + 30 * std::sin(0.45 * x + 0.2 * y) + 30 * std::sin(0.35 * y - 0.15 * x) + 20 * std::sin(0.3 * x);
   };
   std::mt19937 random(6);
   for (int round = 0; round < 50; ++round) {
     const double sx = 0.01 * between(random, -90, 90), sy = 0.01 * between(random, -90, 90);
+    const double gain = 0.01 * between(random, 70, 140), offset = between(random, -30, 12);
     Plane a(60, 60), b(60, 60);
     for (int y = 0; y < 60; ++y)
       for (int x = 0; x < 60; ++x) {
         a.row(y)[x] = static_cast<uint8_t>(std::lround(pattern(x, y)));
-        b.row(y)[x] = static_cast<uint8_t>(std::lround(pattern(x - sx, y - sy) + 12));
+        b.row(y)[x] = static_cast<uint8_t>(std::clamp(std::lround(gain * pattern(x - sx, y - sy) + offset), 0L, 255L));
       }
     RefinePatch patch;
     REQUIRE(patch.take(a, 30, 30, 5));

@@ -4,6 +4,7 @@
 #include <doctest/doctest.h>
 
 #include <cmath>
+#include <cstring>
 #include <fstream>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
@@ -69,7 +70,7 @@ TEST_CASE("a known motion is measured from images, in each mode") {
     Parameters parameters;
     double tolerance_m;
   };
-  Parameters velocity, parabola, window;
+  Parameters velocity, parabola, window, plain;
   velocity.predict = Predict::constant_velocity;
   velocity.r_const = 40;
   parabola.subpixel = Subpixel::parabola;
@@ -77,8 +78,10 @@ TEST_CASE("a known motion is measured from images, in each mode") {
   window.corner_candidates = true;
   window.r_const = 30;
   window.flow_filter = true;
-  for (const Mode& mode : {Mode{"default", {}, 0.003}, Mode{"constant velocity", velocity, 0.003},
-                           Mode{"parabola", parabola, 0.008}, Mode{"window", window, 0.003}}) {
+  plain.brightness = false;
+  for (const Mode& mode :
+       {Mode{"default", {}, 0.003}, Mode{"constant velocity", velocity, 0.003}, Mode{"parabola", parabola, 0.008},
+        Mode{"window", window, 0.003}, Mode{"as bright as they are", plain, 0.003}}) {
     CAPTURE(mode.name);
     Wall wall;
     EgoMotion ego;
@@ -94,11 +97,28 @@ TEST_CASE("a known motion is measured from images, in each mode") {
       r = ego.step(wall.frame(i * 100'000'000));
       CHECK(r.valid);
       CHECK_FALSE(r.keyframe);
-      CHECK(std::abs(r.camera_in_previous.t.x() - 0.02) < mode.tolerance_m);
-      CHECK(std::abs(r.camera_in_previous.t.y()) < mode.tolerance_m);
-      CHECK(std::abs(r.camera_in_previous.t.z() - 0.05) < mode.tolerance_m);
+      CHECK(std::abs(r.camera_in_previous.transform.x - 0.02) < mode.tolerance_m);
+      CHECK(std::abs(r.camera_in_previous.transform.y) < mode.tolerance_m);
+      CHECK(std::abs(r.camera_in_previous.transform.z - 0.05) < mode.tolerance_m);
     }
-    CHECK(std::abs(r.pose.t.z() - 0.20) < 4 * mode.tolerance_m);
+    CHECK(std::abs(r.pose.transform.z - 0.20) < 4 * mode.tolerance_m);
+  }
+}
+
+TEST_CASE("gain and offset that change from frame to frame and between the cameras cost little") {
+  Wall wall;
+  EgoMotion ego;
+  ego.configure(Wall::width, Wall::height, {});
+  for (int i = 0; i <= 4; ++i) {
+    wall.render(0.02 * i, 0.05 * i);
+    const double gain = i % 2 == 0 ? 1 : 1.4;
+    for (uint8_t& v : wall.left) v = static_cast<uint8_t>(std::min(255.0, gain * v + 6 * i));
+    for (uint8_t& v : wall.right) v = static_cast<uint8_t>(std::min(255.0, 0.8 * gain * v + 20));
+    const Result r = ego.step(wall.frame(i * 100'000'000));
+    CHECK(r.valid);
+    if (i == 0) continue;
+    CHECK(std::abs(r.camera_in_previous.transform.x - 0.02) < 0.003);
+    CHECK(std::abs(r.camera_in_previous.transform.z - 0.05) < 0.003);
   }
 }
 
@@ -110,7 +130,7 @@ TEST_CASE("the faithful mode works on whole pixels") {
   ego.step(wall.frame(0));
   wall.render(0.04, 0);
   const Result r = ego.step(wall.frame(100'000'000));
-  CHECK(std::abs(r.camera_in_previous.t.x() - 0.04) < 0.043);  // the thesis's own median error
+  CHECK(std::abs(r.camera_in_previous.transform.x - 0.04) < 0.043);  // the thesis's own median error
   CHECK(r.matched > 50);
 }
 
@@ -127,13 +147,88 @@ TEST_CASE("without texture the motion is predicted at constant velocity over the
   std::fill(wall.right.begin(), wall.right.end(), uint8_t{90});
   const Result predicted = ego.step(wall.frame(300'000'000));
   CHECK_FALSE(predicted.valid);
-  CHECK(predicted.camera_in_previous.t.z() == doctest::Approx(2 * measured.camera_in_previous.t.z()).epsilon(1e-6));
+  CHECK(predicted.camera_in_previous.transform.z ==
+        doctest::Approx(2 * measured.camera_in_previous.transform.z).epsilon(1e-6));
   wall.render(0, 0.20);
   CHECK_FALSE(ego.step(wall.frame(400'000'000)).valid);  // no corners in the blank frame
   wall.render(0, 0.25);
   CHECK(ego.step(wall.frame(500'000'000)).valid);
   ego.reset();
   CHECK(ego.step(wall.frame(600'000'000)).keyframe);
+}
+
+TEST_CASE("a refused motion says so, and the uncertainty of the pose grows by what nobody saw") {
+  Wall wall;
+  EgoMotion ego;
+  ego.configure(Wall::width, Wall::height, {});
+  const auto sigma = [](const takt::UncertainPose& pose) { return std::sqrt(pose.covariance[14]); };  // of z
+  wall.render(0, 0);
+  CHECK(sigma(ego.step(wall.frame(0)).pose) == 0);
+  wall.render(0, 0.05);
+  const Result measured = ego.step(wall.frame(100'000'000));
+  CHECK(measured.valid);
+  CHECK(sigma(measured.pose) > 0);
+  CHECK(sigma(measured.pose) < 0.003);
+  std::fill(wall.left.begin(), wall.left.end(), uint8_t{90});
+  std::fill(wall.right.begin(), wall.right.end(), uint8_t{90});
+  for (int i = 2; i <= 5; ++i) {
+    const Result blind = ego.step(wall.frame(i * 100'000'000));
+    CHECK_FALSE(blind.valid);
+    CHECK_FALSE(blind.estimate.has_value());
+    // Constant acceleration of 1 m/s^2 from the middle of the last measured interval on: a t (t + m) / 2.
+    const double t = 0.1 * (i - 1);
+    const double grown = 0.5 * t * (t + 0.1);
+    CHECK(sigma(blind.pose) == doctest::Approx(std::hypot(grown, sigma(measured.pose))).epsilon(0.01));
+  }
+}
+
+TEST_CASE("odometry answers where the images say nothing, and centres the search") {
+  Parameters p;
+  p.predict = Predict::odometry;
+  p.r_const = 12;  // +-6 px around the prediction; the motion below is about 19 px
+  Wall wall;
+  EgoMotion ego;
+  ego.configure(Wall::width, Wall::height, p);
+  wall.render(0, 0);
+  ego.step(wall.frame(0));
+  wall.render(0.25, 0);
+  Frame frame = wall.frame(100'000'000);
+  frame.odometry = Rigid{Eigen::Matrix3d::Identity(), {0.26, 0, 0.01}};
+  const Result found = ego.step(frame);
+  CHECK(found.valid);
+  CHECK(std::abs(found.camera_in_previous.transform.x - 0.25) < 0.003);
+
+  std::fill(wall.left.begin(), wall.left.end(), uint8_t{90});
+  frame = wall.frame(200'000'000);
+  frame.odometry = Rigid{Eigen::Matrix3d::Identity(), {0.1, 0, 0}};
+  const Result blind = ego.step(frame);
+  CHECK_FALSE(blind.valid);
+  CHECK(blind.camera_in_previous.transform.x == doctest::Approx(0.1));
+  CHECK(std::sqrt(blind.camera_in_previous.covariance[0]) == doctest::Approx(0.1 * 0.1 + 0.002));
+
+  EgoMotion lost;
+  lost.configure(Wall::width, Wall::height, p);
+  wall.render(0, 0);
+  lost.step(wall.frame(0));
+  wall.render(0.25, 0);
+  CHECK_FALSE(lost.step(wall.frame(100'000'000)).valid);  // outside the window around where it was
+}
+
+TEST_CASE("a resumed pose goes on with the uncertainty of the gap") {
+  Wall wall;
+  EgoMotion ego;
+  ego.configure(Wall::width, Wall::height, {});
+  takt::UncertainPose known{{1, 2, 3}, {}};
+  known.covariance[0] = 0.04;
+  ego.resume(known, 1'000'000'000);
+  wall.render(0, 0);
+  const Result first = ego.step(wall.frame(1'500'000'000));
+  CHECK_FALSE(first.valid);
+  CHECK_FALSE(first.keyframe);
+  CHECK(first.pose.transform.y == 2);
+  CHECK(first.pose.covariance[0] == doctest::Approx(0.04 + 0.25 * 0.25));  // (a t^2)^2 with t = 0.5 s
+  wall.render(0, 0.05);
+  CHECK(ego.step(wall.frame(1'600'000'000)).valid);
 }
 
 TEST_CASE("colour and grey images give the same motion up to rounding; same input, same bits") {
@@ -160,9 +255,10 @@ TEST_CASE("colour and grey images give the same motion up to rounding; same inpu
     return r;
   };
   const Result grey = run(false), again = run(false), colour = run(true);
-  CHECK(grey.pose.t == again.pose.t);
-  CHECK(grey.pose.R == again.pose.R);
-  CHECK(grey.pose.t == colour.pose.t);
+  for (const Result& other : {again, colour}) {
+    CHECK(std::memcmp(&grey.pose.transform, &other.pose.transform, sizeof(takt::Transform)) == 0);
+    CHECK(grey.pose.covariance == other.pose.covariance);
+  }
 }
 
 TEST_CASE("a step allocates nothing, in any mode, the first one included") {
@@ -202,11 +298,14 @@ TEST_CASE("the node type registers with its ports") {
   const auto* type = types.find("ego_motion");
   REQUIRE(type);
   const auto node = type->make();
-  REQUIRE(node->inputs().size() == 3);
+  REQUIRE(node->inputs().size() == 4);
   CHECK(node->inputs()[0]->name() == "pair");
   CHECK(node->inputs()[1]->name() == "disparity");
-  REQUIRE(node->outputs().size() == 1);
+  CHECK(node->inputs()[2]->name() == "odometry");
+  REQUIRE(node->outputs().size() == 3);
   CHECK(node->outputs()[0]->name() == "motion");
+  CHECK(node->outputs()[1]->name() == "pose");
+  CHECK(node->outputs()[2]->name() == "robot_motion");
 }
 
 TEST_CASE("a recorded drive: drift and turn error stay below SIFT + SGBM + PnP (1.0 %, 0.026 deg per frame)") {
@@ -247,7 +346,7 @@ TEST_CASE("a recorded drive: drift and turn error stay below SIFT + SGBM + PnP (
                                camera,
                                static_cast<int64_t>(i) * 100'000'000});
     CHECK(r.valid);
-    estimated.push_back(r.pose);
+    estimated.push_back(from_transform(r.pose.transform));
   }
   const Quality q = evaluate(estimated, truth);
   MESSAGE("drift " << q.drift_pct << " %, " << q.deg_per_frame << " deg per frame, " << q.metres_per_frame

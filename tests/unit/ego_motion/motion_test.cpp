@@ -7,6 +7,7 @@
 #include <random>
 #include <vector>
 
+#include "nodes/ego_motion/estimator.hpp"
 #include "nodes/ego_motion/evaluate.hpp"
 
 using namespace takt::ego_motion;

@@ -47,10 +47,11 @@ TEST_CASE("ego_motion: keyframe, then motion with both stamps; nothing for old o
   PortAccess::connect(map_port, kSize);
   test::set_up(*node);
   test::BoxWriter<Motion> out(*node->outputs()[0]);
+  test::BoxWriter<Pose> pose(*node->outputs()[1]), robot(*node->outputs()[2]);
   test::Box<StereoPair> pair(kSize);
   test::Box<DisparityMap> map(kSize);
   const auto step = [&](int64_t pair_stamp, int64_t map_stamp, uint64_t sequence) {
-    out.clear();
+    out.clear(), pose.clear(), robot.clear();
     test::latch(pair_port, pair, pair_stamp, sequence);
     test::latch(map_port, map, map_stamp, sequence);
     return test::run(*node, sequence);
@@ -71,6 +72,15 @@ TEST_CASE("ego_motion: keyframe, then motion with both stamps; nothing for old o
   CHECK(std::abs(out.message().camera_in_previous.x - 0.05) < 0.003);
   CHECK(out.message().pose.x == out.message().camera_in_previous.x);
   CHECK(out.message().inliers > 50);
+  REQUIRE(pose.sent());
+  CHECK(pose.stamp_ns() == 101'000);
+  CHECK(pose.message().transform.x == out.message().pose.x);
+  CHECK(pose.message().covariance[0] > 0);
+  // The camera looks along the robot's y axis, both have x to the right: M_robot moves along x as well.
+  REQUIRE(robot.sent());
+  CHECK(robot.message().transform.x == doctest::Approx(out.message().camera_in_previous.x).epsilon(0.02));
+  CHECK(std::abs(robot.message().transform.z - out.message().camera_in_previous.y * -1) < 0.003);
+  CHECK(robot.message().covariance[0] > 0);
 
   CHECK_FALSE(step(101'000, 101'000, 3));
   CHECK_FALSE(out.sent());
@@ -91,4 +101,90 @@ TEST_CASE("ego_motion refuses a disparity of another size and an even block") {
   PortAccess::connect(test::input(*node, "disparity"), {640, 480, 1, 0});
   test::set(*node, "n_search", int64_t{10});
   CHECK_THROWS_WITH_AS(test::set_up(*node), doctest::Contains("n_search is 10"), SetupError);
+}
+
+TEST_CASE(
+    "ego_motion conjugates with the mount: a robot that turns on the spot moves its camera, and odometry says so") {
+  NodeTypes types;
+  register_ego_motion(types);
+  const auto node = types.find("ego_motion")->make();
+  auto& pair_port = test::input(*node, "pair");
+  auto& map_port = test::input(*node, "disparity");
+  auto& odometry_port = test::input(*node, "odometry");
+  PortAccess::connect(pair_port, kSize);
+  PortAccess::connect(map_port, kSize);
+  PortAccess::connect(odometry_port, {});
+  test::set(*node, "predict", std::string("odometry"));
+  test::set(*node, "camera_y", 0.5);
+  test::set_up(*node);
+  test::BoxWriter<Motion> out(*node->outputs()[0]);
+  test::BoxWriter<Pose> pose(*node->outputs()[1]), robot(*node->outputs()[2]);
+  test::Box<StereoPair> pair(kSize);
+  test::Box<DisparityMap> map(kSize);
+  test::Box<Odometry> odometry[3];
+  const double turn = 0.1;
+  for (size_t i = 0; i < 3; ++i) odometry[i]->theta_rad = turn * static_cast<double>(i) / 2;  // 0, 50 and 100 ms
+  render(*pair, *map, 0);
+  for (const int64_t stamp : {int64_t{0}, int64_t{100'000'000}}) {
+    out.clear(), pose.clear(), robot.clear();
+    test::latch(pair_port, pair, stamp, static_cast<uint64_t>(stamp) + 1);
+    test::latch(map_port, map, stamp, static_cast<uint64_t>(stamp) + 1);
+    for (size_t i = 0; i < 3; ++i)
+      test::latch(odometry_port, odometry[i], static_cast<int64_t>(i) * 50'000'000, i + 1, i);
+    CHECK(test::run(*node));
+    // Nothing to see in the second image: the odometry answers.
+    for (uint8_t& v : pair->left.items()) v = 100;
+  }
+  REQUIRE(out.sent());
+  CHECK(out.message().valid == 0);
+  // A camera 0.5 m before the axis swings to the left; turning left is turning about its y axis, which looks down.
+  const Transform& camera = out.message().camera_in_previous;
+  CHECK(camera.x == doctest::Approx(-0.5 * std::sin(turn)));
+  CHECK(camera.z == doctest::Approx(-0.5 * (1 - std::cos(turn))));
+  CHECK(2 * std::atan2(camera.qy, camera.qw) == doctest::Approx(-turn));
+  const Transform& base = robot.message().transform;
+  CHECK(std::abs(base.x) < 1e-12);
+  CHECK(std::abs(base.y) < 1e-12);
+  CHECK(2 * std::atan2(base.qz, base.qw) == doctest::Approx(turn));
+}
+
+TEST_CASE("ego_motion goes on where another process left off, unsure of the time between") {
+  NodeTypes types;
+  register_ego_motion(types);
+  const auto node = types.find("ego_motion")->make();
+  auto& pair_port = test::input(*node, "pair");
+  auto& map_port = test::input(*node, "disparity");
+  PortAccess::connect(pair_port, kSize);
+  PortAccess::connect(map_port, kSize);
+  test::set_up(*node);
+  test::Box<Motion> last_motion;
+  test::Box<Pose> last_pose;
+  last_motion->from_stamp_ns = 1'000'000'000;
+  last_pose->transform.x = 7;
+  last_pose->covariance[0] = 0.01;
+  PortAccess::hand_over(*node->outputs()[0], &*last_motion);
+  PortAccess::hand_over(*node->outputs()[1], &*last_pose);
+  node->start(0);
+  test::BoxWriter<Motion> out(*node->outputs()[0]);
+  test::BoxWriter<Pose> pose(*node->outputs()[1]);
+  test::Box<StereoPair> pair(kSize);
+  test::Box<DisparityMap> map(kSize);
+  render(*pair, *map, 0);
+  test::latch(pair_port, pair, 1'400'000'000, 1);
+  test::latch(map_port, map, 1'400'000'000, 1);
+  CHECK(test::run(*node));
+  CHECK(out.message().valid == 0);
+  CHECK(out.message().keyframe == 0);
+  CHECK(pose.message().transform.x == 7);
+  CHECK(pose.message().covariance[0] == doctest::Approx(0.01 + 0.16 * 0.16));
+}
+
+TEST_CASE("ego_motion wants the odometry connected that it shall predict from") {
+  NodeTypes types;
+  register_ego_motion(types);
+  const auto node = types.find("ego_motion")->make();
+  PortAccess::connect(test::input(*node, "pair"), kSize);
+  PortAccess::connect(test::input(*node, "disparity"), kSize);
+  test::set(*node, "predict", std::string("odometry"));
+  CHECK_THROWS_WITH_AS(test::set_up(*node), doctest::Contains("input odometry is not connected"), SetupError);
 }
