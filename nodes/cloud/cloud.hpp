@@ -12,9 +12,9 @@ namespace takt::cloud {
 /// Points with a coordinate that is not finite or beyond this are never kept and never counted.
 constexpr float kFarthest_m = 1e6f;
 
-inline bool usable(const Point& p) {
+inline bool usable(const Point& p, float farthest_m = kFarthest_m) {
   // Written so that NaN fails.
-  return std::abs(p.x) <= kFarthest_m && std::abs(p.y) <= kFarthest_m && std::abs(p.z) <= kFarthest_m;
+  return std::abs(p.x) <= farthest_m && std::abs(p.y) <= farthest_m && std::abs(p.z) <= farthest_m;
 }
 
 /// A cloud to read. Without colours where there is not one for each point.

@@ -3,8 +3,6 @@
 
 #include <algorithm>
 
-#include "nodes/cloud/cloud.hpp"
-
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "nodes/cloud/count_kernel.cpp"
 #include <hwy/foreach_target.h>  // must come before highway.h
@@ -55,8 +53,8 @@ class Queries {
   Counts count_;
 };
 
-Bounds BoundsOf(const Point* points, size_t count) {
-  const Floats farthest = hn::Set(kFloats, kFarthest_m);
+Bounds BoundsOf(const Point* points, size_t count, float farthest_m) {
+  const Floats farthest = hn::Set(kFloats, farthest_m);
   Floats low[3], high[3];
   for (int a = 0; a < 3; ++a) low[a] = farthest, high[a] = hn::Neg(farthest);
   Bounds bounds{};
@@ -126,7 +124,9 @@ namespace takt::cloud {
 HWY_EXPORT(BoundsOf);
 HWY_EXPORT(Decide);
 
-Bounds bounds_of(std::span<const Point> points) { return HWY_DYNAMIC_DISPATCH(BoundsOf)(points.data(), points.size()); }
+Bounds bounds_of(std::span<const Point> points, float farthest_m) {
+  return HWY_DYNAMIC_DISPATCH(BoundsOf)(points.data(), points.size(), farthest_m);
+}
 
 void decide(const SortedPoint* points, std::span<const Run> runs, Run queries, float radius2, uint32_t needed,
             uint8_t* pass) {

@@ -3,17 +3,9 @@
 #include <cstdint>
 #include <span>
 
-#include "rt/msg/messages.hpp"
+#include "nodes/cloud/cell_sort.hpp"
 
 namespace takt::cloud {
-
-/// A point and where in its cloud it came from.
-struct SortedPoint {
-  float x, y, z;
-  uint32_t index;
-};
-/// So many sorted points past the last may be read.
-constexpr size_t kReadAhead = 32;
 
 /// Indices first .. last - 1.
 struct Run {
@@ -26,12 +18,13 @@ struct Bounds {
   size_t points = 0;
 };
 
-/// Of the points that are usable().
-Bounds bounds_of(std::span<const Point> points);
+/// Of the points none of whose coordinates is beyond `farthest_m` or no number.
+Bounds bounds_of(std::span<const Point> points, float farthest_m);
 
-/// For each point of `queries`: pass[i] = 1 if at least `needed` points of the runs lie within the radius (itself
-/// included, if a run holds it). (dx dx + dy dy) + dz dz <= radius2, each operation rounded to float: every SIMD target
-/// decides alike. Counting ends once neighbouring queries all have enough, so the runs that hold most come first.
+/// `points` may be read up to CellSort::kReadAhead past the last query. For each point of `queries`: pass[i] = 1 if at
+/// least `needed` points of the runs lie within the radius (itself included, if a run holds it). (dx dx + dy dy) + dz
+/// dz <= radius2, each operation rounded to float: every SIMD target decides alike. Counting ends once neighbouring
+/// queries all have enough, so the runs that hold most come first.
 void decide(const SortedPoint* points, std::span<const Run> runs, Run queries, float radius2, uint32_t needed,
             uint8_t* pass);
 

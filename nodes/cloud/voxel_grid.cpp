@@ -4,19 +4,17 @@
 #include <algorithm>
 #include <bit>
 #include <stdexcept>
-#include <utility>
+
+#include "nodes/cloud/count_kernel.hpp"
 
 namespace takt::cloud {
 namespace {
 
-constexpr uint32_t kBitsOfVoxel = 6;             // 64 voxels a brick
 constexpr size_t kMostPoints = size_t{1} << 24;  // their colours add up in 32 bits
-// A key holds the brick's three coordinates in 21 bits each, moved up so that none is negative and a step of two bricks
-// never carries from one into the next.
 constexpr int kKeyBits = 21;
 constexpr int32_t kMiddle = 1 << (kKeyBits - 1);
 constexpr double kFarthestVoxel = 4e6;
-static_assert(kFarthestVoxel / VoxelGrid::kBrick + 3 < kMiddle);
+static_assert(kFarthestVoxel / VoxelGrid::kBrick + 3 < kMiddle);  // a step of two bricks never carries between axes
 
 constexpr uint64_t step(int x, int y, int z) {
   return static_cast<uint64_t>(x) + (static_cast<uint64_t>(y) << kKeyBits) + (static_cast<uint64_t>(z) << 2 * kKeyBits);
@@ -24,11 +22,15 @@ constexpr uint64_t step(int x, int y, int z) {
 
 uint64_t key_of(const VoxelIndex& v) { return step((v.x >> 2) + kMiddle, (v.y >> 2) + kMiddle, (v.z >> 2) + kMiddle); }
 
+constexpr uint32_t axis_of(uint64_t key, int axis) {
+  return static_cast<uint32_t>(key >> axis * kKeyBits) & ((1u << kKeyBits) - 1);
+}
+
 VoxelIndex first_voxel_of(uint64_t key) {
-  const auto coordinate = [&](int shift) {
-    return (static_cast<int32_t>(key >> shift & ((1u << kKeyBits) - 1)) - kMiddle) * VoxelGrid::kBrick;
+  const auto coordinate = [&](int axis) {
+    return (static_cast<int32_t>(axis_of(key, axis)) - kMiddle) * VoxelGrid::kBrick;
   };
-  return {coordinate(0), coordinate(kKeyBits), coordinate(2 * kKeyBits)};
+  return {coordinate(0), coordinate(1), coordinate(2)};
 }
 
 uint32_t bit_of(const VoxelIndex& v) { return static_cast<uint32_t>((v.x & 3) | (v.y & 3) << 2 | (v.z & 3) << 4); }
@@ -64,8 +66,8 @@ uint8_t rounded(double sum, double weight) { return static_cast<uint8_t>(sum / w
 
 }  // namespace
 
-const std::array<uint64_t, VoxelGrid::kDirections> VoxelGrid::kSteps = [] {
-  std::array<uint64_t, kDirections> steps{};
+const std::array<VoxelGrid::Key, VoxelGrid::kDirections> VoxelGrid::kSteps = [] {
+  std::array<Key, kDirections> steps{};
   for (size_t d = 0; d < kDirections; ++d) steps[d] = step(kNeighbours[d].x, kNeighbours[d].y, kNeighbours[d].z);
   return steps;
 }();
@@ -102,82 +104,101 @@ Point WeightedMean::point() const {
 
 Colour WeightedMean::colour() const { return {rounded(b_, weight_), rounded(g_, weight_), rounded(r_, weight_)}; }
 
-std::optional<VoxelIndex> voxel_of(const Point& point, double edge_m) {
-  const double x = static_cast<double>(point.x) / edge_m, y = static_cast<double>(point.y) / edge_m,
-               z = static_cast<double>(point.z) / edge_m;
-  // Written so that NaN fails.
-  if (!(std::abs(x) < kFarthestVoxel && std::abs(y) < kFarthestVoxel && std::abs(z) < kFarthestVoxel))
-    return std::nullopt;
-  const auto whole = [](double v) {  // rounded down; std::floor is a call on old targets
-    const auto towards_zero = static_cast<int32_t>(v);
-    return towards_zero - (v < towards_zero ? 1 : 0);
-  };
-  return VoxelIndex{whole(x), whole(y), whole(z)};
-}
+VoxelSize::VoxelSize(double edge_m)
+    : edge_m_(edge_m),
+      per_m_(1 / edge_m),
+      farthest_m_(static_cast<float>(std::min(static_cast<double>(kFarthest_m), kFarthestVoxel * edge_m))) {}
 
-std::array<double, 3> centre_of(const VoxelIndex& voxel, double edge_m) {
-  return {(voxel.x + 0.5) * edge_m, (voxel.y + 0.5) * edge_m, (voxel.z + 0.5) * edge_m};
-}
-
-VoxelGrid::VoxelGrid(size_t capacity)
-    : brick_of_(capacity), table_(std::bit_ceil(2 * capacity + 2)), bricks_(capacity), voxels_(capacity) {
+VoxelGrid::VoxelGrid(size_t capacity) : cells_(capacity), bricks_(capacity), voxels_(capacity) {
   if (capacity > kMostPoints) throw std::invalid_argument("a voxel grid holds at most 2^24 points");
 }
 
-uint32_t VoxelGrid::find(uint64_t key) const {
-  const size_t mask = (size_t{1} << (64 - shift_)) - 1;
-  for (size_t at = key * 0x9E3779B97F4A7C15u >> shift_;; at = (at + 1) & mask)
-    if (table_[at] == kEmpty || bricks_[table_[at]].key == key) return table_[at];
-}
-
-uint32_t VoxelGrid::find_or_add(uint64_t key) {
-  const size_t mask = (size_t{1} << (64 - shift_)) - 1;
-  size_t at = key * 0x9E3779B97F4A7C15u >> shift_;
-  for (; table_[at] != kEmpty; at = (at + 1) & mask)
-    if (bricks_[table_[at]].key == key) return table_[at];
-  bricks_[brick_count_] = {key, 0, 0};
-  return table_[at] = brick_count_++;
-}
-
 void VoxelGrid::fill(const CloudView& cloud, double edge_m) {
-  edge_m_ = edge_m;
+  size_ = VoxelSize(edge_m);
   const size_t count = std::min(cloud.points.size(), capacity());
   lost_ = cloud.points.size() - count;
-  unusable_ = 0;
   brick_count_ = voxel_count_ = 0;
-  const size_t table = std::bit_ceil(2 * count + 2);
-  shift_ = 64 - std::countr_zero(table);
-  std::fill_n(table_.begin(), table, kEmpty);
+  sort(cloud.points.first(count));
+  const auto start = cells_.start();
+  uint32_t first_point = 0;
+  for (uint32_t bucket = 0; bucket < layout_.buckets; ++bucket) {
+    const uint32_t last_point = start[bucket + 1];
+    start[bucket] = brick_count_;
+    if (first_point == last_point) continue;
+    const std::span points(cells_.points() + first_point, last_point - first_point);
+    add_bricks(points);
+    add_voxels(points, start[bucket], cloud);
+    first_point = last_point;
+  }
+  start[layout_.buckets] = brick_count_;
+}
 
-  uint64_t last_key = 0;  // no brick has it
-  uint32_t brick = 0;
-  for (size_t i = 0; i < count; ++i) {
-    const auto voxel = voxel_of(cloud.points[i], edge_m);
-    brick_of_[i] = kEmpty;
-    if (!voxel) {
-      ++unusable_;
-      continue;
-    }
-    if (const uint64_t key = key_of(*voxel); key != last_key) {  // neighbours in the cloud are neighbours in space
-      brick = find_or_add(key);
-      last_key = key;
-    }
-    const uint32_t bit = bit_of(*voxel);
-    bricks_[brick].occupied |= uint64_t{1} << bit;
-    brick_of_[i] = brick << kBitsOfVoxel | bit;
+void VoxelGrid::sort(std::span<const Point> points) {
+  const Bounds bounds = bounds_of(points, size_.farthest_m());
+  unusable_ = points.size() - bounds.points;
+  const Point low{bounds.low[0], bounds.low[1], bounds.low[2]}, high{bounds.high[0], bounds.high[1], bounds.high[2]};
+  const Key first = bounds.points > 0 ? key_of(size_.voxel_of(low)) : 0,
+            last = bounds.points > 0 ? key_of(size_.voxel_of(high)) : 0;
+  // Two empty bricks on each side: what is asked for there lies in the layout.
+  constexpr uint32_t kBorder = 2;
+  double cells[3];
+  for (int a = 0; a < 3; ++a) cells[a] = axis_of(last, a) - axis_of(first, a) + 1 + 2 * kBorder;
+  layout_ = cells_.layout(cells, points.size());
+  first_bucket_ = (kBorder - axis_of(first, 0)) + (kBorder - axis_of(first, 1)) * layout_.row +
+                  (kBorder - axis_of(first, 2)) * layout_.layer;
+  for (size_t d = 0; d < kDirections; ++d)
+    bucket_steps_[d] = static_cast<uint32_t>(kNeighbours[d].x) + static_cast<uint32_t>(kNeighbours[d].y) * layout_.row +
+                       static_cast<uint32_t>(kNeighbours[d].z) * layout_.layer;
+  cells_.sort(points, layout_, [this](const Point& p) {
+    return size_.holds(p) ? bucket_of(key_of(size_.voxel_of(p))) : layout_.buckets;
+  });
+}
+
+/// The bricks of the points of one bucket.
+void VoxelGrid::add_bricks(std::span<const SortedPoint> points) {
+  const uint32_t first_brick = brick_count_;
+  for (const SortedPoint& p : points) {
+    const VoxelIndex voxel = size_.voxel_of({p.x, p.y, p.z});
+    uint32_t brick = find(key_of(voxel), first_brick, brick_count_);
+    if (brick == kNone) bricks_[brick = brick_count_++] = {key_of(voxel), 0, 0};
+    bricks_[brick].occupied |= uint64_t{1} << bit_of(voxel);
   }
-  for (uint32_t b = 0; b < brick_count_; ++b) {
-    bricks_[b].first_voxel = voxel_count_;
-    voxel_count_ += static_cast<uint32_t>(std::popcount(bricks_[b].occupied));
+  // Bricks that share a bucket must not be in the order of the points.
+  const auto added = std::span(bricks_).subspan(first_brick, brick_count_ - first_brick);
+  if (added.size() > 1)
+    std::sort(added.begin(), added.end(), [](const Brick& a, const Brick& b) { return a.key < b.key; });
+  for (Brick& brick : added) {
+    brick.first_voxel = voxel_count_;
+    voxel_count_ += static_cast<uint32_t>(std::popcount(brick.occupied));
   }
-  std::fill_n(voxels_.begin(), voxel_count_, Voxel{});
-  for (size_t i = 0; i < count; ++i) {
-    if (brick_of_[i] == kEmpty) continue;
-    const Brick& b = bricks_[brick_of_[i] >> kBitsOfVoxel];
-    const uint64_t before = (uint64_t{1} << (brick_of_[i] & 63)) - 1;
-    voxels_[b.first_voxel + static_cast<uint32_t>(std::popcount(b.occupied & before))].add(
-        cloud.points[i], cloud.coloured() ? cloud.colours[i] : Colour{});
+}
+
+/// The voxels of the points of one bucket, whose bricks are there.
+void VoxelGrid::add_voxels(std::span<const SortedPoint> points, uint32_t first_brick, const CloudView& cloud) {
+  std::fill(voxels_.begin() + bricks_[first_brick].first_voxel, voxels_.begin() + voxel_count_, Voxel{});
+  for (const SortedPoint& p : points) {
+    const VoxelIndex voxel = size_.voxel_of({p.x, p.y, p.z});
+    const Brick& brick = bricks_[find(key_of(voxel), first_brick, brick_count_)];
+    const uint64_t before = (uint64_t{1} << bit_of(voxel)) - 1;
+    voxels_[brick.first_voxel + static_cast<uint32_t>(std::popcount(brick.occupied & before))].add(
+        {p.x, p.y, p.z}, cloud.coloured() ? cloud.colours[p.index] : Colour{});
   }
+}
+
+uint32_t VoxelGrid::bucket_of(Key key) const {
+  return layout_.wrapped(first_bucket_ + layout_.bucket(axis_of(key, 0), axis_of(key, 1), axis_of(key, 2)));
+}
+
+uint32_t VoxelGrid::find(Key key, uint32_t first_brick, uint32_t last_brick) const {
+  for (uint32_t b = first_brick; b < last_brick; ++b)
+    if (bricks_[b].key == key) return b;
+  return kNone;
+}
+
+/// The neighbour of the brick, which is there or not, of that key and bucket.
+uint32_t VoxelGrid::find_neighbour(Key key, uint32_t bucket, size_t direction) const {
+  const uint32_t there = layout_.wrapped(bucket + bucket_steps_[direction]);
+  return find(key + kSteps[direction], cells_.start()[there], cells_.start()[there + 1]);
 }
 
 void VoxelGrid::average() {
@@ -187,34 +208,48 @@ void VoxelGrid::average() {
   }
 }
 
-// True if the brick's points touch an empty brick in that direction, and no brick in an earlier direction from there
-// does as well: so each empty brick is visited once.
-bool VoxelGrid::reaches_empty(uint32_t brick, size_t direction) const {
-  if ((bricks_[brick].occupied & kFacing[direction]) == 0) return false;
-  const uint64_t key = bricks_[brick].key + kSteps[direction];
-  if (find(key) != kEmpty) return false;
-  for (size_t d = 0; d < kDirections; ++d) {
-    const uint32_t other = find(key + kSteps[d]);
-    if (other != kEmpty && (bricks_[other].occupied & kFacing[kDirections - 1 - d]) != 0) return other == brick;
-  }
-  return false;
+// The empty neighbours of a brick that its points touch; the brick is loaded.
+uint32_t VoxelGrid::empty_reached(uint32_t brick) const {
+  uint32_t reached = 0;
+  for (size_t d = 0; d < kDirections; ++d)
+    if ((bricks_[brick].occupied & kFacing[d]) != 0) reached |= 1u << d;
+  return reached & block_.empty_neighbours_;
 }
 
-void VoxelGrid::load(uint64_t key) {
+// Of the bricks whose points touch an empty one, the first in the order of directions: so each is visited once.
+uint32_t VoxelGrid::first_to_reach(Key key) const {
+  const uint32_t bucket = bucket_of(key);
+  for (size_t d = 0; d < kDirections; ++d) {
+    const uint32_t brick = find_neighbour(key, bucket, d);
+    if (brick != kNone && (bricks_[brick].occupied & kFacing[kDirections - 1 - d]) != 0) return brick;
+  }
+  return kNone;
+}
+
+void VoxelGrid::load(Key key) {
   block_.origin_ = first_voxel_of(key);
-  block_.voxels_.fill(kEmpty);
-  const auto load_brick = [&](uint64_t at, const Direction& d) {
-    const uint32_t found = find(at);
-    if (found == kEmpty) return;
-    uint32_t voxel = bricks_[found].first_voxel;
-    for (uint64_t rest = bricks_[found].occupied; rest != 0; rest &= rest - 1) {
-      const int bit = std::countr_zero(rest);
-      block_.voxels_[static_cast<size_t>(
-          Block::place(d.x * kBrick + (bit & 3), d.y * kBrick + (bit >> 2 & 3), d.z * kBrick + (bit >> 4)))] = voxel++;
-    }
-  };
-  load_brick(key, {0, 0, 0});
-  for (size_t d = 0; d < kDirections; ++d) load_brick(key + kSteps[d], kNeighbours[d]);
+  block_.rows_.fill(0);
+  block_.empty_neighbours_ = 0;
+  const uint32_t bucket = bucket_of(key);
+  if (const uint32_t own = find(key, cells_.start()[bucket], cells_.start()[bucket + 1]); own != kNone)
+    load_brick(bricks_[own], 0, 0, 0);
+  for (size_t d = 0; d < kDirections; ++d) {
+    const uint32_t brick = find_neighbour(key, bucket, d);
+    if (brick == kNone) block_.empty_neighbours_ |= 1u << d;
+    else load_brick(bricks_[brick], kNeighbours[d].x, kNeighbours[d].y, kNeighbours[d].z);
+  }
+}
+
+/// So many bricks away from the middle of the block.
+void VoxelGrid::load_brick(const Brick& brick, int x, int y, int z) {
+  uint32_t voxel = brick.first_voxel;
+  for (uint64_t rest = brick.occupied; rest != 0; rest &= rest - 1) {
+    const int bit = std::countr_zero(rest);
+    const VoxelIndex v{x * kBrick + (bit & 3), y * kBrick + (bit >> 2 & 3), z * kBrick + (bit >> 4)};
+    uint16_t& row = block_.rows_[Block::row(v.y, v.z)];
+    row = static_cast<uint16_t>(row | 1 << (v.x + kBrick));
+    block_.voxels_[Block::place(v.x, v.y, v.z)] = voxel++;
+  }
 }
 
 }  // namespace takt::cloud

@@ -19,9 +19,10 @@ using Voxels = std::unordered_map<VoxelIndex, Voxel, Hash>;
 
 Voxels sorted_into_voxels(const CloudView& cloud, double edge_m) {
   Voxels voxels;
+  const VoxelSize size(edge_m);
   for (size_t i = 0; i < cloud.points.size(); ++i)
-    if (const auto index = voxel_of(cloud.points[i], edge_m))
-      voxels[*index].add(cloud.points[i], cloud.coloured() ? cloud.colours[i] : Colour{});
+    if (size.holds(cloud.points[i]))
+      voxels[size.voxel_of(cloud.points[i])].add(cloud.points[i], cloud.coloured() ? cloud.colours[i] : Colour{});
   return voxels;
 }
 
@@ -96,7 +97,7 @@ Cloud interpolate_reference(const CloudView& cloud, const InterpolateParameters&
     int neighbours = 0;
     for_each_around(gap, 1, [&](const VoxelIndex& near) { neighbours += static_cast<int>(voxels.count(near)); });
     if (voxels.count(gap) != 0 || neighbours < parameters.n_adj) continue;
-    const auto centre = centre_of(gap, parameters.edge_m);
+    const auto centre = VoxelSize(parameters.edge_m).centre_of(gap);
     std::vector<Candidate> near;
     for_each_around(gap, static_cast<int>(std::ceil(parameters.reach)) + 1, [&](const VoxelIndex& index) {
       const auto found = voxels.find(index);

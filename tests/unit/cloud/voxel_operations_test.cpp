@@ -19,7 +19,7 @@ namespace {
 constexpr double kEdge = 0.5;  // a binary fraction, so that means of voxel centres are exact
 
 Point at(int x, int y, int z) {
-  const auto centre = centre_of({x, y, z}, kEdge);
+  const auto centre = VoxelSize(kEdge).centre_of({x, y, z});
   return {static_cast<float>(centre[0]), static_cast<float>(centre[1]), static_cast<float>(centre[2])};
 }
 
@@ -41,8 +41,8 @@ struct Result {
   std::multiset<int> layers() const {
     std::multiset<int> found;
     for (const Point& p : buffer.view().points) {
-      const auto voxel = voxel_of(p, kEdge);
-      if (voxel->x == 0 && voxel->y == 0) found.insert(voxel->z);
+      const auto voxel = VoxelSize(kEdge).voxel_of(p);
+      if (voxel.x == 0 && voxel.y == 0) found.insert(voxel.z);
     }
     return found;
   }
@@ -82,7 +82,7 @@ TEST_CASE("smoothing leaves a plane where it is and flattens a bump") {
   points[points.size() / 2].z += 0.1f;  // the middle one, within its voxel
   const Result bump = smoothed(points, 0.25);
   for (const Point& p : bump.buffer.view().points)
-    if (voxel_of(p, kEdge) == takt::cloud::VoxelIndex{0, 0, 0})
+    if (VoxelSize(kEdge).voxel_of(p) == VoxelIndex{0, 0, 0})
       CHECK(p.z == doctest::Approx(static_cast<double>(at(0, 0, 0).z) + 0.1 * 10 / 26));
 }
 
@@ -110,16 +110,16 @@ TEST_CASE("reduction gives mean position and colour, in a settled order") {
   Result result(points.size());
   reduce(grid, result.buffer);
   REQUIRE(result.buffer.size() == 5);
-  // The brick of the first point first; in the next one by z, then y, then x; the one with negative x last.
-  CHECK(result.points[0].x == doctest::Approx(5.2));
-  CHECK(result.points[0].y == doctest::Approx(0.2));
-  CHECK(result.colours[0].b == 2);  // 1.67
-  CHECK(result.colours[0].r == 20);
+  // Brick by brick, in each by z, then y, then x: whatever the order of the points.
+  CHECK(result.points[0].x == -0.1f);
+  CHECK(result.colours[0].g == 4);
   CHECK(result.points[1].x == 0.3f);
   CHECK(result.points[2].y == 0.6f);
   CHECK(result.points[3].z == 0.6f);
-  CHECK(result.points[4].x == -0.1f);
-  CHECK(result.colours[4].g == 4);
+  CHECK(result.points[4].x == doctest::Approx(5.2));
+  CHECK(result.points[4].y == doctest::Approx(0.2));
+  CHECK(result.colours[4].b == 2);  // 1.67
+  CHECK(result.colours[4].r == 20);
 }
 
 TEST_CASE("interpolation closes a hole with the weighted mean of its nearest points") {
@@ -191,11 +191,13 @@ TEST_CASE("what has no place or no room is counted") {
 }
 
 TEST_CASE("voxels begin at multiples of their edge, on either side of the origin") {
-  using takt::cloud::VoxelIndex;
-  CHECK(voxel_of({0, 0.49f, 0.5f}, 0.5) == VoxelIndex{0, 0, 1});
-  CHECK(voxel_of({-0.0f, -0.01f, -0.5f}, 0.5) == VoxelIndex{0, -1, -1});
-  CHECK(voxel_of({-0.51f, 1999999, 0}, 0.5) == VoxelIndex{-2, 3999998, 0});
-  CHECK_FALSE(voxel_of({0, 2e6f, 0}, 0.5));
+  const VoxelSize size(0.5);
+  CHECK(size.voxel_of({0, 0.49f, 0.5f}) == VoxelIndex{0, 0, 1});
+  CHECK(size.voxel_of({-0.0f, -0.01f, -0.5f}) == VoxelIndex{0, -1, -1});
+  CHECK(size.voxel_of({-0.51f, 999999, 0}) == VoxelIndex{-2, 1999998, 0});
+  CHECK(size.holds({0, 1e6f, -1e6f}));
+  CHECK_FALSE(size.holds({0, 0, 1.1e6f}));
+  CHECK_FALSE(VoxelSize(0.01).holds({0, 0, 40001}));
 }
 
 TEST_CASE("no operation on voxels allocates") {
