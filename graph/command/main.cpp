@@ -5,6 +5,7 @@
 
 #include "graph/command/attach_commands.hpp"
 #include "graph/command/check_command.hpp"
+#include "graph/command/cloud_command.hpp"
 #include "graph/command/doctor_command.hpp"
 #include "graph/command/eval_command.hpp"
 #include "graph/command/explain_command.hpp"
@@ -138,6 +139,7 @@ int main(int argc, char** argv) {
   takt::command::EvalGroundOptions ground;
   takt::command::ReplayOptions replay;
   takt::command::LogOptions log;
+  takt::command::CloudOptions cloud;
   std::string type;
   bool check_json = false;
   int exit_code = 0;
@@ -159,6 +161,7 @@ int main(int argc, char** argv) {
   add_profile(app, profile, exit_code);
   takt::command::add_replay(app, replay, exit_code);
   takt::command::add_log(app, log, exit_code);
+  takt::command::add_cloud(app, cloud, exit_code);
   CLI::App* eval = app.add_subcommand("eval", "measures quality against ground truth");
   eval->require_subcommand(1);
   takt::command::add_eval_stereo(*eval, stereo, exit_code);

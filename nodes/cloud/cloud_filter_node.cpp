@@ -32,6 +32,10 @@ class Line {
 class CloudFilterNode final : public Node {
  public:
   void setup(Setup&) override {
+    for (const Param<double>* length : {&outlier_radius_, &interpolate_, &smooth_, &reduce_})
+      if (*length > 0 && *length < kShortest_m)
+        throw SetupError(std::string(length->name()) + " is " + length->value_text() +
+                         " m, must be 0 (none) or at least 0.001 m");
     FilterSteps steps;
     steps.outliers = {outlier_radius_, outlier_n_min_};
     steps.n_min_points = kPointsOfNMin;
@@ -79,6 +83,7 @@ class CloudFilterNode final : public Node {
 
  private:
   static constexpr size_t kPointsOfNMin = 1'200'000;
+  static constexpr double kShortest_m = 1e-3;
   static constexpr uint32_t kStatusCharacters = 160;
 
   Input<PointCloud> in_{this, "cloud", "points in any frame; the newest one is filtered, once"};
