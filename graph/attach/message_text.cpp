@@ -5,6 +5,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include "nodes/cloud/cloud_file.hpp"
 #include "nodes/picture/draw.hpp"
 #include "rt/msg/messages.hpp"
 #include "rt/msg/scalar.hpp"
@@ -89,6 +90,12 @@ std::optional<std::string> message_png(const MessageType& type, const void* mess
   std::vector<uint8_t> png;
   if (image.empty() || !cv::imencode(".png", image, png, {cv::IMWRITE_PNG_COMPRESSION, 1})) return std::nullopt;
   return std::string(png.begin(), png.end());
+}
+
+std::optional<std::string> message_ply(const MessageType& type, const void* message) {
+  if (type.name != PointCloud::type_name) return std::nullopt;
+  const auto& cloud = *static_cast<const PointCloud*>(message);
+  return cloud::ply_of({cloud.points.items(), cloud.colours.items()}, cloud::Encoding::binary);
 }
 
 }  // namespace takt::attach

@@ -16,4 +16,7 @@ nlohmann::ordered_json message_json(const MessageType& type, const void* message
 /// Nothing if its type cannot be seen.
 std::optional<std::string> message_png(const MessageType& type, const void* message);
 
+/// A point cloud as a binary PLY file, in the frame of its sensor. Nothing if the message is none.
+std::optional<std::string> message_ply(const MessageType& type, const void* message);
+
 }  // namespace takt::attach

@@ -175,12 +175,12 @@ bool Server::echo(const Json& question, Connection& connection) {
     return connection.write(wrong(fmt::format("there is no output {}{}", graph::ticked(name),
                                               graph::alternatives(name, known, "outputs of this graph"))));
   }
-  const bool picture = question.value("png", false);
+  const std::string as = question.value("as", "");
   const Json count = question.value("count", Json(1));
   if (!count.is_number_integer()) return connection.write(wrong("count is no whole number"));
   const auto tap = claim_tap(port);
   if (!tap) return connection.write(wrong("somebody else listens to " + name + " already"));
-  return stream(port, picture, count.get<int64_t>(), connection);
+  return stream(port, as, count.get<int64_t>(), connection);
 }
 
 std::shared_ptr<void> Server::claim_tap(size_t port) {
@@ -192,7 +192,7 @@ std::shared_ptr<void> Server::claim_tap(size_t port) {
           }};
 }
 
-bool Server::stream(size_t port, bool picture, int64_t count, Connection& connection) {
+bool Server::stream(size_t port, const std::string& as, int64_t count, Connection& connection) {
   const PortPlan& plan = subject_.plan.ports[port];
   const auto reader = subject_.transport.make_reader(port);
   uint64_t seen = 0;
@@ -213,14 +213,16 @@ bool Server::stream(size_t port, bool picture, int64_t count, Connection& connec
               {"stamp_ns", held.stamp_ns},
               {"age_ms", static_cast<double>(now_ns() - held.stamp_ns) / 1e6},
               {"message", message_json(*plan.type, held.message())}};
-    const auto png = picture ? message_png(*plan.type, held.message()) : std::nullopt;
+    const auto file = as == "png"   ? message_png(*plan.type, held.message())
+                      : as == "ply" ? message_ply(*plan.type, held.message())
+                                    : std::string();
     seen = held.sequence;
     holding.reset();
-    if (picture && !png)
-      return connection.write(
-          wrong(fmt::format("a message of type {} is no picture; leave --png out", plan.type->name)));
-    line["bytes"] = png ? png->size() : 0;
-    if (!connection.write(line, png.value_or(""))) return false;
+    if (!file)
+      return connection.write(wrong(fmt::format("a message of type {} is no {}; leave --{} out", plan.type->name,
+                                                as == "png" ? "picture" : "point cloud", as)));
+    line["bytes"] = file->size();
+    if (!connection.write(line, *file)) return false;
     ++sent;
   }
   return true;

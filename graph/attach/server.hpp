@@ -51,7 +51,8 @@ class Server {
   bool echo(const nlohmann::ordered_json& question, Connection& connection);
   /// The right to listen to an output, given back when it is dropped; null while somebody else has it.
   std::shared_ptr<void> claim_tap(size_t port);
-  bool stream(size_t port, bool picture, int64_t count, Connection& connection);
+  /// `as`: "png", "ply" or "", for text alone.
+  bool stream(size_t port, const std::string& as, int64_t count, Connection& connection);
   nlohmann::ordered_json change_mode(const std::string& name);
   nlohmann::ordered_json set(const std::string& name, const std::string& text);
   nlohmann::ordered_json post_and_wait(size_t task, size_t param, const ParamValue& value);

@@ -95,20 +95,20 @@ int run_top(const AttachOptions& options) {
 int run_echo(const AttachOptions& options) {
   auto connection = attached(options);
   if (!connection) return kDeviceOrSystem;
-  const bool picture = !options.png.empty();
+  const std::string as = !options.png.empty() ? "png" : !options.ply.empty() ? "ply" : "";
+  const std::filesystem::path& path = as == "png" ? options.png : options.ply;
   Json answer;
-  int code =
-      ask(*connection, {{"do", "echo"}, {"port", options.port}, {"png", picture}, {"count", options.count}}, answer);
+  int code = ask(*connection, {{"do", "echo"}, {"port", options.port}, {"as", as}, {"count", options.count}}, answer);
   for (int64_t shown = 0; code == kOk; ++shown) {
     const size_t bytes = answer.value("bytes", size_t{0});
     answer.erase("bytes");
     std::printf("%s\n", answer.dump(2).c_str());
     std::fflush(stdout);
     if (bytes > 0) {
-      const auto png = connection->read_bytes(bytes);
-      std::ofstream out(options.png, std::ios::binary);
-      if (!png || !(out << *png))
-        return refuse(fmt::format("{} cannot be written; choose another --png", options.png.string()), kBadInput);
+      const auto file = connection->read_bytes(bytes);
+      std::ofstream out(path, std::ios::binary);
+      if (!file || !(out << *file))
+        return refuse(fmt::format("{} cannot be written; choose another --{}", path.string(), as), kBadInput);
     }
     if (shown + 1 == options.count) return kOk;
     const auto line = connection->read_line();
@@ -140,7 +140,8 @@ void add_attach_commands(CLI::App& app, AttachOptions& o, int& exit_code) {
   top->callback([&] { exit_code = understood([&] { return run_top(o); }); });
   CLI::App* echo = add(app, "echo", "shows messages of a running graph", o);
   echo->add_option("port", o.port, "NODE.PORT")->required();
-  echo->add_option("--png", o.png, "writes the message as a picture");
+  CLI::Option* png = echo->add_option("--png", o.png, "writes the message as a picture");
+  echo->add_option("--ply", o.ply, "writes the message, a point cloud, as a PLY file")->excludes(png);
   echo->add_option("--count", o.count, "how many messages")->check(CLI::PositiveNumber);
   echo->callback([&] { exit_code = understood([&] { return run_echo(o); }); });
   CLI::App* set = add(app, "set", "sets a parameter of a running node, between two of its jobs", o);

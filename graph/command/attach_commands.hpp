@@ -11,7 +11,7 @@ struct AttachOptions {
   int run = 0;  ///< process id; 0: the only one that runs
   bool once = false, json = false;
   std::string port, param, value, mode;
-  std::filesystem::path png;
+  std::filesystem::path png, ply;  ///< of echo: at most one
   int64_t count = 1;
 };
 

@@ -6,6 +6,7 @@
 #include "graph/command/attach_commands.hpp"
 #include "graph/command/calibrate_command.hpp"
 #include "graph/command/check_command.hpp"
+#include "graph/command/cloud_command.hpp"
 #include "graph/command/doctor_command.hpp"
 #include "graph/command/eval_command.hpp"
 #include "graph/command/explain_command.hpp"
@@ -140,6 +141,7 @@ int main(int argc, char** argv) {
   takt::command::EvalGroundOptions ground;
   takt::command::ReplayOptions replay;
   takt::command::LogOptions log;
+  takt::command::CloudOptions cloud;
   std::string type;
   bool check_json = false;
   int exit_code = 0;
@@ -162,6 +164,7 @@ int main(int argc, char** argv) {
   takt::command::add_replay(app, replay, exit_code);
   takt::command::add_log(app, log, exit_code);
   takt::command::add_calibrate(app, calibrate, exit_code);
+  takt::command::add_cloud(app, cloud, exit_code);
   CLI::App* eval = app.add_subcommand("eval", "measures quality against ground truth");
   eval->require_subcommand(1);
   takt::command::add_eval_stereo(*eval, stereo, exit_code);

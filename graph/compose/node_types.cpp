@@ -12,6 +12,7 @@ void register_picture(NodeTypes& types);
 void register_obstacle_stop(NodeTypes& types);
 void register_semantic(NodeTypes& types);
 void register_load(NodeTypes& types);
+void register_cloud_filter(NodeTypes& types);
 }  // namespace takt
 
 namespace takt::graph {
@@ -27,6 +28,7 @@ NodeTypes node_types() {
   register_obstacle_stop(types);
   register_semantic(types);
   register_load(types);
+  register_cloud_filter(types);
   return types;
 }
 

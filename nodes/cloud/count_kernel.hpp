@@ -3,6 +3,8 @@
 #include <cstdint>
 #include <span>
 
+#include "nodes/cloud/cell_sort.hpp"
+
 namespace takt::cloud {
 
 /// Indices first .. last - 1.
@@ -11,15 +13,19 @@ struct Run {
   uint32_t size() const { return last - first; }
 };
 
-/// Coordinates of sorted points; 64 floats past the last may be read.
-struct Coordinates {
-  const float *x, *y, *z;
+struct Bounds {
+  float low[3], high[3];
+  size_t points = 0;
 };
 
-/// For each point of `queries`: pass[i] = 1 if at least `needed` points of the runs lie within the radius (itself
-/// included, if a run holds it). (dx dx + dy dy) + dz dz <= radius2, each operation rounded to float: every SIMD target
-/// decides alike. Stops counting at `needed`.
-void decide(const Coordinates& points, std::span<const Run> runs, Run queries, float radius2, uint32_t needed,
+/// Of the points none of whose coordinates is beyond `farthest_m` or no number.
+Bounds bounds_of(std::span<const Point> points, float farthest_m);
+
+/// `points` may be read up to CellSort::kReadAhead past the last query. For each point of `queries`: pass[i] = 1 if at
+/// least `needed` points of the runs lie within the radius (itself included, if a run holds it). (dx dx + dy dy) + dz
+/// dz <= radius2, each operation rounded to float: every SIMD target decides alike. Counting ends once neighbouring
+/// queries all have enough, so the runs that hold most come first.
+void decide(const SortedPoint* points, std::span<const Run> runs, Run queries, float radius2, uint32_t needed,
             uint8_t* pass);
 
 /// Name of the SIMD target in use, for reports.

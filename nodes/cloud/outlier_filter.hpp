@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
+#include "nodes/cloud/cell_sort.hpp"
 #include "nodes/cloud/count_kernel.hpp"
-#include "rt/msg/messages.hpp"
 
 namespace takt::cloud {
 
@@ -19,41 +19,32 @@ struct OutlierParameters {
 /// n_min for a thinner cloud of the same scene: in proportion to the points, at least 1.
 int scaled_n_min(int n_min_full, size_t points, size_t points_full = 1200000);
 
-/// Points with a coordinate that is not finite or beyond this are never kept and never counted.
-constexpr float kFarthest_m = 1e6f;
-
 class OutlierFilter {
  public:
-  /// Takes the memory for clouds of up to `capacity` points (about 25 B a point); filter() allocates nothing.
+  /// Takes the memory for clouds of up to `capacity` points (29 to 37 B a point, and 1 MB at least); filter() allocates
+  /// nothing.
   explicit OutlierFilter(size_t capacity);
 
   /// keep[i] = 1 if points[i] has at least n_min others within the radius; returns how many. `keep` has the size of
   /// `points`. Points beyond the capacity are not kept. radius_m > 0.
   size_t filter(std::span<const Point> points, const OutlierParameters& parameters, std::span<uint8_t> keep);
-  size_t capacity() const { return x_.size() - kReadAhead; }
+  size_t capacity() const { return cells_.capacity(); }
+  /// Points of the last cloud that were not usable().
+  size_t unusable() const { return unusable_; }
 
   /// Slow, obvious version: every point against every other.
   static size_t filter_reference(std::span<const Point> points, const OutlierParameters& parameters,
                                  std::span<uint8_t> keep);
 
  private:
-  static constexpr size_t kReadAhead = 64;
-  /// Bucket of cell (x, y, z) = (x + y row + z layer) mod buckets. Cells of a small scene each get their own bucket; in
-  /// a vast one several may share it, which costs time but no exactness.
-  struct Layout {
-    double inverse_edge = 1;
-    double origin[3] = {};
-    uint32_t row = 1, layer = 1, mask = 0;
-  };
-  size_t load(std::span<const Point> points, double radius_m);
-  void sort(std::span<const Point> points);
-  uint32_t bucket_of(const Point& p) const;
-  size_t runs_around(uint32_t bucket, std::span<Run> runs) const;
+  static constexpr size_t kMostRuns = 22;
+  void sort(std::span<const Point> points, const Bounds& bounds, double radius_m);
+  uint32_t last_of_group(uint32_t first) const;
+  size_t runs_around(uint32_t first, uint32_t last, std::span<Run> runs) const;
 
-  Layout layout_;
-  std::vector<float> x_, y_, z_;  // sorted by bucket
-  std::vector<uint32_t> index_;   // where a sorted point came from
-  std::vector<uint32_t> bucket_, start_;
+  size_t unusable_ = 0;
+  CellSort cells_;
+  CellLayout layout_;
   std::vector<uint8_t> pass_;
 };
 

@@ -41,9 +41,13 @@ grep -q "stereo" "$work/top" || fail "top does not show stereo"
 expect 0 "" "$takt" echo stereo.disparity --png "$work/disparity.png" --run $first
 grep -q '"type": "disparity"' "$work/stdout" || fail "echo shows no disparity"
 head -c 4 "$work/disparity.png" | grep -q PNG || fail "echo wrote no PNG"
+expect 0 "" "$takt" echo stereo.cloud --ply "$work/cloud.ply" --run $first
+expect 0 "" "$takt" cloud "$work/cloud.ply" --reduce 0.1
+grep -q "coloured" "$work/stdout" || fail "echo wrote no coloured cloud"
 expect 0 "" "$takt" echo ego_motion.motion --count 3 --run $first
 expect 2 "did you mean \`stereo.disparity\`" "$takt" echo stereo.disparty --run $first
 expect 2 "is no picture" "$takt" echo ego_motion.motion --png "$work/x.png" --run $first
+expect 2 "is no point cloud" "$takt" echo ego_motion.motion --ply "$work/x.ply" --run $first
 expect 2 "must lie in" "$takt" set mapping_3d.n_abs 100000000 --run $first
 expect 2 "without a unit" "$takt" set mapping_3d.voxel 0.3 --run $first
 expect 2 "only before the start" "$takt" set mapping_3d.n_abs 6 --run $first

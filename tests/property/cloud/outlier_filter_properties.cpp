@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
+#include <hwy/targets.h>
 
 #include <random>
 #include <vector>
@@ -9,13 +10,16 @@
 using namespace takt::cloud;
 using takt::Point;
 
-TEST_CASE("the grid decides like every point against every other") {
+TEST_CASE("the grid decides like every point against every other, on every SIMD target") {
+  const std::vector<int64_t> targets = hwy::SupportedAndGeneratedTargets();
   std::mt19937 random(1);
   const auto uniform = [&](double low, double high) {
     return static_cast<float>(std::uniform_real_distribution<>(low, high)(random));
   };
   OutlierFilter filter(3000);  // one object for all rounds: nothing may be left over from a round
   for (int round = 0; round < 150; ++round) {
+    hwy::SetSupportedTargetsForTest(targets[static_cast<size_t>(round / 5) % targets.size()]);
+    CAPTURE(simd_target());
     const auto count = static_cast<size_t>(std::uniform_int_distribution<>(0, 1500)(random));
     // From crowded to a scene so vast that cells share buckets.
     const double extent[] = {0.3, 2, 20, 500, 20000};
@@ -39,4 +43,5 @@ TEST_CASE("the grid decides like every point against every other") {
     CHECK(kept == OutlierFilter::filter_reference(points, p, slow));
     CHECK(fast == slow);
   }
+  hwy::SetSupportedTargetsForTest(0);
 }

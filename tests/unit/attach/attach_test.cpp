@@ -109,6 +109,14 @@ TEST_CASE("every message type becomes JSON with one entry a field, and those tha
   CHECK(image.rows == 3 * 6);
   Built<Odometry> odometry({});
   CHECK_FALSE(attach::message_png(MessageType::of<Odometry>(), odometry.message));
+  Built<PointCloud> cloud({.count = 2});
+  cloud.message->points.push_back({1, 2, 3});
+  cloud.message->colours.push_back({4, 5, 6});
+  const auto ply = attach::message_ply(MessageType::of<PointCloud>(), cloud.message);
+  REQUIRE(ply);
+  CHECK(ply->find("element vertex 1\n") != std::string::npos);
+  CHECK(ply->ends_with("\6\5\4"));
+  CHECK_FALSE(attach::message_ply(MessageType::of<Odometry>(), odometry.message));
 }
 
 TEST_CASE("top, stop and unknown questions over the socket") {
@@ -141,7 +149,7 @@ TEST_CASE("echo gives each new message once, and lets it go") {
   const attach::Server server({scene.spec, scene.plan, *scene.board, *scene.transport});
   auto connection = attach::connect_to(getpid());
   REQUIRE(connection);
-  REQUIRE(connection->write({{"do", "echo"}, {"port", "map.obstacles"}, {"png", true}, {"count", 2}}));
+  REQUIRE(connection->write({{"do", "echo"}, {"port", "map.obstacles"}, {"as", "png"}, {"count", 2}}));
   const auto first = connection->read_line();
   REQUIRE(first);
   CHECK((*first)["type"] == "grid");
