@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <numeric>
 #include <random>
 #include <tuple>
 #include <vector>
@@ -28,7 +29,7 @@ Cloud random_cloud(std::mt19937& random, double edge) {
   Cloud cloud;
   const double size = edge * uniform(2, 30), off = below(4) == 0 ? 1000 * edge * uniform(-100, 100) : 0;
   const bool coloured = below(3) != 0, on_lattice = below(4) == 0;
-  const int kind = below(3);
+  const int kind = below(3), vast = below(4);
   for (int n = below(kMost); n > 0; --n) {
     double p[3] = {uniform(-size, size), uniform(-size, size), uniform(-size, size)};
     if (kind == 0) p[2] = edge * uniform(-0.6, 0.6);
@@ -36,6 +37,11 @@ Cloud random_cloud(std::mt19937& random, double edge) {
       for (double& v : p) v = std::normal_distribution<>(0, 2 * edge)(random);
     if (on_lattice)
       for (double& v : p) v = edge / 2 * std::round(v / edge);
+    if (vast == 0 && below(3) == 0) {  // so far away that bricks share buckets of the grid, some with their neighbours
+      p[0] -= 4 * 1031 * edge;
+      p[1] += 4 * edge;
+    }
+    if (vast == 0 && below(20) == 0) p[2] += 4 * 300 * edge;
     cloud.points.push_back({static_cast<float>(p[0] + off), static_cast<float>(p[1]), static_cast<float>(p[2] - off)});
     if (below(50) == 0) cloud.points.back().y = std::numeric_limits<float>::quiet_NaN();
     if (below(200) == 0) cloud.points.back().x = 3e38f;
@@ -88,6 +94,29 @@ TEST_CASE("reduction, smoothing and interpolation give the points of their refer
         check([&](CloudBuffer& out) { interpolate(grid, p, out); }, interpolate_reference(cloud.view(), p)) - reduced;
   }
   CHECK(made > 1000);
+}
+
+TEST_CASE("the order of voxels does not depend on that of the points") {
+  std::mt19937 random(4);
+  VoxelGrid grid(kMost);
+  const auto voxels = [&](const Cloud& cloud, double edge) {
+    grid.fill(cloud.view(), edge);
+    std::vector<std::tuple<uint32_t, uint32_t, uint32_t, uint32_t>> all;
+    for (const Voxel& v : grid.voxels()) all.emplace_back(v.points, v.b, v.g, v.r);
+    return all;
+  };
+  for (int round = 0; round < 100; ++round) {
+    Cloud cloud = random_cloud(random, 0.1), shuffled;
+    cloud.colours.resize(cloud.points.size());
+    std::vector<size_t> order(cloud.points.size());
+    std::iota(order.begin(), order.end(), size_t{0});
+    std::shuffle(order.begin(), order.end(), random);
+    for (const size_t i : order) {
+      shuffled.points.push_back(cloud.points[i]);
+      shuffled.colours.push_back(cloud.colours[i]);
+    }
+    CHECK(voxels(cloud, 0.1) == voxels(shuffled, 0.1));
+  }
 }
 
 TEST_CASE("the same cloud gives the same bytes in the same order, whatever was filtered before") {
