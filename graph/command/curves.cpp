@@ -21,7 +21,7 @@ void put_text(cv::Mat& image, const std::string& text, cv::Point at) {
 
 void write_curves(const std::string& file, const std::string& parameter, const std::vector<double>& values,
                   const std::vector<Curve>& curves) {
-  constexpr int kLeft = 60, kTop = 30, kPanel = 150, kGap = 34, kStep = 84;
+  constexpr int kLeft = 90, kTop = 30, kPanel = 150, kGap = 34, kStep = 84;
   const int count = static_cast<int>(values.size()), width = kLeft + kStep * count;
   const int height = kTop + static_cast<int>(curves.size()) * (kPanel + kGap) + 20;
   cv::Mat image(height, width, CV_8UC3, cv::Scalar::all(255));

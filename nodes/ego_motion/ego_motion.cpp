@@ -47,6 +47,7 @@ std::string Parameters::error() const {
     return wrong("pyramid_range", pyramid_range_px, "lie in 8..512 px");
   if (!(flow.r_min_px > 0)) return wrong("r_min", flow.r_min_px, "be above 0 px");
   if (!(estimator.inlier_px > 0)) return wrong("inlier", estimator.inlier_px, "be above 0 px");
+  if (!(estimator.shared_px >= 0)) return wrong("shared_error", estimator.shared_px, "be at least 0 px");
   for (const auto& [name, value] : {std::pair{"acceleration", expectation.acceleration_m_s2},
                                     {"turn_acceleration", expectation.turn_acceleration_rad_s2},
                                     {"odometry_error", expectation.odometry_error}})
@@ -68,7 +69,6 @@ void EgoMotion::configure(int width, int height, const Parameters& parameters) {
   previous_ = Pyramid(width, height, kLevels);
   current_ = Pyramid(width, height, kLevels);
   right_ = Level(width, height);
-  mean_sums_.resize(static_cast<size_t>(width + Plane::kPadding));
   detector_ = CornerDetector(width, height, p_.corners);
   flow_filter_ = FlowFilter(width, height, capacity, p_.flow);
   estimator_ = MotionEstimator(p_.estimator, capacity);
@@ -273,7 +273,7 @@ Result EgoMotion::step(const Frame& frame) {
   Result result;
   current_.build(frame.left, p_.brightness);
   to_grey(frame.right, right_.image);
-  if (p_.brightness) fill_means(right_, mean_sums_);
+  if (p_.brightness) right_.fill_mean();
   find_corners(frame);
   if (p_.corner_candidates) mark_candidates();
   result.corners = static_cast<int>(found_.size());

@@ -121,7 +121,6 @@ class EgoMotion {
   int width_ = 0, height_ = 0, half_ = 5;
   Pyramid previous_, current_;
   Level right_;
-  std::vector<uint16_t> mean_sums_;
   CornerDetector detector_;
   FlowFilter flow_filter_;
   MotionEstimator estimator_;

@@ -131,6 +131,7 @@ class EgoMotionNode final : public Node {
     p.estimator.robust = robust_;
     p.estimator.inlier_px = inlier_;
     p.estimator.iterations = iterations_;
+    p.estimator.shared_px = shared_error_;
     p.expectation = {acceleration_, turn_acceleration_, odometry_error_};
     p.confidence_minimum = conf_min_;
     p.inliers_minimum = inliers_min_;
@@ -187,6 +188,8 @@ class EgoMotionNode final : public Node {
                                    "rad/s^2", "standard deviation, where the motion was not measured"};
   Param<double> odometry_error_{
       this, "odometry_error", 0.1, {0.001, 1.0}, "1", "standard deviation, share of what the odometry says"};
+  Param<double> shared_error_{
+      this, "shared_error", 0.05, {0.0, 10.0}, "px", "error that all corners of a frame share; enters the covariance"};
   Param<double> camera_x_{this, "camera_x",
                           0.0,  {-5.0, 5.0},
                           "m",  "camera to the right of the robot's centre, where the pair does not say"};

@@ -21,27 +21,25 @@ void halve(const Plane& in, Plane& out) {
     image_kernels().halve(in.row(2 * y), in.row(2 * y + 1), out.width(), out.row(y));
 }
 
-void fill_means(Level& level, std::vector<uint16_t>& sums) {
-  constexpr int kHalf = Level::kWindow / 2;
-  const Plane& image = level.image;
+void Level::fill_mean() {
+  constexpr int kHalf = kWindow / 2;
   const ImageKernels& kernels = image_kernels();
   const int width = image.width(), height = image.height();
-  std::fill(sums.begin(), sums.end(), uint16_t{0});
-  for (int y = 0; y < Level::kWindow - 1; ++y) kernels.roll(image.row(y), nullptr, width, sums.data());
+  std::fill(sums_.begin(), sums_.end(), uint16_t{0});
+  for (int y = 0; y < kWindow - 1; ++y) kernels.roll(image.row(y), nullptr, width, sums_.data());
   for (int y = kHalf; y <= height - kHalf; ++y) {
-    kernels.roll(image.row(y + kHalf - 1), y > kHalf ? image.row(y - kHalf - 1) : nullptr, width, sums.data());
-    uint8_t* out = level.mean.row(y);
-    kernels.mean_of_8(sums.data(), width - Level::kWindow + 1, out + kHalf);
+    kernels.roll(image.row(y + kHalf - 1), y > kHalf ? image.row(y - kHalf - 1) : nullptr, width, sums_.data());
+    uint8_t* out = mean.row(y);
+    kernels.mean_of_8(sums_.data(), width - kWindow + 1, out + kHalf);
     std::fill_n(out, kHalf, out[kHalf]);
     std::fill_n(out + width - kHalf + 1, kHalf - 1, out[width - kHalf]);
   }
   const auto columns = static_cast<size_t>(width);
-  for (int y = 0; y < kHalf; ++y) std::memcpy(level.mean.row(y), level.mean.row(kHalf), columns);
-  for (int y = height - kHalf + 1; y < height; ++y)
-    std::memcpy(level.mean.row(y), level.mean.row(height - kHalf), columns);
+  for (int y = 0; y < kHalf; ++y) std::memcpy(mean.row(y), mean.row(kHalf), columns);
+  for (int y = height - kHalf + 1; y < height; ++y) std::memcpy(mean.row(y), mean.row(height - kHalf), columns);
 }
 
-Pyramid::Pyramid(int width, int height, int levels) : sums_(static_cast<size_t>(width + Plane::kPadding)) {
+Pyramid::Pyramid(int width, int height, int levels) {
   for (int l = 0; l < levels; ++l) levels_.emplace_back(width >> l, height >> l);
 }
 
@@ -49,7 +47,7 @@ void Pyramid::build(ImageView<const uint8_t> image, bool means) {
   to_grey(image, levels_[0].image);
   for (size_t l = 1; l < levels_.size(); ++l) halve(levels_[l - 1].image, levels_[l].image);
   if (!means) return;
-  for (Level& level : levels_) fill_means(level, sums_);
+  for (Level& level : levels_) level.fill_mean();
 }
 
 }  // namespace takt::ego_motion

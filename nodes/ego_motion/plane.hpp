@@ -39,15 +39,23 @@ void halve(const Plane& in, Plane& out);
 
 /// An image and how bright it is around each pixel, so that blocks of two images can be compared whose exposure
 /// differs.
-struct Level {
+class Level {
+ public:
   static constexpr int kWindow = 8;  ///< edge of the square that `mean` is taken of
 
   Level() = default;
-  Level(int width, int height) : image(width, height), mean(width, height) {}
+  Level(int width, int height)
+      : image(width, height), mean(width, height), sums_(static_cast<size_t>(width + Plane::kPadding)) {}
+  /// Both sides must be at least kWindow.
+  void fill_mean();
+
   Plane image;
   /// Rounded mean of columns x - 4 .. x + 3 and rows y - 4 .. y + 3; where that leaves the image, of the nearest square
   /// that does not. All zero if nobody asked for it: then a comparison is one of grey values.
   Plane mean;
+
+ private:
+  std::vector<uint16_t> sums_;  // of columns
 };
 
 /// Level 0 is the image itself; each next level is half as large.
@@ -59,17 +67,10 @@ class Pyramid {
   void build(ImageView<const uint8_t> image, bool means);
   int levels() const { return static_cast<int>(levels_.size()); }
   const Level& level(int l) const { return levels_[static_cast<size_t>(l)]; }
-  void swap(Pyramid& other) noexcept {
-    levels_.swap(other.levels_);
-    sums_.swap(other.sums_);
-  }
+  void swap(Pyramid& other) noexcept { levels_.swap(other.levels_); }
 
  private:
   std::vector<Level> levels_;
-  std::vector<uint16_t> sums_;
 };
-
-/// Fills `level.mean`; `sums` is scratch of at least width + kPadding elements. Both sides must be at least kWindow.
-void fill_means(Level& level, std::vector<uint16_t>& sums);
 
 }  // namespace takt::ego_motion

@@ -37,6 +37,7 @@ expect 2 "does-not-exist" "$takt" run "$work/does-not-exist.yaml"
 expect 2 "--for" "$takt" run --for 5
 expect 2 "no such directory" env TAKT_DATA="$work/nothing" "$takt" run "$source/graph/kitti.yaml"
 expect 2 "poses.txt" "$takt" eval ego_motion --data "$work"
+expect 2 "either --data DIR or --generated" "$takt" eval ego_motion
 expect 2 "none.png" "$takt" eval stereo --left "$work/none.png" --right "$work/none.png" --gt "$work/none.png" --gt-scale 1 --disparities 16
 expect 2 "no file is named like left*.jpg" "$takt" calibrate stereo "$work"
 

@@ -43,9 +43,8 @@ int between(std::mt19937& random, int low, int high) { return std::uniform_int_d
 
 Level with_means(Plane image) {
   Level level(image.width(), image.height());
-  std::vector<uint16_t> sums(static_cast<size_t>(image.width() + Plane::kPadding));
   level.image = std::move(image);
-  fill_means(level, sums);
+  level.fill_mean();
   return level;
 }
 

@@ -9,6 +9,7 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <random>
 #include <sstream>
 #include <vector>
 
@@ -179,6 +180,32 @@ TEST_CASE("a refused motion says so, and the uncertainty of the pose grows by wh
     const double t = 0.1 * (i - 1);
     const double grown = 0.5 * t * (t + 0.1);
     CHECK(sigma(blind.pose) == doctest::Approx(std::hypot(grown, sigma(measured.pose))).epsilon(0.01));
+  }
+}
+
+TEST_CASE("no motion is invented, in any mode: from a blank image, from noise, from another place") {
+  Parameters parabola, window;
+  parabola.subpixel = Subpixel::parabola;
+  window.predict = Predict::none;
+  for (const Parameters& p : {Parameters{}, parabola, window, Parameters::faithful()}) {
+    Wall wall;
+    const auto after = [&](auto change) {
+      EgoMotion ego;
+      ego.configure(Wall::width, Wall::height, p);
+      wall.render(0, 0);
+      ego.step(wall.frame(0));
+      wall.render(0, 0.01);
+      change();
+      return ego.step(wall.frame(100'000'000));
+    };
+    std::mt19937 random(4);
+    CHECK(after([] {}).valid);
+    CHECK_FALSE(after([&] { std::fill(wall.left.begin(), wall.left.end(), uint8_t{90}); }).valid);
+    CHECK_FALSE(after([&] {
+                  for (auto* image : {&wall.left, &wall.right})
+                    for (uint8_t& v : *image) v = static_cast<uint8_t>(random() % 256);
+                }).valid);
+    CHECK_FALSE(after([&] { wall.render(40, 0); }).valid);
   }
 }
 
