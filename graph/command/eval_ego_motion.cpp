@@ -128,7 +128,7 @@ void add_eval_ego_motion(CLI::App& eval, EvalEgoMotionOptions& o, int& exit_code
   app->add_option("--seed", o.seed, "seed of the generated drives (default 1)");
   app->add_option("--frames", o.frames, "of each generated drive (default 60)")->check(CLI::Range(3, 100000));
   app->add_option("--sweep", o.sweep, "parameter to try values of")->check(CLI::IsMember(sweep_names()));
-  app->add_option("--picture", o.picture, "PNG: matched corners of the last frame, or the curves of a sweep");
+  app->add_option("--picture", o.picture, "PNG: matched corners of the middle frame, or the curves of a sweep");
   app->add_flag("--json", o.json, "one JSON object on stdout");
   app->callback([&] { exit_code = evaluate(o); });
 }
