@@ -273,7 +273,7 @@ class IsolatedRun {
     supervisor_.emplace(plan_, board_, group_, *transport_, clock_, tasks_of(plan_, partition_), how);
     if (again()) supervisor_->all_were_lost(*board_.group().losses.at(board_.group().losses.size() - 1));
     int64_t give_up_ns = INT64_MAX;
-    wait_until([&] {
+    const auto ended = [&] {
       supervisor_->look();
       const int64_t now = clock_.now_ns(), end = board_.stop().end_ns();
       if (now < end) strike(now);
@@ -289,7 +289,8 @@ class IsolatedRun {
       group_.kill_all();
       give_up_ns = now + kPatienceNs;
       return false;
-    });
+    };
+    wait_until(ended, {}, std::chrono::milliseconds(5));
   }
 
   /// What a scenario has in store for the processes.

@@ -3,8 +3,9 @@
 
 #include <unistd.h>
 
-#include <ctime>
+#include <chrono>
 #include <stdexcept>
+#include <thread>
 
 #include "graph/command/machine.hpp"
 #include "graph/command/prepare.hpp"
@@ -57,11 +58,11 @@ Capacity BoardExchange::wait_for(size_t port) {
   return board_.capacity(port).capacity;
 }
 
-bool wait_until(const std::function<bool()>& done, const std::function<bool()>& broken) {
+bool wait_until(const std::function<bool()>& done, const std::function<bool()>& broken,
+                std::chrono::milliseconds between_looks) {
   while (!done()) {
     if (broken && broken()) return false;
-    const timespec pause{0, 1'000'000};
-    nanosleep(&pause, nullptr);
+    std::this_thread::sleep_for(between_looks);
   }
   return true;
 }

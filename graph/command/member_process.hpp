@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <chrono>
 #include <functional>
 
 #include "graph/command/run_command.hpp"
@@ -23,8 +24,9 @@ class BoardExchange final : public graph::CapacityExchange {
   RunBoard& board_;
 };
 
-/// Polls every millisecond until `done` or, where given, `broken`; true if done.
-bool wait_until(const std::function<bool()>& done, const std::function<bool()>& broken = {});
+/// Looks every so often until `done` or, where given, `broken`; true if done.
+bool wait_until(const std::function<bool()>& done, const std::function<bool()>& broken = {},
+                std::chrono::milliseconds between_looks = std::chrono::milliseconds(1));
 
 /// What one process of an isolated run is given.
 struct MemberPart {

@@ -12,7 +12,7 @@
 
 namespace takt {
 namespace {
-constexpr int64_t kStallGrain_ns = 5'000'000;  // between two looks while the host takes time
+constexpr int64_t kStallGrain_ns = 5'000'000;  // between two looks at a job that the host may hold up
 }  // namespace
 
 Watchdog::Watchdog(const Plan& plan, RunBoard& board, const Clock& clock, std::vector<Worker> workers,
@@ -66,9 +66,12 @@ int64_t Watchdog::look(int64_t now_ns) {
   int64_t next_ns = now_ns + 31'536'000'000'000'000;
   if (options_.granted == Policy::deadline && stolen_.counted()) {
     stolen_.look(now_ns);
-    const bool lifted = std::any_of(watched_.begin(), watched_.end(),
-                                    [](const Watched& watched) { return watched.worker.watch->lifted(); });
-    next_ns = now_ns + (lifted || stolen_.recent_ns() > 0 ? kStallGrain_ns : StolenTime::kStep_ns);
+    const bool stolen = stolen_.recent_ns() > 0;
+    const bool close = std::any_of(watched_.begin(), watched_.end(), [&](const Watched& watched) {
+      const JobWatch& watch = *watched.worker.watch;
+      return watch.lifted() || (stolen && watch.running().serial != 0);
+    });
+    next_ns = now_ns + (close ? kStallGrain_ns : StolenTime::kStep_ns);
   }
   for (Watched& watched : watched_) next_ns = std::min(next_ns, look_at(watched, now_ns));
   if (options_.life != nullptr) {

@@ -46,7 +46,7 @@ size_t WorkerThreads::join(const std::function<bool(const std::vector<size_t>&)>
   };
   {
     std::unique_lock lock(ends_->mutex);
-    while (!look()) ends_->changed.wait_for(lock, std::chrono::milliseconds(100));
+    while (!look()) ends_->changed.wait_for(lock, std::chrono::milliseconds(250));
   }
   for (const size_t i : at_work) threads_[i].detach();
   for (std::thread& thread : threads_)
