@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Dense disparity at 640x480 with 150 disparities, against OpenCV's block matcher and its fastest semi-global matcher,
 // on a generated pair.
+#include <hwy/targets.h>
+
 #include <algorithm>
 #include <cstdio>
 #include <opencv2/calib3d.hpp>
@@ -36,6 +38,16 @@ double milliseconds(Work work) {
   const int64_t begin = now_ns();
   work();
   return static_cast<double>(now_ns() - begin) * 1e-6;
+}
+
+/// A matcher for the best instructions that an AVX2 machine has.
+std::unique_ptr<stereo::Matcher> avx2_matcher(int channels, const stereo::MatcherParameters& parameters) {
+  hwy::DisableTargets(HWY_AVX2 - 1);  // a better target has a lower bit
+  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+  auto matcher = stereo::make_matcher(kWidth, kHeight, channels, parameters);
+  hwy::DisableTargets(0);
+  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+  return matcher;
 }
 
 /// Rounds of the reference a and of b, one after the other in one process.
@@ -95,6 +107,9 @@ std::vector<Row> run_stereo(const Options& options) {
           with(*colour, scene.left, scene.right));
   compare(rows, name + "/1-thread-grey", "cv::StereoBM unfiltered", one, rounds, with_block,
           with(*grey, scene.left_grey, scene.right_grey));
+  const auto avx2 = avx2_matcher(3, parameters);
+  compare(rows, name + "/1-thread-avx2", "cv::StereoBM unfiltered, on grey",
+          std::string("one thread, ") + avx2->target(), rounds, with_block, with(*avx2, scene.left, scene.right));
   compare(rows, name + "/1-thread-to-sgbm", "cv::StereoSGBM 3-way", one, rounds, with_global,
           with(*colour, scene.left, scene.right));
   compare(rows, name + "/quality", "cv::StereoSGBM 3-way", one, rounds, with_global,

@@ -19,7 +19,7 @@ using Json = nlohmann::ordered_json;
 struct Sweep {
   std::string name, what;
   std::vector<double> values;
-  Parameters (*with)(double value);
+  void (*set)(Parameters& p, double value);
 };
 
 /// sigma and r_const act on a search within one window only, r_min on the flow filter only.
@@ -28,46 +28,32 @@ const std::vector<Sweep>& sweeps() {
       {"sigma",
        "growth of the search window with the disparity, predict: constant_velocity",
        {0, 0.1, 0.2, 0.4, 0.8, 1.6},
-       [](double value) {
-         Parameters p;
+       [](Parameters& p, double value) {
          p.predict = ego_motion::Predict::constant_velocity;
          p.sigma = value;
-         return p;
        }},
       {"r_const",
        "search window at disparity 0 in px, predict: constant_velocity",
        {5, 10, 20, 30, 40, 60, 80},
-       [](double value) {
-         Parameters p;
+       [](Parameters& p, double value) {
          p.predict = ego_motion::Predict::constant_velocity;
          p.r_const = value;
-         return p;
        }},
       {"search",
        "edge of the matching block (n_search) in px",
        {3, 5, 7, 9, 11, 13, 15},
-       [](double value) {
-         Parameters p;
-         p.n_search = static_cast<int>(value);
-         return p;
-       }},
+       [](Parameters& p, double value) { p.n_search = static_cast<int>(value); }},
       {"r_min",
        "radius of the flow filter's neighbourhood in px",
        {5, 10, 20, 30, 40, 60, 100},
-       [](double value) {
-         Parameters p;
+       [](Parameters& p, double value) {
          p.flow_filter = true;
          p.flow.r_min_px = value;
-         return p;
        }},
       {"corners",
        "most corners of an image",
        {50, 100, 200, 500, 800, 1500, 3000},
-       [](double value) {
-         Parameters p;
-         p.corners.maximum = static_cast<int>(value);
-         return p;
-       }},
+       [](Parameters& p, double value) { p.corners.maximum = static_cast<int>(value); }},
   };
   return list;
 }
@@ -97,7 +83,9 @@ Json measure_sweep(const EvalEgoMotionOptions& options) {
   Curve metres{"median error per step, mm", {}}, degrees{"median error per step, deg", {}}, refused{"refused, %", {}},
       time{"CPU time per step, ms", {}};
   for (const double value : sweep->values) {
-    const Track track = follow(drive, sweep->with(value));
+    Parameters parameters;
+    sweep->set(parameters, value);
+    const Track track = follow(drive, parameters);
     Json row{{"value", value}, {"drift_pct", ego_motion::evaluate(track.poses(), truth).drift_pct}};
     row.update(score(drive, track));
     row.erase("baseline");

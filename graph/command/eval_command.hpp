@@ -12,6 +12,7 @@ struct EvalStereoOptions {
   std::filesystem::path left, right, truth;
   double truth_scale = 1;  ///< disparity = value / scale
   int disparities = 64;
+  double exposure = 1;           ///< of the right image, in that of the left one
   std::vector<std::string> set;  ///< "param=value" of the stereo node
   bool variants = false;
   std::string sweep, picture;  ///< "noise" or "window"; PNG of its curves

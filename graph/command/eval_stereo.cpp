@@ -99,7 +99,9 @@ void print_row(const char* name, const Json& r) {
 }
 
 Json measure(const EvalStereoOptions& options) {
-  const cv::Mat left = read(options.left, cv::IMREAD_COLOR), right = read(options.right, cv::IMREAD_COLOR);
+  const cv::Mat left = read(options.left, cv::IMREAD_COLOR);
+  cv::Mat right = read(options.right, cv::IMREAD_COLOR);
+  right.convertTo(right, -1, options.exposure);  // saturates as a sensor does
   if (left.size() != right.size())
     throw BadData(fmt::format("{} and {} differ in size", options.left.string(), options.right.string()));
   const stereo::DisparityImage truth = read_truth(options.truth, options.truth_scale);
@@ -160,6 +162,9 @@ void add_eval_stereo(CLI::App& eval, EvalStereoOptions& o, int& exit_code) {
   app->add_option("--picture", o.picture, "PNG of the sweep's curves")->needs("--sweep");
   app->add_option("--gt-scale", o.truth_scale, "disparity = value / scale (default 1)")->check(CLI::PositiveNumber);
   app->add_option("--disparities", o.disparities, "search range, px (default 64)")->check(CLI::Range(1, 512));
+  app->add_option("--exposure", o.exposure, "of the right image, in that of the left one (default 1)")
+      ->check(CLI::Range(0.05, 20.0))
+      ->needs(left);
   app->add_option("--set", o.set, "parameter=value of the stereo node, repeatable");
   app->add_flag("--variants", o.variants, "every way of matching, too: costs, windows, selections");
   app->add_flag("--json", o.json, "one JSON object on stdout");

@@ -111,31 +111,31 @@ void Aggregator::find_arms() {
 }
 
 void Aggregator::along_arms(const CostRow& costs, int y, CostRow& out) const {
-  const auto d = static_cast<size_t>(disparities_);
-  const auto reach = static_cast<float>(p_.n_square / 2 + 1);
   for (int x = 0; x < width_; ++x) {
-    const Arms& a = arms_[static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x)];
-    float* to = out.data() + pixel(x);
-    float weights = 0;
-    for (int k = -a.left; k <= a.right; ++k) weights += 1 - static_cast<float>(std::abs(k)) / reach;
-    std::fill_n(to, d, 0.0f);
-    for (int k = -a.left; k <= a.right; ++k)
-      add_to(to, costs.data() + pixel(x + k), d, (1 - static_cast<float>(std::abs(k)) / reach) / weights);
+    const Arms& a = arms_of(x, y);
+    mean_of_arms(
+        a.left, a.right, [&](int k) { return costs.data() + pixel(x + k); }, out.data() + pixel(x));
   }
 }
 
 void Aggregator::within_arms(int y, CostRow& out) const {
-  const auto d = static_cast<size_t>(disparities_);
-  const auto reach = static_cast<float>(p_.n_square / 2 + 1);
   for (int x = 0; x < width_; ++x) {
-    const Arms& a = arms_[static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x)];
-    float* to = out.data() + pixel(x);
-    float weights = 0;
-    for (int l = -a.up; l <= a.down; ++l) weights += 1 - static_cast<float>(std::abs(l)) / reach;
-    std::fill_n(to, d, 0.0f);
-    for (int l = -a.up; l <= a.down; ++l)
-      add_to(to, row(y + l).data() + pixel(x), d, (1 - static_cast<float>(std::abs(l)) / reach) / weights);
+    const Arms& a = arms_of(x, y);
+    mean_of_arms(
+        a.up, a.down, [&](int l) { return row(y + l).data() + pixel(x); }, out.data() + pixel(x));
   }
+}
+
+template <class CostsAt>
+void Aggregator::mean_of_arms(int before, int after, const CostsAt& costs_at, float* out) const {
+  const auto d = static_cast<size_t>(disparities_);
+  const auto weight = [reach = static_cast<float>(p_.n_square / 2 + 1)](int k) {
+    return 1 - static_cast<float>(std::abs(k)) / reach;
+  };
+  float weights = 0;
+  for (int k = -before; k <= after; ++k) weights += weight(k);
+  std::fill_n(out, d, 0.0f);
+  for (int k = -before; k <= after; ++k) add_to(out, costs_at(k), d, weight(k) / weights);
 }
 
 // The weights of a pixel serve all its disparities.

@@ -40,6 +40,12 @@ class Aggregator {
   void along_arms(const CostRow& costs, int y, CostRow& out) const;
   void sum(int y, int edge, CostRow& out);
   void within_arms(int y, CostRow& out) const;
+  const Arms& arms_of(int x, int y) const {
+    return arms_[static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x)];
+  }
+  /// Mean over `before` cells on one side, the cell itself and `after` on the other, nearer ones weighing more.
+  template <class CostsAt>
+  void mean_of_arms(int before, int after, const CostsAt& costs_at, float* out) const;
   void weighted(int y, CostRow& out);
   void minimum(size_t size, int y, CostRow& out);
 
