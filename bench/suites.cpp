@@ -6,6 +6,7 @@
 namespace takt::bench {
 
 std::vector<Row> run_transport(const Options&);
+std::vector<Row> run_publish(const Options&);
 std::vector<Row> run_release(const Options&);
 std::vector<Row> run_release_loads(const Options&);
 std::vector<Row> run_graph(const Options&);
@@ -23,6 +24,7 @@ std::vector<Row> run_ego_motion(const Options&);
 std::span<const Suite> suites() {
   static const auto list = std::to_array<Suite>({
       {"transport", "one message from output to input: one worker, threads, processes", run_transport},
+      {"publish", "what a reader that never comes, or keeps all it gets, costs a writer", run_publish},
       {"release", "lateness of the five rates against clock_nanosleep, idle and under load", run_release},
       {"release_loads", "the same per rate, policy and load, beside cyclictest; seven minutes", run_release_loads},
       {"graph", "ten nodes, seven hops: in one process, as ten processes, and over other libraries", run_graph},
