@@ -2,7 +2,6 @@
 #include "rt/sched/cooperative.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <limits>
 
 namespace takt {
@@ -42,8 +41,10 @@ int64_t CooperativeQueue::next_uncovered_release_ns() {
 
 void CooperativeQueue::sleep(std::unique_lock<std::mutex>& lock, int64_t until_ns) {
   wakes_.push_back(until_ns);
-  // steady_clock is CLOCK_MONOTONIC here, the runtime's own clock.
-  changed_.wait_until(lock, std::chrono::steady_clock::time_point(std::chrono::nanoseconds(until_ns)));
+  lock.unlock();
+  // Nobody need be woken: who finishes a lane sleeps for its next release himself.
+  stop_.sleep_until(until_ns);
+  lock.lock();
   wakes_.erase(std::find(wakes_.begin(), wakes_.end(), until_ns));
 }
 
@@ -61,14 +62,9 @@ void CooperativeQueue::work() {
     }
     // What a busy lane has still to do is done by the worker that is at it: nobody need wait for a job that may never
     // return.
-    if (next_release_ns() >= stop_.end_ns()) return changed_.notify_all();
+    if (next_release_ns() >= stop_.end_ns()) return;
     sleep(lock, next_uncovered_release_ns());
   }
-}
-
-void CooperativeQueue::wake() {
-  const std::lock_guard lock(mutex_);
-  changed_.notify_all();
 }
 
 }  // namespace takt

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include <condition_variable>
 #include <memory>
 #include <mutex>
 #include <vector>
@@ -22,8 +21,6 @@ class CooperativeQueue {
   }
   /// Runs lanes until none has a release before the end.
   void work();
-  /// After a stop: makes sleeping threads look again.
-  void wake();
 
  private:
   struct Entry {
@@ -39,7 +36,6 @@ class CooperativeQueue {
   const Clock& clock_;
   StopSignal& stop_;
   std::mutex mutex_;
-  std::condition_variable changed_;
   std::vector<Entry> entries_;
   std::vector<int64_t> wakes_, releases_;  ///< of the sleeping threads; scratch
 };

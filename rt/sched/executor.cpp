@@ -178,7 +178,6 @@ void Executor::run_cooperative(RunResult& result) {
     });
   }
   stop_.sleep_until(stop_.end_ns());
-  crew_->queue->wake();
   join(result);
 }
 
