@@ -3,8 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <unordered_map>
-#include <unordered_set>
+#include <unordered_map>  // replay: tests and benchmarks call this file, no node does
+#include <unordered_set>  // replay: likewise
 
 namespace takt::cloud {
 namespace {
@@ -15,7 +15,8 @@ struct Hash {
            (static_cast<size_t>(v.z) * 83492791u);
   }
 };
-using Voxels = std::unordered_map<VoxelIndex, Voxel, Hash>;
+using Voxels = std::unordered_map<VoxelIndex, Voxel, Hash>;  // replay: likewise
+using Indices = std::unordered_set<VoxelIndex, Hash>;        // replay: likewise
 
 Voxels sorted_into_voxels(const CloudView& cloud, double edge_m) {
   Voxels voxels;
@@ -34,8 +35,8 @@ void for_each_around(const VoxelIndex& v, int half_width, const Visit& visit) {
       for (int x = v.x - half_width; x <= v.x + half_width; ++x) visit(VoxelIndex{x, y, z});
 }
 
-std::unordered_set<VoxelIndex, Hash> grown_by_one(const Voxels& voxels) {
-  std::unordered_set<VoxelIndex, Hash> grown;
+Indices grown_by_one(const Voxels& voxels) {
+  Indices grown;
   for (const auto& [index, voxel] : voxels)
     for_each_around(index, 1, [&grown](const VoxelIndex& near) { grown.insert(near); });
   return grown;
