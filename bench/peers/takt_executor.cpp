@@ -54,6 +54,7 @@ TaktExecutor::TaktExecutor(const GraphShape& shape, uint32_t bytes, const Reserv
   frames_.reserve(kMostFrames);
   Plan plan;
   plan.policy = reservation.policy;
+  plan.anticipate_ns = kDefaultAnticipate_ns;
   if (reservation.core >= 0) plan.cores = {reservation.core};
   for (size_t node = 0; node < shape.nodes; ++node) {
     nodes_.push_back(std::make_unique<GraphNode>(shape, node, *this));

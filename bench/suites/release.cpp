@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Lateness of releases: five empty nodes at 15, 10, 7, 5 and 2 Hz under Takt's executor, against five threads that call
-// clock_nanosleep under the same policy and reservation. Rounds A B A B ... A; idle, and beside two CPU hogs.
+// clock_nanosleep under the same policy and reservation. Rounds A B A B ... A; idle, and beside two CPU hogs. Once as a
+// schedule has it by default, once with workers that sleep until the release itself (`anticipate: 0ms`).
 #include <cstdio>
 
 #include "bench/load.hpp"
@@ -13,12 +14,13 @@ std::vector<Row> run_release(const Options& options);
 
 namespace {
 
-void run_condition(Policy policy, Load load, int rounds, std::vector<Row>& rows) {
-  const std::string variant = std::string(to_string(policy)) + (load == Load::idle ? "_idle" : "_two_hogs");
+void run_condition(Policy policy, Load load, int64_t anticipate_ns, int rounds, std::vector<Row>& rows) {
+  const std::string variant = std::string(to_string(policy)) + (load == Load::idle ? "_idle" : "_two_hogs") +
+                              (anticipate_ns == 0 ? "_anticipate_0" : "");
   std::fprintf(stderr, "release: %s\n", variant.c_str());
   const Burden burden(load);
-  Pairs p50, p99;
-  Samples all;
+  Pairs p50, p99, cpu;
+  Samples all, all_cpu;
   uint64_t released = 0, completed = 0;
   double late = 0, raw_late = 0;  // of as many raw rounds as Takt's: the last raw round is left out
   std::string granted, raw_refused;
@@ -27,13 +29,16 @@ void run_condition(Policy policy, Load load, int rounds, std::vector<Row>& rows)
     if (p50.rounds() < static_cast<size_t>(rounds)) raw_late += round.over_1ms();
     p50.add_a(round.all().quantile(0.5).value_or(0));
     p99.add_a(round.all().quantile(0.99).value_or(0));
+    cpu.add_a(round.cpu_us);
   };
   reference();
   for (int i = 0; i < rounds; ++i) {
-    const ReleaseRound round = takt_round(policy, granted);
+    const ReleaseRound round = takt_round(policy, anticipate_ns, granted);
     p50.add_b(round.all().quantile(0.5).value_or(0));
     p99.add_b(round.all().quantile(0.99).value_or(0));
+    cpu.add_b(round.cpu_us);
     all.add(round.all().values());
+    all_cpu.add(round.cpu_us);
     late += round.over_1ms();
     released += round.released;
     completed += round.completed;
@@ -43,6 +48,7 @@ void run_condition(Policy policy, Load load, int rounds, std::vector<Row>& rows)
   const std::string name = "clock_nanosleep" + (raw_refused.empty() ? "" : " (" + raw_refused + ")");
   add_pair(rows, {"release/lateness_p50/" + variant, "us", 0, all, {}, {}, {}, granted}, name, p50);
   add_pair(rows, {"release/lateness_p99/" + variant, "us", 0, all, {}, {}, {}, granted}, name, p99);
+  add_pair(rows, {"release/cpu_per_second/" + variant, "us", 0, all_cpu, {}, {}, {}, granted}, name, cpu);
   rows.push_back({"release/over_1ms/" + variant,
                   "count",
                   late,
@@ -66,9 +72,11 @@ void run_condition(Policy policy, Load load, int rounds, std::vector<Row>& rows)
 std::vector<Row> run_release(const Options& options) {
   const int rounds = options.rounds_or(10);
   std::vector<Row> rows;
-  for (Policy policy : {Policy::deadline, Policy::fixed})
-    for (Load load : {Load::idle, Load::cpu}) run_condition(policy, load, rounds, rows);
-  run_condition(Policy::cooperative, Load::idle, rounds, rows);
+  for (int64_t anticipate_ns : {kDefaultAnticipate_ns, int64_t{0}}) {
+    for (Policy policy : {Policy::deadline, Policy::fixed})
+      for (Load load : {Load::idle, Load::cpu}) run_condition(policy, load, anticipate_ns, rounds, rows);
+    run_condition(Policy::cooperative, Load::idle, anticipate_ns, rounds, rows);
+  }
   return rows;
 }
 

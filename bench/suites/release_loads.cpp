@@ -23,7 +23,8 @@ class Condition {
       : policy_(policy), variant_(std::string(to_string(policy)) + "_" + std::string(to_string(load))) {}
 
   void add_round() {
-    const ReleaseRound ours = takt_round(policy_, granted_), raw = nanosleep_round(policy_, raw_refused_);
+    const ReleaseRound ours = takt_round(policy_, kDefaultAnticipate_ns, granted_),
+                       raw = nanosleep_round(policy_, raw_refused_);
     released_ += ours.released;
     completed_ += ours.completed;
     for (size_t rate = 0; rate < kRates; ++rate) {

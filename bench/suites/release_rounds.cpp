@@ -20,12 +20,40 @@ namespace {
 
 constexpr int64_t kRoundNs = 1'000'000'000, kBudgetNs = 5'000'000;
 
+/// CPU time of the process between the first and the last note, all of its threads together.
+class ProcessUse {
+ public:
+  void note() {
+    last_ = {now_ns(), clock_ns(CLOCK_PROCESS_CPUTIME_ID)};
+    if (first_.at_ns == 0) first_ = last_;
+  }
+  double us_per_second() const {
+    return static_cast<double>(last_.cpu_ns - first_.cpu_ns) * 1e6 /
+           static_cast<double>(std::max<int64_t>(last_.at_ns - first_.at_ns, 1));
+  }
+
+ private:
+  struct Reading {
+    int64_t at_ns = 0, cpu_ns = 0;
+  };
+  Reading first_, last_;
+};
+
 /// Does nothing but note when it was run.
 class EmptyNode final : public Node {
  public:
+  /// The fastest of them notes what the process uses.
+  explicit EmptyNode(bool fastest) : fastest_(fastest) {}
   void setup(Setup&) override {}
-  void run(Job& job) override { lateness_us.push_back(static_cast<double>(job.now_ns() - job.release_ns()) * 1e-3); }
+  void run(Job& job) override {
+    lateness_us.push_back(static_cast<double>(job.now_ns() - job.release_ns()) * 1e-3);
+    if (fastest_) process_use.note();
+  }
   std::vector<double> lateness_us;
+  ProcessUse process_use;
+
+ private:
+  const bool fastest_;
 };
 
 int64_t deadline_of(const Rate& rate) { return rate.period_ns(); }
@@ -50,6 +78,7 @@ ReleaseRound nanosleep_round(Policy policy, std::string& refused) {
   std::vector<Grant> grants(std::size(kReleaseRates));
   std::atomic<int64_t> epoch{0};
   Rendezvous ready(std::size(kReleaseRates) + 1), go(std::size(kReleaseRates) + 1);
+  ProcessUse process_use;
   std::vector<std::thread> threads;
   for (size_t i = 0; i < std::size(kReleaseRates); ++i) {
     late[i].reserve(64);
@@ -61,6 +90,7 @@ ReleaseRound nanosleep_round(Policy policy, std::string& refused) {
       for (int64_t k = 0; rate.release_ns(epoch, k) < epoch + kRoundNs; ++k) {
         sleep_until(rate.release_ns(epoch, k));
         late[i].push_back(static_cast<double>(now_ns() - rate.release_ns(epoch, k)) * 1e-3);
+        if (i == 0) process_use.note();
       }
     });
   }
@@ -69,19 +99,21 @@ ReleaseRound nanosleep_round(Policy policy, std::string& refused) {
   go.arrive_and_wait();
   for (std::thread& thread : threads) thread.join();
   for (const auto& l : late) round.lateness_us.emplace_back().add(l);
+  round.cpu_us = process_use.us_per_second();
   refused.clear();
   for (const Grant& grant : grants)
     if (!grant.refused.empty()) refused = grant.refused;
   return round;
 }
 
-ReleaseRound takt_round(Policy policy, std::string& granted) {
+ReleaseRound takt_round(Policy policy, int64_t anticipate_ns, std::string& granted) {
   std::vector<std::unique_ptr<EmptyNode>> nodes;
   Plan plan;
   plan.policy = policy;
+  plan.anticipate_ns = anticipate_ns;
   for (int cpu = 0; cpu < std::min(2L, sysconf(_SC_NPROCESSORS_ONLN)); ++cpu) plan.cores.push_back(cpu);
   for (int64_t hz : kReleaseRates) {
-    nodes.push_back(std::make_unique<EmptyNode>());
+    nodes.push_back(std::make_unique<EmptyNode>(nodes.empty()));
     nodes.back()->lateness_us.reserve(64);
     TaskPlan task;
     task.name = std::to_string(hz) + "hz";
@@ -104,6 +136,7 @@ ReleaseRound takt_round(Policy policy, std::string& granted) {
     round.completed += node->lateness_us.size();
   }
   for (uint64_t released : result.released) round.released += released;
+  round.cpu_us = nodes.front()->process_use.us_per_second();
   granted = to_string(result.policy_granted);
   for (const std::string& refused : result.refused) granted += "; " + refused;
   return round;

@@ -97,7 +97,7 @@ class Admitting {
                                              sum, overheads_.deadline_bandwidth));
   }
 
-  /// Response of lane `l` if its own work were only that long.
+  /// Response of lane `l` if its own work, its lead included where it is woken for it, were only that long.
   std::optional<Ticks> response_of(size_t l, int64_t work_ns) const {
     analysis::TaskSet set = lanes_.set;
     set.tasks[l].budget = work_ns * set.ticks_per_ns;
@@ -112,7 +112,7 @@ class Admitting {
     if (position + 1 == lane.size()) return ns(response);
     const int64_t work = prefix_ns(plan_, lane, position, overheads_);
     if (plan_.policy == Policy::cooperative) return ns(response) - ns(lanes_.set.tasks[l].budget) + work;
-    const auto found = response_of(l, work);
+    const auto found = response_of(l, longest_lead_ns(plan_, lane) + work);
     return found ? std::optional(ns(*found)) : std::nullopt;
   }
 
@@ -134,7 +134,8 @@ class Admitting {
     if (plan_.policy == Policy::cooperative)
       return ns(response) - ns(lanes_.set.tasks[l].budget) + overheads_.release_ns + overheads_.switch_ns;
     constexpr int64_t kMicrosecond = 1'000;
-    const auto found = response_of(l, overheads_.release_ns + overheads_.switch_ns + kMicrosecond);
+    const auto found =
+        response_of(l, longest_lead_ns(plan_, lane) + overheads_.release_ns + overheads_.switch_ns + kMicrosecond);
     return found ? std::optional(ns(*found)) : std::nullopt;
   }
 

@@ -226,6 +226,8 @@ Json make_report(const RunFacts& facts) {
   report["clock"] = facts.clock;
   report["policy_asked"] = facts.policy_asked;
   report["policy_granted"] = to_string(facts.result.policy_granted);
+  if (facts.clock == "real" && facts.plan.anticipate_ns > 0)
+    report["anticipate_us"] = static_cast<double>(facts.plan.anticipate_ns) / 1e3;
   report["duration_s"] = facts.result.duration_s();
   report["commit"] = TAKT_COMMIT;
   report["machine"] = machine_facts();

@@ -45,9 +45,12 @@ std::string policy_text(const Json& report) {
                        report["simulated"]["cores"].get<int>(), report["simulated"]["durations"].get<std::string>());
   const auto verified = std::count_if(report["nodes"].begin(), report["nodes"].end(),
                                       [](const Json& node) { return node["granted"]["verified"].get<bool>(); });
-  return fmt::format("policy {} granted (asked {}), read back for {} of {} nodes",
+  const std::string early = report.contains("anticipate_us")
+                                ? fmt::format("; woken up to {} us early", report["anticipate_us"].get<double>())
+                                : "";
+  return fmt::format("policy {} granted (asked {}), read back for {} of {} nodes{}",
                      report["policy_granted"].get<std::string>(), report["policy_asked"].get<std::string>(), verified,
-                     report["nodes"].size());
+                     report["nodes"].size(), early);
 }
 
 std::string record_line(const Json& record, uint64_t lost) {

@@ -125,6 +125,7 @@ class Composer {
   void connect() {
     result_.plan.policy = graph_.schedule.policy;
     result_.plan.cores = graph_.schedule.cores;
+    result_.plan.anticipate_ns = graph_.schedule.anticipate_ns;
     result_.plan.mode = graph_.mode;
     for (const DeviceSpec& spec : graph_.devices) connect_inputs(result_.plan.tasks[task_index_.at(spec.id)], spec);
     for (const NodeSpec& spec : graph_.nodes) connect_inputs(result_.plan.tasks[task_index_.at(spec.id)], spec);

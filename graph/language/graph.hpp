@@ -109,8 +109,9 @@ struct ScheduleSpec {
   Policy policy = Policy::deadline;
   std::vector<int> cores;  ///< empty: all that the process may use
   Position cores_position;
-  std::map<std::string, ScheduleEntry> entries;  ///< by node or device id
-  std::optional<MeasuredSpec> measured;          ///< nothing: the budgets are estimates
+  int64_t anticipate_ns = kDefaultAnticipate_ns;  ///< 0..kLongestAnticipate_ns
+  std::map<std::string, ScheduleEntry> entries;   ///< by node or device id
+  std::optional<MeasuredSpec> measured;           ///< nothing: the budgets are estimates
 };
 
 struct ChainSpec {

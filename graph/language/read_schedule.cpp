@@ -80,6 +80,13 @@ void Loader::read_schedule() {
   if (cores.is_array())
     for (const auto& core : cores)
       if (core.is_number_integer() && core >= 0 && core <= 1023) spec_.schedule.cores.push_back(core.get<int>());
+  if (const auto anticipate = read_time(schedule_, root, "", "anticipate", "the schedule")) {
+    spec_.schedule.anticipate_ns = *anticipate;
+    if (*anticipate < 0 || *anticipate > kLongestAnticipate_ns)
+      problem(schedule_.value_at("/anticipate"),
+              fmt::format("`anticipate` is {}; it must lie between 0ms and {}", schedule_.raw("/anticipate"),
+                          duration_text(kLongestAnticipate_ns)));
+  }
   if (root.contains("measured") && root["measured"].is_object()) read_measured(root["measured"]);
   const json nodes = root.value("nodes", json::object());
   if (!nodes.is_object()) return;

@@ -21,9 +21,12 @@ std::string policy_text(const Json& report) {
   const Json& nodes = at(report, "nodes");
   const auto verified = std::count_if(nodes.begin(), nodes.end(),
                                       [](const Json& node) { return at(node, "granted", "verified") == true; });
-  return fmt::format("{} granted (asked {}), {}: read back for {} of {} nodes", granted, or_not_recorded(asked),
+  const Json& anticipate_us = at(report, "anticipate_us");
+  const std::string early =
+      anticipate_us.is_number() ? fmt::format("; woken up to {} us early", anticipate_us.get<double>()) : "";
+  return fmt::format("{} granted (asked {}), {}: read back for {} of {} nodes{}", granted, or_not_recorded(asked),
                      static_cast<size_t>(verified) == nodes.size() && !nodes.empty() ? "verified" : "not verified",
-                     verified, nodes.size());
+                     verified, nodes.size(), early);
 }
 
 std::string machine_text(const Json& machine) {

@@ -39,16 +39,31 @@ int64_t CooperativeQueue::next_uncovered_release_ns() {
   return end;
 }
 
-void CooperativeQueue::sleep(std::unique_lock<std::mutex>& lock, int64_t until_ns) {
+void CooperativeQueue::sleep(std::unique_lock<std::mutex>& lock, int64_t until_ns, Anticipation& anticipation) {
   wakes_.push_back(until_ns);
   lock.unlock();
   // Nobody need be woken: who finishes a lane sleeps for its next release himself.
-  stop_.sleep_until(until_ns);
+  const bool early = anticipation.sleep_before(until_ns, clock_, stop_);
   lock.lock();
   wakes_.erase(std::find(wakes_.begin(), wakes_.end(), until_ns));
+  if (early) stay_awake(lock, until_ns);
+}
+
+void CooperativeQueue::stay_awake(std::unique_lock<std::mutex>& lock, int64_t until_ns) {
+  const auto next = std::find_if(entries_.begin(), entries_.end(), [&](const Entry& entry) {
+    return !entry.busy && entry.lane->next_release_ns() == until_ns;
+  });
+  if (next == entries_.end()) return;  // the end of the run
+  next->busy = true;                   // nobody else runs it before its release anyway
+  lock.unlock();
+  next->lane->rehearse();
+  Anticipation::stay_awake_until(until_ns, clock_);
+  lock.lock();
+  next->busy = false;
 }
 
 void CooperativeQueue::work() {
+  Anticipation anticipation(longest_lead_ns_);
   std::unique_lock lock(mutex_);
   while (true) {
     if (Entry* entry = earliest_deadline(clock_.now_ns())) {
@@ -63,7 +78,7 @@ void CooperativeQueue::work() {
     // What a busy lane has still to do is done by the worker that is at it: nobody need wait for a job that may never
     // return.
     if (next_release_ns() >= stop_.end_ns()) return;
-    sleep(lock, next_uncovered_release_ns());
+    sleep(lock, next_uncovered_release_ns(), anticipation);
   }
 }
 

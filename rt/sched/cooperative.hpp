@@ -4,6 +4,7 @@
 #include <mutex>
 #include <vector>
 
+#include "rt/sched/anticipation.hpp"
 #include "rt/sched/lane.hpp"
 
 namespace takt {
@@ -13,8 +14,9 @@ namespace takt {
 /// delay each other at the lock. Needs no privilege.
 class CooperativeQueue {
  public:
-  CooperativeQueue(const std::vector<std::unique_ptr<Lane>>& lanes, const Clock& clock, StopSignal& stop)
-      : clock_(clock), stop_(stop) {
+  CooperativeQueue(const std::vector<std::unique_ptr<Lane>>& lanes, const Clock& clock, StopSignal& stop,
+                   int64_t longest_lead_ns)
+      : clock_(clock), stop_(stop), longest_lead_ns_(longest_lead_ns) {
     for (const auto& lane : lanes) entries_.push_back({lane.get(), false});
     wakes_.reserve(lanes.size() + 1);
     releases_.reserve(lanes.size());
@@ -31,10 +33,13 @@ class CooperativeQueue {
   int64_t next_release_ns() const;
   /// First release for which no sleeping thread wakes in time; the end if there is none.
   int64_t next_uncovered_release_ns();
-  void sleep(std::unique_lock<std::mutex>& lock, int64_t until_ns);
+  void sleep(std::unique_lock<std::mutex>& lock, int64_t until_ns, Anticipation& anticipation);
+  /// The rest of the way to that release, awake, with a lane that is then to run.
+  void stay_awake(std::unique_lock<std::mutex>& lock, int64_t until_ns);
 
   const Clock& clock_;
   StopSignal& stop_;
+  const int64_t longest_lead_ns_;
   std::mutex mutex_;
   std::vector<Entry> entries_;
   std::vector<int64_t> wakes_, releases_;  ///< of the sleeping threads; scratch

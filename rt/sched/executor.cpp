@@ -10,6 +10,7 @@
 #include "rt/memory/memory_use.hpp"
 #include "rt/memory/process_memory.hpp"
 #include "rt/node.hpp"
+#include "rt/sched/anticipation.hpp"
 #include "rt/sched/cooperative.hpp"
 #include "rt/sched/lane_tasks.hpp"
 #include "rt/sched/rendezvous.hpp"
@@ -129,8 +130,13 @@ bool Executor::run_partitioned(Policy policy, RunResult& result) {
       crew.started.arrive_and_wait();
       if (!crew.go.load()) return;
       start_counting();
+      Anticipation anticipation(longest_lead_ns(plan_, lane.members()));
       while (lane.next_release_ns() < stop_.end_ns()) {
-        stop_.sleep_until(lane.next_release_ns());
+        const int64_t release_ns = lane.next_release_ns();
+        if (anticipation.sleep_before(release_ns, clock_, stop_)) {
+          lane.rehearse();
+          Anticipation::stay_awake_until(release_ns, clock_);
+        }
         if (lane.next_release_ns() >= stop_.end_ns()) break;
         lane.run_next(clock_, stop_);
       }
@@ -164,7 +170,9 @@ void Executor::agree(Policy policy, RunResult& result) {
 
 void Executor::run_cooperative(RunResult& result) {
   crew_ = std::make_unique<Crew>(0);
-  crew_->queue = std::make_unique<CooperativeQueue>(lanes_, clock_, stop_);
+  int64_t lead_ns = plan_.anticipate_ns;
+  for (const auto& lane : lanes_) lead_ns = std::min(lead_ns, longest_lead_ns(plan_, lane->members()));
+  crew_->queue = std::make_unique<CooperativeQueue>(lanes_, clock_, stop_, lead_ns);
   watch(Policy::cooperative);
   const size_t workers = std::clamp<size_t>(plan_.cores.size(), 1, std::max<size_t>(lanes_.size(), 1));
   for (size_t i = 0; i < workers; ++i) {

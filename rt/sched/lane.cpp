@@ -64,6 +64,10 @@ TAKT_HOT void Lane::run_next(const Clock& clock, StopSignal& stop) {
   go_on(clock.now_ns(), stop.end_ns());
 }
 
+TAKT_HOT void Lane::rehearse() const {
+  for (const Task* task : tasks_) task->rehearse(next_release_ns_);
+}
+
 void Lane::go_on(int64_t now_ns, int64_t end_ns) {
   go_to(next_ + 1);
   skip_passed(now_ns, end_ns);
@@ -118,6 +122,10 @@ int64_t lane_budget_ns(const Plan& plan, const std::vector<size_t>& members) {
   int64_t sum = 0;
   for (const size_t t : members) sum += enforced_budget_ns(plan.tasks[t]);
   return sum;
+}
+
+int64_t longest_lead_ns(const Plan& plan, const std::vector<size_t>& members) {
+  return std::min(plan.anticipate_ns, lane_span_ns(plan, members) / 20);
 }
 
 int64_t lane_span_ns(const Plan& plan, const std::vector<size_t>& members) {

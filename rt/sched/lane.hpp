@@ -28,6 +28,9 @@ class Lane {
   /// Runs the next job of the head and the jobs it releases; afterwards moves on to the next release still wanted.
   /// Raises `stop` at the head's release if a device's recorded data ended.
   void run_next(const Clock& clock, StopSignal& stop);
+  /// Has at hand what the next pass will need: a job comes to caches that others have filled since the last one. Only
+  /// reads, and only while no job of the lane runs.
+  void rehearse() const;
   /// In virtual time, job by job: the member to run, and its release.
   struct Activation {
     size_t member = 0;
@@ -83,6 +86,9 @@ std::vector<std::vector<size_t>> lane_members(const Plan& plan);
 std::vector<std::pair<size_t, size_t>> low_before_high(const Plan& plan);
 /// CPU time that one pass of a lane may use.
 int64_t lane_budget_ns(const Plan& plan, const std::vector<size_t>& members);
+/// Bound of the time before a release at which a worker of that lane may be woken (Plan::anticipate_ns): no more than a
+/// twentieth of what the pass has.
+int64_t longest_lead_ns(const Plan& plan, const std::vector<size_t>& members);
 /// Longest time from the head's release to the last follower's deadline.
 int64_t lane_span_ns(const Plan& plan, const std::vector<size_t>& members);
 

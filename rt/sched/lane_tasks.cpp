@@ -111,6 +111,20 @@ LaneTasks unplaced(const Plan& plan, const Overheads& o) {
   return result;
 }
 
+/// A worker awake before its release takes the CPU from others as if its job arrived the longest lead earlier and
+/// needed that much more (cooperative workers are awake early only while they have nothing else to do). Under `fixed`
+/// that is exact from below: whatever a shorter lead leaves free, it leaves to the same job. Under `deadline` the
+/// kernel counts a deadline from the wake-up, and the leads of two lanes may differ by the longest one: what is proved
+/// is the deadline less that.
+void charge_leads(const Plan& plan, Policy policy, LaneTasks& lanes) {
+  for (size_t i = 0; i < lanes.lanes.size(); ++i) {
+    analysis::TimedTask& task = lanes.set.tasks[i];
+    const Ticks lead = longest_lead_ns(plan, lanes.lanes[i]) * lanes.set.ticks_per_ns;
+    task.budget += lead;
+    if (policy == Policy::deadline) task.deadline -= lead;
+  }
+}
+
 }  // namespace
 
 LaneTasks lane_tasks(const Plan& plan, Policy policy, const Overheads& overheads) {
@@ -128,6 +142,7 @@ LaneTasks lane_tasks(const Plan& plan, Policy policy, const Overheads& overheads
       result.set.tasks[i].deadline =
           std::min(result.set.tasks[i].deadline, reserved[i].deadline_ns * result.set.ticks_per_ns);
   }
+  if (policy != Policy::cooperative) charge_leads(plan, policy, result);
   return result;
 }
 
@@ -176,7 +191,7 @@ std::vector<Reservation> reservations(const Plan& plan, Policy policy) {
   std::vector<Reservation> wanted(lanes.size());
   const Placement placement = policy == Policy::fixed ? place_fixed(plan) : Placement{};
   for (size_t i = 0; i < lanes.size(); ++i) {
-    const int64_t budget_ns = lane_budget_ns(plan, lanes[i]);
+    const int64_t budget_ns = lane_budget_ns(plan, lanes[i]) + longest_lead_ns(plan, lanes[i]);
     if (policy == Policy::deadline)
       wanted[i] =
           deadline_reservation(budget_ns, lane_span_ns(plan, lanes[i]), plan.tasks[lanes[i].front()].rate->period_ns());

@@ -20,6 +20,8 @@ class Latch {
   /// Fills the node's other inputs for a job released at `release_ns` that starts at `now_ns`; returns how many are
   /// stale.
   size_t acquire(int64_t release_ns, int64_t now_ns);
+  /// Lists what acquire() would choose from, and chooses nothing.
+  void rehearse(int64_t release_ns) const;
   /// Empties all of them again.
   void release();
   /// Counts what was latched since the last call: apart, so that counting stands in no job's way.

@@ -42,6 +42,7 @@ std::string_view to_string(Criticality criticality);
 std::string_view to_string(OnOverrun verb);
 std::string_view to_string(OnMiss verb);
 
+inline constexpr int64_t kDefaultAnticipate_ns = 200'000, kLongestAnticipate_ns = 1'000'000;
 inline constexpr int64_t kDefaultMemory = 256'000'000;
 inline constexpr size_t kNone = std::numeric_limits<size_t>::max();
 
@@ -84,6 +85,8 @@ struct ModePlan {
 struct Plan {
   Policy policy = Policy::cooperative;
   std::vector<int> cores;
+  /// A worker may be woken this long before a release to be there in time (Anticipation); 0: none is.
+  int64_t anticipate_ns = 0;
   std::vector<TaskPlan> tasks;
   std::vector<PortPlan> ports;
   std::string mode = "full";    ///< of the start

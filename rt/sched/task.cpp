@@ -176,6 +176,19 @@ TAKT_HOT JobEnd Task::finish(int modelled_cpu) {
   return end;
 }
 
+TAKT_HOT void Task::rehearse(int64_t release_ns) const {
+  constexpr size_t kCounters = 512, kNode = 256, kPort = 128;  // bytes that every job touches
+  prefetch(this, sizeof *this);
+  prefetch(&statistics_, kCounters);
+  prefetch(plan_.node, kNode);
+  for (const InputPort* input : plan_.node->inputs()) prefetch(input, kPort);
+  for (const OutputPort* output : plan_.node->outputs()) prefetch(output, kPort);
+  prefetch(&board_.mail(index_), sizeof(ParamMail::state));
+  latch_.rehearse(release_ns);
+  // Reads the state of the pool, which a loan begins with.
+  for (const auto& writer : writers_) static_cast<void>(writer->statistics());
+}
+
 void Task::pass_over(int64_t now_ns, bool count) {
   std::fill(published_.begin(), published_.end(), false);
   ended_.paused = count;

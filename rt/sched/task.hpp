@@ -34,6 +34,8 @@ class Task {
     begin(index, release_ns);
     return finish();
   }
+  /// Looks at what the next job will look at first, so that it lies in the caches then. Before that job, on its thread.
+  void rehearse(int64_t release_ns) const;
   /// Its first half: latches and works. In virtual time a job is taken to need `duration_ns` at full quality; the time
   /// it needs at its level is the answer.
   int64_t begin(uint64_t index, int64_t release_ns, int64_t duration_ns = 0);

@@ -24,7 +24,7 @@ graph 's/type: mapping_3d/typ: mapping_3d/';                    run 2 "typ"
 
 # A cycle of `on` edges.
 graph 's/name: ace/name: cyclic/'
-sed -i -E 's/  stereo: \{rate: 15, offset: 26ms/  stereo: {on: ego_motion.motion/; s/  ego_motion: \{rate: 10, offset: 45ms/  ego_motion: {on: stereo.disparity/' "$work/schedules/thesis.yaml"
+sed -i -E 's/  stereo: \{rate: 15, offset: 26ms/  stereo: {on: ego_motion.motion/; s/  ego_motion: \{rate: 10, offset: 48ms/  ego_motion: {on: stereo.disparity/' "$work/schedules/thesis.yaml"
 run 2 "cycle"
 cp "$source"/schedules/*.yaml "$work/schedules/"
 

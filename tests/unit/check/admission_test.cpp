@@ -170,6 +170,29 @@ TEST_CASE("admission: fixed priorities are spread over the cores so that each fi
   CHECK(asked[0].priority > asked[1].priority);
 }
 
+TEST_CASE("admission: being awake before a release costs what it may cost at most") {
+  Plan plan = plan_of(Policy::fixed, {0, 1}, {task("a", 10, 5, 50), task("b", 100, 1, 2)});
+  plan.anticipate_ns = 200'000;
+  const auto budget = [&](Policy policy, size_t lane) { return lane_tasks(plan, policy, {}).set.tasks[lane].budget; };
+  const auto deadline = [&](Policy policy, size_t lane) {
+    return lane_tasks(plan, policy, {}).set.tasks[lane].deadline;
+  };
+  CHECK(budget(Policy::fixed, 0) == 5 * kMs + 200'000);
+  CHECK(deadline(Policy::fixed, 0) == 50 * kMs);
+  CHECK(budget(Policy::fixed, 1) == 1 * kMs + 100'000);  // a twentieth of 2 ms
+  CHECK(budget(Policy::deadline, 0) == 5 * kMs + 200'000);
+  CHECK(deadline(Policy::deadline, 0) == 50 * kMs - 200'000);
+  CHECK(budget(Policy::cooperative, 0) == 5 * kMs);
+  CHECK(deadline(Policy::cooperative, 0) == 50 * kMs);
+  CHECK(reservations(plan, Policy::deadline)[0].runtime_ns == 5 * kMs + 200'000);
+  CHECK(reservations(plan, Policy::deadline)[0].deadline_ns == 50 * kMs);
+  // Full to the last microsecond without it.
+  Plan full = plan_of(Policy::fixed, {0}, {task("a", 10, 50, 100), task("b", 10, 50, 100)});
+  CHECK(answer(full) == Answer::admitted);
+  full.anticipate_ns = 1'000;
+  CHECK(answer(full) != Answer::admitted);
+}
+
 TEST_CASE("admission: one percent below the margin is admitted, one above is refused") {
   std::mt19937 random(5);
   int seen = 0;

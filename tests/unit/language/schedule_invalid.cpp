@@ -46,6 +46,12 @@ TEST_CASE("Cores: at least one, each once") {
   expect_schedule("cores: [0, 1]", "cores: [-1]", "-1", {"a core number from 0 on"});
 }
 
+TEST_CASE("How early workers may be woken has bounds, and a unit") {
+  expect_schedule("cores: [0, 1]", "anticipate: 2ms", "2ms", {"`anticipate` is 2ms; it must lie between 0ms and 1ms"});
+  expect_schedule("cores: [0, 1]", "anticipate: -1us", "-1us", {"`anticipate` is -1us"});
+  expect_schedule("cores: [0, 1]", "anticipate: 100", "100", {"`anticipate` of the schedule", "write 100ms"});
+}
+
 TEST_CASE("A graph without a node of high criticality is invalid") {
   expect_schedule("criticality: high", "criticality: low", "nodes", {"no node has criticality high"});
 }

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "rt/sched/anticipation.hpp"
+
+#include <algorithm>
+
+#include "rt/hot.hpp"
+#include "rt/memory/memory_use.hpp"
+
+namespace takt {
+
+TAKT_HOT bool Anticipation::sleep_before(int64_t release_ns, const Clock& clock, const StopSignal& stop) {
+  const int64_t asked_ns = release_ns - lead_ns_;
+  stop.sleep_until(asked_ns);
+  if (longest_ns_ == 0) return false;
+  const int64_t now_ns = clock.now_ns();
+  if (now_ns < asked_ns) return false;  // a stop
+  learn(now_ns - asked_ns);
+  return now_ns < release_ns;
+}
+
+TAKT_HOT void Anticipation::stay_awake_until(int64_t release_ns, const Clock& clock) {
+  while (clock.now_ns() < release_ns) take_thread_use();
+}
+
+void Anticipation::learn(int64_t took_ns) {
+  // Steps of fixed size, so that one outlier moves it no more than any other: up four times as far as down, it rests
+  // where four of five are shorter.
+  lead_ns_ = std::clamp<int64_t>(lead_ns_ + (took_ns > lead_ns_ ? 4 * kStep_ns : -kStep_ns), 0, longest_ns_);
+}
+
+}  // namespace takt

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+
+#include "rt/sched/stop_signal.hpp"
+#include "rt/time/clock.hpp"
+
+namespace takt {
+
+/// Brings a worker to its release in time. A thread gets to run some time after the instant it asked to be woken at
+/// (timer interrupt, leaving the idle state, the switch), so a worker asks that much earlier and waits the rest of it
+/// out awake. Its lead follows what its wake-ups took: about four of five are to be there in time. The CPU time that
+/// this costs a release is bounded by `longest_ns`. One thread.
+class Anticipation {
+ public:
+  /// `longest_ns`: bound of the lead; 0: the worker sleeps until the release itself.
+  explicit Anticipation(int64_t longest_ns) : longest_ns_(longest_ns), lead_ns_(longest_ns) {}
+  /// Sleeps until the lead before `release_ns` of CLOCK_MONOTONIC, or until the stop. True if it then is still before
+  /// the release, and at most longest_ns before it: what is left is to be waited out.
+  bool sleep_before(int64_t release_ns, const Clock& clock, const StopSignal& stop);
+  /// Returns at `release_ns`. The CPU time of the thread up to then is no job's.
+  static void stay_awake_until(int64_t release_ns, const Clock& clock);
+
+  int64_t lead_ns() const { return lead_ns_; }
+  /// A wake-up came this long after the instant asked for.
+  void learn(int64_t took_ns);
+
+  static constexpr int64_t kStep_ns = 2'000;
+
+ private:
+  const int64_t longest_ns_;
+  int64_t lead_ns_;
+};
+
+}  // namespace takt
