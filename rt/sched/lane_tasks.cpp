@@ -113,9 +113,9 @@ LaneTasks unplaced(const Plan& plan, const Overheads& o) {
 
 /// A worker awake before its release takes the CPU from others as if its job arrived the longest lead earlier and
 /// needed that much more (cooperative workers are awake early only while they have nothing else to do). Under `fixed`
-/// that is exact from below: whatever a shorter lead leaves free, it leaves to the same job. Under `deadline` the
-/// kernel counts a deadline from the wake-up, and the leads of two lanes may differ by the longest one: what is proved
-/// is the deadline less that.
+/// no job ends later than that: what a shorter lead leaves free, it leaves to the same job. Under `deadline` the kernel
+/// counts a deadline from the wake-up, and the leads of two lanes may differ by the longest one: what is proved is the
+/// deadline less that.
 void charge_leads(const Plan& plan, Policy policy, LaneTasks& lanes) {
   for (size_t i = 0; i < lanes.lanes.size(); ++i) {
     analysis::TimedTask& task = lanes.set.tasks[i];

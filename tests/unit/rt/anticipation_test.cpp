@@ -74,10 +74,17 @@ TEST_CASE("anticipation: says whether something is left to wait for") {
   StopSignal stop;
   const int64_t release_ns = 1'000'000 * kUs;  // long past for the kernel: nobody sleeps here
   Anticipation anticipation(100 * kUs);
-  CHECK(anticipation.sleep_before(release_ns, SteppingClock(release_ns - 70 * kUs, 0), stop));  // took 30 us
+  const auto wakes = [&](int64_t from_ns, int64_t to_ns) {  // asleep at the first reading, awake at the second
+    return anticipation.sleep_before(release_ns, SteppingClock(2 * from_ns - to_ns, to_ns - from_ns), stop);
+  };
+  CHECK(wakes(release_ns - 130 * kUs, release_ns - 70 * kUs));  // took 30 us
   CHECK(anticipation.lead_ns() == 100 * kUs - Anticipation::kStep_ns);
-  CHECK_FALSE(anticipation.sleep_before(release_ns, SteppingClock(release_ns, 0), stop));  // took all of it
-  CHECK_FALSE(anticipation.sleep_before(release_ns, SteppingClock(release_ns + 5 * kUs, 0), stop));
+  CHECK_FALSE(wakes(release_ns - 130 * kUs, release_ns + 5 * kUs));  // took all of it
+  CHECK(anticipation.lead_ns() == 100 * kUs);
+  // Who was at work until then was not woken late.
+  CHECK(wakes(release_ns - 50 * kUs, release_ns - 10 * kUs));
+  CHECK_FALSE(wakes(release_ns + 400 * kUs, release_ns + 410 * kUs));
+  CHECK(anticipation.lead_ns() == 100 * kUs);
 }
 
 TEST_CASE("anticipation: a stop long before the release is not waited out") {
