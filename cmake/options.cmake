@@ -28,6 +28,11 @@ if(TAKT_SANITIZE MATCHES thread)
   add_library(takt_tsan_suppressions OBJECT ${PROJECT_SOURCE_DIR}/tests/tsan_suppressions.cpp)
 endif()
 
+option(TAKT_ONE_SIMD_TARGET "Compile SIMD kernels for the baseline CPU only: quicker where they are not what is tested" OFF)
+if(TAKT_ONE_SIMD_TARGET)
+  add_compile_definitions(HWY_COMPILE_ONLY_STATIC)
+endif()
+
 # For a directory whose code runs in no job: half the optimiser's time is half the time of a first build.
 macro(takt_build_quickly)
   add_compile_options($<$<CONFIG:Release>:-O1>)
