@@ -36,10 +36,14 @@ struct EvalEgoMotionOptions {
 void add_eval_ego_motion(CLI::App& eval, EvalEgoMotionOptions& options, int& exit_code);
 
 struct EvalObjectsOptions {
-  std::filesystem::path database;  ///< empty: graph/objects of the project
+  std::filesystem::path database;     ///< empty: graph/objects of the project
+  std::filesystem::path turntable;    ///< instead of a database; empty: none
+  std::filesystem::path backgrounds;  ///< empty: generated
   std::string bins = "64x64x1";
   uint64_t seed = 1;
   int frames = 100;
+  int images = 500, empty = 75;
+  double occlusion = 0.6;
   bool json = false;
 };
 void add_eval_objects(CLI::App& eval, EvalObjectsOptions& options, int& exit_code);

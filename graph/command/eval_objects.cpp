@@ -3,10 +3,14 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
 
 #include "graph/command/eval_command.hpp"
 #include "graph/command/prepare.hpp"
 #include "nodes/object_detection/evaluate.hpp"
+#include "nodes/object_detection/photographs.hpp"
+#include "nodes/object_detection/tally.hpp"
+#include "rt/time/clock.hpp"
 
 namespace takt::command {
 namespace {
@@ -16,6 +20,9 @@ using Json = nlohmann::ordered_json;
 
 /// Factors on all thresholds at which the trade-off between excluded windows and missed objects is shown.
 constexpr double kFactors[] = {0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4};
+
+/// Smallest scores at which the trade-off between missed objects and false positives is shown; the node's is the first.
+constexpr double kScores[] = {0.4, 0.25, 0.3, 0.35, 0.45, 0.5, 0.55, 0.6};
 
 struct Results {
   Measurement ours, mean_colour;
@@ -28,12 +35,15 @@ double median(std::vector<double> v) {
   return v[v.size() / 2];
 }
 
-Results measure_all(const EvalObjectsOptions& options) {
-  const auto database =
-      read_database(options.database.empty() ? shipped("graph/objects") : options.database, 48, TestViews::read);
+ColourBins bins_of(const EvalObjectsOptions& options) {
+  return options.bins == "64x32x2" ? ColourBins::hsv_64x32x2 : ColourBins::hsv_64x64x1;
+}
+
+Results measure_all(const EvalObjectsOptions& options, std::span<const DatabaseObject> database) {
   const SceneParameters scenes;
   DetectorParameters p;
-  p.bins = options.bins == "64x32x2" ? ColourBins::hsv_64x32x2 : ColourBins::hsv_64x64x1;
+  p.last = Stage::colour;
+  p.bins = bins_of(options);
   Detector detector(scenes.width, scenes.height, database, p);
   ColourStageTest ours(detector);
   MeanColourTest mean_colour(detector.grid(), database);
@@ -46,6 +56,98 @@ Results measure_all(const EvalObjectsOptions& options) {
   results.time_ms = median(ours.times_ms());
   results.windows_per_frame = detector.grid().windows();
   return results;
+}
+
+/// The cascade up to one stage, on every image.
+struct Contestant {
+  std::string name;
+  Detector detector;
+  std::vector<Tally> tallies;
+  std::vector<double> times_ms;
+
+  Contestant(std::string stages, Stage last, const EvalObjectsOptions& options, const SceneParameters& scenes,
+             std::span<const DatabaseObject> database)
+      : name(std::move(stages)), detector(scenes.width, scenes.height, database, [&] {
+          DetectorParameters p;
+          p.last = last;
+          p.bins = bins_of(options);
+          return p;
+        }()) {
+    for (const double score : kScores) tallies.emplace_back(score);
+  }
+  void search(const Scene& scene) {
+    const int64_t start = thread_cpu_ns();
+    detector.run(scene.view());
+    times_ms.push_back(static_cast<double>(thread_cpu_ns() - start) / 1e6);
+    std::vector<Detection> boxes(1000);
+    boxes.resize(detector.decision().detections(0, boxes));
+    for (Tally& tally : tallies) tally.add(scene, boxes);
+  }
+  double quantile_ms(double share) {
+    std::sort(times_ms.begin(), times_ms.end());
+    return times_ms[std::min(times_ms.size() - 1, static_cast<size_t>(share * static_cast<double>(times_ms.size())))];
+  }
+};
+
+/// Photographs of 640 x 480 in a folder, by name; those of other sizes are left out.
+std::vector<cv::Mat3b> photographs(const std::filesystem::path& folder, const SceneParameters& p) {
+  std::vector<cv::String> files;
+  cv::glob((folder / "*.png").string(), files);
+  std::vector<cv::Mat3b> images;
+  for (const cv::String& file : files) {
+    const cv::Mat image = cv::imread(file, cv::IMREAD_UNCHANGED);
+    if (image.type() == CV_8UC3 && image.cols == p.width && image.rows == p.height) images.emplace_back(image);
+  }
+  if (images.empty()) throw std::runtime_error(folder.string() + " holds no colour PNG of 640 x 480");
+  return images;
+}
+
+Json to_json(Contestant& contestant) {
+  Json scores = Json::array();
+  for (const Tally& tally : contestant.tallies)
+    scores.push_back({{"min_score", tally.min_score()},
+                      {"detected_pct", tally.detected_pct()},
+                      {"missed", tally.missed()},
+                      {"false_positives", tally.false_positives()}});
+  Json occluded = Json::array();
+  for (size_t tenth = 0; tenth < Tally::kTenths; ++tenth) occluded.push_back(contestant.tallies[0].missed_pct(tenth));
+  return {{"stages", contestant.name},
+          {"scores", scores},
+          {"missed_pct_by_tenth_occluded", occluded},
+          {"cpu_ms",
+           {{"p50", contestant.quantile_ms(0.5)},
+            {"p99", contestant.quantile_ms(0.99)},
+            {"max", contestant.quantile_ms(1)}}}};
+}
+
+/// One object in each of `images` scenes, none in `empty` ones.
+Json measure_cascade(const EvalObjectsOptions& options, std::span<const DatabaseObject> database) {
+  SceneParameters p;
+  p.scale_max = 1.3;
+  p.occlusion_max = options.occlusion;
+  std::vector<cv::Mat3b> backgrounds;
+  if (!options.backgrounds.empty()) backgrounds = photographs(options.backgrounds, p);
+  std::vector<Contestant> contestants;
+  contestants.reserve(kStages);
+  contestants.emplace_back("ch", Stage::colour, options, p, database);
+  contestants.emplace_back("ch+hog", Stage::orientation, options, p, database);
+  contestants.emplace_back("ch+hog+cch", Stage::cooccurrence, options, p, database);
+  for (int i = 0; i < options.images + options.empty; ++i) {
+    p.fewest_objects = p.most_objects = i < options.images ? 1 : 0;
+    if (!backgrounds.empty()) {
+      const cv::Mat3b& image = backgrounds[static_cast<size_t>(i) % backgrounds.size()];
+      p.background = {image.data, image.cols, image.rows, 3};
+    }
+    const Scene scene = make_scene(database, p, options.seed, static_cast<uint64_t>(i));
+    for (Contestant& contestant : contestants) contestant.search(scene);
+  }
+  Json out = {{"images", options.images},
+              {"images_without_object", options.empty},
+              {"objects", database.size()},
+              {"occlusion_max", options.occlusion},
+              {"stage_sets", Json::array()}};
+  for (Contestant& contestant : contestants) out["stage_sets"].push_back(to_json(contestant));
+  return out;
 }
 
 Json curve(const Measurement& measurement) {
@@ -81,7 +183,7 @@ Json to_json(const EvalObjectsOptions& options, const Results& r) {
             {"missed_pct", baseline.missed_pct}}}};
 }
 
-void print(const Json& out) {
+void print_exclusion(const Json& out) {
   const auto number = [](const Json& value) { return value.get<double>(); };
   std::printf("%-44s %10s %9s %8s\n", "method", "excluded %", "missed %", "CPU ms");
   std::printf("%-44s %10.2f %9.2f %8.2f\n", "takt colour stage, thresholds of the database",
@@ -99,12 +201,46 @@ void print(const Json& out) {
                 number(row["excluded_pct"]), number(row["missed_pct"]));
 }
 
+void print_cascade(const Json& out) {
+  const auto number = [](const Json& value) { return value.get<double>(); };
+  std::printf("\n%.0f images with and %.0f without an object, of %.0f; occluded up to %.0f %%; min_score %.2f\n",
+              number(out["images"]), number(out["images_without_object"]), number(out["objects"]),
+              100 * number(out["occlusion_max"]), kScores[0]);
+  std::printf("%-12s %10s %7s %6s   %-42s %s\n", "stages", "detected %", "missed", "false",
+              "missed % by tenths occluded", "CPU ms p50 p99 max");
+  for (const Json& set : out["stage_sets"]) {
+    const Json& now = set["scores"][0];
+    std::printf("%-12s %10.1f %7.0f %6.0f  ", set["stages"].get<std::string>().c_str(), number(now["detected_pct"]),
+                number(now["missed"]), number(now["false_positives"]));
+    for (const Json& tenth : set["missed_pct_by_tenth_occluded"])
+      std::printf(number(tenth) < 0 ? "      -" : " %6.1f", number(tenth));
+    std::printf("  %6.2f %6.2f %6.2f\n", number(set["cpu_ms"]["p50"]), number(set["cpu_ms"]["p99"]),
+                number(set["cpu_ms"]["max"]));
+  }
+  std::printf("%-12s %10d %7d %6d\n", "thesis", 95, 23, 7);
+  for (const Json& set : out["stage_sets"]) {
+    std::printf("%-12s min_score: missed / false ", set["stages"].get<std::string>().c_str());
+    for (const Json& at : set["scores"])
+      std::printf("  %.2f: %.0f / %.0f", number(at["min_score"]), number(at["missed"]), number(at["false_positives"]));
+    std::printf("\n");
+  }
+}
+
 int evaluate(const EvalObjectsOptions& options) {
   try {
     cv::setNumThreads(1);
-    const Json out = to_json(options, measure_all(options));
-    if (options.json) std::printf("%s\n", out.dump(2).c_str());
-    else print(out);
+    const auto database =
+        options.turntable.empty()
+            ? read_database(options.database.empty() ? shipped("graph/objects") : options.database, 48, TestViews::read)
+            : read_turntable(options.turntable, 48);
+    Json out = to_json(options, measure_all(options, database));
+    out["cascade"] = measure_cascade(options, database);
+    if (options.json) {
+      std::printf("%s\n", out.dump(2).c_str());
+    } else {
+      print_exclusion(out);
+      print_cascade(out["cascade"]);
+    }
     return kOk;
   } catch (const std::exception& error) {
     return refuse(error.what(), kBadInput);
@@ -114,11 +250,23 @@ int evaluate(const EvalObjectsOptions& options) {
 }  // namespace
 
 void add_eval_objects(CLI::App& eval, EvalObjectsOptions& o, int& exit_code) {
-  CLI::App* app = eval.add_subcommand("objects", "windows excluded and objects missed on generated scenes");
-  app->add_option("--database", o.database, "folder with objects.txt (default graph/objects)");
+  CLI::App* app = eval.add_subcommand(
+      "objects",
+      "histogram cascade on scenes with known objects: windows excluded, detections, misses, false positives");
+  auto* database = app->add_option("--database", o.database, "folder with objects.txt (default graph/objects)");
+  app->add_option("--turntable", o.turntable,
+                  "instead: photographs objNUMBER__ANGLE.png, every 60 degrees a view (COIL-100)")
+      ->excludes(database);
+  app->add_option("--backgrounds", o.backgrounds, "folder with photographs, 640 x 480 PNG (default: generated)");
   app->add_option("--bins", o.bins, "64x64x1 (default) | 64x32x2")->check(CLI::IsMember({"64x32x2", "64x64x1"}));
   app->add_option("--seed", o.seed, "seed of the scenes (default 1)");
-  app->add_option("--frames", o.frames, "number of scenes (default 100)")->check(CLI::Range(1, 100000));
+  app->add_option("--frames", o.frames, "scenes for the exclusion by colour (default 100)")
+      ->check(CLI::Range(1, 100000));
+  app->add_option("--images", o.images, "scenes with one object for the cascade (default 500)")
+      ->check(CLI::Range(1, 100000));
+  app->add_option("--empty", o.empty, "scenes without (default 75)")->check(CLI::Range(0, 100000));
+  app->add_option("--occlusion", o.occlusion, "largest share of an object that an occluder hides (default 0.6)")
+      ->check(CLI::Range(0.0, 0.9));
   app->add_flag("--json", o.json, "one JSON object on stdout");
   app->callback([&] { exit_code = evaluate(o); });
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Image preparation of the colour stage: each pixel's colour index I_ch (algorithm reference 6.1, bins after 21.7).
+// Image preparation of the stages that look at colour: each pixel's indices I_ch (algorithm reference 6.1, bins after
+// 21.7) and I_cch.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -23,5 +24,24 @@ uint16_t colour_bin(uint8_t blue, uint8_t green, uint8_t red, ColourBins bins);
 
 /// The same for `count` interleaved BGR pixels, vectorised; equal to colour_bin for every colour.
 void colour_bins(const uint8_t* bgr, size_t count, ColourBins bins, uint16_t* index);
+
+/// How the few colours of the co-occurrence stage, 5 or 20, are told apart: black where the value is small, greys
+/// where the saturation is, else hues.
+///
+///     20   0 V < 0.15; S < 0.15: 1 V < 0.45, 2 V < 0.8, 3 brighter; 4 + floor(16 H / 360 degrees)
+///      5   0 V < 0.2;  S < 0.2: 1;                                  2 + floor(3 H / 360 degrees)
+struct PairColourSplit {
+  int black_below, grey_below, mid_from, bright_from;  ///< V in 8 bit; S in twentieths
+  int first_hue, hues;
+};
+constexpr PairColourSplit pair_split_of(int colours) {
+  constexpr int kNever = 256;
+  return colours == 20 ? PairColourSplit{39, 3, 115, 204, 4, 16} : PairColourSplit{51, 4, kNever, kNever, 2, 3};
+}
+/// Index of one colour among them.
+uint8_t pair_colour(uint8_t blue, uint8_t green, uint8_t red, int colours);
+
+/// The same for `count` interleaved BGR pixels, vectorised; equal to pair_colour for every colour.
+void pair_colours(const uint8_t* bgr, size_t count, int colours, uint8_t* index);
 
 }  // namespace takt::object_detection

@@ -50,7 +50,7 @@ ColourStage::ObjectBins ColourStage::gather(const std::vector<Histogram>& views)
       throw std::invalid_argument("a reference has " + std::to_string(view.mass) + " pixels, must have 1 .. 65535");
     const size_t row = object.rows.size();
     object.rows.resize(row + object.slots.size());
-    for (size_t i = 0; i < bins.size(); ++i) object.rows[row + i] = view.count[bins[i]];
+    for (size_t i = 0; i < bins.size(); ++i) object.rows[row + i] = static_cast<uint16_t>(view.count[bins[i]]);
   }
   object.references = views.size();
   return object;
@@ -77,7 +77,7 @@ void ColourStage::begin(ImageView<const uint8_t> bgr, int first_row) {
   windows_->begin(index_.data(), row_);
 }
 
-void ColourStage::search_row() {
+int ColourStage::search_row() {
   if (row_ == grid_.rows) windows_->begin(index_.data(), row_ = 0);
   uint16_t* out = missing_.data() + static_cast<size_t>(row_ * grid_.columns) * references_;
   for (int u = 0; u < grid_.columns; ++u) {
@@ -89,7 +89,7 @@ void ColourStage::search_row() {
       out += object.references;
     }
   }
-  ++row_;
+  return row_++;
 }
 
 }  // namespace takt::object_detection

@@ -26,8 +26,8 @@ class ColourStage {
   void run(ImageView<const uint8_t> bgr);
   /// The same in portions: no window is searched yet, and search_row() begins at that row of windows, 0 .. rows - 1.
   void begin(ImageView<const uint8_t> bgr, int first_row);
-  /// Searches the next row of windows, after the last one row 0; at most once per row.
-  void search_row();
+  /// Searches the next row of windows, after the last one row 0, and returns which one; at most once per row.
+  int search_row();
 
   size_t references() const { return references_; }
   /// The missing mass of every reference, object by object, for window 0, 1 ... (row by row).

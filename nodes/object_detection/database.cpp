@@ -44,10 +44,14 @@ class Reader {
     if (key != "object" && key != "threshold" && key != "view" && key != "test_view")
       fail("unknown word `" + key + "`; " + kWords);
     if (key != "object" && objects_.empty()) fail("`" + key + "` stands before the first `object NAME`");
-    if (words.size() < 2 || words.size() > (key == "view" ? 3u : 2u))
-      fail("`" + key + "` takes " + (key == "view" ? "a file and at most a threshold" : "exactly one word"));
+    const size_t most = key == "view" ? 2 + kStages : key == "threshold" ? 1 + kStages : 2;
+    if (words.size() < 2 || words.size() > most)
+      fail("`" + key + "` takes " +
+           (key == "view"        ? "a file and at most three thresholds"
+            : key == "threshold" ? "one to three thresholds"
+                                 : "exactly one word"));
     if (key == "object") begin(words[1]);
-    else if (key == "threshold") threshold(words[1]);
+    else if (key == "threshold") threshold(words);
     else if (key == "view") add_view(words);
     else if (test_views_ == TestViews::read) objects_.back().test_views.push_back(load(words[1]));
   }
@@ -66,10 +70,18 @@ class Reader {
       fail("object `" + objects_.back().name + "` has no view; write `view FILE` below it");
   }
 
-  void threshold(const std::string& word) {
+  void threshold(const std::vector<std::string>& words) {
     if (threshold_given_) fail("object `" + objects_.back().name + "` has a threshold already");
     threshold_given_ = true;
-    if (word != "auto") objects_.back().threshold = number(word);
+    objects_.back().thresholds = thresholds(words, 1);
+  }
+
+  /// From that word on.
+  Thresholds thresholds(const std::vector<std::string>& words, size_t first) const {
+    Thresholds thresholds;
+    for (size_t i = first; i < words.size(); ++i)
+      if (words[i] != "auto") thresholds[i - first] = number(words[i]);
+    return thresholds;
   }
 
   double number(const std::string& word) const {
@@ -80,13 +92,13 @@ class Reader {
     } catch (const std::exception&) {
     }
     if (used != word.size() || !(value > 0 && value <= 1))
-      fail("the threshold is `" + word + "`, must be a number above 0 and at most 1, or auto for an object");
+      fail("the threshold is `" + word + "`, must be a number above 0 and at most 1, or auto");
     return value;
   }
 
   void add_view(const std::vector<std::string>& words) {
     ReferenceView view = load(words[1]);
-    if (words.size() == 3) view.threshold = number(words[2]);
+    view.thresholds = thresholds(words, 2);
     objects_.back().views.push_back(std::move(view));
   }
 

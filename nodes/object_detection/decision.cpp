@@ -14,57 +14,48 @@ bool better(const Detection& a, const Detection& b) {
 
 }  // namespace
 
-Decision::Decision(const SearchGrid& grid, std::span<const std::vector<ReferenceLimit>> objects) : grid_(grid) {
+StageLimits::StageLimits(std::span<const std::vector<ReferenceLimit>> objects) {
   for (const auto& references : objects) {
     auto& limits = limits_.emplace_back();
     // missing / mass < threshold, with whole numbers on the left: missing < ceil(threshold * mass)
     for (const ReferenceLimit& reference : references)
-      limits.push_back({static_cast<uint32_t>(std::ceil(std::max(0.0, reference.threshold * reference.mass))),
-                        static_cast<float>(reference.mass)});
+      limits.push_back(reference.mass == 0 ? Limit{1, 1.0f}
+                                           : Limit{static_cast<uint32_t>(
+                                                       std::ceil(std::max(0.0, reference.threshold * reference.mass))),
+                                                   static_cast<float>(reference.mass)});
   }
-  const auto windows = static_cast<size_t>(grid.windows());
-  errors_.resize(windows * objects.size());
-  passed_.resize(windows);
-  visited_.resize(windows);
-  stack_.resize(windows);
 }
 
-void Decision::decide(std::span<const uint16_t> missing) {
-  const size_t windows = passed_.size(), references = missing.size() / windows;
-  for (size_t window = 0; window < windows; ++window) decide_window(window, missing.data() + window * references);
+Decision::Decision(const SearchGrid& grid, size_t objects)
+    : grid_(grid), windows_(static_cast<size_t>(grid.windows())) {
+  errors_.assign(windows_ * objects, kFailed);
+  visited_.resize(windows_);
+  stack_.resize(windows_);
 }
 
-void Decision::decide_window(size_t window, const uint16_t* missing) {
-  bool any = false;
-  for (size_t object = 0; object < limits_.size(); ++object) {
-    float best = kFailed;
-    for (const Limit& limit : limits_[object]) {
-      const uint16_t mass = *missing++;
-      if (mass < limit.below) best = std::min(best, static_cast<float>(mass) / limit.mass);
-    }
-    errors_[object * passed_.size() + window] = best;
-    any = any || best < kFailed;
-  }
-  passed_[window] = any ? 255 : 0;
-}
+void Decision::clear() { std::fill(errors_.begin(), errors_.end(), kFailed); }
 
-std::span<const float> Decision::errors(size_t object) const {
-  return std::span(errors_).subspan(object * passed_.size(), passed_.size());
+bool Decision::passes(size_t window) const {
+  for (size_t i = window; i < errors_.size(); i += windows_)
+    if (errors_[i] < kFailed) return true;
+  return false;
 }
 
 void Decision::region_of_interest(ImageView<uint8_t> roi) const {
-  const auto columns = static_cast<size_t>(grid_.columns);
+  size_t window = 0;
   for (int v = 0; v < grid_.rows; ++v)
-    std::copy_n(passed_.data() + static_cast<size_t>(v) * columns, columns, roi.row(v));
+    for (int u = 0; u < grid_.columns; ++u) roi.at(u, v) = passes(window++) ? 255 : 0;
 }
 
 size_t Decision::passed_windows() const {
-  return passed_.size() - static_cast<size_t>(std::count(passed_.begin(), passed_.end(), uint8_t{0}));
+  size_t passed = 0;
+  for (size_t window = 0; window < windows_; ++window) passed += passes(window);
+  return passed;
 }
 
 size_t Decision::detections(double min_score, std::span<Detection> out) {
   size_t found = 0;
-  for (size_t object = 0; object < limits_.size(); ++object) {
+  for (size_t object = 0; object < objects(); ++object) {
     const std::span<const float> errors = this->errors(object);
     std::fill(visited_.begin(), visited_.end(), uint8_t{0});
     for (size_t window = 0; window < errors.size(); ++window) {

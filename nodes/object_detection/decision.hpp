@@ -2,6 +2,7 @@
 // What the errors of a stage mean: which windows pass, and which objects are there (thesis Eq. 3.18, in the OR form of
 // algorithm reference 6.7).
 #pragma once
+#include <algorithm>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -12,48 +13,72 @@
 
 namespace takt::object_detection {
 
-/// One reference view: its mass (pixels) and the error (0..1) below which a window passes.
+/// One reference view: its mass (pixels, or pairs of them) and the error (0..1) below which a window passes.
 struct ReferenceLimit {
   uint32_t mass = 0;
   double threshold = 0;
 };
 
-/// Memory is taken by the constructor; the rest allocates nothing. One thread at a time.
-class Decision {
+constexpr float kFailed = 2.0f;  ///< error of a window that no reference of the object passes
+
+/// The limits of a stage.
+class StageLimits {
  public:
-  static constexpr float kFailed = 2.0f;  ///< error of a window that no reference of the object passes
-
   /// `objects`: per object its references, in the stage's order.
-  Decision(const SearchGrid& grid, std::span<const std::vector<ReferenceLimit>> objects);
+  explicit StageLimits(std::span<const std::vector<ReferenceLimit>> objects);
 
-  /// Takes the stage's missing masses (windows x references). A window passes for an object if the error of at least
-  /// one of its references is below that reference's threshold; it passes at all if it does for one object.
-  void decide(std::span<const uint16_t> missing);
-
-  /// After decide(): per window the smallest error of the object's references that pass, else kFailed.
-  std::span<const float> errors(size_t object) const;
-  /// After decide(): the region of interest, columns x rows, 255 where a window passes, else 0.
-  void region_of_interest(ImageView<uint8_t> roi) const;
-  size_t passed_windows() const;
-
-  /// After decide(): one detection per object and group of touching windows that pass (8 neighbours), at the group's
-  /// window with the smallest error; of equals the upper left one. class_id is the object's index, score 1 - error.
-  /// Those below `min_score` are left out: thresholds are loose, so that the next stage misses nothing. Fills `out`
-  /// with the best, best first (equal scores: lower class, then upper left first); returns how many.
-  size_t detections(double min_score, std::span<Detection> out);
+  /// From the missing masses of the object's references in a window: the smallest error of those that pass, else
+  /// kFailed. A reference passes if its error is below its threshold; one without mass always does.
+  template <class Mass>
+  float error(size_t object, const Mass* missing) const {
+    float best = kFailed;
+    for (const Limit& limit : limits_[object]) {
+      const Mass mass = *missing++;
+      if (mass < limit.below) best = std::min(best, static_cast<float>(mass) / limit.mass);
+    }
+    return best;
+  }
 
  private:
   struct Limit {
     uint32_t below;  ///< a missing mass below this passes
     float mass;
   };
-  void decide_window(size_t window, const uint16_t* missing);
+  std::vector<std::vector<Limit>> limits_;
+};
+
+/// The merged error map of each object: what is known of each window after the last stage that looked at it. Memory is
+/// taken by the constructor; the rest allocates nothing. One thread at a time.
+class Decision {
+ public:
+  Decision(const SearchGrid& grid, size_t objects);
+
+  /// No window passes.
+  void clear();
+  /// A window passes for an object with an error, or fails (kFailed).
+  void set(size_t object, size_t window, float error) { errors_[object * windows_ + window] = error; }
+  /// Per window the object's error, or kFailed.
+  std::span<const float> errors(size_t object) const { return std::span(errors_).subspan(object * windows_, windows_); }
+  size_t objects() const { return errors_.size() / windows_; }
+
+  /// The region of interest, columns x rows, 255 where a window passes for any object, else 0.
+  void region_of_interest(ImageView<uint8_t> roi) const;
+  size_t passed_windows() const;
+
+  /// One detection per object and group of touching windows that pass (8 neighbours), at the group's window with the
+  /// smallest error; of equals the upper left one. class_id is the object's index, score 1 - error. Those below
+  /// `min_score` are left out. Fills `out` with the best, best first (equal scores: lower class, then upper left
+  /// first); returns how many.
+  size_t detections(double min_score, std::span<Detection> out);
+
+ private:
+  bool passes(size_t window) const;
   size_t best_of_group(std::span<const float> errors, size_t seed);
 
   SearchGrid grid_;
-  std::vector<std::vector<Limit>> limits_;
+  size_t windows_;
   std::vector<float> errors_;  ///< object by object
-  std::vector<uint8_t> passed_, visited_;
+  std::vector<uint8_t> visited_;
   std::vector<uint32_t> stack_;
 };
 

@@ -62,7 +62,7 @@ void ColourStageTest::search(const Scene& scene) {
 }
 
 float ColourStageTest::factor(int window, size_t object) const {
-  const auto limits = detector_.limits();
+  const auto& limits = detector_.limits(Stage::colour);
   size_t references = 0, first = 0;
   for (size_t o = 0; o < limits.size(); ++o) {
     if (o == object) first = references;

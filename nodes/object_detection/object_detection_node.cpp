@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
 #include <optional>
 #include <string>
 
@@ -18,7 +20,10 @@ class ObjectDetectionNode final : public Node {
       throw SetupError("`pair` has " + std::to_string(images.channels) +
                        " channel(s), must have three: objects are found by their colour");
     DetectorParameters p;
+    p.last = static_cast<Stage>(stages_());
     p.bins = static_cast<ColourBins>(bins_());
+    p.orientations = std::array{8, 32, 180, 360}[orientations_()];
+    p.pairs = std::array<PairBins, 4>{{{5, 5}, {20, 5}, {5, 25}, {20, 25}}}[pairs_()];
     p.window_px = window_;
     p.tolerance = tolerance_;
     p.threshold_scale = threshold_scale_;
@@ -38,9 +43,13 @@ class ObjectDetectionNode final : public Node {
   void run(Job& job) override {
     const StereoPair* pair = pair_.newest();
     if (!pair || !pair_.is_new()) return job.no_result();
+    // Half of the time is kept for co-occurrences: they decide on what is reported.
     const auto reserve_ns = static_cast<int64_t>(reserve_() * 1e9);
-    const auto may_go_on = [&] { return job.time_left_ns() > reserve_ns; };
-    if (!detector_->run(pair->left_view(), may_go_on)) return job.no_result();
+    const int64_t kept_ns =
+        detector_->last() == Stage::cooccurrence ? std::max<int64_t>(0, job.time_left_ns() - reserve_ns) / 2 : 0;
+    const auto another_row = [&] { return job.time_left_ns() > reserve_ns + kept_ns; };
+    const auto another_window = [&] { return job.time_left_ns() > reserve_ns; };
+    if (!detector_->run(pair->left_view(), another_row, another_window)) return job.no_result();
     Detections* found = detections_.connected() ? detections_.loan() : nullptr;
     if (found != nullptr) {
       found->image_width = pair->width;
@@ -70,7 +79,14 @@ class ObjectDetectionNode final : public Node {
 
   Param<std::string> database_{this, "database", "objects", kPath,
                                "folder with objects.txt and the reference views it names"};
+  Choice stages_{this,
+                 "stages",
+                 "ch+hog+cch",
+                 {"ch", "ch+hog", "ch+hog+cch"},
+                 "colours, oriented gradients, colour co-occurrences; each looks at what passed the one before"};
   Choice bins_{this, "bins", "64x64x1", {"64x32x2", "64x64x1"}, "bins of hue x saturation x value"};
+  Choice orientations_{this, "orientations", "360", {"8", "32", "180", "360"}, "bins of the gradient's orientation"};
+  Choice pairs_{this, "pairs", "20x25", {"5x5", "20x5", "5x25", "20x25"}, "colours x distances of co-occurrences"};
   Param<int> reference_{this, "reference", 48, {4, 254}, "px", "edge of the reference views"};
   Param<int> window_{this,     "window", 64,
                      {5, 255}, "px",     "edge of a search window; neighbours overlap by the reference's edge"};
@@ -80,7 +96,7 @@ class ObjectDetectionNode final : public Node {
       "1",  "share of a reference that occlusion or distance may take; added to automatic thresholds"};
   Param<double> threshold_scale_{
       this, "threshold_scale", 1.0, {0.05, 4.0}, "1", "factor on the thresholds of the database"};
-  Param<double> min_score_{this,       "min_score", 0.5,
+  Param<double> min_score_{this,       "min_score", 0.4,
                            {0.0, 1.0}, "1",         "smallest score (1 - error) of a detection; roi is not affected"};
   Param<double> reserve_{this,       "reserve", 0.001,
                          {0.0, 1.0}, "s",       "with less time left than this the search ends and its best is sent"};
@@ -93,7 +109,7 @@ class ObjectDetectionNode final : public Node {
 
 void register_object_detection(NodeTypes& types) {
   types.add<ObjectDetectionNode>("object_detection", Layer::perception,
-                                 "Known objects by colour histograms on a grid of windows");
+                                 "Known objects by a cascade of histograms on a grid of windows");
 }
 
 }  // namespace takt

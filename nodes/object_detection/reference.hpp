@@ -1,12 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
-// The colour stage in its slow obvious form, for tests: every window counted pixel by pixel, every bin compared.
+// The stages in their slow obvious form, for tests: every window counted pixel by pixel or pair by pair, every bin
+// compared.
 #pragma once
+#include <algorithm>
+#include <cmath>
+#include <numbers>
 #include <vector>
 
 #include "nodes/object_detection/grid.hpp"
 #include "nodes/object_detection/histogram.hpp"
 
 namespace takt::object_detection {
+
+/// Colours of the pixels in the window of `side` px at (x0, y0).
+inline std::vector<uint32_t> colour_window_reference(ImageView<const uint8_t> bgr, int x0, int y0, int side,
+                                                     ColourBins bins) {
+  std::vector<uint32_t> count(kColourBins);
+  for (int y = y0; y < y0 + side; ++y)
+    for (int x = x0; x < x0 + side; ++x) ++count[colour_bin(bgr.at(x, y, 0), bgr.at(x, y, 1), bgr.at(x, y, 2), bins)];
+  return count;
+}
 
 /// Missing masses, windows x references, as ColourStage gives them.
 inline std::vector<uint16_t> colour_stage_reference(const SearchGrid& grid, ColourBins bins,
@@ -15,16 +28,73 @@ inline std::vector<uint16_t> colour_stage_reference(const SearchGrid& grid, Colo
   std::vector<uint16_t> missing;
   for (int v = 0; v < grid.rows; ++v) {
     for (int u = 0; u < grid.columns; ++u) {
-      std::vector<uint16_t> histogram(kColourBins);
-      for (int y = grid.y0(v); y < grid.y0(v) + grid.window_px; ++y)
-        for (int x = grid.x0(u); x < grid.x0(u) + grid.window_px; ++x)
-          ++histogram[colour_bin(bgr.at(x, y, 0), bgr.at(x, y, 1), bgr.at(x, y, 2), bins)];
+      const auto histogram = colour_window_reference(bgr, grid.x0(u), grid.y0(v), grid.window_px, bins);
       for (const auto& views : objects)
         for (const Histogram& view : views)
           missing.push_back(static_cast<uint16_t>(missing_mass(histogram, view.count)));
     }
   }
   return missing;
+}
+
+/// Orientation index of pixel (x, y), thesis Eq. 3.12 and 3.13 as printed; -1 where there is none.
+inline int orientation_reference(ImageView<const uint8_t> bgr, int x, int y, int orientations) {
+  if (x < 1 || y < 1 || x + 1 >= bgr.width || y + 1 >= bgr.height) return -1;
+  constexpr int kAcross[3][3] = {{1, 0, -1}, {2, 0, -2}, {1, 0, -1}};
+  int gx = 0, gy = 0;
+  for (int j = -1; j <= 1; ++j) {
+    for (int i = -1; i <= 1; ++i) {
+      const int value =
+          std::max({bgr.at(x - i, y - j, 0), bgr.at(x - i, y - j, 1), bgr.at(x - i, y - j, 2)});  // a convolution
+      gx += kAcross[j + 1][i + 1] * value;
+      gy += kAcross[i + 1][j + 1] * value;
+    }
+  }
+  if (std::hypot(gx, gy) < OrientationBins::kShortest) return -1;
+  const double turn = std::atan2(gy, gx) / (2 * std::numbers::pi);
+  // Only multiples of 45 degrees lie on a border; rounding must not take them off it.
+  return static_cast<int>(std::floor((turn < 0 ? turn + 1 : turn) * orientations + 1e-9)) % orientations;
+}
+
+/// Orientations of the pixels in the window of `side` px at (x0, y0).
+inline std::vector<uint32_t> orientation_window_reference(ImageView<const uint8_t> bgr, int x0, int y0, int side,
+                                                          int orientations) {
+  std::vector<uint32_t> count(static_cast<size_t>(orientations));
+  for (int y = y0; y < y0 + side; ++y)
+    for (int x = x0; x < x0 + side; ++x)
+      if (const int bin = orientation_reference(bgr, x, y, orientations); bin >= 0) ++count[static_cast<size_t>(bin)];
+  return count;
+}
+
+/// Co-occurrences of a square of colours in the order of pair_bin: every pixel with every offset of a half plane.
+inline std::vector<uint32_t> cooccurrence_reference(const std::vector<uint8_t>& colour, int side,
+                                                    const PairBins& bins) {
+  std::vector<uint32_t> count(pair_bins(bins.colours, bins.distances));
+  for (int dy = 0; dy <= bins.distances; ++dy) {
+    for (int dx = dy == 0 ? 1 : -bins.distances; dx <= bins.distances; ++dx) {
+      const auto k = static_cast<int>(std::lround(std::hypot(dx, dy)));
+      if (k > bins.distances) continue;
+      for (int y = 0; y + dy < side; ++y) {
+        for (int x = std::max(0, -dx); x < side - std::max(0, dx); ++x) {
+          const int a = colour[static_cast<size_t>(y * side + x)],
+                    b = colour[static_cast<size_t>((y + dy) * side + x + dx)];
+          if (a >= bins.colours || b >= bins.colours) continue;
+          ++count[pair_bin(std::min(a, b), std::max(a, b), k, bins.colours, bins.distances)];
+        }
+      }
+    }
+  }
+  return count;
+}
+
+/// The same of a window.
+inline std::vector<uint32_t> cooccurrence_window_reference(ImageView<const uint8_t> bgr, int x0, int y0, int side,
+                                                           const PairBins& bins) {
+  std::vector<uint8_t> colour;
+  for (int y = y0; y < y0 + side; ++y)
+    for (int x = x0; x < x0 + side; ++x)
+      colour.push_back(pair_colour(bgr.at(x, y, 0), bgr.at(x, y, 1), bgr.at(x, y, 2), bins.colours));
+  return cooccurrence_reference(colour, side, bins);
 }
 
 }  // namespace takt::object_detection

@@ -1,56 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
-#include <hwy/targets.h>
 
 #include <algorithm>
-#include <random>
 #include <vector>
 
 #include "nodes/object_detection/colour_stage.hpp"
 #include "nodes/object_detection/reference.hpp"
+#include "tests/property/object_detection/random_images.hpp"
 
 using namespace takt;
 using namespace takt::object_detection;
+using takt::test::Random;
+using takt::test::with_each_target;
 
 namespace {
 
 constexpr ColourBins kBoth[] = {ColourBins::hsv_64x32x2, ColourBins::hsv_64x64x1};
-
-/// Runs the body once with each SIMD target that this machine has, alone.
-template <class Body>
-void with_each_target(const Body& body) {
-  for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    hwy::SetSupportedTargetsForTest(target);
-    CAPTURE(hwy::TargetName(target));
-    body();
-  }
-  hwy::SetSupportedTargetsForTest(0);
-}
-
-class Random {
- public:
-  explicit Random(uint32_t seed) : engine_(seed) {}
-  int in(int low, int high) { return low + static_cast<int>(engine_() % static_cast<uint32_t>(high - low + 1)); }
-  uint8_t byte() { return static_cast<uint8_t>(engine_()); }
-
-  /// Patches of few colours, some black: bins repeat, as in real images.
-  std::vector<uint8_t> image(int width, int height) {
-    std::vector<uint8_t> palette(3 * 12);
-    for (uint8_t& value : palette) value = byte();
-    std::fill_n(palette.begin(), 3, uint8_t{0});
-    std::vector<uint8_t> pixels;
-    const int patch = in(1, 9);
-    for (int y = 0; y < height; ++y)
-      for (int x = 0; x < width; ++x) {
-        const auto colour = static_cast<size_t>((x / patch * 7 + y / patch * 5 + (in(0, 9) == 0)) % 12);
-        for (size_t c = 0; c < 3; ++c) pixels.push_back(palette[3 * colour + c]);
-      }
-    return pixels;
-  }
-
- private:
-  std::mt19937 engine_;
-};
 
 /// References cut out of the image itself and, so that some bins are found nowhere, out of another one.
 std::vector<std::vector<Histogram>> references(Random& random, const std::vector<uint8_t>& image, int width, int height,
@@ -62,7 +27,7 @@ std::vector<std::vector<Histogram>> references(Random& random, const std::vector
       const ImageView<const uint8_t> from(random.in(0, 2) ? image.data() : other.data(), width, height, 3);
       const int x = random.in(0, width - side), y = random.in(0, height - side);
       Histogram view = colour_histogram({&from.at(x, y), side, side, 3, from.stride}, bins);
-      if (view.mass == 0) view.count[5] = static_cast<uint16_t>(view.mass = 1);
+      if (view.mass == 0) view.count[5] = view.mass = 1;
       views.push_back(std::move(view));
     }
   return objects;

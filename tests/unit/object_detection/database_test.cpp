@@ -39,17 +39,17 @@ bool has(const std::string& text, const std::string& part) {
 TEST_CASE("objects in order, with their views and thresholds") {
   const Folder folder;
   folder.list(
-      "# two objects\nobject cup\nthreshold 0.5\nview good.png\nview good.png 0.25 # stricter\n\n"
-      "object bottle\nthreshold auto\nview good.png\ntest_view good.png\n");
+      "# two objects\nobject cup\nthreshold 0.5\nview good.png\nview good.png 0.25 auto 0.7 # stricter\n\n"
+      "object bottle\nthreshold auto 0.4\nview good.png\ntest_view good.png\n");
   const auto objects = read_database(folder.path, 8, TestViews::read);
   REQUIRE(objects.size() == 2);
   CHECK(objects[0].name == "cup");
-  CHECK(objects[0].threshold == 0.5);
+  CHECK(objects[0].thresholds == Thresholds{0.5});
   REQUIRE(objects[0].views.size() == 2);
-  CHECK_FALSE(objects[0].views[0].threshold);
-  CHECK(objects[0].views[1].threshold == 0.25);
+  CHECK(objects[0].views[0].thresholds == Thresholds{});
+  CHECK(objects[0].views[1].thresholds == Thresholds{0.25, std::nullopt, 0.7});
   CHECK(objects[0].views[0].view().at(7, 7, 2) == 200);
-  CHECK_FALSE(objects[1].threshold);
+  CHECK(objects[1].thresholds == Thresholds{std::nullopt, 0.4});
   CHECK(objects[1].test_views.size() == 1);
   CHECK(read_database(folder.path, 8, TestViews::skip)[1].test_views.empty());
 }
@@ -70,9 +70,10 @@ TEST_CASE("mistakes name file and line and what is valid") {
   has(folder.error("object cup\nthreshold 0.4x\n"), "`0.4x`");
   has(folder.error("object cup\nthreshold auto\nthreshold 0.4\n"),
       "objects.txt:3: object `cup` has a threshold already");
-  has(folder.error("object cup\nview good.png auto\n"), "`auto`");
   has(folder.error("object\n"), "objects.txt:1: `object` takes exactly one word");
-  has(folder.error("object cup\nview good.png 0.4 0.5\n"), "at most a threshold");
+  has(folder.error("object cup\nview good.png 0.4 0.5 0.6 0.7\n"), "a file and at most three thresholds");
+  has(folder.error("object cup\nthreshold\n"), "`threshold` takes one to three thresholds");
+  has(folder.error("object cup\nthreshold auto 0.3 2\n"), "objects.txt:2: the threshold is `2`, must be");
   has(folder.error("# nothing\n"), "names no object");
   folder.image("large.png", cv::Mat(9, 8, CV_8UC3, cv::Scalar(1, 2, 3)));
   has(folder.error("object cup\nview large.png\n"), "is 8 x 9 px, must be 8 x 8 (parameter reference)");

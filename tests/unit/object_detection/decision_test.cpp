@@ -25,18 +25,24 @@ struct Fixture {
   void set(int u, int v, size_t reference, uint16_t value) {
     missing[static_cast<size_t>(v * grid.columns + u) * references + reference] = value;
   }
-  std::vector<Detection> detections(size_t most = 20, double min_score = 0) {
-    Decision decision(grid, objects);
-    decision.decide(missing);
+  Decision decide() const {
+    const StageLimits limits(objects);
+    Decision decision(grid, objects.size());
+    for (size_t window = 0; window < static_cast<size_t>(grid.windows()); ++window) {
+      const uint16_t* at = missing.data() + window * references;
+      for (size_t object = 0; object < objects.size(); at += objects[object++].size())
+        decision.set(object, window, limits.error(object, at));
+    }
+    return decision;
+  }
+  std::vector<Detection> detections(size_t most = 20, double min_score = 0) const {
     std::vector<Detection> out(most);
-    out.resize(decision.detections(min_score, out));
+    out.resize(decide().detections(min_score, out));
     return out;
   }
-  std::vector<uint8_t> roi() {
-    Decision decision(grid, objects);
-    decision.decide(missing);
+  std::vector<uint8_t> roi() const {
     std::vector<uint8_t> pixels(static_cast<size_t>(grid.windows()), 7);
-    decision.region_of_interest({pixels.data(), grid.columns, grid.rows});
+    decide().region_of_interest({pixels.data(), grid.columns, grid.rows});
     return pixels;
   }
 };
@@ -59,12 +65,11 @@ TEST_CASE("a window passes if one reference lies below its own threshold, and eq
   CHECK(roi[3] == 255);
   CHECK(roi[23] == 255);
   CHECK(std::count(roi.begin(), roi.end(), 0) == 21);
-  Decision decision(f.grid, f.objects);
-  decision.decide(f.missing);
+  Decision decision = f.decide();
   CHECK(decision.passed_windows() == 3);
   CHECK(decision.errors(0)[0] == doctest::Approx(0.49));
-  CHECK(decision.errors(0)[2] == Decision::kFailed);
-  CHECK(decision.errors(1)[0] == Decision::kFailed);
+  CHECK(decision.errors(0)[2] == kFailed);
+  CHECK(decision.errors(1)[0] == kFailed);
 }
 
 TEST_CASE("touching windows of one object are one detection at the best of them; apart they are two") {
@@ -108,4 +113,19 @@ TEST_CASE("nothing below a threshold: no detection, an empty region of interest"
   Fixture f({{{100, 0.5}}});
   CHECK(f.detections().empty());
   for (const uint8_t pixel : f.roi()) CHECK(pixel == 0);
+}
+
+TEST_CASE("a reference without mass has nothing that could be missing: every window passes") {
+  const std::vector<std::vector<ReferenceLimit>> objects{{{0, 0.5}}};
+  const uint32_t nothing = 0;
+  CHECK(StageLimits(objects).error(0, &nothing) == 0);
+}
+
+TEST_CASE("cleared, no window passes") {
+  Fixture f({{{100, 0.5}}});
+  f.set(2, 1, 0, 10);
+  Decision decision = f.decide();
+  REQUIRE(decision.passed_windows() == 1);
+  decision.clear();
+  CHECK(decision.passed_windows() == 0);
 }

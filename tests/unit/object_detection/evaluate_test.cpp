@@ -3,15 +3,27 @@
 
 #include <doctest/doctest.h>
 
+#include "nodes/object_detection/tally.hpp"
+
 using namespace takt::object_detection;
 
 namespace {
 
 const std::filesystem::path kObjects = std::filesystem::path(TAKT_SOURCE_DIR) / "graph/objects";
 
+/// Without the thresholds that suit the lab.
+std::vector<DatabaseObject> automatic(std::vector<DatabaseObject> database) {
+  for (DatabaseObject& object : database) object.thresholds = {};
+  return database;
+}
+
 struct Shipped {
-  std::vector<DatabaseObject> database = read_database(kObjects, 48, TestViews::read);
-  Detector detector{640, 480, database, {}};
+  std::vector<DatabaseObject> database = automatic(read_database(kObjects, 48, TestViews::read));
+  Detector detector{640, 480, database, [] {
+                      DetectorParameters p;
+                      p.last = Stage::colour;
+                      return p;
+                    }()};
 };
 
 }  // namespace
@@ -81,4 +93,40 @@ TEST_CASE("views never seen before are not missed while at least 75 % of the win
   CHECK(m.at(1).missed_pct == 0);
   CHECK(m.at(1).excluded_pct >= 75);
   CHECK(m.at(1).excluded_pct > baseline.at(baseline.no_miss_factor()).excluded_pct);
+}
+
+TEST_CASE("an occluder hides as much of an object as it says, and the rest of the scene stays as it was") {
+  const Shipped s;
+  SceneParameters p;
+  p.fewest_objects = p.most_objects = 1;
+  p.noise_sigma = 0;
+  p.occlusion_max = 0.6;
+  double least = 1, most = 0;
+  for (uint64_t i = 0; i < 60; ++i) {
+    const Scene scene = make_scene(s.database, p, 4, i);
+    REQUIRE(scene.objects.size() == 1);
+    least = std::min(least, scene.objects[0].occluded);
+    most = std::max(most, scene.objects[0].occluded);
+  }
+  CHECK(least < 0.1);
+  CHECK(most > 0.5);
+  CHECK(most < 0.65);  // whole lines of pixels
+}
+
+TEST_CASE("a tally: a box of the right class over half of the object finds it, others are false") {
+  Scene scene;
+  scene.objects = {{1, 100, 100, 40, 0.35}, {2, 300, 100, 40, 0.05}};
+  const std::vector<takt::Detection> boxes = {
+      {1, 110, 90, 64, 64, 0.7f}, {1, 130, 90, 64, 64, 0.6f}, {2, 100, 100, 64, 64, 0.4f}};
+  Tally all(0), good(0.5);
+  all.add(scene, boxes);
+  good.add(scene, boxes);
+  CHECK(all.objects() == 2);
+  CHECK(all.missed() == 1);
+  CHECK(all.false_positives() == 2);  // one beside its object, one on another's place
+  CHECK(good.false_positives() == 1);
+  CHECK(all.detected_pct() == 50);
+  CHECK(all.missed_pct(3) == 0);
+  CHECK(all.missed_pct(0) == 100);
+  CHECK(all.missed_pct(1) == -1);
 }

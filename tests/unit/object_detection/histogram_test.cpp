@@ -4,6 +4,7 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <stdexcept>
 #include <vector>
 
 using namespace takt;
@@ -81,7 +82,7 @@ TEST_CASE("oracle 11: the error of a histogram with itself is 0, with an empty w
   row.add(30, 0, 0, 200);
   row.add(12, 0, 180, 10);
   const Histogram h = row.histogram();
-  const Histogram empty{std::vector<uint16_t>(kColourBins), 0};
+  const Histogram empty{std::vector<uint32_t>(kColourBins), 0};
   CHECK(missing_mass(h.count, h.count) == 0);
   CHECK(intersection_error(h, h) == 0);
   CHECK(missing_mass(empty.count, h.count) == 42);
@@ -118,4 +119,74 @@ TEST_CASE("automatic threshold: 1.25 times the 90 % quantile over all pairs, the
   CHECK(automatic_threshold(views({10}), 0) == kThresholdCap);
   // 5 views, 20 pairs: the rank is 18; only the two largest errors, of the pair 0 and 50, lie above it.
   CHECK(automatic_threshold(views({0, 2, 4, 6, 50}), 0) == doctest::Approx(1.25 * 0.48));
+}
+
+TEST_CASE("oracle 9: a vertical step edge has one orientation, a horizontal one another, and so have the diagonals") {
+  constexpr int kSide = 16;
+  const OrientationBins bins(360);
+  const auto orientations = [&](auto is_bright) {
+    std::vector<uint8_t> pixels;
+    for (int y = 0; y < kSide; ++y)
+      for (int x = 0; x < kSide; ++x) pixels.insert(pixels.end(), 3, is_bright(x, y) ? uint8_t{200} : uint8_t{50});
+    return orientation_histogram({pixels.data(), kSide, kSide, 3}, bins);
+  };
+  const auto only = [](const Histogram& h, size_t bin) { return h.mass > 0 && h.count[bin] == h.mass; };
+  CHECK(only(orientations([](int x, int) { return x >= 8; }), 0));
+  CHECK(only(orientations([](int x, int) { return x < 8; }), 180));
+  CHECK(only(orientations([](int, int y) { return y >= 8; }), 90));
+  CHECK(only(orientations([](int, int y) { return y < 8; }), 270));
+  CHECK(only(orientations([](int x, int y) { return x + y >= 16; }), 45));
+  CHECK(orientations([](int x, int) { return x >= 8; }).mass == 2 * (kSide - 2));
+  CHECK(orientations([](int, int) { return true; }).mass == 0);
+}
+
+TEST_CASE("the edge between an object and its background is none of the object's") {
+  std::vector<uint8_t> pixels(3 * 16 * 16);
+  for (size_t i = 0; i < pixels.size(); ++i) pixels[i] = i / 3 % 16 < 8 ? 0 : 200;
+  CHECK(orientation_histogram({pixels.data(), 16, 16, 3}, OrientationBins(360)).mass == 0);
+}
+
+TEST_CASE("oracle 10: neighbours in a uniform square, and the sizes of the rings") {
+  constexpr int kSide = 64;
+  const std::vector<uint8_t> pixels(3 * kSide * kSide, 90);
+  const Histogram h = cooccurrence_histogram({pixels.data(), kSide, kSide, 3}, {});
+  const size_t first = pair_bin(1, 1, 1, 20, 25);  // dark grey with itself
+  const int w = kSide;
+  CHECK(2 * h.count[first] == static_cast<uint32_t>(2 * (2 * w * w - w - w) + 4 * (w - 1) * (w - 1)));
+  // A single pixel of another colour in the middle has each ring of a wide enough square to itself.
+  std::vector<uint8_t> dotted = pixels;
+  for (size_t c = 0; c < 3; ++c) dotted[3 * (32 * kSide + 32) + c] = 255;
+  const Histogram one = cooccurrence_histogram({dotted.data(), kSide, kSide, 3}, {});
+  constexpr uint32_t kRings[] = {8,  12, 16,  32,  28,  40,  40,  48,  68,  56,  72,  68, 88,
+                                 88, 84, 112, 112, 112, 116, 112, 144, 140, 144, 144, 168};
+  for (int k = 1; k <= 25; ++k) CHECK(one.count[pair_bin(1, 3, k, 20, 25)] == kRings[k - 1]);
+}
+
+TEST_CASE("background takes part in no pair") {
+  std::vector<uint8_t> pixels(3 * 8 * 8);
+  const auto mass = [&] { return cooccurrence_histogram({pixels.data(), 8, 8, 3}, {}).mass; };
+  CHECK(mass() == 0);
+  pixels[0] = 9;
+  CHECK(mass() == 0);
+  pixels[3] = 9;
+  CHECK(mass() == 1);
+}
+
+TEST_CASE("the few colours: black, greys by brightness, hues") {
+  CHECK(pair_colour(0, 0, 38, 20) == 0);
+  CHECK(pair_colour(0, 0, 39, 20) == 4);
+  CHECK(pair_colour(100, 100, 114, 20) == 1);
+  CHECK(pair_colour(100, 100, 115, 20) == 2);
+  CHECK(pair_colour(203, 203, 203, 20) == 2);
+  CHECK(pair_colour(204, 204, 204, 20) == 3);
+  CHECK(pair_colour(1, 0, 255, 20) == 19);
+  CHECK(pair_colour(0, 0, 50, 5) == 0);
+  CHECK(pair_colour(90, 90, 100, 5) == 1);
+  CHECK(pair_colour(0, 200, 0, 5) == 3);
+  CHECK(pair_colour(200, 0, 0, 5) == 4);
+}
+
+TEST_CASE("orientations that cannot be told apart evenly are refused") {
+  CHECK_THROWS_AS(OrientationBins(10), std::invalid_argument);
+  CHECK_THROWS_AS(OrientationBins(364), std::invalid_argument);
 }

@@ -122,6 +122,7 @@ TEST_CASE("object_detection: boxes and region of interest of the left image, wit
 TEST_CASE("object_detection: with little time the best so far is sent; the next image goes on where this one ended") {
   const auto database = read_database(kObjects, 48, TestViews::skip);
   DetectorParameters p;
+  p.last = Stage::colour;
   p.threshold_scale = 4;  // every window passes, so that those which were searched show
   Detector detector(640, 480, database, p);
   const std::vector<uint8_t> grey(640 * 480 * 3, 100);
@@ -129,7 +130,8 @@ TEST_CASE("object_detection: with little time the best so far is sent; the next 
   const SearchGrid& grid = detector.grid();
   std::vector<uint8_t> roi(static_cast<size_t>(grid.windows()));
   const auto searched_rows = [&](int portions) {
-    REQUIRE(detector.run(image, [&, asked = 0]() mutable { return asked++ < portions; }));
+    REQUIRE(detector.run(
+        image, [&, asked = 0]() mutable { return asked++ < portions; }, [] { return true; }));
     detector.decision().region_of_interest({roi.data(), grid.columns, grid.rows});
     std::vector<int> rows;
     for (int row = 0; row < grid.rows; ++row)
@@ -172,7 +174,8 @@ TEST_CASE("object_detection: out of time it sends what it has and says how much 
 }
 
 TEST_CASE("object_detection: at most max_detections boxes") {
-  Bench bench({{"max_detections", int64_t{2}}, {"min_score", 0.0}});  // so that there are many
+  Bench bench(
+      {{"max_detections", int64_t{2}}, {"min_score", 0.0}, {"stages", std::string("ch")}});  // so that there are many
   auto& [node, port, pair] = bench;
   test::BoxWriter<Detections> boxes(*node->outputs()[0]);
   const auto database = read_database(kObjects, 48, TestViews::read);

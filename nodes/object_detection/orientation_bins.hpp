@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// Image preparation of the second stage: each pixel's orientation index I_hog (thesis Eq. 3.12, 3.13; algorithm
+// reference 6.3).
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "rt/msg/image_view.hpp"
+
+namespace takt::object_detection {
+
+/// Orientations of the gradient of the value channel V = max(B, G, R) under the Sobel operator: index
+/// floor(count theta / 2 pi) with theta = atan2(Gy, Gx) in [0, 2 pi), x to the right, y downwards; none() where the
+/// gradient is shorter than kShortest, and on the image's border. Exact for every gradient, with every SIMD target: an
+/// approximate angle says which border of two bins is near, and on which side the gradient lies is decided in whole
+/// numbers.
+class OrientationBins {
+ public:
+  static constexpr int kShortest = 60;  ///< of 8-bit Sobel units, of which the longest gradient has 1,020 per axis
+
+  /// `count`: orientations, a multiple of 4 and at most 360 (std::invalid_argument otherwise).
+  explicit OrientationBins(int count);
+
+  int count() const { return count_; }
+  uint16_t none() const { return static_cast<uint16_t>(count_); }
+  /// Index of one gradient.
+  uint16_t of(int gx, int gy) const;
+  /// V of one row of interleaved BGR pixels.
+  static void values(const uint8_t* bgr, size_t width, uint8_t* value);
+  /// Indices of a row of `width` pixels from the values of the row above, its own and the one below. Vectorised.
+  void row(const uint8_t* above, const uint8_t* own, const uint8_t* below, size_t width, uint16_t* index) const;
+  /// Indices of a whole image of three channels. `values`: room for as many V as the image has pixels.
+  void image(ImageView<const uint8_t> bgr, uint8_t* values, uint16_t* index) const;
+
+ private:
+  int count_;
+  /// Border i of the first quadrant, theta = 2 pi i / count: the least ratio Gy / Gx = high half / low half of a
+  /// gradient that lies on it or beyond.
+  std::vector<int32_t> borders_;
+};
+
+}  // namespace takt::object_detection
