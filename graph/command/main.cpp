@@ -15,6 +15,7 @@
 #include "graph/command/replay_command.hpp"
 #include "graph/command/run_command.hpp"
 #include "graph/command/show_command.hpp"
+#include "graph/command/train_command.hpp"
 
 namespace {
 
@@ -142,6 +143,7 @@ int main(int argc, char** argv) {
   takt::command::ReplayOptions replay;
   takt::command::LogOptions log;
   takt::command::CloudOptions cloud;
+  takt::command::TrainCascadeOptions train;
   std::string type;
   bool check_json = false;
   int exit_code = 0;
@@ -165,6 +167,7 @@ int main(int argc, char** argv) {
   takt::command::add_log(app, log, exit_code);
   takt::command::add_calibrate(app, calibrate, exit_code);
   takt::command::add_cloud(app, cloud, exit_code);
+  takt::command::add_train(app, train, exit_code);
   CLI::App* eval = app.add_subcommand("eval", "measures quality against ground truth");
   eval->require_subcommand(1);
   takt::command::add_eval_stereo(*eval, stereo, exit_code);

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+// Generated images with and without signs, to train cascades on and to measure them with. Everything follows from seed
+// and index; nothing is taken from photographs.
+#pragma once
+#include <cstdint>
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "nodes/traffic_signs/sign_drawing.hpp"
+
+namespace takt::traffic_signs {
+
+struct PlacedSign {
+  SignClass sign;
+  Box box;
+};
+
+struct SignScene {
+  cv::Mat3b image;  ///< BGR
+  std::vector<PlacedSign> signs;
+};
+
+struct SceneParameters {
+  int width = 640, height = 480;
+  int most_signs = 4;                          ///< 0 .. most_signs, of any class, apart from one another
+  double longest_min = 26, longest_max = 130;  ///< longer edge of a sign, px
+  double light_min = 0.5, light_max = 1.5;     ///< factor on the whole, cut off at 255; a fall of up to a third across
+  double blur_max = 1.0;                       ///< sigma, px
+  double noise_sigma = 3;
+};
+
+/// Noise of many scales, boxes, bars, triangles, discs and rows of stripes of any colour, some half transparent; signs;
+/// then light, blur and noise.
+SignScene make_scene(const SceneParameters& parameters, uint64_t seed, uint64_t index);
+
+/// One window that shows the sign, moved by up to 4 % and scaled by up to 8 % off its place, on such a background, one
+/// channel.
+cv::Mat1b make_positive(SignClass sign, uint64_t seed, uint64_t index);
+
+}  // namespace takt::traffic_signs
