@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 namespace takt::traffic_signs {
 namespace {
@@ -66,7 +67,7 @@ bool SignDetector::begin(ImageView<const uint8_t> bgr, ImageView<const uint8_t> 
 void SignDetector::focus(std::span<const Sighting> expected) {
   focus_.clear();
   for (const Sighting& sight : expected.first(std::min(expected.size(), kMostExpected))) {
-    const double inner = 1 - 2 * parameters_.margin;
+    const double inner = 1 - 2 * kMargin;
     size_t levels = 0;
     for (int level = 0; level < search_.levels(sight.sign) && levels < kLevelsExpected; ++level) {
       const Box window = search_.box(sight.sign, level, 0, 0);
@@ -152,8 +153,8 @@ void SignDetector::end() {
   sightings_.clear();
   for (size_t sign = 0; sign < signs_.size(); ++sign)
     for (const Group& group : grouping_.group(hits_[sign], parameters_.least_hits)) {
-      const auto dx = static_cast<int>(std::lround(group.box.width * parameters_.margin)),
-                 dy = static_cast<int>(std::lround(group.box.height * parameters_.margin));
+      const auto dx = static_cast<int>(std::lround(group.box.width * kMargin)),
+                 dy = static_cast<int>(std::lround(group.box.height * kMargin));
       sightings_.push_back({sign,
                             {group.box.x + dx, group.box.y + dy, group.box.width - 2 * dx, group.box.height - 2 * dy},
                             group.hits});

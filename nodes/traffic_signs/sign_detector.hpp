@@ -22,7 +22,6 @@ struct Sighting {
 struct SignDetectorParameters {
   double scale_factor = 1.15;
   int least_hits = 3;
-  double margin = 1.0 / 12;  ///< share of a window that is free on every side of the sign
 };
 
 /// The image is searched in rows of windows, from the largest scale to the smallest, the rows of all cascades at one
