@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The seven cascades of graph/signs over a generated scene of 640x480, one thread, all windows at all scales and
-// grouped, against cv::CascadeClassifier::detectMultiScale with the same files; and the node's whole search, which
-// looks only where the colours are. OpenCV leaves out each window after one that fails in the first stage.
+// grouped, against cv::CascadeClassifier::detectMultiScale with the same files; and the node's whole search, with
+// colours, rows without them left out. OpenCV leaves out each window after one that fails in the first stage.
 #include <cstdio>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/objdetect.hpp>
