@@ -60,4 +60,14 @@ struct EvalGroundOptions {
 };
 void add_eval_ground(CLI::App& eval, EvalGroundOptions& options, int& exit_code);
 
+struct EvalSignsOptions {
+  std::filesystem::path signs;  ///< empty: graph/signs of the project
+  std::filesystem::path data;   ///< gtsrb/, gtsrb_labels.csv, scenes/, scenes_boxes.csv; empty: below TAKT_DATA
+  uint64_t seed = 1;
+  int scenes = 150, passages = 70;
+  double budget_ms = 36;
+  bool json = false;
+};
+void add_eval_signs(CLI::App& eval, EvalSignsOptions& options, int& exit_code);
+
 }  // namespace takt::command

@@ -140,6 +140,7 @@ int main(int argc, char** argv) {
   takt::command::ProfileOptions profile;
   takt::command::EvalObjectsOptions objects;
   takt::command::EvalGroundOptions ground;
+  takt::command::EvalSignsOptions signs;
   takt::command::ReplayOptions replay;
   takt::command::LogOptions log;
   takt::command::CloudOptions cloud;
@@ -174,6 +175,7 @@ int main(int argc, char** argv) {
   takt::command::add_eval_ego_motion(*eval, ego_motion, exit_code);
   takt::command::add_eval_objects(*eval, objects, exit_code);
   takt::command::add_eval_ground(*eval, ground, exit_code);
+  takt::command::add_eval_signs(*eval, signs, exit_code);
 
   try {
     app.parse(argc, argv);

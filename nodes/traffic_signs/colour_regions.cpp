@@ -6,9 +6,9 @@
 namespace takt::traffic_signs {
 
 SignColour colour_of(uint8_t b, uint8_t g, uint8_t r) {
-  if (2 * r >= 3 * std::max(b, g) + 20) return SignColour::red;
-  if (2 * std::min(r, g) >= 3 * b + 20) return SignColour::yellow;
-  if (4 * b >= 5 * std::max(r, g) + 40) return SignColour::blue;
+  if (4 * std::min(r, g) >= 5 * b + 8 && 5 * g >= 3 * r) return SignColour::yellow;
+  if (5 * r >= 7 * std::max(b, g) + 10) return SignColour::red;
+  if (8 * b >= 9 * std::max(r, g) + 16) return SignColour::blue;
   return SignColour::any;
 }
 

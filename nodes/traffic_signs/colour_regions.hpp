@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where an image has the saturated colours of signs (algorithm reference 21.11): a window without them is not searched.
+// Where an image has the saturated colours of signs (algorithm reference 21.11): a row of windows without them is not
+// searched.
 #pragma once
 #include <cstdint>
 #include <vector>
@@ -11,8 +12,8 @@ namespace takt::traffic_signs {
 
 enum class SignColour : uint8_t { any, red, yellow, blue };
 
-/// The colour of a pixel: red if r >= 1.5 max(g, b) + 10, yellow if min(r, g) >= 1.5 b + 10, blue if b >= 1.25 max(r,
-/// g) + 10; ratios, so that the light does not matter. Otherwise `any`.
+/// The colour of a pixel: yellow if 4 min(r, g) >= 5 b + 8 and 5 g >= 3 r, else red if 5 r >= 7 max(g, b) + 10, else
+/// blue if 8 b >= 9 max(r, g) + 16; ratios, so that the light matters little. Otherwise `any`.
 SignColour colour_of(uint8_t b, uint8_t g, uint8_t r);
 
 /// Counts of coloured pixels in rectangles, in whole cells of 4 x 4 px. Memory is taken by the constructor; the rest

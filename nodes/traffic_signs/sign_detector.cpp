@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 namespace takt::traffic_signs {
 namespace {
@@ -66,7 +67,7 @@ bool SignDetector::begin(ImageView<const uint8_t> bgr, ImageView<const uint8_t> 
 void SignDetector::focus(std::span<const Sighting> expected) {
   focus_.clear();
   for (const Sighting& sight : expected.first(std::min(expected.size(), kMostExpected))) {
-    const double inner = 1 - 2 * parameters_.margin;
+    const double inner = 1 - 2 * kMargin;
     size_t levels = 0;
     for (int level = 0; level < search_.levels(sight.sign) && levels < kLevelsExpected; ++level) {
       const Box window = search_.box(sight.sign, level, 0, 0);
@@ -95,16 +96,18 @@ void SignDetector::build(int level) {
   search_.build(level, {grey_.data(), whole.width, whole.height});
 }
 
-bool SignDetector::may_hold(size_t sign, const Box& window) const {
-  if (roi_.data != nullptr) {
-    const Level& whole = search_.level(0);
-    const int x = std::min(window.x + window.width / 2, whole.width - 1) * roi_.width / whole.width,
-              y = std::min(window.y + window.height / 2, whole.height - 1) * roi_.height / whole.height;
-    if (roi_.at(x, y) == 0) return false;
-  }
+bool SignDetector::in_roi(const Box& window) const {
+  if (roi_.data == nullptr) return true;
+  const Level& whole = search_.level(0);
+  const int x = std::min(window.x + window.width / 2, whole.width - 1) * roi_.width / whole.width,
+            y = std::min(window.y + window.height / 2, whole.height - 1) * roi_.height / whole.height;
+  return roi_.at(x, y) != 0;
+}
+
+bool SignDetector::has_colour(size_t sign, const Box& area, const Box& window) const {
   const SignModel& model = signs_[sign];
   return model.colour == SignColour::any ||
-         colours_.pixels(model.colour, window) >= model.least_share * window.width * window.height;
+         colours_.pixels(model.colour, area) >= model.least_share * window.width * window.height;
 }
 
 void SignDetector::search_focus(const Focus& focus, int row) {
@@ -112,7 +115,7 @@ void SignDetector::search_focus(const Focus& focus, int row) {
   const auto columns = static_cast<size_t>(search_.columns(focus.sign, focus.level));
   std::fill_n(wanted_.begin(), columns, uint8_t{0});
   for (int column = focus.first_column; column <= focus.last_column; ++column)
-    wanted_[static_cast<size_t>(column)] = may_hold(focus.sign, search_.box(focus.sign, focus.level, column, row));
+    wanted_[static_cast<size_t>(column)] = in_roi(search_.box(focus.sign, focus.level, column, row));
   search_.row(focus.sign, focus.level, row, std::span(wanted_).first(columns), passed_);
   take_passed(focus.sign, focus.level, row, std::span(passed_).first(columns));
 }
@@ -121,39 +124,38 @@ void SignDetector::search_row(const Row& at) {
   build(at.level);
   for (size_t sign = 0; sign < signs_.size(); ++sign) {
     if (at.level >= search_.levels(sign) || at.row >= search_.rows(sign, at.level)) continue;
-    const auto columns = static_cast<size_t>(search_.columns(sign, at.level));
     const Box first = search_.box(sign, at.level, 0, at.row);
-    if (const SignModel& model = signs_[sign];
-        model.colour != SignColour::any &&
-        colours_.pixels(model.colour, {0, first.y, search_.level(0).width, first.height}) <
-            model.least_share * first.width * first.height)
-      continue;  // not enough of the colour in all windows of the row together
-    bool any = false;
-    for (size_t column = 0; column < columns; ++column) {
-      wanted_[column] = may_hold(sign, search_.box(sign, at.level, static_cast<int>(column), at.row));
-      any |= wanted_[column] != 0;
+    if (!has_colour(sign, {0, first.y, search_.level(0).width, first.height}, first))
+      continue;  // not enough in all windows of the row together
+    const auto columns = static_cast<size_t>(search_.columns(sign, at.level));
+    bool all = roi_.data == nullptr;
+    for (size_t column = 0; column < columns; ++column)
+      wanted_[column] = all || in_roi(search_.box(sign, at.level, static_cast<int>(column), at.row));
+    for (const Focus& f : focus_) {
+      if (f.sign != sign || f.level != at.level || at.row < f.first_row || at.row > f.last_row) continue;
+      std::fill(wanted_.begin() + f.first_column, wanted_.begin() + f.last_column + 1, uint8_t{0});
+      all = false;
     }
-    if (!any) continue;
-    for (const Focus& f : focus_)
-      if (f.sign == sign && f.level == at.level && at.row >= f.first_row && at.row <= f.last_row)
-        std::fill(wanted_.begin() + f.first_column, wanted_.begin() + f.last_column + 1, uint8_t{0});
-    search_.row(sign, at.level, at.row, std::span(wanted_).first(columns), passed_);
+    search_.row(sign, at.level, at.row, all ? std::span<const uint8_t>() : std::span(wanted_).first(columns), passed_);
     take_passed(sign, at.level, at.row, std::span(passed_).first(columns));
   }
 }
 
+/// The colour is asked of what passed: for every window it would take longer than the cascades do.
 void SignDetector::take_passed(size_t sign, int level, int row, std::span<const uint8_t> passed) {
-  for (size_t column = 0; column < passed.size(); ++column)
-    if (passed[column] == search_.stages(sign) && hits_[sign].size() < kMostHits)
-      hits_[sign].push_back(search_.box(sign, level, static_cast<int>(column), row));
+  for (size_t column = 0; column < passed.size(); ++column) {
+    if (passed[column] != search_.stages(sign) || hits_[sign].size() == kMostHits) continue;
+    const Box window = search_.box(sign, level, static_cast<int>(column), row);
+    if (has_colour(sign, window, window)) hits_[sign].push_back(window);
+  }
 }
 
 void SignDetector::end() {
   sightings_.clear();
   for (size_t sign = 0; sign < signs_.size(); ++sign)
     for (const Group& group : grouping_.group(hits_[sign], parameters_.least_hits)) {
-      const auto dx = static_cast<int>(std::lround(group.box.width * parameters_.margin)),
-                 dy = static_cast<int>(std::lround(group.box.height * parameters_.margin));
+      const auto dx = static_cast<int>(std::lround(group.box.width * kMargin)),
+                 dy = static_cast<int>(std::lround(group.box.height * kMargin));
       sightings_.push_back({sign,
                             {group.box.x + dx, group.box.y + dy, group.box.width - 2 * dx, group.box.height - 2 * dy},
                             group.hits});

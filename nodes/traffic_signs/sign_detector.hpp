@@ -22,7 +22,6 @@ struct Sighting {
 struct SignDetectorParameters {
   double scale_factor = 1.15;
   int least_hits = 3;
-  double margin = 1.0 / 12;  ///< share of a window that is free on every side of the sign
 };
 
 /// The image is searched in rows of windows, from the largest scale to the smallest, the rows of all cascades at one
@@ -82,7 +81,9 @@ class SignDetector {
   void search_focus(const Focus& focus, int row);
   void search_row(const Row& row);
   void build(int level);
-  bool may_hold(size_t sign, const Box& window) const;
+  bool in_roi(const Box& window) const;
+  /// Whether `area` holds as many pixels of the sign's colour as `window` must.
+  bool has_colour(size_t sign, const Box& area, const Box& window) const;
   void take_passed(size_t sign, int level, int row, std::span<const uint8_t> passed);
   void end();
 

@@ -5,7 +5,7 @@
 #include <opencv2/core.hpp>
 #include <string_view>
 
-#include "nodes/traffic_signs/grouping.hpp"
+#include "nodes/traffic_signs/sign_list.hpp"
 
 namespace takt::traffic_signs {
 
@@ -17,9 +17,6 @@ struct SignShape {
   double width_m, height_m;         ///< of the sign's outline
   int window_width, window_height;  ///< of its cascade, px; the sign fills all but kMargin of it on every side
 };
-
-/// Share of a cascade's window that is left free on every side of the sign.
-inline constexpr double kMargin = 1.0 / 12;
 
 /// In the order of SignClass. German signs 205, 206, 306, 209-10, 209-20, 220 and a traffic light.
 inline constexpr std::array<SignShape, 7> kSignShapes{{

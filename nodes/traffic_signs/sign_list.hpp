@@ -10,6 +10,9 @@
 
 namespace takt::traffic_signs {
 
+/// Share of a cascade's window that is left free on every side of the sign.
+inline constexpr double kMargin = 1.0 / 12;
+
 struct SignModel {
   std::string name;
   Cascade cascade;

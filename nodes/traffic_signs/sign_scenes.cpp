@@ -125,6 +125,30 @@ SignScene make_scene(const SceneParameters& p, uint64_t seed, uint64_t index) {
   return scene;
 }
 
+SignScene make_passage(const SceneParameters& p, uint64_t seed, uint64_t index, int frame, int frames) {
+  cv::RNG random = stream(seed, index);
+  const cv::Mat3f far = background({p.width, p.height}, random.uniform(10, 60), random);
+  const SignShape& shape = kSignShapes[index % kSignShapes.size()];
+  const double share = static_cast<double>(frame) / std::max(1, frames - 1);
+  const double edge = p.longest_min * std::pow(p.longest_max / p.longest_min, share);
+  const double aside = random.uniform(0.8, 1.7) * (random.uniform(0, 2) == 0 ? -1 : 1), up = random.uniform(0.2, 1.2);
+  const cv::Point2d middle(p.width / 2.0, p.height / 2.0);
+  SignScene scene;
+  cv::Mat3f image;
+  cv::warpAffine(far, image, cv::getRotationMatrix2D(middle, 0, 1 + 0.5 * share), far.size(), cv::INTER_LINEAR,
+                 cv::BORDER_REFLECT);
+  const double scale = edge / std::max(shape.width_m, shape.height_m);
+  const cv::Size2d size(scale * shape.width_m, scale * shape.height_m);
+  const cv::Point2d centre = middle + edge * cv::Point2d(aside, -up);
+  cv::RNG look = stream(seed + 1, index);  // the same in all frames
+  const cv::Rect2f box =
+      draw_sign(image, shape.sign, cv::Rect2d({centre.x - size.width / 2, centre.y - size.height / 2}, size), look);
+  scene.signs.push_back({shape.sign, {cvRound(box.x), cvRound(box.y), cvRound(box.width), cvRound(box.height)}});
+  cv::RNG camera = stream(seed + 2 + static_cast<uint64_t>(frame), index);
+  scene.image = exposed(image, p, camera);
+  return scene;
+}
+
 cv::Mat1b make_positive(SignClass sign, uint64_t seed, uint64_t index) {
   cv::RNG random = stream(seed, index);
   const SignShape& shape = kSignShapes[static_cast<size_t>(sign)];

@@ -33,6 +33,10 @@ struct SceneParameters {
 /// then light, blur and noise.
 SignScene make_scene(const SceneParameters& parameters, uint64_t seed, uint64_t index);
 
+/// Frame 0 .. frames - 1 of a passage: one sign that comes closer, from the shortest to the longest edge and from the
+/// middle outwards, before a background that grows; light, blur and noise anew in each frame.
+SignScene make_passage(const SceneParameters& parameters, uint64_t seed, uint64_t index, int frame, int frames);
+
 /// One window that shows the sign, moved by up to 4 % and scaled by up to 8 % off its place, on such a background, one
 /// channel.
 cv::Mat1b make_positive(SignClass sign, uint64_t seed, uint64_t index);

@@ -2,6 +2,7 @@
 #include "nodes/traffic_signs/tracks.hpp"
 
 #include <algorithm>
+#include <array>
 
 namespace takt::traffic_signs {
 

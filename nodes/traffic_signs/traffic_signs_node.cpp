@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <array>
 #include <limits>
 #include <optional>
 #include <string>
@@ -77,8 +78,12 @@ class TrafficSignsNode final : public Node {
       found->image_width = pair.width;
       found->image_height = pair.height;
       found->searched = detector_->searched();
+      found->boxes.resize(0);
     }
-    if (places != nullptr) places->camera = pair.camera;
+    if (places != nullptr) {
+      places->camera = pair.camera;
+      places->points.resize(0);
+    }
     for (const Track& track : tracks_->tracks()) {
       if (!track.confirmed || track.missed > 0 || track.seen == 0) continue;
       const Box& box = track.last.box;
@@ -132,7 +137,7 @@ class TrafficSignsNode final : public Node {
                          "1",  "intersection over union of a sign's boxes from image to image, at least"};
   Param<double> size_min_{this, "size_min", 0.5, {0.0, 1.0}, "1", "of the nominal size, if the distance is known"};
   Param<double> size_max_{this, "size_max", 2.0, {1.0, 100.0}, "1", "of the nominal size, if the distance is known"};
-  Param<double> budget_{this, "budget", 0.040, {0.001, 10.0}, "s", "longest search of an image"};
+  Param<double> budget_{this, "budget", 0.036, {0.001, 10.0}, "s", "longest search of an image"};
   Param<double> reserve_{this,       "reserve", 0.002,
                          {0.0, 1.0}, "s",       "with less time left than this the search ends and its best is sent"};
 

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-set(ROOM_TEST_LIBRARIES takt_opencv opencv_objdetect)
+set(ROOM_TEST_LIBRARIES takt_traffic_signs_train opencv_objdetect)
