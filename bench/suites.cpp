@@ -20,6 +20,7 @@ std::vector<Row> run_rectify(const Options&);
 #ifdef TAKT_BENCH_EGO_MOTION
 std::vector<Row> run_ego_motion(const Options&);
 std::vector<Row> run_signs(const Options&);
+std::vector<Row> run_sift(const Options&);
 #endif
 
 std::span<const Suite> suites() {
@@ -39,6 +40,7 @@ std::span<const Suite> suites() {
 #ifdef TAKT_BENCH_EGO_MOTION
       {"ego_motion", "a step at 640x480, against OpenCV's corners and optical flow", run_ego_motion},
       {"signs", "seven cascades over a scene of 640x480, against OpenCV's detector", run_signs},
+      {"sift", "objects in a scene: the colour stage against OpenCV's SIFT", run_sift},
 #endif
   });
   return list;

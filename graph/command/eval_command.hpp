@@ -47,6 +47,23 @@ struct EvalObjectsOptions {
   bool json = false;
 };
 void add_eval_objects(CLI::App& eval, EvalObjectsOptions& options, int& exit_code);
+struct EvalObjects3dOptions {
+  std::filesystem::path data;   ///< recorded scenes; empty: none
+  std::filesystem::path write;  ///< training data; empty: not written
+  uint64_t seed = 1;
+  size_t samples = 60;
+  double sigma_px = 0.2;
+  bool json = false;
+};
+void add_eval_objects3d(CLI::App& eval, EvalObjects3dOptions& options, int& exit_code);
+struct EvalSiftOptions {
+  std::filesystem::path data;      ///< pictures by class; empty: scenes are generated
+  std::filesystem::path database;  ///< empty: graph/objects of the project
+  uint64_t seed = 1;
+  int frames = 30;
+  bool json = false;
+};
+void add_eval_sift(CLI::App& eval, EvalSiftOptions& options, int& exit_code);
 struct EvalGroundOptions {
   std::filesystem::path images, labels;  ///< all three, or none: a pavement is generated
   std::vector<int> drivable;             ///< class ids

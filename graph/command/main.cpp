@@ -139,6 +139,8 @@ int main(int argc, char** argv) {
   takt::command::DoctorOptions doctor;
   takt::command::ProfileOptions profile;
   takt::command::EvalObjectsOptions objects;
+  takt::command::EvalObjects3dOptions objects3d;
+  takt::command::EvalSiftOptions sift;
   takt::command::EvalGroundOptions ground;
   takt::command::EvalSignsOptions signs;
   takt::command::ReplayOptions replay;
@@ -174,6 +176,8 @@ int main(int argc, char** argv) {
   takt::command::add_eval_stereo(*eval, stereo, exit_code);
   takt::command::add_eval_ego_motion(*eval, ego_motion, exit_code);
   takt::command::add_eval_objects(*eval, objects, exit_code);
+  takt::command::add_eval_objects3d(*eval, objects3d, exit_code);
+  takt::command::add_eval_sift(*eval, sift, exit_code);
   takt::command::add_eval_ground(*eval, ground, exit_code);
   takt::command::add_eval_signs(*eval, signs, exit_code);
 

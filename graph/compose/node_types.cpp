@@ -14,6 +14,7 @@ void register_semantic(NodeTypes& types);
 void register_load(NodeTypes& types);
 void register_cloud_filter(NodeTypes& types);
 void register_traffic_signs(NodeTypes& types);
+void register_object_3d(NodeTypes& types);
 }  // namespace takt
 
 namespace takt::graph {
@@ -31,6 +32,7 @@ NodeTypes node_types() {
   register_load(types);
   register_cloud_filter(types);
   register_traffic_signs(types);
+  register_object_3d(types);
   return types;
 }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "nodes/object_3d/seeds.hpp"
 
@@ -106,8 +107,26 @@ Describer::Columns Describer::columns(std::span<const Point> points, std::span<c
   return {area, area * heights / n, x / n, y / n};
 }
 
+/// Points a spacing apart show the straight side of a rectangle well, but not the four places where a round thing
+/// touches it: there the outermost point lies inside by about half of kRoundGap spacings. As round as the hull is.
+void Describer::widen(std::span<const Point2> hull, double spacing_m, Rectangle& outline, Columns& seen) {
+  constexpr double kRoundGap = 0.65;
+  const double area = area_of(hull), fill = area / (outline.length * outline.width);
+  const double round = std::clamp((1 - fill) / (1 - std::numbers::pi / 4), 0.0, 1.0);
+  if (!(area > 0)) return;
+  const double gap = kRoundGap * spacing_m * round;
+  double rim = 0;
+  for (size_t i = 0; i < hull.size(); ++i) {
+    const Point2 &a = hull[i], &b = hull[(i + 1) % hull.size()];
+    rim += std::hypot(b.x - a.x, b.y - a.y);
+  }
+  const double larger = 1 + rim * gap / 2 / area;
+  seen.area_m2 *= larger, seen.volume_m3 *= larger;
+  outline.length += gap, outline.width += gap;
+}
+
 std::optional<Description> Describer::describe(std::span<const Point> points, std::span<const Colour> colours,
-                                               double base_z_m) {
+                                               double base_z_m, double spacing_m) {
   if (points.size() < 3 || points.size() > points_.size()) return std::nullopt;
   double top = -std::numeric_limits<double>::infinity();
   for (size_t i = 0; i < points.size(); ++i) {
@@ -115,9 +134,10 @@ std::optional<Description> Describer::describe(std::span<const Point> points, st
     top = std::max(top, static_cast<double>(points[i].z));
   }
   const std::span<const Point2> hull = convex_hull(std::span(points_).first(points.size()), scratch_);
-  const Columns seen = columns(points, hull, base_z_m);
+  Columns seen = columns(points, hull, base_z_m);
   Description d;
   d.outline = smallest_rectangle(hull);
+  widen(hull, spacing_m, d.outline, seen);
   d.base_z_m = base_z_m, d.top_z_m = top;
   d.area_x_m = seen.x_m, d.area_y_m = seen.y_m;
   const double height = top - base_z_m;

@@ -53,20 +53,22 @@ struct Description {
 class Describer {
  public:
   /// Edge of the cells of area and volume: wide enough that a surface has a point in each.
-  static constexpr double kCell_m = 0.01;
+  static constexpr double kCell_m = 0.015;
 
   /// Takes the memory for objects of up to `capacity` points; nothing else allocates.
   explicit Describer(size_t capacity);
 
-  /// z up; `colours` as many as points. The object stands at `base_z_m`. None for fewer than three points or an outline
-  /// without area.
-  std::optional<Description> describe(std::span<const Point> points, std::span<const Colour> colours, double base_z_m);
+  /// z up; `colours` as many as points. The object stands at `base_z_m`; neighbouring points are `spacing_m` apart
+  /// across the line of sight, 0: not known. None for fewer than three points or an outline without area.
+  std::optional<Description> describe(std::span<const Point> points, std::span<const Colour> colours, double base_z_m,
+                                      double spacing_m);
 
  private:
   struct Columns {
     double area_m2 = 0, volume_m3 = 0, x_m = 0, y_m = 0;
   };
   Columns columns(std::span<const Point> points, std::span<const Point2> hull, double base_z_m);
+  static void widen(std::span<const Point2> hull, double spacing_m, Rectangle& outline, Columns& seen);
 
   std::vector<Point2> points_, scratch_;
   std::vector<float> top_;

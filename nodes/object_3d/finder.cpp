@@ -53,6 +53,7 @@ ObjectFinder::ObjectFinder(size_t capacity, size_t most_objects, const FinderPar
 
 void ObjectFinder::begin(const SensorCloud& cloud, std::span<const Detection> boxes) {
   count_ = described_ = 0;
+  step_per_focal_ = cloud.camera.focal_px > 0 ? cloud.step_px / cloud.camera.focal_px : 0;
   take_points(cloud);
   grid_.fill(std::span(camera_points_).first(points_), cloud.camera, cloud.step_px);
   const size_t seeds = find_seeds(cloud, boxes);
@@ -131,17 +132,18 @@ void ObjectFinder::describe(const Segment& segment) {
     for (size_t i = 0; i < count; ++i) object_points_[i] = robot_points_[members[i]];
   }
   float low = std::numeric_limits<float>::infinity();
-  double x = 0, y = 0;
+  double x = 0, y = 0, spacing_m = 0;
   for (size_t i = 0; i < count; ++i) {
     object_colours_[i] = colours_[members[i]];
     low = std::min(low, object_points_[i].z);
     x += static_cast<double>(object_points_[i].x), y += static_cast<double>(object_points_[i].y);
+    spacing_m += step_per_focal_ * static_cast<double>(camera_points_[members[i]].z);
   }
   const double n = static_cast<double>(std::max<size_t>(1, count));
   const double level = support_ ? support_->z(x / n, y / n) : static_cast<double>(low);
   const bool stands = support_ && static_cast<double>(low) - level < parameters_.gap_m;
   const auto what = describer_.describe(std::span(object_points_).first(count), std::span(object_colours_).first(count),
-                                        stands ? level : static_cast<double>(low));
+                                        stands ? level : static_cast<double>(low), spacing_m / n);
   if (!what) return;
   FoundObject& object = objects_[count_++];
   object = {*what,

@@ -97,6 +97,7 @@ class ObjectFinder {
   Segmenter segmenter_;
   Describer describer_;
   mapping_3d::Affine mount_;
+  double step_per_focal_ = 0;  ///< distance of neighbouring points across the line of sight, by their depth
   std::optional<Plane> support_;
   size_t points_ = 0;  ///< that regions are grown in: those within range, above the support
   std::vector<Point> camera_points_, robot_points_;

@@ -53,12 +53,8 @@ void RegionGrower::fill(std::span<const Point> points, std::span<const Colour> c
     cells[a] = std::floor((static_cast<double>(bounds.high[a]) - origin_[a]) / edge) + 3;
   }
   layout_ = cells_.layout(cells, 2 * points_.size());
-  cells_.sort(points_, layout_, [&](const Point& p) {
-    const auto cell = [&](float v, int axis) {
-      return static_cast<uint32_t>(static_cast<int64_t>((static_cast<double>(v) - origin_[axis]) * per_m_));
-    };
-    return layout_.bucket(cell(p.x, 0), cell(p.y, 1), cell(p.z, 2));
-  });
+  cells_.sort(points_, layout_,
+              [&](const Point& p) { return layout_.bucket(cell(p.x, 0), cell(p.y, 1), cell(p.z, 2)); });
   std::copy_n(cells_.points(), points_.size(), open_.begin());
   std::copy_n(cells_.start().begin() + 1, layout_.buckets, open_end_.begin());
 }
@@ -88,9 +84,6 @@ bool RegionGrower::advance(size_t count) {
 void RegionGrower::look_around(uint32_t index) {
   const Point from = points_[index];
   const Colour colour = parameters_.colour_max > 0 ? colours_[index] : Colour{};
-  const auto cell = [&](float v, int axis) {
-    return static_cast<uint32_t>(static_cast<int64_t>((static_cast<double>(v) - origin_[axis]) * per_m_));
-  };
   const uint32_t x = cell(from.x, 0) - 1, y = cell(from.y, 1) - 1, z = cell(from.z, 2) - 1;
   const size_t before = found_;
   for (uint32_t dz = 0; dz < 3; ++dz)
@@ -105,14 +98,14 @@ void RegionGrower::search_bucket(uint32_t bucket, const Point& from, const Colou
   for (uint32_t k = first; k < end;) {
     const cloud::SortedPoint& p = open_[k];
     const bool own = p.index == region_[0];  // the seed is in the region from the beginning
-    if (!own && (!near(from, point_of(p), parameters_.d_max_m) ||
+    if (!own && (!near(from, {p.x, p.y, p.z}, parameters_.d_max_m) ||
                  (parameters_.colour_max > 0 && !alike(colour, colours_[p.index], parameters_)))) {
       ++k;
       continue;
     }
-    if (own) {
-    } else if (reach_.holds(seed_, p.x, p.y, p.z)) region_[found_++] = p.index;
-    else cut_ = true;
+    const bool within = reach_.holds(seed_, p.x, p.y, p.z);
+    if (!own && within) region_[found_++] = p.index;
+    cut_ |= !within;
     if (end == whole) touched_[touched_count_++] = bucket;
     std::swap(open_[k], open_[--end]);
   }

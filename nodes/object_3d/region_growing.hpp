@@ -54,7 +54,10 @@ class RegionGrower {
   void restore();
   void look_around(uint32_t index);
   void search_bucket(uint32_t bucket, const Point& from, const Colour& colour);
-  Point point_of(const cloud::SortedPoint& p) const { return {p.x, p.y, p.z}; }
+  /// Never negative: the origin lies below all points.
+  uint32_t cell(float v, int axis) const {
+    return static_cast<uint32_t>(static_cast<int64_t>((static_cast<double>(v) - origin_[axis]) * per_m_));
+  }
 
   GrowParameters parameters_;
   std::span<const Point> points_;

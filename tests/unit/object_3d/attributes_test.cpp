@@ -34,7 +34,7 @@ TEST_CASE("attributes of a box from all sides: its measures, its place, a full r
   const auto points = box_points(0.24, 0.12, 0.16);
   const std::vector<Colour> colours(points.size(), Colour{51, 102, 204});
   Describer describer(points.size());
-  const auto found = describer.describe(points, colours, 0.5);
+  const auto found = describer.describe(points, colours, 0.5, 0);
   REQUIRE(found);
   const Attributes& b = found->attributes;
   const auto is = [&](Attribute attribute, double wanted) {
@@ -64,7 +64,7 @@ TEST_CASE("shape: the eigenvalue ratios of a plate are those of its sides") {
   for (int x = 0; x <= 40; ++x)
     for (int y = 0; y <= 20; ++y) plate.push_back({0.01f * static_cast<float>(x), 0.01f * static_cast<float>(y), 0.1f});
   Describer describer(plate.size());
-  const auto found = describer.describe(plate, std::vector<Colour>(plate.size()), 0);
+  const auto found = describer.describe(plate, std::vector<Colour>(plate.size()), 0, 0);
   REQUIRE(found);
   CHECK(value(found->attributes, Attribute::shape_2) == doctest::Approx((21.0 * 21 - 1) / (41.0 * 41 - 1)));
   CHECK(value(found->attributes, Attribute::shape_3) < 1e-6);
@@ -78,7 +78,7 @@ TEST_CASE("a hole in an object is no part of its area, and fill says so") {
       if (std::abs(x) > 25 || std::abs(y) > 25)
         ring.push_back({0.002f * static_cast<float>(x), 0.002f * static_cast<float>(y), 0.1f});
   Describer describer(ring.size());
-  const auto found = describer.describe(ring, std::vector<Colour>(ring.size()), 0);
+  const auto found = describer.describe(ring, std::vector<Colour>(ring.size()), 0, 0);
   REQUIRE(found);
   CHECK(value(found->attributes, Attribute::fill) == doctest::Approx(0.75).epsilon(0.06));
 }
@@ -86,9 +86,11 @@ TEST_CASE("a hole in an object is no part of its area, and fill says so") {
 TEST_CASE("what has no outline or no height is not described") {
   Describer describer(10);
   const std::vector<Colour> colours(4);
-  CHECK_FALSE(describer.describe(std::vector<Point>{{0, 0, 1}, {1, 1, 1}}, std::span(colours).first(2), 0));
-  CHECK_FALSE(describer.describe(std::vector<Point>{{0, 0, 1}, {1, 1, 1}, {2, 2, 1}}, std::span(colours).first(3), 0));
-  CHECK_FALSE(describer.describe(std::vector<Point>{{0, 0, 1}, {1, 0, 1}, {1, 1, 1}}, std::span(colours).first(3), 1));
+  CHECK_FALSE(describer.describe(std::vector<Point>{{0, 0, 1}, {1, 1, 1}}, std::span(colours).first(2), 0, 0));
+  CHECK_FALSE(
+      describer.describe(std::vector<Point>{{0, 0, 1}, {1, 1, 1}, {2, 2, 1}}, std::span(colours).first(3), 0, 0));
+  CHECK_FALSE(
+      describer.describe(std::vector<Point>{{0, 0, 1}, {1, 0, 1}, {1, 1, 1}}, std::span(colours).first(3), 1, 0));
 }
 
 TEST_CASE("every attribute has a name of its own, by which it is found") {
