@@ -139,6 +139,7 @@ int main(int argc, char** argv) {
   takt::command::ProfileOptions profile;
   takt::command::EvalObjectsOptions objects;
   takt::command::EvalGroundOptions ground;
+  takt::command::EvalBodyPoseOptions body_pose;
   takt::command::ReplayOptions replay;
   takt::command::LogOptions log;
   takt::command::CloudOptions cloud;
@@ -171,6 +172,7 @@ int main(int argc, char** argv) {
   takt::command::add_eval_ego_motion(*eval, ego_motion, exit_code);
   takt::command::add_eval_objects(*eval, objects, exit_code);
   takt::command::add_eval_ground(*eval, ground, exit_code);
+  takt::command::add_eval_body_pose(*eval, body_pose, exit_code);
 
   try {
     app.parse(argc, argv);

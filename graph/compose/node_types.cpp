@@ -13,6 +13,7 @@ void register_obstacle_stop(NodeTypes& types);
 void register_semantic(NodeTypes& types);
 void register_load(NodeTypes& types);
 void register_cloud_filter(NodeTypes& types);
+void register_body_pose(NodeTypes& types);
 }  // namespace takt
 
 namespace takt::graph {
@@ -29,6 +30,7 @@ NodeTypes node_types() {
   register_semantic(types);
   register_load(types);
   register_cloud_filter(types);
+  register_body_pose(types);
   return types;
 }
 

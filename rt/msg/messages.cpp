@@ -47,6 +47,8 @@ FIELDS(Motion, F(Motion, from_stamp_ns, "ns"), TRANSFORM_FIELDS(Motion, camera_i
        F(Motion, matched, "1"), F(Motion, inliers, "1"), F(Motion, valid, ""), F(Motion, keyframe, ""))
 FIELDS(Detections, F(Detections, image_width, "px"), F(Detections, image_height, "px"), F(Detections, searched, "1"),
        F(Detections, boxes, "px"))
+FIELDS(BodyPoses, F(BodyPoses, joints, "1"), F(BodyPoses, candidates, "1"), F(BodyPoses, searched, "1"),
+       F(BodyPoses, bodies, ""))
 FIELDS(Grid, F(Grid, width, "1"), F(Grid, height, "1"), F(Grid, cell_m, "m"), F(Grid, origin_x_m, "m"),
        F(Grid, origin_y_m, "m"), TRANSFORM_FIELDS(Grid, grid_in_map), F(Grid, cells, "1"))
 FIELDS(HeadState, F(HeadState, pan_rad, "rad"), F(HeadState, tilt_rad, "rad"), F(HeadState, roll_rad, "rad"),
@@ -64,23 +66,16 @@ FIELDS(TextStatus, F(TextStatus, text, ""))
 #undef CAMERA_FIELDS
 
 std::span<const MessageType* const> message_types() {
-  static const std::array<const MessageType*, 17> types{&MessageType::of<Image>(),
-                                                        &MessageType::of<StereoPair>(),
-                                                        &MessageType::of<DisparityMap>(),
-                                                        &MessageType::of<PointCloud>(),
-                                                        &MessageType::of<LaserScan>(),
-                                                        &MessageType::of<Odometry>(),
-                                                        &MessageType::of<Pose>(),
-                                                        &MessageType::of<Motion>(),
-                                                        &MessageType::of<Detections>(),
-                                                        &MessageType::of<Grid>(),
-                                                        &MessageType::of<HeadState>(),
-                                                        &MessageType::of<HeadCommand>(),
-                                                        &MessageType::of<VelocityCommand>(),
-                                                        &MessageType::of<DigitalState>(),
-                                                        &MessageType::of<StopCommand>(),
-                                                        &MessageType::of<Requests>(),
-                                                        &MessageType::of<TextStatus>()};
+  static const std::array<const MessageType*, 18> types{
+      &MessageType::of<Image>(),        &MessageType::of<StereoPair>(),
+      &MessageType::of<DisparityMap>(), &MessageType::of<PointCloud>(),
+      &MessageType::of<LaserScan>(),    &MessageType::of<Odometry>(),
+      &MessageType::of<Pose>(),         &MessageType::of<Motion>(),
+      &MessageType::of<Detections>(),   &MessageType::of<BodyPoses>(),
+      &MessageType::of<Grid>(),         &MessageType::of<HeadState>(),
+      &MessageType::of<HeadCommand>(),  &MessageType::of<VelocityCommand>(),
+      &MessageType::of<DigitalState>(), &MessageType::of<StopCommand>(),
+      &MessageType::of<Requests>(),     &MessageType::of<TextStatus>()};
   return types;
 }
 
