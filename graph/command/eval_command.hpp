@@ -64,6 +64,17 @@ struct EvalSiftOptions {
   bool json = false;
 };
 void add_eval_sift(CLI::App& eval, EvalSiftOptions& options, int& exit_code);
+struct EvalBodyPoseOptions {
+  std::filesystem::path depth, colour;  ///< of a Kinect; empty: people are generated
+  std::filesystem::path skeleton;       ///< empty: the shipped human
+  uint64_t seed = 1;
+  int people = 150;
+  double noise_px = 0.1;
+  double search_m = 0.30;  ///< of the fit
+  std::string picture;
+  bool json = false;
+};
+void add_eval_body_pose(CLI::App& eval, EvalBodyPoseOptions& options, int& exit_code);
 struct EvalGroundOptions {
   std::filesystem::path images, labels;  ///< all three, or none: a pavement is generated
   std::vector<int> drivable;             ///< class ids

@@ -143,6 +143,7 @@ int main(int argc, char** argv) {
   takt::command::EvalSiftOptions sift;
   takt::command::EvalGroundOptions ground;
   takt::command::EvalSignsOptions signs;
+  takt::command::EvalBodyPoseOptions body_pose;
   takt::command::ReplayOptions replay;
   takt::command::LogOptions log;
   takt::command::CloudOptions cloud;
@@ -180,6 +181,7 @@ int main(int argc, char** argv) {
   takt::command::add_eval_sift(*eval, sift, exit_code);
   takt::command::add_eval_ground(*eval, ground, exit_code);
   takt::command::add_eval_signs(*eval, signs, exit_code);
+  takt::command::add_eval_body_pose(*eval, body_pose, exit_code);
 
   try {
     app.parse(argc, argv);

@@ -15,6 +15,7 @@ void register_load(NodeTypes& types);
 void register_cloud_filter(NodeTypes& types);
 void register_traffic_signs(NodeTypes& types);
 void register_object_3d(NodeTypes& types);
+void register_body_pose(NodeTypes& types);
 }  // namespace takt
 
 namespace takt::graph {
@@ -33,6 +34,7 @@ NodeTypes node_types() {
   register_cloud_filter(types);
   register_traffic_signs(types);
   register_object_3d(types);
+  register_body_pose(types);
   return types;
 }
 

@@ -49,6 +49,8 @@ FIELDS(Detections, F(Detections, image_width, "px"), F(Detections, image_height,
        F(Detections, boxes, "px"))
 FIELDS(Objects3d, F(Objects3d, searched, "1"), F(Objects3d, supported, ""), F(Objects3d, support_a, "1"),
        F(Objects3d, support_b, "1"), F(Objects3d, support_m, "m"), F(Objects3d, objects, ""))
+FIELDS(BodyPoses, F(BodyPoses, joints, "1"), F(BodyPoses, candidates, "1"), F(BodyPoses, searched, "1"),
+       F(BodyPoses, bodies, ""))
 FIELDS(Grid, F(Grid, width, "1"), F(Grid, height, "1"), F(Grid, cell_m, "m"), F(Grid, origin_x_m, "m"),
        F(Grid, origin_y_m, "m"), TRANSFORM_FIELDS(Grid, grid_in_map), F(Grid, cells, "1"))
 FIELDS(HeadState, F(HeadState, pan_rad, "rad"), F(HeadState, tilt_rad, "rad"), F(HeadState, roll_rad, "rad"),
@@ -66,16 +68,14 @@ FIELDS(TextStatus, F(TextStatus, text, ""))
 #undef CAMERA_FIELDS
 
 std::span<const MessageType* const> message_types() {
-  static const std::array<const MessageType*, 18> types{
-      &MessageType::of<Image>(),        &MessageType::of<StereoPair>(),
-      &MessageType::of<DisparityMap>(), &MessageType::of<PointCloud>(),
-      &MessageType::of<LaserScan>(),    &MessageType::of<Odometry>(),
-      &MessageType::of<Pose>(),         &MessageType::of<Motion>(),
-      &MessageType::of<Detections>(),   &MessageType::of<Objects3d>(),
-      &MessageType::of<Grid>(),         &MessageType::of<HeadState>(),
-      &MessageType::of<HeadCommand>(),  &MessageType::of<VelocityCommand>(),
-      &MessageType::of<DigitalState>(), &MessageType::of<StopCommand>(),
-      &MessageType::of<Requests>(),     &MessageType::of<TextStatus>()};
+  static const std::array<const MessageType*, 19> types{
+      &MessageType::of<Image>(),        &MessageType::of<StereoPair>(),  &MessageType::of<DisparityMap>(),
+      &MessageType::of<PointCloud>(),   &MessageType::of<LaserScan>(),   &MessageType::of<Odometry>(),
+      &MessageType::of<Pose>(),         &MessageType::of<Motion>(),      &MessageType::of<Detections>(),
+      &MessageType::of<Objects3d>(),    &MessageType::of<BodyPoses>(),   &MessageType::of<Grid>(),
+      &MessageType::of<HeadState>(),    &MessageType::of<HeadCommand>(), &MessageType::of<VelocityCommand>(),
+      &MessageType::of<DigitalState>(), &MessageType::of<StopCommand>(), &MessageType::of<Requests>(),
+      &MessageType::of<TextStatus>()};
   return types;
 }
 

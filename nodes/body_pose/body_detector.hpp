@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+// Bodies in a cloud: candidates, a fit for each, what is no body left out. Floor frame: z up, floor z = 0.
+#pragma once
+#include <span>
+#include <vector>
+
+#include "nodes/body_pose/fitter.hpp"
+#include "nodes/body_pose/segmentation.hpp"
+
+namespace takt::body_pose {
+
+struct DetectorParameters {
+  SegmentationParameters segmentation;
+  FitParameters fit;
+  double error_max = 2.0;  ///< a fit with a larger error is no body
+  int links_min = 6;       ///< nor is one with fewer links
+};
+
+struct DetectedBody {
+  Fit fit;
+  float top_m = 0;
+  bool valid = false;  ///< is_valid(): Eq. 3.11
+  size_t candidate = 0;
+};
+
+class BodyDetector {
+ public:
+  /// Takes the memory for clouds of up to `capacity` points; run() allocates nothing.
+  BodyDetector(const Skeleton& skeleton, const DetectorParameters& parameters, size_t capacity)
+      : p_(parameters),
+        segmentation_(capacity, parameters.segmentation),
+        fitter_(skeleton, parameters.fit, static_cast<size_t>(parameters.segmentation.points_max)) {
+    bodies_.reserve(static_cast<size_t>(parameters.segmentation.candidates));
+  }
+
+  /// Bodies, nearest first. Asks may_go_on() before each rotation of each candidate; when that says no, candidates
+  /// that were not reached are left out.
+  template <class MayGoOn>
+  std::span<const DetectedBody> run(std::span<const Point> points, const MayGoOn& may_go_on) {
+    bodies_.clear();
+    candidates_ = segmentation_.run(points);
+    double tried = 0;
+    for (size_t i = 0; i < candidates_.size() && (i == 0 || may_go_on()); ++i) {
+      const Fit fit = fitter_.fit(cluster(i), may_go_on);
+      tried += fit.searched;
+      keep(fit, i);
+    }
+    searched_ = candidates_.empty() ? 1 : tried / static_cast<double>(candidates_.size());
+    return bodies_;
+  }
+
+  std::span<const Candidate> candidates() const { return candidates_; }
+  double searched() const { return searched_; }  ///< share of all rotations of all candidates of the last run
+  /// Candidate i as the fit sees it.
+  Cluster cluster(size_t i) const;
+  const Segmentation& segmentation() const { return segmentation_; }
+  const Skeleton& skeleton() const { return fitter_.skeleton(); }
+
+ private:
+  void keep(const Fit& fit, size_t candidate);
+
+  DetectorParameters p_;
+  Segmentation segmentation_;
+  Fitter fitter_;
+  std::span<const Candidate> candidates_;
+  std::vector<DetectedBody> bodies_;
+  double searched_ = 1;
+};
+
+/// Fills one body of a message.
+Body to_message(const Skeleton& skeleton, const DetectedBody& body);
+/// Unit direction of a pointer of the skeleton; 0 0 0 if one of its joints is missing.
+Eigen::Vector3f pointing_direction(const Fit& fit, const Pointer& pointer);
+
+}  // namespace takt::body_pose
