@@ -19,6 +19,7 @@ std::vector<Row> run_rectify(const Options&);
 #endif
 #ifdef TAKT_BENCH_EGO_MOTION
 std::vector<Row> run_ego_motion(const Options&);
+std::vector<Row> run_objects(const Options&);
 #endif
 
 std::span<const Suite> suites() {
@@ -37,6 +38,7 @@ std::span<const Suite> suites() {
 #endif
 #ifdef TAKT_BENCH_EGO_MOTION
       {"ego_motion", "a step at 640x480, against OpenCV's corners and optical flow", run_ego_motion},
+      {"objects", "histogram cascade at 640x480: stages on all windows against brute force, the whole", run_objects},
 #endif
   });
   return list;
