@@ -21,6 +21,7 @@ std::vector<Row> run_rectify(const Options&);
 std::vector<Row> run_ego_motion(const Options&);
 std::vector<Row> run_signs(const Options&);
 std::vector<Row> run_sift(const Options&);
+std::vector<Row> run_objects(const Options&);
 #endif
 
 std::span<const Suite> suites() {
@@ -41,6 +42,7 @@ std::span<const Suite> suites() {
       {"ego_motion", "a step at 640x480, against OpenCV's corners and optical flow", run_ego_motion},
       {"signs", "seven cascades over a scene of 640x480, against OpenCV's detector", run_signs},
       {"sift", "objects in a scene: the colour stage against OpenCV's SIFT", run_sift},
+      {"objects", "histogram cascade at 640x480: stages on all windows against brute force, the whole", run_objects},
 #endif
   });
   return list;
