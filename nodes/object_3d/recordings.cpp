@@ -81,9 +81,9 @@ MatchedScene match(const std::string& name, const Recording& r, double colour_ma
   p.segment.grow.colour_max = static_cast<float>(colour_max);
   ObjectFinder finder(r.points.size(), 64, p, nullptr);
   MatchedScene scene{name};
-  const int64_t begin = thread_cpu_ns();
+  const int64_t begin = thread_cpu_ns();  // replay: a figure of the evaluation, no node calls this
   const auto found = finder.run(r.cloud(), {}, [] { return true; });
-  scene.time_ms = static_cast<double>(thread_cpu_ns() - begin) * 1e-6;
+  scene.time_ms = static_cast<double>(thread_cpu_ns() - begin) * 1e-6;  // replay: likewise
   scene.found = found.size();
   std::map<int, size_t> labelled;
   for (const int object : r.object) labelled[object] += object > 0;
