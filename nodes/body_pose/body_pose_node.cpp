@@ -61,12 +61,11 @@ class BodyPoseNode final : public Node {
   }
 
   std::span<const Point> moved(std::span<const Point> points, const mapping_3d::Affine& a) {
-    const auto along = [&](const Point& p, int row) {
-      const double* r = a.r + 3 * row;
-      return static_cast<float>(r[0] * p.x + r[1] * p.y + r[2] * p.z + a.t[row]);
-    };
     const size_t count = std::min(points.size(), in_robot_.size());
-    for (size_t i = 0; i < count; ++i) in_robot_[i] = {along(points[i], 0), along(points[i], 1), along(points[i], 2)};
+    for (size_t i = 0; i < count; ++i) {
+      const mapping_3d::Position p = mapping_3d::transformed(a, points[i].x, points[i].y, points[i].z);
+      in_robot_[i] = {static_cast<float>(p.x_m), static_cast<float>(p.y_m), static_cast<float>(p.z_m)};
+    }
     return std::span(in_robot_).first(count);
   }
 

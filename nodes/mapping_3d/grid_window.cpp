@@ -6,14 +6,6 @@
 #include "rt/transform/pose_math.hpp"
 
 namespace takt::mapping_3d {
-namespace {
-
-Position transformed(const Affine& a, double x, double y, double z) {
-  return {a.r[0] * x + a.r[1] * y + a.r[2] * z + a.t[0], a.r[3] * x + a.r[4] * y + a.r[5] * z + a.t[1],
-          a.r[6] * x + a.r[7] * y + a.r[8] * z + a.t[2]};
-}
-
-}  // namespace
 
 GridWindow::GridWindow(int views, const GridShape& shape)
     : shape_(shape), quarters_{2 * shape.cells, shape.origin_m, shape.cell_m / 2} {

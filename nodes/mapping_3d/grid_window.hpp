@@ -7,13 +7,9 @@
 #include <vector>
 
 #include "nodes/mapping_3d/obstacle_grid.hpp"
+#include "nodes/mapping_3d/pose.hpp"
 
 namespace takt::mapping_3d {
-
-/// A place in the map frame.
-struct Position {
-  double x_m = 0, y_m = 0, z_m = 0;
-};
 
 /// Memory is taken by the constructor (0.5 MB a view at 70 x 70 cells); nothing else allocates. One thread at a time.
 class GridWindow {

@@ -13,6 +13,17 @@ struct Affine {
 
 Affine to_affine(const Transform& transform);
 
+/// A place in some frame.
+struct Position {
+  double x_m = 0, y_m = 0, z_m = 0;
+};
+
+/// A place in the child frame, seen from the parent frame.
+inline Position transformed(const Affine& a, double x, double y, double z) {
+  return {a.r[0] * x + a.r[1] * y + a.r[2] * z + a.t[0], a.r[3] * x + a.r[4] * y + a.r[5] * z + a.t[1],
+          a.r[6] * x + a.r[7] * y + a.r[8] * z + a.t[2]};
+}
+
 /// A camera on the robot: position in the robot frame (x right, y forward, z up), pan about z (left positive), tilt
 /// about x (up positive); camera axes x right, y down, z forward.
 Transform camera_mount(double x_m, double y_m, double height_m, double pan_rad, double tilt_rad);

@@ -34,12 +34,10 @@ std::pair<double, double> extents_by_axes(const Scene& scene, std::span<const ui
   std::vector<Eigen::Vector2d> flat;
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
   for (const uint32_t i : points) {
-    const Eigen::Vector3d p = Eigen::Vector3f(scene.points[i].x, scene.points[i].y, scene.points[i].z).cast<double>();
-    const auto along = [&](int row) {
-      const double* r = mount.r + 3 * row;
-      return r[0] * p.x() + r[1] * p.y() + r[2] * p.z() + mount.t[row];
-    };
-    flat.emplace_back(along(0), along(1));
+    const Point& point = scene.points[i];
+    const mapping_3d::Position p = mapping_3d::transformed(mount, static_cast<double>(point.x),
+                                                           static_cast<double>(point.y), static_cast<double>(point.z));
+    flat.emplace_back(p.x_m, p.y_m);
     mean += flat.back();
   }
   mean /= static_cast<double>(flat.size());

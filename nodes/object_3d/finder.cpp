@@ -62,12 +62,9 @@ void ObjectFinder::begin(const SensorCloud& cloud, std::span<const Detection> bo
 }
 
 Point ObjectFinder::in_robot(const Point& p) const {
-  const double x = static_cast<double>(p.x), y = static_cast<double>(p.y), z = static_cast<double>(p.z);
-  const auto along = [&](int row) {
-    const double* r = mount_.r + 3 * row;
-    return static_cast<float>(r[0] * x + r[1] * y + r[2] * z + mount_.t[row]);
-  };
-  return {along(0), along(1), along(2)};
+  const mapping_3d::Position q =
+      mapping_3d::transformed(mount_, static_cast<double>(p.x), static_cast<double>(p.y), static_cast<double>(p.z));
+  return {static_cast<float>(q.x_m), static_cast<float>(q.y_m), static_cast<float>(q.z_m)};
 }
 
 void ObjectFinder::take_points(const SensorCloud& cloud) {

@@ -9,11 +9,14 @@
 namespace takt {
 
 TAKT_HOT bool Anticipation::sleep_before(int64_t release_ns, const Clock& clock, const StopSignal& stop) {
+  if (longest_ns_ == 0) {
+    stop.sleep_until(release_ns);
+    return false;
+  }
   const int64_t asked_ns = release_ns - lead_ns_;
   // Who comes late from the job before is not woken, and learns nothing about it.
-  const bool sleeps = longest_ns_ > 0 && clock.now_ns() < asked_ns;
+  const bool sleeps = clock.now_ns() < asked_ns;
   stop.sleep_until(asked_ns);
-  if (longest_ns_ == 0) return false;
   const int64_t now_ns = clock.now_ns();
   if (now_ns < asked_ns) return false;  // a stop
   if (sleeps) learn(now_ns - asked_ns);

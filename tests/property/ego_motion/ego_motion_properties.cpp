@@ -12,7 +12,7 @@
 #include "nodes/ego_motion/corners.hpp"
 #include "nodes/ego_motion/flow_filter.hpp"
 #include "nodes/ego_motion/refine.hpp"
-#include "tests/property/ego_motion/on_each_target.hpp"
+#include "tests/on_each_target.hpp"
 
 using namespace takt::ego_motion;
 using takt::test::on_each_target;

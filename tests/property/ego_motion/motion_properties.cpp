@@ -10,7 +10,7 @@
 #include "nodes/ego_motion/evaluate.hpp"
 #include "nodes/ego_motion/motion_kernel.hpp"
 #include "rt/transform/pose_math.hpp"
-#include "tests/property/ego_motion/on_each_target.hpp"
+#include "tests/on_each_target.hpp"
 
 using namespace takt;
 using namespace takt::ego_motion;

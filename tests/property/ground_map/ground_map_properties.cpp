@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Each fast form against a slow obvious one on random input.
 #include <doctest/doctest.h>
-#include <hwy/targets.h>
 
 #include <Eigen/Geometry>
 #include <cmath>
@@ -15,9 +14,11 @@
 #include "nodes/ground_map/saturation_value.hpp"
 #include "nodes/ground_map/texture.hpp"
 #include "nodes/mapping_3d/pose.hpp"
+#include "tests/on_each_target.hpp"
 
 using namespace takt;
 using namespace takt::ground_map;
+using takt::test::on_each_target;
 
 namespace {
 
@@ -90,8 +91,7 @@ TEST_CASE("saturation and value equal the rounded quotient on every SIMD target 
       const int value[3] = {low, middle, high};
       for (const int c : channel[order]) bgr.push_back(static_cast<uint8_t>(value[c]));
     }
-  for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    hwy::SetSupportedTargetsForTest(target);
+  on_each_target([&] {
     const int pixels = static_cast<int>(bgr.size() / 3);
     for (int first = 0, count = 1; first < pixels; first += count, count = count % 97 + 1) {
       count = std::min(count, pixels - first);
@@ -107,8 +107,7 @@ TEST_CASE("saturation and value equal the rounded quotient on every SIMD target 
       REQUIRE(s.back() == 0xA5);
       REQUIRE(v.back() == 0xA5);
     }
-  }
-  hwy::SetSupportedTargetsForTest(0);
+  });
 }
 
 TEST_CASE("oracle 14: the table equals the sum over all entries, and the weights of Eq. 4.3 with E-19") {
@@ -287,8 +286,7 @@ TEST_CASE("a drive: every observation, and the map it adds up to, equal a map of
 }
 
 TEST_CASE("the cells of a row equal the projection of each pixel on every SIMD target") {
-  for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    hwy::SetSupportedTargetsForTest(target);
+  on_each_target([&] {
     Random random(5);
     for (int round = 0; round < 60; ++round) {
       const int width = random.pick(1, 70), side = random.pick(2, 90);
@@ -311,6 +309,5 @@ TEST_CASE("the cells of a row equal the projection of each pixel on every SIMD t
         }
       }
     }
-  }
-  hwy::SetSupportedTargetsForTest(0);
+  });
 }

@@ -6,12 +6,13 @@
 
 #include "nodes/object_detection/colour_stage.hpp"
 #include "nodes/object_detection/reference.hpp"
+#include "tests/on_each_target.hpp"
 #include "tests/property/object_detection/random_images.hpp"
 
 using namespace takt;
 using namespace takt::object_detection;
+using takt::test::on_each_target;
 using takt::test::Random;
-using takt::test::with_each_target;
 
 namespace {
 
@@ -48,7 +49,7 @@ TEST_CASE("all 16.7 million colours get the same bin from the vectorised form, w
       std::vector<uint16_t> slow;
       for (size_t i = 0; i < 65536; ++i)
         slow.push_back(colour_bin(colours[3 * i], colours[3 * i + 1], colours[3 * i + 2], bins));
-      with_each_target([&] {
+      on_each_target([&] {
         colour_bins(colours.data(), 65535, bins, fast.data());  // an odd length: the rest is done one by one
         fast[65535] = slow[65535];
         REQUIRE(fast == slow);
@@ -75,7 +76,7 @@ TEST_CASE("the colour stage equals counting and comparing everything, for any gr
     for (const auto* image : {&first, &second}) {  // the second run must not remember the first
       const ImageView<const uint8_t> view(image->data(), width, height, 3);
       const auto slow = colour_stage_reference(grid, bins, objects, view);
-      with_each_target([&] {
+      on_each_target([&] {
         stage.run(view);
         REQUIRE(std::equal(slow.begin(), slow.end(), stage.missing().begin(), stage.missing().end()));
       });

@@ -8,12 +8,13 @@
 #include "nodes/object_detection/cooccurrence_stage.hpp"
 #include "nodes/object_detection/orientation_stage.hpp"
 #include "nodes/object_detection/reference.hpp"
+#include "tests/on_each_target.hpp"
 #include "tests/property/object_detection/random_images.hpp"
 
 using namespace takt;
 using namespace takt::object_detection;
+using takt::test::on_each_target;
 using takt::test::Random;
-using takt::test::with_each_target;
 
 namespace {
 
@@ -74,7 +75,7 @@ TEST_CASE("every possible gradient gets the same from the vectorised form, with 
         slow[x] = bins.of(a[1] + 2 * o[1] + b[1] - a[-1] - 2 * o[-1] - b[-1],
                           b[-1] + 2 * b[0] + b[1] - a[-1] - 2 * a[0] - a[1]);
       }
-      with_each_target([&] {
+      on_each_target([&] {
         bins.row(rows[0].data(), rows[1].data(), rows[2].data(), kWidth, fast.data());
         REQUIRE(fast == slow);
       });
@@ -96,7 +97,7 @@ TEST_CASE("the orientation stage equals counting and comparing everything, for a
     const auto objects = references(random, image, reference,
                                     [&](ImageView<const uint8_t> view) { return orientation_histogram(view, bins); });
     OrientationStage stage(grid, bins, objects);
-    with_each_target([&] {
+    on_each_target([&] {
       stage.begin(image);
       const int first_row = random.in(0, grid.rows - 1);
       for (int row = 0; row < grid.rows; ++row) {
@@ -130,7 +131,7 @@ TEST_CASE("co-occurrences equal looking at every pair of pixels, with each SIMD 
     const auto slow = cooccurrence_reference(colour, side, bins);
     CooccurrenceCounter counter(side, bins.distances);
     std::vector<uint32_t> fast(slow.size(), 7);
-    with_each_target([&] {
+    on_each_target([&] {
       counter.count(colour.data(), bins.colours, fast.data());
       REQUIRE(fast == slow);
     });
@@ -149,7 +150,7 @@ TEST_CASE("the co-occurrence stage equals counting and comparing everything") {
     const auto objects = references(random, image, reference,
                                     [&](ImageView<const uint8_t> view) { return cooccurrence_histogram(view, bins); });
     CooccurrenceStage stage(grid, bins, objects);
-    with_each_target([&] {
+    on_each_target([&] {
       for (int k = 0; k < 10; ++k) {
         const int u = random.in(0, grid.columns - 1), v = random.in(0, grid.rows - 1);
         const auto object = static_cast<size_t>(random.in(0, static_cast<int>(objects.size()) - 1));
@@ -172,7 +173,7 @@ TEST_CASE("all 16.7 million colours get the same co-occurrence colour from the v
         colours[3 * i + 2] = static_cast<uint8_t>(i);
         slow[i] = pair_colour(colours[3 * i], colours[3 * i + 1], colours[3 * i + 2], n);
       }
-      with_each_target([&] {
+      on_each_target([&] {
         pair_colours(colours.data(), 65535, n, fast.data());  // an odd length: the rest is done one by one
         fast[65535] = slow[65535];
         REQUIRE(fast == slow);

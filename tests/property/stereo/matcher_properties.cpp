@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The fast matcher against the slow reference: equal bit for bit, for every cost, odd size and SIMD target.
 #include <doctest/doctest.h>
-#include <hwy/targets.h>
 
 #include <random>
 #include <string>
@@ -12,9 +11,11 @@
 #include "nodes/stereo/reference.hpp"
 #include "nodes/stereo/semi_global_matcher.hpp"
 #include "nodes/stereo/window_matcher.hpp"
+#include "tests/on_each_target.hpp"
 
 using namespace takt;
 using namespace takt::stereo;
+using takt::test::on_each_target;
 
 namespace {
 
@@ -102,16 +103,6 @@ MatcherParameters random_parameters(std::mt19937& random, int largest_disparity)
   if (pick(0, 2) == 0) p.subpixel = true;
   if (pick(0, 2) == 0) p.median = true;
   return p;
-}
-
-/// Runs `body` once per SIMD target that this machine and this build have.
-template <class Body>
-void on_each_target(Body body) {
-  for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    hwy::SetSupportedTargetsForTest(target);
-    body();
-  }
-  hwy::SetSupportedTargetsForTest(0);
 }
 
 }  // namespace

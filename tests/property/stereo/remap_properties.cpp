@@ -2,7 +2,6 @@
 // The vectorised debayering and resampling against their definitions: equal bit for bit, for every colour filter, odd
 // sizes, any table, on every SIMD target; and nothing but the image is written.
 #include <doctest/doctest.h>
-#include <hwy/targets.h>
 
 #include <algorithm>
 #include <cmath>
@@ -11,9 +10,11 @@
 
 #include "nodes/stereo/remap.hpp"
 #include "nodes/stereo/remap_reference.hpp"
+#include "tests/on_each_target.hpp"
 
 using namespace takt;
 using namespace takt::stereo;
+using takt::test::on_each_target;
 
 namespace {
 
@@ -91,22 +92,12 @@ void expect_equal(Picture& in, BayerPattern pattern, const std::vector<RemapSour
   }
 }
 
-template <class Check>
-void on_every_target(const Check& check) {
-  for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    hwy::SetSupportedTargetsForTest(target);
-    INFO(hwy::TargetName(target));
-    check();
-  }
-  hwy::SetSupportedTargetsForTest(0);
-}
-
 constexpr BayerPattern kPatterns[] = {BayerPattern::rggb, BayerPattern::bggr, BayerPattern::grbg, BayerPattern::gbrg};
 
 }  // namespace
 
 TEST_CASE("grey and colour images: resampling equals the integer formula") {
-  on_every_target([] {
+  on_each_target([] {
     Dice dice(3);
     for (int round = 0; round < 150; ++round) {
       Picture in(dice.pick(2, 70), dice.pick(2, 40), dice.pick(0, 1) ? 3 : 1, dice.pick(0, 5));
@@ -118,7 +109,7 @@ TEST_CASE("grey and colour images: resampling equals the integer formula") {
 }
 
 TEST_CASE("mosaics: debayering and resampling in one equal one after the other, for every colour filter") {
-  on_every_target([] {
+  on_each_target([] {
     Dice dice(4);
     for (const BayerPattern pattern : kPatterns)
       for (int round = 0; round < 60; ++round) {
@@ -131,7 +122,7 @@ TEST_CASE("mosaics: debayering and resampling in one equal one after the other, 
 }
 
 TEST_CASE("a tall image passes through a window of few rows many times") {
-  on_every_target([] {
+  on_each_target([] {
     Dice dice(5);
     for (int round = 0; round < 8; ++round) {
       Picture in(dice.pick(60, 90), 300, 1, 0);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
-#include <hwy/targets.h>
 
 #include <algorithm>
 #include <opencv2/imgcodecs.hpp>
@@ -11,25 +10,16 @@
 
 #include "nodes/traffic_signs/reference.hpp"
 #include "nodes/traffic_signs/search.hpp"
+#include "tests/on_each_target.hpp"
 #include "tests/temporary_folder.hpp"
 #include "tests/test_data.hpp"
 #include "tests/unit/traffic_signs/random_cascade.hpp"
 
 using namespace takt;
 using namespace takt::traffic_signs;
+using takt::test::on_each_target;
 
 namespace {
-
-/// Runs the body once with each SIMD target that this machine has, alone.
-template <class Body>
-void with_each_target(const Body& body) {
-  for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    hwy::SetSupportedTargetsForTest(target);
-    CAPTURE(hwy::TargetName(target));
-    body();
-  }
-  hwy::SetSupportedTargetsForTest(0);
-}
 
 /// Blobs of several sizes, with places so flat that no window may be looked at.
 cv::Mat1b random_image(uint32_t seed, int width, int height) {
@@ -129,7 +119,7 @@ TEST_CASE("traffic_signs: every window passes as many stages as in the obvious f
         wanted[i] = stages_passed(cascade, level.grey(), column * level.step, row * level.step);
         asked[i] = i * 2654435761u >> 7 & 1;
       }
-      with_each_target([&] {
+      on_each_target([&] {
         for (const bool all : {true, false}) {
           std::vector<uint8_t> passed(static_cast<size_t>(columns));
           int wrong = 0;

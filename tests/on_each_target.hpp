@@ -5,9 +5,9 @@
 
 namespace takt::test {
 
-/// Runs `body` once per SIMD target that this machine and this build have.
+/// Runs `body` once with each SIMD target that this machine and this build have, alone.
 template <class Body>
-void on_each_target(Body body) {
+void on_each_target(const Body& body) {
   for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
     hwy::SetSupportedTargetsForTest(target);
     CAPTURE(hwy::TargetName(target));
