@@ -249,6 +249,8 @@ class Node {
   virtual void start(int64_t epoch_ns) { static_cast<void>(epoch_ns); }
   /// One job. No allocation, lock, file or socket call, logging or exception in here.
   virtual void run(Job& job) = 0;
+  /// CPU time that threads of the node have taken beside its jobs, ns; asked after the last job.
+  virtual int64_t helper_cpu_ns() const { return 0; }
   /// After the last job, on the main thread. Files may be written.
   virtual void finish() {}
 

@@ -1,8 +1,9 @@
 #!/bin/bash
 # SPDX-License-Identifier: Apache-2.0
 # The main job beside stress-ng: stress.sh [ROUNDS] [SECONDS]. Each round runs it under deadline and fixed, the first one
-# also under cooperative (for contrast), beside four CPU and one memory stressor. One line a run, the worst at the end; exit
-# 1 if a high-criticality node missed a deadline or a rate was not kept under deadline or fixed.
+# also under cooperative (for contrast), beside four CPU and one memory stressor. One line a run, below it why each job
+# missed (takt explain), the worst at the end; exit 1 if a high-criticality node missed a deadline or a rate was not kept
+# under deadline or fixed.
 set -u
 root=$(readlink -f "$(dirname "$0")/../..")
 rounds=${1:-10} seconds=${2:-60}
@@ -13,7 +14,7 @@ stress-ng --cpu 4 --vm 1 --vm-bytes 256M --quiet &
 stress=$!
 for ((round = 1; round <= rounds; ++round)); do
   for policy in deadline fixed $([ $round -eq 1 ] && echo cooperative); do
-    "$root/takt" run --for "${seconds}s" --policy $policy --output "$work/out" --report "$work/$round.$policy.json" >"$work/log" 2>&1
+    "$root/takt" run --for "${seconds}s" --policy $policy --output "$work/out" --report "$work/$round.$policy.json" --trace "$work/trace.json" >"$work/log" 2>&1
     [ -e "$work/$round.$policy.json" ] || { echo "round $round, $policy: no report: $(tail -n 1 "$work/log")"; exit 3; }
     kill -0 $stress 2>/dev/null || { echo "stress-ng has ended"; exit 3; }
     python3 - "$work/$round.$policy.json" "$round" <<'PY'
@@ -25,6 +26,7 @@ late = max(n["lateness_us"]["max"] or 0 for n in report["nodes"] if n["criticali
 print(f"round {sys.argv[2]}: {report['policy_granted']:<11} missed {missed or 'none'}, behind {behind or 'none'}, "
       f"latest start of a high node {late / 1000:.1f} ms, host stall {report['host_stall_ms']} ms", flush=True)
 PY
+    [ $policy = cooperative ] || "$root/takt" explain "$work/trace.json" | grep -v '^no job missed$' | sed 's/^/    /'
   done
 done
 python3 - "$work" <<'PY'

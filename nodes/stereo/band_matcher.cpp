@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "nodes/stereo/band_matcher.hpp"
 
+#include <hwy/cache_control.h>
+
 #include <algorithm>
 #include <cstring>
 #include <stdexcept>
 #include <string>
 
 #include "nodes/stereo/post_process.hpp"
+#include "rt/time/clock.hpp"
 
 namespace takt::stereo {
 namespace {
@@ -16,9 +19,9 @@ int reach(const MatcherParameters& p) {
   return p.n_square / 2 + p.n_min / 2 + (p.median ? 1 : 0) + (p.cost == CostKind::census ? kCensusRadius : 1);
 }
 
-template <class T>
-ImageView<const T> rows_of(ImageView<const T> image, int top, int height) {
-  return {image.row(top), image.width, height, image.channels, image.stride};
+void copy_image(ImageView<const uint8_t> from, uint8_t* to) {
+  const size_t row = static_cast<size_t>(from.width) * static_cast<size_t>(from.channels);
+  for (int y = 0; y < from.height; ++y) std::memcpy(to + static_cast<size_t>(y) * row, from.row(y), row);
 }
 
 template <class T>
@@ -30,8 +33,9 @@ void copy_rows(const std::vector<T>& from, int skip, int width, ImageView<T> to,
 
 }  // namespace
 
-BandMatcher::BandMatcher(int width, int height, int channels, const MatcherParameters& parameters, int bands)
-    : width_(width), height_(height), channels_(channels) {
+BandMatcher::BandMatcher(int width, int height, int channels, const MatcherParameters& parameters, int bands,
+                         int patience)
+    : width_(width), channels_(channels), height_(height), patience_(patience), search_(parameters.disparities) {
   if (const auto wrong = problem(parameters, width, height, channels)) throw std::invalid_argument("stereo: " + *wrong);
   const int most = std::clamp(height / 16, 1, 8);
   if (bands < 1 || bands > most)
@@ -40,68 +44,115 @@ BandMatcher::BandMatcher(int width, int height, int channels, const MatcherParam
   if (parameters.selection == Selection::semi_global)
     throw std::invalid_argument("stereo: semi_global looks along the whole image and has no bands");
   for (int i = 0; i < bands; ++i) {
-    Band band;
+    Band& band = bands_.emplace_back();
     band.first = height * i / bands;
     band.last = height * (i + 1) / bands;
     band.top = std::max(0, band.first - reach(parameters));
     band.height = std::min(height, band.last + reach(parameters)) - band.top;
-    band.matcher = make_matcher(width, band.height, channels, parameters);
-    const auto count = static_cast<size_t>(width) * static_cast<size_t>(band.height);
-    band.disparity.resize(count);
-    band.confidence.resize(count);
-    band.fraction.resize(count);
-    bands_.push_back(std::move(band));
+    band.own = make_desk(band.height, parameters);
+    if (i == 0) continue;
+    band.helper = std::make_unique<Helper>();
+    band.helper->desk = make_desk(band.height, parameters);
+    band.helper->left.resize(bytes_of(band.height));
+    band.helper->right.resize(bytes_of(band.height));
   }
-  for (size_t i = 1; i < bands_.size(); ++i)
-    threads_.emplace_back([this, &band = bands_[i]](const std::stop_token& stop) { serve(band, stop); });
+  for (Band& band : bands_)
+    if (band.helper)
+      band.helper->thread = std::jthread([this, &band](const std::stop_token& stop) { serve(band, stop); });
 }
 
 BandMatcher::~BandMatcher() {
-  for (std::jthread& thread : threads_) thread.request_stop();
-  asked_.fetch_add(1, std::memory_order_release);
-  asked_.notify_all();
-}
-
-void BandMatcher::run(Band& band) const {
-  const DisparityViews own{{band.disparity.data(), width_, band.height},
-                           {band.confidence.data(), width_, band.height},
-                           {band.fraction.data(), width_, band.height}};
-  // Sizes were checked for the whole image.
-  (void)band.matcher->match(rows_of(left_, band.top, band.height), rows_of(right_, band.top, band.height), own);
-  const int skip = band.first - band.top;
-  copy_rows(band.disparity, skip, width_, out_.disparity, band.first, band.last);
-  copy_rows(band.confidence, skip, width_, out_.confidence, band.first, band.last);
-  if (out_.fraction.data != nullptr) copy_rows(band.fraction, skip, width_, out_.fraction, band.first, band.last);
-}
-
-void BandMatcher::serve(Band& band, const std::stop_token& stop) {
-  for (uint32_t seen = 0;;) {
-    asked_.wait(seen, std::memory_order_acquire);
-    if (stop.stop_requested()) return;
-    seen = asked_.load(std::memory_order_acquire);
-    run(band);
-    if (done_.fetch_add(1, std::memory_order_acq_rel) + 1 == threads_.size()) done_.notify_one();
+  for (Band& band : bands_) {
+    if (!band.helper) continue;
+    band.helper->thread.request_stop();
+    band.helper->calls.fetch_add(1, std::memory_order_release);
+    band.helper->calls.notify_one();
   }
+}
+
+size_t BandMatcher::bytes_of(int height) const {
+  return static_cast<size_t>(width_) * static_cast<size_t>(height) * static_cast<size_t>(channels_);
+}
+
+BandMatcher::Desk BandMatcher::make_desk(int height, const MatcherParameters& parameters) const {
+  const auto count = static_cast<size_t>(width_) * static_cast<size_t>(height);
+  return {make_matcher(width_, height, channels_, parameters), std::vector<int16_t>(count), std::vector<uint8_t>(count),
+          std::vector<uint8_t>(count)};
+}
+
+void BandMatcher::run(const Band& band, Desk& desk, ImageView<const uint8_t> left,
+                      ImageView<const uint8_t> right) const {
+  const DisparityViews own{{desk.disparity.data(), width_, band.height},
+                           {desk.confidence.data(), width_, band.height},
+                           {desk.fraction.data(), width_, band.height}};
+  (void)desk.matcher->match(left, right, own);  // sizes were checked for the whole image
+}
+
+void BandMatcher::deliver(const Band& band, const Desk& desk, const DisparityViews& out) const {
+  const int skip = band.first - band.top;
+  copy_rows(desk.disparity, skip, width_, out.disparity, band.first, band.last);
+  copy_rows(desk.confidence, skip, width_, out.confidence, band.first, band.last);
+  if (out.fraction.data != nullptr) copy_rows(desk.fraction, skip, width_, out.fraction, band.first, band.last);
+}
+
+void BandMatcher::ask(const Band& band, ImageView<const uint8_t> left, ImageView<const uint8_t> right) const {
+  Helper& helper = *band.helper;
+  helper.asked_now = helper.state.load(std::memory_order_acquire) != State::busy;
+  if (!helper.asked_now) return;
+  copy_image(left, helper.left.data());
+  copy_image(right, helper.right.data());
+  helper.search = search_;
+  helper.state.store(State::asked, std::memory_order_release);
+  helper.calls.fetch_add(1, std::memory_order_release);
+  helper.calls.notify_one();
+}
+
+void BandMatcher::serve(const Band& band, const std::stop_token& stop) {
+  Helper& helper = *band.helper;
+  for (uint32_t seen = 0;;) {
+    helper.calls.wait(seen, std::memory_order_acquire);
+    if (stop.stop_requested()) return;
+    seen = helper.calls.load(std::memory_order_acquire);
+    State asked = State::asked;
+    if (!helper.state.compare_exchange_strong(asked, State::busy, std::memory_order_acquire)) continue;
+    const int64_t before_ns = thread_cpu_ns();  // replay: counted, and no result depends on it
+    helper.desk.matcher->limit_search(helper.search);
+    run(band, helper.desk, {helper.left.data(), width_, band.height, channels_},
+        {helper.right.data(), width_, band.height, channels_});
+    helper_cpu_ns_.fetch_add(thread_cpu_ns() - before_ns, std::memory_order_relaxed);  // replay: likewise
+    helper.state.store(State::done, std::memory_order_release);
+  }
+}
+
+bool BandMatcher::helped(Helper& helper) const {
+  if (!helper.asked_now) return false;
+  State state = State::asked;
+  if (helper.state.compare_exchange_strong(state, State::idle, std::memory_order_acquire)) return false;
+  for (int looks = 0; state == State::busy && looks < patience_; ++looks) {
+    hwy::Pause();
+    state = helper.state.load(std::memory_order_acquire);
+  }
+  return state == State::done;
 }
 
 bool BandMatcher::match(ImageView<const uint8_t> left, ImageView<const uint8_t> right, const DisparityViews& out) {
   if (!fit(left, right, out, width_, height_, channels_)) return false;
-  left_ = left;
-  right_ = right;
-  out_ = out;
-  done_.store(0, std::memory_order_relaxed);
-  asked_.fetch_add(1, std::memory_order_release);
-  asked_.notify_all();
-  run(bands_.front());
-  const auto others = static_cast<uint32_t>(bands_.size() - 1);
-  for (uint32_t done = done_.load(std::memory_order_acquire); done != others;
-       done = done_.load(std::memory_order_acquire))
-    done_.wait(done, std::memory_order_acquire);
+  const auto read_by = [](const Band& band, ImageView<const uint8_t> image) {
+    return ImageView<const uint8_t>{image.row(band.top), image.width, band.height, image.channels, image.stride};
+  };
+  for (const Band& band : bands_)
+    if (band.helper) ask(band, read_by(band, left), read_by(band, right));
+  for (Band& band : bands_) {
+    const bool done = band.helper && helped(*band.helper);
+    if (!done) run(band, band.own, read_by(band, left), read_by(band, right));
+    deliver(band, done ? band.helper->desk : band.own, out);
+  }
   return true;
 }
 
 void BandMatcher::limit_search(int disparities) {
-  for (Band& band : bands_) band.matcher->limit_search(disparities);
+  search_ = disparities;
+  for (Band& band : bands_) band.own.matcher->limit_search(disparities);
 }
 
 }  // namespace takt::stereo

@@ -29,6 +29,9 @@ class Matcher {
   /// at construction; the result is that of a matcher made for n. Allocates nothing.
   virtual void limit_search(int disparities) = 0;
 
+  /// CPU time that threads beside the caller's have taken, ns. Any thread.
+  virtual int64_t helper_cpu_ns() const { return 0; }
+
   /// Name of the SIMD target in use ("AVX3", "AVX2", ...).
   virtual const char* target() const = 0;
 };

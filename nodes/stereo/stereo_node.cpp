@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "nodes/stereo/band_matcher.hpp"
 #include "nodes/stereo/half_resolution.hpp"
 #include "nodes/stereo/matcher.hpp"
 #include "nodes/stereo/rectification_monitor.hpp"
@@ -32,7 +33,9 @@ class StereoNode final : public Node {
     if (pattern_ != BayerPattern::none) check_mosaic();
     range_ = most_ = disparities_;
     try {
-      matcher_ = make_matcher(width_, height_, channels_, parameters(disparities_));
+      if (bands_ > 1)
+        matcher_ = std::make_unique<BandMatcher>(width_, height_, channels_, parameters(disparities_), bands_);
+      else matcher_ = make_matcher(width_, height_, channels_, parameters(disparities_));
       half_matcher_.emplace(width_, height_, channels_, parameters(disparities_));
       if (!calibration_().empty()) load_calibration(setup.directory / calibration_());
     } catch (const std::invalid_argument& error) {
@@ -51,6 +54,8 @@ class StereoNode final : public Node {
     const auto step = static_cast<uint32_t>(cloud_step_());
     cloud_.reserve({0, 0, 1, ((images.width + step - 1) / step) * ((images.height + step - 1) / step)});
   }
+
+  int64_t helper_cpu_ns() const override { return matcher_ ? matcher_->helper_cpu_ns() : 0; }
 
   void run(Job& job) override {
     const StereoPair* in = pair_.newest();
@@ -249,6 +254,8 @@ class StereoNode final : public Node {
                             {0.0, 1.0}, "1",          "smallest (second - best) / second of a valid pixel; 0: off"};
   Param<bool> left_right_check_{this, "left_right_check", false, "",
                                 "reject where left and right disagree by over 1 px; doubles the time"};
+  Param<int> bands_{this,   "bands", 1,
+                    {1, 8}, "",      "of rows, each on a thread of its own while a CPU is free (full level)"};
   Param<int> cloud_step_{this, "cloud_step", 2, {1, 64}, "px", "distance of the pixels that become points"};
   Param<std::string> calibration_{this, "calibration", "", kPath,
                                   "calibration file (M1 D1 M2 D2 R T image_size) for raw pairs"};

@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "rt/sched/grant.hpp"
 
-#include <linux/capability.h>
 #include <linux/sched.h>
 #include <sched.h>
 #include <sys/prctl.h>
-#include <sys/resource.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 
@@ -13,8 +11,6 @@
 #include <cerrno>
 #include <cstring>
 #include <ctime>
-
-#include "rt/capability.hpp"
 
 namespace takt {
 namespace {
@@ -119,15 +115,6 @@ Grant apply_fixed(const Reservation& wanted) {
   return grant;
 }
 
-/// To the kernel SCHED_IDLE is nice 20: who may not lower that (sched(7)) never leaves it again, whatever RLIMIT_RTPRIO
-/// says.
-bool may_leave_idle() {
-  constexpr rlim_t kNiceZero = 20;  // 20 - nice, as RLIMIT_NICE counts
-  rlimit limit{};
-  if (getrlimit(RLIMIT_NICE, &limit) == 0 && limit.rlim_cur >= kNiceZero) return true;
-  return has_capability(CAP_SYS_NICE);
-}
-
 }  // namespace
 
 Reservation deadline_reservation(int64_t budget_ns, int64_t deadline_ns, int64_t period_ns) {
@@ -152,8 +139,7 @@ Grant apply(const Reservation& wanted, int64_t patience_ns) {
 
 bool demote_thread(int thread) {
   const sched_param param{0};
-  const int behind = may_leave_idle() ? SCHED_IDLE : SCHED_OTHER;
-  return sched_setscheduler(thread, behind | SCHED_RESET_ON_FORK, &param) == 0;
+  return sched_setscheduler(thread, SCHED_OTHER | SCHED_RESET_ON_FORK, &param) == 0;
 }
 
 bool lift_thread(int thread) {

@@ -40,9 +40,9 @@ Reservation deadline_reservation(int64_t budget_ns, int64_t deadline_ns, int64_t
 /// finished SCHED_DEADLINE thread gives back only at its 0-lag time.
 Grant apply(const Reservation& reservation, int64_t patience_ns = 100'000'000);
 
-/// Puts another thread of this process behind all others (SCHED_IDLE): it runs when nobody else wants to. Without the
-/// right to come back from there (neither CAP_SYS_NICE nor RLIMIT_NICE of 20) only behind all of SCHED_FIFO
-/// (SCHED_OTHER). False if the kernel refuses.
+/// Puts another thread of this process behind all real-time ones (SCHED_OTHER), where it gets its share beside whatever
+/// else the machine does: behind that as well (SCHED_IDLE) a job could last for minutes, and so could the end of its
+/// process. False if the kernel refuses.
 bool demote_thread(int thread);
 /// Lets another thread of this process run before all of the default policy (SCHED_FIFO, highest priority of a worker).
 /// False if the kernel refuses.

@@ -99,6 +99,7 @@ void Task::start(int64_t epoch_ns, Transport* restarted) {
 
 void Task::settle() {
   for (size_t i = 0; i < writers_.size(); ++i) board_.port(plan_.ports[i]).writer = writers_[i]->statistics();
+  statistics_.cpu_ns += plan_.node->helper_cpu_ns();
 }
 
 TAKT_HOT bool Task::wanted(uint64_t index) const {

@@ -65,7 +65,7 @@ class Task {
   const TaskStatistics& statistics() const { return statistics_; }
   /// Starts the node. In a process that was restarted, with the newest message of each of its outputs.
   void start(int64_t epoch_ns, Transport* restarted);
-  /// After the run: what the writers counted goes onto the board.
+  /// After the run: what the writers counted goes onto the board, and what threads of the node used.
   void settle();
   const Latch& latch() const { return latch_; }
   const Writer& writer(size_t output) const { return *writers_[output]; }

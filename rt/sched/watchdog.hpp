@@ -19,8 +19,8 @@ namespace takt {
 /// this thread sleeps on a timer until the earliest instant at which a job can have used up its budget and reads the
 /// job's own CPU clock then.
 ///
-/// - Under `fixed`, a low-criticality job that has used its budget goes on with what the others leave (SCHED_IDLE, see
-///   demote_thread) until it ends; counted `demoted`. High-criticality jobs keep their priority, whatever they use.
+/// - Under `fixed`, a low-criticality job that has used its budget goes on with what real-time threads leave
+///   (demote_thread) until it ends; counted `demoted`. High-criticality jobs keep their priority, whatever they use.
 /// - Under `deadline` a job that is late because its reservation pays for time that the host took (see judge()) goes on
 ///   under SCHED_FIFO, as its node's next ones, until the kernel has forgotten that debt; counted `lifted`. One that
 ///   uses more than that goes back into the reservation.

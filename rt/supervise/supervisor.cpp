@@ -177,6 +177,8 @@ void Supervisor::end(size_t process, int64_t since_ns, const std::string& why) {
   members_[process].killed_for = why;
   members_[process].away_since_ns = since_ns;
   kill(group_.pid(process), SIGKILL);
+  const int64_t now_ns = clock_.now_ns();  // beside a CPU hog the kernel may take seconds to clear it up
+  board_.lose_sources(members_[process].tasks, now_ns, now_ns + ModeLog::kLead_ns);
 }
 
 }  // namespace takt

@@ -132,7 +132,7 @@ TEST_CASE("a demoted job that returns gets its priority back, and its node runs 
     while (scene.board->task(1).demoted.load() == 0) std::this_thread::yield();
     scene.spinner.let_go.store(true);
   });
-  // What is demoted waits for everybody on this machine: no patience would be sure to be long enough.
+  // How soon a demoted job gets its share is the machine's to say: no patience would be sure to be long enough.
   const RunResult result = scene.run(1'500 * kMs, 3'600'000 * kMs);
   friendly.join();
   REQUIRE(result.policy_granted == Policy::fixed);
