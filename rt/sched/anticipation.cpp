@@ -9,7 +9,8 @@
 namespace takt {
 
 TAKT_HOT bool Anticipation::sleep_before(int64_t release_ns, const Clock& clock, const StopSignal& stop) {
-  if (longest_ns_ == 0) {
+  if (longest_ns_ == 0 || rest_ > 0) {
+    if (rest_ > 0) --rest_;
     stop.sleep_until(release_ns);
     return false;
   }
@@ -24,7 +25,20 @@ TAKT_HOT bool Anticipation::sleep_before(int64_t release_ns, const Clock& clock,
 }
 
 TAKT_HOT void Anticipation::stay_awake_until(int64_t release_ns, const Clock& clock) {
-  while (clock.now_ns() < release_ns) take_thread_use();
+  int64_t before_ns = clock.now_ns(), longest_gap_ns = 0;
+  while (before_ns < release_ns) {
+    take_thread_use();
+    const int64_t now_ns = clock.now_ns();
+    longest_gap_ns = std::max(longest_gap_ns, now_ns - before_ns);
+    before_ns = now_ns;
+  }
+  if (beside_ == Beside::workers) return;
+  if (longest_gap_ns >= kLostCpu_ns) {
+    rest_ = next_rest_;
+    next_rest_ = std::min(2 * next_rest_, kLongestRest);
+  } else if (next_rest_ > kShortestRest) {
+    --next_rest_;
+  }
 }
 
 void Anticipation::learn(int64_t took_ns) {

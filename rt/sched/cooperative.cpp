@@ -46,10 +46,10 @@ void CooperativeQueue::sleep(std::unique_lock<std::mutex>& lock, int64_t until_n
   const bool early = anticipation.sleep_before(until_ns, clock_, stop_);
   lock.lock();
   wakes_.erase(std::find(wakes_.begin(), wakes_.end(), until_ns));
-  if (early) stay_awake(lock, until_ns);
+  if (early) stay_awake(lock, until_ns, anticipation);
 }
 
-void CooperativeQueue::stay_awake(std::unique_lock<std::mutex>& lock, int64_t until_ns) {
+void CooperativeQueue::stay_awake(std::unique_lock<std::mutex>& lock, int64_t until_ns, Anticipation& anticipation) {
   const auto next = std::find_if(entries_.begin(), entries_.end(), [&](const Entry& entry) {
     return !entry.busy && entry.lane->next_release_ns() == until_ns;
   });
@@ -57,13 +57,13 @@ void CooperativeQueue::stay_awake(std::unique_lock<std::mutex>& lock, int64_t un
   next->busy = true;                   // nobody else runs it before its release anyway
   lock.unlock();
   next->lane->rehearse();
-  Anticipation::stay_awake_until(until_ns, clock_);
+  anticipation.stay_awake_until(until_ns, clock_);
   lock.lock();
   next->busy = false;
 }
 
 void CooperativeQueue::work() {
-  Anticipation anticipation(longest_lead_ns_);
+  Anticipation anticipation(longest_lead_ns_, Anticipation::Beside::everybody);
   std::unique_lock lock(mutex_);
   while (true) {
     if (Entry* entry = earliest_deadline(clock_.now_ns())) {

@@ -35,7 +35,7 @@ class CooperativeQueue {
   int64_t next_uncovered_release_ns();
   void sleep(std::unique_lock<std::mutex>& lock, int64_t until_ns, Anticipation& anticipation);
   /// The rest of the way to that release, awake, with a lane that is then to run.
-  void stay_awake(std::unique_lock<std::mutex>& lock, int64_t until_ns);
+  void stay_awake(std::unique_lock<std::mutex>& lock, int64_t until_ns, Anticipation& anticipation);
 
   const Clock& clock_;
   StopSignal& stop_;

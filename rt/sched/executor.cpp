@@ -130,12 +130,12 @@ bool Executor::run_partitioned(Policy policy, RunResult& result) {
       crew.started.arrive_and_wait();
       if (!crew.go.load()) return;
       start_counting();
-      Anticipation anticipation(longest_lead_ns(plan_, lane.members()));
+      Anticipation anticipation(longest_lead_ns(plan_, lane.members()), Anticipation::Beside::workers);
       while (lane.next_release_ns() < stop_.end_ns()) {
         const int64_t release_ns = lane.next_release_ns();
         if (anticipation.sleep_before(release_ns, clock_, stop_)) {
           lane.rehearse();
-          Anticipation::stay_awake_until(release_ns, clock_);
+          anticipation.stay_awake_until(release_ns, clock_);
         }
         if (lane.next_release_ns() >= stop_.end_ns()) break;
         lane.run_next(clock_, stop_);

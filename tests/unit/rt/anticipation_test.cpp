@@ -16,6 +16,7 @@ using namespace takt;
 
 namespace {
 
+using Beside = Anticipation::Beside;
 constexpr int64_t kUs = 1'000;
 
 /// Every reading is that much after the one before.
@@ -44,7 +45,7 @@ TEST_CASE("anticipation: four of five wake-ups are in time, however long they ta
   std::mt19937 random(3);
   for (const double typical_us : {3.0, 25.0, 120.0}) {
     CAPTURE(typical_us);
-    Anticipation anticipation(500 * kUs);
+    Anticipation anticipation(500 * kUs, Beside::workers);
     std::exponential_distribution<double> beyond(4 / typical_us);
     int in_time = 0;
     constexpr int kSettle = 2000, kJobs = 10'000;
@@ -59,7 +60,7 @@ TEST_CASE("anticipation: four of five wake-ups are in time, however long they ta
 }
 
 TEST_CASE("anticipation: the lead stays within its bound, and one long wake-up moves it by four steps") {
-  Anticipation anticipation(50 * kUs);
+  Anticipation anticipation(50 * kUs, Beside::workers);
   CHECK(anticipation.lead_ns() == 50 * kUs);
   for (int i = 0; i < 100; ++i) anticipation.learn(0);
   const int64_t least = anticipation.lead_ns();
@@ -73,7 +74,7 @@ TEST_CASE("anticipation: the lead stays within its bound, and one long wake-up m
 TEST_CASE("anticipation: says whether something is left to wait for") {
   StopSignal stop;
   const int64_t release_ns = 1'000'000 * kUs;  // long past for the kernel: nobody sleeps here
-  Anticipation anticipation(100 * kUs);
+  Anticipation anticipation(100 * kUs, Beside::workers);
   const auto wakes = [&](int64_t from_ns, int64_t to_ns) {  // asleep at the first reading, awake at the second
     return anticipation.sleep_before(release_ns, SteppingClock(2 * from_ns - to_ns, to_ns - from_ns), stop);
   };
@@ -90,7 +91,7 @@ TEST_CASE("anticipation: says whether something is left to wait for") {
 TEST_CASE("anticipation: a stop long before the release is not waited out") {
   StopSignal stop;
   stop.raise(1);
-  Anticipation anticipation(100 * kUs);
+  Anticipation anticipation(100 * kUs, Beside::workers);
   const int64_t lead_ns = anticipation.lead_ns();
   CHECK_FALSE(anticipation.sleep_before(INT64_MAX / 2, SteppingClock(1, 0), stop));
   CHECK(anticipation.lead_ns() == lead_ns);
@@ -98,15 +99,48 @@ TEST_CASE("anticipation: a stop long before the release is not waited out") {
 
 TEST_CASE("anticipation: without a lead nothing is waited for awake, whatever the clock says") {
   StopSignal stop;
-  Anticipation anticipation(0);
+  Anticipation anticipation(0, Beside::workers);
   CHECK(anticipation.lead_ns() == 0);
   CHECK_FALSE(anticipation.sleep_before(1'000, SteppingClock(1, 0), stop));
+}
+
+TEST_CASE("anticipation: without a real-time policy it begins asleep, and rests from the first CPU lost awake") {
+  StopSignal stop;
+  const int64_t release_ns = 1'000'000 * kUs;
+  Anticipation anticipation(100 * kUs, Beside::everybody);
+  CHECK(anticipation.lead_ns() == 0);
+  for (int i = 0; i < 100; ++i) anticipation.learn(1'000'000 * kUs);
+  CHECK(anticipation.lead_ns() == 100 * kUs);
+  const SteppingClock in_time(release_ns - 100 * kUs, 0);
+  const auto rests = [&] {
+    int releases = 0;
+    while (!anticipation.sleep_before(release_ns, in_time, stop)) ++releases;
+    return releases;
+  };
+  const auto lose_cpu = [&](Anticipation& which) {  // the first look is before the release, the second far behind it
+    constexpr int64_t kLost_ns = Anticipation::kLostCpu_ns;
+    which.stay_awake_until(release_ns, SteppingClock(release_ns - 3 * kLost_ns, 2 * kLost_ns));
+  };
+  CHECK(rests() == 0);
+  anticipation.stay_awake_until(release_ns, SteppingClock(release_ns - 50 * kUs, kUs));
+  CHECK(rests() == 0);
+  for (int rest = Anticipation::kShortestRest; rest <= Anticipation::kLongestRest; rest *= 2) {
+    lose_cpu(anticipation);
+    CHECK(rests() == rest);
+  }
+  lose_cpu(anticipation);
+  CHECK(rests() == Anticipation::kLongestRest);
+
+  // Beside workers only: who is more urgent may have the CPU.
+  Anticipation worker(100 * kUs, Beside::workers);
+  lose_cpu(worker);
+  CHECK(worker.sleep_before(release_ns, in_time, stop));
 }
 
 TEST_CASE("anticipation: waits to the release, and what that costs is no job's") {
   const SteppingClock clock(0, 10);
   take_thread_use();
-  Anticipation::stay_awake_until(2'000'000, clock);  // 200,000 readings: some milliseconds
+  Anticipation(100 * kUs, Beside::workers).stay_awake_until(2'000'000, clock);  // 200,000 readings: some milliseconds
   CHECK(clock.now_ns() == 2'000'010);
   CHECK(take_thread_use().cpu_ns < 1'000'000);
 }
