@@ -90,13 +90,14 @@ def comes_back(name, strike):
     for _ in range(repeats):
         with tempfile.TemporaryDirectory(prefix="keepers-") as work:
             run = start(work, "iceoryx")
+            members = len(children(children(run.pid)[0]))
             os.kill(children(run.pid)[0], strike)
-            wait(lambda: open(f"{work}/err").read().count(" is back") >= 5)
+            wait(lambda: open(f"{work}/err").read().count(" is back") >= members)
             time.sleep(1)
             run.send_signal(signal.SIGINT)
             run.wait()
             outages = [f for f in json.load(open(f"{work}/report.json"))["faults"] if f.get("kind") == "outage"]
-            lost += len(outages) != 5 or any(o["back_s"] is None for o in outages)
+            lost += len(outages) != members or any(o["back_s"] is None for o in outages)
             away += [o["down_s"] for o in outages if o["back_s"] is not None]
     row(name + ": every process away", away, f"{lost} of {repeats} runs with one not back")
     bad |= lost > 0

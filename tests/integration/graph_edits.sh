@@ -7,7 +7,7 @@ command -v python3 >/dev/null || echo "NOT RUN: what the maps show needs python3
 edit() { # edit GRAPH-SED SCHEDULE-SED: the example and its schedule, each expression of which must change something
   rm -rf "$work/graph" "$work/schedules"
   mkdir -p "$work/graph" "$work/schedules"
-  cp -r "$source"/graph/{worlds,rigs,objects} "$work/graph/"
+  cp -r "$source"/graph/{worlds,rigs,objects,objects_3d.txt,signs,skeletons} "$work/graph/"
   cp "$source/graph/ace.yaml" "$work/graph/edited.yaml"
   cp "$source/schedules/thesis.yaml" "$work/schedules/"
   apply "$work/graph/edited.yaml" "$1"

@@ -49,7 +49,7 @@ expect 2 "is the record itself" "$takt" log cut "$work/cut.mcap" -o "$work/cut.m
 echo "=== a changed parameter is named"
 rm -rf "$work/graph" "$work/schedules"
 mkdir -p "$work/graph" "$work/schedules"
-cp -r "$source"/graph/{worlds,rigs,objects,ace.yaml} "$work/graph/"
+cp -r "$source"/graph/{worlds,rigs,objects,objects_3d.txt,signs,skeletons,ace.yaml} "$work/graph/"
 cp "$source/schedules/thesis.yaml" "$work/schedules/"
 tells 0 "nothing lost" "$takt" run "$work/graph/ace.yaml" --clock virtual --isolate none --for 2s \
   --record "$work/edited.mcap" --output "$work/out"

@@ -23,10 +23,10 @@ end_run() { # CODES
 for transport in local iceoryx; do
   name=$transport
   start_run $name --isolate subsystem --transport $transport --for 0s --report "$work/$name.json"
-  others=$(for p in devices robot detection mind; do member $p; done)
+  others=$(for p in devices robot detection people mind; do member $p; done)
   kill -KILL "$(member mapping)"
   told "process mapping is back"
-  [ "$others" = "$(for p in devices robot detection mind; do member $p; done)" ] || fail "$name: another process changed"
+  [ "$others" = "$(for p in devices robot detection people mind; do member $p; done)" ] || fail "$name: another process changed"
   expect 0 "" "$takt" echo mapping_3d.obstacles --run $run
   kill -STOP "$(member detection)"
   told "gave no sign of life"
@@ -55,7 +55,7 @@ name=daemon
 start_run $name --isolate subsystem --transport iceoryx --for 0s --report "$work/$name.json"
 kill -KILL "$(pgrep -P $run)"
 told "all processes are started again"
-for p in devices robot detection mapping mind; do told "process $p is back"; done
+for p in devices robot detection people mapping mind; do told "process $p is back"; done
 expect 0 "" "$takt" echo mapping_3d.obstacles --run $run
 end_run 1
 ls /dev/shm /tmp | grep -E "^(roudi|iceoryx|takt-[0-9])" | grep -v '\.lock$' && fail "$name: files are left behind"
