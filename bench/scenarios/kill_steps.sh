@@ -47,5 +47,7 @@ for transport in transports:
         middle = back[len(back) // 2] if back else float("nan")
         print(f"{transport:10}{step:16}{struck:7}{len(back) - group:6}{group:7}{middle:9.2f}s{back[-1] if back else float('nan'):7.2f}s  {misses}; {chunks}"
               + (f"; NOT BACK: {lost}" if lost else ""), flush=True)
+        for o in mine:
+            if o["back_s"] is None: print(f"    {o['what']}", flush=True)
 sys.exit(bad)
 PY

@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <grp.h>
 #include <pwd.h>
+#include <signal.h>
 #include <sys/file.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
@@ -89,6 +90,18 @@ void check_lock(const std::filesystem::path& lock, const IceoryxPlaces& places) 
   if (known && status.st_uid != places.user) foreign(lock, status.st_uid, places.user);
 }
 
+/// A run that was killed whole had nobody left to remove what its clients leave.
+void remove_leftovers_of_the_dead(const IceoryxPlaces& places) {
+  std::vector<pid_t> dead;
+  std::error_code ignored;
+  for (const auto& entry : std::filesystem::directory_iterator(places.run, ignored)) {
+    int pid = 0, number = 0;
+    if (std::sscanf(entry.path().filename().c_str(), "takt-%d-%d", &pid, &number) != 2 || pid <= 0) continue;
+    if (kill(pid, 0) != 0 && errno == ESRCH) dead.push_back(pid);
+  }
+  for (const pid_t pid : dead) remove_iceoryx_leftovers(places, pid);
+}
+
 }  // namespace
 
 IceoryxPlaces IceoryxPlaces::of_this_machine() {
@@ -130,6 +143,7 @@ void iceoryx_preflight(const IceoryxPlaces& places, uint64_t needed_bytes) {
                          "shared memory. Add it: sudo groupadd --gid " +
                          std::to_string(getegid()) + " takt");
   check_lock(places.run / kLock, places);
+  remove_leftovers_of_the_dead(places);
   check_owner(places.run / kSocket, places.user);
   uint64_t reclaimed = 0;
   for (const auto& file : {places.shm / kManagement, places.shm / places.segment}) {

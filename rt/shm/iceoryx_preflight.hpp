@@ -28,7 +28,8 @@ std::optional<pid_t> lock_holder(const std::filesystem::path& file, const std::f
 void remove_iceoryx_leftovers(const IceoryxPlaces& places, pid_t dead);
 
 /// Throws TransportError with the fix if a daemon runs already, if leftovers of another user are in the way, or if
-/// `needed_bytes` do not fit into shared memory. Leftovers of this user are harmless: the daemon replaces them.
+/// `needed_bytes` do not fit into shared memory. Leftovers of this user are harmless: the daemon replaces them, and
+/// sockets and locks of runtimes whose process is dead are removed here.
 void iceoryx_preflight(const IceoryxPlaces& places, uint64_t needed_bytes);
 
 /// The right to start a daemon in these places, from the preflight until the daemon's own lock is there: two runs that

@@ -4,6 +4,7 @@
 #include <doctest/doctest.h>
 #include <fcntl.h>
 #include <sys/file.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <filesystem>
@@ -52,6 +53,25 @@ PortPlan port(uint32_t width, uint32_t history, uint32_t held, uint32_t readers)
 TEST_CASE("an empty machine passes") {
   const Directory directory;
   CHECK(refusal(directory.places()).empty());
+}
+
+TEST_CASE("what the clients of a run left that was killed whole is removed, what the living have is not") {
+  const Directory directory;
+  const pid_t dead = fork();
+  if (dead == 0) _exit(0);
+  REQUIRE(waitpid(dead, nullptr, 0) == dead);
+  const auto file = [&](const std::string& name) { return directory.path / "run" / name; };
+  const std::string of_dead = "takt-" + std::to_string(dead) + "-0",
+                    of_living = "takt-" + std::to_string(getpid()) + "-0";
+  for (const std::string& name :
+       {of_dead, of_dead + ".lock", of_living, std::string("takt-12-notes"), std::string("other")})
+    std::ofstream(file(name)) << "x";
+  CHECK(refusal(directory.places()).empty());
+  CHECK_FALSE(std::filesystem::exists(file(of_dead)));
+  CHECK_FALSE(std::filesystem::exists(file(of_dead + ".lock")));
+  CHECK(std::filesystem::exists(file(of_living)));
+  CHECK(std::filesystem::exists(file("takt-12-notes")));
+  CHECK(std::filesystem::exists(file("other")));
 }
 
 TEST_CASE("the holder of a lock is found") {
