@@ -82,7 +82,10 @@ std::vector<Row> run_signs(const Options& options) {
   cv::Mat1b grey;
   cv::cvtColor(scene.image, grey, cv::COLOR_BGR2GRAY);
   Whole whole(grey.size(), signs);
-  SignDetector detector(grey.cols, grey.rows, signs, {kFactor, kLeastHits});
+  SignDetectorParameters parameters;
+  parameters.scale_factor = kFactor;
+  parameters.least_hits = kLeastHits;
+  SignDetector detector(grey.cols, grey.rows, signs, parameters);
   const ImageView<const uint8_t> bgr(scene.image.ptr(), grey.cols, grey.rows, 3);
   const auto opencv = [&] {
     return cpu_ms([&] {
