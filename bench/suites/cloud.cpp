@@ -14,7 +14,6 @@
 #include "bench/suites/kd_tree.hpp"
 #include "nodes/cloud/outlier_filter.hpp"
 #include "nodes/cloud/voxel_reference.hpp"
-#include "rt/time/clock.hpp"
 
 namespace takt::bench {
 
@@ -66,13 +65,6 @@ struct Coloured {
   }
   cloud::CloudView view() const { return {points, colours}; }
 };
-
-template <class Work>
-double cpu_ms(Work work) {
-  const int64_t begin = thread_cpu_ns();
-  work();
-  return static_cast<double>(thread_cpu_ns() - begin) * 1e-6;
-}
 
 /// For nanoflann: counts, and ends the search at `enough`. It takes what is nearer than worstDist().
 struct Counter {

@@ -13,7 +13,6 @@
 #include "bench/suites/kd_tree.hpp"
 #include "graph/command/prepare.hpp"
 #include "nodes/object_3d/evaluate.hpp"
-#include "rt/time/clock.hpp"
 
 namespace takt::bench {
 
@@ -75,13 +74,6 @@ size_t regions_by_kd_tree(const Things& things, const SegmentParameters& p) {
     regions += !cut && region.size() >= p.points_min;
   }
   return regions;
-}
-
-template <class Work>
-double cpu_ms(Work work) {
-  const int64_t begin = thread_cpu_ns();
-  work();
-  return static_cast<double>(thread_cpu_ns() - begin) * 1e-6;
 }
 
 }  // namespace

@@ -11,7 +11,6 @@
 #include "graph/command/prepare.hpp"
 #include "nodes/traffic_signs/sign_detector.hpp"
 #include "nodes/traffic_signs/sign_scenes.hpp"
-#include "rt/time/clock.hpp"
 
 namespace takt::bench {
 
@@ -62,13 +61,6 @@ class Whole {
   Search search_;
   Grouping grouping_;
 };
-
-template <class Work>
-double cpu_ms(Work work) {
-  const int64_t begin = thread_cpu_ns();
-  work();
-  return static_cast<double>(thread_cpu_ns() - begin) * 1e-6;
-}
 
 }  // namespace
 
