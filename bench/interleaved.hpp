@@ -1,8 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include "bench/statistics.hpp"
+#include "rt/time/clock.hpp"
 
 namespace takt::bench {
+
+/// CPU time of this thread that the work takes.
+template <class Work>
+double cpu_ms(const Work& work) {
+  const int64_t begin = thread_cpu_ns();
+  work();
+  return static_cast<double>(thread_cpu_ns() - begin) * 1e-6;
+}
 
 /// Figures of rounds A B A B ... A.
 struct Compared {

@@ -12,7 +12,6 @@
 #include "nodes/object_detection/detector.hpp"
 #include "nodes/object_detection/reference.hpp"
 #include "nodes/object_detection/scenes.hpp"
-#include "rt/time/clock.hpp"
 
 namespace takt::bench {
 
@@ -21,13 +20,6 @@ std::vector<Row> run_objects(const Options& options);
 namespace {
 
 using namespace object_detection;
-
-template <class Work>
-double cpu_ms(const Work& work) {
-  const int64_t start = thread_cpu_ns();
-  work();
-  return static_cast<double>(thread_cpu_ns() - start) * 1e-6;
-}
 
 template <class Theirs, class Ours>
 void compare_rows(std::vector<Row>& rows, const std::string& name, const std::string& reference, int rounds,

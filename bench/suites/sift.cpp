@@ -11,7 +11,6 @@
 #include "nodes/object_detection/detector.hpp"
 #include "nodes/object_detection/scenes.hpp"
 #include "nodes/sift/sift_match.hpp"
-#include "rt/time/clock.hpp"
 
 namespace takt::bench {
 
@@ -25,13 +24,6 @@ constexpr size_t kScenes = 8;
 
 cv::Mat image_of(const ReferenceView& view) {
   return {view.side_px, view.side_px, CV_8UC3, const_cast<uint8_t*>(view.pixels.data())};
-}
-
-template <class Work>
-double cpu_ms(const Work& work) {
-  const int64_t begin = thread_cpu_ns();
-  work();
-  return static_cast<double>(thread_cpu_ns() - begin) * 1e-6;
 }
 
 }  // namespace

@@ -11,7 +11,6 @@
 #include "graph/command/prepare.hpp"
 #include "nodes/traffic_signs/sign_detector.hpp"
 #include "nodes/traffic_signs/sign_scenes.hpp"
-#include "rt/time/clock.hpp"
 
 namespace takt::bench {
 
@@ -63,13 +62,6 @@ class Whole {
   Grouping grouping_;
 };
 
-template <class Work>
-double cpu_ms(Work work) {
-  const int64_t begin = thread_cpu_ns();
-  work();
-  return static_cast<double>(thread_cpu_ns() - begin) * 1e-6;
-}
-
 }  // namespace
 
 std::vector<Row> run_signs(const Options& options) {
@@ -82,7 +74,10 @@ std::vector<Row> run_signs(const Options& options) {
   cv::Mat1b grey;
   cv::cvtColor(scene.image, grey, cv::COLOR_BGR2GRAY);
   Whole whole(grey.size(), signs);
-  SignDetector detector(grey.cols, grey.rows, signs, {kFactor, kLeastHits});
+  SignDetectorParameters parameters;
+  parameters.scale_factor = kFactor;
+  parameters.least_hits = kLeastHits;
+  SignDetector detector(grey.cols, grey.rows, signs, parameters);
   const ImageView<const uint8_t> bgr(scene.image.ptr(), grey.cols, grey.rows, 3);
   const auto opencv = [&] {
     return cpu_ms([&] {

@@ -147,7 +147,7 @@ int main(int argc, char** argv) {
   takt::command::ReplayOptions replay;
   takt::command::LogOptions log;
   takt::command::CloudOptions cloud;
-  takt::command::TrainCascadeOptions train;
+  takt::command::TrainOptions train;
   std::string type;
   bool check_json = false;
   int exit_code = 0;

@@ -6,10 +6,13 @@
 #include <algorithm>
 #include <cstdio>
 #include <fstream>
+#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "graph/command/curves.hpp"
 #include "graph/command/prepare.hpp"
+#include "nodes/traffic_signs/flat_sign.hpp"
+#include "nodes/traffic_signs/layout_learning.hpp"
 #include "nodes/traffic_signs/sign_scenes.hpp"
 #include "nodes/traffic_signs/training.hpp"
 
@@ -21,10 +24,14 @@ using namespace traffic_signs;
 constexpr uint64_t kHeldOut = 1u << 20;  // indices from here on are for measuring
 constexpr int kHeldOutPositives = 1000, kHeldOutImages = 40;
 
-/// Scenes for all classes, each with the signs in it.
+/// Scenes for all classes, each with the signs in it; fuller than those that `takt eval signs` makes, and with things
+/// that are like signs.
 std::vector<SignScene> scenes(uint64_t seed, uint64_t first, int count) {
+  SceneParameters p;
+  p.shapes_min = 20, p.shapes_max = 90;
+  p.most_decoys = 8;
   std::vector<SignScene> scenes;
-  for (int i = 0; i < count; ++i) scenes.push_back(make_scene({}, seed, first + static_cast<uint64_t>(i)));
+  for (int i = 0; i < count; ++i) scenes.push_back(make_scene(p, seed, first + static_cast<uint64_t>(i)));
   return scenes;
 }
 
@@ -88,6 +95,10 @@ int train(const TrainCascadeOptions& o) {
                     fmt::format("takt train cascade: sign {}, seed {}, {} positives, {} images", name, o.seed,
                                 o.positives, o.images));
       write_curve((o.out / name).string(), curve);
+      if (shape.colour != SignColour::any)
+        write_layout(learn_layout(shape.sign, o.seed), o.out / (name + ".layout"),
+                     fmt::format("takt train cascade: where sign {} is {}, seed {}", name,
+                                 kColourNames[static_cast<size_t>(shape.colour)], o.seed));
       std::printf("%-14s %7zu %7zu %9.2f %28.3f\n", name.c_str(), cascade.stages.size(), cascade.features.size(),
                   curve.missed_pct.back(), curve.false_positives_per_million.back());
       std::fflush(stdout);
@@ -98,23 +109,47 @@ int train(const TrainCascadeOptions& o) {
   }
 }
 
+int draw(const SignPictureOptions& o) {
+  try {
+    cv::RNG random(o.seed);
+    const FlatSign flat = draw_flat(shape_of(o.sign).sign, random);
+    cv::Mat3b plate(kFlatEdge_px, kFlatEdge_px, cv::Vec3b(150, 155, 155));
+    const cv::Size size = flat.colour.size();
+    flat.colour.copyTo(plate(cv::Rect({(plate.cols - size.width) / 2, (plate.rows - size.height) / 2}, size)),
+                       flat.opaque);
+    cv::resize(plate, plate, {o.size, o.size}, 0, 0, cv::INTER_AREA);
+    if (!cv::imwrite(o.file.string(), plate)) return refuse(o.file.string() + ": cannot be written", kBadInput);
+    return kOk;
+  } catch (const std::exception& error) {
+    return refuse(error.what(), kBadInput);
+  }
+}
+
 }  // namespace
 
-void add_train(CLI::App& app, TrainCascadeOptions& o, int& exit_code) {
+void add_train(CLI::App& app, TrainOptions& options, int& exit_code) {
+  TrainCascadeOptions& o = options.cascade;
   CLI::App* train_app = app.add_subcommand("train", "learns what nodes look for");
   train_app->require_subcommand(1);
   CLI::App* cascade =
       train_app->add_subcommand("cascade", "Haar cascades of traffic signs, from signs drawn by the program");
   cascade->add_option("--sign", o.signs, "class, several times for several (default all)");
-  cascade->add_option("--out", o.out, "folder for NAME.xml, NAME.csv, NAME.png (default .)")
+  cascade->add_option("--out", o.out, "folder for NAME.xml, NAME.layout, NAME.csv, NAME.png (default .)")
       ->check(CLI::ExistingDirectory);
   cascade->add_option("--stages", o.stages, "at most (default 16)")->check(CLI::Range(1, 200));
-  cascade->add_option("--positives", o.positives, "windows with the sign (default 2000)")
+  cascade->add_option("--positives", o.positives, "windows with the sign (default 3000)")
       ->check(CLI::Range(50, 100000));
   cascade->add_option("--images", o.images, "images to take windows without it from (default 300)")
       ->check(CLI::Range(2, 5000));
   cascade->add_option("--seed", o.seed, "of signs, images and choices (default 1)");
   cascade->callback([&] { exit_code = train(o); });
+  SignPictureOptions& p = options.picture;
+  CLI::App* picture = train_app->add_subcommand("picture", "draws a sign, for a board of a simulated world");
+  picture->add_option("sign", p.sign, "class")->required();
+  picture->add_option("file", p.file, "picture to write (.ppm, .png)")->required();
+  picture->add_option("--size", p.size, "px a side (default 128)")->check(CLI::Range(16, 1024));
+  picture->add_option("--seed", p.seed, "of the sign's look (default 1)");
+  picture->callback([&] { exit_code = draw(p); });
 }
 
 }  // namespace takt::command

@@ -93,7 +93,7 @@ void Renderer::prepare_quad(const Quad& quad, const Scene& scene, const CameraPo
   s.iz_x = n.x() / camera_.focal_px;
   s.iz_y = n.y() / camera_.focal_px;
   s.iz_0 = n.z() - s.iz_x * camera_.cu_px - s.iz_y * camera_.cv_px;
-  s.texture = &(*scene.textures)[static_cast<size_t>(quad.material)];
+  s.texture = quad.picture ? quad.picture.get() : &(*scene.textures)[static_cast<size_t>(quad.material)];
   s.gain = static_cast<float>(quad.gain);
   texture_axes(s, quad.u_axis, quad.u_offset, quad.v_axis, quad.v_offset, pose);
   surfaces_.push_back(s);

@@ -40,6 +40,15 @@ void add_box(Scene& scene, const Vec3& ground, const Vec3& size, double yaw, Mat
       make_quad({corner(-1, -1, 1), corner(1, -1, 1), corner(1, 1, 1), corner(-1, 1, 1)}, material, offset + 3));
 }
 
+void add_board(Scene& scene, const Vec3& foot, double edge, double yaw, std::shared_ptr<const Texture> picture) {
+  const Vec3 half(-std::sin(yaw) * edge / 2, std::cos(yaw) * edge / 2, 0), up(0, 0, edge);  // to the viewer's right
+  Quad quad = make_quad({foot - half, foot + half, foot + half + up, foot - half + up}, Material::plaster);
+  quad.u_offset = -quad.u_axis.dot(quad.corner[0]);
+  quad.v_offset = -quad.v_axis.dot(quad.corner[0]);
+  quad.picture = std::move(picture);
+  scene.quads.push_back(std::move(quad));
+}
+
 void add_person(Scene& scene, const Vec2& position, double yaw, double height, bool points, double pointing) {
   const double k = height / 1.75;
   const double c = std::cos(yaw), s = std::sin(yaw);

@@ -21,7 +21,8 @@ struct Quad {
   Vec3 u_axis, v_axis;
   double u_offset = 0, v_offset = 0;
   Material material = Material::plaster;
-  double gain = 1;  ///< illumination of the face
+  double gain = 1;                                   ///< illumination of the face
+  std::shared_ptr<const Texture> picture = nullptr;  ///< instead of the material's texture, where there is one
 };
 
 /// Cylinder with half-sphere ends, in the map frame.
@@ -42,6 +43,8 @@ struct Scene {
 Quad make_quad(const std::array<Vec3, 4>& corners, Material material, double offset = 0);
 /// The five visible faces of a box standing on height z.
 void add_box(Scene& scene, const Vec3& centre_on_ground, const Vec3& size, double yaw_rad, Material material);
+/// A square with a picture that faces yaw, upright, its lower edge at `foot` in the middle.
+void add_board(Scene& scene, const Vec3& foot, double edge_m, double yaw_rad, std::shared_ptr<const Texture> picture);
 /// A standing person of `height` metres made of capsules; the right arm points to `pointing_rad` (map azimuth) if
 /// asked.
 void add_person(Scene& scene, const Vec2& position, double yaw_rad, double height, bool points, double pointing_rad);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 
 #include "hal/sim/random.hpp"
 
@@ -208,6 +209,35 @@ bool material_from(std::string_view name, Material& material) {
 std::string_view material_names() {
   return "sky, floor, plaster, ceiling, wood, cardboard, poster, cloth, skin, red_stripes, blue_stripes, "
          "green_stripes, violet_stripes";
+}
+
+tl::expected<Texture, std::string> load_picture(const std::filesystem::path& file, double edge_m) {
+  std::ifstream in(file, std::ios::binary);
+  if (!in) return tl::unexpected("the picture " + file.string() + " cannot be opened");
+  std::string magic;
+  int width = 0, height = 0, peak = 0;
+  in >> magic >> width >> height >> peak;
+  in.get();
+  if (!in || magic != "P6" || width != height || width < 16 || width > 1024 || (width & (width - 1)) != 0 ||
+      peak != 255)
+    return tl::unexpected("the picture " + file.string() +
+                          " is no PPM (P6, 8 bit, without comments) of 16, 32 ... 1024 pixels a side");
+  Texture texture;
+  texture.size = width;
+  texture.texels_per_m = width / edge_m;
+  std::vector<char> row(static_cast<size_t>(width) * 3);
+  texture.texels.resize(static_cast<size_t>(width) * static_cast<size_t>(width));
+  for (int v = width - 1; v >= 0; --v) {
+    if (!in.read(row.data(), static_cast<std::streamsize>(row.size())))
+      return tl::unexpected("the picture " + file.string() + " ends early");
+    for (int u = 0; u < width; ++u) {
+      const auto channel = [&](int c) { return static_cast<uint8_t>(row[static_cast<size_t>(3 * u + c)]); };
+      texture.texels[static_cast<size_t>(v * width + u)] = pack(channel(2), channel(1), channel(0));
+    }
+  }
+  build_levels(texture);
+  tile_levels(texture);
+  return texture;
 }
 
 std::shared_ptr<const TextureSet> make_textures(uint64_t seed) {

@@ -2,8 +2,11 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <filesystem>
 #include <memory>
+#include <string>
 #include <string_view>
+#include <tl/expected.hpp>
 #include <vector>
 
 namespace takt::sim {
@@ -48,5 +51,9 @@ std::string_view material_names();
 /// carry bands of saturated colours: what stands out for a detector that looks at colours.
 using TextureSet = std::array<Texture, kMaterials>;
 std::shared_ptr<const TextureSet> make_textures(uint64_t seed);
+
+/// A picture that is `edge_m` wide and high, from a colour PPM (P6, 8 bit) of 16, 32 ... 1024 pixels a side; v grows
+/// upwards. The error says what is wrong with the file.
+tl::expected<Texture, std::string> load_picture(const std::filesystem::path& file, double edge_m);
 
 }  // namespace takt::sim

@@ -192,6 +192,9 @@ Scene build_scene(const World& world, std::shared_ptr<const TextureSet> textures
               Vec3(object.box->width_m, object.box->depth_m, object.box->height_m), object.yaw_rad,
               object.box->material);
     }
+    if (object.board)
+      add_board(scene, Vec3(object.position.x(), object.position.y(), object.board->z_m), object.board->edge_m,
+                object.yaw_rad, object.board->picture);
     if (object.person) {
       add_person(scene, object.position, object.yaw_rad, object.person->height_m, object.person->points,
                  object.person->pointing_rad);

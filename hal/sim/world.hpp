@@ -29,6 +29,11 @@ struct Box {
   double width_m = 0, depth_m = 0, height_m = 0, z_m = 0;  ///< z of the underside
   Material material = Material::wood;
 };
+/// A picture that hangs free, facing the object's yaw: cameras see it from that side; lasers and collisions do not.
+struct Board {
+  double edge_m = 0, z_m = 0;  ///< z of the lower edge
+  std::shared_ptr<const Texture> picture;
+};
 struct Person {
   double height_m = 1.75;
   bool points = false;
@@ -42,6 +47,7 @@ struct WorldObject {
   std::map<std::string, std::string> attributes;
   std::optional<Box> box;
   std::optional<Person> person;
+  std::optional<Board> board;
 };
 
 struct Waypoint {

@@ -100,11 +100,23 @@ struct Loader {
                           quantity(c, "pointing", Dimension::angle, 0.0)};
         if (o.person->height_m < 0.5 || o.person->height_m > 2.5)
           fail(c, "`height` must lie in 0.5..2.5 m", "correct it");
+      } else if (kind == "board") {
+        board(c, o);
       } else {
-        unknown(c, "attr, box, person");
+        unknown(c, "attr, box, person, board");
       }
     }
     world.objects.push_back(o);
+  }
+
+  void board(const Element* e, WorldObject& o) {
+    const double edge = quantity(e, "edge", Dimension::length), z = quantity(e, "z", Dimension::length);
+    const std::string name = text(e, "picture", true);
+    if (error) return;
+    if (edge <= 0) return fail(e, "`edge` must be positive", "correct it");
+    auto picture = load_picture(std::filesystem::path(file).parent_path() / name, edge);
+    if (!picture) return fail(e, picture.error(), "correct the picture");
+    o.board = Board{edge, z, std::make_shared<const Texture>(std::move(*picture))};
   }
 
   void line(const Element* e) {

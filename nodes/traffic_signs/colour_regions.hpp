@@ -2,7 +2,9 @@
 // Where an image has the saturated colours of signs (algorithm reference 21.11): a row of windows without them is not
 // searched.
 #pragma once
+#include <array>
 #include <cstdint>
+#include <string_view>
 #include <vector>
 
 #include "nodes/traffic_signs/grouping.hpp"
@@ -11,6 +13,7 @@
 namespace takt::traffic_signs {
 
 enum class SignColour : uint8_t { any, red, yellow, blue };
+inline constexpr std::array<std::string_view, 4> kColourNames{"any", "red", "yellow", "blue"};  ///< in its order
 
 /// The colour of a pixel: yellow if 4 min(r, g) >= 5 b + 8 and 5 g >= 3 r, else red if 5 r >= 7 max(g, b) + 10, else
 /// blue if 8 b >= 9 max(r, g) + 16; ratios, so that the light matters little. Otherwise `any`.

@@ -22,6 +22,7 @@ struct Sighting {
 struct SignDetectorParameters {
   double scale_factor = 1.15;
   int least_hits = 3;
+  double least_fit = 0.1;  ///< of a sighting to the sign's colour layout, -1..1
 };
 
 /// The image is searched in rows of windows, from the largest scale to the smallest, the rows of all cascades at one
@@ -57,7 +58,7 @@ class SignDetector {
     }
     if (done == rows_.size()) next_ = 0;
     searched_ = static_cast<float>(done) / static_cast<float>(rows_.size());
-    end();
+    end(bgr);
     return true;
   }
   /// Of the last run(), the strongest first; no two overlap by half.
@@ -85,7 +86,7 @@ class SignDetector {
   /// Whether `area` holds as many pixels of the sign's colour as `window` must.
   bool has_colour(size_t sign, const Box& area, const Box& window) const;
   void take_passed(size_t sign, int level, int row, std::span<const uint8_t> passed);
-  void end();
+  void end(ImageView<const uint8_t> bgr);
 
   std::vector<SignModel> signs_;
   SignDetectorParameters parameters_;

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "nodes/traffic_signs/cascade.hpp"
-#include "nodes/traffic_signs/colour_regions.hpp"
+#include "nodes/traffic_signs/colour_layout.hpp"
 
 namespace takt::traffic_signs {
 
@@ -19,14 +19,15 @@ struct SignModel {
   SignColour colour = SignColour::any;
   double least_share = 0;            ///< of a window's pixels that must have the colour, 0..1
   double width_m = 0, height_m = 0;  ///< nominal, of the sign itself
+  ColourLayout layout;
 };
 
 /// Reads `folder`/signs.txt and the cascades it names. A line holds
 ///
-///     sign NAME CASCADE COLOUR SHARE WIDTH HEIGHT
+///     sign NAME CASCADE COLOUR SHARE WIDTH HEIGHT [LAYOUT]
 ///
-/// (COLOUR any | red | yellow | blue; WIDTH and HEIGHT in metres; the line's place among the signs is the class id of
-/// its detections) or nothing; # begins a comment. Throws CascadeError.
+/// (COLOUR any | red | yellow | blue; WIDTH and HEIGHT in metres; LAYOUT a file for read_layout(), not with `any`; the
+/// line's place among the signs is the class id of its detections) or nothing; # begins a comment. Throws CascadeError.
 std::vector<SignModel> read_signs(const std::filesystem::path& folder);
 
 }  // namespace takt::traffic_signs

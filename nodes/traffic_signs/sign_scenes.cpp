@@ -16,11 +16,11 @@ cv::RNG stream(uint64_t seed, uint64_t index) {
 
 /// Noise of octaves from a quarter of the image down to 2 px.
 cv::Mat3f texture(cv::Size size, cv::RNG& random) {
-  const float grey = random.uniform(50.0f, 190.0f);
+  const float grey = random.uniform(40.0f, 220.0f);
   cv::Vec3f mean;
   for (int channel = 0; channel < 3; ++channel) mean[channel] = grey + random.uniform(-35.0f, 35.0f);
   cv::Mat3f image(size, mean);
-  const double strength = random.uniform(4.0, 18.0);
+  const double strength = random.uniform(4.0, 24.0);
   for (int pitch = std::max(size.width / 4, 4); pitch >= 2; pitch /= 2) {
     cv::Mat3f coarse(size.height / pitch + 2, size.width / pitch + 2), octave;
     random.fill(coarse, cv::RNG::NORMAL, 0, strength);
@@ -80,12 +80,18 @@ cv::Mat3f background(cv::Size size, int shapes, cv::RNG& random) {
   return image;
 }
 
-/// Light, blur and noise of a camera.
+/// Light, motion, blur and noise of a camera.
 cv::Mat3b exposed(cv::Mat3f image, const SceneParameters& p, cv::RNG& random) {
   const double light = random.uniform(p.light_min, p.light_max), fall = random.uniform(-0.33, 0.33);
+  cv::Vec3f of_colour;
+  for (int channel = 0; channel < 3; ++channel)
+    of_colour[channel] = static_cast<float>(light * (1 + random.uniform(-p.cast_max, p.cast_max)));
   for (int y = 0; y < image.rows; ++y)
     for (int x = 0; x < image.cols; ++x)
-      image(y, x) *= static_cast<float>(light * (1 + fall * (static_cast<double>(x) / image.cols - 0.5)));
+      image(y, x) =
+          image(y, x).mul(of_colour) * static_cast<float>(1 + fall * (static_cast<double>(x) / image.cols - 0.5));
+  const int moved = cvFloor(random.uniform(0.0, p.motion_max + 1));
+  if (moved > 1) cv::blur(image, image, random.uniform(0, 2) == 0 ? cv::Size(moved, 1) : cv::Size(1, moved));
   const double blur = random.uniform(0.0, p.blur_max);
   if (blur > 0.2) cv::GaussianBlur(image, image, {}, blur);
   cv::Mat3f noise(image.size());
@@ -106,7 +112,13 @@ bool apart(const Box& a, const Box& b) {
 SignScene make_scene(const SceneParameters& p, uint64_t seed, uint64_t index) {
   cv::RNG random = stream(seed, index);
   SignScene scene;
-  cv::Mat3f image = background({p.width, p.height}, random.uniform(10, 60), random);
+  cv::Mat3f image = background({p.width, p.height}, random.uniform(p.shapes_min, p.shapes_max), random);
+  for (int decoys = random.uniform(0, p.most_decoys + 1); decoys > 0; --decoys) {
+    const auto edge = static_cast<float>(random.uniform(p.longest_min, p.longest_max));
+    const cv::Point2f at{random.uniform(0.0f, static_cast<float>(p.width) - edge),
+                         random.uniform(0.0f, static_cast<float>(p.height) - edge)};
+    draw_decoy(image, {at, cv::Size2f(edge, edge)}, random);
+  }
   const int wanted = random.uniform(0, p.most_signs + 1);
   for (int attempt = 0; static_cast<int>(scene.signs.size()) < wanted && attempt < 50; ++attempt) {
     const SignShape& shape = kSignShapes[static_cast<size_t>(random.uniform(0, static_cast<int>(kSignShapes.size())))];
@@ -127,7 +139,7 @@ SignScene make_scene(const SceneParameters& p, uint64_t seed, uint64_t index) {
 
 SignScene make_passage(const SceneParameters& p, uint64_t seed, uint64_t index, int frame, int frames) {
   cv::RNG random = stream(seed, index);
-  const cv::Mat3f far = background({p.width, p.height}, random.uniform(10, 60), random);
+  const cv::Mat3f far = background({p.width, p.height}, random.uniform(p.shapes_min, p.shapes_max), random);
   const SignShape& shape = kSignShapes[index % kSignShapes.size()];
   const double share = static_cast<double>(frame) / std::max(1, frames - 1);
   const double edge = p.longest_min * std::pow(p.longest_max / p.longest_min, share);
@@ -153,17 +165,25 @@ cv::Mat1b make_positive(SignClass sign, uint64_t seed, uint64_t index) {
   cv::RNG random = stream(seed, index);
   const SignShape& shape = kSignShapes[static_cast<size_t>(sign)];
   const cv::Size window(shape.window_width, shape.window_height);
-  cv::Mat3f image = background(window, random.uniform(0, 4), random);
+  const double larger = std::exp2(random.uniform(0.0, 2.0));
+  const cv::Size taken(cvRound(larger * window.width), cvRound(larger * window.height));
+  cv::Mat3f image = background(taken, random.uniform(0, 4), random);
   const double scale = random.uniform(0.92, 1.08) * (1 - 2 * kMargin);
-  const cv::Size2f size(static_cast<float>(scale * window.width), static_cast<float>(scale * window.height));
+  const cv::Size2f size(static_cast<float>(scale * taken.width), static_cast<float>(scale * taken.height));
   const auto offset = [&](int extent, float used) {
     return (static_cast<float>(extent) - used) / 2 + static_cast<float>(extent) * random.uniform(-0.04f, 0.04f);
   };
-  const float x = offset(window.width, size.width), y = offset(window.height, size.height);
+  const float x = offset(taken.width, size.width), y = offset(taken.height, size.height);
   draw_sign(image, sign, {x, y, size.width, size.height}, random);
-  cv::Mat1b grey;
-  cv::cvtColor(exposed(image, {}, random), grey, cv::COLOR_BGR2GRAY);
-  return grey;
+  const int shorter = std::min(taken.width, taken.height);
+  SceneParameters camera;
+  camera.blur_max = 0.06 * shorter;
+  camera.motion_max = 0.08 * shorter;
+  cv::Mat grey;
+  cv::cvtColor(exposed(image, camera, random), grey, cv::COLOR_BGR2GRAY);
+  cv::Mat1b scaled;
+  cv::resize(grey, scaled, window, 0, 0, cv::INTER_LINEAR_EXACT);
+  return scaled;
 }
 
 }  // namespace takt::traffic_signs

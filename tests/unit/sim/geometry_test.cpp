@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "hal/sim/lens.hpp"
+#include "tests/temporary_folder.hpp"
 #include "tests/unit/sim/small_world.hpp"
 
 using namespace takt;
@@ -82,6 +83,54 @@ TEST_CASE("a point seen at its true depth in the left image lies at x - f B / z 
   // The texture is the same; what differs is the resampling.
   CHECK(difference[difference.size() / 2] < 2.5);
   CHECK(difference[difference.size() * 95 / 100] < 25.0);
+}
+
+TEST_CASE("a board shows its picture upright and not mirrored to whom it faces, and nothing from behind") {
+  const test::TemporaryFolder folder;
+  std::string picture = "P6 16 16 255\n";  // top left red, top right green, lower half blue
+  for (int y = 0; y < 16; ++y)
+    for (int x = 0; x < 16; ++x)
+      picture += y >= 8  ? std::string("\x10\x10\xc8")
+                 : x < 8 ? std::string("\xc8\x10\x10")
+                         : std::string("\x10\xc8\x10");
+  auto texture = load_picture(folder.write("board.ppm", picture), 1.0);
+  REQUIRE(texture.has_value());
+  World world = test::small_world();
+  WorldObject board;
+  board.name = "board", board.type = "sign", board.position = {3.5, 2.5},
+  board.yaw_rad = 3.14159265;  // faces the robot
+  board.board = Board{1.0, 0.8, std::make_shared<const Texture>(std::move(*texture))};
+  StereoRig rig = test::small_rig();
+  rig.tilt_rad = 0;
+  for (const bool faces : {true, false}) {
+    if (!faces) board.yaw_rad = 0;
+    world.objects = {board};
+    Simulation s(world, 0, 3);
+    s.begin(0);
+    const View seen = render(s, rig, 0);
+    const auto at = [&](int x, int y) { return seen.image.row(y) + ptrdiff_t{3} * x; };
+    const auto is = [&](const uint8_t* pixel, int channel) {
+      return pixel[channel] > 100 && pixel[(channel + 1) % 3] < 50 && pixel[(channel + 2) % 3] < 50;
+    };
+    // 1.9 m straight ahead and 1 m wide: 65 px around the middle of the image.
+    CHECK(is(at(63, 43), 2) == faces);
+    CHECK(is(at(96, 43), 1) == faces);
+    CHECK(is(at(63, 76), 0) == faces);
+    CHECK(is(at(96, 76), 0) == faces);
+  }
+}
+
+TEST_CASE("pictures that are none are refused") {
+  const test::TemporaryFolder folder;
+  const auto error = [&](const std::string& bytes) {
+    const auto texture = load_picture(folder.write("board.ppm", bytes), 1.0);
+    return texture ? std::string() : texture.error();
+  };
+  CHECK(error("P3 16 16 255\n").find("is no PPM") != std::string::npos);
+  CHECK(error("P6 16 32 255\n").find("is no PPM") != std::string::npos);
+  CHECK(error("P6 20 20 255\n").find("16, 32 ... 1024") != std::string::npos);
+  CHECK(error("P6 16 16 255\n123").find("ends early") != std::string::npos);
+  CHECK(load_picture(folder.path / "none.ppm", 1.0).error().find("cannot be opened") != std::string::npos);
 }
 
 TEST_CASE("true disparity is f B / depth") {

@@ -1,2 +1,3 @@
 # SPDX-License-Identifier: Apache-2.0
-set(ROOM_TEST_LIBRARIES takt_traffic_signs_train opencv_objdetect)
+# The node also runs in a graph.
+set(ROOM_TEST_LIBRARIES takt_traffic_signs_train takt_compose opencv_objdetect)

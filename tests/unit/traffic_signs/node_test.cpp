@@ -198,6 +198,9 @@ TEST_CASE("traffic_signs: what cannot work is said before start") {
   CHECK(says(list_error("# none\n"), "names no sign"));
   CHECK(says(list_error("\nobject stop\n"), "signs.txt:2: unknown word `object`"));
   CHECK(says(list_error("sign stop stop.xml red 0.2\n"), "takes NAME CASCADE COLOUR SHARE WIDTH HEIGHT"));
+  CHECK(says(list_error("sign stop stop.xml red 0.2 1 1 a b\n"),
+             "takes NAME CASCADE COLOUR SHARE WIDTH HEIGHT [LAYOUT]"));
+  CHECK(says(list_error("sign light l.xml any 0 1 1 l.layout\n"), "a layout needs a colour other than any"));
   CHECK(says(list_error("sign stop stop.xml green 0.2 1 1\n"), "valid are any, red, yellow, blue"));
   CHECK(says(list_error("sign stop stop.xml red 2 1 1\n"), "must lie in 0..1"));
   CHECK(says(list_error("sign stop stop.xml red 0.2 1 1\n"), "stop.xml: cannot be read"));
