@@ -17,6 +17,7 @@ void register_traffic_signs(NodeTypes& types);
 void register_object_3d(NodeTypes& types);
 void register_body_pose(NodeTypes& types);
 void register_scan_matching(NodeTypes& types);
+void register_robot_pose(NodeTypes& types);
 }  // namespace takt
 
 namespace takt::graph {
@@ -37,6 +38,7 @@ NodeTypes node_types() {
   register_object_3d(types);
   register_body_pose(types);
   register_scan_matching(types);
+  register_robot_pose(types);
   return types;
 }
 
