@@ -22,6 +22,7 @@ std::vector<Row> run_ego_motion(const Options&);
 std::vector<Row> run_signs(const Options&);
 std::vector<Row> run_sift(const Options&);
 std::vector<Row> run_objects(const Options&);
+std::vector<Row> run_mapping(const Options&);
 #endif
 
 std::span<const Suite> suites() {
@@ -43,6 +44,7 @@ std::span<const Suite> suites() {
       {"signs", "seven cascades over a scene of 640x480, against OpenCV's detector", run_signs},
       {"sift", "objects in a scene: the colour stage against OpenCV's SIFT", run_sift},
       {"objects", "histogram cascade at 640x480: stages on all windows against brute force, the whole", run_objects},
+      {"mapping", "scan matching: search, refinement against brute force; occupancy map, pose filter", run_mapping},
 #endif
   });
   return list;
