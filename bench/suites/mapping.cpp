@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Matching a scan of 181 beams with the last twenty of a drive through a furnished room: the search against one that
 // tries every candidate, the refinement against one that looks at every mapped point, both with equal results; the
-// whole step, the map update, and a measurement of the pose filter, late or not.
+// whole step, the map update, a measurement of the pose filter, late or not, and a sweep of the traversability grid.
 #include <cstdio>
 #include <stdexcept>
 
@@ -11,6 +11,7 @@
 #include "nodes/scan_matching/drive.hpp"
 #include "nodes/scan_matching/occupancy_map.hpp"
 #include "nodes/scan_matching/scan_matcher.hpp"
+#include "nodes/traversability/height_map.hpp"
 #include "rt/time/clock.hpp"
 
 namespace takt::bench {
@@ -89,6 +90,25 @@ Row filter_row() {
   return out;
 }
 
+/// A sweep of 281 beams 2 m ahead and the judgement of the 12 x 12 m, once the floor behind is known.
+Row traversability_row() {
+  Row out = row("mapping/traversability/sweep");
+  traversability::HeightMap map({});
+  std::vector<int16_t> cells(static_cast<size_t>(map.side()) * static_cast<size_t>(map.side()));
+  for (int sweep = 0; sweep < 500; ++sweep) {
+    const double y_m = sweep / 30.0;
+    std::vector<mapping_3d::Position> points;
+    for (int beam = 0; beam < 281; ++beam) points.push_back({(beam - 140) * 0.01, y_m + 2, 0.001 * (beam % 5)});
+    out.samples.add(used_ms([&] {
+      map.centre(0, y_m);
+      map.add(points, sweep);
+      map.judge({cells.data(), map.side(), map.side()});
+    }));
+  }
+  out.value = out.samples.quantile(0.5).value_or(0);
+  return out;
+}
+
 }  // namespace
 
 std::vector<Row> run_mapping(const Options& options) {
@@ -110,6 +130,7 @@ std::vector<Row> run_mapping(const Options& options) {
   std::vector<Row> rows{step, update};
   stages(rows, drive, matcher, options.rounds_or(10));
   rows.push_back(filter_row());
+  rows.push_back(traversability_row());
   return rows;
 }
 

@@ -18,6 +18,7 @@ void register_object_3d(NodeTypes& types);
 void register_body_pose(NodeTypes& types);
 void register_scan_matching(NodeTypes& types);
 void register_robot_pose(NodeTypes& types);
+void register_traversability(NodeTypes& types);
 }  // namespace takt
 
 namespace takt::graph {
@@ -39,6 +40,7 @@ NodeTypes node_types() {
   register_body_pose(types);
   register_scan_matching(types);
   register_robot_pose(types);
+  register_traversability(types);
   return types;
 }
 
