@@ -77,7 +77,10 @@ Match ScanMatcher::step(const Sweep& sweep, double dt_s, const std::optional<Pla
   out.points = static_cast<int>(
       std::count_if(points_.begin(), points_.end(), [](const SurfacePoint& p) { return p.has_normal(); }));
   const Expected expected = expect(dt_s, moved);
-  out.outcome = match(expected, out);
+  Expected overall = expected;  // with what refused scans have left uncertain
+  overall.sigma_m = std::hypot(expected.sigma_m, unsure_m_);
+  overall.sigma_rad = std::hypot(expected.sigma_rad, unsure_rad_);
+  out.outcome = match(overall, out);
 
   Covariance in_map = Eigen::Vector3d(expected.sigma_m * expected.sigma_m, expected.sigma_m * expected.sigma_m,
                                       expected.sigma_rad * expected.sigma_rad)
@@ -95,10 +98,13 @@ Match ScanMatcher::step(const Sweep& sweep, double dt_s, const std::optional<Pla
   last_dt_s_ = dt_s;
 
   refused_ = out.accepted() ? 0 : refused_ + 1;
+  unsure_m_ = out.accepted() ? 0 : overall.sigma_m;
+  unsure_rad_ = out.accepted() ? 0 : overall.sigma_rad;
   out.map_anew = refused_ >= p_.refused_most && out.points >= p_.points_min;
   if (out.map_anew) {
     map_.clear();
     refused_ = 0;
+    unsure_m_ = unsure_rad_ = 0;
   }
   const PlanarPose since = between(keyframe_, pose_);
   out.keyframe = out.map_anew || out.outcome == Outcome::first ||

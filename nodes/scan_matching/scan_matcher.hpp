@@ -81,6 +81,7 @@ class ScanMatcher {
   UncertainPose accumulated_;
   double last_dt_s_ = 0;
   int refused_ = 0;
+  double unsure_m_ = 0, unsure_rad_ = 0;  ///< standard deviations of what was expected since the last scan that fitted
 };
 
 }  // namespace takt::scan_matching

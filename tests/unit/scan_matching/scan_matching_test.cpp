@@ -176,6 +176,12 @@ TEST_CASE("refusals are told, carry what was expected with its uncertainty, and 
   CHECK(match.outcome == Outcome::matched);
   CHECK(distance(match.robot_in_map, {}) < 0.01);
 
+  // The longer it saw nothing, the less the expectation weighs against the map.
+  for (int i = 0; i < 4; ++i) CHECK_FALSE(matcher.step(blind.sweep(), 0.2, PlanarPose{0, 0.05, 0}).accepted());
+  match = matcher.step(here.sweep(), 0.2, PlanarPose{});
+  CHECK(match.outcome == Outcome::matched);
+  CHECK(distance(match.robot_in_map, {}) < 0.004);
+
   // A place of which the map knows nothing; after some refusals the map is made anew there.
   const std::vector<Wall> elsewhere{{-0.8, 0.5, 0.9, 0.7}, {0.9, 0.7, 1.1, -3}, {-0.8, 0.5, -0.7, -3}};
   const Look strange(elsewhere, {});
