@@ -10,7 +10,6 @@ namespace takt::robot_pose {
 namespace {
 
 using scan_matching::between;
-using scan_matching::compose;
 using scan_matching::wrapped;
 
 constexpr int kSpeed = 3, kTurn = 4;
