@@ -23,6 +23,7 @@ std::vector<Row> run_signs(const Options&);
 std::vector<Row> run_sift(const Options&);
 std::vector<Row> run_objects(const Options&);
 std::vector<Row> run_objects_3d(const Options&);
+std::vector<Row> run_mapping(const Options&);
 #endif
 
 std::span<const Suite> suites() {
@@ -45,6 +46,7 @@ std::span<const Suite> suites() {
       {"sift", "objects in a scene: the colour stage against OpenCV's SIFT", run_sift},
       {"objects", "histogram cascade at 640x480: stages on all windows against brute force, the whole", run_objects},
       {"objects_3d", "things on a table: growing regions against a kd-tree, the whole", run_objects_3d},
+      {"mapping", "scan matching: search, refinement against brute force; occupancy map, pose filter", run_mapping},
 #endif
   });
   return list;

@@ -97,5 +97,13 @@ struct EvalSignsOptions {
   bool json = false;
 };
 void add_eval_signs(CLI::App& eval, EvalSignsOptions& options, int& exit_code);
+struct EvalScanMatchingOptions {
+  std::filesystem::path log;  ///< CARMEN log with corrected poses; empty: a drive is generated
+  bool without_odometry = false;
+  uint64_t seed = 1;
+  std::string picture;
+  bool json = false;
+};
+void add_eval_scan_matching(CLI::App& eval, EvalScanMatchingOptions& options, int& exit_code);
 
 }  // namespace takt::command

@@ -16,6 +16,9 @@ void register_cloud_filter(NodeTypes& types);
 void register_traffic_signs(NodeTypes& types);
 void register_object_3d(NodeTypes& types);
 void register_body_pose(NodeTypes& types);
+void register_scan_matching(NodeTypes& types);
+void register_robot_pose(NodeTypes& types);
+void register_traversability(NodeTypes& types);
 }  // namespace takt
 
 namespace takt::graph {
@@ -35,6 +38,9 @@ NodeTypes node_types() {
   register_traffic_signs(types);
   register_object_3d(types);
   register_body_pose(types);
+  register_scan_matching(types);
+  register_robot_pose(types);
+  register_traversability(types);
   return types;
 }
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 # Another robot by graph edit alone: without a laser, with odometry in place of ego-motion, with one camera for both
-# roles. Each still maps. In virtual time, where no deadline depends on this machine.
+# roles, with a pose joined from wheels, ego-motion and laser scans. Each still maps. In virtual time, where no deadline depends on this machine.
 source "$(dirname "$0")/lib.sh" "$@"
 command -v python3 >/dev/null || echo "NOT RUN: what the maps show needs python3; only that they are written is tested"
 
@@ -106,4 +106,16 @@ edit '
 '
 grep -q 'ground_camera' "$work/graph/edited.yaml" && fail "ground_camera is still in the graph"
 maps one_camera
+
+edit '
+  /^    ground_map:$/i\    scan_matching: {type: scan_matching, in: {scan: {from: front_laser.scan, depth: 4}, odometry: {from: base.odometry, depth: 16}}}
+  /^    ground_map:$/i\    robot_pose: {type: robot_pose, in: {odometry: {from: base.odometry, depth: 16}, motion: {from: ego_motion.motion, depth: 16}, robot_motion: {from: ego_motion.robot_motion, depth: 16}, scan_pose: {from: scan_matching.pose, depth: 16}}}
+  /^    ground_map:$/,/^    mapping_3d:$/s/from: base\.odometry/from: robot_pose.odometry/
+  /^    mapping_3d:$/,/^    picture:$/s/motion: \{from: ego_motion\.motion/odometry: {from: robot_pose.odometry/
+' '
+  $a\  scan_matching: {rate: 5, offset: 22ms, budget: 8ms, deadline: 200ms}
+  $a\  robot_pose: {rate: 10, offset: 40ms, budget: 1ms, deadline: 100ms}
+  s/^(  picture: .*budget: )20ms/\110ms/
+'
+maps joined_pose
 finish
