@@ -45,8 +45,12 @@ struct EvalObjectsOptions {
   int frames = 100;
   int images = 500, empty = 75;
   double occlusion = 0.6;
+  bool study = false;
+  std::string picture;  ///< of the study
   bool json = false;
 };
+/// Time, share excluded and contrast of each stage against bins, thresholds and references (thesis Fig. 3.20).
+int study_objects(const EvalObjectsOptions& options);
 void add_eval_objects(CLI::App& eval, EvalObjectsOptions& options, int& exit_code);
 struct EvalObjects3dOptions {
   std::filesystem::path data;   ///< recorded scenes; empty: none

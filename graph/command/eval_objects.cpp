@@ -22,7 +22,7 @@ using Json = nlohmann::ordered_json;
 constexpr double kFactors[] = {0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4};
 
 /// Smallest scores at which the trade-off between missed objects and false positives is shown; the node's is the first.
-constexpr double kScores[] = {0.4, 0.25, 0.3, 0.35, 0.45, 0.5, 0.55, 0.6};
+constexpr double kScores[] = {0.3, 0.25, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6};
 
 struct Results {
   Measurement ours, mean_colour;
@@ -270,7 +270,11 @@ void add_eval_objects(CLI::App& eval, EvalObjectsOptions& o, int& exit_code) {
   app->add_option("--occlusion", o.occlusion, "largest share of an object that an occluder hides (default 0.6)")
       ->check(CLI::Range(0.0, 0.9));
   app->add_flag("--json", o.json, "one JSON object on stdout");
-  app->callback([&] { exit_code = evaluate(o); });
+  auto* study = app->add_flag("--study", o.study,
+                              "instead: each stage by itself against bins, thresholds, references, on --frames scenes");
+  app->add_option("--picture", o.picture, "PNG of time, share excluded and contrast over the rows of bins")
+      ->needs(study);
+  app->callback([&] { exit_code = o.study ? study_objects(o) : evaluate(o); });
 }
 
 }  // namespace takt::command

@@ -133,7 +133,7 @@ void tune(const ObjectsOptions& o) {
     const auto shows = [&](uint64_t i) { return make_scene(std::span(&database[index], 1), p, o.seed, i); };
     std::vector<DatabaseObject> others;
     for (const DatabaseObject& other : database)
-      if (other.name != database[index].name) others.push_back(other);
+      if (other.name != database[index].name && !other.test_views.empty()) others.push_back(other);
     const auto lacks = [&](uint64_t i) {
       SceneParameters without = p;
       without.fewest_objects = 0;
@@ -259,7 +259,7 @@ void add_objects(CLI::App& app, ObjectsOptions& o, int& exit_code) {
   sub = command("test", "what is found in images", test);
   sub->add_option("images", o.images, "PNG, JPEG ...")->required();
   one_object(sub);
-  sub->add_option("--min-score", o.min_score, "smallest score (default 0.4)")->check(CLI::Range(0.0, 1.0));
+  sub->add_option("--min-score", o.min_score, "smallest score (default 0.3)")->check(CLI::Range(0.0, 1.0));
   sub->add_option("--maps", o.maps, "folder for pictures: the image and the errors of the three stages, per object");
   command("publish", "copies the database as a revision that running nodes can change to", publish);
 }

@@ -21,7 +21,7 @@ struct ObjectsOptions {
   std::string roc;
   bool write = false;
   std::filesystem::path maps;
-  double min_score = 0.4;
+  double min_score = 0.3;
 };
 
 /// `takt objects list | add | tune | test | publish`: the database of the node object_detection. 0 done, 2 bad input.

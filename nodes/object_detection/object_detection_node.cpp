@@ -146,7 +146,7 @@ class ObjectDetectionNode final : public Node {
       "1",  "share of a reference that occlusion or distance may take; added to automatic thresholds"};
   Param<double> threshold_scale_{
       this, "threshold_scale", 1.0, {0.05, 4.0}, "1", "factor on the thresholds of the database"};
-  Param<double> min_score_{this,       "min_score", 0.4,
+  Param<double> min_score_{this,       "min_score", 0.3,
                            {0.0, 1.0}, "1",         "smallest score (1 - error) of a detection; roi is not affected"};
   Param<double> reserve_{this,       "reserve", 0.001,
                          {0.0, 1.0}, "s",       "with less time left than this the search ends and its best is sent"};

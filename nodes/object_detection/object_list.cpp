@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <fstream>
 #include <sstream>
+#include <utility>
 
 #include "nodes/object_detection/cut_out.hpp"
 
@@ -50,7 +51,7 @@ ObjectList::Block ObjectList::find(const std::string& label) const {
   return {lines_.size(), lines_.size()};
 }
 
-void ObjectList::add(const std::string& label, const ReferenceView& view, bool test_view) {
+void ObjectList::add(const std::string& label, ReferenceView view, bool test_view) {
   Block block = find(label);
   if (block.first == block.end) {
     if (!lines_.empty()) lines_.emplace_back();
@@ -61,11 +62,12 @@ void ObjectList::add(const std::string& label, const ReferenceView& view, bool t
   std::replace(stem.begin(), stem.end(), ' ', '_');
   if (stem.find('/') != std::string::npos)
     throw DatabaseError("object `" + label + "`: a name holds no `/`; views are kept under it");
-  std::filesystem::create_directories(folder_ / stem);
   int number = 0;
   const auto file = [&] { return stem + "/" + std::to_string(number) + ".png"; };
-  while (std::filesystem::exists(folder_ / file())) ++number;
-  write_view(view, folder_ / file());
+  const auto taken = [&](const ReferenceView& other) { return other.file == folder_ / file(); };
+  while (std::filesystem::exists(folder_ / file()) || std::any_of(added_.begin(), added_.end(), taken)) ++number;
+  view.file = folder_ / file();
+  added_.push_back(std::move(view));
   lines_.insert(lines_.begin() + static_cast<ptrdiff_t>(block.end), (test_view ? "test_view " : "view ") + file());
 }
 
@@ -90,21 +92,33 @@ void ObjectList::set_thresholds(const std::string& label, const Thresholds& thre
 }
 
 void ObjectList::save(int side_px) {
-  const std::string name = "objects.txt." + std::to_string(getpid());
-  const auto remove = [&] { std::filesystem::remove(folder_ / name); };
-  {
-    std::ofstream out(folder_ / name);
-    for (const std::string& line : lines_) out << line << '\n';
-    out.close();
-    if (!out) {
-      remove();
-      throw DatabaseError((folder_ / name).string() + " cannot be written");
-    }
-  }
   try {
+    write(side_px);
+    added_.clear();
+  } catch (...) {
+    std::error_code ignored;
+    for (const ReferenceView& view : added_) {
+      std::filesystem::remove(view.file, ignored);
+      std::filesystem::remove(view.file.parent_path(), ignored);  // only if nothing else is in it
+    }
+    throw;
+  }
+}
+
+void ObjectList::write(int side_px) {
+  const std::string name = "objects.txt." + std::to_string(getpid());
+  for (const ReferenceView& view : added_) {
+    std::filesystem::create_directories(view.file.parent_path());
+    write_view(view, view.file);
+  }
+  std::ofstream out(folder_ / name);
+  for (const std::string& line : lines_) out << line << '\n';
+  out.close();
+  try {
+    if (!out) throw DatabaseError((folder_ / name).string() + " cannot be written");
     read_database(folder_, side_px, TestViews::read, name);
   } catch (const DatabaseError&) {
-    remove();
+    std::filesystem::remove(folder_ / name);
     throw;
   }
   std::filesystem::rename(folder_ / name, folder_ / "objects.txt");

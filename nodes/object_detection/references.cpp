@@ -44,12 +44,15 @@ CascadeReferences cascade_references(std::span<const DatabaseObject> database, c
   const OrientationBins orientations(p.orientations);
   CascadeReferences stages;
   for (size_t s = 0; s <= static_cast<size_t>(p.last); ++s) {
-    const double cap = s > 0 ? kLaterStagesCap : p.last == Stage::colour ? kThresholdCap : kColourBeforeOthersCap;
+    const double caps[] = {p.last == Stage::colour ? kThresholdCap : kColourBeforeOthersCap, kOrientationCap,
+                           kCooccurrenceCap};
+    const bool of_pairs = static_cast<Stage>(s) == Stage::cooccurrence;
+    const double tolerance = of_pairs ? 1 - (1 - p.tolerance) * (1 - p.tolerance) : p.tolerance;
     for (const DatabaseObject& object : database) {
       auto& views = stages[s].histograms.emplace_back();
       for (const ReferenceView& view : object.views)
         views.push_back(histogram_of(view.view(), static_cast<Stage>(s), p, orientations));
-      const double of_object = object.thresholds[s].value_or(automatic_threshold(views, p.tolerance, cap));
+      const double of_object = object.thresholds[s].value_or(automatic_threshold(views, tolerance, caps[s]));
       auto& limits = stages[s].limits.emplace_back();
       for (size_t r = 0; r < views.size(); ++r)
         limits.push_back({views[r].mass, p.threshold_scale * object.views[r].thresholds[s].value_or(of_object)});

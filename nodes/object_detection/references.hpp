@@ -19,7 +19,8 @@ struct DetectorParameters {
   int orientations = 360;
   PairBins pairs;
   int window_px = 64;
-  double tolerance = 0.36;  ///< added to automatic thresholds: 1 - 0.8^2, an object at 0.8 times its reference's size
+  /// Share of a reference that may be hidden, in automatic thresholds: 1 - 0.8^2, an object at 0.8 times its size.
+  double tolerance = 0.36;
   double threshold_scale = 1;  ///< factor on every threshold
 };
 

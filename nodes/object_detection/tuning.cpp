@@ -5,20 +5,10 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "nodes/object_detection/colour_stage.hpp"
-#include "nodes/object_detection/cooccurrence_stage.hpp"
-#include "nodes/object_detection/orientation_stage.hpp"
+#include "nodes/object_detection/stage_errors.hpp"
 
 namespace takt::object_detection {
 namespace {
-
-template <class Mass>
-float least_error(std::span<const Mass> missing, std::span<const Histogram> views) {
-  float least = 1;
-  for (size_t r = 0; r < views.size(); ++r)
-    least = std::min(least, static_cast<float>(missing[r]) / static_cast<float>(std::max(1u, views[r].mass)));
-  return least;
-}
 
 /// What the last stage's threshold must exceed for the object to be found in the image; none does that: 2.
 float needed(const ErrorMaps& maps, const std::array<double, kStages>& thresholds) {
@@ -40,19 +30,8 @@ ErrorMaps error_maps(ImageView<const uint8_t> bgr, const CascadeReferences& refe
                      const DetectorParameters& p) {
   ErrorMaps maps;
   maps.grid = make_search_grid(bgr.width, bgr.height, reference_px, p.window_px);
-  const auto views = [&](size_t stage) { return std::span(references[stage].histograms).subspan(object, 1); };
-  ColourStage colour(maps.grid, p.bins, views(0));
-  OrientationStage orientation(maps.grid, OrientationBins(p.orientations), views(1));
-  CooccurrenceStage cooccurrence(maps.grid, p.pairs, views(2));
-  colour.run(bgr);
-  orientation.begin(bgr);
-  for (size_t window = 0; window < static_cast<size_t>(maps.grid.windows()); ++window) {
-    orientation.go_to(window);
-    maps.error[0].push_back(least_error(colour.missing().subspan(window * colour.references(), colour.references()),
-                                        std::span(views(0)[0])));
-    maps.error[1].push_back(least_error(orientation.missing(0), std::span(views(1)[0])));
-    maps.error[2].push_back(least_error(cooccurrence.missing(bgr, window, 0), std::span(views(2)[0])));
-  }
+  for (size_t s = 0; s < kStages; ++s)
+    maps.error[s] = StageErrors(static_cast<Stage>(s), maps.grid, references[s].histograms[object], p).run(bgr);
   return maps;
 }
 
@@ -60,8 +39,10 @@ Tuning tune(std::span<const ErrorMaps> with, std::span<const ErrorMaps> without,
   if (with.empty()) throw std::invalid_argument("no image shows the object");
   std::array<std::vector<float>, 2> there;  // errors of the first stages where the object is
   for (const ErrorMaps& maps : with) {
-    const auto& last = maps.error[2];
-    const auto window = static_cast<size_t>(std::min_element(last.begin(), last.end()) - last.begin());
+    std::vector<float> sum = maps.error[0];
+    for (size_t s = 1; s < kStages; ++s)
+      for (size_t window = 0; window < sum.size(); ++window) sum[window] += maps.error[s][window];
+    const auto window = static_cast<size_t>(std::min_element(sum.begin(), sum.end()) - sum.begin());
     for (size_t s = 0; s < 2; ++s) there[s].push_back(maps.error[s][window]);
   }
   Tuning tuning;

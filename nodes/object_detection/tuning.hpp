@@ -32,7 +32,7 @@ struct Tuning {
 };
 
 /// `with`: maps of images that show the object somewhere, at least one; `without`: of images that do not. Where it is
-/// in an image is taken to be the window with the least error in the last stage (6.7). The thresholds of the first two
+/// in an image is taken to be the window with the least sum of its errors. The thresholds of the first two
 /// stages lie a tenth above what all but a share `miss` of these windows have; that of the last stage is where
 /// `detected` exceeds `false_positive` by most, in the middle of all thresholds that are equal in that.
 Tuning tune(std::span<const ErrorMaps> with, std::span<const ErrorMaps> without, double miss);

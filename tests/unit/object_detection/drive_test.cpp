@@ -69,7 +69,7 @@ TEST_CASE("the boxes of the lab are found on the drive, at their places and nowh
                     {image.data(), rig.width, rig.height, 3}, depth.data());
     REQUIRE(detector.run({image.data(), rig.width, rig.height, 3}));
     std::array<Detection, 32> boxes;
-    const size_t count = detector.detections(0.4, boxes);
+    const size_t count = detector.detections(0.3, boxes);
     for (size_t o = 0; o < database.size(); ++o) {
       const auto& objects = (*world)->world().objects;
       const auto object =
