@@ -40,7 +40,7 @@ struct EvalObjectsOptions {
   std::filesystem::path turntable;    ///< instead of a database; empty: none
   std::filesystem::path backgrounds;  ///< empty: generated
   std::string bins = "64x64x1";
-  std::string scales = "1+0.7+0.5";
+  std::string scales = "1";
   uint64_t seed = 1;
   int frames = 100;
   int images = 500, empty = 75;

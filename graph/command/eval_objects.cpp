@@ -260,7 +260,7 @@ void add_eval_objects(CLI::App& eval, EvalObjectsOptions& o, int& exit_code) {
       ->excludes(database);
   app->add_option("--backgrounds", o.backgrounds, "folder with photographs, 640 x 480 PNG (default: generated)");
   app->add_option("--bins", o.bins, "64x64x1 (default) | 64x32x2")->check(CLI::IsMember({"64x32x2", "64x64x1"}));
-  app->add_option("--scales", o.scales, "of the image, for the cascade (default 1+0.7+0.5)");
+  app->add_option("--scales", o.scales, "of the image, for the cascade (default 1), such as 1+0.7+0.5");
   app->add_option("--seed", o.seed, "seed of the scenes (default 1)");
   app->add_option("--frames", o.frames, "scenes for the exclusion by colour (default 100)")
       ->check(CLI::Range(1, 100000));

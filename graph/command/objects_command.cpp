@@ -31,12 +31,6 @@ cv::Mat3b read_image(const std::filesystem::path& file) {
 
 ImageView<const uint8_t> view_of(const cv::Mat3b& image) { return {image.data, image.cols, image.rows, 3}; }
 
-DetectorParameters parameters() {
-  DetectorParameters p;
-  p.scales = {1, 0.7, 0.5};  // as the node by default
-  return p;
-}
-
 /// "bottle closed=true", attributes by name.
 std::string label_of(const ObjectsOptions& o) {
   DatabaseObject entry;
@@ -68,7 +62,7 @@ std::vector<size_t> wanted(const std::vector<DatabaseObject>& database, const st
 
 void list(const ObjectsOptions& o) {
   const auto database = read_database(o.database, o.size_px, TestViews::read);
-  const CascadeReferences references = cascade_references(database, parameters());
+  const CascadeReferences references = cascade_references(database, DetectorParameters{});
   fmt::print("{:>5} {:<32} {:>5} {:>10}   {:<22}\n", "class", "object", "views", "test views", "thresholds CH HOG CCH");
   for (size_t i = 0; i < database.size(); ++i) {
     fmt::print("{:>5} {:<32} {:>5} {:>10}  ", i, database[i].label(), database[i].views.size(),
@@ -98,9 +92,10 @@ std::vector<ErrorMaps> maps_of(const std::vector<std::filesystem::path>& files, 
                                const std::function<Scene(uint64_t)>& scene) {
   std::vector<ErrorMaps> maps;
   for (const auto& file : files)
-    maps.push_back(error_maps(view_of(read_image(file)), references, object, o.size_px, parameters()));
+    maps.push_back(error_maps(view_of(read_image(file)), references, object, o.size_px, DetectorParameters{}));
   for (int i = 0; files.empty() && i < o.scenes; ++i)
-    maps.push_back(error_maps(scene(static_cast<uint64_t>(i)).view(), references, object, o.size_px, parameters()));
+    maps.push_back(
+        error_maps(scene(static_cast<uint64_t>(i)).view(), references, object, o.size_px, DetectorParameters{}));
   return maps;
 }
 
@@ -119,7 +114,7 @@ void write_roc(const std::string& file, const Tuning& tuning) {
 
 void tune(const ObjectsOptions& o) {
   const auto database = read_database(o.database, o.size_px, TestViews::read);
-  const CascadeReferences references = cascade_references(database, parameters());
+  const CascadeReferences references = cascade_references(database, DetectorParameters{});
   const std::vector<size_t> objects = wanted(database, o.object);
   if (objects.size() > 1 && (!o.positives.empty() || !o.negatives.empty() || !o.roc.empty()))
     throw DatabaseError("--positives, --negatives and --roc are of one object; name it with --object");
@@ -179,11 +174,11 @@ cv::Mat3b map_picture(const cv::Mat3b& image, const ErrorMaps& maps, std::span<c
 void test(const ObjectsOptions& o) {
   const auto database = read_database(o.database, o.size_px, TestViews::skip);
   const std::vector<size_t> objects = wanted(database, o.object);
-  const CascadeReferences references = cascade_references(database, parameters());
+  const CascadeReferences references = cascade_references(database, DetectorParameters{});
   if (!o.maps.empty()) std::filesystem::create_directories(o.maps);
   for (const auto& file : o.images) {
     const cv::Mat3b image = read_image(file);
-    Detector detector(image.cols, image.rows, database, parameters());
+    Detector detector(image.cols, image.rows, database, DetectorParameters{});
     detector.run(view_of(image));
     std::vector<Detection> boxes(Detector::kMostDetections);
     boxes.resize(detector.detections(o.min_score, boxes));
@@ -203,7 +198,7 @@ void test(const ObjectsOptions& o) {
         if (static_cast<size_t>(box.class_id) == index) own.push_back(box);
       std::string name = file.stem().string() + "." + database[index].label() + ".png";
       std::replace(name.begin(), name.end(), ' ', '_');
-      const ErrorMaps maps = error_maps(view_of(image), references, index, o.size_px, parameters());
+      const ErrorMaps maps = error_maps(view_of(image), references, index, o.size_px, DetectorParameters{});
       if (!cv::imwrite((o.maps / name).string(), map_picture(image, maps, own)))
         throw std::runtime_error((o.maps / name).string() + " cannot be written");
     }

@@ -125,8 +125,8 @@ class ObjectDetectionNode final : public Node {
 
   Param<std::string> database_{this, "database", "objects", kPath,
                                "folder with objects.txt and the reference views it names"};
-  Param<std::string> scales_{this, "scales", "1+0.7+0.5", "1",
-                             "of the image at which windows are searched; falling, 0.5 or more"};
+  Param<std::string> scales_{this, "scales", "1", "1",
+                             "of the image at which windows are searched, such as 1+0.7+0.5; falling, 0.5 or more"};
   Param<std::string> revision_{this, "revision", "", "",
                                "of the database, as `takt objects publish` names it; empty: as it was at the start"};
   Choice stages_{this,

@@ -99,9 +99,7 @@ TEST_CASE("object_detection: boxes and region of interest of the left image, wit
   CHECK(std::abs(best.y_px + best.height_px / 2 - static_cast<float>(placed.y + placed.side / 2)) <= 24);
 
   // The picture shows just what the detector passes.
-  DetectorParameters parameters;
-  parameters.scales = {1, 0.7, 0.5};
-  Detector detector(640, 480, database, parameters);
+  Detector detector(640, 480, database, {});
   REQUIRE(detector.run(scene.view()));
   REQUIRE(roi.message().width == 37);
   REQUIRE(roi.message().height == 27);
