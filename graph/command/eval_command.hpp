@@ -3,8 +3,13 @@
 #pragma once
 #include <CLI/CLI.hpp>
 #include <filesystem>
+#include <span>
 #include <string>
 #include <vector>
+
+namespace takt::object_detection {
+struct DatabaseObject;
+}
 
 namespace takt::command {
 
@@ -50,7 +55,7 @@ struct EvalObjectsOptions {
   bool json = false;
 };
 /// Time, share excluded and contrast of each stage against bins, thresholds and references (thesis Fig. 3.20).
-int study_objects(const EvalObjectsOptions& options);
+void study_objects(const EvalObjectsOptions& options, std::span<const object_detection::DatabaseObject> database);
 void add_eval_objects(CLI::App& eval, EvalObjectsOptions& options, int& exit_code);
 struct EvalObjects3dOptions {
   std::filesystem::path data;   ///< recorded scenes; empty: none

@@ -234,6 +234,10 @@ int evaluate(const EvalObjectsOptions& options) {
         options.turntable.empty()
             ? read_database(options.database.empty() ? shipped("graph/objects") : options.database, 48, TestViews::read)
             : read_turntable(options.turntable, 48);
+    if (options.study) {
+      study_objects(options, database);
+      return kOk;
+    }
     Json out = to_json(options, measure_all(options, database));
     out["cascade"] = measure_cascade(options, database);
     if (options.json) {
@@ -274,7 +278,7 @@ void add_eval_objects(CLI::App& eval, EvalObjectsOptions& o, int& exit_code) {
                               "instead: each stage by itself against bins, thresholds, references, on --frames scenes");
   app->add_option("--picture", o.picture, "PNG of time, share excluded and contrast over the rows of bins")
       ->needs(study);
-  app->callback([&] { exit_code = o.study ? study_objects(o) : evaluate(o); });
+  app->callback([&] { exit_code = evaluate(o); });
 }
 
 }  // namespace takt::command

@@ -2,12 +2,9 @@
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
-#include <opencv2/core.hpp>
 
 #include "graph/command/curves.hpp"
 #include "graph/command/eval_command.hpp"
-#include "graph/command/prepare.hpp"
-#include "nodes/object_detection/photographs.hpp"
 #include "nodes/object_detection/study.hpp"
 
 namespace takt::command {
@@ -79,59 +76,47 @@ void draw(const std::string& file, const Table& table) {
 
 }  // namespace
 
-int study_objects(const EvalObjectsOptions& options) {
-  try {
-    cv::setNumThreads(1);
-    const auto database =
-        options.turntable.empty()
-            ? read_database(options.database.empty() ? shipped("graph/objects") : options.database, 48, TestViews::read)
-            : read_turntable(options.turntable, 48);
-    SceneParameters p;
-    p.fewest_objects = p.most_objects = 1;
-    p.scale_max = 1.3;
-    std::vector<Scene> scenes;
-    for (int i = 0; i < options.frames; ++i)
-      scenes.push_back(make_scene(database, p, options.seed, static_cast<uint64_t>(i)));
-    std::vector<Table> tables;
-    Table& bins = tables.emplace_back(Table{"bins, automatic thresholds, one object at a time", "bins", {}, {}});
-    for (const Method& method : methods()) {
-      bins.names.push_back(method.name);
-      bins.rows.push_back(study_stage(method.stage, database, scenes, method.p));
-    }
-    const std::pair<const char*, Stage> stages[] = {
-        {"CH 4096", Stage::colour}, {"HOG 360", Stage::orientation}, {"CCH (20,25)", Stage::cooccurrence}};
-    for (const auto& [name, stage] : stages) {
-      Table thresholds{fmt::format("{}: thresholds", name), "factor", {}, {}};
-      for (const double factor : {0.5, 0.75, 1.0, 1.25, 1.5}) {
-        DetectorParameters scaled;
-        scaled.threshold_scale = factor;
-        thresholds.names.push_back(fmt::format("{:.2f}", factor));
-        thresholds.rows.push_back(study_stage(stage, database, scenes, scaled));
-      }
-      tables.push_back(thresholds);
-    }
-    for (const auto& [name, stage] : stages) {
-      Table references{fmt::format("{}: references (views again from the first beyond those there are)", name),
-                       "references",
-                       {},
-                       {}};
-      for (const size_t count : {1, 2, 4, 8, 18, 50}) {
-        references.names.push_back(std::to_string(count));
-        references.rows.push_back(study_stage(stage, database, scenes, {}, count));
-      }
-      tables.push_back(references);
-    }
-    Json out = Json::array();
-    for (const Table& table : tables) {
-      if (options.json) out.push_back(to_json(table));
-      else print(table);
-    }
-    if (options.json) std::printf("%s\n", out.dump(2).c_str());
-    if (!options.picture.empty()) draw(options.picture, tables[0]);
-    return kOk;
-  } catch (const std::exception& error) {
-    return refuse(error.what(), kBadInput);
+void study_objects(const EvalObjectsOptions& options, std::span<const DatabaseObject> database) {
+  SceneParameters p;
+  p.fewest_objects = p.most_objects = 1;
+  p.scale_max = 1.3;
+  std::vector<Scene> scenes;
+  for (int i = 0; i < options.frames; ++i)
+    scenes.push_back(make_scene(database, p, options.seed, static_cast<uint64_t>(i)));
+  std::vector<Table> tables;
+  Table& bins = tables.emplace_back(Table{"bins, automatic thresholds, one object at a time", "bins", {}, {}});
+  for (const Method& method : methods()) {
+    bins.names.push_back(method.name);
+    bins.rows.push_back(study_stage(method.stage, database, scenes, method.p));
   }
+  const std::pair<const char*, Stage> stages[] = {
+      {"CH 4096", Stage::colour}, {"HOG 360", Stage::orientation}, {"CCH (20,25)", Stage::cooccurrence}};
+  for (const auto& [name, stage] : stages) {
+    Table thresholds{fmt::format("{}: thresholds", name), "factor", {}, {}};
+    for (const double factor : {0.5, 0.75, 1.0, 1.25, 1.5}) {
+      DetectorParameters scaled;
+      scaled.threshold_scale = factor;
+      thresholds.names.push_back(fmt::format("{:.2f}", factor));
+      thresholds.rows.push_back(study_stage(stage, database, scenes, scaled));
+    }
+    tables.push_back(thresholds);
+  }
+  for (const auto& [name, stage] : stages) {
+    Table references{
+        fmt::format("{}: references (views again from the first beyond those there are)", name), "references", {}, {}};
+    for (const size_t count : {1, 2, 4, 8, 18, 50}) {
+      references.names.push_back(std::to_string(count));
+      references.rows.push_back(study_stage(stage, database, scenes, {}, count));
+    }
+    tables.push_back(references);
+  }
+  Json out = Json::array();
+  for (const Table& table : tables) {
+    if (options.json) out.push_back(to_json(table));
+    else print(table);
+  }
+  if (options.json) std::printf("%s\n", out.dump(2).c_str());
+  if (!options.picture.empty()) draw(options.picture, tables[0]);
 }
 
 }  // namespace takt::command
