@@ -50,9 +50,9 @@ struct CpuBudget {
   int64_t left_ns() const { return budget_ns - (used_ns != nullptr ? used_ns() - used_before_ns : 0); }
 };
 
-/// What a job may ask the runtime, beside its inputs: Job::now_ns, Job::time_left_ns, and a chunk to loan (noted only
-/// where there was none).
-enum class Question : uint8_t { now, time_left, chunk };
+/// What a job may ask the runtime, beside its inputs: Job::now_ns, Job::time_left_ns, a chunk to loan (noted only where
+/// there was none), and Job::is_done.
+enum class Question : uint8_t { now, time_left, chunk, done };
 
 /// The answers that a job was given, in the same order, for its replay.
 class RecordedAnswers {
@@ -85,6 +85,9 @@ class Job {
     const int64_t to_deadline = deadline_ns_ - clock_->now_ns();
     return answer(Question::time_left, cpu_.budget_ns > 0 ? std::min(to_deadline, cpu_.left_ns()) : to_deadline);
   }
+  /// Whether work that another thread does for this node is done, which only the node knows: noted, so that a replay is
+  /// told the same. If the answer is true and the work is not done, this is a replay, and the job waits for it.
+  bool is_done(bool done) const { return answer(Question::done, done ? 1 : 0) != 0; }
   int level() const { return level_; }  ///< index into the node's Levels; 0 full quality (on_overrun: degrade)
   std::string_view mode() const { return mode_; }
   /// Says that this device's recorded data are used up; the run ends after the jobs under way.

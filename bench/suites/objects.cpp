@@ -106,6 +106,7 @@ std::vector<DatabaseObject> multiplied(std::span<const DatabaseObject> database,
             const uint8_t bgr[] = {view.pixels[i], view.pixels[i + 1], view.pixels[i + 2]};
             for (size_t c = 0; c < 3; ++c) view.pixels[i + c] = bgr[kChannels[k][c]];
           }
+      object.name += "_" + std::to_string(k);
       all.push_back(std::move(object));
     }
   }

@@ -3,8 +3,13 @@
 #pragma once
 #include <CLI/CLI.hpp>
 #include <filesystem>
+#include <span>
 #include <string>
 #include <vector>
+
+namespace takt::object_detection {
+struct DatabaseObject;
+}
 
 namespace takt::command {
 
@@ -40,12 +45,17 @@ struct EvalObjectsOptions {
   std::filesystem::path turntable;    ///< instead of a database; empty: none
   std::filesystem::path backgrounds;  ///< empty: generated
   std::string bins = "64x64x1";
+  std::string scales = "1";
   uint64_t seed = 1;
   int frames = 100;
   int images = 500, empty = 75;
   double occlusion = 0.6;
+  bool study = false;
+  std::string picture;  ///< of the study
   bool json = false;
 };
+/// Time, share excluded and contrast of each stage against bins, thresholds and references (thesis Fig. 3.20).
+void study_objects(const EvalObjectsOptions& options, std::span<const object_detection::DatabaseObject> database);
 void add_eval_objects(CLI::App& eval, EvalObjectsOptions& options, int& exit_code);
 struct EvalObjects3dOptions {
   std::filesystem::path data;   ///< recorded scenes; empty: none

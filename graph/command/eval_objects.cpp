@@ -22,7 +22,7 @@ using Json = nlohmann::ordered_json;
 constexpr double kFactors[] = {0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4};
 
 /// Smallest scores at which the trade-off between missed objects and false positives is shown; the node's is the first.
-constexpr double kScores[] = {0.4, 0.25, 0.3, 0.35, 0.45, 0.5, 0.55, 0.6};
+constexpr double kScores[] = {0.3, 0.25, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6};
 
 struct Results {
   Measurement ours, mean_colour;
@@ -71,6 +71,7 @@ struct Contestant {
           DetectorParameters p;
           p.last = last;
           p.bins = bins_of(options);
+          p.scales = parse_scales(options.scales);
           return p;
         }()) {
     for (const double score : kScores) tallies.emplace_back(score);
@@ -80,7 +81,7 @@ struct Contestant {
     detector.run(scene.view());
     times_ms.push_back(static_cast<double>(thread_cpu_ns() - start) / 1e6);
     std::vector<Detection> boxes(1000);
-    boxes.resize(detector.decision().detections(0, boxes));
+    boxes.resize(detector.detections(0, boxes));
     for (Tally& tally : tallies) tally.add(scene, boxes);
   }
   double quantile_ms(double share) {
@@ -233,6 +234,10 @@ int evaluate(const EvalObjectsOptions& options) {
         options.turntable.empty()
             ? read_database(options.database.empty() ? shipped("graph/objects") : options.database, 48, TestViews::read)
             : read_turntable(options.turntable, 48);
+    if (options.study) {
+      study_objects(options, database);
+      return kOk;
+    }
     Json out = to_json(options, measure_all(options, database));
     out["cascade"] = measure_cascade(options, database);
     if (options.json) {
@@ -259,6 +264,7 @@ void add_eval_objects(CLI::App& eval, EvalObjectsOptions& o, int& exit_code) {
       ->excludes(database);
   app->add_option("--backgrounds", o.backgrounds, "folder with photographs, 640 x 480 PNG (default: generated)");
   app->add_option("--bins", o.bins, "64x64x1 (default) | 64x32x2")->check(CLI::IsMember({"64x32x2", "64x64x1"}));
+  app->add_option("--scales", o.scales, "of the image, for the cascade (default 1), such as 1+0.7+0.5");
   app->add_option("--seed", o.seed, "seed of the scenes (default 1)");
   app->add_option("--frames", o.frames, "scenes for the exclusion by colour (default 100)")
       ->check(CLI::Range(1, 100000));
@@ -268,6 +274,10 @@ void add_eval_objects(CLI::App& eval, EvalObjectsOptions& o, int& exit_code) {
   app->add_option("--occlusion", o.occlusion, "largest share of an object that an occluder hides (default 0.6)")
       ->check(CLI::Range(0.0, 0.9));
   app->add_flag("--json", o.json, "one JSON object on stdout");
+  auto* study = app->add_flag("--study", o.study,
+                              "instead: each stage by itself against bins, thresholds, references, on --frames scenes");
+  app->add_option("--picture", o.picture, "PNG of time, share excluded and contrast over the rows of bins")
+      ->needs(study);
   app->callback([&] { exit_code = evaluate(o); });
 }
 

@@ -11,6 +11,7 @@
 #include "graph/command/eval_command.hpp"
 #include "graph/command/explain_command.hpp"
 #include "graph/command/log_commands.hpp"
+#include "graph/command/objects_command.hpp"
 #include "graph/command/profile_command.hpp"
 #include "graph/command/replay_command.hpp"
 #include "graph/command/run_command.hpp"
@@ -149,6 +150,7 @@ int main(int argc, char** argv) {
   takt::command::LogOptions log;
   takt::command::CloudOptions cloud;
   takt::command::TrainOptions train;
+  takt::command::ObjectsOptions object_database;
   std::string type;
   bool check_json = false;
   int exit_code = 0;
@@ -173,6 +175,7 @@ int main(int argc, char** argv) {
   takt::command::add_calibrate(app, calibrate, exit_code);
   takt::command::add_cloud(app, cloud, exit_code);
   takt::command::add_train(app, train, exit_code);
+  takt::command::add_objects(app, object_database, exit_code);
   CLI::App* eval = app.add_subcommand("eval", "measures quality against ground truth");
   eval->require_subcommand(1);
   takt::command::add_eval_stereo(*eval, stereo, exit_code);

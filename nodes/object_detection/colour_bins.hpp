@@ -7,15 +7,17 @@
 
 namespace takt::object_detection {
 
-/// How 4,096 bins are split over hue, saturation and value. Value gets few: light changes it, and it alone.
-enum class ColourBins : uint8_t { hsv_64x32x2, hsv_64x64x1 };
-constexpr int kColourBins = 4096;
+/// How bins, 4,096 or for comparisons fewer, are split over hue, saturation and value. Value gets few: light changes
+/// it, and it alone.
+enum class ColourBins : uint8_t { hsv_64x32x2, hsv_64x64x1, hsv_32x32x1, hsv_16x16x1, hsv_8x4x1 };
+constexpr int kColourBins = 4096;  ///< at most
 
 struct BinSplit {
   int hue, saturation, value;
 };
 constexpr BinSplit split_of(ColourBins bins) {
-  return bins == ColourBins::hsv_64x32x2 ? BinSplit{64, 32, 2} : BinSplit{64, 64, 1};
+  constexpr BinSplit kSplits[] = {{64, 32, 2}, {64, 64, 1}, {32, 32, 1}, {16, 16, 1}, {8, 4, 1}};
+  return kSplits[static_cast<size_t>(bins)];
 }
 
 /// Index (h * nS + s) * nV + v of one colour, in exact integers: h = floor(nH H / 360 degrees), s = floor(nS S) (S = 1

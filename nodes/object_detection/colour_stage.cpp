@@ -70,7 +70,8 @@ void ColourStage::run(ImageView<const uint8_t> bgr) {
   for (int row = 0; row < grid_.rows; ++row) search_row();
 }
 
-void ColourStage::begin(ImageView<const uint8_t> bgr, int first_row) {
+void ColourStage::begin(ImageView<const uint8_t> bgr, int first_row, std::span<const uint8_t> wanted) {
+  wanted_ = wanted;
   index_image(bgr);
   std::fill(missing_.begin(), missing_.end(), kNotSearched);
   row_ = first_row;
@@ -79,9 +80,14 @@ void ColourStage::begin(ImageView<const uint8_t> bgr, int first_row) {
 
 int ColourStage::search_row() {
   if (row_ == grid_.rows) windows_->begin(index_.data(), row_ = 0);
-  uint16_t* out = missing_.data() + static_cast<size_t>(row_ * grid_.columns) * references_;
-  for (int u = 0; u < grid_.columns; ++u) {
+  const auto columns = static_cast<size_t>(grid_.columns), first = static_cast<size_t>(row_) * columns;
+  const auto left_out = [&](size_t window) { return !wanted_.empty() && wanted_[window] == 0; };
+  size_t end = first + columns;  // of what is wanted of the row
+  while (end > first && left_out(end - 1)) --end;
+  for (size_t window = first; window < end; ++window) {
     const std::span<const uint16_t> histogram = windows_->next();
+    if (left_out(window)) continue;
+    uint16_t* out = missing_.data() + window * references_;
     for (const ObjectBins& object : objects_) {
       const size_t count = object.slots.size();
       for (size_t i = 0; i < count; ++i) gathered_[i] = histogram[object.slots[i]];
@@ -89,6 +95,7 @@ int ColourStage::search_row() {
       out += object.references;
     }
   }
+  if (end < first + columns) windows_->skip_rest_of_row();
   return row_++;
 }
 

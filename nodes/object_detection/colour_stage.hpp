@@ -25,7 +25,8 @@ class ColourStage {
   /// `bgr`: three channels, of the grid's image size (not checked). All windows.
   void run(ImageView<const uint8_t> bgr);
   /// The same in portions: no window is searched yet, and search_row() begins at that row of windows, 0 .. rows - 1.
-  void begin(ImageView<const uint8_t> bgr, int first_row);
+  /// Windows whose `wanted` is 0 are left out; if it is not empty, it must stay until the last search_row().
+  void begin(ImageView<const uint8_t> bgr, int first_row, std::span<const uint8_t> wanted = {});
   /// Searches the next row of windows, after the last one row 0, and returns which one; at most once per row.
   int search_row();
 
@@ -46,7 +47,8 @@ class ColourStage {
   SearchGrid grid_;
   ColourBins bins_;
   size_t references_ = 0;
-  int row_ = 0;                        ///< that search_row() comes to next
+  int row_ = 0;  ///< that search_row() comes to next
+  std::span<const uint8_t> wanted_;
   std::vector<uint16_t> slot_of_bin_;  ///< the last slot takes the bins that no reference uses
   std::vector<ObjectBins> objects_;
   std::optional<WindowHistograms> windows_;

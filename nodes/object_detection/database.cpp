@@ -14,8 +14,8 @@ constexpr const char* kWords = "valid are object, threshold, view, test_view";
 
 class Reader {
  public:
-  Reader(const std::filesystem::path& folder, int side_px, TestViews test_views)
-      : folder_(folder), list_(folder / "objects.txt"), side_px_(side_px), test_views_(test_views) {}
+  Reader(const std::filesystem::path& folder, int side_px, TestViews test_views, const std::string& list)
+      : folder_(folder), list_(folder / list), side_px_(side_px), test_views_(test_views) {}
 
   std::vector<DatabaseObject> read() {
     std::ifstream in(list_);
@@ -45,33 +45,54 @@ class Reader {
       fail("unknown word `" + key + "`; " + kWords);
     if (key != "object" && objects_.empty()) fail("`" + key + "` stands before the first `object NAME`");
     const size_t most = key == "view" ? 2 + kStages : key == "threshold" ? 1 + kStages : 2;
-    if (words.size() < 2 || words.size() > most)
+    if (words.size() < 2 || (words.size() > most && key != "object"))
       fail("`" + key + "` takes " +
            (key == "view"        ? "a file and at most three thresholds"
             : key == "threshold" ? "one to three thresholds"
+            : key == "object"    ? "a name and its attributes"
                                  : "exactly one word"));
-    if (key == "object") begin(words[1]);
+    if (key == "object") begin(words);
     else if (key == "threshold") threshold(words);
     else if (key == "view") add_view(words);
     else if (test_views_ == TestViews::read) objects_.back().test_views.push_back(load(words[1]));
   }
 
-  void begin(const std::string& name) {
+  void begin(const std::vector<std::string>& words) {
     complete();
-    for (const DatabaseObject& object : objects_)
-      if (object.name == name) fail("object `" + name + "` is there already; names must differ");
-    objects_.emplace_back().name = name;
+    DatabaseObject next;
+    next.name = words[1];
+    for (size_t i = 2; i < words.size(); ++i) {
+      const size_t equals = words[i].find('=');
+      if (equals == 0 || equals >= words[i].size() - 1)
+        fail("`" + words[i] + "` is no attribute; write ATTRIBUTE=VALUE, such as closed=true");
+      next.attributes.push_back({words[i].substr(0, equals), words[i].substr(equals + 1)});
+    }
+    const auto by_name = [](const Attribute& a, const Attribute& b) { return a.name < b.name; };
+    std::sort(next.attributes.begin(), next.attributes.end(), by_name);
+    for (size_t i = 1; i < next.attributes.size(); ++i)
+      if (!by_name(next.attributes[i - 1], next.attributes[i]))
+        fail("attribute `" + next.attributes[i].name + "` is given twice");
+    for (const DatabaseObject& object : objects_) {
+      if (object.name != next.name) continue;
+      if (object.attributes == next.attributes)
+        fail("object `" + next.label() + "` is there already; names or attribute values must differ");
+      if (!std::equal(object.attributes.begin(), object.attributes.end(), next.attributes.begin(),
+                      next.attributes.end(), [](const auto& a, const auto& b) { return a.name == b.name; }))
+        fail("object `" + next.label() + "` has other attributes than `" + object.label() +
+             "`; only their values may differ");
+    }
+    objects_.push_back(std::move(next));
     threshold_given_ = false;
   }
 
   /// The object before must have views.
   void complete() const {
     if (!objects_.empty() && objects_.back().views.empty())
-      fail("object `" + objects_.back().name + "` has no view; write `view FILE` below it");
+      fail("object `" + objects_.back().label() + "` has no view; write `view FILE` below it");
   }
 
   void threshold(const std::vector<std::string>& words) {
-    if (threshold_given_) fail("object `" + objects_.back().name + "` has a threshold already");
+    if (threshold_given_) fail("object `" + objects_.back().label() + "` has a threshold already");
     threshold_given_ = true;
     objects_.back().thresholds = thresholds(words, 1);
   }
@@ -134,8 +155,15 @@ class Reader {
 
 }  // namespace
 
-std::vector<DatabaseObject> read_database(const std::filesystem::path& folder, int side_px, TestViews test_views) {
-  return Reader(folder, side_px, test_views).read();
+std::string DatabaseObject::label() const {
+  std::string text = name;
+  for (const Attribute& attribute : attributes) text += " " + attribute.name + "=" + attribute.value;
+  return text;
+}
+
+std::vector<DatabaseObject> read_database(const std::filesystem::path& folder, int side_px, TestViews test_views,
+                                          const std::string& list) {
+  return Reader(folder, side_px, test_views, list).read();
 }
 
 }  // namespace takt::object_detection

@@ -29,11 +29,22 @@ struct ReferenceView {
   ImageView<const uint8_t> view() const { return {pixels.data(), side_px, side_px, 3}; }
 };
 
+/// What is known of an object where it looks like this, such as closed = true of a bottle.
+struct Attribute {
+  std::string name, value;
+  bool operator==(const Attribute&) const = default;
+};
+
+/// An object as it looks with these attribute values. Entries of one name are the same object.
 struct DatabaseObject {
   std::string name;
+  std::vector<Attribute> attributes;  ///< by name
   Thresholds thresholds;
   std::vector<ReferenceView> views;
   std::vector<ReferenceView> test_views;  ///< for measurements, never compared with
+
+  /// As in the list: "bottle closed=true".
+  std::string label() const;
 };
 
 /// What cannot be used: "FILE:LINE: what is wrong; what is valid".
@@ -43,15 +54,17 @@ struct DatabaseError : std::runtime_error {
 
 enum class TestViews : uint8_t { skip, read };
 
-/// Reads `folder`/objects.txt and the views it names, each `side_px` x `side_px`. A line holds one of
+/// Reads the list, in the folder, and the views it names, each `side_px` x `side_px`. A line holds one of
 ///
-///     object NAME                  begins an object; its index is the class id of its detections
+///     object NAME [ATTRIBUTE=VALUE ...]   begins an entry; its index is the class id of its detections, which so
+///                                  carry the attributes. Entries of one name have the same attributes, other values
 ///     threshold T [T [T]]          of the object's views in the stages colour, orientation, co-occurrence: a number
 ///                                  above 0, at most 1, or auto, as without
 ///     view FILE [T [T [T]]]        a reference view, relative to the folder; with thresholds of its own, auto: the
 ///     object's test_view FILE               a view that only measurements use
 ///
 /// or nothing; # begins a comment. Throws DatabaseError.
-std::vector<DatabaseObject> read_database(const std::filesystem::path& folder, int side_px, TestViews test_views);
+std::vector<DatabaseObject> read_database(const std::filesystem::path& folder, int side_px, TestViews test_views,
+                                          const std::string& list = "objects.txt");
 
 }  // namespace takt::object_detection

@@ -6,13 +6,10 @@
 #include <tuple>
 
 namespace takt::object_detection {
-namespace {
 
 bool better(const Detection& a, const Detection& b) {
   return std::tuple(-a.score, a.class_id, a.y_px, a.x_px) < std::tuple(-b.score, b.class_id, b.y_px, b.x_px);
 }
-
-}  // namespace
 
 StageLimits::StageLimits(std::span<const std::vector<ReferenceLimit>> objects) {
   for (const auto& references : objects) {

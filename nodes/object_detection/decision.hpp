@@ -47,6 +47,9 @@ class StageLimits {
   std::vector<std::vector<Limit>> limits_;
 };
 
+/// The order in which detections are reported: by score, of equals the lower class, then the upper left one first.
+bool better(const Detection& a, const Detection& b);
+
 /// The merged error map of each object: what is known of each window after the last stage that looked at it. Memory is
 /// taken by the constructor; the rest allocates nothing. One thread at a time.
 class Decision {
@@ -64,6 +67,8 @@ class Decision {
   /// The region of interest, columns x rows, 255 where a window passes for any object, else 0.
   void region_of_interest(ImageView<uint8_t> roi) const;
   size_t passed_windows() const;
+  /// For any object?
+  bool passes(size_t window) const;
 
   /// One detection per object and group of touching windows that pass (8 neighbours), at the group's window with the
   /// smallest error; of equals the upper left one. class_id is the object's index, score 1 - error. Those below
@@ -72,7 +77,6 @@ class Decision {
   size_t detections(double min_score, std::span<Detection> out);
 
  private:
-  bool passes(size_t window) const;
   size_t best_of_group(std::span<const float> errors, size_t seed);
 
   SearchGrid grid_;

@@ -2,102 +2,70 @@
 #include "nodes/object_detection/detector.hpp"
 
 #include <algorithm>
-#include <stdexcept>
 
 namespace takt::object_detection {
 namespace {
 
-SearchGrid grid_for(int width, int height, std::span<const DatabaseObject> database, int window_px) {
-  if (database.empty() || database[0].views.empty()) throw std::invalid_argument("the object database is empty");
-  return make_search_grid(width, height, database[0].views[0].side_px, window_px);
-}
-
-Histogram histogram_of(ImageView<const uint8_t> view, Stage stage, const DetectorParameters& p,
-                       const OrientationBins& orientations) {
-  switch (stage) {
-    case Stage::colour: return colour_histogram(view, p.bins);
-    case Stage::orientation: return orientation_histogram(view, orientations);
-    case Stage::cooccurrence: break;
-  }
-  return cooccurrence_histogram(view, p.pairs);
+/// Does one of the rectangles cover at least half of the other?
+bool overlap(const Detection& a, const Detection& b) {
+  const float width = std::min(a.x_px + a.width_px, b.x_px + b.width_px) - std::max(a.x_px, b.x_px);
+  const float height = std::min(a.y_px + a.height_px, b.y_px + b.height_px) - std::max(a.y_px, b.y_px);
+  const float smaller = std::min(a.width_px * a.height_px, b.width_px * b.height_px);
+  return width > 0 && height > 0 && 2 * width * height >= smaller;
 }
 
 }  // namespace
 
-/// A view's own threshold goes before the object's, and that before the automatic one.
-std::array<Detector::StageReferences, kStages> Detector::references_of(std::span<const DatabaseObject> database,
-                                                                       const DetectorParameters& p) {
-  const OrientationBins orientations(p.orientations);
-  std::array<StageReferences, kStages> stages;
-  for (size_t s = 0; s <= static_cast<size_t>(p.last); ++s) {
-    const double cap = s > 0 ? kLaterStagesCap : p.last == Stage::colour ? kThresholdCap : kColourBeforeOthersCap;
-    for (const DatabaseObject& object : database) {
-      auto& views = stages[s].histograms.emplace_back();
-      for (const ReferenceView& view : object.views)
-        views.push_back(histogram_of(view.view(), static_cast<Stage>(s), p, orientations));
-      const double of_object = object.thresholds[s].value_or(automatic_threshold(views, p.tolerance, cap));
-      auto& limits = stages[s].limits.emplace_back();
-      for (size_t r = 0; r < views.size(); ++r)
-        limits.push_back({views[r].mass, p.threshold_scale * object.views[r].thresholds[s].value_or(of_object)});
-    }
-  }
-  return stages;
-}
-
 Detector::Detector(int image_width, int image_height, std::span<const DatabaseObject> database,
                    const DetectorParameters& p)
-    : grid_(grid_for(image_width, image_height, database, p.window_px)),
-      last_(p.last),
-      references_(references_of(database, p)),
-      colour_(grid_, p.bins, references(Stage::colour).histograms),
-      decision_(grid_, database.size()),
-      undecided_(static_cast<size_t>(grid_.windows())) {
-  for (const StageReferences& stage : references_) limits_.emplace_back(stage.limits);
-  if (p.last >= Stage::orientation)
-    orientation_.emplace(grid_, OrientationBins(p.orientations), references(Stage::orientation).histograms);
-  if (p.last >= Stage::cooccurrence) {
-    cooccurrence_.emplace(grid_, p.pairs, references(Stage::cooccurrence).histograms);
-    candidates_.reserve(static_cast<size_t>(grid_.windows()) * database.size());
+    : width_(image_width), height_(image_height), last_(p.last), references_(cascade_references(database, p)) {
+  scales_.reserve(p.scales.size());
+  for (const double scale : p.scales) {
+    const auto at = static_cast<uint32_t>(scales_.size());
+    const SearchGrid& grid =
+        scales_.emplace_back(image_width, image_height, scale, database[0].views[0].side_px, references_, p).grid();
+    for (int row = 0; row < grid.rows; ++row) rows_.push_back({at, static_cast<uint32_t>(row)});
+    undecided_.emplace_back(static_cast<size_t>(grid.windows()));
+    windows_ += undecided_.back().size();
   }
+  if (last_ == Stage::cooccurrence) candidates_.reserve(windows_ * database.size());
+  for (const DatabaseObject& object : database)
+    first_of_name_.push_back(static_cast<size_t>(
+        std::find_if(database.begin(), database.end(), [&](const auto& other) { return other.name == object.name; }) -
+        database.begin()));
+  at_scale_.resize(kMostDetections);
+  found_.reserve(scales_.size() * kMostDetections);
 }
 
-bool Detector::begin(ImageView<const uint8_t> bgr) {
-  if (bgr.width != grid_.image_width || bgr.height != grid_.image_height || bgr.channels != 3) return false;
+bool Detector::begin(ImageView<const uint8_t> bgr, const MaskSums* mask) {
+  if (bgr.width != width_ || bgr.height != height_ || bgr.channels != 3) return false;
   image_ = bgr;
-  colour_.begin(bgr, first_row_);
-  if (orientation_) orientation_->begin(bgr);
-  decision_.clear();
+  mask_ = mask;
+  searched_rows_ = searched_windows_ = 0;
+  for (ScaleSearch& scale : scales_) scale.clear();
   return true;
 }
 
 void Detector::search_row() {
-  const auto columns = static_cast<size_t>(grid_.columns);
-  const size_t first = static_cast<size_t>(colour_.search_row()) * columns;
-  for (size_t window = first; window < first + columns; ++window) {
-    const uint16_t* missing = colour_.missing().data() + window * colour_.references();
-    bool there = false;
-    for (size_t object = 0; object < decision_.objects(); ++object) {
-      float error = limits_[0].error(object, missing);
-      missing += references(Stage::colour).histograms[object].size();
-      if (error == kFailed) continue;
-      if (orientation_) {
-        if (!there) orientation_->go_to(window);
-        there = true;
-        error = limits_[1].error(object, orientation_->missing(object).data());
-      }
-      decision_.set(object, window, error);
-    }
-  }
+  const auto [index, row] = rows_[(first_row_ + searched_rows_++) % rows_.size()];
+  ScaleSearch& scale = scales_[index];
+  if (!scale.begun()) scale.begin(image_, mask_, static_cast<int>(row));
+  scale.search_row();
+  searched_windows_ += static_cast<size_t>(scale.grid().columns);
 }
 
 void Detector::gather_candidates() {
   candidates_.clear();
-  if (!cooccurrence_) return;
-  for (size_t object = 0; object < decision_.objects(); ++object) {
-    const std::span<const float> errors = decision_.errors(object);
-    for (size_t window = 0; window < errors.size(); ++window)
-      if (errors[window] < kFailed)
-        candidates_.push_back({errors[window], static_cast<uint32_t>(window), static_cast<uint32_t>(object)});
+  if (last_ < Stage::cooccurrence) return;
+  for (size_t s = 0; s < scales_.size(); ++s) {
+    const Decision& decision = scales_[s].decision();
+    for (size_t object = 0; object < decision.objects(); ++object) {
+      const std::span<const float> errors = decision.errors(object);
+      for (size_t window = 0; window < errors.size(); ++window)
+        if (errors[window] < kFailed)
+          candidates_.push_back(
+              {errors[window], static_cast<uint32_t>(s), static_cast<uint32_t>(window), static_cast<uint32_t>(object)});
+    }
   }
   std::make_heap(candidates_.begin(), candidates_.end(), Candidate::worse);
 }
@@ -106,22 +74,71 @@ void Detector::decide_best_candidate() {
   std::pop_heap(candidates_.begin(), candidates_.end(), Candidate::worse);
   const Candidate best = candidates_.back();
   candidates_.pop_back();
-  const auto missing = cooccurrence_->missing(image_, best.window, best.object);
-  decision_.set(best.object, best.window, limits_[2].error(best.object, missing.data()));
+  scales_[best.scale].decide_by_cooccurrences(best.object, best.window);
 }
 
 void Detector::end() {
-  first_row_ = searched_rows_ == grid_.rows ? 0 : (first_row_ + searched_rows_) % grid_.rows;
-  std::fill(undecided_.begin(), undecided_.end(), uint8_t{0});
+  first_row_ = searched_rows_ == rows_.size() ? 0 : (first_row_ + searched_rows_) % rows_.size();
+  for (auto& undecided : undecided_) std::fill(undecided.begin(), undecided.end(), uint8_t{0});
   for (const Candidate& left : candidates_) {
-    decision_.set(left.object, left.window, kFailed);
-    undecided_[left.window] = 1;
+    scales_[left.scale].decision().set(left.object, left.window, kFailed);
+    undecided_[left.scale][left.window] = 1;
   }
 }
 
 float Detector::searched() const {
-  const auto undecided = std::count(undecided_.begin(), undecided_.end(), 1);
-  return static_cast<float>(searched_rows_ * grid_.columns - undecided) / static_cast<float>(grid_.windows());
+  size_t decided = searched_windows_;
+  for (const auto& undecided : undecided_)
+    decided -= static_cast<size_t>(std::count(undecided.begin(), undecided.end(), 1));
+  return static_cast<float>(decided) / static_cast<float>(windows_);
+}
+
+size_t Detector::detections(double min_score, std::span<Detection> out) {
+  found_.clear();
+  for (size_t s = 0; s < scales_.size(); ++s) {
+    const size_t count = scales_[s].decision().detections(min_score, at_scale_);
+    for (size_t i = 0; i < count; ++i) {
+      scales_[s].to_image(at_scale_[i]);
+      found_.push_back({at_scale_[i], s});
+    }
+  }
+  std::sort(found_.begin(), found_.end(), [](const Found& a, const Found& b) {
+    if (better(a.detection, b.detection)) return true;
+    return !better(b.detection, a.detection) && a.scale < b.scale;
+  });
+  size_t kept = 0;
+  for (const Found& next : found_) {
+    if (kept == out.size()) break;
+    const auto same = [&](const Found& other) {
+      const auto a = static_cast<size_t>(other.detection.class_id), b = static_cast<size_t>(next.detection.class_id);
+      return first_of_name_[a] == first_of_name_[b] && (a != b || other.scale != next.scale) &&
+             overlap(other.detection, next.detection);
+    };
+    if (std::any_of(found_.begin(), found_.begin() + static_cast<ptrdiff_t>(kept), same)) continue;
+    out[kept] = next.detection;
+    found_[kept++] = next;
+  }
+  return kept;
+}
+
+void Detector::region_of_interest(ImageView<uint8_t> roi) const {
+  const SearchGrid& grid = this->grid();
+  scales_[0].decision().region_of_interest(roi);
+  for (size_t s = 1; s < scales_.size(); ++s) {
+    const SearchGrid& other = scales_[s].grid();
+    for (int window = 0; window < other.windows(); ++window) {
+      if (!scales_[s].decision().passes(static_cast<size_t>(window))) continue;
+      const int x = other.x0(window % other.columns), y = other.y0(window / other.columns);
+      const auto covers = [&](int from, int middle, int size, int other_size) {
+        return middle * other_size >= from * size && middle * other_size < (from + other.window_px) * size;
+      };
+      for (int v = 0; v < grid.rows; ++v) {
+        if (!covers(y, grid.y0(v) + grid.window_px / 2, grid.image_height, other.image_height)) continue;
+        for (int u = 0; u < grid.columns; ++u)
+          if (covers(x, grid.x0(u) + grid.window_px / 2, grid.image_width, other.image_width)) roi.at(u, v) = 255;
+      }
+    }
+  }
 }
 
 }  // namespace takt::object_detection

@@ -1,104 +1,97 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include <array>
-#include <optional>
 #include <span>
 #include <tuple>
 #include <vector>
 
-#include "nodes/object_detection/colour_stage.hpp"
-#include "nodes/object_detection/cooccurrence_stage.hpp"
-#include "nodes/object_detection/database.hpp"
-#include "nodes/object_detection/decision.hpp"
-#include "nodes/object_detection/orientation_stage.hpp"
+#include "nodes/object_detection/scale_search.hpp"
 
 namespace takt::object_detection {
 
-struct DetectorParameters {
-  Stage last = Stage::cooccurrence;  ///< the stages before it run as well
-  ColourBins bins = ColourBins::hsv_64x64x1;
-  int orientations = 360;
-  PairBins pairs;
-  int window_px = 64;
-  double tolerance = 0.36;  ///< added to automatic thresholds: 1 - 0.8^2, an object at 0.8 times its reference's size
-  double threshold_scale = 1;  ///< factor on every threshold
-};
-
-/// The cascade for images of one size. A window is compared with an object in a stage only if it passed for it in the
-/// stage before; what counts in the end is the last stage's error. Memory is taken by the constructor; run() allocates
-/// nothing. One thread at a time.
+/// The cascade over all scales for images of one size. What counts of a window in the end is the last stage's error.
+/// Memory is taken by the constructor; the rest allocates nothing. One thread at a time.
 class Detector {
  public:
-  /// Per object and view mass and threshold.
-  using Limits = std::vector<std::vector<ReferenceLimit>>;
+  static constexpr size_t kMostDetections = 1000;
 
-  /// Throws std::invalid_argument if grid or database do not fit.
+  /// Throws std::invalid_argument if windows, scales or database do not fit.
   Detector(int image_width, int image_height, std::span<const DatabaseObject> database, const DetectorParameters& p);
 
-  const SearchGrid& grid() const { return grid_; }
   Stage last() const { return last_; }
   /// In force in a stage; empty for one that does not run.
-  const Limits& limits(Stage stage) const { return references_[static_cast<size_t>(stage)].limits; }
+  const std::vector<std::vector<ReferenceLimit>>& limits(Stage stage) const {
+    return references_[static_cast<size_t>(stage)].limits;
+  }
+  size_t scales() const { return scales_.size(); }
+  const ScaleSearch& at_scale(size_t scale) const { return scales_[scale]; }
+  const SearchGrid& grid() const { return scales_[0].grid(); }  ///< of the first, largest scale
 
   /// Searches an 8-bit BGR image. False, and nothing changed, if it has not the size or the channels.
   bool run(ImageView<const uint8_t> bgr) {
     return run(
-        bgr, [] { return true; }, [] { return true; });
+        bgr, nullptr, [] { return true; }, [] { return true; });
   }
-  /// The same as far as time allows. Colours and orientations go row of windows by row: `another_row()` is asked before
-  /// each; the next image is searched from the row at which this one was left, so that none is left out for long, after
-  /// a whole image from the top. Then co-occurrences, best windows first: `another_window()` is asked before each.
-  /// Windows that were not decided on do not pass. The result depends on images and answers alone.
+  /// The same as far as time allows, where `mask` (null: everywhere) has something. Colours and orientations go row of
+  /// windows by row, scale by scale: `another_row()` is asked before each; the next image is searched from the row at
+  /// which this one was left, so that none is left out for long, after a whole image from the first. Then
+  /// co-occurrences, the best windows of all scales first: `another_window()` is asked before each. Windows that were
+  /// not decided on do not pass. The result depends on images, masks and answers alone.
   template <class AnotherRow, class AnotherWindow>
-  bool run(ImageView<const uint8_t> bgr, AnotherRow another_row, AnotherWindow another_window) {
-    if (!begin(bgr)) return false;
-    for (searched_rows_ = 0; searched_rows_ < grid_.rows && another_row(); ++searched_rows_) search_row();
+  bool run(ImageView<const uint8_t> bgr, const MaskSums* mask, AnotherRow another_row, AnotherWindow another_window) {
+    if (!begin(bgr, mask)) return false;
+    while (searched_rows_ < rows_.size() && another_row()) search_row();
     gather_candidates();
     while (!candidates_.empty() && another_window()) decide_best_candidate();
     end();
     return true;
   }
-  /// Share of the windows that the last run() decided on, 0..1.
+  /// Share of the windows that the last run() decided on, 0..1; those outside the mask count.
   float searched() const;
-  Decision& decision() { return decision_; }
-  /// Of the colour stage.
-  std::span<const uint16_t> missing() const { return colour_.missing(); }
+
+  /// What was found at all scales (Decision::detections), rectangles in the image's pixels, the best first. Of two of
+  /// one object at different scales or with different attributes, one of which covers at least half of the other, the
+  /// worse is left out. Fills `out`, at most kMostDetections; returns how many.
+  size_t detections(double min_score, std::span<Detection> out);
+  /// Of grid(): 255 where a window passes, or its middle lies in one that passes at another scale, else 0.
+  void region_of_interest(ImageView<uint8_t> roi) const;
 
  private:
-  struct StageReferences {
-    std::vector<std::vector<Histogram>> histograms;
-    Limits limits;
+  struct Row {
+    uint32_t scale, row;
   };
   /// A window that passed for an object and waits for the last stage.
   struct Candidate {
     float error;
-    uint32_t window, object;
+    uint32_t scale, window, object;
     static bool worse(const Candidate& a, const Candidate& b) {
-      return std::tie(a.error, a.window, a.object) > std::tie(b.error, b.window, b.object);
+      return std::tie(a.error, a.scale, a.window, a.object) > std::tie(b.error, b.scale, b.window, b.object);
     }
   };
+  struct Found {
+    Detection detection;
+    size_t scale;
+  };
 
-  static std::array<StageReferences, kStages> references_of(std::span<const DatabaseObject> database,
-                                                            const DetectorParameters& p);
-  const StageReferences& references(Stage stage) const { return references_[static_cast<size_t>(stage)]; }
-  bool begin(ImageView<const uint8_t> bgr);
+  bool begin(ImageView<const uint8_t> bgr, const MaskSums* mask);
   void search_row();
   void gather_candidates();
   void decide_best_candidate();
   void end();
 
-  SearchGrid grid_;
+  int width_, height_;
   Stage last_;
-  std::array<StageReferences, kStages> references_;
-  std::vector<StageLimits> limits_;
-  ColourStage colour_;
-  std::optional<OrientationStage> orientation_;
-  std::optional<CooccurrenceStage> cooccurrence_;
-  Decision decision_;
+  CascadeReferences references_;
+  std::vector<ScaleSearch> scales_;
+  std::vector<Row> rows_;  ///< of windows, at all scales
+  size_t windows_ = 0;     ///< at all scales
   ImageView<const uint8_t> image_;
-  int first_row_ = 0, searched_rows_ = 0;
-  std::vector<Candidate> candidates_;  ///< a heap, the best in front
-  std::vector<uint8_t> undecided_;     ///< windows that were candidates to the end
+  const MaskSums* mask_ = nullptr;
+  size_t first_row_ = 0, searched_rows_ = 0, searched_windows_ = 0;
+  std::vector<Candidate> candidates_;            ///< a heap, the best in front
+  std::vector<std::vector<uint8_t>> undecided_;  ///< by scale: windows that were candidates to the end
+  std::vector<size_t> first_of_name_;            ///< of each class: the first of the same object
+  std::vector<Detection> at_scale_;
+  std::vector<Found> found_;
 };
 
 }  // namespace takt::object_detection

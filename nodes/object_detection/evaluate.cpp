@@ -68,7 +68,7 @@ float ColourStageTest::factor(int window, size_t object) const {
     if (o == object) first = references;
     references += limits[o].size();
   }
-  const uint16_t* missing = detector_.missing().data() + static_cast<size_t>(window) * references + first;
+  const uint16_t* missing = detector_.at_scale(0).missing().data() + static_cast<size_t>(window) * references + first;
   double best = kNever;
   for (const ReferenceLimit& limit : limits[object])
     best = std::min(best, *missing++ / (limit.threshold * static_cast<double>(limit.mass)));

@@ -37,7 +37,7 @@ class WindowTest {
   virtual float factor(int window, size_t object) const = 0;
 };
 
-/// The colour stage with the thresholds in force.
+/// The colour stage of the first scale with the thresholds in force.
 class ColourStageTest final : public WindowTest {
  public:
   explicit ColourStageTest(Detector& detector) : detector_(detector) {}

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <array>
+#include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 
-#include "nodes/object_detection/detector.hpp"
+#include "nodes/object_detection/reloader.hpp"
+#include "nodes/object_detection/revisions.hpp"
 #include "rt/node.hpp"
 
 namespace takt {
@@ -28,19 +31,34 @@ class ObjectDetectionNode final : public Node {
     p.tolerance = tolerance_;
     p.threshold_scale = threshold_scale_;
     try {
-      const auto database = read_database(setup.directory / database_(), reference_, TestViews::skip);
-      detector_.emplace(static_cast<int>(images.width), static_cast<int>(images.height), database, p);
+      p.scales = parse_scales(scales_);
+      const auto make = [p, width = static_cast<int>(images.width),
+                         height = static_cast<int>(images.height)](const std::vector<DatabaseObject>& database) {
+        return std::make_unique<Detector>(width, height, database, p);
+      };
+      const auto folder = setup.directory / database_();
+      detector_ = make(read_database(folder, reference_, TestViews::skip));
+      build_ = [make, folder, side_px = reference_()](const std::string& revision) {
+        return make(read_revision(folder, revision, side_px));
+      };
     } catch (const DatabaseError& error) {
       throw SetupError(error.what());
     } catch (const std::invalid_argument& error) {
       throw SetupError(error.what());
     }
+    in_use_.reserve(Reloader::kLongestRevision);
+    virtual_time_ = setup.clock.is_virtual();
+    may(bit(JobCall::sleep), "in virtual time and in a replay a job waits for the database that it changes to");
+    mask_sums_.emplace(mask_.connected() ? mask_.capacity().pixels() : 0);
     detections_.reserve({0, 0, 1, static_cast<uint32_t>(max_detections_())});
     const SearchGrid& grid = detector_->grid();
     roi_.reserve({static_cast<uint32_t>(grid.columns), static_cast<uint32_t>(grid.rows), 1, 0});
   }
 
+  void start(int64_t) override { reloader_.emplace(build_); }
+
   void run(Job& job) override {
+    follow_revision(job);
     const StereoPair* pair = pair_.newest();
     if (!pair || !pair_.is_new()) return job.no_result();
     // Half of the time is kept for co-occurrences: they decide on what is reported.
@@ -49,14 +67,14 @@ class ObjectDetectionNode final : public Node {
         detector_->last() == Stage::cooccurrence ? std::max<int64_t>(0, job.time_left_ns() - reserve_ns) / 2 : 0;
     const auto another_row = [&] { return job.time_left_ns() > reserve_ns + kept_ns; };
     const auto another_window = [&] { return job.time_left_ns() > reserve_ns; };
-    if (!detector_->run(pair->left_view(), another_row, another_window)) return job.no_result();
+    if (!detector_->run(pair->left_view(), take_mask(), another_row, another_window)) return job.no_result();
     Detections* found = detections_.connected() ? detections_.loan() : nullptr;
     if (found != nullptr) {
       found->image_width = pair->width;
       found->image_height = pair->height;
       found->searched = detector_->searched();
       found->boxes.resize(static_cast<size_t>(max_detections_()));
-      found->boxes.resize(detector_->decision().detections(min_score_, found->boxes.items()));
+      found->boxes.resize(detector_->detections(min_score_, found->boxes.items()));
       detections_.send(pair_.stamp_ns());
     }
     Image* roi = roi_.connected() ? roi_.loan() : nullptr;
@@ -66,19 +84,51 @@ class ObjectDetectionNode final : public Node {
       roi->channels = 1;
       roi->health = pair->health;
       roi->pixels.resize(static_cast<size_t>(detector_->grid().windows()));
-      detector_->decision().region_of_interest(roi->view());
+      detector_->region_of_interest(roi->view());
       roi_.send(pair_.stamp_ns());
     }
     if ((detections_.connected() && found == nullptr) || (roi_.connected() && roi == nullptr)) job.no_result();
   }
 
  private:
+  /// The database changes between two images: once the new one is complete, in one step.
+  void follow_revision(Job& job) {
+    if (!reloader_) return;
+    const auto wanted = std::string_view(revision_()).substr(0, Reloader::kLongestRevision);
+    if (!building_ && wanted != in_use_) {
+      in_use_.assign(wanted);
+      reloader_->ask(in_use_);
+      building_ = true;
+    }
+    if (!building_ || !job.is_done(virtual_time_ || reloader_->built())) return;
+    reloader_->wait();
+    building_ = false;
+    if (!reloader_->exchange(detector_)) job.results_doubtful(reloader_->error());
+  }
+
+  /// Null if there is none for the pair: all of the image is searched.
+  const MaskSums* take_mask() {
+    const Image* mask = mask_.newest();
+    if (mask == nullptr || mask_.stamp_ns() != pair_.stamp_ns() || mask->channels != 1 || mask->pixels.size == 0)
+      return nullptr;
+    mask_sums_->take(mask->view());
+    return &*mask_sums_;
+  }
+
   Input<StereoPair> pair_{this, "pair", "the left image is searched; three channels"};
+  Input<Image> mask_{this, "mask", "one channel, same stamp, any size: only windows with a pixel that is not 0",
+                     Need::optional};
   Output<Detections> detections_{this, "detections", "class_id: index of the object in the database; best first"};
-  Output<Image> roi_{this, "roi", "one pixel per search window, 255 where it passed"};
+  Output<Image> roi_{
+      this, "roi",
+      "one pixel per search window of the first scale, 255 where it passed, or one of another scale around its middle"};
 
   Param<std::string> database_{this, "database", "objects", kPath,
                                "folder with objects.txt and the reference views it names"};
+  Param<std::string> scales_{this, "scales", "1", "1",
+                             "of the image at which windows are searched, such as 1+0.7+0.5; falling, 0.5 or more"};
+  Param<std::string> revision_{this, "revision", "", "",
+                               "of the database, as `takt objects publish` names it; empty: as it was at the start"};
   Choice stages_{this,
                  "stages",
                  "ch+hog+cch",
@@ -96,13 +146,18 @@ class ObjectDetectionNode final : public Node {
       "1",  "share of a reference that occlusion or distance may take; added to automatic thresholds"};
   Param<double> threshold_scale_{
       this, "threshold_scale", 1.0, {0.05, 4.0}, "1", "factor on the thresholds of the database"};
-  Param<double> min_score_{this,       "min_score", 0.4,
+  Param<double> min_score_{this,       "min_score", 0.3,
                            {0.0, 1.0}, "1",         "smallest score (1 - error) of a detection; roi is not affected"};
   Param<double> reserve_{this,       "reserve", 0.001,
                          {0.0, 1.0}, "s",       "with less time left than this the search ends and its best is sent"};
   Param<int> max_detections_{this, "max_detections", 32, {1, 1000}, "", "the best are kept"};
 
-  std::optional<Detector> detector_;
+  std::function<std::unique_ptr<Detector>(const std::string&)> build_;
+  std::unique_ptr<Detector> detector_;
+  std::string in_use_;  ///< or being built: a revision
+  bool building_ = false, virtual_time_ = false;
+  std::optional<MaskSums> mask_sums_;
+  std::optional<Reloader> reloader_;  ///< last: its thread uses the rest
 };
 
 }  // namespace

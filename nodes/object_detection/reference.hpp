@@ -12,6 +12,34 @@
 
 namespace takt::object_detection {
 
+/// The image at a scale, three channels, each pixel by itself: between the four around its middle, in 1/256.
+inline std::vector<uint8_t> shrink_reference(ImageView<const uint8_t> bgr, int width, int height) {
+  struct Between {
+    int first, second, share;
+  };
+  const auto between = [](int i, int to, int from) -> Between {
+    const double position = (i + 0.5) / (static_cast<double>(to) / from) - 0.5;
+    const int below = static_cast<int>(std::floor(position));
+    if (below < 0) return {0, 0, 0};
+    if (below >= from - 1) return {from - 1, from - 1, 0};
+    return {below, below + 1, static_cast<int>(std::nearbyint((position - below) * 256))};
+  };
+  std::vector<uint8_t> pixels;
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const Between across = between(x, width, bgr.width), down = between(y, height, bgr.height);
+      for (int c = 0; c < 3; ++c) {
+        const int upper = (256 - across.share) * bgr.at(across.first, down.first, c) +
+                          across.share * bgr.at(across.second, down.first, c);
+        const int lower = (256 - across.share) * bgr.at(across.first, down.second, c) +
+                          across.share * bgr.at(across.second, down.second, c);
+        pixels.push_back(static_cast<uint8_t>(((256 - down.share) * upper + down.share * lower + 0x8000) >> 16));
+      }
+    }
+  }
+  return pixels;
+}
+
 /// Colours of the pixels in the window of `side` px at (x0, y0).
 inline std::vector<uint32_t> colour_window_reference(ImageView<const uint8_t> bgr, int x0, int y0, int side,
                                                      ColourBins bins) {

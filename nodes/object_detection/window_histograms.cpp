@@ -31,14 +31,22 @@ void WindowHistograms::begin(const uint16_t* index, int row) {
   count_rows(grid_.y0(row), grid_.y0(row) + grid_.window_px, 1);
 }
 
+void WindowHistograms::skip_rest_of_row() {
+  begin_row_if_due();
+  u_ = grid_.columns;
+}
+
+void WindowHistograms::begin_row_if_due() {
+  if (u_ < grid_.columns) return;
+  const int gone = grid_.y0(v_), kept = grid_.y0(v_ + 1);
+  count_rows(gone, kept, static_cast<uint16_t>(-1));
+  count_rows(gone + grid_.window_px, kept + grid_.window_px, 1);
+  u_ = 0;
+  ++v_;
+}
+
 std::span<const uint16_t> WindowHistograms::next() {
-  if (u_ == grid_.columns) {
-    const int gone = grid_.y0(v_), kept = grid_.y0(v_ + 1);
-    count_rows(gone, kept, static_cast<uint16_t>(-1));
-    count_rows(gone + grid_.window_px, kept + grid_.window_px, 1);
-    u_ = 0;
-    ++v_;
-  }
+  begin_row_if_due();
   const auto u = static_cast<size_t>(u_++);
   if (u == 0) {
     std::fill(window_.begin(), window_.end(), uint16_t{0});

@@ -26,8 +26,11 @@ class WindowHistograms {
   /// Histogram of the next window, row by row to the lower right; valid until the next call. At most as often as there
   /// are windows from there on.
   std::span<const uint16_t> next();
+  /// Leaves out the windows of the row that next() has not come to the end of; if it has, those of the row below.
+  void skip_rest_of_row();
 
  private:
+  void begin_row_if_due();
   void count_rows(int from, int to, uint16_t change);
   void change_window(size_t from_strip, size_t to_strip, bool add);
 

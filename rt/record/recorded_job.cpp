@@ -56,7 +56,7 @@ class In {
   }
   void question(Question& value) {
     const auto number = reader_.number<uint8_t>();
-    if (number > static_cast<uint8_t>(Question::chunk))
+    if (number > static_cast<uint8_t>(Question::done))
       throw std::runtime_error("a job asked what there is not to ask");
     value = static_cast<Question>(number);
   }

@@ -34,6 +34,7 @@ const char* to_string(Question question) {
   switch (question) {
     case Question::now: return "now";
     case Question::time_left: return "time_left";
+    case Question::done: return "done";
     case Question::chunk: break;
   }
   return "chunk";

@@ -58,6 +58,23 @@ TEST_CASE("all 16.7 million colours get the same bin from the vectorised form, w
   }
 }
 
+TEST_CASE("fewer bins are neighbours of the many taken together") {
+  Random random(7);
+  std::vector<uint8_t> colours(3 * 20000);
+  for (uint8_t& value : colours) value = random.byte();
+  std::vector<uint16_t> many(20000), few(20000);
+  colour_bins(colours.data(), many.size(), ColourBins::hsv_64x64x1, many.data());
+  for (const ColourBins bins : {ColourBins::hsv_32x32x1, ColourBins::hsv_16x16x1, ColourBins::hsv_8x4x1}) {
+    const BinSplit split = split_of(bins);
+    const int hues = 64 / split.hue, saturations = 64 / split.saturation;
+    on_each_target([&] {
+      colour_bins(colours.data(), few.size(), bins, few.data());
+      for (size_t i = 0; i < few.size(); ++i)
+        REQUIRE(few[i] == many[i] / 64 / hues * split.saturation + many[i] % 64 / saturations);
+    });
+  }
+}
+
 TEST_CASE("the colour stage equals counting and comparing everything, for any grid, with each SIMD target") {
   Random random(11);
   for (int round = 0; round < 60; ++round) {

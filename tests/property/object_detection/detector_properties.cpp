@@ -2,6 +2,9 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <opencv2/imgproc.hpp>
+#include <set>
+#include <tuple>
 #include <vector>
 
 #include "nodes/object_detection/detector.hpp"
@@ -37,10 +40,11 @@ std::vector<DatabaseObject> database(Random& random, const std::vector<uint8_t>&
   return objects;
 }
 
-/// Thesis Eq. 3.18 stage by stage, everything counted and compared anew: errors of one window for one object.
-float error_by_brute_force(const Detector& detector, const DatabaseObject& object, size_t index,
+/// Thesis Eq. 3.18 stage by stage, everything counted and compared anew: errors of one window of the image at that
+/// scale for one object.
+float error_by_brute_force(const Detector& detector, size_t scale, const DatabaseObject& object, size_t index,
                            const DetectorParameters& p, ImageView<const uint8_t> image, int window) {
-  const SearchGrid& grid = detector.grid();
+  const SearchGrid& grid = detector.at_scale(scale).grid();
   const int x0 = grid.x0(window % grid.columns), y0 = grid.y0(window / grid.columns);
   float error = kFailed;
   for (size_t s = 0; s <= static_cast<size_t>(p.last); ++s) {
@@ -66,7 +70,29 @@ float error_by_brute_force(const Detector& detector, const DatabaseObject& objec
 
 }  // namespace
 
-TEST_CASE("the cascade equals doing each stage for each window that passed the one before") {
+TEST_CASE("a smaller scale equals doing each pixel by itself, and OpenCV") {
+  Random random(19);
+  for (int round = 0; round < 30; ++round) {
+    const int width = random.in(2, 90), height = random.in(2, 70);
+    const double scale = round == 0 ? 0.5 : 0.01 * random.in(50, 99);
+    CAPTURE(width);
+    CAPTURE(height);
+    CAPTURE(scale);
+    std::vector<uint8_t> pixels(static_cast<size_t>(3 * width * height));
+    for (uint8_t& value : pixels) value = random.byte();
+    const ImageView<const uint8_t> image(pixels.data(), width, height, 3);
+    Shrinker shrinker(width, height, scale);
+    const auto small = shrinker.run(image);
+    const auto slow = shrink_reference(image, small.width, small.height);
+    REQUIRE(std::equal(slow.begin(), slow.end(), small.data));
+    cv::Mat theirs;
+    cv::resize(cv::Mat(height, width, CV_8UC3, pixels.data()), theirs, {small.width, small.height}, 0, 0,
+               cv::INTER_LINEAR_EXACT);
+    REQUIRE(std::equal(slow.begin(), slow.end(), theirs.datastart));
+  }
+}
+
+TEST_CASE("the cascade equals doing each stage for each window that passed the one before, at each scale") {
   Random random(61);
   size_t passed = 0, failed = 0;
   for (int round = 0; round < 12; ++round) {
@@ -78,14 +104,22 @@ TEST_CASE("the cascade equals doing each stage for each window that passed the o
     p.window_px = kWindow;
     p.pairs = round % 2 ? PairBins{} : PairBins{5, 5};
     p.orientations = round % 2 ? 360 : 32;
+    if (round >= 6) p.scales = {1, 0.7, 0.5};
     Detector detector(kWidth, kHeight, objects, p);
     REQUIRE(detector.run(image));
     CHECK(detector.searched() == 1);
-    for (size_t o = 0; o < objects.size(); ++o) {
-      for (int window = 0; window < detector.grid().windows(); ++window) {
-        const float slow = error_by_brute_force(detector, objects[o], o, p, image, window);
-        REQUIRE(detector.decision().errors(o)[static_cast<size_t>(window)] == slow);
-        ++(slow < kFailed ? passed : failed);
+    REQUIRE(detector.scales() == p.scales.size());
+    for (size_t s = 0; s < detector.scales(); ++s) {
+      const SearchGrid& grid = detector.at_scale(s).grid();
+      const auto small = shrink_reference(image, grid.image_width, grid.image_height);
+      const ImageView<const uint8_t> scaled(small.data(), grid.image_width, grid.image_height, 3);
+      CHECK(grid.image_width == std::lround(p.scales[s] * kWidth));
+      for (size_t o = 0; o < objects.size(); ++o) {
+        for (int window = 0; window < grid.windows(); ++window) {
+          const float slow = error_by_brute_force(detector, s, objects[o], o, p, scaled, window);
+          REQUIRE(detector.at_scale(s).decision().errors(o)[static_cast<size_t>(window)] == slow);
+          ++(slow < kFailed ? passed : failed);
+        }
       }
     }
   }
@@ -93,8 +127,52 @@ TEST_CASE("the cascade equals doing each stage for each window that passed the o
   CHECK(failed > 100);
 }
 
-TEST_CASE(
-    "out of time, the windows that were decided on are the best of the stage before, and searched counts the rest") {
+TEST_CASE("with a mask the windows that it touches are as without, the others do not pass") {
+  Random random(83);
+  size_t within = 0, outside = 0;
+  for (int round = 0; round < 12; ++round) {
+    const std::vector<uint8_t> pixels = random.image(kWidth, kHeight);
+    const ImageView<const uint8_t> image(pixels.data(), kWidth, kHeight, 3);
+    const auto objects = database(random, pixels);
+    DetectorParameters p;
+    p.window_px = kWindow;
+    p.last = static_cast<Stage>(round % 3);
+    p.scales = {1, 0.7};
+    const int width = random.in(1, kWidth), height = random.in(1, kHeight);
+    std::vector<uint8_t> mask(static_cast<size_t>(width * height));
+    for (int blot = random.in(0, 3); blot > 0; --blot)
+      mask[static_cast<size_t>(random.in(0, width * height - 1))] = 255;
+    MaskSums sums(mask.size());
+    sums.take({mask.data(), width, height});
+    Detector whole(kWidth, kHeight, objects, p), masked(kWidth, kHeight, objects, p);
+    whole.run(image);
+    REQUIRE(masked.run(
+        image, &sums, [] { return true; }, [] { return true; }));
+    CHECK(masked.searched() == 1);
+    for (size_t s = 0; s < masked.scales(); ++s) {
+      const SearchGrid& grid = masked.at_scale(s).grid();
+      for (int window = 0; window < grid.windows(); ++window) {
+        // Of each pixel of the mask the rectangle that it covers in the image of this scale.
+        const double x0 = grid.x0(window % grid.columns), y0 = grid.y0(window / grid.columns);
+        bool touched = false;
+        for (int y = 0; y < height; ++y)
+          for (int x = 0; x < width; ++x)
+            touched = touched ||
+                      (mask[static_cast<size_t>(y * width + x)] != 0 && (x + 1) * grid.image_width > x0 * width &&
+                       x * grid.image_width < (x0 + kWindow) * width && (y + 1) * grid.image_height > y0 * height &&
+                       y * grid.image_height < (y0 + kWindow) * height);
+        ++(touched ? within : outside);
+        for (size_t o = 0; o < objects.size(); ++o)
+          REQUIRE(masked.at_scale(s).decision().errors(o)[static_cast<size_t>(window)] ==
+                  (touched ? whole.at_scale(s).decision().errors(o)[static_cast<size_t>(window)] : kFailed));
+      }
+    }
+  }
+  CHECK(within > 100);
+  CHECK(outside > 100);
+}
+
+TEST_CASE("out of time, the best windows of all scales were decided on, and searched counts the rest") {
   Random random(71);
   size_t cut_off = 0;
   for (int round = 0; round < 10; ++round) {
@@ -103,35 +181,34 @@ TEST_CASE(
     const auto objects = database(random, pixels);
     DetectorParameters p;
     p.window_px = kWindow;
+    if (round % 2) p.scales = {1, 0.7, 0.5};
     Detector whole(kWidth, kHeight, objects, p), cut(kWidth, kHeight, objects, p);
     p.last = Stage::orientation;
     Detector before(kWidth, kHeight, objects, p);
     whole.run(image);
     before.run(image);
-    struct Candidate {
-      float error;
-      size_t window, object;
-      bool operator<(const Candidate& other) const {
-        return std::tie(error, window, object) < std::tie(other.error, other.window, other.object);
-      }
+    const auto error = [](const Detector& detector, size_t scale, size_t window, size_t object) {
+      return detector.at_scale(scale).decision().errors(object)[window];
     };
-    std::vector<Candidate> candidates;
-    for (size_t o = 0; o < objects.size(); ++o)
-      for (size_t w = 0; w < before.decision().errors(o).size(); ++w)
-        if (const float error = before.decision().errors(o)[w]; error < kFailed) candidates.push_back({error, w, o});
+    std::vector<std::tuple<float, size_t, size_t, size_t>> candidates;  // error, scale, window, object
+    int windows = 0;
+    for (size_t s = 0; s < before.scales(); ++s) {
+      windows += before.at_scale(s).grid().windows();
+      for (size_t o = 0; o < objects.size(); ++o)
+        for (size_t w = 0; w < static_cast<size_t>(before.at_scale(s).grid().windows()); ++w)
+          if (error(before, s, w, o) < kFailed) candidates.emplace_back(error(before, s, w, o), s, w, o);
+    }
     std::sort(candidates.begin(), candidates.end());
     const auto decided = static_cast<size_t>(random.in(0, static_cast<int>(candidates.size())));
     REQUIRE(cut.run(
-        image, [] { return true; }, [&, asked = size_t{0}]() mutable { return asked++ < decided; }));
-    std::vector<bool> open(static_cast<size_t>(cut.grid().windows()));
+        image, nullptr, [] { return true; }, [&, asked = size_t{0}]() mutable { return asked++ < decided; }));
+    std::set<std::pair<size_t, size_t>> open;
     for (size_t i = 0; i < candidates.size(); ++i) {
-      const auto& [error, window, object] = candidates[i];
-      REQUIRE(cut.decision().errors(object)[window] ==
-              (i < decided ? whole.decision().errors(object)[window] : kFailed));
-      if (i >= decided) open[window] = true;
+      const auto& [was, scale, window, object] = candidates[i];
+      REQUIRE(error(cut, scale, window, object) == (i < decided ? error(whole, scale, window, object) : kFailed));
+      if (i >= decided) open.emplace(scale, window);
     }
-    const auto left = std::count(open.begin(), open.end(), true);
-    CHECK(cut.searched() == doctest::Approx(1.0 - static_cast<double>(left) / cut.grid().windows()));
+    CHECK(cut.searched() == doctest::Approx(1.0 - static_cast<double>(open.size()) / windows));
     cut_off += candidates.size() - decided;
   }
   CHECK(cut_off > 50);

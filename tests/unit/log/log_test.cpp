@@ -23,7 +23,7 @@ struct Made {
     const std::string plan = plan_json(graph.plan).dump();
     auto sink = mcap::FileSink::open(folder.path / "run.mcap");
     REQUIRE(sink);
-    test::record_run(graph, *sink, 3, std::move(how),
+    test::record_run(graph.plan, *sink, 3, std::move(how),
                      {{}, {{0, 0, "plan.json", "application/json", mcap::bytes_of(plan)}}});
     auto opened = record::LogFile::open(folder.path / "run.mcap");
     REQUIRE(opened);
@@ -136,7 +136,7 @@ TEST_CASE("A record without its plan cannot be exported") {
   test::SmallGraph graph;
   auto sink = mcap::FileSink::open(folder.path / "run.mcap");
   REQUIRE(sink);
-  test::record_run(graph, *sink, 1);
+  test::record_run(graph.plan, *sink, 1);
   auto log = record::LogFile::open(folder.path / "run.mcap");
   REQUIRE(log);
   auto out = mcap::FileSink::open(folder.path / "export.mcap");

@@ -13,6 +13,8 @@ using namespace takt::object_detection;
 
 namespace {
 
+const std::filesystem::path kShipped = std::filesystem::path(TAKT_SOURCE_DIR) / "graph/objects";
+
 struct Folder : takt::test::TemporaryFolder {
   Folder() { image("good.png", cv::Mat(8, 8, CV_8UC3, cv::Scalar(10, 20, 200))); }
   void image(const std::string& name, const cv::Mat& pixels) const { cv::imwrite((path / name).string(), pixels); }
@@ -54,6 +56,18 @@ TEST_CASE("objects in order, with their views and thresholds") {
   CHECK(read_database(folder.path, 8, TestViews::skip)[1].test_views.empty());
 }
 
+TEST_CASE("an object has an entry for each look, told apart by attribute values") {
+  const Folder folder;
+  folder.list(
+      "object bottle size=large closed=true\nview good.png\nobject bottle closed=false size=large\nview good.png\n");
+  const auto entries = read_database(folder.path, 8, TestViews::skip);
+  REQUIRE(entries.size() == 2);
+  CHECK(entries[0].attributes == std::vector<Attribute>{{"closed", "true"}, {"size", "large"}});
+  CHECK(entries[0].label() == "bottle closed=true size=large");
+  CHECK(entries[1].label() == "bottle closed=false size=large");
+  CHECK(read_database(kShipped, 48, TestViews::skip)[0].label() == "red_box");
+}
+
 TEST_CASE("mistakes name file and line and what is valid") {
   const Folder folder;
   has(folder.error("object cup\nviews good.png\n"), "objects.txt:2: unknown word `views`; valid are object, threshold");
@@ -70,7 +84,14 @@ TEST_CASE("mistakes name file and line and what is valid") {
   has(folder.error("object cup\nthreshold 0.4x\n"), "`0.4x`");
   has(folder.error("object cup\nthreshold auto\nthreshold 0.4\n"),
       "objects.txt:3: object `cup` has a threshold already");
-  has(folder.error("object\n"), "objects.txt:1: `object` takes exactly one word");
+  has(folder.error("object\n"), "objects.txt:1: `object` takes a name and its attributes");
+  has(folder.error("object cup red\n"), "objects.txt:1: `red` is no attribute; write ATTRIBUTE=VALUE");
+  has(folder.error("object cup full=\n"), "`full=` is no attribute");
+  has(folder.error("object cup full=yes full=no\n"), "attribute `full` is given twice");
+  has(folder.error("object cup full=yes\nview good.png\nobject cup full=yes\n"),
+      "objects.txt:3: object `cup full=yes` is there already");
+  has(folder.error("object cup full=yes\nview good.png\nobject cup empty=no\n"),
+      "object `cup empty=no` has other attributes than `cup full=yes`; only their values may differ");
   has(folder.error("object cup\nview good.png 0.4 0.5 0.6 0.7\n"), "a file and at most three thresholds");
   has(folder.error("object cup\nthreshold\n"), "`threshold` takes one to three thresholds");
   has(folder.error("object cup\nthreshold auto 0.3 2\n"), "objects.txt:2: the threshold is `2`, must be");

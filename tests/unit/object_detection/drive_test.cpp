@@ -53,7 +53,9 @@ TEST_CASE("the boxes of the lab are found on the drive, at their places and nowh
   REQUIRE(world);
   const StereoRig rig = *load_rig("camera", kGraph / "rigs/xb3.yaml");
   const auto database = read_database(kGraph / "objects", 48, TestViews::skip);
-  Detector detector(rig.width, rig.height, database, {});
+  DetectorParameters parameters;
+  parameters.scales = {1, 0.7, 0.5};
+  Detector detector(rig.width, rig.height, database, parameters);
   sim::Renderer renderer({rig.width, rig.height, rig.focal_px, rig.cu_px, rig.cv_px});
   (*world)->begin(0);
   std::vector<uint8_t> image(static_cast<size_t>(rig.width * rig.height * 3));
@@ -67,7 +69,7 @@ TEST_CASE("the boxes of the lab are found on the drive, at their places and nowh
                     {image.data(), rig.width, rig.height, 3}, depth.data());
     REQUIRE(detector.run({image.data(), rig.width, rig.height, 3}));
     std::array<Detection, 32> boxes;
-    const size_t count = detector.decision().detections(0.4, boxes);
+    const size_t count = detector.detections(0.3, boxes);
     for (size_t o = 0; o < database.size(); ++o) {
       const auto& objects = (*world)->world().objects;
       const auto object =

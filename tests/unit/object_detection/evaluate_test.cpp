@@ -68,7 +68,7 @@ TEST_CASE("the measured share is that of the decision itself") {
   size_t passed = 0, windows = 0;
   for (uint64_t i = 0; i < 5; ++i) {
     measure(make_scene(s.database, {}, 9, i), s.detector.grid(), s.database.size(), test, m);
-    passed += s.detector.decision().passed_windows();
+    passed += s.detector.at_scale(0).decision().passed_windows();
     windows += static_cast<size_t>(s.detector.grid().windows());
   }
   CHECK(m.window_factor.size() == windows);

@@ -24,7 +24,7 @@ struct Record {
     auto sink = mcap::FileSink::open(file);
     REQUIRE(sink);
     test::SmallGraph graph;
-    result = test::record_run(graph, *sink, seconds, std::move(how));
+    result = test::record_run(graph.plan, *sink, seconds, std::move(how));
   }
   LogFile open() const {
     auto log = LogFile::open(file);
@@ -124,7 +124,7 @@ TEST_CASE("A parameter that is set while the run goes on is set again before the
     auto sink = mcap::FileSink::open(folder.path / "run.mcap");
     REQUIRE(sink);
     int jobs = 0;
-    test::record_run(recorded, *sink, 3, {}, {}, [&](RunBoard& board) {
+    test::record_run(recorded.plan, *sink, 3, {}, {}, [&](RunBoard& board) {
       if (++jobs == 60) CHECK(post(board.mail(1), 1, ParamValue(0.25)));
     });
   }
@@ -218,7 +218,7 @@ TEST_CASE("A file that takes no more, or a queue without room: the run goes on a
     }
   } full;
   test::SmallGraph graph;
-  const RecordResult result = test::record_run(graph, full, 3, {.file = {.chunk_bytes = 1000, .level = 1}});
+  const RecordResult result = test::record_run(graph.plan, full, 3, {.file = {.chunk_bytes = 1000, .level = 1}});
   CHECK(result.not_written > 0);
   CHECK(result.lost() == result.not_written);
   CHECK(result.refused == "No space left on device");

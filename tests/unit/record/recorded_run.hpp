@@ -100,17 +100,17 @@ struct SmallGraph {
   }
 };
 
-/// Runs the graph for `seconds` of virtual time and records it.
-inline record::RecordResult record_run(SmallGraph& graph, mcap::Sink& sink, int64_t seconds,
+/// Runs a plan for `seconds` of virtual time and records it.
+inline record::RecordResult record_run(const Plan& plan, mcap::Sink& sink, int64_t seconds,
                                        record::Recorder::Options how = {}, const record::Head& head = {},
                                        const std::function<void(RunBoard&)>& meanwhile = {}) {
-  RunBoard board(graph.plan);
+  RunBoard board(plan);
   VirtualClock clock(1'000'000'000);
-  const auto transport = make_local_transport(graph.plan.ports);
+  const auto transport = make_local_transport(plan.ports);
   how.by_caller = true;
   record::Head told = head;
   told.facts["format"] = "1";
-  record::Recorder recorder(graph.plan, board, *transport, sink, told, std::move(how));
+  record::Recorder recorder(plan, board, *transport, sink, told, std::move(how));
   trace::Rings rings(4);
   trace::Collector::Options heard;
   heard.best = trace::Source::none;
@@ -126,7 +126,7 @@ inline record::RecordResult record_run(SmallGraph& graph, mcap::Sink& sink, int6
     recorder.capture();
     if (meanwhile) meanwhile(board);
   };
-  Executor executor(graph.plan, *transport, clock, run);
+  Executor executor(plan, *transport, clock, run);
   executor.run();
   collector.finish();
   return recorder.finish({{"epoch_ns", "1000000000"}});

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the cascade looks for: the histograms of an object database's views, and their thresholds, stage by stage.
+#pragma once
+#include <array>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "nodes/object_detection/database.hpp"
+#include "nodes/object_detection/decision.hpp"
+#include "nodes/object_detection/histogram.hpp"
+
+namespace takt::object_detection {
+
+struct DetectorParameters {
+  std::vector<double> scales = {1};  ///< of the image at which windows are searched, as parse_scales() gives them
+  Stage last = Stage::cooccurrence;  ///< the stages before it run as well
+  ColourBins bins = ColourBins::hsv_64x64x1;
+  int orientations = 360;
+  PairBins pairs;
+  int window_px = 64;
+  /// Share of a reference that may be hidden, in automatic thresholds: 1 - 0.8^2, an object at 0.8 times its size.
+  double tolerance = 0.36;
+  double threshold_scale = 1;  ///< factor on every threshold
+};
+
+/// "1+0.7+0.5": numbers in 0.5..1 (below half the size pixels would be left out), falling. Throws
+/// std::invalid_argument.
+std::vector<double> parse_scales(const std::string& text);
+
+/// Of one stage, per object and view.
+struct StageReferences {
+  std::vector<std::vector<Histogram>> histograms;
+  std::vector<std::vector<ReferenceLimit>> limits;
+};
+/// Empty for stages beyond the last one.
+using CascadeReferences = std::array<StageReferences, kStages>;
+
+/// A view's own threshold goes before the object's, and that before the automatic one. Throws std::invalid_argument if
+/// the database is empty.
+CascadeReferences cascade_references(std::span<const DatabaseObject> database, const DetectorParameters& p);
+
+}  // namespace takt::object_detection

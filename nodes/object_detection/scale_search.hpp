@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "nodes/object_detection/colour_stage.hpp"
+#include "nodes/object_detection/cooccurrence_stage.hpp"
+#include "nodes/object_detection/decision.hpp"
+#include "nodes/object_detection/mask_sums.hpp"
+#include "nodes/object_detection/orientation_stage.hpp"
+#include "nodes/object_detection/references.hpp"
+#include "nodes/object_detection/shrink.hpp"
+
+namespace takt::object_detection {
+
+/// The cascade at one scale of the image, in portions. A window is compared with an object in a stage only if it passed
+/// for it in the stage before. Memory is taken by the constructor; the rest allocates nothing. One thread at a time.
+class ScaleSearch {
+ public:
+  /// `references` are copied. Throws std::invalid_argument if the windows do not fit.
+  ScaleSearch(int image_width, int image_height, double scale, int reference_px, const CascadeReferences& references,
+              const DetectorParameters& p);
+
+  const SearchGrid& grid() const { return grid_; }  ///< in the scaled image
+  Decision& decision() { return decision_; }
+  const Decision& decision() const { return decision_; }
+  /// Of the colour stage.
+  std::span<const uint16_t> missing() const { return colour_.missing(); }
+  /// Rectangle of a detection in the image before scaling, px.
+  void to_image(Detection& detection) const;
+
+  /// No window passes, begin() was not called.
+  void clear();
+  bool begun() const { return begun_; }
+  /// Scales the image, which must stay until the last call for it; search_row() begins at that row of windows. Windows
+  /// that have no pixel other than 0 of `mask` are not searched and do not pass; null: all are searched.
+  void begin(ImageView<const uint8_t> bgr, const MaskSums* mask, int first_row);
+  /// The next row of windows through colours and orientations; after the last one comes row 0.
+  void search_row();
+  /// A window that passed these for the object through the last stage.
+  void decide_by_cooccurrences(size_t object, size_t window);
+
+ private:
+  std::optional<Shrinker> shrinker_;  ///< none at full size
+  SearchGrid grid_;
+  double to_image_x_, to_image_y_;
+  std::vector<StageLimits> limits_;
+  std::vector<size_t> views_;  ///< of each object
+  ColourStage colour_;
+  std::optional<OrientationStage> orientation_;
+  std::optional<CooccurrenceStage> cooccurrence_;
+  Decision decision_;
+  bool begun_ = false;
+  ImageView<const uint8_t> image_;
+  std::vector<uint8_t> wanted_;  ///< windows, by the mask
+};
+
+}  // namespace takt::object_detection
