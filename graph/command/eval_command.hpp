@@ -77,7 +77,7 @@ struct EvalBodyPoseOptions {
 void add_eval_body_pose(CLI::App& eval, EvalBodyPoseOptions& options, int& exit_code);
 struct EvalPersonTrackingOptions {
   uint64_t seed = 1;
-  int walks = 6, frames = 150;  ///< of each walk
+  int walks = 6, frames = 75;  ///< of each walk
   std::string picture;
   bool json = false;
 };

@@ -104,7 +104,7 @@ void add_eval_person_tracking(CLI::App& eval, EvalPersonTrackingOptions& o, int&
   CLI::App* app = eval.add_subcommand("person_tracking", "a person in a chessboard T-shirt tracked on generated walks");
   app->add_option("--seed", o.seed, "of the walks (default 1)");
   app->add_option("--walks", o.walks, "default 6")->check(CLI::Range(1, 10000));
-  app->add_option("--frames", o.frames, "of each walk, 15 a second (default 150)")->check(CLI::Range(1, 100000));
+  app->add_option("--frames", o.frames, "of each walk, 15 a second (default 75)")->check(CLI::Range(1, 100000));
   app->add_option("--picture", o.picture, "PNG of a frame with what is found in it");
   app->add_flag("--json", o.json, "one JSON object on stdout");
   app->callback([&] { exit_code = evaluate(o); });

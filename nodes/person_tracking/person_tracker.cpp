@@ -53,8 +53,11 @@ void PersonTracker::note(Sight sight) {
 size_t PersonTracker::nearest(std::span<const Place> places) const {
   size_t best = places.size();
   double least = p_.gate;
-  for (size_t i = 0; i < places.size(); ++i)
+  const bool lately = unseen_s(stamp_ns_) <= p_.unsure_within_s;  // afterwards the gate is wide
+  for (size_t i = 0; i < places.size(); ++i) {
+    if (!places[i].sure && !lately) continue;
     if (const double d2 = filter_.distance2(places[i]); d2 <= least) least = d2, best = i;
+  }
   return best;
 }
 

@@ -11,10 +11,11 @@ namespace takt::person_tracking {
 
 struct TrackerParameters {
   FilterParameters filter;
-  double gate = 9.21;           ///< squared Mahalanobis distance within which a place may be the person's: 99 %
-  int confirm = 3;              ///< consecutive images with the shirt until it counts
-  double lost_after_s = 1.0;    ///< without shirt or body the person is lost
-  double shirt_within_s = 3.0;  ///< nor do bodies alone hold him longer
+  double gate = 9.21;            ///< squared Mahalanobis distance within which a place may be the person's: 99 %
+  int confirm = 3;               ///< consecutive images with the shirt until it counts
+  double lost_after_s = 1.0;     ///< without shirt or body the person is lost
+  double shirt_within_s = 3.0;   ///< nor do bodies alone hold him longer
+  double unsure_within_s = 0.2;  ///< shirts that are not sure only go on with a person who was seen so lately
 };
 
 enum class Sight : uint8_t { none, body, shirt };
@@ -42,7 +43,8 @@ class PersonTracker {
 
  private:
   static double seconds(int64_t from_ns, int64_t to_ns) { return static_cast<double>(to_ns - from_ns) * 1e-9; }
-  /// Index of the place nearest to the expected one, within the gate; the list's size if there is none.
+  /// Index of the place nearest to the expected one, within the gate, sure or lately seen; the list's size if there is
+  /// none.
   size_t nearest(std::span<const Place> places) const;
   void note(Sight sight);
 

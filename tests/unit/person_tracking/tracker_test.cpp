@@ -56,6 +56,11 @@ TEST_CASE("a pattern whose size and disparities disagree goes on with a track, b
   run.step({unsure});
   run.step({unsure});
   CHECK(run.tracker.tracked());
+  for (int i = 0; i < 5; ++i) run.step({});
+  run.step({unsure});  // who was hidden is not found again by it
+  CHECK(run.tracker.sight() == Sight::none);
+  run.step({at(0, 3)});
+  CHECK(run.tracker.sight() == Sight::shirt);
 }
 
 TEST_CASE("who walks behind something is continued at his speed, and lost after a second") {
