@@ -85,6 +85,13 @@ struct EvalBodyPoseOptions {
   bool json = false;
 };
 void add_eval_body_pose(CLI::App& eval, EvalBodyPoseOptions& options, int& exit_code);
+struct EvalPersonTrackingOptions {
+  uint64_t seed = 1;
+  int walks = 6, frames = 75;  ///< of each walk
+  std::string picture;
+  bool json = false;
+};
+void add_eval_person_tracking(CLI::App& eval, EvalPersonTrackingOptions& options, int& exit_code);
 struct EvalGroundOptions {
   std::filesystem::path images, labels;  ///< all three, or none: a pavement is generated
   std::vector<int> drivable;             ///< class ids

@@ -19,6 +19,7 @@ void register_body_pose(NodeTypes& types);
 void register_scan_matching(NodeTypes& types);
 void register_robot_pose(NodeTypes& types);
 void register_traversability(NodeTypes& types);
+void register_person_tracking(NodeTypes& types);
 }  // namespace takt
 
 namespace takt::graph {
@@ -41,6 +42,7 @@ NodeTypes node_types() {
   register_scan_matching(types);
   register_robot_pose(types);
   register_traversability(types);
+  register_person_tracking(types);
   return types;
 }
 

@@ -16,6 +16,26 @@ double ms_since(int64_t cpu_ns) { return static_cast<double>(thread_cpu_ns() - c
 
 const auto kWithoutEnd = [] { return true; };
 
+bool has_candidate(const BodyDetector& detector, const TrueBody& truth) {
+  return std::any_of(detector.candidates().begin(), detector.candidates().end(), [&](const Candidate& candidate) {
+    return (Eigen::Vector3d(candidate.head.x, candidate.head.y, candidate.head.z) - truth.joints[0]).norm() <
+           kHeadNear_m;
+  });
+}
+
+/// Points that lie on the arm that points, the trunk's apart.
+int arm_points(const Skeleton& skeleton, const GeneratedScene& scene) {
+  constexpr float kArm_m = 0.08f, kTrunk_m = 0.18f;
+  const auto joint = [&](size_t i) -> Eigen::Vector3f { return scene.body.joints[i].cast<float>(); };
+  const size_t elbow = skeleton.links[scene.body.to].parent;
+  const Segment upper(joint(scene.body.from), joint(elbow)), lower(joint(elbow), joint(scene.body.to));
+  const Segment trunk(joint(0), joint(skeleton.link("lower_back")));
+  return static_cast<int>(std::count_if(scene.in_floor.begin(), scene.in_floor.end(), [&](const Point& p) {
+    return std::min(upper.squared_distance(p.x, p.y, p.z), lower.squared_distance(p.x, p.y, p.z)) < kArm_m * kArm_m &&
+           trunk.squared_distance(p.x, p.y, p.z) > kTrunk_m * kTrunk_m;
+  }));
+}
+
 }  // namespace
 
 const DetectedBody* match(const TrueBody& truth, std::span<const DetectedBody> found) {
@@ -28,13 +48,16 @@ const DetectedBody* match(const TrueBody& truth, std::span<const DetectedBody> f
   return best;
 }
 
-void add(Figures& figures, const Skeleton& skeleton, const TrueBody& truth, std::span<const DetectedBody> found,
-         double time_ms) {
+void add(Figures& figures, const Skeleton& skeleton, const TrueBody& truth, const Outcome& outcome) {
   ++figures.trials;
-  figures.time_ms.push_back(time_ms);
-  const DetectedBody* body = match(truth, found);
-  figures.extra += static_cast<int>(found.size()) - (body != nullptr ? 1 : 0);
-  if (body == nullptr) return;
+  figures.time_ms.push_back(outcome.time_ms);
+  const DetectedBody* body = match(truth, outcome.found);
+  figures.extra += static_cast<int>(outcome.found.size()) - (body != nullptr ? 1 : 0);
+  const auto miss = [&](int& cause) {
+    ++cause;
+    figures.misses.hidden += outcome.arm_hidden ? 1 : 0;
+  };
+  if (body == nullptr) return miss(outcome.candidate ? figures.misses.refused : figures.misses.no_candidate);
   ++figures.found;
   figures.valid += body->valid ? 1 : 0;
   for (size_t i = 1; i < skeleton.links.size(); ++i) {
@@ -42,11 +65,22 @@ void add(Figures& figures, const Skeleton& skeleton, const TrueBody& truth, std:
     if (body->fit.fitted[i]) figures.joint_m.push_back((body->fit.ends[i].cast<double>() - truth.joints[i]).norm());
     else ++figures.missing;
   }
-  const Eigen::Vector3f direction = pointing_direction(body->fit, {truth.from, truth.to});
-  if (direction.squaredNorm() == 0) return;
-  const double cosine = std::clamp(direction.cast<double>().dot(truth.pointing()), -1.0, 1.0);
-  figures.angle_deg.push_back(std::acos(cosine) * 180 / std::numbers::pi);
-  figures.right += figures.angle_deg.back() <= kRight_deg ? 1 : 0;
+  const auto angle_of = [&](const Pointer& pointer) {
+    const Eigen::Vector3d direction = pointing_direction(body->fit, pointer).cast<double>();
+    if (direction.squaredNorm() == 0) return 180.0;
+    return std::acos(std::clamp(direction.dot(truth.pointing()), -1.0, 1.0)) * 180 / std::numbers::pi;
+  };
+  const bool fitted = body->fit.fitted[truth.from] && body->fit.fitted[truth.to];
+  const double angle = angle_of({truth.from, truth.to});
+  if (fitted) figures.angle_deg.push_back(angle);
+  if (fitted && angle <= kRight_deg) {
+    ++figures.right;
+    return;
+  }
+  const bool other = std::any_of(skeleton.pointers.begin(), skeleton.pointers.end(), [&](const Pointer& pointer) {
+    return pointer.to != truth.to && angle_of(pointer) <= kRight_deg;
+  });
+  miss(other ? figures.misses.other_arm : fitted ? figures.misses.elsewhere : figures.misses.arm_missing);
 }
 
 Figures measure_people(BodyDetector& detector, const SceneCamera& camera, uint64_t seed, int trials) {
@@ -55,7 +89,9 @@ Figures measure_people(BodyDetector& detector, const SceneCamera& camera, uint64
     const GeneratedScene scene = make_person(detector.skeleton(), camera, seed, static_cast<uint64_t>(i));
     const int64_t start = thread_cpu_ns();
     const auto found = detector.run(scene.in_floor, kWithoutEnd);
-    add(figures, detector.skeleton(), scene.body, found, ms_since(start));
+    const double time_ms = ms_since(start);
+    add(figures, detector.skeleton(), scene.body,
+        {found, has_candidate(detector, scene.body), arm_points(detector.skeleton(), scene) < kArmPoints, time_ms});
   }
   return figures;
 }
@@ -79,7 +115,7 @@ Figures measure_any(const Skeleton& skeleton, const FitParameters& parameters, c
     const double density = reference_density(points, parameters.tube_m);
     const Fit fit = fitter.fit({points, scene.body.joints[0].cast<float>(), density}, kWithoutEnd);
     const DetectedBody body{fit, 0, is_valid(skeleton, parameters, fit), 0};
-    add(figures, skeleton, scene.body, {&body, 1}, ms_since(start));
+    add(figures, skeleton, scene.body, {{&body, 1}, true, false, ms_since(start)});
   }
   return figures;
 }

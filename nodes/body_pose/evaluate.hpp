@@ -13,8 +13,19 @@ namespace takt::body_pose {
 /// A trial is right if the arm that points was fitted and its direction is off by at most this.
 constexpr double kRight_deg = 45;
 
+/// Why trials were wrong; each has one cause.
+struct Misses {
+  int no_candidate = 0;  ///< no cluster begins at the head
+  int refused = 0;       ///< the fit of its cluster was no body
+  int arm_missing = 0;   ///< the body was found without the arm that points
+  int other_arm = 0;     ///< its other arm points there: left and right were taken for each other
+  int elsewhere = 0;     ///< neither does
+  int hidden = 0;        ///< of all these: hardly a point of the arm was to be seen
+};
+
 struct Figures {
   int trials = 0, found = 0, right = 0;
+  Misses misses;
   int extra = 0;                  ///< bodies where there is none
   int valid = 0;                  ///< of those found: pass Eq. 3.11
   std::vector<double> angle_deg;  ///< of every pointing arm that was fitted
@@ -28,9 +39,17 @@ struct Figures {
 /// The body of a scene among those found; null if none has its head within 0.35 m of the true one.
 const DetectedBody* match(const TrueBody& truth, std::span<const DetectedBody> found);
 
+/// What was made of one scene.
+struct Outcome {
+  std::span<const DetectedBody> found;
+  bool candidate = true;    ///< a cluster begins at the true head
+  bool arm_hidden = false;  ///< fewer than kArmPoints points lie on the arm that points
+  double time_ms = 0;
+};
+constexpr int kArmPoints = 25;  ///< of an arm whose direction is to be seen; one in the open has some 150 to 400
+
 /// Adds one scene.
-void add(Figures& figures, const Skeleton& skeleton, const TrueBody& truth, std::span<const DetectedBody> found,
-         double time_ms);
+void add(Figures& figures, const Skeleton& skeleton, const TrueBody& truth, const Outcome& outcome);
 
 /// Person number 0 .. trials - 1 of a seed.
 Figures measure_people(BodyDetector& detector, const SceneCamera& camera, uint64_t seed, int trials);

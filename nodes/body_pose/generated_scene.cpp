@@ -4,9 +4,8 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <random>
 
+#include "nodes/body_pose/ray_casting.hpp"
 #include "nodes/mapping_3d/pose.hpp"
 
 namespace takt::body_pose {
@@ -15,76 +14,11 @@ namespace {
 using Eigen::AngleAxisd, Eigen::Matrix3d, Eigen::Vector3d;
 
 constexpr double kDegree = std::numbers::pi / 180;
-constexpr double kNever = std::numeric_limits<double>::infinity();
 
-/// The same numbers everywhere, which the distributions of the standard library do not promise.
-class Lot {
- public:
-  Lot(uint64_t seed, uint64_t index) : bits_(seed * 0x9E3779B97F4A7C15ull + index) { bits_.discard(8); }
-  double in(double low, double high) { return low + (high - low) * (static_cast<double>(bits_() >> 11) * 0x1p-53); }
-  bool chance(double p) { return in(0, 1) < p; }
-  double normal() {
-    const double radius = std::sqrt(-2 * std::log(1 - in(0, 1)));
-    return radius * std::cos(in(0, 2 * std::numbers::pi));
-  }
-  Vector3d unit() { return Vector3d(normal(), normal(), normal()).normalized(); }
-
- private:
-  std::mt19937_64 bits_;
-};
-
-struct Bgr {
-  uint8_t b, g, r;
-};
-/// A ball that is drawn along a line.
-struct Capsule {
-  Vector3d from, to;
-  double radius;
-  Bgr colour;
-};
-struct Box {
-  Vector3d low, high;
-  Bgr colour;
-};
 struct World {
   std::vector<Capsule> capsules;
   std::vector<Box> boxes;
 };
-
-/// Distance along a ray (unit direction) to its first point in a ball.
-double meet_ball(const Vector3d& origin, const Vector3d& ray, const Vector3d& centre, double radius) {
-  const Vector3d to = centre - origin;
-  const double along = to.dot(ray), squared = radius * radius - (to.squaredNorm() - along * along);
-  if (squared < 0) return kNever;
-  const double distance = along - std::sqrt(squared);
-  return distance > 0 ? distance : kNever;
-}
-
-double meet(const Vector3d& origin, const Vector3d& ray, const Capsule& c) {
-  double nearest = std::min(meet_ball(origin, ray, c.from, c.radius), meet_ball(origin, ray, c.to, c.radius));
-  const Vector3d line = c.to - c.from;
-  const double length = line.norm();
-  if (length < 1e-9) return nearest;
-  const Vector3d axis = line / length, to = c.from - origin;
-  const Vector3d across = ray - axis * ray.dot(axis), to_across = to - axis * to.dot(axis);
-  const double a = across.squaredNorm(), b = across.dot(to_across);
-  const double root = b * b - a * (to_across.squaredNorm() - c.radius * c.radius);
-  if (a < 1e-12 || root < 0) return nearest;
-  const double distance = (b - std::sqrt(root)) / a;
-  const double at = (ray * distance - to).dot(axis);
-  if (distance > 0 && at >= 0 && at <= length) nearest = std::min(nearest, distance);
-  return nearest;
-}
-
-double meet(const Vector3d& origin, const Vector3d& ray, const Box& box) {
-  double enter = 0, leave = kNever;
-  for (int k = 0; k < 3; ++k) {
-    const double a = (box.low[k] - origin[k]) / ray[k], b = (box.high[k] - origin[k]) / ray[k];
-    enter = std::max(enter, std::min(a, b));
-    leave = std::min(leave, std::max(a, b));
-  }
-  return enter < leave && enter > 0 ? enter : kNever;
-}
 
 /// Where a link of that length would end; the body's flesh is around the lines between joints.
 void place_joints(const Skeleton& skeleton, const std::vector<Vector3d>& directions, Lot& lot, const Matrix3d& body,
