@@ -16,6 +16,7 @@ void register_cloud_filter(NodeTypes& types);
 void register_traffic_signs(NodeTypes& types);
 void register_object_3d(NodeTypes& types);
 void register_body_pose(NodeTypes& types);
+void register_laser_fusion(NodeTypes& types);
 }  // namespace takt
 
 namespace takt::graph {
@@ -35,6 +36,7 @@ NodeTypes node_types() {
   register_traffic_signs(types);
   register_object_3d(types);
   register_body_pose(types);
+  register_laser_fusion(types);
   return types;
 }
 
