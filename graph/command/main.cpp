@@ -144,6 +144,7 @@ int main(int argc, char** argv) {
   takt::command::EvalGroundOptions ground;
   takt::command::EvalSignsOptions signs;
   takt::command::EvalBodyPoseOptions body_pose;
+  takt::command::EvalRegistrationOptions registration;
   takt::command::ReplayOptions replay;
   takt::command::LogOptions log;
   takt::command::CloudOptions cloud;
@@ -182,6 +183,7 @@ int main(int argc, char** argv) {
   takt::command::add_eval_ground(*eval, ground, exit_code);
   takt::command::add_eval_signs(*eval, signs, exit_code);
   takt::command::add_eval_body_pose(*eval, body_pose, exit_code);
+  takt::command::add_eval_registration(*eval, registration, exit_code);
 
   try {
     app.parse(argc, argv);
