@@ -6,11 +6,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <nanoflann.hpp>
 #include <random>
 #include <tuple>
 
 #include "bench/interleaved.hpp"
+#include "bench/kd_tree.hpp"
 #include "bench/suite.hpp"
 #include "nodes/cloud/outlier_filter.hpp"
 #include "nodes/cloud/voxel_reference.hpp"
@@ -74,17 +74,6 @@ double cpu_ms(Work work) {
   return static_cast<double>(thread_cpu_ns() - begin) * 1e-6;
 }
 
-/// For nanoflann.
-struct Points {
-  const std::vector<Point>& points;
-  size_t kdtree_get_point_count() const { return points.size(); }
-  float kdtree_get_pt(size_t i, size_t axis) const { return (&points[i].x)[axis]; }
-  template <class Box>
-  bool kdtree_get_bbox(Box&) const {
-    return false;
-  }
-};
-
 /// For nanoflann: counts, and ends the search at `enough`. It takes what is nearer than worstDist().
 struct Counter {
   using DistanceType = float;
@@ -97,9 +86,8 @@ struct Counter {
 };
 
 void filter_with_kd_tree(const std::vector<Point>& cloud, int n_min, std::span<uint8_t> keep) {
-  using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, Points>, Points, 3, uint32_t>;
-  const Points points{cloud};
-  Tree tree(3, points, nanoflann::KDTreeSingleIndexAdaptorParams(10));
+  const KdTreePoints points{cloud};
+  KdTree tree(3, points, nanoflann::KDTreeSingleIndexAdaptorParams(10));
   tree.buildIndex();
   const auto radius = static_cast<float>(kRadius_m);
   for (size_t i = 0; i < cloud.size(); ++i) {
