@@ -229,7 +229,7 @@ int sweep_success(const EvalRegistrationOptions& o) {
 
 int sweep_population(const EvalRegistrationOptions& o) {
   const std::vector<size_t> populations{2, 5, 10, 20, 50, 100, 200, 500, 1000};
-  const std::vector<uint32_t> generations{2'000, 5'000, 10'000, 20'000, 50'000};
+  const std::vector<uint32_t> generations{300, 1'000, 3'000, 10'000, 50'000};
   Json rows = Json::array();
   std::vector<Curve> curves;
   for (const double overlap : {1.0, 0.6}) {
