@@ -13,6 +13,7 @@ std::vector<Row> run_graph(const Options&);
 std::vector<Row> run_trace(const Options&);
 std::vector<Row> run_record(const Options&);
 std::vector<Row> run_cloud(const Options&);
+std::vector<Row> run_registration(const Options&);
 #ifdef TAKT_BENCH_STEREO
 std::vector<Row> run_stereo(const Options&);
 std::vector<Row> run_rectify(const Options&);
@@ -36,6 +37,7 @@ std::span<const Suite> suites() {
       {"trace", "what tracing costs a job and a run, against the same without", run_trace},
       {"record", "what recording two stereo cameras of 1280x960 costs, against the same run without", run_record},
       {"cloud", "outlier removal, interpolation, smoothing, reduction; against a kd-tree and hash maps", run_cloud},
+      {"registration", "generations of genetic ICP, 1000 + 1000 points; against a kd-tree", run_registration},
 #ifdef TAKT_BENCH_STEREO
       {"stereo", "dense disparity at 640x480, 150 disparities, against OpenCV's matchers", run_stereo},
       {"rectify", "debayering and rectification of a 640x480 pair, against OpenCV's", run_rectify},

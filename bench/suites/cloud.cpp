@@ -10,8 +10,8 @@
 #include <tuple>
 
 #include "bench/interleaved.hpp"
+#include "bench/kd_tree.hpp"
 #include "bench/suite.hpp"
-#include "bench/suites/kd_tree.hpp"
 #include "nodes/cloud/outlier_filter.hpp"
 #include "nodes/cloud/voxel_reference.hpp"
 
@@ -78,7 +78,7 @@ struct Counter {
 };
 
 void filter_with_kd_tree(const std::vector<Point>& cloud, int n_min, std::span<uint8_t> keep) {
-  const TreePoints points{cloud};
+  const KdTreePoints points{cloud};
   KdTree tree(3, points, nanoflann::KDTreeSingleIndexAdaptorParams(10));
   tree.buildIndex();
   const auto radius = static_cast<float>(kRadius_m);

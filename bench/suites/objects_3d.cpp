@@ -9,8 +9,8 @@
 #include <stdexcept>
 
 #include "bench/interleaved.hpp"
+#include "bench/kd_tree.hpp"
 #include "bench/suite.hpp"
-#include "bench/suites/kd_tree.hpp"
 #include "graph/command/prepare.hpp"
 #include "nodes/object_3d/evaluate.hpp"
 
@@ -46,7 +46,7 @@ Things things_of(const Scene& scene) {
 /// Regions of so many points at least that their reach does not cut; a point is in one region at most.
 size_t regions_by_kd_tree(const Things& things, const SegmentParameters& p) {
   const std::vector<Point>& points = things.points;
-  const TreePoints all{points};
+  const KdTreePoints all{points};
   KdTree tree(3, all, nanoflann::KDTreeSingleIndexAdaptorParams(10));
   tree.buildIndex();
   std::vector<uint32_t> seeds = things.seeds;

@@ -92,6 +92,18 @@ struct EvalPersonTrackingOptions {
   bool json = false;
 };
 void add_eval_person_tracking(CLI::App& eval, EvalPersonTrackingOptions& options, int& exit_code);
+struct EvalRegistrationOptions {
+  std::filesystem::path source, target, reference;  ///< all three, or a sweep
+  std::string sweep, metric;                        ///< of generated pairs
+  size_t runs = 20, points = 1000, population = 100;
+  uint32_t generations = 25'000;
+  double cut_m = 0, sigma_m = 0;  ///< 0: chosen
+  uint64_t seed = 1;
+  std::filesystem::path out;  ///< fused cloud
+  std::string picture;
+  bool json = false;
+};
+void add_eval_registration(CLI::App& eval, EvalRegistrationOptions& options, int& exit_code);
 struct EvalGroundOptions {
   std::filesystem::path images, labels;  ///< all three, or none: a pavement is generated
   std::vector<int> drivable;             ///< class ids

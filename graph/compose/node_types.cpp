@@ -20,6 +20,7 @@ void register_scan_matching(NodeTypes& types);
 void register_robot_pose(NodeTypes& types);
 void register_traversability(NodeTypes& types);
 void register_person_tracking(NodeTypes& types);
+void register_laser_fusion(NodeTypes& types);
 }  // namespace takt
 
 namespace takt::graph {
@@ -43,6 +44,7 @@ NodeTypes node_types() {
   register_robot_pose(types);
   register_traversability(types);
   register_person_tracking(types);
+  register_laser_fusion(types);
   return types;
 }
 

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "nodes/laser_fusion/genetic_icp.hpp"
+
+#include <cmath>
+#include <stdexcept>
+
+#include "nodes/laser_fusion/icp.hpp"
+
+namespace takt::laser_fusion {
+
+GeneticIcp::GeneticIcp(Matcher& matcher, const GeneticParameters& parameters)
+    : matcher_(&matcher), parameters_(parameters) {
+  if (parameters.population < 2) throw std::invalid_argument("the population of genetic ICP must be at least 2");
+  for (const Parameter p : {kX, kY, kZ, kYaw, kPitch, kRoll})
+    if (!parameters.locks[p]) free_.push_back(p);
+  if (free_.empty()) throw std::invalid_argument("genetic ICP has nothing to vary: all six parameters are locked");
+  population_.reserve(parameters.population);
+}
+
+void GeneticIcp::begin(const Rigid& start, uint64_t seed) {
+  random_.seed(seed);
+  current_ = best_ = to_parameters(start);
+  population_.assign(1, current_);
+  oldest_ = 0;
+  generation_ = 0;
+  quality_ = matcher_->evaluate(to_rigid(current_));
+  scores_[0] = scores_[1] = quality_.score;
+}
+
+void GeneticIcp::next() {
+  const bool converged = generation_ >= 1 && !(std::abs(scores_[1] - scores_[0]) >= parameters_.eps_conv);
+  current_ = converged ? offspring() : icp_step(*matcher_, current_, parameters_.locks);
+  ++generation_;
+  const Quality quality = matcher_->evaluate(to_rigid(current_));
+  scores_[1] = scores_[0];
+  scores_[0] = quality.score;
+  if (!(quality.score < quality_.score)) return;
+  quality_ = quality;
+  best_ = current_;
+  if (population_.size() < parameters_.population) {
+    population_.push_back(current_);
+  } else {
+    population_[oldest_] = current_;
+    oldest_ = (oldest_ + 1) % population_.size();
+  }
+}
+
+PoseParameters GeneticIcp::offspring() {
+  PoseParameters child = population_[any(population_.size())];
+  const PoseParameters& other = population_[any(population_.size())];
+  const Parameter inherited = free_[any(free_.size())], mutated = free_[any(free_.size())];
+  child[inherited] = other[inherited];
+  child[mutated] += uniform(-parameters_.mutation[mutated], parameters_.mutation[mutated]);
+  return child;
+}
+
+// Not the standard library's distributions, which differ from one to the next.
+size_t GeneticIcp::any(size_t count) { return random_() % count; }
+
+double GeneticIcp::uniform(double low, double high) {
+  return low + (high - low) * static_cast<double>(random_() >> 11) * 0x1p-53;
+}
+
+}  // namespace takt::laser_fusion

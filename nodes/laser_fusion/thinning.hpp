@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+// From clouds of sensors to the few, evenly spread points that a search works with.
+#pragma once
+#include <span>
+
+#include "nodes/cloud/voxel_grid.hpp"
+
+namespace takt::laser_fusion {
+
+/// Fills `out` with at most out.capacity() points of the cloud: as they are if they are few enough, else the mean point
+/// of each voxel, whose edge is about the least one from `edge_m` on that makes them few enough. Points that are not
+/// usable() are left out. The grid holds as many points as the cloud has. Returns the edge, 0 if none was needed.
+double thin_out(const cloud::CloudView& cloud, double edge_m, cloud::VoxelGrid& grid, cloud::CloudBuffer& out);
+
+/// Median distance from a point to the nearest other one, m; 0 for less than two. Of a large cloud it looks at some
+/// hundred points, evenly chosen. For tools: allocates.
+double spacing_of(std::span<const Point> points);
+
+}  // namespace takt::laser_fusion
