@@ -137,27 +137,34 @@ class CensusCost {
   Vec8 left_[kPlanes];
 };
 
-/// kVectors: of one pixel, known to the compiler; 0: as many as the row says.
+/// The paths from the left and from above, pixel by pixel. kVectors: of one pixel, known to the compiler; 0: as many as
+/// the row says.
 template <int kVectors>
-void forward(const PathRow& given) {
-  const PathRow row = given;  // a copy: stores of bytes could change the original for all that the compiler knows
-  const int last = (kVectors > 0 ? kVectors : row.vectors) - 1;
-  const ptrdiff_t stride = ptrdiff_t{last + 1} * kByteLanes;
-  std::memset(row.beside, 0, static_cast<size_t>(stride));
-  uint8_t beside_least = 0;
-  for (int x = 0; x < row.width; ++x) {
-    const CensusCost cost(row, x);
-    Path beside(row.beside, beside_least, row), above(row.above + x * stride, row.above_least[x], row);
+class Forward {
+ public:
+  HWY_INLINE explicit Forward(const PathRow& row) : row_(row) {
+    std::memset(row.from_left, 0, static_cast<size_t>(row.vectors * kByteLanes));
+  }
+  /// The next one, x = 0, 1, 2 ...
+  HWY_INLINE void advance(int x) {
+    const int last = (kVectors > 0 ? kVectors : row_.vectors) - 1;
+    const ptrdiff_t stride = ptrdiff_t{last + 1} * kByteLanes;
+    const CensusCost cost(row_, x);
+    Path beside(row_.from_left, least_, row_), above(row_.above + x * stride, row_.above_least[x], row_);
     for (int j = 0; j <= last; ++j) {
       const Vec8 c = cost.at(j);
-      hn::Store(c, kByteTag, row.costs + x * stride + j * kByteLanes);
+      hn::Store(c, kByteTag, row_.costs + x * stride + j * kByteLanes);
       hn::Store(hn::SaturatedAdd(beside.advance(j, last, c), above.advance(j, last, c)), kByteTag,
-                row.sums + x * stride + j * kByteLanes);
+                row_.sums + x * stride + j * kByteLanes);
     }
-    beside_least = beside.least();
-    row.above_least[x] = above.least();
+    least_ = beside.least();
+    row_.above_least[x] = above.least();
   }
-}
+
+ private:
+  const PathRow row_;  ///< a copy: stores of bytes could change the original for all that the compiler knows
+  uint8_t least_ = 0;  ///< of the path from the left
+};
 
 /// The first lane of the totals that holds the value.
 HWY_INLINE int find(const uint8_t* totals, uint8_t value) {
@@ -176,53 +183,74 @@ bool ambiguous(const PathRow& row, int best, int d) {
   return (second - best) * 256 <= row.uniqueness * second;
 }
 
+/// The path from the right and the winners, pixel by pixel.
 template <int kVectors>
-void backward(const PathRow& given) {
-  const PathRow row = given;  // see forward()
-  const int last = (kVectors > 0 ? kVectors : row.vectors) - 1;
-  const ptrdiff_t stride = ptrdiff_t{last + 1} * kByteLanes;
-  std::memset(row.beside, 0, static_cast<size_t>(stride));
-  uint8_t beside_least = 0;
-  for (int x = row.width - 1; x >= 0; --x) {
-    Path beside(row.beside, beside_least, row);
+class Backward {
+ public:
+  HWY_INLINE explicit Backward(const PathRow& row) : row_(row) {
+    std::memset(row.from_right, 0, static_cast<size_t>(row.vectors * kByteLanes));
+  }
+  /// The next one, x = width - 1, width - 2 ...
+  HWY_INLINE void advance(int x) {
+    const int last = (kVectors > 0 ? kVectors : row_.vectors) - 1;
+    const ptrdiff_t stride = ptrdiff_t{last + 1} * kByteLanes;
+    Path beside(row_.from_right, least_, row_);
     Vec8 smallest = hn::Set(kByteTag, 255);
     for (int j = 0; j <= last; ++j) {
       const ptrdiff_t at = x * stride + j * kByteLanes;
-      const Vec8 total = hn::SaturatedAdd(hn::Load(kByteTag, row.sums + at),
-                                          beside.advance(j, last, hn::Load(kByteTag, row.costs + at)));
-      hn::Store(total, kByteTag, row.totals + j * kByteLanes);
+      const Vec8 total = hn::SaturatedAdd(hn::Load(kByteTag, row_.sums + at),
+                                          beside.advance(j, last, hn::Load(kByteTag, row_.costs + at)));
+      hn::Store(total, kByteTag, row_.totals + j * kByteLanes);
       smallest = hn::Min(smallest, total);
     }
-    beside_least = beside.least();
+    least_ = beside.least();
     const uint8_t best = smallest_lane(smallest);
-    const int d = find(row.totals, best);
-    const bool fits = row.subpixel && d > 0 && d + 1 < row.disparities;
-    const int fraction = fits ? fraction_of(row.totals[d - 1], best, row.totals[d + 1]) : kNoFraction;
-    row.fine[x] = static_cast<int16_t>(d * kFractions + fraction);
-    row.least[x] = best;
-    if (row.uniqueness > 0) row.ambiguous[x] = ambiguous(row, best, d);
+    const int d = find(row_.totals, best);
+    const bool fits = row_.subpixel && d > 0 && d + 1 < row_.disparities;
+    const int fraction = fits ? fraction_of(row_.totals[d - 1], best, row_.totals[d + 1]) : kNoFraction;
+    row_.fine[x] = static_cast<int16_t>(d * kFractions + fraction);
+    row_.least[x] = best;
+    if (row_.uniqueness > 0) row_.ambiguous[x] = ambiguous(row_, best, d);
+  }
+
+ private:
+  const PathRow row_;  ///< see Forward
+  uint8_t least_ = 0;  ///< of the path from the right
+};
+
+template <int kVectors>
+void run(const PathRow* next, const PathRow* finished) {
+  if (next == nullptr) {
+    Backward<kVectors> backward(*finished);
+    for (int x = finished->width - 1; x >= 0; --x) backward.advance(x);
+    return;
+  }
+  Forward<kVectors> forward(*next);
+  if (finished == nullptr) {
+    for (int x = 0; x < next->width; ++x) forward.advance(x);
+    return;
+  }
+  // Each waits for its own pixel before most of the time; so the processor does one while the other waits.
+  Backward<kVectors> backward(*finished);
+  for (int x = 0; x < next->width; ++x) {
+    forward.advance(x);
+    backward.advance(next->width - 1 - x);
   }
 }
 
-template <int kVectors>
-void run(const PathRow& row) {
-  forward<kVectors>(row);
-  backward<kVectors>(row);
-}
-
-void run_row(const PathRow& row) {
-  switch (row.vectors) {
-    case 1: return run<1>(row);
-    case 2: return run<2>(row);
-    case 3: return run<3>(row);
-    case 4: return run<4>(row);
-    case 5: return run<5>(row);
-    default: return run<0>(row);
+void run_rows(const PathRow* next, const PathRow* finished) {
+  switch ((next != nullptr ? next : finished)->vectors) {
+    case 1: return run<1>(next, finished);
+    case 2: return run<2>(next, finished);
+    case 3: return run<3>(next, finished);
+    case 4: return run<4>(next, finished);
+    case 5: return run<5>(next, finished);
+    default: return run<0>(next, finished);
   }
 }
 
 const PathKernels& target_path_kernels() {
-  static const PathKernels table{hwy::TargetName(HWY_TARGET), kByteLanes, run_row};
+  static const PathKernels table{hwy::TargetName(HWY_TARGET), kByteLanes, run_rows};
   return table;
 }
 

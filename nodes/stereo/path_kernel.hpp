@@ -25,13 +25,13 @@ struct PathRow {
   const uint8_t* beyond = nullptr;        ///< element d: 255 outside the search range, else 0
 
   // `vectors` vectors for each pixel.
-  uint8_t* costs = nullptr;
+  uint8_t* costs = nullptr;        ///< matching costs
   uint8_t* above = nullptr;        ///< in: the path from above at the row before (zero at the first); out: at this row
   uint8_t* above_least = nullptr;  ///< its minima, a byte a pixel
-  uint8_t* sums = nullptr;         ///< scratch: paths from the left and from above
+  uint8_t* sums = nullptr;         ///< paths from the left and from above
 
-  uint8_t* beside = nullptr;  ///< scratch, one pixel: the path from the left or from the right
-  uint8_t* totals = nullptr;  ///< scratch, one pixel
+  // Scratch, one pixel each.
+  uint8_t *from_left = nullptr, *from_right = nullptr, *totals = nullptr;
 
   int16_t* fine = nullptr;       ///< out: disparity << 6 | fraction
   uint8_t* least = nullptr;      ///< out: the winner's total
@@ -42,8 +42,9 @@ struct PathRow {
 struct PathKernels {
   const char* target;
   int lanes;  ///< bytes of a vector
-  /// Paths from the left and from above along a row, then the one from the right and the winners.
-  void (*run_row)(const PathRow& row);
+  /// Paths from the left and from above along the next row, and the one from the right with the winners along the row
+  /// before, which must have been `next` already; null: none. The two share `above` and nothing else that is written.
+  void (*run_rows)(const PathRow* next, const PathRow* finished);
 };
 
 const PathKernels& path_kernels();

@@ -24,7 +24,8 @@ struct SemiGlobalMatcher::State {
   const PathKernels* kernels;
   PlaneMaker maker;
   Planes left, right_mirrored;
-  Buffer<uint8_t> outside, beyond, costs, above, above_least, sums, beside, totals;
+  Buffer<uint8_t> outside, beyond, above, above_least, from_left, from_right, totals;
+  std::array<Buffer<uint8_t>, 2> costs, sums;   ///< of even and odd rows
   Rows<int16_t> left_fine, right_fine, smooth;  ///< the right one's columns are reversed
   Rows<uint8_t> least, ambiguous;
   std::array<uint8_t, 256> confidences{};  ///< of a sum of three paths
@@ -46,12 +47,11 @@ SemiGlobalMatcher::State::State(int width_, int height_, int channels_, const Ma
   std::memset(outside.data() + width, p.truncation(), size(depth));
   beyond = Buffer<uint8_t>(size(depth));
   set_range(p.disparities);
-  costs = Buffer<uint8_t>(size(width) * size(depth));
+  for (auto* volume : {&costs, &sums})
+    for (Buffer<uint8_t>& row : *volume) row = Buffer<uint8_t>(size(width) * size(depth));
   above = Buffer<uint8_t>(size(width) * size(depth));
   above_least = Buffer<uint8_t>(size(width));
-  sums = Buffer<uint8_t>(size(width) * size(depth));
-  beside = Buffer<uint8_t>(size(depth));
-  totals = Buffer<uint8_t>(size(depth));
+  for (Buffer<uint8_t>* pixel : {&from_left, &from_right, &totals}) *pixel = Buffer<uint8_t>(size(depth));
   left_fine = Rows<int16_t>(height, width);
   if (p.left_right_check) right_fine = Rows<int16_t>(height, width);
   if (p.median) smooth = Rows<int16_t>(height, width);
@@ -83,13 +83,15 @@ void SemiGlobalMatcher::State::search(const Planes& reference, const Planes& mir
   row.subpixel = p.subpixel;
   row.outside = outside.data();
   row.beyond = beyond.data();
-  row.costs = costs.data();
   row.above = above.data();
   row.above_least = above_least.data();
-  row.sums = sums.data();
-  row.beside = beside.data();
+  row.from_left = from_left.data();
+  row.from_right = from_right.data();
   row.totals = totals.data();
+  PathRow before;
   for (int y = 0; y < height; ++y) {
+    row.costs = costs[static_cast<size_t>(y % 2)].data();
+    row.sums = sums[static_cast<size_t>(y % 2)].data();
     for (int i = 0; i < maker.count(); ++i) {
       row.left[i] = reference[static_cast<size_t>(i)].row(y);
       row.right[i] = mirrored_other[static_cast<size_t>(i)].row(y);
@@ -97,8 +99,10 @@ void SemiGlobalMatcher::State::search(const Planes& reference, const Planes& mir
     row.fine = fine.row(y);
     row.least = least.row(y);
     row.ambiguous = ambiguous.row(y);
-    kernels->run_row(row);
+    kernels->run_rows(&row, y > 0 ? &before : nullptr);
+    before = row;
   }
+  kernels->run_rows(nullptr, &before);
 }
 
 void SemiGlobalMatcher::State::write(int y, const DisparityViews& out) const {
