@@ -17,8 +17,8 @@ namespace takt::stereo {
 /// live as long as the object, sleep between two matches and run under the policy of the thread that made it.
 class BandMatcher final : public Matcher {
  public:
-  /// About half a millisecond of looking whether a band is done.
-  static constexpr int kPatience = 20'000;
+  /// About two milliseconds of looking whether a band is done: threads of a virtual machine wake up late.
+  static constexpr int kPatience = 80'000;
 
   /// `bands` 1..8, at most one for every 16 rows; `patience` counts looks. Throws std::invalid_argument for those, for
   /// parameters that problem() objects to and for a selection that looks along the whole image (semi_global).
