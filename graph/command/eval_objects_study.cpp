@@ -5,7 +5,7 @@
 
 #include "graph/command/curves.hpp"
 #include "graph/command/eval_command.hpp"
-#include "nodes/object_detection/study.hpp"
+#include "nodes/object_detection/evaluate_study.hpp"
 
 namespace takt::command {
 namespace {

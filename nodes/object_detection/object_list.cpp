@@ -106,7 +106,7 @@ void ObjectList::save(int side_px) {
 }
 
 void ObjectList::write(int side_px) {
-  const std::string name = "objects.txt." + std::to_string(getpid());
+  const std::string name = "objects.txt." + std::to_string(getpid());  // replay: no job writes it
   for (const ReferenceView& view : added_) {
     std::filesystem::create_directories(view.file.parent_path());
     write_view(view, view.file);

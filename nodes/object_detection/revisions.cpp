@@ -50,7 +50,7 @@ std::string publish_revision(const fs::path& folder, int side_px) {
   const std::string name = name_of(folder, files);
   const fs::path revision = revisions_of(folder) / name;
   if (fs::exists(revision)) return name;
-  const fs::path unfinished = revisions_of(folder) / ("." + std::to_string(getpid()));
+  const fs::path unfinished = revisions_of(folder) / ("." + std::to_string(getpid()));  // replay: no job writes it
   try {
     for (const fs::path& file : files) {
       fs::create_directories((unfinished / file).parent_path());

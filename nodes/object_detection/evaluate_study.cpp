@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "nodes/object_detection/study.hpp"
+#include "nodes/object_detection/evaluate_study.hpp"
 
 #include <algorithm>
 
