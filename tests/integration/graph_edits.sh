@@ -115,7 +115,7 @@ edit '
 ' '
   $a\  scan_matching: {rate: 5, offset: 22ms, budget: 8ms, deadline: 200ms}
   $a\  robot_pose: {rate: 10, offset: 40ms, budget: 1ms, deadline: 100ms}
-  s/^(  body_pose: .*budget: )40ms/\120ms/
+  s/^(  body_pose: .*budget: )25ms/\110ms/
 '
 maps joined_pose
 finish
