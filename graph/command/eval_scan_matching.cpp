@@ -21,9 +21,7 @@ using namespace scan_matching;
 using Json = nlohmann::ordered_json;
 
 /// theta of a log is the driving direction, which is the robot's y axis (algorithm reference 21.9).
-PlanarPose robot(const replay::PlanarPose& logged) {
-  return {logged.x_m, logged.y_m, logged.theta_rad - std::numbers::pi / 2};
-}
+PlanarPose robot(const PlanarPose& logged) { return {logged.x_m, logged.y_m, logged.theta_rad - std::numbers::pi / 2}; }
 
 /// Scans that have a corrected pose, which is that of the scanner: it is the body here, carried along by the robot's
 /// odometry. What it cannot see is no return.
@@ -38,8 +36,7 @@ Drive read_drive(const EvalScanMatchingOptions& options) {
     const replay::CarmenScan& scan = log->scans[i];
     if (!scan.corrected) continue;
     drive.scans.push_back({static_cast<double>(scan.time_ns) * 1e-9,
-                           scan_matching::compose(robot(scan.odometry), {0, log->laser_ahead_m, 0}),
-                           robot(scan.logged)});
+                           compose(robot(scan.odometry), {0, log->laser_ahead_m, 0}), robot(scan.logged)});
     for (size_t beam = i * log->beams; beam < (i + 1) * log->beams; ++beam) {
       const float range = log->range_m[beam];
       drive.range_m.push_back(range > 0 && range < log->max_range_m ? range : 0);

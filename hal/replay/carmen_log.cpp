@@ -145,7 +145,7 @@ class Parser {
     pending_.reset();
     if (before_neff && pending_repeats_scan_) {
       log_.scans.back().corrected = true;
-      logged_in_odometry_ = compose(odometry_, relative(line.pose, {}));
+      logged_in_odometry_ = compose(odometry_, between(line.pose, {}));
       return true;
     }
     if (!line.timed) return fail(line.line, "ODOM ends with no time", "delete the line, or record the log again");
@@ -260,18 +260,6 @@ class Parser {
 };
 
 }  // namespace
-
-PlanarPose compose(const PlanarPose& frame, const PlanarPose& pose) {
-  const double c = std::cos(frame.theta_rad), s = std::sin(frame.theta_rad);
-  return {frame.x_m + c * pose.x_m - s * pose.y_m, frame.y_m + s * pose.x_m + c * pose.y_m,
-          std::remainder(frame.theta_rad + pose.theta_rad, 2 * kPi)};
-}
-
-PlanarPose relative(const PlanarPose& from, const PlanarPose& pose) {
-  const double c = std::cos(from.theta_rad), s = std::sin(from.theta_rad);
-  const double dx = pose.x_m - from.x_m, dy = pose.y_m - from.y_m;
-  return {c * dx + s * dy, c * dy - s * dx, std::remainder(pose.theta_rad - from.theta_rad, 2 * kPi)};
-}
 
 tl::expected<CarmenLog, DeviceError> load_carmen_log(const std::string& id, const std::filesystem::path& file,
                                                      uint64_t largest_bytes) {

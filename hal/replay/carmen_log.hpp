@@ -13,21 +13,13 @@
 #include <vector>
 
 #include "hal/device.hpp"
+#include "rt/transform/planar_pose.hpp"
 
 namespace takt::replay {
 
-/// theta is the driving direction, from the x axis.
-struct PlanarPose {
-  double x_m = 0, y_m = 0, theta_rad = 0;
-};
-/// `pose` seen from the frame in which `frame` is given: frame (+) pose.
-PlanarPose compose(const PlanarPose& frame, const PlanarPose& pose);
-/// `pose`, given in the same frame as `from`, as it is seen from there.
-PlanarPose relative(const PlanarPose& from, const PlanarPose& pose);
-
 struct TimedPose {
   int64_t time_ns = 0;  ///< since the logger's start
-  PlanarPose pose;
+  PlanarPose pose;      ///< theta is the driving direction, from the x axis
 };
 
 struct CarmenScan {

@@ -26,7 +26,7 @@ std::vector<BaseReading> readings_of(const std::vector<TimedPose>& odometry, dou
     const double dt_s = static_cast<double>(line.time_ns - odometry[old].time_ns) * 1e-9 / speed;
     if (dt_s > 0) {
       // The base cannot slide sideways and drove an arc: its chord lies along the mean heading.
-      const PlanarPose moved = relative(odometry[old].pose, line.pose);
+      const PlanarPose moved = between(odometry[old].pose, line.pose);
       const double half = moved.theta_rad / 2, chord_m = moved.x_m * std::cos(half) + moved.y_m * std::sin(half);
       reading.speed_m_s = chord_m * (std::abs(half) > 1e-6 ? half / std::sin(half) : 1.0) / dt_s;
       reading.turn_rad_s = moved.theta_rad / dt_s;

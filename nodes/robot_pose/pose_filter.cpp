@@ -9,9 +9,6 @@
 namespace takt::robot_pose {
 namespace {
 
-using scan_matching::between;
-using scan_matching::wrapped;
-
 constexpr int kSpeed = 3, kTurn = 4;
 
 double seconds(int64_t ns) { return static_cast<double>(ns) * 1e-9; }

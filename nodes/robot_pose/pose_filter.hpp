@@ -13,7 +13,6 @@
 namespace takt::robot_pose {
 
 using scan_matching::Covariance;
-using scan_matching::PlanarPose;
 
 /// Who measures.
 enum class Source : uint8_t { wheels, ego_motion, scans };

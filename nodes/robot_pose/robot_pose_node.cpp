@@ -11,7 +11,6 @@ namespace takt {
 namespace {
 
 using namespace robot_pose;
-using scan_matching::between;
 using scan_matching::planar;
 
 UncertainPose uncertain(const Pose& pose) {

@@ -78,7 +78,8 @@ void LocalMap::sort_into_buckets() {
   for (const SurfacePoint& p : points_)
     if (in_buckets(p)) ++starts_[bucket_of(p)];
   uint32_t end = 0;
-  for (uint32_t& start : starts_) start = end += start;  // ends for now: filling from the back makes starts of them
+  for (uint32_t& start : starts_)
+    start = end += start;  // the end of each bucket; filling it from the back moves that to its start
   for (size_t i = points_.size(); i-- > 0;)
     if (in_buckets(points_[i])) order_[--starts_[bucket_of(points_[i])]] = static_cast<uint32_t>(i);
 }

@@ -5,32 +5,13 @@
 #include <cmath>
 #include <numbers>
 
+#include "rt/transform/planar_pose.hpp"
 #include "rt/transform/pose_math.hpp"
 
 namespace takt::scan_matching {
 
-/// p_parent = R(theta) p_child + (x, y).
-struct PlanarPose {
-  double x_m = 0, y_m = 0, theta_rad = 0;
-};
-
 /// Of the errors (x, y, theta) along the axes of the parent, as in rt/transform/pose_math.hpp.
 using Covariance = Eigen::Matrix3d;
-
-inline double wrapped(double angle_rad) { return std::remainder(angle_rad, 2 * std::numbers::pi); }
-
-inline PlanarPose compose(const PlanarPose& parent, const PlanarPose& child) {
-  const double c = std::cos(parent.theta_rad), s = std::sin(parent.theta_rad);
-  return {parent.x_m + c * child.x_m - s * child.y_m, parent.y_m + s * child.x_m + c * child.y_m,
-          wrapped(parent.theta_rad + child.theta_rad)};
-}
-
-/// `to` as it is seen from `from`: compose(from, between(from, to)) is `to`.
-inline PlanarPose between(const PlanarPose& from, const PlanarPose& to) {
-  const double c = std::cos(from.theta_rad), s = std::sin(from.theta_rad);
-  const double dx = to.x_m - from.x_m, dy = to.y_m - from.y_m;
-  return {c * dx + s * dy, c * dy - s * dx, wrapped(to.theta_rad - from.theta_rad)};
-}
 
 inline PlanarPose planar(const Transform& t) {
   return {t.x, t.y, std::atan2(2 * (t.qw * t.qz + t.qx * t.qy), 1 - 2 * (t.qy * t.qy + t.qz * t.qz))};

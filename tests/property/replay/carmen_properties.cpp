@@ -82,7 +82,7 @@ TEST_CASE("a drive whose poses a mapping program corrected gives back its odomet
       const PlanarPose pose =
           compose(compose(correction, odometry), {0.1 * normal(random), 0.1 * normal(random), 0.05 * normal(random)});
       corrected.push_back(pose);
-      correction = compose(pose, relative(odometry, {}));
+      correction = compose(pose, between(odometry, {}));
       text += flaser_line(t, 4, 1, pose) + odom_line(0, pose) + "NEFF 3.5\n";
     }
     const CarmenFile file(text);
@@ -90,7 +90,7 @@ TEST_CASE("a drive whose poses a mapping program corrected gives back its odomet
     REQUIRE(log.has_value());
     REQUIRE(log->odometry.size() == lines.size());
     for (size_t i = 0; i < lines.size(); ++i) {
-      const PlanarPose error = relative(lines[i], log->odometry[i].pose);
+      const PlanarPose error = between(lines[i], log->odometry[i].pose);
       CHECK(std::hypot(error.x_m, error.y_m) < 1e-8);
       CHECK(std::abs(error.theta_rad) < 1e-9);
     }

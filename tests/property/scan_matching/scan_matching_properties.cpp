@@ -11,6 +11,7 @@
 #include "nodes/scan_matching/occupancy_map.hpp"
 #include "nodes/scan_matching/scan_matcher.hpp"
 
+using namespace takt;
 using namespace takt::scan_matching;
 
 namespace {

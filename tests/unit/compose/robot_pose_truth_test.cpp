@@ -11,7 +11,6 @@
 #include "tests/unit/compose/drive.hpp"
 
 using namespace takt;
-using scan_matching::PlanarPose;
 
 namespace {
 

@@ -23,10 +23,10 @@ inline std::string number(double value) {
   return text;
 }
 inline std::string trailer(double time_s) { return " " + number(time_s) + " host " + number(time_s) + "\n"; }
-inline std::string pose_text(const replay::PlanarPose& p) {
+inline std::string pose_text(const PlanarPose& p) {
   return " " + number(p.x_m) + " " + number(p.y_m) + " " + number(p.theta_rad);
 }
-inline std::string odom_line(double time_s, const replay::PlanarPose& p) {
+inline std::string odom_line(double time_s, const PlanarPose& p) {
   return "ODOM" + pose_text(p) + " 0 0 0" + trailer(time_s);
 }
 /// `beams` ranges first, first + 0.01, first + 0.02 ... metres.
@@ -35,7 +35,7 @@ inline std::string ranges_text(int beams, double first) {
   for (int i = 0; i < beams; ++i) text += " " + number(first + 0.01 * i);
   return text;
 }
-inline std::string flaser_line(double time_s, int beams, double first, const replay::PlanarPose& p = {}) {
+inline std::string flaser_line(double time_s, int beams, double first, const PlanarPose& p = {}) {
   return "FLASER" + ranges_text(beams, first) + pose_text(p) + pose_text(p) + trailer(time_s);
 }
 inline std::string rawlaser_line(double time_s, int beams, double first) {

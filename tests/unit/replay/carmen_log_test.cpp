@@ -89,18 +89,18 @@ void check_recording(const CarmenLog& log) {
   for (size_t i = 1; i < log.scans.size(); ++i) {
     const CarmenScan &a = log.scans[i - 1], &b = log.scans[i];
     CHECK(b.time_ns > a.time_ns);
-    const PlanarPose by_odometry = relative(a.odometry, b.odometry), truly = relative(a.logged, b.logged);
+    const PlanarPose by_odometry = between(a.odometry, b.odometry), truly = between(a.logged, b.logged);
     distance_error.push_back(std::hypot(by_odometry.x_m - truly.x_m, by_odometry.y_m - truly.y_m));
     turn_error.push_back(std::abs(std::remainder(by_odometry.theta_rad - truly.theta_rad, 2 * std::numbers::pi)));
   }
   // Odometry is right from scan to scan, and wrong over the whole drive: it is not the corrected trajectory.
   CHECK(median(distance_error) < 0.1);
   CHECK(median(turn_error) < 0.06);
-  const PlanarPose by_odometry = relative(log.scans.front().odometry, log.scans.back().odometry),
-                   truly = relative(log.scans.front().logged, log.scans.back().logged);
+  const PlanarPose by_odometry = between(log.scans.front().odometry, log.scans.back().odometry),
+                   truly = between(log.scans.front().logged, log.scans.back().logged);
   CHECK(std::hypot(by_odometry.x_m - truly.x_m, by_odometry.y_m - truly.y_m) > 10);
   for (size_t i = 1; i < log.odometry.size(); ++i) {
-    const PlanarPose step = relative(log.odometry[i - 1].pose, log.odometry[i].pose);
+    const PlanarPose step = between(log.odometry[i - 1].pose, log.odometry[i].pose);
     CHECK(std::hypot(step.x_m, step.y_m) < 0.3);  // a correction would be a jump
   }
   // Beams run counter-clockwise from the right: seen from corrected poses, walls then stand still.
@@ -110,9 +110,9 @@ void check_recording(const CarmenLog& log) {
 
 }  // namespace
 
-TEST_CASE("poses: relative undoes compose, and the heading stays within half a turn") {
+TEST_CASE("poses: between undoes compose, and the heading stays within half a turn") {
   const PlanarPose a{1, 2, 3}, b{-0.5, 0.25, 2};
-  const PlanarPose back = relative(a, compose(a, b));
+  const PlanarPose back = between(a, compose(a, b));
   CHECK(back.x_m == doctest::Approx(b.x_m));
   CHECK(back.y_m == doctest::Approx(b.y_m));
   CHECK(back.theta_rad == doctest::Approx(b.theta_rad));

@@ -14,7 +14,6 @@ namespace takt::test {
 
 using robot_pose::Covariance;
 using robot_pose::Measured;
-using robot_pose::PlanarPose;
 using robot_pose::Source;
 
 struct Arrival {
@@ -38,7 +37,7 @@ struct GeneratedDrive {
     const auto steps = static_cast<int64_t>(duration_s / dt);
     for (int64_t i = 0; i <= steps; ++i) {
       truth.push_back(robot);
-      robot = scan_matching::compose(robot, {p.slip * root * noise(random), v * dt, w * dt});
+      robot = compose(robot, {p.slip * root * noise(random), v * dt, w * dt});
       v += p.acceleration * root * noise(random);
       w += p.turn_acceleration * root * noise(random);
     }
@@ -55,7 +54,7 @@ struct GeneratedDrive {
     const auto period = static_cast<int64_t>(period_s * 1e3) * kStep_ns;
     const auto last = static_cast<int64_t>(truth.size() - 1) * kStep_ns;
     for (int64_t to = period; to <= last; to += period) {
-      PlanarPose moved = scan_matching::between(at(to - period), at(to));
+      PlanarPose moved = between(at(to - period), at(to));
       moved.x_m += sigma.x() * noise(random);
       moved.y_m += sigma.y() * noise(random);
       moved.theta_rad += sigma.z() * noise(random);
@@ -68,7 +67,7 @@ struct GeneratedDrive {
 /// (e^T C^-1 e) of a pose: 3 in the mean if the covariance is right.
 inline double normalised_error_squared(const robot_pose::Estimate& estimate, const PlanarPose& truth) {
   const PlanarPose& p = estimate.robot_in_map;
-  const Eigen::Vector3d e(p.x_m - truth.x_m, p.y_m - truth.y_m, scan_matching::wrapped(p.theta_rad - truth.theta_rad));
+  const Eigen::Vector3d e(p.x_m - truth.x_m, p.y_m - truth.y_m, wrapped(p.theta_rad - truth.theta_rad));
   return e.dot(estimate.covariance.ldlt().solve(e));
 }
 

@@ -13,7 +13,6 @@ void register_robot_pose(NodeTypes& types);
 }
 
 using namespace takt;
-using scan_matching::PlanarPose;
 
 namespace {
 

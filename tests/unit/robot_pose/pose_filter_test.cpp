@@ -9,6 +9,7 @@
 #include "rt/memory/memory_use.hpp"
 #include "tests/unit/robot_pose/generated_drive.hpp"
 
+using namespace takt;
 using namespace takt::robot_pose;
 using takt::test::Arrival;
 using takt::test::GeneratedDrive;

@@ -9,6 +9,7 @@
 #include "nodes/scan_matching/evaluate.hpp"
 #include "rt/memory/memory_use.hpp"
 
+using namespace takt;
 using namespace takt::scan_matching;
 using takt::UncertainPose;
 
