@@ -4,9 +4,11 @@
 # Default: 30 minutes. obstacle_stop must not miss a deadline; memory must stay flat: resident memory of the supervisor and
 # its members is sampled and the last tenth compared with the second. Exit 1 if either is broken. With --trace FILE it says
 # why a deadline was missed, and memory is not judged, since the trace is kept in it.
+# Beside the run stands how late cyclictest was woken on the same CPUs: what no program could help.
 root=$(readlink -f "$(dirname "$0")/../..")
+export PYTHONPATH="$root/bench/scenarios" PYTHONDONTWRITEBYTECODE=1
 exec python3 - "${TAKT:-$root/takt}" "$root" "$@" <<'PY'
-import json, os, random, subprocess, sys, tempfile, time
+import host_probe, json, os, random, subprocess, sys, tempfile, time
 
 takt, root, args = sys.argv[1], sys.argv[2], sys.argv[3:]
 minutes = float(args[0]) if args else 30
@@ -41,6 +43,7 @@ with tempfile.TemporaryDirectory(prefix="endure-") as work:
             f.write("  - " + kinds[i % len(kinds)].format(t=t, u=t + 3) + "\n")
         f.write("expect:\n  misses: {obstacle_stop: 0}\n")
     log = open(f"{work}/log", "w")
+    probe = host_probe.start(seconds, f"{work}/probe.json")
     run = subprocess.Popen([takt, "run", f"{root}/graph/ace.yaml", "--isolate", "subsystem", "--for", f"{seconds}s", "--faults", f"{work}/scenario.yaml",
                             "--output", f"{work}/out", "--report", f"{work}/report.json", *options], stdout=log, stderr=log)
 
@@ -60,6 +63,8 @@ with tempfile.TemporaryDirectory(prefix="endure-") as work:
         time.sleep(5)
         try: samples.append(resident_mb())
         except OSError: pass
+    if probe: probe.wait()
+    beside = host_probe.text(f"{work}/probe.json", 29)
     if not os.path.exists(f"{work}/report.json"): sys.exit("no report:\n" + open(log.name).read()[-2000:])
     report = json.load(open(f"{work}/report.json"))
     traced = options[options.index("--trace") + 1] if "--trace" in options else None
@@ -70,7 +75,7 @@ early, late = middle(samples[tenth:2 * tenth] or samples), middle(samples[-tenth
 outages = [f for f in report["faults"] if f.get("kind") == "outage"]
 back = sorted(f["down_s"] for f in outages if f["back_s"] is not None)
 faults = report["scenario"]["faults"]
-print(f"{report['duration_s']:.0f} s, policy {report['policy_granted']}, host stall {report['host_stall_ms']} ms: {len(faults)} faults, "
+print(f"{report['duration_s']:.0f} s, policy {report['policy_granted']}, host stall {report['host_stall_ms']} ms, {beside}: {len(faults)} faults, "
       f"{sum(f['struck'] > 0 for f in faults)} struck; {len(outages)} outages, {len(outages) - len(back)} not back"
       + (f", away p50 {back[len(back) // 2]:.2f} s, max {back[-1]:.2f} s" if back else ""))
 print(f"modes {len(report['modes']) - 1} changes; resident memory {early:.0f} MB in the second tenth, {late:.0f} MB in the last")

@@ -3,9 +3,10 @@
 # The main job beside stress-ng: stress.sh [ROUNDS] [SECONDS]. Each round runs it under deadline and fixed, the first one
 # also under cooperative (for contrast), beside four CPU and one memory stressor. One line a run, below it why each job
 # missed (takt explain), the worst at the end; exit 1 if a high-criticality node missed a deadline or a rate was not kept
-# under deadline or fixed.
+# under deadline or fixed. Beside each run stands how late cyclictest was woken on the same CPUs: what no program could help.
 set -u
 root=$(readlink -f "$(dirname "$0")/../..")
+export PYTHONPATH="$root/bench/scenarios" PYTHONDONTWRITEBYTECODE=1
 rounds=${1:-10} seconds=${2:-60}
 command -v stress-ng >/dev/null || { echo "stress-ng is not installed: apt install stress-ng"; exit 3; }
 work=$(mktemp -d)
@@ -14,17 +15,21 @@ stress-ng --cpu 4 --vm 1 --vm-bytes 256M --quiet &
 stress=$!
 for ((round = 1; round <= rounds; ++round)); do
   for policy in deadline fixed $([ $round -eq 1 ] && echo cooperative); do
+    rm -f "$work/probe.json"
+    python3 "$root/bench/scenarios/host_probe.py" "$seconds" "$work/probe.json" &
     "$root/takt" run --for "${seconds}s" --policy $policy --output "$work/out" --report "$work/$round.$policy.json" --trace "$work/trace.json" >"$work/log" 2>&1
     [ -e "$work/$round.$policy.json" ] || { echo "round $round, $policy: no report: $(tail -n 1 "$work/log")"; exit 3; }
+    wait $!  # for the probe
     kill -0 $stress 2>/dev/null || { echo "stress-ng has ended"; exit 3; }
-    python3 - "$work/$round.$policy.json" "$round" <<'PY'
-import json, sys
+    python3 - "$work/$round.$policy.json" "$round" "$work/probe.json" <<'PY'
+import host_probe, json, sys
 report = json.load(open(sys.argv[1]))
 missed = {n["name"]: n["deadline_misses"] for n in report["nodes"] if n["deadline_misses"]}
 behind = {n["name"]: n["released"] - n["completed"] for n in report["nodes"] if n["completed"] < n["released"] - 1}
 late = max(n["lateness_us"]["max"] or 0 for n in report["nodes"] if n["criticality"] == "high")
 print(f"round {sys.argv[2]}: {report['policy_granted']:<11} missed {missed or 'none'}, behind {behind or 'none'}, "
-      f"latest start of a high node {late / 1000:.1f} ms, host stall {report['host_stall_ms']} ms", flush=True)
+      f"latest start of a high node {late / 1000:.1f} ms, host stall {report['host_stall_ms']} ms; "
+      f"{host_probe.text(sys.argv[3], 14)}", flush=True)
 PY
     [ $policy = cooperative ] || "$root/takt" explain "$work/trace.json" | grep -v '^no job missed$' | sed 's/^/    /'
   done
