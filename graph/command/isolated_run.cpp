@@ -60,7 +60,8 @@ std::unique_ptr<DaemonClaim> find_room_for_daemon(std::vector<std::string>& adju
   }
 }
 
-/// Asks the daemon of the transport again and again, and leaves a sign of life each time it has answered.
+/// Asks the daemon of the transport again and again, and leaves a sign of life each time it has answered. Afterwards no
+/// sign is expected: what the supervisor still has to do, such as its report, may take longer.
 class DaemonProbe {
  public:
   DaemonProbe(Transport& transport, GroupSigns& signs, const Clock& clock)
@@ -71,6 +72,7 @@ class DaemonProbe {
             const timespec pause{0, 200'000'000};
             nanosleep(&pause, nullptr);
           }
+          signs.heartbeat_ns.store(0);
         }) {}
 
  private:

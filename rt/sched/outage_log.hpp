@@ -51,7 +51,7 @@ struct GroupSigns {
     int64_t from_ns = 0;
     BoundedText<200> cause;
   };
-  std::atomic<int64_t> heartbeat_ns{0};  ///< when the daemon of its transport last answered; 0: not yet
+  std::atomic<int64_t> heartbeat_ns{0};  ///< when the daemon of its transport last answered; 0: no answer is expected
   AppendLog<Loss, 32> losses;            ///< groups that were lost
 };
 

@@ -9,7 +9,7 @@ namespace takt {
 /// machine is nobody's silence. Time is given. One thread at a time.
 class Silence {
  public:
-  /// Heard at `heartbeat_ns` (0: never yet, which is no silence), looked at now: the silence so far, ns.
+  /// Heard at `heartbeat_ns` (0: none is expected, which is no silence), looked at now: the silence so far, ns.
   int64_t look(int64_t heartbeat_ns, int64_t now_ns) {
     const int64_t awake_ns = std::min(now_ns - last_look_ns_, kAwakeStep_ns);
     silent_ns_ = heartbeat_ns == 0 || heartbeat_ns != heartbeat_ns_ ? 0 : silent_ns_ + awake_ns;
