@@ -72,7 +72,7 @@ Json measure_depth(const EvalBodyPoseOptions& options) {
   const std::vector<Point> in_floor = moved(points, *camera_in_floor);
   BodyDetector detector(skeleton_of(options), {}, in_floor.size());
   const int64_t start = thread_cpu_ns();
-  const auto bodies = detector.run(in_floor, [] { return true; });
+  const auto bodies = detector.run(in_floor, eye_of(*camera_in_floor), [] { return true; });
   const double time_ms = static_cast<double>(thread_cpu_ns() - start) / 1e6;
   if (!options.picture.empty()) {
     cv::Mat image;
@@ -143,7 +143,7 @@ Json measure_generated(const EvalBodyPoseOptions& options) {
     const cv::Mat image(scene.height, scene.width, CV_8UC3, const_cast<uint8_t*>(scene.image.data()));
     cv::Mat large;
     cv::resize(image, large, {}, camera.step_px, camera.step_px, cv::INTER_NEAREST);
-    const auto bodies = detector.run(scene.in_floor, [] { return true; });
+    const auto bodies = detector.run(scene.in_floor, eye_of(scene.camera_in_floor), [] { return true; });
     write(options.picture, draw_bodies(large, scene.camera, scene.camera_in_floor, scene.in_floor, skeleton, bodies));
   }
   Json out = to_json(measure_people(detector, camera, options.seed, options.people));

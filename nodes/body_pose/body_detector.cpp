@@ -8,7 +8,8 @@ namespace takt::body_pose {
 Cluster BodyDetector::cluster(size_t i) const {
   const Candidate& candidate = candidates_[i];
   const auto points = segmentation_.points().subspan(candidate.first, candidate.count);
-  return {points, {candidate.head.x, candidate.head.y, candidate.head.z}, reference_density(points, p_.fit.tube_m)};
+  return {
+      points, {candidate.head.x, candidate.head.y, candidate.head.z}, reference_density(points, p_.fit.tube_m), eye_};
 }
 
 void BodyDetector::keep(const Fit& fit, size_t candidate) {
@@ -30,7 +31,7 @@ Body to_message(const Skeleton& skeleton, const DetectedBody& body) {
   out.top_m = body.top_m;
   for (size_t i = 0; i < skeleton.links.size(); ++i) {
     const Eigen::Vector3f& end = body.fit.ends[i];
-    if (body.fit.fitted[i]) out.joints[i] = {end.x(), end.y(), end.z(), 1};
+    if (body.fit.fitted[i]) out.joints[i] = {end.x(), end.y(), end.z(), body.fit.hidden[i] ? 0.5f : 1.f};
   }
   for (size_t i = 0; i < skeleton.pointers.size(); ++i) {
     const Pointer& pointer = skeleton.pointers[i];

@@ -33,11 +33,13 @@ class BodyDetector {
     bodies_.reserve(static_cast<size_t>(parameters.segmentation.candidates));
   }
 
-  /// Bodies, nearest first. Asks may_go_on() before each rotation of each candidate; when that says no, candidates
-  /// that were not reached are left out.
+  /// Bodies, nearest first, as seen from `eye`. Asks may_go_on() before each rotation of each candidate; when that says
+  /// no, candidates that were not reached are left out.
   template <class MayGoOn>
-  std::span<const DetectedBody> run(std::span<const Point> points, const MayGoOn& may_go_on) {
+  std::span<const DetectedBody> run(std::span<const Point> points, const Eigen::Vector3f& eye,
+                                    const MayGoOn& may_go_on) {
     bodies_.clear();
+    eye_ = eye;
     candidates_ = segmentation_.run(points);
     double tried = 0;
     for (size_t i = 0; i < candidates_.size() && (i == 0 || may_go_on()); ++i) {
@@ -62,11 +64,16 @@ class BodyDetector {
   DetectorParameters p_;
   Segmentation segmentation_;
   Fitter fitter_;
+  Eigen::Vector3f eye_ = Eigen::Vector3f::Zero();
   std::span<const Candidate> candidates_;
   std::vector<DetectedBody> bodies_;
   double searched_ = 1;
 };
 
+/// Where a sensor is that is mounted there: what bodies are seen from.
+inline Eigen::Vector3f eye_of(const Transform& mount) {
+  return Eigen::Vector3d(mount.x, mount.y, mount.z).cast<float>();
+}
 /// Fills one body of a message.
 Body to_message(const Skeleton& skeleton, const DetectedBody& body);
 /// Unit direction of a pointer of the skeleton; 0 0 0 if one of its joints is missing.

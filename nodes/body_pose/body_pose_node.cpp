@@ -43,7 +43,7 @@ class BodyPoseNode final : public Node {
     BodyPoses* out = mount ? bodies_.loan() : nullptr;
     if (out == nullptr) return job.no_result();
     const auto reserve_ns = static_cast<int64_t>(reserve_() * 1e9);
-    const auto found = detector_->run(moved(cloud->points.items(), mapping_3d::to_affine(*mount)),
+    const auto found = detector_->run(moved(cloud->points.items(), mapping_3d::to_affine(*mount)), eye_of(*mount),
                                       [&] { return job.time_left_ns() > reserve_ns; });
     out->joints = static_cast<int32_t>(detector_->skeleton().links.size());
     out->candidates = static_cast<int32_t>(detector_->candidates().size());

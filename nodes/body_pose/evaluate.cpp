@@ -88,7 +88,7 @@ Figures measure_people(BodyDetector& detector, const SceneCamera& camera, uint64
   for (int i = 0; i < trials; ++i) {
     const GeneratedScene scene = make_person(detector.skeleton(), camera, seed, static_cast<uint64_t>(i));
     const int64_t start = thread_cpu_ns();
-    const auto found = detector.run(scene.in_floor, kWithoutEnd);
+    const auto found = detector.run(scene.in_floor, eye_of(scene.camera_in_floor), kWithoutEnd);
     const double time_ms = ms_since(start);
     add(figures, detector.skeleton(), scene.body,
         {found, has_candidate(detector, scene.body), arm_points(detector.skeleton(), scene) < kArmPoints, time_ms});
@@ -113,7 +113,8 @@ Figures measure_any(const Skeleton& skeleton, const FitParameters& parameters, c
     points.clear();
     for (const cloud::Voxel& voxel : grid.voxels()) points.push_back(voxel.mean());
     const double density = reference_density(points, parameters.tube_m);
-    const Fit fit = fitter.fit({points, scene.body.joints[0].cast<float>(), density}, kWithoutEnd);
+    const Cluster cluster{points, scene.body.joints[0].cast<float>(), density, eye_of(scene.camera_in_floor)};
+    const Fit fit = fitter.fit(cluster, kWithoutEnd);
     const DetectedBody body{fit, 0, is_valid(skeleton, parameters, fit), 0};
     add(figures, skeleton, scene.body, {{&body, 1}, true, false, ms_since(start)});
   }

@@ -19,6 +19,27 @@ size_t points_along(const Cluster& cluster, const Vector3f& from, const Vector3f
   return count;
 }
 
+/// Where the link best ends if no point shows it.
+std::optional<Vector3f> find_hidden_end(const Skeleton& skeleton, const FitParameters& p, const Cluster& cluster,
+                                        const LinkTask& task) {
+  std::optional<Vector3f> best;
+  double least = std::numeric_limits<double>::infinity();
+  for (size_t at = 0; at < cluster.points.size(); at += kHidingStep) {
+    const HiddenEnds hidden = hidden_ends(p, task, cluster.eye, vector_of(cluster.points[at]));
+    for (size_t i = 0; i < hidden.count; ++i) {
+      const Vector3f& end = hidden.ends[i];
+      if ((end - task.aim).squaredNorm() > static_cast<float>(p.search_m * p.search_m)) continue;
+      const auto e2 = shape_error(p, task, end);
+      if (!e2 || !(*e2 < least)) continue;
+      if (!angles_allow(skeleton, *task.link, task.frame, (end - task.start).normalized())) continue;
+      if (!is_covered(p, cluster, task, end)) continue;
+      least = *e2;
+      best = end;
+    }
+  }
+  return best;
+}
+
 /// findBestFit of Alg. 3.3.
 std::optional<Vector3f> find_best_fit(const Skeleton& skeleton, const FitParameters& p, const Cluster& cluster,
                                       const LinkTask& task) {
@@ -49,7 +70,7 @@ Fit fit_pose(const Skeleton& skeleton, const FitParameters& p, const Cluster& cl
   std::array<Matrix3f, kMostJoints> follow;
   follow[0] = body;
   PoseError error;
-  error.away = away(cluster.start, fit.yaw_rad);
+  error.away = away(cluster.start, cluster.eye, fit.yaw_rad);
   for (size_t i = 1; i < skeleton.links.size(); ++i) {
     const Link& link = skeleton.links[i];
     std::optional<Vector3f> end;
@@ -62,8 +83,11 @@ Fit fit_pose(const Skeleton& skeleton, const FitParameters& p, const Cluster& cl
                  ? make_mirrored_task(link, start, frame, partner, fit.ends[link.mirrors] - fit.ends[partner.parent])
                  : make_task(link, start, frame, body * skeleton.poses[pose].directions[i].cast<float>());
       end = find_best_fit(skeleton, p, cluster, task);
+      fit.hidden[i] = !end;
+      if (!end && link.descendants > 0) end = find_hidden_end(skeleton, p, cluster, task);
     }
     if (!end) {
+      fit.hidden[i] = false;
       error.missing += p.missing_penalty * (1 + link.descendants);
       continue;
     }
@@ -73,18 +97,20 @@ Fit fit_pose(const Skeleton& skeleton, const FitParameters& p, const Cluster& cl
     follow[i] = frame_of_followers(link, task.frame, offset.normalized());
     error.distance_m += (*end - task.aim).norm();
     const auto along = static_cast<double>(points_along(cluster, task.start, *end, p.tube_m));
-    if (along / offset.norm() < p.density_low * cluster.density) error.thin += p.thin_penalty;
+    if (fit.hidden[i] || along / offset.norm() < p.density_low * cluster.density) error.thin += p.thin_penalty;
   }
-  size_t used = 0;
+  size_t used = 0, all = 0;
   for (const Point& q : cluster.points) {
     bool close = false;
     for (size_t i = 1; i < skeleton.links.size(); ++i)
       close = close || (fit.fitted[i] &&
                         Segment(fit.ends[skeleton.links[i].parent], fit.ends[i]).squared_distance(q.x, q.y, q.z) <=
                             static_cast<float>(p.close_m * p.close_m));
-    used += close ? 1 : 0;
+    const uint32_t weight = weight_of(p, cluster.start, q);
+    used += close ? weight : 0;
+    all += weight;
   }
-  fit.error = error.total(p, used, cluster.points.size());
+  fit.error = error.total(p, used, all);
   return fit;
 }
 

@@ -101,15 +101,43 @@ int rotation_at(int i, int n) {
   return static_cast<int>(int64_t{i} * step % n);
 }
 
-double away(const Vector3f& start, double yaw_rad) {
-  const double distance = std::hypot(start.x(), start.y());
+HiddenEnds hidden_ends(const FitParameters& p, const LinkTask& task, const Vector3f& eye, const Vector3f& point) {
+  HiddenEnds found;
+  const Vector3f ray = (point - eye).normalized(), from_start = point - task.start;
+  const auto length = static_cast<float>(task.link->length_m);
+  const float half = from_start.dot(ray), root = half * half - from_start.squaredNorm() + length * length;
+  if (!(root >= 0)) return found;
+  for (const float behind : {-half - std::sqrt(root), -half + std::sqrt(root)})
+    if (behind >= static_cast<float>(p.behind_m)) found.ends[found.count++] = point + behind * ray;
+  return found;
+}
+
+bool is_covered(const FitParameters& p, const Cluster& cluster, const LinkTask& task, const Vector3f& end) {
+  const auto squared = static_cast<float>(p.tube_m * p.tube_m);
+  for (const float share : {0.25f, 0.5f, 0.75f}) {
+    const Segment sight(cluster.eye, task.start + share * (end - task.start));
+    if (std::none_of(cluster.points.begin(), cluster.points.end(),
+                     [&](const Point& q) { return sight.squared_distance(q.x, q.y, q.z) <= squared; }))
+      return false;
+  }
+  return true;
+}
+
+double away(const Vector3f& start, const Vector3f& eye, double yaw_rad) {
+  const double x = start.x() - eye.x(), y = start.y() - eye.y(), distance = std::hypot(x, y);
   if (distance == 0) return 0;
-  const double towards = (std::sin(yaw_rad) * start.x() - std::cos(yaw_rad) * start.y()) / distance;
+  const double towards = (std::sin(yaw_rad) * x - std::cos(yaw_rad) * y) / distance;
   return (1 - towards) / 2;
 }
 
-double PoseError::total(const FitParameters& p, size_t used, size_t points) const {
-  const double unused = points == 0 ? 0 : 1 - static_cast<double>(used) / static_cast<double>(points);
+uint32_t weight_of(const FitParameters& p, const Vector3f& start, const Point& point) {
+  const float x = point.x - start.x(), y = point.y - start.y();
+  const auto more = static_cast<uint32_t>(std::sqrt(x * x + y * y) / static_cast<float>(p.limb_m));
+  return std::min(1 + more, kMostWeight);
+}
+
+double PoseError::total(const FitParameters& p, size_t used, size_t all) const {
+  const double unused = all == 0 ? 0 : 1 - static_cast<double>(used) / static_cast<double>(all);
   return p.weight_distance * distance_m + p.weight_missing * missing + p.weight_unused * unused + p.weight_thin * thin +
          p.weight_away * away;
 }

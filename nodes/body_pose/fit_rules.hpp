@@ -18,8 +18,10 @@ struct FitParameters {
   double tube_m = 0.06;                         ///< points so near a link lie along it
   double density_min = 0.3, density_low = 0.6;  ///< along a link: below it is refused, penalised
   double length_min = 0.7, length_max = 1.3;
-  double close_m = 0.15;  ///< points so near a fitted link are explained by it
-  double weight_distance = 0.3, weight_missing = 1, weight_unused = 8,
+  double behind_m = 0.06;  ///< what is hidden lies at least so far behind what is seen
+  double close_m = 0.15;   ///< points so near a fitted link are explained by it
+  double limb_m = 0.25;    ///< a point counts once more for each such distance from the start's vertical
+  double weight_distance = 0.3, weight_missing = 1, weight_unused = 6,
          weight_thin = 0.5;      ///< a1 (1/m) .. a4 of Eq. 3.10
   double weight_away = 0.5;      ///< of (1 - cos(angle between where the body faces and the sensor)) / 2
   double missing_penalty = 0.2;  ///< of a link, and once more for each that hangs on it
@@ -27,11 +29,12 @@ struct FitParameters {
   double sigma_length = 0.15;  ///< of length ratios: validation allows twice that from their mean
 };
 
-/// Points of one body, and where its skeleton starts.
+/// Points of one body, where its skeleton starts, and where it is seen from.
 struct Cluster {
   std::span<const Point> points;
   Eigen::Vector3f start = Eigen::Vector3f::Zero();
   double density = 0;  ///< reference density, points a metre: reference_density() of them
+  Eigen::Vector3f eye = Eigen::Vector3f::Zero();
 };
 
 /// Distance of points to a line between two others.
@@ -86,6 +89,17 @@ std::optional<double> shape_error(const FitParameters& p, const LinkTask& task, 
 /// e1 of Alg. 3.3 from the points along a link. Nothing if they are too few.
 std::optional<double> density_error(const FitParameters& p, double reference, size_t points, double length_m);
 
+/// Where a link may end that no point shows: behind a point on its line of sight, a nominal length from its start.
+inline constexpr size_t kHidingStep = 4;  ///< every so many points are asked what they hide
+struct HiddenEnds {
+  std::array<Eigen::Vector3f, 2> ends;
+  size_t count = 0;
+};
+HiddenEnds hidden_ends(const FitParameters& p, const LinkTask& task, const Eigen::Vector3f& eye,
+                       const Eigen::Vector3f& point);
+/// Whether points lie on, or before, all of a link that would end there: otherwise it would be seen if it were there.
+bool is_covered(const FitParameters& p, const Cluster& cluster, const LinkTask& task, const Eigen::Vector3f& end);
+
 /// The link from `start` in a pose: where `direction` (unit) leads, or opposite to its fitted partner.
 LinkTask make_task(const Link& link, const Eigen::Vector3f& start, const Eigen::Matrix3f& frame,
                    const Eigen::Vector3f& direction);
@@ -99,19 +113,27 @@ Eigen::Matrix3f rotation_about_vertical(double yaw_rad);
 /// The order in which n rotations are tried: the i-th of it. Far from one another, so that the first few say much.
 int rotation_at(int i, int n);
 
-/// How much a body at `start` that faces there looks away from the origin, seen from above: 0 not at all .. 1.
-double away(const Eigen::Vector3f& start, double yaw_rad);
+/// How much a body at `start` that faces there looks away from the eye, seen from above: 0 not at all .. 1.
+double away(const Eigen::Vector3f& start, const Eigen::Vector3f& eye, double yaw_rad);
+
+/// Most that a point counts among the unused ones of Eq. 3.10.
+inline constexpr uint32_t kMostWeight = 4;
+/// How often it counts, 1 .. kMostWeight: the more, the farther it lies from the body's vertical. A limb that points at
+/// the camera shows few points, all of them far from the trunk, which shows many.
+uint32_t weight_of(const FitParameters& p, const Eigen::Vector3f& start, const Point& point);
 
 /// What a pose costs (Eq. 3.10), summed up link by link.
 struct PoseError {
   double distance_m = 0, missing = 0, thin = 0, away = 0;
-  double total(const FitParameters& p, size_t used, size_t points) const;
+  /// `used`, `all`: sums of the weights of explained points and of all.
+  double total(const FitParameters& p, size_t used, size_t all) const;
 };
 
 /// A skeleton fitted to a cluster.
 struct Fit {
   std::array<Eigen::Vector3f, kMostJoints> ends;  ///< of the links; ends[0] is the start
   std::array<bool, kMostJoints> fitted{};
+  std::array<bool, kMostJoints> hidden{};  ///< fitted, but no point shows it: hidden_ends()
   double error = 0;
   size_t pose = 0;  ///< of the skeleton's poses
   double yaw_rad = 0;

@@ -23,6 +23,7 @@ Fitter::Fitter(const Skeleton& skeleton, const FitParameters& parameters, size_t
   solved_.reserve(links * poses);
   for (auto& list : of_link_) list.reserve(poses);
   used_.resize((most_points + 63) / 64);
+  for (auto& words : outlying_) words.resize(used_.size());
   close_.resize(used_.size() * links * poses);
 }
 
@@ -35,8 +36,28 @@ void Fitter::begin(const Cluster& cluster) {
     y_[i] = cluster_.points[i].y;
     z_[i] = cluster_.points[i].z;
   }
+  weigh();
   best_ = {};
   best_.error = std::numeric_limits<double>::infinity();
+}
+
+void Fitter::weigh() {
+  for (auto& words : outlying_) std::fill_n(words.begin(), words_, uint64_t{0});
+  weight_of_all_ = 0;
+  for (size_t i = 0; i < cluster_.points.size(); ++i) {
+    const uint32_t weight = weight_of(p_, cluster_.start, cluster_.points[i]);
+    for (uint32_t k = 0; k + 1 < weight; ++k) outlying_[k][i / 64] |= uint64_t{1} << i % 64;
+    weight_of_all_ += weight;
+  }
+}
+
+size_t Fitter::weight_of_used() const {
+  size_t sum = 0;
+  for (size_t w = 0; w < words_; ++w) {
+    sum += static_cast<size_t>(std::popcount(used_[w]));
+    for (const auto& words : outlying_) sum += static_cast<size_t>(std::popcount(used_[w] & words[w]));
+  }
+  return sum;
 }
 
 void Fitter::try_rotation(int k) {
@@ -103,11 +124,31 @@ void Fitter::find_end(const LinkTask& task, Solved& solved) {
     solved.found = true;
     along = points;
   }
+  if (!solved.found && task.link->descendants > 0) find_hidden_end(task, solved);
   if (!solved.found) return;
   const Vector3f offset = solved.end - task.start;
   solved.follow = frame_of_followers(*task.link, task.frame, offset.normalized());
   solved.distance_m = (solved.end - task.aim).norm();
-  solved.thin = static_cast<double>(along) / offset.norm() < p_.density_low * cluster_.density;
+  solved.thin = solved.hidden || static_cast<double>(along) / offset.norm() < p_.density_low * cluster_.density;
+}
+
+void Fitter::find_hidden_end(const LinkTask& task, Solved& solved) const {
+  double least = std::numeric_limits<double>::infinity();
+  const auto reach = static_cast<float>(p_.search_m * p_.search_m);
+  for (size_t i = 0; i < cluster_.points.size(); i += kHidingStep) {
+    const HiddenEnds hidden = hidden_ends(p_, task, cluster_.eye, {x_[i], y_[i], z_[i]});
+    for (size_t k = 0; k < hidden.count; ++k) {
+      const Vector3f& end = hidden.ends[k];
+      if ((end - task.aim).squaredNorm() > reach) continue;
+      const auto e2 = shape_error(p_, task, end);
+      if (!e2 || !(*e2 < least)) continue;
+      if (!angles_allow(skeleton_, *task.link, task.frame, (end - task.start).normalized())) continue;
+      if (!is_covered(p_, cluster_, task, end)) continue;
+      least = *e2;
+      solved.end = end;
+      solved.found = solved.hidden = true;
+    }
+  }
 }
 
 /// The points in the box around everything that can lie along the link.
@@ -150,7 +191,7 @@ void Fitter::mark_close(uint32_t number, const Vector3f& from) {
 /// Keeps a pose that is better than all before.
 void Fitter::judge(size_t pose, int k, std::span<const uint32_t> chain) {
   PoseError error;
-  error.away = away(cluster_.start, yaw_of(k, p_.rotations));
+  error.away = away(cluster_.start, cluster_.eye, yaw_of(k, p_.rotations));
   std::fill_n(used_.begin(), words_, uint64_t{0});
   for (size_t i = 1; i < skeleton_.links.size(); ++i) {
     if (chain[i] == kNone) {
@@ -163,9 +204,7 @@ void Fitter::judge(size_t pose, int k, std::span<const uint32_t> chain) {
     const uint64_t* close = close_.data() + chain[i] * words_;
     for (size_t w = 0; w < words_; ++w) used_[w] |= close[w];
   }
-  size_t used = 0;
-  for (size_t w = 0; w < words_; ++w) used += static_cast<size_t>(std::popcount(used_[w]));
-  const double total = error.total(p_, used, cluster_.points.size());
+  const double total = error.total(p_, weight_of_used(), weight_of_all_);
   if (!(total < best_.error)) return;
   best_.error = total;
   best_.pose = pose;
@@ -174,6 +213,7 @@ void Fitter::judge(size_t pose, int k, std::span<const uint32_t> chain) {
   best_.fitted = {true};
   for (size_t i = 1; i < skeleton_.links.size(); ++i) {
     best_.fitted[i] = chain[i] != kNone;
+    best_.hidden[i] = best_.fitted[i] && solved_[chain[i]].hidden;
     best_.ends[i] = best_.fitted[i] ? solved_[chain[i]].end : Vector3f::Zero();
   }
 }

@@ -40,7 +40,7 @@ class Fitter {
   struct Solved {
     uint32_t parent = 0, partner = 0;  ///< solved_ of these links, kNone if missing
     uint32_t direction = 0;            ///< first pose with the same direction of this link
-    bool found = false, thin = false;
+    bool found = false, hidden = false, thin = false;
     float distance_m = 0;  ///< from where the pose would have the end
     Eigen::Vector3f end = Eigen::Vector3f::Zero();
     Eigen::Matrix3f follow = Eigen::Matrix3f::Identity();  ///< frame of links that follow
@@ -51,9 +51,12 @@ class Fitter {
   void judge(size_t pose, int k, std::span<const uint32_t> chain);
   uint32_t solve(size_t link, size_t pose, std::span<const uint32_t> chain);
   void find_end(const LinkTask& task, Solved& solved);
+  void find_hidden_end(const LinkTask& task, Solved& solved) const;
   void gather(const LinkTask& task);
   size_t count_along(const Eigen::Vector3f& from, const Eigen::Vector3f& to) const;
   void mark_close(uint32_t solved, const Eigen::Vector3f& from);
+  void weigh();
+  size_t weight_of_used() const;
 
   Skeleton skeleton_;
   FitParameters p_;
@@ -67,6 +70,8 @@ class Fitter {
   std::array<std::vector<uint32_t>, kMostJoints> of_link_;  ///< in solved_
   std::vector<uint64_t> close_;                             ///< words_ for each of solved_: the points it explains
   std::vector<uint64_t> used_;
+  std::array<std::vector<uint64_t>, kMostWeight - 1> outlying_;  ///< [k]: points that count more than k + 1 times
+  size_t weight_of_all_ = 0;
   Fit best_;
 };
 

@@ -196,7 +196,8 @@ struct Objects3d {
   static void capacities(const Capacity& c, std::span<uint32_t> a) { a[0] = c.count; }
 };
 
-/// Where a joint of a body is. fitted 0: it could not be found, and x, y, z are 0.
+/// Where a joint of a body is. fitted 1: a point shows it; 0.5: it must be hidden behind one, and its limb has the length
+/// that it should have; 0: it could not be found, and x, y, z are 0.
 struct BodyJoint {
   float x, y, z, fitted;
 };

@@ -4,6 +4,7 @@
 #include <random>
 #include <vector>
 
+#include "nodes/body_pose/body_detector.hpp"
 #include "nodes/body_pose/fitter.hpp"
 #include "nodes/body_pose/generated_scene.hpp"
 #include "nodes/body_pose/segmentation.hpp"
@@ -24,6 +25,7 @@ void check_equal(const Fit& fast, const Fit& slow) {
   CHECK(fast.pose == slow.pose);
   CHECK(fast.yaw_rad == slow.yaw_rad);
   CHECK(fast.fitted == slow.fitted);
+  CHECK(fast.hidden == slow.hidden);
   for (size_t i = 0; i < kMostJoints; ++i)
     if (slow.fitted[i]) CHECK(fast.ends[i] == slow.ends[i]);
 }
@@ -55,7 +57,8 @@ TEST_CASE("the fit that does nothing twice is the one that does everything, bit 
           name == "human" ? make_person(skeleton, camera, seed, 0) : make_any(skeleton, camera, seed, 0);
       const std::vector<Point> points = thinned_body(scene, 12);
       REQUIRE(points.size() > 50);
-      const Cluster cluster{points, scene.body.joints[0].cast<float>(), reference_density(points, p.tube_m)};
+      const Cluster cluster{points, scene.body.joints[0].cast<float>(), reference_density(points, p.tube_m),
+                            eye_of(scene.camera_in_floor)};
       Fitter fitter(skeleton, p, points.size());
       const Fit slow = fit_reference(skeleton, p, cluster);
       check_equal(fitter.fit(cluster, kWithoutEnd), slow);
@@ -74,7 +77,7 @@ TEST_CASE("the same in noise: points without any shape") {
     p.density_min = 0.1 * round;
     std::vector<Point> points(static_cast<size_t>(60 + 80 * round));
     for (Point& q : points) q = {across(random), 2 + across(random), up(random)};
-    const Cluster cluster{points, {0, 2, 1.6f}, reference_density(points, p.tube_m)};
+    const Cluster cluster{points, {0, 2, 1.6f}, reference_density(points, p.tube_m), {0.3f, 0, 1.2f}};
     Fitter fitter(skeleton, p, 400);
     check_equal(fitter.fit(cluster, kWithoutEnd), fit_reference(skeleton, p, cluster));
   }

@@ -20,6 +20,7 @@ Skeleton shipped(const std::string& name) {
 }
 
 const auto kWithoutEnd = [] { return true; };
+const Eigen::Vector3f kEye(0, 0, 1.2f);
 
 }  // namespace
 
@@ -59,23 +60,23 @@ TEST_CASE("a crane is fitted by the same code; what its thin links do not show i
 
 TEST_CASE("an empty room, an empty cloud and points that are not finite hold nobody") {
   BodyDetector detector(shipped("human"), {}, 1000);
-  CHECK(detector.run({}, kWithoutEnd).empty());
+  CHECK(detector.run({}, kEye, kWithoutEnd).empty());
   CHECK(detector.searched() == 1);
   const float nan = std::numeric_limits<float>::quiet_NaN(), infinite = std::numeric_limits<float>::infinity();
   const std::vector<Point> points{{nan, 1, 1}, {1, infinite, 1}, {1, 1, nan}, {0, 2, 1.5f}};
-  CHECK(detector.run(points, kWithoutEnd).empty());
+  CHECK(detector.run(points, kEye, kWithoutEnd).empty());
   std::vector<Point> wall;
   for (int i = 0; i < 900; ++i)
     wall.push_back({static_cast<float>(i % 30) * 0.03f, 2, static_cast<float>(i) * 0.002f + 0.1f});
-  CHECK(detector.run(wall, kWithoutEnd).empty());
+  CHECK(detector.run(wall, kEye, kWithoutEnd).empty());
 }
 
 TEST_CASE("more points than there is memory for are left out; nothing is allocated") {
   const GeneratedScene scene = make_person(shipped("human"), {}, 1, 0);
   BodyDetector detector(shipped("human"), {}, scene.in_floor.size() / 2), whole(shipped("human"), {}, 200'000);
-  detector.run(scene.in_floor, kWithoutEnd);
+  detector.run(scene.in_floor, eye_of(scene.camera_in_floor), kWithoutEnd);
   const uint64_t before = thread_memory_use().allocations;
-  whole.run(scene.in_floor, kWithoutEnd);
+  whole.run(scene.in_floor, eye_of(scene.camera_in_floor), kWithoutEnd);
   if (counting_allocations()) CHECK(thread_memory_use().allocations == before);
 }
 
@@ -83,7 +84,7 @@ TEST_CASE("time that ends leaves candidates out and says how much was tried") {
   const Skeleton skeleton = shipped("human");
   BodyDetector detector(skeleton, {}, 200'000);
   const GeneratedScene scene = make_person(skeleton, {}, 1, 2);
-  detector.run(scene.in_floor, [] { return false; });
+  detector.run(scene.in_floor, eye_of(scene.camera_in_floor), [] { return false; });
   REQUIRE_FALSE(detector.candidates().empty());
   CHECK(detector.searched() == doctest::Approx(1.0 / 11 / static_cast<double>(detector.candidates().size())));
 }
@@ -109,10 +110,13 @@ TEST_CASE("a message says what is missing; a pointing ray begins at the shoulder
   const Skeleton skeleton = shipped("human");
   DetectedBody body;
   for (size_t i = 0; i < 16; ++i) body.fit.ends[i] = {static_cast<float>(i), 2, 1}, body.fit.fitted[i] = i != 7;
+  body.fit.hidden[4] = true;
   body.valid = true;
   const Body told = to_message(skeleton, body);
   CHECK(told.joints[3].fitted == 1);
   CHECK(told.joints[3].x == 3);
+  CHECK(told.joints[4].fitted == 0.5f);
+  CHECK(told.joints[4].x == 4);
   CHECK(told.joints[7].fitted == 0);
   CHECK(told.joints[7].x == 0);
   const size_t side = skeleton.pointers[0].to == 7 ? 1 : 0;  // the arm that is all there

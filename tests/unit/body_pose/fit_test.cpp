@@ -153,6 +153,29 @@ TEST_CASE("rotations are all tried, far from one another first") {
   CHECK(rotation_at(1, 11) == 4);
 }
 
+TEST_CASE("what no point shows may be behind one, a nominal length from its start") {
+  Link link;
+  link.length_m = 0.3;
+  const LinkTask task = make_task(link, {0.2f, 2, 1.4f}, Eigen::Matrix3f::Identity(), {0, -1, 0});
+  const Vector3f eye(0, 0, 1.2f), hand(0.15f, 1.5f, 1.35f);
+  const FitParameters p;
+  const HiddenEnds behind = hidden_ends(p, task, eye, hand);
+  REQUIRE(behind.count == 2);
+  for (const Vector3f& end : behind.ends) {
+    CHECK((end - task.start).norm() == doctest::Approx(0.3));
+    CHECK((end - hand).norm() >= p.behind_m);
+    CHECK((end - eye).normalized().dot((hand - eye).normalized()) == doctest::Approx(1));
+  }
+  // A hand held out at the eye covers an arm; one that is lifted beside the head does not cover the arm that hangs.
+  const std::vector<Point> arm{{0.19f, 1.9f, 1.39f}, {0.17f, 1.7f, 1.37f}, {0.15f, 1.5f, 1.35f}};
+  const Cluster cluster{arm, task.start, 0, eye};
+  CHECK(is_covered(p, cluster, task, {0.19f, 1.7f, 1.39f}));
+  CHECK_FALSE(is_covered(p, cluster, task, {0.2f, 2, 1.1f}));
+  CHECK(hidden_ends(p, task, eye, behind.ends[0]).count == 1);       // what is seen there hides only the far one
+  CHECK(hidden_ends(p, task, eye, {0.2f, 3, 1.4f}).count == 0);      // all that it hides is too far
+  CHECK(hidden_ends(p, task, eye, {0.9f, 1.5f, 1.35f}).count == 0);  // a line of sight that passes by
+}
+
 TEST_CASE("a fit that is told to end gives its best so far") {
   const Skeleton skeleton = shipped("human");
   FitParameters p;
