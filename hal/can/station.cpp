@@ -41,6 +41,7 @@ std::optional<Incoming> Station::next() {
     }
     if (reception.status == PortStatus::down) {
       link_ = Link::down;
+      bus_.state = BusState::active;  // as it will be when the interface is up again
       continue;
     }
     link_ = Link::up;

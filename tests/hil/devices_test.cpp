@@ -7,7 +7,9 @@
 #include <doctest/doctest.h>
 #include <fcntl.h>
 #include <linux/videodev2.h>
+#include <net/if.h>
 #include <sys/ioctl.h>
+#include <termios.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -155,6 +157,72 @@ TEST_CASE("hil: an interface that goes down and up, and bus-off, are losses that
   bus.device.close();
   REQUIRE(bus.device.open(bus.clock.now_ns()) == 0);
   CHECK(bus.reads_until(ReadStatus::ok, 200) >= 0);
+}
+
+namespace {
+
+/// A serial CAN adapter on a pseudo terminal: the far end of the kernel's slcan driver, whose controller it speaks for.
+class SerialAdapter {
+ public:
+  SerialAdapter() : far_(posix_openpt(O_RDWR | O_NOCTTY)) {
+    REQUIRE(grantpt(far_) == 0);
+    REQUIRE(unlockpt(far_) == 0);
+    near_ = ::open(ptsname(far_), O_RDWR | O_NOCTTY);
+    REQUIRE(near_ >= 0);
+    termios raw{};
+    cfmakeraw(&raw);
+    REQUIRE(tcsetattr(near_, TCSANOW, &raw) == 0);
+    int discipline = N_SLCAN;
+    REQUIRE(ioctl(near_, TIOCSETD, &discipline) == 0);
+    ifreq request{};
+    REQUIRE(ioctl(near_, SIOCGIFNAME, &request) == 0);
+    interface_ = request.ifr_name;
+    shell("ip link set " + interface_ + " type can bitrate 500000");
+    shell("ip link set " + interface_ + " up");
+  }
+  ~SerialAdapter() {
+    ::close(near_);
+    ::close(far_);
+  }
+  const std::string& interface() const { return interface_; }
+  void say(const std::string& line) {
+    REQUIRE(::write(far_, (line + "\r").c_str(), line.size() + 1) == static_cast<ssize_t>(line.size() + 1));
+    sleep_until(MonotonicClock().now_ns() + 200 * kMs);  // the line discipline works behind the write
+  }
+
+ private:
+  int far_, near_ = -1;
+  std::string interface_;
+};
+
+}  // namespace
+
+TEST_CASE("hil: bus-off of a kernel's controller, and its way back") {
+  SerialAdapter adapter;
+  MonotonicClock clock;
+  head::CanHead driver("head", {.interface = adapter.interface()}, clock);
+  REQUIRE(driver.open().has_value());
+  REQUIRE(driver.start(clock.now_ns()).has_value());
+  const auto status = [&] { return driver.read(clock.now_ns(), INT64_MAX).status; };
+  const auto accepted = [&] { return driver.station().counters().accepted; };
+  adapter.say("t710105");  // a heartbeat
+  CHECK(status() == ReadStatus::no_data);
+  CHECK(accepted() == 1);
+  adapter.say("sp010130");
+  CHECK(status() == ReadStatus::no_data);
+  CHECK(driver.station().bus().state == can::BusState::passive);
+  adapter.say("sb010255");
+  CHECK(status() == ReadStatus::disconnected);
+  CHECK(driver.station().link() == can::Link::bus_off);
+  CHECK_FALSE(driver.restart(clock.now_ns()));
+  // This controller is restarted by hand, as its driver demands.
+  shell("ip link set " + adapter.interface() + " down");
+  CHECK_FALSE(driver.restart(clock.now_ns()));
+  shell("ip link set " + adapter.interface() + " up");
+  CHECK(driver.restart(clock.now_ns()));
+  adapter.say("t710105");
+  CHECK(status() == ReadStatus::no_data);
+  CHECK(accepted() == 2);
 }
 
 namespace {
