@@ -6,6 +6,7 @@
 
 #include <doctest/doctest.h>
 #include <fcntl.h>
+#include <linux/tty.h>
 #include <linux/videodev2.h>
 #include <net/if.h>
 #include <sys/ioctl.h>
