@@ -16,6 +16,7 @@
 
 #include <cstdlib>
 #include <fstream>
+#include <thread>
 
 #include "hal/base/base_double.hpp"
 #include "hal/base/can_base.hpp"
@@ -72,6 +73,7 @@ struct Bus {
   BusClock clock;
   Double device;
   Driver driver;
+  std::optional<can::Port> listener;
   Bus(const char* host, const char* device_interface)
       : device(device_interface, clock), driver("device", {.interface = host}, clock) {
     REQUIRE(device.open(clock.now_ns()) == 0);
@@ -79,6 +81,20 @@ struct Bus {
   void pace(int64_t at_ns) {
     device.run_until(at_ns);
     clock.go_to(at_ns);
+  }
+  /// As pace, and the message that the device sends in each of its steps has arrived: from card to card that takes the
+  /// emulation a while.
+  test::Pace pace_and_wait(const char* host, const can::Message& message) {
+    const std::array ids{message.id};
+    REQUIRE(listener.emplace(host, clock).open(ids) == 0);
+    return [this](int64_t at_ns) {
+      int64_t expected = (at_ns - clock.now_ns()) / Double::kStep_ns;
+      pace(at_ns);
+      for (int ms = 0; ms < 1000 && expected > 0; ++ms) {
+        while (listener->receive().status == can::PortStatus::ok) --expected;
+        if (expected > 0) sleep_until(MonotonicClock().now_ns() + kMs);
+      }
+    };
   }
   /// Reads of 20 ms until one says that, at most so many.
   int reads_until(ReadStatus status, int most, bool restarts = true) {
@@ -102,7 +118,7 @@ TEST_CASE("hil: camera head on vcan and on two cards of one bus") {
   for (const auto& [host, device] : kBuses) {
     CAPTURE(std::string(host));
     HeadBus bus(host, device);
-    test::check_camera_head(bus.driver, [&](int64_t at_ns) { bus.pace(at_ns); });
+    test::check_camera_head(bus.driver, bus.pace_and_wait(host, head::messages()[head::kPosStatus]));
     CHECK(bus.driver.station().counters().damaged == 0);
     CHECK(bus.driver.station().counters().foreign == 0);  // the kernel's filter lets nothing else through
   }
@@ -112,7 +128,7 @@ TEST_CASE("hil: mobile base on vcan and on two cards of one bus") {
   for (const auto& [host, device] : kBuses) {
     CAPTURE(std::string(host));
     BaseBus bus(host, device);
-    test::check_mobile_base(bus.driver, true, [&](int64_t at_ns) { bus.pace(at_ns); });
+    test::check_mobile_base(bus.driver, true, bus.pace_and_wait(host, base::messages()[base::kWheels]));
     CHECK(bus.driver.station().counters().damaged == 0);
   }
 }
@@ -170,6 +186,12 @@ class SerialAdapter {
     REQUIRE(unlockpt(far_) == 0);
     near_ = ::open(ptsname(far_), O_RDWR | O_NOCTTY);
     REQUIRE(near_ >= 0);
+    // The kernel waits until somebody has taken what it says.
+    listener_ = std::thread([this] {
+      std::array<char, 64> said;
+      while (::read(far_, said.data(), said.size()) > 0) {
+      }
+    });
     termios raw{};
     cfmakeraw(&raw);
     REQUIRE(tcsetattr(near_, TCSANOW, &raw) == 0);
@@ -182,7 +204,8 @@ class SerialAdapter {
     shell("ip link set " + interface_ + " up");
   }
   ~SerialAdapter() {
-    ::close(near_);
+    ::close(near_);  // ends the listener's read
+    listener_.join();
     ::close(far_);
   }
   const std::string& interface() const { return interface_; }
@@ -193,6 +216,7 @@ class SerialAdapter {
 
  private:
   int far_, near_ = -1;
+  std::thread listener_;
   std::string interface_;
 };
 
