@@ -10,45 +10,25 @@ namespace {
 
 constexpr double kSpeed_m_s = 1.4, kAcceleration_m_s2 = 1.35;        // devices.md 5
 constexpr double kTurn_rad_s = 1.2, kTurnAcceleration_rad_s2 = 2.5;  // as the simulated base
-constexpr double kStep_s = static_cast<double>(BaseDouble::kStep_ns) * 1e-9;
+constexpr double kStep_s = static_cast<double>(can::NodeDouble::kStep_ns) * 1e-9;
 /// Where the counters stand when the power comes: soon they wrap.
 constexpr uint32_t kFirstCounts[2] = {kWheelCounts - 100, 12345};
 
 }  // namespace
 
 BaseDouble::BaseDouble(std::string interface, const Clock& clock, uint64_t seed)
-    : link_(std::move(interface), clock, messages(), kPlaces, seed) {}
+    : NodeDouble(std::move(interface), clock, messages(), kPlaces, seed) {}
 
-int BaseDouble::open(int64_t now_ns) {
-  const int error = link_.open();
-  now_ns_ = now_ns;
-  reboot();
-  return error;
-}
-
-void BaseDouble::reboot() {
-  command_ns_ = now_ns_;
+void BaseDouble::forget() {
+  command_ns_ = now_ns();
   state_ = State::disabled;
   stale_ = true;
   wanted_m_s_ = wanted_rad_s_ = speed_m_s_ = turn_rad_s_ = 0;
   for (size_t i = 0; i < 2; ++i) way_m_[i] = kFirstCounts[i] * wheels_.step_m;
-  link_.boot(now_ns_);
 }
 
-void BaseDouble::run_until(int64_t now_ns) {
-  while (now_ns_ + kStep_ns <= now_ns) {
-    take_all();
-    now_ns_ += kStep_ns;
-    step();
-    send_due();
-  }
-}
-
-void BaseDouble::take_all() {
-  while (const auto incoming = link_.next(now_ns_)) {
-    if (incoming->message == kCommand) take_command(incoming->values);
-  }
-  if (link_.take_reset()) reboot();
+void BaseDouble::take(const can::Incoming& incoming) {
+  if (incoming.message == kCommand) take_command(incoming.values);
 }
 
 void BaseDouble::take_command(std::span<const double> values) {
@@ -58,7 +38,7 @@ void BaseDouble::take_command(std::span<const double> values) {
     stale_ = true;
     return;
   }
-  command_ns_ = now_ns_;
+  command_ns_ = now_ns();
   stale_ = false;
   wanted_m_s_ = std::clamp(values[Command::speed_m_s], -kSpeed_m_s, kSpeed_m_s);
   wanted_rad_s_ = std::clamp(values[Command::turn_rad_s], -kTurn_rad_s, kTurn_rad_s);
@@ -66,8 +46,8 @@ void BaseDouble::take_command(std::span<const double> values) {
 }
 
 void BaseDouble::step() {
-  const bool deserted = link_.deserted(now_ns_) || !link_.operational();
-  if (now_ns_ - command_ns_ > kCommandStale_ns) stale_ = true;
+  const bool deserted = link().deserted(now_ns()) || !link().operational();
+  if (now_ns() - command_ns_ > kCommandStale_ns) stale_ = true;
   const bool drives = !stale_ && !deserted && !emergency_stop_ && !bumper_ && state_ != State::fault;
   if (state_ != State::fault) state_ = drives ? State::enabled : State::disabled;
   const double acceleration =
@@ -77,19 +57,20 @@ void BaseDouble::step() {
   const double outward = turn_rad_s_ * wheels_.track_m / 2;
   way_m_[0] += (speed_m_s_ - outward) * kStep_s;
   way_m_[1] += (speed_m_s_ + outward) * kStep_s;
+  send_due();
 }
 
 void BaseDouble::send_due() {
-  link_.beat(now_ns_);
-  if (!link_.operational()) return;
+  link().beat(now_ns());
+  if (!link().operational()) return;
   const auto flag = [](bool on) { return on ? 1.0 : 0.0; };
-  const double sample_ms = std::fmod(static_cast<double>(link_.uptime_ns(now_ns_)) * 1e-6, 6553.6);
-  link_.send(kMotion, std::array{flag(emergency_stop_), flag(bumper_), flag(stale_), flag(state_ == State::fault),
-                                 speed_m_s_, turn_rad_s_, sample_ms});
+  const double sample_ms = std::fmod(static_cast<double>(link().uptime_ns(now_ns())) * 1e-6, 6553.6);
+  link().send(kMotion, std::array{flag(emergency_stop_), flag(bumper_), flag(stale_), flag(state_ == State::fault),
+                                  speed_m_s_, turn_rad_s_, sample_ms});
   const auto counted = [&](double way_m) {
     return static_cast<double>(static_cast<uint32_t>(std::llround(way_m / wheels_.step_m)) % kWheelCounts);
   };
-  link_.send(kWheels, std::array{static_cast<double>(state_), counted(way_m_[0]), counted(way_m_[1])});
+  link().send(kWheels, std::array{static_cast<double>(state_), counted(way_m_[0]), counted(way_m_[1])});
 }
 
 }  // namespace takt::base

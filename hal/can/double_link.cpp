@@ -108,4 +108,26 @@ void DoubleLink::send(size_t message, std::span<const double> values) {
   station_.send(frame);
 }
 
+int NodeDouble::open(int64_t now_ns) {
+  const int error = link_.open();
+  now_ns_ = now_ns;
+  reboot();
+  return error;
+}
+
+void NodeDouble::reboot() {
+  forget();
+  link_.boot(now_ns_);
+}
+
+void NodeDouble::run_until(int64_t now_ns) {
+  for (; now_ns_ + kStep_ns <= now_ns; step()) {
+    const bool operational = link_.operational();
+    while (const auto incoming = link_.next(now_ns_)) take(*incoming);
+    if (link_.operational() && !operational) started();
+    if (link_.take_reset()) reboot();
+    now_ns_ += kStep_ns;
+  }
+}
+
 }  // namespace takt::can

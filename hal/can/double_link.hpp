@@ -64,4 +64,41 @@ class DoubleLink {
   std::array<Frame, Station::kMostMessages> newest_{};
 };
 
+/// The double of a node. It lives in steps of 10 ms of the given clock's time; nobody waits for anything. One thread.
+class NodeDouble {
+ public:
+  static constexpr int64_t kStep_ns = 10'000'000;
+
+  NodeDouble(const NodeDouble&) = delete;
+  NodeDouble& operator=(const NodeDouble&) = delete;
+  virtual ~NodeDouble() = default;
+
+  /// 0 or an errno. Powered at `now_ns`: says boot-up and then waits for a start.
+  int open(int64_t now_ns);
+  void close() { link_.close(); }
+  /// Lives on until `now_ns`: takes what the host sent and sends what is due.
+  void run_until(int64_t now_ns);
+  void misbehave(Misbehaviour how) { link_.misbehave(how); }
+  /// Power off and on: all that it was told is forgotten.
+  void reboot();
+  const Station& station() const { return link_.station(); }
+
+ protected:
+  NodeDouble(std::string interface, const Clock& clock, std::span<const Message> table, const NodePlaces& places,
+             uint64_t seed)
+      : link_(std::move(interface), clock, table, places, seed) {}
+
+  virtual void forget() = 0;
+  virtual void take(const Incoming& incoming) = 0;
+  /// The host has just made it operational.
+  virtual void started() {}
+  virtual void step() = 0;
+  DoubleLink& link() { return link_; }
+  int64_t now_ns() const { return now_ns_; }
+
+ private:
+  DoubleLink link_;
+  int64_t now_ns_ = 0;
+};
+
 }  // namespace takt::can

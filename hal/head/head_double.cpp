@@ -8,7 +8,7 @@ namespace {
 
 constexpr Axis kAxes[2] = {{120 * kDegree, 200 * kDegree, 1000 * kDegree},
                            {45 * kDegree, 150 * kDegree, 1000 * kDegree}};
-constexpr double kStep_s = static_cast<double>(HeadDouble::kStep_ns) * 1e-9;
+constexpr double kStep_s = static_cast<double>(can::NodeDouble::kStep_ns) * 1e-9;
 constexpr double kStartsAt_rad[2] = {7 * kDegree, -4 * kDegree};  // where it stood when the power came
 constexpr int64_t kMs = 1'000'000;
 
@@ -20,47 +20,26 @@ double moved(double from, double to, double elapsed_ms, double time_ms) {
 }  // namespace
 
 HeadDouble::HeadDouble(std::string interface, const Clock& clock, uint64_t seed)
-    : link_(std::move(interface), clock, messages(), kPlaces, seed) {}
+    : NodeDouble(std::move(interface), clock, messages(), kPlaces, seed) {}
 
-int HeadDouble::open(int64_t now_ns) {
-  const int error = link_.open();
-  now_ns_ = now_ns;
-  reboot();
-  return error;
-}
-
-void HeadDouble::reboot() {
+void HeadDouble::forget() {
   state_ = State::switch_on_disabled;
   mode_ = Mode::disable;
   homed_ = fault_ = stale_ = false;
   emergency_ = 0;
-  setpoint_ns_ = now_ns_;
+  setpoint_ns_ = now_ns();
   std::copy_n(kStartsAt_rad, 2, position_rad_.begin());
   speed_rad_s_ = {};
   lids_ = {};
-  link_.boot(now_ns_);
 }
 
-void HeadDouble::run_until(int64_t now_ns) {
-  while (now_ns_ + kStep_ns <= now_ns) {
-    take_all();
-    now_ns_ += kStep_ns;
-    step();
-  }
-}
-
-void HeadDouble::take_all() {
-  const bool began = link_.operational();
-  while (const auto incoming = link_.next(now_ns_)) {
-    if (incoming->message == kSetpoint) take_setpoint(incoming->values);
-    if (incoming->message == kEyelidSetpoint) take_eyelids(incoming->values);
-  }
-  if (link_.operational() && !began) setpoint_ns_ = now_ns_;
-  if (link_.take_reset()) reboot();
+void HeadDouble::take(const can::Incoming& incoming) {
+  if (incoming.message == kSetpoint) take_setpoint(incoming.values);
+  if (incoming.message == kEyelidSetpoint) take_eyelids(incoming.values);
 }
 
 void HeadDouble::take_setpoint(std::span<const double> values) {
-  setpoint_ns_ = now_ns_;
+  setpoint_ns_ = now_ns();
   stale_ = false;
   mode_ = static_cast<Mode>(values[Setpoint::mode]);
   if (mode_ == Mode::fault_reset) {
@@ -91,7 +70,7 @@ void HeadDouble::take_eyelids(std::span<const double> values) {
   lids_.token = token;
   lids_.action = static_cast<EyelidAction>(values[EyelidSetpoint::action]);
   std::copy(values.begin(), values.end(), lids_.told.begin());
-  lids_.since_ns = now_ns_;
+  lids_.since_ns = now_ns();
   lids_.from_left = lids_.left;
   lids_.from_right = lids_.right;
   lids_.moving = lids_.action != EyelidAction::hold && lids_.action != EyelidAction::relax;
@@ -105,13 +84,13 @@ void HeadDouble::step() {
 }
 
 void HeadDouble::watch() {
-  if (!link_.operational()) return;
-  if (link_.deserted(now_ns_)) {
+  if (!link().operational()) return;
+  if (link().deserted(now_ns())) {
     if (emergency_ == 0) say_emergency(kHeartbeatLost);
   } else if (emergency_ == kHeartbeatLost) {
     say_emergency(0);
   }
-  const bool late = now_ns_ - setpoint_ns_ > kSetpointStale_ns;
+  const bool late = now_ns() - setpoint_ns_ > kSetpointStale_ns;
   if (state_ == State::operation_enabled && (late || emergency_ != 0)) {
     state_ = State::quick_stop;
     stale_ = late;
@@ -120,7 +99,7 @@ void HeadDouble::watch() {
 }
 
 void HeadDouble::move() {
-  const bool homes = mode_ == Mode::home && !homed_ && may_move() && now_ns_ - setpoint_ns_ <= kSetpointStale_ns;
+  const bool homes = mode_ == Mode::home && !homed_ && may_move() && now_ns() - setpoint_ns_ <= kSetpointStale_ns;
   for (size_t i = 0; i < 2; ++i) {
     Axis axis = kAxes[i];
     if (asked_speed_rad_s_ > 0) axis.speed_rad_s = std::min(axis.speed_rad_s, asked_speed_rad_s_);
@@ -145,7 +124,7 @@ void HeadDouble::move() {
 void HeadDouble::move_lids() {
   if (!lids_.moving) return;
   const auto& told = lids_.told;
-  const double elapsed_ms = static_cast<double>(now_ns_ - lids_.since_ns) * 1e-6;
+  const double elapsed_ms = static_cast<double>(now_ns() - lids_.since_ns) * 1e-6;
   const double move_ms = told[EyelidSetpoint::move_ms], hold_ms = told[EyelidSetpoint::hold_ms];
   if (lids_.action == EyelidAction::position) {
     lids_.left = moved(lids_.from_left, told[EyelidSetpoint::left], elapsed_ms, move_ms);
@@ -163,30 +142,30 @@ void HeadDouble::move_lids() {
   if (lids_.action != EyelidAction::wink_left) lid(lids_.right, lids_.from_right, told[EyelidSetpoint::right]);
   if (elapsed_ms < whole_ms) return;
   ++lids_.blinks;
-  lids_.since_ns = now_ns_;
+  lids_.since_ns = now_ns();
   lids_.moving = --lids_.told[EyelidSetpoint::repeat] > 0;
 }
 
 void HeadDouble::send_due() {
   // A head that nobody has started says no more than that it lives.
-  link_.beat(now_ns_);
-  if (!link_.operational()) return;
-  const double sample_ms = std::fmod(static_cast<double>(link_.uptime_ns(now_ns_)) * 1e-6, 6553.6);
-  link_.send(kVelStatus, std::array{speed_rad_s_[0] / kDegree, speed_rad_s_[1] / kDegree, sample_ms});
+  link().beat(now_ns());
+  if (!link().operational()) return;
+  const double sample_ms = std::fmod(static_cast<double>(link().uptime_ns(now_ns())) * 1e-6, 6553.6);
+  link().send(kVelStatus, std::array{speed_rad_s_[0] / kDegree, speed_rad_s_[1] / kDegree, sample_ms});
   send_status();
-  if (link_.due(now_ns_, 50 * kMs)) {
+  if (link().due(now_ns(), 50 * kMs)) {
     const auto state = !lids_.moving                            ? EyelidState::idle
                        : lids_.action == EyelidAction::position ? EyelidState::moving
                                                                 : EyelidState::blinking;
     const double current_mA = lids_.moving ? 350 : 20;
-    link_.send(kEyelidStatus, std::array{static_cast<double>(state), lids_.left, lids_.right, current_mA, current_mA,
-                                         6.0, static_cast<double>(lids_.blinks)});
+    link().send(kEyelidStatus, std::array{static_cast<double>(state), lids_.left, lids_.right, current_mA, current_mA,
+                                          6.0, static_cast<double>(lids_.blinks)});
   }
-  if (link_.due(now_ns_, 500 * kMs)) {
-    const double uptime_s = std::floor(static_cast<double>(link_.uptime_ns(now_ns_)) * 1e-9);
-    link_.send(kHealth, std::array{41.0, 38.0, 24.0, 1.7, uptime_s});
+  if (link().due(now_ns(), 500 * kMs)) {
+    const double uptime_s = std::floor(static_cast<double>(link().uptime_ns(now_ns())) * 1e-9);
+    link().send(kHealth, std::array{41.0, 38.0, 24.0, 1.7, uptime_s});
   }
-  if (link_.due(now_ns_, 1000 * kMs)) {
+  if (link().due(now_ns(), 1000 * kMs)) {
     std::array<double, Limits::count> limits{};
     limits[Limits::page] = std::exchange(page_, (page_ + 1) % 3);
     limits[Limits::pan_low] = -kAxes[0].reach_rad / kDegree;
@@ -197,7 +176,7 @@ void HeadDouble::send_due() {
     limits[Limits::pan_speed] = kAxes[0].speed_rad_s / kDegree;
     limits[Limits::tilt_speed] = kAxes[1].speed_rad_s / kDegree;
     limits[Limits::acceleration] = kAxes[0].acceleration_rad_s2 / kDegree;
-    link_.send(kLimits, limits);
+    link().send(kLimits, limits);
   }
 }
 
@@ -222,7 +201,7 @@ void HeadDouble::send_status() {
   status[PosStatus::setpoint_stale] = flag(stale_);
   status[PosStatus::following_error] = flag(fault_);
   status[PosStatus::fault] = flag(fault_);
-  link_.send(kPosStatus, status);
+  link().send(kPosStatus, status);
 }
 
 void HeadDouble::fail(uint16_t code) {
@@ -234,7 +213,7 @@ void HeadDouble::fail(uint16_t code) {
 void HeadDouble::say_emergency(uint16_t code) {
   emergency_ = code;
   const double axis = code == kFollowingError ? 1 : 0;  // pan; else the whole node
-  link_.send(kEmergency, std::array{static_cast<double>(code), code == 0 ? 0.0 : 17.0, axis, 0.0});
+  link().send(kEmergency, std::array{static_cast<double>(code), code == 0 ? 0.0 : 17.0, axis, 0.0});
 }
 
 }  // namespace takt::head

@@ -7,26 +7,16 @@
 namespace takt::head {
 
 /// The camera head as its host sees it on the bus: the messages of ace_head.dbc in their cycles, the states, limits and
-/// watchdogs of devices.md 4.3, mechanics and eyelids that take their time. It lives in steps of 10 ms of the given
-/// clock's time; nobody waits for anything. One thread.
-class HeadDouble {
+/// watchdogs of devices.md 4.3, mechanics and eyelids that take their time. Booted it is not homed.
+class HeadDouble final : public can::NodeDouble {
  public:
-  static constexpr int64_t kStep_ns = 10'000'000;
   static constexpr int64_t kSetpointStale_ns = 100'000'000;
 
   HeadDouble(std::string interface, const Clock& clock, uint64_t seed = 1);
-  /// 0 or an errno. Powered at `now_ns`: says boot-up and then waits for a start.
-  int open(int64_t now_ns);
-  void close() { link_.close(); }
-  /// Lives on until `now_ns`: takes what the host sent and sends what is due.
-  void run_until(int64_t now_ns);
 
-  void misbehave(can::Misbehaviour how) { link_.misbehave(how); }
   void press_emergency_stop(bool pressed) { emergency_stop_ = pressed; }
   /// A following error of the pan axis: a fault until it is reset.
   void block_pan() { fail(kFollowingError); }
-  /// Power off and on: unhomed, and all that it was told is forgotten.
-  void reboot();
 
   State state() const { return state_; }
   bool homed() const { return homed_; }
@@ -35,7 +25,6 @@ class HeadDouble {
   double left_lid_closed_percent() const { return lids_.left; }
   uint8_t blinks() const { return lids_.blinks; }
   uint16_t emergency() const { return emergency_; }
-  const can::Station& station() const { return link_.station(); }
 
  private:
   struct Lids {
@@ -48,10 +37,12 @@ class HeadDouble {
     bool moving = false;
   };
 
-  void take_all();
+  void forget() override;
+  void take(const can::Incoming& incoming) override;
+  void started() override { setpoint_ns_ = now_ns(); }
+  void step() override;
   void take_setpoint(std::span<const double> values);
   void take_eyelids(std::span<const double> values);
-  void step();
   void watch();
   void move();
   void move_lids();
@@ -61,8 +52,7 @@ class HeadDouble {
   void say_emergency(uint16_t code);
   bool may_move() const { return !emergency_stop_ && !fault_ && emergency_ == 0; }
 
-  can::DoubleLink link_;
-  int64_t now_ns_ = 0, setpoint_ns_ = 0;
+  int64_t setpoint_ns_ = 0;
   State state_ = State::not_ready;
   Mode mode_ = Mode::disable;
   bool homed_ = false, fault_ = false, emergency_stop_ = false, stale_ = false;
