@@ -7,6 +7,7 @@
 #include "graph/command/calibrate_command.hpp"
 #include "graph/command/check_command.hpp"
 #include "graph/command/cloud_command.hpp"
+#include "graph/command/devices_command.hpp"
 #include "graph/command/doctor_command.hpp"
 #include "graph/command/eval_command.hpp"
 #include "graph/command/explain_command.hpp"
@@ -105,6 +106,21 @@ void add_run(CLI::App& app, takt::command::RunOptions& o, int& exit_code) {
   run->callback([&] { exit_code = takt::command::run_graph(o); });
 }
 
+void add_devices(CLI::App& app, bool& json, int& exit_code) {
+  CLI::App* devices = app.add_subcommand("devices", "lists what is plugged in, and a line of the graph file for each");
+  devices->add_flag("--json", json, "prints the list as JSON");
+  devices->callback([&] { exit_code = takt::command::list_devices(json); });
+}
+
+void add_capture(CLI::App& app, takt::command::CaptureOptions& o, int& exit_code) {
+  CLI::App* capture = app.add_subcommand("capture", "writes the frames of a CAN bus to a file, as candump -L does");
+  capture->add_option("device", o.device, "CAN interface, or unix:PATH of a double")->required();
+  capture->add_option("file", o.file, "file to be written")->required();
+  capture->add_option("--for", o.duration_s, "how long, e.g. 20s (default 10s)")
+      ->transform(CLI::Validator(duration, "DURATION"));
+  capture->callback([&] { exit_code = takt::command::capture_device(o); });
+}
+
 void add_profile(CLI::App& app, takt::command::ProfileOptions& o, int& exit_code) {
   CLI::App* profile = app.add_subcommand("profile", "measures execution times and writes budgets into a schedule");
   add_load_options(*profile, o.run.graph, o.run.load);
@@ -155,6 +171,8 @@ int main(int argc, char** argv) {
   takt::command::ObjectsOptions object_database;
   std::string type;
   bool check_json = false;
+  bool devices_json = false;
+  takt::command::CaptureOptions capture;
   int exit_code = 0;
 
   add_run(app, run_options, exit_code);
@@ -171,6 +189,8 @@ int main(int argc, char** argv) {
   nodes->callback([&] { exit_code = takt::command::print_nodes(type); });
   takt::command::add_attach_commands(app, attach, exit_code);
   takt::command::add_doctor(app, doctor, exit_code);
+  add_devices(app, devices_json, exit_code);
+  add_capture(app, capture, exit_code);
   add_profile(app, profile, exit_code);
   takt::command::add_replay(app, replay, exit_code);
   takt::command::add_log(app, log, exit_code);

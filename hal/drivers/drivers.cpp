@@ -3,10 +3,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <sstream>
 
 #include "hal/base/base_node.hpp"
+#include "hal/base/can_base.hpp"
 #include "hal/camera/stereo_camera_node.hpp"
+#include "hal/camera/v4l2_camera.hpp"
+#include "hal/gpio/gpio_lines.hpp"
 #include "hal/gpio/lines_node.hpp"
+#include "hal/head/can_head.hpp"
 #include "hal/head/head_node.hpp"
 #include "hal/laser/laser_node.hpp"
 #include "hal/replay/replay_base.hpp"
@@ -211,6 +216,95 @@ NodeResult make_sim(const DeviceConfig& config, Settings& settings, Devices& dev
   return opened<LinesNode>(std::move(device), settings);
 }
 
+std::string interface_of(Settings& settings) {
+  const std::string interface = settings.text("interface", "");
+  if (interface.empty()) settings.fail("setting `interface` is missing", "add `interface: can0` to the device");
+  return interface;
+}
+
+NodeResult make_can_head(const DeviceConfig& config, Settings& settings, const Clock& clock) {
+  head::CanHeadSettings head{.interface = interface_of(settings), .eyelids = settings.flag("eyelids", true)};
+  std::unique_ptr<CameraHead> device = std::make_unique<head::CanHead>(config.id, std::move(head), clock);
+  return opened<HeadNode>(std::move(device), settings);
+}
+
+NodeResult make_can_base(const DeviceConfig& config, Settings& settings, const Clock& clock) {
+  base::CanBaseSettings base{.interface = interface_of(settings)};
+  base.wheels.step_m = settings.quantity("wheel_step", Dimension::length, base.wheels.step_m);
+  base.wheels.track_m = settings.quantity("track", Dimension::length, base.wheels.track_m);
+  if (base.wheels.step_m <= 0 || base.wheels.track_m <= 0)
+    settings.fail("`wheel_step` or `track` is not positive", "measure both: they are the base's geometry");
+  std::unique_ptr<MobileBase> device = std::make_unique<base::CanBase>(config.id, std::move(base), clock);
+  return opened<BaseNode>(std::move(device), settings);
+}
+
+NodeResult make_v4l2_camera(const DeviceConfig& config, Settings& settings, const Clock& clock) {
+  v4l2::V4l2CameraSettings camera;
+  camera.path = settings.path("path", true).string();
+  const auto file = settings.path("rig", true);
+  if (settings.error()) return tl::unexpected(*settings.error());
+  auto rig = load_rig(config.id, file);
+  if (!rig) return tl::unexpected(rig.error());
+  camera.rig = *rig;
+  const std::string format = settings.text("format", "y16"), bayer = settings.text("bayer", "none");
+  if (const auto known = v4l2::frame_format(format)) camera.layout.format = *known;
+  else settings.fail("`format` is `" + format + "`", "use y16, y8i, rgb3, yuyv or grey");
+  if (const auto known = v4l2::mosaic(bayer)) camera.layout.mosaic = *known;
+  else settings.fail("`bayer` is `" + bayer + "`", "use none, rggb, grbg, gbrg or bggr");
+  const bool beside = camera.layout.side_by_side();
+  camera.layout.left = static_cast<int>(settings.count("left", beside ? 0 : 1, 0, 2));
+  camera.layout.right = static_cast<int>(settings.count("right", beside ? 1 : 0, 0, 2));
+  camera.rate = rate_of(settings);
+  camera.buffers = static_cast<uint32_t>(settings.count("buffers", camera.buffers, 2, v4l2::V4l2Camera::kMostBuffers));
+  camera.exposure_s = settings.quantity("exposure", Dimension::time, camera.exposure_s);
+  camera.gain = settings.quantity("gain", Dimension::number, camera.gain);
+  camera.stamp_delay_s = settings.quantity("stamp_delay", Dimension::time, camera.stamp_delay_s);
+  std::unique_ptr<StereoCamera> device = std::make_unique<v4l2::V4l2Camera>(
+      config.id, std::move(camera), std::make_unique<v4l2::KernelVideoDevice>(), clock);
+  return opened<StereoCameraNode>(std::move(device), settings, thresholds_of(settings));
+}
+
+/// "estop, 5": the parts between the commas.
+std::vector<std::string> list_of(Settings& settings, const std::string& name, const std::string& fallback) {
+  std::vector<std::string> parts;
+  std::stringstream text(settings.text(name, fallback));
+  for (std::string part; std::getline(text, part, ',');) {
+    const size_t begin = part.find_first_not_of(' '), end = part.find_last_not_of(' ');
+    if (begin == std::string::npos)
+      settings.fail("`" + name + "` has an empty part", "write names with commas between");
+    else parts.push_back(part.substr(begin, end - begin + 1));
+  }
+  return parts;
+}
+
+NodeResult make_gpio_lines(const DeviceConfig& config, Settings& settings, const Clock& clock) {
+  gpio::GpioLinesSettings lines;
+  lines.chip = settings.path("chip", true).string();
+  lines.inputs = list_of(settings, "inputs", "0");
+  lines.outputs = list_of(settings, "outputs", "");
+  lines.powered = list_of(settings, "powered", "");
+  lines.trigger = settings.text("trigger", "");
+  const auto time_ns = [&](const char* name, double fallback_s, double most_s) {
+    const double time_s = settings.quantity(name, Dimension::time, fallback_s);
+    if (time_s < 0 || time_s > most_s)
+      settings.fail("`" + std::string(name) + "` is out of range", "at most " + std::to_string(most_s) + "s");
+    return static_cast<int64_t>(std::clamp(time_s, 0.0, most_s) * 1e9);
+  };
+  lines.debounce_ns = time_ns("debounce", 0.005, 1.0);
+  lines.pulse_ns = time_ns("pulse", 0.0001, static_cast<double>(gpio::GpioLines::kLongestPulse_ns) * 1e-9);
+  std::unique_ptr<DigitalLines> device =
+      std::make_unique<gpio::GpioLines>(config.id, std::move(lines), std::make_unique<gpio::KernelLineChip>(), clock);
+  return opened<LinesNode>(std::move(device), settings);
+}
+
+/// A driver of real hardware.
+NodeResult make_hardware(const DeviceConfig& config, Settings& settings, const Clock& clock) {
+  if (config.kind == "stereo_camera") return make_v4l2_camera(config, settings, clock);
+  if (config.kind == "camera_head") return make_can_head(config, settings, clock);
+  if (config.kind == "digital_lines") return make_gpio_lines(config, settings, clock);
+  return make_can_base(config, settings, clock);
+}
+
 /// Keys that no driver of the kind knows.
 DeviceResult check_keys(const DeviceConfig& config, const DeviceKind& kind) {
   if (!config.settings.is_object() && !config.settings.is_null())
@@ -283,8 +377,9 @@ NodeResult make_device(const DeviceConfig& config, Devices& devices, const Clock
                           "choose a profile whose devices use one of: " + built_names(kind->drivers));
   Settings settings(config.id, config.settings, config.directory);
   const DeviceHealthSettings health = health_of(config, settings);
-  NodeResult node =
-      config.driver == "replay" ? make_replay(config, settings, clock) : make_sim(config, settings, devices, clock);
+  NodeResult node = config.driver == "sim"      ? make_sim(config, settings, devices, clock)
+                    : config.driver == "replay" ? make_replay(config, settings, clock)
+                                                : make_hardware(config, settings, clock);
   if (node) (*node)->set_health(health);
   return node;
 }

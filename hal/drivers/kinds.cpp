@@ -7,13 +7,15 @@ namespace {
 using enum SettingKind;
 
 constexpr DriverInfo kCameraDrivers[] = {
-    {"sim", "the simulated world"}, {"replay", "recorded images"}, {"v4l2", "a Bumblebee behind Video4Linux", false}};
+    {"sim", "the simulated world"}, {"replay", "recorded images"}, {"v4l2", "a stereo camera behind Video4Linux"}};
 constexpr DriverInfo kLaserDrivers[] = {{"sim", "the simulated world"},
                                         {"replay", "the scans of a CARMEN log"},
                                         {"lms200", "a SICK LMS 200 on a serial line", false}};
-constexpr DriverInfo kHeadDrivers[] = {{"sim", "the simulated world"}, {"can", "the camera head on a CAN bus", false}};
-constexpr DriverInfo kBaseDrivers[] = {{"sim", "the simulated world"}, {"replay", "the odometry of a CARMEN log"}};
-constexpr DriverInfo kLinesDrivers[] = {{"sim", "the simulated world"}, {"gpio", "lines of a GPIO chip", false}};
+constexpr DriverInfo kHeadDrivers[] = {{"sim", "the simulated world"}, {"can", "the camera head on a CAN bus"}};
+constexpr DriverInfo kBaseDrivers[] = {{"sim", "the simulated world"},
+                                       {"replay", "the odometry of a CARMEN log"},
+                                       {"can", "the mobile base on a CAN bus"}};
+constexpr DriverInfo kLinesDrivers[] = {{"sim", "the simulated world"}, {"gpio", "lines of a GPIO chip"}};
 
 #define COMMON_SETTINGS                                                                                                \
   {"rate", "", rate, false, "releases per second of the device's node"},                                               \
@@ -51,6 +53,14 @@ constexpr SettingInfo kCamera[] = {
     {"shrink", "replay", count, false, "images are made smaller by this whole factor when they are loaded; 1"},
     {"path", "v4l2", path, true, "device file, for instance /dev/video0"},
     {"rig", "v4l2", path, true, "YAML file with lens, size, baseline and mount"},
+    {"format", "v4l2", text, false, "y16 (a Bumblebee), y8i, rgb3 (three sensors), yuyv or grey (side by side); y16"},
+    {"left", "v4l2", count, false, "byte of a pixel, or half of a row, of the left eye; 1, 0 side by side"},
+    {"right", "v4l2", count, false, "byte of a pixel, or half of a row, of the right eye; 0, 1 side by side"},
+    {"bayer", "v4l2", text, false, "rggb, grbg, gbrg or bggr: debayered to BGR; none (stereo debayers better)"},
+    {"buffers", "v4l2", count, false, "frames that wait in the kernel's driver; 4"},
+    {"exposure", "v4l2", time, false, "exposure time; as the camera is set"},
+    {"gain", "v4l2", number, false, "gain in the camera's own steps; as the camera is set"},
+    {"stamp_delay", "v4l2", time, false, "from the begin of the exposure to the device's stamp; 0s"},
     {"channels", "replay", count, false, "1 grey, 3 BGR; as the files"},
     {"health_step", "", count, false, "the health check looks at one pixel in n x n; 8"},
     {"saturated_level", "", count, false, "level from which a pixel is saturated; 250"},
@@ -73,11 +83,15 @@ constexpr SettingInfo kLaser[] = {
 };
 constexpr SettingInfo kHead[] = {
     COMMON_SETTINGS,
-    {"interface", "can", text, true, "network interface, for instance can0"},
+    {"interface", "can", text, true, "network interface, for instance can0; unix:PATH for a double"},
+    {"eyelids", "can", flag, false, "opened at the start, closed at the stop; true"},
 };
 constexpr SettingInfo kBase[] = {
     COMMON_SETTINGS,
     CARMEN_SETTINGS,
+    {"interface", "can", text, true, "network interface, for instance can0; unix:PATH for a double"},
+    {"wheel_step", "can", length, false, "way of a wheel per encoder count; 0.05mm"},
+    {"track", "can", length, false, "distance of the two wheels; 0.5m"},
     {"drive", "sim", text, false, "path (the world's) or command (velocity commands); path if the world has one"},
     {"scale_error", "sim", number, false, "systematic error of the odometer's distance; 0.01"},
     {"turn_scale_error", "sim", number, false, "systematic error of the odometer's turns; 0.01"},
@@ -87,6 +101,12 @@ constexpr SettingInfo kBase[] = {
 constexpr SettingInfo kLines[] = {
     COMMON_SETTINGS,
     {"chip", "gpio", path, true, "device file of the chip, for instance /dev/gpiochip0"},
+    {"inputs", "gpio", text, false, "names or offsets of the inputs, the emergency stop first: estop, 5; 0"},
+    {"outputs", "gpio", text, false, "names or offsets of outputs, low until they are written; none"},
+    {"powered", "gpio", text, false, "outputs that are high from the start to the stop, such as eyelid_power; none"},
+    {"trigger", "gpio", text, false, "output with a pulse at each release, such as a camera's trigger; none"},
+    {"debounce", "gpio", time, false, "a rise of an input counts after so long, a fall at once; 5ms"},
+    {"pulse", "gpio", time, false, "how long the trigger is high, at most 1ms; 0.1ms"},
 };
 
 constexpr DeviceKind kKinds[] = {

@@ -9,6 +9,7 @@ struct LinesReading {
   int64_t stamp_ns = 0;
   uint32_t levels = 0;   ///< bit i: level of line i
   uint32_t changed = 0;  ///< bit i: at least one edge since the previous read, even if the level is back
+  int64_t edge_ns = 0;   ///< when the newest of these edges was; 0: none, or not known
 };
 
 /// Digital inputs and outputs (emergency stop, camera trigger). Inputs that stop the robot are active-low, so that a

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "hal/motion.hpp"
 #include "hal/sim/random.hpp"
 
 namespace takt::sim {
@@ -15,8 +16,6 @@ constexpr double kTickS = 0.01;
 constexpr double kMaxSpeed = 1.4, kMaxAcceleration = 1.35;    // algorithms.md 13
 constexpr double kMaxTurn = 1.2, kMaxTurnAcceleration = 2.5;  // our choice: not documented for the platform
 std::atomic<int64_t> g_ahead_ns{0}, g_in_read_ns{0};
-
-double towards(double value, double target, double step) { return value + std::clamp(target - value, -step, step); }
 
 /// The command in force at an instant: the newest whose time has come. `count` commands were ever given.
 const PendingCommand* in_force(const std::array<PendingCommand, 64>& ring, uint32_t count, int64_t at_ns) {
@@ -196,23 +195,9 @@ void Simulation::step_head(int64_t tick) {
   const HeadLimits limits = head_limits();
   const auto* command = in_force(head_commands_, head_command_count_, epoch_ns() + (tick - 1) * History<4>::kTickNs);
   const double target[2] = {command ? command->a : 0, command ? command->b : 0};
-  const double reach[2] = {limits.pan_rad, limits.tilt_rad};
-  const double fastest[2] = {limits.pan_rad_s, limits.tilt_rad_s};
-  for (size_t axis = 0; axis < 2; ++axis) {
-    s[axis] = std::clamp(s[axis] + s[axis + 2] * kTickS, -reach[axis], reach[axis]);  // mechanical stop
-    const double error = target[axis] - s[axis];
-    // Fastest speed from which the rest of the way suffices to brake; close to the target one tick must not overshoot
-    // it.
-    const double braking = std::sqrt(2 * limits.acceleration_rad_s2 * std::abs(error)) * 0.9;
-    const double wanted = std::copysign(std::min({fastest[axis], braking, std::abs(error) / kTickS}), error);
-    s[axis + 2] = towards(s[axis + 2], wanted, limits.acceleration_rad_s2 * kTickS);
-    // Arrived: there, or just past it with a speed that one tick takes away.
-    const bool passed = error * s[axis + 2] < 0 && std::abs(error) < std::abs(s[axis + 2]) * kTickS;
-    if ((std::abs(error) < 1e-4 || passed) && std::abs(s[axis + 2]) < 2 * limits.acceleration_rad_s2 * kTickS) {
-      s[axis] = target[axis];
-      s[axis + 2] = 0;
-    }
-  }
+  const Axis axes[2] = {{limits.pan_rad, limits.pan_rad_s, limits.acceleration_rad_s2},
+                        {limits.tilt_rad, limits.tilt_rad_s, limits.acceleration_rad_s2}};
+  for (size_t axis = 0; axis < 2; ++axis) step_axis(axes[axis], target[axis], kTickS, s[axis], s[axis + 2]);
   head_.append(s);
 }
 

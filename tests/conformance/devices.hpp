@@ -4,6 +4,7 @@
 #include <doctest/doctest.h>
 
 #include <cmath>
+#include <functional>
 #include <vector>
 
 #include "hal/base/mobile_base.hpp"
@@ -15,6 +16,13 @@ namespace takt::test {
 
 constexpr int64_t kDeviceEpoch = 7'000'000'000;
 constexpr int64_t kDevicePeriod = 20'000'000;
+
+/// Lets the world behind a device go on until that instant: doubles live, virtual time passes, real time is waited for.
+/// A simulated world needs none of it.
+using Pace = std::function<void(int64_t at_ns)>;
+inline void no_pace(int64_t) {}
+/// Within so many periods a device that is well has found its zero, is enabled and follows its commands.
+constexpr int kPeriodsToReady = 500;
 
 inline void check_laser_scanner(LaserScanner& laser) {
   REQUIRE(laser.open().has_value());
@@ -46,16 +54,27 @@ inline void check_laser_scanner(LaserScanner& laser) {
   laser.close();
 }
 
-inline void check_camera_head(CameraHead& head) {
+inline void check_camera_head(CameraHead& head, const Pace& pace = no_pace) {
   REQUIRE(head.open().has_value());
   CHECK(head.read(kDeviceEpoch, INT64_MAX).status == ReadStatus::no_data);
   REQUIRE(head.start(kDeviceEpoch).has_value());
+  int64_t at = kDeviceEpoch;
+  const auto next = [&] {
+    at += kDevicePeriod;
+    pace(at);
+  };
+  bool follows = head.command(0.5, -0.2, at);
+  for (int k = 0; k < kPeriodsToReady && !follows; ++k) {
+    next();
+    head.read(at, INT64_MAX);
+    follows = head.command(0.5, -0.2, at);
+  }
+  REQUIRE(follows);
   const HeadLimits limits = head.limits();
-  CHECK(head.command(0.5, -0.2, kDeviceEpoch));
-  double fastest = 0, previous = head.read(kDeviceEpoch, INT64_MAX).pan_rad;
+  double fastest = 0, previous = head.read(at, INT64_MAX).pan_rad;
   HeadReading reading;
   for (int64_t k = 1; k <= 100; ++k) {
-    const int64_t at = kDeviceEpoch + k * kDevicePeriod;
+    next();
     head.command(0.5, -0.2, at);
     reading = head.read(at, INT64_MAX);
     REQUIRE(reading.status == ReadStatus::ok);
@@ -69,30 +88,39 @@ inline void check_camera_head(CameraHead& head) {
   CHECK(fastest > 0.1);
   CHECK(fastest <= limits.pan_rad_s * 1.001);
   // Beyond the limits: clamped, and said so.
-  CHECK_FALSE(head.command(limits.pan_rad + 1, 0, kDeviceEpoch + 101 * kDevicePeriod));
-  CHECK_FALSE(head.command(std::nan(""), 0, kDeviceEpoch + 101 * kDevicePeriod));
+  next();
+  CHECK_FALSE(head.command(limits.pan_rad + 1, 0, at));
+  CHECK_FALSE(head.command(std::nan(""), 0, at));
   for (int64_t k = 102; k <= 400; ++k) {
-    reading = head.read(kDeviceEpoch + k * kDevicePeriod, INT64_MAX);
+    next();
+    reading = head.read(at, INT64_MAX);
     CHECK(reading.pan_rad <= limits.pan_rad + 1e-6);
   }
   head.stop();
-  CHECK(head.read(kDeviceEpoch + 401 * kDevicePeriod, INT64_MAX).status == ReadStatus::no_data);
+  CHECK(head.read(at + kDevicePeriod, INT64_MAX).status == ReadStatus::no_data);
   head.close();
 }
 
 /// `obeys`: the base takes velocity commands (a simulated one may drive a path instead).
-inline void check_mobile_base(MobileBase& base, bool obeys) {
+inline void check_mobile_base(MobileBase& base, bool obeys, const Pace& pace = no_pace) {
   REQUIRE(base.open().has_value());
   CHECK(base.read(kDeviceEpoch, INT64_MAX).status == ReadStatus::no_data);
   REQUIRE(base.start(kDeviceEpoch).has_value());
   const BaseLimits limits = base.limits();
-  BaseReading before = base.read(kDeviceEpoch, INT64_MAX);
+  int64_t at = kDeviceEpoch;
+  BaseReading before = base.read(at, INT64_MAX);
+  const auto ready = [&] { return before.status == ReadStatus::ok && (!obeys || base.command(0, 0, at)); };
+  for (int k = 0; k < kPeriodsToReady && !ready(); ++k) {
+    at += kDevicePeriod;
+    pace(at);
+    before = base.read(at, INT64_MAX);
+  }
   REQUIRE(before.status == ReadStatus::ok);
   const uint32_t epoch = before.epoch;
-  int64_t at = kDeviceEpoch;
   const auto drive = [&](double speed, int jobs, bool repeat) {
     for (int k = 0; k < jobs; ++k) {
       at += kDevicePeriod;
+      pace(at);
       if (repeat) CHECK(base.command(speed, 0.0, at) == obeys);
       const BaseReading now = base.read(at, INT64_MAX);
       REQUIRE(now.status == ReadStatus::ok);

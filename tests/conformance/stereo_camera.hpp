@@ -128,4 +128,48 @@ inline void check_free_running_camera(const MakeCamera& make) {
   CHECK(second.stamp_ns <= clock.now_ns());
 }
 
+/// A camera at a rate of its own, whatever its device: `pace` lets its world go on until an instant of the clock.
+inline void check_streaming_camera(StereoCamera& camera, const Clock& clock,
+                                   const std::function<void(int64_t at_ns)>& pace) {
+  CHECK_FALSE(camera.start(clock.now_ns()).has_value());  // not open yet
+  REQUIRE(camera.open().has_value());
+  REQUIRE(camera.open().has_value());  // opening twice changes nothing
+  const StereoFormat format = camera.format();
+  REQUIRE(format.width > 0);
+  REQUIRE(format.height > 0);
+  REQUIRE(format.rate_hz > 0);
+  CHECK((format.channels == 1 || format.channels == 3));
+  const auto period_ns = static_cast<int64_t>(1e9 / format.rate_hz);
+  for (int run = 0; run < 2; ++run) {
+    GuardedImage left(format), right(format);
+    CHECK(camera.read(left.view(), right.view(), clock.now_ns()).status == ReadStatus::no_data);  // not started
+    CHECK(left.untouched());
+    CHECK(right.untouched());
+    const int64_t started_ns = clock.now_ns();
+    REQUIRE(camera.start(started_ns).has_value());
+    int64_t previous_ns = started_ns - 1;
+    uint32_t frames = 0, number = 0;
+    for (int k = 0; k < 60 && frames < 10; ++k) {
+      pace(clock.now_ns() + period_ns);
+      const StereoFrame frame = camera.read(left.view(), right.view(), clock.now_ns() + period_ns);
+      if (frame.status == ReadStatus::no_data) continue;
+      REQUIRE(frame.status == ReadStatus::ok);
+      CHECK(frame.stamp_ns > previous_ns);
+      CHECK(frame.stamp_ns <= clock.now_ns());
+      CHECK((frames == 0 || frame.frame_number > number));
+      previous_ns = frame.stamp_ns;
+      number = frame.frame_number;
+      ++frames;
+    }
+    CHECK(frames == 10);
+    CHECK(left.guards_hold());
+    CHECK(right.guards_hold());
+    CHECK_FALSE(left.untouched());
+    CHECK(left.bytes != right.bytes);
+    camera.stop();
+  }
+  camera.close();
+  CHECK_FALSE(camera.start(clock.now_ns()).has_value());
+}
+
 }  // namespace takt::test

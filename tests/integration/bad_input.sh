@@ -57,7 +57,7 @@ recording; rm "$work/data/stereo_sequence/kitti06/calib.txt"; replay 2 "calib.tx
 
 # Devices and daemons: exit 3.
 graph 's#sim: \{default: .*#sim: {default: {driver: sim, world: worlds/lab.xml}, head_camera: {driver: v4l2, path: /dev/video99}}#'
-run 3 "v4l2"
+run 3 "/dev/video99"
 # A /tmp and a /dev/shm of its own, so that no daemon of the user is disturbed; what runs there is copied there, because
 # the project itself may stand below /tmp.
 private() {

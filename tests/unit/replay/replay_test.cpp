@@ -59,6 +59,10 @@ TEST_CASE("replay conforms") {
   };
   test::check_stereo_camera(make);
   test::check_free_running_camera(make);
+  const Recording longer(12);
+  VirtualClock clock;
+  ReplayCamera camera("camera", longer.settings(), clock);
+  test::check_streaming_camera(camera, clock, [&](int64_t at_ns) { clock.advance_to(at_ns); });
   const Recording colour(4, 3);
   test::check_stereo_camera([&](const Clock& clock) -> std::unique_ptr<StereoCamera> {
     return std::make_unique<ReplayCamera>("camera", colour.settings(), clock);

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <array>
+#include <filesystem>
+#include <memory>
+#include <vector>
+
+#include "hal/camera/frame_codec.hpp"
+#include "hal/camera/rig.hpp"
+#include "hal/camera/stereo_camera.hpp"
+#include "hal/camera/video_device.hpp"
+#include "rt/time/clock.hpp"
+#include "rt/time/rate.hpp"
+
+namespace takt::v4l2 {
+
+struct V4l2CameraSettings {
+  std::string path;
+  StereoRig rig;             ///< its width and height are those of one eye
+  FrameLayout layout;        ///< format, eyes and mosaic; the rest is the rig's and the device's
+  Rate rate{15, 1};          ///< asked for; the device may give another
+  uint32_t buffers = 4;      ///< asked for, 2..8
+  double exposure_s = 0;     ///< 0: as the device is set
+  double gain = -1;          ///< in the device's own steps; below 0: as it is set
+  double stamp_delay_s = 0;  ///< from the begin of the exposure to the device's stamp
+};
+
+/// What was lost on the way.
+struct V4l2Counters {
+  uint64_t frames = 0;     ///< delivered
+  uint64_t missing = 0;    ///< gaps in the device's count
+  uint64_t skipped = 0;    ///< older than one that was there, too, or than the start
+  uint64_t damaged = 0;    ///< flagged by the device, or short
+  uint64_t repeated = 0;   ///< the same frame again
+  uint64_t io_errors = 0;  ///< a buffer could not be had
+  uint64_t unstamped = 0;  ///< frames whose device has no monotonic stamp: stamped when they were taken
+};
+
+/// A stereo camera behind Video4Linux that runs at a rate of its own: frames are streamed into buffers that the
+/// device's driver shares, and moved from there into the message. Of several frames that wait the newest is delivered.
+class V4l2Camera final : public StereoCamera {
+ public:
+  static constexpr uint32_t kMostBuffers = 8;
+  static constexpr int kIoErrorsToLoss = 3;  ///< in a row (devices.md 8)
+
+  V4l2Camera(std::string id, V4l2CameraSettings settings, std::unique_ptr<VideoDevice> device, const Clock& clock);
+  ~V4l2Camera() override { V4l2Camera::close(); }
+  DeviceResult open() override;
+  void close() override;
+  DeviceResult start(int64_t epoch_ns) override;
+  void stop() override;
+  bool restart(int64_t now_ns) override;
+  DeclaredCalls declared_calls() const override;
+  StereoFormat format() const override;
+  void trigger(int64_t) override {}
+  /// disconnected: the device is gone, its queue has an error, or it gave nothing for three periods and a second.
+  StereoFrame read(ImageView<uint8_t> left, ImageView<uint8_t> right, int64_t deadline_ns) override;
+
+  const V4l2Counters& counters() const { return counters_; }
+
+ private:
+  /// What went wrong in words, with an errno where there is one. No allocation: a job may make it.
+  struct Trouble {
+    const char* what = nullptr;
+    int error = 0;
+    explicit operator bool() const { return what != nullptr; }
+  };
+  struct Frame {
+    uint32_t index = 0;
+    size_t bytes = 0;
+    uint32_t sequence = 0;
+    int64_t stamp_ns = 0;
+    bool flagged = false;
+  };
+
+  Trouble claim();
+  Trouble negotiate();
+  Trouble set_control(uint32_t control, int32_t value, const char* what);
+  Trouble map_buffers();
+  void release();
+  Trouble stream();
+  DeviceResult told(const Trouble& trouble);
+  std::string offered_formats();
+
+  bool queue(uint32_t index);
+  enum class Taken : uint8_t { frame, none, lost };
+  Taken take_one(Frame& frame);
+  Taken take_newest(Frame& frame);
+  StereoFrame deliver(const Frame& frame, ImageView<uint8_t> left, ImageView<uint8_t> right);
+  StereoFrame lose();
+  bool repeats(const Frame& frame) const;
+  void count(const Frame& frame);
+
+  std::string id_;
+  V4l2CameraSettings settings_;
+  std::unique_ptr<VideoDevice> device_;
+  const Clock& clock_;
+  double rate_hz_ = 0;
+  std::array<std::span<const uint8_t>, kMostBuffers> buffers_;
+  uint32_t buffer_count_ = 0;
+  std::vector<uint8_t> left_mosaic_, right_mosaic_;
+  V4l2Counters counters_;
+  bool open_ = false, streaming_ = false, lost_ = false, any_ = false, counts_itself_ = false;
+  int io_errors_in_row_ = 0;
+  int64_t epoch_ns_ = 0, alive_ns_ = 0;
+  uint32_t first_sequence_ = 0, number_ = 0;
+  Frame last_;  ///< taken
+};
+
+}  // namespace takt::v4l2

@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "hal/head/can_head.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace takt::head {
+namespace {
+
+constexpr double kHomingSpeed_deg_s = 30, kHomingAcceleration_deg_s2 = 200;
+constexpr double kLidTime_ms = 400;
+
+bool is_on(double signal) { return signal != 0; }
+
+}  // namespace
+
+HeadRequest next_request(const HeadView& view, const std::optional<HeadAngles>& target) {
+  if (!view.known || view.emergency_stop || view.fault || view.emergency != 0) return {};
+  if (!view.homed) return {Mode::home, {}};
+  if (view.state != State::operation_enabled) return {Mode::position, {view.pan_deg, view.tilt_deg}};
+  return target ? HeadRequest{Mode::position, *target} : HeadRequest{Mode::hold, {}};
+}
+
+CanHead::CanHead(std::string id, CanHeadSettings settings, const Clock& clock)
+    : HostDriver(std::move(id), settings.interface, clock, messages(), kPlaces),
+      settings_(std::move(settings)),
+      limits_(settings_.limits) {}
+
+void CanHead::forget() {
+  view_ = {};
+  target_.reset();
+  lids_closed_percent_ = -1;
+}
+
+void CanHead::rest() {
+  send(HeadRequest{});
+  if (settings_.eyelids) send_eyelids(100);
+}
+
+void CanHead::take(const can::Incoming& incoming) {
+  const auto& values = incoming.values;
+  switch (incoming.message) {
+    case kPosStatus: return take_status(incoming);
+    case kVelStatus:
+      pan_rad_s_ = values[VelStatus::pan] * kDegree;
+      tilt_rad_s_ = values[VelStatus::tilt] * kDegree;
+      return;
+    case kLimits: return narrow(values);
+    case kEmergency: view_.emergency = static_cast<uint16_t>(values[Emergency::code]); return;
+    default: return;
+  }
+}
+
+void CanHead::take_status(const can::Incoming& incoming) {
+  const auto& values = incoming.values;
+  view_.known = true;
+  view_.state = static_cast<State>(values[PosStatus::state]);
+  view_.homed = is_on(values[PosStatus::pan_homed]) && is_on(values[PosStatus::tilt_homed]);
+  view_.emergency_stop = is_on(values[PosStatus::emergency_stop]);
+  view_.fault = is_on(values[PosStatus::fault]);
+  view_.pan_deg = values[PosStatus::pan];
+  view_.tilt_deg = values[PosStatus::tilt];
+  HeadReading reading;
+  reading.status = ReadStatus::ok;
+  reading.stamp_ns = incoming.stamp_ns;
+  reading.pan_rad = view_.pan_deg * kDegree;
+  reading.tilt_rad = view_.tilt_deg * kDegree;
+  reading.pan_rad_s = pan_rad_s_;
+  reading.tilt_rad_s = tilt_rad_s_;
+  reading.moving = !is_on(values[PosStatus::pan_reached]) || !is_on(values[PosStatus::tilt_reached]);
+  keep(reading);
+}
+
+void CanHead::narrow(std::span<const double> values) {
+  const auto least = [&](double& limit, double said_deg) { limit = std::min(limit, said_deg * kDegree); };
+  const auto reach = [&](double& limit, double low, double high, double margin) {
+    least(limit, std::min(-low, high) - margin);
+  };
+  switch (static_cast<int>(values[Limits::page])) {
+    case 0:
+      return reach(limits_.pan_rad, values[Limits::pan_low], values[Limits::pan_high], values[Limits::pan_margin]);
+    case 1:
+      return reach(limits_.tilt_rad, values[Limits::tilt_low], values[Limits::tilt_high], values[Limits::tilt_margin]);
+    default:
+      least(limits_.pan_rad_s, values[Limits::pan_speed]);
+      least(limits_.tilt_rad_s, values[Limits::tilt_speed]);
+      least(limits_.acceleration_rad_s2, values[Limits::acceleration]);
+  }
+}
+
+HeadReading CanHead::read(int64_t wanted_ns, int64_t) {
+  if (!started()) return {};
+  attend();
+  send(next_request(view_, target_));
+  target_.reset();
+  if (settings_.eyelids) send_eyelids(0);
+  return newest(wanted_ns);
+}
+
+bool CanHead::command(double pan_rad, double tilt_rad, int64_t) {
+  if (!started() || !std::isfinite(pan_rad) || !std::isfinite(tilt_rad)) return false;
+  const double pan = std::clamp(pan_rad, -limits_.pan_rad, limits_.pan_rad),
+               tilt = std::clamp(tilt_rad, -limits_.tilt_rad, limits_.tilt_rad);
+  target_ = HeadAngles{pan / kDegree, tilt / kDegree};
+  return pan == pan_rad && tilt == tilt_rad && next_request(view_, target_).mode == Mode::position &&
+         view_.state == State::operation_enabled;
+}
+
+void CanHead::send(const HeadRequest& request) {
+  std::array<double, Setpoint::count> values{};
+  values[Setpoint::mode] = static_cast<double>(request.mode);
+  values[Setpoint::pan] = request.angles.pan_deg;
+  values[Setpoint::tilt] = request.angles.tilt_deg;
+  if (request.mode == Mode::home) {
+    values[Setpoint::speed] = kHomingSpeed_deg_s;
+    values[Setpoint::acceleration] = kHomingAcceleration_deg_s2;
+  } else if (request.mode == Mode::position) {
+    // One bound for both axes; the head keeps each axis to its own. Rounded down: never faster than the limits.
+    values[Setpoint::speed] = std::floor(limits_.pan_rad_s / kDegree + 1e-9);
+    values[Setpoint::acceleration] = 10 * std::floor(limits_.acceleration_rad_s2 / kDegree / 10 + 1e-9);
+  }
+  bus().send(kSetpoint, values);
+}
+
+void CanHead::send_eyelids(double closed_percent) {
+  if (closed_percent != std::exchange(lids_closed_percent_, closed_percent)) {
+    lid_token_ = static_cast<uint8_t>((lid_token_ + 1) % 16);  // the same token again moves nothing twice
+  }
+  std::array<double, EyelidSetpoint::count> values{};
+  values[EyelidSetpoint::action] = static_cast<double>(EyelidAction::position);
+  values[EyelidSetpoint::left] = values[EyelidSetpoint::right] = closed_percent;
+  values[EyelidSetpoint::move_ms] = kLidTime_ms;
+  values[EyelidSetpoint::token] = lid_token_;
+  bus().send(kEyelidSetpoint, values);
+}
+
+}  // namespace takt::head

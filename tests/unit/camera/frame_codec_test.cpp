@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "hal/camera/frame_codec.hpp"
+
+#include <doctest/doctest.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "tests/conformance/dbc_file.hpp"
+#include "tests/unit/can/golden_frames.hpp"
+
+using namespace takt;
+using namespace takt::v4l2;
+
+namespace {
+
+/// 4 x 2 pixels of each sensor, as in golden/bumblebee_frames.json.
+constexpr const char* kRight = "0A0B0C0D14151617";
+constexpr const char* kLeft = "646566676E6F7071";
+constexpr const char* kCentre = "C8C9CACBD2D3D4D5";
+
+struct Eyes {
+  int rows = 0;
+  std::vector<uint8_t> left, right;
+};
+
+Eyes eyes_of(std::span<const uint8_t> frame, FrameLayout layout) {
+  const auto size = static_cast<size_t>(layout.width * layout.height * layout.channels());
+  Eyes eyes{0, std::vector<uint8_t>(size, 0xA5), std::vector<uint8_t>(size, 0xA5)};
+  if (layout.bytes_per_line == 0) layout.bytes_per_line = layout.row_bytes();
+  eyes.rows = split(frame, layout, {eyes.left.data(), layout.width, layout.height, layout.channels()},
+                    {eyes.right.data(), layout.width, layout.height, layout.channels()});
+  return eyes;
+}
+
+FrameLayout layout_of(FrameFormat format, int left, int right) {
+  FrameLayout layout;
+  layout.format = format;
+  layout.width = 4;
+  layout.height = 2;
+  layout.left = left;
+  layout.right = right;
+  return layout;
+}
+
+void check_planes(const char* frame, FrameFormat format, int left, int right, const char* left_plane) {
+  const Eyes eyes = eyes_of(test::bytes_of(frame), layout_of(format, left, right));
+  CHECK(eyes.rows == 2);
+  CHECK(eyes.left == test::bytes_of(left_plane));
+  CHECK(eyes.right == test::bytes_of(kRight));
+}
+
+}  // namespace
+
+TEST_CASE("frame codec: the golden frames of Bumblebee2 and XB3, in every order of planes") {
+  constexpr const char* kThree = "0AC8640BC9650CCA660DCB6714D26E15D36F16D47017D571";
+  check_planes("0A640B650C660D67146E156F16701771", FrameFormat::y16, 1, 0, kLeft);
+  check_planes("640A650B660C670D6E146F1570167117", FrameFormat::y8i, 0, 1, kLeft);
+  check_planes("0AC80BC90CCA0DCB14D215D316D417D5", FrameFormat::y16, 1, 0, kCentre);
+  check_planes(kThree, FrameFormat::rgb3, 2, 0, kLeft);
+  check_planes(kThree, FrameFormat::rgb3, 1, 0, kCentre);
+}
+
+TEST_CASE("frame codec: the vectors are those of the reference") {
+  const auto file = test::reference("golden/bumblebee_frames.json");
+  if (!file) return;
+  std::ifstream stream(*file);
+  const auto golden = nlohmann::json::parse(stream);
+  const auto& planes = golden["planes"];
+  CHECK(planes["right"] == kRight);
+  CHECK(planes["left"] == kLeft);
+  CHECK(planes["center"] == kCentre);
+  size_t frames = 0;
+  for (const auto& frame : golden["frames"]) {
+    const bool three = frame["bytes_per_pixel"] == 3;
+    for (int left = 0; left < (three ? 3 : 2); ++left) {
+      for (int right = 0; right < (three ? 3 : 2); ++right) {
+        if (left == right) continue;
+        const Eyes eyes = eyes_of(test::bytes_of(frame["hex"].get<std::string>()),
+                                  layout_of(three ? FrameFormat::rgb3 : FrameFormat::y16, left, right));
+        const auto plane = [&](int byte) {
+          return test::bytes_of(planes[frame["byte" + std::to_string(byte)].get<std::string>()].get<std::string>());
+        };
+        CHECK(eyes.left == plane(left));
+        CHECK(eyes.right == plane(right));
+      }
+    }
+    ++frames;
+  }
+  CHECK(frames == 4);
+  for (const auto& size : golden["sizes"]) {
+    const std::string camera = size["camera"];
+    FrameLayout layout =
+        layout_of(camera.find("three") == std::string::npos ? FrameFormat::y16 : FrameFormat::rgb3, 1, 0);
+    layout.width = camera.find("XB3") == std::string::npos ? 640 : 1280;
+    layout.height = layout.width * 3 / 4;
+    layout.bytes_per_line = layout.row_bytes();
+    CHECK(layout.bytes_per_line == size["bytesperline"]);
+    CHECK(layout.image_bytes() == size["sizeimage"]);
+  }
+}
+
+TEST_CASE("frame codec: rows are stepped by the device's stride, and a short frame gives its whole rows") {
+  const auto bytes = test::bytes_of("0A640B650C660D67EEEEEE146E156F16701771");  // 3 bytes of padding, none at the end
+  FrameLayout layout = layout_of(FrameFormat::y16, 1, 0);
+  layout.bytes_per_line = 11;
+  CHECK(eyes_of(bytes, layout).left == test::bytes_of(kLeft));
+  for (size_t length = 0; length <= bytes.size(); ++length) {
+    const Eyes eyes = eyes_of(std::span(bytes).first(length), layout);
+    const int rows = length >= 19 ? 2 : length >= 8 ? 1 : 0;
+    CHECK(eyes.rows == rows);
+    for (size_t i = static_cast<size_t>(rows) * 4; i < 8; ++i) CHECK(eyes.left[i] == 0xA5);
+  }
+}
+
+TEST_CASE("frame codec: halves side by side, grey and in colour") {
+  const FrameLayout grey = layout_of(FrameFormat::grey, 0, 1);
+  CHECK(grey.frame_width() == 8);
+  const Eyes eyes = eyes_of(test::bytes_of("646566670A0B0C0D6E6F707114151617"), grey);
+  CHECK(eyes.left == test::bytes_of(kLeft));
+  CHECK(eyes.right == test::bytes_of(kRight));
+  // BT.601: black, white, and the primaries, of which each has an exact level of 8 bits.
+  FrameLayout colour = layout_of(FrameFormat::yuyv, 0, 1);
+  colour.width = 2;
+  colour.height = 1;
+  const auto bgr = [&](const char* left) {
+    std::vector<uint8_t> frame = test::bytes_of(left);
+    for (const uint8_t byte : test::bytes_of("10801080")) frame.push_back(byte);
+    const Eyes both = eyes_of(frame, colour);
+    CHECK(both.right == std::vector<uint8_t>(6, 0));
+    return both.left;
+  };
+  CHECK(bgr("1080EB80") == std::vector<uint8_t>{0, 0, 0, 255, 255, 255});
+  const auto red = bgr("525A52F0");
+  CHECK(red[2] >= 254);
+  CHECK(std::max(red[0], red[1]) <= 1);
+  const auto blue = bgr("29F0296E");
+  CHECK(blue[0] >= 254);
+  CHECK(std::max(blue[1], blue[2]) <= 1);
+}
+
+TEST_CASE("frame codec: each mosaic gives its colours back") {
+  constexpr int kSize = 8;
+  constexpr uint8_t kBgr[3] = {40, 120, 200};
+  for (const auto& [pattern, letters] : std::initializer_list<std::pair<Mosaic, const char*>>{
+           {Mosaic::rggb, "RGGB"}, {Mosaic::grbg, "GRBG"}, {Mosaic::gbrg, "GBRG"}, {Mosaic::bggr, "BGGR"}}) {
+    std::vector<uint8_t> plane(kSize * kSize), image(plane.size() * 3);
+    for (int y = 0; y < kSize; ++y) {
+      for (int x = 0; x < kSize; ++x) {
+        const char letter = letters[y % 2 * 2 + x % 2];
+        plane[static_cast<size_t>(y * kSize + x)] = kBgr[letter == 'B' ? 0 : letter == 'G' ? 1 : 2];
+      }
+    }
+    debayer({plane.data(), kSize, kSize}, pattern, {image.data(), kSize, kSize, 3});
+    for (size_t i = 0; i < image.size(); ++i) CHECK(image[i] == kBgr[i % 3]);
+  }
+}
+
+TEST_CASE("frame codec: names and codes") {
+  CHECK(frame_format("y16") == FrameFormat::y16);
+  CHECK(frame_format("grey") == FrameFormat::grey);
+  CHECK_FALSE(frame_format("jpeg"));
+  CHECK(mosaic("gbrg") == Mosaic::gbrg);
+  CHECK_FALSE(mosaic("rgb"));
+  CHECK(four_characters_text(four_characters(FrameFormat::y16)) == "Y16 ");
+  CHECK(four_characters_text(four_characters(FrameFormat::rgb3)) == "RGB3");
+  CHECK(four_characters_text(0x01020304) == "????");
+}

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+// `takt devices` and `takt capture`.
+#include <doctest/doctest.h>
+
+#include <fstream>
+#include <iterator>
+#include <regex>
+#include <thread>
+
+#include "graph/command/devices_command.hpp"
+#include "graph/command/run_command.hpp"
+#include "hal/can/station.hpp"
+#include "hal/head/head_messages.hpp"
+#include "tests/temporary_folder.hpp"
+
+using namespace takt;
+using namespace takt::command;
+
+TEST_CASE("devices: nothing there is no error") {
+  const test::TemporaryFolder root;
+  CHECK(list_devices(false, root.path) == kOk);
+  CHECK(list_devices(true, root.path) == kOk);
+}
+
+TEST_CASE("capture: what is on the bus stands in the file, frame by frame, until the bus goes") {
+  const test::TemporaryFolder folder;
+  const std::string interface = "unix:" + (folder.path / "can").string();
+  const MonotonicClock clock;
+  can::Station head(interface, clock, head::messages(), can::Sender::device);
+  REQUIRE(head.open() == 0);
+  // The far end of the socket is there before anybody captures: the connection waits in its queue.
+  std::thread device([&] {
+    const can::Frame status = head.make(head::kPosStatus, std::array<double, head::PosStatus::count>{4});
+    while (!head.send(status)) head.next();  // until somebody listens
+    head.send({can::kErrorFlag | 0x40, 8, {}});
+    head.send({0x710, 1, {5}});
+    head.close();
+  });
+  CHECK(capture_device({interface, folder.path / "log", 60}) == kDeviceOrSystem);  // gone before the time was over
+  device.join();
+  std::ifstream file(folder.path / "log");
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  const std::regex expected(R"(\(\d+\.\d{6}\) unix:\S+ 190#[0-9A-F]{16}\n\(\d+\.\d{6}\) unix:\S+ 20000040#0{16}\n)"
+                            R"(\(\d+\.\d{6}\) unix:\S+ 710#05\n)");
+  CHECK_MESSAGE(std::regex_match(text, expected), text);
+}
+
+TEST_CASE("capture: what cannot be captured is told") {
+  const test::TemporaryFolder folder;
+  CHECK(capture_device({"/dev/ttyS0", folder.path / "log", 1}) == kBadInput);
+  CHECK(capture_device({"can99", folder.path / "none" / "log", 1}) == kBadInput);
+  CHECK(capture_device({"can99", folder.path / "log", 1}) == kDeviceOrSystem);
+}

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "hal/discovery/discovery.hpp"
+
+#include <doctest/doctest.h>
+
+#include "tests/temporary_folder.hpp"
+
+using namespace takt;
+
+TEST_CASE("discovery: what sysfs names, in the order of the names, with a line for the graph") {
+  const test::TemporaryFolder root;
+  const auto file = [&](const char* name, const std::string& text) {
+    std::filesystem::create_directories((root.path / name).parent_path());
+    root.write(name, text + "\n");
+  };
+  file("sys/class/video4linux/video10/name", "vivid");
+  file("sys/class/video4linux/video2/name", "Bumblebee bridge");
+  file("sys/class/net/lo/type", "772");
+  file("sys/class/net/can0/type", "280");
+  file("sys/class/net/can0/operstate", "up");
+  std::filesystem::create_directories(root.path / "sys/class/net/can0/device");
+  std::filesystem::create_directory_symlink("../../drivers/kvaser_pci", root.path / "sys/class/net/can0/device/driver");
+  std::filesystem::create_directories(root.path / "sys/bus/gpio/devices/gpiochip0");
+  std::filesystem::create_directories(root.path / "sys/class/tty/ttyUSB0");
+  std::filesystem::create_directories(root.path / "sys/class/tty/tty1");
+  const auto found = discovery::discover(root.path);
+  REQUIRE(found.size() == 5);
+  CHECK(found[0].where == "/dev/video2");
+  CHECK(found[0].description == "Bumblebee bridge");
+  CHECK(found[0].line.find("driver: v4l2, path: /dev/video2,") != std::string::npos);
+  CHECK(found[1].where == "/dev/video10");
+  CHECK(found[2].where == "can0");
+  CHECK(found[2].description == "CAN, kvaser_pci, up");
+  CHECK(found[2].line.find("driver: can, interface: can0") != std::string::npos);
+  CHECK(found[3].where == "/dev/gpiochip0");
+  CHECK(found[4].where == "/dev/ttyUSB0");
+  CHECK(discovery::discover(root.path / "nothing").empty());
+}
