@@ -6,6 +6,7 @@
 
 #include "hal/base/base_node.hpp"
 #include "hal/camera/stereo_camera_node.hpp"
+#include "hal/drivers/sick_lasers.hpp"
 #include "hal/gpio/lines_node.hpp"
 #include "hal/head/head_node.hpp"
 #include "hal/laser/laser_node.hpp"
@@ -211,6 +212,12 @@ NodeResult make_sim(const DeviceConfig& config, Settings& settings, Devices& dev
   return opened<LinesNode>(std::move(device), settings);
 }
 
+NodeResult make_real(const DeviceConfig& config, Settings& settings, const Clock& clock) {
+  if (config.driver == "lms200") return opened<LaserNode>(make_lms200(config, settings, clock), settings);
+  if (config.driver == "lms400") return opened<LaserNode>(make_lms400(config, settings, clock), settings);
+  throw std::logic_error("driver " + config.driver + " is not in hal/drivers/drivers.cpp");
+}
+
 /// Keys that no driver of the kind knows.
 DeviceResult check_keys(const DeviceConfig& config, const DeviceKind& kind) {
   if (!config.settings.is_object() && !config.settings.is_null())
@@ -283,8 +290,9 @@ NodeResult make_device(const DeviceConfig& config, Devices& devices, const Clock
                           "choose a profile whose devices use one of: " + built_names(kind->drivers));
   Settings settings(config.id, config.settings, config.directory);
   const DeviceHealthSettings health = health_of(config, settings);
-  NodeResult node =
-      config.driver == "replay" ? make_replay(config, settings, clock) : make_sim(config, settings, devices, clock);
+  NodeResult node = config.driver == "replay" ? make_replay(config, settings, clock)
+                    : config.driver == "sim"  ? make_sim(config, settings, devices, clock)
+                                              : make_real(config, settings, clock);
   if (node) (*node)->set_health(health);
   return node;
 }

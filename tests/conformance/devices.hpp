@@ -3,7 +3,9 @@
 #pragma once
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <functional>
 #include <vector>
 
 #include "hal/base/mobile_base.hpp"
@@ -16,7 +18,13 @@ namespace takt::test {
 constexpr int64_t kDeviceEpoch = 7'000'000'000;
 constexpr int64_t kDevicePeriod = 20'000'000;
 
-inline void check_laser_scanner(LaserScanner& laser) {
+/// When a scanner is read, and what moves its world there; by default one that always has a new sweep.
+struct LaserPace {
+  int64_t first_ns = kDeviceEpoch, period_ns = kDevicePeriod;
+  std::function<void(int64_t)> advance_to = [](int64_t) {};
+};
+
+inline void check_laser_scanner(LaserScanner& laser, const LaserPace& pace = {}) {
   REQUIRE(laser.open().has_value());
   const ScanFormat format = laser.format();
   REQUIRE(format.beams >= 2);
@@ -30,13 +38,18 @@ inline void check_laser_scanner(LaserScanner& laser) {
   CHECK(laser.read(beams, kDeviceEpoch + 1, kDeviceEpoch).status == ReadStatus::no_data);
   CHECK(range[0] == -7.0f);
   int64_t previous = INT64_MIN;
+  uint32_t first_number = 0;
   for (uint32_t k = 0; k < 5; ++k) {
-    const int64_t wanted = kDeviceEpoch + k * kDevicePeriod;
+    const int64_t wanted = pace.first_ns + k * pace.period_ns;
+    pace.advance_to(wanted);
     const ScanReading reading = laser.read(beams, wanted, INT64_MAX);
     REQUIRE(reading.status == ReadStatus::ok);
     CHECK(reading.stamp_ns <= wanted);
     CHECK(reading.stamp_ns > previous);
-    CHECK(reading.scan_number == k);
+    if (format.stamp_lag_s > 0)
+      CHECK(static_cast<double>(wanted - reading.stamp_ns) <= 1e9 * format.stamp_lag_s + 1e6);
+    if (k == 0) first_number = reading.scan_number;
+    CHECK(reading.scan_number == first_number + k);
     previous = reading.stamp_ns;
     for (const float r : beams) CHECK((r == 0.0f || (r > 0.0f && static_cast<double>(r) < format.max_range_m + 0.1)));
   }
