@@ -38,7 +38,7 @@ DeviceResult SerialPort::open() {
   if (!set_raw(port_.get(), kFirstBaud)) return refused(ENOTTY);
   // Unlike TIOCEXCL this keeps out root as well, and ends with the descriptor.
   if (flock(port_.get(), LOCK_EX | LOCK_NB) != 0) return refused(EBUSY);
-  set_low_latency(port_.get());
+  make_prompt(port_.get());
   set_terminal_baud(port_.get(), kFirstBaud);  // and forgets what came before
   return {};
 }

@@ -41,10 +41,11 @@ uint32_t terminal_baud(int fd) {
   return ioctl(fd, TCGETS2, &settings) == 0 ? settings.c_ospeed : 0;
 }
 
-void set_low_latency(int fd) {
+void make_prompt(int fd) {
   serial_struct port{};
   if (ioctl(fd, TIOCGSERIAL, &port) != 0) return;
   port.flags |= ASYNC_LOW_LATENCY;
+  port.closing_wait = 10;  // hundredths of a second
   ioctl(fd, TIOCSSERIAL, &port);
 }
 

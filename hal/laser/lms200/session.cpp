@@ -27,7 +27,10 @@ bool valid(const Variant& v) {
 }
 
 Session::Session(const SessionSettings& settings)
-    : settings_(settings), instants_(turns_of(settings.variant) * kTurn_ns), wanted_baud_(settings.baud) {
+    : settings_(settings),
+      reception_(Parser::of_replies(), kByteGap_ns),
+      instants_(turns_of(settings.variant) * kTurn_ns),
+      wanted_baud_(settings.baud) {
   assembled_.range_m.assign(beams_of(settings.variant), 0.0f);
   whole_ = assembled_;
 }
@@ -67,7 +70,7 @@ void Session::begin(int64_t now_ns) {
   try_rate(wanted_baud_);
   trouble_ = "no answer yet";
   not_before_ns_ = now_ns;
-  last_scan_ns_ = last_byte_ns_ = now_ns;
+  last_scan_ns_ = now_ns;
   enter(Step::find, now_ns);
 }
 
@@ -86,8 +89,7 @@ void Session::try_next_rate() {
 }
 
 void Session::line_has(uint32_t baud) {
-  byte_clock_.set_baud(baud_);
-  parser_.reset();
+  reception_.begin(baud_);
   const auto wrong = std::abs(static_cast<int64_t>(baud) - static_cast<int64_t>(baud_));
   if (baud == 0 || wrong * 50 <= baud_) return;  // a UART bears some 2 %
   const auto lower = std::find_if(kBauds.begin(), kBauds.end(), [&](uint32_t known) { return known < baud_; });
@@ -176,17 +178,7 @@ LineOrder Session::farewell() {
 
 const ReceivedScan* Session::receive(std::span<const uint8_t> bytes, int64_t now_ns) {
   scan_ready_ = false;
-  const auto on_event = [&](const Event& event) { hear(event, now_ns); };
-  const uint64_t skipped = parser_.skipped();
-  if (parser_.begun() && now_ns - last_byte_ns_ > kByteGap_ns) {
-    parser_.abandon();
-    parse(parser_, {}, on_event);
-  }
-  last_byte_ns_ = now_ns;
-  bytes_ += bytes.size();
-  byte_clock_.add(bytes_, now_ns);
-  parse(parser_, bytes, on_event);
-  if (parser_.skipped() != skipped) ++damaged_;
+  reception_.receive(bytes, now_ns, [&](const Event& event) { hear(event, now_ns); });
   return scan_ready_ ? &whole_ : nullptr;
 }
 
@@ -273,17 +265,17 @@ void Session::hear_scan(std::span<const uint8_t> payload, uint64_t position, int
   const auto scan = read_scan(payload);
   if (!scan || scan->millimetres != settings_.millimetres || scan->partial != interlaced(settings_.variant) ||
       scan->beams() != beams_in(*scan)) {
-    ++damaged_;
+    reception_.count_damage();
     return;
   }
   last_scan_ns_ = now_ns;
   if (severity(scan->status) >= Severity::error) {
-    ++damaged_;
+    reception_.count_damage();
     return;
   }
   // The first beam left when the first of its turns began; the telegram began when the last one had ended.
   const int64_t turns_ns = scan->partial ? kTurn_ns : scan_ns();
-  if (!assemble(*scan, byte_clock_.arrival_ns(position) - byte_clock_.byte_ns() - turns_ns)) return;
+  if (!assemble(*scan, reception_.began_ns(position) - turns_ns)) return;
   std::swap(assembled_, whole_);
   whole_.stamp_ns = instants_.refine(whole_.stamp_ns);
   // Scans that no line of this rate can carry are not counted as lost.

@@ -5,7 +5,7 @@
 #include "hal/laser/laser_session.hpp"
 #include "hal/laser/lms200/commands.hpp"
 #include "hal/laser/lms200/scan.hpp"
-#include "hal/stream/byte_clock.hpp"
+#include "hal/laser/reception.hpp"
 
 namespace takt::lms200 {
 
@@ -41,7 +41,7 @@ class Session final : public LaserSession {
   LineOrder next(int64_t now_ns) override;
   void line_has(uint32_t baud) override;
   LineOrder farewell() override;
-  uint64_t damaged() const override { return damaged_; }
+  uint64_t damaged() const override { return reception_.damaged(); }
   const char* trouble() const override { return trouble_; }
 
   /// Scans are coming.
@@ -86,10 +86,8 @@ class Session final : public LaserSession {
   int64_t interval_ns(uint32_t baud) const;
 
   SessionSettings settings_;
-  Parser parser_ = Parser::of_replies();
-  ByteClock byte_clock_;
+  Reception<Parser> reception_;
   PeriodicInstants instants_;
-  uint64_t bytes_ = 0, damaged_ = 0;
   const char* trouble_ = "not asked yet";
   const char* remark_ = "";  ///< what stays so while scans come
   std::optional<Status> status_;
@@ -109,7 +107,7 @@ class Session final : public LaserSession {
   ReceivedScan assembled_, whole_;
   uint8_t next_quarter_ = 0;
   bool scan_ready_ = false;
-  int64_t last_byte_ns_ = 0, last_scan_ns_ = 0;
+  int64_t last_scan_ns_ = 0;
   std::optional<uint32_t> scan_number_;
 };
 

@@ -2,7 +2,6 @@
 #include "hal/laser/lms200/telegram.hpp"
 
 #include <algorithm>
-#include <utility>
 
 namespace takt::lms200 {
 
@@ -32,51 +31,28 @@ Telegram::Telegram(uint8_t address, std::span<const uint8_t> payload) {
 }
 
 std::optional<Event> Parser::next() {
-  window_.drop(std::exchange(claimed_, 0));
-  for (;;) {
-    const auto bytes = window_.bytes();
-    if (bytes.empty()) return std::nullopt;
-    const uint64_t position = window_.position();
-    if (in_step_ && (bytes[0] == kAck || bytes[0] == kNak)) {
-      const EventKind kind = bytes[0] == kAck ? EventKind::ack : EventKind::nak;
-      window_.drop(1);
-      return Event{kind, position, {}};
+  drop_claimed();
+  for (; !bytes().empty(); skip(1)) {
+    const auto bytes = this->bytes();
+    if (at_boundary() && (bytes[0] == kAck || bytes[0] == kNak)) {
+      claim(1);
+      return Event{bytes[0] == kAck ? EventKind::ack : EventKind::nak, position(), {}};
     }
-    if (bytes[0] != kStx || (bytes.size() > 1 && bytes[1] != address_)) {
-      skip();
-      continue;
-    }
+    if (bytes[0] != kStx || (bytes.size() > 1 && bytes[1] != address_)) continue;
     if (bytes.size() < kHeader) return std::nullopt;
+    const auto refused = [this](EventKind kind) {
+      const Event event{kind, position(), {}};
+      skip(1);
+      return event;
+    };
     const size_t length = read_u16(bytes, 2);
-    if (length < least_ || length > kLargestPayload) {
-      skip();
-      return Event{EventKind::length_error, position, {}};
-    }
+    if (length < least_ || length > kLargestPayload) return refused(EventKind::length_error);
     if (bytes.size() < length + kFraming) return std::nullopt;
-    if (crc(bytes.first(kHeader + length)) != read_u16(bytes, kHeader + length)) {
-      skip();
-      return Event{EventKind::crc_error, position, {}};
-    }
-    claimed_ = length + kFraming;
-    in_step_ = true;
-    return Event{EventKind::telegram, position, bytes.subspan(kHeader, length)};
+    if (crc(bytes.first(kHeader + length)) != read_u16(bytes, kHeader + length)) return refused(EventKind::crc_error);
+    claim(length + kFraming);
+    return Event{EventKind::telegram, position(), bytes.subspan(kHeader, length)};
   }
-}
-
-void Parser::skip() {
-  window_.drop(1);
-  ++skipped_;
-  in_step_ = false;
-}
-
-void Parser::abandon() {
-  if (begun()) skip();
-}
-
-void Parser::reset() {
-  window_.drop(window_.bytes().size());
-  claimed_ = 0;
-  in_step_ = true;
+  return std::nullopt;
 }
 
 }  // namespace takt::lms200

@@ -7,7 +7,7 @@
 #include <optional>
 #include <span>
 
-#include "hal/stream/byte_window.hpp"
+#include "hal/stream/frame_search.hpp"
 
 namespace takt::lms200 {
 
@@ -58,43 +58,20 @@ struct Event {
 /// looked for; where it proves wrong, the search goes on one byte behind its STX, so that a whole telegram inside the
 /// length that a broken one claims is found. 06h and 15h are ACK and NAK only at the very start and right behind a
 /// whole telegram, an ACK or a NAK: elsewhere they are data.
-class Parser {
+class Parser : public FrameSearch<4096> {
  public:
   /// What an LMS says, or what is said to it. `address` of the LMS, 0..127.
   static Parser of_replies(uint8_t address = 0) { return Parser(static_cast<uint8_t>(address + kFromLms), 2); }
   static Parser of_commands(uint8_t address = 0) { return Parser(address, 1); }
 
-  /// Takes at least one of the bytes (how many, it returns) once next() has said that there is nothing left.
-  size_t push(std::span<const uint8_t> bytes) { return window_.push(bytes); }
   std::optional<Event> next();
-  /// True if bytes are left that may be the beginning of a telegram, after next() has said that there is nothing.
-  bool begun() const { return !window_.bytes().empty(); }
-  /// Bytes so far that belong to nothing.
-  uint64_t skipped() const { return skipped_; }
-  /// Gives up what has begun: its rest did not come in time. next() then looks at the bytes behind its STX.
-  void abandon();
-  /// Forgets all bytes; positions go on.
-  void reset();
 
  private:
   Parser(uint8_t address, size_t least) : address_(address), least_(least) {}
-  void skip();
 
-  ByteWindow<4096> window_;
   uint8_t address_;
-  size_t least_;        ///< payload: a reply has a status byte
-  size_t claimed_ = 0;  ///< bytes of the telegram that was returned last
-  uint64_t skipped_ = 0;
-  bool in_step_ = true;  ///< the next byte follows a whole telegram, or nothing
+  size_t least_;  ///< payload: a reply has a status byte
 };
-
-/// Everything that is in `bytes` and in what came before: on_event(const Event&) for each.
-template <class Function>
-void parse(Parser& parser, std::span<const uint8_t> bytes, Function&& on_event) {
-  do {
-    bytes = bytes.subspan(parser.push(bytes));
-    while (const auto event = parser.next()) on_event(*event);
-  } while (!bytes.empty());
-}
+using takt::parse;
 
 }  // namespace takt::lms200

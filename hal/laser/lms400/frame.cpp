@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <functional>
 #include <numeric>
-#include <utility>
 
 namespace takt::lms400 {
 namespace {
@@ -31,9 +30,9 @@ Frame::Frame(std::span<const uint8_t> payload) {
 }
 
 std::optional<Event> Parser::next() {
-  window_.drop(std::exchange(claimed_, 0));
+  drop_claimed();
   for (;;) {
-    const auto bytes = window_.bytes();
+    const auto bytes = this->bytes();
     const auto run = bytes.first(std::min(bytes.size(), kStxs));
     const auto other = std::find_if(run.begin(), run.end(), [](uint8_t byte) { return byte != kStx; });
     if (other != run.end()) {
@@ -46,31 +45,19 @@ std::optional<Event> Parser::next() {
       continue;
     }
     if (bytes.size() < kHeader) return std::nullopt;
-    const uint64_t position = window_.position();
-    const uint32_t length = length_of(bytes);
-    if (length == 0 || length > kLargestPayload) {
+    const auto refused = [this](EventKind kind) {
+      const Event event{kind, position(), {}};
       skip(1);
-      return Event{EventKind::length_error, position, {}};
-    }
+      return event;
+    };
+    const uint32_t length = length_of(bytes);
+    if (length == 0 || length > kLargestPayload) return refused(EventKind::length_error);
     if (bytes.size() < length + kFraming) return std::nullopt;
     const auto payload = bytes.subspan(kHeader, length);
-    if (checksum(payload) != bytes[kHeader + length]) {
-      skip(1);
-      return Event{EventKind::checksum_error, position, {}};
-    }
-    claimed_ = length + kFraming;
-    return Event{EventKind::frame, position, payload};
+    if (checksum(payload) != bytes[kHeader + length]) return refused(EventKind::checksum_error);
+    claim(length + kFraming);
+    return Event{EventKind::frame, position(), payload};
   }
-}
-
-void Parser::skip(size_t bytes) {
-  window_.drop(bytes);
-  skipped_ += bytes;
-}
-
-void Parser::reset() {
-  window_.drop(window_.bytes().size());
-  claimed_ = 0;
 }
 
 }  // namespace takt::lms400

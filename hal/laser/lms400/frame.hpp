@@ -8,7 +8,7 @@
 #include <optional>
 #include <span>
 
-#include "hal/stream/byte_window.hpp"
+#include "hal/stream/frame_search.hpp"
 
 namespace takt::lms400 {
 
@@ -45,35 +45,10 @@ struct Event {
 
 /// Finds frames in bytes, whatever they are, and however they are cut. Of a run of bytes 02h the last four begin a
 /// frame. Where a candidate proves wrong, the search goes on one byte behind its beginning.
-class Parser {
+class Parser : public FrameSearch<4 * kLargestPayload> {
  public:
-  /// Takes at least one of the bytes (how many, it returns) once next() has said that there is nothing left.
-  size_t push(std::span<const uint8_t> bytes) { return window_.push(bytes); }
   std::optional<Event> next();
-  /// True if bytes are left that may be the beginning of a frame, after next() has said that there is nothing.
-  bool begun() const { return !window_.bytes().empty(); }
-  /// Gives up what has begun: its rest did not come in time. next() then looks at the bytes behind its first.
-  void abandon() { skip(begun() ? 1 : 0); }
-  /// Bytes so far that belong to nothing.
-  uint64_t skipped() const { return skipped_; }
-  /// Forgets all bytes; positions go on.
-  void reset();
-
- private:
-  void skip(size_t bytes);
-
-  ByteWindow<4 * kLargestPayload> window_;
-  uint64_t skipped_ = 0;
-  size_t claimed_ = 0;  ///< bytes of the frame that was returned last
 };
-
-/// Everything that is in `bytes` and in what came before: on_event(const Event&) for each.
-template <class Function>
-void parse(Parser& parser, std::span<const uint8_t> bytes, Function&& on_event) {
-  do {
-    bytes = bytes.subspan(parser.push(bytes));
-    while (const auto event = parser.next()) on_event(*event);
-  } while (!bytes.empty());
-}
+using takt::parse;
 
 }  // namespace takt::lms400

@@ -30,6 +30,7 @@ uint32_t beams_of(const ScanConfiguration& scan) {
 Session::Session(const SessionSettings& settings)
     : settings_(settings),
       configure_text_(configure_scan(settings.scan)),
+      reception_({}, kByteGap_ns),
       instants_(period_of(settings.scan.rate_hz)),
       period_ns_(period_of(settings.scan.rate_hz)) {
   scan_.range_m.assign(beams_of(settings.scan), 0.0f);
@@ -55,17 +56,17 @@ ScanFormat Session::format() const {
 // The conversation ---------------------------------------------------------------------------------------------------
 
 void Session::begin(int64_t now_ns) {
-  parser_.reset();
+  reception_.begin(0);
   order_baud_ = settings_.baud != 0;
   order_reopen_ = false;
   trouble_ = "no answer yet";
   remark_ = "";
-  not_before_ns_ = last_byte_ns_ = now_ns;
+  not_before_ns_ = now_ns;
   enter(Step::stop, now_ns);
 }
 
 void Session::line_has(uint32_t baud) {
-  byte_clock_.set_baud(baud);
+  reception_.begin(baud);
   if (baud != settings_.baud) remark_ = "the serial line does not do the rate asked for";
 }
 
@@ -127,17 +128,7 @@ void Session::refuse(const char* why, int64_t now_ns) {
 
 const ReceivedScan* Session::receive(std::span<const uint8_t> bytes, int64_t now_ns) {
   scan_ready_ = false;
-  const auto on_event = [&](const Event& event) { hear(event, now_ns); };
-  const uint64_t skipped = parser_.skipped();
-  if (parser_.begun() && now_ns - last_byte_ns_ > kByteGap_ns) {
-    parser_.abandon();
-    parse(parser_, {}, on_event);
-  }
-  last_byte_ns_ = now_ns;
-  bytes_ += bytes.size();
-  byte_clock_.add(bytes_, now_ns);
-  parse(parser_, bytes, on_event);
-  if (parser_.skipped() != skipped) ++damaged_;
+  reception_.receive(bytes, now_ns, [&](const Event& event) { hear(event, now_ns); });
   return scan_ready_ ? &scan_ : nullptr;
 }
 
@@ -186,7 +177,7 @@ void Session::hear_measurement(const Measurement& m, uint64_t position, int64_t 
   if (m.format == Format::remission || m.count() != scan_.range_m.size() ||
       m.step_tdeg != std::lround(asked.step_deg * kTenThousandths) ||
       m.first_tdeg != std::lround(asked.first_deg * kTenThousandths)) {
-    ++damaged_;
+    reception_.count_damage();
     return;
   }
   last_scan_ns_ = now_ns;
@@ -194,7 +185,7 @@ void Session::hear_measurement(const Measurement& m, uint64_t position, int64_t 
     const double range_m = 0.001 * m.distance(i) * m.distance_scale;
     scan_.range_m[i] = range_m <= settings_.max_range_m ? static_cast<float>(range_m) : 0.0f;
   }
-  scan_.stamp_ns = instants_.refine(byte_clock_.arrival_ns(position) - byte_clock_.byte_ns() - period_ns_);
+  scan_.stamp_ns = instants_.refine(reception_.began_ns(position) - period_ns_);
   if (number_) scan_number_ += std::max<uint32_t>(1, static_cast<uint16_t>(m.number - *number_));
   number_ = m.number;
   scan_.scan_number = scan_number_;

@@ -6,7 +6,7 @@
 #include "hal/laser/laser_session.hpp"
 #include "hal/laser/lms400/frame.hpp"
 #include "hal/laser/lms400/messages.hpp"
-#include "hal/stream/byte_clock.hpp"
+#include "hal/laser/reception.hpp"
 
 namespace takt::lms400 {
 
@@ -31,7 +31,7 @@ class Session final : public LaserSession {
   LineOrder next(int64_t now_ns) override;
   void line_has(uint32_t baud) override;
   LineOrder farewell() override;
-  uint64_t damaged() const override { return damaged_; }
+  uint64_t damaged() const override { return reception_.damaged(); }
   const char* trouble() const override { return trouble_; }
 
   /// Scans are coming.
@@ -51,11 +51,9 @@ class Session final : public LaserSession {
 
   SessionSettings settings_;
   std::string configure_text_;
-  Parser parser_;
-  ByteClock byte_clock_;
+  Reception<Parser> reception_;
   PeriodicInstants instants_;
   int64_t period_ns_;
-  uint64_t bytes_ = 0, damaged_ = 0;
   const char* trouble_ = "not asked yet";
   const char* remark_ = "";  ///< what stays so while scans come
 
@@ -68,7 +66,7 @@ class Session final : public LaserSession {
 
   ReceivedScan scan_;
   bool scan_ready_ = false;
-  int64_t last_byte_ns_ = 0, last_scan_ns_ = 0;
+  int64_t last_scan_ns_ = 0;
   std::optional<uint16_t> number_;  ///< of the last measurement
   uint32_t scan_number_ = 0;
 };
