@@ -28,6 +28,7 @@ if(TAKT_SANITIZE MATCHES thread)
   add_library(takt_tsan_suppressions OBJECT ${PROJECT_SOURCE_DIR}/tests/tsan_suppressions.cpp)
 endif()
 
+option(TAKT_FUZZ "Fuzz targets (tests/fuzz/run); needs Clang" OFF)
 option(TAKT_ONE_SIMD_TARGET "Compile SIMD kernels for the baseline CPU only: quicker where they are not what is tested" OFF)
 if(TAKT_ONE_SIMD_TARGET)
   add_compile_definitions(HWY_COMPILE_ONLY_STATIC)

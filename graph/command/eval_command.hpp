@@ -134,5 +134,10 @@ struct EvalScanMatchingOptions {
   bool json = false;
 };
 void add_eval_scan_matching(CLI::App& eval, EvalScanMatchingOptions& options, int& exit_code);
+struct EvalLms200Options {
+  std::filesystem::path rx, index, distances;  ///< distances empty: not compared
+  bool json = false;
+};
+void add_eval_lms200(CLI::App& eval, EvalLms200Options& options, int& exit_code);
 
 }  // namespace takt::command

@@ -9,6 +9,7 @@
 #include "graph/command/cloud_command.hpp"
 #include "graph/command/devices_command.hpp"
 #include "graph/command/doctor_command.hpp"
+#include "graph/command/double_command.hpp"
 #include "graph/command/eval_command.hpp"
 #include "graph/command/explain_command.hpp"
 #include "graph/command/log_commands.hpp"
@@ -164,6 +165,8 @@ int main(int argc, char** argv) {
   takt::command::EvalScanMatchingOptions scan_matching;
   takt::command::EvalPersonTrackingOptions person_tracking;
   takt::command::EvalRegistrationOptions registration;
+  takt::command::EvalLms200Options lms200;
+  takt::command::DoubleOptions device_double;
   takt::command::ReplayOptions replay;
   takt::command::LogOptions log;
   takt::command::CloudOptions cloud;
@@ -198,6 +201,7 @@ int main(int argc, char** argv) {
   takt::command::add_cloud(app, cloud, exit_code);
   takt::command::add_train(app, train, exit_code);
   takt::command::add_objects(app, object_database, exit_code);
+  takt::command::add_double(app, device_double, exit_code);
   CLI::App* eval = app.add_subcommand("eval", "measures quality against ground truth");
   eval->require_subcommand(1);
   takt::command::add_eval_stereo(*eval, stereo, exit_code);
@@ -211,6 +215,7 @@ int main(int argc, char** argv) {
   takt::command::add_eval_scan_matching(*eval, scan_matching, exit_code);
   takt::command::add_eval_person_tracking(*eval, person_tracking, exit_code);
   takt::command::add_eval_registration(*eval, registration, exit_code);
+  takt::command::add_eval_lms200(*eval, lms200, exit_code);
 
   try {
     app.parse(argc, argv);

@@ -9,6 +9,7 @@
 #include "hal/base/can_base.hpp"
 #include "hal/camera/stereo_camera_node.hpp"
 #include "hal/camera/v4l2_camera.hpp"
+#include "hal/drivers/sick_lasers.hpp"
 #include "hal/gpio/gpio_lines.hpp"
 #include "hal/gpio/lines_node.hpp"
 #include "hal/head/can_head.hpp"
@@ -299,6 +300,8 @@ NodeResult make_gpio_lines(const DeviceConfig& config, Settings& settings, const
 
 /// A driver of real hardware.
 NodeResult make_hardware(const DeviceConfig& config, Settings& settings, const Clock& clock) {
+  if (config.driver == "lms200") return opened<LaserNode>(make_lms200(config, settings, clock), settings);
+  if (config.driver == "lms400") return opened<LaserNode>(make_lms400(config, settings, clock), settings);
   if (config.kind == "stereo_camera") return make_v4l2_camera(config, settings, clock);
   if (config.kind == "camera_head") return make_can_head(config, settings, clock);
   if (config.kind == "digital_lines") return make_gpio_lines(config, settings, clock);

@@ -10,7 +10,8 @@ constexpr DriverInfo kCameraDrivers[] = {
     {"sim", "the simulated world"}, {"replay", "recorded images"}, {"v4l2", "a stereo camera behind Video4Linux"}};
 constexpr DriverInfo kLaserDrivers[] = {{"sim", "the simulated world"},
                                         {"replay", "the scans of a CARMEN log"},
-                                        {"lms200", "a SICK LMS 200 on a serial line", false}};
+                                        {"lms200", "a SICK LMS 200 on a serial line"},
+                                        {"lms400", "a SICK LMS 400 on a network or a serial line"}};
 constexpr DriverInfo kHeadDrivers[] = {{"sim", "the simulated world"}, {"can", "the camera head on a CAN bus"}};
 constexpr DriverInfo kBaseDrivers[] = {{"sim", "the simulated world"},
                                        {"replay", "the odometry of a CARMEN log"},
@@ -80,6 +81,16 @@ constexpr SettingInfo kLaser[] = {
     {"range", "replay", length, false, "larger ranges are no return; as the log says, else 80m"},
     {"port", "lms200", path, true, "serial line, for instance /dev/ttyS1"},
     {"baud", "lms200", count, false, "9600, 19200, 38400 or 500000; 38400"},
+    {"fov", "lms200", angle, false, "100deg or 180deg; 180deg"},
+    {"resolution", "lms200", angle, false, "1deg, 0.5deg or 0.25deg; 0.5deg"},
+    {"range", "lms200", length, false, "8m, 16m, 32m or 80m; 8m"},
+    {"address", "lms400", text, false, "numbers and port of its network interface, for instance 192.168.0.1:2111"},
+    {"port", "lms400", path, false, "serial line instead of `address`"},
+    {"baud", "lms400", count, false, "of the serial line; 115200"},
+    {"scan_rate", "lms400", rate, false, "200..500 Hz; 360"},
+    {"fov", "lms400", angle, false, "up to 70deg, in the middle of what it can see; 70deg"},
+    {"resolution", "lms400", angle, false, "0.1deg..1deg; 0.25deg"},
+    {"range", "lms400", length, false, "larger distances are no return; 3m"},
 };
 constexpr SettingInfo kHead[] = {
     COMMON_SETTINGS,

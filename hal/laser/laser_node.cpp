@@ -17,7 +17,7 @@ void LaserNode::run(Job& job) {
   if (message == nullptr) return job.no_result();
   message->range_m.resize(format_.beams);
   const ScanReading reading = scanner_->read(message->range_m.items(), job.release_ns(), job.deadline_ns());
-  if (!accept(reading.status, job)) return;
+  if (!accept(reading.status, job, false, reading.repeated)) return;
   message->first_angle_rad = format_.first_angle_rad;
   message->step_rad = format_.step_rad;
   message->max_range_m = format_.max_range_m;

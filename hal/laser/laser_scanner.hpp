@@ -15,12 +15,14 @@ struct ScanFormat {
   double sweep_s = 0;  ///< from the first to the last beam
   double rate_hz = 0;  ///< as it comes, on average
   Transform sensor_in_robot;
+  double stamp_lag_s = 0;  ///< how long before a read the stamp of what it gives may lie; 0: sweep_s
 };
 
 struct ScanReading {
   ReadStatus status = ReadStatus::no_data;
   int64_t stamp_ns = 0;      ///< of the first beam
   uint32_t scan_number = 0;  ///< counted by the device where it can; a gap is a lost scan
+  bool repeated = false;     ///< the measurement of the scan before, once more
 };
 
 /// A planar laser scanner (SICK LMS200, LMS400). See Device for the life cycle and the thread rules.

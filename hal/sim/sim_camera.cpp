@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "hal/sim/sim_camera.hpp"
 
-#include <linux/sched.h>
 #include <pthread.h>
-#include <sched.h>
 
 #include <chrono>
 #include <cstring>
 
+#include "hal/device_thread.hpp"
 #include "hal/sim/random.hpp"
 
 namespace takt::sim {
@@ -18,20 +17,6 @@ bool same(const CameraPose& a, const CameraPose& b) { return a.rotation == b.rot
 void copy(const std::vector<uint8_t>& from, ImageView<uint8_t> to) {
   const size_t row = static_cast<size_t>(to.width) * static_cast<size_t>(to.channels);
   for (int y = 0; y < to.height; ++y) std::memcpy(to.row(y), from.data() + static_cast<size_t>(y) * row, row);
-}
-
-/// Of the calling thread.
-bool in_real_time() {
-  const int policy = sched_getscheduler(0) & ~SCHED_RESET_ON_FORK;
-  return policy == SCHED_FIFO || policy == SCHED_DEADLINE;
-}
-
-/// Of the calling thread: the lowest real-time priority, or an ordinary one. Where the kernel refuses it stays as it
-/// is: frames then come late, and read() draws them.
-void take_priority(bool real_time) {
-  sched_param wanted{};
-  if (real_time) wanted.sched_priority = sched_get_priority_min(SCHED_FIFO);
-  pthread_setschedparam(pthread_self(), real_time ? SCHED_FIFO : SCHED_OTHER, &wanted);
 }
 
 }  // namespace
@@ -113,7 +98,7 @@ void SimCamera::trigger(int64_t at_ns) {
 
 void SimCamera::work() {
   pthread_setname_np(pthread_self(), ("sim:" + id_).substr(0, 15).c_str());
-  take_priority(false);
+  take_priority(false);  // frames that come late for it are drawn by read()
   bool raised = false;
   const StereoRig& rig = settings_.rig;
   uint32_t seen = 0;

@@ -3,6 +3,7 @@
 #pragma once
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <vector>
@@ -24,7 +25,13 @@ inline void no_pace(int64_t) {}
 /// Within so many periods a device that is well has found its zero, is enabled and follows its commands.
 constexpr int kPeriodsToReady = 500;
 
-inline void check_laser_scanner(LaserScanner& laser) {
+/// When a scanner is read, and what moves its world there; by default one that always has a new sweep.
+struct LaserPace {
+  int64_t first_ns = kDeviceEpoch, period_ns = kDevicePeriod;
+  Pace advance_to = no_pace;
+};
+
+inline void check_laser_scanner(LaserScanner& laser, const LaserPace& pace = {}) {
   REQUIRE(laser.open().has_value());
   const ScanFormat format = laser.format();
   REQUIRE(format.beams >= 2);
@@ -38,13 +45,17 @@ inline void check_laser_scanner(LaserScanner& laser) {
   CHECK(laser.read(beams, kDeviceEpoch + 1, kDeviceEpoch).status == ReadStatus::no_data);
   CHECK(range[0] == -7.0f);
   int64_t previous = INT64_MIN;
+  uint32_t first_number = 0;
   for (uint32_t k = 0; k < 5; ++k) {
-    const int64_t wanted = kDeviceEpoch + k * kDevicePeriod;
+    const int64_t wanted = pace.first_ns + k * pace.period_ns;
+    pace.advance_to(wanted);
     const ScanReading reading = laser.read(beams, wanted, INT64_MAX);
     REQUIRE(reading.status == ReadStatus::ok);
     CHECK(reading.stamp_ns <= wanted);
     CHECK(reading.stamp_ns > previous);
-    CHECK(reading.scan_number == k);
+    if (format.stamp_lag_s > 0) CHECK(static_cast<double>(wanted - reading.stamp_ns) <= 1e9 * format.stamp_lag_s + 1e6);
+    if (k == 0) first_number = reading.scan_number;
+    CHECK(reading.scan_number == first_number + k);
     previous = reading.stamp_ns;
     for (const float r : beams) CHECK((r == 0.0f || (r > 0.0f && static_cast<double>(r) < format.max_range_m + 0.1)));
   }

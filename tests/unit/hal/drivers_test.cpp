@@ -44,12 +44,16 @@ TEST_CASE("unknown kinds, drivers and settings list the valid ones") {
 TEST_CASE("a driver that this build lacks is a failing device, not bad input") {
   VirtualClock clock;
   Devices devices;
-  const auto node =
-      make_device(config("laser_scanner", "lms200", {{"port", "/dev/ttyS1"}, {"baud", 38400}}), devices, clock);
-  REQUIRE_FALSE(node);
-  CHECK_FALSE(node.error().bad_input);
-  CHECK(has(node.error().text(), "driver `lms200`"));
-  CHECK(has(node.error().fix, "use one of: sim"));
+  for (const DeviceKind& kind : device_kinds()) {
+    for (const DriverInfo& driver : kind.drivers) {
+      if (driver.built) continue;
+      const auto node = make_device(config(std::string(kind.name), std::string(driver.name), {}), devices, clock);
+      REQUIRE_FALSE(node);
+      CHECK_FALSE(node.error().bad_input);
+      CHECK(has(node.error().text(), "driver `" + std::string(driver.name) + "`"));
+      CHECK(has(node.error().fix, "use one of: sim"));
+    }
+  }
 }
 
 TEST_CASE("every kind can be made with every setting that its listing calls required, and no other") {
@@ -202,4 +206,36 @@ TEST_CASE("laser, head, base and line nodes send one message a job, and share on
     CHECK_FALSE(job.without_result());
   }
   CHECK(devices.first_world() != nullptr);
+}
+
+TEST_CASE("settings of the SICK drivers") {
+  const auto with = [](const char* driver, nlohmann::json settings) {
+    return error(config("laser_scanner", driver, std::move(settings)));
+  };
+  // Right settings, and no scanner.
+  const auto absent = config("laser_scanner", "lms200",
+                             {{"port", "/dev/none"},
+                              {"fov", "100deg"},
+                              {"resolution", "0.25deg"},
+                              {"range", "32m"},
+                              {"baud", 500000},
+                              {"mount", {{"z", "0.25m"}}}});
+  Devices devices;
+  VirtualClock clock;
+  const auto node = make_device(absent, devices, clock);
+  REQUIRE_FALSE(node);
+  CHECK_FALSE(node.error().bad_input);
+  CHECK(has(node.error().text(), "/dev/none: No such file"));
+  CHECK(has(with("lms200", nlohmann::json::object()), "`port` is missing"));
+  CHECK(has(with("lms200", {{"port", "/dev/none"}, {"baud", 57600}}), "`baud` is no rate"));
+  CHECK(has(with("lms200", {{"port", "/dev/none"}, {"fov", "90deg"}}), "100deg or 180deg"));
+  CHECK(has(with("lms200", {{"port", "/dev/none"}, {"resolution", "0.3deg"}}), "0.25deg"));
+  CHECK(has(with("lms200", {{"port", "/dev/none"}, {"range", "10m"}}), "8m, 16m, 32m, or 80m"));
+  CHECK(has(with("lms200", {{"port", "/dev/none"}, {"resolution", "0.25deg"}}), "too fast for `baud`"));
+  CHECK(has(with("lms400", nlohmann::json::object()), "`address` or `port`"));
+  CHECK(has(with("lms400", {{"port", "/dev/none"}, {"address", "127.0.0.1:1"}}), "`address` or `port`"));
+  CHECK(has(with("lms400", {{"port", "/dev/none"}}), "/dev/none: No such file"));
+  CHECK(has(with("lms400", {{"address", "laser"}}), "`laser` is no address"));
+  CHECK(has(with("lms400", {{"address", "127.0.0.1:1"}, {"scan_rate", 100}}), "200..500Hz"));
+  CHECK(has(with("lms400", {{"address", "127.0.0.1:1"}, {"fov", "90deg"}}), "out of range"));
 }

@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+// fuzz_seeds FOLDER: inputs that the fuzz targets begin with, made by the codecs themselves: whole conversations, and
+// their telegrams alone.
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "hal/laser/lms200/commands.hpp"
+#include "hal/laser/lms200/scan.hpp"
+#include "hal/laser/lms400/frame.hpp"
+#include "hal/laser/lms400/messages.hpp"
+
+using namespace takt;
+using Bytes = std::vector<uint8_t>;
+
+namespace {
+
+Bytes copy(std::span<const uint8_t> bytes) { return {bytes.begin(), bytes.end()}; }
+std::span<const uint8_t> bytes_of(std::string_view text) {
+  return {reinterpret_cast<const uint8_t*>(text.data()), text.size()};
+}
+
+/// As tests/fuzz/session.hpp reads it: bytes that come at once, after a pause.
+Bytes piece(const Bytes& bytes, uint8_t pause) {
+  Bytes all{static_cast<uint8_t>(uint32_t{pause} << 5 | bytes.size() >> 8), static_cast<uint8_t>(bytes.size())};
+  all.insert(all.end(), bytes.begin(), bytes.end());
+  return all;
+}
+
+class Seeds {
+ public:
+  explicit Seeds(std::filesystem::path folder) : folder_(std::move(folder)) {
+    std::filesystem::create_directories(folder_);
+  }
+  void add(const Bytes& bytes) {
+    std::ofstream file(folder_ / ("seed" + std::to_string(count_++)), std::ios::binary);
+    file.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  }
+  /// Each part alone, then all of them as they come one after the other.
+  void add_conversation(const std::vector<Bytes>& parts) {
+    Bytes all;
+    for (const Bytes& part : parts) {
+      add(part);
+      const Bytes next = piece(part, 2);
+      all.insert(all.end(), next.begin(), next.end());
+    }
+    add(all);
+  }
+  size_t count() const { return count_; }
+
+ private:
+  std::filesystem::path folder_;
+  size_t count_ = 0;
+};
+
+Bytes lms200_scan(size_t beams, bool partial, uint8_t quarters, bool indices) {
+  Bytes words;
+  for (size_t i = 0; i < beams; ++i) {
+    const auto value = static_cast<uint16_t>(i % 50 == 0 ? 8191 : 1000 + 3 * i);
+    words.push_back(static_cast<uint8_t>(value));
+    words.push_back(static_cast<uint8_t>(value >> 8));
+  }
+  lms200::Scan scan{true, partial, quarters, words, {}, 0x10};
+  if (indices) scan.indices = {3, 4};
+  return copy(lms200::scan_telegram(scan).bytes());
+}
+
+void lms200_seeds(Seeds& seeds) {
+  using namespace lms200;
+  const Bytes ok{0}, variant{1, 180, 0, 100, 0}, type{'L', 'M', 'S', '2', '0', '0', ';', 'V', '1'};
+  Status status;
+  status.variant = {180, 100};
+  status.baud = 500000;
+  status.turn_us = 148;
+  Configuration right, wrong;
+  right.set(0, true);
+  wrong.set(4, false);
+  Bytes written{1};
+  written.insert(written.end(), right.bytes.begin(), right.bytes.end());
+  const auto say = [](Reply code, std::span<const uint8_t> data) {
+    Bytes bytes{kAck};
+    const Telegram telegram = reply(code, data, 0x10);
+    bytes.insert(bytes.end(), telegram.bytes().begin(), telegram.bytes().end());
+    return bytes;
+  };
+  const auto status_bytes = status_data(status);
+  for (const bool interlaced : {false, true}) {
+    std::vector<Bytes> parts{say(Reply::mode, ok), say(Reply::type, type), say(Reply::variant, variant),
+                             say(Reply::configuration, interlaced ? wrong.bytes : right.bytes)};
+    if (interlaced)
+      for (const Bytes& more : {say(Reply::mode, ok), say(Reply::configuration_written, written), say(Reply::mode, ok)})
+        parts.push_back(more);
+    parts.push_back(say(Reply::status, status_bytes));
+    parts.push_back(say(Reply::mode, ok));
+    for (uint8_t turn = 0; turn < 6; ++turn)
+      parts.push_back(interlaced ? lms200_scan(turn % 4 == 0 ? 181 : 180, true, turn % 4, false)
+                                 : lms200_scan(181, false, 0, turn % 2 == 1));
+    seeds.add_conversation(parts);
+  }
+  for (const Command code : {Command::reset, Command::status, Command::errors, Command::type})
+    seeds.add(copy(command(code).bytes()));
+  for (const Reply code : {Reply::power_on, Reply::not_permitted, Reply::errors, Reply::keep_baud})
+    seeds.add(say(code, type));
+}
+
+void lms400_seeds(Seeds& seeds) {
+  using namespace lms400;
+  const auto text = [](std::string_view words) { return copy(Frame(bytes_of(words)).bytes()); };
+  std::vector<Bytes> parts{
+      text("sMA mLRstopdata"),     text("sAN mLRstopdata 00000000"),
+      text("sAN SetAccessMode 1"), text("sAN mSCsetscanconfig 00000000 437A0000 3F800000 0000000A"),
+      text("sAN Run 1"),           text("sAN mLRreqdata 00000000")};
+  for (const Format format : {Format::distance, Format::distance_and_remission, Format::remission}) {
+    for (uint16_t number = 1; number < 4; ++number) {
+      Bytes beams(70 * bytes_per_beam(format));
+      for (size_t i = 0; i < beams.size(); ++i) beams[i] = static_cast<uint8_t>(i % 2 == 0 ? 100 + i : 5);
+      Bytes payload(kLargestPayload);
+      payload.resize(write_measurement({format, 1, 550'000, 10'000, 250, 1, 0, 255, beams, number}, payload));
+      parts.push_back(copy(Frame(payload).bytes()));
+    }
+  }
+  seeds.add_conversation(parts);
+  for (const char* words : {"sFA FF", "sWA FLsel", "sRA EImac 0 6", "sMN Run", "sAN SetAccessMode 0"})
+    seeds.add(text(words));
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 2) {
+    std::fprintf(stderr, "usage: fuzz_seeds FOLDER\n");
+    return 2;
+  }
+  const std::filesystem::path folder(argv[1]);
+  Seeds lms200_inputs(folder / "lms200"), lms400_inputs(folder / "lms400");
+  lms200_seeds(lms200_inputs);
+  lms400_seeds(lms400_inputs);
+  std::printf("seeds: %zu for lms200, %zu for lms400\n", lms200_inputs.count(), lms400_inputs.count());
+}

@@ -1,0 +1,83 @@
+#!/bin/bash
+# SPDX-License-Identifier: Apache-2.0
+# The SICK drivers in a running graph, with doubles at the other ends of their lines: a pseudo terminal and a connection.
+# Everything is on the real clock, so counts are judged, and what happened, but no times.
+. "$(dirname "$0")/lib.sh"
+
+# A double that obeys words, each with its line: double NAME ARGUMENTS...; order NAME WORD
+double() {
+  local name=$1
+  shift
+  mkfifo "$work/$name.orders"
+  "$takt" double "$@" <"$work/$name.orders" >"$work/$name.where" 2>"$work/$name.err" &
+  doubles="$doubles $!"
+  exec {pipe}>"$work/$name.orders"
+  pipes[$name]=$pipe
+  for _ in $(seq 200); do [ -s "$work/$name.where" ] && return; sleep 0.05; done
+  cat "$work/$name.err"
+  fail "the double $name did not start"
+}
+declare -A pipes
+doubles=
+order() { echo "$2" >&"${pipes[$1]}"; }
+trap 'kill $doubles 2>/dev/null; rm -rf "$work"' EXIT
+
+port=$(python3 -c 'import socket; s = socket.socket(); s.bind(("127.0.0.1", 0)); print(s.getsockname()[1])')
+sed -e "s|/tmp/front_laser|$work/front|; s|127.0.0.1:2111|127.0.0.1:$port|; s|: worlds/|: $source/graph/worlds/|; s|\.\./schedules|$source/schedules|" \
+  "$source/graph/lasers.yaml" >"$work/lasers.yaml"
+
+expect 3 "ls /dev/serial/by-id" "$takt" run "$work/lasers.yaml" --profile robot --for 1s --output "$work/out"
+expect 2 "known: lms200, lms400" "$takt" double lms500 --pty "$work/front"
+expect 2 "--pty PATH or --tcp PORT" "$takt" double lms200
+
+# Captured bytes of a real scanner, as the index of the capture marks them.
+data=${TAKT_DATA:-$source/../shared/data}/sick/lms200
+capture() { # NAME 'EXPRESSION OF r' OPTIONS...
+  local name=$1 expression=$2
+  shift 2
+  expect 0 "" "$takt" eval lms200 --rx "$data/$name.rx.bin" --index "$data/$name.index.csv" "$@" --json
+  python3 -c 'import json, sys; r = json.load(open(sys.argv[1])); print(r); sys.exit(not eval(sys.argv[2]))' "$work/stdout" "$expression" ||
+    fail "capture $name"
+}
+if [ -d "$data" ]; then
+  capture 2017_Aug_04_23-22-04 'r["accepted"] == 67 and r["not_as_marked"] == r["beams_that_differ"] == 0 and r["beams_compared"] == 58 * 361' \
+    --distances "$data/2017_Aug_04_23-22-04.distances.csv"
+  capture 2017_Aug_05_18-52-56 'r["accepted"] == 176 and r["not_as_marked"] == r["beams_that_differ"] == 0 and r["scans"] == 165' \
+    --distances "$data/2017_Aug_05_18-52-56.distances.csv"
+  capture 2017_Aug_05_19-09-36 'r["accepted"] == 2 and r["rejected"] == 2 and r["not_as_marked"] == 0 and r["found_inside_rejected"] == 1 and r["unlisted"] == 0'
+else
+  echo "NOT RUN: the captures in $data are absent (set TAKT_DATA)"
+fi
+expect 2 "cannot be opened" "$takt" eval lms200 --rx "$work/none" --index "$work/none"
+
+double front lms200 --pty "$work/front"
+double floor lms400 --tcp "$port"
+
+"$takt" run "$work/lasers.yaml" --profile robot --policy cooperative --for 24s --output "$work/out" --report "$work/report.json" \
+  >"$work/run.out" 2>"$work/run.err" &
+run=$!
+sleep 7
+order front unplugged
+order floor silent
+sleep 3
+order front none
+order floor none
+wait $run
+code=$?
+grep -E '^(mode|device)|_laser|obstacle_stop|traversability' "$work/run.out"
+[ $code -le 1 ] || { tail -n 5 "$work/run.err"; fail "exit $code"; }
+python3 - "$work/report.json" <<'PY' || fail "the report is not as it should be"
+import json, sys
+report = json.load(open(sys.argv[1]))
+devices = {d["name"]: d for d in report["devices"]}
+nodes = {n["name"]: n for n in report["nodes"]}
+sent = {e["from"]: e["sent"] for e in report["edges"]}
+print({n: (d["losses"], d["state"]) for n, d in devices.items()}, sent)
+# Some 3 s to begin with, 3 s and what it takes to come back are without scans.
+assert 100 < sent["front_laser.scan"] < 330 and 100 < sent["floor_laser.scan"] < 350
+for name in ("front_laser", "floor_laser"):
+    assert devices[name]["losses"] >= 1 and devices[name]["state"] == "ok"
+assert [m["name"] for m in report["modes"]][-2:] == ["safe_stop", "full"]
+assert all(nodes[n]["allocations"] == 0 for n in ("front_laser", "floor_laser"))
+PY
+finish
