@@ -148,6 +148,7 @@ int main(int argc, char** argv) {
   takt::command::EvalScanMatchingOptions scan_matching;
   takt::command::EvalPersonTrackingOptions person_tracking;
   takt::command::EvalRegistrationOptions registration;
+  takt::command::EvalSemanticOptions semantic;
   takt::command::ReplayOptions replay;
   takt::command::LogOptions log;
   takt::command::CloudOptions cloud;
@@ -191,6 +192,7 @@ int main(int argc, char** argv) {
   takt::command::add_eval_scan_matching(*eval, scan_matching, exit_code);
   takt::command::add_eval_person_tracking(*eval, person_tracking, exit_code);
   takt::command::add_eval_registration(*eval, registration, exit_code);
+  takt::command::add_eval_semantic(*eval, semantic, exit_code);
 
   try {
     app.parse(argc, argv);

@@ -22,10 +22,10 @@ std::string to_text(const semantic::SemanticMap& map, const Domain& domain, cons
                         fmt::join(filled, ", "), static_cast<double>(step.drive_ns) * 1e-9,
                         static_cast<double>(step.action_ns) * 1e-9);
   }
-  return text + fmt::format("{:.1f} s in all{}", static_cast<double>(plan.cost_ns) * 1e-9,
-                            plan.verdict == Verdict::best ? "; no plan takes less"
-                                                          : fmt::format("; none takes less than {:.1f} s",
-                                                                        static_cast<double>(plan.bound_ns) * 1e-9));
+  text += fmt::format("{:.1f} s in all", static_cast<double>(plan.cost_ns) * 1e-9);
+  if (plan.verdict == Verdict::best) return text + "; no plan takes less";
+  if (plan.bound_ns == 0) return text;
+  return text + fmt::format("; none takes less than {:.1f} s", static_cast<double>(plan.bound_ns) * 1e-9);
 }
 
 }  // namespace takt::planner

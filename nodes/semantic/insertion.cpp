@@ -31,6 +31,22 @@ bool seen_free(const OccupancyView& seen, double x_m, double y_m, double radius_
   return true;
 }
 
+/// Text in memory of a fixed size; what does not fit is cut off.
+class Text {
+ public:
+  explicit Text(std::span<char> into) : into_(into) {}
+  template <class... T>
+  void add(fmt::format_string<T...> form, T&&... values) {
+    const auto left = into_.subspan(used_);
+    used_ += std::min(left.size(), fmt::format_to_n(left.data(), left.size(), form, std::forward<T>(values)...).size);
+  }
+  std::string_view written() const { return {into_.data(), used_}; }
+
+ private:
+  std::span<char> into_;
+  size_t used_ = 0;
+};
+
 void write_name(std::string_view name, char (&into)[kLongestName + 1]) { into[name.copy(into, kLongestName)] = '\0'; }
 
 }  // namespace
@@ -105,29 +121,37 @@ Decision Insertion::remove(NodeId node) {
   return decision;
 }
 
-std::string explain(const SemanticMap& map, const Decision& d, const InsertionParameters& parameters) {
+std::string_view explain(const SemanticMap& map, const Decision& d, const InsertionParameters& parameters,
+                         std::span<char> into) {
+  Text text(into);
   const Comparison& c = d.comparison;
   const auto because = [&] {
-    std::string text = fmt::format("{:.2f} m apart", c.distance_m);
-    if (c.farthest != kNoNode)
-      text += fmt::format(", {} differs by {:.2f}{}", map.network().name(c.farthest), c.farthest_distance,
-                          c.identity_differs ? ", which one object cannot" : "");
-    return text;
+    text.add(": {:.2f} m apart", c.distance_m);
+    if (c.farthest == kNoNode) return;
+    text.add(", {} differs by {:.2f}", map.network().name(c.farthest), c.farthest_distance);
+    if (c.identity_differs) text.add(", which one object cannot");
   };
   switch (d.outcome) {
     case Outcome::merged:
-      return fmt::format("merged with {}, p = {:.2f} >= {:.2f}: {}", d.name, c.p, parameters.merge_min, because());
+      text.add("merged with {}, p = {:.2f} >= {:.2f}", d.name, c.p, parameters.merge_min);
+      because();
+      break;
     case Outcome::created:
-      if (d.candidate[0] == '\0')
-        return fmt::format("created {}: none of its type within {:g} m", d.name, parameters.similarity.distance_max_m);
-      return fmt::format("created {}: most similar is {}, p = {:.2f} < {:.2f}: {}", d.name, d.candidate, c.p,
-                         parameters.merge_min, because());
+      text.add("created {}: ", d.name);
+      if (d.candidate[0] == '\0') {
+        text.add("none of its type within {:g} m", parameters.similarity.distance_max_m);
+      } else {
+        text.add("most similar is {}, p = {:.2f} < {:.2f}", d.candidate, c.p, parameters.merge_min);
+        because();
+      }
+      break;
     case Outcome::removed:
-      return fmt::format("removed {}: its place was seen free {} times in a row, after {} sightings", d.name, d.missed,
-                         d.sightings);
-    case Outcome::refused: break;
+      text.add("removed {}: its place was seen free {} times in a row, after {} sightings", d.name, d.missed,
+               d.sightings);
+      break;
+    case Outcome::refused: text.add("refused a {}: {}", d.name, to_string(d.error)); break;
   }
-  return fmt::format("refused a {}: {}", d.name, to_string(d.error));
+  return text.written();
 }
 
 }  // namespace takt::semantic

@@ -66,7 +66,10 @@ class Insertion {
   std::vector<NodeId> gone_;
 };
 
-/// "merged with chair_2, p = 0.83 >= 0.75: 0.62 m apart, colour differs by 0.21".
-std::string explain(const SemanticMap& map, const Decision& decision, const InsertionParameters& parameters);
+constexpr size_t kLongestReason = 200;
+/// Writes as much as fits and returns what was written: "merged with chair_2, p = 0.83 >= 0.75: 0.62 m apart, colour
+/// differs by 0.21". No allocation.
+std::string_view explain(const SemanticMap& map, const Decision& decision, const InsertionParameters& parameters,
+                         std::span<char> into);
 
 }  // namespace takt::semantic

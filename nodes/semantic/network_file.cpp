@@ -70,6 +70,7 @@ class Reader {
     if (node != kNoNode && map_.network().kind(node) == kind) return node;
     Names known;
     for (const NodeId other : map_.all(kind)) known.emplace_back(map_.network().name(other));
+    if (known.empty()) known.emplace_back("(none)");
     fault(at, fmt::format("there is no {} `{}`; valid are: {}", to_string(kind), name, fmt::join(known, ", ")));
     return kNoNode;
   }

@@ -53,7 +53,6 @@ Comparison Similarity::compare(const Description& a, const Description& b) const
     const double weight = map_.weight(a.types, attribute);
     weights += weight;
     c.d1 += weight * d;
-    if (map_.attribute(attribute).identity && d > parameters_.identity_max) c.identity_differs = true;
     if (weight * d <= most) return;
     most = weight * d;
     c.farthest = attribute;
@@ -67,7 +66,12 @@ Comparison Similarity::compare(const Description& a, const Description& b) const
       count(*of_b++, 1);
     } else {
       const Value in_a = value_of(a.states, *of_a), in_b = value_of(b.states, *of_b);
-      if (known(in_a) && known(in_b)) count(*of_a, distance(map_.attribute(*of_a), in_a, in_b));
+      if (known(in_a) && known(in_b)) {
+        const Attribute& attribute = map_.attribute(*of_a);
+        const double d = distance(attribute, in_a, in_b);
+        c.identity_differs = c.identity_differs || (attribute.identity && d > parameters_.identity_max);
+        count(*of_a, d);
+      }
       ++of_a, ++of_b;
     }
   }

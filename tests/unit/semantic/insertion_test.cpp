@@ -3,6 +3,7 @@
 
 #include <doctest/doctest.h>
 
+#include <string>
 #include <vector>
 
 #include "rt/memory/memory_use.hpp"
@@ -34,6 +35,10 @@ struct Fixture {
   Decision insert(Insertion& insertion, double x_m, const Value& value = {}) {
     const State state{colour, value};
     return insertion.insert({chair, x_m, 0, 0.9, stamp_ns += 1000, {&state, 1}});
+  }
+  std::string why(const Decision& decision) const {
+    char text[kLongestReason];
+    return std::string(explain(map, decision, parameters, text));
   }
   size_t objects() const { return map.all(Kind::object).size(); }
 };
@@ -107,7 +112,7 @@ TEST_CASE("oracle 26: two detections 0.5 m apart are one object, three chairs 2.
   CHECK(second.outcome == Outcome::merged);
   CHECK(second.object == first.object);
   CHECK(f.map.object(first.object).x_m == 0.25);
-  CHECK(explain(f.map, second, f.parameters) == "merged with chair_1, p = 0.97 >= 0.75: 0.50 m apart");
+  CHECK(f.why(second) == "merged with chair_1, p = 0.97 >= 0.75: 0.50 m apart");
   CHECK(f.insert(insertion, 2.75).outcome == Outcome::created);
   CHECK(f.insert(insertion, 5.25).outcome == Outcome::created);
   CHECK(f.objects() == 3);
@@ -118,12 +123,11 @@ TEST_CASE("colours keep two objects of one place apart, and the decision says wh
   Insertion insertion(f.map, f.parameters);
   f.insert(insertion, 0, kRed);
   const Decision d = f.insert(insertion, 0, kYellow);
-  CHECK(explain(f.map, d, f.parameters) ==
-        "created chair_2: most similar is chair_1, p = 0.71 < 0.75: 0.00 m apart, colour differs by 0.58");
-  CHECK(explain(f.map, f.insert(insertion, 8), f.parameters) == "created chair_3: none of its type within 2 m");
+  CHECK(f.why(d) == "created chair_2: most similar is chair_1, p = 0.71 < 0.75: 0.00 m apart, colour differs by 0.58");
+  CHECK(f.why(f.insert(insertion, 8)) == "created chair_3: none of its type within 2 m");
   const Decision outside = f.insert(insertion, 100);
   CHECK(outside.outcome == Outcome::refused);
-  CHECK(explain(f.map, outside, f.parameters) == "refused a chair: lies outside of the map");
+  CHECK(f.why(outside) == "refused a chair: lies outside of the map");
 }
 
 TEST_CASE("objects of one view are two if that is asked for") {
@@ -198,8 +202,7 @@ TEST_CASE(
   std::vector<std::string> told;
   for (int64_t stamp = 100'000; stamp < 100'004; ++stamp) {
     insertion.insert({f.chair, 3, 1.5, 1, stamp, {}});
-    insertion.forget({0, 0, 0, 0.576, 5, stamp}, seen,
-                     [&](const Decision& d) { told.push_back(explain(f.map, d, f.parameters)); });
+    insertion.forget({0, 0, 0, 0.576, 5, stamp}, seen, [&](const Decision& d) { told.push_back(f.why(d)); });
   }
   CHECK(told ==
         std::vector<std::string>{"removed chair_1: its place was seen free 3 times in a row, after 1 sightings"});
