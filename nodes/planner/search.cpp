@@ -14,6 +14,9 @@ uint64_t mixed(uint64_t h, uint64_t word) {
   return h ^ (h >> 29);
 }
 
+/// Value 0 is that of the beginning.
+bool open_at_first(const Fact& goal) { return goal.value != 0; }
+
 uint64_t hash_of(std::span<const Fact> changes, uint32_t place) {
   uint64_t h = mixed(0, place);
   for (const Fact& fact : changes) h = mixed(h, uint64_t{fact.variable} << 32 | fact.value);
@@ -26,7 +29,49 @@ Search::Search(const SearchCapacity& capacity)
     : capacity_(capacity), slots_(std::bit_ceil(2 * capacity.states)), open_(capacity.states) {
   states_.reserve(capacity.states);
   changes_.reserve(capacity.changes);
+  worth_.reserve(capacity.actions);
   goal_ns_.reserve(kMostSteps);
+}
+
+/// Whatever else a plan does, it drives to an action's objects and to those of the goals, and acts for both.
+void Search::find_worthwhile() {
+  worth_.clear();
+  full_ = domain_->actions.size() > capacity_.actions;
+  int64_t goals_ns = 0;
+  for (size_t i = 0; i < goal_ns_.size(); ++i)
+    if (open_at_first(domain_->goals[i])) goals_ns += std::max<int64_t>(0, goal_ns_[i]);
+  for (uint32_t number = 0; number < domain_->actions.size() && !full_; ++number) {
+    const GroundAction& action = domain_->actions[number];
+    const bool gives_goal = std::any_of(action.results.begin(), action.results.end(), [&](const Fact& fact) {
+      return open_at_first(fact) &&
+             std::find(domain_->goals.begin(), domain_->goals.end(), fact) != domain_->goals.end();
+    });
+    const int64_t own_ns = fixed_ns(action);
+    const int64_t actions_ns = gives_goal ? std::max(own_ns, goals_ns) : own_ns + goals_ns;
+    if (actions_ns + way_ns(action) < limit_ns_) worth_.push_back(number);
+  }
+}
+
+/// At least so long is a way by an object of the action and one of a goal, in either order.
+int64_t Search::way_ns(const GroundAction& action) const {
+  if (domain_->cost_mode == CostMode::faithful) return 0;
+  int64_t longest = 0;
+  for (const uint32_t place : action.places) {
+    const int64_t there = domain_->travel_ns(0, place);
+    longest = std::max(longest, there);
+    for (size_t i = 0; i < domain_->goals.size(); ++i) {
+      const uint32_t goal = domain_->goal_places[i];
+      if (open_at_first(domain_->goals[i]))
+        longest = std::max(longest, std::min(there + domain_->travel_ns(place, goal),
+                                             domain_->travel_ns(0, goal) + domain_->travel_ns(goal, place)));
+    }
+  }
+  return std::max<int64_t>(0, longest - 2 * kTravelSlack_ns);
+}
+
+/// What an action costs wherever the robot is: driving depends on that only if it is counted in sequence.
+int64_t Search::fixed_ns(const GroundAction& action) const {
+  return action.cost_ns + (domain_->cost_mode == CostMode::faithful ? domain_->drive_ns(0, action) : 0);
 }
 
 /// What each goal costs at least: its cheapest action, whose cost it shares with the other goals that this one gives.
@@ -39,10 +84,8 @@ void Search::prepare() {
       const auto shared = std::count_if(domain_->goals.begin(), domain_->goals.end(), [&](const Fact& g) {
         return std::find(action.results.begin(), action.results.end(), g) != action.results.end();
       });
-      // Driving depends on the step before only if it is counted in sequence.
-      const int64_t cost =
-          action.cost_ns + (domain_->cost_mode == CostMode::faithful ? domain_->drive_ns(0, action) : 0);
-      if (least < 0 || cost / shared < least) least = cost / shared;
+      const int64_t share = fixed_ns(action) / shared;
+      if (least < 0 || share < least) least = share;
     }
     goal_ns_.push_back(least);
   }
@@ -50,7 +93,7 @@ void Search::prepare() {
   changes_.clear();
   std::fill(slots_.begin(), slots_.end(), kNone);
   open_.clear();
-  full_ = false;
+  find_worthwhile();
 }
 
 bool Search::holds(std::span<const Fact> changes, const Fact& fact) const {
@@ -99,7 +142,8 @@ uint32_t& Search::slot_of(const State& state) {
 }
 
 void Search::expand(uint32_t from) {
-  for (uint32_t number = 0; number < domain_->actions.size() && !full_; ++number) {
+  for (size_t i = 0; i < worth_.size() && !full_; ++i) {
+    const uint32_t number = worth_[i];
     const GroundAction& action = domain_->actions[number];
     const auto before = changes(states_[from]);
     if (!std::all_of(action.required.begin(), action.required.end(),

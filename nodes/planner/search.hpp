@@ -10,6 +10,7 @@ namespace takt::planner {
 struct SearchCapacity {
   size_t states = 200'000;
   size_t changes = 1'600'000;  ///< by which all of them together differ from the beginning
+  size_t actions = 200'000;    ///< of the domains that it will be given
 };
 
 /// Memory is taken by the constructor; find() takes none but the plan's. One thread at a time.
@@ -18,7 +19,8 @@ class Search {
   explicit Search(const SearchCapacity& capacity);
 
   /// `known` is a plan of the same domain, or none: what cannot cost less is not looked at, and `known` is what is
-  /// returned if nothing does. Ends early at the effort's end or where memory is used up, with the bound reached.
+  /// returned if nothing does. Ends early at the effort's end or where memory is used up, with the bound reached; at
+  /// once for a domain of too many actions.
   Plan find(const Domain& domain, const Effort& effort, const Plan& known);
 
  private:
@@ -32,6 +34,9 @@ class Search {
   static constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
 
   void prepare();
+  void find_worthwhile();
+  int64_t way_ns(const GroundAction& action) const;
+  int64_t fixed_ns(const GroundAction& action) const;
   std::span<const Fact> changes(const State& s) const { return {changes_.data() + s.first, s.count}; }
   bool holds(std::span<const Fact> changes, const Fact& fact) const;
   /// At least so much is left; nothing where no plan leads on.
@@ -48,6 +53,7 @@ class Search {
   std::vector<Fact> changes_;
   std::vector<uint32_t> slots_;  ///< states by hash
   navigation::IndexedHeap<Key> open_;
+  std::vector<uint32_t> worth_;   ///< actions that a plan below the limit may have
   std::vector<int64_t> goal_ns_;  ///< share of a goal's cheapest action; -1: none gives it
   int64_t limit_ns_ = 0;          ///< only plans below this are of use
   bool full_ = false;

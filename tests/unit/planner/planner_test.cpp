@@ -189,6 +189,8 @@ TEST_CASE("a search that ends early returns the plan it was given and what is pr
   CHECK(search.find(domain, {100, [&] { return ++asked > 2; }}, {}).verdict == Verdict::gave_up);
   CHECK(Search({1, 10}).find(domain, {}, {}).verdict == Verdict::gave_up);
   CHECK(Search({1, 10}).find(domain, {}, dear).verdict == Verdict::found);
+  CHECK(Search({1000, 10'000, 1}).find(domain, {}, dear).verdict ==
+        Verdict::found);  // more actions than it has room for
   CHECK(search.find(domain, {}, dear).cost_ns == best.cost_ns);
 }
 
