@@ -3,9 +3,11 @@
 
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <string>
 
 #include "rt/memory/memory_use.hpp"
+#include "rt/time/clock.hpp"
 
 using namespace takt;
 using namespace takt::navigation;
@@ -120,4 +122,29 @@ TEST_CASE("planning takes no memory") {
     REQUIRE(planner.plan({0.5, i + 0.5}, {39.5, 39.5 - i}, i % 3, path) == PathOutcome::found);
   }
   if (counting_allocations()) CHECK(thread_memory_use().allocations == before);
+}
+
+TEST_CASE("cost of a look and a way" * doctest::skip()) {  // a figure and no check; run with --no-skip
+  // 40 x 40 m in cells of 0.1 m, walls every 5 m with a door each, in turn at both ends.
+  constexpr int kCells = 400;
+  std::vector<std::string> rows(kCells, std::string(kCells, '.'));
+  for (size_t wall = 50; wall < kCells; wall += 50)
+    for (size_t x = 0; x < kCells; ++x)
+      if (const bool door = wall % 100 == 0 ? x < 20 : x >= kCells - 20; !door) rows[wall][x] = '#';
+  const Field f(rows);
+  PathPlanner planner(kCells * kCells, {0.48, 3});
+  std::vector<Place> path;
+  std::vector<double> look_ms, plan_ms;
+  for (int i = 0; i < 50; ++i) {
+    const int64_t begin = thread_cpu_ns();
+    REQUIRE(planner.look(f.view(0.1)));
+    const int64_t between = thread_cpu_ns();
+    REQUIRE(planner.plan({1, 1}, {39, 39}, 0, path) == PathOutcome::found);
+    look_ms.push_back(static_cast<double>(between - begin) * 1e-6);
+    plan_ms.push_back(static_cast<double>(thread_cpu_ns() - between) * 1e-6);
+  }
+  std::sort(look_ms.begin(), look_ms.end());
+  std::sort(plan_ms.begin(), plan_ms.end());
+  MESSAGE("look " << look_ms[25] << " ms, way of " << planner.cost_m() << " m " << plan_ms[25] << " ms, "
+                  << planner.expanded() << " cells expanded");
 }

@@ -99,16 +99,28 @@ class Robot {
 double error_m(const PlanarPose& a, double x_m, double y_m) { return std::hypot(a.x_m - x_m, a.y_m - y_m); }
 double error_deg(const PlanarPose& a, double theta_rad) { return std::abs(wrapped(a.theta_rad - theta_rad)) / kDegree; }
 
+/// Where a behaviour ended against where it should have; the largest errors of a test are printed.
+struct Errors {
+  double m = 0, deg = 0;
+  ~Errors() { MESSAGE("largest errors " << m << " m, " << deg << " deg"); }
+  void check(const PlanarPose& ended, double x_m, double y_m, double theta_rad) {
+    CHECK(error_m(ended, x_m, y_m) < 0.05);
+    CHECK(error_deg(ended, theta_rad) < 2);
+    m = std::max(m, error_m(ended, x_m, y_m));
+    deg = std::max(deg, error_deg(ended, theta_rad));
+  }
+};
+
 }  // namespace
 
 TEST_CASE("rotate: within 2 degrees, on the spot, by any number of turns") {
+  Errors errors;
   for (const double degrees : {5.0, 90.0, -135.0, 179.0, -360.0, 500.0}) {
     CAPTURE(degrees);
     Robot robot;
     robot.pilot.rotate(robot.pose(), degrees * kDegree);
     robot.finish();
-    CHECK(error_deg(robot.truth(), degrees * kDegree) < 2);
-    CHECK(error_m(robot.truth(), 1.5, 2.5) < 0.01);
+    errors.check(robot.truth(), 1.5, 2.5, degrees * kDegree);
     CHECK(robot.fastest_turn > 0.1);
     CHECK(robot.fastest_turn <= 0.8);
     CHECK(robot.turn_acceleration <= doctest::Approx(1.2));
@@ -116,6 +128,7 @@ TEST_CASE("rotate: within 2 degrees, on the spot, by any number of turns") {
 }
 
 TEST_CASE("straight ahead and back: within 5 cm and 2 degrees, within the limits") {
+  Errors errors;
   for (const double speed : {0.3, 0.8, 1.4})
     for (const double metres : {0.1, 1.0, 2.0, -0.6}) {
       CAPTURE(speed);
@@ -125,8 +138,7 @@ TEST_CASE("straight ahead and back: within 5 cm and 2 degrees, within the limits
       Robot robot(p);
       robot.pilot.straight_ahead(robot.pose(), metres);
       robot.finish();
-      CHECK(error_m(robot.truth(), 1.5 + metres, 2.5) < 0.05);
-      CHECK(error_deg(robot.truth(), 0) < 2);
+      errors.check(robot.truth(), 1.5 + metres, 2.5, 0);
       CHECK(robot.fastest <= speed);
       CHECK(robot.acceleration <= doctest::Approx(0.6));
       CHECK_FALSE(robot.touched());
@@ -137,6 +149,7 @@ TEST_CASE("drive to: round the pillar, within 5 cm and 2 degrees of the place th
   struct Wanted {
     double x_m, y_m, degrees;
   };
+  Errors errors;
   for (const Wanted& w : {Wanted{5.2, 1.0, 90}, Wanted{5.0, 4.0, -90}, Wanted{0.8, 0.8, 180}, Wanted{1.6, 2.5, 0},
                           Wanted{1.0, 2.5, 0}, Wanted{3.1, 0.8, 45}}) {
     CAPTURE(w.x_m);
@@ -148,8 +161,7 @@ TEST_CASE("drive to: round the pillar, within 5 cm and 2 degrees of the place th
     REQUIRE(planner.plan({robot.pose().x_m, robot.pose().y_m}, {w.x_m, w.y_m}, 0, way) == PathOutcome::found);
     REQUIRE(robot.pilot.drive_to(way, w.degrees * kDegree));
     robot.finish();
-    CHECK(error_m(robot.truth(), w.x_m, w.y_m) < 0.05);
-    CHECK(error_deg(robot.truth(), w.degrees * kDegree) < 2);
+    errors.check(robot.truth(), w.x_m, w.y_m, w.degrees * kDegree);
     CHECK(robot.fastest <= 0.8);
     CHECK(robot.acceleration <= doctest::Approx(0.6));
     CHECK(robot.turn_acceleration <= doctest::Approx(1.2));
