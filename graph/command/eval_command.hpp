@@ -139,5 +139,17 @@ struct EvalLms200Options {
   bool json = false;
 };
 void add_eval_lms200(CLI::App& eval, EvalLms200Options& options, int& exit_code);
+struct EvalSemanticOptions {
+  size_t rooms = 10, objects = 30, looks = 300;
+  double noise_m = 0.3, merge_min = 0.75, distance_max_m = 2;
+  bool sweep = false, tell = false;
+  uint64_t seed = 1;
+  std::filesystem::path network, dot, graphml;  ///< instead of rooms; empty: none
+  std::vector<std::string> goals;               ///< "OBJECT.ATTRIBUTE=VALUE"
+  std::vector<double> at{0, 0};                 ///< the robot, m
+  bool recursive = false;
+  bool json = false;
+};
+void add_eval_semantic(CLI::App& eval, EvalSemanticOptions& options, int& exit_code);
 
 }  // namespace takt::command

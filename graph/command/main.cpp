@@ -167,6 +167,7 @@ int main(int argc, char** argv) {
   takt::command::EvalRegistrationOptions registration;
   takt::command::EvalLms200Options lms200;
   takt::command::DoubleOptions device_double;
+  takt::command::EvalSemanticOptions semantic;
   takt::command::ReplayOptions replay;
   takt::command::LogOptions log;
   takt::command::CloudOptions cloud;
@@ -216,6 +217,7 @@ int main(int argc, char** argv) {
   takt::command::add_eval_person_tracking(*eval, person_tracking, exit_code);
   takt::command::add_eval_registration(*eval, registration, exit_code);
   takt::command::add_eval_lms200(*eval, lms200, exit_code);
+  takt::command::add_eval_semantic(*eval, semantic, exit_code);
 
   try {
     app.parse(argc, argv);

@@ -11,6 +11,7 @@ void register_ground_map(NodeTypes& types);
 void register_picture(NodeTypes& types);
 void register_obstacle_stop(NodeTypes& types);
 void register_semantic(NodeTypes& types);
+void register_semantic_map(NodeTypes& types);
 void register_load(NodeTypes& types);
 void register_cloud_filter(NodeTypes& types);
 void register_traffic_signs(NodeTypes& types);
@@ -35,6 +36,7 @@ NodeTypes node_types() {
   register_picture(types);
   register_obstacle_stop(types);
   register_semantic(types);
+  register_semantic_map(types);
   register_load(types);
   register_cloud_filter(types);
   register_traffic_signs(types);

@@ -23,8 +23,8 @@ size_t ClockGenerator::index_of(const std::string& id) {
 void ClockGenerator::update(int64_t elapsed_ns, bool robot_stopped) {
   for (; next_ < script_.size() && script_[next_].after_ns <= elapsed_ns; ++next_) {
     Request& node = nodes_[target_[next_]].scripted;
-    if (script_[next_].action == Action::pace) node.every = script_[next_].every;
-    else node.run = script_[next_].action == Action::start;
+    if (script_[next_].verb == Verb::pace) node.every = script_[next_].every;
+    else node.run = script_[next_].verb == Verb::start;
   }
   count_ = 0;
   for (const NodeState& state : nodes_) {

@@ -67,16 +67,16 @@ tl::expected<TimedRequest, std::string> parse_piece(std::string_view piece) {
   if (!time) return fault(piece, "`" + std::string(words[0]) + "` is no time");
   request.after_ns = *time;
   if (words.size() < 2) return fault(piece, "nothing is asked for");
-  if (words[1] == "stop") request.action = Action::stop;
-  else if (words[1] == "start") request.action = Action::start;
-  else if (words[1] == "pace") request.action = Action::pace;
+  if (words[1] == "stop") request.verb = Verb::stop;
+  else if (words[1] == "start") request.verb = Verb::start;
+  else if (words[1] == "pace") request.verb = Verb::pace;
   else return fault(piece, "`" + std::string(words[1]) + "` is no request");
-  const size_t wanted = request.action == Action::pace ? 4 : 3;
+  const size_t wanted = request.verb == Verb::pace ? 4 : 3;
   if (words.size() != wanted)
     return fault(piece, "has " + std::to_string(words.size()) + " words instead of " + std::to_string(wanted));
   if (const std::string wrong = id_fault(words[2]); !wrong.empty()) return fault(piece, wrong);
   request.node = words[2];
-  if (request.action == Action::pace) {
+  if (request.verb == Verb::pace) {
     const std::string_view n = words[3];
     const auto [end, error] = std::from_chars(n.data(), n.data() + n.size(), request.every);
     if (error != std::errc{} || end != n.data() + n.size() || request.every == 0)

@@ -10,11 +10,11 @@
 
 namespace takt::semantic {
 
-enum class Action : uint8_t { stop, start, pace };
+enum class Verb : uint8_t { stop, start, pace };
 
 struct TimedRequest {
   int64_t after_ns = 0;  ///< since the first job
-  Action action = Action::start;
+  Verb verb = Verb::start;
   std::string node;
   uint8_t every = 1;  ///< of pace: every n-th release
 };

@@ -27,11 +27,11 @@ TEST_CASE("a script is read in any order, with blanks and an empty end") {
   REQUIRE(script.has_value());
   REQUIRE(script->size() == 3);
   CHECK((*script)[0].after_ns == kSecond / 2);
-  CHECK((*script)[0].action == Action::start);
+  CHECK((*script)[0].verb == Verb::start);
   CHECK((*script)[0].node == "a1");
   CHECK((*script)[1].after_ns == 5 * kSecond);
-  CHECK((*script)[1].action == Action::stop);
-  CHECK((*script)[2].action == Action::pace);
+  CHECK((*script)[1].verb == Verb::stop);
+  CHECK((*script)[2].verb == Verb::pace);
   CHECK((*script)[2].node == "ground_map");
   CHECK((*script)[2].every == 2);
   CHECK(parse_script("")->empty());

@@ -1,0 +1,201 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "nodes/navigation/path_planner.hpp"
+
+#include <algorithm>
+
+namespace takt::navigation {
+namespace {
+
+constexpr int32_t kFar = std::numeric_limits<int32_t>::max();
+
+/// Of the way over an empty grid.
+int64_t octile(double columns, double rows) {
+  const double high = std::max(std::abs(columns), std::abs(rows)), low = std::min(std::abs(columns), std::abs(rows));
+  return static_cast<int64_t>(high * PathPlanner::kStraight + low * (PathPlanner::kDiagonal - PathPlanner::kStraight));
+}
+constexpr double kCorner = 1e-9;             // share of a piece: so near to a corner it touches all four cells
+constexpr double kOctilePerLength = 1.0824;  // at most: 1 / cos(22.5 deg)
+
+}  // namespace
+
+std::string_view to_string(PathOutcome outcome) {
+  switch (outcome) {
+    case PathOutcome::found: return "found";
+    case PathOutcome::start_outside: return "the start lies outside of the grid";
+    case PathOutcome::goal_outside: return "the goal lies outside of the grid";
+    case PathOutcome::goal_blocked: return "the robot has no room at the goal";
+    case PathOutcome::no_way: break;
+  }
+  return "no way leads there";
+}
+
+PathPlanner::PathPlanner(size_t most_cells, const PathParameters& parameters)
+    : parameters_(parameters),
+      clearance_(most_cells),
+      column_(most_cells),
+      unknown_(most_cells),
+      reached_(most_cells),
+      open_(most_cells) {
+  cells_.reserve(most_cells);
+}
+
+bool PathPlanner::look(const OccupancyView& grid) {
+  const size_t cells = static_cast<size_t>(grid.cells.width) * static_cast<size_t>(grid.cells.height);
+  if (cells > clearance_.size()) return false;
+  grid_ = grid;
+  const double radius = parameters_.radius_m / grid.cell_m;
+  radius2_ = static_cast<int32_t>(radius * radius);
+  for (int row = 0; row < grid.cells.height; ++row)
+    for (int column = 0; column < grid.cells.width; ++column)
+      unknown_[index({column, row})] = grid.cells.at(column, row) == kUnknownCell;
+  grow_obstacles();
+  grid_.cells.data = nullptr;  // the caller's memory may be gone at the next call
+  return true;
+}
+
+/// Squared distances, first along each column, then over the columns as far as the radius reaches.
+void PathPlanner::grow_obstacles() {
+  const int width = grid_.cells.width, height = grid_.cells.height, reach = static_cast<int>(std::sqrt(radius2_));
+  for (int column = 0; column < width; ++column) {
+    int last = -kFar / 2;
+    for (int row = 0; row < height; ++row) {
+      if (grid_.cells.at(column, row) > kHalfOccupied) last = row;
+      column_[index({column, row})] = row - last;
+    }
+    last = kFar / 2;
+    for (int row = height - 1; row >= 0; --row) {
+      int32_t& nearest = column_[index({column, row})];
+      if (nearest == 0) last = row;
+      nearest = std::min(nearest, last - row);
+    }
+  }
+  for (int row = 0; row < height; ++row)
+    for (int column = 0; column < width; ++column) {
+      int32_t nearest = kFar;
+      for (int other = std::max(0, column - reach); other <= std::min(width - 1, column + reach); ++other) {
+        const int32_t rows = column_[index({other, row})];
+        if (rows <= reach) nearest = std::min(nearest, rows * rows + (other - column) * (other - column));
+      }
+      clearance_[index({column, row})] = nearest;
+    }
+}
+
+bool PathPlanner::may_step(const Cell& from, const Cell& to) const {
+  if (!grid_.contains(to)) return false;
+  const int32_t there = clearance_[index(to)];
+  if (there <= radius2_ && (there == 0 || there <= clearance_[index(from)])) return false;
+  if (from.column == to.column || from.row == to.row || blocked(from)) return true;
+  return !blocked({from.column, to.row}) && !blocked({to.column, from.row});
+}
+
+int64_t PathPlanner::step_cost(const Cell& from, const Cell& to) const {
+  const int64_t length = from.column == to.column || from.row == to.row ? kStraight : kDiagonal;
+  return unknown_[index(to)] != 0 ? length * parameters_.unknown_factor : length;
+}
+
+std::optional<uint32_t> PathPlanner::search(const Cell& from, const Place& to, double reach_m) {
+  const double goal_column = (to.x_m - grid_.origin_x_m) / grid_.cell_m - 0.5,
+               goal_row = (to.y_m - grid_.origin_y_m) / grid_.cell_m - 0.5;
+  const Cell goal = grid_.cell_of(to.x_m, to.y_m);
+  const double reach = reach_m / grid_.cell_m;
+  // At least this is left; the goal may lie anywhere in its cell.
+  const auto slack = static_cast<int64_t>(kOctilePerLength * kStraight * std::max(reach, 0.75)) + 1;
+  const auto left = [&](const Cell& c) {
+    return std::max<int64_t>(0, octile(c.column - goal_column, c.row - goal_row) - slack);
+  };
+  const auto there = [&](const Cell& c) {
+    return reach_m > 0 ? std::hypot(c.column - goal_column, c.row - goal_row) <= reach && !blocked(c) : c == goal;
+  };
+
+  ++searches_;
+  open_.clear();
+  expanded_ = 0;
+  reached_[index(from)] = {0, index(from), searches_};
+  open_.put(index(from), {left(from), 0});
+  while (!open_.empty()) {
+    const uint32_t here = open_.take_least();
+    const Cell at = cell(here);
+    ++expanded_;
+    if (there(at)) return here;
+    for (int row = -1; row <= 1; ++row)
+      for (int column = -1; column <= 1; ++column) {
+        const Cell next{at.column + column, at.row + row};
+        if (next == at || !may_step(at, next)) continue;
+        const int64_t cost = reached_[here].cost + step_cost(at, next);
+        Reached& reached = reached_[index(next)];
+        if (reached.search == searches_ && reached.cost <= cost) continue;
+        reached = {cost, here, searches_};
+        open_.put(index(next), {cost + left(next), -cost});
+      }
+  }
+  return std::nullopt;
+}
+
+PathOutcome PathPlanner::plan(const Place& from, const Place& to, double reach_m, std::vector<Place>& path) {
+  path.clear();
+  const Cell start = grid_.cell_of(from.x_m, from.y_m), goal = grid_.cell_of(to.x_m, to.y_m);
+  if (!grid_.contains(start)) return PathOutcome::start_outside;
+  if (!grid_.contains(goal)) return PathOutcome::goal_outside;
+  if (reach_m <= 0 && blocked(goal) && goal != start) return PathOutcome::goal_blocked;
+  const auto end = search(start, to, reach_m);
+  if (!end) return PathOutcome::no_way;
+  cost_ = reached_[*end].cost;
+
+  cells_.clear();
+  for (uint32_t at = *end; at != index(start); at = reached_[at].from) cells_.push_back(at);
+  path.push_back(from);
+  Place last = from;
+  for (size_t i = cells_.size(); i-- > 0;) {
+    const Cell here = cell(cells_[i]);
+    const Place middle{grid_.middle_x_m(here), grid_.middle_y_m(here)};
+    const Place next = i == 0 && reach_m <= 0 ? to : middle;
+    // Straight on from the newest corner as far as the way is free; else the cell before is a corner.
+    if (path.back().x_m != last.x_m || path.back().y_m != last.y_m)
+      if (!sees(path.back(), next)) path.push_back(last);
+    last = next;
+  }
+  if (cells_.empty() && reach_m <= 0) last = to;
+  path.push_back(last);
+  return PathOutcome::found;
+}
+
+template <class Visit>
+bool PathPlanner::along(const Place& a, const Place& b, Visit visit) const {
+  Cell at = grid_.cell_of(a.x_m, a.y_m);
+  const Cell end = grid_.cell_of(b.x_m, b.y_m);
+  const double dx = b.x_m - a.x_m, dy = b.y_m - a.y_m;
+  const int right = dx > 0 ? 1 : -1, up = dy > 0 ? 1 : -1;
+  // Share of the piece at which it enters the next column and the next row.
+  const auto crossing = [&](double origin_m, double from_m, double d, int cell, int step) {
+    return d == 0 ? std::numeric_limits<double>::infinity()
+                  : (origin_m + (cell + (step > 0 ? 1 : 0)) * grid_.cell_m - from_m) / d;
+  };
+  while (visit(at)) {
+    if (at == end) return true;
+    const double column = crossing(grid_.origin_x_m, a.x_m, dx, at.column, right),
+                 row = crossing(grid_.origin_y_m, a.y_m, dy, at.row, up);
+    const bool columns_left = at.column != end.column, rows_left = at.row != end.row;
+    if (columns_left && rows_left && std::abs(column - row) < kCorner) {
+      if (!visit({at.column + right, at.row}) || !visit({at.column, at.row + up})) return false;
+      at = {at.column + right, at.row + up};
+    } else if (columns_left && (column < row || !rows_left)) {
+      at.column += right;
+    } else {
+      at.row += up;
+    }
+  }
+  return false;
+}
+
+/// Straight through known and free cells, so that cutting the corners of a way never costs more.
+bool PathPlanner::sees(const Place& a, const Place& b) const {
+  return along(a, b, [&](const Cell& c) { return grid_.contains(c) && !blocked(c) && unknown_[index(c)] == 0; });
+}
+
+bool PathPlanner::free(std::span<const Place> path) const {
+  for (size_t i = 0; i + 1 < path.size(); ++i)
+    if (!along(path[i], path[i + 1], [&](const Cell& c) { return grid_.contains(c) && !blocked(c); })) return false;
+  return true;
+}
+
+}  // namespace takt::navigation

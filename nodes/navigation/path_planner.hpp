@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+// The cheapest way over an occupancy grid (algorithm reference 15.3; the thesis names the block and prints no
+// algorithm): A* over 8 neighbours, obstacles grown by the robot's radius.
+#pragma once
+#include <optional>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "nodes/navigation/indexed_heap.hpp"
+#include "nodes/navigation/occupancy_view.hpp"
+
+namespace takt::navigation {
+
+struct Place {
+  double x_m = 0, y_m = 0;
+};
+
+struct PathParameters {
+  double radius_m = 0.48;  ///< nearer to the middle of an occupied cell the robot's centre does not go
+  int unknown_factor = 3;  ///< what an unknown cell costs, in known ones
+};
+
+enum class PathOutcome : uint8_t { found, start_outside, goal_outside, goal_blocked, no_way };
+std::string_view to_string(PathOutcome outcome);
+
+/// Steps cost 1000 or, diagonally, 1414 (times unknown_factor into an unknown cell), so that sums are exact; no step
+/// cuts the corner of a blocked cell. A robot that stands too near to an obstacle may move away from it, cell by cell.
+/// Memory is taken by the constructor. One thread at a time.
+class PathPlanner {
+ public:
+  /// For grids of at most so many cells.
+  PathPlanner(size_t most_cells, const PathParameters& parameters);
+
+  /// Looks at the grid anew; the ways before hold no longer. False: the grid is larger than the constructor was told.
+  bool look(const OccupancyView& grid);
+
+  /// A way to within `reach_m` of `to` (0: to the place itself), in place of what `path` held: its corners, `from`
+  /// first. What `path` can hold without allocating is the caller's to reserve: at most one place a cell.
+  PathOutcome plan(const Place& from, const Place& to, double reach_m, std::vector<Place>& path);
+
+  /// Whether no blocked cell lies on the straight pieces of a way: while it is true nothing has to be planned again.
+  bool free(std::span<const Place> path) const;
+
+  /// Of the newest way, m of known cells.
+  double cost_m() const { return static_cast<double>(cost_) / kStraight * grid_.cell_m; }
+  size_t expanded() const { return expanded_; }
+
+  /// For tests: cost of the newest search as a sum of steps; whether the robot may not be there.
+  int64_t cost() const { return cost_; }
+  bool blocked(const Cell& cell) const { return clearance_[index(cell)] <= radius2_; }
+
+  static constexpr int64_t kStraight = 1000, kDiagonal = 1414;
+
+ private:
+  struct Reached {
+    int64_t cost;
+    uint32_t from;
+    uint32_t search;  ///< number of the search that wrote this
+  };
+  using Key = std::pair<int64_t, int64_t>;  ///< cost with what is left at least; then the farther first
+
+  uint32_t index(const Cell& cell) const {
+    return static_cast<uint32_t>(cell.row) * static_cast<uint32_t>(grid_.cells.width) +
+           static_cast<uint32_t>(cell.column);
+  }
+  Cell cell(uint32_t index) const {
+    const auto width = static_cast<uint32_t>(grid_.cells.width);
+    return {static_cast<int>(index % width), static_cast<int>(index / width)};
+  }
+  void grow_obstacles();
+  bool may_step(const Cell& from, const Cell& to) const;
+  int64_t step_cost(const Cell& from, const Cell& to) const;
+  /// Number of the goal cell that was reached.
+  std::optional<uint32_t> search(const Cell& from, const Place& to, double reach_m);
+  /// visit(cell) for each cell that a straight piece passes; ends early where that returns false, and tells so.
+  template <class Visit>
+  bool along(const Place& a, const Place& b, Visit visit) const;
+  bool sees(const Place& a, const Place& b) const;
+
+  PathParameters parameters_;
+  OccupancyView grid_;
+  int32_t radius2_ = 0;                      ///< in cells, squared
+  std::vector<int32_t> clearance_, column_;  ///< squared distance to the nearest occupied cell, as far as radius2_
+  std::vector<uint8_t> unknown_;
+  std::vector<Reached> reached_;
+  std::vector<uint32_t> cells_;  ///< of a way, backwards
+  IndexedHeap<Key> open_;
+  uint32_t searches_ = 0;
+  int64_t cost_ = 0;
+  size_t expanded_ = 0;
+};
+
+}  // namespace takt::navigation

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include "nodes/planner/recursion.hpp"
+#include "nodes/planner/search.hpp"
+
+namespace takt::planner {
+
+enum class Method : uint8_t {
+  best,       ///< the recursion for a first plan, then A* for the best
+  recursive,  ///< the thesis's, as it is
+};
+
+struct PlannerParameters {
+  Method method = Method::best;
+  RecursionParameters recursion;
+  SearchCapacity search;
+};
+
+/// Anytime: a plan is there after the recursion, and better or proved the best after the search. Memory is taken by the
+/// constructor. One thread at a time.
+class Planner {
+ public:
+  explicit Planner(const PlannerParameters& parameters)
+      : method_(parameters.method), recursion_(parameters.recursion), search_(parameters.search) {}
+
+  Plan plan(const Domain& domain, const Effort& effort = {}) {
+    const Plan first = recursion_.find(domain, effort);
+    return method_ == Method::recursive ? first : search_.find(domain, effort, first);
+  }
+
+ private:
+  Method method_;
+  Recursion recursion_;
+  Search search_;
+};
+
+}  // namespace takt::planner

@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <doctest/doctest.h>
+
+#include <map>
+#include <queue>
+#include <random>
+
+#include "nodes/navigation/path_planner.hpp"
+
+using namespace takt::navigation;
+
+namespace {
+
+struct RandomField {
+  std::vector<int16_t> cells;
+  OccupancyView view;
+
+  RandomField(std::mt19937& random, int width, int height, double occupied, double unknown) {
+    std::uniform_real_distribution<double> share(0, 1);
+    for (int i = 0; i < width * height; ++i) {
+      const double s = share(random);
+      cells.push_back(s < occupied ? int16_t{1000} : s < occupied + unknown ? kUnknownCell : int16_t{300});
+    }
+    view = {{cells.data(), width, height}, 0.2, -3, 7};
+  }
+};
+
+/// By looking at every cell for every cell.
+bool blocked(const OccupancyView& view, const Cell& cell, double radius_m) {
+  for (int row = 0; row < view.cells.height; ++row)
+    for (int column = 0; column < view.cells.width; ++column)
+      if (view.cells.at(column, row) > kHalfOccupied &&
+          std::pow(column - cell.column, 2) + std::pow(row - cell.row, 2) <= std::pow(radius_m / view.cell_m, 2))
+        return true;
+  return false;
+}
+
+using Key = std::pair<int, int>;
+
+/// Least cost from a free cell to another (Dijkstra); -1: there is no way.
+int64_t least_cost(const std::map<Key, bool>& free, const OccupancyView& view, const Key& from, const Key& to) {
+  std::map<Key, int64_t> cost{{from, 0}};
+  std::priority_queue<std::pair<int64_t, Key>, std::vector<std::pair<int64_t, Key>>, std::greater<>> open;
+  open.push({0, from});
+  while (!open.empty()) {
+    const auto [so_far, at] = open.top();
+    open.pop();
+    if (at == to) return so_far;
+    if (cost[at] < so_far) continue;
+    for (int dx = -1; dx <= 1; ++dx)
+      for (int dy = -1; dy <= 1; ++dy) {
+        const Key next{at.first + dx, at.second + dy};
+        const auto open_cell = [&](const Key& c) { return free.contains(c) && free.at(c); };
+        if (next == at || !open_cell(next)) continue;
+        if (dx != 0 && dy != 0 && (!open_cell({at.first + dx, at.second}) || !open_cell({at.first, at.second + dy})))
+          continue;
+        const int64_t length = dx != 0 && dy != 0 ? 1414 : 1000;
+        const int64_t sum = so_far + (view.cells.at(next.first, next.second) == kUnknownCell ? 3 : 1) * length;
+        const auto [known, added] = cost.try_emplace(next, sum);
+        if (!added && known->second <= sum) continue;
+        known->second = sum;
+        open.push({sum, next});
+      }
+  }
+  return -1;
+}
+
+}  // namespace
+
+TEST_CASE("obstacles grow as the definition says, and every way costs what Dijkstra's does") {
+  std::mt19937 random(3);
+  const auto below = [&](int n) { return static_cast<int>(random() % static_cast<unsigned>(n)); };
+  PathPlanner planners[] = {{600, {0.1, 3}}, {600, {0.3, 3}}, {600, {0.48, 3}}};
+  constexpr double kRadius_m[] = {0.1, 0.3, 0.48};
+  size_t found = 0, none = 0, pieces = 0;
+  std::vector<Place> path;
+  for (int round = 0; round < 300; ++round) {
+    CAPTURE(round);
+    const int width = 3 + below(22), height = 3 + below(22);
+    const auto which = static_cast<size_t>(below(3));
+    const RandomField field(random, width, height, 0.25 / (1 + 4.0 * static_cast<double>(which)), 0.3 * below(2));
+    PathPlanner& planner = planners[which];
+    REQUIRE(planner.look(field.view));
+    std::map<Key, bool> free;
+    std::vector<Cell> places;
+    for (int row = 0; row < height; ++row)
+      for (int column = 0; column < width; ++column) {
+        const bool b = blocked(field.view, {column, row}, kRadius_m[which]);
+        REQUIRE(planner.blocked({column, row}) == b);
+        free[{column, row}] = !b;
+        if (!b) places.push_back({column, row});
+      }
+    for (int i = 0; i < 4 && !places.empty(); ++i) {
+      const Cell from = places[static_cast<size_t>(below(static_cast<int>(places.size())))],
+                 to = places[static_cast<size_t>(below(static_cast<int>(places.size())))];
+      const Place a{field.view.middle_x_m(from) + 0.09, field.view.middle_y_m(from) - 0.09},
+          b{field.view.middle_x_m(to) - 0.09, field.view.middle_y_m(to) + 0.07};
+      const int64_t truth = least_cost(free, field.view, {from.column, from.row}, {to.column, to.row});
+      const PathOutcome outcome = planner.plan(a, b, 0, path);
+      REQUIRE(outcome == (truth < 0 ? PathOutcome::no_way : PathOutcome::found));
+      ++(truth < 0 ? none : found);
+      if (truth < 0) continue;
+      REQUIRE(planner.cost() == truth);
+      REQUIRE(planner.free(path));
+      for (size_t p = 0; p + 1 < path.size(); ++p, ++pieces)  // in steps of 1 % of a piece
+        for (int step = 0; step <= 100; ++step) {
+          const double s = step / 100.0;
+          const Cell cell = field.view.cell_of(path[p].x_m + s * (path[p + 1].x_m - path[p].x_m),
+                                               path[p].y_m + s * (path[p + 1].y_m - path[p].y_m));
+          REQUIRE(free.at({cell.column, cell.row}));
+        }
+      // To within reach of an occupied place: the cheapest of the cells there.
+      const double reach = 0.25 * (1 + below(4));
+      int64_t nearest = -1;
+      for (const Cell& cell : places) {
+        if (std::hypot(field.view.middle_x_m(cell) - b.x_m, field.view.middle_y_m(cell) - b.y_m) > reach) continue;
+        const int64_t cost = least_cost(free, field.view, {from.column, from.row}, {cell.column, cell.row});
+        if (cost >= 0 && (nearest < 0 || cost < nearest)) nearest = cost;
+      }
+      REQUIRE(planner.plan(a, b, reach, path) == (nearest < 0 ? PathOutcome::no_way : PathOutcome::found));
+      if (nearest >= 0) REQUIRE(planner.cost() == nearest);
+    }
+  }
+  CHECK(found > 500);
+  CHECK(none > 50);
+  CHECK(pieces > 1000);
+}

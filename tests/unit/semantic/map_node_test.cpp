@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <doctest/doctest.h>
+
+#include <numbers>
+#include <string>
+
+#include "rt/memory/memory_use.hpp"
+#include "tests/temporary_folder.hpp"
+#include "tests/unit/mapping_3d/node_harness.hpp"
+
+namespace takt {
+void register_semantic_map(NodeTypes& types);
+}
+
+using namespace takt;
+
+namespace {
+
+constexpr const char* kNetwork = R"(takt_network: 1
+attributes: {colour: {kind: colour}, height: {kind: scalar, range: [0m, 3m]}}
+types: {chair: {attributes: [colour, height]}, table: {attributes: [height]}}
+)";
+
+struct Fixture {
+  VirtualClock clock;
+  test::TemporaryFolder folder;
+  std::unique_ptr<Node> node;
+  std::unique_ptr<test::BoxWriter<Objects3d>> objects;
+  std::unique_ptr<test::BoxWriter<TextStatus>> decisions;
+  test::Box<Objects3d> things{{0, 0, 1, 8}};
+  test::Box<Odometry> odometry;
+  test::Box<Grid> grid{{60, 60, 1, 0}};
+  uint64_t jobs = 0;
+
+  explicit Fixture(const std::string& network = kNetwork, const std::string& classes = "chair, table") {
+    NodeTypes types;
+    register_semantic_map(types);
+    REQUIRE(types.find("semantic_map")->layer == Layer::storage);
+    node = types.find("semantic_map")->make();
+    folder.write("n.yaml", network);
+    test::set(*node, "network", std::string("n.yaml"));
+    test::set(*node, "classes", classes);
+    test::set(*node, "misses", int64_t{2});
+    PortAccess::connect(test::input(*node, "things"), {0, 0, 1, 8});
+    PortAccess::connect(test::input(*node, "odometry"), {});
+    PortAccess::connect(test::input(*node, "grid"), {60, 60, 1, 0});
+  }
+  void set_up() {
+    Setup setup{clock, folder.path, folder.path, 0, std::nullopt, 0};
+    node->setup(setup);
+    objects = std::make_unique<test::BoxWriter<Objects3d>>(*node->outputs()[0]);
+    decisions = std::make_unique<test::BoxWriter<TextStatus>>(*node->outputs()[1]);
+  }
+  void thing(float class_id, float x_m, float y_m, float red = 0) {
+    Object3d o{};
+    o.class_id = class_id, o.score = 0.9F, o.x_m = x_m, o.y_m = y_m, o.red = red, o.height_m = 0.9F;
+    things->objects.push_back(o);
+  }
+  /// What is decided about the things, seen from there at once; they are forgotten by this function.
+  std::string job(double x_m, double y_m, double theta_rad, bool pose_known = true) {
+    const int64_t stamp = 100'000'000 * static_cast<int64_t>(++jobs);
+    odometry->x_m = x_m, odometry->y_m = y_m, odometry->theta_rad = theta_rad;
+    test::latch(test::input(*node, "things"), things, stamp, jobs);
+    if (pose_known) test::latch(test::input(*node, "odometry"), odometry, stamp, jobs);
+    objects->clear(), decisions->clear();
+    Job job(clock, jobs, stamp, stamp + 66'000'000, 0, "full");
+    const uint64_t before = thread_memory_use().allocations;
+    node->run(job);
+    if (counting_allocations()) CHECK(thread_memory_use().allocations == before);
+    things->objects.resize(0);
+    CHECK(objects->sent() == pose_known);
+    CHECK(decisions->sent() == pose_known);
+    if (!pose_known) return "";
+    CHECK(objects->stamp_ns() == stamp);
+    const auto text = decisions->message().text.items();
+    return {text.begin(), text.end()};
+  }
+  std::span<const Object3d> known() { return objects->message().objects.items(); }
+};
+
+constexpr double kQuarter = std::numbers::pi / 2;
+
+}  // namespace
+
+TEST_CASE("semantic_map places what is seen in the map, and knows it again from elsewhere") {
+  Fixture f;
+  f.set_up();
+  f.thing(0, 0.5F, 2, 200);
+  f.thing(1, -1, 3);
+  f.thing(-1, 0, 1);
+  CHECK(f.job(2, 1, kQuarter) ==
+        "created chair_1: none of its type within 2 m\ncreated table_1: none of its type within 2 m");
+  REQUIRE(f.known().size() == 2);
+  CHECK(f.known()[0].class_id == 0);
+  CHECK(f.known()[0].x_m == doctest::Approx(2.5));
+  CHECK(f.known()[0].y_m == doctest::Approx(3));
+  CHECK(f.known()[0].red == doctest::Approx(200));
+  CHECK(f.known()[0].height_m == doctest::Approx(0.9));
+  CHECK(f.known()[1].class_id == 1);
+  CHECK(f.known()[1].x_m == doctest::Approx(1));
+  CHECK(f.known()[1].y_m == doctest::Approx(4));
+  // From (0.5, 3), driving along x: the chair is 2 m ahead.
+  f.thing(0, 0.4F, 2, 200);
+  CHECK(f.job(0.5, 3, 0) == "merged with chair_1, p = 0.98 >= 0.75: 0.40 m apart");
+  CHECK(f.known().size() == 2);
+  CHECK(f.known()[0].y_m == doctest::Approx(2.8));
+}
+
+TEST_CASE("semantic_map waits for the robot's pose at the stamp") {
+  Fixture f;
+  f.set_up();
+  f.thing(0, 0, 2);
+  f.job(0, 0, 0, false);
+  f.thing(0, 0, 2);
+  CHECK(f.job(0, 0, 0) == "created chair_1: none of its type within 2 m");
+}
+
+TEST_CASE("semantic_map removes an object whose place a grid shows free in two looks") {
+  Fixture f;
+  f.set_up();
+  Grid& grid = *f.grid;
+  grid.width = grid.height = 60;
+  grid.cell_m = 0.2;
+  grid.origin_x_m = grid.origin_y_m = -6;
+  grid.cells.resize(3600);
+  for (int16_t& cell : grid.cells.items()) cell = 0;
+  test::latch(test::input(*f.node, "grid"), f.grid, 1, 1);
+  f.thing(0, 0, 2);
+  f.job(0, 0, 0);
+  CHECK(f.job(0, 0, 0) == "");
+  CHECK(f.job(0, 0, kQuarter) == "");  // looks elsewhere
+  f.things->searched = 0.5;
+  CHECK(f.job(0, 0, 0) == "");
+  f.things->searched = 1;
+  CHECK(f.job(0, 0, 0) == "removed chair_1: its place was seen free 2 times in a row, after 1 sightings");
+  CHECK(f.known().empty());
+}
+
+TEST_CASE("semantic_map refuses networks and classes that it cannot read") {
+  Fixture network("takt_network: 1\ntypes: {chair: {attributes: [size]}}\n");
+  CHECK_THROWS_WITH_AS(network.set_up(),
+                       doctest::Contains("n.yaml:2:30: there is no attribute `size`; valid are: (none)"), SetupError);
+  Fixture classes(kNetwork, "chair, colour");
+  CHECK_THROWS_WITH_AS(classes.set_up(), "classes: `colour`: another node has this name", SetupError);
+}
