@@ -39,17 +39,16 @@ Eigen::Vector3d in_room(const LaserReturn& r, const Rigid& mount);
 /// Of every step-th return.
 std::vector<Point> in_room(const LaserSweep& sweep, const Rigid& mount, size_t step = 1);
 
-/// Every n-th of `count` is at most `most`.
+/// n, if every n-th of `count` is to be taken, and at most `most` of them.
 inline size_t stride(size_t count, size_t most) { return std::max<size_t>(1, (count + most - 1) / most); }
 
 /// Reads lines of these words; # begins a comment.
-///   object HEIGHT                             m
-///   scanner NAME X Y Z YAW PITCH ROLL         m and deg, as far as known
-///   beams FIRST STEP                          deg: angles of the beams of all scans that follow
-///   scan HEADING RANGE...                     deg, m; of the scanner named last. A range of 0: nothing came back. One
-///   with
-///                                             an asterisk behind it (1.204*) lies on the object
-/// Throws std::invalid_argument naming file, line and what was expected there, or which scanner lacks what.
+///   object HEIGHT                        m
+///   scanner NAME X Y Z YAW PITCH ROLL    m and deg, as far as known
+///   beams FIRST STEP                     deg: angles of the beams of all scans that follow
+///   scan HEADING RANGE...                deg, m; of the scanner named last
+/// A range of 0: nothing came back; one with an asterisk behind it (1.204*) lies on the object. Throws
+/// std::invalid_argument naming file, line and what was expected there, or which scanner lacks what.
 LaserRecording read_laser_recording(const std::filesystem::path& file);
 
 /// Beams of all sweeps: angles of the first and from one to the next.
