@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 #include "nodes/laser_fusion/icp.hpp"
 
@@ -28,6 +29,7 @@ class ObjectReturns {
   explicit ObjectReturns(const LaserSweep& sweep) {
     for (const LaserReturn& r : sweep.returns)
       if (r.on_object) places_.push_back(in_scanner(r).head<2>());
+    if (places_.empty()) throw std::invalid_argument("no return of scanner " + sweep.name + " is on the object");
     heights_.resize(places_.size());
   }
   Extent extent(const Rigid& mount) {

@@ -28,7 +28,8 @@ struct HeightFit {
 /// z and roll at which the object stands on the floor and has its height, all else as in `mount`; roll keeps its sign.
 /// The object's ends are extrapolated from the 1 % and 3 % quantiles of its heights, and from 99 % and 97 %: noise and
 /// a few returns beside it do not move them. A step is halved when its error changes sign, and doubled, up to the first
-/// one, when it has not for four steps: each of the two moves the other's error.
+/// one, when it has not for four steps: each of the two moves the other's error. Throws std::invalid_argument if no
+/// return is on the object.
 HeightFit fit_height(const LaserSweep& sweep, const PoseParameters& mount, double object_height_m,
                      const HeightParameters& parameters);
 

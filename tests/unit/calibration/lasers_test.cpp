@@ -72,9 +72,10 @@ TEST_CASE("a few returns beside the object do not move its ends") {
   CHECK(std::abs(fit.roll_rad - truth[kRoll]) < 0.003);
 }
 
-TEST_CASE("an object that cannot have that height is told") {
+TEST_CASE("an object that cannot have that height is told, and one that nobody has seen") {
   const PoseParameters truth{0, 0, 0.9, 0, 0, 45 * kDegree};
   CHECK_FALSE(fit_height(object_sweep(truth, 1.2, 1001), truth, 40, {}).converged);
+  CHECK_THROWS_AS(fit_height({"none", truth, {}}, truth, 1.2, {}), std::invalid_argument);
 }
 
 TEST_CASE("a mount is judged by every return's nearest point of the room, and its pairs lead to the mount") {
