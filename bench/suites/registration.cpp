@@ -8,6 +8,7 @@
 #include "bench/suite.hpp"
 #include "nodes/laser_fusion/generated_pair.hpp"
 #include "nodes/laser_fusion/genetic_icp.hpp"
+#include "nodes/laser_fusion/matcher.hpp"
 #include "rt/time/clock.hpp"
 
 namespace takt::bench {

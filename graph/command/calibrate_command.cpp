@@ -302,7 +302,7 @@ int calibrate_stereo(const CalibrateOptions& options) {
 }  // namespace
 
 void add_calibrate(CLI::App& app, CalibrateOptions& o, int& exit_code) {
-  CLI::App* calibrate = app.add_subcommand("calibrate", "measures cameras from pictures of a chessboard");
+  CLI::App* calibrate = app.add_subcommand("calibrate", "measures cameras and lasers from recordings");
   calibrate->require_subcommand(1);
   CLI::App* stereo = calibrate->add_subcommand("stereo", "lenses and pose of a stereo camera, from pairs of pictures");
   stereo->add_option("folder", o.folder, "folder with the pairs")->required();
@@ -316,6 +316,7 @@ void add_calibrate(CLI::App& app, CalibrateOptions& o, int& exit_code) {
                      "writes a picture (.png): a rectified pair with epipolar lines, and where corners were");
   stereo->add_flag("--json", o.json, "one JSON object on stdout");
   stereo->callback([&] { exit_code = calibrate_stereo(o); });
+  add_calibrate_lasers(*calibrate, o.lasers, exit_code);
 }
 
 }  // namespace takt::command

@@ -27,9 +27,9 @@ void write_curves(const std::string& file, const std::string& parameter, const s
   cv::Mat image(height, width, CV_8UC3, cv::Scalar::all(255));
   int top = kTop;
   for (const Curve& curve : curves) {
-    const double most = std::max(1e-9, *std::max_element(curve.values.begin(), curve.values.end()));
+    const double range = std::max(1e-9, *std::max_element(curve.values.begin(), curve.values.end()) - curve.foot);
     const auto at = [&](int i) {
-      const double share = curve.values[static_cast<size_t>(i)] / most;
+      const double share = (curve.values[static_cast<size_t>(i)] - curve.foot) / range;
       return cv::Point(kLeft + kStep * i, top + kPanel - static_cast<int>(share * (kPanel - 20)));
     };
     put_text(image, curve.label, {kLeft, top - 8});
@@ -37,7 +37,7 @@ void write_curves(const std::string& file, const std::string& parameter, const s
     for (int i = 0; i < count; ++i) {
       if (i > 0) cv::line(image, at(i - 1), at(i), kBlue, 2, cv::LINE_AA);
       cv::circle(image, at(i), 3, kBlue, cv::FILLED, cv::LINE_AA);
-      put_text(image, fmt::format("{:.3g}", curve.values[static_cast<size_t>(i)]), at(i) + cv::Point(4, -6));
+      put_text(image, fmt::format("{:.4g}", curve.values[static_cast<size_t>(i)]), at(i) + cv::Point(4, -6));
     }
     top += kPanel + kGap;
   }

@@ -9,9 +9,10 @@ namespace takt::command {
 struct Curve {
   std::string label;
   std::vector<double> values;
+  double foot = 0;  ///< where its scale begins
 };
 
-/// Curves one above the other, each with its own scale from 0, over the same values of `parameter`, as a PNG. Throws
+/// Curves one above the other, each with its own scale, over the same values of `parameter`, as a PNG. Throws
 /// std::invalid_argument if the file cannot be written.
 void write_curves(const std::string& file, const std::string& parameter, const std::vector<double>& values,
                   const std::vector<Curve>& curves);

@@ -93,8 +93,10 @@ struct EvalPersonTrackingOptions {
 };
 void add_eval_person_tracking(CLI::App& eval, EvalPersonTrackingOptions& options, int& exit_code);
 struct EvalRegistrationOptions {
-  std::filesystem::path source, target, reference;  ///< all three, or a sweep
-  std::string sweep, metric;                        ///< of generated pairs
+  std::filesystem::path source, target, reference;  ///< all three, or a scene, or a sweep
+  std::filesystem::path scene;                      ///< folder of KITTI's raw data
+  std::vector<double> displace;                     ///< m, deg: away from the true pose; empty: as the clouds came
+  std::string sweep, metric;                        ///< of the pair given, or of generated ones
   size_t runs = 20, points = 1000, population = 100;
   uint32_t generations = 25'000;
   double cut_m = 0, sigma_m = 0;  ///< 0: chosen

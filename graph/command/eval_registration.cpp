@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -10,6 +11,7 @@
 
 #include "graph/command/curves.hpp"
 #include "graph/command/eval_command.hpp"
+#include "graph/command/laser_stereo.hpp"
 #include "graph/command/prepare.hpp"
 #include "nodes/cloud/cloud_file.hpp"
 #include "nodes/laser_fusion/evaluate.hpp"
@@ -27,7 +29,7 @@ using Json = nlohmann::ordered_json;
 constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kSigmaOfCut = 0.4;  // 0.10 m at the cut of 0.25 m
 
-// Two clouds from files ----------------------------------------------------------------------------------------------
+// Two recorded clouds ------------------------------------------------------------------------------------------------
 
 cloud::Cloud read(const std::filesystem::path& file) {
   auto cloud = cloud::read_cloud(file);
@@ -65,8 +67,20 @@ RegistrationParameters parameters_of(const EvalRegistrationOptions& o) {
   return p;
 }
 
+/// The pair that the options name, if any: its laser is the target, its vision the source.
+std::optional<CloudPair> recorded_pair(const EvalRegistrationOptions& o) {
+  const auto files = {&o.source, &o.target, &o.reference};
+  const auto named = std::count_if(files.begin(), files.end(), [](const auto* file) { return !file->empty(); });
+  if (named == 0 && o.scene.empty()) return std::nullopt;
+  if (o.scene.empty() ? named != 3 : named != 0)
+    throw std::invalid_argument(
+        "registration wants --source, --target and --reference, or --scene, of recorded clouds");
+  if (!o.scene.empty()) return read_laser_stereo(o.scene);
+  return CloudPair{read(o.target), read(o.source), read_pose(o.reference)};
+}
+
 struct Registered {
-  Rigid reference, searched, refined, plain;
+  Rigid reference, searched, refined, plain, generalised;
   double time_ms = 0;  ///< CPU time of the search
 };
 
@@ -127,16 +141,19 @@ Json errors(const Rigid& found, const Rigid& reference) {
   return {{"error_m", error.m}, {"error_deg", error.rad / kDegree}};
 }
 
-Json measure_files(const EvalRegistrationOptions& o) {
-  const cloud::Cloud source = read(o.source), target = read(o.target);
+Json measure_pair(const EvalRegistrationOptions& o, const CloudPair& recorded) {
+  const CloudPair pair =
+      o.displace.empty() ? recorded : displaced(recorded, o.displace[0], o.displace[1] * kDegree, o.seed);
+  const cloud::Cloud &source = pair.vision, &target = pair.laser;
   Registered r;
-  r.reference = read_pose(o.reference);
+  r.reference = pair.vision_in_laser;
   Registration registration(target.view(), source.view(), parameters_of(o));
   const int64_t start_ns = thread_cpu_ns();
   r.searched = registration.search({});
   r.time_ms = static_cast<double>(thread_cpu_ns() - start_ns) / 1e6;
   r.refined = registration.refined(r.searched);
   r.plain = registration.refined(registration.plain({}));
+  r.generalised = registration.refined(registration.generalised({}));
   const double sigma_m = o.sigma_m > 0 ? o.sigma_m : kSigmaOfCut * registration.cut_m();
   write_results(o, target, source, r, sigma_m);
 
@@ -156,7 +173,9 @@ Json measure_files(const EvalRegistrationOptions& o) {
   out["generations_per_s"] = o.generations / (r.time_ms / 1e3);
   out["time_ms"] = r.time_ms;
   out["seed"] = o.seed;
-  out["baseline"] = {{"plain_icp", errors(r.plain, r.reference)}, {"identity", errors({}, r.reference)}};
+  out["baseline"] = {{"plain_icp", errors(r.plain, r.reference)},
+                     {"generalised_icp", errors(r.generalised, r.reference)},
+                     {"identity", errors({}, r.reference)}};
   return out;
 }
 
@@ -171,39 +190,44 @@ void print(const Json& out, const std::string& indent = "") {
     }
 }
 
-// Generated pairs ----------------------------------------------------------------------------------------------------
+// Sweeps -------------------------------------------------------------------------------------------------------------
 
 constexpr size_t kPointsOfSensors = 8000;
 constexpr double kOverlaps[] = {1, 0.9, 0.8, 0.6, 0.45, 0.3};
 constexpr struct { double m, degrees; } kOffsets[] = {{0.25, 15}, {0.5, 30}, {0.75, 45}, {1, 60}};
 
-SuccessParameters generated(const EvalRegistrationOptions& o) {
+SuccessParameters sweep_parameters(const EvalRegistrationOptions& o, bool generated) {
   SuccessParameters p;
   p.registration = parameters_of(o);
-  if (o.cut_m == 0) p.registration.cut_m = QualityParameters{}.cut_m;
+  if (o.cut_m == 0 && generated) p.registration.cut_m = QualityParameters{}.cut_m;
   p.seed = o.seed;
   p.runs = o.runs;
   return p;
 }
 
-int sweep_success(const EvalRegistrationOptions& o) {
-  SuccessParameters p = generated(o);
+/// Of generated pairs over overlaps and offsets, of a recorded one over offsets.
+int sweep_success(const EvalRegistrationOptions& o, const std::optional<CloudPair>& recorded) {
+  SuccessParameters p = sweep_parameters(o, !recorded);
   p.pair.points = kPointsOfSensors;
+  std::vector<double> overlaps(std::begin(kOverlaps), std::end(kOverlaps));
+  if (recorded) overlaps = {0};  // whatever it is
   Json rows = Json::array();
   std::vector<Curve> curves;
   if (!o.json)
-    std::printf("%7s %7s %7s %9s %9s %9s %9s %9s %11s %11s\n", "overlap", "m", "deg", "genetic %", "plain %",
-                "deceived %", "median m", "deg", "at truth", "at found");
+    std::printf("%7s %7s %7s %9s %9s %9s %9s %9s %9s %11s %11s\n", "overlap", "m", "deg", "genetic %", "plain %",
+                "general %", "deceived %", "median m", "deg", "at truth", "at found");
   for (const auto& offset : kOffsets) {
     curves.push_back({fmt::format("successes of genetic ICP, %, offset {} m / {} deg", offset.m, offset.degrees), {}});
-    for (const double overlap : kOverlaps) {
+    for (const double overlap : overlaps) {
       p.pair.overlap = overlap;
       p.pair.offset_m = offset.m;
       p.pair.offset_rad = offset.degrees * kDegree;
-      const Success s = measure_success(p);
+      const Success s = measure_success(p, [&](uint64_t seed) {
+        return recorded ? displaced(*recorded, p.pair.offset_m, p.pair.offset_rad, seed) : generate_pair(p.pair, seed);
+      });
       const auto percent = [&](size_t count) { return 100 * static_cast<double>(count) / static_cast<double>(s.runs); };
       curves.back().values.push_back(percent(s.genetic));
-      rows.push_back({{"overlap", overlap},
+      rows.push_back({{"overlap", recorded ? Json(nullptr) : Json(overlap)},
                       {"offset_m", offset.m},
                       {"offset_deg", offset.degrees},
                       {"runs", s.runs},
@@ -213,17 +237,20 @@ int sweep_success(const EvalRegistrationOptions& o) {
                       {"error_deg", s.median_rad / kDegree},
                       {"score_at_truth", s.score_at_truth},
                       {"score_at_found", s.score_at_found},
-                      {"baseline", {{"plain_icp", {{"success_pct", percent(s.plain)}}}}}});
+                      {"baseline",
+                       {{"plain_icp", {{"success_pct", percent(s.plain)}}},
+                        {"generalised_icp", {{"success_pct", percent(s.generalised)}}}}}});
       if (o.json) continue;
-      std::printf("%7g %7g %7g %9.0f %9.0f %9.0f %9.4f %9.3f %11.5f %11.5f\n", overlap, offset.m, offset.degrees,
-                  percent(s.genetic), percent(s.plain), percent(s.deceived), s.median_m, s.median_rad / kDegree,
+      std::printf("%7s %7g %7g %9.0f %9.0f %9.0f %9.0f %9.4f %9.3f %11.5f %11.5f\n",
+                  recorded ? "-" : fmt::format("{}", overlap).c_str(), offset.m, offset.degrees, percent(s.genetic),
+                  percent(s.plain), percent(s.generalised), percent(s.deceived), s.median_m, s.median_rad / kDegree,
                   s.score_at_truth, s.score_at_found);
       std::fflush(stdout);
     }
   }
   if (o.json)
     std::printf("%s\n", Json{{"seed", o.seed}, {"generations", o.generations}, {"success", rows}}.dump(2).c_str());
-  if (!o.picture.empty()) write_curves(o.picture, "overlap", {std::begin(kOverlaps), std::end(kOverlaps)}, curves);
+  if (!o.picture.empty()) write_curves(o.picture, "overlap", overlaps, curves);
   return kOk;
 }
 
@@ -233,7 +260,7 @@ int sweep_population(const EvalRegistrationOptions& o) {
   Json rows = Json::array();
   std::vector<Curve> curves;
   for (const double overlap : {1.0, 0.6}) {
-    SuccessParameters p = generated(o);
+    SuccessParameters p = sweep_parameters(o, true);
     p.pair.points = o.points;
     p.pair.overlap = overlap;
     const auto measured = measure_populations(p, populations, generations);
@@ -246,6 +273,7 @@ int sweep_population(const EvalRegistrationOptions& o) {
                         {"generations", generations[g]},
                         {"score", c.score[g]}});
       }
+      curves.back().foot = *std::min_element(curves.back().values.begin(), curves.back().values.end());
       if (o.json) continue;
       std::printf("%s:\n ", curves.back().label.c_str());
       for (const PopulationCurve& c : measured) std::printf(" %zu: %.5f", c.population, c.score[g]);
@@ -259,12 +287,13 @@ int sweep_population(const EvalRegistrationOptions& o) {
 
 int evaluate(const EvalRegistrationOptions& o) {
   try {
-    if (o.sweep == "success") return sweep_success(o);
     if (o.sweep == "population") return sweep_population(o);
-    if (o.source.empty() || o.target.empty() || o.reference.empty())
+    const std::optional<CloudPair> recorded = recorded_pair(o);
+    if (o.sweep == "success") return sweep_success(o, recorded);
+    if (!recorded)
       throw std::invalid_argument(
-          "registration wants --source, --target and --reference, or --sweep success or population of generated pairs");
-    const Json out = measure_files(o);
+          "registration wants --source, --target and --reference, or --scene, or --sweep success or population");
+    const Json out = measure_pair(o, *recorded);
     if (o.json) std::printf("%s\n", out.dump(2).c_str());
     else print(out);
     return kOk;
@@ -280,9 +309,13 @@ void add_eval_registration(CLI::App& eval, EvalRegistrationOptions& o, int& exit
   app->add_option("--source", o.source, "cloud that is moved, PLY or PCD");
   app->add_option("--target", o.target, "cloud that stays");
   app->add_option("--reference", o.reference, "true pose, source to target: 4 x 4 numbers");
-  app->add_option(
-         "--sweep", o.sweep,
-         "of generated pairs: success (over overlaps and offsets) | population (scores over sizes and generations)")
+  app->add_option("--scene", o.scene, "instead: a folder of KITTI's raw data, its stereo points to its laser's");
+  app->add_option("--displace", o.displace,
+                  "m and deg: lays the source so far from its true place, about --seed's axes (default: as it came)")
+      ->expected(2);
+  app->add_option("--sweep", o.sweep,
+                  "success (over offsets, and overlaps of generated pairs) | population (scores of a generated pair "
+                  "over sizes and generations)")
       ->check(CLI::IsMember({"success", "population"}));
   app->add_option("--metric", o.metric, "what the search minimises: truncated | thesis (default truncated)")
       ->check(CLI::IsMember({"truncated", "thesis"}));
@@ -296,7 +329,7 @@ void add_eval_registration(CLI::App& eval, EvalRegistrationOptions& o, int& exit
   app->add_option("--population", o.population, "default 100")->check(CLI::Range(2, 10'000));
   app->add_option("--sigma", o.sigma_m, "of match probabilities, m (default 0.4 of the cut)")
       ->check(CLI::PositiveNumber);
-  app->add_option("--seed", o.seed, "of the search and of generated pairs (default 1)");
+  app->add_option("--seed", o.seed, "of the search, of generated pairs and of displacements (default 1)");
   app->add_option("--out", o.out, "writes the target with the source's colours (.ply, .pcd)");
   app->add_option("--picture", o.picture,
                   "PNG: before, after, match probability from red to green, colours; or the curves of a sweep");

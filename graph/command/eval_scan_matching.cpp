@@ -67,6 +67,8 @@ Json to_json(const Evaluation& e) {
     if (e.outcomes[i] > 0) out["outcomes"][std::string(to_string(static_cast<Outcome>(i)))] = e.outcomes[i];
   out["gap_m"] = e.gap_m;
   out["gap_by_truth_m"] = e.gap_by_truth_m;
+  out["apart_m"] = e.apart_m;
+  out["apart_deg"] = e.apart_deg;
   out["within_95_pct"] = e.within_95_pct;
   out["time_ms"] = e.time_ms_p50;
   out["time_ms_max"] = e.time_ms_max;
@@ -91,6 +93,8 @@ void print(const Evaluation& e) {
               limits.error_deg);
   std::printf("surfaces of a scan and the one before, laid over each other: %.4f m apart, by the truth %.4f\n", e.gap_m,
               e.gap_by_truth_m);
+  std::printf("steps by the map and by the scan before alone: %.4f m and %.3f deg apart (p50)\n", e.apart_m,
+              e.apart_deg);
   for (size_t i = 0; i < e.outcomes.size(); ++i)
     if (e.outcomes[i] > 0)
       std::printf("%s: %zu\n", std::string(to_string(static_cast<Outcome>(i))).c_str(), e.outcomes[i]);

@@ -19,12 +19,16 @@ PoseError error_of(const Rigid& found, const Rigid& truth) {
 }
 
 Success measure_success(const SuccessParameters& p) {
+  return measure_success(p, [&](uint64_t seed) { return generate_pair(p.pair, seed); });
+}
+
+Success measure_success(const SuccessParameters& p, const PairSource& pair_of) {
   Success out;
   std::vector<double> error_m, error_rad, at_truth, at_found;
   for (; out.runs < p.runs; ++out.runs) {
     RegistrationParameters parameters = p.registration;
     parameters.seed = p.seed + out.runs;
-    const CloudPair pair = generate_pair(p.pair, parameters.seed);
+    const CloudPair pair = pair_of(parameters.seed);
     Registration registration(pair.laser.view(), pair.vision.view(), parameters);
     const Rigid found = registration.search({});
     const PoseError error = error_of(registration.refined(found), pair.vision_in_laser);
@@ -34,7 +38,11 @@ Success measure_success(const SuccessParameters& p) {
     error_rad.push_back(error.rad);
     out.genetic += error.success();
     out.deceived += !error.success() && at_found.back() < at_truth.back();
-    out.plain += error_of(registration.refined(registration.plain({})), pair.vision_in_laser).success();
+    const auto succeeds = [&](const Rigid& pose) {
+      return error_of(registration.refined(pose), pair.vision_in_laser).success();
+    };
+    out.plain += succeeds(registration.plain({}));
+    out.generalised += succeeds(registration.generalised({}));
   }
   out.median_m = median(error_m);
   out.median_rad = median(error_rad);

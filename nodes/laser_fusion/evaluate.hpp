@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // How often a registration succeeds, on generated pairs.
 #pragma once
+#include <functional>
 #include <vector>
 
 #include "nodes/laser_fusion/generated_pair.hpp"
@@ -21,15 +22,19 @@ struct SuccessParameters {
   size_t runs = 20;
 };
 
-/// Of the runs with one overlap and one offset.
+/// Of the runs with one overlap and one offset, all from the identity.
 struct Success {
   size_t runs = 0;
-  size_t genetic = 0, plain = 0;        ///< successes, from the identity
+  size_t genetic = 0, plain = 0, generalised = 0;  ///< successes; the two beside genetic ICP are refined as it is
   size_t deceived = 0;                  ///< failures of genetic ICP whose score is better than that of the true pose
   double median_m = 0, median_rad = 0;  ///< errors of genetic ICP
   double score_at_truth = 0, score_at_found = 0;  ///< medians, of the search
 };
 Success measure_success(const SuccessParameters& parameters);
+
+/// The same with pairs of one's own: parameters.pair is not looked at.
+using PairSource = std::function<CloudPair(uint64_t seed)>;
+Success measure_success(const SuccessParameters& parameters, const PairSource& pair_of);
 
 /// Median score of the best pose after so many generations, over runs with one pair of clouds as it is, for one size of
 /// the population (thesis Fig. 4.24).

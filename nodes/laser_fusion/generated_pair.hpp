@@ -26,4 +26,8 @@ struct CloudPair {
 /// view is turned away from the laser's as far as the overlap says. So no point is seen twice.
 CloudPair generate_pair(const PairParameters& parameters, uint64_t seed);
 
+/// A pair with its vision cloud moved, so that vision_in_laser is exactly so far and turned by so much as
+/// generate_pair() has it: a recorded pair as one to be registered from the identity.
+CloudPair displaced(const CloudPair& pair, double offset_m, double offset_rad, uint64_t seed);
+
 }  // namespace takt::laser_fusion

@@ -8,8 +8,8 @@
 
 namespace takt::laser_fusion {
 
-GeneticIcp::GeneticIcp(Matcher& matcher, const GeneticParameters& parameters)
-    : matcher_(&matcher), parameters_(parameters) {
+GeneticIcp::GeneticIcp(PoseJudge& judge, const GeneticParameters& parameters)
+    : judge_(&judge), parameters_(parameters) {
   if (parameters.population < 2) throw std::invalid_argument("the population of genetic ICP must be at least 2");
   for (const Parameter p : {kX, kY, kZ, kYaw, kPitch, kRoll})
     if (!parameters.locks[p]) free_.push_back(p);
@@ -23,15 +23,15 @@ void GeneticIcp::begin(const Rigid& start, uint64_t seed) {
   population_.assign(1, current_);
   oldest_ = 0;
   generation_ = 0;
-  quality_ = matcher_->evaluate(to_rigid(current_));
+  quality_ = judge_->evaluate(to_rigid(current_));
   scores_[0] = scores_[1] = quality_.score;
 }
 
 void GeneticIcp::next() {
   const bool converged = generation_ >= 1 && !(std::abs(scores_[1] - scores_[0]) >= parameters_.eps_conv);
-  current_ = converged ? offspring() : icp_step(*matcher_, current_, parameters_.locks);
+  current_ = converged ? offspring() : icp_step(*judge_, current_, parameters_.locks);
   ++generation_;
-  const Quality quality = matcher_->evaluate(to_rigid(current_));
+  const Quality quality = judge_->evaluate(to_rigid(current_));
   scores_[1] = scores_[0];
   scores_[0] = quality.score;
   if (!(quality.score < quality_.score)) return;

@@ -7,7 +7,7 @@
 #include <random>
 #include <vector>
 
-#include "nodes/laser_fusion/matcher.hpp"
+#include "nodes/laser_fusion/pose_judge.hpp"
 
 namespace takt::laser_fusion {
 
@@ -22,9 +22,9 @@ struct GeneticParameters {
 class GeneticIcp {
  public:
   /// Takes its memory. Throws std::invalid_argument if all parameters are locked, or the population is below 2.
-  GeneticIcp(Matcher& matcher, const GeneticParameters& parameters);
+  GeneticIcp(PoseJudge& judge, const GeneticParameters& parameters);
 
-  /// Begins anew with the clouds that the matcher has. The same seed gives the same answer.
+  /// Begins anew with the clouds that the judge has. The same seed gives the same answer.
   void begin(const Rigid& start, uint64_t seed);
 
   /// Generations, until all are done or `more` says no: it is asked before each kPortion of them. Returns done().
@@ -49,7 +49,7 @@ class GeneticIcp {
   size_t any(size_t count);
   double uniform(double low, double high);
 
-  Matcher* matcher_;
+  PoseJudge* judge_;
   GeneticParameters parameters_;
   std::vector<Parameter> free_;  ///< not locked
   std::mt19937_64 random_;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Iterative closest points (thesis Sec. 4.4.2): pairs of nearest points, the motion that fits them best, again.
 #pragma once
-#include "nodes/laser_fusion/matcher.hpp"
+#include "nodes/laser_fusion/pose_judge.hpp"
 
 namespace takt::laser_fusion {
 
@@ -17,12 +17,12 @@ struct IcpResult {
   int iterations;
 };
 
-/// One step from a pose whose evaluation is the matcher's last one: the next pose, or the same if there are too few
+/// One step from a pose whose evaluation is the judge's last one: the next pose, or the same if there are too few
 /// pairs.
-PoseParameters icp_step(const Matcher& matcher, const PoseParameters& pose, const Locks& locks);
+PoseParameters icp_step(const PoseJudge& judge, const PoseParameters& pose, const Locks& locks);
 
 /// Needs similar clouds, a large overlap and a good start. Ends where the score no longer changes, or there is nothing
 /// to go by.
-IcpResult icp(Matcher& matcher, const Rigid& start, const IcpParameters& parameters);
+IcpResult icp(PoseJudge& judge, const Rigid& start, const IcpParameters& parameters);
 
 }  // namespace takt::laser_fusion

@@ -5,6 +5,7 @@
 #include "nodes/laser_fusion/clusters.hpp"
 #include "nodes/laser_fusion/fusion.hpp"
 #include "nodes/laser_fusion/genetic_icp.hpp"
+#include "nodes/laser_fusion/matcher.hpp"
 
 namespace takt::laser_fusion {
 

@@ -6,11 +6,11 @@
 #include <vector>
 
 #include "nodes/laser_fusion/nearest_table.hpp"
-#include "nodes/laser_fusion/quality.hpp"
+#include "nodes/laser_fusion/pose_judge.hpp"
 
 namespace takt::laser_fusion {
 
-class Matcher {
+class Matcher final : public PoseJudge {
  public:
   /// Takes the memory for clouds of so many points; nothing else allocates.
   Matcher(size_t fixed_points, size_t moving_points, const QualityParameters& parameters,
@@ -23,12 +23,11 @@ class Matcher {
 
   /// The nearest moving point for each fixed one at that pose, judged. Not the moving cloud is moved but the fixed one
   /// back to it: so the table of the moving cloud holds for every pose.
-  Quality evaluate(const Rigid& moving_in_fixed);
+  Quality evaluate(const Rigid& moving_in_fixed) override;
   /// The same without the table: every point against every other.
   Quality evaluate_reference(const Rigid& moving_in_fixed);
 
-  /// Of the last evaluation: sums over the pairs it kept.
-  const PairSums& pairs() const { return sums_; }
+  const PairSums& pairs() const override { return sums_; }
   /// Of the last evaluation, one for each fixed point.
   std::span<const Nearest> nearest() const { return nearest_; }
   std::span<const Point> fixed() const { return fixed_; }

@@ -6,6 +6,7 @@
 
 #include "nodes/cloud/count_kernel.hpp"
 #include "nodes/laser_fusion/clusters.hpp"
+#include "nodes/laser_fusion/generalised_icp.hpp"
 #include "nodes/laser_fusion/icp.hpp"
 #include "nodes/laser_fusion/thinning.hpp"
 
@@ -59,6 +60,17 @@ Rigid Registration::search(const Rigid& start) {
 Rigid Registration::plain(const Rigid& start) {
   return icp(*thinned_, start, {.eps_conv = parameters_.genetic.eps_conv, .locks = parameters_.genetic.locks})
       .moving_in_fixed;
+}
+
+Rigid Registration::generalised(const Rigid& start) {
+  GeneralisedIcp icp(*thinned_);
+  const double last_m = cut_m();
+  Rigid pose = start;
+  for (const double times : {4.0, 2.0, 1.0}) {
+    thinned_->set_cut(times * last_m);
+    pose = icp.run(pose);
+  }
+  return pose;
 }
 
 Rigid Registration::refined(const Rigid& pose) {

@@ -6,6 +6,7 @@
 
 #include "nodes/cloud/cloud.hpp"
 #include "nodes/laser_fusion/genetic_icp.hpp"
+#include "nodes/laser_fusion/matcher.hpp"
 
 namespace takt::laser_fusion {
 
@@ -27,6 +28,8 @@ class Registration {
   Rigid search(const Rigid& start);
   /// Plain ICP from there, of the thinned clouds.
   Rigid plain(const Rigid& start);
+  /// Generalised ICP from there, of the thinned clouds; the cut goes down to that of the search from four times that.
+  Rigid generalised(const Rigid& start);
   /// Plain ICP with all points, the cut going down from that of the search to three times the spacing of the clouds as
   /// they came.
   Rigid refined(const Rigid& pose);

@@ -83,6 +83,13 @@ class Gap {
   std::vector<SurfacePoint> points_;
 };
 
+/// Matching with the scan before alone.
+Parameters without_map(Parameters p) {
+  p.map.keyframes = 1;
+  p.keyframe_m = p.keyframe_rad = 0;
+  return p;
+}
+
 bool covered(const Match& match, const PlanarPose& truth) {
   const PlanarPose& step = match.robot_in_previous;
   const Eigen::Vector3d e(step.x_m - truth.x_m, step.y_m - truth.y_m, wrapped(step.theta_rad - truth.theta_rad));
@@ -97,11 +104,11 @@ StepError error_between(const PlanarPose& estimated, const PlanarPose& truth) {
 }
 
 Evaluation evaluate(const Drive& drive, const Parameters& parameters, bool with_odometry, const Limits& limits) {
-  ScanMatcher matcher(drive.beams, parameters);
+  ScanMatcher matcher(drive.beams, parameters), mapless(drive.beams, without_map(parameters));
   Evaluation out;
   Tally matched(limits), odometry(limits);
   Gap gap(drive, parameters);
-  std::vector<double> times_ms, gaps, gaps_by_truth;
+  std::vector<double> times_ms, gaps, gaps_by_truth, apart_m, apart_deg;
   size_t accepted = 0, inside = 0;
   for (size_t i = 0; i < drive.scans.size(); ++i) {
     const double dt_s = i > 0 ? drive.scans[i].time_s - drive.scans[i - 1].time_s : 0;
@@ -110,6 +117,7 @@ Evaluation evaluate(const Drive& drive, const Parameters& parameters, bool with_
     const Match match = matcher.step(drive.sweep(i), dt_s, moved);
     times_ms.push_back(static_cast<double>(thread_cpu_ns() - begin) * 1e-6);
     out.poses.push_back(match.robot_in_map);
+    const Match other = mapless.step(drive.sweep(i), dt_s, moved);
     if (i == 0) continue;
     const PlanarPose truth = drive.moved_truly(i);
     ++out.steps;
@@ -117,6 +125,9 @@ Evaluation evaluate(const Drive& drive, const Parameters& parameters, bool with_
     out.path_m += std::hypot(truth.x_m, truth.y_m);
     matched.add(match.robot_in_previous, truth);
     odometry.add(drive.moved(i), truth);
+    const StepError apart = error_between(match.robot_in_previous, other.robot_in_previous);
+    apart_m.push_back(apart.error_m);
+    apart_deg.push_back(apart.error_rad / kDegree);
     gaps.push_back(gap.metres(i, match.robot_in_previous));
     gaps_by_truth.push_back(gap.metres(i, truth));
     if (match.outcome != Outcome::matched) continue;
@@ -127,6 +138,8 @@ Evaluation evaluate(const Drive& drive, const Parameters& parameters, bool with_
   out.odometry = odometry.figures();
   out.gap_m = quantile(gaps, 0.5);
   out.gap_by_truth_m = quantile(gaps_by_truth, 0.5);
+  out.apart_m = quantile(apart_m, 0.5);
+  out.apart_deg = quantile(apart_deg, 0.5);
   out.within_95_pct = accepted > 0 ? 100 * static_cast<double>(inside) / static_cast<double>(accepted) : 0;
   out.time_ms_p50 = quantile(times_ms, 0.5);
   out.time_ms_max = times_ms.empty() ? 0 : *std::max_element(times_ms.begin(), times_ms.end());

@@ -28,6 +28,9 @@ struct Evaluation {
   /// How far the surfaces of a scan lie from those of the one before (m, medians over the steps of their mean), laid
   /// over each other by matching and by the truth: what the truth is worth.
   double gap_m = 0, gap_by_truth_m = 0;
+  /// Median difference between a step and the same one by matching with the scan before alone. These two share no map:
+  /// an error much larger than this is not matching's but the truth's.
+  double apart_m = 0, apart_deg = 0;
   double within_95_pct = 0;  ///< accepted steps whose error lies within the 95 % ellipsoid of their covariance
   double path_m = 0;
   double time_ms_p50 = 0, time_ms_max = 0;  ///< CPU time of a step

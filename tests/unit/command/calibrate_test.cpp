@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// `takt calibrate stereo` from a folder of pictures to the files it writes.
+// `takt calibrate` from recordings to the files it writes.
 #include <doctest/doctest.h>
 
+#include <fstream>
 #include <opencv2/imgcodecs.hpp>
 
 #include "graph/command/calibrate_command.hpp"
 #include "graph/command/run_command.hpp"
+#include "nodes/calibration/generated_sweeps.hpp"
 #include "nodes/stereo/rectify.hpp"
 #include "tests/temporary_folder.hpp"
 #include "tests/unit/calibration/chessboard_views.hpp"
@@ -58,4 +60,24 @@ TEST_CASE("pictures without a board are refused") {
   for (const char* name : {"left1.png", "right1.png", "left2.png", "right2.png"})
     REQUIRE(cv::imwrite(folder.path / name, cv::Mat(48, 64, CV_8U, cv::Scalar(90))));
   CHECK(run("calibrate stereo " + folder.path.string() + " --left left*.png --right right*.png") == kBadInput);
+}
+
+TEST_CASE("sweeps of lasers become mounts for a graph, and a picture") {
+  const takt::test::TemporaryFolder folder;
+  const std::string sweeps = folder.path / "sweeps.txt", mounts = folder.path / "mounts.yaml",
+                    picture = folder.path / "picture.png";
+  const auto generated = calibration::generate_sweeps({.headings = 180, .beams = 181}, 1);
+  calibration::write_laser_recording(sweeps, generated.recording, generated.beams);
+  CHECK(run("calibrate lasers " + sweeps + " --out " + mounts + " --picture " + picture) == kOk);
+  CHECK_FALSE(cv::imread(picture).empty());
+  std::ifstream in(mounts);
+  std::string line;
+  int scanners = 0;
+  while (std::getline(in, line)) scanners += line.find(": {x: ") != std::string::npos;
+  CHECK(scanners == 2);
+
+  CHECK(run("calibrate lasers") == kBadInput);
+  CHECK(run("calibrate lasers " + mounts) == kBadInput);
+  CHECK(run("calibrate lasers " + sweeps + " --picture " + (folder.path / "picture.nothing").string()) == kBadInput);
+  CHECK(run("calibrate lasers " + sweeps + " --out " + (folder.path / "none" / "mounts.yaml").string()) == kBadInput);
 }

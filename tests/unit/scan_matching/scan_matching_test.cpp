@@ -134,6 +134,18 @@ TEST_CASE("a drive through a furnished room: far better than its odometry, and t
   }
 }
 
+TEST_CASE("how far two ways of matching lie apart tells the errors of a truth from their own") {
+  Drive drive = make_drive(furnished_room(4), rounds(100), {}, 4);
+  const Evaluation exact = evaluate(drive, {}, true, {});
+  CHECK(exact.apart_deg > 0);
+  CHECK(exact.apart_deg < 2 * exact.matched.error_deg + 0.1);
+  for (size_t i = 0; i < drive.scans.size(); i += 2) drive.scans[i].truth.theta_rad += 0.01;
+  const Evaluation spoilt = evaluate(drive, {}, true, {});
+  CHECK(spoilt.apart_deg == exact.apart_deg);
+  CHECK(spoilt.apart_m == exact.apart_m);
+  CHECK(spoilt.matched.error_deg > 5 * spoilt.apart_deg);
+}
+
 TEST_CASE("along a corridor the odometry speaks, with its uncertainty; across it the walls do") {
   std::vector<PlanarPose> straight;
   for (int i = 0; i < 20; ++i) straight.push_back({0.1, 0.2 * i, 0});

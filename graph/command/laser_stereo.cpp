@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "graph/command/laser_stereo.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <fstream>
+#include <opencv2/imgcodecs.hpp>
+#include <sstream>
+#include <stdexcept>
+
+#include "nodes/stereo/matcher.hpp"
+#include "nodes/stereo/triangulate.hpp"
+
+namespace takt::command {
+namespace {
+
+using Eigen::Matrix3d, Eigen::Vector3d;
+using laser_fusion::CloudPair, laser_fusion::Rigid;
+
+constexpr float kNearest_m = 3, kFarthest_m = 20;
+constexpr float kAside = 0.84f, kUpwards = 0.25f;  // tangents of 40 and 14 degrees
+constexpr int kDisparities = 160, kStep = 2;       // every other pixel
+
+/// Lines of "NAME: number ...".
+class CalibrationFile {
+ public:
+  explicit CalibrationFile(std::filesystem::path file) : file_(std::move(file)) {}
+
+  Eigen::MatrixXd matrix(const std::string& name, int rows, int columns) const {
+    std::ifstream in(file_);
+    if (!in) throw std::invalid_argument(file_.string() + ": cannot be read");
+    for (std::string line; std::getline(in, line);) {
+      if (line.rfind(name + ":", 0) != 0) continue;
+      std::istringstream numbers(line.substr(name.size() + 1));
+      Eigen::MatrixXd out(rows, columns);
+      for (int i = 0; i < rows * columns; ++i)
+        if (!(numbers >> out(i / columns, i % columns)))
+          throw std::invalid_argument(
+              fmt::format("{}: {} must be {} x {} numbers", file_.string(), name, rows, columns));
+      return out;
+    }
+    throw std::invalid_argument(fmt::format("{}: has no line \"{}: ...\"", file_.string(), name));
+  }
+
+ private:
+  std::filesystem::path file_;
+};
+
+/// The laser in the frame of the rectified left colour camera: its own rectified frame is that of camera 0, shifted.
+Rigid laser_in_camera(const std::filesystem::path& folder, const Eigen::MatrixXd& left) {
+  const CalibrationFile cameras(folder / "calib_cam_to_cam.txt"), laser(folder / "calib_velo_to_cam.txt");
+  const Matrix3d rectify = cameras.matrix("R_rect_00", 3, 3), turn = laser.matrix("R", 3, 3);
+  const Vector3d shift = laser.matrix("T", 3, 1);
+  const Vector3d camera = left.leftCols<3>().inverse() * left.col(3);
+  return {rectify * turn, rectify * shift + camera};
+}
+
+cv::Mat read_image(const std::filesystem::path& file) {
+  cv::Mat image = cv::imread(file.string(), cv::IMREAD_COLOR);
+  if (image.empty()) throw std::invalid_argument(fmt::format("{}: cannot be read or decoded", file.string()));
+  return image;
+}
+
+cloud::Cloud stereo_cloud(const std::filesystem::path& folder, const CameraModel& camera) {
+  const cv::Mat left = read_image(folder / "image_02.png"), right = read_image(folder / "image_03.png");
+  stereo::MatcherParameters p = stereo::MatcherParameters::quality();
+  p.disparities = kDisparities;
+  p.subpixel = p.left_right_check = true;
+  const auto view = [](const cv::Mat& m) {
+    return ImageView<const uint8_t>{m.data, m.cols, m.rows, m.channels(), static_cast<ptrdiff_t>(m.step)};
+  };
+  cv::Mat disparity(left.size(), CV_16S), confidence(left.size(), CV_8U), fraction(left.size(), CV_8U);
+  const stereo::DisparityViews map{{disparity.ptr<int16_t>(), left.cols, left.rows},
+                                   {confidence.data, left.cols, left.rows},
+                                   {fraction.data, left.cols, left.rows}};
+  if (!stereo::make_matcher(left.cols, left.rows, left.channels(), p)->match(view(left), view(right), map))
+    throw std::invalid_argument(folder.string() + ": image_02.png and image_03.png differ in size");
+  cloud::Cloud all, out;
+  all.points.resize(left.total());
+  all.colours.resize(left.total());
+  const size_t count = stereo::triangulate(map, view(left), camera, kStep, all.points, all.colours);
+  for (size_t i = 0; i < count; ++i) {
+    if (all.points[i].z < kNearest_m || all.points[i].z > kFarthest_m) continue;
+    out.points.push_back(all.points[i]);
+    out.colours.push_back(all.colours[i]);
+  }
+  return out;
+}
+
+cloud::Cloud laser_cloud(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  if (!in) throw std::invalid_argument(file.string() + ": cannot be read");
+  cloud::Cloud out;
+  for (float r[4]; in.read(reinterpret_cast<char*>(r), sizeof r);) {  // x y z reflectance, x ahead, y left
+    if (r[0] < kNearest_m || r[0] > kFarthest_m) continue;
+    if (std::abs(r[1]) > kAside * r[0] || std::abs(r[2]) > kUpwards * r[0]) continue;
+    out.points.push_back({r[0], r[1], r[2]});
+  }
+  return out;
+}
+
+}  // namespace
+
+CloudPair read_laser_stereo(const std::filesystem::path& folder) {
+  const CalibrationFile cameras(folder / "calib_cam_to_cam.txt");
+  const Eigen::MatrixXd left = cameras.matrix("P_rect_02", 3, 4), right = cameras.matrix("P_rect_03", 3, 4);
+  const CameraModel camera{left(0, 0), left(0, 2), left(1, 2), (left(0, 3) - right(0, 3)) / left(0, 0)};
+  if (!(camera.focal_px > 0) || !(camera.baseline_m > 0))
+    throw std::invalid_argument(folder.string() + ": calib_cam_to_cam.txt has no baseline to the right");
+  return {laser_cloud(folder / "velodyne.bin"), stereo_cloud(folder, camera), laser_in_camera(folder, left).inverse()};
+}
+
+}  // namespace takt::command
