@@ -16,6 +16,7 @@
 #include "graph/command/replay_command.hpp"
 #include "graph/command/run_command.hpp"
 #include "graph/command/show_command.hpp"
+#include "graph/command/terrain_command.hpp"
 #include "graph/command/train_command.hpp"
 
 namespace {
@@ -144,6 +145,7 @@ int main(int argc, char** argv) {
   takt::command::EvalSiftOptions sift;
   takt::command::EvalGroundOptions ground;
   takt::command::EvalSignsOptions signs;
+  takt::command::EvalTerrainOptions terrain_eval;
   takt::command::EvalBodyPoseOptions body_pose;
   takt::command::EvalScanMatchingOptions scan_matching;
   takt::command::EvalPersonTrackingOptions person_tracking;
@@ -152,6 +154,7 @@ int main(int argc, char** argv) {
   takt::command::LogOptions log;
   takt::command::CloudOptions cloud;
   takt::command::TrainOptions train;
+  takt::command::TerrainOptions terrain;
   takt::command::ObjectsOptions object_database;
   std::string type;
   bool check_json = false;
@@ -177,6 +180,7 @@ int main(int argc, char** argv) {
   takt::command::add_calibrate(app, calibrate, exit_code);
   takt::command::add_cloud(app, cloud, exit_code);
   takt::command::add_train(app, train, exit_code);
+  takt::command::add_terrain(app, terrain, exit_code);
   takt::command::add_objects(app, object_database, exit_code);
   CLI::App* eval = app.add_subcommand("eval", "measures quality against ground truth");
   eval->require_subcommand(1);
@@ -187,6 +191,7 @@ int main(int argc, char** argv) {
   takt::command::add_eval_sift(*eval, sift, exit_code);
   takt::command::add_eval_ground(*eval, ground, exit_code);
   takt::command::add_eval_signs(*eval, signs, exit_code);
+  takt::command::add_eval_terrain(*eval, terrain_eval, exit_code);
   takt::command::add_eval_body_pose(*eval, body_pose, exit_code);
   takt::command::add_eval_scan_matching(*eval, scan_matching, exit_code);
   takt::command::add_eval_person_tracking(*eval, person_tracking, exit_code);
