@@ -26,6 +26,7 @@ std::vector<Row> run_objects(const Options&);
 std::vector<Row> run_objects_3d(const Options&);
 std::vector<Row> run_mapping(const Options&);
 std::vector<Row> run_semantic(const Options&);
+std::vector<Row> run_ground(const Options&);
 #endif
 
 std::span<const Suite> suites() {
@@ -51,6 +52,7 @@ std::span<const Suite> suites() {
       {"objects_3d", "things on a table: growing regions against a kd-tree, the whole", run_objects_3d},
       {"mapping", "scan matching: search, refinement against brute force; occupancy map, pose filter", run_mapping},
       {"semantic", "network queries, insertion and plans against the size of the network", run_semantic},
+      {"ground", "the ground map at 640x480: stages against brute force and OpenCV, a whole image", run_ground},
 #endif
   });
   return list;

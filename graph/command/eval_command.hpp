@@ -111,6 +111,7 @@ struct EvalGroundOptions {
   std::vector<int> drivable;             ///< class ids
   std::vector<int> ignore;
   std::string learn;             ///< shell pattern of file names
+  bool variants = false;         ///< the generated pavement in other light and of other stone, too
   std::vector<std::string> set;  ///< "param=value" of the ground_map node
   uint64_t seed = 1;
   int frames = 60;
@@ -118,6 +119,15 @@ struct EvalGroundOptions {
   bool json = false;
 };
 void add_eval_ground(CLI::App& eval, EvalGroundOptions& options, int& exit_code);
+
+struct EvalTerrainOptions {
+  std::filesystem::path maps;  ///< empty: graph/terrain.txt of the project
+  uint64_t seed = 2;
+  int drives = 2;
+  std::string picture;
+  bool json = false;
+};
+void add_eval_terrain(CLI::App& eval, EvalTerrainOptions& options, int& exit_code);
 
 struct EvalSignsOptions {
   std::filesystem::path signs;  ///< empty: graph/signs of the project

@@ -18,6 +18,7 @@
 #include "graph/command/replay_command.hpp"
 #include "graph/command/run_command.hpp"
 #include "graph/command/show_command.hpp"
+#include "graph/command/terrain_command.hpp"
 #include "graph/command/train_command.hpp"
 
 namespace {
@@ -161,6 +162,7 @@ int main(int argc, char** argv) {
   takt::command::EvalSiftOptions sift;
   takt::command::EvalGroundOptions ground;
   takt::command::EvalSignsOptions signs;
+  takt::command::EvalTerrainOptions terrain_eval;
   takt::command::EvalBodyPoseOptions body_pose;
   takt::command::EvalScanMatchingOptions scan_matching;
   takt::command::EvalPersonTrackingOptions person_tracking;
@@ -172,6 +174,7 @@ int main(int argc, char** argv) {
   takt::command::LogOptions log;
   takt::command::CloudOptions cloud;
   takt::command::TrainOptions train;
+  takt::command::TerrainOptions terrain;
   takt::command::ObjectsOptions object_database;
   std::string type;
   bool check_json = false;
@@ -201,6 +204,7 @@ int main(int argc, char** argv) {
   takt::command::add_calibrate(app, calibrate, exit_code);
   takt::command::add_cloud(app, cloud, exit_code);
   takt::command::add_train(app, train, exit_code);
+  takt::command::add_terrain(app, terrain, exit_code);
   takt::command::add_objects(app, object_database, exit_code);
   takt::command::add_double(app, device_double, exit_code);
   CLI::App* eval = app.add_subcommand("eval", "measures quality against ground truth");
@@ -212,6 +216,7 @@ int main(int argc, char** argv) {
   takt::command::add_eval_sift(*eval, sift, exit_code);
   takt::command::add_eval_ground(*eval, ground, exit_code);
   takt::command::add_eval_signs(*eval, signs, exit_code);
+  takt::command::add_eval_terrain(*eval, terrain_eval, exit_code);
   takt::command::add_eval_body_pose(*eval, body_pose, exit_code);
   takt::command::add_eval_scan_matching(*eval, scan_matching, exit_code);
   takt::command::add_eval_person_tracking(*eval, person_tracking, exit_code);

@@ -11,7 +11,25 @@ double percent(int64_t part, int64_t whole) {
   return whole == 0 ? 0 : 100.0 * static_cast<double>(part) / static_cast<double>(whole);
 }
 
+/// Row of the lowest pixel of a column that is not `ground`; -1: none.
+int border_row(ImageView<const uint8_t> mask, int x, uint8_t ground) {
+  int y = mask.height - 1;
+  while (y >= 0 && mask.at(x, y) == ground) --y;
+  return y;
+}
+
 }  // namespace
+
+void map_image(ImageView<const uint8_t> image, const FloorProjection& in_robot, const PlanarPose& robot_in_map,
+               GroundDetector& detector, GroundGrid& grid, ImageView<uint8_t> mask) {
+  const FloorPoint robot{robot_in_map.x_m, robot_in_map.y_m};
+  detector.analyse(image);
+  detector.learn();
+  detector.classify(mask, in_robot);
+  grid.centre(robot);
+  grid.observe(mask, in_robot.moved(robot_in_map), robot, detector.confidence());
+  grid.accumulate();
+}
 
 double MaskScore::precision_pct() const { return percent(right, right + wrong); }
 double MaskScore::recall_pct() const { return percent(right, right + missed); }
@@ -32,8 +50,7 @@ std::vector<double> free_range(ImageView<const uint8_t> mask, uint8_t is_ground,
                                const FloorPoint& foot, double range_max_m) {
   std::vector<double> range(static_cast<size_t>(mask.width), range_max_m);
   for (int x = 0; x < mask.width; ++x) {
-    int y = mask.height - 1;
-    while (y >= 0 && mask.at(x, y) == is_ground) --y;
+    const int y = border_row(mask, x, is_ground);
     if (y < 0) continue;
     const auto floor = projection.floor_at(x, y);
     if (!floor) continue;
@@ -47,6 +64,22 @@ void add_border_errors(const std::vector<double>& a, const std::vector<double>& 
                        std::vector<double>& errors) {
   for (size_t i = 0; i < std::min(a.size(), b.size()); ++i)
     if (a[i] < range_max_m || b[i] < range_max_m) errors.push_back(std::abs(a[i] - b[i]));
+}
+
+double DoubtScore::false_doubted_pct() const { return percent(false_doubted, false_borders); }
+double DoubtScore::true_doubted_pct() const { return percent(true_doubted, true_borders); }
+
+void add(DoubtScore& score, ImageView<const uint8_t> mask, ImageView<const uint8_t> truth, const Confidence& confidence,
+         int beyond_px) {
+  for (int x = 0; x < mask.width; ++x) {
+    const int y = border_row(mask, x, 255);
+    if (y < 0) continue;
+    const int beyond = std::max(0, y - beyond_px);
+    const bool floor_goes_on = static_cast<Truth>(truth.at(x, beyond)) == Truth::ground;
+    const bool doubted = confidence.at(x, beyond) < kSure;
+    (floor_goes_on ? score.false_borders : score.true_borders) += 1;
+    (floor_goes_on ? score.false_doubted : score.true_doubted) += doubted;
+  }
 }
 
 void bottom_is_ground(ImageView<uint8_t> mask) {

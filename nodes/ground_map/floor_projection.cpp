@@ -2,6 +2,7 @@
 #include "nodes/ground_map/floor_projection.hpp"
 
 #include <Eigen/Dense>
+#include <Eigen/Geometry>
 #include <cmath>
 
 #include "nodes/mapping_3d/pose.hpp"
@@ -21,15 +22,28 @@ FloorProjection projection(const Matrix& m) {
 
 }  // namespace
 
-FloorPoint PlanarPose::apply(const FloorPoint& p) const {
-  const double c = std::cos(yaw_rad), s = std::sin(yaw_rad);
-  return {x_m + c * p.x_m - s * p.y_m, y_m + s * p.x_m + c * p.y_m};
+FloorPoint transformed(const PlanarPose& child_in_parent, const FloorPoint& p) {
+  const PlanarPose at = compose(child_in_parent, {p.x_m, p.y_m, 0});
+  return {at.x_m, at.y_m};
 }
 
 // With R = Rz(yaw) Rx(pitch) Ry(roll) the image of the y axis is (-sin yaw cos pitch, cos yaw cos pitch, sin pitch).
 PlanarPose planar(const Transform& t) {
   const mapping_3d::Affine a = mapping_3d::to_affine(t);
   return {t.x, t.y, std::atan2(-a.r[1], a.r[4])};
+}
+
+// At rest R = Rz(pan0) Rx(tilt0) Ry(roll0) and then the axes of a camera, whose forward axis Ry leaves in place: pan0
+// is read off it, and the head's tilt goes between Rz and Rx.
+Transform turned_by_head(const Transform& at_rest, double pan_rad, double tilt_rad) {
+  using Eigen::AngleAxisd, Eigen::Vector3d;
+  const Eigen::Quaterniond q(at_rest.qw, at_rest.qx, at_rest.qy, at_rest.qz);
+  const Vector3d ahead = q * Vector3d::UnitZ();
+  const double pan0_rad = std::atan2(-ahead.x(), ahead.y());
+  const Eigen::Quaterniond turned = AngleAxisd(pan0_rad + pan_rad, Vector3d::UnitZ()) *
+                                    AngleAxisd(tilt_rad, Vector3d::UnitX()) * AngleAxisd(-pan0_rad, Vector3d::UnitZ()) *
+                                    q;
+  return {at_rest.x, at_rest.y, at_rest.z, turned.w(), turned.x(), turned.y(), turned.z()};
 }
 
 // The ray of pixel (i, j) has the direction d = R ((i - cu) / f, (j - cv) / f, 1) and meets z = 0 at t - d t_z / d_z.
@@ -50,6 +64,19 @@ std::optional<FloorPoint> FloorProjection::floor_at(double x_px, double y_px) co
   return FloorPoint{p.x() / p.z(), p.y() / p.z()};
 }
 
+// The fall changes in one direction along a row.
+RowSpan FloorProjection::floor_of_row(int y, int width) const {
+  const auto falls = [&](int x) { return h[6] * x + (h[7] * y + h[8]) > kHorizon; };
+  const bool left = falls(0), right = falls(width - 1);
+  if (left == right) return {y, 0, left ? width : 0};
+  int same = 0, other = width - 1;  // as the left end, as the right end
+  while (other - same > 1) {
+    const int middle = (same + other) / 2;
+    (falls(middle) == left ? same : other) = middle;
+  }
+  return left ? RowSpan{y, 0, other} : RowSpan{y, other, width};
+}
+
 std::optional<ImagePoint> FloorProjection::pixel_at(const FloorPoint& point) const {
   const Matrix m = matrix(*this);
   const double determinant = m.determinant();
@@ -61,7 +88,7 @@ std::optional<ImagePoint> FloorProjection::pixel_at(const FloorPoint& point) con
 }
 
 FloorProjection FloorProjection::moved(const PlanarPose& pose) const {
-  const double c = std::cos(pose.yaw_rad), s = std::sin(pose.yaw_rad);
+  const double c = std::cos(pose.theta_rad), s = std::sin(pose.theta_rad);
   Matrix m;
   m << c, -s, pose.x_m, s, c, pose.y_m, 0, 0, 1;
   return projection(m * matrix(*this));

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "rt/msg/messages.hpp"
+#include "rt/transform/planar_pose.hpp"
 
 namespace takt::ground_map {
 
@@ -16,14 +17,20 @@ struct ImagePoint {
   double x_px, y_px;
 };
 
-/// Position and direction on the floor: p_parent = Rz(yaw) p_child + (x, y).
-struct PlanarPose {
-  double x_m = 0, y_m = 0, yaw_rad = 0;
-  FloorPoint apply(const FloorPoint& p) const;
+/// Pixels first .. last - 1 of row y.
+struct RowSpan {
+  int y, first, last;
 };
+
+/// A point of the child frame, seen from the parent frame.
+FloorPoint transformed(const PlanarPose& child_in_parent, const FloorPoint& p);
 
 /// The part of a pose that lies in the floor: yaw of R = Rz(yaw) Rx(pitch) Ry(roll).
 PlanarPose planar(const Transform& transform);
+
+/// A camera on the head, whose pivot is its optical centre: the pose at rest with the head's pan (about z, left
+/// positive) and tilt (up positive) added to its own.
+Transform turned_by_head(const Transform& at_rest, double pan_rad, double tilt_rad);
 
 /// Homogeneous map of pixels (x_px, y_px, 1) to the floor z = 0; row-major. A pixel sees the floor where the third
 /// coordinate, by how much its ray falls per unit of depth, is above kHorizon.
@@ -34,6 +41,8 @@ struct FloorProjection {
   std::optional<FloorPoint> floor_at(double x_px, double y_px) const;
   /// The pixel that sees a point of the floor, inside the image or not; none where it lies behind the camera.
   std::optional<ImagePoint> pixel_at(const FloorPoint& point) const;
+  /// Pixels first .. last - 1 of row y see the floor, of 0 .. width - 1; first = last: none does.
+  RowSpan floor_of_row(int y, int width) const;
   /// To the floor of the frame in which `pose` is that of this one's.
   FloorProjection moved(const PlanarPose& pose) const;
   /// With floor coordinates (p - origin) / unit instead.

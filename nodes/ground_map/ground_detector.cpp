@@ -13,6 +13,7 @@ GroundDetector::GroundDetector(int width, int height, const DetectorParameters& 
       t_m_(parameters.t_m),
       area_(width, height, parameters.trapezoid),
       memory_(parameters.memory_entries, parameters.t_w),
+      confidence_(parameters.doubt),
       cleaner_(width, height, parameters.mean_size) {
   for (auto* plane : {&saturation_, &value_, &raw_})
     plane->resize(static_cast<size_t>(width) * static_cast<size_t>(height));
@@ -32,15 +33,29 @@ void GroundDetector::analyse(ImageView<const uint8_t> image) {
 
 bool GroundDetector::learn() {
   const auto descriptor = describe(view(saturation_), view(value_), area_, t_m_);
-  if (descriptor) memory_.add(*descriptor);
+  if (descriptor) recall(*descriptor);
   return descriptor.has_value();
 }
 
-void GroundDetector::classify(ImageView<uint8_t> mask) {
+void GroundDetector::recall(const Descriptor& descriptor) {
+  memory_.add(descriptor);
+  confidence_.rebuild(memory_.table());
+}
+
+Confidence GroundDetector::confidence() const { return {confidence_.table(), view(saturation_), view(value_)}; }
+
+void GroundDetector::classify(ImageView<uint8_t> mask, const std::optional<FloorProjection>& camera) {
   // Pointers of its own: bytes that are written could otherwise be those of the vectors themselves.
   const uint8_t *table = memory_.table(), *s = saturation_.data(), *v = value_.data();
   uint8_t* out = raw_.data();
   for (size_t i = 0, n = raw_.size(); i < n; ++i) out[i] = table[size_t{v[i]} * 256 + s[i]];
+  if (camera)
+    for (int y = 0; y < height_; ++y) {
+      const RowSpan floor = camera->floor_of_row(y, width_);
+      uint8_t* row = view(raw_).row(y);
+      std::fill(row, row + floor.first, uint8_t{0});
+      std::fill(row + floor.last, row + width_, uint8_t{0});
+    }
   cleaner_.clean(view(raw_), area_, mask);
 }
 

@@ -2,8 +2,10 @@
 // Which pixels of one image are floor: textures learnt in the reference area, tested everywhere (thesis Sec. 4.2.1).
 #pragma once
 #include <cstdint>
+#include <optional>
 #include <vector>
 
+#include "nodes/ground_map/confidence.hpp"
 #include "nodes/ground_map/mask_cleaner.hpp"
 #include "nodes/ground_map/texture.hpp"
 #include "rt/msg/image_view.hpp"
@@ -16,6 +18,7 @@ struct DetectorParameters {
   int memory_entries = 500;  ///< N_b: 100 s of frames
   double t_w = 0.9;          ///< weight above which a pixel is ground
   int mean_size = 5;         ///< px, odd: edge of the box average
+  DoubtParameters doubt;
 };
 
 /// For images of one size. Allocates in the constructor only; one thread at a time.
@@ -27,11 +30,14 @@ class GroundDetector {
   void analyse(ImageView<const uint8_t> image);
   /// Adds the texture of the reference area to the memory; false if no bin was full enough.
   bool learn();
-  /// 255 ground, 0 not. Before the first entry nothing is ground.
-  void classify(ImageView<uint8_t> mask);
+  /// 255 ground, 0 not. Before the first entry nothing is ground, and above the horizon of `camera` never.
+  void classify(ImageView<uint8_t> mask, const std::optional<FloorProjection>& camera = std::nullopt);
 
-  /// Adds a texture that an earlier process learnt.
-  void recall(const Descriptor& descriptor) { memory_.add(descriptor); }
+  /// How far each pixel of the image can be trusted, by what was learnt; until the next of the calls above.
+  Confidence confidence() const;
+
+  /// Adds a texture that an earlier process learnt, or another detector.
+  void recall(const Descriptor& descriptor);
 
   const ReferenceArea& area() const { return area_; }
   const TextureMemory& memory() const { return memory_; }
@@ -40,11 +46,13 @@ class GroundDetector {
 
  private:
   ImageView<uint8_t> view(std::vector<uint8_t>& plane) const { return {plane.data(), width_, height_}; }
+  ImageView<const uint8_t> view(const std::vector<uint8_t>& plane) const { return {plane.data(), width_, height_}; }
 
   int width_, height_;
   double t_m_;
   ReferenceArea area_;
   TextureMemory memory_;
+  ConfidenceTable confidence_;
   MaskCleaner cleaner_;
   std::vector<uint8_t> saturation_, value_, raw_;
 };

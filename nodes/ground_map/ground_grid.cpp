@@ -24,6 +24,7 @@ GroundGrid::GroundGrid(int image_width, const GridParameters& parameters) : p_(p
   const auto cells = static_cast<size_t>(window_.cells) * static_cast<size_t>(window_.cells);
   map_.assign(cells, kUnknown);
   observation_.assign(cells, kUnknown);
+  change_.resize(cells);
   tallies_.resize(cells);
   row_cells_.resize(static_cast<size_t>(image_width));
   column_.resize(static_cast<size_t>(image_width));
@@ -72,17 +73,17 @@ bool GroundGrid::idle(const uint8_t* mask, int first) const {
   return busy == 0;
 }
 
-void GroundGrid::count_row(const uint8_t* mask, int width) {
+void GroundGrid::count_row(const uint8_t* mask, int width, int y, const Confidence& confidence) {
   for (int x = 0; x < width;) {
     if (p_.votes == Votes::columns && x + kBlock <= width && idle(mask, x)) {
       x += kBlock;
       continue;
     }
-    for (const int end = std::min(x + kBlock, width); x < end; ++x) count(mask[x] != 0, x);
+    for (const int end = std::min(x + kBlock, width); x < end; ++x) count(mask[x] != 0, x, y, confidence);
   }
 }
 
-void GroundGrid::count(bool ground, int x) {
+void GroundGrid::count(bool ground, int x, int y, const Confidence& confidence) {
   int32_t& last = column_[static_cast<size_t>(x)];
   if (last == kEnded) return;
   const int32_t cell = row_cells_[static_cast<size_t>(x)];
@@ -91,11 +92,14 @@ void GroundGrid::count(bool ground, int x) {
   open_ -= !ground;
   if (cell == kNoCell) return;
   Tally& tally = tallies_[static_cast<size_t>(cell)];
-  tally.blocked += !ground;
   tally.free += ground && p_.votes == Votes::pixels;
+  if (ground) return;
+  ++tally.blocked;
+  tally.confidence += confidence.at(x, std::max(0, y - p_.beyond_px));
 }
 
-void GroundGrid::observe(ImageView<const uint8_t> mask, const FloorProjection& projection, const FloorPoint& robot) {
+void GroundGrid::observe(ImageView<const uint8_t> mask, const FloorProjection& projection, const FloorPoint& robot,
+                         const Confidence& confidence) {
   const FloorPoint origin = window_.origin();
   const double range = p_.range_max_m / p_.cell_m;
   const CellRow row{projection.scaled(origin, p_.cell_m).h, (robot.x_m - origin.x_m) / p_.cell_m,
@@ -105,13 +109,15 @@ void GroundGrid::observe(ImageView<const uint8_t> mask, const FloorProjection& p
   open_ = mask.width;
   for (int y = mask.height; open_ > 0 && y-- > 0 && !above_horizon(projection, y, mask.width);) {
     cells_of_row(row, y, mask.width, row_cells_.data());
-    count_row(mask.row(y), mask.width);
+    count_row(mask.row(y), mask.width, y, confidence);
   }
   for (int32_t& cell : column_) close(cell);
   for (size_t i = 0; i < tallies_.size(); ++i) {
     const Tally& t = tallies_[i];
     if (t.free + t.blocked < std::max(1, p_.votes_min)) observation_[i] = kUnknown;
     else observation_[i] = t.free >= t.blocked ? kFree : kOccupied;
+    change_[i] =
+        static_cast<int16_t>(observation_[i] == kOccupied ? p_.up * t.confidence / (kSure * t.blocked) : -p_.down);
   }
 }
 
@@ -119,8 +125,7 @@ void GroundGrid::accumulate() {
   for (size_t i = 0; i < map_.size(); ++i) {
     if (observation_[i] == kUnknown) continue;
     const int before = map_[i] == kUnknown ? kOccupied / 2 : map_[i];
-    const int after = observation_[i] == kOccupied ? before + p_.up : before - p_.down;
-    map_[i] = static_cast<int16_t>(std::clamp<int>(after, kFree, kOccupied));
+    map_[i] = static_cast<int16_t>(std::clamp<int>(before + change_[i], kFree, kOccupied));
   }
 }
 

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "nodes/ground_map/confidence.hpp"
 #include "nodes/ground_map/floor_projection.hpp"
 #include "rt/msg/image_view.hpp"
 #include "rt/msg/messages.hpp"
@@ -27,7 +28,8 @@ struct GridParameters {
   double range_max_m = 8;  ///< farther floor is not looked at
   Votes votes = Votes::columns;
   int votes_min = 5;         ///< a cell with fewer votes is not seen
-  int up = 200, down = 100;  ///< added where blocked, taken off where free; of 1000
+  int up = 200, down = 100;  ///< added where surely blocked, taken off where free; of 1000
+  int beyond_px = 2;  ///< so far above the first pixel that is not ground its confidence is read, out of the blur
 };
 
 /// A square of cells of the map frame, aligned with its axes; cell (0, 0) is cell (column, row) of the plane.
@@ -48,8 +50,10 @@ class GroundGrid {
   /// Cells of one image alone: kFree, kOccupied or kUnknown, kept until the next call. Per column of the image only the
   /// ground up to the first pixel that is none counts, and that pixel as an obstacle; nothing beyond.
   /// `robot` is the position that range_max is counted from, `projection` leads to the map frame.
-  void observe(ImageView<const uint8_t> mask, const FloorProjection& projection, const FloorPoint& robot);
-  /// Adds the observation to the map: unknown starts at 500, blocked + up, free - down, within 0..1000.
+  void observe(ImageView<const uint8_t> mask, const FloorProjection& projection, const FloorPoint& robot,
+               const Confidence& confidence = {});
+  /// Adds the observation to the map: unknown starts at 500, blocked + up times the mean confidence of its votes, free
+  /// - down, within 0..1000.
   void accumulate();
 
   /// Takes up the map that an earlier process gave: cells row by row, of the window whose first cell lies at `origin`
@@ -63,17 +67,19 @@ class GroundGrid {
  private:
   struct Tally {
     int32_t free = 0, blocked = 0;
+    int32_t confidence = 0;  ///< sum over those that are blocked, each of kSure
   };
   static constexpr int32_t kEnded = -2;
   static constexpr int kBlock = 16;
   bool idle(const uint8_t* mask, int first) const;
-  void count_row(const uint8_t* mask, int width);
-  void count(bool ground, int x);
+  void count_row(const uint8_t* mask, int width, int y, const Confidence& confidence);
+  void count(bool ground, int x, int y, const Confidence& confidence);
   void close(int32_t& cell);
 
   GridParameters p_;
   Window window_;
   std::vector<int16_t> map_, observation_;
+  std::vector<int16_t> change_;  ///< by the observation, of 1000
   std::vector<Tally> tallies_;
   std::vector<int32_t> row_cells_;  ///< per pixel of a row: its cell or kNoCell
   std::vector<int32_t> column_;     ///< per column of the image: cell of the last pixel, kNoCell, or kEnded

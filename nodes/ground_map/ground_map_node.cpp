@@ -7,6 +7,7 @@
 #include "nodes/ground_map/ground_grid.hpp"
 #include "nodes/ground_map/laser_check.hpp"
 #include "nodes/ground_map/robot_track.hpp"
+#include "nodes/ground_map/terrain_file.hpp"
 #include "nodes/mapping_3d/pose.hpp"
 #include "rt/node.hpp"
 
@@ -23,7 +24,7 @@ struct Chosen {
 
 class GroundMapNode final : public Node {
  public:
-  void setup(Setup&) override {
+  void setup(Setup& setup) override {
     const Capacity& image = pair_.capacity();
     detector_.emplace(static_cast<int>(image.width), static_cast<int>(image.height), detector_parameters());
     if (detector_->area().pixels() == 0)
@@ -33,9 +34,13 @@ class GroundMapNode final : public Node {
     ground_.resize(image.pixels());
     grid_cells_.emplace(static_cast<int>(image.width), grid_parameters());
     mask_.reserve({image.width, image.height, 1, 0});
+    confidence_.reserve(mask_.capacity());
     textures_.reserve({sizeof(Descriptor), static_cast<uint32_t>(n_b_()), 1, 0});
     const auto side = static_cast<uint32_t>(grid_cells_->window().cells);
     grid_.reserve({side, side, 1, 0});
+    if (!terrain_maps_().empty()) read_terrain_maps(setup.directory / terrain_maps_());
+    around_cells_.resize(shape_.cells());
+    around_.reserve({static_cast<uint32_t>(shape_.columns), static_cast<uint32_t>(shape_.rows), 1, 0});
     mount_ = mapping_3d::camera_mount(camera_x_, camera_y_, camera_height_, 0, camera_tilt_);
     motion_mount_ =
         mapping_3d::camera_mount(motion_camera_x_, motion_camera_y_, motion_camera_height_, 0, motion_camera_tilt_);
@@ -58,12 +63,13 @@ class GroundMapNode final : public Node {
     if (!chosen) return job.no_result();
     const StereoPair& pair = pair_[chosen->image];
     last_stamp_ns_ = pair_.stamp_ns(chosen->image);
-    const FloorProjection projection = floor_projection(pair.camera, mount_of(pair));
+    const std::optional<FloorProjection> projection = projection_of(pair);
     detector_->analyse(pair.left_view());
     if (may_learn(pair, projection)) detector_->learn();
-    detector_->classify(ground());
-    const bool mask_given = give_mask(pair);
-    const bool grid_given = !chosen->robot_in_map || give_grid(projection, *chosen->robot_in_map);
+    detector_->classify(ground(), projection);
+    const bool mask_given = give_mask(pair) && give_confidence(pair);
+    const bool grid_given =
+        !projection || !chosen->robot_in_map || give_grid(*projection, planar(*chosen->robot_in_map));
     give_textures();
     if (!mask_given || !grid_given) job.no_result();
   }
@@ -102,37 +108,84 @@ class GroundMapNode final : public Node {
       for (size_t i = 0; i < motion_.size(); ++i)
         track_.insert(motion_.stamp_ns(i), robot_pose(motion_[i].pose, camera));
     } else {
-      for (size_t i = 0; i < odometry_.size(); ++i) track_.insert(odometry_.stamp_ns(i), robot_pose(odometry_[i]));
+      for (size_t i = 0; i < odometry_.size(); ++i)
+        track_.insert(odometry_.stamp_ns(i), mapping_3d::robot_in_odometry(odometry_[i]));
     }
   }
 
   /// A frame that the camera itself calls bad, or in whose reference area something stands or could stand unseen,
   /// teaches nothing; it is classified all the same.
-  bool may_learn(const StereoPair& pair, const FloorProjection& projection) const {
+  bool may_learn(const StereoPair& pair, const std::optional<FloorProjection>& projection) const {
     constexpr uint32_t kBad = image_health::saturated | image_health::dark | image_health::blurred;
     if ((pair.health & kBad) != 0) return false;
     if (!scan_.connected()) return true;
+    if (!projection) return false;
     const auto longest_ns = static_cast<int64_t>(scan_age_ * 1e9);
     for (size_t i = scan_.size(); i-- > 0;)
       if (std::abs(scan_.stamp_ns(i) - last_stamp_ns_) <= longest_ns)
-        return area_is_free(scan_[i], projection, detector_->area());
+        return area_is_free(scan_[i], *projection, detector_->area());
     return false;
+  }
+
+  /// None where the head's angles are not known.
+  std::optional<FloorProjection> projection_of(const StereoPair& pair) const {
+    if (!head_.connected()) return floor_projection(pair.camera, mount_of(pair));
+    const auto head = head_at(last_stamp_ns_);
+    if (!head) return std::nullopt;
+    return floor_projection(pair.camera, turned_by_head(mount_of(pair), head->pan_rad, head->tilt_rad));
+  }
+
+  struct HeadAngles {
+    double pan_rad, tilt_rad;
+  };
+  /// Between two states, or by the last one if the head stood still then.
+  std::optional<HeadAngles> head_at(int64_t stamp_ns) const {
+    for (size_t i = head_.size(); i-- > 0;) {
+      const HeadState& before = head_[i];
+      const int64_t since_ns = stamp_ns - head_.stamp_ns(i);
+      if (since_ns < 0) continue;
+      if (since_ns > RobotTrack::kLongestGapNs) return std::nullopt;
+      if (since_ns == 0 || before.moving == 0) return HeadAngles{before.pan_rad, before.tilt_rad};
+      if (i + 1 == head_.size()) return std::nullopt;
+      const HeadState& after = head_[i + 1];
+      const double share =
+          static_cast<double>(since_ns) / static_cast<double>(head_.stamp_ns(i + 1) - head_.stamp_ns(i));
+      return HeadAngles{std::lerp(before.pan_rad, after.pan_rad, share),
+                        std::lerp(before.tilt_rad, after.tilt_rad, share)};
+    }
+    return std::nullopt;
   }
 
   ImageView<uint8_t> ground() { return {ground_.data(), detector_->width(), detector_->height()}; }
 
-  /// False if no memory was to be had.
-  bool give_mask(const StereoPair& pair) {
-    if (!mask_.connected()) return true;
-    Image* out = mask_.loan();
-    if (!out || !out->pixels.resize(ground_.size())) return false;
+  /// An image of the pair's size and stamp, sent once it is filled; null if no memory was to be had.
+  Image* send_like(Output<Image>& port, const StereoPair& pair) {
+    Image* out = port.loan();
+    if (!out || !out->pixels.resize(ground_.size())) return nullptr;
     out->width = pair.width;
     out->height = pair.height;
     out->channels = 1;
     out->health = pair.health;
     out->camera = pair.camera;
-    std::copy(ground_.begin(), ground_.end(), out->pixels.data());
-    mask_.send(last_stamp_ns_);
+    port.send(last_stamp_ns_);
+    return out;
+  }
+
+  /// False if no memory was to be had; so are those below.
+  bool give_mask(const StereoPair& pair) {
+    if (!mask_.connected()) return true;
+    Image* out = send_like(mask_, pair);
+    if (out) std::copy(ground_.begin(), ground_.end(), out->pixels.data());
+    return out != nullptr;
+  }
+
+  bool give_confidence(const StereoPair& pair) {
+    if (!confidence_.connected()) return true;
+    Image* out = send_like(confidence_, pair);
+    if (!out) return false;
+    const Confidence confidence = detector_->confidence();
+    for (int y = 0; y < out->height; ++y)
+      for (int x = 0; x < out->width; ++x) out->view().at(x, y) = confidence.at(x, y);
     return true;
   }
 
@@ -152,20 +205,24 @@ class GroundMapNode final : public Node {
     textures_.send(last_stamp_ns_);
   }
 
-  /// False if no memory was to be had.
-  bool give_grid(const FloorProjection& projection, const Transform& robot_in_map) {
-    if (!grid_.connected()) return true;
-    const PlanarPose robot = planar(robot_in_map);
+  bool give_grid(const FloorProjection& projection, const PlanarPose& robot) {
+    if (!grid_.connected() && !terrain_.connected()) return true;
     GroundGrid& grid = *grid_cells_;
     grid.centre({robot.x_m, robot.y_m});
     const bool knows_ground = detector_->memory().size() > 0;  // before that "not ground" means nothing
     if (knows_ground) {
-      grid.observe(ground(), projection.moved(robot), {robot.x_m, robot.y_m});
+      grid.observe(ground(), projection.moved(robot), {robot.x_m, robot.y_m}, detector_->confidence());
       grid.accumulate();
     }
+    // Without poses images cannot be laid over one another: what one image shows is all there is.
+    const auto cells = has_pose_input() || !knows_ground ? grid.map() : grid.observation();
+    return give_terrain(cells, robot) && (!grid_.connected() || give_cells(cells));
+  }
+
+  bool give_cells(ImageView<const int16_t> cells) {
     Grid* out = grid_.loan();
     if (!out) return false;
-    const Window& window = grid.window();
+    const Window& window = grid_cells_->window();
     const int half_cells = window.cells / 2;
     const double half_m = half_cells * window.cell_m;
     out->width = out->height = window.cells;
@@ -174,13 +231,52 @@ class GroundMapNode final : public Node {
     out->grid_in_map = {};
     out->grid_in_map.x = window.origin().x_m + half_m;
     out->grid_in_map.y = window.origin().y_m + half_m;
-    // Without poses images cannot be laid over one another: what one image shows is all there is.
-    const auto cells = has_pose_input() || !knows_ground ? grid.map() : grid.observation();
     const size_t count = static_cast<size_t>(window.cells) * static_cast<size_t>(window.cells);
     if (!out->cells.resize(count)) return false;
     std::copy_n(cells.data, count, out->cells.data());
     grid_.send(last_stamp_ns_);
     return true;
+  }
+
+  bool give_terrain(ImageView<const int16_t> cells, const PlanarPose& robot) {
+    cells_around(cells, grid_cells_->window(), robot, shape_, around_cells_);
+    give_around(robot);
+    if (!classifier_) return true;
+    const Terrain& answer = classifier_->step(around_cells_);
+    if (!terrain_.connected()) return true;
+    Terrain* out = terrain_.loan();
+    if (!out) return false;
+    *out = answer;
+    terrain_.send(last_stamp_ns_);
+    return true;
+  }
+
+  /// What terrain is judged by, for whoever learns from a record; not with this job if no memory is to be had.
+  void give_around(const PlanarPose& robot) {
+    Grid* out = around_.loan();
+    if (!out || !out->cells.resize(around_cells_.size())) return;
+    out->width = shape_.columns;
+    out->height = shape_.rows;
+    out->cell_m = shape_.cell_m;
+    out->origin_x_m = -shape_.left * shape_.cell_m;
+    out->origin_y_m = -shape_.behind * shape_.cell_m;
+    out->grid_in_map = {robot.x_m, robot.y_m, 0, std::cos(robot.theta_rad / 2), 0, 0, std::sin(robot.theta_rad / 2)};
+    std::copy(around_cells_.begin(), around_cells_.end(), out->cells.data());
+    around_.send(last_stamp_ns_);
+  }
+
+  void read_terrain_maps(const std::filesystem::path& file) {
+    TerrainParameters p;
+    p.centre = terrain_centre_() == 0 ? Centre::undecided : Centre::mean;
+    p.correlation_min = terrain_correlation_;
+    p.up = static_cast<int>(std::lround(terrain_up_ * 1000));
+    p.down = static_cast<int>(std::lround(terrain_down_ * 1000));
+    try {
+      classifier_.emplace(read_terrain(file).learnt(), p);
+    } catch (const TerrainError& error) {
+      throw SetupError(error.what());
+    }
+    shape_ = classifier_->shape();
   }
 
   const Transform& mount_of(const StereoPair& pair) const {
@@ -201,6 +297,8 @@ class GroundMapNode final : public Node {
     p.memory_entries = n_b_;
     p.t_w = t_w_;
     p.mean_size = mean_size_;
+    p.doubt = {bloom_, shade_deepest_, shade_faintest_, shade_saturation_,
+               static_cast<uint8_t>(std::lround(doubt_ * kSure))};
     return p;
   }
 
@@ -213,6 +311,7 @@ class GroundMapNode final : public Node {
     p.votes_min = votes_min_;
     p.up = static_cast<int>(std::lround(up_ * kOccupied));
     p.down = static_cast<int>(std::lround(down_ * kOccupied));
+    p.beyond_px = mean_size_ / 2;
     return p;
   }
 
@@ -220,10 +319,15 @@ class GroundMapNode final : public Node {
   Input<LaserScan> scan_{this, "scan", "low horizontal scan: guards what is learnt", Need::optional};
   Input<Motion> motion_{this, "motion", "camera poses around the image's stamp; depth 16", Need::optional};
   Input<Odometry> odometry_{this, "odometry", "used if motion is not connected; depth 16", Need::optional};
+  Input<HeadState> head_{this, "head", "where the camera sits on the head; depth 16", Need::optional};
   Output<Image> mask_{this, "mask", "255 ground, 0 not"};
   Output<Grid> grid_{this, "grid", "cells of the map frame around the robot"};
   Output<Image> textures_{this, "textures",
                           "texture memory, a row each, oldest first: least and most saturation, least and most value"};
+
+  Output<Image> confidence_{this, "confidence", "of each pixel's verdict, 255 sure; less: blooming or a hard shadow"};
+  Output<Terrain> terrain_{this, "terrain", "what the floor around the robot is like; needs terrain_maps"};
+  Output<Grid> around_{this, "around", "cells around the robot, heading up: what terrain is judged by"};
 
   Param<double> trapezoid_bottom_{this, "trapezoid_bottom", 0.5, {0.0, 1.0}, "1", "reference area, of the width"};
   Param<double> trapezoid_top_{this, "trapezoid_top", 0.3, {0.0, 1.0}, "1", "reference area, of the width"};
@@ -233,14 +337,28 @@ class GroundMapNode final : public Node {
   Param<int> n_b_{this, "n_b", 500, {1, 10000}, "", "frames remembered; 100 s times the rate"};
   Param<double> t_w_{this, "t_w", 0.9, {0.0, 5000.0}, "1", "sum of weights above which a pixel is ground"};
   Param<int> mean_size_{this, "mean_size", 5, {1, 31}, "px", "edge of the box average, odd"};
+  Param<int> bloom_{this, "bloom", 250, {1, 256}, "1", "value from which on a pixel may have bloomed"};
+  Param<double> shade_deepest_{this, "shade_deepest", 0.3, {0.01, 1.0}, "1", "least light that a shadow leaves"};
+  Param<double> shade_faintest_{this, "shade_faintest", 0.9, {0.01, 1.0}, "1", "most light that a shadow leaves"};
+  Param<int> shade_saturation_{
+      this, "shade_saturation", 20, {0, 255}, "1", "by how much saturation differs in a shadow"};
+  Param<double> doubt_{this, "doubt", 0.25, {0.0, 1.0}, "1", "confidence where it may be blooming or a shadow"};
   Param<double> cell_{this, "cell", 0.30, {0.05, 1.0}, "m", "edge of a cell"};
   Param<double> window_{this, "window", 18.0, {1.0, 100.0}, "m", "side of the grid around the robot"};
   Param<double> range_max_{this, "range_max", 8.0, {0.5, 50.0}, "m", "farther floor is not looked at"};
   Choice votes_{this, "votes", "columns", {"columns", "pixels"}, "what votes for a cell: image columns or pixels"};
   Param<int> votes_min_{this, "votes_min", 5, {1, 100000}, "", "a cell with fewer votes in an image is not seen"};
-  Param<double> up_{this, "up", 0.2, {0.0, 1.0}, "1", "added to a cell that an image shows blocked"};
+  Param<double> up_{this, "up", 0.2, {0.0, 1.0}, "1", "added to a cell that an image surely shows blocked"};
   Param<double> down_{this, "down", 0.1, {0.0, 1.0}, "1", "taken off a cell that an image shows free"};
   Param<double> scan_age_{this, "scan_age", 0.2, {0.0, 10.0}, "s", "between image and scan; none: nothing is learnt"};
+  Param<std::string> terrain_maps_{this, "terrain_maps", "", kPath,
+                                   "file with maps of each kind (takt terrain learn); empty: no terrain"};
+  Choice terrain_centre_{
+      this, "terrain_centre", "undecided", {"undecided", "mean"}, "from where cells are counted in a correlation"};
+  Param<double> terrain_correlation_{
+      this, "terrain_correlation", 0.5, {-1.0, 1.0}, "1", "above it the best kind is believed"};
+  Param<double> terrain_up_{this, "terrain_up", 0.2, {0.0, 1.0}, "1", "added to the hypothesis believed"};
+  Param<double> terrain_down_{this, "terrain_down", 0.1, {0.0, 1.0}, "1", "taken off the others"};
   Param<double> camera_x_{this, "camera_x", 0.0, {-5.0, 5.0}, "m", "camera to the right, where the pair does not say"};
   Param<double> camera_y_{this, "camera_y", 0.0, {-5.0, 5.0}, "m", "camera ahead, where the pair does not say"};
   Param<double> camera_height_{
@@ -257,6 +375,9 @@ class GroundMapNode final : public Node {
   std::optional<GroundDetector> detector_;
   std::vector<uint8_t> ground_;  ///< mask of the present image
   std::optional<GroundGrid> grid_cells_;
+  std::optional<TerrainClassifier> classifier_;
+  TerrainShape shape_;
+  std::vector<int16_t> around_cells_;
   Transform mount_, motion_mount_;
   RobotTrack track_{InputPort::kMaxDepth};
   int64_t last_stamp_ns_ = INT64_MIN;
@@ -265,7 +386,8 @@ class GroundMapNode final : public Node {
 }  // namespace
 
 void register_ground_map(NodeTypes& types) {
-  types.add<GroundMapNode>("ground_map", Layer::perception, "Ground mask and 2-D occupancy grid from one camera");
+  types.add<GroundMapNode>("ground_map", Layer::perception,
+                           "Ground mask, 2-D occupancy grid and terrain from one camera");
 }
 
 }  // namespace takt

@@ -11,9 +11,9 @@
 namespace takt::ground_map {
 namespace {
 
-constexpr double kGrass = -1.6, kKerb = 1.4, kRoad = 1.55, kRoadDepth = -0.12;  // borders along x, m
-constexpr double kSun[3] = {-0.55, 0.35, 0.75};                                 // towards the sun
-constexpr double kShade = 0.62;                                                 // light that a shadow leaves
+constexpr double kKerbWidth = 0.15, kRoadDepth = -0.12;  // m
+constexpr double kSun[3] = {-0.55, 0.35, 0.75};          // towards the sun
+constexpr double kShade = 0.62, kHardShade = 0.45;       // light that a shadow leaves
 
 /// Whitened bits of a counter (the finaliser of SplitMix64, Steele, Lea, Flood 2014).
 uint64_t bits(uint64_t x) {
@@ -50,6 +50,27 @@ double brick_tone(uint64_t seed, double x, double y, double distance) {
          (joint ? 0.35 * visible(distance, 0.008) : 0.05);
 }
 
+/// Slabs of half a metre, each with its own tone, dark joints.
+double slab_tone(uint64_t seed, double x, double y, double distance) {
+  const double column = std::floor(x / 0.5), row = std::floor(y / 0.5);
+  const bool joint = x - column * 0.5 < 0.01 || y - row * 0.5 < 0.01;
+  return 1 + 0.05 * random(seed, static_cast<int64_t>(column), static_cast<int64_t>(row)) +
+         0.05 * smooth_noise(seed + 1, x, y, 0.2) - (joint ? 0.3 * visible(distance, 0.01) : 0.0);
+}
+
+/// Whether the shadow of a trunk lies there: a slanting band, one every 2.6 m of the way.
+bool in_hard_shadow(uint64_t seed, double x, double y) {
+  const double along = (y + 0.4 * x) / 2.6, band = std::floor(along);
+  const double width = 0.27 + 0.1 * random(seed, static_cast<int64_t>(band));
+  return along - band < width;
+}
+
+/// Light that the sun's reflection adds: of 255, nothing far from it.
+double glare_at(double x_share, double y_share, int frame) {
+  const double dx = x_share - 0.5 - 0.25 * std::sin(0.15 * frame), dy = (y_share - 0.62) * 0.75;
+  return 900 * std::exp(-(dx * dx + dy * dy) / (2 * 0.045 * 0.045));
+}
+
 /// What lens and sensor make of it: a blur of 1 2 1 along both axes, and noise of about 4 grey levels (a triangle).
 void expose(ImageView<const float> sharp, uint64_t seed, ImageView<uint8_t> bgr) {
   for (int y = 0; y < bgr.height; ++y)
@@ -82,7 +103,7 @@ void PavementScene::add_obstacles() {
   constexpr Colour3 kColours[] = {{150, 90, 50}, {60, 190, 210}, {140, 140, 135}, {70, 100, 150}, {200, 205, 205}};
   const double end = options_.frames * options_.frame_step_m + 25;
   int64_t n = 0;
-  for (double y = 2.6; y < end; y += 2.2 + 1.2 * (1 + random(options_.seed, n, 1)), ++n) {
+  for (double y = 2.6; y < end; y += options_.obstacles_from_m + 1.2 * (1 + random(options_.seed, n, 1)), ++n) {
     const double side = random(options_.seed, n, 2) < 0 ? -1 : 1;
     const double half_x = 0.13 + 0.08 * (1 + random(options_.seed, n, 3)), half_y = half_x * 1.2;
     const double x = side * (0.75 + 0.2 * (1 + random(options_.seed, n, 4)));
@@ -95,11 +116,25 @@ void PavementScene::add_obstacles() {
 
 PlanarPose PavementScene::robot_in_map(int frame) const {
   const double y = frame * options_.frame_step_m, phase = y / 2.5;
-  return {0.12 * std::sin(phase), y, -0.12 / 2.5 * std::cos(phase)};
+  return {0.12 * std::sin(phase), y, part_at(y).turned_rad - 0.12 / 2.5 * std::cos(phase)};
+}
+
+const PavementPart& PavementScene::part_at(double y_m) const {
+  auto part = options_.parts.end() - 1;
+  while (part != options_.parts.begin() && y_m < part->from_y_m) --part;
+  return *part;
+}
+
+std::optional<size_t> PavementScene::part_seen(int frame) const {
+  const double y = frame * options_.frame_step_m;
+  const PavementPart &near = part_at(y - 0.5), &far = part_at(y + 4.5);
+  if (&near != &far) return std::nullopt;
+  return static_cast<size_t>(&near - options_.parts.data());
 }
 
 bool PavementScene::drivable(const FloorPoint& p) const {
-  if (p.x_m < kGrass || p.x_m >= kKerb) return false;
+  const PavementPart& part = part_at(p.y_m);
+  if (p.x_m < part.left_m || p.x_m >= part.right_m) return false;
   return std::none_of(boxes_.begin(), boxes_.end(),
                       [&](const Box& b) { return p.x_m >= b.x0 && p.x_m < b.x1 && p.y_m >= b.y0 && p.y_m < b.y1; });
 }
@@ -131,9 +166,9 @@ bool PavementScene::in_shadow(double x, double y, double z, const std::vector<co
 }
 
 PavementScene::Hit PavementScene::ground(double x, double y, double z, double distance) const {
-  const auto shade = [](const Colour3& c, double k) { return Colour3{c.b * k, c.g * k, c.r * k}; };
   const uint64_t seed = options_.seed * 1000;
-  if (x < kGrass) {  // with patches of dry earth, nearly of the colour of the bricks
+  const PavementPart& part = part_at(y);
+  if (x < part.left_m) {  // with patches of dry earth, nearly of the colour of the bricks
     const double tone =
         1 + 0.25 * smooth_noise(seed + 5, x, y, 0.25) +
         0.35 * random(seed + 6, static_cast<int64_t>(x * 60), static_cast<int64_t>(y * 60)) * visible(distance, 0.02);
@@ -144,11 +179,26 @@ PavementScene::Hit PavementScene::ground(double x, double y, double z, double di
   if (z < -1e-6)
     return {shade({72, 70, 68}, 1 + dirt + 0.12 * smooth_noise(seed + 7, x, y, 0.03) * visible(distance, 0.03)),
             Truth::other};
-  if (x >= kKerb) return {shade({148, 157, 166}, 1 + dirt), Truth::other};
+  if (x >= part.right_m) return {shade({148, 157, 166}, 1 + dirt), Truth::other};
+  return pavement(part, x, y, distance);
+}
+
+PavementScene::Hit PavementScene::pavement(const PavementPart& part, double x, double y, double distance) const {
+  const uint64_t seed = options_.seed * 1000;
+  const double dirt = 0.15 * smooth_noise(seed + 8, x, y, 0.3);
   const auto i = static_cast<int64_t>(std::floor(x / 0.05)), j = static_cast<int64_t>(std::floor(y / 0.05));
   if (random(seed + 12, i, j) > 0.985) return {shade({35, 95, 160}, 1 + 4 * dirt), Truth::ground};  // a leaf
   const double tint = 0.05 * smooth_noise(seed + 13, x, y, 0.15);
-  return {shade({92 * (1 - tint), 112, 142 * (1 + tint)}, brick_tone(seed + 9, x, y, distance)), Truth::ground};
+  switch (part.surface) {
+    case Surface::bricks:
+      return {shade({92 * (1 - tint), 112, 142 * (1 + tint)}, brick_tone(seed + 9, x, y, distance)), Truth::ground};
+    case Surface::red_bricks:
+      return {shade({70 * (1 - tint), 80, 150 * (1 + tint)}, brick_tone(seed + 9, x, y, distance)), Truth::ground};
+    case Surface::slabs: return {shade({150, 158, 162}, slab_tone(seed + 9, x, y, distance)), Truth::ground};
+    case Surface::asphalt: break;
+  }
+  return {shade({92, 90, 88}, 1 + dirt / 2 + 0.1 * smooth_noise(seed + 9, x, y, 0.03) * visible(distance, 0.03)),
+          Truth::ground};
 }
 
 PavementScene::Hit PavementScene::trace(const Ray& ray, const std::vector<const Box*>& near) const {
@@ -156,7 +206,8 @@ PavementScene::Hit PavementScene::trace(const Ray& ray, const std::vector<const 
   double z = 0;
   if (ray.dz < 0) {
     distance = -ray.oz / ray.dz;
-    if (ray.ox + distance * ray.dx >= kRoad) z = kRoadDepth, distance = (kRoadDepth - ray.oz) / ray.dz;
+    if (ray.ox + distance * ray.dx >= part_at(ray.oy + distance * ray.dy).right_m + kKerbWidth)
+      z = kRoadDepth, distance = (kRoadDepth - ray.oz) / ray.dz;
   }
   const Box* box = nullptr;
   int face = 0;
@@ -173,19 +224,22 @@ PavementScene::Hit PavementScene::trace(const Ray& ray, const std::vector<const 
   }
   if (!(distance < 60)) return {{225, 205, 190}, Truth::other};  // sky, or so far that it looks like it
   Hit hit = ground(x, y, z, distance);
-  if (in_shadow(x, y, z, near)) hit.colour = {hit.colour.b * kShade, hit.colour.g * kShade, hit.colour.r * kShade};
+  if (in_shadow(x, y, z, near)) hit.colour = shade(hit.colour, kShade);
+  else if (options_.hard_shadows && in_hard_shadow(options_.seed * 1000 + 14, x, y))
+    hit.colour = shade(hit.colour, kHardShade);
   return hit;
 }
 
 void PavementScene::render(int frame, ImageView<uint8_t> bgr, ImageView<uint8_t> truth) const {
   const PlanarPose robot = robot_in_map(frame);
   const mapping_3d::Affine a = mapping_3d::to_affine(camera_in_robot_);
-  const double c = std::cos(robot.yaw_rad), s = std::sin(robot.yaw_rad);
-  const FloorPoint eye = robot.apply({a.t[0], a.t[1]});
+  const double c = std::cos(robot.theta_rad), s = std::sin(robot.theta_rad);
+  const FloorPoint eye = transformed(robot, {a.t[0], a.t[1]});
   std::vector<const Box*> near;
   for (const Box& box : boxes_)
     if (box.y1 > eye.y_m - 3 && box.y0 < eye.y_m + 20) near.push_back(&box);
-  const double clouds = 0.93 + 0.17 * std::sin(0.11 * frame + static_cast<double>(options_.seed));  // light changes
+  const double clouds = options_.brightness * (1 + options_.flicker * random(options_.seed, frame, 15)) *
+                        (0.93 + 0.17 * std::sin(0.11 * frame + static_cast<double>(options_.seed)));
   const double warm = 1 + 0.04 * std::sin(0.07 * frame);
   std::vector<float> colours(static_cast<size_t>(bgr.width) * static_cast<size_t>(bgr.height) * 3);
   const ImageView<float> sharp(colours.data(), bgr.width, bgr.height, 3);
@@ -196,9 +250,10 @@ void PavementScene::render(int frame, ImageView<uint8_t> bgr, ImageView<uint8_t>
       const Hit hit =
           trace({eye.x_m, eye.y_m, a.t[2], c * rx - s * ry, s * rx + c * ry, a.r[6] * u + a.r[7] * v + a.r[8]}, near);
       truth.at(x, y) = static_cast<uint8_t>(hit.truth);
-      sharp.at(x, y, 0) = static_cast<float>(hit.colour.b / warm * clouds);
-      sharp.at(x, y, 1) = static_cast<float>(hit.colour.g * clouds);
-      sharp.at(x, y, 2) = static_cast<float>(hit.colour.r * warm * clouds);
+      const double white = options_.glare ? glare_at((x + 0.5) / bgr.width, (y + 0.5) / bgr.height, frame) : 0;
+      sharp.at(x, y, 0) = static_cast<float>(hit.colour.b / warm * clouds + white);
+      sharp.at(x, y, 1) = static_cast<float>(hit.colour.g * clouds + white);
+      sharp.at(x, y, 2) = static_cast<float>(hit.colour.r * warm * clouds + white);
     }
   expose(sharp, bits(options_.seed * 7919 + static_cast<uint64_t>(frame)), bgr);
 }

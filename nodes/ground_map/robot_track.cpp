@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "nodes/ground_map/robot_track.hpp"
 
-#include <cmath>
-#include <numbers>
-
 namespace takt::ground_map {
 
 void RobotTrack::insert(int64_t stamp_ns, const Transform& robot_in_map) {
@@ -25,11 +22,6 @@ std::optional<Transform> RobotTrack::predicted(int64_t stamp_ns) const {
   if (step <= 0 || step > kLongestGapNs || ahead < 0 || ahead > kLongestGapNs) return std::nullopt;
   const double fraction = 1 + static_cast<double>(ahead) / static_cast<double>(step);
   return interpolate(before_.pose, last_.pose, fraction).transform;
-}
-
-Transform robot_pose(const Odometry& odometry) {
-  const double half = (odometry.theta_rad - std::numbers::pi / 2) / 2;
-  return {odometry.x_m, odometry.y_m, 0, std::cos(half), 0, 0, std::sin(half)};
 }
 
 Transform robot_pose(const Transform& camera_in_first, const Transform& camera_in_robot) {

@@ -26,10 +26,6 @@ class RobotTrack {
   StampedPose last_{INT64_MIN, {}}, before_{INT64_MIN, {}};
 };
 
-/// The robot's pose by odometry (algorithm reference 21.9): theta is the driving direction from the map's x axis, and
-/// the robot drives along its own y axis, so its x axis points to theta - 90 degrees.
-Transform robot_pose(const Odometry& odometry);
-
 /// The robot's pose from that of a camera that sits on it: both relative to where they were in the first image
 /// (erratum E-25). The map frame is the robot frame of the first image.
 Transform robot_pose(const Transform& camera_in_first, const Transform& camera_in_robot);

@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "nodes/ground_map/floor_projection.hpp"
 #include "rt/msg/image_view.hpp"
 
 namespace takt::ground_map {
@@ -17,11 +18,6 @@ struct TrapezoidShares {
   double bottom = 0.5, top = 0.3;  ///< of the width
   double height = 0.2;             ///< of the height
   double skip = 0.02;              ///< of the height: lowest rows left out
-};
-
-/// Pixels first .. last - 1 of row y.
-struct RowSpan {
-  int y, first, last;
 };
 
 /// The pixels of the trapezoid. Allocates in the constructor only.

@@ -61,6 +61,7 @@ FIELDS(DigitalState, F(DigitalState, levels, ""), F(DigitalState, changed, ""))
 FIELDS(StopCommand, F(StopCommand, reasons, ""), F(StopCommand, nearest_m, "m"), F(StopCommand, scan_age_s, "s"))
 FIELDS(Requests, F(Requests, wanted, ""))
 FIELDS(TextStatus, F(TextStatus, text, ""))
+FIELDS(Terrain, F(Terrain, kind, ""), F(Terrain, hypotheses, "1"), F(Terrain, correlations, "1"))
 
 #undef F
 #undef FIELDS
@@ -68,14 +69,14 @@ FIELDS(TextStatus, F(TextStatus, text, ""))
 #undef CAMERA_FIELDS
 
 std::span<const MessageType* const> message_types() {
-  static const std::array<const MessageType*, 19> types{
+  static const std::array<const MessageType*, 20> types{
       &MessageType::of<Image>(),        &MessageType::of<StereoPair>(),  &MessageType::of<DisparityMap>(),
       &MessageType::of<PointCloud>(),   &MessageType::of<LaserScan>(),   &MessageType::of<Odometry>(),
       &MessageType::of<Pose>(),         &MessageType::of<Motion>(),      &MessageType::of<Detections>(),
       &MessageType::of<Objects3d>(),    &MessageType::of<BodyPoses>(),   &MessageType::of<Grid>(),
       &MessageType::of<HeadState>(),    &MessageType::of<HeadCommand>(), &MessageType::of<VelocityCommand>(),
       &MessageType::of<DigitalState>(), &MessageType::of<StopCommand>(), &MessageType::of<Requests>(),
-      &MessageType::of<TextStatus>()};
+      &MessageType::of<TextStatus>(),   &MessageType::of<Terrain>()};
   return types;
 }
 

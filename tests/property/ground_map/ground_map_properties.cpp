@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "nodes/ground_map/cell_kernel.hpp"
+#include "nodes/ground_map/confidence.hpp"
 #include "nodes/ground_map/ground_grid.hpp"
 #include "nodes/ground_map/mask_cleaner.hpp"
 #include "nodes/ground_map/saturation_value.hpp"
@@ -154,6 +155,59 @@ TEST_CASE("the cleaned mask equals window means and growth until nothing changes
   }
 }
 
+TEST_CASE("doubtful is what is flooded, or ground in another light: equal to a search of every value and saturation") {
+  Random random(6);
+  for (int round = 0; round < 6; ++round) {
+    DoubtParameters p;
+    p.bloom_value = random.pick(200, 256);
+    p.shade_deepest = random.uniform(0.1, 0.6);
+    p.shade_faintest = random.uniform(p.shade_deepest, 1.0);
+    p.shade_saturation = random.pick(0, 40);
+    std::vector<uint8_t> ground(256 * 256);
+    for (int n = random.pick(0, 3); n > 0; --n) {
+      const int s0 = random.pick(0, 240), v0 = random.pick(0, 240), side = random.pick(1, 15);
+      for (int v = v0; v < v0 + side; ++v) std::fill_n(&ground[static_cast<size_t>(256 * v + s0)], side, uint8_t{1});
+    }
+    ConfidenceTable table(p);
+    table.rebuild(ground.data());
+    const auto other_light = [&](int v, int s) {
+      for (int w = 0; w < 256; ++w) {
+        const bool darker = w * p.shade_deepest <= v && v <= w * p.shade_faintest,
+                   lighter = v * p.shade_deepest <= w && w <= v * p.shade_faintest;
+        if (!darker && !lighter) continue;
+        for (int t = std::max(0, s - p.shade_saturation); t <= std::min(255, s + p.shade_saturation); ++t)
+          if (ground[static_cast<size_t>(256 * w + t)]) return true;
+      }
+      return false;
+    };
+    int differences = 0;
+    for (int i = 0; i < 4000; ++i) {
+      const int v = random.pick(0, 255), s = random.pick(0, 255);
+      const auto at = static_cast<size_t>(256 * v + s);
+      const bool doubtful = v >= p.bloom_value || (!ground[at] && other_light(v, s));
+      differences += table.table()[at] != (doubtful ? p.doubtful : kSure);
+    }
+    CHECK(differences == 0);
+  }
+}
+
+TEST_CASE("the part of a row that sees the floor is that of its pixels, for any pose of the camera") {
+  Random random(7);
+  for (int round = 0; round < 400; ++round) {
+    const int width = random.pick(1, 120);
+    const Eigen::Quaterniond q(Eigen::AngleAxisd(random.uniform(-3, 3), Eigen::Vector3d::UnitZ()) *
+                               Eigen::AngleAxisd(random.uniform(-2.4, -1.0), Eigen::Vector3d::UnitX()) *
+                               Eigen::AngleAxisd(random.uniform(-3, 3), Eigen::Vector3d::UnitZ()));
+    const FloorProjection projection =
+        floor_projection({random.uniform(20, 90), width / 2.0, 40, 0}, {0, 0, 1.2, q.w(), q.x(), q.y(), q.z()});
+    for (int y = 0; y < 80; ++y) {
+      const RowSpan floor = projection.floor_of_row(y, width);
+      for (int x = 0; x < width; ++x)
+        REQUIRE(projection.floor_at(x, y).has_value() == (x >= floor.first && x < floor.last));
+    }
+  }
+}
+
 TEST_CASE("the floor of a pixel is where its ray meets the plane, for any pose of the camera") {
   Random random(3);
   for (int round = 0; round < 300; ++round) {
@@ -188,14 +242,23 @@ namespace {
 
 using Cells = std::map<std::pair<int64_t, int64_t>, int>;
 
-/// Observation of one image the slow way, column by column, in cells of the whole plane.
-Cells observe_reference(ImageView<const uint8_t> mask, const FloorProjection& projection, const FloorPoint& robot,
-                        const GridParameters& p) {
-  std::map<std::pair<int64_t, int64_t>, std::pair<int, int>> tallies;  // free, blocked
+struct Tallied {
+  int free = 0, blocked = 0, confidence = 0;
+};
+
+/// Cells of the whole plane: what one image shows them to be, and by how much it changes them.
+struct Observed {
+  Cells cells, changes;
+};
+
+/// Observation of one image the slow way, column by column.
+Observed observe_reference(ImageView<const uint8_t> mask, const FloorProjection& projection, const FloorPoint& robot,
+                           const GridParameters& p, const Confidence& confidence) {
+  std::map<std::pair<int64_t, int64_t>, Tallied> tallies;
   for (int x = 0; x < mask.width; ++x) {
     std::vector<std::pair<int64_t, int64_t>> passed;
     const auto leave = [&] {
-      if (!passed.empty() && p.votes == Votes::columns) ++tallies[passed.back()].first;
+      if (!passed.empty() && p.votes == Votes::columns) ++tallies[passed.back()].free;
     };
     for (int y = mask.height - 1; y >= 0; --y) {
       const auto floor = projection.floor_at(x, y);
@@ -206,21 +269,26 @@ Cells observe_reference(ImageView<const uint8_t> mask, const FloorProjection& pr
       const bool same = seen && !passed.empty() && passed.back() == cell;
       if (!same) leave(), passed.clear();
       if (!mask.at(x, y)) {
-        if (seen) ++tallies[cell].second;
+        if (seen) ++tallies[cell].blocked, tallies[cell].confidence += confidence.at(x, std::max(0, y - p.beyond_px));
         passed.clear();
         break;
       }
       if (seen) {
         passed.assign(1, cell);
-        if (p.votes == Votes::pixels) ++tallies[cell].first;
+        if (p.votes == Votes::pixels) ++tallies[cell].free;
       }
     }
     leave();
   }
-  Cells cells;
-  for (const auto& [cell, tally] : tallies)
-    if (tally.first + tally.second >= p.votes_min) cells[cell] = tally.first >= tally.second ? kFree : kOccupied;
-  return cells;
+  Observed out;
+  for (const auto& [cell, votes] : tallies) {
+    if (votes.free + votes.blocked < p.votes_min) continue;
+    const bool free = votes.free >= votes.blocked;
+    out.cells[cell] = free ? kFree : kOccupied;
+    out.changes[cell] =
+        free ? -p.down : static_cast<int>(std::floor(p.up * (votes.confidence / 255.0) / votes.blocked + 1e-9));
+  }
+  return out;
 }
 
 bool in_window(const Window& w, const std::pair<int64_t, int64_t>& cell) {
@@ -250,6 +318,9 @@ TEST_CASE("a drive: every observation, and the map it adds up to, equal a map of
     p.range_max_m = random.uniform(2, 9);
     p.votes = drive % 2 == 0 ? Votes::columns : Votes::pixels;
     p.votes_min = random.pick(1, 6);
+    p.beyond_px = random.pick(0, 4);
+    std::vector<uint8_t> table(256 * 256);
+    for (auto& c : table) c = static_cast<uint8_t>(random.pick(0, 255));
     GroundGrid grid(w, p);
     const CameraModel camera{40, 39.5, 29.5, 0};
     const FloorProjection in_robot =
@@ -260,23 +331,30 @@ TEST_CASE("a drive: every observation, and the map it adds up to, equal a map of
     for (int frame = 0; frame < 25; ++frame) {
       robot.x_m += random.uniform(-0.6, 0.6);
       robot.y_m += random.uniform(-0.6, 0.6);
-      robot.yaw_rad += random.uniform(-0.4, 0.4);
+      robot.theta_rad += random.uniform(-0.4, 0.4);
       std::vector<uint8_t> mask = blotches(random, w, h);
       for (int i = 30 * w; i < h * w; ++i)
         if (random.pick(0, 30) != 0) mask[static_cast<size_t>(i)] |= 1;  // mostly free below
       const ImageView<const uint8_t> view(mask.data(), w, h);
       grid.centre({robot.x_m, robot.y_m});
       const FloorProjection in_map = in_robot.moved(robot);
-      grid.observe(view, in_map, {robot.x_m, robot.y_m});
+      std::vector<uint8_t> saturation(mask.size()), value(mask.size());
+      for (size_t i = 0; i < mask.size(); ++i) {
+        saturation[i] = static_cast<uint8_t>(random.pick(0, 255));
+        value[i] = static_cast<uint8_t>(random.pick(0, 255));
+      }
+      const Confidence confidence{
+          drive % 3 == 0 ? nullptr : table.data(), {saturation.data(), w, h}, {value.data(), w, h}};
+      grid.observe(view, in_map, {robot.x_m, robot.y_m}, confidence);
       grid.accumulate();
 
-      const Cells seen = observe_reference(view, in_map, {robot.x_m, robot.y_m}, p);
-      REQUIRE(differences(grid.window(), grid.observation(), seen) == 0);
-      for (const auto& [cell, value] : seen) {
+      const Observed seen = observe_reference(view, in_map, {robot.x_m, robot.y_m}, p, confidence);
+      REQUIRE(differences(grid.window(), grid.observation(), seen.cells) == 0);
+      for (const auto& [cell, change] : seen.changes) {
         if (!in_window(grid.window(), cell)) continue;
         const auto found = map.find(cell);
         const int before = found == map.end() ? 500 : found->second;
-        map[cell] = std::clamp(value == kOccupied ? before + p.up : before - p.down, 0, 1000);
+        map[cell] = std::clamp(before + change, 0, 1000);
       }
       for (auto it = map.begin(); it != map.end();)
         it = in_window(grid.window(), it->first) ? std::next(it) : map.erase(it);

@@ -17,7 +17,8 @@ namespace {
 constexpr double kCellM = 0.30, kRangeM = 8;  // defaults of ground_map
 
 struct Seen {
-  std::set<int64_t> stamps;  ///< of the images that were mapped
+  std::set<int64_t> stamps;    ///< of the images that were mapped
+  std::set<int64_t> terrains;  ///< of those whose terrain was judged
   int32_t width = 0, height = 0;
   double cell_m = 0, corner_x_m = 0, corner_y_m = 0;  ///< of the last grid, in the map frame
   std::vector<int16_t> cells;
@@ -28,6 +29,8 @@ class GridProbe final : public Node {
  public:
   void setup(Setup&) override {}
   void run(Job&) override {
+    if (const Terrain* terrain = terrain_.newest(); terrain && terrain->kind <= terrain_kind::unknown)
+      seen.terrains.insert(terrain_.stamp_ns());
     const Grid* grid = grid_.newest();
     if (!grid || !grid_.is_new()) return;
     seen.stamps.insert(grid_.stamp_ns());
@@ -40,6 +43,7 @@ class GridProbe final : public Node {
 
  private:
   Input<Grid> grid_{this, "grid", ""};
+  Input<Terrain> terrain_{this, "terrain", ""};
 };
 
 // The window is large enough to keep the whole lab.
@@ -61,8 +65,8 @@ subsystems:
         pair: {from: ground_camera.pair, depth: 4}
         scan: {from: front_laser.scan, depth: 4}
         odometry: {from: base.odometry, depth: 16}
-      params: {window: 36m}
-    probe: {type: probe, in: {grid: ground_map.grid}}
+      params: {window: 36m, terrain_maps: @/terrain.txt}
+    probe: {type: probe, in: {grid: ground_map.grid, terrain: ground_map.terrain}}
 )";
 constexpr const char* kScheduleText = R"(takt: 1
 name: ground_truth
@@ -176,6 +180,7 @@ TEST_CASE("the ground map of a drive through the lab agrees with the world") {
   const StereoRig rig = test::rig_of("ground_camera", "x2_wide.yaml");
   REQUIRE(seen.stamps.size() > 145);
   REQUIRE(seen.cell_m == doctest::Approx(kCellM));
+  CHECK(seen.terrains == seen.stamps);
 
   std::map<Cell, Sight> sights;
   for (const int64_t stamp_ns : seen.stamps)

@@ -61,14 +61,27 @@ TEST_CASE("yaw is that of Rz Rx Ry; a moved projection gives points of the map")
   const FloorProjection in_robot = floor_projection(kWide, mount);
   const PlanarPose pose{2, -3, 0.7};
   const auto here = in_robot.floor_at(300, 400), there = in_robot.moved(pose).floor_at(300, 400);
-  const FloorPoint expected = pose.apply(*here);
+  const FloorPoint expected = transformed(pose, *here);
   CHECK(there->x_m == doctest::Approx(expected.x_m));
   CHECK(there->y_m == doctest::Approx(expected.y_m));
-  CHECK(planar({1, 2, 3, std::cos(0.35), 0, 0, std::sin(0.35)}).yaw_rad == doctest::Approx(0.7));
+  CHECK(planar({1, 2, 3, std::cos(0.35), 0, 0, std::sin(0.35)}).theta_rad == doctest::Approx(0.7));
   // Rz(0.7) Rx(0.2): a pitching robot still heads to 0.7.
   const UncertainPose turn{{0, 0, 0, std::cos(0.35), 0, 0, std::sin(0.35)}, {}},
       pitch{{0, 0, 0, std::cos(0.1), std::sin(0.1), 0, 0}, {}};
-  CHECK(planar(compose(turn, pitch).transform).yaw_rad == doctest::Approx(0.7));
+  CHECK(planar(compose(turn, pitch).transform).theta_rad == doctest::Approx(0.7));
+}
+
+TEST_CASE("the head's pan and tilt add to those of the camera at rest") {
+  for (const double pan : {-0.8, 0.0, 0.5})
+    for (const double tilt : {-0.4, 0.0, 0.2}) {
+      const Transform turned = turned_by_head(mapping_3d::camera_mount(0.1, 0.2, 1.4, 0.3, -0.3), pan, tilt);
+      const Transform expected = mapping_3d::camera_mount(0.1, 0.2, 1.4, 0.3 + pan, -0.3 + tilt);
+      const double same =
+          turned.qw * expected.qw + turned.qx * expected.qx + turned.qy * expected.qy + turned.qz * expected.qz;
+      CHECK(std::abs(same) == doctest::Approx(1).epsilon(1e-12));
+      CHECK(turned.x == 0.1);
+      CHECK(turned.z == 1.4);
+    }
 }
 
 TEST_CASE("a laser return above the reference area means that something stands there") {
@@ -109,11 +122,11 @@ TEST_CASE("odometry drives along the robot's y axis (21.9)") {
   odometry.x_m = 3;
   odometry.y_m = 4;
   odometry.theta_rad = 0.5;
-  const PlanarPose pose = planar(robot_pose(odometry));
-  const FloorPoint ahead = pose.apply({0, 1});
+  const PlanarPose pose = planar(mapping_3d::robot_in_odometry(odometry));
+  const FloorPoint ahead = transformed(pose, {0, 1});
   CHECK(ahead.x_m - 3 == doctest::Approx(std::cos(0.5)));
   CHECK(ahead.y_m - 4 == doctest::Approx(std::sin(0.5)));
-  const FloorPoint right = pose.apply({1, 0});
+  const FloorPoint right = transformed(pose, {1, 0});
   CHECK(std::atan2(right.y_m - 4, right.x_m - 3) == doctest::Approx(0.5 - std::numbers::pi / 2));
 }
 

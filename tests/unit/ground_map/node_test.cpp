@@ -3,12 +3,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <numbers>
 
 #include "nodes/ground_map/floor_projection.hpp"
+#include "nodes/ground_map/terrain_file.hpp"
 #include "nodes/mapping_3d/pose.hpp"
 #include "rt/memory/memory_use.hpp"
 #include "rt/transform/pose_math.hpp"
+#include "tests/temporary_folder.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 
 namespace takt {
@@ -172,6 +175,80 @@ TEST_CASE("ground_map: with a laser it learns only where a scan of the same time
   CHECK_FALSE(learnt(0, 0, false));   // a silent scanner
 }
 
+TEST_CASE("ground_map: the camera looks where the head turned it; where that is not known only the mask is given") {
+  Bench bench({"head"});
+  FloorPair pair(3.1);
+  const Transform looking_left = ground_map::turned_by_head(pair->sensor_in_robot, 0.5, 0);
+  const auto at = ground_map::floor_projection(pair->camera, looking_left).floor_at(160, 120);
+  REQUIRE(at.has_value());
+  test::Box<HeadState> rest, turned;
+  turned->pan_rad = 1;
+  rest->moving = turned->moving = 1;
+  test::latch(bench.port("pair"), pair, 100 * kMs, 1);
+  CHECK(bench.run());
+  CHECK(bench.mask->sent());
+  CHECK_FALSE(bench.grid->sent());  // the head has not said anything
+  test::latch(bench.port("head"), rest, 100 * kMs, 1, 0);
+  test::latch(bench.port("pair"), pair, 150 * kMs, 2);
+  CHECK(bench.run());
+  CHECK_FALSE(bench.grid->sent());  // it was moving, and it is not known where to
+  test::latch(bench.port("head"), turned, 200 * kMs, 2, 1);
+  test::latch(bench.port("pair"), pair, 151 * kMs, 3);
+  CHECK(bench.run());
+  REQUIRE(bench.grid->sent());
+  // About half way, 0.51 rad to the left, so what the middle of the image shows lies there.
+  CHECK(at->x_m < -0.5);
+  CHECK(bench.cell(at->x_m * 0.8, at->y_m * 0.8) == 0);
+  CHECK(bench.cell(-at->x_m * 1.2, at->y_m * 1.2) == Grid::unknown);
+  turned->moving = 0;
+  test::latch(bench.port("pair"), pair, 400 * kMs, 4);  // it stands since 200 ms
+  CHECK(bench.run());
+  CHECK(bench.grid->sent());
+  test::latch(bench.port("pair"), pair, 1200 * kMs, 5);  // silent for too long
+  CHECK(bench.run());
+  CHECK_FALSE(bench.grid->sent());
+}
+
+TEST_CASE("ground_map: the confidence of each pixel, and the kind of terrain from learnt maps") {
+  const test::TemporaryFolder folder;
+  std::ofstream maps(folder.path / "terrain.txt");
+  const ground_map::TerrainShape shape{8, 8, 4, 0, 0.3};
+  ground_map::write_terrain_shape(maps, shape);
+  for (size_t kind = 0; kind < ground_map::kTerrainKinds; ++kind)
+    ground_map::write_terrain_map(maps, shape, kind,
+                                  std::vector<int16_t>(64, kind == terrain_kind::crossing ? 0 : 1000));
+  maps.close();
+  NodeTypes types;
+  register_ground_map(types);
+  const auto node = types.find("ground_map")->make();
+  test::set(*node, "terrain_maps", (folder.path / "terrain.txt").string());
+  PortAccess::connect(test::input(*node, "pair"), kImage);
+  test::set_up(*node);
+  test::BoxWriter<Image> confidence(*node->outputs()[3]);
+  test::BoxWriter<Terrain> terrain(*node->outputs()[4]);
+  test::BoxWriter<Grid> around(*node->outputs()[5]);
+  FloorPair pair(9);
+  pair->left_view().at(10, 10, 0) = pair->left_view().at(10, 10, 1) = 255;
+  for (int job = 1; job <= 4; ++job) {
+    test::latch(test::input(*node, "pair"), pair, job * 200 * kMs, static_cast<uint64_t>(job));
+    confidence.clear();
+    terrain.clear();
+    around.clear();
+    CHECK(test::run(*node));
+    REQUIRE(confidence.sent());
+    REQUIRE(terrain.sent());
+    CHECK(terrain.message().kind == (job < 4 ? terrain_kind::unknown : terrain_kind::crossing));
+    CHECK(terrain.stamp_ns() == job * 200 * kMs);
+  }
+  CHECK(around.message().view().at(4, 7) == 0);   // ahead
+  CHECK(around.message().view().at(0, 0) == -1);  // beside the robot, where the camera does not look
+  CHECK(around.message().origin_x_m == doctest::Approx(-1.2));
+  CHECK(terrain.message().correlations[terrain_kind::crossing] == doctest::Approx(1));
+  CHECK(terrain.message().correlations[terrain_kind::left] == doctest::Approx(-1));
+  CHECK(confidence.message().view().at(160, 230) == 255);
+  CHECK(confidence.message().view().at(10, 10) == 64);  // as if flooded
+}
+
 TEST_CASE("ground_map: odometry moves the window, and cells stay where they are in the map (21.9)") {
   Bench bench({"odometry"});
   FloorPair pair(3.1), nearer(2.1);
@@ -280,4 +357,5 @@ TEST_CASE("ground_map refuses parameters that cannot work") {
   refuses("mean_size", int64_t{4}, "mean_size is 4");
   refuses("trapezoid_height", 0.0, "the reference area is empty");
   refuses("t_w", 300.0, "nothing would ever be ground");
+  refuses("terrain_maps", std::string("no_such_file.txt"), "no_such_file.txt: cannot be read");
 }

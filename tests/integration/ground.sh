@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: Apache-2.0
+# Ground and terrain as a user measures them: on generated pavements, and on labelled images where they are.
+source "$(dirname "$0")/lib.sh" "$@"
+
+# figure KEY: the first one of that name in the JSON of the last command; those of variants and baseline come later.
+figure() { sed -n "s/^ *\"$1\": \([-0-9.e]*\),*$/\1/p" "$work/stdout" | head -n 1; }
+at_most() { awk "BEGIN {exit !($(figure "$1") <= $2)}" || fail "$1 is $(figure "$1"), more than $2"; }
+at_least() { awk "BEGIN {exit !($(figure "$1") >= $2)}" || fail "$1 is $(figure "$1"), less than $2"; }
+
+expect 0 "" "$takt" eval ground --frames 8 --json --picture "$work/ground.png"
+at_least precision_pct 95
+at_least recall_pct 90
+at_most turned_head_max_m 1e-6
+[ -s "$work/ground.png" ] || fail "no picture of the ground"
+expect 2 "belong together" "$takt" eval ground --images "$work"
+expect 2 "valid are t_m" "$takt" eval ground --set t_x=1
+
+# Learnt, written, read, learnt again: the same maps.
+expect 0 "" "$takt" terrain learn --seed 5 --each 4 --measured "$work/measured.txt" --out "$work/terrain.txt"
+expect 0 "" "$takt" terrain learn "$work/measured.txt" --out "$work/again.txt"
+cmp -s "$work/terrain.txt" "$work/again.txt" || fail "maps learnt from a file are not those that were learnt when it was written"
+expect 2 "cannot be read" "$takt" terrain learn "$work/none.txt" --out "$work/terrain.txt"
+expect 0 "" "$takt" eval terrain --drives 1 --json --picture "$work/maps.png"
+at_least right_pct 80
+[ -s "$work/maps.png" ] || fail "no picture of the maps"
+
+images=${TAKT_DATA:-$source/../shared/data}/ground
+if [ ! -d "$images" ]; then
+  echo "NOT RUN: recordings $images are absent (set TAKT_DATA)"
+else
+  expect 0 "" "$takt" eval ground --images "$images/camvid" --labels "$images/camvid_annot" --drivable 3,4 --json
+fi
+
+finish
