@@ -25,6 +25,7 @@ std::vector<Row> run_sift(const Options&);
 std::vector<Row> run_objects(const Options&);
 std::vector<Row> run_objects_3d(const Options&);
 std::vector<Row> run_mapping(const Options&);
+std::vector<Row> run_fusion(const Options&);
 #endif
 
 std::span<const Suite> suites() {
@@ -49,6 +50,7 @@ std::span<const Suite> suites() {
       {"objects", "histogram cascade at 640x480: stages on all windows against brute force, the whole", run_objects},
       {"objects_3d", "things on a table: growing regions against a kd-tree, the whole", run_objects_3d},
       {"mapping", "scan matching: search, refinement against brute force; occupancy map, pose filter", run_mapping},
+      {"fusion", "median fusion of depth images against its plain definition; a cloud's way into the map", run_fusion},
 #endif
   });
   return list;

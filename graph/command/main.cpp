@@ -146,6 +146,7 @@ int main(int argc, char** argv) {
   takt::command::EvalSignsOptions signs;
   takt::command::EvalBodyPoseOptions body_pose;
   takt::command::EvalScanMatchingOptions scan_matching;
+  takt::command::EvalMappingOptions mapping;
   takt::command::EvalPersonTrackingOptions person_tracking;
   takt::command::EvalRegistrationOptions registration;
   takt::command::ReplayOptions replay;
@@ -189,6 +190,7 @@ int main(int argc, char** argv) {
   takt::command::add_eval_signs(*eval, signs, exit_code);
   takt::command::add_eval_body_pose(*eval, body_pose, exit_code);
   takt::command::add_eval_scan_matching(*eval, scan_matching, exit_code);
+  takt::command::add_eval_mapping(*eval, mapping, exit_code);
   takt::command::add_eval_person_tracking(*eval, person_tracking, exit_code);
   takt::command::add_eval_registration(*eval, registration, exit_code);
 
