@@ -27,6 +27,7 @@ std::vector<Row> run_objects_3d(const Options&);
 std::vector<Row> run_mapping(const Options&);
 std::vector<Row> run_semantic(const Options&);
 std::vector<Row> run_ground(const Options&);
+std::vector<Row> run_fusion(const Options&);
 #endif
 
 std::span<const Suite> suites() {
@@ -53,6 +54,7 @@ std::span<const Suite> suites() {
       {"mapping", "scan matching: search, refinement against brute force; occupancy map, pose filter", run_mapping},
       {"semantic", "network queries, insertion and plans against the size of the network", run_semantic},
       {"ground", "the ground map at 640x480: stages against brute force and OpenCV, a whole image", run_ground},
+      {"fusion", "median fusion of depth images against its plain definition; a cloud's way into the map", run_fusion},
 #endif
   });
   return list;

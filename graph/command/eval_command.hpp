@@ -163,5 +163,16 @@ struct EvalSemanticOptions {
   bool json = false;
 };
 void add_eval_semantic(CLI::App& eval, EvalSemanticOptions& options, int& exit_code);
+struct EvalMappingOptions {
+  std::filesystem::path data;  ///< depth/1.png .., pose.txt; empty: generated rooms alone
+  double minutes = 30;         ///< of the long drive; 0: none
+  size_t runs = 20, clouds = 80;
+  size_t views = 5;
+  uint64_t seed = 1;
+  std::filesystem::path out, grid;  ///< the map of the room: PLY or PCD; YAML beside a PNG
+  std::string picture;
+  bool json = false;
+};
+void add_eval_mapping(CLI::App& eval, EvalMappingOptions& options, int& exit_code);
 
 }  // namespace takt::command

@@ -165,6 +165,7 @@ int main(int argc, char** argv) {
   takt::command::EvalTerrainOptions terrain_eval;
   takt::command::EvalBodyPoseOptions body_pose;
   takt::command::EvalScanMatchingOptions scan_matching;
+  takt::command::EvalMappingOptions mapping;
   takt::command::EvalPersonTrackingOptions person_tracking;
   takt::command::EvalRegistrationOptions registration;
   takt::command::EvalLms200Options lms200;
@@ -219,6 +220,7 @@ int main(int argc, char** argv) {
   takt::command::add_eval_terrain(*eval, terrain_eval, exit_code);
   takt::command::add_eval_body_pose(*eval, body_pose, exit_code);
   takt::command::add_eval_scan_matching(*eval, scan_matching, exit_code);
+  takt::command::add_eval_mapping(*eval, mapping, exit_code);
   takt::command::add_eval_person_tracking(*eval, person_tracking, exit_code);
   takt::command::add_eval_registration(*eval, registration, exit_code);
   takt::command::add_eval_lms200(*eval, lms200, exit_code);

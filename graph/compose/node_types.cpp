@@ -22,6 +22,7 @@ void register_robot_pose(NodeTypes& types);
 void register_traversability(NodeTypes& types);
 void register_person_tracking(NodeTypes& types);
 void register_laser_fusion(NodeTypes& types);
+void register_laser_cloud(NodeTypes& types);
 }  // namespace takt
 
 namespace takt::graph {
@@ -47,6 +48,7 @@ NodeTypes node_types() {
   register_traversability(types);
   register_person_tracking(types);
   register_laser_fusion(types);
+  register_laser_cloud(types);
   return types;
 }
 

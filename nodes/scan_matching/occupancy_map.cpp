@@ -18,47 +18,24 @@ int64_t rounded(int64_t a, int64_t b) {
 }  // namespace
 
 OccupancyMap::OccupancyMap(const OccupancyParameters& parameters)
-    : p_(parameters),
-      side_(2 * static_cast<int>(std::ceil(p_.window_m / 2 / p_.cell_m - 1e-9))),
-      column_(-side_ / 2),
-      row_(-side_ / 2) {
-  const auto count = static_cast<size_t>(side_) * static_cast<size_t>(side_);
-  cells_.assign(count, kUnknown);
-  moved_.resize(count);
-  observed_.resize(count);
-  touched_.reserve(count);
+    : p_(parameters), cells_(p_.window_m, p_.cell_m, kUnknown), observed_(cells_.cells().size()) {
+  touched_.reserve(observed_.size());
 }
 
 OccupancyMap::Cell OccupancyMap::cell_of(double x_m, double y_m) const {
-  return {static_cast<int64_t>(std::floor(x_m / p_.cell_m)), static_cast<int64_t>(std::floor(y_m / p_.cell_m))};
-}
-
-void OccupancyMap::centre(double x_m, double y_m) {
-  const Cell middle = cell_of(x_m, y_m);
-  const int64_t right = middle.column - side_ / 2 - column_, up = middle.row - side_ / 2 - row_;
-  if (right == 0 && up == 0) return;
-  column_ += right;
-  row_ += up;
-  std::fill(moved_.begin(), moved_.end(), kUnknown);
-  const int64_t first = std::max<int64_t>(0, -right), last = std::min<int64_t>(side_, side_ - right);
-  for (int64_t row = std::max<int64_t>(0, -up); first < last && row < std::min<int64_t>(side_, side_ - up); ++row)
-    std::copy_n(cells_.begin() + (row + up) * side_ + first + right, last - first,
-                moved_.begin() + row * side_ + first);
-  cells_.swap(moved_);
+  return {cells_.column_of(x_m), cells_.row_of(y_m)};
 }
 
 bool OccupancyMap::resume(ImageView<const int16_t> cells, double x_m, double y_m) {
-  if (cells.width != side_ || cells.height != side_) return false;
-  column_ = std::llround(x_m / p_.cell_m);
-  row_ = std::llround(y_m / p_.cell_m);
-  std::copy_n(cells.data, cells_.size(), cells_.begin());
+  if (cells.width != side() || cells.height != side()) return false;
+  cells_.lay_at(x_m, y_m);
+  std::copy_n(cells.data, cells_.cells().size(), cells_.cells().begin());
   return true;
 }
 
 void OccupancyMap::observe(const Cell& cell, uint8_t what) {
-  const int64_t column = cell.column - column_, row = cell.row - row_;
-  if (std::min(column, row) < 0 || std::max(column, row) >= side_) return;
-  const auto at = static_cast<size_t>(row * side_ + column);
+  if (!cells_.contains(cell.column, cell.row)) return;
+  const size_t at = cells_.index(cell.column, cell.row);
   if (observed_[at] == 0) touched_.push_back(at);  // within the reserved capacity: each cell once
   observed_[at] = std::max(observed_[at], what);
 }
@@ -84,9 +61,10 @@ void OccupancyMap::add(const PlanarPose& robot_in_map, const Sweep& sweep) {
     if (range <= p_.range_max_m) observe(to, kEnded);
   }
   for (const size_t at : touched_) {
-    const int before = cells_[at] == kUnknown ? kOccupied / 2 : cells_[at];
+    int16_t& cell = cells_.cells()[at];
+    const int before = cell == kUnknown ? kOccupied / 2 : cell;
     const int after = observed_[at] == kEnded ? before + p_.up : before - p_.down;
-    cells_[at] = static_cast<int16_t>(std::clamp<int>(after, kFree, kOccupied));
+    cell = static_cast<int16_t>(std::clamp<int>(after, kFree, kOccupied));
     observed_[at] = 0;
   }
   touched_.clear();

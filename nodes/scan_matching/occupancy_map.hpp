@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "nodes/mapping_3d/sliding_grid.hpp"
 #include "nodes/scan_matching/scan_points.hpp"
 #include "rt/msg/messages.hpp"
 
@@ -25,30 +26,28 @@ class OccupancyMap {
   explicit OccupancyMap(const OccupancyParameters& parameters);
 
   /// Moves the window by whole cells so that the place lies in its middle; what comes in is unknown.
-  void centre(double x_m, double y_m);
+  void centre(double x_m, double y_m) { cells_.centre(x_m, y_m); }
   /// One sweep: unknown starts at 500, + up where a beam ends, - down where others pass, within 0..1000; a cell changes
   /// once a sweep. Beams without return tell nothing.
   void add(const PlanarPose& robot_in_map, const Sweep& sweep);
   /// Takes up a map that an earlier process gave, its first cell at (x, y). False if it is of another size.
   bool resume(ImageView<const int16_t> cells, double x_m, double y_m);
 
-  int side() const { return side_; }
-  double origin_x_m() const { return static_cast<double>(column_) * p_.cell_m; }
-  double origin_y_m() const { return static_cast<double>(row_) * p_.cell_m; }
-  ImageView<const int16_t> cells() const { return {cells_.data(), side_, side_}; }
+  int side() const { return cells_.side(); }
+  double origin_x_m() const { return cells_.origin_x_m(); }
+  double origin_y_m() const { return cells_.origin_y_m(); }
+  ImageView<const int16_t> cells() const { return {cells_.cells().data(), side(), side()}; }
 
  private:
   struct Cell {
-    int64_t column, row;  ///< of the plane
+    int64_t column, row;  ///< of the window, or beyond
   };
   Cell cell_of(double x_m, double y_m) const;
   void observe(const Cell& cell, uint8_t what);
   void pass(const Cell& from, const Cell& to);
 
   OccupancyParameters p_;
-  int side_;
-  int64_t column_, row_;  ///< cell (0, 0) of the window
-  std::vector<int16_t> cells_, moved_;
+  mapping_3d::SlidingGrid<int16_t> cells_;
   std::vector<uint8_t> observed_;  ///< by this sweep
   std::vector<size_t> touched_;
 };

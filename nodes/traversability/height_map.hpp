@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "nodes/mapping_3d/pose.hpp"
+#include "nodes/mapping_3d/sliding_grid.hpp"
 #include "rt/msg/messages.hpp"
 
 namespace takt::traversability {
@@ -35,14 +36,14 @@ class HeightMap {
   explicit HeightMap(const HeightParameters& parameters);
 
   /// Moves the window by whole cells so that the place lies in its middle; what comes in is unknown.
-  void centre(double x_m, double y_m);
+  void centre(double x_m, double y_m) { cells_.centre(x_m, y_m); }
   /// Points of the map frame, z above the floor that the robot stands on.
   void add(std::span<const mapping_3d::Position> points, int64_t stamp_ns);
 
-  int side() const { return side_; }
+  int side() const { return cells_.side(); }
   double cell_m() const { return p_.cell_m; }
-  double origin_x_m() const { return static_cast<double>(column_) * p_.cell_m; }
-  double origin_y_m() const { return static_cast<double>(row_) * p_.cell_m; }
+  double origin_x_m() const { return cells_.origin_x_m(); }
+  double origin_y_m() const { return cells_.origin_y_m(); }
   Surface surface(int column, int row) const;
 
   /// Blocked is a cell whose heights range over more than step_m, that is steeper than `slope`, or whose mean height
@@ -56,17 +57,10 @@ class HeightMap {
     double n = 0, x = 0, y = 0, z = 0, xx = 0, xy = 0, yy = 0, xz = 0, yz = 0, low = 0, high = 0;
     int64_t seen_ns = 0;
   };
-  size_t index(int64_t column, int64_t row) const { return static_cast<size_t>(row * side_ + column); }
   bool blocked(const Surface& surface, int column, int row) const;
 
   HeightParameters p_;
-  int side_;
-  int64_t column_, row_;  ///< cell (0, 0) of the window, in the plane
-  std::vector<Cell> cells_, moved_;
+  mapping_3d::SlidingGrid<Cell> cells_;
 };
-
-/// Adds another grid, wherever and however finely it lies: unknown yields to known, otherwise the larger counts (15.6).
-/// `into` covers origin + cells of the map frame, aligned with its axes.
-void fuse(const Grid& other, double origin_x_m, double origin_y_m, double cell_m, ImageView<int16_t> into);
 
 }  // namespace takt::traversability

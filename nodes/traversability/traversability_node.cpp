@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "nodes/mapping_3d/map_grid.hpp"
 #include "nodes/traversability/height_map.hpp"
 #include "rt/node.hpp"
 #include "rt/transform/transform_buffer.hpp"
@@ -76,8 +77,7 @@ class TraversabilityNode final : public Node {
     out->grid_in_map.y = heights_->origin_y_m() + half_m;
     heights_->judge(out->view());
     const Grid* other = grid_.newest();
-    if (with_other && other)
-      fuse(*other, heights_->origin_x_m(), heights_->origin_y_m(), heights_->cell_m(), out->view());
+    if (with_other && other) fuse(mapping_3d::view_of(*other), *out);
     port.send(last_stamp_ns_);
     return true;
   }

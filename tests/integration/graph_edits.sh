@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # Another robot by graph edit alone: without a laser, with odometry in place of ego-motion, with one camera for both
-# roles, with a pose joined from wheels, ego-motion and laser scans. Each still maps. In virtual time, where no deadline depends on this machine.
+# roles, with a pose joined from wheels, ego-motion and laser scans, with a laser's cloud, with a pose from scan matching. Each
+# still maps. In virtual time, where no deadline depends on this machine.
 source "$(dirname "$0")/lib.sh" "$@"
 command -v python3 >/dev/null || echo "NOT RUN: what the maps show needs python3; only that they are written is tested"
 
@@ -118,4 +119,25 @@ edit '
   s/^(  body_pose: .*budget: )25ms/\110ms/
 '
 maps joined_pose
+
+# A laser's cloud in place of the stereo camera's: the robot drives on, and obstacles are mapped, without the head camera's depth.
+edit '
+  /^    ground_map:$/i\    laser_cloud: {type: laser_cloud, in: {scan: {from: front_laser.scan, depth: 8}, odometry: {from: base.odometry, depth: 32}}}
+  /^    mapping_3d:$/,/^    picture:$/s/cloud: \{from: stereo\.cloud/cloud: {from: laser_cloud.cloud/
+  /^    mapping_3d:$/,/^    picture:$/s/motion: \{from: ego_motion\.motion/odometry: {from: base.odometry/
+  s/obstacle: \{from: head_camera\.pair/obstacle: {from: front_laser.scan/
+' '
+  $a\  laser_cloud: {rate: 5, offset: 22ms, budget: 1ms, deadline: 200ms}
+'
+maps laser_cloud
+
+# A pose from outside, here that of scan matching, in place of ego-motion.
+edit '
+  /^    ground_map:$/i\    scan_matching: {type: scan_matching, in: {scan: {from: front_laser.scan, depth: 4}, odometry: {from: base.odometry, depth: 16}}}
+  /^    mapping_3d:$/,/^    picture:$/s/motion: \{from: ego_motion\.motion/pose: {from: scan_matching.pose/
+' '
+  $a\  scan_matching: {rate: 5, offset: 22ms, budget: 8ms, deadline: 200ms}
+  s/^(  body_pose: .*budget: )25ms/\110ms/
+'
+maps external_pose
 finish

@@ -2,6 +2,7 @@
 #include <doctest/doctest.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <optional>
@@ -27,29 +28,91 @@ Eigen::Isometry3d isometry(const takt::Transform& t) {
   return i;
 }
 
+/// Floors the slow way: each cell asks the one before it on the way from the robot and those at its sides, and takes
+/// the one whose floor was seen last.
+struct Floor {
+  double height = 0;
+  int unseen = 0;
+};
+class Floors {
+ public:
+  using Place = std::pair<int, int>;
+  Floors(const std::map<Place, std::vector<double>>& heights, const ObstacleParameters& p, const GridShape& shape)
+      : heights_(heights), p_(p), middle_(shape.cells / 2.0) {}
+
+  Floor at(const Place& place) {
+    if (!known_.contains(place)) known_[place] = find(place);
+    return known_[place];
+  }
+
+ private:
+  double away(const Place& place) const {
+    return std::max(std::abs(place.first + 0.5 - middle_), std::abs(place.second + 0.5 - middle_));
+  }
+  Floor find(const Place& place) {
+    const double x = place.first + 0.5 - middle_, y = place.second + 0.5 - middle_, longer = away(place);
+    if (p_.slope == 0 || longer < 1) return {};
+    const Place before{static_cast<int>(std::floor(x - x / longer + middle_)),
+                       static_cast<int>(std::floor(y - y / longer + middle_))};
+    Floor floor = at(before);
+    for (const int side : {-1, 1}) {
+      const Place beside = std::abs(x) >= std::abs(y) ? Place{before.first, before.second + side}
+                                                      : Place{before.first + side, before.second};
+      if (away(beside) < longer && at(beside).unseen < floor.unseen) floor = at(beside);
+    }
+    const double climb =
+        std::min(p_.z_floor_m, p_.slope * (std::hypot(x, y) / longer * p_.voxel_m) * (floor.unseen + 1));
+    ++floor.unseen;
+    const auto here = heights_.find(place);
+    if (here == heights_.end()) return floor;
+    const double lowest = *std::min_element(here->second.begin(), here->second.end());
+    double sum = 0;
+    int count = 0;
+    for (const double z : here->second)
+      if (z <= lowest + 0.02) sum += z, ++count;
+    if (std::abs(sum / count - floor.height) > climb) return floor;
+    return {sum / count, 0};
+  }
+
+  const std::map<Place, std::vector<double>>& heights_;
+  const ObstacleParameters& p_;
+  double middle_;
+  std::map<Place, Floor> known_;
+};
+
 /// The points (robot frame) in blocked voxels the slow way: a map from voxel to points, every rule written out once
 /// more.
 std::map<Voxel, std::vector<Eigen::Vector3d>> blocked_reference(const std::vector<Point>& points, const Viewpoint& view,
                                                                 const ObstacleParameters& p, const GridShape& shape) {
   const Affine m = to_affine(view.camera_in_robot);
-  std::map<Voxel, std::vector<Eigen::Vector3d>> voxels;
+  std::map<std::pair<int, int>, std::vector<Eigen::Vector3d>> columns;
+  std::map<std::pair<int, int>, std::vector<double>> heights;
+  const double inverse = 1 / p.voxel_m;
   for (const Point& q : points) {
     const double c[3] = {q.x, q.y, q.z};
     double r[3];
     for (int i = 0; i < 3; ++i) r[i] = m.r[3 * i] * c[0] + m.r[3 * i + 1] * c[1] + m.r[3 * i + 2] * c[2] + m.t[i];
-    if (r[2] < p.z_floor_m || r[2] < 0 || r[2] >= std::ceil(p.robot_height_m / p.voxel_m) * p.voxel_m) continue;
-    const double inverse = 1 / p.voxel_m;
-    const Voxel voxel{static_cast<int>(std::floor((r[0] - shape.origin_m) * inverse)),
-                      static_cast<int>(std::floor((r[1] - shape.origin_m) * inverse)),
-                      static_cast<int>(std::floor(r[2] * inverse))};
+    const std::pair column{static_cast<int>(std::floor((r[0] - shape.origin_m) * inverse)),
+                           static_cast<int>(std::floor((r[1] - shape.origin_m) * inverse))};
     const auto outside = [&](int i) { return i < 0 || i >= shape.cells; };
-    if (outside(std::get<0>(voxel)) || outside(std::get<1>(voxel))) continue;
-    voxels[voxel].emplace_back(r[0], r[1], r[2]);
+    if (outside(column.first) || outside(column.second)) continue;
+    columns[column].emplace_back(r[0], r[1], r[2]);
+    heights[column].push_back(r[2]);
+  }
+  std::map<Voxel, std::vector<Eigen::Vector3d>> voxels;
+  Floors floors(heights, p, shape);
+  for (const auto& [column, in_it] : columns) {
+    for (const Eigen::Vector3d& r : in_it) {
+      const double height = r.z() - floors.at(column).height;
+      if (height < p.z_floor_m || height >= std::ceil(p.robot_height_m / p.voxel_m) * p.voxel_m) continue;
+      voxels[{column.first, column.second, static_cast<int>(std::floor(height * inverse))}].push_back(r);
+    }
   }
   std::erase_if(voxels, [&](const auto& entry) {
     const auto [column, row, layer] = entry.first;
     const double centre[3] = {shape.origin_m + (column + 0.5) * p.voxel_m - m.t[0],
-                              shape.origin_m + (row + 0.5) * p.voxel_m - m.t[1], (layer + 0.5) * p.voxel_m - m.t[2]};
+                              shape.origin_m + (row + 0.5) * p.voxel_m - m.t[1],
+                              floors.at({column, row}).height + (layer + 0.5) * p.voxel_m - m.t[2]};
     const double depth = std::max(0.5 * p.voxel_m, m.r[2] * centre[0] + m.r[5] * centre[1] + m.r[8] * centre[2]);
     const double expected = std::pow(p.voxel_m * view.focal_px / depth, 2);
     const auto count = static_cast<double>(entry.second.size());
@@ -131,6 +194,8 @@ TEST_CASE("occupied cells equal those of a map of voxels; a free cell is never o
     ObstacleParameters p;
     p.voxel_m = uniform(0.1, 0.4);
     p.share = uniform(0.01, 0.3);
+    p.slope = round % 4 == 0 ? 0 : uniform(0.05, 2);
+    p.z_floor_m = uniform(0.03, 0.3);
     const double step_px = uniform(1, 6);
     ObstacleGrid grid(p);
     const GridShape shape = grid.shape();
@@ -161,6 +226,7 @@ TEST_CASE("the merged grid of a window equals the one made from all its clouds, 
     ObstacleParameters p;
     p.voxel_m = uniform(0.15, 0.3);
     p.share = uniform(0.01, 0.1);
+    p.slope = uniform(0.05, 2);
     ObstacleGrid grid(p);
     const GridShape shape = grid.shape();
     const auto size = static_cast<size_t>(1 + round % 5);

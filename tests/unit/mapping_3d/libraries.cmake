@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-set(ROOM_TEST_LIBRARIES takt_allocation_counter)
+set(ROOM_TEST_LIBRARIES takt_allocation_counter takt_mapping_3d_node takt_mapping_3d_evaluate)

@@ -145,6 +145,24 @@ TEST_CASE("camera mount: forward is robot y, down is -z; tilt up lifts the axis,
   CHECK(axis(camera_mount(0, 0, 0, 0.3, 0))[0] == doctest::Approx(-std::sin(0.3)));
 }
 
+TEST_CASE("a laser looks along y, and one sweep leaves one row of points: enough of it blocks") {
+  Fixture f;
+  f.viewpoint = {{0, 0, 0.25, 1, 0, 0, 0}, 1 / 0.0087, 1.57, Sensor::laser};
+  std::vector<Point> wall;
+  for (int beam = 0; beam < 361; ++beam) {
+    const double angle = (beam - 180) * 0.0087, range = 3.1 / std::cos(angle);  // a wall across, 3.1 m ahead
+    if (std::abs(angle) < 0.6)
+      wall.push_back({static_cast<float>(-range * std::sin(angle)), static_cast<float>(range * std::cos(angle)), 0});
+  }
+  f.grid.fill(wall, f.viewpoint, f.view());
+  CHECK(f.at(0.1, 3.1) == kOccupied);
+  CHECK(f.at(1.1, 3.1) == kOccupied);
+  CHECK(f.at(0.1, 2.1) == kFree);
+  CHECK(f.at(-3.1, 1.1) == kFree);
+  CHECK(f.at(0.1, 4.1) == kUnknown);   // behind
+  CHECK(f.at(0.1, -1.1) == kUnknown);  // not in view
+}
+
 TEST_CASE("merge: unknown yields to known, otherwise the maximum") {
   std::vector<int16_t> into{-1, -1, 0, 1000}, newer{-1, 0, 1000, 0};
   merge({newer.data(), 2, 2}, {into.data(), 2, 2});
@@ -157,7 +175,7 @@ TEST_CASE("the node type registers with its ports") {
   const auto* type = types.find("mapping_3d");
   REQUIRE(type);
   const auto node = type->make();
-  REQUIRE(node->inputs().size() == 4);
+  REQUIRE(node->inputs().size() == 7);
   CHECK(node->inputs()[0]->name() == "cloud");
   CHECK(node->inputs()[1]->name() == "motion");
   CHECK(node->inputs()[2]->name() == "odometry");

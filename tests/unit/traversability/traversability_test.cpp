@@ -125,36 +125,6 @@ TEST_CASE("few points are unknown; a cell that was not seen for long begins anew
   CHECK(map.surface(middle, middle).mean_m == doctest::Approx(0.3));
 }
 
-TEST_CASE("fusion: the larger counts and unknown yields, from a finer, a coarser and a turned grid") {
-  for (const double other_cell : {0.05, 0.45}) {
-    CAPTURE(other_cell);
-    test::Box<Grid> other({20, 20, 1, 0});
-    other->width = other->height = 20;
-    other->cell_m = other_cell;
-    other->origin_x_m = other->origin_y_m = -10 * other_cell;
-    other->grid_in_map = {1, 2, 0, std::sqrt(0.5), 0, 0, std::sqrt(0.5)};  // turned by 90 degrees
-    REQUIRE(other->cells.resize(400));
-    std::fill_n(other->cells.data(), 400, kUnknown);
-    other->view().at(13, 10) = kBlocked;  // 3.5 cells along its x: the map's y
-    other->view().at(6, 10) = kFree;
-    std::vector<int16_t> cells(60 * 60, kUnknown);
-    const ImageView<int16_t> into{cells.data(), 60, 60};
-    const auto at = [&](double x, double y) -> int16_t& {
-      return into.at(static_cast<int>(std::floor((x + 3) / 0.15)), static_cast<int>(std::floor((y + 3) / 0.15)));
-    };
-    const double x = 1 - 0.5 * other_cell, blocked_y = 2 + 3.5 * other_cell, free_y = 2 - 3.5 * other_cell;
-    fuse(*other, -3, -3, 0.15, into);
-    CHECK(at(x, blocked_y) == kBlocked);
-    CHECK(at(x, free_y) == kFree);
-    CHECK(at(x + 2 * other_cell + 0.15, blocked_y) == kUnknown);
-    at(x, free_y) = kBlocked;
-    at(x, blocked_y) = kFree;
-    fuse(*other, -3, -3, 0.15, into);
-    CHECK(at(x, free_y) == kBlocked);
-    CHECK(at(x, blocked_y) == kBlocked);
-  }
-}
-
 TEST_CASE(
     "traversability node: grids at the newest scan with a pose, fused with what else is known, nothing allocated") {
   NodeTypes types;
