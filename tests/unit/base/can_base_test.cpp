@@ -6,8 +6,7 @@
 
 #include "hal/base/base_double.hpp"
 #include "tests/conformance/dbc_file.hpp"
-#include "tests/conformance/devices.hpp"
-#include "tests/temporary_folder.hpp"
+#include "tests/unit/can/bench.hpp"
 
 using namespace takt;
 using namespace takt::base;
@@ -17,21 +16,11 @@ namespace {
 
 constexpr int64_t kMs = 1'000'000;
 
-struct Bench {
-  test::TemporaryFolder folder;
-  std::string interface = "unix:" + (folder.path / "can").string();
-  VirtualClock clock{test::kDeviceEpoch};
-  BaseDouble device{interface, clock};
-  CanBase driver{"base", {.interface = interface}, clock};
+struct Bench : test::CanBench<CanBase, BaseDouble> {
   BaseReading reading;
   bool followed = false;
 
-  Bench() { REQUIRE(device.open(clock.now_ns()) == 0); }
-  void pace(int64_t at_ns) {
-    clock.advance_to(at_ns);
-    device.run_until(at_ns);
-  }
-  int64_t now() const { return clock.now_ns(); }
+  Bench() : CanBench(CanBaseSettings{}) {}
   /// Jobs of a node every 20 ms: a disconnected device is restarted. NaN: no command.
   void jobs(int count, double speed_m_s = std::nan(""), double turn_rad_s = 0) {
     for (int k = 0; k < count; ++k) {

@@ -5,8 +5,7 @@
 #include <doctest/doctest.h>
 
 #include "hal/head/head_double.hpp"
-#include "tests/conformance/devices.hpp"
-#include "tests/temporary_folder.hpp"
+#include "tests/unit/can/bench.hpp"
 
 using namespace takt;
 using namespace takt::head;
@@ -16,23 +15,11 @@ namespace {
 
 constexpr int64_t kMs = 1'000'000;
 
-struct Bench {
-  test::TemporaryFolder folder;
-  std::string interface = "unix:" + (folder.path / "can").string();
-  VirtualClock clock{test::kDeviceEpoch};
-  HeadDouble device{interface, clock};
-  CanHead driver;
+struct Bench : test::CanBench<CanHead, HeadDouble> {
   ReadStatus status = ReadStatus::no_data;
+  bool followed = false;
 
-  explicit Bench(const HeadLimits& limits = kDefaultLimits)
-      : driver("head", {.interface = interface, .limits = limits}, clock) {
-    REQUIRE(device.open(clock.now_ns()) == 0);
-  }
-  void pace(int64_t at_ns) {
-    clock.advance_to(at_ns);
-    device.run_until(at_ns);
-  }
-  int64_t now() const { return clock.now_ns(); }
+  explicit Bench(const HeadLimits& limits = kDefaultLimits) : CanBench(CanHeadSettings{{}, limits}) {}
   /// Jobs of a node every 20 ms: a disconnected device is restarted. Without a command the head holds.
   HeadReading jobs(int count, std::optional<HeadAngles> wanted = {}) {
     HeadReading reading;
@@ -53,7 +40,6 @@ struct Bench {
     REQUIRE(status == ReadStatus::ok);
     REQUIRE(device.state() == State::operation_enabled);
   }
-  bool followed = false;
 };
 
 }  // namespace
