@@ -129,7 +129,14 @@ struct LaserLine {
   VirtualClock clock{7'000'000'000};
   std::unique_ptr<DeviceDouble> device;
   std::unique_ptr<StreamLaser> laser;
+  std::vector<float> range_m;  ///< of the last read()
 
+  void start() {
+    REQUIRE(laser->open().has_value());
+    REQUIRE(laser->start(clock.now_ns()).has_value());
+    range_m.assign(laser->format().beams, -1.0f);
+  }
+  ScanReading read() { return laser->read(range_m, clock.now_ns(), INT64_MAX); }
   /// Until then both do what is due, in steps of a millisecond.
   void advance_to(int64_t end_ns) {
     while (clock.now_ns() < end_ns) {

@@ -81,7 +81,7 @@ TEST_CASE("scans have the values that were measured, and the stamp of their firs
   }
 }
 
-TEST_CASE("five minutes on end: every scan arrives, once, at its time") {
+TEST_CASE("half an hour on end: every scan arrives, once, at its time") {
   Lms200Rig rig(kFast);
   rig.start();
   REQUIRE(rig.runs_within(5 * kSecond));
@@ -90,7 +90,7 @@ TEST_CASE("five minutes on end: every scan arrives, once, at its time") {
   const uint64_t damaged = rig.session->damaged(), sent = rig.scanner->scans_sent();
   int64_t worst_ns = 0;
   uint64_t arrived = 0;
-  for (const int64_t end_ns = rig.clock.now_ns() + 300 * kSecond; rig.clock.now_ns() < end_ns; ++arrived) {
+  for (const int64_t end_ns = rig.clock.now_ns() + 1800 * kSecond; rig.clock.now_ns() < end_ns; ++arrived) {
     rig.advance_by(2 * kTurn_ns);
     const ScanReading reading = rig.read();
     REQUIRE(reading.status == ReadStatus::ok);
@@ -101,7 +101,7 @@ TEST_CASE("five minutes on end: every scan arrives, once, at its time") {
   CHECK(arrived == rig.scanner->scans_sent() - sent);
   CHECK(rig.session->damaged() == damaged);
   CHECK(worst_ns <= LaserLine::kStep_ns);
-  std::printf("LMS 200, 300 s at 37.5 Hz: %llu scans, none lost or damaged; from stamp to stamp at most %.3f ms off\n",
+  std::printf("LMS 200, 1800 s at 37.5 Hz: %llu scans, none lost or damaged; from stamp to stamp at most %.3f ms off\n",
               static_cast<unsigned long long>(arrived), static_cast<double>(worst_ns) * 1e-6);
 }
 

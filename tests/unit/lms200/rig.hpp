@@ -28,7 +28,6 @@ inline RangeSource tunnel() {
 struct Lms200Rig : LaserLine {
   lms200::Session* session = nullptr;
   lms200::Lms200Double* scanner = nullptr;
-  std::vector<float> range_m;
 
   explicit Lms200Rig(const lms200::SessionSettings& settings, RangeSource source = tunnel()) {
     build(settings, std::move(source), std::make_unique<MemoryHostEnd>(state),
@@ -40,12 +39,6 @@ struct Lms200Rig : LaserLine {
           std::make_unique<CountedEnd>(std::make_unique<SerialPort>("laser", path), state.to_device, state.to_host),
           std::make_unique<CountedEnd>(std::make_unique<PseudoTerminal>(path), state.to_host, state.to_device));
   }
-  void start() {
-    REQUIRE(laser->open().has_value());
-    REQUIRE(laser->start(clock.now_ns()).has_value());
-    range_m.assign(laser->format().beams, -1.0f);
-  }
-  ScanReading read() { return laser->read(range_m, clock.now_ns(), INT64_MAX); }
   /// Until scans come, at most so long.
   bool runs_within(int64_t ns) {
     for (const int64_t end_ns = clock.now_ns() + ns; clock.now_ns() < end_ns;) {

@@ -38,7 +38,6 @@ void slope(const Sweep& sweep, std::span<float> range_m) {
 struct Rig : LaserLine {
   Session* session = nullptr;
   Lms400Double* scanner = nullptr;
-  std::vector<float> range_m;
 
   explicit Rig(const SessionSettings& settings = {}) {
     build(settings, std::make_unique<MemoryHostEnd>(state), std::make_unique<MemoryDeviceEnd>(state));
@@ -47,12 +46,6 @@ struct Rig : LaserLine {
     build(settings, std::make_unique<CountedEnd>(std::move(host), state.to_device, state.to_host),
           std::make_unique<CountedEnd>(std::move(far), state.to_host, state.to_device));
   }
-  void start() {
-    REQUIRE(laser->open().has_value());
-    REQUIRE(laser->start(clock.now_ns()).has_value());
-    range_m.assign(laser->format().beams, -1.0f);
-  }
-  ScanReading read() { return laser->read(range_m, clock.now_ns(), INT64_MAX); }
   bool runs_within(int64_t ns) {
     for (const int64_t end_ns = clock.now_ns() + ns; clock.now_ns() < end_ns;) {
       advance_by(10 * kMs);
