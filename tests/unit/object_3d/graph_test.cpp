@@ -2,8 +2,8 @@
 // The node in a graph of its own, at its rate in virtual time: clouds in, labelled objects out.
 #include <doctest/doctest.h>
 
-#include "nodes/object_3d/scenes.hpp"
 #include "tests/unit/compose/drive.hpp"
+#include "tests/unit/object_3d/scene_cloud.hpp"
 
 using namespace takt;
 using namespace takt::object_3d;
@@ -29,14 +29,7 @@ class Table final : public Node {
     if (const Objects3d* objects = objects_.newest(); objects != nullptr && objects_.is_new()) look(*objects);
     PointCloud* cloud = cloud_.loan();
     if (cloud == nullptr) return job.no_result();
-    const Scene& scene = scenes_[seen.clouds++ % scenes_.size()];
-    cloud->camera = scene.camera;
-    cloud->step_px = scene.step_px;
-    cloud->sensor_in_robot = scene.sensor_in_robot;
-    for (size_t i = 0; i < scene.points.size(); ++i) {
-      cloud->points.push_back(scene.points[i]);
-      cloud->colours.push_back(scene.colours[i]);
-    }
+    test::write_scene(scenes_[seen.clouds++ % scenes_.size()], *cloud);
     cloud_.send(job.release_ns());
   }
 

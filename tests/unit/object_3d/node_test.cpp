@@ -8,6 +8,7 @@
 #include "rt/memory/memory_use.hpp"
 #include "tests/temporary_folder.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
+#include "tests/unit/object_3d/scene_cloud.hpp"
 
 namespace takt {
 void register_object_3d(NodeTypes& types);
@@ -40,13 +41,7 @@ struct Bench {
     PortAccess::connect(test::input(*node, "cloud"), kClouds);
     if (boxes) PortAccess::connect(test::input(*node, "detections"), {0, 0, 1, 4});
     test::set_up(*node);
-    cloud->camera = scene.camera;
-    cloud->step_px = scene.step_px;
-    cloud->sensor_in_robot = scene.sensor_in_robot;
-    for (size_t i = 0; i < scene.points.size(); ++i) {
-      cloud->points.push_back(scene.points[i]);
-      cloud->colours.push_back(scene.colours[i]);
-    }
+    test::write_scene(scene, *cloud);
   }
   bool run(int64_t stamp_ns = 1234) {
     test::latch(test::input(*node, "cloud"), cloud, stamp_ns, ++sequence);

@@ -3,8 +3,8 @@
 // keeps them.
 #include <doctest/doctest.h>
 
-#include "nodes/object_3d/scenes.hpp"
 #include "tests/unit/compose/drive.hpp"
+#include "tests/unit/object_3d/scene_cloud.hpp"
 
 using namespace takt;
 
@@ -33,14 +33,7 @@ class Table final : public Node {
     if (cloud == nullptr || odometry == nullptr) return job.no_result();
     odometry->x_m = 3, odometry->y_m = 2, odometry->theta_rad = 0;
     odometry_.send(job.release_ns());
-    const object_3d::Scene& scene = scenes_[shown_++ % scenes_.size()];
-    cloud->camera = scene.camera;
-    cloud->step_px = scene.step_px;
-    cloud->sensor_in_robot = scene.sensor_in_robot;
-    for (size_t i = 0; i < scene.points.size(); ++i) {
-      cloud->points.push_back(scene.points[i]);
-      cloud->colours.push_back(scene.colours[i]);
-    }
+    test::write_scene(scenes_[shown_++ % scenes_.size()], *cloud);
     cloud_.send(job.release_ns());
   }
 
