@@ -91,11 +91,11 @@ void stages(std::vector<Row>& rows, const TextureMemory& full, Plane& bgr, int r
   must_agree(raw == raw_slow);
 
   const ReferenceArea area(kWidth, kHeight, {});
-  MaskCleaner cleaner(kWidth, kHeight, 5);
+  MaskCleaner cleaner(kWidth, kHeight, 9);
   cv::Mat blurred, labels;
   const auto opencv = [&] {
     const cv::Mat input(kHeight, kWidth, CV_8U, raw.data());
-    cv::blur(input * 255, blurred, {5, 5});
+    cv::blur(input * 255, blurred, {9, 9});
     cv::connectedComponents(blurred > 127, labels, 4, CV_32S);
   };
   add(rows, "ground/clean", "OpenCV's blur and components", rounds, opencv,

@@ -151,7 +151,7 @@ void print_row(const std::string& name, const Json& r) {
   const auto text = [](const Json& from, const char* key, int digits) {
     return from.contains(key) ? fmt::format("{:.{}f}", from[key].get<double>(), digits) : std::string("-");
   };
-  const Json grid = r.value("grid", Json::object());
+  const Json grid = r.contains("grid") ? r["grid"] : Json::object();
   std::printf("%-34s %11s %8s %8s %6s %9s %10s %10s %10s %7s\n", name.c_str(), text(r, "precision_pct", 2).c_str(),
               text(r, "recall_pct", 2).c_str(), text(r, "border_error_m", 3).c_str(),
               text(r, "border_error_p90_m", 2).c_str(), text(grid, "free_wrong_pct", 2).c_str(),
@@ -167,7 +167,8 @@ void print(const Json& out) {
   print_row("takt ground_map", out);
   if (out.contains("with_other_drives")) print_row("  memory of the other drives, too", out["with_other_drives"]);
   if (out.contains("not_learnt")) print_row("  on images not learnt from", out["not_learnt"]);
-  for (const auto& [name, row] : out.value("variants", Json::object()).items()) print_row(name, row);
+  if (out.contains("variants"))
+    for (const auto& [name, row] : out["variants"].items()) print_row(name, row);
   print_row("bottom 40 % is ground", out["baseline"]);
   if (!out.contains("projection")) return;
   std::printf("floor from pixels: off by at most %.1e m at any turn of the head\n",

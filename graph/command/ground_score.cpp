@@ -5,26 +5,12 @@
 
 #include <algorithm>
 
+#include "graph/command/set_option.hpp"
+
 namespace takt::command {
 
 using namespace ground_map;
 using Json = nlohmann::ordered_json;
-
-namespace {
-
-double number_of(const std::string& text, const std::string& value, double low, double high) {
-  size_t used = 0;
-  double v = low - 1;
-  try {
-    v = std::stod(value, &used);
-  } catch (const std::exception&) {
-  }
-  if (used != value.size() || !(v >= low && v <= high))
-    throw std::runtime_error(fmt::format("--set {}: must be a number in {}..{}", text, low, high));
-  return v;
-}
-
-}  // namespace
 
 GroundParameters ground_parameters(const std::vector<std::string>& set) {
   GroundParameters all;
@@ -32,11 +18,11 @@ GroundParameters ground_parameters(const std::vector<std::string>& set) {
   for (const std::string& text : set) {
     const size_t equals = text.find('=');
     const std::string key = text.substr(0, equals), value = equals == std::string::npos ? "" : text.substr(equals + 1);
-    if (key == "t_m") p.t_m = number_of(text, value, 0, 1e6);
-    else if (key == "n_b") p.memory_entries = static_cast<int>(number_of(text, value, 1, 10000));
-    else if (key == "t_w") p.t_w = number_of(text, value, 0, 5000);
-    else if (key == "mean_size") p.mean_size = static_cast<int>(number_of(text, value, 1, 31));
-    else if (key == "doubt") p.doubt.doubtful = static_cast<uint8_t>(kSure * number_of(text, value, 0, 1) + 0.5);
+    if (key == "t_m") p.t_m = set_number(text, value, 0, 1e6);
+    else if (key == "n_b") p.memory_entries = static_cast<int>(set_number(text, value, 1, 10000));
+    else if (key == "t_w") p.t_w = set_number(text, value, 0, 5000);
+    else if (key == "mean_size") p.mean_size = static_cast<int>(set_number(text, value, 1, 31));
+    else if (key == "doubt") p.doubt.doubtful = static_cast<uint8_t>(kSure * set_number(text, value, 0, 1) + 0.5);
     else if (text == "votes=columns") all.grid.votes = Votes::columns;
     else if (text == "votes=pixels") all.grid.votes = Votes::pixels;
     else

@@ -10,25 +10,15 @@
 #include <map>
 #include <stdexcept>
 
+#include "graph/command/set_option.hpp"
+
 namespace takt::command {
 namespace {
 
 using stereo::MatcherParameters;
 
-double number(const std::string& text, const std::string& value, double low, double high) {
-  size_t used = 0;
-  double v = low - 1;
-  try {
-    v = std::stod(value, &used);
-  } catch (const std::exception&) {
-  }
-  if (used != value.size() || !(v >= low && v <= high))
-    throw std::invalid_argument(fmt::format("--set {}: must be a number in {}..{}", text, low, high));
-  return v;
-}
-
 int whole(const std::string& text, const std::string& value, int low, int high) {
-  const double v = number(text, value, low, high);
+  const double v = set_number(text, value, low, high);
   if (v != static_cast<int>(v)) throw std::invalid_argument(fmt::format("--set {}: must be a whole number", text));
   return static_cast<int>(v);
 }
@@ -55,8 +45,9 @@ const std::map<std::string, Setter>& setters() {
         [=](const std::string& t, const std::string& v, MatcherParameters& p) { p.*member = whole(t, v, low, high); });
   };
   const auto real = [](double MatcherParameters::*member, double low, double high) {
-    return Setter(
-        [=](const std::string& t, const std::string& v, MatcherParameters& p) { p.*member = number(t, v, low, high); });
+    return Setter([=](const std::string& t, const std::string& v, MatcherParameters& p) {
+      p.*member = set_number(t, v, low, high);
+    });
   };
   const auto yes_no = [](bool MatcherParameters::*member) {
     return Setter([=](const std::string& t, const std::string& v, MatcherParameters& p) {
@@ -65,7 +56,7 @@ const std::map<std::string, Setter>& setters() {
   };
   const auto share = [](int MatcherParameters::*member) {  // 0..1 at the node, 0..255 in the library
     return Setter([=](const std::string& t, const std::string& v, MatcherParameters& p) {
-      p.*member = static_cast<int>(255 * number(t, v, 0, 1) + 0.5);
+      p.*member = static_cast<int>(255 * set_number(t, v, 0, 1) + 0.5);
     });
   };
   using M = MatcherParameters;

@@ -13,9 +13,9 @@ namespace takt::ground_map {
 constexpr uint8_t kSure = 255;
 
 struct DoubtParameters {
-  int bloom_value = 250;                             ///< from this value on the sensor may have been flooded
-  double shade_deepest = 0.3, shade_faintest = 0.9;  ///< light that a shadow leaves, of that beside it
-  int shade_saturation = 20;                         ///< by how much saturation may differ there, to each side
+  int bloom_value = 250;                              ///< from this value on the sensor may have been flooded
+  double shade_deepest = 0.3, shade_faintest = 0.85;  ///< light that a shadow leaves, of that beside it
+  int shade_saturation = 10;                          ///< by how much saturation may differ there, to each side
   uint8_t doubtful = 64;  ///< confidence, of 255, of a pixel that may be the one or the other
 };
 

@@ -21,10 +21,10 @@ int border_row(ImageView<const uint8_t> mask, int x, uint8_t ground) {
 }  // namespace
 
 void map_image(ImageView<const uint8_t> image, const FloorProjection& in_robot, const PlanarPose& robot_in_map,
-               GroundDetector& detector, GroundGrid& grid, ImageView<uint8_t> mask) {
+               GroundDetector& detector, GroundGrid& grid, ImageView<uint8_t> mask, bool area_free) {
   const FloorPoint robot{robot_in_map.x_m, robot_in_map.y_m};
   detector.analyse(image);
-  detector.learn();
+  if (area_free) detector.learn();
   detector.classify(mask, in_robot);
   grid.centre(robot);
   grid.observe(mask, in_robot.moved(robot_in_map), robot, detector.confidence());

@@ -12,9 +12,10 @@
 
 namespace takt::ground_map {
 
-/// One image as the node maps it: learns, calls its ground, adds it to the map. `in_robot` leads to the robot frame.
+/// One image as the node maps it: learns if its reference area is free, calls its ground, adds it to the map.
+/// `in_robot` leads to the robot frame.
 void map_image(ImageView<const uint8_t> image, const FloorProjection& in_robot, const PlanarPose& robot_in_map,
-               GroundDetector& detector, GroundGrid& grid, ImageView<uint8_t> mask);
+               GroundDetector& detector, GroundGrid& grid, ImageView<uint8_t> mask, bool area_free = true);
 
 /// Ground truth of a pixel.
 enum class Truth : uint8_t { other = 0, ground = 1, ignored = 2 };

@@ -17,7 +17,7 @@ struct DetectorParameters {
   double t_m = 80;           ///< px of a bin that counts, for a reference area of kDefaultAreaPx
   int memory_entries = 500;  ///< N_b: 100 s of frames
   double t_w = 0.9;          ///< weight above which a pixel is ground
-  int mean_size = 5;         ///< px, odd: edge of the box average
+  int mean_size = 9;         ///< px, odd: edge of the box average
   DoubtParameters doubt;
 };
 

@@ -29,7 +29,7 @@ struct GridParameters {
   Votes votes = Votes::columns;
   int votes_min = 5;         ///< a cell with fewer votes is not seen
   int up = 200, down = 100;  ///< added where surely blocked, taken off where free; of 1000
-  int beyond_px = 2;  ///< so far above the first pixel that is not ground its confidence is read, out of the blur
+  int beyond_px = 4;  ///< so far above the first pixel that is not ground its confidence is read, out of the blur
 };
 
 /// A square of cells of the map frame, aligned with its axes; cell (0, 0) is cell (column, row) of the plane.

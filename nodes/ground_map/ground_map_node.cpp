@@ -336,12 +336,12 @@ class GroundMapNode final : public Node {
   Param<double> t_m_{this, "t_m", 80.0, {0.0, 1e6}, "px", "pixels of a bin that counts, for an area of 24576 px"};
   Param<int> n_b_{this, "n_b", 500, {1, 10000}, "", "frames remembered; 100 s times the rate"};
   Param<double> t_w_{this, "t_w", 0.9, {0.0, 5000.0}, "1", "sum of weights above which a pixel is ground"};
-  Param<int> mean_size_{this, "mean_size", 5, {1, 31}, "px", "edge of the box average, odd"};
+  Param<int> mean_size_{this, "mean_size", 9, {1, 31}, "px", "edge of the box average, odd"};
   Param<int> bloom_{this, "bloom", 250, {1, 256}, "1", "value from which on a pixel may have bloomed"};
   Param<double> shade_deepest_{this, "shade_deepest", 0.3, {0.01, 1.0}, "1", "least light that a shadow leaves"};
-  Param<double> shade_faintest_{this, "shade_faintest", 0.9, {0.01, 1.0}, "1", "most light that a shadow leaves"};
+  Param<double> shade_faintest_{this, "shade_faintest", 0.85, {0.01, 1.0}, "1", "most light that a shadow leaves"};
   Param<int> shade_saturation_{
-      this, "shade_saturation", 20, {0, 255}, "1", "by how much saturation differs in a shadow"};
+      this, "shade_saturation", 10, {0, 255}, "1", "by how much saturation differs in a shadow"};
   Param<double> doubt_{this, "doubt", 0.25, {0.0, 1.0}, "1", "confidence where it may be blooming or a shadow"};
   Param<double> cell_{this, "cell", 0.30, {0.05, 1.0}, "m", "edge of a cell"};
   Param<double> window_{this, "window", 18.0, {1.0, 100.0}, "m", "side of the grid around the robot"};

@@ -132,11 +132,14 @@ std::optional<size_t> PavementScene::part_seen(int frame) const {
   return static_cast<size_t>(&near - options_.parts.data());
 }
 
+bool PavementScene::occupied(const FloorPoint& p) const {
+  return std::any_of(boxes_.begin(), boxes_.end(),
+                     [&](const Box& b) { return p.x_m >= b.x0 && p.x_m < b.x1 && p.y_m >= b.y0 && p.y_m < b.y1; });
+}
+
 bool PavementScene::drivable(const FloorPoint& p) const {
   const PavementPart& part = part_at(p.y_m);
-  if (p.x_m < part.left_m || p.x_m >= part.right_m) return false;
-  return std::none_of(boxes_.begin(), boxes_.end(),
-                      [&](const Box& b) { return p.x_m >= b.x0 && p.x_m < b.x1 && p.y_m >= b.y0 && p.y_m < b.y1; });
+  return p.x_m >= part.left_m && p.x_m < part.right_m && !occupied(p);
 }
 
 /// Nearest entry of the ray into the box before `distance`, which it then becomes; face 0: across x, 1: y, 2: top.

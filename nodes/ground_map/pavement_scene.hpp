@@ -49,6 +49,8 @@ class PavementScene {
   /// What the camera sees in that frame: BGR, and values of Truth. Equal for equal seeds, on every machine up to
   /// rounding of the mathematical library.
   void render(int frame, ImageView<uint8_t> bgr, ImageView<uint8_t> truth) const;
+  /// Whether something stands there.
+  bool occupied(const FloorPoint& point) const;
   /// Whether a point of the floor is pavement with nothing on it.
   bool drivable(const FloorPoint& point) const;
 

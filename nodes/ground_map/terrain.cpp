@@ -47,10 +47,12 @@ TerrainMaps TerrainLearning::learnt() const {
 std::optional<double> correlation(std::span<const int16_t> a, std::span<const int16_t> b, Centre centre,
                                   double known_min) {
   int64_t n = 0, sum_a = 0, sum_b = 0, aa = 0, bb = 0, ab = 0;
+  const auto from_middle = [](int16_t cell) { return int64_t{cell == kUnknown ? 0 : cell - kOccupied / 2}; };
   for (size_t i = 0; i < a.size(); ++i) {
-    if (a[i] == kUnknown || b[i] == kUnknown) continue;
-    const int64_t x = a[i] - kOccupied / 2, y = b[i] - kOccupied / 2;
-    ++n;
+    const bool known = a[i] != kUnknown && b[i] != kUnknown;
+    n += known;
+    if (!known && centre == Centre::mean) continue;
+    const int64_t x = from_middle(a[i]), y = from_middle(b[i]);
     sum_a += x, sum_b += y;
     aa += x * x, bb += y * y, ab += x * y;
   }

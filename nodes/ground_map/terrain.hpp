@@ -57,8 +57,9 @@ class TerrainLearning {
 
 /// From where cells are counted when two maps are correlated.
 enum class Centre : uint8_t {
-  undecided,  ///< 500: free and occupied are opposite signs, and a map that is free all over has a correlation, too
-  mean,       ///< of each map (Pearson): a map that is free all over has none
+  undecided,  ///< 500, as which unknown cells count: free and occupied are opposite signs, and so where nothing is
+              ///< known tells kinds apart, and a map that is free all over has a correlation, too
+  mean,       ///< of each map over the cells known in both (Pearson): a map that is free all over has none
 };
 
 struct TerrainParameters {
@@ -68,7 +69,7 @@ struct TerrainParameters {
   int up = 200, down = 100;      ///< of 1000
 };
 
-/// Over the cells known in both, -1..1. None if these are too few, or a map has no contrast.
+/// -1..1. None if too few cells are known in both, or a map has no contrast.
 std::optional<double> correlation(std::span<const int16_t> a, std::span<const int16_t> b, Centre centre,
                                   double known_min);
 

@@ -11,12 +11,20 @@ namespace {
 
 PavementPart part_of(size_t kind, double from_y_m) {
   switch (kind) {
-    case terrain_kind::left: return {from_y_m, -0.9, 2.4};
-    case terrain_kind::right: return {from_y_m, -2.4, 0.9};
+    case terrain_kind::left: return {from_y_m, -1.1, 2.4};
+    case terrain_kind::right: return {from_y_m, -2.4, 1.1};
     case terrain_kind::crossing: return {from_y_m, -4.8, 4.8};
-    case terrain_kind::unknown: return {from_y_m, -1.6, 1.6, Surface::bricks, 0.9};
-    default: return {from_y_m, -1.6, 1.6};
+    case terrain_kind::unknown: return {from_y_m, -2, 2, Surface::bricks, 0.7};
+    default: return {from_y_m, -1.75, 1.75};
   }
+}
+
+/// What a low scanner says of the reference area: whether nothing stands in it.
+bool nothing_stands_in(const ReferenceArea& area, const FloorProjection& in_map, const PavementScene& scene) {
+  for (const RowSpan& span : area.spans())
+    for (int x = span.first; x < span.last; x += 4)
+      if (const auto p = in_map.floor_at(x, span.y); p && scene.occupied(*p)) return false;
+  return true;
 }
 
 }  // namespace
@@ -56,7 +64,8 @@ void TerrainDrive::run(
   for (int frame = 0; frame < pavement_.frames; ++frame) {
     scene.render(frame, image, truth_view);
     const PlanarPose robot = scene.robot_in_map(frame);
-    map_image(image, in_robot, robot, detector, grid, mask_view);
+    map_image(image, in_robot, robot, detector, grid, mask_view,
+              nothing_stands_in(detector.area(), in_robot.moved(robot), scene));
     cells_around(grid.map(), grid.window(), robot, shape, around);
     const std::optional<size_t> part = scene.part_seen(frame);
     seen(around, part ? std::optional(kinds_[*part]) : std::nullopt);

@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <fstream>
+#include <iterator>
 #include <sstream>
 
 namespace takt::ground_map {
@@ -13,21 +15,19 @@ namespace {
 
 class TerrainParser {
  public:
-  explicit TerrainParser(std::string name) : name_(std::move(name)) {}
+  TerrainParser(std::istream& text, const std::string& name) : text_(text), name_(name) {}
 
-  TerrainLearning parse(std::istream& text) {
-    for (std::string line; std::getline(text, line);) {
-      ++line_;
-      std::istringstream rest(line.substr(0, line.find('#')));
-      std::vector<std::string> words;
-      for (std::string word; rest >> word;) words.push_back(word);
-      if (!words.empty()) take(words);
+  TerrainLearning parse() {
+    if (!next()) fail("has no maps; write `cells COLUMNS ROWS LEFT BEHIND METRES`, then maps");
+    const TerrainShape shape = take_shape();
+    TerrainLearning learning(shape);
+    while (next()) {
+      const size_t kind = take_kind();
+      learning.add(kind, take_cells(shape));
     }
-    if (!learning_) fail("has no maps; write `cells COLUMNS ROWS LEFT BEHIND METRES`, then maps");
-    if (rows_missing_ > 0) fail(fmt::format("the last map lacks {} rows", rows_missing_));
     for (size_t kind = 0; kind < kTerrainKinds; ++kind)
-      if (learning_->maps(kind) == 0) fail(fmt::format("has no `map {}`", kTerrainNames[kind]));
-    return std::move(*learning_);
+      if (learning.maps(kind) == 0) fail(fmt::format("has no `map {}`", kTerrainNames[kind]));
+    return learning;
   }
 
  private:
@@ -35,49 +35,51 @@ class TerrainParser {
     throw TerrainError(fmt::format("{}:{}: {}", name_, line_, what));
   }
 
-  void take(const std::vector<std::string>& words) {
-    if (rows_missing_ > 0) take_row(words);
-    else if (words[0] == "cells") take_shape(words);
-    else if (words[0] == "map") begin(words);
-    else fail(fmt::format("unknown word `{}`; valid are cells, map", words[0]));
+  /// The words of the next line that has any; false at the end.
+  bool next() {
+    words_.clear();
+    for (std::string line; words_.empty() && std::getline(text_, line); ++line_) {
+      std::istringstream rest(line.substr(0, line.find('#')));
+      words_.assign(std::istream_iterator<std::string>(rest), {});
+    }
+    return !words_.empty();
   }
 
-  void take_shape(const std::vector<std::string>& words) {
-    if (learning_) fail("`cells` stands there a second time");
-    if (words.size() != 6) fail("`cells` takes COLUMNS ROWS LEFT BEHIND METRES");
-    shape_.columns = whole(words[1], 1, 200);
-    shape_.rows = whole(words[2], 1, 200);
-    shape_.left = whole(words[3], 0, shape_.columns);
-    shape_.behind = whole(words[4], 0, shape_.rows);
-    shape_.cell_m = number(words[5], 0.05, 1);
-    learning_.emplace(shape_);
-    cells_.resize(shape_.cells());
+  TerrainShape take_shape() const {
+    if (words_.size() != 6 || words_[0] != "cells") fail("must begin with `cells COLUMNS ROWS LEFT BEHIND METRES`");
+    TerrainShape shape;
+    shape.columns = whole(words_[1], 1, 200);
+    shape.rows = whole(words_[2], 1, 200);
+    shape.left = whole(words_[3], 0, shape.columns);
+    shape.behind = whole(words_[4], 0, shape.rows);
+    shape.cell_m = number(words_[5], 0.05, 1);
+    return shape;
   }
 
-  void begin(const std::vector<std::string>& words) {
-    if (!learning_) fail("`map` stands before `cells COLUMNS ROWS LEFT BEHIND METRES`");
-    const auto found = std::find(kTerrainNames.begin(), kTerrainNames.begin() + kTerrainKinds, words.back());
-    kind_ = static_cast<size_t>(found - kTerrainNames.begin());
-    if (words.size() != 2 || kind_ == kTerrainKinds) fail("`map` takes left, right, middle or crossing");
-    rows_missing_ = shape_.rows;
+  size_t take_kind() const {
+    const auto end = kTerrainNames.begin() + kTerrainKinds,
+               found = std::find(kTerrainNames.begin(), end, words_.back());
+    if (words_.size() != 2 || words_[0] != "map" || found == end)
+      fail("here must stand `map` with left, right, middle or crossing");
+    return static_cast<size_t>(found - kTerrainNames.begin());
   }
 
-  void take_row(const std::vector<std::string>& words) {
-    if (words.size() != static_cast<size_t>(shape_.columns))
-      fail(fmt::format("the row has {} cells, must have {}", words.size(), shape_.columns));
-    int16_t* row = cells_.data() + static_cast<ptrdiff_t>(--rows_missing_) * shape_.columns;
-    for (const std::string& word : words) *row++ = static_cast<int16_t>(whole(word, kUnknown, kOccupied));
-    if (rows_missing_ == 0) learning_->add(kind_, cells_);
+  std::vector<int16_t> take_cells(const TerrainShape& shape) {
+    std::vector<int16_t> cells(shape.cells());
+    for (int row = shape.rows; row-- > 0;) {
+      if (!next()) fail(fmt::format("the last map lacks {} rows", row + 1));
+      if (words_.size() != static_cast<size_t>(shape.columns))
+        fail(fmt::format("the row has {} cells, must have {}", words_.size(), shape.columns));
+      std::transform(words_.begin(), words_.end(), cells.begin() + static_cast<ptrdiff_t>(row) * shape.columns,
+                     [&](const std::string& word) { return static_cast<int16_t>(whole(word, kUnknown, kOccupied)); });
+    }
+    return cells;
   }
 
   double number(const std::string& word, double low, double high) const {
-    size_t used = 0;
-    double value = NAN;
-    try {
-      value = std::stod(word, &used);
-    } catch (const std::exception&) {
-    }
-    if (used != word.size() || !(value >= low && value <= high))
+    char* end = nullptr;
+    const double value = std::strtod(word.c_str(), &end);
+    if (*end != 0 || !(value >= low && value <= high))
       fail(fmt::format("`{}` is no number in {}..{}", word, low, high));
     return value;
   }
@@ -87,18 +89,15 @@ class TerrainParser {
     return static_cast<int>(value);
   }
 
-  std::string name_;
+  std::istream& text_;
+  const std::string& name_;
   int line_ = 0;
-  TerrainShape shape_;
-  std::optional<TerrainLearning> learning_;
-  size_t kind_ = 0;
-  int rows_missing_ = 0;
-  std::vector<int16_t> cells_;
+  std::vector<std::string> words_;
 };
 
 }  // namespace
 
-TerrainLearning parse_terrain(std::istream& text, const std::string& name) { return TerrainParser(name).parse(text); }
+TerrainLearning parse_terrain(std::istream& text, const std::string& name) { return TerrainParser(text, name).parse(); }
 
 TerrainLearning read_terrain(const std::filesystem::path& file) {
   std::ifstream in(file);
@@ -112,11 +111,10 @@ void write_terrain_shape(std::ostream& out, const TerrainShape& shape) {
 }
 
 void write_terrain_map(std::ostream& out, const TerrainShape& shape, size_t kind, std::span<const int16_t> cells) {
+  const auto columns = static_cast<size_t>(shape.columns);
   out << "map " << kTerrainNames[kind] << '\n';
-  for (int row = shape.rows; row-- > 0;)
-    out << fmt::format(
-        "{}\n",
-        fmt::join(cells.subspan(static_cast<size_t>(row * shape.columns), static_cast<size_t>(shape.columns)), " "));
+  for (auto row = static_cast<size_t>(shape.rows); row-- > 0;)
+    out << fmt::format("{}\n", fmt::join(cells.subspan(row * columns, columns), " "));
 }
 
 }  // namespace takt::ground_map

@@ -67,6 +67,8 @@ TEST_CASE("correlation about the middle of the scale, and about the mean (Pearso
   CHECK(*correlation(a, b, Centre::mean, 0.3) == doctest::Approx(-1.0 / 3));
   CHECK(*correlation(a, a, Centre::mean, 0.3) == doctest::Approx(1));
   CHECK_FALSE(correlation(a, flat, Centre::mean, 0.3).has_value());  // no contrast
+  // What is not known counts as undecided: a alone has four cells of contrast, half has two.
+  CHECK(*correlation(a, half, Centre::undecided, 0.5) == doctest::Approx(2 / std::sqrt(8.0)));
   CHECK(correlation(a, half, Centre::mean, 0.5).has_value());
   CHECK_FALSE(correlation(a, half, Centre::mean, 0.51).has_value());  // too little is known
   CHECK_FALSE(correlation(a, std::vector<int16_t>(4, kUnknown), Centre::undecided, 0).has_value());
@@ -122,14 +124,14 @@ TEST_CASE("what is wrong with a file of maps is told with its line") {
     CHECK_THROWS_WITH_AS(parse_terrain(in, "maps"), doctest::Contains(said), TerrainError);
   };
   refuses("", "maps:0: has no maps");
-  refuses("# nothing\nmap left\n", "maps:2: `map` stands before `cells");
-  refuses("cells 2 1 1 0 0.3\nmap up\n", "maps:2: `map` takes left, right, middle or crossing");
+  refuses("# nothing\nmap left\n", "maps:2: must begin with `cells");
+  refuses("cells 2 1 1 0 0.3\nmap up\n", "maps:2: here must stand `map` with left, right, middle or crossing");
   refuses("cells 2 1 1 0 9\n", "`9` is no number in 0.05..1");
   refuses("cells 2 1 1 0 0.3\nmap left\n0 0 0\n", "maps:3: the row has 3 cells, must have 2");
   refuses("cells 2 1 1 0 0.3\nmap left\n0 1001\n", "`1001` is no number in -1..1000");
   refuses("cells 2 2 1 0 0.3\nmap left\n0 0\n", "the last map lacks 1 rows");
   refuses("cells 2 1 1 0 0.3\nmap left\n0 0\n", "has no `map right`");
-  refuses("cell 2\n", "unknown word `cell`; valid are cells, map");
+  refuses("cell 2\n", "maps:1: must begin with `cells");
 }
 
 TEST_CASE("a generated drive shows each kind, and a part of the images two at once") {
