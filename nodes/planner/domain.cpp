@@ -5,7 +5,7 @@
 
 #include <algorithm>
 #include <set>
-#include <unordered_map>
+#include <unordered_map>  // replay: looked up below, never walked through
 
 namespace takt::planner {
 namespace {
@@ -180,9 +180,9 @@ class Grounder {
   const std::vector<NodeId> action_nodes_;
   semantic::NodeSet set_;
   Domain domain_;
-  std::unordered_map<uint64_t, uint32_t> variables_;
-  std::unordered_map<NodeId, uint32_t> places_;
-  std::unordered_map<uint64_t, std::vector<NodeId>> candidates_;
+  std::unordered_map<uint64_t, uint32_t> variables_;              // replay: as above
+  std::unordered_map<NodeId, uint32_t> places_;                   // replay: as above
+  std::unordered_map<uint64_t, std::vector<NodeId>> candidates_;  // replay: as above
   std::set<std::pair<uint32_t, uint32_t>> pursued_;
   std::set<std::vector<NodeId>> known_;
   std::vector<Fact> wanted_;
