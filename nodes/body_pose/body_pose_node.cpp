@@ -84,7 +84,7 @@ class BodyPoseNode final : public Node {
   Param<double> error_max_{this,         "error_max", DetectorParameters{}.error_max,
                            {0.0, 100.0}, "1",         "fits with a larger error are no bodies"};
   Param<int> links_min_{this, "links_min", DetectorParameters{}.links_min, {1, 15}, "", "links that a body must show"};
-  Param<double> reserve_{this, "reserve", 0.002, {0.0, 0.1}, "s", "with less time left than this the search ends"};
+  Param<double> reserve_{this, "reserve", 0.005, {0.0, 0.1}, "s", "with less time left than this the search ends"};
 
   std::optional<BodyDetector> detector_;
   std::vector<Point> in_robot_;
