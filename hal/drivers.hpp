@@ -52,7 +52,6 @@ struct SettingInfo {
 };
 struct DriverInfo {
   std::string_view name, doc;
-  bool built = true;  ///< false: graphs may name it and are checked, but this build cannot open such hardware
 };
 struct DeviceKind {
   std::string_view name, doc;

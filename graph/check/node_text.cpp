@@ -37,7 +37,7 @@ std::string devices_text() {
   for (const hal::DeviceKind& kind : hal::device_kinds()) {
     std::string drivers;
     for (const hal::DriverInfo& driver : kind.drivers)
-      drivers += fmt::format("{}{}{}", drivers.empty() ? "" : ", ", driver.name, driver.built ? "" : " (not built)");
+      drivers += fmt::format("{}{}", drivers.empty() ? "" : ", ", driver.name);
     text += fmt::format("  {:<14} {:<34} drivers: {}\n", kind.name, kind.doc, drivers);
   }
   return text;
@@ -46,7 +46,7 @@ std::string devices_text() {
 std::string device_text(const hal::DeviceKind& kind) {
   std::string text = fmt::format("{} (sensor layer): {}\n", kind.name, kind.doc);
   for (const hal::DriverInfo& driver : kind.drivers)
-    text += fmt::format("  driver {:<12} {}{}\n", driver.name, driver.doc, driver.built ? "" : " (not built)");
+    text += fmt::format("  driver {:<12} {}\n", driver.name, driver.doc);
   text += fmt::format("  {:<22} {:<10} {:<24} {}\n", "setting", "driver", "value", "meaning; default");
   for (const hal::SettingInfo& setting : kind.settings)
     text += fmt::format("  {:<22} {:<10} {:<24} {}{}\n", setting.name, setting.driver.empty() ? "all" : setting.driver,

@@ -35,14 +35,6 @@ std::string names(const List& list) {
   return all;
 }
 
-std::string built_names(std::span<const DriverInfo> drivers) {
-  std::string all;
-  for (const DriverInfo& driver : drivers) {
-    if (driver.built) all.append(all.empty() ? "" : ", ").append(driver.name);
-  }
-  return all;
-}
-
 Rate rate_of(Settings& settings) {
   Rate rate{15, 1};
   if (!settings.has("rate")) return rate;
@@ -375,9 +367,6 @@ NodeResult make_device(const DeviceConfig& config, Devices& devices, const Clock
     return device_error(config.id, config.kind + " has no driver `" + config.driver + "`",
                         "known drivers: " + names(kind->drivers));
   if (const auto keys = check_keys(config, *kind); !keys) return tl::unexpected(keys.error());
-  if (!driver->built)
-    return device_failure(config.id, "this build cannot open the driver `" + config.driver + "`",
-                          "choose a profile whose devices use one of: " + built_names(kind->drivers));
   Settings settings(config.id, config.settings, config.directory);
   const DeviceHealthSettings health = health_of(config, settings);
   NodeResult node = config.driver == "sim"      ? make_sim(config, settings, devices, clock)

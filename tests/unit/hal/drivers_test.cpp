@@ -41,21 +41,6 @@ TEST_CASE("unknown kinds, drivers and settings list the valid ones") {
   CHECK(has(error(config("mobile_base", "sim", {{"world", "worlds/lab.xml"}, {"drive", "walk"}})), "path or command"));
 }
 
-TEST_CASE("a driver that this build lacks is a failing device, not bad input") {
-  VirtualClock clock;
-  Devices devices;
-  for (const DeviceKind& kind : device_kinds()) {
-    for (const DriverInfo& driver : kind.drivers) {
-      if (driver.built) continue;
-      const auto node = make_device(config(std::string(kind.name), std::string(driver.name), {}), devices, clock);
-      REQUIRE_FALSE(node);
-      CHECK_FALSE(node.error().bad_input);
-      CHECK(has(node.error().text(), "driver `" + std::string(driver.name) + "`"));
-      CHECK(has(node.error().fix, "use one of: sim"));
-    }
-  }
-}
-
 TEST_CASE("every kind can be made with every setting that its listing calls required, and no other") {
   VirtualClock clock;
   for (const DeviceKind& kind : device_kinds()) {
