@@ -62,6 +62,12 @@ FIELDS(StopCommand, F(StopCommand, reasons, ""), F(StopCommand, nearest_m, "m"),
 FIELDS(Requests, F(Requests, wanted, ""))
 FIELDS(TextStatus, F(TextStatus, text, ""))
 FIELDS(Terrain, F(Terrain, kind, ""), F(Terrain, hypotheses, "1"), F(Terrain, correlations, "1"))
+FIELDS(ObjectReports, F(ObjectReports, in_map, ""), F(ObjectReports, names, ""), F(ObjectReports, places, ""),
+       F(ObjectReports, attributes, ""))
+FIELDS(Task, F(Task, number, "1"), F(Task, text, ""))
+FIELDS(ActionCommand, F(ActionCommand, number, "1"), F(ActionCommand, action, ""), F(ActionCommand, objects, ""))
+FIELDS(ActionOutcome, F(ActionOutcome, number, "1"), F(ActionOutcome, state, ""), F(ActionOutcome, duration_s, "s"),
+       F(ActionOutcome, reason, ""))
 
 #undef F
 #undef FIELDS
@@ -69,14 +75,15 @@ FIELDS(Terrain, F(Terrain, kind, ""), F(Terrain, hypotheses, "1"), F(Terrain, co
 #undef CAMERA_FIELDS
 
 std::span<const MessageType* const> message_types() {
-  static const std::array<const MessageType*, 20> types{
-      &MessageType::of<Image>(),        &MessageType::of<StereoPair>(),  &MessageType::of<DisparityMap>(),
-      &MessageType::of<PointCloud>(),   &MessageType::of<LaserScan>(),   &MessageType::of<Odometry>(),
-      &MessageType::of<Pose>(),         &MessageType::of<Motion>(),      &MessageType::of<Detections>(),
-      &MessageType::of<Objects3d>(),    &MessageType::of<BodyPoses>(),   &MessageType::of<Grid>(),
-      &MessageType::of<HeadState>(),    &MessageType::of<HeadCommand>(), &MessageType::of<VelocityCommand>(),
-      &MessageType::of<DigitalState>(), &MessageType::of<StopCommand>(), &MessageType::of<Requests>(),
-      &MessageType::of<TextStatus>(),   &MessageType::of<Terrain>()};
+  static const std::array<const MessageType*, 24> types{
+      &MessageType::of<Image>(),        &MessageType::of<StereoPair>(),    &MessageType::of<DisparityMap>(),
+      &MessageType::of<PointCloud>(),   &MessageType::of<LaserScan>(),     &MessageType::of<Odometry>(),
+      &MessageType::of<Pose>(),         &MessageType::of<Motion>(),        &MessageType::of<Detections>(),
+      &MessageType::of<Objects3d>(),    &MessageType::of<BodyPoses>(),     &MessageType::of<Grid>(),
+      &MessageType::of<HeadState>(),    &MessageType::of<HeadCommand>(),   &MessageType::of<VelocityCommand>(),
+      &MessageType::of<DigitalState>(), &MessageType::of<StopCommand>(),   &MessageType::of<Requests>(),
+      &MessageType::of<TextStatus>(),   &MessageType::of<Terrain>(),       &MessageType::of<ObjectReports>(),
+      &MessageType::of<Task>(),         &MessageType::of<ActionCommand>(), &MessageType::of<ActionOutcome>()};
   return types;
 }
 

@@ -196,8 +196,8 @@ struct Objects3d {
   static void capacities(const Capacity& c, std::span<uint32_t> a) { a[0] = c.count; }
 };
 
-/// Where a joint of a body is. fitted 1: a point shows it; 0.5: it must be hidden behind one, and its limb has the length
-/// that it should have; 0: it could not be found, and x, y, z are 0.
+/// Where a joint of a body is. fitted 1: a point shows it; 0.5: it must be hidden behind one, and its limb has the
+/// length that it should have; 0: it could not be found, and x, y, z are 0.
 struct BodyJoint {
   float x, y, z, fitted;
 };
@@ -331,6 +331,76 @@ struct Terrain {
   uint8_t kind = terrain_kind::unknown;  ///< the strongest hypothesis
   float hypotheses[5] = {};              ///< 0..1 for each terrain_kind
   float correlations[4] = {};            ///< -1..1 of the newest map with that of a kind; 0: too little is known
+  static std::span<const Field> fields();
+  static void capacities(const Capacity&, std::span<uint32_t>) {}
+};
+
+/// What an object is called and of which type it is, as the semantic network has it; ended by 0.
+struct ObjectName {
+  using scalar = char;
+  char name[32] = {};  ///< empty: a thing just seen, which nobody has named yet
+  char type[32] = {};
+};
+struct ObjectPlace {
+  using scalar = float;
+  float x_m, y_m, z_m, yaw_rad;
+  float score;  ///< 0..1: how sure the type is
+  float
+      attributes;  ///< how many of ObjectReports::attributes are this object's; they follow those of the object before
+};
+struct ObjectAttribute {
+  using scalar = char;
+  char name[32] = {};
+  char value[32] = {};  ///< as a network file writes it
+};
+
+/// Objects as the semantic network knows them, by names, so that ends with different networks understand each other.
+/// names and places have one entry an object. Capacity: count (objects; eight times as many attributes).
+struct ObjectReports {
+  static constexpr std::string_view type_name = "object_reports";
+  uint8_t in_map = 0;  ///< 0: places in the robot frame; 1: in the map frame
+  Array<ObjectName> names;
+  Array<ObjectPlace> places;
+  Array<ObjectAttribute> attributes;
+  static std::span<const Field> fields();
+  static void capacities(const Capacity& c, std::span<uint32_t> a) {
+    a[0] = a[1] = c.count;
+    a[2] = 8 * c.count;
+  }
+};
+
+/// What somebody wants of the robot, such as a goal in words. State and not an event: repeated until another one comes.
+/// Capacity: count (characters).
+struct Task {
+  static constexpr std::string_view type_name = "task";
+  uint32_t number = 0;  ///< 0: none yet; another number is another task, its text may be the same
+  Array<char> text;
+  static std::span<const Field> fields();
+  static void capacities(const Capacity& c, std::span<uint32_t> a) { a[0] = c.count; }
+};
+
+/// An action of the semantic network to be carried out. State and not an event, as Task.
+struct ActionCommand {
+  static constexpr std::string_view type_name = "action_command";
+  uint32_t number = 0;       ///< 0: none yet
+  char action[32] = {};      ///< ended by 0
+  char objects[4][32] = {};  ///< names of the objects, in the order of the action's roles; empty: no such role
+  static std::span<const Field> fields();
+  static void capacities(const Capacity&, std::span<uint32_t>) {}
+};
+
+/// What became of an action (ActionOutcome::state).
+namespace action_state {
+constexpr uint8_t none = 0, under_way = 1, done = 2, refused = 3, failed = 4;
+}
+
+/// How far the action of the newest command is.
+struct ActionOutcome {
+  static constexpr std::string_view type_name = "action_outcome";
+  uint32_t number = 0;  ///< of the command; 0: none yet
+  uint8_t state = action_state::none;
+  double duration_s = 0;  ///< so far, or of the whole
+  char reason[128] = {};  ///< why it was refused or has failed; ended by 0
   static std::span<const Field> fields();
   static void capacities(const Capacity&, std::span<uint32_t>) {}
 };
