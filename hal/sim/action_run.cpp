@@ -12,6 +12,8 @@
 namespace takt::sim {
 namespace {
 
+constexpr int64_t kPatienceNs = 500'000'000;  // as long others are waited for
+
 /// A text of a message, also of one that somebody forgot to end.
 template <size_t N>
 std::string_view text_of(const char (&field)[N]) {
@@ -176,7 +178,7 @@ void ActionRun::advance(int64_t now_ns) {
   const int64_t horizon_ns = now_ns + kLatencyNs;
   while (waiting_count_ > 0) {
     const int64_t next_ns = waiting_[0].next_ns();
-    if (next_ns > horizon_ns || (next_ns > now_ns && !others_settled(next_ns))) break;
+    if (next_ns > horizon_ns || (next_ns + kPatienceNs > now_ns && !others_settled(next_ns))) break;
     proceed();
   }
   settled_ns_.store(waiting_count_ > 0 ? std::min(horizon_ns, waiting_[0].end_ns - 1) : horizon_ns,

@@ -18,10 +18,12 @@ constexpr double kReach = 0.8;
 /// and at its end each object has to be within reach and each requirement has to hold, then its results come true. One
 /// thread; settled_ns() any.
 ///
-/// Robots work on the same objects without waiting for each other: what a command does, it does kLatencyNs later at the
-/// earliest (the lookahead of Chandy and Misra 1979), so each robot's run goes up to the instant to which all others
-/// have settled theirs, and what happened is in the order of instants, then of clients. Whoever falls behind by more
-/// than kLatencyNs is not waited for: then timing decides what he finds.
+/// Robots work on the same objects without locks: what a command does, it does kLatencyNs later at the earliest (the
+/// lookahead of Chandy and Misra 1979), so each robot's run goes up to the instant to which all others have settled
+/// theirs, and what happens is in the order of instants, then of clients, whoever's job came first. Jobs of n robots
+/// within kLatencyNs / (n + 1) of each other settle everything before it happens (of one robot: within kLatencyNs);
+/// with slower ones a change may come to be known after its instant. Who says nothing for half a second is not waited
+/// for.
 class ActionRun {
  public:
   /// `robot`: its client in the stage's world. The stage must outlive this.

@@ -14,7 +14,7 @@ struct PerceptionModel {
   double unknown = 0;                    ///< probability that an attribute in view is not
   double score = 1;                      ///< how sure of a type it says to be
   bool names = true;                     ///< tells what objects are called
-  std::vector<std::string> types;        ///< of the objects that it knows; empty: all
+  std::vector<std::string> types{};      ///< of the objects that it knows; empty: all
 };
 
 /// Objects of the simulated world in the robot's view. What is missed, and by how much a place is off, depends on seed,

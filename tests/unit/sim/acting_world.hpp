@@ -22,7 +22,7 @@ inline std::string acting_xml(const std::string& more = "") {
 <object name="cup" type="cup" x="1.95m" y="3.25m"><box z="0.7m" width="0.1m" depth="0.1m" height="0.12m" material="red_stripes"/>
   <attr name="level" value="empty"/>
   <look when="level=full"><box z="0.7m" width="0.1m" depth="0.1m" height="0.12m" material="blue_stripes"/></look></object>
-<object name="bottle" type="bottle" x="2.05m" y="3.25m"><box z="0.7m" width="0.1m" depth="0.1m" height="0.3m"/>
+<object name="bottle" type="bottle" x="2.05m" y="3.35m"><box z="0.7m" width="0.1m" depth="0.1m" height="0.3m"/>
   <attr name="level" value="full"/><attr name="closed" value="true"/></object>
 <object name="table" type="table" x="0.95m" y="3.25m"><box width="0.3m" depth="0.3m" height="0.7m"/></object>
 <object name="crate" type="crate" x="5.5m" y="5m"><box width="0.5m" depth="0.5m" height="0.5m"/></object>
