@@ -38,6 +38,8 @@ class DeviceNode : public Node {
   /// only what can be marked as such is sent: `marks_damage` says that the message has a place for it. `repeated`: the
   /// data are those of the job before.
   bool accept(ReadStatus status, Job& job, bool marks_damage = false, bool repeated = false);
+  /// In the mode in which the robot stays where it is; in a mode without a name nobody has said that it may move.
+  static bool stands(std::string_view mode) { return mode.empty() || mode == kSafeStopMode; }
 
  private:
   void judge(ReadStatus status, Job& job, bool repeated);

@@ -14,7 +14,8 @@
 
 namespace takt::sim {
 class Simulation;
-}
+class Stage;
+}  // namespace takt::sim
 
 namespace takt::hal {
 
@@ -26,18 +27,19 @@ struct DeviceConfig {
   uint64_t seed = 0;
 };
 
-/// What the devices of one process share: the simulated worlds, one per world file, client and seed. Must outlive the
-/// nodes. Composition thread only.
+/// What the devices of one process share: the simulated worlds, one per world file and seed, with one robot for each
+/// client that a device names. Must outlive the nodes. Composition thread only.
 class Devices {
  public:
   Devices();
   ~Devices();
   tl::expected<sim::Simulation*, DeviceError> world(const DeviceConfig& config);
-  /// The simulation of the first sim device (for ground truth, fault injection), or null.
+  /// The simulation of the first client of the sim devices (for ground truth, fault injection), or null.
   sim::Simulation* first_world();
 
  private:
-  std::map<std::string, std::unique_ptr<sim::Simulation>> worlds_;
+  std::map<std::string, std::shared_ptr<sim::Stage>> stages_;                          ///< by file and seed
+  std::map<std::pair<std::string, size_t>, std::unique_ptr<sim::Simulation>> robots_;  ///< by that and client
 };
 
 enum class SettingKind : uint8_t { path, length, angle, speed, turn_rate, time, rate, count, number, flag, text, map };

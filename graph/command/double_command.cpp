@@ -44,7 +44,7 @@ struct DoubleKind {
 
 /// A scanner on the robot of the simulated world, which drives its path.
 RangeSource source_in(const Surroundings& s) {
-  return [&world = s.world](const Sweep& sweep, std::span<float> range_m) {
+  return [&world = s.world, met = s.world.make_snapshot()](const Sweep& sweep, std::span<float> range_m) mutable {
     sim::LaserModel model;
     model.beams = static_cast<uint32_t>(range_m.size());
     model.fov_rad = sweep.step_rad * static_cast<double>(range_m.size() - 1);
@@ -55,7 +55,7 @@ RangeSource source_in(const Surroundings& s) {
     model.sensor_in_robot.z = 0.25;
     model.sensor_in_robot.qw = std::cos(middle / 2);
     model.sensor_in_robot.qz = std::sin(middle / 2);
-    sim::scan(world, model, sweep.first_ns, range_m);
+    sim::scan(world, model, sweep.first_ns, range_m, met);
   };
 }
 

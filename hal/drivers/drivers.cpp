@@ -5,6 +5,7 @@
 #include <cmath>
 #include <sstream>
 
+#include "hal/actor/actor_node.hpp"
 #include "hal/base/base_node.hpp"
 #include "hal/base/can_base.hpp"
 #include "hal/camera/stereo_camera_node.hpp"
@@ -15,6 +16,7 @@
 #include "hal/head/can_head.hpp"
 #include "hal/head/head_node.hpp"
 #include "hal/laser/laser_node.hpp"
+#include "hal/object_sensor/object_sensor_node.hpp"
 #include "hal/replay/replay_base.hpp"
 #include "hal/replay/replay_camera.hpp"
 #include "hal/replay/replay_laser.hpp"
@@ -22,6 +24,7 @@
 #include "hal/sim/failing_devices.hpp"
 #include "hal/sim/sim_camera.hpp"
 #include "hal/sim/sim_devices.hpp"
+#include "hal/sim/sim_objects.hpp"
 
 namespace takt::hal {
 namespace {
@@ -193,6 +196,34 @@ NodeResult make_sim_base(const DeviceConfig& config, Settings& settings, sim::Si
   return opened<BaseNode>(std::move(device), settings);
 }
 
+/// "estop, 5": the parts between the commas.
+std::vector<std::string> list_of(Settings& settings, const std::string& name, const std::string& fallback) {
+  std::vector<std::string> parts;
+  std::stringstream text(settings.text(name, fallback));
+  for (std::string part; std::getline(text, part, ',');) {
+    const size_t begin = part.find_first_not_of(' '), end = part.find_last_not_of(' ');
+    if (begin == std::string::npos)
+      settings.fail("`" + name + "` has an empty part", "write names with commas between");
+    else parts.push_back(part.substr(begin, end - begin + 1));
+  }
+  return parts;
+}
+
+NodeResult make_sim_object_sensor(const DeviceConfig& config, Settings& settings, sim::Simulation& world) {
+  sim::PerceptionModel model;
+  model.fov_rad = settings.quantity("fov", Dimension::angle, model.fov_rad);
+  model.range_m = settings.quantity("range", Dimension::length, model.range_m);
+  model.sigma_m = settings.quantity("noise", Dimension::length, model.sigma_m);
+  model.miss = settings.quantity("miss", Dimension::number, model.miss);
+  model.unknown = settings.quantity("unknown", Dimension::number, model.unknown);
+  model.score = settings.quantity("score", Dimension::number, model.score);
+  model.names = settings.flag("names", model.names);
+  model.types = list_of(settings, "types", "");
+  std::unique_ptr<ObjectSensor> device = std::make_unique<sim::SimObjectSensor>(config.id, std::move(model), world);
+  device = with_failures<sim::FailingObjectSensor>(std::move(device), settings);
+  return opened<ObjectSensorNode>(std::move(device), settings);
+}
+
 NodeResult make_sim(const DeviceConfig& config, Settings& settings, Devices& devices, const Clock& clock) {
   auto world = devices.world(config);
   if (!world) return tl::unexpected(world.error());
@@ -203,6 +234,12 @@ NodeResult make_sim(const DeviceConfig& config, Settings& settings, Devices& dev
     std::unique_ptr<CameraHead> device = std::make_unique<sim::SimHead>(config.id, **world);
     device = with_failures<sim::FailingHead>(std::move(device), settings);
     return opened<HeadNode>(std::move(device), settings);
+  }
+  if (config.kind == "object_sensor") return make_sim_object_sensor(config, settings, **world);
+  if (config.kind == "actor") {
+    std::unique_ptr<Actor> device = std::make_unique<sim::SimActor>(config.id, **world);
+    device = with_failures<sim::FailingActor>(std::move(device), settings);
+    return opened<ActorNode>(std::move(device), settings);
   }
   std::unique_ptr<DigitalLines> device = std::make_unique<sim::SimLines>(config.id, **world);
   device = with_failures<sim::FailingLines>(std::move(device), settings);
@@ -255,19 +292,6 @@ NodeResult make_v4l2_camera(const DeviceConfig& config, Settings& settings, cons
   std::unique_ptr<StereoCamera> device = std::make_unique<v4l2::V4l2Camera>(
       config.id, std::move(camera), std::make_unique<v4l2::KernelVideoDevice>(), clock);
   return opened<StereoCameraNode>(std::move(device), settings, thresholds_of(settings));
-}
-
-/// "estop, 5": the parts between the commas.
-std::vector<std::string> list_of(Settings& settings, const std::string& name, const std::string& fallback) {
-  std::vector<std::string> parts;
-  std::stringstream text(settings.text(name, fallback));
-  for (std::string part; std::getline(text, part, ',');) {
-    const size_t begin = part.find_first_not_of(' '), end = part.find_last_not_of(' ');
-    if (begin == std::string::npos)
-      settings.fail("`" + name + "` has an empty part", "write names with commas between");
-    else parts.push_back(part.substr(begin, end - begin + 1));
-  }
-  return parts;
 }
 
 NodeResult make_gpio_lines(const DeviceConfig& config, Settings& settings, const Clock& clock) {
@@ -330,21 +354,21 @@ tl::expected<sim::Simulation*, DeviceError> Devices::world(const DeviceConfig& c
   const auto file = settings.path("world", true);
   const std::string client = settings.text("client", "");
   if (settings.error()) return tl::unexpected(*settings.error());
-  const std::string key =
-      std::filesystem::weakly_canonical(file).string() + "\n" + client + "\n" + std::to_string(config.seed);
-  auto& slot = worlds_[key];
-  if (!slot) {
-    auto loaded = sim::Simulation::load(config.id, file, client, config.seed);
-    if (!loaded) {
-      worlds_.erase(key);
-      return tl::unexpected(loaded.error());
-    }
-    slot = std::move(*loaded);
+  const std::string key = std::filesystem::weakly_canonical(file).string() + "\n" + std::to_string(config.seed);
+  auto stage = stages_.find(key);
+  if (stage == stages_.end()) {
+    auto loaded = sim::Stage::load(config.id, file, config.seed);
+    if (!loaded) return tl::unexpected(loaded.error());
+    stage = stages_.emplace(key, std::move(*loaded)).first;
   }
-  return slot.get();
+  const auto index = sim::Simulation::find_client(*stage->second, config.id, file, client);
+  if (!index) return tl::unexpected(index.error());
+  auto& robot = robots_[{key, *index}];
+  if (!robot) robot = std::make_unique<sim::Simulation>(stage->second, *index);
+  return robot.get();
 }
 
-sim::Simulation* Devices::first_world() { return worlds_.empty() ? nullptr : worlds_.begin()->second.get(); }
+sim::Simulation* Devices::first_world() { return robots_.empty() ? nullptr : robots_.begin()->second.get(); }
 
 std::unique_ptr<DeviceNode> make_shell(std::string_view kind) {
   if (kind == "stereo_camera") return std::make_unique<StereoCameraNode>(nullptr);
@@ -352,6 +376,8 @@ std::unique_ptr<DeviceNode> make_shell(std::string_view kind) {
   if (kind == "camera_head") return std::make_unique<HeadNode>(nullptr);
   if (kind == "mobile_base") return std::make_unique<BaseNode>(nullptr);
   if (kind == "digital_lines") return std::make_unique<LinesNode>(nullptr);
+  if (kind == "object_sensor") return std::make_unique<ObjectSensorNode>(nullptr);
+  if (kind == "actor") return std::make_unique<ActorNode>(nullptr);
   throw std::logic_error("device kind " + std::string(kind) + " has no node in hal/drivers/drivers.cpp");
 }
 

@@ -18,6 +18,8 @@ constexpr DriverInfo kBaseDrivers[] = {{"sim", "the simulated world"},
                                        {"can", "the mobile base on a CAN bus"}};
 constexpr DriverInfo kLinesDrivers[] = {{"sim", "the simulated world"}, {"gpio", "lines of a GPIO chip"}};
 
+constexpr DriverInfo kSimulated[] = {{"sim", "the simulated world"}};
+
 #define COMMON_SETTINGS                                                                                                \
   {"rate", "", rate, false, "releases per second of the device's node"},                                               \
       {"model", "", text, false, "name of the hardware model, for the reader"},                                        \
@@ -120,12 +122,27 @@ constexpr SettingInfo kLines[] = {
     {"pulse", "gpio", time, false, "how long the trigger is high, at most 1ms; 0.1ms"},
 };
 
+constexpr SettingInfo kObjectSensor[] = {
+    COMMON_SETTINGS,
+    {"fov", "sim", angle, false, "angle of its view; 66deg"},
+    {"range", "sim", length, false, "largest distance; 5m"},
+    {"noise", "sim", length, false, "standard deviation of a place along each axis; 0m"},
+    {"miss", "sim", number, false, "probability that an object in view is not reported; 0"},
+    {"unknown", "sim", number, false, "probability that an attribute of a reported object is not; 0"},
+    {"score", "sim", number, false, "how sure of an object's type it says to be, 0..1; 1"},
+    {"names", "sim", flag, false, "tells what objects are called; true"},
+    {"types", "sim", text, false, "types that it knows: cup, bottle; all of the world"},
+};
+constexpr SettingInfo kActor[] = {COMMON_SETTINGS};
+
 constexpr DeviceKind kKinds[] = {
     {"stereo_camera", "gives `pair`", kCameraDrivers, kCamera},
     {"laser_scanner", "gives `scan`", kLaserDrivers, kLaser},
     {"camera_head", "gives `state`, takes `command`", kHeadDrivers, kHead},
     {"mobile_base", "gives `odometry`, takes `velocity` and `stop`", kBaseDrivers, kBase},
     {"digital_lines", "gives `state`", kLinesDrivers, kLines},
+    {"object_sensor", "gives `objects`", kSimulated, kObjectSensor},
+    {"actor", "gives `outcome`, takes `command`", kSimulated, kActor},
 };
 
 }  // namespace

@@ -4,11 +4,13 @@
 #include <memory>
 #include <utility>
 
+#include "hal/actor/actor.hpp"
 #include "hal/base/mobile_base.hpp"
 #include "hal/camera/stereo_camera.hpp"
 #include "hal/gpio/digital_lines.hpp"
 #include "hal/head/camera_head.hpp"
 #include "hal/laser/laser_scanner.hpp"
+#include "hal/object_sensor/object_sensor.hpp"
 #include "hal/sim/failures.hpp"
 #include "rt/time/clock.hpp"
 
@@ -130,6 +132,31 @@ class FailingLines final : public FailingDevice<DigitalLines> {
 
  private:
   LinesReading kept_reading_;
+};
+
+class FailingObjectSensor final : public FailingDevice<ObjectSensor> {
+ public:
+  using FailingDevice::FailingDevice;
+  DeviceResult open() override;
+  uint32_t most_objects() const override { return inner().most_objects(); }
+  ObjectReading read(ObjectReports& reports, int64_t wanted_ns, int64_t deadline_ns) override;
+
+ private:
+  std::vector<ObjectName> kept_names_;
+  std::vector<ObjectPlace> kept_places_;
+  std::vector<ObjectAttribute> kept_attributes_;
+};
+
+class FailingActor final : public FailingDevice<Actor> {
+ public:
+  using FailingDevice::FailingDevice;
+  bool command(const ActionCommand& command, int64_t at_ns) override {
+    return plugged(at_ns) && inner().command(command, at_ns);
+  }
+  ActorReading read(int64_t wanted_ns, int64_t deadline_ns) override;
+
+ private:
+  ActorReading kept_reading_;
 };
 
 }  // namespace takt::sim

@@ -12,7 +12,9 @@ namespace {
 constexpr int64_t kTickNs = 10'000'000;
 }
 
-void scan(const Simulation& simulation, const LaserModel& model, int64_t first_ns, std::span<float> range_m) {
+void scan(const Simulation& simulation, const LaserModel& model, int64_t first_ns, std::span<float> range_m,
+          Snapshot& met) {
+  simulation.look(first_ns, met);
   const Transform& t = model.sensor_in_robot;
   // Yaw of the scanner's forward axis (robot y) about z; the scan plane stays horizontal.
   const double yaw = 2.0 * std::atan2(t.qz, t.qw);
@@ -24,8 +26,8 @@ void scan(const Simulation& simulation, const LaserModel& model, int64_t first_n
     const double c = std::cos(s.theta_rad), n = std::sin(s.theta_rad);
     const Vec2 origin(s.x_m + n * t.x + c * t.y, s.y_m - c * t.x + n * t.y);
     const double angle = s.theta_rad + yaw - model.fov_rad / 2 + static_cast<double>(i) * step;
-    const double range = cast_ray(simulation.world(), simulation.scene(), origin,
-                                  Vec2(std::cos(angle), std::sin(angle)), t.z, model.max_range_m);
+    const double range =
+        simulation.stage().cast_ray(met, origin, Vec2(std::cos(angle), std::sin(angle)), t.z, model.max_range_m);
     const double noise =
         model.sigma_m * normal(simulation.seed() ^ 0x1A5E6, static_cast<uint64_t>(first_ns - simulation.epoch_ns()), i);
     range_m[i] = range >= model.max_range_m ? 0.0f : static_cast<float>(std::max(range + noise, 0.001));

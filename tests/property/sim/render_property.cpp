@@ -7,6 +7,8 @@
 #include <limits>
 
 #include "hal/sim/random.hpp"
+#include "tests/on_each_target.hpp"
+#include "tests/unit/sim/acting_world.hpp"
 #include "tests/unit/sim/small_world.hpp"
 
 using namespace takt;
@@ -85,6 +87,46 @@ TEST_CASE("depth agrees with a ray caster from random poses") {
   }
   CHECK(compared > 50'000);
   // A pixel may differ where a ray grazes an edge: rounding decides.
+  CHECK(wrong <= compared / 2000);
+}
+
+TEST_CASE("what moves is drawn where it stands, in each state, with the same bytes by every SIMD target") {
+  Simulation s(test::acting_stage(R"(<client name="eye" x="3.2m" y="3.2m" theta="180deg"/>
+      <event at="1s" object="cup" attr="level" value="full"/><event at="2s" object="cup" x="2.6m" y="3.3m" yaw="40deg"/>
+      <event at="3s" object="door" x="2m" y="4.5m" yaw="60deg"/><event at="3s" object="door" attr="closed" value="true"/>)"),
+               2);
+  s.begin(0);
+  const StereoRig rig = test::small_rig();
+  const CameraPose pose = s.camera_pose(rig, 0, 0);
+  Renderer renderer({rig.width, rig.height, rig.focal_px, rig.cu_px, rig.cv_px});
+  std::vector<uint8_t> image(static_cast<size_t>(rig.width * rig.height * 3));
+  std::vector<float> depth(static_cast<size_t>(rig.width * rig.height));
+  std::vector<std::vector<uint8_t>> states;
+  Snapshot snapshot = s.make_snapshot();
+  int compared = 0, wrong = 0;
+  for (int64_t k = 0; k < 4; ++k) {
+    s.look(k * test::kSecond, snapshot);
+    std::vector<std::vector<uint8_t>> by_target;
+    test::on_each_target([&] {
+      renderer.render(snapshot.scene, pose, {}, 4, {image.data(), rig.width, rig.height, 3}, depth.data());
+      by_target.push_back(image);
+      CHECK(image == by_target.front());
+    });
+    states.push_back(image);
+    for (int64_t before = 0; before < k; ++before) CHECK(states[static_cast<size_t>(before)] != image);
+    Scene all = *snapshot.scene.fixed;
+    all.quads.insert(all.quads.end(), snapshot.scene.quads.begin(), snapshot.scene.quads.end());
+    for (int y = 0; y < rig.height; y += 2) {
+      for (int x = 0; x < rig.width; x += 2) {
+        const Vec3 ray = pose.rotation * Vec3((x - rig.cu_px) / rig.focal_px, (y - rig.cv_px) / rig.focal_px, 1);
+        const double expected = reference_depth(all, pose.position, ray),
+                     got = static_cast<double>(depth[static_cast<size_t>(y * rig.width + x)]);
+        ++compared;
+        if (std::abs(got - expected) > 1e-3 * expected) ++wrong;
+      }
+    }
+  }
+  MESSAGE(wrong, " of ", compared, " pixels differ");
   CHECK(wrong <= compared / 2000);
 }
 

@@ -3,8 +3,10 @@
 
 #include <doctest/doctest.h>
 
+#include "hal/sim/simulation.hpp"
 #include "rt/time/rate.hpp"
 #include "tests/conformance/fake_writer.hpp"
+#include "tests/temporary_folder.hpp"
 #include "tests/unit/replay/carmen_file.hpp"
 
 using namespace takt;
@@ -30,7 +32,7 @@ const nlohmann::json kWorld = {{"world", "worlds/lab.xml"}};
 
 TEST_CASE("unknown kinds, drivers and settings list the valid ones") {
   CHECK(has(error(config("radar", "sim", kWorld)),
-            "stereo_camera, laser_scanner, camera_head, mobile_base, digital_lines"));
+            "stereo_camera, laser_scanner, camera_head, mobile_base, digital_lines, object_sensor, actor"));
   CHECK(has(error(config("stereo_camera", "v4l", kWorld)), "known drivers: sim, replay, v4l2"));
   CHECK(has(error(config("laser_scanner", "sim", {{"world", "worlds/lab.xml"}, {"beans", 3}})),
             "unknown setting `beans`"));
@@ -177,7 +179,9 @@ TEST_CASE("laser, head, base and line nodes send one message a job, and share on
        std::initializer_list<std::pair<const char*, const char*>>{{"laser_scanner", "scan"},
                                                                   {"camera_head", "state"},
                                                                   {"mobile_base", "odometry"},
-                                                                  {"digital_lines", "state"}}) {
+                                                                  {"digital_lines", "state"},
+                                                                  {"object_sensor", "objects"},
+                                                                  {"actor", "outcome"}}) {
     auto made = make_device(config(kind, "sim", kWorld), devices, clock);
     REQUIRE_MESSAGE(made.has_value(), (made ? "" : made.error().text()));
     DeviceNode& node = **made;
@@ -191,6 +195,43 @@ TEST_CASE("laser, head, base and line nodes send one message a job, and share on
     CHECK_FALSE(job.without_result());
   }
   CHECK(devices.first_world() != nullptr);
+}
+
+TEST_CASE("devices of one world file and seed share it; its first client may be named or not") {
+  const test::TemporaryFolder folder;
+  const std::string file =
+      folder
+          .write("two.xml",
+                 "<world resolution=\"0.5m\"><rows>######## #......# #......# ########</rows>"
+                 "<client name=\"ace\" x=\"1m\" y=\"1m\"/><client name=\"bea\" x=\"3m\" y=\"1m\"/></world>")
+          .string();
+  Devices devices;
+  const auto world = [&](const char* client, uint64_t seed) {
+    DeviceConfig wanted = config("mobile_base", "sim", {{"world", file}, {"client", client}});
+    wanted.seed = seed;
+    const auto made = devices.world(wanted);
+    REQUIRE_MESSAGE(made.has_value(), (made ? "" : made.error().text()));
+    return *made;
+  };
+  CHECK(world("", 1) == world("ace", 1));
+  CHECK(world("ace", 1) != world("bea", 1));
+  CHECK(&world("ace", 1)->stage() == &world("bea", 1)->stage());
+  CHECK(&world("ace", 1)->stage() != &world("ace", 2)->stage());
+  CHECK(has(error(config("actor", "sim", {{"world", file}, {"client", "cid"}})), "ace, bea"));
+  CHECK(has(error(config("actor", "sim", {{"world", file}})), "has no actions"));
+}
+
+TEST_CASE("settings of the object sensor") {
+  const auto with = [](const char* name, const nlohmann::json& value) {
+    nlohmann::json settings = kWorld;
+    settings[name] = value;
+    return error(config("object_sensor", "sim", settings));
+  };
+  CHECK(with("types", "cup, bottle") == "");
+  CHECK(with("fov", "90deg") == "");
+  CHECK(has(with("types", "jug"), "known types: table, shelf"));
+  CHECK(has(with("miss", 2), "0..1"));
+  CHECK(has(with("noise", "-1m"), "noise not negative"));
 }
 
 TEST_CASE("settings of the SICK drivers") {
