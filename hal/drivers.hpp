@@ -18,6 +18,8 @@ class Simulation;
 
 namespace takt::hal {
 
+class SemanticServers;
+
 /// What a device needs to exist.
 struct DeviceConfig {
   std::string id, kind, driver;
@@ -26,8 +28,8 @@ struct DeviceConfig {
   uint64_t seed = 0;
 };
 
-/// What the devices of one process share: the simulated worlds, one per world file, client and seed. Must outlive the
-/// nodes. Composition thread only.
+/// What the devices of one process share: the simulated worlds, one per world file, client and seed; the servers of
+/// semantic services. Must outlive the nodes. Composition thread only.
 class Devices {
  public:
   Devices();
@@ -35,9 +37,11 @@ class Devices {
   tl::expected<sim::Simulation*, DeviceError> world(const DeviceConfig& config);
   /// The simulation of the first sim device (for ground truth, fault injection), or null.
   sim::Simulation* first_world();
+  SemanticServers& semantic_servers() { return *servers_; }
 
  private:
   std::map<std::string, std::unique_ptr<sim::Simulation>> worlds_;
+  std::unique_ptr<SemanticServers> servers_;
 };
 
 enum class SettingKind : uint8_t { path, length, angle, speed, turn_rate, time, rate, count, number, flag, text, map };

@@ -17,6 +17,7 @@ constexpr DriverInfo kBaseDrivers[] = {{"sim", "the simulated world"},
                                        {"replay", "the odometry of a CARMEN log"},
                                        {"can", "the mobile base on a CAN bus"}};
 constexpr DriverInfo kLinesDrivers[] = {{"sim", "the simulated world"}, {"gpio", "lines of a GPIO chip"}};
+constexpr DriverInfo kLinkDrivers[] = {{"udp", "UDP, on this machine or beyond"}, {"dbus", "a D-Bus, on this machine"}};
 
 #define COMMON_SETTINGS                                                                                                \
   {"rate", "", rate, false, "releases per second of the device's node"},                                               \
@@ -120,12 +121,34 @@ constexpr SettingInfo kLines[] = {
     {"pulse", "gpio", time, false, "how long the trigger is high, at most 1ms; 0.1ms"},
 };
 
+#define LINK_SETTINGS                                                                                                \
+  {"robot", "", text, true, "name of the robot, at both ends the same"},                                             \
+      {"address", "udp", text, false, "numbers and port of the server; 127.0.0.1:4700"},                             \
+      {"key", "udp", path, false, "file with 32 hexadecimal digits, at both ends the same; needed beyond loopback"}, \
+      {"bus", "dbus", text, false, "session, system, or an address such as unix:path=/run/bus; session"}, {          \
+    "service", "dbus", text, false, "name of the server on the bus; io.takt.semantic"                                \
+  }
+
+constexpr SettingInfo kService[] = {
+    COMMON_SETTINGS,
+    LINK_SETTINGS,
+    {"watchdog", "", time, false, "without a velocity of the client for so long it is zero; 300ms"},
+};
+constexpr SettingInfo kLink[] = {
+    COMMON_SETTINGS,
+    LINK_SETTINGS,
+    {"lag", "", time, false, "objects, scans and odometry that are older are not sent; 200ms"},
+};
+
 constexpr DeviceKind kKinds[] = {
     {"stereo_camera", "gives `pair`", kCameraDrivers, kCamera},
     {"laser_scanner", "gives `scan`", kLaserDrivers, kLaser},
     {"camera_head", "gives `state`, takes `command`", kHeadDrivers, kHead},
     {"mobile_base", "gives `odometry`, takes `velocity` and `stop`", kBaseDrivers, kBase},
     {"digital_lines", "gives `state`", kLinesDrivers, kLines},
+    {"semantic_service", "a robot for a client elsewhere: takes what it sees, gives what it is to do", kLinkDrivers,
+     kService},
+    {"semantic_link", "a robot elsewhere: gives what it sees, takes what it is to do", kLinkDrivers, kLink},
 };
 
 }  // namespace
