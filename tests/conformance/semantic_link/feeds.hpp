@@ -50,7 +50,7 @@ class MessageFeed final : public Feed {
       Chunk& chunk = chunks_[index_of(kind)];
       chunk.place();
       fill(kind, number, chunk.message());
-      if (kind == Kind::objects) fill(*static_cast<ObjectReports*>(chunk.message()), number, number % 31);
+      if (kind == Kind::objects) fill(*static_cast<ObjectReports*>(chunk.message()), number, 1 + number % 30);
       give(kind, chunk, now_ns - 3 * kMs);
     };
     say(Kind::odometry);
