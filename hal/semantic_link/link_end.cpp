@@ -32,8 +32,7 @@ int64_t LinkEnd::step() {
   const int64_t now_ns = clock_.now_ns();
   if (!open_ && now_ns >= open_again_ns_ && !open()) open_again_ns_ = now_ns + kOpenAgain_ns;
   for (int i = 0; open_ && i < kMostDatagrams && receive_one(now_ns);) ++i;
-  if (open_) return send_due(now_ns);
-  return open_again_ns_;
+  return open_ ? send_due(clock_.now_ns()) : open_again_ns_;
 }
 
 bool LinkEnd::receive_one(int64_t now_ns) {
