@@ -19,6 +19,8 @@ class Stage;
 
 namespace takt::hal {
 
+class SemanticServers;
+
 /// What a device needs to exist.
 struct DeviceConfig {
   std::string id, kind, driver;
@@ -28,7 +30,7 @@ struct DeviceConfig {
 };
 
 /// What the devices of one process share: the simulated worlds, one per world file and seed, with one robot for each
-/// client that a device names. Must outlive the nodes. Composition thread only.
+/// client that a device names; the servers of semantic services. Must outlive the nodes. Composition thread only.
 class Devices {
  public:
   Devices();
@@ -36,10 +38,12 @@ class Devices {
   tl::expected<sim::Simulation*, DeviceError> world(const DeviceConfig& config);
   /// The simulation of the first client of the sim devices (for ground truth, fault injection), or null.
   sim::Simulation* first_world();
+  SemanticServers& semantic_servers() { return *servers_; }
 
  private:
   std::map<std::string, std::shared_ptr<sim::Stage>> stages_;                          ///< by file and seed
   std::map<std::pair<std::string, size_t>, std::unique_ptr<sim::Simulation>> robots_;  ///< by that and client
+  std::unique_ptr<SemanticServers> servers_;
 };
 
 enum class SettingKind : uint8_t { path, length, angle, speed, turn_rate, time, rate, count, number, flag, text, map };

@@ -10,6 +10,7 @@
 #include "hal/base/can_base.hpp"
 #include "hal/camera/stereo_camera_node.hpp"
 #include "hal/camera/v4l2_camera.hpp"
+#include "hal/drivers/semantic_links.hpp"
 #include "hal/drivers/sick_lasers.hpp"
 #include "hal/gpio/gpio_lines.hpp"
 #include "hal/gpio/lines_node.hpp"
@@ -20,6 +21,8 @@
 #include "hal/replay/replay_base.hpp"
 #include "hal/replay/replay_camera.hpp"
 #include "hal/replay/replay_laser.hpp"
+#include "hal/semantic_link/client_node.hpp"
+#include "hal/semantic_link/service_node.hpp"
 #include "hal/settings/settings.hpp"
 #include "hal/sim/failing_devices.hpp"
 #include "hal/sim/sim_camera.hpp"
@@ -346,7 +349,7 @@ DeviceResult check_keys(const DeviceConfig& config, const DeviceKind& kind) {
 
 }  // namespace
 
-Devices::Devices() = default;
+Devices::Devices() : servers_(std::make_unique<SemanticServers>()) {}
 Devices::~Devices() = default;
 
 tl::expected<sim::Simulation*, DeviceError> Devices::world(const DeviceConfig& config) {
@@ -378,6 +381,8 @@ std::unique_ptr<DeviceNode> make_shell(std::string_view kind) {
   if (kind == "digital_lines") return std::make_unique<LinesNode>(nullptr);
   if (kind == "object_sensor") return std::make_unique<ObjectSensorNode>(nullptr);
   if (kind == "actor") return std::make_unique<ActorNode>(nullptr);
+  if (kind == "semantic_service") return std::make_unique<semantic_link::ServiceNode>(nullptr, 0);
+  if (kind == "semantic_link") return std::make_unique<semantic_link::ClientNode>(nullptr, 0);
   throw std::logic_error("device kind " + std::string(kind) + " has no node in hal/drivers/drivers.cpp");
 }
 
@@ -395,9 +400,11 @@ NodeResult make_device(const DeviceConfig& config, Devices& devices, const Clock
   if (const auto keys = check_keys(config, *kind); !keys) return tl::unexpected(keys.error());
   Settings settings(config.id, config.settings, config.directory);
   const DeviceHealthSettings health = health_of(config, settings);
-  NodeResult node = config.driver == "sim"      ? make_sim(config, settings, devices, clock)
-                    : config.driver == "replay" ? make_replay(config, settings, clock)
-                                                : make_hardware(config, settings, clock);
+  NodeResult node = config.kind == "semantic_service" ? devices.semantic_servers().make_service(config, settings, clock)
+                    : config.kind == "semantic_link"  ? make_semantic_link(config, settings, clock)
+                    : config.driver == "sim"          ? make_sim(config, settings, devices, clock)
+                    : config.driver == "replay"       ? make_replay(config, settings, clock)
+                                                      : make_hardware(config, settings, clock);
   if (node) (*node)->set_health(health);
   return node;
 }

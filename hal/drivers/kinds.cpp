@@ -17,6 +17,7 @@ constexpr DriverInfo kBaseDrivers[] = {{"sim", "the simulated world"},
                                        {"replay", "the odometry of a CARMEN log"},
                                        {"can", "the mobile base on a CAN bus"}};
 constexpr DriverInfo kLinesDrivers[] = {{"sim", "the simulated world"}, {"gpio", "lines of a GPIO chip"}};
+constexpr DriverInfo kLinkDrivers[] = {{"udp", "UDP, on this machine or beyond"}, {"dbus", "a D-Bus, on this machine"}};
 
 constexpr DriverInfo kSimulated[] = {{"sim", "the simulated world"}};
 
@@ -134,6 +135,24 @@ constexpr SettingInfo kObjectSensor[] = {
     {"types", "sim", text, false, "types that it knows: cup, bottle; all of the world"},
 };
 constexpr SettingInfo kActor[] = {COMMON_SETTINGS};
+#define LINK_SETTINGS                                                                                                \
+  {"robot", "", text, true, "name of the robot, at both ends the same"},                                             \
+      {"address", "udp", text, false, "numbers and port of the server; 127.0.0.1:4700"},                             \
+      {"key", "udp", path, false, "file with 32 hexadecimal digits, at both ends the same; needed beyond loopback"}, \
+      {"bus", "dbus", text, false, "session, system, or an address such as unix:path=/run/bus; session"}, {          \
+    "service", "dbus", text, false, "name of the server on the bus; io.takt.semantic"                                \
+  }
+
+constexpr SettingInfo kService[] = {
+    COMMON_SETTINGS,
+    LINK_SETTINGS,
+    {"watchdog", "", time, false, "without a velocity of the client for so long it is zero; 300ms"},
+};
+constexpr SettingInfo kLink[] = {
+    COMMON_SETTINGS,
+    LINK_SETTINGS,
+    {"lag", "", time, false, "objects, scans and odometry that are older are not sent; 200ms"},
+};
 
 constexpr DeviceKind kKinds[] = {
     {"stereo_camera", "gives `pair`", kCameraDrivers, kCamera},
@@ -143,6 +162,9 @@ constexpr DeviceKind kKinds[] = {
     {"digital_lines", "gives `state`", kLinesDrivers, kLines},
     {"object_sensor", "gives `objects`", kSimulated, kObjectSensor},
     {"actor", "gives `outcome`, takes `command`", kSimulated, kActor},
+    {"semantic_service", "a robot for a client elsewhere: takes what it sees, gives what it is to do", kLinkDrivers,
+     kService},
+    {"semantic_link", "a robot elsewhere: gives what it sees, takes what it is to do", kLinkDrivers, kLink},
 };
 
 }  // namespace

@@ -6,7 +6,7 @@
 #include <thread>
 
 #include "hal/laser/laser_session.hpp"
-#include "hal/laser/newest.hpp"
+#include "hal/newest.hpp"
 #include "hal/stream/byte_stream.hpp"
 #include "rt/time/clock.hpp"
 
