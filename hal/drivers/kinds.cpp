@@ -16,6 +16,7 @@ constexpr DriverInfo kHeadDrivers[] = {{"sim", "the simulated world"}, {"can", "
 constexpr DriverInfo kBaseDrivers[] = {{"sim", "the simulated world"},
                                        {"replay", "the odometry of a CARMEN log"},
                                        {"can", "the mobile base on a CAN bus"}};
+constexpr DriverInfo kInteractionDrivers[] = {{"sim", "a script"}, {"console", "a terminal, a FIFO or a file"}};
 constexpr DriverInfo kLinesDrivers[] = {{"sim", "the simulated world"}, {"gpio", "lines of a GPIO chip"}};
 
 #define COMMON_SETTINGS                                                                                                \
@@ -120,12 +121,20 @@ constexpr SettingInfo kLines[] = {
     {"pulse", "gpio", time, false, "how long the trigger is high, at most 1ms; 0.1ms"},
 };
 
+constexpr SettingInfo kInteraction[] = {
+    COMMON_SETTINGS,
+    {"script", "sim", text, false, "who says what when, such as 2s goal cup_1.level=full; 30s stop"},
+    {"input", "console", text, false, "terminal, FIFO or file with one task a line; /dev/stdin"},
+    {"output", "console", text, false, "where it prints what is said; /dev/stdout"},
+};
+
 constexpr DeviceKind kKinds[] = {
     {"stereo_camera", "gives `pair`", kCameraDrivers, kCamera},
     {"laser_scanner", "gives `scan`", kLaserDrivers, kLaser},
     {"camera_head", "gives `state`, takes `command`", kHeadDrivers, kHead},
     {"mobile_base", "gives `odometry`, takes `velocity` and `stop`", kBaseDrivers, kBase},
     {"digital_lines", "gives `state`", kLinesDrivers, kLines},
+    {"interaction", "gives `task`, takes `speech`", kInteractionDrivers, kInteraction},
 };
 
 }  // namespace
