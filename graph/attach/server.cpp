@@ -184,7 +184,7 @@ bool Server::echo(const Json& question, Connection& connection) {
   }
   const std::string as = question.value("as", "");
   const Json count = question.value("count", Json(1));
-  const Json items = question.value("items", Json(8));
+  const Json items = question.value("items", Json(8U));
   if (!count.is_number_integer() || !items.is_number_unsigned())
     return connection.write(wrong("count and items have to be whole numbers"));
   const auto tap = claim_tap(port);

@@ -18,11 +18,13 @@ void Client::write_status(std::string& into) const {
                    records_.size() - first_record_);
   if (task_ && task_->verb == Verb::goal) fmt::format_to(out, " | plan {} of {}", plans_, parameters_.plans);
   if (mode_.state == State::drive) {
-    if (deed_.action != kNoNode) into.append(" | to ").append(knowledge_.to_text(deed_));
+    if (deed_.action != kNoNode) knowledge_.append(deed_, into.append(" | to "));
     fmt::format_to(out, " | {:.1f} m left", driving_.left_m(robot_));
   }
-  if (mode_.state == State::action)
-    fmt::format_to(out, " | {}, number {}", knowledge_.to_text(command_.deed), command_.number);
+  if (mode_.state == State::action) {
+    knowledge_.append(command_.deed, into.append(" | "));
+    fmt::format_to(out, ", number {}", command_.number);
+  }
 }
 
 void Client::write_plan(std::string& into) const {

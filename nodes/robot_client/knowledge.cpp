@@ -98,9 +98,14 @@ tl::expected<Deed, std::string> Knowledge::understand(std::span<const std::strin
 }
 
 std::string Knowledge::to_text(const Deed& deed) const {
-  std::string text(name(deed.action));
-  for (const NodeId object : objects_of(deed)) text.append(" ").append(name(object));
+  std::string text;
+  append(deed, text);
   return text;
+}
+
+void Knowledge::append(const Deed& deed, std::string& into) const {
+  into += name(deed.action);
+  for (const NodeId object : objects_of(deed)) into.append(" ").append(name(object));
 }
 
 std::string Knowledge::to_text(const planner::Goal& fact) const {

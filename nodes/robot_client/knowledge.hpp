@@ -57,6 +57,7 @@ class Knowledge {
   std::string_view name(NodeId node) const { return map_.network().name(node); }
   /// "fill cup_1 bottle_2".
   std::string to_text(const Deed& deed) const;
+  void append(const Deed& deed, std::string& into) const;
   /// "cup_1.level=full".
   std::string to_text(const planner::Goal& fact) const;
 
