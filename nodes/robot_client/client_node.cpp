@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <cstring>
 
+#include "nodes/mapping_3d/pose.hpp"
 #include "nodes/robot_client/client.hpp"
 #include "nodes/semantic/network_file.hpp"
 #include "rt/node.hpp"
+#include "rt/transform/transform_buffer.hpp"
 
 namespace takt {
 namespace {
@@ -56,7 +58,7 @@ class RobotClientNode final : public Node {
   }
 
   void start(int64_t) override {
-    if (const ObjectReports* known = map_.handed_over()) learn(*known, 0);
+    if (const ObjectReports* known = map_.handed_over()) learn(*known, {}, 0);
     if (const ActionCommand* last = action_.handed_over()) client_->go_on_after(last->number);
     if (const RobotTask* last = taken_.handed_over()) {
       task_number_ = last->number;
@@ -73,8 +75,9 @@ class RobotClientNode final : public Node {
     const bool first = last_ns_ == kNever;
     if (first && restarted_) last_words_ = words_();  // what the graph says was taken before
     bool learnt = first;
-    for (size_t i = 0; i < objects_.size(); ++i)
-      if (objects_.is_new(i)) learnt |= learn(objects_[i], objects_.stamp_ns(i));
+    for (size_t i = 0; i < odometry_.size(); ++i)
+      track_.insert(odometry_.stamp_ns(i), {mapping_3d::robot_in_odometry(odometry_[i]), {}});
+    for (size_t i = 0; i < objects_.size(); ++i) learnt |= look(objects_[i], objects_.stamp_ns(i));
     look_at_grid(job);
     learnt |= take_tasks();
 
@@ -97,9 +100,22 @@ class RobotClientNode final : public Node {
   }
 
  private:
-  /// False: it was not about the map.
-  bool learn(const ObjectReports& reports, int64_t stamp_ns) {
-    if (reports.in_map == 0) return false;
+  /// Reports in the robot frame count once the robot's pose is known at their stamp. True: it was a new one.
+  bool look(const ObjectReports& reports, int64_t stamp_ns) {
+    if (stamp_ns <= looked_ns_) return false;
+    mapping_3d::Affine to_map;
+    if (reports.in_map == 0) {
+      const auto robot = track_.at(stamp_ns);
+      if (!robot) return false;
+      to_map = mapping_3d::to_affine(robot->transform);
+    }
+    looked_ns_ = stamp_ns;
+    learn(reports, to_map, stamp_ns);
+    client_->note_news();
+    return true;
+  }
+
+  void learn(const ObjectReports& reports, const mapping_3d::Affine& to_map, int64_t stamp_ns) {
     size_t next = 0;
     for (uint32_t i = 0; i < std::min(reports.names.size, reports.places.size); ++i) {
       const ObjectPlace& place = reports.places[i];
@@ -107,12 +123,11 @@ class RobotClientNode final : public Node {
       const size_t end = next + (place.attributes > 0 ? static_cast<size_t>(place.attributes) : 0);
       for (; next < std::min<size_t>(end, reports.attributes.size); ++next)
         states_.push_back({text_of(reports.attributes[next].name), text_of(reports.attributes[next].value)});
+      const auto at = transformed(to_map, place.x_m, place.y_m, place.z_m);
       knowledge_->see(
-          {text_of(reports.names[i].name), text_of(reports.names[i].type), place.x_m, place.y_m, place.score, stamp_ns},
+          {text_of(reports.names[i].name), text_of(reports.names[i].type), at.x_m, at.y_m, place.score, stamp_ns},
           states_);
     }
-    client_->note_news();
-    return true;
   }
 
   void look_at_grid(Job& job) {
@@ -227,9 +242,10 @@ class RobotClientNode final : public Node {
   }
 
   static constexpr uint32_t kCharacters = 2000;
+  static constexpr int64_t kLongestGap_ns = 500'000'000;  ///< between two poses of the odometry
   static constexpr int64_t kNever = INT64_MIN, kLongestStep_ns = 500'000'000;
 
-  Input<ObjectReports> objects_{this, "objects", "objects by name, map frame; depth 4", Need::optional};
+  Input<ObjectReports> objects_{this, "objects", "objects by name, map or robot frame; depth 4", Need::optional};
   Input<Odometry> odometry_{this, "odometry", "the robot's pose in the map; without a new one it stands"};
   Input<Grid> grid_{this, "grid", "what is free, axes of the map frame; none: ways are straight lines", Need::optional};
   Input<RobotTask> task_{this, "task", "what somebody wants", Need::optional};
@@ -260,6 +276,8 @@ class RobotClientNode final : public Node {
 
   std::optional<Knowledge> knowledge_;
   std::optional<Client> client_;
+  PoseTrack track_{InputPort::kMaxDepth, kLongestGap_ns};
+  int64_t looked_ns_ = INT64_MIN;
   std::vector<ReportedState> states_;
   std::string text_, last_words_;
   size_t expansions_ = 0;

@@ -103,6 +103,7 @@ bool Driving::way_is_free(const PlanarPose& robot) {
 void Driving::keep_a_way(const PlanarPose& robot) {
   const bool driving = begun_ && pilot_.behaviour() == navigation::Behaviour::drive_to;
   if (begun_ && !(driving && new_grid_ && !way_is_free(robot))) return;
+  if (closed_s_ > 0 && !new_grid_) return;  // nothing has opened since
   const PathOutcome outcome = find_way(place_of(robot));
   if (outcome == PathOutcome::found) {
     const bool looks = kind_ == Kind::objects;

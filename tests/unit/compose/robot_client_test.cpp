@@ -4,7 +4,9 @@
 #include <doctest/doctest.h>
 
 #include <cmath>
+#include <cstdio>
 #include <cstring>
+#include <sstream>
 
 #include "tests/unit/compose/drive.hpp"
 
@@ -18,6 +20,7 @@ struct Seen {
   double touched_m_s = 0;       ///< fastest while an action was under way
   uint32_t under_way = 0;       ///< jobs with a task taken and not over
   std::string left;             ///< task in the end
+  std::string plan;             ///< with what its steps took
 };
 Seen seen;  // the node is made by the composition, so it has no other way to tell
 
@@ -34,6 +37,7 @@ class Kitchen final : public Node {
   void run(Job& job) override {
     if (const TextStatus* speech = speech_.newest(); speech != nullptr && speech_.is_new())
       seen.speech.append(speech->text.data(), speech->text.size).append("\n");
+    if (const TextStatus* plan = plan_.newest()) seen.plan.assign(plan->text.data(), plan->text.size);
     if (const RobotTask* taken = taken_.newest()) {
       seen.left.assign(taken->text.data(), taken->text.size);
       seen.under_way += seen.left.empty() ? 0 : 1;
@@ -108,6 +112,7 @@ class Kitchen final : public Node {
   Input<Odometry> odometry_{this, "odometry", ""};
   Input<TextStatus> speech_{this, "speech", ""};
   Input<RobotTask> taken_{this, "taken", ""};
+  Input<TextStatus> plan_{this, "plan", ""};
   Output<ActionOutcome> outcome_{this, "outcome", ""};
   Output<ObjectReports> objects_{this, "objects", ""};
 };
@@ -128,7 +133,7 @@ subsystems:
   kitchen:
     probe:
       type: probe
-      in: {command: client.action, odometry: base.odometry, speech: client.speech, taken: client.taken}
+      in: {command: client.action, odometry: base.odometry, speech: client.speech, taken: client.taken, plan: client.plan}
     client:
       type: robot_client
       in:
@@ -154,7 +159,8 @@ nodes:
 TEST_CASE("a goal that somebody says is planned, driven, acted and reported, within reach and standing") {
   seen = {};
   test::Drive::with<Kitchen>(kGraphText, kScheduleText, 60'000'000'000);
-  MESSAGE("said:\n" << seen.speech << "farthest object " << seen.farthest_m << " m, " << seen.under_way << " jobs");
+  MESSAGE("said:\n"
+          << seen.speech << seen.plan << "farthest object " << seen.farthest_m << " m, " << seen.under_way << " jobs");
   CHECK(seen.actions == "open bottle_1; fill cup_1");
   CHECK(seen.speech.find("goal cup_1.level=full: done") != std::string::npos);
   CHECK(seen.speech.find("plan again") == std::string::npos);
@@ -162,4 +168,15 @@ TEST_CASE("a goal that somebody says is planned, driven, acted and reported, wit
   CHECK(seen.touched_m_s < 0.02);
   CHECK(seen.under_way > 100);
   CHECK(seen.left.empty());
+  std::istringstream plan(seen.plan);
+  size_t steps = 0;
+  for (std::string line; std::getline(plan, line); ++steps) {
+    double drive_s = 0, drove_s = 0, act_s = 0, acted_s = 0;
+    const std::string times = line.substr(line.find(": drive "));
+    REQUIRE(std::sscanf(times.c_str(), ": drive %lf s (took %lf), act %lf s (took %lf)", &drive_s, &drove_s, &act_s,
+                        &acted_s) == 4);
+    CHECK(drove_s == doctest::Approx(drive_s).epsilon(0.2));
+    CHECK(acted_s == doctest::Approx(act_s).epsilon(0.2));
+  }
+  CHECK(steps == 2);
 }

@@ -3,6 +3,7 @@
 #include <doctest/doctest.h>
 
 #include <cstring>
+#include <numbers>
 
 #include "tests/unit/mapping_3d/node_harness.hpp"
 
@@ -109,8 +110,9 @@ TEST_CASE("without a new pose the robot stands, and says so") {
   CHECK(f.state().find("DRIVE | halted") == 0);
 }
 
-TEST_CASE("objects of the map are believed, those in another frame are not") {
+TEST_CASE("objects are believed, in the map frame and, where the pose at their stamp is known, in the robot's") {
   Fixture f;
+  f.odometry->x_m = 5, f.odometry->theta_rad = std::numbers::pi / 2;  // looks along the map's y axis
   f.step();
   std::strcpy(f.objects->names.data()[0].name, "cup_7");
   std::strcpy(f.objects->names.data()[0].type, "cup");
@@ -121,16 +123,23 @@ TEST_CASE("objects of the map are believed, those in another frame are not") {
   std::strcpy(f.objects->attributes[0].value, "full");
   std::strcpy(f.objects->attributes[1].name, "taste");
   std::strcpy(f.objects->attributes[1].value, "sweet");
-  for (const uint8_t in_map : {uint8_t{0}, uint8_t{1}}) {
+  const auto show = [&](uint8_t in_map, int64_t stamp_ns) {
     f.objects->in_map = in_map;
-    test::latch(test::input(*f.node, "objects"), f.objects, kSecond, ++f.sequence);
+    test::latch(test::input(*f.node, "objects"), f.objects, stamp_ns, ++f.sequence);
     f.step();
-    CHECK(f.map->sent() == (in_map == 1));
-  }
+    return f.map->sent();
+  };
+  CHECK_FALSE(show(0, 20 * kSecond));  // nobody knows yet where the robot will be
+  CHECK(show(0, kSecond));
   const ObjectReports& map = f.map->message();
   REQUIRE(map.names.size == 4);
   CHECK(std::string(map.names[3].name) == "cup_7");
   CHECK(map.places[3].attributes == 1);  // the network knows no taste
+  CHECK(map.places[3].x_m == doctest::Approx(6));
+  CHECK(map.places[3].y_m == doctest::Approx(2));
+  CHECK_FALSE(show(0, kSecond));  // the same once more
+  CHECK(show(1, kSecond + 1));
+  CHECK(map.places[3].x_m == doctest::Approx(1));
 }
 
 TEST_CASE("a restarted node goes on with its map, its numbers, and a task that names an end") {
