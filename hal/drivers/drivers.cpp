@@ -16,6 +16,9 @@
 #include "hal/gpio/lines_node.hpp"
 #include "hal/head/can_head.hpp"
 #include "hal/head/head_node.hpp"
+#include "hal/interaction/console.hpp"
+#include "hal/interaction/interaction_node.hpp"
+#include "hal/interaction/script.hpp"
 #include "hal/laser/laser_node.hpp"
 #include "hal/object_sensor/object_sensor_node.hpp"
 #include "hal/replay/replay_base.hpp"
@@ -227,12 +230,33 @@ NodeResult make_sim_object_sensor(const DeviceConfig& config, Settings& settings
   return opened<ObjectSensorNode>(std::move(device), settings);
 }
 
+NodeResult make_script(Settings& settings, sim::Simulation& world) {
+  if (settings.has("failures")) settings.fail("a script does not fail", "leave `failures` out");
+  auto script = parse_task_script(settings.text("script", ""));
+  if (!script) {
+    settings.fail("`script`: " + script.error(), "correct `script`");
+    return tl::unexpected(*settings.error());
+  }
+  std::unique_ptr<Interaction> device = std::make_unique<ScriptedPerson>(
+      std::move(*script), [&world](int64_t epoch_ns) { return world.begin(epoch_ns); });
+  return opened<InteractionNode>(std::move(device), settings);
+}
+
+NodeResult make_console(const DeviceConfig& config, Settings& settings) {
+  ConsoleSettings console;
+  console.input = settings.text("input", console.input);
+  console.output = settings.text("output", console.output);
+  std::unique_ptr<Interaction> device = std::make_unique<Console>(config.id, std::move(console));
+  return opened<InteractionNode>(std::move(device), settings);
+}
+
 NodeResult make_sim(const DeviceConfig& config, Settings& settings, Devices& devices, const Clock& clock) {
   auto world = devices.world(config);
   if (!world) return tl::unexpected(world.error());
   if (config.kind == "stereo_camera") return make_sim_camera(config, settings, **world, clock);
   if (config.kind == "laser_scanner") return make_sim_laser(config, settings, **world);
   if (config.kind == "mobile_base") return make_sim_base(config, settings, **world);
+  if (config.kind == "interaction") return make_script(settings, **world);
   if (config.kind == "camera_head") {
     std::unique_ptr<CameraHead> device = std::make_unique<sim::SimHead>(config.id, **world);
     device = with_failures<sim::FailingHead>(std::move(device), settings);
@@ -324,6 +348,7 @@ NodeResult make_hardware(const DeviceConfig& config, Settings& settings, const C
   if (config.kind == "stereo_camera") return make_v4l2_camera(config, settings, clock);
   if (config.kind == "camera_head") return make_can_head(config, settings, clock);
   if (config.kind == "digital_lines") return make_gpio_lines(config, settings, clock);
+  if (config.kind == "interaction") return make_console(config, settings);
   return make_can_base(config, settings, clock);
 }
 
@@ -383,6 +408,7 @@ std::unique_ptr<DeviceNode> make_shell(std::string_view kind) {
   if (kind == "actor") return std::make_unique<ActorNode>(nullptr);
   if (kind == "semantic_service") return std::make_unique<semantic_link::ServiceNode>(nullptr, 0);
   if (kind == "semantic_link") return std::make_unique<semantic_link::ClientNode>(nullptr, 0);
+  if (kind == "interaction") return std::make_unique<InteractionNode>(nullptr);
   throw std::logic_error("device kind " + std::string(kind) + " has no node in hal/drivers/drivers.cpp");
 }
 

@@ -16,6 +16,7 @@ constexpr DriverInfo kHeadDrivers[] = {{"sim", "the simulated world"}, {"can", "
 constexpr DriverInfo kBaseDrivers[] = {{"sim", "the simulated world"},
                                        {"replay", "the odometry of a CARMEN log"},
                                        {"can", "the mobile base on a CAN bus"}};
+constexpr DriverInfo kInteractionDrivers[] = {{"sim", "a script"}, {"console", "a terminal, a FIFO or a file"}};
 constexpr DriverInfo kLinesDrivers[] = {{"sim", "the simulated world"}, {"gpio", "lines of a GPIO chip"}};
 constexpr DriverInfo kLinkDrivers[] = {{"udp", "UDP, on this machine or beyond"}, {"dbus", "a D-Bus, on this machine"}};
 
@@ -135,6 +136,7 @@ constexpr SettingInfo kObjectSensor[] = {
     {"types", "sim", text, false, "types that it knows: cup, bottle; all of the world"},
 };
 constexpr SettingInfo kActor[] = {COMMON_SETTINGS};
+
 #define LINK_SETTINGS                                                                                                \
   {"robot", "", text, true, "name of the robot, at both ends the same"},                                             \
       {"address", "udp", text, false, "numbers and port of the server; 127.0.0.1:4700"},                             \
@@ -153,6 +155,12 @@ constexpr SettingInfo kLink[] = {
     LINK_SETTINGS,
     {"lag", "", time, false, "objects, scans and odometry that are older are not sent; 200ms"},
 };
+constexpr SettingInfo kInteraction[] = {
+    COMMON_SETTINGS,
+    {"script", "sim", text, false, "who says what when, such as 2s goal cup_1.level=full; 30s stop"},
+    {"input", "console", text, false, "terminal, FIFO or file with one task a line; /dev/stdin"},
+    {"output", "console", text, false, "where it prints what is said; /dev/stdout"},
+};
 
 constexpr DeviceKind kKinds[] = {
     {"stereo_camera", "gives `pair`", kCameraDrivers, kCamera},
@@ -165,6 +173,7 @@ constexpr DeviceKind kKinds[] = {
     {"semantic_service", "a robot for a client elsewhere: takes what it sees, gives what it is to do", kLinkDrivers,
      kService},
     {"semantic_link", "a robot elsewhere: gives what it sees, takes what it is to do", kLinkDrivers, kLink},
+    {"interaction", "gives `task`, takes `speech`", kInteractionDrivers, kInteraction},
 };
 
 }  // namespace

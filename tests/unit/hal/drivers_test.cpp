@@ -31,9 +31,10 @@ const nlohmann::json kWorld = {{"world", "worlds/lab.xml"}};
 }  // namespace
 
 TEST_CASE("unknown kinds, drivers and settings list the valid ones") {
-  CHECK(has(error(config("radar", "sim", kWorld)),
-            "stereo_camera, laser_scanner, camera_head, mobile_base, digital_lines, object_sensor, actor, semantic_service, "
-            "semantic_link"));
+  CHECK(has(
+      error(config("radar", "sim", kWorld)),
+      "stereo_camera, laser_scanner, camera_head, mobile_base, digital_lines, object_sensor, actor, semantic_service, "
+      "semantic_link"));
   CHECK(has(error(config("stereo_camera", "v4l", kWorld)), "known drivers: sim, replay, v4l2"));
   CHECK(has(error(config("laser_scanner", "sim", {{"world", "worlds/lab.xml"}, {"beans", 3}})),
             "unknown setting `beans`"));
