@@ -99,7 +99,7 @@ constexpr SettingInfo kLaser[] = {
 constexpr SettingInfo kHead[] = {
     COMMON_SETTINGS,
     {"interface", "can", text, true, "network interface, for instance can0; unix:PATH for a double"},
-    {"eyelids", "can", flag, false, "opened at the start, closed at the stop; true"},
+    {"eyelids", "can", flag, false, "open unless `lids` closes them, closed at the stop; true"},
 };
 constexpr SettingInfo kBase[] = {
     COMMON_SETTINGS,
@@ -165,7 +165,7 @@ constexpr SettingInfo kInteraction[] = {
 constexpr DeviceKind kKinds[] = {
     {"stereo_camera", "gives `pair`", kCameraDrivers, kCamera},
     {"laser_scanner", "gives `scan`", kLaserDrivers, kLaser},
-    {"camera_head", "gives `state`, takes `command`", kHeadDrivers, kHead},
+    {"camera_head", "gives `state`, takes `command` and `lids`", kHeadDrivers, kHead},
     {"mobile_base", "gives `odometry`, takes `velocity` and `stop`", kBaseDrivers, kBase},
     {"digital_lines", "gives `state`", kLinesDrivers, kLines},
     {"object_sensor", "gives `objects`", kSimulated, kObjectSensor},

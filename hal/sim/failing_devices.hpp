@@ -103,6 +103,9 @@ class FailingHead final : public FailingDevice<CameraHead> {
   bool command(double pan_rad, double tilt_rad, int64_t at_ns) override {
     return plugged(at_ns) && inner().command(pan_rad, tilt_rad, at_ns);
   }
+  void close_lids(bool left, bool right, int64_t at_ns) override {
+    if (plugged(at_ns)) inner().close_lids(left, right, at_ns);
+  }
 
  private:
   HeadReading kept_reading_;

@@ -87,6 +87,26 @@ TEST_CASE("can head: homed and enabled without a jump; the eyelids open at the s
   CHECK(bench.device.emergency() == 0);  // told that the host goes, it misses nobody
 }
 
+TEST_CASE("can head: a lid is closed as long as each job says so") {
+  Bench bench;
+  bench.start();
+  const auto say = [&](bool left, bool right) {
+    for (int k = 0; k < 30; ++k) {  // 600 ms
+      bench.driver.close_lids(left, right, bench.now());
+      bench.jobs(1);
+    }
+  };
+  say(true, false);
+  CHECK(bench.device.left_lid_closed_percent() == 100);
+  say(true, true);
+  CHECK(bench.device.left_lid_closed_percent() == 100);
+  say(false, true);
+  CHECK(bench.device.left_lid_closed_percent() == 0);
+  say(true, true);
+  bench.jobs(30);  // nobody says anything
+  CHECK(bench.device.left_lid_closed_percent() == 0);
+}
+
 TEST_CASE("can head: the limits are the narrower of the settings' and the head's own") {
   Bench bench({60 * kDegree, 80 * kDegree, 300 * kDegree, 20 * kDegree, 5000 * kDegree});
   bench.start();
