@@ -35,9 +35,12 @@ class Devices {
   tl::expected<sim::Simulation*, DeviceError> world(const DeviceConfig& config);
   /// The simulation of the first sim device (for ground truth, fault injection), or null.
   sim::Simulation* first_world();
+  /// A folder of this process for the lines of doubles, made when it is first asked for; empty if that failed.
+  const std::filesystem::path& folder();
 
  private:
   std::map<std::string, std::unique_ptr<sim::Simulation>> worlds_;
+  std::filesystem::path folder_;
 };
 
 enum class SettingKind : uint8_t { path, length, angle, speed, turn_rate, time, rate, count, number, flag, text, map };
@@ -49,6 +52,7 @@ struct SettingInfo {
   SettingKind kind;
   bool required;
   std::string_view doc;
+  bool place = false;  ///< says where the device is: a double brings its own
 };
 struct DriverInfo {
   std::string_view name, doc;
@@ -58,6 +62,9 @@ struct DeviceKind {
   std::span<const DriverInfo> drivers;
   std::span<const SettingInfo> settings;
 };
+
+/// A double takes what the driver at the other end of its line takes, but for where the device is.
+bool takes(std::string_view driver, const SettingInfo& setting);
 
 /// Every device kind with its drivers and settings, for the checker and `takt nodes`.
 std::span<const DeviceKind> device_kinds();

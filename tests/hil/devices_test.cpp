@@ -76,10 +76,10 @@ struct Bus {
   std::optional<can::Port> listener;
   Bus(const char* host, const char* device_interface)
       : device(device_interface, clock), driver("device", {.interface = host}, clock) {
-    REQUIRE(device.open(clock.now_ns()) == 0);
+    REQUIRE(device.plug_in().has_value());
   }
   void pace(int64_t at_ns) {
-    device.run_until(at_ns);
+    device.run_to(at_ns);
     clock.go_to(at_ns);
   }
   /// As pace, and the message that the device sends in each of its steps has arrived: from card to card that takes the
@@ -142,7 +142,7 @@ TEST_CASE("hil: kernel stamps of frames lie between their sending and their read
   for (int k = 0; k < 100 && seen < 20; ++k) {
     bus.driver.read(bus.clock.now_ns(), INT64_MAX);
     const int64_t before_ns = bus.clock.now_ns();
-    bus.device.run_until(before_ns + head::HeadDouble::kStep_ns);
+    bus.device.run_to(before_ns + head::HeadDouble::kStep_ns);
     const int64_t sent_ns = bus.clock.now_ns();
     bus.clock.go_to(sent_ns + 20 * kMs);
     const HeadReading reading = bus.driver.read(bus.clock.now_ns(), INT64_MAX);
@@ -163,16 +163,15 @@ TEST_CASE("hil: an interface that goes down and up, and bus-off, are losses that
   CHECK(bus.reads_until(ReadStatus::disconnected, 5, false) >= 0);
   shell("ip link set vcan0 up");
   CHECK(bus.reads_until(ReadStatus::ok, 200) >= 0);
-  bus.device.misbehave(can::Misbehaviour::bus_off);
+  bus.device.misbehave(Misbehaviour::bus_off);
   CHECK(bus.reads_until(ReadStatus::disconnected, 5, false) >= 0);
-  bus.device.misbehave(can::Misbehaviour::none);
+  bus.device.misbehave(Misbehaviour::none);
   CHECK(bus.reads_until(ReadStatus::ok, 200) >= 0);
   shell("ip link delete vcan0");
   CHECK(bus.reads_until(ReadStatus::disconnected, 5, false) >= 0);
   CHECK_FALSE(bus.driver.restart(bus.clock.now_ns()));
   shell("ip link add vcan0 type vcan && ip link set vcan0 up");
-  bus.device.close();
-  REQUIRE(bus.device.open(bus.clock.now_ns()) == 0);
+  REQUIRE(bus.device.plug_in().has_value());
   CHECK(bus.reads_until(ReadStatus::ok, 200) >= 0);
 }
 
