@@ -8,6 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "hal/base/base_messages.hpp"
+#include "hal/can/end_to_end.hpp"
+#include "hal/head/head_messages.hpp"
 #include "hal/laser/lms200/commands.hpp"
 #include "hal/laser/lms200/scan.hpp"
 #include "hal/laser/lms400/frame.hpp"
@@ -158,6 +161,32 @@ void semantic_link_seeds(Seeds& seeds) {
   }
 }
 
+/// Each message three times, all at the middle of their ranges, and what the controller says of the bus.
+void can_seeds(Seeds& seeds) {
+  using namespace can;
+  Bytes all;
+  const auto add = [&](const Frame& frame) {
+    const WireFrame wire = to_wire(frame);
+    seeds.add(copy(wire));
+    all.insert(all.end(), wire.begin(), wire.end());
+  };
+  for (const auto& table : {head::messages(), base::messages()}) {
+    for (const Message& message : table) {
+      std::vector<double> values;
+      for (const Signal& signal : message.signals)
+        values.push_back(signal.page == kPageNumber ? 0 : (signal.low + signal.high) / 2);
+      EndToEndSender sender;
+      for (int k = 0; k < 3; ++k) {
+        Frame frame = encode(message, values);
+        if (message.is_protected) sender.protect(message, frame);
+        add(frame);
+      }
+    }
+  }
+  for (const uint32_t what : {0x4u, 0x40u, 0x100u, 0x200u}) add({kErrorFlag | what, 8, {0, 8, 0, 0, 0, 0, 130, 10}});
+  seeds.add(all);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -166,10 +195,12 @@ int main(int argc, char** argv) {
     return 2;
   }
   const std::filesystem::path folder(argv[1]);
-  Seeds lms200_inputs(folder / "lms200"), lms400_inputs(folder / "lms400"), link_inputs(folder / "semantic_link");
+  Seeds lms200_inputs(folder / "lms200"), lms400_inputs(folder / "lms400"), can_inputs(folder / "can"),
+      link_inputs(folder / "semantic_link");
   lms200_seeds(lms200_inputs);
   lms400_seeds(lms400_inputs);
+  can_seeds(can_inputs);
   semantic_link_seeds(link_inputs);
-  std::printf("seeds: %zu for lms200, %zu for lms400, %zu for semantic_link\n", lms200_inputs.count(),
-              lms400_inputs.count(), link_inputs.count());
+  std::printf("seeds: %zu for lms200, %zu for lms400, %zu for can, %zu for semantic_link\n", lms200_inputs.count(),
+              lms400_inputs.count(), can_inputs.count(), link_inputs.count());
 }

@@ -9,7 +9,6 @@
 
 using namespace takt;
 using namespace takt::head;
-using can::Misbehaviour;
 
 namespace {
 
@@ -128,9 +127,9 @@ TEST_CASE("can head: each misbehaviour is told, and it works again when it ends"
   for (const Case& c :
        {Case{Misbehaviour::silent, ReadStatus::no_data}, Case{Misbehaviour::unplugged, ReadStatus::disconnected},
         Case{Misbehaviour::wrong_crc, ReadStatus::partial}, Case{Misbehaviour::masquerade, ReadStatus::partial},
-        Case{Misbehaviour::lost_frames, ReadStatus::no_data}, Case{Misbehaviour::stuck, ReadStatus::no_data},
+        Case{Misbehaviour::lost_frames, ReadStatus::no_data}, Case{Misbehaviour::repeated, ReadStatus::no_data},
         Case{Misbehaviour::garbage, ReadStatus::partial}, Case{Misbehaviour::no_heartbeat, ReadStatus::no_data},
-        Case{Misbehaviour::bus_off, ReadStatus::disconnected}}) {
+        Case{Misbehaviour::bus_off, ReadStatus::disconnected}, Case{Misbehaviour::frozen, ReadStatus::ok}}) {
     CAPTURE(static_cast<int>(c.how));
     Bench bench;
     bench.start();
