@@ -23,7 +23,7 @@ ByteReferences::ByteReferences(size_t slots, const std::vector<std::vector<Count
   for (uint32_t from = kMost; from < UINT16_MAX; from += kMost)
     for (size_t slot = 0; slot < slots; ++slot)
       if (most[slot] > from) beyond_.push_back({slot, static_cast<uint16_t>(from)});
-  window_.resize(padded(first_beyond_ + beyond_.size(), kByteBlock));
+  window_ = stereo::Buffer<uint8_t>(padded(first_beyond_ + beyond_.size(), kByteBlock));
   for (const auto& references : objects) {
     objects_.push_back(gather(slots, references));
     references_ += references.size();
@@ -48,11 +48,11 @@ ByteReferences::Object ByteReferences::gather(size_t slots, const std::vector<Co
   for (size_t block = 0; block < window_.size(); block += kByteBlock)
     if (std::ranges::any_of(packed, [&](const auto& bytes) { return has_something(bytes, block); }))
       object.blocks.push_back(block);
+  if (object.blocks.empty()) return object;  // without mass
+  object.rows = stereo::Buffer<uint8_t>(packed.size() * object.blocks.size() * kByteBlock);
+  uint8_t* row = object.rows.data();
   for (const auto& bytes : packed)
-    for (const size_t block : object.blocks) {
-      const auto part = block_of(bytes, block);
-      object.rows.insert(object.rows.end(), part.begin(), part.end());
-    }
+    for (const size_t block : object.blocks) row = std::ranges::copy(block_of(bytes, block), row).out;
   return object;
 }
 

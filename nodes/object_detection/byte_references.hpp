@@ -5,6 +5,8 @@
 #include <span>
 #include <vector>
 
+#include "nodes/stereo/aligned_rows.hpp"
+
 namespace takt::object_detection {
 
 /// The references of a stage, compared with one window after another. Counts are packed into bytes, as many of which a
@@ -28,8 +30,8 @@ class ByteReferences {
 
  private:
   struct Object {
-    std::vector<size_t> blocks;  ///< where in a window each begins
-    std::vector<uint8_t> rows;   ///< references x blocks x kByteBlock
+    std::vector<size_t> blocks;    ///< where in a window each begins
+    stereo::Buffer<uint8_t> rows;  ///< references x blocks x kByteBlock
     size_t references = 0;
   };
   struct Beyond {
@@ -41,7 +43,7 @@ class ByteReferences {
 
   size_t first_beyond_;         ///< byte; those before it are slots
   std::vector<Beyond> beyond_;  ///< what the further bytes hold
-  std::vector<uint8_t> window_;
+  stereo::Buffer<uint8_t> window_;
   std::vector<Object> objects_;
   size_t references_ = 0;
 };

@@ -100,12 +100,12 @@ HWY_EXPORT(Saturate);
 HWY_EXPORT(Missing32);
 HWY_EXPORT(Missing8);
 
-void add_counts(std::span<uint16_t> counts, const uint16_t* come) {
-  HWY_DYNAMIC_DISPATCH(Add)(counts.data(), come, counts.size());
+void add_counts(uint16_t* counts, const uint16_t* come, size_t slots) {
+  HWY_DYNAMIC_DISPATCH(Add)(counts, come, slots);
 }
 
-void subtract_counts(std::span<uint16_t> counts, const uint16_t* gone) {
-  HWY_DYNAMIC_DISPATCH(Subtract)(counts.data(), gone, counts.size());
+void subtract_counts(uint16_t* counts, const uint16_t* gone, size_t slots) {
+  HWY_DYNAMIC_DISPATCH(Subtract)(counts, gone, slots);
 }
 
 void saturate_counts(std::span<const uint16_t> counts, uint8_t* bytes) {

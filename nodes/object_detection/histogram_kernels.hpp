@@ -10,9 +10,9 @@ namespace takt::object_detection {
 constexpr size_t kLaneBlock = 32;  ///< histograms are padded with zeros to a multiple of the widest vector of 16 bits
 constexpr size_t kByteBlock = 64;  ///< the same of 8 bits
 
-/// Of each slot, modulo 2^16. Sizes: the same multiple of kLaneBlock.
-void add_counts(std::span<uint16_t> counts, const uint16_t* come);
-void subtract_counts(std::span<uint16_t> counts, const uint16_t* gone);
+/// Of each slot, modulo 2^16. `slots`: a multiple of kLaneBlock.
+void add_counts(uint16_t* counts, const uint16_t* come, size_t slots);
+void subtract_counts(uint16_t* counts, const uint16_t* gone, size_t slots);
 /// bytes[i] = min(255, counts[i]). Size: a multiple of kLaneBlock.
 void saturate_counts(std::span<const uint16_t> counts, uint8_t* bytes);
 

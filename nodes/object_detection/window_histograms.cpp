@@ -45,14 +45,14 @@ WindowHistograms::WindowHistograms(const SearchGrid& grid, size_t slots) : grid_
   int highest = 0;
   for (size_t i = 0; i + 1 < y_edges_.size(); ++i) highest = std::max(highest, y_edges_[i + 1] - y_edges_[i]);
   index_.resize(static_cast<size_t>(highest) * static_cast<size_t>(grid.image_width));
-  strips_.resize(strips() * slots_);
-  cells_.resize(kept_bands_ * strips_.size());
-  window_.resize(slots_);
+  strips_ = stereo::Buffer<uint16_t>(strips() * slots_);
+  cells_ = stereo::Buffer<uint16_t>(kept_bands_ * strips_.size());
+  window_ = stereo::Buffer<uint16_t>(slots_);
 }
 
 void WindowHistograms::forget(size_t first_band) {
   first_ = end_ = first_band;
-  std::fill(strips_.begin(), strips_.end(), uint16_t{0});
+  strips_.fill(0);
 }
 
 void WindowHistograms::go_to_row(int row) {
@@ -62,7 +62,8 @@ void WindowHistograms::go_to_row(int row) {
 }
 
 void WindowHistograms::leave_bands_above() {
-  for (; first_ < std::min(end_, first_band_[v_]); ++first_) subtract_counts(strips_, cells(first_));
+  for (; first_ < std::min(end_, first_band_[v_]); ++first_)
+    subtract_counts(strips_.data(), cells(first_), strips_.size());
   if (end_ < first_band_[v_]) first_ = end_ = first_band_[v_];
 }
 
@@ -74,7 +75,7 @@ void WindowHistograms::count_band() {
   size_t strip = 0;
   for (; strip + kAbreast <= strips(); strip += kAbreast) count_strips<kAbreast>(strip);
   for (; strip < strips(); ++strip) count_strips<1>(strip);
-  add_counts(strips_, cells(end_));
+  add_counts(strips_.data(), cells(end_), strips_.size());
 }
 
 template <size_t kAbreast>
@@ -96,11 +97,11 @@ void WindowHistograms::count_strips(size_t first) {
 
 std::span<const uint16_t> WindowHistograms::slide() {
   const size_t u = u_++;
-  if (u == 0) std::fill(window_.begin(), window_.end(), uint16_t{0});
+  if (u == 0) window_.fill(0);
   const size_t gone = u == 0 ? first_strip_[0] : first_strip_[u - 1], come = u == 0 ? gone : end_strip_[u - 1];
-  for (size_t i = gone; i < first_strip_[u]; ++i) subtract_counts(window_, strips_.data() + i * slots_);
-  for (size_t i = come; i < end_strip_[u]; ++i) add_counts(window_, strips_.data() + i * slots_);
-  return window_;
+  for (size_t i = gone; i < first_strip_[u]; ++i) subtract_counts(window_.data(), strips_.data() + i * slots_, slots_);
+  for (size_t i = come; i < end_strip_[u]; ++i) add_counts(window_.data(), strips_.data() + i * slots_, slots_);
+  return {window_.data(), slots_};
 }
 
 }  // namespace takt::object_detection

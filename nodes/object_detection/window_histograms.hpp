@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "nodes/object_detection/grid.hpp"
+#include "nodes/stereo/aligned_rows.hpp"
 
 namespace takt::object_detection {
 
@@ -54,7 +55,8 @@ class WindowHistograms {
   std::vector<size_t> first_strip_, end_strip_;  ///< of the windows of each column
   std::vector<size_t> first_band_, end_band_;    ///< of the windows of each row
   size_t kept_bands_ = 0;
-  std::vector<uint16_t> index_, cells_, strips_, window_;
+  std::vector<uint16_t> index_;
+  stereo::Buffer<uint16_t> cells_, strips_, window_;
   size_t first_ = 0, end_ = 0;  ///< bands that strips_ has
   size_t u_ = 0, v_ = 0;        ///< window that next() comes to
 };
