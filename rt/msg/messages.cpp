@@ -64,7 +64,7 @@ FIELDS(TextStatus, F(TextStatus, text, ""))
 FIELDS(Terrain, F(Terrain, kind, ""), F(Terrain, hypotheses, "1"), F(Terrain, correlations, "1"))
 FIELDS(ObjectReports, F(ObjectReports, in_map, ""), F(ObjectReports, names, ""), F(ObjectReports, places, ""),
        F(ObjectReports, attributes, ""))
-FIELDS(Task, F(Task, number, "1"), F(Task, text, ""))
+FIELDS(RobotTask, F(RobotTask, number, "1"), F(RobotTask, text, ""))
 FIELDS(ActionCommand, F(ActionCommand, number, "1"), F(ActionCommand, action, ""), F(ActionCommand, objects, ""))
 FIELDS(ActionOutcome, F(ActionOutcome, number, "1"), F(ActionOutcome, state, ""), F(ActionOutcome, duration_s, "s"),
        F(ActionOutcome, reason, ""))
@@ -83,7 +83,7 @@ std::span<const MessageType* const> message_types() {
       &MessageType::of<HeadState>(),    &MessageType::of<HeadCommand>(),   &MessageType::of<VelocityCommand>(),
       &MessageType::of<DigitalState>(), &MessageType::of<StopCommand>(),   &MessageType::of<Requests>(),
       &MessageType::of<TextStatus>(),   &MessageType::of<Terrain>(),       &MessageType::of<ObjectReports>(),
-      &MessageType::of<Task>(),         &MessageType::of<ActionCommand>(), &MessageType::of<ActionOutcome>()};
+      &MessageType::of<RobotTask>(),    &MessageType::of<ActionCommand>(), &MessageType::of<ActionOutcome>()};
   return types;
 }
 

@@ -371,7 +371,7 @@ struct ObjectReports {
 
 /// What somebody wants of the robot, such as a goal in words. State and not an event: repeated until another one comes.
 /// Capacity: count (characters).
-struct Task {
+struct RobotTask {
   static constexpr std::string_view type_name = "task";
   uint32_t number = 0;  ///< 0: none yet; another number is another task, its text may be the same
   Array<char> text;
@@ -379,7 +379,7 @@ struct Task {
   static void capacities(const Capacity& c, std::span<uint32_t> a) { a[0] = c.count; }
 };
 
-/// An action of the semantic network to be carried out. State and not an event, as Task.
+/// An action of the semantic network to be carried out. State and not an event, as RobotTask.
 struct ActionCommand {
   static constexpr std::string_view type_name = "action_command";
   uint32_t number = 0;       ///< 0: none yet
