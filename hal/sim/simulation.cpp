@@ -288,8 +288,8 @@ std::vector<const WorldObject*> Simulation::visible_objects(int64_t at_ns, doubl
     // The nearest thing on the way may be the object itself: allow for its own extent.
     const double extent = object.box ? std::hypot(object.box->width_m, object.box->depth_m) / 2 : 0.4;
     const double z = object.box ? object.box->z_m + object.box->height_m / 2 : 1.0;
-    if (cast_ray(world_, scene_, origin, offset / distance, z, distance) >= distance - extent - 1e-3)
-      seen.push_back(&object);
+    const Vec3 eye(origin.x(), origin.y(), z), ahead(offset.x() / distance, offset.y() / distance, 0);
+    if (cast_ray(world_, scene_, eye, ahead, distance) >= distance - extent - 1e-3) seen.push_back(&object);
   }
   return seen;
 }

@@ -50,15 +50,14 @@ void add_walls(const World& world, Scene& scene) {
   }
 }
 
-/// Distance to the 2-D outline of a box, negative inside the reach of the ray: slab test in the frame of the box.
-double cast_box(const WorldObject& object, const Vec2& origin, const Vec2& direction) {
-  const double c = std::cos(object.yaw_rad), s = std::sin(object.yaw_rad);
-  const Vec2 rel = origin - object.position;
-  const double o[2] = {c * rel.x() + s * rel.y(), -s * rel.x() + c * rel.y()};
-  const double d[2] = {c * direction.x() + s * direction.y(), -s * direction.x() + c * direction.y()};
-  const double half[2] = {object.box->width_m / 2, object.box->depth_m / 2};
+/// Distance to a box, 0 from within: slab test in the frame of the box.
+double cast_box(const WorldObject& object, const Vec3& origin, const Vec3& direction) {
+  const Mat3 to_box = Eigen::AngleAxisd(-object.yaw_rad, Vec3::UnitZ()).toRotationMatrix();
+  const Vec3 half = Vec3(object.box->width_m, object.box->depth_m, object.box->height_m) / 2;
+  const Vec3 o = to_box * (origin - Vec3(object.position.x(), object.position.y(), object.box->z_m + half.z()));
+  const Vec3 d = to_box * direction;
   double near = 0, far = std::numeric_limits<double>::infinity();
-  for (int i = 0; i < 2; ++i) {
+  for (int i = 0; i < 3; ++i) {
     if (std::abs(d[i]) < 1e-12) {
       if (std::abs(o[i]) > half[i]) return std::numeric_limits<double>::infinity();
       continue;
@@ -91,7 +90,7 @@ double cast_capsule(const Capsule& capsule, const Vec3& o, const Vec3& d) {
   return nearest;
 }
 
-/// Exact traversal of the cells on the ray (Amanatides and Woo 1987).
+/// Exact traversal of the cells below the ray (Amanatides and Woo 1987); in lengths of `direction`, of any length.
 double cast_map(const Bitmap& map, const Vec2& origin, const Vec2& direction, double max_range) {
   int column = static_cast<int>(std::floor(origin.x() / map.cell_m)),
       row = static_cast<int>(std::floor(origin.y() / map.cell_m));
@@ -203,16 +202,15 @@ Scene build_scene(const World& world, std::shared_ptr<const TextureSet> textures
   return scene;
 }
 
-double cast_ray(const World& world, const Scene& scene, const Vec2& origin, const Vec2& direction, double z,
-                double max_range) {
-  double nearest = cast_map(world.map, origin, direction, max_range);
-  for (const WorldObject& object : world.objects) {
-    if (object.box && z >= object.box->z_m && z <= object.box->z_m + object.box->height_m) {
-      nearest = std::min(nearest, cast_box(object, origin, direction));
-    }
+double cast_ray(const World& world, const Scene& scene, const Vec3& origin, const Vec3& direction, double max_range) {
+  double nearest = cast_map(world.map, origin.head<2>(), direction.head<2>(), max_range);
+  if (direction.z() != 0) {
+    const double plane_z = direction.z() > 0 ? world.wall_height_m : 0;
+    nearest = std::min(nearest, std::max(0.0, (plane_z - origin.z()) / direction.z()));
   }
-  const Vec3 o(origin.x(), origin.y(), z), d(direction.x(), direction.y(), 0);
-  for (const Capsule& capsule : scene.capsules) nearest = std::min(nearest, cast_capsule(capsule, o, d));
+  for (const WorldObject& object : world.objects)
+    if (object.box) nearest = std::min(nearest, cast_box(object, origin, direction));
+  for (const Capsule& capsule : scene.capsules) nearest = std::min(nearest, cast_capsule(capsule, origin, direction));
   return std::min(nearest, max_range);
 }
 
