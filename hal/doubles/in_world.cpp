@@ -49,11 +49,11 @@ RangeSource ranges_in(const sim::Simulation& world, const Transform& sensor_in_r
     model.sweep_s = sweep.sweep_s;
     model.max_range_m = 80;
     model.sigma_m = 0.005;
-    model.sensor_in_robot = sensor_in_robot;
-    const double yaw =
-        2 * std::atan2(sensor_in_robot.qz, sensor_in_robot.qw) + sweep.first_angle_rad + model.fov_rad / 2;
-    model.sensor_in_robot.qw = std::cos(yaw / 2);
-    model.sensor_in_robot.qz = std::sin(yaw / 2);
+    // The middle of the sweep looks ahead, in the scanner's own plane.
+    const Transform& t = sensor_in_robot;
+    const double half = (sweep.first_angle_rad + model.fov_rad / 2) / 2, c = std::cos(half), s = std::sin(half);
+    model.sensor_in_robot = {
+        t.x, t.y, t.z, t.qw * c - t.qz * s, t.qx * c + t.qy * s, t.qy * c - t.qx * s, t.qw * s + t.qz * c};
     sim::scan(world, model, sweep.first_ns, range_m, met);
   };
 }

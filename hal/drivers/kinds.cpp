@@ -93,7 +93,7 @@ constexpr SettingInfo kCamera[] = {
 constexpr SettingInfo kLaser[] = {
     COMMON_SETTINGS,
     DOUBLE_SETTINGS,
-    {"mount", "", map, false, "sensor in the robot frame: {x, y, z, yaw}"},
+    {"mount", "", map, false, "sensor in the robot frame: {x, y, z, yaw, pitch, roll}"},
     {"beams", "sim", count, false, "beams of a sweep; 181"},
     {"fov", "sim", angle, false, "angle from the first to the last beam; 180deg"},
     {"range", "sim", length, false, "largest distance; 8m"},
