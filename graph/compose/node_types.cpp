@@ -23,6 +23,7 @@ void register_traversability(NodeTypes& types);
 void register_person_tracking(NodeTypes& types);
 void register_laser_fusion(NodeTypes& types);
 void register_laser_cloud(NodeTypes& types);
+void register_cruise(NodeTypes& types);
 }  // namespace takt
 
 namespace takt::graph {
@@ -49,6 +50,7 @@ NodeTypes node_types() {
   register_person_tracking(types);
   register_laser_fusion(types);
   register_laser_cloud(types);
+  register_cruise(types);
   return types;
 }
 
