@@ -163,6 +163,13 @@ struct EvalSemanticOptions {
   bool json = false;
 };
 void add_eval_semantic(CLI::App& eval, EvalSemanticOptions& options, int& exit_code);
+struct EvalObstacleStopOptions {
+  int trials = 1000;  ///< of each kind of vision
+  uint64_t seed = 1;
+  std::string vision = "all";  ///< absent, overloaded, hanging
+  bool json = false;
+};
+void add_eval_obstacle_stop(CLI::App& eval, EvalObstacleStopOptions& options, int& exit_code);
 struct EvalMappingOptions {
   std::filesystem::path data;  ///< depth/1.png .., pose.txt; empty: generated rooms alone
   double minutes = 30;         ///< of the long drive; 0: none

@@ -19,6 +19,7 @@
 #include "graph/command/outages.hpp"
 #include "graph/command/prepare.hpp"
 #include "graph/command/report.hpp"
+#include "graph/command/run_expectations.hpp"
 #include "graph/command/run_support.hpp"
 #include "graph/command/run_trace.hpp"
 #include "graph/command/run_watchdog.hpp"
@@ -93,6 +94,7 @@ class IsolatedRun {
       : options_(options),
         graph_(graph),
         faults_(faults),
+        expectations_(options, graph),
         adjusted_(std::move(adjusted)),
         plan_source_(graph::outline(graph, graph::node_types(), clock_)),
         plan_(plan_source_.plan),
@@ -108,6 +110,7 @@ class IsolatedRun {
 
   /// Runs the graph with this process as supervisor, which has no thread yet. `run`: the process that stands for it.
   int run(pid_t run) {
+    if (const int code = expectations_.bind({}); code != kOk) throw Refused{code};
     if (options_.transport == "iceoryx") claim_ = find_room_for_daemon(adjusted_);
     choose_cores(plan_.cores, adjusted_);
     if (again()) forget_processes();
@@ -122,7 +125,7 @@ class IsolatedRun {
     group_.prepare_restarts();
     wait_for_all(ProcessRecord::composed);
     BoardExchange exchange(board_);
-    graph::complete(plan_, exchange, observers(options_));
+    graph::complete(plan_, exchange, observers(options_, graph_));
     faults_.make_room(plan_);
     if (const int code = again() ? kOk : admit(options_, graph_, plan_, adjusted_); code != kOk) throw Refused{code};
     const CpuLatencyHold latency = hold_cpu_dma_latency();
@@ -150,6 +153,7 @@ class IsolatedRun {
       if (options_.transport == "iceoryx") probe.emplace(*transport_, board_.group(), clock_);
       watchdog_.emplace(options_, plan_, board_);
       const RunFaults::Active faulty(faults_, plan_, clock_, board_);
+      const RunExpectations::Active expecting(expectations_, plan_, clock_, board_, *transport_);
       watch();
     }
     MachineUse use = use_of_all();
@@ -361,16 +365,18 @@ class IsolatedRun {
     record_.tell(report);
     const int exit = code_ != 0 ? code_ : report["ok"].get<bool>() ? kOk : kNotOk;
     faults_.judge(result, board_, exit, partition_.names, report);
+    expectations_.judge(report);
     if (code_ == 0) watchdog_->end();  // else nobody says that all is well
     tell(options_, graph_, report);
     if (!no_trace.empty()) return refuse(no_trace, kBadInput);
-    return faults_.exit_code(exit, report);
+    return expectations_.exit_code(faults_.exit_code(exit, report), report);
   }
 
   std::unique_ptr<DaemonClaim> claim_;  ///< of iceoryx, until its daemon is there
   const RunOptions& options_;
   const graph::GraphSpec& graph_;
   RunFaults& faults_;
+  RunExpectations expectations_;
   std::vector<std::string> adjusted_, problems_;
   std::vector<std::pair<pid_t, int64_t>> stopped_;  ///< processes, and when they go on
   MonotonicClock clock_;

@@ -78,8 +78,10 @@ void add_explain(CLI::App& app, takt::command::ExplainOptions& o, int& exit_code
 void add_run(CLI::App& app, takt::command::RunOptions& o, int& exit_code) {
   CLI::App* run = app.add_subcommand("run", "runs a graph and reports what happened");
   add_load_options(*run, o.graph, o.load);
-  run->add_option("--for", o.duration_s, "how long, e.g. 20s; 0s: until stopped")
-      ->transform(CLI::Validator(duration, "DURATION"));
+  CLI::Option* how_long = run->add_option("--for", o.duration_s,
+                                          "how long, e.g. 20s; 0s: until stopped (default: 20s, or as the graph's "
+                                          "`expect` says)")
+                              ->transform(CLI::Validator(duration, "DURATION"));
   run->add_option("--clock", o.clock, "real | virtual")->check(CLI::IsMember({"real", "virtual"}));
   run->add_option("--durations", o.durations,
                   "what jobs take in virtual time: budgets | random (half a budget to a whole one) | a record");
@@ -106,7 +108,10 @@ void add_run(CLI::App& app, takt::command::RunOptions& o, int& exit_code) {
   run->add_flag("--unchecked", o.unchecked, "runs what the check refuses");
   run->add_flag("--require-rt", o.require_rt,
                 "exit 3 where the machine lacks what `takt doctor` checks for such a run");
-  run->callback([&] { exit_code = takt::command::run_graph(o); });
+  run->callback([&, how_long] {
+    o.duration_asked = how_long->count() > 0;
+    exit_code = takt::command::run_graph(o);
+  });
 }
 
 void add_devices(CLI::App& app, bool& json, int& exit_code) {
@@ -173,6 +178,7 @@ int main(int argc, char** argv) {
   takt::command::EvalLms200Options lms200;
   takt::command::DoubleOptions device_double;
   takt::command::EvalSemanticOptions semantic;
+  takt::command::EvalObstacleStopOptions obstacle_stop;
   takt::command::ReplayOptions replay;
   takt::command::LogOptions log;
   takt::command::CloudOptions cloud;
@@ -228,6 +234,7 @@ int main(int argc, char** argv) {
   takt::command::add_eval_registration(*eval, registration, exit_code);
   takt::command::add_eval_lms200(*eval, lms200, exit_code);
   takt::command::add_eval_semantic(*eval, semantic, exit_code);
+  takt::command::add_eval_obstacle_stop(*eval, obstacle_stop, exit_code);
 
   try {
     app.parse(argc, argv);

@@ -80,7 +80,7 @@ int run_member(const MemberPart& part) {
   graph::ComposeOptions how;
   how.output = options.output;
   how.seed = options.seed;
-  how.observers = observers(options);
+  how.observers = observers(options, part.graph);
   how.owns = [&](const std::string& id) { return part.partition.process_of.at(id) == part.process; };
   how.exchange = &exchange;
   if (const int code = compose(options, how, prepared); code != kOk) {

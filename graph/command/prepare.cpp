@@ -87,7 +87,7 @@ int prepare(const RunOptions& options, Prepared& prepared) {
     graph::ComposeOptions how;
     how.output = options.output;
     how.seed = options.seed;
-    how.observers = observers(options);
+    how.observers = observers(options, *prepared.graph);
     code = compose(options, how, prepared);
   }
   if (code != kOk) tell_problems(prepared.problems.size());

@@ -14,10 +14,12 @@
 #include "graph/command/live_table.hpp"
 #include "graph/command/prepare.hpp"
 #include "graph/command/report.hpp"
+#include "graph/command/run_expectations.hpp"
 #include "graph/command/run_faults.hpp"
 #include "graph/command/run_support.hpp"
 #include "graph/command/run_trace.hpp"
 #include "graph/command/run_watchdog.hpp"
+#include "graph/command/world_truth.hpp"
 #include "rt/shm/iceoryx_preflight.hpp"
 
 namespace takt::command {
@@ -37,7 +39,8 @@ std::unique_ptr<Transport> make_transport(const std::string& name, const Plan& p
 }
 
 /// Runs the composed graph in this process; everything it needs exists and is checked.
-int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, std::vector<std::string> adjusted) {
+int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, RunExpectations& expectations,
+            std::vector<std::string> adjusted) {
   const graph::GraphSpec& graph = *prepared.graph;
   graph::Composition& composition = *prepared.composition;
   const auto durations = job_durations(options.durations, composition.plan, options.seed);
@@ -59,6 +62,7 @@ int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, st
       trace.drain();
       record.capture();
       faults.look();
+      expectations.look();
     };
     run.job_duration_ns = faults.durations(*durations, composition.plan);
     run.ran = [&](const trace::Slice& slice) { trace.ran(slice); };
@@ -80,6 +84,7 @@ int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, st
     watchdog.start();
     {
       const RunFaults::Active faulty(faults, composition.plan, *prepared.clock, board);
+      const RunExpectations::Active expecting(expectations, composition.plan, *prepared.clock, board, *transport);
       result = executor.run();
     }
     if (result.stuck.empty()) watchdog.end();
@@ -111,8 +116,9 @@ int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, st
                            {"durations", options.durations}};
   record.tell(report);
   faults.judge(result, board, run_exit(board, result.policy_granted, report), {}, report);
+  expectations.judge(report);
   int code = tell_faults(options, graph, board, result.policy_granted, report);
-  code = faults.exit_code(code, report);
+  code = expectations.exit_code(faults.exit_code(code, report), report);
   if (!no_trace.empty()) code = refuse(no_trace, kBadInput);
   // A job that never returns still uses what would now be taken down.
   if (!result.stuck.empty()) end_process(code, options.transport);
@@ -124,7 +130,7 @@ int run_in_one_process(const RunOptions& options, Prepared& prepared, RunFaults&
   graph::ComposeOptions how;
   how.output = options.output;
   how.seed = options.seed;
-  how.observers = observers(options);
+  how.observers = observers(options, *prepared.graph);
   if (const int code = compose(options, how, prepared); code != kOk) {
     tell_problems(prepared.problems.size());
     return code;
@@ -134,6 +140,8 @@ int run_in_one_process(const RunOptions& options, Prepared& prepared, RunFaults&
     return kOk;
   }
   faults.make_room(prepared.composition->plan);
+  RunExpectations expectations(options, *prepared.graph);
+  if (const int code = expectations.bind(world_truth(prepared.devices.first_world())); code != kOk) return code;
   // In virtual time the cores of the schedule need not be there.
   std::vector<int>& cores = prepared.composition->plan.cores;
   if (!prepared.clock->is_virtual() || cores.empty()) choose_cores(cores, adjusted);
@@ -146,7 +154,7 @@ int run_in_one_process(const RunOptions& options, Prepared& prepared, RunFaults&
     return refuse("--require-rt: " + lacks.front(), kDeviceOrSystem);
   adjusted.insert(adjusted.end(), lacks.begin(), lacks.end());
   for (const std::string& line : adjusted) std::fprintf(stderr, "takt: adjusted: %s\n", line.c_str());
-  return execute(options, prepared, faults, std::move(adjusted));
+  return execute(options, prepared, faults, expectations, std::move(adjusted));
 }
 
 /// One process, or one per subsystem: as the command line says, else the graph.
@@ -156,6 +164,8 @@ int run_as_asked(RunOptions options) {
     tell_problems(prepared.problems.size());
     return code;
   }
+  if (prepared.graph->expect && !options.duration_asked)
+    options.duration_s = static_cast<double>(prepared.graph->expect->within_ns) * 1e-9;
   std::vector<std::string> adjusted = prepared.graph->adjusted;
   const std::string wanted = options.isolate.empty() ? prepared.graph->isolation : options.isolate;
   if (options.require_rt) {

@@ -13,7 +13,8 @@ enum Exit : int { kOk = 0, kNotOk = 1, kBadInput = 2, kDeviceOrSystem = 3 };
 struct RunOptions {
   std::filesystem::path graph;  ///< empty: graph/ace.yaml of the project
   graph::LoadOptions load;
-  double duration_s = 20;  ///< 0: until stopped
+  double duration_s = 20;       ///< 0: until stopped
+  bool duration_asked = false;  ///< else a graph that expects something says how long
   bool unchecked = false, require_rt = false;
   std::string clock = "real", isolate;
   std::string durations = "budgets";  ///< of jobs in virtual time, see job_durations()

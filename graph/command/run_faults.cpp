@@ -4,10 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
-#include <condition_variable>
 #include <cstdio>
-#include <mutex>
 #include <utility>
 
 #include "graph/command/prepare.hpp"
@@ -125,15 +122,7 @@ void RunFaults::begin(const Plan& plan, const Clock& clock, RunBoard& board) {
   health_.emplace(plan, board);
   if (clock.is_virtual()) return;
   injection_->begin_loads(board.epoch_ns());
-  looking_ = std::jthread([this](const std::stop_token& stop) {
-    std::mutex mutex;
-    std::condition_variable_any ending;
-    std::unique_lock lock(mutex);
-    while (!stop.stop_requested()) {
-      look();
-      ending.wait_for(lock, stop, std::chrono::nanoseconds(graph::HealthWatch::kPeriod_ns), [] { return false; });
-    }
-  });
+  looking_.emplace(std::chrono::nanoseconds(graph::HealthWatch::kPeriod_ns), [this] { look(); });
 }
 
 void RunFaults::look() {
@@ -142,10 +131,7 @@ void RunFaults::look() {
 
 void RunFaults::end() {
   if (!injection_) return;
-  if (looking_.joinable()) {
-    looking_.request_stop();
-    looking_.join();
-  }
+  looking_.reset();
   injection_->end_loads();
 }
 

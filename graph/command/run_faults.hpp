@@ -3,8 +3,8 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <thread>
 
+#include "graph/command/periodic.hpp"
 #include "graph/command/run_command.hpp"
 #include "graph/command/run_record.hpp"
 #include "graph/faults/injection.hpp"
@@ -66,7 +66,7 @@ class RunFaults {
   RunBoard* board_ = nullptr;
   const Plan* plan_ = nullptr;
   bool asked_ = false;  ///< due() has been called
-  std::jthread looking_;
+  std::optional<Periodic> looking_;
 };
 
 }  // namespace takt::command

@@ -41,7 +41,10 @@ std::string absolute(const std::filesystem::path& file) {
 
 }  // namespace
 
-graph::Observers observers(const RunOptions& options) { return {1, options.record.empty() ? 0 : kUndisturbedNs}; }
+graph::Observers observers(const RunOptions& options, const graph::GraphSpec& graph) {
+  const uint32_t followers = (options.record.empty() ? 0u : 1u) + (graph.expect ? 1u : 0u);
+  return {1, followers, kUndisturbedNs};
+}
 
 RunRecord::RunRecord(const RunOptions& options, const Plan& plan) : options_(options) {
   std::vector<std::string> names;

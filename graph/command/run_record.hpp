@@ -14,8 +14,9 @@
 
 namespace takt::command {
 
-/// Who reads the outputs of a run beside its edges: `takt echo`, and the recorder if there is one.
-graph::Observers observers(const RunOptions& options);
+/// Who reads the outputs of a run beside its edges: `takt echo`; the recorder, and what follows the conditions of the
+/// graph, if there are any.
+graph::Observers observers(const RunOptions& options, const graph::GraphSpec& graph);
 
 /// The record of a run, if one was asked for (`--record`); else every call does nothing.
 class RunRecord {

@@ -100,6 +100,10 @@ std::string summary_text(const Json& report) {
   for (const Json& line : report["adjusted"]) text += "adjusted: " + line.get<std::string>() + "\n";
   text += report["ok"].get<bool>() ? "ok\n" : "NOT OK: a high-criticality deadline was missed or a node fell behind\n";
   if (report.contains("scenario")) text += graph::scenario_text(report["scenario"]);
+  if (report.contains("expectations")) {
+    text += graph::findings_text(report["expectations"]["conditions"]);
+    text += report["expectations"]["met"].get<bool>() ? "as expected\n" : "NOT AS EXPECTED\n";
+  }
   return text;
 }
 

@@ -27,6 +27,7 @@ void register_person_tracking(NodeTypes& types);
 void register_laser_fusion(NodeTypes& types);
 void register_laser_cloud(NodeTypes& types);
 void register_robot_client(NodeTypes& types);
+void register_cruise(NodeTypes& types);
 }  // namespace takt
 
 namespace takt::graph {
@@ -57,6 +58,7 @@ NodeTypes node_types() {
   register_laser_fusion(types);
   register_laser_cloud(types);
   register_robot_client(types);
+  register_cruise(types);
   return types;
 }
 

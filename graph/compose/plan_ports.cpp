@@ -36,13 +36,13 @@ size_t producer_of(const Plan& plan, size_t port) {
 }  // namespace
 
 void size_ports(Plan& plan, const Observers& observers) {
-  const uint32_t readers = observers.taps + (observers.recorded_ns > 0 ? 1 : 0);
+  const uint32_t readers = observers.taps + observers.followers;
   for (size_t p = 0; p < plan.ports.size(); ++p) {
     PortPlan& port = plan.ports[p];
     port.held += readers;
     port.readers += readers;
-    if (observers.recorded_ns > 0)
-      port.history = messages_within(observers.recorded_ns, effective_rate_hz(plan, producer_of(plan, p)));
+    if (observers.followers > 0)
+      port.history = messages_within(observers.kept_ns, effective_rate_hz(plan, producer_of(plan, p)));
   }
   // A join looks for equal stamps among outputs of different latency: keep as many messages as the slowest of them may
   // lag behind the fastest, here the longest deadline of any task.

@@ -6,8 +6,9 @@ namespace takt::graph {
 
 /// Who reads outputs beside the edges of the graph.
 struct Observers {
-  uint32_t taps = 0;        ///< may join each output while it runs, each holding one message
-  int64_t recorded_ns = 0;  ///< > 0: one more, which must find every message even if it looks only that often
+  uint32_t taps = 0;       ///< may join each output while it runs, each holding one message
+  uint32_t followers = 0;  ///< likewise, but they must find every message
+  int64_t kept_ns = 0;     ///< even if they look only that often
 };
 
 /// Fills history, held and readers of every port from the edges, deadlines and rates of the tasks, so that no message a

@@ -7,6 +7,7 @@
 
 #include "graph/faults/scenario.hpp"
 #include "graph/language/document.hpp"
+#include "graph/language/figure_reader.hpp"
 #include "graph/language/quantity.hpp"
 #include "graph/language/schema.hpp"
 #include "graph/language/words.hpp"
@@ -214,84 +215,21 @@ class ScenarioReader {
 
   void read_expectations(const json& expect) {
     Expectations& e = scenario_.expect;
-    std::vector<std::string> modes{graph_.mode}, chains;
-    for (const ModeSpec& mode : graph_.modes) modes.push_back(mode.name);
-    for (const ModePlan& mode : plan_.modes) modes.push_back(mode.name);
-    for (const ChainSpec& chain : graph_.chains) chains.push_back(chain.name);
-    read_modes(expect, modes);
-    read_bounds(expect, "rates", nodes(false), "nodes", &Bound::at_least, e.rates);
-    read_bounds(expect, "misses", nodes(false), "nodes", &Bound::at_most, e.misses);
-    read_bounds(expect, "stale", nodes(false), "nodes", &Bound::at_most, e.stale);
-    read_bounds(expect, "restarts", processes_of(graph_), "subsystems", nullptr, e.restarts);
-    read_bounds(expect, "ages", chains, "chains", &Bound::at_most, e.ages);
-    if (expect.contains("lost")) e.lost = read_bound(expect["lost"], "/expect/lost", &Bound::at_most, false);
+    FigureReader::Names names{graph_.name, nodes(false), {}, {graph_.mode}};
+    for (const ModeSpec& mode : graph_.modes) names.modes.push_back(mode.name);
+    for (const ModePlan& mode : plan_.modes) names.modes.push_back(mode.name);
+    for (const ChainSpec& chain : graph_.chains) names.chains.push_back(chain.name);
+    FigureReader figures(document_, names, problems_);
+    figures.read(expect, e);
+    figures.read_bounds(expect, "restarts", processes_of(graph_), "subsystems", nullptr, e.restarts);
+    if (expect.contains("lost")) e.lost = figures.read_bound(expect["lost"], "/expect/lost", &Bound::at_most);
     if (expect.contains("exit") && expect["exit"].is_number_integer()) e.exit = expect["exit"].get<int>();
     e.recovery_ns = read_time(expect, "/expect", "recovery", 0);
   }
 
-  void read_modes(const json& expect, const std::vector<std::string>& valid) {
-    const json modes = expect.value("modes", json::array());
-    for (size_t i = 0; modes.is_array() && i < modes.size(); ++i) {
-      if (!modes[i].is_string()) continue;
-      const auto mode = modes[i].get<std::string>();
-      if (std::find(valid.begin(), valid.end(), mode) == valid.end())
-        problem(document_.value_at(child("/expect/modes", i)),
-                fmt::format("graph {} has no mode {}{}", ticked(graph_.name), ticked(mode), alternatives(mode, valid)));
-      scenario_.expect.modes.push_back(mode);
-    }
-  }
-
-  /// `bare` is the side that a number alone stands for; null: both.
-  void read_bounds(const json& expect, const char* name, const std::vector<std::string>& valid, const char* what,
-                   std::optional<double> Bound::*bare, std::map<std::string, Bound>& bounds) {
-    const json map = expect.value(name, json::object());
-    if (!map.is_object()) return;
-    const std::string pointer = child("/expect", name);
-    for (const auto& [id, value] : map.items()) {
-      const std::string below = child(pointer, id);
-      if (std::find(valid.begin(), valid.end(), id) == valid.end())
-        problem(document_.key_at(below),
-                fmt::format("{} names {}, but it is none of the {} of graph {}{}", ticked(name), ticked(id), what,
-                            ticked(graph_.name), alternatives(id, valid)));
-      bounds[id] = read_bound(value, below, bare, std::string_view(name) == "ages");
-    }
-  }
-
-  Bound read_bound(const json& value, const std::string& pointer, std::optional<double> Bound::*bare, bool time) {
-    const auto figure = [&](const json& holder, const std::string& place, const std::string& key) {
-      return time                 ? as_double(duration_at(place, key))
-             : holder.is_number() ? std::optional(holder.get<double>())
-                                  : std::nullopt;
-    };
-    Bound bound;
-    if (value.is_object()) {
-      if (value.contains("at_least"))
-        bound.at_least = figure(value["at_least"], child(pointer, "at_least"), "at_least");
-      if (value.contains("at_most")) bound.at_most = figure(value["at_most"], child(pointer, "at_most"), "at_most");
-      if (value.empty()) problem(document_.value_at(pointer), "lacks at_least, at_most or both");
-      return bound;
-    }
-    const auto alone = figure(value, pointer, pointer.substr(pointer.rfind('/') + 1));
-    if (bare == nullptr) bound.at_least = bound.at_most = alone;
-    else bound.*bare = alone;
-    return bound;
-  }
-
-  static std::optional<double> as_double(std::optional<int64_t> ns) {
-    return ns ? std::optional(static_cast<double>(*ns)) : std::nullopt;
-  }
-
-  std::optional<int64_t> duration_at(const std::string& pointer, const std::string& key) {
-    if (document_.raw(pointer).empty()) return std::nullopt;
-    const auto ns = parse_duration_ns(document_.raw(pointer));
-    if (ns) return *ns;
-    problem(document_.value_at(pointer), fmt::format("{} {}", ticked(key), ns.error()));
-    return std::nullopt;
-  }
-
   std::optional<int64_t> read_time(const json& value, const std::string& pointer, const char* key, int64_t low) {
     if (!value.contains(key) || !(value[key].is_string() || value[key].is_number())) return std::nullopt;
-    const auto ns = duration_at(child(pointer, key), key);
+    const auto ns = read_duration(document_, child(pointer, key), key, problems_);
     if (!ns || *ns >= low) return ns;
     problem(document_.value_at(child(pointer, key)),
             fmt::format("{} is {}; wanted: at least {}", ticked(key), duration_text(*ns), duration_text(low)));

@@ -22,8 +22,6 @@ int64_t FaultSpec::ends_ns() const {
   return to_ns;
 }
 
-bool Bound::holds(double value) const { return (!at_least || value >= *at_least) && (!at_most || value <= *at_most); }
-
 std::vector<DeviceFailure> device_failures(const Scenario& scenario) {
   std::vector<DeviceFailure> failures;
   for (const FaultSpec& fault : scenario.faults)

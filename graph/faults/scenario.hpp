@@ -38,20 +38,9 @@ struct FaultSpec {
   int64_t ends_ns() const;
 };
 
-/// A figure lies within it, ends included.
-struct Bound {
-  std::optional<double> at_least, at_most;
-  bool holds(double value) const;
-};
-
 /// What is not stated is not asked for, but for what verdict() always asks for.
-struct Expectations {
-  std::vector<std::string> modes;         ///< empty: not stated
-  std::map<std::string, Bound> rates;     ///< by node: jobs completed per active second
-  std::map<std::string, Bound> misses;    ///< by node: deadlines
-  std::map<std::string, Bound> stale;     ///< by node: inputs that were stale at a job
+struct Expectations : FigureExpectations {
   std::map<std::string, Bound> restarts;  ///< by subsystem
-  std::map<std::string, Bound> ages;      ///< by chain: the oldest at its end, ns
   std::optional<int64_t> recovery_ns;     ///< after the end of each fault
   std::optional<Bound> lost;              ///< messages
   std::optional<int> exit;                ///< of the run, had it no scenario

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "graph/expect/finding.hpp"
 #include "graph/faults/health.hpp"
 #include "graph/faults/scenario.hpp"
 
@@ -26,15 +27,9 @@ struct RunEvents {
   int exit = 0;              ///< had it no scenario
 };
 
-struct Finding {
-  std::string what, expected, observed;
-  bool met = false;
-};
-
 /// What the scenario expects against what the run showed; `report` as design section 6 has it. Always asked for, beside
-/// what the file states: every fault struck at least once; high-criticality nodes whose jobs no fault strikes missed
-/// nothing and completed all releases but one (each unless `misses` or `rates` name the node); no other node hung,
-/// threw or took memory that it may not have; an exit of 0 or 1 unless `exit` is stated. Pure.
+/// what the file states: every fault struck at least once; promise_findings() of the nodes whose jobs no fault strikes;
+/// an exit of 0 or 1 unless `exit` is stated. Pure.
 std::vector<Finding> verdict(const Scenario& scenario, const nlohmann::ordered_json& report, const RunEvents& events);
 
 /// The block "scenario" of the report.

@@ -143,6 +143,55 @@ struct SubsystemSpec {
   Position position;
 };
 
+/// A figure lies within it, ends included.
+struct Bound {
+  std::optional<double> at_least, at_most;
+  bool holds(double value) const { return (!at_least || value >= *at_least) && (!at_most || value <= *at_most); }
+};
+
+/// What the figures of a run's report must be. What is not stated is not asked for.
+struct FigureExpectations {
+  std::vector<std::string> modes;       ///< empty: not stated
+  std::map<std::string, Bound> rates;   ///< by node: jobs completed per active second
+  std::map<std::string, Bound> misses;  ///< by node: deadlines
+  std::map<std::string, Bound> stale;   ///< by node: inputs that were stale at a job
+  std::map<std::string, Bound> ages;    ///< by chain: the oldest at its end, ns
+};
+
+/// When a condition must hold: at the end of the run, at some time, each time it can be judged, or not once.
+enum class Holds : uint8_t { at_end, once, always, never };
+
+/// One condition on what an output says or on what is true in the simulated world.
+struct ConditionSpec {
+  enum class Of : uint8_t {
+    messages,   ///< how many there were
+    field,      ///< of each message
+    attribute,  ///< of an object of the world
+    distance,   ///< of an object of the world from another one or from a place, m
+  };
+  Of of = Of::messages;
+  PortName port;          ///< of messages and field
+  std::string field;      ///< as find_field() takes it
+  std::string unit;       ///< that `bound` is in; "": a pure number, or a text
+  std::string object;     ///< of attribute and distance
+  std::string attribute;  ///< of attribute
+  std::string other;      ///< of distance; "": from the place (x, y) of the map
+  double x_m = 0, y_m = 0;
+  std::optional<std::string> is, contains;  ///< of a text; at most one of them
+  Bound bound;                              ///< of a number
+  Holds holds = Holds::at_end;
+  int64_t from_ns = 0;           ///< what was said or true before does not count; since the epoch, as
+  std::optional<int64_t> to_ns;  ///< this: what is said or true from then on
+  Position position;
+};
+
+/// The part `expect` of a graph.
+struct ExpectSpec {
+  int64_t within_ns = 0;  ///< the longest that the run lasts
+  std::vector<ConditionSpec> conditions;
+  FigureExpectations figures;
+};
+
 struct GraphSpec {
   std::string name, file, profile, mode = "full";
   std::filesystem::path directory;
@@ -152,6 +201,7 @@ struct GraphSpec {
   std::vector<SubsystemSpec> subsystems;
   std::vector<ChainSpec> chains;
   std::vector<ModeSpec> modes;
+  std::optional<ExpectSpec> expect;
   ScheduleSpec schedule;
   std::vector<std::string> adjusted;  ///< what validation changed, for stderr and the report
 };

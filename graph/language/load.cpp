@@ -32,6 +32,7 @@ Loaded Loader::load(const std::filesystem::path& file) {
     check_chains();
     check_schedule();
     check_modes();
+    read_expect();
     apply_mode();
     tell_what_is_not_enforced();
   }

@@ -109,6 +109,18 @@ class Loader {
   void check_unconnected(const std::string& id, const Part& part);
   void check_joins();
 
+  // read_expect.cpp: what the run must show
+  void read_expect();
+  std::optional<ConditionSpec> read_condition(const nlohmann::json& value, const std::string& pointer);
+  bool read_port_condition(ConditionSpec& condition, const nlohmann::json& value, const std::string& pointer);
+  bool read_world_condition(ConditionSpec& condition, const nlohmann::json& value, const std::string& pointer);
+  bool read_distance(ConditionSpec& condition, const nlohmann::json& value, const std::string& pointer);
+  bool read_number_test(ConditionSpec& condition, const nlohmann::json& value, const std::string& pointer);
+  bool read_text_test(ConditionSpec& condition, const nlohmann::json& value, const std::string& pointer);
+  bool read_window(ConditionSpec& condition, const nlohmann::json& value, const std::string& pointer);
+  bool check_keys(const nlohmann::json& value, const std::string& pointer, std::string_view what,
+                  const std::vector<std::string>& valid);
+
   // check_graph.cpp
   void check_chains();
   void check_modes();

@@ -196,6 +196,10 @@ class Explainer {
         {"devices", "device "}, {"profiles", "profile "},   {"subsystems", "subsystem "}, {"chains", "chain "},
         {"modes", "mode "},     {"nodes", "the entry of "}, {"expect", "expectation "},   {"faults", ""}};
     if (words[0] == "faults") words[1] = "faults[" + words[1] + "]";
+    if (words[0] == "expect" && words[1] == "all" && words.size() > 2) {
+      words[1] = "all[" + words[2] + "]";
+      words.erase(words.begin() + 2);
+    }
     const auto kind = kinds.find(words[0]);
     std::string text = (kind == kinds.end() ? words[0] + " " : kind->second) + ticked(words[1]);
     size_t next = 2;

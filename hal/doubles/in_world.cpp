@@ -16,7 +16,7 @@ namespace {
 bool began(const sim::Simulation& world) { return world.epoch_ns() != std::numeric_limits<int64_t>::min(); }
 
 /// The world carries commands out kLatencyNs after they were given: given then, they act now.
-int64_t acting(int64_t now_ns) { return now_ns - sim::Simulation::kLatencyNs; }
+int64_t acting(int64_t now_ns) { return now_ns - sim::kLatencyNs; }
 
 /// Two eyes, and what is needed to draw what they see.
 struct Eyes {

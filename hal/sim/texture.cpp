@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <map>
+#include <mutex>
 
 #include "hal/sim/random.hpp"
 
@@ -241,8 +243,14 @@ tl::expected<Texture, std::string> load_picture(const std::filesystem::path& fil
 }
 
 std::shared_ptr<const TextureSet> make_textures(uint64_t seed) {
+  static std::mutex mutex;
+  static std::map<uint64_t, std::weak_ptr<const TextureSet>> made;
+  const std::lock_guard lock(mutex);
+  std::weak_ptr<const TextureSet>& known = made[seed];
+  if (auto set = known.lock()) return set;
   auto set = std::make_shared<TextureSet>();
   for (size_t i = 0; i < kRecipes.size(); ++i) (*set)[i] = make_texture(kRecipes[i], mix(seed, i));
+  known = set;
   return set;
 }
 

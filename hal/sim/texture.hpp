@@ -48,7 +48,8 @@ std::string_view material_names();
 
 /// All materials of one seed: multi-octave hash noise (and random rectangles on posters), rich at every scale that a
 /// 640 x 480 camera resolves between 0.3 m and 15 m, so that a window of 15 px has texture to match. The striped ones
-/// carry bands of saturated colours: what stands out for a detector that looks at colours.
+/// carry bands of saturated colours: what stands out for a detector that looks at colours. Worlds of one seed share one
+/// set while any of them lives. Any thread.
 using TextureSet = std::array<Texture, kMaterials>;
 std::shared_ptr<const TextureSet> make_textures(uint64_t seed);
 

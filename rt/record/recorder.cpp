@@ -4,9 +4,7 @@
 #include <pthread.h>
 
 #include <algorithm>
-#include <array>
 #include <ctime>
-#include <limits>
 #include <utility>
 
 #include "rt/record/message_record.hpp"
@@ -33,7 +31,7 @@ Recorder::Recorder(const Plan& plan, const RunBoard& board, Transport& transport
   note(file_.metadata(kFacts, head.facts));
   for (const mcap::Attachment& attached : head.files) note(file_.attach(attached));
   add_channels(plan);
-  for (size_t p = 0; p < plan.ports.size(); ++p) ports_[p].reader = transport.make_reader(p);
+  for (size_t p = 0; p < plan.ports.size(); ++p) ports_[p].follower.emplace(transport.make_reader(p));
   for (const TaskPlan& task : plan.tasks) ports_of_.push_back(task.ports);
   writing_ = std::thread([this] { write_on(); });
   if (!options_.by_caller) capturing_ = std::thread([this] { capture_on(); });
@@ -73,25 +71,11 @@ void Recorder::take_ports() {
 }
 
 void Recorder::take_port(Port& port) {
-  std::array<Candidate, InputPort::kMaxDepth> candidates;
-  size_t fresh = port.reader->list(std::numeric_limits<int64_t>::max(), candidates);
-  while (fresh > 0 && candidates[fresh - 1].sequence <= port.seen) --fresh;  // the oldest stand last
-  for (size_t i = fresh; i-- > 0;) {
-    const uint64_t sequence = candidates[i].sequence;
-    if (sequence <= port.seen) continue;
-    result_.overwritten += sequence - port.seen - 1;
-    port.seen = sequence;
-    Held held = port.reader->take(sequence);
-    if (!held) {
-      ++result_.overwritten;
-      continue;
-    }
+  result_.overwritten += port.follower->take([&](const Held& held) {
     std::vector<std::byte> data = queue_.buffer();
     pack(*port.type, held, port.whole, data);
-    const int64_t at_ns = held.header->published_ns;
-    port.reader->release(held);
-    push(port.channel, sequence, at_ns, std::move(data));
-  }
+    push(port.channel, held.sequence, held.header->published_ns, std::move(data));
+  });
 }
 
 void Recorder::take_job(const RecordedJob& job) {
@@ -140,7 +124,10 @@ void Recorder::take_rest() {
 RecordResult Recorder::finish(mcap::Metadata facts, uint64_t unheard_threads) {
   take_rest();
   // What its writer took along.
-  for (const Port& port : ports_) result_.overwritten += std::max(port.told, port.seen) - port.seen;
+  for (const Port& port : ports_) {
+    const uint64_t seen = port.follower->seen();
+    result_.overwritten += std::max(port.told, seen) - seen;
+  }
   queue_.close();
   writing_.join();
   result_.no_room = no_room_.load();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <atomic>
-#include <memory>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -10,7 +10,7 @@
 #include "rt/record/mcap/writer.hpp"
 #include "rt/record/write_queue.hpp"
 #include "rt/sched/run_board.hpp"
-#include "rt/shm/transport.hpp"
+#include "rt/shm/follower.hpp"
 
 namespace takt::record {
 
@@ -72,11 +72,10 @@ class Recorder {
 
  private:
   struct Port {
-    std::unique_ptr<Reader> reader;
+    std::optional<Follower> follower;
     const MessageType* type = nullptr;
     uint16_t channel = 0;
     bool whole = false;
-    uint64_t seen = 0;
     uint64_t told = 0;  ///< the newest that a job says it has published
   };
   void add_channels(const Plan& plan);
