@@ -49,7 +49,7 @@ StereoFrame FailingCamera::read(ImageView<uint8_t> left, ImageView<uint8_t> righ
   if (const auto status = nothing(failure)) return {*status};
   StereoFrame frame = inner().read(left, right, deadline_ns);
   if (frame.status != ReadStatus::ok || !failure) return frame;
-  if (*failure == Failure::garbage) {
+  if (*failure == Misbehaviour::garbage) {
     frame.status = ReadStatus::partial;
     damage(left);
     damage(right);
@@ -76,7 +76,7 @@ ScanReading FailingLaser::read(std::span<float> range_m, int64_t wanted_ns, int6
   if (reading.status != ReadStatus::ok || !failure) return reading;
   const size_t beams = std::min(range_m.size(), kept_range_m_.size());
   const auto given = range_m.begin();
-  if (*failure == Failure::garbage) {
+  if (*failure == Misbehaviour::garbage) {
     reading.status = ReadStatus::partial;
     std::fill(given + static_cast<std::ptrdiff_t>(beams / 2), range_m.end(), 0.0f);
   } else if (!std::exchange(kept_, true)) {
@@ -130,7 +130,7 @@ ObjectReading FailingObjectSensor::read(ObjectReports& reports, int64_t wanted_n
     to.resize(from.size());
     std::copy(from.begin(), from.end(), to.data());
   };
-  if (*failure == Failure::garbage) {
+  if (*failure == Misbehaviour::garbage) {
     reading.status = ReadStatus::partial;
     reports.places.resize(reports.places.size / 2);
   } else if (!std::exchange(kept_, true)) {

@@ -83,13 +83,18 @@ void add_moving(Scene& scene, const Placed& placed, double offset) {
   }
 }
 
-double cast_box(const Placed& placed, const Vec2& origin, const Vec2& direction, double z) {
+double cast_box(const Placed& placed, const Vec3& origin, const Vec3& direction) {
   const auto& box = placed.shape->box;
-  if (!box || z < box->z_m + placed.lift_m || z > box->z_m + placed.lift_m + box->height_m) return kNever;
-  const Vec2 o = local(placed, origin - placed.position), d = local(placed, direction);
-  const Vec2 half(box->width_m / 2, box->depth_m / 2);
-  double near = 0, far = kNever;  // slabs of both axes
-  for (int i = 0; i < 2; ++i) {
+  if (!box) return kNever;
+  const auto in_box = [&](const Vec2& level, double z) {
+    const Vec2 turned = local(placed, level);
+    return Vec3(turned.x(), turned.y(), z);
+  };
+  const Vec3 half = Vec3(box->width_m, box->depth_m, box->height_m) / 2;
+  const Vec3 o = in_box(origin.head<2>() - placed.position, origin.z() - box->z_m - placed.lift_m - half.z());
+  const Vec3 d = in_box(direction.head<2>(), direction.z());
+  double near = 0, far = kNever;  // slabs of the three axes
+  for (int i = 0; i < 3; ++i) {
     if (std::abs(d[i]) < 1e-12) {
       if (std::abs(o[i]) > half[i]) return kNever;
       continue;
@@ -101,10 +106,9 @@ double cast_box(const Placed& placed, const Vec2& origin, const Vec2& direction,
   return near <= far ? near : kNever;
 }
 
-double cast_capsules(std::span<const Capsule> capsules, const Vec2& origin, const Vec2& direction, double z) {
-  const Vec3 o(origin.x(), origin.y(), z), d(direction.x(), direction.y(), 0);
+double cast_capsules(std::span<const Capsule> capsules, const Vec3& origin, const Vec3& direction) {
   double nearest = kNever;
-  for (const Capsule& capsule : capsules) nearest = std::min(nearest, cast_capsule(capsule, o, d));
+  for (const Capsule& capsule : capsules) nearest = std::min(nearest, cast_capsule(capsule, origin, direction));
   return nearest;
 }
 

@@ -23,10 +23,10 @@ void add_placed(Scene& scene, const Placed& placed, double offset);
 /// The same; the texture keeps to its place on the box, wherever that stands.
 void add_moving(Scene& scene, const Placed& placed, double offset);
 
-/// Distance along a ray (unit, horizontal) at height z to its box; infinite if that is not hit.
-double cast_box(const Placed& placed, const Vec2& origin, const Vec2& direction, double z);
+/// Distance along a ray (unit) to its box, 0 from within; infinite if that is not hit.
+double cast_box(const Placed& placed, const Vec3& origin, const Vec3& direction);
 /// The same to any of the capsules, of which persons are made.
-double cast_capsules(std::span<const Capsule> capsules, const Vec2& origin, const Vec2& direction, double z);
+double cast_capsules(std::span<const Capsule> capsules, const Vec3& origin, const Vec3& direction);
 
 /// True if a circle on the floor touches its box or person.
 bool touches(const Placed& placed, const Vec2& centre, double radius);

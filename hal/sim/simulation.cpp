@@ -155,7 +155,8 @@ bool Simulation::sees(size_t object, int64_t at_ns, double fov, double range, co
   const auto& box = placed.shape->box;
   const double extent = box ? std::hypot(box->width_m, box->depth_m) / 2 : 0.4;
   const double z = box ? box->z_m + placed.lift_m + box->height_m / 2 : 1.0;
-  return stage_->cast_ray(snapshot, origin, offset / distance, z, distance) >= distance - extent - 1e-3;
+  const Vec3 eye(origin.x(), origin.y(), z), ahead(offset.x() / distance, offset.y() / distance, 0);
+  return stage_->cast_ray(snapshot, eye, ahead, distance) >= distance - extent - 1e-3;
 }
 
 std::vector<const WorldObject*> Simulation::visible_objects(int64_t at_ns, double fov, double range) const {

@@ -138,11 +138,10 @@ void Stage::look(size_t robot, int64_t at_ns, Snapshot& into) const {
   }
 }
 
-double Stage::cast_ray(const Snapshot& snapshot, const Vec2& origin, const Vec2& direction, double z,
-                       double max_range) const {
-  double nearest = sim::cast_ray(fixed_, scene_, origin, direction, z, max_range);
-  for (const Placed& placed : snapshot.placed) nearest = std::min(nearest, cast_box(placed, origin, direction, z));
-  return std::min(nearest, cast_capsules(snapshot.scene.capsules, origin, direction, z));
+double Stage::cast_ray(const Snapshot& snapshot, const Vec3& origin, const Vec3& direction, double max_range) const {
+  double nearest = sim::cast_ray(fixed_, scene_, origin, direction, max_range);
+  for (const Placed& placed : snapshot.placed) nearest = std::min(nearest, cast_box(placed, origin, direction));
+  return std::min(nearest, cast_capsules(snapshot.scene.capsules, origin, direction));
 }
 
 bool Stage::refuses(size_t robot, const Vec2& from, const Vec2& to, int64_t at_ns) const {

@@ -44,9 +44,8 @@ class Stage {
   void look(size_t robot, int64_t at_ns, Snapshot& into) const;
   /// With memory for whatever look() fills in.
   Snapshot make_snapshot() const;
-  /// Distance from `origin` along `direction` (unit, horizontal) at height z to the first wall, box, person or robot.
-  double cast_ray(const Snapshot& snapshot, const Vec2& origin, const Vec2& direction, double z,
-                  double max_range) const;
+  /// Distance from `origin` along `direction` (unit) to the first wall, box, person or robot, to floor or ceiling.
+  double cast_ray(const Snapshot& snapshot, const Vec3& origin, const Vec3& direction, double max_range) const;
 
   /// Whether a robot must not go from one place to the next. What moves or changes counts as it was 100 ms before: that
   /// is settled, whoever asks first. Another robot counts with the way that it can have made meanwhile.

@@ -52,7 +52,7 @@ void add_walls(const World& world, Scene& scene) {
   }
 }
 
-/// Exact traversal of the cells on the ray (Amanatides and Woo 1987).
+/// Exact traversal of the cells below the ray (Amanatides and Woo 1987); in lengths of `direction`, of any length.
 double cast_map(const Bitmap& map, const Vec2& origin, const Vec2& direction, double max_range) {
   int column = static_cast<int>(std::floor(origin.x() / map.cell_m)),
       row = static_cast<int>(std::floor(origin.y() / map.cell_m));
@@ -151,12 +151,15 @@ Scene build_scene(const World& world, std::shared_ptr<const TextureSet> textures
   return scene;
 }
 
-double cast_ray(const World& world, const Scene& scene, const Vec2& origin, const Vec2& direction, double z,
-                double max_range) {
-  double nearest = cast_map(world.map, origin, direction, max_range);
+double cast_ray(const World& world, const Scene& scene, const Vec3& origin, const Vec3& direction, double max_range) {
+  double nearest = cast_map(world.map, origin.head<2>(), direction.head<2>(), max_range);
+  if (direction.z() != 0) {
+    const double plane_z = direction.z() > 0 ? world.wall_height_m : 0;
+    nearest = std::min(nearest, std::max(0.0, (plane_z - origin.z()) / direction.z()));
+  }
   for (const WorldObject& object : world.objects)
-    nearest = std::min(nearest, cast_box(as_it_begins(object), origin, direction, z));
-  return std::min({nearest, cast_capsules(scene.capsules, origin, direction, z), max_range});
+    nearest = std::min(nearest, cast_box(as_it_begins(object), origin, direction));
+  return std::min({nearest, cast_capsules(scene.capsules, origin, direction), max_range});
 }
 
 bool collides(const World& world, const Vec2& centre, double radius) {

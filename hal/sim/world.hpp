@@ -142,10 +142,9 @@ tl::expected<Bitmap, std::string> parse_rows(const std::string& text, double cel
 /// Floor, ceiling, walls (one rectangle for each straight run of cell borders), and the objects as they begin.
 Scene build_scene(const World& world, std::shared_ptr<const TextureSet> textures);
 
-/// Distance from `origin` along `direction` (unit, horizontal) at height z to the first wall, box or person;
-/// `max_range` if nothing is nearer. The scene is that of the world.
-double cast_ray(const World& world, const Scene& scene, const Vec2& origin, const Vec2& direction, double z,
-                double max_range);
+/// Distance from `origin` along `direction` (unit) to the first wall, box or person, to floor or ceiling; `max_range`
+/// if nothing is nearer. The scene is that of the world.
+double cast_ray(const World& world, const Scene& scene, const Vec3& origin, const Vec3& direction, double max_range);
 
 /// True if a circle touches a wall, a box or a person.
 bool collides(const World& world, const Vec2& centre, double radius);

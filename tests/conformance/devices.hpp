@@ -13,6 +13,7 @@
 #include "hal/base/mobile_base.hpp"
 #include "hal/gpio/digital_lines.hpp"
 #include "hal/head/camera_head.hpp"
+#include "hal/interaction/interaction.hpp"
 #include "hal/laser/laser_scanner.hpp"
 #include "hal/object_sensor/object_sensor.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
@@ -114,6 +115,31 @@ inline void check_camera_head(CameraHead& head, const Pace& pace = no_pace) {
   head.stop();
   CHECK(head.read(at + kDevicePeriod, INT64_MAX).status == ReadStatus::no_data);
   head.close();
+}
+
+/// Two tasks are given, 2 and 4 periods after the epoch.
+inline void check_interaction(Interaction& person, const Pace& pace = no_pace) {
+  CHECK(person.read(kDeviceEpoch).status == ReadStatus::no_data);
+  REQUIRE(person.open().has_value());
+  CHECK(person.read(kDeviceEpoch).status == ReadStatus::no_data);
+  REQUIRE(person.start(kDeviceEpoch).has_value());
+  for (int64_t k = 0; k < 8; ++k) {
+    const int64_t at = kDeviceEpoch + k * kDevicePeriod;
+    pace(at);
+    const InteractionReading reading = person.read(at);
+    REQUIRE(reading.status == ReadStatus::ok);  // also where nobody says anything
+    CHECK(reading.stamp_ns <= at);
+    CHECK(reading.number == (k < 2 ? 0 : k < 4 ? 1 : 2));
+    CHECK(reading.task.empty() == (k < 2));
+    CHECK(reading.task.size() <= Interaction::kLongestTask);
+    CHECK(person.say("heard"));
+  }
+  person.stop();
+  CHECK(person.read(kDeviceEpoch + 9 * kDevicePeriod).status == ReadStatus::no_data);
+  person.close();
+  REQUIRE(person.open().has_value());
+  REQUIRE(person.start(kDeviceEpoch).has_value());
+  person.close();
 }
 
 /// `obeys`: the base takes velocity commands (a simulated one may drive a path instead).

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <numbers>
 
 #include "hal/sim/sensors.hpp"
 #include "nodes/semantic/network_file.hpp"
@@ -16,6 +17,7 @@ using takt::test::TemporaryFolder;
 
 namespace {
 
+constexpr double kDegree = std::numbers::pi / 180;
 const std::string kRows = "<rows>\n#######\n#.....#\n#.....#\n#.....#\n#.....#\n#######\n</rows>";
 
 std::string message(const std::string& xml) {
@@ -233,6 +235,26 @@ TEST_CASE("laser: mean and spread of the range to a wall at a known distance") {
   }
   CHECK(sum / n == doctest::Approx(2.4).epsilon(0.002));
   CHECK(std::sqrt(squares / n - sum * sum / n / n) == doctest::Approx(0.01).epsilon(0.2));
+}
+
+TEST_CASE("laser: a scanner tilted to the floor sees it at its distance, and the box on it") {
+  const auto s = test::small_simulation();
+  s->begin(0);
+  LaserModel model;
+  model.beams = 281, model.fov_rad = 70 * kDegree, model.max_range_m = 3, model.sigma_m = 0;
+  model.sensor_in_robot.z = 1;
+  model.sensor_in_robot.qw = std::cos(17 * kDegree), model.sensor_in_robot.qx = -std::sin(17 * kDegree);
+  std::vector<float> range(model.beams);
+  scan(*s, model, 0, range);
+  for (const size_t beam : {size_t{0}, size_t{140}, size_t{280}}) {
+    const double aside = (static_cast<double>(beam) - 140) * 0.25 * kDegree;
+    CHECK(range[beam] == doctest::Approx(1 / std::sin(34 * kDegree) / std::cos(aside)));
+  }
+  model.sensor_in_robot.y = 1;  // the robot looks along x: the scanner at (2.5, 2.5), the box at (4.0, 3.2) before it
+  scan(*s, model, 0, range);
+  const double to_floor_m = 1 / std::sin(34 * kDegree) / std::cos(25 * kDegree);
+  CHECK(range[240] > 0);
+  CHECK(range[240] < to_floor_m - 0.05);
 }
 
 TEST_CASE("objects are seen only in the field of view and unhidden") {
