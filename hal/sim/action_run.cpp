@@ -113,15 +113,13 @@ bool ActionRun::possible_move(const Doing& doing, const RoleMove& move, int64_t 
   const size_t target = role_index(*doing.action, move.to),
                object = doing.objects[role_index(*doing.action, move.role)];
   if (target == doing.action->roles.size()) return true;  // carried, or away
-  const int64_t since = at_ns - stage_.epoch_ns();
+  const auto& objects = stage_.world().objects;
   size_t below = doing.objects[target];
-  for (const Whereabouts* where = &stage_.states().whereabouts(below, since); where->kind == Whereabouts::Kind::on;
-       where = &stage_.states().whereabouts(below, since)) {
-    below = where->index;
-    if (below == object) {
-      const auto& objects = stage_.world().objects;
-      return reason("{} stands on {}", objects[doing.objects[target]].name, objects[object].name);
-    }
+  for (size_t depth = 0; depth < objects.size(); ++depth) {
+    const Whereabouts& where = stage_.states().whereabouts(below, at_ns - stage_.epoch_ns());
+    if (where.kind != Whereabouts::Kind::on) break;
+    below = where.index;
+    if (below == object) return reason("{} stands on {}", objects[doing.objects[target]].name, objects[object].name);
   }
   return true;
 }

@@ -146,15 +146,13 @@ double Stage::cast_ray(const Snapshot& snapshot, const Vec3& origin, const Vec3&
 
 bool Stage::refuses(size_t robot, const Vec2& from, const Vec2& to, int64_t at_ns) const {
   const int64_t before_ns = at_ns - kLatencyNs;
-  const auto inside = [&](const Vec2& centre) {
-    return collides(fixed_, centre, kFootprintRadius) ||
-           std::any_of(changing_.begin(), changing_.end(), [&](size_t object) {
-             const auto placed = this->placed(object, before_ns);
-             return placed && touches(*placed, centre, kFootprintRadius);
-           });
-  };
-  // Whoever is inside already may leave.
-  if (inside(to) && !inside(from)) return true;
+  // Whoever is inside something already may leave it.
+  const auto enters = [&](const auto& meets) { return meets(to) && !meets(from); };
+  if (enters([&](const Vec2& centre) { return collides(fixed_, centre, kFootprintRadius); })) return true;
+  for (const size_t object : changing_) {
+    const auto placed = this->placed(object, before_ns);
+    if (placed && enters([&](const Vec2& centre) { return touches(*placed, centre, kFootprintRadius); })) return true;
+  }
   for (size_t i = 0; i < robots_.size(); ++i) {
     if (i == robot) continue;
     const RobotState other = robots_[i]->state(before_ns);

@@ -112,7 +112,7 @@ std::vector<Order> random_orders(const World& world, const std::vector<std::vect
 /// The world as one list of what happens, gone through from the beginning; all by name.
 class Replay {
  public:
-  Replay(const World& world, const Stage& robots, std::vector<Order> orders) : world_(world), robots_(robots) {
+  Replay(const World& world, const Stage& robots, const std::vector<Order>& orders) : world_(world), robots_(robots) {
     for (const WorldObject& object : world.objects) {
       for (const auto& [name, value] : object.attributes) attributes_[object.name + "." + name] = value;
       places_[object.name] = {"", object.position, object.yaw_rad};
@@ -215,7 +215,7 @@ class Replay {
     for (const ActionRole& role : action.roles) {
       if (!position(object_of(order, role.name), at_ns)) return false;
       const double far = distance(object_of(order, role.name), order.robot, at_ns);
-      doubtful_ = doubtful_ || std::abs(far - kReach) < 0.005;
+      doubtful_ = doubtful_ || std::abs(far - kReach) < 1e-4;
       if (far > kReach) return false;
     }
     for (const RoleCondition& condition : action.pre)
@@ -243,7 +243,7 @@ class Replay {
   std::vector<Step> steps_;
   size_t next_ = 0;
   std::map<std::pair<size_t, uint32_t>, uint8_t> verdicts_;
-  bool doubtful_ = false;  ///< a decision was a matter of millimetres
+  bool doubtful_ = false;  ///< a decision was a matter of how fine that is
 };
 
 /// Releases of one robot's jobs: at most 70 ms apart.
