@@ -336,7 +336,7 @@ class GroundMapNode final : public Node {
   Choice terrain_centre_{
       this, "terrain_centre", "undecided", {"undecided", "mean"}, "from where cells are counted in a correlation"};
   Param<double> terrain_correlation_{
-      this, "terrain_correlation", 0.5, {-1.0, 1.0}, "1", "above it the best kind is believed"};
+      this, "terrain_correlation", 0.7, {-1.0, 1.0}, "1", "above it the best kind is believed; with `mean` 0.5"};
   Param<double> terrain_up_{this, "terrain_up", 0.2, {0.0, 1.0}, "1", "added to the hypothesis believed"};
   Param<double> terrain_down_{this, "terrain_down", 0.1, {0.0, 1.0}, "1", "taken off the others"};
   Param<double> camera_x_{this, "camera_x", 0.0, {-5.0, 5.0}, "m", "camera to the right, where the pair does not say"};

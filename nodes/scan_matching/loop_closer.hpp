@@ -19,7 +19,7 @@ struct ClosureParameters {
   double paired_min = 0.6;                  ///< least share of points with one of the anchors beside them, 0..1
   double prior_share_max = 0.05;            ///< of Refined: along a corridor no loop is closed
   double agree_m = 0.2, agree_rad = 0.05;   ///< by how much two looks in a row may differ, or neither is believed
-  double least_m = 0.05, least_rad = 0.01;  ///< smaller errors are left alone
+  double least_m = 0.15, least_rad = 0.03;  ///< smaller errors are left alone
 };
 
 /// Where the robot turns out to be.

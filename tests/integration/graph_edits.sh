@@ -81,7 +81,7 @@ edit '
   /^        grid: scan_matching\.map/d
   /^        correction: /d
   /^        stop: \{from: obstacle_stop/d
-  /^  stop: \{from: front_laser/d
+  /^  (stop|pose): \{from: front_laser/d
   s/laser_cloud, laser_fusion, //
   s/lost: \[front_laser, /lost: [/
 ' '
@@ -109,6 +109,7 @@ maps no_ego_motion
 edit '
   /^  ground_camera: /d
   s/ground_camera\.pair/head_camera.pair/
+  s/(ground: .*max_age: )400ms/\1600ms/
   s/head_camera, ground_camera, /head_camera, /
   s/lost: \[head_camera, ground_camera\]/lost: [head_camera]/
 ' '
@@ -117,10 +118,10 @@ edit '
 grep -q 'ground_camera' "$work/graph/edited.yaml" && fail "ground_camera is still in the graph"
 maps one_camera
 
-# A laser's cloud in place of the stereo camera's: obstacles are mapped without the head camera's depth.
+# A laser's cloud, twice a second, in place of the stereo camera's: obstacles are mapped without the head camera's depth.
 edit '
   /^    mapping_3d:$/,/^    traversability:$/s/cloud: \{from: stereo\.cloud/cloud: {from: laser_cloud.cloud/
-  s/obstacle: \{from: head_camera\.pair/obstacle: {from: front_laser.scan/
+  s/(obstacle: \{from: )head_camera\.pair(.*max_age: )700ms/\1front_laser.scan\21200ms/
 ' ''
 maps laser_cloud
 
