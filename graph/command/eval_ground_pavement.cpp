@@ -11,6 +11,7 @@
 #include "hal/camera/rig.hpp"
 #include "nodes/ground_map/ground_grid.hpp"
 #include "nodes/ground_map/pavement_scene.hpp"
+#include "nodes/mapping_3d/pose.hpp"
 #include "nodes/picture/draw.hpp"
 #include "rt/time/clock.hpp"
 
@@ -206,8 +207,9 @@ Json projection_errors() {
                  bearing = pan + uniform(-0.4, 0.4);
     const double x = on_head.x_m - range * std::sin(bearing), y = on_head.y_m + range * std::cos(bearing);
     const ImagePoint pixel = pixel_of(on_head, camera_in_robot(on_head, pan, tilt), x, y);
-    const auto found = floor_projection(on_head.camera(), turned_by_head(camera_in_robot(on_head, 0, 0), pan, tilt))
-                           .floor_at(pixel.x_px, pixel.y_px);
+    const auto found =
+        floor_projection(on_head.camera(), mapping_3d::turned_by_head(camera_in_robot(on_head, 0, 0), pan, tilt))
+            .floor_at(pixel.x_px, pixel.y_px);
     worst = std::max(worst, found ? std::hypot(found->x_m - x, found->y_m - y) : INFINITY);
   }
   out["turned_head_max_m"] = worst;
