@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <fstream>
@@ -85,11 +86,12 @@ std::string dot_of(const std::vector<KnownObject>& objects) {
 /// Connects, finds the client, then does `work(connection, client)`.
 template <class Work>
 int with_client(const RobotOptions& o, Work work) {
-  return understood([&] {
+  return understood([&]() -> int {
     auto connection = attached(o.run);
     if (!connection) return kDeviceOrSystem;
     const std::string client = client_of(*connection, o.node);
-    return client.empty() ? kBadInput : work(*connection, client);
+    if (client.empty()) return kBadInput;
+    return work(*connection, client);
   });
 }
 
@@ -105,7 +107,7 @@ int echo(attach::Connection& connection, const std::string& port, Json& message,
 int hand_in(const RobotOptions& o, const std::string& verb) {
   const std::string text = fmt::format("{}{}", verb, fmt::join(o.words, " "));
   if (const auto task = robot_client::parse_task(text); !task) return refuse(task.error(), kBadInput);
-  return with_client(o, [&](attach::Connection& connection, const std::string& client) {
+  return with_client(o, [&](attach::Connection& connection, const std::string& client) -> int {
     const auto number = std::chrono::steady_clock::now().time_since_epoch() / std::chrono::milliseconds(1);
     Json answer;
     return ask(connection, {{"do", "set"}, {"param", client + ".task"}, {"value", fmt::format("{} {}", number, text)}},
@@ -114,7 +116,7 @@ int hand_in(const RobotOptions& o, const std::string& verb) {
 }
 
 int print_map(const RobotOptions& o) {
-  return with_client(o, [&](attach::Connection& connection, const std::string& client) {
+  return with_client(o, [&](attach::Connection& connection, const std::string& client) -> int {
     Json message;
     if (const int code = echo(connection, client + ".map", message); code != kOk) return code;
     const auto objects = objects_of(message);
@@ -132,7 +134,7 @@ int print_map(const RobotOptions& o) {
 }
 
 int answer_about(const RobotOptions& o) {
-  return with_client(o, [&](attach::Connection& connection, const std::string& client) {
+  return with_client(o, [&](attach::Connection& connection, const std::string& client) -> int {
     Json message;
     if (const int code = echo(connection, client + ".map", message); code != kOk) return code;
     const auto objects = objects_of(message);
@@ -151,8 +153,11 @@ int answer_about(const RobotOptions& o) {
       return kOk;
     }
     const std::string attribute = o.object.substr(wanted.size() + 1);
-    for (const auto& [name, value] : object->states)
-      if (name == attribute) return std::printf("%s\n", value.c_str()), kOk;
+    for (const auto& [name, value] : object->states) {
+      if (name != attribute) continue;
+      std::printf("%s\n", value.c_str());
+      return kOk;
+    }
     return refuse(
         fmt::format("of {} the robot knows {}", wanted, object->states.empty() ? "no state" : states_text(*object)),
         kBadInput);
@@ -160,7 +165,7 @@ int answer_about(const RobotOptions& o) {
 }
 
 int print_text(const RobotOptions& o, const char* port) {
-  return with_client(o, [&](attach::Connection& connection, const std::string& client) {
+  return with_client(o, [&](attach::Connection& connection, const std::string& client) -> int {
     Json message;
     const int code = echo(connection, client + port, message);
     if (code == kOk) std::printf("%s\n", message.at("text").get<std::string>().c_str());
@@ -170,7 +175,7 @@ int print_text(const RobotOptions& o, const char* port) {
 
 /// Until the run ends.
 int watch(const RobotOptions& o) {
-  return with_client(o, [&](attach::Connection& connection, const std::string& client) {
+  return with_client(o, [&](attach::Connection& connection, const std::string& client) -> int {
     Json message;
     const int code = echo(connection, client + ".status", message, INT64_MAX);
     std::string last;
