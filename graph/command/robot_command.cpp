@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <fstream>
@@ -89,7 +90,8 @@ int with_client(const RobotOptions& o, Work work) {
     auto connection = attached(o.run);
     if (!connection) return kDeviceOrSystem;
     const std::string client = client_of(*connection, o.node);
-    return client.empty() ? kBadInput : work(*connection, client);
+    if (client.empty()) return kBadInput;
+    return work(*connection, client);
   });
 }
 
@@ -151,8 +153,11 @@ int answer_about(const RobotOptions& o) {
       return kOk;
     }
     const std::string attribute = o.object.substr(wanted.size() + 1);
-    for (const auto& [name, value] : object->states)
-      if (name == attribute) return std::printf("%s\n", value.c_str()), kOk;
+    for (const auto& [name, value] : object->states) {
+      if (name != attribute) continue;
+      std::printf("%s\n", value.c_str());
+      return kOk;
+    }
     return refuse(
         fmt::format("of {} the robot knows {}", wanted, object->states.empty() ? "no state" : states_text(*object)),
         kBadInput);

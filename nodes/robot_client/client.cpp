@@ -54,7 +54,7 @@ void Client::tell(const Task& task) {
     if (!fact) {
       say(fact.error());
     } else {
-      knowledge_.map().set_state(fact->object, fact->attribute, fact->value);
+      knowledge_.believe(*fact);
       say(fmt::format("I believe that {}", knowledge_.to_text(*fact)));
     }
   }
@@ -251,11 +251,9 @@ void Client::expect_results() {
 
 /// Of what nobody has looked at since the action nothing else is known than what the action does.
 void Client::believe_what_is_not_seen() {
-  auto& map = knowledge_.map();
-  const auto& results = map.action(command_.deed.action).results;
-  for (const semantic::Clause& c : results) {
+  for (const semantic::Clause& c : knowledge_.map().action(command_.deed.action).results) {
     const NodeId object = command_.deed.objects[c.role];
-    if (map.object(object).seen_ns <= acted_ns_) map.set_state(object, c.attribute, c.value);
+    if (knowledge_.map().object(object).seen_ns <= acted_ns_) knowledge_.believe({object, c.attribute, c.value});
   }
 }
 

@@ -68,7 +68,6 @@ class Client {
   const Command& command() const { return command_; }
   /// What it is at; empty: nothing.
   std::string_view task() const { return task_ ? std::string_view(task_text_) : std::string_view(); }
-  bool task_names_an_end() const { return task_ && names_an_end(task_->verb); }
   /// Steps done for the task, and those of the present plan.
   std::span<const StepRecord> records() const { return records_; }
   const planner::ActionCosts& costs() const { return costs_; }
@@ -150,7 +149,7 @@ class Client {
 
   Command command_;
   std::string speech_, said_;
-  uint32_t plan_revision_ = 0;
+  uint32_t plan_revision_ = 1;
 };
 
 }  // namespace takt::robot_client

@@ -74,12 +74,11 @@ class RobotClientNode final : public Node {
     const int64_t now_ns = job.release_ns();
     const bool first = last_ns_ == kNever;
     if (first && restarted_) last_words_ = words_();  // what the graph says was taken before
-    bool learnt = first;
     for (size_t i = 0; i < odometry_.size(); ++i)
       track_.insert(odometry_.stamp_ns(i), {mapping_3d::robot_in_odometry(odometry_[i]), {}});
-    for (size_t i = 0; i < objects_.size(); ++i) learnt |= look(objects_[i], objects_.stamp_ns(i));
+    for (size_t i = 0; i < objects_.size(); ++i) look(objects_[i], objects_.stamp_ns(i));
     look_at_grid(job);
-    learnt |= take_tasks();
+    take_tasks();
 
     Percept percept;
     percept.now_ns = now_ns;
@@ -96,23 +95,22 @@ class RobotClientNode final : public Node {
     send_velocity(velocity, now_ns);
     send_command(now_ns);
     send_texts(now_ns);
-    if (learnt) send_map(now_ns);
+    if (map_sent_ != knowledge_->revision()) send_map(now_ns);
   }
 
  private:
-  /// Reports in the robot frame count once the robot's pose is known at their stamp. True: it was a new one.
-  bool look(const ObjectReports& reports, int64_t stamp_ns) {
-    if (stamp_ns <= looked_ns_) return false;
+  /// Reports in the robot frame count once the robot's pose is known at their stamp.
+  void look(const ObjectReports& reports, int64_t stamp_ns) {
+    if (stamp_ns <= looked_ns_) return;
     mapping_3d::Affine to_map;
     if (reports.in_map == 0) {
       const auto robot = track_.at(stamp_ns);
-      if (!robot) return false;
+      if (!robot) return;
       to_map = mapping_3d::to_affine(robot->transform);
     }
     looked_ns_ = stamp_ns;
     learn(reports, to_map, stamp_ns);
     client_->note_news();
-    return true;
   }
 
   void learn(const ObjectReports& reports, const mapping_3d::Affine& to_map, int64_t stamp_ns) {
@@ -142,20 +140,16 @@ class RobotClientNode final : public Node {
   }
 
   /// From the port, and from the parameter that another process sets in a running graph.
-  bool take_tasks() {
-    bool taken = false;
+  void take_tasks() {
     if (const RobotTask* task = task_.newest(); task != nullptr && task->number != 0 && task->number != task_number_) {
       task_number_ = task->number;
       client_->take({task->text.data(), task->text.size});
-      taken = true;
     }
     const std::string& words = words_();
-    if (words == last_words_) return taken;
+    if (words == last_words_) return;
     last_words_ = words;
-    const size_t begin = words.find_first_not_of("0123456789 ");
-    if (begin == std::string::npos) return taken;
-    client_->take(std::string_view(words).substr(begin));
-    return true;
+    if (const size_t begin = words.find_first_not_of("0123456789 "); begin != std::string::npos)
+      client_->take(std::string_view(words).substr(begin));
   }
 
   std::optional<PlanarPose> robot(int64_t now_ns) const {
@@ -202,8 +196,8 @@ class RobotClientNode final : public Node {
     client_->write_status(text_);
     send(status_, text_, now_ns);
     if (const std::string_view said = client_->speech(); !said.empty()) send(speech_, said, now_ns);
-    if (plan_sent_ != client_->plan_revision() + 1) {
-      plan_sent_ = client_->plan_revision() + 1;
+    if (plan_sent_ != client_->plan_revision()) {
+      plan_sent_ = client_->plan_revision();
       client_->write_plan(text_);
       send(plan_, text_, now_ns);
     }
@@ -239,6 +233,7 @@ class RobotClientNode final : public Node {
                                  static_cast<float>(object.confidence), static_cast<float>(states)});
     }
     map_.send(now_ns);
+    map_sent_ = knowledge_->revision();
   }
 
   static constexpr uint32_t kCharacters = 2000;
@@ -282,14 +277,15 @@ class RobotClientNode final : public Node {
   std::string text_, last_words_;
   size_t expansions_ = 0;
   int64_t reserve_ns_ = 0, odometry_age_ns_ = 0, last_ns_ = kNever;
-  uint32_t task_number_ = 0, plan_sent_ = 0;
+  uint32_t task_number_ = 0;
+  uint32_t plan_sent_ = 0, map_sent_ = 0;  ///< revisions of what was sent; 0: nothing
   bool restarted_ = false, told_of_grid_ = false;
 };
 
 }  // namespace
 
 void register_robot_client(NodeTypes& types) {
-  types.add<RobotClientNode>("robot_client", Layer::processing,
+  types.add<RobotClientNode>("robot_client", Layer::storage,
                              "Tasks to drives and actions: plans, and looks what came of it");
 }
 

@@ -26,6 +26,7 @@ NodeId Knowledge::see(const Report& report, std::span<const ReportedState> state
   } else if (network.kind(node) != Kind::object || !map_.move(node, report.x_m, report.y_m)) {
     return kNoNode;
   }
+  ++revision_;
   semantic::Object& object = map_.object(node);
   object.confidence = report.confidence;
   object.seen_ns = report.stamp_ns;

@@ -37,6 +37,7 @@ class Knowledge {
  public:
   explicit Knowledge(const semantic::MapParameters& parameters) : map_(parameters) {}
 
+  /// To be filled from a file.
   semantic::SemanticMap& map() { return map_; }
   const semantic::SemanticMap& map() const { return map_; }
 
@@ -44,6 +45,14 @@ class Knowledge {
   /// have, are left out. kNoNode: the name is empty or another node's, the place lies outside of the map, or it is
   /// full.
   NodeId see(const Report& report, std::span<const ReportedState> states);
+
+  /// A state that nobody has reported.
+  void believe(const planner::Goal& fact) {
+    map_.set_state(fact.object, fact.attribute, fact.value);
+    ++revision_;
+  }
+  /// Rises with whatever is reported or believed.
+  uint32_t revision() const { return revision_; }
 
   /// The error names what is not known, and what is.
   tl::expected<planner::Goal, std::string> understand(const FactText& fact) const;
@@ -66,6 +75,7 @@ class Knowledge {
   tl::expected<NodeId, std::string> object_named(std::string_view name) const;
 
   semantic::SemanticMap map_;
+  uint32_t revision_ = 1;
 };
 
 }  // namespace takt::robot_client

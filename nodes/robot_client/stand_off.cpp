@@ -2,6 +2,8 @@
 #include "nodes/robot_client/stand_off.hpp"
 
 #include <algorithm>
+#include <array>
+#include <utility>
 
 namespace takt::robot_client {
 namespace {
@@ -70,10 +72,11 @@ double Rehearsal::seconds(const PlanarPose& from, std::span<const Place> way, st
   pilot_.halt();
   if (!pilot_.drive_to(way, direction_rad)) return kLongest_s;
   PlanarPose robot = from;
-  double s = kAnswer_s;
-  for (; s < kLongest_s && !pilot_.standing(); s += kStep_s) {
-    const navigation::Velocity v = pilot_.step(robot, kStep_s);
-    robot = compose(robot, {v.speed_m_s * kStep_s, 0, v.turn_rad_s * kStep_s});
+  std::array<navigation::Velocity, kLate> on_their_way{};
+  double s = 0;
+  for (size_t i = 0; s < kLongest_s && !pilot_.standing(); s += kStep_s, i = (i + 1) % kLate) {
+    const navigation::Velocity now = std::exchange(on_their_way[i], pilot_.step(robot, kStep_s));
+    robot = compose(robot, {now.speed_m_s * kStep_s, 0, now.turn_rad_s * kStep_s});
   }
   return s;
 }

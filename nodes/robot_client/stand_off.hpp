@@ -28,21 +28,22 @@ PathOutcome way_to_place(PathPlanner* planner, const Place& from, const Place& t
 /// Direction in which the objects stand, seen from there.
 double direction_to(const Place& from, std::span<const Place> objects);
 
-/// Drives ways in thought: a pilot of the same kind on a robot that does at once what it says. Memory is taken by the
-/// constructor.
+/// Drives ways in thought: a pilot of the same kind on a robot that does exactly what it says, kLate steps later.
+/// Memory is taken by the constructor.
 class Rehearsal {
  public:
   explicit Rehearsal(const navigation::PilotParameters& parameters) : pilot_(parameters) {}
 
-  /// s from standing at `from` to standing at the end of the way, what a base answers late included; at most
-  /// kLongest_s.
+  /// s from standing at `from` to where the pilot stands at the end of the way; at most kLongest_s.
   double seconds(const PlanarPose& from, std::span<const Place> way, std::optional<double> direction_rad);
 
   static constexpr double kLongest_s = 900;
 
  private:
   static constexpr double kStep_s = 1.0 / 15;
-  static constexpr double kAnswer_s = 0.2;  ///< until a base does what it is told, measured in the simulated world
+  /// Two jobs at 15 Hz and the base: from a pose to what follows from it. The end of a drive is shorter for it, since
+  /// the robot goes on while the pilot says less already.
+  static constexpr size_t kLate = 3;
 
   navigation::Pilot pilot_;
 };

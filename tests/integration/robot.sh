@@ -17,6 +17,7 @@ profiles:
     person: {driver: console, input: $work/person, output: $work/speech}
 subsystems:
   mind:
+    exports: [client.velocity, client.speech]
     client:
       type: robot_client
       in: {odometry: {from: base.odometry, max_age: 300ms}, task: person.task}

@@ -131,6 +131,7 @@ profiles:
     person: {script: "1s goal cup_1.level=full"}
 subsystems:
   kitchen:
+    exports: [client.velocity, client.speech]
     probe:
       type: probe
       in: {command: client.action, odometry: base.odometry, speech: client.speech, taken: client.taken, plan: client.plan}
