@@ -54,6 +54,8 @@ class LaserSession {
   virtual void line_has(uint32_t baud) = 0;
   /// What to send so that the device falls silent.
   virtual LineOrder farewell() = 0;
+  /// Whole sweeps that came, also those that receive() did not return for a newer one; since the first begin().
+  virtual uint64_t sweeps() const = 0;
   /// How often bytes came that belong to no telegram; since the first begin().
   virtual uint64_t resyncs() const = 0;
   /// Telegrams with a wrong checksum or length, and values that the device itself calls wrong; since the first begin().

@@ -191,13 +191,14 @@ void StreamLaser::lose_line() {
 }
 
 void StreamLaser::deliver(const ReceivedScan& scan) {
-  const auto count = [](std::atomic<uint64_t>& counter, uint32_t more) {
-    counter.store(counter.load(std::memory_order_relaxed) + more, std::memory_order_relaxed);
-  };
-  count(received_, 1);
-  if (previous_number_ && scan.scan_number > *previous_number_)
-    count(missing_, scan.scan_number - *previous_number_ - 1);
+  const uint64_t sweeps = session_->sweeps(), come = sweeps - previous_sweeps_;
+  const uint64_t passed =
+      previous_number_ && scan.scan_number > *previous_number_ ? scan.scan_number - *previous_number_ : 0;
+  if (passed > come)
+    missing_.store(missing_.load(std::memory_order_relaxed) + passed - come, std::memory_order_relaxed);
+  received_.store(sweeps, std::memory_order_relaxed);
   previous_number_ = scan.scan_number;
+  previous_sweeps_ = sweeps;
   Delivery& draft = newest_.draft();
   draft.scan.stamp_ns = scan.stamp_ns;
   draft.scan.scan_number = scan.scan_number;

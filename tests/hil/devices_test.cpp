@@ -15,7 +15,6 @@
 #include <unistd.h>
 
 #include <cstdlib>
-#include <filesystem>
 #include <fstream>
 #include <thread>
 
@@ -25,9 +24,6 @@
 #include "hal/gpio/gpio_lines.hpp"
 #include "hal/head/can_head.hpp"
 #include "hal/head/head_double.hpp"
-#include "hal/laser/lms200/session.hpp"
-#include "hal/laser/stream_laser.hpp"
-#include "hal/stream/serial_port.hpp"
 #include "tests/conformance/stereo_camera.hpp"
 
 using namespace takt;
@@ -416,50 +412,4 @@ TEST_CASE("hil: digital lines on gpio-sim") {
   CHECK(opened.error().text().find("gpioinfo names it") != std::string::npos);
   device.stop();
   CHECK(power() == "0");
-}
-
-TEST_CASE("hil: LMS 200 behind a USB serial adapter: scans, damage, unplugged and back") {
-  RunningClock clock;
-  const auto order = [](const char* word) { std::ofstream("/hil/orders", std::ios::app) << word << std::endl; };
-  for (int k = 0; k < 100 && !std::filesystem::exists("/dev/ttyUSB0"); ++k) sleep_until(clock.now_ns() + 100 * kMs);
-  lms200::SessionSettings settings;
-  settings.baud = 500000;
-  StreamLaser laser("laser", std::make_unique<SerialPort>("laser", "/dev/ttyUSB0"),
-                    std::make_unique<lms200::Session>(settings), Transform{}, clock);
-  REQUIRE(laser.open().has_value());
-  REQUIRE(laser.start(clock.now_ns()).has_value());
-  std::vector<float> range(laser.format().beams);
-  const auto read = [&] {
-    clock.go_to(clock.now_ns() + 20 * kMs);
-    return laser.read(range, clock.now_ns(), INT64_MAX).status;
-  };
-  const auto until = [&](ReadStatus status) {
-    const int64_t end_ns = clock.now_ns() + 30'000 * kMs;
-    while (clock.now_ns() < end_ns)
-      if (read() == status) return true;
-    MESSAGE(laser.trouble());
-    return false;
-  };
-  REQUIRE(until(ReadStatus::ok));
-  const SourceCounts before = laser.counts();
-  const int64_t began_ns = clock.now_ns();
-  while (clock.now_ns() < began_ns + 3'000 * kMs) read();
-  const SourceCounts streamed = laser.counts();
-  MESSAGE(streamed.received - before.received, " scans in 3 s, ", streamed.damaged - before.damaged, " damaged, ",
-          streamed.resyncs - before.resyncs, " resynchronisations, ", streamed.missing - before.missing, " missing");
-  CHECK(streamed.received - before.received > 30);
-  CHECK(std::any_of(range.begin(), range.end(), [](float r) { return r > 0; }));
-
-  order("wrong_crc");
-  CHECK(until(ReadStatus::partial));
-  order("none");
-  CHECK(until(ReadStatus::ok));
-  CHECK(laser.counts().damaged > streamed.damaged);
-
-  order("unplugged");
-  CHECK(until(ReadStatus::disconnected));
-  CHECK_FALSE(laser.restart(clock.now_ns()));
-  order("none");
-  CHECK(until(ReadStatus::ok));
-  laser.close();
 }

@@ -285,6 +285,7 @@ void Session::hear_scan(std::span<const uint8_t> payload, uint64_t position, int
   scan_number_ = scan_number_ ? *scan_number_ + static_cast<uint32_t>(std::max<int64_t>(1, intervals)) : 0;
   whole_.scan_number = *scan_number_;
   scan_ready_ = true;
+  ++sweeps_;
   trouble_ = remark_;
 }
 

@@ -190,6 +190,7 @@ void Session::hear_measurement(const Measurement& m, uint64_t position, int64_t 
   number_ = m.number;
   scan_.scan_number = scan_number_;
   scan_ready_ = true;
+  ++sweeps_;
   trouble_ = remark_;
 }
 

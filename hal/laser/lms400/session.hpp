@@ -31,6 +31,7 @@ class Session final : public LaserSession {
   LineOrder next(int64_t now_ns) override;
   void line_has(uint32_t baud) override;
   LineOrder farewell() override;
+  uint64_t sweeps() const override { return sweeps_; }
   uint64_t resyncs() const override { return reception_.resyncs(); }
   uint64_t damaged() const override { return reception_.damaged(); }
   const char* trouble() const override { return trouble_; }
@@ -67,6 +68,7 @@ class Session final : public LaserSession {
 
   ReceivedScan scan_;
   bool scan_ready_ = false;
+  uint64_t sweeps_ = 0;
   int64_t last_scan_ns_ = 0;
   std::optional<uint16_t> number_;  ///< of the last measurement
   uint32_t scan_number_ = 0;
