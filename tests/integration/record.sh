@@ -54,7 +54,7 @@ cp "$source/schedules/thesis.yaml" "$work/schedules/"
 tells 0 "nothing lost" "$takt" run "$work/graph/ace.yaml" --clock virtual --isolate none --for 2s \
   --record "$work/edited.mcap" --output "$work/out"
 tells 0 " 0 differ" "$takt" replay "$work/edited.mcap" --compare --output "$work/out"
-sed -i 's/params: {save: map}/params: {save: map, share: 0.6}/' "$work/graph/ace.yaml"
+sed -i 's/params: {save: map, map/params: {share: 0.6, save: map, map/' "$work/graph/ace.yaml"
 grep -q "share: 0.6" "$work/graph/ace.yaml" || fail "the edit of the graph changed nothing"
 tells 1 "first difference: mapping_3d.obstacles, job" "$takt" replay "$work/edited.mcap" --compare --output "$work/out"
 tells 1 "mapping_3d.share is 0.6 instead of 0.15" "$takt" replay "$work/edited.mcap" --compare --output "$work/out"
