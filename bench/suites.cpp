@@ -26,6 +26,7 @@ std::vector<Row> run_objects(const Options&);
 std::vector<Row> run_objects_3d(const Options&);
 std::vector<Row> run_mapping(const Options&);
 std::vector<Row> run_semantic(const Options&);
+std::vector<Row> run_semantic_link(const Options&);
 std::vector<Row> run_ground(const Options&);
 std::vector<Row> run_fusion(const Options&);
 #endif
@@ -53,6 +54,7 @@ std::span<const Suite> suites() {
       {"objects_3d", "things on a table: growing regions against a kd-tree, the whole", run_objects_3d},
       {"mapping", "scan matching: search, refinement against brute force; occupancy map, pose filter", run_mapping},
       {"semantic", "network queries, insertion and plans against the size of the network", run_semantic},
+      {"semantic_link", "a scan to a client elsewhere, over UDP and D-Bus; against a bare socket", run_semantic_link},
       {"ground", "the ground map at 640x480: stages against brute force and OpenCV, a whole image", run_ground},
       {"fusion", "median fusion of depth images against its plain definition; a cloud's way into the map", run_fusion},
 #endif

@@ -6,6 +6,7 @@
 #include <tl/expected.hpp>
 
 #include "rt/memory/job_calls.hpp"
+#include "rt/source_state.hpp"
 
 namespace takt {
 
@@ -82,6 +83,9 @@ class Device {
     stop();
     return start(now_ns).has_value();
   }
+  /// What was lost on the way, and why nothing comes (see SourceReport); on the job thread.
+  virtual SourceCounts counts() const { return {}; }
+  virtual const char* trouble() const { return ""; }
   /// Calls that reads, triggers and commands make although no job should, and why; known once the device is open.
   virtual DeclaredCalls declared_calls() const { return {}; }
 };

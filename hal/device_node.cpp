@@ -15,6 +15,7 @@ void DeviceNode::open_in_setup(const Setup& setup) {
 }
 
 bool DeviceNode::running(Job& job) {
+  if (double_) double_->keep_up();
   if (started_) return true;
   const int64_t now_ns = job.release_ns();
   if (retry_.due(now_ns)) {
@@ -48,7 +49,7 @@ void DeviceNode::judge(ReadStatus status, Job& job, bool repeated) {
   const auto state = health_.state();
   if (!state) return;
   if (*state == SourceState::ok) retry_.works();
-  job.source_state({*state, reopen_tries_});
+  job.source_state({*state, reopen_tries_, device().counts(), device().trouble()});
 }
 
 }  // namespace takt

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <memory>
+
 #include "hal/device.hpp"
 #include "hal/device_health.hpp"
+#include "hal/double_thread.hpp"
 #include "rt/node.hpp"
 
 namespace takt {
@@ -20,7 +23,10 @@ class DeviceNode : public Node {
     device().stop();
     started_ = false;
   }
-  void start(int64_t epoch_ns) override { static_cast<void>(start_device(epoch_ns)); }
+  void start(int64_t epoch_ns) override {
+    if (double_) double_->start(epoch_ns);
+    static_cast<void>(start_device(epoch_ns));
+  }
   void finish() override { stop_device(); }
   virtual Device& device() = 0;
   /// After setup: how long before the planned release of a job the stamp of its message may lie, ns. 0 for a device
@@ -28,6 +34,8 @@ class DeviceNode : public Node {
   virtual int64_t stamp_lag_ns() const { return 0; }
   /// Before setup: what the graph says of the device's health.
   void set_health(const DeviceHealthSettings& settings) { health_settings_ = settings; }
+  /// Before the start: what stands at the other end of the device's line lives as long as the node does.
+  void live_with(std::unique_ptr<DoubleThread> device) { double_ = std::move(device); }
 
  protected:
   /// In setup: opens the device.
@@ -38,6 +46,8 @@ class DeviceNode : public Node {
   /// only what can be marked as such is sent: `marks_damage` says that the message has a place for it. `repeated`: the
   /// data are those of the job before.
   bool accept(ReadStatus status, Job& job, bool marks_damage = false, bool repeated = false);
+  /// In the mode in which the robot stays where it is; in a mode without a name nobody has said that it may move.
+  static bool stands(std::string_view mode) { return mode.empty() || mode == kSafeStopMode; }
 
  private:
   void judge(ReadStatus status, Job& job, bool repeated);
@@ -47,6 +57,7 @@ class DeviceNode : public Node {
   DeviceHealth health_{health_settings_};
   RetryDelay retry_;
   uint64_t reopen_tries_ = 0;
+  std::unique_ptr<DoubleThread> double_;  ///< null: the device is a real one, or simulated
 };
 
 }  // namespace takt

@@ -14,9 +14,12 @@
 
 namespace takt::sim {
 class Simulation;
-}
+class Stage;
+}  // namespace takt::sim
 
 namespace takt::hal {
+
+class SemanticServers;
 
 /// What a device needs to exist.
 struct DeviceConfig {
@@ -26,18 +29,24 @@ struct DeviceConfig {
   uint64_t seed = 0;
 };
 
-/// What the devices of one process share: the simulated worlds, one per world file, client and seed. Must outlive the
-/// nodes. Composition thread only.
+/// What the devices of one process share: the simulated worlds, one per world file and seed, with one robot for each
+/// client that a device names; the servers of semantic services. Must outlive the nodes. Composition thread only.
 class Devices {
  public:
   Devices();
   ~Devices();
   tl::expected<sim::Simulation*, DeviceError> world(const DeviceConfig& config);
-  /// The simulation of the first sim device (for ground truth, fault injection), or null.
+  /// The simulation of the first client of the sim devices (for ground truth, fault injection), or null.
   sim::Simulation* first_world();
+  SemanticServers& semantic_servers() { return *servers_; }
+  /// A folder of this process for the lines of doubles, made when it is first asked for; empty if that failed.
+  const std::filesystem::path& folder();
 
  private:
-  std::map<std::string, std::unique_ptr<sim::Simulation>> worlds_;
+  std::map<std::string, std::shared_ptr<sim::Stage>> stages_;                          ///< by file and seed
+  std::map<std::pair<std::string, size_t>, std::unique_ptr<sim::Simulation>> robots_;  ///< by that and client
+  std::unique_ptr<SemanticServers> servers_;
+  std::filesystem::path folder_;
 };
 
 enum class SettingKind : uint8_t { path, length, angle, speed, turn_rate, time, rate, count, number, flag, text, map };
@@ -49,6 +58,7 @@ struct SettingInfo {
   SettingKind kind;
   bool required;
   std::string_view doc;
+  bool place = false;  ///< says where the device is: a double brings its own
 };
 struct DriverInfo {
   std::string_view name, doc;
@@ -58,6 +68,9 @@ struct DeviceKind {
   std::span<const DriverInfo> drivers;
   std::span<const SettingInfo> settings;
 };
+
+/// A double takes what the driver at the other end of its line takes, but for where the device is.
+bool takes(std::string_view driver, const SettingInfo& setting);
 
 /// Every device kind with its drivers and settings, for the checker and `takt nodes`.
 std::span<const DeviceKind> device_kinds();

@@ -26,10 +26,24 @@ inline const char* to_text(SourceState state) {
   return "?";
 }
 
+/// What has come from a source since the start of its process, and what has not; 0 where a source does not count.
+struct SourceCounts {
+  uint64_t received = 0;  ///< frames, sweeps and telegrams that could be used
+  uint64_t damaged = 0;   ///< refused: a checksum, a length, a flag or a value that none can have
+  uint64_t resyncs = 0;   ///< how often bytes belonged to nothing, until a telegram began
+  uint64_t missing = 0;   ///< gaps in the source's own count
+  uint64_t unsent = 0;    ///< what was to be sent to it and could not be
+  bool lossless() const { return damaged == 0 && resyncs == 0 && missing == 0 && unsent == 0; }
+};
+
 /// What a job says of its source.
 struct SourceReport {
   SourceState state = SourceState::ok;
   uint64_t reopen_tries = 0;  ///< since the start of its process
+  SourceCounts counts = {};
+  /// Why nothing comes, or what is not as it was asked for; a literal, empty if all is well. All processes of a run are
+  /// forks of one program: it is the same in each.
+  const char* trouble = "";
 };
 
 }  // namespace takt

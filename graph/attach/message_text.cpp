@@ -75,7 +75,7 @@ nlohmann::ordered_json message_json(const MessageType& type, const void* message
     const std::string name(field.name);
     if (!field.is_array()) {
       json[name] = scalars(field.scalar, bytes + field.offset, field.count);
-    } else if (type.name == TextStatus::type_name) {
+    } else if (type.name == TextStatus::type_name || type.name == RobotTask::type_name) {
       const auto& text = *reinterpret_cast<const Array<char>*>(bytes + field.offset);
       json[name] = std::string(text.data(), text.size);
     } else {

@@ -144,6 +144,7 @@ Json Server::top() const {
     const TaskPlan& task = subject_.plan.tasks[t];
     const TaskStatistics& s = subject_.board.task(t);
     nodes.push_back({{"name", task.name},
+                     {"type", type_of(task.name)},
                      {"rate_hz", task.rate ? Json(task.rate->hz()) : Json(nullptr)},
                      {"completed", s.completed.load()},
                      {"deadline_misses", s.deadline_misses.load()},
@@ -158,6 +159,12 @@ Json Server::top() const {
           {"transport", subject_.transport.name()},
           {"running_s", epoch_ns > 0 ? static_cast<double>(std::max<int64_t>(0, now_ns() - epoch_ns)) / 1e9 : 0.0},
           {"nodes", nodes}};
+}
+
+std::string Server::type_of(const std::string& node) const {
+  for (const graph::NodeSpec& spec : subject_.graph.nodes)
+    if (spec.id == node) return spec.type;
+  return "";
 }
 
 size_t Server::find_port(const std::string& name) const {
@@ -177,10 +184,12 @@ bool Server::echo(const Json& question, Connection& connection) {
   }
   const std::string as = question.value("as", "");
   const Json count = question.value("count", Json(1));
-  if (!count.is_number_integer()) return connection.write(wrong("count is no whole number"));
+  const Json items = question.value("items", Json(8U));
+  if (!count.is_number_integer() || !items.is_number_unsigned())
+    return connection.write(wrong("count and items have to be whole numbers"));
   const auto tap = claim_tap(port);
   if (!tap) return connection.write(wrong("somebody else listens to " + name + " already"));
-  return stream(port, as, count.get<int64_t>(), connection);
+  return stream(port, as, items.get<size_t>(), count.get<int64_t>(), connection);
 }
 
 std::shared_ptr<void> Server::claim_tap(size_t port) {
@@ -192,7 +201,7 @@ std::shared_ptr<void> Server::claim_tap(size_t port) {
           }};
 }
 
-bool Server::stream(size_t port, const std::string& as, int64_t count, Connection& connection) {
+bool Server::stream(size_t port, const std::string& as, size_t items, int64_t count, Connection& connection) {
   const PortPlan& plan = subject_.plan.ports[port];
   const auto reader = subject_.transport.make_reader(port);
   uint64_t seen = 0;
@@ -212,7 +221,7 @@ bool Server::stream(size_t port, const std::string& as, int64_t count, Connectio
               {"level", held.header->level},
               {"stamp_ns", held.stamp_ns},
               {"age_ms", static_cast<double>(now_ns() - held.stamp_ns) / 1e6},
-              {"message", message_json(*plan.type, held.message())}};
+              {"message", message_json(*plan.type, held.message(), items)}};
     const auto file = as == "png"   ? message_png(*plan.type, held.message())
                       : as == "ply" ? message_ply(*plan.type, held.message())
                                     : std::string();

@@ -51,12 +51,14 @@ class Server {
   bool echo(const nlohmann::ordered_json& question, Connection& connection);
   /// The right to listen to an output, given back when it is dropped; null while somebody else has it.
   std::shared_ptr<void> claim_tap(size_t port);
-  /// `as`: "png", "ply" or "", for text alone.
-  bool stream(size_t port, const std::string& as, int64_t count, Connection& connection);
+  /// `as`: "png", "ply" or "", for text alone; `items`: of longer arrays so many elements.
+  bool stream(size_t port, const std::string& as, size_t items, int64_t count, Connection& connection);
   nlohmann::ordered_json change_mode(const std::string& name);
   nlohmann::ordered_json set(const std::string& name, const std::string& text);
   nlohmann::ordered_json post_and_wait(size_t task, size_t param, const ParamValue& value);
   size_t find_port(const std::string& name) const;
+  /// Of a node; "" of a device.
+  std::string type_of(const std::string& node) const;
 
   const Subject subject_;
   std::string lacks_;

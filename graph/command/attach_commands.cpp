@@ -20,44 +20,6 @@ using Json = nlohmann::ordered_json;
 
 constexpr auto kRefresh = std::chrono::milliseconds(500);
 
-/// To the run that was named, or to the only one; else nothing, and why is said.
-std::optional<attach::Connection> attached(const AttachOptions& options) {
-  const std::vector<int> runs = attach::running();
-  if (options.run == 0 && runs.size() != 1) {
-    if (runs.empty()) refuse("no graph of this user is running; start one with: takt run", kDeviceOrSystem);
-    else
-      refuse(fmt::format("several graphs are running; choose with --run: {}", fmt::join(runs, ", ")), kDeviceOrSystem);
-    return std::nullopt;
-  }
-  const int pid = options.run != 0 ? options.run : runs.front();
-  auto connection = attach::connect_to(pid);
-  if (!connection)
-    refuse(fmt::format("process {} is no running graph of this user (running: {})", pid, fmt::join(runs, ", ")),
-           kDeviceOrSystem);
-  return connection;
-}
-
-/// Asks once; an answer that is an error is said, and its exit code returned.
-int ask(attach::Connection& connection, const Json& question, Json& answer) {
-  if (!connection.write(question)) return refuse("the run has ended", kDeviceOrSystem);
-  const auto line = connection.read_line();
-  if (!line) return refuse("the run has ended, or does not answer", kDeviceOrSystem);
-  answer = *line;
-  return answer.contains("error") ? refuse(answer["error"].get<std::string>(), kBadInput) : kOk;
-}
-
-/// The exit code of `command`, also where the answer of the run is of another kind than it expects.
-template <class Command>
-int understood(const Command& command) {
-  try {
-    return command();
-  } catch (const Json::exception& problem) {
-    return refuse(
-        fmt::format("the answer of the run is not understood ({}); use the takt that runs it", problem.what()),
-        kDeviceOrSystem);
-  }
-}
-
 /// Throws Json::exception for an answer that is none, as a run of another version may give.
 std::string top_text(const Json& top) {
   std::string text = fmt::format("{} ({} profile, {} transport), running {:.0f} s\n",
@@ -77,7 +39,7 @@ std::string top_text(const Json& top) {
 }
 
 int run_top(const AttachOptions& options) {
-  auto connection = attached(options);
+  auto connection = attached(options.run);
   if (!connection) return kDeviceOrSystem;
   const bool redraw = isatty(STDOUT_FILENO) != 0 && !options.once && !options.json;
   for (bool first = true;; first = false) {
@@ -93,7 +55,7 @@ int run_top(const AttachOptions& options) {
 }
 
 int run_echo(const AttachOptions& options) {
-  auto connection = attached(options);
+  auto connection = attached(options.run);
   if (!connection) return kDeviceOrSystem;
   const std::string as = !options.png.empty() ? "png" : !options.ply.empty() ? "ply" : "";
   const std::filesystem::path& path = as == "png" ? options.png : options.ply;
@@ -119,7 +81,7 @@ int run_echo(const AttachOptions& options) {
 }
 
 int run_question(const AttachOptions& options, const Json& question) {
-  auto connection = attached(options);
+  auto connection = attached(options.run);
   if (!connection) return kDeviceOrSystem;
   Json answer;
   return ask(*connection, question, answer);
@@ -132,6 +94,40 @@ CLI::App* add(CLI::App& app, const char* name, const char* purpose, AttachOption
 }
 
 }  // namespace
+
+std::optional<attach::Connection> attached(int run) {
+  const std::vector<int> runs = attach::running();
+  if (run == 0 && runs.size() != 1) {
+    if (runs.empty()) refuse("no graph of this user is running; start one with: takt run", kDeviceOrSystem);
+    else
+      refuse(fmt::format("several graphs are running; choose with --run: {}", fmt::join(runs, ", ")), kDeviceOrSystem);
+    return std::nullopt;
+  }
+  const int pid = run != 0 ? run : runs.front();
+  auto connection = attach::connect_to(pid);
+  if (!connection)
+    refuse(fmt::format("process {} is no running graph of this user (running: {})", pid, fmt::join(runs, ", ")),
+           kDeviceOrSystem);
+  return connection;
+}
+
+int ask(attach::Connection& connection, const Json& question, Json& answer) {
+  if (!connection.write(question)) return refuse("the run has ended", kDeviceOrSystem);
+  const auto line = connection.read_line();
+  if (!line) return refuse("the run has ended, or does not answer", kDeviceOrSystem);
+  answer = *line;
+  return answer.contains("error") ? refuse(answer["error"].get<std::string>(), kBadInput) : kOk;
+}
+
+int understood(const std::function<int()>& command) {
+  try {
+    return command();
+  } catch (const Json::exception& problem) {
+    return refuse(
+        fmt::format("the answer of the run is not understood ({}); use the takt that runs it", problem.what()),
+        kDeviceOrSystem);
+  }
+}
 
 void add_attach_commands(CLI::App& app, AttachOptions& o, int& exit_code) {
   CLI::App* top = add(app, "top", "shows what a running graph does", o);

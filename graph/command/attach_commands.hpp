@@ -3,7 +3,10 @@
 #pragma once
 #include <CLI/CLI.hpp>
 #include <filesystem>
+#include <functional>
 #include <string>
+
+#include "graph/attach/endpoint.hpp"
 
 namespace takt::command {
 
@@ -14,6 +17,15 @@ struct AttachOptions {
   std::filesystem::path png, ply;  ///< of echo: at most one
   int64_t count = 1;
 };
+
+/// To the run with that process id, or (0) to the only one; else nothing, and why is said.
+std::optional<attach::Connection> attached(int run);
+
+/// Asks once; an answer that is an error is said, and its exit code returned.
+int ask(attach::Connection& connection, const nlohmann::ordered_json& question, nlohmann::ordered_json& answer);
+
+/// The exit code of `command`, also where the answer of the run is of another kind than it expects.
+int understood(const std::function<int()>& command);
 
 /// Adds the four commands; each sets the exit code: 0 done, 2 refused or unknown, 3 nothing to attach to.
 void add_attach_commands(CLI::App& app, AttachOptions& options, int& exit_code);

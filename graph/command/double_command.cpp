@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <memory>
@@ -16,9 +15,9 @@
 #include <utility>
 
 #include "graph/command/prepare.hpp"
+#include "hal/doubles/in_world.hpp"
 #include "hal/laser/lms200/lms200_double.hpp"
 #include "hal/laser/lms400/lms400_double.hpp"
-#include "hal/sim/sensors.hpp"
 #include "hal/stream/pseudo_terminal.hpp"
 #include "hal/stream/tcp_listener.hpp"
 #include "rt/time/clock.hpp"
@@ -30,49 +29,48 @@ constexpr int kStep_ms = 1;
 
 std::atomic<bool> stopped{false};
 
-/// What a double needs besides its line.
 struct Surroundings {
   const DoubleOptions& options;
   sim::Simulation& world;
-  int64_t now_ns;
+  const Clock& clock;
 };
+
+enum class Line : uint8_t { bytes, can };
 
 struct DoubleKind {
   std::string_view name, doc;
+  Line line;
   std::unique_ptr<DeviceDouble> (*make)(const Surroundings&);
 };
-
-/// A scanner on the robot of the simulated world, which drives its path.
-RangeSource source_in(const Surroundings& s) {
-  return [&world = s.world](const Sweep& sweep, std::span<float> range_m) {
-    sim::LaserModel model;
-    model.beams = static_cast<uint32_t>(range_m.size());
-    model.fov_rad = sweep.step_rad * static_cast<double>(range_m.size() - 1);
-    model.sweep_s = sweep.sweep_s;
-    model.max_range_m = 80;
-    model.sigma_m = 0.005;  // devices.md 1.9
-    const double middle = sweep.first_angle_rad + model.fov_rad / 2;
-    model.sensor_in_robot.z = 0.25;
-    model.sensor_in_robot.qw = std::cos(middle / 2);
-    model.sensor_in_robot.qz = std::sin(middle / 2);
-    sim::scan(world, model, sweep.first_ns, range_m);
-  };
-}
 
 std::unique_ptr<ByteStream> line_of(const DoubleOptions& options) {
   if (options.tcp) return std::make_unique<TcpListener>(*options.tcp);
   return std::make_unique<PseudoTerminal>(options.pty);
 }
 
+RangeSource ranges_in(const Surroundings& s) {
+  Transform mount;
+  mount.z = 0.25;
+  return doubles::ranges_in(s.world, mount);
+}
+
 constexpr DoubleKind kDoubles[] = {
-    {"lms200", "a SICK LMS 200, on a pseudo terminal",
+    {"head", "the camera head, on a CAN bus", Line::can,
      [](const Surroundings& s) -> std::unique_ptr<DeviceDouble> {
-       return std::make_unique<lms200::Lms200Double>(line_of(s.options), source_in(s), s.now_ns);
+       return std::make_unique<head::HeadDouble>(s.options.can, s.clock, doubles::neck_in(s.world), s.options.seed);
      }},
-    {"lms400", "a SICK LMS 400, on a port of this machine or a pseudo terminal",
+    {"base", "the mobile base, on a CAN bus", Line::can,
+     [](const Surroundings& s) -> std::unique_ptr<DeviceDouble> {
+       return std::make_unique<base::BaseDouble>(s.options.can, s.clock, doubles::body_in(s.world), s.options.seed);
+     }},
+    {"lms200", "a SICK LMS 200, on a pseudo terminal, or a port of this machine", Line::bytes,
+     [](const Surroundings& s) -> std::unique_ptr<DeviceDouble> {
+       return std::make_unique<lms200::Lms200Double>(line_of(s.options), ranges_in(s), s.clock.now_ns());
+     }},
+    {"lms400", "a SICK LMS 400, on a port of this machine or a pseudo terminal", Line::bytes,
      [](const Surroundings& s) -> std::unique_ptr<DeviceDouble> {
        const uint32_t baud = s.options.tcp ? 0 : s.options.baud;
-       return std::make_unique<lms400::Lms400Double>(line_of(s.options), source_in(s), baud, s.now_ns);
+       return std::make_unique<lms400::Lms400Double>(line_of(s.options), ranges_in(s), baud, s.clock.now_ns());
      }},
 };
 
@@ -101,10 +99,8 @@ class Orders {
 
  private:
   static void follow(const std::string& word, DeviceDouble& device) {
-    if (const auto misbehaviour = misbehaviour_of(word)) return device.misbehave(*misbehaviour);
-    std::string known;
-    for (const auto& [name, ignored] : kMisbehaviours) known += fmt::format("{}{}", known.empty() ? "" : ", ", name);
-    std::fprintf(stderr, "takt: `%s` is no order; known: %s\n", word.c_str(), known.c_str());
+    if (const auto how = misbehaviour_of(word, device.known())) return device.misbehave(*how);
+    std::fprintf(stderr, "takt: `%s` is no order; known: %s\n", word.c_str(), names_of(device.known()).c_str());
   }
   std::string word_;
   bool ended_ = false;
@@ -115,20 +111,24 @@ int run_double(const DoubleOptions& options) {
                                   [&](const DoubleKind& known) { return known.name == options.device; });
   if (kind == std::end(kDoubles))
     return refuse(fmt::format("no double of `{}`; known: {}", options.device, device_names()), kBadInput);
-  if (options.pty.empty() != options.tcp.has_value())
+  if (kind->line == Line::can && (options.can.empty() || !options.pty.empty() || options.tcp))
+    return refuse("--can INTERFACE says where the device is to be found: vcan0, or unix:PATH where there is no CAN",
+                  kBadInput);
+  if (kind->line == Line::bytes && (options.pty.empty() != options.tcp.has_value() || !options.can.empty()))
     return refuse("--pty PATH or --tcp PORT says where the device is to be found", kBadInput);
   const auto file = options.world.empty() ? shipped("graph/worlds/lab.xml") : options.world;
   const auto world = sim::Simulation::load(options.device, file, "", options.seed);
   if (!world) return refuse(world.error().text(), kBadInput);
   const MonotonicClock clock;
-  const int64_t begin_ns = clock.now_ns();
-  (*world)->begin(begin_ns);
-  const auto device = kind->make({options, **world, begin_ns});
+  (*world)->begin(clock.now_ns());
+  const auto device = kind->make({options, **world, clock});
   if (const auto plugged = device->plug_in(); !plugged)
     return refuse(plugged.error().text(), plugged.error().bad_input ? kBadInput : kDeviceOrSystem);
   for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, [](int) { stopped = true; });
   std::printf("%s at %s\n", options.device.c_str(),
-              options.tcp ? fmt::format("127.0.0.1:{}", *options.tcp).c_str() : options.pty.c_str());
+              options.tcp               ? fmt::format("127.0.0.1:{}", *options.tcp).c_str()
+              : kind->line == Line::can ? options.can.c_str()
+                                        : options.pty.c_str());
   std::fflush(stdout);
   for (Orders orders; !stopped;) {
     device->run_to(clock.now_ns());
@@ -145,6 +145,8 @@ void add_double(CLI::App& app, DoubleOptions& o, int& exit_code) {
   CLI::Option* pty =
       command->add_option("--pty", o.pty, "makes this path a terminal that drivers open as a serial port");
   command->add_option("--tcp", o.tcp, "port of this machine to be connected to")->excludes(pty);
+  command->add_option("--can", o.can,
+                      "CAN interface of a head or a base, such as vcan0; unix:PATH where there is no CAN");
   command->add_option("--baud", o.baud, "of an lms400 on a serial line (default 115200)");
   command->add_option("--world", o.world, "what it sees (default graph/worlds/lab.xml)");
   command->add_option("--seed", o.seed, "of that world's noise (default 1)");

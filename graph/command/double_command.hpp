@@ -11,6 +11,7 @@ struct DoubleOptions {
   std::string device;
   std::filesystem::path pty;
   std::optional<uint16_t> tcp;
+  std::string can;
   uint32_t baud = 115200;       ///< of an lms400 on a serial line
   std::filesystem::path world;  ///< empty: graph/worlds/lab.xml of the project
   uint64_t seed = 1;

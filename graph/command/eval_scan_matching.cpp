@@ -59,10 +59,22 @@ Json to_json(const ErrorFigures& e) {
           {"end_error_deg", e.end_error_deg}};
 }
 
+Json to_json(const PlaceError& e) {
+  return {{"off_m", e.off_m},
+          {"off_deg", e.off_deg},
+          {"off_m_most", e.off_m_most},
+          {"end_m", e.end_m},
+          {"end_deg", e.end_deg}};
+}
+
 Json to_json(const Evaluation& e) {
   Json out = to_json(e.matched);
   out["steps"] = e.steps;
   out["path_m"] = e.path_m;
+  out["place"] = to_json(e.place);
+  out["place_closed"] = to_json(e.place_closed);
+  out["loops"] = e.loops;
+  out["loop_ms_max"] = e.loop_ms_max;
   for (size_t i = 0; i < e.outcomes.size(); ++i)
     if (e.outcomes[i] > 0) out["outcomes"][std::string(to_string(static_cast<Outcome>(i)))] = e.outcomes[i];
   out["gap_m"] = e.gap_m;
@@ -82,6 +94,10 @@ void print_row(const char* name, const ErrorFigures& e) {
               e.error_deg_p95, e.within_pct, e.end_error_m, e.end_error_deg);
 }
 
+void print_place(const char* name, const PlaceError& e) {
+  std::printf("%-18s %8.3f %8.3f %8.3f %9.2f %9.2f\n", name, e.off_m, e.off_m_most, e.off_deg, e.end_m, e.end_deg);
+}
+
 void print(const Evaluation& e) {
   const Limits limits;
   std::printf("%zu steps from scan to scan, %.0f m\n", e.steps, e.path_m);
@@ -91,6 +107,10 @@ void print(const Evaluation& e) {
   print_row("wheel odometry", e.odometry);
   std::printf("within: steps off by at most %.2f m and %.1f deg; end: all steps chained\n", limits.error_m,
               limits.error_deg);
+  std::printf("%-18s %8s %8s %8s %9s %9s\n", "where it is", "m p50", "m most", "deg p50", "end m", "end deg");
+  print_place("as matched", e.place);
+  print_place("loops closed", e.place_closed);
+  std::printf("%zu corrections; a look for a loop takes at most %.2f ms of CPU\n", e.loops, e.loop_ms_max);
   std::printf("surfaces of a scan and the one before, laid over each other: %.4f m apart, by the truth %.4f\n", e.gap_m,
               e.gap_by_truth_m);
   std::printf("steps by the map and by the scan before alone: %.4f m and %.3f deg apart (p50)\n", e.apart_m,

@@ -50,6 +50,7 @@ std::vector<Judged> judge(const TerrainMaps& maps, const EvalTerrainOptions& opt
   ways[0].name = "undecided";
   ways[1].name = "mean";
   ways[1].parameters.centre = Centre::mean;
+  ways[1].parameters.correlation_min = 0.5;
   for (int i = 0; i < options.drives; ++i) {
     TerrainDriveOptions drive;
     drive.seed = options.seed + static_cast<uint64_t>(i);

@@ -102,7 +102,7 @@ class IsolatedRun {
         board_(plan_, partition_.names.size()),
         stoppable_(board_),
         record_(options, plan_),
-        trace_(options, plan_) {}
+        trace_(options, plan_, partition_.names.size()) {}
 
   ~IsolatedRun() { take_down(); }
   IsolatedRun(const IsolatedRun&) = delete;
@@ -176,6 +176,7 @@ class IsolatedRun {
   bool again() const { return board_.group().losses.size() > 0; }
   void forget_processes() {
     board_.carrier().store(RunBoard::no_carrier);
+    board_.dismissed().store(false);
     for (size_t p = 0; p < board_.process_count(); ++p) {
       ProcessRecord& record = board_.process(p);
       record.state.store(ProcessRecord::starting);
@@ -288,6 +289,11 @@ class IsolatedRun {
         supervisor_->let_end();
         give_up_ns = now + kPatienceNs;
       }
+      if (!board_.dismissed().load() && (all_finished() || now > give_up_ns)) {
+        record_.take_rest();
+        board_.dismissed().store(true);
+        give_up_ns = now + kPatienceNs;
+      }
       if (now <= give_up_ns || group_.alive() == 0) return group_.alive() == 0;
       for (size_t p = 0; p < group_.size(); ++p)
         if (group_.pid(p) != 0)
@@ -297,6 +303,13 @@ class IsolatedRun {
       return false;
     };
     wait_until(ended, {}, std::chrono::milliseconds(5));
+  }
+
+  /// Those that live.
+  bool all_finished() const {
+    for (size_t p = 0; p < group_.size(); ++p)
+      if (group_.pid(p) != 0 && board_.process(p).state.load() != ProcessRecord::finished) return false;
+    return true;
   }
 
   /// What a scenario has in store for the processes.
@@ -342,7 +355,7 @@ class IsolatedRun {
     result.policy_granted = granted_;
     result.released = released_jobs(plan_, board_, result.epoch_ns, result.end_ns);
     const std::string no_trace = trace_.write(graph_, plan_, board_, result);
-    record_.finish(result);
+    record_.finish(result, trace_.unheard_threads());
     auto report = make_report({graph_, plan_, board_, result, *transport_, use, options_.clock,
                                std::string(to_string(plan_.policy)), "subsystem", partition_.names, adjusted_});
     for (const std::string& problem : problems_) report["faults"].push_back({{"what", problem}});

@@ -16,6 +16,7 @@
 #include "graph/command/objects_command.hpp"
 #include "graph/command/profile_command.hpp"
 #include "graph/command/replay_command.hpp"
+#include "graph/command/robot_command.hpp"
 #include "graph/command/run_command.hpp"
 #include "graph/command/show_command.hpp"
 #include "graph/command/terrain_command.hpp"
@@ -160,6 +161,7 @@ int main(int argc, char** argv) {
   takt::command::EvalStereoOptions stereo;
   takt::command::EvalEgoMotionOptions ego_motion;
   takt::command::AttachOptions attach;
+  takt::command::RobotOptions robot;
   takt::command::DoctorOptions doctor;
   takt::command::ProfileOptions profile;
   takt::command::EvalObjectsOptions objects;
@@ -202,6 +204,7 @@ int main(int argc, char** argv) {
   nodes->add_option("type", type, "node type");
   nodes->callback([&] { exit_code = takt::command::print_nodes(type); });
   takt::command::add_attach_commands(app, attach, exit_code);
+  takt::command::add_robot(app, robot, exit_code);
   takt::command::add_doctor(app, doctor, exit_code);
   add_devices(app, devices_json, exit_code);
   add_capture(app, capture, exit_code);

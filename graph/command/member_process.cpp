@@ -118,6 +118,8 @@ int run_member(const MemberPart& part) {
   for (size_t t = 0; t < plan.tasks.size(); ++t)
     if (run.own[t] && !is_stuck(result, t)) prepared.composition->nodes[t]->finish();
   record.state.store(ProcessRecord::finished);
+  // A job of another process may still be about to hold what was published here, and the recorder to copy it.
+  wait_until([&] { return board.dismissed().load(); });
   // A job that never returns still uses what would now be taken down.
   if (!result.stuck.empty()) end_process(kOk, "iceoryx");
   return kOk;

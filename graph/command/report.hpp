@@ -38,7 +38,8 @@ nlohmann::ordered_json make_report(const RunFacts& facts);
 nlohmann::ordered_json modes_json(const RunFacts& facts);
 /// What nodes did and should not have done: [{what, kind, node, job, at_s}].
 nlohmann::ordered_json faults_json(const RunFacts& facts);
-/// Each device and whether it was lost: [{name, state, losses, lost_s, reopen_tries}].
+/// Each device, whether it was lost, and what was lost of its data: [{name, state, losses, lost_s, reopen_tries,
+/// received, damaged, resyncs, missing, unsent, trouble}].
 nlohmann::ordered_json devices_json(const RunFacts& facts);
 /// {call: count} of what jobs called and should not have; null if this program cannot see it.
 nlohmann::ordered_json violations_json(const TaskStatistics& statistics);

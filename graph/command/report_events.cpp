@@ -41,6 +41,16 @@ std::string offences(const Json& node) {
   return text;
 }
 
+/// "900 received, 3 damaged, missing 1; trouble"; empty if the device lost nothing and is well.
+std::string losses(const Json& device) {
+  std::string text;
+  for (const char* what : {"damaged", "resyncs", "missing", "unsent"})
+    if (const auto n = device.value(what, uint64_t{0}); n > 0) text += fmt::format(", {} {}", n, what);
+  if (!text.empty()) text = fmt::format("{} received{}", device["received"].get<uint64_t>(), text);
+  const auto trouble = device.value("trouble", "");
+  return text + (text.empty() || trouble.empty() ? "" : "; ") + trouble;
+}
+
 }  // namespace
 
 Json modes_json(const RunFacts& facts) {
@@ -81,11 +91,18 @@ Json devices_json(const RunFacts& facts) {
   for (size_t t = 0; t < facts.plan.tasks.size(); ++t) {
     if (!facts.plan.tasks[t].device) continue;
     const SourceRecord& source = facts.board.source(t);
+    const SourceCounts counts = source.counts();
     devices.push_back({{"name", facts.plan.tasks[t].name},
                        {"state", to_text(source.state.load())},
                        {"losses", source.losses.load()},
                        {"lost_s", static_cast<double>(source.lost_until_ns(facts.result.end_ns)) / 1e9},
-                       {"reopen_tries", source.reopen_tries.load()}});
+                       {"reopen_tries", source.reopen_tries.load()},
+                       {"received", counts.received},
+                       {"damaged", counts.damaged},
+                       {"resyncs", counts.resyncs},
+                       {"missing", counts.missing},
+                       {"unsent", counts.unsent},
+                       {"trouble", source.trouble.load()}});
   }
   return devices;
 }
@@ -118,6 +135,9 @@ std::string events_text(const Json& report) {
           fmt::format("device {}: lost {} time{}, {:.1f} s; {} tries to reopen it; now {}\n",
                       device["name"].get<std::string>(), losses, losses == 1 ? "" : "s", device["lost_s"].get<double>(),
                       device["reopen_tries"].get<uint64_t>(), device["state"].get<std::string>());
+  for (const Json& device : report["devices"])
+    if (const std::string what = losses(device); !what.empty())
+      text += fmt::format("device {}: {}\n", device["name"].get<std::string>(), what);
   for (const Json& node : report["nodes"])
     if (const std::string what = offences(node); !what.empty())
       text += fmt::format("{}: {}\n", node["name"].get<std::string>(), what);

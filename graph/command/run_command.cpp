@@ -50,7 +50,7 @@ int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, Ru
   faults.disturb_disk(record, *prepared.clock, board);
   const auto transport =
       faults.inject(make_transport(options.transport, composition.plan), composition.plan, *prepared.clock, board);
-  RunTrace trace(options, composition.plan);  // ends first: it speaks to the record
+  RunTrace trace(options, composition.plan, 1);  // ends first: it speaks to the record
   Executor::Options run;
   run.duration_ns = static_cast<int64_t>(options.duration_s * 1e9);
   run.require_policy = options.policy_required();
@@ -91,7 +91,7 @@ int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, Ru
   }
   const ProcessReading after = ProcessReading::now();
   const std::string no_trace = trace.write(graph, composition.plan, board, result);
-  record.finish(result);
+  record.finish(result, trace.unheard_threads());
   for (size_t t = 0; t < composition.nodes.size(); ++t)
     if (!is_stuck(result, t)) composition.nodes[t]->finish();
   for (const std::string& refused : result.refused)

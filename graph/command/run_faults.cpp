@@ -13,13 +13,14 @@ namespace takt::command {
 
 namespace {
 
-/// Writes the failures of devices into their settings, as their simulated drivers read them.
+/// Writes the failures of devices into their settings, as simulated devices and doubles read them.
 int fail_devices(const graph::Scenario& scenario, graph::GraphSpec& graph) {
   for (const graph::DeviceFailure& failure : graph::device_failures(scenario)) {
     const auto device = std::find_if(graph.devices.begin(), graph.devices.end(),
                                      [&](const graph::DeviceSpec& d) { return d.id == failure.device; });
-    if (device->driver != "sim")
-      return refuse(fmt::format("--faults: device {} has the driver {}, which cannot be told to fail; only `sim` can",
+    if (device->driver != "sim" && device->driver != "double")
+      return refuse(fmt::format("--faults: device {} has the driver {}, which cannot be told to fail; `sim` and "
+                                "`double` can",
                                 failure.device, device->driver),
                     kBadInput);
     // Beyond any run, and still a time that can be added to.

@@ -91,11 +91,12 @@ void RunRecord::begin(const graph::GraphSpec& graph, const Plan& plan, const Run
   recorder_ = std::make_unique<record::Recorder>(plan, board, transport, sink, head, std::move(how));
 }
 
-void RunRecord::finish(const RunResult& result) {
+void RunRecord::finish(const RunResult& result, uint64_t unheard_threads) {
   if (!recorder_) return;
   written_ = recorder_->finish({{"epoch_ns", std::to_string(result.epoch_ns)},
                                 {"end_ns", std::to_string(result.end_ns)},
-                                {"policy_granted", std::string(to_string(result.policy_granted))}});
+                                {"policy_granted", std::string(to_string(result.policy_granted))}},
+                               unheard_threads);
   recorder_.reset();
 }
 
@@ -110,7 +111,8 @@ void RunRecord::tell(nlohmann::ordered_json& report) const {
                        {{"overwritten", written_.overwritten},
                         {"no_room", written_.no_room},
                         {"not_written", written_.not_written},
-                        {"jobs", written_.incomplete_jobs}}},
+                        {"jobs", written_.incomplete_jobs},
+                        {"threads", written_.unheard_threads}}},
                       {"refused", written_.refused},
                       {"cpu_ms",
                        {{"copying", static_cast<double>(written_.capture_cpu_ns) / 1e6},

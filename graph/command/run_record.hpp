@@ -37,8 +37,13 @@ class RunRecord {
   void capture() {
     if (recorder_) recorder_->capture();
   }
-  /// After the last event was taken. Adds "record" and "recorder_lost" to the report.
-  void finish(const RunResult& result);
+  /// After the last job, before those who published leave.
+  void take_rest() {
+    if (recorder_) recorder_->take_rest();
+  }
+  /// After the last event was taken; `unheard_threads` noted none.
+  void finish(const RunResult& result, uint64_t unheard_threads);
+  /// Adds "record" and "recorder_lost" to the report.
   void tell(nlohmann::ordered_json& report) const;
 
  private:

@@ -36,11 +36,12 @@ trace::Source best_source(const RunOptions& options) {
 
 }  // namespace
 
-RunTrace::RunTrace(const RunOptions& options, const Plan& plan) : options_(options) {
-  // One for each lane and, if the policy is refused after all, one for each cooperative worker; some for what watches.
+RunTrace::RunTrace(const RunOptions& options, const Plan& plan, size_t processes) : options_(options) {
+  // One for each lane and, if the policy is refused after all, one for each cooperative worker: no process has more than
+  // it has lanes, or one. Some for those of restarted processes that find none of their name.
   constexpr size_t kSpare = 8;
   if (!options.trace.empty() || !options.record.empty())
-    rings_ = std::make_unique<trace::Rings>(plan.tasks.size() + plan.cores.size() + kSpare);
+    rings_ = std::make_unique<trace::Rings>(2 * plan.tasks.size() + processes + kSpare);
 }
 
 void RunTrace::collect(const Plan& plan, RunRecord& record) {

@@ -14,7 +14,7 @@ namespace takt::command {
 class RunTrace {
  public:
   /// Before the processes of the run are made: they share what is made here. Only the shape of the plan is used.
-  RunTrace(const RunOptions& options, const Plan& plan);
+  RunTrace(const RunOptions& options, const Plan& plan, size_t processes);
   /// Where threads note events; null: nowhere.
   trace::Rings* rings() const { return rings_.get(); }
   /// Begins to collect, in the process that lasts longest, and tells every event to the record.
@@ -29,6 +29,8 @@ class RunTrace {
   }
   /// Ends collecting and writes the trace, if one was asked for; "" or why it could not be written.
   std::string write(const graph::GraphSpec& graph, const Plan& plan, const RunBoard& board, const RunResult& result);
+  /// Threads that found no room for their events.
+  size_t unheard_threads() const { return rings_ ? rings_->refused() : 0; }
 
  private:
   const RunOptions& options_;

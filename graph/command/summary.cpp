@@ -59,9 +59,10 @@ std::string record_line(const Json& record, uint64_t lost) {
                   record["messages"].get<uint64_t>(), record["jobs"].get<uint64_t>(), record["mb"].get<double>());
   if (lost == 0) return text + "nothing lost\n";
   const Json& why = record["lost"];
-  text += fmt::format("LOST {}: {} overwritten, {} found the queue full, {} not written, {} jobs incomplete", lost,
-                      why["overwritten"].get<uint64_t>(), why["no_room"].get<uint64_t>(),
-                      why["not_written"].get<uint64_t>(), why["jobs"].get<uint64_t>());
+  text += fmt::format(
+      "LOST {}: {} overwritten, {} found the queue full, {} not written, {} jobs incomplete, {} threads unheard", lost,
+      why["overwritten"].get<uint64_t>(), why["no_room"].get<uint64_t>(), why["not_written"].get<uint64_t>(),
+      why["jobs"].get<uint64_t>(), why["threads"].get<uint64_t>());
   const auto refused = record["refused"].get<std::string>();
   return text + (refused.empty() ? "" : " (" + refused + ")") + "\n";
 }

@@ -171,12 +171,14 @@ class Composer {
   }
 
   /// Producers before consumers, so that an input's capacity is known when its node is set up; in a cycle, file order.
+  /// Requests make no cycle: the runtime reads them, and no node takes memory for them.
   std::vector<size_t> setup_order() const {
     std::vector<size_t> order;
     std::vector<char> done(result_.plan.tasks.size(), 0);
     const auto ready = [&](const TaskPlan& task) {
       return std::all_of(task.edges.begin(), task.edges.end(), [&](const EdgePlan& edge) {
-        return done[task_index_.at(result_.plan.ports[edge.port].node)] != 0;
+        return task.node->inputs()[edge.input] == task.node->control() ||
+               done[task_index_.at(result_.plan.ports[edge.port].node)] != 0;
       });
     };
     while (order.size() < result_.plan.tasks.size()) {

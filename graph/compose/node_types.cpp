@@ -12,6 +12,9 @@ void register_picture(NodeTypes& types);
 void register_obstacle_stop(NodeTypes& types);
 void register_semantic(NodeTypes& types);
 void register_semantic_map(NodeTypes& types);
+void register_object_locator(NodeTypes& types);
+void register_head_behaviour(NodeTypes& types);
+void register_drive_arbiter(NodeTypes& types);
 void register_load(NodeTypes& types);
 void register_cloud_filter(NodeTypes& types);
 void register_traffic_signs(NodeTypes& types);
@@ -23,6 +26,7 @@ void register_traversability(NodeTypes& types);
 void register_person_tracking(NodeTypes& types);
 void register_laser_fusion(NodeTypes& types);
 void register_laser_cloud(NodeTypes& types);
+void register_robot_client(NodeTypes& types);
 void register_cruise(NodeTypes& types);
 }  // namespace takt
 
@@ -39,6 +43,9 @@ NodeTypes node_types() {
   register_obstacle_stop(types);
   register_semantic(types);
   register_semantic_map(types);
+  register_object_locator(types);
+  register_head_behaviour(types);
+  register_drive_arbiter(types);
   register_load(types);
   register_cloud_filter(types);
   register_traffic_signs(types);
@@ -50,6 +57,7 @@ NodeTypes node_types() {
   register_person_tracking(types);
   register_laser_fusion(types);
   register_laser_cloud(types);
+  register_robot_client(types);
   register_cruise(types);
   return types;
 }

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The devices of hal/ as the loader sees them. Apart from the loader, so that its tests need no device.
+#include <algorithm>
+
 #include "graph/language/catalogue.hpp"
 #include "hal/drivers.hpp"
 
@@ -42,6 +44,8 @@ DeviceSetting plain(const hal::SettingInfo& info) {
 }
 
 void add(std::vector<DeviceSetting>& settings, const hal::SettingInfo& info) {
+  const bool has = std::any_of(settings.begin(), settings.end(), [&](const auto& s) { return s.name == info.name; });
+  if (has) return;                  // a double takes the settings of two drivers
   if (info.name == "rate") return;  // the loader's own, of every device
   if (info.kind != hal::SettingKind::map) return settings.push_back(plain(info));
   // The only map there is places the device on the robot.
@@ -69,7 +73,7 @@ DeviceCatalogue hal_catalogue() {
     for (const auto& setting : info.settings) {
       if (setting.driver.empty()) add(kind.settings, setting);
       for (auto& driver : kind.drivers)
-        if (driver.name == setting.driver) add(driver.settings, setting);
+        if (!setting.driver.empty() && hal::takes(driver.name, setting)) add(driver.settings, setting);
     }
     catalogue.kinds[kind.name] = std::move(kind);
   }

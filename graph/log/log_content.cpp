@@ -204,7 +204,8 @@ Json content_json(LogFile& log) {
     lost = {{"overwritten", count(end, "lost_overwritten")},
             {"no_room", count(end, "lost_no_room")},
             {"not_written", count(end, "lost_not_written")},
-            {"jobs", count(end, "lost_jobs")}};
+            {"jobs", count(end, "lost_jobs")},
+            {"threads", count(end, "lost_threads")}};
   return {{"facts", facts},    {"end", end},   {"duration_s", span_s(log)}, {"nodes", nodes},
           {"ports", channels}, {"lost", lost}, {"damages", log.damages()},  {"hash", content_hash(log)}};
 }
@@ -231,9 +232,9 @@ std::string content_text(const Json& content) {
   else
     text += fmt::format(
         "\nlost: {} messages overwritten, {} records found the queue full, {} not written, {} jobs "
-        "incomplete\n",
+        "incomplete, {} threads unheard\n",
         lost["overwritten"].get<uint64_t>(), lost["no_room"].get<uint64_t>(), lost["not_written"].get<uint64_t>(),
-        lost["jobs"].get<uint64_t>());
+        lost["jobs"].get<uint64_t>(), lost["threads"].get<uint64_t>());
   for (const Json& damage : content["damages"]) text += "not whole: " + damage.get<std::string>() + "\n";
   return text + "content " + content["hash"].get<std::string>() + "\n";
 }

@@ -16,14 +16,23 @@ constexpr uint32_t kFirstCounts[2] = {kWheelCounts - 100, 12345};
 
 }  // namespace
 
-BaseDouble::BaseDouble(std::string interface, const Clock& clock, uint64_t seed)
-    : NodeDouble(std::move(interface), clock, messages(), kPlaces, seed) {}
+Body free_body() {
+  return [speed = 0.0, turn = 0.0](const Drive& drive, int64_t) mutable {
+    speed = towards(speed, drive.speed_m_s, drive.acceleration_m_s2 * kStep_s);
+    turn = towards(turn, drive.turn_rad_s, kTurnAcceleration_rad_s2 * kStep_s);
+    return Advance{speed * kStep_s, turn * kStep_s, speed, turn, false};
+  };
+}
+
+BaseDouble::BaseDouble(std::string interface, const Clock& clock, Body body, uint64_t seed)
+    : NodeDouble(std::move(interface), clock, messages(), kPlaces, seed), body_(std::move(body)) {}
 
 void BaseDouble::forget() {
   command_ns_ = now_ns();
   state_ = State::disabled;
   stale_ = true;
-  wanted_m_s_ = wanted_rad_s_ = speed_m_s_ = turn_rad_s_ = 0;
+  wanted_ = {0, 0, kAcceleration_m_s2};
+  moved_ = {};
   for (size_t i = 0; i < 2; ++i) way_m_[i] = kFirstCounts[i] * wheels_.step_m;
 }
 
@@ -40,9 +49,10 @@ void BaseDouble::take_command(std::span<const double> values) {
   }
   command_ns_ = now_ns();
   stale_ = false;
-  wanted_m_s_ = std::clamp(values[Command::speed_m_s], -kSpeed_m_s, kSpeed_m_s);
-  wanted_rad_s_ = std::clamp(values[Command::turn_rad_s], -kTurn_rad_s, kTurn_rad_s);
-  asked_acceleration_m_s2_ = values[Command::acceleration_m_s2];
+  const double asked_m_s2 = values[Command::acceleration_m_s2];
+  wanted_ = {std::clamp(values[Command::speed_m_s], -kSpeed_m_s, kSpeed_m_s),
+             std::clamp(values[Command::turn_rad_s], -kTurn_rad_s, kTurn_rad_s),
+             asked_m_s2 > 0 ? std::min(asked_m_s2, kAcceleration_m_s2) : kAcceleration_m_s2};
 }
 
 void BaseDouble::step() {
@@ -50,13 +60,10 @@ void BaseDouble::step() {
   if (now_ns() - command_ns_ > kCommandStale_ns) stale_ = true;
   const bool drives = !stale_ && !deserted && !emergency_stop_ && !bumper_ && state_ != State::fault;
   if (state_ != State::fault) state_ = drives ? State::enabled : State::disabled;
-  const double acceleration =
-      asked_acceleration_m_s2_ > 0 ? std::min(asked_acceleration_m_s2_, kAcceleration_m_s2) : kAcceleration_m_s2;
-  speed_m_s_ = towards(speed_m_s_, drives ? wanted_m_s_ : 0, acceleration * kStep_s);
-  turn_rad_s_ = towards(turn_rad_s_, drives ? wanted_rad_s_ : 0, kTurnAcceleration_rad_s2 * kStep_s);
-  const double outward = turn_rad_s_ * wheels_.track_m / 2;
-  way_m_[0] += (speed_m_s_ - outward) * kStep_s;
-  way_m_[1] += (speed_m_s_ + outward) * kStep_s;
+  moved_ = body_(drives ? wanted_ : Drive{0, 0, wanted_.acceleration_m_s2}, now_ns());
+  const double outward_m = moved_.turn_rad * wheels_.track_m / 2;
+  way_m_[0] += moved_.forward_m - outward_m;
+  way_m_[1] += moved_.forward_m + outward_m;
   send_due();
 }
 
@@ -65,8 +72,8 @@ void BaseDouble::send_due() {
   if (!link().operational()) return;
   const auto flag = [](bool on) { return on ? 1.0 : 0.0; };
   const double sample_ms = std::fmod(static_cast<double>(link().uptime_ns(now_ns())) * 1e-6, 6553.6);
-  link().send(kMotion, std::array{flag(emergency_stop_), flag(bumper_), flag(stale_), flag(state_ == State::fault),
-                                  speed_m_s_, turn_rad_s_, sample_ms});
+  link().send(kMotion, std::array{flag(emergency_stop_), flag(bumper_ || moved_.blocked), flag(stale_),
+                                  flag(state_ == State::fault), moved_.speed_m_s, moved_.turn_rad_s, sample_ms});
   const auto counted = [&](double way_m) {
     return static_cast<double>(static_cast<uint32_t>(std::llround(way_m / wheels_.step_m)) % kWheelCounts);
   };

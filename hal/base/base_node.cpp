@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "hal/base/base_node.hpp"
 
+#include "hal/base/must_stand.hpp"
+
 namespace takt {
 
 void BaseNode::run(Job& job) {
   if (!running(job)) return job.no_result();
   // A stop is commanded, not left to the base's watchdog, which acts later. A stale velocity is not repeated: the
   // watchdog then stops the base.
-  if (stopped() || stands(job.mode())) {
+  if (must_stand(stop_, job.mode())) {
     base_->command(0, 0, job.release_ns());
   } else if (const VelocityCommand* wanted = velocity_.newest(); wanted != nullptr && !velocity_.stale()) {
     base_->command(wanted->speed_m_s, wanted->turn_rad_s, job.release_ns());

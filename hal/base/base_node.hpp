@@ -17,11 +17,6 @@ class BaseNode final : public DeviceNode {
   Device& device() override { return *base_; }
 
  private:
-  /// In the mode in which the robot stays where it is; in a mode without a name nobody has said that it may drive.
-  static bool stands(std::string_view mode) { return mode.empty() || mode == kSafeStopMode; }
-  /// Silence means stop: a connected input without a command, or with one older than its edge allows.
-  bool stopped() const { return stop_.connected() && (stop_.empty() || stop_.stale() || stop_.newest()->stop()); }
-
   Input<VelocityCommand> velocity_{this, "velocity", "wanted speeds", Need::optional};
   Input<StopCommand> stop_{this, "stop", "drive only while it says so", Need::optional};
   Output<Odometry> odometry_{this, "odometry", "pose and speeds in the drifting odometry frame"};

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
+#include <utility>
 
 namespace takt::v4l2 {
 namespace {
@@ -41,6 +42,9 @@ void split_row(const uint8_t* row, const FrameLayout& layout, int eye, uint8_t* 
     case FrameFormat::grey: std::copy_n(row + ptrdiff_t{layout.width} * eye, layout.width, out); return;
   }
 }
+
+/// Places in BGR of the colours that the pixels (0, 0), (1, 0), (0, 1), (1, 1) of a mosaic see.
+constexpr int kColours[][4] = {{0, 0, 0, 0}, {2, 1, 1, 0}, {1, 2, 0, 1}, {1, 0, 2, 1}, {0, 1, 1, 2}};
 
 /// OpenCV names a pattern by the pixels (1, 1) and (2, 1).
 int conversion(Mosaic mosaic) {
@@ -93,6 +97,25 @@ int split(std::span<const uint8_t> frame, const FrameLayout& layout, ImageView<u
     split_row(frame.data() + begin, layout, layout.right, right.row(rows));
   }
   return rows;
+}
+
+bool join(ImageView<const uint8_t> left, ImageView<const uint8_t> right, const FrameLayout& layout,
+          std::span<uint8_t> frame) {
+  const bool colours = left.channels == 3;
+  if (layout.format == FrameFormat::yuyv || frame.size() < layout.image_bytes() ||
+      colours != (layout.mosaic != Mosaic::none))
+    return false;
+  const auto& sees = kColours[static_cast<size_t>(layout.mosaic)];
+  const int apart = layout.side_by_side() ? 1 : layout.planes();
+  for (int y = 0; y < layout.height; ++y) {
+    uint8_t* row = frame.data() + static_cast<size_t>(y) * layout.bytes_per_line;
+    for (const auto& [image, eye] : {std::pair{&left, layout.left}, std::pair{&right, layout.right}}) {
+      uint8_t* out = row + (layout.side_by_side() ? ptrdiff_t{layout.width} * eye : ptrdiff_t{eye});
+      const uint8_t* in = image->row(y);
+      for (int x = 0; x < layout.width; ++x) out[x * apart] = colours ? in[3 * x + sees[y % 2 * 2 + x % 2]] : in[x];
+    }
+  }
+  return true;
 }
 
 void debayer(ImageView<const uint8_t> plane, Mosaic mosaic, ImageView<uint8_t> bgr) {

@@ -52,6 +52,12 @@ struct FrameLayout {
 /// frame had; what lies below stays as it was.
 int split(std::span<const uint8_t> frame, const FrameLayout& layout, ImageView<uint8_t> left, ImageView<uint8_t> right);
 
+/// The reverse of split(), for images of one channel, or of three (BGR) of which a mosaic keeps one value a pixel.
+/// False, and nothing written, for the format yuyv, a frame that is too short, or colours without a mosaic. A third
+/// plane and the padding of rows are left as they are.
+bool join(ImageView<const uint8_t> left, ImageView<const uint8_t> right, const FrameLayout& layout,
+          std::span<uint8_t> frame);
+
 /// A mosaic to BGR, bilinear. Not the kind none; at least 2 x 2 pixels. May allocate.
 void debayer(ImageView<const uint8_t> plane, Mosaic mosaic, ImageView<uint8_t> bgr);
 

@@ -15,6 +15,8 @@ namespace {
 constexpr uint32_t kCapture = V4L2_BUF_TYPE_VIDEO_CAPTURE;
 constexpr int64_t kLongestWait_ns = 1'000'000'000;
 constexpr int64_t kSilence_ns = 1'000'000'000;
+/// A frame that comes later than so long before the deadline could not be moved into the message in time.
+constexpr int64_t kMoving_ns = 4'000'000;
 
 v4l2_buffer buffer_of(uint32_t index) {
   v4l2_buffer buffer{};
@@ -212,6 +214,10 @@ DeclaredCalls V4l2Camera::declared_calls() const {
           "frames are waited for until the deadline, a lost device is opened again; OpenCV makes the colours"};
 }
 
+SourceCounts V4l2Camera::counts() const {
+  return {counters_.frames, counters_.damaged + counters_.io_errors, 0, counters_.missing, 0};
+}
+
 StereoFormat V4l2Camera::format() const {
   const FrameLayout& layout = settings_.layout;
   return {layout.width,
@@ -290,7 +296,7 @@ StereoFrame V4l2Camera::read(ImageView<uint8_t> left, ImageView<uint8_t> right, 
   Frame frame;
   Taken taken = take_newest(frame);
   if (taken == Taken::none) {
-    const int64_t rest_ns = std::min(deadline_ns, clock_.now_ns() + kLongestWait_ns) - clock_.now_ns();
+    const int64_t rest_ns = std::min(deadline_ns - kMoving_ns, clock_.now_ns() + kLongestWait_ns) - clock_.now_ns();
     const short events = rest_ns > 0 ? device_->wait(rest_ns) : static_cast<short>(0);
     taken = take_newest(frame);
     if (taken == Taken::none && (events & (POLLERR | POLLHUP | POLLNVAL)) != 0) taken = Taken::lost;

@@ -51,6 +51,7 @@ class V4l2Camera final : public StereoCamera {
   void stop() override;
   bool restart(int64_t now_ns) override;
   DeclaredCalls declared_calls() const override;
+  SourceCounts counts() const override;
   StereoFormat format() const override;
   void trigger(int64_t) override {}
   /// disconnected: the device is gone, its queue has an error, or it gave nothing for three periods and a second.

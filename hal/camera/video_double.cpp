@@ -3,6 +3,8 @@
 
 #include <linux/videodev2.h>
 #include <poll.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -24,7 +26,8 @@ class VideoDoubleFile final : public VideoDevice {
   }
   void close() override {
     if (!open_) return;
-    open_ = camera_.opened_ = camera_.streaming_ = false;
+    camera_.stream_off();
+    open_ = camera_.opened_ = false;
     camera_.count_ = 0;
   }
   int control(unsigned long request, void* argument) override {
@@ -37,9 +40,14 @@ class VideoDoubleFile final : public VideoDevice {
     return std::span(camera_.buffers_[offset].bytes).first(bytes);
   }
   void unmap(std::span<const uint8_t>) override {}
-  short wait(int64_t) override {  // virtual time stands while somebody waits
+  short wait(int64_t timeout_ns) override {
+    if (!camera_.clock_.is_virtual()) {  // virtual time stands while somebody waits
+      pollfd wakes{camera_.wakes_, POLLIN, 0};
+      const timespec timeout{timeout_ns / 1'000'000'000, timeout_ns % 1'000'000'000};
+      if (camera_.oldest_done() == nullptr) ppoll(&wakes, 1, &timeout, nullptr);
+    }
     if (!open_ || gone_ || camera_.away()) return POLLERR | POLLHUP;
-    if (camera_.how_ == VideoMisbehaviour::queue_error) return POLLERR;
+    if (camera_.how() == Misbehaviour::queue_error) return POLLERR;
     camera_.live();
     return camera_.oldest_done() != nullptr ? POLLIN : static_cast<short>(0);
   }
@@ -50,7 +58,28 @@ class VideoDoubleFile final : public VideoDevice {
   bool gone_ = false;  ///< it was unplugged while open
 };
 
+VideoDouble::VideoDouble(Settings settings, Fill fill, const Clock& clock)
+    : settings_(settings), fill_(std::move(fill)), clock_(clock), wakes_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
+  for (Buffer& buffer : buffers_) buffer.bytes.resize(settings_.frame_bytes);
+}
+
+VideoDouble::~VideoDouble() { ::close(wakes_); }
+
 std::unique_ptr<VideoDevice> VideoDouble::device() { return std::make_unique<VideoDoubleFile>(*this); }
+
+std::span<const Misbehaviour> VideoDouble::known() const {
+  static constexpr std::array kKnown{Misbehaviour::none,      Misbehaviour::silent,        Misbehaviour::unplugged,
+                                     Misbehaviour::garbage,   Misbehaviour::frozen,        Misbehaviour::repeated,
+                                     Misbehaviour::flagged,   Misbehaviour::cut,           Misbehaviour::empty,
+                                     Misbehaviour::io_error,  Misbehaviour::end_of_stream, Misbehaviour::queue_error,
+                                     Misbehaviour::uncounted, Misbehaviour::unstamped};
+  return kKnown;
+}
+
+void VideoDouble::misbehave(Misbehaviour how) {
+  how_.store(how);
+  eventfd_write(wakes_, 1);  // who waits looks again
+}
 
 int VideoDouble::control(unsigned long request, void* argument) {
   switch (request) {
@@ -89,23 +118,10 @@ int VideoDouble::control(unsigned long request, void* argument) {
       buffer.m.offset = buffer.index;
       return 0;
     }
-    case VIDIOC_QBUF: {
-      live();
-      const auto& buffer = *static_cast<v4l2_buffer*>(argument);
-      if (buffer.index >= count_ || buffers_[buffer.index].state != Buffer::State::idle) return EINVAL;
-      buffers_[buffer.index].state = Buffer::State::queued;
-      return 0;
-    }
+    case VIDIOC_QBUF: live(); return enqueue(static_cast<v4l2_buffer*>(argument)->index);
     case VIDIOC_DQBUF: return dequeue(argument);
-    case VIDIOC_STREAMON:
-      streaming_ = true;
-      streaming_since_ns_ = clock_.now_ns();
-      exposed_ = 0;
-      return 0;
-    case VIDIOC_STREAMOFF:
-      streaming_ = false;
-      for (Buffer& buffer : buffers_) buffer.state = Buffer::State::idle;
-      return 0;
+    case VIDIOC_STREAMON: stream_on(); return 0;
+    case VIDIOC_STREAMOFF: stream_off(); return 0;
     default: return ENOTTY;
   }
 }
@@ -120,31 +136,51 @@ int VideoDouble::set(void* argument) {
 
 int VideoDouble::allocate(void* argument) {
   auto& request = *static_cast<v4l2_requestbuffers*>(argument);
-  request.count = count_ = std::min(request.count, kMostBuffers);
-  for (uint32_t i = 0; i < count_; ++i) {
-    buffers_[i] = {};
-    buffers_[i].bytes.resize(settings_.frame_bytes);
+  for (const Buffer& buffer : buffers_) {
+    if (buffer.state.load() == State::exposes) return EBUSY;  // of a stream that has just ended
   }
+  request.count = count_ = std::min(request.count, kMostBuffers);
+  for (Buffer& buffer : buffers_) buffer.state.store(State::idle);
   return 0;
+}
+
+int VideoDouble::enqueue(uint32_t index) {
+  State mine = State::idle;
+  return index < count_ && buffers_[index].state.compare_exchange_strong(mine, State::queued) ? 0 : EINVAL;
+}
+
+void VideoDouble::stream_on() {
+  for (eventfd_t ignored; eventfd_read(wakes_, &ignored) == 0;) {
+  }
+  streaming_since_ns_.store(clock_.now_ns());
+}
+
+void VideoDouble::stream_off() {
+  streaming_since_ns_.store(INT64_MIN);
+  for (Buffer& buffer : buffers_) {
+    State state = buffer.state.load();
+    while (state != State::exposes && !buffer.state.compare_exchange_weak(state, State::idle)) {
+    }
+  }
 }
 
 VideoDouble::Buffer* VideoDouble::oldest_done() {
   Buffer* oldest = nullptr;
   for (Buffer& buffer : buffers_) {
-    if (buffer.state == Buffer::State::done && (oldest == nullptr || buffer.stamp_ns < oldest->stamp_ns))
+    if (buffer.state.load() == State::done && (oldest == nullptr || buffer.stamp_ns < oldest->stamp_ns))
       oldest = &buffer;
   }
   return oldest;
 }
 
 int VideoDouble::dequeue(void* argument) {
-  if (how_ == VideoMisbehaviour::io_error) return EIO;
-  if (how_ == VideoMisbehaviour::end_of_stream) return EPIPE;
-  if (how_ == VideoMisbehaviour::queue_error) return EAGAIN;
+  if (how() == Misbehaviour::io_error) return EIO;
+  if (how() == Misbehaviour::end_of_stream) return EPIPE;
+  if (how() == Misbehaviour::queue_error) return EAGAIN;
   live();
   Buffer* done = oldest_done();
-  if (done == nullptr) return EAGAIN;
-  done->state = Buffer::State::idle;
+  if (eventfd_t ignored; done == nullptr) eventfd_read(wakes_, &ignored);
+  if (done == nullptr && (done = oldest_done()) == nullptr) return EAGAIN;
   auto& buffer = *static_cast<v4l2_buffer*>(argument);
   buffer.index = static_cast<uint32_t>(done - buffers_.data());
   buffer.sequence = done->sequence;
@@ -152,36 +188,58 @@ int VideoDouble::dequeue(void* argument) {
   buffer.bytesused = done->bytes_used;
   buffer.timestamp.tv_sec = done->stamp_ns / 1'000'000'000;
   buffer.timestamp.tv_usec = done->stamp_ns % 1'000'000'000 / 1000;
+  done->state.store(State::idle);
   return 0;
 }
 
 void VideoDouble::live() {
-  if (!streaming_) return;
-  for (int64_t at_ns; (at_ns = settings_.rate.release_ns(streaming_since_ns_, exposed_)) <= clock_.now_ns();) {
-    const uint32_t k = exposed_++;
-    const auto free = std::find_if(buffers_.begin(), buffers_.end(),
-                                   [](const Buffer& b) { return b.state == Buffer::State::queued; });
-    if (free != buffers_.end() && how_ != VideoMisbehaviour::silent) expose(*free, k, at_ns);
+  if (clock_.is_virtual()) run_to(clock_.now_ns());
+}
+
+void VideoDouble::run_to(int64_t now_ns) {
+  const int64_t since_ns = streaming_since_ns_.load();
+  if (since_ns == INT64_MIN) return;
+  if (stream_ns_ != since_ns) {
+    stream_ns_ = since_ns;
+    const int64_t trigger_ns = trigger_ns_.load();
+    origin_ns_ = trigger_ns == INT64_MIN ? since_ns : trigger_ns;
+    first_ = next_ = settings_.rate.releases_before(origin_ns_, since_ns);
+  }
+  for (int64_t at_ns; (at_ns = settings_.rate.release_ns(origin_ns_, next_)) <= now_ns;) {
+    const auto k = static_cast<uint32_t>(next_++ - first_);
+    if (how() == Misbehaviour::silent) continue;
+    for (Buffer& buffer : buffers_) {
+      State queued = State::queued;
+      if (!buffer.state.compare_exchange_strong(queued, State::exposes)) continue;
+      expose(buffer, k, at_ns);
+      break;
+    }
   }
 }
 
 void VideoDouble::expose(Buffer& buffer, uint32_t k, int64_t at_ns) {
-  const bool again = how_ == VideoMisbehaviour::repeated;
-  if (!again) {
+  if (how() != Misbehaviour::repeated) {
     last_k_ = k;
     last_stamp_ns_ = at_ns;
   }
-  if (how_ != VideoMisbehaviour::frozen) picture_ = last_k_;
-  fill_(picture_, buffer.bytes);
-  buffer.state = Buffer::State::done;
-  buffer.sequence = how_ == VideoMisbehaviour::uncounted ? 0 : last_k_;
+  if (how() != Misbehaviour::frozen) {
+    picture_ = last_k_;
+    picture_ns_ = last_stamp_ns_;
+  }
+  fill_(picture_, picture_ns_, buffer.bytes);
+  buffer.sequence = how() == Misbehaviour::uncounted ? 0 : last_k_;
   buffer.stamp_ns = last_stamp_ns_;
-  buffer.flags =
-      how_ == VideoMisbehaviour::unstamped ? V4L2_BUF_FLAG_TIMESTAMP_UNKNOWN : V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;
-  if (how_ == VideoMisbehaviour::flagged) buffer.flags |= V4L2_BUF_FLAG_ERROR;
-  buffer.bytes_used = how_ == VideoMisbehaviour::empty ? 0
-                      : how_ == VideoMisbehaviour::cut ? settings_.frame_bytes / 2
-                                                       : settings_.frame_bytes;
+  buffer.flags = how() == Misbehaviour::unstamped ? V4L2_BUF_FLAG_TIMESTAMP_UNKNOWN : V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;
+  if (how() == Misbehaviour::flagged || how() == Misbehaviour::garbage) buffer.flags |= V4L2_BUF_FLAG_ERROR;
+  if (how() == Misbehaviour::garbage) {
+    for (size_t i = 0; i < buffer.bytes.size(); ++i) buffer.bytes[i] ^= static_cast<uint8_t>(i * 167 + k);
+  }
+  buffer.bytes_used = how() == Misbehaviour::empty ? 0
+                      : how() == Misbehaviour::cut ? settings_.frame_bytes / 2
+                                                   : settings_.frame_bytes;
+  const bool streams = streaming_since_ns_.load() == stream_ns_;
+  buffer.state.store(streams ? State::done : State::idle);
+  if (streams) eventfd_write(wakes_, 1);
 }
 
 }  // namespace takt::v4l2

@@ -3,32 +3,20 @@
 
 #include <linux/can/error.h>
 
+#include <algorithm>
+#include <cstring>
+
 namespace takt::can {
 namespace {
 
-constexpr std::pair<std::string_view, Misbehaviour> kWords[] = {
-    {"none", Misbehaviour::none},
-    {"silent", Misbehaviour::silent},
-    {"unplugged", Misbehaviour::unplugged},
-    {"wrong_crc", Misbehaviour::wrong_crc},
-    {"masquerade", Misbehaviour::masquerade},
-    {"lost_frames", Misbehaviour::lost_frames},
-    {"stuck", Misbehaviour::stuck},
-    {"garbage", Misbehaviour::garbage},
-    {"no_heartbeat", Misbehaviour::no_heartbeat},
-    {"bus_off", Misbehaviour::bus_off},
-};
+constexpr std::array kKnown{Misbehaviour::none,         Misbehaviour::silent,     Misbehaviour::unplugged,
+                            Misbehaviour::garbage,      Misbehaviour::frozen,     Misbehaviour::repeated,
+                            Misbehaviour::wrong_crc,    Misbehaviour::masquerade, Misbehaviour::lost_frames,
+                            Misbehaviour::no_heartbeat, Misbehaviour::bus_off};
 
 Frame error_frame(uint32_t kind) { return {kErrorFlag | kind, CAN_ERR_DLC, {}}; }
 
 }  // namespace
-
-std::optional<Misbehaviour> misbehaviour(std::string_view word) {
-  for (const auto& [name, how] : kWords) {
-    if (name == word) return how;
-  }
-  return std::nullopt;
-}
 
 void DoubleLink::misbehave(Misbehaviour how) {
   if (how == how_) return;
@@ -90,12 +78,17 @@ void DoubleLink::send(size_t message, std::span<const double> values) {
       if (message == places_.heartbeat) return;
       break;
     case Misbehaviour::lost_frames: station_.skip(message, EndToEndReceiver::kMostDelta); break;
-    case Misbehaviour::stuck:
+    case Misbehaviour::repeated:
       if (newest_[message].length != 0) return static_cast<void>(station_.send(newest_[message]));
+      break;
+    case Misbehaviour::frozen:
+      if (newest_[message].length != 0 && message != places_.heartbeat) values = newest_values_[message];
       break;
     default: break;
   }
   Frame frame = station_.make(message, values);
+  auto& kept = newest_values_[message];
+  if (values.data() != kept.data()) std::copy_n(values.begin(), row.signals.size(), kept.begin());
   newest_[message] = frame;
   if (how_ == Misbehaviour::wrong_crc && row.is_protected) frame.data[0] ^= 0x10;
   if (how_ == Misbehaviour::masquerade && row.is_protected)
@@ -108,11 +101,15 @@ void DoubleLink::send(size_t message, std::span<const double> values) {
   station_.send(frame);
 }
 
-int NodeDouble::open(int64_t now_ns) {
-  const int error = link_.open();
-  now_ns_ = now_ns;
+DeviceResult NodeDouble::plug_in() {
+  link_.close();
+  if (const int error = link_.open(); error != 0) {
+    const std::string& interface = station().interface();
+    return device_failure(interface, std::strerror(error), advice(interface, error));
+  }
+  now_ns_ = clock_.now_ns();
   reboot();
-  return error;
+  return {};
 }
 
 void NodeDouble::reboot() {
@@ -120,7 +117,7 @@ void NodeDouble::reboot() {
   link_.boot(now_ns_);
 }
 
-void NodeDouble::run_until(int64_t now_ns) {
+void NodeDouble::run_to(int64_t now_ns) {
   for (; now_ns_ + kStep_ns <= now_ns; step()) {
     const bool operational = link_.operational();
     while (const auto incoming = link_.next(now_ns_)) take(*incoming);
@@ -129,5 +126,7 @@ void NodeDouble::run_until(int64_t now_ns) {
     now_ns_ += kStep_ns;
   }
 }
+
+std::span<const Misbehaviour> NodeDouble::known() const { return kKnown; }
 
 }  // namespace takt::can

@@ -1,29 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <cstdint>
-#include <string_view>
 #include <utility>
 
 #include "hal/can/node_guard.hpp"
 #include "hal/can/station.hpp"
+#include "hal/device_double.hpp"
 
 namespace takt::can {
-
-/// How a double misbehaves on its bus.
-enum class Misbehaviour : uint8_t {
-  none,
-  silent,        ///< sends nothing
-  unplugged,     ///< leaves the bus; comes back with none (a Unix socket only: it ends the connection)
-  wrong_crc,     ///< protected messages with one bit of the CRC wrong
-  masquerade,    ///< protected messages with the CRC of another one
-  lost_frames,   ///< so many frames are missing that the counter tells
-  stuck,         ///< the newest frame of each message again and again, counter and all
-  garbage,       ///< random bytes and lengths under the right identifiers
-  no_heartbeat,  ///< all but the heartbeat
-  bus_off        ///< the controller says bus-off and is silent; with none it says that it was restarted
-};
-/// Nothing for a word that is none of them.
-std::optional<Misbehaviour> misbehaviour(std::string_view word);
 
 /// What a double lives on: a Station that misbehaves when told to, heartbeats and network management.
 class DoubleLink {
@@ -62,23 +46,20 @@ class DoubleLink {
   uint64_t random_;
   Misbehaviour how_ = Misbehaviour::none;
   std::array<Frame, Station::kMostMessages> newest_{};
+  std::array<std::array<double, kMostSignals>, Station::kMostMessages> newest_values_{};
 };
 
-/// The double of a node. It lives in steps of 10 ms of the given clock's time; nobody waits for anything. One thread.
-class NodeDouble {
+/// The double of a node. It lives in steps of 10 ms of the given clock's time; nobody waits for anything.
+class NodeDouble : public DeviceDouble {
  public:
   static constexpr int64_t kStep_ns = 10'000'000;
 
-  NodeDouble(const NodeDouble&) = delete;
-  NodeDouble& operator=(const NodeDouble&) = delete;
-  virtual ~NodeDouble() = default;
-
-  /// 0 or an errno. Powered at `now_ns`: says boot-up and then waits for a start.
-  int open(int64_t now_ns);
-  void close() { link_.close(); }
-  /// Lives on until `now_ns`: takes what the host sent and sends what is due.
-  void run_until(int64_t now_ns);
-  void misbehave(Misbehaviour how) { link_.misbehave(how); }
+  /// Powered: says boot-up and then waits for a start.
+  DeviceResult plug_in() final;
+  void run_to(int64_t now_ns) final;
+  int64_t step_ns() const final { return kStep_ns; }
+  std::span<const Misbehaviour> known() const final;
+  void misbehave(Misbehaviour how) final { link_.misbehave(how); }
   /// Power off and on: all that it was told is forgotten.
   void reboot();
   const Station& station() const { return link_.station(); }
@@ -86,7 +67,7 @@ class NodeDouble {
  protected:
   NodeDouble(std::string interface, const Clock& clock, std::span<const Message> table, const NodePlaces& places,
              uint64_t seed)
-      : link_(std::move(interface), clock, table, places, seed) {}
+      : clock_(clock), link_(std::move(interface), clock, table, places, seed) {}
 
   virtual void forget() = 0;
   virtual void take(const Incoming& incoming) = 0;
@@ -97,6 +78,7 @@ class NodeDouble {
   int64_t now_ns() const { return now_ns_; }
 
  private:
+  const Clock& clock_;
   DoubleLink link_;
   int64_t now_ns_ = 0;
 };

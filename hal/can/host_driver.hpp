@@ -59,6 +59,20 @@ class HostDriver : public Interface {
   DeclaredCalls declared_calls() const override {
     return {bit(JobCall::socket) | bit(JobCall::file), "frames are taken from and given to a socket that never waits"};
   }
+  SourceCounts counts() const override {
+    const StationCounters& c = station_.counters();
+    return {c.accepted, c.damaged, 0, c.gaps + c.out_of_order, c.unsent};
+  }
+  const char* trouble() const override {
+    if (started_ && faulted()) return "the device says that it is in a fault";
+    switch (station_.link()) {
+      case Link::up: return guard_.operational(clock_.now_ns()) ? "" : "no heartbeat of a device at work";
+      case Link::down: return "the interface is down";
+      case Link::bus_off: return "the controller is off the bus";
+      case Link::gone: return "the interface, or who listens there, is gone";
+    }
+    return "";
+  }
   const Station& station() const { return station_; }
 
  protected:

@@ -41,7 +41,7 @@ PortStatus status_of(int error) {
 int Port::open(std::span<const uint32_t> ids) {
   if (is_open()) return 0;
   const bool is_unix = interface_.starts_with(kUnix);
-  const int error = is_unix ? open_unix(interface_.substr(kUnix.size())) : open_can(ids);
+  const int error = is_unix ? open_unix(std::string_view(interface_).substr(kUnix.size())) : open_can(ids);
   if (error != 0) close();
   emptied_ns_ = clock_.now_ns();
   return error;
@@ -68,7 +68,7 @@ int Port::open_can(std::span<const uint32_t> ids) {
   return bind(descriptor_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0 ? 0 : errno;
 }
 
-int Port::open_unix(const std::string& path) {
+int Port::open_unix(std::string_view path) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   if (path.size() >= sizeof(address.sun_path)) return ENAMETOOLONG;
@@ -83,7 +83,7 @@ int Port::open_unix(const std::string& path) {
     return set(descriptor, SOL_SOCKET, SO_TIMESTAMPNS, 1) ? 0 : errno;
   }
   listener_ = descriptor;
-  unlink(path.c_str());  // of a double that did not end in order
+  unlink(address.sun_path);  // of a double that did not end in order
   return bind(descriptor, where, sizeof(address)) == 0 && listen(descriptor, 1) == 0 ? 0 : errno;
 }
 

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <string_view>
 
 #include "hal/can/frame.hpp"
 #include "rt/time/clock.hpp"
@@ -51,7 +52,7 @@ class Port {
 
  private:
   int open_can(std::span<const uint32_t> ids);
-  int open_unix(const std::string& path);
+  int open_unix(std::string_view path);
   void accept_host();
   int64_t stamp_of(int64_t realtime_ns) const;
 

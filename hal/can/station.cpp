@@ -76,7 +76,8 @@ bool Station::accept(size_t message, const Frame& frame) {
   if (row.is_protected) {
     const EndToEndStatus status = receivers_[message].check(row, frame);
     const bool changed = status == EndToEndStatus::wrong_crc || status == EndToEndStatus::invalid;
-    if (!usable(status)) ++(changed ? counters_.damaged : counters_.out_of_order);
+    if (changed) ++counters_.damaged;
+    else if (!usable(status) && status != EndToEndStatus::initial) ++counters_.out_of_order;
     if (!usable(status)) return false;
     if (status == EndToEndStatus::ok_some_lost) ++counters_.gaps;
   }

@@ -12,7 +12,7 @@ namespace takt::can {
 struct StationCounters {
   uint64_t accepted = 0;
   uint64_t damaged = 0;       ///< no classic frame, or a CRC, counter, length or value that no sender makes
-  uint64_t out_of_order = 0;  ///< the first of a message, the same again, or too many lost before it
+  uint64_t out_of_order = 0;  ///< the same again, or too many lost before it
   uint64_t gaps = 0;          ///< accepted although one or two were missing before
   uint64_t foreign = 0;       ///< identifiers that nobody asked for
   uint64_t unsent = 0;        ///< the queue to the bus was full, or the bus away

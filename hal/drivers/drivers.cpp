@@ -3,37 +3,38 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <sstream>
 
+#include "hal/actor/actor_node.hpp"
 #include "hal/base/base_node.hpp"
 #include "hal/base/can_base.hpp"
 #include "hal/camera/stereo_camera_node.hpp"
 #include "hal/camera/v4l2_camera.hpp"
+#include "hal/drivers/doubled.hpp"
+#include "hal/drivers/semantic_links.hpp"
 #include "hal/drivers/sick_lasers.hpp"
 #include "hal/gpio/gpio_lines.hpp"
 #include "hal/gpio/lines_node.hpp"
 #include "hal/head/can_head.hpp"
 #include "hal/head/head_node.hpp"
+#include "hal/interaction/console.hpp"
+#include "hal/interaction/interaction_node.hpp"
+#include "hal/interaction/script.hpp"
 #include "hal/laser/laser_node.hpp"
+#include "hal/object_sensor/object_sensor_node.hpp"
 #include "hal/replay/replay_base.hpp"
 #include "hal/replay/replay_camera.hpp"
 #include "hal/replay/replay_laser.hpp"
+#include "hal/semantic_link/client_node.hpp"
+#include "hal/semantic_link/service_node.hpp"
 #include "hal/settings/settings.hpp"
 #include "hal/sim/failing_devices.hpp"
 #include "hal/sim/sim_camera.hpp"
 #include "hal/sim/sim_devices.hpp"
+#include "hal/sim/sim_objects.hpp"
 
 namespace takt::hal {
-namespace {
-
-using NodeResult = tl::expected<std::unique_ptr<DeviceNode>, DeviceError>;
-
-template <class List>
-std::string names(const List& list) {
-  std::string all;
-  for (const auto& item : list) all.append(all.empty() ? "" : ", ").append(item.name);
-  return all;
-}
 
 Rate rate_of(Settings& settings) {
   Rate rate{15, 1};
@@ -46,6 +47,17 @@ Rate rate_of(Settings& settings) {
   }
   settings.fail("`rate` is no fraction with a divisor up to 1001", "write it as n or n/m");
   return rate;
+}
+
+namespace {
+
+using NodeResult = tl::expected<std::unique_ptr<DeviceNode>, DeviceError>;
+
+template <class List>
+std::string names(const List& list) {
+  std::string all;
+  for (const auto& item : list) all.append(all.empty() ? "" : ", ").append(item.name);
+  return all;
 }
 
 HealthThresholds thresholds_of(Settings& settings) {
@@ -76,10 +88,10 @@ DeviceHealthSettings health_of(const DeviceConfig& config, Settings& settings) {
 /// The device as it is, or behind one that fails as the setting `failures` says.
 template <class Failing, class Interface, class... More>
 std::unique_ptr<Interface> with_failures(std::unique_ptr<Interface> device, Settings& settings, More&&... more) {
-  auto windows = sim::parse_failures(settings.text("failures", ""));
+  auto windows = parse_failures(settings.text("failures", ""));
   if (!windows) settings.fail("`failures`: " + windows.error(), "correct `failures`");
   if (!windows || windows->empty()) return device;
-  return std::make_unique<Failing>(std::move(device), sim::FailureSchedule(std::move(*windows)),
+  return std::make_unique<Failing>(std::move(device), FailureSchedule(std::move(*windows)),
                                    std::forward<More>(more)...);
 }
 
@@ -183,14 +195,58 @@ NodeResult make_sim_base(const DeviceConfig& config, Settings& settings, sim::Si
   model.turn_scale_error = settings.quantity("turn_scale_error", Dimension::number, model.turn_scale_error);
   model.turn_bias_rad_s = settings.quantity("turn_bias", Dimension::turn_rate, model.turn_bias_rad_s);
   model.turn_bias_walk = settings.quantity("turn_bias_walk", Dimension::number, model.turn_bias_walk);
-  const std::string drive = settings.text("drive", world.path().empty() ? "command" : "path");
-  if (drive == "command") world.set_drive(sim::Drive::command);
-  else if (drive != "path") settings.fail("`drive` is `" + drive + "`", "use path or command");
-  else if (world.path().empty())
-    settings.fail("`drive: path`, but the world's client has no <path>", "add one, or use drive: command");
+  choose_drive(settings, world);
   std::unique_ptr<MobileBase> device = std::make_unique<sim::SimBase>(config.id, model, world);
   device = with_failures<sim::FailingBase>(std::move(device), settings);
   return opened<BaseNode>(std::move(device), settings);
+}
+
+/// "estop, 5": the parts between the commas.
+std::vector<std::string> list_of(Settings& settings, const std::string& name, const std::string& fallback) {
+  std::vector<std::string> parts;
+  std::stringstream text(settings.text(name, fallback));
+  for (std::string part; std::getline(text, part, ',');) {
+    const size_t begin = part.find_first_not_of(' '), end = part.find_last_not_of(' ');
+    if (begin == std::string::npos)
+      settings.fail("`" + name + "` has an empty part", "write names with commas between");
+    else parts.push_back(part.substr(begin, end - begin + 1));
+  }
+  return parts;
+}
+
+NodeResult make_sim_object_sensor(const DeviceConfig& config, Settings& settings, sim::Simulation& world) {
+  sim::PerceptionModel model;
+  model.fov_rad = settings.quantity("fov", Dimension::angle, model.fov_rad);
+  model.range_m = settings.quantity("range", Dimension::length, model.range_m);
+  model.sigma_m = settings.quantity("noise", Dimension::length, model.sigma_m);
+  model.miss = settings.quantity("miss", Dimension::number, model.miss);
+  model.unknown = settings.quantity("unknown", Dimension::number, model.unknown);
+  model.score = settings.quantity("score", Dimension::number, model.score);
+  model.names = settings.flag("names", model.names);
+  model.types = list_of(settings, "types", "");
+  std::unique_ptr<ObjectSensor> device = std::make_unique<sim::SimObjectSensor>(config.id, std::move(model), world);
+  device = with_failures<sim::FailingObjectSensor>(std::move(device), settings);
+  return opened<ObjectSensorNode>(std::move(device), settings);
+}
+
+NodeResult make_script(Settings& settings, sim::Simulation& world) {
+  if (settings.has("failures")) settings.fail("a script does not fail", "leave `failures` out");
+  auto script = parse_task_script(settings.text("script", ""));
+  if (!script) {
+    settings.fail("`script`: " + script.error(), "correct `script`");
+    return tl::unexpected(*settings.error());
+  }
+  std::unique_ptr<Interaction> device = std::make_unique<ScriptedPerson>(
+      std::move(*script), [&world](int64_t epoch_ns) { return world.begin(epoch_ns); });
+  return opened<InteractionNode>(std::move(device), settings);
+}
+
+NodeResult make_console(const DeviceConfig& config, Settings& settings) {
+  ConsoleSettings console;
+  console.input = settings.text("input", console.input);
+  console.output = settings.text("output", console.output);
+  std::unique_ptr<Interaction> device = std::make_unique<Console>(config.id, std::move(console));
+  return opened<InteractionNode>(std::move(device), settings);
 }
 
 NodeResult make_sim(const DeviceConfig& config, Settings& settings, Devices& devices, const Clock& clock) {
@@ -199,10 +255,17 @@ NodeResult make_sim(const DeviceConfig& config, Settings& settings, Devices& dev
   if (config.kind == "stereo_camera") return make_sim_camera(config, settings, **world, clock);
   if (config.kind == "laser_scanner") return make_sim_laser(config, settings, **world);
   if (config.kind == "mobile_base") return make_sim_base(config, settings, **world);
+  if (config.kind == "interaction") return make_script(settings, **world);
   if (config.kind == "camera_head") {
     std::unique_ptr<CameraHead> device = std::make_unique<sim::SimHead>(config.id, **world);
     device = with_failures<sim::FailingHead>(std::move(device), settings);
     return opened<HeadNode>(std::move(device), settings);
+  }
+  if (config.kind == "object_sensor") return make_sim_object_sensor(config, settings, **world);
+  if (config.kind == "actor") {
+    std::unique_ptr<Actor> device = std::make_unique<sim::SimActor>(config.id, **world);
+    device = with_failures<sim::FailingActor>(std::move(device), settings);
+    return opened<ActorNode>(std::move(device), settings);
   }
   std::unique_ptr<DigitalLines> device = std::make_unique<sim::SimLines>(config.id, **world);
   device = with_failures<sim::FailingLines>(std::move(device), settings);
@@ -231,7 +294,7 @@ NodeResult make_can_base(const DeviceConfig& config, Settings& settings, const C
   return opened<BaseNode>(std::move(device), settings);
 }
 
-NodeResult make_v4l2_camera(const DeviceConfig& config, Settings& settings, const Clock& clock) {
+NodeResult make_v4l2_camera(const DeviceConfig& config, Settings& settings, const Clock& clock, Seams seams) {
   v4l2::V4l2CameraSettings camera;
   camera.path = settings.path("path", true).string();
   const auto file = settings.path("rig", true);
@@ -253,24 +316,12 @@ NodeResult make_v4l2_camera(const DeviceConfig& config, Settings& settings, cons
   camera.gain = settings.quantity("gain", Dimension::number, camera.gain);
   camera.stamp_delay_s = settings.quantity("stamp_delay", Dimension::time, camera.stamp_delay_s);
   std::unique_ptr<StereoCamera> device = std::make_unique<v4l2::V4l2Camera>(
-      config.id, std::move(camera), std::make_unique<v4l2::KernelVideoDevice>(), clock);
+      config.id, std::move(camera), seams.video ? std::move(seams.video) : std::make_unique<v4l2::KernelVideoDevice>(),
+      clock);
   return opened<StereoCameraNode>(std::move(device), settings, thresholds_of(settings));
 }
 
-/// "estop, 5": the parts between the commas.
-std::vector<std::string> list_of(Settings& settings, const std::string& name, const std::string& fallback) {
-  std::vector<std::string> parts;
-  std::stringstream text(settings.text(name, fallback));
-  for (std::string part; std::getline(text, part, ',');) {
-    const size_t begin = part.find_first_not_of(' '), end = part.find_last_not_of(' ');
-    if (begin == std::string::npos)
-      settings.fail("`" + name + "` has an empty part", "write names with commas between");
-    else parts.push_back(part.substr(begin, end - begin + 1));
-  }
-  return parts;
-}
-
-NodeResult make_gpio_lines(const DeviceConfig& config, Settings& settings, const Clock& clock) {
+NodeResult make_gpio_lines(const DeviceConfig& config, Settings& settings, const Clock& clock, Seams seams) {
   gpio::GpioLinesSettings lines;
   lines.chip = settings.path("chip", true).string();
   lines.inputs = list_of(settings, "inputs", "0");
@@ -285,19 +336,33 @@ NodeResult make_gpio_lines(const DeviceConfig& config, Settings& settings, const
   };
   lines.debounce_ns = time_ns("debounce", 0.005, 1.0);
   lines.pulse_ns = time_ns("pulse", 0.0001, static_cast<double>(gpio::GpioLines::kLongestPulse_ns) * 1e-9);
-  std::unique_ptr<DigitalLines> device =
-      std::make_unique<gpio::GpioLines>(config.id, std::move(lines), std::make_unique<gpio::KernelLineChip>(), clock);
+  std::unique_ptr<DigitalLines> device = std::make_unique<gpio::GpioLines>(
+      config.id, std::move(lines), seams.chip ? std::move(seams.chip) : std::make_unique<gpio::KernelLineChip>(),
+      clock);
   return opened<LinesNode>(std::move(device), settings);
 }
 
 /// A driver of real hardware.
-NodeResult make_hardware(const DeviceConfig& config, Settings& settings, const Clock& clock) {
+NodeResult make_hardware(const DeviceConfig& config, Settings& settings, const Clock& clock, Seams seams = {}) {
   if (config.driver == "lms200") return opened<LaserNode>(make_lms200(config, settings, clock), settings);
   if (config.driver == "lms400") return opened<LaserNode>(make_lms400(config, settings, clock), settings);
-  if (config.kind == "stereo_camera") return make_v4l2_camera(config, settings, clock);
+  if (config.kind == "stereo_camera") return make_v4l2_camera(config, settings, clock, std::move(seams));
   if (config.kind == "camera_head") return make_can_head(config, settings, clock);
-  if (config.kind == "digital_lines") return make_gpio_lines(config, settings, clock);
+  if (config.kind == "digital_lines") return make_gpio_lines(config, settings, clock, std::move(seams));
+  if (config.kind == "interaction") return make_console(config, settings);
   return make_can_base(config, settings, clock);
+}
+
+/// The driver of real hardware, and a double at the other end of its line.
+NodeResult make_doubled(const DeviceConfig& config, Settings& settings, Devices& devices, const Clock& clock) {
+  const auto world = devices.world(config);
+  if (!world) return tl::unexpected(world.error());
+  auto doubled = make_double(config, settings, **world, devices.folder(), clock);
+  if (!doubled) return tl::unexpected(doubled.error());
+  Settings of_driver(config.id, doubled->config.settings, config.directory);
+  NodeResult node = make_hardware(doubled->config, of_driver, clock, std::move(doubled->seams));
+  if (node) (*node)->live_with(std::move(doubled->thread));
+  return node;
 }
 
 /// Keys that no driver of the kind knows.
@@ -307,13 +372,12 @@ DeviceResult check_keys(const DeviceConfig& config, const DeviceKind& kind) {
   for (const auto& item : config.settings.items()) {
     const std::string& key = item.key();
     const bool known = key == "kind" || key == "driver" ||
-                       std::any_of(kind.settings.begin(), kind.settings.end(), [&](const SettingInfo& s) {
-                         return s.name == key && (s.driver.empty() || s.driver == config.driver);
-                       });
+                       std::any_of(kind.settings.begin(), kind.settings.end(),
+                                   [&](const SettingInfo& s) { return s.name == key && takes(config.driver, s); });
     if (known) continue;
     std::string all;
     for (const SettingInfo& s : kind.settings) {
-      if (s.driver.empty() || s.driver == config.driver) all.append(all.empty() ? "" : ", ").append(s.name);
+      if (takes(config.driver, s)) all.append(all.empty() ? "" : ", ").append(s.name);
     }
     return device_error(config.id, "unknown setting `" + key + "`", "driver `" + config.driver + "` knows: " + all);
   }
@@ -322,29 +386,41 @@ DeviceResult check_keys(const DeviceConfig& config, const DeviceKind& kind) {
 
 }  // namespace
 
-Devices::Devices() = default;
-Devices::~Devices() = default;
+Devices::Devices() : servers_(std::make_unique<SemanticServers>()) {}
+
+Devices::~Devices() {
+  std::error_code ignored;
+  if (!folder_.empty()) std::filesystem::remove_all(folder_, ignored);
+}
+
+const std::filesystem::path& Devices::folder() {
+  if (!folder_.empty()) return folder_;
+  std::error_code error;
+  std::string name = (std::filesystem::temp_directory_path(error) / "takt-doubles-XXXXXX").string();
+  if (mkdtemp(name.data()) != nullptr) folder_ = name;
+  return folder_;
+}
 
 tl::expected<sim::Simulation*, DeviceError> Devices::world(const DeviceConfig& config) {
   Settings settings(config.id, config.settings, config.directory);
   const auto file = settings.path("world", true);
   const std::string client = settings.text("client", "");
   if (settings.error()) return tl::unexpected(*settings.error());
-  const std::string key =
-      std::filesystem::weakly_canonical(file).string() + "\n" + client + "\n" + std::to_string(config.seed);
-  auto& slot = worlds_[key];
-  if (!slot) {
-    auto loaded = sim::Simulation::load(config.id, file, client, config.seed);
-    if (!loaded) {
-      worlds_.erase(key);
-      return tl::unexpected(loaded.error());
-    }
-    slot = std::move(*loaded);
+  const std::string key = std::filesystem::weakly_canonical(file).string() + "\n" + std::to_string(config.seed);
+  auto stage = stages_.find(key);
+  if (stage == stages_.end()) {
+    auto loaded = sim::Stage::load(config.id, file, config.seed);
+    if (!loaded) return tl::unexpected(loaded.error());
+    stage = stages_.emplace(key, std::move(*loaded)).first;
   }
-  return slot.get();
+  const auto index = sim::Simulation::find_client(*stage->second, config.id, file, client);
+  if (!index) return tl::unexpected(index.error());
+  auto& robot = robots_[{key, *index}];
+  if (!robot) robot = std::make_unique<sim::Simulation>(stage->second, *index);
+  return robot.get();
 }
 
-sim::Simulation* Devices::first_world() { return worlds_.empty() ? nullptr : worlds_.begin()->second.get(); }
+sim::Simulation* Devices::first_world() { return robots_.empty() ? nullptr : robots_.begin()->second.get(); }
 
 std::unique_ptr<DeviceNode> make_shell(std::string_view kind) {
   if (kind == "stereo_camera") return std::make_unique<StereoCameraNode>(nullptr);
@@ -352,6 +428,11 @@ std::unique_ptr<DeviceNode> make_shell(std::string_view kind) {
   if (kind == "camera_head") return std::make_unique<HeadNode>(nullptr);
   if (kind == "mobile_base") return std::make_unique<BaseNode>(nullptr);
   if (kind == "digital_lines") return std::make_unique<LinesNode>(nullptr);
+  if (kind == "object_sensor") return std::make_unique<ObjectSensorNode>(nullptr);
+  if (kind == "actor") return std::make_unique<ActorNode>(nullptr);
+  if (kind == "semantic_service") return std::make_unique<semantic_link::ServiceNode>(nullptr, 0);
+  if (kind == "semantic_link") return std::make_unique<semantic_link::ClientNode>(nullptr, 0);
+  if (kind == "interaction") return std::make_unique<InteractionNode>(nullptr);
   throw std::logic_error("device kind " + std::string(kind) + " has no node in hal/drivers/drivers.cpp");
 }
 
@@ -369,9 +450,12 @@ NodeResult make_device(const DeviceConfig& config, Devices& devices, const Clock
   if (const auto keys = check_keys(config, *kind); !keys) return tl::unexpected(keys.error());
   Settings settings(config.id, config.settings, config.directory);
   const DeviceHealthSettings health = health_of(config, settings);
-  NodeResult node = config.driver == "sim"      ? make_sim(config, settings, devices, clock)
-                    : config.driver == "replay" ? make_replay(config, settings, clock)
-                                                : make_hardware(config, settings, clock);
+  NodeResult node = config.kind == "semantic_service" ? devices.semantic_servers().make_service(config, settings, clock)
+                    : config.kind == "semantic_link"  ? make_semantic_link(config, settings, clock)
+                    : config.driver == "sim"          ? make_sim(config, settings, devices, clock)
+                    : config.driver == "replay"       ? make_replay(config, settings, clock)
+                    : config.driver == "double"       ? make_doubled(config, settings, devices, clock)
+                                                      : make_hardware(config, settings, clock);
   if (node) (*node)->set_health(health);
   return node;
 }

@@ -31,6 +31,10 @@ class CameraHead : public Device {
   /// Sets the target. Angles beyond the limits are clamped, and false returned, so that the caller can report it.
   /// Heads stop by themselves when commands cease for 100 ms (devices.md 4.3): repeat the target every job.
   virtual bool command(double pan_rad, double tilt_rad, int64_t at_ns) = 0;
+
+  /// Closes the lids before the cameras, or opens them; in force until the next read, so repeat it every job. A head
+  /// without lids does nothing.
+  virtual void close_lids([[maybe_unused]] bool left, [[maybe_unused]] bool right, [[maybe_unused]] int64_t at_ns) {}
 };
 
 }  // namespace takt

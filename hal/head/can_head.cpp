@@ -9,7 +9,7 @@ namespace takt::head {
 namespace {
 
 constexpr double kHomingSpeed_deg_s = 30, kHomingAcceleration_deg_s2 = 200;
-constexpr double kLidTime_ms = 400;
+constexpr double kLidTime_ms = 400, kClosed_percent = 100;
 
 bool is_on(double signal) { return signal != 0; }
 
@@ -30,12 +30,12 @@ CanHead::CanHead(std::string id, CanHeadSettings settings, const Clock& clock)
 void CanHead::forget() {
   view_ = {};
   target_.reset();
-  lids_closed_percent_ = -1;
+  lids_told_.reset();
 }
 
 void CanHead::rest() {
   send(HeadRequest{});
-  if (settings_.eyelids) send_eyelids(100);
+  if (settings_.eyelids) send_lids({true, true});
 }
 
 void CanHead::take(const can::Incoming& incoming) {
@@ -94,7 +94,7 @@ HeadReading CanHead::read(int64_t wanted_ns, int64_t) {
   attend();
   send(next_request(view_, target_));
   target_.reset();
-  if (settings_.eyelids) send_eyelids(0);
+  if (settings_.eyelids) send_lids(std::exchange(lids_, {}));
   return newest(wanted_ns);
 }
 
@@ -106,6 +106,8 @@ bool CanHead::command(double pan_rad, double tilt_rad, int64_t) {
   return pan == pan_rad && tilt == tilt_rad && next_request(view_, target_).mode == Mode::position &&
          view_.state == State::operation_enabled;
 }
+
+void CanHead::close_lids(bool left, bool right, int64_t) { lids_ = {left, right}; }
 
 void CanHead::send(const HeadRequest& request) {
   std::array<double, Setpoint::count> values{};
@@ -123,13 +125,15 @@ void CanHead::send(const HeadRequest& request) {
   bus().send(kSetpoint, values);
 }
 
-void CanHead::send_eyelids(double closed_percent) {
-  if (closed_percent != std::exchange(lids_closed_percent_, closed_percent)) {
+void CanHead::send_lids(const Lids& closed) {
+  if (lids_told_ != closed) {
+    lids_told_ = closed;
     lid_token_ = static_cast<uint8_t>((lid_token_ + 1) % 16);  // the same token again moves nothing twice
   }
   std::array<double, EyelidSetpoint::count> values{};
   values[EyelidSetpoint::action] = static_cast<double>(EyelidAction::position);
-  values[EyelidSetpoint::left] = values[EyelidSetpoint::right] = closed_percent;
+  values[EyelidSetpoint::left] = closed.left_closed ? kClosed_percent : 0;
+  values[EyelidSetpoint::right] = closed.right_closed ? kClosed_percent : 0;
   values[EyelidSetpoint::move_ms] = kLidTime_ms;
   values[EyelidSetpoint::token] = lid_token_;
   bus().send(kEyelidSetpoint, values);

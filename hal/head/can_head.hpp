@@ -14,7 +14,7 @@ constexpr HeadLimits kDefaultLimits{118 * kDegree, 43 * kDegree, 200 * kDegree, 
 struct CanHeadSettings {
   std::string interface;
   HeadLimits limits = kDefaultLimits;
-  bool eyelids = true;  ///< opened at the start, closed at the stop
+  bool eyelids = true;  ///< open while it runs unless told otherwise, closed at the stop
 };
 
 /// What the head said last.
@@ -28,6 +28,11 @@ struct HeadView {
 
 struct HeadAngles {
   double pan_deg, tilt_deg;
+};
+
+struct Lids {
+  bool left_closed = false, right_closed = false;
+  bool operator==(const Lids&) const = default;
 };
 
 /// What to ask the head for next; `target`: where somebody wants it to be. It is homed first, then enabled where it
@@ -50,6 +55,7 @@ class CanHead final : public can::HostDriver<CameraHead, HeadReading> {
   HeadReading read(int64_t wanted_ns, int64_t deadline_ns) override;
   /// In force until the next read. False also while the head does not follow: stopped, not homed or not enabled yet.
   bool command(double pan_rad, double tilt_rad, int64_t at_ns) override;
+  void close_lids(bool left, bool right, int64_t at_ns) override;
 
   const HeadView& view() const { return view_; }
 
@@ -63,14 +69,15 @@ class CanHead final : public can::HostDriver<CameraHead, HeadReading> {
   void take_status(const can::Incoming& incoming);
   void narrow(std::span<const double> limits);
   void send(const HeadRequest& request);
-  void send_eyelids(double closed_percent);
+  void send_lids(const Lids& closed);
 
   CanHeadSettings settings_;
   HeadLimits limits_;
   HeadView view_;
   std::optional<HeadAngles> target_;
   double pan_rad_s_ = 0, tilt_rad_s_ = 0;
-  double lids_closed_percent_ = -1;  ///< as told; -1: not yet
+  Lids lids_;                      ///< wanted of the next read
+  std::optional<Lids> lids_told_;  ///< none: nothing yet
   uint8_t lid_token_ = 0;
 };
 

@@ -19,8 +19,21 @@ double moved(double from, double to, double elapsed_ms, double time_ms) {
 
 }  // namespace
 
-HeadDouble::HeadDouble(std::string interface, const Clock& clock, uint64_t seed)
-    : NodeDouble(std::move(interface), clock, messages(), kPlaces, seed) {}
+void move_axes(const std::optional<std::array<double, 2>>& target_rad, const std::array<Axis, 2>& bounds, int64_t,
+               Axes& axes) {
+  for (size_t i = 0; i < 2; ++i) {
+    double &position = axes.position_rad[i], &speed = axes.speed_rad_s[i];
+    if (target_rad) {
+      step_axis(bounds[i], (*target_rad)[i], kStep_s, position, speed);
+    } else {  // brakes as hard as it can
+      position = std::clamp(position + speed * kStep_s, -bounds[i].reach_rad, bounds[i].reach_rad);
+      speed = towards(speed, 0, kAxes[i].acceleration_rad_s2 * kStep_s);
+    }
+  }
+}
+
+HeadDouble::HeadDouble(std::string interface, const Clock& clock, Neck neck, uint64_t seed)
+    : NodeDouble(std::move(interface), clock, messages(), kPlaces, seed), neck_(std::move(neck)) {}
 
 void HeadDouble::forget() {
   state_ = State::switch_on_disabled;
@@ -28,8 +41,7 @@ void HeadDouble::forget() {
   homed_ = fault_ = stale_ = false;
   emergency_ = 0;
   setpoint_ns_ = now_ns();
-  std::copy_n(kStartsAt_rad, 2, position_rad_.begin());
-  speed_rad_s_ = {};
+  axes_ = {{kStartsAt_rad[0], kStartsAt_rad[1]}, {}};
   lids_ = {};
 }
 
@@ -58,7 +70,7 @@ void HeadDouble::take_setpoint(std::span<const double> values) {
   if (mode_ == Mode::position && state_ != State::operation_enabled) {
     // Only where it stands: it would jump. A tick of motion may lie between what the host saw and now.
     const bool jumps =
-        std::abs(asked[0] - position_rad_[0]) > kDegree || std::abs(asked[1] - position_rad_[1]) > kDegree;
+        std::abs(asked[0] - axes_.position_rad[0]) > kDegree || std::abs(asked[1] - axes_.position_rad[1]) > kDegree;
     if (homed_ && !jumps) state_ = State::operation_enabled;
   }
   if (mode_ == Mode::position && state_ == State::operation_enabled) target_rad_ = asked;
@@ -100,25 +112,17 @@ void HeadDouble::watch() {
 
 void HeadDouble::move() {
   const bool homes = mode_ == Mode::home && !homed_ && may_move() && now_ns() - setpoint_ns_ <= kSetpointStale_ns;
-  for (size_t i = 0; i < 2; ++i) {
-    Axis axis = kAxes[i];
+  const bool follows = !homes && state_ == State::operation_enabled && mode_ == Mode::position;
+  std::array bounds{kAxes[0], kAxes[1]};
+  for (Axis& axis : bounds) {
     if (asked_speed_rad_s_ > 0) axis.speed_rad_s = std::min(axis.speed_rad_s, asked_speed_rad_s_);
     if (asked_acceleration_rad_s2_ > 0)
       axis.acceleration_rad_s2 = std::min(axis.acceleration_rad_s2, asked_acceleration_rad_s2_);
-    if (homes) {
-      step_axis(axis, 0, kStep_s, position_rad_[i], speed_rad_s_[i]);
-    } else if (state_ == State::operation_enabled && mode_ == Mode::position) {
-      step_axis(axis, target_rad_[i], kStep_s, position_rad_[i], speed_rad_s_[i]);
-    } else {  // brakes as hard as it can
-      position_rad_[i] = std::clamp(position_rad_[i] + speed_rad_s_[i] * kStep_s, -axis.reach_rad, axis.reach_rad);
-      speed_rad_s_[i] = towards(speed_rad_s_[i], 0, kAxes[i].acceleration_rad_s2 * kStep_s);
-      target_rad_[i] = position_rad_[i];
-    }
   }
-  if (homes && position_rad_ == std::array{0.0, 0.0}) {
-    homed_ = true;
-    target_rad_ = {};
-  }
+  if (homes) target_rad_ = {};
+  neck_(homes || follows ? std::optional(target_rad_) : std::nullopt, bounds, now_ns(), axes_);
+  if (homes) homed_ = axes_.position_rad == target_rad_;
+  else if (!follows) target_rad_ = axes_.position_rad;
 }
 
 void HeadDouble::move_lids() {
@@ -151,7 +155,7 @@ void HeadDouble::send_due() {
   link().beat(now_ns());
   if (!link().operational()) return;
   const double sample_ms = std::fmod(static_cast<double>(link().uptime_ns(now_ns())) * 1e-6, 6553.6);
-  link().send(kVelStatus, std::array{speed_rad_s_[0] / kDegree, speed_rad_s_[1] / kDegree, sample_ms});
+  link().send(kVelStatus, std::array{axes_.speed_rad_s[0] / kDegree, axes_.speed_rad_s[1] / kDegree, sample_ms});
   send_status();
   if (link().due(now_ns(), 50 * kMs)) {
     const auto state = !lids_.moving                            ? EyelidState::idle
@@ -182,19 +186,21 @@ void HeadDouble::send_due() {
 
 void HeadDouble::send_status() {
   const auto flag = [](bool on) { return on ? 1.0 : 0.0; };
-  const auto reached = [&](size_t i) { return flag(position_rad_[i] == target_rad_[i] && speed_rad_s_[i] == 0); };
+  const auto reached = [&](size_t i) {
+    return flag(axes_.position_rad[i] == target_rad_[i] && axes_.speed_rad_s[i] == 0);
+  };
   const bool powered = state_ == State::operation_enabled || state_ == State::quick_stop || mode_ == Mode::home;
   std::array<double, PosStatus::count> status{};
   status[PosStatus::state] = static_cast<double>(state_);
-  status[PosStatus::pan] = position_rad_[0] / kDegree;
-  status[PosStatus::tilt] = position_rad_[1] / kDegree;
+  status[PosStatus::pan] = axes_.position_rad[0] / kDegree;
+  status[PosStatus::tilt] = axes_.position_rad[1] / kDegree;
   status[PosStatus::pan_reached] = reached(0);
   status[PosStatus::tilt_reached] = reached(1);
   status[PosStatus::pan_homed] = status[PosStatus::tilt_homed] = flag(homed_);
-  status[PosStatus::pan_at_low] = flag(position_rad_[0] <= -kAxes[0].reach_rad);
-  status[PosStatus::pan_at_high] = flag(position_rad_[0] >= kAxes[0].reach_rad);
-  status[PosStatus::tilt_at_low] = flag(position_rad_[1] <= -kAxes[1].reach_rad);
-  status[PosStatus::tilt_at_high] = flag(position_rad_[1] >= kAxes[1].reach_rad);
+  status[PosStatus::pan_at_low] = flag(axes_.position_rad[0] <= -kAxes[0].reach_rad);
+  status[PosStatus::pan_at_high] = flag(axes_.position_rad[0] >= kAxes[0].reach_rad);
+  status[PosStatus::tilt_at_low] = flag(axes_.position_rad[1] <= -kAxes[1].reach_rad);
+  status[PosStatus::tilt_at_high] = flag(axes_.position_rad[1] >= kAxes[1].reach_rad);
   status[PosStatus::emergency_stop] = flag(emergency_stop_);
   status[PosStatus::servo_power] = flag(powered && !emergency_stop_);
   status[PosStatus::brake] = flag(!powered || emergency_stop_);

@@ -1,10 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <functional>
+
 #include "hal/can/double_link.hpp"
 #include "hal/head/head_messages.hpp"
 #include "hal/motion.hpp"
 
 namespace takt::head {
+
+/// The axes of a head, pan and tilt.
+struct Axes {
+  std::array<double, 2> position_rad{}, speed_rad_s{};
+};
+
+/// What carries a double's axes: moves them for one step of NodeDouble::kStep_ns, which ends at `now_ns`, towards
+/// `target_rad` within `bounds`, or has them brake where there is no target.
+using Neck = std::function<void(const std::optional<std::array<double, 2>>& target_rad,
+                                const std::array<Axis, 2>& bounds, int64_t now_ns, Axes& axes)>;
+
+/// A neck of its own.
+void move_axes(const std::optional<std::array<double, 2>>& target_rad, const std::array<Axis, 2>& bounds,
+               int64_t now_ns, Axes& axes);
 
 /// The camera head as its host sees it on the bus: the messages of ace_head.dbc in their cycles, the states, limits and
 /// watchdogs of devices.md 4.3, mechanics and eyelids that take their time. Booted it is not homed.
@@ -12,7 +28,7 @@ class HeadDouble final : public can::NodeDouble {
  public:
   static constexpr int64_t kSetpointStale_ns = 100'000'000;
 
-  HeadDouble(std::string interface, const Clock& clock, uint64_t seed = 1);
+  HeadDouble(std::string interface, const Clock& clock, Neck neck = move_axes, uint64_t seed = 1);
 
   void press_emergency_stop(bool pressed) { emergency_stop_ = pressed; }
   /// A following error of the pan axis: a fault until it is reset.
@@ -20,8 +36,8 @@ class HeadDouble final : public can::NodeDouble {
 
   State state() const { return state_; }
   bool homed() const { return homed_; }
-  double pan_rad() const { return position_rad_[0]; }
-  double tilt_rad() const { return position_rad_[1]; }
+  double pan_rad() const { return axes_.position_rad[0]; }
+  double tilt_rad() const { return axes_.position_rad[1]; }
   double left_lid_closed_percent() const { return lids_.left; }
   uint8_t blinks() const { return lids_.blinks; }
   uint16_t emergency() const { return emergency_; }
@@ -52,12 +68,14 @@ class HeadDouble final : public can::NodeDouble {
   void say_emergency(uint16_t code);
   bool may_move() const { return !emergency_stop_ && !fault_ && emergency_ == 0; }
 
+  Neck neck_;
   int64_t setpoint_ns_ = 0;
   State state_ = State::not_ready;
   Mode mode_ = Mode::disable;
   bool homed_ = false, fault_ = false, emergency_stop_ = false, stale_ = false;
   uint16_t emergency_ = 0;
-  std::array<double, 2> target_rad_{}, position_rad_{}, speed_rad_s_{};
+  std::array<double, 2> target_rad_{};
+  Axes axes_;
   double asked_speed_rad_s_ = 0, asked_acceleration_rad_s2_ = 0;
   Lids lids_;
   int page_ = 0;

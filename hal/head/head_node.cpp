@@ -9,6 +9,9 @@ void HeadNode::run(Job& job) {
   if (const HeadCommand* wanted = command_.newest(); wanted != nullptr && !command_.stale()) {
     head_->command(wanted->pan_rad, wanted->tilt_rad, job.release_ns());
   }
+  if (const DigitalState* lids = lids_.newest(); lids != nullptr && !lids_.stale()) {
+    head_->close_lids((lids->levels & 1) != 0, (lids->levels & 2) != 0, job.release_ns());
+  }
   const HeadReading reading = head_->read(job.release_ns(), job.deadline_ns());
   if (!accept(reading.status, job)) return;
   HeadState* message = state_.loan();

@@ -17,6 +17,7 @@ class HeadNode final : public DeviceNode {
 
  private:
   Input<HeadCommand> command_{this, "command", "wanted pan and tilt", Need::optional};
+  Input<DigitalState> lids_{this, "lids", "line 0: close the left lid, line 1: the right one", Need::optional};
   Output<HeadState> state_{this, "state", "measured pan and tilt"};
   std::unique_ptr<CameraHead> head_;
 };

@@ -54,8 +54,9 @@ class LaserSession {
   virtual void line_has(uint32_t baud) = 0;
   /// What to send so that the device falls silent.
   virtual LineOrder farewell() = 0;
-  /// How often bytes came that belong to no telegram, or values that the device itself calls wrong; since the first
-  /// begin().
+  /// How often bytes came that belong to no telegram; since the first begin().
+  virtual uint64_t resyncs() const = 0;
+  /// Telegrams with a wrong checksum or length, and values that the device itself calls wrong; since the first begin().
   virtual uint64_t damaged() const = 0;
   /// Why no sweeps come, or what is not as it was asked for; a literal, empty if all is well.
   virtual const char* trouble() const = 0;

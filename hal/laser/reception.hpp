@@ -27,11 +27,13 @@ class Reception {
     bytes_ += bytes.size();
     clock_.add(bytes_, now_ns);
     parse(parser_, bytes, on_event);
-    if (parser_.skipped() != skipped) ++damaged_;
+    if (parser_.skipped() != skipped) ++resyncs_;
   }
   /// When the first bit of the byte at that position came.
   int64_t began_ns(uint64_t position) const { return clock_.arrival_ns(position) - clock_.byte_ns(); }
-  /// How often bytes came that belong to nothing, and what else was counted.
+  /// How often bytes came that belong to nothing.
+  uint64_t resyncs() const { return resyncs_; }
+  /// What else was counted.
   uint64_t damaged() const { return damaged_; }
   void count_damage() { ++damaged_; }
 
@@ -39,7 +41,7 @@ class Reception {
   Parser parser_;
   ByteClock clock_;
   int64_t gap_ns_, last_ns_ = 0;
-  uint64_t bytes_ = 0, damaged_ = 0;
+  uint64_t bytes_ = 0, resyncs_ = 0, damaged_ = 0;
 };
 
 }  // namespace takt

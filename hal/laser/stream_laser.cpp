@@ -62,7 +62,7 @@ DeviceResult StreamLaser::start(int64_t) {
   session_->begin(clock_.now_ns());
   has_line_ = true;
   connected_.store(true);
-  damage_seen_ = damaged_.load();
+  damage_seen_ = damaged_.load() + resyncs_.load();
   started_ = true;
   if (clock_.is_virtual()) return {};
   quit_.store(false);
@@ -88,6 +88,10 @@ DeclaredCalls StreamLaser::declared_calls() const {
           "with a virtual clock the line is read by the job itself"};
 }
 
+SourceCounts StreamLaser::counts() const {
+  return {received_.load(), damaged_.load(), resyncs_.load(), missing_.load(), 0};
+}
+
 ScanFormat StreamLaser::format() const {
   ScanFormat format = session_->format();
   format.sensor_in_robot = sensor_in_robot_;
@@ -99,7 +103,7 @@ ScanReading StreamLaser::read(std::span<float> range_m, int64_t wanted_ns, int64
   if (!started_ || wanted_ns > deadline_ns) return reading;
   if (clock_.is_virtual()) step();
   else if (!real_time_.load(std::memory_order_relaxed) && in_real_time()) real_time_.store(true);
-  const uint64_t damaged = damaged_.load(std::memory_order_relaxed);
+  const uint64_t damaged = damaged_.load(std::memory_order_relaxed) + resyncs_.load(std::memory_order_relaxed);
   if (const Delivery* newest = newest_.take()) {
     const std::vector<float>& range = newest->scan.range_m;
     std::copy_n(range.begin(), std::min(range.size(), range_m.size()), range_m.begin());
@@ -137,6 +141,7 @@ int64_t StreamLaser::step() {
   receive();
   const int64_t until_ns = has_line_ ? obey() : open_again_ns_;
   damaged_.store(session_->damaged(), std::memory_order_relaxed);
+  resyncs_.store(session_->resyncs(), std::memory_order_relaxed);
   trouble_.store(has_line_ ? session_->trouble() : "the line is gone", std::memory_order_relaxed);
   return until_ns;
 }
@@ -186,6 +191,13 @@ void StreamLaser::lose_line() {
 }
 
 void StreamLaser::deliver(const ReceivedScan& scan) {
+  const auto count = [](std::atomic<uint64_t>& counter, uint32_t more) {
+    counter.store(counter.load(std::memory_order_relaxed) + more, std::memory_order_relaxed);
+  };
+  count(received_, 1);
+  if (previous_number_ && scan.scan_number > *previous_number_)
+    count(missing_, scan.scan_number - *previous_number_ - 1);
+  previous_number_ = scan.scan_number;
   Delivery& draft = newest_.draft();
   draft.scan.stamp_ns = scan.stamp_ns;
   draft.scan.scan_number = scan.scan_number;

@@ -2,11 +2,12 @@
 #pragma once
 #include <atomic>
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
 
 #include "hal/laser/laser_session.hpp"
-#include "hal/laser/newest.hpp"
+#include "hal/newest.hpp"
 #include "hal/stream/byte_stream.hpp"
 #include "rt/time/clock.hpp"
 
@@ -35,11 +36,13 @@ class StreamLaser final : public LaserScanner {
   ScanFormat format() const override;
   ScanReading read(std::span<float> range_m, int64_t wanted_ns, int64_t deadline_ns) override;
 
+  SourceCounts counts() const override;
+  /// Any thread.
+  const char* trouble() const override { return trouble_.load(std::memory_order_relaxed); }
+
   /// Does what is due now, all in all less than 1 ms but for a pause between bytes where the device needs it. Only
   /// where there is no thread. Returns when it is to be called again, unless bytes come.
   int64_t step();
-  /// Why no sweeps come, or what is not as the settings want it; a literal, empty if all is well. Any thread.
-  const char* trouble() const { return trouble_.load(std::memory_order_relaxed); }
 
  private:
   struct Delivery {
@@ -64,13 +67,14 @@ class StreamLaser final : public LaserScanner {
   bool has_line_ = false;
   int64_t open_again_ns_ = 0;
   std::vector<float> previous_range_m_;
+  std::optional<uint32_t> previous_number_;
 
   // Between the threads.
   Newest<Delivery> newest_;
   std::atomic<bool> connected_{false}, quit_{false}, real_time_{false};
-  std::atomic<uint64_t> damaged_{0};
+  std::atomic<uint64_t> received_{0}, missing_{0}, damaged_{0}, resyncs_{0};
   std::atomic<const char*> trouble_{""};
-  uint64_t damage_seen_ = 0;
+  uint64_t damage_seen_ = 0;  ///< damaged or resynchronised
   std::thread thread_;
 };
 

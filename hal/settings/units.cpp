@@ -33,13 +33,13 @@ constexpr Unit kUnits[] = {
     {Dimension::number, "", 1},
 };
 
+}  // namespace
+
 std::string_view trim(std::string_view s) {
   while (!s.empty() && (s.front() == ' ' || s.front() == '\t')) s.remove_prefix(1);
   while (!s.empty() && (s.back() == ' ' || s.back() == '\t')) s.remove_suffix(1);
   return s;
 }
-
-}  // namespace
 
 std::optional<double> parse_quantity(std::string_view text, Dimension dimension) {
   text = trim(text);

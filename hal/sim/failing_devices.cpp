@@ -49,7 +49,7 @@ StereoFrame FailingCamera::read(ImageView<uint8_t> left, ImageView<uint8_t> righ
   if (const auto status = nothing(failure)) return {*status};
   StereoFrame frame = inner().read(left, right, deadline_ns);
   if (frame.status != ReadStatus::ok || !failure) return frame;
-  if (*failure == Failure::garbage) {
+  if (*failure == Misbehaviour::garbage) {
     frame.status = ReadStatus::partial;
     damage(left);
     damage(right);
@@ -76,7 +76,7 @@ ScanReading FailingLaser::read(std::span<float> range_m, int64_t wanted_ns, int6
   if (reading.status != ReadStatus::ok || !failure) return reading;
   const size_t beams = std::min(range_m.size(), kept_range_m_.size());
   const auto given = range_m.begin();
-  if (*failure == Failure::garbage) {
+  if (*failure == Misbehaviour::garbage) {
     reading.status = ReadStatus::partial;
     std::fill(given + static_cast<std::ptrdiff_t>(beams / 2), range_m.end(), 0.0f);
   } else if (!std::exchange(kept_, true)) {
@@ -107,6 +107,49 @@ LinesReading FailingLines::read(int64_t wanted_ns) {
   const auto failure = failure_at(wanted_ns);
   if (const auto status = nothing(failure)) return {*status};
   LinesReading reading = inner().read(wanted_ns);
+  spoil(reading, kept_reading_, failure);
+  return reading;
+}
+
+DeviceResult FailingObjectSensor::open() {
+  DeviceResult opened = inner().open();
+  if (!opened) return opened;
+  kept_names_.reserve(inner().most_objects());
+  kept_places_.reserve(inner().most_objects());
+  kept_attributes_.reserve(8 * size_t{inner().most_objects()});
+  return opened;
+}
+
+ObjectReading FailingObjectSensor::read(ObjectReports& reports, int64_t wanted_ns, int64_t deadline_ns) {
+  const auto failure = failure_at(wanted_ns);
+  if (const auto status = nothing(failure)) return {*status};
+  ObjectReading reading = inner().read(reports, wanted_ns, deadline_ns);
+  if (reading.status != ReadStatus::ok || !failure) return reading;
+  const auto keep = [](const auto& from, auto& to) { to.assign(from.data(), from.data() + from.size); };
+  const auto give = [](const auto& from, auto& to) {
+    to.resize(from.size());
+    std::copy(from.begin(), from.end(), to.data());
+  };
+  if (*failure == Misbehaviour::garbage) {
+    reading.status = ReadStatus::partial;
+    reports.places.resize(reports.places.size / 2);
+  } else if (!std::exchange(kept_, true)) {
+    keep(reports.names, kept_names_);
+    keep(reports.places, kept_places_);
+    keep(reports.attributes, kept_attributes_);
+  } else {
+    give(kept_names_, reports.names);
+    give(kept_places_, reports.places);
+    give(kept_attributes_, reports.attributes);
+  }
+  return reading;
+}
+
+ActorReading FailingActor::read(int64_t wanted_ns, int64_t deadline_ns) {
+  // Also while it is silent: what it does goes on, and other robots wait for its instants.
+  ActorReading reading = inner().read(wanted_ns, deadline_ns);
+  const auto failure = failure_at(wanted_ns);
+  if (const auto status = nothing(failure)) return {*status, 0, {}};
   spoil(reading, kept_reading_, failure);
   return reading;
 }

@@ -4,12 +4,14 @@
 #include <memory>
 #include <utility>
 
+#include "hal/actor/actor.hpp"
 #include "hal/base/mobile_base.hpp"
 #include "hal/camera/stereo_camera.hpp"
 #include "hal/gpio/digital_lines.hpp"
 #include "hal/head/camera_head.hpp"
 #include "hal/laser/laser_scanner.hpp"
-#include "hal/sim/failures.hpp"
+#include "hal/object_sensor/object_sensor.hpp"
+#include "hal/settings/failures.hpp"
 #include "rt/time/clock.hpp"
 
 namespace takt::sim {
@@ -30,30 +32,30 @@ class FailingDevice : public Interface {
     return inner_->start(epoch_ns);
   }
   void stop() override { inner_->stop(); }
-  bool restart(int64_t now_ns) override { return plugged_ = schedule_.at(now_ns) != Failure::unplugged; }
+  bool restart(int64_t now_ns) override { return plugged_ = schedule_.at(now_ns) != Misbehaviour::unplugged; }
 
  protected:
   Interface& inner() { return *inner_; }
   const Interface& inner() const { return *inner_; }
-  std::optional<Failure> failure_at(int64_t now_ns) {
+  std::optional<Misbehaviour> failure_at(int64_t now_ns) {
     const auto failure = schedule_.at(now_ns);
-    if (failure == Failure::unplugged) plugged_ = false;
-    if (failure != Failure::frozen) kept_ = false;
-    return plugged_ ? failure : Failure::unplugged;
+    if (failure == Misbehaviour::unplugged) plugged_ = false;
+    if (failure != Misbehaviour::frozen) kept_ = false;
+    return plugged_ ? failure : Misbehaviour::unplugged;
   }
-  bool plugged(int64_t now_ns) { return failure_at(now_ns) != Failure::unplugged; }
+  bool plugged(int64_t now_ns) { return failure_at(now_ns) != Misbehaviour::unplugged; }
   /// What a read says that brings nothing.
-  static std::optional<ReadStatus> nothing(std::optional<Failure> failure) {
-    if (failure == Failure::silent) return ReadStatus::no_data;
-    if (failure == Failure::unplugged) return ReadStatus::disconnected;
+  static std::optional<ReadStatus> nothing(std::optional<Misbehaviour> failure) {
+    if (failure == Misbehaviour::silent) return ReadStatus::no_data;
+    if (failure == Misbehaviour::unplugged) return ReadStatus::disconnected;
     return std::nullopt;
   }
   /// A reading without data of its own beside it: kept and given again, or marked as damaged.
   template <class Reading>
-  void spoil(Reading& reading, Reading& kept, std::optional<Failure> failure) {
+  void spoil(Reading& reading, Reading& kept, std::optional<Misbehaviour> failure) {
     if (reading.status != ReadStatus::ok || !failure) return;
-    if (*failure == Failure::garbage) reading.status = ReadStatus::partial;
-    if (*failure != Failure::frozen) return;
+    if (*failure == Misbehaviour::garbage) reading.status = ReadStatus::partial;
+    if (*failure != Misbehaviour::frozen) return;
     const int64_t stamp_ns = reading.stamp_ns;
     if (!std::exchange(kept_, true)) kept = reading;
     reading = kept;
@@ -101,6 +103,9 @@ class FailingHead final : public FailingDevice<CameraHead> {
   bool command(double pan_rad, double tilt_rad, int64_t at_ns) override {
     return plugged(at_ns) && inner().command(pan_rad, tilt_rad, at_ns);
   }
+  void close_lids(bool left, bool right, int64_t at_ns) override {
+    if (plugged(at_ns)) inner().close_lids(left, right, at_ns);
+  }
 
  private:
   HeadReading kept_reading_;
@@ -130,6 +135,31 @@ class FailingLines final : public FailingDevice<DigitalLines> {
 
  private:
   LinesReading kept_reading_;
+};
+
+class FailingObjectSensor final : public FailingDevice<ObjectSensor> {
+ public:
+  using FailingDevice::FailingDevice;
+  DeviceResult open() override;
+  uint32_t most_objects() const override { return inner().most_objects(); }
+  ObjectReading read(ObjectReports& reports, int64_t wanted_ns, int64_t deadline_ns) override;
+
+ private:
+  std::vector<ObjectName> kept_names_;
+  std::vector<ObjectPlace> kept_places_;
+  std::vector<ObjectAttribute> kept_attributes_;
+};
+
+class FailingActor final : public FailingDevice<Actor> {
+ public:
+  using FailingDevice::FailingDevice;
+  bool command(const ActionCommand& command, int64_t at_ns) override {
+    return plugged(at_ns) && inner().command(command, at_ns);
+  }
+  ActorReading read(int64_t wanted_ns, int64_t deadline_ns) override;
+
+ private:
+  ActorReading kept_reading_;
 };
 
 }  // namespace takt::sim

@@ -251,8 +251,11 @@ void Renderer::render(const Scene& scene, const CameraPose& pose, const SensorNo
   sky_ = Surface{};
   sky_.ua = sky_.ub = sky_.uc = sky_.u0 = sky_.va = sky_.vb = sky_.vc = sky_.v0 = 0;
   sky_.texture = &(*scene.textures)[static_cast<size_t>(Material::sky)];
-  for (const Quad& quad : scene.quads) prepare_quad(quad, scene, pose);
-  for (const Capsule& capsule : scene.capsules) prepare_capsule(capsule, scene, pose);
+  for (const Scene* part : {scene.fixed, &scene}) {
+    if (part == nullptr) continue;
+    for (const Quad& quad : part->quads) prepare_quad(quad, *part, pose);
+    for (const Capsule& capsule : part->capsules) prepare_capsule(capsule, *part, pose);
+  }
   for (int y = 0; y < camera_.height; ++y) {
     // A far away sky instead of nothing keeps the shading free of divisions by zero.
     std::fill(inverse_depth_.begin(), inverse_depth_.end(), 1e-6f);

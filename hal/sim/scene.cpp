@@ -20,14 +20,12 @@ Quad make_quad(const std::array<Vec3, 4>& corners, Material material, double off
   return quad;
 }
 
-void add_box(Scene& scene, const Vec3& ground, const Vec3& size, double yaw, Material material) {
+void add_box(Scene& scene, const Vec3& ground, const Vec3& size, double yaw, Material material, double offset) {
   const double c = std::cos(yaw), s = std::sin(yaw);
   const auto corner = [&](double x, double y, double z) {
     const double px = x * size.x() / 2, py = y * size.y() / 2;
     return Vec3(ground.x() + c * px - s * py, ground.y() + s * px + c * py, ground.z() + z * size.z());
   };
-  // Each box starts elsewhere in its texture: equal boxes do not look equal.
-  const double offset = 0.37 * static_cast<double>(scene.quads.size());
   const std::array<std::array<double, 2>, 4> ring{{{-1, -1}, {1, -1}, {1, 1}, {-1, 1}}};
   for (size_t i = 0; i < 4; ++i) {
     const auto& p = ring[i];

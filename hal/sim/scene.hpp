@@ -37,12 +37,19 @@ struct Scene {
   std::vector<Quad> quads;
   std::vector<Capsule> capsules;
   std::shared_ptr<const TextureSet> textures;
+  const Scene* fixed = nullptr;  ///< drawn as well, if there is one: what never changes
 };
 
 /// Quad with its normal and texture axes (metres along the horizontal edge and along the other edge).
 Quad make_quad(const std::array<Vec3, 4>& corners, Material material, double offset = 0);
-/// The five visible faces of a box standing on height z.
-void add_box(Scene& scene, const Vec3& centre_on_ground, const Vec3& size, double yaw_rad, Material material);
+/// Where the next box of a scene starts in its texture, m: each elsewhere, so that equal boxes do not look equal.
+inline double texture_offset(const Scene& scene) { return 0.37 * static_cast<double>(scene.quads.size()); }
+/// The five visible faces of a box standing on height z; `offset` as texture_offset() says.
+void add_box(Scene& scene, const Vec3& centre_on_ground, const Vec3& size, double yaw_rad, Material material,
+             double offset);
+inline void add_box(Scene& scene, const Vec3& centre_on_ground, const Vec3& size, double yaw_rad, Material material) {
+  add_box(scene, centre_on_ground, size, yaw_rad, material, texture_offset(scene));
+}
 /// A square with a picture that faces yaw, upright, its lower edge at `foot` in the middle.
 void add_board(Scene& scene, const Vec3& foot, double edge_m, double yaw_rad, std::shared_ptr<const Texture> picture);
 /// A standing person of `height` metres made of capsules; the right arm points to `pointing_rad` (map azimuth) if

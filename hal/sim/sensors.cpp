@@ -12,20 +12,21 @@ namespace {
 constexpr int64_t kTickNs = 10'000'000;
 }
 
-void scan(const Simulation& simulation, const LaserModel& model, int64_t first_ns, std::span<float> range_m) {
+void scan(const Simulation& simulation, const LaserModel& model, int64_t first_ns, std::span<float> range_m,
+          Snapshot& met) {
+  simulation.look(first_ns, met);
   const Transform& t = model.sensor_in_robot;
-  // Yaw of the scanner's forward axis (robot y) about z; the scan plane stays horizontal.
-  const double yaw = 2.0 * std::atan2(t.qz, t.qw);
+  const Mat3 sensor_in_robot = Eigen::Quaterniond(t.qw, t.qx, t.qy, t.qz).toRotationMatrix();
   const double step = model.beams > 1 ? model.fov_rad / (model.beams - 1) : 0.0;
   const size_t beams = std::min<size_t>(model.beams, range_m.size());
   for (size_t i = 0; i < beams; ++i) {
     const double share = beams > 1 ? static_cast<double>(i) / static_cast<double>(beams - 1) : 0.0;
     const RobotState s = simulation.robot(first_ns + static_cast<int64_t>(share * model.sweep_s * 1e9));
-    const double c = std::cos(s.theta_rad), n = std::sin(s.theta_rad);
-    const Vec2 origin(s.x_m + n * t.x + c * t.y, s.y_m - c * t.x + n * t.y);
-    const double angle = s.theta_rad + yaw - model.fov_rad / 2 + static_cast<double>(i) * step;
-    const double range = cast_ray(simulation.world(), simulation.scene(), origin,
-                                  Vec2(std::cos(angle), std::sin(angle)), t.z, model.max_range_m);
+    const Mat3 robot_in_map = Eigen::AngleAxisd(s.theta_rad - std::numbers::pi / 2, Vec3::UnitZ()).toRotationMatrix();
+    const double angle = -model.fov_rad / 2 + static_cast<double>(i) * step;  // counter-clockwise from the y axis
+    const Vec3 origin = Vec3(s.x_m, s.y_m, 0) + robot_in_map * Vec3(t.x, t.y, t.z);
+    const Vec3 direction = robot_in_map * (sensor_in_robot * Vec3(-std::sin(angle), std::cos(angle), 0));
+    const double range = simulation.stage().cast_ray(met, origin, direction, model.max_range_m);
     const double noise =
         model.sigma_m * normal(simulation.seed() ^ 0x1A5E6, static_cast<uint64_t>(first_ns - simulation.epoch_ns()), i);
     range_m[i] = range >= model.max_range_m ? 0.0f : static_cast<float>(std::max(range + noise, 0.001));

@@ -19,8 +19,10 @@ struct LaserModel {
   Transform sensor_in_robot;
 };
 
-/// A sweep whose first beam leaves at `first_ns`; each beam from where the robot then is. 0 where there is no return.
-void scan(const Simulation& simulation, const LaserModel& model, int64_t first_ns, std::span<float> range_m);
+/// A sweep whose first beam leaves at `first_ns`; each beam from where the robot then is, to what else moves or changes
+/// as it is at the first. 0 where there is no return. `met`: of Simulation::make_snapshot(), used again and again.
+void scan(const Simulation& simulation, const LaserModel& model, int64_t first_ns, std::span<float> range_m,
+          Snapshot& met);
 
 struct OdometryModel {
   double scale_error = 0.01;        ///< of distance, systematic

@@ -12,14 +12,19 @@
 namespace takt::sim {
 namespace {
 
-bool same(const CameraPose& a, const CameraPose& b) { return a.rotation == b.rotation && a.position == b.position; }
-
 void copy(const std::vector<uint8_t>& from, ImageView<uint8_t> to) {
   const size_t row = static_cast<size_t>(to.width) * static_cast<size_t>(to.channels);
   for (int y = 0; y < to.height; ++y) std::memcpy(to.row(y), from.data() + static_cast<size_t>(y) * row, row);
 }
 
 }  // namespace
+
+bool SimCamera::Request::operator==(const Request& other) const {
+  const auto same = [&](int which) {
+    return pose[which].rotation == other.pose[which].rotation && pose[which].position == other.pose[which].position;
+  };
+  return at_ns == other.at_ns && same(0) && same(1) && snapshot.placed == other.snapshot.placed;
+}
 
 SimCamera::SimCamera(std::string id, SimCameraSettings settings, Simulation& simulation, const Clock& clock)
     : id_(std::move(id)), settings_(std::move(settings)), simulation_(simulation), clock_(clock) {}
@@ -36,6 +41,7 @@ DeviceResult SimCamera::open() {
     return device_error(id_, "the rig has " + std::to_string(rig.channels) + " channels", "use 1 (grey) or 3 (BGR)");
   }
   lens_ = std::make_unique<Lens>(rig);
+  for (Request* request : {&made_, &wanted_}) request->snapshot = simulation_.make_snapshot();
   if (settings_.background && !clock_.is_virtual()) {
     background_lens_ = std::make_unique<Lens>(rig);
     for (auto& image : prepared_) {
@@ -81,8 +87,10 @@ StereoFormat SimCamera::format() const {
   return {rig.width, rig.height, rig.channels, rig.rectified, rig.camera(), 0, camera_in_robot(rig, 0, 0)};
 }
 
-SimCamera::Request SimCamera::request_at(int64_t at_ns) const {
-  return {at_ns, {simulation_.camera_pose(settings_.rig, 0, at_ns), simulation_.camera_pose(settings_.rig, 1, at_ns)}};
+void SimCamera::request(int64_t at_ns, Request& into) const {
+  into.at_ns = at_ns;
+  for (const int which : {0, 1}) into.pose[which] = simulation_.camera_pose(settings_.rig, which, at_ns);
+  simulation_.look(at_ns, into.snapshot);
 }
 
 void SimCamera::trigger(int64_t at_ns) {
@@ -112,7 +120,7 @@ void SimCamera::work() {
     if (quit_.load()) return;
     if (asked_.load() != seen) continue;
     const int64_t before = thread_cpu_ns();
-    made_ = request_at(at_ns);
+    request(at_ns, made_);
     render(*background_lens_, made_, {prepared_[0].data(), rig.width, rig.height, rig.channels},
            {prepared_[1].data(), rig.width, rig.height, rig.channels});
     cost_.add({thread_cpu_ns() - before, 0});
@@ -120,8 +128,9 @@ void SimCamera::work() {
   }
 }
 
-/// A robot or head that is under way may still be sent elsewhere: drawn before that is settled, a frame is drawn in
-/// vain, and read() has to do it again within its job. A camera of 5 Hz is triggered long before.
+/// A robot or head that is under way may still be sent elsewhere, an action may still change what is seen: drawn before
+/// that is settled, a frame is drawn in vain, and read() has to do it again within its job. A camera of 5 Hz is
+/// triggered long before.
 void SimCamera::wait_until_settled(int64_t at_ns, uint32_t asked) const {
   while (asked_.load() == asked && !simulation_.settled(settings_.rig.on_head, at_ns) &&
          clock_.now_ns() < at_ns - kLatestStartNs) {
@@ -132,8 +141,8 @@ void SimCamera::wait_until_settled(int64_t at_ns, uint32_t asked) const {
 void SimCamera::render(Lens& lens, const Request& request, ImageView<uint8_t> left, ImageView<uint8_t> right) const {
   // Noise belongs to the exposure's place in the run, so that two runs of one seed see the same.
   const uint64_t exposure = mix(simulation_.seed(), static_cast<uint64_t>(request.at_ns - simulation_.epoch_ns()));
-  lens.render(simulation_.scene(), request.pose[0], settings_.noise, mix(exposure, 1), left);
-  lens.render(simulation_.scene(), request.pose[1], settings_.noise, mix(exposure, 2), right);
+  lens.render(request.snapshot.scene, request.pose[0], settings_.noise, mix(exposure, 1), left);
+  lens.render(request.snapshot.scene, request.pose[1], settings_.noise, mix(exposure, 2), right);
 }
 
 StereoFrame SimCamera::read(ImageView<uint8_t> left, ImageView<uint8_t> right, int64_t deadline_ns) {
@@ -153,18 +162,17 @@ StereoFrame SimCamera::read(ImageView<uint8_t> left, ImageView<uint8_t> right, i
     next_free_frame_ = newest + 1;
   }
   has_trigger_ = false;
-  const Request request = request_at(at_ns);
+  request(at_ns, wanted_);
   const bool ready = worker_.joinable() &&
                      done_.load(std::memory_order_acquire) == asked_.load(std::memory_order_relaxed) &&
-                     made_.at_ns == at_ns && same(made_.pose[0], request.pose[0]) &&
-                     same(made_.pose[1], request.pose[1]) && asked_.load(std::memory_order_relaxed) != 0;
+                     asked_.load(std::memory_order_relaxed) != 0 && made_ == wanted_;
   if (ready) {
     copy(prepared_[0], left);
     copy(prepared_[1], right);
     ++rendered_ahead_;
   } else {
     const int64_t before = thread_cpu_ns();
-    render(*lens_, request, left, right);
+    render(*lens_, wanted_, left, right);
     cost_.add({0, thread_cpu_ns() - before});
   }
   ++delivered_;

@@ -56,12 +56,14 @@ class SimCamera final : public StereoCamera {
   struct Request {
     int64_t at_ns = 0;
     CameraPose pose[2];
+    Snapshot snapshot;
+    bool operator==(const Request& other) const;
   };
   /// Rendering begins at the latest this long before the exposure: several times what a pair costs.
   static constexpr int64_t kLatestStartNs = 50'000'000;
   void work();
   void wait_until_settled(int64_t at_ns, uint32_t asked) const;
-  Request request_at(int64_t at_ns) const;
+  void request(int64_t at_ns, Request& into) const;
   void render(Lens& lens, const Request& request, ImageView<uint8_t> left, ImageView<uint8_t> right) const;
 
   std::string id_;
@@ -81,7 +83,7 @@ class SimCamera final : public StereoCamera {
   // at them only while they are equal. Asked again while it draws, the thread goes on with the newest wish, so that a
   // frame that came too late costs one read only.
   std::atomic<int64_t> asked_at_ns_{0};
-  Request made_;
+  Request made_, wanted_;
   std::atomic<uint32_t> asked_{0}, done_{0};
   std::atomic<bool> quit_{false}, real_time_{false};
   std::thread worker_;

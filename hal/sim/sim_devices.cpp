@@ -10,6 +10,7 @@ DeviceResult SimLaser::open() {
   if (model_.beams < 2 || model_.beams > 4096) {
     return device_error(id_, "`beams` is " + std::to_string(model_.beams), "use 2..4096 beams");
   }
+  met_ = simulation_.make_snapshot();
   return {};
 }
 DeviceResult SimLaser::start(int64_t epoch_ns) {
@@ -27,7 +28,7 @@ ScanReading SimLaser::read(std::span<float> range_m, int64_t wanted_ns, int64_t 
   ScanReading reading;
   if (!started_ || wanted_ns > deadline_ns) return reading;
   reading.stamp_ns = wanted_ns - static_cast<int64_t>(model_.sweep_s * 1e9);
-  scan(simulation_, model_, reading.stamp_ns, range_m);
+  scan(simulation_, model_, reading.stamp_ns, range_m, met_);
   reading.scan_number = scans_++;
   reading.status = range_m.size() < model_.beams ? ReadStatus::partial : ReadStatus::ok;
   return reading;

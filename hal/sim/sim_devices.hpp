@@ -24,6 +24,7 @@ class SimLaser final : public LaserScanner {
   std::string id_;
   LaserModel model_;
   Simulation& simulation_;
+  Snapshot met_;
   bool started_ = false;
   uint32_t scans_ = 0;
 };

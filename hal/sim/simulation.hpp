@@ -1,72 +1,66 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include <atomic>
-
 #include "hal/camera/rig.hpp"
-#include "hal/head/camera_head.hpp"
-#include "hal/sim/history.hpp"
-#include "hal/sim/path.hpp"
 #include "hal/sim/renderer.hpp"
-#include "hal/sim/world.hpp"
+#include "hal/sim/stage.hpp"
 
 namespace takt::sim {
 
-enum class Drive : uint8_t { path, command };
-
-/// One mechanism command, in force from `at_ns` on.
-struct PendingCommand {
-  int64_t at_ns = 0;
-  double a = 0, b = 0;
-};
-
-/// The world in time: what all sim drivers of a process share. Constant parts (map, scene, path) are immutable; the
-/// commanded parts (base in Drive::command, head, lines) have one writer each, the driver that owns them, and lock-free
-/// readers.
+/// One robot of a world in time: what its sim drivers share. The other robots of the world and the state of its objects
+/// are on the stage, which they all share.
 ///
 /// A command acts kLatencyNs after it was given. Everything up to that horizon is therefore settled before it
 /// happens, which lets a camera render its next exposure ahead of time and makes what is seen independent of how the
 /// threads were scheduled.
 class Simulation {
  public:
-  static constexpr int64_t kLatencyNs = 100'000'000;
-  static constexpr int64_t kWatchdogNs = 200'000'000;  ///< base stops without commands (devices.md 5)
-  static constexpr double kFootprintRadius = 0.48;     ///< m (algorithms.md 13)
+  static constexpr double kFootprintRadius = sim::kFootprintRadius;
 
   /// `client`: which client of the world is the robot; the first if empty.
   static tl::expected<std::unique_ptr<Simulation>, DeviceError> load(const std::string& device_id,
                                                                      const std::filesystem::path& file,
                                                                      const std::string& client, uint64_t seed);
-  Simulation(World world, size_t client, uint64_t seed);
+  Simulation(std::shared_ptr<Stage> stage, size_t client) : stage_(std::move(stage)), client_(client) {}
+  Simulation(World world, size_t client, uint64_t seed)
+      : Simulation(std::make_shared<Stage>(std::move(world), seed), client) {}
+  /// Which client has that name; the first if it is empty. The error names those that there are.
+  static tl::expected<size_t, DeviceError> find_client(const Stage& stage, const std::string& device_id,
+                                                       const std::filesystem::path& file, const std::string& client);
 
-  const World& world() const { return world_; }
-  const Scene& scene() const { return scene_; }
-  const Path& path() const { return path_; }
-  uint64_t seed() const { return seed_; }
+  Stage& stage() { return *stage_; }
+  const Stage& stage() const { return *stage_; }
+  const World& world() const { return stage_->world(); }
+  const Scene& scene() const { return stage_->scene(); }  ///< what never changes
+  const Path& path() const { return body().path(); }
+  uint64_t seed() const;  ///< of this robot's sensors
 
   /// The first caller fixes the start of the world's time; later calls change nothing. Returns what is in force.
-  int64_t begin(int64_t epoch_ns);
-  int64_t epoch_ns() const { return epoch_ns_.load(std::memory_order_acquire); }
-  /// Forgets commands and epoch; only while no driver runs.
-  void reset();
+  int64_t begin(int64_t epoch_ns) { return stage_->begin(epoch_ns); }
+  int64_t epoch_ns() const { return stage_->epoch_ns(); }
 
-  void set_drive(Drive drive) { drive_.store(drive, std::memory_order_relaxed); }
-  Drive drive() const { return drive_.load(std::memory_order_relaxed); }
+  void set_drive(Drive drive) { body().set_drive(drive); }
+  Drive drive() const { return body().drive(); }
 
   /// True state of the robot.
-  RobotState robot(int64_t at_ns) const;
+  RobotState robot(int64_t at_ns) const { return body().state(at_ns); }
   /// Base driver only: the velocity wanted from at_ns on.
-  void command_base(double speed_m_s, double turn_rad_s, int64_t at_ns);
+  void command_base(double speed_m_s, double turn_rad_s, int64_t at_ns) {
+    body().command_base(speed_m_s, turn_rad_s, at_ns);
+  }
   /// Base driver only: settles the motion up to now + latency.
-  void advance_base(int64_t now_ns);
-  bool blocked() const { return blocked_.load(std::memory_order_relaxed); }
+  void advance_base(int64_t now_ns) { body().advance_base(now_ns); }
+  bool blocked() const { return body().blocked(); }
 
   /// True state of the head (and of its motion).
-  HeadReading head(int64_t at_ns) const;
-  HeadLimits head_limits() const { return {2.094, 0.785, 3.49, 2.62, 8.0}; }
-  void command_head(double pan_rad, double tilt_rad, int64_t at_ns);
-  void advance_head(int64_t now_ns);
+  HeadReading head(int64_t at_ns) const { return body().head(at_ns); }
+  HeadLimits head_limits() const { return body().head_limits(); }
+  void command_head(double pan_rad, double tilt_rad, int64_t at_ns) { body().command_head(pan_rad, tilt_rad, at_ns); }
+  void advance_head(int64_t now_ns) { body().advance_head(now_ns); }
 
-  /// True if no command can change any more where the base, and the head if `with_head`, are at that instant. A
+  /// What this robot does with the objects: actor driver only.
+  ActionRun& actions() { return stage_->actions(client_); }
+
+  /// True if no command can change any more how the world, and this robot's head if `with_head`, is at that instant. A
   /// mechanism that nobody has advanced yet stands still.
   bool settled(bool with_head, int64_t at_ns) const;
 
@@ -85,25 +79,29 @@ class Simulation {
   /// f B / depth, rectified left view.
   void true_disparity(const StereoRig& rig, int64_t at_ns, float* disparity_px) const;
 
-  /// Objects within the client's field of view (66 degrees, 5 m) that no wall or object hides (algorithms.md 13).
+  /// What this robot's sensors meet beside scene().
+  void look(int64_t at_ns, Snapshot& into) const { stage_->look(client_, at_ns, into); }
+  Snapshot make_snapshot() const { return stage_->make_snapshot(); }
+
+  /// Ground truth, once the world has begun: what an attribute of an object is. Nothing: there is no such object or
+  /// attribute, or nobody has said what it is.
+  std::optional<std::string> attribute(std::string_view object, std::string_view attribute, int64_t at_ns) const;
+  /// Where the object is, in the map; a carried one is where its robot is. Nothing: there is none, or it is away.
+  std::optional<Vec2> position(std::string_view object, int64_t at_ns) const;
+
+  /// Whether an object is within the robot's field of view, and nothing hides it (algorithms.md 13). `snapshot` is
+  /// that of the instant; `placed` is where the object then stands, if it is seen.
+  bool sees(size_t object, int64_t at_ns, double fov_rad, double range_m, const Snapshot& snapshot,
+            Placed& placed) const;
+  /// All such objects.
   std::vector<const WorldObject*> visible_objects(int64_t at_ns, double fov_rad = 1.1519, double range_m = 5.0) const;
 
  private:
-  void step_base(int64_t tick);
-  void step_head(int64_t tick);
+  Robot& body() { return stage_->robot(client_); }
+  const Robot& body() const { return stage_->robot(client_); }
 
-  World world_;
-  Client client_;
-  uint64_t seed_;
-  Scene scene_;
-  Path path_;
-  std::atomic<int64_t> epoch_ns_;
-  std::atomic<Drive> drive_{Drive::path};
-  std::atomic<bool> blocked_{false};
-  History<5> base_;  ///< x, y, theta, speed, turn
-  History<4> head_;  ///< pan, tilt, and their speeds
-  std::array<PendingCommand, 64> base_commands_{}, head_commands_{};
-  uint32_t base_command_count_ = 0, head_command_count_ = 0;
+  std::shared_ptr<Stage> stage_;
+  size_t client_;
   std::atomic<uint64_t> forced_mask_{0}, forced_level_{0};
 };
 
@@ -127,8 +125,5 @@ class CostCounter {
  private:
   std::atomic<int64_t> ahead_ns_{0}, in_read_ns_{0};
 };
-
-/// x, y, theta moved along an exact arc (algorithms.md 13).
-void integrate_arc(double speed_m_s, double turn_rad_s, double dt_s, double& x_m, double& y_m, double& theta_rad);
 
 }  // namespace takt::sim

@@ -7,6 +7,8 @@
 #include <limits>
 #include <sstream>
 
+#include "hal/sim/placed.hpp"
+
 namespace takt::sim {
 namespace {
 
@@ -50,48 +52,7 @@ void add_walls(const World& world, Scene& scene) {
   }
 }
 
-/// Distance to the 2-D outline of a box, negative inside the reach of the ray: slab test in the frame of the box.
-double cast_box(const WorldObject& object, const Vec2& origin, const Vec2& direction) {
-  const double c = std::cos(object.yaw_rad), s = std::sin(object.yaw_rad);
-  const Vec2 rel = origin - object.position;
-  const double o[2] = {c * rel.x() + s * rel.y(), -s * rel.x() + c * rel.y()};
-  const double d[2] = {c * direction.x() + s * direction.y(), -s * direction.x() + c * direction.y()};
-  const double half[2] = {object.box->width_m / 2, object.box->depth_m / 2};
-  double near = 0, far = std::numeric_limits<double>::infinity();
-  for (int i = 0; i < 2; ++i) {
-    if (std::abs(d[i]) < 1e-12) {
-      if (std::abs(o[i]) > half[i]) return std::numeric_limits<double>::infinity();
-      continue;
-    }
-    const double t0 = (-half[i] - o[i]) / d[i], t1 = (half[i] - o[i]) / d[i];
-    near = std::max(near, std::min(t0, t1));
-    far = std::min(far, std::max(t0, t1));
-  }
-  return near <= far ? near : std::numeric_limits<double>::infinity();
-}
-
-double cast_sphere(const Vec3& centre, double radius, const Vec3& o, const Vec3& d) {
-  const Vec3 rel = o - centre;
-  const double b = rel.dot(d), h = b * b - rel.squaredNorm() + radius * radius;
-  const double t = -b - std::sqrt(std::max(h, 0.0));
-  return h >= 0 && t > 0 ? t : std::numeric_limits<double>::infinity();
-}
-
-double cast_capsule(const Capsule& capsule, const Vec3& o, const Vec3& d) {
-  const Vec3 axis = capsule.b - capsule.a, rel = o - capsule.a;
-  const double axx = axis.squaredNorm(), ad = axis.dot(d), ar = axis.dot(rel);
-  const double a = axx - ad * ad, b = axx * rel.dot(d) - ar * ad;
-  const double c = axx * rel.squaredNorm() - ar * ar - capsule.radius * capsule.radius * axx;
-  const double h = b * b - a * c;
-  double nearest = std::min(cast_sphere(capsule.a, capsule.radius, o, d), cast_sphere(capsule.b, capsule.radius, o, d));
-  if (h >= 0 && a > 1e-12) {
-    const double t = (-b - std::sqrt(h)) / a, along = ar + t * ad;
-    if (t > 0 && along > 0 && along < axx) nearest = std::min(nearest, t);
-  }
-  return nearest;
-}
-
-/// Exact traversal of the cells on the ray (Amanatides and Woo 1987).
+/// Exact traversal of the cells below the ray (Amanatides and Woo 1987); in lengths of `direction`, of any length.
 double cast_map(const Bitmap& map, const Vec2& origin, const Vec2& direction, double max_range) {
   int column = static_cast<int>(std::floor(origin.x() / map.cell_m)),
       row = static_cast<int>(std::floor(origin.y() / map.cell_m));
@@ -186,34 +147,19 @@ Scene build_scene(const World& world, std::shared_ptr<const TextureSet> textures
   scene.quads.push_back(make_quad({Vec3(0, 0, 0), Vec3(w, 0, 0), Vec3(w, h, 0), Vec3(0, h, 0)}, world.floor));
   scene.quads.push_back(make_quad({Vec3(0, h, top), Vec3(w, h, top), Vec3(w, 0, top), Vec3(0, 0, top)}, world.ceiling));
   add_walls(world, scene);
-  for (const WorldObject& object : world.objects) {
-    if (object.box) {
-      add_box(scene, Vec3(object.position.x(), object.position.y(), object.box->z_m),
-              Vec3(object.box->width_m, object.box->depth_m, object.box->height_m), object.yaw_rad,
-              object.box->material);
-    }
-    if (object.board)
-      add_board(scene, Vec3(object.position.x(), object.position.y(), object.board->z_m), object.board->edge_m,
-                object.yaw_rad, object.board->picture);
-    if (object.person) {
-      add_person(scene, object.position, object.yaw_rad, object.person->height_m, object.person->points,
-                 object.person->pointing_rad);
-    }
-  }
+  for (const WorldObject& object : world.objects) add_placed(scene, as_it_begins(object), texture_offset(scene));
   return scene;
 }
 
-double cast_ray(const World& world, const Scene& scene, const Vec2& origin, const Vec2& direction, double z,
-                double max_range) {
-  double nearest = cast_map(world.map, origin, direction, max_range);
-  for (const WorldObject& object : world.objects) {
-    if (object.box && z >= object.box->z_m && z <= object.box->z_m + object.box->height_m) {
-      nearest = std::min(nearest, cast_box(object, origin, direction));
-    }
+double cast_ray(const World& world, const Scene& scene, const Vec3& origin, const Vec3& direction, double max_range) {
+  double nearest = cast_map(world.map, origin.head<2>(), direction.head<2>(), max_range);
+  if (direction.z() != 0) {
+    const double plane_z = direction.z() > 0 ? world.wall_height_m : 0;
+    nearest = std::min(nearest, std::max(0.0, (plane_z - origin.z()) / direction.z()));
   }
-  const Vec3 o(origin.x(), origin.y(), z), d(direction.x(), direction.y(), 0);
-  for (const Capsule& capsule : scene.capsules) nearest = std::min(nearest, cast_capsule(capsule, o, d));
-  return std::min(nearest, max_range);
+  for (const WorldObject& object : world.objects)
+    nearest = std::min(nearest, cast_box(as_it_begins(object), origin, direction));
+  return std::min({nearest, cast_capsules(scene.capsules, origin, direction), max_range});
 }
 
 bool collides(const World& world, const Vec2& centre, double radius) {
@@ -229,16 +175,8 @@ bool collides(const World& world, const Vec2& centre, double radius) {
       if (dx * dx + dy * dy < radius * radius) return true;
     }
   }
-  for (const WorldObject& object : world.objects) {
-    if (object.person && (object.position - centre).norm() < radius + 0.3) return true;
-    if (!object.box || object.box->z_m > 1.8) continue;
-    const double cosine = std::cos(object.yaw_rad), sine = std::sin(object.yaw_rad);
-    const Vec2 rel = centre - object.position;
-    const double dx = std::max(std::abs(cosine * rel.x() + sine * rel.y()) - object.box->width_m / 2, 0.0);
-    const double dy = std::max(std::abs(-sine * rel.x() + cosine * rel.y()) - object.box->depth_m / 2, 0.0);
-    if (dx * dx + dy * dy < radius * radius) return true;
-  }
-  return false;
+  return std::any_of(world.objects.begin(), world.objects.end(),
+                     [&](const WorldObject& object) { return touches(as_it_begins(object), centre, radius); });
 }
 
 }  // namespace takt::sim

@@ -40,14 +40,29 @@ struct Person {
   double pointing_rad = 0;
 };
 
-struct WorldObject {
-  std::string name, type;
-  Vec2 position = Vec2::Zero();
-  double yaw_rad = 0;
-  std::map<std::string, std::string> attributes;
+/// What there is of an object: cameras see all of it, lasers and collisions boxes and persons.
+struct Shape {
   std::optional<Box> box;
   std::optional<Person> person;
   std::optional<Board> board;
+  bool empty() const { return !box && !person && !board; }
+};
+/// "The attribute has the value."
+struct Condition {
+  std::string attribute, value;
+};
+/// An object's shape while all conditions hold; an empty one: it is not there.
+struct Look {
+  std::vector<Condition> when;
+  Shape shape;
+};
+
+struct WorldObject : Shape {
+  std::string name, type;
+  Vec2 position = Vec2::Zero();
+  double yaw_rad = 0;
+  std::map<std::string, std::string> attributes;  ///< at the beginning
+  std::vector<Look> looks;                        ///< the first that holds is the object's shape, else its own is
 };
 
 struct Waypoint {
@@ -78,14 +93,33 @@ struct WorldLine {
 struct RoleCondition {
   std::string role, attribute, value;
 };
+struct ActionRole {
+  std::string name, type;  ///< type of the object
+};
+/// Where an action takes the object of a role: `robot`: the robot carries it; `away`: out of the world; the name of
+/// another role: on top of that one's object.
+struct RoleMove {
+  std::string role, to;
+};
 struct WorldAction {
   std::string name;
   double cost_s = 0;
-  std::map<std::string, std::string> roles;  ///< role name -> object type
+  std::vector<ActionRole> roles;  ///< as commands name their objects
   std::vector<RoleCondition> pre, post;
+  std::vector<RoleMove> moves;
 };
 
-/// The simulated world (algorithms.md section 13): immutable after loading.
+/// What happens by itself: an attribute gets a value or, if `attribute` is empty, the object is put elsewhere.
+struct WorldEvent {
+  double at_s = 0;
+  std::string object, attribute, value;
+  bool away = false;  ///< out of the world, instead of to:
+  Vec2 position = Vec2::Zero();
+  double yaw_rad = 0;
+};
+
+/// The simulated world (algorithms.md section 13) as it begins, and what can happen in it; what has happened is in a
+/// Stage.
 struct World {
   std::string name;
   Bitmap map;
@@ -95,6 +129,7 @@ struct World {
   std::vector<WorldObject> objects;
   std::vector<WorldLine> lines;
   std::vector<WorldAction> actions;
+  std::vector<WorldEvent> events;  ///< in the order of their instants
 };
 
 /// Reads an XML world and its bitmap. Errors name file:line, the element and the valid alternatives.
@@ -104,13 +139,12 @@ tl::expected<Bitmap, std::string> load_pgm(const std::filesystem::path& file, do
 /// Rows of text, top first; '#' is occupied.
 tl::expected<Bitmap, std::string> parse_rows(const std::string& text, double cell_m);
 
-/// Floor, ceiling, walls (one rectangle for each straight run of cell borders), boxes and people.
+/// Floor, ceiling, walls (one rectangle for each straight run of cell borders), and the objects as they begin.
 Scene build_scene(const World& world, std::shared_ptr<const TextureSet> textures);
 
-/// Distance from `origin` along `direction` (unit, horizontal) at height z to the first wall, box or person;
-/// `max_range` if nothing is nearer.
-double cast_ray(const World& world, const Scene& scene, const Vec2& origin, const Vec2& direction, double z,
-                double max_range);
+/// Distance from `origin` along `direction` (unit) to the first wall, box or person, to floor or ceiling; `max_range`
+/// if nothing is nearer. The scene is that of the world.
+double cast_ray(const World& world, const Scene& scene, const Vec3& origin, const Vec3& direction, double max_range);
 
 /// True if a circle touches a wall, a box or a person.
 bool collides(const World& world, const Vec2& centre, double radius);

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <tinyxml2.h>
 
+#include <algorithm>
+#include <sstream>
+
 #include "hal/settings/units.hpp"
 #include "hal/sim/world.hpp"
 
@@ -8,6 +11,24 @@ namespace takt::sim {
 namespace {
 
 using Element = tinyxml2::XMLElement;
+
+constexpr size_t kLongestName = 31, kMostRoles = 4, kMostAttributes = 8;  // what messages hold
+
+/// "a, b" of the names in a list.
+template <class List, class Name>
+std::string listed(const List& list, const Name& name) {
+  std::string all;
+  for (const auto& item : list) all.append(all.empty() ? "" : ", ").append(name(item));
+  return all.empty() ? "(none)" : all;
+}
+template <class List>
+std::string names(const List& list) {
+  return listed(list, [](const auto& item) { return item.name; });
+}
+template <class List>
+auto named(const List& list, const std::string& name) {
+  return std::find_if(list.begin(), list.end(), [&](const auto& item) { return item.name == name; });
+}
 
 struct Loader {
   std::string id, file;
@@ -37,6 +58,13 @@ struct Loader {
          "give a number and its unit");
     return fallback.value_or(0.0);
   }
+  /// A text that messages carry: of an object, a type, an attribute, a value, an action.
+  std::string word(const Element* e, const char* name) {
+    std::string value = text(e, name, true);
+    if (value.empty() || value.size() > kLongestName)
+      fail(e, std::string("`") + name + "` has " + std::to_string(value.size()) + " letters", "use 1 to 31");
+    return value;
+  }
   bool flag(const Element* e, const char* name, bool fallback) {
     bool value = fallback;
     if (e->Attribute(name) != nullptr && e->QueryBoolAttribute(name, &value) != tinyxml2::XML_SUCCESS) {
@@ -57,6 +85,8 @@ struct Loader {
   void client(const Element* e) {
     Client c;
     c.name = text(e, "name", true);
+    if (named(world.clients, c.name) != world.clients.end())
+      fail(e, "client `" + c.name + "` exists already", "choose another name");
     c.x_m = quantity(e, "x", Dimension::length);
     c.y_m = quantity(e, "y", Dimension::length);
     c.theta_rad = quantity(e, "theta", Dimension::angle, 0.0);
@@ -78,45 +108,72 @@ struct Loader {
 
   void object(const Element* e) {
     WorldObject o;
-    o.name = text(e, "name", true);
-    o.type = text(e, "type", true);
+    o.name = word(e, "name");
+    o.type = word(e, "type");
     o.position = Vec2(quantity(e, "x", Dimension::length), quantity(e, "y", Dimension::length));
     o.yaw_rad = quantity(e, "yaw", Dimension::angle, 0.0);
-    for (const WorldObject& other : world.objects) {
-      if (other.name == o.name) fail(e, "object `" + o.name + "` exists already", "choose another name");
-    }
+    if (named(world.objects, o.name) != world.objects.end())
+      fail(e, "object `" + o.name + "` exists already", "choose another name");
+    for (const Element* c = e->FirstChildElement("attr"); c != nullptr; c = c->NextSiblingElement("attr"))
+      o.attributes[word(c, "name")] = word(c, "value");
+    if (o.attributes.size() > kMostAttributes) fail(e, "object `" + o.name + "` has more than 8 attributes", "keep 8");
     for (const Element* c = e->FirstChildElement(); c != nullptr; c = c->NextSiblingElement()) {
       const std::string kind = c->Name();
-      if (kind == "attr") {
-        o.attributes[text(c, "name", true)] = text(c, "value", true);
-      } else if (kind == "box") {
-        o.box = Box{quantity(c, "width", Dimension::length), quantity(c, "depth", Dimension::length),
-                    quantity(c, "height", Dimension::length), quantity(c, "z", Dimension::length, 0.0),
-                    material(c, "material", Material::wood)};
-        if (o.box->width_m <= 0 || o.box->depth_m <= 0 || o.box->height_m <= 0)
-          fail(c, "a box needs positive sizes", "correct them");
-      } else if (kind == "person") {
-        o.person = Person{quantity(c, "height", Dimension::length, 1.75), c->Attribute("pointing") != nullptr,
-                          quantity(c, "pointing", Dimension::angle, 0.0)};
-        if (o.person->height_m < 0.5 || o.person->height_m > 2.5)
-          fail(c, "`height` must lie in 0.5..2.5 m", "correct it");
-      } else if (kind == "board") {
-        board(c, o);
-      } else {
-        unknown(c, "attr, box, person, board");
-      }
+      if (kind == "look") look(c, o);
+      else if (kind != "attr" && !shape(c, o)) unknown(c, "attr, look, " + std::string(kShapes));
     }
-    world.objects.push_back(o);
+    world.objects.push_back(std::move(o));
   }
 
-  void board(const Element* e, WorldObject& o) {
+  static constexpr const char* kShapes = "box, person, board";
+  /// False if the element is no part of a shape.
+  bool shape(const Element* e, Shape& s) {
+    const std::string kind = e->Name();
+    if (kind == "box") {
+      s.box = Box{quantity(e, "width", Dimension::length), quantity(e, "depth", Dimension::length),
+                  quantity(e, "height", Dimension::length), quantity(e, "z", Dimension::length, 0.0),
+                  material(e, "material", Material::wood)};
+      if (s.box->width_m <= 0 || s.box->depth_m <= 0 || s.box->height_m <= 0)
+        fail(e, "a box needs positive sizes", "correct them");
+    } else if (kind == "person") {
+      s.person = Person{quantity(e, "height", Dimension::length, 1.75), e->Attribute("pointing") != nullptr,
+                        quantity(e, "pointing", Dimension::angle, 0.0)};
+      if (s.person->height_m < 0.5 || s.person->height_m > 2.5)
+        fail(e, "`height` must lie in 0.5..2.5 m", "correct it");
+    } else if (kind == "board") {
+      board(e, s);
+    } else {
+      return false;
+    }
+    return true;
+  }
+
+  void look(const Element* e, WorldObject& o) {
+    Look l;
+    std::istringstream conditions(text(e, "when", true));
+    for (std::string part; std::getline(conditions >> std::ws, part, ',');) {
+      const size_t equals = part.find('=');
+      const Condition condition{part.substr(0, equals), equals < part.size() ? part.substr(equals + 1) : ""};
+      if (condition.value.empty()) fail(e, "`when` has the part \"" + part + "\"", "write attribute=value, ...");
+      else if (o.attributes.count(condition.attribute) == 0)
+        fail(e, "object `" + o.name + "` has no attribute `" + condition.attribute + "`",
+             "known: " + listed(o.attributes, [](const auto& attribute) { return attribute.first; }));
+      l.when.push_back(condition);
+    }
+    if (l.when.empty()) fail(e, "`when` is empty", "write attribute=value, ...");
+    for (const Element* c = e->FirstChildElement(); c != nullptr; c = c->NextSiblingElement())
+      if (!shape(c, l.shape)) unknown(c, kShapes);
+    o.looks.push_back(std::move(l));
+  }
+
+  void board(const Element* e, Shape& s) {
     const double edge = quantity(e, "edge", Dimension::length), z = quantity(e, "z", Dimension::length);
     const std::string name = text(e, "picture", true);
     if (error) return;
     if (edge <= 0) return fail(e, "`edge` must be positive", "correct it");
     auto picture = load_picture(std::filesystem::path(file).parent_path() / name, edge);
     if (!picture) return fail(e, picture.error(), "correct the picture");
-    o.board = Board{edge, z, std::make_shared<const Texture>(std::move(*picture))};
+    s.board = Board{edge, z, std::make_shared<const Texture>(std::move(*picture))};
   }
 
   void line(const Element* e) {
@@ -134,24 +191,95 @@ struct Loader {
     world.lines.push_back(l);
   }
 
+  /// Of all objects of a type, each once.
+  std::vector<std::string> attributes_of(const std::string& type) const {
+    std::vector<std::string> all;
+    for (const WorldObject& o : world.objects) {
+      if (o.type != type) continue;
+      for (const auto& [name, value] : o.attributes)
+        if (std::find(all.begin(), all.end(), name) == all.end()) all.push_back(name);
+    }
+    return all;
+  }
+
+  /// The role that an element of an action is about; null after an error.
+  const ActionRole* role(const Element* e, const char* name, const WorldAction& a) {
+    const std::string wanted = text(e, name, true);
+    const auto found = named(a.roles, wanted);
+    if (found != a.roles.end()) return &*found;
+    fail(e, "action `" + a.name + "` has no role `" + wanted + "`",
+         "known: " + names(a.roles) + "; declare others with <role>");
+    return nullptr;
+  }
+
+  void condition(const Element* e, const WorldAction& a, std::vector<RoleCondition>& into) {
+    const RoleCondition c{text(e, "role", true), word(e, "attr"), word(e, "value")};
+    const ActionRole* of = role(e, "role", a);
+    if (of == nullptr) return;
+    const auto known = attributes_of(of->type);
+    if (!known.empty() && std::find(known.begin(), known.end(), c.attribute) == known.end())
+      fail(e, "no " + of->type + " has an attribute `" + c.attribute + "`",
+           "known: " + listed(known, [](const std::string& name) { return name; }));
+    into.push_back(c);
+  }
+
+  void move(const Element* e, WorldAction& a) {
+    const RoleMove m{text(e, "role", true), text(e, "to", true)};
+    if (role(e, "role", a) == nullptr) return;
+    if (m.to != "robot" && m.to != "away" && (named(a.roles, m.to) == a.roles.end() || m.to == m.role))
+      fail(e, "`to` is \"" + m.to + "\"", "use robot, away or another role: " + names(a.roles));
+    a.moves.push_back(m);
+  }
+
   void action(const Element* e) {
     WorldAction a;
-    a.name = text(e, "name", true);
+    a.name = word(e, "name");
     a.cost_s = quantity(e, "cost", Dimension::time);
-    for (const Element* c = e->FirstChildElement(); c != nullptr; c = c->NextSiblingElement()) {
+    if (a.cost_s < 0 || a.cost_s > 1e6) fail(e, "`cost` must lie in 0..1000000 s", "correct it");
+    if (named(world.actions, a.name) != world.actions.end())
+      fail(e, "action `" + a.name + "` exists already", "choose another name");
+    for (const Element* c = e->FirstChildElement("role"); c != nullptr; c = c->NextSiblingElement("role"))
+      a.roles.push_back({word(c, "name"), word(c, "type")});
+    if (a.roles.empty() || a.roles.size() > kMostRoles)
+      fail(e, "action `" + a.name + "` has " + std::to_string(a.roles.size()) + " roles", "give it 1 to 4");
+    for (const Element* c = e->FirstChildElement(); c != nullptr && !error; c = c->NextSiblingElement()) {
       const std::string kind = c->Name();
-      if (kind == "role") a.roles[text(c, "name", true)] = text(c, "type", true);
-      else if (kind == "pre") a.pre.push_back({text(c, "role", true), text(c, "attr", true), text(c, "value", true)});
-      else if (kind == "post") a.post.push_back({text(c, "role", true), text(c, "attr", true), text(c, "value", true)});
-      else unknown(c, "role, pre, post");
+      if (kind == "pre") condition(c, a, a.pre);
+      else if (kind == "post") condition(c, a, a.post);
+      else if (kind == "move") move(c, a);
+      else if (kind != "role") unknown(c, "role, pre, post, move");
     }
-    for (const auto* list : {&a.pre, &a.post}) {
-      for (const RoleCondition& condition : *list) {
-        if (a.roles.count(condition.role) == 0)
-          fail(e, "action `" + a.name + "` has no role `" + condition.role + "`", "declare it with <role>");
-      }
+    for (const RoleMove& m : a.moves)
+      if (std::any_of(a.moves.begin(), a.moves.end(), [&](const RoleMove& other) { return other.role == m.to; }))
+        fail(e, "action `" + a.name + "` moves `" + m.to + "` and something onto it", "make them two actions");
+    world.actions.push_back(std::move(a));
+  }
+
+  void event(const Element* e) {
+    WorldEvent v;
+    v.at_s = quantity(e, "at", Dimension::time);
+    if (v.at_s < 0 || v.at_s > 1e9) fail(e, "`at` must lie in 0..1000000000 s", "count from the begin of the run");
+    v.object = text(e, "object", true);
+    const auto object = named(world.objects, v.object);
+    if (object == world.objects.end()) return fail(e, "no object `" + v.object + "`", "known: " + names(world.objects));
+    const bool sets = e->Attribute("attr") != nullptr, goes = e->Attribute("to") != nullptr,
+               moves = e->Attribute("x") != nullptr;
+    if (sets + goes + moves != 1)
+      return fail(e, "an event is one thing that happens", "give attr and value, x and y, or to=\"away\"");
+    if (sets) {
+      v.attribute = word(e, "attr");
+      v.value = word(e, "value");
+      if (object->attributes.count(v.attribute) == 0)
+        fail(e, "object `" + v.object + "` has no attribute `" + v.attribute + "`",
+             "known: " + listed(object->attributes, [](const auto& attribute) { return attribute.first; }));
+    } else if (goes) {
+      v.away = true;
+      if (text(e, "to", true) != "away") fail(e, "`to` is \"" + text(e, "to", true) + "\"", "use away, or x and y");
+    } else {
+      v.position = Vec2(quantity(e, "x", Dimension::length), quantity(e, "y", Dimension::length));
+      v.yaw_rad = quantity(e, "yaw", Dimension::angle, object->yaw_rad);
     }
-    world.actions.push_back(a);
+    world.events.push_back(v);
   }
 
   void map(const Element* root, const std::filesystem::path& path) {
@@ -179,9 +307,17 @@ struct Loader {
       if (kind == "client") client(c);
       else if (kind == "object") object(c);
       else if (kind == "line") line(c);
-      else if (kind == "action") action(c);
-      else if (kind != "rows") unknown(c, "rows, client, object, line, action");
+      else if (kind != "rows" && kind != "action" && kind != "event")
+        unknown(c, "rows, client, object, line, action, event");
     }
+    // What can happen to objects is read when all are known.
+    for (const Element* c = e->FirstChildElement(); c != nullptr && !error; c = c->NextSiblingElement()) {
+      const std::string kind = c->Name();
+      if (kind == "action") action(c);
+      else if (kind == "event") event(c);
+    }
+    std::stable_sort(world.events.begin(), world.events.end(),
+                     [](const WorldEvent& a, const WorldEvent& b) { return a.at_s < b.at_s; });
     if (!error && world.clients.empty()) fail(e, "no <client>, so no robot", "add <client name=... x=... y=.../>");
     for (const Client& c : world.clients) {
       if (!error && collides(world, Vec2(c.x_m, c.y_m), 0.3))

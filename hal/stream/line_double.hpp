@@ -14,7 +14,8 @@ class LineDouble : public DeviceDouble {
   explicit LineDouble(std::unique_ptr<ByteStream> line) : stream_(std::move(line)), line_(*stream_) {}
   DeviceResult plug_in() override { return stream_->open(); }
   void run_to(int64_t now_ns) final;
-  void misbehave(Misbehaviour misbehaviour) override;
+  std::span<const Misbehaviour> known() const override;
+  void misbehave(Misbehaviour how) override;
 
  protected:
   virtual void hear(std::span<const uint8_t> bytes, int64_t now_ns) = 0;

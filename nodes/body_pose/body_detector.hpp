@@ -12,7 +12,7 @@ namespace takt::body_pose {
 struct DetectorParameters {
   SegmentationParameters segmentation;
   FitParameters fit;
-  double error_max = 2.0;  ///< a fit with a larger error is no body
+  double error_max = 2.5;  ///< a fit with a larger error is no body
   int links_min = 6;       ///< nor is one with fewer links
 };
 

@@ -98,7 +98,8 @@ Figures measure_people(BodyDetector& detector, const SceneCamera& camera, uint64
 
 Figures measure_any(const Skeleton& skeleton, const FitParameters& parameters, const SceneCamera& camera, uint64_t seed,
                     int trials) {
-  constexpr double kFloor_m = 0.08, kVoxel_m = 0.03;
+  const SegmentationParameters s;
+  const auto range = static_cast<float>(s.range_m * s.range_m), low = static_cast<float>(s.floor_m);
   Figures figures;
   const auto rays = static_cast<size_t>(camera.width) * static_cast<size_t>(camera.height);
   Fitter fitter(skeleton, parameters, rays);
@@ -107,9 +108,9 @@ Figures measure_any(const Skeleton& skeleton, const FitParameters& parameters, c
     const GeneratedScene scene = make_any(skeleton, camera, seed, static_cast<uint64_t>(i));
     std::vector<Point> points;
     for (const Point& p : scene.in_floor)
-      if (p.z > kFloor_m) points.push_back(p);
+      if (p.x * p.x + p.y * p.y < range && p.z > low) points.push_back(p);
     const int64_t start = thread_cpu_ns();
-    grid.fill({points, {}}, kVoxel_m);
+    grid.fill({points, {}}, s.voxel_m);
     points.clear();
     for (const cloud::Voxel& voxel : grid.voxels()) points.push_back(voxel.mean());
     const double density = reference_density(points, parameters.tube_m);

@@ -23,7 +23,7 @@ struct FitParameters {
   double limb_m = 0.25;    ///< a point counts once more for each such distance from the start's vertical
   double weight_distance = 0.3, weight_missing = 1, weight_unused = 6,
          weight_thin = 0.5;      ///< a1 (1/m) .. a4 of Eq. 3.10
-  double weight_away = 0.5;      ///< of (1 - cos(angle between where the body faces and the sensor)) / 2
+  double weight_away = 0.7;      ///< of (1 - cos(angle between where the body faces and the sensor)) / 2
   double missing_penalty = 0.2;  ///< of a link, and once more for each that hangs on it
   double thin_penalty = 0.2;
   double sigma_length = 0.15;  ///< of length ratios: validation allows twice that from their mean

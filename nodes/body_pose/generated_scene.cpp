@@ -227,7 +227,8 @@ GeneratedScene make_any(const Skeleton& skeleton, const SceneCamera& camera, uin
   place_joints(skeleton, directions, lot, turn, body.joints);
   double lowest = 0;
   for (const Vector3d& joint : body.joints) lowest = std::min(lowest, joint.z());
-  for (Vector3d& joint : body.joints) joint += Vector3d(lot.in(-0.5, 0.5), lot.in(2.2, 3.0), 0.15 - lowest);
+  const double x = lot.in(-0.5, 0.5), y = lot.in(2.2, 3.0);
+  for (Vector3d& joint : body.joints) joint += Vector3d(x, y, 0.15 - lowest);
   World world;
   for (size_t i = 1; i < skeleton.links.size(); ++i)
     world.capsules.push_back({body.joints[skeleton.links[i].parent], body.joints[i], 0.04, {30, 160, 220}});

@@ -11,10 +11,12 @@ namespace {
 constexpr double kMostCells = 1 << 18;  // CellSort has a bucket for each of so many at least
 constexpr double kPeakRadius_m = 0.20;
 // Where head and trunk are looked at: so far below the top, within so much up and down, within that distance.
-constexpr float kHeadDepth_m = 0.22f, kHeadReach_m = 0.32f;
+constexpr float kHeadDepth_m = 0.22f, kHeadReach_m = 0.6f;
 constexpr float kTrunkBelow_m = 0.50f, kTrunkDepth_m = 0.15f, kTrunkReach_m = 0.45f;
 constexpr float kBeginReach_m = 0.5f;  // everything that begins_at() lies within
-constexpr float kBelow_m = 0.15f;      // as far beside a head's middle a point is still below it
+// As far from a head's middle a point is still below it, across the line of sight and along it: only one side of a body
+// is seen, and a back lies before the middle of what is seen of the head.
+constexpr double kBelowAcross_m = 0.15, kBelowAlong_m = 0.30;
 
 /// Spread of points across the line of sight: stereo has its noise along it.
 class LateralSpread {
@@ -24,8 +26,10 @@ class LateralSpread {
     const double distance = std::hypot(towards.x, towards.y);
     if (distance > 0) across_x_ = towards.y / distance, across_y_ = -towards.x / distance;
   }
+  double across(const Point& p) const { return across_x_ * p.x + across_y_ * p.y; }
+  double along(const Point& p) const { return across_x_ * p.y - across_y_ * p.x; }
   void add(const Point& p) {
-    const double across = across_x_ * p.x + across_y_ * p.y;
+    const double across = this->across(p);
     ++count_;
     x_ += p.x, y_ += p.y;
     across_ += across, squares_ += across * across;
@@ -138,13 +142,13 @@ void Segmentation::find_seeds() {
     top_[cell] = static_cast<uint32_t>(i);
   }
   seeds_.clear();
+  std::fill_n(label_.begin(), count_, -1);
   for (int row = 0; row < map_side_; ++row)
     for (int column = 0; column < map_side_; ++column) {
       const auto cell = static_cast<size_t>(row * map_side_ + column);
       if (map_[cell] < static_cast<float>(p_.head_min_m) || !is_peak(column, row)) continue;
       Seed seed;
-      if (judge_head(reduced_[top_[cell]], seed) && seeds_.size() < static_cast<size_t>(p_.candidates))
-        seeds_.push_back(seed);
+      if (judge_head(top_[cell], seed) && seeds_.size() < static_cast<size_t>(p_.candidates)) seeds_.push_back(seed);
     }
   drop_lower_neighbours();
   std::sort(seeds_.begin(), seeds_.end(), [](const Seed& a, const Seed& b) {
@@ -182,28 +186,49 @@ bool Segmentation::is_peak(int column, int row) const {
   return true;
 }
 
+/// The points that hang together with the top and are hardly lower, at the queue's front; returns how many. Who
+/// stands beside is not among them, but all of a wide thing is.
+size_t Segmentation::gather_head(uint32_t top) {
+  const auto peak = static_cast<int32_t>(top);  // marks what was visited from here
+  const Point& highest = reduced_[top];
+  size_t end = 0;
+  const auto claim = [&](uint32_t i) {
+    if (label_[i] == peak || reduced_[i].z <= highest.z - kHeadDepth_m ||
+        squared_distance(reduced_[i], highest) > kHeadReach_m * kHeadReach_m)
+      return;
+    label_[i] = peak;
+    queue_[end++] = i;
+  };
+  claim(top);
+  for (size_t next = 0; next < end; ++next)
+    for_each_near(reduced_[queue_[next]], static_cast<float>(p_.head_link_m), claim);
+  return end;
+}
+
 /// Across the line of sight the topmost part must be as wide as a head, what is below it wider, and much of
 /// that below the head itself: not so for a hand held out.
-bool Segmentation::judge_head(const Point& top, Seed& seed) const {
-  if (top.z > static_cast<float>(p_.ceiling_m) - kHeadDepth_m / 2) return false;  // goes on above
-  LateralSpread head(top), trunk(top);
-  for_each_near(top, kHeadReach_m, [&](uint32_t i) {
-    if (reduced_[i].z > top.z - kHeadDepth_m) head.add(reduced_[i]);
-  });
+bool Segmentation::judge_head(uint32_t top, Seed& seed) {
+  const Point& highest = reduced_[top];
+  if (highest.z > static_cast<float>(p_.ceiling_m) - kHeadDepth_m / 2) return false;  // goes on above
+  LateralSpread head(highest), trunk(highest);
+  for (const uint32_t i : std::span(queue_).first(gather_head(top))) head.add(reduced_[i]);
   if (head.count() < p_.head_points || head.value() < p_.head_spread_min_m || head.value() > p_.head_spread_max_m)
     return false;
-  const Point middle{static_cast<float>(head.x()), static_cast<float>(head.y()), top.z - kTrunkBelow_m};
+  const Point middle{static_cast<float>(head.x()), static_cast<float>(head.y()), highest.z - kTrunkBelow_m};
   int below = 0;
   for_each_near(middle, kTrunkReach_m, [&](uint32_t i) {
     const Point& p = reduced_[i];
     if (std::abs(p.z - middle.z) >= kTrunkDepth_m) return;
     trunk.add(p);
-    below += squared_distance(p, {middle.x, middle.y, p.z}) < kBelow_m * kBelow_m ? 1 : 0;
+    below += std::abs(trunk.across(p) - trunk.across(middle)) < kBelowAcross_m &&
+                     std::abs(trunk.along(p) - trunk.along(middle)) < kBelowAlong_m
+                 ? 1
+                 : 0;
   });
   if (trunk.count() < p_.head_points || below < p_.trunk_below_min * trunk.count() ||
       trunk.value() < p_.trunk_to_head_min * head.value())
     return false;
-  seed = {{middle.x, middle.y, top.z - static_cast<float>(p_.head_middle_m)}, top.z};
+  seed = {{middle.x, middle.y, highest.z - static_cast<float>(p_.head_middle_m)}, highest.z};
   return true;
 }
 

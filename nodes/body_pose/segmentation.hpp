@@ -22,8 +22,9 @@ struct SegmentationParameters {
   double grow_m = 0.12;                        ///< neighbours in a cluster are no farther apart (d_max)
   double reach_m = 1.0, reach_up_m = 0.8, reach_down_m = 2.0;   ///< cylinder around a head that its body stays in
   double head_min_m = 0.9;                                      ///< heads are no lower
-  double head_spread_min_m = 0.030, head_spread_max_m = 0.072;  ///< standard deviation across the line of sight
-  double trunk_below_min = 0.12;   ///< share of the points half a metre below a head that lie right below it
+  double head_link_m = 0.07;                                    ///< points of a head hang together over so much
+  double head_spread_min_m = 0.030, head_spread_max_m = 0.080;  ///< standard deviation across the line of sight
+  double trunk_below_min = 0.3;    ///< share of the points half a metre below a head that lie right below it
   double trunk_to_head_min = 1.2;  ///< the same deviation of these points, of the head's
   double head_middle_m = 0.13;     ///< of the head, below its top
   int head_points = 8;
@@ -70,7 +71,8 @@ class Segmentation {
   void sort();
   void find_seeds();
   bool is_peak(int column, int row) const;
-  bool judge_head(const Point& top, Seed& seed) const;
+  bool judge_head(uint32_t top, Seed& seed);
+  size_t gather_head(uint32_t top);
   void drop_lower_neighbours();
   void grow();
   bool plausible(size_t label) const;
@@ -90,7 +92,7 @@ class Segmentation {
   std::vector<float> map_;     ///< highest point above each cell of the floor
   std::vector<uint32_t> top_;  ///< which one that is
   std::vector<Seed> seeds_;
-  std::vector<int32_t> label_;  ///< of reduced points: seed, -1 none
+  std::vector<int32_t> label_;  ///< of reduced points: seed, -1 none; while seeds are sought: peak
   std::vector<uint32_t> queue_;
   std::vector<Candidate> candidates_;
 };

@@ -33,19 +33,6 @@ PlanarPose planar(const Transform& t) {
   return {t.x, t.y, std::atan2(-a.r[1], a.r[4])};
 }
 
-// At rest R = Rz(pan0) Rx(tilt0) Ry(roll0) and then the axes of a camera, whose forward axis Ry leaves in place: pan0
-// is read off it, and the head's tilt goes between Rz and Rx.
-Transform turned_by_head(const Transform& at_rest, double pan_rad, double tilt_rad) {
-  using Eigen::AngleAxisd, Eigen::Vector3d;
-  const Eigen::Quaterniond q(at_rest.qw, at_rest.qx, at_rest.qy, at_rest.qz);
-  const Vector3d ahead = q * Vector3d::UnitZ();
-  const double pan0_rad = std::atan2(-ahead.x(), ahead.y());
-  const Eigen::Quaterniond turned = AngleAxisd(pan0_rad + pan_rad, Vector3d::UnitZ()) *
-                                    AngleAxisd(tilt_rad, Vector3d::UnitX()) * AngleAxisd(-pan0_rad, Vector3d::UnitZ()) *
-                                    q;
-  return {at_rest.x, at_rest.y, at_rest.z, turned.w(), turned.x(), turned.y(), turned.z()};
-}
-
 // The ray of pixel (i, j) has the direction d = R ((i - cu) / f, (j - cv) / f, 1) and meets z = 0 at t - d t_z / d_z.
 // Times the fall w = -d_z this is (t_x w + t_z d_x, t_y w + t_z d_y, w): linear in (i, j, 1).
 FloorProjection floor_projection(const CameraModel& camera, const Transform& camera_in_parent) {

@@ -28,10 +28,6 @@ FloorPoint transformed(const PlanarPose& child_in_parent, const FloorPoint& p);
 /// The part of a pose that lies in the floor: yaw of R = Rz(yaw) Rx(pitch) Ry(roll).
 PlanarPose planar(const Transform& transform);
 
-/// A camera on the head, whose pivot is its optical centre: the pose at rest with the head's pan (about z, left
-/// positive) and tilt (up positive) added to its own.
-Transform turned_by_head(const Transform& at_rest, double pan_rad, double tilt_rad);
-
 /// Homogeneous map of pixels (x_px, y_px, 1) to the floor z = 0; row-major. A pixel sees the floor where the third
 /// coordinate, by how much its ray falls per unit of depth, is above kHorizon.
 struct FloorProjection {

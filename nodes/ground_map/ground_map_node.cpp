@@ -8,6 +8,7 @@
 #include "nodes/ground_map/laser_check.hpp"
 #include "nodes/ground_map/robot_track.hpp"
 #include "nodes/ground_map/terrain_file.hpp"
+#include "nodes/mapping_3d/head_at.hpp"
 #include "nodes/mapping_3d/pose.hpp"
 #include "rt/node.hpp"
 
@@ -130,30 +131,9 @@ class GroundMapNode final : public Node {
   /// None where the head's angles are not known.
   std::optional<FloorProjection> projection_of(const StereoPair& pair) const {
     if (!head_.connected()) return floor_projection(pair.camera, mount_of(pair));
-    const auto head = head_at(last_stamp_ns_);
+    const auto head = mapping_3d::head_at(head_, last_stamp_ns_, RobotTrack::kLongestGapNs);
     if (!head) return std::nullopt;
-    return floor_projection(pair.camera, turned_by_head(mount_of(pair), head->pan_rad, head->tilt_rad));
-  }
-
-  struct HeadAngles {
-    double pan_rad, tilt_rad;
-  };
-  /// Between two states, or by the last one if the head stood still then.
-  std::optional<HeadAngles> head_at(int64_t stamp_ns) const {
-    for (size_t i = head_.size(); i-- > 0;) {
-      const HeadState& before = head_[i];
-      const int64_t since_ns = stamp_ns - head_.stamp_ns(i);
-      if (since_ns < 0) continue;
-      if (since_ns > RobotTrack::kLongestGapNs) return std::nullopt;
-      if (since_ns == 0 || before.moving == 0) return HeadAngles{before.pan_rad, before.tilt_rad};
-      if (i + 1 == head_.size()) return std::nullopt;
-      const HeadState& after = head_[i + 1];
-      const double share =
-          static_cast<double>(since_ns) / static_cast<double>(head_.stamp_ns(i + 1) - head_.stamp_ns(i));
-      return HeadAngles{std::lerp(before.pan_rad, after.pan_rad, share),
-                        std::lerp(before.tilt_rad, after.tilt_rad, share)};
-    }
-    return std::nullopt;
+    return floor_projection(pair.camera, mapping_3d::turned_by_head(mount_of(pair), head->pan_rad, head->tilt_rad));
   }
 
   ImageView<uint8_t> ground() { return {ground_.data(), detector_->width(), detector_->height()}; }
@@ -356,7 +336,7 @@ class GroundMapNode final : public Node {
   Choice terrain_centre_{
       this, "terrain_centre", "undecided", {"undecided", "mean"}, "from where cells are counted in a correlation"};
   Param<double> terrain_correlation_{
-      this, "terrain_correlation", 0.5, {-1.0, 1.0}, "1", "above it the best kind is believed"};
+      this, "terrain_correlation", 0.7, {-1.0, 1.0}, "1", "above it the best kind is believed; with `mean` 0.5"};
   Param<double> terrain_up_{this, "terrain_up", 0.2, {0.0, 1.0}, "1", "added to the hypothesis believed"};
   Param<double> terrain_down_{this, "terrain_down", 0.1, {0.0, 1.0}, "1", "taken off the others"};
   Param<double> camera_x_{this, "camera_x", 0.0, {-5.0, 5.0}, "m", "camera to the right, where the pair does not say"};

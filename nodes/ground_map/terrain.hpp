@@ -65,7 +65,7 @@ enum class Centre : uint8_t {
 struct TerrainParameters {
   Centre centre = Centre::undecided;
   double known_min = 0.3;        ///< share of the cells that must be known in both maps
-  double correlation_min = 0.5;  ///< above it the best kind is believed
+  double correlation_min = 0.7;  ///< above it the best kind is believed; with `mean` the reference recommends 0.5
   int up = 200, down = 100;      ///< of 1000
 };
 

@@ -150,7 +150,7 @@ class MappingNode final : public Node {
   /// Where the robot really was at an instant: all poses after it, and the part of the map since the last correction,
   /// are moved. Waits until the pose of that instant is known.
   void take_correction() {
-    if (!correction_.empty() && correction_.is_new())
+    if (!correction_.empty() && correction_.stamp_ns() > right_until_ns_)
       pending_ = Correction{correction_.stamp_ns(), correction_.newest()->transform};
     if (!pending_) return;
     const auto known = track_.at(pending_->stamp_ns);
@@ -303,7 +303,8 @@ class MappingNode final : public Node {
   Input<Pose> pose_{this, "pose",
                     "robot poses around the cloud's stamp from anywhere else, instead of odometry; depth 16",
                     Need::optional};
-  Input<Pose> correction_{this, "correction", "where the robot turns out to have been at its stamp; lays the map anew",
+  Input<Pose> correction_{this, "correction",
+                          "where the robot turns out to have been at its stamp, once for each stamp; lays the map anew",
                           Need::optional};
   Input<Grid> other_{this, "grid", "what else is known of the same map frame, for `fused`", Need::optional};
   Output<Grid> obstacles_{this, "obstacles", "0.20 m grid around the robot, robot frame at the cloud's stamp"};

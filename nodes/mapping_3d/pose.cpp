@@ -23,6 +23,19 @@ Transform camera_mount(double x_m, double y_m, double height_m, double pan_rad, 
   return {x_m, y_m, height_m, q.w(), q.x(), q.y(), q.z()};
 }
 
+// At rest R = Rz(pan0) Rx(tilt0) Ry(roll0) and then the axes of a camera, whose forward axis Ry leaves in place: pan0
+// is read off it, and the head's tilt goes between Rz and Rx.
+Transform turned_by_head(const Transform& at_rest, double pan_rad, double tilt_rad) {
+  using Eigen::AngleAxisd, Eigen::Vector3d;
+  const Eigen::Quaterniond q(at_rest.qw, at_rest.qx, at_rest.qy, at_rest.qz);
+  const Vector3d ahead = q * Vector3d::UnitZ();
+  const double pan0_rad = std::atan2(-ahead.x(), ahead.y());
+  const Eigen::Quaterniond turned = AngleAxisd(pan0_rad + pan_rad, Vector3d::UnitZ()) *
+                                    AngleAxisd(tilt_rad, Vector3d::UnitX()) * AngleAxisd(-pan0_rad, Vector3d::UnitZ()) *
+                                    q;
+  return {at_rest.x, at_rest.y, at_rest.z, turned.w(), turned.x(), turned.y(), turned.z()};
+}
+
 Transform robot_in_odometry(const Odometry& odometry) {
   const double half = (odometry.theta_rad - std::numbers::pi / 2) / 2;
   return {odometry.x_m, odometry.y_m, 0, std::cos(half), 0, 0, std::sin(half)};

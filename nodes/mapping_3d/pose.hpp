@@ -28,6 +28,15 @@ inline Position transformed(const Affine& a, double x, double y, double z) {
 /// about x (up positive); camera axes x right, y down, z forward.
 Transform camera_mount(double x_m, double y_m, double height_m, double pan_rad, double tilt_rad);
 
+/// Where a sensor is mounted; the identity says that nobody knows.
+inline bool is_known(const Transform& t) {
+  return t.x != 0 || t.y != 0 || t.z != 0 || t.qx != 0 || t.qy != 0 || t.qz != 0;
+}
+
+/// A camera on the head, whose pivot is its optical centre: the pose at rest with the head's pan (about z, left
+/// positive) and tilt (up positive) added to its own.
+Transform turned_by_head(const Transform& at_rest, double pan_rad, double tilt_rad);
+
 /// The robot frame in the odometry frame: theta is the driving direction, which is the robot's y axis, so that its x
 /// axis points to theta - 90 degrees (algorithm reference 21.9).
 Transform robot_in_odometry(const Odometry& odometry);

@@ -93,20 +93,16 @@ int64_t PathPlanner::step_cost(const Cell& from, const Cell& to) const {
   return unknown_[index(to)] != 0 ? length * parameters_.unknown_factor : length;
 }
 
-std::optional<uint32_t> PathPlanner::search(const Cell& from, const Place& to, double reach_m) {
-  const double goal_column = (to.x_m - grid_.origin_x_m) / grid_.cell_m - 0.5,
-               goal_row = (to.y_m - grid_.origin_y_m) / grid_.cell_m - 0.5;
-  const Cell goal = grid_.cell_of(to.x_m, to.y_m);
-  const double reach = reach_m / grid_.cell_m;
-  // At least this is left; the goal may lie anywhere in its cell.
+int64_t PathPlanner::left_at_least(const Cell& cell, const Place& to, double reach) const {
+  const double column = (to.x_m - grid_.origin_x_m) / grid_.cell_m - 0.5,
+               row = (to.y_m - grid_.origin_y_m) / grid_.cell_m - 0.5;
+  // The goal may lie anywhere in its cell.
   const auto slack = static_cast<int64_t>(kOctilePerLength * kStraight * std::max(reach, 0.75)) + 1;
-  const auto left = [&](const Cell& c) {
-    return std::max<int64_t>(0, octile(c.column - goal_column, c.row - goal_row) - slack);
-  };
-  const auto there = [&](const Cell& c) {
-    return reach_m > 0 ? std::hypot(c.column - goal_column, c.row - goal_row) <= reach && !blocked(c) : c == goal;
-  };
+  return std::max<int64_t>(0, octile(cell.column - column, cell.row - row) - slack);
+}
 
+template <class There, class Left>
+std::optional<uint32_t> PathPlanner::search(const Cell& from, There there, Left left) {
   ++searches_;
   open_.clear();
   expanded_ = 0;
@@ -116,7 +112,10 @@ std::optional<uint32_t> PathPlanner::search(const Cell& from, const Place& to, d
     const uint32_t here = open_.take_least();
     const Cell at = cell(here);
     ++expanded_;
-    if (there(at)) return here;
+    if (there(at)) {
+      cost_ = reached_[here].cost;
+      return here;
+    }
     for (int row = -1; row <= 1; ++row)
       for (int column = -1; column <= 1; ++column) {
         const Cell next{at.column + column, at.row + row};
@@ -132,31 +131,78 @@ std::optional<uint32_t> PathPlanner::search(const Cell& from, const Place& to, d
 }
 
 PathOutcome PathPlanner::plan(const Place& from, const Place& to, double reach_m, std::vector<Place>& path) {
+  if (reach_m > 0) return plan_near(from, {&to, 1}, reach_m, path);
   path.clear();
   const Cell start = grid_.cell_of(from.x_m, from.y_m), goal = grid_.cell_of(to.x_m, to.y_m);
   if (!grid_.contains(start)) return PathOutcome::start_outside;
   if (!grid_.contains(goal)) return PathOutcome::goal_outside;
-  if (reach_m <= 0 && blocked(goal) && goal != start) return PathOutcome::goal_blocked;
-  const auto end = search(start, to, reach_m);
+  if (blocked(goal) && goal != start) return PathOutcome::goal_blocked;
+  const auto end = search(
+      start, [&](const Cell& c) { return c == goal; }, [&](const Cell& c) { return left_at_least(c, to, 0); });
   if (!end) return PathOutcome::no_way;
-  cost_ = reached_[*end].cost;
+  write_way(from, *end, to, path);
+  return PathOutcome::found;
+}
 
+PathOutcome PathPlanner::plan_near(const Place& from, std::span<const Place> places, double reach_m,
+                                   std::vector<Place>& path) {
+  path.clear();
+  const Cell start = grid_.cell_of(from.x_m, from.y_m);
+  if (!grid_.contains(start)) return PathOutcome::start_outside;
+  for (const Place& place : places)
+    if (!grid_.contains(grid_.cell_of(place.x_m, place.y_m))) return PathOutcome::goal_outside;
+  const auto there = [&](const Cell& c) {
+    const Disc reach{middle(c), reach_m};
+    return !blocked(c) && std::all_of(places.begin(), places.end(), [&](const Place& p) { return reach.contains(p); });
+  };
+  const auto left = [&](const Cell& c) {
+    int64_t most = 0;
+    for (const Place& place : places) most = std::max(most, left_at_least(c, place, reach_m / grid_.cell_m));
+    return most;
+  };
+  const auto end = search(start, there, left);
+  if (!end) return PathOutcome::no_way;
+  write_way(from, *end, middle(cell(*end)), path);
+  return PathOutcome::found;
+}
+
+PathOutcome PathPlanner::plan_to_unknown(const Place& from, const Disc& area, std::span<const Disc> seen,
+                                         std::vector<Place>& path) {
+  path.clear();
+  const Cell start = grid_.cell_of(from.x_m, from.y_m);
+  if (!grid_.contains(start)) return PathOutcome::start_outside;
+  const auto unknown = [&](int column, int row) {
+    return grid_.contains({column, row}) && unknown_[index({column, row})] != 0;
+  };
+  const auto there = [&](const Cell& c) {
+    if (blocked(c) || unknown(c.column, c.row)) return false;
+    if (!unknown(c.column + 1, c.row) && !unknown(c.column - 1, c.row) && !unknown(c.column, c.row + 1) &&
+        !unknown(c.column, c.row - 1))
+      return false;
+    const Place place = middle(c);
+    return area.contains(place) &&
+           std::none_of(seen.begin(), seen.end(), [&](const Disc& disc) { return disc.contains(place); });
+  };
+  const auto end = search(start, there, [](const Cell&) { return int64_t{0}; });
+  if (!end) return PathOutcome::no_way;
+  write_way(from, *end, middle(cell(*end)), path);
+  return PathOutcome::found;
+}
+
+void PathPlanner::write_way(const Place& from, uint32_t end, const Place& to, std::vector<Place>& path) {
+  const uint32_t start = index(grid_.cell_of(from.x_m, from.y_m));
   cells_.clear();
-  for (uint32_t at = *end; at != index(start); at = reached_[at].from) cells_.push_back(at);
+  for (uint32_t at = end; at != start; at = reached_[at].from) cells_.push_back(at);
   path.push_back(from);
   Place last = from;
   for (size_t i = cells_.size(); i-- > 0;) {
-    const Cell here = cell(cells_[i]);
-    const Place middle{grid_.middle_x_m(here), grid_.middle_y_m(here)};
-    const Place next = i == 0 && reach_m <= 0 ? to : middle;
+    const Place next = i == 0 ? to : middle(cell(cells_[i]));
     // Straight on from the newest corner as far as the way is free; else the cell before is a corner.
     if (path.back().x_m != last.x_m || path.back().y_m != last.y_m)
       if (!sees(path.back(), next)) path.push_back(last);
     last = next;
   }
-  if (cells_.empty() && reach_m <= 0) last = to;
-  path.push_back(last);
-  return PathOutcome::found;
+  path.push_back(to);
 }
 
 template <class Visit>

@@ -2,6 +2,7 @@
 // The cheapest way over an occupancy grid (algorithm reference 15.3; the thesis names the block and prints no
 // algorithm): A* over 8 neighbours, obstacles grown by the robot's radius.
 #pragma once
+#include <cmath>
 #include <optional>
 #include <span>
 #include <string_view>
@@ -14,6 +15,14 @@ namespace takt::navigation {
 
 struct Place {
   double x_m = 0, y_m = 0;
+};
+
+struct Disc {
+  Place middle;
+  double radius_m = 0;
+  bool contains(const Place& place) const {
+    return std::hypot(place.x_m - middle.x_m, place.y_m - middle.y_m) <= radius_m;
+  }
 };
 
 struct PathParameters {
@@ -38,6 +47,11 @@ class PathPlanner {
   /// A way to within `reach_m` of `to` (0: to the place itself), in place of what `path` held: its corners, `from`
   /// first. What `path` can hold without allocating is the caller's to reserve: at most one place a cell.
   PathOutcome plan(const Place& from, const Place& to, double reach_m, std::vector<Place>& path);
+  /// The same to within `reach_m` > 0 of each of `places`, to the middle of a cell.
+  PathOutcome plan_near(const Place& from, std::span<const Place> places, double reach_m, std::vector<Place>& path);
+  /// The same to the nearest known cell beside an unknown one that lies in `area` and in none of `seen`.
+  PathOutcome plan_to_unknown(const Place& from, const Disc& area, std::span<const Disc> seen,
+                              std::vector<Place>& path);
 
   /// Whether no blocked cell lies on the straight pieces of a way: while it is true nothing has to be planned again.
   bool free(std::span<const Place> path) const;
@@ -68,11 +82,17 @@ class PathPlanner {
     const auto width = static_cast<uint32_t>(grid_.cells.width);
     return {static_cast<int>(index % width), static_cast<int>(index / width)};
   }
+  Place middle(const Cell& cell) const { return {grid_.middle_x_m(cell), grid_.middle_y_m(cell)}; }
   void grow_obstacles();
   bool may_step(const Cell& from, const Cell& to) const;
   int64_t step_cost(const Cell& from, const Cell& to) const;
-  /// Number of the goal cell that was reached.
-  std::optional<uint32_t> search(const Cell& from, const Place& to, double reach_m);
+  /// Steps that a place at most `reach` cells from this one is away at least.
+  int64_t left_at_least(const Cell& cell, const Place& to, double reach) const;
+  /// Number of the first cell where there(cell); left(cell) is what is left to such a one at least.
+  template <class There, class Left>
+  std::optional<uint32_t> search(const Cell& from, There there, Left left);
+  /// The corners of the way to the cell that was reached, in which `to` lies.
+  void write_way(const Place& from, uint32_t end, const Place& to, std::vector<Place>& path);
   /// visit(cell) for each cell that a straight piece passes; ends early where that returns false, and tells so.
   template <class Visit>
   bool along(const Place& a, const Place& b, Visit visit) const;

@@ -41,6 +41,8 @@ class Pilot {
 
   /// Ends what is going on; the speed falls within its limits.
   void stand() { behaviour_ = Behaviour::stand; }
+  /// The robot stands, whatever it was told: what goes on goes on from there, and speeds rise from 0.
+  void halt() { sent_ = {}; }
   /// Along the corners of a way, its first being where the robot is, to the last; turns to `direction_rad` there if
   /// one is given. False: too many corners; the behaviour before goes on.
   bool drive_to(std::span<const Place> way, std::optional<double> direction_rad = std::nullopt);

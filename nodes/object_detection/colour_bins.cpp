@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "nodes/stereo/simd_targets.hpp"
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "nodes/object_detection/colour_bins.cpp"
 #include <hwy/foreach_target.h>  // must come before highway.h
@@ -12,71 +14,76 @@ HWY_BEFORE_NAMESPACE();
 namespace takt::object_detection::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-constexpr hn::ScalableTag<float> kFloats;
-constexpr hn::Rebind<int32_t, decltype(kFloats)> kInts;
-constexpr hn::Rebind<uint16_t, decltype(kFloats)> kShorts;
-constexpr hn::Rebind<uint8_t, decltype(kFloats)> kBytes;
-using Floats = hn::Vec<decltype(kFloats)>;
-using Ints = hn::Vec<decltype(kInts)>;
+constexpr hn::ScalableTag<int16_t> kShorts;
+constexpr hn::RebindToUnsigned<decltype(kShorts)> kIndices;
+constexpr hn::Rebind<uint8_t, decltype(kShorts)> kBytes;
+constexpr hn::Half<decltype(kShorts)> kHalf;
+constexpr hn::Rebind<int32_t, decltype(kHalf)> kInts;
+constexpr hn::RebindToFloat<decltype(kInts)> kFloats;
+using Shorts = hn::Vec<decltype(kShorts)>;
+using HalfShorts = hn::Vec<decltype(kHalf)>;
+
+HWY_INLINE Shorts number(int value) { return hn::Set(kShorts, static_cast<int16_t>(value)); }
+
+/// floor(factor n / d), less than 2^15. Quotients of integers n / d with n < 2^17 and d < 2^11 stay at least 2^-11
+/// below the next integer unless they are one, farther than a float rounds: truncation gives the floor exactly.
+HWY_INLINE HalfShorts half_quotient(float factor, HalfShorts n, HalfShorts d) {
+  const auto scaled = hn::Mul(hn::Set(kFloats, factor), hn::ConvertTo(kFloats, hn::PromoteTo(kInts, n)));
+  return hn::DemoteTo(kHalf, hn::ConvertTo(kInts, hn::Div(scaled, hn::ConvertTo(kFloats, hn::PromoteTo(kInts, d)))));
+}
+HWY_INLINE Shorts quotient(int factor, Shorts n, Shorts d) {
+  const auto f = static_cast<float>(factor);
+  return hn::Combine(kShorts, half_quotient(f, hn::UpperHalf(kHalf, n), hn::UpperHalf(kHalf, d)),
+                     half_quotient(f, hn::LowerHalf(kHalf, n), hn::LowerHalf(kHalf, d)));
+}
 
 /// Whole numbers: hue / spread is the position on the colour circle in sixths of a turn, spread / high the saturation.
 struct Hsv {
-  Floats hue, spread, high;
+  Shorts hue, spread, high;
 
   HWY_INLINE explicit Hsv(const uint8_t* bgr) {
     hn::Vec<decltype(kBytes)> b8, g8, r8;
     hn::LoadInterleaved3(kBytes, bgr, b8, g8, r8);
-    const auto b = hn::ConvertTo(kFloats, hn::PromoteTo(kInts, b8)),
-               g = hn::ConvertTo(kFloats, hn::PromoteTo(kInts, g8)),
-               r = hn::ConvertTo(kFloats, hn::PromoteTo(kInts, r8));
+    const auto b = hn::PromoteTo(kShorts, b8), g = hn::PromoteTo(kShorts, g8), r = hn::PromoteTo(kShorts, r8);
     high = hn::Max(b, hn::Max(g, r));
     spread = hn::Sub(high, hn::Min(b, hn::Min(g, r)));
-    const auto of_red = hn::Sub(g, b), of_green = hn::Add(hn::Add(spread, spread), hn::Sub(b, r)),
-               of_blue = hn::Add(hn::Mul(hn::Set(kFloats, 4.0f), spread), hn::Sub(r, g));
+    const auto two = hn::ShiftLeft<1>(spread), four = hn::ShiftLeft<2>(spread);
+    const auto of_red = hn::Sub(g, b), of_green = hn::Add(two, hn::Sub(b, r)), of_blue = hn::Add(four, hn::Sub(r, g));
     hue = hn::IfThenElse(hn::Eq(high, r), of_red, hn::IfThenElse(hn::Eq(high, g), of_green, of_blue));
-    hue = hn::Add(hue, hn::IfThenElseZero(hn::Lt(hue, hn::Zero(kFloats)), hn::Mul(hn::Set(kFloats, 6.0f), spread)));
+    hue = hn::Add(hue, hn::IfThenElseZero(hn::Lt(hue, hn::Zero(kShorts)), hn::Add(four, two)));
   }
-  /// floor(`parts` hue / turn). Quotients of integers n / d with n < 2^17 and d < 2^11 stay at least 2^-11 below the
-  /// next integer unless they are one, farther than a float rounds: truncation gives the floor exactly.
-  HWY_INLINE Ints hue_part(Floats parts) const {
-    const auto one = hn::Set(kFloats, 1.0f), six = hn::Set(kFloats, 6.0f);
-    return hn::ConvertTo(kInts, hn::Div(hn::Mul(hue, parts), hn::Mul(six, hn::Max(spread, one))));
+  /// floor(`parts` hue / turn)
+  HWY_INLINE Shorts hue_part(int parts) const {
+    return quotient(parts, hue, hn::Mul(number(6), hn::Max(spread, number(1))));
   }
 };
 
 size_t Bins(const uint8_t* bgr, size_t count, BinSplit split, uint16_t* index) {
-  const auto one = hn::Set(kFloats, 1.0f);
-  const auto hues = hn::Set(kFloats, static_cast<float>(split.hue)),
-             saturations = hn::Set(kFloats, static_cast<float>(split.saturation));
-  const auto last_saturation = hn::Set(kInts, split.saturation - 1), hue_step = hn::Set(kInts, split.saturation);
-  const auto values = hn::Set(kInts, split.value);
+  const auto last_saturation = number(split.saturation - 1), hue_step = number(split.saturation),
+             values = number(split.value);
   size_t x = 0;
-  for (; x + hn::Lanes(kFloats) <= count; x += hn::Lanes(kFloats)) {
+  for (; x + hn::Lanes(kShorts) <= count; x += hn::Lanes(kShorts)) {
     const Hsv c(bgr + 3 * x);
-    const auto s =
-        hn::Min(last_saturation, hn::ConvertTo(kInts, hn::Div(hn::Mul(c.spread, saturations), hn::Max(c.high, one))));
-    const auto v = hn::ShiftRight<8>(hn::Mul(hn::ConvertTo(kInts, c.high), values));
-    const auto bin = hn::Add(hn::Mul(hn::Add(hn::Mul(c.hue_part(hues), hue_step), s), values), v);
-    hn::StoreU(hn::DemoteTo(kShorts, bin), kShorts, index + x);
+    const auto s = hn::Min(last_saturation, quotient(split.saturation, c.spread, hn::Max(c.high, number(1))));
+    const auto v = hn::ShiftRight<8>(hn::Mul(c.high, values));
+    const auto bin = hn::Add(hn::Mul(hn::Add(hn::Mul(c.hue_part(split.hue), hue_step), s), values), v);
+    hn::StoreU(hn::BitCast(kIndices, bin), kIndices, index + x);
   }
   return x;
 }
 
 size_t PairColours(const uint8_t* bgr, size_t count, PairColourSplit split, uint8_t* index) {
-  const auto number = [](int value) HWY_ATTR { return hn::Set(kFloats, static_cast<float>(value)); };
-  const auto black_below = number(split.black_below), grey_below = number(split.grey_below),
-             mid_from = number(split.mid_from), bright_from = number(split.bright_from), hues = number(split.hues),
-             twenty = number(20);
-  const auto one = hn::Set(kInts, 1), first_hue = hn::Set(kInts, split.first_hue);
+  const auto grey_below = number(split.grey_below), twenty = number(20), one = number(1),
+             first_hue = number(split.first_hue);
   size_t x = 0;
-  for (; x + hn::Lanes(kFloats) <= count; x += hn::Lanes(kFloats)) {
+  for (; x + hn::Lanes(kShorts) <= count; x += hn::Lanes(kShorts)) {
     const Hsv c(bgr + 3 * x);
-    const auto at_least = [&](Floats from)
-                              HWY_ATTR { return hn::IfThenElseZero(hn::RebindMask(kInts, hn::Ge(c.high, from)), one); };
-    const auto grey = hn::Add(one, hn::Add(at_least(mid_from), at_least(bright_from)));
+    const auto from = [&](int value) HWY_ATTR { return hn::Gt(c.high, number(value - 1)); };
+    const auto grey = hn::Add(
+        one, hn::Add(hn::IfThenElseZero(from(split.mid_from), one), hn::IfThenElseZero(from(split.bright_from), one)));
     const auto is_grey = hn::Lt(hn::Mul(twenty, c.spread), hn::Mul(grey_below, c.high));
-    auto colour = hn::IfThenElse(hn::RebindMask(kInts, is_grey), grey, hn::Add(first_hue, c.hue_part(hues)));
-    colour = hn::IfThenElseZero(hn::RebindMask(kInts, hn::Ge(c.high, black_below)), colour);
+    auto colour = hn::IfThenElse(is_grey, grey, hn::Add(first_hue, c.hue_part(split.hues)));
+    colour = hn::IfThenElseZero(from(split.black_below), colour);
     hn::StoreU(hn::DemoteTo(kBytes, colour), kBytes, index + x);
   }
   return x;

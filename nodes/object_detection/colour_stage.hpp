@@ -3,10 +3,10 @@
 // (thesis Sec. 3.4.2; algorithm reference 6.1, 6.2, 6.5).
 #pragma once
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <vector>
 
+#include "nodes/object_detection/byte_references.hpp"
 #include "nodes/object_detection/histogram.hpp"
 #include "nodes/object_detection/window_histograms.hpp"
 
@@ -25,34 +25,31 @@ class ColourStage {
   /// `bgr`: three channels, of the grid's image size (not checked). All windows.
   void run(ImageView<const uint8_t> bgr);
   /// The same in portions: no window is searched yet, and search_row() begins at that row of windows, 0 .. rows - 1.
-  /// Windows whose `wanted` is 0 are left out; if it is not empty, it must stay until the last search_row().
+  /// Windows whose `wanted` is 0 are left out. The image, and `wanted` if not empty, must stay until the last
+  /// search_row().
   void begin(ImageView<const uint8_t> bgr, int first_row, std::span<const uint8_t> wanted = {});
   /// Searches the next row of windows, after the last one row 0, and returns which one; at most once per row.
   int search_row();
 
-  size_t references() const { return references_; }
+  size_t references() const { return references_.references(); }
   /// The missing mass of every reference, object by object, for window 0, 1 ... (row by row).
   std::span<const uint16_t> missing() const { return missing_; }
 
  private:
-  /// The bins that an object's references use: where they stand in a window's histogram, and the references' counts.
-  struct ObjectBins {
-    std::vector<uint16_t> slots;  ///< padded
-    std::vector<uint16_t> rows;   ///< references x slots.size()
-    size_t references = 0;
-  };
-  ObjectBins gather(const std::vector<Histogram>& views) const;
-  void index_image(ImageView<const uint8_t> bgr);
+  size_t assign_slots(std::span<const std::vector<Histogram>> objects);
+  std::vector<std::vector<ByteReferences::Counts>> by_slot(std::span<const std::vector<Histogram>> objects) const;
+  void index_rows(int from, int to, uint16_t* index) const;
 
   SearchGrid grid_;
   ColourBins bins_;
-  size_t references_ = 0;
+  ImageView<const uint8_t> image_;
   int row_ = 0;  ///< that search_row() comes to next
   std::span<const uint8_t> wanted_;
   std::vector<uint16_t> slot_of_bin_;  ///< the last slot takes the bins that no reference uses
-  std::vector<ObjectBins> objects_;
-  std::optional<WindowHistograms> windows_;
-  std::vector<uint16_t> index_, gathered_, missing_;
+  size_t slots_;
+  ByteReferences references_;
+  WindowHistograms windows_;
+  std::vector<uint16_t> missing_;
 };
 
 }  // namespace takt::object_detection

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "nodes/object_detection/intersection_kernel.hpp"
+#include "nodes/object_detection/histogram_kernels.hpp"
 
 namespace takt::object_detection {
 

@@ -14,7 +14,8 @@ constexpr const char* kWords = "valid are object, threshold, view, test_view";
 
 class Reader {
  public:
-  Reader(const std::filesystem::path& folder, int side_px, TestViews test_views, const std::string& list)
+  /// Without `side_px` views have no pixels.
+  Reader(const std::filesystem::path& folder, std::optional<int> side_px, TestViews test_views, const std::string& list)
       : folder_(folder), list_(folder / list), side_px_(side_px), test_views_(test_views) {}
 
   std::vector<DatabaseObject> read() {
@@ -126,6 +127,7 @@ class Reader {
   ReferenceView load(const std::string& name) const {
     ReferenceView view;
     view.file = folder_ / name;
+    if (!side_px_) return view;
     cv::Mat image;
     try {
       image = cv::imread(view.file.string(), cv::IMREAD_UNCHANGED);
@@ -134,10 +136,10 @@ class Reader {
     if (image.empty()) fail("view " + view.file.string() + " cannot be read or is no image");
     if (image.type() != CV_8UC3)
       fail("view " + view.file.string() + " must have three channels of 8 bit (no transparency; background is black)");
-    if (image.cols != side_px_ || image.rows != side_px_)
+    if (image.cols != *side_px_ || image.rows != *side_px_)
       fail("view " + view.file.string() + " is " + std::to_string(image.cols) + " x " + std::to_string(image.rows) +
-           " px, must be " + std::to_string(side_px_) + " x " + std::to_string(side_px_) + " (parameter reference)");
-    view.side_px = side_px_;
+           " px, must be " + std::to_string(*side_px_) + " x " + std::to_string(*side_px_) + " (parameter reference)");
+    view.side_px = *side_px_;
     for (int y = 0; y < image.rows; ++y)
       view.pixels.insert(view.pixels.end(), image.ptr(y), image.ptr(y) + 3 * image.cols);
     if (std::all_of(view.pixels.begin(), view.pixels.end(), [](uint8_t value) { return value == 0; }))
@@ -146,7 +148,7 @@ class Reader {
   }
 
   std::filesystem::path folder_, list_;
-  int side_px_;
+  std::optional<int> side_px_;
   TestViews test_views_;
   int line_ = 0;
   bool threshold_given_ = false;
@@ -164,6 +166,10 @@ std::string DatabaseObject::label() const {
 std::vector<DatabaseObject> read_database(const std::filesystem::path& folder, int side_px, TestViews test_views,
                                           const std::string& list) {
   return Reader(folder, side_px, test_views, list).read();
+}
+
+std::vector<DatabaseObject> read_classes(const std::filesystem::path& folder, const std::string& list) {
+  return Reader(folder, std::nullopt, TestViews::skip, list).read();
 }
 
 }  // namespace takt::object_detection

@@ -67,4 +67,8 @@ enum class TestViews : uint8_t { skip, read };
 std::vector<DatabaseObject> read_database(const std::filesystem::path& folder, int side_px, TestViews test_views,
                                           const std::string& list = "objects.txt");
 
+/// Names and attributes of the entries alone, for who needs to know what class ids mean: no image is read. Throws
+/// DatabaseError.
+std::vector<DatabaseObject> read_classes(const std::filesystem::path& folder, const std::string& list = "objects.txt");
+
 }  // namespace takt::object_detection

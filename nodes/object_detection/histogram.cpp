@@ -27,17 +27,17 @@ Histogram colour_histogram(ImageView<const uint8_t> view, ColourBins bins) {
 }
 
 Histogram orientation_histogram(ImageView<const uint8_t> view, const OrientationBins& bins) {
-  const auto pixels = static_cast<size_t>(view.width) * static_cast<size_t>(view.height);
-  std::vector<uint8_t> values(pixels);
-  std::vector<uint16_t> index(pixels);
-  bins.image(view, values.data(), index.data());
+  const auto width = static_cast<size_t>(view.width);
+  std::vector<uint8_t> values(OrientationBins::kValueRows * width);
+  std::vector<uint16_t> index(width * static_cast<size_t>(view.height));
+  bins.rows(view, 0, view.height, values.data(), index.data());
   Histogram histogram;
   histogram.count.resize(static_cast<size_t>(bins.count()));
   for (int y = 1; y + 1 < view.height; ++y) {
     for (int x = 1; x + 1 < view.width; ++x) {
       bool inside = true;
       for (int i = 0; i < 9; ++i) inside = inside && !is_background(view, x + i % 3 - 1, y + i / 3 - 1);
-      const uint16_t bin = index[static_cast<size_t>(y) * static_cast<size_t>(view.width) + static_cast<size_t>(x)];
+      const uint16_t bin = index[static_cast<size_t>(y) * width + static_cast<size_t>(x)];
       if (!inside || bin == bins.none()) continue;
       ++histogram.count[bin];
       ++histogram.mass;

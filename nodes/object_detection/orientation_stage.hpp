@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "nodes/object_detection/byte_references.hpp"
 #include "nodes/object_detection/histogram.hpp"
 #include "nodes/object_detection/window_histograms.hpp"
 
@@ -20,8 +21,8 @@ class OrientationStage {
   OrientationStage(const SearchGrid& grid, const OrientationBins& bins,
                    std::span<const std::vector<Histogram>> objects);
 
-  /// `bgr`: three channels, of the grid's image size (not checked); must stay until the last call for it. Work begins
-  /// with the first window that is asked for.
+  /// `bgr`: three channels, of the grid's image size (not checked); must stay until the last call for it. Only what
+  /// the windows cover that are asked for is looked at.
   void begin(ImageView<const uint8_t> bgr);
   /// Goes to a window: to the right of the last one, or any in another row, 0 .. windows - 1.
   void go_to(size_t window);
@@ -29,21 +30,15 @@ class OrientationStage {
   std::span<const uint16_t> missing(size_t object);
 
  private:
-  struct References {
-    std::vector<uint16_t> rows;
-    size_t count = 0;
-  };
-
   SearchGrid grid_;
   OrientationBins bins_;
   ImageView<const uint8_t> image_;
-  std::vector<References> objects_;
+  ByteReferences references_;
   WindowHistograms windows_;
-  bool prepared_ = false;  ///< index_ is that of image_
-  size_t next_ = 0;        ///< window that windows_ comes to next, once prepared
-  std::span<const uint16_t> histogram_;
+  int row_ = -1;     ///< of windows that windows_ is in; -1 none yet
+  size_t next_ = 0;  ///< window that windows_ comes to next
   std::vector<uint8_t> values_;
-  std::vector<uint16_t> index_, missing_;
+  std::vector<uint16_t> missing_;
 };
 
 }  // namespace takt::object_detection

@@ -6,41 +6,59 @@
 #include <vector>
 
 #include "nodes/object_detection/grid.hpp"
+#include "nodes/stereo/aligned_rows.hpp"
 
 namespace takt::object_detection {
 
-/// The histograms of all windows of a grid, one after another, exactly and without counting a pixel once per window.
+/// The histograms of the windows of a grid, exactly and with each pixel looked at once.
 ///
-/// The borders of all windows cut the image into vertical strips (16 pixels wide at the default grid). Per strip there
-/// is a histogram of the rows that the present row of windows covers: the next row of windows adds the rows that come
-/// and takes away those that go, so each pixel is counted twice. The next window in a row adds the strips that come and
-/// takes away those that go. The work is the same for every image. Memory is taken by the constructor.
+/// The borders of all windows cut the image into vertical strips and horizontal bands (of 16 pixels each at the default
+/// grid). A band's pixels are counted when the first window comes that covers it, by cells, a histogram for each strip.
+/// Per strip the cells of the bands that the present row of windows covers are added up: the next row adds the bands
+/// that come and takes away those that go; the next window of a row does the same with strips. The work is the same for
+/// every image. Memory is taken by the constructor: a histogram for each strip of as many bands as a window covers.
 class WindowHistograms {
  public:
   /// `slots`: indices run from 0 to slots - 1.
   WindowHistograms(const SearchGrid& grid, size_t slots);
 
-  /// Starts at the first window of that row of windows, 0 .. rows - 1. `index`: image_width x image_height slots, row
-  /// by row; must stay until the last next().
-  void begin(const uint16_t* index, int row = 0);
-  /// Histogram of the next window, row by row to the lower right; valid until the next call. At most as often as there
-  /// are windows from there on.
-  std::span<const uint16_t> next();
-  /// Leaves out the windows of the row that next() has not come to the end of; if it has, those of the row below.
-  void skip_rest_of_row();
+  /// A new image: nothing of it is counted.
+  void begin() { forget(0); }
+  /// To the first window of a row, 0 .. rows - 1. Going down costs what is new there, going up a new start.
+  void go_to_row(int row);
+  /// Histogram of the next window of the row, padded with zeros to a multiple of kLaneBlock; valid until the next call.
+  /// At most `columns` times. Bands that come are asked for by index_rows(from, to, index), which writes the slots of
+  /// the rows from .. to - 1, one after another.
+  template <class IndexRows>
+  std::span<const uint16_t> next(const IndexRows& index_rows) {
+    if (u_ == 0) leave_bands_above();
+    for (; end_ < end_band_[v_]; ++end_) {
+      index_rows(y_edges_[end_], y_edges_[end_ + 1], index_.data());
+      count_band();
+    }
+    return slide();
+  }
 
  private:
-  void begin_row_if_due();
-  void count_rows(int from, int to, uint16_t change);
-  void change_window(size_t from_strip, size_t to_strip, bool add);
+  size_t strips() const { return x_edges_.size() - 1; }
+  uint16_t* cells(size_t band) { return cells_.data() + band % kept_bands_ * strips() * slots_; }
+  void forget(size_t first_band);
+  void leave_bands_above();
+  void count_band();
+  template <size_t kAbreast>
+  void count_strips(size_t first);
+  std::span<const uint16_t> slide();
 
   SearchGrid grid_;
-  size_t slots_;
-  std::vector<int> edges_;                       ///< of the strips: strip i is edges_[i] .. edges_[i + 1]
+  size_t slots_;                                 ///< padded
+  std::vector<int> x_edges_, y_edges_;           ///< strip or band i is edge i .. edge i + 1
   std::vector<size_t> first_strip_, end_strip_;  ///< of the windows of each column
-  std::vector<uint16_t> strips_, window_;
-  const uint16_t* index_ = nullptr;
-  int u_ = 0, v_ = 0;
+  std::vector<size_t> first_band_, end_band_;    ///< of the windows of each row
+  size_t kept_bands_ = 0;
+  std::vector<uint16_t> index_;
+  stereo::Buffer<uint16_t> cells_, strips_, window_;
+  size_t first_ = 0, end_ = 0;  ///< bands that strips_ has
+  size_t u_ = 0, v_ = 0;        ///< window that next() comes to
 };
 
 }  // namespace takt::object_detection

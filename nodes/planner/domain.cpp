@@ -148,6 +148,7 @@ class Grounder {
     std::vector<NodeId> identity{node};
     identity.insert(identity.end(), chosen_.begin(), chosen_.end());
     if (!known_.insert(identity).second) return;
+    if (parameters_.within_reach && !parameters_.within_reach(chosen_)) return;
     too_many_ = domain_.actions.size() == parameters_.most_actions;
     if (too_many_) return;
     const Action& action = map_.action(node);
@@ -168,10 +169,7 @@ class Grounder {
       std::sort(ground.required.begin(), ground.required.end(), ascending);
       std::sort(ground.results.begin(), ground.results.end(), ascending);
     }
-    for (Variable& variable : domain_.variables) variable.achievers.resize(variable.values.size());
-    for (uint32_t i = 0; i < domain_.actions.size(); ++i)
-      for (const Fact& fact : domain_.actions[i].results)
-        domain_.variables[fact.variable].achievers[fact.value].push_back(i);
+    domain_.find_achievers();
   }
 
   const SemanticMap& map_;
@@ -199,6 +197,12 @@ int64_t Domain::drive_ns(uint32_t from, const GroundAction& action) const {
     from = place;
   }
   return sum_ns;
+}
+
+void Domain::find_achievers() {
+  for (Variable& variable : variables) variable.achievers.assign(variable.values.size(), {});
+  for (uint32_t i = 0; i < actions.size(); ++i)
+    for (const Fact& fact : actions[i].results) variables[fact.variable].achievers[fact.value].push_back(i);
 }
 
 Travel straight_lines(double speed_m_s) {

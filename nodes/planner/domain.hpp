@@ -57,6 +57,8 @@ struct DomainParameters {
   double speed_m_s = 0.7;         ///< along the straight line, unless there is a `travel`
   Travel travel;                  ///< as a path planner says it, for instance
   size_t most_actions = 200'000;  ///< with their roles filled
+  /// Whether an action can be done with these objects where they stand, one a role; none: always.
+  std::function<bool(std::span<const NodeId>)> within_reach = nullptr;
 };
 
 struct Domain {
@@ -66,9 +68,14 @@ struct Domain {
   std::vector<Variable> variables;
   std::vector<GroundAction> actions;
   std::vector<Fact> goals;
-  std::vector<uint32_t> goal_places;  ///< of the goals' objects
+  std::vector<uint32_t> goal_places;     ///< of the goals' objects
+  std::vector<int64_t> travel_table_ns;  ///< in place of `travel`: row by row, from each place to each; may be empty
 
-  int64_t travel_ns(uint32_t from, uint32_t to) const { return travel(places[from], places[to]); }
+  int64_t travel_ns(uint32_t from, uint32_t to) const {
+    return travel_table_ns.empty() ? travel(places[from], places[to]) : travel_table_ns[from * places.size() + to];
+  }
+  /// Who gives which value, found anew: after `actions` were changed.
+  void find_achievers();
   /// Of an action, the robot being at `from`.
   int64_t drive_ns(uint32_t from, const GroundAction& action) const;
 };

@@ -28,6 +28,12 @@ class Planner {
     return method_ == Method::recursive ? first : search_.find(domain, effort, first);
   }
 
+  /// The same in portions, each with an effort of its own; the recursion is the first. The domain stays until the end.
+  void begin(const Domain& domain, const Effort& effort) { search_.begin(domain, recursion_.find(domain, effort)); }
+  /// True once it is over.
+  bool go_on(const Effort& effort) { return method_ == Method::recursive || search_.go_on(effort); }
+  const Plan& best_so_far() const { return search_.plan(); }
+
  private:
   Method method_;
   Recursion recursion_;

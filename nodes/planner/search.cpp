@@ -186,39 +186,43 @@ void Search::expand(uint32_t from) {
   }
 }
 
-Plan Search::find(const Domain& domain, const Effort& effort, const Plan& known) {
+void Search::begin(const Domain& domain, const Plan& known) {
   domain_ = &domain;
   limit_ns_ = known.exists() ? known.cost_ns : kNoLimit;
   prepare();
-  Plan plan = known;
-  plan.bound_ns = 0;
-  plan.expanded = 0;
+  plan_ = known;
+  plan_.bound_ns = 0;
+  plan_.expanded = 0;
   const State begin{0, hash_of({}, 0), kNone, kNone, 0, 0, 0};
   states_.push_back(begin);
   slot_of(begin) = 0;
   if (const auto left = left_ns({}, 0); left && *left < limit_ns_) open_.put(0, {*left, 0});
-  while (!open_.empty()) {
-    plan.bound_ns = std::max(plan.bound_ns, open_.least().first);
-    const bool early = full_ || plan.expanded >= effort.expansions || (effort.time_is_up && effort.time_is_up());
+}
+
+bool Search::go_on(const Effort& effort) {
+  for (size_t expanded = 0; !open_.empty(); ++expanded) {
+    plan_.bound_ns = std::max(plan_.bound_ns, open_.least().first);
+    const bool early = full_ || expanded >= effort.expansions || (effort.time_is_up && effort.time_is_up());
     if (early) {
-      plan.verdict = plan.exists() ? Verdict::found : Verdict::gave_up;
-      return plan;
+      plan_.verdict = plan_.exists() ? Verdict::found : Verdict::gave_up;
+      return full_;
     }
     const uint32_t number = open_.take_least();
-    ++plan.expanded;
+    ++plan_.expanded;
     const auto now = changes(states_[number]);
-    if (std::all_of(domain.goals.begin(), domain.goals.end(), [&](const Fact& goal) { return holds(now, goal); })) {
-      plan.verdict = Verdict::best;
-      plan.bound_ns = plan.cost_ns = states_[number].cost_ns;
-      write_steps(number, plan);
-      return plan;
+    if (std::all_of(domain_->goals.begin(), domain_->goals.end(), [&](const Fact& goal) { return holds(now, goal); })) {
+      plan_.verdict = Verdict::best;
+      plan_.bound_ns = plan_.cost_ns = states_[number].cost_ns;
+      write_steps(number, plan_);
+      open_.clear();
+      return true;
     }
     expand(number);
-    if (full_) open_.put(number, {plan.bound_ns, 0});  // not expanded wholly: the bound stays
+    if (full_) open_.put(number, {plan_.bound_ns, 0});  // not expanded wholly: the bound stays
   }
-  plan.verdict = plan.exists() ? Verdict::best : Verdict::none;
-  if (plan.exists()) plan.bound_ns = plan.cost_ns;
-  return plan;
+  plan_.verdict = plan_.exists() ? Verdict::best : Verdict::none;
+  if (plan_.exists()) plan_.bound_ns = plan_.cost_ns;
+  return true;
 }
 
 void Search::write_steps(uint32_t end, Plan& plan) const {

@@ -13,7 +13,7 @@ struct SearchCapacity {
   size_t actions = 200'000;    ///< of the domains that it will be given
 };
 
-/// Memory is taken by the constructor; find() takes none but the plan's. One thread at a time.
+/// Memory is taken by the constructor; a search takes none but the plan's. One thread at a time.
 class Search {
  public:
   explicit Search(const SearchCapacity& capacity);
@@ -21,7 +21,19 @@ class Search {
   /// `known` is a plan of the same domain, or none: what cannot cost less is not looked at, and `known` is what is
   /// returned if nothing does. Ends early at the effort's end or where memory is used up, with the bound reached; at
   /// once for a domain of too many actions.
-  Plan find(const Domain& domain, const Effort& effort, const Plan& known);
+  Plan find(const Domain& domain, const Effort& effort, const Plan& known) {
+    begin(domain, known);
+    go_on(effort);
+    return plan_;
+  }
+
+  /// The same in portions: what one leaves, the next goes on with; the same plan in the end. The domain stays until
+  /// then.
+  void begin(const Domain& domain, const Plan& known);
+  /// One portion; true once the search is over. More expansions than a portion's effort it does not make.
+  bool go_on(const Effort& effort);
+  /// The best so far and what is proved.
+  const Plan& plan() const { return plan_; }
 
  private:
   /// Differs from the beginning in `count` variables from `first` on, ascending.
@@ -57,6 +69,7 @@ class Search {
   std::vector<int64_t> goal_ns_;  ///< share of a goal's cheapest action; -1: none gives it
   int64_t limit_ns_ = 0;          ///< only plans below this are of use
   bool full_ = false;
+  Plan plan_;
 };
 
 }  // namespace takt::planner

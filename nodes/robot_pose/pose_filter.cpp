@@ -93,8 +93,10 @@ bool PoseFilter::update(State& state, const Measured& measured) const {
                                    wrapped(z.theta_rad - expected.theta_rad));
   const Eigen::Matrix<double, kSize, 3> cross = state.covariance * by_state.transpose();
   const Eigen::LLT<Eigen::Matrix3d> spread(by_state * cross + measured.covariance);
+  const double distance = innovation.dot(spread.solve(innovation));
+  if (spread.info() != Eigen::Success || !std::isfinite(distance)) return false;  // damaged, and never believed
   const bool trusted = seconds(state.stamp_ns - state.used_ns) <= p_.trust_s;
-  if (trusted && innovation.dot(spread.solve(innovation)) > p_.gate) return false;
+  if (trusted && distance > p_.gate) return false;
 
   const Eigen::Matrix<double, kSize, 3> gain = spread.solve(cross.transpose()).transpose();
   state.mean += gain * innovation;

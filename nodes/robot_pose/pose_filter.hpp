@@ -31,7 +31,7 @@ struct Measured {
 enum class Taken : uint8_t {
   used,
   begun,     ///< the pose at from_ns is not kept: the source's next measurement can be used
-  rejected,  ///< farther from what is expected than `gate`
+  rejected,  ///< farther from what is expected than `gate`, or no number
   too_late,  ///< older than all that is kept, or known already
 };
 

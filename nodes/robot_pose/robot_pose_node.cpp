@@ -75,6 +75,7 @@ class RobotPoseNode final : public Node {
     for (size_t i = 0; i < odometry_.size(); ++i) {
       const int64_t stamp_ns = odometry_.stamp_ns(i);
       if (last_wheels_ && stamp_ns <= wheels_ns_) continue;
+      if (!std::isfinite(odometry_[i].x_m + odometry_[i].y_m + odometry_[i].theta_rad)) continue;
       if (last_wheels_) {
         const PlanarPose moved = between(planar(mapping_3d::robot_in_odometry(*last_wheels_)),
                                          planar(mapping_3d::robot_in_odometry(odometry_[i])));

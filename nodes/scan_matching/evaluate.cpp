@@ -51,6 +51,24 @@ class Tally {
   PlanarPose estimated_, truth_;  ///< chained
 };
 
+/// Places of one method.
+class Places {
+ public:
+  void add(const PlanarPose& estimated, const PlanarPose& truth) {
+    last_ = error_between(estimated, truth);
+    metres_.push_back(last_.error_m);
+    degrees_.push_back(last_.error_rad / kDegree);
+  }
+  PlaceError figures() const {
+    const double most = metres_.empty() ? 0 : *std::max_element(metres_.begin(), metres_.end());
+    return {quantile(metres_, 0.5), quantile(degrees_, 0.5), most, last_.error_m, last_.error_rad / kDegree};
+  }
+
+ private:
+  std::vector<double> metres_, degrees_;
+  StepError last_;
+};
+
 /// How far the surfaces of two scans lie apart.
 class Gap {
  public:
@@ -105,8 +123,10 @@ StepError error_between(const PlanarPose& estimated, const PlanarPose& truth) {
 
 Evaluation evaluate(const Drive& drive, const Parameters& parameters, bool with_odometry, const Limits& limits) {
   ScanMatcher matcher(drive.beams, parameters), mapless(drive.beams, without_map(parameters));
+  LoopCloser closer(drive.beams, parameters.map, {});
   Evaluation out;
   Tally matched(limits), odometry(limits);
+  Places place, closed;
   Gap gap(drive, parameters);
   std::vector<double> times_ms, gaps, gaps_by_truth, apart_m, apart_deg;
   size_t accepted = 0, inside = 0;
@@ -117,6 +137,12 @@ Evaluation evaluate(const Drive& drive, const Parameters& parameters, bool with_
     const Match match = matcher.step(drive.sweep(i), dt_s, moved);
     times_ms.push_back(static_cast<double>(thread_cpu_ns() - begin) * 1e-6);
     out.poses.push_back(match.robot_in_map);
+    const int64_t look = thread_cpu_ns();
+    out.loops += match.accepted() && closer.step(match.robot_in_map, matcher.points());
+    out.loop_ms_max = std::max(out.loop_ms_max, static_cast<double>(thread_cpu_ns() - look) * 1e-6);
+    const PlanarPose truly = between(drive.scans[0].truth, drive.scans[i].truth);
+    place.add(match.robot_in_map, truly);
+    closed.add(closer.robot_in_map(match.robot_in_map), truly);
     const Match other = mapless.step(drive.sweep(i), dt_s, moved);
     if (i == 0) continue;
     const PlanarPose truth = drive.moved_truly(i);
@@ -136,6 +162,8 @@ Evaluation evaluate(const Drive& drive, const Parameters& parameters, bool with_
   }
   out.matched = matched.figures();
   out.odometry = odometry.figures();
+  out.place = place.figures();
+  out.place_closed = closed.figures();
   out.gap_m = quantile(gaps, 0.5);
   out.gap_by_truth_m = quantile(gaps_by_truth, 0.5);
   out.apart_m = quantile(apart_m, 0.5);

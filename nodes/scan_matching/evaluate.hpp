@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "nodes/scan_matching/drive.hpp"
+#include "nodes/scan_matching/loop_closer.hpp"
 #include "nodes/scan_matching/scan_matcher.hpp"
 
 namespace takt::scan_matching {
@@ -21,6 +22,13 @@ struct ErrorFigures {
   double end_error_m = 0, end_error_deg = 0;  ///< of all steps chained
 };
 
+/// Of where the robot is, in the frame of the first scan.
+struct PlaceError {
+  double off_m = 0, off_deg = 0;  ///< medians
+  double off_m_most = 0;
+  double end_m = 0, end_deg = 0;  ///< at the last scan
+};
+
 struct Evaluation {
   ErrorFigures matched, odometry;
   size_t steps = 0;
@@ -31,9 +39,12 @@ struct Evaluation {
   /// Median difference between a step and the same one by matching with the scan before alone. These two share no map:
   /// an error much larger than this is not matching's but the truth's.
   double apart_m = 0, apart_deg = 0;
-  double within_95_pct = 0;  ///< accepted steps whose error lies within the 95 % ellipsoid of their covariance
+  double within_95_pct = 0;        ///< accepted steps whose error lies within the 95 % ellipsoid of their covariance
+  PlaceError place, place_closed;  ///< as matched; with loops closed, as the robot knows it at each scan
+  size_t loops = 0;                ///< corrections
   double path_m = 0;
   double time_ms_p50 = 0, time_ms_max = 0;  ///< CPU time of a step
+  double loop_ms_max = 0;                   ///< of a look for a loop
   std::vector<PlanarPose> poses;            ///< of each scan, in the frame of the first
 };
 

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "nodes/mapping_3d/pose.hpp"
+#include "nodes/scan_matching/loop_closer.hpp"
 #include "nodes/scan_matching/occupancy_map.hpp"
 #include "nodes/scan_matching/scan_matcher.hpp"
 #include "rt/node.hpp"
@@ -20,7 +21,14 @@ class ScanMatchingNode final : public Node {
     if (map_cell_ > map_window_ / 2)
       throw SetupError("map_cell is " + map_cell_.value_text() +
                        " m, must be at most half of map_window = " + map_window_.value_text() + " m");
-    matcher_.emplace(scan_.capacity().count, parameters());
+    const Parameters p = parameters();
+    matcher_.emplace(scan_.capacity().count, p);
+    if (correction_.connected()) {
+      ClosureParameters closure;
+      closure.way_m = loop_way_;
+      closure.drift_m = loop_drift_;
+      closer_.emplace(scan_.capacity().count, p.map, closure);
+    }
     occupancy_.emplace(OccupancyParameters{map_cell_, map_window_, range_max_});
     const auto side = static_cast<uint32_t>(occupancy_->side());
     map_.reserve({side, side, 1, 0});
@@ -54,8 +62,8 @@ class ScanMatchingNode final : public Node {
     if (match.map_anew)
       job.results_doubtful("scans did not fit the map any more: it begins anew where odometry says the robot is");
     if (!match.accepted()) return job.no_result();
-    const bool all =
-        give_pose(match, stamp_ns) && give_odometry(match, dt_s, stamp_ns) && give_map(match, sweep, stamp_ns);
+    const bool all = give_pose(match, stamp_ns) && give_odometry(match, dt_s, stamp_ns) &&
+                     give_map(match, sweep, stamp_ns) && give_correction(match, stamp_ns);
     if (!all) job.no_result();
   }
 
@@ -121,6 +129,19 @@ class ScanMatchingNode final : public Node {
     return true;
   }
 
+  /// State and not an event, so that nothing hangs on one message.
+  bool give_correction(const Match& match, int64_t stamp_ns) {
+    if (!closer_) return true;
+    const std::optional<Closure> closure = closer_->step(match.robot_in_map, matcher_->points());
+    if (closure || !known_) known_ = Known{stamp_ns, closure ? closure->actual : match.robot_in_map};
+    Pose* out = correction_.loan();
+    if (!out) return false;
+    *out = {};
+    out->transform = to_transform(known_->robot_in_map);
+    correction_.send(known_->stamp_ns);
+    return true;
+  }
+
   Parameters parameters() const {
     Parameters p;
     p.map.keyframes = keyframes_;
@@ -149,6 +170,9 @@ class ScanMatchingNode final : public Node {
                      "robot in the frame where odometry, or else the first scan, began; covariance of all steps"};
   Output<Odometry> moved_{this, "odometry", "the same as an odometry, for whoever takes one"};
   Output<Grid> map_{this, "map", "occupancy of the map frame's cells around the robot"};
+  Output<Pose> correction_{this, "correction",
+                           "with each pose: when the robot's place was known last, and where: at the first scan, or "
+                           "where a loop was closed; covariance not known: 0"};
 
   Param<double> range_max_{this, "range_max", 15.0, {1.0, 80.0}, "m", "farther returns are not used"};
   Param<int> keyframes_{this, "keyframes", 20, {1, 200}, "", "scans that the next one is matched with"};
@@ -174,7 +198,16 @@ class ScanMatchingNode final : public Node {
   Param<double> map_cell_{this, "map_cell", 0.10, {0.02, 1.0}, "m", "edge of a cell of the map"};
   Param<double> map_window_{this, "map_window", 30.0, {1.0, 200.0}, "m", "side of the map"};
 
+  Param<double> loop_way_{this, "loop_way", 10.0, {1.0, 1000.0}, "m", "driven before a place counts as known again"};
+  Param<double> loop_drift_{this, "loop_drift", 1.5, {0.2, 10.0}, "m", "error that is looked for there, to each side"};
+
   std::optional<ScanMatcher> matcher_;
+  std::optional<LoopCloser> closer_;  ///< if somebody wants to know
+  struct Known {
+    int64_t stamp_ns;
+    PlanarPose robot_in_map;
+  };
+  std::optional<Known> known_;  ///< the first place, or where the last loop was closed
   std::optional<OccupancyMap> occupancy_;
   PoseTrack wheels_{InputPort::kMaxDepth, kLongestGapNs};  ///< robot in the odometry frame
   int64_t last_stamp_ns_ = INT64_MIN;

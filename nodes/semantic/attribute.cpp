@@ -19,7 +19,8 @@ bool take_number(std::string_view& text, double& value) {
   return true;
 }
 
-Value value_of(const Attribute& attribute, std::string_view text) {
+/// A value of the attribute's kind, in its range or not.
+Value read_value(const Attribute& attribute, std::string_view text) {
   switch (attribute.kind) {
     case ValueKind::scalar:
       if (double number = 0; take_number(text, number) && text == attribute.unit) return number;
@@ -74,24 +75,38 @@ double distance(const Attribute& attribute, const Value& a, const Value& b) {
   return a == b ? 0 : 1;
 }
 
+Value value_of(const Attribute& attribute, std::string_view text) {
+  const Value value = read_value(attribute, text);
+  return fits(attribute, value) ? value : Value{};
+}
+
 tl::expected<Value, std::string> parse_value(const Attribute& attribute, std::string_view text) {
   const Value value = value_of(attribute, text);
-  if (fits(attribute, value)) return value;
+  if (known(value)) return value;
   return tl::make_unexpected(fmt::format("`{}` is no value of it; valid: {}", text, describe(attribute)));
 }
 
-std::string to_text(const Attribute& attribute, const Value& value) {
-  if (!fits(attribute, value)) return "unknown";
+size_t write_value(const Attribute& attribute, const Value& value, std::span<char> into) {
+  if (!fits(attribute, value)) return 0;
+  const auto write = [&]<class... T>(fmt::format_string<T...> form, T&&... values) {
+    return fmt::format_to_n(into.data(), into.size(), form, std::forward<T>(values)...).size;
+  };
   switch (attribute.kind) {
-    case ValueKind::scalar: return fmt::format("{:g}{}", std::get<double>(value), attribute.unit);
-    case ValueKind::boolean: return std::get<bool>(value) ? "true" : "false";
+    case ValueKind::scalar: return write("{:g}{}", std::get<double>(value), attribute.unit);
+    case ValueKind::boolean: return write("{}", std::get<bool>(value));
     case ValueKind::colour: {
       const Rgb& c = std::get<Rgb>(value);
-      return fmt::format("{:g} {:g} {:g}", c.r, c.g, c.b);
+      return write("{:g} {:g} {:g}", c.r, c.g, c.b);
     }
     case ValueKind::enumerated: break;
   }
-  return attribute.words[std::get<Word>(value).index];
+  return write("{}", attribute.words[std::get<Word>(value).index]);
+}
+
+std::string to_text(const Attribute& attribute, const Value& value) {
+  std::string text(write_value(attribute, value, {}), '\0');
+  write_value(attribute, value, text);
+  return text.empty() ? "unknown" : text;
 }
 
 std::string describe(const Attribute& attribute) {

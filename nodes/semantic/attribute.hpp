@@ -3,6 +3,7 @@
 // 10.4, 11.1).
 #pragma once
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 #include <tl/expected.hpp>
@@ -41,8 +42,13 @@ bool fits(const Attribute& attribute, const Value& value);
 /// 0..1 of two values that fit: scalar |a - b| / range, colour root mean square over the channels, else 0 or 1.
 double distance(const Attribute& attribute, const Value& a, const Value& b);
 
-/// "1.5kg", "true", "0.9 0.1 0.1", "full", each as the attribute wants it. The error says what is valid.
+/// "1.5kg", "true", "0.9 0.1 0.1", "full", each as the attribute wants it; unknown: no value of it. No allocation.
+Value value_of(const Attribute& attribute, std::string_view text);
+/// The same; the error says what is valid.
 tl::expected<Value, std::string> parse_value(const Attribute& attribute, std::string_view text);
+/// Writes what value_of() reads, as much as fits, and returns how many characters it takes: 0 of an unknown value. No
+/// allocation.
+size_t write_value(const Attribute& attribute, const Value& value, std::span<char> into);
 /// What parse_value() reads; "unknown" of an unknown value.
 std::string to_text(const Attribute& attribute, const Value& value);
 /// "boolean", "scalar, 0..20 kg", "one of empty, full".

@@ -6,32 +6,42 @@
 namespace takt::semantic {
 
 ClockGenerator::ClockGenerator(std::vector<TimedRequest> script, const std::vector<std::string>& idle,
-                               uint8_t idle_every)
-    : script_(std::move(script)), idle_every_(idle_every) {
+                               uint8_t idle_every, Needs needs)
+    : script_(std::move(script)), needs_(std::move(needs)), idle_every_(idle_every) {
   for (const TimedRequest& request : script_) target_.push_back(index_of(request.node));
   for (const std::string& id : idle) nodes_[index_of(id)].idles = true;
+  for (const Rule& rule : needs_.rules()) of_rule_.push_back(index_of(rule.otherwise.node));
   deviating_.resize(nodes_.size());
 }
 
-size_t ClockGenerator::index_of(const std::string& id) {
+size_t ClockGenerator::index_of(std::string_view id) {
   for (size_t i = 0; i < nodes_.size(); ++i)
     if (id == nodes_[i].scripted.node) return i;
   id.copy(nodes_.emplace_back().scripted.node, sizeof(Request::node) - 1);
   return nodes_.size() - 1;
 }
 
-void ClockGenerator::update(int64_t elapsed_ns, bool robot_stopped) {
+void ClockGenerator::update(int64_t elapsed_ns, bool robot_stopped, const Surroundings& around) {
   for (; next_ < script_.size() && script_[next_].after_ns <= elapsed_ns; ++next_) {
     Request& node = nodes_[target_[next_]].scripted;
     if (script_[next_].verb == Verb::pace) node.every = script_[next_].every;
     else node.run = script_[next_].verb == Verb::start;
   }
-  count_ = 0;
-  for (const NodeState& state : nodes_) {
-    Request wanted = state.scripted;
-    if (robot_stopped && state.idles) wanted.every = std::max(wanted.every, idle_every_);
-    if (!wanted.run || wanted.every > 1) deviating_[count_++] = wanted;
+  for (NodeState& state : nodes_) {
+    state.wanted = state.scripted;
+    if (robot_stopped && state.idles) state.wanted.every = std::max(state.wanted.every, idle_every_);
   }
+  needs_.update(around, elapsed_ns);
+  for (size_t i = 0; i < of_rule_.size(); ++i) {
+    if (needs_.needed(i)) continue;
+    const Request& otherwise = needs_.rules()[i].otherwise;
+    Request& wanted = nodes_[of_rule_[i]].wanted;
+    wanted.run = std::min(wanted.run, otherwise.run);
+    wanted.every = std::max(wanted.every, otherwise.every);
+  }
+  count_ = 0;
+  for (const NodeState& state : nodes_)
+    if (!state.wanted.run || state.wanted.every > 1) deviating_[count_++] = state.wanted;
 }
 
 }  // namespace takt::semantic

@@ -5,8 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "nodes/semantic/script.hpp"
-#include "rt/msg/messages.hpp"
+#include "nodes/semantic/needs.hpp"
 
 namespace takt::semantic {
 
@@ -14,13 +13,15 @@ namespace takt::semantic {
 class ClockGenerator {
  public:
   ClockGenerator() = default;
-  /// `script` ascending in time; `idle` nodes run at every `idle_every`-th release while the robot is stopped.
-  ClockGenerator(std::vector<TimedRequest> script, const std::vector<std::string>& idle, uint8_t idle_every);
+  /// `script` ascending in time; `idle` nodes run at every `idle_every`-th release while the robot is stopped. What is
+  /// asked of a node is the least of what script, list and the rules that do not need it leave.
+  ClockGenerator(std::vector<TimedRequest> script, const std::vector<std::string>& idle, uint8_t idle_every,
+                 Needs needs = {});
 
   /// `elapsed_ns` since the first job, never less than in the call before.
-  void update(int64_t elapsed_ns, bool robot_stopped);
+  void update(int64_t elapsed_ns, bool robot_stopped, const Surroundings& around = {});
 
-  /// Of the nodes named in script and list: those that deviate from their full rate, in the order of their first
+  /// Of the nodes named in script, list and rules: those that deviate from their full rate, in the order of their first
   /// naming.
   std::span<const Request> deviating() const { return {deviating_.data(), count_}; }
   size_t nodes() const { return nodes_.size(); }
@@ -28,12 +29,14 @@ class ClockGenerator {
  private:
   struct NodeState {
     Request scripted;  ///< as the script left it
+    Request wanted;    ///< now
     bool idles = false;
   };
-  size_t index_of(const std::string& id);  ///< in nodes_; added if it is new
+  size_t index_of(std::string_view id);  ///< in nodes_; added if it is new
 
   std::vector<TimedRequest> script_;
-  std::vector<size_t> target_;  ///< index into nodes_ for each request of the script
+  Needs needs_;
+  std::vector<size_t> target_, of_rule_;  ///< index into nodes_ for each request of the script, each rule
   std::vector<NodeState> nodes_;
   std::vector<Request> deviating_;
   size_t next_ = 0, count_ = 0;

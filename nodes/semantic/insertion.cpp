@@ -56,22 +56,40 @@ Insertion::Insertion(SemanticMap& map, const InsertionParameters& parameters)
   gone_.reserve(map.network().capacity());
 }
 
-Decision Insertion::insert(const Observation& observation) {
-  Decision decision;
+/// kNoNode: none of its type is within reach.
+NodeId Insertion::most_similar(const Observation& observation, Comparison& comparison) {
   NodeId best = kNoNode;
   map_.near(observation.x_m, observation.y_m, parameters_.similarity.distance_max_m, [&](NodeId object, double) {
     if (!map_.network().connected(object, observation.type)) return;
     if (parameters_.distinct_in_view && map_.object(object).seen_ns == observation.stamp_ns) return;
     const Comparison c = similarity_.compare(observation, object);
-    if (best != kNoNode && (c.p < decision.comparison.p || (c.p == decision.comparison.p && object > best))) return;
+    if (best != kNoNode && (c.p < comparison.p || (c.p == comparison.p && object > best))) return;
     best = object;
-    decision.comparison = c;
+    comparison = c;
   });
+  return best;
+}
+
+/// kNoNode: there is none.
+NodeId Insertion::namesake(const Observation& observation, Comparison& comparison) {
+  const Network& network = map_.network();
+  const NodeId node = network.find(observation.name);
+  if (node == kNoNode || network.kind(node) != Kind::object || !network.connected(node, observation.type))
+    return kNoNode;
+  comparison = similarity_.compare(observation, node);
+  return node;
+}
+
+Decision Insertion::insert(const Observation& observation) {
+  Decision decision;
+  decision.named = !observation.name.empty();
+  NodeId best =
+      decision.named ? namesake(observation, decision.comparison) : most_similar(observation, decision.comparison);
   if (best != kNoNode) write_name(map_.network().name(best), decision.candidate);
 
-  const bool merge = best != kNoNode && decision.comparison.p >= parameters_.merge_min;
+  const bool merge = best != kNoNode && (decision.named || decision.comparison.p >= parameters_.merge_min);
   if (!merge) {
-    const auto created = map_.add_object(observation.type, observation.x_m, observation.y_m);
+    const auto created = map_.add_object(observation.type, observation.x_m, observation.y_m, observation.name);
     if (!created) {
       decision.error = created.error();
       write_name(map_.network().name(observation.type), decision.name);
@@ -90,6 +108,8 @@ Decision Insertion::insert(const Observation& observation) {
 
 void Insertion::update(NodeId node, const Observation& observation) {
   Object& object = map_.object(node);
+  const double moved_m = std::hypot(observation.x_m - object.x_m, observation.y_m - object.y_m);
+  if (moved_m > parameters_.similarity.distance_max_m) object.sightings = 0;
   const double share = 1.0 / std::min(++object.sightings, parameters_.weight_most);
   object.seen_ns = observation.stamp_ns;
   object.confidence = observation.confidence;
@@ -133,12 +153,15 @@ std::string_view explain(const SemanticMap& map, const Decision& d, const Insert
   };
   switch (d.outcome) {
     case Outcome::merged:
-      text.add("merged with {}, p = {:.2f} >= {:.2f}", d.name, c.p, parameters.merge_min);
+      if (d.named) text.add("merged with {}, which has its name", d.name);
+      else text.add("merged with {}, p = {:.2f} >= {:.2f}", d.name, c.p, parameters.merge_min);
       because();
       break;
     case Outcome::created:
       text.add("created {}: ", d.name);
-      if (d.candidate[0] == '\0') {
+      if (d.named) {
+        text.add("nothing had its name");
+      } else if (d.candidate[0] == '\0') {
         text.add("none of its type within {:g} m", parameters.similarity.distance_max_m);
       } else {
         text.add("most similar is {}, p = {:.2f} < {:.2f}", d.candidate, c.p, parameters.merge_min);

@@ -24,6 +24,7 @@ struct Decision {
   NodeId object = kNoNode;                ///< removed: no longer valid
   char name[kLongestName + 1] = {};       ///< of the object; refused: of the type
   char candidate[kLongestName + 1] = {};  ///< most similar object; empty: none of the type was within reach
+  bool named = false;                     ///< the observation had a name, which decides
   Comparison comparison;                  ///< with the candidate
   uint32_t sightings = 0, missed = 0;
   NetworkError error = NetworkError::full;  ///< of a refused one
@@ -42,7 +43,9 @@ class Insertion {
  public:
   Insertion(SemanticMap& map, const InsertionParameters& parameters);
 
-  /// Of equally similar candidates the one with the lower id. Observed values replace older ones.
+  /// Of equally similar candidates the one with the lower id. What has a name is the object of that name and type, or a
+  /// new one; seen farther away than d_max it has been moved, and is where it was seen. Observed values replace older
+  /// ones.
   Decision insert(const Observation& observation);
 
   /// Once for each look, after its observations were inserted: objects in sight that were not among them, and whose
@@ -56,6 +59,8 @@ class Insertion {
   const InsertionParameters& parameters() const { return parameters_; }
 
  private:
+  NodeId most_similar(const Observation& observation, Comparison& comparison);
+  NodeId namesake(const Observation& observation, Comparison& comparison);
   void find_missed(const Look& look, const navigation::OccupancyView& seen);
   Decision remove(NodeId object);
   void update(NodeId object, const Observation& observation);

@@ -8,6 +8,7 @@
 #include "nodes/mapping_3d/pose.hpp"
 #include "nodes/semantic/insertion.hpp"
 #include "nodes/semantic/network_file.hpp"
+#include "nodes/semantic/reports.hpp"
 #include "nodes/semantic/script.hpp"
 #include "rt/node.hpp"
 #include "rt/transform/transform_buffer.hpp"
@@ -35,6 +36,7 @@ constexpr Measured kMeasured[] = {
 class SemanticMapNode final : public Node {
  public:
   void setup(Setup& setup) override {
+    if (!things_.connected() && !reports_.connected()) throw SetupError("connect `things` or `reports`, or both");
     InsertionParameters p;
     p.merge_min = merge_min_;
     p.similarity.distance_max_m = distance_max_;
@@ -54,32 +56,35 @@ class SemanticMapNode final : public Node {
       measured_[i] = usable ? node : kNoNode;
     }
     insertion_.emplace(*map_, p);
+    reader_.emplace(*map_);
     objects_.reserve({0, 0, 1, static_cast<uint32_t>(capacity_())});
+    known_.reserve({0, 0, 1, static_cast<uint32_t>(capacity_())});
     decisions_.reserve({0, 0, 1, kCharacters});
   }
 
   void start(int64_t) override {
-    const Objects3d* known = objects_.handed_over();
-    if (!known) return;
-    for (const Object3d& object : known->objects.items()) see(object, object.x_m, object.y_m, 0);
-    used_ = 0;
+    if (const ObjectReports* known = known_.handed_over()) restore(*known);
   }
 
   void run(Job& job) override {
     for (size_t i = 0; i < odometry_.size(); ++i)
       track_.insert(odometry_.stamp_ns(i), {mapping_3d::robot_in_odometry(odometry_[i]), {}});
     used_ = 0;
-    const int64_t before_ns = last_stamp_ns_;
+    const int64_t before_ns = newest_ns();
     TextStatus* decisions = decisions_.loan();
     Objects3d* objects = objects_.loan();
+    ObjectReports* known = known_.loan();
     if (decisions) decisions->text.resize(kCharacters);
     text_ = decisions ? decisions->text.items() : std::span<char>();
     for (size_t i = 0; i < things_.size(); ++i) look(things_[i], things_.stamp_ns(i));
-    if (last_stamp_ns_ == before_ns || !decisions || !objects) return job.no_result();
+    for (size_t i = 0; i < reports_.size(); ++i) look(reports_[i], reports_.stamp_ns(i));
+    if (newest_ns() == before_ns || !decisions || !objects || !known) return job.no_result();
     decisions->text.resize(static_cast<uint32_t>(used_));
-    decisions_.send(last_stamp_ns_);
+    decisions_.send(newest_ns());
     list_objects(*objects);
-    objects_.send(last_stamp_ns_);
+    objects_.send(newest_ns());
+    write_reports(*map_, *known);
+    known_.send(newest_ns());
   }
 
  private:
@@ -93,25 +98,48 @@ class SemanticMapNode final : public Node {
     }
   }
 
-  /// Things count once the robot's pose is known at their stamp.
-  void look(const Objects3d& things, int64_t stamp_ns) {
-    if (stamp_ns <= last_stamp_ns_) return;
+  int64_t newest_ns() const { return std::max(last_things_ns_, last_reports_ns_); }
+
+  /// In the map, for a message that has not counted yet; a message counts once the robot's pose is known at its stamp.
+  std::optional<mapping_3d::Affine> robot_at(int64_t stamp_ns, int64_t& last_ns) const {
+    if (stamp_ns <= last_ns) return std::nullopt;
     const auto robot = track_.at(stamp_ns);
+    if (!robot) return std::nullopt;
+    last_ns = stamp_ns;
+    return mapping_3d::to_affine(robot->transform);
+  }
+
+  void look(const Objects3d& things, int64_t stamp_ns) {
+    const auto robot = robot_at(stamp_ns, last_things_ns_);
     if (!robot) return;
-    last_stamp_ns_ = stamp_ns;
-    const mapping_3d::Affine to_map = mapping_3d::to_affine(robot->transform);
     for (const Object3d& thing : things.objects.items()) {
-      const auto place = transformed(to_map, thing.x_m, thing.y_m, thing.z_m);
+      const auto place = transformed(*robot, thing.x_m, thing.y_m, thing.z_m);
       see(thing, place.x_m, place.y_m, stamp_ns);
     }
-    // What a job that ran out of time did not come to is not missed.
+    if (things.searched >= 1) forget(*robot, stamp_ns);  // what a job did not come to is not missed
+  }
+
+  void look(const ObjectReports& reports, int64_t stamp_ns) {
+    const auto robot = robot_at(stamp_ns, last_reports_ns_);
+    if (!robot) return;
+    const mapping_3d::Affine to_map = reports.in_map ? mapping_3d::Affine{} : *robot;
+    for_each_report(reports, [&](const Report& report) {
+      const auto misfit = [&](Misfit what, const ObjectAttribute* attribute) { tell(report, what, attribute); };
+      if (const auto observation = reader_->read(report, to_map, stamp_ns, misfit))
+        tell(insertion_->insert(*observation));
+    });
+    forget(*robot, stamp_ns);
+  }
+
+  /// Objects in view that the grid shows gone.
+  void forget(const mapping_3d::Affine& robot, int64_t stamp_ns) {
     const Grid* grid = grid_.empty() || grid_.stale() ? nullptr : grid_.newest();
-    if (!grid || things.searched < 1 || !lies_in_map(*grid)) return;
+    if (!grid || !lies_in_map(*grid)) return;
     const navigation::OccupancyView seen{grid->view(), grid->cell_m, grid->origin_x_m + grid->grid_in_map.x,
                                          grid->origin_y_m + grid->grid_in_map.y};
     map_->take_over(seen);
-    const double ahead_rad = std::atan2(to_map.r[4], to_map.r[1]);  // the robot drives along its y axis
-    insertion_->forget({robot->transform.x, robot->transform.y, ahead_rad, view_() / 2, range_, stamp_ns}, seen,
+    const double ahead_rad = std::atan2(robot.r[4], robot.r[1]);  // the robot drives along its y axis
+    insertion_->forget({robot.t[0], robot.t[1], ahead_rad, view_() / 2, range_, stamp_ns}, seen,
                        [&](const Decision& decision) { tell(decision); });
   }
 
@@ -134,9 +162,28 @@ class SemanticMapNode final : public Node {
     tell(insertion_->insert({type, x_m, y_m, thing.score, stamp_ns, std::span(states).first(count)}));
   }
 
-  void tell(const Decision& decision) {
+  /// In the place of all objects that the network's file knows: what this node published last.
+  void restore(const ObjectReports& known) {
+    for (NodeId node = 0; node < map_->network().end(); ++node)
+      if (map_->network().exists(node) && map_->network().kind(node) == Kind::object) map_->remove(node);
+    for_each_report(known, [&](const Report& report) {
+      const auto observation = reader_->read(report, {}, 0, [](Misfit, const ObjectAttribute*) {});
+      if (observation) insertion_->insert(*observation);
+    });
+  }
+
+  /// Writes another line, as much of it as there is room for.
+  template <class Write>
+  void line(Write write) {
     if (used_ > 0 && used_ < text_.size()) text_[used_++] = '\n';
-    used_ += explain(*map_, decision, insertion_->parameters(), text_.subspan(used_)).size();
+    used_ += write(text_.subspan(used_)).size();
+  }
+  void tell(const Decision& decision) {
+    line([&](std::span<char> into) { return explain(*map_, decision, insertion_->parameters(), into); });
+  }
+  void tell(const Report& report, Misfit misfit, const ObjectAttribute* attribute) {
+    const uint64_t so_far = ++misfits_[static_cast<size_t>(misfit)];
+    line([&](std::span<char> into) { return explain(report, misfit, attribute, so_far, into); });
   }
 
   void list_objects(Objects3d& out) const {
@@ -166,16 +213,18 @@ class SemanticMapNode final : public Node {
   static constexpr uint32_t kCharacters = 2000;
   static constexpr int64_t kLongestGap_ns = 500'000'000;  ///< between two poses of the odometry
 
-  Input<Objects3d> things_{this, "things", "what is seen, robot frame; depth 4"};
+  Input<Objects3d> things_{this, "things", "what is measured, robot frame; depth 4", Need::optional};
+  Input<ObjectReports> reports_{this, "reports", "what is recognised, robot frame; depth 4", Need::optional};
   Input<Odometry> odometry_{this, "odometry", "the robot's poses in the map around the things' stamps; depth 16"};
   Input<Grid> grid_{this, "grid",
                     "what is free and what is not, axes of the map frame: objects whose place is seen free go",
                     Need::optional};
   Output<Objects3d> objects_{this, "objects", "all objects of the map, map frame; class_id as `classes` counts"};
+  Output<ObjectReports> known_{this, "reports", "the same by names with all states; what a restarted node begins with"};
   Output<TextStatus> decisions_{this, "decisions", "what became of each thing seen, and why; one line each"};
 
   Param<std::string> network_{this, "network", "", kPath, "predefined network (YAML); empty: the classes alone"};
-  Param<std::string> classes_{this, "classes", "", "", "types by class_id, joined by commas; others are not kept"};
+  Param<std::string> classes_{this, "classes", "", "", "types of `things` by class_id, joined by commas"};
   Param<double> merge_min_{this, "merge_min", 0.75, {0.5, 1.0}, "", "p from which on two are one"};
   Param<double> distance_max_{this, "distance_max", 2.0, {0.1, 20.0}, "m", "farther apart places say two are not one"};
   Param<bool> distinct_in_view_{this, "distinct_in_view", false, "", "things of one message are never one object"};
@@ -186,10 +235,12 @@ class SemanticMapNode final : public Node {
 
   std::optional<SemanticMap> map_;
   std::optional<Insertion> insertion_;
+  std::optional<ReportReader> reader_;
   std::vector<NodeId> types_;  ///< by class_id
   std::array<NodeId, std::size(kMeasured)> measured_{};
   PoseTrack track_{InputPort::kMaxDepth, kLongestGap_ns};
-  int64_t last_stamp_ns_ = INT64_MIN;
+  int64_t last_things_ns_ = INT64_MIN, last_reports_ns_ = INT64_MIN;  ///< stamps of the newest that counted
+  std::array<uint64_t, kMisfits> misfits_{};
   std::span<char> text_;  ///< of the job's decisions
   size_t used_ = 0;
 };

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <cmath>
 #include <string>
 
 #include "nodes/semantic/clock_generator.hpp"
+#include "nodes/semantic/reports.hpp"
 #include "nodes/semantic/status_line.hpp"
 #include "rt/node.hpp"
 
@@ -18,7 +20,13 @@ class SemanticNode final : public Node {
     if (!script) throw SetupError("script: " + script.error());
     const auto idle = parse_node_list(idle_());
     if (!idle) throw SetupError("idle: " + idle.error());
-    generator_ = ClockGenerator(std::move(*script), *idle, static_cast<uint8_t>(idle_every_()));
+    auto rules = parse_rules(rules_());
+    if (!rules) throw SetupError("rules: " + rules.error());
+    for (const Rule& rule : *rules) check_sources(rule);
+    const NeedParameters need{rule_margin_, std::llround(rule_hold_ * 1e9)};
+    generator_ =
+        ClockGenerator(std::move(*script), *idle, static_cast<uint8_t>(idle_every_()), Needs(std::move(*rules), need));
+    near_.reserve(reports_.capacity().count + bodies_.capacity().count);
     requests_.reserve({0, 0, 1, static_cast<uint32_t>(std::max<size_t>(1, generator_.nodes()))});
     status_.reserve({0, 0, 1, kStatusCharacters});
   }
@@ -32,7 +40,7 @@ class SemanticNode final : public Node {
     if (!first_ns_) first_ns_ = now_ns;
     const bool stop_lost = stop_.connected() && (stop_.empty() || stop_.stale());
     const uint32_t stop_reasons = stop_.empty() ? 0 : stop_.newest()->reasons;
-    generator_.update(now_ns - *first_ns_, stop_lost || stop_reasons != 0);
+    generator_.update(now_ns - *first_ns_, stop_lost || stop_reasons != 0, surroundings());
 
     Requests* requests = requests_.loan();
     TextStatus* status = status_.loan();
@@ -49,11 +57,53 @@ class SemanticNode final : public Node {
   }
 
  private:
+  static constexpr std::string_view kPerson = "person";  ///< what bodies are
+
+  static bool is_fresh(const InputPort& port) { return !port.empty() && !port.stale(); }
+
+  /// A rule that nobody could ever tell anything of is a mistake.
+  void check_sources(const Rule& rule) const {
+    const std::string node = rule.otherwise.node;
+    if (rule.type.empty() && !crossing_.connected() && !terrain_.connected())
+      throw SetupError("rules: " + node + " when crossing: connect `crossing` or `terrain`");
+    if (!rule.type.empty() && !reports_.connected() && !(bodies_.connected() && rule.type == kPerson))
+      throw SetupError("rules: " + node + " when " + rule.type +
+                       " within: connect `reports`, or `bodies` for a person");
+  }
+
+  Surroundings surroundings() {
+    Surroundings around;
+    near_.clear();
+    if (add_reports() | add_bodies()) around.objects = near_;
+    if (is_fresh(crossing_)) around.crossing = (crossing_.newest()->levels & 1) != 0;
+    if (is_fresh(terrain_))
+      around.crossing = around.crossing.value_or(false) || terrain_.newest()->kind == terrain_kind::crossing;
+    return around;
+  }
+
+  /// False: nobody tells, or not where the robot is among them.
+  bool add_reports() {
+    if (!is_fresh(reports_)) return false;
+    const ObjectReports& reports = *reports_.newest();
+    if (reports.in_map && !is_fresh(odometry_)) return false;
+    const double x_m = reports.in_map ? odometry_.newest()->x_m : 0, y_m = reports.in_map ? odometry_.newest()->y_m : 0;
+    for_each_report(reports, [&](const Report& report) {
+      near_.push_back({report.type, std::hypot(report.place.x_m - x_m, report.place.y_m - y_m)});
+    });
+    return true;
+  }
+  bool add_bodies() {
+    if (!is_fresh(bodies_)) return false;
+    for (const Body& body : bodies_.newest()->bodies.items())
+      near_.push_back({kPerson, std::hypot(body.joints[0].x, body.joints[0].y)});
+    return true;
+  }
+
   Status present(uint32_t stop_reasons, bool stop_lost) const {
     Status status{stop_reasons, stop_lost, generator_.deviating(), {}, {}, {}};
-    if (!detections_.empty() && !detections_.stale()) status.objects = detections_.newest()->boxes.size;
-    if (!obstacles_.empty() && !obstacles_.stale()) status.obstacle_m = way(*obstacles_.newest());
-    if (!ground_.empty() && !ground_.stale()) status.ground_m = way(*ground_.newest());
+    if (is_fresh(detections_)) status.objects = detections_.newest()->boxes.size;
+    if (is_fresh(obstacles_)) status.obstacle_m = way(*obstacles_.newest());
+    if (is_fresh(ground_)) status.ground_m = way(*ground_.newest());
     return status;
   }
 
@@ -71,6 +121,11 @@ class SemanticNode final : public Node {
   Input<Grid> ground_{this, "ground", "where the ground can be driven on; robot frame", Need::optional};
   Input<Grid> obstacles_{this, "obstacles", "obstacles around the robot; robot frame", Need::optional};
   Input<StopCommand> stop_{this, "stop", "while it says stop or is silent, the idle nodes are paced", Need::optional};
+  Input<ObjectReports> reports_{this, "reports", "what is around, for the rules", Need::optional};
+  Input<Odometry> odometry_{this, "odometry", "the robot in the map, if the reports' places are", Need::optional};
+  Input<BodyPoses> bodies_{this, "bodies", "persons, for the rules", Need::optional};
+  Input<DigitalState> crossing_{this, "crossing", "line 0: a crossing is near, as traffic_signs tells", Need::optional};
+  Input<takt::Terrain> terrain_{this, "terrain", "another who may tell of a crossing", Need::optional};
   Output<Requests> requests_{this, "requests", "nodes that are not to run at their full rate, with every job"};
   Output<TextStatus> status_{this, "status", "one line: what is stopped or paced, objects, way ahead"};
   Param<std::string> script_{this, "script", "", "",
@@ -78,9 +133,14 @@ class SemanticNode final : public Node {
   Param<std::string> idle_{this, "idle", "", "", "nodes that need not run at full rate while the robot is stopped"};
   Param<int> idle_every_{this,     "idle_every", 1,
                          {1, 255}, "",           "idle nodes run at every n-th release while the robot is stopped"};
+  Param<std::string> rules_{this, "rules", "", "", "what runs where: \"body_pose when person within 4m else stop\""};
+  Param<double> rule_margin_{this,        "rule_margin", NeedParameters{}.margin_m,
+                             {0.0, 20.0}, "m",           "so much farther away what is needed still counts"};
+  Param<double> rule_hold_{this, "rule_hold", 2.0, {0.0, 3600.0}, "s", "a need lasts so long after it was last seen"};
   Param<double> strip_{this, "strip", 0.8, {0.1, 5.0}, "m", "width of the way ahead that the status tells of"};
 
   ClockGenerator generator_;
+  std::vector<Neighbour> near_;
   int64_t offset_ns_ = 0;
   std::optional<int64_t> first_ns_;
 };

@@ -18,6 +18,7 @@ struct Observation {
   double confidence = 1;
   int64_t stamp_ns = 0;
   std::span<const State> states;
+  std::string_view name = {};  ///< as whoever reports it calls it; empty: nobody has named it
 };
 
 /// p = 1 - (d0 + d1) / 2; d0 = min(1, (distance / d_max)^2); d1 the weighted mean of the attributes' distances.

@@ -43,10 +43,12 @@ BandMatcher::BandMatcher(int width, int height, int channels, const MatcherParam
                                 " for " + std::to_string(height) + " rows");
   if (parameters.selection == Selection::semi_global)
     throw std::invalid_argument("stereo: semi_global looks along the whole image and has no bands");
+  // The caller begins while the others wake up, and so has a few rows more.
+  const int lead = bands > 1 ? height / 32 : 0;
   for (int i = 0; i < bands; ++i) {
     Band& band = bands_.emplace_back();
-    band.first = height * i / bands;
-    band.last = height * (i + 1) / bands;
+    band.first = i == 0 ? 0 : lead + (height - lead) * i / bands;
+    band.last = lead + (height - lead) * (i + 1) / bands;
     band.top = std::max(0, band.first - reach(parameters));
     band.height = std::min(height, band.last + reach(parameters)) - band.top;
     band.own = make_desk(band.height, parameters);

@@ -152,14 +152,17 @@ void SignDetector::take_passed(size_t sign, int level, int row, std::span<const 
 
 void SignDetector::end(ImageView<const uint8_t> bgr) {
   sightings_.clear();
-  for (size_t sign = 0; sign < signs_.size(); ++sign)
-    for (const Group& group : grouping_.group(hits_[sign], parameters_.least_hits)) {
+  for (size_t sign = 0; sign < signs_.size(); ++sign) {
+    const bool alone = signs_[sign].layout.columns == 0;
+    for (const Group& group :
+         grouping_.group(hits_[sign], alone ? parameters_.least_hits_alone : parameters_.least_hits)) {
       const auto dx = static_cast<int>(std::lround(group.box.width * kMargin)),
                  dy = static_cast<int>(std::lround(group.box.height * kMargin));
       const Box box{group.box.x + dx, group.box.y + dy, group.box.width - 2 * dx, group.box.height - 2 * dy};
       if (layout_fit(signs_[sign].layout, signs_[sign].colour, bgr, box) >= parameters_.least_fit)
         sightings_.push_back({sign, box, group.hits});
     }
+  }
   std::sort(sightings_.begin(), sightings_.end(), [](const Sighting& a, const Sighting& b) {
     return std::tie(b.hits, a.sign, a.box.y, a.box.x) < std::tie(a.hits, b.sign, b.box.y, b.box.x);
   });

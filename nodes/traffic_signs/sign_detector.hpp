@@ -21,8 +21,9 @@ struct Sighting {
 
 struct SignDetectorParameters {
   double scale_factor = 1.15;
-  int least_hits = 3;
-  double least_fit = 0.1;  ///< of a sighting to the sign's colour layout, -1..1
+  int least_hits = 2;        ///< windows that must agree on a sign with a colour layout, which decides as well
+  int least_hits_alone = 5;  ///< on one without
+  double least_fit = 0.1;    ///< of a sighting to the sign's colour layout, -1..1
 };
 
 /// The image is searched in rows of windows, from the largest scale to the smallest, the rows of all cascades at one

@@ -23,7 +23,7 @@ class TrafficSignsNode final : public Node {
     try {
       detector_.emplace(static_cast<int>(images.width), static_cast<int>(images.height),
                         read_signs(setup.directory / signs_()),
-                        SignDetectorParameters{scale_factor_, least_hits_, least_fit_});
+                        SignDetectorParameters{scale_factor_, least_hits_, least_hits_alone_, least_fit_});
     } catch (const CascadeError& error) {
       throw SetupError(error.what());
     } catch (const std::invalid_argument& error) {
@@ -130,7 +130,8 @@ class TrafficSignsNode final : public Node {
 
   Param<std::string> signs_{this, "signs", "signs", kPath, "folder with signs.txt and the cascades it names"};
   Param<double> scale_factor_{this, "scale_factor", 1.15, {1.05, 2.0}, "1", "from one scale to the next"};
-  Param<int> least_hits_{this, "least_hits", 3, {1, 100}, "", "windows that must agree on a sign"};
+  Param<int> least_hits_{this, "least_hits", 2, {1, 100}, "", "windows that must agree on a sign with a colour layout"};
+  Param<int> least_hits_alone_{this, "least_hits_alone", 5, {1, 100}, "", "windows that must agree on one without"};
   Param<double> least_fit_{this, "least_fit", 0.1, {-1.0, 1.0}, "1", "of a sighting to the sign's colour layout"};
   Param<int> confirm_{this, "confirm", 2, {1, 100}, "", "consecutive images with a sign until it counts"};
   Param<int> drop_{this, "drop", 3, {1, 100}, "", "consecutive images without it until it is forgotten"};

@@ -3,6 +3,7 @@
 
 #include <pthread.h>
 
+#include <algorithm>
 #include <ctime>
 #include <utility>
 
@@ -31,6 +32,7 @@ Recorder::Recorder(const Plan& plan, const RunBoard& board, Transport& transport
   for (const mcap::Attachment& attached : head.files) note(file_.attach(attached));
   add_channels(plan);
   for (size_t p = 0; p < plan.ports.size(); ++p) ports_[p].follower.emplace(transport.make_reader(p));
+  for (const TaskPlan& task : plan.tasks) ports_of_.push_back(task.ports);
   writing_ = std::thread([this] { write_on(); });
   if (!options_.by_caller) capturing_ = std::thread([this] { capture_on(); });
 }
@@ -79,6 +81,10 @@ void Recorder::take_port(Port& port) {
 void Recorder::take_job(const RecordedJob& job) {
   RecordedJob told = job;
   told.mode = board_.modes().at(job.release_ns);
+  for (const RecordedJob::Output& output : job.outputs) {
+    uint64_t& newest = ports_[ports_of_[job.task][output.output]].told;
+    newest = std::max(newest, output.sequence);
+  }
   std::vector<std::byte> data = queue_.buffer();
   pack(told, data);
   push(jobs_channel_, job.index, job.published_ns, std::move(data));
@@ -109,14 +115,24 @@ void Recorder::note(const mcap::Writer::Done& done) {
   if (!done && result_.refused.empty()) result_.refused = done.error();
 }
 
-RecordResult Recorder::finish(mcap::Metadata facts) {
+void Recorder::take_rest() {
   ending_.store(true);
   if (capturing_.joinable()) capturing_.join();
   else take_ports();
+}
+
+RecordResult Recorder::finish(mcap::Metadata facts, uint64_t unheard_threads) {
+  take_rest();
+  // What its writer took along.
+  for (const Port& port : ports_) {
+    const uint64_t seen = port.follower->seen();
+    result_.overwritten += std::max(port.told, seen) - seen;
+  }
   queue_.close();
   writing_.join();
   result_.no_room = no_room_.load();
   result_.incomplete_jobs = jobs_.incomplete();
+  result_.unheard_threads = unheard_threads;
   result_.not_written = file_.lost();
   const auto& written = file_.statistics();
   const auto jobs = written.channel_messages.find(jobs_channel_);
@@ -126,6 +142,7 @@ RecordResult Recorder::finish(mcap::Metadata facts) {
   facts["lost_no_room"] = std::to_string(result_.no_room);
   facts["lost_not_written"] = std::to_string(result_.not_written);
   facts["lost_jobs"] = std::to_string(result_.incomplete_jobs);
+  facts["lost_threads"] = std::to_string(result_.unheard_threads);
   note(file_.metadata(kEnd, facts));
   note(file_.finish());
   result_.bytes = file_.written_bytes();

@@ -27,10 +27,11 @@ struct RecordResult {
   uint64_t no_room = 0;             ///< messages and jobs that found the queue full
   uint64_t not_written = 0;         ///< ... that the file did not take
   uint64_t incomplete_jobs = 0;     ///< of which an event was lost
+  uint64_t unheard_threads = 0;     ///< that ran jobs and had nowhere to note them: none of these jobs is there
   uint64_t bytes = 0;               ///< of the file
   int64_t capture_cpu_ns = 0, write_cpu_ns = 0;
   std::string refused;  ///< why the file did not take something; empty: it took all
-  uint64_t lost() const { return overwritten + no_room + not_written + incomplete_jobs; }
+  uint64_t lost() const { return overwritten + no_room + not_written + incomplete_jobs + unheard_threads; }
 };
 
 /// Writes the messages of all ports and what each job was given into an MCAP file, as well as it can: it reads beside
@@ -64,8 +65,10 @@ class Recorder {
   void take(int32_t thread, const trace::Event& event) { jobs_.add(thread, event); }
   /// Copies what has been published since. Only with `by_caller`; after every job.
   void capture() { take_ports(); }
+  /// After the last job: copies what is left, so that those who published it may go.
+  void take_rest();
   /// After the last job, and after the last event was given: ends the file. `facts` are what is known only now.
-  RecordResult finish(mcap::Metadata facts);
+  RecordResult finish(mcap::Metadata facts, uint64_t unheard_threads = 0);
 
  private:
   struct Port {
@@ -73,6 +76,7 @@ class Recorder {
     const MessageType* type = nullptr;
     uint16_t channel = 0;
     bool whole = false;
+    uint64_t told = 0;  ///< the newest that a job says it has published
   };
   void add_channels(const Plan& plan);
   void take_ports();
@@ -89,6 +93,7 @@ class Recorder {
   WriteQueue queue_;
   JobAssembler jobs_;
   std::vector<Port> ports_;
+  std::vector<std::vector<size_t>> ports_of_;  ///< by task
   uint16_t jobs_channel_ = 0;
   std::atomic<uint64_t> no_room_{0};
   RecordResult result_;

@@ -110,6 +110,8 @@ class RunBoard {
   std::atomic<int64_t>& epoch_ns() { return shared_->epoch_ns; }  ///< 0: not fixed yet
   std::atomic<uint32_t>& decision() { return shared_->decision; }
   std::atomic<uint32_t>& carrier() { return shared_->carrier; }  ///< the transport that is up and can be joined
+  /// All processes have finished: nobody reads any more what one of them takes along when it leaves.
+  std::atomic<bool>& dismissed() { return shared_->dismissed; }
 
  private:
   struct Shared {
@@ -121,6 +123,7 @@ class RunBoard {
     std::atomic<int64_t> epoch_ns{0};
     std::atomic<uint32_t> decision{undecided};
     std::atomic<uint32_t> carrier{no_carrier};
+    std::atomic<bool> dismissed{false};
   };
   template <class T>
   T* place(std::byte*& at, size_t count);

@@ -14,7 +14,7 @@ constexpr size_t kMostSourceFaults = kMostFaults - 16;
 
 void RunBoard::tell_source(size_t t, uint64_t job, const SourceReport& report, int64_t at_ns, int64_t from_ns) {
   SourceRecord& record = sources_[t];
-  record.reopen_tries.store(report.reopen_tries, std::memory_order_relaxed);
+  record.tell(report);
   const SourceState before = record.state.load(std::memory_order_acquire);
   if (before == report.state) return follow_mode_rules(false, from_ns, "sources lost");
   note_source(t, job, report.state, at_ns);

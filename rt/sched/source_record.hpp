@@ -16,6 +16,22 @@ struct SourceRecord {
   std::atomic<int64_t> lost_ns{0};        ///< sum of the losses that are over
   std::atomic<uint64_t> losses{0};        ///< changes from ok to any other state
   std::atomic<uint64_t> reopen_tries{0};
+  std::atomic<uint64_t> received{0}, damaged{0}, resyncs{0}, missing{0}, unsent{0};  ///< see SourceCounts
+  std::atomic<const char*> trouble{""};
+
+  void tell(const SourceReport& report) {
+    const auto keep = [](auto& to, auto value) { to.store(value, std::memory_order_relaxed); };
+    keep(reopen_tries, report.reopen_tries);
+    keep(received, report.counts.received);
+    keep(damaged, report.counts.damaged);
+    keep(resyncs, report.counts.resyncs);
+    keep(missing, report.counts.missing);
+    keep(unsent, report.counts.unsent);
+    keep(trouble, report.trouble);
+  }
+  SourceCounts counts() const {
+    return {received.load(), damaged.load(), resyncs.load(), missing.load(), unsent.load()};
+  }
 
   /// All of its losses up to `now_ns`.
   int64_t lost_until_ns(int64_t now_ns) const {

@@ -40,6 +40,8 @@ class Follower {
     }
     return gone;
   }
+  /// Sequence of the newest message that it came to; 0: none yet.
+  uint64_t seen() const { return seen_; }
 
  private:
   std::unique_ptr<Reader> reader_;

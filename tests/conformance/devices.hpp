@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What every LaserScanner, CameraHead, MobileBase and DigitalLines must do. Each function takes a fresh closed device.
+// What every LaserScanner, CameraHead, MobileBase, DigitalLines, ObjectSensor and Actor must do. Each function takes a
+// fresh closed device.
 #pragma once
 #include <doctest/doctest.h>
 
@@ -8,10 +9,14 @@
 #include <functional>
 #include <vector>
 
+#include "hal/actor/actor.hpp"
 #include "hal/base/mobile_base.hpp"
 #include "hal/gpio/digital_lines.hpp"
 #include "hal/head/camera_head.hpp"
+#include "hal/interaction/interaction.hpp"
 #include "hal/laser/laser_scanner.hpp"
+#include "hal/object_sensor/object_sensor.hpp"
+#include "tests/unit/mapping_3d/node_harness.hpp"
 
 namespace takt::test {
 
@@ -112,6 +117,31 @@ inline void check_camera_head(CameraHead& head, const Pace& pace = no_pace) {
   head.close();
 }
 
+/// Two tasks are given, 2 and 4 periods after the epoch.
+inline void check_interaction(Interaction& person, const Pace& pace = no_pace) {
+  CHECK(person.read(kDeviceEpoch).status == ReadStatus::no_data);
+  REQUIRE(person.open().has_value());
+  CHECK(person.read(kDeviceEpoch).status == ReadStatus::no_data);
+  REQUIRE(person.start(kDeviceEpoch).has_value());
+  for (int64_t k = 0; k < 8; ++k) {
+    const int64_t at = kDeviceEpoch + k * kDevicePeriod;
+    pace(at);
+    const InteractionReading reading = person.read(at);
+    REQUIRE(reading.status == ReadStatus::ok);  // also where nobody says anything
+    CHECK(reading.stamp_ns <= at);
+    CHECK(reading.number == (k < 2 ? 0 : k < 4 ? 1 : 2));
+    CHECK(reading.task.empty() == (k < 2));
+    CHECK(reading.task.size() <= Interaction::kLongestTask);
+    CHECK(person.say("heard"));
+  }
+  person.stop();
+  CHECK(person.read(kDeviceEpoch + 9 * kDevicePeriod).status == ReadStatus::no_data);
+  person.close();
+  REQUIRE(person.open().has_value());
+  REQUIRE(person.start(kDeviceEpoch).has_value());
+  person.close();
+}
+
 /// `obeys`: the base takes velocity commands (a simulated one may drive a path instead).
 inline void check_mobile_base(MobileBase& base, bool obeys, const Pace& pace = no_pace) {
   REQUIRE(base.open().has_value());
@@ -174,6 +204,82 @@ void check_digital_lines(DigitalLines& lines, uint32_t line, Set set) {
   lines.stop();
   CHECK(lines.read(kDeviceEpoch + 3 * kDevicePeriod).status == ReadStatus::no_data);
   lines.close();
+}
+
+/// Something is in view.
+inline void check_object_sensor(ObjectSensor& sensor, const Pace& pace = no_pace) {
+  REQUIRE(sensor.open().has_value());
+  REQUIRE(sensor.most_objects() >= 1);
+  Capacity capacity;
+  capacity.count = sensor.most_objects();
+  Box<ObjectReports> reports(capacity);
+  CHECK(sensor.read(*reports, kDeviceEpoch, INT64_MAX).status == ReadStatus::no_data);
+  REQUIRE(sensor.start(kDeviceEpoch).has_value());
+  CHECK(sensor.read(*reports, kDeviceEpoch + 1, kDeviceEpoch).status == ReadStatus::no_data);
+  int64_t previous = INT64_MIN;
+  for (int64_t k = 0; k < 5; ++k) {
+    const int64_t wanted = kDeviceEpoch + k * kDevicePeriod;
+    pace(wanted);
+    const ObjectReading reading = sensor.read(*reports, wanted, INT64_MAX);
+    REQUIRE(reading.status == ReadStatus::ok);
+    CHECK(reading.stamp_ns <= wanted);
+    CHECK(reading.stamp_ns > previous);
+    previous = reading.stamp_ns;
+    CHECK(reports->in_map == 0);
+    REQUIRE(reports->places.size > 0);
+    CHECK(reports->names.size == reports->places.size);
+    float attributes = 0;
+    for (const ObjectPlace& place : reports->places.items()) {
+      CHECK(std::isfinite(place.x_m + place.y_m + place.z_m + place.yaw_rad));
+      CHECK((place.score >= 0 && place.score <= 1));
+      attributes += place.attributes;
+    }
+    CHECK(attributes == static_cast<float>(reports->attributes.size));
+    for (const ObjectName& name : reports->names.items()) {
+      CHECK(name.type[0] != 0);
+      CHECK(name.type[sizeof name.type - 1] == 0);
+      CHECK(name.name[sizeof name.name - 1] == 0);
+    }
+  }
+  sensor.stop();
+  CHECK(sensor.read(*reports, previous + kDevicePeriod, INT64_MAX).status == ReadStatus::no_data);
+  sensor.close();
+}
+
+/// `good` can be carried out within 500 periods, `bad` cannot; their numbers differ.
+inline void check_actor(Actor& actor, const ActionCommand& good, const ActionCommand& bad, const Pace& pace = no_pace) {
+  REQUIRE(actor.open().has_value());
+  CHECK(actor.read(kDeviceEpoch, INT64_MAX).status == ReadStatus::no_data);
+  REQUIRE(actor.start(kDeviceEpoch).has_value());
+  CHECK(actor.read(kDeviceEpoch + 1, kDeviceEpoch).status == ReadStatus::no_data);
+  CHECK(actor.read(kDeviceEpoch, INT64_MAX).outcome.state == action_state::none);
+  int64_t at = kDeviceEpoch;
+  // Repeats the command until it is over.
+  const auto carry_out = [&](const ActionCommand& command) {
+    ActionOutcome before;
+    for (int k = 0; k < kPeriodsToReady; ++k) {
+      at += kDevicePeriod;
+      pace(at);
+      actor.command(command, at);
+      const ActorReading reading = actor.read(at, INT64_MAX);
+      REQUIRE(reading.status == ReadStatus::ok);
+      CHECK(reading.stamp_ns <= at);
+      CHECK(reading.outcome.number == command.number);
+      CHECK(reading.outcome.duration_s >= before.duration_s);
+      before = reading.outcome;
+      if (before.state != action_state::under_way) break;
+    }
+    return before;
+  };
+  const ActionOutcome done = carry_out(good), refused = carry_out(bad);
+  CHECK(done.state == action_state::done);
+  CHECK(done.duration_s > 0);
+  CHECK(done.reason[0] == 0);
+  CHECK((refused.state == action_state::refused || refused.state == action_state::failed));
+  CHECK(refused.reason[0] != 0);
+  actor.stop();
+  CHECK(actor.read(at + kDevicePeriod, INT64_MAX).status == ReadStatus::no_data);
+  actor.close();
 }
 
 }  // namespace takt::test

@@ -8,10 +8,14 @@
 #include <string>
 #include <vector>
 
+#include "hal/base/base_messages.hpp"
+#include "hal/can/end_to_end.hpp"
+#include "hal/head/head_messages.hpp"
 #include "hal/laser/lms200/commands.hpp"
 #include "hal/laser/lms200/scan.hpp"
 #include "hal/laser/lms400/frame.hpp"
 #include "hal/laser/lms400/messages.hpp"
+#include "tests/conformance/link_messages.hpp"
 
 using namespace takt;
 using Bytes = std::vector<uint8_t>;
@@ -127,6 +131,62 @@ void lms400_seeds(Seeds& seeds) {
     seeds.add(text(words));
 }
 
+/// As tests/fuzz/semantic_link.cpp reads them: each message alone, as a whole and in fragments, to both ends.
+void semantic_link_seeds(Seeds& seeds) {
+  using namespace semantic_link;
+  for (const MessageKind& info : message_kinds()) {
+    Placed message(info);
+    test::fill(info.kind, 3, message.get());
+    std::vector<std::byte> packed;
+    write_message(info, message.get(), packed);
+    const Bytes bytes = copy(test::plain(packed));
+    seeds.add(bytes);
+    Bytes all;
+    const auto add = [&](uint8_t how, uint8_t fragment, uint8_t fragments, uint8_t number, const Bytes& payload) {
+      Bytes piece{static_cast<uint8_t>(info.kind), fragment, fragments, number, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
+      piece.insert(piece.end(), payload.begin(), payload.end());
+      const uint8_t to = info.way == Way::to_client ? 1 : 0;
+      for (const size_t byte : {size_t{how} | to, piece.size() >> 8, piece.size()})
+        all.push_back(static_cast<uint8_t>(byte));
+      all.insert(all.end(), piece.begin(), piece.end());
+    };
+    for (uint8_t number = 1; number < 4; ++number) add(2, 0, 1, number, bytes);
+    // Of a message in fragments the size stands in its first two bytes.
+    const Bytes part(100, 0);
+    Bytes first = part;
+    first[0] = 200;
+    add(0, 0, 2, 9, first);
+    add(0, 1, 2, 9, first);
+    seeds.add(all);
+  }
+}
+
+/// Each message three times, all at the middle of their ranges, and what the controller says of the bus.
+void can_seeds(Seeds& seeds) {
+  using namespace can;
+  Bytes all;
+  const auto add = [&](const Frame& frame) {
+    const WireFrame wire = to_wire(frame);
+    seeds.add(copy(wire));
+    all.insert(all.end(), wire.begin(), wire.end());
+  };
+  for (const auto& table : {head::messages(), base::messages()}) {
+    for (const Message& message : table) {
+      std::vector<double> values;
+      for (const Signal& signal : message.signals)
+        values.push_back(signal.page == kPageNumber ? 0 : (signal.low + signal.high) / 2);
+      EndToEndSender sender;
+      for (int k = 0; k < 3; ++k) {
+        Frame frame = encode(message, values);
+        if (message.is_protected) sender.protect(message, frame);
+        add(frame);
+      }
+    }
+  }
+  for (const uint32_t what : {0x4u, 0x40u, 0x100u, 0x200u}) add({kErrorFlag | what, 8, {0, 8, 0, 0, 0, 0, 130, 10}});
+  seeds.add(all);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -135,8 +195,12 @@ int main(int argc, char** argv) {
     return 2;
   }
   const std::filesystem::path folder(argv[1]);
-  Seeds lms200_inputs(folder / "lms200"), lms400_inputs(folder / "lms400");
+  Seeds lms200_inputs(folder / "lms200"), lms400_inputs(folder / "lms400"), can_inputs(folder / "can"),
+      link_inputs(folder / "semantic_link");
   lms200_seeds(lms200_inputs);
   lms400_seeds(lms400_inputs);
-  std::printf("seeds: %zu for lms200, %zu for lms400\n", lms200_inputs.count(), lms400_inputs.count());
+  can_seeds(can_inputs);
+  semantic_link_seeds(link_inputs);
+  std::printf("seeds: %zu for lms200, %zu for lms400, %zu for can, %zu for semantic_link\n", lms200_inputs.count(),
+              lms400_inputs.count(), can_inputs.count(), link_inputs.count());
 }

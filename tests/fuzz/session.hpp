@@ -9,12 +9,9 @@
 
 #include "hal/laser/laser_session.hpp"
 #include "hal/stream/frame_search.hpp"
+#include "tests/fuzz/require.hpp"
 
 namespace takt::fuzz {
-
-inline void require(bool holds) {
-  if (!holds) __builtin_trap();
-}
 
 /// What a parser finds in bytes that come in pieces: kinds and places.
 template <class Parser>

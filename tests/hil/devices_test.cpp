@@ -15,6 +15,7 @@
 #include <unistd.h>
 
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <thread>
 
@@ -24,6 +25,9 @@
 #include "hal/gpio/gpio_lines.hpp"
 #include "hal/head/can_head.hpp"
 #include "hal/head/head_double.hpp"
+#include "hal/laser/lms200/session.hpp"
+#include "hal/laser/stream_laser.hpp"
+#include "hal/stream/serial_port.hpp"
 #include "tests/conformance/stereo_camera.hpp"
 
 using namespace takt;
@@ -76,10 +80,10 @@ struct Bus {
   std::optional<can::Port> listener;
   Bus(const char* host, const char* device_interface)
       : device(device_interface, clock), driver("device", {.interface = host}, clock) {
-    REQUIRE(device.open(clock.now_ns()) == 0);
+    REQUIRE(device.plug_in().has_value());
   }
   void pace(int64_t at_ns) {
-    device.run_until(at_ns);
+    device.run_to(at_ns);
     clock.go_to(at_ns);
   }
   /// As pace, and the message that the device sends in each of its steps has arrived: from card to card that takes the
@@ -142,7 +146,7 @@ TEST_CASE("hil: kernel stamps of frames lie between their sending and their read
   for (int k = 0; k < 100 && seen < 20; ++k) {
     bus.driver.read(bus.clock.now_ns(), INT64_MAX);
     const int64_t before_ns = bus.clock.now_ns();
-    bus.device.run_until(before_ns + head::HeadDouble::kStep_ns);
+    bus.device.run_to(before_ns + head::HeadDouble::kStep_ns);
     const int64_t sent_ns = bus.clock.now_ns();
     bus.clock.go_to(sent_ns + 20 * kMs);
     const HeadReading reading = bus.driver.read(bus.clock.now_ns(), INT64_MAX);
@@ -163,16 +167,15 @@ TEST_CASE("hil: an interface that goes down and up, and bus-off, are losses that
   CHECK(bus.reads_until(ReadStatus::disconnected, 5, false) >= 0);
   shell("ip link set vcan0 up");
   CHECK(bus.reads_until(ReadStatus::ok, 200) >= 0);
-  bus.device.misbehave(can::Misbehaviour::bus_off);
+  bus.device.misbehave(Misbehaviour::bus_off);
   CHECK(bus.reads_until(ReadStatus::disconnected, 5, false) >= 0);
-  bus.device.misbehave(can::Misbehaviour::none);
+  bus.device.misbehave(Misbehaviour::none);
   CHECK(bus.reads_until(ReadStatus::ok, 200) >= 0);
   shell("ip link delete vcan0");
   CHECK(bus.reads_until(ReadStatus::disconnected, 5, false) >= 0);
   CHECK_FALSE(bus.driver.restart(bus.clock.now_ns()));
   shell("ip link add vcan0 type vcan && ip link set vcan0 up");
-  bus.device.close();
-  REQUIRE(bus.device.open(bus.clock.now_ns()) == 0);
+  REQUIRE(bus.device.plug_in().has_value());
   CHECK(bus.reads_until(ReadStatus::ok, 200) >= 0);
 }
 
@@ -413,4 +416,50 @@ TEST_CASE("hil: digital lines on gpio-sim") {
   CHECK(opened.error().text().find("gpioinfo names it") != std::string::npos);
   device.stop();
   CHECK(power() == "0");
+}
+
+TEST_CASE("hil: LMS 200 behind a USB serial adapter: scans, damage, unplugged and back") {
+  RunningClock clock;
+  const auto order = [](const char* word) { std::ofstream("/hil/orders", std::ios::app) << word << std::endl; };
+  for (int k = 0; k < 100 && !std::filesystem::exists("/dev/ttyUSB0"); ++k) sleep_until(clock.now_ns() + 100 * kMs);
+  lms200::SessionSettings settings;
+  settings.baud = 500000;
+  StreamLaser laser("laser", std::make_unique<SerialPort>("laser", "/dev/ttyUSB0"),
+                    std::make_unique<lms200::Session>(settings), Transform{}, clock);
+  REQUIRE(laser.open().has_value());
+  REQUIRE(laser.start(clock.now_ns()).has_value());
+  std::vector<float> range(laser.format().beams);
+  const auto read = [&] {
+    clock.go_to(clock.now_ns() + 20 * kMs);
+    return laser.read(range, clock.now_ns(), INT64_MAX).status;
+  };
+  const auto until = [&](ReadStatus status) {
+    const int64_t end_ns = clock.now_ns() + 30'000 * kMs;
+    while (clock.now_ns() < end_ns)
+      if (read() == status) return true;
+    MESSAGE(laser.trouble());
+    return false;
+  };
+  REQUIRE(until(ReadStatus::ok));
+  const SourceCounts before = laser.counts();
+  const int64_t began_ns = clock.now_ns();
+  while (clock.now_ns() < began_ns + 3'000 * kMs) read();
+  const SourceCounts streamed = laser.counts();
+  MESSAGE(streamed.received - before.received, " scans in 3 s, ", streamed.damaged - before.damaged, " damaged, ",
+          streamed.resyncs - before.resyncs, " resynchronisations, ", streamed.missing - before.missing, " missing");
+  CHECK(streamed.received - before.received > 30);
+  CHECK(std::any_of(range.begin(), range.end(), [](float r) { return r > 0; }));
+
+  order("wrong_crc");
+  CHECK(until(ReadStatus::partial));
+  order("none");
+  CHECK(until(ReadStatus::ok));
+  CHECK(laser.counts().damaged > streamed.damaged);
+
+  order("unplugged");
+  CHECK(until(ReadStatus::disconnected));
+  CHECK_FALSE(laser.restart(clock.now_ns()));
+  order("none");
+  CHECK(until(ReadStatus::ok));
+  laser.close();
 }

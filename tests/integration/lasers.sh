@@ -27,7 +27,7 @@ sed -e "s|/tmp/front_laser|$work/front|; s|127.0.0.1:2111|127.0.0.1:$port|; s|: 
   "$source/graph/lasers.yaml" >"$work/lasers.yaml"
 
 expect 3 "ls /dev/serial/by-id" "$takt" run "$work/lasers.yaml" --profile robot --for 1s --output "$work/out"
-expect 2 "known: lms200, lms400" "$takt" double lms500 --pty "$work/front"
+expect 2 "known: head, base, lms200, lms400" "$takt" double lms500 --pty "$work/front"
 expect 2 "--pty PATH or --tcp PORT" "$takt" double lms200
 
 # Captured bytes of a real scanner, as the index of the capture marks them.

@@ -35,9 +35,16 @@ Lms200Double::Lms200Double(std::unique_ptr<ByteStream> stream, RangeSource sourc
   std::copy(kFactory.begin(), kFactory.end(), configuration_.bytes.begin());
 }
 
-void Lms200Double::misbehave(Misbehaviour misbehaviour) {
-  LineDouble::misbehave(misbehaviour);
-  if (misbehaviour == Misbehaviour::wrong_baud) line().set_baud(kOtherBaud);
+std::span<const Misbehaviour> Lms200Double::known() const {
+  static constexpr std::array kKnown{Misbehaviour::none,      Misbehaviour::silent, Misbehaviour::unplugged,
+                                     Misbehaviour::garbage,   Misbehaviour::frozen, Misbehaviour::wrong_crc,
+                                     Misbehaviour::wrong_baud};
+  return kKnown;
+}
+
+void Lms200Double::misbehave(Misbehaviour how) {
+  LineDouble::misbehave(how);
+  if (how == Misbehaviour::wrong_baud) line().set_baud(kOtherBaud);
 }
 
 void Lms200Double::hear(std::span<const uint8_t> bytes, int64_t now_ns) {

@@ -15,7 +15,8 @@ class Lms200Double final : public LineDouble {
  public:
   /// Switched on at `on_ns`, at 9600 baud, silent until asked.
   Lms200Double(std::unique_ptr<ByteStream> line, RangeSource source, int64_t on_ns);
-  void misbehave(Misbehaviour misbehaviour) override;
+  std::span<const Misbehaviour> known() const override;
+  void misbehave(Misbehaviour how) override;
 
   uint32_t baud() { return line().baud(); }
   Mode mode() const { return mode_; }

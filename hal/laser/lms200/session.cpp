@@ -196,6 +196,7 @@ void Session::hear(const Event& event, int64_t now_ns) {
       return;
     case EventKind::crc_error:  // perhaps of the reply that is waited for
     case EventKind::length_error:
+      reception_.count_damage();
       if (asking && acknowledged_) deadline_ns_ = std::min(deadline_ns_, now_ns + kAck_ns);
       return;
     case EventKind::telegram: break;

@@ -41,6 +41,7 @@ class Session final : public LaserSession {
   LineOrder next(int64_t now_ns) override;
   void line_has(uint32_t baud) override;
   LineOrder farewell() override;
+  uint64_t resyncs() const override { return reception_.resyncs(); }
   uint64_t damaged() const override { return reception_.damaged(); }
   const char* trouble() const override { return trouble_; }
 

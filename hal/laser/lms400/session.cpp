@@ -133,7 +133,7 @@ const ReceivedScan* Session::receive(std::span<const uint8_t> bytes, int64_t now
 }
 
 void Session::hear(const Event& event, int64_t now_ns) {
-  if (event.kind != EventKind::frame) return;
+  if (event.kind != EventKind::frame) return reception_.count_damage();
   if (const auto measurement = read_measurement(event.payload))
     return hear_measurement(*measurement, event.position, now_ns);
   if (const auto answer = read_answer(event.payload)) hear_answer(*answer, now_ns);

@@ -67,6 +67,65 @@ int64_t least_cost(const std::map<Key, bool>& free, const OccupancyView& view, c
 
 }  // namespace
 
+TEST_CASE(
+    "ways to where two places are in reach, and to the nearest cell beside an unknown one, cost what Dijkstra's do") {
+  std::mt19937 random(5);
+  const auto below = [&](int n) { return static_cast<int>(random() % static_cast<unsigned>(n)); };
+  PathPlanner planner(400, {0.25, 3});
+  size_t near = 0, unknown = 0, none = 0;
+  std::vector<Place> path;
+  for (int round = 0; round < 150; ++round) {
+    CAPTURE(round);
+    const RandomField field(random, 5 + below(14), 5 + below(14), 0.1, 0.15);
+    REQUIRE(planner.look(field.view));
+    std::map<Key, bool> free;
+    std::vector<Cell> cells;
+    for (int row = 0; row < field.view.cells.height; ++row)
+      for (int column = 0; column < field.view.cells.width; ++column) {
+        free[{column, row}] = !planner.blocked({column, row});
+        if (free[{column, row}]) cells.push_back({column, row});
+      }
+    if (cells.empty()) continue;
+    const auto middle = [&](const Cell& c) { return Place{field.view.middle_x_m(c), field.view.middle_y_m(c)}; };
+    const auto any = [&] { return cells[static_cast<size_t>(below(static_cast<int>(cells.size())))]; };
+    const Cell from = any();
+    const Place wanted[] = {middle(any()), middle(any())};
+    const double reach = 0.3 * (1 + below(5));
+    const Disc area{middle(from), 1.5}, seen{wanted[0], 0.5};
+    const auto is_unknown = [&](int column, int row) {
+      return field.view.contains({column, row}) && field.view.cells.at(column, row) == kUnknownCell;
+    };
+    const auto least = [&](const auto& there) {
+      int64_t cost = -1;
+      for (const Cell& c : cells) {
+        if (!there(c)) continue;
+        const int64_t to = least_cost(free, field.view, {from.column, from.row}, {c.column, c.row});
+        if (to >= 0 && (cost < 0 || to < cost)) cost = to;
+      }
+      return cost;
+    };
+    const auto check = [&](PathOutcome outcome, int64_t truth, size_t& found) {
+      REQUIRE(outcome == (truth < 0 ? PathOutcome::no_way : PathOutcome::found));
+      ++(truth < 0 ? none : found);
+      if (truth >= 0) REQUIRE(planner.cost() == truth);
+      if (truth >= 0) REQUIRE(planner.free(path));
+    };
+    const auto in_reach = [&](const Cell& c) {
+      return Disc{wanted[0], reach}.contains(middle(c)) && Disc{wanted[1], reach}.contains(middle(c));
+    };
+    check(planner.plan_near(middle(from), wanted, reach, path), least(in_reach), near);
+    const auto beside = [&](const Cell& c) {
+      const int x = c.column, y = c.row;
+      return !is_unknown(x, y) && area.contains(middle(c)) && !seen.contains(middle(c)) &&
+             (is_unknown(x + 1, y) || is_unknown(x - 1, y) || is_unknown(x, y + 1) || is_unknown(x, y - 1));
+    };
+    check(planner.plan_to_unknown(middle(from), area, {&seen, 1}, path), least(beside), unknown);
+  }
+  CHECK(near > 30);
+  CHECK(unknown > 30);
+  CHECK(none > 30);
+}
+
 TEST_CASE("obstacles grow as the definition says, and every way costs what Dijkstra's does") {
   std::mt19937 random(3);
   const auto below = [&](int n) { return static_cast<int>(random() % static_cast<unsigned>(n)); };

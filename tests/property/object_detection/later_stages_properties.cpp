@@ -5,7 +5,9 @@
 #include <array>
 #include <vector>
 
+#include "nodes/object_detection/byte_references.hpp"
 #include "nodes/object_detection/cooccurrence_stage.hpp"
+#include "nodes/object_detection/histogram_kernels.hpp"
 #include "nodes/object_detection/orientation_stage.hpp"
 #include "nodes/object_detection/reference.hpp"
 #include "tests/on_each_target.hpp"
@@ -80,6 +82,45 @@ TEST_CASE("every possible gradient gets the same from the vectorised form, with 
         REQUIRE(fast == slow);
       });
     }
+  }
+}
+
+TEST_CASE("references as bytes lack what their counts lack, also above 255, with each SIMD target") {
+  Random random(53);
+  for (int round = 0; round < 60; ++round) {
+    const auto slots = static_cast<size_t>(random.in(1, 300));
+    // Mostly nothing, else few or many: up to more than nine bytes hold.
+    const auto counts = [&](size_t size) {
+      ByteReferences::Counts counts(size);
+      for (uint16_t& count : counts)
+        if (random.in(0, 2) == 0) count = static_cast<uint16_t>(random.in(0, random.in(0, 9) == 0 ? 2600 : 20));
+      for (int left = UINT16_MAX; uint16_t & count : counts)
+        left -= count = std::min<uint16_t>(count, static_cast<uint16_t>(left));
+      return counts;
+    };
+    std::vector<std::vector<ByteReferences::Counts>> objects(static_cast<size_t>(random.in(0, 4)));
+    for (auto& references : objects)
+      for (int k = random.in(0, 9); k > 0; --k)
+        references.push_back(counts(static_cast<size_t>(random.in(0, static_cast<int>(slots)))));
+    on_each_target([&] {
+      ByteReferences bytes(slots, objects);
+      for (int k = 0; k < 4; ++k) {
+        ByteReferences::Counts window = counts(slots);
+        window.resize((slots + kLaneBlock - 1) / kLaneBlock * kLaneBlock);
+        bytes.take(window);
+        for (size_t object = 0; object < objects.size(); ++object) {
+          REQUIRE(bytes.references(object) == objects[object].size());
+          std::vector<uint16_t> missing(objects[object].size());
+          bytes.missing(object, missing.data());
+          for (size_t r = 0; r < missing.size(); ++r) {
+            uint32_t lacks = 0;
+            for (size_t slot = 0; slot < objects[object][r].size(); ++slot)
+              lacks += static_cast<uint32_t>(std::max(0, objects[object][r][slot] - window[slot]));
+            REQUIRE(missing[r] == lacks);
+          }
+        }
+      }
+    });
   }
 }
 

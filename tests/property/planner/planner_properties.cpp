@@ -199,6 +199,34 @@ TEST_CASE("on 1,000 random small domains the planner's cost is that of exhaustiv
   CHECK(dearer > 0);
 }
 
+TEST_CASE("a search in portions of any size ends with the plan of one that is not interrupted") {
+  Planner whole({Method::best, {}, {60'000, 600'000}}), portions({Method::best, {}, {60'000, 600'000}});
+  size_t interrupted = 0;
+  for (uint32_t seed = 1; seed <= 300; ++seed) {
+    RandomTask task(seed);
+    const auto domain = ground(task.map, task.goals, task.robot, {});
+    REQUIRE(domain);
+    const Plan plan = whole.plan(*domain);
+    portions.begin(*domain, {});
+    const Effort portion{1 + seed % 3, {}};
+    size_t calls = 1;
+    for (; !portions.go_on(portion); ++calls) {
+      const Plan& so_far = portions.best_so_far();
+      REQUIRE(so_far.expanded == calls * portion.expansions);
+      if (plan.exists()) REQUIRE(so_far.bound_ns <= plan.cost_ns);
+      if (so_far.exists()) REQUIRE(so_far.cost_ns >= plan.cost_ns);
+    }
+    interrupted += calls > 1;
+    const Plan& last = portions.best_so_far();
+    REQUIRE(last.verdict == plan.verdict);
+    REQUIRE(last.cost_ns == plan.cost_ns);
+    REQUIRE(last.expanded == plan.expanded);
+    REQUIRE(last.steps.size() == plan.steps.size());
+    for (size_t i = 0; i < plan.steps.size(); ++i) REQUIRE(last.steps[i].action == plan.steps[i].action);
+  }
+  CHECK(interrupted > 50);
+}
+
 TEST_CASE("whenever a search is ended, its plan is one and its bound holds") {
   size_t early = 0;
   for (uint32_t seed = 1; seed <= 150; ++seed) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <map>
 #include <random>
 #include <set>
@@ -70,4 +71,87 @@ TEST_CASE("what the clock generator asks for at any time is the last word on eac
     }
   }
   CHECK(named > 1000);
+}
+
+namespace {
+
+/// One look around at an instant.
+struct Around {
+  int at_ms = 0;
+  bool objects_known = false;
+  std::vector<std::pair<std::string, int>> objects;  ///< types and distances, cm
+  int crossing = -1;                                 ///< -1: nobody tells
+};
+struct RuleText {
+  std::string node, type;  ///< type empty: crossing
+  int within_cm, every;    ///< every 0: stop
+};
+
+/// The slow way: the condition of each look so far, from the first one on, and then the last instant it was true.
+bool needed(const RuleText& rule, const std::vector<Around>& looks, int margin_cm, int hold_ms) {
+  bool need = true;
+  int true_ms = -1;
+  for (const Around& look : looks) {
+    const int reach_cm = rule.within_cm + (need && true_ms >= 0 ? margin_cm : 0);
+    bool is_true = rule.type.empty() ? look.crossing != 0 : !look.objects_known;
+    for (const auto& [type, distance_cm] : look.objects)
+      if (!rule.type.empty() && type == rule.type && distance_cm <= reach_cm) is_true = true;
+    if (is_true) true_ms = look.at_ms;
+    need = true_ms >= 0 && look.at_ms - true_ms <= hold_ms;
+  }
+  return need;
+}
+
+}  // namespace
+
+TEST_CASE("what rules leave of each node at any time is what all looks around so far say") {
+  std::mt19937 random(6);
+  const auto below = [&](int n) { return static_cast<int>(random() % static_cast<unsigned>(n)); };
+  const auto letter = [&](char first, int n) { return std::string(1, static_cast<char>(first + below(n))); };
+  size_t stopped = 0, paced = 0, full = 0;
+  for (int round = 0; round < 300; ++round) {
+    std::vector<RuleText> rules;
+    std::string text;
+    for (int i = 1 + below(5); i > 0; --i) {
+      const RuleText rule{letter('a', 4), below(3) == 0 ? "" : letter('s', 3), 1 + below(500),
+                          below(2) * (2 + below(4))};
+      text += rule.node + " when " +
+              (rule.type.empty() ? "crossing" : rule.type + " within " + std::to_string(rule.within_cm) + "cm") +
+              " else " + (rule.every ? "pace " + std::to_string(rule.every) : "stop") + ";";
+      rules.push_back(rule);
+    }
+    const int margin_cm = below(150), hold_ms = below(1500);
+    const auto parsed = parse_rules(text);
+    REQUIRE(parsed.has_value());
+    ClockGenerator generator({}, {}, 1, Needs(*parsed, {margin_cm / 100.0 + 1e-9, int64_t{hold_ms} * 1'000'000}));
+    std::vector<Around> looks;
+    for (int now = below(100); now < 6000; now += 1 + below(400)) {
+      Around& look = looks.emplace_back();
+      look.at_ms = now;
+      look.objects_known = below(10) != 0;
+      look.crossing = below(6) - 1 > 0 ? 0 : below(3) - 1;
+      if (look.objects_known)
+        for (int i = below(3); i > 0; --i) look.objects.emplace_back(letter('s', 3), below(600));
+      std::vector<Neighbour> near;
+      for (const auto& [type, distance_cm] : look.objects) near.push_back({type, distance_cm / 100.0 - 1e-9});
+      Surroundings around;
+      if (look.objects_known) around.objects = near;
+      if (look.crossing >= 0) around.crossing = look.crossing == 1;
+      generator.update(int64_t{now} * 1'000'000, false, around);
+      std::map<std::string, std::pair<bool, int>> expected, seen;
+      for (const RuleText& rule : rules) {
+        auto& [run, every] = expected.emplace(rule.node, std::pair{true, 1}).first->second;
+        if (needed(rule, looks, margin_cm, hold_ms)) continue;
+        if (rule.every) every = std::max(every, rule.every);
+        else run = false;
+      }
+      full += std::erase_if(expected, [](const auto& node) { return node.second == std::pair{true, 1}; });
+      for (const auto& r : generator.deviating()) seen[r.node] = {r.run != 0, r.every};
+      CHECK(seen == expected);
+      for (const auto& [node, state] : seen) ++(state.first ? paced : stopped);
+    }
+  }
+  CHECK(stopped > 1000);
+  CHECK(paced > 1000);
+  CHECK(full > 1000);
 }

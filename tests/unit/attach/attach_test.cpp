@@ -127,6 +127,7 @@ TEST_CASE("top, stop and unknown questions over the socket") {
   CHECK(attach::running() == std::vector<int>{getpid()});
   const Json top = scene.ask({{"do", "top"}});
   CHECK(top["nodes"][0]["name"] == "map");
+  CHECK(top["nodes"][0]["type"] == "mapping_3d");
   CHECK(top["nodes"][0]["completed"] == 17);
   CHECK(scene.ask({{"do", "dance"}})["error"].get<std::string>().find("known: top, echo") != std::string::npos);
   CHECK(scene.board->stop().end_ns() == INT64_MAX);
@@ -162,6 +163,9 @@ TEST_CASE("echo gives each new message once, and lets it go") {
   CHECK((*second)["message"]["cells"]["first"][0] == 700);
   CHECK(connection->read_bytes((*second)["bytes"].get<size_t>()));
   CHECK(writer->statistics().in_use == 2);  // what the ring keeps, nothing else
+  const auto shown = [&](const Json& question) { return scene.ask(question)["message"]["cells"]["first"].size(); };
+  CHECK(shown({{"do", "echo"}, {"port", "map.obstacles"}}) == 8);
+  CHECK(shown({{"do", "echo"}, {"port", "map.obstacles"}, {"items", 100U}}) == 12);
   const std::string wrong = scene.ask({{"do", "echo"}, {"port", "map.obstacle"}})["error"];
   CHECK(wrong.find("did you mean `map.obstacles`") != std::string::npos);
 }
@@ -195,7 +199,8 @@ TEST_CASE("a question of a wrong kind is refused, and the next one answered") {
   REQUIRE(connection);
   for (const Json& question :
        {Json{{"do", 5}}, Json{{"do", "set"}, {"param", 1}}, Json{{"do", "echo"}, {"port", nullptr}},
-        Json{{"do", "echo"}, {"port", "map.obstacles"}, {"count", "many"}}}) {
+        Json{{"do", "echo"}, {"port", "map.obstacles"}, {"count", "many"}},
+        Json{{"do", "echo"}, {"port", "map.obstacles"}, {"items", -1}}}) {
     REQUIRE(connection->write(question));
     const auto answer = connection->read_line();
     REQUIRE(answer);

@@ -10,7 +10,6 @@
 
 using namespace takt;
 using namespace takt::base;
-using can::Misbehaviour;
 
 namespace {
 
@@ -91,7 +90,7 @@ TEST_CASE("can base: each misbehaviour is told, the base stops by itself, and it
   for (const Case& c :
        {Case{Misbehaviour::silent, ReadStatus::no_data}, Case{Misbehaviour::unplugged, ReadStatus::disconnected},
         Case{Misbehaviour::wrong_crc, ReadStatus::partial}, Case{Misbehaviour::lost_frames, ReadStatus::no_data},
-        Case{Misbehaviour::stuck, ReadStatus::no_data}, Case{Misbehaviour::garbage, ReadStatus::partial},
+        Case{Misbehaviour::repeated, ReadStatus::no_data}, Case{Misbehaviour::garbage, ReadStatus::partial},
         Case{Misbehaviour::no_heartbeat, ReadStatus::no_data}, Case{Misbehaviour::bus_off, ReadStatus::disconnected}}) {
     CAPTURE(static_cast<int>(c.how));
     Bench bench;

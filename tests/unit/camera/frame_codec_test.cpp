@@ -5,6 +5,7 @@
 
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <random>
 #include <vector>
 
 #include "tests/conformance/dbc_file.hpp"
@@ -154,6 +155,47 @@ TEST_CASE("frame codec: each mosaic gives its colours back") {
     }
     debayer({plane.data(), kSize, kSize}, pattern, {image.data(), kSize, kSize, 3});
     for (size_t i = 0; i < image.size(); ++i) CHECK(image[i] == kBgr[i % 3]);
+  }
+}
+
+TEST_CASE("frame codec: what is joined is split again, and a mosaic keeps the colours that it sees") {
+  std::mt19937 random(5);
+  const auto noise = [&](size_t bytes) {
+    std::vector<uint8_t> values(bytes);
+    for (uint8_t& value : values) value = static_cast<uint8_t>(random());
+    return values;
+  };
+  constexpr int kWidth = 10, kHeight = 6;
+  for (const FrameFormat format : {FrameFormat::y16, FrameFormat::y8i, FrameFormat::rgb3, FrameFormat::grey}) {
+    for (const Mosaic mosaic : {Mosaic::none, Mosaic::rggb, Mosaic::grbg, Mosaic::gbrg, Mosaic::bggr}) {
+      FrameLayout layout;
+      layout.format = format;
+      layout.width = kWidth;
+      layout.height = kHeight;
+      layout.left = 0;
+      layout.right = 1;
+      layout.mosaic = mosaic;
+      layout.bytes_per_line = layout.row_bytes() + 4;
+      const int channels = mosaic == Mosaic::none ? 1 : 3;
+      const auto left = noise(kWidth * kHeight * static_cast<size_t>(channels)), right = noise(left.size());
+      const ImageView<const uint8_t> l(left.data(), kWidth, kHeight, channels),
+          r(right.data(), kWidth, kHeight, channels);
+      std::vector<uint8_t> frame(layout.image_bytes(), 0xEE);
+      CHECK_FALSE(join(l, r, layout, std::span(frame).first(frame.size() - 1)));
+      REQUIRE(join(l, r, layout, frame));
+      std::vector<uint8_t> again_left(kWidth * kHeight), again_right(again_left);
+      REQUIRE(split(frame, layout, {again_left.data(), kWidth, kHeight}, {again_right.data(), kWidth, kHeight}) ==
+              kHeight);
+      const char* letters = mosaic == Mosaic::none ? "" : kMosaicNames[static_cast<size_t>(mosaic)].data();
+      for (int y = 0; y < kHeight; ++y) {
+        for (int x = 0; x < kWidth; ++x) {
+          const auto i = static_cast<size_t>(y * kWidth + x);
+          const size_t colour = channels == 1 ? 0 : std::string_view("bgr").find(letters[y % 2 * 2 + x % 2]);
+          CHECK(again_left[i] == left[i * static_cast<size_t>(channels) + colour]);
+          CHECK(again_right[i] == right[i * static_cast<size_t>(channels) + colour]);
+        }
+      }
+    }
   }
 }
 

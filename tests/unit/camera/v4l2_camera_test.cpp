@@ -46,7 +46,7 @@ VideoDouble::Settings double_of(const V4l2CameraSettings& settings) {
   return camera;
 }
 
-void fill(uint32_t k, std::span<uint8_t> frame) {
+void fill(uint32_t k, int64_t, std::span<uint8_t> frame) {
   for (size_t i = 0; i < frame.size(); ++i) frame[i] = static_cast<uint8_t>(i * 7 + k * 13);
 }
 
@@ -106,7 +106,7 @@ TEST_CASE("v4l2 camera: pixels, stamps and numbers are the device's") {
     REQUIRE(bench.frame.status == ReadStatus::ok);
     CHECK(bench.frame.stamp_ns == Rate{15, 1}.release_ns(since_ns, k) / 1000 * 1000);
     std::vector<uint8_t> sent(36 * 6);
-    fill(k, sent);
+    fill(k, 0, sent);
     for (int y = 0; y < 6; ++y) {
       for (int x = 0; x < 16; ++x) {
         CHECK(bench.left.view().at(x, y) == sent[static_cast<size_t>(y * 36 + 2 * x + 1)]);
@@ -136,18 +136,17 @@ TEST_CASE("v4l2 camera: the newest of several is delivered, and what was lost sh
 
 TEST_CASE("v4l2 camera: each misbehaviour is told, and it works again when it ends") {
   struct Case {
-    VideoMisbehaviour how;
+    Misbehaviour how;
     ReadStatus status;
   };
   for (const Case& c :
-       {Case{VideoMisbehaviour::silent, ReadStatus::no_data},
-        Case{VideoMisbehaviour::unplugged, ReadStatus::disconnected},
-        Case{VideoMisbehaviour::flagged, ReadStatus::partial}, Case{VideoMisbehaviour::cut, ReadStatus::partial},
-        Case{VideoMisbehaviour::empty, ReadStatus::partial}, Case{VideoMisbehaviour::io_error, ReadStatus::no_data},
-        Case{VideoMisbehaviour::end_of_stream, ReadStatus::disconnected},
-        Case{VideoMisbehaviour::queue_error, ReadStatus::disconnected},
-        Case{VideoMisbehaviour::repeated, ReadStatus::no_data}, Case{VideoMisbehaviour::uncounted, ReadStatus::ok},
-        Case{VideoMisbehaviour::unstamped, ReadStatus::ok}, Case{VideoMisbehaviour::frozen, ReadStatus::ok}}) {
+       {Case{Misbehaviour::silent, ReadStatus::no_data}, Case{Misbehaviour::unplugged, ReadStatus::disconnected},
+        Case{Misbehaviour::flagged, ReadStatus::partial}, Case{Misbehaviour::cut, ReadStatus::partial},
+        Case{Misbehaviour::empty, ReadStatus::partial}, Case{Misbehaviour::io_error, ReadStatus::no_data},
+        Case{Misbehaviour::end_of_stream, ReadStatus::disconnected},
+        Case{Misbehaviour::queue_error, ReadStatus::disconnected}, Case{Misbehaviour::repeated, ReadStatus::no_data},
+        Case{Misbehaviour::uncounted, ReadStatus::ok}, Case{Misbehaviour::unstamped, ReadStatus::ok},
+        Case{Misbehaviour::frozen, ReadStatus::ok}}) {
     CAPTURE(static_cast<int>(c.how));
     Bench bench;
     bench.start();
@@ -170,8 +169,8 @@ TEST_CASE("v4l2 camera: each misbehaviour is told, and it works again when it en
     const bool lost = bench.frame.status == ReadStatus::disconnected;
     CHECK(lost == (c.status == ReadStatus::no_data || c.status == ReadStatus::disconnected));
     CHECK((bench.read().status == ReadStatus::disconnected) == lost);  // until it is restarted
-    if (c.how == VideoMisbehaviour::unplugged) CHECK_FALSE(bench.driver.restart(bench.clock.now_ns()));
-    bench.device.misbehave(VideoMisbehaviour::none);
+    if (c.how == Misbehaviour::unplugged) CHECK_FALSE(bench.driver.restart(bench.clock.now_ns()));
+    bench.device.misbehave(Misbehaviour::none);
     if (lost) CHECK(bench.driver.restart(bench.clock.now_ns()));
     bench.read();
     CHECK(bench.read().status == ReadStatus::ok);

@@ -3,6 +3,7 @@
 #include <doctest/doctest.h>
 
 #include <string>
+#include <utility>
 
 #include "rt/time/clock.hpp"
 #include "tests/conformance/devices.hpp"
@@ -16,17 +17,19 @@ struct CanBench {
   TemporaryFolder folder;
   std::string interface = "unix:" + (folder.path / "can").string();
   VirtualClock clock{kDeviceEpoch};
-  Double device{interface, clock};
+  Double device;
   Driver driver;
 
-  /// `settings`: all but the interface.
-  template <class Settings>
-  explicit CanBench(Settings settings) : driver("device", on(std::move(settings), interface), clock) {
-    REQUIRE(device.open(clock.now_ns()) == 0);
+  /// `settings`: all but the interface. `of_double`: what the double takes besides.
+  template <class Settings, class... More>
+  explicit CanBench(Settings settings, More&&... of_double)
+      : device(interface, clock, std::forward<More>(of_double)...),
+        driver("device", on(std::move(settings), interface), clock) {
+    REQUIRE(device.plug_in().has_value());
   }
   void pace(int64_t at_ns) {
     clock.advance_to(at_ns);
-    device.run_until(at_ns);
+    device.run_to(at_ns);
   }
   int64_t now() const { return clock.now_ns(); }
 

@@ -136,7 +136,11 @@ TEST_CASE("ace: the rules in the order of the file, by task and mode; a lost dev
   CHECK(runs(plan, "laser_only", "head_camera"));
   CHECK(runs(plan, "laser_only", "ground_camera"));
   CHECK_FALSE(runs(plan, "laser_only", "ground_map"));
-  for (const char* needed : {"base", "front_laser", "lines", "obstacle_stop"}) CHECK(runs(plan, "safe_stop", needed));
+  for (const char* blind : {"scan_matching", "robot_pose", "traversability"}) CHECK(runs(plan, "laser_only", blind));
+  for (const char* seeing : {"semantic_map", "person_tracking", "laser_fusion"})
+    CHECK_FALSE(runs(plan, "no_stereo", seeing));
+  for (const char* needed : {"base", "front_laser", "lines", "obstacle_stop", "robot_pose"})
+    CHECK(runs(plan, "safe_stop", needed));
   CHECK_FALSE(runs(plan, "safe_stop", "mapping_3d"));
 }
 

@@ -117,16 +117,45 @@ TEST_CASE("gpio lines: outputs, power from start to stop, one trigger pulse per 
 TEST_CASE("gpio lines: a chip that goes is a loss, and comes back with its lines") {
   Bench bench;
   bench.start();
-  bench.chip.unplug();
+  bench.chip.misbehave(Misbehaviour::unplugged);
   CHECK(bench.read(10).status == ReadStatus::disconnected);
   CHECK_FALSE(bench.driver.restart(bench.clock.now_ns()));
-  bench.chip.plug_in();
+  bench.chip.misbehave(Misbehaviour::none);
   bench.chip.set(kStop, false);
   CHECK(bench.driver.restart(bench.clock.now_ns()));
   CHECK(bench.chip.level(kLids));
   const LinesReading reading = bench.read(10);
   CHECK(reading.status == ReadStatus::ok);
   CHECK((reading.levels & 1) == 0);
+}
+
+TEST_CASE("gpio lines: a source's pulse is seen with its own stamp; frozen lines stay") {
+  VirtualClock clock(1'000'000'000);
+  const auto pressed = [](int64_t at_ns) { return at_ns / kMs >= 1050 && at_ns / kMs < 1053; };
+  ChipDouble chip({"estop", "button"}, clock, [&](int64_t at_ns) { return pressed(at_ns) ? 0b10u : 0b11u; });
+  GpioLines driver("lines", {.chip = "double", .inputs = {"estop", "button"}}, chip.chip(), clock);
+  REQUIRE(driver.open().has_value());
+  REQUIRE(driver.start(clock.now_ns()).has_value());
+  const auto read = [&] {
+    clock.advance_to(clock.now_ns() + 100 * kMs);
+    return driver.read(clock.now_ns());
+  };
+  const LinesReading pulse = read();
+  CHECK(pulse.levels == 0b11u);
+  CHECK(pulse.changed == 0b01u);
+  CHECK(pulse.edge_ns == 1'053 * kMs);
+  CHECK(read().changed == 0);
+
+  ChipDouble other({"estop"}, clock, [&](int64_t at_ns) { return at_ns / kMs < 1250 ? 1u : 0u; });
+  GpioLines stuck("lines", {.chip = "double", .inputs = {"estop"}}, other.chip(), clock);
+  REQUIRE(stuck.open().has_value());
+  REQUIRE(stuck.start(clock.now_ns()).has_value());
+  other.misbehave(Misbehaviour::frozen);
+  clock.advance_to(clock.now_ns() + 100 * kMs);
+  CHECK(stuck.read(clock.now_ns()).levels == 1);
+  other.misbehave(Misbehaviour::none);
+  clock.advance_to(clock.now_ns() + 100 * kMs);
+  CHECK(stuck.read(clock.now_ns()).levels == 0);
 }
 
 TEST_CASE("gpio lines: errors name chip and line, and what to do") {
@@ -145,7 +174,7 @@ TEST_CASE("gpio lines: errors name chip and line, and what to do") {
   CHECK(has(error({"7"}), "line `7`"));
   CHECK(has(error({"a", "0"}), "gpioinfo names it"));  // the same twice
   CHECK(has(error({}), "0 lines"));
-  chip.unplug();
+  chip.misbehave(Misbehaviour::unplugged);
   CHECK(has(error({"a"}), "gpiodetect"));
   GpioLines absent("lines", {.chip = "/dev/no-chip", .inputs = {"a"}}, std::make_unique<KernelLineChip>(), clock);
   const auto opened = absent.open();

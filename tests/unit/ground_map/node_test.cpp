@@ -178,7 +178,7 @@ TEST_CASE("ground_map: with a laser it learns only where a scan of the same time
 TEST_CASE("ground_map: the camera looks where the head turned it; where that is not known only the mask is given") {
   Bench bench({"head"});
   FloorPair pair(3.1);
-  const Transform looking_left = ground_map::turned_by_head(pair->sensor_in_robot, 0.5, 0);
+  const Transform looking_left = mapping_3d::turned_by_head(pair->sensor_in_robot, 0.5, 0);
   const auto at = ground_map::floor_projection(pair->camera, looking_left).floor_at(160, 120);
   REQUIRE(at.has_value());
   test::Box<HeadState> rest, turned;

@@ -3,8 +3,10 @@
 
 #include <doctest/doctest.h>
 
+#include "hal/sim/simulation.hpp"
 #include "rt/time/rate.hpp"
 #include "tests/conformance/fake_writer.hpp"
+#include "tests/temporary_folder.hpp"
 #include "tests/unit/replay/carmen_file.hpp"
 
 using namespace takt;
@@ -29,8 +31,10 @@ const nlohmann::json kWorld = {{"world", "worlds/lab.xml"}};
 }  // namespace
 
 TEST_CASE("unknown kinds, drivers and settings list the valid ones") {
-  CHECK(has(error(config("radar", "sim", kWorld)),
-            "stereo_camera, laser_scanner, camera_head, mobile_base, digital_lines"));
+  CHECK(has(
+      error(config("radar", "sim", kWorld)),
+      "stereo_camera, laser_scanner, camera_head, mobile_base, digital_lines, object_sensor, actor, semantic_service, "
+      "semantic_link"));
   CHECK(has(error(config("stereo_camera", "v4l", kWorld)), "known drivers: sim, replay, v4l2"));
   CHECK(has(error(config("laser_scanner", "sim", {{"world", "worlds/lab.xml"}, {"beans", 3}})),
             "unknown setting `beans`"));
@@ -41,9 +45,10 @@ TEST_CASE("unknown kinds, drivers and settings list the valid ones") {
   CHECK(has(error(config("mobile_base", "sim", {{"world", "worlds/lab.xml"}, {"drive", "walk"}})), "path or command"));
 }
 
-TEST_CASE("every kind can be made with every setting that its listing calls required, and no other") {
+TEST_CASE("every simulated kind can be made with every setting that its listing calls required, and no other") {
   VirtualClock clock;
   for (const DeviceKind& kind : device_kinds()) {
+    if (kind.drivers.front().name != "sim") continue;
     Devices devices;
     nlohmann::json settings = nlohmann::json::object();
     for (const SettingInfo& setting : kind.settings) {
@@ -177,7 +182,9 @@ TEST_CASE("laser, head, base and line nodes send one message a job, and share on
        std::initializer_list<std::pair<const char*, const char*>>{{"laser_scanner", "scan"},
                                                                   {"camera_head", "state"},
                                                                   {"mobile_base", "odometry"},
-                                                                  {"digital_lines", "state"}}) {
+                                                                  {"digital_lines", "state"},
+                                                                  {"object_sensor", "objects"},
+                                                                  {"actor", "outcome"}}) {
     auto made = make_device(config(kind, "sim", kWorld), devices, clock);
     REQUIRE_MESSAGE(made.has_value(), (made ? "" : made.error().text()));
     DeviceNode& node = **made;
@@ -191,6 +198,43 @@ TEST_CASE("laser, head, base and line nodes send one message a job, and share on
     CHECK_FALSE(job.without_result());
   }
   CHECK(devices.first_world() != nullptr);
+}
+
+TEST_CASE("devices of one world file and seed share it; its first client may be named or not") {
+  const test::TemporaryFolder folder;
+  const std::string file =
+      folder
+          .write("two.xml",
+                 "<world resolution=\"0.5m\"><rows>######## #......# #......# ########</rows>"
+                 "<client name=\"ace\" x=\"1m\" y=\"1m\"/><client name=\"bea\" x=\"3m\" y=\"1m\"/></world>")
+          .string();
+  Devices devices;
+  const auto world = [&](const char* client, uint64_t seed) {
+    DeviceConfig wanted = config("mobile_base", "sim", {{"world", file}, {"client", client}});
+    wanted.seed = seed;
+    const auto made = devices.world(wanted);
+    REQUIRE_MESSAGE(made.has_value(), (made ? "" : made.error().text()));
+    return *made;
+  };
+  CHECK(world("", 1) == world("ace", 1));
+  CHECK(world("ace", 1) != world("bea", 1));
+  CHECK(&world("ace", 1)->stage() == &world("bea", 1)->stage());
+  CHECK(&world("ace", 1)->stage() != &world("ace", 2)->stage());
+  CHECK(has(error(config("actor", "sim", {{"world", file}, {"client", "cid"}})), "ace, bea"));
+  CHECK(has(error(config("actor", "sim", {{"world", file}})), "has no actions"));
+}
+
+TEST_CASE("settings of the object sensor") {
+  const auto with = [](const char* name, const nlohmann::json& value) {
+    nlohmann::json settings = kWorld;
+    settings[name] = value;
+    return error(config("object_sensor", "sim", settings));
+  };
+  CHECK(with("types", "cup, bottle") == "");
+  CHECK(with("fov", "90deg") == "");
+  CHECK(has(with("types", "jug"), "known types: table, shelf"));
+  CHECK(has(with("miss", 2), "0..1"));
+  CHECK(has(with("noise", "-1m"), "noise not negative"));
 }
 
 TEST_CASE("settings of the SICK drivers") {
@@ -223,4 +267,39 @@ TEST_CASE("settings of the SICK drivers") {
   CHECK(has(with("lms400", {{"address", "laser"}}), "`laser` is no address"));
   CHECK(has(with("lms400", {{"address", "127.0.0.1:1"}, {"scan_rate", 100}}), "200..500Hz"));
   CHECK(has(with("lms400", {{"address", "127.0.0.1:1"}, {"fov", "90deg"}}), "out of range"));
+}
+
+TEST_CASE("settings of a semantic service and of its link") {
+  const test::TemporaryFolder folder;
+  const auto with = [](const char* kind, const char* driver, nlohmann::json settings, const char* robot = "ace") {
+    settings["robot"] = robot;
+    return error(config(kind, driver, std::move(settings)));
+  };
+  for (const char* kind : {"semantic_service", "semantic_link"}) {
+    CHECK(with(kind, "udp", {{"address", "127.0.0.1:47113"}}) == "");
+    CHECK(has(with(kind, "udp", {}, ""), "`robot` is ``"));
+    CHECK(has(with(kind, "udp", {}, "a_name_of_more_than_thirty_one_characters"), "1 to 31"));
+    CHECK(has(with(kind, "udp", {{"address", "localhost:4700"}}), "`address` is `localhost:4700`"));
+    CHECK(has(with(kind, "udp", {{"address", "127.0.0.1"}}), "such as 127.0.0.1:4700"));
+    CHECK(has(with(kind, "udp", {{"address", "0.0.0.0:47113"}}), "there is no `key`"));
+    const auto key = folder.write("key", "0123456789abcdef0123456789abcde").string();
+    CHECK(has(with(kind, "udp", {{"key", key}}), "32 hexadecimal digits"));
+    CHECK(has(with(kind, "dbus", {{"service", "semantic"}}), "words with dots between"));
+    CHECK(has(with(kind, "dbus", {{"bus", "none"}}), "session, system or an address"));
+    CHECK(has(with(kind, "dbus", {{"bus", "unix:path=/nowhere/bus"}}), "use driver: udp"));
+    CHECK(has(with(kind, "udp", {{"bus", "session"}}), "unknown setting `bus`"));
+  }
+  CHECK(has(with("semantic_service", "udp", {{"watchdog", "0s"}}), "`watchdog`"));
+  CHECK(has(with("semantic_link", "udp", {{"lag", "61s"}}), "`lag`"));
+  Devices devices;
+  VirtualClock clock;
+  const auto service = [&](const char* robot) {
+    return make_device(config("semantic_service", "udp", {{"address", "127.0.0.1:47113"}, {"robot", robot}}), devices,
+                       clock);
+  };
+  const auto ace = service("ace"), again = service("ace"), eve = service("eve");
+  CHECK(ace.has_value());
+  CHECK(eve.has_value());  // another robot of the same server
+  REQUIRE_FALSE(again.has_value());
+  CHECK(has(again.error().text(), "`robot` ace is served at 127.0.0.1:47113 already"));
 }

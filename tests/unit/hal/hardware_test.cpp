@@ -28,7 +28,7 @@ int64_t age_of_first(const std::string& kind, nlohmann::json settings) {
   VirtualClock clock(1'000'000'000);
   const std::string interface = "unix:" + (folder.path / "can").string();
   Double device(interface, clock);
-  REQUIRE(device.open(clock.now_ns()) == 0);
+  REQUIRE(device.plug_in().has_value());
   settings["interface"] = interface;
   auto node = made(kind, "can", std::move(settings), clock);
   REQUIRE_MESSAGE(node.has_value(), (node ? "" : node.error().text()));
@@ -39,7 +39,7 @@ int64_t age_of_first(const std::string& kind, nlohmann::json settings) {
   for (uint64_t k = 0; k < 100; ++k) {
     const int64_t release = clock.now_ns() + 20'000'000;
     clock.advance_to(release);
-    device.run_until(release);
+    device.run_to(release);
     Job job(clock, k, release, release + 20'000'000, 0, "full");
     PortAccess::reset(*(*node)->outputs()[0]);
     (*node)->run(job);
@@ -82,10 +82,33 @@ TEST_CASE("hardware: what is absent is a failing device; what is written wrongly
              "v4l2",
              {{"path", "/dev/video99"}, {"rig", "rigs/xb3.yaml"}, {"left", 2}},
              true,
-             "use two of 0..1"}}) {
+             "use two of 0..1"},
+        Case{"camera_head", "double", {{"world", "worlds/lab.xml"}}, true, "lives in real time only"},
+        Case{"camera_head", "double", {{"world", "worlds/lab.xml"}, {"interface", "can0"}}, true, "`interface`"}}) {
     const auto node = made(c.kind, c.driver, c.settings, clock);
     REQUIRE_FALSE(node.has_value());
     CHECK_MESSAGE(node.error().bad_input == c.bad_input, node.error().text());
+    CHECK_MESSAGE(node.error().text().find(c.part) != std::string::npos, node.error().text());
+  }
+}
+
+TEST_CASE("hardware: doubles refuse what they do not know") {
+  const MonotonicClock clock;
+  struct Case {
+    const char* kind;
+    nlohmann::json settings;
+    const char* part;
+  };
+  for (Case c : {Case{"laser_scanner", {{"model", "lms500"}}, "use lms200 or lms400"},
+                 Case{"laser_scanner", {{"model", "lms200"}, {"failures", "bus_off 1s..2s"}}, "wrong_baud"},
+                 Case{"camera_head", {{"failures", "wrong_baud 1s..2s"}}, "bus_off"},
+                 Case{"digital_lines", {{"failures", "silent 1s..2s"}}, "unplugged, frozen"},
+                 Case{"mobile_base", {{"drive", "walk"}}, "path or command"},
+                 Case{"stereo_camera", {{"rig", "rigs/xb3.yaml"}, {"format", "yuyv"}}, "use y16, y8i, rgb3 or grey"}}) {
+    c.settings["world"] = "worlds/lab.xml";
+    const auto node = made(c.kind, "double", c.settings, clock);
+    REQUIRE_FALSE(node.has_value());
+    CHECK(node.error().bad_input);
     CHECK_MESSAGE(node.error().text().find(c.part) != std::string::npos, node.error().text());
   }
 }

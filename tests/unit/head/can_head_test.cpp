@@ -9,7 +9,6 @@
 
 using namespace takt;
 using namespace takt::head;
-using can::Misbehaviour;
 
 namespace {
 
@@ -87,6 +86,26 @@ TEST_CASE("can head: homed and enabled without a jump; the eyelids open at the s
   CHECK(bench.device.emergency() == 0);  // told that the host goes, it misses nobody
 }
 
+TEST_CASE("can head: a lid is closed as long as each job says so") {
+  Bench bench;
+  bench.start();
+  const auto say = [&](bool left, bool right) {
+    for (int k = 0; k < 30; ++k) {  // 600 ms
+      bench.driver.close_lids(left, right, bench.now());
+      bench.jobs(1);
+    }
+  };
+  say(true, false);
+  CHECK(bench.device.left_lid_closed_percent() == 100);
+  say(true, true);
+  CHECK(bench.device.left_lid_closed_percent() == 100);
+  say(false, true);
+  CHECK(bench.device.left_lid_closed_percent() == 0);
+  say(true, true);
+  bench.jobs(30);  // nobody says anything
+  CHECK(bench.device.left_lid_closed_percent() == 0);
+}
+
 TEST_CASE("can head: the limits are the narrower of the settings' and the head's own") {
   Bench bench({60 * kDegree, 80 * kDegree, 300 * kDegree, 20 * kDegree, 5000 * kDegree});
   bench.start();
@@ -108,9 +127,9 @@ TEST_CASE("can head: each misbehaviour is told, and it works again when it ends"
   for (const Case& c :
        {Case{Misbehaviour::silent, ReadStatus::no_data}, Case{Misbehaviour::unplugged, ReadStatus::disconnected},
         Case{Misbehaviour::wrong_crc, ReadStatus::partial}, Case{Misbehaviour::masquerade, ReadStatus::partial},
-        Case{Misbehaviour::lost_frames, ReadStatus::no_data}, Case{Misbehaviour::stuck, ReadStatus::no_data},
+        Case{Misbehaviour::lost_frames, ReadStatus::no_data}, Case{Misbehaviour::repeated, ReadStatus::no_data},
         Case{Misbehaviour::garbage, ReadStatus::partial}, Case{Misbehaviour::no_heartbeat, ReadStatus::no_data},
-        Case{Misbehaviour::bus_off, ReadStatus::disconnected}}) {
+        Case{Misbehaviour::bus_off, ReadStatus::disconnected}, Case{Misbehaviour::frozen, ReadStatus::ok}}) {
     CAPTURE(static_cast<int>(c.how));
     Bench bench;
     bench.start();

@@ -19,7 +19,7 @@ struct Host {
   can::Station station{interface, clock, messages(), can::Sender::host};
 
   Host() {
-    REQUIRE(device.open(0) == 0);
+    REQUIRE(device.plug_in().has_value());
     REQUIRE(station.open() == 0);
     station.send(kNodeCommand, std::array{1.0, 16.0});
     pass(50);
@@ -27,7 +27,7 @@ struct Host {
   void pass(int64_t ms) {
     station.send(kHostHeartbeat, std::array{5.0});
     clock.advance_to(clock.now_ns() + ms * 1'000'000);
-    device.run_until(clock.now_ns());
+    device.run_to(clock.now_ns());
   }
   void eyelids(EyelidAction action, double left, double right, double move_ms, double hold_ms, double repeat,
                double token) {

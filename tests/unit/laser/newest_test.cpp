@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hal/laser/newest.hpp"
+#include "hal/newest.hpp"
 
 #include <doctest/doctest.h>
 

@@ -155,7 +155,7 @@ TEST_CASE("a scanner that misbehaves: what reads say, and that it comes back") {
   };
   for (const Case& c : {Case{Misbehaviour::silent, ReadStatus::no_data, "does not answer"},
                         Case{Misbehaviour::garbage, ReadStatus::partial, "does not answer"},
-                        Case{Misbehaviour::crc_errors, ReadStatus::partial, "does not answer"},
+                        Case{Misbehaviour::wrong_crc, ReadStatus::partial, "does not answer"},
                         Case{Misbehaviour::unplugged, ReadStatus::disconnected, "line is gone"}}) {
     INFO(static_cast<int>(c.misbehaviour));
     Lms200Rig rig(kFast);
@@ -221,7 +221,7 @@ TEST_CASE("scans that are lost leave gaps in the numbers") {
   REQUIRE(rig.runs_within(5 * kSecond));
   rig.advance_by(2 * kTurn_ns);
   const uint32_t before = rig.read().scan_number;
-  rig.device->misbehave(Misbehaviour::crc_errors);
+  rig.device->misbehave(Misbehaviour::wrong_crc);
   rig.advance_by(5 * 2 * kTurn_ns);
   rig.device->misbehave(Misbehaviour::none);
   rig.advance_by(2 * 2 * kTurn_ns);
@@ -237,7 +237,7 @@ TEST_CASE("interlaced: a quarter that is lost takes its whole scan with it") {
   REQUIRE(rig.runs_within(5 * kSecond));
   rig.advance_by(4 * kTurn_ns);
   const uint32_t before = rig.read().scan_number;
-  rig.device->misbehave(Misbehaviour::crc_errors);
+  rig.device->misbehave(Misbehaviour::wrong_crc);
   rig.advance_by(kTurn_ns);
   rig.device->misbehave(Misbehaviour::none);
   rig.advance_by(3 * 4 * kTurn_ns);

@@ -162,7 +162,7 @@ TEST_CASE("a scanner that misbehaves: what reads say, and that it comes back") {
   };
   for (const Case& c :
        {Case{Misbehaviour::silent, ReadStatus::no_data}, Case{Misbehaviour::garbage, ReadStatus::partial},
-        Case{Misbehaviour::crc_errors, ReadStatus::partial}, Case{Misbehaviour::unplugged, ReadStatus::disconnected}}) {
+        Case{Misbehaviour::wrong_crc, ReadStatus::partial}, Case{Misbehaviour::unplugged, ReadStatus::disconnected}}) {
     INFO(static_cast<int>(c.misbehaviour));
     Rig rig;
     rig.start();

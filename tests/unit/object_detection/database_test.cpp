@@ -68,6 +68,17 @@ TEST_CASE("an object has an entry for each look, told apart by attribute values"
   CHECK(read_database(kShipped, 48, TestViews::skip)[0].label() == "red_box");
 }
 
+TEST_CASE("classes are the entries with their attributes, whether their images are there or not") {
+  const Folder folder;
+  folder.write("objects.txt",
+               "object cup level=full\nview none.png\nobject ball\nview none.png 0.5\ntest_view none.png\n");
+  const auto classes = read_classes(folder.path);
+  REQUIRE(classes.size() == 2);
+  CHECK(classes[0].label() == "cup level=full");
+  CHECK(classes[1].name == "ball");
+  CHECK_THROWS_AS(read_database(folder.path, 8, TestViews::skip), DatabaseError);
+}
+
 TEST_CASE("mistakes name file and line and what is valid") {
   const Folder folder;
   has(folder.error("object cup\nviews good.png\n"), "objects.txt:2: unknown word `views`; valid are object, threshold");

@@ -5,6 +5,7 @@
 
 #include "nodes/semantic/network_file.hpp"
 #include "rt/memory/memory_use.hpp"
+#include "tests/unit/planner/cup_and_bottles.hpp"
 
 using namespace takt;
 using namespace takt::planner;
@@ -61,19 +62,7 @@ objects:
 
 /// Cup and bottles; the second, open one at `x_m`.
 std::string cup_and_bottles(const std::string& x_m) {
-  return R"(
-takt_network: 1
-attributes: {level: {kind: enumerated, words: [empty, full]}, closed: {kind: boolean}}
-types: {cup: {attributes: [level]}, bottle: {attributes: [level, closed]}}
-actions:
-  open: {roles: {b: bottle}, cost: 4s, requires: {b.closed: true}, results: {b.closed: false}}
-  fill: {roles: {c: cup, b: bottle}, cost: 6s, requires: {c.level: empty, b.level: full, b.closed: false},
-         results: {c.level: full, b.level: empty}}
-objects:
-  cup_1: {type: cup, at: [1m, 0m], states: {level: empty}}
-  bottle_1: {type: bottle, at: [2m, 0m], states: {level: full, closed: true}}
-  bottle_2: {type: bottle, at: [)" +
-         x_m + "m, 0m], states: {level: full, closed: false}}\n";
+  return test::cup_and_bottles("[1m, 0m]", "[2m, 0m]", "[" + x_m + "m, 0m]");
 }
 
 }  // namespace

@@ -20,11 +20,11 @@ struct Record {
   test::TemporaryFolder folder;
   std::filesystem::path file = folder.path / "run.mcap";
   RecordResult result;
-  explicit Record(Recorder::Options how = {}, int64_t seconds = 3) {
+  explicit Record(Recorder::Options how = {}, int64_t seconds = 3, int64_t copied_ns = INT64_MAX) {
     auto sink = mcap::FileSink::open(file);
     REQUIRE(sink);
     test::SmallGraph graph;
-    result = test::record_run(graph.plan, *sink, seconds, std::move(how));
+    result = test::record_run(graph.plan, *sink, seconds, std::move(how), {}, {}, copied_ns);
   }
   LogFile open() const {
     auto log = LogFile::open(file);
@@ -66,6 +66,13 @@ TEST_CASE("Every message and every job of a run is in its record") {
   REQUIRE(message);
   CHECK(message->whole);
   CHECK(message->stamp_ns == 1'000'000'000 + 33'333'333 - 1000);
+}
+
+TEST_CASE("Messages that went with their writers before they were copied are counted") {
+  const Record all, some({}, 3, 3'850'000'000);
+  CHECK(some.result.overwritten >= 5);
+  CHECK(some.result.messages + some.result.overwritten == all.result.messages);
+  CHECK(some.result.jobs == all.result.jobs);
 }
 
 TEST_CASE("A replay runs the jobs of all nodes but the devices, and every byte is the same") {

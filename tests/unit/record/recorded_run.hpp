@@ -100,10 +100,12 @@ struct SmallGraph {
   }
 };
 
-/// Runs a plan for `seconds` of virtual time and records it.
+/// Runs a plan for `seconds` of virtual time and records it. Writers leave before the record ends; with `copied_ns`
+/// nothing published later is copied.
 inline record::RecordResult record_run(const Plan& plan, mcap::Sink& sink, int64_t seconds,
                                        record::Recorder::Options how = {}, const record::Head& head = {},
-                                       const std::function<void(RunBoard&)>& meanwhile = {}) {
+                                       const std::function<void(RunBoard&)>& meanwhile = {},
+                                       int64_t copied_ns = INT64_MAX) {
   RunBoard board(plan);
   VirtualClock clock(1'000'000'000);
   const auto transport = make_local_transport(plan.ports);
@@ -123,11 +125,10 @@ inline record::RecordResult record_run(const Plan& plan, mcap::Sink& sink, int64
   run.trace = &rings;
   run.after_step = [&] {
     collector.drain();
-    recorder.capture();
+    if (clock.now_ns() < copied_ns) recorder.capture();
     if (meanwhile) meanwhile(board);
   };
-  Executor executor(plan, *transport, clock, run);
-  executor.run();
+  Executor(plan, *transport, clock, run).run();
   collector.finish();
   return recorder.finish({{"epoch_ns", "1000000000"}});
 }

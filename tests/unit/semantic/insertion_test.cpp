@@ -229,3 +229,26 @@ TEST_CASE("insertions and removals take no memory") {
   if (counting_allocations()) CHECK(thread_memory_use().allocations == before);
   CHECK(removed == 1000);
 }
+
+TEST_CASE("what has a name is the object of that name, however near and like another one it is") {
+  Fixture f;
+  Insertion insertion(f.map, f.parameters);
+  const auto named = [&](const char* name, double x_m) {
+    Observation seen{f.chair, x_m, 0, 0.9, f.stamp_ns += 1000, {}, {}};
+    seen.name = name;
+    return f.why(insertion.insert(seen));
+  };
+  CHECK(named("hers", 1) == "created hers: nothing had its name");
+  CHECK(named("his", 1) == "created his: nothing had its name");
+  CHECK(named("hers", 2) == "merged with hers, which has its name: 1.00 m apart");
+  const NodeId hers = f.map.network().find("hers");
+  CHECK(f.map.object(hers).x_m == 1.5);
+  CHECK(named("hers", 5) == "merged with hers, which has its name: 3.50 m apart");
+  CHECK(f.map.object(hers).x_m == 5);  // it was carried there
+  CHECK(f.map.object(hers).sightings == 1);
+  CHECK(f.objects() == 2);
+  // A name that a type or an object of another type has is nobody's.
+  CHECK(named("table", 1) == "refused a chair: " + std::string(to_string(NetworkError::name_taken)));
+  REQUIRE(f.map.add_object(f.table, 0, 0, "desk"));
+  CHECK(named("desk", 0) == "refused a chair: " + std::string(to_string(NetworkError::name_taken)));
+}

@@ -7,6 +7,7 @@
 #include "rt/memory/memory_use.hpp"
 #include "tests/temporary_folder.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
+#include "tests/unit/semantic/report_message.hpp"
 
 namespace takt {
 void register_semantic_map(NodeTypes& types);
@@ -19,6 +20,7 @@ namespace {
 constexpr const char* kNetwork = R"(takt_network: 1
 attributes: {colour: {kind: colour}, height: {kind: scalar, range: [0m, 3m]}}
 types: {chair: {attributes: [colour, height]}, table: {attributes: [height]}}
+objects: {sofa: {type: chair, at: [20m, 20m], states: {height: 1m}}}
 )";
 
 struct Fixture {
@@ -26,8 +28,10 @@ struct Fixture {
   test::TemporaryFolder folder;
   std::unique_ptr<Node> node;
   std::unique_ptr<test::BoxWriter<Objects3d>> objects;
+  std::unique_ptr<test::BoxWriter<ObjectReports>> reports;
   std::unique_ptr<test::BoxWriter<TextStatus>> decisions;
   test::Box<Objects3d> things{{0, 0, 1, 8}};
+  test::Box<ObjectReports> seen{{0, 0, 1, 8}};
   test::Box<Odometry> odometry;
   test::Box<Grid> grid{{60, 60, 1, 0}};
   uint64_t jobs = 0;
@@ -42,6 +46,7 @@ struct Fixture {
     test::set(*node, "classes", classes);
     test::set(*node, "misses", int64_t{2});
     PortAccess::connect(test::input(*node, "things"), {0, 0, 1, 8});
+    PortAccess::connect(test::input(*node, "reports"), {0, 0, 1, 8});
     PortAccess::connect(test::input(*node, "odometry"), {});
     PortAccess::connect(test::input(*node, "grid"), {60, 60, 1, 0});
   }
@@ -49,33 +54,38 @@ struct Fixture {
     Setup setup{clock, folder.path, folder.path, 0, std::nullopt, 0};
     node->setup(setup);
     objects = std::make_unique<test::BoxWriter<Objects3d>>(*node->outputs()[0]);
-    decisions = std::make_unique<test::BoxWriter<TextStatus>>(*node->outputs()[1]);
+    reports = std::make_unique<test::BoxWriter<ObjectReports>>(*node->outputs()[1]);
+    decisions = std::make_unique<test::BoxWriter<TextStatus>>(*node->outputs()[2]);
   }
   void thing(float class_id, float x_m, float y_m, float red = 0) {
     Object3d o{};
     o.class_id = class_id, o.score = 0.9F, o.x_m = x_m, o.y_m = y_m, o.red = red, o.height_m = 0.9F;
     things->objects.push_back(o);
   }
-  /// What is decided about the things, seen from there at once; they are forgotten by this function.
+  /// What is decided about things and reports, seen from there at once; they are forgotten by this function.
   std::string job(double x_m, double y_m, double theta_rad, bool pose_known = true) {
     const int64_t stamp = 100'000'000 * static_cast<int64_t>(++jobs);
     odometry->x_m = x_m, odometry->y_m = y_m, odometry->theta_rad = theta_rad;
     test::latch(test::input(*node, "things"), things, stamp, jobs);
+    if (!seen->names.empty()) test::latch(test::input(*node, "reports"), seen, stamp, jobs);
     if (pose_known) test::latch(test::input(*node, "odometry"), odometry, stamp, jobs);
-    objects->clear(), decisions->clear();
+    objects->clear(), reports->clear(), decisions->clear();
     Job job(clock, jobs, stamp, stamp + 66'000'000, 0, "full");
     const uint64_t before = thread_memory_use().allocations;
     node->run(job);
     if (counting_allocations()) CHECK(thread_memory_use().allocations == before);
     things->objects.resize(0);
+    seen->names.resize(0), seen->places.resize(0), seen->attributes.resize(0);
     CHECK(objects->sent() == pose_known);
+    CHECK(reports->sent() == pose_known);
     CHECK(decisions->sent() == pose_known);
     if (!pose_known) return "";
     CHECK(objects->stamp_ns() == stamp);
     const auto text = decisions->message().text.items();
     return {text.begin(), text.end()};
   }
-  std::span<const Object3d> known() { return objects->message().objects.items(); }
+  /// Chairs and tables; the sofa, which the network's file places, comes first.
+  std::span<const Object3d> known() { return objects->message().objects.items().subspan(1); }
 };
 
 constexpr double kQuarter = std::numbers::pi / 2;
@@ -134,6 +144,72 @@ TEST_CASE("semantic_map removes an object whose place a grid shows free in two l
   f.things->searched = 1;
   CHECK(f.job(0, 0, 0) == "removed chair_1: its place was seen free 2 times in a row, after 1 sightings");
   CHECK(f.known().empty());
+}
+
+TEST_CASE("semantic_map keeps what is reported by type and name, with its states as text") {
+  Fixture f;
+  f.set_up();
+  test::add_report(*f.seen, "", "chair", 0.5F, 2, {{"colour", "0.5 0.25 0"}});
+  test::add_report(*f.seen, "hers", "table", -1, 3, {{"height", "0.7m"}, {"legs", "4"}});
+  test::add_report(*f.seen, "", "lamp", 1, 1);
+  CHECK(f.job(2, 1, kQuarter) ==
+        "created chair_1: none of its type within 2 m\n"
+        "left out legs of a table, no attribute of the network: 1 such so far\n"
+        "created hers: nothing had its name\n"
+        "left out a `lamp`, no type of the network: 1 such so far");
+  std::string told;
+  semantic::for_each_report(f.reports->message(), [&](const semantic::Report& report) {
+    told += std::string(report.name) + " " + std::string(report.type);
+    for (const ObjectAttribute& said : report.attributes) told += std::string(" ") + said.name + "=" + said.value;
+    told += "\n";
+  });
+  CHECK(told == "sofa chair height=1m\nchair_1 chair colour=0.5 0.25 0\nhers table height=0.7m\n");
+  CHECK(f.reports->message().in_map == 1);
+  CHECK(f.reports->message().places[1].x_m == doctest::Approx(2.5));
+  // From elsewhere: the chair is known again by its type and place, the table by its name, which was carried away.
+  test::add_report(*f.seen, "", "chair", 0.4F, 2);
+  test::add_report(*f.seen, "hers", "table", 3, 2);
+  test::add_report(*f.seen, "", "lamp", 1, 1);
+  CHECK(f.job(0.5, 3, 0) ==
+        "merged with chair_1, p = 0.98 >= 0.75: 0.40 m apart\n"
+        "merged with hers, which has its name: 4.27 m apart\n"
+        "left out a `lamp`, no type of the network: 2 such so far");
+  CHECK(f.reports->message().places[2].x_m == doctest::Approx(2.5));
+  CHECK(f.reports->message().places[2].y_m == doctest::Approx(0));
+}
+
+TEST_CASE("semantic_map goes on after a restart with what it published last") {
+  Fixture first;
+  first.set_up();
+  test::add_report(*first.seen, "", "chair", 0.5F, 2, {{"height", "0.9m"}});
+  test::add_report(*first.seen, "sofa", "chair", 1, 2);  // it stands elsewhere than the network's file says
+  first.job(0, 0, kQuarter);
+  Fixture second;
+  second.set_up();
+  PortAccess::hand_over(*second.node->outputs()[1], &first.reports->message());
+  second.node->start(0);
+  CHECK(second.job(0, 0, kQuarter) == "");
+  const ObjectReports &before = first.reports->message(), &after = second.reports->message();
+  REQUIRE(before.names.size == 2);
+  REQUIRE(after.names.size == 2);
+  const auto find = [](const ObjectReports& reports, std::string_view name) {
+    std::string all;
+    semantic::for_each_report(reports, [&](const semantic::Report& r) {
+      if (r.name != name) return;
+      all = std::string(r.type) + " " + std::to_string(r.place.x_m) + " " + std::to_string(r.place.y_m);
+      for (const ObjectAttribute& said : r.attributes) all += std::string(" ") + said.name + "=" + said.value;
+    });
+    return all;
+  };
+  for (const char* name : {"sofa", "chair_1"}) CHECK(find(before, name) == find(after, name));
+  CHECK(find(after, "sofa").find("height=1m") != std::string::npos);
+}
+
+TEST_CASE("semantic_map needs things or reports") {
+  NodeTypes types;
+  register_semantic_map(types);
+  const auto node = types.find("semantic_map")->make();
+  CHECK_THROWS_WITH_AS(test::set_up(*node), "connect `things` or `reports`, or both", SetupError);
 }
 
 TEST_CASE("semantic_map refuses networks and classes that it cannot read") {

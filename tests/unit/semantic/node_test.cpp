@@ -7,6 +7,7 @@
 
 #include "rt/memory/memory_use.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
+#include "tests/unit/semantic/report_message.hpp"
 
 namespace takt {
 void register_semantic(NodeTypes& types);
@@ -140,6 +141,70 @@ TEST_CASE("semantic: tells objects and the way ahead, from fresh messages only")
   PortAccess::set_held(obstacles_port, 1, true, 0);
   far->width = 3;  // larger than what came with it
   CHECK(f.job(kSecond) == "objects: 3");
+}
+
+TEST_CASE("semantic: rules run a node where it is needed, by what is reported, by bodies and by crossings") {
+  Fixture f;
+  f.set("rules", std::string("body_pose when person within 4m else stop; signs when crossing else pace 3"));
+  f.set("rule_margin", 0.0);
+  f.set("rule_hold", 0.0);
+  auto &reports_port = test::input(*f.node, "reports"), &odometry_port = test::input(*f.node, "odometry"),
+       &bodies_port = test::input(*f.node, "bodies"), &crossing_port = test::input(*f.node, "crossing"),
+       &terrain_port = test::input(*f.node, "terrain");
+  PortAccess::connect(reports_port, {0, 0, 1, 4});
+  PortAccess::connect(bodies_port, {0, 0, 1, 4});
+  for (InputPort* port : {&odometry_port, &crossing_port, &terrain_port}) PortAccess::connect(*port, {});
+  f.set_up();
+  CHECK(f.job(0) == "all nodes at full rate");  // nobody has said anything
+  test::Box<ObjectReports> reports({0, 0, 1, 4});
+  test::add_report(*reports, "", "cup", 1, 1);
+  test::add_report(*reports, "", "person", 3, 3);
+  test::latch(reports_port, reports, 0, 1);
+  CHECK(f.job(kSecond) == "stopped: body_pose");
+  reports->places[1].y_m = 2;
+  CHECK(f.job(2 * kSecond) == "all nodes at full rate");
+  reports->in_map = 1;  // and where is the robot?
+  reports->places[1] = {13, 12, 0, 0, 1, 0};
+  CHECK(f.job(3 * kSecond) == "all nodes at full rate");
+  test::Box<Odometry> odometry;
+  test::latch(odometry_port, odometry, 0, 1);
+  CHECK(f.job(4 * kSecond) == "stopped: body_pose");
+  odometry->x_m = odometry->y_m = 10;
+  CHECK(f.job(5 * kSecond) == "all nodes at full rate");
+  odometry->x_m = 0;
+  test::Box<BodyPoses> bodies({0, 0, 1, 4});
+  test::latch(bodies_port, bodies, 0, 1);
+  CHECK(f.job(6 * kSecond) == "stopped: body_pose");
+  bodies->bodies.resize(1);
+  bodies->bodies[0] = {};
+  bodies->bodies[0].joints[0] = {0, 3.9F, 1.6F, 1};
+  CHECK(f.job(7 * kSecond) == "all nodes at full rate");
+  test::Box<DigitalState> crossing;
+  test::latch(crossing_port, crossing, 0, 1);
+  CHECK(f.job(8 * kSecond) == "paced: signs/3");
+  test::Box<Terrain> terrain;
+  terrain->kind = terrain_kind::crossing;
+  test::latch(terrain_port, terrain, 0, 1);
+  CHECK(f.job(9 * kSecond) == "all nodes at full rate");
+  terrain->kind = terrain_kind::left;
+  CHECK(f.job(10 * kSecond) == "paced: signs/3");
+  crossing->levels = 1;
+  CHECK(f.job(11 * kSecond) == "all nodes at full rate");
+  for (InputPort* port : {&crossing_port, &terrain_port}) PortAccess::set_held(*port, 1, true, 0);
+  crossing->levels = 0;
+  CHECK(f.job(12 * kSecond) == "all nodes at full rate");  // both are silent
+}
+
+TEST_CASE("semantic refuses rules that it cannot read, or that nobody could tell anything of") {
+  for (const auto& [rules, why] :
+       {std::pair{"a when crossing", "rules: \"a when crossing\": lacks `else`"},
+        std::pair{"a when crossing else stop", "a when crossing: connect `crossing`"},
+        std::pair{"a when cup within 1m else stop", "a when cup within: connect `reports`"}}) {
+    Fixture f;
+    PortAccess::connect(test::input(*f.node, "bodies"), {0, 0, 1, 4});  // persons only
+    f.set("rules", std::string(rules));
+    CHECK_THROWS_WITH_AS(f.set_up(), doctest::Contains(why), SetupError);
+  }
 }
 
 TEST_CASE("semantic refuses a script and a list that it cannot read") {

@@ -106,3 +106,95 @@ TEST_CASE("idle nodes are paced while the robot is stopped; a slower pace of the
   generator.update(kSecond, false);
   CHECK(text(generator) == "a/5, b/2, c off");
 }
+
+TEST_CASE("rules: a node, what it is needed for, and what is asked of it otherwise") {
+  const auto rules = parse_rules(
+      "body_pose when person within 4m else stop;\n signs when crossing else pace 3; a when cup within 50cm else pace "
+      "255;");
+  REQUIRE(rules.has_value());
+  REQUIRE(rules->size() == 3);
+  CHECK((*rules)[0].otherwise.node == std::string_view("body_pose"));
+  CHECK((*rules)[0].type == "person");
+  CHECK((*rules)[0].within_m == 4);
+  CHECK((*rules)[0].otherwise.run == 0);
+  CHECK((*rules)[1].type.empty());
+  CHECK((*rules)[1].otherwise.run == 1);
+  CHECK((*rules)[1].otherwise.every == 3);
+  CHECK((*rules)[2].within_m == 0.5);
+  CHECK((*rules)[2].otherwise.every == 255);
+  CHECK(parse_rules(" ; ")->empty());
+}
+
+TEST_CASE("a mistake in a rule is quoted, with the valid forms") {
+  struct Mistake {
+    const char *rules, *piece, *why;
+  };
+  for (const Mistake& m : std::initializer_list<Mistake>{
+           {"a when crossing else stop; B when crossing else stop", "\"B when crossing else stop\"",
+            "`B` is no node id"},
+           {"a", "\"a\"", "lacks `when` and a condition"},
+           {"a if crossing else stop", "\"a if crossing else stop\"", "lacks `when`"},
+           {"a when raining else stop", "\"a when raining else stop\"", "`raining` is no condition"},
+           {"a when cup within 4 else stop", "\"a when cup within 4 else stop\"", "`4` is no length"},
+           {"a when cup within -4m else stop", "\"a when cup within -4m else stop\"", "`-4m` is no length"},
+           {"a when crossing", "\"a when crossing\"", "lacks `else`"},
+           {"a when crossing else", "\"a when crossing else\"", "lacks `else`"},
+           {"a when crossing else halt", "\"a when crossing else halt\"", "no request"},
+           {"a when crossing else stop now", "\"a when crossing else stop now\"", "no request"},
+           {"a when crossing else pace", "\"a when crossing else pace\"", "no request"},
+           {"a when crossing else pace 1", "\"a when crossing else pace 1\"", "`1` is no N of 2..255"},
+           {"a when crossing else pace 256", "\"a when crossing else pace 256\"", "`256` is no N of 2..255"}}) {
+    CAPTURE(m.rules);
+    const auto rules = parse_rules(m.rules);
+    REQUIRE_FALSE(rules.has_value());
+    CHECK(rules.error().starts_with(m.piece));
+    CHECK(rules.error().find(m.why) != std::string::npos);
+    CHECK(rules.error().find("NODE when CONDITION else pace N") != std::string::npos);
+  }
+}
+
+TEST_CASE("a node is needed from the first instant on, some way beyond the distance, and a while longer") {
+  const auto rules = parse_rules("a when cup within 4m else stop");
+  ClockGenerator generator({}, {}, 1, Needs(*rules, {0.5, 2 * kSecond}));
+  const auto at = [&](double s, std::optional<double> cup_m) {
+    std::vector<Neighbour> near{{"table", 0.1}};
+    if (cup_m) near.push_back({"cup", *cup_m});
+    Surroundings around;
+    around.objects = near;
+    generator.update(static_cast<int64_t>(s * 1e9), false, around);
+    return text(generator);
+  };
+  generator.update(0, false);
+  CHECK(text(generator) == "");  // nobody tells of anything yet
+  CHECK(at(1, {}) == "");
+  CHECK(at(2.5, {}) == "a off");
+  CHECK(at(3, 4.2) == "a off");
+  CHECK(at(4, 3.9) == "");
+  CHECK(at(5, 4.4) == "");  // it was near
+  CHECK(at(6, 4.6) == "");
+  CHECK(at(7, 4.6) == "");
+  CHECK(at(7.5, 4.6) == "a off");
+  CHECK(at(8, 4.4) == "a off");
+}
+
+TEST_CASE("of script, idle list and rules the least counts") {
+  const auto rules =
+      parse_rules("a when crossing else pace 3; b when crossing else stop; a when cup within 1m else pace 4");
+  const auto script = parse_script("0s pace a 2; 0s pace b 7; 5s stop a");
+  ClockGenerator generator(*script, {"a"}, 5, Needs(*rules, {0, 0}));
+  Surroundings around;
+  around.crossing = true;
+  generator.update(0, false, around);
+  CHECK(text(generator) == "a/2, b/7");
+  around.crossing = false;
+  generator.update(kSecond, false, around);
+  CHECK(text(generator) == "a/3, b off");
+  around.objects.emplace();
+  generator.update(2 * kSecond, false, around);
+  CHECK(text(generator) == "a/4, b off");
+  generator.update(3 * kSecond, true, around);
+  CHECK(text(generator) == "a/5, b off");
+  around.crossing = true;
+  generator.update(6 * kSecond, false, around);
+  CHECK(text(generator) == "a off, b/7");
+}

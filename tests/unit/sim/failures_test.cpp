@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Devices that fail on time: how it is written, and what each interface then gives.
-#include "hal/sim/failures.hpp"
+#include "hal/settings/failures.hpp"
 
 #include <doctest/doctest.h>
 
@@ -52,10 +52,10 @@ TEST_CASE("failures are written with their windows; mistakes are told with the f
   const auto windows = parse_failures(" unplugged 2s..4s,frozen 6s .. 6.5s ");
   REQUIRE(windows.has_value());
   REQUIRE(windows->size() == 2);
-  CHECK((*windows)[0].failure == Failure::unplugged);
+  CHECK((*windows)[0].failure == Misbehaviour::unplugged);
   CHECK((*windows)[0].from_ns == 2 * kSecond);
   CHECK((*windows)[0].to_ns == 4 * kSecond);
-  CHECK((*windows)[1].failure == Failure::frozen);
+  CHECK((*windows)[1].failure == Misbehaviour::frozen);
   CHECK((*windows)[1].to_ns == 6 * kSecond + kSecond / 2);
   CHECK(parse_failures("")->empty());
   for (const char* wrong : {"unpluged 2s..4s", "silent", "silent 2s", "silent 2..4s", "silent 4s..2s", "silent -1s..2s",
@@ -71,8 +71,8 @@ TEST_CASE("windows begin with the epoch and are half open") {
   FailureSchedule failures = schedule("silent 1s..2s");
   failures.begin(kEpoch);
   CHECK_FALSE(failures.at(kEpoch + kSecond - 1));
-  CHECK(failures.at(kEpoch + kSecond) == Failure::silent);
-  CHECK(failures.at(kEpoch + 2 * kSecond - 1) == Failure::silent);
+  CHECK(failures.at(kEpoch + kSecond) == Misbehaviour::silent);
+  CHECK(failures.at(kEpoch + 2 * kSecond - 1) == Misbehaviour::silent);
   CHECK_FALSE(failures.at(kEpoch + 2 * kSecond));
 }
 

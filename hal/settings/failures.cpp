@@ -1,29 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hal/sim/failures.hpp"
+#include "hal/settings/failures.hpp"
 
 #include <cmath>
 
 #include "hal/settings/units.hpp"
 
-namespace takt::sim {
+namespace takt {
 namespace {
-
-constexpr const char* kForm =
-    "; wanted: silent, unplugged, garbage or frozen with its window, such as `unplugged 2s..4s, frozen 6s..6.5s`";
-
-std::string_view trim(std::string_view text) {
-  while (!text.empty() && text.front() == ' ') text.remove_prefix(1);
-  while (!text.empty() && text.back() == ' ') text.remove_suffix(1);
-  return text;
-}
-
-std::optional<Failure> failure_of(std::string_view word) {
-  if (word == "silent") return Failure::silent;
-  if (word == "unplugged") return Failure::unplugged;
-  if (word == "garbage") return Failure::garbage;
-  if (word == "frozen") return Failure::frozen;
-  return std::nullopt;
-}
 
 std::optional<int64_t> instant_of(std::string_view text) {
   const auto seconds = parse_quantity(text, Dimension::time);
@@ -33,17 +16,19 @@ std::optional<int64_t> instant_of(std::string_view text) {
 
 }  // namespace
 
-tl::expected<std::vector<FailureWindow>, std::string> parse_failures(std::string_view text) {
+tl::expected<std::vector<FailureWindow>, std::string> parse_failures(std::string_view text,
+                                                                     std::span<const Misbehaviour> known) {
   std::vector<FailureWindow> windows;
   while (!trim(text).empty()) {
     const size_t comma = std::min(text.find(','), text.size());
     const std::string_view entry = trim(text.substr(0, comma));
     text.remove_prefix(std::min(comma + 1, text.size()));
     const auto wrong = [&](const char* what) {
-      return tl::make_unexpected("`" + std::string(entry) + "` " + what + kForm);
+      return tl::make_unexpected("`" + std::string(entry) + "` " + what + "; wanted: one of " + names_of(known) +
+                                 " with its window, such as `unplugged 2s..4s, frozen 6s..6.5s`");
     };
     const size_t space = entry.find(' '), dots = entry.find("..");
-    const auto failure = failure_of(entry.substr(0, space));
+    const auto failure = misbehaviour_of(entry.substr(0, space), known);
     if (!failure) return wrong("names no failure");
     if (space == std::string_view::npos || dots == std::string_view::npos || dots < space)
       return wrong("has no window");
@@ -54,4 +39,4 @@ tl::expected<std::vector<FailureWindow>, std::string> parse_failures(std::string
   return windows;
 }
 
-}  // namespace takt::sim
+}  // namespace takt

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "hal/drivers/semantic_links.hpp"
+
+#include <cmath>
+#include <fstream>
+
+#include "hal/semantic_link/client.hpp"
+#include "hal/semantic_link/client_node.hpp"
+#include "hal/semantic_link/dbus_port.hpp"
+#include "hal/semantic_link/server.hpp"
+#include "hal/semantic_link/service_node.hpp"
+#include "hal/semantic_link/udp_port.hpp"
+
+namespace takt::hal {
+namespace {
+
+using namespace semantic_link;
+using NodeResult = tl::expected<std::unique_ptr<DeviceNode>, DeviceError>;
+
+/// Where a link goes, of whichever driver, and the key of its checks.
+struct Place {
+  std::string name;  ///< the same for ends of the same port
+  std::unique_ptr<DatagramPort> port;
+  Key key{};
+};
+
+/// 32 hexadecimal digits in a file of their own.
+Key read_key(Settings& settings) {
+  Key key{};
+  const auto file = settings.path("key", false);
+  if (file.empty()) return key;
+  std::ifstream in(file);
+  std::string digits;
+  in >> digits;
+  const bool right =
+      digits.size() == 2 * key.size() && digits.find_first_not_of("0123456789abcdefABCDEF") == std::string::npos;
+  if (!right)
+    settings.fail(file.string() + " holds no key of 32 hexadecimal digits",
+                  "make one: head -c 16 /dev/urandom | od -An -tx1 | tr -d ' \\n' > " + file.string());
+  for (size_t i = 0; right && i < key.size(); ++i)
+    key[i] = static_cast<uint8_t>(std::stoul(digits.substr(2 * i, 2), nullptr, 16));
+  return key;
+}
+
+Place udp_place(const DeviceConfig& config, Settings& settings, bool server) {
+  const std::string text = settings.text("address", "127.0.0.1:4700");
+  const auto address = parse_udp_address(text);
+  if (!address || address->port == 0) {
+    settings.fail("`address` is `" + text + "`", "write numbers and port, such as 127.0.0.1:4700");
+    return {};
+  }
+  if (!address->loopback() && !settings.has("key"))
+    settings.fail("`address` " + text + " is beyond this machine, and there is no `key`",
+                  "anybody there could drive the robot: give both ends a `key` (a file with 32 hexadecimal digits)");
+  return {address->text(), server ? UdpPort::of_server(config.id, *address) : UdpPort::of_client(config.id, *address),
+          read_key(settings)};
+}
+
+Place dbus_place(const DeviceConfig& config, Settings& settings, bool server) {
+  DbusAddress address{settings.text("bus", "session"), settings.text("service", "io.takt.semantic")};
+  if (!valid(address))
+    settings.fail("`bus` is `" + address.bus + "`, `service` is `" + address.service + "`",
+                  "bus: session, system or an address such as unix:path=/run/bus; service: words with dots between");
+  std::string name = address.bus + " " + address.service;
+  return {
+      std::move(name),
+      server ? DbusPort::of_server(config.id, std::move(address)) : DbusPort::of_client(config.id, std::move(address)),
+      {}};
+}
+
+Place place_of(const DeviceConfig& config, Settings& settings, bool server) {
+  return config.driver == "udp" ? udp_place(config, settings, server) : dbus_place(config, settings, server);
+}
+
+std::string robot_of(Settings& settings) {
+  std::string robot = settings.text("robot", "");
+  if (robot.empty() || robot.size() >= sizeof(Hello::robot))
+    settings.fail("`robot` is `" + robot + "`", "name the robot in 1 to 31 characters, at both ends the same");
+  return robot;
+}
+
+int64_t time_of(Settings& settings, const char* name, double fallback_s) {
+  const double seconds = settings.quantity(name, Dimension::time, fallback_s);
+  if (!(seconds > 0 && seconds <= 60))
+    settings.fail("`" + std::string(name) + "` is not in 0s..60s", "give a time above 0s");
+  return std::llround(std::min(seconds, 60.0) * 1e9);
+}
+
+template <class NodeClass>
+NodeResult opened(std::shared_ptr<LinkRunner> runner, Exchange& exchange, int64_t time_ns) {
+  auto device = std::make_unique<LinkDevice>(std::move(runner), exchange);
+  if (const auto result = device->open(); !result) return tl::unexpected(result.error());
+  return std::make_unique<NodeClass>(std::move(device), time_ns);
+}
+
+}  // namespace
+
+NodeResult SemanticServers::make_service(const DeviceConfig& config, Settings& settings, const Clock& clock) {
+  const std::string robot = robot_of(settings);
+  const int64_t watchdog_ns = time_of(settings, "watchdog", 0.3);
+  Place place = place_of(config, settings, true);
+  if (settings.error()) return tl::unexpected(*settings.error());
+  Shared& shared = servers_[config.driver + " " + place.name];
+  auto runner = shared.runner.lock();
+  if (!runner) {
+    auto server = std::make_unique<Server>(std::move(place.port), place.key, clock);
+    shared.server = server.get();
+    runner = std::make_shared<LinkRunner>(config.id, std::move(server), clock);
+    shared.runner = runner;
+  }
+  Exchange* exchange = shared.server->add_robot(robot);
+  if (exchange == nullptr)
+    return device_error(config.id, "`robot` " + robot + " is served at " + place.name + " already",
+                        "give each service a robot of its own, or another address");
+  return opened<ServiceNode>(std::move(runner), *exchange, watchdog_ns);
+}
+
+NodeResult make_semantic_link(const DeviceConfig& config, Settings& settings, const Clock& clock) {
+  const std::string robot = robot_of(settings);
+  const int64_t lag_ns = time_of(settings, "lag", 0.2);
+  Place place = place_of(config, settings, false);
+  if (settings.error()) return tl::unexpected(*settings.error());
+  auto client = std::make_unique<Client>(std::move(place.port), place.key, robot, clock);
+  Exchange& exchange = client->exchange();
+  return opened<ClientNode>(std::make_shared<LinkRunner>(config.id, std::move(client), clock), exchange, lag_ns);
+}
+
+}  // namespace takt::hal

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a robot is told, in words:
+//
+//   goal cup_1.level=full [OBJECT.ATTRIBUTE=VALUE ...]   plan and do what makes all of it true
+//   do fill cup_1 bottle_2                               one action, its objects in the order of the roles
+//   drive 3 1.5 | rotate 90deg | ahead -0.5              behaviours; m and rad unless a unit says otherwise
+//   explore                                              drive to what is unknown until nothing unknown is near
+//   tell cup_1.level=empty [...]                         believe it; what is under way goes on
+//   stop
+#pragma once
+#include <string>
+#include <string_view>
+#include <tl/expected.hpp>
+#include <vector>
+
+namespace takt::robot_client {
+
+enum class Verb : uint8_t { goal, act, drive, rotate, ahead, explore, tell, stop };
+
+/// OBJECT.ATTRIBUTE=VALUE, as it was written.
+struct FactText {
+  std::string object, attribute, value;
+};
+
+struct Task {
+  Verb verb = Verb::stop;
+  std::vector<FactText> facts;     ///< of goal and tell: one at least
+  std::vector<std::string> words;  ///< of do: the action, its objects
+  double x_m = 0, y_m = 0;         ///< of drive
+  double amount = 0;               ///< of rotate rad (left positive), of ahead m
+};
+
+constexpr size_t kMostFacts = 8, kMostWords = 5;
+
+/// The error quotes what is wrong and says what is valid. Allocates.
+tl::expected<Task, std::string> parse_task(std::string_view text);
+
+/// Whether the task may be begun anew where it was interrupted: it names an end, and no way to it.
+constexpr bool names_an_end(Verb verb) { return verb == Verb::goal || verb == Verb::drive || verb == Verb::explore; }
+
+}  // namespace takt::robot_client

@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: Apache-2.0
+# The robot client of a running graph, told and asked from another process, and by somebody at a FIFO.
+source "$(dirname "$0")/lib.sh" "$@"
+
+mkfifo "$work/person"
+cat >"$work/kitchen.yaml" <<EOF
+takt: 1
+name: kitchen
+schedule: schedule.yaml
+default_profile: sim
+devices:
+  base: {kind: mobile_base, rate: 15, in: {velocity: {from: client.velocity, max_age: 300ms}}}
+  person: {kind: interaction, rate: 5, in: {speech: {from: client.speech, depth: 4}}}
+profiles:
+  sim:
+    base: {driver: sim, world: $source/graph/worlds/lab.xml, drive: command}
+    person: {driver: console, input: $work/person, output: $work/speech}
+subsystems:
+  mind:
+    client:
+      type: robot_client
+      in: {odometry: {from: base.odometry, max_age: 300ms}, task: person.task}
+      params: {network: $source/graph/networks/kitchen.yaml}
+EOF
+cat >"$work/schedule.yaml" <<EOF
+takt: 1
+name: kitchen
+policy: cooperative
+nodes:
+  base: {rate: 15, budget: 1ms}
+  person: {rate: 5, budget: 2ms}
+  client: {rate: 15, offset: 5ms, budget: 20ms, criticality: high}
+EOF
+
+# said TEXT: within 20 s the robot says it.
+said() {
+  for _ in $(seq 200); do
+    grep -qF -- "$1" "$work/speech" 2>/dev/null && return
+    sleep 0.1
+  done
+  cat "$work/speech"
+  fail "the robot does not say '$1'"
+}
+tells() { grep -qF -- "$1" "$work/stdout" || fail "stdout lacks '$1'"; }
+
+expect 2 'OBJECT.ATTRIBUTE=VALUE' "$takt" robot goal cup_1
+expect 2 '"fly 3" is no task' "$takt" robot task fly 3
+expect 3 "no graph of this user is running" "$takt" robot map
+
+start_run robot "$work/kitchen.yaml" --for 0s
+timeout 60 "$takt" robot watch >"$work/watch" &
+watch=$!
+expect 0 "" "$takt" robot map --dot "$work/map.dot"
+tells "cup_1                cup              2.00     0.00  level=empty"
+grep -qF 'graph map' "$work/map.dot" || fail "no DOT"
+expect 0 "" "$takt" robot tell cup_1.level=full
+said "I believe that cup_1.level=full"
+expect 0 "" "$takt" robot ask cup_1.level
+tells "full"
+expect 0 "" "$takt" robot ask bottle_1
+tells "bottle_1 is a bottle at 3.00 m, 1.00 m; level=full closed=true"
+expect 2 "it knows: cup_1, bottle_1, bottle_2" "$takt" robot ask cup_9
+expect 2 "level=full" "$takt" robot ask cup_1.taste
+expect 0 "" "$takt" robot task -- ahead -0.3
+said "ahead -0.3: done"
+echo "goal cup_1.level=full" >"$work/person"
+said "goal cup_1.level=full: it is so already"
+expect 0 "" "$takt" robot goal cup_1.level=empty
+said "goal cup_1.level=empty: no plan leads there"
+expect 0 "" "$takt" robot tell cup_1.level=empty
+expect 0 "" "$takt" robot goal cup_1.level=full
+for _ in $(seq 50); do
+  "$takt" robot plan >"$work/plan" && grep -q "1. open bottle_1: drive" "$work/plan" && break
+  sleep 0.1
+done
+grep -q "2. fill cup_1 bottle_1: drive .* act 6.0 s" "$work/plan" || fail "no plan: $(cat "$work/plan")"
+expect 0 "" "$takt" robot task stop
+said "I leave off: goal cup_1.level=full"
+expect 0 "" "$takt" stop --run $run
+wait $run || fail "the run ended with $?"
+wait $watch || fail "watching ended with $?"
+grep -q "^DRIVE | goal cup_1.level=full | step 1 of 2 | plan 1 of 3 | to open bottle_1" "$work/watch" || fail "nothing to watch"
+
+finish
