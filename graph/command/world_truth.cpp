@@ -8,34 +8,30 @@
 namespace takt::command {
 namespace {
 
-const sim::WorldObject* find_object(const sim::World& world, const std::string& name) {
-  const auto found = std::find_if(world.objects.begin(), world.objects.end(),
-                                  [&](const sim::WorldObject& object) { return object.name == name; });
-  return found == world.objects.end() ? nullptr : &*found;
-}
-
-bool is_robot(const sim::World& world, const std::string& name) {
-  return std::any_of(world.clients.begin(), world.clients.end(),
-                     [&](const sim::Client& client) { return client.name == name; });
+/// The robot of that client of the world; null if there is none of that name.
+const sim::Robot* find_robot(const sim::Simulation& simulation, const std::string& name) {
+  const auto& clients = simulation.world().clients;
+  const auto found =
+      std::find_if(clients.begin(), clients.end(), [&](const sim::Client& client) { return client.name == name; });
+  return found == clients.end() ? nullptr : &simulation.stage().robot(static_cast<size_t>(found - clients.begin()));
 }
 
 std::optional<std::string> attribute(const sim::Simulation& simulation, const std::string& object,
-                                     const std::string& name) {
-  if (is_robot(simulation.world(), object) && name == "blocked") return simulation.blocked() ? "true" : "false";
-  const sim::WorldObject* found = find_object(simulation.world(), object);
-  if (found == nullptr || !found->attributes.contains(name)) return std::nullopt;
-  return found->attributes.at(name);
+                                     const std::string& name, int64_t at_ns) {
+  if (const sim::Robot* robot = find_robot(simulation, object); robot != nullptr && name == "blocked")
+    return robot->blocked() ? "true" : "false";
+  return simulation.attribute(object, name, at_ns);
 }
 
 std::optional<std::array<double, 2>> position(const sim::Simulation& simulation, const std::string& object,
                                               int64_t at_ns) {
-  if (is_robot(simulation.world(), object)) {
-    const sim::RobotState robot = simulation.robot(at_ns);
-    return std::array{robot.x_m, robot.y_m};
+  if (const sim::Robot* robot = find_robot(simulation, object)) {
+    const sim::RobotState state = robot->state(at_ns);
+    return std::array{state.x_m, state.y_m};
   }
-  const sim::WorldObject* found = find_object(simulation.world(), object);
-  if (found == nullptr) return std::nullopt;
-  return std::array{found->position.x(), found->position.y()};
+  const auto place = simulation.position(object, at_ns);
+  if (!place) return std::nullopt;
+  return std::array{place->x(), place->y()};
 }
 
 }  // namespace
@@ -45,8 +41,8 @@ graph::WorldTruth world_truth(const sim::Simulation* world) {
   if (world == nullptr) return truth;
   for (const sim::Client& client : world->world().clients) truth.objects.push_back(client.name);
   for (const sim::WorldObject& object : world->world().objects) truth.objects.push_back(object.name);
-  truth.attribute = [world](const std::string& object, const std::string& name, int64_t) {
-    return attribute(*world, object, name);
+  truth.attribute = [world](const std::string& object, const std::string& name, int64_t at_ns) {
+    return attribute(*world, object, name, at_ns);
   };
   truth.position = [world](const std::string& object, int64_t at_ns) { return position(*world, object, at_ns); };
   return truth;
