@@ -38,7 +38,8 @@ with tempfile.TemporaryDirectory(prefix="day-") as work:
                             "--report", f"{work}/report.json", *options], stdout=log, stderr=log)
 
     def reading():
-        """Proportional set size (MB), descriptors and threads of all processes of the run."""
+        """Memory that is no file (proportional, MB), descriptors and threads of all processes of the run. Pages of libraries are not
+        the run's: how many count as its own depends on who else has them mapped."""
         pids, pss, files, threads = [run.pid], 0, 0, 0
         for pid in pids:
             try:
@@ -46,8 +47,8 @@ with tempfile.TemporaryDirectory(prefix="day-") as work:
                     pids += [int(c) for c in open(f"/proc/{pid}/task/{task}/children").read().split()]
                     threads += 1
                 files += len(os.listdir(f"/proc/{pid}/fd"))
-                pss += int(next(l for l in open(f"/proc/{pid}/smaps_rollup") if l.startswith("Pss:")).split()[1])
-            except (OSError, StopIteration): pass
+                pss += sum(int(l.split()[1]) for l in open(f"/proc/{pid}/smaps_rollup") if l.startswith(("Pss_Anon:", "Pss_Shmem:")))
+            except OSError: pass
         return pss / 1024, files, threads
 
     samples = []
