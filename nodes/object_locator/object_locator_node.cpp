@@ -101,7 +101,7 @@ class ObjectLocatorNode final : public Node {
     if (!front) return;
     Position place = transformed(camera, front->x_m, front->y_m, front->z_m);
     const double right = place.x_m - camera.t[0], ahead = place.y_m - camera.t[1], range = std::hypot(right, ahead);
-    if (!(range > 0) || range > range_max_) return;
+    if (!(range > 0) || range < range_min_ || range > range_max_) return;
     place.x_m += half_depth_ * right / range;
     place.y_m += half_depth_ * ahead / range;
     const Class& known = classes_[static_cast<size_t>(box.class_id)];
@@ -124,6 +124,8 @@ class ObjectLocatorNode final : public Node {
                        {0.1, 1.0}, "1",     "of a box in each direction, about its middle, that counts"};
   Param<double> valid_min_{this,       "valid_min", semantic::BoxLocatorParameters{}.valid_min,
                            {0.0, 1.0}, "1",         "of the pixels there must have a disparity"};
+  Param<double> range_min_{this,        "range_min", 0.0,
+                           {0.0, 50.0}, "m",         "nor are nearer ones: what is larger than its box"};
   Param<double> range_max_{this, "range_max", 5.0, {0.5, 50.0}, "m", "farther objects are not reported"};
   Param<double> half_depth_{this,       "half_depth", 0.0,
                             {0.0, 2.0}, "m",          "how far behind its front an object's middle lies"};

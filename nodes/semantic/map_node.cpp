@@ -70,7 +70,7 @@ class SemanticMapNode final : public Node {
     for (size_t i = 0; i < odometry_.size(); ++i)
       track_.insert(odometry_.stamp_ns(i), {mapping_3d::robot_in_odometry(odometry_[i]), {}});
     used_ = 0;
-    const int64_t before_ns = newest_ns();
+    looks_ = 0;
     TextStatus* decisions = decisions_.loan();
     Objects3d* objects = objects_.loan();
     ObjectReports* known = known_.loan();
@@ -78,7 +78,7 @@ class SemanticMapNode final : public Node {
     text_ = decisions ? decisions->text.items() : std::span<char>();
     for (size_t i = 0; i < things_.size(); ++i) look(things_[i], things_.stamp_ns(i));
     for (size_t i = 0; i < reports_.size(); ++i) look(reports_[i], reports_.stamp_ns(i));
-    if (newest_ns() == before_ns || !decisions || !objects || !known) return job.no_result();
+    if (looks_ == 0 || !decisions || !objects || !known) return job.no_result();
     decisions->text.resize(static_cast<uint32_t>(used_));
     decisions_.send(newest_ns());
     list_objects(*objects);
@@ -101,11 +101,12 @@ class SemanticMapNode final : public Node {
   int64_t newest_ns() const { return std::max(last_things_ns_, last_reports_ns_); }
 
   /// In the map, for a message that has not counted yet; a message counts once the robot's pose is known at its stamp.
-  std::optional<mapping_3d::Affine> robot_at(int64_t stamp_ns, int64_t& last_ns) const {
+  std::optional<mapping_3d::Affine> robot_at(int64_t stamp_ns, int64_t& last_ns) {
     if (stamp_ns <= last_ns) return std::nullopt;
     const auto robot = track_.at(stamp_ns);
     if (!robot) return std::nullopt;
     last_ns = stamp_ns;
+    ++looks_;
     return mapping_3d::to_affine(robot->transform);
   }
 
@@ -240,6 +241,7 @@ class SemanticMapNode final : public Node {
   std::array<NodeId, std::size(kMeasured)> measured_{};
   PoseTrack track_{InputPort::kMaxDepth, kLongestGap_ns};
   int64_t last_things_ns_ = INT64_MIN, last_reports_ns_ = INT64_MIN;  ///< stamps of the newest that counted
+  size_t looks_ = 0;                                                  ///< of the job
   std::array<uint64_t, kMisfits> misfits_{};
   std::span<char> text_;  ///< of the job's decisions
   size_t used_ = 0;
