@@ -148,8 +148,8 @@ TEST_CASE("camera mount: forward is robot y, down is -z; tilt up lifts the axis,
 TEST_CASE("the head's pan and tilt add to those of the camera at rest") {
   for (const double pan : {-0.8, 0.0, 0.5})
     for (const double tilt : {-0.4, 0.0, 0.2}) {
-      const Transform turned = turned_by_head(mapping_3d::camera_mount(0.1, 0.2, 1.4, 0.3, -0.3), pan, tilt);
-      const Transform expected = mapping_3d::camera_mount(0.1, 0.2, 1.4, 0.3 + pan, -0.3 + tilt);
+      const Transform turned = turned_by_head(camera_mount(0.1, 0.2, 1.4, 0.3, -0.3), pan, tilt);
+      const Transform expected = camera_mount(0.1, 0.2, 1.4, 0.3 + pan, -0.3 + tilt);
       const double same =
           turned.qw * expected.qw + turned.qx * expected.qx + turned.qy * expected.qy + turned.qz * expected.qz;
       CHECK(std::abs(same) == doctest::Approx(1).epsilon(1e-12));

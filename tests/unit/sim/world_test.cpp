@@ -245,13 +245,14 @@ TEST_CASE("laser: a scanner tilted to the floor sees it at its distance, and the
   model.sensor_in_robot.z = 1;
   model.sensor_in_robot.qw = std::cos(17 * kDegree), model.sensor_in_robot.qx = -std::sin(17 * kDegree);
   std::vector<float> range(model.beams);
-  scan(*s, model, 0, range);
+  Snapshot met = s->make_snapshot();
+  scan(*s, model, 0, range, met);
   for (const size_t beam : {size_t{0}, size_t{140}, size_t{280}}) {
     const double aside = (static_cast<double>(beam) - 140) * 0.25 * kDegree;
     CHECK(range[beam] == doctest::Approx(1 / std::sin(34 * kDegree) / std::cos(aside)));
   }
   model.sensor_in_robot.y = 1;  // the robot looks along x: the scanner at (2.5, 2.5), the box at (4.0, 3.2) before it
-  scan(*s, model, 0, range);
+  scan(*s, model, 0, range, met);
   const double to_floor_m = 1 / std::sin(34 * kDegree) / std::cos(25 * kDegree);
   CHECK(range[240] > 0);
   CHECK(range[240] < to_floor_m - 0.05);
