@@ -91,7 +91,7 @@ TEST_CASE("depth agrees with a ray caster from random poses") {
 }
 
 TEST_CASE("what moves is drawn where it stands, in each state, with the same bytes by every SIMD target") {
-  Simulation s(test::acting_stage(R"(<client name="eye" x="3.2m" y="3.2m" theta="180deg"/>
+  Simulation s(test::acting_stage(R"(<client name="eye" x="5.2m" y="3.2m" theta="180deg"/>
       <event at="1s" object="cup" attr="level" value="full"/><event at="2s" object="cup" x="2.6m" y="3.3m" yaw="40deg"/>
       <event at="3s" object="door" x="2m" y="4.5m" yaw="60deg"/><event at="3s" object="door" attr="closed" value="true"/>)"),
                2);

@@ -72,7 +72,7 @@ subsystems:
     object_locator:
       type: object_locator
       in: {detections: object_detection.detections, disparity: {from: stereo.disparity, depth: 4}, pair: stereo.rectified}
-      params: {database: @/objects, half_depth: 0.25m}
+      params: {database: @/objects, half_depth: 0.25m, range_min: 3m}
     map:
       type: semantic_map
       in: {reports: {from: object_locator.reports, depth: 4}, odometry: {from: scan_matching.odometry, depth: 16}}
@@ -130,7 +130,7 @@ TEST_CASE("after a round through the lab the semantic map holds its four boxes, 
       ++nodes;
       const double off_m = std::hypot(known.x_m - truth.x_m, known.y_m - truth.y_m);
       MESSAGE(name << " is " << off_m << " m off");
-      CHECK(off_m < 0.25);  // nearer sightings among them
+      CHECK(off_m < 0.1);
     }
     CHECK(nodes == 1);
   }
