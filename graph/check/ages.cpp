@@ -66,7 +66,7 @@ class Ages {
     return task.node == nullptr || task.node->inputs()[task.edges[edge].input] != task.node->control();
   }
 
-  /// Backwards from a task to devices; no task twice.
+  /// Backwards from a task to devices; no node twice.
   void collect(size_t t, size_t only_edge, size_t through, bool passed, Path& walk, std::vector<Path>& paths) const {
     if (paths.size() >= kMostPaths) return;
     const TaskPlan& task = plan_.tasks[t];
@@ -84,7 +84,9 @@ class Ages {
     for (size_t e = 0; e < task.edges.size(); ++e) {
       if ((only_edge != kNone && e != only_edge) || !carries_stamp(task, e)) continue;
       const size_t producer = producer_.find(task.edges[e].port);
-      if (producer == kNone || producer == t || again(producer)) continue;
+      if (producer == kNone) continue;
+      // A device that is both ends of a loop, as of what it is to do for what it saw, ends the path where it begins.
+      if (!plan_.tasks[producer].device && (producer == t || again(producer))) continue;
       walk.push_back({t, e});
       collect(producer, kNone, through, passed || task.edges[e].port == through, walk, paths);
       walk.pop_back();

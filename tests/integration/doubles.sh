@@ -25,6 +25,7 @@ profiles:
     base: {failures: lost_frames 8s..9s}
   apart:
     default: {driver: double, world: $source/graph/worlds/lab.xml}
+    front_laser: {baud: 500000}
     head: {driver: can, interface: "unix:$work/head"}
     base: {driver: can, interface: "unix:$work/base"}
 subsystems:
@@ -47,7 +48,7 @@ nodes:
   floor_laser: {rate: 15, deadline: 40ms}
   base: {rate: 15, deadline: 40ms}
   lines: {rate: 15, deadline: 40ms}
-  obstacle_stop: {rate: 15, offset: 20ms, deadline: 60ms}
+  obstacle_stop: {rate: 15, offset: 20ms, deadline: 60ms, criticality: high}
 YAML
 
 expect 2 "lives in real time only" "$takt" run "$work/graph.yaml" --clock virtual --for 1s --output "$work/out"

@@ -106,6 +106,19 @@ TEST_CASE("ages: the worst path counts, and depth as the oldest") {
   CHECK(chain.bound().oldest_ns == (9 + 3 * 100 + 5) * kMs);
 }
 
+TEST_CASE("ages: a device at both ends of a loop begins the path there") {
+  Chain chain;
+  Filter robot;
+  chain.graph.chains.clear();
+  chain.plan.tasks[0].node = &robot;
+  chain.plan.tasks[0].edges = {{0, 2, 1, 400 * kMs}};
+  const AgeBound bound = age_bounds(chain.graph, chain.plan, chain.nodes).front();
+  CHECK(bound.name == "map.out -> camera.in");
+  CHECK(bound.proven());
+  // What map made of the image of -100 is there at 13, and still the newest at 200.
+  CHECK(bound.bound_ns == (100 + 200 + 1) * kMs);
+}
+
 TEST_CASE("ages: a join waits for the slower of two outputs of one origin; of two origins nothing is known") {
   Chain chain;
   chain.plan.tasks[2].edges.push_back({1, 0, 1, 0});
