@@ -60,7 +60,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   uint64_t error_frames = 0;
   for (const auto& table : {head::messages(), base::messages()}) {
     std::array<EndToEndReceiver, kMostRows> receivers{};
-    std::array<EndToEndSender, kMostRows> senders{};
+    std::array<EndToEndSender, kMostRows> senders;
     std::array<Protection, kMostRows> protections{};
     for (size_t at = 0; at < size; at += 16) {
       const std::span<const uint8_t> wire(data + at, std::min<size_t>(16, size - at));
