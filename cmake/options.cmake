@@ -22,10 +22,10 @@ if(TAKT_SANITIZE)
   endif()
   add_link_options(-fsanitize=${TAKT_SANITIZE})
 endif()
-set(TAKT_TSAN_SUPPRESSIONS)  # linked into programs
-if(TAKT_SANITIZE MATCHES thread)
-  set(TAKT_TSAN_SUPPRESSIONS takt_tsan_suppressions)
-  add_library(takt_tsan_suppressions OBJECT ${PROJECT_SOURCE_DIR}/tests/tsan_suppressions.cpp)
+set(TAKT_SUPPRESSIONS)  # linked into programs
+if(TAKT_SANITIZE)
+  set(TAKT_SUPPRESSIONS takt_suppressions)
+  add_library(takt_suppressions OBJECT ${PROJECT_SOURCE_DIR}/tests/sanitizer_suppressions.cpp)
 endif()
 
 option(TAKT_FUZZ "Fuzz targets (tests/fuzz/run); needs Clang" OFF)
