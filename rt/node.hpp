@@ -204,6 +204,12 @@ class OutputPort {
   /// In setup: fixes how large the messages of this output can become. Types without arrays need no call.
   void reserve(const Capacity& capacity) { capacity_ = capacity; }
   const Capacity& capacity() const { return capacity_; }
+  /// In the node's constructor: the stamps sent are those of these inputs; what comes by the others is only heeded, and
+  /// adds nothing to the age of this output. Without a word they may be any input's, `control` apart.
+  void stamped_by(std::initializer_list<const InputPort*> inputs) { stamped_by_ = inputs; }
+  bool stamped_by(const InputPort& input) const {
+    return stamped_by_.empty() || std::find(stamped_by_.begin(), stamped_by_.end(), &input) != stamped_by_.end();
+  }
   /// False if nobody reads this output; a node may then save itself the work.
   bool connected() const { return connected_; }
   /// In a job: the loaned message is complete; the runtime publishes it when run() returns.
@@ -219,6 +225,7 @@ class OutputPort {
   std::string_view name_, doc_;
   const MessageType* type_;
   Capacity capacity_;
+  std::vector<const InputPort*> stamped_by_;
   Writer* writer_ = nullptr;
   MessageHeader* loaned_ = nullptr;
   int64_t stamp_ns_ = 0;

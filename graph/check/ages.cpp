@@ -25,6 +25,13 @@ struct Step {
 };
 using Path = std::vector<Step>;
 
+/// Where an age is asked for: where a job of the task has taken its message of `edge`, else where its output `port` is
+/// visible.
+struct Place {
+  size_t task = kNone, edge = kNone, port = kNone;
+  bool is_input() const { return edge != kNone; }
+};
+
 class Ages {
  public:
   Ages(const Plan& plan, const std::vector<NodeAdmission>& nodes) : plan_(plan), nodes_(nodes) {
@@ -33,16 +40,15 @@ class Ages {
     ticks_ = ticks_per_ns();
   }
 
-  /// Worst over the paths from a device to that task whose last edge is `edge` (kNone: any), and that pass `through`
-  /// (kNone: any port). `as_input`: the age where the job has taken the message, else where its output is visible.
-  void judge(size_t task, size_t edge, size_t through, bool as_input, AgeBound& bound) {
+  /// Worst over the paths from a device to that place that pass `through` (kNone: any port).
+  void judge(const Place& place, size_t through, AgeBound& bound) {
     std::vector<Path> paths;
     Path walk;
-    collect(task, edge, through, through == kNone, walk, paths);
+    collect(place, through, through == kNone, walk, paths);
     if (paths.empty()) bound.why = "no path from a device leads there";
     if (paths.size() >= kMostPaths) bound.why = "too many paths lead there";
     bound.bound_ns = bound.oldest_ns = 0;
-    for (const Path& path : paths) add(path, as_input, bound);
+    for (const Path& path : paths) add(path, place.is_input(), bound);
     if (!bound.why.empty()) bound.bound_ns = bound.oldest_ns = std::nullopt;
   }
 
@@ -62,18 +68,25 @@ class Ages {
     return Wide{longest_ns} * ticks > analysis::kLongest ? 1 : ticks;
   }
 
-  bool carries_stamp(const TaskPlan& task, size_t edge) const {
-    return task.node == nullptr || task.node->inputs()[task.edges[edge].input] != task.node->control();
+  /// Whether stamps of what comes by that edge go out again by `port` (kNone: by any).
+  static bool carries_stamp(const TaskPlan& task, size_t edge, size_t port) {
+    if (task.node == nullptr) return true;
+    const InputPort& input = *task.node->inputs()[task.edges[edge].input];
+    if (&input == task.node->control()) return false;
+    const auto made = std::find(task.ports.begin(), task.ports.end(), port);
+    return made == task.ports.end() ||
+           task.node->outputs()[static_cast<size_t>(made - task.ports.begin())]->stamped_by(input);
   }
 
-  /// Backwards from a task to devices; no node twice.
-  void collect(size_t t, size_t only_edge, size_t through, bool passed, Path& walk, std::vector<Path>& paths) const {
+  /// Backwards from a place to devices; no node twice.
+  void collect(const Place& place, size_t through, bool passed, Path& walk, std::vector<Path>& paths) const {
     if (paths.size() >= kMostPaths) return;
+    const size_t t = place.task;
     const TaskPlan& task = plan_.tasks[t];
     const auto again = [&](size_t producer) {
       return std::any_of(walk.begin(), walk.end(), [&](const Step& s) { return s.task == producer; });
     };
-    const bool device_output = task.device && (!walk.empty() || only_edge == kNone);
+    const bool device_output = task.device && !place.is_input();
     if (device_output || task.edges.empty()) {  // a device's stamps are its own, whatever it reads
       if (!passed) return;
       walk.push_back({t, kNone});
@@ -82,13 +95,13 @@ class Ages {
       return;
     }
     for (size_t e = 0; e < task.edges.size(); ++e) {
-      if ((only_edge != kNone && e != only_edge) || !carries_stamp(task, e)) continue;
-      const size_t producer = producer_.find(task.edges[e].port);
+      if (place.is_input() ? e != place.edge : !carries_stamp(task, e, place.port)) continue;
+      const size_t port = task.edges[e].port, producer = producer_.find(port);
       if (producer == kNone) continue;
       // A device that is both ends of a loop, as of what it is to do for what it saw, ends the path where it begins.
       if (!plan_.tasks[producer].device && (producer == t || again(producer))) continue;
       walk.push_back({t, e});
-      collect(producer, kNone, through, passed || task.edges[e].port == through, walk, paths);
+      collect({producer, kNone, port}, through, passed || port == through, walk, paths);
       walk.pop_back();
     }
   }
@@ -228,7 +241,7 @@ std::vector<AgeBound> age_bounds(const GraphSpec& graph, const Plan& plan, const
     if (to == kNone || from == kNone) continue;  // left out by the mode
     const size_t edge = edge_of(plan.tasks[to], chain.to.port);
     AgeBound bound{chain.name, false, chain.max_age_ns, {}, {}, 0, {}};
-    ages.judge(to, edge, port_of(plan, chain.from), edge != kNone, bound);
+    ages.judge({to, edge, port_of(plan, chain.to)}, port_of(plan, chain.from), bound);
     result.push_back(std::move(bound));
   }
   for (size_t t = 0; t < plan.tasks.size(); ++t) {
@@ -240,7 +253,7 @@ std::vector<AgeBound> age_bounds(const GraphSpec& graph, const Plan& plan, const
           task.node != nullptr ? "." + std::string(task.node->inputs()[task.edges[e].input]->name()) : "";
       AgeBound bound{
           port.node + "." + port.port + " -> " + task.name + input, true, task.edges[e].max_age_ns, {}, {}, 0, {}};
-      ages.judge(t, e, kNone, true, bound);
+      ages.judge({t, e}, kNone, bound);
       result.push_back(std::move(bound));
     }
   }

@@ -22,9 +22,9 @@ struct AgeBound {
   bool proven() const { return bound_ns && *bound_ns <= max_age_ns; }
 };
 
-/// Stamps come from devices and go along the data edges (not `control`); where several paths lead to a place the worst
-/// counts. `nodes`: what the admission of the same plan found. Every job must publish: a node that is paced or paused
-/// by requests lets its readers' data grow older than this.
+/// Stamps come from devices and go along the data edges (not `control`, nor what an output is not stamped by); where
+/// several paths lead to a place the worst counts. `nodes`: what the admission of the same plan found. Every job must
+/// publish: a node that is paced or paused by requests lets its readers' data grow older than this.
 std::vector<AgeBound> age_bounds(const GraphSpec& graph, const Plan& plan, const std::vector<NodeAdmission>& nodes);
 
 }  // namespace takt::graph

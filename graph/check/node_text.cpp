@@ -4,6 +4,20 @@
 #include "graph/check/check.hpp"
 
 namespace takt::graph {
+namespace {
+
+/// Whose stamps an output sends, where that is not those of all inputs.
+std::string stamp_text(const Node& node, const OutputPort& output) {
+  std::string names;
+  bool all = true;
+  for (const InputPort* input : node.inputs()) {
+    if (output.stamped_by(*input)) names += fmt::format("{}{}", names.empty() ? "" : ", ", input->name());
+    else all = false;
+  }
+  return all ? "" : " (stamps of " + names + ")";
+}
+
+}  // namespace
 
 std::string nodes_text(const NodeTypes& types) {
   std::string text = "node types\n";
@@ -19,7 +33,8 @@ std::string node_text(const NodeType& type) {
     text += fmt::format("  in   {:<14} {:<14} {}{}\n", input->name(), input->type().name, input->doc(),
                         input->need() == Need::optional ? " (optional)" : "");
   for (const OutputPort* output : node->outputs())
-    text += fmt::format("  out  {:<14} {:<14} {}\n", output->name(), output->type().name, output->doc());
+    text += fmt::format("  out  {:<14} {:<14} {}{}\n", output->name(), output->type().name, output->doc(),
+                        stamp_text(*node, *output));
   if (node->levels().size() > 1)
     for (size_t l = 0; l < node->levels().size(); ++l)
       text += fmt::format("  level {:<12} {:<14} {} (about {:g} of the CPU time)\n", l, node->levels()[l].name,

@@ -106,6 +106,24 @@ TEST_CASE("ages: the worst path counts, and depth as the oldest") {
   CHECK(chain.bound().oldest_ns == (9 + 3 * 100 + 5) * kMs);
 }
 
+TEST_CASE("ages: an input that gives an output no stamp adds nothing to its age") {
+  Chain chain;
+  Source slow;
+  chain.add("slow", slow, 1, 0, 900);
+  chain.plan.tasks[3].device = true;
+  chain.plan.tasks[2].edges.push_back({1, 3, 1, 0});
+  chain.graph.chains[0].from = {"slow", "out"};
+  CHECK(chain.bound().bound_ns.value() > 1000 * kMs);
+  chain.map.out.stamped_by({&chain.map.in});
+  CHECK_FALSE(chain.bound().bound_ns);
+  CHECK(chain.bound().why == "no path from a device leads there");
+  chain.graph.chains[0].from = {"camera", "out"};
+  CHECK(chain.bound().bound_ns == (100 + 8 + 5) * kMs);
+  // Where the job takes that input, its age counts nevertheless.
+  chain.graph.chains = {{"heeded", {"slow", "out"}, {"map", "other"}, 2000 * kMs, {}}};
+  CHECK(chain.bound().bound_ns.value() > 1000 * kMs);
+}
+
 TEST_CASE("ages: a device at both ends of a loop begins the path there") {
   Chain chain;
   Filter robot;
