@@ -12,7 +12,9 @@ bool NodeGuard::hear(NodeState state, int64_t stamp_ns) {
 }
 
 void NodeGuard::tend(Station& station, int64_t now_ns) {
-  if (beat_ns_ != INT64_MIN && now_ns - beat_ns_ < kHeartbeatPeriod_ns) return;
+  const bool due = beat_ns_ == INT64_MIN || now_ns - beat_ns_ >= kHeartbeatPeriod_ns;
+  // While the interface is down every job tries: nothing but a frame that leaves tells that it is up again.
+  if (!due && station.link() != Link::down) return;
   beat_ns_ = now_ns;
   station.send(places_.host_heartbeat, std::array{static_cast<double>(NodeState::operational)});
   if (!operational(now_ns)) command(station, NodeCommand::start);

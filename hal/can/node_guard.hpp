@@ -33,7 +33,8 @@ class NodeGuard {
   void begin() { *this = NodeGuard(places_); }
   /// The node's heartbeat arrived. True if the node has just booted: what it was told before it has forgotten.
   bool hear(NodeState state, int64_t stamp_ns);
-  /// Each job: the host's heartbeat when it is due, and a start for a node that is there but not operational.
+  /// Each job: the host's heartbeat when it is due or the interface was down, and a start for a node that is there but
+  /// not operational.
   void tend(Station& station, int64_t now_ns);
   /// Tells the node that the host goes.
   void end(Station& station) { command(station, NodeCommand::pre_operational); }

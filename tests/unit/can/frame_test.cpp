@@ -24,19 +24,6 @@ Frame frame_of(uint32_t id, std::string_view data) {
 const Signal kNoSignals[] = {{"S", 16, 8, false, 1, 0, 0, 255}};
 Message protected_message(uint32_t id) { return {"M", id, 8, Sender::device, true, kNoSignals}; }
 
-std::string_view word(EndToEndStatus status) {
-  switch (status) {
-    case EndToEndStatus::initial: return "INITIAL";
-    case EndToEndStatus::ok: return "OK";
-    case EndToEndStatus::ok_some_lost: return "OKSOMELOST";
-    case EndToEndStatus::repeated: return "REPEATED";
-    case EndToEndStatus::wrong_sequence: return "WRONGSEQUENCE";
-    case EndToEndStatus::wrong_crc: return "WRONGCRC";
-    case EndToEndStatus::invalid: return "INVALID";
-  }
-  return "?";
-}
-
 }  // namespace
 
 TEST_CASE("can: sixteen bytes there and back; what no classic frame has is refused") {
@@ -116,7 +103,7 @@ TEST_CASE("end to end: repeated, lost and refused frames of the golden sequences
   for (const auto& sequence : test::frame_sequences()) {
     EndToEndReceiver receiver;
     for (size_t i = 0; i < sequence.frames.size(); ++i) {
-      CHECK_MESSAGE(word(receiver.check(message, frame_of(0x190, sequence.frames[i]))) == sequence.verdicts[i],
+      CHECK_MESSAGE(test::word(receiver.check(message, frame_of(0x190, sequence.frames[i]))) == sequence.verdicts[i],
                     std::string(sequence.name));
     }
   }

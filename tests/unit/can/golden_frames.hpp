@@ -8,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "hal/can/end_to_end.hpp"
+
 namespace takt::test {
 
 struct GoldenFrame {
@@ -246,6 +248,20 @@ inline constexpr ErrorFrame kErrorFrames[] = {
     {"no_ack", "20000020080000000000000000000000"},         {"tx_timeout", "01000020080000000000000000000000"},
     {"prot_stuff", "88000020080000000000040A00000000"},     {"lost_arb", "02000020080000000500000000000000"},
 };
+
+/// A verdict in the words of the sequences.
+inline std::string_view word(can::EndToEndStatus status) {
+  switch (status) {
+    case can::EndToEndStatus::initial: return "INITIAL";
+    case can::EndToEndStatus::ok: return "OK";
+    case can::EndToEndStatus::ok_some_lost: return "OKSOMELOST";
+    case can::EndToEndStatus::repeated: return "REPEATED";
+    case can::EndToEndStatus::wrong_sequence: return "WRONGSEQUENCE";
+    case can::EndToEndStatus::wrong_crc: return "WRONGCRC";
+    case can::EndToEndStatus::invalid: return "INVALID";
+  }
+  return "?";
+}
 
 inline std::vector<uint8_t> bytes_of(std::string_view hexadecimal) {
   const auto digit = [](char c) { return static_cast<uint8_t>(c <= '9' ? c - '0' : c - 'A' + 10); };
