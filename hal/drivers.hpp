@@ -19,6 +19,7 @@ class Stage;
 
 namespace takt::hal {
 
+class OwnFolder;
 class SemanticServers;
 
 /// What a device needs to exist.
@@ -46,7 +47,7 @@ class Devices {
   std::map<std::string, std::shared_ptr<sim::Stage>> stages_;                          ///< by file and seed
   std::map<std::pair<std::string, size_t>, std::unique_ptr<sim::Simulation>> robots_;  ///< by that and client
   std::unique_ptr<SemanticServers> servers_;
-  std::filesystem::path folder_;
+  std::unique_ptr<OwnFolder> folder_;
 };
 
 enum class SettingKind : uint8_t { path, length, angle, speed, turn_rate, time, rate, count, number, flag, text, map };

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <sstream>
 
 #include "hal/actor/actor_node.hpp"
@@ -12,6 +11,7 @@
 #include "hal/camera/stereo_camera_node.hpp"
 #include "hal/camera/v4l2_camera.hpp"
 #include "hal/drivers/doubled.hpp"
+#include "hal/drivers/own_folder.hpp"
 #include "hal/drivers/semantic_links.hpp"
 #include "hal/drivers/sick_lasers.hpp"
 #include "hal/gpio/gpio_lines.hpp"
@@ -189,14 +189,14 @@ NodeResult make_sim_laser(const DeviceConfig& config, Settings& settings, sim::S
   return opened<LaserNode>(std::move(device), settings);
 }
 
-NodeResult make_sim_base(const DeviceConfig& config, Settings& settings, sim::Simulation& world) {
+NodeResult make_sim_base(const DeviceConfig& config, Settings& settings, sim::Simulation& world, const Clock& clock) {
   sim::OdometryModel model;
   model.scale_error = settings.quantity("scale_error", Dimension::number, model.scale_error);
   model.turn_scale_error = settings.quantity("turn_scale_error", Dimension::number, model.turn_scale_error);
   model.turn_bias_rad_s = settings.quantity("turn_bias", Dimension::turn_rate, model.turn_bias_rad_s);
   model.turn_bias_walk = settings.quantity("turn_bias_walk", Dimension::number, model.turn_bias_walk);
   choose_drive(settings, world);
-  std::unique_ptr<MobileBase> device = std::make_unique<sim::SimBase>(config.id, model, world);
+  std::unique_ptr<MobileBase> device = std::make_unique<sim::SimBase>(config.id, model, world, &clock);
   device = with_failures<sim::FailingBase>(std::move(device), settings);
   return opened<BaseNode>(std::move(device), settings);
 }
@@ -254,7 +254,7 @@ NodeResult make_sim(const DeviceConfig& config, Settings& settings, Devices& dev
   if (!world) return tl::unexpected(world.error());
   if (config.kind == "stereo_camera") return make_sim_camera(config, settings, **world, clock);
   if (config.kind == "laser_scanner") return make_sim_laser(config, settings, **world);
-  if (config.kind == "mobile_base") return make_sim_base(config, settings, **world);
+  if (config.kind == "mobile_base") return make_sim_base(config, settings, **world, clock);
   if (config.kind == "interaction") return make_script(settings, **world);
   if (config.kind == "camera_head") {
     std::unique_ptr<CameraHead> device = std::make_unique<sim::SimHead>(config.id, **world);
@@ -388,17 +388,12 @@ DeviceResult check_keys(const DeviceConfig& config, const DeviceKind& kind) {
 
 Devices::Devices() : servers_(std::make_unique<SemanticServers>()) {}
 
-Devices::~Devices() {
-  std::error_code ignored;
-  if (!folder_.empty()) std::filesystem::remove_all(folder_, ignored);
-}
+Devices::~Devices() = default;
 
 const std::filesystem::path& Devices::folder() {
-  if (!folder_.empty()) return folder_;
   std::error_code error;
-  std::string name = (std::filesystem::temp_directory_path(error) / "takt-doubles-XXXXXX").string();
-  if (mkdtemp(name.data()) != nullptr) folder_ = name;
-  return folder_;
+  if (!folder_) folder_ = std::make_unique<OwnFolder>(std::filesystem::temp_directory_path(error), "takt-doubles-");
+  return folder_->path();
 }
 
 tl::expected<sim::Simulation*, DeviceError> Devices::world(const DeviceConfig& config) {

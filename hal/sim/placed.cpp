@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 namespace takt::sim {
 namespace {
@@ -46,6 +47,16 @@ double cast_capsule(const Capsule& capsule, const Vec3& o, const Vec3& d) {
   return nearest;
 }
 
+void add_shirt(Scene& scene, const Placed& placed) {
+  const Person& person = *placed.shape->person;
+  const double k = person.height_m / 1.75, c = std::cos(placed.yaw_rad), s = std::sin(placed.yaw_rad);
+  for (const double side : {1.0, -1.0}) {
+    const double ahead = side * k * 0.17;  // the torso is 0.15 m thick
+    add_board(scene, {placed.position.x() + ahead * c, placed.position.y() + ahead * s, k * 0.92}, k * kShirtEdge,
+              placed.yaw_rad + (side > 0 ? 0 : std::numbers::pi), person.shirt);
+  }
+}
+
 const Shape& shape_at_first(const WorldObject& object) {
   for (const Look& look : object.looks) {
     const bool holds = std::all_of(look.when.begin(), look.when.end(), [&](const Condition& condition) {
@@ -70,6 +81,7 @@ void add_placed(Scene& scene, const Placed& placed, double offset) {
     add_board(scene, at(board->z_m), board->edge_m, placed.yaw_rad, board->picture);
   if (const auto& person = placed.shape->person)
     add_person(scene, placed.position, placed.yaw_rad, person->height_m, person->points, person->pointing_rad);
+  if (const auto& person = placed.shape->person; person && person->shirt) add_shirt(scene, placed);
 }
 
 void add_moving(Scene& scene, const Placed& placed, double offset) {

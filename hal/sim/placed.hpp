@@ -20,6 +20,8 @@ Placed as_it_begins(const WorldObject& object);
 
 /// What a camera sees of it. Each box starts at another place of its texture, `offset`.
 void add_placed(Scene& scene, const Placed& placed, double offset);
+/// Where the texture of the world's object of that number starts, of those that move or change.
+inline double texture_start(size_t object) { return 0.37 * static_cast<double>(object); }
 /// The same; the texture keeps to its place on the box, wherever that stands.
 void add_moving(Scene& scene, const Placed& placed, double offset);
 

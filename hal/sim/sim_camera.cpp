@@ -3,6 +3,7 @@
 
 #include <pthread.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstring>
 
@@ -64,6 +65,7 @@ DeviceResult SimCamera::start(int64_t epoch_ns) {
   triggers_ = 0;
   next_free_frame_ = 0;
   started_ = true;
+  starting_ = background_lens_ && clock_.now_ns() >= epoch_ns;
   if (background_lens_ && !worker_.joinable()) {
     quit_.store(false);
     worker_ = std::thread([this] { work(); });
@@ -94,11 +96,13 @@ void SimCamera::request(int64_t at_ns, Request& into) const {
 }
 
 void SimCamera::trigger(int64_t at_ns) {
+  starting_ = starting_ && at_ns - clock_.now_ns() < std::min(kLatestStartNs, settings_.rate.release_ns(0, 1) / 2);
   triggered_ns_ = at_ns;
   if (!real_time_.load(std::memory_order_relaxed) && in_real_time()) real_time_.store(true, std::memory_order_relaxed);
-  has_trigger_ = ever_triggered_ = true;
+  ever_triggered_ = true;
+  has_trigger_ = !starting_;
   ++triggers_;
-  if (!worker_.joinable()) return;
+  if (!worker_.joinable() || starting_) return;
   asked_at_ns_.store(at_ns, std::memory_order_relaxed);
   asked_.fetch_add(1, std::memory_order_release);
   asked_.notify_one();

@@ -29,8 +29,9 @@ struct SimCameraSettings {
 /// once a real-time thread triggers, it takes the lowest real-time priority, behind every worker: a camera's hardware
 /// is not slowed by what else the machine does. If the frame is not ready, or the robot turned out to be elsewhere, or
 /// the clock is virtual, read() renders itself: what is delivered depends on the exposure's stamp alone, never on
-/// timing. Nobody triggered: the camera runs free at `rate` from the epoch, and a read gives the newest exposure that
-/// was not delivered.
+/// timing. Started in the midst of a run, with its own thread, it gives nothing until an exposure was asked for in
+/// time, as hardware does. Nobody triggered: the camera runs free at `rate` from the epoch, and a read gives the newest
+/// exposure that was not delivered.
 class SimCamera final : public StereoCamera {
  public:
   SimCamera(std::string id, SimCameraSettings settings, Simulation& simulation, const Clock& clock);
@@ -75,6 +76,7 @@ class SimCamera final : public StereoCamera {
 
   int64_t triggered_ns_ = 0;
   bool has_trigger_ = false, ever_triggered_ = false, started_ = false;
+  bool starting_ = false;  ///< in the midst of a run: no exposure has been asked for in time yet
   uint32_t triggers_ = 0;
   int64_t next_free_frame_ = 0;
   uint64_t rendered_ahead_ = 0, delivered_ = 0;

@@ -53,11 +53,12 @@ bool SimHead::command(double pan, double tilt, int64_t at_ns) {
   return p == pan && t == tilt;
 }
 
-SimBase::SimBase(std::string id, OdometryModel model, Simulation& simulation)
-    : id_(std::move(id)), simulation_(simulation), odometry_(simulation, model, simulation.seed()) {}
+SimBase::SimBase(std::string id, OdometryModel model, Simulation& simulation, const Clock* clock)
+    : id_(std::move(id)), simulation_(simulation), clock_(clock), odometry_(simulation, model, simulation.seed()) {}
 DeviceResult SimBase::start(int64_t epoch_ns) {
   simulation_.begin(epoch_ns);
   odometry_.restart();
+  if (clock_ != nullptr) static_cast<void>(odometry_.at(clock_->now_ns()));
   started_ = true;
   return {};
 }

@@ -5,6 +5,7 @@
 #include "hal/head/camera_head.hpp"
 #include "hal/laser/laser_scanner.hpp"
 #include "hal/sim/sensors.hpp"
+#include "rt/time/clock.hpp"
 
 namespace takt::sim {
 
@@ -50,7 +51,8 @@ class SimHead final : public CameraHead {
 /// Base of the simulated world: drives the world's path, or obeys commands if it has none (or drive: command).
 class SimBase final : public MobileBase {
  public:
-  SimBase(std::string id, OdometryModel model, Simulation& simulation);
+  /// With a clock it lives through what is past in start(), not in the first read() after it.
+  SimBase(std::string id, OdometryModel model, Simulation& simulation, const Clock* clock = nullptr);
   DeviceResult open() override { return {}; }
   void close() override {}
   DeviceResult start(int64_t epoch_ns) override;
@@ -63,6 +65,7 @@ class SimBase final : public MobileBase {
  private:
   std::string id_;
   Simulation& simulation_;
+  const Clock* clock_;
   DriftingOdometry odometry_;
   bool started_ = false;
 };

@@ -8,7 +8,7 @@ namespace takt::sim {
 namespace {
 
 constexpr int64_t kNoEpoch = std::numeric_limits<int64_t>::min();
-constexpr size_t kMostQuads = 6, kMostCapsules = 13;  // of one shape: a box and a board; a person
+constexpr size_t kMostQuads = 8, kMostCapsules = 13;  // of one shape: a box, a board and a shirt; a person
 
 /// A robot as the others see it: 0.78 m long, 0.56 m wide (algorithms.md 13), as high as the one of the thesis.
 const Shape& robot_shape() {
@@ -125,7 +125,7 @@ void Stage::look(size_t robot, int64_t at_ns, Snapshot& into) const {
   into.scene.capsules.clear();
   const auto add = [&](const Placed& placed, size_t number) {
     into.placed.push_back(placed);
-    add_moving(into.scene, placed, 0.37 * static_cast<double>(number));
+    add_moving(into.scene, placed, texture_start(number));
   };
   for (const size_t object : changing_) {
     const auto placed = this->placed(object, at_ns);

@@ -32,8 +32,8 @@ struct Recipe {
 };
 
 // The floor is saturated (S = 255 (max - min) / max about 130) and what stands on it either pale (S below 85: plaster,
-// wood, cardboard, cloth) or more saturated still (the stripes, S about 200): a ground detector that looks at
-// saturation and value can tell them apart, although all of them are textured alike for stereo.
+// wood, cardboard, cloth, and the asphalt of streets) or more saturated still (the stripes, S about 200): a ground
+// detector that looks at saturation and value can tell them apart, although all of them are textured alike for stereo.
 constexpr std::array<Recipe, kMaterials> kRecipes{{
     {"sky", 16, 1, {200, 190, 180}, 0, 0, 0},
     {"floor", 1024, 250, {62, 96, 128}, 28, 3, 0},
@@ -57,6 +57,7 @@ constexpr std::array<Recipe, kMaterials> kRecipes{{
      Paint::colourful,
      {{{165, 35, 130}, {200, 190, 40}, {150, 60, 225}}},
      64},
+    {"asphalt", 512, 250, {92, 88, 86}, 26, 4, 0},
 }};
 
 const std::array<double, 3>& colour_of_row(const Recipe& recipe, int row) {
@@ -210,7 +211,7 @@ bool material_from(std::string_view name, Material& material) {
 
 std::string_view material_names() {
   return "sky, floor, plaster, ceiling, wood, cardboard, poster, cloth, skin, red_stripes, blue_stripes, "
-         "green_stripes, violet_stripes";
+         "green_stripes, violet_stripes, asphalt";
 }
 
 tl::expected<Texture, std::string> load_picture(const std::filesystem::path& file, double edge_m) {

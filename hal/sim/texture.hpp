@@ -39,9 +39,10 @@ enum class Material : uint8_t {
   red_stripes,
   blue_stripes,
   green_stripes,
-  violet_stripes
+  violet_stripes,
+  asphalt
 };
-constexpr int kMaterials = 13;
+constexpr int kMaterials = 14;
 /// "wood" and the like; false if the name is unknown.
 bool material_from(std::string_view name, Material& material);
 std::string_view material_names();

@@ -146,9 +146,27 @@ Scene build_scene(const World& world, std::shared_ptr<const TextureSet> textures
                top = world.wall_height_m;
   scene.quads.push_back(make_quad({Vec3(0, 0, 0), Vec3(w, 0, 0), Vec3(w, h, 0), Vec3(0, h, 0)}, world.floor));
   scene.quads.push_back(make_quad({Vec3(0, h, top), Vec3(w, h, top), Vec3(w, 0, top), Vec3(0, 0, top)}, world.ceiling));
+  constexpr double kThickness = 0.001;
+  double z = 0;
+  for (const TerrainPatch& patch : world.terrain) {
+    z += kThickness;
+    const auto corner = [&](double x, double y) {
+      return Vec3(patch.middle.x() + x * patch.width_m / 2, patch.middle.y() + y * patch.depth_m / 2, z);
+    };
+    scene.quads.push_back(make_quad({corner(-1, -1), corner(1, -1), corner(1, 1), corner(-1, 1)}, patch.material));
+  }
   add_walls(world, scene);
   for (const WorldObject& object : world.objects) add_placed(scene, as_it_begins(object), texture_offset(scene));
   return scene;
+}
+
+std::string_view terrain_at(const World& world, const Vec2& place) {
+  const auto covers = [&](const TerrainPatch& patch) {
+    const Vec2 off = (place - patch.middle).cwiseAbs();
+    return off.x() <= patch.width_m / 2 && off.y() <= patch.depth_m / 2;
+  };
+  const auto top = std::find_if(world.terrain.rbegin(), world.terrain.rend(), covers);
+  return top == world.terrain.rend() ? std::string_view("floor") : std::string_view(top->name);
 }
 
 double cast_ray(const World& world, const Scene& scene, const Vec3& origin, const Vec3& direction, double max_range) {

@@ -4,6 +4,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "hal/device.hpp"
@@ -38,7 +39,9 @@ struct Person {
   double height_m = 1.75;
   bool points = false;
   double pointing_rad = 0;
+  std::shared_ptr<const Texture> shirt = nullptr;  ///< before the chest and behind the back, where there is one
 };
+constexpr double kShirtEdge = 0.48;  ///< m, of a person of 1.75 m
 
 /// What there is of an object: cameras see all of it, lasers and collisions boxes and persons.
 struct Shape {
@@ -109,6 +112,14 @@ struct WorldAction {
   std::vector<RoleMove> moves;
 };
 
+/// What the floor is like on a level rectangle. Cameras see its material; lasers and collisions see no difference.
+struct TerrainPatch {
+  std::string name;
+  Vec2 middle = Vec2::Zero();
+  double width_m = 0, depth_m = 0;  ///< along x, along y
+  Material material = Material::asphalt;
+};
+
 /// What happens by itself: an attribute gets a value or, if `attribute` is empty, the object is put elsewhere.
 struct WorldEvent {
   double at_s = 0;
@@ -127,6 +138,7 @@ struct World {
   Material floor = Material::floor, wall = Material::plaster, ceiling = Material::ceiling;
   std::vector<Client> clients;
   std::vector<WorldObject> objects;
+  std::vector<TerrainPatch> terrain;  ///< later ones lie on earlier ones
   std::vector<WorldLine> lines;
   std::vector<WorldAction> actions;
   std::vector<WorldEvent> events;  ///< in the order of their instants
@@ -141,6 +153,9 @@ tl::expected<Bitmap, std::string> parse_rows(const std::string& text, double cel
 
 /// Floor, ceiling, walls (one rectangle for each straight run of cell borders), and the objects as they begin.
 Scene build_scene(const World& world, std::shared_ptr<const TextureSet> textures);
+
+/// Name of the terrain at a place of the floor; "floor" where there is none.
+std::string_view terrain_at(const World& world, const Vec2& place);
 
 /// Distance from `origin` along `direction` (unit) to the first wall, box or person, to floor or ceiling; `max_range`
 /// if nothing is nearer. The scene is that of the world.

@@ -2,6 +2,7 @@
 #include <tinyxml2.h>
 
 #include <algorithm>
+#include <cmath>
 #include <sstream>
 
 #include "hal/settings/units.hpp"
@@ -140,6 +141,8 @@ struct Loader {
                         quantity(e, "pointing", Dimension::angle, 0.0)};
       if (s.person->height_m < 0.5 || s.person->height_m > 2.5)
         fail(e, "`height` must lie in 0.5..2.5 m", "correct it");
+      if (e->Attribute("shirt") != nullptr)
+        s.person->shirt = picture(e, "shirt", kShirtEdge * s.person->height_m / 1.75);
     } else if (kind == "board") {
       board(e, s);
     } else {
@@ -168,12 +171,30 @@ struct Loader {
 
   void board(const Element* e, Shape& s) {
     const double edge = quantity(e, "edge", Dimension::length), z = quantity(e, "z", Dimension::length);
-    const std::string name = text(e, "picture", true);
     if (error) return;
     if (edge <= 0) return fail(e, "`edge` must be positive", "correct it");
-    auto picture = load_picture(std::filesystem::path(file).parent_path() / name, edge);
-    if (!picture) return fail(e, picture.error(), "correct the picture");
-    s.board = Board{edge, z, std::make_shared<const Texture>(std::move(*picture))};
+    s.board = Board{edge, z, picture(e, "picture", edge)};
+  }
+
+  /// From the file that an attribute names, relative to the world file; null after an error.
+  std::shared_ptr<const Texture> picture(const Element* e, const char* name, double edge_m) {
+    const std::string picture_file = text(e, name, true);
+    if (error) return nullptr;
+    auto read = load_picture(std::filesystem::path(file).parent_path() / picture_file, edge_m);
+    if (read) return std::make_shared<const Texture>(std::move(*read));
+    fail(e, read.error(), "correct the picture");
+    return nullptr;
+  }
+
+  void terrain(const Element* e) {
+    TerrainPatch t;
+    t.name = word(e, "name");
+    t.middle = Vec2(quantity(e, "x", Dimension::length), quantity(e, "y", Dimension::length));
+    t.width_m = quantity(e, "width", Dimension::length);
+    t.depth_m = quantity(e, "depth", Dimension::length);
+    t.material = material(e, "material", t.material);
+    if (t.width_m <= 0 || t.depth_m <= 0) fail(e, "a terrain needs positive sizes", "correct them");
+    world.terrain.push_back(t);
   }
 
   void line(const Element* e) {
@@ -255,13 +276,53 @@ struct Loader {
     world.actions.push_back(std::move(a));
   }
 
+  /// The object that something happens to; null after an error.
+  const WorldObject* object_of(const Element* e) {
+    const std::string name = text(e, "object", true);
+    const auto object = named(world.objects, name);
+    if (object != world.objects.end()) return &*object;
+    fail(e, "no object `" + name + "`", "known: " + names(world.objects));
+    return nullptr;
+  }
+
+  /// Along waypoints, looking ahead, as events every 100 ms.
+  void walk(const Element* e) {
+    constexpr double kStep_s = 0.1;
+    WorldEvent v;
+    v.at_s = quantity(e, "from", Dimension::time);
+    const double speed = quantity(e, "speed", Dimension::speed);
+    const WorldObject* object = object_of(e);
+    if (v.at_s < 0 || v.at_s > 1e9) fail(e, "`from` must lie in 0..1000000000 s", "count from the begin of the run");
+    if (speed <= 0 || speed > 3) fail(e, "`speed` must lie in (0, 3 m/s]", "correct it");
+    std::vector<Vec2> corners;
+    for (const Element* w = e->FirstChildElement(); w != nullptr && !error; w = w->NextSiblingElement()) {
+      if (std::string(w->Name()) != "waypoint") return unknown(w, "waypoint");
+      corners.emplace_back(quantity(w, "x", Dimension::length), quantity(w, "y", Dimension::length));
+    }
+    if (corners.size() < 2) fail(e, "a walk needs at least two waypoints", "add <waypoint x=... y=.../>");
+    if (error) return;
+    v.object = object->name;
+    double along = 0;  // of the present piece
+    for (size_t i = 0; i + 1 < corners.size(); ++i) {
+      const Vec2 piece = corners[i + 1] - corners[i];
+      v.yaw_rad = std::atan2(piece.y(), piece.x());
+      for (; along < piece.norm(); along += speed * kStep_s, v.at_s += kStep_s) {
+        v.position = corners[i] + along * piece.normalized();
+        world.events.push_back(v);
+      }
+      along -= piece.norm();
+    }
+    v.position = corners.back();
+    world.events.push_back(v);
+  }
+
   void event(const Element* e) {
     WorldEvent v;
     v.at_s = quantity(e, "at", Dimension::time);
     if (v.at_s < 0 || v.at_s > 1e9) fail(e, "`at` must lie in 0..1000000000 s", "count from the begin of the run");
-    v.object = text(e, "object", true);
-    const auto object = named(world.objects, v.object);
-    if (object == world.objects.end()) return fail(e, "no object `" + v.object + "`", "known: " + names(world.objects));
+    const WorldObject* object = object_of(e);
+    if (object == nullptr) return;
+    v.object = object->name;
     const bool sets = e->Attribute("attr") != nullptr, goes = e->Attribute("to") != nullptr,
                moves = e->Attribute("x") != nullptr;
     if (sets + goes + moves != 1)
@@ -307,14 +368,16 @@ struct Loader {
       if (kind == "client") client(c);
       else if (kind == "object") object(c);
       else if (kind == "line") line(c);
-      else if (kind != "rows" && kind != "action" && kind != "event")
-        unknown(c, "rows, client, object, line, action, event");
+      else if (kind == "terrain") terrain(c);
+      else if (kind != "rows" && kind != "action" && kind != "event" && kind != "walk")
+        unknown(c, "rows, client, object, terrain, line, action, event, walk");
     }
     // What can happen to objects is read when all are known.
     for (const Element* c = e->FirstChildElement(); c != nullptr && !error; c = c->NextSiblingElement()) {
       const std::string kind = c->Name();
       if (kind == "action") action(c);
       else if (kind == "event") event(c);
+      else if (kind == "walk") walk(c);
     }
     std::stable_sort(world.events.begin(), world.events.end(),
                      [](const WorldEvent& a, const WorldEvent& b) { return a.at_s < b.at_s; });

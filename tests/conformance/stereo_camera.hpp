@@ -44,6 +44,15 @@ struct GuardedImage {
   }
 };
 
+/// Both images of one exposure, left before right.
+inline std::vector<uint8_t> exposure(StereoCamera& camera, int64_t at_ns) {
+  GuardedImage left(camera.format()), right(camera.format());
+  camera.trigger(at_ns);
+  REQUIRE(camera.read(left.view(), right.view(), INT64_MAX).status == ReadStatus::ok);
+  left.bytes.insert(left.bytes.end(), right.bytes.begin(), right.bytes.end());
+  return left.bytes;
+}
+
 using MakeCamera = std::function<std::unique_ptr<StereoCamera>(const Clock&)>;
 
 inline void check_stereo_camera(const MakeCamera& make) {

@@ -21,16 +21,14 @@ World path_world() {
   return world;
 }
 
-std::vector<uint8_t> exposure(Simulation& s, const Clock& clock, int64_t at_ns, bool background) {
+constexpr int64_t kHour = 3'600'000'000'000;
+
+/// `after_ns` after the epoch.
+std::vector<uint8_t> exposure(Simulation& s, const Clock& clock, int64_t epoch_ns, int64_t after_ns, bool background) {
   SimCamera camera("camera", {test::small_rig(), {}, {15, 1}, background}, s, clock);
   REQUIRE(camera.open().has_value());
-  REQUIRE(camera.start(1000).has_value());
-  test::GuardedImage left(camera.format()), right(camera.format());
-  camera.trigger(at_ns);
-  REQUIRE(camera.read(left.view(), right.view(), INT64_MAX).status == ReadStatus::ok);
-  auto both = left.bytes;
-  both.insert(both.end(), right.bytes.begin(), right.bytes.end());
-  return both;
+  REQUIRE(camera.start(epoch_ns).has_value());
+  return test::exposure(camera, epoch_ns + after_ns);
 }
 
 }  // namespace
@@ -78,24 +76,26 @@ TEST_CASE("sim laser, head, base and lines conform") {
 TEST_CASE("what the camera sees depends on seed and exposure only, not on the thread that rendered it") {
   MonotonicClock real;
   VirtualClock virtual_clock;
+  const int64_t epoch = real.now_ns() + kHour;
   Simulation a(path_world(), 0, 11), b(path_world(), 0, 11), c(path_world(), 0, 12);
-  const auto ahead = exposure(a, real, 900'000'000, true);
-  const auto in_read = exposure(b, virtual_clock, 900'000'000, false);
+  const auto ahead = exposure(a, real, epoch, 900'000'000, true);
+  const auto in_read = exposure(b, virtual_clock, epoch, 900'000'000, false);
   CHECK(ahead == in_read);
-  CHECK(exposure(a, virtual_clock, 900'000'001, false) != in_read);  // other noise
-  CHECK(exposure(c, virtual_clock, 900'000'000, false) != in_read);
+  CHECK(exposure(a, virtual_clock, epoch, 900'000'001, false) != in_read);  // other noise
+  CHECK(exposure(c, virtual_clock, epoch, 900'000'000, false) != in_read);
 }
 
 TEST_CASE("a frame rendered in the background is used, and is the same") {
   MonotonicClock clock;
+  const int64_t epoch = clock.now_ns() + kHour;
   Simulation s(path_world(), 0, 11);
   SimCamera camera("camera", {test::small_rig(), {}, {15, 1}, true}, s, clock);
   REQUIRE(camera.open().has_value());
-  REQUIRE(camera.start(0).has_value());
+  REQUIRE(camera.start(epoch).has_value());
   test::GuardedImage left(camera.format()), right(camera.format()), left_again(camera.format()),
       right_again(camera.format());
   const int64_t cpu = simulator_cost().ahead_ns;
-  camera.trigger(500'000'000);
+  camera.trigger(epoch + 500'000'000);
   while (!camera.idle()) std::this_thread::yield();
   REQUIRE(camera.read(left.view(), right.view(), INT64_MAX).status == ReadStatus::ok);
   CHECK(camera.rendered_ahead() == 1);
@@ -103,11 +103,47 @@ TEST_CASE("a frame rendered in the background is used, and is the same") {
   camera.stop();
   SimCamera plain("camera", {test::small_rig(), {}, {15, 1}, false}, s, clock);
   REQUIRE(plain.open().has_value());
-  REQUIRE(plain.start(0).has_value());
-  plain.trigger(500'000'000);
+  REQUIRE(plain.start(epoch).has_value());
+  plain.trigger(epoch + 500'000'000);
   REQUIRE(plain.read(left_again.view(), right_again.view(), INT64_MAX).status == ReadStatus::ok);
   CHECK(left.bytes == left_again.bytes);
   CHECK(right.bytes == right_again.bytes);
+}
+
+TEST_CASE("a camera started in the midst of a run gives nothing that was not asked for in time") {
+  MonotonicClock clock;
+  Simulation s(path_world(), 0, 11);
+  SimCamera camera("camera", {test::small_rig(), {}, {5, 1}, true}, s, clock);
+  REQUIRE(camera.open().has_value());
+  const int64_t now = clock.now_ns();
+  REQUIRE(camera.start(now - kHour).has_value());
+  test::GuardedImage left(camera.format()), right(camera.format());
+  const auto read = [&] { return camera.read(left.view(), right.view(), INT64_MAX); };
+  camera.trigger(now - 1'000'000);
+  CHECK(read().status == ReadStatus::no_data);
+  const int64_t ahead = clock.now_ns() + kHour;
+  camera.trigger(ahead);
+  while (!camera.idle()) std::this_thread::yield();
+  const StereoFrame first = read();
+  CHECK(first.status == ReadStatus::ok);
+  CHECK(first.stamp_ns == ahead);
+  CHECK(first.frame_number == 1);
+  CHECK(camera.cost().in_read_ns == 0);
+  camera.trigger(clock.now_ns());  // once it has started, none is refused
+  CHECK(read().status == ReadStatus::ok);
+}
+
+TEST_CASE("a base started in the midst of a run says what one says that was there from the start") {
+  VirtualClock clock(kHour);
+  Simulation s(path_world(), 0, 5);
+  SimBase always("base", {}, s), late("base", {}, s, &clock);
+  REQUIRE(always.start(0).has_value());
+  REQUIRE(late.start(0).has_value());
+  const BaseReading expected = always.read(kHour + 20'000'000, INT64_MAX),
+                    reading = late.read(kHour + 20'000'000, INT64_MAX);
+  CHECK(reading.x_m == expected.x_m);
+  CHECK(reading.y_m == expected.y_m);
+  CHECK(reading.theta_rad == expected.theta_rad);
 }
 
 TEST_CASE("odometry drifts, but within what its model allows") {

@@ -12,6 +12,7 @@
 
 using namespace takt;
 using namespace takt::sim;
+using test::exposure;
 using test::kMs;
 using test::kSecond;
 
@@ -31,15 +32,6 @@ struct Laser {
   SimLaser laser;
   std::vector<float> range;
 };
-
-std::vector<uint8_t> exposure(SimCamera& camera, int64_t at_ns) {
-  test::GuardedImage left(camera.format()), right(camera.format());
-  camera.trigger(at_ns);
-  REQUIRE(camera.read(left.view(), right.view(), INT64_MAX).status == ReadStatus::ok);
-  auto both = left.bytes;
-  both.insert(both.end(), right.bytes.begin(), right.bytes.end());
-  return both;
-}
 
 }  // namespace
 

@@ -50,7 +50,7 @@ TEST_CASE("mistakes in a world are told with file, line and the way out") {
   CHECK(has(message("<map/>"), "not <world>"));
   CHECK(has(message("<world resolution=\"0.5\">" + kRows + "</world>"), "m, cm or mm"));
   CHECK(has(message("<world resolution=\"0.5m\">" + kRows + "</world>"), "no <client>"));
-  CHECK(has(message("<world resolution=\"0.5m\">" + kRows + "\n<robot/></world>"), "client, object, line, action"));
+  CHECK(has(message("<world resolution=\"0.5m\">" + kRows + "\n<robot/></world>"), "client, object, terrain, line, action"));
   CHECK(has(message("<world resolution=\"0.5m\" wall=\"marble\">" + kRows + "</world>"), "plaster"));
   CHECK(has(message("<world resolution=\"0.5m\"><rows>###\n#.\n###</rows></world>"), "row 2"));
   CHECK(has(message("<world resolution=\"0.5m\" map=\"absent.pgm\"/>"), "absent.pgm"));
