@@ -15,7 +15,7 @@ trap 'rm -rf "$work"; kill $(jobs -p) 2>/dev/null || true' EXIT
 
 one_run() { # VERB
   # A budget that the usual search fits into and the long one exceeds twice; the other nodes keep theirs.
-  sed -E -e "s/(stereo: \{rate: 15, offset: 26ms, budget: )20ms(.*on_overrun: )degrade/\1${budget}\2$1/" \
+  sed -E -e "s/^( *stereo: \{.*budget: )[^,]+(,.*on_overrun: )degrade/\1${budget}\2$1/" \
     "$root/schedules/thesis.yaml" >"$work/$1.yaml"
   grep -q "stereo: .*budget: $budget,.*on_overrun: $1" "$work/$1.yaml" || { echo "schedules/thesis.yaml has changed: mend this script"; exit 1; }
   "$takt" run --for "$((before + cause + after))s" --schedule "$work/$1.yaml" --set "stereo.disparities=$many" \

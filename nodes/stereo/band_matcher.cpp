@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <span>
 #include <stdexcept>
 #include <string>
 
@@ -22,6 +23,11 @@ int reach(const MatcherParameters& p) {
 void copy_image(ImageView<const uint8_t> from, uint8_t* to) {
   const size_t row = static_cast<size_t>(from.width) * static_cast<size_t>(from.channels);
   for (int y = 0; y < from.height; ++y) std::memcpy(to + static_cast<size_t>(y) * row, from.row(y), row);
+}
+
+template <class T>
+ImageView<T> first_rows(ImageView<T> image, int rows) {
+  return {image.data, image.width, rows, image.channels, image.stride};
 }
 
 template <class T>
@@ -44,15 +50,18 @@ BandMatcher::BandMatcher(int width, int height, int channels, const MatcherParam
   if (parameters.selection == Selection::semi_global)
     throw std::invalid_argument("stereo: semi_global looks along the whole image and has no bands");
   // The caller begins while the others wake up, and so has a few rows more.
-  const int lead = bands > 1 ? height / 32 : 0;
+  const int lead = bands > 1 ? height / 96 : 0;
   for (int i = 0; i < bands; ++i) {
     Band& band = bands_.emplace_back();
     band.first = i == 0 ? 0 : lead + (height - lead) * i / bands;
     band.last = lead + (height - lead) * (i + 1) / bands;
     band.top = std::max(0, band.first - reach(parameters));
     band.height = std::min(height, band.last + reach(parameters)) - band.top;
+    if (i == 0) {
+      band.own.matcher = make_matcher(width, band.height, channels, parameters);
+      continue;
+    }
     band.own = make_desk(band.height, parameters);
-    if (i == 0) continue;
     band.helper = std::make_unique<Helper>();
     band.helper->desk = make_desk(band.height, parameters);
     band.helper->left.resize(bytes_of(band.height));
@@ -144,8 +153,13 @@ bool BandMatcher::match(ImageView<const uint8_t> left, ImageView<const uint8_t> 
   };
   for (const Band& band : bands_)
     if (band.helper) ask(band, read_by(band, left), read_by(band, right));
-  for (Band& band : bands_) {
-    const bool done = band.helper && helped(*band.helper);
+  // The first band is matched in place: what it writes below its own rows is the next bands'.
+  const Band& begin = bands_.front();
+  (void)begin.own.matcher->match(read_by(begin, left), read_by(begin, right),
+                                 {first_rows(out.disparity, begin.height), first_rows(out.confidence, begin.height),
+                                  first_rows(out.fraction, begin.height)});
+  for (Band& band : std::span(bands_).subspan(1)) {
+    const bool done = helped(*band.helper);
     if (!done) run(band, band.own, read_by(band, left), read_by(band, right));
     deliver(band, done ? band.helper->desk : band.own, out);
   }

@@ -53,10 +53,10 @@ class BandMatcher final : public Matcher {
     std::jthread thread;             ///< last: ends before what it uses
   };
   struct Band {
-    int first = 0, last = 0;  ///< rows of the result
-    int top = 0, height = 0;  ///< rows that are read
-    Desk own;                 ///< of the caller
-    std::unique_ptr<Helper> helper;
+    int first = 0, last = 0;         ///< rows of the result
+    int top = 0, height = 0;         ///< rows that are read
+    Desk own;                        ///< of the caller; of the first band its matcher only
+    std::unique_ptr<Helper> helper;  ///< not of the first band
   };
 
   Desk make_desk(int height, const MatcherParameters& parameters) const;
