@@ -82,9 +82,16 @@ Fit fit_pose(const Skeleton& skeleton, const FitParameters& p, const Cluster& cl
       task = link.mirrors != 0 && fit.fitted[link.mirrors]
                  ? make_mirrored_task(link, start, frame, partner, fit.ends[link.mirrors] - fit.ends[partner.parent])
                  : make_task(link, start, frame, body * skeleton.poses[pose].directions[i].cast<float>());
-      end = find_best_fit(skeleton, p, cluster, task);
-      fit.hidden[i] = !end;
-      if (!end && link.descendants > 0) end = find_hidden_end(skeleton, p, cluster, task);
+      const auto look = [&] {
+        end = find_best_fit(skeleton, p, cluster, task);
+        fit.hidden[i] = !end;
+        if (!end && link.descendants > 0) end = find_hidden_end(skeleton, p, cluster, task);
+      };
+      look();
+      if (!end && link.follows_parent && link.parent != 0 && link.mirrors == 0) {
+        task = make_task(link, start, frame, frame * link.rest.cast<float>());
+        look();
+      }
     }
     if (!end) {
       fit.hidden[i] = false;

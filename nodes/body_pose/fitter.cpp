@@ -88,13 +88,16 @@ uint32_t Fitter::solve(size_t i, size_t pose, std::span<const uint32_t> chain) {
   of_link_[i].push_back(number);
 
   const Vector3f start = link.parent == 0 ? cluster_.start : solved_[now.parent].end;
-  const Matrix3f& frame = link.follows_parent && link.parent != 0 ? solved_[now.parent].follow : body_;
+  const bool follows = link.follows_parent && link.parent != 0;
+  const Matrix3f& frame = follows ? solved_[now.parent].follow : body_;
   if (now.partner != kNone) {
     const Link& partner = skeleton_.links[link.mirrors];
     const Vector3f from = partner.parent == 0 ? cluster_.start : solved_[chain[partner.parent]].end;
     find_end(make_mirrored_task(link, start, frame, partner, solved_[now.partner].end - from), now);
   } else {
     find_end(make_task(link, start, frame, body_ * skeleton_.poses[direction].directions[i].cast<float>()), now);
+    if (!now.found && follows && link.mirrors == 0)
+      find_end(make_task(link, start, frame, frame * link.rest.cast<float>()), now);
   }
   if (!now.found) return kNone;
   mark_close(number, start);

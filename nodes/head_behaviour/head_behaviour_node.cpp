@@ -35,8 +35,8 @@ class HeadBehaviourNode final : public Node {
     else gaze_->see(faces_, now_ns);
     const StereoPair* pair = pair_.newest();
     if (pair && pair_.is_new()) sun_.see((pair->health & image_health::saturated) != 0, pair_.stamp_ns(), now_ns);
-    const bool sent = send_lids(now_ns) & send_command(pair, now_ns);
-    if (!sent) job.no_result();
+    const bool lids_sent = send_lids(now_ns), command_sent = send_command(pair, now_ns);
+    if (!lids_sent || !command_sent) job.no_result();
   }
 
  private:

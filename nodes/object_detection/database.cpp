@@ -10,7 +10,7 @@
 namespace takt::object_detection {
 namespace {
 
-constexpr const char* kWords = "valid are object, threshold, view, test_view";
+constexpr const char* kWords = "valid are object, threshold, view, test_view, background";
 
 class Reader {
  public:
@@ -34,6 +34,8 @@ class Reader {
     complete();
     return std::move(objects_);
   }
+  /// After read().
+  const std::vector<std::filesystem::path>& backgrounds() const { return backgrounds_; }
 
  private:
   [[noreturn]] void fail(const std::string& what) const {
@@ -42,19 +44,21 @@ class Reader {
 
   void take(const std::vector<std::string>& words) {
     const std::string& key = words[0];
-    if (key != "object" && key != "threshold" && key != "view" && key != "test_view")
+    if (key != "object" && key != "threshold" && key != "view" && key != "test_view" && key != "background")
       fail("unknown word `" + key + "`; " + kWords);
-    if (key != "object" && objects_.empty()) fail("`" + key + "` stands before the first `object NAME`");
-    const size_t most = key == "view" ? 2 + kStages : key == "threshold" ? 1 + kStages : 2;
+    if (key != "object" && key != "background" && objects_.empty())
+      fail("`" + key + "` stands before the first `object NAME`");
+    const size_t most = key == "view" ? 2 + kHistogramStages : key == "threshold" ? 1 + kStages : 2;
     if (words.size() < 2 || (words.size() > most && key != "object"))
       fail("`" + key + "` takes " +
            (key == "view"        ? "a file and at most three thresholds"
-            : key == "threshold" ? "one to three thresholds"
+            : key == "threshold" ? "one to four thresholds"
             : key == "object"    ? "a name and its attributes"
                                  : "exactly one word"));
     if (key == "object") begin(words);
     else if (key == "threshold") threshold(words);
     else if (key == "view") add_view(words);
+    else if (key == "background") backgrounds_.push_back(folder_ / words[1]);
     else if (test_views_ == TestViews::read) objects_.back().test_views.push_back(load(words[1]));
   }
 
@@ -153,6 +157,7 @@ class Reader {
   int line_ = 0;
   bool threshold_given_ = false;
   std::vector<DatabaseObject> objects_;
+  std::vector<std::filesystem::path> backgrounds_;
 };
 
 }  // namespace
@@ -166,6 +171,24 @@ std::string DatabaseObject::label() const {
 std::vector<DatabaseObject> read_database(const std::filesystem::path& folder, int side_px, TestViews test_views,
                                           const std::string& list) {
   return Reader(folder, side_px, test_views, list).read();
+}
+
+std::vector<Photograph> read_backgrounds(const std::filesystem::path& folder, const std::string& list) {
+  Reader reader(folder, std::nullopt, TestViews::skip, list);
+  reader.read();
+  std::vector<Photograph> photographs;
+  for (const auto& file : reader.backgrounds()) photographs.push_back(read_photograph(file));
+  return photographs;
+}
+
+Photograph read_photograph(const std::filesystem::path& file) {
+  cv::Mat image;
+  try {
+    image = cv::imread(file.string(), cv::IMREAD_COLOR);
+  } catch (const cv::Exception&) {
+  }
+  if (image.empty()) throw DatabaseError("background " + file.string() + " cannot be read or is no image");
+  return {file, image.cols, image.rows, {image.datastart, image.dataend}};
 }
 
 std::vector<DatabaseObject> read_classes(const std::filesystem::path& folder, const std::string& list) {

@@ -14,8 +14,8 @@
 namespace takt::object_detection {
 
 /// The stages of the cascade, in their order.
-enum class Stage : uint8_t { colour, orientation, cooccurrence };
-constexpr size_t kStages = 3;
+enum class Stage : uint8_t { colour, orientation, cooccurrence, layout };
+constexpr size_t kStages = 4, kHistogramStages = 3;
 /// Per stage the error below which a window passes; none: the object's, and there automatic_threshold.
 using Thresholds = std::array<std::optional<double>, kStages>;
 
@@ -47,6 +47,15 @@ struct DatabaseObject {
   std::string label() const;
 };
 
+/// Surroundings without any of the objects, 8-bit BGR.
+struct Photograph {
+  std::filesystem::path file;
+  int width = 0, height = 0;
+  std::vector<uint8_t> pixels;
+
+  ImageView<const uint8_t> view() const { return {pixels.data(), width, height, 3}; }
+};
+
 /// What cannot be used: "FILE:LINE: what is wrong; what is valid".
 struct DatabaseError : std::runtime_error {
   using std::runtime_error::runtime_error;
@@ -58,14 +67,21 @@ enum class TestViews : uint8_t { skip, read };
 ///
 ///     object NAME [ATTRIBUTE=VALUE ...]   begins an entry; its index is the class id of its detections, which so
 ///                                  carry the attributes. Entries of one name have the same attributes, other values
-///     threshold T [T [T]]          of the object's views in the stages colour, orientation, co-occurrence: a number
-///                                  above 0, at most 1, or auto, as without
-///     view FILE [T [T [T]]]        a reference view, relative to the folder; with thresholds of its own, auto: the
-///     object's test_view FILE               a view that only measurements use
+///     threshold T [T [T [T]]]      of the object's views in the stages colour, orientation, co-occurrence, layout: a
+///                                  number above 0, at most 1, or auto, as without
+///     view FILE [T [T [T]]]        a reference view, relative to the folder; with thresholds of its own in the first
+///                                  three stages, auto: the object's
+///     test_view FILE               a view that only measurements use
+///     background FILE              a photograph without any of the objects, of any size: read_backgrounds()
 ///
 /// or nothing; # begins a comment. Throws DatabaseError.
 std::vector<DatabaseObject> read_database(const std::filesystem::path& folder, int side_px, TestViews test_views,
                                           const std::string& list = "objects.txt");
+
+/// The photographs that the list names. Throws DatabaseError.
+std::vector<Photograph> read_backgrounds(const std::filesystem::path& folder, const std::string& list = "objects.txt");
+/// An image file as one. Throws DatabaseError if it is none.
+Photograph read_photograph(const std::filesystem::path& file);
 
 /// Names and attributes of the entries alone, for who needs to know what class ids mean: no image is read. Throws
 /// DatabaseError.

@@ -26,6 +26,7 @@ StageLimits::StageLimits(std::span<const std::vector<ReferenceLimit>> objects) {
 Decision::Decision(const SearchGrid& grid, size_t objects)
     : grid_(grid), windows_(static_cast<size_t>(grid.windows())) {
   errors_.assign(windows_ * objects, kFailed);
+  at_.resize(errors_.size());
   visited_.resize(windows_);
   stack_.resize(windows_);
 }
@@ -59,14 +60,10 @@ size_t Decision::detections(double min_score, std::span<Detection> out) {
       if (visited_[window] || errors[window] == kFailed) continue;
       const size_t best = best_of_group(errors, window);
       if (1 - errors[best] < static_cast<float>(min_score)) continue;
-      const int u = static_cast<int>(best) % grid_.columns, v = static_cast<int>(best) / grid_.columns;
-      const auto size = static_cast<float>(grid_.window_px);
-      const Detection detection{static_cast<float>(object),
-                                static_cast<float>(grid_.x0(u)),
-                                static_cast<float>(grid_.y0(v)),
-                                size,
-                                size,
-                                1 - errors[best]};
+      const Placement& at = at_[object * windows_ + best];
+      const auto size = static_cast<float>(at.side);
+      const Detection detection{
+          static_cast<float>(object), static_cast<float>(at.x), static_cast<float>(at.y), size, size, 1 - errors[best]};
       if (found < out.size()) out[found++] = detection;
       else if (auto worst = std::max_element(out.begin(), out.end(), better);
                worst != out.end() && better(detection, *worst))

@@ -59,7 +59,12 @@ class Decision {
   /// No window passes.
   void clear();
   /// A window passes for an object with an error, or fails (kFailed).
-  void set(size_t object, size_t window, float error) { errors_[object * windows_ + window] = error; }
+  void set(size_t object, size_t window, float error) { set(object, window, error, grid_.window(window)); }
+  /// The same, and where around the window the object is.
+  void set(size_t object, size_t window, float error, const Placement& at) {
+    errors_[object * windows_ + window] = error;
+    at_[object * windows_ + window] = at;
+  }
   /// Per window the object's error, or kFailed.
   std::span<const float> errors(size_t object) const { return std::span(errors_).subspan(object * windows_, windows_); }
   size_t objects() const { return errors_.size() / windows_; }
@@ -82,6 +87,7 @@ class Decision {
   SearchGrid grid_;
   size_t windows_;
   std::vector<float> errors_;  ///< object by object
+  std::vector<Placement> at_;  ///< likewise, where a window passes
   std::vector<uint8_t> visited_;
   std::vector<uint32_t> stack_;
 };

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "nodes/object_detection/layout_learning.hpp"
+
 namespace takt::object_detection {
 namespace {
 
@@ -17,18 +19,21 @@ bool overlap(const Detection& a, const Detection& b) {
 }  // namespace
 
 Detector::Detector(int image_width, int image_height, std::span<const DatabaseObject> database,
-                   const DetectorParameters& p)
+                   const DetectorParameters& p, std::span<const Photograph> backgrounds)
     : width_(image_width), height_(image_height), last_(p.last), references_(cascade_references(database, p)) {
+  std::vector<LayoutObject> layout;
+  if (last_ >= Stage::layout) layout = learn_layout(database, backgrounds, p.threshold_scale);
   scales_.reserve(p.scales.size());
   for (const double scale : p.scales) {
     const auto at = static_cast<uint32_t>(scales_.size());
     const SearchGrid& grid =
-        scales_.emplace_back(image_width, image_height, scale, database[0].views[0].side_px, references_, p).grid();
+        scales_.emplace_back(image_width, image_height, scale, database[0].views[0].side_px, references_, layout, p)
+            .grid();
     for (int row = 0; row < grid.rows; ++row) rows_.push_back({at, static_cast<uint32_t>(row)});
     undecided_.emplace_back(static_cast<size_t>(grid.windows()));
     windows_ += undecided_.back().size();
   }
-  if (last_ == Stage::cooccurrence) candidates_.reserve(windows_ * database.size());
+  if (last_ >= Stage::cooccurrence) candidates_.reserve(windows_ * database.size());
   for (const DatabaseObject& object : database)
     first_of_name_.push_back(static_cast<size_t>(
         std::find_if(database.begin(), database.end(), [&](const auto& other) { return other.name == object.name; }) -
@@ -74,7 +79,7 @@ void Detector::decide_best_candidate() {
   std::pop_heap(candidates_.begin(), candidates_.end(), Candidate::worse);
   const Candidate best = candidates_.back();
   candidates_.pop_back();
-  scales_[best.scale].decide_by_cooccurrences(best.object, best.window);
+  scales_[best.scale].decide(best.object, best.window);
 }
 
 void Detector::end() {
@@ -111,8 +116,8 @@ size_t Detector::detections(double min_score, std::span<Detection> out) {
     if (kept == out.size()) break;
     const auto same = [&](const Found& other) {
       const auto a = static_cast<size_t>(other.detection.class_id), b = static_cast<size_t>(next.detection.class_id);
-      return first_of_name_[a] == first_of_name_[b] && (a != b || other.scale != next.scale) &&
-             overlap(other.detection, next.detection);
+      const bool rivals = last_ >= Stage::layout || first_of_name_[a] == first_of_name_[b];
+      return rivals && (a != b || other.scale != next.scale) && overlap(other.detection, next.detection);
     };
     if (std::any_of(found_.begin(), found_.begin() + static_cast<ptrdiff_t>(kept), same)) continue;
     out[kept] = next.detection;

@@ -14,11 +14,13 @@ class Detector {
  public:
   static constexpr size_t kMostDetections = 1000;
 
-  /// Throws std::invalid_argument if windows, scales or database do not fit.
-  Detector(int image_width, int image_height, std::span<const DatabaseObject> database, const DetectorParameters& p);
+  /// `backgrounds`: what the stage layout knows of the surroundings. Throws std::invalid_argument if windows, scales,
+  /// database or backgrounds do not fit.
+  Detector(int image_width, int image_height, std::span<const DatabaseObject> database, const DetectorParameters& p,
+           std::span<const Photograph> backgrounds = {});
 
   Stage last() const { return last_; }
-  /// In force in a stage; empty for one that does not run.
+  /// In force in a stage that compares histograms; empty for one that does not run.
   const std::vector<std::vector<ReferenceLimit>>& limits(Stage stage) const {
     return references_[static_cast<size_t>(stage)].limits;
   }

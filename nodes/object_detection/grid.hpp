@@ -1,8 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Where the search windows lie (thesis Eq. 3.16, 3.17, corrected: algorithm reference 6.6 and 21.8).
 #pragma once
+#include <cstddef>
 
 namespace takt::object_detection {
+
+/// A square of an image, px.
+struct Placement {
+  int x = 0, y = 0, side = 0;
+};
 
 /// Square windows in rows and columns over an image. Window (u, v) covers `window_px` pixels to the right of x0(u) and
 /// below y0(v); the last ones touch the border. Every square of `reference_px` lies completely in at least one window.
@@ -12,6 +18,11 @@ struct SearchGrid {
   int columns = 0, rows = 0;
 
   int windows() const { return columns * rows; }
+  /// Window number i, row by row.
+  Placement window(size_t i) const {
+    const auto n = static_cast<int>(i);
+    return {x0(n % columns), y0(n / columns), window_px};
+  }
   int x0(int u) const { return origin(u, columns, image_width); }
   int y0(int v) const { return origin(v, rows, image_height); }
 

@@ -32,14 +32,14 @@ class ObjectDetectionNode final : public Node {
     p.threshold_scale = threshold_scale_;
     try {
       p.scales = parse_scales(scales_);
-      const auto make = [p, width = static_cast<int>(images.width),
-                         height = static_cast<int>(images.height)](const std::vector<DatabaseObject>& database) {
-        return std::make_unique<Detector>(width, height, database, p);
+      const auto make = [p, width = static_cast<int>(images.width), height = static_cast<int>(images.height)](
+                            const std::vector<DatabaseObject>& database, const std::vector<Photograph>& backgrounds) {
+        return std::make_unique<Detector>(width, height, database, p, backgrounds);
       };
       const auto folder = setup.directory / database_();
-      detector_ = make(read_database(folder, reference_, TestViews::skip));
+      detector_ = make(read_database(folder, reference_, TestViews::skip), read_backgrounds(folder));
       build_ = [make, folder, side_px = reference_()](const std::string& revision) {
-        return make(read_revision(folder, revision, side_px));
+        return make(read_revision(folder, revision, side_px), read_backgrounds(revision_folder(folder, revision)));
       };
     } catch (const DatabaseError& error) {
       throw SetupError(error.what());
@@ -64,7 +64,7 @@ class ObjectDetectionNode final : public Node {
     // Half of the time is kept for co-occurrences: they decide on what is reported.
     const auto reserve_ns = static_cast<int64_t>(reserve_() * 1e9);
     const int64_t kept_ns =
-        detector_->last() == Stage::cooccurrence ? std::max<int64_t>(0, job.time_left_ns() - reserve_ns) / 2 : 0;
+        detector_->last() >= Stage::cooccurrence ? std::max<int64_t>(0, job.time_left_ns() - reserve_ns) / 2 : 0;
     const auto another_row = [&] { return job.time_left_ns() > reserve_ns + kept_ns; };
     const auto another_window = [&] { return job.time_left_ns() > reserve_ns; };
     if (!detector_->run(pair->left_view(), take_mask(), another_row, another_window)) return job.no_result();
@@ -132,8 +132,9 @@ class ObjectDetectionNode final : public Node {
   Choice stages_{this,
                  "stages",
                  "ch+hog+cch",
-                 {"ch", "ch+hog", "ch+hog+cch"},
-                 "colours, oriented gradients, colour co-occurrences; each looks at what passed the one before"};
+                 {"ch", "ch+hog", "ch+hog+cch", "ch+hog+cch+layout"},
+                 "colours, oriented gradients, colour co-occurrences, and where these are; each looks at what passed "
+                 "the one before"};
   Choice bins_{this, "bins", "64x64x1", {"64x32x2", "64x64x1"}, "bins of hue x saturation x value"};
   Choice orientations_{this, "orientations", "360", {"8", "32", "180", "360"}, "bins of the gradient's orientation"};
   Choice pairs_{this, "pairs", "20x25", {"5x5", "20x5", "5x25", "20x25"}, "colours x distances of co-occurrences"};

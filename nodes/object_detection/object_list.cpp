@@ -77,9 +77,11 @@ void ObjectList::set_thresholds(const std::string& label, const Thresholds& thre
     throw DatabaseError((folder_ / "objects.txt").string() + " has no object `" + label + "`");
   std::ostringstream text;
   text << "threshold";
-  for (const auto& threshold : thresholds) {
+  size_t given = thresholds.size();
+  while (given > 1 && !thresholds[given - 1]) --given;
+  for (size_t s = 0; s < given; ++s) {
     text << ' ';
-    if (threshold) text << *threshold;
+    if (thresholds[s]) text << *thresholds[s];
     else text << "auto";
   }
   for (size_t line = block.first + 1; line < block.end; ++line) {

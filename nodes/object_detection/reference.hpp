@@ -4,11 +4,13 @@
 #pragma once
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <vector>
 
 #include "nodes/object_detection/grid.hpp"
 #include "nodes/object_detection/histogram.hpp"
+#include "nodes/object_detection/layout_stage.hpp"
 
 namespace takt::object_detection {
 
@@ -123,6 +125,47 @@ inline std::vector<uint32_t> cooccurrence_window_reference(ImageView<const uint8
     for (int x = x0; x < x0 + side; ++x)
       colour.push_back(pair_colour(bgr.at(x, y, 0), bgr.at(x, y, 1), bgr.at(x, y, 2), bins.colours));
   return cooccurrence_reference(colour, side, bins);
+}
+
+/// Features of a square of an image: each cell counted pixel by pixel.
+inline LayoutFeatures layout_reference(ImageView<const uint8_t> bgr, const Placement& at) {
+  std::vector<uint32_t> count(kLayoutFeatures);
+  std::vector<int> pixels(kLayoutCells * kLayoutCells);
+  const auto cell_of = [&](int from_edge) {
+    int cell = 0;
+    while (from_edge >= std::floor((cell + 1.0) * at.side / kLayoutCells + 0.5)) ++cell;
+    return cell;
+  };
+  for (int y = at.y; y < at.y + at.side; ++y) {
+    for (int x = at.x; x < at.x + at.side; ++x) {
+      const auto cell = static_cast<size_t>(cell_of(y - at.y) * kLayoutCells + cell_of(x - at.x));
+      ++pixels[cell];
+      ++count[cell * kLayoutBins + pair_colour(bgr.at(x, y, 0), bgr.at(x, y, 1), bgr.at(x, y, 2), kLayoutColours)];
+      if (const int bin = orientation_reference(bgr, x, y, 2 * kLayoutOrientations); bin >= 0)
+        ++count[cell * kLayoutBins + static_cast<size_t>(kLayoutColours + bin % kLayoutOrientations)];
+    }
+  }
+  LayoutFeatures features;
+  for (size_t i = 0; i < kLayoutFeatures; ++i) features[i] = layout_feature(count[i], pixels[i / kLayoutBins]);
+  return features;
+}
+
+/// What LayoutStage finds around a window: every square counted anew, sums in 64 bits.
+inline LayoutStage::Fit layout_fit_reference(ImageView<const uint8_t> bgr, const std::vector<Placement>& squares,
+                                             const std::vector<LayoutTemplate>& views) {
+  float most = -std::numeric_limits<float>::infinity();
+  LayoutStage::Fit best;
+  for (const Placement& at : squares) {
+    const LayoutFeatures features = layout_reference(bgr, at);
+    for (const LayoutTemplate& view : views) {
+      int64_t sum = 0;
+      for (size_t i = 0; i < kLayoutFeatures; ++i) sum += int64_t{view.weight[i]} * features[i];
+      if (const float evidence = view.unit * static_cast<float>(sum - view.middle); evidence > most)
+        most = evidence, best.at = at;
+    }
+  }
+  best.error = most > 0 ? kLayoutEvidence / (kLayoutEvidence + most) : 1;
+  return best;
 }
 
 }  // namespace takt::object_detection

@@ -12,7 +12,8 @@ Histogram histogram_of(ImageView<const uint8_t> view, Stage stage, const Detecto
   switch (stage) {
     case Stage::colour: return colour_histogram(view, p.bins);
     case Stage::orientation: return orientation_histogram(view, orientations);
-    case Stage::cooccurrence: break;
+    case Stage::cooccurrence:
+    case Stage::layout: break;
   }
   return cooccurrence_histogram(view, p.pairs);
 }
@@ -43,7 +44,7 @@ CascadeReferences cascade_references(std::span<const DatabaseObject> database, c
   if (database.empty() || database[0].views.empty()) throw std::invalid_argument("the object database is empty");
   const OrientationBins orientations(p.orientations);
   CascadeReferences stages;
-  for (size_t s = 0; s <= static_cast<size_t>(p.last); ++s) {
+  for (size_t s = 0; s < kHistogramStages && s <= static_cast<size_t>(p.last); ++s) {
     const double caps[] = {p.last == Stage::colour ? kThresholdCap : kColourBeforeOthersCap, kOrientationCap,
                            kCooccurrenceCap};
     const bool of_pairs = static_cast<Stage>(s) == Stage::cooccurrence;

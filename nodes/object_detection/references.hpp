@@ -33,8 +33,8 @@ struct StageReferences {
   std::vector<std::vector<Histogram>> histograms;
   std::vector<std::vector<ReferenceLimit>> limits;
 };
-/// Empty for stages beyond the last one.
-using CascadeReferences = std::array<StageReferences, kStages>;
+/// Of the stages that compare histograms; empty for those beyond the last one.
+using CascadeReferences = std::array<StageReferences, kHistogramStages>;
 
 /// A view's own threshold goes before the object's, and that before the automatic one. Throws std::invalid_argument if
 /// the database is empty.

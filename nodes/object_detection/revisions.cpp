@@ -14,12 +14,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The list and all views, relative to the folder, each once.
+/// The list, all views and backgrounds, relative to the folder, each once.
 std::vector<fs::path> files_of(const fs::path& folder, int side_px) {
   std::vector<fs::path> files{"objects.txt"};
   for (const DatabaseObject& object : read_database(folder, side_px, TestViews::read))
     for (const auto* views : {&object.views, &object.test_views})
       for (const ReferenceView& view : *views) files.push_back(view.file.lexically_relative(folder));
+  for (const Photograph& photograph : read_backgrounds(folder))
+    files.push_back(photograph.file.lexically_relative(folder));
   std::sort(files.begin(), files.end());
   files.erase(std::unique(files.begin(), files.end()), files.end());
   return files;
@@ -67,8 +69,10 @@ std::string publish_revision(const fs::path& folder, int side_px) {
   return name;
 }
 
+fs::path revision_folder(const fs::path& folder, const std::string& name) { return revisions_of(folder) / name; }
+
 std::vector<DatabaseObject> read_revision(const fs::path& folder, const std::string& name, int side_px) {
-  const fs::path revision = revisions_of(folder) / name;
+  const fs::path revision = revision_folder(folder, name);
   if (name.empty() || name.find('/') != std::string::npos || !fs::is_directory(revision)) {
     std::string there;
     std::error_code none;

@@ -14,6 +14,8 @@ namespace takt::object_detection {
 /// hexadecimal digits. The copy appears as a whole. Throws DatabaseError if the database cannot be used or copied.
 std::string publish_revision(const std::filesystem::path& folder, int side_px);
 
+/// Where that revision lies.
+std::filesystem::path revision_folder(const std::filesystem::path& folder, const std::string& name);
 /// Reads that revision. Throws DatabaseError if it is not there or its content is not what its name says.
 std::vector<DatabaseObject> read_revision(const std::filesystem::path& folder, const std::string& name, int side_px);
 

@@ -19,7 +19,8 @@ std::optional<Shrinker> shrinker_for(int width, int height, double scale) {
 }  // namespace
 
 ScaleSearch::ScaleSearch(int image_width, int image_height, double scale, int reference_px,
-                         const CascadeReferences& references, const DetectorParameters& p)
+                         const CascadeReferences& references, const std::vector<LayoutObject>& layout,
+                         const DetectorParameters& p)
     : shrinker_(shrinker_for(image_width, image_height, scale)),
       grid_(scaled_grid(shrinker_, image_width, image_height, reference_px, p.window_px)),
       to_image_x_(static_cast<double>(image_width) / grid_.image_width),
@@ -32,6 +33,7 @@ ScaleSearch::ScaleSearch(int image_width, int image_height, double scale, int re
   if (p.last >= Stage::orientation)
     orientation_.emplace(grid_, OrientationBins(p.orientations), references[1].histograms);
   if (p.last >= Stage::cooccurrence) cooccurrence_.emplace(grid_, p.pairs, references[2].histograms);
+  if (p.last >= Stage::layout) layout_.emplace(grid_, reference_px, layout);
 }
 
 void ScaleSearch::to_image(Detection& detection) const {
@@ -80,9 +82,11 @@ void ScaleSearch::search_row() {
   }
 }
 
-void ScaleSearch::decide_by_cooccurrences(size_t object, size_t window) {
-  const auto missing = cooccurrence_->missing(image_, window, object);
-  decision_.set(object, window, limits_[2].error(object, missing.data()));
+void ScaleSearch::decide(size_t object, size_t window) {
+  const float error = limits_[2].error(object, cooccurrence_->missing(image_, window, object).data());
+  if (!layout_ || error == kFailed) return decision_.set(object, window, error);
+  const LayoutStage::Fit fit = layout_->best(image_, window, object);
+  decision_.set(object, window, layout_->passes(object, fit) ? fit.error : kFailed, fit.at);
 }
 
 }  // namespace takt::object_detection

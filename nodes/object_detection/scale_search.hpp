@@ -7,6 +7,7 @@
 #include "nodes/object_detection/colour_stage.hpp"
 #include "nodes/object_detection/cooccurrence_stage.hpp"
 #include "nodes/object_detection/decision.hpp"
+#include "nodes/object_detection/layout_stage.hpp"
 #include "nodes/object_detection/mask_sums.hpp"
 #include "nodes/object_detection/orientation_stage.hpp"
 #include "nodes/object_detection/references.hpp"
@@ -18,9 +19,10 @@ namespace takt::object_detection {
 /// for it in the stage before. Memory is taken by the constructor; the rest allocates nothing. One thread at a time.
 class ScaleSearch {
  public:
-  /// `references` are copied. Throws std::invalid_argument if the windows do not fit.
+  /// `references` and `layout`, empty without that stage, are copied. Throws std::invalid_argument if the windows do
+  /// not fit.
   ScaleSearch(int image_width, int image_height, double scale, int reference_px, const CascadeReferences& references,
-              const DetectorParameters& p);
+              const std::vector<LayoutObject>& layout, const DetectorParameters& p);
 
   const SearchGrid& grid() const { return grid_; }  ///< in the scaled image
   Decision& decision() { return decision_; }
@@ -38,8 +40,8 @@ class ScaleSearch {
   void begin(ImageView<const uint8_t> bgr, const MaskSums* mask, int first_row);
   /// The next row of windows through colours and orientations; after the last one comes row 0.
   void search_row();
-  /// A window that passed these for the object through the last stage.
-  void decide_by_cooccurrences(size_t object, size_t window);
+  /// A window that passed these for the object through the rest.
+  void decide(size_t object, size_t window);
 
  private:
   std::optional<Shrinker> shrinker_;  ///< none at full size
@@ -50,6 +52,7 @@ class ScaleSearch {
   ColourStage colour_;
   std::optional<OrientationStage> orientation_;
   std::optional<CooccurrenceStage> cooccurrence_;
+  std::optional<LayoutStage> layout_;
   Decision decision_;
   bool begun_ = false;
   ImageView<const uint8_t> image_;

@@ -11,7 +11,7 @@ namespace takt::object_detection {
 namespace {
 
 /// What the last stage's threshold must exceed for the object to be found in the image; none does that: 2.
-float needed(const ErrorMaps& maps, const std::array<double, kStages>& thresholds) {
+float needed(const ErrorMaps& maps, const std::array<double, kHistogramStages>& thresholds) {
   float least = kFailed;
   for (size_t window = 0; window < maps.error[0].size(); ++window)
     if (maps.error[0][window] < thresholds[0] && maps.error[1][window] < thresholds[1])
@@ -30,7 +30,7 @@ ErrorMaps error_maps(ImageView<const uint8_t> bgr, const CascadeReferences& refe
                      const DetectorParameters& p) {
   ErrorMaps maps;
   maps.grid = make_search_grid(bgr.width, bgr.height, reference_px, p.window_px);
-  for (size_t s = 0; s < kStages; ++s)
+  for (size_t s = 0; s < kHistogramStages; ++s)
     maps.error[s] = StageErrors(static_cast<Stage>(s), maps.grid, references[s].histograms[object], p).run(bgr);
   return maps;
 }
@@ -40,7 +40,7 @@ Tuning tune(std::span<const ErrorMaps> with, std::span<const ErrorMaps> without,
   std::array<std::vector<float>, 2> there;  // errors of the first stages where the object is
   for (const ErrorMaps& maps : with) {
     std::vector<float> sum = maps.error[0];
-    for (size_t s = 1; s < kStages; ++s)
+    for (size_t s = 1; s < kHistogramStages; ++s)
       for (size_t window = 0; window < sum.size(); ++window) sum[window] += maps.error[s][window];
     const auto window = static_cast<size_t>(std::min_element(sum.begin(), sum.end()) - sum.begin());
     for (size_t s = 0; s < 2; ++s) there[s].push_back(maps.error[s][window]);

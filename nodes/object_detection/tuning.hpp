@@ -13,7 +13,7 @@ namespace takt::object_detection {
 /// Smallest error of an object's views in each window of an image (map m_o of Eq. 3.18), stage by stage.
 struct ErrorMaps {
   SearchGrid grid;
-  std::array<std::vector<float>, kStages> error;
+  std::array<std::vector<float>, kHistogramStages> error;
 };
 /// All stages of every window, whatever passed. `bgr`: three channels; `references`: of all stages. Throws
 /// std::invalid_argument if the windows do not fit.
@@ -26,7 +26,7 @@ struct RocPoint {
 };
 
 struct Tuning {
-  std::array<double, kStages> thresholds{};
+  std::array<double, kHistogramStages> thresholds{};
   std::vector<RocPoint> roc;  ///< by threshold, from nothing passes to all that the first two stages let through
   RocPoint chosen;
 };

@@ -104,7 +104,7 @@ TEST_CASE("mistakes name file and line and what is valid") {
   has(folder.error("object cup full=yes\nview good.png\nobject cup empty=no\n"),
       "object `cup empty=no` has other attributes than `cup full=yes`; only their values may differ");
   has(folder.error("object cup\nview good.png 0.4 0.5 0.6 0.7\n"), "a file and at most three thresholds");
-  has(folder.error("object cup\nthreshold\n"), "`threshold` takes one to three thresholds");
+  has(folder.error("object cup\nthreshold\n"), "`threshold` takes one to four thresholds");
   has(folder.error("object cup\nthreshold auto 0.3 2\n"), "objects.txt:2: the threshold is `2`, must be");
   has(folder.error("# nothing\n"), "names no object");
   folder.image("large.png", cv::Mat(9, 8, CV_8UC3, cv::Scalar(1, 2, 3)));
