@@ -249,6 +249,7 @@ class GroundMapNode final : public Node {
     TerrainParameters p;
     p.centre = terrain_centre_() == 0 ? Centre::undecided : Centre::mean;
     p.correlation_min = terrain_correlation_;
+    p.crossing_min = terrain_crossing_;
     p.up = static_cast<int>(std::lround(terrain_up_ * 1000));
     p.down = static_cast<int>(std::lround(terrain_down_ * 1000));
     try {
@@ -337,6 +338,8 @@ class GroundMapNode final : public Node {
       this, "terrain_centre", "undecided", {"undecided", "mean"}, "from where cells are counted in a correlation"};
   Param<double> terrain_correlation_{
       this, "terrain_correlation", 0.7, {-1.0, 1.0}, "1", "above it the best kind is believed; with `mean` 0.5"};
+  Param<double> terrain_crossing_{
+      this, "terrain_crossing", 0.9, {-1.0, 1.0}, "1", "the same for a crossing: 0.9 allows 1 blocked cell in 20"};
   Param<double> terrain_up_{this, "terrain_up", 0.2, {0.0, 1.0}, "1", "added to the hypothesis believed"};
   Param<double> terrain_down_{this, "terrain_down", 0.1, {0.0, 1.0}, "1", "taken off the others"};
   Param<double> camera_x_{this, "camera_x", 0.0, {-5.0, 5.0}, "m", "camera to the right, where the pair does not say"};

@@ -44,19 +44,18 @@ TerrainMaps TerrainLearning::learnt() const {
 }
 
 // Whole numbers up to the root: at most 1e6 for a product, 1e12 for n cells squared at n = 1000.
-std::optional<double> correlation(std::span<const int16_t> a, std::span<const int16_t> b, Centre centre,
+std::optional<double> correlation(std::span<const int16_t> around, std::span<const int16_t> kind, Centre centre,
                                   double known_min) {
   int64_t n = 0, sum_a = 0, sum_b = 0, aa = 0, bb = 0, ab = 0;
   const auto from_middle = [](int16_t cell) { return int64_t{cell == kUnknown ? 0 : cell - kOccupied / 2}; };
-  for (size_t i = 0; i < a.size(); ++i) {
-    const bool known = a[i] != kUnknown && b[i] != kUnknown;
-    n += known;
-    if (!known && centre == Centre::mean) continue;
-    const int64_t x = from_middle(a[i]), y = from_middle(b[i]);
-    sum_a += x, sum_b += y;
-    aa += x * x, bb += y * y, ab += x * y;
+  for (size_t i = 0; i < around.size(); ++i) {
+    if (around[i] == kUnknown || (kind[i] == kUnknown && centre == Centre::mean)) continue;
+    n += kind[i] != kUnknown;
+    const int64_t a = from_middle(around[i]), b = from_middle(kind[i]);
+    sum_a += a, sum_b += b;
+    aa += a * a, bb += b * b, ab += a * b;
   }
-  if (n == 0 || static_cast<double>(n) < known_min * static_cast<double>(a.size())) return std::nullopt;
+  if (n == 0 || static_cast<double>(n) < known_min * static_cast<double>(around.size())) return std::nullopt;
   if (centre == Centre::mean) {
     aa = n * aa - sum_a * sum_a;
     bb = n * bb - sum_b * sum_b;
@@ -73,17 +72,18 @@ TerrainClassifier::TerrainClassifier(TerrainMaps maps, const TerrainParameters& 
 }
 
 const Terrain& TerrainClassifier::step(std::span<const int16_t> cells) {
-  size_t believed = terrain_kind::unknown;
-  double best = p_.correlation_min;
+  double best = -2;
   for (size_t kind = 0; kind < kTerrainKinds; ++kind) {
     const auto c = correlation(cells, maps_.cells[kind], p_.centre, p_.known_min);
     answer_.correlations[kind] = static_cast<float>(c.value_or(0));
     if (!c || !(*c > best)) continue;
     best = *c;
-    believed = kind;
+    believed_ = kind;
   }
+  if (!(best > (believed_ == terrain_kind::crossing ? p_.crossing_min : p_.correlation_min)))
+    believed_ = terrain_kind::unknown;
   for (size_t i = 0; i < kHypotheses; ++i) {
-    counters_[i] = std::clamp(counters_[i] + (i == believed ? p_.up : -p_.down), 0, 1000);
+    counters_[i] = std::clamp(counters_[i] + (i == believed_ ? p_.up : -p_.down), 0, 1000);
     answer_.hypotheses[i] = static_cast<float>(counters_[i]) / 1000;
   }
   const auto highest = std::max_element(counters_.begin(), counters_.end());

@@ -57,8 +57,9 @@ class TerrainLearning {
 
 /// From where cells are counted when two maps are correlated.
 enum class Centre : uint8_t {
-  undecided,  ///< 500, as which unknown cells count: free and occupied are opposite signs, and so where nothing is
-              ///< known tells kinds apart, and a map that is free all over has a correlation, too
+  undecided,  ///< 500: free and occupied are opposite signs, and a map that is free all over has a correlation, too.
+              ///< Counted are the cells that are known around the robot; those that no map of the kind has shown count
+              ///< as undecided, so that where nothing is known of a kind tells it apart
   mean,       ///< of each map over the cells known in both (Pearson): a map that is free all over has none
 };
 
@@ -66,11 +67,13 @@ struct TerrainParameters {
   Centre centre = Centre::undecided;
   double known_min = 0.3;        ///< share of the cells that must be known in both maps
   double correlation_min = 0.7;  ///< above it the best kind is believed; with `mean` the reference recommends 0.5
-  int up = 200, down = 100;      ///< of 1000
+  double crossing_min = 0.9;  ///< the same for a crossing, which is free all over and so resembles all that mostly is
+  int up = 200, down = 100;   ///< of 1000
 };
 
-/// -1..1. None if too few cells are known in both, or a map has no contrast.
-std::optional<double> correlation(std::span<const int16_t> a, std::span<const int16_t> b, Centre centre,
+/// -1..1, of the cells around the robot and the map of a kind. None if too few cells are known in both, or one has no
+/// contrast.
+std::optional<double> correlation(std::span<const int16_t> around, std::span<const int16_t> kind, Centre centre,
                                   double known_min);
 
 /// Counters of the five hypotheses. Allocates in the constructor only.
@@ -78,15 +81,19 @@ class TerrainClassifier {
  public:
   TerrainClassifier(TerrainMaps maps, const TerrainParameters& parameters);
   const TerrainShape& shape() const { return maps_.shape; }
-  /// Takes the cells around the robot: the best kind's counter rises if its correlation is high enough, else that of
-  /// "unknown"; all others fall. The answer is the highest counter; of equal ones the present answer, then the first.
+  /// Takes the cells around the robot: the counter of the kind with the highest correlation rises if that is high
+  /// enough, else that of "unknown"; all others fall. The answer is the highest counter; of equal ones the present
+  /// answer, then the first.
   const Terrain& step(std::span<const int16_t> cells);
   const Terrain& answer() const { return answer_; }
+  /// What the newest cells alone say.
+  size_t believed() const { return believed_; }
 
  private:
   TerrainMaps maps_;
   TerrainParameters p_;
   std::array<int, kHypotheses> counters_{};  ///< 0..1000
+  size_t believed_ = terrain_kind::unknown;
   Terrain answer_;
 };
 

@@ -15,6 +15,13 @@ struct FusionParameters {
   double confidence_min = 0.1;  ///< in 0..1, above 0; laser points with less are dropped
 };
 
+/// A laser point with the colour of its partner and their match probability.
+struct FusedPoint {
+  Point point;
+  Colour colour;
+  double confidence = 0;
+};
+
 /// Match probability of a laser point and a vision point at that distance: exp(-(d / sigma)^2 / 2), 1 at 0 (thesis
 /// Eq. 4.19, corrected: E-30).
 double match_confidence(double distance_m, double sigma_m);

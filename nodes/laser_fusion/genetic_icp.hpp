@@ -27,11 +27,15 @@ class GeneticIcp {
   /// Begins anew with the clouds that the judge has. The same seed gives the same answer.
   void begin(const Rigid& start, uint64_t seed);
 
-  /// Generations, until all are done or `more` says no: it is asked before each kPortion of them. Returns done().
+  /// Generations, until all are done or `more` says no: it is asked before each portion. Returns done().
   template <class More>
   bool run(const More& more) {
-    while (!done() && more())
-      for (uint32_t i = 0; i < kPortion && !done(); ++i) next();
+    while (!done() && more()) go_on();
+    return done();
+  }
+  /// One portion of kPortion generations; returns done().
+  bool go_on() {
+    for (uint32_t i = 0; i < kPortion && !done(); ++i) next();
     return done();
   }
 

@@ -9,6 +9,8 @@ namespace takt::laser_fusion {
 namespace {
 
 constexpr double kSearchVoxel_m = 0.1;  // the smallest; a room of 1000 points has some 25 cm
+constexpr int kFusionDivisions = 2;     // many points close together: larger voxels are built sooner
+constexpr size_t kFusedAtOnce = 512;
 
 }  // namespace
 
@@ -24,6 +26,7 @@ LaserFusion::LaserFusion(size_t laser_points, size_t vision_points, const LaserF
       matcher_(p.search_points, p.search_points, p.quality),
       genetic_(matcher_, p.genetic) {
   laser_.reserve(laser_points);
+  fused_.reserve(laser_points);
 }
 
 void LaserFusion::begin(std::span<const Point> laser, const cloud::CloudView& vision, const Rigid& vision_in_laser,
@@ -38,22 +41,66 @@ void LaserFusion::begin(std::span<const Point> laser, const cloud::CloudView& vi
   stage_ = Stage::thin_laser;
 }
 
-void LaserFusion::prepare() {
-  const auto few_of = [&](const cloud::CloudView& cloud, std::vector<Point>& out) {
-    cloud::CloudBuffer buffer(out, {});
-    thin_out(cloud, kSearchVoxel_m, grid_, buffer);
-    return clusters_.filter(buffer.points(), parameters_.clusters);
-  };
-  if (stage_ == Stage::thin_laser) {
-    few_laser_count_ = few_of({laser_, {}}, few_laser_);
-    stage_ = Stage::build;
-    return;
+void LaserFusion::go_on() {
+  switch (stage_) {
+    case Stage::thin_laser:
+      few_laser_count_ = thinned(laser_, few_laser_);
+      stage_ = Stage::thin_vision;
+      return;
+    case Stage::thin_vision:
+      few_vision_count_ = thinned(std::span<const Point>(vision_).first(vision_count_), few_vision_);
+      stage_ = Stage::drop_clusters;
+      return;
+    case Stage::drop_clusters:
+      few_laser_count_ = without_clusters(few_laser_, few_laser_count_);
+      few_vision_count_ = without_clusters(few_vision_, few_vision_count_);
+      matcher_.begin(std::span<const Point>(few_laser_).first(few_laser_count_),
+                     std::span<const Point>(few_vision_).first(few_vision_count_));
+      stage_ = Stage::build;
+      return;
+    case Stage::build:
+      if (!matcher_.go_on()) return;
+      genetic_.begin(start_, seed_);
+      stage_ = Stage::search;
+      return;
+    case Stage::search:
+      if (genetic_.go_on()) begin_colours();
+      return;
+    case Stage::build_colours:
+      if (vision_table_.go_on()) stage_ = Stage::fuse;
+      return;
+    case Stage::fuse: return fuse_some();
+    case Stage::idle:
+    case Stage::done: return;
   }
-  const size_t few_vision_count = few_of({std::span<const Point>(vision_).first(vision_count_), {}}, few_vision_);
-  matcher_.set(std::span<const Point>(few_laser_).first(few_laser_count_),
-               std::span<const Point>(few_vision_).first(few_vision_count));
-  genetic_.begin(start_, seed_);
-  stage_ = Stage::search;
+}
+
+size_t LaserFusion::thinned(std::span<const Point> points, std::vector<Point>& out) {
+  cloud::CloudBuffer buffer(out, {});
+  thin_out({points, {}}, kSearchVoxel_m, grid_, buffer);
+  return buffer.size();
+}
+
+size_t LaserFusion::without_clusters(std::span<Point> points, size_t count) {
+  return clusters_.filter(points.first(count), parameters_.clusters);
+}
+
+void LaserFusion::begin_colours() {
+  vision_table_.begin(std::span<const Point>(vision_).first(vision_count_), farthest_match_m(parameters_.fusion),
+                      kFusionDivisions);
+  fused_.clear();
+  next_ = 0;
+  stage_ = Stage::build_colours;
+}
+
+void LaserFusion::fuse_some() {
+  const size_t count = std::min(kFusedAtOnce, laser_.size() - next_);
+  fuse(std::span<const Point>(laser_).subspan(next_, count), vision_table_, vision_colours_, vision_in_laser(),
+       parameters_.fusion, [&](const Point& point, const Colour& colour, double confidence) {
+         fused_.push_back({point, colour, confidence});
+       });
+  next_ += count;
+  if (next_ == laser_.size()) stage_ = Stage::done;
 }
 
 double LaserFusion::share() const {

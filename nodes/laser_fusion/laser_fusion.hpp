@@ -27,52 +27,51 @@ class LaserFusion {
   LaserFusion(const LaserFusion&) = delete;  // the search refers to the matcher beside it
   LaserFusion& operator=(const LaserFusion&) = delete;
 
-  /// Takes a pair of clouds, both copied. Without colours the vision points are grey.
+  /// Takes a pair of clouds, both copied. Without colours the vision points are grey. Of 76,800 vision points some
+  /// milliseconds, in which nothing is asked.
   void begin(std::span<const Point> laser, const cloud::CloudView& vision, const Rigid& vision_in_laser, uint64_t seed);
 
-  /// Goes on with the search until it is done or `more` says no: it is asked before each portion, of some milliseconds
-  /// at most. Returns done().
+  /// Goes on until all is done or `more` says no: it is asked before each portion, of about a millisecond at most.
+  /// Returns done().
   template <class More>
   bool run(const More& more) {
-    while (!done() && more()) {
-      if (stage_ == Stage::search) {
-        genetic_.run(more);
-        if (genetic_.done()) stage_ = Stage::done;
-      } else {
-        prepare();
-      }
-    }
+    while (!done() && more()) go_on();
     return done();
   }
   bool idle() const { return stage_ == Stage::idle; }
+  bool searching() const { return stage_ == Stage::search; }
   bool done() const { return stage_ == Stage::done || stage_ == Stage::idle; }
-  bool searching() const { return stage_ == Stage::search || stage_ == Stage::done; }
 
-  /// While searching(): the best so far.
+  bool has_pose() const { return stage_ >= Stage::search; }
+  /// While has_pose(): the best so far.
   Rigid vision_in_laser() const { return genetic_.best(); }
   const Quality& quality() const { return genetic_.quality(); }
   double share() const;  ///< of the laser points of the search that have a partner
-  uint32_t generation() const { return genetic_.generation(); }
+  /// Of the search for this pair.
+  uint32_t generation() const { return has_pose() ? genetic_.generation() : 0; }
 
-  /// Once done(): fuse() of every laser point at the pose found; then idle() until the next pair.
-  template <class Take>
-  void finish(const Take& take) {
-    vision_table_.build({vision_.data(), vision_count_}, farthest_match_m(parameters_.fusion), kFusionDivisions);
-    fuse(laser_, vision_table_, vision_colours_, vision_in_laser(), parameters_.fusion, take);
+  /// Once done(): fuse() of every laser point at the pose found; then idle(), and these hold until the next pair.
+  std::span<const FusedPoint> finish() {
     stage_ = Stage::idle;
+    return fused_;
   }
 
  private:
-  enum class Stage : uint8_t { idle, thin_laser, build, search, done };
-  static constexpr int kFusionDivisions = 2;  ///< many points close together: larger voxels are built sooner
+  enum class Stage : uint8_t { idle, thin_laser, thin_vision, drop_clusters, build, search, build_colours, fuse, done };
 
-  void prepare();
+  void go_on();
+  size_t thinned(std::span<const Point> points, std::vector<Point>& out);
+  size_t without_clusters(std::span<Point> points, size_t count);
+  void begin_colours();
+  void fuse_some();
 
   LaserFusionParameters parameters_;
   Stage stage_ = Stage::idle;
   std::vector<Point> laser_, vision_, few_laser_, few_vision_;
   std::vector<Colour> vision_colours_;
-  size_t vision_count_ = 0, few_laser_count_ = 0;
+  std::vector<FusedPoint> fused_;
+  size_t vision_count_ = 0, few_laser_count_ = 0, few_vision_count_ = 0;
+  size_t next_ = 0;  ///< laser point to be fused
   Rigid start_;
   uint64_t seed_ = 0;
   cloud::VoxelGrid grid_;

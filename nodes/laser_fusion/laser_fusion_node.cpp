@@ -60,9 +60,10 @@ class LaserFusionNode final : public Node {
     const auto reserve_ns = static_cast<int64_t>(reserve_() * 1e9);
     const auto most = static_cast<uint32_t>(per_job_());
     fusion_->run([&] {
-      return (!fusion_->searching() || fusion_->generation() < first + most) && job.time_left_ns() > reserve_ns;
+      const bool enough = fusion_->searching() && fusion_->generation() >= first + most;
+      return !enough && job.time_left_ns() > reserve_ns;
     });
-    if (!fusion_->searching()) return job.no_result();
+    if (!fusion_->has_pose()) return job.no_result();
     tell_pose(job);
     if (fusion_->done()) tell_clouds(job);
   }
@@ -96,10 +97,10 @@ class LaserFusionNode final : public Node {
     if (!trusted || (fused_.connected() && !fused) || (match_.connected() && !match)) job.no_result();
     for (PointCloud* cloud : {fused, match})
       if (cloud) cloud->sensor_in_robot = laser_in_robot_;
-    fusion_->finish([&](const Point& point, const Colour& colour, double confidence) {
+    for (const auto& [point, colour, confidence] : fusion_->finish()) {
       if (fused) fused->points.push_back(point), fused->colours.push_back(colour);
       if (match) match->points.push_back(point), match->colours.push_back(confidence_colour(confidence));
-    });
+    }
     if (fused) fused_.send(laser_stamp_ns_);
     if (match) match_.send(laser_stamp_ns_);
   }

@@ -25,10 +25,16 @@ Matcher::Matcher(size_t fixed_points, size_t moving_points, const QualityParamet
 }
 
 void Matcher::set(std::span<const Point> fixed, std::span<const Point> moving) {
+  begin(fixed, moving);
+  while (!go_on()) {
+  }
+}
+
+void Matcher::begin(std::span<const Point> fixed, std::span<const Point> moving) {
   fixed = fixed.first(std::min(fixed.size(), fixed_capacity_));
   fixed_.assign(fixed.begin(), fixed.end());
   nearest_.resize(fixed.size());
-  table_.build(moving, reach_m());
+  table_.begin(moving, reach_m());
 }
 
 void Matcher::set_cut(double cut_m) {

@@ -18,6 +18,9 @@ class Matcher final : public PoseJudge {
 
   /// Clouds of usable points to be matched from now on, copied; points beyond the capacity are left out.
   void set(std::span<const Point> fixed, std::span<const Point> moving);
+  /// The same in portions: nothing may be judged before go_on() has said that it is done.
+  void begin(std::span<const Point> fixed, std::span<const Point> moving);
+  bool go_on() { return table_.go_on(); }
   /// Another cut for the same clouds.
   void set_cut(double cut_m);
 

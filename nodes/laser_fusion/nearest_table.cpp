@@ -12,6 +12,7 @@ constexpr double kCoarser = 1.26;  // half as many voxels
 // Bounds are widened by more than the rounding of the places that are looked up and of the distances compared.
 constexpr float kSlack = 1e-4f, kRounding = 2e-6f;
 constexpr double kLeastEdge = 1e-4;  // of the farthest coordinate: beside it the slack is small
+constexpr size_t kPointsAtOnce = 128, kVoxelsAtOnce = size_t{1} << 16;  // of a portion
 
 }  // namespace
 
@@ -30,8 +31,20 @@ NearestTable::NearestTable(size_t points, size_t voxels) : capacity_(points), mo
 }
 
 void NearestTable::build(std::span<const Point> points, double reach_m, int divisions) {
+  begin(points, reach_m, divisions);
+  while (!go_on()) {
+  }
+}
+
+void NearestTable::set_reach(double reach_m, int divisions) {
+  begin_reach(reach_m, divisions);
+  while (!go_on()) {
+  }
+}
+
+void NearestTable::begin(std::span<const Point> points, double reach_m, int divisions) {
   points_.assign(points.begin(), points.begin() + static_cast<std::ptrdiff_t>(std::min(points.size(), capacity_)));
-  set_reach(reach_m, divisions);
+  begin_reach(reach_m, divisions);
 }
 
 void NearestTable::nearest(const IntoChild& into_child, std::span<const Point> points,
@@ -52,28 +65,35 @@ void NearestTable::nearest(const IntoChild& into_child, std::span<const Point> p
   }
 }
 
-void NearestTable::set_reach(double reach_m, int divisions) {
+void NearestTable::begin_reach(double reach_m, int divisions) {
   reach_m_ = reach_m;
-  cloud::Bounds bounds = cloud::bounds_of(points_, cloud::kFarthest_m);
-  if (bounds.points == 0) bounds = {};
-  double farthest_m = reach_m;
+  bounds_ = cloud::bounds_of(points_, cloud::kFarthest_m);
+  if (bounds_.points == 0) bounds_ = {};
+  farthest_m_ = reach_m;
   for (size_t a = 0; a < 3; ++a)
-    farthest_m = std::max({farthest_m, std::abs(double{bounds.low[a]}), std::abs(double{bounds.high[a]})});
-  for (double edge_m = std::max(reach_m / divisions, kLeastEdge * farthest_m);; edge_m *= kCoarser) {
-    slack_m_ = kSlack * static_cast<float>(edge_m) + kRounding * static_cast<float>(farthest_m);
-    if (lay_out(bounds, edge_m) && list()) return;
-  }
+    farthest_m_ = std::max({farthest_m_, std::abs(double{bounds_.low[a]}), std::abs(double{bounds_.high[a]})});
+  divide(std::max(reach_m / divisions, kLeastEdge * farthest_m_));
+}
+
+/// Into voxels of that edge, or of the next one of which there are not too many; every pass is then to be done.
+void NearestTable::divide(double edge_m) {
+  while (!lay_out(edge_m)) edge_m *= kCoarser;
+  start_[voxels_] = start_[voxels_ + 1] = 0;
+  pass_ = Pass::clear;
+  next_ = 0;
+  listed_ = 0;
 }
 
 /// False if there are too many voxels.
-bool NearestTable::lay_out(const cloud::Bounds& bounds, double edge_m) {
+bool NearestTable::lay_out(double edge_m) {
   edge_m_ = edge_m;
   per_m_ = static_cast<float>(1 / edge_m);
+  slack_m_ = kSlack * static_cast<float>(edge_m) + kRounding * static_cast<float>(farthest_m_);
   double voxels = 1;
   for (size_t a = 0; a < 3; ++a) {
     origin_[a] =
-        static_cast<float>(bounds.low[a] - reach_m_ - edge_m);  // a margin of one voxel: rounding loses no place
-    const double cells = std::ceil((bounds.high[a] + reach_m_ + edge_m - origin_[a]) / edge_m);
+        static_cast<float>(bounds_.low[a] - reach_m_ - edge_m);  // a margin of one voxel: rounding loses no place
+    const double cells = std::ceil((bounds_.high[a] + reach_m_ + edge_m - origin_[a]) / edge_m);
     voxels *= cells;
     if (voxels > static_cast<double>(most_voxels_)) return false;
     count_[a] = static_cast<size_t>(cells);
@@ -81,6 +101,39 @@ bool NearestTable::lay_out(const cloud::Bounds& bounds, double edge_m) {
   }
   voxels_ = static_cast<size_t>(voxels);
   return true;
+}
+
+bool NearestTable::go_on() {
+  if (pass_ == Pass::done) return true;
+  const bool of_points = pass_ == Pass::bound || pass_ == Pass::count || pass_ == Pass::fill;
+  const size_t all = of_points ? points_.size() : voxels_;
+  const size_t last = std::min(all, next_ + (of_points ? kPointsAtOnce : kVoxelsAtOnce));
+  if (of_points) pass_points(next_, last);
+  else pass_voxels(next_, last);
+  next_ = last;
+  if (last < all) return false;
+  if (pass_ == Pass::sum && listed_ >= entries_.size()) {  // one past the last is prefetched
+    divide(kCoarser * edge_m_);
+    return false;
+  }
+  next_ = 0;
+  pass_ = static_cast<Pass>(static_cast<uint8_t>(pass_) + 1);
+  return pass_ == Pass::done;
+}
+
+void NearestTable::pass_voxels(size_t first, size_t last) {
+  const auto reach2 = static_cast<float>(reach_m_ * reach_m_);
+  for (size_t v = first; v < last; ++v) {
+    if (pass_ == Pass::clear) {
+      bound2_[v] = reach2;
+      start_[v] = 0;
+    } else if (pass_ == Pass::widen) {
+      bound2_[v] = bound2_[v] * (1 + kSlack) + slack_m_ * slack_m_;
+    } else {
+      listed_ += start_[v + 2];
+      start_[v + 2] = static_cast<uint32_t>(std::min<uint64_t>(listed_, UINT32_MAX));
+    }
+  }
 }
 
 NearestTable::Span NearestTable::span_of(float coordinate, size_t axis) const {
@@ -103,7 +156,7 @@ NearestTable::Span NearestTable::span_of(float coordinate, size_t axis) const {
 }
 
 template <class Visit>
-void NearestTable::for_each_voxel(const Point& point, const Visit& visit) {
+void NearestTable::for_each_voxel(const Point& point, const Visit& visit) const {
   const Span x = span_of(point.x, 0), y = span_of(point.y, 1), z = span_of(point.z, 2);
   for (int k = 0; k < z.count; ++k)
     for (int j = 0; j < y.count; ++j) {
@@ -114,32 +167,20 @@ void NearestTable::for_each_voxel(const Point& point, const Visit& visit) {
     }
 }
 
-/// False if there are too many entries.
-bool NearestTable::list() {
-  const auto reach2 = static_cast<float>(reach_m_ * reach_m_);
-  const auto for_each_point = [&](const auto& visit) {
-    for (uint32_t p = 0; p < points_.size(); ++p)
-      if (cloud::usable(points_[p]))
-        for_each_voxel(points_[p], [&](size_t voxel, float near2, float far2) { visit(p, voxel, near2, far2); });
-  };
-  std::fill_n(bound2_.begin(), voxels_, reach2);
-  for_each_point([&](uint32_t, size_t v, float, float far2) { bound2_[v] = std::min(bound2_[v], far2); });
-  for (size_t v = 0; v < voxels_; ++v) bound2_[v] = bound2_[v] * (1 + kSlack) + slack_m_ * slack_m_;
-
-  // Counted two places on, then filled one place on: in the end start_[v] is where the list of v begins, and that of
-  // voxels_, everything outside, is empty.
-  std::fill_n(start_.begin(), voxels_ + 2, 0u);
-  for_each_point([&](uint32_t, size_t v, float near2, float) { start_[v + 2] += near2 <= bound2_[v] ? 1 : 0; });
-  uint64_t entries = 0;
-  for (size_t v = 0; v < voxels_; ++v) {
-    entries += start_[v + 2];
-    start_[v + 2] = static_cast<uint32_t>(std::min<uint64_t>(entries, UINT32_MAX));
+/// Entries are counted two places on, then filled one place on: in the end start_[v] is where the list of v begins, and
+/// that of voxels_, everything outside, is empty.
+void NearestTable::pass_points(size_t first, size_t last) {
+  for (size_t p = first; p < last; ++p) {
+    if (!cloud::usable(points_[p])) continue;
+    if (pass_ == Pass::bound)
+      for_each_voxel(points_[p], [&](size_t v, float, float far2) { bound2_[v] = std::min(bound2_[v], far2); });
+    else if (pass_ == Pass::count)
+      for_each_voxel(points_[p], [&](size_t v, float near2, float) { start_[v + 2] += near2 <= bound2_[v] ? 1 : 0; });
+    else
+      for_each_voxel(points_[p], [&](size_t v, float near2, float) {
+        if (near2 <= bound2_[v]) entries_[start_[v + 1]++] = static_cast<uint32_t>(p);
+      });
   }
-  if (entries >= entries_.size()) return false;  // one past the last is prefetched
-  for_each_point([&](uint32_t p, size_t v, float near2, float) {
-    if (near2 <= bound2_[v]) entries_[start_[v + 1]++] = p;
-  });
-  return true;
 }
 
 }  // namespace takt::laser_fusion

@@ -58,6 +58,10 @@ class NearestTable {
   void build(std::span<const Point> points, double reach_m, int divisions = kMostDivisions);
   /// The same for the points that it has.
   void set_reach(double reach_m, int divisions = kMostDivisions);
+  /// The same in portions of some tenths of a millisecond: nothing may be looked up before go_on() has said that it is
+  /// done.
+  void begin(std::span<const Point> points, double reach_m, int divisions = kMostDivisions);
+  bool go_on();
 
   /// What nearest_reference() gives, if that is within reach; else a farther point or none.
   Nearest nearest(const Point& place) const { return nearest_in(voxel_of(place), place); }
@@ -93,14 +97,25 @@ class NearestTable {
       best.consider(entries_[e], laser_fusion::distance2(place, points_[entries_[e]]));
     return best;
   }
-  bool lay_out(const cloud::Bounds& bounds, double edge_m);
-  bool list();
+  /// What is done with each voxel or each point, one after the other.
+  enum class Pass : uint8_t { clear, bound, widen, count, sum, fill, done };
+
+  void begin_reach(double reach_m, int divisions);
+  void divide(double edge_m);
+  bool lay_out(double edge_m);
+  void pass_voxels(size_t first, size_t last);
+  void pass_points(size_t first, size_t last);
   Span span_of(float coordinate, size_t axis) const;
   /// Calls visit(voxel, near2, far2) for the voxels that are about within reach of a point.
   template <class Visit>
-  void for_each_voxel(const Point& point, const Visit& visit);
+  void for_each_voxel(const Point& point, const Visit& visit) const;
 
   size_t capacity_, most_voxels_;
+  Pass pass_ = Pass::done;
+  size_t next_ = 0;      ///< voxel or point that the pass goes on with
+  uint64_t listed_ = 0;  ///< entries of the voxels that were summed up
+  cloud::Bounds bounds_;
+  double farthest_m_ = 0;  ///< coordinate
   double reach_m_ = 0, edge_m_ = 0;
   float per_m_ = 0, slack_m_ = 0;
   float origin_[3] = {}, size_[3] = {};

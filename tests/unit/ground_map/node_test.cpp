@@ -243,9 +243,9 @@ TEST_CASE("ground_map: the confidence of each pixel, and the kind of terrain fro
   CHECK(around.message().view().at(4, 7) == 0);   // ahead
   CHECK(around.message().view().at(0, 0) == -1);  // beside the robot, where the camera does not look
   CHECK(around.message().origin_x_m == doctest::Approx(-1.2));
-  const double seen = std::sqrt(56. / 64);  // the other cells, which it does not know, agree with neither
-  CHECK(terrain.message().correlations[terrain_kind::crossing] == doctest::Approx(seen));
-  CHECK(terrain.message().correlations[terrain_kind::left] == doctest::Approx(-seen));
+  // The other cells, which it does not know, do not count.
+  CHECK(terrain.message().correlations[terrain_kind::crossing] == doctest::Approx(1));
+  CHECK(terrain.message().correlations[terrain_kind::left] == doctest::Approx(-1));
   CHECK(confidence.message().view().at(160, 230) == 255);
   CHECK(confidence.message().view().at(10, 10) == 64);  // as if flooded
 }

@@ -67,8 +67,10 @@ TEST_CASE("correlation about the middle of the scale, and about the mean (Pearso
   CHECK(*correlation(a, b, Centre::mean, 0.3) == doctest::Approx(-1.0 / 3));
   CHECK(*correlation(a, a, Centre::mean, 0.3) == doctest::Approx(1));
   CHECK_FALSE(correlation(a, flat, Centre::mean, 0.3).has_value());  // no contrast
-  // What is not known counts as undecided: a alone has four cells of contrast, half has two.
+  // What no map of a kind has shown counts as undecided: a has four cells of contrast, half has two. What is not known
+  // around the robot does not count.
   CHECK(*correlation(a, half, Centre::undecided, 0.5) == doctest::Approx(2 / std::sqrt(8.0)));
+  CHECK(*correlation(half, a, Centre::undecided, 0.5) == doctest::Approx(1));
   CHECK(correlation(a, half, Centre::mean, 0.5).has_value());
   CHECK_FALSE(correlation(a, half, Centre::mean, 0.51).has_value());  // too little is known
   CHECK_FALSE(correlation(a, std::vector<int16_t>(4, kUnknown), Centre::undecided, 0).has_value());
@@ -102,6 +104,28 @@ TEST_CASE("each map is of its own kind, where free all over is a kind") {
     for (int i = 0; i < 5; ++i) classifier.step(small_maps().cells[kind]);
     CHECK(classifier.answer().kind == kind);
   }
+}
+
+TEST_CASE("a crossing is believed where at most one known cell in 20 is blocked, the others from 0.7 on") {
+  TerrainMaps maps{{40, 1, 20, 0, 0.3}, {}};
+  for (auto& cells : maps.cells) cells.assign(40, kUnknown);
+  maps.cells[terrain_kind::crossing].assign(40, kFree);
+  maps.cells[terrain_kind::left].assign(40, kFree);
+  std::fill_n(maps.cells[terrain_kind::left].begin(), 20, kOccupied);
+  std::vector<int16_t> around(40, kFree);
+  const auto believed = [&] {
+    TerrainClassifier classifier(maps, {});
+    classifier.step(around);
+    return classifier.believed();
+  };
+  around[0] = kOccupied;
+  CHECK(believed() == terrain_kind::crossing);
+  around[1] = kOccupied;
+  CHECK(believed() == terrain_kind::unknown);
+  std::fill_n(around.begin(), 16, kOccupied);  // 0.8 of half and half
+  CHECK(believed() == terrain_kind::left);
+  std::fill_n(around.begin(), 13, kFree);  // 0.15 of it
+  CHECK(believed() == terrain_kind::unknown);
 }
 
 TEST_CASE("a file of maps is read back as it was written, several maps of a kind as their mean") {

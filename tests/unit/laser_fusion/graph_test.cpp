@@ -16,11 +16,12 @@ constexpr PairParameters kPair{.points = 500, .offset_m = 0.3, .offset_rad = 0.3
 struct Seen {
   size_t poses = 0, clouds = 0, right = 0, points = 0;
 };
-Seen seen;  // the node is made by the composition, so it has no other way to tell
 
 /// Shows the same scene all the time.
 class Robot final : public Node {
  public:
+  Seen seen;
+
   void setup(Setup&) override {
     pair_ = generate_pair(kPair, kScene);
     laser_.reserve({0, 0, 1, 500});
@@ -53,34 +54,26 @@ class Robot final : public Node {
   Output<PointCloud> laser_{this, "laser", ""}, vision_{this, "vision", ""};
 };
 
-constexpr const char* kGraphText = R"(takt: 1
-name: fusion
-schedule: schedule.yaml
-default_profile: sim
-devices:
+constexpr test::DriveGraph kGraph{
+    .devices = R"(
   base: {kind: mobile_base, rate: 5}
-profiles:
-  sim: {default: {driver: sim, world: @/worlds/lab.xml}}
-subsystems:
-  fusion:
+)",
+    .nodes = R"(
     probe: {type: probe, in: {pose: laser_fusion.pose, fused: laser_fusion.fused}}
     laser_fusion: {type: laser_fusion, in: {laser: probe.laser, vision: probe.vision}, params: {generations: 3000, per_job: 500}}
-)";
-constexpr const char* kScheduleText = R"(takt: 1
-name: fusion
-policy: cooperative
-cores: [0]
-nodes:
+)",
+    .schedule = R"(
   base: {rate: 5, budget: 1ms}
   probe: {rate: 5, offset: 5ms, budget: 5ms, criticality: high}
   laser_fusion: {rate: 5, offset: 20ms, budget: 50ms}
-)";
+)",
+};
 
 }  // namespace
 
 TEST_CASE("laser_fusion at 5 Hz in a graph: six jobs a pair, each tells a pose, the last one a cloud") {
-  seen = {};
-  test::Drive::with<Robot>(kGraphText, kScheduleText, 4'000'000'000);
+  const test::Drive<Robot> drive(kGraph, 4'000'000'000);
+  const Seen& seen = drive.probe().seen;
   CHECK(seen.poses >= 17);
   CHECK(seen.clouds >= 2);
   CHECK(seen.right == seen.clouds);

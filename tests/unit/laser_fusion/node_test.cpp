@@ -4,7 +4,7 @@
 #include <string>
 
 #include "nodes/laser_fusion/evaluate.hpp"
-#include "nodes/laser_fusion/fusion.hpp"
+#include "nodes/laser_fusion/laser_fusion.hpp"
 #include "rt/memory/memory_use.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 
@@ -84,6 +84,56 @@ TEST_CASE("laser_fusion searches over several jobs, tells the best so far, and i
   PortAccess::set_held(test::input(*bench.node, "laser"), 1, false, 1);
   PortAccess::set_held(test::input(*bench.node, "vision"), 1, false, 1);
   CHECK_FALSE(test::run(*bench.node));  // the same pair again
+}
+
+TEST_CASE("a job of laser_fusion asks before every portion how much of its budget is left, and the next one goes on") {
+  static int64_t used_ns = 0;  // each question finds a millisecond more used up
+  constexpr int64_t kBudget_ns = 12'000'000, kReserve_ns = 2'000'000, kPortion_ns = 1'000'000;
+  static const VirtualClock clock;
+  Bench bench;
+  test::set(*bench.node, "generations", int64_t{100});
+  test::set_up(*bench.node);
+  test::BoxWriter<Pose> pose(*bench.node->outputs()[0]);
+  test::BoxWriter<PointCloud> fused(*bench.node->outputs()[1]);
+  int jobs = 0, poses = 0;
+  for (; jobs < 100 && !fused.sent(); ++jobs) {
+    test::latch(test::input(*bench.node, "laser"), bench.laser, 150, 1);
+    test::latch(test::input(*bench.node, "vision"), bench.vision, 140, 1);
+    used_ns = 0;
+    pose.clear();
+    Job job(clock, static_cast<uint64_t>(jobs), 0, 1'000'000'000, 0, "full",
+            {kBudget_ns, 0, [] { return used_ns += kPortion_ns; }});
+    bench.node->run(job);
+    REQUIRE(used_ns <= kBudget_ns - kReserve_ns);
+    poses += pose.sent();
+  }
+  CHECK(fused.sent());
+  CHECK(jobs > 5);      // 13 portions of generations, and those of the tables and colours
+  CHECK(poses < jobs);  // the first ones have not begun to search
+  CHECK(poses > 2);     // the last ones colour
+}
+
+TEST_CASE("a fusion that is stopped before every portion gives what one gives in one go") {
+  const CloudPair pair = generate_pair({.points = 3000, .offset_m = 0.3, .offset_rad = 0.3}, 4);
+  const LaserFusionParameters parameters{.search_points = 300, .vision_points = 2000, .genetic = {.generations = 300}};
+  LaserFusion in_one_go(3000, 3000, parameters), in_portions(3000, 3000, parameters);
+  in_one_go.begin(pair.laser.points, pair.vision.view(), {}, 1);
+  CHECK(in_one_go.run([] { return true; }));
+  in_portions.begin(pair.laser.points, pair.vision.view(), {}, 1);
+  int stops = 0;
+  for (bool stop = false; !in_portions.run([&] { return stop = !stop; }); ++stops) {
+  }
+  CHECK(stops > 60);
+  CHECK(in_portions.vision_in_laser().t == in_one_go.vision_in_laser().t);
+  CHECK(in_portions.vision_in_laser().R == in_one_go.vision_in_laser().R);
+  const auto one = in_one_go.finish(), other = in_portions.finish();
+  REQUIRE(one.size() == other.size());
+  CHECK(one.size() > 1500);
+  for (size_t i = 0; i < one.size(); ++i) {
+    REQUIRE(one[i].point.x == other[i].point.x);
+    REQUIRE(one[i].confidence == other[i].confidence);
+    REQUIRE(one[i].colour.g == other[i].colour.g);
+  }
 }
 
 TEST_CASE("laser_fusion starts from where the sensors are mounted, and holds what is locked") {
