@@ -35,7 +35,7 @@ class CruiseNode final : public Node {
 }  // namespace
 
 void register_cruise(NodeTypes& types) {
-  types.add<CruiseNode>("cruise", Layer::processing, "Wants the same speeds all the time, whatever is in the way");
+  types.add<CruiseNode>("cruise", Layer::storage, "Wants the same speeds all the time, whatever is in the way");
 }
 
 }  // namespace takt

@@ -13,8 +13,16 @@ int64_t octile(double columns, double rows) {
   const double high = std::max(std::abs(columns), std::abs(rows)), low = std::min(std::abs(columns), std::abs(rows));
   return static_cast<int64_t>(high * PathPlanner::kStraight + low * (PathPlanner::kDiagonal - PathPlanner::kStraight));
 }
+constexpr double kRounding = 1e-9;           // a clearance of whole cells
 constexpr double kCorner = 1e-9;             // share of a piece: so near to a corner it touches all four cells
 constexpr double kOctilePerLength = 1.0824;  // at most: 1 / cos(22.5 deg)
+
+/// From a cell that is so many columns and rows away, as PathPlanner::apart_ has it.
+int32_t apart(int32_t columns, int32_t rows) {
+  if (columns == 0 && rows == 0) return 0;
+  const int32_t right = std::max(columns - 1, 0), up = std::max(rows - 1, 0);
+  return 1 + right * right + up * up;
+}
 
 }  // namespace
 
@@ -31,8 +39,8 @@ std::string_view to_string(PathOutcome outcome) {
 
 PathPlanner::PathPlanner(size_t most_cells, const PathParameters& parameters)
     : parameters_(parameters),
-      clearance_(most_cells),
-      column_(most_cells),
+      apart_(most_cells),
+      rows_(most_cells),
       unknown_(most_cells),
       reached_(most_cells),
       open_(most_cells) {
@@ -41,10 +49,10 @@ PathPlanner::PathPlanner(size_t most_cells, const PathParameters& parameters)
 
 bool PathPlanner::look(const OccupancyView& grid) {
   const size_t cells = static_cast<size_t>(grid.cells.width) * static_cast<size_t>(grid.cells.height);
-  if (cells > clearance_.size()) return false;
+  if (cells > apart_.size()) return false;
   grid_ = grid;
-  const double radius = parameters_.radius_m / grid.cell_m;
-  radius2_ = static_cast<int32_t>(radius * radius);
+  const double clearance = parameters_.clearance_m / grid.cell_m;
+  blocked_ = static_cast<int32_t>(std::ceil(clearance * clearance - kRounding));
   for (int row = 0; row < grid.cells.height; ++row)
     for (int column = 0; column < grid.cells.width; ++column)
       unknown_[index({column, row})] = grid.cells.at(column, row) == kUnknownCell;
@@ -53,18 +61,19 @@ bool PathPlanner::look(const OccupancyView& grid) {
   return true;
 }
 
-/// Squared distances, first along each column, then over the columns as far as the radius reaches.
+/// First along each column, then over the columns as far as the clearance reaches.
 void PathPlanner::grow_obstacles() {
-  const int width = grid_.cells.width, height = grid_.cells.height, reach = static_cast<int>(std::sqrt(radius2_));
+  const int width = grid_.cells.width, height = grid_.cells.height;
+  const int reach = blocked_ == 0 ? 0 : 1 + static_cast<int>(std::sqrt(blocked_ - 1));
   for (int column = 0; column < width; ++column) {
     int last = -kFar / 2;
     for (int row = 0; row < height; ++row) {
       if (grid_.cells.at(column, row) > kHalfOccupied) last = row;
-      column_[index({column, row})] = row - last;
+      rows_[index({column, row})] = row - last;
     }
     last = kFar / 2;
     for (int row = height - 1; row >= 0; --row) {
-      int32_t& nearest = column_[index({column, row})];
+      int32_t& nearest = rows_[index({column, row})];
       if (nearest == 0) last = row;
       nearest = std::min(nearest, last - row);
     }
@@ -73,17 +82,17 @@ void PathPlanner::grow_obstacles() {
     for (int column = 0; column < width; ++column) {
       int32_t nearest = kFar;
       for (int other = std::max(0, column - reach); other <= std::min(width - 1, column + reach); ++other) {
-        const int32_t rows = column_[index({other, row})];
-        if (rows <= reach) nearest = std::min(nearest, rows * rows + (other - column) * (other - column));
+        const int32_t rows = rows_[index({other, row})], columns = std::abs(other - column);
+        if (rows <= reach) nearest = std::min(nearest, apart(columns, rows));
       }
-      clearance_[index({column, row})] = nearest;
+      apart_[index({column, row})] = nearest;
     }
 }
 
 bool PathPlanner::may_step(const Cell& from, const Cell& to) const {
   if (!grid_.contains(to)) return false;
-  const int32_t there = clearance_[index(to)];
-  if (there <= radius2_ && (there == 0 || there <= clearance_[index(from)])) return false;
+  const int32_t there = apart_[index(to)];
+  if (there <= blocked_ && (there == 0 || there <= apart_[index(from)])) return false;
   if (from.column == to.column || from.row == to.row || blocked(from)) return true;
   return !blocked({from.column, to.row}) && !blocked({to.column, from.row});
 }

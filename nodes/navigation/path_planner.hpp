@@ -26,16 +26,18 @@ struct Disc {
 };
 
 struct PathParameters {
-  double radius_m = 0.48;  ///< nearer to the middle of an occupied cell the robot's centre does not go
-  int unknown_factor = 3;  ///< what an unknown cell costs, in known ones
+  double clearance_m = 0.58;  ///< nearer to any place of an occupied cell the robot's centre does not go
+  int unknown_factor = 3;     ///< what an unknown cell costs, in known ones
 };
 
 enum class PathOutcome : uint8_t { found, start_outside, goal_outside, goal_blocked, no_way };
 std::string_view to_string(PathOutcome outcome);
 
-/// Steps cost 1000 or, diagonally, 1414 (times unknown_factor into an unknown cell), so that sums are exact; no step
-/// cuts the corner of a blocked cell. A robot that stands too near to an obstacle may move away from it, cell by cell.
-/// Memory is taken by the constructor. One thread at a time.
+/// A cell is blocked if it is occupied, or if some place in it is nearer than the clearance to some place in an
+/// occupied one: wherever in its cells the robot drives, it has the clearance. Steps cost 1000 or, diagonally, 1414
+/// (times unknown_factor into an unknown cell), so that sums are exact; no step cuts the corner of a blocked cell. A
+/// robot that stands too near to an obstacle may move away from it, cell by cell. Memory is taken by the constructor.
+/// One thread at a time.
 class PathPlanner {
  public:
   /// For grids of at most so many cells.
@@ -62,7 +64,7 @@ class PathPlanner {
 
   /// For tests: cost of the newest search as a sum of steps; whether the robot may not be there.
   int64_t cost() const { return cost_; }
-  bool blocked(const Cell& cell) const { return clearance_[index(cell)] <= radius2_; }
+  bool blocked(const Cell& cell) const { return apart_[index(cell)] <= blocked_; }
 
   static constexpr int64_t kStraight = 1000, kDiagonal = 1414;
 
@@ -100,8 +102,10 @@ class PathPlanner {
 
   PathParameters parameters_;
   OccupancyView grid_;
-  int32_t radius2_ = 0;                      ///< in cells, squared
-  std::vector<int32_t> clearance_, column_;  ///< squared distance to the nearest occupied cell, as far as radius2_
+  int32_t blocked_ = 0;  ///< cells that are no farther apart from an occupied one are
+  /// From the nearest occupied cell, as far as blocked_: 0 it is that, else 1 + the square of the cells between them.
+  std::vector<int32_t> apart_;
+  std::vector<int32_t> rows_;  ///< to the nearest occupied cell of the column
   std::vector<uint8_t> unknown_;
   std::vector<Reached> reached_;
   std::vector<uint32_t> cells_;  ///< of a way, backwards

@@ -13,8 +13,11 @@ using namespace obstacle_stop;
 
 class ObstacleStopNode final : public Node {
  public:
+  /// What else it reads decides how far ahead it looks, not what it saw when.
+  ObstacleStopNode() { stop_.stamped_by({&scan_}); }
+
   void setup(Setup&) override {
-    footprint_ = {width_ / 2 + margin_, length_ / 2 + margin_, length_ / 2 + margin_};
+    footprint_ = footprint(width_, length_, margin_);
     field_ = FieldState(stop_reason::scan_lost, nanoseconds(release_after_));
     line_ = LineState(static_cast<uint32_t>(stop_line_()), nanoseconds(hold_));
   }
@@ -49,8 +52,20 @@ class ObstacleStopNode final : public Node {
            std::isfinite(t.x + t.y + t.qw + t.qx + t.qy + t.qz);
   }
 
+  /// Of a robot that moves both what it does and what it is about to do: until it turns it goes on straight.
   FieldReading look(const LaserScan& scan) const {
-    const Drive drive = present_drive();
+    const Drive present = present_drive();
+    const bool stands = std::abs(present.speed_m_s) < kStands_m_s && std::abs(present.turn_rad_s) < kStands_rad_s;
+    const VelocityCommand* wanted = velocity_.newest();
+    if (!wanted || velocity_.stale() || !std::isfinite(wanted->speed_m_s) || !std::isfinite(wanted->turn_rad_s))
+      return look(scan, present);
+    const FieldReading soon =
+        look(scan, drive_before_stop(stands ? Drive{} : present, {wanted->speed_m_s, wanted->turn_rad_s}));
+    if (stands || soon.blocked) return soon;
+    return look(scan, present);
+  }
+
+  FieldReading look(const LaserScan& scan, const Drive& drive) const {
     const ProtectedField field(footprint_, drive,
                                stopping_time_s(drive, {deceleration_, turn_deceleration_, reaction_time_}));
     return read_field({scan.first_angle_rad, scan.step_rad, scan.sensor_in_robot, scan.range_m.items()}, field,
@@ -73,14 +88,21 @@ class ObstacleStopNode final : public Node {
     return (line_.stops(now_ns) ? stop_reason::line : 0) | (lost ? stop_reason::line_lost : 0);
   }
 
+  static constexpr double kStands_m_s = 0.02, kStands_rad_s = 0.02;  ///< slower is no motion
+
   Input<LaserScan> scan_{this, "scan", "newest sweep of a level scanner that looks ahead"};
   Input<DigitalState> lines_{this, "lines", "emergency-stop line; depth as many as come in a period", Need::optional};
   Input<Odometry> odometry_{this, "odometry", "present speeds", Need::optional};
+  Input<VelocityCommand> velocity_{this, "velocity", "what is wanted of the base: what it may soon do", Need::optional};
   Output<StopCommand> stop_{this, "stop", "stop or drive on, each job, with the scan's stamp"};
-  Param<double> width_{this, "robot_width", 0.56, {0.1, 5.0}, "m", "across the driving direction"};
-  Param<double> length_{
-      this, "robot_length", 0.78, {0.1, 5.0}, "m", "along the driving direction, the robot's centre in its middle"};
-  Param<double> margin_{this, "margin", 0.10, {0.0, 1.0}, "m", "added to the robot on every side"};
+  Param<double> width_{this, "robot_width", kRobotWidth_m, {0.1, 5.0}, "m", "across the driving direction"};
+  Param<double> length_{this,
+                        "robot_length",
+                        kRobotLength_m,
+                        {0.1, 5.0},
+                        "m",
+                        "along the driving direction, the robot's centre in its middle"};
+  Param<double> margin_{this, "margin", kMargin_m, {0.0, 1.0}, "m", "nearer to the robot nothing may come"};
   Param<double> speed_max_{this, "speed_max", 1.4, {0.0, 10.0}, "m/s", "assumed where odometry says nothing"};
   Param<double> deceleration_{this, "deceleration", 1.0, {0.05, 20.0}, "m/s2", "that the robot surely brakes with"};
   Param<double> turn_deceleration_{

@@ -25,7 +25,15 @@ PlaneTransform to_plane(const Transform& t) {
           t.y};
 }
 
+double before_stop(double present, double wanted) {
+  return present * wanted >= 0 && std::abs(wanted) > std::abs(present) ? wanted : present;
+}
+
 }  // namespace
+
+Drive drive_before_stop(const Drive& present, const Drive& wanted) {
+  return {before_stop(present.speed_m_s, wanted.speed_m_s), before_stop(present.turn_rad_s, wanted.turn_rad_s)};
+}
 
 double stopping_time_s(const Drive& drive, const Braking& braking) {
   return braking.reaction_s + std::max(std::abs(drive.speed_m_s) / (2 * braking.deceleration_m_s2),
@@ -33,40 +41,68 @@ double stopping_time_s(const Drive& drive, const Braking& braking) {
 }
 
 ProtectedField::ProtectedField(const Footprint& footprint, const Drive& drive, double time_s)
-    : footprint_(footprint), distance_m_(drive.speed_m_s * time_s), angle_rad_(drive.turn_rad_s * time_s) {
-  if (std::abs(angle_rad_) >= kStraight_rad) centre_x_m_ = -drive.speed_m_s / drive.turn_rad_s;
-  reach_m_ = std::abs(distance_m_) + std::hypot(footprint.half_width_m, std::max(footprint.front_m, footprint.rear_m));
+    : footprint_(footprint),
+      distance_m_(drive.speed_m_s * time_s),
+      angle_rad_(drive.turn_rad_s * time_s),
+      straight_(std::abs(angle_rad_) < kStraight_rad) {
+  if (!straight_) centre_x_m_ = -drive.speed_m_s / drive.turn_rad_s;
+  reach_m_ = std::abs(distance_m_) + footprint.clearance_m();
 }
 
-bool ProtectedField::in_footprint(double x, double y) const {
-  return std::abs(x) <= footprint_.half_width_m && y >= -footprint_.rear_m && y <= footprint_.front_m;
+bool ProtectedField::in_margin(double x, double y, double longer_rear, double longer_front) const {
+  const auto& f = footprint_;
+  const double aside = std::max(std::abs(x) - f.half_width_m, 0.0),
+               along = std::max({-f.rear_m - longer_rear - y, y - f.front_m - longer_front, 0.0});
+  return aside * aside + along * along <= f.margin_m * f.margin_m;
+}
+
+// Within a quarter turn about a centre beside the robot such a place only moves on away from the edge.
+bool ProtectedField::left_behind(double x, double y) const {
+  const bool gently = straight_ || (std::abs(centre_x_m_) > footprint_.half_width_m + footprint_.margin_m &&
+                                    std::abs(angle_rad_) <= std::numbers::pi / 2);
+  if (!gently || !in_margin(x, y, 0, 0)) return false;
+  return distance_m_ < 0 ? y > footprint_.front_m : distance_m_ > 0 && y < -footprint_.rear_m;
 }
 
 bool ProtectedField::contains(double x, double y) const {
-  if (!(x * x + y * y <= reach_m_ * reach_m_)) return false;  // NaN fails as well
-  if (std::abs(angle_rad_) < kStraight_rad)
-    return std::abs(x) <= footprint_.half_width_m && y >= -footprint_.rear_m + std::min(0.0, distance_m_) &&
-           y <= footprint_.front_m + std::max(0.0, distance_m_);
-  return in_footprint(x, y) || arc_meets_footprint(x, y);
+  if (!(x * x + y * y <= reach_m_ * reach_m_) || left_behind(x, y)) return false;  // NaN fails as well
+  if (straight_) return in_margin(x, y, std::max(0.0, -distance_m_), std::max(0.0, distance_m_));
+  if (in_margin(x, y, 0, 0)) return true;
+  // Seen from the robot a fixed point runs backwards along the circle through it; it is swept if its arc meets the
+  // border of the margin, as it starts outside: four edges, and the corners' circles.
+  const double dx = x - centre_x_m_, radius = std::hypot(dx, y), from = std::atan2(y, dx);
+  return arc_meets_edge(radius, from) || arc_meets_corner(radius, from);
 }
 
-// Seen from the robot a fixed point runs backwards along the circle through it; it is swept if its arc meets the
-// footprint. It starts outside, so the arc would have to cross an edge.
-bool ProtectedField::arc_meets_footprint(double x, double y) const {
-  const double dx = x - centre_x_m_, radius = std::hypot(dx, y), from = std::atan2(y, dx);
+bool ProtectedField::arc_meets_edge(double radius, double from) const {
   const auto& f = footprint_;
-  for (const double edge_x : {-f.half_width_m, f.half_width_m}) {
+  for (const double edge_x : {-f.half_width_m - f.margin_m, f.half_width_m + f.margin_m}) {
     const double square = radius * radius - (edge_x - centre_x_m_) * (edge_x - centre_x_m_);
     if (square < 0) continue;
     for (const double edge_y : {-std::sqrt(square), std::sqrt(square)})
       if (edge_y >= -f.rear_m && edge_y <= f.front_m && swept_to(edge_x, edge_y, from)) return true;
   }
-  for (const double edge_y : {-f.rear_m, f.front_m}) {
+  for (const double edge_y : {-f.rear_m - f.margin_m, f.front_m + f.margin_m}) {
     const double square = radius * radius - edge_y * edge_y;
     if (square < 0) continue;
     for (const double edge_x : {centre_x_m_ - std::sqrt(square), centre_x_m_ + std::sqrt(square)})
       if (std::abs(edge_x) <= f.half_width_m && swept_to(edge_x, edge_y, from)) return true;
   }
+  return false;
+}
+
+bool ProtectedField::arc_meets_corner(double radius, double from) const {
+  const auto& f = footprint_;
+  for (const double x : {-f.half_width_m, f.half_width_m})
+    for (const double y : {-f.rear_m, f.front_m}) {
+      // Where the two circles meet: beyond the corner by `on` as seen from the centre, and `aside` to both sides.
+      const double dx = x - centre_x_m_, away = std::hypot(dx, y);
+      const double on = ((radius - away) * (radius + away) - f.margin_m * f.margin_m) / (2 * away);
+      const double square = f.margin_m * f.margin_m - on * on;
+      if (square < 0) continue;
+      for (const double aside : {-std::sqrt(square), std::sqrt(square)})
+        if (swept_to(x + (on * dx - aside * y) / away, y + (on * y + aside * dx) / away, from)) return true;
+    }
   return false;
 }
 

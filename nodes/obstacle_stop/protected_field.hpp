@@ -4,14 +4,10 @@
 #pragma once
 #include <span>
 
+#include "nodes/obstacle_stop/footprint.hpp"
 #include "rt/msg/messages.hpp"
 
 namespace takt::obstacle_stop {
-
-/// The robot seen from above, margin included: |x| <= half_width, -rear <= y <= front. All positive.
-struct Footprint {
-  double half_width_m = 0, front_m = 0, rear_m = 0;
-};
 
 /// Speeds of the robot: along +y, and counter-clockwise from above.
 struct Drive {
@@ -28,8 +24,13 @@ struct Braking {
 /// drive.
 double stopping_time_s(const Drive& drive, const Braking& braking);
 
-/// All places that the footprint covers while it moves for `time_s` at constant speeds: along a line, or along the
-/// circle about (-speed / turn, 0).
+/// What a robot may be doing before a stop takes effect: of each speed the wanted one, if that is faster the same way
+/// or the robot stands, else the present one, from which it has to slow down first.
+Drive drive_before_stop(const Drive& present, const Drive& wanted);
+
+/// All places that come to within the margin of the footprint while it moves for `time_s` at constant speeds: along a
+/// line, or along the circle about (-speed / turn, 0). What it leaves behind is not among them: a place in the margin
+/// beyond the edge that trails, on a line or a circle wider than the robot, as the robot only gets farther from it.
 class ProtectedField {
  public:
   ProtectedField(const Footprint& footprint, const Drive& drive, double time_s);
@@ -37,13 +38,17 @@ class ProtectedField {
   bool contains(double x_m, double y_m) const;
 
  private:
-  bool in_footprint(double x_m, double y_m) const;
+  /// Whether the place lies within the margin of the footprint, this being longer by so much at either end.
+  bool in_margin(double x_m, double y_m, double longer_rear_m, double longer_front_m) const;
+  bool left_behind(double x_m, double y_m) const;
   bool swept_to(double x_m, double y_m, double from_rad) const;
-  bool arc_meets_footprint(double x_m, double y_m) const;
+  bool arc_meets_edge(double radius_m, double from_rad) const;
+  bool arc_meets_corner(double radius_m, double from_rad) const;
 
   Footprint footprint_;
   double distance_m_;      ///< signed, along the path
   double angle_rad_;       ///< signed turn on the way
+  bool straight_;          ///< as good as
   double centre_x_m_ = 0;  ///< of the circle
   double reach_m_;         ///< nothing farther from the origin is in the field
 };

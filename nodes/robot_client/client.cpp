@@ -84,13 +84,18 @@ void Client::end(std::string_view what) {
 navigation::Velocity Client::step(const Percept& percept) {
   now_ns_ = percept.now_ns;
   halted_ = percept.stop || !percept.robot;
-  if (halted_) {
+  navigation::Velocity velocity;
+  if (percept.robot && percept.stop && percept.obstacle) {
+    velocity = driving_.halt_before_obstacle(*percept.robot, percept.dt_s);
+    if (driving_.progress() == Progress::under_way) return velocity;
+  } else if (halted_) {
     driving_.halt();
     return {};
+  } else {
+    time_s_ += percept.dt_s;
+    velocity = driving_.step(*percept.robot, percept.dt_s);
   }
   robot_ = *percept.robot;
-  time_s_ += percept.dt_s;
-  const navigation::Velocity velocity = driving_.step(robot_, percept.dt_s);
   switch (mode_.state) {
     case State::idle: be_idle(); break;
     case State::planning: think(percept.effort); break;

@@ -31,6 +31,7 @@ struct Percept {
   double dt_s = 0;                  ///< since the step before
   std::optional<PlanarPose> robot;  ///< in the map; none: not known, and the robot has to stand
   bool stop = false;                ///< the robot has to stand
+  bool obstacle = false;            ///< and that for nothing but an obstacle
   Outcome outcome;
   planner::Effort effort;  ///< of this step's thinking
 };

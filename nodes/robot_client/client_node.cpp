@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "nodes/mapping_3d/pose.hpp"
+#include "nodes/obstacle_stop/footprint.hpp"
 #include "nodes/robot_client/client.hpp"
 #include "nodes/semantic/network_file.hpp"
 #include "rt/node.hpp"
@@ -40,7 +41,7 @@ class RobotClientNode final : public Node {
     ClientParameters p;
     p.driving.pilot.limits.speed_m_s = speed_;
     p.driving.pilot.limits.turn_rad_s = turn_;
-    p.driving.path.radius_m = radius_;
+    p.driving.path.clearance_m = obstacle_stop::footprint(width_, length_, margin_).clearance_m();
     p.driving.most_cells = p.deliberation.most_cells = grid_.connected() ? grid_.capacity().pixels() : 0;
     p.driving.explore_far_m = explore_far_;
     p.deliberation.pilot = p.driving.pilot;
@@ -84,8 +85,9 @@ class RobotClientNode final : public Node {
     percept.now_ns = now_ns;
     percept.dt_s = first ? 0 : static_cast<double>(std::min(now_ns - last_ns_, kLongestStep_ns)) * 1e-9;
     percept.robot = robot(now_ns);
-    percept.stop = job.mode() == kSafeStopMode ||
-                   (stop_.connected() && (stop_.empty() || stop_.stale() || stop_.newest()->stop()));
+    const bool told = stop_.connected() && !stop_.empty() && !stop_.stale();  // by who may stop the robot
+    percept.stop = job.mode() == kSafeStopMode || (stop_.connected() && (!told || stop_.newest()->stop()));
+    percept.obstacle = told && stop_.newest()->reasons == stop_reason::obstacle;
     if (const ActionOutcome* o = outcome_.newest())
       percept.outcome = {o->number, o->state, o->duration_s, text_of(o->reason)};
     percept.effort = {expansions_, [&job, this] { return job.time_left_ns() < reserve_ns_; }};
@@ -257,8 +259,12 @@ class RobotClientNode final : public Node {
   Param<std::string> network_{this, "network", "", kPath, "predefined network (YAML): types, actions, objects"};
   Param<std::string> words_{this, "task", "", "",
                             "a task; live, for `takt robot`: a number before it makes it another"};
-  Param<double> reach_{this, "reach", 0.75, {0.1, 5.0}, "m", "so near to all objects of an action the robot drives"};
-  Param<double> radius_{this, "radius", 0.48, {0.0, 2.0}, "m", "of the robot, by which obstacles grow"};
+  Param<double> reach_{this, "reach", 0.78, {0.1, 5.0}, "m", "so near to all objects of an action the robot drives"};
+  Param<double> width_{this, "robot_width", obstacle_stop::kRobotWidth_m, {0.1, 5.0}, "m", "as obstacle_stop has it"};
+  Param<double> length_{this, "robot_length",           obstacle_stop::kRobotLength_m, {0.1, 5.0},
+                        "m",  "as obstacle_stop has it"};
+  Param<double> margin_{this,       "margin", obstacle_stop::kMargin_m,
+                        {0.0, 1.0}, "m",      "as obstacle_stop has it: ways keep it however the robot turns"};
   Param<double> speed_{this, "speed", 0.8, {0.05, 3.0}, "m/s", "largest speed"};
   Param<double> turn_{this, "turn", 0.8, {0.05, 3.0}, "rad/s", "largest turn rate"};
   Param<int> plans_{this, "plans", 3, {1, 100}, "", "for one goal, until it is given up"};

@@ -6,7 +6,9 @@
 namespace takt::robot_client {
 namespace {
 
+constexpr std::string_view kObstacle = "an obstacle stands in the way";
 constexpr double kMoved_m = 0.05, kTurned_rad = 0.05;  // less is no getting on
+constexpr double kPassed_m = 0.2;                      // nearer to where it had to stand it is the same obstacle
 
 Place place_of(const PlanarPose& robot) { return {robot.x_m, robot.y_m}; }
 
@@ -30,7 +32,9 @@ void Driving::begin(Kind kind) {
   progress_ = Progress::under_way;
   reason_ = {};
   begun_ = false;
-  closed_s_ = standing_s_ = 0;
+  closed_s_ = standing_s_ = halted_s_ = 0;
+  backs_ = 0;
+  backing_.reset();
 }
 
 void Driving::to_place(const Place& place) {
@@ -62,6 +66,35 @@ void Driving::halt() {
   pilot_.halt();
   standing_s_ = 0;
 }
+
+navigation::Velocity Driving::halt_before_obstacle(const PlanarPose& robot, double dt_s) {
+  halt();
+  if (kind_ == Kind::none) return {};
+  if (backing_) return draw_back(robot, dt_s);
+  if (halted_s_ == 0) halted_at_ = robot;
+  if ((halted_s_ += dt_s) < parameters_.wait_s) return {};
+  if (backs_ == parameters_.most_backs) {
+    fail(kObstacle);
+    return {};
+  }
+  ++backs_;
+  halted_s_ = 0;
+  backing_ = robot;
+  return draw_back(robot, dt_s);
+}
+
+/// Also while the stop lasts: who commands it has to see that the robot wants away from the obstacle.
+navigation::Velocity Driving::draw_back(const PlanarPose& robot, double dt_s) {
+  const PlanarPose moved = between(*backing_, robot);
+  halted_s_ += dt_s;
+  if (std::hypot(moved.x_m, moved.y_m) < parameters_.back_m && halted_s_ < parameters_.stuck_s)
+    return {-parameters_.back_m_s, 0};
+  backing_.reset();
+  halted_s_ = standing_s_ = 0;
+  if (has_way(kind_)) begun_ = false;
+  return {};
+}
+
 void Driving::begin_exploring(const PlanarPose& robot) {
   area_ = {place_of(robot), parameters_.explore_far_m};
   explored_count_ = 0;
@@ -129,6 +162,10 @@ void Driving::notice_standstill(const PlanarPose& robot, double dt_s) {
 }
 
 navigation::Velocity Driving::step(const PlanarPose& robot, double dt_s) {
+  if (backing_) return draw_back(robot, dt_s);
+  // A guard that lets go of who stands, and stops who moves, makes many short stops of one.
+  const PlanarPose passed = between(halted_at_, robot);
+  if (std::hypot(passed.x_m, passed.y_m) >= kPassed_m) halted_s_ = 0;
   if (has_way(kind_)) {
     keep_a_way(robot);
     if (kind_ != Kind::none && !begun_ && (closed_s_ += dt_s) > parameters_.patience_s) fail(reason_);

@@ -14,6 +14,10 @@ struct DrivingParameters {
   size_t most_cells = 0;     ///< of a grid; 0: there is none, and ways are straight lines
   double patience_s = 5;     ///< a way that is closed may open again
   double stuck_s = 10;       ///< without getting on at all
+  double wait_s = 2;         ///< made to stand for an obstacle, which may go away
+  double back_m = 0.25;      ///< then the robot draws back by so much
+  double back_m_s = 0.15;    ///< so fast
+  int most_backs = 3;        ///< of one leg
   double explored_m = 1;     ///< what is still unknown so near to where it looked cannot be seen
   double explore_far_m = 8;  ///< from where exploring began, farther off nothing is looked for
 };
@@ -46,6 +50,9 @@ class Driving {
   void stand();
   /// The robot stands at once, by other hands; the leg waits.
   void halt();
+  /// Instead of step() while it is made to stand for an obstacle alone: waits, then wants to draw back from it,
+  /// straight to where it came from. A way is planned anew behind that; after most_backs the leg fails.
+  navigation::Velocity halt_before_obstacle(const PlanarPose& robot, double dt_s);
   /// Exploring begins anew, from here.
   void begin_exploring(const PlanarPose& robot);
 
@@ -68,6 +75,7 @@ class Driving {
   bool way_is_free(const PlanarPose& robot);
   PathOutcome find_way(const Place& from);
   void keep_a_way(const PlanarPose& robot);
+  navigation::Velocity draw_back(const PlanarPose& robot, double dt_s);
   void notice_standstill(const PlanarPose& robot, double dt_s);
   void note_explored(const Place& place);
 
@@ -82,10 +90,14 @@ class Driving {
   double reach_m_ = 0, amount_ = 0;
   Progress progress_ = Progress::arrived;
   std::string_view reason_;
-  bool begun_ = false;     ///< the pilot has the leg
-  double closed_s_ = 0;    ///< for so long there is no way
-  double standing_s_ = 0;  ///< for so long it did not get on
-  PlanarPose got_on_;      ///< where it last did
+  bool begun_ = false;   ///< the pilot has the leg
+  double closed_s_ = 0;  ///< for so long there is no way
+  double halted_s_ = 0;  ///< for so long it has been made to stand, all in all, or has drawn back
+  PlanarPose halted_at_;
+  int backs_ = 0;
+  std::optional<PlanarPose> backing_;  ///< from there on it draws back
+  double standing_s_ = 0;              ///< for so long it did not get on
+  PlanarPose got_on_;                  ///< where it last did
   std::vector<Place> way_, rest_;
 
   Disc area_;

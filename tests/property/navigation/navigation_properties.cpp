@@ -5,7 +5,8 @@
 #include <queue>
 #include <random>
 
-#include "nodes/navigation/path_planner.hpp"
+#include "nodes/navigation/pilot.hpp"
+#include "nodes/obstacle_stop/protected_field.hpp"
 
 using namespace takt::navigation;
 
@@ -15,23 +16,25 @@ struct RandomField {
   std::vector<int16_t> cells;
   OccupancyView view;
 
-  RandomField(std::mt19937& random, int width, int height, double occupied, double unknown) {
+  RandomField(std::mt19937& random, int width, int height, double occupied, double unknown, double cell_m = 0.2) {
     std::uniform_real_distribution<double> share(0, 1);
     for (int i = 0; i < width * height; ++i) {
       const double s = share(random);
       cells.push_back(s < occupied ? int16_t{1000} : s < occupied + unknown ? kUnknownCell : int16_t{300});
     }
-    view = {{cells.data(), width, height}, 0.2, -3, 7};
+    view = {{cells.data(), width, height}, cell_m, -3, 7};
   }
 };
 
-/// By looking at every cell for every cell.
-bool blocked(const OccupancyView& view, const Cell& cell, double radius_m) {
+/// By looking at every cell for every cell: how near two places in them can be.
+bool blocked(const OccupancyView& view, const Cell& cell, double clearance_m) {
   for (int row = 0; row < view.cells.height; ++row)
-    for (int column = 0; column < view.cells.width; ++column)
-      if (view.cells.at(column, row) > kHalfOccupied &&
-          std::pow(column - cell.column, 2) + std::pow(row - cell.row, 2) <= std::pow(radius_m / view.cell_m, 2))
-        return true;
+    for (int column = 0; column < view.cells.width; ++column) {
+      if (view.cells.at(column, row) <= kHalfOccupied) continue;
+      const double right = std::max(0, std::abs(column - cell.column) - 1),
+                   up = std::max(0, std::abs(row - cell.row) - 1);
+      if (Cell{column, row} == cell || std::hypot(right, up) * view.cell_m < clearance_m - 1e-9) return true;
+    }
   return false;
 }
 
@@ -71,7 +74,7 @@ TEST_CASE(
     "ways to where two places are in reach, and to the nearest cell beside an unknown one, cost what Dijkstra's do") {
   std::mt19937 random(5);
   const auto below = [&](int n) { return static_cast<int>(random() % static_cast<unsigned>(n)); };
-  PathPlanner planner(400, {0.25, 3});
+  PathPlanner planner(400, {0.1, 3});
   size_t near = 0, unknown = 0, none = 0;
   std::vector<Place> path;
   for (int round = 0; round < 150; ++round) {
@@ -129,8 +132,8 @@ TEST_CASE(
 TEST_CASE("obstacles grow as the definition says, and every way costs what Dijkstra's does") {
   std::mt19937 random(3);
   const auto below = [&](int n) { return static_cast<int>(random() % static_cast<unsigned>(n)); };
-  PathPlanner planners[] = {{600, {0.1, 3}}, {600, {0.3, 3}}, {600, {0.48, 3}}};
-  constexpr double kRadius_m[] = {0.1, 0.3, 0.48};
+  PathPlanner planners[] = {{600, {0, 3}}, {600, {0.1, 3}}, {600, {0.4, 3}}};
+  constexpr double kClearance_m[] = {0, 0.1, 0.4};
   size_t found = 0, none = 0, pieces = 0;
   std::vector<Place> path;
   for (int round = 0; round < 300; ++round) {
@@ -144,7 +147,7 @@ TEST_CASE("obstacles grow as the definition says, and every way costs what Dijks
     std::vector<Cell> places;
     for (int row = 0; row < height; ++row)
       for (int column = 0; column < width; ++column) {
-        const bool b = blocked(field.view, {column, row}, kRadius_m[which]);
+        const bool b = blocked(field.view, {column, row}, kClearance_m[which]);
         REQUIRE(planner.blocked({column, row}) == b);
         free[{column, row}] = !b;
         if (!b) places.push_back({column, row});
@@ -183,4 +186,91 @@ TEST_CASE("obstacles grow as the definition says, and every way costs what Dijks
   CHECK(found > 500);
   CHECK(none > 50);
   CHECK(pieces > 1000);
+}
+
+namespace {
+
+/// Drives as it is told, three jobs later.
+struct LateRobot {
+  takt::PlanarPose pose;
+  Velocity now;
+  std::array<Velocity, 3> on_their_way{};
+  size_t steps = 0;
+  void step(const Velocity& told, double dt_s) {
+    now = std::exchange(on_their_way[steps++ % on_their_way.size()], told);
+    pose = takt::compose(pose, {now.speed_m_s * dt_s, 0, now.turn_rad_s * dt_s});
+  }
+};
+
+/// All around an occupied cell.
+std::vector<Place> borders(const OccupancyView& view) {
+  std::vector<Place> places;
+  for (int row = 0; row < view.cells.height; ++row)
+    for (int column = 0; column < view.cells.width; ++column)
+      for (int i = 0; i < 16 && view.cells.at(column, row) > kHalfOccupied; ++i) {
+        const double along = (i % 4) / 4.0 - 0.5;
+        const double turned[4][2] = {{along, -0.5}, {0.5, along}, {-along, 0.5}, {-0.5, -along}};
+        const auto& at = turned[i / 4];
+        places.push_back({view.middle_x_m({column, row}) + at[0] * view.cell_m,
+                          view.middle_y_m({column, row}) + at[1] * view.cell_m});
+      }
+  return places;
+}
+
+}  // namespace
+
+TEST_CASE("what a way was planned round never keeps who drives it from standing, turning and driving on") {
+  using namespace takt::obstacle_stop;
+  const Footprint robot = footprint(kRobotWidth_m, kRobotLength_m, kMargin_m);
+  constexpr Braking kBraking{1.0, 1.5, 0.35};  // the guard's parameters
+  constexpr double kStep_s = 1.0 / 15;
+  constexpr int kCells = 80;
+  std::mt19937 random(11);
+  const auto below = [&](int n) { return static_cast<int>(random() % static_cast<unsigned>(n)); };
+  PathPlanner planner(kCells * kCells, {robot.clearance_m(), 3});
+  std::vector<Place> way;
+  size_t ways = 0, steps = 0, at_rest = 0, moving = 0;
+  double nearest_m = 10;
+  for (int round = 0; round < 60; ++round) {
+    const RandomField field(random, kCells, kCells, 0.003, 0, 0.1);
+    REQUIRE(planner.look(field.view));
+    const auto obstacles = borders(field.view);
+    const auto any = [&] {
+      Cell cell;
+      do cell = {below(kCells), below(kCells)};
+      while (planner.blocked(cell));
+      return Place{field.view.middle_x_m(cell), field.view.middle_y_m(cell)};
+    };
+    const Place from = any();
+    if (planner.plan(from, any(), 0, way) != PathOutcome::found) continue;
+    ++ways;
+    LateRobot late{{from.x_m, from.y_m, below(628) / 100.0}, {}};
+    Pilot pilot({});
+    REQUIRE(pilot.drive_to(way, below(628) / 100.0));
+    do {
+      const Velocity wanted = pilot.step(late.pose, kStep_s);
+      const Velocity& judged = late.now.speed_m_s == 0 && late.now.turn_rad_s == 0 ? wanted : late.now;
+      const Drive drive{judged.speed_m_s, judged.turn_rad_s};
+      constexpr Drive kTurn{0, MotionLimits{}.turn_rad_s};
+      const ProtectedField field_of_drive(robot, drive, stopping_time_s(drive, kBraking)),
+          field_at_rest(robot, kTurn, stopping_time_s(kTurn, kBraking));
+      const double c = std::cos(late.pose.theta_rad), s = std::sin(late.pose.theta_rad);
+      bool stops = false, holds = false;
+      for (const Place& place : obstacles) {
+        const double dx = place.x_m - late.pose.x_m, dy = place.y_m - late.pose.y_m;
+        const double x = s * dx - c * dy, y = c * dx + s * dy;
+        nearest_m = std::min(nearest_m, std::hypot(dx, dy));
+        stops |= field_of_drive.contains(x, y);
+        holds |= field_at_rest.contains(x, y);
+      }
+      moving += stops;
+      at_rest += holds;
+      late.step(wanted, kStep_s);
+    } while (++steps < 1'000'000 && !pilot.standing());
+  }
+  MESSAGE(ways << " ways, " << steps << " jobs, " << moving << " with something in the field of the drive, " << at_rest
+               << " in that at rest; never nearer than " << nearest_m << " m");
+  CHECK(ways > 40);
+  CHECK(nearest_m >= robot.clearance_m());
+  CHECK(at_rest == 0);
 }

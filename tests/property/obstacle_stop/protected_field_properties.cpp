@@ -14,11 +14,23 @@ using namespace takt::obstacle_stop;
 
 namespace {
 
+double from_footprint_m(const Footprint& f, double x, double y) {
+  return std::hypot(std::max(std::abs(x) - f.half_width_m, 0.0), std::max({-f.rear_m - y, y - f.front_m, 0.0}));
+}
+
+/// In the margin beyond the edge that trails, while the robot drives on a circle wider than itself or a line, by a
+/// quarter turn at most.
+bool left_behind(const Footprint& f, const Drive& d, double time_s, double x, double y) {
+  const bool gently = std::abs(d.turn_rad_s) * (f.half_width_m + f.margin_m) < std::abs(d.speed_m_s) &&
+                      std::abs(d.turn_rad_s) * time_s <= std::numbers::pi / 2;
+  return gently && from_footprint_m(f, x, y) <= f.margin_m && (d.speed_m_s < 0 ? y > f.front_m : y < -f.rear_m);
+}
+
 /// The swept area the slow way: the robot is moved on in steps of at most a millimetre and half a milliradian, and each
-/// time asked whether it covers the point.
+/// time asked how far it is from the point.
 class Way {
  public:
-  Way(const Drive& d, double time_s) {
+  Way(const Drive& d, double time_s) : drive_(d), time_s_(time_s) {
     const int steps = 1 + static_cast<int>(std::max(std::abs(d.speed_m_s), 2 * std::abs(d.turn_rad_s)) * time_s / 1e-3);
     const double dt = time_s / steps;
     double x = 0, y = 0;
@@ -30,10 +42,11 @@ class Way {
     }
   }
   bool covers(const Footprint& f, double x, double y) const {
+    if (left_behind(f, drive_, time_s_, x, y)) return false;
     return std::any_of(poses_.begin(), poses_.end(), [&](const Pose& p) {
       const double across = p.cosine * (x - p.x) + p.sine * (y - p.y);
       const double along = -p.sine * (x - p.x) + p.cosine * (y - p.y);
-      return std::abs(across) <= f.half_width_m && along >= -f.rear_m && along <= f.front_m;
+      return from_footprint_m(f, across, along) <= f.margin_m;
     });
   }
 
@@ -41,15 +54,17 @@ class Way {
   struct Pose {
     double x, y, cosine, sine;
   };
+  Drive drive_;
+  double time_s_;
   std::vector<Pose> poses_;
 };
 
-Footprint grown(Footprint f, double by) { return {f.half_width_m + by, f.front_m + by, f.rear_m + by}; }
+Footprint grown(Footprint f, double by) { return {f.half_width_m, f.front_m, f.rear_m, f.margin_m + by}; }
 
 struct Random {
   std::mt19937 engine{7};
   double operator()(double low, double high) { return std::uniform_real_distribution<>(low, high)(engine); }
-  Footprint footprint() { return {(*this)(0.1, 0.6), (*this)(0.1, 0.8), (*this)(0.1, 0.8)}; }
+  Footprint footprint() { return {(*this)(0.1, 0.5), (*this)(0.1, 0.7), (*this)(0.1, 0.7), (*this)(0, 0.3)}; }
   /// Straight, turning on the spot, nearly straight, backwards, and all between.
   Drive drive(int round) {
     const double speed = round % 5 == 0 ? 0 : (*this)(-0.8, 1.5);
@@ -94,9 +109,12 @@ TEST_CASE("whatever the robot covers at any instant of its way is in the field")
     // Along the chord: the way on a circle, exact also where the circle is nearly a line.
     const double chord = d.speed_m_s * at * (std::abs(heading) < 1e-9 ? 1 : std::sin(heading / 2) / (heading / 2));
     const double px = -chord * std::sin(heading / 2), py = chord * std::cos(heading / 2);
-    const double across = random(-1, 1) * (f.half_width_m - 1e-6), along = random(-f.rear_m + 1e-6, f.front_m - 1e-6);
+    const double off = random(0, f.margin_m - 1e-6), to = random(0, 2 * std::numbers::pi);
+    const double across = random(-1, 1) * (f.half_width_m - 1e-6) + off * std::cos(to),
+                 along = random(-f.rear_m + 1e-6, f.front_m - 1e-6) + off * std::sin(to);
     const double c = std::cos(heading), s = std::sin(heading);
-    CHECK(ProtectedField(f, d, time).contains(px + c * across - s * along, py + s * across + c * along));
+    const double x = px + c * across - s * along, y = py + s * across + c * along;
+    CHECK(ProtectedField(f, d, time).contains(x, y) != left_behind(f, d, time, x, y));
   }
 }
 

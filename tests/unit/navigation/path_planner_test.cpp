@@ -35,7 +35,7 @@ TEST_CASE("a way round a wall, its corners only, from place to place") {
                  "..#.#..",  //
                  "..#.#..",  //
                  "......."});
-  PathPlanner planner(100, {0.4, 3});
+  PathPlanner planner(100, {0, 3});
   REQUIRE(planner.look(f.view()));
   std::vector<Place> path;
   REQUIRE(planner.plan({3.5, 1.5}, {3.5, 4.9}, 0, path) == PathOutcome::found);
@@ -52,7 +52,7 @@ TEST_CASE("a way round a wall, its corners only, from place to place") {
 
 TEST_CASE("what has no way says why") {
   const Field f({".#.", ".#.", ".#."});
-  PathPlanner planner(9, {0.4, 3});
+  PathPlanner planner(9, {0, 3});
   REQUIRE(planner.look(f.view()));
   std::vector<Place> path;
   CHECK(planner.plan({0.5, 0.5}, {2.5, 0.5}, 0, path) == PathOutcome::no_way);
@@ -61,12 +61,12 @@ TEST_CASE("what has no way says why") {
   CHECK(planner.plan({0.5, 0.5}, {3.5, 0.5}, 0, path) == PathOutcome::goal_outside);
   CHECK(planner.plan({-0.5, 0.5}, {0.5, 0.5}, 0, path) == PathOutcome::start_outside);
   CHECK(planner.plan({0.5, 0.5}, {1.5, 0.5}, 1, path) == PathOutcome::found);  // beside it is near enough
-  CHECK_FALSE(PathPlanner(8, {0.4, 3}).look(f.view()));
+  CHECK_FALSE(PathPlanner(8, {0, 3}).look(f.view()));
 }
 
 TEST_CASE("unknown cells cost three, so that a known detour of less is taken") {
   const Field f({".....", ".???.", "....."});
-  PathPlanner planner(15, {0.4, 3});
+  PathPlanner planner(15, {0, 3});
   REQUIRE(planner.look(f.view()));
   std::vector<Place> path;
   REQUIRE(planner.plan({0.5, 1.5}, {4.5, 1.5}, 0, path) == PathOutcome::found);
@@ -74,13 +74,17 @@ TEST_CASE("unknown cells cost three, so that a known detour of less is taken") {
   for (const Place& place : path) CHECK((place.y_m != 1.5 || place.x_m == 0.5 || place.x_m == 4.5));
 }
 
-TEST_CASE("obstacles grow by the robot's radius; a robot that stands too near may only move away") {
+TEST_CASE("obstacles grow by the clearance; a robot that stands too near may only move away") {
   const Field f({"#....", ".....", ".....", ".....", "....."});
-  PathPlanner planner(25, {1.5, 3});  // cells of 1 m: blocked to 1.5 m from the middle of the corner's
+  PathPlanner planner(25, {1.5, 3});  // cells of 1 m: blocked unless all of it is 1.5 m from all of the corner's
   REQUIRE(planner.look(f.view()));
-  CHECK(planner.blocked({1, 3}));
-  CHECK(planner.blocked({0, 3}));
-  CHECK_FALSE(planner.blocked({2, 4}));
+  CHECK(planner.blocked({2, 4}));
+  CHECK(planner.blocked({2, 2}));
+  CHECK_FALSE(planner.blocked({3, 4}));
+  CHECK_FALSE(planner.blocked({3, 3}));
+  PathPlanner whole(25, {2.0, 3});  // two whole cells between are enough
+  REQUIRE(whole.look(f.view()));
+  CHECK_FALSE(whole.blocked({3, 4}));
   std::vector<Place> path;
   CHECK(planner.plan({0.5, 3.5}, {4.5, 4.5}, 0, path) == PathOutcome::found);
   CHECK_FALSE(planner.free(path));
@@ -96,7 +100,7 @@ TEST_CASE("a door that closes makes a way be planned again") {
            "...#...",  //
            "...#...",  //
            "......."});
-  PathPlanner planner(35, {0.4, 3});
+  PathPlanner planner(35, {0, 3});
   REQUIRE(planner.look(f.view()));
   std::vector<Place> path;
   REQUIRE(planner.plan({1.5, 3.5}, {5.5, 3.5}, 0, path) == PathOutcome::found);
@@ -113,7 +117,7 @@ TEST_CASE("a door that closes makes a way be planned again") {
 
 TEST_CASE("planning takes no memory") {
   const Field f(std::vector<std::string>(40, std::string(40, '.')));
-  PathPlanner planner(1600, {0.4, 3});
+  PathPlanner planner(1600, {0, 3});
   std::vector<Place> path;
   path.reserve(1600);
   const uint64_t before = thread_memory_use().allocations;
@@ -132,7 +136,7 @@ TEST_CASE("cost of a look and a way" * doctest::skip()) {  // a figure and no ch
     for (size_t x = 0; x < kCells; ++x)
       if (const bool door = wall % 100 == 0 ? x < 20 : x >= kCells - 20; !door) rows[wall][x] = '#';
   const Field f(rows);
-  PathPlanner planner(kCells * kCells, {0.48, 3});
+  PathPlanner planner(kCells * kCells, {0.58, 3});
   std::vector<Place> path;
   std::vector<double> look_ms, plan_ms;
   for (int i = 0; i < 50; ++i) {

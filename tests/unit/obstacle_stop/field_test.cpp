@@ -12,7 +12,7 @@ using namespace takt;
 using namespace takt::obstacle_stop;
 
 namespace {
-constexpr Footprint kRobot{0.38, 0.49, 0.49};
+constexpr Footprint kRobot{0.28, 0.39, 0.39, 0.10};
 constexpr Braking kBraking{1.0, 1.5, 0.35};
 ProtectedField field_of(const Drive& drive) { return {kRobot, drive, stopping_time_s(drive, kBraking)}; }
 }  // namespace
@@ -24,16 +24,43 @@ TEST_CASE("straight ahead the field ends where the robot stands: v^2 / (2 a) + v
   CHECK_FALSE(field.contains(0, 0.49 + length + 1e-6));
   CHECK(field.contains(0.379, 1));
   CHECK_FALSE(field.contains(0.381, 1));
-  CHECK(field.contains(0, -0.48));
-  CHECK_FALSE(field.contains(0, -0.5));
+  CHECK(field.contains(0, -0.38));
+  CHECK_FALSE(field.contains(0, -0.4));  // what it leaves behind
   CHECK_FALSE(field.contains(std::nan(""), 0));
 }
 
 TEST_CASE("a robot that stands needs no more than its own place; backwards the field lies behind") {
   CHECK(field_of({}).contains(0, 0.48));
   CHECK_FALSE(field_of({}).contains(0, 0.5));
+  CHECK(field_of({}).contains(0.28 + 0.07, 0.39 + 0.07));
+  CHECK_FALSE(field_of({}).contains(0.28 + 0.072, 0.39 + 0.072));  // round: 0.10 m from the robot's corner
   CHECK(field_of({-0.5, 0}).contains(0, -0.7));
   CHECK_FALSE(field_of({-0.5, 0}).contains(0, 0.5));
+}
+
+TEST_CASE("a robot may drive straight away from what stands in its margin, and not turn or drive on") {
+  const double x = 0.1, y = 0.45;
+  CHECK(field_of({}).contains(x, y));
+  CHECK(field_of({0.1, 0}).contains(x, y));
+  CHECK(field_of({0, 0.2}).contains(x, y));
+  CHECK_FALSE(field_of({-0.1, 0}).contains(x, y));
+  CHECK_FALSE(field_of({-0.1, 0.02}).contains(x, y));
+  CHECK(field_of({-0.1, 0.4}).contains(x, y));     // about a centre within itself it swings
+  CHECK(field_of({-0.1, 0}).contains(0.33, 0.2));  // beside it: no farther when it has gone on
+  CHECK(field_of({-0.1, 0}).contains(x, 0.38));    // touched already
+}
+
+TEST_CASE("what is farther than the clearance never lies in the field of a robot that turns on the spot") {
+  const double clearance = footprint(0.56, 0.78, 0.10).clearance_m();
+  CHECK(clearance == doctest::Approx(0.5801).epsilon(1e-3));
+  const ProtectedField spot = field_of({0, 2.0});
+  bool reached = false;
+  for (int degree = 0; degree < 360; ++degree) {
+    const double c = std::cos(degree * std::numbers::pi / 180), s = std::sin(degree * std::numbers::pi / 180);
+    CHECK_FALSE(spot.contains((clearance + 1e-6) * c, (clearance + 1e-6) * s));
+    reached |= spot.contains((clearance - 1e-6) * c, (clearance - 1e-6) * s);
+  }
+  CHECK(reached);
 }
 
 TEST_CASE("a left turn sweeps to the left and leaves the right free; on the spot the corners swing out") {
@@ -42,14 +69,14 @@ TEST_CASE("a left turn sweeps to the left and leaves the right free; on the spot
   CHECK_FALSE(left.contains(0.5, 0.85));
   CHECK(right.contains(0.5, 0.85));
   CHECK_FALSE(right.contains(-0.5, 0.85));
-  // The front right corner (0.38, 0.49) swings by 39 deg to straight ahead on a circle of 0.62 m, the rear one
-  // to 13 deg behind the right.
+  // The front right corner (0.28, 0.39) and its margin swing by 39 deg to straight ahead on a circle of 0.58 m, the
+  // rear one to 16 deg behind the right.
   const ProtectedField spot = field_of({0, 1.0});
-  CHECK(spot.contains(0, 0.61));
-  CHECK_FALSE(spot.contains(-0.1, 0.60));
-  CHECK(spot.contains(0.56, -0.2));
-  CHECK_FALSE(spot.contains(0.6, 0));
-  CHECK_FALSE(spot.contains(0, 0.63));
+  CHECK(spot.contains(0, 0.57));
+  CHECK_FALSE(spot.contains(-0.2, 0.54));
+  CHECK(spot.contains(0.53, -0.2));
+  CHECK_FALSE(spot.contains(0.57, 0.05));
+  CHECK_FALSE(spot.contains(0, 0.59));
 }
 
 TEST_CASE("a lone beam is dust, two neighbours are an obstacle; no return and NaN are none") {

@@ -33,10 +33,11 @@ struct Fixture {
   test::Box<LaserScan> scan{{0, 0, 1, 181}};
   test::Box<DigitalState> lines;
   test::Box<Odometry> odometry;
+  test::Box<VelocityCommand> velocity;
   uint64_t sequence = 0;
   int64_t now_ns = 1'000 * kMs;
 
-  explicit Fixture(bool with_lines = false, bool with_odometry = true) {
+  explicit Fixture(bool with_lines = false, bool with_odometry = true, bool with_velocity = false) {
     NodeTypes types;
     register_obstacle_stop(types);
     REQUIRE(types.find("obstacle_stop")->layer == Layer::perception);
@@ -44,6 +45,7 @@ struct Fixture {
     PortAccess::connect(test::input(*node, "scan"), {0, 0, 1, 181});
     if (with_lines) PortAccess::connect(test::input(*node, "lines"), {});
     if (with_odometry) PortAccess::connect(test::input(*node, "odometry"), {});
+    if (with_velocity) PortAccess::connect(test::input(*node, "velocity"), {});
     Setup setup{clock, ".", ".", 0, std::nullopt, 0};
     node->setup(setup);
     out = std::make_unique<test::BoxWriter<StopCommand>>(*node->outputs()[0]);
@@ -132,6 +134,62 @@ TEST_CASE("obstacle_stop: the field grows with the speed, and without odometry i
   CHECK(gone.job().reasons == 0);
   PortAccess::set_held(test::input(*gone.node, "odometry"), 1, true, 0);  // stale
   CHECK(gone.job().reasons == stop_reason::obstacle);
+}
+
+TEST_CASE("obstacle_stop: a robot that stands is judged by what is wanted of it: away from a wall it may, at it not") {
+  Fixture f(false, true, true);
+  f.odometry->speed_m_s = 0;
+  f.drive_on();
+  const auto wanted = [&](double speed, double turn) {
+    f.velocity->speed_m_s = speed;
+    f.velocity->turn_rad_s = turn;
+    f.give("velocity", f.velocity);
+    return f.drive_on().reasons;
+  };
+  f.wall(0.15f);  // 0.06 m before the robot
+  CHECK(wanted(0, 0) == stop_reason::obstacle);
+  CHECK(wanted(0.1, 0) == stop_reason::obstacle);
+  CHECK(wanted(0, 0.3) == stop_reason::obstacle);
+  CHECK(wanted(-0.1, 0) == 0);
+  f.odometry->speed_m_s = 0.1;  // whatever is wanted of one that moves on
+  CHECK(f.drive_on().reasons == stop_reason::obstacle);
+  f.odometry->speed_m_s = -0.1;
+  CHECK(f.drive_on().reasons == 0);
+  f.odometry->speed_m_s = 0;
+  f.wall(0.6f);  // it would stand 0.24 m behind the wall's margin, from 0.8 m/s
+  CHECK(wanted(0.1, 0) == 0);
+  CHECK(wanted(0.8, 0) == stop_reason::obstacle);
+  PortAccess::set_held(test::input(*f.node, "velocity"), 1, true, 0);  // stale: nobody wants anything
+  CHECK(f.drive_on().reasons == 0);
+}
+
+TEST_CASE("obstacle_stop: one that brakes is held while what it wants to go on with is not free") {
+  Fixture f(false, true, true);
+  f.velocity->speed_m_s = 0.8;
+  f.give("velocity", f.velocity);
+  f.odometry->speed_m_s = 0.2;
+  f.drive_on();
+  f.wall(0.6f);  // free of the field of 0.2 m/s, not of that of 0.8 m/s
+  CHECK(f.drive_on().reasons == stop_reason::obstacle);
+  f.velocity->speed_m_s = 0.1;
+  f.give("velocity", f.velocity);
+  CHECK(f.drive_on().reasons == 0);
+  f.velocity->speed_m_s = -0.8;  // it has to stand before it drives back
+  f.give("velocity", f.velocity);
+  CHECK(f.drive_on().reasons == 0);
+  f.odometry->speed_m_s = 0.8;
+  CHECK(f.drive_on().reasons == stop_reason::obstacle);
+}
+
+TEST_CASE("obstacle_stop: one that is about to turn still goes on straight") {
+  Fixture f(false, true, true);
+  f.odometry->speed_m_s = 0.8;
+  f.velocity->speed_m_s = 0.8;
+  f.velocity->turn_rad_s = 1.2;
+  f.give("velocity", f.velocity);
+  f.drive_on();
+  f.wall(0.65f);
+  CHECK(f.drive_on().reasons == stop_reason::obstacle);
 }
 
 TEST_CASE("obstacle_stop: released only after release_after of free scans") {

@@ -42,6 +42,7 @@ class Stage {
     p.dt_s = kStep_s;
     if (odometry) p.robot = robot;
     p.stop = stop;
+    p.obstacle = obstacle;
     p.outcome = {outcome.number, outcome.state, outcome.duration_s, reason};
     p.effort.expansions = 50;
     velocity = client.step(p);
@@ -80,7 +81,7 @@ class Stage {
   PlanarPose robot;
   navigation::Velocity velocity;
   int64_t now_ns = 1'000'000'000;
-  bool eyes = true, odometry = true, stop = false, actor = true;
+  bool eyes = true, odometry = true, stop = false, obstacle = false, actor = true;
   std::string refuse, said, done;  ///< `done`: actions, in their order
   double slowness = 1, driven_m = 0;
   std::function<void()> on_step;
@@ -303,6 +304,49 @@ TEST_CASE("emergency: without a pose, and while it has to stop, the robot stands
   }
   stage.finish();
   CHECK(stage.done == "fill cup_1 bottle_2");
+}
+
+TEST_CASE("made to stand before an obstacle the robot waits, draws back and drives on; a few times, then it says so") {
+  for (const bool goes_away : {true, false}) {
+    CAPTURE(goes_away);
+    Stage stage(kitchen("[3.5m, -1m]"));
+    stage.obstacle = true;
+    int drawn_back = 0;
+    double stood_s = 0, nearest_m = 10;
+    stage.on_step = [&] {  // as the guard: it may leave what it may not drive on to
+      const bool back = stage.velocity.speed_m_s < 0;
+      const bool there = stage.robot.x_m > 1 && !(goes_away && drawn_back == 1);
+      if (stage.stop && back) ++drawn_back;
+      if (drawn_back == 0 && stage.stop) stood_s += kStep_s;
+      if (drawn_back > 0) nearest_m = std::min(nearest_m, stage.robot.x_m);
+      CHECK(stage.velocity.speed_m_s >= -0.15);
+      stage.stop = there && !back;
+    };
+    stage.run("drive 3 0");
+    CHECK(stood_s == doctest::Approx(2).epsilon(0.1));  // it might have gone away
+    CHECK(nearest_m > 0.6);
+    CHECK(drawn_back == (goes_away ? 1 : 3));
+    CHECK((std::abs(stage.robot.x_m - 3) < 0.05) == goes_away);
+    CHECK(stage.has_said("drive 3 0: an obstacle stands in the way") != goes_away);
+    CHECK(stage.client.mode() == Mode{});
+  }
+}
+
+TEST_CASE("a guard that lets go of who stands, and stops who moves, does not keep the robot for ever") {
+  Stage stage(kitchen("[3.5m, -1m]"));
+  stage.obstacle = true;
+  double held_s = 0;
+  int stops = 0;
+  stage.on_step = [&] {
+    stage.robot.x_m = std::min(stage.robot.x_m, 1.05);  // there it stands before the obstacle
+    held_s = std::max(0.0, held_s - kStep_s);
+    if (stage.robot.x_m > 1 && stage.velocity.speed_m_s > 0) held_s = 0.5;
+    if (held_s > 0 && !stage.stop) ++stops;
+    stage.stop = held_s > 0 && stage.velocity.speed_m_s >= 0;
+  };
+  stage.run("drive 3 0");
+  CHECK(stops > 10);
+  CHECK(stage.has_said("drive 3 0: an obstacle stands in the way"));
 }
 
 namespace {

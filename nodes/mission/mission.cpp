@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "nodes/mission/mission.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "nodes/mission/pointing.hpp"
+
+namespace takt::mission {
+namespace {
+
+constexpr double kStands_m_s = 0.02, kGotOn_m = 0.3;
+
+constexpr std::array<std::string_view, 10> kStates{"seek",  "ask",  "back",   "read", "turn",
+                                                   "drive", "face", "follow", "done", "failed"};
+
+double distance_m(const PlanarPose& a, const PlanarPose& b) { return std::hypot(a.x_m - b.x_m, a.y_m - b.y_m); }
+
+}  // namespace
+
+std::string_view to_string(State state) { return kStates[static_cast<size_t>(state)]; }
+
+drive_arbiter::VisionState vision_of(State state) {
+  using drive_arbiter::VisionState;
+  if (state == State::read) return VisionState::pose;
+  return state == State::follow ? VisionState::tracking : VisionState::search;
+}
+
+Mission::Mission(const MissionParameters& parameters, const WayAheadParameters& ways, size_t most_cells)
+    : parameters_(parameters), ways_(most_cells, ways) {
+  parameters_.readings = std::clamp<size_t>(parameters_.readings, 1, kMostReadings);
+}
+
+void Mission::enter(State state) {
+  state_ = state;
+  entered_ns_ = now_ns_;
+  standing_ns_ = -1;
+}
+
+void Mission::fail(std::string_view trouble) {
+  trouble_ = trouble;
+  tell("stop");
+  enter(State::failed);
+}
+
+template <class... Values>
+void Mission::tell(const char* format, const Values&... values) {
+  ++number_;
+  size_ = std::min(text_.size(), fmt::format_to_n(text_.data(), text_.size(), fmt::runtime(format), values...).size);
+}
+
+void Mission::step(const Percept& percept) {
+  now_ns_ = percept.now_ns;
+  const bool over = percept.over == number_;
+  switch (state_) {
+    case State::seek:
+      if (percept.pedestrian.empty()) return;
+      tell("do ask {}", percept.pedestrian);
+      return enter(State::ask);
+    case State::ask:
+      if (!over) return;
+      // Whoever was not got to is far enough already, and behind the robot there are no eyes.
+      if (const double back_m = parameters_.view_m - percept.pedestrian_m; !percept.pedestrian.empty() && back_m > 0)
+        tell("ahead {:.2f}", -back_m);
+      return enter(State::back);
+    case State::back:
+      if (!over) return;
+      read_ = 0;
+      return enter(State::read);
+    case State::read: return read(percept);
+    case State::turn:
+      if (!over) return;
+      began_ = percept.robot;
+      farthest_m_ = 0;
+      got_on_ns_ = now_ns_;
+      return enter(State::drive);
+    case State::drive: return drive(percept, over);
+    case State::face:
+      if (!over) return;
+      began_ = percept.robot;
+      return enter(State::follow);
+    case State::follow: return follow(percept);
+    case State::done:
+    case State::failed: return;
+  }
+}
+
+void Mission::read(const Percept& percept) {
+  if (percept.pointed_rad) readings_rad_[read_++] = *percept.pointed_rad;
+  if (read_ == parameters_.readings) {
+    direction_rad_ = middle_direction(std::span(readings_rad_).first(read_));
+    return turn_to_direction(percept.robot, State::turn);
+  }
+  if (since_s(entered_ns_) < parameters_.read_within_s) return;
+  if (++asked_ >= parameters_.asking) return fail("nobody points the way");
+  enter(State::seek);
+}
+
+void Mission::turn_to_direction(const PlanarPose& robot, State next) {
+  tell("rotate {:.3f}", wrapped(*direction_rad_ - robot.theta_rad));
+  enter(next);
+}
+
+/// Leg by leg along the direction, as far as the ground is free.
+void Mission::drive(const Percept& percept, bool over) {
+  const bool last = crossed_ == parameters_.crossings;
+  if (last && distance_m(percept.robot, began_) >= parameters_.beyond_m) {
+    tell("stop");
+    return enter(State::done);
+  }
+  if (!last && percept.sign_m && *percept.sign_m <= parameters_.stop_before_m)
+    return turn_to_direction(percept.robot, State::face);
+  const double along = (percept.robot.x_m - began_.x_m) * std::cos(*direction_rad_) +
+                       (percept.robot.y_m - began_.y_m) * std::sin(*direction_rad_);
+  if (along > farthest_m_ + kGotOn_m) {
+    farthest_m_ = along;
+    got_on_ns_ = now_ns_;
+  }
+  if (since_s(got_on_ns_) > parameters_.patience_s) return fail("no free ground leads on");
+  if (!over || percept.grid == nullptr) return;
+  if (const auto place = ways_.next(*percept.grid, {percept.robot.x_m, percept.robot.y_m}, *direction_rad_))
+    tell("drive {:.2f} {:.2f}", place->x_m, place->y_m);
+}
+
+void Mission::follow(const Percept& percept) {
+  if (std::abs(percept.speed_m_s) > kStands_m_s) standing_ns_ = -1;
+  else if (standing_ns_ < 0) standing_ns_ = now_ns_;
+  const bool stood = standing_ns_ >= 0 && since_s(standing_ns_) >= parameters_.stand_s;
+  if (stood && distance_m(percept.robot, began_) >= parameters_.cross_least_m) {
+    ++crossed_;
+    began_ = percept.robot;
+    farthest_m_ = 0;
+    got_on_ns_ = now_ns_;
+    return enter(State::drive);
+  }
+  if (since_s(entered_ns_) > parameters_.follow_within_s) fail("nobody leads across");
+}
+
+}  // namespace takt::mission

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+// The robot finds its way through a town by asking (thesis App. A; algorithm reference 15.4, 15.5): asks a pedestrian,
+// reads where he points, drives that way on the pavement, stops before a crossing, follows whoever wears the chessboard
+// across it, and drives on. Plain data, one step a job.
+#pragma once
+#include <array>
+#include <string_view>
+
+#include "nodes/drive_arbiter/vision_state.hpp"
+#include "nodes/mission/way_ahead.hpp"
+#include "rt/transform/planar_pose.hpp"
+
+namespace takt::mission {
+
+enum class State : uint8_t { seek, ask, back, read, turn, drive, face, follow, done, failed };
+std::string_view to_string(State state);
+
+/// A street is never entered by the robot's own will: in every state but `follow` it drives where the grid is free.
+drive_arbiter::VisionState vision_of(State state);
+
+struct MissionParameters {
+  double view_m = 2.6;         ///< from so far off all of who was asked is seen: nearer, the robot steps back
+  size_t readings = 8;         ///< of his arm, until the direction counts
+  double read_within_s = 10;   ///< else somebody is asked again
+  int asking = 3;              ///< times at most
+  double stop_before_m = 3.5;  ///< so far from the sign of a crossing the robot waits
+  double cross_least_m = 3;    ///< nobody's crossing is shorter
+  double stand_s = 3;          ///< whoever is followed so far and stands so long has led across
+  double follow_within_s = 120;
+  double patience_s = 30;  ///< without getting on along the direction
+  int crossings = 1;       ///< on the way
+  double beyond_m = 4;     ///< past the last one is the end
+};
+
+constexpr size_t kMostReadings = 32;
+
+/// What a step goes by. Poses, places and directions in the odometry's frame; views are read during the step only.
+struct Percept {
+  int64_t now_ns = 0;
+  PlanarPose robot;
+  double speed_m_s = 0;
+  std::string_view pedestrian;                      ///< name of the nearest one that is seen; empty: none
+  double pedestrian_m = 0;                          ///< how far he is
+  std::optional<double> pointed_rad;                ///< where he points, of a body measured since the last step
+  std::optional<double> sign_m;                     ///< to the nearest sign of a crossing, measured since the last step
+  const navigation::OccupancyView* grid = nullptr;  ///< of the ground; null: none yet
+  uint32_t over = 0;                                ///< number of the newest task that the robot client has ended
+};
+
+/// For the robot client.
+struct MissionTask {
+  uint32_t number = 0;  ///< 0: none yet
+  std::string_view text;
+};
+
+/// Memory is taken by the constructor. One thread at a time.
+class Mission {
+ public:
+  /// For grids of at most so many cells.
+  Mission(const MissionParameters& parameters, const WayAheadParameters& ways, size_t most_cells);
+  /// Tasks are numbered from the one after this on.
+  void go_on_after(uint32_t task) { number_ = task; }
+
+  void step(const Percept& percept);
+
+  State state() const { return state_; }
+  MissionTask task() const { return {number_, {text_.data(), size_}}; }
+  std::optional<double> direction_rad() const { return direction_rad_; }
+  int crossed() const { return crossed_; }
+  /// Why it has failed.
+  std::string_view trouble() const { return trouble_; }
+
+ private:
+  void enter(State state);
+  void fail(std::string_view trouble);
+  template <class... Values>
+  void tell(const char* format, const Values&... values);
+  double since_s(int64_t instant_ns) const { return static_cast<double>(now_ns_ - instant_ns) * 1e-9; }
+
+  void read(const Percept& percept);
+  void drive(const Percept& percept, bool over);
+  void follow(const Percept& percept);
+  void turn_to_direction(const PlanarPose& robot, State next);
+
+  MissionParameters parameters_;
+  WayAhead ways_;
+  State state_ = State::seek;
+  int64_t now_ns_ = 0, entered_ns_ = 0;
+  uint32_t number_ = 0;
+  std::array<char, 96> text_{};
+  size_t size_ = 0;
+  std::string_view trouble_;
+
+  int asked_ = 0, crossed_ = 0;
+  std::array<double, kMostReadings> readings_rad_{};
+  size_t read_ = 0;
+  std::optional<double> direction_rad_;
+  PlanarPose began_;          ///< driving, following, or beyond the last crossing
+  double farthest_m_ = 0;     ///< along the direction since then
+  int64_t got_on_ns_ = 0;     ///< when it was
+  int64_t standing_ns_ = -1;  ///< since when; -1: it drives
+};
+
+}  // namespace takt::mission

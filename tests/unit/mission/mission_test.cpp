@@ -1,0 +1,256 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "nodes/mission/mission.hpp"
+
+#include <doctest/doctest.h>
+
+#include <cstdio>
+#include <numbers>
+#include <random>
+#include <string>
+
+#include "nodes/mission/pointing.hpp"
+#include "rt/memory/memory_use.hpp"
+#include "tests/unit/mapping_3d/node_harness.hpp"
+
+using namespace takt;
+using namespace takt::mission;
+using drive_arbiter::VisionState;
+using navigation::OccupancyView;
+
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180;
+
+/// 20 m x 20 m around the origin, cells of 0.25 m, all free.
+struct Ground {
+  static constexpr int kCells = 80;
+  static constexpr size_t kAll = kCells * kCells;
+  std::vector<int16_t> cells = std::vector<int16_t>(kAll, 0);
+  OccupancyView view() const { return {{cells.data(), kCells, kCells}, 0.25, -10, -10}; }
+  /// Cells of a rectangle of the map, m.
+  void fill(double x0, double y0, double x1, double y1, int16_t value) {
+    for (int row = 0; row < kCells; ++row)
+      for (int column = 0; column < kCells; ++column) {
+        const double x = -10 + 0.25 * (column + 0.5), y = -10 + 0.25 * (row + 0.5);
+        if (x >= x0 && x <= x1 && y >= y0 && y <= y1) cells[static_cast<size_t>(row * kCells + column)] = value;
+      }
+  }
+};
+
+/// A robot client that drives wherever it is told to at once, and turns so, one job after it was told.
+struct Town {
+  Ground ground;
+  OccupancyView view = ground.view();
+  MissionParameters parameters;
+  WayAheadParameters ways;
+  Mission mission{parameters, ways, Ground::kAll};
+  Percept percept;
+  uint32_t ended = 0;
+
+  void step(double seconds = 0.2) {
+    percept.now_ns += static_cast<int64_t>(seconds * 1e9);
+    percept.over = ended;
+    percept.grid = &view;
+    mission.step(percept);
+    percept.pointed_rad.reset();
+    percept.sign_m.reset();
+  }
+  std::string told() const { return std::string(mission.task().text); }
+  /// What it was told is over.
+  void obey() {
+    double x = 0, y = 0;
+    if (std::sscanf(told().c_str(), "drive %lf %lf", &x, &y) == 2) percept.robot.x_m = x, percept.robot.y_m = y;
+    if (std::sscanf(told().c_str(), "rotate %lf", &x) == 1)
+      percept.robot.theta_rad = wrapped(percept.robot.theta_rad + x);
+    ended = mission.task().number;
+  }
+  void ask_the_way(double pointed_rad) {
+    percept.pedestrian = "anna";
+    step();
+    obey(), step();  // asked
+    obey(), step();  // stepped back
+    for (int i = 0; i < 8; ++i) percept.pointed_rad = pointed_rad, step();
+  }
+};
+
+}  // namespace
+
+TEST_CASE("the whole mission: asks, reads, drives, waits, follows, drives on") {
+  Town town;
+  town.percept.robot.theta_rad = -90 * kDegree;
+  town.step();
+  CHECK(town.mission.state() == State::seek);
+  CHECK(town.mission.task().number == 0);
+  town.percept.pedestrian = "anna";
+  town.step();
+  CHECK(town.told() == "do ask anna");
+  town.percept.pedestrian_m = 1;
+  town.step();
+  CHECK(town.mission.state() == State::ask);
+  town.obey(), town.step();
+  CHECK(town.told() == "ahead -1.60");
+  town.obey(), town.step();
+  CHECK(town.mission.state() == State::read);
+  CHECK(vision_of(town.mission.state()) == VisionState::pose);
+  for (int i = 0; i < 7; ++i) town.percept.pointed_rad = (i == 3 ? 170 : 10) * kDegree, town.step();
+  CHECK(town.mission.state() == State::read);
+  town.percept.pointed_rad = 10 * kDegree, town.step();
+  REQUIRE(town.mission.direction_rad().has_value());
+  CHECK(*town.mission.direction_rad() == doctest::Approx(10 * kDegree));
+  CHECK(town.told() == "rotate 1.745");
+  town.obey(), town.step();
+  CHECK(town.mission.state() == State::drive);
+  CHECK(vision_of(State::drive) == VisionState::search);
+  town.step();
+  CHECK(town.told() == "drive 3.45 0.61");  // 3.5 m along 10 degrees
+  town.percept.sign_m = 3.6, town.step();
+  CHECK(town.mission.state() == State::drive);
+  town.percept.sign_m = 3.4, town.step();
+  CHECK(town.mission.state() == State::face);
+  CHECK(town.told() == "rotate 0.000");
+  town.obey(), town.step();
+  CHECK(town.mission.state() == State::follow);
+  CHECK(vision_of(State::follow) == VisionState::tracking);
+  town.step(10);  // whoever waits at the kerb stands, too
+  CHECK(town.mission.state() == State::follow);
+  town.percept.speed_m_s = 0.6, town.percept.robot.x_m += 6, town.step();
+  town.percept.speed_m_s = 0, town.step();
+  town.step(2.9);
+  CHECK(town.mission.state() == State::follow);
+  town.step();
+  CHECK(town.mission.state() == State::drive);
+  CHECK(town.mission.crossed() == 1);
+  town.percept.sign_m = 1.0, town.step();  // of the crossing behind
+  CHECK(town.mission.state() == State::drive);
+  town.percept.robot.x_m += 4.1, town.step();
+  CHECK(town.mission.state() == State::done);
+  CHECK(town.told() == "stop");
+}
+
+TEST_CASE("who does not point is asked again, three times") {
+  Town town;
+  town.percept.pedestrian = "anna";
+  for (int i = 0; i < 3; ++i) {
+    town.step();
+    CHECK(town.told() == "do ask anna");
+    town.obey(), town.step();
+    town.obey(), town.step();
+    CHECK(town.mission.state() == State::read);
+    town.step(9.9);
+    CHECK(town.mission.state() == State::read);
+    town.step();
+  }
+  CHECK(town.mission.state() == State::failed);
+  CHECK(town.mission.trouble() == "nobody points the way");
+  CHECK(town.told() == "stop");
+}
+
+TEST_CASE("where no free ground leads on the mission fails; nobody leads across: too") {
+  Town closed;
+  closed.ground.fill(1, -10, 2, 10, 1000);
+  closed.ask_the_way(0);
+  closed.obey(), closed.step();
+  REQUIRE(closed.mission.state() == State::drive);
+  const uint32_t number = closed.mission.task().number;
+  closed.step(29), closed.step(0.9);
+  CHECK(closed.mission.task().number == number);
+  closed.step();
+  CHECK(closed.mission.trouble() == "no free ground leads on");
+
+  Town lonely;
+  lonely.ask_the_way(0);
+  lonely.obey(), lonely.step();
+  lonely.percept.sign_m = 2, lonely.step();
+  lonely.obey(), lonely.step();
+  REQUIRE(lonely.mission.state() == State::follow);
+  lonely.step(119);
+  CHECK(lonely.mission.state() == State::follow);
+  lonely.step(2);
+  CHECK(lonely.mission.trouble() == "nobody leads across");
+}
+
+TEST_CASE("steps of a mission allocate nothing") {
+  Town town;
+  const uint64_t before = thread_memory_use().allocations;
+  town.percept.pedestrian = "anna";
+  for (int i = 0; i < 2; ++i) town.step(), town.ended = town.mission.task().number, town.step();
+  for (int i = 0; i < 8; ++i) town.percept.pointed_rad = 0, town.step();
+  town.ended = town.mission.task().number, town.step(), town.step();
+  CHECK(town.mission.state() == State::drive);
+  if (counting_allocations()) CHECK(thread_memory_use().allocations == before);
+}
+
+TEST_CASE("the next place is free and known, along the direction, and off what is occupied") {
+  WayAhead ways(Ground::kAll, {});
+  std::mt19937 random(1);
+  int found = 0;
+  for (int trial = 0; trial < 200; ++trial) {
+    Ground ground;
+    const auto draw = [&](double low, double high) { return std::uniform_real_distribution<>(low, high)(random); };
+    for (int i = 0; i < 4; ++i) {
+      const double x = draw(-6, 6), y = draw(-6, 6);
+      if (std::hypot(x, y) > 2) ground.fill(x, y, x + draw(0.3, 2), y + draw(0.3, 2), i == 0 ? -1 : 1000);
+    }
+    const double direction = draw(-3, 3);
+    const auto place = ways.next(ground.view(), {0, 0}, direction);
+    if (!place) continue;
+    ++found;
+    const double along = place->x_m * std::cos(direction) + place->y_m * std::sin(direction);
+    const double aside = place->y_m * std::cos(direction) - place->x_m * std::sin(direction);
+    CHECK(along >= 1 - 1e-9);
+    CHECK(along <= 3.5 + 1e-9);
+    CHECK(std::abs(aside) <= std::min(along, 2.0) + 1e-9);
+    const auto view = ground.view();
+    const auto cell = view.cell_of(place->x_m, place->y_m);
+    CHECK(view.cells.at(cell.column, cell.row) == 0);
+    for (int row = 0; row < Ground::kCells; ++row)
+      for (int column = 0; column < Ground::kCells; ++column)
+        if (view.cells.at(column, row) > 500)
+          CHECK(std::hypot(view.middle_x_m({column, row}) - view.middle_x_m(cell),
+                           view.middle_y_m({column, row}) - view.middle_y_m(cell)) > 0.75 - 1e-9);
+  }
+  CHECK(found > 150);
+  Ground unknown;
+  unknown.fill(-10, -10, 10, 10, -1);
+  CHECK_FALSE(ways.next(unknown.view(), {0, 0}, 0).has_value());
+}
+
+TEST_CASE("a kerb beside the way pushes the place aside, and one across it ends the way") {
+  WayAhead ways(Ground::kAll, {});
+  Ground ground;
+  ground.fill(-10, 0.5, 10, 10, 1000);
+  const auto beside = ways.next(ground.view(), {0, -0.5}, 20 * kDegree);
+  REQUIRE(beside.has_value());
+  CHECK(beside->y_m <= 0.5 - 0.75 + 0.25);
+  CHECK(beside->x_m > 2);
+  ground.fill(1.2, -10, 3, 10, 1000);
+  CHECK_FALSE(ways.next(ground.view(), {0, -1}, 0).has_value());
+}
+
+TEST_CASE("the middle direction is the one with the least sum of angles, over the turn as well") {
+  const std::array spread{3.1, -3.1, -3.0, 0.5};
+  CHECK(middle_direction(spread) == doctest::Approx(-3.1));
+  const std::array alone{1.0};
+  CHECK(middle_direction(alone) == 1.0);
+}
+
+TEST_CASE("where a body points: of whoever was asked, along the arm that is nearest to level") {
+  test::Box<BodyPoses> bodies({0, 0, 1, 4});
+  const auto add = [&](float x, float y, PointingRay one, PointingRay other) {
+    Body body{};
+    body.joints[0] = {x, y, 1.6f, 1};
+    body.pointing[0] = one, body.pointing[1] = other;
+    bodies->bodies.push_back(body);
+  };
+  const PointingRay down{0, 0, 1.4f, 0, 0.1f, -0.995f}, right{0, 0, 1.4f, 1, 0, 0}, left{0, 0, 1.4f, -0.995f, 0, -0.1f};
+  const PointingRay none{};
+  CHECK_FALSE(pointed_direction(*bodies, 0, 2).has_value());
+  add(2, 2, right, none);
+  CHECK_FALSE(pointed_direction(*bodies, 0, 2).has_value());  // somebody else
+  add(0.2f, 2.1f, down, left);
+  REQUIRE(pointed_direction(*bodies, 0, 2).has_value());
+  CHECK(*pointed_direction(*bodies, 0, 2) == doctest::Approx(90 * kDegree));
+  CHECK(*pointed_direction(*bodies, 2, 2) == doctest::Approx(-90 * kDegree));
+  add(-2, 2, down, none);
+  CHECK_FALSE(pointed_direction(*bodies, -2, 2).has_value());
+}
