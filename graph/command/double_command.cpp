@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <memory>
@@ -15,6 +16,7 @@
 #include <utility>
 
 #include "graph/command/prepare.hpp"
+#include "hal/camera/loopback_double.hpp"
 #include "hal/doubles/in_world.hpp"
 #include "hal/laser/lms200/lms200_double.hpp"
 #include "hal/laser/lms400/lms400_double.hpp"
@@ -33,9 +35,10 @@ struct Surroundings {
   const DoubleOptions& options;
   sim::Simulation& world;
   const Clock& clock;
+  StereoRig rig;  ///< of a camera
 };
 
-enum class Line : uint8_t { bytes, can };
+enum class Line : uint8_t { bytes, can, video };
 
 struct DoubleKind {
   std::string_view name, doc;
@@ -52,6 +55,15 @@ RangeSource ranges_in(const Surroundings& s) {
   Transform mount;
   mount.z = 0.25;
   return doubles::ranges_in(s.world, mount);
+}
+
+/// As a Bumblebee: two bytes a pixel, colours through a mosaic.
+v4l2::LoopbackDouble::Settings camera_of(const Surroundings& s) {
+  v4l2::LoopbackDouble::Settings camera{s.options.video, {}, Rate{std::llround(s.options.rate_hz * 1000), 1000}};
+  camera.layout.width = s.rig.width;
+  camera.layout.height = s.rig.height;
+  if (s.rig.channels == 3) camera.layout.mosaic = v4l2::Mosaic::rggb;
+  return camera;
 }
 
 constexpr DoubleKind kDoubles[] = {
@@ -71,6 +83,11 @@ constexpr DoubleKind kDoubles[] = {
      [](const Surroundings& s) -> std::unique_ptr<DeviceDouble> {
        const uint32_t baud = s.options.tcp ? 0 : s.options.baud;
        return std::make_unique<lms400::Lms400Double>(line_of(s.options), ranges_in(s), baud, s.clock.now_ns());
+     }},
+    {"camera", "a stereo camera, behind v4l2loopback", Line::video,
+     [](const Surroundings& s) -> std::unique_ptr<DeviceDouble> {
+       const auto camera = camera_of(s);
+       return std::make_unique<v4l2::LoopbackDouble>(camera, doubles::frames_in(s.world, s.rig, camera.layout));
      }},
 };
 
@@ -111,24 +128,35 @@ int run_double(const DoubleOptions& options) {
                                   [&](const DoubleKind& known) { return known.name == options.device; });
   if (kind == std::end(kDoubles))
     return refuse(fmt::format("no double of `{}`; known: {}", options.device, device_names()), kBadInput);
-  if (kind->line == Line::can && (options.can.empty() || !options.pty.empty() || options.tcp))
+  const bool bytes = !options.pty.empty() || options.tcp, can = !options.can.empty(), video = !options.video.empty();
+  if (kind->line == Line::can && (!can || bytes || video))
     return refuse("--can INTERFACE says where the device is to be found: vcan0, or unix:PATH where there is no CAN",
                   kBadInput);
-  if (kind->line == Line::bytes && (options.pty.empty() != options.tcp.has_value() || !options.can.empty()))
+  if (kind->line == Line::bytes && (!bytes || can || video))
     return refuse("--pty PATH or --tcp PORT says where the device is to be found", kBadInput);
+  if (kind->line == Line::video && (!video || bytes || can))
+    return refuse("--video PATH says where the device is to be found: /dev/video0 of v4l2loopback", kBadInput);
+  StereoRig rig;
+  if (kind->line == Line::video) {
+    const auto loaded = load_rig(options.device, options.rig.empty() ? shipped("graph/rigs/xb3.yaml") : options.rig);
+    if (!loaded) return refuse(loaded.error().text(), kBadInput);
+    rig = *loaded;
+  }
   const auto file = options.world.empty() ? shipped("graph/worlds/lab.xml") : options.world;
   const auto world = sim::Simulation::load(options.device, file, "", options.seed);
   if (!world) return refuse(world.error().text(), kBadInput);
   const MonotonicClock clock;
   (*world)->begin(clock.now_ns());
-  const auto device = kind->make({options, **world, clock});
+  const auto device = kind->make({options, **world, clock, rig});
   if (const auto plugged = device->plug_in(); !plugged)
     return refuse(plugged.error().text(), plugged.error().bad_input ? kBadInput : kDeviceOrSystem);
   for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, [](int) { stopped = true; });
+  device->run_to(clock.now_ns());  // a camera can be opened once it has given a frame
   std::printf("%s at %s\n", options.device.c_str(),
-              options.tcp               ? fmt::format("127.0.0.1:{}", *options.tcp).c_str()
-              : kind->line == Line::can ? options.can.c_str()
-                                        : options.pty.c_str());
+              options.tcp ? fmt::format("127.0.0.1:{}", *options.tcp).c_str()
+              : can       ? options.can.c_str()
+              : video     ? options.video.c_str()
+                          : options.pty.c_str());
   std::fflush(stdout);
   for (Orders orders; !stopped;) {
     device->run_to(clock.now_ns());
@@ -147,6 +175,10 @@ void add_double(CLI::App& app, DoubleOptions& o, int& exit_code) {
   command->add_option("--tcp", o.tcp, "port of this machine to be connected to")->excludes(pty);
   command->add_option("--can", o.can,
                       "CAN interface of a head or a base, such as vcan0; unix:PATH where there is no CAN");
+  command->add_option("--video", o.video, "device file of v4l2loopback that a camera's frames are written to");
+  command->add_option("--rig", o.rig, "lens, size and mount of a camera (default graph/rigs/xb3.yaml)");
+  command->add_option("--rate", o.rate_hz, "frames of a camera per second (default 15)")
+      ->check(CLI::Range(0.01, 200.0));
   command->add_option("--baud", o.baud, "of an lms400 on a serial line (default 115200)");
   command->add_option("--world", o.world, "what it sees (default graph/worlds/lab.xml)");
   command->add_option("--seed", o.seed, "of that world's noise (default 1)");

@@ -12,6 +12,9 @@ struct DoubleOptions {
   std::filesystem::path pty;
   std::optional<uint16_t> tcp;
   std::string can;
+  std::string video;            ///< device file of v4l2loopback
+  std::filesystem::path rig;    ///< of the camera; empty: graph/rigs/xb3.yaml of the project
+  double rate_hz = 15;          ///< of the camera
   uint32_t baud = 115200;       ///< of an lms400 on a serial line
   std::filesystem::path world;  ///< empty: graph/worlds/lab.xml of the project
   uint64_t seed = 1;

@@ -44,6 +44,7 @@ struct EvalObjectsOptions {
   std::filesystem::path database;     ///< empty: graph/objects of the project
   std::filesystem::path turntable;    ///< instead of a database; empty: none
   std::filesystem::path backgrounds;  ///< empty: generated
+  std::vector<std::filesystem::path> negatives;
   std::string bins = "64x64x1";
   std::string scales = "1";
   uint64_t seed = 1;

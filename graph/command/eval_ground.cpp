@@ -159,6 +159,15 @@ void print_row(const std::string& name, const Json& r) {
               text(r, "true_borders_doubted_pct", 1).c_str(), text(r, "time_ms", 2).c_str());
 }
 
+/// Of takt ground_map, over all images.
+void print_cells(const Json& confusion) {
+  constexpr const char* kTruth[] = {"drivable", "half of it and more", "not drivable"};
+  std::printf("%-34s %11s %11s %11s\n", "seen cells, truth", "free", "undecided", "occupied");
+  for (size_t truth = 0; truth < std::size(kTruth); ++truth)
+    std::printf("%-34s %11ld %11ld %11ld\n", kTruth[truth], confusion[truth][0].get<long>(),
+                confusion[truth][1].get<long>(), confusion[truth][2].get<long>());
+}
+
 void print(const Json& out) {
   std::printf("%-34s %11s %8s %8s %6s %20s %21s %7s\n", "", "", "", "", "", "wrong cells, % of", "borders doubted, %",
               "");
@@ -170,6 +179,7 @@ void print(const Json& out) {
   if (out.contains("variants"))
     for (const auto& [name, row] : out["variants"].items()) print_row(name, row);
   print_row("bottom 40 % is ground", out["baseline"]);
+  if (out.contains("grid")) print_cells(out["grid"]["confusion"]);
   if (!out.contains("projection")) return;
   std::printf("floor from pixels: off by at most %.1e m at any turn of the head\n",
               out["projection"]["turned_head_max_m"].get<double>());

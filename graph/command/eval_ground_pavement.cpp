@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
+#include <array>
 #include <cmath>
 #include <opencv2/imgcodecs.hpp>
 #include <random>
@@ -21,10 +22,11 @@ namespace {
 using namespace ground_map;
 using Json = nlohmann::ordered_json;
 
-/// How many cells of a map are called wrong.
+/// Seen cells of a map by how much of them is drivable (all of it, half and more, less) and what they are called (free,
+/// undecided, occupied).
 struct CellScore {
-  int64_t free = 0, free_wrong = 0;        ///< wrong: less than half of the cell is drivable
-  int64_t blocked = 0, blocked_wrong = 0;  ///< wrong: all of it is
+  std::array<std::array<int64_t, 3>, 3> cells{};
+  int64_t called(size_t what) const { return cells[0][what] + cells[1][what] + cells[2][what]; }
 };
 
 double drivable_share(const PavementScene& scene, const FloorPoint& corner, double cell_m) {
@@ -43,15 +45,11 @@ void add_cells(CellScore& score, const PavementScene& scene, const GroundGrid& g
   for (int r = 0; r < window.cells; ++r)
     for (int c = 0; c < window.cells; ++c) {
       const int16_t cell = grid.map().at(c, r);
-      const bool free = cell >= 0 && cell<300, blocked = cell> 700;
-      if (!free && !blocked) continue;
+      if (cell == kUnknown) continue;
       const FloorPoint origin = window.origin();
       const double share =
           drivable_share(scene, {origin.x_m + c * window.cell_m, origin.y_m + r * window.cell_m}, window.cell_m);
-      score.free += free;
-      score.free_wrong += free && share < 0.5;
-      score.blocked += blocked;
-      score.blocked_wrong += blocked && share == 1;
+      ++score.cells[share == 1 ? 0 : share >= 0.5 ? 1 : 2][cell < 300 ? 0 : cell <= 700 ? 1 : 2];
     }
 }
 
@@ -95,9 +93,10 @@ class Mapped {
 
   Json row() const {
     Json out = ground_row(score_, &errors_, quantile(times_, 0.5));
-    out["grid"] = {{"free_wrong_pct", percent(cells_.free_wrong, cells_.free)},
-                   {"blocked_wrong_pct", percent(cells_.blocked_wrong, cells_.blocked)},
-                   {"blocked_cells", cells_.blocked}};
+    out["grid"] = {{"free_wrong_pct", percent(cells_.cells[2][0], cells_.called(0))},
+                   {"blocked_wrong_pct", percent(cells_.cells[0][2], cells_.called(2))},
+                   {"blocked_cells", cells_.called(2)},
+                   {"confusion", cells_.cells}};
     out["false_borders_doubted_pct"] = doubt_.false_doubted_pct();
     out["true_borders_doubted_pct"] = doubt_.true_doubted_pct();
     return out;

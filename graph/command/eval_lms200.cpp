@@ -61,7 +61,7 @@ std::map<uint64_t, Row> read_index(const std::filesystem::path& file) {
 struct Outcome {
   size_t accepted = 0, rejected = 0;  ///< rows
   size_t wrong = 0;                   ///< rows that were not taken as the index marks them
-  size_t found_inside = 0;            ///< whole telegrams inside rejected rows
+  std::vector<std::string> inside;    ///< whole telegrams inside rejected rows
   size_t unlisted = 0;                ///< accepted where the index lists nothing and nothing was rejected
   size_t crc_errors = 0, length_errors = 0;
   uint64_t unfinished_bytes = 0;             ///< at the end: begun, but not whole
@@ -78,28 +78,35 @@ std::vector<uint16_t> distances_of(const lms200::Scan& scan) {
 
 Outcome evaluate_capture(const std::vector<uint8_t>& bytes, const std::map<uint64_t, Row>& rows) {
   Outcome out;
-  std::map<uint64_t, uint64_t> good;  // offset and length of telegrams
+  struct Telegram {
+    uint64_t length;
+    uint8_t code;
+  };
+  std::map<uint64_t, Telegram> good;  // by offset
   lms200::Parser parser = lms200::Parser::of_replies();
   lms200::parse(parser, bytes, [&](const lms200::Event& event) {
     out.crc_errors += event.kind == lms200::EventKind::crc_error;
     out.length_errors += event.kind == lms200::EventKind::length_error;
     if (event.kind != lms200::EventKind::telegram) return;
-    good[event.position] = event.payload.size() + lms200::kFraming;
+    good[event.position] = {event.payload.size() + lms200::kFraming, event.payload[0]};
     if (const auto scan = lms200::read_scan(event.payload)) out.scans.push_back(distances_of(*scan));
   });
   for (const auto& [offset, row] : rows) {
     const auto found = good.find(offset);
-    const bool accepted = found != good.end() && found->second == row.length;
+    const bool accepted = found != good.end() && found->second.length == row.length;
     ++(accepted ? out.accepted : out.rejected);
     out.wrong += accepted != row.good;
   }
   uint64_t end = 0;
-  for (const auto& [offset, length] : good) {
-    end = std::max(end, offset + length);
+  for (const auto& [offset, telegram] : good) {
+    end = std::max(end, offset + telegram.length);
     auto row = rows.upper_bound(offset);
     if (rows.count(offset) != 0) continue;
     const bool inside = row != rows.begin() && !(--row)->second.good && offset < row->first + row->second.length;
-    ++(inside ? out.found_inside : out.unlisted);
+    if (inside)
+      out.inside.push_back(
+          fmt::format("{:02X}, {} bytes at {}, in the row at {}", telegram.code, telegram.length, offset, row->first));
+    else ++out.unlisted;
   }
   if (parser.begun()) out.unfinished_bytes = bytes.size() - end;
   return out;
@@ -142,7 +149,8 @@ int evaluate(const EvalLms200Options& options) {
               {"accepted", out.accepted},
               {"rejected", out.rejected},
               {"not_as_marked", out.wrong},
-              {"found_inside_rejected", out.found_inside},
+              {"found_inside_rejected", out.inside.size()},
+              {"inside", out.inside},
               {"unlisted", out.unlisted},
               {"crc_errors", out.crc_errors},
               {"length_errors", out.length_errors},

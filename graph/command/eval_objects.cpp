@@ -66,14 +66,18 @@ struct Contestant {
   std::vector<double> times_ms;
 
   Contestant(std::string stages, Stage last, const EvalObjectsOptions& options, const SceneParameters& scenes,
-             std::span<const DatabaseObject> database)
-      : name(std::move(stages)), detector(scenes.width, scenes.height, database, [&] {
-          DetectorParameters p;
-          p.last = last;
-          p.bins = bins_of(options);
-          p.scales = parse_scales(options.scales);
-          return p;
-        }()) {
+             std::span<const DatabaseObject> database, std::span<const Photograph> negatives = {})
+      : name(std::move(stages)),
+        detector(
+            scenes.width, scenes.height, database,
+            [&] {
+              DetectorParameters p;
+              p.last = last;
+              p.bins = bins_of(options);
+              p.scales = parse_scales(options.scales);
+              return p;
+            }(),
+            negatives) {
     for (const double score : kScores) tallies.emplace_back(score);
   }
   void search(const Scene& scene) {
@@ -90,12 +94,15 @@ struct Contestant {
   }
 };
 
-/// Photographs of 640 x 480 in a folder, by name; those of other sizes are left out.
-std::vector<cv::Mat3b> photographs(const std::filesystem::path& folder, const SceneParameters& p) {
+/// Photographs of 640 x 480 in a folder, by name; those of other sizes and the negatives are left out.
+std::vector<cv::Mat3b> photographs(const std::filesystem::path& folder, const SceneParameters& p,
+                                   std::span<const std::filesystem::path> negatives) {
   std::vector<cv::String> files;
   cv::glob((folder / "*.png").string(), files);
   std::vector<cv::Mat3b> images;
   for (const cv::String& file : files) {
+    const auto same = [&](const auto& negative) { return std::filesystem::equivalent(negative, std::string(file)); };
+    if (std::any_of(negatives.begin(), negatives.end(), same)) continue;
     const cv::Mat image = cv::imread(file, cv::IMREAD_UNCHANGED);
     if (image.type() == CV_8UC3 && image.cols == p.width && image.rows == p.height) images.emplace_back(image);
   }
@@ -127,12 +134,15 @@ Json measure_cascade(const EvalObjectsOptions& options, std::span<const Database
   p.scale_max = 1.3;
   p.occlusion_max = options.occlusion;
   std::vector<cv::Mat3b> backgrounds;
-  if (!options.backgrounds.empty()) backgrounds = photographs(options.backgrounds, p);
+  if (!options.backgrounds.empty()) backgrounds = photographs(options.backgrounds, p, options.negatives);
+  std::vector<Photograph> negatives;
+  for (const auto& file : options.negatives) negatives.push_back(read_photograph(file));
   std::vector<Contestant> contestants;
   contestants.reserve(kStages);
   contestants.emplace_back("ch", Stage::colour, options, p, database);
   contestants.emplace_back("ch+hog", Stage::orientation, options, p, database);
   contestants.emplace_back("ch+hog+cch", Stage::cooccurrence, options, p, database);
+  contestants.emplace_back("all+layout", Stage::layout, options, p, database, negatives);
   for (int i = 0; i < options.images + options.empty; ++i) {
     p.fewest_objects = p.most_objects = i < options.images ? 1 : 0;
     if (!backgrounds.empty()) {
@@ -263,6 +273,8 @@ void add_eval_objects(CLI::App& eval, EvalObjectsOptions& o, int& exit_code) {
                   "instead: photographs objNUMBER__ANGLE.png, every 60 degrees a view (COIL-100)")
       ->excludes(database);
   app->add_option("--backgrounds", o.backgrounds, "folder with photographs, 640 x 480 PNG (default: generated)");
+  app->add_option("--negatives", o.negatives,
+                  "photographs without the objects, from which the stage layout learns; not used as backgrounds");
   app->add_option("--bins", o.bins, "64x64x1 (default) | 64x32x2")->check(CLI::IsMember({"64x32x2", "64x64x1"}));
   app->add_option("--scales", o.scales, "of the image, for the cascade (default 1), such as 1+0.7+0.5");
   app->add_option("--seed", o.seed, "seed of the scenes (default 1)");

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <fstream>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <opencv2/imgcodecs.hpp>
@@ -67,16 +68,23 @@ RegistrationParameters parameters_of(const EvalRegistrationOptions& o) {
   return p;
 }
 
-/// The pair that the options name, if any: its laser is the target, its vision the source.
-std::optional<CloudPair> recorded_pair(const EvalRegistrationOptions& o) {
+/// Its laser is the target, its vision the source.
+struct Recorded {
+  CloudPair pair;
+  std::optional<CameraModel> camera;  ///< of a scene
+};
+
+/// The pair that the options name, if any.
+std::optional<Recorded> recorded_pair(const EvalRegistrationOptions& o) {
   const auto files = {&o.source, &o.target, &o.reference};
   const auto named = std::count_if(files.begin(), files.end(), [](const auto* file) { return !file->empty(); });
   if (named == 0 && o.scene.empty()) return std::nullopt;
   if (o.scene.empty() ? named != 3 : named != 0)
     throw std::invalid_argument(
         "registration wants --source, --target and --reference, or --scene, of recorded clouds");
-  if (!o.scene.empty()) return read_laser_stereo(o.scene);
-  return CloudPair{read(o.target), read(o.source), read_pose(o.reference)};
+  if (o.scene.empty()) return Recorded{{read(o.target), read(o.source), read_pose(o.reference)}, std::nullopt};
+  const LaserStereo scene = read_laser_stereo(o.scene);
+  return Recorded{scene.pair, scene.camera};
 }
 
 struct Registered {
@@ -141,9 +149,34 @@ Json errors(const Rigid& found, const Rigid& reference) {
   return {{"error_m", error.m}, {"error_deg", error.rad / kDegree}};
 }
 
-Json measure_pair(const EvalRegistrationOptions& o, const CloudPair& recorded) {
-  const CloudPair pair =
-      o.displace.empty() ? recorded : displaced(recorded, o.displace[0], o.displace[1] * kDegree, o.seed);
+CloudPair displaced_as(const EvalRegistrationOptions& o, const CloudPair& pair) {
+  return o.displace.empty() ? pair : displaced(pair, o.displace[0], o.displace[1] * kDegree, o.seed);
+}
+
+/// How far the camera's disparities are off against the laser at the true pose, and the pose that is found without.
+Json disparity_bias(const EvalRegistrationOptions& o, const LaserStereo& scene) {
+  constexpr double kRanges_m[] = {3, 6, 9, 13, 20};
+  Json out;
+  for (size_t i = 0; i + 1 < std::size(kRanges_m); ++i)
+    if (const auto bias_px = disparity_bias_px(scene, kRanges_m[i], kRanges_m[i + 1]))
+      out[fmt::format("px_{}_to_{}_m", kRanges_m[i], kRanges_m[i + 1])] = *bias_px;
+  const auto bias_px = disparity_bias_px(scene, 0, std::numeric_limits<double>::infinity());
+  if (!bias_px) return out;
+  out["px"] = *bias_px;
+  CloudPair pair = scene.pair;
+  pair.vision = with_less_disparity(pair.vision, scene.camera, *bias_px);
+  pair = displaced_as(o, pair);
+  Registration registration(pair.laser.view(), pair.vision.view(), parameters_of(o));
+  const Rigid found = registration.refined(registration.search({}));
+  Json without = errors(found, pair.vision_in_laser);
+  without["score_at_found"] = registration.judged(found).score;
+  without["score_at_truth"] = registration.judged(pair.vision_in_laser).score;
+  out["without"] = without;
+  return out;
+}
+
+Json measure_pair(const EvalRegistrationOptions& o, const Recorded& recorded) {
+  const CloudPair pair = displaced_as(o, recorded.pair);
   const cloud::Cloud &source = pair.vision, &target = pair.laser;
   Registered r;
   r.reference = pair.vision_in_laser;
@@ -176,6 +209,7 @@ Json measure_pair(const EvalRegistrationOptions& o, const CloudPair& recorded) {
   out["baseline"] = {{"plain_icp", errors(r.plain, r.reference)},
                      {"generalised_icp", errors(r.generalised, r.reference)},
                      {"identity", errors({}, r.reference)}};
+  if (recorded.camera) out["disparity_bias"] = disparity_bias(o, {recorded.pair, *recorded.camera});
   return out;
 }
 
@@ -206,7 +240,7 @@ SuccessParameters sweep_parameters(const EvalRegistrationOptions& o, bool genera
 }
 
 /// Of generated pairs over overlaps and offsets, of a recorded one over offsets.
-int sweep_success(const EvalRegistrationOptions& o, const std::optional<CloudPair>& recorded) {
+int sweep_success(const EvalRegistrationOptions& o, const std::optional<Recorded>& recorded) {
   SuccessParameters p = sweep_parameters(o, !recorded);
   p.pair.points = kPointsOfSensors;
   std::vector<double> overlaps(std::begin(kOverlaps), std::end(kOverlaps));
@@ -223,7 +257,8 @@ int sweep_success(const EvalRegistrationOptions& o, const std::optional<CloudPai
       p.pair.offset_m = offset.m;
       p.pair.offset_rad = offset.degrees * kDegree;
       const Success s = measure_success(p, [&](uint64_t seed) {
-        return recorded ? displaced(*recorded, p.pair.offset_m, p.pair.offset_rad, seed) : generate_pair(p.pair, seed);
+        return recorded ? displaced(recorded->pair, p.pair.offset_m, p.pair.offset_rad, seed)
+                        : generate_pair(p.pair, seed);
       });
       const auto percent = [&](size_t count) { return 100 * static_cast<double>(count) / static_cast<double>(s.runs); };
       curves.back().values.push_back(percent(s.genetic));
@@ -288,7 +323,7 @@ int sweep_population(const EvalRegistrationOptions& o) {
 int evaluate(const EvalRegistrationOptions& o) {
   try {
     if (o.sweep == "population") return sweep_population(o);
-    const std::optional<CloudPair> recorded = recorded_pair(o);
+    const std::optional<Recorded> recorded = recorded_pair(o);
     if (o.sweep == "success") return sweep_success(o, recorded);
     if (!recorded)
       throw std::invalid_argument(

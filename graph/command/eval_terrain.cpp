@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -39,18 +38,12 @@ struct Judged {
   Confusion counted{}, alone{};
 };
 
-/// What the newest map alone says.
-size_t best_kind(const Terrain& answer, double least) {
-  const auto best = std::max_element(std::begin(answer.correlations), std::end(answer.correlations));
-  return *best > least ? static_cast<size_t>(best - std::begin(answer.correlations)) : terrain_kind::unknown;
-}
-
 std::vector<Judged> judge(const TerrainMaps& maps, const EvalTerrainOptions& options) {
   std::vector<Judged> ways(2);
   ways[0].name = "undecided";
   ways[1].name = "mean";
   ways[1].parameters.centre = Centre::mean;
-  ways[1].parameters.correlation_min = 0.5;
+  ways[1].parameters.correlation_min = ways[1].parameters.crossing_min = 0.5;
   for (int i = 0; i < options.drives; ++i) {
     TerrainDriveOptions drive;
     drive.seed = options.seed + static_cast<uint64_t>(i);
@@ -61,7 +54,7 @@ std::vector<Judged> judge(const TerrainMaps& maps, const EvalTerrainOptions& opt
         const Terrain& answer = classifiers[k].step(around);
         if (!truth) continue;
         ++ways[k].counted[*truth][answer.kind];
-        ++ways[k].alone[*truth][best_kind(answer, ways[k].parameters.correlation_min)];
+        ++ways[k].alone[*truth][classifiers[k].believed()];
       }
     });
   }

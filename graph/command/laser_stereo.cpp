@@ -3,8 +3,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <map>
 #include <opencv2/imgcodecs.hpp>
 #include <sstream>
 #include <stdexcept>
@@ -20,7 +22,9 @@ using laser_fusion::CloudPair, laser_fusion::Rigid;
 
 constexpr float kNearest_m = 3, kFarthest_m = 20;
 constexpr float kAside = 0.84f, kUpwards = 0.25f;  // tangents of 40 and 14 degrees
-constexpr int kDisparities = 160, kStep = 2;       // every other pixel
+constexpr double kSameSurface_px = 3;
+constexpr size_t kLeastOfMedian = 100;
+constexpr int kDisparities = 160, kStep = 2;  // every other pixel
 
 /// Lines of "NAME: number ...".
 class CalibrationFile {
@@ -102,13 +106,50 @@ cloud::Cloud laser_cloud(const std::filesystem::path& file) {
 
 }  // namespace
 
-CloudPair read_laser_stereo(const std::filesystem::path& folder) {
+LaserStereo read_laser_stereo(const std::filesystem::path& folder) {
   const CalibrationFile cameras(folder / "calib_cam_to_cam.txt");
   const Eigen::MatrixXd left = cameras.matrix("P_rect_02", 3, 4), right = cameras.matrix("P_rect_03", 3, 4);
   const CameraModel camera{left(0, 0), left(0, 2), left(1, 2), (left(0, 3) - right(0, 3)) / left(0, 0)};
   if (!(camera.focal_px > 0) || !(camera.baseline_m > 0))
     throw std::invalid_argument(folder.string() + ": calib_cam_to_cam.txt has no baseline to the right");
-  return {laser_cloud(folder / "velodyne.bin"), stereo_cloud(folder, camera), laser_in_camera(folder, left).inverse()};
+  return {{laser_cloud(folder / "velodyne.bin"), stereo_cloud(folder, camera), laser_in_camera(folder, left).inverse()},
+          camera};
+}
+
+std::optional<double> disparity_bias_px(const LaserStereo& scene, double from_m, double to_m) {
+  const CameraModel& c = scene.camera;
+  const double px_m = c.focal_px * c.baseline_m;
+  const auto pixel = [&](const Vector3d& p) {
+    return std::pair(std::lround((c.focal_px * p.x() / p.z() + c.cu_px) / kStep),
+                     std::lround((c.focal_px * p.y() / p.z() + c.cv_px) / kStep));
+  };
+  std::map<std::pair<long, long>, double> disparity_px;
+  for (const Point& p : scene.pair.vision.points)
+    disparity_px[pixel({p.x, p.y, p.z})] = px_m / static_cast<double>(p.z);
+  const Rigid into_camera = scene.pair.vision_in_laser.inverse();
+  std::vector<double> excess_px;
+  for (const Point& p : scene.pair.laser.points) {
+    const Vector3d at = into_camera * Vector3d(p.x, p.y, p.z);
+    if (at.z() < from_m || at.z() > to_m) continue;
+    const auto seen = disparity_px.find(pixel(at));
+    if (seen == disparity_px.end()) continue;
+    if (const double excess = seen->second - px_m / at.z(); std::abs(excess) <= kSameSurface_px)
+      excess_px.push_back(excess);
+  }
+  if (excess_px.size() < kLeastOfMedian) return std::nullopt;
+  const auto middle = excess_px.begin() + static_cast<std::ptrdiff_t>(excess_px.size() / 2);
+  std::nth_element(excess_px.begin(), middle, excess_px.end());
+  return *middle;
+}
+
+cloud::Cloud with_less_disparity(const cloud::Cloud& vision, const CameraModel& camera, double px) {
+  cloud::Cloud out = vision;
+  for (Point& p : out.points) {  // along its ray
+    const double disparity_px = camera.focal_px * camera.baseline_m / static_cast<double>(p.z);
+    const auto farther = static_cast<float>(disparity_px / (disparity_px - px));
+    p = {farther * p.x, farther * p.y, farther * p.z};
+  }
+  return out;
 }
 
 }  // namespace takt::command

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <filesystem>
+#include <optional>
 
 #include "nodes/laser_fusion/generated_pair.hpp"
 
@@ -11,6 +12,17 @@ namespace takt::command {
 /// straight ahead and 14 up and down, about what the camera sees; the stereo node's (semi-global matching) in the frame
 /// of the left camera; both 3 to 20 m ahead: beyond, half a pixel is more than half a metre. Throws
 /// std::invalid_argument naming the file.
-laser_fusion::CloudPair read_laser_stereo(const std::filesystem::path& folder);
+struct LaserStereo {
+  laser_fusion::CloudPair pair;
+  CameraModel camera;  ///< of the vision cloud
+};
+LaserStereo read_laser_stereo(const std::filesystem::path& folder);
+
+/// By how much disparities of the camera's points exceed those of laser points that lie in the same pixel at the true
+/// pose, from_m to to_m ahead: the median, px, over those at most 3 px apart; none if there are fewer than 100.
+std::optional<double> disparity_bias_px(const LaserStereo& scene, double from_m, double to_m);
+
+/// The vision cloud as the camera would have seen it with so much less disparity.
+cloud::Cloud with_less_disparity(const cloud::Cloud& vision, const CameraModel& camera, double px);
 
 }  // namespace takt::command

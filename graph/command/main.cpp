@@ -5,6 +5,7 @@
 
 #include "graph/command/attach_commands.hpp"
 #include "graph/command/calibrate_command.hpp"
+#include "graph/command/capture_command.hpp"
 #include "graph/command/check_command.hpp"
 #include "graph/command/cloud_command.hpp"
 #include "graph/command/devices_command.hpp"
@@ -121,11 +122,13 @@ void add_devices(CLI::App& app, bool& json, int& exit_code) {
 }
 
 void add_capture(CLI::App& app, takt::command::CaptureOptions& o, int& exit_code) {
-  CLI::App* capture = app.add_subcommand("capture", "writes the frames of a CAN bus to a file, as candump -L does");
-  capture->add_option("device", o.device, "CAN interface, or unix:PATH of a double")->required();
+  CLI::App* capture = app.add_subcommand("capture", "writes what a device says to a file");
+  capture->add_option("device", o.device, "can0, /dev/ttyUSB0, or 192.168.0.1:2111")->required();
   capture->add_option("file", o.file, "file to be written")->required();
   capture->add_option("--for", o.duration_s, "how long, e.g. 20s (default 10s)")
       ->transform(CLI::Validator(duration, "DURATION"));
+  capture->add_option("--scanner", o.scanner, "lms200 | lms400: it is asked for scans meanwhile");
+  capture->add_option("--baud", o.baud, "of a serial line (default 38400)");
   capture->callback([&] { exit_code = takt::command::capture_device(o); });
 }
 

@@ -67,7 +67,7 @@ void list(const ObjectsOptions& o) {
   for (size_t i = 0; i < database.size(); ++i) {
     fmt::print("{:>5} {:<32} {:>5} {:>10}  ", i, database[i].label(), database[i].views.size(),
                database[i].test_views.size());
-    for (size_t s = 0; s < kStages; ++s)
+    for (size_t s = 0; s < kHistogramStages; ++s)
       fmt::print(" {:.3f}{}", references[s].limits[i][0].threshold,
                  database[i].thresholds[s] || database[i].views[0].thresholds[s] ? "" : " (auto)");
     fmt::print("\n");

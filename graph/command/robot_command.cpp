@@ -25,14 +25,48 @@ struct KnownObject {
   std::vector<std::pair<std::string, std::string>> states;
 };
 
+std::vector<std::string> clients_of(const Json& top) {
+  std::vector<std::string> clients;
+  for (const Json& node : top.at("nodes"))
+    if (node.at("type") == "robot_client") clients.push_back(node.at("name").get<std::string>());
+  return clients;
+}
+
+bool contains(const std::vector<std::string>& names, const std::string& name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+/// To the only one of several runs that has a robot client (`wanted`, unless it is empty); else nothing, and why is
+/// said.
+std::optional<attach::Connection> find_robot(const std::vector<int>& runs, const std::string& wanted) {
+  std::optional<attach::Connection> found;
+  std::vector<std::string> choices;
+  for (const int run : runs) {
+    auto connection = attach::connect_to(run);
+    const auto top = connection && connection->write({{"do", "top"}}) ? connection->read_line() : std::nullopt;
+    if (!top) continue;  // it is about to begin, or to end
+    const auto clients = clients_of(*top);
+    if (wanted.empty() ? clients.empty() : !contains(clients, wanted)) continue;
+    choices.push_back(fmt::format("{} ({}: {})", run, top->at("graph").get<std::string>(), fmt::join(clients, ", ")));
+    found.emplace(std::move(*connection));
+  }
+  if (choices.size() == 1) return found;
+  if (choices.empty())
+    refuse(fmt::format("none of the graphs that run ({}) has a {}", fmt::join(runs, ", "),
+                       wanted.empty() ? "node of type robot_client" : "robot client " + wanted),
+           kDeviceOrSystem);
+  else
+    refuse(fmt::format("several running graphs have a robot; choose with --run: {}", fmt::join(choices, ", ")),
+           kDeviceOrSystem);
+  return std::nullopt;
+}
+
 /// The robot client of the run; empty where there is none or which one is meant is not clear, and why is said.
 std::string client_of(attach::Connection& connection, const std::string& wanted) {
   Json top;
   if (ask(connection, {{"do", "top"}}, top) != kOk) return "";
-  std::vector<std::string> clients;
-  for (const Json& node : top.at("nodes"))
-    if (node.at("type") == "robot_client") clients.push_back(node.at("name").get<std::string>());
-  if (!wanted.empty() && std::find(clients.begin(), clients.end(), wanted) != clients.end()) return wanted;
+  const auto clients = clients_of(top);
+  if (contains(clients, wanted)) return wanted;
   if (wanted.empty() && clients.size() == 1) return clients.front();
   refuse(clients.empty() ? "the run has no node of type robot_client"
                          : fmt::format("name the robot with --node: {}", fmt::join(clients, ", ")),
@@ -87,7 +121,8 @@ std::string dot_of(const std::vector<KnownObject>& objects) {
 template <class Work>
 int with_client(const RobotOptions& o, Work work) {
   return understood([&]() -> int {
-    auto connection = attached(o.run);
+    const std::vector<int> runs = attach::running();
+    auto connection = o.run == 0 && runs.size() > 1 ? find_robot(runs, o.node) : attached(o.run);
     if (!connection) return kDeviceOrSystem;
     const std::string client = client_of(*connection, o.node);
     if (client.empty()) return kBadInput;
@@ -198,7 +233,7 @@ int watch(const RobotOptions& o) {
 void add_robot(CLI::App& app, RobotOptions& o, int& exit_code) {
   CLI::App* robot = app.add_subcommand("robot", "tells and asks the robot of a running graph");
   robot->require_subcommand(1);
-  robot->add_option("--run", o.run, "process id of the run, where there are several");
+  robot->add_option("--run", o.run, "process id of the run, where several have a robot");
   robot->add_option("--node", o.node, "the robot client, where there are several");
   const auto add = [&](const char* name, const char* purpose, auto run) {
     CLI::App* command = robot->add_subcommand(name, purpose);

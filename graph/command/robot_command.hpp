@@ -9,7 +9,7 @@
 namespace takt::command {
 
 struct RobotOptions {
-  int run = 0;       ///< process id; 0: the only one that runs
+  int run = 0;       ///< process id; 0: the only one that has a robot client
   std::string node;  ///< of type robot_client; empty: the only one
   std::vector<std::string> words;
   std::string object;

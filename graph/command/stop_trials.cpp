@@ -25,8 +25,9 @@ namespace {
 using sim::RobotState;
 using sim::Vec2;
 
-// The robot (thesis App. A.1), and the strip that the node keeps free around it (its parameter `margin`).
-constexpr double kHalfWidth = 0.28, kHalfLength = 0.39, kMargin = 0.10;
+// The robot, and what the node keeps free around it.
+constexpr double kHalfWidth = obstacle_stop::kRobotWidth_m / 2, kHalfLength = obstacle_stop::kRobotLength_m / 2;
+constexpr double kMargin = obstacle_stop::kMargin_m;
 constexpr double kMoving_m_s = 0.05;
 // A person of 1.75 m as hal/sim draws one: shins, where the laser looks; torso with arms, what the robot would touch.
 constexpr double kLegAside = 0.10, kLegRadius = 0.055, kBodyAside = 0.15, kBodyRadius = 0.15;
@@ -179,8 +180,8 @@ class Referee {
     constexpr double kLane_m = 6, kMostTurn = 3;
     const double time = std::min(kLane_m / std::abs(robot.speed_m_s),
                                  std::abs(robot.turn_rad_s) > 0 ? kMostTurn / std::abs(robot.turn_rad_s) : 1e3);
-    const ProtectedField lane({kHalfWidth + kMargin, kHalfLength + kMargin, kHalfLength + kMargin},
-                              {robot.speed_m_s, robot.turn_rad_s}, time);
+    const ProtectedField lane({kHalfWidth, kHalfLength, kHalfLength, kMargin}, {robot.speed_m_s, robot.turn_rad_s},
+                              time);
     double range = std::numeric_limits<double>::infinity();
     for (const Vec2& leg : stance.legs()) {
       const Vec2 centre = in_robot(robot, leg);
@@ -289,7 +290,11 @@ StopTrials::StopTrials(graph::GraphSpec yard, Vision vision, uint64_t seed)
       vision_(vision),
       seed_(seed),
       types_(graph::node_types()),
-      textures_(sim::make_textures(seed)) {}
+      textures_(sim::make_textures(seed)) {
+  // In virtual time it is said below what a job takes: it need not be spent.
+  for (graph::NodeSpec& node : yard_.nodes)
+    if (node.type == "load") node.params["work"] = {0.0, node.position};
+}
 
 StopOutcome StopTrials::run(const StopTrial& trial) {
   for (graph::NodeSpec& node : yard_.nodes) {

@@ -18,8 +18,11 @@ const sim::Robot* find_robot(const sim::Simulation& simulation, const std::strin
 
 std::optional<std::string> attribute(const sim::Simulation& simulation, const std::string& object,
                                      const std::string& name, int64_t at_ns) {
-  if (const sim::Robot* robot = find_robot(simulation, object); robot != nullptr && name == "blocked")
-    return robot->blocked() ? "true" : "false";
+  if (const sim::Robot* robot = find_robot(simulation, object)) {
+    const sim::RobotState state = robot->state(at_ns);
+    if (name == "blocked") return robot->blocked() ? "true" : "false";
+    if (name == "terrain") return std::string(terrain_at(simulation.world(), {state.x_m, state.y_m}));
+  }
   return simulation.attribute(object, name, at_ns);
 }
 

@@ -129,6 +129,7 @@ class Composer {
     result_.plan.mode = graph_.mode;
     for (const DeviceSpec& spec : graph_.devices) connect_inputs(result_.plan.tasks[task_index_.at(spec.id)], spec);
     for (const NodeSpec& spec : graph_.nodes) connect_inputs(result_.plan.tasks[task_index_.at(spec.id)], spec);
+    mark_expected();
     for (auto& task : result_.plan.tasks) {
       const auto it = graph_.schedule.entries.find(task.name);
       if (it == graph_.schedule.entries.end() || !it->second.on) continue;
@@ -163,6 +164,14 @@ class Composer {
       OutputPort& output = output_of(result_.plan.ports[port]);
       PortAccess::mark_read(output);
     }
+  }
+
+  /// Whoever expects something of an output reads it, too: nodes leave out what nobody reads.
+  void mark_expected() {
+    if (!graph_.expect) return;
+    for (const ConditionSpec& condition : graph_.expect->conditions)
+      if (const auto port = port_index_.find(condition.port.text()); port != port_index_.end())
+        PortAccess::mark_read(output_of(result_.plan.ports[port->second]));
   }
 
   OutputPort& output_of(const PortPlan& port) {

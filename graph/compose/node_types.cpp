@@ -28,6 +28,7 @@ void register_laser_fusion(NodeTypes& types);
 void register_laser_cloud(NodeTypes& types);
 void register_robot_client(NodeTypes& types);
 void register_cruise(NodeTypes& types);
+void register_mission(NodeTypes& types);
 }  // namespace takt
 
 namespace takt::graph {
@@ -59,6 +60,7 @@ NodeTypes node_types() {
   register_laser_cloud(types);
   register_robot_client(types);
   register_cruise(types);
+  register_mission(types);
   return types;
 }
 

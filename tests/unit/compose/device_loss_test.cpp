@@ -23,11 +23,12 @@ struct Seen {
     return extreme;
   }
 };
-Seen seen;  // the node is made by the composition, so it has no other way to tell
 
 /// Wants to drive, whatever happens.
 class Driver final : public Node {
  public:
+  Seen seen;
+
   void setup(Setup&) override {}
   void start(int64_t epoch_ns) override { epoch_ns_ = epoch_ns; }
   void run(Job& job) override {
@@ -49,29 +50,23 @@ class Driver final : public Node {
   Output<VelocityCommand> velocity_{this, "velocity", ""};
 };
 
-constexpr const char* kGraphText = R"(takt: 1
-name: loss
-schedule: schedule.yaml
-default_profile: sim
-devices:
+constexpr test::DriveGraph kGraph{
+    .devices = R"(
   front_laser: {kind: laser_scanner, rate: 15, failures: "silent 2s..3s"}
   base: {kind: mobile_base, rate: 15, drive: command, in: {velocity: driver.velocity}}
-profiles:
-  sim: {default: {driver: sim, world: @/worlds/lab.xml}}
-subsystems:
-  robot:
+)",
+    .nodes = R"(
     exports: [driver.velocity]
     driver: {type: probe, in: {odometry: base.odometry, scan: front_laser.scan}}
 modes:
   safe_stop: {lost: [front_laser]}
-)";
-constexpr const char* kScheduleText = R"(takt: 1
-name: loss
-nodes:
+)",
+    .schedule = R"(
   front_laser: {rate: 15, budget: 1ms}
   base: {rate: 15, budget: 1ms}
   driver: {rate: 15, offset: 20ms, budget: 1ms, criticality: high}
-)";
+)",
+};
 
 std::vector<std::string> names(const Plan& plan, SourceSet set) {
   std::vector<std::string> all;
@@ -103,8 +98,8 @@ bool runs(const Plan& plan, const std::string& mode, const std::string& task) {
 }  // namespace
 
 TEST_CASE("a robot whose scanner falls silent stands until it is back, whatever it is told to do") {
-  seen = {};
-  test::Drive::with<Driver>(kGraphText, kScheduleText, 6'000'000'000);
+  const test::Drive<Driver> drive(kGraph, 6'000'000'000);
+  const Seen& seen = drive.probe().seen;
   std::vector<std::string> modes;
   double stopped_s = 0, back_s = 0;
   for (const auto& [at_s, mode] : seen.mode) {

@@ -5,6 +5,8 @@
 
 #include <filesystem>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "graph/compose/composition.hpp"
 #include "hal/camera/rig.hpp"
@@ -24,45 +26,64 @@ inline StereoRig rig_of(const std::string& id, const std::string& file) {
   return *rig;
 }
 
-/// A drive that is over; the world stays for questions about its truth.
-class Drive {
- public:
-  /// Runs the graph for `ns`; `@` in it stands for graph_folder(), and its node type `probe` is Probe.
-  template <class Probe>
-  static Drive with(const char* graph_text, const char* schedule_text, int64_t ns) {
-    NodeTypes types = graph::node_types();
-    types.add<Probe>("probe", Layer::storage, "test");
-    return Drive(graph_text, schedule_text, types, ns);
-  }
-  const sim::Simulation& world() { return *devices_.first_world(); }
-
- private:
-  Drive(std::string graph_text, const std::string& schedule_text, const NodeTypes& types, int64_t ns);
-
-  VirtualClock clock_{1'000'000'000};
-  hal::Devices devices_;
+/// What the graph of a test has of its own, as text of graph and schedule files; `@` stands for graph_folder().
+struct DriveGraph {
+  std::string_view devices;   ///< entries of `devices`; the driver is `sim` where they name no other
+  std::string_view nodes;     ///< entries of a subsystem, one of the type `probe`; then what the graph has beside
+  std::string_view schedule;  ///< entries of the schedule's `nodes`
+  std::string_view world = "lab";
 };
 
-inline Drive::Drive(std::string graph_text, const std::string& schedule_text, const NodeTypes& types, int64_t ns) {
-  for (size_t at; (at = graph_text.find('@')) != std::string::npos;) graph_text.replace(at, 1, graph_folder().string());
+/// The nodes of a graph once it has run for `ns`, on one core under `cooperative`.
+inline std::vector<std::unique_ptr<Node>> drive(const DriveGraph& own, const NodeTypes& types, int64_t ns,
+                                                VirtualClock& clock, hal::Devices& devices) {
+  using namespace std::string_literals;
+  std::string text = "takt: 1\nname: drive\nschedule: schedule.yaml\ndefault_profile: sim\ndevices:"s;
+  text.append(own.devices).append("profiles:\n  sim: {default: {driver: sim, world: @/worlds/").append(own.world);
+  text.append(".xml}}\nsubsystems:\n  robot:").append(own.nodes);
+  for (size_t at; (at = text.find('@')) != std::string::npos;) text.replace(at, 1, graph_folder().string());
   const TemporaryFolder folder;
-  folder.write("schedule.yaml", schedule_text);
-  graph::Loaded loaded = graph::load(folder.write("graph.yaml", graph_text), {}, types);
+  folder.write("schedule.yaml", "takt: 1\nname: drive\npolicy: cooperative\ncores: [0]\nnodes:"s.append(own.schedule));
+  graph::Loaded loaded = graph::load(folder.write("graph.yaml", text), {}, types);
   for (const auto& problem : loaded.problems) MESSAGE(graph::to_string(problem));
   REQUIRE(loaded.graph);
   const graph::DeviceFactory factory =
       [&](const graph::DeviceSpec& spec) -> tl::expected<std::unique_ptr<Node>, graph::ComposeError> {
-    auto node = hal::make_device({spec.id, spec.kind, spec.driver, spec.settings, loaded.graph->directory, 1}, devices_,
-                                 clock_);
+    auto node =
+        hal::make_device({spec.id, spec.kind, spec.driver, spec.settings, loaded.graph->directory, 1}, devices, clock);
     REQUIRE(node);
     return std::move(*node);
   };
-  auto composition = graph::compose(*loaded.graph, types, factory, clock_, {folder.path, 1});
+  auto composition = graph::compose(*loaded.graph, types, factory, clock, {folder.path, 1});
   REQUIRE(composition);
   const auto transport = make_local_transport(composition->plan.ports);
-  Executor executor(composition->plan, *transport, clock_, {ns, 0, false});
+  Executor executor(composition->plan, *transport, clock, {ns, 0, false});
   executor.run();
   for (auto& node : composition->nodes) node->finish();
+  return std::move(composition->nodes);
 }
+
+/// A drive that is over: the world stays for questions about its truth, the probe for what it saw.
+template <class Probe>
+class Drive {
+ public:
+  /// Runs the graph for `ns`; its node type `probe` is Probe.
+  Drive(const DriveGraph& graph, int64_t ns) {
+    NodeTypes types = graph::node_types();
+    types.add<Probe>("probe", Layer::storage, "test");
+    nodes_ = drive(graph, types, ns, clock_, devices_);
+    for (const auto& node : nodes_)
+      if (const auto* probe = dynamic_cast<const Probe*>(node.get())) probe_ = probe;
+    REQUIRE(probe_ != nullptr);
+  }
+  const sim::Simulation& world() { return *devices_.first_world(); }
+  const Probe& probe() const { return *probe_; }
+
+ private:
+  VirtualClock clock_{1'000'000'000};
+  hal::Devices devices_;
+  std::vector<std::unique_ptr<Node>> nodes_;
+  const Probe* probe_ = nullptr;
+};
 
 }  // namespace takt::test

@@ -16,17 +16,34 @@ namespace {
 
 constexpr double kCellM = 0.30, kRangeM = 8;  // defaults of ground_map
 
+using Cell = std::pair<int, int>;  ///< column and row of the map frame
+
 struct Seen {
   std::set<int64_t> stamps;    ///< of the images that were mapped
   std::set<int64_t> terrains;  ///< of those whose terrain was judged
   int32_t width = 0, height = 0;
   double cell_m = 0, corner_x_m = 0, corner_y_m = 0;  ///< of the last grid, in the map frame
   std::vector<int16_t> cells;
+
+  /// Of the last grid; unknown outside of it.
+  int16_t value(const Cell& cell) const {
+    const int column = cell.first - static_cast<int>(std::lround(corner_x_m / kCellM)),
+              row = cell.second - static_cast<int>(std::lround(corner_y_m / kCellM));
+    if (column < 0 || row < 0 || column >= width || row >= height) return Grid::unknown;
+    return cells[static_cast<size_t>(row * width + column)];
+  }
+  bool occupied_near(const Cell& cell, int reach) const {
+    for (int dy = -reach; dy <= reach; ++dy)
+      for (int dx = -reach; dx <= reach; ++dx)
+        if (value({cell.first + dx, cell.second + dy}) > 500) return true;
+    return false;
+  }
 };
-Seen seen;  // the node is made by the composition, so it has no other way to tell
 
 class GridProbe final : public Node {
  public:
+  Seen seen;
+
   void setup(Setup&) override {}
   void run(Job&) override {
     if (const Terrain* terrain = terrain_.newest(); terrain && terrain->kind <= terrain_kind::unknown)
@@ -47,18 +64,13 @@ class GridProbe final : public Node {
 };
 
 // The window is large enough to keep the whole lab.
-constexpr const char* kGraphText = R"(takt: 1
-name: ground_truth
-schedule: schedule.yaml
-default_profile: sim
-devices:
+constexpr test::DriveGraph kGraph{
+    .devices = R"(
   ground_camera: {kind: stereo_camera, rig: @/rigs/x2_wide.yaml, rate: 5}
   front_laser: {kind: laser_scanner, model: lms200, rate: 15, mount: {x: 0.0m, y: 0.30m, z: 0.25m, yaw: 0deg}}
   base: {kind: mobile_base, rate: 15}
-profiles:
-  sim: {default: {driver: sim, world: @/worlds/lab.xml}}
-subsystems:
-  mapping:
+)",
+    .nodes = R"(
     ground_map:
       type: ground_map
       in:
@@ -67,20 +79,15 @@ subsystems:
         odometry: {from: base.odometry, depth: 16}
       params: {window: 36m, terrain_maps: @/terrain.txt}
     probe: {type: probe, in: {grid: ground_map.grid, terrain: ground_map.terrain}}
-)";
-constexpr const char* kScheduleText = R"(takt: 1
-name: ground_truth
-policy: cooperative
-cores: [0]
-nodes:
+)",
+    .schedule = R"(
   ground_camera: {rate: 5, offset: 5ms, budget: 10ms}
   front_laser: {rate: 15, budget: 1ms}
   base: {rate: 15, budget: 1ms}
   ground_map: {rate: 5, offset: 46ms, budget: 6ms, criticality: high}
   probe: {rate: 5, offset: 90ms, budget: 1ms}
-)";
-
-using Cell = std::pair<int, int>;  ///< column and row of the map frame
+)",
+};
 
 /// What the camera saw of a cell: in how many images.
 struct Sight {
@@ -124,37 +131,22 @@ std::map<Cell, Columns> look(const sim::Simulation& world, const StereoRig& rig,
   return cells;
 }
 
-/// Value of the last grid; unknown outside of it.
-int16_t value(const Cell& cell) {
-  const int column = cell.first - static_cast<int>(std::lround(seen.corner_x_m / kCellM)),
-            row = cell.second - static_cast<int>(std::lround(seen.corner_y_m / kCellM));
-  if (column < 0 || row < 0 || column >= seen.width || row >= seen.height) return Grid::unknown;
-  return seen.cells[static_cast<size_t>(row * seen.width + column)];
-}
-
-bool occupied_near(const Cell& cell, int reach) {
-  for (int dy = -reach; dy <= reach; ++dy)
-    for (int dx = -reach; dx <= reach; ++dx)
-      if (value({cell.first + dx, cell.second + dy}) > 500) return true;
-  return false;
-}
-
 struct Shares {
   int blocked = 0, marked = 0, marked_near = 0;  ///< near: the cell or one of its eight neighbours
   int free = 0, called_free = 0, called_occupied = 0;
 };
 
-Shares compare(const std::map<Cell, Sight>& sights, const sim::Simulation& world) {
+Shares compare(const std::map<Cell, Sight>& sights, const Seen& seen, const sim::Simulation& world) {
   constexpr int kImages = 3;  // a cell seen in fewer does not count
   const Eigen::Isometry2d to_world = map_in_world(world);
   Shares s;
   for (const auto& [cell, sight] : sights) {
     const Eigen::Vector2d centre = to_world * (kCellM * Eigen::Vector2d(cell.first + 0.5, cell.second + 0.5));
-    const int16_t v = value(cell);
+    const int16_t v = seen.value(cell);
     if (sight.as_border >= kImages) {
       ++s.blocked;
       s.marked += v > 500;
-      s.marked_near += occupied_near(cell, 1);
+      s.marked_near += seen.occupied_near(cell, 1);
     } else if (sight.as_floor >= kImages && !sim::collides(world.world(), centre, kCellM * std::sqrt(0.5))) {
       ++s.free;
       s.called_free += v >= 0 && v < 500;
@@ -174,8 +166,8 @@ double percent(int part, int whole) { return 100.0 * part / whole; }
 // with the neighbouring cells too, because a face may stand a few centimetres from the next cell and the odometry
 // drifts by more than that. After 30 s its drift begins to be what is measured.
 TEST_CASE("the ground map of a drive through the lab agrees with the world") {
-  seen = {};
-  auto drive = test::Drive::with<GridProbe>(kGraphText, kScheduleText, 30'000'000'000);
+  test::Drive<GridProbe> drive(kGraph, 30'000'000'000);
+  const Seen& seen = drive.probe().seen;
   const sim::Simulation& world = drive.world();
   const StereoRig rig = test::rig_of("ground_camera", "x2_wide.yaml");
   REQUIRE(seen.stamps.size() > 145);
@@ -188,7 +180,7 @@ TEST_CASE("the ground map of a drive through the lab agrees with the world") {
       sights[cell].as_floor += columns.floor >= 5;
       sights[cell].as_border += columns.border >= 5;
     }
-  const Shares s = compare(sights, world);
+  const Shares s = compare(sights, seen, world);
   MESSAGE("blocked cells: " << s.blocked << ", marked " << percent(s.marked, s.blocked) << " %, marked or next to one "
                             << percent(s.marked_near, s.blocked) << " %");
   MESSAGE("free cells: " << s.free << ", called free " << percent(s.called_free, s.free) << " %, called occupied "

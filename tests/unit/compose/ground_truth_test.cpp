@@ -12,6 +12,7 @@ using namespace takt;
 
 namespace {
 
+/// What the probe saw last.
 struct Seen {
   int64_t disparity_stamp = 0, motion_stamp = 0, grid_stamp = 0;
   int32_t width = 0;
@@ -21,10 +22,11 @@ struct Seen {
   int32_t cells_per_side = 0;
   std::vector<int16_t> cells;
 };
-Seen seen;  // what the probe saw last; the node is made by the composition, so it has no other way to tell
 
 class ProbeNode final : public Node {
  public:
+  Seen seen;
+
   void setup(Setup&) override {}
   void run(Job&) override {
     if (const DisparityMap* map = disparity_.newest()) {
@@ -51,17 +53,12 @@ class ProbeNode final : public Node {
   Input<Grid> obstacles_{this, "obstacles", ""};
 };
 
-constexpr const char* kGraphText = R"(takt: 1
-name: truth
-schedule: schedule.yaml
-default_profile: sim
-devices:
+constexpr test::DriveGraph kGraph{
+    .devices = R"(
   head_camera: {kind: stereo_camera, rig: @/rigs/xb3.yaml, rate: 15}
   base: {kind: mobile_base, rate: 15}
-profiles:
-  sim: {default: {driver: sim, world: @/worlds/lab.xml}}
-subsystems:
-  depth:
+)",
+    .nodes = R"(
     stereo: {type: stereo, in: {pair: head_camera.pair}}
     ego_motion:
       type: ego_motion
@@ -69,19 +66,16 @@ subsystems:
       join: [pair, disparity]
     mapping_3d: {type: mapping_3d, in: {cloud: stereo.cloud, motion: {from: ego_motion.motion, depth: 16}}}
     probe: {type: probe, in: {disparity: stereo.disparity, motion: ego_motion.motion, obstacles: mapping_3d.obstacles}}
-)";
-constexpr const char* kScheduleText = R"(takt: 1
-name: truth
-policy: cooperative
-cores: [0]
-nodes:
+)",
+    .schedule = R"(
   head_camera: {rate: 15, budget: 5ms}
   base: {rate: 15, budget: 1ms}
   stereo: {rate: 15, offset: 10ms, budget: 5ms, criticality: high}
   ego_motion: {rate: 15, offset: 20ms, budget: 5ms}
   mapping_3d: {rate: 15, offset: 30ms, budget: 5ms}
   probe: {rate: 15, offset: 50ms, budget: 1ms}
-)";
+)",
+};
 
 Eigen::Isometry3d isometry(const Transform& t) {
   Eigen::Isometry3d out = Eigen::Isometry3d::Identity();
@@ -100,8 +94,8 @@ Eigen::Isometry3d isometry(const sim::CameraPose& pose) {
 }  // namespace
 
 TEST_CASE("stereo, ego-motion and the obstacle grid agree with the simulated world") {
-  seen = {};
-  auto drive = test::Drive::with<ProbeNode>(kGraphText, kScheduleText, 6'000'000'000);
+  test::Drive<ProbeNode> drive(kGraph, 6'000'000'000);
+  const Seen& seen = drive.probe().seen;
   const sim::Simulation& world = drive.world();
   const StereoRig rig = test::rig_of("head_camera", "xb3.yaml");
   const auto pixels = static_cast<size_t>(rig.width) * static_cast<size_t>(rig.height);

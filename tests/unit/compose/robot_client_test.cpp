@@ -22,7 +22,6 @@ struct Seen {
   std::string left;             ///< task in the end
   std::string plan;             ///< with what its steps took
 };
-Seen seen;  // the node is made by the composition, so it has no other way to tell
 
 struct Thing {
   const char *name, *type;
@@ -33,6 +32,8 @@ struct Thing {
 /// graph/networks/kitchen.yaml, as it really is.
 class Kitchen final : public Node {
  public:
+  Seen seen;
+
   void setup(Setup&) override { objects_.reserve({0, 0, 1, 8}); }
   void run(Job& job) override {
     if (const TextStatus* speech = speech_.newest(); speech != nullptr && speech_.is_new())
@@ -117,20 +118,12 @@ class Kitchen final : public Node {
   Output<ObjectReports> objects_{this, "objects", ""};
 };
 
-constexpr const char* kGraphText = R"(takt: 1
-name: kitchen
-schedule: schedule.yaml
-default_profile: sim
-devices:
-  base: {kind: mobile_base, rate: 15, in: {velocity: {from: client.velocity, max_age: 300ms}}}
-  person: {kind: interaction, rate: 5, in: {speech: {from: client.speech, depth: 4}}}
-profiles:
-  sim:
-    default: {driver: sim, world: @/worlds/lab.xml}
-    base: {drive: command}
-    person: {script: "1s goal cup_1.level=full"}
-subsystems:
-  kitchen:
+constexpr test::DriveGraph kGraph{
+    .devices = R"(
+  base: {kind: mobile_base, rate: 15, drive: command, in: {velocity: {from: client.velocity, max_age: 300ms}}}
+  person: {kind: interaction, rate: 5, script: "1s goal cup_1.level=full", in: {speech: {from: client.speech, depth: 4}}}
+)",
+    .nodes = R"(
     exports: [client.velocity, client.speech]
     probe:
       type: probe
@@ -143,23 +136,20 @@ subsystems:
         outcome: probe.outcome
         task: person.task
       params: {network: @/networks/kitchen.yaml}
-)";
-constexpr const char* kScheduleText = R"(takt: 1
-name: kitchen
-policy: cooperative
-cores: [0]
-nodes:
+)",
+    .schedule = R"(
   base: {rate: 15, budget: 1ms}
   person: {rate: 5, budget: 1ms}
   client: {rate: 15, offset: 5ms, budget: 20ms, criticality: high}
   probe: {rate: 15, offset: 40ms, budget: 2ms}
-)";
+)",
+};
 
 }  // namespace
 
 TEST_CASE("a goal that somebody says is planned, driven, acted and reported, within reach and standing") {
-  seen = {};
-  test::Drive::with<Kitchen>(kGraphText, kScheduleText, 60'000'000'000);
+  const test::Drive<Kitchen> drive(kGraph, 60'000'000'000);
+  const Seen& seen = drive.probe().seen;
   MESSAGE("said:\n"
           << seen.speech << seen.plan << "farthest object " << seen.farthest_m << " m, " << seen.under_way << " jobs");
   CHECK(seen.actions == "open bottle_1; fill cup_1");

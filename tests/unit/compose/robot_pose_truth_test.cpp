@@ -22,10 +22,11 @@ struct Known {
 struct Seen {
   Known wheels, scans, joined;
 };
-Seen seen;  // the node is made by the composition, so it has no other way to tell
 
 class PoseProbe final : public Node {
  public:
+  Seen seen;
+
   void setup(Setup&) override {}
   void run(Job&) override {
     if (const Odometry* odometry = wheels_.newest())
@@ -49,18 +50,13 @@ class PoseProbe final : public Node {
   Input<Pose> joined_{this, "joined", ""};
 };
 
-constexpr const char* kGraphText = R"(takt: 1
-name: robot_pose
-schedule: schedule.yaml
-default_profile: sim
-devices:
+constexpr test::DriveGraph kGraph{
+    .devices = R"(
   head_camera: {kind: stereo_camera, rig: @/rigs/xb3.yaml, rate: 10}
-  front_laser: {kind: laser_scanner, model: lms200, rate: 15, mount: {x: 0.0m, y: 0.30m, z: 0.25m, yaw: 0deg}LASER}
+  front_laser: {kind: laser_scanner, model: lms200, rate: 15, mount: {x: 0.0m, y: 0.30m, z: 0.25m, yaw: 0deg}}
   base: {kind: mobile_base, rate: 15}
-profiles:
-  sim: {default: {driver: sim, world: @/worlds/lab.xml}}
-subsystems:
-  mapping:
+)",
+    .nodes = R"(
     stereo: {type: stereo, in: {pair: head_camera.pair}}
     ego_motion: {type: ego_motion, in: {pair: stereo.rectified, disparity: stereo.disparity}, join: [pair, disparity]}
     scan_matching:
@@ -74,12 +70,8 @@ subsystems:
         robot_motion: {from: ego_motion.robot_motion, depth: 16}
         scan_pose: {from: scan_matching.pose, depth: 16}
     probe: {type: probe, in: {wheels: base.odometry, scans: scan_matching.pose, joined: robot_pose.pose}}
-)";
-constexpr const char* kScheduleText = R"(takt: 1
-name: robot_pose
-policy: cooperative
-cores: [0]
-nodes:
+)",
+    .schedule = R"(
   head_camera: {rate: 10, budget: 5ms}
   front_laser: {rate: 15, budget: 1ms}
   base: {rate: 15, budget: 1ms}
@@ -88,7 +80,8 @@ nodes:
   scan_matching: {rate: 5, offset: 30ms, budget: 5ms}
   robot_pose: {rate: 10, offset: 50ms, budget: 1ms}
   probe: {rate: 10, offset: 60ms, budget: 1ms}
-)";
+)",
+};
 
 struct Off {
   double metres, degrees;
@@ -106,20 +99,18 @@ Off off(const Known& known, const sim::Simulation& world) {
   return {std::hypot(error.x_m, error.y_m), std::abs(error.theta_rad) * 180 / std::numbers::pi};
 }
 
-std::string graph_text(const std::string& laser_settings) {
-  std::string text = kGraphText;
-  return text.replace(text.find("LASER"), 5, laser_settings);
-}
-
 }  // namespace
 
 TEST_CASE("wheels, ego-motion and scans joined are better than wheels, with the laser or with half a drive of it") {
   constexpr int64_t kDrive_ns = 24'000'000'000;
   for (const bool laser_fails : {false, true}) {
     CAPTURE(laser_fails);
-    seen = {};
-    const std::string text = graph_text(laser_fails ? ", failures: \"silent 12s..60s\"" : "");
-    auto drive = test::Drive::with<PoseProbe>(text.c_str(), kScheduleText, kDrive_ns);
+    std::string devices(kGraph.devices);
+    if (laser_fails) devices.insert(devices.find(", mount: "), ", failures: \"silent 12s..60s\"");
+    test::DriveGraph graph = kGraph;
+    graph.devices = devices;
+    test::Drive<PoseProbe> drive(graph, kDrive_ns);
+    const Seen& seen = drive.probe().seen;
     const sim::Simulation& world = drive.world();
     const Off wheels = off(seen.wheels, world), scans = off(seen.scans, world), joined = off(seen.joined, world);
     MESSAGE("wheels off by " << wheels.metres << " m, " << wheels.degrees << " deg; scans " << scans.metres << ", "

@@ -17,10 +17,11 @@ struct Seen {
   double cell_m = 0;
   std::map<Cell, int16_t> floor, fused;  ///< what was last known of each cell
 };
-Seen seen;  // the node is made by the composition, so it has no other way to tell
 
 class FloorProbe final : public Node {
  public:
+  Seen seen;
+
   void setup(Setup&) override {}
   void run(Job&) override {
     keep(floor_, seen.floor);
@@ -28,7 +29,7 @@ class FloorProbe final : public Node {
   }
 
  private:
-  static void keep(const Input<Grid>& port, std::map<Cell, int16_t>& cells) {
+  void keep(const Input<Grid>& port, std::map<Cell, int16_t>& cells) {
     const Grid* grid = port.newest();
     if (!grid || !port.is_new()) return;
     seen.cell_m = grid->cell_m;
@@ -42,19 +43,14 @@ class FloorProbe final : public Node {
   Input<Grid> fused_{this, "fused", ""};
 };
 
-constexpr const char* kGraphText = R"(takt: 1
-name: floor
-schedule: schedule.yaml
-default_profile: sim
-devices:
+constexpr test::DriveGraph kGraph{
+    .devices = R"(
   front_laser: {kind: laser_scanner, model: lms200, rate: 15, mount: {x: 0.0m, y: 0.30m, z: 0.25m}}
   floor_laser: {kind: laser_scanner, model: lms400, rate: 15, mount: {x: 0.0m, y: 0.25m, z: 1.0m, pitch: -34deg},
                 beams: 281, fov: 70deg, range: 3m, noise: 4mm}
   base: {kind: mobile_base, rate: 15}
-profiles:
-  sim: {default: {driver: sim, world: @/worlds/lab.xml}}
-subsystems:
-  mapping:
+)",
+    .nodes = R"(
     scan_matching:
       type: scan_matching
       in: {scan: {from: front_laser.scan, depth: 4}, odometry: {from: base.odometry, depth: 16}}
@@ -68,12 +64,8 @@ subsystems:
         odometry: {from: robot_pose.odometry, depth: 16}
         grid: scan_matching.map
     probe: {type: probe, in: {floor: traversability.traversability, fused: traversability.fused}}
-)";
-constexpr const char* kScheduleText = R"(takt: 1
-name: floor
-policy: cooperative
-cores: [0]
-nodes:
+)",
+    .schedule = R"(
   front_laser: {rate: 15, budget: 1ms}
   floor_laser: {rate: 15, budget: 1ms}
   base: {rate: 15, budget: 1ms}
@@ -81,7 +73,8 @@ nodes:
   traversability: {rate: 15, offset: 20ms, budget: 1ms}
   scan_matching: {rate: 5, offset: 30ms, budget: 5ms}
   probe: {rate: 15, offset: 50ms, budget: 1ms}
-)";
+)",
+};
 
 /// Cells called blocked and free, and how many of them with reason.
 struct Judged {
@@ -90,16 +83,16 @@ struct Judged {
 
 /// Blocked rightly: something stands within two cells of it, as the rules say. Free rightly: nothing stands on its
 /// middle.
-Judged judge(const std::map<Cell, int16_t>& cells, const sim::Simulation& world) {
+Judged judge(const std::map<Cell, int16_t>& cells, double cell_m, const sim::Simulation& world) {
   const sim::RobotState start = world.robot(world.epoch_ns());
   const double c = std::cos(start.theta_rad), s = std::sin(start.theta_rad);
   Judged out;
   for (const auto& [cell, value] : cells) {
-    const double x = (cell.first + 0.5) * seen.cell_m, y = (cell.second + 0.5) * seen.cell_m;
+    const double x = (cell.first + 0.5) * cell_m, y = (cell.second + 0.5) * cell_m;
     const sim::Vec2 at(start.x_m + c * x - s * y, start.y_m + s * x + c * y);
     const bool blocked = value > 500;
     ++(blocked ? out.blocked : out.free);
-    if (blocked) out.blocked_rightly += collides(world.world(), at, 2.5 * seen.cell_m);
+    if (blocked) out.blocked_rightly += collides(world.world(), at, 2.5 * cell_m);
     else out.free_rightly += !collides(world.world(), at, 1e-6);
   }
   return out;
@@ -110,8 +103,10 @@ double pct(size_t part, size_t of) { return of == 0 ? 0 : 100.0 * static_cast<do
 }  // namespace
 
 TEST_CASE("what a tilted scanner says of the floor on a drive through the lab agrees with the world") {
-  auto drive = test::Drive::with<FloorProbe>(kGraphText, kScheduleText, 75'000'000'000);
-  const Judged floor = judge(seen.floor, drive.world()), fused = judge(seen.fused, drive.world());
+  test::Drive<FloorProbe> drive(kGraph, 75'000'000'000);
+  const Seen& seen = drive.probe().seen;
+  const Judged floor = judge(seen.floor, seen.cell_m, drive.world()),
+               fused = judge(seen.fused, seen.cell_m, drive.world());
   for (const Judged& j : {floor, fused}) {
     MESSAGE(j.blocked << " cells blocked, " << pct(j.blocked_rightly, j.blocked) << " % rightly; " << j.free
                       << " free, " << pct(j.free_rightly, j.free) << " % rightly");

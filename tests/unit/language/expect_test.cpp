@@ -56,6 +56,7 @@ TEST_CASE("conditions on ports: counts, numbers with units, texts, windows") {
   CHECK(c.bound.at_most == 1);
   CHECK(c.unit.empty());
   CHECK(condition("port: stereo.disparity, field: disparity, at_least: 1").field == "disparity");
+  CHECK(condition("port: stereo.disparity, field: \"disparity[12]\", at_least: 1").field == "disparity[12]");
   CHECK(condition("port: stereo.disparity, messages: {at_most: 0}").bound.at_most == 0);
 }
 
