@@ -38,7 +38,7 @@ run 1 "" "$scenarios/obstacle.yaml" --clock virtual --for 3s
 
 # What cannot be looked at is refused before anything starts.
 edited obstacle 's/of: bernd/of: bert/'
-run 2 'obstacle.yaml:28:7: error: the simulated world has no object `bert`; did you mean `bernd`?' "$work/scenarios/obstacle.yaml"
+run 2 'obstacle.yaml:30:7: error: the simulated world has no object `bert`; did you mean `bernd`?' "$work/scenarios/obstacle.yaml"
 run 2 'with devices whose driver is sim, and --isolate none' "$scenarios/obstacle.yaml" --isolate subsystem
 edited obstacle 's/field: speed_m_s/field: sped_m_s/'
 run 2 'did you mean `speed_m_s`?' "$work/scenarios/obstacle.yaml"

@@ -21,6 +21,7 @@ expect 0 "" "$takt" terrain learn "$work/measured.txt" --out "$work/again.txt"
 cmp -s "$work/terrain.txt" "$work/again.txt" || fail "maps learnt from a file are not those that were learnt when it was written"
 expect 2 "cannot be read" "$takt" terrain learn "$work/none.txt" --out "$work/terrain.txt"
 expect 0 "" "$takt" eval terrain --drives 1 --json --picture "$work/maps.png"
+at_least right_pct 85
 [ -s "$work/maps.png" ] || fail "no picture of the maps"
 
 images=${TAKT_DATA:-$source/../shared/data}/ground

@@ -29,6 +29,8 @@ sed -e "s|/tmp/front_laser|$work/front|; s|127.0.0.1:2111|127.0.0.1:$port|; s|: 
 expect 3 "ls /dev/serial/by-id" "$takt" run "$work/lasers.yaml" --profile robot --for 1s --output "$work/out"
 expect 2 "known: head, base, lms200, lms400" "$takt" double lms500 --pty "$work/front"
 expect 2 "--pty PATH or --tcp PORT" "$takt" double lms200
+expect 2 "--video PATH" "$takt" double camera --can vcan0
+expect 3 "modprobe v4l2loopback" "$takt" double camera --video "$work/none"
 
 # Captured bytes of a real scanner, as the index of the capture marks them.
 data=${TAKT_DATA:-$source/../shared/data}/sick/lms200
@@ -52,6 +54,16 @@ expect 2 "cannot be opened" "$takt" eval lms200 --rx "$work/none" --index "$work
 
 double front lms200 --pty "$work/front"
 double floor lms400 --tcp "$port"
+
+# What they say, asked for scans meanwhile: taken from the file as it was from the line.
+expect 0 "" "$takt" capture "$work/front" "$work/front.rx.bin" --scanner lms200 --baud 500000 --for 5s
+cat "$work/stdout"
+: >"$work/none.csv"
+expect 0 "" "$takt" eval lms200 --rx "$work/front.rx.bin" --index "$work/none.csv" --json
+python3 -c 'import json, sys; r = json.load(open(sys.argv[1])); print(r); sys.exit(r["scans"] < 10)' "$work/stdout" || fail "the captured bytes hold no scans"
+expect 0 "" "$takt" capture "127.0.0.1:$port" "$work/floor.rx.bin" --scanner lms400 --for 5s
+cat "$work/stdout"
+grep -q " [1-9][0-9]* scans" "$work/stdout" || fail "no scans of the lms400 were captured"
 
 "$takt" run "$work/lasers.yaml" --profile robot --policy cooperative --for 24s --output "$work/out" --report "$work/report.json" \
   >"$work/run.out" 2>"$work/run.err" &

@@ -27,11 +27,12 @@ expect() {
 }
 
 # start_run NAME OPTIONS... : in the background, its process in $run; returns once it can be attached to. However long
-# that takes: under a sanitizer it is many seconds.
+# that takes: under a sanitizer it is many seconds. Under $policy; empty: that of the schedule, where the kernel grants it.
+policy=cooperative
 start_run() {
   local name=$1
   shift
-  "$takt" run --policy cooperative --output "$work/$name" "$@" >"$work/$name.out" 2>"$work/$name.err" &
+  "$takt" run ${policy:+--policy "$policy"} --output "$work/$name" "$@" >"$work/$name.out" 2>"$work/$name.err" &
   run=$!
   while kill -0 $run 2>/dev/null; do
     "$takt" top --once --run $run >"$work/top" 2>/dev/null && return

@@ -24,46 +24,45 @@ struct Sighting {
   int64_t stamp_ns = 0;
   Place place;  ///< robot frame
 };
-// The node is made by the composition, so it has no other way to tell.
-std::map<std::string, Place> kept;  ///< what the map holds at the end, by names
-std::vector<Sighting> sightings;
-size_t looks = 0;
+struct Seen {
+  std::map<std::string, Place> kept;  ///< what the map holds at the end, by names
+  std::vector<Sighting> sightings;
+  size_t looks = 0;
+};
 
 class MapProbe final : public Node {
  public:
+  Seen seen;
+
   void setup(Setup&) override {}
   void run(Job&) override {
-    if (seen_.is_new())
-      semantic::for_each_report(*seen_.newest(), [&](const semantic::Report& report) {
-        sightings.push_back({seen_.stamp_ns(), place_of(report)});
+    if (sighted_.is_new())
+      semantic::for_each_report(*sighted_.newest(), [&](const semantic::Report& report) {
+        seen.sightings.push_back({sighted_.stamp_ns(), place_of(report)});
       });
     if (!known_.is_new()) return;
-    ++looks;
-    kept.clear();
-    semantic::for_each_report(
-        *known_.newest(), [](const semantic::Report& report) { kept[std::string(report.name)] = place_of(report); });
+    ++seen.looks;
+    seen.kept.clear();
+    semantic::for_each_report(*known_.newest(), [&](const semantic::Report& report) {
+      seen.kept[std::string(report.name)] = place_of(report);
+    });
   }
 
  private:
   static Place place_of(const semantic::Report& report) {
     return {std::string(report.type), report.place.x_m, report.place.y_m};
   }
-  Input<ObjectReports> seen_{this, "seen", ""};
+  Input<ObjectReports> sighted_{this, "seen", ""};
   Input<ObjectReports> known_{this, "known", ""};
 };
 
-constexpr const char* kGraphText = R"(takt: 1
-name: boxes
-schedule: schedule.yaml
-default_profile: sim
-devices:
+constexpr test::DriveGraph kGraph{
+    .devices = R"(
   head_camera: {kind: stereo_camera, rig: @/rigs/xb3.yaml, rate: 5}
   front_laser: {kind: laser_scanner, model: lms200, rate: 15, mount: {x: 0.0m, y: 0.30m, z: 0.25m, yaw: 0deg}}
   base: {kind: mobile_base, rate: 15}
-profiles:
-  sim: {default: {driver: sim, world: @/worlds/lab.xml}}
-subsystems:
-  robot:
+)",
+    .nodes = R"(
     stereo: {type: stereo, in: {pair: head_camera.pair}, params: {disparities: 128, subpixel: true}}
     object_detection: {type: object_detection, in: {pair: head_camera.pair}, params: {database: @/objects}}
     scan_matching:
@@ -78,12 +77,8 @@ subsystems:
       in: {reports: {from: object_locator.reports, depth: 4}, odometry: {from: scan_matching.odometry, depth: 16}}
       params: {network: @/networks/boxes.yaml, distance_max: 1m}
     probe: {type: probe, in: {seen: object_locator.reports, known: map.reports}}
-)";
-constexpr const char* kScheduleText = R"(takt: 1
-name: boxes
-policy: cooperative
-cores: [0]
-nodes:
+)",
+    .schedule = R"(
   head_camera: {rate: 5, budget: 5ms}
   front_laser: {rate: 15, budget: 1ms}
   base: {rate: 15, budget: 1ms}
@@ -93,7 +88,8 @@ nodes:
   object_locator: {rate: 5, offset: 60ms, budget: 1ms}
   map: {rate: 5, offset: 100ms, budget: 1ms}
   probe: {rate: 5, offset: 150ms, budget: 1ms}
-)";
+)",
+};
 
 constexpr double kFills_m = 3;                // nearer boxes are larger than the detector's window
 constexpr int64_t kOnce_ns = 72'000'000'000;  // around the lab
@@ -108,16 +104,17 @@ PlanarPose seen_from(const sim::RobotState& robot, const sim::WorldObject& objec
 }  // namespace
 
 TEST_CASE("after a round through the lab the semantic map holds its four boxes, and where they stand") {
-  auto drive = test::Drive::with<MapProbe>(kGraphText, kScheduleText, kOnce_ns);
+  test::Drive<MapProbe> drive(kGraph, kOnce_ns);
+  const Seen& seen = drive.probe().seen;
   const sim::Simulation& world = drive.world();
-  CHECK(looks > 250);
-  CHECK(kept.size() == 4);
+  CHECK(seen.looks > 250);
+  CHECK(seen.kept.size() == 4);
   std::vector<double> errors_m;
   size_t boxes = 0;
   for (const sim::WorldObject& object : world.world().objects) {
     if (object.type != "box") continue;
     ++boxes;
-    for (const Sighting& sighting : sightings) {
+    for (const Sighting& sighting : seen.sightings) {
       if (sighting.place.type != object.name) continue;
       const PlanarPose truth = seen_from(world.robot(sighting.stamp_ns), object);
       if (std::hypot(truth.x_m, truth.y_m) < kFills_m) continue;
@@ -125,7 +122,7 @@ TEST_CASE("after a round through the lab the semantic map holds its four boxes, 
     }
     const PlanarPose truth = seen_from(world.robot(world.epoch_ns()), object);
     size_t nodes = 0;
-    for (const auto& [name, known] : kept) {
+    for (const auto& [name, known] : seen.kept) {
       if (known.type != object.name) continue;
       ++nodes;
       const double off_m = std::hypot(known.x_m - truth.x_m, known.y_m - truth.y_m);

@@ -19,10 +19,11 @@ struct Seen {
   std::array<int, kSignShapes.size()> of_class{};
   int placed = 0, near_truth = 0;
 };
-Seen seen;  // the node is made by the composition, so it has no other way to tell
 
 class SignProbe final : public Node {
  public:
+  Seen seen;
+
   void setup(Setup&) override {}
   void run(Job&) override {
     const Detections* found = detections_.newest();
@@ -46,16 +47,11 @@ class SignProbe final : public Node {
   Input<PointCloud> places_{this, "places", ""};
 };
 
-constexpr const char* kGraphText = R"(takt: 1
-name: crossing
-schedule: schedule.yaml
-default_profile: sim
-devices:
+constexpr test::DriveGraph kGraph{
+    .devices = R"(
   head_camera: {kind: stereo_camera, rig: @/rigs/xb3.yaml, rate: 5}
-profiles:
-  sim: {default: {driver: sim, world: @/worlds/crossing.xml}}
-subsystems:
-  street:
+)",
+    .nodes = R"(
     stereo: {type: stereo, in: {pair: head_camera.pair}, params: {disparities: 128}}
     traffic_signs:
       type: traffic_signs
@@ -66,25 +62,23 @@ subsystems:
       type: probe
       in: {detections: traffic_signs.detections, places: traffic_signs.places}
       join: [detections, places]
-)";
-constexpr const char* kScheduleText = R"(takt: 1
-name: crossing
-policy: cooperative
-cores: [0]
-nodes:
+)",
+    .schedule = R"(
   head_camera: {rate: 5, budget: 8ms, criticality: high}
   stereo: {rate: 5, offset: 26ms, budget: 20ms, criticality: high}
   traffic_signs: {rate: 5, offset: 90ms, budget: 40ms}
   probe: {rate: 5, offset: 180ms, budget: 1ms}
-)";
+)",
+    .world = "crossing",
+};
 
 }  // namespace
 
 TEST_CASE("traffic_signs in a graph: three signs of a simulated yard by their names, with their distances") {
-  seen = {};
-  test::Drive::with<SignProbe>(kGraphText, kScheduleText, 4'000'000'000);
+  const test::Drive<SignProbe> drive(kGraph, 4'000'000'000);
+  const Seen& seen = drive.probe().seen;
   CHECK(seen.messages >= 18);
-  const auto of = [](SignClass sign) { return seen.of_class[static_cast<size_t>(sign)]; };
+  const auto of = [&](SignClass sign) { return seen.of_class[static_cast<size_t>(sign)]; };
   CHECK(of(SignClass::stop) >= 12);
   CHECK(of(SignClass::yield) >= 6);
   CHECK(of(SignClass::arrow_right) >= 6);

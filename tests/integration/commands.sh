@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: Apache-2.0
+# What no other script runs: every other command that the README shows, once and small, as a user starts it. How good its
+# figures are, the tests of its room know.
+source "$(dirname "$0")/lib.sh" "$@"
+unset TAKT_DATA  # what is recorded is another test's
+
+# answers COMMAND...: exit 0, and something on stdout.
+answers() {
+  expect 0 "" "$@"
+  [ -s "$work/stdout" ] || fail "nothing on stdout: $*"
+}
+# tells TEXT COMMAND...: exit 0, and TEXT on stdout.
+tells() {
+  local text=$1
+  shift
+  expect 0 "" "$@"
+  grep -qF -- "$text" "$work/stdout" || fail "stdout lacks '$text': $*"
+}
+# writes FILE COMMAND...: exit 0, and FILE holds something.
+writes() {
+  local file=$1
+  shift
+  expect 0 "" "$@"
+  [ -s "$file" ] || fail "$file is empty or absent: $*"
+}
+
+tells robot_client "$takt" nodes
+tells disparities "$takt" nodes stereo
+expect 0 "" "$takt" devices --json
+python3 -m json.tool "$work/stdout" >/dev/null || fail "devices: no JSON"
+
+"$takt" double base --can "unix:$work/can" </dev/null >"$work/double.out" 2>&1 &
+double=$!
+for _ in $(seq 100); do [ -S "$work/can" ] && break; sleep 0.1; done
+expect 0 "" "$takt" capture "unix:$work/can" "$work/frames.log" --for 1s
+kill $double
+wait $double
+
+writes "$work/sweeps.txt" "$takt" calibrate lasers --generate "$work/sweeps.txt"
+writes "$work/mounts.yaml" "$takt" calibrate lasers "$work/sweeps.txt" --out "$work/mounts.yaml"
+
+writes "$work/stop.png" "$takt" train picture stop "$work/stop.png"
+mkdir "$work/signs"
+writes "$work/signs/stop.xml" "$takt" train cascade --sign stop --out "$work/signs" --stages 1 --positives 50 --images 2
+
+cp -r "$source/graph/objects" "$work/objects"
+view=$(ls "$work"/objects/*/*.png | head -n 1)
+tells red_box "$takt" objects list "$work/objects"
+answers "$takt" objects add "$work/objects" copy "$view"
+tells copy "$takt" objects list "$work/objects"
+answers "$takt" objects tune "$work/objects" --object red_box --scenes 1
+expect 0 "" "$takt" run --clock virtual --for 1s --output "$work/out"
+answers "$takt" objects test "$work/objects" "$work/out/left.png"
+answers "$takt" objects publish "$work/objects"
+
+for graph in crossing people remote_robot yard; do
+  expect 0 "" "$takt" run "$source/graph/$graph.yaml" --clock virtual --for 1s --output "$work/out"
+done
+port=$((20000 + RANDOM % 10000))
+expect 0 "" "$takt" run "$source/graph/simulator.yaml" --clock virtual --for 1s --set "service.address=127.0.0.1:$port" --output "$work/out"
+expect 0 "" "$takt" run --profile replay --clock virtual --for 1s --output "$work/out"
+
+answers "$takt" eval objects --frames 1 --images 1 --empty 1
+answers "$takt" eval objects3d --samples 2
+answers "$takt" eval sift --frames 1
+answers "$takt" eval signs --scenes 1 --passages 1
+answers "$takt" eval body_pose --people 1
+answers "$takt" eval person_tracking --walks 1 --frames 5
+answers "$takt" eval mapping --minutes 0 --runs 1 --clouds 3
+answers "$takt" eval registration --sweep population --runs 1 --generations 20 --points 50
+answers "$takt" eval obstacle_stop --trials 1 --vision absent
+answers "$takt" eval semantic --rooms 1 --objects 5 --looks 10
+answers "$takt" eval semantic --network "$source/graph/networks/kitchen.yaml" --goal cup_1.level=full --at 0 0
+finish
