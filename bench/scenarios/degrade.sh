@@ -26,7 +26,8 @@ one_run() { # VERB
     running
     sleep 0.2
   done
-  "$takt" top --json >"$work/$1.top" 2>/dev/null & local top=$!
+  : >"$work/$1.top"  # read at once below
+  "$takt" top --json >>"$work/$1.top" 2>/dev/null & local top=$!
   wait_until() { # until the run is that old, s
     until awk -v t="$1" 'END { exit !(match($0, /"running_s":[0-9.]+/) && substr($0, RSTART + 12, RLENGTH - 12) + 0 >= t) }' "$work/$verb.top"
     do

@@ -3,8 +3,8 @@
 # Kills processes of a run at random instants: kills.sh [KILLS] [SECONDS] [SEED] [takt run options...]
 # Default: 200 kills in a run of 10 minutes. Prints how long each process was away, what the nodes of the others missed
 # meanwhile, and what is left afterwards: chunks, descriptors, threads, /dev/shm, /tmp, and SCHED_DEADLINE bandwidth,
-# found by asking the kernel for it. Exit 1 if a process did not come back or something is left; deadlines missed by
-# nodes whose own process was not killed are told and counted as such.
+# found by asking the kernel for it. Each miss of a high-criticality node is told with its reason (takt explain) and with
+# the kill before it. Exit 1 if a process did not come back or something is left.
 root=$(readlink -f "$(dirname "$0")/../..")
 exec python3 - "${TAKT:-$root/takt}" "$@" <<'PY'
 import ctypes, json, os, random, signal, struct, subprocess, sys, tempfile, time
@@ -74,12 +74,26 @@ def open_things(pid):
     return {name: (len(os.listdir(f"/proc/{p}/fd")), len(os.listdir(f"/proc/{p}/task"))) for name, p in sorted(pids.items())}
 
 
+def why_missed(trace_file, nodes, struck):
+    """A line per job of these nodes that missed, with the kill before it."""
+    jobs = [(e["args"], e["name"].split()[0]) for e in json.load(open(trace_file))["traceEvents"] if e.get("cat") == "job"]
+    late = sorted((job["release_ns"], name) for job, name in jobs if job["late"] and name in nodes)
+    said = {n: subprocess.run([takt, "explain", trace_file, n], capture_output=True, text=True).stdout.splitlines()
+            for n in {name for _, name in late}}
+    lines = []
+    for release_ns, name in late:
+        before = [kill for kill in struck if kill[0] <= release_ns]
+        kill = f"{(release_ns - before[-1][0]) / 1e6:.0f} ms after the end of {before[-1][1]}" if before else "before any kill"
+        lines.append(f"{kill}: {said[name].pop(0)}")
+    return lines
+
+
 with tempfile.TemporaryDirectory(prefix="kills-") as work:
     before, room = traces(), bandwidth()
-    report_file = f"{work}/report.json"
+    report_file, trace_file = f"{work}/report.json", f"{work}/trace.json"
     log = open(f"{work}/log", "w")
     run = subprocess.Popen([takt, "run", "--isolate", "subsystem", "--for", f"{seconds}s", "--output", f"{work}/out",
-                            "--report", report_file, *options], stdout=log, stderr=log)
+                            "--report", report_file, "--trace", trace_file, *options], stdout=log, stderr=log)
     while len(children(run.pid)) < 2 and run.poll() is None: time.sleep(0.1)
     time.sleep(6)
     if run.poll() is not None: sys.exit("the run did not start:\n" + open(log.name).read())
@@ -93,11 +107,13 @@ with tempfile.TemporaryDirectory(prefix="kills-") as work:
         victim = chance.choice(sorted(alive))
         try: os.kill(alive[victim], signal.SIGKILL)
         except ProcessLookupError: continue
-        struck.append(victim)
+        struck.append((time.monotonic_ns(), victim))
     time.sleep(max(0, last + 5 - time.monotonic()))
     late = open_things(run.pid) if run.poll() is None else {}
     code = run.wait()
     report = json.load(open(report_file))
+    high = {n["name"] for n in report["nodes"] if n["criticality"] == "high"}
+    reasons = why_missed(trace_file, high, struck)
     print(open(log.name).read()[-3000:] if code not in (0, 1) else "", end="")
     after, room_after = traces(), bandwidth()
 
@@ -114,6 +130,7 @@ for n in report["nodes"]:
     print(f"{n['name']:18}{n['criticality']:>6}{n['released']:10}{n.get('down', 0):7}{n['completed']:8}{n['deadline_misses']:6}{n['skipped']:6}")
     if n["criticality"] == "high": worse += n["deadline_misses"]
 print(f"deadline misses of high-criticality nodes: {worse}")
+for line in reasons: print("   ", line)
 bad = []
 if len(outages) != len(back): bad.append("a process did not come back")
 if early != late: bad.append(f"descriptors or threads: {early} -> {late}")

@@ -7,6 +7,7 @@
 #include "bench/load.hpp"
 #include "bench/suite.hpp"
 #include "bench/suites/release_rounds.hpp"
+#include "rt/memory/process_memory.hpp"
 
 namespace takt::bench {
 
@@ -70,6 +71,8 @@ void run_condition(Policy policy, Load load, int64_t anticipate_ns, int rounds, 
 }  // namespace
 
 std::vector<Row> run_release(const Options& options) {
+  const CpuLatencyHold latency = hold_cpu_dma_latency();  // as `takt run` does; cyclictest holds it, too
+  if (latency.refused()) std::fprintf(stderr, "release: %s\n", latency.lacks().c_str());
   const int rounds = options.rounds_or(10);
   std::vector<Row> rows;
   for (int64_t anticipate_ns : {kDefaultAnticipate_ns, int64_t{0}}) {

@@ -7,6 +7,7 @@
 #include "bench/load.hpp"
 #include "bench/suite.hpp"
 #include "bench/suites/release_rounds.hpp"
+#include "rt/memory/process_memory.hpp"
 
 namespace takt::bench {
 
@@ -95,6 +96,8 @@ class Condition {
 }  // namespace
 
 std::vector<Row> run_release_loads(const Options& options) {
+  const CpuLatencyHold latency = hold_cpu_dma_latency();  // as `takt run` does; cyclictest holds it, too
+  if (latency.refused()) std::fprintf(stderr, "release_loads: %s\n", latency.lacks().c_str());
   const int rounds = options.rounds_or(10);
   std::vector<Row> rows;
   if (!cyclictest_round(Policy::cooperative))

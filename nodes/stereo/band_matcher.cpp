@@ -58,12 +58,12 @@ BandMatcher::BandMatcher(int width, int height, int channels, const MatcherParam
     band.top = std::max(0, band.first - reach(parameters));
     band.height = std::min(height, band.last + reach(parameters)) - band.top;
     if (i == 0) {
-      band.own.matcher = make_matcher(width, band.height, channels, parameters);
+      band.own.matcher = make_matcher_of(band, parameters);
       continue;
     }
-    band.own = make_desk(band.height, parameters);
+    band.own = make_desk(band, parameters);
     band.helper = std::make_unique<Helper>();
-    band.helper->desk = make_desk(band.height, parameters);
+    band.helper->desk = make_desk(band, parameters);
     band.helper->left.resize(bytes_of(band.height));
     band.helper->right.resize(bytes_of(band.height));
   }
@@ -85,9 +85,15 @@ size_t BandMatcher::bytes_of(int height) const {
   return static_cast<size_t>(width_) * static_cast<size_t>(height) * static_cast<size_t>(channels_);
 }
 
-BandMatcher::Desk BandMatcher::make_desk(int height, const MatcherParameters& parameters) const {
-  const auto count = static_cast<size_t>(width_) * static_cast<size_t>(height);
-  return {make_matcher(width_, height, channels_, parameters), std::vector<int16_t>(count), std::vector<uint8_t>(count),
+std::unique_ptr<Matcher> BandMatcher::make_matcher_of(const Band& band, const MatcherParameters& parameters) const {
+  auto matcher = make_matcher(width_, band.height, channels_, parameters);
+  matcher->want_rows(band.first - band.top, band.last - band.top);
+  return matcher;
+}
+
+BandMatcher::Desk BandMatcher::make_desk(const Band& band, const MatcherParameters& parameters) const {
+  const auto count = static_cast<size_t>(width_) * static_cast<size_t>(band.height);
+  return {make_matcher_of(band, parameters), std::vector<int16_t>(count), std::vector<uint8_t>(count),
           std::vector<uint8_t>(count)};
 }
 
@@ -110,12 +116,16 @@ void BandMatcher::ask(const Band& band, ImageView<const uint8_t> left, ImageView
   Helper& helper = *band.helper;
   helper.asked_now = helper.state.load(std::memory_order_acquire) != State::busy;
   if (!helper.asked_now) return;
+  const auto call = [&](State state) {
+    helper.state.store(state, std::memory_order_release);
+    helper.calls.fetch_add(1, std::memory_order_release);
+    helper.calls.notify_one();
+  };
+  call(State::soon);  // it wakes up meanwhile
   copy_image(left, helper.left.data());
   copy_image(right, helper.right.data());
   helper.search = search_;
-  helper.state.store(State::asked, std::memory_order_release);
-  helper.calls.fetch_add(1, std::memory_order_release);
-  helper.calls.notify_one();
+  call(State::asked);
 }
 
 void BandMatcher::serve(const Band& band, const std::stop_token& stop) {
@@ -124,6 +134,8 @@ void BandMatcher::serve(const Band& band, const std::stop_token& stop) {
     helper.calls.wait(seen, std::memory_order_acquire);
     if (stop.stop_requested()) return;
     seen = helper.calls.load(std::memory_order_acquire);
+    for (int looks = 0; looks < patience_ && helper.state.load(std::memory_order_acquire) == State::soon; ++looks)
+      hwy::Pause();
     State asked = State::asked;
     if (!helper.state.compare_exchange_strong(asked, State::busy, std::memory_order_acquire)) continue;
     const int64_t before_ns = thread_cpu_ns();  // replay: counted, and no result depends on it
@@ -153,7 +165,7 @@ bool BandMatcher::match(ImageView<const uint8_t> left, ImageView<const uint8_t> 
   };
   for (const Band& band : bands_)
     if (band.helper) ask(band, read_by(band, left), read_by(band, right));
-  // The first band is matched in place: what it writes below its own rows is the next bands'.
+  // The first band is matched in place: below its own rows it reads, and writes nothing that lasts.
   const Band& begin = bands_.front();
   (void)begin.own.matcher->match(read_by(begin, left), read_by(begin, right),
                                  {first_rows(out.disparity, begin.height), first_rows(out.confidence, begin.height),

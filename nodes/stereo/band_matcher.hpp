@@ -40,8 +40,8 @@ class BandMatcher final : public Matcher {
     std::vector<int16_t> disparity;
     std::vector<uint8_t> confidence, fraction;
   };
-  /// The caller makes idle and done -> asked and asked -> idle, the thread asked -> busy -> done.
-  enum class State : uint8_t { idle, asked, busy, done };
+  /// The caller makes idle and done -> soon -> asked and asked -> idle, the thread asked -> busy -> done.
+  enum class State : uint8_t { idle, soon, asked, busy, done };
   /// The thread that may do a band, and its copy of the rows.
   struct Helper {
     Desk desk;
@@ -59,7 +59,9 @@ class BandMatcher final : public Matcher {
     std::unique_ptr<Helper> helper;  ///< not of the first band
   };
 
-  Desk make_desk(int height, const MatcherParameters& parameters) const;
+  /// Of the rows that the band reads; it gives those of its result.
+  std::unique_ptr<Matcher> make_matcher_of(const Band& band, const MatcherParameters& parameters) const;
+  Desk make_desk(const Band& band, const MatcherParameters& parameters) const;
   /// Matches on a desk; `left` and `right` are the rows that the band reads.
   void run(const Band& band, Desk& desk, ImageView<const uint8_t> left, ImageView<const uint8_t> right) const;
   void deliver(const Band& band, const Desk& desk, const DisparityViews& out) const;

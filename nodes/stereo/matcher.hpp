@@ -29,6 +29,10 @@ class Matcher {
   /// at construction; the result is that of a matcher made for n. Allocates nothing.
   virtual void limit_search(int disparities) = 0;
 
+  /// From the next match() on only rows first .. last - 1 of the result are wanted, 0 <= first < last <= height; what
+  /// the others then hold is undefined. Allocates nothing.
+  virtual void want_rows(int /*first*/, int /*last*/) {}
+
   /// CPU time that threads beside the caller's have taken, ns. Any thread.
   virtual int64_t helper_cpu_ns() const { return 0; }
 

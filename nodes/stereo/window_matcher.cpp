@@ -20,10 +20,18 @@ constexpr int kStripWidth = 320;
 }  // namespace
 
 struct WindowMatcher::State {
+  struct RowRange {
+    int first, last;  ///< the last is not one of them
+
+    RowRange wider(int rows, int height) const { return {std::max(0, first - rows), std::min(height, last + rows)}; }
+    int count() const { return last - first; }
+  };
+
   State(int width_, int height_, int channels_, const MatcherParameters& parameters);
 
   /// Searches 0 .. disparities - 1, not more than memory was taken for.
   void set_range(int disparities);
+  void set_rows(RowRange rows);
   /// Groups of the next block when that many are left.
   int block_size(int groups_left) const;
   /// Keys of the reference image against the other one, given mirrored; minimum filter applied, left in `filtered`.
@@ -31,11 +39,13 @@ struct WindowMatcher::State {
   void search_block(const Planes& reference, const Planes& mirrored_other, RowJob job, const RowFunctions& rows);
   void load_row(const Planes& reference, const Planes& mirrored_other, int y, RowJob& job);
   void filter(Rows<uint32_t>& out);
+  void smooth_rows();
   bool in_memory() const { return p.uniqueness > 0 || p.subpixel; }
   void write(int y, const DisparityViews& out) const;
 
   MatcherParameters p;
   const int most_disparities;
+  RowRange wanted, filtered, decided;  ///< rows of the result, and those that they are made of
   int width, height, channels, planes, lanes, all_groups, block_groups;
   bool narrow;
   const Kernels* kernels;
@@ -56,6 +66,9 @@ struct WindowMatcher::State {
 WindowMatcher::State::State(int width_, int height_, int channels_, const MatcherParameters& parameters)
     : p(parameters),
       most_disparities(parameters.disparities),
+      wanted{0, height_},
+      filtered{0, height_},
+      decided{0, height_},
       width(width_),
       height(height_),
       channels(channels_),
@@ -109,6 +122,12 @@ void WindowMatcher::State::set_range(int disparities) {
     last_tail.data()[i] = (all_groups - 1) * lanes + i >= p.disparities ? uint16_t{0xFFFF} : uint16_t{0};
 }
 
+void WindowMatcher::State::set_rows(RowRange rows) {
+  wanted = rows;
+  filtered = wanted.wider(p.median ? 1 : 0, height);
+  decided = filtered.wider(p.n_min / 2, height);
+}
+
 int WindowMatcher::State::block_size(int groups_left) const {
   // Sums are scaled by the number of groups and must stay below 65535.
   const int most = std::min(groups_left, 65535 / (p.max_sum() + 1));
@@ -134,19 +153,20 @@ void WindowMatcher::State::search_block(const Planes& reference, const Planes& m
   const size_t row_bytes = static_cast<size_t>(job.last_column - job.first_column + 1) * column_stride;
   const auto slot = [&](int y) { return ring.data() + static_cast<size_t>(y % n) * row_bytes; };
   std::memset(columns.data(), 0, row_bytes * column_bytes(narrow));
-  for (int y = 0; y <= std::min(r, last); ++y) {
+  const int begin = decided.first;
+  for (int y = std::max(0, begin - r); y <= std::min(begin + r, last); ++y) {
     load_row(reference, mirrored_other, y, job);
     job.ring_new = slot(y);
     rows.fill(job);
   }
   job.ring_old = zeros.data();
-  for (int y = -r; y <= r; ++y) {
+  for (int y = begin - r; y <= begin + r; ++y) {
     job.ring_new = slot(std::clamp(y, 0, last));
     rows.roll(job);
   }
-  for (int y = 0; y < height; ++y) {
+  for (int y = begin; y < decided.last; ++y) {
     const int enters = std::min(y + r, last), leaves = std::max(y - r - 1, 0);
-    if (y > 0) {
+    if (y > begin) {
       job.new_row = y + r <= last && r > 0;
       job.ring_new = slot(enters);
       job.ring_old = slot(leaves);
@@ -198,13 +218,22 @@ void WindowMatcher::State::search(const Planes& reference, const Planes& mirrore
 // min_d min_w S = min_w min_d S: the minimum filter on the volume is one on the (sum, disparity) keys, ties included.
 void WindowMatcher::State::filter(Rows<uint32_t>& out) {
   const int r = p.n_min / 2;
-  for (int y = 0; y < height; ++y) images->minimum_along(keys.row(y), r, width, along.row(y));
-  for (int y = 0; y < height; ++y) {
+  for (int y = decided.first; y < decided.last; ++y) images->minimum_along(keys.row(y), r, width, along.row(y));
+  for (int y = filtered.first; y < filtered.last; ++y) {
     uint32_t* row = out.row(y);
     std::memcpy(row, along.row(y), static_cast<size_t>(width) * sizeof(uint32_t));
     for (int n = std::max(0, y - r); n <= std::min(height - 1, y + r); ++n)
       if (n != y) images->minimum_with(along.row(n), width, row);
   }
+}
+
+void WindowMatcher::State::smooth_rows() {
+  const auto rows = [&](const Rows<int16_t>& of) {
+    return ImageView<int16_t>{of.row(filtered.first), width, filtered.count(), 1, of.view().stride};
+  };
+  for (int y = filtered.first; y < filtered.last; ++y)
+    for (int x = 0; x < width; ++x) fine.row(y)[x] = static_cast<int16_t>(left_keys.row(y)[x] % 65536 >> 1);
+  median_3x3(rows(fine), rows(smooth));
 }
 
 void WindowMatcher::State::write(int y, const DisparityViews& out) const {
@@ -233,6 +262,8 @@ WindowMatcher::~WindowMatcher() = default;
 
 void WindowMatcher::limit_search(int disparities) { state_->set_range(disparities); }
 
+void WindowMatcher::want_rows(int first, int last) { state_->set_rows({first, last}); }
+
 const char* WindowMatcher::target() const { return state_->kernels->target; }
 
 bool WindowMatcher::match(ImageView<const uint8_t> left, ImageView<const uint8_t> right, const DisparityViews& out) {
@@ -243,12 +274,8 @@ bool WindowMatcher::match(ImageView<const uint8_t> left, ImageView<const uint8_t
   s.search(s.left, s.right_mirrored, s.left_keys);
   // Seen in a mirror the right image is a left one, and the left image as it is stored is the mirrored right one.
   if (s.p.left_right_check) s.search(s.right_mirrored, s.left, s.right_keys);
-  if (s.p.median) {
-    for (int y = 0; y < s.height; ++y)
-      for (int x = 0; x < s.width; ++x) s.fine.row(y)[x] = static_cast<int16_t>(s.left_keys.row(y)[x] % 65536 >> 1);
-    median_3x3(s.fine.view(), s.smooth.view());
-  }
-  for (int y = 0; y < s.height; ++y) s.write(y, out);
+  if (s.p.median) s.smooth_rows();
+  for (int y = s.wanted.first; y < s.wanted.last; ++y) s.write(y, out);
   return true;
 }
 

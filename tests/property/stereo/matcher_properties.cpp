@@ -59,6 +59,17 @@ struct Output {
             {confidence.data(), p.width, p.height},
             {fraction.data(), p.width, p.height}};
   }
+  /// Those rows of all three, one behind another.
+  std::vector<int> rows(int first, int last, int width) const {
+    std::vector<int> all;
+    const auto add = [&](const auto& image) {
+      all.insert(all.end(), image.begin() + first * width, image.begin() + last * width);
+    };
+    add(disparity);
+    add(confidence);
+    add(fraction);
+    return all;
+  }
   bool operator==(const Output&) const = default;
 };
 
@@ -133,6 +144,28 @@ TEST_CASE("a search limited after construction: equal to the reference of the sm
       const Picture left = random_picture(random, pick(1, 45), pick(1, 33), 1, 256);
       const Picture right = shifted(random, left, pick(0, left.width - 1), pick(0, 100));
       expect_equal(left, right, random_parameters(random, 200), pick(1, 512));
+    }
+  });
+}
+
+TEST_CASE("rows that are wanted: equal to the reference of the whole image") {
+  on_each_target([&] {
+    std::mt19937 random(37);
+    for (int round = 0; round < 40; ++round) {
+      const auto pick = [&](int low, int high) { return std::uniform_int_distribution<int>(low, high)(random); };
+      const Picture left = random_picture(random, pick(1, 45), pick(2, 40), 1, 256);
+      const Picture right = shifted(random, left, pick(0, left.width - 1), pick(0, 100));
+      const MatcherParameters p = random_parameters(random, 60);
+      Output expected(left), out(left);
+      reference::match(left.view(), right.view(), p, expected.views(left));
+      WindowMatcher matcher(left.width, left.height, 1, p);
+      for (int wish = 0; wish < 3; ++wish) {
+        const int first = pick(0, left.height - 1), last = pick(first + 1, left.height);
+        INFO(matcher.target(), " rows ", first, " to ", last, " of ", left.height);
+        matcher.want_rows(first, last);
+        REQUIRE(matcher.match(left.view(), right.view(), out.views(left)));
+        CHECK(out.rows(first, last, left.width) == expected.rows(first, last, left.width));
+      }
     }
   });
 }
