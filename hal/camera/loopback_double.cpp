@@ -46,6 +46,9 @@ DeviceResult LoopbackDouble::plug_in() {
   format.fmt.pix.field = V4L2_FIELD_NONE;
   format.fmt.pix.colorspace = V4L2_COLORSPACE_SRGB;
   if (ioctl(descriptor_, VIDIOC_S_FMT, &format) != 0) return refused("takes no frames of that format");
+  // Frames are written, not queued; but the module notices only of who streams that it leaves, and takes nobody else.
+  int type = V4L2_BUF_TYPE_VIDEO_OUTPUT;
+  if (ioctl(descriptor_, VIDIOC_STREAMON, &type) != 0) return refused("takes no frames");
   return {};
 }
 

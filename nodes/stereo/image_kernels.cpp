@@ -98,8 +98,13 @@ void minimum_along(const uint32_t* in, int radius, int count, uint32_t* HWY_REST
     }
 }
 
-void minimum_with(const uint32_t* HWY_RESTRICT in, int count, uint32_t* HWY_RESTRICT inout) {
-  for (int i = 0; i < count; ++i) inout[i] = in[i] < inout[i] ? in[i] : inout[i];
+void minimum_across(const uint32_t* const* rows, int height, int count, uint32_t* HWY_RESTRICT out) {
+  constexpr hn::ScalableTag<uint32_t> kKeys;
+  for (int i = 0; i < count; i += static_cast<int>(hn::MaxLanes(kKeys))) {
+    auto smallest = hn::LoadU(kKeys, rows[0] + i);
+    for (int k = 1; k < height; ++k) smallest = hn::Min(smallest, hn::LoadU(kKeys, rows[k] + i));
+    hn::StoreU(smallest, kKeys, out + i);
+  }
 }
 
 void decode(const uint32_t* HWY_RESTRICT keys, int max_sum, int min_confidence, int count,
@@ -119,8 +124,8 @@ void decode(const uint32_t* HWY_RESTRICT keys, int max_sum, int min_confidence, 
 }
 
 const ImageKernels& target_image_kernels() {
-  static const ImageKernels table{grey,   derivative,    census,       channel, reverse,
-                                  spread, minimum_along, minimum_with, decode};
+  static const ImageKernels table{grey,   derivative,    census,         channel, reverse,
+                                  spread, minimum_along, minimum_across, decode};
   return table;
 }
 

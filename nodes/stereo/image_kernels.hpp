@@ -25,8 +25,8 @@ struct ImageKernels {
   void (*spread)(const uint8_t* in, int count, uint32_t* out);
   /// out[i] = min of in[i - radius .. i + radius].
   void (*minimum_along)(const uint32_t* in, int radius, int count, uint32_t* out);
-  /// inout[i] = min(inout[i], in[i]).
-  void (*minimum_with)(const uint32_t* in, int count, uint32_t* inout);
+  /// out[i] = the smallest rows[k][i] of all `height` rows, one at least.
+  void (*minimum_across)(const uint32_t* const* rows, int height, int count, uint32_t* out);
   /// Keys (row_kernel.hpp) to disparities and confidences (confidence_of, max_sum <= 65534).
   void (*decode)(const uint32_t* keys, int max_sum, int min_confidence, int count, int16_t* disparity,
                  uint8_t* confidence);

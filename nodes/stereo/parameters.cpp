@@ -26,7 +26,7 @@ int largest_truncation(CostKind kind) {
 }
 
 std::optional<std::string> window_problem(const MatcherParameters& p) {
-  if (p.n_square < 1 || p.n_square > 31 || p.n_square % 2 == 0)
+  if (p.n_square < 1 || p.n_square > kLargestWindow || p.n_square % 2 == 0)
     return out_of_range("n_square", p.n_square, "the odd numbers of 1..31");
   if (p.aggregation == Aggregation::adaptive_window && p.n_square < 5)
     return out_of_range("n_square", p.n_square, "5..31 for an adaptive window");

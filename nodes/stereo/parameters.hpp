@@ -39,6 +39,8 @@ constexpr int default_truncation(CostKind kind) {
   return kind == CostKind::gradient ? 10 : kind == CostKind::census ? 24 : 50;
 }
 
+constexpr int kLargestWindow = 31;  ///< edge, px
+
 /// Settings of a Matcher. The defaults are the recommended fast ones; quality() the recommended ones for weak texture
 /// and slanted surfaces; the thesis's own are {cost = ssd, c_max = 50}.
 struct MatcherParameters {

@@ -34,11 +34,13 @@ struct WindowMatcher::State {
   void set_rows(RowRange rows);
   /// Groups of the next block when that many are left.
   int block_size(int groups_left) const;
-  /// Keys of the reference image against the other one, given mirrored; minimum filter applied, left in `filtered`.
-  void search(const Planes& reference, const Planes& mirrored_other, Rows<uint32_t>& out);
+  /// Keys of the reference image against the other one, given mirrored.
+  void search(const Planes& reference, const Planes& mirrored_other);
   void search_block(const Planes& reference, const Planes& mirrored_other, RowJob job, const RowFunctions& rows);
   void load_row(const Planes& reference, const Planes& mirrored_other, int y, RowJob& job);
-  void filter(Rows<uint32_t>& out);
+  /// The minimum filter on the keys, row by row: `done(y)` follows when row y of `out` is.
+  template <class Done>
+  void filter(Rows<uint32_t>& out, Done done);
   void smooth_rows();
   bool in_memory() const { return p.uniqueness > 0 || p.subpixel; }
   void write(int y, const DisparityViews& out) const;
@@ -106,7 +108,7 @@ WindowMatcher::State::State(int width_, int height_, int channels_, const Matche
   set_range(p.disparities);
 
   keys = Rows<uint32_t>(height, width, 0, kNoKey);
-  along = Rows<uint32_t>(height, width, 0, kNoKey);
+  along = Rows<uint32_t>(p.n_min, width, 0, kNoKey);
   left_keys = Rows<uint32_t>(height, width, 0, kNoKey);
   if (p.left_right_check) right_keys = Rows<uint32_t>(height, width, 0, kNoKey);
   if (p.median) {
@@ -183,7 +185,7 @@ void WindowMatcher::State::search_block(const Planes& reference, const Planes& m
   }
 }
 
-void WindowMatcher::State::search(const Planes& reference, const Planes& mirrored_other, Rows<uint32_t>& out) {
+void WindowMatcher::State::search(const Planes& reference, const Planes& mirrored_other) {
   RowJob job;
   job.image_width = width;
   job.radius = p.n_square / 2;
@@ -212,18 +214,22 @@ void WindowMatcher::State::search(const Planes& reference, const Planes& mirrore
                    in_memory() ? kernels->rows_in_memory(p.cost, narrow) : kernels->rows(p.cost, narrow, job.groups));
     }
   }
-  filter(out);
 }
 
 // min_d min_w S = min_w min_d S: the minimum filter on the volume is one on the (sum, disparity) keys, ties included.
-void WindowMatcher::State::filter(Rows<uint32_t>& out) {
+template <class Done>
+void WindowMatcher::State::filter(Rows<uint32_t>& out, Done done) {
   const int r = p.n_min / 2;
-  for (int y = decided.first; y < decided.last; ++y) images->minimum_along(keys.row(y), r, width, along.row(y));
+  std::array<const uint32_t*, kLargestWindow> near{};
+  const auto along_row = [&](int y) { return along.row(y % p.n_min); };
+  int next = decided.first;  // row that the filter along rows has not seen yet
   for (int y = filtered.first; y < filtered.last; ++y) {
-    uint32_t* row = out.row(y);
-    std::memcpy(row, along.row(y), static_cast<size_t>(width) * sizeof(uint32_t));
-    for (int n = std::max(0, y - r); n <= std::min(height - 1, y + r); ++n)
-      if (n != y) images->minimum_with(along.row(n), width, row);
+    const int top = std::max(0, y - r), bottom = std::min(height - 1, y + r);
+    for (; next <= bottom; ++next) images->minimum_along(keys.row(next), r, width, along_row(next));
+    size_t count = 0;
+    for (int n = top; n <= bottom; ++n) near[count++] = along_row(n);
+    images->minimum_across(near.data(), static_cast<int>(count), width, out.row(y));
+    done(y);
   }
 }
 
@@ -271,11 +277,22 @@ bool WindowMatcher::match(ImageView<const uint8_t> left, ImageView<const uint8_t
   if (!fit(left, right, out, s.width, s.height, s.channels)) return false;
   s.maker.make(left, false, s.left);
   s.maker.make(right, true, s.right_mirrored);
-  s.search(s.left, s.right_mirrored, s.left_keys);
+  const auto write = [&](int y) {
+    if (y >= s.wanted.first && y < s.wanted.last) s.write(y, out);
+  };
+  const bool at_once = !s.p.left_right_check && !s.p.median;  // while the row is in the cache
+  s.search(s.left, s.right_mirrored);
+  s.filter(s.left_keys, [&](int y) {
+    if (at_once) write(y);
+  });
+  if (at_once) return true;
   // Seen in a mirror the right image is a left one, and the left image as it is stored is the mirrored right one.
-  if (s.p.left_right_check) s.search(s.right_mirrored, s.left, s.right_keys);
+  if (s.p.left_right_check) {
+    s.search(s.right_mirrored, s.left);
+    s.filter(s.right_keys, [](int) {});
+  }
   if (s.p.median) s.smooth_rows();
-  for (int y = s.wanted.first; y < s.wanted.last; ++y) s.write(y, out);
+  for (int y = s.wanted.first; y < s.wanted.last; ++y) write(y);
   return true;
 }
 
