@@ -119,14 +119,15 @@ class CensusCost {
       : row_(row), offset_(row.width - 1 - x), c_max_(hn::Set(kByteTag, row.c_max)) {
     for (int p = 0; p < kPlanes; ++p) left_[p] = hn::Set(kByteTag, row.left[p][x]);
   }
-  HWY_INLINE Vec8 at(int j) const {
+  /// Vector j of `last` + 1. Of the others no lane lies beyond the search range.
+  HWY_INLINE Vec8 at(int j, int last) const {
     const ptrdiff_t d = ptrdiff_t{j} * kByteLanes;
     Vec8 differences[kPlanes];
     for (int p = 0; p < kPlanes; ++p)
       differences[p] = hn::Xor(left_[p], hn::LoadU(kByteTag, row_.right[p] + offset_ + d));
     const Vec8 cost =
         hn::Max(hn::Min(ones_of_six(differences), c_max_), hn::LoadU(kByteTag, row_.outside + offset_ + d));
-    return hn::Max(cost, hn::Load(kByteTag, row_.beyond + d));
+    return j < last ? cost : hn::Max(cost, hn::Load(kByteTag, row_.beyond + d));
   }
 
  private:
@@ -152,7 +153,7 @@ class Forward {
     const CensusCost cost(row_, x);
     Path beside(row_.from_left, least_, row_), above(row_.above + x * stride, row_.above_least[x], row_);
     for (int j = 0; j <= last; ++j) {
-      const Vec8 c = cost.at(j);
+      const Vec8 c = cost.at(j, last);
       hn::Store(c, kByteTag, row_.costs + x * stride + j * kByteLanes);
       hn::Store(hn::SaturatedAdd(beside.advance(j, last, c), above.advance(j, last, c)), kByteTag,
                 row_.sums + x * stride + j * kByteLanes);

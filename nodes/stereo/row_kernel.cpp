@@ -55,10 +55,11 @@ class Cost {
     squares_ = hn::LoadDup128(kBytes, squares);
   }
 
-  HWY_INLINE void select(int column) {
+  /// `index`: column - first_column.
+  HWY_INLINE void select(ptrdiff_t index) {
     for (int p = 0; p < kPlanes; ++p)
-      left_[p] = hn::BitCast(kBytes, hn::Set(hn::ScalableTag<uint32_t>(), job_.left[p][column - job_.first_column]));
-    offset_ = ptrdiff_t{2} * (job_.last_column - column);
+      left_[p] = hn::BitCast(kBytes, hn::Set(hn::ScalableTag<uint32_t>(), job_.left[p][index]));
+    offset_ = 2 * (ptrdiff_t{job_.last_column} - job_.first_column - index);
   }
 
   template <bool kOutside>
@@ -103,7 +104,7 @@ class Rows {
   static void fill(const RowJob& job) {
     Rows rows(job);
     for (int c = job.first_column; c <= job.last_column; ++c) {
-      rows.cost_.select(c);
+      rows.cost_.select(c - job.first_column);
       for (int j = 0; j < rows.chunks(); ++j)
         hn::Store(rows.cost_.template at<true>(j), kBytes, job.ring_new + rows.place(c, j));
     }
@@ -135,6 +136,7 @@ class Rows {
  private:
   static constexpr bool kInMemory = kGroups == 0;
   static constexpr int kRegisters = kInMemory ? 1 : kGroups;
+  static constexpr int kChunks = (kRegisters + 1) / 2;
 
   explicit Rows(const RowJob& job)
       : job_(job), cost_(job), scale_(kInMemory ? 1 : kGroups), tail_(hn::LoadU(kWords, job.tail)) {
@@ -167,7 +169,7 @@ class Rows {
 
   template <bool kOutside>
   HWY_INLINE void new_column(int column) {
-    cost_.select(column);
+    cost_.select(column - job_.first_column);
     for (int j = 0; j < chunks(); ++j) {
       const Bytes cost = cost_.template at<kOutside>(j);
       const ptrdiff_t at = place(column, j);
@@ -176,10 +178,13 @@ class Rows {
     }
   }
 
+  /// Narrow sums of group g's chunk as scaled words.
+  HWY_INLINE Words widened(Bytes chunk, int g) const { return scaled_bytes(chunk, g % 2 ? odd_ : even_); }
+
   /// Vertical sum of one column as scaled words of group g.
   HWY_INLINE Words column_sum(int column, int g) const {
     const ptrdiff_t at = place(column, g / 2);
-    if constexpr (kNarrow) return scaled_bytes(hn::Load(kBytes, narrow() + at), g % 2 ? odd_ : even_);
+    if constexpr (kNarrow) return widened(hn::Load(kBytes, narrow() + at), g);
     return hn::Load(kWords, wide() + at + (g % 2) * kLanes);
   }
   HWY_INLINE int clamped(int column) const { return std::clamp(column, 0, job_.image_width - 1); }
@@ -200,21 +205,58 @@ class Rows {
     else walk_registers<kNew, kOutside>(from, to);
   }
 
+  /// new_column() of narrow sums, which stay in `column`, too. Nothing else may point to `sums`: the compiler then need
+  /// not read again what it has just stored.
+  template <bool kOutside>
+  HWY_INLINE void new_narrow_column(ptrdiff_t index, const uint8_t* ring_old, uint8_t* ring_new,
+                                    uint8_t* HWY_RESTRICT sums, Bytes* column) {
+    cost_.select(index);
+    for (int j = 0; j < kChunks; ++j) {
+      const ptrdiff_t at = (index * kChunks + j) * kChunk;
+      const Bytes cost = cost_.template at<kOutside>(j);
+      column[j] = hn::Sub(hn::Add(hn::Load(kBytes, sums + at), cost), hn::Load(kBytes, ring_old + at));
+      hn::Store(column[j], kBytes, sums + at);
+      hn::Store(cost, kBytes, ring_new + at);
+    }
+  }
+
+  /// Columns are counted from first_column here, and what changes in the loop are few locals: half of the time goes
+  /// with addresses otherwise.
   template <bool kNew, bool kOutside>
   HWY_INLINE void walk_registers(int from, int to) {
+    if (from >= to) return;
     Words sums[kRegisters];
     for (int g = 0; g < kRegisters; ++g) sums[g] = sums_[g];
-    for (int x = from; x < to; ++x) {
-      const int enters = std::min(x + job_.radius, job_.image_width - 1), leaves = std::max(x - job_.radius - 1, 0);
-      if constexpr (kNew) new_column<kOutside>(enters);
-      for (int g = 0; g < kRegisters; ++g)
-        sums[g] = hn::Sub(hn::Add(sums[g], column_sum(enters, g)), column_sum(leaves, g));
+    uint8_t* HWY_RESTRICT columns = narrow();
+    const uint8_t* ring_old = job_.ring_old;
+    uint8_t* ring_new = job_.ring_new;
+    uint32_t* HWY_RESTRICT winner = job_.winners + (from - job_.x_begin);
+    const ptrdiff_t first = -job_.first_column, last = job_.image_width - 1 + first, window = 2 * job_.radius + 1;
+    ptrdiff_t index = from + job_.radius + first;
+    for (const ptrdiff_t end = index + to - from; index < end; ++index) {
+      const ptrdiff_t enters = kNew ? index : std::min(index, last), leaves = std::max(index - window, first);
+      if constexpr (kNarrow) {
+        Bytes column[kChunks];
+        if constexpr (kNew) new_narrow_column<kOutside>(enters, ring_old, ring_new, columns, column);
+        else
+          for (int j = 0; j < kChunks; ++j) column[j] = hn::Load(kBytes, columns + (enters * kChunks + j) * kChunk);
+        const uint8_t* leaving = columns + leaves * kChunks * kChunk;
+        for (int g = 0; g < kRegisters; ++g) sums[g] = hn::Add(sums[g], widened(column[g / 2], g));
+        for (int g = 0; g < kRegisters; ++g)
+          sums[g] = hn::Sub(sums[g], widened(hn::Load(kBytes, leaving + g / 2 * kChunk), g));
+      } else {
+        const int entering = job_.first_column + static_cast<int>(enters);
+        if constexpr (kNew) new_column<kOutside>(entering);
+        for (int g = 0; g < kRegisters; ++g)
+          sums[g] = hn::Sub(hn::Add(sums[g], column_sum(entering, g)),
+                            column_sum(job_.first_column + static_cast<int>(leaves), g));
+      }
       Words best = hn::Or(sums[kRegisters - 1], tail_);
       for (int g = 0; g + 1 < kRegisters; ++g) best = hn::Min(best, sums[g]);
       const uint32_t smallest = smallest_lane(best);
       const size_t lane =
           hn::FindKnownFirstTrue(kWords, hn::Eq(best, hn::Set(kWords, static_cast<uint16_t>(smallest))));
-      job_.winners[x - job_.x_begin] = smallest << 8 | static_cast<uint32_t>(lane);
+      *winner++ = smallest << 8 | static_cast<uint32_t>(lane);
     }
     for (int g = 0; g < kRegisters; ++g) sums_[g] = sums[g];
   }

@@ -108,10 +108,9 @@ void SemiGlobalMatcher::State::search(const Planes& reference, const Planes& mir
 void SemiGlobalMatcher::State::write(int y, const DisparityViews& out) const {
   int16_t* disparity = out.disparity.row(y);
   uint8_t* confidence = out.confidence.row(y);
-  for (int x = 0; x < width; ++x) {
-    confidence[x] = confidences[least.row(y)[x]];
-    disparity[x] = confidence[x] < p.min_confidence || ambiguous.row(y)[x] != 0 ? int16_t{-1} : int16_t{0};
-  }
+  const uint8_t *at_least = least.row(y), *is_ambiguous = ambiguous.row(y);
+  for (int x = 0; x < width; ++x) confidence[x] = confidences[at_least[x]];
+  for (int x = 0; x < width; ++x) disparity[x] = (confidence[x] < p.min_confidence) | is_ambiguous[x] ? -1 : 0;
   take_fine((p.median ? smooth : left_fine).row(y), width, disparity,
             out.fraction.data != nullptr ? out.fraction.row(y) : nullptr);
   if (!p.left_right_check) return;

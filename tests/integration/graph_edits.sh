@@ -10,6 +10,7 @@ edit() { # edit GRAPH-SED SCHEDULE-SED: the example and its schedule, each expre
   mkdir -p "$work/graph" "$work/schedules"
   cp -r "$source"/graph/{worlds,rigs,objects,objects_3d.txt,terrain.txt,networks,signs,skeletons} "$work/graph/"
   cp "$source/graph/ace.yaml" "$work/graph/edited.yaml"
+  apply "$work/graph/edited.yaml" '/^  # ACE itself/,/^    lines: /d'  # its profile robot names every device
   cp "$source/schedules/thesis.yaml" "$work/schedules/"
   apply "$work/graph/edited.yaml" "$1"
   apply "$work/schedules/thesis.yaml" "$2"
