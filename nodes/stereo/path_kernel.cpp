@@ -119,14 +119,16 @@ class CensusCost {
       : row_(row), offset_(row.width - 1 - x), c_max_(hn::Set(kByteTag, row.c_max)) {
     for (int p = 0; p < kPlanes; ++p) left_[p] = hn::Set(kByteTag, row.left[p][x]);
   }
-  /// Vector j of `last` + 1. Of the others no lane lies beyond the search range.
+  /// Vector j of `last` + 1. Of the others no lane lies beyond the search range; kOutside: some pixel x - d may lie
+  /// outside the image.
+  template <bool kOutside>
   HWY_INLINE Vec8 at(int j, int last) const {
     const ptrdiff_t d = ptrdiff_t{j} * kByteLanes;
     Vec8 differences[kPlanes];
     for (int p = 0; p < kPlanes; ++p)
       differences[p] = hn::Xor(left_[p], hn::LoadU(kByteTag, row_.right[p] + offset_ + d));
-    const Vec8 cost =
-        hn::Max(hn::Min(ones_of_six(differences), c_max_), hn::LoadU(kByteTag, row_.outside + offset_ + d));
+    Vec8 cost = hn::Min(ones_of_six(differences), c_max_);
+    if constexpr (kOutside) cost = hn::Max(cost, hn::LoadU(kByteTag, row_.outside + offset_ + d));
     return j < last ? cost : hn::Max(cost, hn::Load(kByteTag, row_.beyond + d));
   }
 
@@ -147,13 +149,14 @@ class Forward {
     std::memset(row.from_left, 0, static_cast<size_t>(row.vectors * kByteLanes));
   }
   /// The next one, x = 0, 1, 2 ...
+  template <bool kOutside>
   HWY_INLINE void advance(int x) {
     const int last = (kVectors > 0 ? kVectors : row_.vectors) - 1;
     const ptrdiff_t stride = ptrdiff_t{last + 1} * kByteLanes;
     const CensusCost cost(row_, x);
     Path beside(row_.from_left, least_, row_), above(row_.above + x * stride, row_.above_least[x], row_);
     for (int j = 0; j <= last; ++j) {
-      const Vec8 c = cost.at(j, last);
+      const Vec8 c = cost.at<kOutside>(j, last);
       hn::Store(c, kByteTag, row_.costs + x * stride + j * kByteLanes);
       hn::Store(hn::SaturatedAdd(beside.advance(j, last, c), above.advance(j, last, c)), kByteTag,
                 row_.sums + x * stride + j * kByteLanes);
@@ -219,6 +222,16 @@ class Backward {
   uint8_t least_ = 0;  ///< of the path from the right
 };
 
+/// Pixels from .. to - 1 of the one, and of the other as many from the right. Each waits for its own pixel before most
+/// of the time; so the processor does one while the other waits.
+template <bool kOutside, int kVectors>
+HWY_INLINE void advance(Forward<kVectors>& forward, Backward<kVectors>* backward, int from, int to, int width) {
+  for (int x = from; x < to; ++x) {
+    forward.template advance<kOutside>(x);
+    if (backward != nullptr) backward->advance(width - 1 - x);
+  }
+}
+
 template <int kVectors>
 void run(const PathRow* next, const PathRow* finished) {
   if (next == nullptr) {
@@ -227,16 +240,15 @@ void run(const PathRow* next, const PathRow* finished) {
     return;
   }
   Forward<kVectors> forward(*next);
+  const int width = next->width, inside = std::min(width, next->vectors * kByteLanes);
   if (finished == nullptr) {
-    for (int x = 0; x < next->width; ++x) forward.advance(x);
+    advance<true, kVectors>(forward, nullptr, 0, inside, width);
+    advance<false, kVectors>(forward, nullptr, inside, width, width);
     return;
   }
-  // Each waits for its own pixel before most of the time; so the processor does one while the other waits.
   Backward<kVectors> backward(*finished);
-  for (int x = 0; x < next->width; ++x) {
-    forward.advance(x);
-    backward.advance(next->width - 1 - x);
-  }
+  advance<true>(forward, &backward, 0, inside, width);
+  advance<false>(forward, &backward, inside, width, width);
 }
 
 void run_rows(const PathRow* next, const PathRow* finished) {
