@@ -87,7 +87,7 @@ std::string part_text(const Part& part, const std::string& figure, const std::st
 const char* source_text(trace::Source source) {
   switch (source) {
     case trace::Source::tracefs: return "switches from tracefs";
-    case trace::Source::perf: return "switches from perf, which names no culprit";
+    case trace::Source::perf: return "switches from perf, which sees our own threads only";
     case trace::Source::simulation: return "switches as simulated";
     case trace::Source::none: break;
   }

@@ -84,8 +84,7 @@ class Course {
   }
 
   void wait_for_cpu(int64_t to_ns, int cpu, int priority) {
-    if (!knows_every_cpu(evidence_.trace().source))
-      return until(to_ns, started_ ? Cause::preempted : Cause::late, "", started_ ? cpu : -1);
+    if (!knows_every_cpu(evidence_.trace().source)) return wait_for_ours(to_ns, cpu);
     for (const Piece& occupant : evidence_.occupants(cpu, at_, to_ns)) {
       nobody_ran(occupant.from_ns, cpu, priority);
       // A thread of SCHED_DEADLINE yields to nobody but its like, unless the kernel holds it back.
@@ -93,6 +92,18 @@ class Course {
       else until(occupant.to_ns, started_ ? Cause::preempted : Cause::behind, occupant.who, cpu);
     }
     nobody_ran(to_ns, cpu, priority);
+  }
+
+  /// Where only our own threads are followed: they are named, whoever else had the CPU is not.
+  void wait_for_ours(int64_t to_ns, int cpu) {
+    const auto others = [&](int64_t until_ns) {
+      until(until_ns, started_ ? Cause::preempted : Cause::late, "", started_ ? cpu : -1);
+    };
+    for (const Piece& occupant : evidence_.occupants(cpu, at_, to_ns)) {
+      others(occupant.from_ns);
+      until(occupant.to_ns, started_ ? Cause::preempted : Cause::behind, occupant.who, cpu);
+    }
+    others(to_ns);
   }
 
   /// Of SCHED_DEADLINE, runnable, and its CPU did nothing more urgent.

@@ -13,7 +13,7 @@ namespace takt::trace {
 /// Where the knowledge of who had a CPU comes from.
 enum class Source : uint8_t {
   tracefs,     ///< sched_switch of every CPU: names who ran instead
-  perf,        ///< PERF_RECORD_SWITCH of our own threads: when they did not run, not who did
+  perf,        ///< PERF_RECORD_SWITCH of our own threads: when they did not run, and which of them did
   simulation,  ///< the schedule of a run in virtual time: everything
   none         ///< the CPU clock of each thread alone: how long they did not run
 };

@@ -111,13 +111,19 @@ TEST_CASE("a late timer on a CPU from which the host took time is a host stall, 
   CHECK(part_us(result, Cause::late) == 20);
 }
 
-TEST_CASE("perf names nobody; without a source what did not run is unattributed") {
+TEST_CASE("perf names our own threads only; without a source what did not run is unattributed") {
   Trace trace = two_lanes(Source::perf);
   trace.jobs = {job(1, 1, 0, 300, 15'000, 6'000)};
   trace.slices = {slice(12, 1, 300, 4'000, kPreempted), slice(12, 1, 12'700, 15'000, kAsleep)};
   Blame result = blame_last(trace);
   REQUIRE(part_us(result, Cause::preempted) == 8'700);
   for (const Part& part : result.parts) CHECK(part.who.empty());
+  trace.jobs.insert(trace.jobs.begin(), job(0, 7, 4'500, 4'500, 12'000, 7'500));
+  trace.slices.insert(trace.slices.begin() + 1, slice(11, 1, 4'500, 12'000, kAsleep));
+  result = blame_last(trace);
+  CHECK(part_us(result, Cause::preempted, "stereo") == 7'500);
+  CHECK(part_us(result, Cause::preempted) == 8'700);  // 0.5 before it and 0.7 after it somebody else's
+  trace.jobs.erase(trace.jobs.begin());
   trace.source = Source::none;
   trace.slices.clear();
   result = blame_last(trace);
