@@ -31,7 +31,8 @@ class Takt {
     argv.push_back(nullptr);
     posix_spawn_file_actions_t actions;
     posix_spawn_file_actions_init(&actions);
-    posix_spawn_file_actions_adddup2(&actions, said_[1], STDOUT_FILENO);
+    for (const int stream : {STDOUT_FILENO, STDERR_FILENO})
+      posix_spawn_file_actions_adddup2(&actions, said_[1], stream);
     REQUIRE(posix_spawn(&process_, program, &actions, nullptr, argv.data(), environ) == 0);
     posix_spawn_file_actions_destroy(&actions);
     ::close(std::exchange(said_[1], -1));
@@ -45,10 +46,11 @@ class Takt {
     }
     ::close(said_[0]);
   }
-  /// Returns once it has said something: where a double is to be found.
-  void wait_for_word() const {
-    char word;
-    REQUIRE(::read(said_[0], &word, 1) == 1);
+  /// Of a double: returns once it has said where it is to be found.
+  void wait_for_place() const {
+    std::string line;
+    for (char c = ' '; c != '\n' && ::read(said_[0], &c, 1) == 1;) line += c;
+    REQUIRE_MESSAGE(line.find(" at ") != std::string::npos, line);
   }
   /// What it has said, until it ends.
   std::string output() const {
@@ -91,16 +93,17 @@ Json named(const Json& list, const std::string& name) {
 TEST_CASE("hil: takt run on all devices, three of them pulled and put back") {
   const char* lines = std::getenv("HIL_GPIO_LINES");
   REQUIRE(lines != nullptr);
-  std::ofstream(std::string(lines) + "/sim_gpio1/pull")
-      << "pull-up" << std::flush;  // nobody presses the emergency stop
+  std::ofstream(lines + std::string("/sim_gpio1/pull")) << "pull-up" << std::flush;  // no emergency stop is pressed
   const std::vector<std::string> camera{"double", "camera", "--video", "/dev/video0",
                                         "--rate", "2",      "--rig",   TAKT_SOURCE_DIR "/tests/hil/robot_camera.yaml"};
   const Takt head({"double", "head", "--can", "can1"}), base({"double", "base", "--can", "can1"});
   auto eyes = std::make_unique<Takt>(camera);
-  for (const Takt* device : std::initializer_list<const Takt*>{&head, &base, eyes.get()}) device->wait_for_word();
+  for (const Takt* device : std::initializer_list<const Takt*>{&head, &base, eyes.get()}) device->wait_for_place();
   Takt run({"run", TAKT_SOURCE_DIR "/tests/hil/robot.yaml", "--for", "45s", "--output", "/tmp/rig", "--report",
             "/tmp/rig.json"});
-  sleep_for(12 * kSecond);
+  const auto runs = [] { return std::system("\"$HIL_TAKT\" top --once > /dev/null 2>&1") == 0; };
+  for (int tries = 0; tries < 60 && !runs(); ++tries) sleep_for(500 * kMs);
+  sleep_for(6 * kSecond);  // the scanner needs some to begin
   eyes.reset();
   sleep_for(2 * kSecond);
   shell("echo 1 > $(readlink -f /sys/class/net/can0/device)/remove");
