@@ -85,7 +85,7 @@ bool may_hold(const Trace& trace, const JobSpan& job, const Piece& piece, int64_
     case Cause::queue: return ahead;
     case Cause::running: return !before && (on_cpu || !known);
     case Cause::late: return before && !ahead;
-    case Cause::behind: return before && !ahead && !on_cpu && knows_every_cpu(trace.source);
+    case Cause::behind: return before && !ahead && !on_cpu && known;
     case Cause::stall: return !ahead && !on_cpu && !trace.steals.empty();
     case Cause::preempted:
     case Cause::asleep: return !before && !on_cpu && known;
