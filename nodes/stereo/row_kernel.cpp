@@ -220,8 +220,8 @@ class Rows {
     }
   }
 
-  /// Columns are counted from first_column here, and what changes in the loop are few locals: half of the time goes
-  /// with addresses otherwise.
+  /// Columns are counted from first_column here, and what changes in the loop are few locals: a fifth of the time goes
+  /// with addresses otherwise. Told that the loop runs at least once, GCC keeps them in registers with AVX2, too (15 %).
   template <bool kNew, bool kOutside>
   HWY_INLINE void walk_registers(int from, int to) {
     if (from >= to) return;
