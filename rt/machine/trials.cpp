@@ -35,6 +35,7 @@ PolicyTrial try_policy(Policy policy) {
   wanted.priority = 50;
   wanted.runtime_ns = kMs;
   wanted.deadline_ns = wanted.period_ns = 10 * kMs;
+  wanted.reclaims = policy == Policy::deadline;  // as lanes of high criticality have it
   const Grant grant = apply(wanted);
   PolicyTrial trial;
   trial.answered = true;

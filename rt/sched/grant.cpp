@@ -25,7 +25,7 @@ struct SchedulingAttributes {
   uint64_t runtime = 0, deadline = 0, period = 0;
 };
 constexpr uint32_t kDeadline = 6;  // SCHED_DEADLINE
-constexpr uint64_t kResetOnFork = 1;
+constexpr uint64_t kResetOnFork = 1, kReclaim = 2;
 
 /// Of the calling thread (0), or another one.
 int set_attributes(const SchedulingAttributes& a, int thread = 0) {
@@ -64,7 +64,7 @@ bool pin(int core, Grant& grant) {
 SchedulingAttributes attributes_of(const Reservation& wanted) {
   SchedulingAttributes a;
   a.policy = kDeadline;
-  a.flags = kResetOnFork;
+  a.flags = kResetOnFork | (wanted.reclaims ? kReclaim : 0);
   a.runtime = static_cast<uint64_t>(wanted.runtime_ns);
   a.deadline = static_cast<uint64_t>(wanted.deadline_ns);
   a.period = static_cast<uint64_t>(wanted.period_ns);
@@ -92,7 +92,8 @@ Grant apply_deadline(const Reservation& wanted, int64_t patience_ns) {
     grant.policy = Policy::deadline;
     grant.runtime_ms = static_cast<double>(got.runtime) / 1e6;
     grant.deadline_ms = static_cast<double>(got.deadline) / 1e6;
-    grant.verified = got.runtime == a.runtime && got.deadline == a.deadline && got.period == a.period;
+    grant.verified = got.runtime == a.runtime && got.deadline == a.deadline && got.period == a.period &&
+                     (got.flags & kReclaim) == (a.flags & kReclaim);
   }
   return grant;
 }

@@ -18,6 +18,10 @@ struct Reservation {
   int64_t runtime_ns = 0, deadline_ns = 0, period_ns = 0;  ///< deadline
   int priority = 0;                                        ///< fixed: SCHED_FIFO 1..99
   int core = -1;                                           ///< fixed: the only CPU; -1: any
+  /// deadline: once its runtime is used up the thread goes on with what other reservations leave unused
+  /// (SCHED_FLAG_RECLAIM, the kernel's GRUB: Lipari & Baruah 2000; Abeni, Lipari, Parri & Sun 2016). Without it a
+  /// thread that the host of a virtual machine stops for longer than its runtime is held back for a period or more.
+  bool reclaims = false;
 };
 
 /// What the kernel says the thread has, read back after asking.

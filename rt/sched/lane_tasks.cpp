@@ -192,9 +192,12 @@ std::vector<Reservation> reservations(const Plan& plan, Policy policy) {
   const Placement placement = policy == Policy::fixed ? place_fixed(plan) : Placement{};
   for (size_t i = 0; i < lanes.size(); ++i) {
     const int64_t budget_ns = lane_budget_ns(plan, lanes[i]) + longest_lead_ns(plan, lanes[i]);
-    if (policy == Policy::deadline)
+    if (policy == Policy::deadline) {
       wanted[i] =
           deadline_reservation(budget_ns, lane_span_ns(plan, lanes[i]), plan.tasks[lanes[i].front()].rate->period_ns());
+      wanted[i].reclaims = std::any_of(lanes[i].begin(), lanes[i].end(),
+                                       [&](size_t t) { return plan.tasks[t].criticality == Criticality::high; });
+    }
     wanted[i].policy = policy;
     if (policy != Policy::fixed) continue;
     wanted[i].priority = placement.priority[i];

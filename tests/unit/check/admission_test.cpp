@@ -170,6 +170,15 @@ TEST_CASE("admission: fixed priorities are spread over the cores so that each fi
   CHECK(asked[0].priority > asked[1].priority);
 }
 
+TEST_CASE("admission: only a lane with a high-criticality member goes on beyond its reservation") {
+  Plan plan = plan_of(Policy::deadline, {0, 1}, {task("a", 10, 5, 50), task("b", 10, 5, 50)});
+  plan.tasks[0].criticality = Criticality::high;
+  plan.tasks[1].criticality = Criticality::low;
+  CHECK(reservations(plan, Policy::deadline)[0].reclaims);
+  CHECK(!reservations(plan, Policy::deadline)[1].reclaims);
+  CHECK(!reservations(plan, Policy::fixed)[0].reclaims);
+}
+
 TEST_CASE("admission: being awake before a release costs what it may cost at most") {
   Plan plan = plan_of(Policy::fixed, {0, 1}, {task("a", 10, 5, 50), task("b", 100, 1, 2)});
   plan.anticipate_ns = 200'000;
