@@ -50,6 +50,10 @@ expect 1 "because a job of spinner did not return" timeout 60 "$takt" run "$grap
   --output "$work/out" --report "$work/hang.json"
 judge "$work/hang.json" '("spinner", "hang") in faults' "a hang in a process of its own is not in the report"
 
+# TAKT_RT_STRICT=1 ends the run at the first call that no job should make, with its name.
+expect 134 "node sleeper called nanosleep (sleep) in job" timeout --foreground 60 env TAKT_RT_STRICT=1 "$takt" run "$graph" --policy cooperative \
+  --for 5s --isolate none --set hoarder.allocate=0MB --output "$work/out"
+
 # A declared miss leads to safe_stop, which only the high-criticality nodes are part of here.
 sed 's/on_miss: skip/on_miss: safe_stop/' "$source/bench/scenarios/saboteur_schedule.yaml" >"$work/schedule.yaml"
 timeout 60 "$takt" run "$graph" --schedule "$work/schedule.yaml" --policy cooperative --for 2s --output "$work/out" \
