@@ -46,7 +46,9 @@ def report(verb): return json.load(open(f"{work}/{verb}.json"))
 def cost_ms(search):
     """Median CPU time of a job at full quality."""
     subprocess.run(run("continue", search, 5, "--policy", "cooperative"), **QUIET)
-    return stereo_of(report("continue"))["exec_ms"]["p50"]
+    stereo = stereo_of(report("continue"))
+    if 2 * stereo["no_result"] > stereo["samples"]: sys.exit("stereo gets no images: this machine is too busy to measure what a job takes")
+    return stereo["exec_ms"]["p50"]
 
 
 def choose():
@@ -86,7 +88,7 @@ def slowed_run(verb, budget, usual, many):
         instants = []
         for instant_s, search in ((BEFORE, many), (BEFORE + cause, usual)):
             instants.append(wait_until(instant_s))
-            subprocess.run([takt, "set", "stereo.search", str(search)], check=True, **QUIET)
+            subprocess.run([takt, "set", "stereo.search", str(search)], check=True, **{**QUIET, "stderr": None})
         process.wait()
         top.wait()
     tops = [json.loads(line) for line in open(f"{work}/{verb}.top") if line.endswith("\n")]
