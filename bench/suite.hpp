@@ -12,7 +12,8 @@
 namespace takt::bench {
 
 struct Options {
-  int rounds = 0;  ///< interleaved; 0: the suite's own default, for about two minutes (release_loads: seven)
+  int rounds =
+      0;  ///< interleaved; 0: the suite's own default, for about two minutes (release: six, release_loads: ten)
   int rounds_or(int standard) const { return rounds > 0 ? rounds : standard; }
 };
 

@@ -36,7 +36,7 @@ std::span<const Suite> suites() {
       {"transport", "one message from output to input: one worker, threads, processes", run_transport},
       {"publish", "what a reader that never comes, or keeps all it gets, costs a writer", run_publish},
       {"release", "lateness of the five rates against clock_nanosleep, idle and under load", run_release},
-      {"release_loads", "the same per rate, policy and load, beside cyclictest; seven minutes", run_release_loads},
+      {"release_loads", "the same per rate, policy and load, beside cyclictest; ten minutes", run_release_loads},
       {"graph", "ten nodes, seven hops: in one process, as ten processes, and over other libraries", run_graph},
       {"trace", "what tracing costs a job and a run, against the same without", run_trace},
       {"record", "what recording two stereo cameras of 1280x960 costs, against the same run without", run_record},

@@ -29,11 +29,12 @@ OutputPort::OutputPort(Node* owner, std::string_view name, const MessageType& ty
 }
 
 void* OutputPort::loan_message() {
-  if (loaned_ == nullptr && writer_ != nullptr) {
-    loaned_ = writer_->loan();
-    if (loaned_ == nullptr) note_answer(Question::chunk, 0, 0);
-  }
-  return loaned_ == nullptr ? nullptr : loaned_ + 1;
+  if (writer_ == nullptr) return nullptr;
+  if (loaned_ != nullptr && !sent_) return loaned_ + 1;
+  MessageHeader* chunk = writer_->loan();  // none where this job has sent its message already
+  if (chunk == nullptr) return note_answer(Question::chunk, 0, 0), nullptr;
+  loaned_ = chunk;
+  return loaned_ + 1;
 }
 
 void OutputPort::send(int64_t stamp_ns) {

@@ -238,7 +238,7 @@ class Output final : public OutputPort {
   Output(Node* owner, std::string_view name, std::string_view doc)
       : OutputPort(owner, name, MessageType::of<T>(), doc) {}
   /// In a job: an empty message to fill in place; null if every chunk is still held by consumers (counted).
-  /// A second call in one job returns the same message.
+  /// Again in one job: the same message until it is sent; then null, since a job has one for each output (counted).
   T* loan() { return static_cast<T*>(loan_message()); }
   /// In start: what this output published last, before the process of this node died and was started again; null at an
   /// ordinary start. So what a node needs to go on (a pose, a map) it gives as an output, which nobody need read.

@@ -1,42 +1,64 @@
 #!/bin/bash
 # SPDX-License-Identifier: Apache-2.0
-# From scan stamp to stop command while every other node asks for more than there is: overload.sh [SECONDS]. The other
-# nodes run at several times their rate and cost; the check is told to let that pass. Prints the chain `stop` of a quiet run and
-# of overloaded ones under each policy.
+# From scan stamp to stop command while every other node asks for more than there is: overload.sh [SECONDS]. The others
+# get four times their rate, a fourth of their budgets and deadlines, and low criticality: they reserve what they did before and
+# want four times that. Prints the chain `stop` of a quiet run and of overloaded ones under each policy; exit 1 if under
+# `deadline` or `fixed` the chain exceeded its bound, obstacle_stop missed a deadline, or there was no overload.
+# `overload.sh inputs` only makes the schedule and has it read.
 set -eu
 root=$(readlink -f "$(dirname "$0")/../..")
+export PYTHONPATH="$root/bench/scenarios" PYTHONDONTWRITEBYTECODE=1
+takt=${TAKT:-$root/takt}
 seconds=${1:-20}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-sed -E -e 's/(head_camera: \{rate: )15, budget: 8ms, deadline: 25ms/\130, budget: 5ms, deadline: 30ms/' \
-  -e 's/(ground_camera: \{rate: )5, offset: 5ms, budget: 8ms, deadline: 60ms/\115, offset: 5ms, budget: 5ms, deadline: 60ms/' \
-  -e 's/(stereo: \{rate: )15, offset: 26ms, budget: 20ms/\150, offset: 26ms, budget: 20ms/' \
-  -e 's/(ego_motion: \{rate: )10/\150/; s/(object_detection: \{rate: )7/\140/; s/(ground_map: \{rate: )5/\150/' \
-  -e 's/(mapping_3d: \{rate: )2/\140/; s/deadline: (1\/15 s|80ms|1\/7 s|100ms|400ms|450ms)/deadline: 20ms/' \
-  -e 's/budget: ([0-9]{2}|6)ms, deadline: 20ms/budget: 3ms, deadline: 20ms/' "$root/schedules/thesis.yaml" >"$work/overload.yaml"
-for row in 'head_camera: {rate: 30' 'ground_camera: {rate: 15' 'stereo: {rate: 50' 'ego_motion: {rate: 50' 'object_detection: {rate: 40' \
-  'ground_map: {rate: 50' 'mapping_3d: {rate: 40'; do
-  grep -qF "$row" "$work/overload.yaml" || { echo "schedules/thesis.yaml has changed: no row \`$row\`; mend this script"; exit 1; }
-done
-
-show() { # NAME
-  python3 - "$work/$1.json" "$1" <<'PY'
-import json, sys
-report = json.load(open(sys.argv[1]))
-chain = next(c for c in report["chains"] if c["name"] == "stop")["age_ms"]
-stop = next(n for n in report["nodes"] if n["name"] == "obstacle_stop")
-others = [n for n in report["nodes"] if n["name"] not in ("obstacle_stop", "front_laser", "lines", "base", "head")]
-behind = sum(n["released"] - n["completed"] for n in others)
-print(f"{sys.argv[2]:<22} scan to stop p50 {chain['p50']:.1f} ms, p99 {chain['p99']:.1f}, max {chain['max']:.1f}; obstacle_stop "
-      f"{stop['completed']} of {stop['released']} jobs, {stop['deadline_misses']} misses; the others fell {behind} jobs behind; "
-      f"CPU {report['cpu']['utilisation']:.2f} cores, policy {report['policy_granted']}, host stall {report['host_stall_ms']} ms")
+python3 - "$root/schedules/thesis.yaml" "$work/overload.yaml" <<'PY'
+import sys
+from schedule_lines import Schedule, in_us, seconds
+FACTOR = 4
+schedule = Schedule(sys.argv[1])
+schedule.change("obstacle_stop", criticality="high")
+for node, says in schedule.nodes.items():
+    if node in ("obstacle_stop", "front_laser", "lines", "base", "head"): continue
+    changed = {key: in_us(seconds(says[key]) / FACTOR) for key in ("offset", "budget", "deadline") if key in says}
+    if "rate" in says: changed["rate"] = str(FACTOR * int(says["rate"]))
+    if "criticality" in says: changed["criticality"] = "low"
+    schedule.change(node, **changed)
+schedule.write(sys.argv[2])
 PY
-}
+if [ "${1:-}" = inputs ]; then
+  "$takt" check "$root/graph/ace.yaml" --schedule "$work/overload.yaml" --set stereo.disparities=500 >"$work/check" || [ $? -eq 1 ]
+  exit
+fi
 
-"$root/takt" run --for "${seconds}s" --output "$work/out" --report "$work/quiet.json" >/dev/null 2>&1 || true
-show quiet
+run() { # NAME OPTIONS...
+  "$takt" run "$root/graph/ace.yaml" --for "${seconds}s" --output "$work/out" --report "$work/$1.json" "${@:2}" >"$work/log" 2>&1 ||
+    [ -e "$work/$1.json" ] || tail -n 2 "$work/log"
+}
+run quiet
 for policy in deadline fixed cooperative; do
-  "$root/takt" run --for "${seconds}s" --policy $policy --schedule "$work/overload.yaml" --unchecked --set stereo.disparities=500 \
-    --output "$work/out" --report "$work/$policy.json" >"$work/log" 2>&1 || true
-  if [ -e "$work/$policy.json" ]; then show $policy; else tail -n 2 "$work/log"; fi
+  run $policy --policy $policy --schedule "$work/overload.yaml" --unchecked --set stereo.disparities=500
 done
+python3 - "$work" <<'PY'
+import json, os, sys
+wrong = []
+for name in ("quiet", "deadline", "fixed", "cooperative"):
+    file = f"{sys.argv[1]}/{name}.json"
+    if not os.path.exists(file):
+        if name != "cooperative": wrong.append(f"{name} did not run")
+        continue
+    report = json.load(open(file))
+    chain = next(c for c in report["chains"] if c["name"] == "stop")
+    stop = next(n for n in report["nodes"] if n["name"] == "obstacle_stop")
+    others = [n for n in report["nodes"] if n["name"] not in ("obstacle_stop", "front_laser", "lines", "base", "head")]
+    behind = sum(n["released"] - n["completed"] for n in others)
+    age = chain["age_ms"]
+    print(f"{name:<12} scan to stop p50 {age['p50']:.1f} ms, p99 {age['p99']:.1f}, max {age['max']:.1f} of {chain['bound_ms']:.0f}; obstacle_stop "
+          f"{stop['completed']} of {stop['released']} jobs, {stop['deadline_misses']} misses; the others fell {behind} jobs behind; "
+          f"CPU {report['cpu']['utilisation']:.2f} cores, policy {report['policy_granted']}, host stall {report['host_stall_ms']} ms")
+    if name not in ("deadline", "fixed"): continue
+    if not chain["within"] or stop["deadline_misses"] or stop["completed"] < stop["released"] - 1: wrong.append(f"{name}: the stop was touched")
+    if behind < sum(n["released"] for n in others) / 10: wrong.append(f"{name}: no overload")
+print("\n".join(wrong) or "the stop was not touched")
+sys.exit(len(wrong) > 0)
+PY

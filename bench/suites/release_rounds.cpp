@@ -18,7 +18,24 @@
 namespace takt::bench {
 namespace {
 
-constexpr int64_t kRoundNs = 1'000'000'000, kBudgetNs = 5'000'000;
+constexpr int64_t kBudgetNs = 5'000'000;
+
+/// The nodes of a round, the fastest first.
+struct ReleasePlan {
+  size_t rate_index;
+  Rate rate;
+  int64_t offset_ns;
+};
+std::vector<ReleasePlan> release_plans() {
+  std::vector<ReleasePlan> plans;
+  for (size_t i = 0; i < std::size(kReleaseRates); ++i)
+    for (size_t node = 0; node < kNodesAtEachRate; ++node) {
+      const Rate rate{kReleaseRates[i], 1};
+      plans.push_back(
+          {i, rate, rate.period_ns() * static_cast<int64_t>(node) / static_cast<int64_t>(kNodesAtEachRate)});
+    }
+  return plans;
+}
 
 /// CPU time of the process between the first and the last note, all of its threads together.
 class ProcessUse {
@@ -73,23 +90,26 @@ Reservation reservation(Policy policy, size_t rank, const Rate& rate) {
 }  // namespace
 
 ReleaseRound nanosleep_round(Policy policy, std::string& refused) {
+  const std::vector<ReleasePlan> plans = release_plans();
   ReleaseRound round;
-  std::vector<std::vector<double>> late(std::size(kReleaseRates));
-  std::vector<Grant> grants(std::size(kReleaseRates));
+  round.lateness_us.resize(std::size(kReleaseRates));
+  std::vector<std::vector<double>> late(plans.size());
+  std::vector<Grant> grants(plans.size());
   std::atomic<int64_t> epoch{0};
-  Rendezvous ready(std::size(kReleaseRates) + 1), go(std::size(kReleaseRates) + 1);
+  Rendezvous ready(plans.size() + 1), go(plans.size() + 1);
   ProcessUse process_use;
   std::vector<std::thread> threads;
-  for (size_t i = 0; i < std::size(kReleaseRates); ++i) {
+  for (size_t i = 0; i < plans.size(); ++i) {
     late[i].reserve(64);
     threads.emplace_back([&, i] {
-      const Rate rate{kReleaseRates[i], 1};
+      const Rate& rate = plans[i].rate;
       grants[i] = apply(reservation(policy, i, rate));
       ready.arrive_and_wait();
       go.arrive_and_wait();
-      for (int64_t k = 0; rate.release_ns(epoch, k) < epoch + kRoundNs; ++k) {
-        sleep_until(rate.release_ns(epoch, k));
-        late[i].push_back(static_cast<double>(now_ns() - rate.release_ns(epoch, k)) * 1e-3);
+      const int64_t first = epoch + plans[i].offset_ns;
+      for (int64_t k = 0; rate.release_ns(first, k) < epoch + kRoundNs; ++k) {
+        sleep_until(rate.release_ns(first, k));
+        late[i].push_back(static_cast<double>(now_ns() - rate.release_ns(first, k)) * 1e-3);
         if (i == 0) process_use.note();
       }
     });
@@ -98,7 +118,12 @@ ReleaseRound nanosleep_round(Policy policy, std::string& refused) {
   epoch = now_ns() + 50'000'000;
   go.arrive_and_wait();
   for (std::thread& thread : threads) thread.join();
-  for (const auto& l : late) round.lateness_us.emplace_back().add(l);
+  for (size_t i = 0; i < plans.size(); ++i) {
+    round.lateness_us[plans[i].rate_index].add(late[i]);
+    const double deadline_us = static_cast<double>(deadline_of(plans[i].rate)) * 1e-3;
+    round.missed += static_cast<uint64_t>(
+        std::count_if(late[i].begin(), late[i].end(), [&](double us) { return us > deadline_us; }));
+  }
   round.cpu_us = process_use.us_per_second();
   refused.clear();
   for (const Grant& grant : grants)
@@ -107,18 +132,20 @@ ReleaseRound nanosleep_round(Policy policy, std::string& refused) {
 }
 
 ReleaseRound takt_round(Policy policy, int64_t anticipate_ns, std::string& granted) {
+  const std::vector<ReleasePlan> plans = release_plans();
   std::vector<std::unique_ptr<EmptyNode>> nodes;
   Plan plan;
   plan.policy = policy;
   plan.anticipate_ns = anticipate_ns;
   for (int cpu = 0; cpu < std::min(2L, sysconf(_SC_NPROCESSORS_ONLN)); ++cpu) plan.cores.push_back(cpu);
-  for (int64_t hz : kReleaseRates) {
+  for (const ReleasePlan& release : plans) {
     nodes.push_back(std::make_unique<EmptyNode>(nodes.empty()));
     nodes.back()->lateness_us.reserve(64);
     TaskPlan task;
-    task.name = std::to_string(hz) + "hz";
+    task.name = std::to_string(kReleaseRates[release.rate_index]) + "hz_" + std::to_string(nodes.size());
     task.node = nodes.back().get();
-    task.rate = Rate{hz, 1};
+    task.rate = release.rate;
+    task.offset_ns = release.offset_ns;
     task.deadline_ns = deadline_of(*task.rate);
     task.budget_ns = kBudgetNs;
     task.criticality = Criticality::high;
@@ -131,11 +158,13 @@ ReleaseRound takt_round(Policy policy, int64_t anticipate_ns, std::string& grant
   Executor executor(plan, *transport, clock, options);
   const RunResult result = executor.run();
   ReleaseRound round;
-  for (const auto& node : nodes) {
-    round.lateness_us.emplace_back().add(node->lateness_us);
-    round.completed += node->lateness_us.size();
+  round.lateness_us.resize(std::size(kReleaseRates));
+  for (size_t i = 0; i < plans.size(); ++i) {
+    const uint64_t ran = nodes[i]->lateness_us.size();
+    round.lateness_us[plans[i].rate_index].add(nodes[i]->lateness_us);
+    round.missed +=
+        executor.board().task(i).deadline_misses.load() + (result.released[i] - std::min(result.released[i], ran));
   }
-  for (uint64_t released : result.released) round.released += released;
   round.cpu_us = nodes.front()->process_use.us_per_second();
   granted = to_string(result.policy_granted);
   for (const std::string& refused : result.refused) granted += "; " + refused;
@@ -143,9 +172,13 @@ ReleaseRound takt_round(Policy policy, int64_t anticipate_ns, std::string& grant
 }
 
 std::optional<Samples> cyclictest_round(Policy policy) {
-  const std::string how = policy == Policy::fixed ? "--policy=fifo --priority=80 --affinity=0" : "--policy=other";
-  std::FILE* pipe =
-      popen(("cyclictest --verbose --threads=1 --interval=66667 --loops=15 " + how + " 2>&1").c_str(), "r");
+  const std::string how = policy == Policy::fixed ? "--policy=fifo --priority=80 --affinity=0" : "--policy=other",
+                    threads = std::to_string(kNodesAtEachRate),
+                    loops = std::to_string(kReleaseRates[0] * kRoundNs / 1'000'000'000);
+  // Its threads begin together; intervals that differ by 0.5 ms keep them from waiting for one another in each loop.
+  const std::string command =
+      "cyclictest --verbose --threads=" + threads + " --interval=66667 --distance=500 --loops=" + loops;
+  std::FILE* pipe = popen((command + " " + how + " 2>&1").c_str(), "r");
   if (pipe == nullptr) return std::nullopt;
   Samples samples;
   char line[256];

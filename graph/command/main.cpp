@@ -143,9 +143,12 @@ void add_profile(CLI::App& app, takt::command::ProfileOptions& o, int& exit_code
   CLI::Option* write = profile->add_option("--write", o.write, "writes the schedule with the budgets to this file");
   CLI::Option* in_place = profile->add_flag("--in-place", o.in_place, "writes them into the schedule itself");
   CLI::Option* compare = profile->add_option("--compare", o.compare, "compares with this schedule: exit 1 if above");
+  CLI::Option* keep =
+      profile->add_flag("--keep-budgets", o.keep_budgets, "writes what was measured, and leaves budgets");
   profile->add_option("--tolerance", o.tolerance, "by how much a node may be above (default 20%)")->needs(compare);
   in_place->excludes(write)->excludes(compare);
   write->excludes(compare);
+  keep->excludes(compare);
   profile->callback([&] { exit_code = takt::command::profile_graph(o); });
 }
 

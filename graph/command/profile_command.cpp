@@ -123,8 +123,9 @@ int write_budgets(const ProfileOptions& options, const Profile& profile) {
   const std::filesystem::path from = profile.schedule.file, to = options.in_place ? from : options.write;
   std::ifstream in(from, std::ios::binary);
   const std::string text{std::istreambuf_iterator<char>(in), {}};
-  const auto edited =
-      graph::with_budgets(text, from.string(), budgets_of(profile.nodes, options.quantile, options.margin), measured);
+  const auto budgets = options.keep_budgets ? std::map<std::string, int64_t>()
+                                            : budgets_of(profile.nodes, options.quantile, options.margin);
+  const auto edited = graph::with_budgets(text, from.string(), budgets, measured);
   if (!edited) return refuse(graph::to_string(edited.error()) + "; nothing was written", kBadInput);
   if (const std::string why = write_whole(to, *edited); !why.empty())
     return refuse(fmt::format("{}: {}; choose another --write", to.string(), why), kBadInput);

@@ -12,6 +12,7 @@ struct ProfileOptions {
   double quantile = 0.99, margin = 1.2;
   std::filesystem::path write;    ///< a copy of the schedule with the budgets
   bool in_place = false;          ///< into the schedule itself
+  bool keep_budgets = false;      ///< of what would be written only the block `measured`
   std::filesystem::path compare;  ///< schedule to be compared with
   std::string tolerance = "20%";
 };
@@ -20,7 +21,8 @@ struct ProfileOptions {
 /// those of a schedule. Runs in one process. 0 measured (and within the tolerance), 1 above it, or stopped by a signal.
 ///
 /// Alone: one worker runs all jobs one after the other, cooperatively, so that no other job of the graph runs at the
-/// same time or interrupts; producers run before their readers as ever. Together: as the schedule says, on all of its
+/// same time or interrupts; producers run before their readers as ever. So caches are as the others' jobs left them, as
+/// they are in the run, and inputs are real ones. Together: as the schedule says, on all of its
 /// cores and under its policy, with budgets large enough not to throttle what is being measured. In both passes a job
 /// may finish late and nothing degrades.
 int profile_graph(const ProfileOptions& options);

@@ -141,6 +141,9 @@ std::string events_text(const Json& report) {
   for (const Json& node : report["nodes"])
     if (const std::string what = offences(node); !what.empty())
       text += fmt::format("{}: {}\n", node["name"].get<std::string>(), what);
+  for (const Json& pool : report["memory"]["pools"])
+    if (const auto refused = pool["exhausted"].get<uint64_t>(); refused > 0)
+      text += fmt::format("{}: {} messages refused\n", pool["port"].get<std::string>(), refused);
   for (const Json& fault : report["faults"]) text += "fault: " + fault["what"].get<std::string>() + "\n";
   return text;
 }

@@ -127,7 +127,10 @@ std::string sentence(const trace::Trace& trace, const trace::JobSpan& job, const
     sum += units.back();
     if (std::abs(part.ns) > std::abs(parts[largest].ns)) largest = units.size() - 1;
   }
-  if (!units.empty()) units[largest] += miss - sum;  // what rounding took is too little to show in the largest
+  // What rounding took, half a unit of each figure at most, is too little to show in the largest. If more is missing,
+  // the figures stay as they are: they do not add up, and nobody shall think so.
+  const bool by_rounding = 2 * std::abs(miss - sum) <= static_cast<int64_t>(units.size()) + 1;
+  if (!units.empty() && by_rounding) units[largest] += miss - sum;
   std::vector<std::string> texts;
   for (size_t i = 0; i < parts.size(); ++i)
     if (units[i] != 0) texts.push_back(part_text(parts[i], ms(std::abs(units[i]), digits), node));

@@ -35,8 +35,11 @@ class LoadNode final : public Node {
     if (real_) spend(job);
     TextStatus* message = output_.loan();
     if (message == nullptr) return job.no_result();
-    fill(message->text, job.index());
-    output_.send(input_.empty() ? job.release_ns() : input_.stamp_ns());
+    // A flood sends what it is given, over and over; that ends where it is refused.
+    for (; message != nullptr; message = flood_() ? output_.loan() : nullptr) {
+      fill(message->text, job.index());
+      output_.send(input_.empty() ? job.release_ns() : input_.stamp_ns());
+    }
   }
 
  private:
@@ -83,7 +86,7 @@ class LoadNode final : public Node {
   Param<int> allocate_{this, "allocate", 0, {0, 100'000}, "MB", "memory that one job takes, writes to and keeps"};
   Param<int> allocate_at_{this, "allocate_at", 0, {0, 1'000'000'000}, "1", "number of that job, from 0"};
   Param<int> message_size_{this, "message_size", 64, {20, 16'000'000}, "1", "capacity of the output, characters"};
-  Param<bool> flood_{this, "flood", false, "", "each job fills its output up to the capacity"};
+  Param<bool> flood_{this, "flood", false, "", "fills each message up to the capacity and sends until it is refused"};
 
   bool real_ = true;
   load::Trouble trouble_;

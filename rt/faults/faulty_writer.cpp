@@ -68,8 +68,9 @@ void FaultyWriter::hoard(int64_t now_ns) {
 MessageHeader* FaultyWriter::loan() {
   const int64_t now = clock_.now_ns();
   hoard(now);
-  loaned_ = inner_->loan();
-  if (loaned_ != nullptr) return loaned_;
+  MessageHeader* const chunk = inner_->loan();
+  if (chunk != nullptr) return loaned_ = chunk;
+  if (loaned_ != nullptr) return nullptr;  // the job has its chunk: no strike of ours
   for (Strike& strike : strikes_)
     if (strike.fault.kind == MessageFaultKind::exhaust && covers(strike, now)) add(strike.count->struck);
   return nullptr;

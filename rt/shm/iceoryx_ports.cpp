@@ -118,8 +118,7 @@ class IceoryxWriter final : public Writer {
   ~IceoryxWriter() override { discard(); }
 
   MessageHeader* loan() override {
-    if (loaned_ != nullptr) return loaned_;
-    void* chunk = messages_.try_loan(port_.pool, port_.pool_index);
+    void* chunk = loaned_ == nullptr ? messages_.try_loan(port_.pool, port_.pool_index) : nullptr;
     if (chunk == nullptr) {
       ++pool_empty_;
       return nullptr;

@@ -50,8 +50,7 @@ class LocalWriter final : public Writer {
   }
 
   MessageHeader* loan() override {
-    if (loaned_ != kNoChunk) return pool_.header(loaned_);
-    for (uint32_t i = 0; i < pool_.chunks(); ++i) {
+    for (uint32_t i = 0; i < pool_.chunks() && loaned_ == kNoChunk; ++i) {
       const uint32_t chunk = (next_ + i) % pool_.chunks();
       if (!pool_.loan(chunk)) continue;
       next_ = chunk + 1;

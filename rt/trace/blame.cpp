@@ -9,13 +9,18 @@ namespace {
 
 constexpr int64_t kTimerNs = 200'000;  // a timer that is later than this did not just take its time
 
+/// What its thread did, if all of the job's time is known; else null.
+const std::vector<const Slice*>* slices_for(const Evidence& evidence, const JobSpan& job) {
+  const Trace& trace = evidence.trace();
+  const bool known = trace.source != Source::none && job.release_ns >= trace.first_ns;
+  return known ? evidence.slices_of(job.thread) : nullptr;
+}
+
 /// Builds the course of one job, front to back.
 class Course {
  public:
   Course(const Evidence& evidence, const JobSpan& job)
-      : evidence_(evidence), job_(job), slices_(evidence.slices_of(job.thread)), at_(job.release_ns) {
-    if (evidence.trace().source == Source::none || job.release_ns < evidence.trace().first_ns) slices_ = nullptr;
-  }
+      : evidence_(evidence), job_(job), slices_(slices_for(evidence, job)), at_(job.release_ns) {}
 
   std::vector<Piece> pieces() {
     const int64_t start = std::max(job_.start_ns, job_.release_ns);
@@ -136,6 +141,17 @@ void add(std::vector<Part>& parts, Cause cause, int64_t ns, const std::string& w
   else parts.push_back({cause, ns, who, cpu});
 }
 
+/// What the host took from the CPUs that the job ran on while it did, at most; 0 if none of it shows.
+int64_t taken_from(const std::vector<Piece>& pieces, const Evidence& evidence) {
+  std::map<int, std::pair<int64_t, int64_t>> ran;  // per CPU, from the first to the last
+  for (const Piece& piece : pieces)
+    if (piece.cause == Cause::running) ran.try_emplace(piece.cpu, piece.from_ns, 0).first->second.second = piece.to_ns;
+  int64_t sum = 0;
+  for (const auto& [cpu, span] : ran)
+    if (const int64_t shown = evidence.stolen_ns(cpu, span.first, span.second); shown > 0) sum += shown + kStealTickNs;
+  return sum;
+}
+
 }  // namespace
 
 std::vector<Piece> course(const Evidence& evidence, const JobSpan& job) { return Course(evidence, job).pieces(); }
@@ -146,14 +162,18 @@ Blame blame(const Evidence& evidence, const JobSpan& job) {
   Blame result;
   result.miss_ns = job.published_ns - job.deadline_ns;
   int64_t had_cpu = 0;
-  for (const Piece& piece : course(evidence, job)) {
+  const std::vector<Piece> pieces = course(evidence, job);
+  for (const Piece& piece : pieces) {
     if (piece.cause == Cause::running) had_cpu += piece.to_ns - piece.from_ns;
     else add(result.parts, piece.cause, piece.to_ns - piece.from_ns, piece.who, piece.cpu);
   }
   // The CPU clock also counts the wake-up, which the course has as lateness.
   const int64_t executed = std::min(job.cpu_ns, had_cpu);
-  const bool switches_known = trace.source != Source::none && evidence.slices_of(job.thread) != nullptr;
-  add(result.parts, switches_known && !trace.steals.empty() ? Cause::stall : Cause::unattributed, had_cpu - executed);
+  const int64_t stood_still = had_cpu - executed;
+  const bool switches_known = slices_for(evidence, job) != nullptr;
+  const int64_t stall = switches_known ? std::min(stood_still, taken_from(pieces, evidence)) : 0;
+  add(result.parts, Cause::stall, stall);
+  add(result.parts, Cause::unattributed, stood_still - stall);
   const int64_t allowed = task.budget_ns > 0 ? std::min(executed, task.budget_ns) : 0;
   add(result.parts, task.budget_ns > 0 ? Cause::budget : Cause::execution, executed - allowed);
   // A job that starts before its planned release (clocks of two machines) is not early but has that much more slack.

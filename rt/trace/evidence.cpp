@@ -6,8 +6,6 @@
 namespace takt::trace {
 namespace {
 
-constexpr int64_t kStealSpreadNs = 50'000'000;  // the counter of stolen time is read that rarely
-
 /// The first element whose end lies after `at`; elements are sorted and do not overlap.
 template <class T, class End>
 auto first_ending_after(const std::vector<T>& sorted, int64_t at, End end) {
@@ -86,7 +84,7 @@ const std::vector<const Slice*>* Evidence::slices_of(int32_t thread) const {
 int64_t Evidence::stolen_ns(int cpu, int64_t from_ns, int64_t to_ns) const {
   int64_t sum = 0;
   for (const Steal& steal : trace_.steals)
-    if (steal.cpu == cpu && steal.from_ns < to_ns && steal.to_ns + kStealSpreadNs > from_ns) sum += steal.stolen_ns;
+    if (steal.cpu == cpu && steal.from_ns - kStealTickNs < to_ns && steal.to_ns > from_ns) sum += steal.stolen_ns;
   return sum;
 }
 

@@ -66,11 +66,13 @@ struct Mark {
   uint16_t task = kNoTask;
 };
 
-/// Time that the host took from a CPU, as the kernel's counter says (in ticks of 10 ms).
+/// Time that the host took from a CPU, as the kernel's counter says. It counts in ticks, at the next timer interrupt of
+/// that CPU: what was taken shows up to a tick late, and may be a tick more or less.
 struct Steal {
   int64_t from_ns = 0, to_ns = 0, stolen_ns = 0;
   int cpu = -1;
 };
+inline constexpr int64_t kStealTickNs = 10'000'000;
 
 struct EdgeFacts {
   std::string input;

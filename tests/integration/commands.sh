@@ -60,6 +60,11 @@ port=$((20000 + RANDOM % 10000))
 expect 0 "" "$takt" run "$source/graph/simulator.yaml" --clock virtual --for 1s --set "service.address=127.0.0.1:$port" --output "$work/out"
 expect 0 "" "$takt" run --profile replay --clock virtual --for 1s --output "$work/out"
 
+# What the scenarios run is made from schedules and graphs that change: it must still be read.
+for scenario in overload degrade saboteur; do
+  expect 0 "" env TAKT="$takt" bash "$source/bench/scenarios/$scenario.sh" inputs
+done
+
 answers "$takt" eval objects --frames 1 --images 1 --empty 1
 answers "$takt" eval objects3d --samples 2
 answers "$takt" eval sift --frames 1

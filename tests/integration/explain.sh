@@ -81,11 +81,17 @@ if run --for 8s --isolate none --trace "$work/t.json" --report "$work/r.json" --
     expect 0 "" "$takt" explain "$work/t2.json"
     adds_up
     named long_one ' ' ' over its own budget' 5
+  else
+    fail "in processes of their own: $(tail -n 1 "$work/run.stderr")"
   fi
   run --for 3s --isolate none --trace "$work/t3.json" --trace-source perf
   expect 0 "" "$takt" explain "$work/t3.json"
   adds_up
-  grep -q "switches from perf" "$work/stdout" && named victim 'preempted ' " by culprit on cpu $core" 9
+  if grep -q "switches from perf" "$work/stdout"; then
+    named victim 'preempted ' " by culprit on cpu $core" 9
+  else
+    echo "NOT RUN: the same from perf: $(grep note: "$work/stdout")"
+  fi
   run --for 3s --isolate none --trace "$work/t4.json" --trace-source none
   expect 0 "" "$takt" explain "$work/t4.json" victim
   adds_up

@@ -2,7 +2,8 @@
 """Whether the documents say what is there.
 
 documents.py messages SOURCE          docs/faq.md is indexed by messages that the code can say
-documents.py links SOURCE             what documents link to exists
+documents.py links SOURCE             what documents link to exists, and so does what the scripts of bench/scenarios use; bench/README.md
+                                      names each of them
 documents.py figures SOURCE           our figures in docs/thesis.md stand in the READMEs that their row links to
 documents.py commands SOURCE TAKT...  commands and options in documents are known to the programs TAKT (takt, takt-bench),
                                       files named in them exist, and a test runs every command of takt
@@ -79,16 +80,27 @@ def check_messages():
 
 
 LINK = re.compile(r"\]\(([^)#:\s]+)(?:#[^)]*)?\)")
+USED = re.compile(r"(?:\$root|\{root\}|\{source\})/([\w./-]+\w)")  # of the project, by a script
 
 
 def check_links():
     if LINK.findall("[a](b/c.md#d) [e](https://f)") != ["b/c.md"]:
         mistakes.append("the check does not see links")
+    if USED.findall('"$root/takt" f"{root}/graph/ace.yaml" $root;') != ["takt", "graph/ace.yaml"]:
+        mistakes.append("the check does not see what scripts use")
     for path in documents:
         for number, line in enumerate(path.read_text().splitlines(), 1):
             for target in LINK.findall(line):
                 if not (path.parent / target).exists():
                     tell(path, number, f"links to {target}, which does not exist")
+    readme = (source / "bench" / "README.md").read_text()
+    for path in sorted((source / "bench" / "scenarios").glob("*.sh")):
+        if f"`{path.name}" not in readme:
+            mistakes.append(f"bench/README.md does not name {path.name}")
+        for number, line in enumerate(path.read_text().splitlines(), 1):
+            for used in USED.findall(line):
+                if not (source / used).exists() and not used.startswith("build/"):
+                    tell(path, number, f"uses {used}, which does not exist")
 
 
 # Figures.

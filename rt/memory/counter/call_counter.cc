@@ -99,14 +99,21 @@ TAKT_SEE(ssize_t, read, file, (int file, void* data, size_t size), (file, data, 
 TAKT_SEE(ssize_t, write, file, (int file, const void* data, size_t size), (file, data, size))
 TAKT_SEE(ssize_t, pread, file, (int file, void* data, size_t size, off_t at), (file, data, size, at))
 TAKT_SEE(ssize_t, pwrite, file, (int file, const void* data, size_t size, off_t at), (file, data, size, at))
+TAKT_SEE(ssize_t, pread64, file, (int file, void* data, size_t size, off64_t at), (file, data, size, at))
+TAKT_SEE(ssize_t, pwrite64, file, (int file, const void* data, size_t size, off64_t at), (file, data, size, at))
 TAKT_SEE(ssize_t, readv, file, (int file, const iovec* parts, int count), (file, parts, count))
 TAKT_SEE(ssize_t, writev, file, (int file, const iovec* parts, int count), (file, parts, count))
 TAKT_SEE(int, close, file, (int file), (file))
 TAKT_SEE(int, fsync, file, (int file), (file))
+TAKT_SEE(int, fdatasync, file, (int file), (file))
+
+TAKT_SEE(void*, sbrk, mmap, (intptr_t more), (more))
+TAKT_SEE(int, brk, mmap, (void* end), (end))
 
 TAKT_SEE(int, socket, socket, (int domain, int type, int protocol), (domain, type, protocol))
 TAKT_SEE(int, connect, socket, (int file, const sockaddr* to, socklen_t size), (file, to, size))
 TAKT_SEE(int, accept, socket, (int file, sockaddr* from, socklen_t* size), (file, from, size))
+TAKT_SEE(int, accept4, socket, (int file, sockaddr* from, socklen_t* size, int flags), (file, from, size, flags))
 TAKT_SEE(ssize_t, send, socket, (int file, const void* data, size_t size, int flags), (file, data, size, flags))
 TAKT_SEE(ssize_t, recv, socket, (int file, void* data, size_t size, int flags), (file, data, size, flags))
 TAKT_SEE(ssize_t, sendmsg, socket, (int file, const msghdr* message, int flags), (file, message, flags))
@@ -131,12 +138,17 @@ TAKT_SEE(int, sched_yield, sleep, (), ())
 TAKT_SEE(int, pthread_join, wait, (pthread_t thread, void** result), (thread, result))
 TAKT_SEE(int, sem_wait, wait, (sem_t * semaphore), (semaphore))
 TAKT_SEE(int, sem_timedwait, wait, (sem_t * semaphore, const timespec* until), (semaphore, until))
+TAKT_SEE(int, sem_clockwait, wait, (sem_t * semaphore, clockid_t clock, const timespec* until),
+         (semaphore, clock, until))
+TAKT_SEE(int, pthread_barrier_wait, wait, (pthread_barrier_t * barrier), (barrier))
 TAKT_SEE(int, poll, wait, (pollfd * files, nfds_t count, int timeout), (files, count, timeout))
 TAKT_SEE(int, ppoll, wait, (pollfd * files, nfds_t count, const timespec* timeout, const sigset_t* blocked),
          (files, count, timeout, blocked))
 TAKT_SEE(int, select, wait, (int files, fd_set* read, fd_set* write, fd_set* other, timeval* timeout),
          (files, read, write, other, timeout))
 TAKT_SEE(int, epoll_wait, wait, (int epoll, epoll_event* events, int size, int timeout), (epoll, events, size, timeout))
+TAKT_SEE(int, epoll_pwait, wait, (int epoll, epoll_event* events, int size, int timeout, const sigset_t* blocked),
+         (epoll, events, size, timeout, blocked))
 
 // Condition variables changed their layout once; the old functions are still there under the old version.
 #define TAKT_SEE_CONDITION(name, parameters, arguments)        \
@@ -152,15 +164,24 @@ TAKT_SEE_CONDITION(pthread_cond_clockwait,
                    (pthread_cond_t * condition, pthread_mutex_t* mutex, clockid_t clock, const timespec* until),
                    (condition, mutex, clock, until))
 
-int pthread_mutex_lock(pthread_mutex_t* mutex) {
-  static Next<int (*)(pthread_mutex_t*)> next("pthread_mutex_lock");
-  if (takt::counter::job != nullptr) {
-    const int taken = pthread_mutex_trylock(mutex);
-    if (taken != EBUSY) return taken;
-    see(JobCall::lock, "pthread_mutex_lock");
+// One that would have to wait.
+#define TAKT_SEE_LOCK(name, at_once, parameters, arguments) \
+  int name parameters {                                     \
+    static Next<int(*) parameters> next(#name);             \
+    if (takt::counter::job != nullptr) {                    \
+      const int taken = at_once(lock);                      \
+      if (taken != EBUSY) return taken;                     \
+      see(JobCall::lock, #name);                            \
+    }                                                       \
+    return next.get() arguments;                            \
   }
-  return next.get()(mutex);
-}
+TAKT_SEE_LOCK(pthread_mutex_lock, pthread_mutex_trylock, (pthread_mutex_t * lock), (lock))
+TAKT_SEE_LOCK(pthread_mutex_timedlock, pthread_mutex_trylock, (pthread_mutex_t * lock, const timespec* until),
+              (lock, until))
+TAKT_SEE_LOCK(pthread_mutex_clocklock, pthread_mutex_trylock,
+              (pthread_mutex_t * lock, clockid_t clock, const timespec* until), (lock, clock, until))
+TAKT_SEE_LOCK(pthread_rwlock_rdlock, pthread_rwlock_tryrdlock, (pthread_rwlock_t * lock), (lock))
+TAKT_SEE_LOCK(pthread_rwlock_wrlock, pthread_rwlock_trywrlock, (pthread_rwlock_t * lock), (lock))
 
 TAKT_SEE(int, puts, stdio, (const char* text), (text))
 TAKT_SEE(int, fputs, stdio, (const char* text, FILE* file), (text, file))

@@ -18,7 +18,18 @@ struct Random {
   int64_t operator()(int64_t low, int64_t high) { return std::uniform_int_distribution<int64_t>(low, high)(engine); }
 };
 
-/// Some threads that take turns on two CPUs, instant by instant, and jobs anywhere on them: one unit is one ns.
+constexpr int64_t kUnit = 1'000'000;  // ns
+
+void in_units(Trace& trace) {
+  const auto scale = [](auto&... instants) { ((instants *= kUnit), ...); };
+  for (TaskFacts& task : trace.tasks) scale(task.budget_ns);
+  for (Slice& slice : trace.slices) scale(slice.from_ns, slice.to_ns, slice.woken_ns);
+  for (JobSpan& job : trace.jobs)
+    scale(job.start_ns, job.release_ns, job.published_ns, job.finish_ns, job.deadline_ns, job.cpu_ns);
+  for (Steal& steal : trace.steals) scale(steal.from_ns, steal.to_ns, steal.stolen_ns);
+}
+
+/// Some threads that take turns on two CPUs, instant by instant, and jobs anywhere on them, in whole units.
 Trace random_trace(Random& random) {
   Trace trace;
   trace.source = static_cast<Source>(random(0, 3));
@@ -54,8 +65,44 @@ Trace random_trace(Random& random) {
       at = job.published_ns + random(0, 20);
     }
   }
-  if (random(0, 1) == 0) trace.steals.push_back({0, 300, 10, static_cast<int>(random(0, 1))});
+  for (int64_t at = random(-50, 300); at < 300; at += random(20, 300))
+    trace.steals.push_back({at, at + random(1, 50), random(1, 30), static_cast<int>(random(0, 1))});
+  in_units(trace);
   return trace;
+}
+
+/// The steals of that CPU that may tell of [from, to).
+int64_t stolen(const Trace& trace, int cpu, int64_t from, int64_t to) {
+  int64_t sum = 0;
+  for (const Steal& steal : trace.steals) {
+    const bool before = steal.to_ns <= from, after = steal.from_ns - kStealTickNs >= to;
+    if (steal.cpu == cpu && !before && !after) sum += steal.stolen_ns;
+  }
+  return sum;
+}
+
+/// What its parts must say of a job whose CPU clock says less than its slices: [stall, unattributed], by looking at
+/// every instant. A job that is known by its CPU clock alone may have been preempted.
+std::pair<int64_t, int64_t> stood_still(const Trace& trace, const JobSpan& job) {
+  const bool known = trace.source != Source::none;
+  std::map<int, std::pair<int64_t, int64_t>> on;  // per CPU: first and last instant
+  int64_t had = 0;
+  bool seen = false;
+  for (const Slice& slice : trace.slices) seen = seen || slice.thread == job.thread;
+  for (int64_t at = std::max(job.start_ns, job.release_ns); at < job.published_ns; at += kUnit) {
+    int cpu = known && seen ? -1 : job.cpu;
+    for (const Slice& slice : trace.slices)
+      if (known && slice.thread == job.thread && slice.from_ns <= at && at < slice.to_ns) cpu = slice.cpu;
+    if (known && seen && cpu < 0) continue;
+    had += kUnit;
+    on.try_emplace(cpu, at, 0).first->second.second = at + kUnit;
+  }
+  const int64_t missing = had - std::min(had, job.cpu_ns);
+  int64_t host = 0;
+  for (const auto& [cpu, span] : on)
+    if (const int64_t shown = stolen(trace, cpu, span.first, span.second); known && seen && shown > 0)
+      host += shown + kStealTickNs;
+  return {std::min(missing, host), missing - std::min(missing, host)};
 }
 
 /// True if the job's thread had a CPU at that instant, by looking at every slice.
@@ -86,7 +133,9 @@ bool may_hold(const Trace& trace, const JobSpan& job, const Piece& piece, int64_
     case Cause::running: return !before && (on_cpu || !known);
     case Cause::late: return before && !ahead;
     case Cause::behind: return before && !ahead && !on_cpu && known;
-    case Cause::stall: return !ahead && !on_cpu && !trace.steals.empty();
+    case Cause::stall:
+      return !ahead && !on_cpu &&
+             stolen(trace, 0, piece.from_ns, piece.to_ns) + stolen(trace, 1, piece.from_ns, piece.to_ns) > 0;
     case Cause::preempted:
     case Cause::asleep: return !before && !on_cpu && known;
     case Cause::unattributed: return !before && !on_cpu;
@@ -111,16 +160,18 @@ bool occupied_by(const Trace& trace, const Piece& piece, int64_t at) {
 
 TEST_CASE("parts make up the miss, and every instant holds what was going on then") {
   Random random{std::mt19937(7)};
-  size_t misses = 0;
+  size_t misses = 0, stalls = 0, unexplained = 0;
   std::map<Cause, size_t> met;
   for (int round = 0; round < 400; ++round) {
     const Trace trace = random_trace(random);
     const Evidence evidence(trace);
     for (const JobSpan& job : trace.jobs) {
       const Blame result = blame(evidence, job);
-      int64_t sum = 0;
+      int64_t sum = 0, stall = 0, unattributed = 0;
       for (const Part& part : result.parts) {
         sum += part.ns;
+        if (part.cause == Cause::stall) stall += part.ns;
+        if (part.cause == Cause::unattributed) unattributed += part.ns;
         CHECK((part.ns > 0 || part.cause == Cause::slack));
         CHECK(part.ns != 0);
       }
@@ -131,7 +182,9 @@ TEST_CASE("parts make up the miss, and every instant holds what was going on the
         REQUIRE(piece.from_ns == at);
         REQUIRE(piece.to_ns > at);
         ++met[piece.cause];
-        for (; at < piece.to_ns; ++at) {
+        if (piece.cause == Cause::stall) stall -= piece.to_ns - piece.from_ns;
+        if (piece.cause == Cause::unattributed) unattributed -= piece.to_ns - piece.from_ns;
+        for (; at < piece.to_ns; at += kUnit) {
           INFO("round ", round, " instant ", at, " cause ", static_cast<int>(piece.cause));
           REQUIRE(may_hold(trace, job, piece, at));
           if (piece.cause == Cause::behind || (piece.cause == Cause::preempted && !piece.who.empty()))
@@ -139,9 +192,15 @@ TEST_CASE("parts make up the miss, and every instant holds what was going on the
         }
       }
       REQUIRE(at == std::max(job.release_ns, job.published_ns));
+      INFO("round ", round);
+      REQUIRE(std::pair(stall, unattributed) == stood_still(trace, job));
+      stalls += stall > 0;
+      unexplained += stall > 0 && unattributed > 0;
     }
   }
   CHECK(misses > 500);
+  CHECK(stalls > 20);
+  CHECK(unexplained > 2);
   for (const Cause cause : {Cause::late, Cause::behind, Cause::lane, Cause::preempted, Cause::throttled, Cause::asleep,
                             Cause::unattributed, Cause::running})
     CHECK(met[cause] > 20);

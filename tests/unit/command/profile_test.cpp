@@ -73,6 +73,14 @@ TEST_CASE("drift: above the stored quantile or above the budget, by more than th
   CHECK(drifts[4].ok());
   CHECK(!drifts[4].measured);
   CHECK(drift_of(nodes, schedule, 0.99, 0.3)[1].ok());
+  // As long as before, and a nanosecond longer.
+  schedule.measured->nodes["slower"].exec_ns = nodes[1].quantile_ns(0.99);
+  CHECK(drift_of(nodes, schedule, 0.99, 0)[1].ok());
+  schedule.measured->nodes["slower"].exec_ns -= 1;
+  CHECK(drift_of(nodes, schedule, 0.99, 0)[1].above_stored);
+  schedule.measured.reset();  // then the budget alone counts
+  CHECK(drift_of(nodes, schedule, 0.99, 0.2)[1].ok());
+  CHECK(drift_of(nodes, schedule, 0.99, 0.2)[2].above_budget);
   const std::string text = drift_text(drifts, 0.2);
   CHECK(text.find("ABOVE stored") != std::string::npos);
   CHECK(text.find("2 of 5 nodes above by more than 20 %") != std::string::npos);

@@ -142,6 +142,18 @@ TEST_CASE("rounded figures add up, whatever the parts") {
   }
 }
 
+TEST_CASE("parts that do not make up the miss are not made to") {
+  const trace::Trace trace = sample();
+  trace::Blame blame;
+  blame.parts = {{trace::Cause::preempted, 9'104'000, "a", 1}, {trace::Cause::budget, 1'002'000}};
+  blame.miss_ns = 10'106'000;
+  CHECK(explain::sentence(trace, trace.jobs[1], blame).find("by 10.1 ms: preempted 9.1 by a on cpu 1, 1.0 over") !=
+        std::string::npos);
+  blame.miss_ns = 10'352'000;  // 10.4, of which 0.3 are nobody's
+  CHECK(explain::sentence(trace, trace.jobs[1], blame).find("by 10.4 ms: preempted 9.1 by a on cpu 1, 1.0 over") !=
+        std::string::npos);
+}
+
 TEST_CASE("files that are no traces are refused with words, never with a crash") {
   CHECK(explain::read_trace(Json::parse("[]")).error() == "is no trace of a run");
   CHECK(explain::read_trace(Json()).error() == "is no trace of a run");

@@ -34,6 +34,7 @@ struct Fixture {
     Setup setup{clock, ".", ".", 0, std::nullopt, 0};
     node->setup(setup);
     out = std::make_unique<test::BoxWriter<TextStatus>>(*node->outputs()[0]);
+    out->refuses = true;
   }
   uint64_t allocations = 0;  ///< of the last job
 
@@ -78,11 +79,16 @@ TEST_CASE("load: its output names the job and carries the input's stamp on") {
   CHECK(f.out->stamp_ns() == 5);
 }
 
-TEST_CASE("load: a flood fills the output up to its capacity") {
+TEST_CASE("load: a flood fills its message up to the capacity, and sends until it is refused") {
   Fixture f({{"work", 0.0}, {"flood", true}, {"message_size", int64_t{5000}}});
-  f.job(4);
+  for (uint64_t index = 4; index < 7; ++index) f.job(index);
   CHECK(f.text().size() == 5000);
-  CHECK(f.text().substr(0, 3) == "4..");
+  CHECK(f.text().substr(0, 3) == "6..");
+  CHECK(f.out->refused == 3);
+  test::set(*f.node, "flood", false);
+  f.job(7);
+  CHECK(f.text() == "7");
+  CHECK(f.out->refused == 3);
 }
 
 TEST_CASE("load: allocates once, at the job it is told to") {

@@ -47,6 +47,7 @@ class BoxWriter final : public Writer {
     PortAccess::mark_read(port);
   }
   MessageHeader* loan() override {
+    if (refuses && sent()) return ++refused, nullptr;
     MessageType::of<T>().place(&*box_, capacity_);
     return &box_.header();
   }
@@ -60,6 +61,8 @@ class BoxWriter final : public Writer {
   bool sent() const { return PortAccess::sent(*port_); }
   int64_t stamp_ns() const { return PortAccess::stamp_ns(*port_); }
   void clear() { PortAccess::reset(*port_); }
+  bool refuses = false;  ///< a second message between two clear(), as the runtime does in one job
+  uint64_t refused = 0;
 
  private:
   Capacity capacity_;

@@ -30,6 +30,19 @@ struct Source final : Node {
   }
 };
 
+/// Sends its job index, then asks for more until it is refused.
+struct Flood final : Node {
+  Output<Odometry> out{this, "out", "test data"};
+  void setup(Setup&) override {}
+  void run(Job& job) override {
+    for (Odometry* message = out.loan(); message != nullptr; message = out.loan()) {
+      CHECK(out.loan() == message);  // until it is sent
+      message->x_m = static_cast<double>(job.index());
+      out.send(job.release_ns());
+    }
+  }
+};
+
 /// Notes what it latched.
 struct Sink final : Node {
   Input<Odometry> a{this, "a", "test data"};
@@ -105,6 +118,23 @@ TEST_CASE("completed equals the releases computed from rate and window, for each
       CHECK(executor.tasks()[i]->statistics().skipped.load() == 0);
     }
   });
+}
+
+TEST_CASE("a job that floods its output gets one message through; what it was refused is counted") {
+  Bench bench;
+  Flood flood;
+  Sink sink;
+  const size_t from = bench.add(flood, "flood", Rate{10, 1}, 0, 5 * kMs);
+  const size_t to = bench.add(sink, "sink", Rate{10, 1}, 50 * kMs, kMs);
+  bench.edge(from, to, 0);
+  bench.run(1000 * kMs, [&](Executor& executor) {
+    const WriterStatistics& pool = executor.board().port(0).writer;
+    CHECK(pool.sent == 10);
+    CHECK(pool.pool_empty == 10);
+    CHECK(pool.peak_in_use < pool.chunks);
+  });
+  REQUIRE(sink.seen.size() == 10);
+  for (size_t k = 0; k < 10; ++k) CHECK(sink.seen[k].a == std::vector<double>{static_cast<double>(k)});
 }
 
 TEST_CASE("a job latches the newest message visible at its planned release, not at its start") {

@@ -88,13 +88,36 @@ TEST_CASE("SCHED_DEADLINE: an idle CPU, or an ordinary thread on it, means throt
   CHECK(part_us(blame_last(trace), Cause::preempted, "cc1plus") == 3'000);
 }
 
-TEST_CASE("the CPU clock stood still while the thread had the CPU: the host, where it takes time at all") {
+TEST_CASE("the CPU clock stood still while the thread had the CPU: the host, where it took time from that CPU then") {
   Trace trace = two_lanes();
-  trace.jobs = {job(1, 1, 0, 0, 11'000, 4'000)};
-  trace.slices = {slice(12, 1, 0, 11'000, kAsleep)};
-  CHECK(part_us(blame_last(trace), Cause::unattributed) == 7'000);
-  trace.steals = {{0, 100'000 * kUs, 10'000 * kUs, 1}};
-  CHECK(part_us(blame_last(trace), Cause::stall) == 7'000);
+  trace.jobs = {job(1, 1, 200'000, 200'000, 240'000, 5'000)};
+  trace.slices = {slice(12, 1, 200'000, 240'000, kAsleep)};
+  CHECK(part_us(blame_last(trace), Cause::unattributed) == 35'000);
+  const auto stall_us = [&](int64_t from_us, int64_t to_us, int64_t stolen_us, int cpu) {
+    trace.steals = {{from_us * kUs, to_us * kUs, stolen_us * kUs, cpu}};
+    const Blame result = blame_last(trace);
+    const int64_t stall = part_us(result, Cause::stall);
+    CHECK(stall + part_us(result, Cause::unattributed) == 35'000);
+    return stall;
+  };
+  CHECK(stall_us(180'000, 280'000, 30'000, 1) == 35'000);
+  CHECK(stall_us(180'000, 280'000, 10'000, 1) == 20'000);  // what shows, and a tick that may not show yet
+  CHECK(stall_us(180'000, 280'000, 30'000, 0) == 0);       // from another CPU
+  CHECK(stall_us(100'000, 200'000, 30'000, 1) == 0);       // before the job
+  CHECK(stall_us(249'000, 349'000, 30'000, 1) == 35'000);  // counted at the next tick
+  CHECK(stall_us(250'000, 350'000, 30'000, 1) == 0);       // later
+  trace.source = Source::none;                             // what did not run may as well have been preempted
+  CHECK(stall_us(180'000, 280'000, 30'000, 1) == 0);
+}
+
+TEST_CASE("a job that moved to another CPU: each CPU's stolen time counts for the time it was there") {
+  Trace trace = two_lanes();
+  trace.jobs = {job(1, 1, 0, 0, 60'000, 5'000)};
+  trace.slices = {slice(12, 0, 0, 10'000, kPreempted), slice(12, 1, 10'000, 60'000, kAsleep)};
+  trace.steals = {{30'000 * kUs, 50'000 * kUs, 10'000 * kUs, 0}};
+  CHECK(part_us(blame_last(trace), Cause::stall) == 0);
+  trace.steals.push_back({30'000 * kUs, 50'000 * kUs, 10'000 * kUs, 1});
+  CHECK(part_us(blame_last(trace), Cause::stall) == 20'000);
 }
 
 TEST_CASE("a late timer on a CPU from which the host took time is a host stall, whoever ran there") {
