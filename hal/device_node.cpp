@@ -4,6 +4,7 @@
 namespace takt {
 
 void DeviceNode::open_in_setup(const Setup& setup) {
+  if (!opens_) return;
   if (const auto opened = device().open(); !opened) throw SetupError(opened.error().text());
   const DeclaredCalls declared = device().declared_calls();
   if (declared.calls != 0) may(declared.calls, declared.reason);

@@ -36,6 +36,8 @@ class DeviceNode : public Node {
   void set_health(const DeviceHealthSettings& settings) { health_settings_ = settings; }
   /// Before the start: what stands at the other end of the device's line lives as long as the node does.
   void live_with(std::unique_ptr<DoubleThread> device) { double_ = std::move(device); }
+  /// Before setup: the device is not opened there. Such a node tells its capacities, and never runs.
+  void leave_closed() { opens_ = false; }
 
  protected:
   /// In setup: opens the device.
@@ -52,7 +54,7 @@ class DeviceNode : public Node {
  private:
   void judge(ReadStatus status, Job& job, bool repeated);
 
-  bool started_ = false;
+  bool opens_ = true, started_ = false;
   DeviceHealthSettings health_settings_;
   DeviceHealth health_{health_settings_};
   RetryDelay retry_;

@@ -28,6 +28,8 @@ struct DeviceConfig {
   nlohmann::json settings;          ///< one object; values with a unit as text ("0.24m") or as numbers in SI
   std::filesystem::path directory;  ///< relative paths in the settings start here
   uint64_t seed = 0;
+  bool plugged =
+      true;  ///< false: hardware need not be there. Its node knows sizes from settings and files, and never runs
 };
 
 /// What the devices of one process share: the simulated worlds, one per world file and seed, with one robot for each
@@ -80,8 +82,8 @@ std::span<const DeviceKind> device_kinds();
 /// std::logic_error for a kind that device_kinds() does not have.
 std::unique_ptr<DeviceNode> make_shell(std::string_view kind);
 
-/// Makes the node of a device and opens the device: everything that can be wrong with files and settings is told here.
-/// Errors list the valid alternatives.
+/// Makes the node of a device and opens the device (hardware only if it is `plugged`): everything that can be wrong
+/// with files and settings is told here. Errors list the valid alternatives.
 tl::expected<std::unique_ptr<DeviceNode>, DeviceError> make_device(const DeviceConfig& config, Devices& devices,
                                                                    const Clock& clock);
 

@@ -34,13 +34,15 @@ enum class Misbehaviour : uint8_t {
   queue_error,    ///< the queue is in error: POLLERR, and no frame
   uncounted,      ///< the number of every frame is 0
   unstamped,      ///< no monotonic stamps
+  dazzled,        ///< light that is too bright: of a wide field it says that it sees nothing
+  polluted,       ///< a dirty window: it warns for two seconds, and is in error then
 };
 
 /// In the order of Misbehaviour.
-inline constexpr std::array<std::string_view, 20> kMisbehaviours{
-    "none",       "silent",     "unplugged",     "garbage",      "frozen",    "repeated", "wrong_crc",
-    "wrong_baud", "masquerade", "lost_frames",   "no_heartbeat", "bus_off",   "flagged",  "cut",
-    "empty",      "io_error",   "end_of_stream", "queue_error",  "uncounted", "unstamped"};
+inline constexpr std::array<std::string_view, 22> kMisbehaviours{
+    "none",          "silent",      "unplugged",    "garbage",   "frozen",  "repeated", "wrong_crc", "wrong_baud",
+    "masquerade",    "lost_frames", "no_heartbeat", "bus_off",   "flagged", "cut",      "empty",     "io_error",
+    "end_of_stream", "queue_error", "uncounted",    "unstamped", "dazzled", "polluted"};
 
 constexpr std::string_view to_text(Misbehaviour how) { return kMisbehaviours[static_cast<size_t>(how)]; }
 

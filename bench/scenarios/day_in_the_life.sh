@@ -1,11 +1,13 @@
 #!/bin/bash
 # SPDX-License-Identifier: Apache-2.0
 # A graph whose devices are all doubles at byte level, with everything on: day_in_the_life.sh [MINUTES] [SEED]
-# Default: 30 minutes of graph/ace.yaml (GRAPH=FILE: another one), profile doubles. It prints which rates were kept, what
-# each device lost, memory and descriptors at the start, in the middle and at the end, and deadlines missed. With a SEED
-# (and at least 2 minutes) a device misbehaves every 12 seconds for 3, in every way that its double knows.
-# Exit 1 if memory or descriptors grew, a device was not well at the end, obstacle_stop missed a deadline, or, without a
-# SEED, a device lost data or was away after its start.
+# Default: 30 minutes of graph/ace.yaml (GRAPH=FILE: another one), profile doubles, recorded (RECORD=FILE keeps the record;
+# it is some 40 MB a second, so by default it goes to /dev/null). It prints which rates were kept, what each device lost,
+# memory and descriptors at the start, in the middle and at the end, and deadlines missed. With a SEED (and at least 2
+# minutes) a device misbehaves every 12 seconds for 3, in every way that its double knows.
+# Exit 1 if memory or descriptors grew, a device was not well at the end, obstacle_stop missed a deadline, a node with a
+# rate had fewer than 99 of 100 jobs while it was to run, the record lost anything, or, without a SEED, a device had
+# damaged or missing data, left commands unsent, or was away after its start.
 root=$(readlink -f "$(dirname "$0")/../..")
 export PYTHONDONTWRITEBYTECODE=1
 exec python3 - "${TAKT:-$root/takt}" "${GRAPH:-$root/graph/ace.yaml}" "$@" <<'PY'
@@ -17,12 +19,13 @@ seed = int(args[1]) if len(args) > 1 else None
 # What each kind's double knows that its device may really do; frozen lines and axes are nothing that a driver can see.
 words = {
     "stereo_camera": ["silent", "unplugged", "garbage", "frozen", "repeated", "flagged", "cut", "empty", "io_error", "end_of_stream", "queue_error"],
-    "laser_scanner": ["silent", "unplugged", "garbage", "frozen", "wrong_crc", "wrong_baud"],
+    "lms200": ["silent", "unplugged", "garbage", "frozen", "wrong_crc", "wrong_baud", "dazzled", "polluted"],
+    "lms400": ["silent", "unplugged", "garbage", "frozen", "wrong_crc"],
     "camera_head": ["silent", "unplugged", "garbage", "repeated", "wrong_crc", "masquerade", "lost_frames", "no_heartbeat", "bus_off"],
     "mobile_base": ["silent", "unplugged", "garbage", "repeated", "wrong_crc", "masquerade", "lost_frames", "no_heartbeat", "bus_off"],
     "digital_lines": ["unplugged"],
 }
-devices = dict(re.findall(r"^  (\w+): \{kind: (\w+)", open(graph).read(), re.M))
+devices = {d: model or kind for d, kind, model in re.findall(r"^  (\w+): \{kind: (\w+)(?:, model: (\w+))?", open(graph).read(), re.M)}
 told = {d: [] for d in devices}
 if seed is not None:
     orders = [(d, w) for d, kind in devices.items() for w in words.get(kind, [])]
@@ -35,7 +38,7 @@ options = [f"--set={d}.failures={', '.join(failures)}" for d, failures in told.i
 with tempfile.TemporaryDirectory(prefix="day-") as work:
     log = open(f"{work}/log", "w")
     run = subprocess.Popen([takt, "run", graph, "--profile", "doubles", "--for", f"{seconds}s", "--output", f"{work}/out",
-                            "--report", f"{work}/report.json", *options], stdout=log, stderr=log)
+                            "--report", f"{work}/report.json", "--record", os.environ.get("RECORD", "/dev/null"), *options], stdout=log, stderr=log)
 
     def reading():
         """Memory that is no file (proportional, MB), descriptors and threads of all processes of the run. Pages of libraries are not
@@ -63,6 +66,7 @@ print(f"{report['graph']}: {duration:.0f} s, policy {report['policy_granted']}, 
       f"host stall {report['host_stall_ms']} ms" + (f", {sum(map(len, told.values()))} misbehaviours (seed {seed})" if seed is not None else ""))
 bad = []
 for n in report["nodes"]:
+    if n["rate_hz"] and n["completed"] < 0.99 * n["rate_hz"] * n["active_s"] - 1: bad.append(f"{n['name']} did not keep its rate")
     rate = f"{n['completed'] / max(n['active_s'], 1e-9):.2f} of {n['rate_hz']:g} Hz" if n["rate_hz"] else "on demand"
     print(f"{n['name']:18}{n['criticality']:>7}  {rate:18} released {n['released']:6} done {n['completed']:6} skipped {n['skipped']:4} no result {n['no_result']:5} miss {n['deadline_misses']:4}")
 for d in report["devices"]:
@@ -70,11 +74,14 @@ for d in report["devices"]:
           f"lost {d['losses']} times, {d['lost_s']:.1f} s" + (f"; {d['trouble']}" if d["trouble"] else ""))
     if d["state"] != "ok": bad.append(f"{d['name']} is {d['state']} at the end")
     if seed is None and d["damaged"] + d["resyncs"] > 0: bad.append(f"{d['name']} had damaged data")
+    if seed is None and d["missing"] + d["unsent"] > 0: bad.append(f"{d['name']} has {d['missing']} missing, {d['unsent']} unsent")
     if seed is None and d["losses"] > 1: bad.append(f"{d['name']} was lost {d['losses']} times")
 high = [n for n in report["nodes"] if n["criticality"] == "high"]
 print(f"deadlines missed by nodes of high criticality: {sum(n['deadline_misses'] for n in high)} of {sum(n['released'] for n in high)}; "
       f"changes of mode: {len(report['modes']) - 1}")
 if any(n["name"] == "obstacle_stop" and n["deadline_misses"] for n in high): bad.append("obstacle_stop missed a deadline")
+print(f"record: {report['record']}")
+if report["recorder_lost"]: bad.append(f"the record lost {report['recorder_lost']}")
 tenth = max(1, len(samples) // 10)
 middle = lambda part: tuple(sorted(column)[len(part) // 2] for column in zip(*part))
 early, half, late = middle(samples[tenth:2 * tenth] or samples), middle(samples[len(samples) // 2:][:tenth]), middle(samples[-tenth - 1:-1] or samples)

@@ -153,6 +153,11 @@ Json Server::top() const {
                      {"level", s.last_level.load()},
                      {"exec_ms", static_cast<double>(s.last_exec_ns.load()) / 1e6},
                      {"response_ms", static_cast<double>(s.last_response_ns.load()) / 1e6}});
+    if (!task.device) continue;
+    const SourceRecord& source = subject_.board.source(t);
+    nodes.back()["device"] = {{"state", to_text(source.state.load())},
+                              {"losses", source.losses.load()},
+                              {"received", source.received.load()}};
   }
   return {{"graph", subject_.graph.name},
           {"profile", subject_.graph.profile},

@@ -14,7 +14,7 @@ namespace takt::command {
 
 int check_graph(const RunOptions& options, bool json) {
   Prepared prepared;
-  if (const int code = prepare(options, prepared); code != kOk) {
+  if (const int code = prepare_check(options, prepared); code != kOk) {
     if (json) std::printf("%s\n", graph::check_failed(prepared.problems).json.dump(2).c_str());
     return code;
   }

@@ -24,7 +24,8 @@ int refuse(Prepared& prepared, std::vector<graph::Problem> problems, Exit code) 
 
 graph::DeviceFactory device_factory(Prepared& prepared, uint64_t seed) {
   return [&prepared, seed](const graph::DeviceSpec& spec) -> tl::expected<std::unique_ptr<Node>, graph::ComposeError> {
-    const hal::DeviceConfig config{spec.id, spec.kind, spec.driver, spec.settings, prepared.graph->directory, seed};
+    const hal::DeviceConfig config{spec.id, spec.kind,       spec.driver, spec.settings, prepared.graph->directory,
+                                   seed,    prepared.plugged};
     auto node = hal::make_device(config, prepared.devices, *prepared.clock);
     if (node) return std::move(*node);
     graph::ComposeError error;
@@ -81,7 +82,8 @@ int compose(const RunOptions& options, const graph::ComposeOptions& how, Prepare
   return kOk;
 }
 
-int prepare(const RunOptions& options, Prepared& prepared) {
+int prepare_check(const RunOptions& options, Prepared& prepared) {
+  prepared.plugged = false;
   int code = load(options, prepared);
   if (code == kOk) {
     graph::ComposeOptions how;

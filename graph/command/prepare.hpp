@@ -16,6 +16,7 @@ struct Prepared {
   hal::Devices devices;
   std::optional<graph::Composition> composition;
   std::vector<graph::Problem> problems;  ///< why there is no composition
+  bool plugged = true;                   ///< hardware is there and is opened
 };
 
 /// Loads only, no device is opened; nothing if the input is wrong, which is then written to stderr. An empty `file` is
@@ -27,8 +28,8 @@ std::optional<graph::GraphSpec> load_graph(const std::filesystem::path& file, co
 int load(const RunOptions& options, Prepared& prepared);
 /// Composes what is loaded, or the part of it that `compose` says; problems as above.
 int compose(const RunOptions& options, const graph::ComposeOptions& compose, Prepared& prepared);
-/// Both, for a run in one process.
-int prepare(const RunOptions& options, Prepared& prepared);
+/// Both, for what is not run: hardware need not be there.
+int prepare_check(const RunOptions& options, Prepared& prepared);
 /// "takt: n problems, nothing was started".
 void tell_problems(size_t count);
 

@@ -23,6 +23,9 @@ Loaded Loader::load(const std::filesystem::path& file) {
   if (graph_.root.is_object()) {
     read_graph();
     make_instances();
+    check_profile_ids();
+    spec_.profile = choose_profile();
+    read_profile_set();
     read_set();
     read_params();
     read_devices();

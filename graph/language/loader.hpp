@@ -45,7 +45,7 @@ struct Given {
 };
 
 struct Setting {
-  std::string id, name;  ///< node.param of --set
+  std::string id, name;  ///< node.param of --set, or of the profile's `set`
   Given given;
 };
 
@@ -71,8 +71,9 @@ class Loader {
   // read_measured.cpp
   void read_measured(const nlohmann::json& value);
 
-  // read_params.cpp: node types, parameters of nodes, --set
+  // read_params.cpp: node types, parameters of nodes, `set` of the profile, --set
   void make_instances();
+  void read_profile_set();
   void read_set();
   void read_params();
   void read_param(NodeSpec& node, Node& instance, const std::string& name, const Given& given);

@@ -88,7 +88,7 @@ std::string Loader::choose_profile() {
 }
 
 void Loader::check_profile_ids() {
-  std::vector<std::string> valid{"default"};
+  std::vector<std::string> valid{"default", "set"};
   for (const auto& device : spec_.devices) valid.push_back(device.id);
   const json profiles = graph_.root.value("profiles", json::object());
   if (!profiles.is_object()) return;
@@ -103,8 +103,6 @@ void Loader::check_profile_ids() {
 }
 
 void Loader::read_devices() {
-  check_profile_ids();
-  spec_.profile = choose_profile();
   if (spec_.profile.empty()) return;
   const std::string defaults = child(child("/profiles", spec_.profile), "default");
   std::set<std::string> unclaimed;  // settings of `default` that no device takes

@@ -65,8 +65,9 @@ void Loader::read_graph() {
   for (const auto& [id, value] : devices.items()) {
     const std::string pointer = child("/devices", id);
     claim_id(id, graph_.key_at(pointer));
-    if (id == "default")
-      problem(graph_.key_at(pointer), "`default` is no id of a device: in a profile it means all devices");
+    if (id == "default" || id == "set")
+      problem(graph_.key_at(pointer), ticked(id) + " is no id of a device: in a profile it means " +
+                                          (id == "set" ? "parameters of nodes" : "all devices"));
     DeviceSpec device;
     device.id = id;
     device.kind = text_at(value, "kind");

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "graph/language/loader.hpp"
@@ -79,6 +80,27 @@ void Loader::make_instances() {
     } catch (const std::exception& error) {
       problem(at, fmt::format("node {}: type {} cannot be made: {}", ticked(node.id), ticked(node.type), error.what()));
     }
+  }
+}
+
+/// Parameters of nodes that the profile chooses; the command line may choose others.
+void Loader::read_profile_set() {
+  const std::string pointer = child(child("/profiles", spec_.profile), "set");
+  const json::json_pointer where(pointer);
+  if (spec_.profile.empty() || !graph_.root.contains(where) || !graph_.root.at(where).is_object()) return;
+  std::vector<std::string> nodes;
+  for (const auto& node : spec_.nodes) nodes.push_back(node.id);
+  for (const auto& [text, value] : graph_.root.at(where).items()) {
+    if (!value.is_primitive() || value.is_null()) continue;  // the schema has reported it
+    const size_t dot = std::min(text.find('.'), text.size());
+    const std::string id = text.substr(0, dot);
+    if (dot + 1 >= text.size())
+      problem(graph_.key_at(child(pointer, text)), ticked(text) + " is not understood; write node.param: value");
+    else if (std::find(nodes.begin(), nodes.end(), id) == nodes.end())
+      problem(graph_.key_at(child(pointer, text)),
+              fmt::format("profile {} sets {}, which is no node{}", ticked(spec_.profile), ticked(id),
+                          alternatives(id, nodes, "nodes")));
+    else set_.push_back({id, text.substr(dot + 1), given(child(pointer, text), value)});
   }
 }
 

@@ -15,7 +15,7 @@ void BaseNode::run(Job& job) {
     base_->command(wanted->speed_m_s, wanted->turn_rad_s, job.release_ns());
   }
   const BaseReading reading = base_->read(job.release_ns(), job.deadline_ns());
-  if (!accept(reading.status, job)) return;
+  if (!accept(reading.status, job, false, reading.repeated)) return;
   Odometry* message = odometry_.loan();
   if (message == nullptr) return job.no_result();
   message->x_m = reading.x_m;

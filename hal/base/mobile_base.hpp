@@ -14,8 +14,9 @@ struct BaseReading {
   int64_t stamp_ns = 0;
   double x_m = 0, y_m = 0, theta_rad = 0;  ///< in the odometry frame, theta from its x axis; drifts
   double speed_m_s = 0, turn_rad_s = 0;
-  uint32_t epoch = 0;    ///< rises when the base forgot its pose (restart, reconnect); never silently reset
-  bool blocked = false;  ///< a motion was refused (collision, bumper, emergency stop)
+  uint32_t epoch = 0;     ///< rises when the base forgot its pose (restart, reconnect); never silently reset
+  bool blocked = false;   ///< a motion was refused (collision, bumper, emergency stop)
+  bool repeated = false;  ///< it has to move, or says that it does, and its wheels stand
 };
 
 /// The differential-drive platform. See Device for the life cycle and the thread rules.

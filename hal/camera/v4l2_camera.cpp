@@ -35,10 +35,10 @@ V4l2Camera::V4l2Camera(std::string id, V4l2CameraSettings settings, std::unique_
     : id_(std::move(id)), settings_(std::move(settings)), device_(std::move(device)), clock_(clock) {
   settings_.layout.width = settings_.rig.width;
   settings_.layout.height = settings_.rig.height;
+  rate_hz_ = settings_.rate.hz();
 }
 
-DeviceResult V4l2Camera::open() {
-  if (open_) return {};
+DeviceResult V4l2Camera::check_settings() const {
   const FrameLayout& layout = settings_.layout;
   if (layout.left == layout.right || std::min(layout.left, layout.right) < 0 ||
       std::max(layout.left, layout.right) >= layout.planes()) {
@@ -48,6 +48,13 @@ DeviceResult V4l2Camera::open() {
   if (layout.format == FrameFormat::yuyv && (layout.mosaic != Mosaic::none || layout.width % 2 != 0))
     return device_error(id_, "yuyv has colours of its own, for pairs of pixels",
                         "leave `bayer` out, use an even width");
+  return {};
+}
+
+DeviceResult V4l2Camera::open() {
+  if (open_) return {};
+  if (const auto sound = check_settings(); !sound) return sound;
+  const FrameLayout& layout = settings_.layout;
   if (const Trouble trouble = claim()) {
     DeviceResult result = told(trouble);
     release();

@@ -45,6 +45,8 @@ class V4l2Camera final : public StereoCamera {
 
   V4l2Camera(std::string id, V4l2CameraSettings settings, std::unique_ptr<VideoDevice> device, const Clock& clock);
   ~V4l2Camera() override { V4l2Camera::close(); }
+  /// Of the settings alone, what open() would refuse.
+  DeviceResult check_settings() const;
   DeviceResult open() override;
   void close() override;
   DeviceResult start(int64_t epoch_ns) override;

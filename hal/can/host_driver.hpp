@@ -61,14 +61,15 @@ class HostDriver : public Interface {
   }
   SourceCounts counts() const override {
     const StationCounters& c = station_.counters();
-    return {c.accepted, c.damaged, 0, c.gaps + c.out_of_order, c.unsent};
+    return {c.accepted, c.damaged, 0, c.gaps + c.out_of_order + station_.overflows(), c.unsent};
   }
   const char* trouble() const override {
     if (started_ && faulted()) return "the device says that it is in a fault";
     switch (station_.link()) {
       case Link::up: return guard_.operational(clock_.now_ns()) ? "" : "no heartbeat of a device at work";
       case Link::down: return "the interface is down";
-      case Link::bus_off: return "the controller is off the bus";
+      case Link::bus_off:
+        return station_.restless() ? "the controller was off the bus again and again" : "the controller is off the bus";
       case Link::gone: return "the interface, or who listens there, is gone";
     }
     return "";

@@ -43,6 +43,7 @@ int Port::open(std::span<const uint32_t> ids) {
   const bool is_unix = interface_.starts_with(kUnix);
   const int error = is_unix ? open_unix(std::string_view(interface_).substr(kUnix.size())) : open_can(ids);
   if (error != 0) close();
+  socket_overflows_ = 0;
   emptied_ns_ = clock_.now_ns();
   return error;
 }
@@ -141,7 +142,11 @@ Reception Port::receive() {
   reception.stamp_ns = clock_.now_ns();
   for (cmsghdr* c = CMSG_FIRSTHDR(&message); c != nullptr; c = CMSG_NXTHDR(&message, c)) {
     if (c->cmsg_level != SOL_SOCKET) continue;
-    if (c->cmsg_type == SO_RXQ_OVFL) std::memcpy(&overflows_, CMSG_DATA(c), sizeof(overflows_));
+    if (c->cmsg_type == SO_RXQ_OVFL) {
+      const uint32_t before = socket_overflows_;
+      std::memcpy(&socket_overflows_, CMSG_DATA(c), sizeof(socket_overflows_));
+      overflows_ += socket_overflows_ - before;
+    }
     if (c->cmsg_type != SCM_TIMESTAMPNS) continue;
     timespec stamp;
     std::memcpy(&stamp, CMSG_DATA(c), sizeof(stamp));

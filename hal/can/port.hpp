@@ -47,8 +47,8 @@ class Port {
 
   Reception receive();
   PortStatus send(const Frame& frame);
-  /// Frames that the kernel dropped because nobody took them in time.
-  uint32_t overflows() const { return overflows_; }
+  /// Frames that the kernel dropped because nobody took them in time; since construction.
+  uint64_t overflows() const { return overflows_; }
 
  private:
   int open_can(std::span<const uint32_t> ids);
@@ -60,7 +60,8 @@ class Port {
   const Clock& clock_;
   End end_;
   int descriptor_ = -1, listener_ = -1;
-  uint32_t overflows_ = 0;
+  uint64_t overflows_ = 0;
+  uint32_t socket_overflows_ = 0;   ///< of the socket that is open, as the kernel counts them
   int64_t emptied_ns_ = INT64_MIN;  ///< what arrived before has been taken
 };
 

@@ -7,7 +7,8 @@
 namespace takt::can {
 
 Station::Station(std::string interface, const Clock& clock, std::span<const Message> table, Sender self)
-    : port_(std::move(interface), clock, self == Sender::host ? Port::End::host : Port::End::device),
+    : clock_(clock),
+      port_(std::move(interface), clock, self == Sender::host ? Port::End::host : Port::End::device),
       table_(table),
       self_(self) {
   const bool fits = table.size() <= kMostMessages && std::all_of(table.begin(), table.end(), [](const Message& m) {
@@ -51,7 +52,7 @@ std::optional<Incoming> Station::next() {
     }
     const Frame& frame = reception.frame;
     if ((frame.id & kErrorFlag) != 0) {
-      bus_.observe(frame);
+      observe(frame);
       continue;
     }
     if (bus_.state == BusState::off) bus_.state = BusState::active;  // who hears frames is on the bus
@@ -69,6 +70,17 @@ std::optional<Incoming> Station::next() {
   }
   looked_at_ = 0;
   return std::nullopt;
+}
+
+void Station::observe(const Frame& error) {
+  constexpr int64_t kMinute_ns = 60'000'000'000;
+  const uint64_t before = bus_.restarts;
+  bus_.observe(error);
+  if (bus_.restarts == before) return;
+  int64_t& oldest_ns = restarted_ns_[before % kMostRestarts];
+  const int64_t now_ns = clock_.now_ns();
+  if (before >= kMostRestarts && now_ns - oldest_ns < kMinute_ns) restless_until_ns_ = now_ns + kMinute_ns;
+  oldest_ns = now_ns;
 }
 
 bool Station::accept(size_t message, const Frame& frame) {

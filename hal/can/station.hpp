@@ -33,7 +33,8 @@ struct Incoming {
 class Station {
  public:
   static constexpr size_t kMostMessages = 24;
-  static constexpr int kMostFrames = 256;  ///< looked at without a pause: a babbling bus does not hold up a job
+  static constexpr size_t kMostRestarts = 5;  ///< of a controller in a minute (devices.md 6)
+  static constexpr int kMostFrames = 256;     ///< looked at without a pause: a babbling bus does not hold up a job
 
   /// `table` must outlive it.
   Station(std::string interface, const Clock& clock, std::span<const Message> table, Sender self);
@@ -53,7 +54,11 @@ class Station {
   /// The frames of a message before were lost.
   void skip(size_t message, uint8_t frames) { senders_[message].skip(frames); }
 
-  Link link() const { return bus_.state == BusState::off && link_ == Link::up ? Link::bus_off : link_; }
+  Link link() const { return link_ == Link::up && (bus_.state == BusState::off || restless()) ? Link::bus_off : link_; }
+  /// The controller was restarted too often: it counts as off the bus for a minute, whatever it says.
+  bool restless() const { return clock_.now_ns() < restless_until_ns_; }
+  /// Frames that came faster than they were taken, by the controller or from the kernel's queue.
+  uint64_t overflows() const { return bus_.overflows + port_.overflows(); }
   const BusWatch& bus() const { return bus_; }
   const StationCounters& counters() const { return counters_; }
 
@@ -61,11 +66,16 @@ class Station {
   /// False if the frame is not to be used. Otherwise its values are in values_.
   bool accept(size_t message, const Frame& frame);
 
+  void observe(const Frame& error);
+
+  const Clock& clock_;
   Port port_;
   std::span<const Message> table_;
   Sender self_;
   Link link_ = Link::gone;
   BusWatch bus_;
+  std::array<int64_t, kMostRestarts> restarted_ns_{};  ///< the last ones, a ring
+  int64_t restless_until_ns_ = INT64_MIN;
   StationCounters counters_;
   int looked_at_ = 0;
   std::array<EndToEndSender, kMostMessages> senders_;

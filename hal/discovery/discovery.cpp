@@ -34,6 +34,15 @@ std::string line_of(const fs::path& file) {
   return line;
 }
 
+/// The link below `folder` of /dev that leads to the device file of that name and survives a replug; else the file.
+std::string lasting_name(const fs::path& root, const char* folder, const std::string& name) {
+  std::error_code ignored;
+  for (const std::string& link : names_in(root / "dev" / folder, ""))
+    if (fs::read_symlink(root / "dev" / folder / link, ignored).filename() == name)
+      return std::string("/dev/") + folder + "/" + link;
+  return "/dev/" + name;
+}
+
 /// The name of the kernel driver behind a device of sysfs.
 std::string driver_of(const fs::path& device) {
   std::error_code error;
@@ -45,7 +54,8 @@ void find_cameras(const fs::path& root, std::vector<Found>& all) {
   const fs::path folder = root / "sys/class/video4linux";
   for (const std::string& name : names_in(folder, "video")) {
     all.push_back({"/dev/" + name, line_of(folder / name / "name"),
-                   "camera: {driver: v4l2, path: /dev/" + name + ", rig: rigs/NAME.yaml, format: y16}"});
+                   "camera: {driver: v4l2, path: " + lasting_name(root, "v4l/by-id", name) +
+                       ", rig: rigs/NAME.yaml, format: y16}"});
   }
 }
 
@@ -72,7 +82,7 @@ void find_serial_lines(const fs::path& root, std::vector<Found>& all) {
   for (const char* prefix : {"ttyUSB", "ttyACM"}) {
     for (const std::string& name : names_in(folder, prefix)) {
       all.push_back({"/dev/" + name, "serial line, " + driver_of(folder / name / "device"),
-                     "laser: {driver: lms200, port: /dev/" + name + "}"});
+                     "laser: {driver: lms200, port: " + lasting_name(root, "serial/by-id", name) + "}"});
     }
   }
 }

@@ -10,7 +10,7 @@ namespace takt::discovery {
 struct Found {
   std::string where;        ///< /dev/video0, can0
   std::string description;  ///< in the words of its kernel driver
-  std::string line;         ///< for the devices of a graph's profile
+  std::string line;         ///< for the devices of a graph's profile; names that survive a replug where there are some
 };
 
 /// What is plugged in, from sysfs and the device files below `root`: cameras, CAN interfaces, GPIO chips and serial

@@ -95,12 +95,22 @@ std::unique_ptr<Interface> with_failures(std::unique_ptr<Interface> device, Sett
                                    std::forward<More>(more)...);
 }
 
-/// Opens the device; only then does it become a node.
+/// The node of a device that is still closed.
+template <class NodeClass, class Interface, class... More>
+NodeResult closed(std::unique_ptr<Interface> device, const Settings& settings, More&&... more) {
+  if (settings.error()) return tl::unexpected(*settings.error());
+  return std::make_unique<NodeClass>(std::move(device), std::forward<More>(more)...);
+}
+
+NodeResult opened(NodeResult node) {
+  if (!node) return node;
+  if (const auto result = (*node)->device().open(); !result) return tl::unexpected(result.error());
+  return node;
+}
+
 template <class NodeClass, class Interface, class... More>
 NodeResult opened(std::unique_ptr<Interface> device, const Settings& settings, More&&... more) {
-  if (settings.error()) return tl::unexpected(*settings.error());
-  if (const auto result = device->open(); !result) return tl::unexpected(result.error());
-  return std::make_unique<NodeClass>(std::move(device), std::forward<More>(more)...);
+  return opened(closed<NodeClass>(std::move(device), settings, std::forward<More>(more)...));
 }
 
 NodeResult make_sim_camera(const DeviceConfig& config, Settings& settings, sim::Simulation& world, const Clock& clock) {
@@ -246,7 +256,7 @@ NodeResult make_console(const DeviceConfig& config, Settings& settings) {
   console.input = settings.text("input", console.input);
   console.output = settings.text("output", console.output);
   std::unique_ptr<Interaction> device = std::make_unique<Console>(config.id, std::move(console));
-  return opened<InteractionNode>(std::move(device), settings);
+  return closed<InteractionNode>(std::move(device), settings);
 }
 
 NodeResult make_sim(const DeviceConfig& config, Settings& settings, Devices& devices, const Clock& clock) {
@@ -281,7 +291,7 @@ std::string interface_of(Settings& settings) {
 NodeResult make_can_head(const DeviceConfig& config, Settings& settings, const Clock& clock) {
   head::CanHeadSettings head{.interface = interface_of(settings), .eyelids = settings.flag("eyelids", true)};
   std::unique_ptr<CameraHead> device = std::make_unique<head::CanHead>(config.id, std::move(head), clock);
-  return opened<HeadNode>(std::move(device), settings);
+  return closed<HeadNode>(std::move(device), settings);
 }
 
 NodeResult make_can_base(const DeviceConfig& config, Settings& settings, const Clock& clock) {
@@ -291,7 +301,7 @@ NodeResult make_can_base(const DeviceConfig& config, Settings& settings, const C
   if (base.wheels.step_m <= 0 || base.wheels.track_m <= 0)
     settings.fail("`wheel_step` or `track` is not positive", "measure both: they are the base's geometry");
   std::unique_ptr<MobileBase> device = std::make_unique<base::CanBase>(config.id, std::move(base), clock);
-  return opened<BaseNode>(std::move(device), settings);
+  return closed<BaseNode>(std::move(device), settings);
 }
 
 NodeResult make_v4l2_camera(const DeviceConfig& config, Settings& settings, const Clock& clock, Seams seams) {
@@ -315,10 +325,11 @@ NodeResult make_v4l2_camera(const DeviceConfig& config, Settings& settings, cons
   camera.exposure_s = settings.quantity("exposure", Dimension::time, camera.exposure_s);
   camera.gain = settings.quantity("gain", Dimension::number, camera.gain);
   camera.stamp_delay_s = settings.quantity("stamp_delay", Dimension::time, camera.stamp_delay_s);
-  std::unique_ptr<StereoCamera> device = std::make_unique<v4l2::V4l2Camera>(
+  auto device = std::make_unique<v4l2::V4l2Camera>(
       config.id, std::move(camera), seams.video ? std::move(seams.video) : std::make_unique<v4l2::KernelVideoDevice>(),
       clock);
-  return opened<StereoCameraNode>(std::move(device), settings, thresholds_of(settings));
+  if (const auto sound = device->check_settings(); !sound) return tl::unexpected(sound.error());
+  return closed<StereoCameraNode>(std::move(device), settings, thresholds_of(settings));
 }
 
 NodeResult make_gpio_lines(const DeviceConfig& config, Settings& settings, const Clock& clock, Seams seams) {
@@ -339,18 +350,25 @@ NodeResult make_gpio_lines(const DeviceConfig& config, Settings& settings, const
   std::unique_ptr<DigitalLines> device = std::make_unique<gpio::GpioLines>(
       config.id, std::move(lines), seams.chip ? std::move(seams.chip) : std::make_unique<gpio::KernelLineChip>(),
       clock);
-  return opened<LinesNode>(std::move(device), settings);
+  return closed<LinesNode>(std::move(device), settings);
 }
 
-/// A driver of real hardware.
-NodeResult make_hardware(const DeviceConfig& config, Settings& settings, const Clock& clock, Seams seams = {}) {
-  if (config.driver == "lms200") return opened<LaserNode>(make_lms200(config, settings, clock), settings);
-  if (config.driver == "lms400") return opened<LaserNode>(make_lms400(config, settings, clock), settings);
+/// A driver of real hardware, still closed.
+NodeResult make_driver(const DeviceConfig& config, Settings& settings, const Clock& clock, Seams seams) {
+  if (config.driver == "lms200") return closed<LaserNode>(make_lms200(config, settings, clock), settings);
+  if (config.driver == "lms400") return closed<LaserNode>(make_lms400(config, settings, clock), settings);
   if (config.kind == "stereo_camera") return make_v4l2_camera(config, settings, clock, std::move(seams));
   if (config.kind == "camera_head") return make_can_head(config, settings, clock);
   if (config.kind == "digital_lines") return make_gpio_lines(config, settings, clock, std::move(seams));
   if (config.kind == "interaction") return make_console(config, settings);
   return make_can_base(config, settings, clock);
+}
+
+NodeResult make_hardware(const DeviceConfig& config, Settings& settings, const Clock& clock, Seams seams = {}) {
+  NodeResult node = make_driver(config, settings, clock, std::move(seams));
+  if (config.plugged) return opened(std::move(node));
+  if (node) (*node)->leave_closed();
+  return node;
 }
 
 /// The driver of real hardware, and a double at the other end of its line.

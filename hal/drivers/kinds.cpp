@@ -105,6 +105,7 @@ constexpr SettingInfo kLaser[] = {
     {"fov", "lms200", angle, false, "100deg or 180deg; 180deg"},
     {"resolution", "lms200", angle, false, "1deg, 0.5deg or 0.25deg; 0.5deg"},
     {"range", "lms200", length, false, "8m, 16m, 32m or 80m; 8m"},
+    {"blinded_max", "lms200", number, false, "share of blinded beams above which a scan is refused; 0.1"},
     {"address", "lms400", text, false, "numbers and port of its network interface, for instance 192.168.0.1:2111",
      true},
     {"port", "lms400", path, false, "serial line instead of `address`", true},

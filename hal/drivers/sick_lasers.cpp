@@ -50,6 +50,9 @@ std::unique_ptr<LaserScanner> make_lms200(const DeviceConfig& config, Settings& 
   session.baud = static_cast<uint32_t>(settings.count("baud", session.baud, 9600, 500000));
   if (std::find(lms200::kBauds.begin(), lms200::kBauds.end(), session.baud) == lms200::kBauds.end())
     settings.fail("`baud` is no rate that the scanner has", "use 9600, 19200, 38400, or 500000 on an RS-422 line");
+  session.blinded_max = settings.quantity("blinded_max", Dimension::number, session.blinded_max);
+  if (!(session.blinded_max >= 0 && session.blinded_max <= 1))
+    settings.fail("`blinded_max` is no share of the beams", "use 0..1, for instance 0.1");
   if (lms200::interlaced(session.variant) && session.baud != 500000)
     settings.fail("180deg at 0.25deg is sent in four parts, too fast for `baud`",
                   "use baud 500000, or resolution 0.5deg");

@@ -17,6 +17,7 @@ struct HeadReading {
   double pan_rad = 0, tilt_rad = 0, roll_rad = 0;  ///< pan: left positive; tilt: up positive
   double pan_rad_s = 0, tilt_rad_s = 0;
   bool moving = false;
+  bool repeated = false;  ///< it has to move, and says the same again and again
 };
 
 /// The pan-tilt head under the camera (CAN). See Device for the life cycle and the thread rules.

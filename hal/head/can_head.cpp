@@ -11,6 +11,11 @@ namespace {
 constexpr double kHomingSpeed_deg_s = 30, kHomingAcceleration_deg_s2 = 200;
 constexpr double kLidTime_ms = 400, kClosed_percent = 100;
 
+/// Ours, as the head's messages are: what its servos and its supply of 24 V bear.
+constexpr double kHot_degC = 70, kLowSupply_V = 20.4;
+/// An axis that is farther from its set-point has to move.
+constexpr double kThere_deg = 1;
+
 bool is_on(double signal) { return signal != 0; }
 
 }  // namespace
@@ -30,7 +35,22 @@ CanHead::CanHead(std::string id, CanHeadSettings settings, const Clock& clock)
 void CanHead::forget() {
   view_ = {};
   target_.reset();
+  sent_.reset();
+  stuck_.forget();
   lids_told_.reset();
+}
+
+const char* CanHead::trouble() const {
+  const char* of_bus = HostDriver::trouble();
+  if (*of_bus != 0) return of_bus;
+  if (stuck_.stuck()) return "the head does not move although it has to";
+  return *health_ != 0 ? health_ : lids_stuck_ ? "the head says that an eyelid is stuck" : "";
+}
+
+void CanHead::take_health(std::span<const double> values) {
+  health_ = std::max(values[Health::pan_degC], values[Health::tilt_degC]) > kHot_degC ? "the head is too hot"
+            : values[Health::volts] < kLowSupply_V                                    ? "the head's supply is low"
+                                                                                      : "";
 }
 
 void CanHead::rest() {
@@ -47,6 +67,12 @@ void CanHead::take(const can::Incoming& incoming) {
       tilt_rad_s_ = values[VelStatus::tilt] * kDegree;
       return;
     case kLimits: return narrow(values);
+    case kHealth: return take_health(values);
+    case kEyelidStatus: {
+      const auto state = static_cast<EyelidState>(values[EyelidStatus::state]);
+      lids_stuck_ = state == EyelidState::stalled || state == EyelidState::fault;
+      return;
+    }
     case kEmergency: view_.emergency = static_cast<uint16_t>(values[Emergency::code]); return;
     default: return;
   }
@@ -59,6 +85,7 @@ void CanHead::take_status(const can::Incoming& incoming) {
   view_.homed = is_on(values[PosStatus::pan_homed]) && is_on(values[PosStatus::tilt_homed]);
   view_.emergency_stop = is_on(values[PosStatus::emergency_stop]);
   view_.fault = is_on(values[PosStatus::fault]);
+  const bool moved = view_.pan_deg != values[PosStatus::pan] || view_.tilt_deg != values[PosStatus::tilt];
   view_.pan_deg = values[PosStatus::pan];
   view_.tilt_deg = values[PosStatus::tilt];
   HeadReading reading;
@@ -68,6 +95,10 @@ void CanHead::take_status(const can::Incoming& incoming) {
   reading.tilt_rad = view_.tilt_deg * kDegree;
   reading.pan_rad_s = pan_rad_s_;
   reading.tilt_rad_s = tilt_rad_s_;
+  const bool away = sent_ && std::max(std::abs(sent_->pan_deg - view_.pan_deg),
+                                      std::abs(sent_->tilt_deg - view_.tilt_deg)) > kThere_deg;
+  stuck_.observe(away && view_.state == State::operation_enabled, moved, incoming.stamp_ns);
+  reading.repeated = stuck_.stuck();
   reading.moving = !is_on(values[PosStatus::pan_reached]) || !is_on(values[PosStatus::tilt_reached]);
   keep(reading);
 }
@@ -92,7 +123,9 @@ void CanHead::narrow(std::span<const double> values) {
 HeadReading CanHead::read(int64_t wanted_ns, int64_t) {
   if (!started()) return {};
   attend();
-  send(next_request(view_, target_));
+  const HeadRequest request = next_request(view_, target_);
+  send(request);
+  sent_ = request.mode == Mode::position ? std::optional(request.angles) : std::nullopt;
   target_.reset();
   if (settings_.eyelids) send_lids(std::exchange(lids_, {}));
   return newest(wanted_ns);

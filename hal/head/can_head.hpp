@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "hal/can/host_driver.hpp"
+#include "hal/can/stuck.hpp"
 #include "hal/head/camera_head.hpp"
 #include "hal/head/head_messages.hpp"
 
@@ -57,6 +58,9 @@ class CanHead final : public can::HostDriver<CameraHead, HeadReading> {
   bool command(double pan_rad, double tilt_rad, int64_t at_ns) override;
   void close_lids(bool left, bool right, int64_t at_ns) override;
 
+  /// Also what the head says of its temperatures, its supply and its lids.
+  const char* trouble() const override;
+
   const HeadView& view() const { return view_; }
 
  private:
@@ -67,6 +71,7 @@ class CanHead final : public can::HostDriver<CameraHead, HeadReading> {
   void reset_fault() override { send({Mode::fault_reset, {}}); }
 
   void take_status(const can::Incoming& incoming);
+  void take_health(std::span<const double> values);
   void narrow(std::span<const double> limits);
   void send(const HeadRequest& request);
   void send_lids(const Lids& closed);
@@ -74,7 +79,10 @@ class CanHead final : public can::HostDriver<CameraHead, HeadReading> {
   CanHeadSettings settings_;
   HeadLimits limits_;
   HeadView view_;
-  std::optional<HeadAngles> target_;
+  std::optional<HeadAngles> target_, sent_;  ///< wanted of the next read; asked of the head with the last one
+  can::Stuck stuck_;
+  const char* health_ = "";  ///< what is not well, for a while or for good
+  bool lids_stuck_ = false;
   double pan_rad_s_ = 0, tilt_rad_s_ = 0;
   Lids lids_;                      ///< wanted of the next read
   std::optional<Lids> lids_told_;  ///< none: nothing yet

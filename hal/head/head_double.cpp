@@ -158,7 +158,8 @@ void HeadDouble::send_due() {
   link().send(kVelStatus, std::array{axes_.speed_rad_s[0] / kDegree, axes_.speed_rad_s[1] / kDegree, sample_ms});
   send_status();
   if (link().due(now_ns(), 50 * kMs)) {
-    const auto state = !lids_.moving                            ? EyelidState::idle
+    const auto state = lids_jammed_                             ? EyelidState::stalled
+                       : !lids_.moving                          ? EyelidState::idle
                        : lids_.action == EyelidAction::position ? EyelidState::moving
                                                                 : EyelidState::blinking;
     const double current_mA = lids_.moving ? 350 : 20;
@@ -167,7 +168,7 @@ void HeadDouble::send_due() {
   }
   if (link().due(now_ns(), 500 * kMs)) {
     const double uptime_s = std::floor(static_cast<double>(link().uptime_ns(now_ns())) * 1e-9);
-    link().send(kHealth, std::array{41.0, 38.0, 24.0, 1.7, uptime_s});
+    link().send(kHealth, std::array{temperature_degC_, temperature_degC_ - 3, supply_V_, 1.7, uptime_s});
   }
   if (link().due(now_ns(), 1000 * kMs)) {
     std::array<double, Limits::count> limits{};

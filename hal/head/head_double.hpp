@@ -33,6 +33,11 @@ class HeadDouble final : public can::NodeDouble {
   void press_emergency_stop(bool pressed) { emergency_stop_ = pressed; }
   /// A following error of the pan axis: a fault until it is reset.
   void block_pan() { fail(kFollowingError); }
+  /// What it says of itself.
+  void set_health(double temperature_degC, double supply_V) {
+    temperature_degC_ = temperature_degC, supply_V_ = supply_V;
+  }
+  void jam_lids(bool jammed) { lids_jammed_ = jammed; }
 
   State state() const { return state_; }
   bool homed() const { return homed_; }
@@ -79,6 +84,8 @@ class HeadDouble final : public can::NodeDouble {
   double asked_speed_rad_s_ = 0, asked_acceleration_rad_s2_ = 0;
   Lids lids_;
   int page_ = 0;
+  double temperature_degC_ = 41, supply_V_ = 24;
+  bool lids_jammed_ = false;
 };
 
 }  // namespace takt::head

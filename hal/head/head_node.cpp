@@ -13,7 +13,7 @@ void HeadNode::run(Job& job) {
     head_->close_lids((lids->levels & 1) != 0, (lids->levels & 2) != 0, job.release_ns());
   }
   const HeadReading reading = head_->read(job.release_ns(), job.deadline_ns());
-  if (!accept(reading.status, job)) return;
+  if (!accept(reading.status, job, false, reading.repeated)) return;
   HeadState* message = state_.loan();
   if (message == nullptr) return job.no_result();
   message->pan_rad = reading.pan_rad;

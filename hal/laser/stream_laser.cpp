@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cstring>
 
 #include "hal/device_thread.hpp"
 
@@ -26,7 +27,8 @@ void wait_for_bytes(int descriptor, int64_t wait_ns) {
 
 /// Values scatter by millimetres from sweep to sweep: equal ones are the same measurement once more.
 bool same_measurement(const std::vector<float>& a, const std::vector<float>& b) {
-  return a == b && static_cast<ptrdiff_t>(a.size()) - std::count(a.begin(), a.end(), 0.0f) >= kEchoesThatDiffer;
+  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(float)) == 0 &&
+         std::count_if(a.begin(), a.end(), [](float range) { return range > 0; }) >= kEchoesThatDiffer;
 }
 
 }  // namespace

@@ -2,6 +2,9 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
 
 #include "nodes/ground_map/ground_detector.hpp"
 #include "nodes/ground_map/ground_grid.hpp"
@@ -10,6 +13,7 @@
 #include "nodes/ground_map/terrain_file.hpp"
 #include "nodes/mapping_3d/head_at.hpp"
 #include "nodes/mapping_3d/pose.hpp"
+#include "nodes/stereo/rectify.hpp"
 #include "rt/node.hpp"
 
 namespace takt {
@@ -32,6 +36,7 @@ class GroundMapNode final : public Node {
       throw SetupError("the reference area is empty: trapezoid_height = " + trapezoid_height_.value_text() +
                        ", trapezoid_bottom = " + trapezoid_bottom_.value_text() +
                        ", trapezoid_top = " + trapezoid_top_.value_text());
+    if (!calibration_().empty()) read_calibration(setup.directory / calibration_(), image);
     ground_.resize(image.pixels());
     grid_cells_.emplace(static_cast<int>(image.width), grid_parameters());
     mask_.reserve({image.width, image.height, 1, 0});
@@ -65,7 +70,7 @@ class GroundMapNode final : public Node {
     const StereoPair& pair = pair_[chosen->image];
     last_stamp_ns_ = pair_.stamp_ns(chosen->image);
     const std::optional<FloorProjection> projection = projection_of(pair);
-    detector_->analyse(pair.left_view());
+    detector_->analyse(left_of(pair));
     if (may_learn(pair, projection)) detector_->learn();
     detector_->classify(ground(), projection);
     const bool mask_given = give_mask(pair) && give_confidence(pair);
@@ -79,9 +84,37 @@ class GroundMapNode final : public Node {
   bool has_pose_input() const { return motion_.connected() || odometry_.connected(); }
 
   bool usable(const StereoPair& pair) const {
-    return pair.camera.focal_px > 0 && pair.width == detector_->width() && pair.height == detector_->height() &&
-           (pair.channels == 1 || pair.channels == 3) &&
+    return (pair.camera.focal_px > 0 || !straight_.empty()) && pair.width == detector_->width() &&
+           pair.height == detector_->height() && (pair.channels == 1 || pair.channels == 3) &&
            pair.left.size == ground_.size() * static_cast<size_t>(pair.channels);
+  }
+
+  static bool is_raw(const StereoPair& pair) { return !(pair.camera.focal_px > 0); }
+  CameraModel camera_of(const StereoPair& pair) const { return is_raw(pair) ? camera_ : pair.camera; }
+
+  /// The left image as an ideal camera in the same place would see it.
+  ImageView<const uint8_t> left_of(const StereoPair& pair) {
+    if (!is_raw(pair)) return pair.left_view();
+    const ImageView<uint8_t> straight(straight_.data(), pair.width, pair.height, pair.channels);
+    undistort_.run(pair.left_view(), stereo::BayerPattern::none, remap_window_, straight);
+    return straight;
+  }
+
+  void read_calibration(const std::filesystem::path& file, const Capacity& image) {
+    try {
+      const stereo::StereoCalibration calibration = stereo::read_calibration(file);
+      if (calibration.width != static_cast<int>(image.width) || calibration.height != static_cast<int>(image.height))
+        throw SetupError(file.string() + " is for " + std::to_string(calibration.width) + " x " +
+                         std::to_string(calibration.height) + " px but `pair` has " + std::to_string(image.width) +
+                         " x " + std::to_string(image.height) + "; give the calibration of this camera mode");
+      const stereo::RectificationTables tables = stereo::undistortion_table(calibration);
+      camera_ = tables.camera;
+      undistort_ = stereo::Remap(calibration.width, calibration.height, tables.left);
+    } catch (const std::invalid_argument& error) {
+      throw SetupError(error.what());
+    }
+    straight_.resize(image.pixels() * image.channels);
+    remap_window_.resize(undistort_.window_bytes());
   }
 
   /// The newest image that was not mapped before, with its pose known or predicted; else an older one with its pose
@@ -130,10 +163,10 @@ class GroundMapNode final : public Node {
 
   /// None where the head's angles are not known.
   std::optional<FloorProjection> projection_of(const StereoPair& pair) const {
-    if (!head_.connected()) return floor_projection(pair.camera, mount_of(pair));
+    if (!head_.connected()) return floor_projection(camera_of(pair), mount_of(pair));
     const auto head = mapping_3d::head_at(head_, last_stamp_ns_, RobotTrack::kLongestGapNs);
     if (!head) return std::nullopt;
-    return floor_projection(pair.camera, mapping_3d::turned_by_head(mount_of(pair), head->pan_rad, head->tilt_rad));
+    return floor_projection(camera_of(pair), mapping_3d::turned_by_head(mount_of(pair), head->pan_rad, head->tilt_rad));
   }
 
   ImageView<uint8_t> ground() { return {ground_.data(), detector_->width(), detector_->height()}; }
@@ -146,7 +179,7 @@ class GroundMapNode final : public Node {
     out->height = pair.height;
     out->channels = 1;
     out->health = pair.health;
-    out->camera = pair.camera;
+    out->camera = camera_of(pair);
     port.send(last_stamp_ns_);
     return out;
   }
@@ -334,6 +367,7 @@ class GroundMapNode final : public Node {
   Param<double> scan_age_{this, "scan_age", 0.2, {0.0, 10.0}, "s", "between image and scan; none: nothing is learnt"};
   Param<std::string> terrain_maps_{this, "terrain_maps", "", kPath,
                                    "file with maps of each kind (takt terrain learn); empty: no terrain"};
+  Param<std::string> calibration_{this, "calibration", "", kPath, "calibration file of raw pairs, as stereo has it"};
   Choice terrain_centre_{
       this, "terrain_centre", "undecided", {"undecided", "mean"}, "from where cells are counted in a correlation"};
   Param<double> terrain_correlation_{
@@ -356,6 +390,10 @@ class GroundMapNode final : public Node {
                                     "rad", "the other camera, up positive"};
 
   std::optional<GroundDetector> detector_;
+  stereo::Remap undistort_;
+  CameraModel camera_;             ///< of raw pairs, undistorted
+  std::vector<uint8_t> straight_;  ///< the left image of a raw pair, undistorted; empty: raw pairs are not used
+  std::vector<int8_t> remap_window_;
   std::vector<uint8_t> ground_;  ///< mask of the present image
   std::optional<GroundGrid> grid_cells_;
   std::optional<TerrainClassifier> classifier_;

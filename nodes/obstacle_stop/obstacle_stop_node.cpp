@@ -29,7 +29,7 @@ class ObstacleStopNode final : public Node {
     const bool lost = !scan || !has_geometry(*scan) || scan_.stale() || now_ns - stamp_ns > nanoseconds(scan_age_max_);
     FieldReading seen;
     if (scan) seen = look(*scan);
-    uint32_t reasons = lost ? stop_reason::scan_lost : 0;
+    uint32_t reasons = lost || seen.blinded ? stop_reason::scan_lost : 0;
     if (seen.blocked) reasons |= stop_reason::obstacle;
     reasons = field_.update(reasons, stamp_ns) | line_reasons(now_ns);
     if (job.mode() == kSafeStopMode) reasons |= stop_reason::safe_stop;
@@ -61,15 +61,17 @@ class ObstacleStopNode final : public Node {
       return look(scan, present);
     const FieldReading soon =
         look(scan, drive_before_stop(stands ? Drive{} : present, {wanted->speed_m_s, wanted->turn_rad_s}));
-    if (stands || soon.blocked) return soon;
+    if (stands || soon.blocked || soon.blinded) return soon;
     return look(scan, present);
   }
 
   FieldReading look(const LaserScan& scan, const Drive& drive) const {
     const ProtectedField field(footprint_, drive,
                                stopping_time_s(drive, {deceleration_, turn_deceleration_, reaction_time_}));
-    return read_field({scan.first_angle_rad, scan.step_rad, scan.sensor_in_robot, scan.range_m.items()}, field,
-                      beams_min_);
+    const Sweep sweep{scan.first_angle_rad, scan.step_rad, scan.sensor_in_robot, scan.range_m.items()};
+    FieldReading reading = read_field(sweep, field, beams_min_);
+    reading.blinded = has_geometry(scan) && could_hide(sweep, field, hidden_width_);
+    return reading;
   }
 
   /// What odometry says; straight ahead at the highest speed where it says nothing.
@@ -110,6 +112,8 @@ class ObstacleStopNode final : public Node {
   Param<double> reaction_time_{
       this, "reaction_time", 0.35, {0.0, 3.0}, "s", "from the first beam of a scan until the robot brakes"};
   Param<int> beams_min_{this, "beams_min", 2, {1, 64}, "", "neighbouring beams that an obstacle returns at least"};
+  Param<double> hidden_width_{
+      this, "hidden_width", 0.08, {0.01, 1.0}, "m", "what blinded beams may hide in the field must be narrower"};
   Param<double> release_after_{
       this, "release_after", 0.5, {0.0, 60.0}, "s", "the field must have been free before a stop ends"};
   Param<double> scan_age_max_{this, "scan_age_max", 0.2, {0.01, 5.0}, "s", "a scan older than this counts as none"};

@@ -29,6 +29,14 @@ double before_stop(double present, double wanted) {
   return present * wanted >= 0 && std::abs(wanted) > std::abs(present) ? wanted : present;
 }
 
+/// Whether the beam ends in the field at that range.
+bool ends_in(const ProtectedField& field, const PlaneTransform& t, const Sweep& sweep, size_t beam, double range) {
+  // Counter-clockwise from the sensor's forward axis, which is its y.
+  const double angle = sweep.first_angle_rad + static_cast<double>(beam) * sweep.step_rad;
+  const double x = -range * std::sin(angle), y = range * std::cos(angle);
+  return field.contains(t.xx * x + t.yx * y + t.x, t.xy * x + t.yy * y + t.y);
+}
+
 }  // namespace
 
 Drive drive_before_stop(const Drive& present, const Drive& wanted) {
@@ -122,10 +130,7 @@ FieldReading read_field(const Sweep& sweep, const ProtectedField& field, int bea
   double nearest = 0;
   for (size_t i = 0; i < sweep.range_m.size(); ++i) {
     const double range = static_cast<double>(sweep.range_m[i]);
-    // Counter-clockwise from the sensor's forward axis, which is its y.
-    const double angle = sweep.first_angle_rad + static_cast<double>(i) * sweep.step_rad;
-    const double x = -range * std::sin(angle), y = range * std::cos(angle);
-    if (!(range > 0) || !field.contains(t.xx * x + t.yx * y + t.x, t.xy * x + t.yy * y + t.y)) {
+    if (!(range > 0) || !ends_in(field, t, sweep, i, range)) {
       run = 0;
       continue;
     }
@@ -135,6 +140,27 @@ FieldReading read_field(const Sweep& sweep, const ProtectedField& field, int bea
     reading.blocked = true;
   }
   return reading;
+}
+
+bool could_hide(const Sweep& sweep, const ProtectedField& field, double width_m) {
+  constexpr double kStep_m = 0.05;
+  const PlaneTransform t = to_plane(sweep.sensor_in_robot);
+  const double farthest = field.reach_m() + std::hypot(t.x, t.y);
+  const auto blind = [&](size_t i) { return i < sweep.range_m.size() && std::isnan(sweep.range_m[i]); };
+  for (size_t first = 0, end = 0; first < sweep.range_m.size(); first = end + 1) {
+    for (end = first; blind(end);) ++end;
+    if (end == first) continue;
+    // Nearer to the sensor the gap is too narrow.
+    const double nearest = width_m / (static_cast<double>(end - first + 1) * sweep.step_rad);
+    for (double range = std::max(nearest, kStep_m); range <= farthest; range += kStep_m) {
+      size_t run = 0;
+      for (size_t i = first; i < end; ++i) {
+        run = ends_in(field, t, sweep, i, range) ? run + 1 : 0;
+        if (run > 0 && static_cast<double>(run + 1) * sweep.step_rad * range >= width_m) return true;
+      }
+    }
+  }
+  return false;
 }
 
 }  // namespace takt::obstacle_stop

@@ -36,6 +36,8 @@ class ProtectedField {
   ProtectedField(const Footprint& footprint, const Drive& drive, double time_s);
   /// The border belongs to the field. False for a coordinate that is not finite.
   bool contains(double x_m, double y_m) const;
+  /// Nothing farther from the origin is in the field.
+  double reach_m() const { return reach_m_; }
 
  private:
   /// Whether the place lies within the margin of the footprint, this being longer by so much at either end.
@@ -50,22 +52,27 @@ class ProtectedField {
   double angle_rad_;       ///< signed turn on the way
   bool straight_;          ///< as good as
   double centre_x_m_ = 0;  ///< of the circle
-  double reach_m_;         ///< nothing farther from the origin is in the field
+  double reach_m_;
 };
 
 /// A sweep as plain data, angles as in LaserScan.
 struct Sweep {
   double first_angle_rad = 0, step_rad = 0;
   Transform sensor_in_robot;
-  std::span<const float> range_m;  ///< 0: no return
+  std::span<const float> range_m;  ///< 0: no return; NaN: the beam is blinded
 };
 
 struct FieldReading {
   bool blocked = false;
   double nearest_m = 0;  ///< least range of the returns that block; 0: none
+  bool blinded = false;  ///< as could_hide() says
 };
 
 /// Blocked if at least `beams_min` (>= 1) neighbouring beams return from the field: a lone one is dust or a reflection.
 FieldReading read_field(const Sweep& sweep, const ProtectedField& field, int beams_min);
+
+/// Whether something so wide could stand in the field, and only blinded beams point at it: neighbouring ones, the gap
+/// between the two that see being that wide there. Ranges are tried every 5 cm.
+bool could_hide(const Sweep& sweep, const ProtectedField& field, double width_m);
 
 }  // namespace takt::obstacle_stop

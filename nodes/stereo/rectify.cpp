@@ -162,6 +162,18 @@ RectificationTables rectification_tables(const StereoCalibration& c) {
   return tables;
 }
 
+RectificationTables undistortion_table(const StereoCalibration& c) {
+  check(c);
+  const auto& m = c.left_matrix;
+  const double focal = (m[0] + m[4]) / 2;
+  const std::array<double, 9> ideal{focal, 0, m[2], 0, focal, m[5], 0, 0, 1};
+  RectificationTables tables;
+  tables.camera = {focal, m[2], m[5], std::hypot(c.translation_m[0], c.translation_m[1], c.translation_m[2])};
+  tables.left = sources(matrix(m, 3), matrix(c.left_distortion, 1), cv::Mat::eye(3, 3, CV_64F), matrix(ideal, 3),
+                        {c.width, c.height});
+  return tables;
+}
+
 Rectifier::Rectifier(const StereoCalibration& c, BayerPattern pattern)
     : width_(c.width), height_(c.height), pattern_(pattern) {
   const RectificationTables tables = rectification_tables(c);

@@ -43,6 +43,10 @@ struct RectificationTables {
 /// not stand left and right of each other.
 RectificationTables rectification_tables(const StereoCalibration& calibration);
 
+/// The table that undistorts the left image alone (`right` is empty): the camera keeps its direction and its matrix, as
+/// far as that has one focal length. Throws as rectification_tables().
+RectificationTables undistortion_table(const StereoCalibration& calibration);
+
 /// Undistorts and rectifies pairs so that epipolar lines are rows of equal number. Memory is taken by the constructor;
 /// one thread at a time.
 class Rectifier {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Any bytes, to the parser, the decoders and the session of the LMS 2xx.
+#include <cmath>
 #include <initializer_list>
 #include <vector>
 
@@ -34,12 +35,13 @@ void check_payload(std::span<const uint8_t> payload) {
   }
   if (const auto configuration = read_configuration(payload))
     require(write_configuration(*configuration).bytes().size() == 41);
+  if (const auto error = read_error(payload)) require(error_text(*error)[0] != 0);
   const auto scan = read_scan(payload);
   if (!scan) return;
   for (size_t i = 0; i < scan->beams(); ++i)
     for (const uint8_t mode : std::initializer_list<uint8_t>{0, 4, 6, 0x3F}) {
       const float range = range_m(scan->word(i), mode, scan->millimetres);
-      require(range >= 0 && range <= 327.6f);
+      require(std::isnan(range) || (range >= 0 && range <= 327.6f));
     }
   if (scan->beams() <= 401) {
     const Telegram made = scan_telegram(*scan);

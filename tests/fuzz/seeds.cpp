@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// fuzz_seeds FOLDER: inputs that the fuzz targets begin with, made by the codecs themselves: whole conversations, and
-// their telegrams alone.
+// fuzz_seeds FOLDER: inputs that the fuzz targets begin with: whole conversations and their telegrams alone, made by
+// the codecs themselves, and the golden vectors; all of them also cut, doubled and with flipped bits.
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
@@ -16,6 +16,8 @@
 #include "hal/laser/lms400/frame.hpp"
 #include "hal/laser/lms400/messages.hpp"
 #include "tests/conformance/link_messages.hpp"
+#include "tests/unit/lms200/golden.hpp"
+#include "tests/unit/lms400/golden.hpp"
 
 using namespace takt;
 using Bytes = std::vector<uint8_t>;
@@ -53,12 +55,39 @@ class Seeds {
     }
     add(all);
   }
+  /// As it is; cut after a third, two thirds and before its end; twice; with one bit flipped near the begin, in the
+  /// middle, at the end; joined to its own begin.
+  void add_and_spoil(const Bytes& bytes) {
+    add(bytes);
+    const auto end = [&](size_t size) { return bytes.begin() + static_cast<ptrdiff_t>(size); };
+    for (const size_t size : {bytes.size() / 3, 2 * bytes.size() / 3, bytes.size() - 1}) {
+      add({bytes.begin(), end(size)});
+      Bytes joined(bytes.begin(), end(size));
+      joined.insert(joined.end(), bytes.begin(), bytes.end());
+      add(joined);
+    }
+    Bytes twice = bytes;
+    twice.insert(twice.end(), bytes.begin(), bytes.end());
+    add(twice);
+    for (const size_t at : {std::min<size_t>(2, bytes.size() - 1), bytes.size() / 2, bytes.size() - 1}) {
+      Bytes flipped = bytes;
+      flipped[at] ^= 0x10;
+      add(flipped);
+    }
+  }
   size_t count() const { return count_; }
 
  private:
   std::filesystem::path folder_;
   size_t count_ = 0;
 };
+
+Bytes bytes_of_hex(std::string_view hex) {
+  Bytes bytes;
+  for (size_t i = 0; i + 1 < hex.size(); i += 2)
+    bytes.push_back(static_cast<uint8_t>(std::stoul(std::string(hex.substr(i, 2)), nullptr, 16)));
+  return bytes;
+}
 
 Bytes lms200_scan(size_t beams, bool partial, uint8_t quarters, bool indices) {
   Bytes words;
@@ -104,6 +133,8 @@ void lms200_seeds(Seeds& seeds) {
                                  : lms200_scan(181, false, 0, turn % 2 == 1));
     seeds.add_conversation(parts);
   }
+  for (const auto& golden : test::kLms200Telegrams) seeds.add_and_spoil(bytes_of_hex(golden.hex));
+  for (const auto& golden : test::kLms200ShortScans) seeds.add_and_spoil(bytes_of_hex(golden.hex));
   for (const Command code : {Command::reset, Command::status, Command::errors, Command::type})
     seeds.add(copy(command(code).bytes()));
   for (const Reply code : {Reply::power_on, Reply::not_permitted, Reply::errors, Reply::keep_baud})
@@ -127,6 +158,9 @@ void lms400_seeds(Seeds& seeds) {
     }
   }
   seeds.add_conversation(parts);
+  for (const auto& golden : test::kLms400Texts) seeds.add_and_spoil(text(golden.text));
+  for (const auto& golden : test::kLms400Measurements) seeds.add_and_spoil(bytes_of_hex(golden.hex));
+  for (const auto& golden : test::kLms400Streams) seeds.add_and_spoil(bytes_of_hex(golden.hex));
   for (const char* words : {"sFA FF", "sWA FLsel", "sRA EImac 0 6", "sMN Run", "sAN SetAccessMode 0"})
     seeds.add(text(words));
 }
@@ -167,7 +201,7 @@ void can_seeds(Seeds& seeds) {
   Bytes all;
   const auto add = [&](const Frame& frame) {
     const WireFrame wire = to_wire(frame);
-    seeds.add(copy(wire));
+    seeds.add_and_spoil(copy(wire));
     all.insert(all.end(), wire.begin(), wire.end());
   };
   for (const auto& table : {head::messages(), base::messages()}) {
@@ -187,6 +221,17 @@ void can_seeds(Seeds& seeds) {
   seeds.add(all);
 }
 
+/// As tests/fuzz/camera.cpp reads them: each format, with every order of eyes and every mosaic, whole and cut.
+void camera_seeds(Seeds& seeds) {
+  for (uint8_t format = 0; format < 5; ++format)
+    for (const uint8_t eyes : {uint8_t{0}, uint8_t{1}, uint8_t{16}})
+      for (uint8_t mosaic = 0; mosaic < 5; ++mosaic) {
+        Bytes bytes{format, 6, 4, eyes, mosaic, 3};
+        for (int i = 0; i < 6 * (3 * 2 * 14 + 3); ++i) bytes.push_back(static_cast<uint8_t>(37 * i + format));
+        seeds.add_and_spoil(bytes);
+      }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -196,11 +241,13 @@ int main(int argc, char** argv) {
   }
   const std::filesystem::path folder(argv[1]);
   Seeds lms200_inputs(folder / "lms200"), lms400_inputs(folder / "lms400"), can_inputs(folder / "can"),
-      link_inputs(folder / "semantic_link");
+      camera_inputs(folder / "camera"), link_inputs(folder / "semantic_link");
   lms200_seeds(lms200_inputs);
   lms400_seeds(lms400_inputs);
   can_seeds(can_inputs);
+  camera_seeds(camera_inputs);
   semantic_link_seeds(link_inputs);
-  std::printf("seeds: %zu for lms200, %zu for lms400, %zu for can, %zu for semantic_link\n", lms200_inputs.count(),
-              lms400_inputs.count(), can_inputs.count(), link_inputs.count());
+  std::printf("seeds: %zu for lms200, %zu for lms400, %zu for can, %zu for camera, %zu for semantic_link\n",
+              lms200_inputs.count(), lms400_inputs.count(), can_inputs.count(), camera_inputs.count(),
+              link_inputs.count());
 }

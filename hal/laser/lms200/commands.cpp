@@ -124,6 +124,33 @@ std::optional<Status> read_status(std::span<const uint8_t> payload) {
   return s;
 }
 
+std::optional<uint8_t> read_error(std::span<const uint8_t> payload) {
+  constexpr uint8_t kOldEntry = 0x80;
+  if (!is(payload, Reply::errors, 2)) return std::nullopt;
+  // Pairs of type and number follow the count; the status byte is last.
+  for (size_t at = 2; at + 2 < payload.size() && at < 2 + 2 * static_cast<size_t>(payload[1]); at += 2)
+    if ((payload[at] & kOldEntry) == 0) return payload[at + 1];
+  return 0;
+}
+
+const char* error_text(uint8_t number) {
+  switch (number) {
+    case 5: return "the scanner says that it is dazzled";
+    case 17:
+    case 18:
+    case 19:
+    case 20:
+    case 21:
+    case 22: return "the scanner says that its front pane is too dirty: clean it";
+    case 29: return "the scanner says that its motor turns at a wrong speed";
+    case 45:
+    case 46: return "the scanner says that it misses measurements";
+    case 56: return "the scanner says that its watchdog has struck";
+    case 57: return "the scanner says that it finds no index of its mirror";
+    default: return "the scanner says that it is in error";
+  }
+}
+
 std::optional<Configuration> read_configuration(std::span<const uint8_t> payload) {
   // The reply to a change has a byte before it that says whether it was made.
   const size_t before = is(payload, Reply::configuration_written, 1) ? 2 : 1;

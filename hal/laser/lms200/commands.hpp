@@ -107,6 +107,10 @@ std::optional<Reply> reply_code(std::span<const uint8_t> payload);
 inline uint8_t status_byte(std::span<const uint8_t> payload) { return payload.back(); }
 std::optional<Status> read_status(std::span<const uint8_t> payload);
 std::optional<Configuration> read_configuration(std::span<const uint8_t> payload);
+/// Of the error list: the number of the first entry that still holds, 0 where there is none.
+std::optional<uint8_t> read_error(std::span<const uint8_t> payload);
+/// What an error number means, as a sentence; a literal.
+const char* error_text(uint8_t number);
 /// The text of a power-on or type reply.
 std::string_view read_text(std::span<const uint8_t> payload);
 /// Of mode and variant replies and of configuration_written: what was asked for was done.
@@ -118,5 +122,7 @@ std::optional<uint32_t> baud_of_mode(uint8_t mode);
 /// Bits 0..2 of the status byte.
 enum class Severity : uint8_t { ok, info, warning, error, fatal };
 inline Severity severity(uint8_t status) { return static_cast<Severity>(status & 7); }
+/// Bits 6 and 7: measured values are implausible, the front pane is dirty.
+inline constexpr uint8_t kImplausible = 0x40, kPolluted = 0x80;
 
 }  // namespace takt::lms200

@@ -20,6 +20,7 @@ constexpr int64_t kMs = 1'000'000, kUs = 1'000;
 constexpr int64_t kAckAfter_ns = 10 * kMs;      // the manual allows 60
 constexpr int64_t kHostGap_ns = 6 * kMs;        // between two bytes of a command
 constexpr int64_t kSelfTest_ns = 1000 * kMs;    // after a reset; from power-on it may take a minute
+constexpr int64_t kWarning_ns = 2000 * kMs;     // of a dirty pane, before it is an error
 constexpr int64_t kWriting_ns = 106'000 * kUs;  // recorded, command 77h
 /// From the last byte of a command to the first of its reply; recorded at 38400 baud, transfer times taken off.
 constexpr std::array<int64_t, 7> kReplyAfter_us{61'600, 69'600, 70'500, 62'300, 66'600, 66'500, 61'500};
@@ -36,14 +37,15 @@ Lms200Double::Lms200Double(std::unique_ptr<ByteStream> stream, RangeSource sourc
 }
 
 std::span<const Misbehaviour> Lms200Double::known() const {
-  static constexpr std::array kKnown{Misbehaviour::none,      Misbehaviour::silent, Misbehaviour::unplugged,
-                                     Misbehaviour::garbage,   Misbehaviour::frozen, Misbehaviour::wrong_crc,
-                                     Misbehaviour::wrong_baud};
+  static constexpr std::array kKnown{Misbehaviour::none,       Misbehaviour::silent,  Misbehaviour::unplugged,
+                                     Misbehaviour::garbage,    Misbehaviour::frozen,  Misbehaviour::wrong_crc,
+                                     Misbehaviour::wrong_baud, Misbehaviour::dazzled, Misbehaviour::polluted};
   return kKnown;
 }
 
 void Lms200Double::misbehave(Misbehaviour how) {
   LineDouble::misbehave(how);
+  polluted_since_ns_ = INT64_MAX;
   if (how == Misbehaviour::wrong_baud) line().set_baud(kOtherBaud);
 }
 
@@ -113,7 +115,12 @@ void Lms200Double::obey(std::span<const uint8_t> payload, int64_t now_ns) {
       if (!wanted_once_) not_permitted();
       return;
     case Command::status: return answer(Reply::status, status_data(status()), at_ns);
-    case Command::errors: return answer(Reply::errors, {}, at_ns);
+    case Command::errors: {
+      // Type and number; of an old dazzling, too, which is over.
+      constexpr std::array<uint8_t, 5> dirty{2, 0x82, 5, 2, 18}, well{1, 0x82, 5};
+      const bool in_error = severity(scan_status(now_ns)) >= Severity::error;
+      return answer(Reply::errors, in_error ? std::span<const uint8_t>(dirty) : well, at_ns);
+    }
     case Command::type:
       return answer(Reply::type, std::span(reinterpret_cast<const uint8_t*>(kType.data()), kType.size()), at_ns);
     case Command::variant: {
@@ -186,12 +193,20 @@ Status Lms200Double::status() {
   return s;
 }
 
+uint8_t Lms200Double::scan_status(int64_t now_ns) {
+  constexpr uint8_t kWarned = kWell | kPolluted | static_cast<uint8_t>(Severity::warning),
+                    kInError = kWell | kPolluted | kImplausible | static_cast<uint8_t>(Severity::error);
+  if (misbehaviour() != Misbehaviour::polluted) return kWell;
+  polluted_since_ns_ = std::min(polluted_since_ns_, now_ns);
+  return now_ns - polluted_since_ns_ < kWarning_ns ? kWarned : kInError;
+}
+
 void Lms200Double::send_scan(int64_t turn) {
   const int64_t end_ns = on_ns_ + turn * kTurn_ns;
   const bool partial = mode_ == Mode::stream_partial;
   Scan scan;
   scan.millimetres = configuration_.millimetres();
-  scan.status = kWell;
+  scan.status = scan_status(end_ns);
   if ((configuration_.availability() & kIndices) != 0) scan.indices = {scan_index_++, telegram_index_++};
   const bool again = misbehaviour() == Misbehaviour::frozen && !words_.empty();
   if (partial) {
@@ -229,8 +244,12 @@ void Lms200Double::measure(int64_t first_ns, size_t first, size_t step) {
   for (size_t i = 0; i < beams; ++i) {
     const double distance = std::round(static_cast<double>(range_m_[i]) / unit_m);
     const bool seen = distance >= 1 && distance <= largest_distance(bits);
-    const uint16_t word = seen ? static_cast<uint16_t>(distance) : no_echo(bits);
-    const size_t at = 2 * (from + i * apart);
+    const size_t beam = from + i * apart;
+    const bool sun = misbehaviour() == Misbehaviour::dazzled && beam > words_.size() / 6 && beam < words_.size() / 3;
+    const auto word = static_cast<uint16_t>(sun    ? no_echo(bits) - 1
+                                            : seen ? static_cast<int>(distance)
+                                                   : no_echo(bits));
+    const size_t at = 2 * beam;
     words_[at] = static_cast<uint8_t>(word);
     words_[at + 1] = static_cast<uint8_t>(word >> 8);
   }

@@ -41,11 +41,14 @@ class Lms200Double final : public LineDouble {
   void measure(int64_t first_ns, size_t first, size_t step);
   int64_t turns() const;
   Status status();
+  /// The status byte of a scan; what it does not say of values is measured all the same.
+  uint8_t scan_status(int64_t now_ns);
 
   RangeSource source_;
   Parser parser_ = Parser::of_commands();
   int64_t on_ns_, last_byte_ns_ = 0, next_turn_ = 1;
   int64_t power_on_at_ns_ = INT64_MAX, new_baud_at_ns_ = INT64_MAX;
+  int64_t polluted_since_ns_ = INT64_MAX;
   uint32_t new_baud_ = 0;
   Mode mode_ = Mode::on_request;
   Variant variant_;

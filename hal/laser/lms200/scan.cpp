@@ -2,6 +2,7 @@
 #include "hal/laser/lms200/scan.hpp"
 
 #include <algorithm>
+#include <limits>
 
 namespace takt::lms200 {
 namespace {
@@ -81,10 +82,11 @@ Beam read_beam(uint16_t word, int bits) {
 
 float range_m(uint16_t word, uint8_t measuring_mode, bool millimetres) {
   constexpr uint8_t kDazzled = 4;  // of mode 0
+  constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
   const auto bits = distance_bits(measuring_mode);
-  if (!bits) return 0;
+  if (!bits) return kUnknown;
   const Beam beam = read_beam(word, *bits);
-  if (measuring_mode == 0 && (beam.flags & kDazzled) != 0) return 0;
+  if (blinded(beam.echo) || (measuring_mode == 0 && (beam.flags & kDazzled) != 0)) return kUnknown;
   return static_cast<float>(beam.distance) * (millimetres ? 0.001f : 0.01f);
 }
 

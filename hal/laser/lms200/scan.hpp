@@ -37,6 +37,8 @@ Telegram scan_telegram(const Scan& scan);
 std::optional<int> distance_bits(uint8_t measuring_mode);
 
 enum class Echo : uint8_t { valid, none, dazzled, overflow, noisy, read_error, out_of_range, unknown };
+/// Nothing is known of what is there, unlike where nothing came back, or what lies beyond the range.
+constexpr bool blinded(Echo echo) { return echo != Echo::valid && echo != Echo::none && echo != Echo::out_of_range; }
 
 struct Beam {
   uint16_t distance = 0;  ///< in the scan's unit; 0 unless valid
@@ -50,7 +52,7 @@ constexpr uint16_t no_echo(int distance_bits) { return static_cast<uint16_t>((1u
 /// The largest distance.
 constexpr uint16_t largest_distance(int distance_bits) { return static_cast<uint16_t>((1u << distance_bits) - 10); }
 
-/// Metres; 0 for whatever is no distance, and in measuring mode 0 for a dazzled beam.
+/// Metres; 0: nothing within the range; NaN: the beam is blinded, as in measuring mode 0 a flag says of it, too.
 float range_m(uint16_t word, uint8_t measuring_mode, bool millimetres);
 
 }  // namespace takt::lms200

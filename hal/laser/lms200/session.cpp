@@ -69,6 +69,7 @@ void Session::begin(int64_t now_ns) {
   // After a host that died it may still send, at the rate wanted; trying that first also shows whether the line can.
   try_rate(wanted_baud_);
   trouble_ = "no answer yet";
+  error_ = "";
   not_before_ns_ = now_ns;
   last_scan_ns_ = now_ns;
   enter(Step::find, now_ns);
@@ -127,6 +128,7 @@ void Session::enter(Step step, int64_t now_ns) {
     case Step::install: return ask(enter_installation(), Reply::mode, kModeReply_ns);
     case Step::write: return ask(write_configuration(configuration_), Reply::configuration_written, kWriteReply_ns);
     case Step::leave: return ask(switch_mode(Mode::on_request), Reply::mode, kModeReply_ns);
+    case Step::errors: return ask(command(Command::errors), Reply::errors, kReply_ns);
     case Step::start:
       return ask(switch_mode(interlaced(settings_.variant) ? Mode::stream_partial : Mode::stream), Reply::mode,
                  kModeReply_ns);
@@ -244,6 +246,9 @@ void Session::hear_reply(std::span<const uint8_t> payload, int64_t now_ns) {
     case Step::start:
       if (!done) return fail("the scanner refuses to stream scans", now_ns);
       return enter(Step::run, now_ns);
+    case Step::errors:
+      if (const auto number = read_error(payload)) error_ = trouble_ = error_text(*number);
+      return enter(Step::run, now_ns);
     case Step::run: return;
   }
 }
@@ -262,7 +267,7 @@ void Session::hear_configuration(std::span<const uint8_t> payload, int64_t now_n
 // Scans --------------------------------------------------------------------------------------------------------------
 
 void Session::hear_scan(std::span<const uint8_t> payload, uint64_t position, int64_t now_ns) {
-  if (step_ != Step::run) return;  // of a stream that is being stopped, measured as nobody here asked
+  if (!running()) return;  // of a stream that is being stopped, measured as nobody here asked
   const auto scan = read_scan(payload);
   if (!scan || scan->millimetres != settings_.millimetres || scan->partial != interlaced(settings_.variant) ||
       scan->beams() != beams_in(*scan)) {
@@ -270,13 +275,11 @@ void Session::hear_scan(std::span<const uint8_t> payload, uint64_t position, int
     return;
   }
   last_scan_ns_ = now_ns;
-  if (severity(scan->status) >= Severity::error) {
-    reception_.count_damage();
-    return;
-  }
+  if (!hear_status(scan->status, now_ns)) return reception_.count_damage();
   // The first beam left when the first of its turns began; the telegram began when the last one had ended.
   const int64_t turns_ns = scan->partial ? kTurn_ns : scan_ns();
   if (!assemble(*scan, reception_.began_ns(position) - turns_ns)) return;
+  if (!sees()) return reception_.count_damage();
   std::swap(assembled_, whole_);
   whole_.stamp_ns = instants_.refine(whole_.stamp_ns);
   // Scans that no line of this rate can carry are not counted as lost.
@@ -286,7 +289,28 @@ void Session::hear_scan(std::span<const uint8_t> payload, uint64_t position, int
   whole_.scan_number = *scan_number_;
   scan_ready_ = true;
   ++sweeps_;
-  trouble_ = remark_;
+  trouble_ = (scan->status & kImplausible) != 0 ? "the scanner says that values are implausible"
+             : (scan->status & kPolluted) != 0  ? "the scanner says that its front pane is dirty"
+                                                : remark_;
+}
+
+bool Session::hear_status(uint8_t status, int64_t now_ns) {
+  const bool in_error = severity(status) >= Severity::error;
+  if (in_error && *error_ == 0) {
+    error_ = trouble_ = error_text(0);
+    enter(Step::errors, now_ns);
+  }
+  if (!in_error) error_ = "";
+  return !in_error;
+}
+
+// Of a few blinded beams the way may be judged (they are NaN), of a blinded scanner not.
+bool Session::sees() {
+  const auto blind = static_cast<double>(std::count_if(assembled_.range_m.begin(), assembled_.range_m.end(),
+                                                       [](float range) { return std::isnan(range); }));
+  if (blind <= settings_.blinded_max * static_cast<double>(assembled_.range_m.size())) return true;
+  trouble_ = "the scanner is blinded: too many beams say nothing of what is there";
+  return false;
 }
 
 size_t Session::beams_in(const Scan& scan) const {

@@ -17,6 +17,7 @@ struct SessionSettings {
   Variant variant;
   uint8_t measuring_mode = 0;  ///< with a distance_bits()
   bool millimetres = true;
+  double blinded_max = 0.1;  ///< share of the beams of a scan that may be blinded; one with more is refused
 };
 
 /// True for fields and steps that the scanner knows.
@@ -47,7 +48,7 @@ class Session final : public LaserSession {
   const char* trouble() const override { return trouble_; }
 
   /// Scans are coming.
-  bool running() const { return step_ == Step::run; }
+  bool running() const { return step_ == Step::run || step_ == Step::errors; }
   uint32_t baud() const { return baud_; }
   /// What the scanner said of itself on the way; nothing before.
   const std::optional<Status>& status() const { return status_; }
@@ -66,6 +67,7 @@ class Session final : public LaserSession {
     health,
     start,  ///< the stream
     run,
+    errors,  ///< asked for in the stream, once while it says that it is in error
   };
   void enter(Step step, int64_t now_ns);
   void ask(const Telegram& telegram, Reply reply, int64_t reply_within_ns);
@@ -81,6 +83,10 @@ class Session final : public LaserSession {
   size_t beams_in(const Scan& scan) const;
   /// Puts the values where they belong; true if the scan is whole with them.
   bool assemble(const Scan& scan, int64_t stamp_ns);
+  /// Refuses the scan that is whole if too much of it is blinded.
+  bool sees();
+  /// What the scanner says with each scan; false if the scan is not to be used.
+  bool hear_status(uint8_t status, int64_t now_ns);
   LineOrder repeat(int64_t now_ns);
   int64_t scan_ns() const { return turns_of(settings_.variant) * kTurn_ns; }
   int64_t telegram_ns(uint32_t baud) const;
@@ -92,6 +98,7 @@ class Session final : public LaserSession {
   PeriodicInstants instants_;
   const char* trouble_ = "not asked yet";
   const char* remark_ = "";  ///< what stays so while scans come
+  const char* error_ = "";   ///< what the scanner calls its error, while it is in one; else empty
   std::optional<Status> status_;
 
   // The conversation.

@@ -129,6 +129,7 @@ TEST_CASE("top, stop and unknown questions over the socket") {
   CHECK(top["nodes"][0]["name"] == "map");
   CHECK(top["nodes"][0]["type"] == "mapping_3d");
   CHECK(top["nodes"][0]["completed"] == 17);
+  CHECK_FALSE(top["nodes"][0].contains("device"));
   CHECK(scene.ask({{"do", "dance"}})["error"].get<std::string>().find("known: top, echo") != std::string::npos);
   CHECK(scene.board->stop().end_ns() == INT64_MAX);
   CHECK(scene.ask({{"do", "stop"}})["ok"] == true);

@@ -4,6 +4,8 @@
 
 #include <doctest/doctest.h>
 
+#include <string_view>
+
 #include "hal/base/base_double.hpp"
 #include "tests/conformance/dbc_file.hpp"
 #include "tests/unit/can/bench.hpp"
@@ -106,6 +108,32 @@ TEST_CASE("can base: each misbehaviour is told, the base stops by itself, and it
     CHECK(bench.followed);
     CHECK(bench.reading.speed_m_s == doctest::Approx(0.3).epsilon(1e-3));
   }
+}
+
+TEST_CASE("can base: wheels that stand while it has to move, or says that it does, count as frozen") {
+  Bench bench;
+  bench.start();
+  bench.jobs(50, 0.4);
+  CHECK_FALSE(bench.reading.repeated);
+  bench.device.misbehave(Misbehaviour::frozen);
+  bench.jobs(20, 0.4);
+  CHECK_FALSE(bench.reading.repeated);  // not for long enough
+  bench.jobs(20, 0.4);
+  CHECK(bench.reading.status == ReadStatus::ok);
+  CHECK(bench.reading.repeated);
+  CHECK(std::string_view(bench.driver.trouble()).find("wheels stand") != std::string_view::npos);
+  bench.device.misbehave(Misbehaviour::none);
+  bench.jobs(50, 0.4);
+  CHECK_FALSE(bench.reading.repeated);
+  CHECK(std::string_view(bench.driver.trouble()).empty());
+
+  Bench standing;
+  standing.start();
+  standing.device.misbehave(Misbehaviour::frozen);
+  standing.jobs(50, 0);
+  CHECK_FALSE(standing.reading.repeated);
+  standing.jobs(50, 0, 0.5);
+  CHECK(standing.reading.repeated);
 }
 
 TEST_CASE("can base: emergency stop and bumper are refusals; a fault is reset by a restart") {

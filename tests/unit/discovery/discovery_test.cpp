@@ -23,16 +23,22 @@ TEST_CASE("discovery: what sysfs names, in the order of the names, with a line f
   std::filesystem::create_directories(root.path / "sys/bus/gpio/devices/gpiochip0");
   std::filesystem::create_directories(root.path / "sys/class/tty/ttyUSB0");
   std::filesystem::create_directories(root.path / "sys/class/tty/tty1");
+  for (const char* folder : {"dev/serial/by-id", "dev/v4l/by-id"})
+    std::filesystem::create_directories(root.path / folder);
+  std::filesystem::create_symlink("../../ttyUSB0", root.path / "dev/serial/by-id/usb-FTDI_USB-RS422_A1-if00-port0");
+  std::filesystem::create_symlink("../../video10", root.path / "dev/v4l/by-id/usb-Vivid-video-index0");
   const auto found = discovery::discover(root.path);
   REQUIRE(found.size() == 5);
   CHECK(found[0].where == "/dev/video2");
   CHECK(found[0].description == "Bumblebee bridge");
   CHECK(found[0].line.find("driver: v4l2, path: /dev/video2,") != std::string::npos);
   CHECK(found[1].where == "/dev/video10");
+  CHECK(found[1].line.find("path: /dev/v4l/by-id/usb-Vivid-video-index0,") != std::string::npos);
   CHECK(found[2].where == "can0");
   CHECK(found[2].description == "CAN, kvaser_pci, up");
   CHECK(found[2].line.find("driver: can, interface: can0") != std::string::npos);
   CHECK(found[3].where == "/dev/gpiochip0");
   CHECK(found[4].where == "/dev/ttyUSB0");
+  CHECK(found[4].line.find("port: /dev/serial/by-id/usb-FTDI_USB-RS422_A1-if00-port0}") != std::string::npos);
   CHECK(discovery::discover(root.path / "nothing").empty());
 }

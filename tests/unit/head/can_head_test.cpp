@@ -4,6 +4,8 @@
 
 #include <doctest/doctest.h>
 
+#include <string_view>
+
 #include "hal/head/head_double.hpp"
 #include "tests/unit/can/bench.hpp"
 
@@ -142,6 +144,66 @@ TEST_CASE("can head: each misbehaviour is told, and it works again when it ends"
     CHECK(bench.followed);
     CHECK(bench.device.pan_rad() == doctest::Approx(20 * kDegree).epsilon(1e-3));
   }
+}
+
+TEST_CASE("can head: a head that has to move and says the same again and again counts as frozen") {
+  Bench bench;
+  bench.start();
+  CHECK_FALSE(bench.jobs(50, HeadAngles{20, 0}).repeated);  // it is there
+  bench.device.misbehave(Misbehaviour::frozen);
+  CHECK_FALSE(bench.jobs(50).repeated);  // nothing is asked of it
+  CHECK_FALSE(bench.jobs(20, HeadAngles{-20, 0}).repeated);
+  const HeadReading stuck = bench.jobs(20, HeadAngles{-20, 0});
+  CHECK(stuck.status == ReadStatus::ok);
+  CHECK(stuck.repeated);
+  CHECK(std::string_view(bench.driver.trouble()).find("does not move") != std::string_view::npos);
+  bench.device.misbehave(Misbehaviour::none);
+  CHECK_FALSE(bench.jobs(50, HeadAngles{-20, 0}).repeated);
+  CHECK(std::string_view(bench.driver.trouble()).empty());
+}
+
+TEST_CASE("can head: what it says of temperatures, supply and lids is told") {
+  Bench bench;
+  bench.start();
+  const auto told = [&](const char* what) {
+    bench.jobs(50);  // a second: each of these messages has come
+    CAPTURE(bench.driver.trouble());
+    return std::string_view(bench.driver.trouble()).find(what) != std::string_view::npos &&
+           bench.status == ReadStatus::ok;
+  };
+  CHECK(std::string_view(bench.driver.trouble()).empty());
+  bench.device.set_health(75, 24);
+  CHECK(told("too hot"));
+  bench.device.set_health(41, 19);
+  CHECK(told("supply is low"));
+  bench.device.set_health(41, 24);
+  bench.device.jam_lids(true);
+  CHECK(told("eyelid is stuck"));
+  bench.device.jam_lids(false);
+  bench.jobs(50);
+  CHECK(std::string_view(bench.driver.trouble()).empty());
+}
+
+TEST_CASE("can head: a controller that is restarted again and again counts as off the bus until it has been steady") {
+  Bench bench;
+  bench.start();
+  for (size_t restarts = 0; restarts < can::Station::kMostRestarts; ++restarts) {
+    bench.device.misbehave(Misbehaviour::bus_off);
+    bench.jobs(10);
+    CHECK(bench.status == ReadStatus::disconnected);
+    bench.device.misbehave(Misbehaviour::none);
+    bench.jobs(100);
+    CHECK(bench.status == ReadStatus::ok);
+  }
+  bench.device.misbehave(Misbehaviour::bus_off);
+  bench.jobs(10);
+  bench.device.misbehave(Misbehaviour::none);
+  bench.jobs(100);
+  CHECK(bench.status == ReadStatus::disconnected);
+  CHECK(std::string_view(bench.driver.trouble()).find("again and again") != std::string_view::npos);
+  bench.jobs(60 * 50);
+  CHECK(bench.status == ReadStatus::ok);
+  CHECK(std::string_view(bench.driver.trouble()).empty());
 }
 
 TEST_CASE("can head: an emergency stop is a refusal, not a loss; afterwards it goes on from where it stands") {

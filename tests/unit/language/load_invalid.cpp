@@ -44,6 +44,12 @@ TEST_CASE("Unknown ids") {
                {"no output `dispartiy`", "did you mean `disparity`?"});
   expect_graph("robot: {camera:", "robot: {kamera:", "kamera",
                {"profile `robot`", "`kamera`", "did you mean `camera`?"});
+  expect_graph("sim: {default:", "sim: {set: {stero.disparities: 3}, default:", "stero.disparities",
+               {"profile `sim` sets `stero`, which is no node", "did you mean `stereo`?"});
+  expect_graph("sim: {default:", "sim: {set: {stereo.disparties: 3}, default:", "stereo.disparties",
+               {"node `stereo`", "`disparties`", "did you mean `disparities`?"});
+  expect_graph("sim: {default:", "sim: {set: {stereo: 3}, default:", "stereo: 3",
+               {"`stereo` is not understood", "node.param: value"});
   expect_schedule("  planner: {rate: 1/3}", "  planner: {rate: 1/3}\n  planer: {rate: 2}",
                   "planer:", {"`planer`", "no such node or device", "did you mean `planner`?"});
 }

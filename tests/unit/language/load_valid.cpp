@@ -96,6 +96,24 @@ TEST_CASE("A profile chooses drivers and their settings") {
   CHECK(loaded.graph->devices[0].settings["buffers"] == 4);
 }
 
+TEST_CASE("A profile may set parameters of nodes; --set has the last word") {
+  const Files files(
+      with(kGraph, "robot: {camera:", "robot: {set: {stereo.disparities: 32, stereo.max_range: 4m}, camera:"));
+  LoadOptions options;
+  const Loaded other = files.load(options);
+  INFO(all(other));
+  REQUIRE(other.graph);
+  CHECK(std::get<double>(other.graph->nodes[0].params.at("max_range").value) != 4.0);
+  options.profile = "robot";
+  options.set = {"stereo.disparities=48"};
+  const Loaded loaded = files.load(options);
+  INFO(all(loaded));
+  REQUIRE(loaded.graph);
+  const auto& params = loaded.graph->nodes[0].params;
+  CHECK(std::get<int64_t>(params.at("disparities").value) == 48);
+  CHECK(std::get<double>(params.at("max_range").value) == 4.0);
+}
+
 TEST_CASE("Options change what the files say") {
   const Files files;
   files.write("other.yaml", with(kSchedule, "name: slow", "name: other"));

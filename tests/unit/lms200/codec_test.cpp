@@ -2,6 +2,8 @@
 // The codec of the LMS 2xx against golden vectors, both ways.
 #include <doctest/doctest.h>
 
+#include <cmath>
+
 #include <cstdio>
 #include <map>
 
@@ -173,6 +175,22 @@ TEST_CASE("a checksum that a manual misprints is none") {
   CHECK(payload_of(power_on).empty());
 }
 
+TEST_CASE("the error list: what still holds comes first; a list that is cut tells nothing more") {
+  const auto error_of = [](std::vector<uint8_t> list) {
+    const Telegram telegram = reply(Reply::errors, list, 0x13);
+    return read_error(telegram.bytes().subspan(kHeader, list.size() + 2));
+  };
+  CHECK(error_of({0}) == 0);
+  CHECK(error_of({1, 0x83, 5}) == 0);  // over
+  CHECK(error_of({3, 0x83, 5, 2, 18, 3, 29}) == 18);
+  CHECK(error_of({200, 0x83, 5}) == 0);
+  CHECK(error_of({1, 3}) == 0);
+  CHECK_FALSE(read_error(std::vector<uint8_t>{0xB1, 1, 2, 18, 0x10}));
+  CHECK(std::string_view(error_text(5)).find("dazzled") != std::string_view::npos);
+  CHECK(std::string_view(error_text(22)).find("clean it") != std::string_view::npos);
+  CHECK(std::string_view(error_text(200)).find("in error") != std::string_view::npos);
+}
+
 TEST_CASE("values, flags and special values of a scan") {
   const auto flags = payload_of(golden("scan_flags"));
   const auto scan = read_scan(flags);
@@ -185,7 +203,9 @@ TEST_CASE("values, flags and special values of a scan") {
     CHECK(beam.echo == Echo::valid);
     CHECK(beam.distance == 1234 + i);
     const bool dazzled = (expected[i] & 4) != 0;
-    CHECK(range_m(scan->word(i), 0, true) == doctest::Approx(dazzled ? 0.0 : 1.234 + 0.001 * static_cast<double>(i)));
+    const float range = range_m(scan->word(i), 0, true);
+    if (dazzled) CHECK(std::isnan(range));
+    else CHECK(range == doctest::Approx(1.234 + 0.001 * static_cast<double>(i)));
   }
   const auto special = payload_of(golden("scan_overflow"));
   const auto values = read_scan(special);
@@ -194,7 +214,9 @@ TEST_CASE("values, flags and special values of a scan") {
                          Echo::read_error, Echo::out_of_range, Echo::valid,    Echo::dazzled};
   for (size_t i = 0; i < 8; ++i) CHECK(read_beam(values->word(i), 13).echo == echoes[i]);
   CHECK(range_m(values->word(6), 0, true) == doctest::Approx(8.182));
-  CHECK(range_m(values->word(5), 0, true) == 0);
+  CHECK(range_m(values->word(0), 0, true) == 0);
+  CHECK(range_m(values->word(5), 0, true) == 0);  // farther than can be measured
+  for (const size_t blind : {1, 2, 3, 4, 7}) CHECK(std::isnan(range_m(values->word(blind), 0, true)));
   CHECK(read_beam(0x1FF9, 13).echo == Echo::unknown);
   CHECK(read_beam(0x3FFB, 14).echo == Echo::noisy);
   CHECK(read_beam(0x7FF6, 15).echo == Echo::valid);
@@ -205,7 +227,7 @@ TEST_CASE("values, flags and special values of a scan") {
   REQUIRE(far);
   CHECK_FALSE(far->millimetres);
   CHECK(range_m(far->word(2), 0, false) == doctest::Approx(81.82));
-  CHECK(range_m(1000, 0x3F, true) == 0);  // reflectivity is no distance
+  CHECK(std::isnan(range_m(1000, 0x3F, true)));  // reflectivity is no distance
 }
 
 TEST_CASE("scans that are no scans") {

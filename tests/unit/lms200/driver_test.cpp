@@ -177,6 +177,56 @@ TEST_CASE("a scanner that misbehaves: what reads say, and that it comes back") {
   }
 }
 
+TEST_CASE("a dazzled scanner gives no scans, since what it does not see would look like a free way; then it is back") {
+  Lms200Rig rig(kFast);
+  rig.start();
+  REQUIRE(rig.runs_within(5 * kSecond));
+  rig.device->misbehave(Misbehaviour::dazzled);
+  rig.statuses(2);
+  const auto meanwhile = rig.statuses(30);
+  CHECK(count_of(meanwhile, ReadStatus::partial) == 30);
+  CHECK(has(rig.laser->trouble(), "blinded"));
+  CHECK(rig.laser->counts().damaged > 30);
+  rig.device->misbehave(Misbehaviour::none);
+  rig.statuses(2);
+  CHECK(count_of(rig.statuses(30), ReadStatus::ok) == 30);
+  CHECK(std::string_view(rig.laser->trouble()).empty());
+
+  // Where so much may be blinded, scans come, and it is known which beams saw nothing.
+  SessionSettings bold = kFast;
+  bold.blinded_max = 0.5;
+  Lms200Rig other(bold);
+  other.start();
+  REQUIRE(other.runs_within(5 * kSecond));
+  other.device->misbehave(Misbehaviour::dazzled);
+  other.statuses(2);
+  CHECK(count_of(other.statuses(10), ReadStatus::ok) == 10);
+  CHECK(std::count_if(other.range_m.begin(), other.range_m.end(), [](float range) { return std::isnan(range); }) ==
+        doctest::Approx(361 / 3.0).epsilon(0.02));
+  CHECK(other.range_m[0] > 0);
+  CHECK(other.range_m[360] > 0);
+}
+
+TEST_CASE("a dirty pane: first told beside scans, then an error, whose kind is asked for; nothing is begun anew") {
+  Lms200Rig rig(kFast);
+  rig.start();
+  REQUIRE(rig.runs_within(5 * kSecond));
+  rig.device->misbehave(Misbehaviour::polluted);
+  rig.statuses(2);
+  CHECK(count_of(rig.statuses(20), ReadStatus::ok) == 20);
+  CHECK(has(rig.laser->trouble(), "pane is dirty"));
+  rig.statuses(15);
+  const auto in_error = rig.statuses(30);
+  CHECK(count_of(in_error, ReadStatus::ok) == 0);
+  CHECK(count_of(in_error, ReadStatus::partial) == 30);
+  CHECK(has(rig.laser->trouble(), "too dirty: clean it"));
+  CHECK(rig.scanner->mode() == Mode::stream);
+  rig.device->misbehave(Misbehaviour::none);
+  rig.statuses(2);
+  CHECK(count_of(rig.statuses(30), ReadStatus::ok) == 30);
+  CHECK(std::string_view(rig.laser->trouble()).empty());
+}
+
 TEST_CASE("a scanner that falls to another rate is found again") {
   Lms200Rig rig(kFast);
   rig.start();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <vector>
@@ -98,6 +99,32 @@ TEST_CASE("a lone beam is dust, two neighbours are an obstacle; no return and Na
   CHECK(reading.nearest_m == doctest::Approx(0.6));
   CHECK(read_field(sweep, field, 3).blocked);
   CHECK_FALSE(read_field(sweep, field, 4).blocked);
+}
+
+TEST_CASE("blinded beams hide what is as wide as the gap between those that see") {
+  const ProtectedField field = field_of({1, 0});  // ends at 1.34 m
+  Sweep sweep{-std::numbers::pi / 2, std::numbers::pi / 360, {0, 0.3, 0.25, 1, 0, 0, 0}, {}};
+  std::vector<float> ranges(361, 0.0f);
+  sweep.range_m = ranges;
+  const auto blind = [&](size_t first, size_t count) {
+    std::fill(ranges.begin(), ranges.end(), 0.0f);
+    std::fill_n(ranges.begin() + static_cast<ptrdiff_t>(first), count, std::nanf(""));
+  };
+  CHECK_FALSE(could_hide(sweep, field, 0.08));
+  // Ahead the field ends 1.04 m from the scanner, where beams are 9 mm apart: eight of them leave a gap of 82 mm.
+  blind(177, 7);
+  CHECK_FALSE(could_hide(sweep, field, 0.08));
+  blind(177, 8);
+  CHECK(could_hide(sweep, field, 0.08));
+  CHECK_FALSE(could_hide(sweep, field, 0.09));
+  blind(0, 20);  // to the right the field is near: 0.38 m, 3 mm
+  CHECK_FALSE(could_hide(sweep, field, 0.08));
+  CHECK(could_hide(sweep, field, 0.04));
+  blind(0, 361);
+  CHECK(could_hide(sweep, field, 0.3));
+  for (size_t i = 0; i < ranges.size(); i += 4) ranges[i] = 5;  // every fourth beam sees
+  CHECK_FALSE(could_hide(sweep, field, 0.08));
+  CHECK_FALSE(could_hide({0, 0.01, {}, {}}, field, 0.08));
 }
 
 TEST_CASE("beam 0 points to the right; the scanner's mount moves and turns its beams") {

@@ -110,6 +110,18 @@ TEST_CASE(
   CHECK(f.out->message().nearest_m == 0);
 }
 
+TEST_CASE("obstacle_stop: where the scanner is blinded in the robot's way, that is no free way") {
+  Fixture f;
+  CHECK(f.drive_on().reasons == 0);
+  f.wall(std::nanf(""));
+  f.give("scan", f.scan);
+  CHECK(f.job().reasons == stop_reason::scan_lost);
+  CHECK(f.out->message().nearest_m == 0);
+  f.free();
+  f.scan->range_m[90] = f.scan->range_m[120] = std::nanf("");  // too narrow for a leg
+  CHECK(f.drive_on().reasons == 0);
+}
+
 TEST_CASE("obstacle_stop: the field grows with the speed, and without odometry is that of speed_max") {
   // At 1 m/s the field ends 1.34 m before the robot's centre, at 1.4 m/s 1.96 m; the scanner sits at 0.3 m.
   Fixture f;
