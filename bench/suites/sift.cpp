@@ -37,7 +37,9 @@ std::vector<Row> run_sift(const Options& options) {
   std::vector<sift::Features> views;
   for (const DatabaseObject& object : database)
     for (const ReferenceView& view : object.views) views.push_back(matcher.features(image_of(view)));
-  Detector detector(scenes[0].width, scenes[0].height, database, {});
+  DetectorParameters p;
+  p.last = Stage::colour;
+  Detector detector(scenes[0].width, scenes[0].height, database, p);
   std::fprintf(stderr, "sift: %zu views, %zu scenes in turn\n", views.size(), scenes.size());
   size_t ours = 0, theirs = 0;
   Compared figures = compare(

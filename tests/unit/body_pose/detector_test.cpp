@@ -48,7 +48,7 @@ TEST_CASE("generated people are found among furniture, and most point where they
   CHECK(figures.trials == 20);
   CHECK(figures.found >= 18);
   CHECK(figures.extra <= 2);
-  CHECK(figures.right >= 12);
+  CHECK(figures.right >= 14);  // 15 were measured, 19 found, 2 extra
 }
 
 TEST_CASE("heads are told apart whose people stand shoulder to shoulder") {

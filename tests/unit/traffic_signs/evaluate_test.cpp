@@ -38,7 +38,8 @@ TEST_CASE("traffic_signs: the shipped cascades find most signs of generated scen
     hit += score.hit;
     wrong += score.false_positives;
   }
-  CHECK(shown >= 15);
-  CHECK(10 * hit >= 7 * shown);
-  CHECK(wrong <= 8);
+  MESSAGE(hit << " of " << shown << " found, " << wrong << " false");  // 29 of 35 and 1 were measured
+  CHECK(shown == 35);
+  CHECK(hit >= 28);
+  CHECK(wrong <= 2);
 }
