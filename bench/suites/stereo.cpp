@@ -8,12 +8,14 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
+#include <tuple>
 
 #include "bench/suite.hpp"
 #include "bench/suites/hops.hpp"
 #include "bench/two_cores.hpp"
 #include "nodes/stereo/band_matcher.hpp"
 #include "nodes/stereo/generated_pair.hpp"
+#include "nodes/stereo/half_resolution.hpp"
 #include "nodes/stereo/matcher.hpp"
 
 namespace takt::bench {
@@ -72,6 +74,24 @@ void compare(std::vector<Row>& rows, const std::string& name, const std::string&
 
 }  // namespace
 
+/// Beside what the original's figure says: a constant, so there are no rounds of it.
+void add_original(std::vector<Row>& rows, const std::string& name) {
+  constexpr double kOriginal_ms = 60;
+  Row row = rows.front();
+  row.name = name;
+  row.reference = "the original's graphics processors (thesis)";
+  row.value = *row.samples.quantile(0.5);
+  row.reference_value = kOriginal_ms;
+  row.ratio = row.value / kOriginal_ms;
+  rows.push_back(std::move(row));
+}
+
+cv::Mat padded(const cv::Mat& image, int left) {
+  cv::Mat out;
+  cv::copyMakeBorder(image, out, 0, 0, left, 0, cv::BORDER_REPLICATE);
+  return out;
+}
+
 std::vector<Row> run_stereo(const Options& options) {
   cv::setNumThreads(1);
   const int rounds = options.rounds_or(30);
@@ -96,6 +116,8 @@ std::vector<Row> run_stereo(const Options& options) {
   const auto global = cv::StereoSGBM::create(0, kRange, 5, 600, 2400, 1, 0, 0, 0, 0, cv::StereoSGBM::MODE_SGBM_3WAY);
   const auto with_block = [&] { block->compute(scene.left_grey, scene.right_grey, theirs); };
   const auto with_global = [&] { global->compute(scene.left, scene.right, theirs); };
+  const cv::Mat wide_left = padded(scene.left, kRange), wide_right = padded(scene.right, kRange);
+  const auto with_padded_global = [&] { global->compute(wide_left, wide_right, theirs); };
   auto quality_parameters = stereo::MatcherParameters::quality();
   quality_parameters.disparities = kDisparities;
   const auto quality = stereo::make_matcher(kWidth, kHeight, 3, quality_parameters);
@@ -105,6 +127,7 @@ std::vector<Row> run_stereo(const Options& options) {
   std::vector<Row> rows;
   compare(rows, name + "/1-thread", "cv::StereoBM unfiltered, on grey", one, rounds, with_block,
           with(*colour, scene.left, scene.right));
+  add_original(rows, name + "/1-thread-to-original");
   compare(rows, name + "/1-thread-grey", "cv::StereoBM unfiltered", one, rounds, with_block,
           with(*grey, scene.left_grey, scene.right_grey));
   const auto avx2 = avx2_matcher(3, parameters);
@@ -114,6 +137,18 @@ std::vector<Row> run_stereo(const Options& options) {
           with(*colour, scene.left, scene.right));
   compare(rows, name + "/quality", "cv::StereoSGBM 3-way", one, rounds, with_global,
           with(*quality, scene.left, scene.right));
+  compare(rows, name + "/quality-to-padded", "cv::StereoSGBM 3-way, padded on the left: every column", one, rounds,
+          with_padded_global, with(*quality, scene.left, scene.right));
+  for (const auto& [method, full, p] :
+       {std::tuple("default", colour.get(), &parameters), std::tuple("quality", quality.get(), &quality_parameters)}) {
+    stereo::HalfMatcher half(kWidth, kHeight, 3, *p);
+    const std::string levels = name + "/" + method + "-level-";
+    compare(rows, levels + "half", "the same at level full", one, rounds, with(*full, scene.left, scene.right),
+            with(half, scene.left, scene.right));
+    half.limit_search(kDisparities / 2);
+    compare(rows, levels + "half_range", "the same at level full", one, rounds, with(*full, scene.left, scene.right),
+            with(half, scene.left, scene.right));
+  }
   const TwoCores cores;
   stereo::BandMatcher bands(kWidth, kHeight, 3, parameters, 2);
   compare(rows, name + "/2-bands", "the same on one thread", "two threads on " + cores.text() + ", " + colour->target(),

@@ -131,7 +131,7 @@ void GeneralMatcher::State::put(const float* all, int d, float largest, int x, i
   float second = p.selection == Selection::semi_global ? largest : 65535;
   for (int e = 0; e < p.disparities; ++e)
     if (std::abs(e - d) > 1) second = std::min(second, all[e]);
-  ambiguous.row(y)[x] = (second - all[d]) * 256 <= static_cast<float>(p.uniqueness) * second;
+  ambiguous.row(y)[x] = static_cast<double>(second - all[d]) * 256 <= p.uniqueness * static_cast<double>(second);
 }
 
 void GeneralMatcher::State::select_winners(const CostRow& all, float largest, int y, Rows<int16_t>& fine) {

@@ -16,17 +16,21 @@ namespace takt::stereo {
 class RectificationMonitor {
  public:
   static constexpr int kPlaces = 300;     ///< that are looked at in one pair, about
-  static constexpr int kReach = 3;        ///< px up and down: larger errors count as this, where they are seen at all
+  static constexpr int kReach = 3;        ///< px up and down where the disparity says
+  static constexpr int kFarReach = 16;    ///< px up and down where it says nothing of use
+  static constexpr int kFarPlaces = 8;    ///< of one pair that are searched so far, at most
   static constexpr size_t kWindow = 600;  ///< points that the median is taken of, the newest
   static constexpr size_t kLeastPoints = 60;
 
-  /// For pairs of that size, px.
-  RectificationMonitor(int width, int height);
+  /// For pairs of that size, px, and points with disparities 0 .. disparities - 1.
+  RectificationMonitor(int width, int height, int disparities);
 
   /// Looks at one place in each cell of a grid, another one in each pair. A place counts where the left image changes
   /// along its column (and not along a diagonal, where an error in x would look like one in y), has a disparity, and
   /// where one of the rows of the right image resembles it far more than the others; a parabola through the squared
-  /// differences of three rows gives the row to a fraction. Views have the size given, 1 or 3 channels alike.
+  /// differences of three rows gives the row to a fraction. Where most places with such structure have no distinct row,
+  /// disparities are not to be believed either: some of these places are then looked for in all columns of the search
+  /// range and many rows, whatever their disparity. Views have the size given, 1 or 3 channels alike.
   void observe(ImageView<const uint8_t> left, ImageView<const uint8_t> right, ImageView<const int16_t> disparity);
 
   /// Median of |row in the right image - row in the left|, px; nothing while there are less than kLeastPoints.
@@ -35,13 +39,22 @@ class RectificationMonitor {
   size_t points() const { return errors_.size(); }
 
  private:
+  struct Place {
+    int x, y;
+  };
   void add(float error_px);
+  /// The place's point in the right image, found without a disparity: row relative to the left one's; nothing if no
+  /// place of the right image resembles it far more than the others.
+  std::optional<float> far_row(ImageView<const uint8_t> left, ImageView<const uint8_t> right, Place place);
 
-  int width_, height_, cell_ = 0;
+  int width_, height_, disparities_, cell_ = 0;
   uint32_t pairs_ = 0;
   std::vector<float> errors_;  ///< |px|, a ring of kWindow
   size_t oldest_ = 0;
   std::vector<float> scratch_;
+  std::vector<Place> lost_;     ///< with structure, without a distinct row, of one pair
+  std::vector<uint8_t> strip_;  ///< of the right image, around one place
+  std::vector<int> far_costs_;  ///< by row, then column
 };
 
 /// How far a rectified pair can be trusted.

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 #include <opencv2/calib3d.hpp>
+#include <opencv2/core/quaternion.hpp>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -157,6 +158,8 @@ RectificationTables rectification_tables(const StereoCalibration& c) {
            "; the right camera must stand to the right of the left one (x < 0); are they swapped?");
   RectificationTables tables;
   tables.camera = {focal, p1.at<double>(0, 2), p1.at<double>(1, 2), baseline};
+  const auto turn = cv::Quatd::createFromRotMat(r1.t());
+  tables.rectified_in_raw = {0, 0, 0, turn.w, turn.x, turn.y, turn.z};
   tables.left = sources(k1, d1, r1, p1, size);
   tables.right = sources(k2, d2, r2, p2, size);
   return tables;
@@ -178,6 +181,7 @@ Rectifier::Rectifier(const StereoCalibration& c, BayerPattern pattern)
     : width_(c.width), height_(c.height), pattern_(pattern) {
   const RectificationTables tables = rectification_tables(c);
   camera_ = tables.camera;
+  rectified_in_raw_ = tables.rectified_in_raw;
   left_ = Remap(width_, height_, tables.left);
   right_ = Remap(width_, height_, tables.right);
   window_.resize(std::max(left_.window_bytes(), right_.window_bytes()));

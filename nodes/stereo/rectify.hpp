@@ -35,6 +35,7 @@ void write_calibration(const std::filesystem::path& file, const StereoCalibratio
 /// Model of the rectified images, and where each of their pixels comes from (width x height, row by row).
 struct RectificationTables {
   CameraModel camera;
+  Transform rectified_in_raw;  ///< the left camera turned about its optical centre
   std::vector<RemapSource> left, right;
 };
 
@@ -58,6 +59,8 @@ class Rectifier {
 
   /// Model of the rectified images.
   const CameraModel& camera() const { return camera_; }
+  /// The frame of the rectified left camera in that of the raw one: a turn about the optical centre.
+  const Transform& rectified_in_raw() const { return rectified_in_raw_; }
   int width() const { return width_; }
   int height() const { return height_; }
 
@@ -70,6 +73,7 @@ class Rectifier {
  private:
   int width_ = 0, height_ = 0;
   CameraModel camera_;
+  Transform rectified_in_raw_;
   BayerPattern pattern_ = BayerPattern::none;
   Remap left_, right_;
   std::vector<int8_t> window_;  ///< of both, one after the other; empty: pass through

@@ -5,6 +5,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "nodes/stereo/band_matcher.hpp"
@@ -14,13 +15,15 @@
 #include "nodes/stereo/rectify.hpp"
 #include "nodes/stereo/triangulate.hpp"
 #include "rt/node.hpp"
+#include "rt/transform/pose_math.hpp"
 
 namespace takt {
 namespace {
 
 using namespace stereo;
 
-constexpr double kHalfCost = 0.35;  // README.md, measured cost
+constexpr int kHalfRange = 2;                              // level
+constexpr double kHalfCost = 0.35, kHalfRangeCost = 0.25;  // README.md, quality levels
 
 class StereoNode final : public Node {
  public:
@@ -49,7 +52,7 @@ class StereoNode final : public Node {
     confidence_scratch_.resize(pixels);
     if (subpixel_) fraction_scratch_.resize(pixels);
     rectified_.reserve({images.width, images.height, static_cast<uint32_t>(channels_), 0});
-    monitor_.emplace(width_, height_);
+    monitor_.emplace(width_, height_, disparities_());
     disparity_.reserve({images.width, images.height, 1, 0});
     const auto step = static_cast<uint32_t>(cloud_step_());
     cloud_.reserve({0, 0, 1, ((images.width + step - 1) / step) * ((images.height + step - 1) / step)});
@@ -61,15 +64,13 @@ class StereoNode final : public Node {
     const StereoPair* in = pair_.newest();
     if (!in || !pair_.is_new()) return job.no_result();  // nothing to match, or matched already
     const bool is_rectified = in->camera.focal_px > 0;
-    if (in->width != width_ || in->height != height_ || in->channels != (is_rectified ? channels_ : input_channels_) ||
-        (!is_rectified && !rectifier_))
-      return job.no_result();
+    if (!fits(job, *in, is_rectified)) return job.no_result();
     stamp_ = pair_.stamp_ns();
-    sensor_in_robot_ = in->sensor_in_robot;
+    sensor_in_robot_ = is_rectified ? in->sensor_in_robot : rectified_in_robot(in->sensor_in_robot);
     camera_ = is_rectified ? in->camera : rectifier_->camera();
     ImageView<const uint8_t> left = in->left_view(), right = in->right_view();
     if (!rectify(*in, is_rectified, left, right)) return job.no_result();
-    set_range();
+    set_range(job.level());
     if (disparity_.connected() || cloud_.connected()) match_and_send(job, left, right);
   }
 
@@ -115,6 +116,28 @@ class StereoNode final : public Node {
                        std::to_string(calibration.height) + " px but `pair` has " + std::to_string(width_) + " x " +
                        std::to_string(height_) + "; give the calibration of this camera mode");
     rectifier_.emplace(calibration, pattern_);
+  }
+
+  /// Whether the node was set up for such a pair; else the first one says why it gets no result.
+  bool fits(Job& job, const StereoPair& in, bool is_rectified) {
+    char text[160];
+    const int channels = is_rectified ? channels_ : input_channels_;
+    if (!is_rectified && !rectifier_)
+      std::snprintf(
+          text, sizeof text,
+          "the pair is raw and `calibration` is not set, so nothing is matched; docs/calibration.md makes one");
+    else if (in.width != width_ || in.height != height_ || in.channels != channels)
+      std::snprintf(text, sizeof text, "a pair of %d x %d px and %d channels is not matched; those of %d x %d, %d are",
+                    in.width, in.height, in.channels, width_, height_, channels);
+    else return true;
+    if (!std::exchange(told_of_misfit_, true)) job.results_wrong(text);
+    return false;
+  }
+
+  /// Rectification turned the left camera; a mount that is not known stays so.
+  Transform rectified_in_robot(const Transform& raw) const {
+    const bool known = raw.x != 0 || raw.y != 0 || raw.z != 0 || raw.qx != 0 || raw.qy != 0 || raw.qz != 0;
+    return known ? compose({raw, {}}, {rectifier_->rectified_in_raw(), {}}).transform : raw;
   }
 
   /// Leaves the views on rectified images: in the input, in the message to send or in this node's own memory.
@@ -198,9 +221,10 @@ class StereoNode final : public Node {
     else job.results_doubtful(text);
   }
 
-  /// `search` may have been changed between two jobs.
-  void set_range() {
-    const int wanted = search_ > 0 ? std::min(search_(), most_) : most_;
+  /// `search` may have been changed between two jobs, and the level.
+  void set_range(int level) {
+    const int all = search_ > 0 ? std::min(search_(), most_) : most_,
+              wanted = level == kHalfRange ? (all + 1) / 2 : all;
     if (wanted == range_) return;
     range_ = wanted;
     matcher_->limit_search(range_);
@@ -213,9 +237,11 @@ class StereoNode final : public Node {
   Output<PointCloud> cloud_{this, "cloud",
                             "coloured points in the frame of the left camera (x right, y down, z forward)"};
 
-  Levels levels_{this,
-                 {{"full", 1.0, "every pixel, every disparity"},
-                  {"half", kHalfCost, "half resolution over the same range; disparities are even"}}};
+  Levels levels_{
+      this,
+      {{"full", 1.0, "every pixel, every disparity"},
+       {"half", kHalfCost, "half resolution over the same range; disparities are even"},
+       {"half_range", kHalfRangeCost, "half resolution, half of the range: what is nearer gets a wrong one"}}};
 
   Param<int> disparities_{this, "disparities", 150, {1, 512}, "px", "search range 0 .. disparities - 1"};
   Param<int> search_{this,     "search", 0,
@@ -279,6 +305,7 @@ class StereoNode final : public Node {
   std::optional<Rectifier> rectifier_;
   std::optional<RectificationMonitor> monitor_;
   RowErrorAlarm alarm_;
+  bool told_of_misfit_ = false;
   std::vector<uint8_t> left_, right_, confidence_scratch_, fraction_scratch_;
   std::vector<int16_t> disparity_scratch_;
 };

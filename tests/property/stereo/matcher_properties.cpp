@@ -13,80 +13,13 @@
 #include "nodes/stereo/semi_global_matcher.hpp"
 #include "nodes/stereo/window_matcher.hpp"
 #include "tests/on_each_target.hpp"
+#include "tests/property/stereo/random_pairs.hpp"
 
 using namespace takt;
 using namespace takt::stereo;
-using takt::test::on_each_target;
+using namespace takt::test;
 
 namespace {
-
-struct Picture {
-  int width, height, channels;
-  std::vector<uint8_t> pixels;
-  ImageView<const uint8_t> view() const { return {pixels.data(), width, height, channels}; }
-};
-
-/// Few grey levels now and then, so that ties occur.
-Picture random_picture(std::mt19937& random, int width, int height, int channels, int levels) {
-  Picture p{width, height, channels, std::vector<uint8_t>(static_cast<size_t>(width * height * channels))};
-  std::uniform_int_distribution<int> level(0, levels - 1);
-  for (auto& v : p.pixels) v = static_cast<uint8_t>(level(random) * 255 / std::max(1, levels - 1));
-  return p;
-}
-
-/// The right image: the left one shifted by `shift`, a share of the pixels replaced.
-Picture shifted(std::mt19937& random, const Picture& left, int shift, int noise_percent) {
-  Picture right = random_picture(random, left.width, left.height, left.channels, 256);
-  std::uniform_int_distribution<int> percent(0, 99);
-  for (int y = 0; y < left.height; ++y)
-    for (int x = shift; x < left.width; ++x)
-      if (percent(random) >= noise_percent)
-        for (int c = 0; c < left.channels; ++c)
-          right.pixels[static_cast<size_t>(((y * left.width) + x - shift) * left.channels + c)] =
-              left.view().at(x, y, c);
-  return right;
-}
-
-struct Output {
-  std::vector<int16_t> disparity;
-  std::vector<uint8_t> confidence, fraction;
-  explicit Output(const Picture& p)
-      : disparity(static_cast<size_t>(p.width * p.height), -7),
-        confidence(disparity.size()),
-        fraction(disparity.size()) {}
-  DisparityViews views(const Picture& p) {
-    return {{disparity.data(), p.width, p.height},
-            {confidence.data(), p.width, p.height},
-            {fraction.data(), p.width, p.height}};
-  }
-  /// Those rows of all three, one behind another.
-  std::vector<int> rows(int first, int last, int width) const {
-    std::vector<int> all;
-    const auto add = [&](const auto& image) {
-      all.insert(all.end(), image.begin() + first * width, image.begin() + last * width);
-    };
-    add(disparity);
-    add(confidence);
-    add(fraction);
-    return all;
-  }
-  bool operator==(const Output&) const = default;
-};
-
-void expect_equal(Matcher& matcher, const Picture& left, const Picture& right, const MatcherParameters& p,
-                  const Output& expected) {
-  for (int run = 0; run < 2; ++run) {  // the second run finds used scratch memory
-    Output out(left);
-    REQUIRE(matcher.match(left.view(), right.view(), out.views(left)));
-    INFO(matcher.target(), " ", left.width, "x", left.height, "x", left.channels, " D ", p.disparities, " cost ",
-         static_cast<int>(p.cost), " c_max ", p.truncation(), " n ", p.n_square, " min ", p.n_min, " selection ",
-         static_cast<int>(p.selection), " p ", p.step_once(), "/", p.step_twice(), " unique ", p.uniqueness, " lr ",
-         p.left_right_check, " median ", p.median, " subpixel ", p.subpixel);
-    CHECK(expected.disparity == out.disparity);
-    CHECK(expected.confidence == out.confidence);
-    CHECK(expected.fraction == out.fraction);
-  }
-}
 
 /// `room`: disparities that the matcher takes memory for, of which it then searches those of `p`.
 void expect_equal(const Picture& left, const Picture& right, const MatcherParameters& p, int room = 0) {
@@ -97,24 +30,6 @@ void expect_equal(const Picture& left, const Picture& right, const MatcherParame
   WindowMatcher matcher(left.width, left.height, left.channels, largest);
   matcher.limit_search(p.disparities);
   expect_equal(matcher, left, right, p, slow);
-}
-
-MatcherParameters random_parameters(std::mt19937& random, int largest_disparity) {
-  const auto pick = [&](int low, int high) { return std::uniform_int_distribution<int>(low, high)(random); };
-  MatcherParameters p;
-  p.disparities = pick(1, largest_disparity);
-  p.cost = static_cast<CostKind>(pick(0, 3));
-  p.n_square = 2 * pick(0, 5) + 1;
-  p.n_min = std::min(p.n_square, 2 * pick(0, 3) + 1);
-  constexpr int kLargest[] = {64, 225, 255, 48};
-  const int limit = kLargest[static_cast<int>(p.cost)];
-  if (pick(0, 2) > 0) p.c_max = pick(1, limit);
-  if (pick(0, 3) == 0) p.min_confidence = pick(1, 255);
-  if (pick(0, 2) == 0) p.uniqueness = pick(1, 255);
-  if (pick(0, 2) == 0) p.left_right_check = true;
-  if (pick(0, 2) == 0) p.subpixel = true;
-  if (pick(0, 2) == 0) p.median = true;
-  return p;
 }
 
 }  // namespace
@@ -244,7 +159,7 @@ TEST_CASE("the general matcher agrees with the fast ones where both serve") {
     const Picture left = random_picture(random, pick(1, 45), pick(1, 33), channels, round % 3 ? 256 : 3);
     const Picture right = shifted(random, left, pick(0, left.width - 1), pick(0, 100));
     MatcherParameters p = random_parameters(random, 60);
-    if (p.n_min > 1) {  // after the minimum filter the general matcher no longer knows the window that won
+    if (p.n_min > 1) {  // what lies beside a filtered winner is another thing there: the next test
       p.uniqueness = 0;
       p.subpixel = false;
     }
@@ -260,6 +175,72 @@ TEST_CASE("the general matcher agrees with the fast ones where both serve") {
     GeneralMatcher general(left.width, left.height, channels, p);
     expect_equal(general, left, right, p, expected);
   }
+}
+
+TEST_CASE(
+    "the general matcher equals the reference: every cost and share of it, filtered or not, what lies beside the "
+    "winner") {
+  std::mt19937 random(43);
+  for (const CostKind cost :
+       {CostKind::gradient, CostKind::ssd, CostKind::sad, CostKind::census, CostKind::rss, CostKind::mixed})
+    for (const int n_min : {1, 5})
+      for (const double weight : {0.0, 0.5, 1.0})
+        for (const int channels : {1, 3}) {
+          if (weight != 1 && cost != CostKind::mixed) continue;
+          if (cost == CostKind::rss && channels == 3) continue;  // roots of sums are no whole numbers: the next test
+          for (int round = 0; round < 8; ++round) {
+            const auto pick = [&](int low, int high) { return std::uniform_int_distribution<int>(low, high)(random); };
+            const Picture left = random_picture(random, pick(1, 40), pick(1, 25), channels, round % 3 ? 256 : 4);
+            const Picture right = shifted(random, left, pick(0, left.width - 1), pick(0, 100));
+            MatcherParameters p = random_parameters(random, 40);
+            p.cost = cost;
+            p.c_max = round % 4 == 0 ? 0 : pick(1, 48);
+            p.intensity_weight = weight;
+            p.n_min = n_min;
+            p.n_square = std::max(p.n_square, n_min);
+            INFO("weight ", weight);
+            Output expected(left);
+            reference::match(left.view(), right.view(), p, expected.views(left), reference::Beside::filtered);
+            GeneralMatcher general(left.width, left.height, channels, p);
+            expect_equal(general, left, right, p, expected);
+          }
+        }
+}
+
+TEST_CASE(
+    "cost rss of colours: winner, fraction and uniqueness of the reference's sums, but for the last bits of a float") {
+  std::mt19937 random(47);
+  for (const int n_min : {1, 5})
+    for (int round = 0; round < 12; ++round) {
+      const auto pick = [&](int low, int high) { return std::uniform_int_distribution<int>(low, high)(random); };
+      const Picture left = random_picture(random, pick(6, 40), pick(1, 25), 3, 256);
+      const Picture right = shifted(random, left, pick(0, left.width - 1), pick(0, 60));
+      MatcherParameters p;
+      p.cost = CostKind::rss;
+      p.c_max = pick(20, 255);
+      p.disparities = pick(2, 40);
+      p.n_square = 7;
+      p.n_min = n_min;
+      p.subpixel = true;
+      p.uniqueness = 40;
+      Output found(left);
+      REQUIRE(GeneralMatcher(left.width, left.height, 3, p).match(left.view(), right.view(), found.views(left)));
+      const auto sums =
+          reference::filtered(reference::window_sums(left.view(), right.view(), p, false), left.width, left.height, p);
+      size_t kept = 0, rejected = 0;
+      for (size_t i = 0; i < found.disparity.size(); ++i) {
+        const double* at = &sums[i * static_cast<size_t>(p.disparities)];
+        const reference::Choice best = reference::winner(at, p, 65535);
+        ++(best.ambiguous ? rejected : kept);
+        CHECK(std::abs(found.confidence[i] - reference::confidence(best.sum, p.max_sum(), p)) <= 1);
+        CHECK((found.disparity[i] < 0) == best.ambiguous);
+        if (found.disparity[i] < 0) continue;
+        CHECK(at[found.disparity[i]] <= best.sum + 1e-3);
+        if (found.disparity[i] == best.disparity) CHECK(std::abs(found.fraction[i] - best.fraction) <= 1);
+      }
+      CHECK(kept + rejected == found.disparity.size());
+      CHECK(kept > 0);
+    }
 }
 
 TEST_CASE("bands of rows on threads give the result of one matcher") {

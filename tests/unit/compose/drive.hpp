@@ -34,9 +34,10 @@ struct DriveGraph {
   std::string_view world = "lab";
 };
 
-/// The nodes of a graph once it has run for `ns`, on one core under `cooperative`.
+/// The nodes of a graph once it has run for `ns`, on one core under `cooperative`; what its jobs said goes to `faults`.
 inline std::vector<std::unique_ptr<Node>> drive(const DriveGraph& own, const NodeTypes& types, int64_t ns,
-                                                VirtualClock& clock, hal::Devices& devices) {
+                                                VirtualClock& clock, hal::Devices& devices,
+                                                std::vector<Fault>& faults) {
   using namespace std::string_literals;
   std::string text = "takt: 1\nname: drive\nschedule: schedule.yaml\ndefault_profile: sim\ndevices:"s;
   text.append(own.devices).append("profiles:\n  sim: {default: {driver: sim, world: @/worlds/").append(own.world);
@@ -59,6 +60,7 @@ inline std::vector<std::unique_ptr<Node>> drive(const DriveGraph& own, const Nod
   const auto transport = make_local_transport(composition->plan.ports);
   Executor executor(composition->plan, *transport, clock, {ns, 0, false});
   executor.run();
+  for (size_t i = 0; i < executor.board().faults().size(); ++i) faults.push_back(*executor.board().faults().at(i));
   for (auto& node : composition->nodes) node->finish();
   return std::move(composition->nodes);
 }
@@ -71,19 +73,21 @@ class Drive {
   Drive(const DriveGraph& graph, int64_t ns) {
     NodeTypes types = graph::node_types();
     types.add<Probe>("probe", Layer::storage, "test");
-    nodes_ = drive(graph, types, ns, clock_, devices_);
+    nodes_ = drive(graph, types, ns, clock_, devices_, faults_);
     for (const auto& node : nodes_)
       if (const auto* probe = dynamic_cast<const Probe*>(node.get())) probe_ = probe;
     REQUIRE(probe_ != nullptr);
   }
   const sim::Simulation& world() { return *devices_.first_world(); }
   const Probe& probe() const { return *probe_; }
+  const std::vector<Fault>& faults() const { return faults_; }
 
  private:
   VirtualClock clock_{1'000'000'000};
   hal::Devices devices_;
   std::vector<std::unique_ptr<Node>> nodes_;
   const Probe* probe_ = nullptr;
+  std::vector<Fault> faults_;
 };
 
 }  // namespace takt::test

@@ -137,6 +137,23 @@ TEST_CASE("level 1 on recorded pairs with ground truth") {
   }
 }
 
+TEST_CASE("half of the range finds what lies in it as well as all of the range does, and nothing beyond") {
+  const Scene s = made_scene(320, 240);
+  MatcherParameters p;
+  p.disparities = 80;  // the nearer box has 43
+  HalfMatcher all(s.width, s.height, 1, p), narrow(s.width, s.height, 1, p);
+  narrow.limit_search(40);
+  const ImageView<const uint8_t> left(s.left.data(), s.width, s.height), right(s.right.data(), s.width, s.height);
+  DisparityImage far = s.truth, near = s.truth;
+  for (size_t i = 0; i < s.truth.pixels.size(); ++i) (s.truth.pixels[i] < 40 ? near : far).pixels[i] = 0;
+  const double all_pct = run(all, left, right, far).score.bad_1px_pct,
+               narrow_pct = run(narrow, left, right, far).score.bad_1px_pct;
+  MESSAGE("bad pixels within half of the range: ", all_pct, " % searching all of it, ", narrow_pct, " % half");
+  CHECK(narrow_pct <= all_pct + 0.5);
+  CHECK(run(all, left, right, near).score.bad_1px_pct < 40);  // measured 32, at the box's edges
+  CHECK(run(narrow, left, right, near).score.bad_1px_pct > 90);
+}
+
 TEST_CASE("odd sizes keep their size; views that do not fit are refused and untouched") {
   const int w = 37, h = 21;
   std::vector<uint8_t> image(static_cast<size_t>(w * h), 7);

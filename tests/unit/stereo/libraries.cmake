@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-set(ROOM_TEST_LIBRARIES takt_stereo_evaluate takt_opencv)
+set(ROOM_TEST_LIBRARIES takt_stereo_evaluate takt_allocation_counter takt_opencv)

@@ -52,7 +52,8 @@ TEST_CASE("oracle 2: running window sums equal the direct double loop") {
   p.n_square = 15;
   const auto sums = reference::window_sums({left.data(), w, h}, {right.data(), w, h}, p, false);
   const auto r = match(left, right, w, h, 1, p);
-  for (size_t i = 0; i < sums.size(); ++i) CHECK(r.confidence[i] == confidence_of(sums[i], p.max_sum()));
+  for (size_t i = 0; i < sums.size(); ++i)
+    CHECK(r.confidence[i] == confidence_of(static_cast<int>(sums[i]), p.max_sum()));
 }
 
 TEST_CASE("oracle 3: the minimum filter never raises a cost") {

@@ -82,7 +82,7 @@ double median_of_truth(const Misalignment& wrong) {
 
 /// What the monitor finds after some pairs.
 std::optional<double> measure(const Pair& pair, int pairs = 6, int channels = 1) {
-  RectificationMonitor monitor(kWidth, kHeight);
+  RectificationMonitor monitor(kWidth, kHeight, 48);
   for (int i = 0; i < pairs; ++i)
     monitor.observe({pair.left.data(), kWidth, kHeight, channels}, {pair.right.data(), kWidth, kHeight, channels},
                     {pair.disparity.data(), kWidth, kHeight});
@@ -140,7 +140,7 @@ TEST_CASE("nothing is said without structure, without disparities, or where left
 
 TEST_CASE("places move through the image, and a new state replaces the old one") {
   const Pair good = make_pair({0, 0}, 2, 7), bad = make_pair({1.5, 0}, 2, 7);
-  RectificationMonitor monitor(kWidth, kHeight);
+  RectificationMonitor monitor(kWidth, kHeight, 48);
   const auto observe = [&](const Pair& pair) {
     monitor.observe({pair.left.data(), kWidth, kHeight}, {pair.right.data(), kWidth, kHeight},
                     {pair.disparity.data(), kWidth, kHeight});
@@ -158,10 +158,45 @@ TEST_CASE("places move through the image, and a new state replaces the old one")
 TEST_CASE("images too small for a single place are looked at in peace") {
   std::vector<uint8_t> pixels(12 * 8);
   std::vector<int16_t> disparity(12 * 8);
-  RectificationMonitor monitor(12, 8);
+  RectificationMonitor monitor(12, 8, 4);
   for (int i = 0; i < 20; ++i)
     monitor.observe({pixels.data(), 12, 8}, {pixels.data(), 12, 8}, {disparity.data(), 12, 8});
   CHECK(monitor.points() == 0);
+}
+
+TEST_CASE("errors too large for matching are found as well: from the images alone, to a tenth of a pixel") {
+  for (const double noise : {0.0, 3.0})
+    for (const double down : {2.0, 4.0, 8.0, -8.0, 12.5}) {
+      INFO("shift ", down, " px, noise ", noise);
+      Pair pair = make_pair({down, 0}, noise, 8);
+      const auto from_disparities = measure(pair, 40);
+      REQUIRE(from_disparities);
+      CHECK(std::abs(*from_disparities - std::abs(down)) < 0.1);
+      std::mt19937 random(9);
+      for (int16_t& d : pair.disparity) d = static_cast<int16_t>(random() % 48);  // as on rows that do not match
+      const auto from_wrong_ones = measure(pair, 40);
+      REQUIRE(from_wrong_ones);
+      CHECK(std::abs(*from_wrong_ones - std::abs(down)) < 0.1);
+      std::fill(pair.disparity.begin(), pair.disparity.end(), int16_t{-1});
+      const auto from_none = measure(pair, 40);
+      REQUIRE(from_none);
+      CHECK(std::abs(*from_none - std::abs(down)) < 0.1);
+    }
+}
+
+TEST_CASE("a camera that is knocked by many rows while the pair was good before: told within four seconds at 15 Hz") {
+  const Pair good = make_pair({0, 0}, 2, 10);
+  Pair bad = make_pair({8, 0}, 2, 10);
+  std::fill(bad.disparity.begin(), bad.disparity.end(), int16_t{-1});
+  RectificationMonitor monitor(kWidth, kHeight, 48);
+  const auto observe = [&](const Pair& pair, int times) {
+    for (int i = 0; i < times; ++i)
+      monitor.observe({pair.left.data(), kWidth, kHeight}, {pair.right.data(), kWidth, kHeight},
+                      {pair.disparity.data(), kWidth, kHeight});
+    return *monitor.row_error_px();
+  };
+  CHECK(observe(good, 60) < 0.1);
+  CHECK(observe(bad, 60) > RowErrorAlarm::kWrong);
 }
 
 TEST_CASE("each state is told once in an episode, which ends well below where it began") {

@@ -195,16 +195,51 @@ TEST_CASE("`search` narrows the range between two jobs, at both levels, and give
   CHECK(largest(0).second >= Bench::kShift);
 }
 
+TEST_CASE("level 2 searches half of the range, and level 0 all of it again") {
+  Bench bench({{"disparities", int64_t{33}}});
+  bench.setup();
+  const auto found = [&](int level) {
+    REQUIRE(bench.run(level));
+    const auto& map = bench.output<DisparityMap>(1);
+    int right = 0, all = 0;
+    for (int y = 0; y < Bench::kHeight; ++y)
+      for (int x = 40; x < 80; ++x, ++all) {
+        REQUIRE(map.view().at(x, y) < map.disparities);
+        right += map.view().at(x, y) == Bench::kShift;
+      }
+    return std::pair(map.disparities, right > all * 9 / 10);
+  };
+  CHECK(found(0) == std::pair(33, true));
+  CHECK(found(2) == std::pair(17, true));
+  CHECK(found(1) == std::pair(33, true));
+  CHECK(bench.set("search", int64_t{16}));
+  CHECK(found(2) == std::pair(8, false));  // the scene lies nearer
+  CHECK(found(0) == std::pair(16, true));
+}
+
 TEST_CASE("nothing new, another size, or a raw pair without calibration: no result, nothing sent") {
   Bench bench({{"disparities", int64_t{16}}});
   bench.setup();
   CHECK_FALSE(bench.run(0, false));
+  CHECK_FALSE(bench.notice());
   bench.pair().camera = {};
   CHECK_FALSE(bench.run());
+  REQUIRE(bench.notice());
+  CHECK(bench.notice()->wrong);
+  CHECK(std::string(bench.notice()->why.c_str()).find("`calibration` is not set") != std::string::npos);
+  CHECK_FALSE(bench.run());
+  CHECK_FALSE(bench.notice());  // once is enough
   bench.pair().camera.focal_px = 100;
   bench.pair().width = 95;
   CHECK_FALSE(bench.run());
   for (size_t i = 0; i < 3; ++i) CHECK_FALSE(bench.sent(i));
+  Bench fresh;
+  fresh.setup();
+  fresh.pair().width = 95;
+  CHECK_FALSE(fresh.run());
+  REQUIRE(fresh.notice());
+  CHECK(std::string(fresh.notice()->why.c_str()) ==
+        "a pair of 95 x 40 px and 3 channels is not matched; those of 96 x 40, 3 are");
 }
 
 TEST_CASE("a raw mosaic becomes a rectified colour pair, and is matched as one") {
