@@ -6,7 +6,7 @@
 # measured first. The same run twice, with `continue` and with `degrade`; the rest of the graph is the thesis's. Exit 1 unless
 # a job took twice its budget, more than 30 % were late or skipped meanwhile without `degrade`, less than 1 % with it, and
 # level 0 was back within 5 s of the cause's end; 3 where SCHED_DEADLINE, which makes an overrun late, is refused.
-# `degrade.sh inputs` only makes the schedules and has them read.
+# `degrade.sh inputs` only makes the schedule and has it read.
 set -eu
 root=$(readlink -f "$(dirname "$0")/../..")
 export PYTHONPATH="$root/bench/scenarios" PYTHONDONTWRITEBYTECODE=1 TAKT_HOME="$root"
@@ -118,10 +118,7 @@ def judge(verb, budget, instants, tops):
 
 
 if cause == "inputs":
-    for verb in ("continue", "degrade"):
-        if subprocess.run([takt, "check", f"{root}/graph/ace.yaml", *schedule(verb, budget="10ms")], **QUIET).returncode > 1:
-            sys.exit(f"takt check does not read the schedule for {verb}")
-    sys.exit()
+    sys.exit(subprocess.run([takt, "check", f"{root}/graph/ace.yaml", *schedule("degrade", budget="10ms")], **QUIET).returncode > 1)
 cause = float(cause)
 chosen = choose()
 granted, without, _, over = judge("continue", chosen[0], *slowed_run("continue", *chosen))
