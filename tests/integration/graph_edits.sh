@@ -130,6 +130,25 @@ edit '
 ' ''
 maps laser_cloud
 
+# The cloud of full images, twice a second, in place of the small ones', beside all else: every fourth pixel, as much floor
+# as 150 disparities show, and ages that leave the reservations room. graph/fine.yaml has more of it, and less beside.
+edit '
+  s/^(  )(head_camera: \{kind: .*)/\1\2\n\1fine_camera: {kind: stereo_camera, rig: rigs\/xb3_fine.yaml, rate: 2}/
+  s/^(    )(stereo: \{type: stereo, .*)/\1\2\n\1stereo_fine: {type: stereo, in: {pair: fine_camera.pair}, params: {cloud_step: 4}}/
+  /^    mapping_3d:$/,/^    traversability:$/s/cloud: \{from: stereo\.cloud/cloud: {from: stereo_fine.cloud/
+  s/(obstacle: \{from: )head_camera\.pair(.*max_age: )700ms/\1fine_camera.pair\21300ms/
+  s/(stereo\.disparity, max_age: )250ms/\1400ms/
+  s/(traversability\.fused, max_age: )1s/\11500ms/
+  s/without: \[stereo, /&stereo_fine, /
+  s/(without: \[head_camera, ground_camera, )stereo, /\1fine_camera, stereo, stereo_fine, /
+  s/lost: \[head_camera/lost: [fine_camera, head_camera/
+' '
+  s/^(  )(head_camera: .*)/\1\2\n\1fine_camera: {rate: 2, budget: 16ms, deadline: 300ms}/
+  s/^(  )(stereo: .*)/\1\2\n\1stereo_fine: {rate: 2, offset: 305ms, budget: 60ms, deadline: 490ms, on_overrun: degrade}/
+  s/^(  mapping_3d: .*offset: )70ms/\1300ms/
+'
+maps stereo_fine
+
 # A pose from outside, here that of scan matching, in place of what ego-motion has a part in.
 edit '
   /^    mapping_3d:$/,/^    traversability:$/s/pose: \{from: robot_pose\.pose/pose: {from: scan_matching.pose/
@@ -143,4 +162,14 @@ edit '
   /^    ground_map:$/,/^    mapping_3d:$/s/from: robot_pose\.odometry/from: base.odometry/
 ' ''
 maps thesis
+
+# Full images for the map alone, and the switch back to small ones.
+for profile in sim coarse; do
+  echo "=== fine, profile $profile"
+  expect 0 "" "$takt" check "$source/graph/fine.yaml" --profile $profile
+  expect 0 "" "$takt" run "$source/graph/fine.yaml" --profile $profile --clock virtual --isolate none --for 5s --output "$work/fine_$profile"
+  command -v python3 >/dev/null && shows "$work/fine_$profile/obstacles.png"
+done
+points() { sed -n 's/^element vertex //p;/^end_header/q' "$work/fine_$1/map/map.ply" | head -n 1; }
+[ "$(points sim)" -gt "$(points coarse)" ] || fail "full images gave $(points sim) points of a map, small ones $(points coarse)"
 finish
