@@ -27,8 +27,9 @@ struct Admission {
 };
 
 /// Two questions, each answered by the analysis of the policy: does every job meet its deadline if all keep their
-/// budgets; and do those of high criticality if every one of low criticality runs on until it is stopped, which happens
-/// `enforcement_ns` after its budget? The second is not asked under `cooperative`, where nothing is enforced.
+/// budgets; and do those of high criticality that keep theirs if every one of low criticality, and under `deadline` one
+/// of high, runs on until it is stopped, late by the error of the enforcement? The second is not asked under
+/// `cooperative`, where nothing is enforced.
 /// `bounds` false leaves out what only the ages need.
 Admission admit(const Plan& plan, const analysis::Overheads& overheads, bool bounds = true);
 

@@ -5,6 +5,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 
 #include "graph/check/check_text.hpp"
@@ -12,6 +13,7 @@
 #include "graph/check/measured.hpp"
 #include "rt/sched/lane.hpp"
 #include "rt/sched/lane_tasks.hpp"
+#include "rt/sched/mode_log.hpp"
 
 namespace takt::graph {
 namespace {
@@ -27,18 +29,17 @@ void add_pools(const Plan& plan, CheckResult& result) {
 }
 
 /// Under `fixed` as placed; else the largest first, each where most is free.
-void spread_over_cores(const Plan& plan, CheckResult& result) {
+void spread_over_cores(const Plan& plan, const analysis::Overheads& overheads, CheckResult& result) {
   for (const int core : plan.cores) result.core_use.push_back({core, 0});
   if (result.core_use.empty()) result.core_use.push_back({0, 0});
   const auto share = [&](size_t t) {
     return static_cast<double>(plan.tasks[t].budget_ns) * 1e-9 * effective_rate_hz(plan, t);
   };
   if (plan.policy == Policy::fixed) {
-    const auto lanes = lane_members(plan);
-    const Placement placement = place_fixed(plan);
-    for (size_t l = 0; l < lanes.size(); ++l)
-      for (const size_t t : lanes[l])
-        result.core_use[static_cast<size_t>(std::max(placement.core[l], 0))].utilisation += share(t);
+    const LaneTasks placed = lane_tasks(plan, plan.policy, overheads);
+    for (size_t l = 0; l < placed.lanes.size(); ++l)
+      for (const size_t t : placed.lanes[l])
+        result.core_use[static_cast<size_t>(placed.set.tasks[l].core)].utilisation += share(t);
     return;
   }
   std::vector<double> shares;
@@ -66,9 +67,11 @@ std::string wrong_cores(const GraphSpec& graph, const Plan& plan, const CheckMac
       fmt::join(asked, ", "), fmt::join(all, ", "), fmt::join(all, ", "));
 }
 
+std::string name_of(const AgeBound& age) { return (age.edge ? "edge " : "chain ") + age.name; }
+
 void judge_ages(ModeCheck& mode, CheckResult& result) {
   for (const AgeBound& age : mode.ages) {
-    const std::string name = age.edge ? "edge " + age.name : "chain " + age.name;
+    const std::string name = name_of(age);
     if (!age.possible()) {
       result.verdict = Verdict::invalid;
       mode.problems.push_back(
@@ -83,6 +86,37 @@ void judge_ages(ModeCheck& mode, CheckResult& result) {
   }
 }
 
+/// What the check asks of one mode, without saying why not.
+bool holds(const GraphSpec& graph, const Plan& plan, const analysis::Overheads& overheads) {
+  const Admission admission = admit(plan, overheads);
+  if (admission.answer != Answer::admitted) return false;
+  const std::vector<AgeBound> ages = age_bounds(graph, plan, admission.nodes);
+  return std::all_of(ages.begin(), ages.end(), [](const AgeBound& age) { return age.possible() && age.proven(); });
+}
+
+/// One change that makes the ages of an admitted plan fit: a later max_age where only one is too early, or what the
+/// schedule could say.
+std::optional<Change> change_for_ages(const GraphSpec& graph, const Plan& plan, const ModeCheck& mode,
+                                      const analysis::Overheads& overheads) {
+  std::vector<const AgeBound*> late;
+  for (const AgeBound& age : mode.ages)
+    if (!age.proven()) late.push_back(&age);
+  if (late.empty()) return std::nullopt;
+  std::optional<Change> later;
+  constexpr int64_t kMicrosecond = 1'000;
+  if (const AgeBound& age = *late.front(); late.size() == 1 && age.bound_ns) {
+    const int64_t enough = (*age.bound_ns + kMicrosecond - 1) / kMicrosecond * kMicrosecond;
+    later = Change{Change::What::max_age,
+                   kNone,
+                   ms(age.max_age_ns),
+                   ms(enough),
+                   static_cast<double>(enough - age.max_age_ns) / static_cast<double>(age.max_age_ns),
+                   name_of(age)};
+  }
+  return smallest_age_change(
+      plan, [&](const Plan& changed) { return holds(graph, changed, overheads); }, later);
+}
+
 ModeCheck check_mode(const GraphSpec& graph, const Plan& plan, const std::string& name, const CheckOptions& options,
                      CheckResult& result) {
   ModeCheck mode;
@@ -91,11 +125,12 @@ ModeCheck check_mode(const GraphSpec& graph, const Plan& plan, const std::string
   for (const TaskPlan& task : plan.tasks) mode.tasks.push_back(task.name);
   mode.problems = mode.admission.reasons;
   mode.ages = age_bounds(graph, plan, mode.admission.nodes);
-  if (mode.admission.answer != Answer::admitted) {
-    if (const auto change = smallest_change(plan, options.machine.overheads))
-      mode.change = fmt::format("the smallest single change that makes it fit: {} ({:.1f} %)", to_string(*change, plan),
-                                100 * change->relative);
-  }
+  const auto change = mode.admission.answer != Answer::admitted
+                          ? smallest_change(plan, options.machine.overheads)
+                          : change_for_ages(graph, plan, mode, options.machine.overheads);
+  if (change)
+    mode.change = fmt::format("the smallest single change that makes it fit: {} ({:.1f} %)", to_string(*change, plan),
+                              100 * change->relative);
   judge_ages(mode, result);
   return mode;
 }
@@ -105,12 +140,35 @@ Answer answer_of(const ModeCheck& mode) {
   return mode.problems.empty() ? Answer::admitted : Answer::not_proven;
 }
 
+/// As ModeLog promises: the last job that was released before the change ends by its deadline, and the first one
+/// behind it comes within a period.
+int64_t change_within_ns(const Plan& plan, const std::vector<char>& runs) {
+  int64_t longest_ns = 0;
+  for (size_t t = 0; t < plan.tasks.size(); ++t) {
+    const TaskPlan& task = plan.tasks[t];
+    longest_ns = std::max(longest_ns, task.deadline_ns);
+    const double rate = effective_rate_hz(plan, t);
+    if (!runs[t] || rate <= 0) continue;
+    const auto period = static_cast<int64_t>(std::ceil(1e9 / rate));
+    longest_ns = std::max(longest_ns, period + (task.min_interval_ns + period - 1) / period * period);
+  }
+  return ModeLog::kLead_ns + longest_ns;
+}
+
+/// The plan in its mode of that index.
+Plan in_mode(const Plan& plan, size_t mode) {
+  std::vector<std::string> paused;
+  for (size_t t = 0; mode > 0 && t < plan.tasks.size(); ++t)
+    if (!plan.modes[mode].runs[t]) paused.push_back(plan.tasks[t].name);
+  return without(plan, paused);
+}
+
 void check_modes(const GraphSpec& graph, const Plan& plan, const CheckOptions& options, CheckResult& result) {
-  result.modes.push_back(check_mode(graph, plan, plan.mode, options, result));
-  if (plan.mode == "full") {
-    for (const ModeSpec& mode : graph.modes)
-      if (mode.defined)
-        result.modes.push_back(check_mode(graph, without(plan, mode.pauses()), mode.name, options, result));
+  for (size_t m = 0; m < std::max<size_t>(plan.modes.size(), 1); ++m) {
+    const std::string& name = m == 0 ? plan.mode : plan.modes[m].name;
+    result.modes.push_back(check_mode(graph, in_mode(plan, m), name, options, result));
+    result.modes.back().change_within_ns =
+        change_within_ns(plan, m == 0 ? std::vector<char>(plan.tasks.size(), 1) : plan.modes[m].runs);
   }
   result.answer = Answer::admitted;
   for (const ModeCheck& mode : result.modes) {
@@ -125,31 +183,17 @@ void check_modes(const GraphSpec& graph, const Plan& plan, const CheckOptions& o
   }
 }
 
-/// What the check asks of one mode, without saying why not.
-bool holds(const GraphSpec& graph, const Plan& plan, const analysis::Overheads& overheads) {
-  const Admission admission = admit(plan, overheads);
-  if (admission.answer != Answer::admitted) return false;
-  const std::vector<AgeBound> ages = age_bounds(graph, plan, admission.nodes);
-  return std::all_of(ages.begin(), ages.end(), [](const AgeBound& age) { return age.possible() && age.proven(); });
-}
-
 /// Margins of each mode; a budget of the whole plan counts in the others as well.
 void add_margins(const GraphSpec& graph, const Plan& plan, const analysis::Overheads& overheads, CheckResult& result) {
-  const auto plan_of = [&](const Plan& whole, const ModeCheck& mode) {
-    const auto spec =
-        std::find_if(graph.modes.begin(), graph.modes.end(), [&](const ModeSpec& m) { return m.name == mode.mode; });
-    return &mode == &result.modes.front() || spec == graph.modes.end() ? whole : without(whole, spec->pauses());
-  };
   const auto all_hold = [&](const Plan& changed) {
-    return std::all_of(result.modes.begin(), result.modes.end(),
-                       [&](const ModeCheck& mode) { return holds(graph, plan_of(changed, mode), overheads); });
+    for (size_t m = 0; m < result.modes.size(); ++m)
+      if (!holds(graph, in_mode(changed, m), overheads)) return false;
+    return true;
   };
-  for (ModeCheck& mode : result.modes) {
-    const bool whole = &mode == &result.modes.front();
-    mode.margins_ns = margins(
-        plan_of(plan, mode), overheads,
-        whole ? Accepts(all_hold) : [&](const Plan& changed) { return holds(graph, changed, overheads); });
-  }
+  for (size_t m = 0; m < result.modes.size(); ++m)
+    result.modes[m].margins_ns = margins(
+        in_mode(plan, m), overheads,
+        m == 0 ? Accepts(all_hold) : [&](const Plan& changed) { return holds(graph, changed, overheads); });
 }
 
 }  // namespace
@@ -205,12 +249,13 @@ CheckResult check(const GraphSpec& graph, const Plan& plan, const CheckOptions& 
     if (!elsewhere.empty()) result.warnings.push_back(elsewhere);
   }
   add_pools(plan, result);
-  spread_over_cores(plan, result);
+  spread_over_cores(plan, options.machine.overheads, result);
   if (const std::string wrong = options.real_time ? wrong_cores(graph, plan, options.machine) : ""; !wrong.empty()) {
     result.verdict = Verdict::invalid;
     result.problems.push_back(to_string(Problem{graph.schedule.cores_position, wrong}));
   }
   check_modes(graph, plan, options, result);
+  result.bandwidth_within_ns = bandwidth_within_ns(reservations(plan, plan.policy));
   result.notes = result.modes.front().admission.notes;
   result.admitted = result.answer == Answer::admitted && result.verdict != Verdict::invalid;
   if (result.admitted && options.margins) add_margins(graph, plan, options.machine.overheads, result);

@@ -40,6 +40,8 @@ struct ModeCheck {
   std::vector<std::string> tasks;   ///< names, in the order of the admission's nodes
   std::vector<int64_t> margins_ns;  ///< by task if admitted and asked for
   std::string change;               ///< the smallest single one that would make it fit; "" if none or admitted
+  int64_t change_within_ns =
+      0;  ///< from asking for it: then no job of another mode runs, and each of its own has begun
   std::vector<AgeBound> ages;
   std::vector<std::string> problems;  ///< why it is refused, ages included
 };
@@ -58,8 +60,10 @@ struct CheckResult {
   std::vector<std::string> problems;    ///< why it is not admitted: the task, the value, what would make it fit
   std::vector<PoolUse> pools;
   std::vector<CoreUse> core_use;
-  std::vector<ModeCheck> modes;  ///< that of the plan first; the graph's others if the plan is that of all nodes
-  std::string text;              ///< for people, the reason first if not admitted
+  std::vector<ModeCheck> modes;  ///< that of the start first, then all others that the run can change to
+  int64_t bandwidth_within_ns =
+      0;             ///< after a process died: what its threads had of SCHED_DEADLINE is there again; 0: none
+  std::string text;  ///< for people, the reason first if not admitted
   nlohmann::ordered_json json;
 };
 

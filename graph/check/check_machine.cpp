@@ -57,7 +57,13 @@ analysis::Overheads assumed_overheads(const machine::Facts& facts) {
   o.publish_ns = o.take_ns = 2'000;
   timespec tick{};
   o.tick_ns = clock_getres(CLOCK_MONOTONIC_COARSE, &tick) == 0 ? tick.tv_nsec : 4'000'000;
-  o.enforcement_ns = o.tick_ns;
+  o.enforcement_ns = o.demotion_ns = o.tick_ns;
+  for (const int cpu : machine::online_cpus(facts)) {
+    const machine::OrdinaryShare share = machine::ordinary_share(facts, cpu);
+    if (share.runtime_ns <= o.ordinary_runtime_ns) continue;
+    o.ordinary_runtime_ns = share.runtime_ns;
+    o.ordinary_period_ns = share.period_ns;
+  }
   const auto setting = [&](const char* name) {
     return static_cast<double>(
         machine::parse_number(facts.text(std::string("/proc/sys/kernel/") + name).value_or("")).value_or(0));

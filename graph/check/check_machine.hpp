@@ -23,8 +23,9 @@ struct CheckMachine {
 };
 
 /// Figures for a machine that nobody measured: generous ones for a virtual machine of two cores, a budget enforced on
-/// the kernel's tick, and the bandwidth that the kernel's settings allow SCHED_DEADLINE on all CPUs
-/// (sched_rt_runtime_us / sched_rt_period_us, from Linux 6.12 on less 5 % for the fair server).
+/// the kernel's tick, the bandwidth that the kernel's settings allow SCHED_DEADLINE on all CPUs
+/// (sched_rt_runtime_us / sched_rt_period_us, from Linux 6.12 on less 5 % for the fair server), and the largest share
+/// that ordinary threads have of any CPU.
 analysis::Overheads assumed_overheads(const machine::Facts& facts);
 
 /// The machine, with the overheads that `takt doctor --measure` left in `file` (machine_figures.hpp). What was not

@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+
 #include "graph/check/machine_figures.hpp"
 
 namespace takt::graph {
@@ -40,9 +42,14 @@ std::string head_text(const GraphSpec& graph, const Plan& plan, const CheckOptio
     const analysis::Overheads& o = options.machine.overheads;
     text += fmt::format("{}\n  a job {:.0f} us + {:.1f} us per input or output, enforcement {:.2f} ms",
                         options.machine.overheads_from, static_cast<double>(o.release_ns + 2 * o.switch_ns) / 1e3,
-                        static_cast<double>(std::max(o.take_ns, o.publish_ns)) / 1e3, ms(o.enforcement_ns));
+                        static_cast<double>(std::max(o.take_ns, o.publish_ns)) / 1e3,
+                        ms(plan.policy == Policy::fixed ? o.demotion_ns : o.throttled_late_ns()));
     if (plan.policy == Policy::deadline)
-      text += fmt::format("\n  SCHED_DEADLINE has {:.2f} cores", o.deadline_bandwidth);
+      text += fmt::format("\n  SCHED_DEADLINE has {:.2f} cores; of a process that died within {:.0f} ms again",
+                          o.deadline_bandwidth, ms(result.bandwidth_within_ns));
+    if (plan.policy == Policy::fixed && o.ordinary_runtime_ns > 0)
+      text += fmt::format("\n  ordinary threads get {:g} ms of each {:g} ms of a core", ms(o.ordinary_runtime_ns),
+                          ms(o.ordinary_period_ns));
     text += "\n";
   }
   return text;
@@ -72,10 +79,11 @@ std::string ages_table(const ModeCheck& mode) {
 
 std::string modes_text(const CheckResult& result) {
   std::string text;
-  for (size_t m = 1; m < result.modes.size(); ++m) {
+  for (size_t m = result.modes.size() > 1 ? 0 : 1; m < result.modes.size(); ++m) {
     const ModeCheck& mode = result.modes[m];
-    text += fmt::format("mode {}: {} ({} nodes; {})\n", mode.mode, mode.problems.empty() ? "admitted" : "refused",
-                        mode.tasks.size(), mode.admission.by);
+    text += fmt::format("mode {}: {} ({} nodes; {})\n  a change to it takes {:.0f} ms at most\n", mode.mode,
+                        mode.problems.empty() ? "admitted" : "refused", mode.tasks.size(), mode.admission.by,
+                        std::ceil(ms(mode.change_within_ns)));
   }
   return text;
 }
@@ -109,6 +117,7 @@ Json mode_json(const ModeCheck& mode) {
   Json row{{"name", mode.mode},
            {"answer", to_string(mode.admission.answer)},
            {"analysis", mode.admission.by},
+           {"change_within_ms", ms(mode.change_within_ns)},
            {"problems", mode.problems},
            {"notes", mode.admission.notes},
            {"nodes", Json::array()}};
@@ -145,6 +154,7 @@ Json check_json(const Plan& plan, const CheckOptions& options, const CheckResult
   json["cores"] = result.cores;
   json["overheads"] = {{"measured", options.machine.measured}};
   json["overheads"].update(overheads_json(options.machine.overheads));
+  if (result.bandwidth_within_ns > 0) json["bandwidth_within_ms"] = ms(result.bandwidth_within_ns);
   json["warnings"] = result.warnings;
   json["nodes"] = Json::array();
   for (size_t t = 0; t < plan.tasks.size(); ++t) {

@@ -25,6 +25,7 @@ constexpr std::array kTimes{
     TimeFigure{"take_us", &MachineFigures::take, &Overheads::take_ns},
     TimeFigure{"per_mb_us", &MachineFigures::per_mb, &Overheads::per_mb_ns},
     TimeFigure{"enforcement_us", &MachineFigures::enforcement, &Overheads::enforcement_ns},
+    TimeFigure{"demotion_us", &MachineFigures::demotion, &Overheads::demotion_ns},
     TimeFigure{"tick_us", &MachineFigures::tick, &Overheads::tick_ns},
 };
 constexpr const char *kMachine = "machine", *kCpu = "cpu", *kCores = "cores", *kKernel = "kernel",
@@ -80,6 +81,8 @@ Json overheads_json(const Overheads& overheads) {
   Json json;
   for (const TimeFigure& time : kTimes) json[time.key] = static_cast<double>(overheads.*time.ns) / 1e3;
   json[kBandwidth] = overheads.deadline_bandwidth;
+  json["ordinary_ms"] = static_cast<double>(overheads.ordinary_runtime_ns) / 1e6;
+  json["ordinary_period_ms"] = static_cast<double>(overheads.ordinary_period_ns) / 1e6;
   return json;
 }
 

@@ -14,7 +14,7 @@ namespace takt::graph {
 /// What a check charges. Nothing: not measured.
 struct MachineFigures {
   /// us, each in [0, 1e9).
-  std::optional<double> release, context_switch, publish, take, per_mb, enforcement, tick;
+  std::optional<double> release, context_switch, publish, take, per_mb, enforcement, demotion, tick;
   std::optional<double> deadline_bandwidth;  ///< cores, in [0, 1e6)
 };
 
@@ -25,7 +25,8 @@ struct MeasuredMachine {
 };
 
 /// {"machine": {"cpu", "cores", "kernel"}, "measured_at", "release_us", "switch_us", "publish_us", "take_us",
-/// "per_mb_us", "enforcement_us", "tick_us", "deadline_bandwidth"}; a figure that was not measured is left out.
+/// "per_mb_us", "enforcement_us", "demotion_us", "tick_us", "deadline_bandwidth"}; a figure that was not measured is
+/// left out.
 nlohmann::ordered_json measured_machine_json(const MeasuredMachine& measured);
 /// The reverse; other keys are passed over, a figure that is missing or null was not measured. Throws std::exception
 /// with what is wrong: no machine, a value of another type, a figure out of its range.
@@ -36,7 +37,7 @@ nlohmann::ordered_json identity_json(const machine::Identity& machine);
 
 /// `otherwise`, with the figures that were measured in its place.
 analysis::Overheads overheads_of(const MachineFigures& figures, analysis::Overheads otherwise);
-/// The overheads that are charged, under the keys of the file.
+/// The overheads that are charged, under the keys of the file; and {"ordinary_ms", "ordinary_period_ms"}.
 nlohmann::ordered_json overheads_json(const analysis::Overheads& overheads);
 
 }  // namespace takt::graph

@@ -5,7 +5,6 @@
 #include <cstdio>
 
 #include "graph/check/check.hpp"
-#include "graph/command/machine_file.hpp"
 #include "graph/command/prepare.hpp"
 #include "graph/command/run_support.hpp"
 #include "hal/drivers.hpp"
@@ -20,8 +19,7 @@ int check_graph(const RunOptions& options, bool json) {
   }
   choose_cores(prepared.composition->plan.cores, prepared.graph->adjusted);
   const graph::CheckResult result =
-      graph::check(*prepared.graph, prepared.composition->plan,
-                   {graph::check_machine(machine::SystemFacts(), machine_file()), true, true});
+      graph::check(*prepared.graph, prepared.composition->plan, {this_machine(), true, true});
   std::fputs(json ? (result.json.dump(2) + "\n").c_str() : result.text.c_str(), stdout);
   if (result.verdict == graph::Verdict::invalid) return kBadInput;
   return result.admitted ? kOk : kNotOk;

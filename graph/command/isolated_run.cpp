@@ -113,11 +113,14 @@ class IsolatedRun {
     if (const int code = expectations_.bind({}); code != kOk) throw Refused{code};
     if (options_.transport == "iceoryx") claim_ = find_room_for_daemon(adjusted_);
     choose_cores(plan_.cores, adjusted_);
+    const graph::CheckMachine machine = this_machine();
+    plan_.overheads = machine.overheads;
     if (again()) forget_processes();
     for (size_t p = 0; p < partition_.names.size(); ++p)
       group_.start(partition_.names[p], [this, p, supervisor = getpid()]() -> int {
         try {
-          return run_member({options_, graph_, partition_, p, supervisor, board_, pools_, trace_.rings(), faults_});
+          return run_member(
+              {options_, graph_, partition_, plan_.overheads, p, supervisor, board_, pools_, trace_.rings(), faults_});
         } catch (const std::exception& problem) {  // as in a run in one process: no memory, no daemon, no thread
           return refuse(fmt::format("process {}: {}", partition_.names[p], problem.what()), kDeviceOrSystem);
         }
@@ -127,7 +130,11 @@ class IsolatedRun {
     BoardExchange exchange(board_);
     graph::complete(plan_, exchange, observers(options_, graph_));
     faults_.make_room(plan_);
-    if (const int code = again() ? kOk : admit(options_, graph_, plan_, adjusted_); code != kOk) throw Refused{code};
+    if (!again()) {
+      auto ages = admit(options_, graph_, plan_, machine, adjusted_);
+      if (!ages) throw Refused{ages.error()};
+      ages_ = std::move(*ages);
+    }
     const CpuLatencyHold latency = hold_cpu_dma_latency();
     tell_lacks(latency);
     bring_up_transport();
@@ -357,7 +364,7 @@ class IsolatedRun {
     const std::string no_trace = trace_.write(graph_, plan_, board_, result);
     record_.finish(result, trace_.unheard_threads());
     auto report = make_report({graph_, plan_, board_, result, *transport_, use, options_.clock,
-                               std::string(to_string(plan_.policy)), "subsystem", partition_.names, adjusted_});
+                               std::string(to_string(plan_.policy)), "subsystem", partition_.names, adjusted_, ages_});
     for (const std::string& problem : problems_) report["faults"].push_back({{"what", problem}});
     add_outages(board_.outages(), partition_.names, plan_, tasks_of(plan_, partition_), result, report);
     if (!problems_.empty() || board_.outages().size() > 0) report["ok"] = false;
@@ -378,6 +385,7 @@ class IsolatedRun {
   RunFaults& faults_;
   RunExpectations expectations_;
   std::vector<std::string> adjusted_, problems_;
+  std::vector<graph::AgeBound> ages_;
   std::vector<std::pair<pid_t, int64_t>> stopped_;  ///< processes, and when they go on
   MonotonicClock clock_;
   graph::Composition plan_source_;  ///< shells of all nodes; the plan points into them

@@ -111,6 +111,7 @@ Json measured_json(const machine::Identity& machine, const std::string& measured
   figures.take = dearer(m, [](const TransferCosts& costs) { return costs[0].take.charged_us(); });
   figures.per_mb = dearer(m, per_mb_us);
   if (m.reservation_overrun) figures.enforcement = m.reservation_overrun->max_us;
+  if (m.watchdog_overrun) figures.demotion = m.watchdog_overrun->max_us;
   figures.tick = m.tick_us;
   if (m.bandwidth) figures.deadline_bandwidth = m.bandwidth->accepted;
   Json json = graph::measured_machine_json({machine, measured_at, figures});

@@ -91,6 +91,7 @@ int run_member(const MemberPart& part) {
   part.faults.make_room(plan);
   std::vector<std::string> told;  // the supervisor says it
   choose_cores(plan.cores, told);
+  plan.overheads = part.overheads;
   record.state.store(ProcessRecord::composed);
   wait_until([&] { return board.carrier().load() != RunBoard::no_carrier; });
   prepare_process();

@@ -33,8 +33,9 @@ struct MemberPart {
   const RunOptions& options;
   const graph::GraphSpec& graph;
   const graph::Partition& partition;
-  size_t process = 0;  ///< index into partition.names
-  int supervisor = 0;  ///< the process whose daemon it may have to join
+  const analysis::Overheads& overheads;  ///< the supervisor's, so that all put lanes on the same cores
+  size_t process = 0;                    ///< index into partition.names
+  int supervisor = 0;                    ///< the process whose daemon it may have to join
   RunBoard& board;
   const PoolFile& pools;
   trace::Rings* rings = nullptr;  ///< null: not traced

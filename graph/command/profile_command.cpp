@@ -63,6 +63,7 @@ int pass(const RunOptions& options, const char* name, const Change& change, cons
   Plan& plan = prepared.composition->plan;
   std::vector<std::string> adjusted;
   choose_cores(plan.cores, adjusted);
+  plan.overheads = this_machine().overheads;
   let_jobs_finish(plan);
   change(plan);
   std::fprintf(stderr, "takt profile: %s, %g s\n", name, options.duration_s);

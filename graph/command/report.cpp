@@ -197,10 +197,17 @@ Json chains_json(const RunFacts& facts) {
   for (const graph::ChainSpec& chain : facts.graph.chains) {
     const Histogram* age = output_age(facts, chain.to);
     const bool sampled = age != nullptr && age->count() > 0;
-    chains.push_back({{"name", chain.name},
-                      {"age_ms", distribution(sampled ? *age : Histogram(), 1e6)},
-                      {"bound_ms", static_cast<double>(chain.max_age_ns) / 1e6},
-                      {"within", sampled ? Json(age->max_ns() <= chain.max_age_ns) : Json(nullptr)}});
+    const auto proven = std::find_if(facts.ages.begin(), facts.ages.end(), [&](const graph::AgeBound& bound) {
+      return !bound.edge && bound.name == chain.name && bound.bound_ns;
+    });
+    const bool as_proven = facts.clock == "virtual" || facts.result.policy_granted == facts.plan.policy;
+    chains.push_back(
+        {{"name", chain.name},
+         {"age_ms", distribution(sampled ? *age : Histogram(), 1e6)},
+         {"bound_ms", static_cast<double>(chain.max_age_ns) / 1e6},
+         {"proven_ms",
+          as_proven && proven != facts.ages.end() ? Json(static_cast<double>(*proven->bound_ns) / 1e6) : Json(nullptr)},
+         {"within", sampled ? Json(age->max_ns() <= chain.max_age_ns) : Json(nullptr)}});
   }
   return chains;
 }

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "graph/check/ages.hpp"
 #include "graph/command/machine.hpp"
 #include "graph/compose/composition.hpp"
 #include "rt/sched/executor.hpp"
@@ -29,6 +30,7 @@ struct RunFacts {
   std::string clock, policy_asked, isolation;
   std::vector<std::string> processes;  ///< names, where there are several
   std::vector<std::string> adjusted;
+  std::vector<graph::AgeBound> ages;  ///< that were proved of the mode of the start, under the policy asked for
 };
 
 /// The report of design section 6: times in the unit the key says, null where there are no samples.

@@ -40,7 +40,7 @@ std::unique_ptr<Transport> make_transport(const std::string& name, const Plan& p
 
 /// Runs the composed graph in this process; everything it needs exists and is checked.
 int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, RunExpectations& expectations,
-            std::vector<std::string> adjusted) {
+            const std::vector<graph::AgeBound>& ages, std::vector<std::string> adjusted) {
   const graph::GraphSpec& graph = *prepared.graph;
   graph::Composition& composition = *prepared.composition;
   const auto durations = job_durations(options.durations, composition.plan, options.seed);
@@ -109,7 +109,8 @@ int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, Ru
                              std::string(to_string(graph.schedule.policy)),
                              "none",
                              {},
-                             std::move(adjusted)});
+                             std::move(adjusted),
+                             ages});
   if (prepared.clock->is_virtual())
     report["simulated"] = {{"policy", to_string(composition.plan.policy)},
                            {"cores", composition.plan.cores.size()},
@@ -145,7 +146,10 @@ int run_in_one_process(const RunOptions& options, Prepared& prepared, RunFaults&
   // In virtual time the cores of the schedule need not be there.
   std::vector<int>& cores = prepared.composition->plan.cores;
   if (!prepared.clock->is_virtual() || cores.empty()) choose_cores(cores, adjusted);
-  if (const int code = admit(options, *prepared.graph, prepared.composition->plan, adjusted); code != kOk) return code;
+  const graph::CheckMachine machine = this_machine();
+  prepared.composition->plan.overheads = machine.overheads;
+  const auto ages = admit(options, *prepared.graph, prepared.composition->plan, machine, adjusted);
+  if (!ages) return ages.error();
   const CpuLatencyHold latency = hold_cpu_dma_latency();
   std::vector<std::string> lacks = prepare_process();
   const bool locked = lacks.empty();
@@ -154,7 +158,7 @@ int run_in_one_process(const RunOptions& options, Prepared& prepared, RunFaults&
     return refuse("--require-rt: " + lacks.front(), kDeviceOrSystem);
   adjusted.insert(adjusted.end(), lacks.begin(), lacks.end());
   for (const std::string& line : adjusted) std::fprintf(stderr, "takt: adjusted: %s\n", line.c_str());
-  return execute(options, prepared, faults, expectations, std::move(adjusted));
+  return execute(options, prepared, faults, expectations, *ages, std::move(adjusted));
 }
 
 /// One process, or one per subsystem: as the command line says, else the graph.

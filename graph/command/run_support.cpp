@@ -94,19 +94,27 @@ void choose_cores(std::vector<int>& cores, std::vector<std::string>& adjusted) {
   cores = usable;
 }
 
-int admit(const RunOptions& options, const graph::GraphSpec& graph, const Plan& plan,
-          std::vector<std::string>& adjusted) {
+graph::CheckMachine this_machine() { return graph::check_machine(machine::SystemFacts(), machine_file()); }
+
+tl::expected<std::vector<graph::AgeBound>, Exit> admit(const RunOptions& options, const graph::GraphSpec& graph,
+                                                       const Plan& plan, const graph::CheckMachine& machine,
+                                                       std::vector<std::string>& adjusted) {
   graph::CheckOptions how;
-  how.machine = graph::check_machine(machine::SystemFacts(), machine_file());
+  how.machine = machine;
   how.real_time = options.clock != "virtual";
   const graph::CheckResult check = graph::check(graph, plan, how);
-  if (check.verdict == graph::Verdict::invalid) return refuse(check.text, kBadInput);
-  if (check.admitted || options.unchecked) return kOk;
+  const auto refused = [&](const std::string& text, Exit code) {
+    refuse(text, code);
+    return tl::make_unexpected(code);
+  };
+  if (check.verdict == graph::Verdict::invalid) return refused(check.text, kBadInput);
+  if (check.admitted) return check.modes.front().ages;
+  if (options.unchecked) return {};
   if (plan.policy != Policy::cooperative || check.answer != graph::Answer::not_proven)
-    return refuse(check.text + "(--unchecked runs it all the same)", kNotOk);
+    return refused(check.text + "(--unchecked runs it all the same)", kNotOk);
   adjusted.push_back(
       "admission -> none: under the policy cooperative the deadlines are not proven (takt check says why)");
-  return kOk;
+  return {};
 }
 
 std::vector<std::string> prepare_process() {

@@ -3,8 +3,11 @@
 #pragma once
 #include <nlohmann/json.hpp>
 #include <string>
+#include <tl/expected.hpp>
 #include <vector>
 
+#include "graph/check/ages.hpp"
+#include "graph/check/check_machine.hpp"
 #include "graph/command/run_command.hpp"
 #include "rt/memory/process_memory.hpp"
 #include "rt/sched/executor.hpp"
@@ -50,13 +53,17 @@ class KeptPlace {
 /// Says what it changed of cores that the schedule names.
 void choose_cores(std::vector<int>& cores, std::vector<std::string>& adjusted);
 
-/// Asks the check. kOk: the run may go on; else what was refused is on stderr and this is the exit code. --unchecked
-/// goes on in spite of everything but Invalid input. So does `cooperative` in spite of an answer that is not proven,
-/// and says so in `adjusted`: it promises no deadline, and no proof would hold among ordinary threads. The policy that
-/// was asked for is the one that is checked; what the kernel refuses and replaces by `cooperative` later is not asked
-/// again.
-int admit(const RunOptions& options, const graph::GraphSpec& graph, const Plan& plan,
-          std::vector<std::string>& adjusted);
+/// This machine, with what `takt doctor --measure` left.
+graph::CheckMachine this_machine();
+
+/// Asks the check. The age bounds that it proved (none if it proved nothing): the run may go on; else what was refused
+/// is on stderr and this is the exit code. --unchecked goes on in spite of everything but Invalid input. So does
+/// `cooperative` in spite of an answer that is not proven, and says so in `adjusted`: it promises no deadline, and no
+/// proof would hold among ordinary threads. The policy that was asked for is the one that is checked; what the kernel
+/// refuses and replaces by `cooperative` later is not asked again.
+tl::expected<std::vector<graph::AgeBound>, Exit> admit(const RunOptions& options, const graph::GraphSpec& graph,
+                                                       const Plan& plan, const graph::CheckMachine& machine,
+                                                       std::vector<std::string>& adjusted);
 
 /// Memory locked, OpenCV's thread pool off; what was refused.
 std::vector<std::string> prepare_process();

@@ -120,6 +120,7 @@ class Composer {
     task.on_miss = entry.on_miss;
     task.publish = entry.publish;
     task.memory_bytes = entry.memory_bytes;
+    task.core = entry.core;
   }
 
   void connect() {

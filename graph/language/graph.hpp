@@ -87,6 +87,7 @@ struct ScheduleEntry {
   OnMiss on_miss = OnMiss::proceed;
   PublishAt publish = PublishAt::asap;
   int64_t memory_bytes = kDefaultMemory;
+  int core = -1;  ///< under `fixed`; -1: chosen
   Position position;
 };
 

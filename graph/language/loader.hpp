@@ -92,6 +92,7 @@ class Loader {
   void read_schedule();
   std::optional<std::filesystem::path> schedule_path(Position& wanted_from);
   void read_entry(const std::string& id, const nlohmann::json& value, const std::string& pointer);
+  void read_core(ScheduleEntry& entry, const std::string& id, const nlohmann::json& value, const std::string& pointer);
   void read_memory(ScheduleEntry& entry, const std::string& id, const nlohmann::json& value,
                    const std::string& pointer);
   void read_release(ScheduleEntry& entry, const std::string& id, const nlohmann::json& value,

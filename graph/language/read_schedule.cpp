@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -114,8 +115,26 @@ void Loader::read_entry(const std::string& id, const json& value, const std::str
   read_word(value, "on_overrun", kOnOverrun, entry.on_overrun);
   read_word(value, "on_miss", kOnMiss, entry.on_miss);
   read_word(value, "publish", kPublish, entry.publish);
+  read_core(entry, id, value, pointer);
   read_memory(entry, id, value, pointer);
   if (claimed_.contains(id)) spec_.schedule.entries[id] = std::move(entry);
+}
+
+void Loader::read_core(ScheduleEntry& entry, const std::string& id, const json& value, const std::string& pointer) {
+  if (!value.contains("core") || !value["core"].is_number_integer() || value["core"] < 0 || value["core"] > 1023)
+    return;
+  entry.core = value["core"].get<int>();
+  const std::vector<int>& cores = spec_.schedule.cores;
+  const Position at = schedule_.value_at(child(pointer, "core"));
+  if (value.contains("on"))
+    problem(at,
+            fmt::format("`core` of {} goes with `rate` only; an `on` node runs where its producer does", ticked(id)));
+  else if (!cores.empty() && std::find(cores.begin(), cores.end(), entry.core) == cores.end())
+    problem(at, fmt::format("`core` of {} is {}, which is none of the schedule's; valid are: {}", ticked(id),
+                            entry.core, fmt::join(cores, ", ")));
+  else if (spec_.schedule.policy != Policy::fixed)
+    spec_.adjusted.push_back(
+        fmt::format("core {} of {} -> none: only under the policy fixed a node has a core of its own", entry.core, id));
 }
 
 void Loader::read_memory(ScheduleEntry& entry, const std::string& id, const json& value, const std::string& pointer) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "rt/machine/check_support.hpp"
 
+#include <algorithm>
+
 #include "rt/machine/parse.hpp"
 
 namespace takt::machine {
@@ -16,6 +18,20 @@ std::string kernel_config(const Facts& facts) {
 
 std::vector<int> online_cpus(const Facts& facts) {
   return parse_cpu_list(facts.text("/sys/devices/system/cpu/online").value_or(""));
+}
+
+OrdinaryShare ordinary_share(const Facts& facts, int cpu) {
+  const auto number = [&](const std::string& file) { return parse_number(facts.text(file).value_or("")); };
+  if (parse_release(kernel_release(facts)).at_least(6, 12)) {
+    const std::string folder = "/sys/kernel/debug/sched/fair_server/cpu" + std::to_string(cpu);
+    const auto runtime = number(folder + "/runtime"), period = number(folder + "/period");
+    if (runtime && period) return {*runtime, *period};
+    return {50'000'000, 1'000'000'000, false};
+  }
+  const auto runtime = number("/proc/sys/kernel/sched_rt_runtime_us"),
+             period = number("/proc/sys/kernel/sched_rt_period_us");
+  if (!runtime || !period) return {50'000'000, 1'000'000'000, false};
+  return {*runtime < 0 ? 0 : std::max<int64_t>(*period - *runtime, 0) * 1000, *period * 1000};
 }
 
 std::vector<Fix> grant_rights(const Facts& facts) {

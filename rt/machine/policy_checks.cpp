@@ -157,17 +157,16 @@ Finding check_fair_server(const Facts& facts) {
     f.found = "none before Linux 6.12: rt_runtime throttles instead";
     return f;
   }
-  const std::string folder = "/sys/kernel/debug/sched/fair_server/cpu0";
-  const auto runtime = parse_number(facts.text(folder + "/runtime").value_or(""));
-  const auto period = parse_number(facts.text(folder + "/period").value_or(""));
-  if (!runtime || !period) {
+  const OrdinaryShare share = ordinary_share(facts, 0);
+  if (!share.known) {
     f.found = "Linux " + kernel_release(facts) + " has one; debugfs is not readable, its default is 50 ms of 1000 ms";
     f.fixes = {shell("sudo mount -t debugfs debugfs /sys/kernel/debug")};
     return f;
   }
-  f.status = *runtime == 0 ? Status::ok : Status::warn;
-  f.found = microseconds_as_ms(*runtime / 1000) + " of " + microseconds_as_ms(*period / 1000) + " on cpu0";
-  if (*runtime > 0)
+  f.status = share.runtime_ns == 0 ? Status::ok : Status::warn;
+  f.found =
+      microseconds_as_ms(share.runtime_ns / 1000) + " of " + microseconds_as_ms(share.period_ns / 1000) + " on cpu0";
+  if (share.runtime_ns > 0)
     f.fixes = {shell("for f in /sys/kernel/debug/sched/fair_server/cpu*/runtime; do echo 0 | sudo tee $f; done")};
   return f;
 }

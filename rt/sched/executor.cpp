@@ -118,13 +118,15 @@ struct Executor::Crew {
 
 bool Executor::run_partitioned(Policy policy, RunResult& result) {
   const std::vector<Reservation> wanted = own_reservations(policy);
+  // A process before this one may just have died with the same reservations.
+  const int64_t patience_ns = bandwidth_within_ns(wanted) + kBandwidthMargin_ns;
   crew_ = std::make_unique<Crew>(lanes_.size());
   for (size_t i = 0; i < lanes_.size(); ++i) {
-    crew_->workers.start([this, &crew = *crew_, &lane = *lanes_[i], mine = wanted[i], i] {
+    crew_->workers.start([this, &crew = *crew_, &lane = *lanes_[i], mine = wanted[i], patience_ns, i] {
       name_thread(lane.head().plan().name);
       const trace::Thread traced(options_.trace, lane.head().plan().name);
       prefault_stack();
-      crew.grants[i] = apply(mine);
+      crew.grants[i] = apply(mine, patience_ns);
       lane.watch().bind(mine);
       crew.ready.arrive_and_wait();
       crew.started.arrive_and_wait();

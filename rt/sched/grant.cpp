@@ -73,12 +73,11 @@ SchedulingAttributes attributes_of(const Reservation& wanted) {
 
 Grant apply_deadline(const Reservation& wanted, int64_t patience_ns) {
   const SchedulingAttributes a = attributes_of(wanted);
-  constexpr int64_t kStep = 5'000'000;
   int error = 0;
-  for (int64_t waited = 0;; waited += kStep) {
+  for (int64_t waited = 0;; waited += kBandwidthStep_ns) {
     error = set_attributes(a) == 0 ? 0 : errno;
     if (error != EBUSY || waited >= patience_ns) break;
-    const timespec pause{0, kStep};
+    const timespec pause{0, kBandwidthStep_ns};
     nanosleep(&pause, nullptr);
   }
   Grant grant;
@@ -124,6 +123,13 @@ Reservation deadline_reservation(int64_t budget_ns, int64_t deadline_ns, int64_t
   r.deadline_ns = r.period_ns = deadline_ns < period_ns ? deadline_ns : period_ns / 20 * 19;
   r.runtime_ns = std::min(budget_ns, r.deadline_ns);
   return r;
+}
+
+int64_t bandwidth_within_ns(const std::vector<Reservation>& reservations) {
+  int64_t longest_ns = 0;
+  for (const Reservation& r : reservations)
+    if (r.policy == Policy::deadline) longest_ns = std::max(longest_ns, r.period_ns + kBandwidthStep_ns);
+  return longest_ns;
 }
 
 Grant apply(const Reservation& wanted, int64_t patience_ns) {

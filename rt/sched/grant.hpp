@@ -40,9 +40,15 @@ struct Grant {
 /// that fall before it (measured: up to 27 ms late).
 Reservation deadline_reservation(int64_t budget_ns, int64_t deadline_ns, int64_t period_ns);
 
-/// Applies the reservation to the calling thread and reads it back. Waits up to `patience_ns` for bandwidth that a
-/// finished SCHED_DEADLINE thread gives back only at its 0-lag time.
-Grant apply(const Reservation& reservation, int64_t patience_ns = 100'000'000);
+/// A thread of SCHED_DEADLINE that ends gives its bandwidth back at its 0-lag time, at most one period of its
+/// reservation later; whoever wants it asks again every kBandwidthStep_ns.
+inline constexpr int64_t kBandwidthStep_ns = 5'000'000, kBandwidthMargin_ns = 100'000'000;
+/// When the bandwidth of threads with these reservations is there again at the latest after all of them have ended; 0
+/// if none is of `deadline`.
+int64_t bandwidth_within_ns(const std::vector<Reservation>& reservations);
+
+/// Applies the reservation to the calling thread and reads it back. Waits up to `patience_ns` for bandwidth.
+Grant apply(const Reservation& reservation, int64_t patience_ns = kBandwidthMargin_ns);
 
 /// Puts another thread of this process behind all real-time ones (SCHED_OTHER), where it gets its share beside whatever
 /// else the machine does: behind that as well (SCHED_IDLE) a job could last for minutes, and so could the end of its

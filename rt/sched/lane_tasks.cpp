@@ -3,10 +3,10 @@
 
 #include <algorithm>
 #include <numeric>
-#include <optional>
 
 #include "rt/node.hpp"
 #include "rt/sched/analysis/integers.hpp"
+#include "rt/sched/analysis/partition.hpp"
 #include "rt/sched/lane.hpp"
 
 namespace takt {
@@ -79,20 +79,7 @@ int64_t occupied_ns(const Plan& plan, const std::vector<size_t>& lane, size_t fi
   return at;
 }
 
-/// Response-time analysis (Joseph and Pandya 1986) of the last task, all others having the higher priority.
-bool last_fits(const std::vector<analysis::TimedTask>& tasks) {
-  const analysis::TimedTask& task = tasks.back();
-  for (Ticks response = task.budget; response <= task.deadline;) {
-    Ticks next = task.budget;
-    for (size_t i = 0; i + 1 < tasks.size(); ++i)
-      next += (response + tasks[i].period - 1) / tasks[i].period * tasks[i].budget;
-    if (next == response) return true;
-    response = next;
-  }
-  return false;
-}
-
-/// All lanes under `fixed`, not placed yet and without overheads or offsets.
+/// All lanes as they are under `fixed`, not placed yet and without leads.
 LaneTasks unplaced(const Plan& plan, const Overheads& o) {
   LaneTasks result;
   result.lanes = lane_members(plan);
@@ -125,17 +112,46 @@ void charge_leads(const Plan& plan, Policy policy, LaneTasks& lanes) {
   }
 }
 
+/// The share of ordinary threads on each core. The kernel gives it up to a millisecond early (dl_server_min_res).
+void add_ordinary(const Overheads& o, analysis::TaskSet& set) {
+  if (o.ordinary_runtime_ns <= 0 || o.ordinary_period_ns <= o.ordinary_runtime_ns) return;
+  constexpr int64_t kEarly_ns = 1'000'000;
+  for (int core = 0; core < set.cores; ++core) {
+    analysis::TimedTask share;
+    share.name = "ordinary threads";
+    share.period = share.deadline = o.ordinary_period_ns * set.ticks_per_ns;
+    share.budget = std::min(o.ordinary_runtime_ns + kEarly_ns, o.ordinary_period_ns) * set.ticks_per_ns;
+    share.sporadic = share.deferrable = true;
+    share.core = core;
+    set.tasks.push_back(std::move(share));
+  }
+}
+
+/// Cores and priorities under `fixed`.
+void place(const Plan& plan, LaneTasks& lanes) {
+  analysis::TaskSet& set = lanes.set;
+  for (size_t i = 0; i < lanes.lanes.size(); ++i) {
+    const auto named = std::find(plan.cores.begin(), plan.cores.end(), plan.tasks[lanes.lanes[i].front()].core);
+    set.tasks[i].core = named == plan.cores.end() ? -1 : static_cast<int>(named - plan.cores.begin());
+  }
+  assign_deadline_monotonic(set);
+  const auto lowest = static_cast<int>(set.tasks.size());
+  for (analysis::TimedTask& task : set.tasks) task.priority = std::max(1, kHighestPriority - (lowest - task.priority));
+  set = partition(set, set.cores, analysis::CorePolicy::fixed_priority).set;
+  std::vector<double> work(static_cast<size_t>(set.cores), 0.0);
+  for (const bool rest : {false, true}) {
+    for (analysis::TimedTask& task : set.tasks) {
+      if (rest != (task.core < 0)) continue;
+      if (rest) task.core = static_cast<int>(std::min_element(work.begin(), work.end()) - work.begin());
+      work[static_cast<size_t>(task.core)] += static_cast<double>(task.budget) / static_cast<double>(task.period);
+    }
+  }
+}
+
 }  // namespace
 
 LaneTasks lane_tasks(const Plan& plan, Policy policy, const Overheads& overheads) {
   LaneTasks result = unplaced(plan, overheads);
-  if (policy == Policy::fixed) {
-    const Placement placement = place_fixed(plan);
-    for (size_t i = 0; i < result.lanes.size(); ++i) {
-      result.set.tasks[i].core = std::max(placement.core[i], 0);
-      result.set.tasks[i].priority = placement.priority[i];
-    }
-  }
   if (policy == Policy::deadline) {
     const std::vector<Reservation> reserved = reservations(plan, policy);
     for (size_t i = 0; i < result.lanes.size(); ++i)
@@ -143,6 +159,10 @@ LaneTasks lane_tasks(const Plan& plan, Policy policy, const Overheads& overheads
           std::min(result.set.tasks[i].deadline, reserved[i].deadline_ns * result.set.ticks_per_ns);
   }
   if (policy != Policy::cooperative) charge_leads(plan, policy, result);
+  if (policy == Policy::fixed) {
+    add_ordinary(overheads, result.set);
+    place(plan, result);
+  }
   return result;
 }
 
@@ -156,40 +176,10 @@ int64_t segment_ns(const Plan& plan, const std::vector<size_t>& lane, size_t pos
   return occupied_ns(plan, lane, static_cast<size_t>(producer - lane.begin()) + 1, position, overheads);
 }
 
-Placement place_fixed(const Plan& plan) {
-  const LaneTasks lanes = unplaced(plan, {});
-  const size_t count = lanes.lanes.size(), cores = std::max<size_t>(plan.cores.size(), 1);
-  std::vector<size_t> order(count);
-  std::iota(order.begin(), order.end(), size_t{0});
-  std::stable_sort(order.begin(), order.end(),
-                   [&](size_t a, size_t b) { return lanes.set.tasks[a].deadline < lanes.set.tasks[b].deadline; });
-  Placement result{std::vector<int>(count, -1), std::vector<int>(count, 1)};
-  std::vector<std::vector<analysis::TimedTask>> placed(cores);
-  std::vector<double> load(cores, 0.0);
-  for (size_t rank = 0; rank < count; ++rank) {
-    analysis::TimedTask task = lanes.set.tasks[order[rank]];
-    task.priority = std::max(1, kHighestPriority - static_cast<int>(rank));
-    task.offset = 0;  // wherever the phases lie
-    std::optional<size_t> chosen;
-    for (size_t core = 0; core < cores; ++core) {
-      if (chosen && load[core] >= load[*chosen]) continue;
-      placed[core].push_back(task);
-      if (last_fits(placed[core])) chosen = core;
-      placed[core].pop_back();
-    }
-    if (!chosen) chosen = static_cast<size_t>(std::min_element(load.begin(), load.end()) - load.begin());
-    placed[*chosen].push_back(task);
-    load[*chosen] += static_cast<double>(task.budget) / static_cast<double>(task.period);
-    result.priority[order[rank]] = task.priority;
-    if (!plan.cores.empty()) result.core[order[rank]] = static_cast<int>(*chosen);
-  }
-  return result;
-}
-
 std::vector<Reservation> reservations(const Plan& plan, Policy policy) {
   const std::vector<std::vector<size_t>> lanes = lane_members(plan);
   std::vector<Reservation> wanted(lanes.size());
-  const Placement placement = policy == Policy::fixed ? place_fixed(plan) : Placement{};
+  const LaneTasks placed = policy == Policy::fixed ? lane_tasks(plan, policy, plan.overheads) : LaneTasks{};
   for (size_t i = 0; i < lanes.size(); ++i) {
     const int64_t budget_ns = lane_budget_ns(plan, lanes[i]) + longest_lead_ns(plan, lanes[i]);
     if (policy == Policy::deadline) {
@@ -200,8 +190,9 @@ std::vector<Reservation> reservations(const Plan& plan, Policy policy) {
     }
     wanted[i].policy = policy;
     if (policy != Policy::fixed) continue;
-    wanted[i].priority = placement.priority[i];
-    wanted[i].core = placement.core[i] < 0 ? -1 : plan.cores[static_cast<size_t>(placement.core[i])];
+    const analysis::TimedTask& task = placed.set.tasks[i];
+    wanted[i].priority = task.priority;
+    wanted[i].core = plan.cores.empty() ? -1 : plan.cores[static_cast<size_t>(task.core)];
   }
   return wanted;
 }

@@ -13,13 +13,16 @@ namespace takt {
 
 struct LaneTasks {
   std::vector<std::vector<size_t>> lanes;  ///< as lane_members() gives them
-  analysis::TaskSet set;                   ///< one task per lane in the same order, with the name of its head
+  analysis::TaskSet set;                   ///< the lanes' tasks in the same order, with the names of their heads, first
 };
 
 /// One task per lane: the head's rate and offset, the lane's span as deadline, the sum of the members' budgets and the
 /// overheads of their jobs. A lane that waits within (`publish: let` before a follower) occupies its thread meanwhile,
 /// so the wait counts as budget. Under `deadline` the deadline is that of the reservation. Under `fixed` every task has
-/// its core (an index into Plan::cores) and priority. Throws std::logic_error as lane_members() does.
+/// its core (an index into Plan::cores) and its SCHED_FIFO priority: deadline monotonic, on the core that the plan
+/// names, else where `analysis::partition` puts it; what that finds no place for goes where the least work is. Behind
+/// the lanes then comes one task per core for ordinary threads, if they have a share. Throws std::logic_error as
+/// lane_members() does.
 LaneTasks lane_tasks(const Plan& plan, Policy policy, const analysis::Overheads& overheads = {});
 
 /// Occupation of the thread, overheads included, from the lane's release to the publication of its member at
@@ -30,16 +33,8 @@ int64_t prefix_ns(const Plan& plan, const std::vector<size_t>& lane, size_t posi
 int64_t segment_ns(const Plan& plan, const std::vector<size_t>& lane, size_t position,
                    const analysis::Overheads& overheads = {});
 
-/// Core (index into Plan::cores, -1 without any) and SCHED_FIFO priority of each lane under `fixed`. Deadline
-/// monotonic: the shorter a lane's span, the higher its priority. Each lane in that order goes to the core with the
-/// least work among those where response-time analysis still finds it and all before it in time; if there is none, to
-/// the one with the least work. Depends on the plan alone, so that every process of a run comes to the same.
-struct Placement {
-  std::vector<int> core, priority;
-};
-Placement place_fixed(const Plan& plan);
-
-/// What each lane asks of the kernel under that policy, in the order of lane_members().
+/// What each lane asks of the kernel under that policy, in the order of lane_members(). Depends on the plan alone, its
+/// overheads included, so that every process of a run comes to the same.
 std::vector<Reservation> reservations(const Plan& plan, Policy policy);
 
 }  // namespace takt

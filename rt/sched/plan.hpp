@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "rt/sched/analysis/overheads.hpp"
 #include "rt/sched/mode_rules.hpp"
 #include "rt/shm/transport.hpp"
 #include "rt/time/rate.hpp"
@@ -69,6 +70,7 @@ struct TaskPlan {
   OnOverrun on_overrun = OnOverrun::proceed;
   OnMiss on_miss = OnMiss::proceed;
   PublishAt publish = PublishAt::asap;
+  int core = -1;  ///< under `fixed`: the CPU of the lane that this task heads; -1: chosen (lane_tasks.hpp)
   int64_t memory_bytes = kDefaultMemory;  ///< what its jobs may take from the heap beyond what they give back
   std::vector<EdgePlan> edges;
   std::vector<std::vector<size_t>> joins;  ///< groups of indexes into Node::inputs()
@@ -85,6 +87,7 @@ struct ModePlan {
 struct Plan {
   Policy policy = Policy::cooperative;
   std::vector<int> cores;
+  analysis::Overheads overheads = {};  ///< of the machine; under `fixed` lanes are put on cores so that these fit, too
   /// A worker may be woken this long before a release to be there in time (Anticipation); 0: none is.
   int64_t anticipate_ns = 0;
   std::vector<TaskPlan> tasks;

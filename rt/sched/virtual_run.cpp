@@ -12,7 +12,6 @@ namespace {
 /// The lanes as the simulator knows them, one tick being 1 ns. Releases and durations are told as they come.
 analysis::TaskSet task_set(const Plan& plan) {
   const std::vector<std::vector<size_t>> lanes = lane_members(plan);
-  const Placement placement = plan.policy == Policy::fixed ? place_fixed(plan) : Placement{};
   const std::vector<Reservation> reserved = reservations(plan, plan.policy);
   analysis::TaskSet set;
   set.cores = static_cast<int>(plan.cores.empty() ? lanes.size() : plan.cores.size());
@@ -21,8 +20,9 @@ analysis::TaskSet task_set(const Plan& plan) {
     task.name = plan.tasks[lanes[i].front()].name;
     task.deadline = plan.policy == Policy::deadline ? reserved[i].deadline_ns : lane_span_ns(plan, lanes[i]);
     if (plan.policy == Policy::fixed) {
-      task.core = placement.core[i] >= 0 ? placement.core[i] : static_cast<int>(i);
-      task.priority = placement.priority[i];
+      const auto core = std::find(plan.cores.begin(), plan.cores.end(), reserved[i].core);
+      task.core = static_cast<int>(plan.cores.empty() ? static_cast<ptrdiff_t>(i) : core - plan.cores.begin());
+      task.priority = reserved[i].priority;
     }
     set.tasks.push_back(std::move(task));
   }

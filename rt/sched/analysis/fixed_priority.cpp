@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "rt/sched/analysis/fixed_priority.hpp"
 
+#include <limits>
+
 #include "rt/sched/analysis/busy_start.hpp"
 
 namespace takt::analysis {
@@ -60,9 +62,7 @@ std::optional<Ticks> response_of(const Level& level, const std::vector<Candidate
   return longest;
 }
 
-}  // namespace
-
-ResponseBounds fixed_priority_responses(const std::vector<TimedTask>& tasks) {
+ResponseBounds responses_of(const std::vector<TimedTask>& tasks) {
   ResponseBounds answer;
   for (size_t i = 0; i < tasks.size(); ++i) {
     const Level level = level_of(tasks, i);
@@ -78,6 +78,28 @@ ResponseBounds fixed_priority_responses(const std::vector<TimedTask>& tasks) {
     }
     answer.bounds.push_back(bound);
   }
+  return answer;
+}
+
+}  // namespace
+
+ResponseBounds fixed_priority_responses(const std::vector<TimedTask>& tasks) {
+  std::vector<TimedTask> behind = tasks, before = tasks;
+  bool any = false;
+  for (size_t i = 0; i < tasks.size(); ++i) {
+    if (!tasks[i].deferrable) continue;
+    any = true;
+    behind[i].priority = std::numeric_limits<int>::min();
+    before[i].priority = std::numeric_limits<int>::max();
+    before[i].jitter += tasks[i].period - tasks[i].budget;
+  }
+  ResponseBounds answer = responses_of(behind);
+  bool deferred = true;
+  for (size_t i = 0; i < tasks.size(); ++i)
+    deferred = deferred && (!tasks[i].deferrable || (answer.bounds[i] && *answer.bounds[i] <= tasks[i].deadline));
+  if (!any || deferred) return answer;
+  answer = responses_of(before);
+  answer.exact = false;
   return answer;
 }
 

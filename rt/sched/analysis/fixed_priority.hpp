@@ -27,6 +27,11 @@ namespace takt::analysis {
 ///    computed happens. Releases before the last first release add nothing: the same pattern with at least those jobs
 ///    comes one hyperperiod later.
 /// Execution times below the budget shorten every response here, so budgets are the worst.
+///
+/// Deferrable tasks, as the kernel's fair server: behind all others where that gets each done within its deadline,
+/// for then it never goes before them (its laxity, which is its deadline less the time less what it has not had yet,
+/// stays above 0). Else before all others, ready any time that leaves it its budget by the end of its period: bounds
+/// only.
 ResponseBounds fixed_priority_responses(const std::vector<TimedTask>& tasks);
 
 }  // namespace takt::analysis

@@ -2,6 +2,7 @@
 #include "rt/sched/analysis/partition.hpp"
 
 #include <algorithm>
+#include <numeric>
 #include <utility>
 
 #include "rt/sched/analysis/integers.hpp"
@@ -12,6 +13,11 @@ namespace {
 struct CoreLoad {
   std::vector<size_t> indexes = {};  ///< in the set
   std::vector<TimedTask> tasks = {};
+  double work() const {
+    double sum = 0;
+    for (const TimedTask& task : tasks) sum += static_cast<double>(task.budget) / static_cast<double>(task.period);
+    return sum;
+  }
 };
 
 class Search {
@@ -38,11 +44,16 @@ class Search {
     return std::all_of(on_core_.begin(), on_core_.end(), [&](const CoreLoad& core) { return fits(core); });
   }
 
-  /// Each task on the first core that takes it.
-  bool first_fit() {
+  /// Each task on the first core that takes it, the cores as they are numbered or `evenly`: by their work.
+  bool first_fit(bool evenly) {
     const auto given = on_core_;
     for (const size_t task : free_) {
-      if (!std::any_of(on_core_.begin(), on_core_.end(), [&](CoreLoad& core) { return put(task, core); })) {
+      std::vector<size_t> order(on_core_.size());
+      std::iota(order.begin(), order.end(), size_t{0});
+      if (evenly)
+        std::stable_sort(order.begin(), order.end(),
+                         [&](size_t a, size_t b) { return on_core_[a].work() < on_core_[b].work(); });
+      if (!std::any_of(order.begin(), order.end(), [&](size_t core) { return put(task, on_core_[core]); })) {
         misfit_ = task;
         on_core_ = given;
         return false;
@@ -117,7 +128,8 @@ Partition partition(TaskSet set, int cores, CorePolicy policy) {
   if (!search.given_cores_fit()) {
     answer.verdict = search.conclusive() ? Verdict::not_schedulable : Verdict::not_proven;
     answer.why = "the tasks with a given core do not fit on it";
-  } else if (search.first_fit() || (search.free_tasks() <= kFewTasks && search.all_assignments())) {
+  } else if (search.first_fit(true) || search.first_fit(false) ||
+             (search.free_tasks() <= kFewTasks && search.all_assignments())) {
     answer.verdict = Verdict::schedulable;
     answer.set = search.assigned();
   } else {

@@ -17,8 +17,9 @@ struct Partition {
 /// Gives each task without a core one of [0, cores), keeping the cores that are given; set.cores becomes `cores`.
 /// Priorities are not changed (see assign_deadline_monotonic).
 ///
-/// First fit by decreasing density (budget / deadline), with the per-core test of the policy deciding what fits
-/// (Lopez, Diaz & Garcia 2004 on first fit; exact tests as in Baruah & Fisher 2006). Where that fails and at most
+/// By decreasing density (budget / deadline), with the per-core test of the policy deciding what fits (exact tests as
+/// in Baruah & Fisher 2006): each task on the core with the least work that takes it, so that every core has something
+/// left; where that fails on the first core that takes it (Lopez, Diaz & Garcia 2004). Where both fail and at most
 /// kFewTasks tasks are free, all assignments in depth-first order: a core that fails stays failing with more tasks,
 /// and of several empty cores one stands for all. Deterministic; at most kMostTests tests.
 Partition partition(TaskSet set, int cores, CorePolicy policy);

@@ -27,6 +27,9 @@ struct TimedTask {
   bool sporadic = false;  ///< arrivals at any instants not closer than a period
   int priority = 0;       ///< fixed priorities: the larger wins; distinct on one core
   int core = -1;          ///< -1: any
+  /// Fixed priorities: the share of somebody who waits as long as he gets it by the end of the period behind all
+  /// others, and else goes before all of them.
+  bool deferrable = false;
 };
 
 struct TaskSet {

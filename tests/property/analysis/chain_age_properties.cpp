@@ -14,7 +14,7 @@ using namespace takt::analysis;
 namespace {
 
 struct Message {
-  Ticks visible_at, origin;
+  Ticks release, visible_at, origin;
 };
 
 enum class Responses { longest, shortest, random, first_half };
@@ -25,11 +25,10 @@ Ticks observed_age(const std::vector<ChainTask>& chain, Responses how, Random& r
   Ticks span = 0;
   for (const ChainTask& task : chain) span += 8 * task.period + task.offset + task.visible;
   std::vector<Message> input, output;
-  std::vector<Ticks> starts;
-  Ticks worst = 0;
+  Ticks worst = 0, start = 0;
   for (size_t i = 0; i < chain.size(); ++i) {
     const ChainTask& task = chain[i];
-    const Ticks start = task.phased ? task.offset : random.uniform(0, task.period);
+    if (!task.follows) start = task.phased ? task.offset : random.uniform(0, task.period);  // else that of its lane
     output.clear();
     for (Ticks k = 0; start + k * task.period < span; ++k) {
       const Ticks release = start + k * task.period;
@@ -42,14 +41,13 @@ Ticks observed_age(const std::vector<ChainTask>& chain, Responses how, Random& r
       if (i > 0) {
         const Message* newest = nullptr;
         for (const Message& m : input) {
-          const bool taken = task.follows ? m.visible_at >= release && m.visible_at <= release + chain[i - 1].visible
-                                          : m.visible_at <= release;
+          const bool taken = task.follows ? m.release == release : m.visible_at <= release;
           if (taken && (newest == nullptr || m.origin >= newest->origin)) newest = &m;
         }
         if (newest == nullptr) continue;
         origin = newest->origin;
       }
-      output.push_back({release + response, origin});
+      output.push_back({release, release + response, origin});
       if (i + 1 == chain.size()) worst = std::max(worst, release + response - origin);
     }
     input = output;
@@ -66,6 +64,12 @@ std::vector<ChainTask> random_chain(Random& random, bool phased) {
     task.offset = random.uniform(0, task.period);
     task.visible = random.uniform(1, task.period);
     task.phased = phased;
+    if (i > 0 && random.uniform(0, 3) == 0) {  // in the lane of the one before, by each of its messages or every other
+      task.follows = true;
+      task.period = chain.back().period * random.uniform(1, 2);
+      task.offset = chain.back().offset;
+      task.visible += chain.back().visible;
+    }
     task.depth = static_cast<uint32_t>(random.uniform(1, 3));
     chain.push_back(task);
   }

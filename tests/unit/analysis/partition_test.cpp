@@ -21,21 +21,30 @@ TaskSet set_of(std::vector<TimedTask> tasks) {
 
 }  // namespace
 
-TEST_CASE("first fit by decreasing density") {
+TEST_CASE("by decreasing density, on the core with the least work") {
   const Partition found =
       partition(set_of(tasks_of({{2, 10, 10}, {6, 10, 10}, {5, 10, 10}, {3, 10, 10}})), 2, CorePolicy::edf);
   CHECK(found.verdict == Verdict::schedulable);
-  CHECK(cores_of(found.set) == std::vector<int>{1, 0, 1, 0});  // 6 + 3, then 5 + 2
+  CHECK(cores_of(found.set) == std::vector<int>{0, 0, 1, 1});  // 6, 5, then 3 beside 5, then 2
   CHECK(found.set.cores == 2);
   CHECK(found.why.empty());
 }
 
-TEST_CASE("where first fit fails, all assignments are tried") {
-  // first fit: 4 + 4 and 3 + 3 + 3, and the last 3 fits nowhere; 4 + 3 + 3 on each does
-  const auto tasks = tasks_of({{4, 10, 10}, {4, 10, 10}, {3, 10, 10}, {3, 10, 10}, {3, 10, 10}, {3, 10, 10}});
+TEST_CASE("where that fails, first fit is tried") {
+  // 6 + 3 and 4 + 4, and the last 3 fits nowhere
+  const auto tasks = tasks_of({{6, 10, 10}, {4, 10, 10}, {4, 10, 10}, {3, 10, 10}, {3, 10, 10}});
   const Partition found = partition(set_of(tasks), 2, CorePolicy::edf);
   CHECK(found.verdict == Verdict::schedulable);
-  CHECK(found.set.tasks[0].core != found.set.tasks[1].core);
+  CHECK(cores_of(found.set) == std::vector<int>{0, 0, 1, 1, 1});
+}
+
+TEST_CASE("where both fail, all assignments are tried") {
+  // by work: 5 + 2 + 2 and 4 + 3 + 2, and the last 2 fits nowhere; first fit: 5 + 4 and 3 + 2 + 2 + 2; 5 + 3 + 2 does
+  const auto tasks =
+      tasks_of({{5, 10, 10}, {4, 10, 10}, {3, 10, 10}, {2, 10, 10}, {2, 10, 10}, {2, 10, 10}, {2, 10, 10}});
+  const Partition found = partition(set_of(tasks), 2, CorePolicy::edf);
+  CHECK(found.verdict == Verdict::schedulable);
+  CHECK(found.set.tasks[0].core == found.set.tasks[2].core);
   CHECK(analyse(found.set, CorePolicy::edf).verdict == Verdict::schedulable);
 }
 

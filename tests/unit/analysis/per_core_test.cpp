@@ -109,3 +109,21 @@ TEST_CASE("the rates of the robot on one core, in exact ticks") {
   CHECK(fixed.responses.bounds[2] == 47 * ms);
   CHECK(fixed.responses.bounds[3] == 57 * ms);
 }
+
+TEST_CASE("a deferrable share waits where that gets it done, and else goes before all") {
+  const auto bounds = [](Ticks period, Ticks budget, Row row) {
+    std::vector<TimedTask> tasks = tasks_of({row, {budget, period, period}});
+    tasks[1].deferrable = true;
+    return fixed_priority_responses(tasks);
+  };
+  ResponseBounds found = bounds(10, 3, {6, 10, 10});
+  CHECK(found.bounds == Bounds{6, 9});
+  CHECK(found.exact);
+  CHECK(bounds(10, 4, {6, 10, 10}).bounds == Bounds{6, 10});
+  // 12 and then 4 is past 15: 4, which may have waited until 11, 4 at once of the next period, and 4 when that has
+  // waited no more.
+  found = bounds(15, 4, {12, 30, 30});
+  CHECK(found.bounds[0] == 24);
+  CHECK(!found.exact);
+  CHECK(verdict_of(tasks_of({{12, 20, 30}, {4, 15, 15}}), found) == Verdict::not_proven);
+}

@@ -4,6 +4,7 @@
 #include <doctest/doctest.h>
 
 #include "graph/check/check.hpp"
+#include "graph/check/margins.hpp"
 #include "rt/node.hpp"
 
 using namespace takt;
@@ -173,4 +174,37 @@ TEST_CASE("ages: what no execution can meet is Invalid, what is not shown is ref
   CHECK(late.verdict == Verdict::valid);
   CHECK(late.answer == Answer::not_proven);
   CHECK(late.problems.front().find("chain whole: max_age is 100 ms, and the bound on its age is") == 0);
+  // What would do is said: here stereo's answer in time for the map, which any of these figures brings about.
+  REQUIRE(late.modes.front().change.find("the smallest single change that makes it fit: ") == 0);
+  CHECK(late.json["change"] == late.modes.front().change);
+}
+
+TEST_CASE("ages: the smallest change that makes an age fit does, and a little less does not") {
+  Chain chain;
+  chain.graph.chains[0].max_age_ns = 112 * kMs;
+  const CheckResult refused = check(chain.graph, chain.plan);
+  REQUIRE(refused.answer == Answer::admitted);
+  chain.graph.chains[0].max_age_ns = 100 * kMs;
+  chain.plan.tasks[2].offset_ns = 4 * kMs;
+  chain.plan.tasks[1].budget_ns = 2 * kMs;
+  const auto accepted = [&](const Plan& plan) { return check(chain.graph, plan).admitted; };
+  REQUIRE_FALSE(accepted(chain.plan));
+  const auto change = smallest_age_change(chain.plan, accepted, {});
+  REQUIRE(change);
+  CAPTURE(to_string(*change, chain.plan));
+  const auto with = [&](double share) {
+    Plan changed = chain.plan;
+    TaskPlan& task = changed.tasks[change->task];
+    const double value = change->from + share * (change->to - change->from);
+    if (change->what == Change::What::offset) task.offset_ns = static_cast<int64_t>(value * 1e6 + 0.5);
+    else if (change->what == Change::What::budget) task.budget_ns = static_cast<int64_t>(value * 1e6);
+    else if (change->what == Change::What::rate) task.rate = Rate{static_cast<int64_t>(value * 10 + 0.5), 10};
+    return accepted(changed);
+  };
+  CHECK(with(1));
+  CHECK_FALSE(with(0.98));
+  // One later max_age is preferred where it is the smaller change.
+  const Change later{Change::What::max_age, kNone, 100, 100.001, 1e-5, "chain whole"};
+  CHECK(to_string(*smallest_age_change(chain.plan, accepted, later), chain.plan) ==
+        "raise the max_age of chain whole from 100 ms to 100.001 ms");
 }

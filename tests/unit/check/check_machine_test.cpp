@@ -23,7 +23,7 @@ test::FakeFacts machine_six() {
 constexpr const char* kMeasured =
     R"({"machine": {"cpu": "Six", "cores": 2, "kernel": "6.18.1 #1 SMP"}, "measured_at": "2026-11-21T22:45:00Z",
         "release_us": 60.5, "switch_us": 3, "publish_us": 1, "take_us": 0.5, "per_mb_us": 10,
-        "enforcement_us": null, "deadline_bandwidth": 1.8})";
+        "enforcement_us": null, "demotion_us": 30, "deadline_bandwidth": 1.8})";
 
 }  // namespace
 
@@ -39,6 +39,36 @@ TEST_CASE("overheads: assumed where nobody measured, with the bandwidth of the k
   CHECK(assumed_overheads(facts).deadline_bandwidth == doctest::Approx(1.9));
 }
 
+TEST_CASE("overheads: the share of ordinary threads, the largest of all CPUs") {
+  test::FakeFacts facts = machine_six();
+  const auto share = [&] {
+    const analysis::Overheads o = assumed_overheads(facts);
+    return std::pair(o.ordinary_runtime_ns, o.ordinary_period_ns);
+  };
+  CHECK(share() == std::pair<int64_t, int64_t>(50'000'000, 1'000'000'000));  // the kernel's default
+  const std::string folder = "/sys/kernel/debug/sched/fair_server/cpu";
+  facts.write({{folder + "0/runtime", "0\n"}, {folder + "0/period", "1000000000\n"}});
+  facts.write({{folder + "1/runtime", "20000000\n"}, {folder + "1/period", "500000000\n"}});
+  CHECK(share() == std::pair<int64_t, int64_t>(20'000'000, 500'000'000));
+  facts.files[folder + "1/runtime"] = "0\n";
+  CHECK(share().first == 0);
+  facts.files["/proc/sys/kernel/osrelease"] = "6.1.0-18-amd64\n";  // throttling
+  CHECK(share() == std::pair<int64_t, int64_t>(50'000'000, 1'000'000'000));
+  facts.files["/proc/sys/kernel/sched_rt_runtime_us"] = "-1\n";
+  CHECK(share().first == 0);
+}
+
+TEST_CASE("overheads: what is enforced on the tick may be late by a whole one") {
+  analysis::Overheads o;
+  o.tick_ns = 4'000'000;
+  o.enforcement_ns = 3'100'000;  // no sample met the worst phase
+  CHECK(o.throttled_late_ns() == 4'000'000);
+  o.enforcement_ns = 4'200'000;
+  CHECK(o.throttled_late_ns() == 4'200'000);
+  o.enforcement_ns = 20'000;  // a timer of its own
+  CHECK(o.throttled_late_ns() == 20'000);
+}
+
 TEST_CASE("overheads: of the file, null as assumed") {
   test::FakeFacts facts = machine_six();
   facts.files["/m.json"] = kMeasured;
@@ -47,6 +77,7 @@ TEST_CASE("overheads: of the file, null as assumed") {
   CHECK(found.warnings.empty());
   CHECK(found.overheads.release_ns == 60'500);
   CHECK(found.overheads.take_ns == 500);
+  CHECK(found.overheads.demotion_ns == 30'000);
   CHECK(found.overheads.enforcement_ns == assumed_overheads(facts).enforcement_ns);
   CHECK(found.overheads_from == "overheads measured 2026-11-21T22:45:00Z");
 }

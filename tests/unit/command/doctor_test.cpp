@@ -77,7 +77,7 @@ TEST_CASE(
   machine::Measured m;
   const auto nothing = measured_json(kHere, "now", m);
   for (const char* key : {"policy", "release_us", "switch_us", "publish_us", "take_us", "per_mb_us", "enforcement_us",
-                          "tick_us", "deadline_bandwidth"}) {
+                          "demotion_us", "tick_us", "deadline_bandwidth"}) {
     CAPTURE(key);
     CHECK(!nothing.contains(key));
   }
@@ -92,6 +92,7 @@ TEST_CASE(
   m.local = local;
   m.iceoryx = iceoryx;
   m.reservation_overrun = spread(2000, 3500, 4100, 100);
+  m.watchdog_overrun = spread(10, 20, 45, 300);
   m.tick_us = 4000;
   m.bandwidth = machine::BandwidthLimit{1.8, 0};
   const auto json = measured_json(kHere, "now", m);
@@ -102,6 +103,7 @@ TEST_CASE(
   CHECK(json["take_us"] == 4);
   CHECK(json["per_mb_us"].get<double>() == doctest::Approx(1));
   CHECK(json["enforcement_us"] == 4100);
+  CHECK(json["demotion_us"] == 45);
   CHECK(json["tick_us"] == 4000);
   CHECK(json["deadline_bandwidth"] == 1.8);
   CHECK(json["measured_at"] == "now");

@@ -159,6 +159,20 @@ TEST_CASE("safe_stop and a bound on memory are taken as they stand") {
   CHECK(loaded.graph->schedule.entries.at("ego_motion").memory_bytes == kDefaultMemory);
 }
 
+TEST_CASE("A node may name its core, which only the policy fixed gives it") {
+  const std::string named = with(kSchedule, "rate: 1/3", "rate: 1/3, core: 1");
+  const Loaded fixed = Files(kGraph, named).load();
+  INFO(all(fixed));
+  REQUIRE(fixed.graph);
+  CHECK(fixed.graph->adjusted.empty());
+  CHECK(fixed.graph->schedule.entries.at("planner").core == 1);
+  CHECK(fixed.graph->schedule.entries.at("base").core == -1);
+  const Loaded cooperative = Files(kGraph, with(named, "policy: fixed", "policy: cooperative")).load();
+  REQUIRE(cooperative.graph);
+  REQUIRE(cooperative.graph->adjusted.size() == 1);
+  CHECK(cooperative.graph->adjusted[0].find("core 1 of planner -> none") == 0);
+}
+
 TEST_CASE("A node with levels degrades; for one without the word is adjusted") {
   const Loaded with_levels = Files().load();
   REQUIRE(with_levels.graph);

@@ -43,6 +43,10 @@ TEST_CASE("A budget above its deadline is for the check, not for the loader") {
 TEST_CASE("Cores: at least one, each once") {
   expect_schedule("cores: [0, 1]", "cores: []", "[]", {"`cores` of the schedule has 0 entries"});
   expect_schedule("cores: [0, 1]", "cores: [0, 1, 0]", "0]", {"names `0` twice"});
+  expect_schedule("rate: 1/3", "rate: 1/3, core: 2", "2}",
+                  {"`core` of `planner` is 2, which is none of the schedule's; valid are: 0, 1"});
+  expect_schedule("every: 2", "core: 1, every: 2", "1, every", {"`core` of `ego_motion` goes with `rate` only"});
+  expect_schedule("rate: 1/3", "rate: 1/3, core: -1", "-1}", {"a number from 0 on"});
   expect_schedule("cores: [0, 1]", "cores: [-1]", "-1", {"a core number from 0 on"});
 }
 
