@@ -94,8 +94,8 @@ def begin(name, length):
     log = open(f"{work}/{name}.log", "w")
     run = subprocess.Popen([takt, "run", "--isolate", "subsystem", "--for", f"{length}s", "--output", f"{work}/{name}", "--report", f"{work}/{name}.json",
                             "--trace", f"{work}/{name}.trace", *options], stdout=log, stderr=log)
-    while len(victims(run.pid)) < 3 and run.poll() is None: time.sleep(0.1)
-    time.sleep(6)
+    while "completed:" not in open(log.name).read() and run.poll() is None: time.sleep(0.1)  # all of them are at work
+    time.sleep(2)
     if run.poll() is not None: sys.exit("the run did not start:\n" + open(log.name).read())
     return run
 
@@ -113,13 +113,14 @@ def missed(report):
     high = {n["name"]: n["deadline_misses"] for n in report["nodes"] if n["criticality"] == "high"}
     away = [(set(o["nodes"]), epoch + o["at_s"] * 1e9, epoch + o["back_s"] * 1e9 if o["back_s"] is not None else float("inf"))
             for o in report["faults"] if o.get("kind") == "outage"]
-    jobs = [(e["args"], e["name"].split()[0]) for e in trace["traceEvents"] if e.get("cat") == "job" and e["args"]["late"]]
+    jobs = [(e["args"], e["name"].split()[0]) for e in trace["traceEvents"] if e.get("cat") == "job" and e["args"]["late"]
+            and e["args"]["release_ns"] < trace["otherData"]["end_ns"]]
     late = sorted((job["release_ns"], job["deadline_ns"], name) for job, name in jobs if name in high)
     said = {n: subprocess.run([takt, "explain", f"{work}/killed.trace", n], capture_output=True, text=True).stdout.splitlines()
             for n in {name for _, _, name in late}}
     rows = []
     for release, deadline, name in late:
-        line = said[name].pop(0)
+        line = said[name].pop(0) if said[name] else f"{name} missed a job that takt explain does not tell of"
         before = [kill for kill in struck if kill[0] <= release]
         kill = f"{(release - before[-1][0]) / 1e6:.0f} ms after the end of {before[-1][1]}" if before else "before any kill"
         stall, by = re.search(r"host stall ([\d.]+)", line), re.search(r" by ([\d.]+) ms", line)
@@ -138,7 +139,7 @@ with tempfile.TemporaryDirectory(prefix="kills-") as work:
     calm = chunks(json.load(open(f"{work}/calm.json")))
     run = begin("killed", seconds)
     early = open_things(run.pid)
-    first, last = time.monotonic(), time.monotonic() + seconds - 20
+    first, last = time.monotonic(), time.monotonic() + seconds - 16
     for instant in sorted(chance.uniform(first, last) for _ in range(kills)):
         time.sleep(max(0, instant - time.monotonic()))
         while not victims(run.pid) and run.poll() is None: time.sleep(0.01)  # all of them are being started again
@@ -150,11 +151,15 @@ with tempfile.TemporaryDirectory(prefix="kills-") as work:
     time.sleep(max(0, last + 5 - time.monotonic()))
     late = open_things(run.pid) if run.poll() is None else []
     code = run.wait()
+    if not os.path.exists(f"{work}/killed.json"): sys.exit(f"no report, exit {code}, killed {struck}:\n" + open(f"{work}/killed.log").read()[-3000:])
     report = json.load(open(f"{work}/killed.json"))
     misses = missed(report)
     print(open(f"{work}/killed.log").read()[-3000:] if code not in (0, 1) else "", end="")
     after, room_after = traces(), bandwidth()
 
+outages = [f for f in report["faults"] if f.get("kind") == "outage"]
+back = sorted(f["down_s"] for f in outages if f["back_s"] is not None)
+pick = lambda q: back[min(len(back) - 1, int(q * len(back)))] if back else float("nan")
 print(f"{len(struck)} kills in {report['duration_s']:.0f} s, policy {report['policy_granted']}, {report['transport']} transport, "
       f"host stall {report['host_stall_ms']} ms; exit {code}")
 print(f"away until every node has run again: p50 {pick(.5):.2f} s, p99 {pick(.99):.2f} s, max {pick(1):.2f} s; "
