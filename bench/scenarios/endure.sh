@@ -1,8 +1,9 @@
 #!/bin/bash
 # SPDX-License-Identifier: Apache-2.0
 # A run with a fault every ten seconds, of all kinds in turn: endure.sh [MINUTES] [SEED] [takt run options...]
-# Default: 30 minutes. obstacle_stop must not miss a deadline; memory must stay flat: resident memory of the supervisor and
-# its members is sampled and the last tenth compared with the second. Exit 1 if either is broken. With --trace FILE it says
+# Default: 30 minutes. Each fault must strike, obstacle_stop must not miss a deadline, and whatever else a scenario always
+# expects (docs/faults.md) must be met; memory must stay flat: resident memory of the supervisor and its members is sampled
+# and the last tenth compared with the second. Exit 1 if any of it is broken. With --trace FILE it says
 # why a deadline was missed, and memory is not judged, since the trace is kept in it.
 # Beside the run stands how late cyclictest was woken on the same CPUs: what no program could help.
 root=$(readlink -f "$(dirname "$0")/../..")
@@ -34,7 +35,16 @@ kinds = [  # {t}: when it begins; {u}: three seconds later
     "{{kind: kill, target: devices, at: {t}s}}",
     "{{kind: garbage, target: front_laser, from: {t}s, to: {u}s}}",
     "{{kind: kill, target: detection, at: {t}s}}",
+    "{{kind: duplicate, target: front_laser.scan, from: {t}s, to: {u}s}}",
+    "{{kind: truncate, target: stereo.cloud, from: {t}s, to: {u}s}}",
+    "{{kind: freeze, target: stereo.disparity, from: {t}s, to: {u}s}}",
+    "{{kind: reorder, target: front_laser.scan, from: {t}s, to: {u}s}}",
+    "{{kind: clock_step, target: head_camera.pair, by: -200ms, from: {t}s, to: {u}s}}",
+    "{{kind: slow_disk, bytes_per_s: 2000, from: {t}s, to: {u}s}}",
+    "{{kind: full_disk, megabytes: 0.001, from: {t}s, to: {u}s}}",
 ]
+known = json.load(open(f"{root}/graph/schema/faults.schema.json"))["definitions"]["fault"]["properties"]["kind"]["enum"]
+if lacking := [kind for kind in known if not any(f"kind: {kind}," in line for line in kinds)]: sys.exit(f"endure.sh has no fault of these kinds: {lacking}")
 chance.shuffle(kinds)
 with tempfile.TemporaryDirectory(prefix="endure-") as work:
     with open(f"{work}/scenario.yaml", "w") as f:
@@ -45,7 +55,8 @@ with tempfile.TemporaryDirectory(prefix="endure-") as work:
     log = open(f"{work}/log", "w")
     probe = host_probe.start(seconds, f"{work}/probe.json")
     run = subprocess.Popen([takt, "run", f"{root}/graph/ace.yaml", "--isolate", "subsystem", "--for", f"{seconds}s", "--faults", f"{work}/scenario.yaml",
-                            "--output", f"{work}/out", "--report", f"{work}/report.json", *options], stdout=log, stderr=log)
+                            "--output", f"{work}/out", "--report", f"{work}/report.json",
+                            "--record", f"{work}/record.mcap", "--record-port", "front_laser.scan", *options], stdout=log, stderr=log)
 
     def resident_mb():
         """Proportional set size of all processes of the run."""
@@ -85,6 +96,9 @@ stop = next(n for n in report["nodes"] if n["name"] == "obstacle_stop")
 bad = []
 if stop["deadline_misses"]: bad.append(f"obstacle_stop missed {stop['deadline_misses']}\n{why.rstrip()}")
 if len(outages) != len(back): bad.append("a process did not come back")
+if idle := [f"{f['kind']} {f['target']}" for f in faults if f["struck"] == 0]: bad.append(f"did not strike: {idle}")
+bad += [f"{row['what']}: expected {row['expected']}, observed {row['observed']}" for row in report["scenario"]["expectations"] if not row["met"]]
+if run.returncode not in (0, 1): bad.append(f"exit {run.returncode}")
 if not traced and late > 1.05 * early + 5: bad.append(f"memory grew from {early:.0f} to {late:.0f} MB")
 for what in bad: print("FAILED:", what)
 sys.exit(bool(bad))
