@@ -21,7 +21,7 @@ std::optional<std::string> attribute(const sim::Simulation& simulation, const st
   if (const sim::Robot* robot = find_robot(simulation, object)) {
     const sim::RobotState state = robot->state(at_ns);
     if (name == "blocked") return robot->blocked() ? "true" : "false";
-    if (name == "terrain") return std::string(terrain_at(simulation.world(), {state.x_m, state.y_m}));
+    if (name == "terrain") return terrain_under(simulation.world(), {state.x_m, state.y_m}, state.theta_rad);
   }
   return simulation.attribute(object, name, at_ns);
 }

@@ -170,9 +170,14 @@ class Composer {
   /// Whoever expects something of an output reads it, too: nodes leave out what nobody reads.
   void mark_expected() {
     if (!graph_.expect) return;
-    for (const ConditionSpec& condition : graph_.expect->conditions)
+    const auto mark = [&](const ConditionSpec& condition) {
       if (const auto port = port_index_.find(condition.port.text()); port != port_index_.end())
         PortAccess::mark_read(output_of(result_.plan.ports[port->second]));
+    };
+    for (const ConditionSpec& condition : graph_.expect->conditions) {
+      mark(condition);
+      std::for_each(condition.unless.begin(), condition.unless.end(), mark);
+    }
   }
 
   OutputPort& output_of(const PortPlan& port) {

@@ -28,21 +28,21 @@ const char* word_of(Holds holds) {
 }  // namespace
 
 ConditionWatch::ConditionWatch(const ConditionSpec& spec) : spec_(spec) {
-  if (spec_.of == ConditionSpec::Of::messages) newest_ = 0.0, passes_now_ = passes(*newest_);
+  if (spec_.of == ConditionSpec::Of::messages) newest_ = 0.0, passes_now_ = passes(spec_, *newest_);
 }
 
-bool ConditionWatch::passes(const FieldValue& value) const {
+bool ConditionWatch::passes(const ConditionSpec& spec, const FieldValue& value) {
   const auto* text = std::get_if<std::string>(&value);
-  if (spec_.is) return text != nullptr && *text == *spec_.is;
-  if (spec_.contains) return text != nullptr && text->find(*spec_.contains) != std::string::npos;
-  return text == nullptr && spec_.bound.holds(std::get<double>(value));
+  if (spec.is) return text != nullptr && *text == *spec.is;
+  if (spec.contains) return text != nullptr && text->find(*spec.contains) != std::string::npos;
+  return text == nullptr && spec.bound.holds(std::get<double>(value));
 }
 
 void ConditionWatch::see(const std::optional<FieldValue>& value, int64_t at_ns) {
-  if (!counts(at_ns)) return;
+  if (excepted_ || !counts(at_ns)) return;
   ++seen_;
   newest_ = spec_.of == ConditionSpec::Of::messages ? FieldValue(static_cast<double>(seen_)) : value;
-  const bool passed = std::exchange(passes_now_, newest_ && passes(*newest_));
+  const bool passed = std::exchange(passes_now_, newest_ && passes(spec_, *newest_));
   if (passes_now_ && (!passed || !since_ns_)) since_ns_ = at_ns;
   if (passes_now_ && !first_ns_) first_ns_ = at_ns, first_ = newest_;
   const bool breaks = (spec_.holds == Holds::always && !passes_now_) || (spec_.holds == Holds::never && passes_now_);
@@ -83,13 +83,19 @@ std::string ConditionWatch::what() const {
                      spec_.other.empty() ? fmt::format("({:g} m, {:g} m)", spec_.x_m, spec_.y_m) : spec_.other);
 }
 
-std::string ConditionWatch::expected() const {
+std::string ConditionWatch::test_text() const {
   const std::string unit = spec_.unit.empty() ? "" : " " + spec_.unit;
+  if (spec_.is) return "is " + quoted(*spec_.is);
+  if (spec_.contains) return "contains " + quoted(*spec_.contains);
+  if (spec_.of == ConditionSpec::Of::distance) return fmt::format("within {:g}{}", *spec_.bound.at_most, unit);
+  return bound_text(spec_.bound, unit);
+}
+
+std::string ConditionWatch::expected() const {
   std::string text = spec_.of == ConditionSpec::Of::messages ? "" : fmt::format("{} ", word_of(spec_.holds));
-  if (spec_.is) text += "is " + quoted(*spec_.is);
-  else if (spec_.contains) text += "contains " + quoted(*spec_.contains);
-  else if (spec_.of == ConditionSpec::Of::distance) text += fmt::format("within {:g}{}", *spec_.bound.at_most, unit);
-  else text += bound_text(spec_.bound, unit);
+  text += test_text();
+  for (const ConditionSpec& exception : spec_.unless)
+    text += " unless " + ConditionWatch(exception).what() + " " + ConditionWatch(exception).test_text();
   if (spec_.from_ns > 0) text += fmt::format(" from {:g} s", seconds(spec_.from_ns));
   if (spec_.to_ns) text += fmt::format(" to {:g} s", seconds(*spec_.to_ns));
   return text;

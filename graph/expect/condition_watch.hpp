@@ -17,6 +17,11 @@ class ConditionWatch {
   /// What it is about was so then: of one message, or in the world. Nothing: it had no value.
   void see(const std::optional<FieldValue>& value, int64_t at_ns);
 
+  /// What `unless` names was so in the newest message.
+  void see_exception(const std::optional<FieldValue>& value) {
+    excepted_ = value && passes(spec_.unless.front(), *value);
+  }
+
   /// As far as can be said at that instant it holds, and no later instant of its window is to be waited for.
   bool satisfied(int64_t now_ns) const;
   /// It can not hold any more.
@@ -28,14 +33,16 @@ class ConditionWatch {
 
  private:
   bool counts(int64_t at_ns) const { return at_ns >= spec_.from_ns && (!spec_.to_ns || at_ns < *spec_.to_ns); }
-  bool passes(const FieldValue& value) const;
+  static bool passes(const ConditionSpec& spec, const FieldValue& value);
   bool met() const;
   std::string what() const;
+  std::string test_text() const;
   std::string expected() const;
   std::string observed() const;
 
   const ConditionSpec spec_;
   uint64_t seen_ = 0;
+  bool excepted_ = false;
   bool passes_now_ = false;
   std::optional<int64_t> first_ns_;   ///< it passed for the first time
   std::optional<int64_t> since_ns_;   ///< it has passed from then on

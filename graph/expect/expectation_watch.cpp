@@ -35,18 +35,20 @@ ExpectationWatch::ExpectationWatch(const ExpectSpec& expect, const Plan& plan, T
     : world_(std::move(world)) {
   for (const ConditionSpec& spec : expect.conditions) {
     conditions_.emplace_back(spec);
-    if (!about_world(spec)) hear(conditions_.size() - 1, plan, transport);
+    if (!about_world(spec)) hear(conditions_.size() - 1, spec, false, plan, transport);
+    for (const ConditionSpec& exception : spec.unless) hear(conditions_.size() - 1, exception, true, plan, transport);
   }
 }
 
-void ExpectationWatch::hear(size_t condition, const Plan& plan, Transport& transport) {
-  const ConditionSpec& spec = conditions_[condition].spec();
+void ExpectationWatch::hear(size_t condition, const ConditionSpec& spec, bool excepts, const Plan& plan,
+                            Transport& transport) {
   for (size_t p = 0; p < plan.ports.size(); ++p) {
     if (plan.ports[p].node != spec.port.node || plan.ports[p].port != spec.port.port) continue;
     const auto field = find_field(*plan.ports[p].type, spec.field);
     auto known = ports_.find(p);
     if (known == ports_.end()) known = ports_.emplace(p, Port{Follower(transport.make_reader(p)), {}}).first;
-    known->second.heard.push_back({condition, field.value_or(MessageField{})});  // none where messages are counted
+    known->second.heard.push_back(
+        {condition, excepts, field.value_or(MessageField{})});  // none where messages are counted
   }
 }
 
@@ -60,6 +62,10 @@ void ExpectationWatch::look_at_messages(int64_t epoch_ns) {
     gone_ += port.follower.take([&](const Held& held) {
       for (const Heard& heard : port.heard) {
         ConditionWatch& condition = conditions_[heard.condition];
+        if (heard.excepts) {
+          condition.see_exception(value_of(heard.field, held.message()));
+          continue;
+        }
         const bool counted = condition.spec().of == ConditionSpec::Of::messages;
         condition.see(counted ? std::nullopt : value_of(heard.field, held.message()),
                       held.header->published_ns - epoch_ns);

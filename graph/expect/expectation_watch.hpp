@@ -45,13 +45,14 @@ class ExpectationWatch {
  private:
   struct Heard {
     size_t condition;
+    bool excepts;  ///< it is what the condition's `unless` names
     MessageField field;
   };
   struct Port {
     Follower follower;
     std::vector<Heard> heard;
   };
-  void hear(size_t condition, const Plan& plan, Transport& transport);
+  void hear(size_t condition, const ConditionSpec& spec, bool excepts, const Plan& plan, Transport& transport);
   void look_at_world(int64_t now_ns, int64_t epoch_ns);
   std::optional<FieldValue> truth(const ConditionSpec& spec, int64_t now_ns) const;
 

@@ -183,6 +183,8 @@ struct ConditionSpec {
   Holds holds = Holds::at_end;
   int64_t from_ns = 0;           ///< what was said or true before does not count; since the epoch, as
   std::optional<int64_t> to_ns;  ///< this: what is said or true from then on
+  /// Of attribute and distance, at most one, of a field: what is true while its newest message passes does not count.
+  std::vector<ConditionSpec> unless;
   Position position;
 };
 

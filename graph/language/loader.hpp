@@ -120,6 +120,7 @@ class Loader {
   bool read_number_test(ConditionSpec& condition, const nlohmann::json& value, const std::string& pointer);
   bool read_text_test(ConditionSpec& condition, const nlohmann::json& value, const std::string& pointer);
   bool read_window(ConditionSpec& condition, const nlohmann::json& value, const std::string& pointer);
+  bool read_unless(ConditionSpec& condition, const nlohmann::json& value, const std::string& pointer);
   bool check_keys(const nlohmann::json& value, const std::string& pointer, std::string_view what,
                   const std::vector<std::string>& valid);
 

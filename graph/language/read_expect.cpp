@@ -15,7 +15,7 @@ namespace {
 using nlohmann::json;
 
 const std::vector<std::string> kWindow{"from", "to"}, kTests{"is", "contains", "at_least", "at_most"},
-    kOthers{"port", "field", "messages", "world", "within", "of", "holds"};
+    kOthers{"port", "field", "messages", "world", "within", "of", "holds", "unless"};
 
 std::vector<std::string> joined(std::initializer_list<std::vector<std::string>> lists) {
   std::vector<std::string> all;
@@ -67,7 +67,7 @@ std::optional<ConditionSpec> Loader::read_condition(const json& value, const std
   condition.holds = holds_of(value.value("holds", json()));
   const bool sound = (value.contains("port") ? read_port_condition(condition, value, pointer)
                                              : read_world_condition(condition, value, pointer)) &&
-                     read_window(condition, value, pointer);
+                     read_window(condition, value, pointer) && read_unless(condition, value, pointer);
   return sound ? std::optional(std::move(condition)) : std::nullopt;
 }
 
@@ -133,14 +133,16 @@ bool Loader::read_world_condition(ConditionSpec& condition, const json& value, c
   if (dot == std::string::npos) return read_distance(condition, value, pointer);
   condition.of = ConditionSpec::Of::attribute;
   condition.attribute = name.substr(dot + 1);
-  return check_keys(value, pointer, "an attribute", joined({{"world", "is", "contains", "holds"}, kWindow})) &&
+  return check_keys(value, pointer, "an attribute",
+                    joined({{"world", "is", "contains", "holds", "unless"}, kWindow})) &&
          read_text_test(condition, value, pointer);
 }
 
 bool Loader::read_distance(ConditionSpec& condition, const json& value, const std::string& pointer) {
   condition.of = ConditionSpec::Of::distance;
   condition.unit = "m";
-  if (!check_keys(value, pointer, "a distance", joined({{"world", "within", "of", "holds"}, kWindow}))) return false;
+  if (!check_keys(value, pointer, "a distance", joined({{"world", "within", "of", "holds", "unless"}, kWindow})))
+    return false;
   if (!value.contains("within") || !value.contains("of")) {
     problem(
         condition.position,
@@ -214,6 +216,21 @@ bool Loader::read_window(ConditionSpec& condition, const json& value, const std:
   if (condition.to_ns && *condition.to_ns <= condition.from_ns)
     problem(graph_.value_at(child(pointer, "to")), "`to` is not after `from`: nothing would count");
   return problems_.size() == before;
+}
+
+bool Loader::read_unless(ConditionSpec& condition, const json& value, const std::string& pointer) {
+  if (!value.contains("unless")) return true;
+  const std::string place = child(pointer, "unless");
+  auto exception = read_condition(value["unless"], place);
+  if (!exception) return false;
+  const json& given = value["unless"];
+  if (exception->of != ConditionSpec::Of::field || given.contains("holds") || given.contains("from") ||
+      given.contains("to")) {
+    problem(graph_.value_at(place), "`unless` is a test of a `field` of a `port`, without `holds`, `from` and `to`");
+    return false;
+  }
+  condition.unless.push_back(std::move(*exception));
+  return true;
 }
 
 }  // namespace takt::graph

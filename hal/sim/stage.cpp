@@ -10,9 +10,9 @@ namespace {
 constexpr int64_t kNoEpoch = std::numeric_limits<int64_t>::min();
 constexpr size_t kMostQuads = 8, kMostCapsules = 13;  // of one shape: a box, a board and a shirt; a person
 
-/// A robot as the others see it: 0.78 m long, 0.56 m wide (algorithms.md 13), as high as the one of the thesis.
+/// A robot as the others see it, as high as the one of the thesis.
 const Shape& robot_shape() {
-  static const Shape shape{Box{0.78, 0.56, 1.78, 0, Material::cloth}, {}, {}};
+  static const Shape shape{Box{kRobotLength, kRobotWidth, 1.78, 0, Material::cloth}, {}, {}};
   return shape;
 }
 const Shape& no_shape() {

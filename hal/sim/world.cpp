@@ -5,6 +5,7 @@
 #include <cmath>
 #include <fstream>
 #include <limits>
+#include <set>
 #include <sstream>
 
 #include "hal/sim/placed.hpp"
@@ -167,6 +168,19 @@ std::string_view terrain_at(const World& world, const Vec2& place) {
   };
   const auto top = std::find_if(world.terrain.rbegin(), world.terrain.rend(), covers);
   return top == world.terrain.rend() ? std::string_view("floor") : std::string_view(top->name);
+}
+
+std::string terrain_under(const World& world, const Vec2& middle, double theta_rad) {
+  constexpr int kAlong = 8, kAcross = 6;
+  const Vec2 ahead(std::cos(theta_rad), std::sin(theta_rad)), left(-ahead.y(), ahead.x());
+  std::set<std::string_view> names;
+  for (int i = 0; i <= kAlong; ++i)
+    for (int j = 0; j <= kAcross; ++j)
+      names.insert(terrain_at(world, middle + kRobotLength * (static_cast<double>(i) / kAlong - 0.5) * ahead +
+                                         kRobotWidth * (static_cast<double>(j) / kAcross - 0.5) * left));
+  std::string all;
+  for (const std::string_view name : names) all.append(all.empty() ? "" : ", ").append(name);
+  return all;
 }
 
 double cast_ray(const World& world, const Scene& scene, const Vec3& origin, const Vec3& direction, double max_range) {

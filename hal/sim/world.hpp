@@ -154,6 +154,11 @@ tl::expected<Bitmap, std::string> parse_rows(const std::string& text, double cel
 /// Floor, ceiling, walls (one rectangle for each straight run of cell borders), and the objects as they begin.
 Scene build_scene(const World& world, std::shared_ptr<const TextureSet> textures);
 
+/// Of a robot as others see it, m (algorithms.md 13).
+constexpr double kRobotLength = 0.78, kRobotWidth = 0.56;
+
+/// Names of all terrains under a robot's outline, looked at every 0.1 m at most: "crossing, floor".
+std::string terrain_under(const World& world, const Vec2& middle, double theta_rad);
 /// Name of the terrain at a place of the floor; "floor" where there is none.
 std::string_view terrain_at(const World& world, const Vec2& place);
 

@@ -109,8 +109,10 @@ void Mission::drive(const Percept& percept, bool over) {
     tell("stop");
     return enter(State::done);
   }
-  if (!last && percept.sign_m && *percept.sign_m <= parameters_.stop_before_m)
+  if (!last && percept.sign_m && *percept.sign_m <= parameters_.stop_before_m) {
+    to_cross_m_ = *percept.sign_m + parameters_.cross_least_m;
     return turn_to_direction(percept.robot, State::face);
+  }
   const double along = (percept.robot.x_m - began_.x_m) * std::cos(*direction_rad_) +
                        (percept.robot.y_m - began_.y_m) * std::sin(*direction_rad_);
   if (along > farthest_m_ + kGotOn_m) {
@@ -127,7 +129,7 @@ void Mission::follow(const Percept& percept) {
   if (std::abs(percept.speed_m_s) > kStands_m_s) standing_ns_ = -1;
   else if (standing_ns_ < 0) standing_ns_ = now_ns_;
   const bool stood = standing_ns_ >= 0 && since_s(standing_ns_) >= parameters_.stand_s;
-  if (stood && distance_m(percept.robot, began_) >= parameters_.cross_least_m) {
+  if (stood && distance_m(percept.robot, began_) >= to_cross_m_) {
     ++crossed_;
     began_ = percept.robot;
     farthest_m_ = 0;

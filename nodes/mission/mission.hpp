@@ -24,7 +24,7 @@ struct MissionParameters {
   double read_within_s = 10;   ///< else somebody is asked again
   int asking = 3;              ///< times at most
   double stop_before_m = 3.5;  ///< so far from the sign of a crossing the robot waits
-  double cross_least_m = 3;    ///< nobody's crossing is shorter
+  double cross_least_m = 3;    ///< no crossing is narrower; behind its sign
   double stand_s = 3;          ///< whoever is followed so far and stands so long has led across
   double follow_within_s = 120;
   double patience_s = 30;  ///< without getting on along the direction
@@ -97,6 +97,7 @@ class Mission {
   std::optional<double> direction_rad_;
   PlanarPose began_;          ///< driving, following, or beyond the last crossing
   double farthest_m_ = 0;     ///< along the direction since then
+  double to_cross_m_ = 0;     ///< from where following began to beyond the crossing, at least
   int64_t got_on_ns_ = 0;     ///< when it was
   int64_t standing_ns_ = -1;  ///< since when; -1: it drives
 };

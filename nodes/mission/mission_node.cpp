@@ -180,7 +180,7 @@ class MissionNode final : public Node {
   Param<double> stop_before_{this,        "stop_before", MissionParameters{}.stop_before_m,
                              {0.5, 20.0}, "m",           "so far from the sign of a crossing it waits"};
   Param<double> cross_least_{this,        "cross_least", MissionParameters{}.cross_least_m,
-                             {0.5, 50.0}, "m",           "no crossing is shorter"};
+                             {0.5, 50.0}, "m",           "no crossing is narrower; counts from its sign on"};
   Param<double> patience_{this,         "patience", MissionParameters{}.patience_s,
                           {1.0, 600.0}, "s",        "without getting on along the direction"};
   Param<int> crossings_{this, "crossings", 1, {0, 20}, "", "on the way"};

@@ -20,15 +20,21 @@ class ActionCosts {
   }
   /// `took_s` >= 0. Takes memory at an action's first time.
   void learn(NodeId action, double declared_s, double took_s) {
-    Learned& l = learned_.try_emplace(action, Learned{declared_s, 1}).first->second;
+    Learned& l = learned_.try_emplace(action, Learned{declared_s, 1, 0}).first->second;
     l.count = std::min<uint32_t>(l.count + 1, 10);
     l.mean_s += (took_s - l.mean_s) / l.count;
+    ++l.times;
+  }
+  /// visit(action, mean in s, how often it was done) for each that was.
+  template <class Visit>
+  void each(Visit visit) const {
+    for (const auto& [action, learned] : learned_) visit(action, learned.mean_s, learned.times);
   }
 
  private:
   struct Learned {
     double mean_s;
-    uint32_t count;
+    uint32_t count, times;
   };
   std::map<NodeId, Learned> learned_;
 };

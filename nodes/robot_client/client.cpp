@@ -10,8 +10,7 @@
 namespace takt::robot_client {
 namespace {
 
-constexpr double kActorReach_m = 0.8;  // of who carries actions out; the stand-offs leave the pilot's error below it
-constexpr double kMoved_m = 0.2;       // an object that was driven to, and is elsewhere now
+constexpr double kMoved_m = 0.2;  // an object that was driven to, and is elsewhere now
 constexpr size_t kMostRecords = 64, kMostExploringTroubles = 5;
 
 }  // namespace
@@ -275,7 +274,7 @@ void Client::drive_to_objects(const Deed& deed) {
 
 bool Client::in_reach(const Deed& deed) const {
   const auto places = knowledge_.places(knowledge_.objects_of(deed));
-  const Disc reach{{robot_.x_m, robot_.y_m}, kActorReach_m};
+  const Disc reach{{robot_.x_m, robot_.y_m}, parameters_.deliberation.reach_m};
   return std::all_of(places.begin(), places.end(), [&](const Place& place) { return reach.contains(place); });
 }
 

@@ -45,6 +45,10 @@ void Client::write_plan(std::string& into) const {
     taken(r.action_took_s);
     into += executing() && i == first_record_ + step_ ? "  <- now\n" : "\n";
   }
+  costs_.each([&](NodeId action, double mean_s, uint32_t times) {
+    fmt::format_to(out, "{} is taken to last {:.1f} s, declared {:.1f} s, done {} times\n", knowledge_.name(action),
+                   mean_s, knowledge_.map().action(action).cost_s, times);
+  });
   if (!executing()) return;
   const planner::Plan& plan = deliberation_.plan();
   fmt::format_to(out, "{:.1f} s in all{}", static_cast<double>(plan.cost_ns) * 1e-9,

@@ -10,8 +10,26 @@ namespace {
 
 double distance_m(const Place& a, const Place& b) { return std::hypot(b.x_m - a.x_m, b.y_m - a.y_m); }
 
+constexpr double kOff_m = 0.04;  // as far as the pilot may be off (unit tests of navigation)
+
 bool reaches(const Place& from, std::span<const Place> objects, double reach_m) {
   return std::all_of(objects.begin(), objects.end(), [&](const Place& o) { return distance_m(from, o) <= reach_m; });
+}
+
+Place between(const Place& a, const Place& b, double share) {
+  return {a.x_m + share * (b.x_m - a.x_m), a.y_m + share * (b.y_m - a.y_m)};
+}
+
+/// Cells are coarse: the last piece of a way ends where all is within reach, whatever the pilot is off.
+void end_within_reach(std::span<const Place> objects, double reach_m, std::vector<Place>& way) {
+  const Place begin = way[way.size() - 2], end = way.back();
+  double outside = 0, inside = 1;
+  if (!reaches(end, objects, reach_m - kOff_m) || reaches(begin, objects, reach_m - kOff_m)) return;
+  while (inside - outside > 1e-6) {
+    const double middle = (outside + inside) / 2;
+    (reaches(between(begin, end, middle), objects, reach_m - kOff_m) ? inside : outside) = middle;
+  }
+  way.back() = between(begin, end, inside);
 }
 
 }  // namespace
@@ -52,14 +70,13 @@ PathOutcome way_to_objects(PathPlanner* planner, const Place& from, std::span<co
   if (disc.radius_m > reach_m) return PathOutcome::no_way;
   if (planner != nullptr) {
     const PathOutcome outcome = planner->plan_near(from, objects, reach_m, way);
+    if (outcome == PathOutcome::found) end_within_reach(objects, reach_m, way);
     // Where no cell's middle lies in so small an overlap, its own middle does.
     return outcome == PathOutcome::no_way ? planner->plan(from, disc.middle, 0, way) : outcome;
   }
   const double left_m = distance_m(disc.middle, from), stop_m = std::min(left_m, reach_m - disc.radius_m);
   const double share = left_m > 0 ? stop_m / left_m : 0;
-  way.assign({from,
-              {disc.middle.x_m + share * (from.x_m - disc.middle.x_m),
-               disc.middle.y_m + share * (from.y_m - disc.middle.y_m)}});
+  way.assign({from, between(disc.middle, from, share)});
   return PathOutcome::found;
 }
 

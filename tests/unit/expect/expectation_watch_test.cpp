@@ -131,6 +131,35 @@ TEST_CASE("the world: attributes, distances from places and objects; it is looke
   CHECK(watch.findings()[1].since_s == doctest::Approx(0.01));
 }
 
+TEST_CASE("what is true while the exception's newest message passes does not count") {
+  Fixture f;
+  ConditionSpec never;
+  never.of = ConditionSpec::Of::attribute;
+  never.object = "cup", never.attribute = "content", never.is = "full", never.holds = Holds::never;
+  never.unless.push_back(f.speed(1, Holds::at_end));
+  f.expect.conditions = {never};
+  auto watch = f.watch();
+  watch.look(kEpoch, kEpoch);
+  CHECK(watch.findings()[0].met);
+  CHECK(watch.findings()[0].expected == "never is \"full\" unless base.odometry speed_m_s at least 1");
+  f.content = "full";
+  f.say(2, kEpoch + 5 * kMs);
+  watch.look(kEpoch + 10 * kMs, kEpoch);
+  CHECK(watch.findings()[0].met);
+  f.say(0, kEpoch + 15 * kMs);
+  watch.look(kEpoch + 20 * kMs, kEpoch);
+  CHECK_FALSE(watch.findings()[0].met);
+  CHECK(watch.findings()[0].since_s == doctest::Approx(0.02));
+  CHECK(watch.decided(kEpoch + 20 * kMs, kEpoch));
+
+  Fixture silent;  // nobody says anything that passes: all of it counts
+  silent.expect.conditions = {never};
+  silent.content = "full";
+  auto strict = silent.watch();
+  strict.look(kEpoch, kEpoch);
+  CHECK_FALSE(strict.findings()[0].met);
+}
+
 TEST_CASE("objects that the world does not have are told before the run, with those it has") {
   Fixture f;
   ConditionSpec spec;

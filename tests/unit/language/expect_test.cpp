@@ -75,6 +75,12 @@ TEST_CASE("conditions on the world: attributes and distances") {
   CHECK(c.y_m == -4);
   CHECK(c.other.empty());
   CHECK(condition("world: ace, within: 1m, of: bernd").other == "bernd");
+  c = condition(
+      "world: ace.terrain, contains: street, holds: never, unless: {port: base.odometry, field: speed_m_s, at_most: "
+      "0m/s}");
+  REQUIRE(c.unless.size() == 1);
+  CHECK(c.unless[0].port.text() == "base.odometry");
+  CHECK(c.unless[0].bound.at_most == 0);
 }
 
 TEST_CASE("figures, as a fault scenario has them") {
@@ -114,6 +120,12 @@ TEST_CASE("tests that do not fit, or lack a unit") {
   wrong("world: cup", "{world", {"within: 0.5m, of: [3m, 4m]"});
   wrong("world: cup, within: 1, of: [3m, 4m]", "1,", {"`within`", "without a unit"});
   wrong("world: cup, within: 1m, of: [3m, 4m, 5m]", "[3m", {"two lengths"});
+  wrong("world: cup.content, is: full, unless: {world: ace.blocked, is: true}", "{world: ace", {"a test of a `field`"});
+  wrong("world: cup.content, is: full, unless: {port: base.odometry, messages: 1}", "{port", {"a test of a `field`"});
+  wrong("world: cup.content, is: full, unless: {port: base.odometri, is: 1}", "base.odometri",
+        {"did you mean `odometry`?"});
+  wrong("port: base.odometry, messages: 1, unless: {port: base.odometry, messages: 1}", "unless",
+        {"takes no `unless`"});
   wrong("holds: once", "{holds", {"either on a `port` or on the simulated `world`"});
   wrong("port: base.odometry, messages: 1, from: 2s, to: 1s", "1s}", {"not after `from`"});
   wrong("port: base.odometry, messages: 1, from: 2", "2}", {"`from`", "without a unit"});

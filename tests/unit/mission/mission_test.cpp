@@ -113,7 +113,11 @@ TEST_CASE("the whole mission: asks, reads, drives, waits, follows, drives on") {
   CHECK(vision_of(State::follow) == VisionState::tracking);
   town.step(10);  // whoever waits at the kerb stands, too
   CHECK(town.mission.state() == State::follow);
-  town.percept.speed_m_s = 0.6, town.percept.robot.x_m += 6, town.step();
+  town.percept.speed_m_s = 0.6, town.percept.robot.x_m += 6.3, town.step();
+  town.percept.speed_m_s = 0, town.step();
+  town.step(10);  // 3.4 m to the sign, and 3 m at least behind it
+  CHECK(town.mission.state() == State::follow);
+  town.percept.speed_m_s = 0.6, town.percept.robot.x_m += 0.2, town.step();
   town.percept.speed_m_s = 0, town.step();
   town.step(2.9);
   CHECK(town.mission.state() == State::follow);
