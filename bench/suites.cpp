@@ -23,6 +23,7 @@ std::vector<Row> run_ego_motion(const Options&);
 std::vector<Row> run_signs(const Options&);
 std::vector<Row> run_sift(const Options&);
 std::vector<Row> run_objects(const Options&);
+std::vector<Row> run_detection(const Options&);
 std::vector<Row> run_objects_3d(const Options&);
 std::vector<Row> run_mapping(const Options&);
 std::vector<Row> run_semantic(const Options&);
@@ -51,6 +52,7 @@ std::span<const Suite> suites() {
       {"signs", "seven cascades over a scene of 640x480, against OpenCV's detector", run_signs},
       {"sift", "objects in a scene: the colour stage against OpenCV's SIFT", run_sift},
       {"objects", "histogram cascade at 640x480: stages on all windows against brute force, the whole", run_objects},
+      {"detection", "the same as objects", run_detection},
       {"objects_3d", "things on a table: growing regions against a kd-tree, the whole", run_objects_3d},
       {"mapping", "scan matching: search, refinement against brute force; occupancy map, pose filter", run_mapping},
       {"semantic", "network queries, insertion and plans against the size of the network", run_semantic},

@@ -258,6 +258,26 @@ Json Server::change_mode(const std::string& name) {
 }
 
 Json Server::set(const std::string& name, const std::string& text) {
+  const size_t colon = name.find(':');
+  return colon == std::string::npos ? set_one(name, text)
+                                    : set_all(name.substr(0, colon), name.substr(colon + 1), text);
+}
+
+Json Server::set_all(const std::string& type, const std::string& key, const std::string& text) {
+  std::vector<std::string> types;
+  Json answer;
+  for (const graph::NodeSpec& spec : subject_.graph.nodes) {
+    types.push_back(spec.type);
+    if (spec.type != type) continue;
+    const Json one = set_one(spec.id + "." + key, text);
+    if (!answer.contains("error")) answer = one;  // the first that refuses is told, the others are asked all the same
+  }
+  if (!answer.is_null()) return answer;
+  return wrong(
+      fmt::format("there is no node of type {}{}", graph::ticked(type), graph::alternatives(type, types, "types")));
+}
+
+Json Server::set_one(const std::string& name, const std::string& text) {
   const size_t dot = name.find('.');
   const std::string id = name.substr(0, dot), key = dot == std::string::npos ? "" : name.substr(dot + 1);
   std::vector<std::string> ids, keys;

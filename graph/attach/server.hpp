@@ -54,7 +54,10 @@ class Server {
   /// `as`: "png", "ply" or "", for text alone; `items`: of longer arrays so many elements.
   bool stream(size_t port, const std::string& as, size_t items, int64_t count, Connection& connection);
   nlohmann::ordered_json change_mode(const std::string& name);
+  /// `name`: NODE.PARAM, or TYPE:PARAM for every node of that type.
   nlohmann::ordered_json set(const std::string& name, const std::string& text);
+  nlohmann::ordered_json set_one(const std::string& name, const std::string& text);
+  nlohmann::ordered_json set_all(const std::string& type, const std::string& key, const std::string& text);
   nlohmann::ordered_json post_and_wait(size_t task, size_t param, const ParamValue& value);
   size_t find_port(const std::string& name) const;
   /// Of a node; "" of a device.

@@ -141,7 +141,7 @@ void add_attach_commands(CLI::App& app, AttachOptions& o, int& exit_code) {
   echo->add_option("--count", o.count, "how many messages")->check(CLI::PositiveNumber);
   echo->callback([&] { exit_code = understood([&] { return run_echo(o); }); });
   CLI::App* set = add(app, "set", "sets a parameter of a running node, between two of its jobs", o);
-  set->add_option("param", o.param, "NODE.PARAM")->required();
+  set->add_option("param", o.param, "NODE.PARAM, or TYPE:PARAM for every node of that type")->required();
   set->add_option("value", o.value, "with its unit")->required();
   set->callback([&] {
     exit_code = understood([&] { return run_question(o, {{"do", "set"}, {"param", o.param}, {"value", o.value}}); });

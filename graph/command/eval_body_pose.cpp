@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cstdio>
+#include <limits>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -18,6 +20,8 @@ namespace {
 
 using namespace body_pose;
 using Json = nlohmann::ordered_json;
+
+constexpr double kReserve_ms = 5;  ///< what the node leaves of its budget (its parameter `reserve`)
 
 double quantile(std::vector<double> v, double share) {
   if (v.empty()) return 0;
@@ -125,6 +129,7 @@ Json to_json(const Figures& f) {
           {"joint_median_m", quantile(f.joint_m, 0.5)},
           {"missing_pct", f.links == 0 ? 0 : 100.0 * f.missing / f.links},
           {"valid", f.valid},
+          {"searched_pct", f.trials == 0 ? 0 : 100 * f.searched / f.trials},
           {"time_ms", quantile(f.time_ms, 0.5)},
           {"time_max_ms", quantile(f.time_ms, 1)}};
 }
@@ -135,6 +140,8 @@ Json measure_generated(const EvalBodyPoseOptions& options) {
   p.fit.search_m = options.search_m;
   SceneCamera camera;
   camera.noise_px = options.noise_px;
+  camera.disparity_step_px = options.step_px;
+  camera.tilt_rad = options.tilt_rad;
   if (skeleton.links[0].name != "head")
     return to_json(measure_any(skeleton, p.fit, camera, options.seed, options.people));
   BodyDetector detector(skeleton, p, static_cast<size_t>(camera.width) * static_cast<size_t>(camera.height));
@@ -146,8 +153,11 @@ Json measure_generated(const EvalBodyPoseOptions& options) {
     const auto bodies = detector.run(scene.in_floor, eye_of(scene.camera_in_floor), [] { return true; });
     write(options.picture, draw_bodies(large, scene.camera, scene.camera_in_floor, scene.in_floor, skeleton, bodies));
   }
-  Json out = to_json(measure_people(detector, camera, options.seed, options.people));
+  const double search_ms =
+      options.budget_ms > 0 ? options.budget_ms - kReserve_ms : std::numeric_limits<double>::infinity();
+  Json out = to_json(measure_people(detector, camera, options.seed, options.people, search_ms));
   out["seed"] = options.seed;
+  out["budget_ms"] = options.budget_ms;
   out["thesis"] = {{"right_pct", 80.2}, {"angle_median_deg", 6.8}, {"time_ms", 150}};
   return out;
 }
@@ -184,6 +194,14 @@ void add_eval_body_pose(CLI::App& eval, EvalBodyPoseOptions& o, int& exit_code) 
   app->add_option("--people", o.people, "number of scenes (default 150)")->check(CLI::Range(1, 100000));
   app->add_option("--noise", o.noise_px, "standard deviation of disparities, px (default 0.1)")
       ->check(CLI::Range(0.0, 5.0));
+  app->add_option("--step", o.step_px, "of disparities, px: 1 as of stereo without subpixel (default 1/64)")
+      ->check(CLI::Range(0.001, 4.0));
+  app->add_option_function<double>(
+         "--tilt", [&o](double degrees) { o.tilt_rad = degrees * std::numbers::pi / 180; },
+         "of the camera, degrees: below 0 it looks down (default -5.7)")
+      ->check(CLI::Range(-45.0, 45.0));
+  app->add_option("--budget", o.budget_ms, "ms of CPU time for each scene, as the node has it (default: no limit)")
+      ->check(CLI::Range(6.0, 10000.0));
   app->add_option("--search", o.search_m, "a link ends at most so far from where a pose has it, m (default 0.30)")
       ->check(CLI::Range(0.05, 2.0));
   app->add_option("--picture", o.picture, "PNG with the skeletons over image and cloud (of the first scene)");

@@ -41,16 +41,19 @@ struct EvalEgoMotionOptions {
 void add_eval_ego_motion(CLI::App& eval, EvalEgoMotionOptions& options, int& exit_code);
 
 struct EvalObjectsOptions {
-  std::filesystem::path database;     ///< empty: graph/objects of the project
-  std::filesystem::path turntable;    ///< instead of a database; empty: none
-  std::filesystem::path backgrounds;  ///< empty: generated
-  std::vector<std::filesystem::path> negatives;
+  std::filesystem::path database;                ///< empty: graph/objects of the project
+  std::filesystem::path views;                   ///< of a turntable, instead of a database; empty: none
+  std::filesystem::path scenes;                  ///< photographs to put them in; empty: generated
+  std::vector<std::filesystem::path> negatives;  ///< empty: every other one of `scenes`
   std::string bins = "64x64x1";
   std::string scales = "1";
   uint64_t seed = 1;
   int frames = 100;
   int images = 500, empty = 75;
   double occlusion = 0.6;
+  double budget_ms = 0;                ///< of CPU time for an image; 0: none
+  std::vector<double> size{0.8, 1.3};  ///< of the objects in the cascade's scenes, in that of their views
+  bool automatic = false;              ///< thresholds, whatever the database says
   bool study = false;
   std::string picture;  ///< of the study
   bool json = false;
@@ -80,8 +83,10 @@ struct EvalBodyPoseOptions {
   std::filesystem::path skeleton;       ///< empty: the shipped human
   uint64_t seed = 1;
   int people = 150;
-  double noise_px = 0.1;
-  double search_m = 0.30;  ///< of the fit
+  double noise_px = 0.1, step_px = 1.0 / 64;  ///< of disparities
+  double tilt_rad = -0.1;                     ///< of the camera
+  double budget_ms = 0;                       ///< of CPU time for a scene; 0: none
+  double search_m = 0.30;                     ///< of the fit
   std::string picture;
   bool json = false;
 };
@@ -131,11 +136,13 @@ struct EvalTerrainOptions {
 void add_eval_terrain(CLI::App& eval, EvalTerrainOptions& options, int& exit_code);
 
 struct EvalSignsOptions {
-  std::filesystem::path signs;  ///< empty: graph/signs of the project
-  std::filesystem::path data;   ///< gtsrb/, gtsrb_labels.csv, scenes/, scenes_boxes.csv; empty: below TAKT_DATA
+  std::filesystem::path signs;          ///< empty: graph/signs of the project
+  std::filesystem::path crops, labels;  ///< both, or
+  std::filesystem::path scenes, boxes;  ///< both, or none of the four: scenes and passages are generated
   uint64_t seed = 1;
-  int scenes = 150, passages = 70;
+  int count = 150, passages = 70;
   double budget_ms = 36;
+  int confirm = 2;  ///< images in a row until a track counts
   bool json = false;
 };
 void add_eval_signs(CLI::App& eval, EvalSignsOptions& options, int& exit_code);

@@ -142,7 +142,7 @@ void tune(const ObjectsOptions& o) {
     fmt::print("{:<32} {:6.3f} {:6.3f} {:6.3f} {:11.1f} {:17.1f}\n", database[index].label(), t[0], t[1], t[2],
                100 * tuning.chosen.detected, 100 * tuning.chosen.false_positive);
     if (!o.roc.empty()) write_roc(o.roc, tuning);
-    entries.set_thresholds(database[index].label(), {t[0], t[1], t[2]});
+    entries.set_thresholds(database[index].label(), {t[0], t[1], t[2], database[index].thresholds[3]});
   }
   if (o.write) entries.save(o.size_px);
   else
@@ -207,7 +207,7 @@ void test(const ObjectsOptions& o) {
 
 void publish(const ObjectsOptions& o) {
   const std::string revision = publish_revision(o.database, o.size_px);
-  fmt::print("{}\nto a running node: takt set object_detection.revision {}\n", revision, revision);
+  fmt::print("{}\nto all running nodes: takt set object_detection:revision {}\n", revision, revision);
 }
 
 }  // namespace

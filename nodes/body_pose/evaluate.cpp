@@ -51,6 +51,7 @@ const DetectedBody* match(const TrueBody& truth, std::span<const DetectedBody> f
 void add(Figures& figures, const Skeleton& skeleton, const TrueBody& truth, const Outcome& outcome) {
   ++figures.trials;
   figures.time_ms.push_back(outcome.time_ms);
+  figures.searched += outcome.searched;
   const DetectedBody* body = match(truth, outcome.found);
   figures.extra += static_cast<int>(outcome.found.size()) - (body != nullptr ? 1 : 0);
   const auto miss = [&](int& cause) {
@@ -83,15 +84,17 @@ void add(Figures& figures, const Skeleton& skeleton, const TrueBody& truth, cons
   miss(other ? figures.misses.other_arm : fitted ? figures.misses.elsewhere : figures.misses.arm_missing);
 }
 
-Figures measure_people(BodyDetector& detector, const SceneCamera& camera, uint64_t seed, int trials) {
+Figures measure_people(BodyDetector& detector, const SceneCamera& camera, uint64_t seed, int trials, double search_ms) {
   Figures figures;
   for (int i = 0; i < trials; ++i) {
     const GeneratedScene scene = make_person(detector.skeleton(), camera, seed, static_cast<uint64_t>(i));
     const int64_t start = thread_cpu_ns();
-    const auto found = detector.run(scene.in_floor, eye_of(scene.camera_in_floor), kWithoutEnd);
+    const auto found =
+        detector.run(scene.in_floor, eye_of(scene.camera_in_floor), [&] { return ms_since(start) < search_ms; });
     const double time_ms = ms_since(start);
     add(figures, detector.skeleton(), scene.body,
-        {found, has_candidate(detector, scene.body), arm_points(detector.skeleton(), scene) < kArmPoints, time_ms});
+        {found, has_candidate(detector, scene.body), arm_points(detector.skeleton(), scene) < kArmPoints, time_ms,
+         detector.searched()});
   }
   return figures;
 }

@@ -3,6 +3,7 @@
 // median error 6.8 degrees).
 #pragma once
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "nodes/body_pose/body_detector.hpp"
@@ -32,6 +33,7 @@ struct Figures {
   std::vector<double> joint_m;    ///< error of every joint of bodies found
   int links = 0, missing = 0;     ///< of bodies found: all, and those reported missing
   std::vector<double> time_ms;    ///< CPU time of each scene
+  double searched = 0;            ///< share of the rotations of all candidates, sum over the scenes
 
   double right_pct() const { return trials == 0 ? 0 : 100.0 * right / trials; }
 };
@@ -44,15 +46,17 @@ struct Outcome {
   std::span<const DetectedBody> found;
   bool candidate = true;    ///< a cluster begins at the true head
   bool arm_hidden = false;  ///< fewer than kArmPoints points lie on the arm that points
-  double time_ms = 0;
+  double time_ms = 0, searched = 1;
 };
 constexpr int kArmPoints = 25;  ///< of an arm whose direction is to be seen; one in the open has some 150 to 400
 
 /// Adds one scene.
 void add(Figures& figures, const Skeleton& skeleton, const TrueBody& truth, const Outcome& outcome);
 
-/// Person number 0 .. trials - 1 of a seed.
-Figures measure_people(BodyDetector& detector, const SceneCamera& camera, uint64_t seed, int trials);
+/// Person number 0 .. trials - 1 of a seed. The search of each scene ends after so much CPU time, as the node's does at
+/// its budget less its reserve.
+Figures measure_people(BodyDetector& detector, const SceneCamera& camera, uint64_t seed, int trials,
+                       double search_ms = std::numeric_limits<double>::infinity());
 
 /// Any skeleton on make_any() scenes: fitted to all points of the scene above the floor, its start known. `right` is
 /// every trial in which the first pointer of the skeleton is within 45 degrees.

@@ -168,7 +168,8 @@ void look(const World& world, const SceneCamera& c, Lot& lot, GeneratedScene& sc
       const double beside = column > 0 ? depth[at - 1] : z;
       if (std::isfinite(z) && std::isfinite(beside) && std::abs(z - beside) > 0.2 && lot.chance(c.smeared))
         z += lot.in(0, 1) * (beside - z);
-      const double disparity = std::round(64 * (c.focal_px * c.baseline_m / z + c.noise_px * lot.normal())) / 64;
+      const double exact = c.focal_px * c.baseline_m / z + c.noise_px * lot.normal();
+      const double disparity = std::round(exact / c.disparity_step_px) * c.disparity_step_px;
       if (lot.chance(c.missing) || !std::isfinite(z) || !(disparity > 0.5)) continue;
       const Vector3d p = ray_of(column, row) * (c.focal_px * c.baseline_m / disparity), q = rotation * p + eye;
       scene.points.push_back({static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z())});

@@ -15,9 +15,10 @@ struct SceneCamera {
   int width = 640, height = 480, step_px = 2;  ///< one point per step x step pixels
   double focal_px = 283.1, baseline_m = 0.12;
   double height_m = 1.2, tilt_rad = -0.1;
-  double noise_px = 0.1;  ///< standard deviation of a disparity
-  double missing = 0.05;  ///< share of pixels without a disparity
-  double smeared = 0.3;   ///< share of pixels at a depth edge that get a depth between both
+  double noise_px = 0.1;                ///< standard deviation of a disparity
+  double disparity_step_px = 1.0 / 64;  ///< 1: as of stereo without `subpixel`
+  double missing = 0.05;                ///< share of pixels without a disparity
+  double smeared = 0.3;                 ///< share of pixels at a depth edge that get a depth between both
 };
 
 /// A body of known pose.

@@ -191,6 +191,16 @@ Photograph read_photograph(const std::filesystem::path& file) {
   return {file, image.cols, image.rows, {image.datastart, image.dataend}};
 }
 
+std::vector<float> ClassIds::of(const std::vector<DatabaseObject>& database) {
+  std::vector<float> ids;
+  for (const DatabaseObject& entry : database) {
+    const auto known = std::find(labels_.begin(), labels_.end(), entry.label());
+    ids.push_back(static_cast<float>(known - labels_.begin()));
+    if (known == labels_.end()) labels_.push_back(entry.label());
+  }
+  return ids;
+}
+
 std::vector<DatabaseObject> read_classes(const std::filesystem::path& folder, const std::string& list) {
   return Reader(folder, std::nullopt, TestViews::skip, list).read();
 }

@@ -83,6 +83,19 @@ std::vector<Photograph> read_backgrounds(const std::filesystem::path& folder, co
 /// An image file as one. Throws DatabaseError if it is none.
 Photograph read_photograph(const std::filesystem::path& file);
 
+/// Class ids that stay while a database changes: an entry keeps that of the first list that had its label, whatever its
+/// place, and what is new is counted on.
+class ClassIds {
+ public:
+  /// Of the first list: the places in it.
+  explicit ClassIds(const std::vector<DatabaseObject>& first) { of(first); }
+  /// Of each entry.
+  std::vector<float> of(const std::vector<DatabaseObject>& database);
+
+ private:
+  std::vector<std::string> labels_;
+};
+
 /// Names and attributes of the entries alone, for who needs to know what class ids mean: no image is read. Throws
 /// DatabaseError.
 std::vector<DatabaseObject> read_classes(const std::filesystem::path& folder, const std::string& list = "objects.txt");

@@ -34,6 +34,7 @@ Detector::Detector(int image_width, int image_height, std::span<const DatabaseOb
     windows_ += undecided_.back().size();
   }
   if (last_ >= Stage::cooccurrence) candidates_.reserve(windows_ * database.size());
+  for (size_t entry = 0; entry < database.size(); ++entry) class_ids_.push_back(static_cast<float>(entry));
   for (const DatabaseObject& object : database)
     first_of_name_.push_back(static_cast<size_t>(
         std::find_if(database.begin(), database.end(), [&](const auto& other) { return other.name == object.name; }) -
@@ -121,6 +122,7 @@ size_t Detector::detections(double min_score, std::span<Detection> out) {
     };
     if (std::any_of(found_.begin(), found_.begin() + static_cast<ptrdiff_t>(kept), same)) continue;
     out[kept] = next.detection;
+    out[kept].class_id = class_ids_[static_cast<size_t>(next.detection.class_id)];
     found_[kept++] = next;
   }
   return kept;

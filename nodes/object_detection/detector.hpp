@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <algorithm>
 #include <span>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "nodes/object_detection/scale_search.hpp"
@@ -20,6 +22,8 @@ class Detector {
            std::span<const Photograph> backgrounds = {});
 
   Stage last() const { return last_; }
+  /// What detections of each entry are called instead of its index in the database.
+  void set_class_ids(std::vector<float> of_entry) { class_ids_ = std::move(of_entry); }
   /// In force in a stage that compares histograms; empty for one that does not run.
   const std::vector<std::vector<ReferenceLimit>>& limits(Stage stage) const {
     return references_[static_cast<size_t>(stage)].limits;
@@ -46,6 +50,14 @@ class Detector {
     while (!candidates_.empty() && another_window()) decide_best_candidate();
     end();
     return true;
+  }
+  /// The same until no more than `reserve_ns` of `time_left_ns()` is left. Half of what lies before that is kept for
+  /// the stages behind orientations: they decide on what is reported.
+  template <class TimeLeft>
+  bool run_within(ImageView<const uint8_t> bgr, const MaskSums* mask, TimeLeft time_left_ns, int64_t reserve_ns) {
+    const int64_t kept_ns = last_ >= Stage::cooccurrence ? std::max<int64_t>(0, time_left_ns() - reserve_ns) / 2 : 0;
+    return run(
+        bgr, mask, [&] { return time_left_ns() > reserve_ns + kept_ns; }, [&] { return time_left_ns() > reserve_ns; });
   }
   /// Share of the windows that the last run() decided on, 0..1; those outside the mask count.
   float searched() const;
@@ -91,7 +103,8 @@ class Detector {
   size_t first_row_ = 0, searched_rows_ = 0, searched_windows_ = 0;
   std::vector<Candidate> candidates_;            ///< a heap, the best in front
   std::vector<std::vector<uint8_t>> undecided_;  ///< by scale: windows that were candidates to the end
-  std::vector<size_t> first_of_name_;            ///< of each class: the first of the same object
+  std::vector<size_t> first_of_name_;            ///< of each entry: the first of the same object
+  std::vector<float> class_ids_;                 ///< of each entry
   std::vector<Detection> at_scale_;
   std::vector<Found> found_;
 };

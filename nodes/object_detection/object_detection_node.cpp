@@ -37,16 +37,23 @@ class ObjectDetectionNode final : public Node {
         return std::make_unique<Detector>(width, height, database, p, backgrounds);
       };
       const auto folder = setup.directory / database_();
-      detector_ = make(read_database(folder, reference_, TestViews::skip), read_backgrounds(folder));
-      build_ = [make, folder, side_px = reference_()](const std::string& revision) {
-        return make(read_revision(folder, revision, side_px), read_backgrounds(revision_folder(folder, revision)));
+      const auto database = read_database(folder, reference_, TestViews::skip);
+      const auto backgrounds = read_backgrounds(folder);
+      detector_ = make(database, backgrounds);
+      build_ = [make, folder, database, backgrounds, known = ClassIds(database),
+                side_px = reference_()](const std::string& revision) mutable {
+        if (revision.empty()) return make(database, backgrounds);
+        const auto changed = read_revision(folder, revision, side_px);
+        auto detector = make(changed, read_backgrounds(revision_folder(folder, revision)));
+        detector->set_class_ids(known.of(changed));
+        return detector;
       };
     } catch (const DatabaseError& error) {
       throw SetupError(error.what());
     } catch (const std::invalid_argument& error) {
       throw SetupError(error.what());
     }
-    in_use_.reserve(Reloader::kLongestRevision);
+    for (std::string* name : {&in_use_, &asked_, &refused_}) name->reserve(Reloader::kLongestRevision);
     virtual_time_ = setup.clock.is_virtual();
     may(bit(JobCall::sleep), "in virtual time and in a replay a job waits for the database that it changes to");
     mask_sums_.emplace(mask_.connected() ? mask_.capacity().pixels() : 0);
@@ -61,13 +68,9 @@ class ObjectDetectionNode final : public Node {
     follow_revision(job);
     const StereoPair* pair = pair_.newest();
     if (!pair || !pair_.is_new()) return job.no_result();
-    // Half of the time is kept for co-occurrences: they decide on what is reported.
-    const auto reserve_ns = static_cast<int64_t>(reserve_() * 1e9);
-    const int64_t kept_ns =
-        detector_->last() >= Stage::cooccurrence ? std::max<int64_t>(0, job.time_left_ns() - reserve_ns) / 2 : 0;
-    const auto another_row = [&] { return job.time_left_ns() > reserve_ns + kept_ns; };
-    const auto another_window = [&] { return job.time_left_ns() > reserve_ns; };
-    if (!detector_->run(pair->left_view(), take_mask(), another_row, another_window)) return job.no_result();
+    const auto time_left_ns = [&] { return job.time_left_ns(); };
+    if (!detector_->run_within(pair->left_view(), take_mask(), time_left_ns, static_cast<int64_t>(reserve_() * 1e9)))
+      return job.no_result();
     Detections* found = detections_.connected() ? detections_.loan() : nullptr;
     if (found != nullptr) {
       found->image_width = pair->width;
@@ -91,19 +94,29 @@ class ObjectDetectionNode final : public Node {
   }
 
  private:
-  /// The database changes between two images: once the new one is complete, in one step.
+  /// The database changes between two images: once the new one is complete, in one step. One that cannot be used is
+  /// asked for again now and then: it may have been wanted before it was published.
   void follow_revision(Job& job) {
     if (!reloader_) return;
     const auto wanted = std::string_view(revision_()).substr(0, Reloader::kLongestRevision);
-    if (!building_ && wanted != in_use_) {
-      in_use_.assign(wanted);
-      reloader_->ask(in_use_);
+    if (wanted != refused_) rest_ = 0;
+    if (rest_ > 0) --rest_;
+    if (!building_ && wanted != in_use_ && rest_ == 0) {
+      asked_.assign(wanted);
+      reloader_->ask(asked_);
       building_ = true;
     }
     if (!building_ || !job.is_done(virtual_time_ || reloader_->built())) return;
     reloader_->wait();
     building_ = false;
-    if (!reloader_->exchange(detector_)) job.results_doubtful(reloader_->error());
+    if (reloader_->exchange(detector_)) {
+      in_use_.assign(asked_);
+      refused_.clear();
+    } else {
+      if (refused_ != asked_) job.results_doubtful(reloader_->error());
+      refused_.assign(asked_);
+      rest_ = kRest;
+    }
   }
 
   /// Null if there is none for the pair: all of the image is searched.
@@ -118,7 +131,8 @@ class ObjectDetectionNode final : public Node {
   Input<StereoPair> pair_{this, "pair", "the left image is searched; three channels"};
   Input<Image> mask_{this, "mask", "one channel, same stamp, any size: only windows with a pixel that is not 0",
                      Need::optional};
-  Output<Detections> detections_{this, "detections", "class_id: index of the object in the database; best first"};
+  Output<Detections> detections_{this, "detections",
+                                 "class_id: index of the object in the database as it was at the start; best first"};
   Output<Image> roi_{
       this, "roi",
       "one pixel per search window of the first scale, 255 where it passed, or one of another scale around its middle"};
@@ -155,7 +169,9 @@ class ObjectDetectionNode final : public Node {
 
   std::function<std::unique_ptr<Detector>(const std::string&)> build_;
   std::unique_ptr<Detector> detector_;
-  std::string in_use_;  ///< or being built: a revision
+  static constexpr int kRest = 16;        ///< jobs until what could not be used is asked for again
+  std::string in_use_, asked_, refused_;  ///< revisions; refused: the last that could not be used, said once
+  int rest_ = 0;
   bool building_ = false, virtual_time_ = false;
   std::optional<MaskSums> mask_sums_;
   std::optional<Reloader> reloader_;  ///< last: its thread uses the rest

@@ -15,13 +15,6 @@ bool hits(const Sighting& sighting, const ShownSign& shown) {
   return sighting.sign == shown.sign && intersection_over_union(sighting.box, shown.box) >= kHit;
 }
 
-std::vector<ShownSign> shown_in(const SignScene& scene, std::span<const SignModel> signs) {
-  std::vector<ShownSign> shown;
-  for (const PlacedSign& placed : scene.signs)
-    shown.push_back({sign_index(signs, kSignShapes[static_cast<size_t>(placed.sign)].name), placed.box});
-  return shown;
-}
-
 ImageView<const uint8_t> view(const cv::Mat3b& image) { return {image.ptr(), image.cols, image.rows, 3}; }
 
 }  // namespace
@@ -32,6 +25,13 @@ size_t sign_index(std::span<const SignModel> signs, std::string_view name) {
       signs.begin());
 }
 
+std::vector<ShownSign> shown_in(const SignScene& scene, std::span<const SignModel> signs) {
+  std::vector<ShownSign> shown;
+  for (const PlacedSign& placed : scene.signs)
+    shown.push_back({sign_index(signs, kSignShapes[static_cast<size_t>(placed.sign)].name), placed.box});
+  return shown;
+}
+
 void score_image(std::span<const ShownSign> shown, std::span<const Sighting> found, Scores& scores) {
   ++scores.images;
   for (const ShownSign& sign : shown) {
@@ -40,9 +40,13 @@ void score_image(std::span<const ShownSign> shown, std::span<const Sighting> fou
     ++score.shown;
     score.hit += std::any_of(found.begin(), found.end(), [&](const Sighting& s) { return hits(s, sign); });
   }
-  for (const Sighting& sighting : found)
-    scores.of_class[sighting.sign].false_positives +=
-        std::none_of(shown.begin(), shown.end(), [&](const ShownSign& sign) { return hits(sighting, sign); });
+  bool wrong = false;
+  for (const Sighting& sighting : found) {
+    if (std::any_of(shown.begin(), shown.end(), [&](const ShownSign& sign) { return hits(sighting, sign); })) continue;
+    ++scores.of_class[sighting.sign].false_positives;
+    wrong = true;
+  }
+  scores.images_false += wrong;
 }
 
 Scores score_scenes(SignDetector& detector, uint64_t seed, int count) {
@@ -58,13 +62,14 @@ Scores score_scenes(SignDetector& detector, uint64_t seed, int count) {
   return scores;
 }
 
-Scores score_passages(const std::vector<SignModel>& signs, uint64_t seed, int count, double budget_s) {
+Scores score_passages(const std::vector<SignModel>& signs, uint64_t seed, int count, double budget_s,
+                      const TrackParameters& track_parameters) {
   Scores scores;
   scores.of_class.resize(signs.size());
   const SceneParameters p;
   for (int passage = 0; passage < count; ++passage) {
     SignDetector detector(p.width, p.height, signs, {});
-    Tracks tracks({});
+    Tracks tracks(track_parameters);
     bool hit = false;
     std::vector<ShownSign> shown;
     std::vector<Sighting> wrong;  // the last place of each false track
@@ -90,6 +95,7 @@ Scores score_passages(const std::vector<SignModel>& signs, uint64_t seed, int co
       }
     }
     ++scores.images;
+    scores.images_false += !wrong.empty();
     if (shown[0].sign < signs.size()) {
       ++scores.of_class[shown[0].sign].shown;
       scores.of_class[shown[0].sign].hit += hit;

@@ -48,10 +48,46 @@ view=$(ls "$work"/objects/*/*.png | head -n 1)
 tells red_box "$takt" objects list "$work/objects"
 answers "$takt" objects add "$work/objects" copy "$view"
 tells copy "$takt" objects list "$work/objects"
-answers "$takt" objects tune "$work/objects" --object red_box --scenes 1
+sed -i '/^object green_box/{n;s/.*/threshold auto auto auto 0.4/}' "$work/objects/objects.txt"
+answers "$takt" objects tune "$work/objects" --object green_box --scenes 1 --write
+grep -A 1 '^object green_box' "$work/objects/objects.txt" | grep -qE '^threshold( 0[.0-9]+| 1){3} 0\.4$' || fail "tune --write: not its three thresholds before the one of the layout"
 expect 0 "" "$takt" run --clock virtual --for 1s --output "$work/out"
 answers "$takt" objects test "$work/objects" "$work/out/left.png"
 answers "$takt" objects publish "$work/objects"
+
+mkdir "$work/views"
+# The forms that recordings have. One crop and one photograph of a sign, named by a CSV beside them; a row of another folder is left out.
+"$takt" train picture stop "$work/signs/00001_00000.png" --size 96 >/dev/null 2>&1 || fail "no picture of a sign"
+printf 'file,gtsrb_class,name\nsigns/00001_00000.png,14,stop\n' >"$work/labels.csv"
+printf 'file,class,x,y,w,h\nsigns/00001_00000.png,stop,0,0,96,96\nstop.png,stop,0,0,9,9\n' >"$work/boxes.csv"
+rates() { # IMAGES COMMAND...: one flat object with both rates and those of a baseline
+  local images=$1
+  shift
+  expect 0 "" "$takt" eval signs "$@" --json
+  python3 -c 'import json, sys; o = json.load(open(sys.argv[1]))
+for one in (o, o["baseline"]): assert 0 <= one["hits_pct"] <= 100 and 0 <= one["false_pct"] <= 100, one
+assert o["images"] == int(sys.argv[2]), o' "$work/stdout" "$images" || fail "eval signs $*: not the figures that design.md names"
+}
+rates 1 --crops "$work/signs" --labels "$work/labels.csv"
+rates 1 --scenes "$work/signs" --boxes "$work/boxes.csv"
+rates 4 --count 4 --passages 1
+printf 'file,class,x,y,w,h\nsigns/00001_00000.png,stop,0,none,96,96\n' >"$work/wrong.csv"
+expect 2 "wrong.csv:2: \`y\` is \`none\`" "$takt" eval signs --scenes "$work/signs" --boxes "$work/wrong.csv"
+expect 2 "labels.csv:1: has no column \`x\`" "$takt" eval signs --scenes "$work/signs" --boxes "$work/labels.csv"
+expect 2 "names no image in" "$takt" eval signs --crops "$work/views" --labels "$work/labels.csv"
+mkdir "$work/photographs"
+for i in 0 1 2; do cp "$work/out/left.png" "$work/photographs/$i.png"; done
+angle=0
+for view in "$source"/graph/objects/red_box/*.png; do
+  cp "$view" "$work/views/obj1__$angle.png"
+  angle=$((angle + 30))
+done
+expect 0 "" "$takt" eval objects --views "$work/views" --scenes "$work/photographs" --frames 1 --images 2 --empty 1 --seed 3 --json
+python3 -c 'import json, sys; o = json.load(open(sys.argv[1]))
+for one in (o, o["baseline"]): assert 0 <= one["detected_pct"] <= 100 and one["missed"] <= 2 and one["false_positives"] >= 0, one
+assert o["seed"] == 3 and o["cascade"]["photographs"] == 2 and o["cascade"]["photographs_learnt_from"] == 1, o' "$work/stdout" ||
+  fail "eval objects --views --scenes: not its figures"
+expect 2 "holds no photograph obj" "$takt" eval objects --views "$work/photographs"
 
 for graph in crossing people remote_robot yard; do
   expect 0 "" "$takt" run "$source/graph/$graph.yaml" --clock virtual --for 1s --output "$work/out"
@@ -65,11 +101,10 @@ for scenario in overload degrade saboteur; do
   expect 0 "" env TAKT="$takt" bash "$source/bench/scenarios/$scenario.sh" inputs
 done
 
-answers "$takt" eval objects --frames 1 --images 1 --empty 1
+answers "$takt" eval objects --frames 1 --images 1 --empty 1 --budget 12 --automatic --size 1 1.2
 answers "$takt" eval objects3d --samples 2
 answers "$takt" eval sift --frames 1
-answers "$takt" eval signs --scenes 1 --passages 1
-answers "$takt" eval body_pose --people 1
+answers "$takt" eval body_pose --people 1 --budget 60 --tilt -25 --noise 0.2 --step 1
 answers "$takt" eval person_tracking --walks 1 --frames 5
 answers "$takt" eval mapping --minutes 0 --runs 1 --clouds 3
 answers "$takt" eval registration --sweep population --runs 1 --generations 20 --points 50

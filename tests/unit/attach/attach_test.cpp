@@ -186,6 +186,9 @@ TEST_CASE("set refuses what the parameter would refuse, before the node sees it"
   CHECK(error("map.voxl", "0.2m").find("did you mean `voxel`") != std::string::npos);
   CHECK(error("map.voxel", "0.2").find("without a unit") != std::string::npos);
   CHECK(error("map.voxel", "20m").find("must lie in") != std::string::npos);
+  CHECK(error("mapping:voxel", "0.2m").find("there is no node of type `mapping`; did you mean `mapping_3d`") !=
+        std::string::npos);
+  CHECK(error("mapping_3d:voxl", "0.2m").find("node `map` (type `mapping_3d`)") != std::string::npos);
   CHECK(scene.board->mail(0).state.load() == ParamMail::empty);
 }
 

@@ -36,7 +36,7 @@ cv::Mat3b striped(const cv::Scalar& colour, const cv::Scalar& other) {
 cv::Mat3b red() { return striped({20, 30, 200}, {20, 200, 220}); }
 cv::Mat3b blue() { return striped({210, 60, 10}, {40, 160, 20}); }
 
-/// Two revisions of one database, which hold the same two objects the other way round.
+/// Two revisions of one database, which hold the same two views the other way round and under other names.
 struct Database : test::TemporaryFolder {
   std::filesystem::path folder = path / "objects";
   std::string revisions[2];
@@ -44,7 +44,7 @@ struct Database : test::TemporaryFolder {
     std::filesystem::create_directory(folder);
     cv::imwrite((folder / "red.png").string(), red());
     cv::imwrite((folder / "blue.png").string(), blue());
-    write("objects/objects.txt", "object blue\nview blue.png\nobject red\nview red.png\n");
+    write("objects/objects.txt", "object navy\nview blue.png\nobject crimson\nview red.png\n");
     revisions[1] = publish_revision(folder, kSide);
     write("objects/objects.txt", "object red\nview red.png\nobject blue\nview blue.png\n");
     revisions[0] = publish_revision(folder, kSide);
@@ -67,19 +67,21 @@ struct Camera final : Node {
   }
 };
 
-/// Which class is red: 0 or 1 by the two revisions; -1 if the boxes are of neither.
+/// Of which revision both boxes are, by their classes; -1: of neither.
 struct Reader final : Node {
   Input<Detections> detections{this, "detections", ""};
   Output<Odometry> seen{this, "seen", ""};
-  std::vector<int> red;
+  std::vector<int> revision;
   void setup(Setup&) override {}
   void run(Job& job) override {
     const Detections* found = detections.newest();
     if (found == nullptr || !detections.is_new()) return job.no_result();
     int classes[2] = {-1, -1};  // left, right
     for (const Detection& box : found->boxes.items()) classes[box.x_px > 40] = static_cast<int>(box.class_id);
-    const bool whole = found->boxes.size == 2 && classes[0] + classes[1] == 1;
-    red.push_back(whole ? classes[0] : -1);
+    const auto both = [&](int left, int right) {
+      return found->boxes.size == 2 && classes[0] == left && classes[1] == right;
+    };
+    revision.push_back(both(0, 1) ? 0 : both(3, 2) ? 1 : -1);
   }
 };
 
@@ -148,9 +150,9 @@ TEST_CASE(
     CHECK(changes == 100);
     CHECK(jobs == 16 * 7);
     CHECK(missed == 0);
-    REQUIRE(scene.reader.red.size() >= 110);
-    for (size_t i = 0; i < scene.reader.red.size(); ++i)
-      CHECK(scene.reader.red[i] == static_cast<int>(std::min<size_t>(i, 100) % 2));
+    const std::vector<int>& seen = scene.reader.revision;
+    REQUIRE(seen.size() >= 110);
+    for (size_t i = 0; i < seen.size(); ++i) CHECK(seen[i] == static_cast<int>(std::min<size_t>(i, 100) % 2));
   }
   Scene again(database);
   again.node->start(0);
@@ -159,6 +161,51 @@ TEST_CASE(
   const record::ReplayResult replayed = record::Replayer(again.plan, *log, {}).run();
   CHECK(replayed.compared >= 110);
   CHECK(replayed.different == 0);
+}
+
+TEST_CASE(
+    "object_detection: a revision that was wanted too early is used once it is there; without one the start's is "
+    "back") {
+  const Database database;
+  const test::TemporaryFolder folder;
+  const auto published = revision_folder(database.folder, database.revisions[1]), away = database.path / "away";
+  std::filesystem::rename(published, away);
+  Scene scene(database);
+  auto sink = mcap::FileSink::open(folder.path / "run.mcap");
+  REQUIRE(sink);
+  uint64_t jobs = 0;
+  test::record_run(scene.plan, *sink, 10, {}, {}, [&](RunBoard& board) {
+    const uint64_t done = board.task(1).completed.load();
+    if (done == jobs) return;
+    jobs = done;
+    if (jobs == 2) CHECK(post(board.mail(1), scene.revision, ParamValue(database.revisions[1])));
+    if (jobs == 8) std::filesystem::rename(away, published);
+    if (jobs == 40) {  // as one who edits the list that the next revision is made of
+      database.write("objects/objects.txt", "object other\nview blue.png\n");
+      CHECK(post(board.mail(1), scene.revision, ParamValue(std::string())));
+    }
+  });
+  const std::vector<int>& seen = scene.reader.revision;
+  REQUIRE(seen.size() >= 60);
+  for (size_t i = 0; i < 9; ++i) CHECK(seen[i] == 0);
+  for (size_t i = 26; i < 40; ++i) CHECK(seen[i] == 1);
+  for (size_t i = 42; i < seen.size(); ++i) CHECK(seen[i] == 0);
+}
+
+TEST_CASE("class ids stay when entries change their places, and new ones are counted on") {
+  const auto list = [](std::initializer_list<const char*> names) {
+    std::vector<DatabaseObject> database;
+    for (const char* name : names) database.emplace_back().name = name;
+    return database;
+  };
+  auto bottles = list({"bottle", "bottle"});
+  bottles[0].attributes = {{"closed", "true"}};
+  bottles[1].attributes = {{"closed", "false"}};
+  CHECK(ClassIds(bottles).of({bottles[1], bottles[0]}) == std::vector<float>{1, 0});
+  ClassIds ids(list({"red", "blue"}));
+  CHECK(ids.of(list({"blue", "red"})) == std::vector<float>{1, 0});
+  CHECK(ids.of(list({"green", "blue"})) == std::vector<float>{2, 1});
+  CHECK(ids.of(list({"yellow", "green", "red"})) == std::vector<float>{3, 2, 0});
 }
 
 TEST_CASE("object_detection: beside jobs in real time the old database stays until the new one is whole") {
@@ -201,7 +248,7 @@ TEST_CASE("a revision is a copy under the name of its content, and a changed cop
   CHECK(database.revisions[0] != database.revisions[1]);
   CHECK(publish_revision(database.folder, kSide) == database.revisions[0]);  // it is there already
   CHECK(publish_revision(database.folder / "", kSide) == database.revisions[0]);
-  CHECK(read_revision(database.folder, database.revisions[1], kSide)[0].name == "blue");
+  CHECK(read_revision(database.folder, database.revisions[1], kSide)[0].name == "navy");
   const auto refusal = [&](const std::string& name) {
     try {
       read_revision(database.folder, name, kSide);
