@@ -317,6 +317,7 @@ void add_calibrate(CLI::App& app, CalibrateOptions& o, int& exit_code) {
   stereo->add_flag("--json", o.json, "one JSON object on stdout");
   stereo->callback([&] { exit_code = calibrate_stereo(o); });
   add_calibrate_lasers(*calibrate, o.lasers, exit_code);
+  add_calibrate_rig(*calibrate, o.rig, exit_code);
 }
 
 }  // namespace takt::command

@@ -16,6 +16,10 @@ struct CalibrateLasersOptions {
   bool json = false;
 };
 
+struct CalibrateRigOptions {
+  std::filesystem::path rig, out;
+};
+
 struct CalibrateOptions {
   std::filesystem::path folder;
   std::string board = "9x6";  ///< inner corners
@@ -24,14 +28,20 @@ struct CalibrateOptions {
   std::filesystem::path out, picture;
   bool json = false;
   CalibrateLasersOptions lasers;
+  CalibrateRigOptions rig;
 };
 
 /// `takt calibrate stereo`: from pictures of a chessboard to a calibration of both cameras. 0 done, 2 bad input. stdout
-/// carries the table, or with --json one object and nothing else. `takt calibrate lasers` as add_calibrate_lasers().
+/// carries the table, or with --json one object and nothing else. `takt calibrate lasers` as add_calibrate_lasers(),
+/// `takt calibrate rig` as add_calibrate_rig().
 void add_calibrate(CLI::App& app, CalibrateOptions& options, int& exit_code);
 
 /// `takt calibrate lasers`: from sweeps of scanners on a robot that turns to where these are mounted. 0 done, 1 it did
 /// not settle, 2 bad input.
 void add_calibrate_lasers(CLI::App& calibrate, CalibrateLasersOptions& options, int& exit_code);
+
+/// `takt calibrate rig`: from a rig file of raw pairs to the calibration that fits the simulated camera and its doubles
+/// exactly. 0 done, 2 bad input.
+void add_calibrate_rig(CLI::App& calibrate, CalibrateRigOptions& options, int& exit_code);
 
 }  // namespace takt::command

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <vector>
 
 #include "nodes/ego_motion/evaluate.hpp"
@@ -48,13 +49,14 @@ double percent(int part, int whole) { return whole == 0 ? 0 : 100.0 * part / who
 
 Json score(const Drive& drive, const Track& track) {
   Errors ours, zero, constant;
-  int steps = 0, refused = 0, rightly = 0, accepted_wrong = 0, within = 0;
+  int steps = 0, refused = 0, rightly = 0, accepted_wrong = 0, within = 0, corners = 0;
   Rigid before;
   for (size_t i = 1; i < drive.frames.size(); ++i) {
     const Rigid truth = drive.frames[i - 1].pose.inverse() * drive.frames[i].pose;
     const Result& r = track.results[i];
     const bool wrong = !r.estimate || is_wrong(*r.estimate, truth);
     ++steps;
+    corners += r.corners;
     refused += !r.valid;
     rightly += !r.valid && wrong;
     accepted_wrong += r.valid && wrong;
@@ -70,6 +72,7 @@ Json score(const Drive& drive, const Track& track) {
   out["refused_rightly_pct"] = refused == 0 ? Json() : Json(percent(rightly, refused));
   out["accepted_wrong_pct"] = percent(accepted_wrong, steps);
   out["within_95_pct"] = percent(within, steps);
+  out["corners"] = static_cast<double>(corners) / std::max(1, steps);
   out["time_ms"] = track.step_ms;
   out["baseline"] = {{"zero motion", zero.row()}, {"constant velocity", constant.row()}};
   return out;

@@ -15,7 +15,8 @@ namespace takt::command {
 
 struct EvalStereoOptions {
   std::filesystem::path left, right, truth;
-  double truth_scale = 1;  ///< disparity = value / scale
+  std::filesystem::path scene;  ///< instead: a folder as in data/clouds/laser_stereo
+  double truth_scale = 1;       ///< disparity = value / scale
   int disparities = 64;
   double exposure = 1;           ///< of the right image, in that of the left one
   std::vector<std::string> set;  ///< "param=value" of the stereo node

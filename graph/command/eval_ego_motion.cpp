@@ -72,16 +72,16 @@ Json measure_generated(const EvalEgoMotionOptions& options) {
 }
 
 void print_row(const std::string& condition, const std::string& method, const Json& row) {
-  std::printf("%-22s %-18s %7s %7s %6s %7s %7s %9s %9s %9s %8s\n", condition.c_str(), method.c_str(),
+  std::printf("%-22s %-18s %7s %7s %6s %7s %7s %9s %9s %9s %8s %8s\n", condition.c_str(), method.c_str(),
               text(row, "median_mm", 2).c_str(), text(row, "p95_mm", 2).c_str(), text(row, "median_pct", 2).c_str(),
               text(row, "median_deg", 3).c_str(), text(row, "p95_deg", 3).c_str(), text(row, "refused_pct", 1).c_str(),
               text(row, "refused_rightly_pct", 0).c_str(), text(row, "accepted_wrong_pct", 1).c_str(),
-              text(row, "within_95_pct", 0).c_str());
+              text(row, "within_95_pct", 0).c_str(), text(row, "corners", 0).c_str());
 }
 
 void print_generated(const Json& out) {
-  std::printf("%-22s %-18s %7s %7s %6s %7s %7s %9s %9s %9s %8s\n", "condition", "method", "mm p50", "p95", "% p50",
-              "deg p50", "p95", "refused %", "rightly %", "wrong %", "in 95 %");
+  std::printf("%-22s %-18s %7s %7s %6s %7s %7s %9s %9s %9s %8s %8s\n", "condition", "method", "mm p50", "p95", "% p50",
+              "deg p50", "p95", "refused %", "rightly %", "wrong %", "in 95 %", "corners");
   for (const Json& condition : out["conditions"]) {
     print_row(condition["condition"], "takt ego_motion", condition);
     for (const auto& [name, row] : condition["baseline"].items()) print_row("", name, row);

@@ -2,13 +2,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
 #include "graph/command/eval_command.hpp"
+#include "graph/command/laser_stereo.hpp"
 #include "graph/command/run_command.hpp"
 #include "graph/command/stereo_parameters.hpp"
 #include "nodes/stereo/evaluate.hpp"
@@ -71,7 +72,17 @@ Json run_ours(const cv::Mat& left, const cv::Mat& right, const stereo::Disparity
     if (!matcher.match(view(left), view(right), out)) throw BadData("left and right image differ in size or channels");
     times.push_back(static_cast<double>(thread_cpu_ns() - start) / 1e6);
   }
-  return row(stereo::score(stereo::to_disparity_image(out), truth), median(times));
+  Json json = row(stereo::score(stereo::to_disparity_image(out), truth), median(times));
+  std::vector<double> right_ones, wrong_ones;
+  for (int y = 0; y < truth.height; ++y)
+    for (int x = 0; x < truth.width; ++x) {
+      if (truth.at(x, y) <= 0 || out.disparity.at(x, y) < 0) continue;
+      const bool is_right = std::abs(static_cast<float>(out.disparity.at(x, y)) - truth.at(x, y)) <= 1;
+      (is_right ? right_ones : wrong_ones).push_back(out.confidence.at(x, y) / 255.0);
+    }
+  json["confidence_right"] = right_ones.empty() ? Json() : Json(median(right_ones));
+  json["confidence_wrong"] = wrong_ones.empty() ? Json() : Json(median(wrong_ones));
+  return json;
 }
 
 Json run_variants(const cv::Mat& left, const cv::Mat& right, const stereo::DisparityImage& truth, int disparities) {
@@ -92,29 +103,46 @@ Json run_peer(stereo::Peer peer, const cv::Mat& left, const cv::Mat& right, cons
   return row(stereo::score(result, truth), median(times));
 }
 
+std::string confidence(const Json& row, const char* key) {
+  const auto found = row.find(key);
+  return found == row.end() || found->is_null() ? "-" : fmt::format("{:.2f}", found->get<double>());
+}
+
 void print_row(const char* name, const Json& r) {
-  std::printf("%-34s %9.2f %9.2f %9.2f %10.1f %9.2f\n", name, r["bad_1px_pct"].get<double>(),
+  std::printf("%-34s %9.2f %9.2f %9.2f %10.1f %9.2f %6s %6s\n", name, r["bad_1px_pct"].get<double>(),
               r["bad_1px_all_pct"].get<double>(), r["bad_half_px_pct"].get<double>(), r["density_pct"].get<double>(),
-              r["time_ms"].get<double>());
+              r["time_ms"].get<double>(), confidence(r, "confidence_right").c_str(),
+              confidence(r, "confidence_wrong").c_str());
+}
+
+/// What is matched, and what should come out.
+LaserTruth read_pair(const EvalStereoOptions& options) {
+  if (!options.scene.empty()) return read_laser_truth(options.scene);
+  LaserTruth pair{read(options.left, cv::IMREAD_COLOR), read(options.right, cv::IMREAD_COLOR),
+                  read_truth(options.truth, options.truth_scale)};
+  if (pair.left.size() != pair.right.size())
+    throw BadData(fmt::format("{} and {} differ in size", options.left.string(), options.right.string()));
+  if (pair.disparity.width != pair.left.cols || pair.disparity.height != pair.left.rows)
+    throw BadData(fmt::format("{}: {} x {}, the images are {} x {}", options.truth.string(), pair.disparity.width,
+                              pair.disparity.height, pair.left.cols, pair.left.rows));
+  return pair;
 }
 
 Json measure(const EvalStereoOptions& options) {
-  const cv::Mat left = read(options.left, cv::IMREAD_COLOR);
-  cv::Mat right = read(options.right, cv::IMREAD_COLOR);
-  right.convertTo(right, -1, options.exposure);  // saturates as a sensor does
-  if (left.size() != right.size())
-    throw BadData(fmt::format("{} and {} differ in size", options.left.string(), options.right.string()));
-  const stereo::DisparityImage truth = read_truth(options.truth, options.truth_scale);
-  if (truth.width != left.cols || truth.height != left.rows)
-    throw BadData(fmt::format("{}: {} x {}, the images are {} x {}", options.truth.string(), truth.width, truth.height,
-                              left.cols, left.rows));
+  LaserTruth pair = read_pair(options);
+  const cv::Mat &left = pair.left, &right = pair.right;
+  const stereo::DisparityImage& truth = pair.disparity;
+  pair.right.convertTo(pair.right, -1, options.exposure);  // saturates as a sensor does
   stereo::MatcherParameters p;
   p.disparities = options.disparities;
   set_stereo_parameters(options.set, p);
   const auto matcher = stereo::make_matcher(left.cols, left.rows, left.channels(), p);
   Json out = run_ours(left, right, truth, *matcher, kRepeats);
+  out["known_px"] = std::count_if(truth.pixels.begin(), truth.pixels.end(), [](float d) { return d > 0; });
   stereo::HalfMatcher half(left.cols, left.rows, left.channels(), p);
   out["levels"]["half"] = run_ours(left, right, truth, half, kRepeats);
+  half.limit_search((p.disparities + 1) / 2);
+  out["levels"]["half_range"] = run_ours(left, right, truth, half, kRepeats);
   if (options.variants) out["variants"] = run_variants(left, right, truth, p.disparities);
   stereo::DisparityImage middle = truth;
   std::fill(middle.pixels.begin(), middle.pixels.end(), static_cast<float>(p.disparities) / 2);
@@ -134,9 +162,11 @@ int evaluate(const EvalStereoOptions& options) {
       std::printf("%s\n", out.dump(2).c_str());
       return kOk;
     }
-    std::printf("%-34s %9s %9s %9s %10s %9s\n", "method", "bad >1px", "bad, all", "bad >0.5", "density %", "CPU ms");
+    std::printf("%-34s %9s %9s %9s %10s %9s %13s\n", "method", "bad >1px", "bad, all", "bad >0.5", "density %",
+                "CPU ms", "zeta: right, wrong");
     print_row("takt stereo", out);
     print_row("takt stereo, level half", out["levels"]["half"]);
+    print_row("takt stereo, level half_range", out["levels"]["half_range"]);
     if (out.contains("variants"))
       for (const auto& [name, variant] : out["variants"].items()) print_row(name.c_str(), variant);
     for (const auto& [name, peer] : out["peers"].items()) print_row(name.c_str(), peer);
@@ -152,25 +182,28 @@ int evaluate(const EvalStereoOptions& options) {
 
 void add_eval_stereo(CLI::App& eval, EvalStereoOptions& o, int& exit_code) {
   CLI::App* app = eval.add_subcommand("stereo", "bad pixels of dense stereo against ground truth, beside OpenCV");
+  auto* scene = app->add_option("--scene", o.scene,
+                                "folder with a pair and a laser's points as ground truth (data/clouds/laser_stereo)");
   auto* left = app->add_option("--left", o.left, "left rectified image");
   auto* right = app->add_option("--right", o.right, "right rectified image")->needs(left);
   auto* truth = app->add_option("--gt", o.truth, "ground truth of the left image, 0: unknown")->needs(right);
-  left->needs(truth);
+  left->needs(truth)->excludes(scene);
   app->add_option("--sweep", o.sweep, "on generated pairs: error against noise, or against the window's edge")
       ->check(CLI::IsMember({"noise", "window"}))
-      ->excludes(left);
+      ->excludes(left)
+      ->excludes(scene);
   app->add_option("--picture", o.picture, "PNG of the sweep's curves")->needs("--sweep");
   app->add_option("--gt-scale", o.truth_scale, "disparity = value / scale (default 1)")->check(CLI::PositiveNumber);
   app->add_option("--disparities", o.disparities, "search range, px (default 64)")->check(CLI::Range(1, 512));
   app->add_option("--exposure", o.exposure, "of the right image, in that of the left one (default 1)")
       ->check(CLI::Range(0.05, 20.0))
-      ->needs(left);
+      ->excludes("--sweep");
   app->add_option("--set", o.set, "parameter=value of the stereo node, repeatable");
   app->add_flag("--variants", o.variants, "every way of matching, too: costs, windows, selections");
   app->add_flag("--json", o.json, "one JSON object on stdout");
   app->callback([&] {
-    if (o.left.empty() && o.sweep.empty())
-      throw CLI::RequiredError("--left, --right and --gt of a recorded pair, or --sweep,");
+    if (o.left.empty() && o.scene.empty() && o.sweep.empty())
+      throw CLI::RequiredError("--left, --right and --gt of a recorded pair, or --scene, or --sweep,");
     exit_code = o.sweep.empty() ? evaluate(o) : sweep_stereo(o);
   });
 }

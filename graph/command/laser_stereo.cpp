@@ -10,6 +10,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <sstream>
 #include <stdexcept>
+#include <tuple>
+#include <vector>
 
 #include "nodes/stereo/matcher.hpp"
 #include "nodes/stereo/triangulate.hpp"
@@ -66,8 +68,16 @@ cv::Mat read_image(const std::filesystem::path& file) {
   return image;
 }
 
+/// Left and right.
+std::pair<cv::Mat, cv::Mat> read_images(const std::filesystem::path& folder) {
+  std::pair pair(read_image(folder / "image_02.png"), read_image(folder / "image_03.png"));
+  if (pair.first.size() != pair.second.size())
+    throw std::invalid_argument(folder.string() + ": image_02.png and image_03.png differ in size");
+  return pair;
+}
+
 cloud::Cloud stereo_cloud(const std::filesystem::path& folder, const CameraModel& camera) {
-  const cv::Mat left = read_image(folder / "image_02.png"), right = read_image(folder / "image_03.png");
+  const auto [left, right] = read_images(folder);
   stereo::MatcherParameters p = stereo::MatcherParameters::quality();
   p.disparities = kDisparities;
   p.subpixel = p.left_right_check = true;
@@ -79,7 +89,7 @@ cloud::Cloud stereo_cloud(const std::filesystem::path& folder, const CameraModel
                                    {confidence.data, left.cols, left.rows},
                                    {fraction.data, left.cols, left.rows}};
   if (!stereo::make_matcher(left.cols, left.rows, left.channels(), p)->match(view(left), view(right), map))
-    throw std::invalid_argument(folder.string() + ": image_02.png and image_03.png differ in size");
+    throw std::logic_error("the matcher refused a pair of its own size");
   cloud::Cloud all, out;
   all.points.resize(left.total());
   all.colours.resize(left.total());
@@ -92,28 +102,62 @@ cloud::Cloud stereo_cloud(const std::filesystem::path& folder, const CameraModel
   return out;
 }
 
-cloud::Cloud laser_cloud(const std::filesystem::path& file) {
+/// x ahead, y left.
+std::vector<Point> laser_points(const std::filesystem::path& folder) {
+  const std::filesystem::path file = folder / "velodyne.bin";
   std::ifstream in(file, std::ios::binary);
   if (!in) throw std::invalid_argument(file.string() + ": cannot be read");
+  std::vector<Point> out;
+  for (float r[4]; in.read(reinterpret_cast<char*>(r), sizeof r);)
+    out.push_back({r[0], r[1], r[2]});  // and reflectance
+  return out;
+}
+
+cloud::Cloud laser_cloud(const std::filesystem::path& folder) {
   cloud::Cloud out;
-  for (float r[4]; in.read(reinterpret_cast<char*>(r), sizeof r);) {  // x y z reflectance, x ahead, y left
-    if (r[0] < kNearest_m || r[0] > kFarthest_m) continue;
-    if (std::abs(r[1]) > kAside * r[0] || std::abs(r[2]) > kUpwards * r[0]) continue;
-    out.points.push_back({r[0], r[1], r[2]});
+  for (const Point& p : laser_points(folder)) {
+    if (p.x < kNearest_m || p.x > kFarthest_m) continue;
+    if (std::abs(p.y) > kAside * p.x || std::abs(p.z) > kUpwards * p.x) continue;
+    out.points.push_back(p);
   }
   return out;
+}
+
+/// Of the rectified colour cameras, from the projections of both.
+CameraModel camera_model(const std::filesystem::path& folder, const Eigen::MatrixXd& left,
+                         const Eigen::MatrixXd& right) {
+  const CameraModel camera{left(0, 0), left(0, 2), left(1, 2), (left(0, 3) - right(0, 3)) / left(0, 0)};
+  if (!(camera.focal_px > 0) || !(camera.baseline_m > 0))
+    throw std::invalid_argument(folder.string() + ": calib_cam_to_cam.txt has no baseline to the right");
+  return camera;
 }
 
 }  // namespace
 
 LaserStereo read_laser_stereo(const std::filesystem::path& folder) {
   const CalibrationFile cameras(folder / "calib_cam_to_cam.txt");
-  const Eigen::MatrixXd left = cameras.matrix("P_rect_02", 3, 4), right = cameras.matrix("P_rect_03", 3, 4);
-  const CameraModel camera{left(0, 0), left(0, 2), left(1, 2), (left(0, 3) - right(0, 3)) / left(0, 0)};
-  if (!(camera.focal_px > 0) || !(camera.baseline_m > 0))
-    throw std::invalid_argument(folder.string() + ": calib_cam_to_cam.txt has no baseline to the right");
-  return {{laser_cloud(folder / "velodyne.bin"), stereo_cloud(folder, camera), laser_in_camera(folder, left).inverse()},
-          camera};
+  const Eigen::MatrixXd left = cameras.matrix("P_rect_02", 3, 4);
+  const CameraModel camera = camera_model(folder, left, cameras.matrix("P_rect_03", 3, 4));
+  return {{laser_cloud(folder), stereo_cloud(folder, camera), laser_in_camera(folder, left).inverse()}, camera};
+}
+
+LaserTruth read_laser_truth(const std::filesystem::path& folder) {
+  const CalibrationFile cameras(folder / "calib_cam_to_cam.txt");
+  const Eigen::MatrixXd left = cameras.matrix("P_rect_02", 3, 4);
+  const CameraModel camera = camera_model(folder, left, cameras.matrix("P_rect_03", 3, 4));
+  const Rigid into_camera = laser_in_camera(folder, left);
+  LaserTruth out;
+  std::tie(out.left, out.right) = read_images(folder);
+  out.disparity = {out.left.cols, out.left.rows, std::vector<float>(out.left.total())};
+  for (const Point& point : laser_points(folder)) {
+    const Vector3d p = into_camera * Vector3d(point.x, point.y, point.z);
+    if (p.z() <= 0) continue;
+    const double u = camera.focal_px * p.x() / p.z() + camera.cu_px, v = camera.focal_px * p.y() / p.z() + camera.cv_px;
+    if (u < -0.5 || v < -0.5 || u >= out.left.cols - 0.5 || v >= out.left.rows - 0.5) continue;
+    float& pixel = out.disparity.at(static_cast<int>(std::lround(u)), static_cast<int>(std::lround(v)));
+    pixel = std::max(pixel, static_cast<float>(camera.focal_px * camera.baseline_m / p.z()));
+  }
+  return out;
 }
 
 std::optional<double> disparity_bias_px(const LaserStereo& scene, double from_m, double to_m) {

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <filesystem>
+#include <opencv2/core.hpp>
 #include <optional>
 
 #include "nodes/laser_fusion/generated_pair.hpp"
+#include "nodes/stereo/evaluate.hpp"
 
 namespace takt::command {
 
@@ -17,6 +19,14 @@ struct LaserStereo {
   CameraModel camera;  ///< of the vision cloud
 };
 LaserStereo read_laser_stereo(const std::filesystem::path& folder);
+
+/// The pair of such a folder, and what the laser says of its disparities: every point ahead in the pixel of the
+/// rectified left image that it falls into, the nearest of several; 0 where none does. Throws as read_laser_stereo().
+struct LaserTruth {
+  cv::Mat left, right;  ///< BGR
+  stereo::DisparityImage disparity;
+};
+LaserTruth read_laser_truth(const std::filesystem::path& folder);
 
 /// By how much disparities of the camera's points exceed those of laser points that lie in the same pixel at the true
 /// pose, from_m to to_m ahead: the median, px, over those at most 3 px apart; none if there are fewer than 100.

@@ -126,13 +126,20 @@ std::vector<StereoVariant> stereo_variants(int disparities) {
       {"gradient, no minimum filter", with([](auto& p) { p.n_min = 1; })},
       {"gradient, median", with([](auto& p) { p.median = true; })},
       {"gradient, adaptive window", with([](auto& p) { p.aggregation = Aggregation::adaptive_window; })},
+      {"the same, largest",
+       with([](auto& p) { p.aggregation = Aggregation::adaptive_window, p.combination = Combination::max; })},
+      {"the same, mean",
+       with([](auto& p) { p.aggregation = Aggregation::adaptive_window, p.combination = Combination::mean; })},
       {"gradient, boundary guided", with([](auto& p) { p.aggregation = Aggregation::boundary, p.n_min = 1; })},
       {"gradient, adaptive weight", with([](auto& p) { p.aggregation = Aggregation::adaptive_weight, p.n_min = 1; })},
+      {"gradient, uniqueness 0.1", with([](auto& p) { p.uniqueness = 26; })},
+      {"gradient, left-right check", with([](auto& p) { p.left_right_check = true; })},
       {"gradient, scanline", with([](auto& p) { p.selection = Selection::scanline; })},
       {"census, scanline", quality([](auto& p) { p.selection = Selection::scanline, p.n_square = 5; })},
       {"census, semi-global (quality)", quality([](auto&) {})},
       {"the same, sub-pixel", quality([](auto& p) { p.subpixel = true; })},
-      {"the same, left-right check", quality([](auto& p) { p.left_right_check = true; })},
+      {"quality, uniqueness 0.1", quality([](auto& p) { p.uniqueness = 26; })},
+      {"quality, left-right check", quality([](auto& p) { p.left_right_check = true; })},
   };
 }
 

@@ -92,6 +92,14 @@ expect 2 "holds no photograph obj" "$takt" eval objects --views "$work/photograp
 for graph in crossing people remote_robot yard; do
   expect 0 "" "$takt" run "$source/graph/$graph.yaml" --clock virtual --for 1s --output "$work/out"
 done
+expect 0 "" "$takt" run "$source/tests/scenarios/raw_cloud.yaml" --clock virtual --output "$work/out" --report "$work/report.json"
+python3 - "$work/report.json" <<'PY' || fail "raw_cloud: a job took memory"
+import json, sys
+nodes = {node["name"]: node for node in json.load(open(sys.argv[1]))["nodes"]}
+for name in ("stereo", "ego_motion", "cloud_filter"):
+    print(name, nodes[name]["samples"], "jobs,", nodes[name]["allocations"], "allocations,", nodes[name]["page_faults"], "page faults")
+    assert nodes[name]["samples"] > 10 and nodes[name]["allocations"] == 0 and nodes[name]["page_faults"] == 0
+PY
 port=$((20000 + RANDOM % 10000))
 expect 0 "" "$takt" run "$source/graph/simulator.yaml" --clock virtual --for 1s --set "service.address=127.0.0.1:$port" --output "$work/out"
 expect 0 "" "$takt" run --profile replay --clock virtual --for 1s --output "$work/out"
@@ -100,6 +108,94 @@ expect 0 "" "$takt" run --profile replay --clock virtual --for 1s --output "$wor
 for scenario in overload degrade saboteur; do
   expect 0 "" env TAKT="$takt" bash "$source/bench/scenarios/$scenario.sh" inputs
 done
+
+# Made data: a pair shifted by 8 px, a wall seen by a laser, pictures of a chessboard, a cloud.
+python3 - "$work" <<'PY'
+import math, os, random, struct, sys
+work = sys.argv[1]
+random.seed(1)
+w, h, shift = 160, 60, 8
+
+def write(path, header, pixels):
+    with open(path, "wb") as file:
+        file.write(header.encode() + bytes(pixels))
+
+def ppm(path, rows):  # OpenCV goes by the content, not by the name
+    write(path, f"P6 {len(rows[0])} {len(rows)} 255\n", [value for row in rows for pixel in row for value in (pixel,) * 3])
+
+wide = [[random.randrange(256) for _ in range(w + shift)] for _ in range(h)]
+left, right = [row[:w] for row in wide], [row[shift:] for row in wide]
+ppm(f"{work}/left.ppm", left)
+ppm(f"{work}/right.ppm", right)
+write(f"{work}/truth.pgm", f"P5 {w} {h} 255\n", [shift] * (w * h))
+
+scene = f"{work}/scene"  # f 100 px, baseline 0.8 m, the wall 10 m ahead
+os.mkdir(scene)
+ppm(f"{scene}/image_02.png", left)
+ppm(f"{scene}/image_03.png", right)
+with open(f"{scene}/velodyne.bin", "wb") as file:
+    for i in range(-120, 121):
+        for k in range(-50, 51):
+            file.write(struct.pack("4f", 10, i / 20, k / 20, 0))
+with open(f"{scene}/calib_cam_to_cam.txt", "w") as file:
+    file.write("R_rect_00: 1 0 0 0 1 0 0 0 1\nP_rect_02: 100 0 80 0 0 100 30 0 0 0 1 0\nP_rect_03: 100 0 80 -80 0 100 30 0 0 0 1 0\n")
+with open(f"{scene}/calib_velo_to_cam.txt", "w") as file:
+    file.write("R: 0 -1 0 0 0 -1 1 0 0\nT: 0 0 0\n")
+
+def board(path, pan, tilt, centre, camera_x):  # 9 x 6 inner corners, squares of 30 mm, seen with f 260 px
+    cp, sp, ct, st = math.cos(pan), math.sin(pan), math.cos(tilt), math.sin(tilt)
+    x_axis, y_axis, normal = (cp, 0, -sp), (sp * st, ct, cp * st), (sp * ct, -st, cp * ct)
+    c = (centre[0] - camera_x, centre[1], centre[2])
+    ahead = sum(n * v for n, v in zip(normal, c))
+    rows = []
+    for y in range(240):
+        row = []
+        for x in range(320):
+            ray = ((x - 159.5) / 260, (y - 119.5) / 260, 1)
+            s = ahead / sum(n * v for n, v in zip(normal, ray))
+            p = [s * r - v for r, v in zip(ray, c)]
+            u = sum(a * v for a, v in zip(x_axis, p)) / 0.03 + 5
+            v = sum(a * v for a, v in zip(y_axis, p)) / 0.03 + 3.5
+            inside = 0 < u < 10 and 0 < v < 7
+            margin = -1 < u < 11 and -1 < v < 8
+            shade = math.tanh(4 * math.sin(math.pi * u) * math.sin(math.pi * v)) if inside else 1
+            row.append(int(128 + 100 * shade) if margin else 90)
+        rows.append(row)
+    ppm(path, rows)
+
+os.mkdir(f"{work}/boards")
+places = [(0, 0, 0.05, 0, 0.55), (0.4, 0, 0.05, 0, 0.5), (-0.4, 0.1, 0.05, 0.02, 0.5), (0, 0.4, 0.02, 0, 0.5),
+          (0.1, -0.4, 0.08, -0.02, 0.5), (0.3, 0.3, 0.05, 0.03, 0.55), (-0.3, -0.3, 0.03, -0.03, 0.55)]
+for i, (pan, tilt, *centre) in enumerate(places):
+    board(f"{work}/boards/left{i}.ppm", pan, tilt, centre, 0)
+    board(f"{work}/boards/right{i}.ppm", pan, tilt, centre, 0.1)
+
+with open(f"{work}/cloud.ply", "w") as file:
+    points = [(i / 50, k / 50, 1) for i in range(30) for k in range(30)] + [(9, 9, 9)]
+    file.write(f"ply\nformat ascii 1.0\nelement vertex {len(points)}\nproperty float x\nproperty float y\nproperty float z\nend_header\n")
+    file.writelines("%g %g %g\n" % p for p in points)
+PY
+# judge 'EXPRESSION OF r': the JSON on stdout of the last command.
+judge() {
+  python3 -c 'import json, sys; r = json.load(open(sys.argv[1])); sys.exit(not eval(sys.argv[2]))' "$work/stdout" "$1" ||
+    fail "not as it should be: $1"
+}
+
+pair=(--left "$work/left.ppm" --right "$work/right.ppm" --gt "$work/truth.pgm")
+tells "level half_range" "$takt" eval stereo "${pair[@]}" --disparities 32
+tells "adaptive weight" "$takt" eval stereo "${pair[@]}" --disparities 16 --variants
+answers "$takt" eval stereo "${pair[@]}" --disparities 32 --set cost=rss --json
+judge 'r["bad_1px_pct"] < 5 and r["known_px"] == 160 * 60 and r["confidence_right"] > 0.9'
+answers "$takt" eval stereo --scene "$work/scene" --disparities 32 --json
+judge 'r["bad_1px_pct"] < 5 and r["known_px"] > 8000'
+writes "$work/noise.png" "$takt" eval stereo --sweep noise --disparities 16 --picture "$work/noise.png"
+tells corners "$takt" eval ego_motion --generated --frames 3
+writes "$work/head.yaml" "$takt" calibrate stereo "$work/boards" --square 0.03 --left 'left*.ppm' --right 'right*.ppm' \
+  --out "$work/head.yaml" --picture "$work/head.png" --json
+judge 'abs(r["calibration"]["baseline"] - 0.1) < 0.002 and r["calibration"]["epipolar_px"]["median"] < 0.3 and not r["rejected"]'
+writes "$work/rig.yaml" "$takt" calibrate rig "$source/graph/rigs/xb3_raw.yaml" --out "$work/rig.yaml"
+writes "$work/clean.pcd" "$takt" cloud "$work/cloud.ply" --outliers 0.1:5 --reduce 0.1 --out "$work/clean.pcd" --json
+judge 'r[0]["points"] == 901 and 20 < r[0]["points_out"] < 100'
 
 answers "$takt" eval objects --frames 1 --images 1 --empty 1 --budget 12 --automatic --size 1 1.2
 answers "$takt" eval objects3d --samples 2

@@ -55,6 +55,32 @@ TEST_CASE("pictures of a board become a file that the stereo node reads, and a p
   CHECK(run(common) == kBadInput);
 }
 
+TEST_CASE("the calibration shipped beside a rig of raw pairs is the one its rig file gives") {
+  const takt::test::TemporaryFolder folder;
+  const std::filesystem::path rigs = std::filesystem::path(TAKT_SOURCE_DIR) / "graph" / "rigs";
+  const std::string out = folder.path / "made.yaml";
+  CHECK(run("calibrate rig " + (rigs / "xb3_raw.yaml").string() + " --out " + out) == kOk);
+  const auto made = stereo::read_calibration(out),
+             shipped = stereo::read_calibration(rigs / "xb3_raw_calibration.yaml");
+  CHECK(made.width == shipped.width);
+  CHECK(made.height == shipped.height);
+  const auto same = [](const auto& a, const auto& b) {
+    for (size_t i = 0; i < a.size(); ++i) CHECK(a[i] == doctest::Approx(b[i]).epsilon(1e-12));
+  };
+  same(made.left_matrix, shipped.left_matrix);
+  same(made.right_matrix, shipped.right_matrix);
+  same(made.left_distortion, shipped.left_distortion);
+  same(made.right_distortion, shipped.right_distortion);
+  same(made.rotation, shipped.rotation);
+  same(made.translation_m, shipped.translation_m);
+  CHECK(made.rotation[0] < 1 - 1e-6);  // not parallel
+
+  CHECK(run("calibrate rig " + (rigs / "xb3.yaml").string() + " --out " + out) == kBadInput);
+  CHECK(run("calibrate rig " + (rigs / "none.yaml").string() + " --out " + out) == kBadInput);
+  CHECK(run("calibrate rig " + (rigs / "xb3_raw.yaml").string() + " --out " + (folder.path / "made").string()) ==
+        kBadInput);
+}
+
 TEST_CASE("pictures without a board are refused") {
   const takt::test::TemporaryFolder folder;
   for (const char* name : {"left1.png", "right1.png", "left2.png", "right2.png"})
