@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 # Kills processes of a run at every step of a message's life: kill_steps.sh [REPEATS] [TRANSPORT...]
 # Default: 50 repeats over local and iceoryx. One run for each step: the process of stereo (the writer of
-# stereo.disparity), or of semantic (a reader of obstacle_stop.stop), is killed there every 4 s (over iceoryx less often).
-# Prints for each step how often it struck, what came of it (the process came
+# stereo.disparity), or of semantic (a reader of obstacle_stop.stop), is killed there every 4 s (over iceoryx less often), at
+# the instants within inside_publish in turn. Prints for each step how often it struck, what came of it (the process came
 # back, or the whole group was started anew), how long it took, and the chunks in use at the end beside those of a run
 # without kills. Exit 1 if a kill did not strike, anybody did not come back, or a chunk is left taken.
 root=$(readlink -f "$(dirname "$0")/../..")

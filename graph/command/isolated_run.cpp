@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <ctime>
 #include <memory>
@@ -138,6 +139,8 @@ class IsolatedRun {
     const CpuLatencyHold latency = hold_cpu_dma_latency();
     tell_lacks(latency);
     bring_up_transport();
+    std::optional<DaemonProbe> probe;  // from here on somebody waits for the daemon: members that join
+    if (options_.transport == "iceoryx") probe.emplace(*transport_, board_.group(), clock_);
     agree_on_policy();
     faults_.disturb_disk(record_, clock_, board_);
     if (!again()) record_.begin(graph_, plan_, board_, *transport_, "subsystem");
@@ -148,7 +151,7 @@ class IsolatedRun {
     // Now, with everything in place and locked: at the end they leave one after the other.
     memory_mb_ = proportional_memory_mb(getpid());
     for (size_t p = 0; p < group_.size(); ++p) memory_mb_ += proportional_memory_mb(group_.pid(p));
-    memory_mb_ += proportional_memory_mb(group_.nursery());
+    for (const pid_t nursery : group_.nurseries()) memory_mb_ += proportional_memory_mb(nursery);
     start();
     {
       const attach::Server server({graph_, plan_, board_, *transport_, run});
@@ -156,13 +159,13 @@ class IsolatedRun {
       const LiveTable live(plan_, board_,
                            fmt::format("takt run {} ({}, policy {}, {} processes)", graph_.name, graph_.profile,
                                        to_string(plan_.policy), group_.size()));
-      std::optional<DaemonProbe> probe;
-      if (options_.transport == "iceoryx") probe.emplace(*transport_, board_.group(), clock_);
       watchdog_.emplace(options_, plan_, board_);
       const RunFaults::Active faulty(faults_, plan_, clock_, board_);
       const RunExpectations::Active expecting(expectations_, plan_, clock_, board_, *transport_);
       watch();
     }
+    probe.reset();
+    watchdog_->start();  // whoever waits for feeds does so until the end: reports and traces take their time
     MachineUse use = use_of_all();
     use.steal_ms -= steal_before_ms;
     use.cpu_ns -= cpu_before_ns;
@@ -298,6 +301,8 @@ class IsolatedRun {
       }
       if (!board_.dismissed().load() && (all_finished() || now > give_up_ns)) {
         record_.take_rest();
+        // Nobody holds a message any more: what is taken now beyond what outputs keep stays taken.
+        chunks_at_end_ = transport_->chunks_in_use();
         board_.dismissed().store(true);
         give_up_ns = now + kPatienceNs;
       }
@@ -341,6 +346,7 @@ class IsolatedRun {
     for (size_t port = 0; port < plan_.ports.size(); ++port)
       if (plan_.ports[port].node + "." + plan_.ports[port].port == strike.output)
         order.port.store(static_cast<uint32_t>(port));
+    order.passes.store(strike.passes);
     order.step.store(strike.step);
   }
 
@@ -365,6 +371,9 @@ class IsolatedRun {
     record_.finish(result, trace_.unheard_threads());
     auto report = make_report({graph_, plan_, board_, result, *transport_, use, options_.clock,
                                std::string(to_string(plan_.policy)), "subsystem", partition_.names, adjusted_, ages_});
+    if (chunks_at_end_ > 0) report["memory"]["chunks_at_end"] = chunks_at_end_;
+    if (const size_t lost = group_.lost_nurseries(); lost > 0)
+      problems_.push_back(fmt::format("the process that starts others again was lost {} times and replaced", lost));
     for (const std::string& problem : problems_) report["faults"].push_back({{"what", problem}});
     add_outages(board_.outages(), partition_.names, plan_, tasks_of(plan_, partition_), result, report);
     if (!problems_.empty() || board_.outages().size() > 0) report["ok"] = false;
@@ -373,8 +382,8 @@ class IsolatedRun {
     const int exit = code_ != 0 ? code_ : report["ok"].get<bool>() ? kOk : kNotOk;
     faults_.judge(result, board_, exit, partition_.names, report);
     expectations_.judge(report);
-    if (code_ == 0) watchdog_->end();  // else nobody says that all is well
     tell(options_, graph_, report);
+    if (code_ == 0) watchdog_->end();  // else nobody says that all is well
     if (!no_trace.empty()) return refuse(no_trace, kBadInput);
     return expectations_.exit_code(faults_.exit_code(exit, report), report);
   }
@@ -399,6 +408,7 @@ class IsolatedRun {
   size_t told_ = 0;
   bool ending_ = false;
   double memory_mb_ = 0;
+  uint32_t chunks_at_end_ = 0;  ///< 0: not known
   std::unique_ptr<Transport> transport_;  ///< of iceoryx with the daemon: ends after all members
   RunRecord record_;                      ///< reads from the transport
   RunTrace trace_;                        ///< speaks to the record
@@ -406,6 +416,13 @@ class IsolatedRun {
   std::optional<Supervisor> supervisor_;  ///< of the group
   std::optional<RunWatchdog> watchdog_;
 };
+
+/// The process that stands for the run to the service manager is the keeper; the group's is the one that speaks.
+void take_over_notifications(pid_t keeper) {
+  const char* meant = std::getenv("WATCHDOG_PID");
+  if (meant != nullptr && std::to_string(keeper) == meant)
+    setenv("WATCHDOG_PID", std::to_string(getpid()).c_str(), 1);
+}
 
 }  // namespace
 
@@ -433,7 +450,8 @@ int run_isolated(const RunOptions& options, const graph::GraphSpec& graph, RunFa
   };
   how.say = [](const std::string& what) { std::fprintf(stderr, "takt: %s\n", what.c_str()); };
   const MonotonicClock clock;
-  const auto code = GroupKeeper(run.board().group(), clock, how).keep([&] {
+  const auto code = GroupKeeper(run.board().group(), clock, how).keep([&, keeper = getpid()] {
+    take_over_notifications(keeper);
     int code = kDeviceOrSystem;
     try {
       code = as_supervisor();

@@ -36,12 +36,11 @@ Json told(const Outage& outage, const std::string& process, std::vector<std::str
 }
 
 /// Releases of a task within the outages of its process, none counted twice.
-uint64_t missed(const TaskPlan& task, size_t process, const OutageLog& outages, const RunResult& result) {
+uint64_t missed(const TaskPlan& task, size_t process, const std::vector<Outage>& outages, const RunResult& result) {
   if (!task.rate) return 0;
   const int64_t origin_ns = result.epoch_ns + task.offset_ns;
   int64_t counted_to = 0, jobs = 0;
-  for (size_t i = 0; i < outages.size(); ++i) {
-    const Outage& outage = outages[i];
+  for (const Outage& outage : outages) {
     if (outage.process != process) continue;
     const int64_t from = std::max(counted_to, task.rate->releases_before(origin_ns, outage.from_ns));
     counted_to = std::max(from, task.rate->releases_before(origin_ns, end_of(outage, result)));
@@ -52,15 +51,17 @@ uint64_t missed(const TaskPlan& task, size_t process, const OutageLog& outages, 
 
 }  // namespace
 
-void add_outages(const OutageLog& outages, const std::vector<std::string>& processes, const Plan& plan,
+void add_outages(const OutageLog& log, const std::vector<std::string>& processes, const Plan& plan,
                  const std::vector<std::vector<size_t>>& tasks_of, const RunResult& result, Json& report) {
-  for (size_t i = 0; i < outages.size(); ++i) {
+  const std::vector<Outage> outages = log.in_order();
+  for (const Outage& outage : outages) {
     std::vector<std::string> nodes;
-    for (const size_t t : tasks_of[outages[i].process]) nodes.push_back(plan.tasks[t].name);
-    report["faults"].push_back(told(outages[i], processes[outages[i].process], std::move(nodes), result));
+    for (const size_t t : tasks_of[outage.process]) nodes.push_back(plan.tasks[t].name);
+    report["faults"].push_back(told(outage, processes[outage.process], std::move(nodes), result));
   }
-  if (outages.lost() > 0)
-    report["faults"].push_back({{"what", fmt::format("{} more outages, not kept", outages.lost())}});
+  if (log.lost() > 0)
+    report["faults"].push_back(
+        {{"what", fmt::format("{} earlier outages, not kept: releases in them are not in `down`", log.lost())}});
   for (size_t p = 0; p < tasks_of.size(); ++p)
     for (const size_t t : tasks_of[p])
       for (Json& node : report["nodes"])

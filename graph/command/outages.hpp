@@ -12,7 +12,7 @@ namespace takt::command {
 /// Tells in the report what became of processes that died: an entry of "faults" each ({what, kind: "outage", process,
 /// nodes, cause, at_s, back_s, down_s, chunks_freed}; back_s is null if it never came back), and for each node "down",
 /// the planned releases that fell into an outage of its process. `tasks_of`: by process, indexes into plan.tasks.
-void add_outages(const OutageLog& outages, const std::vector<std::string>& processes, const Plan& plan,
+void add_outages(const OutageLog& log, const std::vector<std::string>& processes, const Plan& plan,
                  const std::vector<std::vector<size_t>>& tasks_of, const RunResult& result,
                  nlohmann::ordered_json& report);
 

@@ -124,6 +124,7 @@ Json edges_json(const RunFacts& facts) {
                        {"received", s.received},
                        {"dropped", s.dropped},
                        {"stale", s.stale},
+                       {"exhausted", facts.board.port(task.edges[e].port).writer.pool_empty},
                        {"age_ms", distribution(s.age, 1e6)}});
     }
   }

@@ -138,6 +138,10 @@ std::string events_text(const Json& report) {
   for (const Json& device : report["devices"])
     if (const std::string what = losses(device); !what.empty())
       text += fmt::format("device {}: {}\n", device["name"].get<std::string>(), what);
+  for (const Json& edge : report["edges"])
+    if (const auto refused = edge["exhausted"].get<uint64_t>(); refused > 0)
+      text += fmt::format("edge {} -> {}: {} messages never made, no chunk was free\n", edge["from"].get<std::string>(),
+                          edge["to"].get<std::string>(), refused);
   for (const Json& node : report["nodes"])
     if (const std::string what = offences(node); !what.empty())
       text += fmt::format("{}: {}\n", node["name"].get<std::string>(), what);

@@ -87,7 +87,6 @@ int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, Ru
       const RunExpectations::Active expecting(expectations, composition.plan, *prepared.clock, board, *transport);
       result = executor.run();
     }
-    if (result.stuck.empty()) watchdog.end();
   }
   const ProcessReading after = ProcessReading::now();
   const std::string no_trace = trace.write(graph, composition.plan, board, result);
@@ -121,6 +120,7 @@ int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, Ru
   int code = tell_faults(options, graph, board, result.policy_granted, report);
   code = expectations.exit_code(faults.exit_code(code, report), report);
   if (!no_trace.empty()) code = refuse(no_trace, kBadInput);
+  if (result.stuck.empty()) watchdog.end();
   // A job that never returns still uses what would now be taken down.
   if (!result.stuck.empty()) end_process(code, options.transport);
   return code;

@@ -46,10 +46,9 @@ uint64_t losses_of(const std::vector<TaskPlan>& tasks, const std::string& device
 std::vector<graph::Restart> restarts_of(const OutageLog& outages, const std::vector<std::string>& processes,
                                         const RunResult& result) {
   std::vector<graph::Restart> restarts;
-  for (size_t i = 0; i < outages.size(); ++i) {
-    const int64_t back_ns = outages[i].back_ns > 0 ? outages[i].back_ns : result.end_ns;
-    restarts.push_back(
-        {processes[outages[i].process], outages[i].from_ns - result.epoch_ns, back_ns - result.epoch_ns});
+  for (const Outage& outage : outages.in_order()) {
+    const int64_t back_ns = outage.back_ns > 0 ? outage.back_ns : result.end_ns;
+    restarts.push_back({processes[outage.process], outage.from_ns - result.epoch_ns, back_ns - result.epoch_ns});
   }
   return restarts;
 }

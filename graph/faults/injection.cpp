@@ -73,13 +73,14 @@ void Injection::plan_process_strikes() {
     const FaultSpec& fault = scenario_.faults[f];
     if (!strikes_processes(fault.kind)) continue;
     uint64_t number = 0;
+    uint32_t turn = 0;
     const auto add = [&](int64_t at_ns) {
       const bool any = fault.target == "any";
       const std::string at_step = fault.reader.empty() ? fault.target.substr(0, fault.target.find('.')) : fault.reader;
       const std::string process = any ? all[faults::mixed(scenario_.seed, f, number++) % all.size()]
                                       : process_of(graph_, fault.step == MessageStep::none ? fault.target : at_step);
       strikes_.push_back({fault.kind, process, at_ns, fault.for_ns, f, fault.step,
-                          fault.step == MessageStep::none ? std::string() : fault.target});
+                          fault.step == MessageStep::none ? std::string() : fault.target, turn++ % kInstantsOfStep});
     };
     if (fault.every_ns == 0) add(fault.at_ns);
     else

@@ -26,6 +26,7 @@ struct ProcessStrike {
   size_t fault = 0;                      ///< index into Scenario::faults
   MessageStep step = MessageStep::none;  ///< of kill_at_step, with the output
   std::string output = {};
+  uint32_t passes = 0;  ///< instants of the step that come before: the strikes of one fault take turns
 };
 
 class Injection {

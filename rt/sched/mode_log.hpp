@@ -13,7 +13,9 @@ namespace takt {
 /// period after it. So a change is complete, for each task, `lead + max(deadline, period)` after it was asked for.
 class ModeLog {
  public:
-  static constexpr size_t kMost = 512;
+  /// A device that is lost and back takes two of them: one a minute can go on for almost three days. All are kept, since
+  /// how many jobs were to be released is counted from them; when they are used up, the run is in safe_stop for good.
+  static constexpr size_t kMost = 8192;
   /// A request made while the run goes on takes effect this much later, so that it is on the board before the first
   /// release it is to hold for.
   static constexpr int64_t kLead_ns = 1'000'000;
@@ -35,18 +37,13 @@ class ModeLog {
   uint32_t newest() const { return at(INT64_MAX); }
   /// ... with who entered it, and the newest mode that no rule did.
   ModeInForce in_force() const {
-    ModeInForce now;
-    bool found = false;
     for (size_t i = log_.size(); i-- > 0;) {
       const Change* change = log_.at(i);
       if (change == nullptr) continue;
-      if (!found) now = {change->mode, change->origin, 0};
-      found = true;
-      if (change->origin == ModeOrigin::rule) continue;
-      now.before = change->mode;
-      break;
+      if (change->origin != ModeOrigin::rule) return {change->mode, change->origin, change->mode};
+      return {change->mode, change->origin, static_cast<uint32_t>(without_rule_.load(std::memory_order_acquire))};
     }
-    return now;
+    return {};
   }
   /// Nothing happens if that mode is the newest one already, unless a rule entered it. False if there were too many
   /// changes; those that a person asks for are refused earlier, so that a safe stop always has its place.
@@ -68,12 +65,23 @@ class ModeLog {
  private:
   bool has_room() const { return log_.size() + 8 <= kMost; }
   bool append(uint32_t mode, int64_t from_ns, std::string_view reason, ModeOrigin origin) {
-    for (size_t i = log_.size(); i-- > 0;)  // instants never go back
-      if (const Change* change = log_.at(i)) from_ns = std::max(from_ns, change->from_ns);
-    return log_.append({mode, from_ns, BoundedText<120>(reason), origin});
+    from_ns = std::max(from_ns, newest_ns_.load());  // instants never go back
+    if (!log_.append({mode, from_ns, BoundedText<120>(reason), origin})) return false;
+    raise(newest_ns_, from_ns);
+    // Looked for in the log it would take the longer the more changes there were, at every job of a device.
+    if (origin != ModeOrigin::rule) raise(without_rule_, (others_.fetch_add(1) + 1) << 32 | mode);
+    return true;
+  }
+  template <class T>
+  static void raise(std::atomic<T>& most, T value) {
+    for (T had = most.load(); had < value && !most.compare_exchange_weak(had, value);) {
+    }
   }
 
   AppendLog<Change, kMost> log_;
+  std::atomic<int64_t> newest_ns_{0};
+  std::atomic<uint64_t> others_{0};        ///< changes that no rule asked for
+  std::atomic<uint64_t> without_rule_{0};  ///< the mode of the newest of them, its number above it
 };
 
 }  // namespace takt

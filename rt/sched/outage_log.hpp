@@ -2,9 +2,13 @@
 // What became of processes that were away: plain data in the memory that the processes of a run share, so that it is
 // there even if the process that noted it is not.
 #pragma once
+#include <algorithm>
 #include <array>
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
+#include <utility>
+#include <vector>
 
 #include "rt/sched/append_log.hpp"
 
@@ -21,20 +25,33 @@ struct Outage {
   BoundedText<200> cause;  ///< "was ended by signal 9 (Killed)"
 };
 
-/// In the order of their ends. One writer.
+/// The newest ones, and those that last. One writer.
 class OutageLog {
  public:
   static constexpr size_t kMost = 512;
   size_t size() const { return count_.load(std::memory_order_acquire); }
   Outage& operator[](size_t i) { return outages_[i]; }
   const Outage& operator[](size_t i) const { return outages_[i]; }
-  /// Its place. When the log is full the last place is taken again and again, and the ones before it are counted.
+  /// Its place, where it stays while it lasts. When the log is full, it takes that of the oldest one that is over.
   size_t add(const Outage& outage) {
-    const size_t count = size(), place = count < kMost ? count : kMost - 1;
-    outages_[place] = outage;
-    if (count < kMost) count_.store(count + 1, std::memory_order_release);
-    else lost_.fetch_add(1);
-    return place;
+    const size_t count = size();
+    if (count < kMost) {
+      outages_[count] = outage;
+      count_.store(count + 1, std::memory_order_release);
+      return count;
+    }
+    const auto oldest = std::min_element(outages_.begin(), outages_.end(), [](const Outage& a, const Outage& b) {
+      return std::pair(a.back_ns == 0, a.from_ns) < std::pair(b.back_ns == 0, b.from_ns);
+    });
+    *oldest = outage;
+    lost_.fetch_add(1);
+    return static_cast<size_t>(oldest - outages_.begin());
+  }
+  /// In the order of their beginnings.
+  std::vector<Outage> in_order() const {
+    std::vector<Outage> all(outages_.begin(), outages_.begin() + static_cast<std::ptrdiff_t>(size()));
+    std::stable_sort(all.begin(), all.end(), [](const Outage& a, const Outage& b) { return a.from_ns < b.from_ns; });
+    return all;
   }
   /// Outages that are no longer in it.
   uint64_t lost() const { return lost_.load(); }

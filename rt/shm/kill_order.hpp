@@ -20,6 +20,8 @@ enum class MessageStep : uint32_t {
   inside_release,  ///< a reader is giving it back
 };
 inline constexpr size_t kMessageSteps = 7;
+/// The most instants that one step has: those of `inside_publish` in the runtime's own pools.
+inline constexpr uint32_t kInstantsOfStep = 3;
 std::string_view to_string(MessageStep step);
 /// None if there is no step of that name.
 std::optional<MessageStep> message_step(std::string_view name);

@@ -12,6 +12,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <ctime>
 #include <stdexcept>
 #include <utility>
 
@@ -78,7 +79,17 @@ bool ProcessGroup::restart(size_t process) {
   return members_[process].pid > 0;
 }
 
+int64_t ProcessGroup::cpu_ns(size_t process) const {
+  clockid_t clock;
+  timespec used{};
+  if (members_[process].pid <= 0 || clock_getcpuclockid(members_[process].pid, &clock) != 0 ||
+      clock_gettime(clock, &used) != 0)
+    return 0;
+  return used.tv_sec * 1'000'000'000 + used.tv_nsec;
+}
+
 std::optional<ProcessGroup::End> ProcessGroup::reap() {
+  if (nursery_) nursery_->look();
   for (size_t i = 0; i < members_.size(); ++i) {
     int status = 0;
     rusage used{};

@@ -36,16 +36,20 @@ class ProcessGroup {
   /// After the last start and before the first thread: makes restart() possible. Throws std::runtime_error.
   void prepare_restarts();
   /// Runs the body of an ended process again, with what this process's memory held at prepare_restarts(). False if
-  /// there can be no more processes.
+  /// there can be no more processes now.
   bool restart(size_t process);
-  /// The end of one of them that was not told yet, without waiting.
+  /// The end of one of them that was not told yet, without waiting. Looks after what makes restarts possible, too.
   std::optional<End> reap();
   void kill_all();
   size_t alive() const;
   size_t size() const { return members_.size(); }
   const std::string& name(size_t process) const { return members_[process].name; }
   pid_t pid(size_t process) const { return members_[process].pid; }  ///< 0: ended
-  pid_t nursery() const { return nursery_ ? nursery_->pid() : 0; }   ///< the process that makes restarts possible
+  /// CPU time that it has used so far; 0 if it has ended.
+  int64_t cpu_ns(size_t process) const;
+  /// The processes that make restarts possible, and how many of them were lost and replaced.
+  std::vector<pid_t> nurseries() const { return nursery_ ? nursery_->pids() : std::vector<pid_t>{}; }
+  size_t lost_nurseries() const { return nursery_ ? nursery_->lost() : 0; }
 
  private:
   struct Member {

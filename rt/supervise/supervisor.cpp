@@ -42,6 +42,10 @@ Supervisor::Supervisor(const Plan& plan, RunBoard& board, ProcessGroup& group, T
 void Supervisor::look() {
   const int64_t now_ns = clock_.now_ns();
   while (const auto end = group_.reap()) note_end(*end, now_ns);
+  if (const size_t lost = group_.lost_nurseries(); lost != lost_nurseries_) {
+    lost_nurseries_ = lost;
+    if (options_.say) options_.say("the process that starts others again was lost; its spare takes its place");
+  }
   if (ending_) return;
   for (size_t p = 0; p < members_.size(); ++p) {
     Member& member = members_[p];
@@ -75,12 +79,15 @@ void Supervisor::note_end(const ProcessGroup::End& end, int64_t now_ns) {
   outage.freed += transport_.reclaim(static_cast<uint32_t>(end.process) + 1);
   outage.started = false;
   outage.start_ns = 0;
-  if (ending_) return;
-  const auto again = member.policy.ended(now_ns);
-  if (!again) return give_up(end.process, now_ns, cause);
-  outage.start_ns = *again;
+  if (!ending_) plan_start(end.process, now_ns, cause);
+}
+
+void Supervisor::plan_start(size_t process, int64_t now_ns, const std::string& cause) {
+  const auto again = members_[process].policy.ended(now_ns);
+  if (!again) return give_up(process, now_ns, cause);
+  outages_[members_[process].outage].start_ns = *again;
   if (options_.say)
-    options_.say("process " + group_.name(end.process) + " " + cause + "; it is started again" +
+    options_.say("process " + group_.name(process) + " " + cause + "; it is started again" +
                  (*again > now_ns ? " in " + seconds(*again - now_ns) : ""));
 }
 
@@ -124,11 +131,12 @@ void Supervisor::start_again(size_t process, int64_t now_ns) {
   record.restarts.fetch_add(1);
   member.releases_before.clear();
   for (const size_t t : member.tasks) member.releases_before.push_back(releases_seen(t));
+  member.silence = {};
   Outage& outage = outages_[member.outage];
   outage.started = group_.restart(process);
-  outage.start_ns = now_ns;
+  outage.start_ns = outage.started ? now_ns : 0;
   member.policy.started(now_ns);
-  if (!outage.started) give_up(process, now_ns, "could not be started again"), outage.start_ns = 0;
+  if (!outage.started) plan_start(process, now_ns, "could not be started again");
 }
 
 uint64_t Supervisor::releases_seen(size_t task) const {
@@ -158,6 +166,11 @@ void Supervisor::watch_return(size_t process, int64_t now_ns) {
   } else if (now_ns - outage.start_ns > options_.start_patience_ns) {
     end(process, now_ns, ", because it did not come back within " + seconds(options_.start_patience_ns));
     outage.start_ns = now_ns;
+  } else if (const LifeSigns& life = board_.process(process).life; life.hanging.load() > 0) {
+    watch_life(process, now_ns);
+    // Before it has a watchdog that tells of it, it lives as long as it uses CPU time.
+  } else if (member.silence.look(life.heartbeat_ns.load() + group_.cpu_ns(process), now_ns) > options_.silence_ns) {
+    end(process, now_ns, ", because it stood still on its way back for " + seconds(options_.silence_ns));
   }
 }
 

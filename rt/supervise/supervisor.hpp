@@ -25,7 +25,7 @@ class Supervisor {
   struct Options {
     RestartPolicy::Limits restarts;
     int64_t silence_ns = kSlowdown * 1'000'000'000LL;
-    /// For a restarted process to come back to its first job.
+    /// For a restarted process that is at work to come back to its first jobs; one that stands still has `silence`.
     int64_t start_patience_ns = kSlowdown * 5'000'000'000LL;
     /// After a process has ended by a signal, before its place is taken; may be empty.
     std::function<void(pid_t)> clean_up = {};
@@ -61,6 +61,8 @@ class Supervisor {
   };
 
   void note_end(const ProcessGroup::End& end, int64_t now_ns);
+  /// When it is started again, or that it never is.
+  void plan_start(size_t process, int64_t now_ns, const std::string& cause);
   void start_again(size_t process, int64_t now_ns);
   void give_up(size_t process, int64_t now_ns, const std::string& cause);
   void watch_return(size_t process, int64_t now_ns);
@@ -79,6 +81,7 @@ class Supervisor {
   std::vector<Member> members_;
   OutageLog& outages_;  ///< on the board
   int64_t lost_cpu_ns_ = 0;
+  size_t lost_nurseries_ = 0;
   bool ending_ = false, gave_up_ = false;
 };
 

@@ -54,6 +54,38 @@ grep -q "STATUS=mode full" "$work/good.heard" || fail "no status"
 awk '/WATCHDOG=1/ { if (last && $1 - last > 1.5) exit 1; last = $1 }' "$work/good.heard" || fail "too long without a feed"
 expect 0 "" timeout 60 "$takt" run "$work/graph.yaml" --isolate none --for 1s --output "$work/out"
 
+# A trace that takes three seconds to be written, since nobody reads it before: the last judgement counts until the end.
+for isolation in none subsystem; do
+  listen late
+  rm -f "$work/trace"
+  mkfifo "$work/trace"
+  NOTIFY_SOCKET=$work/notify WATCHDOG_USEC=1000000 timeout 60 "$takt" run "$work/graph.yaml" --isolate $isolation --for 1s --output "$work/out" \
+    --trace "$work/trace" >"$work/late.out" 2>"$work/late.err" &
+  run=$!
+  until grep -q READY=1 "$work/late.heard" || ! kill -0 $run 2>/dev/null; do sleep 0.05; done
+  sleep 4
+  grep -q STOPPING=1 "$work/late.heard" && fail "isolation $isolation: the end is told before it is there"
+  cat "$work/trace" >/dev/null
+  wait $run || { cat "$work/late.err"; fail "isolation $isolation: the run with a slow trace is not ok"; }
+  hush
+  [ "$(count late WATCHDOG=1)" -ge 8 ] || { cat "$work/late.heard"; fail "isolation $isolation: not fed while the trace is written"; }
+  [ "$(count late STOPPING=1)" -eq 1 ] || fail "isolation $isolation: the end is not told"
+done
+
+# Over iceoryx the process that was started only keeps the one that speaks: what is meant for it is meant for that one.
+over_iceoryx() { # NAME WHOM: as the service manager starts it, which means the process WHOM ($$: that one)
+  listen $1
+  NOTIFY_SOCKET=$work/notify WATCHDOG_USEC=1000000 timeout 60 bash -c "WATCHDOG_PID=$2"' exec "$0" "$@"' "$takt" run "$work/graph.yaml" \
+    --isolate subsystem --transport iceoryx --for 3s --output "$work/out" >"$work/$1.out" 2>"$work/$1.err" ||
+    { cat "$work/$1.err"; fail "the run $1 is not ok"; }
+  hush
+  [ "$(count $1 READY=1)" -eq 1 ] && [ "$(count $1 STOPPING=1)" -eq 1 ] || { cat "$work/$1.heard"; fail "$1: not ready, or no end"; }
+}
+over_iceoryx kept '$$'
+[ "$(count kept WATCHDOG=1)" -ge 5 ] || { cat "$work/kept.heard"; fail "not fed over iceoryx"; }
+over_iceoryx another 1
+[ "$(count another WATCHDOG=1)" -eq 0 ] || fail "fed although another process is to feed"
+
 # A high-criticality node that begins to miss its deadlines: no feed any more, although the run goes on.
 listen bad
 export NOTIFY_SOCKET=$work/notify WATCHDOG_USEC=1000000

@@ -360,3 +360,32 @@ TEST_CASE("ground_map refuses parameters that cannot work") {
   refuses("t_w", 300.0, "nothing would ever be ground");
   refuses("terrain_maps", std::string("no_such_file.txt"), "no_such_file.txt: cannot be read");
 }
+
+TEST_CASE("ground_map: one that takes another's place knows the textures that were learnt, and its map") {
+  FloorPair image(3.1);
+  Bench first({"odometry"});
+  test::BoxWriter<Image> textures(*first.node->outputs()[2]);
+  test::Box<Odometry> before, now;
+  const auto look = [&](Bench& bench, int64_t stamp_ns, uint64_t sequence) {
+    test::latch(bench.port("odometry"), before, stamp_ns - 100 * kMs, 2 * sequence, 0);
+    test::latch(bench.port("odometry"), now, stamp_ns, 2 * sequence + 1, 1);
+    test::latch(bench.port("pair"), image, stamp_ns, sequence);
+    return bench.run();
+  };
+  REQUIRE(look(first, 1000 * kMs, 1));
+  REQUIRE(textures.message().height > 0);
+  for (const bool handed_over : {true, false}) {
+    CAPTURE(handed_over);
+    Bench next({"odometry", "scan"});  // no scan says that the area before it is free: it learns nothing
+    if (handed_over) {
+      PortAccess::hand_over(*next.node->outputs()[2], &textures.message());
+      PortAccess::hand_over(*next.node->outputs()[1], &first.grid->message());
+    }
+    next.node->start(0);
+    for (OutputPort* output : next.node->outputs()) PortAccess::hand_over(*output, nullptr);
+    REQUIRE(look(next, 2000 * kMs, 2));
+    CHECK(next.mask_at(160, 230) == (handed_over ? 255 : 0));
+    CHECK(next.mask_at(160, 10) == 0);
+    CHECK(next.cell(0.1, 2.5) == (handed_over ? 0 : int{Grid::unknown}));
+  }
+}

@@ -142,3 +142,19 @@ TEST_CASE("robot_pose says what must be connected") {
   CHECK(refused({"odometry", "robot_motion"}).find("robot_motion is connected without motion") != std::string::npos);
   CHECK(refused({"scan_pose"}).empty());
 }
+
+TEST_CASE("robot_pose: one that takes another's place goes on from its pose, however the wheels count") {
+  Fixture f;
+  test::Box<Pose> last;
+  Fixture::fill(*last, {7, 2, 0}, 0.1);
+  PortAccess::hand_over(*f.node->outputs()[0], &*last);
+  f.node->start(0);
+  PortAccess::hand_over(*f.node->outputs()[0], nullptr);
+  f.wheels_at(5000, -40);
+  f.run();
+  f.wheels_at(5100, -40);
+  REQUIRE(f.run());
+  CHECK(f.x_m() == doctest::Approx(7.05).epsilon(0.01));
+  CHECK(f.joined->message().y_m == doctest::Approx(2).epsilon(0.01));
+  CHECK(f.pose->message().covariance[0] >= 0.01);  // no surer than the one before
+}

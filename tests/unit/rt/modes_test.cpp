@@ -88,10 +88,24 @@ TEST_CASE("instants of changes never go back") {
   CHECK(log.newest() == 2);
 }
 
+TEST_CASE("a mode that rules have left again and again is still the one to go back to") {
+  ModeLog log;
+  CHECK(log.request(3, 10, "a person"));
+  for (uint32_t i = 0; i < 1000; ++i) {
+    CHECK(log.request_by_rule(1 + i % 2, 20 + i, "lost"));
+    CHECK(log.in_force().before == 3);
+  }
+  CHECK(log.request(4, 5000, "a person"));
+  CHECK(log.in_force().before == 4);
+  CHECK(log.request_by_rule(1, 5001, "lost"));
+  CHECK(log.in_force().mode == 1);
+  CHECK(log.in_force().before == 4);
+}
+
 TEST_CASE("a person cannot use up all changes: a safe stop has its place") {
   ModeLog log;
   uint32_t asked = 0;
-  while (asked < 1000 && log.request(asked % 2 + 1, asked, "", true)) ++asked;
+  while (asked < 2 * ModeLog::kMost && log.request(asked % 2 + 1, asked, "", true)) ++asked;
   CHECK(asked < ModeLog::kMost);
   CHECK(log.request(7, asked, "safe_stop"));
   CHECK(log.newest() == 7);

@@ -183,3 +183,44 @@ TEST_CASE("a process that was started again does not outlive its group, and none
   wait_for_end(without);
   CHECK_FALSE(without.restart(0));
 }
+
+TEST_CASE("whoever makes restarts possible may die or fall silent: its spare takes its place and gets a new one") {
+  ProcessGroup group;
+  group.start("phoenix", [] { return 7; });
+  group.prepare_restarts();
+  CHECK(wait_for_end(group).code == 7);
+  const auto wait_for = [](pid_t pid) {  // its death, which the group is left to see
+    siginfo_t ended;
+    while (waitid(P_PID, static_cast<id_t>(pid), &ended, WEXITED | WNOWAIT) != 0) REQUIRE(errno == EINTR);
+  };
+  for (int again = 0; again < 6; ++again) {
+    const std::vector<pid_t> before = group.nurseries();
+    REQUIRE(before.size() == 2);
+    const pid_t victim = before[again < 4 ? 0 : 1];
+    CAPTURE(again);
+    if (again % 2 == 0) {
+      kill(victim, SIGKILL);
+      wait_for(victim);
+    } else {
+      kill(victim, SIGSTOP);  // it is only missed when it is asked
+    }
+    REQUIRE(group.restart(0));
+    CHECK(wait_for_end(group).code == 7);
+    if (again == 5) kill(victim, SIGCONT);  // the spare was not asked
+  }
+  CHECK(group.lost_nurseries() == 5);
+  CHECK_FALSE(group.reap());
+  CHECK(group.nurseries().size() == 2);
+}
+
+TEST_CASE("both lost at once: no restart, which is told, and nobody waits for ever") {
+  ProcessGroup group;
+  group.start("phoenix", [] { return 7; });
+  group.prepare_restarts();
+  CHECK(wait_for_end(group).code == 7);
+  for (const pid_t nursery : group.nurseries()) kill(nursery, SIGSTOP);
+  CHECK_FALSE(group.restart(0));
+  CHECK(group.nurseries().empty());
+  CHECK(group.lost_nurseries() == 2);
+  CHECK_FALSE(group.restart(0));
+}

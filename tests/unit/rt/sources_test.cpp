@@ -168,9 +168,10 @@ TEST_CASE("the sources of a dead process are lost, once, until its successor say
 TEST_CASE("a source that comes and goes for ever ends in a safe stop, and leaves room for other faults") {
   Scene scene;
   RunBoard board(scene.plan);
-  for (int64_t i = 0; i < 2000; ++i)
+  constexpr auto kTimes = static_cast<int64_t>(2 * ModeLog::kMost);
+  for (int64_t i = 0; i < kTimes; ++i)
     board.tell_source(0, 0, {i % 2 == 0 ? SourceState::silent : SourceState::ok, 0}, i * kMs, i * kMs);
-  CHECK(board.source(0).losses.load() == 1000);
+  CHECK(board.source(0).losses.load() == ModeLog::kMost);
   CHECK(board.modes().newest() == 2);
   CHECK(board.modes().size() < ModeLog::kMost);
   CHECK(board.faults().size() == kMostFaults - 16);

@@ -161,3 +161,32 @@ TEST_CASE("scan_matching refuses a map of less than two cells") {
   PortAccess::connect(test::input(*node, "scan"), {0, 0, 1, 181});
   CHECK_THROWS_AS(test::set_up(*node), SetupError);
 }
+
+TEST_CASE("scan_matching: one that takes another's place goes on from its pose and in its map") {
+  constexpr size_t kTaken = 9;
+  Fixture first, next, anew;
+  const auto known = [](Grid& map) {
+    const auto cells = map.cells.items();
+    return std::count_if(cells.begin(), cells.end(), [](int16_t cell) { return cell != Grid::unknown; });
+  };
+  for (size_t i = 0; i <= kTaken; ++i) {
+    first.latch(i, true);
+    REQUIRE(first.run());
+  }
+  PortAccess::hand_over(*next.node->outputs()[0], &first.pose->message());
+  PortAccess::hand_over(*next.node->outputs()[2], &first.map->message());
+  next.node->start(0);
+  for (OutputPort* output : next.node->outputs()) PortAccess::hand_over(*output, nullptr);
+  for (size_t i = kTaken; i <= kTaken + 1; ++i)
+    for (Fixture* f : {&next, &anew}) {
+      f->latch(i, true);
+      REQUIRE(f->run());
+    }
+  first.latch(kTaken + 1, true);
+  REQUIRE(first.run());
+  const PlanarPose expected = planar(first.pose->message().transform), found = planar(next.pose->message().transform);
+  CHECK(std::hypot(found.x_m - expected.x_m, found.y_m - expected.y_m) < 0.03);
+  CHECK(std::abs(wrapped(found.theta_rad - expected.theta_rad)) < 0.02);
+  CHECK(known(next.map->message()) >= known(first.map->message()) * 99 / 100);
+  CHECK(known(anew.map->message()) < known(next.map->message()));  // what was handed over is more than two scans show
+}

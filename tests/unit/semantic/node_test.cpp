@@ -241,3 +241,18 @@ TEST_CASE("cost of a job" * doctest::skip()) {  // a figure and no check; run wi
   std::sort(us.begin(), us.end());
   MESSAGE(us[500] << " us median, " << us[990] << " us p99, with the harness's own");
 }
+
+TEST_CASE("semantic: one that takes another's place goes on in the script, it does not begin anew") {
+  for (const bool handed_over : {true, false}) {
+    CAPTURE(handed_over);
+    Fixture f;
+    f.set("script", std::string("5s stop object_detection"));
+    f.set_up();
+    test::Box<Requests> last;
+    if (handed_over) PortAccess::hand_over(*f.node->outputs()[0], &*last);
+    f.node->start(100 * kSecond);
+    PortAccess::hand_over(*f.node->outputs()[0], nullptr);
+    f.job(106 * kSecond);
+    CHECK(f.wanted().size() == (handed_over ? 1 : 0));
+  }
+}
