@@ -20,6 +20,7 @@ namespace {
 using namespace mapping_3d;
 
 constexpr double kStep_m = 0.15, kCircle_m = 1.9;
+constexpr size_t kLooks = 80;  // more than a round
 
 DepthCamera pixels_of(const WorldCamera& c) {
   return depth_camera_of(c.model(), c.step_px, static_cast<size_t>(c.width) * static_cast<size_t>(c.height));
@@ -76,25 +77,6 @@ void fill(CloudMapper& mapper, size_t points) {
   }
 }
 
-Row cloud_row(const std::string& name, size_t views, size_t map_points, int rounds) {
-  const WorldCamera camera;
-  const std::vector<Look> looks = walk(camera, 80);
-  Row out = row(name);
-  for (int pass = 0; pass < std::max(1, rounds / 5); ++pass) {
-    MapperParameters p;
-    p.views = views;
-    p.map.tiles = 64;
-    CloudMapper mapper(p, pixels_of(camera).pixels());
-    fill(mapper, map_points);
-    int64_t stamp_ns = 0;
-    for (const Look& look : looks)
-      out.samples.add(
-          cpu_ms([&] { mapper.add_view(look.cloud(), pixels_of(camera), look.camera_in_world, ++stamp_ns); }));
-  }
-  out.value = out.samples.quantile(0.5).value_or(0);
-  return out;
-}
-
 WorldCamera camera_of(int width, int step_px, double focal_px) {
   WorldCamera camera;
   camera.width = width;
@@ -102,6 +84,42 @@ WorldCamera camera_of(int width, int step_px, double focal_px) {
   camera.step_px = step_px;
   camera.focal_px = focal_px;
   return camera;
+}
+
+/// A walk whose clouds go into a map of about so many other points: all that add_view() and tidy() do with one, and
+/// each of tidy()'s portions.
+struct CloudRows {
+  Row cloud, portion;
+};
+CloudRows cloud_rows(const std::string& name, const WorldCamera& camera, size_t looks, size_t views, size_t map_points,
+                     int rounds) {
+  const std::vector<Look> seen = walk(camera, looks);
+  const DepthCamera pixels = pixels_of(camera);
+  CloudRows out{row("cloud/" + name), row("tidy/" + name)};
+  for (int pass = 0; pass < std::max(1, rounds / 5); ++pass) {
+    MapperParameters p;
+    p.views = views;
+    p.map.tiles = 64;
+    CloudMapper mapper(p, pixels.pixels());
+    fill(mapper, map_points);
+    int64_t stamp_ns = 0;
+    for (const Look& look : seen) {
+      const int64_t begin_ns = thread_cpu_ns();
+      mapper.add_view(look.cloud(), pixels, look.camera_in_world, ++stamp_ns);
+      int64_t asked_ns = 0;
+      const auto portion_ends = [&] {
+        const int64_t now_ns = thread_cpu_ns();
+        if (asked_ns > 0) out.portion.samples.add(static_cast<double>(now_ns - asked_ns) * 1e-6);
+        asked_ns = now_ns;
+        return true;
+      };
+      mapper.tidy(portion_ends);
+      portion_ends();
+      out.cloud.samples.add(static_cast<double>(asked_ns - begin_ns) * 1e-6);
+    }
+  }
+  for (Row* r : {&out.cloud, &out.portion}) r->value = r->samples.quantile(0.5).value_or(0);
+  return out;
 }
 
 }  // namespace
@@ -113,10 +131,17 @@ std::vector<Row> run_fusion(const Options& options) {
   for (const size_t views : {5, 9}) fuse_rows(rows, WorldCamera{}, views, several);
   for (const size_t views : {5, 9}) fuse_rows(rows, camera_of(640, 1, 492.8), views, std::max<size_t>(1, several / 3));
   fuse_rows(rows, camera_of(1280, 1, 985.6), 5, std::max<size_t>(1, several / 5));
-  for (const size_t views : {1, 5, 9, 16})
-    rows.push_back(cloud_row(fmt::format("cloud/window_{}", views), views, 0, rounds));
-  for (const size_t points : {100'000, 400'000})
-    rows.push_back(cloud_row(fmt::format("cloud/map_{}", points), 5, points, rounds));
+  const auto add = [&](const std::string& name, const WorldCamera& camera, size_t looks, size_t views, size_t points) {
+    CloudRows measured = cloud_rows(name, camera, looks, views, points, rounds);
+    rows.push_back(std::move(measured.cloud));
+    if (points > 0) rows.push_back(std::move(measured.portion));
+  };
+  for (const size_t views : {1, 5, 9, 16}) add(fmt::format("window_{}", views), {}, kLooks, views, 0);
+  for (const size_t points : {100'000, 400'000}) add(fmt::format("map_{}", points), {}, kLooks, 5, points);
+  // What stereo gives in `ace`, in `fine` and in the original; fewer looks, which take their time to be rendered.
+  add("points_76800", camera_of(320, 2, 492.8), kLooks / 2, 5, 0);
+  add("points_307200", camera_of(640, 2, 985.6), kLooks / 4, 5, 0);
+  add("points_1228800", camera_of(1280, 1, 985.6), kLooks / 4, 5, 0);
   return rows;
 }
 

@@ -6,6 +6,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "nodes/cloud/cloud_file.hpp"
+#include "nodes/picture/clouds.hpp"
 #include "nodes/picture/draw.hpp"
 #include "rt/msg/messages.hpp"
 #include "rt/msg/scalar.hpp"
@@ -58,11 +59,17 @@ cv::Mat draw(const StereoPair& pair) {
   return both;
 }
 
+cv::Mat draw(const PointCloud& cloud) {
+  const cloud::CloudView view{cloud.points.items(), cloud.colours.items()};
+  return picture::draw_clouds({&view, 1});
+}
+
 cv::Mat picture_of(const MessageType& type, const void* message) {
   if (type.name == Image::type_name) return wrap(static_cast<const Image*>(message)->view());
   if (type.name == StereoPair::type_name) return draw(*static_cast<const StereoPair*>(message));
   if (type.name == DisparityMap::type_name) return draw(*static_cast<const DisparityMap*>(message));
   if (type.name == Grid::type_name) return draw(*static_cast<const Grid*>(message));
+  if (type.name == PointCloud::type_name) return draw(*static_cast<const PointCloud*>(message));
   return {};
 }
 

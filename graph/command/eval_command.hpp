@@ -105,7 +105,7 @@ struct EvalRegistrationOptions {
   std::vector<double> displace;                     ///< m, deg: away from the true pose; empty: as the clouds came
   std::string sweep, metric;                        ///< of the pair given, or of generated ones
   size_t runs = 20, points = 1000, population = 100;
-  uint32_t generations = 25'000;
+  uint32_t generations = 25'000, patience = 1000;
   double cut_m = 0, sigma_m = 0;  ///< 0: chosen
   uint64_t seed = 1;
   std::filesystem::path out;  ///< fused cloud

@@ -9,9 +9,9 @@
 #include "graph/command/eval_command.hpp"
 #include "graph/command/prepare.hpp"
 #include "nodes/cloud/cloud_file.hpp"
-#include "nodes/laser_fusion/picture.hpp"
 #include "nodes/mapping_3d/evaluate.hpp"
 #include "nodes/mapping_3d/grid_file.hpp"
+#include "nodes/picture/clouds.hpp"
 
 namespace takt::command {
 namespace {
@@ -27,33 +27,46 @@ class Results {
   void fusion(const char* name, const std::string& key, const FusionEvaluation& e) {
     const DepthFigures &single = e.methods[0], &fused = e.methods.back();
     all_[key + "rms_m"] = fused.rms_m;
+    all_[key + "rms_with_outliers_m"] = fused.rms_all_m;
     all_[key + "outliers_pct"] = fused.outliers_pct;
     all_[key + "density_pct"] = fused.density_pct;
     all_[key + "fusion_ms"] = e.time_ms;
-    for (size_t i = 0; i + 1 < e.methods.size(); ++i)
-      baseline_[e.methods[i].method][key + "rms_m"] = e.methods[i].rms_m,
-                                           baseline_[e.methods[i].method][key + "outliers_pct"] =
-                                               e.methods[i].outliers_pct;
+    for (size_t i = 0; i + 1 < e.methods.size(); ++i) {
+      Json& other = baseline_[e.methods[i].method];
+      other[key + "rms_m"] = e.methods[i].rms_m;
+      other[key + "rms_with_outliers_m"] = e.methods[i].rms_all_m;
+      other[key + "outliers_pct"] = e.methods[i].outliers_pct;
+    }
     if (json_) return;
     std::printf("%s: %.1f ms a fusion, RMS %.2f of a single view's\n", name, e.time_ms, fused.rms_m / single.rms_m);
-    std::printf("  %-16s %9s %8s %8s %11s %9s\n", "method", "points", "rms mm", "bias mm", "outliers %", "density %");
+    std::printf("  %-16s %9s %8s %14s %8s %11s %9s\n", "method", "points", "rms mm", "with outliers", "bias mm",
+                "outliers %", "density %");
     for (const DepthFigures& f : e.methods)
-      std::printf("  %-16s %9zu %8.1f %8.1f %11.2f %9.1f\n", f.method.c_str(), f.points, 1e3 * f.rms_m, 1e3 * f.bias_m,
-                  f.outliers_pct, f.density_pct);
+      std::printf("  %-16s %9zu %8.1f %14.1f %8.1f %11.2f %9.1f\n", f.method.c_str(), f.points, 1e3 * f.rms_m,
+                  1e3 * f.rms_all_m, 1e3 * f.bias_m, f.outliers_pct, f.density_pct);
   }
 
   void redundancy(const RedundancyFigures& r) {
-    all_["redundancy_factor"] = r.factor;
-    all_["points_a_voxel"] = r.points_a_voxel;
-    all_["completeness_pct"] = r.completeness_pct;
-    all_["map_rms_m"] = r.rms_m;
-    baseline_["plain merge"]["map_rms_m"] = r.seen_rms_m;
+    const auto tell = [](Json& into, const MapFigures& map) {
+      into["redundancy_factor"] = map.factor;
+      into["points_a_voxel"] = map.points_a_voxel;
+      into["completeness_pct"] = map.completeness_pct;
+      into["exact_voxel_completeness_pct"] = map.exact_pct;
+      into["map_rms_m"] = map.rms_m;
+    };
+    tell(all_, r);
+    tell(baseline_["plain merge"], r.plain);
+    baseline_["points as seen"]["map_rms_m"] = r.seen_rms_m;
     all_["cloud_ms"] = r.time_ms;
     if (json_) return;
-    std::printf("map of a room, %zu clouds, %.1f ms each: %zu points seen, %zu kept (1 of %.1f), %.2f a voxel\n",
-                r.clouds, r.time_ms, r.seen_points, r.map_points, r.factor, r.points_a_voxel);
-    std::printf("  %.1f %% complete, %.1f mm off (the points as seen: %.1f)\n", r.completeness_pct, 1e3 * r.rms_m,
-                1e3 * r.seen_rms_m);
+    std::printf("map of a room, %zu clouds, %.1f ms each: %zu points seen, %.1f mm off\n", r.clouds, r.time_ms,
+                r.seen_points, 1e3 * r.seen_rms_m);
+    std::printf("  %-16s %9s %7s %8s %20s %15s %8s\n", "", "points", "1 of", "a voxel", "complete within 1 %",
+                "in the voxel %", "rms mm");
+    const std::pair<const char*, const MapFigures*> maps[] = {{"plain merge", &r.plain}, {"the map", &r}};
+    for (const auto& [name, map] : maps)
+      std::printf("  %-16s %9zu %7.1f %8.2f %20.1f %15.1f %8.1f\n", name, map->points, map->factor, map->points_a_voxel,
+                  map->completeness_pct, map->exact_pct, 1e3 * map->rms_m);
   }
 
   void ghosts(const GhostFigures& g) {
@@ -139,7 +152,7 @@ void write(const EvalMappingOptions& o, const RedundancyFigures& room) {
   const cloud::CloudView view = room.map.view();
   bool written = false;
   try {
-    written = cv::imwrite(o.picture, laser_fusion::draw_clouds({&view, 1}));
+    written = cv::imwrite(o.picture, picture::draw_clouds({&view, 1}));
   } catch (const cv::Exception&) {  // a name whose ending tells no format
   }
   if (!written)

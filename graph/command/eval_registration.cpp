@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <fstream>
 #include <limits>
@@ -17,8 +18,8 @@
 #include "nodes/cloud/cloud_file.hpp"
 #include "nodes/laser_fusion/evaluate.hpp"
 #include "nodes/laser_fusion/fusion.hpp"
-#include "nodes/laser_fusion/picture.hpp"
 #include "nodes/laser_fusion/registration.hpp"
+#include "nodes/picture/clouds.hpp"
 #include "rt/time/clock.hpp"
 
 namespace takt::command {
@@ -65,6 +66,7 @@ RegistrationParameters parameters_of(const EvalRegistrationOptions& o) {
   p.seed = o.seed;
   p.genetic.generations = o.generations;
   p.genetic.population = o.population;
+  p.genetic.patience = o.patience;
   return p;
 }
 
@@ -136,7 +138,7 @@ void write_results(const EvalRegistrationOptions& o, const cloud::Cloud& target,
   const cloud::CloudView views[] = {before.view(), after.view(), result.confidence.view(), result.coloured.view()};
   bool written = false;
   try {
-    written = cv::imwrite(o.picture, draw_clouds(std::span(views).first(source.colours.empty() ? 3 : 4)));
+    written = cv::imwrite(o.picture, picture::draw_clouds(std::span(views).first(source.colours.empty() ? 3 : 4)));
   } catch (const cv::Exception&) {  // a name whose ending tells no format
   }
   if (!written)
@@ -239,6 +241,14 @@ SuccessParameters sweep_parameters(const EvalRegistrationOptions& o, bool genera
   return p;
 }
 
+/// 95 % interval of a share (Wilson 1927), per cent: what so few runs can say.
+std::pair<double, double> wilson_pct(size_t part, size_t all) {
+  constexpr double kZ = 1.959964;
+  const double n = static_cast<double>(all), p = static_cast<double>(part) / n, z2 = kZ * kZ;
+  const double middle = p + z2 / (2 * n), half = kZ * std::sqrt(p * (1 - p) / n + z2 / (4 * n * n));
+  return {100 * std::max(0.0, middle - half) / (1 + z2 / n), 100 * std::min(1 + z2 / n, middle + half) / (1 + z2 / n)};
+}
+
 /// Of generated pairs over overlaps and offsets, of a recorded one over offsets.
 int sweep_success(const EvalRegistrationOptions& o, const std::optional<Recorded>& recorded) {
   SuccessParameters p = sweep_parameters(o, !recorded);
@@ -248,8 +258,8 @@ int sweep_success(const EvalRegistrationOptions& o, const std::optional<Recorded
   Json rows = Json::array();
   std::vector<Curve> curves;
   if (!o.json)
-    std::printf("%7s %7s %7s %9s %9s %9s %9s %9s %9s %11s %11s\n", "overlap", "m", "deg", "genetic %", "plain %",
-                "general %", "deceived %", "median m", "deg", "at truth", "at found");
+    std::printf("%7s %7s %7s %9s %9s %9s %9s %9s %9s %9s %11s %11s\n", "overlap", "m", "deg", "genetic %", "95 %",
+                "plain %", "general %", "deceived %", "median m", "deg", "at truth", "at found");
   for (const auto& offset : kOffsets) {
     curves.push_back({fmt::format("successes of genetic ICP, %, offset {} m / {} deg", offset.m, offset.degrees), {}});
     for (const double overlap : overlaps) {
@@ -261,12 +271,15 @@ int sweep_success(const EvalRegistrationOptions& o, const std::optional<Recorded
                         : generate_pair(p.pair, seed);
       });
       const auto percent = [&](size_t count) { return 100 * static_cast<double>(count) / static_cast<double>(s.runs); };
+      const auto [low, high] = wilson_pct(s.genetic, s.runs);
       curves.back().values.push_back(percent(s.genetic));
       rows.push_back({{"overlap", recorded ? Json(nullptr) : Json(overlap)},
                       {"offset_m", offset.m},
                       {"offset_deg", offset.degrees},
                       {"runs", s.runs},
                       {"success_pct", percent(s.genetic)},
+                      {"success_low_pct", low},
+                      {"success_high_pct", high},
                       {"deceived_pct", percent(s.deceived)},
                       {"error_m", s.median_m},
                       {"error_deg", s.median_rad / kDegree},
@@ -276,10 +289,10 @@ int sweep_success(const EvalRegistrationOptions& o, const std::optional<Recorded
                        {{"plain_icp", {{"success_pct", percent(s.plain)}}},
                         {"generalised_icp", {{"success_pct", percent(s.generalised)}}}}}});
       if (o.json) continue;
-      std::printf("%7s %7g %7g %9.0f %9.0f %9.0f %9.0f %9.4f %9.3f %11.5f %11.5f\n",
+      std::printf("%7s %7g %7g %9.0f %9s %9.0f %9.0f %9.0f %9.4f %9.3f %11.5f %11.5f\n",
                   recorded ? "-" : fmt::format("{}", overlap).c_str(), offset.m, offset.degrees, percent(s.genetic),
-                  percent(s.plain), percent(s.generalised), percent(s.deceived), s.median_m, s.median_rad / kDegree,
-                  s.score_at_truth, s.score_at_found);
+                  fmt::format("{:.0f}..{:.0f}", low, high).c_str(), percent(s.plain), percent(s.generalised),
+                  percent(s.deceived), s.median_m, s.median_rad / kDegree, s.score_at_truth, s.score_at_found);
       std::fflush(stdout);
     }
   }
@@ -296,6 +309,7 @@ int sweep_population(const EvalRegistrationOptions& o) {
   std::vector<Curve> curves;
   for (const double overlap : {1.0, 0.6}) {
     SuccessParameters p = sweep_parameters(o, true);
+    p.registration.genetic.patience = 0;  // the thesis's search, whose populations these curves are about
     p.pair.points = o.points;
     p.pair.overlap = overlap;
     const auto measured = measure_populations(p, populations, generations);
@@ -362,6 +376,9 @@ void add_eval_registration(CLI::App& eval, EvalRegistrationOptions& o, int& exit
       ->check(CLI::PositiveNumber);
   app->add_option("--generations", o.generations, "default 25000")->check(CLI::Range(1, 10'000'000));
   app->add_option("--population", o.population, "default 100")->check(CLI::Range(2, 10'000));
+  app->add_option("--patience", o.patience,
+                  "generations without a gain after which a search begins anew; 0: never (default 1000)")
+      ->check(CLI::Range(0, 10'000'000));
   app->add_option("--sigma", o.sigma_m, "of match probabilities, m (default 0.4 of the cut)")
       ->check(CLI::PositiveNumber);
   app->add_option("--seed", o.seed, "of the search, of generated pairs and of displacements (default 1)");

@@ -67,6 +67,10 @@ void add_quality(Json& json, const Node& node, const TaskStatistics& s, int64_t 
   }
 }
 
+double cores_of(const RunFacts& facts, size_t t) {
+  return static_cast<double>(facts.board.task(t).cpu_ns) / std::max(1.0, facts.result.duration_s() * 1e9);
+}
+
 Json node_json(const RunFacts& facts, size_t t) {
   const TaskPlan& plan = facts.plan.tasks[t];
   const TaskStatistics& s = facts.board.task(t);
@@ -103,6 +107,7 @@ Json node_json(const RunFacts& facts, size_t t) {
   node["exec_ms"] = distribution(s.exec, 1e6);
   node["response_ms"] = distribution(s.response, 1e6);
   node["publish_ms"] = distribution(s.publish, 1e6);
+  node["cores"] = cores_of(facts, t);
   node["preempted_ms"] = static_cast<double>(s.preempted_ns) / 1e6;
   node["samples"] = s.exec.count();
   node["allocations"] = s.allocations;

@@ -2,6 +2,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
+#include <vector>
 
 #include "graph/command/report.hpp"
 #include "graph/faults/verdict.hpp"
@@ -36,6 +38,24 @@ std::string quality_line(const Json& node) {
     text += fmt::format("{} {} {}", l == 0 ? "" : ",", node["quality_levels"][l].get<std::string>(),
                         node["quality"][std::to_string(l)].get<uint64_t>());
   return text + fmt::format(" jobs; {} changes\n", changes);
+}
+
+/// Who used the CPUs, most first, in lines of a terminal's width; below half a hundredth of a core nobody is named.
+std::string cores_text(const Json& nodes) {
+  constexpr double kLeastCores = 0.005;
+  constexpr size_t kWidth = 80;
+  std::vector<std::pair<double, std::string>> used;
+  for (const Json& node : nodes)
+    if (const auto cores = node["cores"].get<double>(); cores >= kLeastCores)
+      used.emplace_back(cores, node["name"].get<std::string>());
+  std::sort(used.rbegin(), used.rend());
+  std::string text, line;
+  for (const auto& [cores, name] : used) {
+    const std::string piece = fmt::format("{} {:.2f}", name, cores);
+    if (!line.empty() && line.size() + piece.size() + 3 > kWidth) text += std::exchange(line, "") + ",\n";
+    line += (line.empty() ? "  " : ", ") + piece;
+  }
+  return line.empty() ? "" : text + line + "\n";
 }
 
 /// What was asked of the kernel, and what it says it gave.
@@ -92,6 +112,7 @@ std::string summary_text(const Json& report) {
   text += fmt::format("CPU {:.2f} cores: nodes {:.2f}, devices {:.2f}, simulator {:.2f}, runtime {:.2f}\n",
                       report["cpu"]["utilisation"].get<double>(), by["nodes"].get<double>(),
                       by["devices"].get<double>(), by["simulator"].get<double>(), by["runtime"].get<double>());
+  text += cores_text(report["nodes"]);
   text += fmt::format("memory {:.0f} MB shared, {:.0f} MB resident; host stall {} ms\n",
                       report["memory"]["shm_mb"].get<double>(), report["memory"]["rss_mb"].get<double>(),
                       report["host_stall_ms"].get<int64_t>());

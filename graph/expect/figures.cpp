@@ -30,11 +30,15 @@ Finding modes(const std::vector<std::string>& expected, const Json& report) {
           seen == expected};
 }
 
-Finding rate(const std::string& name, const Bound& bound, const Json& report) {
+/// Jobs completed per active second, those without a result left out where `results` are asked for.
+Finding rate(const char* what, bool results, const std::string& name, const Bound& bound, const Json& report) {
   std::optional<double> value;
-  if (const Json* entry = named(report["nodes"], name); entry != nullptr && (*entry)["active_s"].get<double>() > 0)
-    value = static_cast<double>((*entry)["completed"].get<uint64_t>()) / (*entry)["active_s"].get<double>();
-  return figure("rate of " + name, bound, " Hz", value);
+  if (const Json* entry = named(report["nodes"], name); entry != nullptr && (*entry)["active_s"].get<double>() > 0) {
+    const auto completed = (*entry)["completed"].get<double>();
+    const double without = results ? (*entry)["no_result"].get<double>() : 0;
+    value = std::max(0.0, completed - without) / (*entry)["active_s"].get<double>();
+  }
+  return figure(what + name, bound, " Hz", value);
 }
 
 Finding counter(const char* what, const std::string& name, const char* key, const Bound& bound, const Json& report) {
@@ -91,7 +95,8 @@ Finding failures(const Json& report, const std::vector<std::string>& except) {
 std::vector<Finding> figure_findings(const FigureExpectations& expected, const Json& report) {
   std::vector<Finding> findings;
   if (!expected.modes.empty()) findings.push_back(modes(expected.modes, report));
-  for (const auto& [node, bound] : expected.rates) findings.push_back(rate(node, bound, report));
+  for (const auto& [node, bound] : expected.rates) findings.push_back(rate("rate of ", false, node, bound, report));
+  for (const auto& [node, bound] : expected.results) findings.push_back(rate("results of ", true, node, bound, report));
   for (const auto& [node, bound] : expected.misses)
     findings.push_back(counter("misses", node, "deadline_misses", bound, report));
   for (const auto& [node, bound] : expected.stale)

@@ -24,6 +24,7 @@ std::optional<int64_t> read_duration(const Document& document, const std::string
 void FigureReader::read(const json& expect, FigureExpectations& figures) {
   read_modes(expect, figures);
   read_bounds(expect, "rates", names_.nodes, "nodes", &Bound::at_least, figures.rates);
+  read_bounds(expect, "results", names_.nodes, "nodes", &Bound::at_least, figures.results);
   read_bounds(expect, "misses", names_.nodes, "nodes", &Bound::at_most, figures.misses);
   read_bounds(expect, "stale", names_.nodes, "nodes", &Bound::at_most, figures.stale);
   read_bounds(expect, "ages", names_.chains, "chains", &Bound::at_most, figures.ages);

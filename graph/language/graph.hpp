@@ -152,11 +152,12 @@ struct Bound {
 
 /// What the figures of a run's report must be. What is not stated is not asked for.
 struct FigureExpectations {
-  std::vector<std::string> modes;       ///< empty: not stated
-  std::map<std::string, Bound> rates;   ///< by node: jobs completed per active second
-  std::map<std::string, Bound> misses;  ///< by node: deadlines
-  std::map<std::string, Bound> stale;   ///< by node: inputs that were stale at a job
-  std::map<std::string, Bound> ages;    ///< by chain: the oldest at its end, ns
+  std::vector<std::string> modes;        ///< empty: not stated
+  std::map<std::string, Bound> rates;    ///< by node: jobs completed per active second
+  std::map<std::string, Bound> results;  ///< by node: of these, those that had a result
+  std::map<std::string, Bound> misses;   ///< by node: deadlines
+  std::map<std::string, Bound> stale;    ///< by node: inputs that were stale at a job
+  std::map<std::string, Bound> ages;     ///< by chain: the oldest at its end, ns
 };
 
 /// When a condition must hold: at the end of the run, at some time, each time it can be judged, or not once.

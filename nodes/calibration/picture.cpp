@@ -5,7 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "nodes/laser_fusion/fusion.hpp"
-#include "nodes/laser_fusion/picture.hpp"
+#include "nodes/picture/clouds.hpp"
 
 namespace takt::calibration {
 namespace {
@@ -69,7 +69,7 @@ cv::Mat draw_calibration(const LaserRecording& recording, std::span<const Calibr
   const cloud::Cloud after = laid_out(recording, found), before = laid_out(recording, known),
                      apart = residuals(recording, found);
   const cloud::CloudView views[] = {before.view(), after.view(), apart.view()};
-  return laser_fusion::draw_clouds(views);
+  return picture::draw_clouds(views);
 }
 
 cv::Mat draw_calibration(const RectifiedPair& pair, std::span<const View> views, const CalibrationResult& result) {

@@ -2,6 +2,7 @@
 #include "nodes/laser_fusion/genetic_icp.hpp"
 
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include "nodes/laser_fusion/icp.hpp"
@@ -19,24 +20,35 @@ GeneticIcp::GeneticIcp(PoseJudge& judge, const GeneticParameters& parameters)
 
 void GeneticIcp::begin(const Rigid& start, uint64_t seed) {
   random_.seed(seed);
-  current_ = best_ = to_parameters(start);
-  population_.assign(1, current_);
-  oldest_ = 0;
+  start_ = best_ = to_parameters(start);
   generation_ = 0;
+  begin_anew();
   quality_ = judge_->evaluate(to_rigid(current_));
-  scores_[0] = scores_[1] = quality_.score;
+  leader_ = scores_[0] = scores_[1] = quality_.score;
+}
+
+void GeneticIcp::begin_anew() {
+  current_ = start_;
+  population_.assign(1, start_);
+  oldest_ = 0;
+  last_gain_ = generation_;
 }
 
 void GeneticIcp::next() {
   const bool converged = generation_ >= 1 && !(std::abs(scores_[1] - scores_[0]) >= parameters_.eps_conv);
+  if (converged && parameters_.patience > 0 && generation_ - last_gain_ >= parameters_.patience) {
+    begin_anew();
+    leader_ = std::numeric_limits<double>::infinity();
+  }
   current_ = converged ? offspring() : icp_step(*judge_, current_, parameters_.locks);
   ++generation_;
   const Quality quality = judge_->evaluate(to_rigid(current_));
   scores_[1] = scores_[0];
   scores_[0] = quality.score;
-  if (!(quality.score < quality_.score)) return;
-  quality_ = quality;
-  best_ = current_;
+  if (quality.score < quality_.score) quality_ = quality, best_ = current_;
+  if (!(quality.score < leader_)) return;
+  if (!(leader_ - quality.score < parameters_.eps_conv)) last_gain_ = generation_;
+  leader_ = quality.score;
   if (population_.size() < parameters_.population) {
     population_.push_back(current_);
   } else {

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // ICP that leaves local minima by reproduction and mutation (thesis Alg. 4.3, repaired: E-29). Whenever ICP converges,
 // a pose of the population takes one parameter of another and has one changed at random; ICP goes on from there. What
-// beats all before joins the population.
+// beats all before joins the population. A population that gets no better may sit in a wrong place for good: with some
+// patience, another one begins where the first did (not in the thesis).
 #pragma once
 #include <cstdint>
 #include <random>
@@ -17,6 +18,7 @@ struct GeneticParameters {
   PoseParameters mutation{0.5, 0.5, 0.5, 1.05, 1.05, 1.05};  ///< a parameter changes by at most so much, m and rad
   double eps_conv = 1e-5;                                    ///< a local minimum: the score changed by less
   Locks locks{};                                             ///< these parameters stay as in the start pose
+  uint32_t patience = 0;  ///< after so many generations without a gain it begins anew, the best so far kept; 0: never
 };
 
 class GeneticIcp {
@@ -49,6 +51,7 @@ class GeneticIcp {
 
  private:
   void next();
+  void begin_anew();
   PoseParameters offspring();
   size_t any(size_t count);
   double uniform(double low, double high);
@@ -59,9 +62,11 @@ class GeneticIcp {
   std::mt19937_64 random_;
   std::vector<PoseParameters> population_;  ///< a ring, once it is full
   size_t oldest_ = 0;
-  PoseParameters current_{}, best_{};
+  PoseParameters start_{}, current_{}, best_{};
   Quality quality_{};
-  double scores_[2] = {};  ///< of the current pose and of the one before
+  double leader_ = 0;       ///< best score since it began, or began anew
+  uint32_t last_gain_ = 0;  ///< generation
+  double scores_[2] = {};   ///< of the current pose and of the one before
   uint32_t generation_ = 0;
 };
 

@@ -3,8 +3,6 @@
 
 #include <algorithm>
 
-#include "nodes/laser_fusion/thinning.hpp"
-
 namespace takt::laser_fusion {
 namespace {
 
@@ -26,34 +24,49 @@ LaserFusion::LaserFusion(size_t laser_points, size_t vision_points, const LaserF
       matcher_(p.search_points, p.search_points, p.quality),
       genetic_(matcher_, p.genetic) {
   laser_.reserve(laser_points);
+  all_vision_.reserve(vision_points);
+  all_colours_.reserve(vision_points);
   fused_.reserve(laser_points);
 }
 
 void LaserFusion::begin(std::span<const Point> laser, const cloud::CloudView& vision, const Rigid& vision_in_laser,
-                        uint64_t seed) {
-  laser_.assign(laser.begin(), laser.begin() + static_cast<std::ptrdiff_t>(std::min(laser.size(), laser_.capacity())));
-  cloud::CloudBuffer few(vision_, vision_colours_);
-  thin_out(vision, parameters_.vision_voxel_m, grid_, few);
-  vision_count_ = few.size();
-  if (!vision.coloured()) std::fill(vision_colours_.begin(), vision_colours_.end(), Colour{128, 128, 128});
+                        uint64_t seed, bool coloured) {
+  const auto copied = [](const auto& from, auto& into) {
+    into.assign(from.begin(), from.begin() + static_cast<std::ptrdiff_t>(std::min(from.size(), into.capacity())));
+  };
+  copied(laser, laser_);
+  copied(vision.points, all_vision_);
+  copied(vision.coloured() ? vision.colours : std::span<const Colour>(), all_colours_);
+  fused_.clear();
   start_ = vision_in_laser;
   seed_ = seed;
-  stage_ = Stage::thin_laser;
+  coloured_ = coloured;
+  thinning_.begin({all_vision_, all_colours_}, parameters_.vision_voxel_m, {vision_, vision_colours_});
+  stage_ = Stage::take_vision;
 }
 
 void LaserFusion::go_on() {
   switch (stage_) {
+    case Stage::take_vision:
+      if (!thinning_.go_on(grid_)) return;
+      vision_count_ = thinning_.size();
+      if (all_colours_.empty()) std::fill(vision_colours_.begin(), vision_colours_.end(), Colour{128, 128, 128});
+      return thin(Stage::thin_laser, laser_, few_laser_);
     case Stage::thin_laser:
-      few_laser_count_ = thinned(laser_, few_laser_);
-      stage_ = Stage::thin_vision;
-      return;
+      if (!thinning_.go_on(grid_)) return;
+      few_laser_count_ = thinning_.size();
+      return thin(Stage::thin_vision, std::span<const Point>(vision_).first(vision_count_), few_vision_);
     case Stage::thin_vision:
-      few_vision_count_ = thinned(std::span<const Point>(vision_).first(vision_count_), few_vision_);
-      stage_ = Stage::drop_clusters;
-      return;
-    case Stage::drop_clusters:
-      few_laser_count_ = without_clusters(few_laser_, few_laser_count_);
-      few_vision_count_ = without_clusters(few_vision_, few_vision_count_);
+      if (!thinning_.go_on(grid_)) return;
+      few_vision_count_ = thinning_.size();
+      return drop_clusters(Stage::drop_of_laser, std::span(few_laser_).first(few_laser_count_));
+    case Stage::drop_of_laser:
+      if (!clusters_.go_on()) return;
+      few_laser_count_ = clusters_.kept();
+      return drop_clusters(Stage::drop_of_vision, std::span(few_vision_).first(few_vision_count_));
+    case Stage::drop_of_vision:
+      if (!clusters_.go_on()) return;
+      few_vision_count_ = clusters_.kept();
       matcher_.begin(std::span<const Point>(few_laser_).first(few_laser_count_),
                      std::span<const Point>(few_vision_).first(few_vision_count_));
       stage_ = Stage::build;
@@ -63,9 +76,7 @@ void LaserFusion::go_on() {
       genetic_.begin(start_, seed_);
       stage_ = Stage::search;
       return;
-    case Stage::search:
-      if (genetic_.go_on()) begin_colours();
-      return;
+    case Stage::search: return search_or_end();
     case Stage::build_colours:
       if (vision_table_.go_on()) stage_ = Stage::fuse;
       return;
@@ -75,20 +86,25 @@ void LaserFusion::go_on() {
   }
 }
 
-size_t LaserFusion::thinned(std::span<const Point> points, std::vector<Point>& out) {
-  cloud::CloudBuffer buffer(out, {});
-  thin_out({points, {}}, kSearchVoxel_m, grid_, buffer);
-  return buffer.size();
+void LaserFusion::thin(Stage stage, std::span<const Point> points, std::vector<Point>& out) {
+  thinning_.begin({points, {}}, kSearchVoxel_m, {out, {}});
+  stage_ = stage;
 }
 
-size_t LaserFusion::without_clusters(std::span<Point> points, size_t count) {
-  return clusters_.filter(points.first(count), parameters_.clusters);
+void LaserFusion::drop_clusters(Stage stage, std::span<Point> points) {
+  clusters_.begin(points, parameters_.clusters);
+  stage_ = stage;
+}
+
+void LaserFusion::search_or_end() {
+  if (!genetic_.go_on()) return;
+  if (coloured_) begin_colours();
+  else stage_ = Stage::done;
 }
 
 void LaserFusion::begin_colours() {
   vision_table_.begin(std::span<const Point>(vision_).first(vision_count_), farthest_match_m(parameters_.fusion),
                       kFusionDivisions);
-  fused_.clear();
   next_ = 0;
   stage_ = Stage::build_colours;
 }

@@ -6,6 +6,7 @@
 #include "nodes/laser_fusion/fusion.hpp"
 #include "nodes/laser_fusion/genetic_icp.hpp"
 #include "nodes/laser_fusion/matcher.hpp"
+#include "nodes/laser_fusion/thinning.hpp"
 
 namespace takt::laser_fusion {
 
@@ -27,12 +28,13 @@ class LaserFusion {
   LaserFusion(const LaserFusion&) = delete;  // the search refers to the matcher beside it
   LaserFusion& operator=(const LaserFusion&) = delete;
 
-  /// Takes a pair of clouds, both copied. Without colours the vision points are grey. Of 76,800 vision points some
-  /// milliseconds, in which nothing is asked.
-  void begin(std::span<const Point> laser, const cloud::CloudView& vision, const Rigid& vision_in_laser, uint64_t seed);
+  /// Takes a pair of clouds, both copied. Without colours the vision points are grey. `coloured`: somebody wants the
+  /// laser points with their colours; else all ends with the search.
+  void begin(std::span<const Point> laser, const cloud::CloudView& vision, const Rigid& vision_in_laser, uint64_t seed,
+             bool coloured = true);
 
-  /// Goes on until all is done or `more` says no: it is asked before each portion, of about a millisecond at most.
-  /// Returns done().
+  /// Goes on until all is done or `more` says no: it is asked before each portion. That is a pass over a cloud where it
+  /// is thinned out, about a millisecond at most elsewhere. Returns done().
   template <class More>
   bool run(const More& more) {
     while (!done() && more()) go_on();
@@ -57,24 +59,39 @@ class LaserFusion {
   }
 
  private:
-  enum class Stage : uint8_t { idle, thin_laser, thin_vision, drop_clusters, build, search, build_colours, fuse, done };
+  enum class Stage : uint8_t {
+    idle,
+    take_vision,
+    thin_laser,
+    thin_vision,
+    drop_of_laser,
+    drop_of_vision,
+    build,
+    search,
+    build_colours,
+    fuse,
+    done
+  };
 
   void go_on();
-  size_t thinned(std::span<const Point> points, std::vector<Point>& out);
-  size_t without_clusters(std::span<Point> points, size_t count);
+  void thin(Stage stage, std::span<const Point> points, std::vector<Point>& out);
+  void drop_clusters(Stage stage, std::span<Point> points);
+  void search_or_end();
   void begin_colours();
   void fuse_some();
 
   LaserFusionParameters parameters_;
   Stage stage_ = Stage::idle;
-  std::vector<Point> laser_, vision_, few_laser_, few_vision_;
-  std::vector<Colour> vision_colours_;
+  std::vector<Point> laser_, all_vision_, vision_, few_laser_, few_vision_;
+  std::vector<Colour> all_colours_, vision_colours_;
   std::vector<FusedPoint> fused_;
   size_t vision_count_ = 0, few_laser_count_ = 0, few_vision_count_ = 0;
   size_t next_ = 0;  ///< laser point to be fused
   Rigid start_;
   uint64_t seed_ = 0;
+  bool coloured_ = true;
   cloud::VoxelGrid grid_;
+  Thinning thinning_;
   ClusterFilter clusters_;
   NearestTable vision_table_;
   Matcher matcher_;

@@ -40,6 +40,7 @@ class LaserFusionNode final : public Node {
     p.quality.cut_m = cut_;
     p.genetic.population = static_cast<size_t>(population_());
     p.genetic.generations = static_cast<uint32_t>(generations_());
+    p.genetic.patience = static_cast<uint32_t>(patience_());
     p.genetic.locks = locks_of(locked_);
     for (const Parameter axis : {kX, kY, kZ}) p.genetic.mutation[axis] = mutation_distance_;
     for (const Parameter angle : {kYaw, kPitch, kRoll}) p.genetic.mutation[angle] = mutation_angle_;
@@ -79,7 +80,7 @@ class LaserFusionNode final : public Node {
     const Rigid start = ego_motion::from_transform(laser->sensor_in_robot).inverse() *
                         ego_motion::from_transform(vision->sensor_in_robot);
     fusion_->begin(laser->points.items(), {vision->points.items(), vision->colours.items()}, start,
-                   static_cast<uint64_t>(seed_()));
+                   static_cast<uint64_t>(seed_()), fused_.connected() || match_.connected());
     return true;
   }
 
@@ -121,6 +122,7 @@ class LaserFusionNode final : public Node {
   Param<double> cut_{this, "cut", 0.25, {0.005, 10.0}, "m", "points at most so far apart are pairs"};
   Param<int> population_{this, "population", 100, {2, 10'000}, "", "poses that have offspring; 50 to 200 advised"};
   Param<int> generations_{this, "generations", 25'000, {1, 10'000'000}, "", "ICP steps of a search"};
+  Param<int> patience_{this, "patience", 1000, {0, 10'000'000}, "", "without a gain it begins anew; 0: never"};
   Param<int> per_job_{this, "per_job", 1000, {8, 1'000'000}, "", "of these, in one job"};
   Param<double> mutation_distance_{
       this, "mutation_distance", 0.5, {0.0, 10.0}, "m", "a mutation moves along an axis by at most so much"};

@@ -26,9 +26,9 @@ class Registration {
 
   /// Genetic ICP from a start pose, of the thinned clouds.
   Rigid search(const Rigid& start);
-  /// Plain ICP from there, of the thinned clouds.
+  /// Plain ICP from there, of the thinned clouds; the cut goes down to that of the search from four times that.
   Rigid plain(const Rigid& start);
-  /// Generalised ICP from there, of the thinned clouds; the cut goes down to that of the search from four times that.
+  /// Generalised ICP, likewise.
   Rigid generalised(const Rigid& start);
   /// Plain ICP with all points, the cut going down from that of the search to three times the spacing of the clouds as
   /// they came.
@@ -44,6 +44,9 @@ class Registration {
   size_t moving_points() const { return thinned_->moving().size(); }  ///< thinned
 
  private:
+  template <class Icp>
+  Rigid with_falling_cut(const Rigid& start, const Icp& icp_from);
+
   RegistrationParameters parameters_;
   std::vector<Point> fixed_, moving_;  ///< all that refined() uses
   double last_cut_m_ = 0;

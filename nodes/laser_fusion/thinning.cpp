@@ -16,23 +16,42 @@ constexpr size_t kLookedAt = 500;
 
 }  // namespace
 
+void Thinning::begin(const cloud::CloudView& cloud, double edge_m, const cloud::CloudBuffer& out) {
+  cloud_ = cloud;
+  edge_m_ = edge_m;
+  out_ = out;
+  out_.clear();
+  counted_ = false;
+}
+
+bool Thinning::go_on(cloud::VoxelGrid& grid) {
+  if (!counted_) {
+    counted_ = true;
+    const auto usable = [](const Point& p) { return cloud::usable(p); };
+    const auto count = static_cast<size_t>(std::count_if(cloud_.points.begin(), cloud_.points.end(), usable));
+    if (count > out_.capacity()) return false;
+    edge_m_ = 0;
+    for (size_t i = 0; i < cloud_.points.size(); ++i)
+      if (usable(cloud_.points[i])) out_.push(cloud_.points[i], cloud_.coloured() ? cloud_.colours[i] : Colour{});
+    return true;
+  }
+  grid.fill(cloud_, edge_m_);
+  const double times_too_many = static_cast<double>(grid.voxels().size()) / static_cast<double>(out_.capacity());
+  if (times_too_many > 1) {
+    edge_m_ *= std::max(kLeastStep, std::sqrt(times_too_many));  // voxels of a surface
+    return false;
+  }
+  cloud::reduce(grid, out_);
+  return true;
+}
+
 double thin_out(const cloud::CloudView& cloud, double edge_m, cloud::VoxelGrid& grid, cloud::CloudBuffer& out) {
-  const auto usable = [](const Point& p) { return cloud::usable(p); };
-  const auto count = static_cast<size_t>(std::count_if(cloud.points.begin(), cloud.points.end(), usable));
-  out.clear();
-  if (count <= out.capacity()) {
-    for (size_t i = 0; i < cloud.points.size(); ++i)
-      if (usable(cloud.points[i])) out.push(cloud.points[i], cloud.coloured() ? cloud.colours[i] : Colour{});
-    return 0;
+  Thinning thinning;
+  thinning.begin(cloud, edge_m, out);
+  while (!thinning.go_on(grid)) {
   }
-  for (;;) {
-    grid.fill(cloud, edge_m);
-    const double times_too_many = static_cast<double>(grid.voxels().size()) / static_cast<double>(out.capacity());
-    if (times_too_many <= 1) break;
-    edge_m *= std::max(kLeastStep, std::sqrt(times_too_many));  // voxels of a surface
-  }
-  cloud::reduce(grid, out);
-  return edge_m;
+  out.shorten(thinning.size());
+  return thinning.edge_m();
 }
 
 double spacing_of(std::span<const Point> points) {

@@ -44,11 +44,10 @@ void CloudMapper::add_view(const cloud::CloudView& cloud, const DepthCamera& cam
   const std::span<const DepthView> window = std::span(views).first(views_);
   const std::span<float> depth_m = std::span(depth_m_).first(camera.pixels());
   fusion_.fuse(window, middle, p_.fusion, depth_m);
-  const DepthView result{camera, window[middle].camera_in_map, depth_m, {}};
-  if (p_.clear) map_.clear_seen_through(result, p_.fusion.steps * camera.step_per_m, p_.clear_margin_m, p_.range_max_m);
+  unjudged_ = DepthView{camera, window[middle].camera_in_map, depth_m, {}};
   cloud::CloudBuffer out(points_, cloud.coloured() ? std::span(colours_) : std::span<Colour>());
   fusion_.push(window, depth_m, p_.range_max_m, out);
-  fused_ = {out.view(), result.camera_in_map,
+  fused_ = {out.view(), unjudged_->camera_in_map,
             ring_[(newest_ + ring_.size() - (views_ - 1) + middle) % ring_.size()].stamp_ns};
   map_.add(fused_.cloud, fused_.camera_in_map, fused_.stamp_ns);
 }

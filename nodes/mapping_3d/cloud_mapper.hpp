@@ -3,7 +3,9 @@
 // a laser it takes as they are.
 #pragma once
 #include <array>
+#include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "nodes/mapping_3d/median_fusion.hpp"
@@ -34,11 +36,24 @@ class CloudMapper {
   CloudMapper(const MapperParameters& parameters, size_t pixels);
 
   /// The newest view: it is kept, the oldest of a full window goes, and the view in the middle, which others have seen
-  /// from both sides, is fused from all and added to the map.
+  /// from both sides, is fused from all and added to the map. How long that takes depends on the view alone.
   void add_view(const cloud::CloudView& cloud, const DepthCamera& camera, const Transform& camera_in_map,
                 int64_t stamp_ns);
   void add_sweep(const cloud::CloudView& cloud, const Transform& sensor_in_map, int64_t stamp_ns) {
     map_.add(cloud, sensor_in_map, stamp_ns);
+  }
+
+  /// What a map needs beside, and what takes the longer the more there is of it: tiles that a correction has laid anew
+  /// are joined, and what the last fused view looks through goes. Tile by tile while `more` says so; true once all is
+  /// done. What is left of the joining goes on with the next call, what is left of the looking through goes with the
+  /// view.
+  template <class More = Always>
+  bool tidy(const More& more = {}) {
+    if (!map_.join_laid(more)) return false;
+    if (!p_.clear || !unjudged_) return true;
+    const DepthView view = *std::exchange(unjudged_, std::nullopt);
+    return map_.clear_seen_through(view, p_.fusion.steps * view.camera.step_per_m, p_.clear_margin_m, p_.range_max_m,
+                                   more);
   }
 
   /// Of the last add_view(), valid until the next one.
@@ -48,6 +63,7 @@ class CloudMapper {
   void correct(int64_t from_ns, int64_t to_ns, const Transform& believed, const Transform& actual) {
     map_.correct(from_ns, to_ns, believed, actual);
     views_ = 0;
+    unjudged_.reset();
   }
   /// Points of the map frame to begin with. Allocates.
   void load(const cloud::CloudView& cloud) { map_.load(cloud); }
@@ -55,6 +71,7 @@ class CloudMapper {
   void forget() {
     map_.clear();
     views_ = 0;
+    unjudged_.reset();
   }
 
  private:
@@ -78,6 +95,7 @@ class CloudMapper {
   std::vector<Point> points_;
   std::vector<Colour> colours_;
   FusedCloud fused_;
+  std::optional<DepthView> unjudged_;  ///< fused, and the map not yet held against it
 };
 
 }  // namespace takt::mapping_3d

@@ -17,6 +17,7 @@ struct DepthFigures {
   std::string method;
   size_t points = 0;
   double rms_m = 0;         ///< of those that are no outliers
+  double rms_all_m = 0;     ///< of all; only where the truth has nothing around there is no error to count
   double outliers_pct = 0;  ///< farther off than 0.10 m and than a step of the disparity
   double bias_m = 0;        ///< mean error of those that are none; negative: too near
   double density_pct = 0;   ///< points a pixel of the truth
@@ -41,15 +42,22 @@ FusionEvaluation evaluate_generated(const FusionRuns& runs);
 /// first. Throws std::runtime_error naming the file.
 FusionEvaluation evaluate_recorded(const std::filesystem::path& folder, uint64_t seed);
 
-/// A walk around a room: what the map keeps of what was seen.
-struct RedundancyFigures {
-  size_t clouds = 0, seen_points = 0, map_points = 0;
+/// What a map keeps of what was seen, and how true it is.
+struct MapFigures {
+  size_t points = 0;
   double factor = 0;            ///< seen points for each that the map keeps
-  double points_a_voxel = 0;    ///< of the map, in voxels of the world's lattice that hold any
+  double points_a_voxel = 0;    ///< in voxels of the world's lattice that hold any
   double completeness_pct = 0;  ///< voxels of the true surfaces, seen twice, with a point of the map within a voxel
-  double rms_m = 0;             ///< of the map's points, from the true surfaces
-  double seen_rms_m = 0;        ///< of all points seen, as they are
-  double time_ms = 0;           ///< CPU time of a cloud, median
+  double exact_pct = 0;         ///< the same voxels with a point of the map in them
+  double rms_m = 0;             ///< of all points, from the true surfaces
+};
+
+/// A walk around a room: the map, and beside it the same clouds merged as they are, one point a voxel.
+struct RedundancyFigures : MapFigures {
+  size_t clouds = 0, seen_points = 0;
+  MapFigures plain;
+  double seen_rms_m = 0;  ///< of all points seen, as they are
+  double time_ms = 0;     ///< CPU time of a cloud, median
   cloud::Cloud map;
   GridMap grid;
 };

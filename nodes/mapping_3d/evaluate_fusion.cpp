@@ -28,6 +28,10 @@ class Errors {
       if (!(depth_m[i] > 0)) continue;
       ++points_;
       const double error = nearest_error(camera, i, depth_m[i], truth_m);
+      if (std::isfinite(error)) {
+        ++judged_;
+        all_squares_ += error * error;
+      }
       const double limit = std::max(kOutlier_m, camera.step_per_m * depth_m[i] * depth_m[i]);
       if (!(std::abs(error) <= limit)) {
         ++outliers_;
@@ -43,6 +47,7 @@ class Errors {
     return {method_,
             points_,
             std::sqrt(squares_ / good),
+            std::sqrt(all_squares_ / std::max<double>(1, static_cast<double>(judged_))),
             100.0 * static_cast<double>(outliers_) / std::max<double>(1, static_cast<double>(points_)),
             sum_ / good,
             100.0 * static_cast<double>(points_) / std::max<double>(1, static_cast<double>(pixels_))};
@@ -62,8 +67,8 @@ class Errors {
   }
 
   std::string method_;
-  size_t points_ = 0, outliers_ = 0, pixels_ = 0;
-  double sum_ = 0, squares_ = 0;
+  size_t points_ = 0, judged_ = 0, outliers_ = 0, pixels_ = 0;
+  double sum_ = 0, squares_ = 0, all_squares_ = 0;
 };
 
 /// What is compared, over any number of windows.

@@ -44,6 +44,7 @@ class Mapped {
     const DepthCamera camera = depth_camera_of(WorldCamera{});
     const int64_t begin = thread_cpu_ns();
     mapper.add_view(look.cloud(), camera, camera_in_map, ++clouds * kPeriodNs);
+    mapper.tidy();
     times_ms.push_back(static_cast<double>(thread_cpu_ns() - begin) * 1e-6);
   }
   /// Of the map's points from the world's surfaces.
@@ -67,6 +68,49 @@ cloud::VoxelIndex beside(const cloud::VoxelIndex& v, int i) {
   return {v.x + i % 3 - 1, v.y + i / 3 % 3 - 1, v.z + i / 9 - 1};
 }
 
+using Voxels = std::map<cloud::VoxelIndex, int>;  ///< and how often each was met
+
+cloud::VoxelIndex voxel_of(const cloud::VoxelSize& size, const Position& at) {
+  return size.voxel_of({static_cast<float>(at.x_m), static_cast<float>(at.y_m), static_cast<float>(at.z_m)});
+}
+
+/// `surfaces`: voxels of the true ones, and how many looks met each.
+MapFigures figures_of(const Mapped& mapped, const World& world, const Voxels& surfaces, const cloud::VoxelSize& size,
+                      size_t seen_points) {
+  Voxels held;
+  mapped.mapper.map().for_each([&](const Position& at, const MapPoint&) { ++held[voxel_of(size, at)]; });
+  size_t twice = 0, near = 0, exact = 0;
+  for (const auto& [voxel, looks] : surfaces) {
+    if (looks < 2) continue;
+    ++twice;
+    exact += held.contains(voxel);
+    for (int i = 0; i < 27; ++i)
+      if (held.contains(beside(voxel, i))) {
+        ++near;
+        break;
+      }
+  }
+  MapFigures out;
+  const auto share = [](size_t part, size_t all) {
+    return static_cast<double>(part) / std::max<double>(1, static_cast<double>(all));
+  };
+  out.points = mapped.mapper.map().points();
+  out.factor = share(seen_points, out.points);
+  out.points_a_voxel = share(out.points, held.size());
+  out.completeness_pct = 100 * share(near, twice);
+  out.exact_pct = 100 * share(exact, twice);
+  out.rms_m = mapped.rms_m(world);
+  return out;
+}
+
+/// Every point that is seen is kept, one a voxel.
+MapperParameters plain_merge(MapperParameters p) {
+  p.views = 1;
+  p.fusion.support = 1;
+  p.clear = false;
+  return p;
+}
+
 double resident_mb() {
   std::ifstream statm("/proc/self/statm");
   double total = 0, resident = 0;
@@ -86,17 +130,17 @@ RedundancyFigures evaluate_redundancy(const MapperParameters& p, size_t clouds, 
   const WorldCamera camera;
   const DepthCamera pixels = depth_camera_of(camera);
   Lot lot(seed, 2);
-  Mapped mapped(p);
-  RedundancyFigures out;
-  out.clouds = clouds;
+  Mapped mapped(p), plain(plain_merge(p));
   const cloud::VoxelSize size(p.map.voxel_m);
-  std::map<cloud::VoxelIndex, int> true_voxels;  // and how many looks met each
+  Voxels surfaces;
+  size_t seen_points = 0;
   double squares = 0;
   for (size_t i = 0; i < clouds; ++i) {
     const Transform robot = on_circle(i);
     const Look seen = look(world, camera, robot, lot);
     const Transform believed = disturbed(seen.camera_in_world, 0.01, 0.003, lot);
     mapped.add(seen, believed);
+    plain.add(seen, believed);
     const Affine m = to_affine(seen.camera_in_world), to_map = to_affine(believed);
     std::set<cloud::VoxelIndex> now;
     for (size_t k = 0; k < seen.depth_m.size(); ++k) {
@@ -104,40 +148,27 @@ RedundancyFigures evaluate_redundancy(const MapperParameters& p, size_t clouds, 
       if (!(z > 0 && z < p.range_max_m)) continue;
       const double u = static_cast<double>(k % static_cast<size_t>(camera.width)) - pixels.cu_px,
                    v = static_cast<double>(k / static_cast<size_t>(camera.width)) - pixels.cv_px;
-      const Position at = transformed(m, u / pixels.focal_px * z, v / pixels.focal_px * z, z);
-      now.insert(size.voxel_of({static_cast<float>(at.x_m), static_cast<float>(at.y_m), static_cast<float>(at.z_m)}));
+      now.insert(voxel_of(size, transformed(m, u / pixels.focal_px * z, v / pixels.focal_px * z, z)));
     }
-    for (const cloud::VoxelIndex& voxel : now) ++true_voxels[voxel];
+    for (const cloud::VoxelIndex& voxel : now) ++surfaces[voxel];
     for (const Point& q : seen.points) {
       if (q.z >= p.range_max_m) continue;
       const Position at = transformed(to_map, q.x, q.y, q.z);
       const double off = distance_m(world, {at.x_m, at.y_m, at.z_m});
       squares += off * off;
-      ++out.seen_points;
+      ++seen_points;
     }
   }
-  std::map<cloud::VoxelIndex, int> mapped_voxels;
+  RedundancyFigures out;
+  static_cast<MapFigures&>(out) = figures_of(mapped, world, surfaces, size, seen_points);
+  out.plain = figures_of(plain, world, surfaces, size, seen_points);
+  out.clouds = clouds;
+  out.seen_points = seen_points;
   mapped.mapper.map().for_each([&](const Position& at, const MapPoint& point) {
     out.map.points.push_back({static_cast<float>(at.x_m), static_cast<float>(at.y_m), static_cast<float>(at.z_m)});
     out.map.colours.push_back(point.colour);
-    ++mapped_voxels[size.voxel_of(out.map.points.back())];
   });
-  size_t twice = 0, covered = 0;
-  for (const auto& [voxel, looks] : true_voxels) {
-    if (looks < 2) continue;
-    ++twice;
-    for (int i = 0; i < 27; ++i)
-      if (mapped_voxels.contains(beside(voxel, i))) {
-        ++covered;
-        break;
-      }
-  }
-  out.map_points = mapped.mapper.map().points();
-  out.factor = static_cast<double>(out.seen_points) / static_cast<double>(out.map_points);
-  out.points_a_voxel = static_cast<double>(out.map_points) / static_cast<double>(mapped_voxels.size());
-  out.completeness_pct = 100.0 * static_cast<double>(covered) / static_cast<double>(twice);
-  out.rms_m = mapped.rms_m(world);
-  out.seen_rms_m = std::sqrt(squares / static_cast<double>(out.seen_points));
+  out.seen_rms_m = std::sqrt(squares / static_cast<double>(seen_points));
   out.time_ms = quantile(mapped.times_ms, 0.5);
   out.grid = grid_of(mapped.mapper.map(), {});
   return out;
@@ -148,11 +179,9 @@ GhostFigures evaluate_ghosts(const MapperParameters& p, uint64_t seed) {
   World still = furnished_room(seed);
   still.boxes.pop_back();  // nothing in the middle
   const Transform robot = robot_at(0, -2.2, 0);
-  MapperParameters fused = p, plain = p;
-  fused.clear = plain.clear = false;
-  plain.views = 1;
-  plain.fusion.support = 1;
-  Mapped plain_map(plain), fused_map(fused), cleared_map(p);
+  MapperParameters fused = p;
+  fused.clear = false;
+  Mapped plain_map(plain_merge(p)), fused_map(fused), cleared_map(p);
   Lot lot(seed, 3);
   for (int i = 0; i < 40; ++i) {
     World world = still;
@@ -218,6 +247,7 @@ CorrectionFigures evaluate_correction(const MapperParameters& p, uint64_t seed) 
   out.drift_m = std::hypot(believed.transform.x - actual.x, believed.transform.y - actual.y);
   out.before_m = mapped.rms_m(world);
   mapped.mapper.correct(kPeriodNs, mapped.clouds * kPeriodNs, believed.transform, actual);
+  mapped.mapper.tidy();
   out.after_m = mapped.rms_m(world);
   return out;
 }

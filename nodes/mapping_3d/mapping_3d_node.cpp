@@ -26,6 +26,9 @@ using namespace mapping_3d;
 
 class MappingNode final : public Node {
  public:
+  MappingNode() {
+    for (OutputPort* out : outputs()) out->stamped_by({&cloud_});
+  }
   void setup(Setup& setup) override {
     if (range_min_ >= range_max_)
       throw SetupError("range_min is " + range_min_.value_text() +
@@ -58,6 +61,7 @@ class MappingNode final : public Node {
     const Grid* known = obstacles_.handed_over();
     if (known != nullptr && views_ && known->width == grid_.shape().cells)
       views_->resume(known->cells.items(), known->grid_in_map);
+    if (const Pose* frame = poses_in_map_.handed_over()) map_from_poses_ = {frame->transform, {}};
   }
 
   void run(Job& job) override {
@@ -89,7 +93,11 @@ class MappingNode final : public Node {
     obstacles_.send(last_stamp_ns_);
     if (mapper_) add_to_map(cloud, viewpoint, grid->grid_in_map);
     const bool all = give_fused(*grid) && give_cloud(cloud) && give_map(grid->grid_in_map);
+    give_poses_in_map();
     if (!all) job.no_result();
+    // Last, since it may be left out: nothing that others wait for comes after it.
+    const auto reserve_ns = static_cast<int64_t>(reserve_() * 1e9);
+    if (mapper_) mapper_->tidy([&] { return job.time_left_ns() > reserve_ns; });
   }
 
   void finish() override {
@@ -188,7 +196,11 @@ class MappingNode final : public Node {
     out->origin_x_m = obstacles.origin_x_m, out->origin_y_m = obstacles.origin_y_m;
     out->grid_in_map = obstacles.grid_in_map;
     std::copy_n(obstacles.cells.data(), obstacles.cells.size, out->cells.data());
-    if (const Grid* other = other_.newest()) fuse(view_of(*other), *out);
+    if (const Grid* other = other_.newest()) {
+      GridView there = view_of(*other);  // in the frame of the poses
+      there.grid_in_map = compose(map_from_poses_, {there.grid_in_map, {}}).transform;
+      fuse(there, *out);
+    }
     if (known_) fuse(view_of(*known_), *out);
     fused_.send(last_stamp_ns_);
     return true;
@@ -209,11 +221,20 @@ class MappingNode final : public Node {
     return true;
   }
 
+  /// Not with this job if no memory is to be had.
+  void give_poses_in_map() {
+    Pose* out = poses_in_map_.loan();
+    if (!out) return;
+    *out = {};
+    out->transform = map_from_poses_.transform;
+    poses_in_map_.send(last_stamp_ns_);
+  }
+
   bool give_map(const Transform& robot) {
     if (!map_.connected() || !mapper_) return true;
     PointCloud* out = map_.loan();
     if (!out) return false;
-    mapper_->map().for_each([&](const Position& at, const MapPoint& p) {
+    mapper_->map().for_each_near(robot, map_range_, [&](const Position& at, const MapPoint& p) {
       if (std::hypot(at.x_m - robot.x, at.y_m - robot.y) > map_range_) return;
       out->points.push_back({static_cast<float>(at.x_m), static_cast<float>(at.y_m), static_cast<float>(at.z_m)});
       out->colours.push_back(p.colour);
@@ -306,13 +327,15 @@ class MappingNode final : public Node {
   Input<Pose> correction_{this, "correction",
                           "where the robot turns out to have been at its stamp, once for each stamp; lays the map anew",
                           Need::optional};
-  Input<Grid> other_{this, "grid", "what else is known of the same map frame, for `fused`", Need::optional};
+  Input<Grid> other_{this, "grid", "what else is known, in the frame of the poses, for `fused`", Need::optional};
   Output<Grid> obstacles_{this, "obstacles", "0.20 m grid around the robot, robot frame at the cloud's stamp"};
   Output<Grid> fused_{this, "fused",
                       "the same with `grid` and load_grid: unknown yields to known, else the larger counts"};
   Output<PointCloud> fused_cloud_{this, "cloud",
                                   "one cloud by median fusion of the last `views`, in the camera's frame"};
   Output<PointCloud> map_{this, "map", "points of the map within map_range of the robot, in the map frame"};
+  Output<Pose> poses_in_map_{this, "poses_in_map",
+                             "where the frame of the poses lies in the map: the identity until a correction came"};
   Param<double> outlier_radius_{this, "outlier_radius", 0.20, {0.0, 1.0}, "m", "outlier removal; 0: none"};
   Param<int> outlier_n_min_{this, "outlier_n_min",
                             100,  {1, 100000},
@@ -354,6 +377,8 @@ class MappingNode final : public Node {
   Param<bool> clear_{this, "clear", true, "", "points that later views look through go"};
   Param<double> map_range_{this, "map_range", 10.0, {0.1, 1000.0}, "m", "of the output `map`"};
   Param<int> map_count_{this, "map_count", 100000, {1, 10000000}, "", "points of the output `map`, at most"};
+  Param<double> reserve_{this,       "reserve", 0.005,
+                         {0.0, 1.0}, "s",       "with less time left the map is not looked through any further"};
   Param<std::string> save_{this, "save", "", "",
                            "folder for map.ply, map.yaml and map.png at the end of a run; empty: none"};
   Param<std::string> load_{this, "load", "", kPath, "PLY or PCD file that the map begins with; empty: none"};

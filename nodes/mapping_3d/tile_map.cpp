@@ -18,8 +18,6 @@ Point point(const Position& p) {
 
 Position placed(const Affine& a, const Point& p) { return transformed(a, p.x, p.y, p.z); }
 
-double distance(const Transform& a, const Transform& b) { return std::hypot(a.x - b.x, a.y - b.y, a.z - b.z); }
-
 Transform seen_from(const Transform& frame, const Transform& child) {
   return compose(inverse({frame, {}}), {child, {}}).transform;
 }
@@ -48,6 +46,7 @@ Tile::Tile(size_t points, double voxel_m) : size_(voxel_m), table_(std::bit_ceil
 
 void Tile::begin(const Transform& in_map, int64_t stamp_ns) {
   used_ = true;
+  loose_ = false;
   in_map_ = in_map;
   stamp_ns_ = stamp_ns;
   reach_m_ = 0;
@@ -106,7 +105,7 @@ TileMap::TileMap(const MapParameters& parameters) : p_(parameters) {
 // The tile whose anchor is nearest, if it has room; else a new one, for which the farthest makes room if it must.
 Tile& TileMap::tile_for(const Transform& sensor_in_map, int64_t stamp_ns) {
   Tile *nearest = nullptr, *farthest = nullptr, *unused = nullptr;
-  const auto away = [&](const Tile* tile) { return distance(tile->in_map(), sensor_in_map); };
+  const auto away = [&](const Tile* tile) { return tile->distance_m(sensor_in_map); };
   for (Tile& tile : tiles_) {
     if (!tile.used()) {
       if (!unused) unused = &tile;
@@ -134,13 +133,16 @@ Tile& TileMap::tile_for(const Transform& sensor_in_map, int64_t stamp_ns) {
 void TileMap::gather_near(const Transform& sensor_in_map, double range_m, const Tile* but) {
   near_.clear();
   for (Tile& tile : tiles_)
-    if (tile.used() && &tile != but && distance(tile.in_map(), sensor_in_map) <= tile.reach_m() + range_m)
-      near_.push_back({&tile, to_affine(seen_from(tile.in_map(), sensor_in_map))});  // within the reserved capacity
+    if (tile.used() && &tile != but && tile.distance_m(sensor_in_map) <= tile.reach_m() + range_m)
+      near_.push_back({&tile, to_affine(seen_from(tile.in_map(), sensor_in_map)),  // within the reserved capacity
+                       tile.reach_m() + std::sqrt(3.0) * p_.voxel_m});
 }
 
 MapPoint* TileMap::find_near(const Point& p, Point& place) {
   for (const Near& near : near_) {
-    place = point(placed(near.from_sensor, p));
+    const Position at = placed(near.from_sensor, p);
+    if (at.x_m * at.x_m + at.y_m * at.y_m + at.z_m * at.z_m > near.reach_m * near.reach_m) continue;
+    place = point(at);
     if (MapPoint* found = near.tile->at(place)) return found;
   }
   return nullptr;
@@ -172,29 +174,27 @@ void TileMap::add(const cloud::CloudView& cloud, const Transform& sensor_in_map,
   }
 }
 
-void TileMap::clear_seen_through(const DepthView& view, double tolerance_per_m2, double margin_m, double range_max_m) {
+void TileMap::clear(Tile& tile, const SeenThrough& by) {
+  const DepthView& view = by.view;
   const DepthCamera& camera = view.camera;
   const auto depth_at = [&](int u, int v) {
     return view.depth_m[static_cast<size_t>(v) * static_cast<size_t>(camera.width) + static_cast<size_t>(u)];
   };
-  for (Tile& tile : tiles_) {
-    if (!tile.used() || distance(tile.in_map(), view.camera_in_map) > tile.reach_m() + range_max_m) continue;
-    const Affine to_camera = to_affine(seen_from(view.camera_in_map, tile.in_map()));
-    for (MapPoint& p : tile.points()) {
-      const Position at = placed(to_camera, p.place);
-      if (p.seen == 0 || !(at.z_m > 0) || at.z_m > range_max_m) continue;
-      const double scale = camera.focal_px / at.z_m;
-      const double u = at.x_m * scale + camera.cu_px + 0.5, v = at.y_m * scale + camera.cv_px + 0.5;
-      if (!(u >= 1 && v >= 1 && u < camera.width - 1 && v < camera.height - 1)) continue;
-      // At the edge of a thing its pixel may show what is behind: all nine around must see past it.
-      bool through = true;
-      for (int dv = -1; dv <= 1 && through; ++dv)
-        for (int du = -1; du <= 1 && through; ++du) {
-          const double seen = depth_at(static_cast<int>(u) + du, static_cast<int>(v) + dv);
-          through = seen > 0 && at.z_m < seen - margin_m - tolerance_per_m2 * seen * seen;
-        }
-      if (through && ++p.missing > p.seen) p.seen = 0;
-    }
+  const Affine to_camera = to_affine(seen_from(view.camera_in_map, tile.in_map()));
+  for (MapPoint& p : tile.points()) {
+    const Position at = placed(to_camera, p.place);
+    if (p.seen == 0 || !(at.z_m > 0) || at.z_m > by.range_max_m) continue;
+    const double scale = camera.focal_px / at.z_m;
+    const double u = at.x_m * scale + camera.cu_px + 0.5, v = at.y_m * scale + camera.cv_px + 0.5;
+    if (!(u >= 1 && v >= 1 && u < camera.width - 1 && v < camera.height - 1)) continue;
+    // At the edge of a thing its pixel may show what is behind: all nine around must see past it.
+    bool through = true;
+    for (int dv = -1; dv <= 1 && through; ++dv)
+      for (int du = -1; du <= 1 && through; ++du) {
+        const double seen = depth_at(static_cast<int>(u) + du, static_cast<int>(v) + dv);
+        through = seen > 0 && at.z_m < seen - by.margin_m - by.tolerance_per_m2 * seen * seen;
+      }
+    if (through && ++p.missing > p.seen) p.seen = 0;
   }
 }
 
@@ -208,6 +208,7 @@ void TileMap::join(Tile& tile) {
       p.seen = 0;
     }
   }
+  tile.joined();
 }
 
 void TileMap::correct(int64_t from_ns, int64_t to_ns, const Transform& believed, const Transform& actual) {
@@ -226,8 +227,6 @@ void TileMap::correct(int64_t from_ns, int64_t to_ns, const Transform& believed,
     laid.z = tile.in_map().z + share * (actual.z - believed.z);
     tile.lay(laid);
   }
-  for (Tile& tile : tiles_)
-    if (tile.used() && tile.stamp_ns() > from_ns) join(tile);
 }
 
 void TileMap::load(const cloud::CloudView& cloud) {

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "nodes/cloud/cloud.hpp"
 #include "nodes/picture/draw.hpp"
 #include "rt/msg/image_view.hpp"
 
@@ -32,6 +33,25 @@ class KeptImage {
  private:
   std::vector<T> items_;
   int width_ = 0, height_ = 0, channels_ = 1;
+};
+
+/// The last cloud.
+class KeptCloud {
+ public:
+  void reserve(size_t points) { points_.reserve(points), colours_.reserve(points); }
+
+  /// One with a colour for each point, that fits the memory taken; else the earlier one stays.
+  void keep(const PointCloud& cloud) {
+    if (cloud.points.size > points_.capacity() || cloud.colours.size != cloud.points.size) return;
+    points_.assign(cloud.points.items().begin(), cloud.points.items().end());
+    colours_.assign(cloud.colours.items().begin(), cloud.colours.items().end());
+  }
+
+  cloud::CloudView view() const { return {points_, colours_}; }
+
+ private:
+  std::vector<Point> points_;
+  std::vector<Colour> colours_;
 };
 
 /// The whole of a path: when the memory is full every second point is dropped, and every second one kept from then on.

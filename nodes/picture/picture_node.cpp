@@ -4,10 +4,14 @@
 #include <iostream>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "nodes/ground_map/terrain.hpp"
+#include "nodes/picture/clouds.hpp"
 #include "nodes/picture/draw.hpp"
 #include "nodes/picture/kept.hpp"
 #include "rt/node.hpp"
@@ -25,8 +29,9 @@ class PictureNode final : public Node {
     ground_left_.reserve(elements_of(ground_pair_));
     mask_kept_.reserve(elements_of(mask_));
     map_.reserve(elements_of(disparity_));
-    obstacle_cells_.reserve(elements_of(obstacles_));
-    ground_cells_.reserve(elements_of(ground_));
+    for (const Drawn& drawn : grids_) drawn.cells->reserve(elements_of(*drawn.port));
+    for (const auto& [port, cloud] : clouds_)
+      if (port->connected()) cloud->reserve(port->capacity().count);
     if (detections_.connected()) boxes_.reserve(detections_.capacity().count);
     if (motion_.connected()) track_.reserve(static_cast<size_t>(track_points_()));
   }
@@ -37,8 +42,10 @@ class PictureNode final : public Node {
     const DisparityMap* map = disparity_.newest();
     if (map && disparity_.is_new() && map_.keep(map->disparity.items(), map->width, map->height))
       disparities_ = map->disparities;
-    keep_grid(obstacles_, obstacle_cells_);
-    keep_grid(ground_, ground_cells_);
+    for (const Drawn& drawn : grids_) keep_grid(*drawn.port, *drawn.cells);
+    for (const auto& [port, cloud] : clouds_)
+      if (port->newest() && port->is_new()) cloud->keep(*port->newest());
+    if (terrain_.newest()) kind_ = terrain_.newest()->kind;
     for (size_t i = 0; i < motion_.size(); ++i)
       if (motion_.is_new(i)) track_.add({motion_[i].pose.x, motion_[i].pose.z, motion_[i].valid != 0});
   }
@@ -61,8 +68,9 @@ class PictureNode final : public Node {
       draw_disparity(map_.view(), disparities_, view(image));
       write("disparity.png", image);
     }
-    write_grid("obstacles.png", obstacle_cells_.view());
-    write_grid("ground_map.png", ground_cells_.view());
+    for (const Drawn& drawn : grids_) write_grid(drawn);
+    const cloud::CloudView clouds[] = {coloured_cloud_.view(), match_cloud_.view()};
+    if (!clouds[0].points.empty() || !clouds[1].points.empty()) write("laser.png", draw_clouds(clouds));
     if (!track_.points().empty()) {
       cv::Mat image(600, 600, CV_8UC3);
       draw_track(track_.points(), view(image));
@@ -128,12 +136,23 @@ class PictureNode final : public Node {
     return image;
   }
 
-  void write_grid(const char* name, ImageView<const int16_t> cells) const {
+  /// An input, what of it is kept, and where it is written.
+  struct Drawn {
+    const Input<Grid>* port;
+    KeptImage<int16_t>* cells;
+    const char* file;
+  };
+
+  void write_grid(const Drawn& drawn) const {
+    const ImageView<const int16_t> cells = drawn.cells->view();
     if (!cells.data || cells.width == 0) return;
     const int scale = std::max(1, 600 / std::max(cells.width, cells.height));
     cv::Mat image(cells.height * scale, cells.width * scale, CV_8UC3);
     draw_grid(cells, scale, view(image));
-    write(name, image);
+    if (drawn.port == &ground_ && kind_ && *kind_ < ground_map::kTerrainNames.size())
+      cv::putText(image, std::string(ground_map::kTerrainNames[*kind_]), {10, image.rows - 12},
+                  cv::FONT_HERSHEY_SIMPLEX, 0.8, {0, 0, 200}, 2);
+    write(drawn.file, image);
   }
 
   void write(const char* name, const cv::Mat& image) const {
@@ -156,12 +175,27 @@ class PictureNode final : public Node {
   Input<StereoPair> ground_pair_{this, "ground_pair", "images that mask belongs to; depth 4", Need::optional};
   Input<Image> mask_{this, "mask", "ground: drawn over the left image of its stamp as ground.png", Need::optional};
   Input<Grid> ground_{this, "ground", "drawn as ground_map.png", Need::optional};
+  Input<takt::Terrain> terrain_{this, "terrain", "its kind is written on ground_map.png", Need::optional};
+  Input<Grid> merged_{this, "merged", "obstacles with what else is known: merged.png", Need::optional};
+  Input<Grid> traversability_{this, "traversability", "drawn as traversability.png", Need::optional};
+  Input<PointCloud> coloured_{this, "coloured", "laser points in a camera's colours: left in laser.png",
+                              Need::optional};
+  Input<PointCloud> match_{this, "match", "the same, red to green by how well they match: right in laser.png",
+                           Need::optional};
   Param<std::string> directory_name_{this, "directory", ".", "", "where to write, below the run's output directory"};
   Param<int> track_points_{this, "track_points", 20000, {16, 10000000}, "", "points of the path kept in memory"};
 
   std::filesystem::path directory_;
   KeptImage<uint8_t> left_, ground_left_, mask_kept_;
-  KeptImage<int16_t> map_, obstacle_cells_, ground_cells_;
+  KeptImage<int16_t> map_, obstacle_cells_, ground_cells_, merged_cells_, traversability_cells_;
+  const Drawn grids_[4] = {{&obstacles_, &obstacle_cells_, "obstacles.png"},
+                           {&ground_, &ground_cells_, "ground_map.png"},
+                           {&merged_, &merged_cells_, "merged.png"},
+                           {&traversability_, &traversability_cells_, "traversability.png"}};
+  KeptCloud coloured_cloud_, match_cloud_;
+  const std::pair<const Input<PointCloud>*, KeptCloud*> clouds_[2] = {{&coloured_, &coloured_cloud_},
+                                                                      {&match_, &match_cloud_}};
+  std::optional<uint8_t> kind_;
   std::vector<Detection> boxes_;
   KeptTrack track_;
   int disparities_ = 0;
@@ -171,8 +205,9 @@ class PictureNode final : public Node {
 }  // namespace
 
 void register_picture(NodeTypes& types) {
-  types.add<PictureNode>("picture", Layer::storage,
-                         "Sink: writes the last images, maps, ground mask, detections and the path as PNG at the end");
+  types.add<PictureNode>(
+      "picture", Layer::storage,
+      "Sink: writes the last images, maps, clouds, ground mask, detections and the path as PNG at the end");
 }
 
 }  // namespace takt

@@ -13,16 +13,21 @@ namespace takt::semantic {
 class ClockGenerator {
  public:
   ClockGenerator() = default;
-  /// `script` ascending in time; `idle` nodes run at every `idle_every`-th release while the robot is stopped. What is
-  /// asked of a node is the least of what script, list and the rules that do not need it leave.
+  /// `script` ascending in time; `idle` nodes run at every `idle_every`-th release while the robot is stopped;
+  /// `on_request` ones are stopped until the script starts them, or request() names them. What is asked of a node is
+  /// the least of what script, list and the rules that do not need it leave.
   ClockGenerator(std::vector<TimedRequest> script, const std::vector<std::string>& idle, uint8_t idle_every,
-                 Needs needs = {});
+                 Needs needs = {}, const std::vector<std::string>& on_request = {});
+
+  /// From the next update() on the nodes named run whatever the script says, until another list leaves them out: ids
+  /// joined by commas or spaces. Those of no list are not looked for.
+  void request(std::string_view ids);
 
   /// `elapsed_ns` since the first job, never less than in the call before.
   void update(int64_t elapsed_ns, bool robot_stopped, const Surroundings& around = {});
 
-  /// Of the nodes named in script, list and rules: those that deviate from their full rate, in the order of their first
-  /// naming.
+  /// Of the nodes named in script, lists and rules: those that deviate from their full rate, in the order of their
+  /// first naming.
   std::span<const Request> deviating() const { return {deviating_.data(), count_}; }
   size_t nodes() const { return nodes_.size(); }
 
@@ -31,6 +36,7 @@ class ClockGenerator {
     Request scripted;  ///< as the script left it
     Request wanted;    ///< now
     bool idles = false;
+    bool requested = false;
   };
   size_t index_of(std::string_view id);  ///< in nodes_; added if it is new
 

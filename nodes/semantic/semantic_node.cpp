@@ -20,12 +20,14 @@ class SemanticNode final : public Node {
     if (!script) throw SetupError("script: " + script.error());
     const auto idle = parse_node_list(idle_());
     if (!idle) throw SetupError("idle: " + idle.error());
+    const auto on_request = parse_node_list(on_request_());
+    if (!on_request) throw SetupError("on_request: " + on_request.error());
     auto rules = parse_rules(rules_());
     if (!rules) throw SetupError("rules: " + rules.error());
     for (const Rule& rule : *rules) check_sources(rule);
     const NeedParameters need{rule_margin_, std::llround(rule_hold_ * 1e9)};
-    generator_ =
-        ClockGenerator(std::move(*script), *idle, static_cast<uint8_t>(idle_every_()), Needs(std::move(*rules), need));
+    generator_ = ClockGenerator(std::move(*script), *idle, static_cast<uint8_t>(idle_every_()),
+                                Needs(std::move(*rules), need), *on_request);
     near_.reserve(reports_.capacity().count + bodies_.capacity().count);
     requests_.reserve({0, 0, 1, static_cast<uint32_t>(std::max<size_t>(1, generator_.nodes()))});
     status_.reserve({0, 0, 1, kStatusCharacters});
@@ -40,6 +42,7 @@ class SemanticNode final : public Node {
     if (!first_ns_) first_ns_ = now_ns;
     const bool stop_lost = stop_.connected() && (stop_.empty() || stop_.stale());
     const uint32_t stop_reasons = stop_.empty() ? 0 : stop_.newest()->reasons;
+    generator_.request(request_());
     generator_.update(now_ns - *first_ns_, stop_lost || stop_reasons != 0, surroundings());
 
     Requests* requests = requests_.loan();
@@ -133,6 +136,10 @@ class SemanticNode final : public Node {
   Param<std::string> idle_{this, "idle", "", "", "nodes that need not run at full rate while the robot is stopped"};
   Param<int> idle_every_{this,     "idle_every", 1,
                          {1, 255}, "",           "idle nodes run at every n-th release while the robot is stopped"};
+  Param<std::string> on_request_{this, "on_request", "", "",
+                                 "nodes that are stopped until the script starts them or `request` names them"};
+  Param<std::string> request_{this, "request", "", "",
+                              "nodes that run now, whatever the script says. May change during a run"};
   Param<std::string> rules_{this, "rules", "", "", "what runs where: \"body_pose when person within 4m else stop\""};
   Param<double> rule_margin_{this,        "rule_margin", NeedParameters{}.margin_m,
                              {0.0, 20.0}, "m",           "so much farther away what is needed still counts"};

@@ -80,10 +80,12 @@ edit '
   /^        scan: \{from: front_laser/d
   /^        scan_pose: /d
   /^        grid: scan_matching\.map/d
+  /: laser_fusion\./d
   /^        correction: /d
   /^        stop: \{from: obstacle_stop/d
   /^  (stop|pose): \{from: front_laser/d
   s/laser_cloud, laser_fusion, //
+  /^      params: \{on_request: laser_fusion\}/d
   s/lost: \[front_laser, /lost: [/
   s/, front_laser: \{[^}]*\}//
 ' '

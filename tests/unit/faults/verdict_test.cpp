@@ -15,7 +15,8 @@ constexpr int64_t kMs = 1'000'000;
 
 Json node(const char* name, uint64_t completed, uint64_t released, uint64_t misses, const char* criticality = "low") {
   return {{"name", name},         {"rate_hz", 10.0},        {"active_s", 10.0},          {"criticality", criticality},
-          {"released", released}, {"completed", completed}, {"deadline_misses", misses}, {"stale_inputs", 3}};
+          {"released", released}, {"completed", completed}, {"deadline_misses", misses}, {"stale_inputs", 3},
+          {"no_result", 20}};
 }
 
 /// Ten seconds; stereo is high.
@@ -64,6 +65,8 @@ TEST_CASE("modes: others, fewer, in another order") {
 TEST_CASE("rates, misses, stale inputs and ages out of their bounds") {
   CHECK(unmet("{rates: {planner: 9.1}}") == Words{"rate of planner"});
   CHECK(unmet("{rates: {stereo: {at_most: 9.9}}}") == Words{"rate of stereo"});
+  CHECK(unmet("{results: {planner: 7}}").empty());  // 90 jobs, 20 of them without
+  CHECK(unmet("{results: {planner: 7.1}}") == Words{"results of planner"});
   CHECK(unmet("{misses: {planner: 1}}") == Words{"misses of planner"});
   CHECK(unmet("{misses: {planner: {at_least: 3}}}") == Words{"misses of planner"});
   CHECK(unmet("{stale: {stereo: 2}}") == Words{"stale of stereo"});

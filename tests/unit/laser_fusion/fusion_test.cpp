@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <random>
 #include <vector>
 
 #include "nodes/laser_fusion/clusters.hpp"
@@ -66,6 +67,25 @@ TEST_CASE("clusters of too few points are dropped, the others keep their order")
   kept = points;
   CHECK(filter.filter(kept, {0.49, 2}) == 0);
   CHECK(filter.filter({}, {0.5, 1}) == 0);
+}
+
+TEST_CASE("clusters are dropped alike in one go and in portions") {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<float> place(0, 10);
+  std::vector<Point> points;
+  for (int i = 0; i < 3000; ++i) points.push_back({place(random), place(random), 0});
+  std::vector<Point> in_portions = points;
+  ClusterFilter filter(points.size());
+  const size_t kept = filter.filter(points, {0.2, 10});
+  CHECK(kept > 100);
+  CHECK(kept < 2900);
+  filter.begin(in_portions, {0.2, 10});
+  int portions = 1;
+  for (; !filter.go_on(); ++portions) {
+  }
+  CHECK(portions > 5);
+  REQUIRE(filter.kept() == kept);
+  for (size_t i = 0; i < kept; ++i) REQUIRE(in_portions[i].x == points[i].x);
 }
 
 TEST_CASE("a cloud is thinned to what fits, by no more than it takes; a small one stays as it is") {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 
+#include <optional>
 #include <string>
 
 #include "nodes/laser_fusion/evaluate.hpp"
@@ -111,6 +112,29 @@ TEST_CASE("a job of laser_fusion asks before every portion how much of its budge
   CHECK(jobs > 5);      // 13 portions of generations, and those of the tables and colours
   CHECK(poses < jobs);  // the first ones have not begun to search
   CHECK(poses > 2);     // the last ones colour
+}
+
+TEST_CASE("laser_fusion gives the pose alone where nobody reads its clouds, and spends nothing on colours") {
+  int64_t portions[2] = {};
+  for (const bool read : {false, true}) {
+    Bench bench;
+    test::set(*bench.node, "generations", int64_t{8});
+    test::set_up(*bench.node);
+    test::BoxWriter<Pose> pose(*bench.node->outputs()[0]);
+    std::optional<test::BoxWriter<PointCloud>> fused;
+    if (read) fused.emplace(*bench.node->outputs()[1]);
+    static const VirtualClock clock;
+    static int64_t asked = 0;
+    asked = 0;
+    Job job(clock, 0, 0, 1'000'000'000, 0, "full", {1'000'000'000, 0, [] { return ++asked; }});
+    test::latch(test::input(*bench.node, "laser"), bench.laser, 150, 1);
+    test::latch(test::input(*bench.node, "vision"), bench.vision, 140, 1);
+    bench.node->run(job);
+    CHECK(pose.sent());
+    portions[read] = asked;
+  }
+  CHECK(portions[0] > 5);
+  CHECK(portions[0] < portions[1]);
 }
 
 TEST_CASE("a fusion that is stopped before every portion gives what one gives in one go") {

@@ -14,6 +14,7 @@ namespace {
 void check_fusion(const FusionEvaluation& e) {
   const DepthFigures &single = e.methods[0], &merged = e.methods[1], &fused = e.methods.back();
   CHECK(fused.rms_m < 0.9 * single.rms_m);
+  CHECK(fused.rms_all_m < 0.9 * single.rms_all_m);
   CHECK(fused.outliers_pct < 0.5 * single.outliers_pct);
   CHECK(fused.outliers_pct < 0.5 * merged.outliers_pct);
   CHECK(fused.points < merged.points);
@@ -33,6 +34,9 @@ TEST_CASE("a map of a room holds few points and nearly all surfaces; who walked 
   CHECK(room.factor > 5);
   CHECK(room.points_a_voxel < 1.05);
   CHECK(room.completeness_pct >= 95);
+  CHECK(room.exact_pct < room.completeness_pct);
+  CHECK(room.plain.points > room.points);  // what was seen wrongly is in it
+  CHECK(room.plain.rms_m > room.rms_m);
   CHECK(room.rms_m < 0.08);
   const GhostFigures ghosts = evaluate_ghosts({}, 2);
   CHECK(ghosts.plain > 100);

@@ -49,6 +49,7 @@ class Walk {
     fused = std::make_unique<test::BoxWriter<Grid>>(*node_->outputs()[1]);
     cloud = std::make_unique<test::BoxWriter<PointCloud>>(*node_->outputs()[2]);
     map = std::make_unique<test::BoxWriter<PointCloud>>(*node_->outputs()[3]);
+    frame = std::make_unique<test::BoxWriter<Pose>>(*node_->outputs()[4]);
   }
 
   void look_from(double x, double y, double heading) {
@@ -73,9 +74,16 @@ class Walk {
     if (std::string_view(poses_) == "odometry")
       test::latch(test::input(*node_, "odometry"), odometry_, stamp_ns, sequence_);
     else test::latch(test::input(*node_, "pose"), pose_, stamp_ns, sequence_);
-    obstacles->clear(), fused->clear(), cloud->clear(), map->clear();
+    obstacles->clear(), fused->clear(), cloud->clear(), map->clear(), frame->clear();
     const uint64_t before = thread_memory_use().allocations;
-    REQUIRE(test::run(*node_));
+    if (budget_ns == 0) {
+      REQUIRE(test::run(*node_));
+    } else {
+      static const VirtualClock clock;
+      used_ns = 0;
+      Job job(clock, sequence_, 0, 1'000'000'000, 0, "full", {budget_ns, 0, [] { return used_ns += kTile_ns; }});
+      node_->run(job);
+    }
     if (counting_allocations()) CHECK(thread_memory_use().allocations == before);
   }
 
@@ -94,8 +102,12 @@ class Walk {
   World world = furnished_room(4);
   Lot lot{4, 0};
   int64_t stamp_ns = 0;
+  static constexpr int64_t kTile_ns = 1'000'000;
+  inline static int64_t used_ns = 0;  ///< of the budget, by the last job: each question finds a tile's worth more
+  int64_t budget_ns = 0;              ///< 0: all the time in the world
   std::unique_ptr<test::BoxWriter<Grid>> obstacles, fused;
   std::unique_ptr<test::BoxWriter<PointCloud>> cloud, map;
+  std::unique_ptr<test::BoxWriter<Pose>> frame;
 
  private:
   const char* poses_;
@@ -133,6 +145,73 @@ TEST_CASE("mapping_3d: a pose from anywhere else in place of odometry gives the 
   }
   CHECK(odometry.map->message().points.size == pose.map->message().points.size);
   CHECK(pose.obstacles->message().grid_in_map.y == doctest::Approx(0.6));
+}
+
+TEST_CASE(
+    "mapping_3d: a job looks through the map tile by tile while its budget lasts; who has gone goes from the map") {
+  constexpr int64_t kBudget_ns = 8 * Walk::kTile_ns, kReserve_ns = 5 * Walk::kTile_ns;
+  auto node = make_node();
+  test::set(*node, "tile", 0.5);
+  Walk walk("odometry", std::move(node));
+  walk.world = World{};
+  walk.world.boxes.push_back({{-4, 4, 0}, {4, 4.1, 3}, {}});
+  const World empty = walk.world;
+  for (int i = 0; i < 6; ++i) walk.look_from(0.6 * i - 1.5, 0, 0);  // tiles beside each other
+  const auto person = [&] {
+    size_t count = 0;
+    for (const Point& p : walk.map->message().points.items())
+      count += std::abs(p.x) < 0.5 && std::abs(p.y - 2) < 0.5 && p.z > 0.3 && p.z < 1.7;
+    return count;
+  };
+  add_person(walk.world, 0, 2);
+  for (int i = 0; i < 6; ++i) walk.look_from(0, 0, 0);
+  const size_t met = person();
+  REQUIRE(met > 20);
+  walk.world = empty;
+  walk.budget_ns = kBudget_ns;
+  int looks = 0;
+  for (; looks < 100 && person() > met / 10; ++looks) {
+    walk.look_from(0, 0, 0);
+    CHECK(Walk::used_ns > kBudget_ns - kReserve_ns - Walk::kTile_ns);  // it used what there was
+    CHECK(Walk::used_ns <= kBudget_ns - kReserve_ns);                  // and no more
+  }
+  CHECK(looks < 100);
+  CHECK(looks > 12);  // of a map of several tiles no view was held against all
+}
+
+TEST_CASE("mapping_3d: after a correction grids of the poses' frame are laid where the map now is, and it says how") {
+  Walk walk("pose", make_node(), ".", true);
+  test::Box<Grid> other({10, 10, 1, 0});
+  other->width = other->height = 10;
+  other->cell_m = 0.2;
+  other->grid_in_map = {1, 2, 0, 1, 0, 0, 0};  // a square of 2 m before the robot, in the frame of the poses
+  REQUIRE(other->cells.resize(100));
+  std::fill_n(other->cells.data(), 100, int16_t{1000});
+  test::latch(test::input(walk.node(), "grid"), other, 0, 1);
+  walk.world = World{};
+  const auto at = [&](double x, double y) {  // a place seen from the robot
+    Grid& grid = walk.fused->message();
+    return grid.view().at(static_cast<int>((x - grid.origin_x_m) / grid.cell_m),
+                          static_cast<int>((y - grid.origin_y_m) / grid.cell_m));
+  };
+  const auto check = [&] {
+    walk.look_from(1, 1, 0);
+    CHECK(at(0.1, 1.1) == 1000);
+    CHECK(at(1.9, 2.9) == 1000);
+    CHECK(at(-0.3, 1.1) != 1000);
+    CHECK(at(0.1, 0.5) != 1000);
+  };
+  check();
+  CHECK(walk.frame->message().transform.x == 0);
+  test::Box<Pose> correction;
+  correction->transform = robot_at(1.6, 1.2, 0.5);  // where the robot was in truth
+  test::latch(test::input(walk.node(), "correction"), correction, walk.stamp_ns, 1);
+  check();  // robot and grid have moved together: nothing changes between them
+  REQUIRE(walk.frame->sent());
+  CHECK(walk.fused->message().grid_in_map.x == doctest::Approx(1.6));
+  const UncertainPose moved = compose({walk.frame->message().transform, {}}, {robot_at(1, 1, 0), {}});
+  CHECK(moved.transform.x == doctest::Approx(1.6));
+  CHECK(moved.transform.y == doctest::Approx(1.2));
 }
 
 TEST_CASE("mapping_3d: a correction moves what comes after it, and lays the map anew") {

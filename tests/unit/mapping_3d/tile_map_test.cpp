@@ -116,6 +116,33 @@ TEST_CASE("what is looked through goes, once it was missing more often than seen
   CHECK(map.points() == 5);
 }
 
+TEST_CASE("a map that has time for a few tiles a view holds in the end what one without haste does") {
+  const DepthCamera camera{40, 40, 40, 19.5, 19.5, 0.01};
+  std::vector<float> depth(camera.pixels(), 9.0f);
+  MapParameters p;
+  p.tile_m = 0.5;
+  TileMap hasty(p), patient(p);
+  for (TileMap* map : {&hasty, &patient})
+    for (int i = 0; i < 6; ++i) {
+      const std::vector<Point> ahead{{-0.52f + 0.2f * static_cast<float>(i), 0.12f, static_cast<float>(4 - i)}};
+      Transform sensor;
+      sensor.z = i;
+      map->add({ahead, {}}, sensor, i);
+    }
+  REQUIRE(hasty.tiles() == 6);
+  const DepthView view{camera, {}, depth, {}};
+  size_t views = 0;
+  for (; views < 20 && hasty.points() > 0; ++views) {
+    int tiles = 0;
+    CHECK_FALSE(hasty.clear_seen_through(view, 0, 0.1, 10, [&] { return tiles++ < 2; }));
+  }
+  CHECK(views == 6);  // each of the six tiles is held against two views: one point, seen once
+  CHECK(patient.clear_seen_through(view, 0, 0.1, 10));
+  CHECK(patient.points() == 6);
+  CHECK(patient.clear_seen_through(view, 0, 0.1, 10));
+  CHECK(patient.points() == 0);
+}
+
 TEST_CASE("a correction moves each tile by its share of the error, and joins what then lies in one place") {
   MapParameters p;
   p.tile_m = 1;
@@ -140,6 +167,9 @@ TEST_CASE("a correction moves each tile by its share of the error, and joins wha
   round.add({points, {}}, at(4, 0), 100);
   CHECK(round.points() == 800);
   round.correct(0, 100, at(4, 0), at(0, 0));
+  CHECK_FALSE(round.join_laid([] { return false; }));
+  CHECK(round.points() == 800);
+  CHECK(round.join_laid());
   CHECK(round.points() == 400);
 }
 

@@ -119,6 +119,46 @@ TEST_CASE("picture: the ground mask lies over the image of its stamp; one withou
   CHECK_FALSE(bench.wrote("left.png"));
 }
 
+TEST_CASE("picture: laser points lie in their colours beside their match probabilities; each grid has its file") {
+  Bench bench({"coloured", "match", "merged", "traversability", "ground", "terrain"});
+  test::Box<PointCloud> coloured({0, 0, 1, 8}), match({0, 0, 1, 8});
+  for (int i = 0; i < 5; ++i)
+    for (auto& [cloud, colour] : {std::pair(&coloured, Colour{255, 0, 0}), std::pair(&match, Colour{0, 255, 0})}) {
+      (*cloud)->points.push_back({static_cast<float>(i), static_cast<float>(i), 0});
+      (*cloud)->colours.push_back(colour);
+    }
+  test::Box<Grid> blocked({1, 1, 1, 0}), free({1, 1, 1, 0});
+  for (auto* grid : {&blocked, &free}) {
+    (*grid)->width = (*grid)->height = 1;
+    (*grid)->cells.resize(1);
+  }
+  blocked->cells[0] = 1000, free->cells[0] = 0;
+  test::Box<Terrain> terrain;
+  terrain->kind = terrain_kind::crossing;
+  test::latch(bench.port("coloured"), coloured, 1, 1);
+  test::latch(bench.port("match"), match, 1, 1);
+  test::latch(bench.port("merged"), blocked, 1, 1);
+  test::latch(bench.port("traversability"), free, 1, 1);
+  test::latch(bench.port("ground"), free, 1, 1);
+  test::latch(bench.port("terrain"), terrain, 1, 1);
+  test::run(*bench.node);
+  bench.node->finish();
+  const cv::Mat laser = bench.read("laser.png");
+  REQUIRE(laser.cols == 2 * laser.rows / 2);  // two clouds side by side, two views each
+  cv::Mat planes[3];
+  cv::split(laser(cv::Rect(0, 0, laser.cols / 2, laser.rows)), planes);
+  CHECK(cv::countNonZero(planes[0]) > 10);  // blue
+  CHECK(cv::countNonZero(planes[1]) == 0);
+  cv::split(laser(cv::Rect(laser.cols / 2, 0, laser.cols / 2, laser.rows)), planes);
+  CHECK(cv::countNonZero(planes[0]) == 0);
+  CHECK(cv::countNonZero(planes[1]) > 10);  // green
+  CHECK(bench.read("merged.png").at<cv::Vec3b>(0, 0) == grey(0));
+  CHECK(bench.read("traversability.png").at<cv::Vec3b>(0, 0) == grey(255));
+  const cv::Mat ground = bench.read("ground_map.png");
+  cv::split(ground, planes);
+  CHECK(cv::countNonZero(planes[2] != planes[0]) > 100);  // the word on it
+}
+
 TEST_CASE("picture: a job allocates nothing") {
   if (!counting_allocations()) {
     MESSAGE("NOT RUN: this program does not count allocations (sanitizer)");

@@ -85,6 +85,21 @@ TEST_CASE("semantic: the script counts from the first job, and its state is repe
   CHECK(f.wanted()[0].every == 2);
 }
 
+TEST_CASE("semantic: a node on request runs while its name stands in a parameter that may change between two jobs") {
+  Fixture f;
+  f.set("on_request", std::string("laser_fusion"));
+  f.set_up();
+  CHECK(f.job(0) == "stopped: laser_fusion");
+  f.set("request", std::string("laser_fusion"));
+  CHECK(f.job(kSecond) == "all nodes at full rate");
+  CHECK(f.wanted().empty());
+  f.set("request", std::string());
+  CHECK(f.job(2 * kSecond) == "stopped: laser_fusion");
+  Fixture wrong;
+  wrong.set("on_request", std::string("laser-fusion"));
+  CHECK_THROWS_AS(wrong.set_up(), SetupError);
+}
+
 TEST_CASE("semantic: idle nodes are paced while the robot is stopped or nobody says that it may drive") {
   Fixture f;
   f.set("idle", std::string("stereo, ground_map"));

@@ -107,6 +107,23 @@ TEST_CASE("idle nodes are paced while the robot is stopped; a slower pace of the
   CHECK(text(generator) == "a/5, b/2, c off");
 }
 
+TEST_CASE("nodes on request are stopped until the script starts them, or while they are asked for") {
+  ClockGenerator generator(*parse_script("2s start fusion; 3s stop fusion"), {"a"}, 2, {}, {"fusion", "fusion_2"});
+  const auto at = [&](int64_t ns, std::string_view ids) {
+    generator.request(ids);
+    generator.update(ns, false);
+    return text(generator);
+  };
+  CHECK(at(0, "") == "fusion off, fusion_2 off");
+  CHECK(at(1, "fusion") == "fusion_2 off");
+  CHECK(at(2, "other, fusion_2 fusion") == "");
+  CHECK(at(3, "fusion_") == "fusion off, fusion_2 off");
+  CHECK(at(4, ",") == "fusion off, fusion_2 off");
+  CHECK(at(2 * kSecond, "") == "fusion_2 off");
+  CHECK(at(3 * kSecond, "fusion_2") == "fusion off");
+  CHECK(at(4 * kSecond, "fusion,fusion_2") == "");
+}
+
 TEST_CASE("rules: a node, what it is needed for, and what is asked of it otherwise") {
   const auto rules = parse_rules(
       "body_pose when person within 4m else stop;\n signs when crossing else pace 3; a when cup within 50cm else pace "

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "nodes/laser_fusion/picture.hpp"
+#include "nodes/picture/clouds.hpp"
 
 #include <algorithm>
 
-namespace takt::laser_fusion {
+namespace takt::picture {
 namespace {
 
 constexpr int kPanel = 480, kMargin = 12;
@@ -51,4 +51,4 @@ cv::Mat draw_clouds(std::span<const cloud::CloudView> clouds) {
   return image;
 }
 
-}  // namespace takt::laser_fusion
+}  // namespace takt::picture
