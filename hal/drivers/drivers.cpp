@@ -273,7 +273,8 @@ NodeResult make_sim(const DeviceConfig& config, Settings& settings, Devices& dev
   }
   if (config.kind == "object_sensor") return make_sim_object_sensor(config, settings, **world);
   if (config.kind == "actor") {
-    std::unique_ptr<Actor> device = std::make_unique<sim::SimActor>(config.id, **world);
+    std::unique_ptr<Actor> device =
+        std::make_unique<sim::SimActor>(config.id, **world, settings.quantity("spread", Dimension::number, 0.0));
     device = with_failures<sim::FailingActor>(std::move(device), settings);
     return opened<ActorNode>(std::move(device), settings);
   }

@@ -158,7 +158,11 @@ constexpr SettingInfo kObjectSensor[] = {
     {"names", "sim", flag, false, "tells what objects are called; true"},
     {"types", "sim", text, false, "types that it knows: cup, bottle; all of the world"},
 };
-constexpr SettingInfo kActor[] = {COMMON_SETTINGS};
+constexpr SettingInfo kActor[] = {
+    COMMON_SETTINGS,
+    {"spread", "sim", number, false,
+     "actions take longer or shorter than their cost by this share at most, by seed; 0"},
+};
 
 #define LINK_SETTINGS                                                                                                \
   {"robot", "", text, true, "name of the robot, at both ends the same"},                                             \

@@ -7,11 +7,13 @@
 #include <cmath>
 #include <cstring>
 
+#include "hal/sim/random.hpp"
 #include "hal/sim/stage.hpp"
 
 namespace takt::sim {
 namespace {
 
+constexpr uint64_t kDurationDraw = 0x0B4;
 constexpr int64_t kPatienceNs = 500'000'000;  // as long others are waited for
 
 /// A text of a message, also of one that somebody forgot to end.
@@ -46,7 +48,8 @@ struct ActionRun::Reason {
   }
 };
 
-void ActionRun::start(int64_t at_ns) {
+void ActionRun::start(int64_t at_ns, double spread) {
+  spread_ = spread;
   waiting_count_ = 0;
   newest_ = 0;
   verdict_ = {};
@@ -157,9 +160,15 @@ bool ActionRun::command(const ActionCommand& command, int64_t at_ns) {
     judge(doing, action_state::refused, at_ns, reason);
     return true;
   }
-  doing.end_ns = doing.begin_ns + std::llround(doing.action->cost_s * 1e9);
+  doing.end_ns = doing.begin_ns + duration_ns(*doing.action);
   waiting_[waiting_count_++] = doing;
   return true;
+}
+
+int64_t ActionRun::duration_ns(const WorldAction& action) const {
+  const auto number = static_cast<uint64_t>(&action - stage_.world().actions.data());
+  const double share = 2 * uniform(mix(stage_.seed() ^ kDurationDraw, robot_, number)) - 1;
+  return std::llround(action.cost_s * (1 + spread_ * share) * 1e9);
 }
 
 bool ActionRun::others_settled(int64_t at_ns) const {

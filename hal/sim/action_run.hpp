@@ -14,7 +14,8 @@ class Stage;
 /// How near the robot's centre must be to everything that an action is about, m (algorithms.md 13).
 constexpr double kReach = 0.8;
 
-/// Carries the actions of one robot out. An action begins kLatencyNs after its command and lasts its cost; at its begin
+/// Carries the actions of one robot out. An action begins kLatencyNs after its command and lasts its cost, longer or
+/// shorter by a share that seed, robot and action decide, `spread` at most; at its begin
 /// and at its end each object has to be within reach and each requirement has to hold, then its results come true. One
 /// thread; settled_ns() any.
 ///
@@ -30,7 +31,7 @@ class ActionRun {
   ActionRun(Stage& stage, size_t robot) : stage_(stage), robot_(robot) {}
 
   /// From that instant on, until stop(), the other robots mind what this one does.
-  void start(int64_t at_ns);
+  void start(int64_t at_ns, double spread = 0);
   void stop() { settled_ns_.store(INT64_MAX, std::memory_order_release); }
 
   /// A new number is a new action, and number 0 none; what is under way and not over when the new one begins is given
@@ -68,6 +69,7 @@ class ActionRun {
   /// The front of what waits has come to its begin or its end.
   void proceed();
   bool others_settled(int64_t at_ns) const;
+  int64_t duration_ns(const WorldAction& action) const;
   void judge(const Doing& doing, uint8_t state, int64_t at_ns, const Reason& reason);
 
   Stage& stage_;
@@ -76,6 +78,7 @@ class ActionRun {
   size_t waiting_count_ = 0;
   uint32_t newest_ = 0;
   int64_t newest_begin_ns_ = 0;
+  double spread_ = 0;
   Verdict verdict_;
   std::atomic<int64_t> settled_ns_{INT64_MAX};
 };

@@ -115,12 +115,13 @@ void SimObjectSensor::report(size_t object, const Placed& placed, int64_t at_ns,
 DeviceResult SimActor::open() {
   if (simulation_.world().actions.empty())
     return device_error(id_, "the world `" + simulation_.world().name + "` has no actions", "add <action> elements");
+  if (!(spread_ >= 0 && spread_ <= 0.9)) return device_error(id_, "`spread` is not in 0..0.9", "give a share");
   return {};
 }
 
 DeviceResult SimActor::start(int64_t epoch_ns) {
   simulation_.begin(epoch_ns);
-  simulation_.actions().start(epoch_ns);
+  simulation_.actions().start(epoch_ns, spread_);
   started_ = true;
   return {};
 }

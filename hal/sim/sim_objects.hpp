@@ -45,9 +45,11 @@ class SimObjectSensor final : public ObjectSensor {
 /// Carries the actions of the simulated world out.
 class SimActor final : public Actor {
  public:
-  SimActor(std::string id, Simulation& simulation) : id_(std::move(id)), simulation_(simulation) {}
+  /// `spread`: an action takes longer or shorter than its cost by this share at most.
+  SimActor(std::string id, Simulation& simulation, double spread = 0)
+      : id_(std::move(id)), simulation_(simulation), spread_(spread) {}
   ~SimActor() override { stop(); }
-  /// Refuses a world without actions.
+  /// Refuses a world without actions, and a spread outside of 0..0.9.
   DeviceResult open() override;
   void close() override {}
   DeviceResult start(int64_t epoch_ns) override;
@@ -58,6 +60,7 @@ class SimActor final : public Actor {
  private:
   std::string id_;
   Simulation& simulation_;
+  double spread_;
   bool started_ = false;
 };
 

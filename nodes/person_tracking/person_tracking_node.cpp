@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "nodes/mapping_3d/head_at.hpp"
 #include "nodes/person_tracking/follower.hpp"
 #include "nodes/person_tracking/person_tracking.hpp"
 #include "rt/node.hpp"
@@ -17,6 +18,7 @@ using namespace person_tracking;
 
 constexpr size_t kMostBodies = 64;
 constexpr int64_t kOldBody_ns = 400'000'000;
+constexpr int64_t kOldHead_ns = 500'000'000;
 constexpr double kBodySigma_m = 0.15;                                     // of a body's head from the person's middle
 constexpr double kAnyYaw_rad2 = std::numbers::pi * std::numbers::pi / 3;  // of a direction that may be any
 constexpr double kBodySpeed_m_s = 1.0;                                    // that he may have walked since
@@ -41,8 +43,9 @@ class PersonTrackingNode final : public Node {
 
   void run(Job& job) override {
     const StereoPair* pair = pair_.newest();
-    const bool looks = pair != nullptr && pair_.is_new() && usable(*pair);
-    if (looks) look(job, *pair);
+    const auto camera = pair != nullptr && usable(*pair) ? camera_at(*pair) : std::nullopt;
+    const bool looks = camera && pair_.is_new();
+    if (looks) look(job, *pair, *camera);
     else tracking_->wait(job.release_ns());
     const int64_t stamp_ns = looks ? pair_.stamp_ns() : job.release_ns();
     const auto robot = robot_at(stamp_ns);
@@ -61,6 +64,14 @@ class PersonTrackingNode final : public Node {
            pair.height == static_cast<int>(images.height) && pair.channels == static_cast<int>(images.channels);
   }
 
+  /// In the robot frame, at the newest pair's stamp; none: not known, since where the head was is not.
+  std::optional<mapping_3d::Affine> camera_at(const StereoPair& pair) const {
+    if (!head_.connected()) return mapping_3d::to_affine(pair.sensor_in_robot);
+    const auto head = mapping_3d::head_at(head_, pair_.stamp_ns(), kOldHead_ns);
+    if (!head) return std::nullopt;
+    return mapping_3d::to_affine(mapping_3d::turned_by_head(pair.sensor_in_robot, head->pan_rad, head->tilt_rad));
+  }
+
   /// The robot in the odometry's frame at a stamp: the message nearest to it, continued at its speed.
   mapping_3d::Affine robot_at(int64_t stamp_ns) const {
     if (odometry_.empty()) return {};
@@ -76,11 +87,8 @@ class PersonTrackingNode final : public Node {
     return mapping_3d::to_affine(mapping_3d::robot_in_odometry(then));
   }
 
-  void look(Job& job, const StereoPair& pair) {
-    Frame frame{pair_.stamp_ns(),
-                pair.left_view(),
-                {},
-                {pair.camera, mapping_3d::to_affine(pair.sensor_in_robot), robot_at(pair_.stamp_ns())}};
+  void look(Job& job, const StereoPair& pair, const mapping_3d::Affine& camera) {
+    Frame frame{pair_.stamp_ns(), pair.left_view(), {}, {pair.camera, camera, robot_at(pair_.stamp_ns())}};
     const DisparityMap* map = disparity_.newest();
     if (map != nullptr && disparity_.stamp_ns() == frame.stamp_ns && map->width == pair.width &&
         map->height == pair.height) {
@@ -168,6 +176,7 @@ class PersonTrackingNode final : public Node {
   Input<DisparityMap> disparity_{
       this, "disparity", "of the pair, same stamp; without it ranges come from the shirt's size", Need::optional};
   Input<Odometry> odometry_{this, "odometry", "how the robot moves; without it it stands; depth 16", Need::optional};
+  Input<HeadState> head_{this, "head", "where the camera sits on the head; depth 16", Need::optional};
   Input<BodyPoses> bodies_{this, "bodies", "hold a person whose shirt is not seen", Need::optional};
   Output<Pose> person_{this, "person", "the person in the shirt, robot frame: y axis where he walks; none: nobody"};
   Output<Detections> shirts_{this, "shirts", "chessboards in the left image; class 1: the one that is followed"};

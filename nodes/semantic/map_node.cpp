@@ -5,7 +5,8 @@
 #include <optional>
 #include <string>
 
-#include "nodes/mapping_3d/pose.hpp"
+#include "nodes/ground_map/terrain.hpp"
+#include "nodes/mapping_3d/head_at.hpp"
 #include "nodes/semantic/insertion.hpp"
 #include "nodes/semantic/network_file.hpp"
 #include "nodes/semantic/reports.hpp"
@@ -78,9 +79,11 @@ class SemanticMapNode final : public Node {
     text_ = decisions ? decisions->text.items() : std::span<char>();
     for (size_t i = 0; i < things_.size(); ++i) look(things_[i], things_.stamp_ns(i));
     for (size_t i = 0; i < reports_.size(); ++i) look(reports_[i], reports_.stamp_ns(i));
-    if (looks_ == 0 || !decisions || !objects || !known) return job.no_result();
+    for (size_t i = 0; i < terrain_.size(); ++i) keep(terrain_[i], terrain_.stamp_ns(i));
+    if ((looks_ == 0 && used_ == 0) || !decisions || !objects || !known) return job.no_result();
     decisions->text.resize(static_cast<uint32_t>(used_));
-    decisions_.send(newest_ns());
+    decisions_.send(std::max(newest_ns(), last_terrain_ns_));
+    if (looks_ == 0) return;
     list_objects(*objects);
     objects_.send(newest_ns());
     write_reports(*map_, *known);
@@ -132,15 +135,39 @@ class SemanticMapNode final : public Node {
     forget(*robot, stamp_ns);
   }
 
+  /// At the place where the robot was then; told where it is another than before.
+  void keep(const takt::Terrain& seen, int64_t stamp_ns) {
+    const auto robot = track_.at(stamp_ns);
+    if (stamp_ns <= last_terrain_ns_ || !robot) return;
+    last_terrain_ns_ = stamp_ns;
+    if (seen.kind >= terrain_kind::unknown) return;
+    const mapping_3d::Affine place = mapping_3d::to_affine(robot->transform);
+    const auto terrain = static_cast<semantic::Terrain>(seen.kind + 1);  // 0: unknown
+    const semantic::Terrain before = map_->terrain(place.t[0], place.t[1]);
+    if (before == terrain || !map_->contains(place.t[0], place.t[1])) return;
+    map_->set_terrain(place.t[0], place.t[1], terrain);
+    line([&](std::span<char> into) {
+      const auto written = fmt::format_to_n(into.data(), into.size(), "terrain at ({:.1f} m, {:.1f} m): {}, was {}",
+                                            place.t[0], place.t[1], terrain_name(terrain), terrain_name(before));
+      return into.first(std::min(into.size(), written.size));
+    });
+  }
+  static std::string_view terrain_name(semantic::Terrain terrain) {
+    return ground_map::kTerrainNames[terrain == 0 ? terrain_kind::unknown : terrain - size_t{1}];
+  }
+
   /// Objects in view that the grid shows gone.
   void forget(const mapping_3d::Affine& robot, int64_t stamp_ns) {
+    const auto head =
+        head_.connected() ? mapping_3d::head_at(head_, stamp_ns, kLongestGap_ns) : mapping_3d::HeadAngles{};
+    if (!head) return;  // nobody knows what it saw
     const Grid* grid = grid_.empty() || grid_.stale() ? nullptr : grid_.newest();
     if (!grid || !lies_in_map(*grid)) return;
     const navigation::OccupancyView seen{grid->view(), grid->cell_m, grid->origin_x_m + grid->grid_in_map.x,
                                          grid->origin_y_m + grid->grid_in_map.y};
     map_->take_over(seen);
     const double ahead_rad = std::atan2(robot.r[4], robot.r[1]);  // the robot drives along its y axis
-    insertion_->forget({robot.t[0], robot.t[1], ahead_rad, view_() / 2, range_, stamp_ns}, seen,
+    insertion_->forget({robot.t[0], robot.t[1], ahead_rad + head->pan_rad, view_() / 2, range_, stamp_ns}, seen,
                        [&](const Decision& decision) { tell(decision); });
   }
 
@@ -220,9 +247,14 @@ class SemanticMapNode final : public Node {
   Input<Grid> grid_{this, "grid",
                     "what is free and what is not, axes of the map frame: objects whose place is seen free go",
                     Need::optional};
+  Input<HeadState> head_{this, "head", "where it turns the camera; none: things are seen straight ahead; depth 16",
+                         Need::optional};
+  Input<takt::Terrain> terrain_{this, "terrain", "of the floor where the robot is: kept at the place; depth 4",
+                                Need::optional};
   Output<Objects3d> objects_{this, "objects", "all objects of the map, map frame; class_id as `classes` counts"};
   Output<ObjectReports> known_{this, "reports", "the same by names with all states; what a restarted node begins with"};
-  Output<TextStatus> decisions_{this, "decisions", "what became of each thing seen, and why; one line each"};
+  Output<TextStatus> decisions_{this, "decisions",
+                                "what became of each thing and terrain seen, and why; one line each"};
 
   Param<std::string> network_{this, "network", "", kPath, "predefined network (YAML); empty: the classes alone"};
   Param<std::string> classes_{this, "classes", "", "", "types of `things` by class_id, joined by commas"};
@@ -240,8 +272,9 @@ class SemanticMapNode final : public Node {
   std::vector<NodeId> types_;  ///< by class_id
   std::array<NodeId, std::size(kMeasured)> measured_{};
   PoseTrack track_{InputPort::kMaxDepth, kLongestGap_ns};
-  int64_t last_things_ns_ = INT64_MIN, last_reports_ns_ = INT64_MIN;  ///< stamps of the newest that counted
-  size_t looks_ = 0;                                                  ///< of the job
+  /// Stamps of the newest that counted.
+  int64_t last_things_ns_ = INT64_MIN, last_reports_ns_ = INT64_MIN, last_terrain_ns_ = INT64_MIN;
+  size_t looks_ = 0;  ///< of the job
   std::array<uint64_t, kMisfits> misfits_{};
   std::span<char> text_;  ///< of the job's decisions
   size_t used_ = 0;

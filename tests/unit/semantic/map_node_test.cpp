@@ -49,6 +49,7 @@ struct Fixture {
     PortAccess::connect(test::input(*node, "reports"), {0, 0, 1, 8});
     PortAccess::connect(test::input(*node, "odometry"), {});
     PortAccess::connect(test::input(*node, "grid"), {60, 60, 1, 0});
+    PortAccess::connect(test::input(*node, "terrain"), {});
   }
   void set_up() {
     Setup setup{clock, folder.path, folder.path, 0, std::nullopt, 0};
@@ -56,6 +57,15 @@ struct Fixture {
     objects = std::make_unique<test::BoxWriter<Objects3d>>(*node->outputs()[0]);
     reports = std::make_unique<test::BoxWriter<ObjectReports>>(*node->outputs()[1]);
     decisions = std::make_unique<test::BoxWriter<TextStatus>>(*node->outputs()[2]);
+  }
+  /// 12 m x 12 m around the origin.
+  void free_grid() {
+    grid->width = grid->height = 60;
+    grid->cell_m = 0.2;
+    grid->origin_x_m = grid->origin_y_m = -6;
+    grid->cells.resize(3600);
+    for (int16_t& cell : grid->cells.items()) cell = 0;
+    test::latch(test::input(*node, "grid"), grid, 1, 1);
   }
   void thing(float class_id, float x_m, float y_m, float red = 0) {
     Object3d o{};
@@ -128,13 +138,7 @@ TEST_CASE("semantic_map waits for the robot's pose at the stamp") {
 TEST_CASE("semantic_map removes an object whose place a grid shows free in two looks") {
   Fixture f;
   f.set_up();
-  Grid& grid = *f.grid;
-  grid.width = grid.height = 60;
-  grid.cell_m = 0.2;
-  grid.origin_x_m = grid.origin_y_m = -6;
-  grid.cells.resize(3600);
-  for (int16_t& cell : grid.cells.items()) cell = 0;
-  test::latch(test::input(*f.node, "grid"), f.grid, 1, 1);
+  f.free_grid();
   f.thing(0, 0, 2);
   f.job(0, 0, 0);
   CHECK(f.job(0, 0, 0) == "");
@@ -144,6 +148,42 @@ TEST_CASE("semantic_map removes an object whose place a grid shows free in two l
   f.things->searched = 1;
   CHECK(f.job(0, 0, 0) == "removed chair_1: its place was seen free 2 times in a row, after 1 sightings");
   CHECK(f.known().empty());
+}
+
+TEST_CASE("semantic_map misses what the head looks at, wherever the robot drives") {
+  Fixture f;
+  PortAccess::connect(test::input(*f.node, "head"), {});
+  f.set_up();
+  test::Box<HeadState> head;
+  const auto look = [&](double pan_rad) {
+    head->pan_rad = pan_rad;
+    test::latch(test::input(*f.node, "head"), head, 100'000'000 * static_cast<int64_t>(f.jobs + 1), f.jobs + 1);
+    return f.job(0, 0, 0);
+  };
+  f.free_grid();
+  f.thing(0, 0, 2);
+  look(0);
+  CHECK(look(kQuarter) == "");
+  CHECK(look(kQuarter) == "");
+  CHECK(f.job(0, 0, 0) == "");  // it has not moved since
+  look(0);
+  CHECK(look(0) == "removed chair_1: its place was seen free 2 times in a row, after 1 sightings");
+}
+
+TEST_CASE("semantic_map keeps terrain at the place where it was seen, and tells where it is another") {
+  Fixture f;
+  f.set_up();
+  test::Box<Terrain> terrain;
+  const auto on = [&](uint8_t kind, double x_m) {
+    terrain->kind = kind;
+    test::latch(test::input(*f.node, "terrain"), terrain, 100'000'000 * static_cast<int64_t>(f.jobs + 1), f.jobs + 1);
+    return f.job(x_m, 1, 0);
+  };
+  CHECK(on(terrain_kind::left, 2.1) == "terrain at (2.1 m, 1.0 m): left, was unknown");
+  CHECK(on(terrain_kind::left, 2.1) == "");
+  CHECK(on(terrain_kind::unknown, 2.1) == "");
+  CHECK(on(terrain_kind::crossing, 5) == "terrain at (5.0 m, 1.0 m): crossing, was unknown");
+  CHECK(on(terrain_kind::crossing, 2.1) == "terrain at (2.1 m, 1.0 m): crossing, was left");
 }
 
 TEST_CASE("semantic_map keeps what is reported by type and name, with its states as text") {

@@ -52,6 +52,25 @@ std::string refusal(const ActionCommand& command, const std::string& more = "") 
 
 }  // namespace
 
+TEST_CASE("with a spread an action takes what seed, robot and action decide, each time the same, within it") {
+  const auto took_s = [](bool bea, const char* action, double spread) {
+    Two two;
+    Simulation& robot = bea ? two.bea : two.ace;
+    robot.actions().start(kEpoch, spread);
+    robot.actions().command(action_command(1, action, "bottle"), kEpoch);
+    two.run_to(3000);
+    CHECK(two.outcome(robot).state == action_state::done);
+    return two.outcome(robot).duration_s;
+  };
+  CHECK(took_s(false, "open", 0) == doctest::Approx(1));
+  const double first = took_s(false, "open", 0.3);
+  CHECK(first == took_s(false, "open", 0.3));
+  CHECK(first != took_s(true, "open", 0.3));
+  CHECK(std::abs(first - 1) <= 0.3);
+  CHECK(std::abs(first - 1) > 0.001);
+  CHECK(took_s(false, "open", 0.6) - 1 == doctest::Approx(2 * (first - 1)));
+}
+
 TEST_CASE("an action begins 100 ms after its command, takes its cost, and then its results are true") {
   Two two;
   CHECK(two.outcome(two.ace).state == action_state::none);
