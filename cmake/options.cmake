@@ -4,8 +4,9 @@
 find_program(TAKT_CCACHE ccache)
 if(TAKT_CCACHE)
   set(CMAKE_C_COMPILER_LAUNCHER ${TAKT_CCACHE})
-  # One cache serves all checkouts: paths below the source are hashed relative. Not pch_defines: a precompiled header from the cache knows its headers by the times of another checkout, and what
-  # they guard by `#pragma once` is then read, and defined, twice.
+  # One cache serves all checkouts: paths below the source are hashed relative. Not pch_defines: a precompiled header
+  # from the cache knows its headers by the times of another checkout, and what they guard by `#pragma once` is then
+  # read, and defined, twice.
   set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env CCACHE_SLOPPINESS=time_macros CCACHE_BASEDIR=${PROJECT_SOURCE_DIR}
     CCACHE_NOHASHDIR=1 ${TAKT_CCACHE})
 endif()
