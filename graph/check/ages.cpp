@@ -45,7 +45,8 @@ class Ages {
     std::vector<Path> paths;
     Path walk;
     collect(place, through, through == kNone, walk, paths);
-    if (paths.empty()) bound.why = "no path from a device leads there";
+    bound.reached = !paths.empty();
+    if (!bound.reached) bound.why = "no path from a device leads there";
     if (paths.size() >= kMostPaths) bound.why = "too many paths lead there";
     bound.bound_ns = bound.oldest_ns = 0;
     for (const Path& path : paths) add(path, place.is_input(), bound);
@@ -236,13 +237,17 @@ size_t edge_of(const TaskPlan& task, const std::string& input) {
 std::vector<AgeBound> age_bounds(const GraphSpec& graph, const Plan& plan, const std::vector<NodeAdmission>& nodes) {
   std::vector<AgeBound> result;
   Ages ages(plan, nodes);
+  const bool reduced = plan.tasks.size() < graph.devices.size() + graph.nodes.size();
+  const auto note = [&](AgeBound bound) {
+    if (bound.reached || !reduced) result.push_back(std::move(bound));
+  };
   for (const ChainSpec& chain : graph.chains) {
     const size_t to = task_of(plan, chain.to.node), from = task_of(plan, chain.from.node);
     if (to == kNone || from == kNone) continue;  // left out by the mode
     const size_t edge = edge_of(plan.tasks[to], chain.to.port);
-    AgeBound bound{chain.name, false, chain.max_age_ns, {}, {}, 0, {}};
+    AgeBound bound{chain.name, false, chain.max_age_ns, {}, {}, 0, {}, true};
     ages.judge({to, edge, port_of(plan, chain.to)}, port_of(plan, chain.from), bound);
-    result.push_back(std::move(bound));
+    note(std::move(bound));
   }
   for (size_t t = 0; t < plan.tasks.size(); ++t) {
     const TaskPlan& task = plan.tasks[t];
@@ -252,9 +257,9 @@ std::vector<AgeBound> age_bounds(const GraphSpec& graph, const Plan& plan, const
       const std::string input =
           task.node != nullptr ? "." + std::string(task.node->inputs()[task.edges[e].input]->name()) : "";
       AgeBound bound{
-          port.node + "." + port.port + " -> " + task.name + input, true, task.edges[e].max_age_ns, {}, {}, 0, {}};
+          port.node + "." + port.port + " -> " + task.name + input, true, task.edges[e].max_age_ns, {}, {}, 0, {}, true};
       ages.judge({t, e}, kNone, bound);
-      result.push_back(std::move(bound));
+      note(std::move(bound));
     }
   }
   return result;
