@@ -94,13 +94,13 @@ TEST_CASE("Exactly full cores are admitted if ordinary threads have no share of 
   CHECK(check({}, plan, options).admitted);
   plan.tasks[0].budget_ns += 100'000;
   CHECK(says(check({}, plan, options), "budgets and overheads ask for 1.00 of 1 core"));
-  // Two jobs of 500 ms leave no 51 ms of a second free: the share goes before them, twice in a row at worst.
-  plan.tasks = {task("long", 1, 500, 700, Criticality::high)};
-  plan.tasks[0].rate = Rate{7, 5};
+  // A job of 1200 ms leaves no 51 ms of a second free: the share goes before it, late once and then at once.
+  plan.tasks = {task("long", 1, 1200, 1400, Criticality::high)};
+  plan.tasks[0].rate = Rate{1, 2};
   CHECK(check({}, plan, options).admitted);
-  CHECK(check({}, plan, options).modes[0].admission.nodes[0].response_ns == 602'000'000);
-  plan.tasks[0].deadline_ns = 600'000'000;
-  CHECK(says(check({}, plan, options), "long may take 602.000 ms from its release and has 600.000 ms"));
+  CHECK(check({}, plan, options).modes[0].admission.nodes[0].response_ns == 1'353'000'000);
+  plan.tasks[0].deadline_ns = 1'350'000'000;
+  CHECK(says(check({}, plan, options), "long may take 1353.000 ms from its release and has 1350.000 ms"));
   CHECK(check({}, plan, options).answer == Answer::not_proven);
   plan.tasks.clear();
   for (int i = 0; i < 10; ++i) plan.tasks.push_back(task("n" + std::to_string(i), 10, 10, 100, Criticality::high));

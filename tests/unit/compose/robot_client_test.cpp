@@ -160,8 +160,16 @@ TEST_CASE("a goal that somebody says is planned, driven, acted and reported, wit
   CHECK(seen.under_way > 100);
   CHECK(seen.left.empty());
   std::istringstream plan(seen.plan);
-  size_t steps = 0;
-  for (std::string line; std::getline(plan, line); ++steps) {
+  size_t steps = 0, learned = 0;
+  for (std::string line; std::getline(plan, line);) {
+    if (const size_t said = line.find(" is taken to last "); said != std::string::npos) {
+      double mean_s = 0, declared_s = 0;
+      REQUIRE(std::sscanf(line.c_str() + said, " is taken to last %lf s, declared %lf s", &mean_s, &declared_s) == 2);
+      CHECK(mean_s == doctest::Approx(declared_s).epsilon(0.2));
+      ++learned;
+      continue;
+    }
+    ++steps;
     double drive_s = 0, drove_s = 0, act_s = 0, acted_s = 0;
     const std::string times = line.substr(line.find(": drive "));
     REQUIRE(std::sscanf(times.c_str(), ": drive %lf s (took %lf), act %lf s (took %lf)", &drive_s, &drove_s, &act_s,
@@ -170,4 +178,5 @@ TEST_CASE("a goal that somebody says is planned, driven, acted and reported, wit
     CHECK(acted_s == doctest::Approx(act_s).epsilon(0.2));
   }
   CHECK(steps == 2);
+  CHECK(learned == 2);
 }

@@ -202,6 +202,7 @@ TEST_CASE("mapping_3d: after a correction grids of the poses' frame are laid whe
     CHECK(at(0.1, 0.5) != 1000);
   };
   check();
+  check();  // what is corrected came after the first image
   CHECK(walk.frame->message().transform.x == 0);
   test::Box<Pose> correction;
   correction->transform = robot_at(1.6, 1.2, 0.5);  // where the robot was in truth

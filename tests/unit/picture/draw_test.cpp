@@ -121,7 +121,7 @@ TEST_CASE("the node type registers; every input is optional") {
   const auto* type = types.find("picture");
   REQUIRE(type);
   const auto node = type->make();
-  REQUIRE(node->inputs().size() == 9);  // with control
+  REQUIRE(node->inputs().size() == 14);  // with control
   for (const auto* input : node->inputs()) CHECK(input->need() == takt::Need::optional);
   CHECK(node->outputs().empty());
 }
