@@ -57,27 +57,20 @@ Rigid Registration::search(const Rigid& start) {
   return genetic.best();
 }
 
-template <class Icp>
-Rigid Registration::with_falling_cut(const Rigid& start, const Icp& icp_from) {
-  const double last_m = cut_m();
-  Rigid pose = start;
-  for (const double times : {4.0, 2.0, 1.0}) {
-    thinned_->set_cut(times * last_m);
-    pose = icp_from(pose);
-  }
-  return pose;
-}
-
 Rigid Registration::plain(const Rigid& start) {
-  return with_falling_cut(start, [&](const Rigid& pose) {
-    return icp(*thinned_, pose, {.eps_conv = parameters_.genetic.eps_conv, .locks = parameters_.genetic.locks})
-        .moving_in_fixed;
-  });
+  return icp(*thinned_, start, {.eps_conv = parameters_.genetic.eps_conv, .locks = parameters_.genetic.locks})
+      .moving_in_fixed;
 }
 
 Rigid Registration::generalised(const Rigid& start) {
   GeneralisedIcp icp(*thinned_);
-  return with_falling_cut(start, [&](const Rigid& pose) { return icp.run(pose); });
+  const double last_m = cut_m();
+  Rigid pose = start;
+  for (const double times : {4.0, 2.0, 1.0}) {
+    thinned_->set_cut(times * last_m);
+    pose = icp.run(pose);
+  }
+  return pose;
 }
 
 Rigid Registration::refined(const Rigid& pose) {

@@ -44,9 +44,6 @@ class Registration {
   size_t moving_points() const { return thinned_->moving().size(); }  ///< thinned
 
  private:
-  template <class Icp>
-  Rigid with_falling_cut(const Rigid& start, const Icp& icp_from);
-
   RegistrationParameters parameters_;
   std::vector<Point> fixed_, moving_;  ///< all that refined() uses
   double last_cut_m_ = 0;

@@ -204,19 +204,11 @@ void PathPlanner::write_way(const Place& from, uint32_t end, const Place& to, st
   for (uint32_t at = end; at != start; at = reached_[at].from) cells_.push_back(at);
   path.push_back(from);
   Place last = from;
-  double cost_m = 0;  // of the cells' way since the newest corner
   for (size_t i = cells_.size(); i-- > 0;) {
     const Place next = i == 0 ? to : middle(cell(cells_[i]));
-    const double step_m = straight_cost_m(last, next);
-    // Straight on from the newest corner as long as that is free and costs no more; else the cell before is a corner.
-    if (path.back().x_m != last.x_m || path.back().y_m != last.y_m) {
-      const double straight_m = straight_cost_m(path.back(), next);
-      if (!std::isfinite(straight_m) || straight_m > cost_m + step_m + kRounding) {
-        path.push_back(last);
-        cost_m = 0;
-      }
-    }
-    cost_m += step_m;
+    // Straight on from the newest corner as far as the way is free; else the cell before is a corner.
+    if (path.back().x_m != last.x_m || path.back().y_m != last.y_m)
+      if (!sees(path.back(), next)) path.push_back(last);
     last = next;
   }
   path.push_back(to);
@@ -233,15 +225,13 @@ bool PathPlanner::along(const Place& a, const Place& b, Visit visit) const {
     return d == 0 ? std::numeric_limits<double>::infinity()
                   : (origin_m + (cell + (step > 0 ? 1 : 0)) * grid_.cell_m - from_m) / d;
   };
-  for (;;) {
+  while (visit(at)) {
+    if (at == end) return true;
     const double column = crossing(grid_.origin_x_m, a.x_m, dx, at.column, right),
                  row = crossing(grid_.origin_y_m, a.y_m, dy, at.row, up);
     const bool columns_left = at.column != end.column, rows_left = at.row != end.row;
-    const double leaves = std::min({columns_left ? column : 1.0, rows_left ? row : 1.0, 1.0});
-    if (!visit(at, leaves)) return false;
-    if (!columns_left && !rows_left) return true;
     if (columns_left && rows_left && std::abs(column - row) < kCorner) {
-      if (!visit({at.column + right, at.row}, leaves) || !visit({at.column, at.row + up}, leaves)) return false;
+      if (!visit({at.column + right, at.row}) || !visit({at.column, at.row + up})) return false;
       at = {at.column + right, at.row + up};
     } else if (columns_left && (column < row || !rows_left)) {
       at.column += right;
@@ -249,23 +239,17 @@ bool PathPlanner::along(const Place& a, const Place& b, Visit visit) const {
       at.row += up;
     }
   }
+  return false;
 }
 
-double PathPlanner::straight_cost_m(const Place& a, const Place& b) const {
-  double shares = 0, entered = 0;
-  const bool free = along(a, b, [&](const Cell& c, double leaves) {
-    if (!grid_.contains(c) || blocked(c)) return false;
-    shares += (leaves - entered) * (unknown_[index(c)] != 0 ? parameters_.unknown_factor : 1);
-    entered = leaves;
-    return true;
-  });
-  return free ? shares * std::hypot(b.x_m - a.x_m, b.y_m - a.y_m) : std::numeric_limits<double>::infinity();
+/// Straight through known and free cells, so that cutting the corners of a way never costs more.
+bool PathPlanner::sees(const Place& a, const Place& b) const {
+  return along(a, b, [&](const Cell& c) { return grid_.contains(c) && !blocked(c) && unknown_[index(c)] == 0; });
 }
 
 bool PathPlanner::free(std::span<const Place> path) const {
   for (size_t i = 0; i + 1 < path.size(); ++i)
-    if (!along(path[i], path[i + 1], [&](const Cell& c, double) { return grid_.contains(c) && !blocked(c); }))
-      return false;
+    if (!along(path[i], path[i + 1], [&](const Cell& c) { return grid_.contains(c) && !blocked(c); })) return false;
   return true;
 }
 

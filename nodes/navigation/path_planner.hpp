@@ -95,12 +95,10 @@ class PathPlanner {
   std::optional<uint32_t> search(const Cell& from, There there, Left left);
   /// The corners of the way to the cell that was reached, in which `to` lies.
   void write_way(const Place& from, uint32_t end, const Place& to, std::vector<Place>& path);
-  /// visit(cell, share of the piece at which it leaves it) for each cell that a straight piece passes; ends early where
-  /// that returns false, and tells so.
+  /// visit(cell) for each cell that a straight piece passes; ends early where that returns false, and tells so.
   template <class Visit>
   bool along(const Place& a, const Place& b, Visit visit) const;
-  /// Of a straight piece, m of known cells; infinite: it passes a blocked one.
-  double straight_cost_m(const Place& a, const Place& b) const;
+  bool sees(const Place& a, const Place& b) const;
 
   PathParameters parameters_;
   OccupancyView grid_;

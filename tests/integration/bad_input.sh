@@ -41,7 +41,7 @@ expect 2 "either --data DIR or --generated" "$takt" eval ego_motion
 expect 2 "none.png" "$takt" eval stereo --left "$work/none.png" --right "$work/none.png" --gt "$work/none.png" --gt-scale 1 --disparities 16
 expect 2 "no file is named like left*.jpg" "$takt" calibrate stereo "$work"
 expect 2 "calib_cam_to_cam.txt: cannot be read" "$takt" eval stereo --scene "$work"
-expect 2 "--sweep excludes --scene" "$takt" eval stereo --scene "$work" --sweep noise
+expect 2 "--scene excludes --sweep" "$takt" eval stereo --scene "$work" --sweep noise
 expect 2 "xb3.yaml: the pairs are rectified already" "$takt" calibrate rig "$source/graph/rigs/xb3.yaml" --out "$work/rig.yaml"
 expect 2 "none.yaml: the rig file cannot be opened" "$takt" calibrate rig "$work/none.yaml" --out "$work/rig.yaml"
 

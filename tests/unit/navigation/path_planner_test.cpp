@@ -74,25 +74,6 @@ TEST_CASE("unknown cells cost three, so that a known detour of less is taken") {
   for (const Place& place : path) CHECK((place.y_m != 1.5 || place.x_m == 0.5 || place.x_m == 4.5));
 }
 
-TEST_CASE("what is unknown is passed straight, too, where that costs no more than the cells' way") {
-  std::vector<Place> path;
-  PathPlanner planner(60, {0, 3});
-  const Field unknown(std::vector<std::string>(6, std::string(10, '?')));
-  REQUIRE(planner.look(unknown.view()));
-  REQUIRE(planner.plan({0.4, 0.6}, {9.5, 3.2}, 0, path) == PathOutcome::found);
-  CHECK(path.size() == 2);
-  const Field lane({"??????????",  //
-                    "????......",  //
-                    "????.?????",  //
-                    "????.?????",  //
-                    ".....?????",  //
-                    "??????????"});
-  REQUIRE(planner.look(lane.view()));
-  REQUIRE(planner.plan({0.5, 1.5}, {9.5, 4.5}, 0, path) == PathOutcome::found);
-  CHECK(planner.cost() == 9 * PathPlanner::kStraight + 2 * PathPlanner::kDiagonal - PathPlanner::kStraight);
-  CHECK(path.size() >= 4);  // along the lane
-}
-
 TEST_CASE("obstacles grow by the clearance; a robot that stands too near may only move away") {
   const Field f({"#....", ".....", ".....", ".....", "....."});
   PathPlanner planner(25, {1.5, 3});  // cells of 1 m: blocked unless all of it is 1.5 m from all of the corner's
