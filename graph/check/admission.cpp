@@ -66,13 +66,14 @@ class Admitting {
         refuse(Answer::not_proven,
                fmt::format("{}: no budget stated; give it one (`takt profile` measures it)", task.name));
     ask_kernel();
-    const SetAnswer answer = analyse_set(lanes_.set, plan_.policy, bounds_);
-    result_.by = answer.by;
-    if (answer.answer != Answer::admitted) {
-      refuse(answer.answer, answer.why);
+    const bool followers = lanes_.lanes.size() < plan_.tasks.size();
+    whole_ = analyse_set(lanes_.set, plan_.policy, bounds_ || followers);
+    result_.by = whole_.by;
+    if (whole_.answer != Answer::admitted) {
+      refuse(whole_.answer, whole_.why);
       return std::move(result_);
     }
-    for (size_t l = 0; l < lanes_.lanes.size(); ++l) judge_members(l, *answer.response[l]);
+    for (size_t l = 0; l < lanes_.lanes.size(); ++l) judge_members(l);
     ask_about_overruns();
     return std::move(result_);
   }
@@ -98,56 +99,65 @@ class Admitting {
                                              sum, overheads_.deadline_bandwidth));
   }
 
-  /// Response of lane `l` if its own work, its lead included where it is woken for it, were only that long.
-  std::optional<Ticks> response_of(size_t l, int64_t work_ns) const {
-    analysis::TaskSet set = lanes_.set;
-    set.tasks[l].budget = work_ns * set.ticks_per_ns;
-    const SetAnswer answer = analyse_set(set, plan_.policy);
-    return answer.answer == Answer::admitted ? answer.response[l] : std::nullopt;
+  /// Bound on the end of a piece of what lane `l` does (policy_analysis.hpp: Part).
+  std::optional<int64_t> part_of(size_t l, int64_t work_ns, bool first) const {
+    const auto found =
+        response_of_part(lanes_.set, plan_.policy, whole_, {l, work_ns * lanes_.set.ticks_per_ns, first});
+    return found ? std::optional(ns(*found)) : std::nullopt;
   }
 
-  /// From the head's release, with the work of the lane up to there. A lane that is not preempted has begun its
-  /// last job at `response` minus what was left to do.
-  std::optional<int64_t> finish_of(size_t l, size_t position, Ticks response) const {
+  /// What a worker is charged before its head's own work.
+  int64_t lead_ns(const std::vector<size_t>& lane) const {
+    return plan_.policy == Policy::cooperative ? 0 : longest_lead_ns(plan_, lane);
+  }
+
+  /// From the head's release, with the work of the lane up to there.
+  std::optional<int64_t> finish_of(size_t l, size_t position) const {
     const std::vector<size_t>& lane = lanes_.lanes[l];
-    if (position + 1 == lane.size()) return ns(response);
-    const int64_t work = prefix_ns(plan_, lane, position, overheads_);
-    if (plan_.policy == Policy::cooperative) return ns(response) - ns(lanes_.set.tasks[l].budget) + work;
-    const auto found = response_of(l, longest_lead_ns(plan_, lane) + work);
-    return found ? std::optional(ns(*found)) : std::nullopt;
+    if (position + 1 == lane.size()) return ns(*whole_.response[l]);
+    return part_of(l, lead_ns(lane) + prefix_ns(plan_, lane, position, overheads_), true);
   }
 
+  /// The least time from the head's release to that of task t of its lane.
+  int64_t released_after_ns(size_t t) const {
+    if (plan_.tasks[t].on_task == kNone) return 0;
+    const TaskPlan& producer = plan_.tasks[plan_.tasks[t].on_task];
+    return released_after_ns(plan_.tasks[t].on_task) + (producer.publish == PublishAt::let ? producer.deadline_ns : 0);
+  }
+
+  /// Of a follower, from its own release.
   std::optional<int64_t> response_of_member(size_t l, size_t position) const {
-    const int64_t work = segment_ns(plan_, lanes_.lanes[l], position, overheads_);
-    if (plan_.policy == Policy::cooperative) return work;
-    const auto found = response_of(l, work);
-    return found ? std::optional(ns(*found)) : std::nullopt;
+    const std::vector<size_t>& lane = lanes_.lanes[l];
+    std::optional<int64_t> bound = finish_of(l, position);
+    if (bound) *bound -= released_after_ns(lane[position]);
+    // A worker that waits for an output to become visible lets others run, who may then be in its way.
+    const bool goes_on = std::none_of(lane.begin(), lane.begin() + static_cast<ptrdiff_t>(position),
+                                      [&](size_t t) { return plan_.tasks[t].publish == PublishAt::let; });
+    if (!goes_on && plan_.policy != Policy::cooperative) return bound;
+    const auto part = part_of(l, segment_ns(plan_, lane, position, overheads_), false);
+    return part && bound ? std::min(part, bound) : part ? part : bound;
   }
 
   /// Of a head: as if it had only to begin. A follower begins when the member before it is done, or is waited for.
-  std::optional<int64_t> start_of(size_t l, size_t position, Ticks response) const {
+  std::optional<int64_t> start_of(size_t l, size_t position) const {
     const std::vector<size_t>& lane = lanes_.lanes[l];
     if (position > 0) {
       const TaskPlan& producer = plan_.tasks[plan_.tasks[lane[position]].on_task];
       return producer.publish == PublishAt::asap ? result_.nodes[lane[position - 1]].finish_ns
-                                                 : finish_of(l, position, response);
+                                                 : finish_of(l, position);
     }
-    if (plan_.policy == Policy::cooperative)
-      return ns(response) - ns(lanes_.set.tasks[l].budget) + overheads_.release_ns + overheads_.switch_ns;
     constexpr int64_t kMicrosecond = 1'000;
-    const auto found =
-        response_of(l, longest_lead_ns(plan_, lane) + overheads_.release_ns + overheads_.switch_ns + kMicrosecond);
-    return found ? std::optional(ns(*found)) : std::nullopt;
+    return part_of(l, lead_ns(lane) + overheads_.release_ns + overheads_.switch_ns + kMicrosecond, true);
   }
 
-  void judge_members(size_t l, Ticks response) {
+  void judge_members(size_t l) {
     const std::vector<size_t>& lane = lanes_.lanes[l];
     for (size_t m = 0; m < lane.size(); ++m) {
       const TaskPlan& task = plan_.tasks[lane[m]];
       NodeAdmission& node = result_.nodes[lane[m]];
-      node.finish_ns = finish_of(l, m, response);
+      node.finish_ns = finish_of(l, m);
       const auto aged = [](const EdgePlan& edge) { return edge.max_age_ns > 0; };
-      if (bounds_ && std::any_of(task.edges.begin(), task.edges.end(), aged)) node.start_ns = start_of(l, m, response);
+      if (bounds_ && std::any_of(task.edges.begin(), task.edges.end(), aged)) node.start_ns = start_of(l, m);
       node.response_ns = m == 0 ? node.finish_ns : response_of_member(l, m);
       // The lane is in time as a whole; a member's own deadline may be tighter.
       if (node.response_ns && *node.response_ns <= task.deadline_ns) continue;
@@ -232,6 +242,7 @@ class Admitting {
   const Overheads& overheads_;
   const bool bounds_;
   const LaneTasks lanes_;
+  SetAnswer whole_ = {};  ///< of the lanes
   Admission result_;
 };
 

@@ -107,8 +107,9 @@ class Ages {
     }
   }
 
-  /// The task as the analysis of chains sees it, without the edge it reads.
-  ChainTask model(size_t t) const {
+  /// The task as the analysis of chains sees it, without the edge it reads. Which of its producer's messages an
+  /// `every`-th one is depends on the first that was made: at the `last` task of a chain any may be it.
+  ChainTask model(size_t t, bool last) const {
     size_t head = t;
     Wide every = 1;
     int64_t apart = 0;
@@ -116,13 +117,14 @@ class Ages {
       every *= plan_.tasks[head].every;
       apart = std::max(apart, plan_.tasks[head].min_interval_ns);
     }
+    if (last) every = 1, apart = 0;
     const Rate& rate = *plan_.tasks[head].rate;
     ChainTask model;
     const Wide period = Wide{rate.denominator} * 1'000'000'000 * ticks_ / rate.numerator * every;
     model.period = static_cast<Ticks>(std::min<Wide>(period, analysis::kLongest));
     model.offset = plan_.tasks[head].offset_ns * ticks_;
+    model.phased = every == 1 && apart == 0;
     if (apart > 0) {
-      model.phased = false;
       model.period += (apart * ticks_ + model.period - 1) / model.period * model.period;
     }
     model.visible = visible_ns(t).value_or(0) * ticks_;
@@ -143,7 +145,7 @@ class Ages {
     std::vector<ChainTask> chain;
     for (size_t i = 0; i < path.size(); ++i) {
       const TaskPlan& task = plan_.tasks[path[i].task];
-      ChainTask m = model(path[i].task);
+      ChainTask m = model(path[i].task, i + 1 == path.size());
       if (!visible_ns(path[i].task)) bound.why = fmt::format("no response of {} is bounded", task.name);
       if (i > 0) {
         const EdgePlan& edge = task.edges[path[i].edge];

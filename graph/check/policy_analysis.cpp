@@ -113,4 +113,30 @@ SetAnswer analyse_set(const TaskSet& set, Policy policy, bool responses) {
   return cooperative(set);
 }
 
+std::optional<analysis::Ticks> response_of_part(const TaskSet& set, Policy policy, const SetAnswer& whole,
+                                                const Part& part) {
+  const size_t k = part.task;
+  if (policy == Policy::cooperative && !part.first) return part.work;  // nobody comes between
+  if (policy == Policy::deadline && set.cores > 1) {
+    std::vector<analysis::Ticks> responses;
+    for (const auto& response : whole.response) responses.push_back(*response);
+    const analysis::Ticks found = analysis::global_response_of_part(set, k, part.work, responses);
+    return found < 0 ? std::nullopt : std::optional(found);
+  }
+  // A job that goes on behind the part for all of its budget ends in time: the part was done by so much earlier.
+  std::optional<analysis::Ticks> bound = *whole.response[k] - (set.tasks[k].budget - part.work);
+  // Above fixed priorities nothing is left of the task's job before. Under EDF that one has held up others, who now come
+  // first; only behind work of the same job none of them waits.
+  if (policy == Policy::cooperative || (policy == Policy::deadline && part.first)) return bound;
+  TaskSet alone = set;
+  alone.tasks[k].budget = part.work;
+  if (!part.first) {  // ready at any phase
+    alone.tasks[k].sporadic = true;
+    alone.tasks[k].offset = 0;
+  }
+  const SetAnswer answer = analyse_set(alone, policy);
+  if (answer.answer == Answer::admitted) bound = std::min(*bound, *answer.response[k]);
+  return bound;
+}
+
 }  // namespace takt::graph

@@ -27,4 +27,18 @@ struct SetAnswer {
 /// Without `responses` deadlines may stand in for them, which is faster.
 SetAnswer analyse_set(const analysis::TaskSet& set, Policy policy, bool responses = true);
 
+/// A piece of the work of one task of a set that analyse_set admitted.
+struct Part {
+  size_t task = 0;
+  analysis::Ticks work = 0;  ///< at most
+  /// True: what a job begins with. False: it gets ready the moment that the thread of the task has done what comes
+  /// before it in the same job.
+  bool first = true;
+};
+
+/// Bound on its end, from its getting ready, ticks (of a first one: from the planned release); nothing where none is
+/// found. `whole` is what analyse_set, with `responses`, said of the set.
+std::optional<analysis::Ticks> response_of_part(const analysis::TaskSet& set, Policy policy, const SetAnswer& whole,
+                                                const Part& part);
+
 }  // namespace takt::graph

@@ -70,14 +70,17 @@ void VirtualRun::expect_head(size_t lane) {
   add(lane, release);
 }
 
-void VirtualRun::expect_follower(size_t lane) {
+void VirtualRun::expect_follower(const analysis::SimulatedJob& before) {
+  Course& course = courses_[before.task];
   // In the order of the lane, whoever released them.
-  std::vector<Lane::Activation>& waiting = courses_[lane].waiting;
+  std::vector<Lane::Activation>& waiting = course.waiting;
   const auto next = std::min_element(waiting.begin(), waiting.end(),
                                      [](const auto& a, const auto& b) { return a.member < b.member; });
-  courses_[lane].job = *next;
+  course.job = *next;
   waiting.erase(next);
-  add(lane, courses_[lane].job.release_ns);
+  if (plan_.policy != Policy::cooperative) return add(before.task, course.job.release_ns);
+  course.asleep = course.job.release_ns > clock_.now_ns();
+  simulator_.add_next_part(before, course.lane->next_release_ns());
 }
 
 void VirtualRun::add(size_t lane, int64_t ready_ns) {
@@ -88,6 +91,7 @@ void VirtualRun::add(size_t lane, int64_t ready_ns) {
 analysis::Ticks VirtualRun::begin(const analysis::SimulatedJob& simulated) {
   Course& course = courses_[simulated.task];
   clock_.advance_to(simulator_.now());
+  if (course.asleep) return course.job.release_ns - clock_.now_ns();
   course.dropped = course.job.member == 0 && course.job.release_ns >= stop_.end_ns();
   if (course.dropped) return 0;
   const size_t task = course.lane->members()[course.job.member];
@@ -103,13 +107,14 @@ void VirtualRun::finish(const analysis::SimulatedJob& simulated) {
   Course& course = courses_[simulated.task];
   if (course.dropped) return;
   clock_.advance_to(simulator_.now());
+  if (std::exchange(course.asleep, false)) return simulator_.add_next_part(simulated, course.lane->next_release_ns());
   const trace::As traced(course.ring);
   released_.clear();
   const JobEnd end = course.lane->finish(course.job, core_of(simulated), released_);
   if (options_.after_step) options_.after_step();
   if (end.end_of_data) return stop_.raise(course.job.release_ns);
   course.waiting.insert(course.waiting.end(), released_.begin(), released_.end());
-  if (!course.waiting.empty()) return expect_follower(simulated.task);
+  if (!course.waiting.empty()) return expect_follower(simulated);
   course.lane->go_on(clock_.now_ns(), stop_.end_ns());
   expect_head(simulated.task);
 }
@@ -119,7 +124,7 @@ int VirtualRun::core_of(const analysis::SimulatedJob& job) const {
 }
 
 void VirtualRun::tell_stretch(const analysis::SimulatedJob& job, int64_t from_ns, int64_t to_ns) const {
-  if (!options_.ran || from_ns == to_ns) return;
+  if (!options_.ran || from_ns == to_ns || courses_[job.task].asleep) return;
   trace::Slice slice;
   slice.from_ns = from_ns;
   slice.to_ns = to_ns;

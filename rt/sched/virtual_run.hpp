@@ -15,8 +15,9 @@ namespace takt {
 /// instant at which the simulated schedule (analysis::Simulator, see there for the order of events) lets it start, and
 /// publishes when it is taken to be done. Policy, cores and preemption are those of the plan: `deadline` is global EDF
 /// with the deadlines of the reservations, whose budgets nobody enforces; `fixed` is per core, by priority;
-/// `cooperative` is global EDF without preemption. A plan that names no cores has one for each lane: nobody waits. The
-/// same plan, nodes and durations give the same run. On the calling thread alone.
+/// `cooperative` is global EDF in which a core stays with a lane until the pass is done, asleep where that waits for a
+/// `let` output. A plan that names no cores has one for each lane: nobody waits. The same plan, nodes and durations
+/// give the same run. On the calling thread alone.
 class VirtualRun {
  public:
   struct Options {
@@ -42,6 +43,7 @@ class VirtualRun {
     Lane::Activation job = {};
     bool dropped = false;                        ///< the run ended before it started
     std::vector<Lane::Activation> waiting = {};  ///< followers still to run in this pass
+    bool asleep = false;  ///< its worker waits for the release of the follower `job`
   };
 
   analysis::Ticks begin(const analysis::SimulatedJob& job);
@@ -49,7 +51,7 @@ class VirtualRun {
   void tell_stretch(const analysis::SimulatedJob& job, int64_t from_ns, int64_t to_ns) const;
   int core_of(const analysis::SimulatedJob& job) const;
   void expect_head(size_t lane);
-  void expect_follower(size_t lane);
+  void expect_follower(const analysis::SimulatedJob& before);
   void add(size_t lane, int64_t ready_ns);
 
   const Plan& plan_;

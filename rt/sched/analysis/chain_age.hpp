@@ -16,7 +16,7 @@
 namespace takt::analysis {
 
 /// A task of a chain and the edge that it reads. What follows another by `on` has the releases of the head of its lane,
-/// each `every`-th of them, and bounds counted from there.
+/// and bounds counted from there; with `every` some of them, without known phase.
 struct ChainTask {
   Ticks period = 0;      ///< of the jobs that publish; the greatest distance if they are not periodic
   Ticks offset = 0;      ///< of the first release

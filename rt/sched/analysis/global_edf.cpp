@@ -245,6 +245,15 @@ std::vector<Ticks> global_response_times(const TaskSet& set) {
   return found;
 }
 
+Ticks global_response_of_part(const TaskSet& set, size_t k, Ticks budget, const std::vector<Ticks>& responses) {
+  std::vector<Sporadic> tasks = charged(set);
+  tasks[k].budget = budget + set.tasks[k].blocking;
+  if (tasks[k].budget > tasks[k].deadline) return -1;
+  std::vector<Ticks> ready_to_end = responses;
+  for (size_t i = 0; i < tasks.size(); ++i) ready_to_end[i] -= set.tasks[i].jitter;
+  return bounded_response(tasks, k, ready_to_end, set.cores);
+}
+
 GlobalEdfResult global_edf(const TaskSet& set, bool responses) {
   GlobalEdfResult result;
   if (density_test(set)) result.proven_by = GlobalTest::density;

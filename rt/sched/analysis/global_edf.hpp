@@ -35,6 +35,11 @@ bool carry_in_test(const TaskSet& set, size_t max_points = 20'000);
 /// or the set is known by another test to meet its deadlines.
 std::vector<Ticks> global_response_times(const TaskSet& set);
 
+/// Of a piece of work of task k by itself: from when it gets ready to its end, at most `budget` of work whose deadline
+/// is no later than that of a job released at that instant, while the rest of task k does nothing. `responses` of all
+/// tasks, from their planned releases, hold. -1 where the iteration passes the deadline.
+Ticks global_response_of_part(const TaskSet& set, size_t k, Ticks budget, const std::vector<Ticks>& responses);
+
 struct GlobalEdfResult {
   GlobalTest proven_by = GlobalTest::none;  ///< the first test that did
   /// By task, from the planned release: of the response-time test where that converged, else the deadline; -1 if

@@ -40,8 +40,15 @@ void Simulator::add(size_t task, Ticks planned, Ticks ready) {
   job.deadline = planned + set_.tasks[task].deadline;
   jobs_.push_back(job);
   left_.push_back(0);
+  keeps_core_.push_back(false);
   arrivals_.push_back(jobs_.size() - 1);
   std::push_heap(arrivals_.begin(), arrivals_.end(), [&](size_t a, size_t b) { return ready_later(a, b); });
+}
+
+void Simulator::add_next_part(const SimulatedJob& finished, Ticks planned) {
+  add(finished.task, planned, now_);
+  jobs_.back().core = finished.core;
+  keeps_core_.back() = true;
 }
 
 void Simulator::run_until(Ticks end) {
@@ -131,6 +138,7 @@ void Simulator::place(size_t index, const Group& group) {
     left_[index] = job.duration;
   }
   job.core = static_cast<int>(core);
+  keeps_core_[index] = false;
   cores_[core].job = index;
   cores_[core].since = now_;
 }
@@ -147,8 +155,8 @@ bool Simulator::running(size_t job) const {
 bool Simulator::goes_before(size_t a, size_t b) const {
   const SimulatedJob &one = jobs_[a], &other = jobs_[b];
   const TimedTask &task = set_.tasks[one.task], &other_task = set_.tasks[other.task];
-  const bool pinned = !preemptable_[one.task] && running(a);
-  const bool other_pinned = !preemptable_[other.task] && running(b);
+  const bool pinned = keeps_core_[a] || (!preemptable_[one.task] && running(a));
+  const bool other_pinned = keeps_core_[b] || (!preemptable_[other.task] && running(b));
   if (pinned != other_pinned) return pinned;
   if (dispatch_ != Dispatch::fixed_priority && one.deadline != other.deadline) return one.deadline < other.deadline;
   if (task.priority != other_task.priority) return task.priority > other_task.priority;

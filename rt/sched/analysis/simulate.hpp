@@ -63,6 +63,9 @@ class Simulator {
   void make_non_preemptable(size_t task) { preemptable_[task] = false; }
   /// A job due at planned + deadline, ready at `ready` >= now.
   void add(size_t task, Ticks planned, Ticks ready);
+  /// To be called by the hook `finished` of a job that is not preempted: its core goes on at once with another one of
+  /// its task, before any other.
+  void add_next_part(const SimulatedJob& finished, Ticks planned);
   /// Plays all events up to and including `end`.
   void run_until(Ticks end);
   /// Until no job is left; ends only if the hook adds no jobs for ever.
@@ -104,6 +107,7 @@ class Simulator {
   std::vector<bool> preemptable_;
   std::vector<SimulatedJob> jobs_ = {};
   std::vector<Ticks> left_ = {};              ///< execution time left when last looked at, per job
+  std::vector<bool> keeps_core_ = {};         ///< per job: of the one before it, until it runs
   std::vector<size_t> arrivals_ = {};         ///< heap of the jobs that are not ready yet
   std::vector<std::vector<size_t>> pending_;  ///< per task: ready and unfinished, oldest first
   std::vector<int64_t> added_;                ///< jobs per task

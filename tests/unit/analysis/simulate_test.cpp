@@ -61,6 +61,24 @@ TEST_CASE("one task that is not to be preempted among others that are") {
   CHECK(story(simulator.jobs()) == "b0 0-4; a0 4-5; ");
 }
 
+TEST_CASE("a job in parts keeps its core between them, and gives it up behind the last") {
+  const TaskSet set = set_of(tasks_of({{1, 5, 10}, {4, 20, 20}}));
+  SimulationHooks hooks;
+  Simulator* simulated = nullptr;
+  hooks.finished = [&](const SimulatedJob& job) {
+    if (job.task == 1 && job.number < 2) simulated->add_next_part(job, 0);
+    else if (job.task == 1 && job.number == 2) simulated->add(1, 0, 12);
+  };
+  Simulator simulator(set, Dispatch::global_edf, hooks);
+  simulated = &simulator;
+  simulator.make_non_preemptable(1);
+  simulator.add(1, 0, 0);
+  simulator.add(0, 1, 1);
+  simulator.add(0, 2, 2);
+  simulator.run();
+  CHECK(story(simulator.jobs()) == "b0 0-4; b1 4-8; b2 8-12; a0 12-13 late; a1 13-14 late; b3 14-18; ");
+}
+
 TEST_CASE("global EDF: Dhall's effect on two cores") {
   // Dhall & Liu 1978: two light tasks and one heavy task, utilisation little above 1, miss on two cores
   const TaskSet set = set_of(tasks_of({{2, 10, 10}, {2, 10, 10}, {10, 11, 11}}), 2);

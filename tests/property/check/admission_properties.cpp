@@ -1,0 +1,254 @@
+// SPDX-License-Identifier: Apache-2.0
+// What admission proves of a plan against what a run of it does: random plans with lanes, `let`, `every`, modes, and
+// each policy, run by the executor in virtual time with phases and execution times of many kinds.
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <deque>
+#include <random>
+
+#include "graph/check/check.hpp"
+#include "rt/sched/executor.hpp"
+#include "rt/sched/port_access.hpp"
+#include "rt/shm/local_transport.hpp"
+
+namespace {
+
+using namespace takt;
+using namespace takt::graph;
+
+constexpr int64_t kMs = 1'000'000, kEpoch = 1'000 * kMs;
+
+struct Random {
+  std::mt19937 engine;
+  int64_t uniform(int64_t low, int64_t high) { return std::uniform_int_distribution<int64_t>(low, high)(engine); }
+  bool chance(double p) { return std::bernoulli_distribution(p)(engine); }
+};
+
+/// Hands on the stamp of what it has; without an input it is where the stamps come from.
+struct Relay final : Node {
+  Input<Odometry> in{this, "in", "", Need::optional};
+  Output<Odometry> out{this, "out", ""};
+  bool source = false;
+  void setup(Setup&) override {}
+  void run(Job& job) override {
+    if (!source && in.empty()) return job.no_result();
+    if (out.loan() == nullptr) return job.no_result();
+    out.send(source ? job.release_ns() : in.stamp_ns());
+  }
+};
+
+struct Scene {
+  Plan plan;
+  GraphSpec graph;
+  std::deque<Relay> nodes;
+
+  void add(Random& random) {
+    constexpr int64_t kRates[] = {5, 10, 20, 40};  // one common period of 200 ms
+    Relay& node = nodes.emplace_back();
+    const size_t index = plan.tasks.size();
+    TaskPlan task;
+    task.name = "n" + std::to_string(index);
+    task.node = &node;
+    task.criticality = random.chance(0.5) ? Criticality::high : Criticality::low;
+    task.ports = {index};
+    task.device = node.source = index == 0;
+    if (index > 0) {
+      const auto producer = static_cast<size_t>(random.uniform(0, static_cast<int64_t>(index) - 1));
+      task.edges = {{0, producer, 1, 0}};
+      PortAccess::connect(node.in, {});
+      if (random.chance(0.3)) {
+        task.on_task = task.on_port = producer;
+        task.every = static_cast<int>(random.uniform(1, 2));
+      }
+    }
+    if (task.on_task == kNone) {
+      task.rate = Rate{kRates[random.uniform(0, 3)], 1};
+    }
+    if (random.chance(0.25)) task.publish = PublishAt::let;
+    PortPlan port;
+    port.node = task.name;
+    port.port = "out";
+    port.type = &node.out.type();
+    port.history = 24;
+    port.held = 8;
+    plan.ports.push_back(port);
+    plan.tasks.push_back(std::move(task));
+  }
+
+  /// Other phases of all; in one of four cases they begin together.
+  void shift(Random& random) {
+    const bool together = random.chance(0.25);
+    for (TaskPlan& task : plan.tasks)
+      if (task.rate) task.offset_ns = together ? 0 : random.uniform(0, task.rate->period_ns() / kMs - 1) * kMs;
+  }
+
+  /// Budgets and deadlines that have a fair chance.
+  void time(Random& random) {
+    const auto cores = static_cast<double>(plan.cores.size()), count = static_cast<double>(plan.tasks.size());
+    for (size_t t = 0; t < plan.tasks.size(); ++t) {
+      TaskPlan& task = plan.tasks[t];
+      const auto period = static_cast<int64_t>(1e9 / effective_rate_hz(plan, t));
+      const double share = cores * std::uniform_real_distribution(0.2, 0.9)(random.engine) / count;
+      task.budget_ns = std::max<int64_t>(kMs / 10, static_cast<int64_t>(share * static_cast<double>(period)));
+      const int64_t most = task.on_task == kNone ? period : period / 2;
+      task.deadline_ns = std::max(task.budget_ns, random.uniform(most / 3, most) / 1000 * 1000);
+    }
+  }
+};
+
+Scene random_scene(Random& random) {
+  Scene scene;
+  scene.plan.policy = static_cast<Policy>(random.uniform(0, 2));
+  scene.plan.cores = random.chance(0.6) ? std::vector<int>{0} : std::vector<int>{0, 1};
+  for (int64_t n = random.uniform(2, 6); n > 0; --n) scene.add(random);
+  scene.shift(random);
+  scene.time(random);
+  for (size_t t = 1; t < scene.plan.tasks.size(); ++t)
+    scene.graph.chains.push_back(
+        {"to " + scene.plan.tasks[t].name, {"n0", "out"}, {scene.plan.tasks[t].name, "out"}, 3'600'000 * kMs, {}});
+  if (random.chance(0.3)) {  // in a mode without the last task, and who follows it
+    scene.plan = without(scene.plan, {scene.plan.tasks.back().name});
+    scene.plan.mode = "less";
+  }
+  return scene;
+}
+
+struct Seen {
+  std::vector<int64_t> response_ns, age_ns;  ///< the longest by task, and by its port
+};
+
+/// How long jobs take, of their budgets.
+enum class Use : uint8_t { all, any, all_or_nothing };
+
+/// Several common periods and the longest way through.
+Seen seen_in(const Plan& plan, Use use, Random& random) {
+  VirtualClock clock(kEpoch);
+  RunBoard board(plan);
+  const auto transport = make_local_transport(plan.ports);
+  Executor::Options options;
+  options.duration_ns = 1'400 * kMs;
+  options.board = &board;
+  options.job_duration_ns = [&](size_t task, uint64_t) {
+    const int64_t budget = plan.tasks[task].budget_ns;
+    switch (use) {
+      case Use::all: break;
+      case Use::any: return random.uniform(1, budget);
+      case Use::all_or_nothing: return random.chance(0.6) ? budget : 1;
+    }
+    return budget;
+  };
+  Executor(plan, *transport, clock, options).run();
+  Seen seen;
+  for (size_t t = 0; t < plan.tasks.size(); ++t) {
+    seen.response_ns.push_back(board.task(t).response.max_ns());
+    seen.age_ns.push_back(board.port(plan.tasks[t].ports[0]).age.max_ns());
+  }
+  return seen;
+}
+
+/// The worst of many runs.
+Seen worst_of(const Plan& plan, Random& random) {
+  Seen worst = seen_in(plan, Use::all, random);
+  for (const Use use : {Use::any, Use::all_or_nothing, Use::all_or_nothing, Use::all_or_nothing}) {
+    const Seen other = seen_in(plan, use, random);
+    for (size_t t = 0; t < plan.tasks.size(); ++t) {
+      worst.response_ns[t] = std::max(worst.response_ns[t], other.response_ns[t]);
+      worst.age_ns[t] = std::max(worst.age_ns[t], other.age_ns[t]);
+    }
+  }
+  return worst;
+}
+
+/// The longest by task, of several runs or proofs.
+void raise(std::vector<int64_t>& longest, size_t task, int64_t ns) { longest[task] = std::max(longest[task], ns); }
+
+struct Tally {
+  double largest = 0, sum = 0;
+  int count = 0;
+  void add(int64_t bound_ns, int64_t seen_ns) {
+    if (seen_ns <= 0) return;
+    const double ratio = static_cast<double>(bound_ns) / static_cast<double>(seen_ns);
+    largest = std::max(largest, ratio);
+    sum += ratio;
+    ++count;
+  }
+  void print(const char* what) const {
+    std::printf("%s: bound / observed %.3f on average, at most %.3f, of %d\n", what, sum / count, largest, count);
+  }
+};
+
+/// One scene under several phases: the longest that was proved and seen under any of them.
+struct Compared {
+  Seen bound, seen;
+  int admitted = 0;
+
+  explicit Compared(size_t tasks) {
+    for (Seen* each : {&bound, &seen}) each->response_ns.resize(tasks), each->age_ns.resize(tasks);
+  }
+
+  void compare(const Scene& scene, Random& random) {
+    const Plan& plan = scene.plan;
+    const Admission admission = admit(plan, {});
+    if (admission.answer != Answer::admitted) return;
+    ++admitted;
+    const Seen worst = worst_of(plan, random);
+    for (size_t t = 0; t < plan.tasks.size(); ++t) {
+      CAPTURE(plan.tasks[t].name);
+      REQUIRE(admission.nodes[t].response_ns);
+      const int64_t proven = *admission.nodes[t].response_ns;
+      REQUIRE(worst.response_ns[t] <= proven);
+      REQUIRE(proven <= plan.tasks[t].deadline_ns);
+      raise(bound.response_ns, t, proven);
+      raise(seen.response_ns, t, worst.response_ns[t]);
+    }
+    for (const AgeBound& age : age_bounds(scene.graph, plan, admission.nodes)) {
+      CAPTURE(age.name);
+      const auto to = std::find_if(plan.tasks.begin(), plan.tasks.end(),
+                                   [&](const TaskPlan& task) { return age.name == "to " + task.name; });
+      const auto t = static_cast<size_t>(to - plan.tasks.begin());
+      REQUIRE(age.bound_ns);
+      REQUIRE(worst.age_ns[t] <= *age.bound_ns);
+      raise(bound.age_ns, t, *age.bound_ns);
+      raise(seen.age_ns, t, worst.age_ns[t]);
+    }
+  }
+};
+
+}  // namespace
+
+TEST_CASE("what a run does stays within what admission proved, and is not far from it") {
+  constexpr int kScenes = 100, kPhases = 16;
+  Random random{std::mt19937(70)};
+  Tally one_core, more_cores, followers, ages;
+  int admitted[3] = {};
+  for (int round = 0; round < kScenes; ++round) {
+    CAPTURE(round);
+    Scene scene = random_scene(random);
+    const Plan& plan = scene.plan;
+    CAPTURE(to_string(plan.policy));
+    Compared compared(plan.tasks.size());
+    for (int phase = 0; phase < kPhases; ++phase) {
+      CAPTURE(phase);
+      if (phase > 0) scene.shift(random);
+      compared.compare(scene, random);
+    }
+    admitted[static_cast<size_t>(plan.policy)] += compared.admitted;
+    for (size_t t = 0; t < plan.tasks.size(); ++t) {
+      const bool follows = plan.tasks[t].on_task != kNone;
+      (follows ? followers : plan.cores.size() == 1 ? one_core : more_cores)
+          .add(compared.bound.response_ns[t], compared.seen.response_ns[t]);
+      ages.add(compared.bound.age_ns[t], compared.seen.age_ns[t]);
+    }
+  }
+  std::printf("admitted: deadline %d, fixed %d, cooperative %d\n", admitted[0], admitted[1], admitted[2]);
+  one_core.print("response, one core");
+  more_cores.print("response, two cores");
+  followers.print("response, of what follows on its producer's worker");
+  ages.print("age of a chain");
+  for (const int plans : admitted) CHECK(plans > 60);
+  CHECK(one_core.largest <= 2);
+  CHECK(followers.sum / followers.count <= 1.5);  // each may follow at any instant, and few of them were tried
+  CHECK(ages.largest <= 3);
+}
