@@ -128,7 +128,7 @@ Json edges_json(const RunFacts& facts) {
                        {"sent", facts.board.port(task.edges[e].port).writer.sent},
                        {"received", s.received},
                        {"dropped", s.dropped},
-                       {"stale", s.stale},
+                       {"stale", s.stale.load()},
                        {"exhausted", facts.board.port(task.edges[e].port).writer.pool_empty},
                        {"age_ms", distribution(s.age, 1e6)}});
     }

@@ -8,22 +8,49 @@
 namespace takt::graph {
 
 HealthWatch::HealthWatch(const Plan& plan, const RunBoard& board)
-    : plan_(plan), board_(board), seen_(plan.tasks.size()) {}
+    : plan_(plan), board_(board), seen_(plan.tasks.size()), producer_(plan.ports.size(), kNone) {
+  for (size_t t = 0; t < plan.tasks.size(); ++t) {
+    seen_[t].stale.resize(plan.tasks[t].edges.size());
+    for (const size_t port : plan.tasks[t].ports) producer_[port] = t;
+  }
+}
 
 void HealthWatch::look(int64_t now_ns, int64_t epoch_ns) {
   if (epoch_ns == 0 || now_ns < next_ns_) return;
   next_ns_ = now_ns + kPeriod_ns;
+  for (size_t t = 0; t < plan_.tasks.size(); ++t) see_whether_it_rests(t);
   for (size_t t = 0; t < plan_.tasks.size(); ++t) {
     Seen& seen = seen_[t];
     const uint64_t now = troubles(board_.task(t));
     const uint64_t lacks = missing(t, seen, now_ns, epoch_ns);
-    if (now > seen.troubles || lacks > 0) unwell_.push_back({plan_.tasks[t].name, now_ns - epoch_ns});
+    const bool stale = stale_beyond_rest(t);
+    if (now > seen.troubles || lacks > 0 || stale) unwell_.push_back({plan_.tasks[t].name, now_ns - epoch_ns});
     seen.troubles = now;
   }
 }
 
 uint64_t HealthWatch::troubles(const TaskStatistics& s) {
-  return s.skipped.load() + s.reused.load() + s.no_result.load() + s.stale_inputs.load();
+  return s.skipped.load() + s.reused.load() + s.no_result.load();
+}
+
+void HealthWatch::see_whether_it_rests(size_t task) {
+  Seen& seen = seen_[task];
+  const uint64_t jobs = board_.task(task).job_count.load(), pauses = board_.task(task).paused.load();
+  if (jobs > seen.jobs) seen.rests = false;
+  else if (pauses > seen.pauses) seen.rests = true;
+  seen.jobs = jobs;
+  seen.pauses = pauses;
+}
+
+bool HealthWatch::stale_beyond_rest(size_t task) {
+  bool any = false;
+  for (size_t e = 0; e < plan_.tasks[task].edges.size(); ++e) {
+    const uint64_t now = board_.edge(task, e).stale.load(std::memory_order_relaxed);
+    const size_t producer = producer_[plan_.tasks[task].edges[e].port];
+    any = any || (now > seen_[task].stale[e] && (producer == kNone || !seen_[producer].rests));
+    seen_[task].stale[e] = now;
+  }
+  return any;
 }
 
 uint64_t HealthWatch::missing(size_t task, Seen& seen, int64_t now_ns, int64_t epoch_ns) const {

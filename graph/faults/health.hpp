@@ -15,8 +15,8 @@ struct Unwell {
 };
 
 /// Looks at a run again and again and notes who is not well: a node that has fallen behind its rate, skipped or reused
-/// a job, had no result or a stale input. A missed deadline alone is none: it has an expectation of its own. One
-/// thread.
+/// a job, had no result, or a stale input whose producer is not resting because nobody asks it to run. A missed deadline
+/// alone is none: it has an expectation of its own. One thread.
 class HealthWatch {
  public:
   /// From one look to the next.
@@ -30,17 +30,23 @@ class HealthWatch {
 
  private:
   struct Seen {
-    uint64_t troubles = 0;  ///< skipped, reused and fruitless jobs, stale inputs
-    int64_t due_ns = 0;     ///< jobs released before were looked for
-    uint64_t paused = 0;    ///< releases that were found to be paused
+    uint64_t troubles = 0;             ///< skipped, reused and fruitless jobs
+    std::vector<uint64_t> stale = {};  ///< by edge
+    int64_t due_ns = 0;                ///< jobs released before were looked for
+    uint64_t paused = 0;               ///< releases that were found to be paused
+    uint64_t jobs = 0, pauses = 0;     ///< at the last look
+    bool rests = false;                ///< what was last seen of it is a paused release
   };
   static uint64_t troubles(const TaskStatistics& statistics);
+  void see_whether_it_rests(size_t task);
+  bool stale_beyond_rest(size_t task);
   /// Jobs that should have ended since the last look and have not.
   uint64_t missing(size_t task, Seen& seen, int64_t now_ns, int64_t epoch_ns) const;
 
   const Plan& plan_;
   const RunBoard& board_;
   std::vector<Seen> seen_;
+  std::vector<size_t> producer_;  ///< by port
   std::vector<Unwell> unwell_;
   int64_t next_ns_ = 0;
 };

@@ -122,6 +122,7 @@ class StereoNode final : public Node {
   bool fits(Job& job, const StereoPair& in, bool is_rectified) {
     char text[160];
     const int channels = is_rectified ? channels_ : input_channels_;
+    if (in.camera.focal_px != 0 && !is_rectified) return false;  // damaged: a camera that is not calibrated says 0
     if (!is_rectified && !rectifier_)
       std::snprintf(
           text, sizeof text,

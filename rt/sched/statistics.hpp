@@ -59,7 +59,8 @@ struct TaskStatistics {
 
 /// What one edge carried. Every message sent is received, superseded before a job latched it (dropped), or waiting.
 struct EdgeStatistics {
-  uint64_t received = 0, dropped = 0, stale = 0;
+  uint64_t received = 0, dropped = 0;
+  std::atomic<uint64_t> stale{0};
   uint64_t last_seen =
       0;          ///< sequence of the newest message latched: whoever takes a dead reader's place goes on there
   Histogram age;  ///< stamp to job start, of the newest latched message

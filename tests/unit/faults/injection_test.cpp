@@ -139,6 +139,12 @@ struct Patients {
       ++s.job_count;
     }
   }
+  size_t producer_of(size_t task, size_t edge) const {
+    const size_t port = plan.tasks[task].edges[edge].port;
+    for (size_t t = 0; t < plan.tasks.size(); ++t)
+      if (std::count(plan.tasks[t].ports.begin(), plan.tasks[t].ports.end(), port) > 0) return t;
+    return kNone;
+  }
   /// Who was found unwell then, since the epoch.
   std::vector<std::string> look(int64_t ms) {
     const size_t before = watch.unwell().size();
@@ -177,7 +183,7 @@ TEST_CASE("health: a job that does not end is noticed once, when it should have 
 
 TEST_CASE("health: stale inputs, skipped jobs and jobs without result; releases that requests paused are none") {
   Patients patients;
-  patients.board.task(2).stale_inputs = 1;
+  patients.board.edge(2, 0).stale = 1;
   CHECK(patients.look(50) == Names{"planner"});
   CHECK(patients.look(100).empty());
   patients.board.task(0).skipped = 1;
@@ -189,4 +195,16 @@ TEST_CASE("health: stale inputs, skipped jobs and jobs without result; releases 
   CHECK(patients.look(250).empty());
   patients.job(2, 2);
   CHECK(patients.look(350) == Names{"planner"});
+}
+
+TEST_CASE("health: who waits for somebody that is not asked to run is well") {
+  Patients patients;
+  const size_t producer = patients.producer_of(2, 0);
+  patients.job(0, producer);
+  patients.board.task(producer).paused = 1;
+  patients.board.edge(2, 0).stale = 1;
+  CHECK(patients.look(150).empty());
+  patients.job(1);
+  patients.board.edge(2, 0).stale = 2;
+  CHECK(patients.look(250) == Names{"planner"});
 }
