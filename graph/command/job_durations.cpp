@@ -26,10 +26,11 @@ JobDurations random(const Plan& plan, uint64_t seed) {
   };
 }
 
-/// Execution times by name of the node, in the order of its jobs.
+/// Execution times by name of the node, in the order of its jobs; none of a node that the record only names.
 std::map<std::string, std::vector<int64_t>> recorded(const record::LogFile& log, const log::Json& tasks,
                                                      const Plan& plan) {
   std::map<std::string, std::vector<int64_t>> times;
+  for (const log::Json& task : tasks) times[task.value("name", "")];  // those that had no job as well
   std::map<std::string, const Node*> nodes;
   for (const TaskPlan& task : plan.tasks) nodes[task.name] = task.node;
   for (const record::RecordedJob& job : log.jobs()) {
@@ -56,8 +57,9 @@ tl::expected<JobDurations, std::string> recorded(const std::filesystem::path& fi
   for (const TaskPlan& task : plan.tasks) {
     const auto found = by_name.find(task.name);
     if (found == by_name.end())
-      return tl::make_unexpected(fmt::format("--durations {}: the record has no job of {}", file.string(), task.name));
+      return tl::make_unexpected(fmt::format("--durations {}: the record knows no node {}", file.string(), task.name));
     times.push_back(found->second);
+    if (times.back().empty()) times.back().push_back(task.budget_ns);
   }
   return [times = std::move(times)](size_t task, uint64_t job) { return times[task][job % times[task].size()]; };
 }

@@ -15,7 +15,8 @@ using JobDurations = std::function<int64_t(size_t task, uint64_t job)>;
 
 /// What `--durations` asks for: `budgets`; `random`, evenly between half the budget and the whole, the same for the
 /// same seed, node and job; else a record, whose jobs' execution times are taken (each divided by the cost of its
-/// level; from the first one again where there are no more). Error: no readable record, or one without jobs of a node.
+/// level; from the first one again where there are no more; the budget of a node that had none, because it runs only on
+/// request). Error: no readable record, or one that does not know a node.
 tl::expected<JobDurations, std::string> job_durations(const std::string& how, const Plan& plan, uint64_t seed);
 
 }  // namespace takt::command
