@@ -119,7 +119,11 @@ TEST_CASE("too many losses in a short time are the last one") {
 TEST_CASE("asked to stop, it passes that on, and what ends then is no loss") {
   Scene scene;
   scene.options.stop_asked = [&] { return scene.shared->groups.load() == 1; };
-  CHECK(scene.keep([](int) { return wait_for_ever(); }) == 128 + SIGTERM);
+  const auto group = [](int) {
+    signal(SIGTERM, SIG_DFL);  // not as the test program would have it, which reports a crash
+    return wait_for_ever();
+  };
+  CHECK(scene.keep(group) == 128 + SIGTERM);
   CHECK(scene.shared->groups.load() == 1);
   CHECK(scene.shared->signs.losses.size() == 0);
 }
