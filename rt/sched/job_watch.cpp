@@ -17,6 +17,7 @@ void JobWatch::bind(const Reservation& has) {
   has_ = has;
   clockid_t clock{};
   if (pthread_getcpuclockid(pthread_self(), &clock) == 0) clock_.store(clock, std::memory_order_release);
+  rest(cpu_ns());
   thread_.store(thread, std::memory_order_release);
 }
 

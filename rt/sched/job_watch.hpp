@@ -26,6 +26,8 @@ class JobWatch {
   // The worker's side.
   /// By the thread that will run the jobs, before the first: what it has, and is given back after a demotion.
   void bind(const Reservation& has);
+  /// It has done its work, up to this reading of its CPU clock.
+  void rest(int64_t cpu_ns) { rested_cpu_ns_.store(cpu_ns, std::memory_order_release); }
   /// No job begins before this instant.
   void expect(int64_t release_ns) { expected_ns_.store(release_ns, std::memory_order_release); }
   /// `cpu_limit_ns`: reading of the thread's CPU clock at which the budget is used up.
@@ -42,6 +44,10 @@ class JobWatch {
   int64_t expected_ns() const { return expected_ns_.load(std::memory_order_acquire); }
   /// CPU clock of the worker, ns; -1 if it cannot be read.
   int64_t cpu_ns() const;
+  /// Runtime of its reservation; 0: it has none.
+  int64_t runtime_ns() const { return has_.runtime_ns; }
+  /// Reading of its CPU clock at which a whole runtime is used since it rested.
+  int64_t reserve_end_ns() const { return rested_cpu_ns_.load(std::memory_order_acquire) + has_.runtime_ns; }
   /// Puts the worker behind everybody else until its job ends; false if job `serial` ended before, or the kernel
   /// refuses.
   bool demote(uint64_t serial);
@@ -70,7 +76,7 @@ class JobWatch {
   std::atomic<uint64_t> index_{0};
   std::atomic<int64_t> release_ns_{0}, cpu_limit_ns_{0}, expected_ns_{0};
   std::atomic<int64_t> lifted_until_ns_{0};  ///< 0: it is not
-  std::atomic<int64_t> owed_ns_{0}, owed_at_ns_{0};
+  std::atomic<int64_t> owed_ns_{0}, owed_at_ns_{0}, rested_cpu_ns_{0};
   std::atomic<int> thread_{0};
   std::atomic<clockid_t> clock_{0};
   Reservation has_;

@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "rt/hot.hpp"
+#include "rt/memory/memory_use.hpp"
 #include "rt/sched/watch_rules.hpp"
 
 namespace takt {
@@ -61,6 +62,7 @@ TAKT_HOT void Lane::run_next(const Clock& clock, StopSignal& stop) {
   // Page faults are asked for once a pass and stand with its head: asking costs more than an empty job.
   for (size_t m = 0; m < tasks_.size(); ++m)
     if (ran_[m]) tasks_[m]->count(m == 0 ? take_page_faults() : 0);
+  watch_->rest(last_thread_use_ns());
   go_on(clock.now_ns(), stop.end_ns());
 }
 

@@ -14,6 +14,7 @@ WatchRules watch_rules(const TaskPlan& task, Policy granted, int64_t patience_ns
   rules.patience_ns = patience_ns;
   rules.demote = granted == Policy::fixed && task.criticality == Criticality::low;
   rules.lift = granted == Policy::deadline;
+  rules.rescue = rules.lift && task.criticality == Criticality::high;
   rules.stop_on_overrun = task.on_overrun == OnOverrun::safe_stop;
   rules.stop_on_miss = task.on_miss == OnMiss::safe_stop;
   return rules;
@@ -39,10 +40,19 @@ WatchVerdict judge(const WatchRules& rules, const WatchSight& sight) {
   by_the_clock(rules.stop_on_miss, sight.miss_told, missed_ns, verdict.miss);
   by_the_clock(true, sight.hang_told, hung_ns, verdict.hang);
   const int64_t owed_ns = sight.owed_ns + std::max<int64_t>(0, -sight.cpu_left_ns);
-  verdict.drop = sight.running && sight.lifted && owed_ns > sight.stolen_ns && sight.cpu_left_ns < 0;
+  const int64_t allowed_ns = rules.rescue ? std::max(sight.stolen_ns, rules.deadline_ns) : sight.stolen_ns;
+  verdict.drop = sight.running && sight.lifted && owed_ns > allowed_ns && sight.cpu_left_ns < 0;
   verdict.lift = rules.lift && sight.running && !sight.lifted && sight.now_ns >= missed_ns && owed_ns > 0 &&
                  owed_ns <= sight.stolen_ns;
   return verdict;
+}
+
+ReserveVerdict judge_reserve(const ReserveSight& sight) {
+  if (sight.lifted) return {false, std::numeric_limits<int64_t>::max()};
+  const int64_t soonest_ns = sight.release_ns + sight.runtime_ns;
+  if (sight.now_ns < soonest_ns) return {false, soonest_ns};
+  if (sight.left_ns <= 0 && sight.stands) return {true, std::numeric_limits<int64_t>::max()};
+  return {false, sight.now_ns + std::max(sight.left_ns, kReserveGrain_ns)};
 }
 
 }  // namespace takt

@@ -26,6 +26,8 @@ Watchdog::Watchdog(const Plan& plan, RunBoard& board, const Clock& clock, std::v
   for (size_t w = 0; w < workers.size(); ++w) {
     for (const size_t task : workers[w].tasks)
       watched_[w].rules.push_back(watch_rules(plan.tasks[task], options.granted, options.patience_ns));
+    watched_[w].rescue = std::any_of(watched_[w].rules.begin(), watched_[w].rules.end(),
+                                     [](const WatchRules& rules) { return rules.rescue; });
     watched_[w].worker = std::move(workers[w]);
   }
   thread_ = std::thread([this] { watch(); });
@@ -73,7 +75,8 @@ int64_t Watchdog::look(int64_t now_ns) {
     });
     next_ns = now_ns + (close ? kStallGrain_ns : StolenTime::kStep_ns);
   }
-  for (Watched& watched : watched_) next_ns = std::min(next_ns, look_at(watched, now_ns));
+  for (Watched& watched : watched_)
+    next_ns = std::min({next_ns, look_at(watched, now_ns), look_at_reserve(watched, now_ns)});
   if (options_.life != nullptr) {
     options_.life->heartbeat_ns.store(now_ns, std::memory_order_relaxed);
     next_ns = std::min(next_ns, now_ns + options_.heartbeat_period_ns);
@@ -112,6 +115,27 @@ int64_t Watchdog::look_at(Watched& watched, int64_t now_ns) {
   return verdict.overrun || verdict.miss || verdict.hang ? now_ns + kWatchGrain_ns : verdict.look_again_ns;
 }
 
+int64_t Watchdog::look_at_reserve(Watched& watched, int64_t now_ns) {
+  const JobWatch& watch = *watched.worker.watch;
+  if (!watched.rescue || watch.runtime_ns() <= 0) return std::numeric_limits<int64_t>::max();
+  const JobWatch::Running job = watch.running();
+  ReserveSight sight;
+  sight.now_ns = now_ns;
+  sight.release_ns = job.serial != 0 ? job.release_ns : watch.expected_ns();
+  sight.runtime_ns = watch.runtime_ns();
+  sight.lifted = watch.lifted();
+  if (!sight.lifted && now_ns >= sight.release_ns + sight.runtime_ns) {
+    const int64_t cpu_ns = watch.cpu_ns();
+    sight.left_ns = watch.reserve_end_ns() - cpu_ns;
+    sight.stands = cpu_ns == watched.overdrawn_cpu_ns;
+    watched.overdrawn_cpu_ns = sight.left_ns <= 0 ? cpu_ns : 0;
+  }
+  const ReserveVerdict verdict = judge_reserve(sight);
+  if (verdict.lift)
+    lift(watched, watched.worker.tasks[job.serial != 0 ? job.member : 0], watch.owed_ns(now_ns) - sight.left_ns, now_ns);
+  return verdict.look_again_ns;
+}
+
 void Watchdog::overrun(Watched& watched, const JobWatch::Running& job, int64_t now_ns) {
   const WatchRules& rules = watched.rules[job.member];
   const size_t task = watched.worker.tasks[job.member];
@@ -130,7 +154,8 @@ void Watchdog::overrun(Watched& watched, const JobWatch::Running& job, int64_t n
 void Watchdog::act(Watched& watched, const JobWatch::Running& job, const WatchVerdict& verdict, int64_t now_ns) {
   const size_t task = watched.worker.tasks[job.member];
   if (verdict.overrun) overrun(watched, job, now_ns);
-  if (verdict.lift) lift(watched, job, now_ns);
+  if (const JobWatch& watch = *watched.worker.watch; verdict.lift)
+    lift(watched, task, watch.owed_ns(now_ns) + std::max<int64_t>(0, watch.cpu_ns() - job.cpu_limit_ns), now_ns);
   if (verdict.drop) watched.worker.watch->drop();
   if (verdict.miss) {
     watched.miss_told = job.serial;
@@ -142,11 +167,9 @@ void Watchdog::act(Watched& watched, const JobWatch::Running& job, const WatchVe
   }
 }
 
-void Watchdog::lift(Watched& watched, const JobWatch::Running& job, int64_t now_ns) {
-  JobWatch& watch = *watched.worker.watch;
-  const int64_t owed_ns = watch.owed_ns(now_ns) + std::max<int64_t>(0, watch.cpu_ns() - job.cpu_limit_ns);
-  if (!watch.lift(now_ns, owed_ns)) return;
-  board_.task(watched.worker.tasks[job.member]).lifted.fetch_add(1, std::memory_order_relaxed);
+void Watchdog::lift(Watched& watched, size_t task, int64_t owed_ns, int64_t now_ns) {
+  if (watched.worker.watch->lift(now_ns, owed_ns))
+    board_.task(task).lifted.fetch_add(1, std::memory_order_relaxed);
 }
 
 void Watchdog::safe_stop(size_t task, uint64_t job, const char* why, int64_t now_ns) {

@@ -16,7 +16,7 @@ run() { expect "$1" "$2" "$takt" run "$work/graph/bad.yaml" --for 1s --output "$
 graph 's/stereo\.disparity, max_age/stereo.disparty, max_age/'; run 2 "did you mean"
 graph 's/type: stereo,/type: stereoo,/';                        run 2 "stereoo"
 graph 's/^    ego_motion:/    stereo:/';                         run 2 "stereo"
-graph 's/max_age: 250ms/max_age: 250/';                         run 2 "max_age"
+graph 's/max_age: 350ms/max_age: 250/';                         run 2 "max_age"
 graph 's/in: \{pair: head_camera\.pair\}/in: {pair: stereo.disparity}/'; run 2 "disparity"
 graph 's/disparities: 150/disparities: 5000/';                  run 2 "1..512"
 graph 's/xb3\.yaml/none.yaml/';                                 run 2 "none.yaml"
@@ -29,7 +29,7 @@ run 2 "cycle"
 cp "$source"/schedules/*.yaml "$work/schedules/"
 
 # All problems at once.
-graph 's/type: stereo,/type: stereoo,/; s/max_age: 250ms/max_age: 250/'
+graph 's/type: stereo,/type: stereoo,/; s/max_age: 350ms/max_age: 250/'
 run 2 "stereoo"
 grep -q "max_age" "$work/stderr" || fail "only the first problem was reported"
 

@@ -139,7 +139,7 @@ edit '
   s/^(    )(stereo: \{type: stereo, .*)/\1\2\n\1stereo_fine: {type: stereo, in: {pair: fine_camera.pair}, params: {cloud_step: 4}}/
   /^    mapping_3d:$/,/^    traversability:$/s/cloud: \{from: stereo\.cloud/cloud: {from: stereo_fine.cloud/
   s/(obstacle: \{from: )head_camera\.pair(.*max_age: )700ms/\1fine_camera.pair\21300ms/
-  s/(stereo\.disparity, max_age: )250ms/\1400ms/
+  s/(stereo\.disparity, max_age: )350ms/\1500ms/
   s/(traversability\.fused, max_age: )1s/\11500ms/
   s/without: \[stereo, /&stereo_fine, /
   s/(without: \[head_camera, ground_camera, )stereo, /\1fine_camera, stereo, stereo_fine, /

@@ -71,9 +71,42 @@ TEST_CASE("a late job is lifted only for what the host took, and dropped if it u
     sight.owed_ns = 3 * kMs;  // from the job before
     CHECK(judged(Policy::deadline).lift);
   }
+  SUBCASE("one of high criticality may use more before it is dropped") {
+    task.criticality = Criticality::high;
+    sight.lifted = true;
+    sight.cpu_left_ns = -50 * kMs;
+    CHECK_FALSE(judged(Policy::deadline).drop);
+    sight.cpu_left_ns = -51 * kMs;
+    CHECK(judged(Policy::deadline).drop);
+  }
   SUBCASE("once") {
     sight.lifted = true;
     CHECK_FALSE(judged(Policy::deadline).lift);
     CHECK_FALSE(judged(Policy::deadline).drop);
   }
+}
+
+TEST_CASE("a reservation that is used up: the worker is lifted once it stands, and looked at no more than needed") {
+  TaskPlan task;
+  CHECK_FALSE(watch_rules(task, Policy::deadline, 1000 * kMs).rescue);
+  task.criticality = Criticality::high;
+  CHECK(watch_rules(task, Policy::deadline, 1000 * kMs).rescue);
+  CHECK_FALSE(watch_rules(task, Policy::fixed, 1000 * kMs).rescue);
+  ReserveSight sight;
+  sight.release_ns = 100 * kMs;
+  sight.runtime_ns = 4 * kMs;
+  sight.now_ns = 90 * kMs;
+  CHECK(judge_reserve(sight).look_again_ns == 104 * kMs);
+  sight.now_ns = 104 * kMs;
+  sight.left_ns = 3 * kMs;
+  CHECK(judge_reserve(sight).look_again_ns == 107 * kMs);
+  CHECK_FALSE(judge_reserve(sight).lift);
+  sight.now_ns = 110 * kMs;
+  sight.left_ns = -2 * kMs;
+  CHECK(judge_reserve(sight).look_again_ns == 110 * kMs + kReserveGrain_ns);
+  CHECK_FALSE(judge_reserve(sight).lift);  // it may still be served
+  sight.stands = true;
+  CHECK(judge_reserve(sight).lift);
+  sight.lifted = true;
+  CHECK_FALSE(judge_reserve(sight).lift);
 }
