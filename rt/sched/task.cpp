@@ -192,6 +192,7 @@ TAKT_HOT void Task::rehearse(int64_t release_ns) const {
 
 void Task::pass_over(int64_t now_ns, bool count) {
   std::fill(published_.begin(), published_.end(), false);
+  take_thread_use();  // of no job: the next one need not answer for it
   ended_.paused = count;
   ended_.end.finished_ns = ended_.end.visible_at_ns = now_ns;
 }

@@ -48,7 +48,8 @@ WatchVerdict judge(const WatchRules& rules, const WatchSight& sight) {
 }
 
 ReserveVerdict judge_reserve(const ReserveSight& sight) {
-  if (sight.lifted) return {false, std::numeric_limits<int64_t>::max()};
+  constexpr int64_t kLifted_ns = 50'000'000;  // between two looks whether it still is
+  if (sight.lifted) return {false, sight.now_ns + kLifted_ns};
   const int64_t soonest_ns = sight.release_ns + sight.runtime_ns;
   if (sight.now_ns < soonest_ns) return {false, soonest_ns};
   if (sight.left_ns <= 0 && sight.stands) return {true, std::numeric_limits<int64_t>::max()};

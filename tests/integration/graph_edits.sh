@@ -110,16 +110,17 @@ grep -q 'ego_motion' "$work/graph/edited.yaml" && fail "ego_motion is still in t
 maps no_ego_motion
 [ -e "$work/no_ego_motion/track.png" ] && fail "no_ego_motion: a track without ego-motion"
 
-# What the head camera sees now also comes to the ground map by way of ego-motion and the joined pose, which is 317 ms old
-# where the map starts 50 ms after the image: too old for the chain's 400 ms. This camera's image is made to be there sooner.
+# What the head camera sees now also comes to the ground map by way of ego-motion and the joined pose, which is up to 407 ms
+# old even where this camera's image is made to be there sooner: the chain may be.
 edit '
   /^  ground_camera: /d
   s/ground_camera\.pair/head_camera.pair/
   s/head_camera, ground_camera, /head_camera, /
   s/lost: \[head_camera, ground_camera\]/lost: [head_camera]/
+  s/(to: ground_map\.grid, max_age: )400ms/\1450ms/
 ' '
   /^  ground_camera: /d
-  s/^(  head_camera: .*deadline: )40ms/\125ms/
+  s/^(  head_camera: .*deadline: )55ms/\125ms/
   s/^(  ground_map: .*offset: )50ms/\130ms/
 '
 grep -q 'ground_camera' "$work/graph/edited.yaml" && fail "ground_camera is still in the graph"
@@ -128,19 +129,19 @@ maps one_camera
 # A laser's cloud, twice a second, in place of the stereo camera's: obstacles are mapped without the head camera's depth.
 edit '
   /^    mapping_3d:$/,/^    traversability:$/s/cloud: \{from: stereo\.cloud/cloud: {from: laser_cloud.cloud/
-  s/(obstacle: \{from: )head_camera\.pair(.*max_age: )700ms/\1front_laser.scan\21200ms/
+  s/(obstacle: \{from: )head_camera\.pair(.*max_age: )700ms/\1front_laser.scan\21300ms/
 ' ''
 maps laser_cloud
 
 # The cloud of full images, twice a second, in place of the small ones', beside all else: every fourth pixel, as much floor
-# as 150 disparities show, and ages that leave the reservations room. graph/fine.yaml has more of it, and less beside.
+# as 150 disparities show, and a search for bodies that leaves the reservations room. graph/fine.yaml has more of it, and less
+# beside.
 edit '
   s/^(  )(head_camera: \{kind: .*)/\1\2\n\1fine_camera: {kind: stereo_camera, rig: rigs\/xb3_fine.yaml, rate: 2}/
   s/^(    )(stereo: \{type: stereo, .*)/\1\2\n\1stereo_fine: {type: stereo, in: {pair: fine_camera.pair}, params: {cloud_step: 4}}/
   /^    mapping_3d:$/,/^    traversability:$/s/cloud: \{from: stereo\.cloud/cloud: {from: stereo_fine.cloud/
   s/(obstacle: \{from: )head_camera\.pair(.*max_age: )700ms/\1fine_camera.pair\21300ms/
   s/(stereo\.disparity, max_age: )350ms/\1500ms/
-  s/(traversability\.fused, max_age: )1s/\11500ms/
   s/without: \[stereo, /&stereo_fine, /
   s/(without: \[head_camera, ground_camera, )stereo, /\1fine_camera, stereo, stereo_fine, /
   s/lost: \[head_camera/lost: [fine_camera, head_camera/
@@ -148,6 +149,7 @@ edit '
   s/^(  )(head_camera: .*)/\1\2\n\1fine_camera: {rate: 2, budget: 16ms, deadline: 300ms}/
   s/^(  )(stereo: .*)/\1\2\n\1stereo_fine: {rate: 2, offset: 305ms, budget: 60ms, deadline: 490ms, on_overrun: degrade}/
   s/^(  mapping_3d: .*offset: )70ms/\1300ms/
+  s/^(  body_pose: .*budget: )22ms/\18ms/
 '
 maps stereo_fine
 
