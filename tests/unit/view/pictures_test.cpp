@@ -91,7 +91,7 @@ TEST_CASE("The SVG of ACE is well-formed and shows each node, device, edge and c
     CAPTURE(words);
     CHECK(svg.find(words) != std::string::npos);
   }
-  for (const char* words : {"stereo, 15 Hz", "depth 4", "max_age 250 ms", "stereo_pair", "age at most 700 ms",
+  for (const char* words : {"stereo, 15 Hz", "depth 4", "max_age 350 ms", "stereo_pair", "age at most 700 ms",
                             "criticality=\"high\"", "prefers-color-scheme: dark"}) {
     CAPTURE(words);
     CHECK(svg.find(words) != std::string::npos);
@@ -131,7 +131,7 @@ TEST_CASE("Graphviz text has a cluster for each room and a line for each edge") 
     CHECK(dot.find("subgraph cluster_" + std::to_string(room)) != std::string::npos);
   CHECK(test::count(dot, " -> ") == diagram.edges.size() + diagram.chains.size());
   CHECK(test::count(dot, "{") == test::count(dot, "}"));
-  CHECK(dot.find("\"stereo\" -> \"ego_motion\" [label=\"disparity\\nmax_age 250 ms\"]") != std::string::npos);
+  CHECK(dot.find("\"stereo\" -> \"ego_motion\" [label=\"disparity\\nmax_age 350 ms\"]") != std::string::npos);
 }
 
 TEST_CASE("The listing fits 80 columns and names every edge") {
