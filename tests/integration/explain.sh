@@ -45,12 +45,12 @@ adds_up() {
     lines++ } END { exit bad || !lines }' "$work/stdout" || fail "figures that do not add up"
 }
 
-# named NODE WORDS-BEFORE WORDS-AFTER MS: the middle figure between those words.
+# named NODE WORDS-BEFORE WORDS-AFTER MS [WITHIN]: the middle figure between those words.
 named() {
-  local middle
+  local middle within=${5:-0.5}
   middle=$(sed -nE "s/^$1 missed .*$2([0-9]+\.[0-9]+)$3.*/\1/p" "$work/stdout" | sort -n | awk '{v[NR] = $1} END {if (NR) print v[int((NR + 1) / 2)]}')
   echo "$1: injected $4 ms, told ${middle:-nothing}"
-  awk -v got="${middle:-99}" -v wanted="$4" 'BEGIN {exit got - wanted > 0.5 || wanted - got > 0.5}' ||
+  awk -v got="${middle:-99}" -v wanted="$4" -v within="$within" 'BEGIN {exit got - wanted > within || wanted - got > within}' ||
     fail "$1: '${middle:-nothing}' instead of $4 ms:"$'\n'"$(cat "$work/stdout" "$work/stderr")"
 }
 
@@ -95,7 +95,7 @@ if run --for 8s --isolate none --trace "$work/t.json" --report "$work/r.json" --
   run --for 3s --isolate none --trace "$work/t4.json" --trace-source none
   expect 0 "" "$takt" explain "$work/t4.json" victim
   adds_up
-  named victim ' ' ' unattributed' 9
+  named victim ' ' ' unattributed' 9 1  # nobody is named, so what else took the CPU is in it
 else
   echo "NOT RUN: injected causes need SCHED_FIFO and locked memory; run as root"
 fi
