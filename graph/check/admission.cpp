@@ -135,7 +135,8 @@ class Admitting {
                                       [&](size_t t) { return plan_.tasks[t].publish == PublishAt::let; });
     if (!goes_on && plan_.policy != Policy::cooperative) return bound;
     const auto part = part_of(l, segment_ns(plan_, lane, position, overheads_), false);
-    return part && bound ? std::min(part, bound) : part ? part : bound;
+    if (!bound || (part && *part < *bound)) bound = part;
+    return bound;
   }
 
   /// Of a head: as if it had only to begin. A follower begins when the member before it is done, or is waited for.

@@ -34,9 +34,8 @@ struct Place {
 
 class Ages {
  public:
-  Ages(const Plan& plan, const std::vector<NodeAdmission>& nodes) : plan_(plan), nodes_(nodes) {
-    for (size_t t = 0; t < plan.tasks.size(); ++t)
-      for (const size_t port : plan.tasks[t].ports) producer_.at_port(port) = t;
+  Ages(const Plan& plan, const std::vector<NodeAdmission>& nodes)
+      : plan_(plan), nodes_(nodes), producers_(plan) {
     ticks_ = ticks_per_ns();
   }
 
@@ -97,7 +96,7 @@ class Ages {
     }
     for (size_t e = 0; e < task.edges.size(); ++e) {
       if (place.is_input() ? e != place.edge : !carries_stamp(task, e, place.port)) continue;
-      const size_t port = task.edges[e].port, producer = producer_.find(port);
+      const size_t port = task.edges[e].port, producer = producers_.find(port);
       if (producer == kNone) continue;
       // A device that is both ends of a loop, as of what it is to do for what it saw, ends the path where it begins.
       if (!plan_.tasks[producer].device && (producer == t || again(producer))) continue;
@@ -117,7 +116,10 @@ class Ages {
       every *= plan_.tasks[head].every;
       apart = std::max(apart, plan_.tasks[head].min_interval_ns);
     }
-    if (last) every = 1, apart = 0;
+    if (last) {
+      every = 1;
+      apart = 0;
+    }
     const Rate& rate = *plan_.tasks[head].rate;
     ChainTask model;
     const Wide period = Wide{rate.denominator} * 1'000'000'000 * ticks_ / rate.numerator * every;
@@ -173,10 +175,10 @@ class Ages {
     for (const auto& group : task.joins) {
       const auto joined = [&](size_t input) { return std::find(group.begin(), group.end(), input) != group.end(); };
       if (!joined(task.edges[step.edge].input)) continue;
-      const size_t own = producer_.find(task.edges[step.edge].port);
+      const size_t own = producers_.find(task.edges[step.edge].port);
       for (const EdgePlan& other : task.edges) {
         if (!joined(other.input)) continue;
-        const size_t producer = producer_.find(other.port);
+        const size_t producer = producers_.find(other.port);
         if (producer == own || upstream(own, producer) || upstream(producer, own)) continue;
         bound.why = fmt::format("{} joins outputs of {} and {}, and how often their stamps meet is not known",
                                 task.name, plan_.tasks[own].name, plan_.tasks[producer].name);
@@ -196,23 +198,14 @@ class Ages {
       if (seen[t] || plan_.tasks[t].device) continue;
       seen[t] = 1;
       for (const EdgePlan& edge : plan_.tasks[t].edges)
-        if (const size_t producer = producer_.find(edge.port); producer != kNone) todo.push_back(producer);
+        if (const size_t producer = producers_.find(edge.port); producer != kNone) todo.push_back(producer);
     }
     return false;
   }
 
-  struct Producers {
-    std::vector<size_t> by_port;
-    size_t& at_port(size_t port) {
-      if (by_port.size() <= port) by_port.resize(port + 1, kNone);
-      return by_port[port];
-    }
-    size_t find(size_t port) const { return port < by_port.size() ? by_port[port] : kNone; }
-  };
-
   const Plan& plan_;
   const std::vector<NodeAdmission>& nodes_;
-  Producers producer_;
+  const PortProducers producers_;
   int64_t ticks_ = 1;
 };
 

@@ -222,11 +222,10 @@ Plan without(const Plan& plan, const std::vector<std::string>& names) {
     index[t] = result.tasks.size();
     result.tasks.push_back(plan.tasks[t]);
   }
+  const PortProducers producers(plan);
   const auto gone = [&](const EdgePlan& edge) {
-    return std::any_of(plan.tasks.begin(), plan.tasks.end(), [&](const TaskPlan& task) {
-      return out[static_cast<size_t>(&task - plan.tasks.data())] &&
-             std::find(task.ports.begin(), task.ports.end(), edge.port) != task.ports.end();
-    });
+    const size_t producer = producers.find(edge.port);
+    return producer != kNone && out[producer];
   };
   for (TaskPlan& task : result.tasks) {
     if (task.on_task != kNone) task.on_task = index[task.on_task];

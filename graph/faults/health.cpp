@@ -8,11 +8,8 @@
 namespace takt::graph {
 
 HealthWatch::HealthWatch(const Plan& plan, const RunBoard& board)
-    : plan_(plan), board_(board), seen_(plan.tasks.size()), producer_(plan.ports.size(), kNone) {
-  for (size_t t = 0; t < plan.tasks.size(); ++t) {
-    seen_[t].stale.resize(plan.tasks[t].edges.size());
-    for (const size_t port : plan.tasks[t].ports) producer_[port] = t;
-  }
+    : plan_(plan), board_(board), seen_(plan.tasks.size()), producers_(plan) {
+  for (size_t t = 0; t < plan.tasks.size(); ++t) seen_[t].stale.resize(plan.tasks[t].edges.size());
 }
 
 void HealthWatch::look(int64_t now_ns, int64_t epoch_ns) {
@@ -46,7 +43,7 @@ bool HealthWatch::stale_beyond_rest(size_t task) {
   bool any = false;
   for (size_t e = 0; e < plan_.tasks[task].edges.size(); ++e) {
     const uint64_t now = board_.edge(task, e).stale.load(std::memory_order_relaxed);
-    const size_t producer = producer_[plan_.tasks[task].edges[e].port];
+    const size_t producer = producers_.find(plan_.tasks[task].edges[e].port);
     any = any || (now > seen_[task].stale[e] && (producer == kNone || !seen_[producer].rests));
     seen_[task].stale[e] = now;
   }

@@ -46,7 +46,7 @@ class HealthWatch {
   const Plan& plan_;
   const RunBoard& board_;
   std::vector<Seen> seen_;
-  std::vector<size_t> producer_;  ///< by port
+  const PortProducers producers_;
   std::vector<Unwell> unwell_;
   int64_t next_ns_ = 0;
 };

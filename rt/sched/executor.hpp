@@ -62,7 +62,7 @@ class Executor {
     bool rejoin = false;                  ///< a process before this one ran the same tasks, and died
     LifeSigns* life = nullptr;            ///< of a process that somebody looks after, see Watchdog::Options
     /// A job that has not returned this long after its deadline hangs.
-    int64_t hang_patience_ns = kSlowdown * 1'000'000'000LL;
+    int64_t hang_patience_ns = kSlowdown * 750'000'000LL;
     std::function<int64_t()> stolen_ns = {};  ///< see StolenTime; empty: no job is lifted
     // Virtual time: see VirtualRun::Options.
     std::function<int64_t(size_t task, uint64_t job)> job_duration_ns = {};

@@ -130,7 +130,7 @@ void Latch::count() {
   for (Edge& edge : edges_) {
     edge.statistics->received += edge.fresh.received;
     edge.statistics->dropped += edge.fresh.dropped;
-    edge.statistics->stale.fetch_add(edge.fresh.stale, std::memory_order_relaxed);
+    add(edge.statistics->stale, edge.fresh.stale);
     edge.statistics->last_seen = edge.last_seen;
     edge.fresh = {};
     if (edge.age_ns == kNoAge) continue;

@@ -33,6 +33,15 @@ std::string_view to_string(OnMiss verb) {
   return "";
 }
 
+PortProducers::PortProducers(const Plan& plan) : by_port_(plan.ports.size(), kNone) {
+  for (size_t t = 0; t < plan.tasks.size(); ++t) {
+    for (const size_t port : plan.tasks[t].ports) {
+      if (port >= by_port_.size()) by_port_.resize(port + 1, kNone);
+      by_port_[port] = t;
+    }
+  }
+}
+
 double effective_rate_hz(const Plan& plan, size_t task) {
   double divisor = 1;
   for (size_t hops = 0; hops <= plan.tasks.size() && task != kNone; ++hops) {

@@ -98,6 +98,17 @@ struct Plan {
   ModeRules mode_rules = {};    ///< which mode the loss of sources leads to; without rules it leads to none
 };
 
+/// Which task makes what a port carries.
+class PortProducers {
+ public:
+  explicit PortProducers(const Plan& plan);
+  /// kNone: nobody.
+  size_t find(size_t port) const { return port < by_port_.size() ? by_port_[port] : kNone; }
+
+ private:
+  std::vector<size_t> by_port_;
+};
+
 /// Rate at which a task runs: its own, or that of the producer whose output releases it (divided by `every`); 0 if
 /// none.
 double effective_rate_hz(const Plan& plan, size_t task);

@@ -13,6 +13,11 @@
 
 namespace takt {
 
+/// Where one thread counts, and the others only look.
+inline void add(std::atomic<uint64_t>& counter, uint64_t by = 1) {
+  counter.store(counter.load(std::memory_order_relaxed) + by, std::memory_order_relaxed);
+}
+
 /// One finished job, for timelines.
 struct JobRecord {
   int64_t release_ns = 0, start_ns = 0, finish_ns = 0;

@@ -25,10 +25,6 @@ std::span<const QualityLevel> levels_of(const TaskPlan& plan) {
   return std::span(plan.node->levels()).first(plan.on_overrun == OnOverrun::degrade ? plan.node->levels().size() : 1);
 }
 
-// One thread counts; the others only look.
-void add(std::atomic<uint64_t>& counter, uint64_t by = 1) {
-  counter.store(counter.load(std::memory_order_relaxed) + by, std::memory_order_relaxed);
-}
 }  // namespace
 
 void TaskStatistics::add_lateness(int64_t ns) {

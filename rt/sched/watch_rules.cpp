@@ -52,7 +52,8 @@ ReserveVerdict judge_reserve(const ReserveSight& sight) {
   if (sight.lifted) return {false, sight.now_ns + kLifted_ns};
   const int64_t soonest_ns = sight.release_ns + sight.runtime_ns;
   if (sight.now_ns < soonest_ns) return {false, soonest_ns};
-  if (sight.left_ns <= 0 && sight.stands) return {true, std::numeric_limits<int64_t>::max()};
+  if (sight.left_ns <= 0 && sight.stands && sight.owed_ns - sight.left_ns <= sight.deadline_ns)
+    return {true, sight.now_ns + kLifted_ns};
   return {false, sight.now_ns + std::max(sight.left_ns, kReserveGrain_ns)};
 }
 

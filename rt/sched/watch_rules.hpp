@@ -60,7 +60,9 @@ struct ReserveSight {
   int64_t now_ns = 0;
   int64_t release_ns = 0;  ///< of the job that runs; else of the next one
   int64_t runtime_ns = 0;  ///< of the reservation
+  int64_t deadline_ns = 0; ///< of that job
   int64_t left_ns = 0;     ///< of it; must be told from release + runtime on
+  int64_t owed_ns = 0;     ///< by how much jobs of the worker overran lately, this one apart
   bool stands = false;     ///< it was used up at the look before, and nothing was used since
   bool lifted = false;
 };
@@ -72,8 +74,9 @@ struct ReserveVerdict {
 
 /// A worker may have used up what it has before its job has even begun: where the host takes a CPU without saying so,
 /// the kernel charges whoever was on it. One that has, and is not served any more, is to be lifted. While others leave
-/// it something beyond its reservation (Reservation::reclaims) it goes on there. Nothing can be used up before that
-/// much time has passed since the release: a job that is done by then costs one look.
+/// it something beyond its reservation (Reservation::reclaims) it goes on there. One that would be dropped for what it
+/// owes is not lifted. Nothing can be used up before that much time has passed since the release: a job that is done by
+/// then costs one look.
 ReserveVerdict judge_reserve(const ReserveSight& sight);
 
 constexpr int64_t kReserveGrain_ns = 1'000'000;

@@ -121,18 +121,20 @@ int64_t Watchdog::look_at_reserve(Watched& watched, int64_t now_ns) {
   const JobWatch::Running job = watch.running();
   ReserveSight sight;
   sight.now_ns = now_ns;
+  const size_t member = job.serial != 0 ? job.member : 0;
   sight.release_ns = job.serial != 0 ? job.release_ns : watch.expected_ns();
+  sight.deadline_ns = watched.rules[member].deadline_ns;
   sight.runtime_ns = watch.runtime_ns();
   sight.lifted = watch.lifted();
   if (!sight.lifted && now_ns >= sight.release_ns + sight.runtime_ns) {
     const int64_t cpu_ns = watch.cpu_ns();
     sight.left_ns = watch.reserve_end_ns() - cpu_ns;
+    sight.owed_ns = watch.owed_ns(now_ns);
     sight.stands = cpu_ns == watched.overdrawn_cpu_ns;
     watched.overdrawn_cpu_ns = sight.left_ns <= 0 ? cpu_ns : 0;
   }
   const ReserveVerdict verdict = judge_reserve(sight);
-  if (verdict.lift)
-    lift(watched, watched.worker.tasks[job.serial != 0 ? job.member : 0], watch.owed_ns(now_ns) - sight.left_ns, now_ns);
+  if (verdict.lift) lift(watched, watched.worker.tasks[member], sight.owed_ns - sight.left_ns, now_ns);
   return verdict.look_again_ns;
 }
 

@@ -40,7 +40,7 @@ class Watchdog {
   };
   struct Options {
     Policy granted = Policy::cooperative;
-    int64_t patience_ns = 1'000'000'000;
+    int64_t patience_ns = 750'000'000;
     int priority = 0;                         ///< SCHED_FIFO; 0: none
     std::function<int64_t()> stolen_ns = {};  ///< see StolenTime
     /// Where somebody outside looks after this process: at least every `heartbeat_period` the instant of a look is left

@@ -139,12 +139,6 @@ struct Patients {
       ++s.job_count;
     }
   }
-  size_t producer_of(size_t task, size_t edge) const {
-    const size_t port = plan.tasks[task].edges[edge].port;
-    for (size_t t = 0; t < plan.tasks.size(); ++t)
-      if (std::count(plan.tasks[t].ports.begin(), plan.tasks[t].ports.end(), port) > 0) return t;
-    return kNone;
-  }
   /// Who was found unwell then, since the epoch.
   std::vector<std::string> look(int64_t ms) {
     const size_t before = watch.unwell().size();
@@ -199,7 +193,7 @@ TEST_CASE("health: stale inputs, skipped jobs and jobs without result; releases 
 
 TEST_CASE("health: who waits for somebody that is not asked to run is well") {
   Patients patients;
-  const size_t producer = patients.producer_of(2, 0);
+  const size_t producer = PortProducers(patients.plan).find(patients.plan.tasks[2].edges[0].port);
   patients.job(0, producer);
   patients.board.task(producer).paused = 1;
   patients.board.edge(2, 0).stale = 1;

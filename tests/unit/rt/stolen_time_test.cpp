@@ -106,7 +106,11 @@ TEST_CASE("a reservation that is used up: the worker is lifted once it stands, a
   CHECK(judge_reserve(sight).look_again_ns == 110 * kMs + kReserveGrain_ns);
   CHECK_FALSE(judge_reserve(sight).lift);  // it may still be served
   sight.stands = true;
+  sight.deadline_ns = 50 * kMs;
   CHECK(judge_reserve(sight).lift);
+  sight.owed_ns = 49 * kMs;
+  CHECK_FALSE(judge_reserve(sight).lift);  // it would be dropped again
+  sight.owed_ns = 0;
   sight.lifted = true;
   CHECK_FALSE(judge_reserve(sight).lift);
 }
