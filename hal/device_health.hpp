@@ -47,10 +47,10 @@ class DeviceHealth {
   uint32_t reads_ = 0, damaged_ = 0, repeated_ = 0;  ///< since then
 };
 
-/// When to try again what failed: after 100 ms, then each time after twice as long, at most 2 s. One thread at a time.
+/// When to try again what failed: after 100 ms, then each time after twice as long, at most 1 s. One thread at a time.
 class RetryDelay {
  public:
-  static constexpr int64_t kFirst_ns = 100'000'000, kLongest_ns = 2'000'000'000;
+  static constexpr int64_t kFirst_ns = 100'000'000, kLongest_ns = 1'000'000'000;
 
   bool due(int64_t now_ns) const { return now_ns >= next_ns_; }
   void failed(int64_t now_ns) {

@@ -24,7 +24,7 @@ class Supervisor {
  public:
   struct Options {
     RestartPolicy::Limits restarts;
-    int64_t silence_ns = kSlowdown * 1'000'000'000LL;
+    int64_t silence_ns = kSlowdown * 750'000'000LL;
     /// For a restarted process that is at work to come back to its first jobs; one that stands still has `silence`.
     int64_t start_patience_ns = kSlowdown * 5'000'000'000LL;
     /// After a process has ended by a signal, before its place is taken; may be empty.
