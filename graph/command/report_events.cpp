@@ -34,7 +34,7 @@ std::string offences(const Json& node) {
   count("budget_overruns", "budget overruns");
   if (const auto n = node.value("demoted", uint64_t{0}); n > 0)
     add(fmt::format("demoted {} (at most {:.0f} us late)", n, node["enforcement_error_us"].get<double>()));
-  count("lifted", "lifted out of what the host's stalls cost its reservation");
+  count("lifted", "lifted out of a used-up reservation");
   if (node["rt_violations"].is_object())
     for (const auto& [call, n] : node["rt_violations"].items())
       add(fmt::format("{} in jobs {}", call, n.get<uint64_t>()));

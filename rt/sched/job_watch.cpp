@@ -98,8 +98,10 @@ bool JobWatch::demote(uint64_t serial) {
   return done;
 }
 
-bool JobWatch::lift(int64_t now_ns, int64_t owed_ns) {
-  if (has_.runtime_ns <= 0 || !lift_thread(thread_.load(std::memory_order_acquire))) return false;
+bool JobWatch::lift(int64_t now_ns, int64_t owed_ns, bool ordinary) {
+  const int thread = thread_.load(std::memory_order_acquire);
+  if (has_.runtime_ns <= 0 || !(ordinary ? demote_thread(thread) : lift_thread(thread))) return false;
+  ordinary_ = ordinary;
   // One period for each budget that is owed, the one under way, and one to be sure.
   constexpr int64_t kLongest_ns = 30'000'000'000;
   const int64_t lapse_ns = (owed_ns / has_.runtime_ns + 2) * has_.period_ns;

@@ -51,16 +51,19 @@ class JobWatch {
   /// Puts the worker behind everybody else until its job ends; false if job `serial` ended before, or the kernel
   /// refuses.
   bool demote(uint64_t serial);
-  /// Lets the worker, which has a reservation, go on under SCHED_FIFO: the `owed_ns` that it owes the kernel are
-  /// forgotten only with time (measured: the kernel keeps the debt of a thread that leaves and comes back). After the
-  /// first job that ends when that has passed, the worker takes its reservation back. False if the kernel refuses.
-  bool lift(int64_t now_ns, int64_t owed_ns);
+  /// Lets the worker, which has a reservation, go on under SCHED_FIFO, or as an ordinary thread: the `owed_ns` that it
+  /// owes the kernel are forgotten only with time (measured: the kernel keeps the debt of a thread that leaves and comes
+  /// back). After the first job that ends when that has passed, the worker takes its reservation back. False if the
+  /// kernel refuses.
+  bool lift(int64_t now_ns, int64_t owed_ns, bool ordinary);
   /// Puts a lifted worker back into its reservation.
   void drop();
   /// By how much jobs that ended within StolenTime::kWindow_ns overran.
   int64_t owed_ns(int64_t now_ns) const;
   /// The worker was lifted and has not taken its reservation back.
   bool lifted() const { return lifted_until_ns_.load(std::memory_order_acquire) != 0; }
+  /// It was last lifted to be an ordinary thread.
+  bool ordinary() const { return ordinary_; }
   /// Notes that the overrun of job `serial` was told; false if the job ended before, was demoted or told already.
   bool tell(uint64_t serial);
 
@@ -76,6 +79,7 @@ class JobWatch {
   std::atomic<uint64_t> index_{0};
   std::atomic<int64_t> release_ns_{0}, cpu_limit_ns_{0}, expected_ns_{0};
   std::atomic<int64_t> lifted_until_ns_{0};  ///< 0: it is not
+  bool ordinary_ = false;                    ///< the watchdog's alone
   std::atomic<int64_t> owed_ns_{0}, owed_at_ns_{0}, rested_cpu_ns_{0};
   std::atomic<int> thread_{0};
   std::atomic<clockid_t> clock_{0};

@@ -39,7 +39,7 @@ struct TaskStatistics {
   std::atomic<uint64_t> no_result{0};
   std::atomic<int64_t> enforcement_error_ns{0};  ///< most CPU time beyond its budget that a job had when it was demoted
   std::atomic<uint64_t> demoted{0};  ///< jobs that used up their budget and gave way to all others; by the watchdog
-  std::atomic<uint64_t> lifted{0};   ///< late jobs that went on beside a reservation that paid for the host; likewise
+  std::atomic<uint64_t> lifted{0};   ///< jobs that went on beside a reservation that was used up; likewise
   std::array<std::atomic<uint64_t>, kMaxLevels> at_level{};  ///< jobs by quality level
   std::atomic<int32_t> last_level{0};
   std::atomic<int64_t> last_exec_ns{0}, last_response_ns{0};

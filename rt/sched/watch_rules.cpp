@@ -14,7 +14,7 @@ WatchRules watch_rules(const TaskPlan& task, Policy granted, int64_t patience_ns
   rules.patience_ns = patience_ns;
   rules.demote = granted == Policy::fixed && task.criticality == Criticality::low;
   rules.lift = granted == Policy::deadline;
-  rules.rescue = rules.lift && task.criticality == Criticality::high;
+  rules.ordinary = task.criticality == Criticality::low;
   rules.stop_on_overrun = task.on_overrun == OnOverrun::safe_stop;
   rules.stop_on_miss = task.on_miss == OnMiss::safe_stop;
   return rules;
@@ -40,19 +40,23 @@ WatchVerdict judge(const WatchRules& rules, const WatchSight& sight) {
   by_the_clock(rules.stop_on_miss, sight.miss_told, missed_ns, verdict.miss);
   by_the_clock(true, sight.hang_told, hung_ns, verdict.hang);
   const int64_t owed_ns = sight.owed_ns + std::max<int64_t>(0, -sight.cpu_left_ns);
-  const int64_t allowed_ns = rules.rescue ? std::max(sight.stolen_ns, rules.deadline_ns) : sight.stolen_ns;
-  verdict.drop = sight.running && sight.lifted && owed_ns > allowed_ns && sight.cpu_left_ns < 0;
+  const bool paid_by_host = rules.ordinary && !sight.ordinary;
+  const int64_t allowed_ns = paid_by_host ? sight.stolen_ns : std::max(sight.stolen_ns, rules.deadline_ns);
+  const bool used_up = owed_ns > allowed_ns && sight.cpu_left_ns < 0;
+  verdict.drop = sight.running && sight.lifted && (used_up || (sight.ordinary && sight.now_ns >= missed_ns));
   verdict.lift = rules.lift && sight.running && !sight.lifted && sight.now_ns >= missed_ns && owed_ns > 0 &&
                  owed_ns <= sight.stolen_ns;
   return verdict;
 }
 
 ReserveVerdict judge_reserve(const ReserveSight& sight) {
-  constexpr int64_t kLifted_ns = 50'000'000;  // between two looks whether it still is
+  constexpr int64_t kLifted_ns = 50'000'000;  // between two looks where nothing can be done now
   if (sight.lifted) return {false, sight.now_ns + kLifted_ns};
   const int64_t soonest_ns = sight.release_ns + sight.runtime_ns;
   if (sight.now_ns < soonest_ns) return {false, soonest_ns};
-  if (sight.left_ns <= 0 && sight.stands && sight.owed_ns - sight.left_ns <= sight.deadline_ns)
+  const bool in_time = sight.now_ns <= sight.release_ns + sight.deadline_ns;
+  if (sight.ordinary && !in_time) return {false, sight.now_ns + kLifted_ns};
+  if (sight.used_up() && sight.stands && sight.owed_ns - sight.left_ns <= sight.deadline_ns)
     return {true, sight.now_ns + kLifted_ns};
   return {false, sight.now_ns + std::max(sight.left_ns, kReserveGrain_ns)};
 }

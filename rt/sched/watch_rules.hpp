@@ -14,8 +14,8 @@ struct WatchRules {
   int64_t patience_ns = 0;  ///< a job that has not returned this long after its deadline hangs
   bool demote = false;      ///< budget used up: it goes on with what the others leave
   bool stop_on_overrun = false, stop_on_miss = false;  ///< on_overrun, on_miss: safe_stop
-  bool lift = false;    ///< late through what the host took: it goes on beside its reservation
-  bool rescue = false;  ///< so it does once its reservation is used up, whoever used it, and while it is in time
+  bool lift = false;      ///< late through what the host took, or its reservation used up: it goes on beside that
+  bool ordinary = false;  ///< once its reservation is used up: as an ordinary thread, and while it is in time
 
   bool minds_overrun() const { return demote || stop_on_overrun; }
 };
@@ -36,6 +36,7 @@ struct WatchSight {
   int64_t stolen_ns = 0;  ///< what the host took lately; cpu_left_ns must be told of a job that is late then, or lifted
   int64_t owed_ns = 0;    ///< by how much jobs of the worker overran lately, this one apart
   bool lifted = false;    ///< the worker is, still
+  bool ordinary = false;  ///< as an ordinary thread
 };
 
 struct WatchVerdict {
@@ -45,8 +46,9 @@ struct WatchVerdict {
 
 /// The kernel charges a reservation for time that the host took from its CPU, and holds the thread back until that is
 /// paid off, one budget a period: a job that is late while its worker owes something, and no more than the host took,
-/// is lifted out of that, and dropped again once it has used more than that (one to be rescued: more than its deadline
-/// is long as well). Both are seen when somebody looks: they make no look_again.
+/// is lifted out of that, and dropped again once it has used more than that. One that was lifted because its reservation
+/// was used up (see judge_reserve) may use as much as its deadline is long; as an ordinary thread, nothing once it is
+/// late: the reservation is then due again. All of that is seen when somebody looks: it makes no look_again.
 ///
 /// A job cannot have used a budget before that much time has passed: so the next look is due when the earliest thing
 /// can have happened. A running job is looked at no more than once in kWatchGrain_ns, so that one that was preempted
@@ -55,16 +57,19 @@ WatchVerdict judge(const WatchRules& rules, const WatchSight& sight);
 
 constexpr int64_t kWatchGrain_ns = 100'000;
 
-/// What a worker to be rescued has left of its reservation. Times in ns.
+/// What a worker has left of its reservation. Times in ns.
 struct ReserveSight {
   int64_t now_ns = 0;
   int64_t release_ns = 0;  ///< of the job that runs; else of the next one
-  int64_t runtime_ns = 0;  ///< of the reservation
   int64_t deadline_ns = 0; ///< of that job
+  int64_t runtime_ns = 0;  ///< of the reservation
   int64_t left_ns = 0;     ///< of it; must be told from release + runtime on
   int64_t owed_ns = 0;     ///< by how much jobs of the worker overran lately, this one apart
-  bool stands = false;     ///< it was used up at the look before, and nothing was used since
+  bool stands = false;     ///< used_up() at the look before, and nothing was used since
   bool lifted = false;
+  bool ordinary = false;   ///< it would go on as an ordinary thread
+
+  bool used_up() const;
 };
 
 struct ReserveVerdict {
@@ -74,11 +79,14 @@ struct ReserveVerdict {
 
 /// A worker may have used up what it has before its job has even begun: where the host takes a CPU without saying so,
 /// the kernel charges whoever was on it. One that has, and is not served any more, is to be lifted. While others leave
-/// it something beyond its reservation (Reservation::reclaims) it goes on there. One that would be dropped for what it
-/// owes is not lifted. Nothing can be used up before that much time has passed since the release: a job that is done by
-/// then costs one look.
+/// it something beyond its reservation (Reservation::reclaims) it goes on there. One that would be dropped at once, for
+/// what it owes or as an ordinary thread that is late, is not lifted. Nothing can be used up before that much time has
+/// passed since the release: a job that is done by then costs one look.
 ReserveVerdict judge_reserve(const ReserveSight& sight);
 
 constexpr int64_t kReserveGrain_ns = 1'000'000;
+/// The kernel's account is not ours: it begins and ends in the middle of what a worker does around its sleep.
+constexpr int64_t kReserveSlack_ns = 100'000;
+inline bool ReserveSight::used_up() const { return left_ns <= kReserveSlack_ns; }
 
 }  // namespace takt

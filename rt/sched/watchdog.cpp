@@ -26,8 +26,8 @@ Watchdog::Watchdog(const Plan& plan, RunBoard& board, const Clock& clock, std::v
   for (size_t w = 0; w < workers.size(); ++w) {
     for (const size_t task : workers[w].tasks)
       watched_[w].rules.push_back(watch_rules(plan.tasks[task], options.granted, options.patience_ns));
-    watched_[w].rescue = std::any_of(watched_[w].rules.begin(), watched_[w].rules.end(),
-                                     [](const WatchRules& rules) { return rules.rescue; });
+    watched_[w].ordinary = std::all_of(watched_[w].rules.begin(), watched_[w].rules.end(),
+                                       [](const WatchRules& rules) { return rules.ordinary; });
     watched_[w].worker = std::move(workers[w]);
   }
   thread_ = std::thread([this] { watch(); });
@@ -103,6 +103,7 @@ int64_t Watchdog::look_at(Watched& watched, int64_t now_ns) {
   sight.hang_told = watched.hang_told.load() == job.serial;
   sight.stolen_ns = rules.lift ? stolen_.recent_ns() : 0;
   sight.lifted = watch.lifted();
+  sight.ordinary = sight.lifted && watch.ordinary();
   sight.owed_ns = watch.owed_ns(now_ns);
   const bool may_lift = sight.stolen_ns > 0 && now_ns > job.release_ns + rules.deadline_ns;
   if ((rules.minds_overrun() && !job.acted) || may_lift || sight.lifted) {
@@ -117,7 +118,7 @@ int64_t Watchdog::look_at(Watched& watched, int64_t now_ns) {
 
 int64_t Watchdog::look_at_reserve(Watched& watched, int64_t now_ns) {
   const JobWatch& watch = *watched.worker.watch;
-  if (!watched.rescue || watch.runtime_ns() <= 0) return std::numeric_limits<int64_t>::max();
+  if (watch.runtime_ns() <= 0) return std::numeric_limits<int64_t>::max();
   const JobWatch::Running job = watch.running();
   ReserveSight sight;
   sight.now_ns = now_ns;
@@ -126,15 +127,17 @@ int64_t Watchdog::look_at_reserve(Watched& watched, int64_t now_ns) {
   sight.deadline_ns = watched.rules[member].deadline_ns;
   sight.runtime_ns = watch.runtime_ns();
   sight.lifted = watch.lifted();
+  sight.ordinary = watched.ordinary;
   if (!sight.lifted && now_ns >= sight.release_ns + sight.runtime_ns) {
     const int64_t cpu_ns = watch.cpu_ns();
     sight.left_ns = watch.reserve_end_ns() - cpu_ns;
     sight.owed_ns = watch.owed_ns(now_ns);
     sight.stands = cpu_ns == watched.overdrawn_cpu_ns;
-    watched.overdrawn_cpu_ns = sight.left_ns <= 0 ? cpu_ns : 0;
+    watched.overdrawn_cpu_ns = sight.used_up() ? cpu_ns : 0;
   }
   const ReserveVerdict verdict = judge_reserve(sight);
-  if (verdict.lift) lift(watched, watched.worker.tasks[member], sight.owed_ns - sight.left_ns, now_ns);
+  if (verdict.lift)
+    lift(watched, watched.worker.tasks[member], sight.owed_ns - sight.left_ns, now_ns, watched.ordinary);
   return verdict.look_again_ns;
 }
 
@@ -157,7 +160,7 @@ void Watchdog::act(Watched& watched, const JobWatch::Running& job, const WatchVe
   const size_t task = watched.worker.tasks[job.member];
   if (verdict.overrun) overrun(watched, job, now_ns);
   if (const JobWatch& watch = *watched.worker.watch; verdict.lift)
-    lift(watched, task, watch.owed_ns(now_ns) + std::max<int64_t>(0, watch.cpu_ns() - job.cpu_limit_ns), now_ns);
+    lift(watched, task, watch.owed_ns(now_ns) + std::max<int64_t>(0, watch.cpu_ns() - job.cpu_limit_ns), now_ns, false);
   if (verdict.drop) watched.worker.watch->drop();
   if (verdict.miss) {
     watched.miss_told = job.serial;
@@ -169,8 +172,8 @@ void Watchdog::act(Watched& watched, const JobWatch::Running& job, const WatchVe
   }
 }
 
-void Watchdog::lift(Watched& watched, size_t task, int64_t owed_ns, int64_t now_ns) {
-  if (watched.worker.watch->lift(now_ns, owed_ns))
+void Watchdog::lift(Watched& watched, size_t task, int64_t owed_ns, int64_t now_ns, bool ordinary) {
+  if (watched.worker.watch->lift(now_ns, owed_ns, ordinary))
     board_.task(task).lifted.fetch_add(1, std::memory_order_relaxed);
 }
 

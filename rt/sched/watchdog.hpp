@@ -24,14 +24,14 @@ namespace takt {
 /// - Under `deadline` a job that is late because its reservation pays for time that the host took (see judge()) goes on
 ///   under SCHED_FIFO, as its node's next ones, until the kernel has forgotten that debt; counted `lifted`. One that
 ///   uses more than that goes back into the reservation.
-/// - Under `deadline` a worker with a task of high criticality that has used up its reservation goes on under SCHED_FIFO
-///   as well, before it is late (see judge_reserve()).
+/// - Under `deadline` a worker that has used up its reservation goes on beside it before it is late (see judge_reserve()):
+///   one with a task of high criticality under SCHED_FIFO, any other as an ordinary thread; counted `lifted` as well.
 /// - `safe_stop` is asked for the moment a budget or a deadline has passed, not when the job ends.
 /// - A job that has not returned `patience` after its deadline hangs: told once, by name. Under `cooperative` that ends
 ///   the run, unless somebody looks after this process.
 ///
-/// Cost: at most one wake-up a job that is minded (under `deadline`: one to be rescued), none for the others but one a
-/// job's deadline and patience; under `deadline` one every 50 ms, 5 ms while the host takes time.
+/// Cost: at most one wake-up a job that is minded (under `deadline`: each), none for the others but one a job's deadline
+/// and patience; under `deadline` one every 50 ms, 5 ms while the host takes time.
 class Watchdog {
  public:
   struct Worker {
@@ -61,7 +61,7 @@ class Watchdog {
   struct Watched {
     Worker worker;
     std::vector<WatchRules> rules;       ///< by member
-    bool rescue = false;                 ///< any of them asks for it
+    bool ordinary = true;                ///< all of them ask for it
     int64_t overdrawn_cpu_ns = 0;        ///< CPU clock at the last look, if the reservation was used up then
     uint64_t miss_told = 0;              ///< serial of the last job it was told of; 0: none
     std::atomic<uint64_t> hang_told{0};  ///< the same
@@ -75,7 +75,7 @@ class Watchdog {
   void act(Watched& watched, const JobWatch::Running& job, const WatchVerdict& verdict, int64_t now_ns);
   void safe_stop(size_t task, uint64_t job, const char* why, int64_t now_ns);
   /// `task` is the one that is late, or would be.
-  void lift(Watched& watched, size_t task, int64_t owed_ns, int64_t now_ns);
+  void lift(Watched& watched, size_t task, int64_t owed_ns, int64_t now_ns, bool ordinary);
   void tell_hang(size_t task, const JobWatch::Running& job, int64_t now_ns);
 
   const Plan& plan_;

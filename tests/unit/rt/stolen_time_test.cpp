@@ -79,6 +79,17 @@ TEST_CASE("a late job is lifted only for what the host took, and dropped if it u
     sight.cpu_left_ns = -51 * kMs;
     CHECK(judged(Policy::deadline).drop);
   }
+  SUBCASE("as an ordinary thread it may use more, and is dropped when it is late") {
+    sight.lifted = sight.ordinary = true;
+    sight.now_ns = 50 * kMs;
+    sight.cpu_left_ns = -50 * kMs;
+    CHECK_FALSE(judged(Policy::deadline).drop);
+    sight.cpu_left_ns = -51 * kMs;
+    CHECK(judged(Policy::deadline).drop);
+    sight.cpu_left_ns = 1 * kMs;
+    sight.now_ns = 60 * kMs;
+    CHECK(judged(Policy::deadline).drop);
+  }
   SUBCASE("once") {
     sight.lifted = true;
     CHECK_FALSE(judged(Policy::deadline).lift);
@@ -87,11 +98,6 @@ TEST_CASE("a late job is lifted only for what the host took, and dropped if it u
 }
 
 TEST_CASE("a reservation that is used up: the worker is lifted once it stands, and looked at no more than needed") {
-  TaskPlan task;
-  CHECK_FALSE(watch_rules(task, Policy::deadline, 1000 * kMs).rescue);
-  task.criticality = Criticality::high;
-  CHECK(watch_rules(task, Policy::deadline, 1000 * kMs).rescue);
-  CHECK_FALSE(watch_rules(task, Policy::fixed, 1000 * kMs).rescue);
   ReserveSight sight;
   sight.release_ns = 100 * kMs;
   sight.runtime_ns = 4 * kMs;
@@ -107,10 +113,30 @@ TEST_CASE("a reservation that is used up: the worker is lifted once it stands, a
   CHECK_FALSE(judge_reserve(sight).lift);  // it may still be served
   sight.stands = true;
   sight.deadline_ns = 50 * kMs;
+  sight.left_ns = kReserveSlack_ns + 1;
+  CHECK_FALSE(judge_reserve(sight).lift);
+  sight.left_ns = kReserveSlack_ns;
+  CHECK(judge_reserve(sight).lift);
+  sight.left_ns = -2 * kMs;
   CHECK(judge_reserve(sight).lift);
   sight.owed_ns = 49 * kMs;
   CHECK_FALSE(judge_reserve(sight).lift);  // it would be dropped again
   sight.owed_ns = 0;
-  sight.lifted = true;
-  CHECK_FALSE(judge_reserve(sight).lift);
+  SUBCASE("once") {
+    sight.lifted = true;
+    CHECK_FALSE(judge_reserve(sight).lift);
+  }
+  SUBCASE("late, as one of high criticality") {
+    sight.now_ns = 151 * kMs;
+    CHECK(judge_reserve(sight).lift);
+  }
+  SUBCASE("late, as an ordinary thread: its reservation is due again") {
+    sight.ordinary = true;
+    CHECK(judge_reserve(sight).lift);
+    sight.now_ns = 150 * kMs;
+    CHECK(judge_reserve(sight).lift);
+    sight.now_ns = 151 * kMs;
+    CHECK_FALSE(judge_reserve(sight).lift);
+    CHECK(judge_reserve(sight).look_again_ns > sight.now_ns + kReserveGrain_ns);
+  }
 }
