@@ -166,6 +166,7 @@ class IsolatedRun {
     }
     probe.reset();
     watchdog_->start();  // whoever waits for feeds does so until the end: reports and traces take their time
+    count_chunks();
     MachineUse use = use_of_all();
     use.steal_ms -= steal_before_ms;
     use.cpu_ns -= cpu_before_ns;
@@ -301,8 +302,6 @@ class IsolatedRun {
       }
       if (!board_.dismissed().load() && (all_finished() || now > give_up_ns)) {
         record_.take_rest();
-        // Nobody holds a message any more: what is taken now beyond what outputs keep stays taken.
-        chunks_at_end_ = transport_->chunks_in_use();
         board_.dismissed().store(true);
         give_up_ns = now + kPatienceNs;
       }
@@ -315,6 +314,14 @@ class IsolatedRun {
       return false;
     };
     wait_until(ended, {}, std::chrono::milliseconds(5));
+  }
+
+  /// Nobody is there any more: what is taken now, beyond what outputs keep in memory of our own, stays taken. Over
+  /// iceoryx nothing should be, once its daemon has noticed who is gone.
+  void count_chunks() {
+    constexpr int64_t kNoticed_ns = 3'000'000'000;  // it does so within 1.5 s
+    const int64_t until = clock_.now_ns() + (options_.transport == "iceoryx" ? kNoticed_ns : 0);
+    wait_until([&] { return (chunks_at_end_ = transport_->chunks_in_use()) == 0 || clock_.now_ns() >= until; });
   }
 
   /// Those that live.
@@ -371,7 +378,7 @@ class IsolatedRun {
     record_.finish(result, trace_.unheard_threads());
     auto report = make_report({graph_, plan_, board_, result, *transport_, use, options_.clock,
                                std::string(to_string(plan_.policy)), "subsystem", partition_.names, adjusted_, ages_});
-    if (chunks_at_end_ > 0) report["memory"]["chunks_at_end"] = chunks_at_end_;
+    report["memory"]["chunks_at_end"] = chunks_at_end_;
     if (const size_t lost = group_.lost_nurseries(); lost > 0)
       problems_.push_back(fmt::format("the process that starts others again was lost {} times and replaced", lost));
     for (const std::string& problem : problems_) report["faults"].push_back({{"what", problem}});
@@ -408,7 +415,7 @@ class IsolatedRun {
   size_t told_ = 0;
   bool ending_ = false;
   double memory_mb_ = 0;
-  uint32_t chunks_at_end_ = 0;  ///< 0: not known
+  uint32_t chunks_at_end_ = 0;  ///< see count_chunks
   std::unique_ptr<Transport> transport_;  ///< of iceoryx with the daemon: ends after all members
   RunRecord record_;                      ///< reads from the transport
   RunTrace trace_;                        ///< speaks to the record

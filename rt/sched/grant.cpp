@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "rt/sched/grant.hpp"
 
+#include <fcntl.h>
 #include <linux/sched.h>
 #include <sched.h>
 #include <sys/prctl.h>
@@ -8,7 +9,9 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
+#include <cstdio>
 #include <cstring>
 #include <ctime>
 
@@ -154,7 +157,18 @@ bool lift_thread(int thread) {
   return sched_setscheduler(thread, SCHED_FIFO | SCHED_RESET_ON_FORK, &param) == 0;
 }
 
-bool drop_thread(int thread, const Reservation& had) { return set_attributes(attributes_of(had), thread) == 0; }
+bool runnable(int thread) {
+  std::array<char, 256> text{};
+  std::snprintf(text.data(), text.size(), "/proc/self/task/%d/stat", thread);
+  const int file = open(text.data(), O_RDONLY | O_CLOEXEC);
+  if (file < 0) return false;
+  const ssize_t got = read(file, text.data(), text.size());
+  close(file);
+  // "TID (NAME) STATE ...", and a name may have brackets of its own.
+  const std::string_view stat(text.data(), got > 0 ? static_cast<size_t>(got) : 0);
+  const size_t name_end = stat.rfind(')');
+  return name_end != std::string_view::npos && stat.substr(name_end).starts_with(") R");
+}
 
 bool restore_thread(const Reservation& had) {
   if (had.policy == Policy::deadline) return set_attributes(attributes_of(had)) == 0;

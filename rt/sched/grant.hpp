@@ -57,8 +57,10 @@ bool demote_thread(int thread);
 /// Lets another thread of this process run before all of the default policy (SCHED_FIFO, highest priority of a worker).
 /// False if the kernel refuses.
 bool lift_thread(int thread);
-/// Puts such a thread back into its reservation. False if the kernel refuses.
-bool drop_thread(int thread, const Reservation& had);
+/// Another thread of this process runs, or would but for its turn or its reservation. Only such a one may be taken out of
+/// SCHED_DEADLINE: where it sleeps, Linux 6.18 never gives its bandwidth back (until sched_rt_runtime_us is written), and
+/// one that is put back by others may never be replenished again: not even SIGKILL ends it then. Both measured.
+bool runnable(int thread);
 /// Gives the calling thread back what it had under `fixed` or `deadline`. False if the kernel refuses.
 bool restore_thread(const Reservation& had);
 

@@ -100,7 +100,8 @@ bool JobWatch::demote(uint64_t serial) {
 
 bool JobWatch::lift(int64_t now_ns, int64_t owed_ns, bool ordinary) {
   const int thread = thread_.load(std::memory_order_acquire);
-  if (has_.runtime_ns <= 0 || !(ordinary ? demote_thread(thread) : lift_thread(thread))) return false;
+  if (has_.runtime_ns <= 0 || !runnable(thread)) return false;
+  if (!(ordinary ? demote_thread(thread) : lift_thread(thread))) return false;
   ordinary_ = ordinary;
   // One period for each budget that is owed, the one under way, and one to be sure.
   constexpr int64_t kLongest_ns = 30'000'000'000;
@@ -109,9 +110,7 @@ bool JobWatch::lift(int64_t now_ns, int64_t owed_ns, bool ordinary) {
   return true;
 }
 
-void JobWatch::drop() {
-  if (drop_thread(thread_.load(std::memory_order_acquire), has_)) lifted_until_ns_.store(0, std::memory_order_release);
-}
+void JobWatch::drop() { ordinary_ = demote_thread(thread_.load(std::memory_order_acquire)); }
 
 // In one step: nobody ever waits for a watchdog that only tells. Under `deadline` the workers go before it, so a wait
 // could last as long as their budget does.

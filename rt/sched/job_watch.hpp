@@ -54,15 +54,15 @@ class JobWatch {
   /// Lets the worker, which has a reservation, go on under SCHED_FIFO, or as an ordinary thread: the `owed_ns` that it
   /// owes the kernel are forgotten only with time (measured: the kernel keeps the debt of a thread that leaves and comes
   /// back). After the first job that ends when that has passed, the worker takes its reservation back. False if the
-  /// kernel refuses.
+  /// thread sleeps or the kernel refuses.
   bool lift(int64_t now_ns, int64_t owed_ns, bool ordinary);
-  /// Puts a lifted worker back into its reservation.
+  /// A lifted worker goes on as an ordinary thread from here on.
   void drop();
   /// By how much jobs that ended within StolenTime::kWindow_ns overran.
   int64_t owed_ns(int64_t now_ns) const;
   /// The worker was lifted and has not taken its reservation back.
   bool lifted() const { return lifted_until_ns_.load(std::memory_order_acquire) != 0; }
-  /// It was last lifted to be an ordinary thread.
+  /// As an ordinary thread, if it is.
   bool ordinary() const { return ordinary_; }
   /// Notes that the overrun of job `serial` was told; false if the job ended before, was demoted or told already.
   bool tell(uint64_t serial);

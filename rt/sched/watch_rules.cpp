@@ -40,10 +40,9 @@ WatchVerdict judge(const WatchRules& rules, const WatchSight& sight) {
   by_the_clock(rules.stop_on_miss, sight.miss_told, missed_ns, verdict.miss);
   by_the_clock(true, sight.hang_told, hung_ns, verdict.hang);
   const int64_t owed_ns = sight.owed_ns + std::max<int64_t>(0, -sight.cpu_left_ns);
-  const bool paid_by_host = rules.ordinary && !sight.ordinary;
-  const int64_t allowed_ns = paid_by_host ? sight.stolen_ns : std::max(sight.stolen_ns, rules.deadline_ns);
+  const int64_t allowed_ns = rules.ordinary ? sight.stolen_ns : std::max(sight.stolen_ns, rules.deadline_ns);
   const bool used_up = owed_ns > allowed_ns && sight.cpu_left_ns < 0;
-  verdict.drop = sight.running && sight.lifted && (used_up || (sight.ordinary && sight.now_ns >= missed_ns));
+  verdict.drop = sight.running && sight.lifted && !sight.ordinary && used_up;
   verdict.lift = rules.lift && sight.running && !sight.lifted && sight.now_ns >= missed_ns && owed_ns > 0 &&
                  owed_ns <= sight.stolen_ns;
   return verdict;

@@ -46,9 +46,9 @@ struct WatchVerdict {
 
 /// The kernel charges a reservation for time that the host took from its CPU, and holds the thread back until that is
 /// paid off, one budget a period: a job that is late while its worker owes something, and no more than the host took,
-/// is lifted out of that, and dropped again once it has used more than that. One that was lifted because its reservation
-/// was used up (see judge_reserve) may use as much as its deadline is long; as an ordinary thread, nothing once it is
-/// late: the reservation is then due again. All of that is seen when somebody looks: it makes no look_again.
+/// is lifted out of that, and dropped to be an ordinary thread once it has used more than that. One that was lifted
+/// because its reservation was used up (see judge_reserve) may use as much as its deadline is long. All of that is seen
+/// when somebody looks: it makes no look_again.
 ///
 /// A job cannot have used a budget before that much time has passed: so the next look is due when the earliest thing
 /// can have happened. A running job is looked at no more than once in kWatchGrain_ns, so that one that was preempted
@@ -79,9 +79,9 @@ struct ReserveVerdict {
 
 /// A worker may have used up what it has before its job has even begun: where the host takes a CPU without saying so,
 /// the kernel charges whoever was on it. One that has, and is not served any more, is to be lifted. While others leave
-/// it something beyond its reservation (Reservation::reclaims) it goes on there. One that would be dropped at once, for
-/// what it owes or as an ordinary thread that is late, is not lifted. Nothing can be used up before that much time has
-/// passed since the release: a job that is done by then costs one look.
+/// it something beyond its reservation (Reservation::reclaims) it goes on there. One that would be dropped at once for
+/// what it owes is not lifted, and no late one to be an ordinary thread: its reservation is due again. Nothing can be
+/// used up before that much time has passed since the release: a job that is done by then costs one look.
 ReserveVerdict judge_reserve(const ReserveSight& sight);
 
 constexpr int64_t kReserveGrain_ns = 1'000'000;

@@ -23,7 +23,7 @@ namespace takt {
 ///   (demote_thread) until it ends; counted `demoted`. High-criticality jobs keep their priority, whatever they use.
 /// - Under `deadline` a job that is late because its reservation pays for time that the host took (see judge()) goes on
 ///   under SCHED_FIFO, as its node's next ones, until the kernel has forgotten that debt; counted `lifted`. One that
-///   uses more than that goes back into the reservation.
+///   uses more than that goes on as an ordinary thread.
 /// - Under `deadline` a worker that has used up its reservation goes on beside it before it is late (see judge_reserve()):
 ///   one with a task of high criticality under SCHED_FIFO, any other as an ordinary thread; counted `lifted` as well.
 /// - `safe_stop` is asked for the moment a budget or a deadline has passed, not when the job ends.

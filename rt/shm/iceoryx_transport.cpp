@@ -122,6 +122,18 @@ class Daemon {
                // It must not send SIGTERM to the processes it knows: this one is among them.
                iox::roudi::RouDi::RoudiStartupParameters{iox::roudi::MonitoringMode::ON, false}) {}
 
+  uint32_t chunks_in_use() const {
+    const auto segments = components_.rouDiMemoryManager.segmentManager();
+    if (!segments.has_value()) return 0;
+    const auto user = iox::posix::PosixUser::getUserOfCurrentProcess();
+    const auto segment = segments.value()->getSegmentInformationWithWriteAccessForUser(user);
+    if (!segment.m_memoryManager.has_value()) return 0;
+    const iox::mepoo::MemoryManager& pools = segment.m_memoryManager.value();
+    uint32_t chunks = 0;
+    for (uint32_t i = 0; i < pools.getNumberOfMemPools(); ++i) chunks += pools.getMemPoolInfo(i).m_usedChunks;
+    return chunks;
+  }
+
  private:
   iox::roudi::IceOryxRouDiComponents components_;
   iox::roudi::RouDi roudi_;
@@ -159,6 +171,7 @@ class IceoryxTransport final : public PortsOverIceoryx {
     // It makes every port, and waits for whatever keeps it from watching processes and joining ports.
     const iox::popo::UntypedSubscriber asked({"takt", "daemon", "does it answer"});
   }
+  uint32_t chunks_in_use() const override { return daemon_->chunks_in_use(); }
 
  private:
   std::unique_ptr<Daemon> daemon_;

@@ -102,7 +102,7 @@ class Transport {
   /// Asks the daemon that the transport depends on, and returns when it has answered: never if it hangs. At once where
   /// there is none. Not in a job.
   virtual void ask_daemon() {}
-  /// Of all ports together; 0 where only writers know.
+  /// Of all ports together, queues of readers included; 0 in a process that joined another one's memory.
   virtual uint32_t chunks_in_use() const { return 0; }
 };
 
