@@ -83,6 +83,9 @@ TEST_CASE("a late job is lifted only for what the host took, and dropped if it u
     sight.lifted = sight.ordinary = true;
     sight.cpu_left_ns = -1000 * kMs;
     CHECK_FALSE(judged(Policy::deadline).drop);
+    CHECK_FALSE(judged(Policy::deadline).lift);
+    sight.cpu_left_ns = -20 * kMs;  // of which the host took all
+    CHECK(judged(Policy::deadline).lift);
   }
   SUBCASE("once") {
     sight.lifted = true;
