@@ -153,7 +153,7 @@ struct Stalled final : Node {
   std::vector<int> policies;  ///< after each job, as the kernel says
   void setup(Setup&) override { policies.reserve(100); }
   void run(Job& job) override {
-    const int64_t until_ns = thread_cpu_ns() + (job.index() == 3 ? 60 * kMs : 0);
+    const int64_t until_ns = thread_cpu_ns() + (job.index() == 3 ? 100 * kMs : 0);
     do {
       was_first = was_first || own_policy() == SCHED_FIFO;
     } while (thread_cpu_ns() < until_ns);
@@ -187,7 +187,7 @@ TEST_CASE("under deadline a late job that pays for time of the host goes first, 
   options.duration_ns = 6'000 * kMs;
   options.board = &board;
   // The machine's own counter would decide otherwise. For a second, in which the long job falls.
-  options.stolen_ns = [&, reads = 0]() mutable { return host_takes ? std::min(++reads, 20) * 10 * kMs : 0; };
+  options.stolen_ns = [&, reads = 0]() mutable { return host_takes ? std::min(++reads, 20) * 100 * kMs : 0; };
   const RunResult result = Executor(plan, *transport, clock, options).run();
   if (result.policy_granted != Policy::deadline) {
     MESSAGE("NOT RUN: SCHED_DEADLINE is refused to this user");
