@@ -34,8 +34,7 @@ struct Place {
 
 class Ages {
  public:
-  Ages(const Plan& plan, const std::vector<NodeAdmission>& nodes)
-      : plan_(plan), nodes_(nodes), producers_(plan) {
+  Ages(const Plan& plan, const std::vector<NodeAdmission>& nodes) : plan_(plan), nodes_(nodes), producers_(plan) {
     ticks_ = ticks_per_ns();
   }
 

@@ -415,7 +415,7 @@ class IsolatedRun {
   size_t told_ = 0;
   bool ending_ = false;
   double memory_mb_ = 0;
-  uint32_t chunks_at_end_ = 0;  ///< see count_chunks
+  uint32_t chunks_at_end_ = 0;            ///< see count_chunks
   std::unique_ptr<Transport> transport_;  ///< of iceoryx with the daemon: ends after all members
   RunRecord record_;                      ///< reads from the transport
   RunTrace trace_;                        ///< speaks to the record
@@ -427,8 +427,7 @@ class IsolatedRun {
 /// The process that stands for the run to the service manager is the keeper; the group's is the one that speaks.
 void take_over_notifications(pid_t keeper) {
   const char* meant = std::getenv("WATCHDOG_PID");
-  if (meant != nullptr && std::to_string(keeper) == meant)
-    setenv("WATCHDOG_PID", std::to_string(getpid()).c_str(), 1);
+  if (meant != nullptr && std::to_string(keeper) == meant) setenv("WATCHDOG_PID", std::to_string(getpid()).c_str(), 1);
 }
 
 }  // namespace

@@ -60,9 +60,7 @@ Json modes_json(const RunFacts& facts) {
       Json::array({{{"name", facts.graph.mode}, {"from_s", 0.0}, {"to_s", seconds(end)}, {"reason", "start"}}});
   for (size_t i = 0; i < facts.board.modes().size(); ++i) {
     const ModeLog::Change* change = facts.board.modes().change(i);
-    if (change == nullptr || change->from_ns >= end) continue;
-    // Two processes whose devices came back at once have each asked for it.
-    if (change->origin == ModeOrigin::rule && facts.plan.modes[change->mode].name == modes.back()["name"]) continue;
+    if (change == nullptr || change->from_ns >= end || facts.board.modes().repeats(i)) continue;
     modes.back()["to_s"] = seconds(change->from_ns);
     modes.push_back({{"name", facts.plan.modes[change->mode].name},
                      {"from_s", seconds(change->from_ns)},

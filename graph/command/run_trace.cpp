@@ -23,7 +23,7 @@ std::vector<int> cpus_of(const Plan& plan) {
 /// Changes of mode belong to no thread; the board has them all.
 void add_modes(const RunBoard& board, trace::Trace& trace) {
   for (size_t i = 0; i < board.modes().size(); ++i)
-    if (const ModeLog::Change* change = board.modes().change(i))
+    if (const ModeLog::Change* change = board.modes().change(i); change != nullptr && !board.modes().repeats(i))
       trace.marks.push_back({trace::Kind::mode, change->from_ns, change->mode});
   std::stable_sort(trace.marks.begin(), trace.marks.end(),
                    [](const trace::Mark& a, const trace::Mark& b) { return a.at_ns < b.at_ns; });

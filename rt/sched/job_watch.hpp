@@ -52,9 +52,9 @@ class JobWatch {
   /// refuses.
   bool demote(uint64_t serial);
   /// Lets the worker, which has a reservation, go on under SCHED_FIFO, or as an ordinary thread: the `owed_ns` that it
-  /// owes the kernel are forgotten only with time (measured: the kernel keeps the debt of a thread that leaves and comes
-  /// back). After the first job that ends when that has passed, the worker takes its reservation back. False if the
-  /// thread sleeps or the kernel refuses.
+  /// owes the kernel are forgotten only with time (measured: the kernel keeps the debt of a thread that leaves and
+  /// comes back). After the first job that ends when that has passed, the worker takes its reservation back. False if
+  /// the thread sleeps or the kernel refuses.
   bool lift(int64_t now_ns, int64_t owed_ns, bool ordinary);
   /// A lifted worker goes on as an ordinary thread from here on.
   void drop();

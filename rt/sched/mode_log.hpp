@@ -61,6 +61,14 @@ class ModeLog {
   size_t size() const { return log_.size(); }
   /// In the order of their instants; null while it is being written.
   const Change* change(size_t i) const { return log_.at(i); }
+  /// A rule asked for the mode that was in force already: so does each process whose devices come back at that instant.
+  bool repeats(size_t i) const {
+    const Change* asked = change(i);
+    if (asked == nullptr || asked->origin != ModeOrigin::rule) return false;
+    while (i-- > 0)
+      if (const Change* before = change(i); before != nullptr) return before->mode == asked->mode;
+    return asked->mode == 0;
+  }
 
  private:
   bool has_room() const { return log_.size() + 8 <= kMost; }

@@ -57,19 +57,22 @@ WatchVerdict judge(const WatchRules& rules, const WatchSight& sight);
 
 constexpr int64_t kWatchGrain_ns = 100'000;
 
+/// The kernel's account is not ours: it begins and ends in the middle of what a worker does around its sleep.
+constexpr int64_t kReserveSlack_ns = 100'000;
+
 /// What a worker has left of its reservation. Times in ns.
 struct ReserveSight {
   int64_t now_ns = 0;
-  int64_t release_ns = 0;  ///< of the job that runs; else of the next one
-  int64_t deadline_ns = 0; ///< of that job
-  int64_t runtime_ns = 0;  ///< of the reservation
-  int64_t left_ns = 0;     ///< of it; must be told from release + runtime on
-  int64_t owed_ns = 0;     ///< by how much jobs of the worker overran lately, this one apart
-  bool stands = false;     ///< used_up() at the look before, and nothing was used since
+  int64_t release_ns = 0;   ///< of the job that runs; else of the next one
+  int64_t deadline_ns = 0;  ///< of that job
+  int64_t runtime_ns = 0;   ///< of the reservation
+  int64_t left_ns = 0;      ///< of it; must be told from release + runtime on
+  int64_t owed_ns = 0;      ///< by how much jobs of the worker overran lately, this one apart
+  bool stands = false;      ///< used_up() at the look before, and nothing was used since
   bool lifted = false;
-  bool ordinary = false;   ///< it would go on as an ordinary thread
+  bool ordinary = false;  ///< it would go on as an ordinary thread
 
-  bool used_up() const;
+  bool used_up() const { return left_ns <= kReserveSlack_ns; }
 };
 
 struct ReserveVerdict {
@@ -85,8 +88,5 @@ struct ReserveVerdict {
 ReserveVerdict judge_reserve(const ReserveSight& sight);
 
 constexpr int64_t kReserveGrain_ns = 1'000'000;
-/// The kernel's account is not ours: it begins and ends in the middle of what a worker does around its sleep.
-constexpr int64_t kReserveSlack_ns = 100'000;
-inline bool ReserveSight::used_up() const { return left_ns <= kReserveSlack_ns; }
 
 }  // namespace takt

@@ -160,7 +160,8 @@ void Watchdog::act(Watched& watched, const JobWatch::Running& job, const WatchVe
   const size_t task = watched.worker.tasks[job.member];
   if (verdict.overrun) overrun(watched, job, now_ns);
   if (const JobWatch& watch = *watched.worker.watch; verdict.lift)
-    lift(watched, task, watch.owed_ns(now_ns) + std::max<int64_t>(0, watch.cpu_ns() - job.cpu_limit_ns), now_ns, false);
+    lift(watched, task, watch.owed_ns(now_ns) + std::max<int64_t>(0, watch.cpu_ns() - job.cpu_limit_ns), now_ns,
+         /*ordinary=*/false);
   if (verdict.drop) watched.worker.watch->drop();
   if (verdict.miss) {
     watched.miss_told = job.serial;

@@ -24,14 +24,14 @@ namespace takt {
 /// - Under `deadline` a job that is late because its reservation pays for time that the host took (see judge()) goes on
 ///   under SCHED_FIFO, as its node's next ones, until the kernel has forgotten that debt; counted `lifted`. One that
 ///   uses more than that goes on as an ordinary thread.
-/// - Under `deadline` a worker that has used up its reservation goes on beside it before it is late (see judge_reserve()):
+/// - Under `deadline` a worker that has used up its reservation goes on beside it before it is late (judge_reserve()):
 ///   one with a task of high criticality under SCHED_FIFO, any other as an ordinary thread; counted `lifted` as well.
 /// - `safe_stop` is asked for the moment a budget or a deadline has passed, not when the job ends.
 /// - A job that has not returned `patience` after its deadline hangs: told once, by name. Under `cooperative` that ends
 ///   the run, unless somebody looks after this process.
 ///
-/// Cost: at most one wake-up a job that is minded (under `deadline`: each), none for the others but one a job's deadline
-/// and patience; under `deadline` one every 50 ms, 5 ms while the host takes time.
+/// Cost: at most one wake-up a job that is minded (under `deadline`: each), none for the others but one a job's
+/// deadline and patience; under `deadline` one every 50 ms, 5 ms while the host takes time.
 class Watchdog {
  public:
   struct Worker {

@@ -163,7 +163,8 @@ struct Stalled final : Node {
 
 }  // namespace
 
-TEST_CASE("under deadline a late job that pays for time of the host goes first, and its thread takes its reservation back") {
+TEST_CASE(
+    "under deadline a late job that pays for time of the host goes first, and its thread takes its reservation back") {
   constexpr int kDeadline = 6;  // SCHED_DEADLINE
   bool host_takes = false;
   SUBCASE("the host took it") { host_takes = true; }

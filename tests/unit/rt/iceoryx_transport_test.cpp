@@ -36,7 +36,9 @@ TEST_CASE("a second iceoryx transport in the process is refused, one after the o
     CHECK_THROWS_AS(make_iceoryx_transport(ports), TransportError);
     const auto writer = transport->make_writer(basic);
     const auto reader = transport->make_reader(basic);
+    CHECK(transport->chunks_in_use() == 0);
     publish(*writer, 3, 0, 0);
+    CHECK(transport->chunks_in_use() > 0);
     CHECK(sequences(*reader, kEver) == Sequences{1});
   }
   const auto transport = make_iceoryx_transport(ports);

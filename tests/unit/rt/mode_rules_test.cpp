@@ -5,8 +5,10 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <random>
 #include <set>
+#include <thread>
 
 #include "rt/sched/mode_log.hpp"
 
@@ -114,4 +116,23 @@ TEST_CASE("random histories: log and rule say what the slow reference says") {
     }
   }
   CHECK(changes > 1000);
+}
+
+TEST_CASE("a mode that several processes ask for at once is entered once") {
+  ModeLog log;
+  constexpr uint32_t kRounds = 500;
+  for (uint32_t round = 0; round < kRounds; ++round) {
+    std::atomic<int> ready{0};
+    const auto ask = [&] {
+      for (++ready; ready.load() < 2;) std::this_thread::yield();
+      log.request_by_rule((round + 1) % 2, round, "");
+    };
+    std::thread other(ask);
+    ask();
+    other.join();
+  }
+  size_t entered = 0;
+  for (size_t i = 0; i < log.size(); ++i) entered += log.repeats(i) ? 0 : 1;
+  CHECK(entered == kRounds);
+  MESSAGE("asked for twice in " << log.size() - kRounds << " of " << kRounds << " rounds");
 }

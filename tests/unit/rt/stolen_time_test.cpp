@@ -95,6 +95,10 @@ TEST_CASE("a late job is lifted only for what the host took, and dropped if it u
 }
 
 TEST_CASE("a reservation that is used up: the worker is lifted once it stands, and looked at no more than needed") {
+  TaskPlan task;
+  CHECK(watch_rules(task, Policy::deadline, 1000 * kMs).ordinary);
+  task.criticality = Criticality::high;
+  CHECK_FALSE(watch_rules(task, Policy::deadline, 1000 * kMs).ordinary);
   ReserveSight sight;
   sight.release_ns = 100 * kMs;
   sight.runtime_ns = 4 * kMs;
