@@ -164,6 +164,8 @@ TEST_CASE("one that stands still on its way back is ended after the silence, one
   };
   SUBCASE("stands still") {
     kill(second, SIGSTOP);
+    siginfo_t stopped;  // until then it may use CPU time yet, which is a sign of life
+    while (waitid(P_PID, static_cast<id_t>(second), &stopped, WSTOPPED | WNOWAIT) != 0) REQUIRE(errno == EINTR);
     until_ended([] {});
     // However late its death is seen, it was ended long before the patience was over.
     CHECK(std::string(scene.outage().cause.c_str()) == "was ended by signal 9 (Killed)");
