@@ -1,8 +1,8 @@
 #!/bin/bash
 # SPDX-License-Identifier: Apache-2.0
 # From scan stamp to stop command while every other node asks for more than there is: overload.sh [SECONDS]. The others
-# get four times their rate, a fourth of their budgets and deadlines, and low criticality: they reserve what they did before and
-# want four times that. Prints the chain `stop` of a quiet run and of overloaded ones under each policy; exit 1 if under
+# get eight times their rate, an eighth of their budgets and deadlines, and low criticality: they reserve what they did before and
+# want eight times that. Prints the chain `stop` of a quiet run and of overloaded ones under each policy; exit 1 if under
 # `deadline` or `fixed` the chain exceeded its bound, obstacle_stop missed a deadline, or there was no overload.
 # `overload.sh inputs` only makes the schedule and has it read.
 set -eu
@@ -15,7 +15,7 @@ trap 'rm -rf "$work"' EXIT
 python3 - "$root/schedules/thesis.yaml" "$work/overload.yaml" <<'PY'
 import sys
 from schedule_lines import Schedule, in_us, seconds
-FACTOR = 4
+FACTOR = 8
 schedule = Schedule(sys.argv[1])
 schedule.change("obstacle_stop", criticality="high")
 for node, says in schedule.nodes.items():

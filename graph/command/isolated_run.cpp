@@ -184,7 +184,7 @@ class IsolatedRun {
 
  private:
   /// An earlier supervisor was lost with all processes; board and epoch are still what they were.
-  bool again() const { return board_.group().losses.size() > 0; }
+  bool again() const { return board_.group().losses.load() > 0; }
   void forget_processes() {
     board_.carrier().store(RunBoard::no_carrier);
     board_.dismissed().store(false);
@@ -289,7 +289,7 @@ class IsolatedRun {
     how.clean_up = [](pid_t pid) { remove_iceoryx_leftovers(IceoryxPlaces::of_this_machine(), pid); };
     how.say = [](const std::string& what) { std::fprintf(stderr, "takt: %s\n", what.c_str()); };
     supervisor_.emplace(plan_, board_, group_, *transport_, clock_, tasks_of(plan_, partition_), how);
-    if (again()) supervisor_->all_were_lost(*board_.group().losses.at(board_.group().losses.size() - 1));
+    if (again()) supervisor_->all_were_lost(board_.group().newest_loss);
     int64_t give_up_ns = INT64_MAX;
     const auto ended = [&] {
       supervisor_->look();

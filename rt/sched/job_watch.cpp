@@ -15,6 +15,7 @@ namespace takt {
 void JobWatch::bind(const Reservation& has) {
   thread_local const int thread = gettid();
   has_ = has;
+  runtime_ns_.store(has.runtime_ns, std::memory_order_release);
   clockid_t clock{};
   if (pthread_getcpuclockid(pthread_self(), &clock) == 0) clock_.store(clock, std::memory_order_release);
   rest(cpu_ns());
@@ -100,12 +101,13 @@ bool JobWatch::demote(uint64_t serial) {
 
 bool JobWatch::lift(int64_t now_ns, int64_t owed_ns, bool ordinary) {
   const int thread = thread_.load(std::memory_order_acquire);
-  if (has_.runtime_ns <= 0 || !runnable(thread)) return false;
+  const int64_t runtime_ns = this->runtime_ns();
+  if (runtime_ns <= 0 || !runnable(thread)) return false;
   if (!(ordinary ? demote_thread(thread) : lift_thread(thread))) return false;
   ordinary_ = ordinary;
   // One period for each budget that is owed, the one under way, and one to be sure.
   constexpr int64_t kLongest_ns = 30'000'000'000;
-  const int64_t lapse_ns = (owed_ns / has_.runtime_ns + 2) * has_.period_ns;
+  const int64_t lapse_ns = (owed_ns / runtime_ns + 2) * has_.period_ns;
   lifted_until_ns_.store(now_ns + std::min(lapse_ns, kLongest_ns), std::memory_order_release);
   return true;
 }

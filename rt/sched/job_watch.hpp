@@ -45,9 +45,9 @@ class JobWatch {
   /// CPU clock of the worker, ns; -1 if it cannot be read.
   int64_t cpu_ns() const;
   /// Runtime of its reservation; 0: it has none.
-  int64_t runtime_ns() const { return has_.runtime_ns; }
+  int64_t runtime_ns() const { return runtime_ns_.load(std::memory_order_acquire); }
   /// Reading of its CPU clock at which a whole runtime is used since it rested.
-  int64_t reserve_end_ns() const { return rested_cpu_ns_.load(std::memory_order_acquire) + has_.runtime_ns; }
+  int64_t reserve_end_ns() const { return rested_cpu_ns_.load(std::memory_order_acquire) + runtime_ns(); }
   /// Puts the worker behind everybody else until its job ends; false if job `serial` ended before, or the kernel
   /// refuses.
   bool demote(uint64_t serial);
@@ -83,6 +83,7 @@ class JobWatch {
   std::atomic<int64_t> owed_ns_{0}, owed_at_ns_{0}, rested_cpu_ns_{0};
   std::atomic<int> thread_{0};
   std::atomic<clockid_t> clock_{0};
+  std::atomic<int64_t> runtime_ns_{0};  ///< of `has_`, for the watchdog, which looks before the worker is bound
   Reservation has_;
 };
 

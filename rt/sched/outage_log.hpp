@@ -62,14 +62,15 @@ class OutageLog {
   std::array<Outage, kMost> outages_{};
 };
 
-/// What a group of processes, a supervisor with its members, shows to the one who keeps it.
+/// What a group of processes, a supervisor with its members, and the one who keeps it show to each other.
 struct GroupSigns {
   struct Loss {
     int64_t from_ns = 0;
     BoundedText<200> cause;
   };
   std::atomic<int64_t> heartbeat_ns{0};  ///< when the daemon of its transport last answered; 0: no answer is expected
-  AppendLog<Loss, 32> losses;            ///< groups that were lost
+  Loss newest_loss;                      ///< written by the keeper, while there is no group
+  std::atomic<uint64_t> losses{0};       ///< groups that were lost
 };
 
 }  // namespace takt

@@ -90,7 +90,8 @@ std::optional<int> GroupKeeper::watch(const std::function<int()>& group) {
                                   std::to_string(WTERMSIG(status)) + " (" + strsignal(WTERMSIG(status)) + ")");
   }
   if (told) return 128 + WTERMSIG(status);  // it was to end anyway
-  signs_.losses.append(loss);
+  signs_.newest_loss = loss;
+  signs_.losses.fetch_add(1);
   if (options_.say) options_.say(std::string(loss.cause.c_str()) + "; all processes are started again");
   return std::nullopt;
 }

@@ -54,7 +54,7 @@ struct Scene {
   std::optional<int> keep(const std::function<int(int)>& group) {
     return GroupKeeper(shared->signs, clock, options).keep([&] { return group(shared->groups.fetch_add(1) + 1); });
   }
-  const GroupSigns::Loss& loss(size_t i) const { return *shared->signs.losses.at(i); }
+  const GroupSigns::Loss& loss() const { return shared->signs.newest_loss; }
 };
 
 int wait_for_ever() {
@@ -81,7 +81,7 @@ TEST_CASE("the code of a group that ends by itself is that of the run") {
   Scene scene;
   CHECK(scene.keep([](int) { return 3; }) == 3);
   CHECK(scene.shared->groups.load() == 1);
-  CHECK(scene.shared->signs.losses.size() == 0);
+  CHECK(scene.shared->signs.losses.load() == 0);
   CHECK(scene.cleaned.empty());
 }
 
@@ -90,8 +90,8 @@ TEST_CASE("a group whose first process dies is cleared up after, noted and start
   CHECK(scene.keep([](int number) { return number == 1 ? raise(SIGKILL) : 4; }) == 4);
   CHECK(scene.shared->groups.load() == 2);
   CHECK(scene.cleaned.size() == 1);
-  REQUIRE(scene.shared->signs.losses.size() == 1);
-  CHECK(std::string(scene.loss(0).cause.c_str()) == "the supervisor was ended by signal 9 (Killed)");
+  REQUIRE(scene.shared->signs.losses.load() == 1);
+  CHECK(std::string(scene.loss().cause.c_str()) == "the supervisor was ended by signal 9 (Killed)");
   REQUIRE(scene.said.size() == 1);
   CHECK(scene.said[0].find("all processes are started again") != std::string::npos);
 }
@@ -104,16 +104,30 @@ TEST_CASE("a group that once gave a sign and gives none any more is ended and st
     return wait_for_ever();
   });
   CHECK(code == 0);
-  REQUIRE(scene.shared->signs.losses.size() == 1);
-  CHECK(scene.loss(0).from_ns == 77);  // lost since it was last heard
-  CHECK(std::string(scene.loss(0).cause.c_str()) == "the transport's daemon gave no sign of life");
+  REQUIRE(scene.shared->signs.losses.load() == 1);
+  CHECK(scene.loss().from_ns == 77);  // lost since it was last heard
+  CHECK(std::string(scene.loss().cause.c_str()) == "the transport's daemon gave no sign of life");
+}
+
+TEST_CASE("after any number of losses the newest one is told") {
+  Scene scene;
+  constexpr int kMany = 100;
+  scene.options.restarts.most_in_window = kMany + 1;
+  const auto code = scene.keep([&](int number) {
+    if (number > kMany) return 0;
+    scene.shared->signs.heartbeat_ns.store(number);
+    return wait_for_ever();
+  });
+  CHECK(code == 0);
+  CHECK(scene.shared->signs.losses.load() == kMany);
+  CHECK(scene.loss().from_ns == kMany);
 }
 
 TEST_CASE("too many losses in a short time are the last one") {
   Scene scene;
   CHECK_FALSE(scene.keep([](int) { return raise(SIGKILL); }));
   CHECK(scene.shared->groups.load() == 3);
-  CHECK(scene.shared->signs.losses.size() == 3);
+  CHECK(scene.shared->signs.losses.load() == 3);
 }
 
 TEST_CASE("asked to stop, it passes that on, and what ends then is no loss") {
@@ -125,5 +139,5 @@ TEST_CASE("asked to stop, it passes that on, and what ends then is no loss") {
   };
   CHECK(scene.keep(group) == 128 + SIGTERM);
   CHECK(scene.shared->groups.load() == 1);
-  CHECK(scene.shared->signs.losses.size() == 0);
+  CHECK(scene.shared->signs.losses.load() == 0);
 }
