@@ -2,10 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 # What `on_overrun: degrade` is worth: degrade.sh [SECONDS OF THE CAUSE]. The stereo node of the simulated robot is slowed
 # while it runs: it is asked to search more disparities (`takt set stereo.search`), so that a job at full quality takes over
-# twice its budget, and told to search the usual number again. It matches by the quality matcher and does little else: the cost
-# of the default one hardly depends on the range. Budget and number follow from what a job costs here, which is measured first. The same run twice, with `continue` and with `degrade`; the rest of the graph is the thesis's. Exit 1 unless
-# a job took twice its budget, more than 30 % were late or skipped meanwhile without `degrade`, less than 1 % with it, and
-# level 0 was back within 5 s of the cause's end; 3 where SCHED_DEADLINE, which makes an overrun late, is refused.
+# twice its budget, and told to search the usual number again. It matches in large windows, in both directions, and does little
+# else: by default its cost depends too little on the range. Budget and number follow from what a job costs here, which is
+# measured first. Its deadline is twice the budget: what takes longer is late even if all CPUs are free. To make room for that,
+# four of the dear nodes run at 2 Hz; the rest of the graph is the thesis's. It is not proven with the enforcement error of a
+# virtual machine, and so runs `--unchecked`. The same run twice, with `continue` and with `degrade`. Exit 1 unless a job took
+# twice its budget, more than 30 % were late or skipped meanwhile without `degrade`, less than 1 % with it, and level 0 was back
+# within 5 s of the cause's end; 3 where SCHED_DEADLINE, which makes an overrun late, is refused.
 # `degrade.sh inputs` only makes the schedule and has it read.
 set -eu
 root=$(readlink -f "$(dirname "$0")/../..")
@@ -23,13 +26,14 @@ from schedule_lines import Schedule, in_us
 root, takt, work, cause = sys.argv[1:]
 BEFORE, AFTER, RATE = 6, 10, 15
 MOST = 512             # disparities that the node can search
-TWICE = (2.1, 2.2, 2.4)  # least, wanted and most of a slowed job over its budget: at half resolution it still fits
-DEAR = ("cost=census", "n_square=1", "n_min=1", "selection=semi_global", "cloud_step=8", "row_check=false", f"disparities={MOST}")
+TWICE = (2.3, 2.5, 2.8)  # least, wanted and most of a slowed job over its budget, as measured: a shared machine may be faster later
+DEAR = ("n_square=31", "n_min=1", "left_right_check=true", "cloud_step=16", "row_check=false", f"disparities={MOST}")
 QUIET = dict(stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
 
 def schedule(verb, **says):
     made = Schedule(f"{root}/schedules/thesis.yaml")
+    for node in ("stereo_wide", "traffic_signs", "body_pose", "object_detection"): made.change(node, rate="2", deadline="450ms")
     made.change("stereo", rate=str(RATE), on_overrun=verb, **says)
     made.write(f"{work}/{verb}.yaml")
     return ["--schedule", f"{work}/{verb}.yaml", *(word for value in DEAR for word in ("--set", f"stereo.{value}"))]
@@ -76,7 +80,8 @@ def running_s():
 
 def slowed_run(verb, budget, usual, many):
     """The instants at which it was slowed and let go, and what `takt top` showed meanwhile."""
-    process = subprocess.Popen(run(verb, usual, BEFORE + cause + AFTER, budget=in_us(budget / 1000)), **QUIET)
+    process = subprocess.Popen(run(verb, usual, BEFORE + cause + AFTER, "--unchecked", budget=in_us(budget / 1000),
+                                   deadline=in_us(2 * budget / 1000)), **QUIET)
 
     def wait_until(instant_s):
         while (now := running_s()) < instant_s:
@@ -119,7 +124,7 @@ def judge(verb, budget, instants, tops):
 
 
 if cause == "inputs":
-    sys.exit(subprocess.run([takt, "check", f"{root}/graph/ace.yaml", *schedule("degrade", budget="10ms")], **QUIET).returncode > 1)
+    sys.exit(subprocess.run([takt, "check", f"{root}/graph/ace.yaml", *schedule("degrade", budget="10ms", deadline="20ms")], **QUIET).returncode > 1)
 cause = float(cause)
 chosen = choose()
 granted, without, _, over = judge("continue", chosen[0], *slowed_run("continue", *chosen))

@@ -1,21 +1,23 @@
 #!/bin/bash
 # SPDX-License-Identifier: Apache-2.0
 # From scan stamp to stop command while every other node asks for more than there is: overload.sh [SECONDS]. The others
-# get eight times their rate, an eighth of their budgets and deadlines, and low criticality: they reserve what they did before and
-# want eight times that. Prints the chain `stop` of a quiet run and of overloaded ones under each policy; exit 1 if under
-# `deadline` or `fixed` the chain exceeded its bound, obstacle_stop missed a deadline, or there was no overload.
+# get four times their rate, a fourth of their budgets and deadlines, and low criticality: they reserve what they did before and
+# want four times that; both stereo nodes match in adaptive windows, which alone asks for more than two CPUs. Prints the chain
+# `stop` of a quiet run and of overloaded ones under each policy; exit 1 if under `deadline` or `fixed` the chain exceeded its
+# bound, obstacle_stop missed a deadline, or there was no overload.
 # `overload.sh inputs` only makes the schedule and has it read.
 set -eu
 root=$(readlink -f "$(dirname "$0")/../..")
 export PYTHONPATH="$root/bench/scenarios" PYTHONDONTWRITEBYTECODE=1
 takt=${TAKT:-$root/takt}
 seconds=${1:-20}
+dear=(--set stereo.aggregation=adaptive_window --set stereo_wide.aggregation=adaptive_window)
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 python3 - "$root/schedules/thesis.yaml" "$work/overload.yaml" <<'PY'
 import sys
 from schedule_lines import Schedule, in_us, seconds
-FACTOR = 8
+FACTOR = 4
 schedule = Schedule(sys.argv[1])
 schedule.change("obstacle_stop", criticality="high")
 for node, says in schedule.nodes.items():
@@ -27,7 +29,7 @@ for node, says in schedule.nodes.items():
 schedule.write(sys.argv[2])
 PY
 if [ "${1:-}" = inputs ]; then
-  "$takt" check "$root/graph/ace.yaml" --schedule "$work/overload.yaml" --set stereo.disparities=500 >"$work/check" || [ $? -eq 1 ]
+  "$takt" check "$root/graph/ace.yaml" --schedule "$work/overload.yaml" "${dear[@]}" >"$work/check" || [ $? -eq 1 ]
   exit
 fi
 
@@ -37,7 +39,7 @@ run() { # NAME OPTIONS...
 }
 run quiet
 for policy in deadline fixed cooperative; do
-  run $policy --policy $policy --schedule "$work/overload.yaml" --unchecked --set stereo.disparities=500
+  run $policy --policy $policy --schedule "$work/overload.yaml" --unchecked "${dear[@]}"
 done
 python3 - "$work" <<'PY'
 import json, os, sys
