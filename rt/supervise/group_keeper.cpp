@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <cstring>
 #include <ctime>
+#include <fstream>
 #include <stdexcept>
 #include <utility>
 
@@ -35,10 +36,18 @@ pid_t fork_group(const std::function<int()>& group) {
   std::exit(code);
 }
 
-/// They die with their supervisor and then belong to this process; waits until the last one is gone.
+/// Of this process, which has one thread.
+void kill_children() {
+  std::ifstream children("/proc/thread-self/children");
+  for (pid_t child; children >> child;) kill(child, SIGKILL);
+}
+
+/// They die with their supervisor, but for one that was just being forked or that has no tie to it; then they belong to
+/// this process. Waits until the last one is gone: the next group works on the same board.
 void bury_members() {
   pid_t buried = 0;
   for (int tries = 0; tries < 1000 && (buried >= 0 || errno != ECHILD); ++tries) {
+    kill_children();
     buried = waitpid(-1, nullptr, WNOHANG);
     if (buried == 0) wait_a_step();
   }

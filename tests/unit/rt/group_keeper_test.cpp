@@ -29,6 +29,7 @@ struct Scene {
   struct Shared {
     GroupSigns signs;
     std::atomic<int> groups{0};
+    std::atomic<pid_t> member{0};
   };
   Shared* shared;
   HastyClock clock;
@@ -107,6 +108,18 @@ TEST_CASE("a group that once gave a sign and gives none any more is ended and st
   REQUIRE(scene.shared->signs.losses.load() == 1);
   CHECK(scene.loss().from_ns == 77);  // lost since it was last heard
   CHECK(std::string(scene.loss().cause.c_str()) == "the transport's daemon gave no sign of life");
+}
+
+TEST_CASE("nobody of a lost group lives on beside the next one") {
+  Scene scene;
+  const auto code = scene.keep([&](int number) {
+    if (number == 2) return kill(scene.shared->member.load(), 0) == 0 ? 9 : 5;
+    const pid_t member = fork();
+    if (member == 0) wait_for_ever();  // does not die with who forked it
+    scene.shared->member.store(member);
+    return raise(SIGKILL);
+  });
+  CHECK(code == 5);
 }
 
 TEST_CASE("after any number of losses the newest one is told") {
