@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # From scan stamp to stop command while every other node asks for more than there is: overload.sh [SECONDS]. The others
 # get four times their rate, a fourth of their budgets and deadlines, and low criticality: they reserve what they did before and
-# want four times that; both stereo nodes match in adaptive windows, which alone asks for more than two CPUs. Prints the chain
+# want four times that; both stereo nodes match in adaptive windows, which takes all that is left of two CPUs. Prints the chain
 # `stop` of a quiet run and of overloaded ones under each policy; exit 1 if under `deadline` or `fixed` the chain exceeded its
 # bound, obstacle_stop missed a deadline, or there was no overload.
 # `overload.sh inputs` only makes the schedule and has it read.
