@@ -1,7 +1,7 @@
 #!/bin/bash
 # SPDX-License-Identifier: Apache-2.0
-# Kills processes of a run at every step of a message's life: kill_steps.sh [REPEATS] [TRANSPORT...]
-# Default: 50 repeats over local and iceoryx. One run for each step: the process of stereo (the writer of
+# Kills processes of a run at every step of a message's life: kill_steps.sh [REPEATS] [TRANSPORT or STEP...]
+# Default: 50 repeats of all steps over local and iceoryx. One run for each step: the process of stereo (the writer of
 # stereo.disparity), or of semantic (a reader of obstacle_stop.stop), is killed there every 4 s (over iceoryx less often), at
 # the instants within inside_publish in turn. Prints for each step how often it struck, what came of it (the process came
 # back, or the whole group was started anew), how long it took, and the chunks in use at the end beside those of a run
@@ -12,9 +12,12 @@ import json, os, subprocess, sys, tempfile
 
 takt, root, args = sys.argv[1], sys.argv[2], sys.argv[3:]
 repeats = int(args[0]) if args else 50
-transports = args[1:] or ["local", "iceoryx"]
 writer = [(step, "stereo.disparity", None) for step in ("after_loan", "half_written", "inside_publish", "after_publish")]
 reader = [(step, "obstacle_stop.stop", "semantic") for step in ("while_held", "inside_release")]
+known = ["local", "iceoryx"], [step for step, _, _ in writer + reader]
+if unknown := [a for a in args[1:] if a not in known[0] + known[1]]:
+    sys.exit(f"kill_steps.sh: {unknown[0]} is neither a transport ({', '.join(known[0])}) nor a step ({', '.join(known[1])})")
+transports, steps = ([a for a in args[1:] if a in those] or those for those in known)
 bad = 0
 print(f"{'transport':10}{'step':16}{'struck':>7}{'back':>6}{'group':>7}{'away p50':>10}{'max':>8}  others' high-criticality misses; chunks at the end")
 
@@ -36,7 +39,7 @@ for transport in transports:
     with tempfile.TemporaryDirectory(prefix="steps-") as work:
         calm = run_it(work, transport, 30)
     if calm is None: sys.exit(1)
-    for step, output, who in writer + reader:
+    for step, output, who in (of for of in writer + reader if of[0] in steps):
         with tempfile.TemporaryDirectory(prefix="steps-") as work:
             # Given up, by design, is a process that ends 12 times in 30 s, and a group that is lost six times.
             pace = 4 if transport == "local" else 8 if step == "inside_publish" else 5
