@@ -182,7 +182,7 @@ void Executor::run_cooperative(RunResult& result) {
       name_thread("takt-worker-" + std::to_string(i));
       const trace::Thread traced(options_.trace, "takt-worker-" + std::to_string(i));
       prefault_stack();
-      apply(Reservation{});
+      apply(cooperative_reservation());
       start_counting();
       queue.work();
     });

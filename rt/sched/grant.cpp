@@ -118,7 +118,24 @@ Grant apply_fixed(const Reservation& wanted) {
   return grant;
 }
 
+Grant apply_cooperative(const Reservation& wanted) {
+  Grant grant;
+  grant.verified = true;
+  if (wanted.slice_ns == 0) return grant;
+  SchedulingAttributes a;
+  if (get_attributes(a) != 0) return grant;
+  a.runtime = static_cast<uint64_t>(wanted.slice_ns);
+  set_attributes(a);  // no promise rests on it
+  return grant;
+}
+
 }  // namespace
+
+Reservation cooperative_reservation() {
+  Reservation r;
+  r.slice_ns = 100'000;
+  return r;
+}
 
 Reservation deadline_reservation(int64_t budget_ns, int64_t deadline_ns, int64_t period_ns) {
   Reservation r;
@@ -140,7 +157,7 @@ Grant apply(const Reservation& wanted, int64_t patience_ns) {
   Grant grant;
   if (wanted.policy == Policy::deadline) grant = apply_deadline(wanted, patience_ns);
   else if (wanted.policy == Policy::fixed) grant = apply_fixed(wanted);
-  else grant.verified = true;
+  else grant = apply_cooperative(wanted);
   grant.cpus = current_cpus();
   if (wanted.policy == Policy::fixed && wanted.core >= 0)
     grant.verified = grant.verified && grant.cpus == std::vector<int>{wanted.core};
@@ -157,9 +174,16 @@ bool lift_thread(int thread) {
   return sched_setscheduler(thread, SCHED_FIFO | SCHED_RESET_ON_FORK, &param) == 0;
 }
 
+bool take_from_reservation(int thread) {
+  if ((sched_getscheduler(thread) & ~SCHED_RESET_ON_FORK) != static_cast<int>(kDeadline)) return false;
+  if (!runnable(thread)) return false;
+  const sched_param lowest{1};
+  return sched_setscheduler(thread, SCHED_FIFO | SCHED_RESET_ON_FORK, &lowest) == 0 || demote_thread(thread);
+}
+
 bool runnable(int thread) {
   std::array<char, 256> text{};
-  std::snprintf(text.data(), text.size(), "/proc/self/task/%d/stat", thread);
+  std::snprintf(text.data(), text.size(), "/proc/%d/stat", thread);
   const int file = open(text.data(), O_RDONLY | O_CLOEXEC);
   if (file < 0) return false;
   const ssize_t got = read(file, text.data(), text.size());

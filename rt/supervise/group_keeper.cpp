@@ -14,6 +14,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "rt/supervise/hasten_end.hpp"
+
 namespace takt {
 namespace {
 
@@ -39,11 +41,14 @@ pid_t fork_group(const std::function<int()>& group) {
 /// Of this process, which has one thread.
 void kill_children() {
   std::ifstream children("/proc/thread-self/children");
-  for (pid_t child; children >> child;) kill(child, SIGKILL);
+  for (pid_t child; children >> child;) {
+    kill(child, SIGKILL);
+    hasten_end(child);
+  }
 }
 
-/// They die with their supervisor, but for one that was just being forked or that has no tie to it; then they belong to
-/// this process. Waits until the last one is gone: the next group works on the same board.
+/// They die with their supervisor, but for one that was just being forked or that has no tie to it; all of them belong to
+/// this process then. Waits until the last one is gone: the next group works on the same board.
 void bury_members() {
   pid_t buried = 0;
   for (int tries = 0; tries < 1000 && (buried >= 0 || errno != ECHILD); ++tries) {
@@ -90,8 +95,8 @@ std::optional<int> GroupKeeper::watch(const std::function<int()>& group) {
     loss.cause = BoundedText<200>("the transport's daemon gave no sign of life");
     kill(pid, SIGKILL);  // its members go with it
   }
-  if (!WIFSIGNALED(status)) return WEXITSTATUS(status);
   bury_members();
+  if (!WIFSIGNALED(status)) return WEXITSTATUS(status);
   if (options_.clean_up) options_.clean_up(pid);
   if (loss.from_ns == 0) {
     loss.from_ns = clock_.now_ns();

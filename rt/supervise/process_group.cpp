@@ -16,6 +16,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "rt/supervise/hasten_end.hpp"
+
 namespace takt {
 namespace {
 
@@ -49,7 +51,10 @@ ProcessGroup::~ProcessGroup() {
   kill_all();
   for (const Member& member : members_) {
     if (member.pid <= 0) continue;
-    while (waitpid(member.pid, nullptr, 0) < 0 && errno == EINTR) {
+    for (bool ended = false; !ended; ended = waitpid(member.pid, nullptr, WNOHANG) != 0) {
+      hasten_end(member.pid);
+      const timespec pause{0, 1'000'000};
+      nanosleep(&pause, nullptr);
     }
   }
 }
@@ -62,7 +67,7 @@ void ProcessGroup::start(const std::string& name, const std::function<int()>& bo
     die_with(supervisor);
     run_member(name, body);
   }
-  members_.push_back({name, pid, body});
+  members_.push_back({name, pid, body, false});
 }
 
 void ProcessGroup::prepare_restarts() {
@@ -90,16 +95,25 @@ int64_t ProcessGroup::cpu_ns(size_t process) const {
 
 std::optional<ProcessGroup::End> ProcessGroup::reap() {
   if (nursery_) nursery_->look();
+  if (++looks_ % kLooksBetween == 0) hasten_ends();
   for (size_t i = 0; i < members_.size(); ++i) {
     int status = 0;
     rusage used{};
     if (members_[i].pid <= 0 || wait4(members_[i].pid, &status, WNOHANG, &used) != members_[i].pid) continue;
     const pid_t pid = std::exchange(members_[i].pid, 0);
+    members_[i].ending = false;
     const int64_t cpu_ns = nanoseconds(used.ru_utime) + nanoseconds(used.ru_stime);
     if (WIFSIGNALED(status)) return End{i, pid, -1, WTERMSIG(status), cpu_ns};
     return End{i, pid, WEXITSTATUS(status), 0, cpu_ns};
   }
   return std::nullopt;
+}
+
+void ProcessGroup::hasten_ends() {
+  for (Member& member : members_) {
+    // Most end within one look; who does not waits for something.
+    if (member.pid > 0 && std::exchange(member.ending, is_ending(member.pid)) && member.ending) hasten_end(member.pid);
+  }
 }
 
 void ProcessGroup::kill_all() {
