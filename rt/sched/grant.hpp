@@ -8,7 +8,7 @@
 
 namespace takt {
 
-/// SCHED_FIFO priority of the lane with the shortest span under `fixed`. Below the kernel's own interrupt threads (50
+/// The highest SCHED_FIFO priority of a lane under `fixed`. Below the kernel's own interrupt threads (50
 /// by default) nothing is gained.
 inline constexpr int kHighestPriority = 80;
 

@@ -127,6 +127,44 @@ void add_ordinary(const Overheads& o, analysis::TaskSet& set) {
   }
 }
 
+bool is_high(const Plan& plan, const std::vector<size_t>& lane) {
+  return std::any_of(lane.begin(), lane.end(),
+                     [&](size_t t) { return plan.tasks[t].criticality == Criticality::high; });
+}
+
+/// Of a core's tasks, `indexes` in the set, the lanes of high criticality come first. Deadline monotonic order within
+/// them and within the others stays.
+void put_high_first(const Plan& plan, const LaneTasks& lanes, std::vector<size_t> indexes, analysis::TaskSet& set) {
+  std::sort(indexes.begin(), indexes.end(),
+            [&](size_t a, size_t b) { return set.tasks[a].priority > set.tasks[b].priority; });
+  std::vector<int> priorities;
+  for (const size_t i : indexes) priorities.push_back(set.tasks[i].priority);
+  std::stable_partition(indexes.begin(), indexes.end(),
+                        [&](size_t i) { return i < lanes.lanes.size() && is_high(plan, lanes.lanes[i]); });
+  for (size_t k = 0; k < indexes.size(); ++k) set.tasks[indexes[k]].priority = priorities[k];
+}
+
+/// Criticality decides who yields: a node that overruns its budget is stopped late, and an overload that nobody admitted
+/// is not stopped at all. So the high ones go first on each core, unless the others would miss deadlines then that they
+/// meet in plain deadline monotonic order.
+void let_criticality_decide(const Plan& plan, LaneTasks& lanes) {
+  const auto verdict = [](const analysis::TaskSet& set, const std::vector<size_t>& indexes) {
+    std::vector<analysis::TimedTask> tasks;
+    for (const size_t i : indexes) tasks.push_back(set.tasks[i]);
+    return analysis::core_verdict(tasks, analysis::CorePolicy::fixed_priority);
+  };
+  for (int core = 0; core < lanes.set.cores; ++core) {
+    std::vector<size_t> indexes;
+    for (size_t i = 0; i < lanes.set.tasks.size(); ++i)
+      if (lanes.set.tasks[i].core == core) indexes.push_back(i);
+    analysis::TaskSet high_first = lanes.set;
+    put_high_first(plan, lanes, indexes, high_first);
+    if (verdict(high_first, indexes) == analysis::Verdict::schedulable ||
+        verdict(lanes.set, indexes) != analysis::Verdict::schedulable)
+      lanes.set = std::move(high_first);
+  }
+}
+
 /// Cores and priorities under `fixed`.
 void place(const Plan& plan, LaneTasks& lanes) {
   analysis::TaskSet& set = lanes.set;
@@ -146,6 +184,7 @@ void place(const Plan& plan, LaneTasks& lanes) {
       work[static_cast<size_t>(task.core)] += static_cast<double>(task.budget) / static_cast<double>(task.period);
     }
   }
+  let_criticality_decide(plan, lanes);
 }
 
 }  // namespace
@@ -185,8 +224,7 @@ std::vector<Reservation> reservations(const Plan& plan, Policy policy) {
     if (policy == Policy::deadline) {
       wanted[i] =
           deadline_reservation(budget_ns, lane_span_ns(plan, lanes[i]), plan.tasks[lanes[i].front()].rate->period_ns());
-      wanted[i].reclaims = std::any_of(lanes[i].begin(), lanes[i].end(),
-                                       [&](size_t t) { return plan.tasks[t].criticality == Criticality::high; });
+      wanted[i].reclaims = is_high(plan, lanes[i]);
     }
     wanted[i].policy = policy;
     if (policy != Policy::fixed) continue;

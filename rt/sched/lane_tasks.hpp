@@ -19,9 +19,10 @@ struct LaneTasks {
 /// One task per lane: the head's rate and offset, the lane's span as deadline, the sum of the members' budgets and the
 /// overheads of their jobs. A lane that waits within (`publish: let` before a follower) occupies its thread meanwhile,
 /// so the wait counts as budget. Under `deadline` the deadline is that of the reservation. Under `fixed` every task has
-/// its core (an index into Plan::cores) and its SCHED_FIFO priority: deadline monotonic, on the core that the plan
-/// names, else where `analysis::partition` puts it; what that finds no place for goes where the least work is. Behind
-/// the lanes then comes one task per core for ordinary threads, if they have a share. Throws std::logic_error as
+/// its core (an index into Plan::cores) and its SCHED_FIFO priority: on the core that the plan names, else where
+/// `analysis::partition` puts it; what that finds no place for goes where the least work is. On each core deadline
+/// monotonic, lanes with a member of high criticality before all others where all deadlines hold then, too. Behind the
+/// lanes then comes one task per core for ordinary threads, if they have a share. Throws std::logic_error as
 /// lane_members() does.
 LaneTasks lane_tasks(const Plan& plan, Policy policy, const analysis::Overheads& overheads = {});
 

@@ -90,6 +90,16 @@ void check_lock(const std::filesystem::path& lock, const IceoryxPlaces& places) 
   if (known && status.st_uid != places.user) foreign(lock, status.st_uid, places.user);
 }
 
+/// One that has ended, but whose parent has not asked for its end yet, is dead.
+bool is_dead(pid_t pid) {
+  if (kill(pid, 0) != 0) return errno == ESRCH;
+  std::ifstream in("/proc/" + std::to_string(pid) + "/stat");
+  std::string stat;
+  std::getline(in, stat);
+  const size_t name_end = stat.rfind(") ");  // "PID (NAME) STATE ...", and a name may have brackets of its own
+  return name_end != std::string::npos && (stat[name_end + 2] == 'Z' || stat[name_end + 2] == 'X');
+}
+
 /// A run that was killed whole had nobody left to remove what its clients leave.
 void remove_leftovers_of_the_dead(const IceoryxPlaces& places) {
   std::vector<pid_t> dead;
@@ -97,7 +107,7 @@ void remove_leftovers_of_the_dead(const IceoryxPlaces& places) {
   for (const auto& entry : std::filesystem::directory_iterator(places.run, ignored)) {
     int pid = 0, number = 0;
     if (std::sscanf(entry.path().filename().c_str(), "takt-%d-%d", &pid, &number) != 2 || pid <= 0) continue;
-    if (kill(pid, 0) != 0 && errno == ESRCH) dead.push_back(pid);
+    if (is_dead(pid)) dead.push_back(pid);
   }
   for (const pid_t pid : dead) remove_iceoryx_leftovers(places, pid);
 }

@@ -3,6 +3,7 @@
 
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <random>
 
 #include "graph/check/check.hpp"
@@ -140,7 +141,8 @@ TEST_CASE("admission: a lane that waits for an instant occupies its thread meanw
 }
 
 TEST_CASE("admission: a low node that is stopped late must not make a high one late") {
-  Plan plan = plan_of(Policy::fixed, {0}, {task("noise", 10, 5, 10, Criticality::low), task("guard", 10, 5, 20)});
+  // Behind the guard, noise would not be done after 8.
+  Plan plan = plan_of(Policy::fixed, {0}, {task("noise", 10, 5, 8, Criticality::low), task("guard", 10, 5, 20)});
   analysis::Overheads o;
   constexpr int64_t kGrain = 100'000;  // the watchdog looks no more often
   o.enforcement_ns = 30 * kMs;         // that of the other policy
@@ -151,6 +153,8 @@ TEST_CASE("admission: a low node that is stopped late must not make a high one l
   plan.tasks[0].criticality = Criticality::high;  // nobody to be guarded against
   CHECK(answer(plan, o) == Answer::admitted);
   plan.tasks[0].criticality = Criticality::low;
+  plan.tasks[0].deadline_ns = 10 * kMs;  // now it may come second
+  CHECK(answer(plan, o) == Answer::admitted);
   plan.policy = Policy::deadline;
   plan.cores = {0, 1};
   o.enforcement_ns = 5 * kMs;
@@ -170,6 +174,30 @@ TEST_CASE("admission: fixed priorities are spread over the cores so that each fi
   CHECK(asked[0].core == 5);
   CHECK(asked[1].core == 3);  // first, since its deadline leaves the least
   CHECK(asked[0].priority > asked[1].priority);
+}
+
+TEST_CASE("admission: under fixed lanes of high criticality go first unless that makes others late") {
+  Plan plan = plan_of(Policy::fixed, {0},
+                      {task("low", 10, 5, 20, Criticality::low), task("quick", 10, 5, 30, Criticality::low),
+                       task("guard", 10, 5, 40), task("stop", 10, 5, 35)});
+  const auto order = [&] {
+    const std::vector<Reservation> asked = reservations(plan, Policy::fixed);
+    std::vector<size_t> tasks{0, 1, 2, 3};
+    std::sort(tasks.begin(), tasks.end(), [&](size_t a, size_t b) { return asked[a].priority > asked[b].priority; });
+    return tasks;
+  };
+  CHECK(order() == std::vector<size_t>{3, 2, 0, 1});
+  CHECK(answer(plan) == Answer::admitted);
+  plan.tasks[0].deadline_ns = 14 * kMs;  // behind both it is done after 15
+  CHECK(order() == std::vector<size_t>{0, 1, 3, 2});
+  CHECK(answer(plan) == Answer::admitted);
+  plan.tasks[1].budget_ns = 90 * kMs;  // nothing is met in either order
+  CHECK(order() == std::vector<size_t>{3, 2, 0, 1});
+  CHECK(answer(plan) == Answer::infeasible);
+  plan.tasks[1].budget_ns = 5 * kMs;
+  follow(plan, 3, 0);  // one high member makes its lane one
+  CHECK(reservations(plan, Policy::fixed).size() == 3);
+  CHECK(reservations(plan, Policy::fixed)[0].priority > reservations(plan, Policy::fixed)[1].priority);
 }
 
 TEST_CASE("admission: only a lane with a high-criticality member goes on beyond its reservation") {

@@ -74,6 +74,19 @@ TEST_CASE("what the clients of a run left that was killed whole is removed, what
   CHECK(std::filesystem::exists(file("other")));
 }
 
+TEST_CASE("one that has ended is dead, also before its parent has asked for its end") {
+  const Directory directory;
+  const pid_t dead = fork();
+  if (dead == 0) _exit(0);
+  siginfo_t ended;
+  REQUIRE(waitid(P_PID, static_cast<id_t>(dead), &ended, WEXITED | WNOWAIT) == 0);
+  const auto file = directory.path / "run" / ("takt-" + std::to_string(dead) + "-0");
+  std::ofstream(file) << "x";
+  CHECK(refusal(directory.places()).empty());
+  CHECK_FALSE(std::filesystem::exists(file));
+  REQUIRE(waitpid(dead, nullptr, 0) == dead);
+}
+
 TEST_CASE("the holder of a lock is found") {
   const Directory directory;
   const auto lock = directory.path / "run/iox-unique-roudi.lock";
