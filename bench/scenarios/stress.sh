@@ -1,20 +1,20 @@
 #!/bin/bash
 # SPDX-License-Identifier: Apache-2.0
-# The main job beside stress-ng: stress.sh [ROUNDS] [SECONDS]. Each round runs it under deadline and fixed, the first one
-# also under cooperative (for contrast), beside four CPU and one memory stressor. One line a run, below it why each job
+# The main job beside stress-ng: stress.sh [ROUNDS] [SECONDS] [POLICY...]. Each round runs it under the policies named, or
+# under deadline and fixed and, the first time, under cooperative (for contrast), beside four CPU and one memory stressor. One line a run, below it why each job
 # missed (takt explain), the worst at the end; exit 1 if a high-criticality node missed a deadline or a rate was not kept
 # under deadline or fixed. Beside each run stands how late cyclictest was woken on the same CPUs: what no program could help.
 set -u
 root=$(readlink -f "$(dirname "$0")/../..")
 export PYTHONPATH="$root/bench/scenarios" PYTHONDONTWRITEBYTECODE=1
-rounds=${1:-10} seconds=${2:-60}
+rounds=${1:-10} seconds=${2:-60} policies=${*:3}
 command -v stress-ng >/dev/null || { echo "stress-ng is not installed: apt install stress-ng"; exit 3; }
 work=$(mktemp -d)
 trap 'rm -rf "$work"; kill $stress 2>/dev/null' EXIT
 stress-ng --cpu 4 --vm 1 --vm-bytes 256M --quiet &
 stress=$!
 for ((round = 1; round <= rounds; ++round)); do
-  for policy in deadline fixed $([ $round -eq 1 ] && echo cooperative); do
+  for policy in ${policies:-deadline fixed $([ $round -eq 1 ] && echo cooperative)}; do
     rm -f "$work/probe.json"
     python3 "$root/bench/scenarios/host_probe.py" "$seconds" "$work/probe.json" &
     "$root/takt" run --for "${seconds}s" --policy $policy --output "$work/out" --report "$work/$round.$policy.json" --trace "$work/trace.json" >"$work/log" 2>&1
@@ -39,6 +39,7 @@ import glob, json, sys
 bad = False
 for policy in ("deadline", "fixed", "cooperative"):
     reports = [json.load(open(f)) for f in glob.glob(f"{sys.argv[1]}/*.{policy}.json")]
+    if not reports: continue
     high = [sum(n["deadline_misses"] for n in r["nodes"] if n["criticality"] == "high") for r in reports]
     low = [sum(n["deadline_misses"] for n in r["nodes"] if n["criticality"] == "low") for r in reports]
     behind = [sum(n["completed"] < n["released"] - 1 for n in r["nodes"]) for r in reports]
