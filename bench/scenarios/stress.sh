@@ -1,9 +1,10 @@
 #!/bin/bash
 # SPDX-License-Identifier: Apache-2.0
 # The main job beside stress-ng: stress.sh [ROUNDS] [SECONDS] [POLICY...]. Each round runs it under the policies named, or
-# under deadline and fixed and, the first time, under cooperative (for contrast), beside four CPU and one memory stressor. One line a run, below it why each job
-# missed (takt explain), the worst at the end; exit 1 if a high-criticality node missed a deadline or a rate was not kept
-# under deadline or fixed. Beside each run stands how late cyclictest was woken on the same CPUs: what no program could help.
+# under deadline and fixed and, the first time, under cooperative (for contrast), beside four CPU and one memory stressor.
+# One line a run, below it why each job missed (takt explain), the worst at the end; exit 1 if a high-criticality node
+# missed a deadline or a rate was not kept under deadline or fixed. Beside each run stands how late cyclictest was woken on
+# the same CPUs: what no program could help.
 set -u
 root=$(readlink -f "$(dirname "$0")/../..")
 export PYTHONPATH="$root/bench/scenarios" PYTHONDONTWRITEBYTECODE=1
