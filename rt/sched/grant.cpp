@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "rt/sched/grant.hpp"
 
-#include <fcntl.h>
 #include <linux/sched.h>
 #include <sched.h>
 #include <sys/prctl.h>
@@ -9,11 +8,12 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
-#include <cstdio>
 #include <cstring>
 #include <ctime>
+#include <optional>
+
+#include "rt/thread_state.hpp"
 
 namespace takt {
 namespace {
@@ -182,16 +182,8 @@ bool take_from_reservation(int thread) {
 }
 
 bool runnable(int thread) {
-  std::array<char, 256> text{};
-  std::snprintf(text.data(), text.size(), "/proc/%d/stat", thread);
-  const int file = open(text.data(), O_RDONLY | O_CLOEXEC);
-  if (file < 0) return false;
-  const ssize_t got = read(file, text.data(), text.size());
-  close(file);
-  // "TID (NAME) STATE ...", and a name may have brackets of its own.
-  const std::string_view stat(text.data(), got > 0 ? static_cast<size_t>(got) : 0);
-  const size_t name_end = stat.rfind(')');
-  return name_end != std::string_view::npos && stat.substr(name_end).starts_with(") R");
+  const std::optional<ThreadState> told = thread_state(thread);
+  return told && told->runnable();
 }
 
 bool restore_thread(const Reservation& had) {

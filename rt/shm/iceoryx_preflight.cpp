@@ -17,11 +17,13 @@
 #include <cstdio>
 #include <cstring>
 #include <fstream>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include "rt/shm/iceoryx_transport.hpp"
 #include "rt/shm/transport_error.hpp"
+#include "rt/thread_state.hpp"
 
 namespace takt {
 namespace {
@@ -93,11 +95,8 @@ void check_lock(const std::filesystem::path& lock, const IceoryxPlaces& places) 
 /// One that has ended, but whose parent has not asked for its end yet, is dead.
 bool is_dead(pid_t pid) {
   if (kill(pid, 0) != 0) return errno == ESRCH;
-  std::ifstream in("/proc/" + std::to_string(pid) + "/stat");
-  std::string stat;
-  std::getline(in, stat);
-  const size_t name_end = stat.rfind(") ");  // "PID (NAME) STATE ...", and a name may have brackets of its own
-  return name_end != std::string::npos && (stat[name_end + 2] == 'Z' || stat[name_end + 2] == 'X');
+  const std::optional<ThreadState> told = thread_state(pid);
+  return told && told->ended();
 }
 
 /// A run that was killed whole had nobody left to remove what its clients leave.

@@ -2,39 +2,20 @@
 #include "rt/supervise/hasten_end.hpp"
 
 #include <dirent.h>
-#include <fcntl.h>
-#include <unistd.h>
 
 #include <array>
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
-#include <string_view>
+#include <optional>
 
 #include "rt/sched/grant.hpp"
+#include "rt/thread_state.hpp"
 
 namespace takt {
-namespace {
-
-constexpr unsigned kExiting = 0x4;  // PF_EXITING of proc(5), /proc/PID/stat, field 9
-
-}  // namespace
-
 bool is_ending(pid_t process) {
-  std::array<char, 256> text{};
-  // Of its first thread alone: to sum up all of them would take ten times as long.
-  std::snprintf(text.data(), text.size(), "/proc/%d/task/%d/stat", process, process);
-  const int file = open(text.data(), O_RDONLY | O_CLOEXEC);
-  if (file < 0) return false;
-  const ssize_t got = read(file, text.data(), text.size() - 1);
-  close(file);
-  const std::string_view stat(text.data(), got > 0 ? static_cast<size_t>(got) : 0);
-  const size_t name_end = stat.rfind(')');  // "PID (NAME) STATE ...", and a name may have brackets of its own
-  if (name_end == std::string_view::npos) return false;
-  char state = 0;
-  unsigned flags = 0;
-  if (std::sscanf(text.data() + name_end, ") %c %*d %*d %*d %*d %*d %u", &state, &flags) != 2) return false;
-  return state == 'Z' || state == 'X' || (flags & kExiting) != 0;
+  const std::optional<ThreadState> told = thread_state(process);
+  return told && told->ending();
 }
 
 size_t hasten_end(pid_t process) {
