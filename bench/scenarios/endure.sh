@@ -9,7 +9,7 @@
 root=$(readlink -f "$(dirname "$0")/../..")
 export PYTHONPATH="$root/bench/scenarios" PYTHONDONTWRITEBYTECODE=1
 exec python3 - "${TAKT:-$root/takt}" "$root" "$@" <<'PY'
-import host_probe, json, os, random, subprocess, sys, tempfile, time
+import host_probe, json, os, processes, random, subprocess, sys, tempfile, time
 
 takt, root, args = sys.argv[1], sys.argv[2], sys.argv[3:]
 minutes = float(args[0]) if args else 30
@@ -60,11 +60,8 @@ with tempfile.TemporaryDirectory(prefix="endure-") as work:
 
     def resident_mb():
         """Proportional set size of all processes of the run."""
-        pids, total = [run.pid], 0
-        for task in os.listdir(f"/proc/{run.pid}/task"):
-            try: pids += open(f"/proc/{run.pid}/task/{task}/children").read().split()
-            except OSError: pass
-        for pid in pids:
+        total = 0
+        for pid in processes.family(run.pid):
             try: total += int(next(l for l in open(f"/proc/{pid}/smaps_rollup") if l.startswith("Pss:")).split()[1])
             except (OSError, StopIteration): pass
         return total / 1024

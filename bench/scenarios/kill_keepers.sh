@@ -5,36 +5,19 @@
 # all nodes run again, how long the next start takes and what is left behind after that one. Exit 1 if something is left, nobody comes
 # back, or the next start fails.
 root=$(readlink -f "$(dirname "$0")/../..")
+export PYTHONPATH="$root/bench/scenarios" PYTHONDONTWRITEBYTECODE=1
 exec python3 - "${TAKT:-$root/takt}" "$@" <<'PY'
 import json, os, signal, subprocess, sys, tempfile, time
+from processes import alive, children, family, name as name_of
 
 takt, args = sys.argv[1], sys.argv[2:]
 repeats = int(args[0]) if args else 20
 bad = 0
 
 
-def children(pid):
-    found = []
-    try: tasks = os.listdir(f"/proc/{pid}/task")
-    except OSError: return found
-    for task in tasks:
-        try: found += [int(c) for c in open(f"/proc/{pid}/task/{task}/children").read().split()]
-        except OSError: pass
-    return found
-
-
 def members_of(supervisor):
     """Without those that only fork the others again."""
-    return [c for c in children(supervisor) if open(f"/proc/{c}/comm").read().strip() != "takt-nursery"]
-
-
-def family(pid):
-    return [pid] + [f for child in children(pid) for f in family(child)]
-
-
-def alive(pid):
-    try: return open(f"/proc/{pid}/stat").read().rsplit(")", 1)[1].split()[0] not in "ZX"
-    except OSError: return False
+    return [c for c in children(supervisor) if name_of(c) != "takt-nursery"]
 
 
 def left():

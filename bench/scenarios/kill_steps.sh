@@ -30,11 +30,6 @@ def run_it(work, transport, seconds, *more):
     except OSError: print(f"{transport}: no report, exit {run.returncode}: {run.stderr[-300:]}")
 
 
-def chunks(report):
-    """In use once every process has ended: what outputs keep; over iceoryx, whose daemon takes that along, nothing."""
-    return report["memory"]["chunks_at_end"]
-
-
 for transport in transports:
     with tempfile.TemporaryDirectory(prefix="steps-") as work:
         calm = run_it(work, transport, 30)
@@ -59,13 +54,13 @@ for transport in transports:
         back = sorted(o["down_s"] for o in mine if o["back_s"] is not None)
         members = set(mine[0]["nodes"]) if mine else set()
         misses = sum(n["deadline_misses"] for n in report["nodes"] if n["criticality"] == "high" and n["name"] not in members)
-        left = chunks(report) > chunks(calm)
+        chunks, calm_chunks = (r["memory"]["chunks_at_end"] for r in (report, calm))
         lost = len(mine) - len(back)
-        bad |= lost > 0 or left or min(struck, len(mine)) < repeats
+        bad |= lost > 0 or chunks > calm_chunks or min(struck, len(mine)) < repeats
         middle = back[len(back) // 2] if back else float("nan")
-        print(f"{transport:10}{step:16}{struck:7}{len(back) - group:6}{group:7}{middle:9.2f}s{back[-1] if back else float('nan'):7.2f}s  {misses}; {chunks(report)} "
-              f"({chunks(calm)} without kills)" + (f"; NOT BACK: {lost}" if lost else "")
-              + ("; CHUNKS LEFT TAKEN" if left else "") + (f"; OF {repeats}" if min(struck, len(mine)) < repeats else ""), flush=True)
+        print(f"{transport:10}{step:16}{struck:7}{len(back) - group:6}{group:7}{middle:9.2f}s{back[-1] if back else float('nan'):7.2f}s  {misses}; {chunks} "
+              f"({calm_chunks} without kills)" + (f"; NOT BACK: {lost}" if lost else "")
+              + ("; CHUNKS LEFT TAKEN" if chunks > calm_chunks else "") + (f"; OF {repeats}" if min(struck, len(mine)) < repeats else ""), flush=True)
         for o in mine:
             if o["back_s"] is None: print(f"    {o['what']}", flush=True)
 sys.exit(bad)

@@ -8,8 +8,9 @@
 # own process was away are counted apart. Exit 1 if a process was away for more than 2 s or did not come back, a
 # high-criticality node of another one missed a deadline for which the host's stall does not account, or something is left.
 root=$(readlink -f "$(dirname "$0")/../..")
+export PYTHONPATH="$root/bench/scenarios" PYTHONDONTWRITEBYTECODE=1
 exec python3 - "${TAKT:-$root/takt}" "$@" <<'PY'
-import ctypes, json, os, random, re, signal, struct, subprocess, sys, tempfile, time
+import ctypes, json, os, processes, random, re, signal, struct, subprocess, sys, tempfile, time
 
 takt, args = sys.argv[1], sys.argv[2:]
 kills = int(args[0]) if args else 200
@@ -62,27 +63,14 @@ def traces():
                   if "takt" in n or "roudi" in n or "iceoryx" in n)
 
 
-def children(pid):
-    """(name, pid) of each."""
-    found = []
-    try: tasks = os.listdir(f"/proc/{pid}/task")
-    except OSError: return found
-    for tid in tasks:
-        try: pids = open(f"/proc/{pid}/task/{tid}/children").read().split()
-        except OSError: continue
-        for child in pids:
-            try: found.append((open(f"/proc/{child}/comm").read().strip(), int(child)))
-            except OSError: pass
-    return found
-
-
 def supervisor(run):
     """Over iceoryx there is a keeper in front of it; 0 while there is none."""
-    return next((pid for _, pid in children(run)), 0) if iceoryx else run
+    return next(iter(processes.children(run)), 0) if iceoryx else run
 
 
 def victims(run):
-    return children(supervisor(run))
+    """(name, process number) of each."""
+    return [(processes.name(pid), pid) for pid in processes.children(supervisor(run))]
 
 
 def open_things(run):
@@ -98,11 +86,6 @@ def begin(name, length):
     time.sleep(2)
     if run.poll() is not None: sys.exit("the run did not start:\n" + open(log.name).read())
     return run
-
-
-def chunks(report):
-    """In use once every process has ended: what outputs keep; over iceoryx, whose daemon takes that along, nothing."""
-    return report["memory"]["chunks_at_end"]
 
 
 def missed(report):
@@ -136,7 +119,7 @@ struck = []
 with tempfile.TemporaryDirectory(prefix="kills-") as work:
     before, room = traces(), bandwidth()
     begin("calm", min(seconds, 60)).wait()
-    calm = chunks(json.load(open(f"{work}/calm.json")))
+    calm = json.load(open(f"{work}/calm.json"))["memory"]["chunks_at_end"]
     run = begin("killed", seconds)
     early = open_things(run.pid)
     first, last = time.monotonic(), time.monotonic() + seconds - 16
@@ -158,6 +141,7 @@ with tempfile.TemporaryDirectory(prefix="kills-") as work:
     after, room_after = traces(), bandwidth()
 
 outages = [f for f in report["faults"] if f.get("kind") == "outage"]
+chunks = report["memory"]["chunks_at_end"]
 back = sorted(f["down_s"] for f in outages if f["back_s"] is not None)
 pick = lambda q: back[min(len(back) - 1, int(q * len(back)))] if back else float("nan")
 print(f"{len(struck)} kills in {report['duration_s']:.0f} s, policy {report['policy_granted']}, {report['transport']} transport, "
@@ -180,12 +164,12 @@ if back and back[-1] > 2: bad.append(f"away for {back[-1]:.2f} s, more than 2 s"
 if others: bad.append(f"{len(others)} deadlines of high-criticality nodes whose process was there")
 if early != late: bad.append(f"descriptors or threads: {early} -> {late}")
 if before != after: bad.append(f"left behind: {sorted(set(after) - set(before))}")
-if chunks(report) > calm: bad.append(f"chunks in use at the end: {calm} without kills, {chunks(report)} with them")
+if chunks > calm: bad.append(f"chunks in use at the end: {calm} without kills, {chunks} with them")
 if room is None and "--policy" not in options: bad.append("SCHED_DEADLINE is not permitted here: its bandwidth cannot be compared")
 if room != room_after: bad.append(f"SCHED_DEADLINE bandwidth: {room} -> {room_after} ms of 100")
 print(f"before and after: descriptors and threads {'equal' if early == late else 'NOT EQUAL'}, files {'equal' if before == after else 'NOT EQUAL'}, "
       + ("SCHED_DEADLINE bandwidth not measured (not permitted)" if room is None else f"SCHED_DEADLINE bandwidth {room} and {room_after} ms of 100")
-      + f"; chunks in use at the end of a run without kills {calm}, of this one {chunks(report)}")
+      + f"; chunks in use at the end of a run without kills {calm}, of this one {chunks}")
 for what in bad: print("FAILED:", what)
 sys.exit(1 if bad else 0)
 PY
