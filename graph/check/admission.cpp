@@ -99,11 +99,39 @@ class Admitting {
                                              sum, overheads_.deadline_bandwidth));
   }
 
-  /// Bound on the end of a piece of what lane `l` does (policy_analysis.hpp: Part).
-  std::optional<int64_t> part_of(size_t l, int64_t work_ns, bool first) const {
-    const auto found =
-        response_of_part(lanes_.set, plan_.policy, whole_, {l, work_ns * lanes_.set.ticks_per_ns, first});
+  /// Bound on the end of what lane `l` begins with.
+  std::optional<int64_t> first_part_of(size_t l, int64_t work_ns) const {
+    return bound_of({l, work_ns * lanes_.set.ticks_per_ns});
+  }
+
+  /// Of a member that its thread goes on with, from its own release.
+  std::optional<int64_t> continuation_of(size_t l, size_t position) const {
+    const std::vector<size_t>& lane = lanes_.lanes[l];
+    const int64_t ticks = lanes_.set.ticks_per_ns;
+    Part part{l, segment_ns(plan_, lane, position, overheads_) * ticks, false};
+    const auto producer = std::find(lane.begin(), lane.end(), plan_.tasks[lane[position]].on_task);
+    const auto ready = finish_of(l, static_cast<size_t>(producer - lane.begin())), done = finish_of(l, position);
+    const bool waits =
+        std::any_of(lanes_.lanes.begin(), lanes_.lanes.end(), [&](const auto& other) { return waits_within(other); });
+    if (ready && done && !waits) {
+      part.ready_by = *ready * ticks;
+      part.done_by = *done * ticks;
+      part.slack = (plan_.anticipate_ns + overheads_.release_ns) * ticks;
+    }
+    return bound_of(part);
+  }
+
+  std::optional<int64_t> bound_of(const Part& part) const {
+    const auto found = response_of_part(lanes_.set, plan_.policy, whole_, part);
     return found ? std::optional(ns(*found)) : std::nullopt;
+  }
+
+  /// Whether a worker waits in the middle of the lane for an output to become visible.
+  bool waits_within(const std::vector<size_t>& lane) const {
+    return std::any_of(lane.begin(), lane.end(), [&](size_t t) {
+      const size_t producer = plan_.tasks[t].on_task;
+      return producer != kNone && plan_.tasks[producer].publish == PublishAt::let;
+    });
   }
 
   /// What a worker is charged before its head's own work.
@@ -115,7 +143,7 @@ class Admitting {
   std::optional<int64_t> finish_of(size_t l, size_t position) const {
     const std::vector<size_t>& lane = lanes_.lanes[l];
     if (position + 1 == lane.size()) return ns(*whole_.response[l]);
-    return part_of(l, lead_ns(lane) + prefix_ns(plan_, lane, position, overheads_), true);
+    return first_part_of(l, lead_ns(lane) + prefix_ns(plan_, lane, position, overheads_));
   }
 
   /// The least time from the head's release to that of task t of its lane.
@@ -134,7 +162,7 @@ class Admitting {
     const bool goes_on = std::none_of(lane.begin(), lane.begin() + static_cast<ptrdiff_t>(position),
                                       [&](size_t t) { return plan_.tasks[t].publish == PublishAt::let; });
     if (!goes_on && plan_.policy != Policy::cooperative) return bound;
-    const auto part = part_of(l, segment_ns(plan_, lane, position, overheads_), false);
+    const auto part = continuation_of(l, position);
     if (!bound || (part && *part < *bound)) bound = part;
     return bound;
   }
@@ -148,7 +176,7 @@ class Admitting {
                                                  : finish_of(l, position);
     }
     constexpr int64_t kMicrosecond = 1'000;
-    return part_of(l, lead_ns(lane) + overheads_.release_ns + overheads_.switch_ns + kMicrosecond, true);
+    return first_part_of(l, lead_ns(lane) + overheads_.release_ns + overheads_.switch_ns + kMicrosecond);
   }
 
   void judge_members(size_t l) {

@@ -5,6 +5,9 @@
 
 #include <algorithm>
 
+#include "rt/sched/analysis/continuation.hpp"
+#include "rt/sched/analysis/edf.hpp"
+#include "rt/sched/analysis/fixed_priority.hpp"
 #include "rt/sched/analysis/global_edf.hpp"
 #include "rt/sched/analysis/global_non_preemptive.hpp"
 #include "rt/sched/analysis/per_core.hpp"
@@ -79,15 +82,46 @@ SetAnswer global(const TaskSet& set, bool responses) {
   return result;
 }
 
-SetAnswer cooperative(const TaskSet& set) {
+SetAnswer cooperative(const TaskSet& set, bool responses) {
+  SetAnswer one;
   if (set.cores == 1) {
-    SetAnswer one = per_core(set, analysis::CorePolicy::non_preemptive_edf, "non-preemptive EDF on one core");
-    if (one.answer != Answer::not_proven) return one;
+    one = per_core(set, analysis::CorePolicy::non_preemptive_edf, "non-preemptive EDF on one core");
+    if (one.answer == Answer::infeasible || (one.answer == Answer::admitted && !responses)) return one;
   }
   const analysis::CoreAnalysis found = analysis::global_non_preemptive_edf(set);
+  if (one.answer == Answer::admitted) {
+    // That one takes whoever may block at the worst instant; with known offsets few of them come then.
+    if (found.verdict == analysis::Verdict::schedulable)
+      for (size_t t = 0; t < set.tasks.size(); ++t)
+        one.response[t] = std::min(one.response[t], found.responses.bounds[t]);
+    return one;
+  }
   SetAnswer result{Answer::not_proven, "non-preemptive EDF, all schedules explored", found.why, found.responses.bounds};
   if (found.verdict == analysis::Verdict::schedulable) result.answer = Answer::admitted;
   return result;
+}
+
+/// The same, of tasks that share the core of the part's.
+std::optional<analysis::Ticks> part_on_core(const TaskSet& set, Policy policy, const Part& part) {
+  std::vector<analysis::TimedTask> tasks{set.tasks[part.task]};
+  for (size_t i = 0; i < set.tasks.size(); ++i)
+    if (i != part.task && set.tasks[i].core == set.tasks[part.task].core) tasks.push_back(set.tasks[i]);
+  const bool edf = policy == Policy::deadline;
+  // Above fixed priorities nothing is left of the task's job before. Under EDF that one has held up others, who now
+  // come first; only behind work of the same job none of them waits.
+  if (edf && part.first) return analysis::edf_response_of_first(tasks, 0, part.work);
+  const auto core_policy = edf ? analysis::CorePolicy::edf : analysis::CorePolicy::fixed_priority;
+  std::optional<analysis::Ticks> going_on;
+  if (!part.first && part.ready_by > 0)
+    going_on = continuation_response(tasks, core_policy, {0, part.work, part.ready_by, part.done_by, part.slack});
+  tasks[0].budget = part.work;
+  if (!part.first) {  // ready at any phase
+    tasks[0].sporadic = true;
+    tasks[0].offset = 0;
+  }
+  const auto alone = edf ? edf_responses(tasks).bounds[0] : fixed_priority_responses(tasks).bounds[0];
+  if (!going_on || !alone) return going_on ? going_on : alone;
+  return std::min(*going_on, *alone);
 }
 
 }  // namespace
@@ -110,7 +144,7 @@ SetAnswer analyse_set(const TaskSet& set, Policy policy, bool responses) {
     case Policy::fixed: return per_core(set, analysis::CorePolicy::fixed_priority, "fixed priorities per core, exact");
     case Policy::cooperative: break;
   }
-  return cooperative(set);
+  return cooperative(set, responses);
 }
 
 std::optional<analysis::Ticks> response_of_part(const TaskSet& set, Policy policy, const SetAnswer& whole,
@@ -124,19 +158,9 @@ std::optional<analysis::Ticks> response_of_part(const TaskSet& set, Policy polic
     return found < 0 ? std::nullopt : std::optional(found);
   }
   // A job that goes on behind the part for all of its budget ends in time: the part was done by so much earlier.
-  std::optional<analysis::Ticks> bound = *whole.response[k] - (set.tasks[k].budget - part.work);
-  // Above fixed priorities nothing is left of the task's job before. Under EDF that one has held up others, who now come
-  // first; only behind work of the same job none of them waits.
-  if (policy == Policy::cooperative || (policy == Policy::deadline && part.first)) return bound;
-  TaskSet alone = set;
-  alone.tasks[k].budget = part.work;
-  if (!part.first) {  // ready at any phase
-    alone.tasks[k].sporadic = true;
-    alone.tasks[k].offset = 0;
-  }
-  const SetAnswer answer = analyse_set(alone, policy);
-  if (answer.answer == Answer::admitted) bound = std::min(*bound, *answer.response[k]);
-  return bound;
+  const analysis::Ticks bound = *whole.response[k] - (set.tasks[k].budget - part.work);
+  if (policy == Policy::cooperative) return bound;
+  return std::min(bound, part_on_core(set, policy, part).value_or(bound));
 }
 
 }  // namespace takt::graph

@@ -74,7 +74,7 @@ struct EdgeStatistics {
 /// What one output gave.
 struct PortStatistics {
   std::atomic<uint64_t> published{0};  ///< sequence of the newest message, stored before it is out
-  Histogram age;                       ///< stamp of a message to its publication
+  Histogram age;                       ///< stamp of a message to the instant from which consumers may see it
   WriterStatistics writer;             ///< at the end of the run, before anything is torn down
 };
 

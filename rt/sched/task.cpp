@@ -262,7 +262,7 @@ void Task::count_end() {
   if (ended_.new_input) add(statistics_.new_inputs);
   for (size_t i = 0; i < sent_stamps_ns_.size(); ++i)
     if (sent_stamps_ns_[i] != kNothingSent)
-      board_.port(plan_.ports[i]).age.add(ended_.published_ns - sent_stamps_ns_[i]);
+      board_.port(plan_.ports[i]).age.add(end.visible_at_ns - sent_stamps_ns_[i]);
   statistics_.cpu_ns += used.cpu_ns;
   statistics_.allocations += used.allocations;
   if (end.end_of_data) return;

@@ -35,6 +35,10 @@ DemandAnswer edf_demand_test(const std::vector<TimedTask>& tasks);
 /// No job leaves the interval in these moves, so that the response grows or stays.
 ResponseBounds edf_responses(const std::vector<TimedTask>& tasks);
 
+/// The same of the first `work` of the jobs of one task, 0 < work <= budget, from their planned releases: its jobs before
+/// count whole. Nothing beyond the range.
+std::optional<Ticks> edf_response_of_first(const std::vector<TimedTask>& tasks, size_t task, Ticks work);
+
 /// Non-preemptive EDF (policy `cooperative`): does every job meet its deadline? Time is whole ticks: a job that blocks
 /// has started one tick before the interval at the latest.
 ///

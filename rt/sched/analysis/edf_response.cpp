@@ -6,16 +6,17 @@
 namespace takt::analysis {
 namespace {
 
-/// Longest response of one task, searched over deadline busy periods.
+/// Longest response of one task, or of what its jobs begin with, searched over deadline busy periods.
 class ResponseSearch {
  public:
-  ResponseSearch(const std::vector<TimedTask>& tasks, size_t own, bool preemptive)
-      : tasks_(tasks), own_(own), preemptive_(preemptive) {}
+  /// Of the job itself only the first `work` counts.
+  ResponseSearch(const std::vector<TimedTask>& tasks, size_t own, bool preemptive, Ticks work)
+      : tasks_(tasks), own_(own), preemptive_(preemptive), work_(work) {}
 
   std::optional<Ticks> longest() {
     const auto starts = busy_starts(tasks_);
     if (!starts || !measure_window()) return std::nullopt;
-    longest_ = task().jitter + task().budget;
+    longest_ = task().jitter + work_;
     const bool found = task().sporadic ? search_sporadic(*starts) : search_planned();
     if (!found) return std::nullopt;
     return longest_;
@@ -104,10 +105,10 @@ class ResponseSearch {
     std::optional<Ticks> finish;
     if (preemptive_) {
       finish = fixed_point(1, tasks_.size(), effort_,
-                           [&](Ticks length) { return pending(busy.start + length - 1) + task().budget; });
+                           [&](Ticks length) { return pending(busy.start + length - 1) + work_; });
     } else {  // a job that is ready at the very start of this one goes first
       finish = fixed_point(0, tasks_.size(), effort_, [&](Ticks length) { return pending(busy.start + length); });
-      if (finish) *finish += task().budget;
+      if (finish) *finish += work_;
     }
     if (finish) longest_ = std::max(longest_, busy.start + *finish - planned);
     return finish.has_value();
@@ -126,10 +127,20 @@ class ResponseSearch {
   const std::vector<TimedTask>& tasks_;
   size_t own_;
   bool preemptive_;
+  Ticks work_;
   Ticks window_ = 0;
   Ticks longest_ = 0;
   Effort effort_;
 };
+
+/// Where the search is beyond its range offsets are forgotten, and `exact` is false.
+std::optional<Ticks> response(const std::vector<TimedTask>& tasks, size_t task, bool preemptive, Ticks work,
+                              bool& exact) {
+  if (const auto found = ResponseSearch(tasks, task, preemptive, work).longest()) return found;
+  exact = false;
+  const std::vector<TimedTask> sporadic = as_sporadic(tasks);
+  return ResponseSearch(sporadic, task, preemptive, work).longest();
+}
 
 ResponseBounds responses(const std::vector<TimedTask>& tasks, bool preemptive) {
   ResponseBounds answer;
@@ -139,15 +150,8 @@ ResponseBounds responses(const std::vector<TimedTask>& tasks, bool preemptive) {
     answer.bounds.resize(tasks.size());
     return answer;
   }
-  for (size_t i = 0; i < tasks.size(); ++i) {
-    std::optional<Ticks> bound = ResponseSearch(tasks, i, preemptive).longest();
-    if (!bound) {
-      answer.exact = false;
-      const std::vector<TimedTask> sporadic = as_sporadic(tasks);
-      bound = ResponseSearch(sporadic, i, preemptive).longest();
-    }
-    answer.bounds.push_back(bound);
-  }
+  for (size_t i = 0; i < tasks.size(); ++i)
+    answer.bounds.push_back(response(tasks, i, preemptive, tasks[i].budget, answer.exact));
   return answer;
 }
 
@@ -155,6 +159,13 @@ ResponseBounds responses(const std::vector<TimedTask>& tasks, bool preemptive) {
 
 ResponseBounds edf_responses(const std::vector<TimedTask>& tasks) {
   return responses(tasks_with_offsets(tasks).size() > 1 ? tasks : as_sporadic(tasks), true);
+}
+
+std::optional<Ticks> edf_response_of_first(const std::vector<TimedTask>& tasks, size_t task, Ticks work) {
+  const std::optional<int> load = compare_utilisation_with_one(tasks);
+  if (!load || *load > 0) return std::nullopt;
+  bool exact = true;
+  return response(tasks_with_offsets(tasks).size() > 1 ? tasks : as_sporadic(tasks), task, true, work, exact);
 }
 
 ResponseBounds non_preemptive_edf_responses(const std::vector<TimedTask>& tasks) {

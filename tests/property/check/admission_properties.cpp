@@ -26,14 +26,16 @@ struct Random {
   bool chance(double p) { return std::bernoulli_distribution(p)(engine); }
 };
 
-/// Hands on the stamp of what it has; without an input it is where the stamps come from.
+/// Hands on the stamp of what it has; without an input it is where the stamps come from. Its first jobs may make nothing:
+/// which of them an `every`-th one follows depends on that.
 struct Relay final : Node {
   Input<Odometry> in{this, "in", "", Need::optional};
   Output<Odometry> out{this, "out", ""};
   bool source = false;
+  uint64_t silent_jobs = 0;
   void setup(Setup&) override {}
   void run(Job& job) override {
-    if (!source && in.empty()) return job.no_result();
+    if (job.index() < silent_jobs || (!source && in.empty())) return job.no_result();
     if (out.loan() == nullptr) return job.no_result();
     out.send(source ? job.release_ns() : in.stamp_ns());
   }
@@ -124,6 +126,8 @@ enum class Use : uint8_t { all, any, all_or_nothing };
 
 /// Several common periods and the longest way through.
 Seen seen_in(const Plan& plan, Use use, Random& random) {
+  for (const TaskPlan& task : plan.tasks)
+    dynamic_cast<Relay&>(*task.node).silent_jobs = static_cast<uint64_t>(random.uniform(0, 3));
   VirtualClock clock(kEpoch);
   RunBoard board(plan);
   const auto transport = make_local_transport(plan.ports);
@@ -164,18 +168,28 @@ Seen worst_of(const Plan& plan, Random& random) {
 /// The longest by task, of several runs or proofs.
 void raise(std::vector<int64_t>& longest, size_t task, int64_t ns) { longest[task] = std::max(longest[task], ns); }
 
+/// Whether a lane counts as more than it does: a wait within it (`let` before a follower) as work, a member that is not
+/// in every job (`every`) as if it were.
+bool counts_as_more(const Plan& plan) {
+  return std::any_of(plan.tasks.begin(), plan.tasks.end(), [&](const TaskPlan& task) {
+    return task.on_task != kNone && (task.every > 1 || plan.tasks[task.on_task].publish == PublishAt::let);
+  });
+}
+
 struct Tally {
   double largest = 0, sum = 0;
-  int count = 0;
+  int count = 0, above_two = 0;
   void add(int64_t bound_ns, int64_t seen_ns) {
     if (seen_ns <= 0) return;
     const double ratio = static_cast<double>(bound_ns) / static_cast<double>(seen_ns);
     largest = std::max(largest, ratio);
     sum += ratio;
     ++count;
+    above_two += ratio > 2;
   }
   void print(const char* what) const {
-    std::printf("%s: bound / observed %.3f on average, at most %.3f, of %d\n", what, sum / count, largest, count);
+    std::printf("%s: bound / observed %.3f on average, at most %.3f, above 2 for %d of %d\n", what, sum / count,
+                largest, above_two, count);
   }
 };
 
@@ -219,9 +233,9 @@ struct Compared {
 }  // namespace
 
 TEST_CASE("what a run does stays within what admission proved, and is not far from it") {
-  constexpr int kScenes = 100, kPhases = 16;
+  constexpr int kScenes = 200, kPhases = 8, kTries = 100;  // what few phases allow, few were seen of
   Random random{std::mt19937(70)};
-  Tally one_core, more_cores, followers, ages;
+  Tally one_core, as_more, more_cores, ages;
   int admitted[3] = {};
   for (int round = 0; round < kScenes; ++round) {
     CAPTURE(round);
@@ -229,26 +243,25 @@ TEST_CASE("what a run does stays within what admission proved, and is not far fr
     const Plan& plan = scene.plan;
     CAPTURE(to_string(plan.policy));
     Compared compared(plan.tasks.size());
-    for (int phase = 0; phase < kPhases; ++phase) {
+    for (int phase = 0; phase < kTries && compared.admitted < kPhases; ++phase) {
       CAPTURE(phase);
       if (phase > 0) scene.shift(random);
       compared.compare(scene, random);
     }
     admitted[static_cast<size_t>(plan.policy)] += compared.admitted;
     for (size_t t = 0; t < plan.tasks.size(); ++t) {
-      const bool follows = plan.tasks[t].on_task != kNone;
-      (follows ? followers : plan.cores.size() == 1 ? one_core : more_cores)
+      (plan.cores.size() > 1 ? more_cores : counts_as_more(plan) ? as_more : one_core)
           .add(compared.bound.response_ns[t], compared.seen.response_ns[t]);
       ages.add(compared.bound.age_ns[t], compared.seen.age_ns[t]);
     }
   }
   std::printf("admitted: deadline %d, fixed %d, cooperative %d\n", admitted[0], admitted[1], admitted[2]);
   one_core.print("response, one core");
+  as_more.print("response, one core, beside lanes that wait within or do not always do all");
   more_cores.print("response, two cores");
-  followers.print("response, of what follows on its producer's worker");
   ages.print("age of a chain");
   for (const int plans : admitted) CHECK(plans > 60);
   CHECK(one_core.largest <= 2);
-  CHECK(followers.sum / followers.count <= 1.5);  // each may follow at any instant, and few of them were tried
+  CHECK(as_more.sum <= 1.5 * as_more.count);
   CHECK(ages.largest <= 3);
 }

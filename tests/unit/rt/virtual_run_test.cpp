@@ -70,6 +70,15 @@ struct Scene {
 
 }  // namespace
 
+TEST_CASE("the age of a message is that at which others may see it") {
+  for (const auto& [publish, age_ms] : {std::pair{PublishAt::asap, 5}, {PublishAt::let, 60}}) {
+    Scene scene(Policy::fixed);
+    scene.add("node", 0, 5, 60).publish = publish;
+    scene.run();
+    CHECK(scene.board->port(0).age.max_ns() == age_ms * kMs);
+  }
+}
+
 TEST_CASE("fixed: the shorter deadline preempts, and the longer job ends that much later") {
   Scene scene(Policy::fixed);
   scene.add("slow", 0, 10, 60);
