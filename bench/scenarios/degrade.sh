@@ -62,8 +62,8 @@ def choose():
     for usual in (64, 32, 16):
         cheap = cost_ms(usual)
         budget = 2 * cheap  # leaves level 0 room for a noisy machine
-        if dearest >= TWICE[0] * budget: break
-    else: sys.exit(f"searching {MOST} disparities takes {dearest:.1f} ms, {usual} {cheap:.1f}: no cause of twice a budget; mend this script")
+        if dearest >= TWICE[0] * budget and 2 * budget <= 950 / RATE: break  # the deadline lies within the period
+    else: sys.exit(f"searching {MOST} disparities takes {dearest:.1f} ms, {usual} {cheap:.1f}: no cause of twice a budget whose deadline fits; mend this script")
     many, reached = MOST, dearest
     for _ in range(4):
         if reached <= TWICE[2] * budget: break
@@ -81,11 +81,11 @@ def running_s():
 def slowed_run(verb, budget, usual, many):
     """The instants at which it was slowed and let go, and what `takt top` showed meanwhile."""
     process = subprocess.Popen(run(verb, usual, BEFORE + cause + AFTER, "--unchecked", budget=in_us(budget / 1000),
-                                   deadline=in_us(2 * budget / 1000)), **QUIET)
+                                   deadline=in_us(2 * budget / 1000)), **{**QUIET, "stderr": open(f"{work}/{verb}.err", "w")})
 
     def wait_until(instant_s):
         while (now := running_s()) < instant_s:
-            if process.poll() is not None: sys.exit(f"{verb}: the run ended with {process.returncode}")
+            if process.poll() is not None: sys.exit(f"{verb}: the run ended with {process.returncode}: {open(f'{work}/{verb}.err').read()[-500:]}")
             time.sleep(0.2)
         return now
     wait_until(0)

@@ -169,16 +169,15 @@ bool demote_thread(int thread) {
   return sched_setscheduler(thread, SCHED_OTHER | SCHED_RESET_ON_FORK, &param) == 0;
 }
 
-bool lift_thread(int thread) {
-  const sched_param param{kHighestPriority};
+bool lift_thread(int thread, int priority) {
+  const sched_param param{priority};
   return sched_setscheduler(thread, SCHED_FIFO | SCHED_RESET_ON_FORK, &param) == 0;
 }
 
 bool take_from_reservation(int thread) {
   if ((sched_getscheduler(thread) & ~SCHED_RESET_ON_FORK) != static_cast<int>(kDeadline)) return false;
   if (!runnable(thread)) return false;
-  const sched_param lowest{1};
-  return sched_setscheduler(thread, SCHED_FIFO | SCHED_RESET_ON_FORK, &lowest) == 0 || demote_thread(thread);
+  return lift_thread(thread, kLowestPriority) || demote_thread(thread);
 }
 
 bool runnable(int thread) {

@@ -11,6 +11,8 @@ namespace takt {
 /// The highest SCHED_FIFO priority of a lane under `fixed`. Below the kernel's own interrupt threads (50
 /// by default) nothing is gained.
 inline constexpr int kHighestPriority = 80;
+/// Behind all lanes and before ordinary threads.
+inline constexpr int kLowestPriority = 1;
 
 /// What a worker thread asks of the kernel.
 struct Reservation {
@@ -61,11 +63,11 @@ Grant apply(const Reservation& reservation, int64_t patience_ns = kBandwidthMarg
 /// else the machine does: behind that as well (SCHED_IDLE) a job could last for minutes, and so could the end of its
 /// process. False if the kernel refuses.
 bool demote_thread(int thread);
-/// Lets another thread of this process run before all of the default policy (SCHED_FIFO, highest priority of a worker).
-/// False if the kernel refuses.
-bool lift_thread(int thread);
-/// Puts a thread of SCHED_DEADLINE that is runnable, of this process or another one, behind all workers and before
-/// ordinary threads (SCHED_FIFO, lowest priority). False if it is not such a one, or the kernel refuses.
+/// Lets another thread of this process run before all of the default policy (SCHED_FIFO of that priority). False if the
+/// kernel refuses.
+bool lift_thread(int thread, int priority);
+/// Puts a thread of SCHED_DEADLINE that is runnable, of this process or another one, at kLowestPriority. False if it is not
+/// such a one, or the kernel refuses.
 bool take_from_reservation(int thread);
 /// A thread runs, or would but for its turn or its reservation. Only such a one may be taken out of
 /// SCHED_DEADLINE: where it sleeps, Linux 6.18 never gives its bandwidth back (until sched_rt_runtime_us is written), and

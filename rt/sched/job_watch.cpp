@@ -99,12 +99,13 @@ bool JobWatch::demote(uint64_t serial) {
   return done;
 }
 
-bool JobWatch::lift(int64_t now_ns, int64_t owed_ns, bool ordinary) {
+bool JobWatch::lift(int64_t now_ns, int64_t owed_ns, bool behind) {
   const int thread = thread_.load(std::memory_order_acquire);
   const int64_t runtime_ns = this->runtime_ns();
   if (runtime_ns <= 0 || !runnable(thread)) return false;
-  if (!(ordinary ? demote_thread(thread) : lift_thread(thread))) return false;
-  ordinary_ = ordinary;
+  const bool refused = !lift_thread(thread, behind ? kLowestPriority : kHighestPriority);
+  if (refused && !(behind && demote_thread(thread))) return false;
+  place_ = refused ? Place::ordinary : behind ? Place::behind : Place::first;
   // One period for each budget that is owed, the one under way, and one to be sure.
   constexpr int64_t kLongest_ns = 30'000'000'000;
   const int64_t lapse_ns = (owed_ns / runtime_ns + 2) * has_.period_ns;
@@ -112,7 +113,9 @@ bool JobWatch::lift(int64_t now_ns, int64_t owed_ns, bool ordinary) {
   return true;
 }
 
-void JobWatch::drop() { ordinary_ = demote_thread(thread_.load(std::memory_order_acquire)); }
+void JobWatch::drop() {
+  if (demote_thread(thread_.load(std::memory_order_acquire))) place_ = Place::ordinary;
+}
 
 // In one step: nobody ever waits for a watchdog that only tells. Under `deadline` the workers go before it, so a wait
 // could last as long as their budget does.

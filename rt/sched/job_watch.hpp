@@ -51,24 +51,26 @@ class JobWatch {
   /// Puts the worker behind everybody else until its job ends; false if job `serial` ended before, or the kernel
   /// refuses.
   bool demote(uint64_t serial);
-  /// Lets the worker, which has a reservation, go on under SCHED_FIFO, or as an ordinary thread: the `owed_ns` that it
-  /// owes the kernel are forgotten only with time (measured: the kernel keeps the debt of a thread that leaves and
-  /// comes back). After the first job that ends when that has passed, the worker takes its reservation back. False if
-  /// the thread sleeps or the kernel refuses.
-  bool lift(int64_t now_ns, int64_t owed_ns, bool ordinary);
+  /// Lets the worker, which has a reservation, go on under SCHED_FIFO: before all workers, or `behind` all of them (where
+  /// that is refused, as an ordinary thread). The `owed_ns` that it owes the kernel are forgotten only with time
+  /// (measured: the kernel keeps the debt of a thread that leaves and comes back). After the first job that ends when
+  /// that has passed, the worker takes its reservation back. False if the thread sleeps or the kernel refuses.
+  bool lift(int64_t now_ns, int64_t owed_ns, bool behind);
   /// A lifted worker goes on as an ordinary thread from here on.
   void drop();
   /// By how much jobs that ended within StolenTime::kWindow_ns overran.
   int64_t owed_ns(int64_t now_ns) const;
   /// The worker was lifted and has not taken its reservation back.
   bool lifted() const { return lifted_until_ns_.load(std::memory_order_acquire) != 0; }
-  /// As an ordinary thread, if it is.
-  bool ordinary() const { return ordinary_; }
+  /// Where, if it is: before all workers, behind them, or as an ordinary thread.
+  bool first() const { return place_ == Place::first; }
+  bool ordinary() const { return place_ == Place::ordinary; }
   /// Notes that the overrun of job `serial` was told; false if the job ended before, was demoted or told already.
   bool tell(uint64_t serial);
 
  private:
   enum Phase : uint64_t { idle, at_work, acting, demoted, told };
+  enum class Place : uint8_t { first, behind, ordinary };
   static constexpr uint64_t kPhases = 8;  // state = serial * kPhases + phase
   void settle_down();
   /// From `at_work` to that phase; false if job `serial` is in another one.
@@ -79,7 +81,7 @@ class JobWatch {
   std::atomic<uint64_t> index_{0};
   std::atomic<int64_t> release_ns_{0}, cpu_limit_ns_{0}, expected_ns_{0};
   std::atomic<int64_t> lifted_until_ns_{0};  ///< 0: it is not
-  bool ordinary_ = false;                    ///< the watchdog's alone
+  Place place_ = Place::first;               ///< where it was lifted to; the watchdog's alone
   std::atomic<int64_t> owed_ns_{0}, owed_at_ns_{0}, rested_cpu_ns_{0};
   std::atomic<int> thread_{0};
   std::atomic<clockid_t> clock_{0};

@@ -132,6 +132,20 @@ bool is_high(const Plan& plan, const std::vector<size_t>& lane) {
                      [&](size_t t) { return plan.tasks[t].criticality == Criticality::high; });
 }
 
+/// In deadline monotonic order nobody behind has a shorter lead, so that his own covers how much earlier than released
+/// one of those before him may begin. In another order the rest of that is charged once, as blocking. `order`: the tasks
+/// of a core, the highest priority first.
+void charge_longer_leads(const Plan& plan, const LaneTasks& lanes, const std::vector<size_t>& order,
+                         analysis::TaskSet& set) {
+  int64_t longest_ns = 0;
+  for (const size_t i : order) {
+    if (i >= lanes.lanes.size()) continue;  // ordinary threads
+    const int64_t lead_ns = longest_lead_ns(plan, lanes.lanes[i]);
+    longest_ns = std::max(longest_ns, lead_ns);
+    set.tasks[i].blocking = (longest_ns - lead_ns) * set.ticks_per_ns;
+  }
+}
+
 /// Of a core's tasks, `indexes` in the set, the lanes of high criticality come first. Deadline monotonic order within
 /// them and within the others stays.
 void put_high_first(const Plan& plan, const LaneTasks& lanes, std::vector<size_t> indexes, analysis::TaskSet& set) {
@@ -142,6 +156,7 @@ void put_high_first(const Plan& plan, const LaneTasks& lanes, std::vector<size_t
   std::stable_partition(indexes.begin(), indexes.end(),
                         [&](size_t i) { return i < lanes.lanes.size() && is_high(plan, lanes.lanes[i]); });
   for (size_t k = 0; k < indexes.size(); ++k) set.tasks[indexes[k]].priority = priorities[k];
+  charge_longer_leads(plan, lanes, indexes, set);
 }
 
 /// Criticality decides who yields: a node that overruns its budget is stopped late, and an overload that nobody admitted

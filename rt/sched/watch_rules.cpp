@@ -14,7 +14,7 @@ WatchRules watch_rules(const TaskPlan& task, Policy granted, int64_t patience_ns
   rules.patience_ns = patience_ns;
   rules.demote = granted == Policy::fixed && task.criticality == Criticality::low;
   rules.lift = granted == Policy::deadline;
-  rules.ordinary = task.criticality == Criticality::low;
+  rules.low = task.criticality == Criticality::low;
   rules.stop_on_overrun = task.on_overrun == OnOverrun::safe_stop;
   rules.stop_on_miss = task.on_miss == OnMiss::safe_stop;
   return rules;
@@ -40,10 +40,10 @@ WatchVerdict judge(const WatchRules& rules, const WatchSight& sight) {
   by_the_clock(rules.stop_on_miss, sight.miss_told, missed_ns, verdict.miss);
   by_the_clock(true, sight.hang_told, hung_ns, verdict.hang);
   const int64_t owed_ns = sight.owed_ns + std::max<int64_t>(0, -sight.cpu_left_ns);
-  const int64_t allowed_ns = rules.ordinary ? sight.stolen_ns : std::max(sight.stolen_ns, rules.deadline_ns);
+  const int64_t allowed_ns = std::max(sight.stolen_ns, rules.low ? rules.budget_ns / 2 : rules.deadline_ns);
   const bool used_up = owed_ns > allowed_ns && sight.cpu_left_ns < 0;
   verdict.drop = sight.running && sight.lifted && !sight.ordinary && used_up;
-  const bool may_rise = !sight.lifted || sight.ordinary;
+  const bool may_rise = !sight.lifted || !sight.first;
   verdict.lift = rules.lift && sight.running && may_rise && sight.now_ns >= missed_ns && owed_ns > 0 &&
                  owed_ns <= sight.stolen_ns;
   return verdict;
@@ -55,7 +55,7 @@ ReserveVerdict judge_reserve(const ReserveSight& sight) {
   const int64_t soonest_ns = sight.release_ns + sight.runtime_ns;
   if (sight.now_ns < soonest_ns) return {false, soonest_ns};
   const bool in_time = sight.now_ns <= sight.release_ns + sight.deadline_ns;
-  if (sight.ordinary && !in_time) return {false, sight.now_ns + kLifted_ns};
+  if (sight.low && !in_time) return {false, sight.now_ns + kLifted_ns};
   if (sight.used_up() && sight.stands && sight.owed_ns - sight.left_ns <= sight.deadline_ns)
     return {true, sight.now_ns + kLifted_ns};
   return {false, sight.now_ns + std::max(sight.left_ns, kReserveGrain_ns)};

@@ -15,7 +15,7 @@ struct WatchRules {
   bool demote = false;      ///< budget used up: it goes on with what the others leave
   bool stop_on_overrun = false, stop_on_miss = false;  ///< on_overrun, on_miss: safe_stop
   bool lift = false;      ///< late through what the host took, or its reservation used up: it goes on beside that
-  bool ordinary = false;  ///< once its reservation is used up: as an ordinary thread, and while it is in time
+  bool low = false;       ///< once its reservation is used up: behind all workers, and while it is in time
 
   bool minds_overrun() const { return demote || stop_on_overrun; }
 };
@@ -36,6 +36,7 @@ struct WatchSight {
   int64_t stolen_ns = 0;  ///< what the host took lately; cpu_left_ns must be told of a job that is late then, or lifted
   int64_t owed_ns = 0;    ///< by how much jobs of the worker overran lately, this one apart
   bool lifted = false;    ///< the worker is, still
+  bool first = false;     ///< before all workers
   bool ordinary = false;  ///< as an ordinary thread
 };
 
@@ -47,8 +48,8 @@ struct WatchVerdict {
 /// The kernel charges a reservation for time that the host took from its CPU, and holds the thread back until that is
 /// paid off, one budget a period: a job that is late while its worker owes something, and no more than the host took,
 /// is lifted out of that, and dropped to be an ordinary thread once it has used more than that. One that was lifted
-/// because its reservation was used up (see judge_reserve) may use as much as its deadline is long. All of that is seen
-/// when somebody looks: it makes no look_again.
+/// because its reservation was used up (see judge_reserve) may use as much as its deadline is long, one of low criticality
+/// half a budget. All of that is seen when somebody looks: it makes no look_again.
 ///
 /// A job cannot have used a budget before that much time has passed: so the next look is due when the earliest thing
 /// can have happened. A running job is looked at no more than once in kWatchGrain_ns, so that one that was preempted
@@ -70,7 +71,7 @@ struct ReserveSight {
   int64_t owed_ns = 0;      ///< by how much jobs of the worker overran lately, this one apart
   bool stands = false;      ///< used_up() at the look before, and nothing was used since
   bool lifted = false;
-  bool ordinary = false;  ///< it would go on as an ordinary thread
+  bool low = false;       ///< nobody of high criticality is on it
 
   bool used_up() const { return left_ns <= kReserveSlack_ns; }
 };
@@ -83,7 +84,7 @@ struct ReserveVerdict {
 /// A worker may have used up what it has before its job has even begun: where the host takes a CPU without saying so,
 /// the kernel charges whoever was on it. One that has, and is not served any more, is to be lifted. While others leave
 /// it something beyond its reservation (Reservation::reclaims) it goes on there. One that would be dropped at once for
-/// what it owes is not lifted, and no late one to be an ordinary thread: its reservation is due again. Nothing can be
+/// what it owes is not lifted, and no late one of low criticality: its reservation is due again. Nothing can be
 /// used up before that much time has passed since the release: a job that is done by then costs one look.
 ReserveVerdict judge_reserve(const ReserveSight& sight);
 

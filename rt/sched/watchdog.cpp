@@ -26,8 +26,8 @@ Watchdog::Watchdog(const Plan& plan, RunBoard& board, const Clock& clock, std::v
   for (size_t w = 0; w < workers.size(); ++w) {
     for (const size_t task : workers[w].tasks)
       watched_[w].rules.push_back(watch_rules(plan.tasks[task], options.granted, options.patience_ns));
-    watched_[w].ordinary = std::all_of(watched_[w].rules.begin(), watched_[w].rules.end(),
-                                       [](const WatchRules& rules) { return rules.ordinary; });
+    watched_[w].low = std::all_of(watched_[w].rules.begin(), watched_[w].rules.end(),
+                                  [](const WatchRules& rules) { return rules.low; });
     watched_[w].worker = std::move(workers[w]);
   }
   thread_ = std::thread([this] { watch(); });
@@ -103,6 +103,7 @@ int64_t Watchdog::look_at(Watched& watched, int64_t now_ns) {
   sight.hang_told = watched.hang_told.load() == job.serial;
   sight.stolen_ns = rules.lift ? stolen_.recent_ns() : 0;
   sight.lifted = watch.lifted();
+  sight.first = sight.lifted && watch.first();
   sight.ordinary = sight.lifted && watch.ordinary();
   sight.owed_ns = watch.owed_ns(now_ns);
   const bool may_lift = sight.stolen_ns > 0 && now_ns > job.release_ns + rules.deadline_ns;
@@ -127,7 +128,7 @@ int64_t Watchdog::look_at_reserve(Watched& watched, int64_t now_ns) {
   sight.deadline_ns = watched.rules[member].deadline_ns;
   sight.runtime_ns = watch.runtime_ns();
   sight.lifted = watch.lifted();
-  sight.ordinary = watched.ordinary;
+  sight.low = watched.low;
   if (!sight.lifted && now_ns >= sight.release_ns + sight.runtime_ns) {
     const int64_t cpu_ns = watch.cpu_ns();
     sight.left_ns = watch.reserve_end_ns() - cpu_ns;
@@ -137,7 +138,7 @@ int64_t Watchdog::look_at_reserve(Watched& watched, int64_t now_ns) {
   }
   const ReserveVerdict verdict = judge_reserve(sight);
   if (verdict.lift)
-    lift(watched, watched.worker.tasks[member], sight.owed_ns - sight.left_ns, now_ns, watched.ordinary);
+    lift(watched, watched.worker.tasks[member], sight.owed_ns - sight.left_ns, now_ns, watched.low);
   return verdict.look_again_ns;
 }
 
@@ -161,7 +162,7 @@ void Watchdog::act(Watched& watched, const JobWatch::Running& job, const WatchVe
   if (verdict.overrun) overrun(watched, job, now_ns);
   if (const JobWatch& watch = *watched.worker.watch; verdict.lift)
     lift(watched, task, watch.owed_ns(now_ns) + std::max<int64_t>(0, watch.cpu_ns() - job.cpu_limit_ns), now_ns,
-         /*ordinary=*/false);
+         /*behind=*/false);
   if (verdict.drop) watched.worker.watch->drop();
   if (verdict.miss) {
     watched.miss_told = job.serial;
@@ -173,8 +174,8 @@ void Watchdog::act(Watched& watched, const JobWatch::Running& job, const WatchVe
   }
 }
 
-void Watchdog::lift(Watched& watched, size_t task, int64_t owed_ns, int64_t now_ns, bool ordinary) {
-  if (watched.worker.watch->lift(now_ns, owed_ns, ordinary))
+void Watchdog::lift(Watched& watched, size_t task, int64_t owed_ns, int64_t now_ns, bool behind) {
+  if (watched.worker.watch->lift(now_ns, owed_ns, behind))
     board_.task(task).lifted.fetch_add(1, std::memory_order_relaxed);
 }
 

@@ -25,7 +25,8 @@ namespace takt {
 ///   under SCHED_FIFO, as its node's next ones, until the kernel has forgotten that debt; counted `lifted`. One that
 ///   uses more than that goes on as an ordinary thread.
 /// - Under `deadline` a worker that has used up its reservation goes on beside it before it is late (judge_reserve()):
-///   one with a task of high criticality under SCHED_FIFO, any other as an ordinary thread; counted `lifted` as well.
+///   one with a task of high criticality before all workers of SCHED_FIFO, any other behind them and, once it has used half
+///   a budget more, as an ordinary thread; counted `lifted` as well.
 /// - `safe_stop` is asked for the moment a budget or a deadline has passed, not when the job ends.
 /// - A job that has not returned `patience` after its deadline hangs: told once, by name. Under `cooperative` that ends
 ///   the run, unless somebody looks after this process.
@@ -61,7 +62,7 @@ class Watchdog {
   struct Watched {
     Worker worker;
     std::vector<WatchRules> rules;       ///< by member
-    bool ordinary = true;                ///< all of them ask for it
+    bool low = true;                     ///< all of them are of low criticality
     int64_t overdrawn_cpu_ns = 0;        ///< CPU clock at the last look, if the reservation was used up then
     uint64_t miss_told = 0;              ///< serial of the last job it was told of; 0: none
     std::atomic<uint64_t> hang_told{0};  ///< the same
@@ -75,7 +76,7 @@ class Watchdog {
   void act(Watched& watched, const JobWatch::Running& job, const WatchVerdict& verdict, int64_t now_ns);
   void safe_stop(size_t task, uint64_t job, const char* why, int64_t now_ns);
   /// `task` is the one that is late, or would be.
-  void lift(Watched& watched, size_t task, int64_t owed_ns, int64_t now_ns, bool ordinary);
+  void lift(Watched& watched, size_t task, int64_t owed_ns, int64_t now_ns, bool behind);
   void tell_hang(size_t task, const JobWatch::Running& job, int64_t now_ns);
 
   const Plan& plan_;

@@ -200,6 +200,18 @@ TEST_CASE("admission: under fixed lanes of high criticality go first unless that
   CHECK(reservations(plan, Policy::fixed)[0].priority > reservations(plan, Policy::fixed)[1].priority);
 }
 
+TEST_CASE("admission: under fixed who goes behind a longer lead than his own is charged the rest of it") {
+  Plan plan = plan_of(Policy::fixed, {0}, {task("guard", 10, 5, 40), task("low", 10, 5, 20, Criticality::low)});
+  plan.anticipate_ns = 2 * kMs;  // at most a twentieth of the deadline: 2 and 1 ms
+  const Admission admission = admit(plan, {});
+  REQUIRE(admission.answer == Answer::admitted);
+  CHECK(admission.nodes[0].response_ns == 7 * kMs);
+  CHECK(admission.nodes[1].response_ns == 14 * kMs);  // 7 of the guard, 6 of its own, 1 for the guard's being early
+  plan.tasks[0].criticality = Criticality::low;       // deadline monotonic
+  CHECK(admit(plan, {}).nodes[0].response_ns == 13 * kMs);
+  CHECK(admit(plan, {}).nodes[1].response_ns == 6 * kMs);
+}
+
 TEST_CASE("admission: only a lane with a high-criticality member goes on beyond its reservation") {
   Plan plan = plan_of(Policy::deadline, {0, 1}, {task("a", 10, 5, 50), task("b", 10, 5, 50)});
   plan.tasks[0].criticality = Criticality::high;

@@ -146,16 +146,22 @@ TEST_CASE("a demoted job that returns gets its priority back, and its node runs 
 namespace {
 
 int own_policy() { return sched_getscheduler(0) & ~SCHED_RESET_ON_FORK; }
+/// 0 but under SCHED_FIFO.
+int own_priority() {
+  sched_param param{};
+  sched_getparam(0, &param);
+  return param.sched_priority;
+}
 
 /// Job 3 takes far more than its budget, as if the host had taken it; the others nothing.
 struct Stalled final : Node {
-  bool was_first = false;     ///< under SCHED_FIFO at any instant of any job: a lift may end before its job does
+  bool was_first = false;     ///< before all workers at any instant of any job: a lift may end before its job does
   std::vector<int> policies;  ///< after each job, as the kernel says
   void setup(Setup&) override { policies.reserve(100); }
   void run(Job& job) override {
     const int64_t until_ns = thread_cpu_ns() + (job.index() == 3 ? 100 * kMs : 0);
     do {
-      was_first = was_first || own_policy() == SCHED_FIFO;
+      was_first = was_first || own_priority() == kHighestPriority;
     } while (thread_cpu_ns() < until_ns);
     policies.push_back(own_policy());
   }
@@ -194,7 +200,7 @@ TEST_CASE(
     MESSAGE("NOT RUN: SCHED_DEADLINE is refused to this user");
     return;
   }
-  CHECK(board.task(0).lifted.load() > 0);  // while it was in time, as an ordinary thread
+  CHECK(board.task(0).lifted.load() > 0);  // while it was in time, behind all workers
   CHECK(node.was_first == host_takes);
   REQUIRE_FALSE(node.policies.empty());
   CHECK(node.policies.back() == kDeadline);
@@ -210,7 +216,7 @@ TEST_CASE("a worker whose reservation is used up goes on beside it, in its job a
     criticality = Criticality::low;
     begun = false;
   }
-  const int beside = criticality == Criticality::high ? SCHED_FIFO : SCHED_OTHER;
+  const int beside = criticality == Criticality::high ? kHighestPriority : kLowestPriority;
   CAPTURE(beside);
   Steady node;
   Plan plan;
@@ -238,7 +244,7 @@ TEST_CASE("a worker whose reservation is used up goes on beside it, in its job a
     options.granted = Policy::deadline;
     options.priority = kHighestPriority + 1;
     const Watchdog watchdog(plan, board, clock, {{&watch, {0}}}, options);
-    while (thread_cpu_ns() - cpu_ns < 40 * kMs) was_lifted = was_lifted || own_policy() == beside;
+    while (thread_cpu_ns() - cpu_ns < 40 * kMs) was_lifted = was_lifted || own_priority() == beside;
     if (begun) watch.end();
   });
   worker.join();

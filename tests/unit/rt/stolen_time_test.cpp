@@ -71,6 +71,14 @@ TEST_CASE("a late job is lifted only for what the host took, and dropped if it u
     sight.owed_ns = 3 * kMs;  // from the job before
     CHECK(judged(Policy::deadline).lift);
   }
+  SUBCASE("one that used up its reservation may use half a budget more before it is dropped") {
+    sight.stolen_ns = 0;
+    sight.lifted = true;
+    sight.cpu_left_ns = -2'500'000;
+    CHECK_FALSE(judged(Policy::deadline).drop);
+    sight.cpu_left_ns = -2'500'001;
+    CHECK(judged(Policy::deadline).drop);
+  }
   SUBCASE("one of high criticality may use more before it is dropped") {
     task.criticality = Criticality::high;
     sight.lifted = true;
@@ -87,8 +95,10 @@ TEST_CASE("a late job is lifted only for what the host took, and dropped if it u
     sight.cpu_left_ns = -20 * kMs;  // of which the host took all
     CHECK(judged(Policy::deadline).lift);
   }
-  SUBCASE("once") {
+  SUBCASE("once, but for one that was lifted behind all workers before it was late") {
     sight.lifted = true;
+    CHECK(judged(Policy::deadline).lift);
+    sight.first = true;
     CHECK_FALSE(judged(Policy::deadline).lift);
     CHECK_FALSE(judged(Policy::deadline).drop);
   }
@@ -96,9 +106,9 @@ TEST_CASE("a late job is lifted only for what the host took, and dropped if it u
 
 TEST_CASE("a reservation that is used up: the worker is lifted once it stands, and looked at no more than needed") {
   TaskPlan task;
-  CHECK(watch_rules(task, Policy::deadline, 1000 * kMs).ordinary);
+  CHECK(watch_rules(task, Policy::deadline, 1000 * kMs).low);
   task.criticality = Criticality::high;
-  CHECK_FALSE(watch_rules(task, Policy::deadline, 1000 * kMs).ordinary);
+  CHECK_FALSE(watch_rules(task, Policy::deadline, 1000 * kMs).low);
   ReserveSight sight;
   sight.release_ns = 100 * kMs;
   sight.runtime_ns = 4 * kMs;
@@ -131,8 +141,8 @@ TEST_CASE("a reservation that is used up: the worker is lifted once it stands, a
     sight.now_ns = 151 * kMs;
     CHECK(judge_reserve(sight).lift);
   }
-  SUBCASE("late, as an ordinary thread: its reservation is due again") {
-    sight.ordinary = true;
+  SUBCASE("late, as one of low criticality: its reservation is due again") {
+    sight.low = true;
     CHECK(judge_reserve(sight).lift);
     sight.now_ns = 150 * kMs;
     CHECK(judge_reserve(sight).lift);
