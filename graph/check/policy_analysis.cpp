@@ -101,7 +101,7 @@ SetAnswer cooperative(const TaskSet& set, bool responses) {
   return result;
 }
 
-/// The same, of tasks that share the core of the part's.
+/// As response_of_part() says, by the tasks that share the part's core.
 std::optional<analysis::Ticks> part_on_core(const TaskSet& set, Policy policy, const Part& part) {
   std::vector<analysis::TimedTask> tasks{set.tasks[part.task]};
   for (size_t i = 0; i < set.tasks.size(); ++i)
