@@ -43,8 +43,7 @@ WatchVerdict judge(const WatchRules& rules, const WatchSight& sight) {
   const int64_t allowed_ns = std::max(sight.stolen_ns, rules.low ? rules.budget_ns / 2 : rules.deadline_ns);
   const bool used_up = owed_ns > allowed_ns && sight.cpu_left_ns < 0;
   verdict.drop = sight.running && sight.lifted && !sight.ordinary && used_up;
-  const bool may_rise = !sight.lifted || !sight.first;
-  verdict.lift = rules.lift && sight.running && may_rise && sight.now_ns >= missed_ns && owed_ns > 0 &&
+  verdict.lift = rules.lift && sight.running && !sight.first && sight.now_ns >= missed_ns && owed_ns > 0 &&
                  owed_ns <= sight.stolen_ns;
   return verdict;
 }

@@ -36,7 +36,7 @@ struct WatchSight {
   int64_t stolen_ns = 0;  ///< what the host took lately; cpu_left_ns must be told of a job that is late then, or lifted
   int64_t owed_ns = 0;    ///< by how much jobs of the worker overran lately, this one apart
   bool lifted = false;    ///< the worker is, still
-  bool first = false;     ///< before all workers
+  bool first = false;     ///< lifted before all workers
   bool ordinary = false;  ///< as an ordinary thread
 };
 

@@ -13,6 +13,7 @@
 #include "rt/thread_state.hpp"
 
 namespace takt {
+
 bool is_ending(pid_t process) {
   const std::optional<ThreadState> told = thread_state(process);
   return told && told->ending();
