@@ -5,8 +5,8 @@
 
 #include <algorithm>
 
+#include "graph/check/piece_bounds.hpp"
 #include "rt/sched/lane.hpp"
-#include "rt/sched/lane_tasks.hpp"
 #include "rt/sched/watch_rules.hpp"
 
 namespace takt::graph {
@@ -66,21 +66,13 @@ class Admitting {
         refuse(Answer::not_proven,
                fmt::format("{}: no budget stated; give it one (`takt profile` measures it)", task.name));
     ask_kernel();
-    const bool followers = lanes_.lanes.size() < plan_.tasks.size();
-    whole_ = analyse_set(lanes_.set, plan_.policy, bounds_ || followers);
-    result_.by = whole_.by;
-    if (whole_.answer != Answer::admitted) {
-      refuse(whole_.answer, whole_.why);
-      return std::move(result_);
-    }
-    for (size_t l = 0; l < lanes_.lanes.size(); ++l) judge_members(l);
-    ask_about_overruns();
+    ask_about_waits();
+    ask_about_lanes();
+    if (lanes_admitted_) ask_about_overruns();
     return std::move(result_);
   }
 
  private:
-  int64_t ns(Ticks ticks) const { return (ticks + lanes_.set.ticks_per_ns - 1) / lanes_.set.ticks_per_ns; }
-
   void refuse(Answer answer, std::string reason) {
     if (result_.answer != Answer::infeasible) result_.answer = answer;
     result_.reasons.push_back(std::move(reason));
@@ -99,101 +91,100 @@ class Admitting {
                                              sum, overheads_.deadline_bandwidth));
   }
 
-  /// Bound on the end of what lane `l` begins with.
-  std::optional<int64_t> first_part_of(size_t l, int64_t work_ns) const {
-    return bound_of({l, work_ns * lanes_.set.ticks_per_ns});
-  }
-
-  /// Of a member that its thread goes on with, from its own release.
-  std::optional<int64_t> continuation_of(size_t l, size_t position) const {
-    const std::vector<size_t>& lane = lanes_.lanes[l];
-    const int64_t ticks = lanes_.set.ticks_per_ns;
-    Part part{l, segment_ns(plan_, lane, position, overheads_) * ticks, false};
-    const auto producer = std::find(lane.begin(), lane.end(), plan_.tasks[lane[position]].on_task);
-    const auto ready = finish_of(l, static_cast<size_t>(producer - lane.begin())), done = finish_of(l, position);
-    const bool waits =
-        std::any_of(lanes_.lanes.begin(), lanes_.lanes.end(), [&](const auto& other) { return waits_within(other); });
-    if (ready && done && !waits) {
-      part.ready_by = *ready * ticks;
-      part.done_by = *done * ticks;
-      part.slack = (plan_.anticipate_ns + overheads_.release_ns) * ticks;
+  /// A worker that has slept within its pass gets a new deadline from the kernel, counted from its waking, and takes
+  /// what is left of that into its next pass (the wake-up rule of a constant bandwidth server, Abeni & Buttazzo 1998):
+  /// its jobs are neither due when the analyses think, nor bound by it.
+  void ask_about_waits() {
+    if (plan_.policy != Policy::deadline) return;
+    for (const TaskPlan& task : plan_.tasks) {
+      if (task.on_task == kNone || plan_.tasks[task.on_task].publish != PublishAt::let) continue;
+      const TaskPlan& producer = plan_.tasks[task.on_task];
+      refuse(
+          Answer::not_proven,
+          fmt::format("{}: it waits for the instant at which what {} publishes with `let` is seen, and after a wait "
+                      "within a pass SCHED_DEADLINE keeps no deadline; give {} a `rate` and, as `offset`, that of {} "
+                      "and its deadline, or let {} publish `asap`",
+                      task.name, producer.name, task.name, producer.name, producer.name));
     }
-    return bound_of(part);
   }
 
-  std::optional<int64_t> bound_of(const Part& part) const {
-    const auto found = response_of_part(lanes_.set, plan_.policy, whole_, part);
-    return found ? std::optional(ns(*found)) : std::nullopt;
-  }
+  /// What the analysis says of the lanes, cut into pieces in one manner.
+  struct Judged {
+    SetAnswer set = {};  ///< of the pieces that decided
+    std::vector<PieceSet> ways = {};
+    std::vector<NodeAdmission> nodes = {};
+  };
 
-  /// Whether a worker waits in the middle of the lane for an output to become visible.
-  bool waits_within(const std::vector<size_t>& lane) const {
-    return std::any_of(lane.begin(), lane.end(), [&](size_t t) {
-      const size_t producer = plan_.tasks[t].on_task;
-      return producer != kNone && plan_.tasks[producer].publish == PublishAt::let;
-    });
-  }
-
-  /// What a worker is charged before its head's own work.
-  int64_t lead_ns(const std::vector<size_t>& lane) const {
-    return plan_.policy == Policy::cooperative ? 0 : longest_lead_ns(plan_, lane);
-  }
-
-  /// From the head's release, with the work of the lane up to there.
-  std::optional<int64_t> finish_of(size_t l, size_t position) const {
-    const std::vector<size_t>& lane = lanes_.lanes[l];
-    if (position + 1 == lane.size()) return ns(*whole_.response[l]);
-    return first_part_of(l, lead_ns(lane) + prefix_ns(plan_, lane, position, overheads_));
-  }
-
-  /// The least time from the head's release to that of task t of its lane.
-  int64_t released_after_ns(size_t t) const {
-    if (plan_.tasks[t].on_task == kNone) return 0;
-    const TaskPlan& producer = plan_.tasks[plan_.tasks[t].on_task];
-    return released_after_ns(plan_.tasks[t].on_task) + (producer.publish == PublishAt::let ? producer.deadline_ns : 0);
-  }
-
-  /// Of a follower, from its own release.
-  std::optional<int64_t> response_of_member(size_t l, size_t position) const {
-    const std::vector<size_t>& lane = lanes_.lanes[l];
-    std::optional<int64_t> bound = finish_of(l, position);
-    if (bound) *bound -= released_after_ns(lane[position]);
-    // A worker that waits for an output to become visible lets others run, who may then be in its way.
-    const bool goes_on = std::none_of(lane.begin(), lane.begin() + static_cast<ptrdiff_t>(position),
-                                      [&](size_t t) { return plan_.tasks[t].publish == PublishAt::let; });
-    if (!goes_on && plan_.policy != Policy::cooperative) return bound;
-    const auto part = continuation_of(l, position);
-    if (!bound || (part && *part < *bound)) bound = part;
-    return bound;
-  }
-
-  /// Of a head: as if it had only to begin. A follower begins when the member before it is done, or is waited for.
-  std::optional<int64_t> start_of(size_t l, size_t position) const {
-    const std::vector<size_t>& lane = lanes_.lanes[l];
-    if (position > 0) {
-      const TaskPlan& producer = plan_.tasks[plan_.tasks[lane[position]].on_task];
-      return producer.publish == PublishAt::asap ? result_.nodes[lane[position - 1]].finish_ns
-                                                 : finish_of(l, position);
+  Judged judge(Splitting splitting, const std::vector<int64_t>& done_by_ns) const {
+    Judged judged;
+    judged.ways = lane_pieces(plan_, lanes_, overheads_, done_by_ns, splitting);
+    const bool followers = lanes_.lanes.size() < plan_.tasks.size();
+    for (const PieceSet& pieces : judged.ways) {
+      judged.set = analyse_set(pieces.set, plan_.policy, bounds_ || followers);
+      // A delay that is only a bound need not come.
+      if (judged.set.answer == Answer::infeasible && delayed(pieces)) judged.set.answer = Answer::not_proven;
+      if (judged.set.answer != Answer::admitted) return judged;
+      const PieceBounds bounds(plan_, overheads_, lanes_, pieces, judged.set);
+      const std::vector<NodeAdmission> longest = bounds.longest(bounds_);
+      for (size_t t = 0; t < longest.size(); ++t)
+        if (judged.nodes.size() <= t) judged.nodes.push_back(longest[t]);
+        else judged.nodes[t] = longer(judged.nodes[t], longest[t]);
     }
-    constexpr int64_t kMicrosecond = 1'000;
-    return first_part_of(l, lead_ns(lane) + overheads_.release_ns + overheads_.switch_ns + kMicrosecond);
+    return judged;
   }
 
-  void judge_members(size_t l) {
-    const std::vector<size_t>& lane = lanes_.lanes[l];
-    for (size_t m = 0; m < lane.size(); ++m) {
-      const TaskPlan& task = plan_.tasks[lane[m]];
-      NodeAdmission& node = result_.nodes[lane[m]];
-      node.finish_ns = finish_of(l, m);
-      const auto aged = [](const EdgePlan& edge) { return edge.max_age_ns > 0; };
-      if (bounds_ && std::any_of(task.edges.begin(), task.edges.end(), aged)) node.start_ns = start_of(l, m);
-      node.response_ns = m == 0 ? node.finish_ns : response_of_member(l, m);
+  static bool delayed(const PieceSet& pieces) {
+    return std::any_of(pieces.set.tasks.begin(), pieces.set.tasks.end(), [](const auto& t) { return t.jitter > 0; });
+  }
+
+  /// Under `cooperative` a worker that waits does nothing else meanwhile, under `deadline` none may wait; and global
+  /// EDF knows no phases.
+  Splitting splitting() const {
+    const bool fits = std::all_of(lanes_.set.tasks.begin(), lanes_.set.tasks.end(),
+                                  [](const analysis::TimedTask& task) { return task.budget <= task.deadline; });
+    const bool phases = plan_.policy != Policy::deadline || lanes_.set.cores == 1;
+    return {fits && plan_.policy == Policy::fixed, fits && phases};
+  }
+
+  /// Every task published by its deadline, which is what is asked for.
+  std::vector<int64_t> due_ns() const {
+    std::vector<int64_t> due(plan_.tasks.size(), 0);
+    for (const auto& lane : lanes_.lanes)
+      for (const size_t t : lane)
+        due[t] = (plan_.tasks[t].on_task == kNone ? 0 : due[plan_.tasks[t].on_task]) + plan_.tasks[t].deadline_ns;
+    return due;
+  }
+
+  void ask_about_lanes() {
+    Judged judged = judge(splitting(), due_ns());
+    const bool delays = delayed(judged.ways.front());
+    if (judged.set.answer == Answer::not_proven)
+      if (Judged plain = judge({}, due_ns()); plain.set.answer == Answer::admitted) judged = std::move(plain);
+    result_.by = judged.set.by;
+    if (judged.set.answer != Answer::admitted) return refuse(judged.set.answer, judged.set.why);
+    // What was shown of those that others are delayed by takes the place of their deadlines.
+    constexpr int kRounds = 3;
+    for (int round = 0; round < kRounds && bounds_ && delays; ++round) {
+      std::vector<int64_t> done_by_ns = due_ns();
+      for (size_t t = 0; t < done_by_ns.size(); ++t)
+        done_by_ns[t] = std::min(done_by_ns[t], judged.nodes[t].finish_ns.value_or(done_by_ns[t]));
+      if (Judged closer = judge(splitting(), done_by_ns); closer.set.answer == Answer::admitted)
+        judged = std::move(closer);
+    }
+    lanes_admitted_ = true;
+    result_.nodes = std::move(judged.nodes);
+    for (const auto& lane : lanes_.lanes) judge_members(lane);
+  }
+
+  void judge_members(const std::vector<size_t>& lane) {
+    for (const size_t t : lane) {
+      const NodeAdmission& node = result_.nodes[t];
       // The lane is in time as a whole; a member's own deadline may be tighter.
-      if (node.response_ns && *node.response_ns <= task.deadline_ns) continue;
+      if (node.response_ns && *node.response_ns <= plan_.tasks[t].deadline_ns) continue;
       if (!node.response_ns && lane.size() == 1) continue;
       refuse(Answer::not_proven,
-             fmt::format("{}: its deadline of {} ms is not proven within the lane of {}{}", task.name,
-                         ms(task.deadline_ns), plan_.tasks[lane.front()].name,
+             fmt::format("{}: its deadline of {} ms is not proven within the lane of {}{}", plan_.tasks[t].name,
+                         ms(plan_.tasks[t].deadline_ns), plan_.tasks[lane.front()].name,
                          node.response_ns ? fmt::format(" (bound {:.3f} ms)", ms(*node.response_ns)) : ""));
     }
   }
@@ -211,13 +202,14 @@ class Admitting {
 
   /// Lanes that are stopped late. Under `fixed` one of low criticality is demoted until the job has ended, so the
   /// excess may come with every job; one of high criticality is not demoted.
-  analysis::TaskSet with_overruns() const {
-    analysis::TaskSet set = lanes_.set;
-    if (plan_.policy == Policy::deadline) return throttled(std::move(set));
-    for (size_t l = 0; l < lanes_.lanes.size(); ++l) {
-      if (high(l)) continue;
-      set.tasks[l].budget += excess_ns() * set.ticks_per_ns;
-      set.tasks[l].deadline = set.tasks[l].period;  // its own fault
+  analysis::TaskSet with_demotions(const PieceSet& pieces) const {
+    analysis::TaskSet set = pieces.set;
+    for (size_t p = 0; p < pieces.pieces.size(); ++p) {
+      const Piece& piece = pieces.pieces[p];
+      if (high(piece.lane)) continue;
+      set.tasks[p].budget += excess_ns() * set.ticks_per_ns;
+      // Being late is its own fault.
+      set.tasks[p].deadline = lanes_.set.tasks[piece.lane].period - piece.ready_ns * set.ticks_per_ns;
     }
     return set;
   }
@@ -225,7 +217,8 @@ class Admitting {
   /// Under `deadline` a reservation is filled up every reservation period, which is shorter than the lane's where its
   /// deadline is: whoever runs on takes that much. What he ran too long he pays back: the excess comes once in any
   /// window, here as a task of its own, of each low lane and of that one of the high ones that runs on.
-  analysis::TaskSet throttled(analysis::TaskSet set) const {
+  analysis::TaskSet throttled() const {
+    analysis::TaskSet set = lanes_.set;
     const Ticks excess = excess_ns() * set.ticks_per_ns;
     const std::vector<Reservation> reserved = reservations(plan_, plan_.policy);
     std::optional<analysis::TimedTask> high_one;
@@ -252,18 +245,43 @@ class Admitting {
       result_.notes.push_back("cooperative: nothing is enforced, a node that overruns its budget delays the others");
       return;
     }
-    const SetAnswer answer = analyse_set(with_overruns(), plan_.policy, false);
-    if (answer.answer == Answer::admitted || high_ones_keep_up(answer)) return;
-    refuse(Answer::not_proven,
-           fmt::format("with every node of low criticality{} running on to {:.1f} ms over its budget: {}",
-                       plan_.policy == Policy::deadline ? " and one of high" : "", ms(excess_ns()), answer.why));
+    if (plan_.policy == Policy::deadline)
+      return refuse_overruns(analyse_set(throttled(), plan_.policy, false), " and one of high");
+    if (excess_ns() == 0) return;  // asked already
+    for (const PieceSet& pieces : lane_pieces(plan_, lanes_, overheads_, due_ns(), splitting_of_overruns())) {
+      const SetAnswer answer = analyse_set(with_demotions(pieces), plan_.policy, false);
+      if (answer.answer != Answer::admitted && !high_ones_keep_up(pieces, answer)) return refuse_overruns(answer, "");
+    }
   }
 
-  /// Under `fixed` the low ones may miss then; the high ones must not.
-  bool high_ones_keep_up(const SetAnswer& answer) const {
-    if (plan_.policy != Policy::fixed || answer.response.size() != lanes_.set.tasks.size()) return false;
+  /// A lane that is late waits for later instants than planned. If one may be, waits count as work, wherever they fall.
+  Splitting splitting_of_overruns() const {
+    Splitting splitting = this->splitting();
+    for (size_t t = 0; t < plan_.tasks.size(); ++t)
+      if (const size_t p = plan_.tasks[t].on_task; p != kNone && plan_.tasks[p].publish == PublishAt::let)
+        splitting.at_waits = splitting.at_waits && high_lane_of(t);
+    return splitting;
+  }
+
+  bool high_lane_of(size_t task) const {
     for (size_t l = 0; l < lanes_.lanes.size(); ++l)
-      if (high(l) && (!answer.response[l] || *answer.response[l] > lanes_.set.tasks[l].deadline)) return false;
+      if (std::find(lanes_.lanes[l].begin(), lanes_.lanes[l].end(), task) != lanes_.lanes[l].end()) return high(l);
+    return false;
+  }
+
+  void refuse_overruns(const SetAnswer& answer, std::string_view more) {
+    if (answer.answer == Answer::admitted) return;
+    refuse(Answer::not_proven, fmt::format("with every node of low criticality{} running on to {:.1f} ms over its "
+                                           "budget: {}",
+                                           more, ms(excess_ns()), answer.why));
+  }
+
+  /// The low ones may miss then; the high ones must not.
+  bool high_ones_keep_up(const PieceSet& pieces, const SetAnswer& answer) const {
+    if (answer.response.size() != pieces.set.tasks.size()) return false;
+    for (size_t p = 0; p < pieces.pieces.size(); ++p)
+      if (high(pieces.pieces[p].lane) && (!answer.response[p] || *answer.response[p] > pieces.set.tasks[p].deadline))
+        return false;
     return true;
   }
 
@@ -271,7 +289,7 @@ class Admitting {
   const Overheads& overheads_;
   const bool bounds_;
   const LaneTasks lanes_;
-  SetAnswer whole_ = {};  ///< of the lanes
+  bool lanes_admitted_ = false;
   Admission result_;
 };
 

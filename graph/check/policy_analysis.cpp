@@ -104,8 +104,12 @@ SetAnswer cooperative(const TaskSet& set, bool responses) {
 /// As response_of_part() says, by the tasks that share the part's core.
 std::optional<analysis::Ticks> part_on_core(const TaskSet& set, Policy policy, const Part& part) {
   std::vector<analysis::TimedTask> tasks{set.tasks[part.task]};
-  for (size_t i = 0; i < set.tasks.size(); ++i)
-    if (i != part.task && set.tasks[i].core == set.tasks[part.task].core) tasks.push_back(set.tasks[i]);
+  for (size_t i = 0; i < set.tasks.size(); ++i) {
+    const bool elsewhere = set.tasks[i].core != set.tasks[part.task].core;
+    const auto& same = part.same_thread;
+    if (i != part.task && !elsewhere && std::find(same.begin(), same.end(), i) == same.end())
+      tasks.push_back(set.tasks[i]);
+  }
   const bool edf = policy == Policy::deadline;
   // Above fixed priorities nothing is left of the task's job before. Under EDF that one has held up others, who now
   // come first; only behind work of the same job none of them waits.
@@ -117,7 +121,7 @@ std::optional<analysis::Ticks> part_on_core(const TaskSet& set, Policy policy, c
   tasks[0].budget = part.work;
   if (!part.first) {  // ready at any phase
     tasks[0].sporadic = true;
-    tasks[0].offset = 0;
+    tasks[0].offset = tasks[0].jitter = 0;
   }
   const auto alone = edf ? edf_responses(tasks).bounds[0] : fixed_priority_responses(tasks).bounds[0];
   if (!going_on || !alone) return going_on ? going_on : alone;

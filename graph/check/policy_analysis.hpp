@@ -34,9 +34,11 @@ struct Part {
   /// True: what a job begins with. False: it gets ready the moment that the thread of the task has done what comes
   /// before it in the same job.
   bool first = true;
-  /// If not first: bounds on that moment and on its end, from the job's planned release, and by how much the releases of
-  /// others may be off. 0: not known, or some task of the set waits in the middle of its jobs.
+  /// If not first: bounds on that moment and on its end, from the job's planned release, and by how much the releases
+  /// of others may be off. 0: not known, or some task of the set waits in the middle of its jobs.
   analysis::Ticks ready_by = 0, done_by = 0, slack = 0;
+  /// If not first: tasks of the same thread, which has done what came before and has not begun with what comes after.
+  std::vector<size_t> same_thread = {};
 };
 
 /// Bound on its end, from its getting ready, ticks (of a first one: from the planned release); nothing where none is

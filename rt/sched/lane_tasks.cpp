@@ -63,20 +63,11 @@ int64_t member_ns(const Plan& plan, size_t t, const Overheads& o) {
   return lane_budget_ns(plan, {t}) + transport_ns(plan, plan.tasks[t], o);
 }
 
-/// Longest occupation of the thread from the start of member `first` to the publication of member `last`, without
-/// what others take from it. Members in between run too; whoever follows a `let` output waits for its instant.
-int64_t occupied_ns(const Plan& plan, const std::vector<size_t>& lane, size_t first, size_t last, const Overheads& o) {
-  int64_t at = 0;
-  std::vector<int64_t> visible(lane.size(), 0);
-  for (size_t m = first; m <= last; ++m) {
-    const TaskPlan& task = plan.tasks[lane[m]];
-    const auto producer = std::find(lane.begin(), lane.end(), task.on_task);
-    const auto p = static_cast<size_t>(producer - lane.begin());
-    const int64_t release = m > 0 && p >= first && p < m ? visible[p] : 0;
-    at = std::max(at, release) + member_ns(plan, lane[m], o);
-    visible[m] = task.publish == PublishAt::let ? std::max(at, release + task.deadline_ns) : at;
-  }
-  return at;
+/// The whole of a pass.
+int64_t pass_ns(const Plan& plan, const std::vector<size_t>& lane, const Overheads& o) {
+  std::vector<size_t> members(lane.size());
+  std::iota(members.begin(), members.end(), size_t{0});
+  return begin_ns(o) + occupied_ns(plan, lane, members, o);
 }
 
 /// All lanes as they are under `fixed`, not placed yet and without leads.
@@ -91,7 +82,7 @@ LaneTasks unplaced(const Plan& plan, const Overheads& o) {
     task.name = head.name;
     task.period = static_cast<Ticks>(Wide{head.rate->denominator} * kSecond * ticks / head.rate->numerator);
     task.deadline = std::min(task.period, lane_span_ns(plan, lane) * ticks);
-    task.budget = prefix_ns(plan, lane, lane.size() - 1, o) * ticks;
+    task.budget = pass_ns(plan, lane, o) * ticks;
     task.offset = head.offset_ns * ticks;
     result.set.tasks.push_back(std::move(task));
   }
@@ -133,8 +124,8 @@ bool is_high(const Plan& plan, const std::vector<size_t>& lane) {
 }
 
 /// In deadline monotonic order nobody behind has a shorter lead, so that his own covers how much earlier than released
-/// one of those before him may begin. In another order the rest of that is charged once, as blocking. `order`: the tasks
-/// of a core, the highest priority first.
+/// one of those before him may begin. In another order the rest of that is charged once, as blocking. `order`: the
+/// tasks of a core, the highest priority first.
 void charge_longer_leads(const Plan& plan, const LaneTasks& lanes, const std::vector<size_t>& order,
                          analysis::TaskSet& set) {
   int64_t longest_ns = 0;
@@ -159,9 +150,9 @@ void put_high_first(const Plan& plan, const LaneTasks& lanes, std::vector<size_t
   charge_longer_leads(plan, lanes, indexes, set);
 }
 
-/// Criticality decides who yields: a node that overruns its budget is stopped late, and an overload that nobody admitted
-/// is not stopped at all. So the high ones go first on each core, unless the others would miss deadlines then that they
-/// meet in plain deadline monotonic order.
+/// Criticality decides who yields: a node that overruns its budget is stopped late, and an overload that nobody
+/// admitted is not stopped at all. So the high ones go first on each core, unless the others would miss deadlines then
+/// that they meet in plain deadline monotonic order.
 void let_criticality_decide(const Plan& plan, LaneTasks& lanes) {
   const auto verdict = [](const analysis::TaskSet& set, const std::vector<size_t>& indexes) {
     std::vector<analysis::TimedTask> tasks;
@@ -220,14 +211,19 @@ LaneTasks lane_tasks(const Plan& plan, Policy policy, const Overheads& overheads
   return result;
 }
 
-int64_t prefix_ns(const Plan& plan, const std::vector<size_t>& lane, size_t position, const Overheads& overheads) {
-  return occupied_ns(plan, lane, 0, position, overheads) + overheads.release_ns + 2 * overheads.switch_ns;
-}
-
-int64_t segment_ns(const Plan& plan, const std::vector<size_t>& lane, size_t position, const Overheads& overheads) {
-  if (position == 0) return prefix_ns(plan, lane, 0, overheads);
-  const auto producer = std::find(lane.begin(), lane.end(), plan.tasks[lane[position]].on_task);
-  return occupied_ns(plan, lane, static_cast<size_t>(producer - lane.begin()) + 1, position, overheads);
+int64_t occupied_ns(const Plan& plan, const std::vector<size_t>& lane, std::span<const size_t> members,
+                    const Overheads& overheads) {
+  int64_t at = 0;
+  std::vector<int64_t> visible(lane.size(), 0);
+  for (size_t k = 0; k < members.size(); ++k) {
+    const TaskPlan& task = plan.tasks[lane[members[k]]];
+    const auto before = members.first(k);
+    const auto producer = std::find_if(before.begin(), before.end(), [&](size_t m) { return lane[m] == task.on_task; });
+    const int64_t release = producer == before.end() ? 0 : visible[*producer];
+    at = std::max(at, release) + member_ns(plan, lane[members[k]], overheads);
+    visible[members[k]] = task.publish == PublishAt::let ? std::max(at, release + task.deadline_ns) : at;
+  }
+  return at;
 }
 
 std::vector<Reservation> reservations(const Plan& plan, Policy policy) {

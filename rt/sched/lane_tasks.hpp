@@ -2,6 +2,7 @@
 // The lanes of a plan as the tasks that the analyses look at, and what each lane asks of the kernel. The executor and
 // the admission use the same functions, so that what was proven is what runs.
 #pragma once
+#include <span>
 #include <vector>
 
 #include "rt/sched/analysis/overheads.hpp"
@@ -26,13 +27,13 @@ struct LaneTasks {
 /// lane_members() does.
 LaneTasks lane_tasks(const Plan& plan, Policy policy, const analysis::Overheads& overheads = {});
 
-/// Occupation of the thread, overheads included, from the lane's release to the publication of its member at
-/// `position`, without what other lanes take from it.
-int64_t prefix_ns(const Plan& plan, const std::vector<size_t>& lane, size_t position,
-                  const analysis::Overheads& overheads = {});
-/// The same from the publication that releases this member; for a head from its release.
-int64_t segment_ns(const Plan& plan, const std::vector<size_t>& lane, size_t position,
-                   const analysis::Overheads& overheads = {});
+/// Longest occupation of the thread from the start of the first of these members of a lane (positions in it, ascending)
+/// to the publication of the last, without what other lanes take from it: their budgets and what the runtime adds to
+/// each. Whoever follows a `let` output of one of them waits for its instant.
+int64_t occupied_ns(const Plan& plan, const std::vector<size_t>& lane, std::span<const size_t> members,
+                    const analysis::Overheads& overheads = {});
+/// What comes before that where a thread has slept: it is woken, and goes to sleep again.
+inline int64_t begin_ns(const analysis::Overheads& overheads) { return overheads.release_ns + 2 * overheads.switch_ns; }
 
 /// What each lane asks of the kernel under that policy, in the order of lane_members(). Depends on the plan alone, its
 /// overheads included, so that every process of a run comes to the same.

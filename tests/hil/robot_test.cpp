@@ -2,6 +2,7 @@
 // In the guest of tests/hil/run: a graph of the robot on the kernel's drivers, as processes, with devices that are
 // pulled and put back while it runs.
 #include <fcntl.h>
+#include <poll.h>
 #include <signal.h>
 #include <spawn.h>
 #include <sys/wait.h>
@@ -11,8 +12,10 @@
 #include <cstdio>
 #include <fstream>
 #include <map>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/hil/guest.hpp"
@@ -56,6 +59,17 @@ class Takt {
     for (char c = ' '; c != '\n' && ::read(said_[0], &c, 1) == 1;) line += c;
     REQUIRE_MESSAGE(line.find(" at ") != std::string::npos, line);
   }
+  /// Whether there is something to read from it: what it has said, or that it has ended.
+  bool has_said() const {
+    pollfd said{said_[0], POLLIN, 0};
+    return poll(&said, 1, 0) > 0;
+  }
+  /// The next of what it has said; empty once it has ended. Waits for it.
+  std::string next() const {
+    char part[4096];
+    const ssize_t n = ::read(said_[0], part, sizeof part);
+    return {part, static_cast<size_t>(std::max<ssize_t>(n, 0))};
+  }
   /// What it has said, until it ends.
   std::string output() const {
     std::string all(1 << 16, ' ');
@@ -85,43 +99,58 @@ void plug_adapter(bool in) {
         " > ${device%idVendor}authorized; done");
 }
 
-/// What `takt top` says of the running graph's devices, by their names; empty while there is no such run.
-std::map<std::string, Json> devices() {
-  std::string said;
-  FILE* top = popen("\"$HIL_TAKT\" top --once --json 2> /dev/null", "re");
-  REQUIRE(top != nullptr);
-  for (int c; (c = std::fgetc(top)) != EOF;) said += static_cast<char>(c);
-  pclose(top);
-  std::map<std::string, Json> found;
-  const Json answer = Json::parse(said, nullptr, false);
-  if (!answer.is_object()) return found;
-  for (const Json& node : answer.at("nodes"))
-    if (node.contains("device")) found[node.at("name")] = node.at("device");
-  return found;
-}
-
-/// How often each device was lost so far.
-std::map<std::string, int> losses() {
-  std::map<std::string, int> all;
-  for (const auto& [name, device] : devices()) all[name] = device.at("losses").get<int>();
-  return all;
-}
-
-bool well(const std::string& device) {
-  const auto all = devices();
-  const auto found = all.find(device);
-  return found != all.end() && found->second.at("state") == "ok" && found->second.at("received") > 0;
-}
-
-/// Whether that comes true; an emulated machine takes its time.
-template <class Condition>
-bool until(Condition condition) {
-  for (int tries = 0; tries < 60; ++tries) {
-    if (condition()) return true;
-    sleep_for(500 * kMs);
+/// What `takt top` says of the running graph's devices. One process for all questions: its start alone costs an
+/// emulated machine seconds, in which the graph does not get them.
+class Devices {
+ public:
+  /// Comes true before long; an emulated machine takes its time.
+  template <class Condition>
+  bool until(Condition condition) {
+    const int64_t end = takt::MonotonicClock().now_ns() + 60 * kSecond;
+    do {
+      sleep_for(kSecond);
+      read();
+      if (condition()) return true;
+    } while (takt::MonotonicClock().now_ns() < end);
+    for (const auto& [name, device] : devices_) MESSAGE(name, ": ", device.dump());
+    return false;
   }
-  return false;
-}
+  bool well(const std::string& device) const {
+    const auto found = devices_.find(device);
+    return found != devices_.end() && found->second.at("state") == "ok" && found->second.at("received") > 0;
+  }
+  /// How often each was lost so far.
+  std::map<std::string, int> losses() const {
+    std::map<std::string, int> all;
+    for (const auto& [name, device] : devices_) all[name] = device.at("losses").get<int>();
+    return all;
+  }
+
+ private:
+  void read() {
+    if (!top_) top_ = std::make_unique<Takt>(std::vector<std::string>{"top", "--json"});
+    while (top_ && top_->has_said()) {
+      const std::string part = top_->next();
+      if (part.empty()) top_.reset();  // there is no run yet
+      for (const char c : part) {
+        if (c != '\n') {
+          line_ += c;
+          continue;
+        }
+        take(Json::parse(std::exchange(line_, ""), nullptr, false));
+      }
+    }
+  }
+  void take(const Json& answer) {
+    if (!answer.is_object()) return;
+    for (const Json& node : answer.at("nodes"))
+      if (node.contains("device")) devices_[node.at("name")] = node.at("device");
+  }
+
+  std::unique_ptr<Takt> top_;
+  std::string line_;
+  std::map<std::string, Json> devices_;  ///< by their names, as told last
+};
 
 Json named(const Json& list, const std::string& name) {
   for (const Json& entry : list)
@@ -141,28 +170,30 @@ TEST_CASE("hil: takt run on all devices, three of them pulled and put back") {
   const Takt head({"double", "head", "--can", "can1"}), base({"double", "base", "--can", "can1"});
   auto eyes = std::make_unique<Takt>(camera);
   for (const Takt* device : std::initializer_list<const Takt*>{&head, &base, eyes.get()}) device->wait_for_place();
-  Takt run({"run", TAKT_SOURCE_DIR "/tests/hil/robot.yaml", "--for", "120s", "--output", "/tmp/rig", "--report",
+  Takt run({"run", TAKT_SOURCE_DIR "/tests/hil/robot.yaml", "--for", "150s", "--output", "/tmp/rig", "--report",
             "/tmp/rig.json"});
   const std::vector<std::string> pulled{"head", "base", "front_laser", "head_camera"};
-  REQUIRE(until([&] { return std::all_of(pulled.begin(), pulled.end(), well); }));
-  const auto before = losses();
+  Devices devices;
+  const auto all_well = [&] {
+    return std::all_of(pulled.begin(), pulled.end(), [&](const auto& name) { return devices.well(name); });
+  };
+  REQUIRE(devices.until(all_well));
+  const auto before = devices.losses();
+  const auto lost = [&](const std::string& name) { return devices.losses()[name] == before.at(name) + 1; };
   eyes.reset();
-  CHECK(until([&] { return losses()["head_camera"] == before.at("head_camera") + 1; }));
+  REQUIRE(devices.until([&] { return lost("head_camera"); }));
   shell("echo 1 > $(readlink -f /sys/class/net/can0/device)/remove");
-  CHECK(until([&] {
-    auto now = losses();
-    return now["head"] == before.at("head") + 1 && now["base"] == before.at("base") + 1;
-  }));
+  REQUIRE(devices.until([&] { return lost("head") && lost("base"); }));
   eyes = std::make_unique<Takt>(camera);
   shell("echo 1 > /sys/bus/pci/rescan && " TAKT_SOURCE_DIR "/tests/hil/can_up can0");
-  CHECK(until([&] { return well("head") && well("base") && well("head_camera"); }));
+  REQUIRE(devices.until([&] { return devices.well("head") && devices.well("base") && devices.well("head_camera"); }));
   plug_adapter(false);
-  CHECK(until([&] { return losses()["front_laser"] == before.at("front_laser") + 1; }));
+  REQUIRE(devices.until([&] { return lost("front_laser"); }));
   plug_adapter(true);
-  CHECK(until([&] { return std::all_of(pulled.begin(), pulled.end(), well); }));
+  REQUIRE(devices.until(all_well));
   auto expected = before;  // each was lost once, by what was done here, and by nothing else
   for (const std::string& device : pulled) ++expected[device];
-  CHECK(losses() == expected);
+  CHECK(devices.losses() == expected);
   sleep_for(kSecond);  // in the mode full again
   shell("\"$HIL_TAKT\" stop > /dev/null");
   const std::string output = run.output();

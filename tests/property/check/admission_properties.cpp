@@ -26,8 +26,8 @@ struct Random {
   bool chance(double p) { return std::bernoulli_distribution(p)(engine); }
 };
 
-/// Hands on the stamp of what it has; without an input it is where the stamps come from. Its first jobs may make nothing:
-/// which of them an `every`-th one follows depends on that.
+/// Hands on the stamp of what it has; without an input it is where the stamps come from. Its first jobs may make
+/// nothing: which of them an `every`-th one follows depends on that.
 struct Relay final : Node {
   Input<Odometry> in{this, "in", "", Need::optional};
   Output<Odometry> out{this, "out", ""};
@@ -126,8 +126,9 @@ enum class Use : uint8_t { all, any, all_or_nothing };
 
 /// Several common periods and the longest way through.
 Seen seen_in(const Plan& plan, Use use, Random& random) {
-  for (const TaskPlan& task : plan.tasks)
-    dynamic_cast<Relay&>(*task.node).silent_jobs = static_cast<uint64_t>(random.uniform(0, 3));
+  for (const TaskPlan& task : plan.tasks)  // not all for as long: who has nothing to hand on is silent, too
+    dynamic_cast<Relay&>(*task.node).silent_jobs =
+        static_cast<uint64_t>(random.uniform(0, task.rate ? 3 * task.rate->numerator / 5 : 3));
   VirtualClock clock(kEpoch);
   RunBoard board(plan);
   const auto transport = make_local_transport(plan.ports);
@@ -154,12 +155,15 @@ Seen seen_in(const Plan& plan, Use use, Random& random) {
 
 /// The worst of many runs.
 Seen worst_of(const Plan& plan, Random& random) {
-  Seen worst = seen_in(plan, Use::all, random);
-  for (const Use use : {Use::any, Use::all_or_nothing, Use::all_or_nothing, Use::all_or_nothing}) {
-    const Seen other = seen_in(plan, use, random);
-    for (size_t t = 0; t < plan.tasks.size(); ++t) {
-      worst.response_ns[t] = std::max(worst.response_ns[t], other.response_ns[t]);
-      worst.age_ns[t] = std::max(worst.age_ns[t], other.age_ns[t]);
+  constexpr int kRuns[] = {6, 4, 6};  // by Use
+  Seen worst{std::vector<int64_t>(plan.tasks.size()), std::vector<int64_t>(plan.tasks.size())};
+  for (const Use use : {Use::all, Use::any, Use::all_or_nothing}) {
+    for (int run = 0; run < kRuns[static_cast<size_t>(use)]; ++run) {
+      const Seen other = seen_in(plan, use, random);
+      for (size_t t = 0; t < plan.tasks.size(); ++t) {
+        worst.response_ns[t] = std::max(worst.response_ns[t], other.response_ns[t]);
+        worst.age_ns[t] = std::max(worst.age_ns[t], other.age_ns[t]);
+      }
     }
   }
   return worst;
@@ -168,9 +172,8 @@ Seen worst_of(const Plan& plan, Random& random) {
 /// The longest by task, of several runs or proofs.
 void raise(std::vector<int64_t>& longest, size_t task, int64_t ns) { longest[task] = std::max(longest[task], ns); }
 
-/// Whether a lane counts as more than it does: a wait within it (`let` before a follower) as work, a member that is not
-/// in every job (`every`) as if it were.
-bool counts_as_more(const Plan& plan) {
+/// Whether a worker waits within a lane (`let` before a follower), or a member is not in every pass (`every`).
+bool in_pieces(const Plan& plan) {
   return std::any_of(plan.tasks.begin(), plan.tasks.end(), [&](const TaskPlan& task) {
     return task.on_task != kNone && (task.every > 1 || plan.tasks[task.on_task].publish == PublishAt::let);
   });
@@ -235,7 +238,7 @@ struct Compared {
 TEST_CASE("what a run does stays within what admission proved, and is not far from it") {
   constexpr int kScenes = 200, kPhases = 8, kTries = 100;  // what few phases allow, few were seen of
   Random random{std::mt19937(70)};
-  Tally one_core, as_more, more_cores, ages;
+  Tally one_core, pieces, more_cores, ages;
   int admitted[3] = {};
   for (int round = 0; round < kScenes; ++round) {
     CAPTURE(round);
@@ -250,19 +253,20 @@ TEST_CASE("what a run does stays within what admission proved, and is not far fr
     }
     admitted[static_cast<size_t>(plan.policy)] += compared.admitted;
     for (size_t t = 0; t < plan.tasks.size(); ++t) {
-      (plan.cores.size() > 1 ? more_cores : counts_as_more(plan) ? as_more : one_core)
+      (plan.cores.size() > 1 ? more_cores
+       : in_pieces(plan)     ? pieces
+                             : one_core)
           .add(compared.bound.response_ns[t], compared.seen.response_ns[t]);
       ages.add(compared.bound.age_ns[t], compared.seen.age_ns[t]);
     }
   }
   std::printf("admitted: deadline %d, fixed %d, cooperative %d\n", admitted[0], admitted[1], admitted[2]);
   one_core.print("response, one core");
-  as_more.print("response, one core, beside lanes that wait within or do not always do all");
+  pieces.print("response, one core, beside lanes that wait within or do not always do all");
   more_cores.print("response, two cores");
   ages.print("age of a chain");
   for (const int plans : admitted) CHECK(plans > 60);
   CHECK(one_core.largest <= 2);
-  CHECK(as_more.sum <= 1.2 * as_more.count);
-  CHECK(as_more.above_two * 50 <= as_more.count);
+  CHECK(pieces.largest <= 2);
   CHECK(ages.largest <= 3);
 }

@@ -8,39 +8,14 @@
 
 #include "graph/check/check.hpp"
 #include "graph/check/margins.hpp"
+#include "plans.hpp"
 #include "rt/sched/lane_tasks.hpp"
 
 using namespace takt;
 using namespace takt::graph;
+using namespace takt::test;
 
 namespace {
-
-constexpr int64_t kMs = 1'000'000;
-
-TaskPlan task(std::string name, int64_t hz, double budget_ms, double deadline_ms,
-              Criticality criticality = Criticality::high) {
-  TaskPlan plan;
-  plan.name = std::move(name);
-  plan.rate = Rate{hz, 1};
-  plan.budget_ns = static_cast<int64_t>(budget_ms * 1e6);
-  plan.deadline_ns = static_cast<int64_t>(deadline_ms * 1e6);
-  plan.criticality = criticality;
-  return plan;
-}
-
-Plan plan_of(Policy policy, std::vector<int> cores, std::vector<TaskPlan> tasks) {
-  Plan plan;
-  plan.policy = policy;
-  plan.cores = std::move(cores);
-  plan.tasks = std::move(tasks);
-  return plan;
-}
-
-/// `follower` runs when `producer` has published.
-void follow(Plan& plan, size_t follower, size_t producer) {
-  plan.tasks[follower].rate.reset();
-  plan.tasks[follower].on_task = producer;
-}
 
 Answer answer(const Plan& plan, const analysis::Overheads& o = {}) { return admit(plan, o, false).answer; }
 
@@ -131,13 +106,64 @@ TEST_CASE("admission: members of a lane have their own deadlines") {
   CHECK(says(admit(plan, {}), "tail: its deadline of 24 ms is not proven"));
 }
 
-TEST_CASE("admission: a lane that waits for an instant occupies its thread meanwhile") {
+TEST_CASE("admission: while a lane waits for an instant others run under fixed") {
   Plan plan =
-      plan_of(Policy::fixed, {0}, {task("head", 10, 10, 40), task("tail", 10, 10, 30), task("other", 10, 55, 100)});
+      plan_of(Policy::fixed, {0}, {task("head", 10, 10, 40), task("tail", 10, 10, 30), task("other", 10, 50, 70)});
+  follow(plan, 1, 0);
+  CHECK(admit(plan, {}).nodes[2].response_ns == 70 * kMs);
+  plan.tasks[0].publish = PublishAt::let;  // tail begins at 40, in the midst of other
+  Admission found = admit(plan, {});
+  CHECK(found.answer == Answer::admitted);
+  CHECK(found.nodes[0].response_ns == 10 * kMs);
+  CHECK(found.nodes[1].response_ns == 10 * kMs);
+  CHECK(found.nodes[1].finish_ns == 50 * kMs);
+  CHECK(found.nodes[2].response_ns == 70 * kMs);
+  plan.tasks[2].budget_ns = 51 * kMs;
+  CHECK(says(admit(plan, {}), "other may take 71.000 ms"));
+  plan.tasks[2].budget_ns = 29 * kMs;  // just done
+  CHECK(admit(plan, {}).nodes[2].response_ns == 39 * kMs);
+}
+
+TEST_CASE("admission: under cooperative a worker is occupied by waiting") {
+  Plan plan = plan_of(Policy::cooperative, {0},
+                      {task("head", 10, 10, 40), task("tail", 10, 10, 30), task("other", 10, 50, 100)});
+  follow(plan, 1, 0);
+  CHECK(admit(plan, {}).nodes[2].response_ns == 70 * kMs);
+  plan.tasks[0].publish = PublishAt::let;
+  const Admission found = admit(plan, {});
+  CHECK(found.answer == Answer::admitted);
+  CHECK(found.nodes[1].response_ns == 10 * kMs);  // whenever the head had begun
+  CHECK(found.nodes[2].response_ns == 100 * kMs);
+  plan.tasks[2].budget_ns += 1;
+  CHECK(answer(plan) != Answer::admitted);
+}
+
+TEST_CASE("admission: a worker that waits gets no deadline from the kernel that could be relied on") {
+  Plan plan = plan_of(Policy::deadline, {0}, {task("head", 10, 10, 40), task("tail", 10, 10, 30)});
   follow(plan, 1, 0);
   CHECK(answer(plan) == Answer::admitted);
-  plan.tasks[0].publish = PublishAt::let;  // tail begins at 40: 40 + 10 + 55 do not fit
-  CHECK(answer(plan) == Answer::infeasible);
+  plan.tasks[0].publish = PublishAt::let;
+  CHECK(answer(plan) == Answer::not_proven);
+  CHECK(says(admit(plan, {}), "give tail a `rate`"));
+  plan.tasks[1].rate = plan.tasks[0].rate;  // as it is told
+  plan.tasks[1].on_task = kNone;
+  plan.tasks[1].offset_ns = plan.tasks[0].deadline_ns;
+  CHECK(answer(plan) == Answer::admitted);
+}
+
+TEST_CASE("admission: who follows each second message is in each second job") {
+  for (const Policy policy : {Policy::fixed, Policy::deadline, Policy::cooperative}) {
+    CAPTURE(to_string(policy));
+    Plan plan = plan_of(policy, {0}, {task("often", 10, 20, 50), task("seldom", 10, 40, 50), task("slow", 5, 60, 200)});
+    follow(plan, 1, 0);
+    plan.tasks[1].every = 2;  // of 200 ms 20 + 40 + 20 are used, wherever the 40 fall
+    plan.tasks[2].offset_ns = 30 * kMs;
+    const Admission found = admit(plan, {});
+    REQUIRE(found.answer == Answer::admitted);
+    CHECK(found.nodes[1].response_ns == 40 * kMs);
+    // Released at 30, behind the seldom one until 60, and from 100 on behind the often one if that may interrupt it.
+    CHECK(found.nodes[2].response_ns == (policy == Policy::cooperative ? 90 * kMs : 110 * kMs));
+  }
 }
 
 TEST_CASE("admission: a low node that is stopped late must not make a high one late") {
