@@ -41,9 +41,9 @@ std::optional<int64_t> PieceBounds::bound_of(const Part& part) const {
   return found ? std::optional(ns(*found)) : std::nullopt;
 }
 
-/// A part that the thread begins with in the instant in which it is ready, the piece before being done.
-Part PieceBounds::going_on(size_t piece, int64_t work_ns) const {
-  Part part{piece, ticks(work_ns), false};
+/// A part that the thread may begin with in the instant in which it is ready, the piece before being done.
+Part PieceBounds::alone(size_t piece, int64_t work_ns) const {
+  Part part{piece, ticks(work_ns)};
   for (size_t p = 0; p < pieces_.pieces.size(); ++p)
     if (p != piece && pieces_.pieces[p].lane == pieces_.pieces[piece].lane) part.same_thread.push_back(p);
   return part;
@@ -83,7 +83,8 @@ int64_t PieceBounds::finish_in_turn(const Place& place) const {
 std::optional<int64_t> PieceBounds::continuation_of(const Place& before, const Place& place) const {
   const Piece& piece = pieces_.pieces[place.piece];
   const auto between = std::span(piece.members).subspan(before.at + 1, place.at - before.at);
-  Part part = going_on(place.piece, occupied_ns(plan_, lanes_.lanes[piece.lane], between, overheads_));
+  Part part = alone(place.piece, occupied_ns(plan_, lanes_.lanes[piece.lane], between, overheads_));
+  part.first = false;
   if (const auto ready = finish_of(before), done = finish_of(place); ready && done && !waits_) {
     part.ready_by = ticks(*ready - piece.ready_ns);
     part.done_by = ticks(*done - piece.ready_ns);
@@ -103,6 +104,24 @@ std::optional<PieceBounds::Place> PieceBounds::prompt_one_before(const Place& pl
   return std::nullopt;
 }
 
+/// Of what begins a piece whose instant is not known in advance, from that instant: as if it were one of some short
+/// stretches of time, whichever is the worst.
+std::optional<int64_t> PieceBounds::response_when_woken(const Place& place) const {
+  constexpr int kStretches = 16;
+  const Piece& piece = pieces_.pieces[place.piece];
+  const Part part = alone(place.piece, work_until_ns(plan_, lanes_, piece, place.at, overheads_));
+  analysis::TaskSet set = pieces_.set;
+  analysis::TimedTask& task = set.tasks[place.piece];
+  task.jitter = (task.jitter + kStretches - 1) / kStretches;
+  int64_t longest = 0;
+  for (int k = 0; k < kStretches; ++k, task.offset += task.jitter) {
+    const auto found = response_of_part(set, plan_.policy, whole_, part);
+    if (!found) return std::nullopt;
+    longest = std::max(longest, ns(*found));
+  }
+  return longest;
+}
+
 /// From its own release.
 std::optional<int64_t> PieceBounds::response_of(const Place& place) const {
   const Piece& piece = pieces_.pieces[place.piece];
@@ -116,9 +135,8 @@ std::optional<int64_t> PieceBounds::response_of(const Place& place) const {
     if (const auto before = prompt_one_before(place); before && (other = continuation_of(*before, place)))
       *other -= released_after_ns(plan_, task) - released_after_ns(plan_, task_at(*before));
   }
-  const bool begins = task_at({place.piece, 0}) == task;
-  if (begins && piece.prompt && piece.ready_by_ns > piece.ready_ns)  // ready at any instant
-    other = bound_of(going_on(place.piece, work_until_ns(plan_, lanes_, piece, place.at, overheads_)));
+  const bool begins = place.at == 0 && piece.prompt && piece.ready_by_ns > piece.ready_ns;
+  if (begins) other = response_when_woken(place);
   return !bound || (other && *other < *bound) ? other : bound;
 }
 

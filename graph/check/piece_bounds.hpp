@@ -27,11 +27,12 @@ class PieceBounds {
   int64_t ns(analysis::Ticks ticks) const;
   analysis::Ticks ticks(int64_t ns) const { return ns * pieces_.set.ticks_per_ns; }
   std::optional<int64_t> bound_of(const Part& part) const;
-  Part going_on(size_t piece, int64_t work_ns) const;
+  Part alone(size_t piece, int64_t work_ns) const;
   std::optional<int64_t> finish_of(const Place& place) const;
   int64_t finish_in_turn(const Place& place) const;
   std::optional<int64_t> continuation_of(const Place& before, const Place& place) const;
   std::optional<Place> prompt_one_before(const Place& place) const;
+  std::optional<int64_t> response_when_woken(const Place& place) const;
   std::optional<int64_t> response_of(const Place& place) const;
   std::optional<int64_t> start_of(const Place& place) const;
 

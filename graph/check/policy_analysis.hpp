@@ -37,7 +37,8 @@ struct Part {
   /// If not first: bounds on that moment and on its end, from the job's planned release, and by how much the releases
   /// of others may be off. 0: not known, or some task of the set waits in the middle of its jobs.
   analysis::Ticks ready_by = 0, done_by = 0, slack = 0;
-  /// If not first: tasks of the same thread, which has done what came before and has not begun with what comes after.
+  /// Tasks of the same thread, which has done what came before and has not begun with what comes after; empty: not
+  /// known.
   std::vector<size_t> same_thread = {};
 };
 
