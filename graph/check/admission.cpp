@@ -164,7 +164,7 @@ class Admitting {
     if (judged.set.answer != Answer::admitted) return refuse(judged.set.answer, judged.set.why);
     // What was shown of those that others are delayed by takes the place of their deadlines.
     constexpr int kRounds = 3;
-    for (int round = 0; round < kRounds && bounds_ && delays; ++round) {
+    for (int round = 0; round < kRounds && delays; ++round) {
       std::vector<int64_t> done_by_ns = due_ns();
       for (size_t t = 0; t < done_by_ns.size(); ++t)
         done_by_ns[t] = std::min(done_by_ns[t], judged.nodes[t].finish_ns.value_or(done_by_ns[t]));
