@@ -197,7 +197,8 @@ TEST_CASE("hil: takt run on all devices, three of them pulled and put back") {
   for (const std::string& device : pulled) ++expected[device];
   CHECK(devices.losses() == expected);
   sleep_for(kSecond);  // in the mode full again
-  run.stop();  // and no `takt stop`, whose start would keep the camera's double from its frames
+  // Not by `takt stop`, whose start would keep the camera's double from its frames for seconds.
+  run.stop();
   const std::string output = run.output();
   INFO(output);
   const int code = run.wait();
