@@ -96,8 +96,9 @@ class Admitting {
   /// its jobs are neither due when the analyses think, nor bound by it.
   void ask_about_waits() {
     if (plan_.policy != Policy::deadline) return;
-    for (const TaskPlan& task : plan_.tasks) {
-      if (task.on_task == kNone || plan_.tasks[task.on_task].publish != PublishAt::let) continue;
+    for (size_t t = 0; t < plan_.tasks.size(); ++t) {
+      if (!waits_for_release(plan_, t)) continue;
+      const TaskPlan& task = plan_.tasks[t];
       const TaskPlan& producer = plan_.tasks[task.on_task];
       refuse(
           Answer::not_proven,
@@ -257,16 +258,13 @@ class Admitting {
   /// A lane that is late waits for later instants than planned. If one may be, waits count as work, wherever they fall.
   Splitting splitting_of_overruns() const {
     Splitting splitting = this->splitting();
-    for (size_t t = 0; t < plan_.tasks.size(); ++t)
-      if (const size_t p = plan_.tasks[t].on_task; p != kNone && plan_.tasks[p].publish == PublishAt::let)
-        splitting.at_waits = splitting.at_waits && high_lane_of(t);
+    for (size_t l = 0; l < lanes_.lanes.size(); ++l) {
+      const auto& members = lanes_.lanes[l];
+      const bool waits =
+          std::any_of(members.begin(), members.end(), [&](size_t t) { return waits_for_release(plan_, t); });
+      if (waits && !high(l)) splitting.at_waits = false;
+    }
     return splitting;
-  }
-
-  bool high_lane_of(size_t task) const {
-    for (size_t l = 0; l < lanes_.lanes.size(); ++l)
-      if (std::find(lanes_.lanes[l].begin(), lanes_.lanes[l].end(), task) != lanes_.lanes[l].end()) return high(l);
-    return false;
   }
 
   void refuse_overruns(const SetAnswer& answer, std::string_view more) {

@@ -13,15 +13,11 @@ namespace {
 
 using Members = std::vector<size_t>;
 
-bool is_waited_for(const Plan& plan, size_t producer) {
-  return producer != kNone && plan.tasks[producer].publish == PublishAt::let;
-}
-
 /// Bound on the release of a task, from the planned one of its head.
 int64_t released_by_ns(const Plan& plan, size_t task, const std::vector<int64_t>& done_by_ns) {
   const size_t producer = plan.tasks[task].on_task;
   if (producer == kNone) return 0;
-  if (!is_waited_for(plan, producer)) return done_by_ns[producer];
+  if (!waits_for_release(plan, task)) return done_by_ns[producer];
   return released_by_ns(plan, producer, done_by_ns) + plan.tasks[producer].deadline_ns;
 }
 
@@ -30,7 +26,7 @@ std::vector<Piece> cut(const Plan& plan, size_t lane, const Members& tasks, cons
                        const std::vector<int64_t>& done_by_ns) {
   std::vector<Piece> pieces;
   for (const size_t m : members) {
-    const bool waited = is_waited_for(plan, plan.tasks[tasks[m]].on_task);
+    const bool waited = waits_for_release(plan, tasks[m]);
     if (pieces.empty()) {
       pieces.push_back({lane, {}});
     } else if (waited && !at_waits) {
@@ -200,10 +196,15 @@ int64_t work_until_ns(const Plan& plan, const LaneTasks& lanes, const Piece& pie
          occupied_ns(plan, lane, std::span(piece.members).first(place + 1), overheads);
 }
 
+bool waits_for_release(const Plan& plan, size_t task) {
+  const size_t producer = plan.tasks[task].on_task;
+  return producer != kNone && plan.tasks[producer].publish == PublishAt::let;
+}
+
 int64_t released_after_ns(const Plan& plan, size_t task) {
   const size_t producer = plan.tasks[task].on_task;
   if (producer == kNone) return 0;
-  return released_after_ns(plan, producer) + (is_waited_for(plan, producer) ? plan.tasks[producer].deadline_ns : 0);
+  return released_after_ns(plan, producer) + (waits_for_release(plan, task) ? plan.tasks[producer].deadline_ns : 0);
 }
 
 }  // namespace takt::graph

@@ -52,6 +52,9 @@ inline constexpr int64_t kMostWays = 64, kMostPasses = 100;
 int64_t work_until_ns(const Plan& plan, const LaneTasks& lanes, const Piece& piece, size_t place,
                       const analysis::Overheads& overheads);
 
+/// Whether a task is released at an instant that its worker may have to wait for: it follows a `let` output.
+bool waits_for_release(const Plan& plan, size_t task);
+
 /// The least time from the planned release of a task's head to its own release.
 int64_t released_after_ns(const Plan& plan, size_t task);
 
