@@ -26,8 +26,10 @@ tl::expected<void, std::string> FaultySink::append(std::span<const mcap::Bytes> 
     const bool full = written_ + bytes > fault.room_bytes;
     if (full || fault.bytes_per_s > 0) struck_[f]->fetch_add(1);
     if (full) return tl::unexpected(std::string(std::strerror(ENOSPC)));
-    if (fault.bytes_per_s > 0)
-      wait_(static_cast<int64_t>(static_cast<double>(bytes) * 1e9 / static_cast<double>(fault.bytes_per_s)));
+    if (fault.bytes_per_s == 0) continue;
+    const double needed_ns = static_cast<double>(bytes) * 1e9 / static_cast<double>(fault.bytes_per_s);
+    const int64_t left_ns = fault.to_ns - since_epoch;  // afterwards it takes the rest at once
+    wait_(needed_ns < static_cast<double>(left_ns) ? static_cast<int64_t>(needed_ns) : left_ns);
   }
   auto done = inner_.append(parts);
   if (done) written_ += bytes;

@@ -14,7 +14,7 @@ namespace takt::record {
 /// What is wrong with the disk that a record is written to, and when.
 struct DiskFault {
   int64_t from_ns = 0, to_ns = std::numeric_limits<int64_t>::max();  ///< [from, to), since the epoch
-  uint64_t bytes_per_s = 0;                                          ///< > 0: it takes no more
+  uint64_t bytes_per_s = 0;                                          ///< > 0: it takes no more, within the window
   uint64_t room_bytes = std::numeric_limits<uint64_t>::max();        ///< it is full after so many, of the whole record
 };
 

@@ -54,6 +54,16 @@ TEST_CASE("a slow disk takes its time for each byte, within its window") {
   CHECK(disk.file.bytes == 1500);
 }
 
+TEST_CASE("what a slow disk still holds when it is fast again is written at once") {
+  record::DiskFault fault;
+  fault.to_ns = 2 * kSecond;
+  fault.bytes_per_s = 1000;
+  Disk disk(fault);
+  disk.clock.advance_to(2 * kSecond);  // a second after the epoch, another one before the window's end
+  CHECK(disk.append(1'000'000));
+  CHECK(disk.waited_ns == kSecond);
+}
+
 TEST_CASE("a full disk refuses what does not fit, whole, and takes it again when there is room") {
   record::DiskFault fault;
   fault.to_ns = kSecond;
