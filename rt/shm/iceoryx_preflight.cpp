@@ -16,6 +16,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <ctime>
 #include <fstream>
 #include <optional>
 #include <utility>
@@ -73,6 +74,19 @@ void check_owner(const std::filesystem::path& file, uid_t user) {
   if (status.st_uid != user) foreign(file, status.st_uid, user);
 }
 
+/// Takes the lock. From a process that is just ending it is awaited, two seconds at most: its threads go one after the
+/// other, and the lock goes with the last of them.
+bool take_lock(int file, const std::filesystem::path& lock, const std::filesystem::path& locks) {
+  constexpr timespec kStep{0, 5'000'000};
+  for (int tries = 0; flock(file, LOCK_EX | LOCK_NB) != 0; ++tries) {
+    const std::optional<pid_t> holder = lock_holder(lock, locks);
+    const std::optional<ThreadState> told = holder ? thread_state(*holder) : std::nullopt;
+    if (!holder || (told && !told->ending()) || tries == 400) return false;
+    nanosleep(&kStep, nullptr);
+  }
+  return true;
+}
+
 void check_lock(const std::filesystem::path& lock, const IceoryxPlaces& places) {
   const int file = open(lock.c_str(), O_RDWR | O_CLOEXEC);
   if (file < 0) {
@@ -83,7 +97,7 @@ void check_lock(const std::filesystem::path& lock, const IceoryxPlaces& places) 
     throw TransportError("cannot open " + lock.string() + ": " + std::strerror(reason) + ". Remove it: sudo rm " +
                          lock.string());
   }
-  const bool free = flock(file, LOCK_EX | LOCK_NB) == 0;
+  const bool free = take_lock(file, lock, places.locks);
   struct stat status {};
   const bool known = fstat(file, &status) == 0;
   close(file);
@@ -182,7 +196,7 @@ void remove_iceoryx_leftovers(const IceoryxPlaces& places, pid_t dead) {
 
 DaemonClaim::DaemonClaim(const IceoryxPlaces& places) : folder_(open(places.shm.c_str(), O_RDONLY | O_CLOEXEC)) {
   // The folder itself is locked: it is there, everybody may read it, and each mount namespace has its own.
-  if (folder_ < 0 || flock(folder_, LOCK_EX | LOCK_NB) == 0) return;
+  if (folder_ < 0 || take_lock(folder_, places.shm, places.locks)) return;
   close(std::exchange(folder_, -1));
   throw TransportError(
       "another iceoryx daemon is running: it is being started at this moment; there can be one on a machine");

@@ -4,15 +4,18 @@
 #include <doctest/doctest.h>
 #include <fcntl.h>
 #include <sys/file.h>
+#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
+#include <thread>
 
 #include "rt/msg/messages.hpp"
 #include "rt/shm/iceoryx_layout.hpp"
 #include "rt/shm/transport_error.hpp"
+#include "rt/thread_state.hpp"
 #include "tests/temporary_folder.hpp"
 
 using namespace takt;
@@ -99,6 +102,43 @@ TEST_CASE("the holder of a lock is found") {
   CHECK(has(message, "another iceoryx daemon is running"));
   CHECK(has(message, "kill " + std::to_string(getpid())));
   close(file);
+}
+
+TEST_CASE("a daemon's process that is just ending is awaited, one that lives is not") {
+  const Directory directory;
+  const auto lock = directory.path / "run" / "iox-unique-roudi.lock";
+  std::ofstream(lock) << "";
+  int holds[2], first[2], last[2];  // pipes: from the daemon; what its threads wait for
+  for (int* both : {holds, first, last}) REQUIRE(pipe(both) == 0);
+  const pid_t daemon = fork();
+  if (daemon == 0) {
+    const auto wait_for = [](int from) {
+      char byte = 0;
+      if (read(from, &byte, 1) != 1) _exit(1);
+    };
+    flock(open(lock.c_str(), O_RDWR | O_CLOEXEC), LOCK_EX);
+    std::thread([&] {
+      wait_for(last[0]);
+      _exit(0);
+    }).detach();
+    if (write(holds[1], "x", 1) != 1) _exit(1);
+    wait_for(first[0]);
+    syscall(SYS_exit, 0);  // of this thread alone: the process is ending then, but the other keeps the lock
+  }
+  char byte = 0;
+  REQUIRE(read(holds[0], &byte, 1) == 1);
+  CHECK(has(refusal(directory.places()), "another iceoryx daemon is running: process " + std::to_string(daemon)));
+  REQUIRE(write(first[1], "x", 1) == 1);
+  while (!thread_state(daemon)->ended()) std::this_thread::yield();
+  std::thread later([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));  // so that it is waited for
+    CHECK(write(last[1], "x", 1) == 1);
+  });
+  CHECK(refusal(directory.places()).empty());
+  later.join();
+  CHECK(waitpid(daemon, nullptr, 0) == daemon);
+  for (int* both : {holds, first, last})
+    for (const int end : {both[0], both[1]}) close(end);
 }
 
 TEST_CASE("a lock table with waiting processes is read") {
