@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <tuple>
 
 namespace takt::object_detection {
@@ -60,10 +61,7 @@ size_t Decision::detections(double min_score, std::span<Detection> out) {
       if (visited_[window] || errors[window] == kFailed) continue;
       const size_t best = best_of_group(errors, window);
       if (1 - errors[best] < static_cast<float>(min_score)) continue;
-      const Placement& at = at_[object * windows_ + best];
-      const auto size = static_cast<float>(at.side);
-      const Detection detection{
-          static_cast<float>(object), static_cast<float>(at.x), static_cast<float>(at.y), size, size, 1 - errors[best]};
+      const Detection detection = this->detection(object, best);
       if (found < out.size()) out[found++] = detection;
       else if (auto worst = std::max_element(out.begin(), out.end(), better);
                worst != out.end() && better(detection, *worst))
@@ -72,6 +70,28 @@ size_t Decision::detections(double min_score, std::span<Detection> out) {
   }
   std::sort(out.begin(), out.begin() + static_cast<ptrdiff_t>(found), better);
   return found;
+}
+
+Detection Decision::detection(size_t object, size_t best) const {
+  const std::span<const float> errors = this->errors(object);
+  const Placement& at = at_[object * windows_ + best];
+  const Placement middle = grid_.window(best);
+  const auto near = [&](int origin, int of_best) { return 2 * std::abs(origin - of_best) <= grid_.window_px; };
+  float x = 0, y = 0, weights = 0;
+  for (int v = 0; v < grid_.rows; ++v) {
+    if (!near(grid_.y0(v), middle.y)) continue;
+    for (int u = 0; u < grid_.columns; ++u) {
+      const auto window = static_cast<size_t>(v * grid_.columns + u);
+      const float weight = errors[best] + kNearlyBest - errors[window];
+      const Placement& other = at_[object * windows_ + window];
+      if (weight <= 0 || !near(grid_.x0(u), middle.x) || other.side != at.side) continue;
+      x += weight * static_cast<float>(other.x);
+      y += weight * static_cast<float>(other.y);
+      weights += weight;
+    }
+  }
+  const auto side = static_cast<float>(at.side);
+  return {static_cast<float>(object), x / weights, y / weights, side, side, 1 - errors[best]};
 }
 
 /// Marks the group of touching windows around `seed` as visited.

@@ -75,14 +75,19 @@ class Decision {
   /// For any object?
   bool passes(size_t window) const;
 
-  /// One detection per object and group of touching windows that pass (8 neighbours), at the group's window with the
-  /// smallest error; of equals the upper left one. class_id is the object's index, score 1 - error. Those below
-  /// `min_score` are left out. Fills `out` with the best, best first (equal scores: lower class, then upper left
+  /// One detection per object and group of touching windows that pass (8 neighbours): score 1 - the smallest error in
+  /// the group, class_id the object's index. It lies where the window with that error does (of equals the upper left
+  /// one), or rather at the mean of the passing windows whose middle that window covers, each with the weight by which
+  /// its error is less than kNearlyBest beyond the smallest: several windows may show enough of an object, and it is in
+  /// their midst. Those below `min_score` are left out. Fills `out` with the best, best first (equal scores: lower class, then upper left
   /// first); returns how many.
   size_t detections(double min_score, std::span<Detection> out);
 
  private:
+  static constexpr float kNearlyBest = 0.1f;
+
   size_t best_of_group(std::span<const float> errors, size_t seed);
+  Detection detection(size_t object, size_t best) const;
 
   SearchGrid grid_;
   size_t windows_;

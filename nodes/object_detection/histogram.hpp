@@ -40,15 +40,14 @@ uint32_t missing_mass(std::span<const uint32_t> window, std::span<const uint32_t
 /// The same over the reference's mass: 0 = all found, 1 = nothing found; 0 for a reference without mass.
 double intersection_error(const Histogram& window, const Histogram& reference);
 
-/// Largest thresholds that automatic_threshold gives: of colour histograms alone (algorithm reference 21.7); of those
-/// before other stages, which lose the objects beyond it anyway and need not look at so many windows; of orientations
-/// (6.8); of co-occurrences, which lose more.
-constexpr double kThresholdCap = 0.75, kColourBeforeOthersCap = 0.65, kOrientationCap = 0.6, kCooccurrenceCap = 0.7;
+/// Largest thresholds that automatic_threshold gives: of colours, orientations, and co-occurrences, which lose more. Those
+/// of the algorithm reference (0.6 in 6.8, 0.75 in 21.7) are for views compared with at their full size.
+constexpr double kColourCap = 0.5, kOrientationCap = 0.5, kCooccurrenceCap = 0.64;
 /// Start value of an object's threshold: 1.25 times the 90 % quantile (nearest rank) of the error of every view against
 /// every other view of the object (algorithm reference 6.8), and `tolerance` on top, at most `cap`, which is also the
 /// value for a single view. The views say nothing of what a scene takes away: an occlusion of a share q takes about q
-/// of the reference's mass (6.8), an object at k < 1 times its reference's edge takes 1 - k^2; that is the tolerance.
-/// Of pairs of pixels both must be seen: there it is 1 - (1 - q)^2.
-double automatic_threshold(std::span<const Histogram> views, double tolerance, double cap = kThresholdCap);
+/// of the reference's mass (6.8); that is the tolerance. Of pairs of pixels both must be seen: there it is
+/// 1 - (1 - q)^2.
+double automatic_threshold(std::span<const Histogram> views, double tolerance, double cap);
 
 }  // namespace takt::object_detection

@@ -28,6 +28,7 @@ class ObjectDetectionNode final : public Node {
     p.orientations = std::array{8, 32, 180, 360}[orientations_()];
     p.pairs = std::array<PairBins, 4>{{{5, 5}, {20, 5}, {5, 25}, {20, 25}}}[pairs_()];
     p.window_px = window_;
+    p.smallest = smallest_;
     p.tolerance = tolerance_;
     p.threshold_scale = threshold_scale_;
     try {
@@ -155,10 +156,14 @@ class ObjectDetectionNode final : public Node {
   Param<int> reference_{this, "reference", 48, {4, 254}, "px", "edge of the reference views"};
   Param<int> window_{this,     "window", 64,
                      {5, 255}, "px",     "edge of a search window; neighbours overlap by the reference's edge"};
+  Param<double> smallest_{
+      this, "smallest",
+      0.7,  {0.5, 1.0},
+      "1",  "size, of the views' edge, down to which objects are found: views are compared with at that size"};
   Param<double> tolerance_{
       this, "tolerance",
-      0.36, {0.0, 0.75},
-      "1",  "share of a reference that occlusion or distance may take; added to automatic thresholds"};
+      0.4,  {0.0, 0.75},
+      "1",  "share of an object that may be hidden; added to automatic thresholds"};
   Param<double> threshold_scale_{
       this, "threshold_scale", 1.0, {0.05, 4.0}, "1", "factor on the thresholds of the database"};
   Param<double> min_score_{this,       "min_score", 0.3,

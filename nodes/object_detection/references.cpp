@@ -1,14 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "nodes/object_detection/references.hpp"
 
+#include <cmath>
 #include <sstream>
 #include <stdexcept>
+
+#include "nodes/object_detection/shrink.hpp"
 
 namespace takt::object_detection {
 namespace {
 
-Histogram histogram_of(ImageView<const uint8_t> view, Stage stage, const DetectorParameters& p,
+Histogram histogram_of(const ReferenceView& reference, Stage stage, const DetectorParameters& p,
                        const OrientationBins& orientations) {
+  const std::vector<uint8_t> pixels = shrunk_view(reference.view(), p.smallest);
+  const auto side_px = static_cast<int>(std::lround(p.smallest * reference.side_px));
+  const ImageView<const uint8_t> view(pixels.data(), side_px, side_px, 3);
   switch (stage) {
     case Stage::colour: return colour_histogram(view, p.bins);
     case Stage::orientation: return orientation_histogram(view, orientations);
@@ -45,14 +51,13 @@ CascadeReferences cascade_references(std::span<const DatabaseObject> database, c
   const OrientationBins orientations(p.orientations);
   CascadeReferences stages;
   for (size_t s = 0; s < kHistogramStages && s <= static_cast<size_t>(p.last); ++s) {
-    const double caps[] = {p.last == Stage::colour ? kThresholdCap : kColourBeforeOthersCap, kOrientationCap,
-                           kCooccurrenceCap};
+    const double caps[] = {kColourCap, kOrientationCap, kCooccurrenceCap};
     const bool of_pairs = static_cast<Stage>(s) == Stage::cooccurrence;
     const double tolerance = of_pairs ? 1 - (1 - p.tolerance) * (1 - p.tolerance) : p.tolerance;
     for (const DatabaseObject& object : database) {
       auto& views = stages[s].histograms.emplace_back();
       for (const ReferenceView& view : object.views)
-        views.push_back(histogram_of(view.view(), static_cast<Stage>(s), p, orientations));
+        views.push_back(histogram_of(view, static_cast<Stage>(s), p, orientations));
       const double of_object = object.thresholds[s].value_or(automatic_threshold(views, tolerance, caps[s]));
       auto& limits = stages[s].limits.emplace_back();
       for (size_t r = 0; r < views.size(); ++r)

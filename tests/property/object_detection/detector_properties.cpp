@@ -2,6 +2,7 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <set>
 #include <tuple>
@@ -9,6 +10,7 @@
 
 #include "nodes/object_detection/detector.hpp"
 #include "nodes/object_detection/reference.hpp"
+#include "nodes/object_detection/shrink.hpp"
 #include "tests/property/object_detection/random_images.hpp"
 
 using namespace takt;
@@ -55,7 +57,9 @@ float error_by_brute_force(const Detector& detector, size_t scale, const Databas
     error = kFailed;
     for (size_t r = 0; r < object.views.size(); ++r) {
       const ReferenceLimit& limit = detector.limits(static_cast<Stage>(s))[index][r];
-      const auto view = object.views[r].view();
+      const std::vector<uint8_t> pixels = shrunk_view(object.views[r].view(), p.smallest);
+      const auto side_px = static_cast<int>(std::lround(p.smallest * object.views[r].side_px));
+      const ImageView<const uint8_t> view(pixels.data(), side_px, side_px, 3);
       const Histogram reference = s == 0   ? colour_histogram(view, p.bins)
                                   : s == 1 ? orientation_histogram(view, OrientationBins(p.orientations))
                                            : cooccurrence_histogram(view, p.pairs);
@@ -92,6 +96,37 @@ TEST_CASE("a smaller scale equals doing each pixel by itself, and OpenCV") {
   }
 }
 
+TEST_CASE("a smaller view: pixels between those of the object, as OpenCV has them; background where little is object") {
+  Random random(23);
+  for (const double scale : {0.5, 0.7, 0.83, 1.0}) {
+    constexpr int kSide = 40;
+    std::vector<uint8_t> pixels(3 * kSide * kSide, 0), object(pixels.size(), 0);
+    for (int y = 3; y < 31; ++y) {
+      for (int x = 9; x < 36; ++x) {
+        const auto i = static_cast<size_t>(3 * (y * kSide + x));
+        for (size_t c = 0; c < 3; ++c) pixels[i + c] = random.in(0, 3) ? random.byte() : uint8_t{0}, object[i + c] = 255;
+        if ((pixels[i] | pixels[i + 1] | pixels[i + 2]) == 0) std::fill_n(&pixels[i], 3, uint8_t{1});
+      }
+    }
+    const int side = static_cast<int>(std::lround(scale * kSide));
+    cv::Mat theirs, share;
+    cv::resize(cv::Mat(kSide, kSide, CV_8UC3, pixels.data()), theirs, {side, side}, 0, 0, cv::INTER_LINEAR_EXACT);
+    cv::resize(cv::Mat(kSide, kSide, CV_8UC3, object.data()), share, {side, side}, 0, 0, cv::INTER_LINEAR_EXACT);
+    const std::vector<uint8_t> ours = shrunk_view({pixels.data(), kSide, kSide, 3}, scale);
+    REQUIRE(ours.size() == static_cast<size_t>(3 * side * side));
+    size_t objects = 0;
+    for (size_t i = 0; i < ours.size(); i += 3) {
+      const bool is_object = share.data[i] >= 204;
+      const bool black = (theirs.data[i] | theirs.data[i + 1] | theirs.data[i + 2]) == 0;
+      for (size_t c = 0; c < 3; ++c) REQUIRE(ours[i + c] == (!is_object ? 0 : black ? 1 : theirs.data[i + c]));
+      objects += is_object;
+    }
+    CHECK(static_cast<double>(objects) > (scale * 28 - 1.5) * (scale * 27 - 1.5));
+    CHECK(static_cast<double>(objects) < (scale * 28 + 1) * (scale * 27 + 1));
+    if (scale == 1) CHECK(ours == pixels);
+  }
+}
+
 TEST_CASE("the cascade equals doing each stage for each window that passed the one before, at each scale") {
   Random random(61);
   size_t passed = 0, failed = 0;
@@ -105,6 +140,7 @@ TEST_CASE("the cascade equals doing each stage for each window that passed the o
     p.pairs = round % 2 ? PairBins{} : PairBins{5, 5};
     p.orientations = round % 2 ? 360 : 32;
     if (round >= 6) p.scales = {1, 0.7, 0.5};
+    if (round % 2) p.smallest = 1;
     Detector detector(kWidth, kHeight, objects, p);
     REQUIRE(detector.run(image));
     CHECK(detector.searched() == 1);

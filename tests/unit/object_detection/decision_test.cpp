@@ -93,9 +93,9 @@ TEST_CASE("touching windows of one object are one detection at the best of them;
   CHECK(found[2].score == doctest::Approx(0.7));
 }
 
-TEST_CASE("of equal errors the upper left window wins, of more detections than places the best stay") {
+TEST_CASE("of more detections than places the best stay") {
   Fixture f({{{100, 0.5}}});
-  for (const int u : {0, 1, 2}) f.set(u, 0, 0, 30);
+  for (const int u : {0, 1, 2}) f.set(u, 0, 0, u == 0 ? 30 : 45);
   f.set(4, 0, 0, 20);
   f.set(0, 2, 0, 10);
   f.set(5, 3, 0, 40);
@@ -107,6 +107,21 @@ TEST_CASE("of equal errors the upper left window wins, of more detections than p
   CHECK(f.detections(0).empty());
   CHECK(f.detections(20, 0.65).size() == 3);
   CHECK(f.detections(20, 0.95).empty());
+}
+
+TEST_CASE("a detection lies amid the windows around the best that are nearly as good, the better ones count more") {
+  const auto x_px = [](std::vector<uint16_t> missing) {
+    Fixture f({{{100, 0.5}}});
+    for (size_t u = 0; u < missing.size(); ++u) f.set(static_cast<int>(u), 1, 0, missing[u]);
+    const auto found = f.detections();
+    REQUIRE(found.size() == 1);
+    CHECK(found[0].y_px == 4);
+    return found[0].x_px;
+  };
+  CHECK(x_px({40, 30, 40}) == 4);  // 0.1 worse: too far
+  CHECK(x_px({45, 30, 35}) == doctest::Approx((4 * 0.1 + 8 * 0.05) / 0.15));
+  CHECK(x_px({30, 30, 30, 30}) == 2);  // the upper left one is the best of equals
+  CHECK(x_px({32, 31, 30}) == doctest::Approx((4 * 0.09 + 8 * 0.1) / 0.19));  // the first begins 8 px before the best
 }
 
 TEST_CASE("nothing below a threshold: no detection, an empty region of interest") {

@@ -99,7 +99,7 @@ TEST_CASE("clutter in the window costs nothing; what lacks counts as a share of 
   CHECK(intersection_error(window.histogram(), reference.histogram()) == doctest::Approx(0.4));
 }
 
-TEST_CASE("automatic threshold: 1.25 times the 90 % quantile over all pairs, the tolerance on top, capped at 0.75") {
+TEST_CASE("automatic threshold: 1.25 times the 90 % quantile over all pairs, the tolerance on top, capped") {
   // Views with k blue pixels and 100 - k red ones: the error of view i against view k is |k_i - k_k| / 100.
   const auto views = [](std::initializer_list<int> blue) {
     std::vector<Histogram> out;
@@ -111,14 +111,14 @@ TEST_CASE("automatic threshold: 1.25 times the 90 % quantile over all pairs, the
     }
     return out;
   };
-  CHECK(automatic_threshold(views({10, 20, 40}), 0) == doctest::Approx(1.25 * 0.30));  // 6 pairs: rank 6 of 6
-  CHECK(automatic_threshold(views({10, 10, 10}), 0) == 0);
-  CHECK(automatic_threshold(views({10, 10, 10}), 0.36) == doctest::Approx(0.36));
-  CHECK(automatic_threshold(views({0, 90}), 0) == kThresholdCap);
-  CHECK(automatic_threshold(views({10, 20, 40}), 0.6) == kThresholdCap);
-  CHECK(automatic_threshold(views({10}), 0) == kThresholdCap);
+  CHECK(automatic_threshold(views({10, 20, 40}), 0, 0.75) == doctest::Approx(1.25 * 0.30));  // 6 pairs: rank 6 of 6
+  CHECK(automatic_threshold(views({10, 10, 10}), 0, 0.75) == 0);
+  CHECK(automatic_threshold(views({10, 10, 10}), 0.36, 0.75) == doctest::Approx(0.36));
+  CHECK(automatic_threshold(views({0, 90}), 0, 0.75) == 0.75);
+  CHECK(automatic_threshold(views({10, 20, 40}), 0.6, 0.75) == 0.75);
+  CHECK(automatic_threshold(views({10}), 0, 0.75) == 0.75);
   // 5 views, 20 pairs: the rank is 18; only the two largest errors, of the pair 0 and 50, lie above it.
-  CHECK(automatic_threshold(views({0, 2, 4, 6, 50}), 0) == doctest::Approx(1.25 * 0.48));
+  CHECK(automatic_threshold(views({0, 2, 4, 6, 50}), 0, 0.75) == doctest::Approx(1.25 * 0.48));
 }
 
 TEST_CASE("oracle 9: a vertical step edge has one orientation, a horizontal one another, and so have the diagonals") {

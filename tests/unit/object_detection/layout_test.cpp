@@ -35,7 +35,7 @@ std::vector<Photograph> photographs(std::span<const DatabaseObject> database) {
 DetectorParameters wide_open(Stage last) {
   DetectorParameters p;
   p.last = last;
-  p.threshold_scale = 1.25;
+  p.threshold_scale = 1.5;
   return p;
 }
 

@@ -304,8 +304,10 @@ TEST_CASE("object_detection: out of time it sends what it has and says how much 
 }
 
 TEST_CASE("object_detection: at most max_detections boxes") {
-  Bench bench(
-      {{"max_detections", int64_t{2}}, {"min_score", 0.0}, {"stages", std::string("ch")}});  // so that there are many
+  Bench bench({{"max_detections", int64_t{2}},
+               {"min_score", 0.0},
+               {"threshold_scale", 2.0},
+               {"stages", std::string("ch")}});  // so that there are many
   auto& [node, port, pair] = bench;
   test::BoxWriter<Detections> boxes(*node->outputs()[0]);
   const auto database = read_database(kObjects, 48, TestViews::read);
