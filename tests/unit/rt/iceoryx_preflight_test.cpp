@@ -4,6 +4,7 @@
 #include <doctest/doctest.h>
 #include <fcntl.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -139,6 +140,23 @@ TEST_CASE("a daemon's process that is just ending is awaited, one that lives is 
   CHECK(waitpid(daemon, nullptr, 0) == daemon);
   for (int* both : {holds, first, last})
     for (const int end : {both[0], both[1]}) close(end);
+}
+
+TEST_CASE("a daemon that gives its lock back while it is asked for is gone") {
+  const Directory directory;
+  IceoryxPlaces places = directory.places();
+  places.locks = directory.path / "locks";
+  REQUIRE(mkfifo(places.locks.c_str(), 0600) == 0);
+  const int lock = open((directory.path / "run/iox-unique-roudi.lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+  REQUIRE(flock(lock, LOCK_EX | LOCK_NB) == 0);
+  std::thread daemon([&] {
+    const int table = open(places.locks.c_str(), O_WRONLY | O_CLOEXEC);  // until somebody reads who holds which lock
+    flock(lock, LOCK_UN);
+    close(table);
+  });
+  CHECK(refusal(places).empty());
+  daemon.join();
+  close(lock);
 }
 
 TEST_CASE("a lock table with waiting processes is read") {
