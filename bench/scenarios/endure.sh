@@ -4,7 +4,8 @@
 # Default: 30 minutes. Each fault must strike, obstacle_stop must not miss a deadline, and whatever else a scenario always
 # expects (docs/faults.md) must be met; memory must stay flat: resident memory of the supervisor and its members is sampled
 # and the last tenth compared with the second. Exit 1 if any of it is broken. With --trace FILE it says
-# why a deadline was missed, and memory is not judged, since the trace is kept in it.
+# why a deadline was missed, and memory is not judged, since the trace is kept in it. The run is recorded, for faults of the
+# disk: 2 GB a minute in the temporary folder.
 # Beside the run stands how late cyclictest was woken on the same CPUs: what no program could help.
 root=$(readlink -f "$(dirname "$0")/../..")
 export PYTHONPATH="$root/bench/scenarios" PYTHONDONTWRITEBYTECODE=1

@@ -104,7 +104,7 @@ Writer::Done Writer::flush() {
   index.length = head.size() + stored.size();
   const Done done = append({head, stored, indexes(index, size_ + index.length)});
   if (!done) return drop_chunk(), done;
-  count_chunk(std::move(index));
+  count_chunk(index);
   return {};
 }
 
@@ -124,14 +124,14 @@ std::vector<std::byte> Writer::indexes(ChunkIndex& index, uint64_t at) const {
   return records;
 }
 
-void Writer::count_chunk(ChunkIndex index) {
+void Writer::count_chunk(const ChunkIndex& index) {
   const bool first = statistics_.messages == 0;
   statistics_.start_ns = first ? index.start_ns : std::min(statistics_.start_ns, index.start_ns);
   statistics_.end_ns = first ? index.end_ns : std::max(statistics_.end_ns, index.end_ns);
   statistics_.messages += chunk_messages_;
   ++statistics_.chunks;
   for (const auto& [channel, entries] : indexed_) statistics_.channel_messages[channel] += entries.size();
-  chunks_.push_back(std::move(index));
+  put(chunk_indexes_, index);
   chunk_messages_ = 0;  // it is written
   drop_chunk();
 }
@@ -195,9 +195,7 @@ std::vector<std::byte> Writer::summary() {
     for (const Channel& channel : channels_) put(data, channel);
   });
   group(Op::statistics, [&] { put(data, statistics_, schemas_.size(), channels_.size()); });
-  group(Op::chunk_index, [&] {
-    for (const ChunkIndex& chunk : chunks_) put(data, chunk);
-  });
+  group(Op::chunk_index, [&] { ByteWriter(data).bytes(chunk_indexes_); });
   group(Op::attachment_index, [&] { ByteWriter(data).bytes(attachment_indexes_); });
   group(Op::metadata_index, [&] { ByteWriter(data).bytes(metadata_indexes_); });
   const uint64_t offsets_at = size_ + data.size();

@@ -50,7 +50,7 @@ class Writer {
   Done append(std::initializer_list<Bytes> parts);
   Done write_definitions();
   std::vector<std::byte> indexes(ChunkIndex& index, uint64_t at) const;
-  void count_chunk(ChunkIndex index);
+  void count_chunk(const ChunkIndex& index);
   void drop_chunk();
   std::vector<std::byte> summary();
 
@@ -67,8 +67,8 @@ class Writer {
   std::vector<std::byte> chunk_;                      ///< records of the chunk in hand
   std::map<uint16_t, std::vector<Indexed>> indexed_;  ///< its messages
   uint64_t chunk_start_ns_ = 0, chunk_end_ns_ = 0, chunk_messages_ = 0, lost_ = 0;
-  std::vector<ChunkIndex> chunks_;
-  std::vector<std::byte> attachment_indexes_, metadata_indexes_;  ///< records for the summary
+  /// Records for the summary, as they lie in it: of chunks there are tens of thousands.
+  std::vector<std::byte> chunk_indexes_, attachment_indexes_, metadata_indexes_;
   Statistics statistics_;
 };
 
