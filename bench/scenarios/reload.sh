@@ -1,8 +1,8 @@
 #!/bin/bash
 # SPDX-License-Identifier: Apache-2.0
 # What it costs to change the database of known objects while the robot runs: reload.sh [CHANGES]. The same run twice, without
-# and with CHANGES (100) of object_detection's database, one at each of its jobs (7 Hz): `takt objects publish` of a list whose
-# entries have other names in turn, and `takt set object_detection:revision`. Every message is read beside it: the classes
+# and with CHANGES (100) of object_detection's database, one after the other as its jobs (7 Hz) take them: two lists, with other
+# names of their entries, are published, and `takt set object_detection:revision` asks for them in turn. Every message is read beside it: the classes
 # in one must be of one list. Exit 1 if a node of high criticality misses, if object_detection misses or skips more than
 # without the changes, or if a message mixes two lists or none shows the change.
 # POLICY=cooperative where the kernel refuses the schedule's.
@@ -10,7 +10,7 @@ set -eu
 root=$(readlink -f "$(dirname "$0")/../..")
 takt=${TAKT:-$root/takt}
 changes=${1:-100}
-seconds=$((changes / 5 + 10))
+seconds=$((changes / 3 + 10))
 work=$(mktemp -d)
 trap 'rm -rf "$work"; kill $(jobs -p) 2>/dev/null || true' EXIT
 
@@ -21,8 +21,8 @@ publish() { # 0 or 1: prints the revision
   cp "$work/list_$1" "$work/list" && mv "$work/list" "$work/objects/objects.txt"
   "$takt" objects publish "$work/objects" | head -n 1
 }
-publish 1 >"$work/revisions"  # before the run: 1 is known by name only once it is wanted
-publish 0 >>"$work/revisions"
+revisions[1]=$(publish 1)  # before the run, so that changes come as fast as jobs take them
+revisions[0]=$(publish 0)
 
 for with in without with; do
   "$takt" run ${POLICY:+--policy "$POLICY"} --for "${seconds}s" --set "object_detection.database=$work/objects" --output "$work/out" \
@@ -34,10 +34,7 @@ for with in without with; do
   "$takt" echo object_detection.detections --count $((7 * seconds)) >"$work/$with.echo" 2>/dev/null & echo=$!
   if [ $with = with ]; then
     begin=$(date +%s.%N)
-    for ((i = 1; i <= changes; ++i)); do
-      revision=$(publish $((i % 2)))
-      "$takt" set object_detection:revision "$revision"
-    done
+    for ((i = 1; i <= changes; ++i)); do "$takt" set object_detection:revision "${revisions[i % 2]}"; done
     echo "$changes changes, $(echo "$changes $begin $(date +%s.%N)" | awk '{ printf "%.1f", $1 / ($3 - $2) }') a second"
   fi
   wait $run || true
