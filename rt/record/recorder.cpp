@@ -72,8 +72,9 @@ void Recorder::take_ports() {
 
 void Recorder::take_port(Port& port) {
   result_.overwritten += port.follower->take([&](const Held& held) {
-    std::vector<std::byte> data = queue_.buffer();
+    std::vector<std::byte> data = queue_.buffer(port.bytes);
     pack(*port.type, held, port.whole, data);
+    port.bytes = data.size();
     push(port.channel, held.sequence, held.header->published_ns, std::move(data));
   });
 }
@@ -85,8 +86,9 @@ void Recorder::take_job(const RecordedJob& job) {
     uint64_t& newest = ports_[ports_of_[job.task][output.output]].told;
     newest = std::max(newest, output.sequence);
   }
-  std::vector<std::byte> data = queue_.buffer();
+  std::vector<std::byte> data = queue_.buffer(job_bytes_);
   pack(told, data);
+  job_bytes_ = data.size();
   push(jobs_channel_, job.index, job.published_ns, std::move(data));
 }
 

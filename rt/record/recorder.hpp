@@ -77,6 +77,7 @@ class Recorder {
     uint16_t channel = 0;
     bool whole = false;
     uint64_t told = 0;  ///< the newest that a job says it has published
+    size_t bytes = 0;   ///< of the last message, packed
   };
   void add_channels(const Plan& plan);
   void take_ports();
@@ -95,6 +96,7 @@ class Recorder {
   std::vector<Port> ports_;
   std::vector<std::vector<size_t>> ports_of_;  ///< by task
   uint16_t jobs_channel_ = 0;
+  size_t job_bytes_ = 0;  ///< of the last job, packed
   std::atomic<uint64_t> no_room_{0};
   RecordResult result_;
   std::atomic<bool> ending_{false};

@@ -1,15 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "rt/record/write_queue.hpp"
 
+#include <algorithm>
 #include <utility>
 
 namespace takt::record {
 
-std::vector<std::byte> WriteQueue::buffer() {
+std::vector<std::byte> WriteQueue::buffer(size_t expected_bytes) {
+  constexpr size_t kSmall = 4096;
   const std::lock_guard lock(mutex_);
-  if (spare_.empty()) return {};
+  const auto fits = [&](size_t capacity) {
+    return capacity >= expected_bytes && capacity <= 4 * std::max(expected_bytes, kSmall);
+  };
+  const auto found =
+      std::find_if(spare_.begin(), spare_.end(), [&](const auto& spare) { return fits(spare.capacity()); });
+  if (found == spare_.end()) return {};
+  std::swap(*found, spare_.back());
   std::vector<std::byte> buffer = std::move(spare_.back());
   spare_.pop_back();
+  spare_bytes_ -= buffer.capacity();
   buffer.clear();
   return buffer;
 }
@@ -37,7 +46,9 @@ std::optional<WriteQueue::Entry> WriteQueue::pop() {
 
 void WriteQueue::recycle(std::vector<std::byte> buffer) {
   const std::lock_guard lock(mutex_);
-  if (spare_.size() < kBuffersKept) spare_.push_back(std::move(buffer));
+  if (spare_.size() == kBuffersKept || spare_bytes_ + buffer.capacity() > kSpareBytes) return;
+  spare_bytes_ += buffer.capacity();
+  spare_.push_back(std::move(buffer));
 }
 
 void WriteQueue::close() {

@@ -22,15 +22,18 @@ class WriteQueue {
 
   explicit WriteQueue(size_t most_bytes) : most_bytes_(most_bytes) {}
 
-  /// A buffer to fill, empty, with the memory of an earlier one where there is one.
-  std::vector<std::byte> buffer();
+  /// A buffer to fill, empty, with the memory of an earlier one where there is one for so many bytes: large enough, and
+  /// not much larger, or small messages would sooner or later hold the memory of images.
+  std::vector<std::byte> buffer(size_t expected_bytes);
   /// False if there is no room: the entry is lost. With `wait` there always is, sooner or later. Any thread.
   bool push(Entry entry, bool wait);
   /// The oldest entry; waits for one. Nothing once the queue was closed and is empty.
   std::optional<Entry> pop();
-  /// Gives the memory of a popped entry back.
+  /// Gives the memory of a popped entry back; kept up to kSpareBytes in all.
   void recycle(std::vector<std::byte> buffer);
   void close();
+
+  static constexpr size_t kSpareBytes = 16 << 20;
 
  private:
   static constexpr size_t kBuffersKept = 64;
@@ -39,7 +42,7 @@ class WriteQueue {
   std::condition_variable filled_, emptied_;
   std::deque<Entry> entries_;
   std::vector<std::vector<std::byte>> spare_;
-  size_t bytes_ = 0;
+  size_t bytes_ = 0, spare_bytes_ = 0;
   bool closed_ = false;
 };
 
