@@ -5,7 +5,6 @@
 #include <fcntl.h>
 #include <sys/file.h>
 #include <sys/stat.h>
-#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -118,14 +117,16 @@ TEST_CASE("a daemon's process that is just ending is awaited, one that lives is 
       if (read(from, &byte, 1) != 1) _exit(1);
     };
     flock(open(lock.c_str(), O_RDWR | O_CLOEXEC), LOCK_EX);
-    std::thread([&] {
+    // Instead of a second thread: one that has the file, too, and so keeps the lock when the first is gone.
+    if (fork() == 0) {
       wait_for(last[0]);
       _exit(0);
-    }).detach();
+    }
     if (write(holds[1], "x", 1) != 1) _exit(1);
     wait_for(first[0]);
-    syscall(SYS_exit, 0);  // of this thread alone: the process is ending then, but the other keeps the lock
+    _exit(0);
   }
+  close(holds[1]);
   char byte = 0;
   REQUIRE(read(holds[0], &byte, 1) == 1);
   CHECK(has(refusal(directory.places()), "another iceoryx daemon is running: process " + std::to_string(daemon)));
@@ -138,8 +139,7 @@ TEST_CASE("a daemon's process that is just ending is awaited, one that lives is 
   CHECK(refusal(directory.places()).empty());
   later.join();
   CHECK(waitpid(daemon, nullptr, 0) == daemon);
-  for (int* both : {holds, first, last})
-    for (const int end : {both[0], both[1]}) close(end);
+  for (const int end : {holds[0], first[0], first[1], last[0], last[1]}) close(end);
 }
 
 TEST_CASE("a daemon that gives its lock back while it is asked for is gone") {
