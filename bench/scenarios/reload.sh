@@ -1,16 +1,15 @@
 #!/bin/bash
 # SPDX-License-Identifier: Apache-2.0
 # What it costs to change the database of known objects while the robot runs: reload.sh [CHANGES]. The same run twice, without
-# and with CHANGES (100) of object_detection's database, one after the other as its jobs (7 Hz) take them: two lists, with other
-# names of their entries, are published, and `takt set object_detection:revision` asks for them in turn. Every message is read beside it: the classes
-# in one must be of one list. Exit 1 if a node of high criticality misses, if object_detection misses or skips more than
+# and with CHANGES (100) of object_detection's database, seven a second as its jobs: two lists, with other names of their entries,
+# are published, and `takt set object_detection:revision` asks for them in turn. Every message is read beside it: the classes in one must be of one list. Exit 1 if a node of high criticality misses, if object_detection misses or skips more than
 # without the changes, or if a message mixes two lists or none shows the change.
 # POLICY=cooperative where the kernel refuses the schedule's.
 set -eu
 root=$(readlink -f "$(dirname "$0")/../..")
 takt=${TAKT:-$root/takt}
 changes=${1:-100}
-seconds=$((changes / 3 + 10))
+seconds=$((changes / 5 + 10))
 work=$(mktemp -d)
 trap 'rm -rf "$work"; kill $(jobs -p) 2>/dev/null || true' EXIT
 
@@ -34,7 +33,12 @@ for with in without with; do
   "$takt" echo object_detection.detections --count $((7 * seconds)) >"$work/$with.echo" 2>/dev/null & echo=$!
   if [ $with = with ]; then
     begin=$(date +%s.%N)
-    for ((i = 1; i <= changes; ++i)); do "$takt" set object_detection:revision "${revisions[i % 2]}"; done
+    sets=()
+    for ((i = 1; i <= changes; ++i)); do  # none waits for the one before, which takes until the node's next job
+      "$takt" set object_detection:revision "${revisions[i % 2]}" & sets+=($!)
+      sleep "$(echo "$begin $(date +%s.%N) $i" | awk '{ d = $3 / 7 - ($2 - $1); print (d > 0 ? d : 0) }')"
+    done
+    for set in "${sets[@]}"; do wait "$set"; done
     echo "$changes changes, $(echo "$changes $begin $(date +%s.%N)" | awk '{ printf "%.1f", $1 / ($3 - $2) }') a second"
   fi
   wait $run || true

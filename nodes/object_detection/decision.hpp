@@ -76,11 +76,11 @@ class Decision {
   bool passes(size_t window) const;
 
   /// One detection per object and group of touching windows that pass (8 neighbours): score 1 - the smallest error in
-  /// the group, class_id the object's index. It lies where the window with that error does (of equals the upper left
-  /// one), or rather at the mean of the passing windows whose middle that window covers, each with the weight by which
-  /// its error is less than kNearlyBest beyond the smallest: several windows may show enough of an object, and it is in
-  /// their midst. Those below `min_score` are left out. Fills `out` with the best, best first (equal scores: lower class, then upper left
-  /// first); returns how many.
+  /// the group, class_id the object's index. Several windows may show enough of an object, and it is in their midst:
+  /// around the window with the smallest error (of equals the upper left one) at the mean of those whose middle it
+  /// covers, each weighted with how much its error is below the smallest + kNearlyBest. Those below `min_score` are
+  /// left out. Fills `out` with the best, best first (equal scores: lower class, then upper left first); returns how
+  /// many.
   size_t detections(double min_score, std::span<Detection> out);
 
  private:

@@ -5,14 +5,6 @@
 #include <numeric>
 
 namespace takt::object_detection {
-namespace {
-
-bool is_background(ImageView<const uint8_t> view, int x, int y) {
-  return (view.at(x, y, 0) | view.at(x, y, 1) | view.at(x, y, 2)) == 0;
-}
-
-}  // namespace
-
 Histogram colour_histogram(ImageView<const uint8_t> view, ColourBins bins) {
   Histogram histogram;
   histogram.count.resize(kColourBins);

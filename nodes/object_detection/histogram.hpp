@@ -19,6 +19,11 @@ struct Histogram {
   uint32_t mass = 0;
 };
 
+/// Whether a pixel of a reference view is none of the object: exactly (0, 0, 0).
+inline bool is_background(ImageView<const uint8_t> view, int x, int y) {
+  return (view.at(x, y, 0) | view.at(x, y, 1) | view.at(x, y, 2)) == 0;
+}
+
 /// Colour histogram of a reference view: 8-bit BGR, at most 255 x 255 pixels; pixels of exactly (0, 0, 0) are
 /// background and not counted.
 Histogram colour_histogram(ImageView<const uint8_t> view, ColourBins bins);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "nodes/object_detection/references.hpp"
 
-#include <cmath>
+#include <algorithm>
 #include <sstream>
 #include <stdexcept>
 
@@ -10,11 +10,8 @@
 namespace takt::object_detection {
 namespace {
 
-Histogram histogram_of(const ReferenceView& reference, Stage stage, const DetectorParameters& p,
+Histogram histogram_of(ImageView<const uint8_t> view, Stage stage, const DetectorParameters& p,
                        const OrientationBins& orientations) {
-  const std::vector<uint8_t> pixels = shrunk_view(reference.view(), p.smallest);
-  const auto side_px = static_cast<int>(std::lround(p.smallest * reference.side_px));
-  const ImageView<const uint8_t> view(pixels.data(), side_px, side_px, 3);
   switch (stage) {
     case Stage::colour: return colour_histogram(view, p.bins);
     case Stage::orientation: return orientation_histogram(view, orientations);
@@ -46,18 +43,46 @@ std::vector<double> parse_scales(const std::string& text) {
   return scales;
 }
 
+ReferenceView shrunk(const ReferenceView& view, double scale) {
+  constexpr uint8_t kObject = 204;  // four fifths of 255
+  const ImageView<const uint8_t> from = view.view();
+  std::vector<uint8_t> whole;
+  for (int y = 0; y < from.height; ++y)
+    for (int x = 0; x < from.width; ++x) whole.insert(whole.end(), 3, is_background(from, x, y) ? 0 : UINT8_MAX);
+  Shrinker shrinker(from.width, from.height, scale), of_object(from.width, from.height, scale);
+  const ImageView<const uint8_t> small = shrinker.run(from);
+  const ImageView<const uint8_t> share = of_object.run({whole.data(), from.width, from.height, 3});
+  ReferenceView out = view;
+  out.side_px = small.width;
+  out.pixels.assign(small.data, small.data + ptrdiff_t{3} * small.width * small.height);
+  for (int y = 0; y < small.height; ++y) {
+    for (int x = 0; x < small.width; ++x) {
+      const bool object = share.at(x, y) >= kObject;
+      if (!object || is_background(small, x, y))
+        std::fill_n(out.pixels.begin() + ptrdiff_t{3} * (y * small.width + x), 3, object ? uint8_t{1} : uint8_t{0});
+    }
+  }
+  return out;
+}
+
 CascadeReferences cascade_references(std::span<const DatabaseObject> database, const DetectorParameters& p) {
   if (database.empty() || database[0].views.empty()) throw std::invalid_argument("the object database is empty");
   const OrientationBins orientations(p.orientations);
+  std::vector<std::vector<ReferenceView>> compared;  // with windows, per object
+  for (const DatabaseObject& object : database) {
+    auto& views = compared.emplace_back();
+    for (const ReferenceView& view : object.views) views.push_back(shrunk(view, p.smallest));
+  }
   CascadeReferences stages;
   for (size_t s = 0; s < kHistogramStages && s <= static_cast<size_t>(p.last); ++s) {
     const double caps[] = {kColourCap, kOrientationCap, kCooccurrenceCap};
     const bool of_pairs = static_cast<Stage>(s) == Stage::cooccurrence;
     const double tolerance = of_pairs ? 1 - (1 - p.tolerance) * (1 - p.tolerance) : p.tolerance;
-    for (const DatabaseObject& object : database) {
+    for (size_t o = 0; o < database.size(); ++o) {
+      const DatabaseObject& object = database[o];
       auto& views = stages[s].histograms.emplace_back();
-      for (const ReferenceView& view : object.views)
-        views.push_back(histogram_of(view, static_cast<Stage>(s), p, orientations));
+      for (const ReferenceView& view : compared[o])
+        views.push_back(histogram_of(view.view(), static_cast<Stage>(s), p, orientations));
       const double of_object = object.thresholds[s].value_or(automatic_threshold(views, tolerance, caps[s]));
       auto& limits = stages[s].limits.emplace_back();
       for (size_t r = 0; r < views.size(); ++r)

@@ -30,6 +30,10 @@ struct DetectorParameters {
 /// std::invalid_argument.
 std::vector<double> parse_scales(const std::string& text);
 
+/// The view at a smaller scale, 0.5 .. 1, as Shrinker makes it. A pixel is object where the view's are to four fifths;
+/// black ones of the object become (1, 1, 1).
+ReferenceView shrunk(const ReferenceView& view, double scale);
+
 /// Of one stage, per object and view.
 struct StageReferences {
   std::vector<std::vector<Histogram>> histograms;

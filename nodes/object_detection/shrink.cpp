@@ -39,22 +39,4 @@ ImageView<const uint8_t> Shrinker::run(ImageView<const uint8_t> bgr) {
   return {pixels_.data(), width(), height(), 3};
 }
 
-std::vector<uint8_t> shrunk_view(ImageView<const uint8_t> view, double scale) {
-  constexpr uint8_t kObject = 204;  // four fifths of 255
-  std::vector<uint8_t> whole;
-  for (int y = 0; y < view.height; ++y)
-    for (int x = 0; x < view.width; ++x)
-      whole.insert(whole.end(), 3, (view.at(x, y, 0) | view.at(x, y, 1) | view.at(x, y, 2)) == 0 ? 0 : UINT8_MAX);
-  Shrinker shrinker(view.width, view.height, scale);
-  const ImageView<const uint8_t> share = shrinker.run({whole.data(), view.width, view.height, 3});
-  const std::vector<uint8_t> shares(share.data, share.data + 3 * share.width * share.height);
-  const ImageView<const uint8_t> small = shrinker.run(view);
-  std::vector<uint8_t> pixels(small.data, small.data + shares.size());
-  for (size_t i = 0; i < pixels.size(); i += 3) {
-    const bool object = shares[i] >= kObject, black = (pixels[i] | pixels[i + 1] | pixels[i + 2]) == 0;
-    if (!object || black) std::fill_n(&pixels[i], 3, object ? uint8_t{1} : uint8_t{0});
-  }
-  return pixels;
-}
-
 }  // namespace takt::object_detection

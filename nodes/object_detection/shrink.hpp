@@ -34,8 +34,4 @@ class Shrinker {
   std::vector<uint8_t> pixels_;
 };
 
-/// A reference view (8-bit BGR, exactly (0, 0, 0) is background) at a smaller scale, 0.5 .. 1. A pixel is object where
-/// the view's are to four fifths; black ones of the object become (1, 1, 1). Three channels, row by row, edges as of Shrinker.
-std::vector<uint8_t> shrunk_view(ImageView<const uint8_t> view, double scale);
-
 }  // namespace takt::object_detection

@@ -79,11 +79,12 @@ void check_owner(const std::filesystem::path& file, uid_t user) {
 /// hold it then, as of a lock of a process that is not to be seen from here: that one is not awaited for long.
 bool take_lock(int file, const std::filesystem::path& lock, const std::filesystem::path& locks) {
   constexpr timespec kStep{0, 5'000'000};
+  constexpr int kMostTries = 400, kMostUnknown = 3;
   for (int tries = 0, unknown = 0; flock(file, LOCK_EX | LOCK_NB) != 0; ++tries) {
     const std::optional<pid_t> holder = lock_holder(lock, locks);
     const std::optional<ThreadState> told = holder ? thread_state(*holder) : std::nullopt;
     unknown += !holder;
-    if (unknown == 3 || (told && !told->ending()) || tries == 400) return false;
+    if (unknown == kMostUnknown || (told && !told->ending()) || tries == kMostTries) return false;
     nanosleep(&kStep, nullptr);
   }
   return true;

@@ -10,7 +10,6 @@
 
 #include "nodes/object_detection/detector.hpp"
 #include "nodes/object_detection/reference.hpp"
-#include "nodes/object_detection/shrink.hpp"
 #include "tests/property/object_detection/random_images.hpp"
 
 using namespace takt;
@@ -57,9 +56,8 @@ float error_by_brute_force(const Detector& detector, size_t scale, const Databas
     error = kFailed;
     for (size_t r = 0; r < object.views.size(); ++r) {
       const ReferenceLimit& limit = detector.limits(static_cast<Stage>(s))[index][r];
-      const std::vector<uint8_t> pixels = shrunk_view(object.views[r].view(), p.smallest);
-      const auto side_px = static_cast<int>(std::lround(p.smallest * object.views[r].side_px));
-      const ImageView<const uint8_t> view(pixels.data(), side_px, side_px, 3);
+      const ReferenceView small = shrunk(object.views[r], p.smallest);
+      const auto view = small.view();
       const Histogram reference = s == 0   ? colour_histogram(view, p.bins)
                                   : s == 1 ? orientation_histogram(view, OrientationBins(p.orientations))
                                            : cooccurrence_histogram(view, p.pairs);
@@ -112,7 +110,9 @@ TEST_CASE("a smaller view: pixels between those of the object, as OpenCV has the
     cv::Mat theirs, share;
     cv::resize(cv::Mat(kSide, kSide, CV_8UC3, pixels.data()), theirs, {side, side}, 0, 0, cv::INTER_LINEAR_EXACT);
     cv::resize(cv::Mat(kSide, kSide, CV_8UC3, object.data()), share, {side, side}, 0, 0, cv::INTER_LINEAR_EXACT);
-    const std::vector<uint8_t> ours = shrunk_view({pixels.data(), kSide, kSide, 3}, scale);
+    const ReferenceView small = shrunk({"", kSide, pixels, {}}, scale);
+    CHECK(small.side_px == side);
+    const std::vector<uint8_t>& ours = small.pixels;
     REQUIRE(ours.size() == static_cast<size_t>(3 * side * side));
     size_t objects = 0;
     for (size_t i = 0; i < ours.size(); i += 3) {

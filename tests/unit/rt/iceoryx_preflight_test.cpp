@@ -5,9 +5,12 @@
 #include <fcntl.h>
 #include <sys/file.h>
 #include <sys/stat.h>
+#include <sys/sysmacros.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <array>
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <thread>
@@ -104,58 +107,43 @@ TEST_CASE("the holder of a lock is found") {
   close(file);
 }
 
-TEST_CASE("a daemon's process that is just ending is awaited, one that lives is not") {
-  const Directory directory;
-  const auto lock = directory.path / "run" / "iox-unique-roudi.lock";
-  std::ofstream(lock) << "";
-  int holds[2], first[2], last[2];  // pipes: from the daemon; what its threads wait for
-  for (int* both : {holds, first, last}) REQUIRE(pipe(both) == 0);
-  const pid_t daemon = fork();
-  if (daemon == 0) {
-    const auto wait_for = [](int from) {
-      char byte = 0;
-      if (read(from, &byte, 1) != 1) _exit(1);
-    };
-    flock(open(lock.c_str(), O_RDWR | O_CLOEXEC), LOCK_EX);
-    // Instead of a second thread: one that has the file, too, and so keeps the lock when the first is gone.
-    if (fork() == 0) {
-      wait_for(last[0]);
-      _exit(0);
-    }
-    if (write(holds[1], "x", 1) != 1) _exit(1);
-    wait_for(first[0]);
-    _exit(0);
-  }
-  close(holds[1]);
-  char byte = 0;
-  REQUIRE(read(holds[0], &byte, 1) == 1);
-  CHECK(has(refusal(directory.places()), "another iceoryx daemon is running: process " + std::to_string(daemon)));
-  REQUIRE(write(first[1], "x", 1) == 1);
-  while (!thread_state(daemon)->ended()) std::this_thread::yield();
-  std::thread later([&] {
-    std::this_thread::sleep_for(std::chrono::milliseconds(50));  // so that it is waited for
-    CHECK(write(last[1], "x", 1) == 1);
-  });
-  CHECK(refusal(directory.places()).empty());
-  later.join();
-  CHECK(waitpid(daemon, nullptr, 0) == daemon);
-  for (const int end : {holds[0], first[0], first[1], last[0], last[1]}) close(end);
-}
-
-TEST_CASE("a daemon that gives its lock back while it is asked for is gone") {
+TEST_CASE("a daemon whose process is just ending, or gone when it is asked for, is awaited; one that lives is not") {
   const Directory directory;
   IceoryxPlaces places = directory.places();
   places.locks = directory.path / "locks";
-  REQUIRE(mkfifo(places.locks.c_str(), 0600) == 0);
-  const int lock = open((directory.path / "run/iox-unique-roudi.lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+  const auto path = directory.path / "run/iox-unique-roudi.lock";
+  const int lock = open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
   REQUIRE(flock(lock, LOCK_EX | LOCK_NB) == 0);
-  std::thread daemon([&] {
-    const int table = open(places.locks.c_str(), O_WRONLY | O_CLOEXEC);  // until somebody reads who holds which lock
-    flock(lock, LOCK_UN);
-    close(table);
-  });
-  CHECK(refusal(places).empty());
-  daemon.join();
+  struct stat status {};
+  REQUIRE(fstat(lock, &status) == 0);
+  const auto held_by = [&](pid_t pid) {
+    std::array<char, 96> line{};
+    std::snprintf(line.data(), line.size(), "1: FLOCK  ADVISORY  WRITE %d %02x:%02x:%lu 0 EOF\n", pid,
+                  major(status.st_dev), minor(status.st_dev), static_cast<unsigned long>(status.st_ino));
+    return std::string(line.data());
+  };
+  std::ofstream(places.locks) << held_by(getpid());
+  CHECK(has(refusal(places), "another iceoryx daemon is running: process " + std::to_string(getpid())));
+
+  const pid_t ending = fork();  // nobody asks for its end yet
+  if (ending == 0) _exit(0);
+  while (!thread_state(ending)->ended()) std::this_thread::yield();
+  REQUIRE(std::filesystem::remove(places.locks));
+  REQUIRE(mkfifo(places.locks.c_str(), 0600) == 0);
+  for (const std::string& line : {held_by(ending), std::string()}) {
+    REQUIRE(flock(lock, LOCK_EX | LOCK_NB) == 0);
+    std::thread daemon([&] {
+      const int table = open(places.locks.c_str(), O_WRONLY | O_CLOEXEC);  // until somebody looks who holds the lock
+      CHECK(write(table, line.data(), line.size()) == static_cast<ssize_t>(line.size()));
+      flock(lock, LOCK_UN);
+      close(table);
+    });
+    CHECK(refusal(places).empty());
+    const int unread = open(places.locks.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);  // if nobody looked
+    daemon.join();
+    close(unread);
+  }
+  CHECK(waitpid(ending, nullptr, 0) == ending);
   close(lock);
 }
 
