@@ -18,10 +18,12 @@ using Json = nlohmann::ordered_json;
 struct Cell {
   int trials = 0;
   std::vector<double> impacts_m_s;
+  int unavoidable = 0;  ///< of the contacts
   double least_gap_m = INFINITY;
   void add(const StopOutcome& outcome) {
     ++trials;
     if (outcome.contact) impacts_m_s.push_back(outcome.impact_m_s);
+    unavoidable += outcome.contact && outcome.unavoidable;
     least_gap_m = std::min(least_gap_m, outcome.least_gap_m);
   }
 };
@@ -30,9 +32,18 @@ struct Table {
   std::array<std::array<Cell, kWalks>, kDistances> cells;
   uint64_t chain_misses = 0, vision_misses = 0;
   int far_contacts() const {
-    size_t contacts = 0;
-    for (const Cell& cell : cells[static_cast<size_t>(Distance::far)]) contacts += cell.impacts_m_s.size();
-    return static_cast<int>(contacts);
+    return far_sum([](const Cell& cell) { return static_cast<int>(cell.impacts_m_s.size()); });
+  }
+  int far_unavoidable() const {
+    return far_sum([](const Cell& cell) { return cell.unavoidable; });
+  }
+
+ private:
+  template <typename Count>
+  int far_sum(const Count& count) const {
+    int sum = 0;
+    for (const Cell& cell : cells[static_cast<size_t>(Distance::far)]) sum += count(cell);
+    return sum;
   }
 };
 
@@ -59,6 +70,7 @@ Json to_json(const Cell& cell) {
   const auto figure = [](double value, bool known) { return known ? Json(value) : Json(nullptr); };
   return {{"trials", cell.trials},
           {"contacts", impacts.size()},
+          {"unavoidable", cell.unavoidable},
           {"impact_p50_m_s", impacts.empty() ? Json(nullptr) : Json(impacts[impacts.size() / 2])},
           {"impact_max_m_s", impacts.empty() ? Json(nullptr) : Json(impacts.back())},
           {"least_gap_m", figure(cell.least_gap_m, std::isfinite(cell.least_gap_m))}};
@@ -72,6 +84,7 @@ Json to_json(const Table& table) {
         json[std::string(to_string(static_cast<Distance>(d)))][std::string(to_string(static_cast<Walk>(w)))] =
             to_json(table.cells[d][w]);
   json["far_contacts"] = table.far_contacts();
+  json["far_unavoidable"] = table.far_unavoidable();
   json["chain_misses"] = table.chain_misses;
   json["vision_misses"] = table.vision_misses;
   return json;
@@ -83,19 +96,26 @@ void print(const Json& table, Vision vision, int trials) {
     if (!value.is_null()) std::snprintf(text, sizeof text, "%.2f", value.get<double>());
     return std::string(text);
   };
-  std::printf("%d trials, vision %s; contacts: touched while the robot moved faster than 0.05 m/s\n", trials,
-              std::string(to_string(vision)).c_str());
-  std::printf("  %-13s %-9s %7s %9s %11s %11s %10s\n", "first seen", "walk", "trials", "contacts", "impact p50",
-              "impact max", "least gap");
+  std::printf(
+      "%d trials, vision %s; contacts: touched while the robot moved faster than 0.05 m/s; unavoidable: also by one "
+      "that "
+      "brakes when he is first seen in its lane\n",
+      trials, std::string(to_string(vision)).c_str());
+  std::printf("  %-13s %-9s %7s %9s %12s %11s %11s %10s\n", "first seen", "walk", "trials", "contacts", "unavoidable",
+              "impact p50", "impact max", "least gap");
   for (const auto& [distance, walks] : table.items()) {
     if (!walks.is_object()) continue;
     for (const auto& [walk, cell] : walks.items())
-      std::printf("  %-13s %-9s %7d %9d %7s m/s %7s m/s %8s m\n", distance.c_str(), walk.c_str(),
-                  cell["trials"].get<int>(), cell["contacts"].get<int>(), figure(cell["impact_p50_m_s"]).c_str(),
-                  figure(cell["impact_max_m_s"]).c_str(), figure(cell["least_gap_m"]).c_str());
+      std::printf("  %-13s %-9s %7d %9d %12d %7s m/s %7s m/s %8s m\n", distance.c_str(), walk.c_str(),
+                  cell["trials"].get<int>(), cell["contacts"].get<int>(), cell["unavoidable"].get<int>(),
+                  figure(cell["impact_p50_m_s"]).c_str(), figure(cell["impact_max_m_s"]).c_str(),
+                  figure(cell["least_gap_m"]).c_str());
   }
-  std::printf("  far: %d contacts; deadlines missed by laser, base and obstacle_stop: %d; by the loads: %d\n",
-              table["far_contacts"].get<int>(), table["chain_misses"].get<int>(), table["vision_misses"].get<int>());
+  std::printf(
+      "  far: %d contacts, %d of them unavoidable; deadlines missed by laser, base and obstacle_stop: %d; by the "
+      "loads: %d\n",
+      table["far_contacts"].get<int>(), table["far_unavoidable"].get<int>(), table["chain_misses"].get<int>(),
+      table["vision_misses"].get<int>());
 }
 
 int evaluate(const EvalObstacleStopOptions& o) {
@@ -107,7 +127,7 @@ int evaluate(const EvalObstacleStopOptions& o) {
       const auto table = measure(o, vision);
       if (!table) return kBadInput;
       const Json json = to_json(*table);
-      kept = kept && table->far_contacts() == 0 && table->chain_misses == 0;
+      kept = kept && table->far_contacts() == table->far_unavoidable() && table->chain_misses == 0;
       if (!o.json) print(json, vision, o.trials);
       all["vision"][std::string(to_string(vision))] = json;
     }

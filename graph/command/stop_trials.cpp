@@ -31,6 +31,7 @@ constexpr double kMargin = obstacle_stop::kMargin_m;
 constexpr double kMoving_m_s = 0.05;
 // A person of 1.75 m as hal/sim draws one: shins, where the laser looks; torso with arms, what the robot would touch.
 constexpr double kLegAside = 0.10, kLegRadius = 0.055, kBodyAside = 0.15, kBodyRadius = 0.15;
+constexpr double kDeceleration_m_s2 = 1, kReaction_s = 0.25;  // of stopping_distance()
 constexpr int64_t kTick_ns = 10'000'000;
 constexpr double kTick_s = 0.01;
 constexpr double kLongest_s = 6;  ///< of a trial, once he has appeared
@@ -136,6 +137,9 @@ double gap_m(const RobotState& robot, const Stance& person) {
   return least - kBodyRadius;
 }
 
+/// The robot in a map frame that is its own.
+const RobotState kAtOrigin{.x_m = 0, .y_m = 0, .theta_rad = std::numbers::pi / 2};
+
 /// From the scanner to the nearest point of his legs.
 double legs_range_m(const Vec2& scanner, const Stance& person) {
   const auto legs = person.legs();
@@ -195,6 +199,7 @@ class Referee {
     }
     if (!std::isfinite(range)) return;
     seen_ = true;
+    outcome_.unavoidable = touched_though_braking(robot, at_ns);
     const double needed = stopping_distance(std::abs(robot.speed_m_s));
     const Vec2 scanner = in_map(robot, scanner_);
     const double now = legs_range_m(scanner, stance);
@@ -206,6 +211,20 @@ class Referee {
     outcome_.distance = range < needed                               ? Distance::near
                         : nearest < std::min(needed, now - kComes_m) ? Distance::comes_nearer
                                                                      : Distance::far;
+  }
+
+  /// Whether he and a robot that brakes from now on, with the figures of stopping_distance(), touch while it moves.
+  bool touched_though_braking(RobotState robot, int64_t at_ns) const {
+    const double speed = robot.speed_m_s, turn = robot.turn_rad_s;
+    for (int tick = 0; std::abs(robot.speed_m_s) > kMoving_m_s; ++tick) {
+      if (gap_m(robot, *person_.at(at_ns + tick * kTick_ns)) <= 0) return true;
+      const double braking = std::max(0.0, tick * kTick_s - kReaction_s) * kDeceleration_m_s2;
+      const double share = std::max(0.0, 1 - braking / std::abs(speed));
+      robot = {robot.x_m + robot.speed_m_s * kTick_s * std::cos(robot.theta_rad),
+               robot.y_m + robot.speed_m_s * kTick_s * std::sin(robot.theta_rad),
+               robot.theta_rad + robot.turn_rad_s * kTick_s, share * speed, share * turn};
+    }
+    return false;
   }
 
   const sim::Simulation& simulation_;
@@ -247,7 +266,9 @@ std::string_view to_string(Distance distance) {
   return kNames[static_cast<size_t>(distance)];
 }
 
-double stopping_distance(double speed_m_s) { return speed_m_s * speed_m_s / 2 + 0.25 * speed_m_s + 0.3; }
+double stopping_distance(double speed_m_s) {
+  return speed_m_s * speed_m_s / (2 * kDeceleration_m_s2) + kReaction_s * speed_m_s + 0.3;
+}
 
 StopTrial draw_trial(uint64_t seed, uint64_t number) {
   std::mt19937_64 engine(sim::mix(seed, number));
@@ -261,9 +282,11 @@ StopTrial draw_trial(uint64_t seed, uint64_t number) {
   const auto beside = [&](double along, double right) { return beside_lane(t.speed_m_s, t.turn_rad_s, along, right); };
   constexpr double kScanner_m = 0.30;
   if (t.walk == Walk::stands) {
-    const Vec2 place = beside(kScanner_m + range, draw(-1.4, 1.4) * lane);
-    t.x_m = place.x(), t.y_m = place.y();
-    t.heading_rad = draw(-std::numbers::pi, std::numbers::pi);
+    do {  // nobody appears within the robot
+      const Vec2 place = beside(kScanner_m + range, draw(-1.4, 1.4) * lane);
+      t.x_m = place.x(), t.y_m = place.y();
+      t.heading_rad = draw(-std::numbers::pi, std::numbers::pi);
+    } while (gap_m(kAtOrigin, {{t.x_m, t.y_m}, kAtOrigin.theta_rad + t.heading_rad}) <= 0);
     return t;
   }
   t.pace_m_s = draw(0.3, 1.5);

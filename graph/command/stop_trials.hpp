@@ -52,10 +52,11 @@ double stopping_distance(double speed_m_s);
 
 struct StopOutcome {
   Distance distance = Distance::aside;
-  bool contact = false;        ///< his body and the robot's touched while it moved faster than 0.05 m/s
-  double impact_m_s = 0;       ///< the robot's speed then
-  double least_gap_m = 0;      ///< between the two while the robot moved so
-  uint64_t chain_misses = 0;   ///< deadlines of laser, base and obstacle_stop
+  bool contact = false;       ///< his body and the robot's touched while it moved faster than 0.05 m/s
+  bool unavoidable = false;   ///< so they would if it braked as stopping_distance() says from when he was first seen so
+  double impact_m_s = 0;      ///< the robot's speed then
+  double least_gap_m = 0;     ///< between the two while the robot moved so
+  uint64_t chain_misses = 0;  ///< deadlines of laser, base and obstacle_stop
   uint64_t vision_misses = 0;  ///< of the others
 };
 

@@ -2,6 +2,7 @@
 #include "nodes/laser_fusion/evaluate.hpp"
 
 #include <algorithm>
+#include <opencv2/core/utility.hpp>
 
 namespace takt::laser_fusion {
 namespace {
@@ -10,6 +11,36 @@ double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
+}
+
+/// Calls body(0) .. body(count - 1) on all CPUs, in any order.
+template <typename Body>
+void for_each(size_t count, const Body& body) {
+  cv::parallel_for_(
+      {0, static_cast<int>(count)},
+      [&](const cv::Range& range) {
+        for (int i = range.start; i < range.end; ++i) body(static_cast<size_t>(i));
+      },
+      static_cast<double>(count));
+}
+
+/// One pair from the same start by three methods, all refined alike.
+struct Registrations {
+  PoseError genetic, plain, generalised;
+  double score_at_truth = 0, score_at_found = 0;  ///< of the search
+};
+
+Registrations register_once(const CloudPair& pair, const RegistrationParameters& parameters) {
+  Registration registration(pair.laser.view(), pair.vision.view(), parameters);
+  const auto refined_error = [&](const Rigid& pose) {
+    return error_of(registration.refined(pose), pair.vision_in_laser);
+  };
+  const Rigid found = registration.search({});
+  return {.genetic = refined_error(found),
+          .plain = refined_error(registration.plain({})),
+          .generalised = refined_error(registration.generalised({})),
+          .score_at_truth = registration.judged(pair.vision_in_laser).score,
+          .score_at_found = registration.judged(found).score};
 }
 
 }  // namespace
@@ -23,26 +54,24 @@ Success measure_success(const SuccessParameters& p) {
 }
 
 Success measure_success(const SuccessParameters& p, const PairSource& pair_of) {
+  std::vector<Registrations> runs(p.runs);
+  for_each(runs.size(), [&](size_t run) {
+    RegistrationParameters parameters = p.registration;
+    parameters.seed = p.seed + run;
+    runs[run] = register_once(pair_of(parameters.seed), parameters);
+  });
   Success out;
   std::vector<double> error_m, error_rad, at_truth, at_found;
-  for (; out.runs < p.runs; ++out.runs) {
-    RegistrationParameters parameters = p.registration;
-    parameters.seed = p.seed + out.runs;
-    const CloudPair pair = pair_of(parameters.seed);
-    Registration registration(pair.laser.view(), pair.vision.view(), parameters);
-    const Rigid found = registration.search({});
-    const PoseError error = error_of(registration.refined(found), pair.vision_in_laser);
-    at_found.push_back(registration.judged(found).score);
-    at_truth.push_back(registration.judged(pair.vision_in_laser).score);
-    error_m.push_back(error.m);
-    error_rad.push_back(error.rad);
-    out.genetic += error.success();
-    out.deceived += !error.success() && at_found.back() < at_truth.back();
-    const auto succeeds = [&](const Rigid& pose) {
-      return error_of(registration.refined(pose), pair.vision_in_laser).success();
-    };
-    out.plain += succeeds(registration.plain({}));
-    out.generalised += succeeds(registration.generalised({}));
+  for (const Registrations& run : runs) {
+    ++out.runs;
+    out.genetic += run.genetic.success();
+    out.plain += run.plain.success();
+    out.generalised += run.generalised.success();
+    out.deceived += !run.genetic.success() && run.score_at_found < run.score_at_truth;
+    error_m.push_back(run.genetic.m);
+    error_rad.push_back(run.genetic.rad);
+    at_truth.push_back(run.score_at_truth);
+    at_found.push_back(run.score_at_found);
   }
   out.median_m = median(error_m);
   out.median_rad = median(error_rad);
@@ -53,25 +82,27 @@ Success measure_success(const SuccessParameters& p, const PairSource& pair_of) {
 
 std::vector<PopulationCurve> measure_populations(const SuccessParameters& p, const std::vector<size_t>& populations,
                                                  const std::vector<uint32_t>& generations) {
-  std::vector<PopulationCurve> curves;
-  Matcher matcher(p.pair.points, p.pair.points, {.metric = p.registration.metric, .cut_m = p.registration.cut_m});
   const CloudPair pair = generate_pair(p.pair, p.seed);
-  matcher.set(pair.laser.points, pair.vision.points);
-  for (const size_t population : populations) {
+  // scores[population][generations][run]
+  std::vector scores(populations.size(), std::vector(generations.size(), std::vector<double>(p.runs)));
+  for_each(populations.size() * p.runs, [&](size_t task) {
+    const size_t population = task / p.runs, run = task % p.runs;
+    Matcher matcher(p.pair.points, p.pair.points, {.metric = p.registration.metric, .cut_m = p.registration.cut_m});
+    matcher.set(pair.laser.points, pair.vision.points);
     GeneticParameters parameters = p.registration.genetic;
-    parameters.population = population;
+    parameters.population = populations[population];
     parameters.generations = generations.back();
     GeneticIcp genetic(matcher, parameters);
-    std::vector<std::vector<double>> scores(generations.size());
-    for (size_t run = 0; run < p.runs; ++run) {
-      genetic.begin({}, p.seed + run);
-      for (size_t g = 0; g < generations.size(); ++g) {
-        genetic.run([&] { return genetic.generation() < generations[g]; });
-        scores[g].push_back(genetic.quality().score);
-      }
+    genetic.begin({}, p.seed + run);
+    for (size_t g = 0; g < generations.size(); ++g) {
+      genetic.run([&] { return genetic.generation() < generations[g]; });
+      scores[population][g][run] = genetic.quality().score;
     }
-    curves.push_back({population, {}});
-    for (auto& s : scores) curves.back().score.push_back(median(std::move(s)));
+  });
+  std::vector<PopulationCurve> curves;
+  for (size_t i = 0; i < populations.size(); ++i) {
+    curves.push_back({populations[i], {}});
+    for (auto& runs : scores[i]) curves.back().score.push_back(median(std::move(runs)));
   }
   return curves;
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// How often a registration succeeds, on generated pairs.
+// How often a registration succeeds, on generated pairs. Runs go on all CPUs; what they give does not depend on how
+// many.
 #pragma once
 #include <functional>
 #include <vector>
@@ -32,7 +33,7 @@ struct Success {
 };
 Success measure_success(const SuccessParameters& parameters);
 
-/// The same with pairs of one's own: parameters.pair is not looked at.
+/// The same with pairs of one's own: parameters.pair is not looked at. pair_of is called from several threads at once.
 using PairSource = std::function<CloudPair(uint64_t seed)>;
 Success measure_success(const SuccessParameters& parameters, const PairSource& pair_of);
 

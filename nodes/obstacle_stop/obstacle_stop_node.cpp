@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
+#include <numbers>
+#include <optional>
 
 #include "nodes/obstacle_stop/protected_field.hpp"
 #include "nodes/obstacle_stop/stop_state.hpp"
+#include "nodes/obstacle_stop/sweep_memory.hpp"
 #include "rt/node.hpp"
 
 namespace takt {
@@ -18,6 +21,8 @@ class ObstacleStopNode final : public Node {
 
   void setup(Setup&) override {
     footprint_ = footprint(width_, length_, margin_);
+    wide_footprint_ = footprint(width_, length_, std::max<double>(margin_, moving_margin_));
+    memory_ = SweepMemory(scan_.capacity().count, nanoseconds(memory_span_));
     field_ = FieldState(stop_reason::scan_lost, nanoseconds(release_after_));
     line_ = LineState(static_cast<uint32_t>(stop_line_()), nanoseconds(hold_));
   }
@@ -26,9 +31,14 @@ class ObstacleStopNode final : public Node {
     const int64_t now_ns = job.release_ns();
     const LaserScan* scan = scan_.newest();
     const int64_t stamp_ns = scan ? scan_.stamp_ns() : now_ns;
-    const bool lost = !scan || !has_geometry(*scan) || scan_.stale() || now_ns - stamp_ns > nanoseconds(scan_age_max_);
+    bool lost = !scan || scan_.stale() || now_ns - stamp_ns > nanoseconds(scan_age_max_);
     FieldReading seen;
-    if (scan) seen = look(*scan);
+    if (scan) {
+      const Sweep sweep{scan->first_angle_rad, scan->step_rad, scan->sensor_in_robot, scan->range_m.items()};
+      lost = lost || !has_geometry(sweep);
+      seen = look(sweep, stamp_ns);
+      if (!lost) remember(sweep, stamp_ns);
+    }
     uint32_t reasons = lost || seen.blinded ? stop_reason::scan_lost : 0;
     if (seen.blocked) reasons |= stop_reason::obstacle;
     reasons = field_.update(reasons, stamp_ns) | line_reasons(now_ns);
@@ -46,40 +56,70 @@ class ObstacleStopNode final : public Node {
   static int64_t nanoseconds(double seconds) { return std::llround(seconds * 1e9); }
 
   /// Without it the beams lie nowhere, and an obstacle would be overlooked.
-  static bool has_geometry(const LaserScan& scan) {
-    const Transform& t = scan.sensor_in_robot;
-    return !scan.range_m.empty() && scan.step_rad > 0 && std::isfinite(scan.first_angle_rad + scan.step_rad) &&
+  static bool has_geometry(const Sweep& sweep) {
+    const Transform& t = sweep.sensor_in_robot;
+    return !sweep.range_m.empty() && sweep.step_rad > 0 && std::isfinite(sweep.first_angle_rad + sweep.step_rad) &&
            std::isfinite(t.x + t.y + t.qw + t.qx + t.qy + t.qz);
   }
 
   /// Of a robot that moves both what it does and what it is about to do: until it turns it goes on straight.
-  FieldReading look(const LaserScan& scan) const {
+  FieldReading look(const Sweep& sweep, int64_t stamp_ns) {
     const Drive present = present_drive();
     const bool stands = std::abs(present.speed_m_s) < kStands_m_s && std::abs(present.turn_rad_s) < kStands_rad_s;
-    const VelocityCommand* wanted = velocity_.newest();
-    if (!wanted || velocity_.stale() || !std::isfinite(wanted->speed_m_s) || !std::isfinite(wanted->turn_rad_s))
-      return look(scan, present);
-    const FieldReading soon =
-        look(scan, drive_before_stop(stands ? Drive{} : present, {wanted->speed_m_s, wanted->turn_rad_s}));
+    const std::optional<Drive> wanted = wanted_drive();
+    if (!wanted) return look(sweep, stamp_ns, present);
+    const FieldReading soon = look(sweep, stamp_ns, drive_before_stop(stands ? Drive{} : present, *wanted));
     if (stands || soon.blocked || soon.blinded) return soon;
-    return look(scan, present);
+    return look(sweep, stamp_ns, present);
   }
 
-  FieldReading look(const LaserScan& scan, const Drive& drive) const {
-    const ProtectedField field(footprint_, drive,
-                               stopping_time_s(drive, {deceleration_, turn_deceleration_, reaction_time_}));
-    const Sweep sweep{scan.first_angle_rad, scan.step_rad, scan.sensor_in_robot, scan.range_m.items()};
+  FieldReading look(const Sweep& sweep, int64_t stamp_ns, const Drive& drive) {
+    const double time_s = stopping_time_s(drive, {deceleration_, turn_deceleration_, reaction_time_});
+    const ProtectedField field(footprint_, drive, time_s);
     FieldReading reading = read_field(sweep, field, beams_min_);
-    reading.blinded = has_geometry(scan) && could_hide(sweep, field, hidden_width_);
-    return reading;
+    reading.blinded = has_geometry(sweep) && could_hide(sweep, field, hidden_width_);
+    if (reading.blocked || !has_geometry(sweep)) return reading;
+    const auto robot = robot_in_odometry(stamp_ns);
+    if (!robot) return reading;
+    const ProtectedField wide(wide_footprint_, drive, time_s);
+    Sweep moved_in = sweep;
+    moved_in.range_m = memory_.moved_in(sweep, *robot, stamp_ns, wide.reach_m());
+    const FieldReading moved = read_field(moved_in, wide, beams_min_);
+    return {moved.blocked, moved.nearest_m, reading.blinded};
+  }
+
+  void remember(const Sweep& sweep, int64_t stamp_ns) {
+    if (const auto robot = robot_in_odometry(stamp_ns)) memory_.add(sweep, *robot, stamp_ns);
   }
 
   /// What odometry says; straight ahead at the highest speed where it says nothing.
   Drive present_drive() const {
+    const Odometry* odometry = present_odometry();
+    return odometry ? Drive{odometry->speed_m_s, odometry->turn_rad_s} : Drive{speed_max_, 0};
+  }
+
+  const Odometry* present_odometry() const {
     const Odometry* odometry = odometry_.newest();
-    if (!odometry || odometry_.stale() || !std::isfinite(odometry->speed_m_s) || !std::isfinite(odometry->turn_rad_s))
-      return {speed_max_, 0};
-    return {odometry->speed_m_s, odometry->turn_rad_s};
+    const bool usable =
+        odometry && !odometry_.stale() && std::isfinite(odometry->speed_m_s) && std::isfinite(odometry->turn_rad_s);
+    return usable ? odometry : nullptr;
+  }
+
+  /// At that instant, by the speeds of the newest odometry. Nothing where there is none.
+  std::optional<PlanarPose> robot_in_odometry(int64_t at_ns) const {
+    const Odometry* odometry = present_odometry();
+    if (!odometry || !std::isfinite(odometry->x_m + odometry->y_m + odometry->theta_rad)) return std::nullopt;
+    const double since_s = static_cast<double>(at_ns - odometry_.stamp_ns()) * 1e-9;
+    // The robot drives along its y axis, whose direction an odometry gives (algorithm reference 21.9).
+    return compose({odometry->x_m, odometry->y_m, odometry->theta_rad - std::numbers::pi / 2},
+                   {0, odometry->speed_m_s * since_s, odometry->turn_rad_s * since_s});
+  }
+
+  std::optional<Drive> wanted_drive() const {
+    const VelocityCommand* wanted = velocity_.newest();
+    if (!wanted || velocity_.stale() || !std::isfinite(wanted->speed_m_s) || !std::isfinite(wanted->turn_rad_s))
+      return std::nullopt;
+    return Drive{wanted->speed_m_s, wanted->turn_rad_s};
   }
 
   uint32_t line_reasons(int64_t now_ns) {
@@ -105,6 +145,9 @@ class ObstacleStopNode final : public Node {
                         "m",
                         "along the driving direction, the robot's centre in its middle"};
   Param<double> margin_{this, "margin", kMargin_m, {0.0, 1.0}, "m", "nearer to the robot nothing may come"};
+  Param<double> moving_margin_{this, "moving_margin", 0.7, {0.0, 3.0}, "m", "nor what has moved in nearer than this"};
+  Param<double> memory_span_{this,        "memory", 1.5,
+                             {0.0, 10.0}, "s",      "where sweeps of the last so many passed through it has moved in"};
   Param<double> speed_max_{this, "speed_max", 1.4, {0.0, 10.0}, "m/s", "assumed where odometry says nothing"};
   Param<double> deceleration_{this, "deceleration", 1.0, {0.05, 20.0}, "m/s2", "that the robot surely brakes with"};
   Param<double> turn_deceleration_{
@@ -121,7 +164,8 @@ class ObstacleStopNode final : public Node {
   Param<double> hold_{this, "hold", 1.0, {0.0, 60.0}, "s", "a pulse on the line stops for this long"};
   Param<double> line_age_max_{this, "line_age_max", 0.2, {0.01, 5.0}, "s", "an older line state counts as none"};
 
-  Footprint footprint_;
+  Footprint footprint_, wide_footprint_;
+  SweepMemory memory_;
   FieldState field_{stop_reason::scan_lost, 0};
   LineState line_{0, 0};
 };

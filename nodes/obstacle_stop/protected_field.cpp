@@ -11,30 +11,14 @@ namespace {
 // Below this the circle differs from a line by less than half a micrometre per metre of way.
 constexpr double kStraight_rad = 1e-6;
 
-/// The robot frame's x and y of the sensor's x and y axes (from the quaternion), and the sensor's place.
-struct PlaneTransform {
-  double xx, xy, yx, yy, x, y;
-};
-
-PlaneTransform to_plane(const Transform& t) {
-  return {1 - 2 * (t.qy * t.qy + t.qz * t.qz),
-          2 * (t.qx * t.qy + t.qw * t.qz),
-          2 * (t.qx * t.qy - t.qw * t.qz),
-          1 - 2 * (t.qx * t.qx + t.qz * t.qz),
-          t.x,
-          t.y};
-}
-
 double before_stop(double present, double wanted) {
   return present * wanted >= 0 && std::abs(wanted) > std::abs(present) ? wanted : present;
 }
 
 /// Whether the beam ends in the field at that range.
-bool ends_in(const ProtectedField& field, const PlaneTransform& t, const Sweep& sweep, size_t beam, double range) {
-  // Counter-clockwise from the sensor's forward axis, which is its y.
-  const double angle = sweep.first_angle_rad + static_cast<double>(beam) * sweep.step_rad;
-  const double x = -range * std::sin(angle), y = range * std::cos(angle);
-  return field.contains(t.xx * x + t.yx * y + t.x, t.xy * x + t.yy * y + t.y);
+bool ends_in(const ProtectedField& field, const PlaneTransform& mount, const Sweep& sweep, size_t beam, double range) {
+  const PlanarPoint place = mount.place(sweep, beam, range);
+  return field.contains(place.x_m, place.y_m);
 }
 
 }  // namespace
@@ -124,13 +108,13 @@ bool ProtectedField::swept_to(double x, double y, double from) const {
 }
 
 FieldReading read_field(const Sweep& sweep, const ProtectedField& field, int beams_min) {
-  const PlaneTransform t = to_plane(sweep.sensor_in_robot);
+  const PlaneTransform mount(sweep.sensor_in_robot);
   FieldReading reading;
   int run = 0;
   double nearest = 0;
   for (size_t i = 0; i < sweep.range_m.size(); ++i) {
     const double range = static_cast<double>(sweep.range_m[i]);
-    if (!(range > 0) || !ends_in(field, t, sweep, i, range)) {
+    if (!(range > 0) || !ends_in(field, mount, sweep, i, range)) {
       run = 0;
       continue;
     }
@@ -144,8 +128,8 @@ FieldReading read_field(const Sweep& sweep, const ProtectedField& field, int bea
 
 bool could_hide(const Sweep& sweep, const ProtectedField& field, double width_m) {
   constexpr double kStep_m = 0.05;
-  const PlaneTransform t = to_plane(sweep.sensor_in_robot);
-  const double farthest = field.reach_m() + std::hypot(t.x, t.y);
+  const PlaneTransform mount(sweep.sensor_in_robot);
+  const double farthest = field.reach_m() + std::hypot(mount.x, mount.y);
   const auto blind = [&](size_t i) { return i < sweep.range_m.size() && std::isnan(sweep.range_m[i]); };
   for (size_t first = 0, end = 0; first < sweep.range_m.size(); first = end + 1) {
     for (end = first; blind(end);) ++end;
@@ -155,7 +139,7 @@ bool could_hide(const Sweep& sweep, const ProtectedField& field, double width_m)
     for (double range = std::max(nearest, kStep_m); range <= farthest; range += kStep_m) {
       size_t run = 0;
       for (size_t i = first; i < end; ++i) {
-        run = ends_in(field, t, sweep, i, range) ? run + 1 : 0;
+        run = ends_in(field, mount, sweep, i, range) ? run + 1 : 0;
         if (run > 0 && static_cast<double>(run + 1) * sweep.step_rad * range >= width_m) return true;
       }
     }

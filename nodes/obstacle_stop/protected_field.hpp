@@ -2,10 +2,8 @@
 // The area that the robot sweeps while it comes to a stand, and the returns of a laser scan in it.
 // Robot frame: x right, y forward (driving direction), z up. Pure functions, no allocation, any thread.
 #pragma once
-#include <span>
-
 #include "nodes/obstacle_stop/footprint.hpp"
-#include "rt/msg/messages.hpp"
+#include "nodes/obstacle_stop/sweep.hpp"
 
 namespace takt::obstacle_stop {
 
@@ -53,13 +51,6 @@ class ProtectedField {
   bool straight_;          ///< as good as
   double centre_x_m_ = 0;  ///< of the circle
   double reach_m_;
-};
-
-/// A sweep as plain data, angles as in LaserScan.
-struct Sweep {
-  double first_angle_rad = 0, step_rad = 0;
-  Transform sensor_in_robot;
-  std::span<const float> range_m;  ///< 0: no return; NaN: the beam is blinded
 };
 
 struct FieldReading {

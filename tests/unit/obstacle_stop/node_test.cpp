@@ -37,11 +37,14 @@ struct Fixture {
   uint64_t sequence = 0;
   int64_t now_ns = 1'000 * kMs;
 
-  explicit Fixture(bool with_lines = false, bool with_odometry = true, bool with_velocity = false) {
+  /// Things may come and go as they like, unless there is a margin for those that move.
+  explicit Fixture(bool with_lines = false, bool with_odometry = true, bool with_velocity = false,
+                   double moving_margin_m = 0) {
     NodeTypes types;
     register_obstacle_stop(types);
     REQUIRE(types.find("obstacle_stop")->layer == Layer::perception);
     node = types.find("obstacle_stop")->make();
+    test::set(*node, "moving_margin", moving_margin_m);
     PortAccess::connect(test::input(*node, "scan"), {0, 0, 1, 181});
     if (with_lines) PortAccess::connect(test::input(*node, "lines"), {});
     if (with_odometry) PortAccess::connect(test::input(*node, "odometry"), {});
@@ -204,6 +207,49 @@ TEST_CASE("obstacle_stop: one that is about to turn still goes on straight") {
   CHECK(f.drive_on().reasons == stop_reason::obstacle);
 }
 
+TEST_CASE(
+    "obstacle_stop: what moves in stops the robot from farther off than what was there, until it has stood a while") {
+  // At 0.2 m/s the field ends 0.58 m before the robot's centre, that of what moves 1.18 m.
+  Fixture f(false, true, false, 0.7);
+  f.odometry->speed_m_s = 0.2;
+  f.wall(0.6f);
+  f.drive_on(), f.drive_on();
+  CHECK(f.drive_on().reasons == 0);  // 2.4 s later: it was always there
+  f.free();
+  CHECK(f.drive_on().reasons == 0);
+  f.wall(0.6f);
+  f.give("scan", f.scan);
+  CHECK(f.job().reasons == stop_reason::obstacle);
+  CHECK(f.out->message().nearest_m == doctest::Approx(0.6));
+  CHECK(f.drive_on().reasons == stop_reason::obstacle);
+  f.drive_on();
+  CHECK(f.drive_on().reasons == 0);  // after 1.5 s, and the release
+  f.wall(0.9f);                      // farther off than that
+  f.give("scan", f.scan);
+  CHECK(f.job().reasons == 0);
+}
+
+TEST_CASE("obstacle_stop: without odometry nobody can tell what has moved in; what the robot drives up to has not") {
+  Fixture lost(false, true, false, 0.7);
+  test::set(*lost.node, "speed_max", 0.2);
+  lost.odometry->x_m = std::nan("");
+  lost.odometry->speed_m_s = 0.2;
+  lost.drive_on();
+  lost.wall(0.6f);
+  lost.give("scan", lost.scan);
+  CHECK(lost.job().reasons == 0);
+  Fixture nearer(false, true, false, 0.7);
+  nearer.odometry->speed_m_s = 0.2;
+  nearer.odometry->theta_rad = std::numbers::pi / 2;  // it drives along y
+  nearer.wall(1.1f);
+  for (int i = 0; i < 5; ++i) {
+    nearer.drive_on();
+    CHECK(nearer.job().reasons == 0);
+    nearer.odometry->y_m += 0.08;
+    nearer.wall(1.1f - 0.08f * static_cast<float>(i + 1));
+  }
+}
+
 TEST_CASE("obstacle_stop: released only after release_after of free scans") {
   Fixture f;
   f.drive_on();
@@ -280,7 +326,7 @@ TEST_CASE("obstacle_stop allocates nothing in a job") {
     MESSAGE("NOT RUN: this program does not count allocations (sanitizer)");
     return;
   }
-  Fixture f(true);
+  Fixture f(true, true, false, 0.7);
   f.wall(1.0f);
   f.odometry->turn_rad_s = 0.3;
   f.drive_on();
@@ -293,7 +339,7 @@ TEST_CASE("obstacle_stop allocates nothing in a job") {
 
 TEST_CASE("cost of a job" * doctest::skip()) {  // a figure and no check; run with --no-skip
   for (const bool near : {false, true}) {
-    Fixture f(true);
+    Fixture f(true, true, false, 0.7);
     f.odometry->turn_rad_s = near ? 0.4 : 0;
     for (float& r : f.scan->range_m.items()) r = near ? 0.9f : 8.0f;
     f.drive_on();
