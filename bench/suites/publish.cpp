@@ -133,10 +133,12 @@ void run_on(const char* name, std::unique_ptr<Transport> (*make)(std::span<const
   const std::string base = std::string("publish/") + name + "/";
   const auto judge = [&](size_t i) {
     const double longest = measured.all[i].max().value_or(0);
-    rows.push_back({base + kNames[i] + "_max", "us", longest, {}, "limit", kLimitUs, longest / kLimitUs, measured.granted});
+    rows.push_back(
+        {base + kNames[i] + "_max", "us", longest, {}, "limit", kLimitUs, longest / kLimitUs, measured.granted});
     const auto& all = measured.all[i].values();
     const auto over = std::count_if(all.begin(), all.end(), [](double us) { return us > kLimitUs; });
-    rows.push_back({base + kNames[i] + "_over_limit", "count", static_cast<double>(over), {}, {}, {}, {}, measured.granted});
+    rows.push_back(
+        {base + kNames[i] + "_over_limit", "count", static_cast<double>(over), {}, {}, {}, {}, measured.granted});
   };
   Row prompt{base + kNames[0], "us", 0, measured.all[0], {}, {}, {}, measured.granted};
   prompt.value = prompt.samples.quantile(0.5).value_or(0);
