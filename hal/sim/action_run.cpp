@@ -97,7 +97,8 @@ bool ActionRun::possible(const Doing& doing, int64_t at_ns, Reason& reason) cons
     const auto placed = stage_.placed(doing.objects[i], at_ns);
     if (!placed) return reason("{} is not here any more", name);
     const double distance = distance_to(*placed, {robot.x_m, robot.y_m});
-    if (distance > kReach) return reason("{} is {:.2f} m away, and the reach is {:.1f} m", name, distance, kReach);
+    if (distance > action.reach_m)
+      return reason("{} is {:.2f} m away, and the reach is {:.1f} m", name, distance, action.reach_m);
   }
   for (const RoleCondition& condition : action.pre) {
     const size_t object = doing.objects[role_index(action, condition.role)];

@@ -11,9 +11,6 @@ namespace takt::sim {
 
 class Stage;
 
-/// How near the robot's centre must be to everything that an action is about, m (algorithms.md 13).
-constexpr double kReach = 0.8;
-
 /// Carries the actions of one robot out. An action begins kLatencyNs after its command and lasts its cost, longer or
 /// shorter by a share that seed, robot and action decide, `spread` at most; at its begin
 /// and at its end each object has to be within reach and each requirement has to hold, then its results come true. One

@@ -104,9 +104,13 @@ struct ActionRole {
 struct RoleMove {
   std::string role, to;
 };
+/// How near the robot's centre must be to everything that an action is about, m (algorithms.md 13).
+constexpr double kReach = 0.8;
+
 struct WorldAction {
   std::string name;
   double cost_s = 0;
+  double reach_m = kReach;
   std::vector<ActionRole> roles;  ///< as commands name their objects
   std::vector<RoleCondition> pre, post;
   std::vector<RoleMove> moves;

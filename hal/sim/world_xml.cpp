@@ -257,6 +257,8 @@ struct Loader {
     a.name = word(e, "name");
     a.cost_s = quantity(e, "cost", Dimension::time);
     if (a.cost_s < 0 || a.cost_s > 1e6) fail(e, "`cost` must lie in 0..1000000 s", "correct it");
+    a.reach_m = quantity(e, "reach", Dimension::length, a.reach_m);
+    if (a.reach_m <= 0 || a.reach_m > 100) fail(e, "`reach` must lie in (0, 100 m]", "correct it");
     if (named(world.actions, a.name) != world.actions.end())
       fail(e, "action `" + a.name + "` exists already", "choose another name");
     for (const Element* c = e->FirstChildElement("role"); c != nullptr; c = c->NextSiblingElement("role"))

@@ -63,6 +63,7 @@ class GroundGrid {
   const Window& window() const { return window_; }
   ImageView<const int16_t> observation() const { return {observation_.data(), window_.cells, window_.cells}; }
   ImageView<const int16_t> map() const { return {map_.data(), window_.cells, window_.cells}; }
+  ImageView<int16_t> map() { return {map_.data(), window_.cells, window_.cells}; }
 
  private:
   struct Tally {

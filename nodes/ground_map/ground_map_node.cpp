@@ -10,6 +10,7 @@
 #include "nodes/ground_map/ground_grid.hpp"
 #include "nodes/ground_map/laser_check.hpp"
 #include "nodes/ground_map/robot_track.hpp"
+#include "nodes/ground_map/specks.hpp"
 #include "nodes/ground_map/terrain_file.hpp"
 #include "nodes/mapping_3d/head_at.hpp"
 #include "nodes/mapping_3d/pose.hpp"
@@ -44,6 +45,9 @@ class GroundMapNode final : public Node {
     textures_.reserve({sizeof(Descriptor), static_cast<uint32_t>(n_b_()), 1, 0});
     const auto side = static_cast<uint32_t>(grid_cells_->window().cells);
     grid_.reserve({side, side, 1, 0});
+    specks_.emplace(grid_cells_->window().cells, speck_);
+    if (speck_ > 0 && !scan_.connected())
+      throw SetupError("speck wants `scan`: it frees only what a scanner sees past");
     if (!terrain_maps_().empty()) read_terrain_maps(setup.directory / terrain_maps_());
     around_cells_.resize(shape_.cells());
     around_.reserve({static_cast<uint32_t>(shape_.columns), static_cast<uint32_t>(shape_.rows), 1, 0});
@@ -153,12 +157,16 @@ class GroundMapNode final : public Node {
     constexpr uint32_t kBad = image_health::saturated | image_health::dark | image_health::blurred;
     if ((pair.health & kBad) != 0) return false;
     if (!scan_.connected()) return true;
-    if (!projection) return false;
+    const auto scan = scan_at_image();
+    return scan && projection && area_is_free(scan_[*scan], *projection, detector_->area());
+  }
+
+  /// The newest scan that is at most `scan_age` from the image.
+  std::optional<size_t> scan_at_image() const {
     const auto longest_ns = static_cast<int64_t>(scan_age_ * 1e9);
     for (size_t i = scan_.size(); i-- > 0;)
-      if (std::abs(scan_.stamp_ns(i) - last_stamp_ns_) <= longest_ns)
-        return area_is_free(scan_[i], *projection, detector_->area());
-    return false;
+      if (std::abs(scan_.stamp_ns(i) - last_stamp_ns_) <= longest_ns) return i;
+    return std::nullopt;
   }
 
   /// None where the head's angles are not known.
@@ -226,6 +234,7 @@ class GroundMapNode final : public Node {
     if (knows_ground) {
       grid.observe(ground(), projection.moved(robot), {robot.x_m, robot.y_m}, detector_->confidence());
       grid.accumulate();
+      clear_specks();
     }
     // Without poses images cannot be laid over one another: what one image shows is all there is.
     const auto cells = has_pose_input() || !knows_ground ? grid.map() : grid.observation();
@@ -249,6 +258,22 @@ class GroundMapNode final : public Node {
     std::copy_n(cells.data, count, out->cells.data());
     grid_.send(last_stamp_ns_);
     return true;
+  }
+
+  void clear_specks() {
+    const auto scan = scan_at_image();
+    if (!scan) return;
+    auto pose = track_.at(scan_.stamp_ns(*scan));
+    if (!pose) pose = track_.predicted(scan_.stamp_ns(*scan));
+    if (!pose) return;
+    const PlanarPose robot = planar(*pose);
+    const Window& window = grid_cells_->window();
+    const FloorPoint origin = window.origin();
+    specks_->clear(grid_cells_->map(), [&](int column, int row) {
+      const PlanarPose middle =
+          between(robot, {origin.x_m + (column + 0.5) * window.cell_m, origin.y_m + (row + 0.5) * window.cell_m, 0});
+      return sees_past(scan_[*scan], {middle.x_m, middle.y_m}, window.cell_m);
+    });
   }
 
   bool give_terrain(ImageView<const int16_t> cells, const PlanarPose& robot) {
@@ -364,6 +389,9 @@ class GroundMapNode final : public Node {
   Param<int> votes_min_{this, "votes_min", 5, {1, 100000}, "", "a cell with fewer votes in an image is not seen"};
   Param<double> up_{this, "up", 0.2, {0.0, 1.0}, "1", "added to a cell that an image surely shows blocked"};
   Param<double> down_{this, "down", 0.1, {0.0, 1.0}, "1", "taken off a cell that an image shows free"};
+  Param<int> speck_{this, "speck",
+                    0,    {0, 1000},
+                    "",   "cells of an island of blocked ones that is free if the scanner sees past it; 0: none"};
   Param<double> scan_age_{this, "scan_age", 0.2, {0.0, 10.0}, "s", "between image and scan; none: nothing is learnt"};
   Param<std::string> terrain_maps_{this, "terrain_maps", "", kPath,
                                    "file with maps of each kind (takt terrain learn); empty: no terrain"};
@@ -396,6 +424,7 @@ class GroundMapNode final : public Node {
   std::vector<int8_t> remap_window_;
   std::vector<uint8_t> ground_;  ///< mask of the present image
   std::optional<GroundGrid> grid_cells_;
+  std::optional<Specks> specks_;
   std::optional<TerrainClassifier> classifier_;
   TerrainShape shape_;
   std::vector<int16_t> around_cells_;

@@ -12,7 +12,9 @@ namespace {
 
 constexpr double kStands_m_s = 0.02, kGotOn_m = 0.3;
 
-constexpr std::array<std::string_view, 10> kStates{"seek",  "ask",  "back",   "read", "turn",
+constexpr double kLooksThere_rad = 0.35, kLookOn_rad = 1.0;
+
+constexpr std::array<std::string_view, 11> kStates{"seek",  "look", "ask",    "back", "read",  "turn",
                                                    "drive", "face", "follow", "done", "failed"};
 
 double distance_m(const PlanarPose& a, const PlanarPose& b) { return std::hypot(a.x_m - b.x_m, a.y_m - b.y_m); }
@@ -53,15 +55,18 @@ void Mission::tell(const char* format, const Values&... values) {
 void Mission::step(const Percept& percept) {
   now_ns_ = percept.now_ns;
   const bool over = percept.over == number_;
+  if (!percept.pedestrian.empty()) pedestrian_ = percept.pedestrian_at;
   switch (state_) {
-    case State::seek:
-      if (percept.pedestrian.empty()) return;
-      tell("do ask {}", percept.pedestrian);
-      return enter(State::ask);
+    case State::seek: return seek(percept);
+    case State::look:
+      if (over) enter(State::seek);
+      return;
     case State::ask:
       if (!over) return;
       // Whoever was not got to is far enough already, and behind the robot there are no eyes.
-      if (const double back_m = parameters_.view_m - percept.pedestrian_m; !percept.pedestrian.empty() && back_m > 0)
+      if (const double back_m = parameters_.view_m - std::hypot(percept.pedestrian_at.x_m - percept.robot.x_m,
+                                                                percept.pedestrian_at.y_m - percept.robot.y_m);
+          !percept.pedestrian.empty() && back_m > 0)
         tell("ahead {:.2f}", -back_m);
       return enter(State::back);
     case State::back:
@@ -84,6 +89,24 @@ void Mission::step(const Percept& percept) {
     case State::done:
     case State::failed: return;
   }
+}
+
+/// Who is out of sight may be where one was seen last, or anywhere.
+void Mission::seek(const Percept& percept) {
+  if (!percept.pedestrian.empty()) {
+    tell("do ask {}", percept.pedestrian);
+    return enter(State::ask);
+  }
+  if (since_s(entered_ns_) < parameters_.look_after_s) return;
+  double turn_rad = kLookOn_rad;
+  if (pedestrian_) {
+    const double to_rad = std::atan2(pedestrian_->y_m - percept.robot.y_m, pedestrian_->x_m - percept.robot.x_m);
+    const double there_rad = wrapped(to_rad - percept.robot.theta_rad);
+    if (std::abs(there_rad) > kLooksThere_rad) turn_rad = there_rad;
+    pedestrian_.reset();
+  }
+  tell("rotate {:.3f}", turn_rad);
+  enter(State::look);
 }
 
 void Mission::read(const Percept& percept) {
@@ -109,9 +132,12 @@ void Mission::drive(const Percept& percept, bool over) {
     tell("stop");
     return enter(State::done);
   }
-  if (!last && percept.sign_m && *percept.sign_m <= parameters_.stop_before_m) {
-    to_cross_m_ = *percept.sign_m + parameters_.cross_least_m;
-    return turn_to_direction(percept.robot, State::face);
+  // Seen now and then as the robot comes nearer, and not any more from close by.
+  if (percept.sign) sign_ = percept.sign;
+  if (!last && sign_) {
+    const double sign_m = std::hypot(sign_->x_m - percept.robot.x_m, sign_->y_m - percept.robot.y_m);
+    to_cross_m_ = sign_m + parameters_.cross_least_m;
+    if (sign_m <= parameters_.stop_before_m) return turn_to_direction(percept.robot, State::face);
   }
   const double along = (percept.robot.x_m - began_.x_m) * std::cos(*direction_rad_) +
                        (percept.robot.y_m - began_.y_m) * std::sin(*direction_rad_);
@@ -131,10 +157,8 @@ void Mission::follow(const Percept& percept) {
   const bool stood = standing_ns_ >= 0 && since_s(standing_ns_) >= parameters_.stand_s;
   if (stood && distance_m(percept.robot, began_) >= to_cross_m_) {
     ++crossed_;
-    began_ = percept.robot;
-    farthest_m_ = 0;
-    got_on_ns_ = now_ns_;
-    return enter(State::drive);
+    sign_.reset();
+    return turn_to_direction(percept.robot, State::turn);  // who led it may have turned aside
   }
   if (since_s(entered_ns_) > parameters_.follow_within_s) fail("nobody leads across");
 }

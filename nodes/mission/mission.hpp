@@ -12,7 +12,7 @@
 
 namespace takt::mission {
 
-enum class State : uint8_t { seek, ask, back, read, turn, drive, face, follow, done, failed };
+enum class State : uint8_t { seek, look, ask, back, read, turn, drive, face, follow, done, failed };
 std::string_view to_string(State state);
 
 /// A street is never entered by the robot's own will: in every state but `follow` it drives where the grid is free.
@@ -21,6 +21,7 @@ drive_arbiter::VisionState vision_of(State state);
 struct MissionParameters {
   double view_m = 2.6;         ///< from so far off all of who was asked is seen: nearer, the robot steps back
   size_t readings = 8;         ///< of his arm, until the direction counts
+  double look_after_s = 2;     ///< without seeing one the robot looks elsewhere
   double read_within_s = 10;   ///< else somebody is asked again
   int asking = 3;              ///< times at most
   double stop_before_m = 3.5;  ///< so far from the sign of a crossing the robot waits
@@ -40,9 +41,9 @@ struct Percept {
   PlanarPose robot;
   double speed_m_s = 0;
   std::string_view pedestrian;                      ///< name of the nearest one that is seen; empty: none
-  double pedestrian_m = 0;                          ///< how far he is
+  navigation::Place pedestrian_at;                  ///< of that one
   std::optional<double> pointed_rad;                ///< where he points, of a body measured since the last step
-  std::optional<double> sign_m;                     ///< to the nearest sign of a crossing, measured since the last step
+  std::optional<navigation::Place> sign;            ///< the nearest one of a crossing, measured since the last step
   const navigation::OccupancyView* grid = nullptr;  ///< of the ground; null: none yet
   uint32_t over = 0;                                ///< number of the newest task that the robot client has ended
 };
@@ -77,6 +78,7 @@ class Mission {
   void tell(const char* format, const Values&... values);
   double since_s(int64_t instant_ns) const { return static_cast<double>(now_ns_ - instant_ns) * 1e-9; }
 
+  void seek(const Percept& percept);
   void read(const Percept& percept);
   void drive(const Percept& percept, bool over);
   void follow(const Percept& percept);
@@ -91,15 +93,17 @@ class Mission {
   size_t size_ = 0;
   std::string_view trouble_;
 
+  std::optional<navigation::Place> pedestrian_;  ///< where one was seen last
   int asked_ = 0, crossed_ = 0;
   std::array<double, kMostReadings> readings_rad_{};
   size_t read_ = 0;
   std::optional<double> direction_rad_;
-  PlanarPose began_;          ///< driving, following, or beyond the last crossing
-  double farthest_m_ = 0;     ///< along the direction since then
-  double to_cross_m_ = 0;     ///< from where following began to beyond the crossing, at least
-  int64_t got_on_ns_ = 0;     ///< when it was
-  int64_t standing_ns_ = -1;  ///< since when; -1: it drives
+  PlanarPose began_;                       ///< driving, following, or beyond the last crossing
+  double farthest_m_ = 0;                  ///< along the direction since then
+  std::optional<navigation::Place> sign_;  ///< of the next crossing, where it was measured last
+  double to_cross_m_ = 0;                  ///< from where following began to beyond the crossing, at least
+  int64_t got_on_ns_ = 0;                  ///< when it was
+  int64_t standing_ns_ = -1;               ///< since when; -1: it drives
 };
 
 }  // namespace takt::mission

@@ -91,7 +91,7 @@ class MissionNode final : public Node {
     percept.robot = {odometry.x_m, odometry.y_m, odometry.theta_rad};
     percept.speed_m_s = odometry.speed_m_s;
     look_for_pedestrian(percept);
-    percept.sign_m = sign_m();
+    percept.sign = sign(percept.robot);
     if (const RobotTask* taken = taken_.newest(); taken != nullptr && taken->text.size == 0)
       percept.over = taken->number;
     navigation::OccupancyView view;
@@ -116,22 +116,24 @@ class MissionNode final : public Node {
       place = report.place;
       percept.pedestrian = report.name;
     });
-    percept.pedestrian_m = nearest;
+    const PlanarPose at = compose(percept.robot, {place.y_m, -place.x_m, 0});  // x along the driving direction
+    percept.pedestrian_at = {at.x_m, at.y_m};
     if (percept.pedestrian.empty() || bodies_.empty() || !bodies_.is_new()) return;
     if (const auto pointed = pointed_direction(*bodies_.newest(), place.x_m, place.y_m))
       percept.pointed_rad = wrapped(percept.robot.theta_rad + *pointed);
   }
 
-  /// To the nearest sign that the newest image shows while a crossing is told.
-  std::optional<double> sign_m() const {
+  /// The nearest sign that the newest image shows while a crossing is told.
+  std::optional<navigation::Place> sign(const PlanarPose& robot) const {
     if (signs_.empty() || !signs_.is_new() || crossing_.empty() || (crossing_.newest()->levels & 1) == 0)
       return std::nullopt;
-    std::optional<double> nearest;
-    for (const Point& sign : signs_.newest()->points.items()) {
-      const double distance = std::hypot(sign.x, sign.z);  // camera frame: x right, z ahead
-      if (distance > 0 && (!nearest || distance < *nearest)) nearest = distance;
-    }
-    return nearest;
+    const Point* nearest = nullptr;
+    const auto distance = [](const Point& p) { return std::hypot(p.x, p.z); };  // camera frame: x right, z ahead
+    for (const Point& p : signs_.newest()->points.items())
+      if (distance(p) > 0 && (nearest == nullptr || distance(p) < distance(*nearest))) nearest = &p;
+    if (nearest == nullptr) return std::nullopt;
+    const PlanarPose at = compose(robot, {nearest->z, -nearest->x, 0});  // x along the driving direction
+    return navigation::Place{at.x_m, at.y_m};
   }
 
   bool is_map(const Grid& grid) const {

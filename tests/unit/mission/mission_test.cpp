@@ -53,7 +53,12 @@ struct Town {
     percept.grid = &view;
     mission.step(percept);
     percept.pointed_rad.reset();
-    percept.sign_m.reset();
+    percept.sign.reset();
+  }
+  /// Straight before the robot.
+  void see_sign(double m) {
+    const PlanarPose at = compose(percept.robot, {m, 0, 0});
+    percept.sign = navigation::Place{at.x_m, at.y_m};
   }
   std::string told() const { return std::string(mission.task().text); }
   /// What it was told is over.
@@ -84,7 +89,7 @@ TEST_CASE("the whole mission: asks, reads, drives, waits, follows, drives on") {
   town.percept.pedestrian = "anna";
   town.step();
   CHECK(town.told() == "do ask anna");
-  town.percept.pedestrian_m = 1;
+  town.percept.pedestrian_at = {0, -1};
   town.step();
   CHECK(town.mission.state() == State::ask);
   town.obey(), town.step();
@@ -103,9 +108,9 @@ TEST_CASE("the whole mission: asks, reads, drives, waits, follows, drives on") {
   CHECK(vision_of(State::drive) == VisionState::search);
   town.step();
   CHECK(town.told() == "drive 3.45 0.61");  // 3.5 m along 10 degrees
-  town.percept.sign_m = 3.6, town.step();
+  town.see_sign(3.6), town.step();
   CHECK(town.mission.state() == State::drive);
-  town.percept.sign_m = 3.4, town.step();
+  town.see_sign(3.4), town.step();
   CHECK(town.mission.state() == State::face);
   CHECK(town.told() == "rotate 0.000");
   town.obey(), town.step();
@@ -121,14 +126,55 @@ TEST_CASE("the whole mission: asks, reads, drives, waits, follows, drives on") {
   town.percept.speed_m_s = 0, town.step();
   town.step(2.9);
   CHECK(town.mission.state() == State::follow);
-  town.step();
-  CHECK(town.mission.state() == State::drive);
+  town.percept.robot.theta_rad = -20 * kDegree, town.step();
+  CHECK(town.mission.state() == State::turn);
+  CHECK(town.told() == "rotate 0.524");
   CHECK(town.mission.crossed() == 1);
-  town.percept.sign_m = 1.0, town.step();  // of the crossing behind
+  town.obey(), town.step();
+  CHECK(town.mission.state() == State::drive);
+  town.see_sign(1.0), town.step();  // of the crossing behind
   CHECK(town.mission.state() == State::drive);
   town.percept.robot.x_m += 4.1, town.step();
   CHECK(town.mission.state() == State::done);
   CHECK(town.told() == "stop");
+}
+
+TEST_CASE("who cannot be seen is looked for where he was seen last, then round about") {
+  Town town;
+  town.percept.pedestrian = "anna", town.percept.pedestrian_at = {0, 2};
+  town.step();
+  town.percept.pedestrian = {};
+  town.obey(), town.step();
+  town.obey(), town.step();
+  REQUIRE(town.mission.state() == State::read);
+  town.step(10);
+  REQUIRE(town.mission.state() == State::seek);
+  town.step(1.8);
+  CHECK(town.mission.state() == State::seek);
+  town.step(0.3);
+  CHECK(town.mission.state() == State::look);
+  CHECK(town.told() == "rotate 1.571");
+  town.obey(), town.step();
+  CHECK(town.mission.state() == State::seek);
+  town.step(2.1);
+  CHECK(town.told() == "rotate 1.000");
+  town.obey(), town.step();
+  town.percept.pedestrian = "bert", town.step();
+  CHECK(town.told() == "do ask bert");
+}
+
+TEST_CASE("a sign that was seen from afar is kept in mind where it is, until the robot is near it") {
+  Town town;
+  town.ask_the_way(0);
+  town.obey(), town.step();
+  town.step();
+  REQUIRE(town.told() == "drive 3.50 0.00");
+  town.see_sign(6.5), town.step();
+  CHECK(town.mission.state() == State::drive);
+  town.percept.robot.x_m = 2.9, town.step();
+  CHECK(town.mission.state() == State::drive);
+  town.percept.robot.x_m = 3.1, town.step();
+  CHECK(town.mission.state() == State::face);
 }
 
 TEST_CASE("who does not point is asked again, three times") {
@@ -164,7 +210,7 @@ TEST_CASE("where no free ground leads on the mission fails; nobody leads across:
   Town lonely;
   lonely.ask_the_way(0);
   lonely.obey(), lonely.step();
-  lonely.percept.sign_m = 2, lonely.step();
+  lonely.see_sign(2), lonely.step();
   lonely.obey(), lonely.step();
   REQUIRE(lonely.mission.state() == State::follow);
   lonely.step(119);

@@ -39,6 +39,8 @@ inline std::string acting_xml(const std::string& more = "") {
   <move role="vessel" to="onto"/></action>
 <action name="drop" cost="0s"><role name="vessel" type="cup"/><move role="vessel" to="away"/></action>
 <action name="move_crate" cost="1s"><role name="crate" type="crate"/><move role="crate" to="away"/></action>
+<action name="call" cost="1s" reach="4.3m"><role name="crate" type="crate"/></action>
+<action name="whisper" cost="1s" reach="4.2m"><role name="crate" type="crate"/></action>
 )" + more +
          "</world>";
 }

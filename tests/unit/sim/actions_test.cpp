@@ -108,11 +108,19 @@ TEST_CASE("an action that cannot be is refused with the reason and what is valid
   CHECK(has(refusal(action_command(1, "fill", "cup")), "no object `` to be bottle `source`"));
   CHECK(has(refusal(action_command(1, "fill", "cup", "bottle")), "bottle.closed is true and not false"));
   CHECK(has(refusal(action_command(1, "move_crate", "crate")), "crate is 4.27 m away"));
+  CHECK(has(refusal(action_command(1, "whisper", "crate")), "crate is 4.27 m away, and the reach is 4.2 m"));
   CHECK(has(refusal(action_command(1, "take", "cup"), R"(<event at="50ms" object="cup" to="away"/>)"),
             "cup is not here any more"));
   ActionCommand endless = action_command(1, "open", "bottle");
   std::memset(endless.action, 'x', sizeof endless.action);  // nobody ended it
   CHECK(has(refusal(endless), "xxxx`"));
+}
+
+TEST_CASE("an action may have a reach of its own") {
+  Two two;
+  two.ace.actions().command(action_command(1, "call", "crate"), kEpoch);
+  two.run_to(1500);
+  CHECK(two.outcome(two.ace).state == action_state::done);
 }
 
 TEST_CASE("an action fails, and changes nothing, if the world has changed at its end") {

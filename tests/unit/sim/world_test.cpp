@@ -94,6 +94,7 @@ TEST_CASE("mistakes in what can change are told with file, line and what is vali
   CHECK(has(about_cup("<move role=\"c\" to=\"j\"/><move role=\"j\" to=\"robot\"/>"), "make them two actions"));
   CHECK(has(about_cup("<effect/>"), "known here: role, pre, post, move"));
   CHECK(has(told("<action name=\"wait\" cost=\"1s\"/>"), "has 0 roles | give it 1 to 4"));
+  CHECK(has(told("<action name=\"wait\" cost=\"1s\" reach=\"0m\"/>"), "`reach` must lie in (0, 100 m] | correct it"));
   CHECK(looking("<look when=\"closed=true\"><box width=\"1m\" depth=\"1m\" height=\"1m\"/></look>") == "");
   CHECK(has(looking("<look><box/></look>"), "lacks `when`"));
   CHECK(has(looking("<look when=\"closed\"/>"), "write attribute=value"));
