@@ -96,11 +96,10 @@ void print(const Json& table, Vision vision, int trials) {
     if (!value.is_null()) std::snprintf(text, sizeof text, "%.2f", value.get<double>());
     return std::string(text);
   };
+  std::printf("%d trials, vision %s\n", trials, std::string(to_string(vision)).c_str());
   std::printf(
-      "%d trials, vision %s; contacts: touched while the robot moved faster than 0.05 m/s; unavoidable: also by one "
-      "that "
-      "brakes when he is first seen in its lane\n",
-      trials, std::string(to_string(vision)).c_str());
+      "  contacts: touched while the robot moved faster than 0.05 m/s; unavoidable: so also by one that brakes\n"
+      "  as soon as he is first seen in its lane\n");
   std::printf("  %-13s %-9s %7s %9s %12s %11s %11s %10s\n", "first seen", "walk", "trials", "contacts", "unavoidable",
               "impact p50", "impact max", "least gap");
   for (const auto& [distance, walks] : table.items()) {

@@ -117,7 +117,9 @@ void Mission::read(const Percept& percept) {
   }
   if (since_s(entered_ns_) < parameters_.read_within_s) return;
   if (++asked_ >= parameters_.asking) return fail("nobody points the way");
-  enter(State::seek);
+  // From elsewhere he may be seen better, and the ground on the way to him.
+  tell("rotate {:.3f}", kLookOn_rad);
+  enter(State::look);
 }
 
 void Mission::turn_to_direction(const PlanarPose& robot, State next) {

@@ -30,8 +30,9 @@ void SweepMemory::add(const Sweep& sweep, const PlanarPose& robot, int64_t stamp
   count_ = std::min(count_ + 1, kSweeps);
   Kept& kept = kept_[newest_];
   std::copy(sweep.range_m.begin(), sweep.range_m.end(), kept.range_m.begin());
-  kept.sweep = sweep;
-  kept.sweep.range_m = std::span(kept.range_m).first(sweep.range_m.size());
+  kept.beams = sweep.range_m.size();
+  kept.first_angle_rad = sweep.first_angle_rad;
+  kept.step_rad = sweep.step_rad;
   kept.mount = PlaneTransform(sweep.sensor_in_robot);
   kept.robot = robot;
   kept.stamp_ns = stamp_ns;
@@ -60,20 +61,19 @@ std::span<const float> SweepMemory::moved_in(const Sweep& sweep, const PlanarPos
 }
 
 bool SweepMemory::saw_through(const Kept& earlier, const PlanarPoint& in_odometry) const {
-  const Sweep& sweep = earlier.sweep;
   const PlaneTransform& m = earlier.mount;
   const PlanarPoint p = from_parent(earlier.robot, in_odometry);
   const double dx = p.x_m - m.x, dy = p.y_m - m.y, determinant = m.xx * m.yy - m.xy * m.yx;
   const double right = (m.yy * dx - m.yx * dy) / determinant, ahead = (m.xx * dy - m.xy * dx) / determinant;
   const double range = std::hypot(right, ahead);
-  if (range * sweep.step_rad > kGap_m) return false;
-  const double beam = (std::atan2(-right, ahead) - sweep.first_angle_rad) / sweep.step_rad;
-  const double aside = std::max(1.0, kAside_rad / sweep.step_rad);
+  if (range * earlier.step_rad > kGap_m) return false;
+  const double beam = (std::atan2(-right, ahead) - earlier.first_angle_rad) / earlier.step_rad;
+  const double aside = std::max(1.0, kAside_rad / earlier.step_rad);
   const double first = std::ceil(beam - aside), last = std::floor(beam + aside);
-  if (!(first >= 0 && last < static_cast<double>(sweep.range_m.size()))) return false;  // NaN as well
+  if (!(first >= 0 && last < static_cast<double>(earlier.beams))) return false;  // NaN as well
   const auto farther = [&](float seen) { return seen == 0 || static_cast<double>(seen) > range + kDeeper_m; };
-  return std::all_of(sweep.range_m.begin() + static_cast<ptrdiff_t>(first),
-                     sweep.range_m.begin() + static_cast<ptrdiff_t>(last) + 1, farther);
+  return std::all_of(earlier.range_m.begin() + static_cast<ptrdiff_t>(first),
+                     earlier.range_m.begin() + static_cast<ptrdiff_t>(last) + 1, farther);
 }
 
 }  // namespace takt::obstacle_stop

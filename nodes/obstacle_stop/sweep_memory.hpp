@@ -34,11 +34,12 @@ class SweepMemory {
 
  private:
   struct Kept {
-    Sweep sweep;
+    double first_angle_rad = 0, step_rad = 0;
     PlaneTransform mount{Transform{}};
     PlanarPose robot;
     int64_t stamp_ns = 0;
-    std::vector<float> range_m;  ///< that `sweep` shows
+    size_t beams = 0;
+    std::vector<float> range_m;  ///< of the beams, and room for more
   };
   bool saw_through(const Kept& earlier, const PlanarPoint& in_odometry) const;
 

@@ -148,12 +148,14 @@ TEST_CASE("who cannot be seen is looked for where he was seen last, then round a
   town.obey(), town.step();
   REQUIRE(town.mission.state() == State::read);
   town.step(10);
+  CHECK(town.told() == "rotate 1.000");
+  town.obey(), town.step();
   REQUIRE(town.mission.state() == State::seek);
   town.step(1.8);
   CHECK(town.mission.state() == State::seek);
   town.step(0.3);
   CHECK(town.mission.state() == State::look);
-  CHECK(town.told() == "rotate 1.571");
+  CHECK(town.told() == "rotate 0.571");
   town.obey(), town.step();
   CHECK(town.mission.state() == State::seek);
   town.step(2.1);
@@ -181,6 +183,11 @@ TEST_CASE("who does not point is asked again, three times") {
   Town town;
   town.percept.pedestrian = "anna";
   for (int i = 0; i < 3; ++i) {
+    if (i > 0) {
+      CHECK(town.mission.state() == State::look);
+      CHECK(town.told() == "rotate 1.000");
+      town.obey(), town.step();
+    }
     town.step();
     CHECK(town.told() == "do ask anna");
     town.obey(), town.step();
