@@ -104,6 +104,7 @@ struct ActionRole {
 struct RoleMove {
   std::string role, to;
 };
+
 /// How near the robot's centre must be to everything that an action is about, m (algorithms.md 13).
 constexpr double kReach = 0.8;
 

@@ -34,9 +34,7 @@ bool Specks::grow(ImageView<const int16_t> cells, int first) {
 }
 
 bool sees_past(const LaserScan& scan, const FloorPoint& cell, double cell_m) {
-  const Transform& t = scan.sensor_in_robot;
-  const PlanarPose mount{t.x, t.y, std::atan2(2 * (t.qw * t.qz + t.qx * t.qy), 1 - 2 * (t.qy * t.qy + t.qz * t.qz))};
-  const PlanarPose at = between(mount, {cell.x_m, cell.y_m, 0});
+  const PlanarPose at = between(planar(scan.sensor_in_robot), {cell.x_m, cell.y_m, 0});
   const double half_m = cell_m / std::numbers::sqrt2, range = std::hypot(at.x_m, at.y_m);
   if (!(range > half_m) || !(scan.step_rad > 0)) return false;
   // Counter-clockwise from the forward axis y.

@@ -17,7 +17,10 @@ constexpr double kLooksThere_rad = 0.35, kLookOn_rad = 1.0;
 constexpr std::array<std::string_view, 11> kStates{"seek",  "look", "ask",    "back", "read",  "turn",
                                                    "drive", "face", "follow", "done", "failed"};
 
-double distance_m(const PlanarPose& a, const PlanarPose& b) { return std::hypot(a.x_m - b.x_m, a.y_m - b.y_m); }
+template <class To>  // a pose or a place
+double distance_m(const PlanarPose& from, const To& to) {
+  return std::hypot(from.x_m - to.x_m, from.y_m - to.y_m);
+}
 
 }  // namespace
 
@@ -64,8 +67,7 @@ void Mission::step(const Percept& percept) {
     case State::ask:
       if (!over) return;
       // Whoever was not got to is far enough already, and behind the robot there are no eyes.
-      if (const double back_m = parameters_.view_m - std::hypot(percept.pedestrian_at.x_m - percept.robot.x_m,
-                                                                percept.pedestrian_at.y_m - percept.robot.y_m);
+      if (const double back_m = parameters_.view_m - distance_m(percept.robot, percept.pedestrian_at);
           !percept.pedestrian.empty() && back_m > 0)
         tell("ahead {:.2f}", -back_m);
       return enter(State::back);
@@ -137,7 +139,7 @@ void Mission::drive(const Percept& percept, bool over) {
   // Seen now and then as the robot comes nearer, and not any more from close by.
   if (percept.sign) sign_ = percept.sign;
   if (!last && sign_) {
-    const double sign_m = std::hypot(sign_->x_m - percept.robot.x_m, sign_->y_m - percept.robot.y_m);
+    const double sign_m = distance_m(percept.robot, *sign_);
     to_cross_m_ = sign_m + parameters_.cross_least_m;
     if (sign_m <= parameters_.stop_before_m) return turn_to_direction(percept.robot, State::face);
   }

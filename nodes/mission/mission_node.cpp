@@ -116,11 +116,16 @@ class MissionNode final : public Node {
       place = report.place;
       percept.pedestrian = report.name;
     });
-    const PlanarPose at = compose(percept.robot, {place.y_m, -place.x_m, 0});  // x along the driving direction
-    percept.pedestrian_at = {at.x_m, at.y_m};
+    percept.pedestrian_at = seen_from(percept.robot, place.y_m, place.x_m);
     if (percept.pedestrian.empty() || bodies_.empty() || !bodies_.is_new()) return;
     if (const auto pointed = pointed_direction(*bodies_.newest(), place.x_m, place.y_m))
       percept.pointed_rad = wrapped(percept.robot.theta_rad + *pointed);
+  }
+
+  /// What is so far ahead of the robot, and to its right; its x axis here is the driving direction.
+  static navigation::Place seen_from(const PlanarPose& robot, double ahead_m, double right_m) {
+    const PlanarPose at = compose(robot, {ahead_m, -right_m, 0});
+    return {at.x_m, at.y_m};
   }
 
   /// The nearest sign that the newest image shows while a crossing is told.
@@ -132,8 +137,7 @@ class MissionNode final : public Node {
     for (const Point& p : signs_.newest()->points.items())
       if (distance(p) > 0 && (nearest == nullptr || distance(p) < distance(*nearest))) nearest = &p;
     if (nearest == nullptr) return std::nullopt;
-    const PlanarPose at = compose(robot, {nearest->z, -nearest->x, 0});  // x along the driving direction
-    return navigation::Place{at.x_m, at.y_m};
+    return seen_from(robot, nearest->z, nearest->x);
   }
 
   bool is_map(const Grid& grid) const {

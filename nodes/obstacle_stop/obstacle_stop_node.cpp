@@ -3,6 +3,7 @@
 #include <cmath>
 #include <numbers>
 #include <optional>
+#include <span>
 
 #include "nodes/obstacle_stop/protected_field.hpp"
 #include "nodes/obstacle_stop/stop_state.hpp"
@@ -67,25 +68,34 @@ class ObstacleStopNode final : public Node {
     const Drive present = present_drive();
     const bool stands = std::abs(present.speed_m_s) < kStands_m_s && std::abs(present.turn_rad_s) < kStands_rad_s;
     const std::optional<Drive> wanted = wanted_drive();
-    if (!wanted) return look(sweep, stamp_ns, present);
-    const FieldReading soon = look(sweep, stamp_ns, drive_before_stop(stands ? Drive{} : present, *wanted));
-    if (stands || soon.blocked || soon.blinded) return soon;
-    return look(sweep, stamp_ns, present);
+    const Drive soon = wanted ? drive_before_stop(stands ? Drive{} : present, *wanted) : present;
+    const Sweep moved_in = what_moved_in(
+        sweep, stamp_ns,
+        std::max(field_of(wide_footprint_, soon).reach_m(), field_of(wide_footprint_, present).reach_m()));
+    const FieldReading first = look(sweep, moved_in, soon);
+    if (!wanted || stands || first.blocked || first.blinded) return first;
+    return look(sweep, moved_in, present);
   }
 
-  FieldReading look(const Sweep& sweep, int64_t stamp_ns, const Drive& drive) {
-    const double time_s = stopping_time_s(drive, {deceleration_, turn_deceleration_, reaction_time_});
-    const ProtectedField field(footprint_, drive, time_s);
+  FieldReading look(const Sweep& sweep, const Sweep& moved_in, const Drive& drive) const {
+    const ProtectedField field = field_of(footprint_, drive);
     FieldReading reading = read_field(sweep, field, beams_min_);
     reading.blinded = has_geometry(sweep) && could_hide(sweep, field, hidden_width_);
-    if (reading.blocked || !has_geometry(sweep)) return reading;
-    const auto robot = robot_in_odometry(stamp_ns);
-    if (!robot) return reading;
-    const ProtectedField wide(wide_footprint_, drive, time_s);
-    Sweep moved_in = sweep;
-    moved_in.range_m = memory_.moved_in(sweep, *robot, stamp_ns, wide.reach_m());
-    const FieldReading moved = read_field(moved_in, wide, beams_min_);
+    if (reading.blocked) return reading;
+    const FieldReading moved = read_field(moved_in, field_of(wide_footprint_, drive), beams_min_);
     return {moved.blocked, moved.nearest_m, reading.blinded};
+  }
+
+  ProtectedField field_of(const Footprint& footprint, const Drive& drive) const {
+    return {footprint, drive, stopping_time_s(drive, {deceleration_, turn_deceleration_, reaction_time_})};
+  }
+
+  /// Its returns alone that moved in, the others without range; no beam at all where nobody can tell.
+  Sweep what_moved_in(Sweep sweep, int64_t stamp_ns, double reach_m) {
+    const auto robot = robot_in_odometry(stamp_ns);
+    sweep.range_m =
+        robot && has_geometry(sweep) ? memory_.moved_in(sweep, *robot, stamp_ns, reach_m) : std::span<const float>();
+    return sweep;
   }
 
   void remember(const Sweep& sweep, int64_t stamp_ns) {
