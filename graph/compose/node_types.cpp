@@ -9,6 +9,7 @@ void register_mapping_3d(NodeTypes& types);
 void register_object_detection(NodeTypes& types);
 void register_ground_map(NodeTypes& types);
 void register_picture(NodeTypes& types);
+void register_moments(NodeTypes& types);
 void register_obstacle_stop(NodeTypes& types);
 void register_semantic(NodeTypes& types);
 void register_semantic_map(NodeTypes& types);
@@ -41,6 +42,7 @@ NodeTypes node_types() {
   register_object_detection(types);
   register_ground_map(types);
   register_picture(types);
+  register_moments(types);
   register_obstacle_stop(types);
   register_semantic(types);
   register_semantic_map(types);

@@ -58,6 +58,16 @@ constexpr std::array<Recipe, kMaterials> kRecipes{{
      {{{165, 35, 130}, {200, 190, 40}, {150, 60, 225}}},
      64},
     {"asphalt", 512, 250, {92, 88, 86}, 26, 4, 0},
+    {"orange_stripes",
+     256,
+     300,
+     {},
+     20,
+     4,
+     0,
+     Paint::colourful,
+     {{{25, 110, 225}, {170, 160, 30}, {110, 25, 70}}},
+     64},
 }};
 
 const std::array<double, 3>& colour_of_row(const Recipe& recipe, int row) {
@@ -211,7 +221,7 @@ bool material_from(std::string_view name, Material& material) {
 
 std::string_view material_names() {
   return "sky, floor, plaster, ceiling, wood, cardboard, poster, cloth, skin, red_stripes, blue_stripes, "
-         "green_stripes, violet_stripes, asphalt";
+         "green_stripes, violet_stripes, asphalt, orange_stripes";
 }
 
 tl::expected<Texture, std::string> load_picture(const std::filesystem::path& file, double edge_m) {

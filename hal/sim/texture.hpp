@@ -40,9 +40,10 @@ enum class Material : uint8_t {
   blue_stripes,
   green_stripes,
   violet_stripes,
-  asphalt
+  asphalt,
+  orange_stripes
 };
-constexpr int kMaterials = 14;
+constexpr int kMaterials = 15;
 /// "wood" and the like; false if the name is unknown.
 bool material_from(std::string_view name, Material& material);
 std::string_view material_names();

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <cstring>
 #include <optional>
 #include <vector>
 
@@ -49,7 +50,7 @@ class ObjectLocatorNode final : public Node {
     } catch (const object_detection::DatabaseError& error) {
       throw SetupError(error.what());
     }
-    locator_.emplace(disparity_.capacity().pixels(), semantic::BoxLocatorParameters{share_, valid_min_});
+    locator_.emplace(disparity_.capacity().pixels(), semantic::BoxLocatorParameters{share_, valid_min_, agree_});
     reports_.reserve({0, 0, 1, detections_.capacity().count});
   }
 
@@ -105,10 +106,19 @@ class ObjectLocatorNode final : public Node {
     place.x_m += half_depth_ * right / range;
     place.y_m += half_depth_ * ahead / range;
     const Class& known = classes_[static_cast<size_t>(box.class_id)];
-    if (!out.names.push_back(known.name)) return;
+    if (is_there(known.name, place, out) || !out.names.push_back(known.name)) return;
     out.places.push_back({static_cast<float>(place.x_m), static_cast<float>(place.y_m), static_cast<float>(place.z_m),
                           0, box.score, static_cast<float>(known.attributes.size())});
     for (const ObjectAttribute& attribute : known.attributes) out.attributes.push_back(attribute);
+  }
+
+  /// An object of that type, of a better box (they come best first), at that place.
+  bool is_there(const ObjectName& name, const Position& place, const ObjectReports& reported) const {
+    for (uint32_t i = 0; i < reported.names.size; ++i)
+      if (std::strcmp(reported.names[i].type, name.type) == 0 &&
+          std::hypot(reported.places[i].x_m - place.x_m, reported.places[i].y_m - place.y_m) < apart_)
+        return true;
+    return false;
   }
 
   static constexpr int64_t kFarthest_ns = 250'000'000;  ///< from an image to its disparities (algorithm reference 14.3)
@@ -124,9 +134,19 @@ class ObjectLocatorNode final : public Node {
                        {0.1, 1.0}, "1",     "of a box in each direction, about its middle, that counts"};
   Param<double> valid_min_{this,       "valid_min", semantic::BoxLocatorParameters{}.valid_min,
                            {0.0, 1.0}, "1",         "of the pixels there must have a disparity"};
+  Param<double> agree_{
+      this,
+      "agree",
+      semantic::BoxLocatorParameters{}.agree,
+      {0.0, 1.0},
+      "1",
+      "of the disparities there: the nearest that are so many near one depth are the object's; 0: the median of all"};
   Param<double> range_min_{this,        "range_min", 0.0,
                            {0.0, 50.0}, "m",         "nor are nearer ones: what is larger than its box"};
   Param<double> range_max_{this, "range_max", 5.0, {0.5, 50.0}, "m", "farther objects are not reported"};
+  Param<double> apart_{this, "apart",
+                       0.0,  {0.0, 5.0},
+                       "m",  "boxes of one type that are nearer to each other are of one object: the best is reported"};
   Param<double> half_depth_{this,       "half_depth", 0.0,
                             {0.0, 2.0}, "m",          "how far behind its front an object's middle lies"};
 

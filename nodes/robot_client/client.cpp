@@ -164,6 +164,8 @@ void Client::begin_goal() {
     goals_.push_back(*goal);
   }
   plans_ = 0;
+  shut_since_ns_.reset();
+  next_plan_ns_ = now_ns_;
   fire(Event::plan_task);
   begin_plan();
 }
@@ -178,17 +180,34 @@ void Client::begin_plan() {
   }
 }
 
+/// True while it may still open: the plan is then looked for again, once a second, and the robot turns about, since the
+/// map keeps whoever has gone where nobody looks any more.
+bool Client::waits_for_way(const std::string& why) {
+  if (!shut_since_ns_) {
+    shut_since_ns_ = now_ns_;
+    if (parameters_.patience_s > 0) say(why + "; I look around and wait");
+    if (parameters_.patience_s > 0 && driving_.planner() != nullptr) driving_.rotate(2 * std::numbers::pi);
+  }
+  if (static_cast<double>(now_ns_ - *shut_since_ns_) >= parameters_.patience_s * 1e9) return false;
+  next_plan_ns_ = now_ns_ + 1'000'000'000;
+  return deliberation_.begin(goals_, robot_, costs_).has_value();
+}
+
 void Client::think(const planner::Effort& effort) {
+  if (now_ns_ < next_plan_ns_) return fire(Event::wait);
   if (!deliberation_.go_on(driving_.planner(), effort)) return fire(Event::wait);
   const planner::Plan& plan = deliberation_.plan();
   if (!plan.exists() || plan.steps.empty()) {
+    const std::string far = plan.exists() ? "" : deliberation_.out_of_reach();
+    if (!far.empty() && waits_for_way(far)) return fire(Event::wait);
     fire(Event::no_plan);
     if (plan.exists()) return end(records_.empty() ? "it is so already" : "done");
     std::string why =
         plan.verdict == planner::Verdict::none ? "no plan leads there" : "no plan was found in the time that was left";
-    if (const std::string far = deliberation_.out_of_reach(); !far.empty()) why += "; " + far;
+    if (!far.empty()) why += "; " + far;
     return end(why);
   }
+  shut_since_ns_.reset();
   fire(Event::plan_found);
   step_ = 0;
   expected_.assign(deliberation_.domain().variables.size(), 0);

@@ -12,6 +12,7 @@ struct ClientParameters {
   DrivingParameters driving;
   DeliberationParameters deliberation;
   int plans = 3;           ///< for one goal, until it is given up
+  double patience_s = 20;  ///< while no way leads to the objects: somebody may stand in it who goes on
   double settle_s = 3;     ///< after an action, until what it changed must be seen
   double answer_s = 3;     ///< until somebody must have taken an action up
   double endless_s = 120;  ///< an action beyond its time by so much has no end
@@ -93,6 +94,7 @@ class Client {
   void begin_goal();
   void think(const planner::Effort& effort);
   void begin_plan();
+  bool waits_for_way(const std::string& why);
   void plan_again(std::string_view why);
   void execute();
   void drive();
@@ -128,6 +130,8 @@ class Client {
   int64_t now_ns_ = 0;
   double time_s_ = 0;  ///< that the robot was not made to stand
   bool halted_ = false, news_ = false;
+  std::optional<int64_t> shut_since_ns_;  ///< since when no way leads to the objects of the plan that is looked for
+  int64_t next_plan_ns_ = 0;              ///< then the next one is looked for
 
   std::optional<Task> task_;
   std::string task_text_;

@@ -47,6 +47,7 @@ class RobotClientNode final : public Node {
     p.deliberation.pilot = p.driving.pilot;
     p.deliberation.reach_m = reach_;
     p.plans = plans_;
+    p.patience_s = patience_;
     p.settle_s = settle_;
     client_.emplace(*knowledge_, p);
     expansions_ = static_cast<size_t>(expansions_a_job_());
@@ -268,6 +269,9 @@ class RobotClientNode final : public Node {
   Param<double> speed_{this, "speed", 0.8, {0.05, 3.0}, "m/s", "largest speed"};
   Param<double> turn_{this, "turn", 0.8, {0.05, 3.0}, "rad/s", "largest turn rate"};
   Param<int> plans_{this, "plans", 3, {1, 100}, "", "for one goal, until it is given up"};
+  Param<double> patience_{this, "patience",
+                          20.0, {0.0, 3600.0},
+                          "s",  "while no way leads to an object: the plan is looked for again once a second"};
   Param<double> settle_{this, "settle", 3.0, {0.0, 60.0}, "s", "after an action, until what it changed must be seen"};
   Param<double> explore_far_{this, "explore_far", 8.0, {1.0, 1000.0}, "m", "from where exploring began"};
   Param<double> odometry_age_{this, "odometry_age", 0.5, {0.05, 10.0}, "s", "an older pose is none"};

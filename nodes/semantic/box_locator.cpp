@@ -8,6 +8,7 @@ namespace takt::semantic {
 namespace {
 
 constexpr int kFractions = 64, kFractionOffset = 32;  // DisparityMap::fraction
+constexpr double kNear = 0.06;                        // of a disparity: those of one depth
 
 struct Range {
   int begin, end;
@@ -25,6 +26,21 @@ BoxLocator::BoxLocator(size_t most_pixels, const BoxLocatorParameters& parameter
   disparities_.reserve(most_pixels);
 }
 
+int32_t BoxLocator::object_disparity() {
+  const size_t count = disparities_.size();
+  if (parameters_.agree > 0) {
+    std::sort(disparities_.begin(), disparities_.end());
+    const size_t wanted = std::max<size_t>(1, static_cast<size_t>(parameters_.agree * static_cast<double>(count)));
+    for (size_t last = count; last >= wanted; --last) {
+      const size_t first = last - wanted;
+      if (disparities_[first] >= (1 - kNear) * disparities_[last - 1]) return disparities_[first + wanted / 2];
+    }
+  }
+  const auto median = disparities_.begin() + static_cast<ptrdiff_t>(count / 2);
+  std::nth_element(disparities_.begin(), median, disparities_.end());
+  return *median;
+}
+
 std::optional<mapping_3d::Position> BoxLocator::locate(double x_px, double y_px, double width_px, double height_px,
                                                        const DisparityView& map) {
   const Range columns = middle_of(x_px, width_px, parameters_.share, map.disparity.width),
@@ -40,11 +56,10 @@ std::optional<mapping_3d::Position> BoxLocator::locate(double x_px, double y_px,
   const auto pixels = static_cast<double>(columns.end - columns.begin) * (rows.end - rows.begin);
   if (static_cast<double>(disparities_.size()) < parameters_.valid_min * pixels || disparities_.empty())
     return std::nullopt;
-  const auto median = disparities_.begin() + static_cast<ptrdiff_t>(disparities_.size() / 2);
-  std::nth_element(disparities_.begin(), median, disparities_.end());
-  if (*median <= 0) return std::nullopt;
+  const int32_t disparity = object_disparity();
+  if (disparity <= 0) return std::nullopt;
   const CameraModel& c = map.camera;
-  const double z_m = c.focal_px * c.baseline_m * kFractions / *median;
+  const double z_m = c.focal_px * c.baseline_m * kFractions / disparity;
   return mapping_3d::Position{(x_px + width_px / 2 - c.cu_px) * z_m / c.focal_px,
                               (y_px + height_px / 2 - c.cv_px) * z_m / c.focal_px, z_m};
 }

@@ -164,7 +164,7 @@ class Reader {
       for (const auto& item : attributes) add(item, text(item), 1);
     else
       each(at, "attributes", [&](const std::string& attribute, const YAML::Node& value) {
-        if (const auto weight = number(value, "", 1e-6, 1e6)) add(value, attribute, *weight);
+        if (const auto weight = number(value, "", 0, 1e6)) add(value, attribute, *weight);
       });
   }
 

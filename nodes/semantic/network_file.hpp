@@ -8,7 +8,7 @@
 //     colour: {kind: colour, identity: true}                  # objects that differ much in it are two
 //     closed: {kind: boolean}
 //   types:
-//     cup:    {attributes: {level: 1, colour: 2}}             # with their weights in comparisons
+//     cup:    {attributes: {level: 1, colour: 2}}             # with their weights in comparisons, 0 or more
 //     bottle: {attributes: [level, closed]}                   # each 1
 //   actions:
 //     fill:

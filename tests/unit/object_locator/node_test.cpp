@@ -117,6 +117,23 @@ TEST_CASE("object_locator: type, attributes, score and place of each detection, 
   CHECK(f.seen().attributes[1].value == std::string_view("full"));
 }
 
+TEST_CASE("object_locator: of boxes of one type at one place the best is reported, if asked for") {
+  for (const double apart_m : {0.0, 0.3}) {
+    Fixture f("object cup level=empty\nview a.png\nobject cup level=full\nview b.png\nobject jug\nview c.png\n");
+    test::set(*f.node, "apart", apart_m);
+    f.set_up();
+    test::latch(f.port("disparity"), f.wall, 0, 1);
+    f.box(1, 79.5, 59.5);  // a pixel is 2.5 cm there
+    f.box(0, 85.5, 59.5);  // the same one in a worse box
+    f.box(2, 79.5, 59.5);  // another type
+    f.box(0, 99.5, 59.5);  // another one, 0.5 m beside
+    REQUIRE(f.job(0));
+    REQUIRE(f.seen().names.size == (apart_m > 0 ? 3 : 4));
+    CHECK(f.seen().attributes[0].value == std::string_view("full"));
+    CHECK(f.seen().names[apart_m > 0 ? 1 : 2].type == std::string_view("jug"));
+  }
+}
+
 TEST_CASE("object_locator: the disparities nearest in time count, and none that are 0.25 s away") {
   Fixture f;
   f.set_up();

@@ -393,6 +393,18 @@ TEST_CASE("on a grid, too, goals are reached, and objects behind walls are known
   CHECK(shut.driven_m == 0);
 }
 
+TEST_CASE("a goal whose objects no way leads to is waited for, and reached once there is one") {
+  Stage stage(kitchen("[3.5m, -1m]"), {}, 1600);
+  build_room(stage, false, false);
+  int steps = 0;
+  stage.on_step = [&] {
+    if (++steps == 80) build_room(stage, true, false);
+  };
+  stage.run("goal cup_1.level=full");
+  CHECK(stage.has_said("; I look around and wait"));
+  CHECK(stage.done == "fill cup_1 bottle_2");
+}
+
 TEST_CASE("exploring ends when nothing unknown that can be got to is near") {
   Stage stage(kitchen("[3.5m, -1m]"), {}, 1600);
   build_room(stage, true, false);

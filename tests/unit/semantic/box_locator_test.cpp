@@ -60,6 +60,25 @@ TEST_CASE("a box 3 m away: within 10 cm with 40 % of its disparities wrong, with
   MESSAGE("largest error " << worst << " m");
 }
 
+TEST_CASE("a box that shows more of the wall than of the thing: where enough agree on a nearer depth, that is the thing's") {
+  const auto off_m = [](double agree, double outliers) {
+    BoxLocator locator(640 * 480, {.agree = agree});
+    double worst = 0;
+    for (uint32_t seed = 1; seed <= 20; ++seed) {
+      Scene scene(seed);
+      scene.draw(3, outliers, 0.2);
+      const auto p = locator.locate(330, 205, 70, 110, scene.view());  // 16 of the 43 columns of its middle
+      REQUIRE(p);
+      worst = std::max(worst, std::abs(p->z_m - 3));
+    }
+    return worst;
+  };
+  CHECK(off_m(0.15, 0) < 0.03);
+  CHECK(off_m(0.15, 0.4) < 0.10);
+  CHECK(off_m(0, 0.4) > 0.10);    // the median is the wall
+  CHECK(off_m(0.9, 0.4) > 0.10);  // nobody agrees: the median
+}
+
 TEST_CASE("a box with too few disparities, of nothing near, or outside of the image has no place") {
   BoxLocator locator(640 * 480, {});
   Scene scene(1);

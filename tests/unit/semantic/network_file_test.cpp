@@ -4,6 +4,7 @@
 #include <doctest/doctest.h>
 
 #include "nodes/semantic/network_text.hpp"
+#include "nodes/semantic/similarity.hpp"
 
 using namespace takt::semantic;
 
@@ -115,4 +116,20 @@ TEST_CASE("a network as DOT and as GraphML: every node and every link once") {
         std::string::npos);
   CHECK(graphml.find("<edge source=\"n1\" target=\"n2\"><data key=\"relation\">is of type</data></edge>") !=
         std::string::npos);
+}
+
+TEST_CASE("an attribute of the weight 0 tells no two objects apart") {
+  SemanticMap map(small());
+  REQUIRE(
+      parse_network("takt_network: 1\nattributes: {level: {kind: enumerated, words: [empty, full]}}\n"
+                    "types: {cup: {attributes: {level: 0}}}\n"
+                    "objects: {cup_1: {type: cup, at: [1m, 2m], states: {level: empty}}}\n",
+                    "n.yaml", map));
+  const State full{map.network().find("level"), Word{1}};
+  Similarity similarity(map, {});
+  const Comparison same = similarity.compare(
+      {.type = map.network().find("cup"), .x_m = 1, .y_m = 2, .states = {&full, 1}}, map.network().find("cup_1"));
+  CHECK(same.p == 1);
+  CHECK(mistakes("takt_network: 1\nattributes: {level: {kind: boolean}}\ntypes: {cup: {attributes: {level: -1}}}\n")
+            .find("n.yaml:3") != std::string::npos);
 }
