@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <numbers>
 
 #include "nodes/mission/pointing.hpp"
 
@@ -12,7 +13,8 @@ namespace {
 
 constexpr double kStands_m_s = 0.02, kGotOn_m = 0.3;
 
-constexpr double kLooksThere_rad = 0.35, kLookOn_rad = 1.0;
+constexpr double kLooksThere_rad = 0.35, kLookOn_rad = 1.0, kAllAround_rad = 2 * std::numbers::pi;
+constexpr std::array kLeaderLooks_rad{0.7, -1.4, 2.1, -2.8, 1.4};  // left, right, farther left, right, ahead
 
 constexpr std::array<std::string_view, 11> kStates{"seek",  "look", "ask",    "back", "read",  "turn",
                                                    "drive", "face", "follow", "done", "failed"};
@@ -85,7 +87,8 @@ void Mission::step(const Percept& percept) {
     case State::drive: return drive(percept, over);
     case State::face:
       if (!over) return;
-      began_ = percept.robot;
+      if (leader_looks_ == 0) began_ = percept.robot;
+      leader_ns_ = now_ns_;
       return enter(State::follow);
     case State::follow: return follow(percept);
     case State::done:
@@ -119,8 +122,8 @@ void Mission::read(const Percept& percept) {
   }
   if (since_s(entered_ns_) < parameters_.read_within_s) return;
   if (++asked_ >= parameters_.asking) return fail("nobody points the way");
-  // From elsewhere he may be seen better, and the ground on the way to him.
-  tell("rotate {:.3f}", kLookOn_rad);
+  // The memory of what the ground looks like learns from what lies before the robot: all around there is more of it.
+  tell("rotate {:.3f}", kAllAround_rad);
   enter(State::look);
 }
 
@@ -141,7 +144,11 @@ void Mission::drive(const Percept& percept, bool over) {
   if (!last && sign_) {
     const double sign_m = distance_m(percept.robot, *sign_);
     to_cross_m_ = sign_m + parameters_.cross_least_m;
-    if (sign_m <= parameters_.stop_before_m) return turn_to_direction(percept.robot, State::face);
+    if (sign_m <= parameters_.stop_before_m) {
+      waiting_ns_ = now_ns_;
+      leader_looks_ = 0;
+      return turn_to_direction(percept.robot, State::face);
+    }
   }
   const double along = (percept.robot.x_m - began_.x_m) * std::cos(*direction_rad_) +
                        (percept.robot.y_m - began_.y_m) * std::sin(*direction_rad_);
@@ -164,7 +171,12 @@ void Mission::follow(const Percept& percept) {
     sign_.reset();
     return turn_to_direction(percept.robot, State::turn);  // who led it may have turned aside
   }
-  if (since_s(entered_ns_) > parameters_.follow_within_s) fail("nobody leads across");
+  if (since_s(waiting_ns_) > parameters_.follow_within_s) return fail("nobody leads across");
+  if (percept.leader || standing_ns_ < 0) leader_ns_ = now_ns_;
+  if (since_s(leader_ns_) <= parameters_.leader_after_s) return;
+  // Who waits beside the robot, or has gone past it, is beyond the edge of its view.
+  tell("rotate {:.3f}", kLeaderLooks_rad[leader_looks_++ % kLeaderLooks_rad.size()]);
+  enter(State::face);
 }
 
 }  // namespace takt::mission

@@ -27,6 +27,7 @@ struct MissionParameters {
   double stop_before_m = 3.5;  ///< so far from the sign of a crossing the robot waits
   double cross_least_m = 3;    ///< no crossing is narrower; behind its sign
   double stand_s = 3;          ///< whoever is followed so far and stands so long has led across
+  double leader_after_s = 4;  ///< standing without whoever leads in sight, the robot looks elsewhere
   double follow_within_s = 120;
   double patience_s = 30;  ///< without getting on along the direction
   int crossings = 1;       ///< on the way
@@ -44,6 +45,7 @@ struct Percept {
   navigation::Place pedestrian_at;                  ///< of that one
   std::optional<double> pointed_rad;                ///< where he points, of a body measured since the last step
   std::optional<navigation::Place> sign;            ///< the nearest one of a crossing, measured since the last step
+  bool leader = true;                               ///< whoever is followed is in sight, or nobody can tell
   const navigation::OccupancyView* grid = nullptr;  ///< of the ground; null: none yet
   uint32_t over = 0;                                ///< number of the newest task that the robot client has ended
 };
@@ -104,6 +106,9 @@ class Mission {
   double to_cross_m_ = 0;                  ///< from where following began to beyond the crossing, at least
   int64_t got_on_ns_ = 0;                  ///< when it was
   int64_t standing_ns_ = -1;               ///< since when; -1: it drives
+  int64_t waiting_ns_ = 0;                 ///< since when for whoever leads across
+  int64_t leader_ns_ = 0;                  ///< when he was seen last, or a look for him began
+  size_t leader_looks_ = 0;                ///< since it waits
 };
 
 }  // namespace takt::mission

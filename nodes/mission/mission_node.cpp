@@ -92,6 +92,7 @@ class MissionNode final : public Node {
     percept.speed_m_s = odometry.speed_m_s;
     look_for_pedestrian(percept);
     percept.sign = sign(percept.robot);
+    percept.leader = !leader_.connected() || (!leader_.empty() && !leader_.stale());
     if (const RobotTask* taken = taken_.newest(); taken != nullptr && taken->text.size == 0)
       percept.over = taken->number;
     navigation::OccupancyView view;
@@ -170,6 +171,9 @@ class MissionNode final : public Node {
   Input<BodyPoses> bodies_{this, "bodies", "where people point"};
   Input<DigitalState> crossing_{this, "crossing", "line 0: a crossing is near, as traffic_signs tells"};
   Input<PointCloud> signs_{this, "signs", "where its signs are, as traffic_signs tells"};
+  Input<Pose> leader_{this, "leader",
+                      "who is followed, as person_tracking tells while it sees him; give the edge a max_age",
+                      Need::optional};
   Input<Grid> grid_{this, "grid", "of the ground: what is occupied is no pavement; axes of the map frame"};
   Input<RobotTask> taken_{this, "taken", "of the robot client: its newest task, without text when it is over"};
   Output<RobotTask> task_{this, "task", "for the robot client, with every job"};

@@ -148,14 +148,14 @@ TEST_CASE("who cannot be seen is looked for where he was seen last, then round a
   town.obey(), town.step();
   REQUIRE(town.mission.state() == State::read);
   town.step(10);
-  CHECK(town.told() == "rotate 1.000");
+  CHECK(town.told() == "rotate 6.283");
   town.obey(), town.step();
   REQUIRE(town.mission.state() == State::seek);
   town.step(1.8);
   CHECK(town.mission.state() == State::seek);
   town.step(0.3);
   CHECK(town.mission.state() == State::look);
-  CHECK(town.told() == "rotate 0.571");
+  CHECK(town.told() == "rotate 1.571");
   town.obey(), town.step();
   CHECK(town.mission.state() == State::seek);
   town.step(2.1);
@@ -185,7 +185,7 @@ TEST_CASE("who does not point is asked again, three times") {
   for (int i = 0; i < 3; ++i) {
     if (i > 0) {
       CHECK(town.mission.state() == State::look);
-      CHECK(town.told() == "rotate 1.000");
+      CHECK(town.told() == "rotate 6.283");
       town.obey(), town.step();
     }
     town.step();
@@ -224,6 +224,37 @@ TEST_CASE("where no free ground leads on the mission fails; nobody leads across:
   CHECK(lonely.mission.state() == State::follow);
   lonely.step(2);
   CHECK(lonely.mission.trouble() == "nobody leads across");
+}
+
+TEST_CASE("whoever leads across is looked for beside the robot, while he is not in sight") {
+  Town town;
+  town.ask_the_way(0);
+  town.obey(), town.step();
+  town.see_sign(2), town.step();
+  town.obey(), town.step();
+  REQUIRE(town.mission.state() == State::follow);
+  town.step(3), town.step(3);
+  CHECK(town.mission.state() == State::follow);  // he is there
+  town.percept.leader = false;
+  town.step(3.9);
+  CHECK(town.mission.state() == State::follow);
+  const PlanarPose began = town.percept.robot;
+  for (const char* look :
+       {"rotate 0.700", "rotate -1.400", "rotate 2.100", "rotate -2.800", "rotate 1.400", "rotate 0.700"}) {
+    town.step(0.2);
+    CHECK(town.mission.state() == State::face);
+    CHECK(town.told() == look);
+    town.obey(), town.step();
+    CHECK(town.mission.state() == State::follow);
+    town.step(4);
+  }
+  town.percept.speed_m_s = 0.6;  // under way person_tracking itself looks where he went
+  town.step(20);
+  CHECK(town.mission.state() == State::follow);
+  town.percept.robot = compose(began, {5.2, 0, 0});  // the looks did not begin the way anew
+  town.percept.speed_m_s = 0, town.step();
+  town.step(3.1);
+  CHECK(town.mission.crossed() == 1);
 }
 
 TEST_CASE("steps of a mission allocate nothing") {
