@@ -58,7 +58,7 @@ constexpr std::array<Recipe, kMaterials> kRecipes{{
      {{{165, 35, 130}, {200, 190, 40}, {150, 60, 225}}},
      64},
     {"asphalt", 512, 250, {92, 88, 86}, 26, 4, 0},
-    {"orange_stripes",
+    {"lime_stripes",
      256,
      300,
      {},
@@ -66,7 +66,7 @@ constexpr std::array<Recipe, kMaterials> kRecipes{{
      4,
      0,
      Paint::colourful,
-     {{{25, 110, 225}, {170, 160, 30}, {110, 25, 70}}},
+     {{{35, 205, 160}, {25, 70, 140}, {45, 40, 40}}},
      64},
 }};
 
@@ -221,7 +221,7 @@ bool material_from(std::string_view name, Material& material) {
 
 std::string_view material_names() {
   return "sky, floor, plaster, ceiling, wood, cardboard, poster, cloth, skin, red_stripes, blue_stripes, "
-         "green_stripes, violet_stripes, asphalt, orange_stripes";
+         "green_stripes, violet_stripes, asphalt, lime_stripes";
 }
 
 tl::expected<Texture, std::string> load_picture(const std::filesystem::path& file, double edge_m) {

@@ -41,7 +41,7 @@ enum class Material : uint8_t {
   green_stripes,
   violet_stripes,
   asphalt,
-  orange_stripes
+  lime_stripes
 };
 constexpr int kMaterials = 15;
 /// "wood" and the like; false if the name is unknown.
