@@ -1,15 +1,43 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a job copies for the end of the run. Memory is taken once, in setup; keeping allocates nothing.
 #pragma once
+#include <algorithm>
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "nodes/cloud/cloud.hpp"
 #include "nodes/picture/draw.hpp"
 #include "rt/msg/image_view.hpp"
+#include "rt/node.hpp"
 
 namespace takt::picture {
+
+/// Place in a port of the message with that stamp, if it is latched.
+inline std::optional<size_t> with_stamp(const InputPort& port, int64_t stamp_ns) {
+  for (size_t i = port.size(); i-- > 0;)
+    if (port.stamp_ns(i) == stamp_ns) return i;
+  return std::nullopt;
+}
+
+/// The newest image whose detections are latched with it, else the newest without any: boxes are never drawn on another
+/// image than theirs. `pair` must hold a message.
+struct ImageWithBoxes {
+  size_t image;
+  std::optional<size_t> boxes;
+};
+inline ImageWithBoxes newest_with_boxes(const InputPort& pair, const InputPort& detections) {
+  for (size_t i = pair.size(); i-- > 0;)
+    if (const auto boxes = with_stamp(detections, pair.stamp_ns(i))) return {i, boxes};
+  return {pair.size() - 1, std::nullopt};
+}
+
+/// Into the memory that there is.
+inline void keep_boxes(const Detections& detections, std::vector<Detection>& into) {
+  const auto found = detections.boxes.items();
+  into.assign(found.begin(), found.begin() + static_cast<ptrdiff_t>(std::min(found.size(), into.capacity())));
+}
 
 /// The last array of an image, a map or a grid. One thread at a time.
 template <class T>

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cstdio>
-#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -16,6 +15,7 @@ namespace takt {
 namespace {
 
 using namespace picture;
+using semantic::text_in;
 
 /// What stands in a page must not be read as its language.
 std::string as_text(std::string_view words) {
@@ -80,17 +80,25 @@ class MomentsNode final : public Node {
       const auto names = reports.names.items();
       const auto attributes = reports.attributes.items();
       if (same(names, names_) && same(attributes, attributes_)) return false;
-      names_.assign(names.begin(), names.begin() + static_cast<ptrdiff_t>(std::min(names.size(), names_.capacity())));
-      attributes_.assign(attributes.begin(), attributes.begin() + static_cast<ptrdiff_t>(std::min(
-                                                                      attributes.size(), attributes_.capacity())));
+      copy(names, names_);
+      copy(attributes, attributes_);
       return true;
     }
 
    private:
+    static bool equal(const ObjectName& a, const ObjectName& b) {
+      return text_in(a.name) == text_in(b.name) && text_in(a.type) == text_in(b.type);
+    }
+    static bool equal(const ObjectAttribute& a, const ObjectAttribute& b) {
+      return text_in(a.name) == text_in(b.name) && text_in(a.value) == text_in(b.value);
+    }
     template <class T>
     static bool same(std::span<const T> a, const std::vector<T>& b) {
-      return std::equal(a.begin(), a.end(), b.begin(), b.end(),
-                        [](const T& x, const T& y) { return std::memcmp(&x, &y, sizeof(T)) == 0; });
+      return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const T& x, const T& y) { return equal(x, y); });
+    }
+    template <class T>
+    static void copy(std::span<const T> from, std::vector<T>& to) {
+      to.assign(from.begin(), from.begin() + static_cast<ptrdiff_t>(std::min(from.size(), to.capacity())));
     }
     std::vector<ObjectName> names_;
     std::vector<ObjectAttribute> attributes_;
@@ -131,18 +139,12 @@ class MomentsNode final : public Node {
     keep_left(into);
   }
 
-  /// The newest image that has its boxes with it, else the newest.
   void keep_left(Moment& into) const {
     if (pair_.empty()) return;
-    size_t image = pair_.size() - 1;
-    std::span<const Detection> boxes;
-    for (size_t i = pair_.size(); i-- > 0 && boxes.empty();)
-      for (size_t k = 0; k < detections_.size(); ++k)
-        if (detections_.stamp_ns(k) == pair_.stamp_ns(i)) image = i, boxes = detections_[k].boxes.items();
-    const StereoPair& pair = pair_[image];
-    if (!into.left.keep(pair.left.items(), pair.width, pair.height, pair.channels)) return;
-    into.boxes.assign(boxes.begin(),
-                      boxes.begin() + static_cast<ptrdiff_t>(std::min(boxes.size(), into.boxes.capacity())));
+    const ImageWithBoxes found = newest_with_boxes(pair_, detections_);
+    const StereoPair& pair = pair_[found.image];
+    if (into.left.keep(pair.left.items(), pair.width, pair.height, pair.channels) && found.boxes)
+      keep_boxes(detections_[*found.boxes], into.boxes);
   }
 
   void write(size_t i, std::ofstream& page) const {

@@ -83,32 +83,18 @@ class PictureNode final : public Node {
     return port.connected() ? port.capacity().pixels() * port.capacity().channels : 0;
   }
 
-  /// The message with that stamp, if it is latched.
-  static std::optional<size_t> find(const InputPort& port, int64_t stamp_ns) {
-    for (size_t i = port.size(); i-- > 0;)
-      if (port.stamp_ns(i) == stamp_ns) return i;
-    return std::nullopt;
-  }
-
-  /// The newest image whose detections are latched with it, else the newest: boxes are never drawn on another image
-  /// than theirs.
   void keep_left() {
     if (!pair_.is_new()) return;
-    size_t image = pair_.size() - 1;
-    std::optional<size_t> boxes;
-    for (size_t i = pair_.size(); i-- > 0 && !boxes;)
-      if ((boxes = find(detections_, pair_.stamp_ns(i)))) image = i;
-    if (!keep(pair_[image], left_)) return;
+    const ImageWithBoxes found = newest_with_boxes(pair_, detections_);
+    if (!keep(pair_[found.image], left_)) return;
     boxes_.clear();
-    if (!boxes) return;
-    const auto found = detections_[*boxes].boxes.items();
-    boxes_.assign(found.begin(), found.begin() + static_cast<ptrdiff_t>(std::min(found.size(), boxes_.capacity())));
+    if (found.boxes) keep_boxes(detections_[*found.boxes], boxes_);
   }
 
   /// The newest mask whose image is latched with it.
   void keep_ground_mask() {
     for (size_t i = mask_.size(); i-- > 0 && mask_.stamp_ns(i) > mask_stamp_ns_;) {
-      const auto image = find(ground_pair_, mask_.stamp_ns(i));
+      const auto image = with_stamp(ground_pair_, mask_.stamp_ns(i));
       if (!image || ground_pair_[*image].width != mask_[i].width || ground_pair_[*image].height != mask_[i].height ||
           mask_[i].channels != 1)
         continue;
