@@ -41,6 +41,7 @@ class MomentsNode final : public Node {
 
   void run(Job& job) override {
     const ObjectReports* reports = reports_.newest();
+    if (reports != nullptr && reports->in_map == 0) reports = nullptr;
     const bool spoke = speech_.newest() != nullptr && speech_.is_new();
     const bool changed = reports != nullptr && reports_.is_new() && before_.take(*reports);
     if (!spoke && !changed) return;
@@ -59,8 +60,7 @@ class MomentsNode final : public Node {
     page << "<!doctype html><meta charset=\"utf-8\"><title>what the robot knew</title>\n"
             "<style>body{font:15px sans-serif;margin:2em}img{max-width:100%;border:1px solid #ccc}</style>\n"
             "<h1>What the robot knew</h1>\n<p>What its camera saw, its map, and the semantic network, whenever the "
-            "robot said "
-            "something or one of the objects had changed.</p>\n";
+            "robot said something or one of the objects had changed.</p>\n";
     for (size_t i = 0; i < used_; ++i) write(i, page);
     if (left_out_ > 0)
       page << "<p>" << left_out_ << " more are not shown: the node keeps the first " << moments_.size()

@@ -183,10 +183,11 @@ void Client::begin_plan() {
 /// True while it may still open: the plan is then looked for again, once a second, and the robot turns about, since the
 /// map keeps whoever has gone where nobody looks any more.
 bool Client::waits_for_way(const std::string& why) {
+  if (parameters_.patience_s <= 0) return false;
   if (!shut_since_ns_) {
     shut_since_ns_ = now_ns_;
-    if (parameters_.patience_s > 0) say(why + "; I look around and wait");
-    if (parameters_.patience_s > 0 && driving_.planner() != nullptr) driving_.rotate(2 * std::numbers::pi);
+    say(why + "; I look around and wait");
+    if (driving_.planner() != nullptr) driving_.rotate(2 * std::numbers::pi);
   }
   if (static_cast<double>(now_ns_ - *shut_since_ns_) >= parameters_.patience_s * 1e9) return false;
   next_plan_ns_ = now_ns_ + 1'000'000'000;
