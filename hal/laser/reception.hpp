@@ -9,8 +9,12 @@ namespace takt {
 template <class Parser>
 class Reception {
  public:
-  /// A frame whose next byte does not come within `gap_ns` is given up.
-  Reception(Parser parser, int64_t gap_ns) : parser_(std::move(parser)), gap_ns_(gap_ns) {}
+  /// A frame that has begun is given up if nothing more comes for so long. No device pauses for as long as that within
+  /// a frame; a host that is held up (its receiving thread, or the kernel's worker that hands bytes on) seems to, and
+  /// loses nothing by it. It matters only where noise looks like the beginning of a frame and bytes are few.
+  static constexpr int64_t kGap_ns = 250'000'000;
+
+  explicit Reception(Parser parser) : parser_(std::move(parser)) {}
   /// Another rate, or another line: what has begun is forgotten.
   void begin(uint32_t baud) {
     clock_.set_baud(baud);
@@ -19,7 +23,7 @@ class Reception {
   template <class Function>
   void receive(std::span<const uint8_t> bytes, int64_t now_ns, Function&& on_event) {
     const uint64_t skipped = parser_.skipped();
-    if (parser_.begun() && now_ns - last_ns_ > gap_ns_) {
+    if (parser_.begun() && now_ns - last_ns_ > kGap_ns) {
       parser_.abandon();
       parse(parser_, {}, on_event);
     }
@@ -40,7 +44,7 @@ class Reception {
  private:
   Parser parser_;
   ByteClock clock_;
-  int64_t gap_ns_, last_ns_ = 0;
+  int64_t last_ns_ = 0;
   uint64_t bytes_ = 0, resyncs_ = 0, damaged_ = 0;
 };
 

@@ -142,6 +142,8 @@ int64_t StreamLaser::step() {
   }
   receive();
   const int64_t until_ns = has_line_ ? obey() : open_again_ns_;
+  received_.store(session_->sweeps(), std::memory_order_relaxed);
+  missing_.store(session_->missing(), std::memory_order_relaxed);
   damaged_.store(session_->damaged(), std::memory_order_relaxed);
   resyncs_.store(session_->resyncs(), std::memory_order_relaxed);
   trouble_.store(has_line_ ? session_->trouble() : "the line is gone", std::memory_order_relaxed);
@@ -193,14 +195,6 @@ void StreamLaser::lose_line() {
 }
 
 void StreamLaser::deliver(const ReceivedScan& scan) {
-  const uint64_t sweeps = session_->sweeps(), come = sweeps - previous_sweeps_;
-  const uint64_t passed =
-      previous_number_ && scan.scan_number > *previous_number_ ? scan.scan_number - *previous_number_ : 0;
-  if (passed > come)
-    missing_.store(missing_.load(std::memory_order_relaxed) + passed - come, std::memory_order_relaxed);
-  received_.store(sweeps, std::memory_order_relaxed);
-  previous_number_ = scan.scan_number;
-  previous_sweeps_ = sweeps;
   Delivery& draft = newest_.draft();
   draft.scan.stamp_ns = scan.stamp_ns;
   draft.scan.scan_number = scan.scan_number;

@@ -2,7 +2,6 @@
 #pragma once
 #include <atomic>
 #include <memory>
-#include <optional>
 #include <string>
 #include <thread>
 
@@ -67,8 +66,6 @@ class StreamLaser final : public LaserScanner {
   bool has_line_ = false;
   int64_t open_again_ns_ = 0;
   std::vector<float> previous_range_m_;
-  std::optional<uint32_t> previous_number_;  ///< of the newest sweep, and how many had come by then
-  uint64_t previous_sweeps_ = 0;
 
   // Between the threads.
   Newest<Delivery> newest_;

@@ -45,24 +45,36 @@ class ByteClock {
 class PeriodicInstants {
  public:
   explicit PeriodicInstants(int64_t period_ns) : period_ns_(period_ns) {}
-  void reset() { known_ = false; }
-  /// The instant that was seen at `seen_ns`, not after it; sets how many periods lie since the one before (at least 1).
+  void reset() {
+    known_ = false;
+    too_many_ = 0;
+  }
+  /// The instant that was seen at `seen_ns`, not after it; sets periods().
   int64_t refine(int64_t seen_ns) {
     periods_ = 1;
     int64_t expected = seen_ns;
     if (known_) {
-      // Late by up to three quarters of a period.
-      periods_ = std::max<int64_t>(1, (seen_ns - last_ns_ + period_ns_ / 4) / period_ns_);
-      expected = last_ns_ + periods_ * period_ns_ + periods_ * period_ns_ / kLeak;
+      // Late by up to three quarters of a period; one that is seen later counts as the next one.
+      const int64_t since_ns = seen_ns - last_ns_;
+      periods_ = (since_ns + period_ns_ / 4) / period_ns_;
+      // Too near to the one before: that was the first, which may be as late as it likes, or it was counted too far.
+      if (periods_ <= 0) periods_ = too_many_ > 0 ? 0 : 1;
+      too_many_ += periods_ - 1;
+      if (periods_ > 0) expected = last_ns_ + periods_ * period_ns_ + periods_ * period_ns_ / kLeak;
+      // Late itself, then; later ones must not be taken for it.
+      else if (since_ns > period_ns_ / 4) expected = last_ns_ + period_ns_ / 20;
     }
     known_ = true;
     return last_ns_ = std::min(seen_ns, expected);
   }
+  /// From the instant before to this one: 1, more where some were not seen, 0 where the one before had been seen so
+  /// late that one too many was counted. In sum they are right whenever an instant has been seen in time.
   int64_t periods() const { return periods_; }
 
  private:
   static constexpr int64_t kLeak = 300;  ///< one part in so many
   int64_t period_ns_, last_ns_ = 0, periods_ = 1;
+  int64_t too_many_ = 0;  ///< periods without a sighting: so many may have been counted too many
   bool known_ = false;
 };
 

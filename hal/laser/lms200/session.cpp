@@ -14,8 +14,6 @@ constexpr int64_t kMs = 1'000'000;
 constexpr int64_t kAck_ns = 150 * kMs;
 constexpr int64_t kReply_ns = 1000 * kMs, kModeReply_ns = 3000 * kMs, kWriteReply_ns = 15'000 * kMs;
 constexpr int64_t kAfterNak_ns = 30 * kMs, kAfterNewRate_ns = 250 * kMs;
-/// Between two bytes of a telegram: 14 ms, and an adapter's latency.
-constexpr int64_t kByteGap_ns = 40 * kMs;
 /// The scanner loses bytes that follow one another faster than 55 us: at 500000 baud they would.
 constexpr int64_t kSlowly_ns = 60'000;
 constexpr int kTries = 3;
@@ -28,7 +26,7 @@ bool valid(const Variant& v) {
 
 Session::Session(const SessionSettings& settings)
     : settings_(settings),
-      reception_(Parser::of_replies(), kByteGap_ns),
+      reception_(Parser::of_replies()),
       instants_(turns_of(settings.variant) * kTurn_ns),
       wanted_baud_(settings.baud) {
   assembled_.range_m.assign(beams_of(settings.variant), 0.0f);
@@ -285,10 +283,13 @@ void Session::hear_scan(std::span<const uint8_t> payload, uint64_t position, int
   // Scans that no line of this rate can carry are not counted as lost.
   const int64_t interval_ns = this->interval_ns(baud_);
   const int64_t intervals = (instants_.periods() * scan_ns() + interval_ns / 2) / interval_ns;
-  scan_number_ = scan_number_ ? *scan_number_ + static_cast<uint32_t>(std::max<int64_t>(1, intervals)) : 0;
-  whole_.scan_number = *scan_number_;
+  if (sweeps_++ > 0) {
+    pace_ += intervals;
+    scan_number_ = std::max(scan_number_ + 1, static_cast<uint32_t>(pace_));
+    missing_ = static_cast<uint64_t>(std::max<int64_t>(0, static_cast<int64_t>(missing_) + intervals - 1));
+  }
+  whole_.scan_number = scan_number_;
   scan_ready_ = true;
-  ++sweeps_;
   trouble_ = (scan->status & kImplausible) != 0 ? "the scanner says that values are implausible"
              : (scan->status & kPolluted) != 0  ? "the scanner says that its front pane is dirty"
                                                 : remark_;

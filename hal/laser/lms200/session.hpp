@@ -43,6 +43,7 @@ class Session final : public LaserSession {
   void line_has(uint32_t baud) override;
   LineOrder farewell() override;
   uint64_t sweeps() const override { return sweeps_; }
+  uint64_t missing() const override { return missing_; }
   uint64_t resyncs() const override { return reception_.resyncs(); }
   uint64_t damaged() const override { return reception_.damaged(); }
   const char* trouble() const override { return trouble_; }
@@ -116,9 +117,10 @@ class Session final : public LaserSession {
   ReceivedScan assembled_, whole_;
   uint8_t next_quarter_ = 0;
   bool scan_ready_ = false;
-  uint64_t sweeps_ = 0;
+  uint64_t sweeps_ = 0, missing_ = 0;
   int64_t last_scan_ns_ = 0;
-  std::optional<uint32_t> scan_number_;
+  uint32_t scan_number_ = 0;
+  int64_t pace_ = 0;  ///< scans by their instants; behind scan_number_ where one was seen too late, until some are lost
 };
 
 }  // namespace takt::lms200

@@ -11,7 +11,6 @@ namespace {
 
 constexpr int64_t kMs = 1'000'000;
 constexpr int64_t kAnswer_ns = 1000 * kMs, kSilent_ns = 1000 * kMs, kAfterRefusal_ns = 1000 * kMs;
-constexpr int64_t kByteGap_ns = 200 * kMs;  // within a frame
 constexpr int kTries = 3;
 constexpr double kTenThousandths = 1e4;
 
@@ -30,7 +29,7 @@ uint32_t beams_of(const ScanConfiguration& scan) {
 Session::Session(const SessionSettings& settings)
     : settings_(settings),
       configure_text_(configure_scan(settings.scan)),
-      reception_({}, kByteGap_ns),
+      reception_(Parser{}),
       instants_(period_of(settings.scan.rate_hz)),
       period_ns_(period_of(settings.scan.rate_hz)) {
   scan_.range_m.assign(beams_of(settings.scan), 0.0f);
@@ -87,6 +86,7 @@ void Session::enter(Step step, int64_t now_ns) {
     case Step::request: return ask(kSendDistances);
     case Step::stream:
       instants_ = PeriodicInstants(period_ns_);
+      number_.reset();
       last_scan_ns_ = now_ns;
       return;
   }
@@ -186,7 +186,11 @@ void Session::hear_measurement(const Measurement& m, uint64_t position, int64_t 
     scan_.range_m[i] = range_m <= settings_.max_range_m ? static_cast<float>(range_m) : 0.0f;
   }
   scan_.stamp_ns = instants_.refine(reception_.began_ns(position) - period_ns_);
-  if (number_) scan_number_ += std::max<uint32_t>(1, static_cast<uint16_t>(m.number - *number_));
+  if (sweeps_ > 0) {
+    const uint32_t apart = number_ ? std::max<uint32_t>(1, static_cast<uint16_t>(m.number - *number_)) : 1;
+    scan_number_ += apart;
+    missing_ += apart - 1;
+  }
   number_ = m.number;
   scan_.scan_number = scan_number_;
   scan_ready_ = true;

@@ -32,6 +32,7 @@ class Session final : public LaserSession {
   void line_has(uint32_t baud) override;
   LineOrder farewell() override;
   uint64_t sweeps() const override { return sweeps_; }
+  uint64_t missing() const override { return missing_; }
   uint64_t resyncs() const override { return reception_.resyncs(); }
   uint64_t damaged() const override { return reception_.damaged(); }
   const char* trouble() const override { return trouble_; }
@@ -68,7 +69,7 @@ class Session final : public LaserSession {
 
   ReceivedScan scan_;
   bool scan_ready_ = false;
-  uint64_t sweeps_ = 0;
+  uint64_t sweeps_ = 0, missing_ = 0;
   int64_t last_scan_ns_ = 0;
   std::optional<uint16_t> number_;  ///< of the last measurement
   uint32_t scan_number_ = 0;

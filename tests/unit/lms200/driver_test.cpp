@@ -105,6 +105,25 @@ TEST_CASE("half an hour on end: every scan arrives, once, at its time") {
               static_cast<unsigned long long>(arrived), static_cast<double>(worst_ns) * 1e-6);
 }
 
+TEST_CASE("a host that is held up, in the middle of a telegram too, loses no scan") {
+  Lms200Rig rig(kFast);
+  rig.start();
+  REQUIRE(rig.runs_within(5 * kSecond));
+  const uint64_t resyncs = rig.session->resyncs(), damaged = rig.session->damaged(),
+                 before = rig.scanner->scans_sent() - rig.session->sweeps();
+  for (int k = 0; k < 60; ++k) {
+    rig.advance_by(17 * kMs);                       // to another place in the telegram each time
+    rig.device_alone_for((1 + k % 20) * 10 * kMs);  // the driver gets all of it at once
+    rig.advance_by(17 * kMs);
+    rig.clock.advance_to(rig.clock.now_ns() + (1 + k % 20) * 10 * kMs);  // the line itself: what was due comes then
+  }
+  rig.advance_by(4 * kTurn_ns);
+  CHECK(rig.session->resyncs() == resyncs);
+  CHECK(rig.session->damaged() == damaged);
+  CHECK(rig.session->missing() == 0);
+  CHECK(rig.scanner->scans_sent() - rig.session->sweeps() <= before + 1);  // one may be on its way
+}
+
 TEST_CASE("what a host that died has left: a scanner that streams at another rate is found") {
   Lms200Rig first(kFast);
   first.start();

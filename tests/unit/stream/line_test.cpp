@@ -128,6 +128,24 @@ TEST_CASE("periodic instants are found behind sightings that are up to 16 ms lat
   }
 }
 
+TEST_CASE("periods that late sightings count too many are taken back when one comes in time") {
+  uint32_t random = 3;
+  constexpr int64_t kPeriod = 26'640'000;
+  PeriodicInstants instants(kPeriod);
+  int64_t counted = 0, truth = 0, wrong = 0, last_seen_ns = 0;
+  for (int k = 0; k < 20'000; ++k, ++truth) {
+    if (next(random) % 50 == 0) truth += next(random) % 4;  // some are not there
+    const bool in_time = next(random) % 100 > 0;
+    const int64_t late_ns = in_time ? 0 : next(random) * 3 * kPeriod / 65536;
+    const int64_t seen_ns = std::max(last_seen_ns + kPeriod / 2, truth * kPeriod + late_ns);  // in their order
+    instants.refine(last_seen_ns = seen_ns);
+    counted += k > 0 ? instants.periods() : 0;
+    wrong += counted != truth ? 1 : 0;
+    if (seen_ns - truth * kPeriod < kPeriod / 4) CHECK(counted == truth);
+  }
+  CHECK(wrong > 0);
+}
+
 TEST_CASE("a window holds what was pushed, in one piece") {
   ByteWindow<64> window;
   uint32_t random = 9;
