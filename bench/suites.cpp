@@ -14,11 +14,8 @@ std::vector<Row> run_trace(const Options&);
 std::vector<Row> run_record(const Options&);
 std::vector<Row> run_cloud(const Options&);
 std::vector<Row> run_registration(const Options&);
-#ifdef TAKT_BENCH_STEREO
 std::vector<Row> run_stereo(const Options&);
 std::vector<Row> run_rectify(const Options&);
-#endif
-#ifdef TAKT_BENCH_EGO_MOTION
 std::vector<Row> run_ego_motion(const Options&);
 std::vector<Row> run_signs(const Options&);
 std::vector<Row> run_sift(const Options&);
@@ -30,7 +27,6 @@ std::vector<Row> run_semantic(const Options&);
 std::vector<Row> run_semantic_link(const Options&);
 std::vector<Row> run_ground(const Options&);
 std::vector<Row> run_fusion(const Options&);
-#endif
 
 std::span<const Suite> suites() {
   static const auto list = std::to_array<Suite>({
@@ -43,11 +39,8 @@ std::span<const Suite> suites() {
       {"record", "what recording two stereo cameras of 1280x960 costs, against the same run without", run_record},
       {"cloud", "outlier removal, interpolation, smoothing, reduction; against a kd-tree and hash maps", run_cloud},
       {"registration", "generations of genetic ICP, 1000 + 1000 points; against a kd-tree", run_registration},
-#ifdef TAKT_BENCH_STEREO
       {"stereo", "dense disparity at 640x480, 150 disparities, against OpenCV's matchers", run_stereo},
       {"rectify", "debayering and rectification of a 640x480 pair, against OpenCV's", run_rectify},
-#endif
-#ifdef TAKT_BENCH_EGO_MOTION
       {"ego_motion", "a step at 640x480, against OpenCV's corners and optical flow", run_ego_motion},
       {"signs", "seven cascades over a scene of 640x480, against OpenCV's detector", run_signs},
       {"sift", "objects in a scene: the colour stage against OpenCV's SIFT", run_sift},
@@ -59,7 +52,6 @@ std::span<const Suite> suites() {
       {"semantic_link", "a scan to a client elsewhere, over UDP and D-Bus; against a bare socket", run_semantic_link},
       {"ground", "the ground map at 640x480: stages against brute force and OpenCV, a whole image", run_ground},
       {"fusion", "median fusion of depth images against its plain definition; a cloud's way into the map", run_fusion},
-#endif
   });
   return list;
 }

@@ -13,7 +13,7 @@
 #include "bench/interleaved.hpp"
 #include "bench/suite.hpp"
 #include "bench/suites/hops.hpp"
-#include "graph/command/ego_motion_drive.hpp"
+#include "graph/evaluate/ego_motion_drive.hpp"
 
 namespace takt::bench {
 

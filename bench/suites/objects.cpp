@@ -9,7 +9,7 @@
 
 #include "bench/interleaved.hpp"
 #include "bench/suite.hpp"
-#include "graph/command/prepare.hpp"
+#include "graph/cli/outcome.hpp"
 #include "nodes/object_detection/detector.hpp"
 #include "nodes/object_detection/reference.hpp"
 #include "nodes/object_detection/scenes.hpp"

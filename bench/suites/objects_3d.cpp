@@ -11,7 +11,7 @@
 #include "bench/interleaved.hpp"
 #include "bench/kd_tree.hpp"
 #include "bench/suite.hpp"
-#include "graph/command/prepare.hpp"
+#include "graph/cli/outcome.hpp"
 #include "nodes/object_3d/evaluate.hpp"
 
 namespace takt::bench {

@@ -8,7 +8,7 @@
 
 #include "bench/interleaved.hpp"
 #include "bench/suite.hpp"
-#include "graph/command/prepare.hpp"
+#include "graph/cli/outcome.hpp"
 #include "nodes/traffic_signs/sign_detector.hpp"
 #include "nodes/traffic_signs/sign_scenes.hpp"
 

@@ -11,7 +11,7 @@
 #include <thread>
 
 #include "graph/attach/endpoint.hpp"
-#include "graph/command/prepare.hpp"
+#include "graph/cli/outcome.hpp"
 
 namespace takt::command {
 namespace {

@@ -9,8 +9,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
 
+#include "graph/cli/outcome.hpp"
 #include "graph/command/calibrate_command.hpp"
-#include "graph/command/prepare.hpp"
 #include "graph/command/run_command.hpp"
 #include "nodes/calibration/generated_sweeps.hpp"
 #include "nodes/calibration/picture.hpp"

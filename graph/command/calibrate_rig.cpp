@@ -2,8 +2,8 @@
 #include <cstdio>
 #include <stdexcept>
 
+#include "graph/cli/outcome.hpp"
 #include "graph/command/calibrate_command.hpp"
-#include "graph/command/prepare.hpp"
 #include "hal/camera/rig.hpp"
 #include "hal/sim/simulation.hpp"
 #include "nodes/stereo/rectify.hpp"

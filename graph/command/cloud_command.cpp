@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "graph/command/prepare.hpp"
+#include "graph/cli/outcome.hpp"
 #include "nodes/cloud/cloud_file.hpp"
 #include "rt/time/clock.hpp"
 

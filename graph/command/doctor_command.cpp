@@ -3,9 +3,9 @@
 
 #include <cstdio>
 
+#include "graph/cli/outcome.hpp"
 #include "graph/command/doctor_text.hpp"
 #include "graph/command/machine_file.hpp"
-#include "graph/command/prepare.hpp"
 #include "rt/machine/checks.hpp"
 #include "rt/machine/measure.hpp"
 

@@ -8,7 +8,7 @@
 #include <cstdio>
 #include <fstream>
 
-#include "graph/command/prepare.hpp"
+#include "graph/cli/outcome.hpp"
 #include "graph/explain/miss_svg.hpp"
 #include "graph/explain/sentence.hpp"
 

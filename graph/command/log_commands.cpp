@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <optional>
 
-#include "graph/command/prepare.hpp"
+#include "graph/cli/outcome.hpp"
 #include "graph/log/cut_log.hpp"
 #include "graph/log/export_log.hpp"
 #include "graph/log/log_content.hpp"

@@ -11,7 +11,6 @@
 #include "graph/command/devices_command.hpp"
 #include "graph/command/doctor_command.hpp"
 #include "graph/command/double_command.hpp"
-#include "graph/command/eval_command.hpp"
 #include "graph/command/explain_command.hpp"
 #include "graph/command/log_commands.hpp"
 #include "graph/command/objects_command.hpp"
@@ -22,6 +21,7 @@
 #include "graph/command/show_command.hpp"
 #include "graph/command/terrain_command.hpp"
 #include "graph/command/train_command.hpp"
+#include "graph/evaluate/evaluations.hpp"
 
 namespace {
 
@@ -164,27 +164,12 @@ int main(int argc, char** argv) {
   takt::command::RenderOptions render_options;
   takt::command::ExplainOptions explain_options;
   takt::command::CalibrateOptions calibrate;
-  takt::command::EvalStereoOptions stereo;
-  takt::command::EvalEgoMotionOptions ego_motion;
+  takt::command::Evaluations evaluations;
   takt::command::AttachOptions attach;
   takt::command::RobotOptions robot;
   takt::command::DoctorOptions doctor;
   takt::command::ProfileOptions profile;
-  takt::command::EvalObjectsOptions objects;
-  takt::command::EvalObjects3dOptions objects3d;
-  takt::command::EvalSiftOptions sift;
-  takt::command::EvalGroundOptions ground;
-  takt::command::EvalSignsOptions signs;
-  takt::command::EvalTerrainOptions terrain_eval;
-  takt::command::EvalBodyPoseOptions body_pose;
-  takt::command::EvalScanMatchingOptions scan_matching;
-  takt::command::EvalMappingOptions mapping;
-  takt::command::EvalPersonTrackingOptions person_tracking;
-  takt::command::EvalRegistrationOptions registration;
-  takt::command::EvalLms200Options lms200;
   takt::command::DoubleOptions device_double;
-  takt::command::EvalSemanticOptions semantic;
-  takt::command::EvalObstacleStopOptions obstacle_stop;
   takt::command::ReplayOptions replay;
   takt::command::LogOptions log;
   takt::command::CloudOptions cloud;
@@ -223,24 +208,7 @@ int main(int argc, char** argv) {
   takt::command::add_terrain(app, terrain, exit_code);
   takt::command::add_objects(app, object_database, exit_code);
   takt::command::add_double(app, device_double, exit_code);
-  CLI::App* eval = app.add_subcommand("eval", "measures quality against ground truth");
-  eval->require_subcommand(1);
-  takt::command::add_eval_stereo(*eval, stereo, exit_code);
-  takt::command::add_eval_ego_motion(*eval, ego_motion, exit_code);
-  takt::command::add_eval_objects(*eval, objects, exit_code);
-  takt::command::add_eval_objects3d(*eval, objects3d, exit_code);
-  takt::command::add_eval_sift(*eval, sift, exit_code);
-  takt::command::add_eval_ground(*eval, ground, exit_code);
-  takt::command::add_eval_signs(*eval, signs, exit_code);
-  takt::command::add_eval_terrain(*eval, terrain_eval, exit_code);
-  takt::command::add_eval_body_pose(*eval, body_pose, exit_code);
-  takt::command::add_eval_scan_matching(*eval, scan_matching, exit_code);
-  takt::command::add_eval_mapping(*eval, mapping, exit_code);
-  takt::command::add_eval_person_tracking(*eval, person_tracking, exit_code);
-  takt::command::add_eval_registration(*eval, registration, exit_code);
-  takt::command::add_eval_lms200(*eval, lms200, exit_code);
-  takt::command::add_eval_semantic(*eval, semantic, exit_code);
-  takt::command::add_eval_obstacle_stop(*eval, obstacle_stop, exit_code);
+  takt::command::add_evaluations(app, evaluations, exit_code);
 
   try {
     app.parse(argc, argv);

@@ -9,14 +9,14 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "graph/command/curves.hpp"
-#include "graph/command/prepare.hpp"
+#include "graph/cli/outcome.hpp"
 #include "nodes/object_detection/cut_out.hpp"
 #include "nodes/object_detection/detector.hpp"
 #include "nodes/object_detection/object_list.hpp"
 #include "nodes/object_detection/revisions.hpp"
 #include "nodes/object_detection/scenes.hpp"
 #include "nodes/object_detection/tuning.hpp"
+#include "nodes/picture/curves.hpp"
 
 namespace takt::command {
 namespace {
@@ -102,14 +102,14 @@ std::vector<ErrorMaps> maps_of(const std::vector<std::filesystem::path>& files, 
 void write_roc(const std::string& file, const Tuning& tuning) {
   constexpr size_t kPoints = 14;
   std::vector<double> false_positive;
-  Curve detected{"detected % against false positive %", {}}, threshold{"threshold of the last stage", {}};
+  picture::Curve detected{"detected % against false positive %", {}}, threshold{"threshold of the last stage", {}};
   for (size_t i = 0; i < kPoints; ++i) {
     const RocPoint& point = tuning.roc[i * (tuning.roc.size() - 1) / (kPoints - 1)];
     false_positive.push_back(std::round(1000 * point.false_positive) / 10);
     detected.values.push_back(100 * point.detected);
     threshold.values.push_back(point.threshold);
   }
-  write_curves(file, "false %", false_positive, {detected, threshold});
+  picture::write_curves(file, "false %", false_positive, {detected, threshold});
 }
 
 void tune(const ObjectsOptions& o) {

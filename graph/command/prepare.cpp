@@ -12,10 +12,6 @@
 namespace takt::command {
 namespace {
 
-void tell(const std::vector<graph::Problem>& problems) {
-  for (const auto& problem : problems) std::fprintf(stderr, "%s\n", graph::to_string(problem).c_str());
-}
-
 int refuse(Prepared& prepared, std::vector<graph::Problem> problems, Exit code) {
   tell(problems);
   prepared.problems = std::move(problems);
@@ -36,31 +32,6 @@ graph::DeviceFactory device_factory(Prepared& prepared, uint64_t seed) {
 }
 
 }  // namespace
-
-std::filesystem::path shipped(const std::filesystem::path& relative) {
-  if (const char* home = std::getenv("TAKT_HOME")) return std::filesystem::path(home) / relative;
-  std::error_code error;
-  const auto program = std::filesystem::read_symlink("/proc/self/exe", error);
-  const auto installed = program.parent_path().parent_path() / "share/takt" / relative;
-  return std::filesystem::exists(installed, error) ? installed : relative;
-}
-
-int refuse(const std::string& text, Exit code) {
-  std::fprintf(stderr, "takt: error: %s\n", text.c_str());
-  return code;
-}
-
-void tell_problems(size_t count) {
-  std::fprintf(stderr, "takt: %zu problem%s, nothing was started\n", count, count == 1 ? "" : "s");
-}
-
-std::optional<graph::GraphSpec> load_graph(const std::filesystem::path& file, const graph::LoadOptions& options) {
-  graph::Loaded loaded = graph::load(file.empty() ? shipped("graph/ace.yaml") : file, options, graph::node_types());
-  if (loaded.graph) return std::move(loaded.graph);
-  tell(loaded.problems);
-  tell_problems(loaded.problems.size());
-  return std::nullopt;
-}
 
 int load(const RunOptions& options, Prepared& prepared) {
   const auto file = options.graph.empty() ? shipped("graph/ace.yaml") : options.graph;

@@ -9,8 +9,8 @@
 #include <cstdio>
 #include <fstream>
 
+#include "graph/cli/outcome.hpp"
 #include "graph/command/attach_commands.hpp"
-#include "graph/command/prepare.hpp"
 #include "nodes/robot_client/task.hpp"
 #include "rt/msg/messages.hpp"
 

@@ -3,12 +3,10 @@
 #include <filesystem>
 #include <string>
 
+#include "graph/cli/outcome.hpp"
 #include "graph/language/graph.hpp"
 
 namespace takt::command {
-
-/// Exit codes of every takt command.
-enum Exit : int { kOk = 0, kNotOk = 1, kBadInput = 2, kDeviceOrSystem = 3 };
 
 struct RunOptions {
   std::filesystem::path graph;  ///< empty: graph/ace.yaml of the project

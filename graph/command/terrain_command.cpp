@@ -9,7 +9,7 @@
 #include <cstdio>
 #include <fstream>
 
-#include "graph/command/prepare.hpp"
+#include "graph/cli/outcome.hpp"
 #include "graph/log/recorded_plan.hpp"
 #include "nodes/ground_map/terrain_drive.hpp"
 #include "nodes/ground_map/terrain_file.hpp"

@@ -9,8 +9,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "graph/command/curves.hpp"
-#include "graph/command/prepare.hpp"
+#include "graph/cli/outcome.hpp"
+#include "nodes/picture/curves.hpp"
 #include "nodes/traffic_signs/flat_sign.hpp"
 #include "nodes/traffic_signs/layout_learning.hpp"
 #include "nodes/traffic_signs/sign_scenes.hpp"
@@ -57,7 +57,7 @@ void write_curve(const std::string& stem, const StageCurve& curve) {
     stages.push_back(static_cast<double>(i + 1));
     table << fmt::format("{},{:.2f},{:.3f}\n", i + 1, curve.missed_pct[i], curve.false_positives_per_million[i]);
   }
-  write_curves(
+  picture::write_curves(
       stem + ".png", "stages", stages,
       {{"missed %", curve.missed_pct}, {"false positives per million windows", curve.false_positives_per_million}});
 }

@@ -26,7 +26,7 @@ bool valid(const Variant& v) {
 
 Session::Session(const SessionSettings& settings)
     : settings_(settings),
-      reception_(Parser::of_replies()),
+      receiver_(Parser::of_replies()),
       instants_(turns_of(settings.variant) * kTurn_ns),
       wanted_baud_(settings.baud) {
   assembled_.range_m.assign(beams_of(settings.variant), 0.0f);
@@ -88,7 +88,7 @@ void Session::try_next_rate() {
 }
 
 void Session::line_has(uint32_t baud) {
-  reception_.begin(baud_);
+  receiver_.begin(baud_);
   const auto wrong = std::abs(static_cast<int64_t>(baud) - static_cast<int64_t>(baud_));
   if (baud == 0 || wrong * 50 <= baud_) return;  // a UART bears some 2 %
   const auto lower = std::find_if(kBauds.begin(), kBauds.end(), [&](uint32_t known) { return known < baud_; });
@@ -178,7 +178,7 @@ LineOrder Session::farewell() {
 
 const ReceivedScan* Session::receive(std::span<const uint8_t> bytes, int64_t now_ns) {
   scan_ready_ = false;
-  reception_.receive(bytes, now_ns, [&](const Event& event) { hear(event, now_ns); });
+  receiver_.receive(bytes, now_ns, [&](const Event& event) { hear(event, now_ns); });
   return scan_ready_ ? &whole_ : nullptr;
 }
 
@@ -196,7 +196,7 @@ void Session::hear(const Event& event, int64_t now_ns) {
       return;
     case EventKind::crc_error:  // perhaps of the reply that is waited for
     case EventKind::length_error:
-      reception_.count_damage();
+      receiver_.count_damage();
       if (asking && acknowledged_) deadline_ns_ = std::min(deadline_ns_, now_ns + kAck_ns);
       return;
     case EventKind::telegram: break;
@@ -269,15 +269,15 @@ void Session::hear_scan(std::span<const uint8_t> payload, uint64_t position, int
   const auto scan = read_scan(payload);
   if (!scan || scan->millimetres != settings_.millimetres || scan->partial != interlaced(settings_.variant) ||
       scan->beams() != beams_in(*scan)) {
-    reception_.count_damage();
+    receiver_.count_damage();
     return;
   }
   last_scan_ns_ = now_ns;
-  if (!hear_status(scan->status, now_ns)) return reception_.count_damage();
+  if (!hear_status(scan->status, now_ns)) return receiver_.count_damage();
   // The first beam left when the first of its turns began; the telegram began when the last one had ended.
   const int64_t turns_ns = scan->partial ? kTurn_ns : scan_ns();
-  if (!assemble(*scan, reception_.began_ns(position) - turns_ns)) return;
-  if (!sees()) return reception_.count_damage();
+  if (!assemble(*scan, receiver_.began_ns(position) - turns_ns)) return;
+  if (!sees()) return receiver_.count_damage();
   std::swap(assembled_, whole_);
   whole_.stamp_ns = instants_.refine(whole_.stamp_ns);
   // Scans that no line of this rate can carry are not counted as lost.

@@ -2,10 +2,10 @@
 #pragma once
 #include <optional>
 
+#include "hal/laser/frame_receiver.hpp"
 #include "hal/laser/laser_session.hpp"
 #include "hal/laser/lms200/commands.hpp"
 #include "hal/laser/lms200/scan.hpp"
-#include "hal/laser/reception.hpp"
 
 namespace takt::lms200 {
 
@@ -44,8 +44,8 @@ class Session final : public LaserSession {
   LineOrder farewell() override;
   uint64_t sweeps() const override { return sweeps_; }
   uint64_t missing() const override { return missing_; }
-  uint64_t resyncs() const override { return reception_.resyncs(); }
-  uint64_t damaged() const override { return reception_.damaged(); }
+  uint64_t resyncs() const override { return receiver_.resyncs(); }
+  uint64_t damaged() const override { return receiver_.damaged(); }
   const char* trouble() const override { return trouble_; }
 
   /// Scans are coming.
@@ -95,7 +95,7 @@ class Session final : public LaserSession {
   int64_t interval_ns(uint32_t baud) const;
 
   SessionSettings settings_;
-  Reception<Parser> reception_;
+  FrameReceiver<Parser> receiver_;
   PeriodicInstants instants_;
   const char* trouble_ = "not asked yet";
   const char* remark_ = "";  ///< what stays so while scans come

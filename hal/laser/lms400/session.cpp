@@ -29,7 +29,7 @@ uint32_t beams_of(const ScanConfiguration& scan) {
 Session::Session(const SessionSettings& settings)
     : settings_(settings),
       configure_text_(configure_scan(settings.scan)),
-      reception_(Parser{}),
+      receiver_(Parser{}),
       instants_(period_of(settings.scan.rate_hz)),
       period_ns_(period_of(settings.scan.rate_hz)) {
   scan_.range_m.assign(beams_of(settings.scan), 0.0f);
@@ -55,7 +55,7 @@ ScanFormat Session::format() const {
 // The conversation ---------------------------------------------------------------------------------------------------
 
 void Session::begin(int64_t now_ns) {
-  reception_.begin(0);
+  receiver_.begin(0);
   order_baud_ = settings_.baud != 0;
   order_reopen_ = false;
   trouble_ = "no answer yet";
@@ -65,7 +65,7 @@ void Session::begin(int64_t now_ns) {
 }
 
 void Session::line_has(uint32_t baud) {
-  reception_.begin(baud);
+  receiver_.begin(baud);
   if (baud != settings_.baud) remark_ = "the serial line does not do the rate asked for";
 }
 
@@ -128,12 +128,12 @@ void Session::refuse(const char* why, int64_t now_ns) {
 
 const ReceivedScan* Session::receive(std::span<const uint8_t> bytes, int64_t now_ns) {
   scan_ready_ = false;
-  reception_.receive(bytes, now_ns, [&](const Event& event) { hear(event, now_ns); });
+  receiver_.receive(bytes, now_ns, [&](const Event& event) { hear(event, now_ns); });
   return scan_ready_ ? &scan_ : nullptr;
 }
 
 void Session::hear(const Event& event, int64_t now_ns) {
-  if (event.kind != EventKind::frame) return reception_.count_damage();
+  if (event.kind != EventKind::frame) return receiver_.count_damage();
   if (const auto measurement = read_measurement(event.payload))
     return hear_measurement(*measurement, event.position, now_ns);
   if (const auto answer = read_answer(event.payload)) hear_answer(*answer, now_ns);
@@ -177,7 +177,7 @@ void Session::hear_measurement(const Measurement& m, uint64_t position, int64_t 
   if (m.format == Format::remission || m.count() != scan_.range_m.size() ||
       m.step_tdeg != std::lround(asked.step_deg * kTenThousandths) ||
       m.first_tdeg != std::lround(asked.first_deg * kTenThousandths)) {
-    reception_.count_damage();
+    receiver_.count_damage();
     return;
   }
   last_scan_ns_ = now_ns;
@@ -185,7 +185,7 @@ void Session::hear_measurement(const Measurement& m, uint64_t position, int64_t 
     const double range_m = 0.001 * m.distance(i) * m.distance_scale;
     scan_.range_m[i] = range_m <= settings_.max_range_m ? static_cast<float>(range_m) : 0.0f;
   }
-  scan_.stamp_ns = instants_.refine(reception_.began_ns(position) - period_ns_);
+  scan_.stamp_ns = instants_.refine(receiver_.began_ns(position) - period_ns_);
   if (sweeps_ > 0) {
     const uint32_t apart = number_ ? std::max<uint32_t>(1, static_cast<uint16_t>(m.number - *number_)) : 1;
     scan_number_ += apart;

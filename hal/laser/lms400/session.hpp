@@ -3,10 +3,10 @@
 #include <optional>
 #include <string>
 
+#include "hal/laser/frame_receiver.hpp"
 #include "hal/laser/laser_session.hpp"
 #include "hal/laser/lms400/frame.hpp"
 #include "hal/laser/lms400/messages.hpp"
-#include "hal/laser/reception.hpp"
 
 namespace takt::lms400 {
 
@@ -33,8 +33,8 @@ class Session final : public LaserSession {
   LineOrder farewell() override;
   uint64_t sweeps() const override { return sweeps_; }
   uint64_t missing() const override { return missing_; }
-  uint64_t resyncs() const override { return reception_.resyncs(); }
-  uint64_t damaged() const override { return reception_.damaged(); }
+  uint64_t resyncs() const override { return receiver_.resyncs(); }
+  uint64_t damaged() const override { return receiver_.damaged(); }
   const char* trouble() const override { return trouble_; }
 
   /// Scans are coming.
@@ -54,7 +54,7 @@ class Session final : public LaserSession {
 
   SessionSettings settings_;
   std::string configure_text_;
-  Reception<Parser> reception_;
+  FrameReceiver<Parser> receiver_;
   PeriodicInstants instants_;
   int64_t period_ns_;
   const char* trouble_ = "not asked yet";

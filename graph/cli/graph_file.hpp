@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <filesystem>
+#include <optional>
+#include <vector>
+
+#include "graph/language/graph.hpp"
+
+namespace takt::command {
+
+/// Loads only, no device is opened; nothing if the input is wrong, which is then written to stderr. An empty `file` is
+/// the default graph.
+std::optional<graph::GraphSpec> load_graph(const std::filesystem::path& file, const graph::LoadOptions& options);
+
+/// Each on a line of stderr.
+void tell(const std::vector<graph::Problem>& problems);
+/// "takt: n problems, nothing was started"
+void tell_problems(size_t count);
+
+}  // namespace takt::command
