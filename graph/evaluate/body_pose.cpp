@@ -172,14 +172,10 @@ void print(const Json& out) {
 }
 
 int evaluate(const EvalBodyPoseOptions& options) {
-  try {
-    const Json out = options.depth.empty() ? measure_generated(options) : measure_depth(options);
-    if (options.json) std::printf("%s\n", out.dump(2).c_str());
-    else print(out);
-    return kOk;
-  } catch (const std::exception& error) {
-    return refuse(error.what(), kBadInput);
-  }
+  const Json out = options.depth.empty() ? measure_generated(options) : measure_depth(options);
+  if (options.json) std::printf("%s\n", out.dump(2).c_str());
+  else print(out);
+  return kOk;
 }
 
 }  // namespace
@@ -206,7 +202,7 @@ void add_eval_body_pose(CLI::App& eval, EvalBodyPoseOptions& o, int& exit_code) 
       ->check(CLI::Range(0.05, 2.0));
   app->add_option("--picture", o.picture, "PNG with the skeletons over image and cloud (of the first scene)");
   app->add_flag("--json", o.json, "one JSON object on stdout");
-  app->callback([&] { exit_code = evaluate(o); });
+  call(*app, exit_code, [&o] { return evaluate(o); });
 }
 
 }  // namespace takt::command

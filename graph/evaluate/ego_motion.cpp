@@ -94,26 +94,21 @@ void print_generated(const Json& out) {
 }
 
 int evaluate(const EvalEgoMotionOptions& options) {
-  try {
-    if (options.generated != options.data.empty())
-      throw BadData("takt eval ego_motion wants either --data DIR or --generated");
-    if (options.generated && options.scale != 1)
-      throw BadData("--scale makes recorded images smaller: it wants --data");
-    cv::setNumThreads(1);
-    if (!options.sweep.empty()) {
-      const Json out = measure_sweep(options);
-      if (options.json) std::printf("%s\n", out.dump(2).c_str());
-      else print_sweep(out);
-      return kOk;
-    }
-    const Json out = options.generated ? measure_generated(options) : measure_recorded(options);
+  if (options.generated != options.data.empty())
+    throw BadData("takt eval ego_motion wants either --data DIR or --generated");
+  if (options.generated && options.scale != 1) throw BadData("--scale makes recorded images smaller: it wants --data");
+  cv::setNumThreads(1);
+  if (!options.sweep.empty()) {
+    const Json out = measure_sweep(options);
     if (options.json) std::printf("%s\n", out.dump(2).c_str());
-    else if (options.generated) print_generated(out);
-    else print_recorded(out);
+    else print_sweep(out);
     return kOk;
-  } catch (const std::exception& error) {
-    return refuse(error.what(), kBadInput);
   }
+  const Json out = options.generated ? measure_generated(options) : measure_recorded(options);
+  if (options.json) std::printf("%s\n", out.dump(2).c_str());
+  else if (options.generated) print_generated(out);
+  else print_recorded(out);
+  return kOk;
 }
 
 }  // namespace
@@ -130,7 +125,7 @@ void add_eval_ego_motion(CLI::App& eval, EvalEgoMotionOptions& o, int& exit_code
   app->add_option("--sweep", o.sweep, "parameter to try values of")->check(CLI::IsMember(sweep_names()));
   app->add_option("--picture", o.picture, "PNG: matched corners of the middle frame, or the curves of a sweep");
   app->add_flag("--json", o.json, "one JSON object on stdout");
-  app->callback([&] { exit_code = evaluate(o); });
+  call(*app, exit_code, [&o] { return evaluate(o); });
 }
 
 }  // namespace takt::command

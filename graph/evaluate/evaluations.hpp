@@ -2,16 +2,31 @@
 // `takt eval TASK`: quality against ground truth. stdout carries the table, or with --json one object and nothing else.
 #pragma once
 #include <CLI/CLI.hpp>
+#include <exception>
 #include <filesystem>
 #include <span>
 #include <string>
 #include <vector>
+
+#include "graph/cli/outcome.hpp"
 
 namespace takt::object_detection {
 struct DatabaseObject;
 }
 
 namespace takt::command {
+
+/// Has a task evaluate when it is asked for. What it throws is told: files or options are at fault.
+template <class Function>
+void call(CLI::App& task, int& exit_code, Function evaluate) {
+  task.callback([&exit_code, evaluate] {
+    try {
+      exit_code = evaluate();
+    } catch (const std::exception& error) {
+      exit_code = refuse(error.what(), kBadInput);
+    }
+  });
+}
 
 struct EvalStereoOptions {
   std::filesystem::path left, right, truth;

@@ -265,23 +265,18 @@ void print(const Json& out) {
 }
 
 int evaluate(const EvalGroundOptions& options) {
-  try {
-    if (options.images.empty() != options.labels.empty() || options.images.empty() != options.drivable.empty())
-      throw std::runtime_error(
-          "--images, --labels and --drivable belong together; without them a pavement is generated");
-    if (options.images.empty() && !options.learn.empty())
-      throw std::runtime_error(
-          "--learn names images, so it wants --images; on a generated pavement each image teaches in turn");
-    if (!options.images.empty() && options.variants)
-      throw std::runtime_error("--variants are those of the generated pavement, so it wants no --images");
-    Json out = options.images.empty() ? measure_pavement(options) : measure_images(options);
-    out["baseline"]["name"] = "bottom 40 % of the image is ground";
-    if (options.json) std::printf("%s\n", out.dump(2).c_str());
-    else print(out);
-    return kOk;
-  } catch (const std::exception& error) {
-    return refuse(error.what(), kBadInput);
-  }
+  if (options.images.empty() != options.labels.empty() || options.images.empty() != options.drivable.empty())
+    throw std::runtime_error("--images, --labels and --drivable belong together; without them a pavement is generated");
+  if (options.images.empty() && !options.learn.empty())
+    throw std::runtime_error(
+        "--learn names images, so it wants --images; on a generated pavement each image teaches in turn");
+  if (!options.images.empty() && options.variants)
+    throw std::runtime_error("--variants are those of the generated pavement, so it wants no --images");
+  Json out = options.images.empty() ? measure_pavement(options) : measure_images(options);
+  out["baseline"]["name"] = "bottom 40 % of the image is ground";
+  if (options.json) std::printf("%s\n", out.dump(2).c_str());
+  else print(out);
+  return kOk;
 }
 
 }  // namespace
@@ -302,7 +297,7 @@ void add_eval_ground(CLI::App& eval, EvalGroundOptions& o, int& exit_code) {
   app->add_flag("--variants", o.variants, "the generated pavement in other light and of other stone, too");
   app->add_option("--picture", o.picture, "PNG of the last generated image with its mask, and the grid");
   app->add_flag("--json", o.json, "one JSON object on stdout");
-  app->callback([&] { exit_code = evaluate(o); });
+  call(*app, exit_code, [&o] { return evaluate(o); });
 }
 
 }  // namespace takt::command

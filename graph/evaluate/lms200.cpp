@@ -141,29 +141,25 @@ void compare(const std::filesystem::path& file, const Outcome& out, Json& json) 
 }
 
 int evaluate(const EvalLms200Options& options) {
-  try {
-    std::ifstream stream = open_file(options.rx);
-    const std::vector<uint8_t> bytes{std::istreambuf_iterator<char>(stream), {}};
-    const Outcome out = evaluate_capture(bytes, read_index(options.index));
-    Json json{{"bytes", bytes.size()},
-              {"accepted", out.accepted},
-              {"rejected", out.rejected},
-              {"not_as_marked", out.wrong},
-              {"found_inside_rejected", out.inside.size()},
-              {"inside", out.inside},
-              {"unlisted", out.unlisted},
-              {"crc_errors", out.crc_errors},
-              {"length_errors", out.length_errors},
-              {"unfinished_bytes", out.unfinished_bytes},
-              {"scans", out.scans.size()}};
-    if (!options.distances.empty()) compare(options.distances, out, json);
-    if (options.json) std::printf("%s\n", json.dump(2).c_str());
-    else
-      for (const auto& [name, value] : json.items()) std::printf("%-22s %s\n", name.c_str(), value.dump().c_str());
-    return kOk;
-  } catch (const std::exception& error) {
-    return refuse(error.what(), kBadInput);
-  }
+  std::ifstream stream = open_file(options.rx);
+  const std::vector<uint8_t> bytes{std::istreambuf_iterator<char>(stream), {}};
+  const Outcome out = evaluate_capture(bytes, read_index(options.index));
+  Json json{{"bytes", bytes.size()},
+            {"accepted", out.accepted},
+            {"rejected", out.rejected},
+            {"not_as_marked", out.wrong},
+            {"found_inside_rejected", out.inside.size()},
+            {"inside", out.inside},
+            {"unlisted", out.unlisted},
+            {"crc_errors", out.crc_errors},
+            {"length_errors", out.length_errors},
+            {"unfinished_bytes", out.unfinished_bytes},
+            {"scans", out.scans.size()}};
+  if (!options.distances.empty()) compare(options.distances, out, json);
+  if (options.json) std::printf("%s\n", json.dump(2).c_str());
+  else
+    for (const auto& [name, value] : json.items()) std::printf("%-22s %s\n", name.c_str(), value.dump().c_str());
+  return kOk;
 }
 
 }  // namespace
@@ -174,7 +170,7 @@ void add_eval_lms200(CLI::App& eval, EvalLms200Options& o, int& exit_code) {
   app->add_option("--index", o.index, "CSV: time,direction,offset,length,command,ok|BAD")->required();
   app->add_option("--distances", o.distances, "CSV: time, then metres, a line for each scan");
   app->add_flag("--json", o.json, "one JSON object on stdout");
-  app->callback([&] { exit_code = evaluate(o); });
+  call(*app, exit_code, [&o] { return evaluate(o); });
 }
 
 }  // namespace takt::command

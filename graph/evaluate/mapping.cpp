@@ -161,30 +161,26 @@ void write(const EvalMappingOptions& o, const RedundancyFigures& room) {
 }
 
 int evaluate(const EvalMappingOptions& o) {
-  try {
-    Results results(o.json);
-    FusionRuns runs;
-    runs.views = o.views;
-    runs.runs = o.runs;
-    runs.seed = o.seed;
-    results.fusion("generated walks", "", evaluate_generated(runs));
-    if (!o.data.empty())
-      results.fusion("recorded views, each left out in turn", "recorded_", evaluate_recorded(o.data, o.seed));
-    MapperParameters p;
-    p.views = o.views;
-    const RedundancyFigures room = evaluate_redundancy(p, o.clouds, o.seed);
-    write(o, room);
-    results.redundancy(room);
-    results.ghosts(evaluate_ghosts(p, o.seed));
-    results.correction(evaluate_correction(p, o.seed));
-    results.obstacles(evaluate_obstacles(o.runs, o.seed));
-    results.edges(evaluate_edges(o.runs, o.seed));
-    if (o.minutes > 0) results.drive(evaluate_drive(p, o.minutes, o.seed));
-    results.finish();
-    return kOk;
-  } catch (const std::exception& error) {
-    return refuse(error.what(), kBadInput);
-  }
+  Results results(o.json);
+  FusionRuns runs;
+  runs.views = o.views;
+  runs.runs = o.runs;
+  runs.seed = o.seed;
+  results.fusion("generated walks", "", evaluate_generated(runs));
+  if (!o.data.empty())
+    results.fusion("recorded views, each left out in turn", "recorded_", evaluate_recorded(o.data, o.seed));
+  MapperParameters p;
+  p.views = o.views;
+  const RedundancyFigures room = evaluate_redundancy(p, o.clouds, o.seed);
+  write(o, room);
+  results.redundancy(room);
+  results.ghosts(evaluate_ghosts(p, o.seed));
+  results.correction(evaluate_correction(p, o.seed));
+  results.obstacles(evaluate_obstacles(o.runs, o.seed));
+  results.edges(evaluate_edges(o.runs, o.seed));
+  if (o.minutes > 0) results.drive(evaluate_drive(p, o.minutes, o.seed));
+  results.finish();
+  return kOk;
 }
 
 }  // namespace
@@ -202,7 +198,7 @@ void add_eval_mapping(CLI::App& eval, EvalMappingOptions& o, int& exit_code) {
   app->add_option("--grid", o.grid, "YAML file of the room's occupancy grid, its PNG beside it");
   app->add_option("--picture", o.picture, "PNG of the room's map, from above and from the side");
   app->add_flag("--json", o.json, "one JSON object on stdout");
-  app->callback([&] { exit_code = evaluate(o); });
+  call(*app, exit_code, [&o] { return evaluate(o); });
 }
 
 }  // namespace takt::command

@@ -319,33 +319,29 @@ void print_cascade(const Json& all) {
 }
 
 int evaluate(const EvalObjectsOptions& options) {
-  try {
-    cv::setNumThreads(1);
-    auto database =
-        options.views.empty()
-            ? read_database(options.database.empty() ? shipped("graph/objects") : options.database, 48, TestViews::read)
-            : read_turntable(options.views, 48);
-    for (DatabaseObject& object : database) {
-      if (!options.automatic) break;
-      object.thresholds = {};
-      for (ReferenceView& view : object.views) view.thresholds = {};
-    }
-    if (options.study) {
-      study_objects(options, database);
-      return kOk;
-    }
-    Json out = to_json(options, measure_all(options, database));
-    measure_cascade(options, database, out);
-    if (options.json) {
-      std::printf("%s\n", out.dump(2).c_str());
-    } else {
-      print_exclusion(out);
-      print_cascade(out);
-    }
-    return kOk;
-  } catch (const std::exception& error) {
-    return refuse(error.what(), kBadInput);
+  cv::setNumThreads(1);
+  auto database =
+      options.views.empty()
+          ? read_database(options.database.empty() ? shipped("graph/objects") : options.database, 48, TestViews::read)
+          : read_turntable(options.views, 48);
+  for (DatabaseObject& object : database) {
+    if (!options.automatic) break;
+    object.thresholds = {};
+    for (ReferenceView& view : object.views) view.thresholds = {};
   }
+  if (options.study) {
+    study_objects(options, database);
+    return kOk;
+  }
+  Json out = to_json(options, measure_all(options, database));
+  measure_cascade(options, database, out);
+  if (options.json) {
+    std::printf("%s\n", out.dump(2).c_str());
+  } else {
+    print_exclusion(out);
+    print_cascade(out);
+  }
+  return kOk;
 }
 
 }  // namespace
@@ -385,7 +381,7 @@ void add_eval_objects(CLI::App& eval, EvalObjectsOptions& o, int& exit_code) {
                               "instead: each stage by itself against bins, thresholds, references, on --frames scenes");
   app->add_option("--picture", o.picture, "PNG of time, share excluded and contrast over the rows of bins")
       ->needs(study);
-  app->callback([&] { exit_code = evaluate(o); });
+  call(*app, exit_code, [&o] { return evaluate(o); });
 }
 
 }  // namespace takt::command

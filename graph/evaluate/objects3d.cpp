@@ -121,15 +121,11 @@ void print(const Results& r) {
 }
 
 int evaluate(const EvalObjects3dOptions& options) {
-  try {
-    cv::setNumThreads(1);
-    const Results results = measure_all(options);
-    if (options.json) std::printf("%s\n", to_json(options, results).dump(2).c_str());
-    else print(results);
-    return kOk;
-  } catch (const std::exception& error) {
-    return refuse(error.what(), kBadInput);
-  }
+  cv::setNumThreads(1);
+  const Results results = measure_all(options);
+  if (options.json) std::printf("%s\n", to_json(options, results).dump(2).c_str());
+  else print(results);
+  return kOk;
 }
 
 }  // namespace
@@ -143,7 +139,7 @@ void add_eval_objects3d(CLI::App& eval, EvalObjects3dOptions& o, int& exit_code)
   app->add_option("--sigma", o.sigma_px, "noise of the disparity, px (default 0.2)")->check(CLI::Range(0.0, 2.0));
   app->add_option("--write", o.write, "writes what the classifiers learnt from, for the node object_3d");
   app->add_flag("--json", o.json, "one JSON object on stdout");
-  app->callback([&] { exit_code = evaluate(o); });
+  call(*app, exit_code, [&o] { return evaluate(o); });
 }
 
 }  // namespace takt::command

@@ -65,37 +65,33 @@ void draw(const std::string& file, uint64_t seed) {
 }
 
 int evaluate(const EvalPersonTrackingOptions& o) {
-  try {
-    if (!o.picture.empty()) draw(o.picture, o.seed);
-    const WalkFigures f = measure_walks({}, {}, o.seed, o.walks, o.frames);
-    Json out{{"seed", o.seed},
-             {"frames", f.frames},
-             {"shown", f.shown},
-             {"sighted_pct", percent(f.sighted, f.frames)},
-             {"sighted_shown_pct", percent(f.sighted_shown, f.shown)},
-             {"wrong_sightings", f.wrong_sightings},
-             {"time_p50_ms", quantile(f.time_ms, 0.5)},
-             {"time_p99_ms", quantile(f.time_ms, 0.99)},
-             {"time_max_ms", quantile(f.time_ms, 1)}};
-    Json trackers{{"filter", to_json(f, f.filter)},
-                  {"last_held", to_json(f, f.hold)},
-                  {"constant_velocity", to_json(f, f.constant)}};
-    if (o.json) {
-      out["trackers"] = trackers;
-      std::printf("%s\n", out.dump(2).c_str());
-      return kOk;
-    }
-    for (const auto& [key, value] : out.items())
-      std::printf("%-20s %s\n", key.c_str(),
-                  value.is_number_float() ? std::to_string(value.get<double>()).c_str() : value.dump().c_str());
-    std::printf("%-20s %10s %10s %18s\n", "", "filter", "last held", "constant velocity");
-    for (const auto& [key, value] : trackers["filter"].items())
-      std::printf("%-20s %10.3f %10.3f %18.3f\n", key.c_str(), value.get<double>(),
-                  trackers["last_held"][key].get<double>(), trackers["constant_velocity"][key].get<double>());
+  if (!o.picture.empty()) draw(o.picture, o.seed);
+  const WalkFigures f = measure_walks({}, {}, o.seed, o.walks, o.frames);
+  Json out{{"seed", o.seed},
+           {"frames", f.frames},
+           {"shown", f.shown},
+           {"sighted_pct", percent(f.sighted, f.frames)},
+           {"sighted_shown_pct", percent(f.sighted_shown, f.shown)},
+           {"wrong_sightings", f.wrong_sightings},
+           {"time_p50_ms", quantile(f.time_ms, 0.5)},
+           {"time_p99_ms", quantile(f.time_ms, 0.99)},
+           {"time_max_ms", quantile(f.time_ms, 1)}};
+  Json trackers{{"filter", to_json(f, f.filter)},
+                {"last_held", to_json(f, f.hold)},
+                {"constant_velocity", to_json(f, f.constant)}};
+  if (o.json) {
+    out["trackers"] = trackers;
+    std::printf("%s\n", out.dump(2).c_str());
     return kOk;
-  } catch (const std::exception& error) {
-    return refuse(error.what(), kBadInput);
   }
+  for (const auto& [key, value] : out.items())
+    std::printf("%-20s %s\n", key.c_str(),
+                value.is_number_float() ? std::to_string(value.get<double>()).c_str() : value.dump().c_str());
+  std::printf("%-20s %10s %10s %18s\n", "", "filter", "last held", "constant velocity");
+  for (const auto& [key, value] : trackers["filter"].items())
+    std::printf("%-20s %10.3f %10.3f %18.3f\n", key.c_str(), value.get<double>(),
+                trackers["last_held"][key].get<double>(), trackers["constant_velocity"][key].get<double>());
+  return kOk;
 }
 
 }  // namespace
@@ -107,7 +103,7 @@ void add_eval_person_tracking(CLI::App& eval, EvalPersonTrackingOptions& o, int&
   app->add_option("--frames", o.frames, "of each walk, 15 a second (default 75)")->check(CLI::Range(1, 100000));
   app->add_option("--picture", o.picture, "PNG of a frame with what is found in it");
   app->add_flag("--json", o.json, "one JSON object on stdout");
-  app->callback([&] { exit_code = evaluate(o); });
+  call(*app, exit_code, [&o] { return evaluate(o); });
 }
 
 }  // namespace takt::command

@@ -337,20 +337,16 @@ int sweep_population(const EvalRegistrationOptions& o) {
 }
 
 int evaluate(const EvalRegistrationOptions& o) {
-  try {
-    if (o.sweep == "population") return sweep_population(o);
-    const std::optional<Recorded> recorded = recorded_pair(o);
-    if (o.sweep == "success") return sweep_success(o, recorded);
-    if (!recorded)
-      throw std::invalid_argument(
-          "registration wants --source, --target and --reference, or --scene, or --sweep success or population");
-    const Json out = measure_pair(o, *recorded);
-    if (o.json) std::printf("%s\n", out.dump(2).c_str());
-    else print(out);
-    return kOk;
-  } catch (const std::exception& error) {
-    return refuse(error.what(), kBadInput);
-  }
+  if (o.sweep == "population") return sweep_population(o);
+  const std::optional<Recorded> recorded = recorded_pair(o);
+  if (o.sweep == "success") return sweep_success(o, recorded);
+  if (!recorded)
+    throw std::invalid_argument(
+        "registration wants --source, --target and --reference, or --scene, or --sweep success or population");
+  const Json out = measure_pair(o, *recorded);
+  if (o.json) std::printf("%s\n", out.dump(2).c_str());
+  else print(out);
+  return kOk;
 }
 
 }  // namespace
@@ -388,7 +384,7 @@ void add_eval_registration(CLI::App& eval, EvalRegistrationOptions& o, int& exit
   app->add_option("--picture", o.picture,
                   "PNG: before, after, match probability from red to green, colours; or the curves of a sweep");
   app->add_flag("--json", o.json, "one JSON object on stdout");
-  app->callback([&] { exit_code = evaluate(o); });
+  call(*app, exit_code, [&o] { return evaluate(o); });
 }
 
 }  // namespace takt::command

@@ -145,17 +145,13 @@ void write_map(const std::string& file, const Drive& drive, const std::vector<Pl
 }
 
 int evaluate(const EvalScanMatchingOptions& options) {
-  try {
-    const Drive drive = options.log.empty() ? make_drive(furnished_room(options.seed), rounds(400), {}, options.seed)
-                                            : read_drive(options);
-    const Evaluation out = scan_matching::evaluate(drive, {}, !options.without_odometry, {});
-    if (!options.picture.empty()) write_map(options.picture, drive, out.poses);
-    if (options.json) std::printf("%s\n", to_json(out).dump(2).c_str());
-    else print(out);
-    return kOk;
-  } catch (const std::exception& error) {
-    return refuse(error.what(), kBadInput);
-  }
+  const Drive drive = options.log.empty() ? make_drive(furnished_room(options.seed), rounds(400), {}, options.seed)
+                                          : read_drive(options);
+  const Evaluation out = scan_matching::evaluate(drive, {}, !options.without_odometry, {});
+  if (!options.picture.empty()) write_map(options.picture, drive, out.poses);
+  if (options.json) std::printf("%s\n", to_json(out).dump(2).c_str());
+  else print(out);
+  return kOk;
 }
 
 }  // namespace
@@ -168,7 +164,7 @@ void add_eval_scan_matching(CLI::App& eval, EvalScanMatchingOptions& o, int& exi
   app->add_option("--seed", o.seed, "seed of the generated drive (default 1)");
   app->add_option("--picture", o.picture, "PNG of the map that the matched scans make, 10 cm a pixel");
   app->add_flag("--json", o.json, "one JSON object on stdout");
-  app->callback([&] { exit_code = evaluate(o); });
+  call(*app, exit_code, [&o] { return evaluate(o); });
 }
 
 }  // namespace takt::command

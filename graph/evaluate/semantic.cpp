@@ -183,12 +183,8 @@ int show_network(const EvalSemanticOptions& o) {
 }
 
 int evaluate(const EvalSemanticOptions& o) {
-  try {
-    if (!o.network.empty()) return show_network(o);
-    return o.tell ? tell(o) : o.sweep ? sweep(o) : compare(o);
-  } catch (const std::exception& error) {
-    return refuse(error.what(), kBadInput);
-  }
+  if (!o.network.empty()) return show_network(o);
+  return o.tell ? tell(o) : o.sweep ? sweep(o) : compare(o);
 }
 
 }  // namespace
@@ -213,7 +209,7 @@ void add_eval_semantic(CLI::App& eval, EvalSemanticOptions& o, int& exit_code) {
   app->add_option("--at", o.at, "where the robot is then: x y, m (default 0 0)")->expected(2)->needs(network);
   app->add_flag("--recursive", o.recursive, "by the thesis's recursion instead of A*")->needs(network);
   app->add_flag("--json", o.json, "one JSON object on stdout");
-  app->callback([&] { exit_code = evaluate(o); });
+  call(*app, exit_code, [&o] { return evaluate(o); });
 }
 
 }  // namespace takt::command

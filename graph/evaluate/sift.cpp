@@ -165,16 +165,12 @@ void print(const Json& j) {
 }
 
 int evaluate(const EvalSiftOptions& options) {
-  try {
-    cv::setNumThreads(1);
-    cv::setRNGSeed(static_cast<int>(options.seed));
-    const Json out = to_json(options.data.empty() ? measure_generated(options) : measure_pictures(options));
-    if (options.json) std::printf("%s\n", out.dump(2).c_str());
-    else print(out);
-    return kOk;
-  } catch (const std::exception& error) {
-    return refuse(error.what(), kBadInput);
-  }
+  cv::setNumThreads(1);
+  cv::setRNGSeed(static_cast<int>(options.seed));
+  const Json out = to_json(options.data.empty() ? measure_generated(options) : measure_pictures(options));
+  if (options.json) std::printf("%s\n", out.dump(2).c_str());
+  else print(out);
+  return kOk;
 }
 
 }  // namespace
@@ -186,7 +182,7 @@ void add_eval_sift(CLI::App& eval, EvalSiftOptions& o, int& exit_code) {
   app->add_option("--seed", o.seed, "seed of the scenes (default 1)");
   app->add_option("--frames", o.frames, "number of scenes (default 30)")->check(CLI::Range(1, 100000));
   app->add_flag("--json", o.json, "one JSON object on stdout");
-  app->callback([&] { exit_code = evaluate(o); });
+  call(*app, exit_code, [&o] { return evaluate(o); });
 }
 
 }  // namespace takt::command

@@ -305,29 +305,25 @@ void print(const char* title, const Json& part) {
 }
 
 int evaluate(const EvalSignsOptions& o) {
-  try {
-    cv::setNumThreads(1);
-    const auto signs = read_signs(o.signs.empty() ? shipped("graph/signs") : o.signs);
-    const Json out = !o.crops.empty()    ? judge_crops(signs, o)
-                     : !o.scenes.empty() ? judge_scenes(signs, o)
-                                         : judge_generated(signs, o);
-    if (o.json) {
-      std::printf("%s\n", out.dump(2).c_str());
-      return kOk;
-    }
-    print(!o.crops.empty()    ? "crops, by track"
-          : !o.scenes.empty() ? "photographs"
-                              : "generated scenes, each on its own, no budget",
-          out);
-    if (out.contains("held_out"))
-      print("the same, tracks of odd number alone: held out while signs were drawn", out["held_out"]);
-    if (out.contains("passages"))
-      print(fmt::format("generated passages of 12 frames, budget {:g} ms, tracked", o.budget_ms).c_str(),
-            out["passages"]);
+  cv::setNumThreads(1);
+  const auto signs = read_signs(o.signs.empty() ? shipped("graph/signs") : o.signs);
+  const Json out = !o.crops.empty()    ? judge_crops(signs, o)
+                   : !o.scenes.empty() ? judge_scenes(signs, o)
+                                       : judge_generated(signs, o);
+  if (o.json) {
+    std::printf("%s\n", out.dump(2).c_str());
     return kOk;
-  } catch (const std::exception& error) {
-    return refuse(error.what(), kBadInput);
   }
+  print(!o.crops.empty()    ? "crops, by track"
+        : !o.scenes.empty() ? "photographs"
+                            : "generated scenes, each on its own, no budget",
+        out);
+  if (out.contains("held_out"))
+    print("the same, tracks of odd number alone: held out while signs were drawn", out["held_out"]);
+  if (out.contains("passages"))
+    print(fmt::format("generated passages of 12 frames, budget {:g} ms, tracked", o.budget_ms).c_str(),
+          out["passages"]);
+  return kOk;
 }
 
 }  // namespace
@@ -353,7 +349,7 @@ void add_eval_signs(CLI::App& eval, EvalSignsOptions& o, int& exit_code) {
   app->add_option("--confirm", o.confirm, "images in a row until a sign of a passage counts (default 2)")
       ->check(CLI::Range(1, 12));
   app->add_flag("--json", o.json, "one JSON object on stdout");
-  app->callback([&] { exit_code = evaluate(o); });
+  call(*app, exit_code, [&o] { return evaluate(o); });
 }
 
 }  // namespace takt::command

@@ -86,25 +86,21 @@ void write_maps(const std::string& file, const TerrainMaps& maps) {
 }
 
 int evaluate(const EvalTerrainOptions& options) {
-  try {
-    const TerrainMaps maps = read_terrain(options.maps.empty() ? shipped("graph/terrain.txt") : options.maps).learnt();
-    if (!options.picture.empty()) write_maps(options.picture, maps);
-    const std::vector<Judged> ways = judge(maps, options);
-    Json out;
-    for (const Judged& way : ways) {
-      out[way.name] = {{"right_pct", right_pct(way.counted)},
-                       {"confusion", way.counted},
-                       {"newest_alone_right_pct", right_pct(way.alone)},
-                       {"newest_alone_confusion", way.alone}};
-      if (options.json) continue;
-      print(fmt::format("centre {}, with counters", way.name).c_str(), way.counted);
-      print(fmt::format("centre {}, the newest map alone", way.name).c_str(), way.alone);
-    }
-    if (options.json) std::printf("%s\n", out.dump(2).c_str());
-    return kOk;
-  } catch (const std::exception& error) {
-    return refuse(error.what(), kBadInput);
+  const TerrainMaps maps = read_terrain(options.maps.empty() ? shipped("graph/terrain.txt") : options.maps).learnt();
+  if (!options.picture.empty()) write_maps(options.picture, maps);
+  const std::vector<Judged> ways = judge(maps, options);
+  Json out;
+  for (const Judged& way : ways) {
+    out[way.name] = {{"right_pct", right_pct(way.counted)},
+                     {"confusion", way.counted},
+                     {"newest_alone_right_pct", right_pct(way.alone)},
+                     {"newest_alone_confusion", way.alone}};
+    if (options.json) continue;
+    print(fmt::format("centre {}, with counters", way.name).c_str(), way.counted);
+    print(fmt::format("centre {}, the newest map alone", way.name).c_str(), way.alone);
   }
+  if (options.json) std::printf("%s\n", out.dump(2).c_str());
+  return kOk;
 }
 
 }  // namespace
@@ -116,7 +112,7 @@ void add_eval_terrain(CLI::App& eval, EvalTerrainOptions& o, int& exit_code) {
   app->add_option("--drives", o.drives, "how many, each with the next seed (default 2)")->check(CLI::Range(1, 1000));
   app->add_option("--picture", o.picture, "PNG of the four maps");
   app->add_flag("--json", o.json, "one JSON object on stdout");
-  app->callback([&] { exit_code = evaluate(o); });
+  call(*app, exit_code, [&o] { return evaluate(o); });
 }
 
 }  // namespace takt::command
