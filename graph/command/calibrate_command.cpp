@@ -10,7 +10,7 @@
 #include <optional>
 #include <stdexcept>
 
-#include "graph/command/run_command.hpp"
+#include "graph/cli/outcome.hpp"
 #include "hal/replay/stereo_files.hpp"
 #include "nodes/calibration/calibrate.hpp"
 #include "nodes/calibration/epipolar.hpp"
@@ -294,8 +294,7 @@ int calibrate_stereo(const CalibrateOptions& options) {
     for (const std::string& doubt : out.doubts) std::fprintf(stderr, "takt: warning: %s\n", doubt.c_str());
     return kOk;
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "takt: error: %s\n", error.what());
-    return kBadInput;
+    return refuse(error.what(), kBadInput);
   }
 }
 

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <stdexcept>
 
 #include "graph/cli/outcome.hpp"
 #include "graph/evaluate/evaluations.hpp"
@@ -155,27 +156,22 @@ Json measure(const EvalStereoOptions& options) {
 }
 
 int evaluate(const EvalStereoOptions& options) {
-  try {
-    cv::setNumThreads(1);
-    const Json out = measure(options);
-    if (options.json) {
-      std::printf("%s\n", out.dump(2).c_str());
-      return kOk;
-    }
-    std::printf("%-34s %9s %9s %9s %10s %9s %13s\n", "method", "bad >1px", "bad, all", "bad >0.5", "density %",
-                "CPU ms", "zeta: right, wrong");
-    print_row("takt stereo", out);
-    print_row("takt stereo, level half", out["levels"]["half"]);
-    print_row("takt stereo, level half_range", out["levels"]["half_range"]);
-    if (out.contains("variants"))
-      for (const auto& [name, variant] : out["variants"].items()) print_row(name.c_str(), variant);
-    for (const auto& [name, peer] : out["peers"].items()) print_row(name.c_str(), peer);
-    print_row("half the search range everywhere", out["baseline"]);
+  cv::setNumThreads(1);
+  const Json out = measure(options);
+  if (options.json) {
+    std::printf("%s\n", out.dump(2).c_str());
     return kOk;
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "takt: error: %s\n", error.what());
-    return kBadInput;
   }
+  std::printf("%-34s %9s %9s %9s %10s %9s %13s\n", "method", "bad >1px", "bad, all", "bad >0.5", "density %", "CPU ms",
+              "zeta: right, wrong");
+  print_row("takt stereo", out);
+  print_row("takt stereo, level half", out["levels"]["half"]);
+  print_row("takt stereo, level half_range", out["levels"]["half_range"]);
+  if (out.contains("variants"))
+    for (const auto& [name, variant] : out["variants"].items()) print_row(name.c_str(), variant);
+  for (const auto& [name, peer] : out["peers"].items()) print_row(name.c_str(), peer);
+  print_row("half the search range everywhere", out["baseline"]);
+  return kOk;
 }
 
 }  // namespace
@@ -201,10 +197,10 @@ void add_eval_stereo(CLI::App& eval, EvalStereoOptions& o, int& exit_code) {
   app->add_option("--set", o.set, "parameter=value of the stereo node, repeatable");
   app->add_flag("--variants", o.variants, "every way of matching, too: costs, windows, selections");
   app->add_flag("--json", o.json, "one JSON object on stdout");
-  app->callback([&] {
+  call(*app, exit_code, [&o] {
     if (o.left.empty() && o.scene.empty() && o.sweep.empty())
-      throw CLI::RequiredError("--left, --right and --gt of a recorded pair, or --scene, or --sweep,");
-    exit_code = o.sweep.empty() ? evaluate(o) : sweep_stereo(o);
+      throw std::invalid_argument("stereo wants --left, --right and --gt of a recorded pair, or --scene, or --sweep");
+    return o.sweep.empty() ? evaluate(o) : sweep_stereo(o);
   });
 }
 

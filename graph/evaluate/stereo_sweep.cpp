@@ -72,51 +72,46 @@ std::vector<Method> methods(const EvalStereoOptions& options) {
 }  // namespace
 
 int sweep_stereo(const EvalStereoOptions& options) {
-  try {
-    const bool noise = options.sweep == "noise";
-    const std::vector<double> values =
-        noise ? std::vector<double>{0, 1, 2, 3, 4, 5, 6} : std::vector<double>{3, 5, 7, 9, 11, 15, 19, 23, 27, 31};
-    const std::vector<Method> all = methods(options);
-    std::vector<picture::Curve> bad, time;
-    nlohmann::ordered_json rows = nlohmann::ordered_json::array();
-    for (const Method& method : all) {
-      bad.push_back({fmt::format("bad > 1 px, %: {}", method.name), {}});
-      time.push_back({fmt::format("CPU ms: {}", method.name), {}});
-      for (const double value : values) {
-        MatcherParameters p = method.parameters;
-        if (!noise) {
-          p.n_square = static_cast<int>(value);
-          p.n_min = std::min(p.n_min, p.n_square);
-        }
-        const Reading r = read(p, noise ? value : 2);
-        bad.back().values.push_back(r.bad_pct);
-        time.back().values.push_back(r.time_ms);
-        rows.push_back(
-            {{"method", method.name}, {options.sweep, value}, {"bad_1px_pct", r.bad_pct}, {"time_ms", r.time_ms}});
+  const bool noise = options.sweep == "noise";
+  const std::vector<double> values =
+      noise ? std::vector<double>{0, 1, 2, 3, 4, 5, 6} : std::vector<double>{3, 5, 7, 9, 11, 15, 19, 23, 27, 31};
+  const std::vector<Method> all = methods(options);
+  std::vector<picture::Curve> bad, time;
+  nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+  for (const Method& method : all) {
+    bad.push_back({fmt::format("bad > 1 px, %: {}", method.name), {}});
+    time.push_back({fmt::format("CPU ms: {}", method.name), {}});
+    for (const double value : values) {
+      MatcherParameters p = method.parameters;
+      if (!noise) {
+        p.n_square = static_cast<int>(value);
+        p.n_min = std::min(p.n_min, p.n_square);
       }
+      const Reading r = read(p, noise ? value : 2);
+      bad.back().values.push_back(r.bad_pct);
+      time.back().values.push_back(r.time_ms);
+      rows.push_back(
+          {{"method", method.name}, {options.sweep, value}, {"bad_1px_pct", r.bad_pct}, {"time_ms", r.time_ms}});
     }
-    if (options.json) {
-      std::printf("%s\n", rows.dump(2).c_str());
-    } else {
-      std::printf("%-18s", noise ? "sigma, grey levels" : "n_square, px");
-      for (const Method& method : all) std::printf(" %18s", method.name);
-      std::printf("   (bad > 1 px %% / CPU ms)\n");
-      for (size_t i = 0; i < values.size(); ++i) {
-        std::printf("%-18g", values[i]);
-        for (size_t m = 0; m < all.size(); ++m)
-          std::printf(" %18s", fmt::format("{:.1f} / {:.2f}", bad[m].values[i], time[m].values[i]).c_str());
-        std::printf("\n");
-      }
-    }
-    if (!options.picture.empty()) {
-      if (!noise) bad.insert(bad.end(), time.begin(), time.end());
-      picture::write_curves(options.picture, noise ? "sigma" : "n_square", values, bad);
-    }
-    return kOk;
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "takt: error: %s\n", error.what());
-    return kBadInput;
   }
+  if (options.json) {
+    std::printf("%s\n", rows.dump(2).c_str());
+  } else {
+    std::printf("%-18s", noise ? "sigma, grey levels" : "n_square, px");
+    for (const Method& method : all) std::printf(" %18s", method.name);
+    std::printf("   (bad > 1 px %% / CPU ms)\n");
+    for (size_t i = 0; i < values.size(); ++i) {
+      std::printf("%-18g", values[i]);
+      for (size_t m = 0; m < all.size(); ++m)
+        std::printf(" %18s", fmt::format("{:.1f} / {:.2f}", bad[m].values[i], time[m].values[i]).c_str());
+      std::printf("\n");
+    }
+  }
+  if (!options.picture.empty()) {
+    if (!noise) bad.insert(bad.end(), time.begin(), time.end());
+    picture::write_curves(options.picture, noise ? "sigma" : "n_square", values, bad);
+  }
+  return kOk;
 }
 
 }  // namespace takt::command

@@ -56,8 +56,8 @@ class LaserSession {
   virtual LineOrder farewell() = 0;
   /// Whole sweeps that came, also those that receive() did not return for a newer one; since the first begin().
   virtual uint64_t sweeps() const = 0;
-  /// Sweeps that the device made, by its numbers or its pace, and that did not come whole; since the first begin(). By
-  /// its pace one that was late may count until the next one has come in time.
+  /// Sweeps that the device made while it streamed, by its numbers or its pace, and that did not come whole; since the
+  /// first begin(). By its pace one that was late may count until the next one has come in time.
   virtual uint64_t missing() const = 0;
   /// How often bytes came that belong to no telegram; since the first begin().
   virtual uint64_t resyncs() const = 0;

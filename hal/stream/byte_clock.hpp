@@ -68,7 +68,8 @@ class PeriodicInstants {
     return last_ns_ = std::min(seen_ns, expected);
   }
   /// From the instant before to this one: 1, more where some were not seen, 0 where the one before had been seen so
-  /// late that one too many was counted. In sum they are right whenever an instant has been seen in time.
+  /// late that one too many was counted. In sum they are right once an instant has been seen in time; where many of
+  /// them in a row come a period and more late, one may stay counted too many or too few.
   int64_t periods() const { return periods_; }
 
  private:
