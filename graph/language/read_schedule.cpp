@@ -235,7 +235,7 @@ void Loader::check_schedule() {
   });
   if (!high && !spec_.nodes.empty())
     problem(schedule_.key_at("/nodes"),
-            "no node has criticality high; name at least one that must never give way "
+            "no node has criticality high, devices apart; name at least one that must never give way "
             "(criticality: high)");
   for (const auto& [id, entry] : entries)
     if (entry.on) check_on(id, entry);

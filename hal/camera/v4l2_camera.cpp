@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "hal/camera/v4l2_camera.hpp"
 
+#include <fcntl.h>
 #include <linux/videodev2.h>
 #include <poll.h>
 
@@ -31,8 +32,12 @@ int64_t to_ns(const timeval& t) { return (int64_t{t.tv_sec} * 1'000'000 + t.tv_u
 }  // namespace
 
 V4l2Camera::V4l2Camera(std::string id, V4l2CameraSettings settings, std::unique_ptr<VideoDevice> device,
-                       const Clock& clock)
-    : id_(std::move(id)), settings_(std::move(settings)), device_(std::move(device)), clock_(clock) {
+                       const Clock& clock, std::unique_ptr<FrameTrigger> trigger)
+    : id_(std::move(id)),
+      settings_(std::move(settings)),
+      device_(std::move(device)),
+      trigger_(std::move(trigger)),
+      clock_(clock) {
   settings_.layout.width = settings_.rig.width;
   settings_.layout.height = settings_.rig.height;
   rate_hz_ = settings_.rate.hz();
@@ -69,6 +74,8 @@ DeviceResult V4l2Camera::open() {
 }
 
 V4l2Camera::Trouble V4l2Camera::claim() {
+  if (const int error = trigger_ ? trigger_->open() : 0; error != 0)
+    return {"cannot be had", error, Trouble::Of::trigger};
   if (const int error = device_->open(settings_.path); error != 0) return {"cannot be opened", error};
   v4l2_capability capability{};
   if (const int error = device_->control(VIDIOC_QUERYCAP, &capability); error != 0)
@@ -130,20 +137,38 @@ V4l2Camera::Trouble V4l2Camera::map_buffers() {
   request.memory = V4L2_MEMORY_MMAP;
   if (const int error = device_->control(VIDIOC_REQBUFS, &request); error != 0) return {"gives no buffers", error};
   if (request.count < 2) return {"gives fewer than two buffers", 0};
+  if (settings_.dmabuf && request.count < 3) return {"gives fewer than three buffers, one of which is to be lent", 0};
   for (uint32_t i = 0; i < std::min(request.count, kMostBuffers); ++i) {
     v4l2_buffer buffer = buffer_of(i);
     if (const int error = device_->control(VIDIOC_QUERYBUF, &buffer); error != 0) return {"hides a buffer", error};
     buffers_[i] = device_->map(buffer.length, buffer.m.offset);
     if (buffers_[i].empty()) return {"has a buffer that cannot be mapped", errno};
     buffer_count_ = i + 1;
+    if (const Trouble trouble = export_buffer(i)) return trouble;
   }
   return {};
 }
 
+V4l2Camera::Trouble V4l2Camera::export_buffer(uint32_t index) {
+  if (!settings_.dmabuf) return {};
+  v4l2_exportbuffer request{};
+  request.type = kCapture;
+  request.index = index;
+  request.flags = O_RDONLY | O_CLOEXEC;
+  if (const int error = device_->control(VIDIOC_EXPBUF, &request); error != 0)
+    return {"exports no buffer", error, Trouble::Of::export_};
+  exported_[index] = Descriptor(request.fd);
+  return {};
+}
+
 void V4l2Camera::release() {
-  for (uint32_t i = 0; i < buffer_count_; ++i) device_->unmap(buffers_[i]);
+  for (uint32_t i = 0; i < buffer_count_; ++i) {
+    device_->unmap(buffers_[i]);
+    exported_[i].close();
+  }
   buffer_count_ = 0;
   device_->close();
+  if (trigger_) trigger_->close();
 }
 
 void V4l2Camera::close() {
@@ -162,8 +187,17 @@ std::string V4l2Camera::offered_formats() {
 }
 
 DeviceResult V4l2Camera::told(const Trouble& trouble) {
+  if (trouble.of == Trouble::Of::trigger) {
+    const FrameTriggerSettings& line = trigger_->settings();
+    return device_failure(
+        id_, line.chip + ": trigger line `" + line.line + "` " + trouble.what + ": " + std::strerror(trouble.error),
+        trouble.error == EBUSY ? "end the program that holds it: gpioinfo names it"
+                               : "name a chip and a line of this machine: gpioinfo");
+  }
   const std::string what = settings_.path + ": " + trouble.what + (trouble.error != 0 ? ": " : "") +
                            (trouble.error != 0 ? std::strerror(trouble.error) : "");
+  if (trouble.of == Trouble::Of::export_)
+    return device_failure(id_, what, "the device's driver does not offer it: leave `dmabuf` out");
   switch (trouble.error) {
     case ENOENT:
     case ENODEV:
@@ -188,6 +222,7 @@ DeviceResult V4l2Camera::start(int64_t epoch_ns) {
 
 V4l2Camera::Trouble V4l2Camera::stream() {
   stop();
+  if (trigger_) trigger_->start();
   for (uint32_t i = 0; i < buffer_count_; ++i) {
     if (!queue(i)) return {"does not take a buffer", errno};
   }
@@ -195,7 +230,8 @@ V4l2Camera::Trouble V4l2Camera::stream() {
   if (const int error = device_->control(VIDIOC_STREAMON, &type); error != 0) return {"does not stream", error};
   streaming_ = true;
   any_ = counts_itself_ = false;
-  io_errors_in_row_ = 0;
+  io_errors_in_row_ = untriggered_in_row_ = 0;
+  lent_ = -1;
   alive_ns_ = clock_.now_ns();
   return {};
 }
@@ -206,6 +242,7 @@ void V4l2Camera::stop() {
   uint32_t type = kCapture;
   device_->control(VIDIOC_STREAMOFF, &type);
   streaming_ = false;
+  lent_ = -1;
 }
 
 bool V4l2Camera::restart(int64_t) {
@@ -232,8 +269,18 @@ StereoFormat V4l2Camera::format() const {
           layout.channels(),
           settings_.rig.rectified,
           settings_.rig.camera(),
-          rate_hz_,
+          trigger_ ? 0 : rate_hz_,
           camera_in_robot(settings_.rig, 0, 0)};
+}
+
+const char* V4l2Camera::trouble() const {
+  return untriggered_in_row_ < kIoErrorsToLoss
+             ? ""
+             : "frames come half a period off every trigger pulse: `stamp_delay`, or the camera's trigger mode";
+}
+
+void V4l2Camera::trigger(int64_t at_ns) {
+  if (trigger_) trigger_->ask(at_ns);
 }
 
 bool V4l2Camera::queue(uint32_t index) {
@@ -268,8 +315,8 @@ V4l2Camera::Taken V4l2Camera::take_newest(Frame& frame) {
     const Taken taken = take_one(next);
     if (taken == Taken::lost) return taken;
     if (taken == Taken::none) break;
-    if (next.stamp_ns < epoch_ns_ || repeats(next)) {
-      ++(next.stamp_ns < epoch_ns_ ? counters_.skipped : counters_.repeated);
+    if (uint64_t* const counter = left_out(next); counter != nullptr) {
+      ++*counter;
       if (!queue(next.index)) return Taken::lost;
       continue;
     }
@@ -282,6 +329,23 @@ V4l2Camera::Taken V4l2Camera::take_newest(Frame& frame) {
     held = true;
   }
   return held ? Taken::frame : Taken::none;
+}
+
+/// The frame becomes that of the pulse it is of, if it is of one.
+bool V4l2Camera::match(Frame& frame) {
+  const FrameTrigger::Pulse* pulse = trigger_->of(frame.stamp_ns, settings_.rate.period_ns() / 2);
+  untriggered_in_row_ = pulse != nullptr ? 0 : untriggered_in_row_ + 1;
+  if (pulse == nullptr) return false;
+  frame.sequence = pulse->number;
+  frame.stamp_ns = pulse->stamp_ns;
+  return true;
+}
+
+/// What counts the frame, if it is not to be delivered.
+uint64_t* V4l2Camera::left_out(Frame& frame) {
+  if (trigger_ && !match(frame)) return &counters_.untriggered;
+  if (frame.stamp_ns < epoch_ns_) return &counters_.skipped;
+  return repeats(frame) ? &counters_.repeated : nullptr;
 }
 
 bool V4l2Camera::repeats(const Frame& frame) const {
@@ -300,6 +364,7 @@ void V4l2Camera::count(const Frame& frame) {
 StereoFrame V4l2Camera::read(ImageView<uint8_t> left, ImageView<uint8_t> right, int64_t deadline_ns) {
   if (lost_) return lose();
   if (!streaming_) return {};
+  if (trigger_ && trigger_->give() != 0) return lose();
   Frame frame;
   Taken taken = take_newest(frame);
   if (taken == Taken::none) {
@@ -343,8 +408,15 @@ StereoFrame V4l2Camera::deliver(const Frame& frame, ImageView<uint8_t> left, Ima
   result.frame_number = number_ = counts_itself_ ? number_ + 1 : frame.sequence - first_sequence_;
   counters_.damaged += whole ? 0 : 1;
   ++counters_.frames;
-  // The pixels are in the message: the buffer goes back before anybody works on them.
-  return queue(frame.index) ? result : lose();
+  return give_back(frame.index) ? result : lose();
+}
+
+/// The pixels are in the message: the buffer goes back before anybody works on them. One that is lent goes when the
+/// next one is.
+bool V4l2Camera::give_back(uint32_t index) {
+  if (!settings_.dmabuf) return queue(index);
+  const int before = std::exchange(lent_, static_cast<int>(index));
+  return before < 0 || queue(static_cast<uint32_t>(before));
 }
 
 }  // namespace takt::v4l2

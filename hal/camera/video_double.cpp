@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "hal/camera/video_double.hpp"
 
+#include <fcntl.h>
 #include <linux/videodev2.h>
 #include <poll.h>
 #include <sys/eventfd.h>
+#include <sys/mman.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -59,11 +61,31 @@ class VideoDoubleFile final : public VideoDevice {
 };
 
 VideoDouble::VideoDouble(Settings settings, Fill fill, const Clock& clock)
-    : settings_(settings), fill_(std::move(fill)), clock_(clock), wakes_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
-  for (Buffer& buffer : buffers_) buffer.bytes.resize(settings_.frame_bytes);
+    : settings_(std::move(settings)),
+      fill_(std::move(fill)),
+      clock_(clock),
+      wakes_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)),
+      wire_({settings_.trigger_line}, clock) {
+  for (Buffer& buffer : buffers_) {
+    buffer.memory = Descriptor(memfd_create("takt-frame", MFD_CLOEXEC));
+    void* const bytes =
+        ftruncate(buffer.memory.get(), settings_.frame_bytes) != 0
+            ? MAP_FAILED
+            : mmap(nullptr, settings_.frame_bytes, PROT_READ | PROT_WRITE, MAP_SHARED, buffer.memory.get(), 0);
+    if (bytes == MAP_FAILED) throw std::bad_alloc();
+    buffer.bytes = {static_cast<uint8_t*>(bytes), settings_.frame_bytes};
+  }
+  wire_.on_rise([this](uint32_t) {
+    const uint32_t rise = rises_.load(std::memory_order_relaxed);
+    rises_ns_[rise % kMostBuffers].store(clock_.now_ns(), std::memory_order_relaxed);
+    rises_.store(rise + 1, std::memory_order_release);
+  });
 }
 
-VideoDouble::~VideoDouble() { ::close(wakes_); }
+VideoDouble::~VideoDouble() {
+  for (const Buffer& buffer : buffers_) munmap(buffer.bytes.data(), buffer.bytes.size());
+  ::close(wakes_);
+}
 
 std::unique_ptr<VideoDevice> VideoDouble::device() { return std::make_unique<VideoDoubleFile>(*this); }
 
@@ -118,6 +140,7 @@ int VideoDouble::control(unsigned long request, void* argument) {
       buffer.m.offset = buffer.index;
       return 0;
     }
+    case VIDIOC_EXPBUF: return export_buffer(argument);
     case VIDIOC_QBUF: live(); return enqueue(static_cast<v4l2_buffer*>(argument)->index);
     case VIDIOC_DQBUF: return dequeue(argument);
     case VIDIOC_STREAMON: stream_on(); return 0;
@@ -132,6 +155,14 @@ int VideoDouble::set(void* argument) {
   if (wanted.id == V4L2_CID_EXPOSURE_ABSOLUTE) exposure_ = wanted.value;
   if (wanted.id == V4L2_CID_GAIN) gain_ = wanted.value;
   return 0;
+}
+
+int VideoDouble::export_buffer(void* argument) {
+  auto& request = *static_cast<v4l2_exportbuffer*>(argument);
+  if (!settings_.exports) return ENOTTY;
+  if (request.index >= count_) return EINVAL;
+  request.fd = fcntl(buffers_[request.index].memory.get(), F_DUPFD_CLOEXEC, 0);
+  return request.fd >= 0 ? 0 : errno;
 }
 
 int VideoDouble::allocate(void* argument) {
@@ -199,21 +230,35 @@ void VideoDouble::live() {
 void VideoDouble::run_to(int64_t now_ns) {
   const int64_t since_ns = streaming_since_ns_.load();
   if (since_ns == INT64_MIN) return;
-  if (stream_ns_ != since_ns) {
-    stream_ns_ = since_ns;
-    const int64_t trigger_ns = trigger_ns_.load();
-    origin_ns_ = trigger_ns == INT64_MIN ? since_ns : trigger_ns;
-    first_ = next_ = settings_.rate.releases_before(origin_ns_, since_ns);
+  if (stream_ns_ != since_ns) begin_stream(since_ns);
+  if (settings_.trigger_line.empty()) {
+    for (int64_t at_ns; (at_ns = settings_.rate.release_ns(origin_ns_, next_)) <= now_ns;) expose_next(at_ns);
+    return;
   }
-  for (int64_t at_ns; (at_ns = settings_.rate.release_ns(origin_ns_, next_)) <= now_ns;) {
-    const auto k = static_cast<uint32_t>(next_++ - first_);
-    if (how() == Misbehaviour::silent) continue;
-    for (Buffer& buffer : buffers_) {
-      State queued = State::queued;
-      if (!buffer.state.compare_exchange_strong(queued, State::exposes)) continue;
-      expose(buffer, k, at_ns);
-      break;
-    }
+  for (; risen_ != rises_.load(std::memory_order_acquire); ++risen_) {
+    const int64_t at_ns = rises_ns_[risen_ % kMostBuffers].load(std::memory_order_relaxed);
+    if (at_ns < sees_trigger_ns_) continue;
+    sees_trigger_ns_ = at_ns + settings_.rate.period_ns() * 9 / 10;
+    expose_next(at_ns);
+  }
+}
+
+void VideoDouble::begin_stream(int64_t since_ns) {
+  stream_ns_ = since_ns;
+  const int64_t trigger_ns = trigger_ns_.load();
+  origin_ns_ = trigger_ns == INT64_MIN ? since_ns : trigger_ns;
+  first_ = next_ = settings_.trigger_line.empty() ? settings_.rate.releases_before(origin_ns_, since_ns) : 0;
+  sees_trigger_ns_ = since_ns;
+}
+
+void VideoDouble::expose_next(int64_t at_ns) {
+  const auto k = static_cast<uint32_t>(next_++ - first_);
+  if (how() == Misbehaviour::silent) return;
+  for (Buffer& buffer : buffers_) {
+    State queued = State::queued;
+    if (!buffer.state.compare_exchange_strong(queued, State::exposes)) continue;
+    expose(buffer, k, at_ns);
+    return;
   }
 }
 

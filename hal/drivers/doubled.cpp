@@ -122,8 +122,10 @@ Made make_camera(Order& order) {
   camera.bytes_per_line = static_cast<uint32_t>(layout.bytes_per_line);
   camera.frame_bytes = static_cast<uint32_t>(layout.image_bytes());
   camera.rate = rate_of(settings);
+  camera.trigger_line = settings.text("trigger_line", "");
   auto device = std::make_unique<v4l2::VideoDouble>(camera, doubles::frames_in(order.world, *rig, layout), order.clock);
   order.doubled.seams.video = device->device();
+  order.doubled.seams.chip = device->wire().chip();
   auto expose = [&video = *device, lead_ns = std::llround(lead_s * 1e9)](int64_t epoch_ns) {
     video.expose_at(epoch_ns - lead_ns);
   };

@@ -16,6 +16,7 @@
 #include "hal/drivers/sick_lasers.hpp"
 #include "hal/gpio/gpio_lines.hpp"
 #include "hal/gpio/lines_node.hpp"
+#include "hal/gpio/pulse.hpp"
 #include "hal/head/can_head.hpp"
 #include "hal/head/head_node.hpp"
 #include "hal/interaction/console.hpp"
@@ -305,6 +306,35 @@ NodeResult make_can_base(const DeviceConfig& config, Settings& settings, const C
   return closed<BaseNode>(std::move(device), settings);
 }
 
+/// A time of at most so long, both in s.
+int64_t time_ns(Settings& settings, const char* name, double fallback_s, double most_s) {
+  const double time_s = settings.quantity(name, Dimension::time, fallback_s);
+  if (time_s < 0 || time_s > most_s)
+    settings.fail("`" + std::string(name) + "` is out of range", "at most " + std::to_string(most_s) + "s");
+  return static_cast<int64_t>(std::clamp(time_s, 0.0, most_s) * 1e9);
+}
+
+int64_t pulse_ns(Settings& settings, const char* name) {
+  return time_ns(settings, name, 0.0001, static_cast<double>(gpio::kLongestPulse_ns) * 1e-9);
+}
+
+std::unique_ptr<gpio::LineChip> chip_or(std::unique_ptr<gpio::LineChip> seam) {
+  return seam ? std::move(seam) : std::make_unique<gpio::KernelLineChip>();
+}
+
+/// None without a `trigger_line`.
+std::unique_ptr<v4l2::FrameTrigger> trigger_of(Settings& settings, const Clock& clock,
+                                               std::unique_ptr<gpio::LineChip> seam) {
+  v4l2::FrameTriggerSettings trigger;
+  trigger.line = settings.text("trigger_line", "");
+  trigger.chip = settings.text("trigger_chip", "/dev/gpiochip0");
+  trigger.pulse_ns = pulse_ns(settings, "trigger_pulse");
+  if (trigger.line.empty() && (settings.has("trigger_chip") || settings.has("trigger_pulse")))
+    settings.fail("the trigger has no line", "add `trigger_line`, or leave `trigger_chip` and `trigger_pulse` out");
+  if (trigger.line.empty()) return nullptr;
+  return std::make_unique<v4l2::FrameTrigger>(std::move(trigger), chip_or(std::move(seam)), clock);
+}
+
 NodeResult make_v4l2_camera(const DeviceConfig& config, Settings& settings, const Clock& clock, Seams seams) {
   v4l2::V4l2CameraSettings camera;
   camera.path = settings.path("path", true).string();
@@ -326,9 +356,11 @@ NodeResult make_v4l2_camera(const DeviceConfig& config, Settings& settings, cons
   camera.exposure_s = settings.quantity("exposure", Dimension::time, camera.exposure_s);
   camera.gain = settings.quantity("gain", Dimension::number, camera.gain);
   camera.stamp_delay_s = settings.quantity("stamp_delay", Dimension::time, camera.stamp_delay_s);
+  camera.dmabuf = settings.flag("dmabuf", camera.dmabuf);
+  auto trigger = trigger_of(settings, clock, std::move(seams.chip));
   auto device = std::make_unique<v4l2::V4l2Camera>(
       config.id, std::move(camera), seams.video ? std::move(seams.video) : std::make_unique<v4l2::KernelVideoDevice>(),
-      clock);
+      clock, std::move(trigger));
   if (const auto sound = device->check_settings(); !sound) return tl::unexpected(sound.error());
   return closed<StereoCameraNode>(std::move(device), settings, thresholds_of(settings));
 }
@@ -340,17 +372,10 @@ NodeResult make_gpio_lines(const DeviceConfig& config, Settings& settings, const
   lines.outputs = list_of(settings, "outputs", "");
   lines.powered = list_of(settings, "powered", "");
   lines.trigger = settings.text("trigger", "");
-  const auto time_ns = [&](const char* name, double fallback_s, double most_s) {
-    const double time_s = settings.quantity(name, Dimension::time, fallback_s);
-    if (time_s < 0 || time_s > most_s)
-      settings.fail("`" + std::string(name) + "` is out of range", "at most " + std::to_string(most_s) + "s");
-    return static_cast<int64_t>(std::clamp(time_s, 0.0, most_s) * 1e9);
-  };
-  lines.debounce_ns = time_ns("debounce", 0.005, 1.0);
-  lines.pulse_ns = time_ns("pulse", 0.0001, static_cast<double>(gpio::GpioLines::kLongestPulse_ns) * 1e-9);
-  std::unique_ptr<DigitalLines> device = std::make_unique<gpio::GpioLines>(
-      config.id, std::move(lines), seams.chip ? std::move(seams.chip) : std::make_unique<gpio::KernelLineChip>(),
-      clock);
+  lines.debounce_ns = time_ns(settings, "debounce", 0.005, 1.0);
+  lines.pulse_ns = pulse_ns(settings, "pulse");
+  std::unique_ptr<DigitalLines> device =
+      std::make_unique<gpio::GpioLines>(config.id, std::move(lines), chip_or(std::move(seams.chip)), clock);
   return closed<LinesNode>(std::move(device), settings);
 }
 

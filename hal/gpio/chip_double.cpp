@@ -47,8 +47,11 @@ class ChipDoubleFile final : public LineChip {
   }
   int set(size_t slot, bool level) override {
     if (!there()) return ENODEV;
-    slots_[slot]->rises += level && !slots_[slot]->level ? 1 : 0;
-    slots_[slot]->level = level;
+    auto& line = *slots_[slot];
+    const bool rises = level && !line.level;
+    line.rises += rises ? 1 : 0;
+    line.level = level;
+    if (rises && chip_.on_rise_) chip_.on_rise_(static_cast<uint32_t>(&line - chip_.lines_.data()));
     return 0;
   }
   int next_event(size_t slot, LineEvent& event) override {

@@ -27,6 +27,8 @@ class ChipDouble final : public DeviceDouble {
   /// From outside, on a line that is no output.
   void set(uint32_t offset, bool level) { set(offset, level, clock_.now_ns()); }
   bool level(uint32_t offset) const { return lines_[offset].level; }
+  /// Is told of every rise of an output, in the call that drives it. Before the driver opens the chip.
+  void on_rise(std::function<void(uint32_t offset)> told) { on_rise_ = std::move(told); }
   /// How often it was driven high.
   uint32_t rises(uint32_t offset) const { return lines_[offset].rises; }
 
@@ -52,6 +54,7 @@ class ChipDouble final : public DeviceDouble {
 
   const Clock& clock_;
   LevelSource source_;
+  std::function<void(uint32_t)> on_rise_;
   std::vector<Line> lines_;
   std::atomic<Misbehaviour> how_{Misbehaviour::none};
   int64_t lived_ns_ = INT64_MIN;

@@ -3,20 +3,14 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <charconv>
 #include <cstring>
+
+#include "hal/gpio/pulse.hpp"
 
 namespace takt::gpio {
 namespace {
 
 constexpr int kMostEvents = 64;  ///< of a line in one read: four times what the kernel keeps
-
-/// The offset that the text is, if it is one.
-std::optional<uint32_t> offset_of(const std::string& text) {
-  uint32_t offset = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), offset);
-  return error == std::errc{} && end == text.data() + text.size() ? std::optional(offset) : std::nullopt;
-}
 
 }  // namespace
 
@@ -54,8 +48,7 @@ GpioLines::Trouble GpioLines::claim() {
   if (const int error = chip_->open(settings_.chip); error != 0) return {-1, error};
   for (size_t i = 0; i < lines_.size(); ++i) {
     Line& line = lines_[i];
-    auto offset = chip_->find(*line.name);
-    if (!offset) offset = offset_of(*line.name);
+    const auto offset = find_line(*chip_, *line.name);
     const int at = static_cast<int>(i);
     if (!offset) return {at, ENOENT};
     const int error =
@@ -142,15 +135,12 @@ int GpioLines::look(size_t index, LinesReading& reading) {
   return 0;
 }
 
-int GpioLines::pulse(size_t line) {
-  const int64_t before_ns = clock_.now_ns();
-  if (const int error = drive(line, true); error != 0) return error;
-  const int64_t after_ns = clock_.now_ns();
-  while (!clock_.is_virtual() && clock_.now_ns() - after_ns < std::min(settings_.pulse_ns, kLongestPulse_ns)) {
-  }
-  pulse_stamp_ns_ = before_ns + (after_ns - before_ns) / 2;
+int GpioLines::give_pulse(size_t line) {
+  const Pulse given = pulse(*chip_, line, settings_.pulse_ns, clock_);
+  if (given.error != 0) return given.error;
+  pulse_stamp_ns_ = given.stamp_ns;
   ++pulses_;
-  return drive(line, false);
+  return 0;
 }
 
 LinesReading GpioLines::read(int64_t) {
@@ -158,7 +148,7 @@ LinesReading GpioLines::read(int64_t) {
   if (!started_) return reading;
   for (size_t i = 0; i < lines_.size() && !lost_; ++i) {
     const Line& line = lines_[i];
-    if (line.use == Use::trigger) lost_ = pulse(i) != 0;
+    if (line.use == Use::trigger) lost_ = give_pulse(i) != 0;
     else if (line.use == Use::input) lost_ = look(i, reading) != 0;
     else if (line.level) reading.levels |= 1u << i;
   }

@@ -26,8 +26,6 @@ struct GpioLinesSettings {
 /// matters. Outputs fall back to what their hardware rests at when the program ends, in whatever way.
 class GpioLines final : public DigitalLines {
  public:
-  static constexpr int64_t kLongestPulse_ns = 1'000'000;
-
   GpioLines(std::string id, GpioLinesSettings settings, std::unique_ptr<LineChip> chip, const Clock& clock);
   ~GpioLines() override { GpioLines::close(); }
   DeviceResult open() override;
@@ -60,7 +58,7 @@ class GpioLines final : public DigitalLines {
   Trouble claim();
   int look(size_t line, LinesReading& reading);
   int drive(size_t line, bool level);
-  int pulse(size_t line);
+  int give_pulse(size_t line);
 
   std::string id_;
   GpioLinesSettings settings_;

@@ -4,6 +4,7 @@
 #include <gpiod.h>
 
 #include <cerrno>
+#include <charconv>
 
 namespace takt::gpio {
 namespace {
@@ -11,6 +12,13 @@ namespace {
 constexpr const char* kConsumer = "takt";
 
 }  // namespace
+
+std::optional<uint32_t> find_line(LineChip& chip, const std::string& text) {
+  if (const auto offset = chip.find(text)) return offset;
+  uint32_t offset = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), offset);
+  return error == std::errc{} && end == text.data() + text.size() ? std::optional(offset) : std::nullopt;
+}
 
 int KernelLineChip::open(const std::string& path) {
   close();

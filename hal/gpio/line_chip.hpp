@@ -41,6 +41,9 @@ class LineChip {
   virtual int next_event(size_t slot, LineEvent& event) = 0;
 };
 
+/// The offset of the line with that name; else the offset that the text is, if it is one.
+std::optional<uint32_t> find_line(LineChip& chip, const std::string& text);
+
 /// A chip of this machine, through libgpiod 1.6.
 class KernelLineChip final : public LineChip {
  public:

@@ -7,28 +7,25 @@
 #include <doctest/doctest.h>
 #include <fcntl.h>
 #include <linux/tty.h>
-#include <linux/videodev2.h>
 #include <net/if.h>
 #include <sys/ioctl.h>
 #include <termios.h>
 #include <unistd.h>
 
-#include <cstdlib>
 #include <fstream>
 #include <thread>
 
 #include "hal/base/base_double.hpp"
 #include "hal/base/can_base.hpp"
-#include "hal/camera/loopback_double.hpp"
-#include "hal/camera/v4l2_camera.hpp"
 #include "hal/gpio/gpio_lines.hpp"
 #include "hal/head/can_head.hpp"
 #include "hal/head/head_double.hpp"
-#include "tests/conformance/stereo_camera.hpp"
 #include "tests/hil/guest.hpp"
 
 using namespace takt;
+using test::from_environment;
 using test::kMs;
+using test::level_of;
 using test::shell;
 using test::sleep_until;
 
@@ -252,120 +249,11 @@ TEST_CASE("hil: slcan, bus-off of a controller and its way back") {
   CHECK(accepted() == 2);
 }
 
-namespace {
-
-uint8_t byte_of_frame(uint32_t number, size_t i) { return static_cast<uint8_t>(i == 0 ? number : i * 7 + number); }
-
-v4l2::V4l2CameraSettings camera_settings(const char* path, v4l2::FrameFormat format) {
-  v4l2::V4l2CameraSettings settings;
-  settings.path = path;
-  settings.rig.width = format == v4l2::FrameFormat::y16 ? 640 : 320;  // of a frame of 640
-  settings.rig.height = 480;
-  settings.rig.rectified = false;
-  settings.layout.format = format;
-  if (settings.layout.side_by_side()) std::swap(settings.layout.left, settings.layout.right);
-  return settings;
-}
-
-}  // namespace
-
-TEST_CASE("hil: stereo_camera on v4l2loopback, bit by bit") {
-  constexpr const char* kPath = "/dev/video0";
-  MonotonicClock clock;
-  const auto settings = camera_settings(kPath, v4l2::FrameFormat::y16);
-  v4l2::LoopbackDouble::Settings fed{kPath, settings.layout, settings.rate};
-  fed.layout.width = settings.rig.width;
-  fed.layout.height = settings.rig.height;
-  uint32_t fed_number = 0;
-  v4l2::LoopbackDouble feeder(fed, [&](uint32_t number, int64_t, std::span<uint8_t> frame) {
-    fed_number = number;
-    for (size_t i = 0; i < frame.size(); ++i) frame[i] = byte_of_frame(number, i);
-  });
-  REQUIRE(feeder.plug_in().has_value());
-  feeder.run_to(clock.now_ns());  // there is nothing to be opened before
-  v4l2::V4l2Camera camera("camera", settings, std::make_unique<v4l2::KernelVideoDevice>(), clock);
-  const auto pace = [&](int64_t at_ns) {
-    feeder.run_to(at_ns);
-    sleep_until(at_ns);
-  };
-  test::check_streaming_camera(camera, clock, pace);
-
-  REQUIRE(camera.open().has_value());
-  REQUIRE(camera.start(clock.now_ns()).has_value());
-  test::GuardedImage left(camera.format()), right(camera.format());
-  int compared = 0;
-  for (int k = 0; k < 20; ++k) {
-    pace(clock.now_ns() + 67 * kMs);
-    const StereoFrame frame = camera.read(left.view(), right.view(), clock.now_ns() + 67 * kMs);
-    if (frame.status != ReadStatus::ok) continue;
-    const uint32_t number = right.view().at(0, 0);  // byte 0 of the frame
-    size_t wrong = 0;
-    for (int y = 0; y < 480; ++y) {
-      for (int x = 0; x < 640; ++x) {
-        const auto i = static_cast<size_t>(2 * (y * 640 + x));
-        wrong += right.view().at(x, y) != byte_of_frame(number, i) ? 1 : 0;
-        wrong += left.view().at(x, y) != byte_of_frame(number, i + 1) ? 1 : 0;
-      }
-    }
-    CHECK(wrong == 0);
-    CHECK(number == (fed_number & 0xFF));
-    ++compared;
-  }
-  CHECK(compared >= 15);
-}
-
-TEST_CASE("hil: stereo_camera on vivid, side by side, and its errors are told") {
-  MonotonicClock clock;
-  v4l2::V4l2Camera camera("camera", camera_settings("/dev/video30", v4l2::FrameFormat::grey),
-                          std::make_unique<v4l2::KernelVideoDevice>(), clock);
-  test::check_streaming_camera(camera, clock, [](int64_t) {});
-
-  REQUIRE(camera.open().has_value());
-  REQUIRE(camera.start(clock.now_ns()).has_value());
-  test::GuardedImage left(camera.format()), right(camera.format());
-  const auto until = [&](ReadStatus status) {
-    for (int k = 0; k < 30; ++k) {
-      const StereoFrame frame = camera.read(left.view(), right.view(), clock.now_ns() + 200 * kMs);
-      if (frame.status == status) return true;
-      if (frame.status == ReadStatus::disconnected) camera.restart(clock.now_ns());
-    }
-    return false;
-  };
-  const auto control = [](const std::string& set) { shell("v4l2-ctl -d /dev/video30 -c " + set); };
-  REQUIRE(until(ReadStatus::ok));
-  bool told = false;
-  for (int k = 0; k < 5 && !told; ++k) {  // where the guest is slow a newer frame may stand before the damaged one
-    control("inject_v4l2_buf_flag_error=1");
-    told = until(ReadStatus::partial);
-  }
-  CHECK(told);
-  CHECK(until(ReadStatus::ok));
-  const uint64_t missing = camera.counters().missing;
-  control("percentage_of_dropped_buffers=60");
-  for (int k = 0; k < 20; ++k) camera.read(left.view(), right.view(), clock.now_ns() + 200 * kMs);
-  control("percentage_of_dropped_buffers=0");
-  CHECK(camera.counters().missing > missing);
-  control("inject_fatal_streaming_error=1");
-  CHECK(until(ReadStatus::disconnected));
-  CHECK(until(ReadStatus::ok));
-  control("disconnect=1");
-  CHECK(until(ReadStatus::disconnected));
-  CHECK(until(ReadStatus::ok));
-}
-
 TEST_CASE("hil: digital_lines on gpio-sim") {
-  const char* chip = std::getenv("HIL_GPIO_CHIP");
-  const char* lines = std::getenv("HIL_GPIO_LINES");
-  REQUIRE(chip != nullptr);
-  REQUIRE(lines != nullptr);
+  const std::string chip = from_environment("HIL_GPIO_CHIP"), lines = from_environment("HIL_GPIO_LINES");
   const auto pull = [&](bool up) {
-    std::ofstream(std::string(lines) + "/sim_gpio1/pull") << (up ? "pull-up" : "pull-down");
+    std::ofstream(lines + "/sim_gpio1/pull") << (up ? "pull-up" : "pull-down");
     sleep_until(MonotonicClock().now_ns() + 100 * kMs);  // the simulated interrupt's work
-  };
-  const auto power = [&] {
-    std::string value;
-    std::ifstream(std::string(lines) + "/sim_gpio2/value") >> value;
-    return value;
   };
   MonotonicClock clock;
   pull(true);
@@ -377,7 +265,7 @@ TEST_CASE("hil: digital_lines on gpio-sim") {
   pull(true);
   REQUIRE(device.open().has_value());
   REQUIRE(device.start(clock.now_ns()).has_value());
-  CHECK(power() == "1");
+  CHECK(level_of("sim_gpio2") == "1");
   device.read(clock.now_ns());
   const int64_t before_ns = clock.now_ns();
   pull(false);
@@ -392,5 +280,5 @@ TEST_CASE("hil: digital_lines on gpio-sim") {
   REQUIRE_FALSE(opened.has_value());
   CHECK(opened.error().text().find("gpioinfo names it") != std::string::npos);
   device.stop();
-  CHECK(power() == "0");
+  CHECK(level_of("sim_gpio2") == "0");
 }

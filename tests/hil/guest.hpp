@@ -6,6 +6,7 @@
 
 #include <cerrno>
 #include <cstdlib>
+#include <fstream>
 #include <string>
 
 #include "rt/time/clock.hpp"
@@ -22,5 +23,18 @@ inline void sleep_until(int64_t monotonic_ns) {
 inline void sleep_for(int64_t ns) { sleep_until(MonotonicClock().now_ns() + ns); }
 
 inline void shell(const std::string& command) { REQUIRE_MESSAGE(std::system(command.c_str()) == 0, command); }
+
+inline std::string from_environment(const char* name) {
+  const char* value = std::getenv(name);
+  REQUIRE(value != nullptr);
+  return value;
+}
+
+/// What gpio-sim says of a line: 0 or 1.
+inline std::string level_of(const std::string& line) {
+  std::string value;
+  std::ifstream(from_environment("HIL_GPIO_LINES") + "/" + line + "/value") >> value;
+  return value;
+}
 
 }  // namespace takt::test

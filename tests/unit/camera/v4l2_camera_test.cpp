@@ -3,6 +3,7 @@
 #include "hal/camera/v4l2_camera.hpp"
 
 #include <doctest/doctest.h>
+#include <sys/mman.h>
 
 #include "hal/camera/video_double.hpp"
 #include "tests/conformance/stereo_camera.hpp"
@@ -32,7 +33,7 @@ V4l2CameraSettings settings_of(FrameFormat format, Mosaic mosaic = Mosaic::none)
   return settings;
 }
 
-VideoDouble::Settings double_of(const V4l2CameraSettings& settings) {
+VideoDouble::Settings double_of(const V4l2CameraSettings& settings, const std::string& trigger_line = "") {
   FrameLayout layout = settings.layout;
   layout.width = settings.rig.width;
   layout.height = settings.rig.height;
@@ -43,7 +44,13 @@ VideoDouble::Settings double_of(const V4l2CameraSettings& settings) {
   camera.bytes_per_line = static_cast<uint32_t>(layout.row_bytes()) + 4;  // padded
   camera.frame_bytes = camera.bytes_per_line * camera.height;
   camera.rate = settings.rate;
+  camera.trigger_line = trigger_line;
   return camera;
+}
+
+std::unique_ptr<FrameTrigger> trigger_of(VideoDouble& device, const std::string& line, const Clock& clock) {
+  if (line.empty()) return nullptr;
+  return std::make_unique<FrameTrigger>(FrameTriggerSettings{"/dev/chip-double", line}, device.wire().chip(), clock);
 }
 
 void fill(uint32_t k, int64_t, std::span<uint8_t> frame) {
@@ -63,23 +70,24 @@ struct Bench {
   VirtualClock clock{5'000'000'000};
   V4l2CameraSettings settings;
   VideoDouble device;
-  V4l2Camera driver;
+  V4l2Camera driver;  ///< has a trigger if the double has
   test::GuardedImage left, right;
   StereoFrame frame;
 
-  explicit Bench(V4l2CameraSettings s = settings_of(FrameFormat::y16))
+  explicit Bench(V4l2CameraSettings s = settings_of(FrameFormat::y16), const std::string& trigger_line = "")
       : settings(std::move(s)),
-        device(double_of(settings), fill, clock),
-        driver("camera", settings, device.device(), clock),
+        device(double_of(settings, trigger_line), fill, clock),
+        driver("camera", settings, device.device(), clock, trigger_of(device, trigger_line, clock)),
         left(format_of(settings)),
         right(left) {}
   void start() {
     REQUIRE(driver.open().has_value());
     REQUIRE(driver.start(clock.now_ns()).has_value());
   }
-  /// After so many milliseconds.
+  /// After so many milliseconds, with a pulse if it is triggered.
   StereoFrame read(int64_t after_ms = 67) {
     clock.advance_to(clock.now_ns() + after_ms * kMs);
+    driver.trigger(clock.now_ns());
     return frame = driver.read(left.view(), right.view(), clock.now_ns() + 60 * kMs);
   }
 };
@@ -241,4 +249,135 @@ TEST_CASE("v4l2 camera: a camera that another program holds is told as busy") {
   CHECK(opened.error().text().find("fuser") != std::string::npos);
   bench.read();
   CHECK(bench.frame.status == ReadStatus::ok);  // the first one goes on
+}
+
+TEST_CASE("v4l2 camera: with a trigger line it conforms, and each frame has number and stamp of its pulse") {
+  Bench bench(settings_of(FrameFormat::y16), "camera_trigger");
+  test::check_streaming_camera(bench.driver, bench.clock, [&](int64_t at_ns) { bench.clock.advance_to(at_ns); });
+  CHECK(bench.driver.counters().untriggered == 0);
+  CHECK(bench.driver.format().rate_hz == 0);
+
+  bench.start();
+  for (uint32_t k = 0; k < 20; ++k) {
+    bench.device.misbehave(k == 7 || k == 8 ? Misbehaviour::silent : Misbehaviour::none);
+    bench.read();
+    if (k == 7 || k == 8) {
+      CHECK(bench.frame.status == ReadStatus::no_data);
+      continue;
+    }
+    REQUIRE(bench.frame.status == ReadStatus::ok);
+    CHECK(bench.frame.frame_number == k);
+    CHECK(bench.frame.stamp_ns == bench.clock.now_ns());
+  }
+  CHECK(bench.driver.counters().missing == 2);
+  CHECK(bench.device.wire().rises(0) == 40);  // of the suite's two runs, too
+}
+
+TEST_CASE("v4l2 camera: no pulse comes before its instant, nor twice") {
+  Bench bench(settings_of(FrameFormat::y16), "camera_trigger");
+  bench.start();
+  const auto read = [&] { return bench.driver.read(bench.left.view(), bench.right.view(), INT64_MAX).status; };
+  const int64_t at_ns = bench.clock.now_ns() + 10 * kMs;
+  bench.driver.trigger(at_ns);
+  CHECK(read() == ReadStatus::no_data);
+  CHECK(bench.device.wire().rises(0) == 0);
+  bench.clock.advance_to(at_ns);
+  CHECK(read() == ReadStatus::ok);
+  CHECK(read() == ReadStatus::no_data);
+  CHECK(bench.device.wire().rises(0) == 1);
+  CHECK_FALSE(bench.device.wire().level(0));
+}
+
+TEST_CASE("v4l2 camera: a trigger that is too fast gives every second frame, and the others are missing") {
+  Bench bench(settings_of(FrameFormat::y16), "camera_trigger");
+  bench.start();
+  int frames = 0;
+  for (int k = 0; k < 40; ++k) frames += bench.read(40).status == ReadStatus::ok ? 1 : 0;
+  CHECK(frames == 20);
+  CHECK(bench.driver.counters().missing == 19);  // what comes after the last one is not known yet
+}
+
+TEST_CASE("v4l2 camera: frames of no pulse are left out, and the reason is told") {
+  Bench bench;  // exposes at its own rate, whatever its driver's line does
+  gpio::ChipDouble chip({"spare"}, bench.clock);
+  V4l2Camera driver("camera", bench.settings, bench.device.device(), bench.clock,
+                    std::make_unique<FrameTrigger>(FrameTriggerSettings{"chip", "0"}, chip.chip(), bench.clock));
+  REQUIRE(driver.open().has_value());
+  REQUIRE(driver.start(bench.clock.now_ns()).has_value());
+  CHECK(std::string(driver.trouble()).empty());
+  for (int k = 0; k < 5; ++k) {
+    bench.clock.advance_to(bench.clock.now_ns() + 67 * kMs);
+    CHECK(driver.read(bench.left.view(), bench.right.view(), bench.clock.now_ns()).status == ReadStatus::no_data);
+  }
+  CHECK(driver.counters().untriggered == 6);
+  CHECK(driver.counters().frames == 0);
+  CHECK(std::string(driver.trouble()).find("stamp_delay") != std::string::npos);
+}
+
+TEST_CASE("v4l2 camera: a trigger line that is lost is a loss of the camera, and comes back with it") {
+  Bench bench(settings_of(FrameFormat::y16), "camera_trigger");
+  bench.start();
+  CHECK(bench.read().status == ReadStatus::ok);
+  bench.device.wire().misbehave(Misbehaviour::unplugged);
+  CHECK(bench.read().status == ReadStatus::disconnected);
+  CHECK_FALSE(bench.driver.restart(bench.clock.now_ns()));
+  bench.device.wire().misbehave(Misbehaviour::none);
+  CHECK(bench.driver.restart(bench.clock.now_ns()));
+  CHECK(bench.read().status == ReadStatus::ok);
+}
+
+TEST_CASE("v4l2 camera: a trigger line that cannot be had is told with chip and line") {
+  Bench bench(settings_of(FrameFormat::y16), "camera_trigger");
+  const auto error = [&](const char* line) {
+    V4l2Camera driver("camera", bench.settings, bench.device.device(), bench.clock,
+                      std::make_unique<FrameTrigger>(FrameTriggerSettings{"/dev/chip", line},
+                                                     bench.device.wire().chip(), bench.clock));
+    const auto opened = driver.open();
+    return opened ? std::string() : opened.error().text();
+  };
+  CHECK(error("strobe").find("/dev/chip: trigger line `strobe` cannot be had: No such file") != std::string::npos);
+  bench.start();
+  CHECK(error("camera_trigger").find("gpioinfo names it") != std::string::npos);
+}
+
+TEST_CASE("v4l2 camera: an exported buffer is the frame that was delivered, and stays so until the next one is") {
+  auto settings = settings_of(FrameFormat::y16);
+  settings.dmabuf = true;
+  Bench bench(settings);
+  bench.start();
+  CHECK(bench.driver.exported().size() == 4);
+  CHECK(bench.driver.lent() == -1);
+  const size_t bytes = 36 * 6;
+  const auto matches = [&] {
+    const int buffer = bench.driver.exported()[static_cast<size_t>(bench.driver.lent())].get();
+    void* const memory = mmap(nullptr, bytes, PROT_READ, MAP_SHARED, buffer, 0);
+    REQUIRE(memory != MAP_FAILED);
+    const std::span frame(static_cast<const uint8_t*>(memory), bytes);
+    size_t wrong = 0;
+    for (int y = 0; y < 6; ++y) {
+      for (int x = 0; x < 16; ++x)
+        wrong += bench.left.view().at(x, y) != frame[static_cast<size_t>(y * 36 + 2 * x + 1)] ? 1 : 0;
+    }
+    munmap(memory, bytes);
+    return wrong == 0;
+  };
+  for (int k = 0; k < 10; ++k) {
+    REQUIRE(bench.read().status == ReadStatus::ok);
+    CHECK(matches());
+    bench.clock.advance_to(bench.clock.now_ns() + 500 * kMs);  // more exposures than there are buffers
+    CHECK(matches());
+  }
+  bench.driver.stop();
+  CHECK(bench.driver.lent() == -1);
+  bench.driver.close();
+  CHECK(bench.driver.exported().empty());
+
+  auto without = double_of(settings);
+  without.exports = false;
+  VideoDouble device(without, fill, bench.clock);
+  V4l2Camera driver("camera", settings, device.device(), bench.clock);
+  const auto opened = driver.open();
+  REQUIRE_FALSE(opened.has_value());
+  CHECK(opened.error().text().find("exports no buffer: ") != std::string::npos);
+  CHECK(opened.error().text().find("leave `dmabuf` out") != std::string::npos);
 }

@@ -234,9 +234,10 @@ TEST_CASE("a worker whose reservation is used up goes on beside it, in its job a
   bool granted = false, was_lifted = false;
   std::thread worker([&] {
     Reservation has = deadline_reservation(task.budget_ns, task.deadline_ns, task.rate->period_ns());
+    watch.bind(
+        has);  // before the kernel's account begins: what it sees as used up is never more than what the watch sees
     granted = apply(has).policy == Policy::deadline;  // it reclaims nothing
     if (!granted) return;
-    watch.bind(has);
     const int64_t release_ns = clock.now_ns(), cpu_ns = thread_cpu_ns();
     watch.expect(release_ns);
     if (begun) watch.begin(0, 0, release_ns, cpu_ns + task.budget_ns);
