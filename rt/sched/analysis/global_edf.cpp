@@ -83,13 +83,15 @@ Ticks bounded_response(const std::vector<Sporadic>& tasks, size_t k, const std::
   }
 }
 
-Ticks demand(const Sporadic& i, Ticks length) {
-  return length < i.deadline ? 0 : ((length - i.deadline) / i.period + 1) * i.budget;
-}
+/// What task i can run in a window of that length: by jobs that arrive and are due in it, and with one more that was
+/// released before it.
+struct Demand {
+  Ticks without, with;
+};
 
-Ticks demand_with_carry_in(const Sporadic& i, Ticks length) {
-  const Ticks whole = length / i.period;
-  return whole * i.budget + std::min(i.budget, length - whole * i.period);
+Demand demand(const Sporadic& i, Ticks length) {
+  const Ticks whole = length / i.period, rest = length - whole * i.period;
+  return {(whole + (rest < i.deadline ? 0 : 1)) * i.budget, whole * i.budget + std::min(i.budget, rest)};
 }
 
 /// BAR of one task: the window starts `extra` before the release of the job that would miss.
@@ -102,9 +104,14 @@ class CarryIn {
     std::vector<Ticks> points{0};
     for (const Sporadic& i : tasks_)
       if (!add_points(i, last, max_points, points)) return false;
-    std::sort(points.begin(), points.end());
-    points.erase(std::unique(points.begin(), points.end()), points.end());
-    return std::all_of(points.begin(), points.end(), [&](Ticks extra) { return fits_at(extra); });
+    // Downwards, as QPA goes (Zhang and Burns 2009): what the others take grows with the window, so a shorter one fits
+    // as well, down to where a miss needs no more than that. It leaves out all but a few of the points.
+    for (Ticks extra = last; extra >= 0;) {
+      const Wide taken = taken_at(extra);
+      if (taken >= Wide{m_} * busy_at(extra)) return false;
+      extra = last_up_to(static_cast<Ticks>(taken / m_) - busy_at(0), points);
+    }
+    return true;
   }
 
  private:
@@ -150,28 +157,39 @@ class CarryIn {
     return true;
   }
 
-  bool fits_at(Ticks extra) const {
-    // A miss needs all cores busy with others for longer than `room`, so in whole ticks for one more. Terms cut at
-    // `room` itself would let a single task on one core never fail.
-    const Ticks length = extra + job_.deadline, room = length - job_.budget;
+  /// The largest of the points that are not above `most`; -1 if there is none.
+  static Ticks last_up_to(Ticks most, const std::vector<Ticks>& points) {
+    Ticks last = -1;
+    for (const Ticks point : points)
+      if (point <= most) last = std::max(last, point);
+    return last;
+  }
+
+  /// A miss needs all cores busy with others for longer than the job can spare, so in whole ticks for one more.
+  Ticks busy_at(Ticks extra) const { return extra + job_.deadline - job_.budget + 1; }
+
+  /// What the others can run in that at most on all cores, m - 1 of them with work carried in. Terms cut at what the
+  /// job can spare would let a single task on one core never fail.
+  Wide taken_at(Ticks extra) {
     Wide sum = 0;
-    std::vector<Ticks> more;
+    more_.clear();
     for (size_t i = 0; i < tasks_.size(); ++i) {
-      const Ticks own = i == k_ ? job_.budget : 0, most = i == k_ ? extra : room + 1;
-      const Ticks without = std::min(demand(tasks_[i], length) - own, most);
-      const Ticks with = std::min(demand_with_carry_in(tasks_[i], length) - own, most);
+      const Ticks own = i == k_ ? job_.budget : 0, most = i == k_ ? extra : busy_at(extra);
+      const Demand all = demand(tasks_[i], extra + job_.deadline);
+      const Ticks without = std::min(all.without - own, most);
       sum += without;
-      more.push_back(std::max<Ticks>(0, with - without));
+      more_.push_back(std::max<Ticks>(0, std::min(all.with - own, most) - without));
     }
-    std::sort(more.begin(), more.end(), std::greater<>());
-    for (size_t i = 0; i + 1 < static_cast<size_t>(m_) && i < more.size(); ++i) sum += more[i];
-    return sum < Wide{m_} * (room + 1);
+    const auto carried = more_.begin() + std::min(static_cast<ptrdiff_t>(m_) - 1, std::ssize(more_));
+    std::partial_sort(more_.begin(), carried, more_.end(), std::greater<>());
+    return std::accumulate(more_.begin(), carried, sum);
   }
 
   const std::vector<Sporadic>& tasks_;
   const Sporadic& job_;
   const size_t k_;
   const Ticks m_;
+  std::vector<Ticks> more_;  ///< by task, in the window at hand: what carrying work in adds
 };
 
 }  // namespace
