@@ -25,7 +25,7 @@ constexpr sim::Pinhole kCamera{640, 480, 492.8, 319.5, 239.5};  // 66 degrees
 /// What stands in the room. Faces of the walls look inwards.
 sim::Scene room(uint64_t seed) {
   sim::Scene scene;
-  scene.textures = sim::make_textures(seed);
+  scene.textures = sim::textures_of(seed);
   const std::array<Vec3, 4> floor{Vec3(0, 0, 0), Vec3(kWidth_m, 0, 0), Vec3(kWidth_m, kDepth_m, 0),
                                   Vec3(0, kDepth_m, 0)};
   const Vec3 up(0, 0, kHeight_m);

@@ -313,7 +313,7 @@ StopTrials::StopTrials(graph::GraphSpec yard, Vision vision, uint64_t seed)
       vision_(vision),
       seed_(seed),
       types_(graph::node_types()),
-      textures_(sim::make_textures(seed)) {
+      textures_(sim::textures_of(seed)) {
   // In virtual time it is said below what a job takes: it need not be spent.
   for (graph::NodeSpec& node : yard_.nodes)
     if (node.type == "load") node.params["work"] = {0.0, node.position};

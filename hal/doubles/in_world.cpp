@@ -96,6 +96,7 @@ gpio::LevelSource levels_in(const sim::Simulation& world) {
 }
 
 v4l2::VideoDouble::Fill frames_in(const sim::Simulation& world, StereoRig rig, const v4l2::FrameLayout& layout) {
+  world.scene().textures->make();
   rig.channels = layout.mosaic == v4l2::Mosaic::none ? 1 : 3;
   return
       [&world, eyes = std::make_shared<Eyes>(world, rig, layout)](uint32_t, int64_t at_ns, std::span<uint8_t> frame) {

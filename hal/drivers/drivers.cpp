@@ -123,6 +123,7 @@ NodeResult make_sim_camera(const DeviceConfig& config, Settings& settings, sim::
   camera.rig = *rig;
   camera.rate = rate_of(settings);
   camera.background = settings.flag("background", true);
+  camera.is_read = config.plugged;
   camera.noise.read_sigma = settings.quantity("read_noise", Dimension::number, camera.noise.read_sigma);
   camera.noise.photon_variance = settings.quantity("photon_noise", Dimension::number, camera.noise.photon_variance);
   if (camera.noise.read_sigma < 0 || camera.noise.photon_variance < 0)

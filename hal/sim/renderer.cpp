@@ -93,7 +93,7 @@ void Renderer::prepare_quad(const Quad& quad, const Scene& scene, const CameraPo
   s.iz_x = n.x() / camera_.focal_px;
   s.iz_y = n.y() / camera_.focal_px;
   s.iz_0 = n.z() - s.iz_x * camera_.cu_px - s.iz_y * camera_.cv_px;
-  s.texture = quad.picture ? quad.picture.get() : &(*scene.textures)[static_cast<size_t>(quad.material)];
+  s.texture = quad.picture ? quad.picture.get() : &scene.textures->of(quad.material);
   s.gain = static_cast<float>(quad.gain);
   texture_axes(s, quad.u_axis, quad.u_offset, quad.v_axis, quad.v_offset, pose);
   surfaces_.push_back(s);
@@ -131,7 +131,7 @@ void Renderer::prepare_capsule(const Capsule& capsule, const Scene& scene, const
   r.kernel.axis_axis = static_cast<float>(axis.dot(axis));
   r.kernel.a_axis = static_cast<float>(-a.dot(axis));
   r.kernel.a_a = static_cast<float>(a.dot(a));
-  r.surface.texture = &(*scene.textures)[static_cast<size_t>(capsule.material)];
+  r.surface.texture = &scene.textures->of(capsule.material);
   r.surface.iz_0 = 2.0 / (a.z() + b.z());  // mean depth: good enough to choose a mip level
   // Planar projection of the texture on two oblique horizontal directions and the height: attached to the body.
   texture_axes(r.surface, Vec3(0.8, 0.6, 0.15), 0.0, Vec3(-0.12, 0.09, 1.0), 0.0, pose);
@@ -250,7 +250,7 @@ void Renderer::render(const Scene& scene, const CameraPose& pose, const SensorNo
   rounds_.clear();
   sky_ = Surface{};
   sky_.ua = sky_.ub = sky_.uc = sky_.u0 = sky_.va = sky_.vb = sky_.vc = sky_.v0 = 0;
-  sky_.texture = &(*scene.textures)[static_cast<size_t>(Material::sky)];
+  sky_.texture = &scene.textures->of(Material::sky);
   for (const Scene* part : {scene.fixed, &scene}) {
     if (part == nullptr) continue;
     for (const Quad& quad : part->quads) prepare_quad(quad, *part, pose);

@@ -41,6 +41,7 @@ DeviceResult SimCamera::open() {
   if (rig.channels != 1 && rig.channels != 3) {
     return device_error(id_, "the rig has " + std::to_string(rig.channels) + " channels", "use 1 (grey) or 3 (BGR)");
   }
+  if (settings_.is_read) simulation_.scene().textures->make();
   lens_ = std::make_unique<Lens>(rig);
   for (Request* request : {&made_, &wanted_}) request->snapshot = simulation_.make_snapshot();
   if (settings_.background && !clock_.is_virtual()) {

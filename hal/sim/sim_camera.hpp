@@ -19,6 +19,7 @@ struct SimCameraSettings {
   StereoRig rig;
   SensorNoise noise;
   Rate rate{15, 1};        ///< of exposures while nobody triggers
+  bool is_read = true;     ///< false: somebody only wants to know its format, and nothing is made for images
   bool background = true;  ///< render ahead of time in a thread of its own; ignored with a virtual clock
 };
 

@@ -65,7 +65,7 @@ Stage::Stage(World world, uint64_t seed)
       states_(world_),
       seed_(seed),
       fixed_(without(world_, changing(world_, states_))),
-      scene_(build_scene(fixed_, make_textures(seed))),
+      scene_(build_scene(fixed_, textures_of(seed))),
       changing_(changing(world_, states_)),
       epoch_ns_(kNoEpoch) {
   for (size_t i = 0; i < world_.clients.size(); ++i) {

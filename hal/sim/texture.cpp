@@ -5,7 +5,6 @@
 #include <cmath>
 #include <fstream>
 #include <map>
-#include <mutex>
 
 #include "hal/sim/random.hpp"
 
@@ -58,16 +57,7 @@ constexpr std::array<Recipe, kMaterials> kRecipes{{
      {{{165, 35, 130}, {200, 190, 40}, {150, 60, 225}}},
      64},
     {"asphalt", 512, 250, {92, 88, 86}, 26, 4, 0},
-    {"lime_stripes",
-     256,
-     300,
-     {},
-     20,
-     4,
-     0,
-     Paint::colourful,
-     {{{35, 205, 160}, {25, 70, 140}, {45, 40, 40}}},
-     64},
+    {"lime_stripes", 256, 300, {}, 20, 4, 0, Paint::colourful, {{{35, 205, 160}, {25, 70, 140}, {45, 40, 40}}}, 64},
 }};
 
 const std::array<double, 3>& colour_of_row(const Recipe& recipe, int row) {
@@ -253,14 +243,19 @@ tl::expected<Texture, std::string> load_picture(const std::filesystem::path& fil
   return texture;
 }
 
-std::shared_ptr<const TextureSet> make_textures(uint64_t seed) {
+void TextureSet::make() const {
+  std::call_once(made_, [this] {
+    for (size_t i = 0; i < kRecipes.size(); ++i) textures_[i] = make_texture(kRecipes[i], mix(seed_, i));
+  });
+}
+
+std::shared_ptr<const TextureSet> textures_of(uint64_t seed) {
   static std::mutex mutex;
-  static std::map<uint64_t, std::weak_ptr<const TextureSet>> made;
+  static std::map<uint64_t, std::weak_ptr<const TextureSet>> sets;
   const std::lock_guard lock(mutex);
-  std::weak_ptr<const TextureSet>& known = made[seed];
+  std::weak_ptr<const TextureSet>& known = sets[seed];
   if (auto set = known.lock()) return set;
-  auto set = std::make_shared<TextureSet>();
-  for (size_t i = 0; i < kRecipes.size(); ++i) (*set)[i] = make_texture(kRecipes[i], mix(seed, i));
+  auto set = std::make_shared<const TextureSet>(seed);
   known = set;
   return set;
 }

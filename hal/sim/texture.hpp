@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <string_view>
 #include <tl/expected.hpp>
@@ -48,12 +49,27 @@ constexpr int kMaterials = 15;
 bool material_from(std::string_view name, Material& material);
 std::string_view material_names();
 
-/// All materials of one seed: multi-octave hash noise (and random rectangles on posters), rich at every scale that a
-/// 640 x 480 camera resolves between 0.3 m and 15 m, so that a window of 15 px has texture to match. The striped ones
-/// carry bands of saturated colours: what stands out for a detector that looks at colours. Worlds of one seed share one
-/// set while any of them lives. Any thread.
-using TextureSet = std::array<Texture, kMaterials>;
-std::shared_ptr<const TextureSet> make_textures(uint64_t seed);
+/// All materials of one seed, made when the first of them is asked for (0.15 s): multi-octave hash noise (and random
+/// rectangles on posters), rich at every scale that a 640 x 480 camera resolves between 0.3 m and 15 m, so that a
+/// window of 15 px has texture to match. The striped ones carry bands of saturated colours: what stands out for a
+/// detector that looks at colours. Any thread.
+class TextureSet {
+ public:
+  explicit TextureSet(uint64_t seed) : seed_(seed) {}
+  /// Who is to look in a job asks for it before.
+  void make() const;
+  const Texture& of(Material material) const {
+    make();
+    return textures_[static_cast<size_t>(material)];
+  }
+
+ private:
+  uint64_t seed_;
+  mutable std::once_flag made_;
+  mutable std::array<Texture, kMaterials> textures_;
+};
+/// Worlds of one seed share one set while any of them lives. Any thread.
+std::shared_ptr<const TextureSet> textures_of(uint64_t seed);
 
 /// A picture that is `edge_m` wide and high, from a colour PPM (P6, 8 bit) of 16, 32 ... 1024 pixels a side; v grows
 /// upwards. The error says what is wrong with the file.

@@ -140,7 +140,7 @@ Entry entry_of(const WorldObject& object, const Shape& shape, const std::string&
 }
 
 std::vector<Entry> entries_of(const World& world) {
-  const auto textures = make_textures(kSeed);
+  const auto textures = textures_of(kSeed);
   std::vector<Entry> entries;
   std::set<std::string> types;
   for (size_t i = 0; i < world.objects.size(); ++i) {
