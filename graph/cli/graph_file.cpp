@@ -8,8 +8,12 @@
 
 namespace takt::command {
 
+std::filesystem::path graph_file(const std::filesystem::path& asked) {
+  return asked.empty() ? shipped("graph/ace.yaml") : asked;
+}
+
 std::optional<graph::GraphSpec> load_graph(const std::filesystem::path& file, const graph::LoadOptions& options) {
-  graph::Loaded loaded = graph::load(file.empty() ? shipped("graph/ace.yaml") : file, options, graph::node_types());
+  graph::Loaded loaded = graph::load(graph_file(file), options, graph::node_types());
   if (loaded.graph) return std::move(loaded.graph);
   tell(loaded.problems);
   tell_problems(loaded.problems.size());

@@ -8,8 +8,10 @@
 
 namespace takt::command {
 
-/// Loads only, no device is opened; nothing if the input is wrong, which is then written to stderr. An empty `file` is
-/// the default graph.
+/// What a command line means by that graph: an empty one is the default graph.
+std::filesystem::path graph_file(const std::filesystem::path& asked);
+/// Loads only, no device is opened; nothing if the input is wrong, which is then written to stderr. `file` as for
+/// graph_file().
 std::optional<graph::GraphSpec> load_graph(const std::filesystem::path& file, const graph::LoadOptions& options);
 
 /// Each on a line of stderr.

@@ -34,8 +34,7 @@ graph::DeviceFactory device_factory(Prepared& prepared, uint64_t seed) {
 }  // namespace
 
 int load(const RunOptions& options, Prepared& prepared) {
-  const auto file = options.graph.empty() ? shipped("graph/ace.yaml") : options.graph;
-  graph::Loaded loaded = graph::load(file, options.load, graph::node_types());
+  graph::Loaded loaded = graph::load(graph_file(options.graph), options.load, graph::node_types());
   if (!loaded.graph) return refuse(prepared, std::move(loaded.problems), kBadInput);
   prepared.graph = std::move(loaded.graph);
   if (options.clock == "virtual") prepared.clock = std::make_unique<VirtualClock>(1'000'000'000);

@@ -214,31 +214,45 @@ class Composer {
 
   tl::expected<void, ComposeError> set_up() {
     ComposeError error;
-    std::vector<char> done(result_.plan.tasks.size(), 0);
-    for (const size_t t : setup_order()) {
-      if (owns(result_.plan.tasks[t].name)) set_up_node(t, done, error);
-      done[t] = 1;
-    }
+    std::vector<SetUp> states(result_.plan.tasks.size(), SetUp::not_yet);
+    for (const size_t t : setup_order())
+      states[t] = !owns(result_.plan.tasks[t].name) || set_up_node(t, states, error) ? SetUp::done : SetUp::failed;
     if (!error.problems.empty()) return tl::make_unexpected(std::move(error));
     return {};
   }
 
-  void set_up_node(size_t t, const std::vector<char>& done, ComposeError& error) {
+  enum class SetUp : uint8_t { not_yet, done, failed };
+
+  bool set_up_node(size_t t, const std::vector<SetUp>& states, ComposeError& error) {
     TaskPlan& task = result_.plan.tasks[t];
+    bool sound = true;
     for (const EdgePlan& edge : task.edges) {
       // In a cycle the producer may come later in the order: then its capacity is not known yet, here as elsewhere.
-      const bool known = done[task_index_.at(result_.plan.ports[edge.port].node)] != 0;
-      PortAccess::connect(*task.node->inputs()[edge.input], known ? capacity_of(edge.port) : Capacity{});
+      const SetUp producer = states[task_index_.at(result_.plan.ports[edge.port].node)];
+      InputPort* const input = task.node->inputs()[edge.input];
+      PortAccess::connect(*input, producer == SetUp::done ? capacity_of(edge.port) : Capacity{});
+      // What it would say of an input whose sizes nobody knows is no problem of its own. Of requests it needs none.
+      sound = sound && (producer != SetUp::failed || input == task.node->control());
     }
+    if (sound) sound = call_setup(t, error);
+    for (ParamBase* param : task.node->params()) param->end_setup();
+    if (options_.exchange != nullptr) {
+      for (const size_t port : task.ports)
+        options_.exchange->tell(port, output_of(result_.plan.ports[port]).capacity());
+    }
+    return sound;
+  }
+
+  bool call_setup(size_t t, ComposeError& error) {
+    TaskPlan& task = result_.plan.tasks[t];
     Setup setup{clock_, graph_.directory, options_.output, options_.seed + t, task.rate, task.offset_ns};
     try {
       task.node->setup(setup);
+      return true;
     } catch (const std::exception& problem) {
       error.problems.push_back({positions_[t], fmt::format("{}: {}", task.name, problem.what())});
+      return false;
     }
-    for (ParamBase* param : task.node->params()) param->end_setup();
-    if (options_.exchange == nullptr) return;
-    for (const size_t port : task.ports) options_.exchange->tell(port, output_of(result_.plan.ports[port]).capacity());
   }
 
   const GraphSpec& graph_;

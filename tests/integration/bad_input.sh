@@ -33,6 +33,11 @@ graph 's/type: stereo,/type: stereoo,/; s/max_age: 350ms/max_age: 250/'
 run 2 "stereoo"
 grep -q "max_age" "$work/stderr" || fail "only the first problem was reported"
 
+# One cause is one problem: nobody complains of what a node that was refused would have given.
+graph 's/disparities: 150\}/disparities: 150, calibration: none.yaml}/'
+run 2 "none.yaml: no such file; check parameter \`calibration\`"
+[ "$(grep -c 'error:' "$work/stderr")" = 1 ] || fail "one wrong file makes more than one problem"
+
 expect 2 "does-not-exist" "$takt" run "$work/does-not-exist.yaml"
 expect 2 "--for" "$takt" run --for 5
 expect 2 "no such directory" env TAKT_DATA="$work/nothing" "$takt" run "$source/graph/kitti.yaml"
