@@ -11,7 +11,7 @@
 
 #include "graph/cli/outcome.hpp"
 #include "graph/command/calibrate_command.hpp"
-#include "graph/command/run_command.hpp"
+#include "graph/run/run.hpp"
 #include "nodes/calibration/generated_sweeps.hpp"
 #include "nodes/calibration/picture.hpp"
 

@@ -12,7 +12,7 @@
 #include <memory>
 #include <utility>
 
-#include "graph/command/run_support.hpp"
+#include "graph/run/support.hpp"
 #include "hal/can/port.hpp"
 #include "hal/laser/lms200/session.hpp"
 #include "hal/laser/lms400/session.hpp"

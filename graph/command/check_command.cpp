@@ -5,8 +5,8 @@
 #include <cstdio>
 
 #include "graph/check/check.hpp"
-#include "graph/command/prepare.hpp"
-#include "graph/command/run_support.hpp"
+#include "graph/run/prepare.hpp"
+#include "graph/run/support.hpp"
 #include "hal/drivers.hpp"
 
 namespace takt::command {

@@ -2,7 +2,7 @@
 #pragma once
 #include <string>
 
-#include "graph/command/run_command.hpp"
+#include "graph/run/run.hpp"
 
 namespace takt::command {
 

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "graph/command/run_command.hpp"
+#include "graph/run/run.hpp"
 #include "hal/discovery/discovery.hpp"
 
 namespace takt::command {

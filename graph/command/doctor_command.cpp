@@ -3,9 +3,9 @@
 
 #include <cstdio>
 
+#include "graph/check/doctor_text.hpp"
+#include "graph/check/machine_file.hpp"
 #include "graph/cli/outcome.hpp"
-#include "graph/command/doctor_text.hpp"
-#include "graph/command/machine_file.hpp"
 #include "rt/machine/checks.hpp"
 #include "rt/machine/measure.hpp"
 
@@ -13,26 +13,26 @@ namespace takt::command {
 namespace {
 
 int run_doctor(const DoctorOptions& options) {
-  const std::filesystem::path file = machine_file();
+  const std::filesystem::path file = graph::machine_file();
   if (options.measure && file.empty())
     return refuse("--measure: no place for the figures; set TAKT_MACHINE to a file, or HOME", kBadInput);
   // Before half a minute of measuring.
-  if (const std::string why = options.measure ? cannot_write(file) : ""; !why.empty())
+  if (const std::string why = options.measure ? graph::cannot_write(file) : ""; !why.empty())
     return refuse(file.string() + ": " + why + "; set TAKT_MACHINE to a file that can be written", kDeviceOrSystem);
   const machine::SystemFacts facts;
   const auto identity = machine::Identity::of(facts);
   const auto findings = machine::examine(facts, machine::try_machine());
-  auto json = doctor_json(identity, findings);
-  if (!options.json) std::fputs(doctor_text(identity, findings).c_str(), stdout);
+  auto json = graph::doctor_json(identity, findings);
+  if (!options.json) std::fputs(graph::doctor_text(identity, findings).c_str(), stdout);
   std::string refused;
   if (options.measure) {
     std::fflush(stdout);
     const auto measured = machine::measure_all(
         [](const std::string& what) { std::fprintf(stderr, "takt doctor: measuring %s\n", what.c_str()); });
-    const auto figures = measured_json(identity, utc_now(), measured);
+    const auto figures = graph::measured_json(identity, graph::utc_now(), measured);
     json["measured"] = figures;
-    refused = write_whole(file, figures.dump(2) + "\n");
-    if (!options.json) std::printf("\n%s", measured_text(measured).c_str());
+    refused = graph::write_whole(file, figures.dump(2) + "\n");
+    if (!options.json) std::printf("\n%s", graph::measured_text(measured).c_str());
     if (!options.json && refused.empty()) std::printf("  written to %s for `takt check`\n", file.c_str());
   }
   if (options.json) std::printf("%s\n", json.dump(2).c_str());
@@ -41,11 +41,6 @@ int run_doctor(const DoctorOptions& options) {
 }
 
 }  // namespace
-
-std::string lacks_text(Policy policy, bool over_iceoryx) {
-  const machine::SystemFacts facts;
-  return findings_text(machine::lacking(machine::examine(facts, machine::try_machine()), policy, over_iceoryx));
-}
 
 void add_doctor(CLI::App& app, DoctorOptions& o, int& exit_code) {
   CLI::App* doctor = app.add_subcommand("doctor", "tries what Takt asks of this machine, and says what to change");

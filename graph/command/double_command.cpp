@@ -15,7 +15,7 @@
 #include <thread>
 #include <utility>
 
-#include "graph/command/prepare.hpp"
+#include "graph/run/prepare.hpp"
 #include "hal/camera/loopback_double.hpp"
 #include "hal/doubles/in_world.hpp"
 #include "hal/laser/lms200/lms200_double.hpp"

@@ -17,11 +17,11 @@
 #include "graph/command/profile_command.hpp"
 #include "graph/command/replay_command.hpp"
 #include "graph/command/robot_command.hpp"
-#include "graph/command/run_command.hpp"
 #include "graph/command/show_command.hpp"
 #include "graph/command/terrain_command.hpp"
 #include "graph/command/train_command.hpp"
 #include "graph/evaluate/evaluations.hpp"
+#include "graph/run/run.hpp"
 
 namespace {
 

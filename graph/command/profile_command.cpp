@@ -10,12 +10,12 @@
 #include <iterator>
 #include <stdexcept>
 
+#include "graph/check/machine_file.hpp"
 #include "graph/check/measured.hpp"
-#include "graph/command/machine_file.hpp"
-#include "graph/command/prepare.hpp"
 #include "graph/command/profile.hpp"
-#include "graph/command/run_support.hpp"
 #include "graph/language/edit_schedule.hpp"
+#include "graph/run/prepare.hpp"
+#include "graph/run/support.hpp"
 #include "rt/sched/executor.hpp"
 
 namespace takt::command {
@@ -114,7 +114,7 @@ int measure(const RunOptions& options, Profile& profile) {
 int write_budgets(const ProfileOptions& options, const Profile& profile) {
   graph::MeasuredSpec measured;
   measured.machine = machine::Identity::of(machine::SystemFacts());
-  measured.at = utc_now();
+  measured.at = graph::utc_now();
   measured.policy = to_string(profile.policy);
   measured.quantile = options.quantile;
   measured.margin = options.margin;
@@ -128,7 +128,7 @@ int write_budgets(const ProfileOptions& options, const Profile& profile) {
                                             : budgets_of(profile.nodes, options.quantile, options.margin);
   const auto edited = graph::with_budgets(text, from.string(), budgets, measured);
   if (!edited) return refuse(graph::to_string(edited.error()) + "; nothing was written", kBadInput);
-  if (const std::string why = write_whole(to, *edited); !why.empty())
+  if (const std::string why = graph::write_whole(to, *edited); !why.empty())
     return refuse(fmt::format("{}: {}; choose another --write", to.string(), why), kBadInput);
   std::printf("written to %s\nsee `takt check GRAPH --schedule` of it\n", to.c_str());
   return kOk;
@@ -154,7 +154,7 @@ int profile_graph(const ProfileOptions& options) {
     return refuse("--compare names the schedule; leave --schedule out", kBadInput);
   if (options.run.duration_s <= 0) return refuse("--for: a profile needs an end; write for instance 20s", kBadInput);
   // Before both passes; --in-place names its file only once the graph is loaded.
-  if (const std::string why = options.write.empty() ? "" : cannot_write(options.write); !why.empty())
+  if (const std::string why = options.write.empty() ? "" : graph::cannot_write(options.write); !why.empty())
     return refuse(fmt::format("{}: {}; choose another --write", options.write.string(), why), kBadInput);
   RunOptions run = options.run;
   if (!options.compare.empty()) run.load.schedule = options.compare;

@@ -10,15 +10,15 @@
 #include <optional>
 #include <sstream>
 
-#include "graph/command/isolated_replay.hpp"
-#include "graph/command/prepare.hpp"
-#include "graph/command/run_support.hpp"
 #include "graph/compose/composition.hpp"
 #include "graph/compose/partition.hpp"
 #include "graph/language/words.hpp"
 #include "graph/log/cut_log.hpp"
 #include "graph/log/log_content.hpp"
 #include "graph/log/recorded_plan.hpp"
+#include "graph/run/isolated_replay.hpp"
+#include "graph/run/prepare.hpp"
+#include "graph/run/support.hpp"
 #include "rt/record/replayer.hpp"
 #include "takt_commit.hpp"
 

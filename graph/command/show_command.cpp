@@ -8,7 +8,7 @@
 #include <fstream>
 #include <system_error>
 
-#include "graph/command/prepare.hpp"
+#include "graph/run/prepare.hpp"
 #include "graph/view/graph_pictures.hpp"
 #include "graph/view/html_report.hpp"
 

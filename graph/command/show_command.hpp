@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <optional>
 
-#include "graph/command/run_command.hpp"
+#include "graph/run/run.hpp"
 
 namespace takt::command {
 

@@ -6,7 +6,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "graph/command/calibrate_command.hpp"
-#include "graph/command/run_command.hpp"
+#include "graph/run/run.hpp"
 #include "nodes/calibration/generated_sweeps.hpp"
 #include "nodes/stereo/rectify.hpp"
 #include "tests/temporary_folder.hpp"

@@ -12,7 +12,7 @@
 
 #include "graph/command/capture_command.hpp"
 #include "graph/command/devices_command.hpp"
-#include "graph/command/run_command.hpp"
+#include "graph/run/run.hpp"
 #include "hal/can/station.hpp"
 #include "hal/head/head_messages.hpp"
 #include "hal/stream/tcp_listener.hpp"

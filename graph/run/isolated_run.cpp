@@ -1,0 +1,473 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "graph/run/isolated_run.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <ctime>
+#include <memory>
+#include <optional>
+#include <thread>
+
+#include "graph/attach/server.hpp"
+#include "graph/run/expectations.hpp"
+#include "graph/run/live_table.hpp"
+#include "graph/run/member_process.hpp"
+#include "graph/run/outages.hpp"
+#include "graph/run/prepare.hpp"
+#include "graph/run/report.hpp"
+#include "graph/run/support.hpp"
+#include "graph/run/trace.hpp"
+#include "graph/run/watchdog.hpp"
+#include "rt/memory/sanitized.hpp"
+#include "rt/sched/executor.hpp"
+#include "rt/shm/iceoryx_preflight.hpp"
+#include "rt/shm/local_transport.hpp"
+#include "rt/shm/transport_error.hpp"
+#include "rt/supervise/group_keeper.hpp"
+#include "rt/supervise/private_mounts.hpp"
+#include "rt/supervise/process_group.hpp"
+#include "rt/supervise/supervisor.hpp"
+
+namespace takt::command {
+namespace {
+
+constexpr int64_t kStartDelayNs = 100'000'000;                // devices start between the agreement and the epoch
+constexpr int64_t kPatienceNs = kSlowdown * 3'000'000'000LL;  // for the processes to end after the stop
+
+/// Ends the run with an exit code before it began.
+struct Refused {
+  int code;
+};
+
+/// The claim on a place for an iceoryx daemon, if need be a private one. Throws TransportError.
+std::unique_ptr<DaemonClaim> find_room_for_daemon(std::vector<std::string>& adjusted) {
+  const auto claimed = [] {
+    auto claim = std::make_unique<DaemonClaim>(IceoryxPlaces::of_this_machine());
+    iceoryx_preflight(IceoryxPlaces::of_this_machine(), 0);
+    return claim;
+  };
+  try {
+    return claimed();
+  } catch (const TransportError& taken) {
+    const std::string refused = enter_private_mounts();
+    if (!refused.empty()) throw TransportError(fmt::format("{} ({} was refused)", taken.what(), refused));
+    adjusted.push_back("/tmp and /dev/shm -> private ones: another iceoryx daemon is running on this machine");
+    return claimed();
+  }
+}
+
+/// Asks the daemon of the transport again and again, and leaves a sign of life each time it has answered. Afterwards no
+/// sign is expected: what the supervisor still has to do, such as its report, may take longer.
+class DaemonProbe {
+ public:
+  DaemonProbe(Transport& transport, GroupSigns& signs, const Clock& clock)
+      : thread_([&](const std::stop_token& end) {
+          while (!end.stop_requested()) {
+            transport.ask_daemon();
+            signs.heartbeat_ns.store(clock.now_ns());
+            const timespec pause{0, 200'000'000};
+            nanosleep(&pause, nullptr);
+          }
+          signs.heartbeat_ns.store(0);
+        }) {}
+
+ private:
+  std::jthread thread_;
+};
+
+/// By process, the tasks that it runs.
+std::vector<std::vector<size_t>> tasks_of(const Plan& plan, const graph::Partition& partition) {
+  std::vector<std::vector<size_t>> tasks(partition.names.size());
+  for (size_t t = 0; t < plan.tasks.size(); ++t) tasks[partition.process_of.at(plan.tasks[t].name)].push_back(t);
+  return tasks;
+}
+
+class IsolatedRun {
+ public:
+  IsolatedRun(const RunOptions& options, const graph::GraphSpec& graph, RunFaults& faults,
+              std::vector<std::string> adjusted)
+      : options_(options),
+        graph_(graph),
+        faults_(faults),
+        expectations_(options, graph),
+        adjusted_(std::move(adjusted)),
+        plan_source_(graph::outline(graph, graph::node_types(), clock_)),
+        plan_(plan_source_.plan),
+        partition_(graph::partition(graph, adjusted_)),
+        board_(plan_, partition_.names.size()),
+        stoppable_(board_),
+        record_(options, plan_),
+        trace_(options, plan_, partition_.names.size()) {}
+
+  ~IsolatedRun() { take_down(); }
+  IsolatedRun(const IsolatedRun&) = delete;
+  IsolatedRun& operator=(const IsolatedRun&) = delete;
+
+  /// Runs the graph with this process as supervisor, which has no thread yet. `run`: the process that stands for it.
+  int run(pid_t run) {
+    if (const int code = expectations_.bind({}); code != kOk) throw Refused{code};
+    if (options_.transport == "iceoryx") claim_ = find_room_for_daemon(adjusted_);
+    choose_cores(plan_.cores, adjusted_);
+    const graph::CheckMachine machine = this_machine();
+    plan_.overheads = machine.overheads;
+    if (again()) forget_processes();
+    for (size_t p = 0; p < partition_.names.size(); ++p)
+      group_.start(partition_.names[p], [this, p, supervisor = getpid()]() -> int {
+        try {
+          return run_member(
+              {options_, graph_, partition_, plan_.overheads, p, supervisor, board_, pools_, trace_.rings(), faults_});
+        } catch (const std::exception& problem) {  // as in a run in one process: no memory, no daemon, no thread
+          return refuse(fmt::format("process {}: {}", partition_.names[p], problem.what()), kDeviceOrSystem);
+        }
+      });
+    group_.prepare_restarts();
+    wait_for_all(ProcessRecord::composed);
+    BoardExchange exchange(board_);
+    graph::complete(plan_, exchange, observers(options_, graph_));
+    faults_.make_room(plan_);
+    if (!again()) {
+      auto ages = admit(options_, graph_, plan_, machine, adjusted_);
+      if (!ages) throw Refused{ages.error()};
+      ages_ = std::move(*ages);
+    }
+    const CpuLatencyHold latency = hold_cpu_dma_latency();
+    tell_lacks(latency);
+    bring_up_transport();
+    std::optional<DaemonProbe> probe;  // from here on somebody waits for the daemon: members that join
+    if (options_.transport == "iceoryx") probe.emplace(*transport_, board_.group(), clock_);
+    agree_on_policy();
+    faults_.disturb_disk(record_, clock_, board_);
+    if (!again()) record_.begin(graph_, plan_, board_, *transport_, "subsystem");
+    else if (record_.wanted()) adjusted_.push_back("the record ends where the group of processes was lost");
+    trace_.collect(plan_, record_);
+    wait_for_all(ProcessRecord::running);
+    const int64_t steal_before_ms = ProcessReading::now().steal_ms, cpu_before_ns = ProcessReading::now().cpu_ns;
+    // Now, with everything in place and locked: at the end they leave one after the other.
+    memory_mb_ = proportional_memory_mb(getpid());
+    for (size_t p = 0; p < group_.size(); ++p) memory_mb_ += proportional_memory_mb(group_.pid(p));
+    for (const pid_t nursery : group_.nurseries()) memory_mb_ += proportional_memory_mb(nursery);
+    start();
+    {
+      const attach::Server server({graph_, plan_, board_, *transport_, run});
+      if (!server.lacks().empty()) adjusted_.push_back("nobody can attach: " + server.lacks());
+      const LiveTable live(plan_, board_,
+                           fmt::format("takt run {} ({}, policy {}, {} processes)", graph_.name, graph_.profile,
+                                       to_string(plan_.policy), group_.size()));
+      watchdog_.emplace(options_, plan_, board_);
+      const RunFaults::Active faulty(faults_, plan_, clock_, board_);
+      const RunExpectations::Active expecting(expectations_, plan_, clock_, board_, *transport_);
+      watch();
+    }
+    probe.reset();
+    watchdog_->start();  // whoever waits for feeds does so until the end: reports and traces take their time
+    count_chunks();
+    MachineUse use = use_of_all();
+    use.steal_ms -= steal_before_ms;
+    use.cpu_ns -= cpu_before_ns;
+    return report(use);
+  }
+
+  RunBoard& board() { return board_; }
+  /// Ends whatever still lives of the run.
+  void take_down() {
+    ending_ = true;
+    group_.kill_all();
+    wait_until([&] { return collect_ends(), group_.alive() == 0; });
+    transport_.reset();
+  }
+
+ private:
+  /// An earlier supervisor was lost with all processes; board and epoch are still what they were.
+  bool again() const { return board_.group().losses.load() > 0; }
+  void forget_processes() {
+    board_.carrier().store(RunBoard::no_carrier);
+    board_.dismissed().store(false);
+    for (size_t p = 0; p < board_.process_count(); ++p) {
+      ProcessRecord& record = board_.process(p);
+      record.state.store(ProcessRecord::starting);
+      record.life.heartbeat_ns.store(0);
+      record.life.hanging.store(0);
+      record.restarts.fetch_add(1);
+    }
+  }
+  /// Waits until every process has come that far. A process that ended instead has said why: exits with its code.
+  void wait_for_all(uint32_t state) {
+    const bool come = wait_until(
+        [&] {
+          for (size_t p = 0; p < group_.size(); ++p)
+            if (board_.process(p).state.load() < state) return false;
+          return true;
+        },
+        [&] { return StopOnSignal::asked() || collect_ends(); });
+    if (come) return;
+    if (StopOnSignal::asked()) {
+      std::fputs("takt: stopped before the run began\n", stderr);
+      throw Refused{kOk};
+    }
+    // The others may have something to say, too.
+    const int64_t until = clock_.now_ns() + 300'000'000;
+    wait_until([&] { return clock_.now_ns() > until || (collect_ends(), group_.alive() == 0); });
+    size_t problems = 0;
+    for (size_t p = 0; p < group_.size(); ++p) problems += board_.process(p).problems.load();
+    if (problems > 0) tell_problems(problems);
+    throw Refused{code_};
+  }
+
+  /// Notes how processes ended; true if one ended that should not have.
+  bool collect_ends() {
+    while (const auto end = group_.reap()) {
+      if (end->code == 0) continue;
+      if (end->signal != 0) remove_iceoryx_leftovers(IceoryxPlaces::of_this_machine(), end->pid);
+      if (ending_) continue;
+      code_ = std::max(code_, end->signal != 0 ? static_cast<int>(kDeviceOrSystem) : end->code);
+      if (end->signal != 0)
+        problems_.push_back(fmt::format("process {} was ended by signal {} ({})", group_.name(end->process),
+                                        end->signal, strsignal(end->signal)));
+      else if (board_.process(end->process).problems.load() == 0)
+        problems_.push_back(fmt::format("process {} ended with code {}", group_.name(end->process), end->code));
+      for (; told_ < problems_.size(); ++told_) std::fprintf(stderr, "takt: error: %s\n", problems_[told_].c_str());
+    }
+    return code_ != 0;
+  }
+
+  void bring_up_transport() {
+    if (claim_) {
+      transport_ = make_iceoryx_transport(plan_.ports);
+      claim_.reset();
+    } else {
+      transport_ = make_local_transport(plan_.ports, pools_, static_cast<uint32_t>(group_.size()) + 1);
+    }
+    board_.carrier().store(options_.transport == "iceoryx" ? RunBoard::iceoryx : RunBoard::local);
+  }
+
+  void tell_lacks(const CpuLatencyHold& latency) {
+    std::vector<std::string> lacks = prepare_process();
+    const bool locked = lacks.empty();
+    if (!latency.granted()) lacks.push_back(latency.lacks());
+    if (options_.require_rt && (!locked || latency.refused()))
+      throw Refused{refuse("--require-rt: " + lacks.front(), kDeviceOrSystem)};
+    adjusted_.insert(adjusted_.end(), lacks.begin(), lacks.end());
+    for (const std::string& line : adjusted_) std::fprintf(stderr, "takt: adjusted: %s\n", line.c_str());
+  }
+
+  void agree_on_policy() {
+    if (plan_.policy == Policy::cooperative) return;
+    if (again()) {
+      granted_ = board_.decision().load() == RunBoard::as_asked ? plan_.policy : Policy::cooperative;
+      return;
+    }
+    wait_for_all(ProcessRecord::agreed);
+    bool refused = false;
+    for (size_t p = 0; p < group_.size(); ++p) refused = refused || board_.process(p).refused.load();
+    if (!refused) {
+      granted_ = plan_.policy;
+    } else {
+      const std::vector<std::string> lines = refusals(plan_, board_);
+      if (options_.policy_required()) throw Refused{refuse(lines.front(), kDeviceOrSystem)};
+      for (const std::string& line : lines)
+        adjusted_.push_back(fmt::format("policy {} -> cooperative: {}", to_string(plan_.policy), line));
+    }
+    board_.decision().store(refused ? RunBoard::cooperative : RunBoard::as_asked);
+  }
+
+  void start() {
+    if (board_.epoch_ns().load() != 0) return;
+    const int64_t epoch = clock_.now_ns() + kStartDelayNs;
+    if (options_.duration_s > 0) board_.stop().set_planned_end(epoch + static_cast<int64_t>(options_.duration_s * 1e9));
+    board_.epoch_ns().store(epoch);
+  }
+
+  /// Until all processes have ended. One that dies is started again beside the others, until the end of the run.
+  void watch() {
+    Supervisor::Options how;
+    how.clean_up = [](pid_t pid) { remove_iceoryx_leftovers(IceoryxPlaces::of_this_machine(), pid); };
+    how.say = [](const std::string& what) { std::fprintf(stderr, "takt: %s\n", what.c_str()); };
+    supervisor_.emplace(plan_, board_, group_, *transport_, clock_, tasks_of(plan_, partition_), how);
+    if (again()) supervisor_->all_were_lost(board_.group().newest_loss);
+    int64_t give_up_ns = INT64_MAX;
+    const auto ended = [&] {
+      supervisor_->look();
+      const int64_t now = clock_.now_ns(), end = board_.stop().end_ns();
+      if (now < end) strike(now);
+      watchdog_->tick(now);
+      if (give_up_ns == INT64_MAX && now > end) {
+        supervisor_->let_end();
+        give_up_ns = now + kPatienceNs;
+      }
+      if (!board_.dismissed().load() && (all_finished() || now > give_up_ns)) {
+        record_.take_rest();
+        board_.dismissed().store(true);
+        give_up_ns = now + kPatienceNs;
+      }
+      if (now <= give_up_ns || group_.alive() == 0) return group_.alive() == 0;
+      for (size_t p = 0; p < group_.size(); ++p)
+        if (group_.pid(p) != 0)
+          problems_.push_back(fmt::format("process {} did not end and was killed", group_.name(p)));
+      group_.kill_all();
+      give_up_ns = now + kPatienceNs;
+      return false;
+    };
+    wait_until(ended, {}, std::chrono::milliseconds(5));
+  }
+
+  /// Nobody is there any more: what is taken now, beyond what outputs keep in memory of our own, stays taken. Over
+  /// iceoryx nothing should be, once its daemon has noticed who is gone.
+  void count_chunks() {
+    constexpr int64_t kNoticed_ns = 3'000'000'000;  // it does so within 1.5 s
+    const int64_t until = clock_.now_ns() + (options_.transport == "iceoryx" ? kNoticed_ns : 0);
+    wait_until([&] { return (chunks_at_end_ = transport_->chunks_in_use()) == 0 || clock_.now_ns() >= until; });
+  }
+
+  /// Those that live.
+  bool all_finished() const {
+    for (size_t p = 0; p < group_.size(); ++p)
+      if (group_.pid(p) != 0 && board_.process(p).state.load() != ProcessRecord::finished) return false;
+    return true;
+  }
+
+  /// What a scenario has in store for the processes.
+  void strike(int64_t now_ns) {
+    for (const graph::ProcessStrike& strike : faults_.due(now_ns)) {
+      const auto named = std::find(partition_.names.begin(), partition_.names.end(), strike.process);
+      const auto p = static_cast<size_t>(named - partition_.names.begin());
+      if (p == partition_.names.size() || group_.pid(p) == 0) continue;  // away already
+      faults_.count(strike);
+      if (strike.kind == graph::FaultKind::kill_at_step) order(p, strike);
+      else kill(group_.pid(p), strike.kind == graph::FaultKind::kill ? SIGKILL : SIGSTOP);
+      if (strike.kind == graph::FaultKind::stop_process) stopped_.push_back({group_.pid(p), now_ns + strike.for_ns});
+    }
+    std::erase_if(stopped_, [&](const auto& stopped) {
+      return now_ns >= stopped.second && (kill(stopped.first, SIGCONT), true);
+    });
+  }
+
+  /// Orders a process to die when it comes to that step.
+  void order(size_t process, const graph::ProcessStrike& strike) {
+    KillOrder& order = board_.process(process).kill;
+    for (size_t port = 0; port < plan_.ports.size(); ++port)
+      if (plan_.ports[port].node + "." + plan_.ports[port].port == strike.output)
+        order.port.store(static_cast<uint32_t>(port));
+    order.passes.store(strike.passes);
+    order.step.store(strike.step);
+  }
+
+  MachineUse use_of_all() const {
+    const ProcessReading own = ProcessReading::now();
+    MachineUse use{own.cpu_ns + supervisor_->lost_cpu_ns(), 0, 0, own.steal_ms, memory_mb_};
+    for (size_t p = 0; p < board_.process_count(); ++p) {
+      use.cpu_ns += board_.process(p).cpu_ns;
+      use.simulator_cpu_ns += board_.process(p).simulator_cpu_ns;
+      use.simulator_in_jobs_ns += board_.process(p).simulator_in_jobs_ns;
+    }
+    return use;
+  }
+
+  int report(const MachineUse& use) {
+    RunResult result;
+    result.epoch_ns = board_.epoch_ns().load();
+    result.end_ns = board_.stop().end_ns();
+    result.policy_granted = granted_;
+    result.released = released_jobs(plan_, board_, result.epoch_ns, result.end_ns);
+    const std::string no_trace = trace_.write(graph_, plan_, board_, result);
+    record_.finish(result, trace_.unheard_threads());
+    auto report = make_report({graph_, plan_, board_, result, *transport_, use, options_.clock,
+                               std::string(to_string(plan_.policy)), "subsystem", partition_.names, adjusted_, ages_});
+    report["memory"]["chunks_at_end"] = chunks_at_end_;
+    if (const size_t lost = group_.lost_nurseries(); lost > 0)
+      problems_.push_back(fmt::format("the process that starts others again was lost {} times and replaced", lost));
+    for (const std::string& problem : problems_) report["faults"].push_back({{"what", problem}});
+    add_outages(board_.outages(), partition_.names, plan_, tasks_of(plan_, partition_), result, report);
+    if (!problems_.empty() || board_.outages().size() > 0) report["ok"] = false;
+    if (supervisor_->gave_up()) code_ = kDeviceOrSystem;
+    record_.tell(report);
+    const int exit = code_ != 0 ? code_ : report["ok"].get<bool>() ? kOk : kNotOk;
+    faults_.judge(result, board_, exit, partition_.names, report);
+    expectations_.judge(report);
+    tell(options_, graph_, report);
+    if (code_ == 0) watchdog_->end();  // else nobody says that all is well
+    if (!no_trace.empty()) return refuse(no_trace, kBadInput);
+    return expectations_.exit_code(faults_.exit_code(exit, report), report);
+  }
+
+  std::unique_ptr<DaemonClaim> claim_;  ///< of iceoryx, until its daemon is there
+  const RunOptions& options_;
+  const graph::GraphSpec& graph_;
+  RunFaults& faults_;
+  RunExpectations expectations_;
+  std::vector<std::string> adjusted_, problems_;
+  std::vector<graph::AgeBound> ages_;
+  std::vector<std::pair<pid_t, int64_t>> stopped_;  ///< processes, and when they go on
+  MonotonicClock clock_;
+  graph::Composition plan_source_;  ///< shells of all nodes; the plan points into them
+  Plan& plan_;
+  const graph::Partition partition_;
+  RunBoard board_;
+  const Stoppable stoppable_;
+  const PoolFile pools_;  ///< of the local transport
+  Policy granted_ = Policy::cooperative;
+  int code_ = 0;
+  size_t told_ = 0;
+  bool ending_ = false;
+  double memory_mb_ = 0;
+  uint32_t chunks_at_end_ = 0;            ///< see count_chunks
+  std::unique_ptr<Transport> transport_;  ///< of iceoryx with the daemon: ends after all members
+  RunRecord record_;                      ///< reads from the transport
+  RunTrace trace_;                        ///< speaks to the record
+  ProcessGroup group_;                    ///< its members end before what they share
+  std::optional<Supervisor> supervisor_;  ///< of the group
+  std::optional<RunWatchdog> watchdog_;
+};
+
+/// The process that stands for the run to the service manager is the keeper; the group's is the one that speaks.
+void take_over_notifications(pid_t keeper) {
+  const char* meant = std::getenv("WATCHDOG_PID");
+  if (meant != nullptr && std::to_string(keeper) == meant) setenv("WATCHDOG_PID", std::to_string(getpid()).c_str(), 1);
+}
+
+}  // namespace
+
+int run_isolated(const RunOptions& options, const graph::GraphSpec& graph, RunFaults& faults,
+                 std::vector<std::string> adjusted) {
+  IsolatedRun run(options, graph, faults, std::move(adjusted));
+  const auto as_supervisor = [&, keeper = getpid()] {
+    try {
+      return run.run(keeper);
+    } catch (const Refused& refused) {
+      return refused.code;
+    }
+  };
+  // Nothing of the runtime's own pools can be left locked: there is nobody to be kept alive but the members.
+  if (options.transport != "iceoryx") return as_supervisor();
+  GroupKeeper::Options how;
+  how.stop_asked = StopOnSignal::asked;
+  how.clean_up = [&](pid_t supervisor) {
+    const IceoryxPlaces places = IceoryxPlaces::of_this_machine();
+    remove_iceoryx_leftovers(places, supervisor);
+    for (size_t p = 0; p < run.board().process_count(); ++p) {
+      const pid_t member = run.board().process(p).pid.load();
+      if (member > 0) remove_iceoryx_leftovers(places, member);
+    }
+  };
+  how.say = [](const std::string& what) { std::fprintf(stderr, "takt: %s\n", what.c_str()); };
+  const MonotonicClock clock;
+  const auto code = GroupKeeper(run.board().group(), clock, how).keep([&, keeper = getpid()] {
+    take_over_notifications(keeper);
+    int code = kDeviceOrSystem;
+    try {
+      code = as_supervisor();
+    } catch (const std::exception& problem) {  // as in a run without a keeper
+      refuse(problem.what(), kDeviceOrSystem);
+    }
+    run.take_down();  // this process ends without leaving the scope that owns the run
+    return code;
+  });
+  return code ? *code : refuse("the group of processes was lost too often", kDeviceOrSystem);
+}
+
+}  // namespace takt::command

@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "graph/run/member_process.hpp"
+
+#include <unistd.h>
+
+#include <chrono>
+#include <stdexcept>
+#include <thread>
+
+#include "graph/run/machine.hpp"
+#include "graph/run/prepare.hpp"
+#include "graph/run/record.hpp"
+#include "graph/run/support.hpp"
+#include "rt/sched/executor.hpp"
+#include "rt/shm/iceoryx_transport.hpp"
+
+namespace takt::command {
+namespace {
+
+class BoardGate final : public StartGate {
+ public:
+  BoardGate(RunBoard& board, size_t process) : board_(board), record_(board.process(process)) {}
+  bool all_granted(bool mine) override {
+    // After a restart the others will not wait: whoever looks after us tries again.
+    if (record_.restarts.load() > 0 && !mine && board_.decision().load() == RunBoard::as_asked)
+      throw std::runtime_error("the kernel refused a policy that it had granted before the restart");
+    record_.refused.store(!mine);
+    record_.state.store(ProcessRecord::agreed);
+    wait_until([&] { return board_.decision().load() != RunBoard::undecided; });
+    return board_.decision().load() == RunBoard::as_asked;
+  }
+  int64_t epoch_ns() override {
+    record_.state.store(ProcessRecord::running);
+    wait_until([&] { return board_.epoch_ns().load() != 0; });
+    return board_.epoch_ns().load();
+  }
+
+ private:
+  RunBoard& board_;
+  ProcessRecord& record_;
+};
+
+std::vector<bool> owned(const Plan& plan, const graph::Partition& partition, size_t process) {
+  std::vector<bool> own;
+  for (const TaskPlan& task : plan.tasks) own.push_back(partition.process_of.at(task.name) == process);
+  return own;
+}
+
+}  // namespace
+
+void BoardExchange::tell(size_t port, const Capacity& capacity) {
+  board_.capacity(port).capacity = capacity;
+  board_.capacity(port).known.store(1, std::memory_order_release);
+}
+
+Capacity BoardExchange::wait_for(size_t port) {
+  wait_until([&] { return board_.capacity(port).known.load(std::memory_order_acquire) != 0; });
+  return board_.capacity(port).capacity;
+}
+
+bool wait_until(const std::function<bool()>& done, const std::function<bool()>& broken,
+                std::chrono::milliseconds between_looks) {
+  while (!done()) {
+    if (broken && broken()) return false;
+    std::this_thread::sleep_for(between_looks);
+  }
+  return true;
+}
+
+int run_member(const MemberPart& part) {
+  const RunOptions& options = part.options;
+  RunBoard& board = part.board;
+  ProcessRecord& record = board.process(part.process);
+  record.pid.store(getpid());
+  obey_orders(&record.kill);
+  Prepared prepared;
+  prepared.graph = part.graph;
+  prepared.clock = std::make_unique<MonotonicClock>();
+  BoardExchange exchange(board);
+  graph::ComposeOptions how;
+  how.output = options.output;
+  how.seed = options.seed;
+  how.observers = observers(options, part.graph);
+  how.owns = [&](const std::string& id) { return part.partition.process_of.at(id) == part.process; };
+  how.exchange = &exchange;
+  if (const int code = compose(options, how, prepared); code != kOk) {
+    record.problems.store(static_cast<uint32_t>(prepared.problems.size()));
+    return code;
+  }
+  Plan& plan = prepared.composition->plan;
+  part.faults.make_room(plan);
+  std::vector<std::string> told;  // the supervisor says it
+  choose_cores(plan.cores, told);
+  plan.overheads = part.overheads;
+  record.state.store(ProcessRecord::composed);
+  wait_until([&] { return board.carrier().load() != RunBoard::no_carrier; });
+  prepare_process();
+  auto joined = board.carrier().load() == RunBoard::local
+                    ? join_local_transport(plan.ports, part.pools, static_cast<uint32_t>(part.process) + 1)
+                    : join_iceoryx_transport(plan.ports, iceoryx_domain(part.supervisor));
+  const auto transport = part.faults.inject(std::move(joined), plan, *prepared.clock, board);
+  BoardGate gate(board, part.process);
+  Executor::Options run;
+  run.duration_ns = static_cast<int64_t>(options.duration_s * 1e9);
+  run.board = &board;
+  run.stolen_ns = stolen_ns;
+  run.trace = part.rings;
+  run.gate = &gate;
+  run.rejoin = record.restarts.load() > 0;
+  run.life = &record.life;
+  run.own = owned(plan, part.partition, part.process);
+  Executor executor(plan, *transport, *prepared.clock, run);
+  record.state.store(ProcessRecord::joined);
+  const ProcessReading before = ProcessReading::now();
+  const RunResult result = executor.run();
+  record.cpu_ns = ProcessReading::now().cpu_ns - before.cpu_ns;
+  record.simulator_cpu_ns += hal::simulator_use().cpu_ns;
+  record.simulator_in_jobs_ns += hal::simulator_use().in_jobs_ns;
+  for (size_t t = 0; t < plan.tasks.size(); ++t)
+    if (run.own[t] && !is_stuck(result, t)) prepared.composition->nodes[t]->finish();
+  record.state.store(ProcessRecord::finished);
+  // A job of another process may still be about to hold what was published here, and the recorder to copy it.
+  wait_until([&] { return board.dismissed().load(); });
+  // A job that never returns still uses what would now be taken down.
+  if (!result.stuck.empty()) end_process(kOk, "iceoryx");
+  return kOk;
+}
+
+}  // namespace takt::command

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <chrono>
+#include <functional>
+
+#include "graph/compose/composition.hpp"
+#include "graph/compose/partition.hpp"
+#include "graph/run/faults.hpp"
+#include "graph/run/run.hpp"
+#include "rt/sched/run_board.hpp"
+#include "rt/shm/local_transport.hpp"
+#include "rt/trace/rings.hpp"
+
+namespace takt::command {
+
+/// Capacities over the board. wait_for() polls: it is used before the start only.
+class BoardExchange final : public graph::CapacityExchange {
+ public:
+  explicit BoardExchange(RunBoard& board) : board_(board) {}
+  void tell(size_t port, const Capacity& capacity) override;
+  Capacity wait_for(size_t port) override;
+
+ private:
+  RunBoard& board_;
+};
+
+/// Looks every so often until `done` or, where given, `broken`; true if done.
+bool wait_until(const std::function<bool()>& done, const std::function<bool()>& broken = {},
+                std::chrono::milliseconds between_looks = std::chrono::milliseconds(1));
+
+/// What one process of an isolated run is given.
+struct MemberPart {
+  const RunOptions& options;
+  const graph::GraphSpec& graph;
+  const graph::Partition& partition;
+  const analysis::Overheads& overheads;  ///< the supervisor's, so that all put lanes on the same cores
+  size_t process = 0;                    ///< index into partition.names
+  int supervisor = 0;                    ///< the process whose daemon it may have to join
+  RunBoard& board;
+  const PoolFile& pools;
+  trace::Rings* rings = nullptr;  ///< null: not traced
+  RunFaults& faults;
+};
+
+/// One process of an isolated run, as the supervisor's fork enters it: composes its part, joins the transport that the
+/// board names, runs until the board's stop. Returns the exit code.
+int run_member(const MemberPart& part);
+
+}  // namespace takt::command

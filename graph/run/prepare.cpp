@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "graph/run/prepare.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <cstdlib>
+
+#include "graph/run/record.hpp"
+
+namespace takt::command {
+namespace {
+
+int refuse(Prepared& prepared, std::vector<graph::Problem> problems, Exit code) {
+  tell(problems);
+  prepared.problems = std::move(problems);
+  return code;
+}
+
+graph::DeviceFactory device_factory(Prepared& prepared, uint64_t seed) {
+  return [&prepared, seed](const graph::DeviceSpec& spec) -> tl::expected<std::unique_ptr<Node>, graph::ComposeError> {
+    const hal::DeviceConfig config{spec.id, spec.kind,       spec.driver, spec.settings, prepared.graph->directory,
+                                   seed,    prepared.plugged};
+    auto node = hal::make_device(config, prepared.devices, *prepared.clock);
+    if (node) return std::move(*node);
+    graph::ComposeError error;
+    error.problems.push_back({spec.position, node.error().text()});
+    error.device_failed = !node.error().bad_input;
+    return tl::make_unexpected(std::move(error));
+  };
+}
+
+}  // namespace
+
+int load(const RunOptions& options, Prepared& prepared) {
+  graph::Loaded loaded = graph::load(graph_file(options.graph), options.load, graph::node_types());
+  if (!loaded.graph) return refuse(prepared, std::move(loaded.problems), kBadInput);
+  prepared.graph = std::move(loaded.graph);
+  if (options.clock == "virtual") prepared.clock = std::make_unique<VirtualClock>(1'000'000'000);
+  else prepared.clock = std::make_unique<MonotonicClock>();
+  return kOk;
+}
+
+int compose(const RunOptions& options, const graph::ComposeOptions& how, Prepared& prepared) {
+  auto composition = graph::compose(*prepared.graph, graph::node_types(), device_factory(prepared, options.seed),
+                                    *prepared.clock, how);
+  if (!composition)
+    return refuse(prepared, std::move(composition.error().problems),
+                  composition.error().device_failed ? kDeviceOrSystem : kBadInput);
+  prepared.composition = std::move(*composition);
+  return kOk;
+}
+
+int prepare_check(const RunOptions& options, Prepared& prepared) {
+  prepared.plugged = false;
+  int code = load(options, prepared);
+  if (code == kOk) {
+    graph::ComposeOptions how;
+    how.output = options.output;
+    how.seed = options.seed;
+    how.observers = observers(options, *prepared.graph);
+    code = compose(options, how, prepared);
+  }
+  if (code != kOk) tell_problems(prepared.problems.size());
+  return code;
+}
+
+}  // namespace takt::command

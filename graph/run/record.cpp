@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "graph/run/record.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <iterator>
+#include <stdexcept>
+
+#include "graph/language/words.hpp"
+#include "graph/log/recorded_plan.hpp"
+#include "graph/run/machine.hpp"
+#include "takt_commit.hpp"
+
+namespace takt::command {
+namespace {
+
+/// As long may the thread that copies messages be kept from running before one is overwritten.
+constexpr int64_t kUndisturbedNs = 250'000'000;
+/// Outputs whose messages are smaller are recorded with all fields.
+constexpr uint64_t kSmallBytes = 64 * 1024;
+
+/// By port: recorded with all fields. Devices always are, or nothing could be replayed.
+std::vector<char> whole_ports(const Plan& plan, const std::vector<std::string>& also) {
+  const auto named = [&](const std::string& name) { return std::find(also.begin(), also.end(), name) != also.end(); };
+  std::vector<char> whole(plan.ports.size(), 0);
+  for (size_t p = 0; p < plan.ports.size(); ++p)
+    whole[p] = plan.ports[p].chunk_bytes() <= kSmallBytes || named("all") ||
+               named(plan.ports[p].node + "." + plan.ports[p].port);
+  for (const TaskPlan& task : plan.tasks)
+    for (const size_t port : task.ports) whole[port] |= static_cast<char>(task.device);
+  return whole;
+}
+
+std::string absolute(const std::filesystem::path& file) {
+  std::error_code error;
+  return std::filesystem::absolute(file, error).string();
+}
+
+}  // namespace
+
+graph::Observers observers(const RunOptions& options, const graph::GraphSpec& graph) {
+  const uint32_t followers = (options.record.empty() ? 0u : 1u) + (graph.expect ? 1u : 0u);
+  return {1, followers, kUndisturbedNs};
+}
+
+RunRecord::RunRecord(const RunOptions& options, const Plan& plan) : options_(options) {
+  std::vector<std::string> names;
+  for (const PortPlan& port : plan.ports) names.push_back(port.node + "." + port.port);
+  for (const std::string& name : options_.record_ports)
+    if (name != "all" && std::find(names.begin(), names.end(), name) == names.end())
+      throw std::invalid_argument(fmt::format("--record-port {}: there is no such output{}", graph::ticked(name),
+                                              graph::alternatives(name, names, "outputs of this graph")));
+}
+
+void RunRecord::begin(const graph::GraphSpec& graph, const Plan& plan, const RunBoard& board, Transport& transport,
+                      const std::string& isolation) {
+  if (!wanted()) return;
+  auto file = mcap::FileSink::open(options_.record);
+  if (!file) throw std::runtime_error("--record " + file.error() + "; choose another place");
+  file_.emplace(std::move(*file));
+  if (make_disk_) disk_ = make_disk_(*file_);
+  mcap::Sink& sink = disk_ ? *disk_ : *file_;
+  record::Head head;
+  head.facts = {{"format", "1"},
+                {"graph", absolute(graph.file)},
+                {"schedule", absolute(graph.schedule.file)},
+                {"profile", graph.profile},
+                {"mode", options_.load.mode},
+                {"policy_asked", std::string(to_string(graph.schedule.policy))},
+                {"policy_option", options_.load.policy},
+                {"set", fmt::format("{}", fmt::join(options_.load.set, "\n"))},
+                {"seed", std::to_string(options_.seed)},
+                {"clock", options_.clock},
+                {"transport", transport.name()},
+                {"isolation", isolation},
+                {"commit", TAKT_COMMIT},
+                {"program", log::file_hash("/proc/self/exe")},
+                {"simd", hwy::TargetName(hwy::SupportedTargets() & -hwy::SupportedTargets())},
+                {"machine", machine_facts().dump()}};
+  const std::string texts[]{log::file_text(graph.file), log::file_text(graph.schedule.file),
+                            log::plan_json(plan).dump(), log::asset_hashes(plan, graph.directory).dump()};
+  const char* names[]{"graph.yaml", "schedule.yaml", "plan.json", "assets.json"};
+  for (size_t i = 0; i < std::size(texts); ++i)
+    head.files.push_back({0, 0, names[i], i < 2 ? "application/yaml" : "application/json", mcap::bytes_of(texts[i])});
+  record::Recorder::Options how;
+  how.whole = whole_ports(plan, options_.record_ports);
+  how.by_caller = options_.clock == "virtual";
+  recorder_ = std::make_unique<record::Recorder>(plan, board, transport, sink, head, std::move(how));
+}
+
+void RunRecord::finish(const RunResult& result, uint64_t unheard_threads) {
+  if (!recorder_) return;
+  written_ = recorder_->finish({{"epoch_ns", std::to_string(result.epoch_ns)},
+                                {"end_ns", std::to_string(result.end_ns)},
+                                {"policy_granted", std::string(to_string(result.policy_granted))}},
+                               unheard_threads);
+  recorder_.reset();
+}
+
+void RunRecord::tell(nlohmann::ordered_json& report) const {
+  if (!wanted()) return;
+  report["recorder_lost"] = written_.lost();
+  report["record"] = {{"file", options_.record.filename().string()},
+                      {"messages", written_.messages},
+                      {"jobs", written_.jobs},
+                      {"mb", static_cast<double>(written_.bytes) / 1e6},
+                      {"lost",
+                       {{"overwritten", written_.overwritten},
+                        {"no_room", written_.no_room},
+                        {"not_written", written_.not_written},
+                        {"jobs", written_.incomplete_jobs},
+                        {"threads", written_.unheard_threads}}},
+                      {"refused", written_.refused},
+                      {"cpu_ms",
+                       {{"copying", static_cast<double>(written_.capture_cpu_ns) / 1e6},
+                        {"writing", static_cast<double>(written_.write_cpu_ns) / 1e6}}}};
+}
+
+}  // namespace takt::command

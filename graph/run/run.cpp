@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "graph/run/run.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <optional>
+
+#include "graph/attach/server.hpp"
+#include "graph/check/doctor_text.hpp"
+#include "graph/run/expectations.hpp"
+#include "graph/run/faults.hpp"
+#include "graph/run/isolated_run.hpp"
+#include "graph/run/job_durations.hpp"
+#include "graph/run/live_table.hpp"
+#include "graph/run/prepare.hpp"
+#include "graph/run/report.hpp"
+#include "graph/run/support.hpp"
+#include "graph/run/trace.hpp"
+#include "graph/run/watchdog.hpp"
+#include "graph/run/world_truth.hpp"
+#include "rt/shm/iceoryx_preflight.hpp"
+
+namespace takt::command {
+namespace {
+
+/// Whether a file can be written there, without making it yet.
+bool writable(const std::filesystem::path& file) {
+  if (access(file.c_str(), F_OK) == 0) return access(file.c_str(), W_OK) == 0;
+  const auto folder = file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
+  return access(folder.c_str(), W_OK) == 0;
+}
+
+std::unique_ptr<Transport> make_transport(const std::string& name, const Plan& plan) {
+  if (name != "iceoryx") return make_local_transport(plan.ports);
+  const DaemonClaim claim(IceoryxPlaces::of_this_machine());
+  return make_iceoryx_transport(plan.ports);
+}
+
+/// Runs the composed graph in this process; everything it needs exists and is checked.
+int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, RunExpectations& expectations,
+            const std::vector<graph::AgeBound>& ages, std::vector<std::string> adjusted) {
+  const graph::GraphSpec& graph = *prepared.graph;
+  graph::Composition& composition = *prepared.composition;
+  const auto durations = job_durations(options.durations, composition.plan, options.seed);
+  if (!durations) return refuse(durations.error(), kBadInput);
+  RunBoard board(composition.plan);
+  RunRecord record(options, composition.plan);
+  faults.disturb_disk(record, *prepared.clock, board);
+  const auto transport =
+      faults.inject(make_transport(options.transport, composition.plan), composition.plan, *prepared.clock, board);
+  RunTrace trace(options, composition.plan, 1);  // ends first: it speaks to the record
+  Executor::Options run;
+  run.duration_ns = static_cast<int64_t>(options.duration_s * 1e9);
+  run.require_policy = options.policy_required();
+  run.board = &board;
+  run.stolen_ns = stolen_ns;
+  run.trace = trace.rings();
+  if (prepared.clock->is_virtual()) {
+    run.after_step = [&] {
+      trace.drain();
+      record.capture();
+      faults.look();
+      expectations.look();
+    };
+    run.job_duration_ns = faults.durations(*durations, composition.plan);
+    run.ran = [&](const trace::Slice& slice) { trace.ran(slice); };
+  }
+  Executor executor(composition.plan, *transport, *prepared.clock, run);
+  const ProcessReading before = ProcessReading::now();
+  RunWatchdog watchdog(options, composition.plan, board);
+  RunResult result;
+  {
+    const Stoppable stoppable(board);
+    std::optional<attach::Server> server;  // virtual time passes too fast to speak to
+    if (!prepared.clock->is_virtual()) server.emplace(attach::Subject{graph, composition.plan, board, *transport});
+    if (server && !server->lacks().empty()) adjusted.push_back("nobody can attach: " + server->lacks());
+    const LiveTable live(
+        composition.plan, board,
+        fmt::format("takt run {} ({}, policy {})", graph.name, graph.profile, to_string(graph.schedule.policy)));
+    record.begin(graph, composition.plan, board, *transport, "none");
+    trace.collect(composition.plan, record);
+    watchdog.start();
+    {
+      const RunFaults::Active faulty(faults, composition.plan, *prepared.clock, board);
+      const RunExpectations::Active expecting(expectations, composition.plan, *prepared.clock, board, *transport);
+      result = executor.run();
+    }
+  }
+  const ProcessReading after = ProcessReading::now();
+  const std::string no_trace = trace.write(graph, composition.plan, board, result);
+  record.finish(result, trace.unheard_threads());
+  for (size_t t = 0; t < composition.nodes.size(); ++t)
+    if (!is_stuck(result, t)) composition.nodes[t]->finish();
+  for (const std::string& refused : result.refused)
+    adjusted.push_back(fmt::format("policy {} -> cooperative: {}", to_string(graph.schedule.policy), refused));
+  const hal::SimulatorUse simulator = hal::simulator_use();
+  const MachineUse use{after.cpu_ns - before.cpu_ns, simulator.cpu_ns, simulator.in_jobs_ns,
+                       after.steal_ms - before.steal_ms, after.rss_mb};
+  auto report = make_report({graph,
+                             composition.plan,
+                             board,
+                             result,
+                             *transport,
+                             use,
+                             options.clock,
+                             std::string(to_string(graph.schedule.policy)),
+                             "none",
+                             {},
+                             std::move(adjusted),
+                             ages});
+  if (prepared.clock->is_virtual())
+    report["simulated"] = {{"policy", to_string(composition.plan.policy)},
+                           {"cores", composition.plan.cores.size()},
+                           {"durations", options.durations}};
+  record.tell(report);
+  faults.judge(result, board, run_exit(board, result.policy_granted, report), {}, report);
+  expectations.judge(report);
+  int code = tell_faults(options, graph, board, result.policy_granted, report);
+  code = expectations.exit_code(faults.exit_code(code, report), report);
+  if (!no_trace.empty()) code = refuse(no_trace, kBadInput);
+  if (result.stuck.empty()) watchdog.end();
+  // A job that never returns still uses what would now be taken down.
+  if (!result.stuck.empty()) end_process(code, options.transport);
+  return code;
+}
+
+int run_in_one_process(const RunOptions& options, Prepared& prepared, RunFaults& faults,
+                       std::vector<std::string> adjusted) {
+  graph::ComposeOptions how;
+  how.output = options.output;
+  how.seed = options.seed;
+  how.observers = observers(options, *prepared.graph);
+  if (const int code = compose(options, how, prepared); code != kOk) {
+    tell_problems(prepared.problems.size());
+    return code;
+  }
+  if (StopOnSignal::asked()) {
+    std::fputs("takt: stopped before the run began\n", stderr);
+    return kOk;
+  }
+  faults.make_room(prepared.composition->plan);
+  RunExpectations expectations(options, *prepared.graph);
+  if (const int code = expectations.bind(world_truth(prepared.devices.first_world())); code != kOk) return code;
+  // In virtual time the cores of the schedule need not be there.
+  std::vector<int>& cores = prepared.composition->plan.cores;
+  if (!prepared.clock->is_virtual() || cores.empty()) choose_cores(cores, adjusted);
+  const graph::CheckMachine machine = this_machine();
+  prepared.composition->plan.overheads = machine.overheads;
+  const auto ages = admit(options, *prepared.graph, prepared.composition->plan, machine, adjusted);
+  if (!ages) return ages.error();
+  const CpuLatencyHold latency = hold_cpu_dma_latency();
+  std::vector<std::string> lacks = prepare_process();
+  const bool locked = lacks.empty();
+  if (!latency.granted()) lacks.push_back(latency.lacks());
+  if (options.require_rt && (!locked || latency.refused()))
+    return refuse("--require-rt: " + lacks.front(), kDeviceOrSystem);
+  adjusted.insert(adjusted.end(), lacks.begin(), lacks.end());
+  for (const std::string& line : adjusted) std::fprintf(stderr, "takt: adjusted: %s\n", line.c_str());
+  return execute(options, prepared, faults, expectations, *ages, std::move(adjusted));
+}
+
+/// One process, or one per subsystem: as the command line says, else the graph.
+int run_as_asked(RunOptions options) {
+  Prepared prepared;
+  if (const int code = load(options, prepared); code != kOk) {
+    tell_problems(prepared.problems.size());
+    return code;
+  }
+  if (prepared.graph->expect && !options.duration_asked)
+    options.duration_s = static_cast<double>(prepared.graph->expect->within_ns) * 1e-9;
+  std::vector<std::string> adjusted = prepared.graph->adjusted;
+  const std::string wanted = options.isolate.empty() ? prepared.graph->isolation : options.isolate;
+  if (options.require_rt) {
+    const std::string lacks = graph::lacks_text(prepared.graph->schedule.policy, options.transport == "iceoryx");
+    if (!lacks.empty())
+      return refuse("--require-rt: this machine lacks (see `takt doctor`)\n" + lacks, kDeviceOrSystem);
+  }
+  const bool processes = wanted == "subsystem" && options.clock != "virtual";
+  RunFaults faults(options);
+  if (const int code = faults.load(*prepared.graph, *prepared.clock, processes); code != kOk) return code;
+  if (!processes) return run_in_one_process(options, prepared, faults, adjusted);
+  const KeptPlace report(options.report), page(options.html), trace(options.trace), record(options.record);
+  return run_isolated(options, *prepared.graph, faults, std::move(adjusted));
+}
+
+}  // namespace
+
+int run_graph(const RunOptions& options) {
+  std::error_code error;
+  std::filesystem::create_directories(options.output, error);
+  if (error)
+    return refuse(fmt::format("--output {}: {}; choose a writable folder", options.output.string(), error.message()),
+                  kBadInput);
+  if (!options.report.empty() && !writable(options.report))
+    return refuse("--report " + options.report.string() + ": cannot be written; choose another place", kBadInput);
+  if (!options.html.empty() && !writable(options.html))
+    return refuse("--html " + options.html.string() + ": cannot be written; choose another place", kBadInput);
+  if (!options.trace.empty() && !writable(options.trace))
+    return refuse("--trace " + options.trace.string() + ": cannot be written; choose another place", kBadInput);
+  if (!options.record.empty() && !writable(options.record))
+    return refuse("--record " + options.record.string() + ": cannot be written; choose another place", kBadInput);
+  if (options.durations != "budgets" && options.clock != "virtual")
+    return refuse("--durations: only jobs in virtual time take what they are told; add --clock virtual", kBadInput);
+  if (!options.watchdog.empty() && options.clock == "virtual")
+    return refuse("--watchdog: a run in virtual time keeps no deadline that a watchdog could guard; leave one out",
+                  kBadInput);
+  const StopOnSignal guard;
+  try {
+    return run_as_asked(options);
+  } catch (const std::invalid_argument& problem) {  // more ports or edges than the transport carries
+    return refuse(problem.what(), kBadInput);
+  } catch (const std::exception& problem) {  // PolicyRefused, TransportError, no memory
+    return refuse(problem.what(), kDeviceOrSystem);
+  }
+}
+
+}  // namespace takt::command
