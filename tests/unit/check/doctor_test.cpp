@@ -11,7 +11,12 @@
 #include "tests/temporary_folder.hpp"
 
 using namespace takt;
-using namespace takt::graph;
+using graph::doctor_json;
+using graph::doctor_text;
+using graph::machine_file;
+using graph::measured_json;
+using graph::measured_text;
+using graph::write_whole;
 using machine::Finding;
 using machine::Need;
 using machine::Status;

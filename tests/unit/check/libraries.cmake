@@ -1,3 +1,3 @@
 # SPDX-License-Identifier: Apache-2.0
 set(ROOM_TEST_LIBRARIES nlohmann_json::nlohmann_json)
-set(ROOM_APART ages_test.cpp check.cpp lane_pieces_test.cpp)
+set(ROOM_APART ages_test.cpp check.cpp doctor_test.cpp lane_pieces_test.cpp)
