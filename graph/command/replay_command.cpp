@@ -44,8 +44,8 @@ Json attached_json(const record::LogFile& file, const char* name) {
 class RecordedCapacities final : public graph::CapacityExchange {
  public:
   explicit RecordedCapacities(const Json& plan) : plan_(plan) {}
-  void tell(size_t, const Capacity&) override {}
-  Capacity wait_for(size_t port) override { return log::capacity_of(plan_, port); }
+  void tell(size_t, const std::optional<Capacity>&) override {}
+  std::optional<Capacity> wait_for(size_t port) override { return log::capacity_of(plan_, port); }
 
  private:
   const Json& plan_;

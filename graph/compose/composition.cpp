@@ -36,7 +36,8 @@ class Composer {
     make_nodes();
     connect();
     if (auto ready = set_up(); !ready) return tl::make_unexpected(ready.error());
-    for (size_t p = 0; p < result_.plan.ports.size(); ++p) result_.plan.ports[p].capacity = capacity_of(p);
+    for (size_t p = 0; p < result_.plan.ports.size(); ++p)
+      result_.plan.ports[p].capacity = capacity_of(p).value_or(Capacity{});
     size_ports(result_.plan, options_.observers);
     return std::move(result_);
   }
@@ -70,7 +71,7 @@ class Composer {
   bool owns(const std::string& id) const { return !options_.owns || options_.owns(id); }
 
   /// Of an output of this process, or as its owner tells.
-  Capacity capacity_of(size_t port) {
+  std::optional<Capacity> capacity_of(size_t port) {
     const PortPlan& plan = result_.plan.ports[port];
     return owns(plan.node) ? output_of(plan).capacity() : options_.exchange->wait_for(port);
   }
@@ -217,7 +218,8 @@ class Composer {
     std::vector<SetUp> states(result_.plan.tasks.size(), SetUp::not_yet);
     for (const size_t t : setup_order())
       states[t] = !owns(result_.plan.tasks[t].name) || set_up_node(t, states, error) ? SetUp::done : SetUp::failed;
-    if (!error.problems.empty()) return tl::make_unexpected(std::move(error));
+    // Without a problem of its own where what failed belongs to another process, which tells it.
+    if (std::count(states.begin(), states.end(), SetUp::failed) > 0) return tl::make_unexpected(std::move(error));
     return {};
   }
 
@@ -230,15 +232,19 @@ class Composer {
       // In a cycle the producer may come later in the order: then its capacity is not known yet, here as elsewhere.
       const SetUp producer = states[task_index_.at(result_.plan.ports[edge.port].node)];
       InputPort* const input = task.node->inputs()[edge.input];
-      PortAccess::connect(*input, producer == SetUp::done ? capacity_of(edge.port) : Capacity{});
+      std::optional<Capacity> capacity = Capacity{};
+      if (producer == SetUp::done) capacity = capacity_of(edge.port);
+      if (producer == SetUp::failed) capacity.reset();
+      PortAccess::connect(*input, capacity.value_or(Capacity{}));
       // What it would say of an input whose sizes nobody knows is no problem of its own. Of requests it needs none.
-      sound = sound && (producer != SetUp::failed || input == task.node->control());
+      sound = sound && (capacity || input == task.node->control());
     }
     if (sound) sound = call_setup(t, error);
     for (ParamBase* param : task.node->params()) param->end_setup();
     if (options_.exchange != nullptr) {
       for (const size_t port : task.ports)
-        options_.exchange->tell(port, output_of(result_.plan.ports[port]).capacity());
+        options_.exchange->tell(port,
+                                sound ? std::optional(output_of(result_.plan.ports[port]).capacity()) : std::nullopt);
     }
     return sound;
   }
@@ -272,7 +278,7 @@ Composition outline(const GraphSpec& graph, const NodeTypes& types, const Clock&
 }
 
 void complete(Plan& plan, CapacityExchange& exchange, const Observers& observers) {
-  for (size_t p = 0; p < plan.ports.size(); ++p) plan.ports[p].capacity = exchange.wait_for(p);
+  for (size_t p = 0; p < plan.ports.size(); ++p) plan.ports[p].capacity = exchange.wait_for(p).value_or(Capacity{});
   size_ports(plan, observers);
 }
 

@@ -25,9 +25,10 @@ using DeviceFactory = std::function<tl::expected<std::unique_ptr<Node>, ComposeE
 class CapacityExchange {
  public:
   virtual ~CapacityExchange() = default;
-  virtual void tell(size_t port, const Capacity& capacity) = 0;
+  /// Nothing: the node could not be set up.
+  virtual void tell(size_t port, const std::optional<Capacity>& capacity) = 0;
   /// Waits for the process that owns the port. Throws std::runtime_error if that will never tell.
-  virtual Capacity wait_for(size_t port) = 0;
+  virtual std::optional<Capacity> wait_for(size_t port) = 0;
 };
 
 struct ComposeOptions {

@@ -48,14 +48,16 @@ std::vector<bool> owned(const Plan& plan, const graph::Partition& partition, siz
 
 }  // namespace
 
-void BoardExchange::tell(size_t port, const Capacity& capacity) {
-  board_.capacity(port).capacity = capacity;
-  board_.capacity(port).known.store(1, std::memory_order_release);
+void BoardExchange::tell(size_t port, const std::optional<Capacity>& capacity) {
+  CapacityRecord& record = board_.capacity(port);
+  record.capacity = capacity.value_or(Capacity{});
+  record.known.store(capacity ? CapacityRecord::kTold : CapacityRecord::kNeverTold, std::memory_order_release);
 }
 
-Capacity BoardExchange::wait_for(size_t port) {
-  wait_until([&] { return board_.capacity(port).known.load(std::memory_order_acquire) != 0; });
-  return board_.capacity(port).capacity;
+std::optional<Capacity> BoardExchange::wait_for(size_t port) {
+  const CapacityRecord& record = board_.capacity(port);
+  wait_until([&] { return record.known.load(std::memory_order_acquire) != 0; });
+  return record.known.load() == CapacityRecord::kTold ? std::optional(record.capacity) : std::nullopt;
 }
 
 bool wait_until(const std::function<bool()>& done, const std::function<bool()>& broken,

@@ -17,8 +17,8 @@ namespace takt::command {
 class BoardExchange final : public graph::CapacityExchange {
  public:
   explicit BoardExchange(RunBoard& board) : board_(board) {}
-  void tell(size_t port, const Capacity& capacity) override;
-  Capacity wait_for(size_t port) override;
+  void tell(size_t port, const std::optional<Capacity>& capacity) override;
+  std::optional<Capacity> wait_for(size_t port) override;
 
  private:
   RunBoard& board_;

@@ -52,6 +52,7 @@ struct ProcessRecord {
 
 /// How large the messages of an output can become, once its node is set up.
 struct CapacityRecord {
+  static constexpr uint32_t kTold = 1, kNeverTold = 2;  ///< the latter: its node could not be set up
   std::atomic<uint32_t> known{0};
   Capacity capacity;
 };

@@ -35,8 +35,10 @@ grep -q "max_age" "$work/stderr" || fail "only the first problem was reported"
 
 # One cause is one problem: nobody complains of what a node that was refused would have given.
 graph 's/disparities: 150\}/disparities: 150, calibration: none.yaml}/'
-run 2 "none.yaml: no such file; check parameter \`calibration\`"
-[ "$(grep -c 'error:' "$work/stderr")" = 1 ] || fail "one wrong file makes more than one problem"
+for isolate in none subsystem; do
+  expect 2 "none.yaml: no such file; check parameter \`calibration\`" "$takt" run "$work/graph/bad.yaml" --for 1s --output "$work/out" --isolate $isolate
+  grep -qE "traffic_signs|ego_motion" "$work/stderr" && fail "one wrong file makes more than one problem"
+done
 
 expect 2 "does-not-exist" "$takt" run "$work/does-not-exist.yaml"
 expect 2 "--for" "$takt" run --for 5
