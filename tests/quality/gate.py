@@ -101,7 +101,8 @@ def print_ratios(bench):
             if len(words) != 3 or words[1] not in ("<=", ">="):
                 fail(f"{place}: write ROW, <= or >=, the target")
             target = number(place, words[2])
-            found = [r for r in rows if fnmatch.fnmatch(r["name"], words[0]) and not r["name"].endswith("_null")]
+            found = [r for r in rows if fnmatch.fnmatch(r["name"], words[0]) and not r["name"].endswith("_null")
+                     and r.get("ratio") is not None]  # some rows have no reference
             for row in found:
                 met = row["ratio"] <= target if words[1] == "<=" else row["ratio"] >= target
                 missed += not met
