@@ -219,7 +219,8 @@ class Composer {
     for (const size_t t : setup_order())
       states[t] = !owns(result_.plan.tasks[t].name) || set_up_node(t, states, error) ? SetUp::done : SetUp::failed;
     // Without a problem of its own where what failed belongs to another process, which tells it.
-    if (std::count(states.begin(), states.end(), SetUp::failed) > 0) return tl::make_unexpected(std::move(error));
+    if (std::find(states.begin(), states.end(), SetUp::failed) != states.end())
+      return tl::make_unexpected(std::move(error));
     return {};
   }
 
