@@ -2,9 +2,10 @@
 // Damaged files: nothing crashes, every failure names a line or a byte.
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <random>
-#include <regex>
 #include <string>
+#include <string_view>
 
 #include "nodes/cloud/cloud_file.hpp"
 
@@ -35,12 +36,25 @@ std::string mutated(std::string bytes, std::mt19937& random) {
   return bytes;
 }
 
+/// "file:LINE: WHY" or "file: byte NUMBER: WHY", in printable characters.
+bool has_place(std::string_view error) {
+  for (const std::string_view before : {"file:", "file: byte "}) {
+    if (!error.starts_with(before)) continue;
+    const std::string_view place = error.substr(before.size());
+    const size_t colon = place.find_first_not_of("0123456789");
+    if (colon == 0 || colon == std::string_view::npos) continue;
+    const std::string_view why = place.substr(colon);
+    return why.size() > 2 && why.starts_with(": ") &&
+           std::all_of(why.begin(), why.end(), [](char c) { return c >= ' ' && c <= '~'; });
+  }
+  return false;
+}
+
 /// What parse_cloud answers is a cloud that is whole, or an error with a place.
 bool check(const std::string& bytes) {
-  static const std::regex kPlace("^file(:[0-9]+|: byte [0-9]+): [ -~]+$");
   const auto cloud = parse_cloud(bytes, "file");
   if (cloud) CHECK((cloud->colours.empty() || cloud->colours.size() == cloud->points.size()));
-  else CHECK_MESSAGE(std::regex_match(cloud.error(), kPlace), cloud.error());
+  else CHECK_MESSAGE(has_place(cloud.error()), cloud.error());
   return cloud.has_value();
 }
 
