@@ -13,7 +13,7 @@ namespace {
 
 using namespace takt::trace;
 
-struct Random {
+struct RandomNumber {
   std::mt19937 engine;
   int64_t operator()(int64_t low, int64_t high) { return std::uniform_int_distribution<int64_t>(low, high)(engine); }
 };
@@ -30,7 +30,7 @@ void in_units(Trace& trace) {
 }
 
 /// Some threads that take turns on two CPUs, instant by instant, and jobs anywhere on them, in whole units.
-Trace random_trace(Random& random) {
+Trace random_trace(RandomNumber& random) {
   Trace trace;
   trace.source = static_cast<Source>(random(0, 3));
   for (size_t t = 0; t < 4; ++t)
@@ -159,7 +159,7 @@ bool occupied_by(const Trace& trace, const Piece& piece, int64_t at) {
 }  // namespace
 
 TEST_CASE("parts make up the miss, and every instant holds what was going on then") {
-  Random random{std::mt19937(7)};
+  RandomNumber random{std::mt19937(7)};
   size_t misses = 0, stalls = 0, unexplained = 0;
   std::map<Cause, size_t> met;
   for (int round = 0; round < 400; ++round) {

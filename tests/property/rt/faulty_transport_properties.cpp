@@ -9,12 +9,14 @@
 
 #include "rt/faults/faulty_transport.hpp"
 #include "rt/msg/messages.hpp"
+#include "tests/nanoseconds.hpp"
 
 namespace {
 
 using namespace takt;
 using namespace takt::faults;
-constexpr int64_t kMs = 1'000'000, kEpoch = 1'000 * kMs;
+using test::kMs;
+constexpr int64_t kEpoch = 1'000 * kMs;
 constexpr uint64_t kMessages = 150;
 
 std::vector<MessageFault> random_plan(std::mt19937_64& random) {

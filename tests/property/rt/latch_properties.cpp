@@ -8,11 +8,13 @@
 #include "rt/node.hpp"
 #include "rt/sched/executor.hpp"
 #include "rt/sched/port_access.hpp"
+#include "tests/nanoseconds.hpp"
 
 namespace {
 
 using namespace takt;
-constexpr int64_t kMs = 1'000'000, kStart = 1'000'000'000, kDuration = 3'000 * kMs;
+using test::kMs;
+constexpr int64_t kStart = 1'000'000'000, kDuration = 3'000 * kMs;
 
 struct Source final : Node {
   Output<Odometry> out{this, "out", ""};
@@ -48,17 +50,17 @@ struct Sink final : Node {
   }
 };
 
-struct Scene {
+struct LatchScene {
   TaskPlan producer, consumer;
   uint32_t depth = 1;
   int64_t max_age_ns = 0;
 };
 
-Scene random_scene(std::mt19937& random) {
+LatchScene random_scene(std::mt19937& random) {
   const auto uniform = [&](int64_t low, int64_t high) {
     return std::uniform_int_distribution<int64_t>(low, high)(random);
   };
-  Scene scene;
+  LatchScene scene;
   for (TaskPlan* task : {&scene.producer, &scene.consumer}) {
     task->rate = Rate{uniform(1, 40), uniform(1, 3)};
     task->offset_ns = uniform(0, 200 * kMs);
@@ -71,7 +73,7 @@ Scene random_scene(std::mt19937& random) {
   return scene;
 }
 
-std::vector<Seen> observed(const Scene& scene) {
+std::vector<Seen> observed(const LatchScene& scene) {
   Source source;
   Sink sink;
   Plan plan;
@@ -115,7 +117,7 @@ std::vector<Ran> jobs_of(const TaskPlan& task) {
   return jobs;
 }
 
-std::vector<Seen> expected(const Scene& scene) {
+std::vector<Seen> expected(const LatchScene& scene) {
   const auto& [producer, consumer, depth, max_age] = scene;
   struct Message {
     int64_t index, stamp_ns, visible_at_ns;
@@ -153,7 +155,7 @@ TEST_CASE(
   std::mt19937 random(7);
   for (int round = 0; round < 200; ++round) {
     CAPTURE(round);
-    const Scene scene = random_scene(random);
+    const LatchScene scene = random_scene(random);
     const std::vector<Seen> got = observed(scene), wanted = expected(scene);
     REQUIRE(got.size() == wanted.size());
     for (size_t k = 0; k < got.size(); ++k) {

@@ -13,18 +13,18 @@ namespace {
 using namespace takt;
 constexpr int64_t kSecond = QualityControl::kSecond;
 
-struct Scene {
+struct QualityScene {
   std::vector<QualityLevel> levels{{"0", 1.0}};
   int64_t period_ns = 0, budget_ns = 0, deadline_ns = 0;
 };
 
-class Random {
+class RandomLoad {
  public:
-  explicit Random(uint64_t seed) : engine_(seed) {}
+  explicit RandomLoad(uint64_t seed) : engine_(seed) {}
   double uniform(double low, double high) { return std::uniform_real_distribution<double>(low, high)(engine_); }
   int whole(int low, int high) { return std::uniform_int_distribution<int>(low, high)(engine_); }
-  Scene scene() {
-    Scene s;
+  QualityScene scene() {
+    QualityScene s;
     const int levels = whole(2, static_cast<int>(kMaxLevels));
     for (int l = 1; l < levels; ++l) s.levels.push_back({"worse", s.levels.back().cost * uniform(0.2, 0.8)});
     s.period_ns = static_cast<int64_t>(1e9 / uniform(0.5, 60));
@@ -40,7 +40,8 @@ class Random {
 /// A run of jobs whose CPU time at level 0 is `load` in parts of the budget.
 class Run {
  public:
-  explicit Run(const Scene& scene) : scene_(scene), control_(scene_.levels, scene_.budget_ns, scene_.deadline_ns) {}
+  explicit Run(const QualityScene& scene)
+      : scene_(scene), control_(scene_.levels, scene_.budget_ns, scene_.deadline_ns) {}
   int level() const { return control_.level(); }
   int64_t now_ns() const { return jobs_ * scene_.period_ns; }
   void job(double load) {
@@ -58,7 +59,7 @@ class Run {
   int overruns = 0, raises = 0, lowers = 0;
 
  private:
-  const Scene scene_;
+  const QualityScene scene_;
   QualityControl control_;
   int64_t jobs_ = 0;
 };
@@ -66,7 +67,7 @@ class Run {
 }  // namespace
 
 TEST_CASE("level 0 stays as long as the largest load plus half of the range fits") {
-  Random random(1);
+  RandomLoad random(1);
   for (int round = 0; round < 300; ++round) {
     Run run(random.scene());
     const double range = random.uniform(0, 0.6), top = 1 - range / 2;
@@ -78,9 +79,9 @@ TEST_CASE("level 0 stays as long as the largest load plus half of the range fits
 }
 
 TEST_CASE("a constant load with 5 % of noise settles: no level is taken back and left again but blindly") {
-  Random random(2);
+  RandomLoad random(2);
   for (int round = 0; round < 300; ++round) {
-    const Scene scene = random.scene();
+    const QualityScene scene = random.scene();
     Run run(scene);
     for (int k = random.whole(0, 20); k > 0; --k) run.job(random.uniform(0, 3));  // whatever went before
     const double load = random.uniform(0.1, 4);
@@ -99,9 +100,9 @@ TEST_CASE("a constant load with 5 % of noise settles: no level is taken back and
 }
 
 TEST_CASE("after any past, a load that fits brings level 0 back within the stated bounds") {
-  Random random(3);
+  RandomLoad random(3);
   for (int round = 0; round < 500; ++round) {
-    const Scene scene = random.scene();
+    const QualityScene scene = random.scene();
     Run run(scene);
     const double worst = random.uniform(0.5, 5);
     for (int k = random.whole(1, 3000); k > 0; --k) run.job(random.uniform(0, worst));
@@ -122,7 +123,7 @@ TEST_CASE("after any past, a load that fits brings level 0 back within the state
 
 TEST_CASE(
     "whatever the load does, level 0 is left at most once in a bar, and failing again and again makes it longer") {
-  Random random(4);
+  RandomLoad random(4);
   for (int round = 0; round < 200; ++round) {
     Run run(random.scene());
     const double low = random.uniform(0, 1), high = random.uniform(1, 3), share = random.uniform(0, 0.3);

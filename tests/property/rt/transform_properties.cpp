@@ -76,9 +76,9 @@ Matrix6 jacobian(const std::function<Rigid(const Rigid&)>& f, const Rigid& at) {
 
 Matrix6 covariance(const UncertainPose& p) { return Eigen::Map<const Matrix6>(p.covariance.data()); }
 
-struct Random {
+struct RandomPose {
   std::mt19937 engine;
-  explicit Random(uint32_t seed) : engine(seed) {}
+  explicit RandomPose(uint32_t seed) : engine(seed) {}
   double uniform(double low, double high) { return low + (high - low) * static_cast<double>(engine()) / 4294967296.0; }
   int64_t below(int64_t n) { return static_cast<int64_t>(engine() % static_cast<uint64_t>(n)); }
   UncertainPose pose() {
@@ -106,7 +106,7 @@ void check_equal(const UncertainPose& got, const Rigid& mean, const Matrix6& exp
 }  // namespace
 
 TEST_CASE("composition and inverse agree with matrices and numerical derivatives") {
-  Random random(1);
+  RandomPose random(1);
   for (int i = 0; i < 300; ++i) {
     const UncertainPose a = random.pose(), b = random.pose();
     const Rigid ra = rigid(a.transform), rb = rigid(b.transform);
@@ -119,7 +119,7 @@ TEST_CASE("composition and inverse agree with matrices and numerical derivatives
 }
 
 TEST_CASE("composition is associative and the inverse of the inverse is the pose") {
-  Random random(2);
+  RandomPose random(2);
   for (int i = 0; i < 300; ++i) {
     const UncertainPose a = random.pose(), b = random.pose(), c = random.pose();
     const UncertainPose left = compose(compose(a, b), c);
@@ -129,7 +129,7 @@ TEST_CASE("composition is associative and the inverse of the inverse is the pose
 }
 
 TEST_CASE("interpolation agrees with the exponential map and is an upper bound of the uncertainty") {
-  Random random(3);
+  RandomPose random(3);
   for (int i = 0; i < 300; ++i) {
     const UncertainPose a = random.pose(), b = random.pose();
     const Rigid ra = rigid(a.transform), rb = rigid(b.transform);
@@ -147,7 +147,7 @@ TEST_CASE("interpolation agrees with the exponential map and is an upper bound o
 
 TEST_CASE("a track answers as a linear search over all it was given would") {
   for (uint32_t seed = 10; seed < 20; ++seed) {
-    Random random(seed);
+    RandomPose random(seed);
     const auto capacity = static_cast<size_t>(1 + random.below(8));
     const int64_t gap = 1 + random.below(30);
     PoseTrack track(capacity, gap);
@@ -198,7 +198,7 @@ TEST_CASE("a track answers as a linear search over all it was given would") {
 
 TEST_CASE("any two frames of a random tree are joined as their matrices say") {
   for (uint32_t seed = 30; seed < 60; ++seed) {
-    Random random(seed);
+    RandomPose random(seed);
     TransformBuffer buffer;
     constexpr int kFrames = 8;
     std::vector<Rigid> in_root(kFrames);

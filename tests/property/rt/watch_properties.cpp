@@ -7,11 +7,12 @@
 #include <vector>
 
 #include "rt/sched/watch_rules.hpp"
+#include "tests/nanoseconds.hpp"
 
 namespace {
 
 using namespace takt;
-constexpr int64_t kUs = 1'000;
+using test::kUs;
 
 /// A job in steps of a microsecond: when it runs and when it is preempted, until it returns.
 struct JobTrace {

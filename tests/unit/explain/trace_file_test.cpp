@@ -15,7 +15,7 @@
 namespace {
 
 using namespace takt;
-using namespace takt::trace::test;
+using namespace takt::trace::by_hand;
 using explain::Json;
 using trace::Slice;
 

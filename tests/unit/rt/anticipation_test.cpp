@@ -11,13 +11,14 @@
 #include "rt/memory/memory_use.hpp"
 #include "rt/node.hpp"
 #include "rt/sched/executor.hpp"
+#include "tests/nanoseconds.hpp"
 
 using namespace takt;
 
 namespace {
 
 using Beside = Anticipation::Beside;
-constexpr int64_t kUs = 1'000;
+using test::kUs;
 
 /// Every reading is that much after the one before.
 class SteppingClock final : public Clock {

@@ -9,11 +9,12 @@
 #include "rt/node.hpp"
 #include "rt/sched/executor.hpp"
 #include "rt/sched/port_access.hpp"
+#include "tests/nanoseconds.hpp"
 
 namespace {
 
 using namespace takt;
-constexpr int64_t kMs = 1'000'000;
+using test::kMs;
 
 struct Degrading final : Node {
   Levels levels{this, {{"full", 1.0}, {"half", 0.5}}};
@@ -28,7 +29,7 @@ struct Degrading final : Node {
   }
 };
 
-struct Reader final : Node {
+struct LevelReader final : Node {
   Input<Odometry> in{this, "in", "test data"};
   std::vector<int> seen;
   void setup(Setup&) override {}
@@ -36,13 +37,13 @@ struct Reader final : Node {
 };
 
 /// Jobs take exactly their budget, at level 1 half of it; a deadline below the budget is the overrun.
-struct Scene {
+struct DegradeScene {
   Degrading node;
-  Reader reader;
+  LevelReader reader;
   Plan plan;
   VirtualClock clock{1'000'000'000};
 
-  Scene(int64_t budget_ns, int64_t deadline_ns, OnOverrun on_overrun) {
+  DegradeScene(int64_t budget_ns, int64_t deadline_ns, OnOverrun on_overrun) {
     plan.tasks.resize(2);
     plan.ports.resize(1);
     plan.ports[0].type = &node.out.type();
@@ -75,7 +76,7 @@ struct Scene {
 }  // namespace
 
 TEST_CASE("degrade: the job after an overrun runs at level 1, its message says so, the report can count it") {
-  Scene scene(30 * kMs, 20 * kMs, OnOverrun::degrade);
+  DegradeScene scene(30 * kMs, 20 * kMs, OnOverrun::degrade);
   const TaskStatistics& counted = scene.run(20);
   REQUIRE(scene.node.seen.size() == 20);
   CHECK(scene.node.seen[0] == 0);
@@ -90,7 +91,7 @@ TEST_CASE("degrade: the job after an overrun runs at level 1, its message says s
 }
 
 TEST_CASE("continue: the level stays 0, whatever happens") {
-  Scene scene(30 * kMs, 20 * kMs, OnOverrun::proceed);
+  DegradeScene scene(30 * kMs, 20 * kMs, OnOverrun::proceed);
   const TaskStatistics& counted = scene.run(20);
   CHECK(std::count(scene.node.seen.begin(), scene.node.seen.end(), 0) == 20);
   CHECK(counted.at_level[0].load() == 20);
@@ -98,13 +99,14 @@ TEST_CASE("continue: the level stays 0, whatever happens") {
 }
 
 TEST_CASE("a node that fits keeps level 0 under degrade") {
-  Scene scene(20 * kMs, 20 * kMs, OnOverrun::degrade);
+  DegradeScene scene(20 * kMs, 20 * kMs, OnOverrun::degrade);
   CHECK(scene.run(20).level_changes.load() == 0);
   CHECK(scene.node.seen.back() == 0);
 }
 
 TEST_CASE("time left: to the deadline or to the end of the budget, whichever comes first") {
-  Scene tight_budget(5 * kMs, 20 * kMs, OnOverrun::proceed), tight_deadline(30 * kMs, 20 * kMs, OnOverrun::proceed);
+  DegradeScene tight_budget(5 * kMs, 20 * kMs, OnOverrun::proceed),
+      tight_deadline(30 * kMs, 20 * kMs, OnOverrun::proceed);
   tight_budget.run(2);
   tight_deadline.run(2);
   CHECK(tight_budget.node.left_ms == std::vector<int64_t>{5, 5});

@@ -12,11 +12,12 @@
 #include "rt/node.hpp"
 #include "rt/sched/executor.hpp"
 #include "rt/sched/watchdog.hpp"
+#include "tests/nanoseconds.hpp"
 
 namespace {
 
 using namespace takt;
-constexpr int64_t kMs = 1'000'000;
+using test::kMs;
 
 struct Steady final : Node {
   void setup(Setup&) override {}
@@ -34,7 +35,7 @@ struct Spinner final : Node {
   }
 };
 
-struct Scene {
+struct SpinnerScene {
   Steady steady;
   Spinner spinner;
   Plan plan;
@@ -43,7 +44,7 @@ struct Scene {
   std::unique_ptr<RunBoard> board;
   std::unique_ptr<Executor> executor;
 
-  explicit Scene(Policy policy) {
+  explicit SpinnerScene(Policy policy) {
     plan.policy = policy;
     plan.cores = {0, 1};
     add(steady, "steady", Criticality::high, 90 * kMs);
@@ -71,13 +72,13 @@ struct Scene {
   }
 };
 
-std::vector<std::unique_ptr<Scene>>& kept_scenes() {
-  static auto& scenes = *new std::vector<std::unique_ptr<Scene>>;
+std::vector<std::unique_ptr<SpinnerScene>>& kept_scenes() {
+  static auto& scenes = *new std::vector<std::unique_ptr<SpinnerScene>>;
   return scenes;
 }
 
 /// Kept for ever: a thread that was given up may use it until the process ends.
-Scene& new_scene(Policy policy) { return *kept_scenes().emplace_back(std::make_unique<Scene>(policy)); }
+SpinnerScene& new_scene(Policy policy) { return *kept_scenes().emplace_back(std::make_unique<SpinnerScene>(policy)); }
 
 /// The spinner need not spin through all other tests.
 struct LetGo {
@@ -88,7 +89,7 @@ struct LetGo {
 }  // namespace
 
 TEST_CASE("without real-time policies a job that does not return is named and ends the run") {
-  Scene& scene = new_scene(Policy::cooperative);
+  SpinnerScene& scene = new_scene(Policy::cooperative);
   const LetGo let_go{scene.spinner};
   const RunResult result = scene.run(3'600'000 * kMs);
   REQUIRE(result.stuck.size() == 1);
@@ -104,7 +105,7 @@ TEST_CASE("without real-time policies a job that does not return is named and en
 }
 
 TEST_CASE("under fixed a job that does not return is demoted, and the run goes on to its planned end") {
-  Scene& scene = new_scene(Policy::fixed);
+  SpinnerScene& scene = new_scene(Policy::fixed);
   const LetGo let_go{scene.spinner};
   const RunResult result = scene.run(1'500 * kMs);
   if (result.policy_granted != Policy::fixed) {
@@ -128,7 +129,7 @@ TEST_CASE("a demoted job that returns gets its priority back, and its node runs 
     MESSAGE("NOT RUN: SCHED_FIFO is refused to this user");
     return;
   }
-  Scene& scene = new_scene(Policy::fixed);
+  SpinnerScene& scene = new_scene(Policy::fixed);
   std::thread friendly([&] {
     while (scene.board->task(1).demoted.load() == 0) std::this_thread::yield();
     scene.spinner.let_go.store(true);

@@ -10,14 +10,15 @@
 
 #include "rt/node.hpp"
 #include "rt/sched/port_access.hpp"
+#include "tests/nanoseconds.hpp"
 
 namespace {
 
 using namespace takt;
-constexpr int64_t kMs = 1'000'000;
+using test::kMs;
 
 /// A source that sends its job index as an odometry x, stamped with its release.
-struct Source final : Node {
+struct IndexSource final : Node {
   Output<Odometry> out{this, "out", "test data"};
   int64_t last_job = -1;
   void setup(Setup&) override {}
@@ -44,9 +45,9 @@ struct Flood final : Node {
 };
 
 /// Notes what it latched.
-struct Sink final : Node {
+struct NotingSink final : Node {
   Input<Odometry> a{this, "a", "test data"};
-  Input<Odometry> b{this, "b", "test data", Need::optional};
+  Input<Odometry> b{this, "b", "test data", takt::Need::optional};
   Output<Odometry> out{this, "out", "test data"};
   struct Seen {
     int64_t release_ns;
@@ -64,7 +65,7 @@ struct Sink final : Node {
   }
 };
 
-struct Bench {
+struct ExecutorBench {
   Plan plan;
   std::vector<Node*> nodes;
   VirtualClock clock{1'000'000'000};
@@ -107,8 +108,8 @@ struct Bench {
 }  // namespace
 
 TEST_CASE("completed equals the releases computed from rate and window, for each rate of the thesis") {
-  Bench bench;
-  std::array<Source, 5> sources;
+  ExecutorBench bench;
+  std::array<IndexSource, 5> sources;
   const std::array rates{Rate{15, 1}, Rate{10, 1}, Rate{7, 1}, Rate{5, 1}, Rate{2, 1}};
   for (size_t i = 0; i < rates.size(); ++i) bench.add(sources[i], "s" + std::to_string(i), rates[i], 3 * kMs, kMs);
   bench.run(20'000 * kMs, [&](Executor& executor) {
@@ -121,9 +122,9 @@ TEST_CASE("completed equals the releases computed from rate and window, for each
 }
 
 TEST_CASE("a job that floods its output gets one message through; what it was refused is counted") {
-  Bench bench;
+  ExecutorBench bench;
   Flood flood;
-  Sink sink;
+  NotingSink sink;
   const size_t from = bench.add(flood, "flood", Rate{10, 1}, 0, 5 * kMs);
   const size_t to = bench.add(sink, "sink", Rate{10, 1}, 50 * kMs, kMs);
   bench.edge(from, to, 0);
@@ -138,9 +139,9 @@ TEST_CASE("a job that floods its output gets one message through; what it was re
 }
 
 TEST_CASE("a job latches the newest message visible at its planned release, not at its start") {
-  Bench bench;
-  Source source;
-  Sink sink;
+  ExecutorBench bench;
+  IndexSource source;
+  NotingSink sink;
   const size_t from = bench.add(source, "source", Rate{10, 1}, 0, 5 * kMs);  // visible 5 ms after each release
   const size_t to = bench.add(sink, "sink", Rate{10, 1}, 4 * kMs, kMs);
   bench.edge(from, to, 0);
@@ -154,9 +155,9 @@ TEST_CASE("a job latches the newest message visible at its planned release, not 
 }
 
 TEST_CASE("depth latches the newest n, oldest first, and tells which are new; every message is accounted for") {
-  Bench bench;
-  Source source;
-  Sink sink;
+  ExecutorBench bench;
+  IndexSource source;
+  NotingSink sink;
   const size_t from = bench.add(source, "source", Rate{15, 1}, 0, kMs);
   const size_t to = bench.add(sink, "sink", Rate{2, 1}, 490 * kMs, kMs);
   bench.edge(from, to, 0, 4);
@@ -176,9 +177,9 @@ TEST_CASE("depth latches the newest n, oldest first, and tells which are new; ev
 }
 
 TEST_CASE("a join latches the newest set with equal stamps, none is stale") {
-  Bench bench;
-  Source fast, slow;
-  Sink sink;
+  ExecutorBench bench;
+  IndexSource fast, slow;
+  NotingSink sink;
   const size_t a = bench.add(fast, "fast", Rate{10, 1}, 0, kMs);
   const size_t b = bench.add(slow, "slow", Rate{5, 1}, 0, 150 * kMs);  // same stamps, visible much later
   const size_t to = bench.add(sink, "sink", Rate{10, 1}, 50 * kMs, kMs);
@@ -198,9 +199,9 @@ TEST_CASE("a join latches the newest set with equal stamps, none is stale") {
 }
 
 TEST_CASE("an input older than max_age is stale but still seen") {
-  Bench bench;
-  Source source;
-  Sink sink;
+  ExecutorBench bench;
+  IndexSource source;
+  NotingSink sink;
   source.last_job = 100;
   const size_t from = bench.add(source, "source", Rate{1, 1}, 0, kMs);
   const size_t to = bench.add(sink, "sink", Rate{10, 1}, 50 * kMs, kMs);
@@ -212,11 +213,11 @@ TEST_CASE("an input older than max_age is stale but still seen") {
 }
 
 TEST_CASE("an `on` task runs once per publication of its producer, every n-th, and not more often than min_interval") {
-  Bench bench;
-  Source source;
-  Sink all, second, spaced;
+  ExecutorBench bench;
+  IndexSource source;
+  NotingSink all, second, spaced;
   const size_t from = bench.add(source, "source", Rate{10, 1}, 0, kMs);
-  for (Sink* sink : {&all, &second, &spaced}) {
+  for (NotingSink* sink : {&all, &second, &spaced}) {
     const size_t to = bench.add(*sink, "sink", std::nullopt, 0, kMs);
     bench.edge(from, to, 0);
     bench.plan.tasks[to].on_task = from;
@@ -233,8 +234,8 @@ TEST_CASE("an `on` task runs once per publication of its producer, every n-th, a
 }
 
 TEST_CASE("the end of recorded data ends the run at that release, and jobs before it are finished") {
-  Bench bench;
-  Source source, other;
+  ExecutorBench bench;
+  IndexSource source, other;
   source.last_job = 4;
   bench.add(source, "source", Rate{10, 1}, 0, kMs);
   bench.add(other, "other", Rate{10, 1}, 30 * kMs, kMs);
@@ -243,9 +244,9 @@ TEST_CASE("the end of recorded data ends the run at that release, and jobs befor
 }
 
 TEST_CASE("a job released at the very instant at which the data end is not counted, even if it ran") {
-  Bench bench;
-  Source source;
-  Sink sink;
+  ExecutorBench bench;
+  IndexSource source;
+  NotingSink sink;
   source.last_job = 4;
   const size_t from = bench.add(source, "source", Rate{10, 1}, 0, kMs);
   const size_t to = bench.add(sink, "sink", Rate{10, 1}, 0, kMs);
@@ -261,9 +262,9 @@ TEST_CASE("a job released at the very instant at which the data end is not count
 
 TEST_CASE("late jobs: continue publishes, skip withholds, reuse_last repeats the old message") {
   for (const OnMiss verb : {OnMiss::proceed, OnMiss::skip, OnMiss::reuse_last}) {
-    Bench bench;
-    Source source;
-    Sink sink;
+    ExecutorBench bench;
+    IndexSource source;
+    NotingSink sink;
     const size_t from = bench.add(source, "source", Rate{10, 1}, 0, 20 * kMs);
     const size_t to = bench.add(sink, "sink", Rate{10, 1}, 90 * kMs, kMs);
     bench.edge(from, to, 0);
@@ -282,9 +283,9 @@ TEST_CASE("late jobs: continue publishes, skip withholds, reuse_last repeats the
 
 TEST_CASE("virtual time gives the same observations in every run") {
   const auto once = [] {
-    Bench bench;
-    Source a, b;
-    Sink sink;
+    ExecutorBench bench;
+    IndexSource a, b;
+    NotingSink sink;
     const size_t fast = bench.add(a, "a", Rate{15, 1}, 0, 7 * kMs);
     const size_t slow = bench.add(b, "b", Rate{7, 1}, 0, 11 * kMs);
     const size_t to = bench.add(sink, "sink", Rate{10, 1}, 0, kMs);

@@ -11,15 +11,16 @@
 #include "rt/memory/aligned_bytes.hpp"
 #include "rt/memory/memory_use.hpp"
 #include "rt/msg/messages.hpp"
+#include "tests/unit/rt/epoch.hpp"
 
 namespace {
 
 using namespace takt;
 using namespace takt::faults;
-constexpr int64_t kMs = 1'000'000, kEpoch = 1'000 * kMs;
+using test::kEpoch, test::kMs;
 
 /// One output of texts and one reader; message n is "n" twenty times, stamped and published n * 10 ms after the epoch.
-struct Bench {
+struct FaultBench {
   std::vector<PortPlan> ports;
   VirtualClock clock{kEpoch};
   std::atomic<int64_t> epoch{kEpoch};
@@ -30,7 +31,7 @@ struct Bench {
   std::unique_ptr<Reader> reader;
   uint64_t made = 0;
 
-  explicit Bench(std::vector<MessageFault> faults, uint32_t history = 8) : counts(faults.size()) {
+  explicit FaultBench(std::vector<MessageFault> faults, uint32_t history = 8) : counts(faults.size()) {
     ports.push_back({"node", "text", &MessageType::of<TextStatus>(), {.count = 64}, history, 2, 1});
     const double rate = 100;
     make_room(ports, faults, std::span(&rate, 1));
@@ -80,14 +81,14 @@ MessageFault fault(MessageFaultKind kind, int64_t by_ns = 0) {
   return f;
 }
 
-using Seen = std::vector<std::pair<char, int64_t>>;
+using SeenTexts = std::vector<std::pair<char, int64_t>>;
 
 }  // namespace
 
 TEST_CASE("drop: messages of the window are not there, and are counted") {
-  Bench bench({fault(MessageFaultKind::drop)});
+  FaultBench bench({fault(MessageFaultKind::drop)});
   bench.publish_to(5);
-  CHECK(bench.seen() == Seen{{'1', 1}, {'4', 4}, {'5', 5}});
+  CHECK(bench.seen() == SeenTexts{{'1', 1}, {'4', 4}, {'5', 5}});
   CHECK(bench.counts[0].struck == 2);
   CHECK(bench.counts[0].withheld == 2);
   CHECK(bench.offered[0] == 5);
@@ -96,7 +97,7 @@ TEST_CASE("drop: messages of the window are not there, and are counted") {
 }
 
 TEST_CASE("nothing strikes before the run has an epoch") {
-  Bench bench({fault(MessageFaultKind::drop)});
+  FaultBench bench({fault(MessageFaultKind::drop)});
   bench.epoch = 0;
   bench.publish_to(5);
   CHECK(bench.seen().size() == 5);
@@ -104,12 +105,12 @@ TEST_CASE("nothing strikes before the run has an epoch") {
 }
 
 TEST_CASE("delay: visible that much later, behind its successors") {
-  Bench bench({fault(MessageFaultKind::delay, 25 * kMs)});
+  FaultBench bench({fault(MessageFaultKind::delay, 25 * kMs)});
   bench.publish_to(5);
-  CHECK(bench.seen(Bench::at(4)) == Seen{{'1', 1}, {'4', 4}});
-  CHECK(bench.seen(Bench::at(2) + 25 * kMs - 1) == Seen{{'1', 1}, {'4', 4}});
-  CHECK(bench.seen(Bench::at(2) + 25 * kMs) == Seen{{'1', 1}, {'2', 2}, {'4', 4}});
-  CHECK(bench.seen(Bench::at(3) + 25 * kMs).size() == 5);
+  CHECK(bench.seen(FaultBench::at(4)) == SeenTexts{{'1', 1}, {'4', 4}});
+  CHECK(bench.seen(FaultBench::at(2) + 25 * kMs - 1) == SeenTexts{{'1', 1}, {'4', 4}});
+  CHECK(bench.seen(FaultBench::at(2) + 25 * kMs) == SeenTexts{{'1', 1}, {'2', 2}, {'4', 4}});
+  CHECK(bench.seen(FaultBench::at(3) + 25 * kMs).size() == 5);
   CHECK(bench.counts[0].struck == 2);
 }
 
@@ -117,10 +118,10 @@ TEST_CASE("a delayed message is still there when it becomes visible, however lon
   MessageFault all = fault(MessageFaultKind::delay, 200 * kMs);
   all.from_ns = 0;
   all.to_ns = kForever;
-  Bench bench({all}, 2);
+  FaultBench bench({all}, 2);
   for (uint64_t n = 1; n <= 60; ++n) {
     CHECK(bench.publish());
-    const Seen seen = bench.seen(Bench::at(n));
+    const SeenTexts seen = bench.seen(FaultBench::at(n));
     if (n > 20) {
       REQUIRE_FALSE(seen.empty());
       CHECK(seen.back().second == static_cast<int64_t>(n - 20));
@@ -129,9 +130,9 @@ TEST_CASE("a delayed message is still there when it becomes visible, however lon
 }
 
 TEST_CASE("duplicate: published twice with one stamp") {
-  Bench bench({fault(MessageFaultKind::duplicate)});
+  FaultBench bench({fault(MessageFaultKind::duplicate)});
   bench.publish_to(4);
-  CHECK(bench.seen() == Seen{{'1', 1}, {'2', 2}, {'2', 2}, {'3', 3}, {'3', 3}, {'4', 4}});
+  CHECK(bench.seen() == SeenTexts{{'1', 1}, {'2', 2}, {'2', 2}, {'3', 3}, {'3', 3}, {'4', 4}});
   CHECK(bench.counts[0].struck == 2);
   CHECK(bench.counts[0].added == 2);
   CHECK(bench.writer->statistics().sent == 6);
@@ -140,18 +141,18 @@ TEST_CASE("duplicate: published twice with one stamp") {
 TEST_CASE("freeze: the first content of the window under new stamps") {
   MessageFault frozen = fault(MessageFaultKind::freeze);
   frozen.to_ns = 50 * kMs;
-  Bench bench({frozen});
+  FaultBench bench({frozen});
   bench.publish_to(6);
-  CHECK(bench.seen() == Seen{{'1', 1}, {'2', 2}, {'2', 3}, {'2', 4}, {'5', 5}, {'6', 6}});
+  CHECK(bench.seen() == SeenTexts{{'1', 1}, {'2', 2}, {'2', 3}, {'2', 4}, {'5', 5}, {'6', 6}});
   CHECK_MESSAGE(bench.counts[0].struck == 2, "the first one is as it was");
 }
 
 TEST_CASE("reorder: neighbours change places, with their stamps") {
   MessageFault swapped = fault(MessageFaultKind::reorder);
   swapped.to_ns = 50 * kMs;
-  Bench bench({swapped});
+  FaultBench bench({swapped});
   bench.publish_to(6);
-  CHECK(bench.seen() == Seen{{'1', 1}, {'3', 3}, {'2', 2}, {'5', 5}, {'4', 4}, {'6', 6}});
+  CHECK(bench.seen() == SeenTexts{{'1', 1}, {'3', 3}, {'2', 2}, {'5', 5}, {'4', 4}, {'6', 6}});
   CHECK(bench.counts[0].struck == 2);
   CHECK(bench.offered[0] + bench.counts[0].added - bench.counts[0].withheld == 6);
 }
@@ -159,19 +160,19 @@ TEST_CASE("reorder: neighbours change places, with their stamps") {
 TEST_CASE("reorder: what is held back at the end of the window follows all the same") {
   MessageFault swapped = fault(MessageFaultKind::reorder);
   swapped.to_ns = 30 * kMs;
-  Bench bench({swapped});
+  FaultBench bench({swapped});
   bench.publish_to(4);
-  CHECK(bench.seen() == Seen{{'1', 1}, {'3', 3}, {'2', 2}, {'4', 4}});
+  CHECK(bench.seen() == SeenTexts{{'1', 1}, {'3', 3}, {'2', 2}, {'4', 4}});
 }
 
 TEST_CASE("clock_step: stamps are off in the window, and right again after it") {
-  Bench bench({fault(MessageFaultKind::clock_step, -50 * kMs)});
+  FaultBench bench({fault(MessageFaultKind::clock_step, -50 * kMs)});
   bench.publish_to(4);
-  CHECK(bench.seen() == Seen{{'1', 1}, {'2', -3}, {'3', -2}, {'4', 4}});
+  CHECK(bench.seen() == SeenTexts{{'1', 1}, {'2', -3}, {'3', -2}, {'4', 4}});
 }
 
 TEST_CASE("truncate: arrays are shorter, never longer") {
-  Bench bench({fault(MessageFaultKind::truncate)});
+  FaultBench bench({fault(MessageFaultKind::truncate)});
   bench.publish_to(4);
   std::array<Candidate, 8> candidates;
   const size_t listed = bench.reader->list(kForever, candidates);
@@ -187,7 +188,7 @@ TEST_CASE("truncate: arrays are shorter, never longer") {
 }
 
 TEST_CASE("corrupt: content changes, size does not") {
-  Bench bench({fault(MessageFaultKind::corrupt)});
+  FaultBench bench({fault(MessageFaultKind::corrupt)});
   bench.publish_to(4);
   std::array<Candidate, 8> candidates;
   const size_t listed = bench.reader->list(kForever, candidates);
@@ -205,7 +206,7 @@ TEST_CASE("corrupt: content changes, size does not") {
 TEST_CASE("exhaust: once every chunk is held there is none to write into, until the window ends") {
   MessageFault hoarded = fault(MessageFaultKind::exhaust);
   hoarded.to_ns = 300 * kMs;
-  Bench bench({hoarded});
+  FaultBench bench({hoarded});
   uint64_t refused = 0;
   while (bench.made < 29) refused += bench.publish() ? 0 : 1;
   CHECK(refused > 10);
@@ -216,18 +217,18 @@ TEST_CASE("exhaust: once every chunk is held there is none to write into, until 
 }
 
 TEST_CASE("several faults strike in their order; a withheld message is struck no more") {
-  Bench bench({fault(MessageFaultKind::drop), fault(MessageFaultKind::duplicate)});
+  FaultBench bench({fault(MessageFaultKind::drop), fault(MessageFaultKind::duplicate)});
   bench.publish_to(4);
-  CHECK(bench.seen() == Seen{{'1', 1}, {'4', 4}});
+  CHECK(bench.seen() == SeenTexts{{'1', 1}, {'4', 4}});
   CHECK(bench.counts[1].struck == 0);
 }
 
 TEST_CASE("a repeated message is dropped and delayed like one of the node's own") {
-  Bench bench({fault(MessageFaultKind::drop)});
+  FaultBench bench({fault(MessageFaultKind::drop)});
   bench.publish_to(1);
-  CHECK_FALSE(bench.writer->repeat(Bench::at(2), Bench::at(2)));
-  CHECK(bench.writer->repeat(Bench::at(4), Bench::at(4)));
-  CHECK(bench.seen() == Seen{{'1', 1}, {'1', 1}});
+  CHECK_FALSE(bench.writer->repeat(FaultBench::at(2), FaultBench::at(2)));
+  CHECK(bench.writer->repeat(FaultBench::at(4), FaultBench::at(4)));
+  CHECK(bench.seen() == SeenTexts{{'1', 1}, {'1', 1}});
   CHECK(bench.offered[0] - bench.counts[0].withheld == bench.writer->statistics().sent);
 }
 
@@ -262,7 +263,7 @@ TEST_CASE("no fault allocates while it strikes") {
     all.back().seed = all.size();
     if (kind == MessageFaultKind::exhaust) all.back().from_ns = 1'000 * kMs;  // nothing is published after it
   }
-  Bench bench(all);
+  FaultBench bench(all);
   take_thread_use();
   for (int i = 0; i < 200; ++i) bench.publish();
   CHECK(take_thread_use().allocations == 0);

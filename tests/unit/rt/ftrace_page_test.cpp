@@ -26,13 +26,13 @@ struct Page {
   }
 };
 
-struct Seen {
+struct SeenRecord {
   int64_t at;
   size_t bytes;
-  bool operator==(const Seen&) const = default;
+  bool operator==(const SeenRecord&) const = default;
 };
-std::vector<Seen> walk(const Page& page, uint64_t* missed = nullptr) {
-  std::vector<Seen> seen;
+std::vector<SeenRecord> walk(const Page& page, uint64_t* missed = nullptr) {
+  std::vector<SeenRecord> seen;
   const uint64_t lost = for_each_record(page.bytes, 16, [&](int64_t at, std::span<const std::byte> record) {
     seen.push_back({at, record.size()});
   });
@@ -58,7 +58,7 @@ TEST_CASE("records of each length, time extensions and padding") {
   page.head(29, 0), page.word(0);  // the rest is empty
   page.close(1'000);
   const int64_t extended = 1'005 + (int64_t{1} << 27) + 7;
-  CHECK(walk(page) == std::vector<Seen>{{1'005, 8}, {extended + 3, 8}, {(int64_t{100} << 27) + 10, 4}});
+  CHECK(walk(page) == std::vector<SeenRecord>{{1'005, 8}, {extended + 3, 8}, {(int64_t{100} << 27) + 10, 4}});
 }
 
 TEST_CASE("what the kernel dropped is counted") {
@@ -82,7 +82,7 @@ TEST_CASE("a damaged page is never read beyond its end") {
       page.word(static_cast<uint32_t>(random() % (round % 2 == 0 ? 64 : 1U << 31U)));
     page.close(random(), random() % 3 == 0 ? 4'000 : 0);
     if (random() % 4 == 0) page.bytes.resize(random() % (page.bytes.size() + 1));
-    for (const Seen& seen : walk(page)) CHECK(seen.bytes <= page.bytes.size());
+    for (const SeenRecord& seen : walk(page)) CHECK(seen.bytes <= page.bytes.size());
   }
 }
 

@@ -10,10 +10,12 @@
 #include <csignal>
 #include <new>
 
+#include "tests/nanoseconds.hpp"
+
 namespace {
 
 using namespace takt;
-constexpr int64_t kMs = 1'000'000;
+using test::kMs;
 
 class HastyClock final : public Clock {
  public:
@@ -25,7 +27,7 @@ class HastyClock final : public Clock {
 };
 
 /// What keeper and groups share: signs, and how many groups there were.
-struct Scene {
+struct GroupScene {
   struct Shared {
     GroupSigns signs;
     std::atomic<int> groups{0};
@@ -37,7 +39,7 @@ struct Scene {
   std::vector<pid_t> cleaned;
   std::vector<std::string> said;
 
-  Scene() {
+  GroupScene() {
     void* memory = mmap(nullptr, sizeof(Shared), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
     REQUIRE(memory != MAP_FAILED);
     shared = ::new (memory) Shared;
@@ -47,9 +49,9 @@ struct Scene {
     options.clean_up = [this](pid_t pid) { cleaned.push_back(pid); };
     options.say = [this](const std::string& what) { said.push_back(what); };
   }
-  ~Scene() { munmap(shared, sizeof(Shared)); }
-  Scene(const Scene&) = delete;
-  Scene& operator=(const Scene&) = delete;
+  ~GroupScene() { munmap(shared, sizeof(Shared)); }
+  GroupScene(const GroupScene&) = delete;
+  GroupScene& operator=(const GroupScene&) = delete;
 
   /// `group` is told the how many-th it is, from 1 on.
   std::optional<int> keep(const std::function<int(int)>& group) {
@@ -79,7 +81,7 @@ TEST_CASE("silence lasts from a sign to the next look at which there is none, as
 }
 
 TEST_CASE("the code of a group that ends by itself is that of the run") {
-  Scene scene;
+  GroupScene scene;
   CHECK(scene.keep([](int) { return 3; }) == 3);
   CHECK(scene.shared->groups.load() == 1);
   CHECK(scene.shared->signs.losses.load() == 0);
@@ -87,7 +89,7 @@ TEST_CASE("the code of a group that ends by itself is that of the run") {
 }
 
 TEST_CASE("a group whose first process dies is cleared up after, noted and started anew") {
-  Scene scene;
+  GroupScene scene;
   CHECK(scene.keep([](int number) { return number == 1 ? raise(SIGKILL) : 4; }) == 4);
   CHECK(scene.shared->groups.load() == 2);
   CHECK(scene.cleaned.size() == 1);
@@ -98,7 +100,7 @@ TEST_CASE("a group whose first process dies is cleared up after, noted and start
 }
 
 TEST_CASE("a group that once gave a sign and gives none any more is ended and started anew") {
-  Scene scene;
+  GroupScene scene;
   const auto code = scene.keep([&](int number) {
     if (number == 2) return 0;
     scene.shared->signs.heartbeat_ns.store(77);
@@ -111,7 +113,7 @@ TEST_CASE("a group that once gave a sign and gives none any more is ended and st
 }
 
 TEST_CASE("nobody of a lost group lives on beside the next one") {
-  Scene scene;
+  GroupScene scene;
   const auto code = scene.keep([&](int number) {
     if (number == 2) return kill(scene.shared->member.load(), 0) == 0 ? 9 : 5;
     const pid_t member = fork();
@@ -123,7 +125,7 @@ TEST_CASE("nobody of a lost group lives on beside the next one") {
 }
 
 TEST_CASE("after any number of losses the newest one is told") {
-  Scene scene;
+  GroupScene scene;
   constexpr int kMany = 100;
   scene.options.restarts.most_in_window = kMany + 1;
   const auto code = scene.keep([&](int number) {
@@ -137,14 +139,14 @@ TEST_CASE("after any number of losses the newest one is told") {
 }
 
 TEST_CASE("too many losses in a short time are the last one") {
-  Scene scene;
+  GroupScene scene;
   CHECK_FALSE(scene.keep([](int) { return raise(SIGKILL); }));
   CHECK(scene.shared->groups.load() == 3);
   CHECK(scene.shared->signs.losses.load() == 3);
 }
 
 TEST_CASE("asked to stop, it passes that on, and what ends then is no loss") {
-  Scene scene;
+  GroupScene scene;
   scene.options.stop_asked = [&] { return scene.shared->groups.load() == 1; };
   const auto group = [](int) {
     signal(SIGTERM, SIG_DFL);  // not as the test program would have it, which reports a crash

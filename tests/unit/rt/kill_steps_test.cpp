@@ -24,23 +24,23 @@ constexpr int kRepeats = 50;
 constexpr size_t kPort = stress;  // keeps 3, two readers
 
 /// What both processes see: the order, and how far the victim came.
-struct Scene {
+struct KillScene {
   KillOrder order;
   std::atomic<uint64_t> published{0};
 };
 
 class Stage {
  public:
-  Stage() : scene_(new (map()) Scene), transport_(make_local_transport(conformance_ports(), file_, kSelf)) {}
-  ~Stage() { munmap(scene_, sizeof(Scene)); }
+  Stage() : scene_(new (map()) KillScene), transport_(make_local_transport(conformance_ports(), file_, kSelf)) {}
+  ~Stage() { munmap(scene_, sizeof(KillScene)); }
   Stage(const Stage&) = delete;
   Stage& operator=(const Stage&) = delete;
 
-  Scene& scene() { return *scene_; }
+  KillScene& scene() { return *scene_; }
   Transport& transport() { return *transport_; }
 
   /// Runs `body` in a process that obeys the order; true if the order ended it.
-  bool perform(MessageStep step, uint32_t passes, const std::function<void(Transport&, Scene&)>& body) {
+  bool perform(MessageStep step, uint32_t passes, const std::function<void(Transport&, KillScene&)>& body) {
     scene_->order.port.store(kPort);
     scene_->order.passes.store(passes);
     scene_->order.step.store(step);
@@ -61,12 +61,12 @@ class Stage {
 
  private:
   static void* map() {
-    void* memory = mmap(nullptr, sizeof(Scene), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    void* memory = mmap(nullptr, sizeof(KillScene), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
     REQUIRE(memory != MAP_FAILED);
     return memory;
   }
   PoolFile file_;
-  Scene* scene_;
+  KillScene* scene_;
   std::unique_ptr<Transport> transport_;
 };
 
@@ -81,7 +81,7 @@ void publish_plainly(Writer& writer, uint64_t value) {
   writer.publish(static_cast<int64_t>(value), static_cast<int64_t>(value), 0);
 }
 
-void publish_six(Transport& transport, Scene& scene) {
+void publish_six(Transport& transport, KillScene& scene) {
   const auto writer = transport.make_writer(kPort);
   for (int i = 0; i < 6; ++i) {
     publish_plainly(*writer, scene.published.load() + 1);
@@ -122,7 +122,7 @@ void kill_writer(MessageStep step, uint32_t passes) {
   }
 }
 
-void read_all(Transport& transport, Scene& scene) {
+void read_all(Transport& transport, KillScene& scene) {
   const auto reader = transport.make_reader(kPort);
   scene.published.fetch_add(1);
   for (int round = 0; round < 3; ++round)

@@ -241,13 +241,15 @@ TEST_CASE("interrupts and stolen time") {
 }
 
 TEST_CASE("a run lacks what every run needs and what its own policy needs, and nothing else") {
-  const auto finding = [](const char* name, Need need, Status status) {
+  const auto finding = [](const char* name, machine::Need need, Status status) {
     return Finding{"group", name, need, status, "", ""};
   };
-  const std::vector<Finding> findings{
-      finding("deadline", Need::deadline, Status::lacks), finding("fixed", Need::fixed, Status::lacks),
-      finding("lock", Need::every_run, Status::lacks),    finding("slack", Need::every_run, Status::warn),
-      finding("shm", Need::iceoryx, Status::lacks),       finding("tick", Need::advice, Status::lacks)};
+  const std::vector<Finding> findings{finding("deadline", machine::Need::deadline, Status::lacks),
+                                      finding("fixed", machine::Need::fixed, Status::lacks),
+                                      finding("lock", machine::Need::every_run, Status::lacks),
+                                      finding("slack", machine::Need::every_run, Status::warn),
+                                      finding("shm", machine::Need::iceoryx, Status::lacks),
+                                      finding("tick", machine::Need::advice, Status::lacks)};
   const auto names = [&](Policy policy, bool iceoryx) {
     std::string text;
     for (const Finding& f : lacking(findings, policy, iceoryx)) text += f.name + " ";

@@ -10,12 +10,13 @@
 #include "rt/node.hpp"
 #include "rt/sched/executor.hpp"
 #include "rt/sched/job_watch.hpp"
+#include "tests/unit/rt/epoch.hpp"
 #include "tests/unit/rt/plans.hpp"
 
 namespace {
 
 using namespace takt;
-constexpr int64_t kMs = 1'000'000, kEpoch = 1000 * kMs;
+using test::kEpoch, test::kMs;
 
 struct Notes final : Node {
   Output<Odometry> out{this, "out", ""};
@@ -32,13 +33,13 @@ struct Notes final : Node {
 };
 
 /// Two nodes at 10 Hz; the mode `safe_stop` leaves the second one out.
-struct Scene {
+struct ModesScene {
   Notes first, second;
   Plan plan;
   VirtualClock clock{kEpoch};
   std::unique_ptr<RunBoard> board;
 
-  Scene() {
+  ModesScene() {
     test::add_task(plan, first, "first", 0);
     test::add_task(plan, second, "second", 50 * kMs);
     plan.modes = {{"full", {1, 1}}, {"half", {0, 1}}, {"safe_stop", {1, 0}}};
@@ -60,7 +61,7 @@ struct Scene {
 }  // namespace
 
 TEST_CASE("a change of mode holds for releases at or after its instant, and released counts honour it") {
-  Scene scene;
+  ModesScene scene;
   const RunResult result = scene.run([](RunBoard& board) {
     CHECK(board.modes().request(1, kEpoch + 300 * kMs, "a test"));
     CHECK(board.modes().request(0, kEpoch + 600 * kMs + 1, "a test"));
@@ -112,7 +113,7 @@ TEST_CASE("a person cannot use up all changes: a safe stop has its place") {
 }
 
 TEST_CASE("on_miss: safe_stop changes the mode when the first deadline is missed, and says why") {
-  Scene scene;
+  ModesScene scene;
   scene.plan.tasks[0].on_miss = OnMiss::safe_stop;
   scene.plan.tasks[0].deadline_ns = kMs / 2;  // the budget is 1 ms
   scene.run();
@@ -126,7 +127,7 @@ TEST_CASE("on_miss: safe_stop changes the mode when the first deadline is missed
 }
 
 TEST_CASE("on_overrun: safe_stop changes the mode") {
-  Scene scene;
+  ModesScene scene;
   scene.plan.tasks[1].on_overrun = OnOverrun::safe_stop;
   scene.run({}, kMs + 1);
   CHECK(scene.second.releases_ms == std::vector<int64_t>{50});
@@ -134,7 +135,7 @@ TEST_CASE("on_overrun: safe_stop changes the mode") {
 }
 
 TEST_CASE("a job that throws loses its result and is told; the run goes on") {
-  Scene scene;
+  ModesScene scene;
   scene.first.act = [](const Job& job) {
     if (job.index() == 3) throw std::runtime_error("out of luck");
   };
@@ -146,7 +147,7 @@ TEST_CASE("a job that throws loses its result and is told; the run goes on") {
 }
 
 TEST_CASE("a job that says that its results are doubtful or wrong is told, and they count all the same") {
-  Scene scene;
+  ModesScene scene;
   scene.first.act = [](Job& job) {
     if (job.index() == 2) job.results_doubtful("blurred");
     if (job.index() == 5) job.results_wrong(std::string(300, 'x'));

@@ -4,6 +4,7 @@
 
 #include <doctest/doctest.h>
 
+#include "epoch.hpp"
 #include "plans.hpp"
 #include "rt/sched/executor.hpp"
 #include "rt/shm/local_transport.hpp"
@@ -12,7 +13,7 @@ namespace {
 
 using namespace takt;
 using namespace takt::faults;
-constexpr int64_t kMs = 1'000'000, kEpoch = 1'000 * kMs;
+using test::kEpoch, test::kMs;
 
 struct Counter final : Node {
   Output<Odometry> out{this, "out", ""};

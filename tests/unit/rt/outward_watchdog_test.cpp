@@ -9,18 +9,13 @@
 
 #include "rt/node.hpp"
 #include "rt/supervise/watchdog_device.hpp"
+#include "tests/unit/rt/epoch.hpp"
 #include "tests/unit/rt/plans.hpp"
 
 namespace {
 
 using namespace takt;
-constexpr int64_t kMs = 1'000'000, kEpoch = 1000 * kMs;
-
-struct Idle final : Node {
-  Output<Odometry> out{this, "out", ""};
-  void setup(Setup&) override {}
-  void run(Job&) override {}
-};
+using test::Idle, test::kEpoch, test::kMs;
 
 struct Listener final : WatchdogSink {
   explicit Listener(int64_t timeout) : timeout_(timeout) {}
@@ -37,7 +32,7 @@ struct Listener final : WatchdogSink {
 };
 
 /// One high and one low task at 10 Hz with deadlines of 100 ms, and a mode without the high one. Patience is 300 ms.
-struct Scene {
+struct WatchdogScene {
   Idle high, low;
   Plan plan;
   RunBoard board{make()};
@@ -111,7 +106,7 @@ TEST_CASE("may be fed: every high node that the mode lets run met its deadlines 
 }
 
 TEST_CASE("fed at half of the shortest timeout while all is well; ready once, with the epoch") {
-  Scene scene;
+  WatchdogScene scene;
   CHECK(scene.watchdog.interval_ns() == 200 * kMs);
   scene.to(100);  // the start is still to come: fed, but not ready
   CHECK(scene.listener.readies == 0);
@@ -127,7 +122,7 @@ TEST_CASE("fed at half of the shortest timeout while all is well; ready once, wi
 }
 
 TEST_CASE("a deadline that a high node misses ends the feeding for good, one of a low node does not") {
-  Scene scene;
+  WatchdogScene scene;
   scene.begin();
   scene.to(500);
   ++scene.board.task(1).deadline_misses;
@@ -140,7 +135,7 @@ TEST_CASE("a deadline that a high node misses ends the feeding for good, one of 
 }
 
 TEST_CASE("a high node that gets no further is not fed for, and is again once it does") {
-  Scene scene;
+  WatchdogScene scene;
   scene.begin();
   scene.to(1000);
   scene.high_works = false;
@@ -153,7 +148,7 @@ TEST_CASE("a high node that gets no further is not fed for, and is again once it
 }
 
 TEST_CASE("what the mode leaves out need not get further; a lost source stands in the status") {
-  Scene scene;
+  WatchdogScene scene;
   scene.begin();
   scene.to(500);
   scene.high_works = false;
@@ -165,14 +160,14 @@ TEST_CASE("what the mode leaves out need not get further; a lost source stands i
 }
 
 TEST_CASE("after the end of the run its last jobs are not judged") {
-  Scene scene;
+  WatchdogScene scene;
   scene.begin();
   scene.board.stop().set_planned_end(kEpoch + 1000 * kMs);
   scene.to(1000);
   scene.high_works = false;
   scene.to(3000);
   CHECK(scene.feeds() == 15);
-  Scene missed;
+  WatchdogScene missed;
   missed.begin();
   missed.board.stop().set_planned_end(kEpoch + 1000 * kMs);
   missed.to(500);
@@ -182,7 +177,7 @@ TEST_CASE("after the end of the run its last jobs are not judged") {
 }
 
 TEST_CASE("who only listens asks for no feed") {
-  Scene scene;
+  WatchdogScene scene;
   Listener listener{0};
   OutwardWatchdog watchdog{scene.plan, scene.board, {&listener}};
   CHECK(watchdog.interval_ns() == 0);

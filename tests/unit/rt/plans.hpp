@@ -6,6 +6,13 @@
 
 namespace takt::test {
 
+/// Does nothing.
+struct Idle final : Node {
+  Output<Odometry> out{this, "out", ""};
+  void setup(Setup&) override {}
+  void run(Job&) override {}
+};
+
 /// Appends `node` at 10 Hz, with a deadline of 100 ms, a budget of 1 ms and its first output as a port.
 inline void add_task(Plan& plan, Node& node, const char* name, int64_t offset_ns, const Capacity& capacity = {}) {
   TaskPlan task;

@@ -8,11 +8,12 @@
 #include <vector>
 
 #include "rt/node.hpp"
+#include "tests/nanoseconds.hpp"
 
 namespace {
 
 using namespace takt;
-constexpr int64_t kMs = 1'000'000;
+using test::kMs;
 constexpr int64_t kBudget = 20 * kMs;
 
 /// A node whose job at level l takes load(job) * cost(l), released at `hz`, alone on its machine.

@@ -9,12 +9,13 @@
 #include "rt/sched/executor.hpp"
 #include "rt/sched/param_mail.hpp"
 #include "rt/sched/port_access.hpp"
+#include "tests/nanoseconds.hpp"
 #include "tests/unit/rt/plans.hpp"
 
 namespace {
 
 using namespace takt;
-constexpr int64_t kMs = 1'000'000;
+using test::kMs;
 
 /// Asks for one thing from a job on, until another.
 struct Generator final : Node {
@@ -58,13 +59,13 @@ Request request(const char* node, uint8_t run, uint8_t every) {
   return r;
 }
 
-struct Scene {
+struct RequestScene {
   Generator generator;
   Worker worker;
   Plan plan;
   VirtualClock clock{1000 * kMs};
 
-  Scene() {
+  RequestScene() {
     worker.accept_requests();
     test::add_task(plan, generator, "generator", 0, {0, 0, 1, 4});
     test::add_task(plan, worker, "worker", 50 * kMs);
@@ -89,7 +90,7 @@ struct Scene {
 }  // namespace
 
 TEST_CASE("a node that is asked to stop runs no job until it is asked to start, and is not released meanwhile") {
-  Scene scene;
+  RequestScene scene;
   scene.generator.wishes = {{3, request("worker", 0, 1)}, {6, request("worker", 1, 1)}};
   const RunResult result = scene.run(1000 * kMs);
   CHECK(scene.worker.releases_ms == std::vector<int64_t>{50, 150, 250, 650, 750, 850, 950});
@@ -100,21 +101,21 @@ TEST_CASE("a node that is asked to stop runs no job until it is asked to start, 
 }
 
 TEST_CASE("a node that is paced runs at every n-th of its releases") {
-  Scene scene;
+  RequestScene scene;
   scene.generator.wishes = {{0, request("worker", 1, 3)}};
   CHECK(scene.run(1000 * kMs).released[1] == 4);
   CHECK(scene.worker.releases_ms == std::vector<int64_t>{50, 350, 650, 950});
 }
 
 TEST_CASE("requests to other nodes, and none at all, leave a node at its full rate") {
-  Scene scene;
+  RequestScene scene;
   scene.generator.wishes = {{0, request("worker2", 0, 1)}};
   CHECK(scene.run(1000 * kMs).released[1] == 10);
   CHECK(scene.worker.releases_ms.size() == 10);
 }
 
 TEST_CASE("mail sets a parameter between jobs if the node reads it in its jobs only, else says why not") {
-  Scene scene;
+  RequestScene scene;
   Setup setup{scene.clock, {}, {}, 0, {}, 0};
   scene.worker.setup(setup);
   for (ParamBase* param : scene.worker.params()) param->end_setup();
@@ -138,7 +139,7 @@ TEST_CASE("mail sets a parameter between jobs if the node reads it in its jobs o
 }
 
 TEST_CASE("a text longer than the mail holds is not posted") {
-  Scene scene;
+  RequestScene scene;
   RunBoard board(scene.plan);
   CHECK(post(board.mail(0), 0, std::string(127, 'x')));
   board.mail(0).state.store(ParamMail::taken);

@@ -3,10 +3,12 @@
 
 #include <doctest/doctest.h>
 
+#include "tests/nanoseconds.hpp"
+
 using namespace takt;
+using test::kSecond;
 
 namespace {
-constexpr int64_t kSecond = 1'000'000'000;
 constexpr RestartPolicy::Limits kLimits{.first_wait_ns = 0,
                                         .step_ns = kSecond / 10,
                                         .most_ns = kSecond,

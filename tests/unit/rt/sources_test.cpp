@@ -6,12 +6,13 @@
 
 #include "rt/node.hpp"
 #include "rt/sched/executor.hpp"
+#include "tests/unit/rt/epoch.hpp"
 #include "tests/unit/rt/plans.hpp"
 
 namespace {
 
 using namespace takt;
-constexpr int64_t kMs = 1'000'000, kEpoch = 1000 * kMs;
+using test::kEpoch, test::kMs;
 
 struct Sensor final : Node {
   Output<Odometry> out{this, "out", ""};
@@ -26,13 +27,13 @@ struct Sensor final : Node {
 
 /// Two sources and a node that needs the first, all at 10 Hz; losing the first one leads to `without`, the second to
 /// safe_stop.
-struct Scene {
+struct SourcesScene {
   Sensor camera, laser, user;
   Plan plan;
   VirtualClock clock{kEpoch};
   std::unique_ptr<RunBoard> board;
 
-  Scene() {
+  SourcesScene() {
     test::add_task(plan, camera, "camera", 0);
     test::add_task(plan, laser, "laser", 10 * kMs);
     test::add_task(plan, user, "user", 50 * kMs);
@@ -72,7 +73,7 @@ auto lost_between(int64_t from_ms, int64_t to_ms, SourceState state) {
 }  // namespace
 
 TEST_CASE("a loss pauses what needs the source, its return lets it go on; report and faults know of both") {
-  Scene scene;
+  SourcesScene scene;
   scene.camera.act = lost_between(200, 600, SourceState::disconnected);
   scene.run();
   CHECK(scene.changes() ==
@@ -93,7 +94,7 @@ TEST_CASE("a loss pauses what needs the source, its return lets it go on; report
 }
 
 TEST_CASE("a loss that goes on counts up to the end; another kind of loss is no second one") {
-  Scene scene;
+  SourcesScene scene;
   scene.camera.act = [](Job& job, int64_t at_ms) {
     job.source_state({at_ms < 300   ? SourceState::ok
                       : at_ms < 500 ? SourceState::silent
@@ -110,7 +111,7 @@ TEST_CASE("a loss that goes on counts up to the end; another kind of loss is no 
 }
 
 TEST_CASE("two at once that no mode covers are a safe stop, which a rule entered and leaves step by step") {
-  Scene scene;
+  SourcesScene scene;
   scene.camera.act = lost_between(100, 700, SourceState::silent);
   scene.laser.act = lost_between(300, 500, SourceState::garbage);
   scene.run();
@@ -121,7 +122,7 @@ TEST_CASE("two at once that no mode covers are a safe stop, which a rule entered
 
 TEST_CASE("a mode by hand, and a safe stop for a missed deadline, stay when the source is back") {
   for (const bool by_hand : {true, false}) {
-    Scene scene;
+    SourcesScene scene;
     scene.camera.act = lost_between(200, 600, SourceState::silent);
     scene.laser.act = [&](Job& job, int64_t at_ms) {
       if (at_ms != 410) return;
@@ -136,7 +137,7 @@ TEST_CASE("a mode by hand, and a safe stop for a missed deadline, stay when the 
 }
 
 TEST_CASE("a safe stop for a missed deadline takes over the one that a rule entered") {
-  Scene scene;
+  SourcesScene scene;
   scene.laser.act = lost_between(200, 600, SourceState::silent);
   scene.camera.act = [&](Job& job, int64_t at_ms) {
     if (at_ms == 400) scene.board->safe_stop(job.release_ns(), "user: deadline missed");
@@ -147,7 +148,7 @@ TEST_CASE("a safe stop for a missed deadline takes over the one that a rule ente
 }
 
 TEST_CASE("the sources of a dead process are lost, once, until its successor says otherwise") {
-  Scene scene;
+  SourcesScene scene;
   RunBoard board(scene.plan);
   const std::vector<size_t> tasks{0, 2};
   board.lose_sources(tasks, 5 * kMs, 6 * kMs);
@@ -166,7 +167,7 @@ TEST_CASE("the sources of a dead process are lost, once, until its successor say
 }
 
 TEST_CASE("a source that comes and goes for ever ends in a safe stop, and leaves room for other faults") {
-  Scene scene;
+  SourcesScene scene;
   RunBoard board(scene.plan);
   constexpr auto kTimes = static_cast<int64_t>(2 * ModeLog::kMost);
   for (int64_t i = 0; i < kTimes; ++i)

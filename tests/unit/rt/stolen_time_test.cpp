@@ -5,12 +5,10 @@
 #include <doctest/doctest.h>
 
 #include "rt/sched/watch_rules.hpp"
+#include "tests/nanoseconds.hpp"
 
 using namespace takt;
-
-namespace {
-constexpr int64_t kMs = 1'000'000;
-}
+using test::kMs;
 
 TEST_CASE("stolen time: the window moves on, readings are as rare as they may be") {
   int64_t total = 500 * kMs;

@@ -11,21 +11,17 @@
 #include <chrono>
 #include <csignal>
 
+#include "tests/nanoseconds.hpp"
 #include "tests/unit/rt/plans.hpp"
 
 namespace {
 
 using namespace takt;
-constexpr int64_t kMs = 1'000'000, kBegin = 1000 * kMs;
-
-struct Idle final : Node {
-  Output<Odometry> out{this, "out", ""};
-  void setup(Setup&) override {}
-  void run(Job&) override {}
-};
+using test::Idle, test::kMs;
+constexpr int64_t kBegin = 1000 * kMs;
 
 /// Two processes with a task each, of which the first is of high criticality.
-struct Scene {
+struct SupervisorScene {
   Idle first, second;
   Plan plan;
   VirtualClock clock{kBegin};
@@ -36,7 +32,7 @@ struct Scene {
   std::vector<std::string> said;
   std::vector<pid_t> cleaned;
 
-  explicit Scene(const RestartPolicy::Limits& limits = {}) {
+  explicit SupervisorScene(const RestartPolicy::Limits& limits = {}) {
     test::add_task(plan, first, "first", 0);
     test::add_task(plan, second, "second", 0);
     plan.tasks[0].criticality = Criticality::high;
@@ -87,7 +83,7 @@ struct Scene {
 }  // namespace
 
 TEST_CASE("one that dies is noted, cleared up after and started again at once; back when its tasks have run") {
-  Scene scene;
+  SupervisorScene scene;
   const pid_t dead = scene.group.pid(0), other = scene.group.pid(1);
   scene.to(20'000);
   scene.kill_one();
@@ -114,7 +110,7 @@ TEST_CASE("one that dies is noted, cleared up after and started again at once; b
 }
 
 TEST_CASE("one that gives no sign of life is ended, while one whose watchdog speaks is not") {
-  Scene scene;
+  SupervisorScene scene;
   for (int64_t ms = 10; ms <= 1500; ms += 10) {
     scene.board->process(0).life.heartbeat_ns.store(kBegin + 10 * kMs);
     scene.board->process(1).life.heartbeat_ns.store(kBegin + ms * kMs);
@@ -130,7 +126,7 @@ TEST_CASE("one that gives no sign of life is ended, while one whose watchdog spe
 }
 
 TEST_CASE("a job that does not return costs its process a restart") {
-  Scene scene;
+  SupervisorScene scene;
   scene.board->process(0).life.hanging_since_ns.store(kBegin + 5 * kMs);
   scene.board->process(0).life.hanging.store(1);
   const pid_t hung = scene.group.pid(0);
@@ -143,7 +139,7 @@ TEST_CASE("a job that does not return costs its process a restart") {
 }
 
 TEST_CASE("one that stands still on its way back is ended after the silence, one that is not back after the patience") {
-  Scene scene;
+  SupervisorScene scene;
   scene.to(20'000);
   scene.kill_one();
   const pid_t second = scene.group.pid(0);
@@ -181,7 +177,7 @@ TEST_CASE("one that stands still on its way back is ended after the silence, one
 }
 
 TEST_CASE("one that dies too often is given up, and with high criticality that is a safe stop") {
-  Scene scene({.step_ns = 0, .most_in_window = 3});
+  SupervisorScene scene({.step_ns = 0, .most_in_window = 3});
   for (int64_t i = 1; i <= 3; ++i) {
     CHECK(scene.board->modes().newest() == 0);
     scene.to(i * 100);
@@ -196,7 +192,7 @@ TEST_CASE("one that dies too often is given up, and with high criticality that i
 }
 
 TEST_CASE("an end in order is no outage, one before the run's end is; at the end nobody is started again") {
-  Scene scene;
+  SupervisorScene scene;
   scene.board->process(1).state.store(ProcessRecord::finished);
   scene.to(1000);
   CHECK(scene.board->outages().size() == 0);
@@ -209,7 +205,7 @@ TEST_CASE("an end in order is no outage, one before the run's end is; at the end
 }
 
 TEST_CASE("after the loss of a whole group every process counts as away, one that was away already only once") {
-  Scene scene;
+  SupervisorScene scene;
   Outage before;
   before.process = 1;
   before.from_ns = kBegin;

@@ -5,20 +5,21 @@
 #include "rt/sched/executor.hpp"
 #include "rt/sched/port_access.hpp"
 #include "rt/trace/collector.hpp"
+#include "tests/nanoseconds.hpp"
 
 namespace {
 
 using namespace takt;
-constexpr int64_t kMs = 1'000'000;
+using test::kMs;
 
-struct Source final : Node {
+struct PlainSource final : Node {
   Output<Odometry> out{this, "out", "test data"};
   void setup(Setup&) override {}
   void run(Job& job) override {
     if (out.loan() != nullptr) out.send(job.release_ns());
   }
 };
-struct Sink final : Node {
+struct PlainSink final : Node {
   Input<Odometry> in{this, "in", "test data"};
   void setup(Setup&) override {}
   void run(Job&) override {}
@@ -26,8 +27,8 @@ struct Sink final : Node {
 
 /// A source at 10 Hz and a sink on it, both in virtual time; the sink's budget is beyond its deadline.
 trace::Trace traced_run(bool traced) {
-  Source source;
-  Sink sink;
+  PlainSource source;
+  PlainSink sink;
   Plan plan;
   plan.ports.resize(1);
   plan.ports[0].node = "source", plan.ports[0].port = "out", plan.ports[0].type = &source.out.type();

@@ -7,7 +7,7 @@
 namespace {
 
 using namespace takt::trace;
-using namespace takt::trace::test;
+using namespace takt::trace::by_hand;
 constexpr auto kPreempted = Slice::End::preempted, kAsleep = Slice::End::asleep;
 
 /// Blame of the last job; the parts must always make up the miss.

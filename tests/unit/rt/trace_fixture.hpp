@@ -2,10 +2,11 @@
 // Traces written by hand: instants in us after zero.
 #pragma once
 #include "rt/trace/blame.hpp"
+#include "tests/nanoseconds.hpp"
 
-namespace takt::trace::test {
+namespace takt::trace::by_hand {
 
-constexpr int64_t kUs = 1'000;
+using takt::test::kUs;
 
 /// Two lanes: `stereo` alone on thread 11; `camera` with its follower `ground_map` on thread 12. Budgets 5 ms,
 /// deadlines 10 ms. Thread 99 is `cc1plus`, no thread of ours.
@@ -54,4 +55,4 @@ inline int64_t sum_ns(const Blame& blame) {
   return sum;
 }
 
-}  // namespace takt::trace::test
+}  // namespace takt::trace::by_hand

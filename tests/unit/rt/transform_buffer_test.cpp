@@ -7,11 +7,12 @@
 #include <limits>
 #include <stdexcept>
 
+#include "tests/nanoseconds.hpp"
+
 using namespace takt;
+using test::kMs;
 
 namespace {
-
-constexpr int64_t kMs = 1'000'000;
 
 UncertainPose at_x(double x, double variance = 0) {
   UncertainPose pose;

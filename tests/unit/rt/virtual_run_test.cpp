@@ -8,15 +8,16 @@
 #include "rt/sched/executor.hpp"
 #include "rt/sched/port_access.hpp"
 #include "rt/shm/local_transport.hpp"
+#include "tests/unit/rt/epoch.hpp"
 
 namespace {
 
 using namespace takt;
-constexpr int64_t kMs = 1'000'000, kEpoch = 1'000 * kMs;
+using test::kEpoch, test::kMs;
 
 /// Notes when its jobs begin; hands on the newest index it has seen.
 struct Walker final : Node {
-  Input<Odometry> in{this, "in", "", Need::optional};
+  Input<Odometry> in{this, "in", "", takt::Need::optional};
   Output<Odometry> out{this, "out", ""};
   const VirtualClock* clock = nullptr;
   std::vector<int64_t> starts_ms;
@@ -32,13 +33,13 @@ struct Walker final : Node {
   }
 };
 
-struct Scene {
+struct VirtualScene {
   Plan plan;
   VirtualClock clock{kEpoch};
   std::map<std::string, Walker> walkers;
   std::unique_ptr<RunBoard> board;
 
-  explicit Scene(Policy policy, std::vector<int> cores = {0}) {
+  explicit VirtualScene(Policy policy, std::vector<int> cores = {0}) {
     plan.policy = policy;
     plan.cores = std::move(cores);
   }
@@ -72,7 +73,7 @@ struct Scene {
 
 TEST_CASE("the age of a message is that at which others may see it") {
   for (const auto& [publish, age_ms] : {std::pair{PublishAt::asap, 5}, {PublishAt::let, 60}}) {
-    Scene scene(Policy::fixed);
+    VirtualScene scene(Policy::fixed);
     scene.add("node", 0, 5, 60).publish = publish;
     scene.run();
     CHECK(scene.board->port(0).age.max_ns() == age_ms * kMs);
@@ -80,7 +81,7 @@ TEST_CASE("the age of a message is that at which others may see it") {
 }
 
 TEST_CASE("fixed: the shorter deadline preempts, and the longer job ends that much later") {
-  Scene scene(Policy::fixed);
+  VirtualScene scene(Policy::fixed);
   scene.add("slow", 0, 10, 60);
   scene.add("quick", 4, 3, 20);
   scene.run();
@@ -92,7 +93,7 @@ TEST_CASE("fixed: the shorter deadline preempts, and the longer job ends that mu
 }
 
 TEST_CASE("cooperative: nobody is preempted, a job that is due earlier waits") {
-  Scene scene(Policy::cooperative);
+  VirtualScene scene(Policy::cooperative);
   scene.add("slow", 0, 10, 60);
   scene.add("quick", 4, 3, 20);
   scene.run();
@@ -103,7 +104,7 @@ TEST_CASE("cooperative: nobody is preempted, a job that is due earlier waits") {
 
 TEST_CASE("cooperative and deadline use every core of the plan") {
   for (const Policy policy : {Policy::cooperative, Policy::deadline}) {
-    Scene scene(policy, {2, 5});
+    VirtualScene scene(policy, {2, 5});
     scene.add("one", 0, 10, 60);
     scene.add("two", 0, 10, 50);
     scene.add("three", 0, 10, 40);
@@ -117,7 +118,7 @@ TEST_CASE("cooperative and deadline use every core of the plan") {
 }
 
 TEST_CASE("deadline: the earliest absolute deadline runs, whoever came first") {
-  Scene scene(Policy::deadline);
+  VirtualScene scene(Policy::deadline);
   scene.add("patient", 0, 20, 90);
   scene.add("urgent", 5, 5, 30);
   scene.run();
@@ -126,7 +127,7 @@ TEST_CASE("deadline: the earliest absolute deadline runs, whoever came first") {
 }
 
 TEST_CASE("a plan without cores lets nobody wait") {
-  Scene scene(Policy::fixed, {});
+  VirtualScene scene(Policy::fixed, {});
   scene.add("one", 0, 10, 60);
   scene.add("two", 0, 10, 60);
   scene.run();
@@ -134,7 +135,7 @@ TEST_CASE("a plan without cores lets nobody wait") {
 }
 
 TEST_CASE("what a job publishes is seen from the end of its preempted execution on") {
-  Scene scene(Policy::fixed);
+  VirtualScene scene(Policy::fixed);
   scene.add("source", 0, 10, 60);  // would be done at 10
   scene.add("other", 2, 5, 20);    // takes it 5 ms
   scene.add("reader", 12, 1, 90);  // latches at 12: nothing there yet
@@ -145,7 +146,7 @@ TEST_CASE("what a job publishes is seen from the end of its preempted execution 
 }
 
 TEST_CASE("a job beyond its period: one release stays pending, those before it are skipped; all are told") {
-  Scene scene(Policy::fixed);
+  VirtualScene scene(Policy::fixed);
   scene.add("long", 0, 5, 100);
   // The job of the first release takes 250 ms; the release at 200 is still pending then, that at 100 has passed.
   scene.run(500, [](size_t, uint64_t job) { return job == 0 ? 250 * kMs : 5 * kMs; });
@@ -156,7 +157,7 @@ TEST_CASE("a job beyond its period: one release stays pending, those before it a
 }
 
 TEST_CASE("followers run in the order of their lane, on its CPU time, before its next release") {
-  Scene scene(Policy::cooperative);
+  VirtualScene scene(Policy::cooperative);
   scene.add("head", 0, 5, 30);
   for (const char* name : {"left", "right"}) {
     TaskPlan& follower = scene.add(name, 0, 10, 30);
