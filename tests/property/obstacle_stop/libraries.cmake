@@ -1,3 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
 set(ROOM_TEST_LIBRARIES takt_eigen)
-set(ROOM_APART sweep_memory_properties.cpp)

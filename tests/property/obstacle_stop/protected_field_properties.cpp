@@ -61,7 +61,7 @@ class Way {
 
 Footprint grown(Footprint f, double by) { return {f.half_width_m, f.front_m, f.rear_m, f.margin_m + by}; }
 
-struct Random {
+struct RandomDrive {
   std::mt19937 engine{7};
   double operator()(double low, double high) { return std::uniform_real_distribution<>(low, high)(engine); }
   Footprint footprint() { return {(*this)(0.1, 0.5), (*this)(0.1, 0.7), (*this)(0.1, 0.7), (*this)(0, 0.3)}; }
@@ -79,7 +79,7 @@ constexpr double kStep_m = 2e-3;
 }  // namespace
 
 TEST_CASE("the protected field is the area that a robot moved step by step covers") {
-  Random random;
+  RandomDrive random;
   int inside = 0, outside = 0;
   for (int round = 0; round < 210; ++round) {
     CAPTURE(round);
@@ -101,7 +101,7 @@ TEST_CASE("the protected field is the area that a robot moved step by step cover
 }
 
 TEST_CASE("whatever the robot covers at any instant of its way is in the field") {
-  Random random;
+  RandomDrive random;
   for (int round = 0; round < 4000; ++round) {
     const Footprint f = random.footprint();
     const Drive d = random.drive(round);
@@ -119,7 +119,7 @@ TEST_CASE("whatever the robot covers at any instant of its way is in the field")
 }
 
 TEST_CASE("a sweep blocks exactly if a row of neighbouring beams ends in the field") {
-  Random random;
+  RandomDrive random;
   int blocked = 0;
   for (int round = 0; round < 600; ++round) {
     CAPTURE(round);

@@ -32,10 +32,10 @@ class Dice {
 };
 
 /// Rows with some bytes between them; none behind the last, so that sanitizers see an overrun.
-struct Picture {
+struct PaddedPicture {
   int width, height, channels, stride;
   std::vector<uint8_t> bytes;
-  Picture(int w, int h, int c, int gap)
+  PaddedPicture(int w, int h, int c, int gap)
       : width(w),
         height(h),
         channels(c),
@@ -76,9 +76,9 @@ std::vector<RemapSource> smooth_table(Dice& dice, int width, int height) {
   return table;
 }
 
-void expect_equal(Picture& in, BayerPattern pattern, const std::vector<RemapSource>& table, int gap) {
+void expect_equal(PaddedPicture& in, BayerPattern pattern, const std::vector<RemapSource>& table, int gap) {
   const int channels = pattern == BayerPattern::none ? in.channels : 3;
-  Picture colour(in.width, in.height, channels, 0), expected(in.width, in.height, channels, gap), made = expected;
+  PaddedPicture colour(in.width, in.height, channels, 0), expected(in.width, in.height, channels, gap), made = expected;
   if (pattern == BayerPattern::none) colour = in;
   else reference::debayer(in.view(), pattern, colour.view());
   reference::remap(table, colour.view(), expected.view());
@@ -100,7 +100,7 @@ TEST_CASE("grey and colour images: resampling equals the integer formula") {
   on_each_target([] {
     Dice dice(3);
     for (int round = 0; round < 150; ++round) {
-      Picture in(dice.pick(2, 70), dice.pick(2, 40), dice.pick(0, 1) ? 3 : 1, dice.pick(0, 5));
+      PaddedPicture in(dice.pick(2, 70), dice.pick(2, 40), dice.pick(0, 1) ? 3 : 1, dice.pick(0, 5));
       in.fill(dice);
       const auto table = round % 2 ? wild_table(dice, in.width, in.height) : smooth_table(dice, in.width, in.height);
       expect_equal(in, BayerPattern::none, table, dice.pick(0, 70));
@@ -113,7 +113,7 @@ TEST_CASE("mosaics: debayering and resampling in one equal one after the other, 
     Dice dice(4);
     for (const BayerPattern pattern : kPatterns)
       for (int round = 0; round < 60; ++round) {
-        Picture in(dice.pick(2, round % 3 ? 30 : 200), dice.pick(2, 30), 1, dice.pick(0, 5));
+        PaddedPicture in(dice.pick(2, round % 3 ? 30 : 200), dice.pick(2, 30), 1, dice.pick(0, 5));
         in.fill(dice);
         const auto table = round % 2 ? wild_table(dice, in.width, in.height) : smooth_table(dice, in.width, in.height);
         expect_equal(in, pattern, table, dice.pick(0, 70));
@@ -125,7 +125,7 @@ TEST_CASE("a tall image passes through a window of few rows many times") {
   on_each_target([] {
     Dice dice(5);
     for (int round = 0; round < 8; ++round) {
-      Picture in(dice.pick(60, 90), 300, 1, 0);
+      PaddedPicture in(dice.pick(60, 90), 300, 1, 0);
       in.fill(dice);
       const auto table = smooth_table(dice, in.width, in.height);
       CHECK(Remap(in.width, in.height, table).window_bytes() < static_cast<size_t>(4 * in.width * 40));
@@ -135,7 +135,7 @@ TEST_CASE("a tall image passes through a window of few rows many times") {
 }
 
 TEST_CASE("a table without any source gives black") {
-  Picture in(20, 4, 3, 0);
+  PaddedPicture in(20, 4, 3, 0);
   Dice dice(6);
   in.fill(dice);
   expect_equal(in, BayerPattern::none, std::vector<RemapSource>(80), 3);

@@ -11,17 +11,15 @@
 #include "nodes/mapping_3d/pose.hpp"
 #include "rt/memory/memory_use.hpp"
 #include "tests/test_data.hpp"
+#include "tests/unit/body_pose/skeletons.hpp"
 
 using namespace takt;
 using namespace takt::body_pose;
+using test::kWithoutEnd;
+using test::shipped;
 
 namespace {
 
-Skeleton shipped(const std::string& name) {
-  return read_skeleton(std::string(TAKT_SOURCE_DIR) + "/graph/skeletons/" + name + ".txt");
-}
-
-const auto kWithoutEnd = [] { return true; };
 const Eigen::Vector3f kEye(0, 0, 1.2f);
 
 }  // namespace

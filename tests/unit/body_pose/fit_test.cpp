@@ -5,16 +5,15 @@
 #include <set>
 
 #include "nodes/body_pose/fitter.hpp"
+#include "tests/unit/body_pose/skeletons.hpp"
 
 using namespace takt;
 using namespace takt::body_pose;
 using Eigen::Vector3f;
+using test::kWithoutEnd;
+using test::shipped;
 
 namespace {
-
-Skeleton shipped(const std::string& name) {
-  return read_skeleton(std::string(TAKT_SOURCE_DIR) + "/graph/skeletons/" + name + ".txt");
-}
 
 /// A body of bare bones that stands in a typical pose: points along its links, joints included.
 std::vector<Point> bones(const Skeleton& skeleton, size_t pose, const Vector3f& start, std::vector<Vector3f>& joints) {
@@ -32,8 +31,6 @@ std::vector<Point> bones(const Skeleton& skeleton, size_t pose, const Vector3f& 
   }
   return points;
 }
-
-const auto kWithoutEnd = [] { return true; };
 
 }  // namespace
 

@@ -1,3 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
 set(ROOM_TEST_LIBRARIES takt_body_pose_evaluate takt_allocation_counter takt_opencv)
-set(ROOM_APART fit_test.cpp skeleton_test.cpp)

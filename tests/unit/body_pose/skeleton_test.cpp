@@ -6,17 +6,11 @@
 #include <fstream>
 
 #include "tests/temporary_folder.hpp"
+#include "tests/unit/body_pose/skeletons.hpp"
 
 using namespace takt;
 using namespace takt::body_pose;
-
-namespace {
-
-Skeleton shipped(const std::string& name) {
-  return read_skeleton(std::string(TAKT_SOURCE_DIR) + "/graph/skeletons/" + name + ".txt");
-}
-
-}  // namespace
+using test::shipped;
 
 TEST_CASE("oracle 7: the human skeleton has 15 links and 28 degrees of freedom") {
   for (const std::string name : {"human", "human_thesis"}) {

@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kSpeed = 0.4;
 
-struct Seen {
+struct SeenModes {
   std::map<double, std::string> mode;  ///< by seconds since the epoch
   std::map<double, double> speed_m_s;  ///< likewise, of the odometry's stamp
   double speed_at(double from_s, double to_s, bool fastest) const {
@@ -27,7 +27,7 @@ struct Seen {
 /// Wants to drive, whatever happens.
 class Driver final : public Node {
  public:
-  Seen seen;
+  SeenModes seen;
 
   void setup(Setup&) override {}
   void start(int64_t epoch_ns) override { epoch_ns_ = epoch_ns; }
@@ -50,7 +50,7 @@ class Driver final : public Node {
   Output<VelocityCommand> velocity_{this, "velocity", ""};
 };
 
-constexpr test::DriveGraph kGraph{
+constexpr test::DriveGraph kLostLaserGraph{
     .devices = R"(
   front_laser: {kind: laser_scanner, rate: 15, failures: "silent 2s..3s"}
   base: {kind: mobile_base, rate: 15, drive: command, in: {velocity: driver.velocity}}
@@ -98,8 +98,8 @@ bool runs(const Plan& plan, const std::string& mode, const std::string& task) {
 }  // namespace
 
 TEST_CASE("a robot whose scanner falls silent stands until it is back, whatever it is told to do") {
-  const test::Drive<Driver> drive(kGraph, 6'000'000'000);
-  const Seen& seen = drive.probe().seen;
+  const test::Drive<Driver> drive(kLostLaserGraph, 6'000'000'000);
+  const SeenModes& seen = drive.probe().seen;
   std::vector<std::string> modes;
   double stopped_s = 0, back_s = 0;
   for (const auto& [at_s, mode] : seen.mode) {

@@ -13,11 +13,10 @@
 #include "hal/drivers.hpp"
 #include "hal/sim/simulation.hpp"
 #include "rt/sched/executor.hpp"
+#include "tests/graph_folder.hpp"
 #include "tests/temporary_folder.hpp"
 
 namespace takt::test {
-
-inline std::filesystem::path graph_folder() { return std::filesystem::path(TAKT_SOURCE_DIR) / "graph"; }
 
 /// The shipped rig of that name, as the camera `id` has it.
 inline StereoRig rig_of(const std::string& id, const std::string& file) {

@@ -18,7 +18,7 @@ constexpr double kCellM = 0.30, kRangeM = 8;  // defaults of ground_map
 
 using Cell = std::pair<int, int>;  ///< column and row of the map frame
 
-struct Seen {
+struct SeenGround {
   std::set<int64_t> stamps;    ///< of the images that were mapped
   std::set<int64_t> terrains;  ///< of those whose terrain was judged
   int32_t width = 0, height = 0;
@@ -42,7 +42,7 @@ struct Seen {
 
 class GridProbe final : public Node {
  public:
-  Seen seen;
+  SeenGround seen;
 
   void setup(Setup&) override {}
   void run(Job&) override {
@@ -64,7 +64,7 @@ class GridProbe final : public Node {
 };
 
 // The window is large enough to keep the whole lab.
-constexpr test::DriveGraph kGraph{
+constexpr test::DriveGraph kGroundMapGraph{
     .devices = R"(
   ground_camera: {kind: stereo_camera, rig: @/rigs/x2_wide.yaml, rate: 5}
   front_laser: {kind: laser_scanner, model: lms200, rate: 15, mount: {x: 0.0m, y: 0.30m, z: 0.25m, yaw: 0deg}}
@@ -136,7 +136,7 @@ struct Shares {
   int free = 0, called_free = 0, called_occupied = 0;
 };
 
-Shares compare(const std::map<Cell, Sight>& sights, const Seen& seen, const sim::Simulation& world) {
+Shares compare(const std::map<Cell, Sight>& sights, const SeenGround& seen, const sim::Simulation& world) {
   constexpr int kImages = 3;  // a cell seen in fewer does not count
   const Eigen::Isometry2d to_world = map_in_world(world);
   Shares s;
@@ -166,8 +166,8 @@ double percent(int part, int whole) { return 100.0 * part / whole; }
 // with the neighbouring cells too, because a face may stand a few centimetres from the next cell and the odometry
 // drifts by more than that. After 30 s its drift begins to be what is measured.
 TEST_CASE("the ground map of a drive through the lab agrees with the world") {
-  test::Drive<GridProbe> drive(kGraph, 30'000'000'000);
-  const Seen& seen = drive.probe().seen;
+  test::Drive<GridProbe> drive(kGroundMapGraph, 30'000'000'000);
+  const SeenGround& seen = drive.probe().seen;
   const sim::Simulation& world = drive.world();
   const StereoRig rig = test::rig_of("ground_camera", "x2_wide.yaml");
   REQUIRE(seen.stamps.size() > 145);

@@ -7,13 +7,15 @@
 #include <cmath>
 
 #include "tests/unit/compose/drive.hpp"
+#include "tests/unit/compose/isometry.hpp"
 
 using namespace takt;
+using test::isometry;
 
 namespace {
 
 /// What the probe saw last.
-struct Seen {
+struct SeenByStereo {
   int64_t disparity_stamp = 0, motion_stamp = 0, grid_stamp = 0;
   int32_t width = 0;
   std::vector<int16_t> disparity;
@@ -25,7 +27,7 @@ struct Seen {
 
 class ProbeNode final : public Node {
  public:
-  Seen seen;
+  SeenByStereo seen;
 
   void setup(Setup&) override {}
   void run(Job&) override {
@@ -53,7 +55,7 @@ class ProbeNode final : public Node {
   Input<Grid> obstacles_{this, "obstacles", ""};
 };
 
-constexpr test::DriveGraph kGraph{
+constexpr test::DriveGraph kStereoGraph{
     .devices = R"(
   head_camera: {kind: stereo_camera, rig: @/rigs/xb3.yaml, rate: 15}
   base: {kind: mobile_base, rate: 15}
@@ -77,25 +79,11 @@ constexpr test::DriveGraph kGraph{
 )",
 };
 
-Eigen::Isometry3d isometry(const Transform& t) {
-  Eigen::Isometry3d out = Eigen::Isometry3d::Identity();
-  out.linear() = Eigen::Quaterniond(t.qw, t.qx, t.qy, t.qz).normalized().toRotationMatrix();
-  out.translation() = Eigen::Vector3d(t.x, t.y, t.z);
-  return out;
-}
-
-Eigen::Isometry3d isometry(const sim::CameraPose& pose) {
-  Eigen::Isometry3d out = Eigen::Isometry3d::Identity();
-  out.linear() = pose.rotation;
-  out.translation() = pose.position;
-  return out;
-}
-
 }  // namespace
 
 TEST_CASE("stereo, ego-motion and the obstacle grid agree with the simulated world") {
-  test::Drive<ProbeNode> drive(kGraph, 6'000'000'000);
-  const Seen& seen = drive.probe().seen;
+  test::Drive<ProbeNode> drive(kStereoGraph, 6'000'000'000);
+  const SeenByStereo& seen = drive.probe().seen;
   const sim::Simulation& world = drive.world();
   const StereoRig rig = test::rig_of("head_camera", "xb3.yaml");
   const auto pixels = static_cast<size_t>(rig.width) * static_cast<size_t>(rig.height);

@@ -8,8 +8,10 @@
 
 #include "nodes/stereo/rectify.hpp"
 #include "tests/unit/compose/drive.hpp"
+#include "tests/unit/compose/isometry.hpp"
 
 using namespace takt;
+using test::isometry;
 
 namespace {
 
@@ -49,13 +51,6 @@ test::Drive<CloudProbe> drive_with(const std::string& calibration) {
   probe: {rate: 15, offset: 30ms, budget: 1ms}
 )"},
           2'000'000'000};
-}
-
-Eigen::Isometry3d isometry(const Transform& t) {
-  Eigen::Isometry3d out = Eigen::Isometry3d::Identity();
-  out.linear() = Eigen::Quaterniond(t.qw, t.qx, t.qy, t.qz).normalized().toRotationMatrix();
-  out.translation() = Eigen::Vector3d(t.x, t.y, t.z);
-  return out;
 }
 
 const std::string kTrueFile = test::graph_folder() / "rigs" / "xb3_raw_calibration.yaml";

@@ -14,7 +14,7 @@ using namespace takt;
 
 namespace {
 
-struct Seen {
+struct SeenKitchen {
   std::string actions, speech;  ///< done, joined by `; `; all that was said
   double farthest_m = 0;        ///< of an action's objects from the robot
   double touched_m_s = 0;       ///< fastest while an action was under way
@@ -32,7 +32,7 @@ struct Thing {
 /// graph/networks/kitchen.yaml, as it really is.
 class Kitchen final : public Node {
  public:
-  Seen seen;
+  SeenKitchen seen;
 
   void setup(Setup&) override { objects_.reserve({0, 0, 1, 8}); }
   void run(Job& job) override {
@@ -118,7 +118,7 @@ class Kitchen final : public Node {
   Output<ObjectReports> objects_{this, "objects", ""};
 };
 
-constexpr test::DriveGraph kGraph{
+constexpr test::DriveGraph kKitchenGraph{
     .devices = R"(
   base: {kind: mobile_base, rate: 15, drive: command, in: {velocity: {from: client.velocity, max_age: 300ms}}}
   person: {kind: interaction, rate: 5, script: "1s goal cup_1.level=full", in: {speech: {from: client.speech, depth: 4}}}
@@ -148,8 +148,8 @@ constexpr test::DriveGraph kGraph{
 }  // namespace
 
 TEST_CASE("a goal that somebody says is planned, driven, acted and reported, within reach and standing") {
-  const test::Drive<Kitchen> drive(kGraph, 60'000'000'000);
-  const Seen& seen = drive.probe().seen;
+  const test::Drive<Kitchen> drive(kKitchenGraph, 60'000'000'000);
+  const SeenKitchen& seen = drive.probe().seen;
   MESSAGE("said:\n"
           << seen.speech << seen.plan << "farthest object " << seen.farthest_m << " m, " << seen.under_way << " jobs");
   CHECK(seen.actions == "open bottle_1; fill cup_1");

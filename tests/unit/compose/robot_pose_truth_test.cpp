@@ -19,13 +19,13 @@ struct Known {
   PlanarPose robot_in_map;
   scan_matching::Covariance covariance = scan_matching::Covariance::Zero();
 };
-struct Seen {
+struct SeenPoses {
   Known wheels, scans, joined;
 };
 
 class PoseProbe final : public Node {
  public:
-  Seen seen;
+  SeenPoses seen;
 
   void setup(Setup&) override {}
   void run(Job&) override {
@@ -50,7 +50,7 @@ class PoseProbe final : public Node {
   Input<Pose> joined_{this, "joined", ""};
 };
 
-constexpr test::DriveGraph kGraph{
+constexpr test::DriveGraph kRobotPoseGraph{
     .devices = R"(
   head_camera: {kind: stereo_camera, rig: @/rigs/xb3.yaml, rate: 10}
   front_laser: {kind: laser_scanner, model: lms200, rate: 15, mount: {x: 0.0m, y: 0.30m, z: 0.25m, yaw: 0deg}}
@@ -105,12 +105,12 @@ TEST_CASE("wheels, ego-motion and scans joined are better than wheels, with the 
   constexpr int64_t kDrive_ns = 24'000'000'000;
   for (const bool laser_fails : {false, true}) {
     CAPTURE(laser_fails);
-    std::string devices(kGraph.devices);
+    std::string devices(kRobotPoseGraph.devices);
     if (laser_fails) devices.insert(devices.find(", mount: "), ", failures: \"silent 12s..60s\"");
-    test::DriveGraph graph = kGraph;
+    test::DriveGraph graph = kRobotPoseGraph;
     graph.devices = devices;
     test::Drive<PoseProbe> drive(graph, kDrive_ns);
-    const Seen& seen = drive.probe().seen;
+    const SeenPoses& seen = drive.probe().seen;
     const sim::Simulation& world = drive.world();
     const Off wheels = off(seen.wheels, world), scans = off(seen.scans, world), joined = off(seen.joined, world);
     MESSAGE("wheels off by " << wheels.metres << " m, " << wheels.degrees << " deg; scans " << scans.metres << ", "

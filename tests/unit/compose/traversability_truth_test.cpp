@@ -13,14 +13,14 @@ namespace {
 
 using Cell = std::pair<int, int>;  ///< column and row of the map frame
 
-struct Seen {
+struct SeenFloor {
   double cell_m = 0;
   std::map<Cell, int16_t> floor, fused;  ///< what was last known of each cell
 };
 
 class FloorProbe final : public Node {
  public:
-  Seen seen;
+  SeenFloor seen;
 
   void setup(Setup&) override {}
   void run(Job&) override {
@@ -43,7 +43,7 @@ class FloorProbe final : public Node {
   Input<Grid> fused_{this, "fused", ""};
 };
 
-constexpr test::DriveGraph kGraph{
+constexpr test::DriveGraph kTraversabilityGraph{
     .devices = R"(
   front_laser: {kind: laser_scanner, model: lms200, rate: 15, mount: {x: 0.0m, y: 0.30m, z: 0.25m}}
   floor_laser: {kind: laser_scanner, model: lms400, rate: 15, mount: {x: 0.0m, y: 0.25m, z: 1.0m, pitch: -34deg},
@@ -103,8 +103,8 @@ double pct(size_t part, size_t of) { return of == 0 ? 0 : 100.0 * static_cast<do
 }  // namespace
 
 TEST_CASE("what a tilted scanner says of the floor on a drive through the lab agrees with the world") {
-  test::Drive<FloorProbe> drive(kGraph, 75'000'000'000);
-  const Seen& seen = drive.probe().seen;
+  test::Drive<FloorProbe> drive(kTraversabilityGraph, 75'000'000'000);
+  const SeenFloor& seen = drive.probe().seen;
   const Judged floor = judge(seen.floor, seen.cell_m, drive.world()),
                fused = judge(seen.fused, seen.cell_m, drive.world());
   for (const Judged& j : {floor, fused}) {

@@ -9,14 +9,13 @@
 #include "nodes/ground_map/ground_grid.hpp"
 #include "nodes/ground_map/pavement_scene.hpp"
 #include "nodes/mapping_3d/pose.hpp"
+#include "tests/unit/ground_map/camera.hpp"
 
 using namespace takt;
 using namespace takt::ground_map;
+using test::kCamera, test::kHeight, test::kWidth;
 
 namespace {
-
-constexpr int kWidth = 320, kHeight = 240;
-const CameraModel kCamera{141.5, 159.5, 119.5, 0.12};
 
 struct View {
   FloorProjection projection = floor_projection(kCamera, mapping_3d::camera_mount(0, 0, 1.2, 0, -0.45));

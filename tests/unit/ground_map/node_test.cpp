@@ -12,6 +12,7 @@
 #include "rt/memory/memory_use.hpp"
 #include "rt/transform/pose_math.hpp"
 #include "tests/temporary_folder.hpp"
+#include "tests/unit/ground_map/camera.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 
 namespace takt {
@@ -19,10 +20,10 @@ void register_ground_map(NodeTypes& types);
 }
 
 using namespace takt;
+using test::kCamera, test::kHeight, test::kWidth;
 
 namespace {
 
-constexpr int kWidth = 320, kHeight = 240;
 constexpr Capacity kImage{kWidth, kHeight, 3, 0};
 constexpr int64_t kMs = 1'000'000;
 
@@ -33,7 +34,7 @@ struct FloorPair : test::Box<StereoPair> {
     pair.width = kWidth;
     pair.height = kHeight;
     pair.channels = 3;
-    pair.camera = {141.5, 159.5, 119.5, 0.12};
+    pair.camera = kCamera;
     pair.sensor_in_robot = mapping_3d::camera_mount(0, 0, 1.2, 0, -0.45);
     pair.left.resize(static_cast<size_t>(kWidth * kHeight * 3));
     pair.right.resize(pair.left.size);

@@ -5,13 +5,10 @@
 
 #include <vector>
 
+#include "tests/nanoseconds.hpp"
+
 using namespace takt::head_behaviour;
-
-namespace {
-
-constexpr int64_t kMs = 1'000'000;
-
-}  // namespace
+using takt::test::kMs;
 
 TEST_CASE("three saturated images in a row shut the lid for five seconds; then it opens to look again") {
   SunGuard sun;

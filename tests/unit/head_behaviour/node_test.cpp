@@ -5,6 +5,7 @@
 
 #include "nodes/mapping_3d/pose.hpp"
 #include "rt/memory/memory_use.hpp"
+#include "tests/nanoseconds.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 
 namespace takt {
@@ -12,10 +13,9 @@ void register_head_behaviour(NodeTypes& types);
 }
 
 using namespace takt;
+using test::kMs;
 
 namespace {
-
-constexpr int64_t kMs = 1'000'000;
 
 struct Fixture {
   VirtualClock clock;

@@ -1,3 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
 set(ROOM_TEST_LIBRARIES takt_allocation_counter takt_mapping_3d_node takt_mapping_3d_evaluate)
-set(ROOM_APART window_test.cpp)

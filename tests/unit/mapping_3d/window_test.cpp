@@ -134,7 +134,7 @@ class Mapper {
   uint64_t sequence_ = 0;
 };
 
-constexpr int kFree = mapping_3d::kFree, kOccupied = mapping_3d::kOccupied, kUnknown = mapping_3d::kUnknown;
+using mapping_3d::kFree, mapping_3d::kOccupied, mapping_3d::kUnknown;
 const std::vector<std::array<double, 2>> kPost{{0.5, 4.1}};
 
 }  // namespace

@@ -4,12 +4,12 @@
 #include <doctest/doctest.h>
 
 #include "nodes/object_detection/tally.hpp"
+#include "tests/unit/object_detection/objects.hpp"
 
 using namespace takt::object_detection;
+using takt::test::kObjects;
 
 namespace {
-
-const std::filesystem::path kObjects = std::filesystem::path(TAKT_SOURCE_DIR) / "graph/objects";
 
 /// Without the thresholds that suit the lab.
 std::vector<DatabaseObject> automatic(std::vector<DatabaseObject> database) {

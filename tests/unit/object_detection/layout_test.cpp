@@ -11,13 +11,13 @@
 #include "nodes/object_detection/scenes.hpp"
 #include "nodes/object_detection/tally.hpp"
 #include "tests/temporary_folder.hpp"
+#include "tests/unit/object_detection/objects.hpp"
 
 using takt::Detection;
 using namespace takt::object_detection;
+using takt::test::kObjects;
 
 namespace {
-
-const std::filesystem::path kObjects = std::filesystem::path(TAKT_SOURCE_DIR) / "graph/objects";
 
 /// Generated surroundings of a seed.
 Photograph photograph(std::span<const DatabaseObject> database, uint64_t seed) {

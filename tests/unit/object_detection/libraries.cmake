@@ -1,3 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
 set(ROOM_TEST_LIBRARIES takt_object_detection_evaluate takt_sim takt_record takt_opencv)
-set(ROOM_APART node_test.cpp reload_test.cpp tools_test.cpp)

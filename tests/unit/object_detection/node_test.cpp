@@ -9,6 +9,7 @@
 #include "nodes/object_detection/detector.hpp"
 #include "nodes/object_detection/scenes.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
+#include "tests/unit/object_detection/objects.hpp"
 
 namespace takt {
 void register_object_detection(NodeTypes& types);
@@ -16,10 +17,9 @@ void register_object_detection(NodeTypes& types);
 
 using namespace takt;
 using namespace takt::object_detection;
+using test::kObjects;
 
 namespace {
-
-const std::filesystem::path kObjects = std::filesystem::path(TAKT_SOURCE_DIR) / "graph/objects";
 
 std::unique_ptr<Node> make_node() {
   NodeTypes types;

@@ -25,7 +25,7 @@ using namespace takt::object_detection;
 namespace {
 
 constexpr int kSide = 16, kWidth = 96, kHeight = 48;
-constexpr Capacity kImages{kWidth, kHeight, 3, 0};
+constexpr Capacity kSmallImages{kWidth, kHeight, 3, 0};
 
 cv::Mat3b striped(const cv::Scalar& colour, const cv::Scalar& other) {
   cv::Mat3b image(kSide, kSide);
@@ -54,7 +54,7 @@ struct Database : test::TemporaryFolder {
 /// Red on the left, blue on the right.
 struct Camera final : Node {
   Output<StereoPair> pair{this, "pair", ""};
-  void setup(Setup&) override { pair.reserve(kImages); }
+  void setup(Setup&) override { pair.reserve(kSmallImages); }
   void run(Job& job) override {
     StereoPair* message = pair.loan();
     message->width = kWidth, message->height = kHeight, message->channels = 3;
@@ -85,14 +85,14 @@ struct Reader final : Node {
   }
 };
 
-struct Scene {
+struct ReloadScene {
   Camera camera;
   std::unique_ptr<Node> node;
   Reader reader;
   Plan plan;
   size_t revision = 0;  ///< index of the parameter
 
-  explicit Scene(const Database& database) {
+  explicit ReloadScene(const Database& database) {
     NodeTypes types;
     register_object_detection(types);
     node = types.find("object_detection")->make();
@@ -101,7 +101,7 @@ struct Scene {
     test::set(*node, "window", int64_t{24});
     test::set(*node, "scales", std::string("1+0.7"));
     while (node->params()[revision]->name() != "revision") ++revision;
-    test::add_task(plan, camera, "camera", 0, kImages);
+    test::add_task(plan, camera, "camera", 0, kSmallImages);
     test::add_task(plan, *node, "detection", 10'000'000, {0, 0, 1, 32});
     test::add_task(plan, reader, "reader", 90'000'000);
     plan.tasks[0].device = true;
@@ -118,7 +118,7 @@ struct Scene {
     const VirtualClock clock;
     Setup setup{clock, {}, {}, 1, std::nullopt, 0};
     camera.setup(setup);
-    PortAccess::connect(*node->inputs()[0], kImages);
+    PortAccess::connect(*node->inputs()[0], kSmallImages);
     PortAccess::mark_read(*node->outputs()[0]);
     node->setup(setup);
     reader.setup(setup);
@@ -135,7 +135,7 @@ TEST_CASE(
   const Database database;
   const test::TemporaryFolder folder;
   {
-    Scene scene(database);
+    ReloadScene scene(database);
     auto sink = mcap::FileSink::open(folder.path / "run.mcap");
     REQUIRE(sink);
     uint64_t jobs = 0, missed = 0;
@@ -154,7 +154,7 @@ TEST_CASE(
     REQUIRE(seen.size() >= 110);
     for (size_t i = 0; i < seen.size(); ++i) CHECK(seen[i] == static_cast<int>(std::min<size_t>(i, 100) % 2));
   }
-  Scene again(database);
+  ReloadScene again(database);
   again.node->start(0);
   auto log = record::LogFile::open(folder.path / "run.mcap");
   REQUIRE(log);
@@ -170,7 +170,7 @@ TEST_CASE(
   const test::TemporaryFolder folder;
   const auto published = revision_folder(database.folder, database.revisions[1]), away = database.path / "away";
   std::filesystem::rename(published, away);
-  Scene scene(database);
+  ReloadScene scene(database);
   auto sink = mcap::FileSink::open(folder.path / "run.mcap");
   REQUIRE(sink);
   uint64_t jobs = 0;

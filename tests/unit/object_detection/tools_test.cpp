@@ -17,7 +17,7 @@ using namespace takt::object_detection;
 
 namespace {
 
-constexpr int kSide = 16;
+constexpr int kViewSide = 16;
 
 std::string text_of(const std::filesystem::path& file) {
   std::ifstream in(file);
@@ -40,7 +40,7 @@ cv::Mat rectangle(int type, const cv::Scalar& background, const cv::Scalar& obje
   return image;
 }
 
-ReferenceView plain_view() { return {"", kSide, std::vector<uint8_t>(kSide * kSide * 3, 90), {}}; }
+ReferenceView plain_view() { return {"", kViewSide, std::vector<uint8_t>(kViewSide * kViewSide * 3, 90), {}}; }
 
 /// Maps of an image with three windows.
 ErrorMaps maps(std::vector<float> colour, std::vector<float> orientation, std::vector<float> cooccurrence) {
@@ -53,13 +53,13 @@ TEST_CASE("a view is learnt by transparency, from black and from before one colo
   const takt::test::TemporaryFolder folder;
   const auto learnt = [&](const cv::Mat& image) {
     cv::imwrite((folder.path / "in.png").string(), image);
-    return learn_view(folder.path / "in.png", kSide);
+    return learn_view(folder.path / "in.png", kViewSide);
   };
   const cv::Scalar colour(10, 20, 200);
   for (const cv::Mat& image : {rectangle(CV_8UC4, {70, 70, 70, 0}, {10, 20, 200, 255}),
                                rectangle(CV_8UC3, {0, 0, 0}, colour), rectangle(CV_8UC3, {120, 125, 130}, colour)}) {
     const ReferenceView view = learnt(image);
-    REQUIRE(view.side_px == kSide);
+    REQUIRE(view.side_px == kViewSide);
     const auto pixel = [&](int x, int y) {
       return cv::Scalar(view.view().at(x, y, 0), view.view().at(x, y, 1), view.view().at(x, y, 2));
     };
@@ -71,14 +71,15 @@ TEST_CASE("a view is learnt by transparency, from black and from before one colo
     CHECK(pixel(8, 13) == cv::Scalar(0, 0, 0));
   }
   // Already as the database wants it: not a pixel is changed.
-  cv::Mat3b ready(kSide, kSide, cv::Vec3b(0, 0, 0));
+  cv::Mat3b ready(kViewSide, kViewSide, cv::Vec3b(0, 0, 0));
   ready(5, 6) = {1, 2, 3};
   CHECK(learnt(ready).pixels == std::vector<uint8_t>(ready.datastart, ready.dataend));
   const auto refused = [&](const cv::Mat& image) { return refusal([&] { learnt(image); }); };
   CHECK(refused(cv::Mat(30, 40, CV_8UC3, cv::Scalar(0, 0, 0))).find("shows no object") != std::string::npos);
   CHECK(refused(cv::Mat(30, 40, CV_8UC4, cv::Scalar(1, 2, 3, 255))).find("has no background") != std::string::npos);
   CHECK(refused(cv::Mat(30, 40, CV_8UC1, cv::Scalar(9))).find("three channels") != std::string::npos);
-  CHECK(refusal([&] { learn_view(folder.path / "absent.png", kSide); }).find("cannot be read") != std::string::npos);
+  CHECK(refusal([&] { learn_view(folder.path / "absent.png", kViewSide); }).find("cannot be read") !=
+        std::string::npos);
 }
 
 TEST_CASE("views and thresholds are put where they belong; comments and the rest of the list stay") {
@@ -88,7 +89,7 @@ TEST_CASE("views and thresholds are put where they belong; comments and the rest
   made.add("cup", plain_view(), false);
   made.add("bottle closed=true", plain_view(), false);
   made.add("bottle closed=true", plain_view(), true);
-  made.save(kSide);
+  made.save(kViewSide);
   CHECK(text_of(list) ==
         "object cup\nview cup/0.png\n\nobject bottle closed=true\nview bottle_closed=true/0.png\n"
         "test_view bottle_closed=true/1.png\n");
@@ -97,10 +98,10 @@ TEST_CASE("views and thresholds are put where they belong; comments and the rest
   changed.add("cup", plain_view(), false);
   changed.set_thresholds("cup", {0.5, std::nullopt, 0.25});
   changed.set_thresholds("cup", {0.5, std::nullopt, 0.375});
-  changed.save(kSide);
+  changed.save(kViewSide);
   CHECK(text_of(list).find("# ours\nobject cup\nthreshold 0.5 auto 0.375\nview cup/0.png\nview cup/1.png\n\nobject") ==
         0);
-  const auto read = read_database(folder.path, kSide, TestViews::read);
+  const auto read = read_database(folder.path, kViewSide, TestViews::read);
   REQUIRE(read.size() == 2);
   CHECK(read[0].views.size() == 2);
   CHECK(read[0].thresholds == Thresholds{0.5, std::nullopt, 0.375});
@@ -112,14 +113,14 @@ TEST_CASE("a list that could not be read is never put in the place of one that c
   const takt::test::TemporaryFolder folder;
   ObjectList good(folder.path);
   good.add("cup", plain_view(), false);
-  good.save(kSide);
+  good.save(kViewSide);
   const std::string before = text_of(folder.path / "objects.txt");
   ObjectList bad(folder.path);
   bad.set_thresholds("cup", {1.5});
-  CHECK(refusal([&] { bad.save(kSide); }).find("the threshold is `1.5`") != std::string::npos);
+  CHECK(refusal([&] { bad.save(kViewSide); }).find("the threshold is `1.5`") != std::string::npos);
   ObjectList wrong_size(folder.path);
   wrong_size.add("can", plain_view(), false);
-  CHECK(refusal([&] { wrong_size.save(kSide + 1); }).find("px, must be") != std::string::npos);
+  CHECK(refusal([&] { wrong_size.save(kViewSide + 1); }).find("px, must be") != std::string::npos);
   CHECK(text_of(folder.path / "objects.txt") == before);
   for (const auto& entry : std::filesystem::directory_iterator(folder.path))
     CHECK((entry.path().filename() == "objects.txt" || entry.path().filename() == "cup"));  // nothing else is left

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "rt/memory/memory_use.hpp"
+#include "tests/nanoseconds.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 
 namespace takt {
@@ -15,10 +16,9 @@ void register_obstacle_stop(NodeTypes& types);
 }
 
 using namespace takt;
+using test::kMs;
 
 namespace {
-
-constexpr int64_t kMs = 1'000'000;
 
 int64_t cpu_ns() {
   timespec t;

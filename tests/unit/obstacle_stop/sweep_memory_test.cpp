@@ -8,12 +8,14 @@
 #include <numbers>
 #include <vector>
 
+#include "tests/nanoseconds.hpp"
+
 using namespace takt;
 using namespace takt::obstacle_stop;
+using test::kMs;
 
 namespace {
 
-constexpr int64_t kMs = 1'000'000;
 constexpr size_t kBeams = 181, kAhead = 90;
 
 /// A scanner of one degree at the robot's centre.

@@ -17,10 +17,10 @@ using takt::Colour;
 
 namespace {
 
-struct Image {
+struct DrawnImage {
   int width, height;
   std::vector<uint8_t> bytes;
-  Image(int w, int h) : width(w), height(h), bytes(static_cast<size_t>(w * h * 3), 1) {}
+  DrawnImage(int w, int h) : width(w), height(h), bytes(static_cast<size_t>(w * h * 3), 1) {}
   Bgr view() { return {bytes.data(), width, height, 3}; }
   std::array<int, 3> at(int x, int y) { return {view().at(x, y, 0), view().at(x, y, 1), view().at(x, y, 2)}; }
 };
@@ -37,7 +37,7 @@ TEST_CASE("heat runs from blue over green to red and clamps") {
 
 TEST_CASE("disparity: invalid is black, near is red, far is blue") {
   const std::vector<int16_t> map{-1, 0, 9, 9};
-  Image image(2, 2);
+  DrawnImage image(2, 2);
   draw_disparity({map.data(), 2, 2}, 10, image.view());
   CHECK(image.at(0, 0) == std::array{0, 0, 0});
   CHECK(image.at(1, 0)[0] > image.at(1, 0)[2]);
@@ -46,7 +46,7 @@ TEST_CASE("disparity: invalid is black, near is red, far is blue") {
 
 TEST_CASE("grid: row 0 lies at the bottom; unknown grey, free white, occupied black") {
   const std::vector<int16_t> cells{-1, 0, 1000, 500};
-  Image image(6, 6);
+  DrawnImage image(6, 6);
   draw_grid({cells.data(), 2, 2}, 3, image.view());
   CHECK(image.at(0, 5) == std::array{128, 128, 128});
   CHECK(image.at(5, 3) == std::array{255, 255, 255});
@@ -57,7 +57,7 @@ TEST_CASE("grid: row 0 lies at the bottom; unknown grey, free white, occupied bl
 
 TEST_CASE("image: one channel is grey, three are kept") {
   const std::vector<uint8_t> grey{7, 200}, colour{1, 2, 3, 4, 5, 6};
-  Image image(2, 1);
+  DrawnImage image(2, 1);
   draw_image({grey.data(), 2, 1}, image.view());
   CHECK(image.at(1, 0) == std::array{200, 200, 200});
   draw_image({colour.data(), 2, 1, 3}, image.view());
@@ -69,7 +69,7 @@ TEST_CASE("mask: ground is tinted, its border inside the image is plain green, t
   std::vector<uint8_t> mask(10 * 10, 0);
   for (int y = 4; y < 10; ++y)
     for (int x = 0; x < 10; ++x) mask[static_cast<size_t>(10 * y + x)] = 255;
-  Image image(10, 10);
+  DrawnImage image(10, 10);
   for (auto& byte : image.bytes) byte = 100;
   draw_mask({mask.data(), 10, 10}, image.view());
   for (int x = 0; x < 10; ++x) {
@@ -82,7 +82,7 @@ TEST_CASE("mask: ground is tinted, its border inside the image is plain green, t
 TEST_CASE("detections: a frame and a number in the colour of the class; what lies outside is cut off") {
   const std::vector<takt::Detection> boxes{
       {0, 20, 30, 40, 50, 0.9f}, {1, 190, 190, 40, 40, 0.9f}, {2, -90, -90, 9, 9, 1}};
-  Image image(200, 200);
+  DrawnImage image(200, 200);
   draw_detections(boxes, image.view());
   const auto frame = image.at(20, 55);
   CHECK(frame != std::array{1, 1, 1});
@@ -99,7 +99,7 @@ TEST_CASE("detections: a frame and a number in the colour of the class; what lie
 
 TEST_CASE("track: forward is up, unmeasured parts are red, any length and place fits") {
   std::vector<TrackPoint> track{{0, 0}, {0, 10}, {5, 10, false}};
-  Image image(200, 200);
+  DrawnImage image(200, 200);
   CHECK(draw_track(track, image.view()) == 10);
   int blue_rows = 0, red = 0, lowest_red = 0;
   for (int y = 0; y < 200; ++y)

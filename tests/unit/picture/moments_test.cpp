@@ -46,12 +46,12 @@ struct Words : test::Box<TextStatus> {
 };
 
 /// Connected to what is known and said, writing to a folder of the test's own.
-struct Bench {
+struct MomentsBench {
   test::TemporaryFolder folder;
   std::unique_ptr<Node> node;
   uint64_t sequence = 0;
 
-  explicit Bench(int most = 24) {
+  explicit MomentsBench(int most = 24) {
     NodeTypes types;
     register_moments(types);
     node = types.find("moments")->make();
@@ -84,7 +84,7 @@ struct Bench {
 }  // namespace
 
 TEST_CASE("moments: a picture when states change or something is said, none while all stays") {
-  Bench bench;
+  MomentsBench bench;
   Known empty("empty"), full("full");
   Words words("cup_1 <full>: done, which is more than a short string holds");
   bench.know(empty);
@@ -106,7 +106,7 @@ TEST_CASE("moments: a picture when states change or something is said, none whil
 }
 
 TEST_CASE("moments: those beyond the memory taken are counted, and a run in which nothing was known leaves nothing") {
-  Bench bench(2), silent;
+  MomentsBench bench(2), silent;
   for (const char* level : {"empty", "full", "half", "empty"}) {
     Known known(level);
     bench.know(known);

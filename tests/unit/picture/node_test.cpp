@@ -23,12 +23,12 @@ namespace {
 constexpr Capacity kSize{40, 30, 1, 0};
 
 /// The node with some inputs connected, writing to a folder of the test's own.
-struct Bench {
+struct PictureBench {
   test::TemporaryFolder folder;
   std::unique_ptr<Node> node;
 
-  explicit Bench(std::initializer_list<const char*> connected,
-                 const std::vector<std::pair<std::string, ParamValue>>& params = {}) {
+  explicit PictureBench(std::initializer_list<const char*> connected,
+                        const std::vector<std::pair<std::string, ParamValue>>& params = {}) {
     NodeTypes types;
     register_picture(types);
     node = types.find("picture")->make();
@@ -61,7 +61,7 @@ cv::Vec3b grey(uint8_t level) { return {level, level, level}; }
 }  // namespace
 
 TEST_CASE("picture: boxes are drawn on the image of their stamp, not on a newer one") {
-  Bench bench({"pair", "detections"});
+  PictureBench bench({"pair", "detections"});
   GreyPair older(50), newer(90);
   OneDetection boxes;
   test::latch(bench.port("detections"), boxes, 100, 1);
@@ -76,7 +76,7 @@ TEST_CASE("picture: boxes are drawn on the image of their stamp, not on a newer 
 }
 
 TEST_CASE("picture: without detections of any latched image the newest one is written, without boxes") {
-  Bench bench({"pair", "detections"});
+  PictureBench bench({"pair", "detections"});
   GreyPair first(50), second(90);
   OneDetection boxes;
   test::latch(bench.port("detections"), boxes, 100, 1);
@@ -91,7 +91,7 @@ TEST_CASE("picture: without detections of any latched image the newest one is wr
 }
 
 TEST_CASE("picture: the ground mask lies over the image of its stamp; one without its image is not drawn") {
-  Bench bench({"ground_pair", "mask", "ground"});
+  PictureBench bench({"ground_pair", "mask", "ground"});
   GreyPair first(60), second(100);
   test::Box<Image> mask(kSize);
   mask->width = 40, mask->height = 30, mask->channels = 1;
@@ -120,7 +120,7 @@ TEST_CASE("picture: the ground mask lies over the image of its stamp; one withou
 }
 
 TEST_CASE("picture: laser points lie in their colours beside their match probabilities; each grid has its file") {
-  Bench bench({"coloured", "match", "merged", "traversability", "ground", "terrain"});
+  PictureBench bench({"coloured", "match", "merged", "traversability", "ground", "terrain"});
   test::Box<PointCloud> coloured({0, 0, 1, 8}), match({0, 0, 1, 8});
   for (int i = 0; i < 5; ++i)
     for (auto& [cloud, colour] : {std::pair(&coloured, Colour{255, 0, 0}), std::pair(&match, Colour{0, 255, 0})}) {
@@ -164,7 +164,7 @@ TEST_CASE("picture: a job allocates nothing") {
     MESSAGE("NOT RUN: this program does not count allocations (sanitizer)");
     return;
   }
-  Bench bench({"pair", "detections", "motion", "ground_pair", "mask", "ground"});
+  PictureBench bench({"pair", "detections", "motion", "ground_pair", "mask", "ground"});
   GreyPair pair(60);
   test::Box<Detections> boxes({0, 0, 1, 8});
   boxes->boxes.resize(8);
@@ -176,7 +176,8 @@ TEST_CASE("picture: a job allocates nothing") {
 }
 
 TEST_CASE("picture: writes what it has seen when the run ends, and nothing else") {
-  Bench bench({"disparity", "motion", "pair"}, {{"directory", std::string("pictures")}, {"track_points", int64_t{16}}});
+  PictureBench bench({"disparity", "motion", "pair"},
+                     {{"directory", std::string("pictures")}, {"track_points", int64_t{16}}});
   test::Box<DisparityMap> map(kSize);
   map->width = 40, map->height = 30, map->disparities = 20;
   map->disparity.resize(40 * 30);

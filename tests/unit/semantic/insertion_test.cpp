@@ -15,14 +15,14 @@ namespace {
 
 constexpr Rgb kRed{1, 0, 0}, kYellow{1, 1, 0};
 
-struct Fixture {
+struct InsertionFixture {
   SemanticMap map{MapParameters{{200, 600}, 0.3, 100, 100, -15, -15}};
   NodeId colour = *map.add_attribute("colour", {ValueKind::colour, "", 0, 1, {}, false});
   NodeId chair = *map.add_type("chair"), table = *map.add_type("table");
   InsertionParameters parameters;
   int64_t stamp_ns = 0;
 
-  Fixture() {
+  InsertionFixture() {
     REQUIRE(map.add_to_type(chair, colour));
     REQUIRE(map.add_to_type(table, colour));
   }
@@ -46,7 +46,7 @@ struct Fixture {
 }  // namespace
 
 TEST_CASE("oracle 24: similarity of two objects") {
-  Fixture f;
+  InsertionFixture f;
   const NodeId red = f.add(f.chair, 0, kRed);
   CHECK(f.p(red, f.add(f.chair, 0, kRed)) == 1);
   CHECK(f.p(red, f.add(f.table, 0, kRed)) == 0);
@@ -59,7 +59,7 @@ TEST_CASE("oracle 24: similarity of two objects") {
 }
 
 TEST_CASE("an unknown value is left out, an attribute that one of the two cannot have counts 1") {
-  Fixture f;
+  InsertionFixture f;
   const NodeId mass = *f.map.add_attribute("mass", {ValueKind::scalar, "kg", 0, 10, {}, false});
   const NodeId red = f.add(f.chair, 0, kRed), unknown = *f.map.add_object(f.chair, 0, 0);
   CHECK(f.p(red, unknown) == 1);
@@ -73,7 +73,7 @@ TEST_CASE("an unknown value is left out, an attribute that one of the two cannot
 }
 
 TEST_CASE("weights are those of the type; identity cannot differ") {
-  Fixture f;
+  InsertionFixture f;
   const NodeId name = *f.map.add_attribute("name", {ValueKind::enumerated, "", 0, 1, {"Ann", "Bob"}, true});
   const NodeId person = *f.map.add_type("person");
   REQUIRE(f.map.add_to_type(person, f.colour, 3));
@@ -105,7 +105,7 @@ TEST_CASE("distances of every kind of value lie in 0..1") {
 }
 
 TEST_CASE("oracle 26: two detections 0.5 m apart are one object, three chairs 2.5 m apart stay three") {
-  Fixture f;
+  InsertionFixture f;
   Insertion insertion(f.map, f.parameters);
   const Decision first = f.insert(insertion, 0), second = f.insert(insertion, 0.5);
   CHECK(first.outcome == Outcome::created);
@@ -119,7 +119,7 @@ TEST_CASE("oracle 26: two detections 0.5 m apart are one object, three chairs 2.
 }
 
 TEST_CASE("colours keep two objects of one place apart, and the decision says why") {
-  Fixture f;
+  InsertionFixture f;
   Insertion insertion(f.map, f.parameters);
   f.insert(insertion, 0, kRed);
   const Decision d = f.insert(insertion, 0, kYellow);
@@ -131,7 +131,7 @@ TEST_CASE("colours keep two objects of one place apart, and the decision says wh
 }
 
 TEST_CASE("objects of one view are two if that is asked for") {
-  Fixture f;
+  InsertionFixture f;
   f.parameters.distinct_in_view = true;
   Insertion insertion(f.map, f.parameters);
   CHECK(insertion.insert({f.chair, 0, 0, 1, 5, {}}).outcome == Outcome::created);
@@ -142,7 +142,7 @@ TEST_CASE("objects of one view are two if that is asked for") {
 }
 
 TEST_CASE("cells and objects are linked both ways, as objects move") {
-  Fixture f;
+  InsertionFixture f;
   const auto at = [&](double x_m) {
     std::vector<NodeId> objects;
     f.map.in_cell(f.map.grid().cell_of(x_m, 0), [&](NodeId o) { objects.push_back(o); });
@@ -162,7 +162,7 @@ TEST_CASE("cells and objects are linked both ways, as objects move") {
 }
 
 TEST_CASE("terrain is kept at the place where it was seen; known cells of another grid are taken over") {
-  Fixture f;
+  InsertionFixture f;
   f.map.set_terrain(1, 1, 3);
   f.map.set_terrain(99, 1, 3);
   CHECK(f.map.terrain(1.1, 1.1) == 3);
@@ -183,7 +183,7 @@ TEST_CASE("terrain is kept at the place where it was seen; known cells of anothe
 
 TEST_CASE(
     "an object whose place is seen free often enough is removed; one that is seen, hidden or out of sight stays") {
-  Fixture f;
+  InsertionFixture f;
   f.parameters.misses = 3;
   Insertion insertion(f.map, f.parameters);
   std::vector<int16_t> cells(100 * 100, 0);
@@ -213,7 +213,7 @@ TEST_CASE(
 }
 
 TEST_CASE("insertions and removals take no memory") {
-  Fixture f;
+  InsertionFixture f;
   f.parameters.misses = 1;
   Insertion insertion(f.map, f.parameters);
   const std::vector<int16_t> cells(100 * 100, 0);
@@ -231,7 +231,7 @@ TEST_CASE("insertions and removals take no memory") {
 }
 
 TEST_CASE("what has a name is the object of that name, however near and like another one it is") {
-  Fixture f;
+  InsertionFixture f;
   Insertion insertion(f.map, f.parameters);
   const auto named = [&](const char* name, double x_m) {
     Observation seen{f.chair, x_m, 0, 0.9, f.stamp_ns += 1000, {}, {}};

@@ -23,7 +23,7 @@ types: {chair: {attributes: [colour, height]}, table: {attributes: [height]}}
 objects: {sofa: {type: chair, at: [20m, 20m], states: {height: 1m}}}
 )";
 
-struct Fixture {
+struct MapFixture {
   VirtualClock clock;
   test::TemporaryFolder folder;
   std::unique_ptr<Node> node;
@@ -36,7 +36,7 @@ struct Fixture {
   test::Box<Grid> grid{{60, 60, 1, 0}};
   uint64_t jobs = 0;
 
-  explicit Fixture(const std::string& network = kNetwork, const std::string& classes = "chair, table") {
+  explicit MapFixture(const std::string& network = kNetwork, const std::string& classes = "chair, table") {
     NodeTypes types;
     register_semantic_map(types);
     REQUIRE(types.find("semantic_map")->layer == Layer::storage);
@@ -103,7 +103,7 @@ constexpr double kQuarter = std::numbers::pi / 2;
 }  // namespace
 
 TEST_CASE("semantic_map places what is seen in the map, and knows it again from elsewhere") {
-  Fixture f;
+  MapFixture f;
   f.set_up();
   f.thing(0, 0.5F, 2, 200);
   f.thing(1, -1, 3);
@@ -127,7 +127,7 @@ TEST_CASE("semantic_map places what is seen in the map, and knows it again from 
 }
 
 TEST_CASE("semantic_map waits for the robot's pose at the stamp") {
-  Fixture f;
+  MapFixture f;
   f.set_up();
   f.thing(0, 0, 2);
   f.job(0, 0, 0, false);
@@ -136,7 +136,7 @@ TEST_CASE("semantic_map waits for the robot's pose at the stamp") {
 }
 
 TEST_CASE("semantic_map removes an object whose place a grid shows free in two looks") {
-  Fixture f;
+  MapFixture f;
   f.set_up();
   f.free_grid();
   f.thing(0, 0, 2);
@@ -151,7 +151,7 @@ TEST_CASE("semantic_map removes an object whose place a grid shows free in two l
 }
 
 TEST_CASE("semantic_map misses what the head looks at, wherever the robot drives") {
-  Fixture f;
+  MapFixture f;
   PortAccess::connect(test::input(*f.node, "head"), {});
   f.set_up();
   test::Box<HeadState> head;
@@ -171,9 +171,9 @@ TEST_CASE("semantic_map misses what the head looks at, wherever the robot drives
 }
 
 TEST_CASE("semantic_map keeps terrain at the place where it was seen, and tells where it is another") {
-  Fixture f;
+  MapFixture f;
   f.set_up();
-  test::Box<Terrain> terrain;
+  test::Box<takt::Terrain> terrain;
   const auto on = [&](uint8_t kind, double x_m) {
     terrain->kind = kind;
     test::latch(test::input(*f.node, "terrain"), terrain, 100'000'000 * static_cast<int64_t>(f.jobs + 1), f.jobs + 1);
@@ -187,7 +187,7 @@ TEST_CASE("semantic_map keeps terrain at the place where it was seen, and tells 
 }
 
 TEST_CASE("semantic_map keeps what is reported by type and name, with its states as text") {
-  Fixture f;
+  MapFixture f;
   f.set_up();
   test::add_report(*f.seen, "", "chair", 0.5F, 2, {{"colour", "0.5 0.25 0"}});
   test::add_report(*f.seen, "hers", "table", -1, 3, {{"height", "0.7m"}, {"legs", "4"}});
@@ -219,12 +219,12 @@ TEST_CASE("semantic_map keeps what is reported by type and name, with its states
 }
 
 TEST_CASE("semantic_map goes on after a restart with what it published last") {
-  Fixture first;
+  MapFixture first;
   first.set_up();
   test::add_report(*first.seen, "", "chair", 0.5F, 2, {{"height", "0.9m"}});
   test::add_report(*first.seen, "sofa", "chair", 1, 2);  // it stands elsewhere than the network's file says
   first.job(0, 0, kQuarter);
-  Fixture second;
+  MapFixture second;
   second.set_up();
   PortAccess::hand_over(*second.node->outputs()[1], &first.reports->message());
   second.node->start(0);
@@ -253,9 +253,9 @@ TEST_CASE("semantic_map needs things or reports") {
 }
 
 TEST_CASE("semantic_map refuses networks and classes that it cannot read") {
-  Fixture network("takt_network: 1\ntypes: {chair: {attributes: [size]}}\n");
+  MapFixture network("takt_network: 1\ntypes: {chair: {attributes: [size]}}\n");
   CHECK_THROWS_WITH_AS(network.set_up(),
                        doctest::Contains("n.yaml:2:30: there is no attribute `size`; valid are: (none)"), SetupError);
-  Fixture classes(kNetwork, "chair, colour");
+  MapFixture classes(kNetwork, "chair, colour");
   CHECK_THROWS_WITH_AS(classes.set_up(), "classes: `colour`: another node has this name", SetupError);
 }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "rt/memory/memory_use.hpp"
+#include "tests/nanoseconds.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 #include "tests/unit/semantic/report_message.hpp"
 
@@ -14,10 +15,9 @@ void register_semantic(NodeTypes& types);
 }
 
 using namespace takt;
+using test::kSecond;
 
 namespace {
-
-constexpr int64_t kSecond = 1'000'000'000;
 
 int64_t cpu_ns() {
   timespec t;
@@ -25,14 +25,14 @@ int64_t cpu_ns() {
   return int64_t{t.tv_sec} * 1'000'000'000 + t.tv_nsec;
 }
 
-struct Fixture {
+struct SemanticFixture {
   VirtualClock clock;
   std::unique_ptr<Node> node;
   std::unique_ptr<test::BoxWriter<Requests>> requests;
   std::unique_ptr<test::BoxWriter<TextStatus>> status;
   test::Box<StopCommand> stop;
 
-  Fixture() {
+  SemanticFixture() {
     NodeTypes types;
     register_semantic(types);
     REQUIRE(types.find("semantic")->layer == Layer::processing);
@@ -64,7 +64,7 @@ struct Fixture {
 }  // namespace
 
 TEST_CASE("semantic: the script counts from the first job, and its state is repeated by each") {
-  Fixture f;
+  SemanticFixture f;
   f.set("script", std::string("5s stop object_detection; 8s start object_detection; 10s pace ground_map 2"));
   f.set_up();
   CHECK(f.job(100 * kSecond) == "all nodes at full rate");
@@ -86,7 +86,7 @@ TEST_CASE("semantic: the script counts from the first job, and its state is repe
 }
 
 TEST_CASE("semantic: a node on request runs while its name stands in a parameter that may change between two jobs") {
-  Fixture f;
+  SemanticFixture f;
   f.set("on_request", std::string("laser_fusion"));
   f.set_up();
   CHECK(f.job(0) == "stopped: laser_fusion");
@@ -95,13 +95,13 @@ TEST_CASE("semantic: a node on request runs while its name stands in a parameter
   CHECK(f.wanted().empty());
   f.set("request", std::string());
   CHECK(f.job(2 * kSecond) == "stopped: laser_fusion");
-  Fixture wrong;
+  SemanticFixture wrong;
   wrong.set("on_request", std::string("laser-fusion"));
   CHECK_THROWS_AS(wrong.set_up(), SetupError);
 }
 
 TEST_CASE("semantic: idle nodes are paced while the robot is stopped or nobody says that it may drive") {
-  Fixture f;
+  SemanticFixture f;
   f.set("idle", std::string("stereo, ground_map"));
   f.set("idle_every", int64_t{5});
   auto& port = test::input(*f.node, "stop");
@@ -120,7 +120,7 @@ TEST_CASE("semantic: idle nodes are paced while the robot is stopped or nobody s
   f.job(4 * kSecond);
   CHECK(f.wanted().size() == 2);
 
-  Fixture unconnected;
+  SemanticFixture unconnected;
   unconnected.set("idle", std::string("stereo"));
   unconnected.set("idle_every", int64_t{5});
   unconnected.set_up();
@@ -129,7 +129,7 @@ TEST_CASE("semantic: idle nodes are paced while the robot is stopped or nobody s
 }
 
 TEST_CASE("semantic: tells objects and the way ahead, from fresh messages only") {
-  Fixture f;
+  SemanticFixture f;
   auto& detections_port = test::input(*f.node, "detections");
   auto& obstacles_port = test::input(*f.node, "obstacles");
   auto& ground_port = test::input(*f.node, "ground");
@@ -159,7 +159,7 @@ TEST_CASE("semantic: tells objects and the way ahead, from fresh messages only")
 }
 
 TEST_CASE("semantic: rules run a node where it is needed, by what is reported, by bodies and by crossings") {
-  Fixture f;
+  SemanticFixture f;
   f.set("rules", std::string("body_pose when person within 4m else stop; signs when crossing else pace 3"));
   f.set("rule_margin", 0.0);
   f.set("rule_hold", 0.0);
@@ -197,7 +197,7 @@ TEST_CASE("semantic: rules run a node where it is needed, by what is reported, b
   test::Box<DigitalState> crossing;
   test::latch(crossing_port, crossing, 0, 1);
   CHECK(f.job(8 * kSecond) == "paced: signs/3");
-  test::Box<Terrain> terrain;
+  test::Box<takt::Terrain> terrain;
   terrain->kind = terrain_kind::crossing;
   test::latch(terrain_port, terrain, 0, 1);
   CHECK(f.job(9 * kSecond) == "all nodes at full rate");
@@ -215,7 +215,7 @@ TEST_CASE("semantic refuses rules that it cannot read, or that nobody could tell
        {std::pair{"a when crossing", "rules: \"a when crossing\": lacks `else`"},
         std::pair{"a when crossing else stop", "a when crossing: connect `crossing`"},
         std::pair{"a when cup within 1m else stop", "a when cup within: connect `reports`"}}) {
-    Fixture f;
+    SemanticFixture f;
     PortAccess::connect(test::input(*f.node, "bodies"), {0, 0, 1, 4});  // persons only
     f.set("rules", std::string(rules));
     CHECK_THROWS_WITH_AS(f.set_up(), doctest::Contains(why), SetupError);
@@ -223,16 +223,16 @@ TEST_CASE("semantic refuses rules that it cannot read, or that nobody could tell
 }
 
 TEST_CASE("semantic refuses a script and a list that it cannot read") {
-  Fixture f;
+  SemanticFixture f;
   f.set("script", std::string("5s stop a; 6s stopp b"));
   CHECK_THROWS_WITH_AS(f.set_up(), doctest::Contains("script: \"6s stopp b\": `stopp` is no request"), SetupError);
-  Fixture g;
+  SemanticFixture g;
   g.set("idle", std::string("a; b"));
   CHECK_THROWS_WITH_AS(g.set_up(), doctest::Contains("idle: \"a; b\": `a;` is no node id"), SetupError);
 }
 
 TEST_CASE("cost of a job" * doctest::skip()) {  // a figure and no check; run with --no-skip
-  Fixture f;
+  SemanticFixture f;
   f.set("script", std::string("0s stop a; 0s pace b 2; 0s pace c 3"));
   auto& obstacles_port = test::input(*f.node, "obstacles");
   auto& ground_port = test::input(*f.node, "ground");
@@ -260,7 +260,7 @@ TEST_CASE("cost of a job" * doctest::skip()) {  // a figure and no check; run wi
 TEST_CASE("semantic: one that takes another's place goes on in the script, it does not begin anew") {
   for (const bool handed_over : {true, false}) {
     CAPTURE(handed_over);
-    Fixture f;
+    SemanticFixture f;
     f.set("script", std::string("5s stop object_detection"));
     f.set_up();
     test::Box<Requests> last;

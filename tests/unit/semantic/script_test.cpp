@@ -4,13 +4,13 @@
 #include <doctest/doctest.h>
 
 #include "nodes/semantic/clock_generator.hpp"
+#include "tests/nanoseconds.hpp"
 
 using namespace takt;
 using namespace takt::semantic;
+using test::kSecond;
 
 namespace {
-
-constexpr int64_t kSecond = 1'000'000'000;
 
 /// "a off, b/2" for what deviates.
 std::string text(const ClockGenerator& generator) {

@@ -20,7 +20,7 @@ using namespace takt::stereo;
 
 namespace {
 
-struct Scene {
+struct MadeScene {
   int width, height;
   std::vector<uint8_t> left, right;
   DisparityImage truth;
@@ -28,9 +28,9 @@ struct Scene {
 
 /// Textured ground that rises towards the camera, and two boxes in front of it. The texture is smooth over about 3 px,
 /// as a lens makes it: noise of single pixels would vanish at half resolution.
-Scene made_scene(int width, int height) {
+MadeScene made_scene(int width, int height) {
   const auto count = static_cast<size_t>(width * height);
-  Scene s{width, height, std::vector<uint8_t>(count), std::vector<uint8_t>(count), {width, height, {}}};
+  MadeScene s{width, height, std::vector<uint8_t>(count), std::vector<uint8_t>(count), {width, height, {}}};
   s.truth.pixels.resize(count);
   std::mt19937 random(5);
   std::vector<int> rough(count);
@@ -59,16 +59,16 @@ Scene made_scene(int width, int height) {
   return s;
 }
 
-struct Result {
+struct ScoredResult {
   StereoScore score;
   double mean_error_px = 0;
   std::vector<int16_t> disparity;
   std::vector<uint8_t> confidence;
 };
 
-Result run(Matcher& matcher, ImageView<const uint8_t> left, ImageView<const uint8_t> right,
-           const DisparityImage& truth) {
-  Result r;
+ScoredResult run(Matcher& matcher, ImageView<const uint8_t> left, ImageView<const uint8_t> right,
+                 const DisparityImage& truth) {
+  ScoredResult r;
   r.disparity.resize(truth.pixels.size());
   r.confidence.resize(truth.pixels.size());
   const ImageView<int16_t> disparity(r.disparity.data(), left.width, left.height);
@@ -86,13 +86,13 @@ Result run(Matcher& matcher, ImageView<const uint8_t> left, ImageView<const uint
 
 TEST_CASE(
     "level 1 on a made scene: the same size and unit, an error a few per cent of pixels above the full matcher's") {
-  const Scene s = made_scene(320, 240);
+  const MadeScene s = made_scene(320, 240);
   MatcherParameters p;
   p.disparities = 64;
   WindowMatcher full(s.width, s.height, 1, p);
   HalfMatcher half_matcher(s.width, s.height, 1, p);
   const ImageView<const uint8_t> left(s.left.data(), s.width, s.height), right(s.right.data(), s.width, s.height);
-  const Result best = run(full, left, right, s.truth), worse = run(half_matcher, left, right, s.truth);
+  const ScoredResult best = run(full, left, right, s.truth), worse = run(half_matcher, left, right, s.truth);
   MESSAGE("bad pixels: full ", best.score.bad_1px_pct, " %, half ", worse.score.bad_1px_pct, " %; mean error ",
           best.mean_error_px, " and ", worse.mean_error_px, " px");
   CHECK(worse.score.density_pct == 100);
@@ -130,7 +130,7 @@ TEST_CASE("level 1 on recorded pairs with ground truth") {
     MatcherParameters p;
     p.disparities = r.disparities;
     HalfMatcher matcher(left.cols, left.rows, 3, p);
-    const Result result =
+    const ScoredResult result =
         run(matcher, {left.data, left.cols, left.rows, 3}, {right.data, left.cols, left.rows, 3}, truth);
     MESSAGE(std::string(r.folder), ": ", result.score.bad_1px_pct, " % bad");
     CHECK(result.score.bad_1px_pct <= r.most_bad_pct);
@@ -138,7 +138,7 @@ TEST_CASE("level 1 on recorded pairs with ground truth") {
 }
 
 TEST_CASE("half of the range finds what lies in it as well as all of the range does, and nothing beyond") {
-  const Scene s = made_scene(320, 240);
+  const MadeScene s = made_scene(320, 240);
   MatcherParameters p;
   p.disparities = 80;  // the nearer box has 43
   HalfMatcher all(s.width, s.height, 1, p), narrow(s.width, s.height, 1, p);
@@ -170,11 +170,11 @@ TEST_CASE("odd sizes keep their size; views that do not fit are refused and unto
 }
 
 TEST_CASE("a limited search gives nothing beyond its range") {
-  const Scene s = made_scene(160, 120);
+  const MadeScene s = made_scene(160, 120);
   MatcherParameters p;
   p.disparities = 64;
   HalfMatcher matcher(s.width, s.height, 1, p);
   matcher.limit_search(20);
-  const Result r = run(matcher, {s.left.data(), s.width, s.height}, {s.right.data(), s.width, s.height}, s.truth);
+  const ScoredResult r = run(matcher, {s.left.data(), s.width, s.height}, {s.right.data(), s.width, s.height}, s.truth);
   for (const int16_t d : r.disparity) REQUIRE(d < 20);
 }

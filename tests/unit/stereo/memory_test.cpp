@@ -21,7 +21,7 @@ using namespace takt::stereo;
 
 namespace {
 
-constexpr int kWidth = 330, kHeight = 90;  // more than one strip of columns
+constexpr int kPairWidth = 330, kPairHeight = 90;  // more than one strip of columns
 
 /// Of the calls after the first the one with the fewest: now and then the kernel itself takes a page away.
 void expect_no_memory(const std::string& what, const std::function<void()>& call) {
@@ -44,17 +44,18 @@ void expect_no_memory(const std::string& what, const std::function<void()>& call
   CHECK(fewest == 0);
 }
 
-struct Scene {
-  GeneratedPair pair = generate_pair(kWidth, kHeight, 60, 30, 2, 1);
-  std::vector<int16_t> disparity = std::vector<int16_t>(kWidth * kHeight);
-  std::vector<uint8_t> confidence = std::vector<uint8_t>(kWidth * kHeight), fraction = confidence;
+struct MemoryScene {
+  GeneratedPair pair = generate_pair(kPairWidth, kPairHeight, 60, 30, 2, 1);
+  std::vector<int16_t> disparity = std::vector<int16_t>(kPairWidth * kPairHeight);
+  std::vector<uint8_t> confidence = std::vector<uint8_t>(kPairWidth * kPairHeight), fraction = confidence;
   DisparityViews views() {
-    return {
-        {disparity.data(), kWidth, kHeight}, {confidence.data(), kWidth, kHeight}, {fraction.data(), kWidth, kHeight}};
+    return {{disparity.data(), kPairWidth, kPairHeight},
+            {confidence.data(), kPairWidth, kPairHeight},
+            {fraction.data(), kPairWidth, kPairHeight}};
   }
 };
 
-void expect_no_memory(const std::string& what, Matcher& matcher, Scene& scene) {
+void expect_no_memory(const std::string& what, Matcher& matcher, MemoryScene& scene) {
   int range = 60;
   expect_no_memory(what, [&] {
     CHECK(matcher.match(scene.pair.left_view(), scene.pair.right_view(), scene.views()));
@@ -65,7 +66,7 @@ void expect_no_memory(const std::string& what, Matcher& matcher, Scene& scene) {
 }  // namespace
 
 TEST_CASE("matching allocates nothing and misses no page: windows, paths, half resolution, bands, all else") {
-  Scene scene;
+  MemoryScene scene;
   MatcherParameters windows, checked, paths = MatcherParameters::quality(), general;
   checked.left_right_check = checked.subpixel = checked.median = true;
   checked.uniqueness = 20;
@@ -78,39 +79,39 @@ TEST_CASE("matching allocates nothing and misses no page: windows, paths, half r
       {"windows", &windows}, {"windows, every check", &checked}, {"paths", &paths}, {"general", &general}};
   for (const auto& [name, parameters] : all) {
     parameters->disparities = 60;
-    expect_no_memory(name, *make_matcher(kWidth, kHeight, 3, *parameters), scene);
-    HalfMatcher half_matcher(kWidth, kHeight, 3, *parameters);
+    expect_no_memory(name, *make_matcher(kPairWidth, kPairHeight, 3, *parameters), scene);
+    HalfMatcher half_matcher(kPairWidth, kPairHeight, 3, *parameters);
     expect_no_memory(std::string(name) + ", half resolution", half_matcher, scene);
     if (!WindowMatcher::serves(*parameters)) continue;
-    BandMatcher bands(kWidth, kHeight, 3, *parameters, 2);
+    BandMatcher bands(kPairWidth, kPairHeight, 3, *parameters, 2);
     expect_no_memory(std::string(name) + ", two bands", bands, scene);
   }
 }
 
 TEST_CASE("rectifying and watching rows allocate nothing and miss no page") {
-  Scene scene;
+  MemoryScene scene;
   StereoCalibration cameras;
-  cameras.width = kWidth;
-  cameras.height = kHeight;
+  cameras.width = kPairWidth;
+  cameras.height = kPairHeight;
   cameras.left_matrix = cameras.right_matrix = {300, 0, 165, 0, 300, 45, 0, 0, 1};
   cameras.left_distortion = cameras.right_distortion = {-0.1, 0.01, 0, 0, 0};
   cameras.translation_m = {-0.24, 0, 0};
-  std::vector<uint8_t> left(kWidth * kHeight * 3), right = left;
+  std::vector<uint8_t> left(kPairWidth * kPairHeight * 3), right = left;
   for (const BayerPattern pattern : {BayerPattern::none, BayerPattern::rggb}) {
     Rectifier rectifier(cameras, pattern);
     const int channels = pattern == BayerPattern::none ? 3 : 1;
     expect_no_memory("rectifier", [&] {
-      CHECK(rectifier.rectify({scene.pair.left.data(), kWidth, kHeight, channels},
-                              {scene.pair.right.data(), kWidth, kHeight, channels}, {left.data(), kWidth, kHeight, 3},
-                              {right.data(), kWidth, kHeight, 3}));
+      CHECK(rectifier.rectify({scene.pair.left.data(), kPairWidth, kPairHeight, channels},
+                              {scene.pair.right.data(), kPairWidth, kPairHeight, channels},
+                              {left.data(), kPairWidth, kPairHeight, 3}, {right.data(), kPairWidth, kPairHeight, 3}));
     });
   }
-  RectificationMonitor monitor(kWidth, kHeight, 60);
+  RectificationMonitor monitor(kPairWidth, kPairHeight, 60);
   std::vector<int16_t> truth;
   for (const float d : scene.pair.truth.pixels) truth.push_back(static_cast<int16_t>(d));
   expect_no_memory("monitor", [&] {
     for (int i = 0; i < 10; ++i)
-      monitor.observe(scene.pair.left_view(), scene.pair.right_view(), {truth.data(), kWidth, kHeight});
+      monitor.observe(scene.pair.left_view(), scene.pair.right_view(), {truth.data(), kPairWidth, kPairHeight});
     CHECK(monitor.row_error_px());
   });
 }

@@ -18,14 +18,14 @@ using namespace takt::stereo;
 
 namespace {
 
-struct Scene {
+struct NamedPair {
   std::string name;
   cv::Mat left, right;
   int disparities;
 };
 
 /// What the monitor says after three seconds at 15 Hz with the right image `down` px lower (cubic).
-std::optional<double> row_error_px(const Scene& scene, double down) {
+std::optional<double> row_error_px(const NamedPair& scene, double down) {
   cv::Mat moved;
   cv::warpAffine(scene.right, moved, cv::Matx23d(1, 0, 0, 0, 1, down), scene.right.size(), cv::INTER_CUBIC,
                  cv::BORDER_REPLICATE);
@@ -41,7 +41,7 @@ std::optional<double> row_error_px(const Scene& scene, double down) {
   return monitor.row_error_px();
 }
 
-void expect_told(const Scene& scene) {
+void expect_told(const NamedPair& scene) {
   const auto good = row_error_px(scene, 0);
   REQUIRE(good);
   CAPTURE(scene.name);
@@ -76,8 +76,8 @@ TEST_CASE("recorded pairs whose rows differ by more than a pixel are told as wro
                              Recording{"stereo/aloe", "aloeL.jpg", "aloeR.jpg", 112, 0.5}}) {
     const auto folder = takt::test::recording(r.folder);
     if (!folder) return;
-    Scene scene{r.folder, cv::imread((*folder / r.left).string()), cv::imread((*folder / r.right).string()),
-                r.disparities};
+    NamedPair scene{r.folder, cv::imread((*folder / r.left).string()), cv::imread((*folder / r.right).string()),
+                    r.disparities};
     for (cv::Mat* image : {&scene.left, &scene.right})
       cv::resize(*image, *image, {}, r.size, r.size, r.size < 1 ? cv::INTER_AREA : cv::INTER_LINEAR);
     expect_told(scene);

@@ -24,15 +24,15 @@ std::vector<uint8_t> noise(size_t count, unsigned seed) {
   return v;
 }
 
-struct Result {
+struct MatchResult {
   std::vector<int16_t> disparity;
   std::vector<uint8_t> confidence;
 };
 
-Result match(const std::vector<uint8_t>& left, const std::vector<uint8_t>& right, int width, int height, int channels,
-             const MatcherParameters& p) {
+MatchResult match(const std::vector<uint8_t>& left, const std::vector<uint8_t>& right, int width, int height,
+                  int channels, const MatcherParameters& p) {
   const auto count = static_cast<size_t>(width * height);
-  Result r{std::vector<int16_t>(count, -9), std::vector<uint8_t>(count)};
+  MatchResult r{std::vector<int16_t>(count, -9), std::vector<uint8_t>(count)};
   const auto matcher = make_matcher(width, height, channels, p);
   REQUIRE(matcher->match({left.data(), width, height, channels}, {right.data(), width, height, channels},
                          {{r.disparity.data(), width, height}, {r.confidence.data(), width, height}}));

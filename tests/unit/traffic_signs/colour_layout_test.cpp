@@ -10,13 +10,13 @@
 #include "nodes/traffic_signs/layout_learning.hpp"
 #include "nodes/traffic_signs/sign_list.hpp"
 #include "tests/temporary_folder.hpp"
+#include "tests/unit/traffic_signs/signs.hpp"
 
 using namespace takt;
 using namespace takt::traffic_signs;
+using test::kSigns;
 
 namespace {
-
-const std::filesystem::path kSigns = std::filesystem::path(TAKT_SOURCE_DIR) / "graph/signs";
 
 ImageView<const uint8_t> view(const cv::Mat3b& image) { return {image.ptr(), image.cols, image.rows, 3}; }
 

@@ -3,14 +3,11 @@
 
 #include <doctest/doctest.h>
 
+#include "tests/unit/traffic_signs/signs.hpp"
+
 using namespace takt;
 using namespace takt::traffic_signs;
-
-namespace {
-
-const std::filesystem::path kSigns = std::filesystem::path(TAKT_SOURCE_DIR) / "graph/signs";
-
-}  // namespace
+using test::kSigns;
 
 TEST_CASE("traffic_signs: a hit wants the class and half of the box; all else found is false") {
   Scores scores;

@@ -8,6 +8,7 @@
 #include "nodes/traffic_signs/sign_scenes.hpp"
 #include "tests/temporary_folder.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
+#include "tests/unit/traffic_signs/signs.hpp"
 
 namespace takt {
 void register_traffic_signs(NodeTypes& types);
@@ -15,10 +16,10 @@ void register_traffic_signs(NodeTypes& types);
 
 using namespace takt;
 using namespace takt::traffic_signs;
+using test::kSigns;
 
 namespace {
 
-const std::filesystem::path kSigns = std::filesystem::path(TAKT_SOURCE_DIR) / "graph/signs";
 constexpr Capacity kImages{640, 480, 3, 0};
 constexpr size_t kArrowRight = 4;
 
