@@ -15,7 +15,7 @@ using namespace takt::analysis;
 
 namespace {
 
-struct SimulatedJob {
+struct ReleasedJob {
   size_t task;
   Ticks arrival, deadline, left;
 };
@@ -26,11 +26,11 @@ struct Outcome {
 };
 
 /// Preemptive global EDF, event by event; equal deadlines go by arrival in the list.
-Outcome simulate(const TaskSet& set, std::vector<SimulatedJob> jobs) {
+Outcome simulate(const TaskSet& set, std::vector<ReleasedJob> jobs) {
   Outcome outcome;
   outcome.response.assign(set.tasks.size(), 0);
   std::stable_sort(jobs.begin(), jobs.end(), [](const auto& a, const auto& b) { return a.arrival < b.arrival; });
-  std::vector<SimulatedJob> ready;
+  std::vector<ReleasedJob> ready;
   size_t next = 0;
   for (Ticks now = 0; next < jobs.size() || !ready.empty();) {
     if (ready.empty()) now = std::max(now, jobs[next].arrival);
@@ -41,7 +41,7 @@ Outcome simulate(const TaskSet& set, std::vector<SimulatedJob> jobs) {
     for (size_t i = 0; i < running; ++i) step = std::min(step, ready[i].left);
     now += step;
     for (size_t i = 0; i < running; ++i) ready[i].left -= step;
-    std::erase_if(ready, [&](const SimulatedJob& job) {
+    std::erase_if(ready, [&](const ReleasedJob& job) {
       if (job.left > 0) return false;
       outcome.response[job.task] = std::max(outcome.response[job.task], now - job.arrival);
       outcome.missed = outcome.missed || now > job.deadline;
@@ -51,7 +51,7 @@ Outcome simulate(const TaskSet& set, std::vector<SimulatedJob> jobs) {
   return outcome;
 }
 
-TaskSet random_set(Random& random) {
+TaskSet random_edf_set(Random& random) {
   TaskSet set;
   set.cores = static_cast<int>(random.uniform(1, 4));
   const Ticks count = random.uniform(set.cores, 4 * set.cores + 2);
@@ -73,9 +73,9 @@ TaskSet random_set(Random& random) {
 
 /// Jobs in [0, end): synchronous or from random phases, periodic or with random gaps between arrivals; all take their
 /// budget, or anything up to it.
-std::vector<SimulatedJob> arrivals(const TaskSet& set, Ticks end, int kind, Random& random) {
+std::vector<ReleasedJob> arrivals(const TaskSet& set, Ticks end, int kind, Random& random) {
   const bool phases = kind % 2 == 1, gaps = kind / 2 % 2 == 1, short_jobs = kind / 4 % 2 == 1;
-  std::vector<SimulatedJob> jobs;
+  std::vector<ReleasedJob> jobs;
   for (size_t t = 0; t < set.tasks.size(); ++t) {
     const TimedTask& task = set.tasks[t];
     for (Ticks at = phases ? random.uniform(0, task.period) : 0; at < end;) {
@@ -161,7 +161,7 @@ TEST_CASE("global EDF: what is called schedulable misses nothing, and no respons
   int accepted = 0;
   for (int round = 0; round < 12'000; ++round) {
     CAPTURE(round);
-    const TaskSet set = random_set(random);
+    const TaskSet set = random_edf_set(random);
     const GlobalEdfResult result = global_edf(set);
     const std::vector<Ticks> responses = global_response_times(set);
     Bin& bin = bins[std::min<size_t>(9, static_cast<size_t>(10 * set.utilisation() / set.cores))];
@@ -191,7 +191,7 @@ TEST_CASE("global EDF: more budget never makes a refused set schedulable") {
   Random random{std::mt19937(21)};
   for (int round = 0; round < 3'000; ++round) {
     CAPTURE(round);
-    TaskSet set = random_set(random);
+    TaskSet set = random_edf_set(random);
     const bool before = global_edf(set).schedulable();
     TimedTask& grown = set.tasks[static_cast<size_t>(random.uniform(0, static_cast<Ticks>(set.tasks.size()) - 1))];
     ++grown.budget;
@@ -204,7 +204,7 @@ TEST_CASE("global EDF: the carry-in test leaves out lengths, and each budget may
   int refused = 0, grown = 0;
   for (int round = 0; round < 600; ++round) {
     CAPTURE(round);
-    const TaskSet set = random_set(random);
+    const TaskSet set = random_edf_set(random);
     // Far beyond all lengths that matter for most sets; shares that leave nothing free would need ever longer ones.
     if (set.utilisation() > 0.95 * set.cores) continue;
     const auto plain = [](const TaskSet& s) { return s.utilisation() < s.cores && plain_carry_in_test(s, 3'000); };

@@ -49,7 +49,7 @@ std::vector<Ticks> simulate(const TaskSet& set, Ticks end, Lengths lengths, Rand
   return response;
 }
 
-TaskSet random_set(Random& random) {
+TaskSet random_cooperative_set(Random& random) {
   constexpr Ticks kPeriods[] = {6, 10, 15, 30, 60};
   TaskSet set;
   set.cores = static_cast<int>(random.uniform(1, 3));
@@ -84,7 +84,7 @@ TEST_CASE("cooperative workers: what is called schedulable misses nothing, and n
   int accepted = 0, fine = 0, reached = 0, tasks = 0;
   for (int round = 0; round < 10'000; ++round) {
     CAPTURE(round);
-    const TaskSet set = random_set(random);
+    const TaskSet set = random_cooperative_set(random);
     const CoreAnalysis answer = global_non_preemptive_edf(set, 5'000);
     const bool schedulable = answer.verdict == Verdict::schedulable;
     accepted += schedulable;

@@ -7,7 +7,7 @@ using namespace takt::analysis;
 
 namespace {
 
-TaskSet set_of(std::vector<TimedTask> tasks, int cores = 1) {
+TaskSet simulated_set(std::vector<TimedTask> tasks, int cores = 1) {
   TaskSet set;
   set.tasks = std::move(tasks);
   set.cores = cores;
@@ -36,7 +36,7 @@ std::string story(std::vector<SimulatedJob> jobs) {
 }  // namespace
 
 TEST_CASE("rate monotonic: (2, 5) and (4, 7) miss at 7; EDF runs the second through and misses nothing") {
-  const TaskSet set = set_of(tasks_of({{2, 5, 5}, {4, 7, 7}}));
+  const TaskSet set = simulated_set(tasks_of({{2, 5, 5}, {4, 7, 7}}));
   const auto arrivals = all_periodic(set, 14);
   CHECK(story(simulate(set, Dispatch::fixed_priority, arrivals)) ==
         "a0 0-2; b0 2-8!1 late; a1 5-7; b1 8-14!1; a2 10-12; ");
@@ -44,7 +44,7 @@ TEST_CASE("rate monotonic: (2, 5) and (4, 7) miss at 7; EDF runs the second thro
 }
 
 TEST_CASE("non-preemptive EDF: what has started finishes, then the earliest deadline") {
-  const TaskSet set = set_of(tasks_of({{2, 5, 10}, {3, 9, 10, 1}, {6, 20, 20, 0}}, false));
+  const TaskSet set = simulated_set(tasks_of({{2, 5, 10}, {3, 9, 10, 1}, {6, 20, 20, 0}}, false));
   std::vector<std::vector<Arrival>> arrivals = {{{1, 1}, {11, 12}}, {{1, 1}}, {{0, 0}}};
   CHECK(story(simulate(set, Dispatch::non_preemptive_edf, arrivals)) ==
         "c0 0-6; a0 6-8 late; b0 8-11 late; a1 12-14; ");
@@ -52,7 +52,7 @@ TEST_CASE("non-preemptive EDF: what has started finishes, then the earliest dead
 }
 
 TEST_CASE("one task that is not to be preempted among others that are") {
-  const TaskSet set = set_of(tasks_of({{1, 5, 10}, {4, 20, 20}}));
+  const TaskSet set = simulated_set(tasks_of({{1, 5, 10}, {4, 20, 20}}));
   Simulator simulator(set, Dispatch::fixed_priority);
   simulator.make_non_preemptable(1);
   simulator.add(1, 0, 0);
@@ -62,7 +62,7 @@ TEST_CASE("one task that is not to be preempted among others that are") {
 }
 
 TEST_CASE("a job in parts keeps its core between them, and gives it up behind the last") {
-  const TaskSet set = set_of(tasks_of({{1, 5, 10}, {4, 20, 20}}));
+  const TaskSet set = simulated_set(tasks_of({{1, 5, 10}, {4, 20, 20}}));
   SimulationHooks hooks;
   Simulator* simulated = nullptr;
   hooks.finished = [&](const SimulatedJob& job) {
@@ -81,7 +81,7 @@ TEST_CASE("a job in parts keeps its core between them, and gives it up behind th
 
 TEST_CASE("global EDF: Dhall's effect on two cores") {
   // Dhall & Liu 1978: two light tasks and one heavy task, utilisation little above 1, miss on two cores
-  const TaskSet set = set_of(tasks_of({{2, 10, 10}, {2, 10, 10}, {10, 11, 11}}), 2);
+  const TaskSet set = simulated_set(tasks_of({{2, 10, 10}, {2, 10, 10}, {10, 11, 11}}), 2);
   const auto jobs = simulate(set, Dispatch::global_edf, {{{0, 0}}, {{0, 0}}, {{0, 0}}});
   CHECK(story(jobs) == "a0 0-2; b0 0-2; c0 2-12 late; ");
   CHECK(jobs[0].core == 0);
@@ -89,14 +89,14 @@ TEST_CASE("global EDF: Dhall's effect on two cores") {
 }
 
 TEST_CASE("global EDF: a job that is preempted goes on where there is room, jobs of a task one after another") {
-  const TaskSet set = set_of(tasks_of({{3, 4, 10}, {3, 4, 10}, {5, 20, 20}}), 2);
+  const TaskSet set = simulated_set(tasks_of({{3, 4, 10}, {3, 4, 10}, {5, 20, 20}}), 2);
   const auto jobs = simulate(set, Dispatch::global_edf, {{{1, 1}}, {{1, 1}}, {{0, 0}, {2, 2}}});
   CHECK(story(jobs) == "c0 0-8!1; a0 1-4; b0 1-4; c1 8-13; ");
   CHECK(jobs[2].core == 0);
 }
 
 TEST_CASE("cores are served apart, each with its own tasks") {
-  TaskSet set = set_of(tasks_of({{4, 10, 10}, {4, 10, 10}, {2, 10, 10}}), 2);
+  TaskSet set = simulated_set(tasks_of({{4, 10, 10}, {4, 10, 10}, {2, 10, 10}}), 2);
   set.tasks[1].core = 1;
   const auto jobs = simulate(set, Dispatch::fixed_priority, all_periodic(set, 10));
   CHECK(story(jobs) == "a0 0-4; b0 0-4; c0 4-6; ");
@@ -104,14 +104,14 @@ TEST_CASE("cores are served apart, each with its own tasks") {
 }
 
 TEST_CASE("ties: the larger priority, then the earlier task") {
-  TaskSet set = set_of(tasks_of({{1, 5, 5}, {1, 5, 5}, {1, 5, 5}}));
+  TaskSet set = simulated_set(tasks_of({{1, 5, 5}, {1, 5, 5}, {1, 5, 5}}));
   for (TimedTask& task : set.tasks) task.priority = 0;
   set.tasks[2].priority = 1;
   CHECK(story(simulate(set, Dispatch::edf, {{{0, 0}}, {{0, 0}}, {{0, 0}}})) == "c0 0-1; a0 1-2; b0 2-3; ");
 }
 
 TEST_CASE("durations are asked once, at the start; a finished job may release another at once") {
-  const TaskSet set = set_of(tasks_of({{5, 10, 10}, {5, 10, 10}}));
+  const TaskSet set = simulated_set(tasks_of({{5, 10, 10}, {5, 10, 10}}));
   int asked = 0;
   Simulator* running = nullptr;
   SimulationHooks hooks;

@@ -6,13 +6,13 @@
 #include "graph/check/check.hpp"
 #include "graph/check/margins.hpp"
 #include "rt/node.hpp"
+#include "tests/nanoseconds.hpp"
 
 using namespace takt;
 using namespace takt::graph;
+using test::kMs;
 
 namespace {
-
-constexpr int64_t kMs = 1'000'000;
 
 struct Source final : Node {
   Output<Motion> out{this, "out", ""};

@@ -3,29 +3,20 @@
 
 #include <doctest/doctest.h>
 
+#include "plans.hpp"
 #include "rt/node.hpp"
 
 using namespace takt;
 using namespace takt::graph;
+using test::task;
 
 namespace {
-
-TaskPlan task(std::string name, int64_t hz, int64_t budget_ms, int64_t deadline_ms,
-              Criticality criticality = Criticality::low) {
-  TaskPlan plan;
-  plan.name = std::move(name);
-  plan.rate = Rate{hz, 1};
-  plan.budget_ns = budget_ms * 1'000'000;
-  plan.deadline_ns = deadline_ms * 1'000'000;
-  plan.criticality = criticality;
-  return plan;
-}
 
 Plan two_tasks() {
   Plan plan;
   plan.policy = Policy::deadline;
   plan.cores = {0, 2};
-  plan.tasks = {task("stereo", 10, 50, 100, Criticality::high), task("picture", 2, 100, 450)};
+  plan.tasks = {task("stereo", 10, 50, 100, Criticality::high), task("picture", 2, 100, 450, Criticality::low)};
   PortPlan port;
   port.node = "stereo";
   port.port = "motion";
@@ -124,11 +115,11 @@ TEST_CASE("A budget above its deadline is infeasible") {
 TEST_CASE("More work than cores, or than one core for one task, is infeasible") {
   Plan plan = two_tasks();
   plan.cores = {0};
-  plan.tasks[1] = task("picture", 2, 300, 450);
+  plan.tasks[1] = task("picture", 2, 300, 450, Criticality::low);
   CHECK(says(check({}, plan), "budgets ask for 1.10 of 1 core"));
   CHECK(!check({}, plan).admitted);
   plan = two_tasks();
-  plan.tasks[1] = task("picture", 10, 150, 200);
+  plan.tasks[1] = task("picture", 10, 150, 200, Criticality::low);
   CHECK(says(check({}, plan), "picture: its budget of 150 ms at 10 Hz is more than one core"));
   CHECK(says(check({}, plan), "at most 6.667 Hz would fit"));
 }

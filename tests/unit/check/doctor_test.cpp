@@ -18,7 +18,6 @@ using graph::measured_json;
 using graph::measured_text;
 using graph::write_whole;
 using machine::Finding;
-using machine::Need;
 using machine::Status;
 
 namespace {
@@ -29,10 +28,10 @@ std::vector<Finding> findings() {
   const std::string words =
       "a value that is long enough to be broken between two of its words, and then once more "
       "because it has so many of them";
-  return {{"policies", "first", Need::deadline, Status::ok, "granted", "what it is for"},
+  return {{"policies", "first", machine::Need::deadline, Status::ok, "granted", "what it is for"},
           {"policies",
            "second",
-           Need::fixed,
+           machine::Need::fixed,
            Status::lacks,
            words,
            "meaning",
@@ -40,7 +39,7 @@ std::vector<Finding> findings() {
              "sudo something --with a --very-long list --of options --that does not --fit into --one line "
              "--of eighty"},
             {"systemd unit", "[Service]\nOne=1\nTwo=2"}}},
-          {"memory", "third", Need::advice, Status::unknown, "nobody knows", "meaning"}};
+          {"memory", "third", machine::Need::advice, Status::unknown, "nobody knows", "meaning"}};
 }
 
 }  // namespace

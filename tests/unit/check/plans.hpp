@@ -6,10 +6,9 @@
 #include <vector>
 
 #include "rt/sched/plan.hpp"
+#include "tests/nanoseconds.hpp"
 
 namespace takt::test {
-
-inline constexpr int64_t kMs = 1'000'000;
 
 inline TaskPlan task(std::string name, int64_t hz, double budget_ms, double deadline_ms,
                      Criticality criticality = Criticality::high) {

@@ -4,12 +4,13 @@
 
 #include <doctest/doctest.h>
 
+#include "tests/nanoseconds.hpp"
+
 using namespace takt;
 using namespace takt::graph;
+using test::kMs;
 
 namespace {
-
-constexpr int64_t kMs = 1'000'000;
 
 ConditionSpec at_least(double low, Holds holds = Holds::at_end) {
   ConditionSpec spec;

@@ -4,12 +4,15 @@
 
 #include <doctest/doctest.h>
 
+#include "tests/nanoseconds.hpp"
+
 using namespace takt;
 using namespace takt::graph;
+using test::kMs;
 
 namespace {
 
-constexpr int64_t kMs = 1'000'000, kEpoch = 1'000 * kMs;
+constexpr int64_t kEpoch = 1'000 * kMs;
 
 struct Fixture {
   Plan plan;

@@ -5,6 +5,7 @@
 
 #include "graph/faults/scenario.hpp"
 #include "rt/msg/messages.hpp"
+#include "tests/nanoseconds.hpp"
 #include "tests/temporary_folder.hpp"
 
 namespace takt::test {

@@ -11,7 +11,7 @@ using namespace takt::test;
 
 namespace {
 
-constexpr int64_t kMs = 1'000'000, kEpoch = 1'000 * kMs;
+constexpr int64_t kEpoch = 1'000 * kMs;
 constexpr size_t kPorts = 8;  // more than the plan has
 
 std::string many(const std::string& faults) { return "takt: 1\nname: t\nseed: 3\nfaults: [" + faults + "]\n"; }

@@ -8,8 +8,6 @@ using namespace takt::test;
 
 namespace {
 
-constexpr int64_t kMs = 1'000'000;
-
 /// Exactly one problem, there, whose text holds all the words.
 void expect_problem(const std::string& text, int line, int column, const std::vector<std::string>& words,
                     const RunKind& run = {true, false, true}) {

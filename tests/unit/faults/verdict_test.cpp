@@ -11,8 +11,6 @@ using Json = nlohmann::ordered_json;
 
 namespace {
 
-constexpr int64_t kMs = 1'000'000;
-
 Json node(const char* name, uint64_t completed, uint64_t released, uint64_t misses, const char* criticality = "low") {
   return {{"name", name},         {"rate_hz", 10.0},        {"active_s", 10.0},          {"criticality", criticality},
           {"released", released}, {"completed", completed}, {"deadline_misses", misses}, {"stale_inputs", 3},

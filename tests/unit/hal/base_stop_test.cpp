@@ -28,7 +28,7 @@ class NotingBase final : public MobileBase {
   int commands = 0;
 };
 
-struct Fixture {
+struct BaseFixture {
   NotingBase* base = new NotingBase;  // owned by the node
   BaseNode node{std::unique_ptr<MobileBase>(base)};
   InputPort& velocity = *node.inputs()[0];
@@ -38,7 +38,7 @@ struct Fixture {
   test::Box<StopCommand> command;
   VirtualClock clock;
 
-  explicit Fixture(bool with_stop) {
+  explicit BaseFixture(bool with_stop) {
     REQUIRE(velocity.name() == "velocity");
     REQUIRE(stop.name() == "stop");
     PortAccess::connect(velocity, {});
@@ -65,13 +65,13 @@ struct Fixture {
 }  // namespace
 
 TEST_CASE("base: without a stop input the velocity is passed on") {
-  Fixture f(false);
+  BaseFixture f(false);
   f.job();
   CHECK(f.drives());
 }
 
 TEST_CASE("base: a stop command makes the velocity zero, and silence stops as well") {
-  Fixture f(true);
+  BaseFixture f(true);
   f.job();
   CHECK(f.halts());  // connected, but nothing has come yet
   test::latch(f.stop, f.command, 0, 1);
@@ -92,7 +92,7 @@ TEST_CASE("base: a stop command makes the velocity zero, and silence stops as we
 }
 
 TEST_CASE("base: a stop is commanded also where there is no velocity, which alone would only wait for the watchdog") {
-  Fixture f(true);
+  BaseFixture f(true);
   f.command->reasons = stop_reason::obstacle;
   test::latch(f.stop, f.command, 0, 1);
   PortAccess::set_held(f.velocity, 0, true, 0);
@@ -105,7 +105,7 @@ TEST_CASE("base: a stop is commanded also where there is no velocity, which alon
 
 TEST_CASE("base: in safe_stop, and in a mode that has no name, zero is commanded each job whatever the inputs say") {
   for (const bool with_stop : {false, true}) {
-    Fixture f(with_stop);
+    BaseFixture f(with_stop);
     if (with_stop) test::latch(f.stop, f.command, 0, 1);  // it says: drive
     f.job("no_stereo");
     CHECK(f.drives());

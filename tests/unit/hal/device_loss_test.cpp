@@ -38,7 +38,7 @@ class Lines final : public DigitalLines {
   int starts = 0, stops = 0, reads = 0;
 };
 
-struct Fixture {
+struct LinesFixture {
   Lines* lines = new Lines;  // owned by the node
   LinesNode node{std::unique_ptr<DigitalLines>(lines)};
   test::FakeWriter writer{*node.outputs()[0]};
@@ -47,7 +47,7 @@ struct Fixture {
   std::optional<SourceReport> report;
   bool result = false;
 
-  Fixture() {
+  LinesFixture() {
     Setup setup{clock, ".", {}, 1, Rate{20, 1}};
     node.setup(setup);
   }
@@ -67,7 +67,7 @@ struct Fixture {
 }  // namespace
 
 TEST_CASE("a device that is not there at the start is tried with growing pauses, and told as lost") {
-  Fixture f;
+  LinesFixture f;
   f.lines->there_ns = 2000 * kMs;
   f.node.start(0);
   f.run_to(2000);  // tried at 0, 100, 300, 700 and 1500 ms
@@ -90,7 +90,7 @@ TEST_CASE("a device that is not there at the start is tried with growing pauses,
 }
 
 TEST_CASE("a device that says it is gone is restarted by the jobs, not read meanwhile") {
-  Fixture f;
+  LinesFixture f;
   f.node.start(0);
   f.run_to(1000);
   CHECK(f.report->state == SourceState::ok);
@@ -111,7 +111,7 @@ TEST_CASE("a device that says it is gone is restarted by the jobs, not read mean
 }
 
 TEST_CASE("a device that comes for one read and goes again is not tried more often for it") {
-  Fixture f;
+  LinesFixture f;
   f.node.start(0);
   bool there = false;
   f.lines->status = [&](int64_t) { return (there = !there) ? ReadStatus::ok : ReadStatus::disconnected; };
@@ -123,7 +123,7 @@ TEST_CASE("a device that comes for one read and goes again is not tried more oft
 TEST_CASE("silence, damage and the settings of the graph decide the state; damaged small data are not sent") {
   for (const auto& [status, state] :
        {std::pair{ReadStatus::no_data, SourceState::silent}, std::pair{ReadStatus::partial, SourceState::garbage}}) {
-    Fixture f;
+    LinesFixture f;
     f.node.set_health({100 * kMs, 200 * kMs, true});
     Setup setup{f.clock, ".", {}, 1, Rate{20, 1}};
     f.node.setup(setup);

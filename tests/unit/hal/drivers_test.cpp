@@ -6,18 +6,18 @@
 #include "hal/sim/simulation.hpp"
 #include "rt/time/rate.hpp"
 #include "tests/conformance/fake_writer.hpp"
+#include "tests/graph_folder.hpp"
 #include "tests/temporary_folder.hpp"
 #include "tests/unit/replay/carmen_file.hpp"
 
 using namespace takt;
 using namespace takt::hal;
+using test::graph_folder;
 
 namespace {
 
-const std::filesystem::path kGraph = std::filesystem::path(TAKT_SOURCE_DIR) / "graph";
-
 DeviceConfig config(const std::string& kind, const std::string& driver, nlohmann::json settings) {
-  return {"thing", kind, driver, std::move(settings), kGraph, 1};
+  return {"thing", kind, driver, std::move(settings), graph_folder(), 1};
 }
 std::string error(const DeviceConfig& c) {
   Devices devices;
@@ -69,7 +69,7 @@ TEST_CASE("a job of the camera node sends one pair with the stamp of its release
   auto made = make_device(config("stereo_camera", "sim", settings), devices, clock);
   REQUIRE(made.has_value());
   DeviceNode& node = **made;
-  Setup setup{clock, kGraph, {}, 1, Rate{15, 1}};
+  Setup setup{clock, graph_folder(), {}, 1, Rate{15, 1}};
   node.setup(setup);
   OutputPort& output = *node.outputs().at(0);
   CHECK(output.name() == "pair");
@@ -97,14 +97,14 @@ TEST_CASE("a job of the camera node sends one pair with the stamp of its release
 TEST_CASE("a replayed camera ends the run after its last frame") {
   VirtualClock clock;
   Devices devices;
-  const auto image = (kGraph / "worlds/lab.pgm").string();
+  const auto image = (graph_folder() / "worlds/lab.pgm").string();
   auto made =
       make_device(config("stereo_camera", "replay",
                          {{"left", image}, {"right", image}, {"focal", 100}, {"baseline", "0.1m"}, {"frames", 2}}),
                   devices, clock);
   REQUIRE_MESSAGE(made.has_value(), (made ? "" : made.error().text()));
   DeviceNode& node = **made;
-  Setup setup{clock, kGraph, {}, 1, Rate{15, 1}};
+  Setup setup{clock, graph_folder(), {}, 1, Rate{15, 1}};
   node.setup(setup);
   test::FakeWriter writer(*node.outputs().at(0));
   std::vector<bool> ended, sent;
@@ -132,7 +132,7 @@ TEST_CASE("laser and base nodes replay a CARMEN log and end with it") {
     auto made = make_device(config(kind, "replay", {{"log", log.path.string()}, {"start", "0s"}}), devices, clock);
     REQUIRE_MESSAGE(made.has_value(), (made ? "" : made.error().text()));
     DeviceNode& node = **made;
-    Setup setup{clock, kGraph, {}, 1, Rate{15, 1}};
+    Setup setup{clock, graph_folder(), {}, 1, Rate{15, 1}};
     node.setup(setup);
     node.start(0);
     test::FakeWriter writer(*node.outputs().at(0));
@@ -188,7 +188,7 @@ TEST_CASE("laser, head, base and line nodes send one message a job, and share on
     auto made = make_device(config(kind, "sim", kWorld), devices, clock);
     REQUIRE_MESSAGE(made.has_value(), (made ? "" : made.error().text()));
     DeviceNode& node = **made;
-    Setup setup{clock, kGraph, {}, 1, Rate{15, 1}};
+    Setup setup{clock, graph_folder(), {}, 1, Rate{15, 1}};
     node.setup(setup);
     CHECK(node.outputs().at(0)->name() == port);
     test::FakeWriter writer(*node.outputs()[0]);

@@ -6,19 +6,19 @@
 #include "hal/drivers.hpp"
 #include "hal/head/head_double.hpp"
 #include "tests/conformance/fake_writer.hpp"
+#include "tests/graph_folder.hpp"
 #include "tests/temporary_folder.hpp"
 
 using namespace takt;
 using namespace takt::hal;
+using test::graph_folder;
 
 namespace {
-
-const std::filesystem::path kGraph = std::filesystem::path(TAKT_SOURCE_DIR) / "graph";
 
 tl::expected<std::unique_ptr<DeviceNode>, DeviceError> made(const std::string& kind, const std::string& driver,
                                                             nlohmann::json settings, const Clock& clock) {
   Devices devices;
-  return make_device({"thing", kind, driver, std::move(settings), kGraph, 1}, devices, clock);
+  return make_device({"thing", kind, driver, std::move(settings), graph_folder(), 1}, devices, clock);
 }
 
 /// A node on a double: jobs of 20 ms until it has sent a message; then its stamp's age.
@@ -32,7 +32,7 @@ int64_t age_of_first(const std::string& kind, nlohmann::json settings) {
   settings["interface"] = interface;
   auto node = made(kind, "can", std::move(settings), clock);
   REQUIRE_MESSAGE(node.has_value(), (node ? "" : node.error().text()));
-  Setup setup{clock, kGraph, {}, 1, Rate{50, 1}};
+  Setup setup{clock, graph_folder(), {}, 1, Rate{50, 1}};
   (*node)->setup(setup);
   test::FakeWriter writer(*(*node)->outputs().at(0));
   (*node)->start(clock.now_ns());

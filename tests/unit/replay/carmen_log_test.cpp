@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "hal/replay/late_stamps.hpp"
+#include "tests/has.hpp"
 #include "tests/test_data.hpp"
 #include "tests/unit/replay/carmen_file.hpp"
 
@@ -40,7 +41,6 @@ std::string error(const std::string& text) {
   REQUIRE(at == 0);
   return what.substr(file.path.string().size());
 }
-bool has(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 constexpr double kDegree = std::numbers::pi / 180;
 

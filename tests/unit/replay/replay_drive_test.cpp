@@ -9,6 +9,7 @@
 #include "hal/replay/replay_base.hpp"
 #include "hal/replay/replay_laser.hpp"
 #include "tests/conformance/devices.hpp"
+#include "tests/has.hpp"
 #include "tests/test_data.hpp"
 #include "tests/unit/replay/carmen_file.hpp"
 
@@ -33,7 +34,6 @@ std::string drive(bool raw) {
   return text;
 }
 LogPace pace(double speed, double start_s) { return {speed, std::llround(start_s * 1e9)}; }
-bool has(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 std::string laser_error(const CarmenFile& file, LogPace pace = {}) {
   const auto opened = ReplayLaser("laser", {file.path, pace, {}, 0}).open();

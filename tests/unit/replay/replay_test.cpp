@@ -6,11 +6,13 @@
 
 #include "hal/replay/replay_camera.hpp"
 #include "tests/conformance/stereo_camera.hpp"
+#include "tests/has.hpp"
 #include "tests/temporary_folder.hpp"
 #include "tests/test_data.hpp"
 
 using namespace takt;
 using namespace takt::replay;
+using test::has;
 namespace fs = std::filesystem;
 
 namespace {
@@ -48,7 +50,6 @@ struct Recording : takt::test::TemporaryFolder {
     return opened ? "" : opened.error().text();
   }
 };
-bool has(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 }  // namespace
 

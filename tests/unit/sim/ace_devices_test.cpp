@@ -22,7 +22,7 @@ using namespace takt::sim;
 
 namespace {
 
-constexpr int64_t kEpoch = 3'000'000'000;
+constexpr int64_t kAceEpoch = 3'000'000'000;
 const std::filesystem::path kGraph = std::filesystem::path(TAKT_SOURCE_DIR) / "graph";
 
 StereoRig rig(const char* name) {
@@ -48,7 +48,7 @@ class ClockOfRun final : public Clock {
   void set(int64_t now_ns) { now_ns_.store(now_ns); }
 
  private:
-  std::atomic<int64_t> now_ns_ = kEpoch - 1'000'000'000;
+  std::atomic<int64_t> now_ns_ = kAceEpoch - 1'000'000'000;
 };
 
 /// The devices of ACE, opened and started.
@@ -76,7 +76,7 @@ struct Ace {
     for (Device* device : std::initializer_list<Device*>{head_camera.get(), ground_camera.get(), head.get(),
                                                          lines.get(), laser.get(), base.get()}) {
       REQUIRE(device->open().has_value());
-      REQUIRE(device->start(kEpoch).has_value());
+      REQUIRE(device->start(kAceEpoch).has_value());
     }
     range.resize(laser->format().beams);
   }
@@ -102,7 +102,7 @@ Pair expose(SimCamera& camera, int64_t at_ns) {
   return read(camera);
 }
 
-int64_t release(int64_t hz, int64_t k) { return Rate{hz, 1}.release_ns(kEpoch, k); }
+int64_t release(int64_t hz, int64_t k) { return Rate{hz, 1}.release_ns(kAceEpoch, k); }
 
 /// What one camera shows at the pixels where the other one sees the same points, by ground truth.
 struct CommonView {
@@ -144,7 +144,7 @@ int median(std::vector<int> values) {
 }  // namespace
 
 TEST_CASE("all devices run together at their rates, and share the instants of their common releases") {
-  VirtualClock clock(kEpoch);
+  VirtualClock clock(kAceEpoch);
   Ace ace(clock);
   std::set<int64_t> head_stamps, ground_stamps;
   for (int64_t k = 0; k < 15; ++k) {
@@ -164,7 +164,7 @@ TEST_CASE("all devices run together at their rates, and share the instants of th
 }
 
 TEST_CASE("at one instant both cameras see the same world: the same points at the same depth, looking alike") {
-  VirtualClock clock(kEpoch);
+  VirtualClock clock(kAceEpoch);
   Ace ace(clock);
   for (int64_t k = 0; k <= 60; ++k) {
     const int64_t at = release(15, k);
@@ -185,7 +185,7 @@ TEST_CASE("at one instant both cameras see the same world: the same points at th
 }
 
 TEST_CASE("pan and tilt of the head move the head camera only") {
-  VirtualClock clock(kEpoch);
+  VirtualClock clock(kAceEpoch);
   Ace still(clock), turning(clock);
   const StereoRig narrow = rig("xb3.yaml"), wide = rig("x2_wide.yaml");
   for (int64_t k = 0; k <= 18; ++k) {
@@ -214,15 +214,15 @@ TEST_CASE("pan and tilt of the head move the head camera only") {
 }
 
 TEST_CASE("the cost of each camera's rendering is told apart, and that of no other device is in it") {
-  VirtualClock clock(kEpoch);
+  VirtualClock clock(kAceEpoch);
   Ace ace(clock);
   const SimulatorCost before = simulator_cost();
-  ace.read_others(kEpoch);
+  ace.read_others(kAceEpoch);
   CHECK(simulator_cost().total_ns() == before.total_ns());
   for (int64_t k = 0; k < 3; ++k) expose(*ace.head_camera, release(15, k));
   CHECK(ace.head_camera->cost().in_read_ns > 0);
   CHECK(ace.ground_camera->cost().total_ns() == 0);
-  expose(*ace.ground_camera, kEpoch);
+  expose(*ace.ground_camera, kAceEpoch);
   const SimulatorCost head = ace.head_camera->cost(), ground = ace.ground_camera->cost();
   CHECK(ground.in_read_ns > 0);
   CHECK(head.ahead_ns + ground.ahead_ns == 0);
@@ -233,7 +233,7 @@ TEST_CASE("both cameras render ahead in threads of their own, while all else mov
   constexpr int64_t kReleases = 13;  // of 15 Hz: five of 5 Hz
   std::vector<Pair> expected_head, expected_ground;
   {
-    VirtualClock clock(kEpoch);
+    VirtualClock clock(kAceEpoch);
     Ace ace(clock);
     for (int64_t k = 0; k < kReleases; ++k) {
       ace.head->command(0.5, 0, release(15, k));
@@ -248,7 +248,7 @@ TEST_CASE("both cameras render ahead in threads of their own, while all else mov
   std::barrier release_begins(3), release_ends(3);
   // As the camera node does it: read the exposure asked for before, then ask for the next.
   const auto job = [&](SimCamera& camera, int64_t hz, std::vector<Pair>& pairs) {
-    camera.trigger(kEpoch);
+    camera.trigger(kAceEpoch);
     for (int64_t k = 0; k < kReleases; ++k) {
       release_begins.arrive_and_wait();
       if (const int64_t every = 15 / hz; k % every == 0) {

@@ -5,11 +5,12 @@
 #include <cstring>
 
 #include "hal/sim/simulation.hpp"
+#include "tests/nanoseconds.hpp"
 #include "tests/temporary_folder.hpp"
 
 namespace takt::test {
 
-constexpr int64_t kMs = 1'000'000, kSecond = 1'000'000'000;
+constexpr int64_t kEpoch = 5 * kSecond;
 
 /// A room of 7 m x 6 m in which the robots ace and bea both reach a cup, a bottle and a table; a door stands open, a
 /// crate is out of reach. `more` may bring events and objects.

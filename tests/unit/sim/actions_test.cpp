@@ -3,18 +3,17 @@
 #include <doctest/doctest.h>
 
 #include "hal/sim/sim_devices.hpp"
+#include "tests/has.hpp"
 #include "tests/unit/sim/acting_world.hpp"
 
 using namespace takt;
 using namespace takt::sim;
 using test::action_command;
+using test::has;
+using test::kEpoch;
 using test::kMs;
-using test::kSecond;
 
 namespace {
-
-constexpr int64_t kEpoch = 5 * kSecond;
-bool has(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 /// Both robots of the acting world, their jobs every 50 ms.
 struct Two {

@@ -9,14 +9,16 @@
 #include "hal/sim/sim_devices.hpp"
 #include "tests/conformance/devices.hpp"
 #include "tests/conformance/stereo_camera.hpp"
+#include "tests/nanoseconds.hpp"
 #include "tests/unit/sim/small_world.hpp"
 
 using namespace takt;
 using namespace takt::sim;
+using test::kSecond;
 
 namespace {
 
-constexpr int64_t kEpoch = 7'000'000'000, kSecond = 1'000'000'000;
+constexpr int64_t kFailureEpoch = 7 * kSecond;
 
 FailureSchedule schedule(const char* text) {
   auto windows = parse_failures(text);
@@ -28,10 +30,10 @@ FailureSchedule schedule(const char* text) {
 template <class Interface, class Read>
 std::vector<ReadStatus> each_second(Interface& device, Read&& read) {
   REQUIRE(device.open().has_value());
-  REQUIRE(device.start(kEpoch).has_value());
+  REQUIRE(device.start(kFailureEpoch).has_value());
   std::vector<ReadStatus> statuses;
   for (int64_t s = 0; s < 6; ++s) {
-    const int64_t at_ns = kEpoch + s * kSecond + kSecond / 2;
+    const int64_t at_ns = kFailureEpoch + s * kSecond + kSecond / 2;
     statuses.push_back(read(at_ns));
     if (statuses.back() == ReadStatus::disconnected) {
       CHECK_FALSE(device.restart(at_ns));
@@ -69,11 +71,11 @@ TEST_CASE("failures are written with their windows; mistakes are told with the f
 
 TEST_CASE("windows begin with the epoch and are half open") {
   FailureSchedule failures = schedule("silent 1s..2s");
-  failures.begin(kEpoch);
-  CHECK_FALSE(failures.at(kEpoch + kSecond - 1));
-  CHECK(failures.at(kEpoch + kSecond) == Misbehaviour::silent);
-  CHECK(failures.at(kEpoch + 2 * kSecond - 1) == Misbehaviour::silent);
-  CHECK_FALSE(failures.at(kEpoch + 2 * kSecond));
+  failures.begin(kFailureEpoch);
+  CHECK_FALSE(failures.at(kFailureEpoch + kSecond - 1));
+  CHECK(failures.at(kFailureEpoch + kSecond) == Misbehaviour::silent);
+  CHECK(failures.at(kFailureEpoch + 2 * kSecond - 1) == Misbehaviour::silent);
+  CHECK_FALSE(failures.at(kFailureEpoch + 2 * kSecond));
 }
 
 TEST_CASE("a laser, a head, a base and lines fail as they are told, and work before and after") {
@@ -97,10 +99,10 @@ TEST_CASE("a frozen laser gives one scan with new stamps; of a damaged one half 
   FailingLaser laser(std::make_unique<SimLaser>("laser", LaserModel{}, *world),
                      schedule("frozen 1s..2s, garbage 3s..4s"));
   REQUIRE(laser.open().has_value());
-  REQUIRE(laser.start(kEpoch).has_value());
+  REQUIRE(laser.start(kFailureEpoch).has_value());
   std::vector<float> first(laser.format().beams), second(first), fresh(first);
   const auto read = [&](std::vector<float>& ranges, int64_t after_ns) {
-    return laser.read(ranges, kEpoch + after_ns, INT64_MAX);
+    return laser.read(ranges, kFailureEpoch + after_ns, INT64_MAX);
   };
   const int64_t stamp = read(first, kSecond).stamp_ns;
   CHECK(read(second, kSecond + kSecond / 2).stamp_ns > stamp);
@@ -114,7 +116,7 @@ TEST_CASE("a frozen laser gives one scan with new stamps; of a damaged one half 
 
 TEST_CASE("a frozen camera gives one pair with new stamps; unplugged it needs a restart") {
   const auto world = test::small_simulation();
-  VirtualClock clock(kEpoch);
+  VirtualClock clock(kFailureEpoch);
   FailingCamera camera(
       std::make_unique<SimCamera>("camera", SimCameraSettings{test::small_rig(), {}, {15, 1}, false}, *world, clock),
       schedule(kAll), clock);
@@ -129,7 +131,7 @@ TEST_CASE("a frozen camera gives one pair with new stamps; unplugged it needs a 
   };
   CHECK(each_second(camera, read) == kExpected);
   frozen.clear();
-  read(kEpoch + 4 * kSecond + 1), read(kEpoch + 4 * kSecond + 2), read(kEpoch + 5 * kSecond);
+  read(kFailureEpoch + 4 * kSecond + 1), read(kFailureEpoch + 4 * kSecond + 2), read(kFailureEpoch + 5 * kSecond);
   CHECK(frozen[0] == frozen[1]);
   CHECK(frozen[1] != frozen[2]);
 }
@@ -138,12 +140,12 @@ TEST_CASE("an unplugged base takes no command") {
   const auto world = test::small_simulation();
   FailingBase base(std::make_unique<SimBase>("base", OdometryModel{}, *world), schedule("unplugged 1s..2s"));
   REQUIRE(base.open().has_value());
-  REQUIRE(base.start(kEpoch).has_value());
-  CHECK(base.command(0.2, 0, kEpoch));
-  CHECK_FALSE(base.command(0.2, 0, kEpoch + kSecond));
-  CHECK_FALSE(base.command(0.2, 0, kEpoch + 3 * kSecond));  // not yet restarted
-  CHECK(base.restart(kEpoch + 3 * kSecond));
-  CHECK(base.command(0.2, 0, kEpoch + 3 * kSecond));
+  REQUIRE(base.start(kFailureEpoch).has_value());
+  CHECK(base.command(0.2, 0, kFailureEpoch));
+  CHECK_FALSE(base.command(0.2, 0, kFailureEpoch + kSecond));
+  CHECK_FALSE(base.command(0.2, 0, kFailureEpoch + 3 * kSecond));  // not yet restarted
+  CHECK(base.restart(kFailureEpoch + 3 * kSecond));
+  CHECK(base.command(0.2, 0, kFailureEpoch + 3 * kSecond));
 }
 
 TEST_CASE("devices that do not fail conform, behind what would make them fail") {

@@ -8,11 +8,13 @@
 #include "hal/sim/failing_devices.hpp"
 #include "hal/sim/sim_objects.hpp"
 #include "tests/conformance/devices.hpp"
+#include "tests/has.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 #include "tests/unit/sim/acting_world.hpp"
 
 using namespace takt;
 using namespace takt::sim;
+using test::has;
 using test::kMs;
 using test::kSecond;
 
@@ -62,7 +64,6 @@ std::string error_of(PerceptionModel model) {
   const auto opened = SimObjectSensor("eye", std::move(model), s).open();
   return opened ? "" : opened.error().text();
 }
-bool has(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 }  // namespace
 

@@ -13,12 +13,11 @@
 using namespace takt;
 using namespace takt::sim;
 using test::exposure;
+using test::kEpoch;
 using test::kMs;
 using test::kSecond;
 
 namespace {
-
-constexpr int64_t kEpoch = 5 * kSecond;
 
 struct Laser {
   explicit Laser(Simulation& s) : laser("laser", {}, s), range(181) {

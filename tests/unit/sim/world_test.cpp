@@ -8,11 +8,13 @@
 
 #include "hal/sim/sensors.hpp"
 #include "nodes/semantic/network_file.hpp"
+#include "tests/has.hpp"
 #include "tests/temporary_folder.hpp"
 #include "tests/unit/sim/small_world.hpp"
 
 using namespace takt;
 using namespace takt::sim;
+using takt::test::has;
 using takt::test::TemporaryFolder;
 
 namespace {
@@ -25,7 +27,6 @@ std::string message(const std::string& xml) {
   const auto world = load_world("camera", folder.write("world.xml", xml));
   return world ? "" : world.error().what + " | " + world.error().fix;
 }
-bool has(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 }  // namespace
 
@@ -50,7 +51,8 @@ TEST_CASE("mistakes in a world are told with file, line and the way out") {
   CHECK(has(message("<map/>"), "not <world>"));
   CHECK(has(message("<world resolution=\"0.5\">" + kRows + "</world>"), "m, cm or mm"));
   CHECK(has(message("<world resolution=\"0.5m\">" + kRows + "</world>"), "no <client>"));
-  CHECK(has(message("<world resolution=\"0.5m\">" + kRows + "\n<robot/></world>"), "client, object, terrain, line, action"));
+  CHECK(has(message("<world resolution=\"0.5m\">" + kRows + "\n<robot/></world>"),
+            "client, object, terrain, line, action"));
   CHECK(has(message("<world resolution=\"0.5m\" wall=\"marble\">" + kRows + "</world>"), "plaster"));
   CHECK(has(message("<world resolution=\"0.5m\"><rows>###\n#.\n###</rows></world>"), "row 2"));
   CHECK(has(message("<world resolution=\"0.5m\" map=\"absent.pgm\"/>"), "absent.pgm"));
