@@ -7,10 +7,10 @@
 #include <cstdio>
 #include <fstream>
 #include <iostream>
-#include <nlohmann/json.hpp>
 #include <string>
 
 #include "bench/suite.hpp"
+#include "hal/settings/json.hpp"
 
 namespace {
 

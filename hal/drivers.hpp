@@ -4,12 +4,12 @@
 #include <filesystem>
 #include <map>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <span>
 #include <string>
 #include <string_view>
 
 #include "hal/device_node.hpp"
+#include "hal/settings/json.hpp"
 #include "rt/time/clock.hpp"
 
 namespace takt::sim {

@@ -5,10 +5,11 @@
 #include <sys/un.h>
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
+
+#include "hal/settings/json.hpp"
 
 namespace takt::attach {
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 
+#include "hal/settings/json.hpp"
 #include "rt/msg/field.hpp"
 
 namespace takt::attach {

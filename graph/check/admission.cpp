@@ -8,14 +8,13 @@
 #include "graph/check/piece_bounds.hpp"
 #include "rt/sched/lane.hpp"
 #include "rt/sched/watch_rules.hpp"
+#include "rt/time/units.hpp"
 
 namespace takt::graph {
 namespace {
 
 using analysis::Overheads;
 using analysis::Ticks;
-
-double ms(int64_t ns) { return static_cast<double>(ns) / 1e6; }
 
 /// What no schedule can do, task by task and together.
 std::vector<std::string> impossible(const Plan& plan) {
@@ -30,12 +29,12 @@ std::vector<std::string> impossible(const Plan& plan) {
       reasons.push_back(
           fmt::format("{}: its budget of {} ms is above its deadline of {} ms; give it a deadline from {} ms "
                       "on or a smaller budget",
-                      task.name, ms(task.budget_ns), ms(task.deadline_ns), ms(task.budget_ns)));
+                      task.name, to_ms(task.budget_ns), to_ms(task.deadline_ns), to_ms(task.budget_ns)));
     else if (share > 1 + kRounding)
       reasons.push_back(
           fmt::format("{}: its budget of {} ms at {:.4g} Hz is more than one core, and a job runs on one; at "
                       "most {:.4g} Hz would fit",
-                      task.name, ms(task.budget_ns), rate, 1e9 / static_cast<double>(task.budget_ns)));
+                      task.name, to_ms(task.budget_ns), rate, 1e9 / static_cast<double>(task.budget_ns)));
   }
   const size_t cores = std::max<size_t>(plan.cores.size(), 1);
   if (all > static_cast<double>(cores) + kRounding)
@@ -185,8 +184,8 @@ class Admitting {
       if (!node.response_ns && lane.size() == 1) continue;
       refuse(Answer::not_proven,
              fmt::format("{}: its deadline of {} ms is not proven within the lane of {}{}", plan_.tasks[t].name,
-                         ms(plan_.tasks[t].deadline_ns), plan_.tasks[lane.front()].name,
-                         node.response_ns ? fmt::format(" (bound {:.3f} ms)", ms(*node.response_ns)) : ""));
+                         to_ms(plan_.tasks[t].deadline_ns), plan_.tasks[lane.front()].name,
+                         node.response_ns ? fmt::format(" (bound {:.3f} ms)", to_ms(*node.response_ns)) : ""));
     }
   }
 
@@ -271,7 +270,7 @@ class Admitting {
     if (answer.answer == Answer::admitted) return;
     refuse(Answer::not_proven, fmt::format("with every node of low criticality{} running on to {:.1f} ms over its "
                                            "budget: {}",
-                                           more, ms(excess_ns()), answer.why));
+                                           more, to_ms(excess_ns()), answer.why));
   }
 
   /// The low ones may miss then; the high ones must not.

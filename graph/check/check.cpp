@@ -14,11 +14,10 @@
 #include "rt/sched/lane.hpp"
 #include "rt/sched/lane_tasks.hpp"
 #include "rt/sched/mode_log.hpp"
+#include "rt/time/units.hpp"
 
 namespace takt::graph {
 namespace {
-
-double ms(int64_t ns) { return static_cast<double>(ns) / 1e6; }
 
 void add_pools(const Plan& plan, CheckResult& result) {
   for (const PortPlan& port : plan.ports) {
@@ -77,10 +76,10 @@ void judge_ages(ModeCheck& mode, CheckResult& result) {
       mode.problems.push_back(
           fmt::format("{}: max_age is {} ms, but with these rates and offsets its data is up to {:.3f} "
                       "ms old even if every job took no time; raise it, or a rate",
-                      name, ms(age.max_age_ns), ms(age.least_ns)));
+                      name, to_ms(age.max_age_ns), to_ms(age.least_ns)));
     } else if (mode.admission.answer == Answer::admitted && !age.proven()) {
       mode.problems.push_back(age.bound_ns ? fmt::format("{}: max_age is {} ms, and the bound on its age is {:.3f} ms",
-                                                         name, ms(age.max_age_ns), ms(*age.bound_ns))
+                                                         name, to_ms(age.max_age_ns), to_ms(*age.bound_ns))
                                            : fmt::format("{}: no bound on its age: {}", name, age.why));
     }
   }
@@ -108,8 +107,8 @@ std::optional<Change> change_for_ages(const GraphSpec& graph, const Plan& plan, 
     const int64_t enough = (*age.bound_ns + kMicrosecond - 1) / kMicrosecond * kMicrosecond;
     later = Change{Change::What::max_age,
                    kNone,
-                   ms(age.max_age_ns),
-                   ms(enough),
+                   to_ms(age.max_age_ns),
+                   to_ms(enough),
                    static_cast<double>(enough - age.max_age_ns) / static_cast<double>(age.max_age_ns),
                    name_of(age)};
   }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What can be known of a composed graph before it starts.
 #pragma once
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -10,6 +9,7 @@
 #include "graph/check/check_machine.hpp"
 #include "graph/language/graph.hpp"
 #include "hal/drivers.hpp"
+#include "hal/settings/json.hpp"
 #include "rt/node.hpp"
 #include "rt/sched/plan.hpp"
 

@@ -4,9 +4,9 @@
 #include <fmt/format.h>
 
 #include <ctime>
-#include <nlohmann/json.hpp>
 
 #include "graph/check/machine_figures.hpp"
+#include "hal/settings/json.hpp"
 #include "rt/machine/check_support.hpp"
 #include "rt/machine/parse.hpp"
 

@@ -6,17 +6,16 @@
 #include <cmath>
 
 #include "graph/check/machine_figures.hpp"
+#include "rt/time/units.hpp"
 
 namespace takt::graph {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
-double ms(int64_t ns) { return static_cast<double>(ns) / 1e6; }
+std::string column(const std::optional<int64_t>& ns) { return ns ? fmt::format("{:.3f}", to_ms(*ns)) : "-"; }
 
-std::string column(const std::optional<int64_t>& ns) { return ns ? fmt::format("{:.3f}", ms(*ns)) : "-"; }
-
-Json number(const std::optional<int64_t>& ns) { return ns ? Json(ms(*ns)) : Json(nullptr); }
+Json number(const std::optional<int64_t>& ns) { return ns ? Json(to_ms(*ns)) : Json(nullptr); }
 
 std::optional<int64_t> margin_of(const ModeCheck& mode, size_t t) {
   return t < mode.margins_ns.size() ? std::optional(mode.margins_ns[t]) : std::nullopt;
@@ -43,13 +42,13 @@ std::string head_text(const GraphSpec& graph, const Plan& plan, const CheckOptio
     text += fmt::format("{}\n  a job {:.0f} us + {:.1f} us per input or output, enforcement {:.2f} ms",
                         options.machine.overheads_from, static_cast<double>(o.release_ns + 2 * o.switch_ns) / 1e3,
                         static_cast<double>(std::max(o.take_ns, o.publish_ns)) / 1e3,
-                        ms(plan.policy == Policy::fixed ? o.demotion_ns : o.throttled_late_ns()));
+                        to_ms(plan.policy == Policy::fixed ? o.demotion_ns : o.throttled_late_ns()));
     if (plan.policy == Policy::deadline)
       text += fmt::format("\n  SCHED_DEADLINE has {:.2f} cores; of a process that died within {:.0f} ms again",
-                          o.deadline_bandwidth, ms(result.bandwidth_within_ns));
+                          o.deadline_bandwidth, to_ms(result.bandwidth_within_ns));
     if (plan.policy == Policy::fixed && o.ordinary_runtime_ns > 0)
-      text += fmt::format("\n  ordinary threads get {:g} ms of each {:g} ms of a core", ms(o.ordinary_runtime_ns),
-                          ms(o.ordinary_period_ns));
+      text += fmt::format("\n  ordinary threads get {:g} ms of each {:g} ms of a core", to_ms(o.ordinary_runtime_ns),
+                          to_ms(o.ordinary_period_ns));
     text += "\n";
   }
   return text;
@@ -62,7 +61,7 @@ std::string nodes_table(const Plan& plan, const ModeCheck& mode) {
     const TaskPlan& task = plan.tasks[t];
     const double rate = effective_rate_hz(plan, t);
     text += fmt::format("{:<18} {:>6.3g} {:>10.3f} {:>11.3f} {:>11} {:>10} {:>6.3f}\n", task.name, rate,
-                        ms(task.budget_ns), ms(task.deadline_ns), column(mode.admission.nodes[t].response_ns),
+                        to_ms(task.budget_ns), to_ms(task.deadline_ns), column(mode.admission.nodes[t].response_ns),
                         column(margin_of(mode, t)), static_cast<double>(task.budget_ns) * 1e-9 * rate);
   }
   return text;
@@ -73,7 +72,7 @@ std::string ages_table(const ModeCheck& mode) {
   std::string text = fmt::format("{:<52} {:>12} {:>12}\n", "age of the newest data", "bound ms", "max_age ms");
   for (const AgeBound& age : mode.ages)
     text += fmt::format("{:<52} {:>12} {:>12.3f}\n", (age.edge ? "" : "chain ") + age.name, column(age.bound_ns),
-                        ms(age.max_age_ns));
+                        to_ms(age.max_age_ns));
   return text;
 }
 
@@ -83,7 +82,7 @@ std::string modes_text(const CheckResult& result) {
     const ModeCheck& mode = result.modes[m];
     text += fmt::format("mode {}: {} ({} nodes; {})\n  a change to it takes {:.0f} ms at most\n", mode.mode,
                         mode.problems.empty() ? "admitted" : "refused", mode.tasks.size(), mode.admission.by,
-                        std::ceil(ms(mode.change_within_ns)));
+                        std::ceil(to_ms(mode.change_within_ns)));
   }
   return text;
 }
@@ -104,8 +103,8 @@ Json ages_json(const ModeCheck& mode, bool edges) {
     Json row{{"name", age.name},
              {"bound_ms", number(age.bound_ns)},
              {"oldest_ms", number(age.oldest_ns)},
-             {"least_ms", ms(age.least_ns)},
-             {"max_age_ms", ms(age.max_age_ns)},
+             {"least_ms", to_ms(age.least_ns)},
+             {"max_age_ms", to_ms(age.max_age_ns)},
              {"within", age.proven()}};
     if (!age.why.empty()) row["why"] = age.why;
     list.push_back(std::move(row));
@@ -117,7 +116,7 @@ Json mode_json(const ModeCheck& mode) {
   Json row{{"name", mode.mode},
            {"answer", to_string(mode.admission.answer)},
            {"analysis", mode.admission.by},
-           {"change_within_ms", ms(mode.change_within_ns)},
+           {"change_within_ms", to_ms(mode.change_within_ns)},
            {"problems", mode.problems},
            {"notes", mode.admission.notes},
            {"nodes", Json::array()}};
@@ -154,7 +153,7 @@ Json check_json(const Plan& plan, const CheckOptions& options, const CheckResult
   json["cores"] = result.cores;
   json["overheads"] = {{"measured", options.machine.measured}};
   json["overheads"].update(overheads_json(options.machine.overheads));
-  if (result.bandwidth_within_ns > 0) json["bandwidth_within_ms"] = ms(result.bandwidth_within_ns);
+  if (result.bandwidth_within_ns > 0) json["bandwidth_within_ms"] = to_ms(result.bandwidth_within_ns);
   json["warnings"] = result.warnings;
   json["nodes"] = Json::array();
   for (size_t t = 0; t < plan.tasks.size(); ++t) {
@@ -162,8 +161,8 @@ Json check_json(const Plan& plan, const CheckOptions& options, const CheckResult
     const double rate = effective_rate_hz(plan, t);
     json["nodes"].push_back({{"name", task.name},
                              {"rate_hz", rate},
-                             {"budget_ms", ms(task.budget_ns)},
-                             {"deadline_ms", ms(task.deadline_ns)},
+                             {"budget_ms", to_ms(task.budget_ns)},
+                             {"deadline_ms", to_ms(task.deadline_ns)},
                              {"response_ms", number(whole.admission.nodes[t].response_ns)},
                              {"margin_ms", number(margin_of(whole, t))},
                              {"utilisation", static_cast<double>(task.budget_ns) * 1e-9 * rate}});

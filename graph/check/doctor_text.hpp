@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
+#include "hal/settings/json.hpp"
 #include "rt/machine/finding.hpp"
 #include "rt/machine/identity.hpp"
 #include "rt/sched/plan.hpp"

@@ -2,10 +2,10 @@
 // The file that `takt doctor --measure` leaves for `takt check`: what is read of it, and the only place that knows its
 // keys. Pure; any thread.
 #pragma once
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 
+#include "hal/settings/json.hpp"
 #include "rt/machine/identity.hpp"
 #include "rt/sched/analysis/overheads.hpp"
 

@@ -2,9 +2,9 @@
 // What `takt doctor --measure` leaves for `takt check`: the figures of this machine, as a file of the user.
 #pragma once
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <string>
 
+#include "hal/settings/json.hpp"
 #include "rt/machine/identity.hpp"
 #include "rt/machine/measure.hpp"
 

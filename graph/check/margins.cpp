@@ -7,14 +7,14 @@
 #include <cmath>
 #include <functional>
 
+#include "rt/time/units.hpp"
+
 namespace takt::graph {
 namespace {
 
 using analysis::Overheads;
 
 constexpr int64_t kMicrosecond = 1'000;
-
-double ms(int64_t ns) { return static_cast<double>(ns) / 1e6; }
 
 bool admitted(const Plan& plan, const Overheads& overheads) {
   return admit(plan, overheads, false).answer == Answer::admitted;
@@ -127,7 +127,7 @@ class Smallest {
     if (budget <= kMicrosecond) return;
     const Asking admits(plan_, accepts_, [t](Plan& p, int64_t ns) { p.tasks[t].budget_ns = ns; });
     if (const auto found = nearest(admits, budget, kMicrosecond, kMicrosecond))
-      offer(Change::What::budget, t, ms(budget), ms(*found));
+      offer(Change::What::budget, t, to_ms(budget), to_ms(*found));
   }
 
   void try_deadline(size_t t) {
@@ -146,7 +146,7 @@ class Smallest {
     const int64_t deadline = plan_.tasks[t].deadline_ns;
     const Asking admits(plan_, accepts_, [t](Plan& p, int64_t ns) { p.tasks[t].deadline_ns = ns; });
     if (const auto found = nearest(admits, deadline, far, kMicrosecond))
-      offer(Change::What::deadline, t, ms(deadline), ms(*found));
+      offer(Change::What::deadline, t, to_ms(deadline), to_ms(*found));
   }
 
   void try_offset(size_t t) {
@@ -162,7 +162,7 @@ class Smallest {
         const int64_t least = edge(admits, to, to < offset ? to + step : to - step, offset, kMicrosecond);
         if (const double relative = static_cast<double>(std::abs(least - offset)) / static_cast<double>(period);
             !best_ || relative < best_->relative)
-          best_ = Change{Change::What::offset, t, ms(offset), ms(least), relative, {}};
+          best_ = Change{Change::What::offset, t, to_ms(offset), to_ms(least), relative, {}};
         return;
       }
     }

@@ -5,13 +5,13 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <optional>
 #include <stdexcept>
 
 #include "graph/cli/outcome.hpp"
 #include "hal/replay/stereo_files.hpp"
+#include "hal/settings/json.hpp"
 #include "nodes/calibration/calibrate.hpp"
 #include "nodes/calibration/epipolar.hpp"
 #include "nodes/calibration/image_pairs.hpp"

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cstdio>
 #include <fstream>
-#include <nlohmann/json.hpp>
 #include <numbers>
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
@@ -12,6 +11,7 @@
 #include "graph/cli/outcome.hpp"
 #include "graph/command/calibrate_command.hpp"
 #include "graph/run/run.hpp"
+#include "hal/settings/json.hpp"
 #include "nodes/calibration/generated_sweeps.hpp"
 #include "nodes/calibration/picture.hpp"
 

@@ -5,10 +5,10 @@
 
 #include <charconv>
 #include <cstdio>
-#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "graph/cli/outcome.hpp"
+#include "hal/settings/json.hpp"
 #include "nodes/cloud/cloud_file.hpp"
 #include "rt/time/clock.hpp"
 

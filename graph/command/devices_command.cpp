@@ -4,10 +4,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 
 #include "graph/run/run.hpp"
 #include "hal/discovery/discovery.hpp"
+#include "hal/settings/json.hpp"
 
 namespace takt::command {
 

@@ -40,7 +40,7 @@ int64_t NodeProfile::quantile_ns(double quantile) const {
 }
 
 bool NodeProfile::enough_for(double quantile) const {
-  const auto enough = [&](const Histogram& h) {
+  const auto enough = [&](const takt::Histogram& h) {
     return h.count() == 0 || static_cast<double>(h.count()) * (1 - quantile) >= 1;
   };
   return enough(alone) && enough(together);

@@ -15,8 +15,8 @@ namespace takt::command {
 /// Execution times of one node: CPU time of its thread per job, wake-up and latching included.
 struct NodeProfile {
   std::string name;
-  Histogram alone, together;
-  int64_t budget_ns = 0;  ///< of the schedule; 0: not stated
+  takt::Histogram alone, together;  // beside object_detection::Histogram
+  int64_t budget_ns = 0;            ///< of the schedule; 0: not stated
   uint64_t samples() const { return alone.count() + together.count(); }
   /// The larger of both quantiles; 0 without samples.
   int64_t quantile_ns(double quantile) const;

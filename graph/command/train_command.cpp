@@ -27,7 +27,7 @@ constexpr int kHeldOutPositives = 1000, kHeldOutImages = 40;
 /// Scenes for all classes, each with the signs in it; fuller than those that `takt eval signs` makes, and with things
 /// that are like signs.
 std::vector<SignScene> scenes(uint64_t seed, uint64_t first, int count) {
-  SceneParameters p;
+  traffic_signs::SceneParameters p;
   p.shapes_min = 20, p.shapes_max = 90;
   p.most_decoys = 8;
   std::vector<SignScene> scenes;

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cstdio>
 #include <limits>
-#include <nlohmann/json.hpp>
 #include <numbers>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
@@ -10,6 +9,7 @@
 
 #include "graph/cli/outcome.hpp"
 #include "graph/evaluate/evaluations.hpp"
+#include "hal/settings/json.hpp"
 #include "nodes/body_pose/evaluate.hpp"
 #include "nodes/body_pose/floor.hpp"
 #include "nodes/body_pose/picture.hpp"
@@ -171,38 +171,13 @@ void print(const Json& out) {
                   value.is_number_float() ? std::to_string(value.get<double>()).c_str() : value.dump().c_str());
 }
 
+}  // namespace
+
 int evaluate(const EvalBodyPoseOptions& options) {
   const Json out = options.depth.empty() ? measure_generated(options) : measure_depth(options);
   if (options.json) std::printf("%s\n", out.dump(2).c_str());
   else print(out);
   return kOk;
-}
-
-}  // namespace
-
-void add_eval_body_pose(CLI::App& eval, EvalBodyPoseOptions& o, int& exit_code) {
-  CLI::App* app = eval.add_subcommand("body_pose", "people found, where they point: generated, or in a depth image");
-  app->alias("body");
-  app->add_option("--depth", o.depth, "depth image of a Kinect (16 bit, mm); without it people are generated");
-  app->add_option("--rgb", o.colour, "colour image of the same size, for the picture");
-  app->add_option("--skeleton", o.skeleton, "skeleton file (default graph/skeletons/human.txt)");
-  app->add_option("--seed", o.seed, "seed of the generated scenes (default 1)");
-  app->add_option("--people", o.people, "number of scenes (default 150)")->check(CLI::Range(1, 100000));
-  app->add_option("--noise", o.noise_px, "standard deviation of disparities, px (default 0.1)")
-      ->check(CLI::Range(0.0, 5.0));
-  app->add_option("--step", o.step_px, "of disparities, px: 1 as of stereo without subpixel (default 1/64)")
-      ->check(CLI::Range(0.001, 4.0));
-  app->add_option_function<double>(
-         "--tilt", [&o](double degrees) { o.tilt_rad = degrees * std::numbers::pi / 180; },
-         "of the camera, degrees: below 0 it looks down (default -5.7)")
-      ->check(CLI::Range(-45.0, 45.0));
-  app->add_option("--budget", o.budget_ms, "ms of CPU time for each scene, as the node has it (default: no limit)")
-      ->check(CLI::Range(6.0, 10000.0));
-  app->add_option("--search", o.search_m, "a link ends at most so far from where a pose has it, m (default 0.30)")
-      ->check(CLI::Range(0.05, 2.0));
-  app->add_option("--picture", o.picture, "PNG with the skeletons over image and cloud (of the first scene)");
-  app->add_flag("--json", o.json, "one JSON object on stdout");
-  call(*app, exit_code, [&o] { return evaluate(o); });
 }
 
 }  // namespace takt::command

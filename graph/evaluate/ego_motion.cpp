@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 
 #include "graph/cli/outcome.hpp"
@@ -12,6 +11,7 @@
 #include "graph/evaluate/ego_motion_score.hpp"
 #include "graph/evaluate/ego_motion_sweep.hpp"
 #include "graph/evaluate/evaluations.hpp"
+#include "hal/settings/json.hpp"
 #include "nodes/ego_motion/evaluate.hpp"
 
 namespace takt::command {
@@ -93,6 +93,8 @@ void print_generated(const Json& out) {
       1000 * kWrong_m, 100 * kWrongShare, kWrong_deg);
 }
 
+}  // namespace
+
 int evaluate(const EvalEgoMotionOptions& options) {
   if (options.generated != options.data.empty())
     throw BadData("takt eval ego_motion wants either --data DIR or --generated");
@@ -109,23 +111,6 @@ int evaluate(const EvalEgoMotionOptions& options) {
   else if (options.generated) print_generated(out);
   else print_recorded(out);
   return kOk;
-}
-
-}  // namespace
-
-void add_eval_ego_motion(CLI::App& eval, EvalEgoMotionOptions& o, int& exit_code) {
-  CLI::App* app = eval.add_subcommand("ego_motion", "errors of stereo ego-motion against true poses");
-  app->add_option("--data", o.data, "folder with image_l/, image_r/, calib.txt, poses.txt");
-  app->add_flag("--generated", o.generated, "drives through a room that is rendered, in several conditions");
-  app->add_option("--scale", o.scale, "size of the recorded images (default 1)")->check(CLI::Range(0.1, 1.0));
-  app->add_option("--disparities", o.disparities, "search range at scale 1, px (default 128)")
-      ->check(CLI::Range(16, 512));
-  app->add_option("--seed", o.seed, "seed of the generated drives (default 1)");
-  app->add_option("--frames", o.frames, "of each generated drive (default 60)")->check(CLI::Range(3, 100000));
-  app->add_option("--sweep", o.sweep, "parameter to try values of")->check(CLI::IsMember(sweep_names()));
-  app->add_option("--picture", o.picture, "PNG: matched corners of the middle frame, or the curves of a sweep");
-  app->add_flag("--json", o.json, "one JSON object on stdout");
-  call(*app, exit_code, [&o] { return evaluate(o); });
 }
 
 }  // namespace takt::command

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include <nlohmann/json.hpp>
 #include <string>
 
 #include "graph/evaluate/ego_motion_drive.hpp"
+#include "hal/settings/json.hpp"
 
 namespace takt::command {
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // What one parameter does to the errors of a drive.
 #pragma once
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
 #include "graph/evaluate/evaluations.hpp"
+#include "hal/settings/json.hpp"
 
 namespace takt::command {
 

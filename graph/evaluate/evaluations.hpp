@@ -1,32 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// `takt eval TASK`: quality against ground truth. stdout carries the table, or with --json one object and nothing else.
+// `takt eval TASK`: quality against ground truth. evaluate() prints a table to stdout, or with `json` one object and
+// nothing else, and returns the exit code of the command; it throws where files or options are at fault.
 #pragma once
-#include <CLI/CLI.hpp>
-#include <exception>
 #include <filesystem>
 #include <span>
 #include <string>
 #include <vector>
-
-#include "graph/cli/outcome.hpp"
 
 namespace takt::object_detection {
 struct DatabaseObject;
 }
 
 namespace takt::command {
-
-/// Has a task evaluate when it is asked for. What it throws is told: files or options are at fault.
-template <class Function>
-void call(CLI::App& task, int& exit_code, Function evaluate) {
-  task.callback([&exit_code, evaluate] {
-    try {
-      exit_code = evaluate();
-    } catch (const std::exception& error) {
-      exit_code = refuse(error.what(), kBadInput);
-    }
-  });
-}
 
 struct EvalStereoOptions {
   std::filesystem::path left, right, truth;
@@ -41,7 +26,7 @@ struct EvalStereoOptions {
 };
 /// Error and time on generated pairs against the sensor's noise, or the edge of the window.
 int sweep_stereo(const EvalStereoOptions& options);
-void add_eval_stereo(CLI::App& eval, EvalStereoOptions& options, int& exit_code);
+int evaluate(const EvalStereoOptions& options);
 
 struct EvalEgoMotionOptions {
   std::filesystem::path data;  ///< image_l/, image_r/, calib.txt, poses.txt; empty: drives are generated
@@ -54,7 +39,7 @@ struct EvalEgoMotionOptions {
   std::string picture;
   bool json = false;
 };
-void add_eval_ego_motion(CLI::App& eval, EvalEgoMotionOptions& options, int& exit_code);
+int evaluate(const EvalEgoMotionOptions& options);
 
 struct EvalObjectsOptions {
   std::filesystem::path database;                ///< empty: graph/objects of the project
@@ -76,7 +61,8 @@ struct EvalObjectsOptions {
 };
 /// Time, share excluded and contrast of each stage against bins, thresholds and references (thesis Fig. 3.20).
 void study_objects(const EvalObjectsOptions& options, std::span<const object_detection::DatabaseObject> database);
-void add_eval_objects(CLI::App& eval, EvalObjectsOptions& options, int& exit_code);
+int evaluate(const EvalObjectsOptions& options);
+
 struct EvalObjects3dOptions {
   std::filesystem::path data;   ///< recorded scenes; empty: none
   std::filesystem::path write;  ///< training data; empty: not written
@@ -85,7 +71,8 @@ struct EvalObjects3dOptions {
   double sigma_px = 0.2;
   bool json = false;
 };
-void add_eval_objects3d(CLI::App& eval, EvalObjects3dOptions& options, int& exit_code);
+int evaluate(const EvalObjects3dOptions& options);
+
 struct EvalSiftOptions {
   std::filesystem::path data;      ///< pictures by class; empty: scenes are generated
   std::filesystem::path database;  ///< empty: graph/objects of the project
@@ -93,7 +80,8 @@ struct EvalSiftOptions {
   int frames = 30;
   bool json = false;
 };
-void add_eval_sift(CLI::App& eval, EvalSiftOptions& options, int& exit_code);
+int evaluate(const EvalSiftOptions& options);
+
 struct EvalBodyPoseOptions {
   std::filesystem::path depth, colour;  ///< of a Kinect; empty: people are generated
   std::filesystem::path skeleton;       ///< empty: the shipped human
@@ -106,14 +94,16 @@ struct EvalBodyPoseOptions {
   std::string picture;
   bool json = false;
 };
-void add_eval_body_pose(CLI::App& eval, EvalBodyPoseOptions& options, int& exit_code);
+int evaluate(const EvalBodyPoseOptions& options);
+
 struct EvalPersonTrackingOptions {
   uint64_t seed = 1;
   int walks = 6, frames = 75;  ///< of each walk
   std::string picture;
   bool json = false;
 };
-void add_eval_person_tracking(CLI::App& eval, EvalPersonTrackingOptions& options, int& exit_code);
+int evaluate(const EvalPersonTrackingOptions& options);
+
 struct EvalRegistrationOptions {
   std::filesystem::path source, target, reference;  ///< all three, or a scene, or a sweep
   std::filesystem::path scene;                      ///< folder of KITTI's raw data
@@ -127,7 +117,8 @@ struct EvalRegistrationOptions {
   std::string picture;
   bool json = false;
 };
-void add_eval_registration(CLI::App& eval, EvalRegistrationOptions& options, int& exit_code);
+int evaluate(const EvalRegistrationOptions& options);
+
 struct EvalGroundOptions {
   std::filesystem::path images, labels;  ///< all three, or none: a pavement is generated
   std::vector<int> drivable;             ///< class ids
@@ -140,7 +131,7 @@ struct EvalGroundOptions {
   std::string picture;
   bool json = false;
 };
-void add_eval_ground(CLI::App& eval, EvalGroundOptions& options, int& exit_code);
+int evaluate(const EvalGroundOptions& options);
 
 struct EvalTerrainOptions {
   std::filesystem::path maps;  ///< empty: graph/terrain.txt of the project
@@ -149,7 +140,7 @@ struct EvalTerrainOptions {
   std::string picture;
   bool json = false;
 };
-void add_eval_terrain(CLI::App& eval, EvalTerrainOptions& options, int& exit_code);
+int evaluate(const EvalTerrainOptions& options);
 
 struct EvalSignsOptions {
   std::filesystem::path signs;          ///< empty: graph/signs of the project
@@ -161,7 +152,8 @@ struct EvalSignsOptions {
   int confirm = 2;  ///< images in a row until a track counts
   bool json = false;
 };
-void add_eval_signs(CLI::App& eval, EvalSignsOptions& options, int& exit_code);
+int evaluate(const EvalSignsOptions& options);
+
 struct EvalScanMatchingOptions {
   std::filesystem::path log;  ///< CARMEN log with corrected poses; empty: a drive is generated
   bool without_odometry = false;
@@ -169,12 +161,14 @@ struct EvalScanMatchingOptions {
   std::string picture;
   bool json = false;
 };
-void add_eval_scan_matching(CLI::App& eval, EvalScanMatchingOptions& options, int& exit_code);
+int evaluate(const EvalScanMatchingOptions& options);
+
 struct EvalLms200Options {
   std::filesystem::path rx, index, distances;  ///< distances empty: not compared
   bool json = false;
 };
-void add_eval_lms200(CLI::App& eval, EvalLms200Options& options, int& exit_code);
+int evaluate(const EvalLms200Options& options);
+
 struct EvalSemanticOptions {
   size_t rooms = 10, objects = 30, looks = 300;
   double noise_m = 0.3, merge_min = 0.75, distance_max_m = 2;
@@ -186,14 +180,16 @@ struct EvalSemanticOptions {
   bool recursive = false;
   bool json = false;
 };
-void add_eval_semantic(CLI::App& eval, EvalSemanticOptions& options, int& exit_code);
+int evaluate(const EvalSemanticOptions& options);
+
 struct EvalObstacleStopOptions {
   int trials = 1000;  ///< of each kind of vision
   uint64_t seed = 1;
   std::string vision = "all";  ///< absent, overloaded, hanging
   bool json = false;
 };
-void add_eval_obstacle_stop(CLI::App& eval, EvalObstacleStopOptions& options, int& exit_code);
+int evaluate(const EvalObstacleStopOptions& options);
+
 struct EvalMappingOptions {
   std::filesystem::path data;  ///< depth/1.png .., pose.txt; empty: generated rooms alone
   double minutes = 30;         ///< of the long drive; 0: none
@@ -204,9 +200,9 @@ struct EvalMappingOptions {
   std::string picture;
   bool json = false;
 };
-void add_eval_mapping(CLI::App& eval, EvalMappingOptions& options, int& exit_code);
+int evaluate(const EvalMappingOptions& options);
 
-/// The options of every `takt eval TASK`; they must live until the command line has been parsed.
+/// The options of every `takt eval TASK`.
 struct Evaluations {
   EvalStereoOptions stereo;
   EvalEgoMotionOptions ego_motion;
@@ -225,7 +221,5 @@ struct Evaluations {
   EvalObstacleStopOptions obstacle_stop;
   EvalMappingOptions mapping;
 };
-/// Adds `eval` with all its tasks.
-void add_evaluations(CLI::App& app, Evaluations& options, int& exit_code);
 
 }  // namespace takt::command

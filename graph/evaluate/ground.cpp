@@ -5,13 +5,13 @@
 #include <algorithm>
 #include <cstdio>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <optional>
 
 #include "graph/cli/outcome.hpp"
 #include "graph/evaluate/ground_score.hpp"
+#include "hal/settings/json.hpp"
 #include "rt/time/clock.hpp"
 
 namespace takt::command {
@@ -264,6 +264,8 @@ void print(const Json& out) {
                 at["half_pixel_m"].get<double>(), at["thesis_error_m"].get<double>());
 }
 
+}  // namespace
+
 int evaluate(const EvalGroundOptions& options) {
   if (options.images.empty() != options.labels.empty() || options.images.empty() != options.drivable.empty())
     throw std::runtime_error("--images, --labels and --drivable belong together; without them a pavement is generated");
@@ -277,27 +279,6 @@ int evaluate(const EvalGroundOptions& options) {
   if (options.json) std::printf("%s\n", out.dump(2).c_str());
   else print(out);
   return kOk;
-}
-
-}  // namespace
-
-void add_eval_ground(CLI::App& eval, EvalGroundOptions& o, int& exit_code) {
-  CLI::App* app = eval.add_subcommand("ground", "ground mask against labels, or on a pavement that is generated");
-  app->add_option("--images", o.images, "folder with colour images");
-  app->add_option("--labels", o.labels, "folder with a PNG of class ids for each image, of the same name");
-  app->add_option("--drivable", o.drivable, "class ids that are ground, e.g. 3,4")
-      ->delimiter(',')
-      ->check(CLI::Range(0, 255));
-  app->add_option("--ignore", o.ignore, "class ids that are not counted")->delimiter(',')->check(CLI::Range(0, 255));
-  app->add_option("--learn", o.learn,
-                  "images that teach instead, e.g. 'first*' (default: each its own, and beside it the other drives)");
-  app->add_option("--set", o.set, "parameter=value of the ground_map node, repeatable");
-  app->add_option("--seed", o.seed, "seed of the generated pavement (default 1)");
-  app->add_option("--frames", o.frames, "images along the generated drive (default 60)")->check(CLI::Range(1, 100000));
-  app->add_flag("--variants", o.variants, "the generated pavement in other light and of other stone, too");
-  app->add_option("--picture", o.picture, "PNG of the last generated image with its mask, and the grid");
-  app->add_flag("--json", o.json, "one JSON object on stdout");
-  call(*app, exit_code, [&o] { return evaluate(o); });
 }
 
 }  // namespace takt::command

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the parts of `takt eval ground` share.
 #pragma once
-#include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "graph/evaluate/evaluations.hpp"
+#include "hal/settings/json.hpp"
 #include "nodes/ground_map/evaluate.hpp"
 #include "nodes/ground_map/ground_detector.hpp"
 

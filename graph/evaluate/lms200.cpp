@@ -6,13 +6,13 @@
 #include <fstream>
 #include <iterator>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "graph/cli/outcome.hpp"
 #include "graph/evaluate/evaluations.hpp"
 #include "hal/laser/lms200/commands.hpp"
 #include "hal/laser/lms200/scan.hpp"
+#include "hal/settings/json.hpp"
 
 namespace takt::command {
 namespace {
@@ -140,6 +140,8 @@ void compare(const std::filesystem::path& file, const Outcome& out, Json& json) 
   json["largest_difference_mm"] = 1e3 * largest_m;
 }
 
+}  // namespace
+
 int evaluate(const EvalLms200Options& options) {
   std::ifstream stream = open_file(options.rx);
   const std::vector<uint8_t> bytes{std::istreambuf_iterator<char>(stream), {}};
@@ -160,17 +162,6 @@ int evaluate(const EvalLms200Options& options) {
   else
     for (const auto& [name, value] : json.items()) std::printf("%-22s %s\n", name.c_str(), value.dump().c_str());
   return kOk;
-}
-
-}  // namespace
-
-void add_eval_lms200(CLI::App& eval, EvalLms200Options& o, int& exit_code) {
-  CLI::App* app = eval.add_subcommand("lms200", "captured bytes of a SICK LMS 200 against the index of the capture");
-  app->add_option("--rx", o.rx, "bytes that the scanner sent")->required();
-  app->add_option("--index", o.index, "CSV: time,direction,offset,length,command,ok|BAD")->required();
-  app->add_option("--distances", o.distances, "CSV: time, then metres, a line for each scan");
-  app->add_flag("--json", o.json, "one JSON object on stdout");
-  call(*app, exit_code, [&o] { return evaluate(o); });
 }
 
 }  // namespace takt::command

@@ -2,12 +2,12 @@
 #include <fmt/format.h>
 
 #include <cstdio>
-#include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
 
 #include "graph/cli/outcome.hpp"
 #include "graph/evaluate/evaluations.hpp"
+#include "hal/settings/json.hpp"
 #include "nodes/cloud/cloud_file.hpp"
 #include "nodes/mapping_3d/evaluate.hpp"
 #include "nodes/mapping_3d/grid_file.hpp"
@@ -160,6 +160,8 @@ void write(const EvalMappingOptions& o, const RedundancyFigures& room) {
         fmt::format("--picture {}: cannot be written; it wants a name that ends in .png", o.picture));
 }
 
+}  // namespace
+
 int evaluate(const EvalMappingOptions& o) {
   Results results(o.json);
   FusionRuns runs;
@@ -181,24 +183,6 @@ int evaluate(const EvalMappingOptions& o) {
   if (o.minutes > 0) results.drive(evaluate_drive(p, o.minutes, o.seed));
   results.finish();
   return kOk;
-}
-
-}  // namespace
-
-void add_eval_mapping(CLI::App& eval, EvalMappingOptions& o, int& exit_code) {
-  CLI::App* app = eval.add_subcommand("mapping", "fused clouds, maps and obstacle grids against generated worlds");
-  app->add_option("--data", o.data, "folder with recorded depth images (depth/1.png ..) and their poses (pose.txt)");
-  app->add_option("--minutes", o.minutes, "of the long drive (default 30; 0: none)")->check(CLI::Range(0.0, 600.0));
-  app->add_option("--runs", o.runs, "generated windows and scenes of a kind (default 20)")
-      ->check(CLI::Range(1, 10'000));
-  app->add_option("--clouds", o.clouds, "of the walk around a room (default 80)")->check(CLI::Range(3, 100'000));
-  app->add_option("--views", o.views, "that are fused (default 5)")->check(CLI::Range(1, 16));
-  app->add_option("--seed", o.seed, "of everything generated (default 1)");
-  app->add_option("--out", o.out, "PLY or PCD file of the room's map");
-  app->add_option("--grid", o.grid, "YAML file of the room's occupancy grid, its PNG beside it");
-  app->add_option("--picture", o.picture, "PNG of the room's map, from above and from the side");
-  app->add_flag("--json", o.json, "one JSON object on stdout");
-  call(*app, exit_code, [&o] { return evaluate(o); });
 }
 
 }  // namespace takt::command

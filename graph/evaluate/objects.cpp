@@ -2,12 +2,12 @@
 #include <algorithm>
 #include <cstdio>
 #include <limits>
-#include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
 #include "graph/cli/outcome.hpp"
 #include "graph/evaluate/evaluations.hpp"
+#include "hal/settings/json.hpp"
 #include "nodes/object_detection/evaluate.hpp"
 #include "nodes/object_detection/photographs.hpp"
 #include "nodes/object_detection/tally.hpp"
@@ -318,6 +318,8 @@ void print_cascade(const Json& all) {
   }
 }
 
+}  // namespace
+
 int evaluate(const EvalObjectsOptions& options) {
   cv::setNumThreads(1);
   auto database =
@@ -342,46 +344,6 @@ int evaluate(const EvalObjectsOptions& options) {
     print_cascade(out);
   }
   return kOk;
-}
-
-}  // namespace
-
-void add_eval_objects(CLI::App& eval, EvalObjectsOptions& o, int& exit_code) {
-  CLI::App* app = eval.add_subcommand(
-      "objects",
-      "histogram cascade on scenes with known objects: windows excluded, detections, misses, false positives");
-  auto* database = app->add_option("--database", o.database, "folder with objects.txt (default graph/objects)");
-  app->add_option("--views", o.views,
-                  "instead: folder with photographs objNUMBER__ANGLE.png; every 60 degrees one is learnt (COIL-100)")
-      ->excludes(database);
-  app->add_option("--scenes", o.scenes,
-                  "folder with photographs to put objects in, 640 x 480 PNG; every other one is learnt from instead "
-                  "(default: generated)");
-  app->add_option("--negatives", o.negatives,
-                  "photographs without the objects, from which the stage layout learns instead of those of --scenes");
-  app->add_option("--bins", o.bins, "64x64x1 (default) | 64x32x2")->check(CLI::IsMember({"64x32x2", "64x64x1"}));
-  app->add_option("--scales", o.scales, "of the image, for the cascade (default 1), such as 1+0.7+0.5");
-  app->add_flag("--automatic", o.automatic, "all thresholds as if the database gave none");
-  app->add_option("--size", o.size,
-                  "least and most of the objects, of the cascade's, in their views' (default 0.8 1.3)")
-      ->expected(2)
-      ->check(CLI::Range(0.3, 4.0));
-  app->add_option("--seed", o.seed, "seed of the scenes (default 1)");
-  app->add_option("--frames", o.frames, "scenes for the exclusion by colour (default 100)")
-      ->check(CLI::Range(1, 100000));
-  app->add_option("--images", o.images, "scenes with one object for the cascade (default 500)")
-      ->check(CLI::Range(1, 100000));
-  app->add_option("--empty", o.empty, "scenes without (default 75)")->check(CLI::Range(0, 100000));
-  app->add_option("--occlusion", o.occlusion, "largest share of an object that an occluder hides (default 0.6)")
-      ->check(CLI::Range(0.0, 0.9));
-  app->add_option("--budget", o.budget_ms, "ms of CPU time for each image of the cascade (default: no limit)")
-      ->check(CLI::PositiveNumber);
-  app->add_flag("--json", o.json, "one JSON object on stdout");
-  auto* study = app->add_flag("--study", o.study,
-                              "instead: each stage by itself against bins, thresholds, references, on --frames scenes");
-  app->add_option("--picture", o.picture, "PNG of time, share excluded and contrast over the rows of bins")
-      ->needs(study);
-  call(*app, exit_code, [&o] { return evaluate(o); });
 }
 
 }  // namespace takt::command

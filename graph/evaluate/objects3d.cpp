@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cstdio>
 #include <fstream>
-#include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 
 #include "graph/cli/outcome.hpp"
 #include "graph/evaluate/evaluations.hpp"
+#include "hal/settings/json.hpp"
 #include "nodes/object_3d/evaluate.hpp"
 
 namespace takt::command {
@@ -120,26 +120,14 @@ void print(const Results& r) {
   }
 }
 
+}  // namespace
+
 int evaluate(const EvalObjects3dOptions& options) {
   cv::setNumThreads(1);
   const Results results = measure_all(options);
   if (options.json) std::printf("%s\n", to_json(options, results).dump(2).c_str());
   else print(results);
   return kOk;
-}
-
-}  // namespace
-
-void add_eval_objects3d(CLI::App& eval, EvalObjects3dOptions& o, int& exit_code) {
-  CLI::App* app = eval.add_subcommand("objects3d", "attributes and classes of generated objects on a table");
-  app->add_option("data", o.data, "folder with recorded scenes as mOSD has them: regions against labels");
-  app->add_option("--seed", o.seed, "seed of the scenes (default 1)");
-  app->add_option("--samples", o.samples, "solids, samples of each class, scenes (default 60)")
-      ->check(CLI::Range(2, 10000));
-  app->add_option("--sigma", o.sigma_px, "noise of the disparity, px (default 0.2)")->check(CLI::Range(0.0, 2.0));
-  app->add_option("--write", o.write, "writes what the classifiers learnt from, for the node object_3d");
-  app->add_flag("--json", o.json, "one JSON object on stdout");
-  call(*app, exit_code, [&o] { return evaluate(o); });
 }
 
 }  // namespace takt::command

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
-#include <nlohmann/json.hpp>
-
 #include "graph/evaluate/evaluations.hpp"
+#include "hal/settings/json.hpp"
 #include "nodes/object_detection/evaluate_study.hpp"
 #include "nodes/picture/curves.hpp"
 

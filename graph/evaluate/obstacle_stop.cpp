@@ -3,12 +3,12 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <nlohmann/json.hpp>
 
 #include "graph/cli/graph_file.hpp"
 #include "graph/cli/outcome.hpp"
 #include "graph/evaluate/evaluations.hpp"
 #include "graph/evaluate/stop_trials.hpp"
+#include "hal/settings/json.hpp"
 
 namespace takt::command {
 namespace {
@@ -118,6 +118,8 @@ void print(const Json& table, Vision vision, int trials) {
       table["vision_misses"].get<int>());
 }
 
+}  // namespace
+
 int evaluate(const EvalObstacleStopOptions& o) {
   try {
     Json all{{"trials", o.trials}, {"seed", o.seed}};
@@ -136,19 +138,6 @@ int evaluate(const EvalObstacleStopOptions& o) {
   } catch (const std::exception& error) {
     return refuse(error.what(), kDeviceOrSystem);
   }
-}
-
-}  // namespace
-
-void add_eval_obstacle_stop(CLI::App& eval, EvalObstacleStopOptions& o, int& exit_code) {
-  CLI::App* app =
-      eval.add_subcommand("obstacle_stop", "people step before a robot that drives through a simulated yard");
-  app->add_option("--trials", o.trials, "of each kind of vision (default 1000)")->check(CLI::Range(1, 1'000'000));
-  app->add_option("--seed", o.seed, "of the trials (default 1)");
-  app->add_option("--vision", o.vision, "what else uses the CPUs: absent | overloaded | hanging | all (default)")
-      ->check(CLI::IsMember({"absent", "overloaded", "hanging", "all"}));
-  app->add_flag("--json", o.json, "one JSON object on stdout");
-  app->callback([&] { exit_code = evaluate(o); });
 }
 
 }  // namespace takt::command

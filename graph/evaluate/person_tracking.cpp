@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cstdio>
-#include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "graph/cli/outcome.hpp"
 #include "graph/evaluate/evaluations.hpp"
+#include "hal/settings/json.hpp"
 #include "nodes/person_tracking/evaluate.hpp"
 
 namespace takt::command {
@@ -64,6 +64,8 @@ void draw(const std::string& file, uint64_t seed) {
   if (!cv::imwrite(file, picture)) throw std::runtime_error(file + ": cannot be written");
 }
 
+}  // namespace
+
 int evaluate(const EvalPersonTrackingOptions& o) {
   if (!o.picture.empty()) draw(o.picture, o.seed);
   const WalkFigures f = measure_walks({}, {}, o.seed, o.walks, o.frames);
@@ -92,18 +94,6 @@ int evaluate(const EvalPersonTrackingOptions& o) {
     std::printf("%-20s %10.3f %10.3f %18.3f\n", key.c_str(), value.get<double>(),
                 trackers["last_held"][key].get<double>(), trackers["constant_velocity"][key].get<double>());
   return kOk;
-}
-
-}  // namespace
-
-void add_eval_person_tracking(CLI::App& eval, EvalPersonTrackingOptions& o, int& exit_code) {
-  CLI::App* app = eval.add_subcommand("person_tracking", "a person in a chessboard T-shirt tracked on generated walks");
-  app->add_option("--seed", o.seed, "of the walks (default 1)");
-  app->add_option("--walks", o.walks, "default 6")->check(CLI::Range(1, 10000));
-  app->add_option("--frames", o.frames, "of each walk, 15 a second (default 75)")->check(CLI::Range(1, 100000));
-  app->add_option("--picture", o.picture, "PNG of a frame with what is found in it");
-  app->add_flag("--json", o.json, "one JSON object on stdout");
-  call(*app, exit_code, [&o] { return evaluate(o); });
 }
 
 }  // namespace takt::command

@@ -8,7 +8,6 @@
 #include <cstdio>
 #include <fstream>
 #include <limits>
-#include <nlohmann/json.hpp>
 #include <numbers>
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
@@ -16,6 +15,7 @@
 #include "graph/cli/outcome.hpp"
 #include "graph/evaluate/evaluations.hpp"
 #include "graph/evaluate/laser_stereo.hpp"
+#include "hal/settings/json.hpp"
 #include "nodes/cloud/cloud_file.hpp"
 #include "nodes/laser_fusion/evaluate.hpp"
 #include "nodes/laser_fusion/fusion.hpp"
@@ -336,6 +336,8 @@ int sweep_population(const EvalRegistrationOptions& o) {
   return kOk;
 }
 
+}  // namespace
+
 int evaluate(const EvalRegistrationOptions& o) {
   if (o.sweep == "population") return sweep_population(o);
   const std::optional<Recorded> recorded = recorded_pair(o);
@@ -347,44 +349,6 @@ int evaluate(const EvalRegistrationOptions& o) {
   if (o.json) std::printf("%s\n", out.dump(2).c_str());
   else print(out);
   return kOk;
-}
-
-}  // namespace
-
-void add_eval_registration(CLI::App& eval, EvalRegistrationOptions& o, int& exit_code) {
-  CLI::App* app = eval.add_subcommand("registration", "genetic ICP: the pose that brings one cloud to another");
-  app->add_option("--source", o.source, "cloud that is moved, PLY or PCD");
-  app->add_option("--target", o.target, "cloud that stays");
-  app->add_option("--reference", o.reference, "true pose, source to target: 4 x 4 numbers");
-  app->add_option("--scene", o.scene, "instead: a folder of KITTI's raw data, its stereo points to its laser's");
-  app->add_option("--displace", o.displace,
-                  "m and deg: lays the source so far from its true place, about --seed's axes (default: as it came)")
-      ->expected(2);
-  app->add_option("--sweep", o.sweep,
-                  "success (over offsets, and overlaps of generated pairs) | population (scores of a generated pair "
-                  "over sizes and generations)")
-      ->check(CLI::IsMember({"success", "population"}));
-  app->add_option("--metric", o.metric, "what the search minimises: truncated | thesis (default truncated)")
-      ->check(CLI::IsMember({"truncated", "thesis"}));
-  app->add_option("--runs", o.runs, "of a sweep, for each of its settings (default 20)")->check(CLI::Range(1, 10000));
-  app->add_option("--points", o.points, "of each cloud in the search, at most (default 1000)")
-      ->check(CLI::Range(50, 100000));
-  app->add_option("--cut", o.cut_m,
-                  "pairs are at most so far apart, m (default: 0.25 in sweeps, else by the clouds' spacing)")
-      ->check(CLI::PositiveNumber);
-  app->add_option("--generations", o.generations, "default 25000")->check(CLI::Range(1, 10'000'000));
-  app->add_option("--population", o.population, "default 100")->check(CLI::Range(2, 10'000));
-  app->add_option("--patience", o.patience,
-                  "generations without a gain after which a search begins anew; 0: never (default 1000)")
-      ->check(CLI::Range(0, 10'000'000));
-  app->add_option("--sigma", o.sigma_m, "of match probabilities, m (default 0.4 of the cut)")
-      ->check(CLI::PositiveNumber);
-  app->add_option("--seed", o.seed, "of the search, of generated pairs and of displacements (default 1)");
-  app->add_option("--out", o.out, "writes the target with the source's colours (.ply, .pcd)");
-  app->add_option("--picture", o.picture,
-                  "PNG: before, after, match probability from red to green, colours; or the curves of a sweep");
-  app->add_flag("--json", o.json, "one JSON object on stdout");
-  call(*app, exit_code, [&o] { return evaluate(o); });
 }
 
 }  // namespace takt::command

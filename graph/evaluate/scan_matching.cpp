@@ -3,13 +3,13 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
 #include "graph/cli/outcome.hpp"
 #include "graph/evaluate/evaluations.hpp"
 #include "hal/replay/carmen_log.hpp"
+#include "hal/settings/json.hpp"
 #include "nodes/picture/draw.hpp"
 #include "nodes/scan_matching/evaluate.hpp"
 #include "nodes/scan_matching/occupancy_map.hpp"
@@ -144,6 +144,8 @@ void write_map(const std::string& file, const Drive& drive, const std::vector<Pl
     throw std::runtime_error(fmt::format("--picture {}: cannot be written; it wants a name that ends in .png", file));
 }
 
+}  // namespace
+
 int evaluate(const EvalScanMatchingOptions& options) {
   const Drive drive = options.log.empty() ? make_drive(furnished_room(options.seed), rounds(400), {}, options.seed)
                                           : read_drive(options);
@@ -152,19 +154,6 @@ int evaluate(const EvalScanMatchingOptions& options) {
   if (options.json) std::printf("%s\n", to_json(out).dump(2).c_str());
   else print(out);
   return kOk;
-}
-
-}  // namespace
-
-void add_eval_scan_matching(CLI::App& eval, EvalScanMatchingOptions& o, int& exit_code) {
-  CLI::App* app =
-      eval.add_subcommand("scan_matching", "laser odometry against corrected poses, or in a generated room");
-  app->add_option("--log", o.log, "CARMEN log that a mapping program has corrected");
-  app->add_flag("--without-odometry", o.without_odometry, "matching expects the last motion to go on instead");
-  app->add_option("--seed", o.seed, "seed of the generated drive (default 1)");
-  app->add_option("--picture", o.picture, "PNG of the map that the matched scans make, 10 cm a pixel");
-  app->add_flag("--json", o.json, "one JSON object on stdout");
-  call(*app, exit_code, [&o] { return evaluate(o); });
 }
 
 }  // namespace takt::command

@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cstdio>
 #include <fstream>
-#include <nlohmann/json.hpp>
 
 #include "graph/cli/outcome.hpp"
 #include "graph/evaluate/evaluations.hpp"
+#include "hal/settings/json.hpp"
 #include "nodes/planner/planner.hpp"
 #include "nodes/semantic/evaluate.hpp"
 #include "nodes/semantic/network_file.hpp"
@@ -182,34 +182,11 @@ int show_network(const EvalSemanticOptions& o) {
   return kOk;
 }
 
+}  // namespace
+
 int evaluate(const EvalSemanticOptions& o) {
   if (!o.network.empty()) return show_network(o);
   return o.tell ? tell(o) : o.sweep ? sweep(o) : compare(o);
-}
-
-}  // namespace
-
-void add_eval_semantic(CLI::App& eval, EvalSemanticOptions& o, int& exit_code) {
-  CLI::App* app = eval.add_subcommand("semantic",
-                                      "generated rooms of objects seen with noise, and what a semantic map "
-                                      "makes of them; or a network from a file, and a plan in it");
-  app->add_option("--rooms", o.rooms, "default 10")->check(CLI::Range(1, 10000));
-  app->add_option("--objects", o.objects, "in each room (default 30)")->check(CLI::Range(1, 100));
-  app->add_option("--looks", o.looks, "of the robot in each room (default 300)")->check(CLI::Range(2, 100000));
-  app->add_option("--noise", o.noise_m, "of a place, m (default 0.3)")->check(CLI::Range(0.0, 5.0));
-  app->add_option("--merge-min", o.merge_min, "p_min (default 0.75)")->check(CLI::Range(0.5, 1.0));
-  app->add_option("--distance-max", o.distance_max_m, "d_max, m (default 2)")->check(CLI::Range(0.1, 20.0));
-  app->add_flag("--sweep", o.sweep, "over p_min and d_max");
-  app->add_flag("--tell", o.tell, "one room: each decision and why");
-  app->add_option("--seed", o.seed, "of the first room (default 1)");
-  CLI::Option* network = app->add_option("--network", o.network, "YAML file with a predefined network");
-  app->add_option("--dot", o.dot, "writes that network for Graphviz")->needs(network);
-  app->add_option("--graphml", o.graphml, "writes it as GraphML")->needs(network);
-  app->add_option("--goal", o.goals, "OBJECT.ATTRIBUTE=VALUE, repeatable: plans how it can come true")->needs(network);
-  app->add_option("--at", o.at, "where the robot is then: x y, m (default 0 0)")->expected(2)->needs(network);
-  app->add_flag("--recursive", o.recursive, "by the thesis's recursion instead of A*")->needs(network);
-  app->add_flag("--json", o.json, "one JSON object on stdout");
-  call(*app, exit_code, [&o] { return evaluate(o); });
 }
 
 }  // namespace takt::command

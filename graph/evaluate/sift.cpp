@@ -2,12 +2,12 @@
 #include <algorithm>
 #include <cstdio>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "graph/cli/outcome.hpp"
 #include "graph/evaluate/evaluations.hpp"
+#include "hal/settings/json.hpp"
 #include "nodes/object_detection/scenes.hpp"
 #include "nodes/sift/sift_match.hpp"
 #include "rt/time/clock.hpp"
@@ -164,6 +164,8 @@ void print(const Json& j) {
               number("match_ms"));
 }
 
+}  // namespace
+
 int evaluate(const EvalSiftOptions& options) {
   cv::setNumThreads(1);
   cv::setRNGSeed(static_cast<int>(options.seed));
@@ -171,18 +173,6 @@ int evaluate(const EvalSiftOptions& options) {
   if (options.json) std::printf("%s\n", out.dump(2).c_str());
   else print(out);
   return kOk;
-}
-
-}  // namespace
-
-void add_eval_sift(CLI::App& eval, EvalSiftOptions& o, int& exit_code) {
-  CLI::App* app = eval.add_subcommand("sift", "SIFT as the baseline of object and sign recognition");
-  app->add_option("data", o.data, "folder CLASS/TRACK_FRAME.png (as traffic_signs/gtsrb) instead of generated scenes");
-  app->add_option("--database", o.database, "folder with objects.txt (default graph/objects)");
-  app->add_option("--seed", o.seed, "seed of the scenes (default 1)");
-  app->add_option("--frames", o.frames, "number of scenes (default 30)")->check(CLI::Range(1, 100000));
-  app->add_flag("--json", o.json, "one JSON object on stdout");
-  call(*app, exit_code, [&o] { return evaluate(o); });
 }
 
 }  // namespace takt::command

@@ -7,13 +7,13 @@
 #include <cstdio>
 #include <fstream>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <optional>
 #include <sstream>
 
 #include "graph/cli/outcome.hpp"
 #include "graph/evaluate/evaluations.hpp"
+#include "hal/settings/json.hpp"
 #include "nodes/traffic_signs/evaluate.hpp"
 
 namespace takt::command {
@@ -304,6 +304,8 @@ void print(const char* title, const Json& part) {
                 part["p99_ms"].get<double>(), part["max_ms"].get<double>());
 }
 
+}  // namespace
+
 int evaluate(const EvalSignsOptions& o) {
   cv::setNumThreads(1);
   const auto signs = read_signs(o.signs.empty() ? shipped("graph/signs") : o.signs);
@@ -324,32 +326,6 @@ int evaluate(const EvalSignsOptions& o) {
     print(fmt::format("generated passages of 12 frames, budget {:g} ms, tracked", o.budget_ms).c_str(),
           out["passages"]);
   return kOk;
-}
-
-}  // namespace
-
-void add_eval_signs(CLI::App& eval, EvalSignsOptions& o, int& exit_code) {
-  CLI::App* app = eval.add_subcommand(
-      "signs", "traffic signs found: on crops, in photographs, or (without either) on generated scenes and passages");
-  app->add_option("--signs", o.signs, "folder with signs.txt (default graph/signs)");
-  auto* crops = app->add_option("--crops", o.crops, "folder with images of one sign each, a border of 10 % around it");
-  auto* labels = app->add_option("--labels", o.labels,
-                                 "CSV with columns file, name: of all crops; TRACK_FRAME.png is one image of a track");
-  auto* scenes = app->add_option("--scenes", o.scenes, "folder with photographs");
-  auto* boxes = app->add_option("--boxes", o.boxes, "CSV with columns file, class, x, y, w, h: of all signs in them");
-  for (auto* folder : {crops, scenes}) folder->check(CLI::ExistingDirectory);
-  crops->needs(labels)->excludes(scenes);
-  labels->needs(crops);
-  scenes->needs(boxes);
-  boxes->needs(scenes);
-  app->add_option("--seed", o.seed, "of generated scenes and passages (default 1)");
-  app->add_option("--count", o.count, "of generated scenes (default 150)")->check(CLI::Range(1, 100000));
-  app->add_option("--passages", o.passages, "default 70")->check(CLI::Range(1, 100000));
-  app->add_option("--budget", o.budget_ms, "ms for each image of a passage (default 36)")->check(CLI::PositiveNumber);
-  app->add_option("--confirm", o.confirm, "images in a row until a sign of a passage counts (default 2)")
-      ->check(CLI::Range(1, 12));
-  app->add_flag("--json", o.json, "one JSON object on stdout");
-  call(*app, exit_code, [&o] { return evaluate(o); });
 }
 
 }  // namespace takt::command

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
@@ -13,6 +12,7 @@
 #include "graph/evaluate/evaluations.hpp"
 #include "graph/evaluate/laser_stereo.hpp"
 #include "graph/evaluate/stereo_parameters.hpp"
+#include "hal/settings/json.hpp"
 #include "nodes/stereo/evaluate.hpp"
 #include "nodes/stereo/evaluate_peers.hpp"
 #include "nodes/stereo/half_resolution.hpp"
@@ -155,7 +155,12 @@ Json measure(const EvalStereoOptions& options) {
   return out;
 }
 
+}  // namespace
+
 int evaluate(const EvalStereoOptions& options) {
+  if (!options.sweep.empty()) return sweep_stereo(options);
+  if (options.left.empty() && options.scene.empty())
+    throw std::invalid_argument("stereo wants --left, --right and --gt of a recorded pair, or --scene, or --sweep");
   cv::setNumThreads(1);
   const Json out = measure(options);
   if (options.json) {
@@ -172,36 +177,6 @@ int evaluate(const EvalStereoOptions& options) {
   for (const auto& [name, peer] : out["peers"].items()) print_row(name.c_str(), peer);
   print_row("half the search range everywhere", out["baseline"]);
   return kOk;
-}
-
-}  // namespace
-
-void add_eval_stereo(CLI::App& eval, EvalStereoOptions& o, int& exit_code) {
-  CLI::App* app = eval.add_subcommand("stereo", "bad pixels of dense stereo against ground truth, beside OpenCV");
-  auto* scene = app->add_option("--scene", o.scene,
-                                "folder with a pair and a laser's points as ground truth (data/clouds/laser_stereo)");
-  auto* left = app->add_option("--left", o.left, "left rectified image");
-  auto* right = app->add_option("--right", o.right, "right rectified image")->needs(left);
-  auto* truth = app->add_option("--gt", o.truth, "ground truth of the left image, 0: unknown")->needs(right);
-  left->needs(truth)->excludes(scene);
-  app->add_option("--sweep", o.sweep, "on generated pairs: error against noise, or against the window's edge")
-      ->check(CLI::IsMember({"noise", "window"}))
-      ->excludes(left)
-      ->excludes(scene);
-  app->add_option("--picture", o.picture, "PNG of the sweep's curves")->needs("--sweep");
-  app->add_option("--gt-scale", o.truth_scale, "disparity = value / scale (default 1)")->check(CLI::PositiveNumber);
-  app->add_option("--disparities", o.disparities, "search range, px (default 64)")->check(CLI::Range(1, 512));
-  app->add_option("--exposure", o.exposure, "of the right image, in that of the left one (default 1)")
-      ->check(CLI::Range(0.05, 20.0))
-      ->excludes("--sweep");
-  app->add_option("--set", o.set, "parameter=value of the stereo node, repeatable");
-  app->add_flag("--variants", o.variants, "every way of matching, too: costs, windows, selections");
-  app->add_flag("--json", o.json, "one JSON object on stdout");
-  call(*app, exit_code, [&o] {
-    if (o.left.empty() && o.scene.empty() && o.sweep.empty())
-      throw std::invalid_argument("stereo wants --left, --right and --gt of a recorded pair, or --scene, or --sweep");
-    return o.sweep.empty() ? evaluate(o) : sweep_stereo(o);
-  });
 }
 
 }  // namespace takt::command

@@ -5,11 +5,11 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <nlohmann/json.hpp>
 
 #include "graph/cli/outcome.hpp"
 #include "graph/evaluate/evaluations.hpp"
 #include "graph/evaluate/stereo_parameters.hpp"
+#include "hal/settings/json.hpp"
 #include "nodes/picture/curves.hpp"
 #include "nodes/stereo/generated_pair.hpp"
 #include "nodes/stereo/matcher.hpp"

@@ -18,6 +18,7 @@
 #include "hal/sim/sim_devices.hpp"
 #include "nodes/obstacle_stop/protected_field.hpp"
 #include "rt/sched/executor.hpp"
+#include "rt/time/units.hpp"
 
 namespace takt::command {
 namespace {
@@ -35,8 +36,6 @@ constexpr double kDeceleration_m_s2 = 1, kReaction_s = 0.25;  // of stopping_dis
 constexpr int64_t kTick_ns = 10'000'000;
 constexpr double kTick_s = 0.01;
 constexpr double kLongest_s = 6;  ///< of a trial, once he has appeared
-
-double seconds(int64_t ns) { return static_cast<double>(ns) * 1e-9; }
 
 /// Map frame to robot frame and back: y forward, x right.
 Vec2 in_robot(const RobotState& robot, const Vec2& p) {
@@ -62,7 +61,7 @@ class Person {
   Person(const StopTrial& trial, const sim::Simulation& simulation) : trial_(trial), simulation_(simulation) {}
   /// Nothing before he appears; asked for no instant that the simulation has not settled yet before that.
   std::optional<Stance> at(int64_t at_ns) const {
-    const double since = seconds(at_ns - simulation_.epoch_ns()) - trial_.appears_s;
+    const double since = to_seconds(at_ns - simulation_.epoch_ns()) - trial_.appears_s;
     if (since < 0) return std::nullopt;
     if (!from_)
       from_ = simulation_.robot(simulation_.epoch_ns() + static_cast<int64_t>(std::llround(trial_.appears_s * 1e9)));
@@ -175,7 +174,7 @@ class Referee {
     }
     stood_ = speed > kMoving_m_s ? 0 : stood_ + 1;
     constexpr int kStands = 30;  // ticks
-    over_ = outcome_.contact || stood_ >= kStands || seconds(at_ns - since_ns_) > kLongest_s;
+    over_ = outcome_.contact || stood_ >= kStands || to_seconds(at_ns - since_ns_) > kLongest_s;
   }
 
   /// Whether the laser can see a part of him in the robot's lane now, and how near he is then and later.

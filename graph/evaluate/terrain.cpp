@@ -3,11 +3,11 @@
 
 #include <array>
 #include <cstdio>
-#include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
 #include "graph/cli/outcome.hpp"
 #include "graph/evaluate/evaluations.hpp"
+#include "hal/settings/json.hpp"
 #include "nodes/ground_map/terrain_drive.hpp"
 #include "nodes/ground_map/terrain_file.hpp"
 #include "nodes/picture/draw.hpp"
@@ -85,6 +85,8 @@ void write_maps(const std::string& file, const TerrainMaps& maps) {
   if (!cv::imwrite(file, out)) throw std::runtime_error(file + ": cannot be written");
 }
 
+}  // namespace
+
 int evaluate(const EvalTerrainOptions& options) {
   const TerrainMaps maps = read_terrain(options.maps.empty() ? shipped("graph/terrain.txt") : options.maps).learnt();
   if (!options.picture.empty()) write_maps(options.picture, maps);
@@ -101,18 +103,6 @@ int evaluate(const EvalTerrainOptions& options) {
   }
   if (options.json) std::printf("%s\n", out.dump(2).c_str());
   return kOk;
-}
-
-}  // namespace
-
-void add_eval_terrain(CLI::App& eval, EvalTerrainOptions& o, int& exit_code) {
-  CLI::App* app = eval.add_subcommand("terrain", "kinds of terrain along generated drives, as a confusion matrix");
-  app->add_option("--maps", o.maps, "of each kind (default: the shipped graph/terrain.txt)");
-  app->add_option("--seed", o.seed, "of the first drive (default 2; the shipped maps were learnt with 1)");
-  app->add_option("--drives", o.drives, "how many, each with the next seed (default 2)")->check(CLI::Range(1, 1000));
-  app->add_option("--picture", o.picture, "PNG of the four maps");
-  app->add_flag("--json", o.json, "one JSON object on stdout");
-  call(*app, exit_code, [&o] { return evaluate(o); });
 }
 
 }  // namespace takt::command

@@ -5,10 +5,10 @@
 
 #include <utility>
 
+#include "rt/time/units.hpp"
+
 namespace takt::graph {
 namespace {
-
-double seconds(int64_t ns) { return static_cast<double>(ns) * 1e-9; }
 
 std::string quoted(const std::string& text) {
   constexpr size_t kShown = 60;
@@ -69,7 +69,7 @@ Finding ConditionWatch::finding() const {
   const std::optional<int64_t>& since = spec_.holds == Holds::once                    ? first_ns_
                                         : spec_.holds == Holds::at_end && passes_now_ ? since_ns_
                                                                                       : broken_ns_;
-  return {what(), expected(), observed(), met(), since ? std::optional(seconds(*since)) : std::nullopt};
+  return {what(), expected(), observed(), met(), since ? std::optional(to_seconds(*since)) : std::nullopt};
 }
 
 std::string ConditionWatch::what() const {
@@ -96,8 +96,8 @@ std::string ConditionWatch::expected() const {
   text += test_text();
   for (const ConditionSpec& exception : spec_.unless)
     text += " unless " + ConditionWatch(exception).what() + " " + ConditionWatch(exception).test_text();
-  if (spec_.from_ns > 0) text += fmt::format(" from {:g} s", seconds(spec_.from_ns));
-  if (spec_.to_ns) text += fmt::format(" to {:g} s", seconds(*spec_.to_ns));
+  if (spec_.from_ns > 0) text += fmt::format(" from {:g} s", to_seconds(spec_.from_ns));
+  if (spec_.to_ns) text += fmt::format(" to {:g} s", to_seconds(*spec_.to_ns));
   return text;
 }
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // What was expected of a run and what it showed.
 #pragma once
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "graph/language/graph.hpp"
+#include "hal/settings/json.hpp"
 
 namespace takt::graph {
 

@@ -2,11 +2,11 @@
 // A trace as a file: the JSON that chrome://tracing and https://ui.perfetto.dev load ("Trace Event Format", JSON object
 // form), with all that `takt explain` needs to read it back.
 #pragma once
-#include <nlohmann/json.hpp>
 #include <ostream>
 #include <string>
 #include <tl/expected.hpp>
 
+#include "hal/settings/json.hpp"
 #include "rt/sched/plan.hpp"
 #include "rt/trace/trace.hpp"
 

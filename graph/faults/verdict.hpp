@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
 #include "graph/expect/finding.hpp"
 #include "graph/faults/health.hpp"
 #include "graph/faults/scenario.hpp"
+#include "hal/settings/json.hpp"
 
 namespace takt::graph {
 

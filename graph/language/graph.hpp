@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <filesystem>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "hal/settings/json.hpp"
 #include "rt/machine/identity.hpp"
 #include "rt/param.hpp"
 #include "rt/sched/plan.hpp"

@@ -3,11 +3,11 @@
 // is still the same one.
 #pragma once
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "hal/settings/json.hpp"
 #include "rt/sched/plan.hpp"
 
 namespace takt::log {

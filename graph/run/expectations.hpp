@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <vector>
 
 #include "graph/expect/expectation_watch.hpp"
 #include "graph/run/periodic.hpp"
 #include "graph/run/run.hpp"
+#include "hal/settings/json.hpp"
 #include "rt/sched/run_board.hpp"
 #include "rt/time/clock.hpp"
 

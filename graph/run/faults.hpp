@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "graph/faults/injection.hpp"
@@ -9,6 +8,7 @@
 #include "graph/run/periodic.hpp"
 #include "graph/run/record.hpp"
 #include "graph/run/run.hpp"
+#include "hal/settings/json.hpp"
 #include "rt/sched/executor.hpp"
 
 namespace takt::command {

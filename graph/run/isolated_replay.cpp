@@ -8,10 +8,10 @@
 #include <cerrno>
 #include <cstring>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <stdexcept>
 
 #include "graph/run/support.hpp"
+#include "hal/settings/json.hpp"
 #include "rt/supervise/process_group.hpp"
 
 namespace takt::command {

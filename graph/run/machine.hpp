@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <cstdint>
-#include <nlohmann/json.hpp>
+
+#include "hal/settings/json.hpp"
 
 namespace takt::command {
 

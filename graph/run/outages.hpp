@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
+#include "hal/settings/json.hpp"
 #include "rt/sched/executor.hpp"
 #include "rt/sched/outage_log.hpp"
 

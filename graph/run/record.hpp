@@ -2,12 +2,12 @@
 #pragma once
 #include <functional>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 
 #include "graph/compose/plan_ports.hpp"
 #include "graph/run/run.hpp"
+#include "hal/settings/json.hpp"
 #include "rt/record/mcap/file_sink.hpp"
 #include "rt/record/recorder.hpp"
 #include "rt/sched/executor.hpp"

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
 #include "graph/check/ages.hpp"
 #include "graph/compose/composition.hpp"
 #include "graph/run/machine.hpp"
+#include "hal/settings/json.hpp"
 #include "rt/sched/executor.hpp"
 
 namespace takt::command {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a run in one process and a run in several have in common.
 #pragma once
-#include <nlohmann/json.hpp>
 #include <string>
 #include <tl/expected.hpp>
 #include <vector>
@@ -9,6 +8,7 @@
 #include "graph/check/ages.hpp"
 #include "graph/check/check_machine.hpp"
 #include "graph/run/run.hpp"
+#include "hal/settings/json.hpp"
 #include "rt/memory/process_memory.hpp"
 #include "rt/sched/executor.hpp"
 #include "rt/sched/run_board.hpp"

@@ -2,13 +2,13 @@
 // Internal to graph/view: the sections of the page and what they share. A section is complete HTML with its heading.
 #pragma once
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "graph/language/graph.hpp"
+#include "hal/settings/json.hpp"
 
 namespace takt::view {
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <string>
 
 #include "graph/language/graph.hpp"
+#include "hal/settings/json.hpp"
 
 namespace takt::view {
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 
 #include "hal/device.hpp"
+#include "hal/settings/json.hpp"
 #include "hal/settings/units.hpp"
 #include "rt/msg/messages.hpp"
 

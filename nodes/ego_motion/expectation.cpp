@@ -4,14 +4,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "rt/time/units.hpp"
+
 namespace takt::ego_motion {
 namespace {
 
 constexpr double kLongestGap = 10;          // a motion is not stretched further than this many intervals
 constexpr double kOdometryFloor_m = 0.002;  // what an odometry that stands still may be off
 constexpr double kOdometryFloor_rad = 0.001;
-
-double seconds(int64_t interval_ns) { return 1e-9 * static_cast<double>(interval_ns); }
 
 /// Same variance on all axes of the translation, and of the rotation.
 UncertainPose with_variance(const Rigid& motion, double translation_m2, double rotation_rad2) {
@@ -29,7 +29,7 @@ double squared(double v) { return v * v; }
 
 std::optional<Rigid> Expectation::continued(int64_t interval_ns) const {
   if (!known_) return std::nullopt;
-  return scaled(last_, last_s_ > 0 ? std::clamp(seconds(interval_ns) / last_s_, 0.0, kLongestGap) : 1);
+  return scaled(last_, last_s_ > 0 ? std::clamp(to_seconds(interval_ns) / last_s_, 0.0, kLongestGap) : 1);
 }
 
 UncertainPose Expectation::motion(int64_t interval_ns, const std::optional<Rigid>& odometry) const {
@@ -38,7 +38,7 @@ UncertainPose Expectation::motion(int64_t interval_ns, const std::optional<Rigid
     return with_variance(*odometry, squared(p_.odometry_error * odometry->t.norm() + kOdometryFloor_m),
                          squared(p_.odometry_error * angle + kOdometryFloor_rad));
   }
-  const double interval_s = seconds(interval_ns);
+  const double interval_s = to_seconds(interval_ns);
   const auto error_s2 = [&](double t_s) { return 0.5 * t_s * (t_s + (known_ ? measured_s_ : interval_s)); };
   const double increase = squared(error_s2(unseen_s_ + interval_s)) - squared(error_s2(unseen_s_));
   return with_variance(continued(interval_ns).value_or(Rigid{}), squared(p_.acceleration_m_s2) * increase,
@@ -47,14 +47,14 @@ UncertainPose Expectation::motion(int64_t interval_ns, const std::optional<Rigid
 
 void Expectation::measured(const Rigid& motion, int64_t interval_ns) {
   last_ = motion;
-  last_s_ = measured_s_ = seconds(interval_ns);
+  last_s_ = measured_s_ = to_seconds(interval_ns);
   unseen_s_ = 0;
   known_ = true;
 }
 
 void Expectation::unmeasured(int64_t interval_ns, const std::optional<Rigid>& odometry) {
   if (odometry) measured(*odometry, interval_ns);
-  else unseen_s_ += seconds(interval_ns);
+  else unseen_s_ += to_seconds(interval_ns);
 }
 
 }  // namespace takt::ego_motion

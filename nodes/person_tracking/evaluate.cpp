@@ -7,6 +7,7 @@
 #include "nodes/person_tracking/follower.hpp"
 #include "nodes/stereo/matcher.hpp"
 #include "rt/time/clock.hpp"
+#include "rt/time/units.hpp"
 
 namespace takt::person_tracking {
 namespace {
@@ -28,14 +29,13 @@ class LastSightings {
   void add(const Sighting& now) { before_ = last_, last_ = now, ++count_; }
   Said held(int64_t stamp_ns) const { return is_old(stamp_ns) ? Said() : last_.at; }
   Said continued(int64_t stamp_ns) const {
-    const double between = seconds(before_.stamp_ns, last_.stamp_ns);
+    const double between = to_seconds(last_.stamp_ns - before_.stamp_ns);
     if (is_old(stamp_ns) || count_ < 2 || between > hold_s_) return held(stamp_ns);
-    return last_.at + (last_.at - before_.at) * (seconds(last_.stamp_ns, stamp_ns) / between);
+    return last_.at + (last_.at - before_.at) * (to_seconds(stamp_ns - last_.stamp_ns) / between);
   }
 
  private:
-  static double seconds(int64_t from, int64_t to) { return static_cast<double>(to - from) * 1e-9; }
-  bool is_old(int64_t stamp_ns) const { return count_ == 0 || seconds(last_.stamp_ns, stamp_ns) > hold_s_; }
+  bool is_old(int64_t stamp_ns) const { return count_ == 0 || to_seconds(stamp_ns - last_.stamp_ns) > hold_s_; }
   double hold_s_;
   int count_ = 0;
   Sighting before_, last_;

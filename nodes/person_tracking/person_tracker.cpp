@@ -8,18 +8,18 @@ namespace takt::person_tracking {
 void PersonTracker::wait(int64_t now_ns) {
   sight_ = Sight::none;
   if (!tracked_) return;
-  if (seconds(seen_ns_, now_ns) <= p_.lost_after_s && seconds(shirt_ns_, now_ns) <= p_.shirt_within_s) return;
+  if (to_seconds(now_ns - seen_ns_) <= p_.lost_after_s && to_seconds(now_ns - shirt_ns_) <= p_.shirt_within_s) return;
   tracked_ = false;
   seen_in_a_row_ = 0;
 }
 
 Estimate PersonTracker::at(int64_t stamp_ns) const {
-  return filter_.after(std::max(0.0, seconds(stamp_ns_, stamp_ns)));
+  return filter_.after(std::max(0.0, to_seconds(stamp_ns - stamp_ns_)));
 }
 
 void PersonTracker::step(int64_t stamp_ns, std::span<const Place> shirts, std::span<const Place> bodies) {
   wait(stamp_ns);
-  if (active()) filter_.predict(std::max(0.0, seconds(stamp_ns_, stamp_ns)));
+  if (active()) filter_.predict(std::max(0.0, to_seconds(stamp_ns - stamp_ns_)));
   stamp_ns_ = stamp_ns;
   shirt_ = active() ? nearest(shirts) : shirts.size();
   if (shirt_ < shirts.size()) {

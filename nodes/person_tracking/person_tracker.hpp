@@ -6,6 +6,7 @@
 #include <span>
 
 #include "nodes/person_tracking/person_filter.hpp"
+#include "rt/time/units.hpp"
 
 namespace takt::person_tracking {
 
@@ -38,11 +39,10 @@ class PersonTracker {
   /// At the last step's stamp, and later.
   const Estimate& estimate() const { return filter_.estimate(); }
   Estimate at(int64_t stamp_ns) const;
-  double unseen_s(int64_t now_ns) const { return seconds(seen_ns_, now_ns); }
+  double unseen_s(int64_t now_ns) const { return to_seconds(now_ns - seen_ns_); }
   uint32_t number() const { return number_; }  ///< counts persons, those found again included
 
  private:
-  static double seconds(int64_t from_ns, int64_t to_ns) { return static_cast<double>(to_ns - from_ns) * 1e-9; }
   /// Index of the place nearest to the expected one, within the gate, sure or lately seen; the list's size if there is
   /// none.
   size_t nearest(std::span<const Place> places) const;

@@ -6,12 +6,12 @@
 #include <cmath>
 #include <tuple>
 
+#include "rt/time/units.hpp"
+
 namespace takt::robot_pose {
 namespace {
 
 constexpr int kSpeed = 3, kTurn = 4;
-
-double seconds(int64_t ns) { return static_cast<double>(ns) * 1e-9; }
 
 /// Where the pose stands in the state that a source's next measurement starts from.
 int clone_at(Source source) { return 5 + 3 * static_cast<int>(source); }
@@ -31,7 +31,7 @@ void PoseFilter::begin_at(const PlanarPose& robot_in_map, const Covariance& cova
 // The robot drives along its y axis: speed v, turn rate w, constant but for white noise on their derivatives.
 //   theta' = theta + w t,  (x, y)' = (x, y) + v t (-sin m, cos m),  m = theta + w t / 2
 void PoseFilter::predict(State& state, int64_t stamp_ns) const {
-  const double t = seconds(stamp_ns - state.stamp_ns);
+  const double t = to_seconds(stamp_ns - state.stamp_ns);
   state.stamp_ns = stamp_ns;
   if (t <= 0) return;
   const double v = state.mean(kSpeed), w = state.mean(kTurn), middle = state.mean(2) + w * t / 2;
@@ -95,7 +95,7 @@ bool PoseFilter::update(State& state, const Measured& measured) const {
   const Eigen::LLT<Eigen::Matrix3d> spread(by_state * cross + measured.covariance);
   const double distance = innovation.dot(spread.solve(innovation));
   if (spread.info() != Eigen::Success || !std::isfinite(distance)) return false;  // damaged, and never believed
-  const bool trusted = seconds(state.stamp_ns - state.used_ns) <= p_.trust_s;
+  const bool trusted = to_seconds(state.stamp_ns - state.used_ns) <= p_.trust_s;
   if (trusted && distance > p_.gate) return false;
 
   const Eigen::Matrix<double, kSize, 3> gain = spread.solve(cross.transpose()).transpose();
