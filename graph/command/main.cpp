@@ -21,7 +21,6 @@
 #include "graph/command/terrain_command.hpp"
 #include "graph/command/train_command.hpp"
 #include "graph/evaluate/command_line.hpp"
-#include "graph/evaluate/evaluations.hpp"
 #include "graph/run/run.hpp"
 
 namespace {

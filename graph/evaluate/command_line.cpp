@@ -7,7 +7,6 @@
 
 #include "graph/cli/outcome.hpp"
 #include "graph/evaluate/ego_motion_sweep.hpp"
-#include "graph/evaluate/evaluations.hpp"
 
 namespace takt::command {
 namespace {

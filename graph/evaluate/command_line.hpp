@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include "graph/evaluate/evaluations.hpp"
 
 namespace CLI {
 class App;
@@ -7,9 +8,26 @@ class App;
 
 namespace takt::command {
 
-struct Evaluations;
-
-/// Adds `eval` with all its tasks, whose options must live until the command line has been parsed.
+/// The options of every `takt eval TASK`.
+struct Evaluations {
+  EvalStereoOptions stereo;
+  EvalEgoMotionOptions ego_motion;
+  EvalObjectsOptions objects;
+  EvalObjects3dOptions objects3d;
+  EvalSiftOptions sift;
+  EvalBodyPoseOptions body_pose;
+  EvalPersonTrackingOptions person_tracking;
+  EvalRegistrationOptions registration;
+  EvalGroundOptions ground;
+  EvalTerrainOptions terrain;
+  EvalSignsOptions signs;
+  EvalScanMatchingOptions scan_matching;
+  EvalLms200Options lms200;
+  EvalSemanticOptions semantic;
+  EvalObstacleStopOptions obstacle_stop;
+  EvalMappingOptions mapping;
+};
+/// Adds `eval` with all its tasks to the command line, whose options must live until it has been parsed.
 void add_evaluations(CLI::App& app, Evaluations& options, int& exit_code);
 
 }  // namespace takt::command

@@ -202,24 +202,4 @@ struct EvalMappingOptions {
 };
 int evaluate(const EvalMappingOptions& options);
 
-/// The options of every `takt eval TASK`.
-struct Evaluations {
-  EvalStereoOptions stereo;
-  EvalEgoMotionOptions ego_motion;
-  EvalObjectsOptions objects;
-  EvalObjects3dOptions objects3d;
-  EvalSiftOptions sift;
-  EvalBodyPoseOptions body_pose;
-  EvalPersonTrackingOptions person_tracking;
-  EvalRegistrationOptions registration;
-  EvalGroundOptions ground;
-  EvalTerrainOptions terrain;
-  EvalSignsOptions signs;
-  EvalScanMatchingOptions scan_matching;
-  EvalLms200Options lms200;
-  EvalSemanticOptions semantic;
-  EvalObstacleStopOptions obstacle_stop;
-  EvalMappingOptions mapping;
-};
-
 }  // namespace takt::command
