@@ -76,6 +76,8 @@ class Device {
   /// `epoch_ns` is the first planned instant of the run: sources that own their time line (replay, sim) begin there.
   virtual DeviceResult start(int64_t epoch_ns) = 0;
   virtual void stop() = 0;
+  /// From start() to its first data, at most, if the device is there and well: so long nothing is no loss.
+  virtual int64_t starts_within_ns() const { return 0; }
   /// On the job thread, after a read said `disconnected` or start() failed: one try to get the device going again, on
   /// the time line it had. Neither waits nor allocates in drivers that can say `disconnected`; true if reads may
   /// succeed again.

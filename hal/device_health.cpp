@@ -22,18 +22,22 @@ void DeviceHealth::observe(int64_t release_ns, ReadStatus status, bool repeated)
   ++reads_;
   damaged_ += status == ReadStatus::partial ? 1 : 0;
   repeated_ += status == ReadStatus::ok ? 1 : 0;
-  const bool over = release_ns - *bad_since_ns_ >= settings_.silent_after_ns;
+  const bool over = release_ns - *bad_since_ns_ >= patience_ns();
   if (status != ReadStatus::no_data || over) good_since_ns_.reset();
   if (over) state_ = kind_of_loss();
 }
 
 void DeviceHealth::observe_good(int64_t release_ns) {
-  if (good_since_ns_ && release_ns - last_good_ns_ >= settings_.silent_after_ns) good_since_ns_.reset();
+  if (good_since_ns_ && release_ns - *last_good_ns_ >= settings_.silent_after_ns) good_since_ns_.reset();
   if (!good_since_ns_) good_since_ns_ = release_ns;
   last_good_ns_ = release_ns;
   bad_since_ns_ = release_ns;
   reads_ = damaged_ = repeated_ = 0;
   if (release_ns - *good_since_ns_ >= settings_.recovers_after_ns) state_ = SourceState::ok;
+}
+
+int64_t DeviceHealth::patience_ns() const {
+  return last_good_ns_ ? settings_.silent_after_ns : std::max(settings_.silent_after_ns, settings_.starts_within_ns);
 }
 
 SourceState DeviceHealth::kind_of_loss() const {

@@ -10,6 +10,7 @@ void DeviceNode::open_in_setup(const Setup& setup) {
   if (declared.calls != 0) may(declared.calls, declared.reason);
   if (health_settings_.silent_after_ns == 0)
     health_settings_.silent_after_ns = default_silent_after_ns(setup.rate ? setup.rate->release_ns(0, 1) : 0);
+  health_settings_.starts_within_ns = device().starts_within_ns();
   health_ = DeviceHealth(health_settings_);
   retry_ = {};
   reopen_tries_ = 0;

@@ -15,7 +15,7 @@ namespace takt::command {
 /// Execution times of one node: CPU time of its thread per job, wake-up and latching included.
 struct NodeProfile {
   std::string name;
-  takt::Histogram alone, together;  // in full: files compiled with this one use a namespace that has a Histogram, too
+  Histogram alone, together;
   int64_t budget_ns = 0;            ///< of the schedule; 0: not stated
   uint64_t samples() const { return alone.count() + together.count(); }
   /// The larger of both quantiles; 0 without samples.

@@ -9,6 +9,7 @@
 
 #include "graph/cli/outcome.hpp"
 #include "graph/evaluate/evaluations.hpp"
+#include "graph/evaluate/figures.hpp"
 #include "hal/settings/json.hpp"
 #include "nodes/body_pose/evaluate.hpp"
 #include "nodes/body_pose/floor.hpp"
@@ -22,13 +23,6 @@ using namespace body_pose;
 using Json = nlohmann::ordered_json;
 
 constexpr double kReserve_ms = 5;  ///< what the node leaves of its budget (its parameter `reserve`)
-
-double quantile(std::vector<double> v, double share) {
-  if (v.empty()) return 0;
-  const auto at = std::min(v.size() - 1, static_cast<size_t>(share * static_cast<double>(v.size())));
-  std::nth_element(v.begin(), v.begin() + static_cast<ptrdiff_t>(at), v.end());
-  return v[at];
-}
 
 Skeleton skeleton_of(const EvalBodyPoseOptions& options) {
   return read_skeleton(options.skeleton.empty() ? shipped("graph/skeletons/human.txt") : options.skeleton);

@@ -303,25 +303,24 @@ void add_mapping(CLI::App& eval, EvalMappingOptions& o, int& exit_code) {
 
 }  // namespace
 
-void add_evaluations(CLI::App& app, Evaluations& o, int& exit_code) {
-  CLI::App* eval = app.add_subcommand("eval", "measures quality against ground truth");
-  eval->require_subcommand(1);
-  add_stereo(*eval, o.stereo, exit_code);
-  add_ego_motion(*eval, o.ego_motion, exit_code);
-  add_objects(*eval, o.objects, exit_code);
-  add_objects3d(*eval, o.objects3d, exit_code);
-  add_sift(*eval, o.sift, exit_code);
-  add_body_pose(*eval, o.body_pose, exit_code);
-  add_person_tracking(*eval, o.person_tracking, exit_code);
-  add_registration(*eval, o.registration, exit_code);
-  add_ground(*eval, o.ground, exit_code);
-  add_terrain(*eval, o.terrain, exit_code);
-  add_signs(*eval, o.signs, exit_code);
-  add_scan_matching(*eval, o.scan_matching, exit_code);
-  add_lms200(*eval, o.lms200, exit_code);
-  add_semantic(*eval, o.semantic, exit_code);
-  add_obstacle_stop(*eval, o.obstacle_stop, exit_code);
-  add_mapping(*eval, o.mapping, exit_code);
+void add_evaluations(CLI::App& eval, Evaluations& o, int& exit_code) {
+  eval.require_subcommand(1);
+  add_stereo(eval, o.stereo, exit_code);
+  add_ego_motion(eval, o.ego_motion, exit_code);
+  add_objects(eval, o.objects, exit_code);
+  add_objects3d(eval, o.objects3d, exit_code);
+  add_sift(eval, o.sift, exit_code);
+  add_body_pose(eval, o.body_pose, exit_code);
+  add_person_tracking(eval, o.person_tracking, exit_code);
+  add_registration(eval, o.registration, exit_code);
+  add_ground(eval, o.ground, exit_code);
+  add_terrain(eval, o.terrain, exit_code);
+  add_signs(eval, o.signs, exit_code);
+  add_scan_matching(eval, o.scan_matching, exit_code);
+  add_lms200(eval, o.lms200, exit_code);
+  add_semantic(eval, o.semantic, exit_code);
+  add_obstacle_stop(eval, o.obstacle_stop, exit_code);
+  add_mapping(eval, o.mapping, exit_code);
 }
 
 }  // namespace takt::command

@@ -27,7 +27,7 @@ struct Evaluations {
   EvalObstacleStopOptions obstacle_stop;
   EvalMappingOptions mapping;
 };
-/// Adds `eval` with all its tasks to the command line, whose options must live until it has been parsed.
-void add_evaluations(CLI::App& app, Evaluations& options, int& exit_code);
+/// Adds every TASK to the command line, whose options must live until it has been parsed.
+void add_evaluations(CLI::App& eval, Evaluations& options, int& exit_code);
 
 }  // namespace takt::command

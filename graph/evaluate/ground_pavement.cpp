@@ -8,6 +8,7 @@
 #include <random>
 
 #include "graph/cli/outcome.hpp"
+#include "graph/evaluate/figures.hpp"
 #include "graph/evaluate/ground_score.hpp"
 #include "hal/camera/rig.hpp"
 #include "nodes/ground_map/ground_grid.hpp"
@@ -51,10 +52,6 @@ void add_cells(CellScore& score, const PavementScene& scene, const GroundGrid& g
           drivable_share(scene, {origin.x_m + c * window.cell_m, origin.y_m + r * window.cell_m}, window.cell_m);
       ++score.cells[share == 1 ? 0 : share >= 0.5 ? 1 : 2][cell < 300 ? 0 : cell <= 700 ? 1 : 2];
     }
-}
-
-double percent(int64_t part, int64_t whole) {
-  return whole == 0 ? 0 : 100 * static_cast<double>(part) / static_cast<double>(whole);
 }
 
 /// Image with the mask in green beside the grid, forward up.

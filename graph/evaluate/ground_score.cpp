@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "graph/cli/set_option.hpp"
+#include "graph/evaluate/figures.hpp"
 
 namespace takt::command {
 
@@ -34,13 +35,6 @@ GroundParameters ground_parameters(const std::vector<std::string>& set) {
   if (p.mean_size % 2 == 0) throw std::runtime_error(fmt::format("--set mean_size={}: must be odd", p.mean_size));
   all.grid.beyond_px = p.mean_size / 2;
   return all;
-}
-
-double quantile(std::vector<double> values, double share) {
-  if (values.empty()) return 0;
-  const auto at = std::min(values.size() - 1, static_cast<size_t>(share * static_cast<double>(values.size())));
-  std::nth_element(values.begin(), values.begin() + static_cast<ptrdiff_t>(at), values.end());
-  return values[at];
 }
 
 Json ground_row(const MaskScore& score, const std::vector<double>* border_errors, std::optional<double> time_ms) {

@@ -25,8 +25,6 @@ GroundParameters ground_parameters(const std::vector<std::string>& set);
 nlohmann::ordered_json ground_row(const ground_map::MaskScore& score, const std::vector<double>* border_errors,
                                   std::optional<double> time_ms);
 
-double quantile(std::vector<double> values, double share);  ///< 0 of none
-
 inline ImageView<const uint8_t> view(const cv::Mat& m) {
   return {m.data, m.cols, m.rows, m.channels(), static_cast<ptrdiff_t>(m.step)};
 }

@@ -13,6 +13,7 @@
 #include <tuple>
 #include <vector>
 
+#include "graph/evaluate/figures.hpp"
 #include "nodes/stereo/matcher.hpp"
 #include "nodes/stereo/triangulate.hpp"
 
@@ -181,9 +182,7 @@ std::optional<double> disparity_bias_px(const LaserStereo& scene, double from_m,
       excess_px.push_back(excess);
   }
   if (excess_px.size() < kLeastOfMedian) return std::nullopt;
-  const auto middle = excess_px.begin() + static_cast<std::ptrdiff_t>(excess_px.size() / 2);
-  std::nth_element(excess_px.begin(), middle, excess_px.end());
-  return *middle;
+  return quantile(std::move(excess_px), 0.5);
 }
 
 cloud::Cloud with_less_disparity(const cloud::Cloud& vision, const CameraModel& camera, double px) {

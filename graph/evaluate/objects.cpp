@@ -7,6 +7,7 @@
 
 #include "graph/cli/outcome.hpp"
 #include "graph/evaluate/evaluations.hpp"
+#include "graph/evaluate/figures.hpp"
 #include "hal/settings/json.hpp"
 #include "nodes/object_detection/evaluate.hpp"
 #include "nodes/object_detection/photographs.hpp"
@@ -37,11 +38,6 @@ struct Results {
   int windows_per_frame = 0;
 };
 
-double median(std::vector<double> v) {
-  std::nth_element(v.begin(), v.begin() + static_cast<ptrdiff_t>(v.size() / 2), v.end());
-  return v[v.size() / 2];
-}
-
 ColourBins bins_of(const EvalObjectsOptions& options) {
   return options.bins == "64x32x2" ? ColourBins::hsv_64x32x2 : ColourBins::hsv_64x64x1;
 }
@@ -60,7 +56,7 @@ Results measure_all(const EvalObjectsOptions& options, std::span<const DatabaseO
     measure(scene, detector.grid(), database.size(), ours, results.ours);
     measure(scene, detector.grid(), database.size(), mean_colour, results.mean_colour);
   }
-  results.time_ms = median(ours.times_ms());
+  results.time_ms = quantile(ours.times_ms(), 0.5);
   results.windows_per_frame = detector.grid().windows();
   return results;
 }
@@ -101,10 +97,6 @@ struct Contestant {
     times_ms.push_back(static_cast<double>(thread_cpu_ns() - start) / 1e6);
     searched += static_cast<double>(detector.searched());
     for (Tally& tally : tallies) tally.add(scene, boxes);
-  }
-  double quantile_ms(double share) {
-    std::sort(times_ms.begin(), times_ms.end());
-    return times_ms[std::min(times_ms.size() - 1, static_cast<size_t>(share * static_cast<double>(times_ms.size())))];
   }
 };
 
@@ -183,9 +175,9 @@ Json to_json(Contestant& contestant) {
           {"missed_pct_by_tenth_occluded", occluded},
           {"searched_pct", 100 * contestant.searched / static_cast<double>(contestant.times_ms.size())},
           {"cpu_ms",
-           {{"p50", contestant.quantile_ms(0.5)},
-            {"p99", contestant.quantile_ms(0.99)},
-            {"max", contestant.quantile_ms(1)}}}};
+           {{"p50", quantile(contestant.times_ms, 0.5)},
+            {"p99", quantile(contestant.times_ms, 0.99)},
+            {"max", quantile(contestant.times_ms, 1)}}}};
 }
 
 /// The figures that count, of the node's own stages; where there are photographs to learn from, with the layout's.

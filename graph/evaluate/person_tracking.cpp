@@ -7,6 +7,7 @@
 
 #include "graph/cli/outcome.hpp"
 #include "graph/evaluate/evaluations.hpp"
+#include "graph/evaluate/figures.hpp"
 #include "hal/settings/json.hpp"
 #include "nodes/person_tracking/evaluate.hpp"
 
@@ -17,16 +18,6 @@ using namespace person_tracking;
 using Json = nlohmann::ordered_json;
 
 constexpr int kPictureFrame = 30;
-
-double quantile(std::vector<double> v, double share) {
-  if (v.empty()) return 0;
-  const auto at = v.begin() + static_cast<ptrdiff_t>(
-                                  std::min(v.size() - 1, static_cast<size_t>(share * static_cast<double>(v.size()))));
-  std::nth_element(v.begin(), at, v.end());
-  return *at;
-}
-
-double percent(int part, int whole) { return whole == 0 ? 0 : 100.0 * part / whole; }
 
 Json to_json(const WalkFigures& f, const TrackFigures& t) {
   return {{"tracked_pct", percent(t.tracked, f.frames)},

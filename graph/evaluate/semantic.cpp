@@ -7,6 +7,7 @@
 
 #include "graph/cli/outcome.hpp"
 #include "graph/evaluate/evaluations.hpp"
+#include "graph/evaluate/figures.hpp"
 #include "hal/settings/json.hpp"
 #include "nodes/planner/planner.hpp"
 #include "nodes/semantic/evaluate.hpp"
@@ -21,15 +22,6 @@ using Json = nlohmann::ordered_json;
 
 constexpr double kMergeMin[] = {0.55, 0.65, 0.75, 0.85, 0.95};
 constexpr double kDistanceMax_m[] = {0.5, 1, 1.5, 2, 3, 4};
-
-double quantile(std::vector<double> v, double share) {
-  if (v.empty()) return 0;
-  std::sort(v.begin(), v.end());
-  return v[std::min(v.size() - 1, static_cast<size_t>(share * static_cast<double>(v.size())))];
-}
-double percent(size_t part, size_t whole) {
-  return whole == 0 ? 0 : 100 * static_cast<double>(part) / static_cast<double>(whole);
-}
 
 RoomParameters room_of(const EvalSemanticOptions& o) {
   RoomParameters room;

@@ -7,6 +7,7 @@
 
 #include "graph/cli/outcome.hpp"
 #include "graph/evaluate/evaluations.hpp"
+#include "graph/evaluate/figures.hpp"
 #include "hal/settings/json.hpp"
 #include "nodes/object_detection/scenes.hpp"
 #include "nodes/sift/sift_match.hpp"
@@ -22,12 +23,6 @@ using Json = nlohmann::ordered_json;
 constexpr int kScale = 2;
 
 double ms_since(int64_t begin) { return static_cast<double>(thread_cpu_ns() - begin) * 1e-6; }
-
-double median(std::vector<double> v) {
-  if (v.empty()) return 0;
-  std::nth_element(v.begin(), v.begin() + static_cast<ptrdiff_t>(v.size() / 2), v.end());
-  return v[v.size() / 2];
-}
 
 cv::Mat larger(const cv::Mat& image) {
   cv::Mat out;
@@ -150,8 +145,8 @@ Json to_json(const Scores& s) {
           {"keypoints_per_image", per(s.keypoints, s.images)},
           {"matches_per_question", per(s.matches, s.questions)},
           {"inliers_per_question", per(s.inliers, s.questions)},
-          {"features_ms", median(s.features_ms)},
-          {"match_ms", median(s.match_ms)}};
+          {"features_ms", quantile(s.features_ms, 0.5)},
+          {"match_ms", quantile(s.match_ms, 0.5)}};
 }
 
 void print(const Json& j) {

@@ -10,6 +10,7 @@
 
 #include "graph/cli/outcome.hpp"
 #include "graph/evaluate/evaluations.hpp"
+#include "graph/evaluate/figures.hpp"
 #include "graph/evaluate/laser_stereo.hpp"
 #include "graph/evaluate/stereo_parameters.hpp"
 #include "hal/settings/json.hpp"
@@ -56,11 +57,6 @@ Json row(const stereo::StereoScore& score, double time_ms) {
           {"time_ms", time_ms}};
 }
 
-double median(std::vector<double> v) {
-  std::nth_element(v.begin(), v.begin() + static_cast<ptrdiff_t>(v.size() / 2), v.end());
-  return v[v.size() / 2];
-}
-
 Json run_ours(const cv::Mat& left, const cv::Mat& right, const stereo::DisparityImage& truth, stereo::Matcher& matcher,
               int repeats) {
   cv::Mat disparity(left.size(), CV_16S), confidence(left.size(), CV_8U), fraction(left.size(), CV_8U);
@@ -73,7 +69,7 @@ Json run_ours(const cv::Mat& left, const cv::Mat& right, const stereo::Disparity
     if (!matcher.match(view(left), view(right), out)) throw BadData("left and right image differ in size or channels");
     times.push_back(static_cast<double>(thread_cpu_ns() - start) / 1e6);
   }
-  Json json = row(stereo::score(stereo::to_disparity_image(out), truth), median(times));
+  Json json = row(stereo::score(stereo::to_disparity_image(out), truth), quantile(times, 0.5));
   std::vector<double> right_ones, wrong_ones;
   for (int y = 0; y < truth.height; ++y)
     for (int x = 0; x < truth.width; ++x) {
@@ -81,8 +77,8 @@ Json run_ours(const cv::Mat& left, const cv::Mat& right, const stereo::Disparity
       const bool is_right = std::abs(static_cast<float>(out.disparity.at(x, y)) - truth.at(x, y)) <= 1;
       (is_right ? right_ones : wrong_ones).push_back(out.confidence.at(x, y) / 255.0);
     }
-  json["confidence_right"] = right_ones.empty() ? Json() : Json(median(right_ones));
-  json["confidence_wrong"] = wrong_ones.empty() ? Json() : Json(median(wrong_ones));
+  json["confidence_right"] = right_ones.empty() ? Json() : Json(quantile(right_ones, 0.5));
+  json["confidence_wrong"] = wrong_ones.empty() ? Json() : Json(quantile(wrong_ones, 0.5));
   return json;
 }
 
@@ -101,7 +97,7 @@ Json run_peer(stereo::Peer peer, const cv::Mat& left, const cv::Mat& right, cons
   std::vector<double> times(kRepeats);
   stereo::DisparityImage result;
   for (double& time : times) result = stereo::run_peer(peer, view(left), view(right), disparities, &time);
-  return row(stereo::score(result, truth), median(times));
+  return row(stereo::score(result, truth), quantile(times, 0.5));
 }
 
 std::string confidence(const Json& row, const char* key) {

@@ -44,6 +44,8 @@ class LaserSession {
   virtual ~LaserSession() = default;
   /// Always the same; sensor_in_robot is left out.
   virtual ScanFormat format() const = 0;
+  /// From begin() to the first sweep, at most, with a scanner that is up and answers; 0: no longer than between sweeps.
+  virtual int64_t starts_within_ns() const { return 0; }
   /// The line is open, for the first time or again; nothing is known of the device.
   virtual void begin(int64_t now_ns) = 0;
   /// Bytes that had come by now. Returns the newest sweep that they complete, valid until the next call, or null.

@@ -29,6 +29,7 @@ class StreamLaser final : public LaserScanner {
   void close() override;
   DeviceResult start(int64_t epoch_ns) override;
   void stop() override;
+  int64_t starts_within_ns() const override { return session_->starts_within_ns(); }
   /// True once the thread has the line again.
   bool restart(int64_t now_ns) override;
   DeclaredCalls declared_calls() const override;

@@ -7,6 +7,7 @@
 #include "hal/semantic_link/wire.hpp"
 #include "tests/conformance/link_network.hpp"
 #include "tests/fuzz/session.hpp"
+#include "tests/nanoseconds.hpp"
 
 using namespace takt;
 using namespace takt::semantic_link;
@@ -14,7 +15,7 @@ using takt::fuzz::require, takt::test::Bytes, takt::test::MemoryNetwork;
 
 namespace {
 
-constexpr int64_t kMs = 1'000'000;
+using test::kMs;
 constexpr test::Peer kClient = static_cast<test::Peer>(2);
 
 /// What the codec takes it gives back, byte by byte.

@@ -10,10 +10,10 @@
 #include <string>
 
 #include "rt/time/clock.hpp"
+#include "tests/nanoseconds.hpp"
 
 namespace takt::test {
 
-constexpr int64_t kMs = 1'000'000;
 
 inline void sleep_until(int64_t monotonic_ns) {
   const timespec t{monotonic_ns / 1'000'000'000, monotonic_ns % 1'000'000'000};

@@ -67,6 +67,8 @@ devices = {d["name"]: d for d in report["devices"]}
 sent = {n["name"]: n["completed"] - n["no_result"] for n in report["nodes"]}
 print(sent)
 assert all(d["state"] == "ok" and d["trouble"] == "" for d in devices.values()), devices
+# Host and scanner agree on rate and mode before the first scan: no loss, so the run begins in the mode it is to have.
+assert not [f for f in report["faults"] if f["at_s"] < 5], report["faults"]
 assert all(d["received"] > 50 for n, d in devices.items() if n != "lines")
 assert devices["front_laser"]["damaged"] > 0 and devices["front_laser"]["resyncs"] > 0
 assert devices["camera"]["missing"] <= 2 and devices["camera"]["damaged"] > 0 and devices["head"]["damaged"] > 0 and devices["base"]["missing"] > 0

@@ -37,6 +37,7 @@ class Session final : public LaserSession {
  public:
   explicit Session(const SessionSettings& settings);
   ScanFormat format() const override;
+  int64_t starts_within_ns() const override;
   void begin(int64_t now_ns) override;
   const ReceivedScan* receive(std::span<const uint8_t> bytes, int64_t now_ns) override;
   LineOrder next(int64_t now_ns) override;

@@ -18,12 +18,13 @@
 #include "rt/sched/port_access.hpp"
 #include "tests/conformance/link_messages.hpp"
 #include "tests/conformance/link_network.hpp"
+#include "tests/nanoseconds.hpp"
 
 namespace takt::test {
 
 using semantic_link::index_of, semantic_link::info_of, semantic_link::Kind, semantic_link::MessageKind;
 
-constexpr int64_t kMs = 1'000'000, kLinkPeriod_ns = 20 * kMs, kAhead_ns = 123'456'789'000;
+constexpr int64_t kLinkPeriod_ns = 20 * kMs, kAhead_ns = 123'456'789'000;
 
 /// Makes the ports of the two ends, the server's first.
 struct Line {

@@ -12,13 +12,15 @@
 #include "rt/sched/executor.hpp"
 #include "rt/sched/port_access.hpp"
 #include "rt/shm/local_transport.hpp"
+#include "tests/nanoseconds.hpp"
 
 namespace {
 
 using namespace takt;
 using namespace takt::graph;
 
-constexpr int64_t kMs = 1'000'000, kEpoch = 1'000 * kMs;
+using test::kMs;
+constexpr int64_t kEpoch = 1'000 * kMs;
 
 struct Random {
   std::mt19937 engine;

@@ -9,13 +9,15 @@
 #include <vector>
 
 #include "nodes/obstacle_stop/sweep_memory.hpp"
+#include "tests/nanoseconds.hpp"
 
 using namespace takt;
 using namespace takt::obstacle_stop;
 
 namespace {
 
-constexpr int64_t kMs = 1'000'000, kPeriod_ns = 66'666'667, kSpan_ns = 1'000 * kMs;
+using test::kMs;
+constexpr int64_t kPeriod_ns = 66'666'667, kSpan_ns = 1'000 * kMs;
 constexpr size_t kBeams = 181;
 
 struct Disc {

@@ -8,6 +8,7 @@
 
 #include "hal/base/base_double.hpp"
 #include "tests/conformance/dbc_file.hpp"
+#include "tests/nanoseconds.hpp"
 #include "tests/unit/can/bench.hpp"
 
 using namespace takt;
@@ -15,7 +16,7 @@ using namespace takt::base;
 
 namespace {
 
-constexpr int64_t kMs = 1'000'000;
+using test::kMs;
 
 struct Bench : test::CanBench<CanBase, BaseDouble> {
   BaseReading reading;

@@ -5,9 +5,11 @@
 
 #include <cmath>
 
+#include "tests/has.hpp"
 #include "tests/temporary_folder.hpp"
 
 using namespace takt;
+using test::has;
 
 namespace {
 
@@ -19,7 +21,6 @@ std::string message(const std::string& yaml) {
   const auto rig = load(yaml);
   return rig ? "" : rig.error().text();
 }
-bool has(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 }  // namespace
 

@@ -7,13 +7,14 @@
 
 #include "hal/camera/video_double.hpp"
 #include "tests/conformance/stereo_camera.hpp"
+#include "tests/nanoseconds.hpp"
 
 using namespace takt;
 using namespace takt::v4l2;
 
 namespace {
 
-constexpr int64_t kMs = 1'000'000;
+using test::kMs;
 
 StereoRig small_rig() {
   StereoRig rig;

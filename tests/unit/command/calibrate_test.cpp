@@ -9,6 +9,7 @@
 #include "graph/run/run.hpp"
 #include "nodes/calibration/generated_sweeps.hpp"
 #include "nodes/stereo/rectify.hpp"
+#include "tests/graph_folder.hpp"
 #include "tests/temporary_folder.hpp"
 #include "tests/unit/calibration/chessboard_views.hpp"
 
@@ -57,7 +58,7 @@ TEST_CASE("pictures of a board become a file that the stereo node reads, and a p
 
 TEST_CASE("the calibration shipped beside a rig of raw pairs is the one its rig file gives") {
   const takt::test::TemporaryFolder folder;
-  const std::filesystem::path rigs = std::filesystem::path(TAKT_SOURCE_DIR) / "graph" / "rigs";
+  const std::filesystem::path rigs = takt::test::graph_folder() / "rigs";
   const std::string out = folder.path / "made.yaml";
   CHECK(run("calibrate rig " + (rigs / "xb3_raw.yaml").string() + " --out " + out) == kOk);
   const auto made = stereo::read_calibration(out),

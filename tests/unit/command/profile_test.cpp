@@ -4,13 +4,14 @@
 #include <doctest/doctest.h>
 
 #include "rt/machine/parse.hpp"
+#include "tests/nanoseconds.hpp"
 
 using namespace takt;
 using namespace takt::command;
 
 namespace {
 
-constexpr int64_t kMs = 1'000'000;
+using test::kMs;
 
 /// `count` jobs of so long, and one of `longest`.
 NodeProfile node(const char* name, int64_t alone_ns, int64_t together_ns, int count, int64_t longest_ns) {

@@ -6,11 +6,12 @@
 
 #include "rt/sched/executor.hpp"
 #include "rt/sched/port_access.hpp"
+#include "tests/nanoseconds.hpp"
 
 namespace {
 
 using namespace takt;
-constexpr int64_t kMs = 1'000'000;
+using test::kMs;
 
 /// Sends on the stamp of what it reads; of its release where it reads nothing.
 struct Relay final : Node {

@@ -4,18 +4,20 @@
 #include <vector>
 
 #include "hal/device_health.hpp"
+#include "tests/nanoseconds.hpp"
 
 namespace {
 
 using namespace takt;
-constexpr int64_t kMs = 1'000'000;
+using test::kMs;
 
 /// One read every 50 ms; lost after 300 ms, back after 500 ms.
 struct Reads {
   DeviceHealth health;
   int64_t now_ms = 0;
 
-  explicit Reads(bool judges_frozen = true) : health({300 * kMs, 500 * kMs, judges_frozen}) {}
+  explicit Reads(bool judges_frozen = true, int64_t starts_within_ns = 0)
+      : health({300 * kMs, starts_within_ns, 500 * kMs, judges_frozen}) {}
   std::optional<SourceState> read(ReadStatus status, int times = 1, bool repeated = false) {
     for (int i = 0; i < times; ++i, now_ms += 50) health.observe(now_ms * kMs, status, repeated);
     return health.state();
@@ -43,6 +45,28 @@ TEST_CASE("nothing is said until the device has shown that it works, or that it 
   Reads never;
   CHECK_FALSE(never.read(ReadStatus::no_data, 6).has_value());
   CHECK(never.read(ReadStatus::no_data) == SourceState::silent);
+}
+
+TEST_CASE("before its first good data a device may take as long as it says, after them no longer than any") {
+  struct Case {
+    int64_t starts_within_ms;
+    int bad_reads;  ///< without a verdict
+  };
+  for (const Case& c : {Case{0, 6}, Case{200, 6}, Case{1000, 20}}) {
+    INFO(c.starts_within_ms, " ms");
+    for (const ReadStatus status : {ReadStatus::no_data, ReadStatus::partial}) {
+      Reads never{true, c.starts_within_ms * kMs};
+      CHECK_FALSE(never.read(status, c.bad_reads).has_value());
+      CHECK(never.read(status).has_value());
+    }
+    Reads gone{true, c.starts_within_ms * kMs};
+    CHECK(gone.read(ReadStatus::disconnected) == SourceState::disconnected);
+    Reads stops{true, c.starts_within_ms * kMs};
+    stops.read(ReadStatus::no_data, 5);
+    stops.read(ReadStatus::ok);
+    CHECK_FALSE(stops.read(ReadStatus::no_data, 5).has_value());
+    CHECK(stops.read(ReadStatus::no_data) == SourceState::silent);
+  }
 }
 
 TEST_CASE("each kind of loss after its time: 300 ms after the last good read, disconnected at once") {

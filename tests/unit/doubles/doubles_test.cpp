@@ -11,6 +11,7 @@
 #include "hal/sim/lens.hpp"
 #include "hal/sim/sensors.hpp"
 #include "tests/conformance/stereo_camera.hpp"
+#include "tests/nanoseconds.hpp"
 #include "tests/unit/can/bench.hpp"
 #include "tests/unit/sim/small_world.hpp"
 
@@ -18,7 +19,8 @@ using namespace takt;
 
 namespace {
 
-constexpr int64_t kMs = 1'000'000, kSecond = 1000 * kMs;
+using test::kMs;
+using test::kSecond;
 
 std::unique_ptr<sim::Simulation> world_from(sim::World world, int64_t epoch_ns) {
   auto simulation = std::make_unique<sim::Simulation>(std::move(world), 0, 3);

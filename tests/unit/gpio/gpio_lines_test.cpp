@@ -8,13 +8,14 @@
 
 #include "hal/gpio/chip_double.hpp"
 #include "tests/conformance/devices.hpp"
+#include "tests/nanoseconds.hpp"
 
 using namespace takt;
 using namespace takt::gpio;
 
 namespace {
 
-constexpr int64_t kMs = 1'000'000;
+using test::kMs;
 enum Offset : uint32_t { kFree, kStop, kButton, kLamp, kLids, kTrigger };
 
 struct Bench {

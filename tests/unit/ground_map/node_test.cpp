@@ -11,6 +11,7 @@
 #include "nodes/mapping_3d/pose.hpp"
 #include "rt/memory/memory_use.hpp"
 #include "rt/transform/pose_math.hpp"
+#include "tests/nanoseconds.hpp"
 #include "tests/temporary_folder.hpp"
 #include "tests/unit/ground_map/camera.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
@@ -25,7 +26,7 @@ using test::kCamera, test::kHeight, test::kWidth;
 namespace {
 
 constexpr Capacity kImage{kWidth, kHeight, 3, 0};
-constexpr int64_t kMs = 1'000'000;
+using test::kMs;
 
 /// A floor of one colour; what lies beyond wall_y_m ahead of the robot has another.
 struct FloorPair : test::Box<StereoPair> {

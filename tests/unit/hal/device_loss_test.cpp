@@ -8,12 +8,14 @@
 #include "hal/gpio/lines_node.hpp"
 #include "hal/laser/laser_node.hpp"
 #include "tests/conformance/fake_writer.hpp"
+#include "tests/nanoseconds.hpp"
 
 using namespace takt;
 
 namespace {
 
-constexpr int64_t kMs = 1'000'000, kPeriod = 50 * kMs;
+using test::kMs;
+constexpr int64_t kPeriod = 50 * kMs;
 
 /// There from `there_ms` on; a read says what `status` does.
 class Lines final : public DigitalLines {

@@ -7,12 +7,14 @@
 #include "rt/time/rate.hpp"
 #include "tests/conformance/fake_writer.hpp"
 #include "tests/graph_folder.hpp"
+#include "tests/has.hpp"
 #include "tests/temporary_folder.hpp"
 #include "tests/unit/replay/carmen_file.hpp"
 
 using namespace takt;
 using namespace takt::hal;
 using test::graph_folder;
+using test::has;
 
 namespace {
 
@@ -25,7 +27,6 @@ std::string error(const DeviceConfig& c) {
   const auto node = make_device(c, devices, clock);
   return node ? "" : node.error().text();
 }
-bool has(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 const nlohmann::json kWorld = {{"world", "worlds/lab.xml"}};
 
 }  // namespace

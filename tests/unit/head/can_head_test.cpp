@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "hal/head/head_double.hpp"
+#include "tests/nanoseconds.hpp"
 #include "tests/unit/can/bench.hpp"
 
 using namespace takt;
@@ -14,7 +15,7 @@ using namespace takt::head;
 
 namespace {
 
-constexpr int64_t kMs = 1'000'000;
+using test::kMs;
 
 struct Bench : test::CanBench<CanHead, HeadDouble> {
   ReadStatus status = ReadStatus::no_data;

@@ -8,6 +8,8 @@
 #include <string_view>
 
 #include "tests/conformance/devices.hpp"
+#include "tests/has.hpp"
+#include "tests/nanoseconds.hpp"
 #include "tests/unit/lms200/rig.hpp"
 
 using namespace takt;
@@ -16,12 +18,7 @@ using namespace takt::test;
 
 namespace {
 
-constexpr int64_t kMs = 1'000'000, kSecond = 1000 * kMs;
 constexpr SessionSettings kFast{500000, {180, 50}, 0, true};
-
-bool has(const char* text, std::string_view part) {
-  return std::string_view(text).find(part) != std::string_view::npos;
-}
 
 size_t count_of(const std::vector<ReadStatus>& all, ReadStatus one) {
   return static_cast<size_t>(std::count(all.begin(), all.end(), one));
@@ -45,6 +42,23 @@ TEST_CASE("the driver conforms, at every variant and rate, on a line of memory")
     CHECK(rig.scanner->baud() == c.settings.baud);
     CHECK(rig.session->format().rate_hz == doctest::Approx(1e9 / static_cast<double>(c.scan_ns)));
   }
+}
+
+TEST_CASE("the first scan comes within the time that the driver says, whatever rate and stream a host has left behind") {
+  const uint32_t rates[] = {9600, 19200, 38400, 500000};
+  for (const uint32_t left_at : rates)
+    for (const uint32_t wanted : rates) {
+      INFO("left at ", left_at, " baud, wanted ", wanted);
+      Lms200Rig rig({left_at, {180, 50}, 0, true});
+      rig.start();
+      REQUIRE(rig.runs_within(60 * kSecond));
+      rig.replace_host({wanted, {180, 100}, 4, true});
+      rig.start();
+      const int64_t from_ns = rig.clock.now_ns();
+      REQUIRE(rig.runs_within(60 * kSecond));
+      CHECK(rig.scanner->baud() == wanted);
+      CHECK(rig.clock.now_ns() - from_ns <= rig.laser->starts_within_ns());
+    }
 }
 
 TEST_CASE("the driver conforms on a terminal of the kernel") {

@@ -39,6 +39,11 @@ struct Lms200Rig : LaserLine {
           std::make_unique<CountedEnd>(std::make_unique<SerialPort>("laser", path), state.to_device, state.to_host),
           std::make_unique<CountedEnd>(std::make_unique<PseudoTerminal>(path), state.to_host, state.to_device));
   }
+  /// The host dies in the middle of what it does, and another one comes.
+  void replace_host(const lms200::SessionSettings& settings) {
+    dead_host = std::move(laser);
+    host(settings, std::make_unique<MemoryHostEnd>(state));
+  }
   /// Until scans come, at most so long.
   bool runs_within(int64_t ns) {
     for (const int64_t end_ns = clock.now_ns() + ns; clock.now_ns() < end_ns;) {
@@ -64,10 +69,15 @@ struct Lms200Rig : LaserLine {
     scanner = made.get();
     device = std::move(made);
     REQUIRE(device->plug_in().has_value());
+    this->host(settings, std::move(host));
+  }
+  void host(const lms200::SessionSettings& settings, std::unique_ptr<ByteStream> line) {
     auto talk = std::make_unique<lms200::Session>(settings);
     session = talk.get();
-    laser = std::make_unique<StreamLaser>("laser", std::move(host), std::move(talk), Transform{}, clock);
+    laser = std::make_unique<StreamLaser>("laser", std::move(line), std::move(talk), Transform{}, clock);
   }
+
+  std::unique_ptr<StreamLaser> dead_host;  ///< says and hears nothing
 };
 
 }  // namespace takt::test

@@ -13,6 +13,8 @@
 #include "hal/stream/tcp_listener.hpp"
 #include "tests/conformance/devices.hpp"
 #include "tests/conformance/laser_line.hpp"
+#include "tests/has.hpp"
+#include "tests/nanoseconds.hpp"
 #include "tests/temporary_folder.hpp"
 
 using namespace takt;
@@ -20,12 +22,6 @@ using namespace takt::lms400;
 using namespace takt::test;
 
 namespace {
-
-constexpr int64_t kMs = 1'000'000, kSecond = 1000 * kMs;
-
-bool has(const char* text, std::string_view part) {
-  return std::string_view(text).find(part) != std::string_view::npos;
-}
 
 /// A slope before the robot that comes nearer by 0.1 m in a second.
 void slope(const Sweep& sweep, std::span<float> range_m) {

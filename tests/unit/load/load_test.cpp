@@ -6,6 +6,7 @@
 
 #include "nodes/load/burn.hpp"
 #include "rt/memory/memory_use.hpp"
+#include "tests/nanoseconds.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 
 namespace takt {
@@ -16,7 +17,7 @@ using namespace takt;
 
 namespace {
 
-constexpr int64_t kMs = 1'000'000;
+using test::kMs;
 
 struct Fixture {
   MonotonicClock real;

@@ -6,6 +6,7 @@
 
 #include "nodes/object_3d/evaluate.hpp"
 #include "rt/memory/memory_use.hpp"
+#include "tests/graph_folder.hpp"
 #include "tests/temporary_folder.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 #include "tests/unit/object_3d/scene_cloud.hpp"
@@ -19,7 +20,7 @@ using namespace takt::object_3d;
 
 namespace {
 
-const std::filesystem::path kTraining = std::filesystem::path(TAKT_SOURCE_DIR) / "graph/objects_3d.txt";
+const std::filesystem::path kTraining = takt::test::graph_folder() / "objects_3d.txt";
 constexpr Capacity kClouds{0, 0, 1, 320 * 240};
 
 std::unique_ptr<Node> make_node(const std::vector<std::pair<std::string, ParamValue>>& params) {

@@ -7,13 +7,14 @@
 #include <opencv2/imgcodecs.hpp>
 #include <string>
 
+#include "tests/graph_folder.hpp"
 #include "tests/temporary_folder.hpp"
 
 using namespace takt::object_detection;
 
 namespace {
 
-const std::filesystem::path kShipped = std::filesystem::path(TAKT_SOURCE_DIR) / "graph/objects";
+const std::filesystem::path kShipped = takt::test::graph_folder() / "objects";
 
 struct Folder : takt::test::TemporaryFolder {
   Folder() { image("good.png", cv::Mat(8, 8, CV_8UC3, cv::Scalar(10, 20, 200))); }
@@ -30,10 +31,9 @@ struct Folder : takt::test::TemporaryFolder {
   }
 };
 
-bool has(const std::string& text, const std::string& part) {
+void check_says(const std::string& text, const std::string& part) {
   INFO(text);
   CHECK(text.find(part) != std::string::npos);
-  return text.find(part) != std::string::npos;
 }
 
 }  // namespace
@@ -81,43 +81,43 @@ TEST_CASE("classes are the entries with their attributes, whether their images a
 
 TEST_CASE("mistakes name file and line and what is valid") {
   const Folder folder;
-  has(folder.error("object cup\nviews good.png\n"), "objects.txt:2: unknown word `views`; valid are object, threshold");
-  has(folder.error("view good.png\n"), "objects.txt:1: `view` stands before");
-  has(folder.error("object cup\n\nview absent.png\n"), "objects.txt:3: view ");
-  has(folder.error("object cup\nview absent.png\n"), "absent.png cannot be read");
-  has(folder.error("object cup\nview objects.txt\n"), "is no image");
-  has(folder.error("object cup\nobject can\nview good.png\n"), "objects.txt:2: object `cup` has no view");
-  has(folder.error("object cup\nview good.png\nobject can\n"), "objects.txt:3: object `can` has no view");
-  has(folder.error("object cup\nview good.png\nobject cup\n"), "objects.txt:3: object `cup` is there already");
-  has(folder.error("object cup\nthreshold 1.5\n"), "objects.txt:2: the threshold is `1.5`, must be");
-  has(folder.error("object cup\nthreshold 0\n"), "must be a number above 0");
-  has(folder.error("object cup\nthreshold nan\n"), "must be a number above 0");
-  has(folder.error("object cup\nthreshold 0.4x\n"), "`0.4x`");
-  has(folder.error("object cup\nthreshold auto\nthreshold 0.4\n"),
+  check_says(folder.error("object cup\nviews good.png\n"), "objects.txt:2: unknown word `views`; valid are object, threshold");
+  check_says(folder.error("view good.png\n"), "objects.txt:1: `view` stands before");
+  check_says(folder.error("object cup\n\nview absent.png\n"), "objects.txt:3: view ");
+  check_says(folder.error("object cup\nview absent.png\n"), "absent.png cannot be read");
+  check_says(folder.error("object cup\nview objects.txt\n"), "is no image");
+  check_says(folder.error("object cup\nobject can\nview good.png\n"), "objects.txt:2: object `cup` has no view");
+  check_says(folder.error("object cup\nview good.png\nobject can\n"), "objects.txt:3: object `can` has no view");
+  check_says(folder.error("object cup\nview good.png\nobject cup\n"), "objects.txt:3: object `cup` is there already");
+  check_says(folder.error("object cup\nthreshold 1.5\n"), "objects.txt:2: the threshold is `1.5`, must be");
+  check_says(folder.error("object cup\nthreshold 0\n"), "must be a number above 0");
+  check_says(folder.error("object cup\nthreshold nan\n"), "must be a number above 0");
+  check_says(folder.error("object cup\nthreshold 0.4x\n"), "`0.4x`");
+  check_says(folder.error("object cup\nthreshold auto\nthreshold 0.4\n"),
       "objects.txt:3: object `cup` has a threshold already");
-  has(folder.error("object\n"), "objects.txt:1: `object` takes a name and its attributes");
-  has(folder.error("object cup red\n"), "objects.txt:1: `red` is no attribute; write ATTRIBUTE=VALUE");
-  has(folder.error("object cup full=\n"), "`full=` is no attribute");
-  has(folder.error("object cup full=yes full=no\n"), "attribute `full` is given twice");
-  has(folder.error("object cup full=yes\nview good.png\nobject cup full=yes\n"),
+  check_says(folder.error("object\n"), "objects.txt:1: `object` takes a name and its attributes");
+  check_says(folder.error("object cup red\n"), "objects.txt:1: `red` is no attribute; write ATTRIBUTE=VALUE");
+  check_says(folder.error("object cup full=\n"), "`full=` is no attribute");
+  check_says(folder.error("object cup full=yes full=no\n"), "attribute `full` is given twice");
+  check_says(folder.error("object cup full=yes\nview good.png\nobject cup full=yes\n"),
       "objects.txt:3: object `cup full=yes` is there already");
-  has(folder.error("object cup full=yes\nview good.png\nobject cup empty=no\n"),
+  check_says(folder.error("object cup full=yes\nview good.png\nobject cup empty=no\n"),
       "object `cup empty=no` has other attributes than `cup full=yes`; only their values may differ");
-  has(folder.error("object cup\nview good.png 0.4 0.5 0.6 0.7\n"), "a file and at most three thresholds");
-  has(folder.error("object cup\nthreshold\n"), "`threshold` takes one to four thresholds");
-  has(folder.error("object cup\nthreshold auto 0.3 2\n"), "objects.txt:2: the threshold is `2`, must be");
-  has(folder.error("# nothing\n"), "names no object");
+  check_says(folder.error("object cup\nview good.png 0.4 0.5 0.6 0.7\n"), "a file and at most three thresholds");
+  check_says(folder.error("object cup\nthreshold\n"), "`threshold` takes one to four thresholds");
+  check_says(folder.error("object cup\nthreshold auto 0.3 2\n"), "objects.txt:2: the threshold is `2`, must be");
+  check_says(folder.error("# nothing\n"), "names no object");
   folder.image("large.png", cv::Mat(9, 8, CV_8UC3, cv::Scalar(1, 2, 3)));
-  has(folder.error("object cup\nview large.png\n"), "is 8 x 9 px, must be 8 x 8 (parameter reference)");
+  check_says(folder.error("object cup\nview large.png\n"), "is 8 x 9 px, must be 8 x 8 (parameter reference)");
   folder.image("grey.png", cv::Mat(8, 8, CV_8UC1, cv::Scalar(9)));
-  has(folder.error("object cup\nview grey.png\n"), "three channels of 8 bit");
+  check_says(folder.error("object cup\nview grey.png\n"), "three channels of 8 bit");
   folder.image("black.png", cv::Mat(8, 8, CV_8UC3, cv::Scalar(0, 0, 0)));
-  has(folder.error("object cup\nview black.png\n"), "background, (0, 0, 0), everywhere");
+  check_says(folder.error("object cup\nview black.png\n"), "background, (0, 0, 0), everywhere");
   std::filesystem::remove(folder.path / "objects.txt");
   try {
     read_database(folder.path, 8, TestViews::skip);
     FAIL("an absent list must be refused");
   } catch (const DatabaseError& problem) {
-    has(problem.what(), "objects.txt: cannot be read");
+    check_says(problem.what(), "objects.txt: cannot be read");
   }
 }

@@ -8,13 +8,14 @@
 
 #include "hal/sim/simulation.hpp"
 #include "nodes/object_detection/detector.hpp"
+#include "tests/graph_folder.hpp"
 
 using namespace takt;
 using namespace takt::object_detection;
 
 namespace {
 
-const std::filesystem::path kGraph = std::filesystem::path(TAKT_SOURCE_DIR) / "graph";
+const std::filesystem::path kGraph = takt::test::graph_folder();
 
 struct Seen {
   double x = 0, y = 0;    ///< centre of the object, px

@@ -7,6 +7,7 @@
 #include "nodes/mapping_3d/pose.hpp"
 #include "nodes/semantic/reports.hpp"
 #include "rt/memory/memory_use.hpp"
+#include "tests/nanoseconds.hpp"
 #include "tests/temporary_folder.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 
@@ -20,7 +21,7 @@ namespace {
 
 constexpr int kWidth = 160, kHeight = 120;
 constexpr CameraModel kCamera{120, 79.5, 59.5, 0.25};
-constexpr int64_t kMs = 1'000'000;
+using test::kMs;
 const Transform kMount = mapping_3d::camera_mount(-0.1, 0.2, 1.4, 0, 0);
 
 constexpr const char* kDatabase = "object ball\nview a.png\nobject bottle closed=true level=full\nview b.png\n";

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <numbers>
 
+#include "tests/graph_folder.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 
 namespace takt {
@@ -41,7 +42,7 @@ struct Fixture {
     NodeTypes types;
     register_robot_client(types);
     node = types.find("robot_client")->make();
-    test::set(*node, "network", (std::filesystem::path(TAKT_SOURCE_DIR) / "graph/networks/kitchen.yaml").string());
+    test::set(*node, "network", (takt::test::graph_folder() / "networks/kitchen.yaml").string());
     for (const char* name : {"odometry", "task", "objects"}) PortAccess::connect(test::input(*node, name), {});
     test::set_up(*node);
     for (ParamBase* param : node->params()) param->end_setup();

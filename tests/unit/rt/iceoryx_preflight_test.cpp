@@ -19,9 +19,11 @@
 #include "rt/shm/iceoryx_layout.hpp"
 #include "rt/shm/transport_error.hpp"
 #include "rt/thread_state.hpp"
+#include "tests/has.hpp"
 #include "tests/temporary_folder.hpp"
 
 using namespace takt;
+using test::has;
 
 namespace {
 
@@ -46,8 +48,6 @@ std::string refusal(const IceoryxPlaces& places, uint64_t bytes = 0) {
   }
   return {};
 }
-
-bool has(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 PortPlan port(uint32_t width, uint32_t history, uint32_t held, uint32_t readers) {
   return {"node", "port", &MessageType::of<Image>(), {.width = width, .height = 1, .channels = 1}, history,

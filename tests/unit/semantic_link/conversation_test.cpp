@@ -10,6 +10,7 @@
 #include "hal/semantic_link/server.hpp"
 #include "tests/conformance/link_messages.hpp"
 #include "tests/conformance/link_network.hpp"
+#include "tests/nanoseconds.hpp"
 
 using namespace takt;
 using namespace takt::semantic_link;
@@ -17,7 +18,7 @@ using takt::test::Bytes, takt::test::MemoryNetwork;
 
 namespace {
 
-constexpr int64_t kMs = 1'000'000;
+using test::kMs;
 
 struct Fixture {
   VirtualClock clock{1'000'000'000};

@@ -15,6 +15,7 @@
 #include "hal/sim/sim_camera.hpp"
 #include "hal/sim/sim_devices.hpp"
 #include "tests/conformance/stereo_camera.hpp"
+#include "tests/graph_folder.hpp"
 #include "tests/unit/sim/small_world.hpp"
 
 using namespace takt;
@@ -23,7 +24,7 @@ using namespace takt::sim;
 namespace {
 
 constexpr int64_t kAceEpoch = 3'000'000'000;
-const std::filesystem::path kGraph = std::filesystem::path(TAKT_SOURCE_DIR) / "graph";
+const std::filesystem::path kGraph = takt::test::graph_folder();
 
 StereoRig rig(const char* name) {
   auto loaded = load_rig("camera", kGraph / "rigs" / name);

@@ -8,6 +8,7 @@
 
 #include "hal/sim/sensors.hpp"
 #include "nodes/semantic/network_file.hpp"
+#include "tests/graph_folder.hpp"
 #include "tests/has.hpp"
 #include "tests/temporary_folder.hpp"
 #include "tests/unit/sim/small_world.hpp"
@@ -105,7 +106,7 @@ TEST_CASE("mistakes in what can change are told with file, line and what is vali
 }
 
 TEST_CASE("the shipped worlds of the semantic robot load, and their objects can be reached") {
-  const std::filesystem::path worlds = std::filesystem::path(TAKT_SOURCE_DIR) / "graph/worlds";
+  const std::filesystem::path worlds = takt::test::graph_folder() / "worlds";
   struct Near {
     const char *world, *object;
     Vec2 robot;
@@ -125,7 +126,7 @@ TEST_CASE("the shipped worlds of the semantic robot load, and their objects can 
 }
 
 TEST_CASE("the kitchen has the types, attributes, actions and costs of the network that plans in it") {
-  const std::filesystem::path graph = std::filesystem::path(TAKT_SOURCE_DIR) / "graph";
+  const std::filesystem::path graph = takt::test::graph_folder();
   const auto world = load_world("world", graph / "worlds/kitchen.xml");
   REQUIRE(world.has_value());
   semantic::SemanticMap map({});
@@ -181,7 +182,7 @@ TEST_CASE("truncated and foreign maps are refused") {
 }
 
 TEST_CASE("the shipped world and rigs load, and the drive is free, slow and smooth") {
-  const std::filesystem::path graph = std::filesystem::path(TAKT_SOURCE_DIR) / "graph";
+  const std::filesystem::path graph = takt::test::graph_folder();
   const auto s = Simulation::load("camera", graph / "worlds/lab.xml", "", 1);
   REQUIRE_MESSAGE(s.has_value(), (s ? "" : s.error().text()));
   for (const char* rig : {"xb3.yaml", "xb3_fine.yaml", "xb3_raw.yaml", "x2_wide.yaml"}) {

@@ -9,11 +9,12 @@
 
 #include "graph/compose/composition.hpp"
 #include "graph/view/diagram.hpp"
+#include "tests/graph_folder.hpp"
 
 namespace takt::test {
 
 inline graph::GraphSpec load_ace() {
-  auto loaded = graph::load(std::filesystem::path(TAKT_SOURCE_DIR) / "graph/ace.yaml", {}, graph::node_types());
+  auto loaded = graph::load(takt::test::graph_folder() / "ace.yaml", {}, graph::node_types());
   for (const auto& problem : loaded.problems) MESSAGE(graph::to_string(problem));
   REQUIRE(loaded.graph);
   return *loaded.graph;

@@ -4,15 +4,15 @@
 #include <cmath>
 
 #include "fixture.hpp"
+#include "tests/has.hpp"
 #include "tests/temporary_folder.hpp"
 
 using namespace takt;
 using namespace takt::view;
+using test::has;
 using Json = nlohmann::ordered_json;
 
 namespace {
-
-bool has(const std::string& page, const std::string& part) { return page.find(part) != std::string::npos; }
 
 Json distribution(double p50, double p99, double max) {
   return {{"p50", p50}, {"p99", p99}, {"p999", nullptr}, {"max", max}};

@@ -9,6 +9,7 @@
 #include "fixture.hpp"
 #include "graph/view/graph_pictures.hpp"
 #include "graph/view/markup.hpp"
+#include "tests/graph_folder.hpp"
 
 using namespace takt;
 using namespace takt::view;
@@ -157,7 +158,7 @@ TEST_CASE("What a mode leaves out is not drawn, and its edges neither") {
   graph::LoadOptions options;
   options.mode = "no_stereo";
   const auto loaded =
-      graph::load(std::filesystem::path(TAKT_SOURCE_DIR) / "graph/ace.yaml", options, graph::node_types());
+      graph::load(takt::test::graph_folder() / "ace.yaml", options, graph::node_types());
   REQUIRE(loaded.graph);
   const Diagram diagram = make_diagram(*loaded.graph, graph::node_types(), graph::hal_catalogue());
   CHECK(diagram.boxes.size() == loaded.graph->nodes.size() + loaded.graph->devices.size());
