@@ -93,8 +93,6 @@ class Takt {
   int said_[2] = {-1, -1};
 };
 
-constexpr int64_t kSecond = 1000 * kMs;
-
 /// The USB adapter, by the vendor of its chip.
 void plug_adapter(bool in) {
   shell("for device in $(grep -l 0403 /sys/bus/usb/devices/*/idVendor); do echo " + std::to_string(in ? 1 : 0) +
