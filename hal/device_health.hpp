@@ -9,7 +9,7 @@
 namespace takt {
 
 struct DeviceHealthSettings {
-  int64_t silent_after_ns = 0;  ///< of no good data until the device counts as lost; 0: the default for its rate
+  int64_t silent_after_ns = 0;   ///< of no good data until the device counts as lost; 0: the default for its rate
   int64_t starts_within_ns = 0;  ///< until the first good data a device may take longer than silent_after, up to this
   int64_t recovers_after_ns = 500'000'000;  ///< of good data without a break until a lost device counts as back
   bool judges_frozen = true;                ///< false: repeated data are good, as of a recording of one image
@@ -22,9 +22,9 @@ int64_t default_silent_after_ns(int64_t period_ns);
 /// clock. No allocation. One thread at a time.
 ///
 /// disconnected: at once. silent, garbage, frozen: no good read for `silent_after`, or none at all for `starts_within`;
-/// all reads since were damaged, all were repetitions, or else. ok: good data for `recovers_after` without a break, a break being a bad read or
-/// `silent_after` without any data (a device may be slower than its jobs). So a loose plug does not change the state
-/// with each contact, and a device counts as lost until it has shown that it works.
+/// all reads since were damaged, all were repetitions, or else. ok: good data for `recovers_after` without a break, a
+/// break being a bad read or `silent_after` without any data (a device may be slower than its jobs). So a loose plug
+/// does not change the state with each contact, and a device counts as lost until it has shown that it works.
 class DeviceHealth {
  public:
   /// silent_after_ns > 0.

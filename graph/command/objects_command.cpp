@@ -23,8 +23,9 @@ namespace {
 
 using object_detection::Attribute, object_detection::CascadeReferences, object_detection::DatabaseError,
     object_detection::DatabaseObject, object_detection::Detector, object_detection::DetectorParameters,
-    object_detection::ErrorMaps, object_detection::ObjectList, object_detection::ReferenceView, object_detection::RocPoint,
-    object_detection::Scene, object_detection::SceneParameters, object_detection::TestViews, object_detection::Tuning;
+    object_detection::ErrorMaps, object_detection::ObjectList, object_detection::ReferenceView,
+    object_detection::RocPoint, object_detection::Scene, object_detection::SceneParameters, object_detection::TestViews,
+    object_detection::Tuning;
 using object_detection::kHistogramStages, object_detection::learn_view, object_detection::make_scene,
     object_detection::publish_revision, object_detection::read_database;
 

@@ -16,7 +16,7 @@ namespace takt::command {
 struct NodeProfile {
   std::string name;
   Histogram alone, together;
-  int64_t budget_ns = 0;            ///< of the schedule; 0: not stated
+  int64_t budget_ns = 0;  ///< of the schedule; 0: not stated
   uint64_t samples() const { return alone.count() + together.count(); }
   /// The larger of both quantiles; 0 without samples.
   int64_t quantile_ns(double quantile) const;

@@ -14,7 +14,6 @@
 
 namespace takt::test {
 
-
 inline void sleep_until(int64_t monotonic_ns) {
   const timespec t{monotonic_ns / 1'000'000'000, monotonic_ns % 1'000'000'000};
   while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &t, nullptr) == EINTR) {

@@ -44,7 +44,7 @@ TEST_CASE("the driver conforms, at every variant and rate, on a line of memory")
   }
 }
 
-TEST_CASE("the first scan comes within the time that the driver says, whatever rate and stream a host has left behind") {
+TEST_CASE("the first scan comes in the time that the driver says, whatever rate and stream a host left behind") {
   const uint32_t rates[] = {9600, 19200, 38400, 500000};
   for (const uint32_t left_at : rates)
     for (const uint32_t wanted : rates) {

@@ -81,7 +81,8 @@ TEST_CASE("classes are the entries with their attributes, whether their images a
 
 TEST_CASE("mistakes name file and line and what is valid") {
   const Folder folder;
-  check_says(folder.error("object cup\nviews good.png\n"), "objects.txt:2: unknown word `views`; valid are object, threshold");
+  check_says(folder.error("object cup\nviews good.png\n"),
+             "objects.txt:2: unknown word `views`; valid are object, threshold");
   check_says(folder.error("view good.png\n"), "objects.txt:1: `view` stands before");
   check_says(folder.error("object cup\n\nview absent.png\n"), "objects.txt:3: view ");
   check_says(folder.error("object cup\nview absent.png\n"), "absent.png cannot be read");
@@ -94,15 +95,15 @@ TEST_CASE("mistakes name file and line and what is valid") {
   check_says(folder.error("object cup\nthreshold nan\n"), "must be a number above 0");
   check_says(folder.error("object cup\nthreshold 0.4x\n"), "`0.4x`");
   check_says(folder.error("object cup\nthreshold auto\nthreshold 0.4\n"),
-      "objects.txt:3: object `cup` has a threshold already");
+             "objects.txt:3: object `cup` has a threshold already");
   check_says(folder.error("object\n"), "objects.txt:1: `object` takes a name and its attributes");
   check_says(folder.error("object cup red\n"), "objects.txt:1: `red` is no attribute; write ATTRIBUTE=VALUE");
   check_says(folder.error("object cup full=\n"), "`full=` is no attribute");
   check_says(folder.error("object cup full=yes full=no\n"), "attribute `full` is given twice");
   check_says(folder.error("object cup full=yes\nview good.png\nobject cup full=yes\n"),
-      "objects.txt:3: object `cup full=yes` is there already");
+             "objects.txt:3: object `cup full=yes` is there already");
   check_says(folder.error("object cup full=yes\nview good.png\nobject cup empty=no\n"),
-      "object `cup empty=no` has other attributes than `cup full=yes`; only their values may differ");
+             "object `cup empty=no` has other attributes than `cup full=yes`; only their values may differ");
   check_says(folder.error("object cup\nview good.png 0.4 0.5 0.6 0.7\n"), "a file and at most three thresholds");
   check_says(folder.error("object cup\nthreshold\n"), "`threshold` takes one to four thresholds");
   check_says(folder.error("object cup\nthreshold auto 0.3 2\n"), "objects.txt:2: the threshold is `2`, must be");

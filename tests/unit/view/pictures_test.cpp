@@ -157,8 +157,7 @@ TEST_CASE("The listing wraps long ids") {
 TEST_CASE("What a mode leaves out is not drawn, and its edges neither") {
   graph::LoadOptions options;
   options.mode = "no_stereo";
-  const auto loaded =
-      graph::load(takt::test::graph_folder() / "ace.yaml", options, graph::node_types());
+  const auto loaded = graph::load(takt::test::graph_folder() / "ace.yaml", options, graph::node_types());
   REQUIRE(loaded.graph);
   const Diagram diagram = make_diagram(*loaded.graph, graph::node_types(), graph::hal_catalogue());
   CHECK(diagram.boxes.size() == loaded.graph->nodes.size() + loaded.graph->devices.size());
