@@ -3,16 +3,22 @@
 # Is a replay really the run? record.sh [SECONDS]. The main job beside stress-ng, its stereo node slowed in the middle third
 # (`takt set stereo.search`) so that it degrades, is recorded; then every job runs again, alone and beside stress-ng, and
 # every message is compared. Exit 1 if a byte differs or the record lacks something.
+# `record.sh inputs` only makes the schedule and has it read.
 set -eu
 root=$(readlink -f "$(dirname "$0")/../..")
 takt=${TAKT:-$root/takt}
 seconds=${1:-60}
-command -v stress-ng >/dev/null || { echo "stress-ng is not installed: apt install stress-ng"; exit 3; }
 work=$(mktemp -d)
 trap 'rm -rf "$work"; kill $(jobs -p) 2>/dev/null || true' EXIT
 # A budget that the usual search fits into and the long one exceeds (as in degrade.sh).
-sed -E 's/(stereo: \{rate: 15, offset: 26ms, budget: )20ms/\110ms/' "$root/schedules/thesis.yaml" >"$work/schedule.yaml"
-grep -q 'stereo: .*budget: 10ms.*degrade' "$work/schedule.yaml" || { echo "schedules/thesis.yaml has changed: mend this script"; exit 1; }
+sed -E '/^ *stereo:/s/budget: [0-9]+ms/budget: 10ms/' "$root/schedules/thesis.yaml" >"$work/schedule.yaml"
+grep -q '^ *stereo: .*budget: 10ms.*degrade' "$work/schedule.yaml" || { echo "schedules/thesis.yaml has changed: mend this script"; exit 1; }
+if [ "$seconds" = inputs ]; then
+  code=0
+  "$takt" check "$root/graph/ace.yaml" --schedule "$work/schedule.yaml" >/dev/null || code=$?
+  exit $((code > 1))
+fi
+command -v stress-ng >/dev/null || { echo "stress-ng is not installed: apt install stress-ng"; exit 3; }
 
 stress-ng --cpu 2 --quiet & stress=$!
 "$takt" run --for "${seconds}s" --schedule "$work/schedule.yaml" --set stereo.disparities=512 --set stereo.search=64 \

@@ -105,7 +105,7 @@ expect 0 "" "$takt" run "$source/graph/simulator.yaml" --clock virtual --for 1s 
 expect 0 "" "$takt" run --profile replay --clock virtual --for 1s --output "$work/out"
 
 # What the scenarios run is made from schedules and graphs that change: it must still be read.
-for scenario in overload degrade saboteur; do
+for scenario in overload degrade saboteur record; do
   expect 0 "" env TAKT="$takt" bash "$source/bench/scenarios/$scenario.sh" inputs
 done
 
