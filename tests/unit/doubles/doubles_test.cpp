@@ -19,8 +19,7 @@ using namespace takt;
 
 namespace {
 
-using test::kMs;
-using test::kSecond;
+using test::kMs, test::kSecond;
 
 std::unique_ptr<sim::Simulation> world_from(sim::World world, int64_t epoch_ns) {
   auto simulation = std::make_unique<sim::Simulation>(std::move(world), 0, 3);

@@ -42,7 +42,7 @@ struct Lms200Rig : LaserLine {
   /// The host dies in the middle of what it does, and another one comes.
   void replace_host(const lms200::SessionSettings& settings) {
     dead_host = std::move(laser);
-    host(settings, std::make_unique<MemoryHostEnd>(state));
+    connect_host(settings, std::make_unique<MemoryHostEnd>(state));
   }
   /// Until scans come, at most so long.
   bool runs_within(int64_t ns) {
@@ -69,9 +69,9 @@ struct Lms200Rig : LaserLine {
     scanner = made.get();
     device = std::move(made);
     REQUIRE(device->plug_in().has_value());
-    this->host(settings, std::move(host));
+    connect_host(settings, std::move(host));
   }
-  void host(const lms200::SessionSettings& settings, std::unique_ptr<ByteStream> line) {
+  void connect_host(const lms200::SessionSettings& settings, std::unique_ptr<ByteStream> line) {
     auto talk = std::make_unique<lms200::Session>(settings);
     session = talk.get();
     laser = std::make_unique<StreamLaser>("laser", std::move(line), std::move(talk), Transform{}, clock);
