@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-
 #include "graph/cli/set_option.hpp"
 #include "graph/evaluate/figures.hpp"
 
