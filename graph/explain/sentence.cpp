@@ -79,7 +79,9 @@ std::string part_text(const Part& part, const std::string& figure, const std::st
     case Cause::budget: return fmt::format("{} over its own budget", figure);
     case Cause::execution: return fmt::format("ran {} with no budget stated", figure);
     case Cause::running: return fmt::format("ran {}", figure);
-    case Cause::slack: return fmt::format("less {} of slack", figure);
+    case Cause::slack:
+      return part.ns > 0 ? fmt::format("{} of its budget beyond its deadline", figure)
+                         : fmt::format("less {} of slack", figure);
   }
   return figure;
 }

@@ -22,7 +22,7 @@ enum class Cause : uint8_t {
   budget,        ///< execution beyond its budget
   execution,     ///< execution, where the schedule states no budget
   running,       ///< only in course(): it ran
-  slack          ///< what deadline and budget left; negative
+  slack          ///< what deadline and budget left; negative (positive: budget that was used beyond the deadline)
 };
 
 /// The time [from, to) of a job, and what it was spent on.

@@ -114,6 +114,20 @@ TEST_CASE("the sentence names causes and the source, and its figures add up") {
   CHECK(said().find("no source") != std::string::npos);
 }
 
+TEST_CASE("a budget above the deadline adds to the miss, it leaves no slack") {
+  trace::Trace trace = sample();
+  trace.jobs[1].deadline_ns = trace.jobs[1].release_ns + 9'500'000;
+  trace.tasks[trace.jobs[1].task].budget_ns = 10'000'000;
+  const trace::Evidence evidence(trace);
+  const trace::Blame blame = trace::blame(evidence, trace.jobs[1]);
+  REQUIRE(blame.parts.back().cause == trace::Cause::slack);
+  CHECK(blame.parts.back().ns == 299'999);  // ran 9.8 ms, less the 1 ns that its slice begins late
+  const std::string text = explain::sentence(trace, trace.jobs[1], blame);
+  INFO(text);
+  CHECK(text.find("0.30 of its budget beyond its deadline") != std::string::npos);
+  CHECK(text.find("less") == std::string::npos);
+}
+
 TEST_CASE("rounded figures add up, whatever the parts") {
   std::mt19937 random(11);
   trace::Trace trace = sample();
