@@ -3,15 +3,16 @@
 # A graph whose devices are all doubles at byte level, with everything on: day_in_the_life.sh [MINUTES] [SEED]
 # Default: 30 minutes of graph/ace.yaml (GRAPH=FILE: another one), profile doubles, recorded (RECORD=FILE keeps the record;
 # it is some 40 MB a second, so by default it goes to /dev/null). It prints which rates were kept, what each device lost,
-# memory and descriptors at the start, in the middle and at the end, and deadlines missed. With a SEED (and at least 2
-# minutes) a device misbehaves every 12 seconds for 3, in every way that its double knows.
+# memory and descriptors at the start, in the middle and at the end, deadlines missed, and how long the host was seen away
+# (tests/tools/host_holes.py). With a SEED (and at least 2 minutes) a device misbehaves every 12 seconds for 3, in every way
+# that its double knows.
 # Exit 1 if memory or descriptors grew, a device was not well at the end, obstacle_stop missed a deadline, a node with a
 # rate had fewer than 99 of 100 jobs while it was to run, the record lost anything, or, without a SEED, a device had
 # damaged or missing data, left commands unsent, or was away after its start.
 root=$(readlink -f "$(dirname "$0")/../..")
-export PYTHONDONTWRITEBYTECODE=1
+export PYTHONPATH="$root/tests/tools" PYTHONDONTWRITEBYTECODE=1
 exec python3 - "${TAKT:-$root/takt}" "${GRAPH:-$root/graph/ace.yaml}" "$@" <<'PY'
-import json, os, random, re, subprocess, sys, tempfile, time
+import host_holes, json, os, random, re, subprocess, sys, tempfile, time
 
 takt, graph, args = sys.argv[1], sys.argv[2], sys.argv[3:]
 seconds = int(float(args[0] if args else 30) * 60)
@@ -37,6 +38,7 @@ options = [f"--set={d}.failures={', '.join(failures)}" for d, failures in told.i
 
 with tempfile.TemporaryDirectory(prefix="day-") as work:
     log = open(f"{work}/log", "w")
+    watch = host_holes.start(f"{work}/holes")
     run = subprocess.Popen([takt, "run", graph, "--profile", "doubles", "--for", f"{seconds}s", "--output", f"{work}/out",
                             "--report", f"{work}/report.json", "--record", os.environ.get("RECORD", "/dev/null"), *options], stdout=log, stderr=log)
 
@@ -60,10 +62,11 @@ with tempfile.TemporaryDirectory(prefix="day-") as work:
         if run.poll() is None: samples.append(reading())
     if not os.path.exists(f"{work}/report.json"): sys.exit("no report:\n" + open(log.name).read()[-3000:])
     report = json.load(open(f"{work}/report.json"))
+    holes_ms = [(end - begin) / 1e6 for _, begin, end in host_holes.end(watch, f"{work}/holes")]
 
 duration = report["duration_s"]
 print(f"{report['graph']}: {duration:.0f} s, policy {report['policy_granted']}, {len(report['processes']) or 1} processes, CPU {report['cpu']['utilisation']:.2f} cores, "
-      f"host stall {report['host_stall_ms']} ms" + (f", {sum(map(len, told.values()))} misbehaviours (seed {seed})" if seed is not None else ""))
+      f"host stall {report['host_stall_ms']} ms, seen away {len(holes_ms)} times, longest {max(holes_ms, default=0):.0f}, in all {sum(holes_ms):.0f} ms" + (f", {sum(map(len, told.values()))} misbehaviours (seed {seed})" if seed is not None else ""))
 bad = []
 for n in report["nodes"]:
     if n["rate_hz"] and n["completed"] < 0.99 * n["rate_hz"] * n["active_s"] - 1: bad.append(f"{n['name']} did not keep its rate")

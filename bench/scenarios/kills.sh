@@ -5,12 +5,13 @@
 # was away, what the nodes of the others missed meanwhile, and what is left afterwards: chunks, beside a minute without kills
 # that comes first; descriptors, threads, /dev/shm, /tmp, and SCHED_DEADLINE bandwidth, found by asking the kernel for it.
 # Each miss of a high-criticality node is told with its reason (takt explain) and with the kill before it; those of jobs whose
-# own process was away are counted apart. Exit 1 if a process was away for more than 2 s or did not come back, a
+# own process was away are counted apart, and those that the host's absence accounts for: what it tells itself, or what
+# tests/tools/host_holes.py sees beside the run. Exit 1 if a process was away for more than 2 s or did not come back, a
 # high-criticality node of another one missed a deadline for which the host's stall does not account, or something is left.
 root=$(readlink -f "$(dirname "$0")/../..")
-export PYTHONPATH="$root/bench/scenarios" PYTHONDONTWRITEBYTECODE=1
+export PYTHONPATH="$root/bench/scenarios:$root/tests/tools" PYTHONDONTWRITEBYTECODE=1
 exec python3 - "${TAKT:-$root/takt}" "$@" <<'PY'
-import ctypes, json, os, processes, random, re, signal, struct, subprocess, sys, tempfile, time
+import ctypes, host_holes, json, os, processes, random, re, signal, struct, subprocess, sys, tempfile, time
 
 takt, args = sys.argv[1], sys.argv[2:]
 kills = int(args[0]) if args else 200
@@ -88,8 +89,8 @@ def begin(name, length):
     return run
 
 
-def missed(report):
-    """Jobs of high-criticality nodes that were late: (line, whether their own process was away, whether the host's stall
+def missed(report, holes):
+    """Jobs of high-criticality nodes that were late: (line, whether their own process was away, whether the host's absence
     accounts for it). A miss that the trace does not have is nobody's excuse."""
     trace = json.load(open(f"{work}/killed.trace"))
     epoch = trace["otherData"]["epoch_ns"]
@@ -107,8 +108,11 @@ def missed(report):
         before = [kill for kill in struck if kill[0] <= release]
         kill = f"{(release - before[-1][0]) / 1e6:.0f} ms after the end of {before[-1][1]}" if before else "before any kill"
         stall, by = re.search(r"host stall ([\d.]+)", line), re.search(r" by ([\d.]+) ms", line)
-        rows.append((f"{kill}: {line}", any(name in nodes and release <= to and deadline >= start for nodes, start, to in away),
-                     bool(stall and by and float(stall[1]) >= float(by[1]))))
+        late_ms = float(by[1]) if by else 0
+        seen_ms = host_holes.taken_ns(holes, release, deadline + late_ms * 1e6) / 1e6
+        rows.append((f"{kill}: {line}" + (f"; the host was seen away for {seen_ms:.1f} ms meanwhile" if seen_ms else ""),
+                     any(name in nodes and release <= to and deadline >= start for nodes, start, to in away),
+                     bool(by and max(seen_ms, float(stall[1]) if stall else 0) >= late_ms)))
     for name, count in high.items():
         told = sum(row[2] == name for row in late)
         if count > told: rows.append((f"{count - told} misses of {name} that the trace does not have", False, False))
@@ -120,6 +124,7 @@ with tempfile.TemporaryDirectory(prefix="kills-") as work:
     before, room = traces(), bandwidth()
     begin("calm", min(seconds, 60)).wait()
     calm = json.load(open(f"{work}/calm.json"))["memory"]["chunks_at_end"]
+    watch = host_holes.start(f"{work}/holes")
     run = begin("killed", seconds)
     early = open_things(run.pid)
     first, last = time.monotonic(), time.monotonic() + seconds - 16
@@ -136,7 +141,8 @@ with tempfile.TemporaryDirectory(prefix="kills-") as work:
     code = run.wait()
     if not os.path.exists(f"{work}/killed.json"): sys.exit(f"no report, exit {code}, killed {struck}:\n" + open(f"{work}/killed.log").read()[-3000:])
     report = json.load(open(f"{work}/killed.json"))
-    misses = missed(report)
+    holes = host_holes.end(watch, f"{work}/holes")
+    misses = missed(report, holes)
     print(open(f"{work}/killed.log").read()[-3000:] if code not in (0, 1) else "", end="")
     after, room_after = traces(), bandwidth()
 
@@ -145,7 +151,7 @@ chunks = report["memory"]["chunks_at_end"]
 back = sorted(f["down_s"] for f in outages if f["back_s"] is not None)
 pick = lambda q: back[min(len(back) - 1, int(q * len(back)))] if back else float("nan")
 print(f"{len(struck)} kills in {report['duration_s']:.0f} s, policy {report['policy_granted']}, {report['transport']} transport, "
-      f"host stall {report['host_stall_ms']} ms; exit {code}")
+      f"host stall {report['host_stall_ms']} ms, seen away {len(holes)} times, {sum(end - begin for _, begin, end in holes) / 1e6:.0f} ms; exit {code}")
 print(f"away until every node has run again: p50 {pick(.5):.2f} s, p99 {pick(.99):.2f} s, max {pick(1):.2f} s; "
       f"not back: {len(outages) - len(back)}; chunks taken back from the dead: {sum(f['chunks_freed'] for f in outages)}")
 print(f"{'node':18}{'crit':>6}{'released':>10}{'down':>7}{'done':>8}{'miss':>6}{'skip':>6}")

@@ -2,11 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Runs a command and tells how long the host kept this machine's CPUs from running meanwhile.
 
-host_holes.py FILE COMMAND...: exit code of the command; FILE then holds whole milliseconds, of all CPUs together: the
-larger of what the kernel counts as stolen and of what is seen here, since some hosts report none. On each CPU a thread of
-SCHED_FIFO 98 wakes every 5 ms. Where it wakes late, either somebody of higher priority had the CPU: then its tick came
-meanwhile, or nobody had: then it did not. Only the latter counts, from 12 ms on. Without the right to SCHED_FIFO only the
-kernel's count is told."""
+host_holes.py FILE COMMAND...: exit code of the command; the first line of FILE then holds whole milliseconds, of all CPUs
+together: the larger of what the kernel counts as stolen and of what is seen here, since some hosts report none. Each other
+line is a hole that was seen: `CPU FROM_NS TO_NS` (CLOCK_MONOTONIC). On each CPU a thread of SCHED_FIFO 98 wakes every 5 ms.
+Where it wakes late, either somebody of higher priority had the CPU: then its tick came meanwhile, or nobody had: then it
+did not. Only the latter counts, from 12 ms on. Without the right to SCHED_FIFO only the kernel's count is told.
+
+For scripts:  watch = host_holes.start(file)         before a run: a process of its own, which ends with its starter at the latest
+              holes = host_holes.end(watch, file)    after it: [(cpu, from_ns, to_ns)]
+              host_holes.taken_ns(holes, from, to)   the most that one CPU lost of that time"""
 import os
 import subprocess
 import sys
@@ -28,7 +32,7 @@ def timer_interrupts(cpu):
         return next(int(line.split()[column]) for line in table if line.lstrip().startswith("LOC:"))
 
 
-def watch(cpu, ended, holes_s):
+def watch(cpu, ended, holes):
     os.sched_setaffinity(0, {cpu})
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
@@ -40,14 +44,31 @@ def watch(cpu, ended, holes_s):
         late = time.monotonic() - due
         before, ticks = ticks, timer_interrupts(cpu)
         if late > LEAST_S and (ticks - before) * TICK_S < late / 2:
-            holes_s.append(late)
+            holes.append((cpu, round(due * 1e9), round((due + late) * 1e9)))
         due = time.monotonic() + STEP_S
+
+
+def start(file):
+    return subprocess.Popen([sys.executable, __file__, file, "cat"], stdin=subprocess.PIPE)
+
+
+def end(watch, file):
+    watch.communicate()  # closes what `cat` reads
+    with open(file) as lines:
+        return [tuple(map(int, line.split())) for line in list(lines)[1:]]
+
+
+def taken_ns(holes, from_ns, to_ns):
+    of_cpu = {}
+    for cpu, begin, end in holes:
+        of_cpu[cpu] = of_cpu.get(cpu, 0) + max(0, min(end, to_ns) - max(begin, from_ns))
+    return max(of_cpu.values(), default=0)
 
 
 def main():
     file, command = sys.argv[1], sys.argv[2:]
-    ended, holes_s, stolen_before = threading.Event(), [], stolen_ms()
-    threads = [threading.Thread(target=watch, args=(cpu, ended, holes_s)) for cpu in os.sched_getaffinity(0)]
+    ended, holes, stolen_before = threading.Event(), [], stolen_ms()
+    threads = [threading.Thread(target=watch, args=(cpu, ended, holes)) for cpu in os.sched_getaffinity(0)]
     for thread in threads:
         thread.start()
     code = subprocess.run(command, check=False).returncode
@@ -55,8 +76,10 @@ def main():
     for thread in threads:
         thread.join()
     with open(file, "w") as out:
-        out.write(f"{max(stolen_ms() - stolen_before, round(1000 * sum(holes_s)))}\n")
+        out.write(f"{max(stolen_ms() - stolen_before, round(sum(end - begin for _, begin, end in holes) / 1e6))}\n")
+        out.writelines(f"{cpu} {begin} {end}\n" for cpu, begin, end in sorted(holes, key=lambda hole: hole[1]))
     return code if code >= 0 else 128 - code
 
 
-sys.exit(main())
+if __name__ == "__main__":
+    sys.exit(main())
