@@ -14,6 +14,7 @@
 #include "hal/settings/json.hpp"
 #include "nodes/calibration/generated_sweeps.hpp"
 #include "nodes/calibration/picture.hpp"
+#include "rt/quantile.hpp"
 
 namespace takt::command {
 namespace {
@@ -121,12 +122,6 @@ int calibrate_recording(const CalibrateLasersOptions& o) {
 }
 
 // Generated sweeps ---------------------------------------------------------------------------------------------------
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 Json to_json(const MountErrors& e) {
   return {{"error_m", median(e.position_m)},

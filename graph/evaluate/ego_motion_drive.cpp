@@ -14,6 +14,7 @@
 #include "graph/evaluate/evaluations.hpp"
 #include "nodes/ego_motion/evaluate.hpp"
 #include "nodes/stereo/matcher.hpp"
+#include "rt/quantile.hpp"
 #include "rt/time/clock.hpp"
 
 namespace takt::command {
@@ -110,7 +111,7 @@ void add_disparity(Drive& drive, int disparities) {
     if (!matched)
       throw BadData(fmt::format("frame {}: size differs from the first image", &frame - drive.frames.data()));
   }
-  drive.stereo_ms = ego_motion::quantile(times, 0.5);
+  drive.stereo_ms = quantile(times, 0.5);
 }
 
 Drive read_drive(const std::filesystem::path& folder, double scale, int disparities) {
@@ -158,7 +159,7 @@ Track follow(const Drive& drive, const ego_motion::Parameters& parameters) {
   std::vector<double> times;
   for (size_t i = 0; i < drive.frames.size(); ++i)
     times.push_back(cpu_ms([&] { track.results.push_back(ego.step(frame_of(drive, i))); }));
-  track.step_ms = ego_motion::quantile(times, 0.5);
+  track.step_ms = quantile(times, 0.5);
   return track;
 }
 

@@ -6,8 +6,9 @@
 #include <algorithm>
 #include <vector>
 
-#include "graph/evaluate/figures.hpp"
+#include "graph/evaluate/percent.hpp"
 #include "nodes/ego_motion/evaluate.hpp"
+#include "rt/quantile.hpp"
 
 namespace takt::command {
 namespace {
@@ -32,11 +33,11 @@ class Errors {
     if (truth.t.norm() > kLeastStep_m) percent_.push_back(100 * e.metres / truth.t.norm());
   }
   Json row() const {
-    return {{"median_mm", ego_motion::quantile(mm_, 0.5)},
-            {"p95_mm", ego_motion::quantile(mm_, 0.95)},
-            {"median_pct", percent_.empty() ? Json() : Json(ego_motion::quantile(percent_, 0.5))},
-            {"median_deg", ego_motion::quantile(degrees_, 0.5)},
-            {"p95_deg", ego_motion::quantile(degrees_, 0.95)}};
+    return {{"median_mm", quantile(mm_, 0.5)},
+            {"p95_mm", quantile(mm_, 0.95)},
+            {"median_pct", percent_.empty() ? Json() : Json(quantile(percent_, 0.5))},
+            {"median_deg", quantile(degrees_, 0.5)},
+            {"p95_deg", quantile(degrees_, 0.95)}};
   }
 
  private:

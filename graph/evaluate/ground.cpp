@@ -10,9 +10,9 @@
 #include <optional>
 
 #include "graph/cli/outcome.hpp"
-#include "graph/evaluate/figures.hpp"
 #include "graph/evaluate/ground_score.hpp"
 #include "hal/settings/json.hpp"
+#include "rt/quantile.hpp"
 #include "rt/time/clock.hpp"
 
 namespace takt::command {

@@ -8,13 +8,14 @@
 #include <random>
 
 #include "graph/cli/outcome.hpp"
-#include "graph/evaluate/figures.hpp"
 #include "graph/evaluate/ground_score.hpp"
+#include "graph/evaluate/percent.hpp"
 #include "hal/camera/rig.hpp"
 #include "nodes/ground_map/ground_grid.hpp"
 #include "nodes/ground_map/pavement_scene.hpp"
 #include "nodes/mapping_3d/pose.hpp"
 #include "nodes/picture/draw.hpp"
+#include "rt/quantile.hpp"
 #include "rt/time/clock.hpp"
 
 namespace takt::command {

@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 
 #include "graph/cli/set_option.hpp"
-#include "graph/evaluate/figures.hpp"
+#include "rt/quantile.hpp"
 
 namespace takt::command {
 

@@ -13,9 +13,9 @@
 #include <tuple>
 #include <vector>
 
-#include "graph/evaluate/figures.hpp"
 #include "nodes/stereo/matcher.hpp"
 #include "nodes/stereo/triangulate.hpp"
+#include "rt/quantile.hpp"
 
 namespace takt::command {
 namespace {

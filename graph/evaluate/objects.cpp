@@ -7,11 +7,11 @@
 
 #include "graph/cli/outcome.hpp"
 #include "graph/evaluate/evaluations.hpp"
-#include "graph/evaluate/figures.hpp"
 #include "hal/settings/json.hpp"
 #include "nodes/object_detection/evaluate.hpp"
 #include "nodes/object_detection/photographs.hpp"
 #include "nodes/object_detection/tally.hpp"
+#include "rt/quantile.hpp"
 #include "rt/time/clock.hpp"
 
 namespace takt::command {

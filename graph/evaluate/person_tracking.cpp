@@ -6,9 +6,10 @@
 
 #include "graph/cli/outcome.hpp"
 #include "graph/evaluate/evaluations.hpp"
-#include "graph/evaluate/figures.hpp"
+#include "graph/evaluate/percent.hpp"
 #include "hal/settings/json.hpp"
 #include "nodes/person_tracking/evaluate.hpp"
+#include "rt/quantile.hpp"
 
 namespace takt::command {
 namespace {

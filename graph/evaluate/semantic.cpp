@@ -6,12 +6,13 @@
 
 #include "graph/cli/outcome.hpp"
 #include "graph/evaluate/evaluations.hpp"
-#include "graph/evaluate/figures.hpp"
+#include "graph/evaluate/percent.hpp"
 #include "hal/settings/json.hpp"
 #include "nodes/planner/planner.hpp"
 #include "nodes/semantic/evaluate.hpp"
 #include "nodes/semantic/network_file.hpp"
 #include "nodes/semantic/network_text.hpp"
+#include "rt/quantile.hpp"
 
 namespace takt::command {
 namespace {

@@ -7,10 +7,10 @@
 
 #include "graph/cli/outcome.hpp"
 #include "graph/evaluate/evaluations.hpp"
-#include "graph/evaluate/figures.hpp"
 #include "hal/settings/json.hpp"
 #include "nodes/object_detection/scenes.hpp"
 #include "nodes/sift/sift_match.hpp"
+#include "rt/quantile.hpp"
 #include "rt/time/clock.hpp"
 
 namespace takt::command {

@@ -10,7 +10,6 @@
 
 #include "graph/cli/outcome.hpp"
 #include "graph/evaluate/evaluations.hpp"
-#include "graph/evaluate/figures.hpp"
 #include "graph/evaluate/laser_stereo.hpp"
 #include "graph/evaluate/stereo_parameters.hpp"
 #include "hal/settings/json.hpp"
@@ -18,6 +17,7 @@
 #include "nodes/stereo/evaluate_peers.hpp"
 #include "nodes/stereo/half_resolution.hpp"
 #include "nodes/stereo/matcher.hpp"
+#include "rt/quantile.hpp"
 #include "rt/time/clock.hpp"
 
 namespace takt::command {

@@ -10,6 +10,8 @@
 #include <opencv2/calib3d.hpp>
 #include <stdexcept>
 
+#include "rt/quantile.hpp"
+
 namespace takt::calibration {
 namespace {
 
@@ -81,12 +83,6 @@ struct Alone {
 Fit fit_all(const Observations& seen, cv::Size image) {
   return fit(seen, Alone(seen, seen.left, image).camera, Alone(seen, seen.right, image).camera, image,
              kModel | cv::CALIB_USE_INTRINSIC_GUESS);
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 /// The pose between the cameras as each view alone has it, tried on all views: by how much it misses the corners of the

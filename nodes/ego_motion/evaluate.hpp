@@ -3,24 +3,15 @@
 #pragma once
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <numbers>
 #include <span>
 #include <vector>
 
 #include "nodes/ego_motion/rigid.hpp"
+#include "rt/quantile.hpp"
 #include "rt/transform/pose_math.hpp"
 
 namespace takt::ego_motion {
-
-/// The smallest value that at least `share` of all do not exceed; 0 of none.
-inline double quantile(std::vector<double> values, double share) {
-  if (values.empty()) return 0;
-  const double rank = std::ceil(share * static_cast<double>(values.size())) - 1;
-  const auto at = values.begin() + std::clamp<ptrdiff_t>(static_cast<ptrdiff_t>(rank), 0, std::ssize(values) - 1);
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
-}
 
 inline double degrees(const Eigen::Matrix3d& R) { return rotation_vector(R).norm() * 180 / std::numbers::pi; }
 

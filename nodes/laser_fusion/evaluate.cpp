@@ -1,17 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "nodes/laser_fusion/evaluate.hpp"
 
-#include <algorithm>
 #include <opencv2/core/utility.hpp>
+
+#include "rt/quantile.hpp"
 
 namespace takt::laser_fusion {
 namespace {
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// Calls body(0) .. body(count - 1) on all CPUs, in any order.
 template <typename Body>

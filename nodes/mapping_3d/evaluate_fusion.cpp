@@ -4,18 +4,13 @@
 
 #include "nodes/mapping_3d/evaluate.hpp"
 #include "nodes/mapping_3d/recorded_views.hpp"
+#include "rt/quantile.hpp"
 #include "rt/time/clock.hpp"
 
 namespace takt::mapping_3d {
 namespace {
 
 constexpr double kOutlier_m = 0.10;
-
-double median_of(std::vector<double> values) {
-  if (values.empty()) return 0;
-  std::nth_element(values.begin(), values.begin() + static_cast<ptrdiff_t>(values.size() / 2), values.end());
-  return values[values.size() / 2];
-}
 
 /// Errors of depths, added up.
 class Errors {
@@ -102,7 +97,7 @@ class Comparison {
   }
 
   FusionEvaluation result() const {
-    return {{single_.figures(), merged_.figures(), printed_.figures(), fused_.figures()}, median_of(times_ms_)};
+    return {{single_.figures(), merged_.figures(), printed_.figures(), fused_.figures()}, median(times_ms_)};
   }
 
  private:

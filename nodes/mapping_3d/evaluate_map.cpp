@@ -8,6 +8,7 @@
 #include <set>
 
 #include "nodes/mapping_3d/evaluate.hpp"
+#include "rt/quantile.hpp"
 #include "rt/time/clock.hpp"
 #include "rt/transform/pose_math.hpp"
 
@@ -22,12 +23,6 @@ constexpr double kCircle_m = 1.9, kStep_m = 0.15;
 DepthCamera depth_camera_of(const WorldCamera& c) {
   return mapping_3d::depth_camera_of(c.model(), c.step_px,
                                      static_cast<size_t>(c.width) * static_cast<size_t>(c.height));
-}
-
-double quantile(std::vector<double> values, double share) {
-  if (values.empty()) return 0;
-  std::sort(values.begin(), values.end());
-  return values[static_cast<size_t>(share * static_cast<double>(values.size() - 1))];
 }
 
 Transform on_circle(size_t step) {

@@ -9,6 +9,7 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "rt/quantile.hpp"
 #include "rt/time/clock.hpp"
 
 namespace takt::object_3d {
@@ -16,13 +17,6 @@ namespace {
 
 constexpr size_t kMostPoints = 320 * 240, kMostObjects = 16;
 const auto kWhole = [] { return true; };
-
-double quantile(std::vector<double> v, double q) {
-  if (v.empty()) return 0;
-  const auto at = v.begin() + static_cast<ptrdiff_t>(std::floor(q * static_cast<double>(v.size() - 1)));
-  std::nth_element(v.begin(), at, v.end());
-  return *at;
-}
 
 double pct(size_t part, size_t whole) {
   return whole == 0 ? 0 : 100.0 * static_cast<double>(part) / static_cast<double>(whole);

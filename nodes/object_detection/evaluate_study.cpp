@@ -4,17 +4,11 @@
 #include <algorithm>
 
 #include "nodes/object_detection/stage_errors.hpp"
+#include "rt/quantile.hpp"
 #include "rt/time/clock.hpp"
 
 namespace takt::object_detection {
 namespace {
-
-template <class Number>
-double median(std::vector<Number> v) {
-  if (v.empty()) return 0;
-  std::nth_element(v.begin(), v.begin() + static_cast<ptrdiff_t>(v.size() / 2), v.end());
-  return static_cast<double>(v[v.size() / 2]);
-}
 
 DatabaseObject with_references(DatabaseObject object, size_t references) {
   const std::vector<ReferenceView> views = object.views;

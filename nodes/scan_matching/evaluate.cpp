@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "rt/quantile.hpp"
 #include "rt/time/clock.hpp"
 
 namespace takt::scan_matching {
@@ -12,13 +13,6 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kChiSquared95 = 7.815;  // three degrees of freedom
-
-double quantile(std::vector<double> v, double share) {
-  if (v.empty()) return 0;
-  const auto at = std::min(v.size() - 1, static_cast<size_t>(share * static_cast<double>(v.size())));
-  std::nth_element(v.begin(), v.begin() + static_cast<ptrdiff_t>(at), v.end());
-  return v[at];
-}
 
 /// Steps of one method.
 class Tally {
