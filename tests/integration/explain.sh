@@ -133,6 +133,9 @@ run --clock virtual --for 1s --trace "$work/v.json"
 expect 0 "" "$takt" explain "$work/v.json" victim
 grep -q "^victim missed job 0 by 7.00 ms: preempted 10.00 by culprit on cpu $core, less 3.00 of slack (switches as sim" \
   "$work/stdout" || fail "what was simulated is not what is told: $(cat "$work/stdout")"
+expect 0 "" "$takt" explain "$work/v.json" culprit
+grep -q "^culprit missed job 0 by 0.500 ms: 0.500 of its budget beyond its deadline (switches as sim" "$work/stdout" ||
+  fail "a budget above its deadline is not told: $(cat "$work/stdout")"
 expect 0 "" "$takt" explain "$work/v.json" blocker
 grep -q "no job of blocker missed" "$work/stdout" || fail "a job that was in time is said to have missed"
 expect 2 "valid are: long_one" "$takt" explain "$work/v.json" nobody
