@@ -81,9 +81,11 @@ def follow_driver(clone):
     clone.run(clone.said(GUIDES, r"Then `([^`]*)` runs the suite"), output="100% tests passed")
     clone.run(clone.said(GUIDES, r"`(\./takt nodes laser_scanner)`"), output="a scanner in a tube")
     clone.run(clone.said(GUIDES, r"`(\./takt run graph/lasers.yaml --profile tube [^`]*)`") + " || [ $? -eq 1 ]", output="front_laser")
-    for wrong, command, code in (("2cm3", clone.said(GUIDES, r"refused by `([^`]*)`"), 2), ("-1m", "./takt run graph/lasers.yaml --profile tube --for 1s", 3)):
+    in_the_profile, of_the_device = r"lasers\.yaml:15:", r"lasers\.yaml:10:"
+    for wrong, command, line in (("2cm3", clone.said(GUIDES, r"refused by `([^`]*)`"), in_the_profile),
+                                 ("-1m", "./takt run graph/lasers.yaml --profile tube --for 1s", of_the_device)):
         clone.replace("graph/lasers.yaml", "radius: 2m}", f"radius: {wrong}}}")
-        clone.run(command, code, r"lasers\.yaml:15:")
+        clone.run(command, 2, line)
         clone.replace("graph/lasers.yaml", f"radius: {wrong}}}", "radius: 2m}")
 
 
