@@ -27,15 +27,14 @@ class Clone:
         if not found: sys.exit(f"{document} no longer says {pattern}")
         return found[1]
 
-    def insert(self, file, after, text):
-        path = self.folder / file
-        old = path.read_text()
-        if old.count(after) != 1: sys.exit(f"{file} has {after!r} {old.count(after)} times, to insert behind it")
-        path.write_text(old.replace(after, after + text))
-
     def replace(self, file, old, new):
         path = self.folder / file
-        path.write_text(path.read_text().replace(old, new))
+        text = path.read_text()
+        if text.count(old) != 1: sys.exit(f"{file} has {old!r} {text.count(old)} times, and the guide speaks of one")
+        path.write_text(text.replace(old, new))
+
+    def insert(self, file, after, text):
+        self.replace(file, after, after + text)
 
     def run(self, command, code=0, output="", beside=None):
         """`output`: what it must print. `beside`: (seconds later, a command that must end with 0 meanwhile)."""
