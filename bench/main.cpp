@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// takt-bench SUITE [--json FILE] [--rounds N]
+// takt-bench SUITE [--json FILE] [--rounds N] [--only CONDITION]
 #include <sys/utsname.h>
 #include <unistd.h>
 
@@ -75,6 +75,7 @@ int main(int argc, char** argv) {
   app.add_option("--json", json_file, "write the rows to this file as one JSON array");
   app.add_option("--rounds", options.rounds, "interleaved rounds (default: the suite's own)")
       ->check(CLI::Range(1, 10000));
+  app.add_option("--only", options.only, "one condition of a suite that has several (release, release_loads)");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -85,6 +86,10 @@ int main(int argc, char** argv) {
     if (suite.name == suite_name) chosen = &suite;
   if (chosen == nullptr) {
     std::cerr << "takt-bench: no suite `" << suite_name << "`; there are:" << list << '\n';
+    return 2;
+  }
+  if (const std::string refused = refused_condition(*chosen, options.only); !refused.empty()) {
+    std::cerr << "takt-bench: " << refused << '\n';
     return 2;
   }
   describe_machine();

@@ -8,7 +8,9 @@ namespace takt::bench {
 std::vector<Row> run_transport(const Options&);
 std::vector<Row> run_publish(const Options&);
 std::vector<Row> run_release(const Options&);
+std::vector<std::string> release_conditions();
 std::vector<Row> run_release_loads(const Options&);
+std::vector<std::string> release_loads_conditions();
 std::vector<Row> run_graph(const Options&);
 std::vector<Row> run_trace(const Options&);
 std::vector<Row> run_record(const Options&);
@@ -32,8 +34,10 @@ std::span<const Suite> suites() {
   static const auto list = std::to_array<Suite>({
       {"transport", "one message from output to input: one worker, threads, processes", run_transport},
       {"publish", "what a reader that never comes, or keeps all it gets, costs a writer", run_publish},
-      {"release", "lateness of the five rates against clock_nanosleep, idle and under load", run_release},
-      {"release_loads", "the same per rate, policy and load, beside cyclictest; ten minutes", run_release_loads},
+      {"release", "lateness of the five rates against clock_nanosleep, idle and under load", run_release,
+       release_conditions},
+      {"release_loads", "the same per rate, policy and load, beside cyclictest; ten minutes", run_release_loads,
+       release_loads_conditions},
       {"graph", "ten nodes, seven hops: in one process, as ten processes, and over other libraries", run_graph},
       {"trace", "what tracing costs a job and a run, against the same without", run_trace},
       {"record", "what recording two stereo cameras of 1280x960 costs, against the same run without", run_record},
@@ -54,30 +58,6 @@ std::span<const Suite> suites() {
       {"fusion", "median fusion of depth images against its plain definition; a cloud's way into the map", run_fusion},
   });
   return list;
-}
-
-std::string granted_text(const Grant& grant) {
-  if (!grant.refused.empty()) return grant.refused;
-  if (grant.policy != Policy::fixed) return "default policy";
-  return "SCHED_FIFO " + std::to_string(grant.priority) +
-         (grant.cpus.size() == 1 ? ", CPU " + std::to_string(grant.cpus[0]) : "");
-}
-
-void add_pair(std::vector<Row>& rows, Row row, const std::string& reference, const Pairs& pairs) {
-  Row null{row.name + "_null", row.unit, 0, {}, reference, {}, {}, row.granted};
-  row.reference = reference;
-  if (const auto middle = pairs.middle()) {
-    row.value = middle->value;
-    row.reference_value = middle->reference;
-    row.ratio = middle->ratio;
-  }
-  rows.push_back(std::move(row));
-  if (const auto middle = pairs.null()) {
-    null.value = middle->value;
-    null.reference_value = middle->reference;
-    null.ratio = middle->ratio;
-    rows.push_back(std::move(null));
-  }
 }
 
 }  // namespace takt::bench

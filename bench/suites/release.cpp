@@ -13,14 +13,35 @@
 namespace takt::bench {
 
 std::vector<Row> run_release(const Options& options);
+std::vector<std::string> release_conditions();
 
 namespace {
 
-void run_condition(Policy policy, Load load, int64_t anticipate_ns, int rounds, std::vector<Row>& rows) {
-  const std::string variant = std::string(to_string(policy)) + (load == Load::idle ? "_idle" : "_two_hogs") +
-                              (anticipate_ns == 0 ? "_anticipate_0" : "");
+struct Condition {
+  Policy policy;
+  Load load;
+  int64_t anticipate_ns;
+  std::string name() const {
+    return std::string(to_string(policy)) + (load == Load::idle ? "_idle" : "_two_hogs") +
+           (anticipate_ns == 0 ? "_anticipate_0" : "");
+  }
+};
+
+std::vector<Condition> all_conditions() {
+  std::vector<Condition> all;
+  for (const int64_t anticipate_ns : {kDefaultAnticipate_ns, int64_t{0}}) {
+    for (const Policy policy : {Policy::deadline, Policy::fixed})
+      for (const Load load : {Load::idle, Load::cpu}) all.push_back({policy, load, anticipate_ns});
+    all.push_back({Policy::cooperative, Load::idle, anticipate_ns});
+  }
+  return all;
+}
+
+void run_condition(const Condition& condition, int rounds, std::vector<Row>& rows) {
+  const Policy policy = condition.policy;
+  const std::string variant = condition.name();
   std::fprintf(stderr, "release: %s\n", variant.c_str());
-  const Burden burden(load);
+  const Burden burden(condition.load);
   Pairs p50, p99, cpu;
   Samples all, all_cpu;
   // Of as many raw rounds as Takt's: the last raw round is left out.
@@ -38,7 +59,7 @@ void run_condition(Policy policy, Load load, int64_t anticipate_ns, int rounds, 
   };
   reference();
   for (int i = 0; i < rounds; ++i) {
-    const ReleaseRound round = takt_round(policy, anticipate_ns, granted);
+    const ReleaseRound round = takt_round(policy, condition.anticipate_ns, granted);
     p50.add_b(round.all().quantile(0.5).value_or(0));
     p99.add_b(round.all().quantile(0.99).value_or(0));
     cpu.add_b(round.cpu_us);
@@ -67,16 +88,19 @@ void run_condition(Policy policy, Load load, int64_t anticipate_ns, int rounds, 
 
 }  // namespace
 
+std::vector<std::string> release_conditions() {
+  std::vector<std::string> names;
+  for (const Condition& condition : all_conditions()) names.push_back(condition.name());
+  return names;
+}
+
 std::vector<Row> run_release(const Options& options) {
   const CpuLatencyHold latency = hold_cpu_dma_latency();  // as `takt run` does; cyclictest holds it, too
   if (latency.refused()) std::fprintf(stderr, "release: %s\n", latency.lacks().c_str());
   const int rounds = options.rounds_or(10);
   std::vector<Row> rows;
-  for (int64_t anticipate_ns : {kDefaultAnticipate_ns, int64_t{0}}) {
-    for (Policy policy : {Policy::deadline, Policy::fixed})
-      for (Load load : {Load::idle, Load::cpu}) run_condition(policy, load, anticipate_ns, rounds, rows);
-    run_condition(Policy::cooperative, Load::idle, anticipate_ns, rounds, rows);
-  }
+  for (const Condition& condition : all_conditions())
+    if (options.wants(condition.name())) run_condition(condition, rounds, rows);
   return rows;
 }
 

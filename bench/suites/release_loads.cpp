@@ -12,16 +12,29 @@
 namespace takt::bench {
 
 std::vector<Row> run_release_loads(const Options& options);
+std::vector<std::string> release_loads_conditions();
 
 namespace {
 
 constexpr size_t kRates = std::size(kReleaseRates);
 
+struct Variant {
+  Policy policy;
+  Load load;
+  std::string name() const { return std::string(to_string(policy)) + "_" + std::string(to_string(load)); }
+};
+
+std::vector<Variant> all_variants() {
+  std::vector<Variant> all;
+  for (const Policy policy : {Policy::deadline, Policy::fixed, Policy::cooperative})
+    for (const Load load : {Load::idle, Load::cpu, Load::memory, Load::disk}) all.push_back({policy, load});
+  return all;
+}
+
 /// All rounds under one policy and load.
 class Condition {
  public:
-  Condition(Policy policy, Load load)
-      : policy_(policy), variant_(std::string(to_string(policy)) + "_" + std::string(to_string(load))) {}
+  explicit Condition(const Variant& variant) : policy_(variant.policy), variant_(variant.name()) {}
 
   void add_round() {
     const ReleaseRound ours = takt_round(policy_, kDefaultAnticipate_ns, granted_),
@@ -100,6 +113,12 @@ class Condition {
 
 }  // namespace
 
+std::vector<std::string> release_loads_conditions() {
+  std::vector<std::string> names;
+  for (const Variant& variant : all_variants()) names.push_back(variant.name());
+  return names;
+}
+
 std::vector<Row> run_release_loads(const Options& options) {
   const CpuLatencyHold latency = hold_cpu_dma_latency();  // as `takt run` does; cyclictest holds it, too
   if (latency.refused()) std::fprintf(stderr, "release_loads: %s\n", latency.lacks().c_str());
@@ -107,16 +126,15 @@ std::vector<Row> run_release_loads(const Options& options) {
   std::vector<Row> rows;
   if (!cyclictest_round(Policy::cooperative))
     std::fputs("release_loads: cyclictest is not installed; its rows are left out (apt install rt-tests)\n", stderr);
-  for (const Policy policy : {Policy::deadline, Policy::fixed, Policy::cooperative})
-    for (const Load load : {Load::idle, Load::cpu, Load::memory, Load::disk}) {
-      std::fprintf(stderr, "release_loads: %s, %s\n", std::string(to_string(policy)).c_str(),
-                   std::string(to_string(load)).c_str());
-      const Burden burden(load);
-      Condition condition(policy, load);
-      for (int round = 0; round < rounds; ++round) condition.add_round();
-      burden.check();
-      condition.report(rows);
-    }
+  for (const Variant& variant : all_variants()) {
+    if (!options.wants(variant.name())) continue;
+    std::fprintf(stderr, "release_loads: %s\n", variant.name().c_str());
+    const Burden burden(variant.load);
+    Condition condition(variant);
+    for (int round = 0; round < rounds; ++round) condition.add_round();
+    burden.check();
+    condition.report(rows);
+  }
   return rows;
 }
 
