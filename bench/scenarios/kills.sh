@@ -1,13 +1,14 @@
 #!/bin/bash
 # SPDX-License-Identifier: Apache-2.0
 # Kills processes of a run at random instants: kills.sh [KILLS] [SECONDS] [SEED] [takt run options...]
-# Default: 200 kills in a run of 10 minutes, of the nursery that starts the others again, too. Prints how long each process
-# was away, what the nodes of the others missed meanwhile, and what is left afterwards: chunks, beside a minute without kills
-# that comes first; descriptors, threads, /dev/shm, /tmp, and SCHED_DEADLINE bandwidth, found by asking the kernel for it.
+# Default: 200 kills in a run of 10 minutes, of the nursery that starts the others again, too. Prints how soon each process
+# was back after a kill (after the last, where it was killed again on its way back), what the nodes of the others missed
+# meanwhile, and what is left afterwards: chunks, beside a minute without kills that comes first; descriptors, threads,
+# /dev/shm, /tmp, and SCHED_DEADLINE bandwidth, found by asking the kernel for it.
 # Each miss of a high-criticality node is told with its reason (takt explain) and with the kill before it; those of jobs whose
 # own process was away are counted apart. How long the host was seen away meanwhile (tests/tools/host_holes.py) is told and
-# excuses nothing. Exit 1 if a process was away for more than 2 s or did not come back, a
-# high-criticality node of another one missed a deadline for which the host's stall does not account, or something is left.
+# excuses nothing. Exit 1 if a process was not back 2 s after a kill, a high-criticality node of another one missed a deadline
+# for which the host's stall does not account, or something is left.
 root=$(readlink -f "$(dirname "$0")/../..")
 export PYTHONPATH="$root/bench/scenarios:$root/tests/tools" PYTHONDONTWRITEBYTECODE=1
 exec python3 - "${TAKT:-$root/takt}" "$@" <<'PY'
@@ -118,6 +119,22 @@ def missed(report, holes):
     return rows
 
 
+def with_kills(outages):
+    """Each outage that ended, with `kills`: the instants in it, in seconds from its begin, at which its process was killed,
+    and `recovery_s`: from the last of them until every node had run again. The begin is when the end was seen, up to 0.7 s
+    after the kill: it takes the kernel so long to clear a process up."""
+    epoch = json.load(open(f"{work}/killed.trace"))["otherData"]["epoch_ns"]
+    ended = [o for o in outages if o["back_s"] is not None]
+    last_back = {}
+    for o in ended:
+        begin, back = (epoch + o[key] * 1e9 for key in ("at_s", "back_s"))
+        since = max(begin - 0.7e9, last_back.get(o["process"], 0))
+        o["kills"] = [(at - begin) / 1e9 for at, name in struck if name == o["process"][:15] and since <= at <= back]
+        o["recovery_s"] = o["down_s"] - max(o["kills"], default=0)
+        last_back[o["process"]] = back
+    return ended
+
+
 struck = []
 with tempfile.TemporaryDirectory(prefix="kills-") as work:
     before, room = traces(), bandwidth()
@@ -142,17 +159,22 @@ with tempfile.TemporaryDirectory(prefix="kills-") as work:
     report = json.load(open(f"{work}/killed.json"))
     holes = host_holes.end(watch, f"{work}/holes")
     misses = missed(report, holes)
+    outages = [f for f in report["faults"] if f.get("kind") == "outage"]
+    ended = with_kills(outages)
     print(open(f"{work}/killed.log").read()[-3000:] if code not in (0, 1) else "", end="")
     after, room_after = traces(), bandwidth()
 
-outages = [f for f in report["faults"] if f.get("kind") == "outage"]
 chunks = report["memory"]["chunks_at_end"]
-back = sorted(f["down_s"] for f in outages if f["back_s"] is not None)
-pick = lambda q: back[min(len(back) - 1, int(q * len(back)))] if back else float("nan")
+back, away = sorted(o["recovery_s"] for o in ended), sorted(o["down_s"] for o in ended)
+pick = lambda values, q: values[min(len(values) - 1, int(q * len(values)))] if values else float("nan")
 print(f"{len(struck)} kills in {report['duration_s']:.0f} s, policy {report['policy_granted']}, {report['transport']} transport, "
       f"host stall {report['host_stall_ms']} ms, seen away {len(holes)} times, {sum(end - begin for _, begin, end in holes) / 1e6:.0f} ms; exit {code}")
-print(f"away until every node has run again: p50 {pick(.5):.2f} s, p99 {pick(.99):.2f} s, max {pick(1):.2f} s; "
-      f"not back: {len(outages) - len(back)}; chunks taken back from the dead: {sum(f['chunks_freed'] for f in outages)}")
+print(f"from the last kill of a process until every node of it has run again: p50 {pick(back, .5):.2f} s, p99 {pick(back, .99):.2f} s, "
+      f"max {pick(back, 1):.2f} s; not back: {len(outages) - len(back)}; chunks taken back from the dead: {sum(f['chunks_freed'] for f in outages)}")
+print(f"{len(ended)} outages, {sum(len(o['kills']) > 1 for o in ended)} of them of processes killed again on their way back; away in all: "
+      f"p50 {pick(away, .5):.2f} s, max {pick(away, 1):.2f} s; those of 1.5 s and more:")
+for o in (o for o in ended if o["down_s"] >= 1.5):
+    print(f"    {o['process']} {o['down_s']:.2f} s from {o['at_s']:.2f} s on, killed at {', '.join(f'{at:+.2f}' for at in o['kills'])} s")
 print(f"{'node':18}{'crit':>6}{'released':>10}{'down':>7}{'done':>8}{'miss':>6}{'skip':>6}")
 for n in report["nodes"]:
     print(f"{n['name']:18}{n['criticality']:>6}{n['released']:10}{n.get('down', 0):7}{n['completed']:8}{n['deadline_misses']:6}{n['skipped']:6}")
@@ -165,7 +187,7 @@ bad = []
 if len(struck) < kills: bad.append(f"only {len(struck)} of {kills} kills")
 if code not in (0, 1): bad.append(f"exit {code}")
 if len(outages) != len(back): bad.append("a process did not come back")
-if back and back[-1] > 2: bad.append(f"away for {back[-1]:.2f} s, more than 2 s")
+if back and back[-1] > 2: bad.append(f"back {back[-1]:.2f} s after a kill, more than 2 s")
 if others: bad.append(f"{len(others)} deadlines of high-criticality nodes whose process was there")
 if early != late: bad.append(f"descriptors or threads: {early} -> {late}")
 if before != after: bad.append(f"left behind: {sorted(set(after) - set(before))}")
