@@ -10,6 +10,7 @@
 #include <string>
 
 #include "bench/suite.hpp"
+#include "graph/cli/outcome.hpp"
 #include "hal/settings/json.hpp"
 
 namespace {
@@ -67,6 +68,7 @@ void describe_machine() {
 }  // namespace
 
 int main(int argc, char** argv) {
+  takt::command::hold_standard_streams();
   CLI::App app("Benchmarks of Takt against named references, measured in the same run in pairs A B A B");
   std::string suite_name, json_file, list;
   Options options;
@@ -79,7 +81,7 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
+    return takt::command::with_output(app.exit(error) == 0 ? 0 : 2);
   }
   const Suite* chosen = nullptr;
   for (const Suite& suite : suites())
@@ -101,7 +103,7 @@ int main(int argc, char** argv) {
     return 3;
   }
   for (const Row& row : rows) print(row);
-  if (json_file.empty()) return 0;
+  if (json_file.empty()) return takt::command::with_output(0);
   nlohmann::json array = nlohmann::json::array();
   for (const Row& row : rows) array.push_back(to_json(row));
   std::ofstream out(json_file);
@@ -111,5 +113,5 @@ int main(int argc, char** argv) {
     std::cerr << "takt-bench: cannot write " << json_file << "; choose a writable --json\n";
     return 2;
   }
-  return 0;
+  return takt::command::with_output(0);
 }

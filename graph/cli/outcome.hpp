@@ -11,6 +11,14 @@ enum Exit : int { kOk = 0, kNotOk = 1, kBadInput = 2, kDeviceOrSystem = 3 };
 /// Writes one error to stderr and returns the code.
 int refuse(const std::string& text, Exit code);
 
+/// For the begin of main: a closed stdin, stdout or stderr leads to /dev/null from now on. Else the next file or device
+/// to be opened would get its number, and with it what is printed.
+void hold_standard_streams();
+
+/// For the end of main: writes out what stdout still holds. The code again, or, where stdout could not take all (a full
+/// disk), the reason on stderr and kDeviceOrSystem instead of kOk. A reader that has gone (`| head`) wanted no more.
+int with_output(int code);
+
 /// A file or folder that the command ships with: beside the launcher, or in share/takt beside an installed bin/.
 std::filesystem::path shipped(const std::filesystem::path& relative);
 

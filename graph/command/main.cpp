@@ -168,6 +168,7 @@ int become_eval(char** arguments) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  takt::command::hold_standard_streams();
   if (argc > 1 && std::string_view(argv[1]) == "eval") return become_eval(argv + 1);
   // Files that cannot be read are reported by the commands themselves, with the next step.
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
@@ -226,7 +227,7 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : takt::command::kBadInput;
+    exit_code = app.exit(error) == 0 ? 0 : takt::command::kBadInput;
   }
-  return exit_code;
+  return takt::command::with_output(exit_code);
 }

@@ -7,6 +7,7 @@
 #include "graph/evaluate/command_line.hpp"
 
 int main(int argc, char** argv) {
+  takt::command::hold_standard_streams();
   // Files that cannot be read are reported by the evaluations themselves, with the next step.
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
   CLI::App eval{"measures quality against ground truth", "takt eval"};
@@ -16,7 +17,7 @@ int main(int argc, char** argv) {
   try {
     eval.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return eval.exit(error) == 0 ? 0 : takt::command::kBadInput;
+    exit_code = eval.exit(error) == 0 ? 0 : takt::command::kBadInput;
   }
-  return exit_code;
+  return takt::command::with_output(exit_code);
 }

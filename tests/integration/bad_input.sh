@@ -40,6 +40,22 @@ for isolate in none subsystem; do
   grep -qE "traffic_signs|ego_motion" "$work/stderr" && fail "one wrong file makes more than one problem"
 done
 
+# Where stdout cannot take what is printed, whoever reads the file must learn of it.
+for command in nodes "check --json" --help "eval --help"; do
+  expect 3 "stdout could not take all that was printed" sh -c "'$takt' $command >/dev/full"
+done
+# Closed streams: no file or device of a run gets their numbers, and what is printed goes into none.
+"$takt" run --for 0s --isolate none --policy cooperative --output "$work/closed" <&- >&- 2>&- &
+run=$!
+until "$takt" top --once --run $run >/dev/null 2>&1 || ! kill -0 $run; do sleep 0.1; done
+for stream in 0 1 2; do
+  [ "$(readlink /proc/$run/fd/$stream)" = /dev/null ] || fail "stream $stream, which was closed, is $(readlink /proc/$run/fd/$stream)"
+done
+kill -TERM $run
+wait $run
+code=$?
+[ $code -le 1 ] || fail "a run with closed streams: exit $code"  # 1: a deadline was missed, which is not judged here
+
 expect 2 "does-not-exist" "$takt" run "$work/does-not-exist.yaml"
 expect 2 "--for" "$takt" run --for 5
 expect 2 "no such directory" env TAKT_DATA="$work/nothing" "$takt" run "$source/graph/kitti.yaml"
