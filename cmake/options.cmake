@@ -4,11 +4,22 @@
 find_program(TAKT_CCACHE ccache)
 if(TAKT_CCACHE)
   set(CMAKE_C_COMPILER_LAUNCHER ${TAKT_CCACHE})
-  # One cache serves all checkouts: paths below the source are hashed relative. Not pch_defines: a precompiled header
-  # from the cache knows its headers by the times of another checkout, and what they guard by `#pragma once` is then
-  # read, and defined, twice.
+  # One cache serves all checkouts: paths below the source are hashed relative, and a precompiled header by what it was
+  # made from (parsed_once.cmake). Not pch_defines: precompiled headers themselves do not come from the cache.
   set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env CCACHE_SLOPPINESS=time_macros CCACHE_BASEDIR=${PROJECT_SOURCE_DIR}
-    CCACHE_NOHASHDIR=1 ${TAKT_CCACHE})
+    CCACHE_NOHASHDIR=1 CCACHE_PCH_EXTSUM=1 ${TAKT_CCACHE})
+endif()
+
+# Highway compiles each kernel once per processor generation. With SSE4.2 and AES as the floor, its emulated vectors, the
+# slowest to compile by far, are left out.
+set(TAKT_CPU x86-64-v2 CACHE STRING "Oldest x86 processor to run on: x86-64-v2 (with AES; since 2010) or x86-64")
+set_property(CACHE TAKT_CPU PROPERTY STRINGS x86-64-v2 x86-64)
+if(CMAKE_SYSTEM_PROCESSOR STREQUAL x86_64)
+  if(TAKT_CPU STREQUAL x86-64-v2)
+    add_compile_options(-march=x86-64-v2 -maes -mpclmul)
+  elseif(NOT TAKT_CPU STREQUAL x86-64)
+    message(FATAL_ERROR "TAKT_CPU is `${TAKT_CPU}`; it must be x86-64-v2 or x86-64")
+  endif()
 endif()
 
 # Contraction off: results must not depend on whether the compiler found an FMA (bit-exact replay).
@@ -46,7 +57,7 @@ endmacro()
 # Most of a file's compile time are the headers it reads. Off: every file apart, for edits and for tools that read
 # compile_commands.json.
 option(TAKT_UNITE "Compile several files of a target as one: a first build in half the time" ON)
-set(TAKT_FILES_AT_ONCE 6 CACHE STRING "How many; 0: all of a target")
+set(TAKT_FILES_AT_ONCE 12 CACHE STRING "How many; 0: all of a target")
 
 # The sources of a target of this directory. Those given behind it stay apart: they share a name with another one, inside
 # their anonymous namespaces.
@@ -74,4 +85,5 @@ function(takt_room name)
   add_library(takt_${name} STATIC ${ARG_SOURCES})
   target_link_libraries(takt_${name} PUBLIC ${ARG_USES})
   takt_unite(takt_${name} ${ARG_APART})
+  takt_use_parsed(takt_${name})
 endfunction()

@@ -9,22 +9,17 @@
 
 #include "graph/cli/outcome.hpp"
 #include "graph/command/attach_commands.hpp"
-#include "graph/command/calibrate_command.hpp"
 #include "graph/command/capture_command.hpp"
 #include "graph/command/check_command.hpp"
-#include "graph/command/cloud_command.hpp"
 #include "graph/command/devices_command.hpp"
 #include "graph/command/doctor_command.hpp"
 #include "graph/command/double_command.hpp"
 #include "graph/command/explain_command.hpp"
 #include "graph/command/log_commands.hpp"
-#include "graph/command/objects_command.hpp"
 #include "graph/command/profile_command.hpp"
 #include "graph/command/replay_command.hpp"
 #include "graph/command/robot_command.hpp"
 #include "graph/command/show_command.hpp"
-#include "graph/command/terrain_command.hpp"
-#include "graph/command/train_command.hpp"
 #include "graph/run/run.hpp"
 
 namespace {
@@ -156,12 +151,26 @@ void add_profile(CLI::App& app, takt::command::ProfileOptions& o, int& exit_code
   profile->callback([&] { exit_code = takt::command::profile_graph(o); });
 }
 
-/// `takt eval` is takt-eval, beside this program, with all that is said behind it. Returns only where it is not there.
-int become_eval(char** arguments) {
-  const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe").replace_filename("takt-eval");
-  execv(program.c_str(), arguments);
-  return takt::command::refuse(program.string() + " cannot be started: " + std::strerror(errno) +
-                                   "\n  fix: `./takt eval` of a checkout builds it (target takt-eval)",
+/// A command of another program, which stands next to this one: no run needs it, so nobody waits for it to be built.
+struct DeskCommand {
+  const char *name, *what, *program;
+};
+constexpr DeskCommand kDeskCommands[] = {
+    {"calibrate", "measures stereo cameras and laser mounts", "takt-tools"},
+    {"cloud", "filters point clouds from files", "takt-tools"},
+    {"objects", "keeps the database of known objects", "takt-tools"},
+    {"terrain", "learns maps of terrain types", "takt-tools"},
+    {"train", "learns cascades of traffic signs", "takt-tools"},
+    {"eval", "measures quality against ground truth", "takt-eval"},
+};
+
+/// Hands the whole command line over to the program of `command`. Returns only where that cannot be started.
+int become(const DeskCommand& command, char** arguments) {
+  const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe").replace_filename(command.program);
+  const bool names_itself = std::string_view(command.program) == "takt-eval";  // a program of one command
+  execv(program.c_str(), names_itself ? arguments + 1 : arguments);
+  return takt::command::refuse(program.string() + " cannot be started: " + std::strerror(errno) + "\n  fix: `./takt " +
+                                   command.name + "` of a checkout builds it (target " + command.program + ")",
                                takt::command::kDeviceOrSystem);
 }
 
@@ -169,7 +178,8 @@ int become_eval(char** arguments) {
 
 int main(int argc, char** argv) {
   takt::command::hold_standard_streams();
-  if (argc > 1 && std::string_view(argv[1]) == "eval") return become_eval(argv + 1);
+  for (const DeskCommand& command : kDeskCommands)
+    if (argc > 1 && std::string_view(argv[1]) == command.name) return become(command, argv);
   // Files that cannot be read are reported by the commands themselves, with the next step.
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
   CLI::App app{"Takt: a real-time dataflow runtime with a static task graph"};
@@ -178,7 +188,6 @@ int main(int argc, char** argv) {
   takt::command::ShowOptions show_options;
   takt::command::RenderOptions render_options;
   takt::command::ExplainOptions explain_options;
-  takt::command::CalibrateOptions calibrate;
   takt::command::AttachOptions attach;
   takt::command::RobotOptions robot;
   takt::command::DoctorOptions doctor;
@@ -186,10 +195,6 @@ int main(int argc, char** argv) {
   takt::command::DoubleOptions device_double;
   takt::command::ReplayOptions replay;
   takt::command::LogOptions log;
-  takt::command::CloudOptions cloud;
-  takt::command::TrainOptions train;
-  takt::command::TerrainOptions terrain;
-  takt::command::ObjectsOptions object_database;
   std::string type;
   bool check_json = false;
   bool devices_json = false;
@@ -216,13 +221,8 @@ int main(int argc, char** argv) {
   add_profile(app, profile, exit_code);
   takt::command::add_replay(app, replay, exit_code);
   takt::command::add_log(app, log, exit_code);
-  takt::command::add_calibrate(app, calibrate, exit_code);
-  takt::command::add_cloud(app, cloud, exit_code);
-  takt::command::add_train(app, train, exit_code);
-  takt::command::add_terrain(app, terrain, exit_code);
-  takt::command::add_objects(app, object_database, exit_code);
   takt::command::add_double(app, device_double, exit_code);
-  app.add_subcommand("eval", "measures quality against ground truth");  // for the list of commands: see become_eval
+  for (const DeskCommand& command : kDeskCommands) app.add_subcommand(command.name, command.what);  // for the list only
 
   try {
     app.parse(argc, argv);

@@ -41,7 +41,7 @@ void LinkRunner::wake() {
   if (clock_.is_virtual()) return void(end_->step());
   const uint64_t once = 1;
   // A bell that is full rings already.
-  static_cast<void>(!write(bell_.get(), &once, sizeof once));
+  static_cast<void>(!::write(bell_.get(), &once, sizeof once));
 }
 
 void LinkRunner::poll() {

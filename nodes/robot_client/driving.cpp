@@ -7,7 +7,7 @@ namespace takt::robot_client {
 namespace {
 
 constexpr std::string_view kObstacle = "an obstacle stands in the way";
-constexpr double kMoved_m = 0.05, kTurned_rad = 0.05;  // less is no getting on
+constexpr double kDriven_m = 0.05, kTurned_rad = 0.05;  // less is no getting on
 constexpr double kPassed_m = 0.2;                      // nearer to where it had to stand it is the same obstacle
 
 Place place_of(const PlanarPose& robot) { return {robot.x_m, robot.y_m}; }
@@ -155,7 +155,7 @@ void Driving::keep_a_way(const PlanarPose& robot) {
 
 void Driving::notice_standstill(const PlanarPose& robot, double dt_s) {
   const PlanarPose moved = between(got_on_, robot);
-  const bool got_on = std::hypot(moved.x_m, moved.y_m) >= kMoved_m || std::abs(moved.theta_rad) >= kTurned_rad;
+  const bool got_on = std::hypot(moved.x_m, moved.y_m) >= kDriven_m || std::abs(moved.theta_rad) >= kTurned_rad;
   if (got_on || standing_s_ == 0) got_on_ = robot;
   standing_s_ = got_on ? 0 : standing_s_ + dt_s;
   if (standing_s_ > parameters_.stuck_s) fail("the robot does not get on");

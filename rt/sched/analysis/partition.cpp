@@ -20,9 +20,9 @@ struct CoreLoad {
   }
 };
 
-class Search {
+class PartitionSearch {
  public:
-  Search(const TaskSet& set, CorePolicy policy) : set_(set), policy_(policy), on_core_(static_cast<size_t>(set.cores)) {
+  PartitionSearch(const TaskSet& set, CorePolicy policy) : set_(set), policy_(policy), on_core_(static_cast<size_t>(set.cores)) {
     for (size_t i = 0; i < set.tasks.size(); ++i) {
       const TimedTask& task = set.tasks[i];
       if (task.core < 0) {
@@ -124,7 +124,7 @@ Partition partition(TaskSet set, int cores, CorePolicy policy) {
   answer.set = set;
   answer.why = defect(set);
   if (!answer.why.empty()) return answer;
-  Search search(set, policy);
+  PartitionSearch search(set, policy);
   if (!search.given_cores_fit()) {
     answer.verdict = search.conclusive() ? Verdict::not_schedulable : Verdict::not_proven;
     answer.why = "the tasks with a given core do not fit on it";

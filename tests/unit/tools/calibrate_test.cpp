@@ -5,7 +5,7 @@
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
 
-#include "graph/command/calibrate_command.hpp"
+#include "graph/tools/calibrate_command.hpp"
 #include "graph/run/run.hpp"
 #include "nodes/calibration/generated_sweeps.hpp"
 #include "nodes/stereo/rectify.hpp"

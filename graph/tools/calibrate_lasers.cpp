@@ -9,8 +9,7 @@
 #include <stdexcept>
 
 #include "graph/cli/outcome.hpp"
-#include "graph/command/calibrate_command.hpp"
-#include "graph/run/run.hpp"
+#include "graph/tools/calibrate_command.hpp"
 #include "hal/settings/json.hpp"
 #include "nodes/calibration/generated_sweeps.hpp"
 #include "nodes/calibration/picture.hpp"

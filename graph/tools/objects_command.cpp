@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "graph/command/objects_command.hpp"
+#include "graph/tools/objects_command.hpp"
 
 #include <fmt/format.h>
 

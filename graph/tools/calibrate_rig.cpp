@@ -3,7 +3,7 @@
 #include <stdexcept>
 
 #include "graph/cli/outcome.hpp"
-#include "graph/command/calibrate_command.hpp"
+#include "graph/tools/calibrate_command.hpp"
 #include "hal/camera/rig.hpp"
 #include "hal/sim/simulation.hpp"
 #include "nodes/stereo/rectify.hpp"
