@@ -6,4 +6,7 @@ execute_process(COMMAND git -C ${SOURCE} describe --always --dirty --abbrev=12 O
 if(NOT commit)
   set(commit unknown)
 endif()
-file(CONFIGURE OUTPUT ${OUTPUT} CONTENT "#pragma once\n#define TAKT_COMMIT \"@commit@\"\n" @ONLY)
+file(CONFIGURE OUTPUT ${OUTPUT} CONTENT
+"#include \"graph/run/commit.hpp\"
+const char* const takt::command::kCommit = \"@commit@\";
+" @ONLY)

@@ -14,13 +14,15 @@ endif()
 # slowest to compile by far, are left out.
 set(TAKT_CPU x86-64-v2 CACHE STRING "Oldest x86 processor to run on: x86-64-v2 (with AES; since 2010) or x86-64")
 set_property(CACHE TAKT_CPU PROPERTY STRINGS x86-64-v2 x86-64)
+set(TAKT_CPU_FLAGS)
 if(CMAKE_SYSTEM_PROCESSOR STREQUAL x86_64)
   if(TAKT_CPU STREQUAL x86-64-v2)
-    add_compile_options(-march=x86-64-v2 -maes -mpclmul)
+    set(TAKT_CPU_FLAGS -march=x86-64-v2 -maes -mpclmul)  # rt/machine/required_cpu.cpp checks for these
   elseif(NOT TAKT_CPU STREQUAL x86-64)
     message(FATAL_ERROR "TAKT_CPU is `${TAKT_CPU}`; it must be x86-64-v2 or x86-64")
   endif()
 endif()
+add_compile_options(${TAKT_CPU_FLAGS})
 
 # Contraction off: results must not depend on whether the compiler found an FMA (bit-exact replay).
 add_compile_options(-Wall -Wextra -Wpedantic -Wconversion -Werror -ffp-contract=off -fno-math-errno)

@@ -16,11 +16,11 @@
 #include "graph/log/cut_log.hpp"
 #include "graph/log/log_content.hpp"
 #include "graph/log/recorded_plan.hpp"
+#include "graph/run/commit.hpp"
 #include "graph/run/isolated_replay.hpp"
 #include "graph/run/prepare.hpp"
 #include "graph/run/support.hpp"
 #include "rt/record/replayer.hpp"
-#include "takt_commit.hpp"
 
 namespace takt::command {
 namespace {
@@ -139,7 +139,7 @@ class Replay {
       std::fprintf(stderr, "takt: %s\n", param.c_str());
     if (fact(file_->facts(), "program") != log::file_hash("/proc/self/exe"))
       std::fprintf(stderr, "takt: this is another program (commit %s) than the one that recorded (commit %s)\n",
-                   TAKT_COMMIT, fact(file_->facts(), "commit").c_str());
+                   kCommit, fact(file_->facts(), "commit").c_str());
   }
 
   record::ReplayResult replay() {

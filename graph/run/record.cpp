@@ -11,8 +11,8 @@
 
 #include "graph/language/words.hpp"
 #include "graph/log/recorded_plan.hpp"
+#include "graph/run/commit.hpp"
 #include "graph/run/machine.hpp"
-#include "takt_commit.hpp"
 
 namespace takt::command {
 namespace {
@@ -76,7 +76,7 @@ void RunRecord::begin(const graph::GraphSpec& graph, const Plan& plan, const Run
                 {"clock", options_.clock},
                 {"transport", transport.name()},
                 {"isolation", isolation},
-                {"commit", TAKT_COMMIT},
+                {"commit", kCommit},
                 {"program", log::file_hash("/proc/self/exe")},
                 {"simd", hwy::TargetName(hwy::SupportedTargets() & -hwy::SupportedTargets())},
                 {"machine", machine_facts().dump()}};

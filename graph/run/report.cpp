@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "graph/run/report.hpp"
+#include "graph/run/commit.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
-#include "takt_commit.hpp"
 
 namespace takt::command {
 namespace {
@@ -242,7 +242,7 @@ Json make_report(const RunFacts& facts) {
   if (facts.clock == "real" && facts.plan.anticipate_ns > 0)
     report["anticipate_us"] = static_cast<double>(facts.plan.anticipate_ns) / 1e3;
   report["duration_s"] = facts.result.duration_s();
-  report["commit"] = TAKT_COMMIT;
+  report["commit"] = kCommit;
   report["machine"] = machine_facts();
   report["ok"] = kept_its_promises(nodes);
   report["modes"] = modes_json(facts);

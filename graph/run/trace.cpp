@@ -7,8 +7,8 @@
 #include <fstream>
 
 #include "graph/explain/trace_file.hpp"
+#include "graph/run/commit.hpp"
 #include "rt/machine/facts.hpp"
-#include "takt_commit.hpp"
 
 namespace takt::command {
 namespace {
@@ -73,7 +73,7 @@ std::string RunTrace::write(const graph::GraphSpec& graph, const Plan& plan, con
                      {"profile", graph.profile},
                      {"clock", options_.clock},
                      {"policy_asked", to_string(graph.schedule.policy)},
-                     {"commit", TAKT_COMMIT},
+                     {"commit", kCommit},
                      {"collector_cpu_ms", static_cast<double>(recording.collector_cpu_ns) / 1e6}};
   std::ofstream file(options_.trace, std::ios::binary);
   explain::write_trace(file, head, trace);
