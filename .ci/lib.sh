@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: Apache-2.0
+# Shared by .ci/run and its steps, which start in the root of the project.
+export CCACHE_MAXSIZE=4G
+base=${TAKT_CI_BASE:-HEAD~1}  # what the change is compared with
+
+usage() {
+  echo "ci: $1" >&2
+  exit 2
+}
+
+# install COMMAND PACKAGES...: if there is no such command yet.
+install() {
+  command -v "$1" >/dev/null && return
+  apt-get install -y --no-install-recommends "${@:2}" >/dev/null 2>&1 ||
+    { apt-get update >/dev/null && apt-get install -y --no-install-recommends "${@:2}" >/dev/null; }
+}
+
+# changed PATHS...: whether the change touches one of them. Without a commit to compare with, all of them are new.
+changed() {
+  git rev-parse --verify -q "$base" >/dev/null || return 0
+  ! git diff --quiet "$base" HEAD -- "$@"
+}
+
+# build PRESET TARGETS... : configured once, quiet unless it fails.
+build() {
+  local preset=$1
+  shift
+  [ -f "build/$preset/build.ninja" ] || cmake --preset "$preset" ${configure_with:-} >/dev/null
+  cmake --build --preset "$preset" --target "$@" >"build/$preset.log" 2>&1 || { tail -n 60 "build/$preset.log"; return 1; }
+  echo "built $preset: $* ($SECONDS s)"
+}
+
+# Shares are seconds of a machine on which two compilations side by side, those below, take this long.
+nominal_ms=3000
+machine_ms=
+measure_machine() { # once, as soon as there is a compiler
+  [ -z "$machine_ms" ] && command -v g++ >/dev/null || return 0
+  local start
+  start=$(date +%s%N)
+  for _ in 1 2; do
+    printf '#include <regex>\nbool f(const char* a) { return std::regex_match(a, std::regex("a*")); }\n' |
+      CCACHE_DISABLE=1 g++ -std=c++20 -O2 -x c++ -c - -o /dev/null &
+  done
+  wait
+  machine_ms=$((($(date +%s%N) - start) / 1000000))
+  echo "this machine: $(nproc) cores, two compilations side by side in $machine_ms ms (shares: $nominal_ms ms)"
+}
+allowed_s() { echo $((${machine_ms:-0} > nominal_ms ? $1 * machine_ms / nominal_ms : $1)); }
+
+# take_shard K N: the steps of shard K; the longest first, each to the shard that has least to do.
+take_shard() {
+  for s in $(names); do echo "$(header "$s" share) $s"; done | sort -k1,1nr -k2 |
+    awk -v k="$1" -v n="$2" '{ least = 1; for (i = 2; i <= n; ++i) if (load[i] < load[least]) least = i; load[least] += $1; if (least == k) print $2 }' | sort
+}
