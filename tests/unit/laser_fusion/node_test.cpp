@@ -90,7 +90,6 @@ TEST_CASE("laser_fusion searches over several jobs, tells the best so far, and i
 TEST_CASE("a job of laser_fusion asks before every portion how much of its budget is left, and the next one goes on") {
   static int64_t used_ns = 0;  // each question finds a millisecond more used up
   constexpr int64_t kBudget_ns = 12'000'000, kReserve_ns = 2'000'000, kPortion_ns = 1'000'000;
-  static const VirtualClock clock;
   Bench bench;
   test::set(*bench.node, "generations", int64_t{100});
   test::set_up(*bench.node);
@@ -102,7 +101,7 @@ TEST_CASE("a job of laser_fusion asks before every portion how much of its budge
     test::latch(test::input(*bench.node, "vision"), bench.vision, 140, 1);
     used_ns = 0;
     pose.clear();
-    Job job(clock, static_cast<uint64_t>(jobs), 0, 1'000'000'000, 0, "full",
+    Job job(test::standing_clock, static_cast<uint64_t>(jobs), 0, 1'000'000'000, 0, "full",
             {kBudget_ns, 0, [] { return used_ns += kPortion_ns; }});
     bench.node->run(job);
     REQUIRE(used_ns <= kBudget_ns - kReserve_ns);
@@ -123,10 +122,9 @@ TEST_CASE("laser_fusion gives the pose alone where nobody reads its clouds, and 
     test::BoxWriter<Pose> pose(*bench.node->outputs()[0]);
     std::optional<test::BoxWriter<PointCloud>> fused;
     if (read) fused.emplace(*bench.node->outputs()[1]);
-    static const VirtualClock clock;
     static int64_t asked = 0;
     asked = 0;
-    Job job(clock, 0, 0, 1'000'000'000, 0, "full", {1'000'000'000, 0, [] { return ++asked; }});
+    Job job(test::standing_clock, 0, 0, 1'000'000'000, 0, "full", {1'000'000'000, 0, [] { return ++asked; }});
     test::latch(test::input(*bench.node, "laser"), bench.laser, 150, 1);
     test::latch(test::input(*bench.node, "vision"), bench.vision, 140, 1);
     bench.node->run(job);

@@ -79,9 +79,9 @@ class Walk {
     if (budget_ns == 0) {
       REQUIRE(test::run(*node_));
     } else {
-      static const VirtualClock clock;
       used_ns = 0;
-      Job job(clock, sequence_, 0, 1'000'000'000, 0, "full", {budget_ns, 0, [] { return used_ns += kTile_ns; }});
+      Job job(test::standing_clock, sequence_, 0, 1'000'000'000, 0, "full",
+              {budget_ns, 0, [] { return used_ns += kTile_ns; }});
       node_->run(job);
     }
     if (counting_allocations()) CHECK(thread_memory_use().allocations == before);
