@@ -3,10 +3,8 @@
 #pragma once
 #include <doctest/doctest.h>
 
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <iostream>
 #include <optional>
 #include <span>
 #include <string>
@@ -15,14 +13,6 @@
 #include "hal/can/codec.hpp"
 
 namespace takt::test {
-
-/// A file of ../shared/reference; says visibly where it is absent.
-inline std::optional<std::filesystem::path> reference(const std::string& relative) {
-  const auto path = std::filesystem::path(TAKT_SOURCE_DIR) / "../shared/reference" / relative;
-  if (std::filesystem::exists(path)) return path;
-  std::cerr << "NOT RUN: reference " << path << " is absent\n";
-  return std::nullopt;
-}
 
 /// Takes a line apart from its front.
 class LineParts {

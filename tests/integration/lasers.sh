@@ -32,24 +32,6 @@ expect 2 "--pty PATH or --tcp PORT" "$takt" double lms200
 expect 2 "--video PATH" "$takt" double camera --can vcan0
 expect 3 "modprobe v4l2loopback" "$takt" double camera --video "$work/none"
 
-# Captured bytes of a real scanner, as the index of the capture marks them.
-data=${TAKT_DATA:-$source/../shared/data}/sick/lms200
-capture() { # NAME 'EXPRESSION OF r' OPTIONS...
-  local name=$1 expression=$2
-  shift 2
-  expect 0 "" "$takt" eval lms200 --rx "$data/$name.rx.bin" --index "$data/$name.index.csv" "$@" --json
-  python3 -c 'import json, sys; r = json.load(open(sys.argv[1])); print(r); sys.exit(not eval(sys.argv[2]))' "$work/stdout" "$expression" ||
-    fail "capture $name"
-}
-if [ -d "$data" ]; then
-  capture 2017_Aug_04_23-22-04 'r["accepted"] == 67 and r["not_as_marked"] == r["beams_that_differ"] == 0 and r["beams_compared"] == 58 * 361' \
-    --distances "$data/2017_Aug_04_23-22-04.distances.csv"
-  capture 2017_Aug_05_18-52-56 'r["accepted"] == 176 and r["not_as_marked"] == r["beams_that_differ"] == 0 and r["scans"] == 165' \
-    --distances "$data/2017_Aug_05_18-52-56.distances.csv"
-  capture 2017_Aug_05_19-09-36 'r["accepted"] == 2 and r["rejected"] == 2 and r["not_as_marked"] == 0 and r["found_inside_rejected"] == 1 and r["unlisted"] == 0'
-else
-  echo "NOT RUN: the captures in $data are absent (set TAKT_DATA)"
-fi
 expect 2 "cannot be opened" "$takt" eval lms200 --rx "$work/none" --index "$work/none"
 
 double front lms200 --pty "$work/front"

@@ -26,6 +26,19 @@ expect() {
   [ -z "$text" ] || grep -qF -- "$text" "$work/stderr" || fail "stderr lacks '$text': $*"
 }
 
+# figure KEY: the first one of that name in the JSON of the last command; those of variants and baseline come later.
+figure() { sed -n "s/^ *\"$1\": \([-0-9.e]*\),*$/\1/p" "$work/stdout" | head -n 1; }
+at_most() { awk "BEGIN {exit !($(figure "$1") <= $2)}" || fail "$1 is $(figure "$1"), more than $2"; }
+at_least() { awk "BEGIN {exit !($(figure "$1") >= $2)}" || fail "$1 is $(figure "$1"), less than $2"; }
+
+# recordings FOLDER: $recordings is that folder of $data, the folder of recordings; without $data the test is skipped.
+recordings() {
+  data=${TAKT_DATA:-$source/../shared/data}
+  [ -d "$data" ] || { echo "NOT RUN: the folder of recordings $data is missing; set TAKT_DATA to it"; exit 77; }
+  recordings=$data/$1
+  [ -d "$recordings" ] || { echo "FAILED: $recordings is missing (TAKT_DATA names the folder of recordings)"; exit 1; }
+}
+
 # start_run NAME OPTIONS... : in the background, its process in $run; returns once it can be attached to. However long
 # that takes: under a sanitizer it is many seconds. Under $policy; empty: that of the schedule, where the kernel grants it.
 policy=cooperative

@@ -1,14 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The fast matchers against the slow reference where random sizes would leave gaps: every width, every search range, an
-// image of several strips at the defaults, a piece of a recorded pair; on every SIMD target.
-#include <opencv2/imgcodecs.hpp>
-
-#include "nodes/stereo/reference.hpp"
-#include "nodes/stereo/semi_global_matcher.hpp"
-#include "nodes/stereo/window_matcher.hpp"
-#include "tests/on_each_target.hpp"
-#include "tests/property/stereo/random_pairs.hpp"
-#include "tests/test_data.hpp"
+// image of several strips at the defaults; on every SIMD target.
+#include "tests/property/stereo/equal_on_each_target.hpp"
 
 using namespace takt;
 using namespace takt::stereo;
@@ -17,24 +10,6 @@ using namespace takt::test;
 namespace {
 
 constexpr CostKind kCosts[] = {CostKind::gradient, CostKind::ssd, CostKind::sad, CostKind::census};
-
-/// The reference once, then the matcher that make_matcher() chooses on each target.
-void expect_equal_on_each_target(const Picture& left, const Picture& right, const MatcherParameters& p) {
-  Output expected(left);
-  if (p.selection == Selection::semi_global) reference::semi_global(left.view(), right.view(), p, expected.views(left));
-  else reference::match(left.view(), right.view(), p, expected.views(left));
-  on_each_target([&] {
-    const auto matcher = make_matcher(left.width, left.height, left.channels, p);
-    REQUIRE(std::string_view(matcher->target()) != "scalar");  // not the general one
-    expect_equal(*matcher, left, right, p, expected);
-  });
-}
-
-MatcherParameters quality_of(int disparities) {
-  MatcherParameters p = MatcherParameters::quality();
-  p.disparities = disparities;
-  return p;
-}
 
 }  // namespace
 
@@ -81,19 +56,4 @@ TEST_CASE("the defaults on several strips of columns: equal to the reference") {
   const Picture right = shifted(random, left, 61, 20);
   expect_equal_on_each_target(left, right, {});
   expect_equal_on_each_target(left, right, quality_of(150));
-}
-
-TEST_CASE("a piece of a recorded pair, the defaults and the quality matcher: equal to the reference") {
-  const auto folder = recording("stereo/teddy");
-  if (!folder) return;
-  const cv::Rect piece(120, 150, 250, 41);
-  const auto read = [&](const char* name) {
-    const cv::Mat image = cv::imread((*folder / name).string())(piece).clone();
-    return Picture{piece.width, piece.height, 3, {image.data, image.data + image.total() * 3}};
-  };
-  const Picture left = read("im2.png"), right = read("im6.png");
-  MatcherParameters p;
-  p.disparities = 64;
-  expect_equal_on_each_target(left, right, p);
-  expect_equal_on_each_target(left, right, quality_of(64));
 }

@@ -1,23 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 
-#include <algorithm>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/objdetect.hpp>
 #include <random>
-#include <tuple>
 
 #include "nodes/traffic_signs/reference.hpp"
-#include "nodes/traffic_signs/search.hpp"
 #include "tests/on_each_target.hpp"
+#include "tests/property/traffic_signs/as_opencv.hpp"
 #include "tests/temporary_folder.hpp"
-#include "tests/test_data.hpp"
 #include "tests/unit/traffic_signs/random_cascade.hpp"
 
 using namespace takt;
 using namespace takt::traffic_signs;
-using takt::test::on_each_target;
+using namespace takt::test;
 
 namespace {
 
@@ -35,45 +31,6 @@ cv::Mat1b random_image(uint32_t seed, int width, int height) {
   image.convertTo(bytes, CV_8U);
   bytes(cv::Rect(width / 2, height / 2, width / 3, height / 3)) = 90;
   return bytes;
-}
-
-ImageView<const uint8_t> view(const cv::Mat1b& image) { return {image.data, image.cols, image.rows}; }
-
-auto key(const Box& b) { return std::tuple(b.x, b.y, b.width, b.height); }
-
-std::vector<std::tuple<int, int, int, int>> sorted(const std::vector<Box>& boxes) {
-  std::vector<std::tuple<int, int, int, int>> keys;
-  for (const Box& box : boxes) keys.push_back(key(box));
-  std::sort(keys.begin(), keys.end());
-  return keys;
-}
-
-std::vector<std::tuple<int, int, int, int>> sorted(const std::vector<cv::Rect>& boxes) {
-  std::vector<std::tuple<int, int, int, int>> keys;
-  for (const cv::Rect& b : boxes) keys.emplace_back(b.x, b.y, b.width, b.height);
-  std::sort(keys.begin(), keys.end());
-  return keys;
-}
-
-/// What ours and OpenCV's detector find with a file, before grouping: the same, but that OpenCV leaves out the last row
-/// of windows at some scales (the size of its stripes is rounded down).
-size_t check_equal(const std::filesystem::path& file, const cv::Mat1b& image, double factor) {
-  const Cascade cascade = read_cascade(file);
-  Search search(image.cols, image.rows, factor, {&cascade, 1});
-  cv::CascadeClassifier theirs;
-  REQUIRE(theirs.load(file.string()));
-  std::vector<cv::Rect> boxes;
-  theirs.detectMultiScale(image, boxes, factor, 0);
-  std::vector<Box> ours = detect_multi_scale(search, 0, view(image));
-  const auto all = sorted(ours), wanted = sorted(boxes);
-  std::erase_if(ours, [&](const Box& b) {
-    const double scale = static_cast<double>(b.width) / cascade.width;
-    return b.y + b.height > image.rows - 1 - (scale < 2 ? 2 : 1) * scale;
-  });
-  const auto above_the_last = sorted(ours);
-  CHECK(std::includes(all.begin(), all.end(), wanted.begin(), wanted.end()));
-  CHECK(std::includes(wanted.begin(), wanted.end(), above_the_last.begin(), above_the_last.end()));
-  return above_the_last.size();
 }
 
 }  // namespace
@@ -148,21 +105,6 @@ TEST_CASE("traffic_signs: the windows that pass are those of cv::CascadeClassifi
     found += check_equal(file, random_image(seed, 301, 220), 1.1 + 0.03 * seed);
   }
   CHECK(found > 500);
-}
-
-TEST_CASE("traffic_signs: the same on photographs with cascades that others trained") {
-  size_t found = 0;
-  for (const char* cascade :
-       {"traffic_signs/cascades/cascade_stop_3_10.xml", "traffic_signs/cascades/cascade_stop_3_15.xml",
-        "cascades_opencv/haarcascade_frontalface_alt.xml"}) {
-    const auto file = test::recording(cascade);
-    if (!file) return;
-    for (const char* name : {"st1", "st3", "st6", "st7", "p1"}) {
-      const auto scene = test::recording(std::string("traffic_signs/scenes/") + name + ".jpg");
-      found += check_equal(*file, cv::imread(scene->string(), cv::IMREAD_GRAYSCALE), 1.2);
-    }
-  }
-  CHECK(found > 20);
 }
 
 TEST_CASE("traffic_signs: groups are those of cv::groupRectangles") {

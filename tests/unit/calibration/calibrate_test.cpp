@@ -10,7 +10,6 @@
 
 #include "nodes/calibration/epipolar.hpp"
 #include "nodes/calibration/picture.hpp"
-#include "tests/test_data.hpp"
 #include "tests/unit/calibration/chessboard_views.hpp"
 
 using namespace takt;
@@ -156,22 +155,4 @@ TEST_CASE("the picture has a rectified pair above and both coverages below") {
   cv::inRange(picture, cv::Scalar(50, 50, 225), cv::Scalar(70, 70, 245), red);
   CHECK(cv::countNonZero(red.rowRange(0, scene.truth.height)) == 0);
   CHECK(cv::countNonZero(red.rowRange(scene.truth.height, picture.rows)) > 54);
-}
-
-TEST_CASE("the recorded chessboard gives rows better than half a pixel") {
-  const auto folder = takt::test::recording("calibration/chessboard_stereo");
-  if (!folder) return;
-  const Board board;
-  const auto images = read_pairs(find_pairs(*folder, "left*.jpg", "right*.jpg"));
-  std::vector<View> views = takt::test::views_of(images, board);
-  std::erase_if(views, [](const View& view) { return view.left.empty() || view.right.empty(); });
-  REQUIRE(views.size() >= 10);
-  const CalibrationResult result = calibrate(views, board, images.front().left.size());
-  CHECK(result.fit.both_px < 0.5);
-  stereo::Rectifier rectifier(result.fit.cameras);
-  std::vector<RectifiedPair> rectified;
-  for (const GreyPair& pair : images) rectified.push_back(rectify(rectifier, pair, board));
-  const auto rows = epipolar_error(rectified);
-  REQUIRE(rows);
-  CHECK(rows->median_px < 0.5);
 }

@@ -3,47 +3,17 @@
 
 #include <doctest/doctest.h>
 
-#include <fstream>
-#include <nlohmann/json.hpp>
 #include <random>
 #include <vector>
 
-#include "tests/conformance/dbc_file.hpp"
+#include "tests/unit/camera/eyes.hpp"
 #include "tests/unit/can/golden_frames.hpp"
 
 using namespace takt;
 using namespace takt::v4l2;
+using namespace takt::test;
 
 namespace {
-
-/// 4 x 2 pixels of each sensor, as in golden/bumblebee_frames.json.
-constexpr const char* kRight = "0A0B0C0D14151617";
-constexpr const char* kLeft = "646566676E6F7071";
-constexpr const char* kCentre = "C8C9CACBD2D3D4D5";
-
-struct Eyes {
-  int rows = 0;
-  std::vector<uint8_t> left, right;
-};
-
-Eyes eyes_of(std::span<const uint8_t> frame, FrameLayout layout) {
-  const auto size = static_cast<size_t>(layout.width * layout.height * layout.channels());
-  Eyes eyes{0, std::vector<uint8_t>(size, 0xA5), std::vector<uint8_t>(size, 0xA5)};
-  if (layout.bytes_per_line == 0) layout.bytes_per_line = layout.row_bytes();
-  eyes.rows = split(frame, layout, {eyes.left.data(), layout.width, layout.height, layout.channels()},
-                    {eyes.right.data(), layout.width, layout.height, layout.channels()});
-  return eyes;
-}
-
-FrameLayout layout_of(FrameFormat format, int left, int right) {
-  FrameLayout layout;
-  layout.format = format;
-  layout.width = 4;
-  layout.height = 2;
-  layout.left = left;
-  layout.right = right;
-  return layout;
-}
 
 void check_planes(const char* frame, FrameFormat format, int left, int right, const char* left_plane) {
   const Eyes eyes = eyes_of(test::bytes_of(frame), layout_of(format, left, right));
@@ -61,45 +31,6 @@ TEST_CASE("frame codec: the golden frames of Bumblebee2 and XB3, in every order 
   check_planes("0AC80BC90CCA0DCB14D215D316D417D5", FrameFormat::y16, 1, 0, kCentre);
   check_planes(kThree, FrameFormat::rgb3, 2, 0, kLeft);
   check_planes(kThree, FrameFormat::rgb3, 1, 0, kCentre);
-}
-
-TEST_CASE("frame codec: the vectors are those of the reference") {
-  const auto file = test::reference("golden/bumblebee_frames.json");
-  if (!file) return;
-  std::ifstream stream(*file);
-  const auto golden = nlohmann::json::parse(stream);
-  const auto& planes = golden["planes"];
-  CHECK(planes["right"] == kRight);
-  CHECK(planes["left"] == kLeft);
-  CHECK(planes["center"] == kCentre);
-  size_t frames = 0;
-  for (const auto& frame : golden["frames"]) {
-    const bool three = frame["bytes_per_pixel"] == 3;
-    for (int left = 0; left < (three ? 3 : 2); ++left) {
-      for (int right = 0; right < (three ? 3 : 2); ++right) {
-        if (left == right) continue;
-        const Eyes eyes = eyes_of(test::bytes_of(frame["hex"].get<std::string>()),
-                                  layout_of(three ? FrameFormat::rgb3 : FrameFormat::y16, left, right));
-        const auto plane = [&](int byte) {
-          return test::bytes_of(planes[frame["byte" + std::to_string(byte)].get<std::string>()].get<std::string>());
-        };
-        CHECK(eyes.left == plane(left));
-        CHECK(eyes.right == plane(right));
-      }
-    }
-    ++frames;
-  }
-  CHECK(frames == 4);
-  for (const auto& size : golden["sizes"]) {
-    const std::string camera = size["camera"];
-    FrameLayout layout =
-        layout_of(camera.find("three") == std::string::npos ? FrameFormat::y16 : FrameFormat::rgb3, 1, 0);
-    layout.width = camera.find("XB3") == std::string::npos ? 640 : 1280;
-    layout.height = layout.width * 3 / 4;
-    layout.bytes_per_line = layout.row_bytes();
-    CHECK(layout.bytes_per_line == size["bytesperline"]);
-    CHECK(layout.image_bytes() == size["sizeimage"]);
-  }
 }
 
 TEST_CASE("frame codec: rows are stepped by the device's stride, and a short frame gives its whole rows") {

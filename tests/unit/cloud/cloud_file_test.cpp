@@ -8,7 +8,6 @@
 #include <limits>
 
 #include "tests/temporary_folder.hpp"
-#include "tests/test_data.hpp"
 
 using namespace takt::cloud;
 using takt::Colour;
@@ -162,18 +161,4 @@ TEST_CASE("files that cannot be read or written are named") {
         (folder.path / "a.txt").string() + ": clouds are written to files ending in .ply or .pcd");
   CHECK(write_cloud(folder.path / "none" / "a.ply", kCloud.view()).error() ==
         (folder.path / "none" / "a.ply").string() + ": No such file or directory; choose another place");
-}
-
-TEST_CASE("recorded clouds") {
-  const auto points = [](const char* name) -> std::optional<size_t> {
-    const auto file = takt::test::recording(std::string("clouds/") + name);
-    if (!file) return std::nullopt;
-    const auto cloud = read_cloud(*file);
-    REQUIRE_MESSAGE(cloud.has_value(), cloud.error());
-    return cloud->points.size();
-  };
-  for (const auto& [name, count] : {std::pair{"human/ism_train_michael.pcd", 3400},
-                                    {"registration/bunny/bun0.pcd", 397},
-                                    {"registration/car_lidar/cloud_00000.ply", 24989}})
-    if (const auto found = points(name)) CHECK(*found == static_cast<size_t>(count));
 }

@@ -1,3 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-# Stereo matching and image files for the recorded drive; the room itself needs neither.
-set(ROOM_TEST_LIBRARIES takt_opencv takt_allocation_counter)
+set(ROOM_TEST_LIBRARIES takt_allocation_counter)

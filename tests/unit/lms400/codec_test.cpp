@@ -3,68 +3,12 @@
 #include <doctest/doctest.h>
 
 #include <cstdio>
-#include <fstream>
-#include <nlohmann/json.hpp>
 
-#include "hal/laser/lms400/frame.hpp"
-#include "hal/laser/lms400/messages.hpp"
-#include "tests/hex.hpp"
-#include "tests/test_data.hpp"
+#include "tests/unit/lms400/frames.hpp"
 #include "tests/unit/lms400/golden.hpp"
 
 using namespace takt::lms400;
 using namespace takt::test;
-using Texts = std::vector<std::string>;
-
-namespace {
-
-std::span<const uint8_t> bytes_of(std::string_view text) {
-  return {reinterpret_cast<const uint8_t*>(text.data()), text.size()};
-}
-std::string text_of(std::span<const uint8_t> bytes) { return {bytes.begin(), bytes.end()}; }
-
-/// "sMA", "sAN ok", "m20 x5", "error".
-std::string text_of(const Event& event) {
-  if (event.kind != EventKind::frame) return "error";
-  if (const auto m = read_measurement(event.payload)) {
-    char text[32];
-    std::snprintf(text, sizeof text, "m%X x%zu", static_cast<unsigned>(m->format), m->count());
-    return text;
-  }
-  const auto answer = read_answer(event.payload);
-  if (!answer) return "other";
-  return answer->kind == Kind::accepted ? "sMA" : read_hex(answer->word(0)) == 0u ? "sAN ok" : "sAN";
-}
-
-Texts events_in(std::span<const uint8_t> bytes, size_t piece = SIZE_MAX) {
-  Parser parser;
-  Texts events;
-  while (!bytes.empty()) {
-    const auto now = bytes.first(std::min(piece, bytes.size()));
-    parse(parser, now, [&](const Event& event) { events.push_back(text_of(event)); });
-    bytes = bytes.subspan(now.size());
-  }
-  return events;
-}
-
-std::vector<uint8_t> payload_of(std::span<const uint8_t> frame) {
-  Parser parser;
-  std::vector<uint8_t> payload;
-  parse(parser, frame, [&](const Event& event) { payload = copy_of(event.payload); });
-  return payload;
-}
-
-std::vector<uint8_t> written(const Measurement& m) {
-  std::vector<uint8_t> payload(kLargestPayload);
-  payload.resize(write_measurement(m, payload));
-  return copy_of(Frame(payload).bytes());
-}
-
-/// Of the golden streams, in their order.
-const Texts kStreamEvents[] = {
-    {"sMA", "sAN ok", "m20 x5"}, {"sMA", "m20 x5", "sAN ok"}, {"error", "m20 x5"}, {"m20 x5"}, {"error", "m20 x5"}};
-
-}  // namespace
 
 TEST_CASE("every golden frame is taken, and is made again from its payload, bit by bit") {
   for (const GoldenFrame& golden : kLms400Texts) {
@@ -183,34 +127,4 @@ TEST_CASE("the length is bounded, and any number of 02 may stand before a frame"
   std::vector<uint8_t> many;
   for (int i = 0; i < 3000; ++i) many = many + frame;
   CHECK(events_in(many).size() == 3000);
-}
-
-TEST_CASE("the whole collection of golden vectors, bit by bit") {
-  const auto file = recording("../reference/golden/lms400_telegrams.json");
-  if (!file) return;
-  std::ifstream stream(*file);
-  const auto all = nlohmann::json::parse(stream);
-  size_t texts = 0, measurements = 0, streams = 0;
-  for (const auto& entry : all["telegrams"]) {
-    INFO(entry["id"].get<std::string>());
-    const auto bytes = bytes_of_hex(entry["hex"].get<std::string>());
-    CHECK(text_of(payload_of(bytes)) == entry["ascii"].get<std::string>());
-    CHECK(copy_of(Frame(bytes_of(entry["ascii"].get<std::string>())).bytes()) == bytes);
-    ++texts;
-  }
-  for (const auto& entry : all["scans"]) {
-    INFO(entry["id"].get<std::string>());
-    const auto bytes = bytes_of_hex(entry["hex"].get<std::string>());
-    const auto payload = payload_of(bytes);
-    const auto m = read_measurement(payload);
-    REQUIRE(m);
-    CHECK(written(*m) == bytes);
-    ++measurements;
-  }
-  for (const auto& entry : all["streams"]) {
-    CHECK(events_in(bytes_of_hex(entry["hex"].get<std::string>())) == kStreamEvents[streams]);
-    ++streams;
-  }
-  std::printf("lms400_telegrams.json: %zu texts and %zu measurements both ways, %zu streams\n", texts, measurements,
-              streams);
 }

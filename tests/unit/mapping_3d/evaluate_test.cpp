@@ -4,8 +4,6 @@
 
 #include <doctest/doctest.h>
 
-#include "tests/test_data.hpp"
-
 using namespace takt;
 using namespace takt::mapping_3d;
 
@@ -70,12 +68,4 @@ TEST_CASE("the memory of a drive does not grow; a correction at its end mends th
   const CorrectionFigures round = evaluate_correction({}, 1);
   CHECK(round.drift_m > 0.1);
   CHECK(round.after_m < 0.7 * round.before_m);
-}
-
-TEST_CASE("median fusion of recorded depth images") {
-  const auto folder = test::recording("clouds/rgbd_poses");
-  if (!folder) return;
-  const FusionEvaluation e = evaluate_recorded(*folder, 1);
-  CHECK(e.methods.back().outliers_pct < e.methods[0].outliers_pct);
-  CHECK_THROWS_WITH_AS(evaluate_recorded(*folder / "depth", 1), doctest::Contains("pose.txt"), std::runtime_error);
 }

@@ -2,15 +2,11 @@
 #include <doctest/doctest.h>
 
 #include <cmath>
-#include <filesystem>
-#include <opencv2/calib3d.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <random>
 
 #include "nodes/person_tracking/shirt_place.hpp"
 #include "rt/memory/memory_use.hpp"
-#include "tests/test_data.hpp"
 
 using namespace takt;
 using namespace takt::person_tracking;
@@ -113,38 +109,6 @@ TEST_CASE("finding allocates nothing, and looks only where it is told") {
   CHECK(all == 1);
   CHECK(beside == 0);
   CHECK(outside == 0);
-}
-
-TEST_CASE("against cv::findChessboardCorners on real boards: its corners are among ours") {
-  const auto data = test::recording("calibration/chessboard_stereo");
-  if (!data) return;
-  int theirs = 0, ours = 0, boards = 0, images = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(*data)) {
-    if (entry.path().extension() != ".jpg") continue;
-    const cv::Mat image = cv::imread(entry.path().string(), cv::IMREAD_GRAYSCALE);
-    ++images;
-    std::vector<cv::Point2f> corners;
-    if (!cv::findChessboardCorners(image, {9, 6}, corners)) continue;
-    cv::cornerSubPix(image, corners, {5, 5}, {-1, -1}, {cv::TermCriteria::EPS + cv::TermCriteria::COUNT, 30, 0.01});
-    ChessboardFinder finder(image.cols, image.rows, 1, {});
-    int most = 0, level_of_most = 0;
-    for (int level = 0; level < ChessboardFinder::kLevels; ++level)
-      if (const auto found = finder.find(view_of(image), kAll, level); !found.empty() && found[0].corners > most)
-        most = found[0].corners, level_of_most = level;
-    boards += most > 0 ? 1 : 0;
-    finder.find(view_of(image), kAll, level_of_most);
-    for (const cv::Point2f& corner : corners) {
-      ++theirs;
-      for (const Corner& other : finder.corners())
-        if (std::hypot(other.x - corner.x, other.y - corner.y) < 1.5 * (1 << level_of_most)) {
-          ++ours;
-          break;
-        }
-    }
-  }
-  MESSAGE("boards in " << boards << " of " << images << " images, " << ours << " of OpenCV's " << theirs << " corners");
-  CHECK(boards >= images * 9 / 10);
-  CHECK(ours >= theirs * 9 / 10);
 }
 
 TEST_CASE("the range comes from disparities that agree with the size of the squares, else from that size") {

@@ -10,7 +10,6 @@
 #include "hal/replay/replay_laser.hpp"
 #include "tests/conformance/devices.hpp"
 #include "tests/has.hpp"
-#include "tests/test_data.hpp"
 #include "tests/unit/replay/carmen_file.hpp"
 
 using namespace takt;
@@ -192,28 +191,4 @@ TEST_CASE("logs that give nothing are refused before the start") {
   CHECK(has(laser_error(late), "`start: 1000000000.0"));
   CHECK(laser_error(late, pace(1, 1e9)) == "");
   CHECK(laser_error(scans_only, pace(1, -5)) == "");
-}
-
-// The suites read every 20 ms. Recorded scans are seconds apart, so that the log has to run fast enough for one in each
-// of the first five reads; a minute of driving passes while the base is read.
-TEST_CASE("recorded drives conform") {
-  struct Drive {
-    const char* file;
-    double laser_speed, moving_s;
-  };
-  for (const Drive& drive : {Drive{"sick/carmen/intel-corrected.log", 115, 400},
-                             Drive{"sick/carmen/freiburg-101-corrected.log", 150, 396}}) {
-    const auto path = test::recording(drive.file);
-    if (!path) continue;
-    const auto log = load_carmen_log("log", *path);
-    REQUIRE(log.has_value());
-    ReplayLaser laser("laser", {*path, {drive.laser_speed, log->scans.front().time_ns}, {}, 0});
-    check_laser_scanner(laser);
-    const auto moving = std::find_if(log->odometry.begin(), log->odometry.end(), [&](const TimedPose& line) {
-      return line.time_ns >= std::llround(drive.moving_s * 1e9);
-    });
-    REQUIRE(moving != log->odometry.end());
-    ReplayBase base("base", {*path, {40, moving->time_ns}});
-    check_mobile_base(base, false);
-  }
 }

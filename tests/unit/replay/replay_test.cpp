@@ -8,7 +8,6 @@
 #include "tests/conformance/stereo_camera.hpp"
 #include "tests/has.hpp"
 #include "tests/temporary_folder.hpp"
-#include "tests/test_data.hpp"
 
 using namespace takt;
 using namespace takt::replay;
@@ -226,19 +225,4 @@ TEST_CASE("a single pair is repeated") {
   }
   camera.trigger(4);
   CHECK(camera.read(left.view(), right.view(), INT64_MAX).status == ReadStatus::end_of_data);
-}
-
-TEST_CASE("a real KITTI sequence opens with its calibration") {
-  const auto path = test::recording("stereo_sequence/kitti06");
-  if (!path) return;
-  ReplayCameraSettings s;
-  s.directory = *path;
-  s.rate = {10, 1};
-  VirtualClock clock;
-  ReplayCamera camera("camera", s, clock);
-  REQUIRE(camera.open().has_value());
-  CHECK(camera.frames() == 35);
-  CHECK(camera.format().width == 1226);
-  CHECK(camera.format().channels == 1);
-  CHECK(camera.format().camera.baseline_m == doctest::Approx(0.53715).epsilon(1e-4));
 }

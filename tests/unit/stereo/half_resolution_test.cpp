@@ -1,22 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-// Half resolution against the full matcher: on made scenes with known disparities, and on recorded pairs.
+// Half resolution against the full matcher on made scenes with known disparities.
 #include "nodes/stereo/half_resolution.hpp"
 
 #include <doctest/doctest.h>
 
 #include <algorithm>
-#include <cmath>
-#include <opencv2/imgcodecs.hpp>
 #include <random>
 #include <string>
 #include <vector>
 
-#include "nodes/stereo/evaluate.hpp"
 #include "nodes/stereo/window_matcher.hpp"
-#include "tests/test_data.hpp"
+#include "tests/unit/stereo/scored_result.hpp"
 
 using namespace takt;
 using namespace takt::stereo;
+using takt::test::ScoredResult;
 
 namespace {
 
@@ -59,29 +57,6 @@ MadeScene made_scene(int width, int height) {
   return s;
 }
 
-struct ScoredResult {
-  StereoScore score;
-  double mean_error_px = 0;
-  std::vector<int16_t> disparity;
-  std::vector<uint8_t> confidence;
-};
-
-ScoredResult run(Matcher& matcher, ImageView<const uint8_t> left, ImageView<const uint8_t> right,
-                 const DisparityImage& truth) {
-  ScoredResult r;
-  r.disparity.resize(truth.pixels.size());
-  r.confidence.resize(truth.pixels.size());
-  const ImageView<int16_t> disparity(r.disparity.data(), left.width, left.height);
-  REQUIRE(matcher.match(left, right, {disparity, {r.confidence.data(), left.width, left.height}}));
-  r.score = score(to_disparity_image(disparity), truth);
-  const auto visible = visible_in_right(truth);
-  double sum = 0;
-  for (size_t i = 0; i < visible.size(); ++i)
-    if (visible[i]) sum += std::abs(static_cast<double>(r.disparity[i]) - static_cast<double>(truth.pixels[i]));
-  r.mean_error_px = sum / static_cast<double>(r.score.visible);
-  return r;
-}
-
 }  // namespace
 
 TEST_CASE(
@@ -92,7 +67,8 @@ TEST_CASE(
   WindowMatcher full(s.width, s.height, 1, p);
   HalfMatcher half_matcher(s.width, s.height, 1, p);
   const ImageView<const uint8_t> left(s.left.data(), s.width, s.height), right(s.right.data(), s.width, s.height);
-  const ScoredResult best = run(full, left, right, s.truth), worse = run(half_matcher, left, right, s.truth);
+  const ScoredResult best = test::run(full, left, right, s.truth),
+                     worse = test::run(half_matcher, left, right, s.truth);
   MESSAGE("bad pixels: full ", best.score.bad_1px_pct, " %, half ", worse.score.bad_1px_pct, " %; mean error ",
           best.mean_error_px, " and ", worse.mean_error_px, " px");
   CHECK(worse.score.density_pct == 100);
@@ -111,32 +87,6 @@ TEST_CASE(
   CHECK(confidence > 0.55 * best_confidence);  // measured 0.61: odd disparities fall between two
 }
 
-TEST_CASE("level 1 on recorded pairs with ground truth") {
-  struct Recording {
-    const char *folder, *left, *right, *truth;
-    int disparities;
-    double scale, most_bad_pct;  // measured 7.7, 16.5 and 10.0
-  };
-  for (const Recording& r : {Recording{"stereo/tsukuba", "im3.png", "im4.png", "disp3.pgm", 16, 16, 8.1},
-                             Recording{"stereo/teddy", "im2.png", "im6.png", "disp2.png", 64, 4, 16.9},
-                             Recording{"stereo/aloe", "aloeL.jpg", "aloeR.jpg", "aloeGT.png", 216, 1, 10.4}}) {
-    const auto folder = takt::test::recording(r.folder);
-    if (!folder) return;
-    const cv::Mat left = cv::imread((*folder / r.left).string()), right = cv::imread((*folder / r.right).string());
-    const cv::Mat truth_image = cv::imread((*folder / r.truth).string(), cv::IMREAD_GRAYSCALE);
-    REQUIRE(left.size() == truth_image.size());
-    const DisparityImage truth =
-        ground_truth(ImageView<const uint8_t>(truth_image.data, truth_image.cols, truth_image.rows), r.scale);
-    MatcherParameters p;
-    p.disparities = r.disparities;
-    HalfMatcher matcher(left.cols, left.rows, 3, p);
-    const ScoredResult result =
-        run(matcher, {left.data, left.cols, left.rows, 3}, {right.data, left.cols, left.rows, 3}, truth);
-    MESSAGE(std::string(r.folder), ": ", result.score.bad_1px_pct, " % bad");
-    CHECK(result.score.bad_1px_pct <= r.most_bad_pct);
-  }
-}
-
 TEST_CASE("half of the range finds what lies in it as well as all of the range does, and nothing beyond") {
   const MadeScene s = made_scene(320, 240);
   MatcherParameters p;
@@ -146,12 +96,12 @@ TEST_CASE("half of the range finds what lies in it as well as all of the range d
   const ImageView<const uint8_t> left(s.left.data(), s.width, s.height), right(s.right.data(), s.width, s.height);
   DisparityImage far = s.truth, near = s.truth;
   for (size_t i = 0; i < s.truth.pixels.size(); ++i) (s.truth.pixels[i] < 40 ? near : far).pixels[i] = 0;
-  const double all_pct = run(all, left, right, far).score.bad_1px_pct,
-               narrow_pct = run(narrow, left, right, far).score.bad_1px_pct;
+  const double all_pct = test::run(all, left, right, far).score.bad_1px_pct,
+               narrow_pct = test::run(narrow, left, right, far).score.bad_1px_pct;
   MESSAGE("bad pixels within half of the range: ", all_pct, " % searching all of it, ", narrow_pct, " % half");
   CHECK(narrow_pct <= all_pct + 0.5);
-  CHECK(run(all, left, right, near).score.bad_1px_pct < 40);  // measured 32, at the box's edges
-  CHECK(run(narrow, left, right, near).score.bad_1px_pct > 90);
+  CHECK(test::run(all, left, right, near).score.bad_1px_pct < 40);  // measured 32, at the box's edges
+  CHECK(test::run(narrow, left, right, near).score.bad_1px_pct > 90);
 }
 
 TEST_CASE("odd sizes keep their size; views that do not fit are refused and untouched") {
@@ -175,6 +125,7 @@ TEST_CASE("a limited search gives nothing beyond its range") {
   p.disparities = 64;
   HalfMatcher matcher(s.width, s.height, 1, p);
   matcher.limit_search(20);
-  const ScoredResult r = run(matcher, {s.left.data(), s.width, s.height}, {s.right.data(), s.width, s.height}, s.truth);
+  const ScoredResult r =
+      test::run(matcher, {s.left.data(), s.width, s.height}, {s.right.data(), s.width, s.height}, s.truth);
   for (const int16_t d : r.disparity) REQUIRE(d < 20);
 }

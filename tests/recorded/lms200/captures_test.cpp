@@ -10,7 +10,7 @@
 #include <sstream>
 
 #include "hal/laser/lms200/commands.hpp"
-#include "tests/test_data.hpp"
+#include "tests/recorded/recording.hpp"
 #include "tests/unit/lms200/telegrams.hpp"
 
 using namespace takt::lms200;
@@ -51,7 +51,7 @@ Found telegrams_in(std::span<const uint8_t> bytes, Parser parser) {
 /// Every row of the index is taken or refused as it is marked; returns what else was found.
 Found check_rows(const std::string& session, const char* direction, Found found) {
   size_t taken = 0, refused = 0;
-  for (const auto& row : rows_in(*recording("sick/lms200/" + session + ".index.csv"))) {
+  for (const auto& row : rows_in(recording("sick/lms200/" + session + ".index.csv"))) {
     if (row.size() < 6 || row[1] != direction) continue;
     INFO(session, " ", row[2]);
     const auto telegram = found.find(std::stoull(row[2]));
@@ -73,10 +73,9 @@ Found check_rows(const std::string& session, const char* direction, Found found)
 TEST_CASE("captures of a real scanner: rows as marked, distances as its driver had them") {
   for (const std::string session : {"2017_Aug_04_23-22-04", "2017_Aug_05_18-52-56"}) {
     const auto file = recording("sick/lms200/" + session + ".rx.bin");
-    if (!file) return;
-    const auto found = telegrams_in(bytes_in(*file), Parser::of_replies());
+    const auto found = telegrams_in(bytes_in(file), Parser::of_replies());
     CHECK(check_rows(session, "rx", found).empty());
-    auto rows = rows_in(*recording("sick/lms200/" + session + ".distances.csv"));
+    auto rows = rows_in(recording("sick/lms200/" + session + ".distances.csv"));
     auto row = rows.begin();
     while (row != rows.end() && row->size() < 300) ++row;  // a heading
     size_t beams = 0;
@@ -102,8 +101,7 @@ TEST_CASE("captures of a real scanner: rows as marked, distances as its driver h
 TEST_CASE("what was said to a real scanner") {
   for (const std::string session : {"2017_Aug_04_23-22-04", "2017_Jul_03_14-29-30"}) {
     const auto file = recording("sick/lms200/" + session + ".tx.bin");
-    if (!file) return;
-    const auto found = telegrams_in(bytes_in(*file), Parser::of_commands());
+    const auto found = telegrams_in(bytes_in(file), Parser::of_commands());
     CHECK(check_rows(session, "tx", found).empty());
     for (const auto& [position, payload] : found)
       CHECK(copy_of(Telegram(0, payload).bytes()).size() == payload.size() + kFraming);
@@ -112,8 +110,7 @@ TEST_CASE("what was said to a real scanner") {
 
 TEST_CASE("a corrupted link: a whole telegram inside a broken one is found, the broken ones are not") {
   const auto file = recording("sick/lms200/2017_Aug_05_19-09-36.rx.bin");
-  if (!file) return;
-  const auto bytes = bytes_in(*file);
+  const auto bytes = bytes_in(file);
   const auto inside = check_rows("2017_Aug_05_19-09-36", "rx", telegrams_in(bytes, Parser::of_replies()));
   REQUIRE(inside.size() == 1);
   CHECK(inside.begin()->first == 60);  // in the row that begins at 47
@@ -123,9 +120,8 @@ TEST_CASE("a corrupted link: a whole telegram inside a broken one is found, the 
 
 TEST_CASE("the whole collection of golden vectors, bit by bit") {
   for (const char* name : {"lms200_telegrams.json", "lms200_recorded.json"}) {
-    const auto file = recording(std::string("../reference/golden/") + name);
-    if (!file) return;
-    std::ifstream stream(*file);
+    const auto file = reference(std::string("golden/") + name);
+    std::ifstream stream(file);
     const auto all = nlohmann::json::parse(stream);
     size_t telegrams = 0, checked_streams = 0;
     const auto check = [&](const nlohmann::json& entry) {

@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 // Photographs of real objects (COIL-100, thesis Sec. 3.4 works with such views) in generated scenes.
+#include "nodes/object_detection/photographs.hpp"
+
 #include <doctest/doctest.h>
 
 #include "nodes/object_detection/evaluate.hpp"
-#include "nodes/object_detection/photographs.hpp"
-#include "tests/test_data.hpp"
+#include "tests/recorded/recording.hpp"
 
 using namespace takt::object_detection;
+using takt::test::recording;
 
 TEST_CASE("photographed objects, views 60 degrees apart: most windows go, few objects with them") {
-  const auto folder = takt::test::recording("objects/coil100");
-  if (!folder) return;
-  const auto database = read_turntable(*folder, 48);
+  const auto folder = recording("objects/coil100");
+  const auto database = read_turntable(folder, 48);
   REQUIRE(database.size() == 10);
   Exclusion of[2], none_missed[2];
   for (const ColourBins bins : {ColourBins::hsv_64x32x2, ColourBins::hsv_64x64x1}) {

@@ -6,7 +6,7 @@
 
 #include "nodes/stereo/evaluate_peers.hpp"
 #include "nodes/stereo/matcher.hpp"
-#include "tests/test_data.hpp"
+#include "tests/recorded/recording.hpp"
 
 using namespace takt;
 using namespace takt::stereo;
@@ -27,17 +27,15 @@ struct Recording {
   }
 };
 
-/// Empty where the recordings are absent.
 std::vector<Recording> recordings() {
   std::vector<Recording> all{{"stereo/tsukuba", "im3.png", "im4.png", "disp3.pgm", 16, 16, 6.0, 4.3},
                              {"stereo/teddy", "im2.png", "im6.png", "disp2.png", 64, 4, 11.6, 5.9},
                              {"stereo/aloe", "aloeL.jpg", "aloeR.jpg", "aloeGT.png", 216, 1, 10.2, 6.7}};
   for (Recording& r : all) {
     const auto folder = takt::test::recording(r.folder);
-    if (!folder) return {};
-    r.left = cv::imread((*folder / r.left_name).string());
-    r.right = cv::imread((*folder / r.right_name).string());
-    const cv::Mat truth = cv::imread((*folder / r.truth_name).string(), cv::IMREAD_GRAYSCALE);
+    r.left = cv::imread((folder / r.left_name).string());
+    r.right = cv::imread((folder / r.right_name).string());
+    const cv::Mat truth = cv::imread((folder / r.truth_name).string(), cv::IMREAD_GRAYSCALE);
     REQUIRE(r.left.total() > 0);
     REQUIRE(r.left.size() == truth.size());
     r.truth = ground_truth(ImageView<const uint8_t>(truth.data, truth.cols, truth.rows), r.scale);

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <doctest/doctest.h>
+
+#include <stdexcept>
+
+#include "nodes/mapping_3d/evaluate.hpp"
+#include "tests/recorded/recording.hpp"
+
+using namespace takt::mapping_3d;
+using takt::test::recording;
+
+TEST_CASE("median fusion of recorded depth images") {
+  const auto folder = recording("clouds/rgbd_poses");
+  const FusionEvaluation e = evaluate_recorded(folder, 1);
+  CHECK(e.methods.back().outliers_pct < e.methods[0].outliers_pct);
+  CHECK_THROWS_WITH_AS(evaluate_recorded(folder / "depth", 1), doctest::Contains("pose.txt"), std::runtime_error);
+}
