@@ -31,8 +31,11 @@ function(takt_sum_parsed name)
   file(CONFIGURE OUTPUT ${CMAKE_CURRENT_BINARY_DIR}/CMakeFiles/${name}.dir/cmake_pch.hxx.gch.sum CONTENT "${sum}\n")
 endfunction()
 
-# For all files of TARGET, the headers that this directory parses once (TAKT_PARSED names them).
+# For all files of TARGET, the headers that this directory parses once (TAKT_PARSED names them; empty: none).
 function(takt_use_parsed target)
+  if(NOT TAKT_PARSED)
+    return()
+  endif()
   target_precompile_headers(${target} REUSE_FROM ${TAKT_PARSED})
   if(CMAKE_CXX_COMPILER_ID STREQUAL GNU)
     # GCC bug 105651 again: in what it inlines from a precompiled header, optimised. The sanitizer presets keep them.
