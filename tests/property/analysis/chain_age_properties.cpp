@@ -8,6 +8,7 @@
 
 #include "random.hpp"
 #include "rt/sched/analysis/chain_age.hpp"
+#include "tests/property_scale.hpp"
 
 using namespace takt::analysis;
 
@@ -79,9 +80,9 @@ std::vector<ChainTask> random_chain(Random& random, bool phased) {
 }  // namespace
 
 TEST_CASE("chain age: the bound is never exceeded, with known phases it is reached within a factor") {
-  Random random{std::mt19937(30)};
+  Random random{std::mt19937(takt::test::seed(30))};
   double ratio = 0;
-  for (int round = 0; round < 3'000; ++round) {
+  for (int round = 0; round < takt::test::rounds(3'000); ++round) {
     CAPTURE(round);
     const std::vector<ChainTask> chain = random_chain(random, true);
     const Ticks bound = chain_age(chain).newest;
@@ -97,10 +98,10 @@ TEST_CASE("chain age: the bound is never exceeded, with known phases it is reach
 }
 
 TEST_CASE("chain age: without known phases the bound is never exceeded, whatever they are, and not far off") {
-  Random random{std::mt19937(31)};
+  Random random{std::mt19937(takt::test::seed(31))};
   double largest = 0, sum = 0;
-  constexpr int kRounds = 400;
-  for (int round = 0; round < kRounds; ++round) {
+  const int rounds = takt::test::rounds(400);
+  for (int round = 0; round < rounds; ++round) {
     CAPTURE(round);
     const std::vector<ChainTask> chain = random_chain(random, false);
     const Ticks bound = chain_age(chain).newest;
@@ -113,7 +114,7 @@ TEST_CASE("chain age: without known phases the bound is never exceeded, whatever
     largest = std::max(largest, ratio);
     sum += ratio;
   }
-  std::printf("chain age, phases unknown: bound / observed %.3f on average, at most %.3f\n", sum / kRounds, largest);
+  std::printf("chain age, phases unknown: bound / observed %.3f on average, at most %.3f\n", sum / rounds, largest);
   CHECK(largest <= 3);
 }
 

@@ -6,6 +6,7 @@
 #include "random_sets.hpp"
 #include "rt/sched/analysis/edf.hpp"
 #include "rt/sched/analysis/per_core.hpp"
+#include "tests/property_scale.hpp"
 
 namespace {
 
@@ -17,10 +18,10 @@ struct Tally {
 };
 
 /// `exact`: an equivalence is expected, in verdict and responses; else only soundness.
-void compare(uint32_t seed, int sets, const SetStyle& style, CorePolicy policy, Dispatch dispatch, bool exact) {
-  std::mt19937 random(seed);
+void compare(uint64_t seed, int sets, const SetStyle& style, CorePolicy policy, Dispatch dispatch, bool exact) {
+  std::mt19937 random(takt::test::seed(seed));
   Tally tally;
-  for (int n = 0; n < sets; ++n) {
+  for (int n = 0; n < takt::test::rounds(sets); ++n) {
     const TaskSet set = random_set(random, style);
     CAPTURE(describe(set));
     const Adversary all(set.tasks, dispatch);
@@ -42,8 +43,8 @@ void compare(uint32_t seed, int sets, const SetStyle& style, CorePolicy policy, 
   }
   MESSAGE(tally.schedulable << " schedulable (" << tally.not_proven << " of them not proven), " << tally.not_schedulable
                             << " not; " << tally.states << " states");
-  CHECK(tally.schedulable > 0.15 * sets);
-  CHECK(tally.not_schedulable > 0.15 * sets);
+  CHECK(tally.schedulable > 0.15 * takt::test::rounds(sets));
+  CHECK(tally.not_schedulable > 0.15 * takt::test::rounds(sets));
 }
 
 const SetStyle kTiny{.most_tasks = 3, .longest_period = 12, .least_load = 0.65, .tight = 0.8};
@@ -71,10 +72,10 @@ TEST_CASE("non-preemptive EDF with offsets: sound against everything that can ha
 namespace {
 
 /// Bounds under blocking, task by task: each task's own blocking is what the others do not see.
-void compare_blocking(uint32_t seed, int sets, CorePolicy policy, Dispatch dispatch) {
-  std::mt19937 random(seed);
+void compare_blocking(uint64_t seed, int sets, CorePolicy policy, Dispatch dispatch) {
+  std::mt19937 random(takt::test::seed(seed));
   int bounds = 0, unscheduled = 0, not_compared = 0;
-  for (int n = 0; n < sets; ++n) {
+  for (int n = 0; n < takt::test::rounds(sets); ++n) {
     TaskSet set = random_set(random, kTiny);
     for (TimedTask& task : set.tasks) task.blocking = std::uniform_int_distribution<Ticks>(0, task.period / 3)(random);
     CAPTURE(describe(set));

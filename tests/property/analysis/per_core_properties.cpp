@@ -11,6 +11,7 @@
 #include "random_sets.hpp"
 #include "rt/sched/analysis/edf.hpp"
 #include "rt/sched/analysis/fixed_priority.hpp"
+#include "tests/property_scale.hpp"
 
 namespace {
 
@@ -84,9 +85,9 @@ struct Count {
 }  // namespace
 
 TEST_CASE("fixed priorities: every response bound is the longest simulated response") {
-  std::mt19937 random(1);
+  std::mt19937 random(takt::test::seed(1));
   Count count;
-  for (int i = 0; i < kSets; ++i) {
+  for (int i = 0; i < takt::test::rounds(kSets); ++i) {
     const TaskSet set = random_set(random);
     const ResponseBounds bounds = fixed_priority_responses(set.tasks);
     const Seen seen = simulate_all_starts(set, Dispatch::fixed_priority);
@@ -108,9 +109,9 @@ TEST_CASE("fixed priorities: every response bound is the longest simulated respo
 }
 
 TEST_CASE("EDF: a set fails the demand test exactly if a simulated job misses") {
-  std::mt19937 random(2);
+  std::mt19937 random(takt::test::seed(2));
   Count count;
-  for (int i = 0; i < kSets; ++i) {
+  for (int i = 0; i < takt::test::rounds(kSets); ++i) {
     const TaskSet set = random_set(random, {.least_load = 0.75, .tight = 0.9});
     const DemandAnswer answer = edf_demand_test(set.tasks);
     Seen seen = simulate_all_starts(set, Dispatch::edf);
@@ -123,9 +124,9 @@ TEST_CASE("EDF: a set fails the demand test exactly if a simulated job misses") 
 }
 
 TEST_CASE("non-preemptive EDF, sporadic: a set fails exactly if a simulated job misses") {
-  std::mt19937 random(3);
+  std::mt19937 random(takt::test::seed(3));
   Count count;
-  for (int i = 0; i < kSets; ++i) {
+  for (int i = 0; i < takt::test::rounds(kSets); ++i) {
     const TaskSet set = random_set(random, {.offsets = false});
     Seen seen = simulate_blockers(set);
     CAPTURE(describe(set));
@@ -137,9 +138,9 @@ TEST_CASE("non-preemptive EDF, sporadic: a set fails exactly if a simulated job 
 }
 
 TEST_CASE("non-preemptive EDF with offsets: nothing that it calls schedulable misses") {
-  std::mt19937 random(4);
+  std::mt19937 random(takt::test::seed(4));
   int proven = 0, refused = 0, refused_without_miss = 0;
-  for (int i = 0; i < kSets / 2; ++i) {
+  for (int i = 0; i < takt::test::rounds(kSets / 2); ++i) {
     const TaskSet set = random_set(random, {.sporadic = 0.2});
     const bool fits = non_preemptive_edf_demand_test(set.tasks).verdict == Verdict::schedulable;
     const ResponseBounds bounds = non_preemptive_edf_responses(set.tasks);
@@ -153,6 +154,6 @@ TEST_CASE("non-preemptive EDF with offsets: nothing that it calls schedulable mi
   }
   MESSAGE("non-preemptive EDF with offsets: " << proven << " proven, " << refused << " refused, "
                                               << refused_without_miss << " of them without a miss in simulation");
-  CHECK(proven > 0.15 * kSets / 2);
-  CHECK(refused > 0.15 * kSets / 2);
+  CHECK(proven > 0.15 * takt::test::rounds(kSets / 2));
+  CHECK(refused > 0.15 * takt::test::rounds(kSets / 2));
 }

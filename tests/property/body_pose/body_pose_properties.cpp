@@ -8,6 +8,7 @@
 #include "nodes/body_pose/fitter.hpp"
 #include "nodes/body_pose/generated_scene.hpp"
 #include "nodes/body_pose/segmentation.hpp"
+#include "tests/property_scale.hpp"
 
 using namespace takt;
 using namespace takt::body_pose;
@@ -48,13 +49,13 @@ TEST_CASE("the fit that does nothing twice is the one that does everything, bit 
   SceneCamera camera;
   for (const std::string name : {"human", "human_thesis", "crane"}) {
     const Skeleton skeleton = shipped(name);
-    for (uint64_t seed = 1; seed <= (name == "human" ? 4u : 2u); ++seed) {
+    for (uint64_t seed = 1; seed <= test::rounds(name == "human" ? 4u : 2u); ++seed) {
       FitParameters p;
       p.rotations = static_cast<int>(1 + seed % 3);
       p.search_m = 0.1 + 0.1 * static_cast<double>(seed % 4);
       p.density_min = 0.15 * static_cast<double>(seed % 3);
-      const GeneratedScene scene =
-          name == "human" ? make_person(skeleton, camera, seed, 0) : make_any(skeleton, camera, seed, 0);
+      const GeneratedScene scene = name == "human" ? make_person(skeleton, camera, test::seed(seed), 0)
+                                                   : make_any(skeleton, camera, test::seed(seed), 0);
       const std::vector<Point> points = thinned_body(scene, name == "crane" ? 4 : 12);
       REQUIRE(points.size() > 50);
       const Cluster cluster{points, scene.body.joints[0].cast<float>(), reference_density(points, p.tube_m),
@@ -69,9 +70,9 @@ TEST_CASE("the fit that does nothing twice is the one that does everything, bit 
 
 TEST_CASE("the same in noise: points without any shape") {
   const Skeleton skeleton = shipped("human");
-  std::mt19937_64 random(7);
+  std::mt19937_64 random(test::seed(7));
   std::uniform_real_distribution<float> across(-0.7f, 0.7f), up(0.1f, 1.8f);
-  for (int round = 0; round < 4; ++round) {
+  for (int round = 0; round < test::rounds(4); ++round) {
     FitParameters p;
     p.rotations = 2;
     p.density_min = 0.1 * round;
@@ -92,10 +93,10 @@ TEST_CASE("regions grow from all heads at once as if every point asked every oth
   p.density_min = 20;
   p.grow_m = 0.12;
   size_t candidates = 0;
-  for (uint64_t seed = 1; seed <= 6; ++seed) {
+  for (uint64_t seed = 1; seed <= test::rounds(6u); ++seed) {
     std::vector<Point> points;
     for (uint64_t person = 0; person < 2; ++person) {  // two whose regions touch
-      for (Point q : make_person(skeleton, camera, seed, person, false).in_floor) {
+      for (Point q : make_person(skeleton, camera, test::seed(seed), person, false).in_floor) {
         q.x += person == 0 ? 0.0f : 0.3f;
         points.push_back(q);
       }
@@ -117,5 +118,5 @@ TEST_CASE("regions grow from all heads at once as if every point asked every oth
         CHECK(squared_distance(expected[i], segmentation.points()[candidate.first + i]) == 0);
     }
   }
-  CHECK(candidates >= 6);
+  CHECK(candidates >= test::at_scale(6));
 }

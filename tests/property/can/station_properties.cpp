@@ -9,6 +9,7 @@
 #include "hal/base/base_messages.hpp"
 #include "hal/base/can_base.hpp"
 #include "hal/head/can_head.hpp"
+#include "tests/property_scale.hpp"
 #include "tests/temporary_folder.hpp"
 
 using namespace takt;
@@ -54,12 +55,12 @@ void for_all_messages(Check check) {
 /// Whatever bytes arrive, a read ends, and says something.
 template <class Driver>
 void check_any_bytes(Driver& driver, RawPeer& peer, std::span<const Message> table, VirtualClock& clock,
-                     uint32_t seed) {
+                     uint64_t seed) {
   REQUIRE(driver.open().has_value());
   peer.accept();
   REQUIRE(driver.start(clock.now_ns()).has_value());
   std::mt19937 random(seed);
-  for (int round = 0; round < 400; ++round) {
+  for (int round = 0; round < test::rounds(400); ++round) {
     for (int k = 0; k < 20; ++k) {
       const Message& message = table[random() % table.size()];
       WireFrame wire{};
@@ -82,16 +83,16 @@ void check_any_bytes(Driver& driver, RawPeer& peer, std::span<const Message> tab
     if (reading.status == ReadStatus::disconnected) driver.restart(clock.now_ns());
     peer.drain();
   }
-  CHECK(driver.station().counters().damaged > 1000);
-  CHECK(driver.station().counters().accepted > 100);
+  CHECK(driver.station().counters().damaged >= test::at_scale(1000));
+  CHECK(driver.station().counters().accepted >= test::at_scale(100));
 }
 
 }  // namespace
 
 TEST_CASE("property: what is encoded is decoded to the last bit, whatever else stands in the frame") {
-  std::mt19937_64 random(1);
+  std::mt19937_64 random(test::seed(1));
   for_all_messages([&](const Message& message) {
-    for (int round = 0; round < 300; ++round) {
+    for (int round = 0; round < test::rounds(300); ++round) {
       Frame frame{message.id, message.length, {}};
       for (size_t i = 0; i < frame.length; ++i) frame.data[i] = static_cast<uint8_t>(random());
       std::array<double, kMostSignals> values{}, again{};
@@ -113,10 +114,10 @@ TEST_CASE("property: no bytes end a driver of the head or the base, or hold it u
     RawPeer peer(path);
     if (seed % 2 == 0) {
       base::CanBase driver("base", {.interface = "unix:" + path}, clock);
-      check_any_bytes(driver, peer, base::messages(), clock, seed);
+      check_any_bytes(driver, peer, base::messages(), clock, test::seed(seed));
     } else {
       head::CanHead driver("head", {.interface = "unix:" + path}, clock);
-      check_any_bytes(driver, peer, head::messages(), clock, seed);
+      check_any_bytes(driver, peer, head::messages(), clock, test::seed(seed));
     }
   }
 }

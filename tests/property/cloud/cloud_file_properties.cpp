@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "nodes/cloud/cloud_file.hpp"
+#include "tests/property_scale.hpp"
 
 using namespace takt::cloud;
 
@@ -61,7 +62,7 @@ bool check(const std::string& bytes) {
 }  // namespace
 
 TEST_CASE("no damage to a file crashes the reader, and every failure carries its place") {
-  std::mt19937 random(3);
+  std::mt19937 random(takt::test::seed(3));
   Cloud cloud;
   for (int i = 0; i < 6; ++i) {
     cloud.points.push_back({static_cast<float>(i), -0.5f, 1e-3f});
@@ -78,14 +79,14 @@ TEST_CASE("no damage to a file crashes the reader, and every failure carries its
     for (const auto& write : {ply_of, pcd_of}) whole.push_back(write(cloud.view(), encoding));
   for (const std::string& bytes : whole) REQUIRE(check(bytes));
   size_t refused = 0;
-  constexpr size_t kRounds = 12000;
-  for (size_t i = 0; i < kRounds; ++i) {
+  const size_t rounds = takt::test::rounds(size_t{12000});
+  for (size_t i = 0; i < rounds; ++i) {
     const std::string bytes = mutated(whole[i % whole.size()], random);
     CAPTURE(bytes);
     refused += check(bytes) ? 0 : 1;
   }
-  CHECK(refused > kRounds / 3);
-  CHECK(refused < kRounds);
+  CHECK(refused > rounds / 3);
+  CHECK(refused < rounds);
 }
 
 TEST_CASE("a file cut off anywhere is refused") {
@@ -101,8 +102,8 @@ TEST_CASE("a file cut off anywhere is refused") {
 }
 
 TEST_CASE("random bytes are refused") {
-  std::mt19937 random(5);
-  for (int i = 0; i < 2000; ++i) {
+  std::mt19937 random(takt::test::seed(5));
+  for (int i = 0; i < takt::test::rounds(2000); ++i) {
     std::string bytes = i % 3 == 0 ? "ply\n" : i % 3 == 1 ? "FIELDS x y z\n" : "";
     for (size_t n = random() % 300; n > 0; --n) bytes += static_cast<char>(random());
     CHECK_FALSE(check(bytes));

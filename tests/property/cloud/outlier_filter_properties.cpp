@@ -6,18 +6,19 @@
 #include <vector>
 
 #include "nodes/cloud/outlier_filter.hpp"
+#include "tests/property_scale.hpp"
 
 using namespace takt::cloud;
 using takt::Point;
 
 TEST_CASE("the grid decides like every point against every other, on every SIMD target") {
   const std::vector<int64_t> targets = hwy::SupportedAndGeneratedTargets();
-  std::mt19937 random(1);
+  std::mt19937 random(takt::test::seed(1));
   const auto uniform = [&](double low, double high) {
     return static_cast<float>(std::uniform_real_distribution<>(low, high)(random));
   };
   OutlierFilter filter(3000);  // one object for all rounds: nothing may be left over from a round
-  for (int round = 0; round < 150; ++round) {
+  for (int round = 0; round < takt::test::rounds(150); ++round) {
     hwy::SetSupportedTargetsForTest(targets[static_cast<size_t>(round / 5) % targets.size()]);
     CAPTURE(simd_target());
     const auto count = static_cast<size_t>(std::uniform_int_distribution<>(0, 1500)(random));

@@ -13,6 +13,7 @@
 
 #include "nodes/cloud/cloud_filter.hpp"
 #include "nodes/cloud/voxel_reference.hpp"
+#include "tests/property_scale.hpp"
 
 using namespace takt::cloud;
 using takt::Colour;
@@ -68,11 +69,11 @@ auto bits(const CloudView& cloud) {
 }  // namespace
 
 TEST_CASE("reduction, smoothing and interpolation give the points of their references, bit for bit") {
-  std::mt19937 random(1);
+  std::mt19937 random(takt::test::seed(1));
   VoxelGrid grid(kMost);  // one object for all rounds: nothing may be left over from a round
   Cloud memory{std::vector<Point>(100 * kMost), std::vector<Colour>(100 * kMost)};
   size_t made = 0;
-  for (int round = 0; round < 300; ++round) {
+  for (int round = 0; round < takt::test::rounds(300); ++round) {
     CAPTURE(round);
     const double edge = std::uniform_real_distribution<>(0.01, 0.5)(random);
     const Cloud cloud = random_cloud(random, edge);
@@ -93,11 +94,11 @@ TEST_CASE("reduction, smoothing and interpolation give the points of their refer
     made +=
         check([&](CloudBuffer& out) { interpolate(grid, p, out); }, interpolate_reference(cloud.view(), p)) - reduced;
   }
-  CHECK(made > 1000);
+  CHECK(made >= takt::test::at_scale(1000));
 }
 
 TEST_CASE("the order of voxels does not depend on that of the points") {
-  std::mt19937 random(4);
+  std::mt19937 random(takt::test::seed(4));
   VoxelGrid grid(kMost);
   const auto voxels = [&](const Cloud& cloud, double edge) {
     grid.fill(cloud.view(), edge);
@@ -105,7 +106,7 @@ TEST_CASE("the order of voxels does not depend on that of the points") {
     for (const Voxel& v : grid.voxels()) all.emplace_back(v.points, v.b, v.g, v.r);
     return all;
   };
-  for (int round = 0; round < 100; ++round) {
+  for (int round = 0; round < takt::test::rounds(100); ++round) {
     Cloud cloud = random_cloud(random, 0.1), shuffled;
     cloud.colours.resize(cloud.points.size());
     std::vector<size_t> order(cloud.points.size());
@@ -120,7 +121,7 @@ TEST_CASE("the order of voxels does not depend on that of the points") {
 }
 
 TEST_CASE("the same cloud gives the same bytes in the same order, whatever was filtered before") {
-  std::mt19937 random(2);
+  std::mt19937 random(takt::test::seed(2));
   FilterSteps steps;
   steps.outliers = {0.3, 3};
   steps.interpolate.edge_m = 0.1;
@@ -142,7 +143,7 @@ TEST_CASE("the same cloud gives the same bytes in the same order, whatever was f
     return memory;
   };
   size_t points = 0;
-  for (int round = 0; round < 40; ++round) {
+  for (int round = 0; round < takt::test::rounds(40); ++round) {
     const Cloud cloud = random_cloud(random, 0.1);
     CloudFilter fresh(kCapacity, steps);
     const Cloud a = run(used, cloud), b = run(fresh, cloud);
@@ -155,5 +156,5 @@ TEST_CASE("the same cloud gives the same bytes in the same order, whatever was f
     CHECK(same(a.points, b.points));
     CHECK(same(a.colours, b.colours));
   }
-  CHECK(points > 1000);
+  CHECK(points >= takt::test::at_scale(1000));
 }

@@ -13,6 +13,7 @@
 #include "nodes/ego_motion/flow_filter.hpp"
 #include "nodes/ego_motion/refine.hpp"
 #include "tests/on_each_target.hpp"
+#include "tests/property_scale.hpp"
 
 using namespace takt::ego_motion;
 using takt::test::on_each_target;
@@ -51,8 +52,8 @@ Level with_means(Plane image) {
 TEST_CASE(
     "block_search equals three nested loops over pixels on every SIMD target, with equal brightness or as it is") {
   on_each_target([] {
-    std::mt19937 random(1);
-    for (int round = 0; round < 300; ++round) {
+    std::mt19937 random(takt::test::seed(1));
+    for (int round = 0; round < takt::test::rounds(300); ++round) {
       const int width = between(random, 33, 90), height = between(random, 33, 70), half = between(random, 1, 7);
       Level a(width, height), b(width, height);
       a.image = noise(random, width, height, round % 3);
@@ -75,8 +76,8 @@ TEST_CASE(
 
 TEST_CASE("the corner response equals the double loop bit by bit on every SIMD target") {
   on_each_target([] {
-    std::mt19937 random(2);
-    for (int round = 0; round < 20; ++round) {
+    std::mt19937 random(takt::test::seed(2));
+    for (int round = 0; round < takt::test::rounds(20); ++round) {
       const int width = between(random, 20, 150), height = between(random, 20, 60);
       const Plane image = noise(random, width, height, round % 4);
       CornerDetector detector(width, height, {});
@@ -94,8 +95,8 @@ TEST_CASE("the corner response equals the double loop bit by bit on every SIMD t
 
 TEST_CASE("corners are the same on every SIMD target, the best of a quadratic search") {
   on_each_target([] {
-    std::mt19937 random(13);
-    for (int round = 0; round < 20; ++round) {
+    std::mt19937 random(takt::test::seed(13));
+    for (int round = 0; round < takt::test::rounds(20); ++round) {
       const int width = between(random, 64, 200), height = between(random, 64, 150);
       const Plane image = noise(random, width, height, round % 3);
       CornerParameters p;
@@ -116,8 +117,8 @@ TEST_CASE("corners are the same on every SIMD target, the best of a quadratic se
 }
 
 TEST_CASE("corners keep their distance, their margin and the mask, strongest first") {
-  std::mt19937 random(3);
-  for (int round = 0; round < 20; ++round) {
+  std::mt19937 random(takt::test::seed(3));
+  for (int round = 0; round < takt::test::rounds(20); ++round) {
     const int width = between(random, 64, 200), height = between(random, 64, 150);
     const Plane image = noise(random, width, height, 2);
     CornerParameters p;
@@ -145,8 +146,8 @@ TEST_CASE("corners keep their distance, their margin and the mask, strongest fir
 }
 
 TEST_CASE("the flow filter decides like the quadratic one") {
-  std::mt19937 random(4);
-  for (int round = 0; round < 100; ++round) {
+  std::mt19937 random(takt::test::seed(4));
+  for (int round = 0; round < takt::test::rounds(100); ++round) {
     const int width = between(random, 64, 400), height = between(random, 64, 300);
     FlowFilterParameters p{static_cast<double>(between(random, 2, 60)), 0.5 * between(random, 1, 10),
                            between(random, 1, 6)};
@@ -163,7 +164,7 @@ TEST_CASE("the flow filter decides like the quadratic one") {
 
 TEST_CASE("the pyramid halves by rounded means and knows the mean around each pixel, on every SIMD target") {
   on_each_target([] {
-    std::mt19937 random(5);
+    std::mt19937 random(takt::test::seed(5));
     const int width = between(random, 64, 180), height = between(random, 64, 100);
     const Plane image = noise(random, width, height, 0);
     Pyramid pyramid(width, height, 3);
@@ -199,8 +200,8 @@ TEST_CASE("the pyramid halves by rounded means and knows the mean around each pi
 
 TEST_CASE("sub-pixel refinement equals loops over pixels bit by bit on every SIMD target") {
   on_each_target([] {
-    std::mt19937 random(12);
-    for (int round = 0; round < 200; ++round) {
+    std::mt19937 random(takt::test::seed(12));
+    for (int round = 0; round < takt::test::rounds(200); ++round) {
       const int half = between(random, 1, 7);
       const Plane a = noise(random, 60, 50, round % 4), b = round % 5 == 0 ? a : noise(random, 60, 50, round % 4);
       const double x = between(random, 4, 55) + 0.125 * between(random, 0, 7);
@@ -227,8 +228,8 @@ TEST_CASE(
   const auto pattern = [](double x, double y) {
     return 110 + 30 * std::sin(0.45 * x + 0.2 * y) + 30 * std::sin(0.35 * y - 0.15 * x) + 20 * std::sin(0.3 * x);
   };
-  std::mt19937 random(6);
-  for (int round = 0; round < 50; ++round) {
+  std::mt19937 random(takt::test::seed(6));
+  for (int round = 0; round < takt::test::rounds(50); ++round) {
     const double sx = 0.01 * between(random, -90, 90), sy = 0.01 * between(random, -90, 90);
     const double gain = 0.01 * between(random, 70, 140), offset = between(random, -30, 12);
     Plane a(60, 60), b(60, 60);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
+#include <string>
 #include <vector>
 
 #include "nodes/ego_motion/estimator.hpp"
@@ -11,6 +12,7 @@
 #include "nodes/ego_motion/motion_kernel.hpp"
 #include "rt/transform/pose_math.hpp"
 #include "tests/on_each_target.hpp"
+#include "tests/property_scale.hpp"
 
 using namespace takt;
 using namespace takt::ego_motion;
@@ -22,7 +24,7 @@ constexpr Optics kOptics{492.8, 0.24};
 /// Points before a camera of 640 x 480, 1.5 to 10 m away, as two frames see them.
 class Views {
  public:
-  explicit Views(unsigned seed) : random_(seed) {}
+  explicit Views(uint64_t seed) : random_(seed) {}
   double uniform(double low, double high) { return std::uniform_real_distribution<double>(low, high)(random_); }
   double normal(double sigma) { return std::normal_distribution<double>(0, sigma)(random_); }
 
@@ -61,8 +63,8 @@ class Views {
 
 TEST_CASE("sums over observations equal those of one after the other bit by bit on every SIMD target") {
   test::on_each_target([] {
-    Views views(21);
-    for (int round = 0; round < 60; ++round) {
+    Views views(test::seed(21));
+    for (int round = 0; round < test::rounds(60); ++round) {
       const Rigid T = views.motion(0.3, 0.1);
       const auto observations = views.observe(T, static_cast<int>(views.uniform(1, 70)), 0.3, 0.2, 0.2);
       ObservationTable table(observations.size());
@@ -89,11 +91,11 @@ TEST_CASE("sums over observations equal those of one after the other bit by bit 
 }
 
 TEST_CASE("a residual of the table is that of the observation") {
-  Views views(22);
+  Views views(test::seed(22));
   const auto observations = views.observe(views.motion(0.3, 0.1), 50, 0.3, 0.2, 0.2);
   ObservationTable table(observations.size());
   table.fill(observations, kOptics);
-  for (int round = 0; round < 20; ++round) {
+  for (int round = 0; round < test::rounds(20); ++round) {
     const Rigid T = views.motion(0.3, 0.1);
     const double limit = views.uniform(1, 30);
     size_t inside = 0;
@@ -110,40 +112,48 @@ TEST_CASE("a residual of the table is that of the observation") {
 // up.)
 TEST_CASE("the stated covariance of a step and of the accumulated pose is consistent with the errors made") {
   struct Case {
-    const char* name;
+    std::string name;
     int corners;
     double noise_px, outliers, unmatched, shared_px;
   };
-  constexpr int kRuns = 400, kSteps = 10;
+  constexpr int kSteps = 10;
+  const int runs = test::rounds(400);
+  const double wider = std::sqrt(400.0 / runs);  // than with 400 runs
   for (const Case& c : {Case{"plain", 200, 0.15, 0, 0, 0}, Case{"noisy", 200, 0.3, 0, 0, 0},
                         Case{"fine", 200, 0.03, 0, 0, 0}, Case{"outliers, missing disparities", 200, 0.15, 0.3, 0.2, 0},
                         Case{"few corners", 40, 0.15, 0, 0, 0}, Case{"shared error", 200, 0.1, 0, 0, 0.05}}) {
     CAPTURE(c.name);
-    Views views(23);
+    Views views(test::seed(23));
     double step_mean = 0, pose_mean = 0;
+    int unsolved = 0;
     EstimatorParameters parameters;
     parameters.shared_px = c.shared_px;
     MotionEstimator estimator(parameters, static_cast<size_t>(c.corners));
-    for (int run = 0; run < kRuns; ++run) {
+    for (int run = 0; run < runs; ++run) {
       UncertainPose pose;
       Rigid truth;
-      for (int step = 0; step < kSteps; ++step) {
+      for (int step = 0; step < kSteps;) {
         const Rigid T = views.motion(0.15, 0.1);
         const auto seen = views.observe(T, c.corners, c.noise_px, c.outliers, c.unmatched, c.shared_px);
         const Estimate e = estimator.estimate(seen, kOptics, {}, static_cast<uint64_t>(step));
-        REQUIRE(e.solved);
+        unsolved += !e.solved;
+        if (!e.solved) continue;
+        ++step;
         const UncertainPose moved = camera_in_previous(e);
-        step_mean += normalised_error_squared(moved, T.inverse()) / (kRuns * kSteps);
+        step_mean += normalised_error_squared(moved, T.inverse()) / (runs * kSteps);
         pose = compose(pose, moved);
         truth = truth * T.inverse();
       }
-      pose_mean += normalised_error_squared(pose, truth) / kRuns;
+      pose_mean += normalised_error_squared(pose, truth) / runs;
     }
-    MESSAGE(c.name << ": mean normalised error squared of a step " << step_mean << ", of a pose " << pose_mean);
+    MESSAGE(c.name << ": mean normalised error squared of a step " << step_mean << ", of a pose " << pose_mean << "; "
+                   << unsolved << " steps without a motion");
+    // No good sample was among those drawn: that often by design.
+    CHECK(unsolved <= test::at_most(runs * kSteps, 1 - parameters.success));
     const double corners = c.corners * (1 - c.outliers);
-    CHECK(step_mean > 5.5);
-    CHECK(step_mean < 6.3 * corners / (corners - 14));
-    CHECK(pose_mean > 5.1);
-    CHECK(pose_mean < 6.9);
+    CHECK(step_mean > 6 - 0.5 * wider);
+    CHECK(step_mean < (6 + 0.3 * wider) * corners / (corners - 14));
+    CHECK(pose_mean > 6 - 0.9 * wider);
+    CHECK(pose_mean < 6 + 0.9 * wider);
   }
 }

@@ -4,6 +4,7 @@
 
 #include "../../unit/faults/fixture.hpp"
 #include "graph/faults/injection.hpp"
+#include "tests/property_scale.hpp"
 
 using namespace takt;
 using namespace takt::graph;
@@ -51,10 +52,10 @@ std::string damaged(std::mt19937& random) {
 }  // namespace
 
 TEST_CASE("damaged scenarios") {
-  std::mt19937 random(23);
+  std::mt19937 random(test::seed(23));
   const GraphSpec graph = small_graph();
   size_t refused = 0, sound = 0;
-  for (int i = 0; i < 3000; ++i) {
+  for (int i = 0; i < test::rounds(3000); ++i) {
     const std::string text = damaged(random);
     CAPTURE(text);
     auto loaded = load(text);
@@ -69,6 +70,6 @@ TEST_CASE("damaged scenarios") {
     injection.make_room(plan);
     injection.disturb(plan, clock, epoch);
   }
-  CHECK(refused > 1000);
-  CHECK(sound > 200);
+  CHECK(refused >= test::at_scale(1000));
+  CHECK(sound >= test::at_scale(200));
 }

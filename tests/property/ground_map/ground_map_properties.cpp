@@ -16,6 +16,7 @@
 #include "nodes/ground_map/texture.hpp"
 #include "nodes/mapping_3d/pose.hpp"
 #include "tests/on_each_target.hpp"
+#include "tests/property_scale.hpp"
 
 using namespace takt;
 using namespace takt::ground_map;
@@ -25,7 +26,7 @@ namespace {
 
 struct Random {
   std::mt19937 engine;
-  explicit Random(unsigned seed) : engine(seed) {}
+  explicit Random(uint64_t seed) : engine(seed) {}
   int pick(int low, int high) { return std::uniform_int_distribution<int>(low, high)(engine); }
   double uniform(double low, double high) { return std::uniform_real_distribution<>(low, high)(engine); }
 };
@@ -112,8 +113,8 @@ TEST_CASE("saturation and value equal the rounded quotient on every SIMD target 
 }
 
 TEST_CASE("oracle 14: the table equals the sum over all entries, and the weights of Eq. 4.3 with E-19") {
-  Random random(1);
-  for (int round = 0; round < 40; ++round) {
+  Random random(test::seed(1));
+  for (int round = 0; round < test::rounds(40); ++round) {
     const int capacity = random.pick(1, 40);
     const double t_w = random.uniform(0.05, 3);
     TextureMemory memory(capacity, t_w);
@@ -141,8 +142,8 @@ TEST_CASE("oracle 14: the table equals the sum over all entries, and the weights
 }
 
 TEST_CASE("the cleaned mask equals window means and growth until nothing changes") {
-  Random random(2);
-  for (int round = 0; round < 150; ++round) {
+  Random random(test::seed(2));
+  for (int round = 0; round < test::rounds(150); ++round) {
     const int w = random.pick(1, 90), h = random.pick(1, 60), mean_size = 2 * random.pick(0, 4) + 1;
     const ReferenceArea area(w, h, {random.uniform(0.1, 1), random.uniform(0.1, 1), random.uniform(0.05, 1), 0.02});
     MaskCleaner cleaner(w, h, mean_size);
@@ -156,8 +157,8 @@ TEST_CASE("the cleaned mask equals window means and growth until nothing changes
 }
 
 TEST_CASE("doubtful is what is flooded, or ground in another light: equal to a search of every value and saturation") {
-  Random random(6);
-  for (int round = 0; round < 6; ++round) {
+  Random random(test::seed(6));
+  for (int round = 0; round < test::rounds(6); ++round) {
     DoubtParameters p;
     p.bloom_value = random.pick(200, 256);
     p.shade_deepest = random.uniform(0.1, 0.6);
@@ -192,8 +193,8 @@ TEST_CASE("doubtful is what is flooded, or ground in another light: equal to a s
 }
 
 TEST_CASE("the part of a row that sees the floor is that of its pixels, for any pose of the camera") {
-  Random random(7);
-  for (int round = 0; round < 400; ++round) {
+  Random random(test::seed(7));
+  for (int round = 0; round < test::rounds(400); ++round) {
     const int width = random.pick(1, 120);
     const Eigen::Quaterniond q(Eigen::AngleAxisd(random.uniform(-3, 3), Eigen::Vector3d::UnitZ()) *
                                Eigen::AngleAxisd(random.uniform(-2.4, -1.0), Eigen::Vector3d::UnitX()) *
@@ -209,8 +210,8 @@ TEST_CASE("the part of a row that sees the floor is that of its pixels, for any 
 }
 
 TEST_CASE("the floor of a pixel is where its ray meets the plane, for any pose of the camera") {
-  Random random(3);
-  for (int round = 0; round < 300; ++round) {
+  Random random(test::seed(3));
+  for (int round = 0; round < test::rounds(300); ++round) {
     const CameraModel camera{random.uniform(100, 1000), random.uniform(200, 400), random.uniform(150, 300), 0};
     const Eigen::Quaterniond q(Eigen::AngleAxisd(random.uniform(-3, 3), Eigen::Vector3d::UnitZ()) *
                                Eigen::AngleAxisd(random.uniform(-2.6, -1.4), Eigen::Vector3d::UnitX()) *
@@ -309,9 +310,9 @@ int differences(const Window& w, ImageView<const int16_t> cells, const Cells& ex
 }  // namespace
 
 TEST_CASE("a drive: every observation, and the map it adds up to, equal a map of cells without a window") {
-  Random random(4);
+  Random random(test::seed(4));
   const int w = 80, h = 60;
-  for (int drive = 0; drive < 12; ++drive) {
+  for (int drive = 0; drive < test::rounds(12); ++drive) {
     GridParameters p;
     p.cell_m = random.uniform(0.15, 0.5);
     p.window_m = random.uniform(3, 14);
@@ -365,8 +366,8 @@ TEST_CASE("a drive: every observation, and the map it adds up to, equal a map of
 
 TEST_CASE("the cells of a row equal the projection of each pixel on every SIMD target") {
   on_each_target([&] {
-    Random random(5);
-    for (int round = 0; round < 60; ++round) {
+    Random random(test::seed(5));
+    for (int round = 0; round < test::rounds(60); ++round) {
       const int width = random.pick(1, 70), side = random.pick(2, 90);
       const double range = random.uniform(3, 40);
       const FloorProjection to_cells =

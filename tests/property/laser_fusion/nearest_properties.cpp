@@ -7,6 +7,7 @@
 
 #include "nodes/laser_fusion/generated_pair.hpp"
 #include "nodes/laser_fusion/matcher.hpp"
+#include "tests/property_scale.hpp"
 
 using namespace takt;
 using namespace takt::laser_fusion;
@@ -36,8 +37,8 @@ bool same(const PairSums& a, const PairSums& b) {
 TEST_CASE("the table finds the point that looking at every point finds, wherever that is within reach") {
   NearestTable usual(400), small(400, 300);  // one object for all rounds: nothing may be left over from a round
   size_t within = 0, ties = 0;
-  for (int round = 0; round < 60; ++round) {
-    Draw draw(static_cast<uint64_t>(round));
+  for (int round = 0; round < test::rounds(60); ++round) {
+    Draw draw(test::seed(static_cast<uint64_t>(round)));
     const double extents[] = {0.05, 1, 6, 300, 2e5}, extent = extents[round % 5];
     const double reach = extent * (round % 2 == 0 ? 0.05 : 0.4);
     const double away = round % 3 == 0 ? 10 * extent : 0;  // of the origin
@@ -68,14 +69,15 @@ TEST_CASE("the table finds the point that looking at every point finds, wherever
       }
     }
   }
-  CHECK(within > 20'000);
-  CHECK(ties > 2'000);
+  CHECK(within >= test::at_scale(20'000));
+  CHECK(ties >= test::at_scale(2'000));
 }
 
 TEST_CASE("a pose is judged alike with and without the table, in both metrics, to the last bit") {
-  for (uint64_t seed = 1; seed <= 12; ++seed) {
-    Draw draw(seed);
-    const CloudPair pair = generate_pair({.points = 300, .overlap = 0.3 + 0.1 * static_cast<double>(seed % 8)}, seed);
+  for (uint64_t seed = 1; seed <= test::rounds(12u); ++seed) {
+    Draw draw(test::seed(seed));
+    const CloudPair pair =
+        generate_pair({.points = 300, .overlap = 0.3 + 0.1 * static_cast<double>(seed % 8)}, test::seed(seed));
     for (const Metric metric : {Metric::truncated, Metric::thesis}) {
       Matcher matcher(300, 300, {.metric = metric, .cut_m = seed % 2 == 0 ? 0.25 : 0.6});
       matcher.set(pair.laser.points, pair.vision.points);

@@ -12,6 +12,7 @@
 #include "nodes/mapping_3d/tile_map.hpp"
 #include "rt/transform/pose_math.hpp"
 #include "tests/on_each_target.hpp"
+#include "tests/property_scale.hpp"
 
 using namespace takt;
 using namespace takt::mapping_3d;
@@ -50,11 +51,11 @@ struct Views {
 TEST_CASE("median fusion equals the algorithm pixel by pixel, view by view, on every target") {
   test::on_each_target([] {
     size_t contested = 0, known = 0;
-    for (uint64_t round = 0; round < 30; ++round) {
+    for (uint64_t round = 0; round < test::rounds(30u); ++round) {
       CAPTURE(round);
-      Lot lot(5, round);
+      Lot lot(test::seed(5), round);
       const size_t count = 1 + static_cast<size_t>(lot.in(0, 11.999));
-      Views views(count, lot, round);
+      Views views(count, lot, test::seed(round));
       const auto reference = static_cast<size_t>(lot.in(0, static_cast<double>(count) - 0.001));
       FusionParameters p;
       p.steps = lot.chance(0.3) ? 0 : lot.in(0, 2);
@@ -72,15 +73,15 @@ TEST_CASE("median fusion equals the algorithm pixel by pixel, view by view, on e
         contested += fast[i] > 0 && std::abs(fast[i] - views.depth_m[reference][i]) > 0.2;
       }
     }
-    CHECK(known > 5000);
-    CHECK(contested > 500);
+    CHECK(known >= test::at_scale(5000));
+    CHECK(contested >= test::at_scale(500));
   });
 }
 
 TEST_CASE("the map holds the voxels that were seen, each once, with the mean of what was seen there, in any tiles") {
-  for (uint64_t round = 0; round < 20; ++round) {
+  for (uint64_t round = 0; round < test::rounds(20u); ++round) {
     CAPTURE(round);
-    Lot lot(6, round);
+    Lot lot(test::seed(6), round);
     MapParameters p;
     p.voxel_m = lot.in(0.04, 0.3);
     p.tile_m = lot.in(0.5, 3);

@@ -13,6 +13,7 @@
 
 #include "nodes/mapping_3d/grid_window.hpp"
 #include "nodes/mapping_3d/obstacle_grid.hpp"
+#include "tests/property_scale.hpp"
 
 using namespace takt::mapping_3d;
 using takt::Point;
@@ -189,8 +190,8 @@ struct Random {
 }  // namespace
 
 TEST_CASE("occupied cells equal those of a map of voxels; a free cell is never occupied") {
-  Random uniform{std::mt19937(1)};
-  for (int round = 0; round < 40; ++round) {
+  Random uniform{std::mt19937(takt::test::seed(1))};
+  for (int round = 0; round < takt::test::rounds(40); ++round) {
     ObstacleParameters p;
     p.voxel_m = uniform(0.1, 0.4);
     p.share = uniform(0.01, 0.3);
@@ -219,9 +220,9 @@ TEST_CASE("occupied cells equal those of a map of voxels; a free cell is never o
 }
 
 TEST_CASE("the merged grid of a window equals the one made from all its clouds, view by view and point by point") {
-  Random uniform{std::mt19937(2)};
+  Random uniform{std::mt19937(takt::test::seed(2))};
   size_t remembered = 0, opened = 0, lost = 0;
-  for (int round = 0; round < 12; ++round) {
+  for (int round = 0; round < takt::test::rounds(12); ++round) {
     CAPTURE(round);
     ObstacleParameters p;
     p.voxel_m = uniform(0.15, 0.3);
@@ -256,6 +257,6 @@ TEST_CASE("the merged grid of a window equals the one made from all its clouds, 
     }
   }
   CHECK(lost == 0);
-  CHECK(remembered > 1000);
-  CHECK(opened > 1000);
+  CHECK(remembered >= takt::test::at_scale(1000));
+  CHECK(opened >= takt::test::at_scale(1000));
 }

@@ -7,6 +7,7 @@
 
 #include "nodes/navigation/pilot.hpp"
 #include "nodes/obstacle_stop/protected_field.hpp"
+#include "tests/property_scale.hpp"
 
 using namespace takt::navigation;
 
@@ -72,12 +73,12 @@ int64_t least_cost(const std::map<Key, bool>& free, const OccupancyView& view, c
 
 TEST_CASE(
     "ways to where two places are in reach, and to the nearest cell beside an unknown one, cost what Dijkstra's do") {
-  std::mt19937 random(5);
+  std::mt19937 random(takt::test::seed(5));
   const auto below = [&](int n) { return static_cast<int>(random() % static_cast<unsigned>(n)); };
   PathPlanner planner(400, {0.1, 3});
   size_t near = 0, unknown = 0, none = 0;
   std::vector<Place> path;
-  for (int round = 0; round < 150; ++round) {
+  for (int round = 0; round < takt::test::rounds(150); ++round) {
     CAPTURE(round);
     const RandomField field(random, 5 + below(14), 5 + below(14), 0.1, 0.15);
     REQUIRE(planner.look(field.view));
@@ -124,19 +125,19 @@ TEST_CASE(
     };
     check(planner.plan_to_unknown(middle(from), area, {&seen, 1}, path), least(beside), unknown);
   }
-  CHECK(near > 30);
-  CHECK(unknown > 30);
-  CHECK(none > 30);
+  CHECK(near >= takt::test::at_scale(30));
+  CHECK(unknown >= takt::test::at_scale(30));
+  CHECK(none >= takt::test::at_scale(30));
 }
 
 TEST_CASE("obstacles grow as the definition says, and every way costs what Dijkstra's does") {
-  std::mt19937 random(3);
+  std::mt19937 random(takt::test::seed(3));
   const auto below = [&](int n) { return static_cast<int>(random() % static_cast<unsigned>(n)); };
   PathPlanner planners[] = {{600, {0, 3}}, {600, {0.1, 3}}, {600, {0.4, 3}}};
   constexpr double kClearance_m[] = {0, 0.1, 0.4};
   size_t found = 0, none = 0, pieces = 0;
   std::vector<Place> path;
-  for (int round = 0; round < 300; ++round) {
+  for (int round = 0; round < takt::test::rounds(300); ++round) {
     CAPTURE(round);
     const int width = 3 + below(22), height = 3 + below(22);
     const auto which = static_cast<size_t>(below(3));
@@ -183,9 +184,9 @@ TEST_CASE("obstacles grow as the definition says, and every way costs what Dijks
       if (nearest >= 0) REQUIRE(planner.cost() == nearest);
     }
   }
-  CHECK(found > 500);
-  CHECK(none > 50);
-  CHECK(pieces > 1000);
+  CHECK(found >= takt::test::at_scale(500));
+  CHECK(none >= takt::test::at_scale(50));
+  CHECK(pieces >= takt::test::at_scale(1000));
 }
 
 namespace {
@@ -225,13 +226,13 @@ TEST_CASE("what a way was planned round never keeps who drives it from standing,
   constexpr Braking kBraking{1.0, 1.5, 0.35};  // the guard's parameters
   constexpr double kStep_s = 1.0 / 15;
   constexpr int kCells = 80;
-  std::mt19937 random(11);
+  std::mt19937 random(takt::test::seed(11));
   const auto below = [&](int n) { return static_cast<int>(random() % static_cast<unsigned>(n)); };
   PathPlanner planner(kCells * kCells, {robot.clearance_m(), 3});
   std::vector<Place> way;
   size_t ways = 0, steps = 0, at_rest = 0, moving = 0;
   double nearest_m = 10;
-  for (int round = 0; round < 60; ++round) {
+  for (int round = 0; round < takt::test::rounds(60); ++round) {
     const RandomField field(random, kCells, kCells, 0.003, 0, 0.1);
     REQUIRE(planner.look(field.view));
     const auto obstacles = borders(field.view);
@@ -270,7 +271,7 @@ TEST_CASE("what a way was planned round never keeps who drives it from standing,
   }
   MESSAGE(ways << " ways, " << steps << " jobs, " << moving << " with something in the field of the drive, " << at_rest
                << " in that at rest; never nearer than " << nearest_m << " m");
-  CHECK(ways > 40);
+  CHECK(ways >= takt::test::at_scale(40));
   CHECK(nearest_m >= robot.clearance_m());
   CHECK(at_rest == 0);
 }

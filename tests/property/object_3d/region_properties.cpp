@@ -7,6 +7,7 @@
 
 #include "nodes/object_3d/outline.hpp"
 #include "nodes/object_3d/segmenter.hpp"
+#include "tests/property_scale.hpp"
 
 using namespace takt;
 using namespace takt::object_3d;
@@ -46,10 +47,10 @@ GrowParameters random_growth(std::mt19937& random, int round) {
 }  // namespace
 
 TEST_CASE("region growing finds the points of the plain definition, in its order, from every kind of cloud") {
-  std::mt19937 random(3);
+  std::mt19937 random(test::seed(3));
   RegionGrower grower(400);
   size_t largest = 0, cut = 0;
-  for (int round = 0; round < 300; ++round) {
+  for (int round = 0; round < test::rounds(300); ++round) {
     const GrowParameters p = random_growth(random, round);
     const RandomCloud cloud = random_cloud(random, 1 + random() % 400, p.d_max_m, round);
     grower.fill(cloud.points, cloud.colours, p);
@@ -68,14 +69,14 @@ TEST_CASE("region growing finds the points of the plain definition, in its order
     }
   }
   CHECK(largest > 200);  // that the clouds test something
-  CHECK(cut > 100);
+  CHECK(cut >= test::at_scale(100));
 }
 
 TEST_CASE("objects equal those of the plain definition, also where regions overlap or are cut off") {
-  std::mt19937 random(5);
+  std::mt19937 random(test::seed(5));
   Segmenter segmenter(300, 300);
   size_t objects = 0;
-  for (int round = 0; round < 200; ++round) {
+  for (int round = 0; round < test::rounds(200); ++round) {
     SegmentParameters p;
     p.grow = random_growth(random, round);
     p.reach = {p.grow.d_max_m * static_cast<float>(2 + random() % 6), 4 * p.grow.d_max_m, 4 * p.grow.d_max_m};
@@ -97,12 +98,12 @@ TEST_CASE("objects equal those of the plain definition, also where regions overl
     REQUIRE(segmenter.done() == 1);
     objects += wanted.size();
   }
-  CHECK(objects > 1000);
+  CHECK(objects >= test::at_scale(1000));
 }
 
 TEST_CASE("the hull has the corners of the plain definition, and its rectangle is the smallest of all directions") {
-  std::mt19937 random(7);
-  for (int round = 0; round < 400; ++round) {
+  std::mt19937 random(test::seed(7));
+  for (int round = 0; round < test::rounds(400); ++round) {
     std::vector<Point2> points(1 + random() % 40), scratch(2 * points.size() + 2);
     for (Point2& p : points)  // small whole numbers: many equal, many in line
       p = {static_cast<double>(random() % 7), static_cast<double>(random() % 7)};

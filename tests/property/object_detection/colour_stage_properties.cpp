@@ -8,6 +8,7 @@
 #include "nodes/object_detection/reference.hpp"
 #include "tests/on_each_target.hpp"
 #include "tests/property/object_detection/random_images.hpp"
+#include "tests/property_scale.hpp"
 
 using namespace takt;
 using namespace takt::object_detection;
@@ -59,7 +60,7 @@ TEST_CASE("all 16.7 million colours get the same bin from the vectorised form, w
 }
 
 TEST_CASE("fewer bins are neighbours of the many taken together") {
-  Random random(7);
+  Random random(test::seed(7));
   std::vector<uint8_t> colours(3 * 20000);
   for (uint8_t& value : colours) value = random.byte();
   std::vector<uint16_t> many(20000), few(20000);
@@ -76,8 +77,8 @@ TEST_CASE("fewer bins are neighbours of the many taken together") {
 }
 
 TEST_CASE("the colour stage equals counting and comparing everything, for any grid, with each SIMD target") {
-  Random random(11);
-  for (int round = 0; round < 60; ++round) {
+  Random random(test::seed(11));
+  for (int round = 0; round < test::rounds(60); ++round) {
     const int window = random.in(5, 70), reference = random.in(std::max(1, window / 3), window - 1);
     const int width = random.in(window, 150), height = random.in(window, 130);
     const ColourBins bins = kBoth[round % 2];
@@ -102,8 +103,8 @@ TEST_CASE("the colour stage equals counting and comparing everything, for any gr
 }
 
 TEST_CASE("in portions: the searched rows of windows equal the reference, from any row on, the others say so") {
-  Random random(23);
-  for (int round = 0; round < 40; ++round) {
+  Random random(test::seed(23));
+  for (int round = 0; round < test::rounds(40); ++round) {
     const int window = random.in(5, 40), reference = random.in(std::max(1, window / 3), window - 1);
     const int width = random.in(window, 120), height = random.in(window, 120);
     const SearchGrid grid = make_search_grid(width, height, reference, window);
@@ -129,7 +130,7 @@ TEST_CASE("in portions: the searched rows of windows equal the reference, from a
 }
 
 TEST_CASE("the same at the size of the camera: 37 x 27 windows of 64 px over 640 x 480") {
-  Random random(5);
+  Random random(test::seed(5));
   const SearchGrid grid = make_search_grid(640, 480, 48, 64);
   const std::vector<uint8_t> image = random.image(640, 480);
   const ImageView<const uint8_t> view(image.data(), 640, 480, 3);

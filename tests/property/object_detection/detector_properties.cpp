@@ -11,6 +11,7 @@
 #include "nodes/object_detection/detector.hpp"
 #include "nodes/object_detection/reference.hpp"
 #include "tests/property/object_detection/random_images.hpp"
+#include "tests/property_scale.hpp"
 
 using namespace takt;
 using namespace takt::object_detection;
@@ -73,8 +74,8 @@ float error_by_brute_force(const Detector& detector, size_t scale, const Databas
 }  // namespace
 
 TEST_CASE("a smaller scale equals doing each pixel by itself, and OpenCV") {
-  Random random(19);
-  for (int round = 0; round < 30; ++round) {
+  Random random(test::seed(19));
+  for (int round = 0; round < test::rounds(30); ++round) {
     const int width = random.in(2, 90), height = random.in(2, 70);
     const double scale = round == 0 ? 0.5 : 0.01 * random.in(50, 99);
     CAPTURE(width);
@@ -95,14 +96,15 @@ TEST_CASE("a smaller scale equals doing each pixel by itself, and OpenCV") {
 }
 
 TEST_CASE("a smaller view: pixels between those of the object, as OpenCV has them; background where little is object") {
-  Random random(23);
+  Random random(test::seed(23));
   for (const double scale : {0.5, 0.7, 0.83, 1.0}) {
     constexpr int kSide = 40;
     std::vector<uint8_t> pixels(3 * kSide * kSide, 0), object(pixels.size(), 0);
     for (int y = 3; y < 31; ++y) {
       for (int x = 9; x < 36; ++x) {
         const auto i = static_cast<size_t>(3 * (y * kSide + x));
-        for (size_t c = 0; c < 3; ++c) pixels[i + c] = random.in(0, 3) ? random.byte() : uint8_t{0}, object[i + c] = 255;
+        for (size_t c = 0; c < 3; ++c)
+          pixels[i + c] = random.in(0, 3) ? random.byte() : uint8_t{0}, object[i + c] = 255;
         if ((pixels[i] | pixels[i + 1] | pixels[i + 2]) == 0) std::fill_n(&pixels[i], 3, uint8_t{1});
       }
     }
@@ -128,9 +130,9 @@ TEST_CASE("a smaller view: pixels between those of the object, as OpenCV has the
 }
 
 TEST_CASE("the cascade equals doing each stage for each window that passed the one before, at each scale") {
-  Random random(61);
+  Random random(test::seed(61));
   size_t passed = 0, failed = 0;
-  for (int round = 0; round < 12; ++round) {
+  for (int round = 0; round < test::rounds(12); ++round) {
     const std::vector<uint8_t> pixels = random.image(kWidth, kHeight);
     const ImageView<const uint8_t> image(pixels.data(), kWidth, kHeight, 3);
     const auto objects = database(random, pixels);
@@ -159,14 +161,14 @@ TEST_CASE("the cascade equals doing each stage for each window that passed the o
       }
     }
   }
-  CHECK(passed > 100);
-  CHECK(failed > 100);
+  CHECK(passed >= test::at_scale(100));
+  CHECK(failed >= test::at_scale(100));
 }
 
 TEST_CASE("with a mask the windows that it touches are as without, the others do not pass") {
-  Random random(83);
+  Random random(test::seed(83));
   size_t within = 0, outside = 0;
-  for (int round = 0; round < 12; ++round) {
+  for (int round = 0; round < test::rounds(12); ++round) {
     const std::vector<uint8_t> pixels = random.image(kWidth, kHeight);
     const ImageView<const uint8_t> image(pixels.data(), kWidth, kHeight, 3);
     const auto objects = database(random, pixels);
@@ -204,14 +206,14 @@ TEST_CASE("with a mask the windows that it touches are as without, the others do
       }
     }
   }
-  CHECK(within > 100);
-  CHECK(outside > 100);
+  CHECK(within >= test::at_scale(100));
+  CHECK(outside >= test::at_scale(100));
 }
 
 TEST_CASE("out of time, the best windows of all scales were decided on, and searched counts the rest") {
-  Random random(71);
+  Random random(test::seed(71));
   size_t cut_off = 0;
-  for (int round = 0; round < 10; ++round) {
+  for (int round = 0; round < test::rounds(10); ++round) {
     const std::vector<uint8_t> pixels = random.image(kWidth, kHeight);
     const ImageView<const uint8_t> image(pixels.data(), kWidth, kHeight, 3);
     const auto objects = database(random, pixels);
@@ -247,5 +249,5 @@ TEST_CASE("out of time, the best windows of all scales were decided on, and sear
     CHECK(cut.searched() == doctest::Approx(1.0 - static_cast<double>(open.size()) / windows));
     cut_off += candidates.size() - decided;
   }
-  CHECK(cut_off > 50);
+  CHECK(cut_off >= test::at_scale(50));
 }

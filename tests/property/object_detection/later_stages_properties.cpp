@@ -12,6 +12,7 @@
 #include "nodes/object_detection/reference.hpp"
 #include "tests/on_each_target.hpp"
 #include "tests/property/object_detection/random_images.hpp"
+#include "tests/property_scale.hpp"
 
 using namespace takt;
 using namespace takt::object_detection;
@@ -60,14 +61,14 @@ TEST_CASE("every possible gradient gets the orientation that the arctangent give
 
 TEST_CASE("every possible gradient gets the same from the vectorised form, with each SIMD target") {
   // Only sideways neighbours give Gx = 2 (right - left), diagonals every sum in between.
-  Random random(3);
+  Random random(test::seed(3));
   constexpr size_t kWidth = 4099;
   std::vector<uint8_t> rows[3];
   for (auto& row : rows) row.resize(kWidth);
   std::vector<uint16_t> fast(kWidth), slow(kWidth);
   for (const int orientations : {8, 32, 180, 360}) {
     const OrientationBins bins(orientations);
-    for (int round = 0; round < 200; ++round) {
+    for (int round = 0; round < test::rounds(200); ++round) {
       const int contrast = random.in(8, 255);
       for (auto& row : rows)
         for (uint8_t& value : row) value = static_cast<uint8_t>(random.byte() % contrast);
@@ -86,8 +87,8 @@ TEST_CASE("every possible gradient gets the same from the vectorised form, with 
 }
 
 TEST_CASE("references as bytes lack what their counts lack, also above 255, with each SIMD target") {
-  Random random(53);
-  for (int round = 0; round < 60; ++round) {
+  Random random(test::seed(53));
+  for (int round = 0; round < test::rounds(60); ++round) {
     const auto slots = static_cast<size_t>(random.in(1, 300));
     // Mostly nothing, else few or many: up to more than nine bytes hold.
     const auto counts = [&](size_t size) {
@@ -125,8 +126,8 @@ TEST_CASE("references as bytes lack what their counts lack, also above 255, with
 }
 
 TEST_CASE("the orientation stage equals counting and comparing everything, for any grid and any windows asked for") {
-  Random random(17);
-  for (int round = 0; round < 40; ++round) {
+  Random random(test::seed(17));
+  for (int round = 0; round < test::rounds(40); ++round) {
     const int window = random.in(5, 70), reference = random.in(std::max(4, window / 3), window - 1);
     const int width = random.in(window, 150), height = random.in(window, 130);
     const int orientations = std::array{4, 8, 32, 180, 360}[static_cast<size_t>(random.in(0, 4))];
@@ -158,8 +159,8 @@ TEST_CASE("the orientation stage equals counting and comparing everything, for a
 }
 
 TEST_CASE("co-occurrences equal looking at every pair of pixels, with each SIMD target") {
-  Random random(29);
-  for (int round = 0; round < 60; ++round) {
+  Random random(test::seed(29));
+  for (int round = 0; round < test::rounds(60); ++round) {
     const int side = round < 3 ? 70 + round : random.in(1, 40);  // beyond one vector, too
     const PairBins bins{random.in(1, CooccurrenceCounter::kMaxColours), random.in(1, kMaxDistance)};
     CAPTURE(side);
@@ -180,8 +181,8 @@ TEST_CASE("co-occurrences equal looking at every pair of pixels, with each SIMD 
 }
 
 TEST_CASE("the co-occurrence stage equals counting and comparing everything") {
-  Random random(41);
-  for (int round = 0; round < 12; ++round) {
+  Random random(test::seed(41));
+  for (int round = 0; round < test::rounds(12); ++round) {
     const int window = random.in(8, 48), reference = random.in(std::max(4, window / 2), window - 1);
     const int width = random.in(window, 120), height = random.in(window, 100);
     const SearchGrid grid = make_search_grid(width, height, reference, window);

@@ -11,7 +11,7 @@ namespace takt::test {
 
 class Random {
  public:
-  explicit Random(uint32_t seed) : engine_(seed) {}
+  explicit Random(uint64_t seed) : engine_(seed) {}
   int in(int low, int high) { return low + static_cast<int>(engine_() % static_cast<uint32_t>(high - low + 1)); }
   uint8_t byte() { return static_cast<uint8_t>(engine_()); }
 

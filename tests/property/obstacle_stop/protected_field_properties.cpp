@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "nodes/obstacle_stop/protected_field.hpp"
+#include "tests/property_scale.hpp"
 
 using namespace takt::obstacle_stop;
 
@@ -62,7 +63,7 @@ class Way {
 Footprint grown(Footprint f, double by) { return {f.half_width_m, f.front_m, f.rear_m, f.margin_m + by}; }
 
 struct RandomDrive {
-  std::mt19937 engine{7};
+  std::mt19937 engine{takt::test::seed(7)};
   double operator()(double low, double high) { return std::uniform_real_distribution<>(low, high)(engine); }
   Footprint footprint() { return {(*this)(0.1, 0.5), (*this)(0.1, 0.7), (*this)(0.1, 0.7), (*this)(0, 0.3)}; }
   /// Straight, turning on the spot, nearly straight, backwards, and all between.
@@ -81,7 +82,7 @@ constexpr double kStep_m = 2e-3;
 TEST_CASE("the protected field is the area that a robot moved step by step covers") {
   RandomDrive random;
   int inside = 0, outside = 0;
-  for (int round = 0; round < 210; ++round) {
+  for (int round = 0; round < takt::test::rounds(210); ++round) {
     CAPTURE(round);
     const Footprint f = random.footprint();
     const Drive d = random.drive(round);
@@ -96,13 +97,13 @@ TEST_CASE("the protected field is the area that a robot moved step by step cover
       if (field.contains(x, y)) CHECK(way.covers(grown(f, kStep_m), x, y));
     }
   }
-  CHECK(inside > 1000);
-  CHECK(outside > 1000);
+  CHECK(inside >= takt::test::at_scale(1000));
+  CHECK(outside >= takt::test::at_scale(1000));
 }
 
 TEST_CASE("whatever the robot covers at any instant of its way is in the field") {
   RandomDrive random;
-  for (int round = 0; round < 4000; ++round) {
+  for (int round = 0; round < takt::test::rounds(4000); ++round) {
     const Footprint f = random.footprint();
     const Drive d = random.drive(round);
     const double time = random(0.05, 2.5), at = random(0, time), heading = d.turn_rad_s * at;
@@ -121,7 +122,7 @@ TEST_CASE("whatever the robot covers at any instant of its way is in the field")
 TEST_CASE("a sweep blocks exactly if a row of neighbouring beams ends in the field") {
   RandomDrive random;
   int blocked = 0;
-  for (int round = 0; round < 600; ++round) {
+  for (int round = 0; round < takt::test::rounds(600); ++round) {
     CAPTURE(round);
     const ProtectedField field(random.footprint(), random.drive(round), random(0.1, 1.5));
     std::vector<float> ranges(static_cast<size_t>(random(0, 90)));
@@ -157,6 +158,6 @@ TEST_CASE("a sweep blocks exactly if a row of neighbouring beams ends in the fie
     CHECK(fast.nearest_m == slow.nearest_m);
     blocked += slow.blocked;
   }
-  CHECK(blocked > 50);
-  CHECK(blocked < 550);
+  CHECK(blocked >= takt::test::at_scale(50));
+  CHECK(blocked <= takt::test::rounds(600) - takt::test::at_scale(50));
 }

@@ -10,6 +10,7 @@
 
 #include "nodes/obstacle_stop/sweep_memory.hpp"
 #include "tests/nanoseconds.hpp"
+#include "tests/property_scale.hpp"
 
 using namespace takt;
 using namespace takt::obstacle_stop;
@@ -119,8 +120,8 @@ int in_pairs(std::span<const float> moved_in) {
 TEST_CASE(
     "in a room where all stands still next to nothing moves in while the robot drives; who appears does, at once") {
   int sweeps = 0, wrong = 0, appeared = 0, noticed = 0;
-  for (uint64_t seed = 0; seed < 200; ++seed) {
-    Random random(seed);
+  for (uint64_t seed = 0; seed < test::rounds(200u); ++seed) {
+    Random random(test::seed(seed));
     Room room(random);
     Robot robot;
     SweepMemory memory(kBeams, kSpan_ns);
@@ -154,8 +155,8 @@ TEST_CASE(
     noticed += in_pairs(memory.moved_in(sweep_of(ranges), robot.odometry, k * kPeriod_ns, 2.0)) > 0;
   }
   MESSAGE("wrong in " << wrong << " of " << sweeps << " sweeps; noticed " << noticed << " of " << appeared);
-  CHECK(sweeps > 2000);
-  CHECK(wrong * 500 <= sweeps);
-  CHECK(appeared > 50);
-  CHECK(noticed * 20 >= appeared * 19);
+  CHECK(sweeps >= test::at_scale(2000));
+  CHECK(wrong <= test::at_most(sweeps, 1.0 / 500));
+  CHECK(appeared >= test::at_scale(50));
+  CHECK(appeared - noticed <= test::at_most(appeared, 1.0 / 20));
 }

@@ -8,6 +8,7 @@
 #include "nodes/person_tracking/person_filter.hpp"
 #include "nodes/person_tracking/saddle_kernel.hpp"
 #include "tests/on_each_target.hpp"
+#include "tests/property_scale.hpp"
 
 using namespace takt;
 using namespace takt::person_tracking;
@@ -26,7 +27,7 @@ Place any_place(std::mt19937_64& random) {
 }  // namespace
 
 TEST_CASE("the saddle response of a row is that of each of its pixels, on every SIMD target") {
-  std::mt19937_64 random(3);
+  std::mt19937_64 random(test::seed(3));
   for (const int width : {3, 6, 7, 8, 21, 64, 97, 640}) {
     const int height = 9, stride = width + kRowSlack;
     std::vector<uint8_t> pixels(static_cast<size_t>(stride * height));
@@ -49,7 +50,7 @@ TEST_CASE("the saddle response of a row is that of each of its pixels, on every 
 }
 
 TEST_CASE("grey of a row is that of each pixel, on every SIMD target") {
-  std::mt19937_64 random(4);
+  std::mt19937_64 random(test::seed(4));
   for (const int width : {1, 15, 16, 33, 640}) {
     std::vector<uint8_t> bgr(static_cast<size_t>(3 * width)), grey(static_cast<size_t>(width + kRowSlack));
     for (uint8_t& p : bgr) p = static_cast<uint8_t>(random());
@@ -62,9 +63,9 @@ TEST_CASE("grey of a row is that of each pixel, on every SIMD target") {
 }
 
 TEST_CASE("the filter's estimate is the least squares of all that was seen") {
-  std::mt19937_64 random(5);
+  std::mt19937_64 random(test::seed(5));
   std::uniform_real_distribution<double> step(0.02, 0.8), noise(0.05, 4);
-  for (int round = 0; round < 30; ++round) {
+  for (int round = 0; round < test::rounds(30); ++round) {
     const FilterParameters p{noise(random), noise(random)};
     PersonFilter filter(p);
     std::vector<TimedPlace> seen;
@@ -84,11 +85,11 @@ TEST_CASE("the filter's estimate is the least squares of all that was seen") {
 }
 
 TEST_CASE("two predictions are one of both times; no update makes the filter less certain or its covariance improper") {
-  std::mt19937_64 random(6);
+  std::mt19937_64 random(test::seed(6));
   std::uniform_real_distribution<double> step(0.01, 1);
   PersonFilter filter({});
   filter.begin(any_place(random));
-  for (int i = 0; i < 200; ++i) {
+  for (int i = 0; i < test::rounds(200); ++i) {
     const double a = step(random), b = step(random);
     PersonFilter twice = filter;
     twice.predict(a);

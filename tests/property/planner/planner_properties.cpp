@@ -6,6 +6,7 @@
 #include <random>
 
 #include "nodes/planner/planner.hpp"
+#include "tests/property_scale.hpp"
 
 using namespace takt::planner;
 using namespace takt::semantic;
@@ -20,7 +21,7 @@ struct RandomTask {
   std::vector<Goal> goals;
   takt::planner::Place robot;
 
-  explicit RandomTask(uint32_t seed) {
+  explicit RandomTask(uint64_t seed) {
     std::mt19937 random(seed);
     const auto below = [&](size_t n) { return static_cast<uint32_t>(random() % n); };
     const auto coordinate = [&] { return std::uniform_real_distribution<double>(0, 9.9)(random); };
@@ -165,9 +166,9 @@ TEST_CASE("on 1,000 random small domains the planner's cost is that of exhaustiv
   Planner recursive({Method::recursive, {}, {1, 1}});
   Search alone({60'000, 600'000});
   size_t solvable = 0, dearer = 0, missed = 0, long_plans = 0;
-  for (uint32_t seed = 1; seed <= 1000; ++seed) {
+  for (uint32_t seed = 1; seed <= takt::test::rounds(1000u); ++seed) {
     CAPTURE(seed);
-    RandomTask task(seed);
+    RandomTask task(takt::test::seed(seed));
     const CostMode mode = seed % 5 == 0 ? CostMode::faithful : CostMode::sequential;
     const auto domain = ground(task.map, task.goals, task.robot, {mode, 0.7, {}, 200'000});
     REQUIRE(domain);
@@ -187,23 +188,24 @@ TEST_CASE("on 1,000 random small domains the planner's cost is that of exhaustiv
     dearer += thesis.exists() && thesis.cost_ns > truth;
     if (thesis.exists()) {
       REQUIRE(thesis.cost_ns >= truth);
-      RandomTask again(seed);
+      RandomTask again(takt::test::seed(seed));
       REQUIRE(executed(again, *domain, thesis) == thesis.cost_ns);
     }
     REQUIRE(executed(task, *domain, plan) == plan.cost_ns);
   }
-  MESSAGE(solvable << " of 1000 have a plan, " << long_plans << " of more than two steps; the recursion is dearer in "
-                   << dearer << " and finds none in " << missed);
-  CHECK(solvable > 300);
-  CHECK(long_plans > 50);
-  CHECK(dearer > 0);
+  MESSAGE(solvable << " of " << takt::test::rounds(1000) << " have a plan, " << long_plans
+                   << " of more than two steps; the recursion is dearer in " << dearer << " and finds none in "
+                   << missed);
+  CHECK(solvable >= takt::test::at_scale(300));
+  CHECK(long_plans >= takt::test::at_scale(50));
+  CHECK(dearer >= takt::test::at_scale(1));
 }
 
 TEST_CASE("a search in portions of any size ends with the plan of one that is not interrupted") {
   Planner whole({Method::best, {}, {60'000, 600'000}}), portions({Method::best, {}, {60'000, 600'000}});
   size_t interrupted = 0;
-  for (uint32_t seed = 1; seed <= 300; ++seed) {
-    RandomTask task(seed);
+  for (uint32_t seed = 1; seed <= takt::test::rounds(300u); ++seed) {
+    RandomTask task(takt::test::seed(seed));
     const auto domain = ground(task.map, task.goals, task.robot, {});
     REQUIRE(domain);
     const Plan plan = whole.plan(*domain);
@@ -224,13 +226,13 @@ TEST_CASE("a search in portions of any size ends with the plan of one that is no
     REQUIRE(last.steps.size() == plan.steps.size());
     for (size_t i = 0; i < plan.steps.size(); ++i) REQUIRE(last.steps[i].action == plan.steps[i].action);
   }
-  CHECK(interrupted > 50);
+  CHECK(interrupted >= takt::test::at_scale(50));
 }
 
 TEST_CASE("whenever a search is ended, its plan is one and its bound holds") {
   size_t early = 0;
-  for (uint32_t seed = 1; seed <= 150; ++seed) {
-    RandomTask task(seed);
+  for (uint32_t seed = 1; seed <= takt::test::rounds(150u); ++seed) {
+    RandomTask task(takt::test::seed(seed));
     const auto domain = ground(task.map, task.goals, task.robot, {});
     REQUIRE(domain);
     const int64_t truth = exhaustive(task, CostMode::sequential);
@@ -241,9 +243,9 @@ TEST_CASE("whenever a search is ended, its plan is one and its bound holds") {
       if (truth >= 0) REQUIRE(plan.bound_ns <= truth);
       if (!plan.exists()) continue;
       REQUIRE(plan.cost_ns >= truth);
-      RandomTask again(seed);
+      RandomTask again(takt::test::seed(seed));
       REQUIRE(executed(again, *domain, plan) == plan.cost_ns);
     }
   }
-  CHECK(early > 50);
+  CHECK(early >= takt::test::at_scale(50));
 }

@@ -7,6 +7,7 @@
 
 #include "hal/replay/carmen_log.hpp"
 #include "hal/replay/late_stamps.hpp"
+#include "tests/property_scale.hpp"
 #include "tests/unit/replay/carmen_file.hpp"
 
 using namespace takt;
@@ -41,11 +42,11 @@ LineTimes reference(const std::vector<double>& seconds) {
 }  // namespace
 
 TEST_CASE("late stamps: agrees with the definition, and never falls") {
-  std::mt19937 random(7);
+  std::mt19937 random(test::seed(7));
   const auto uniform = [&](double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(random);
   };
-  for (int round = 0; round < 300; ++round) {
+  for (int round = 0; round < test::rounds(300); ++round) {
     std::vector<double> seconds;
     double now = uniform(0, 100);
     for (int i = static_cast<int>(uniform(0, 60)); i > 0; --i) {
@@ -67,9 +68,9 @@ TEST_CASE("late stamps: agrees with the definition, and never falls") {
 }
 
 TEST_CASE("a drive whose poses a mapping program corrected gives back its odometry") {
-  std::mt19937 random(11);
+  std::mt19937 random(test::seed(11));
   std::normal_distribution<double> normal;
-  for (int round = 0; round < 20; ++round) {
+  for (int round = 0; round < test::rounds(20); ++round) {
     std::string text;
     PlanarPose odometry, correction;  // correction: frame of the odometry in the map, changes with each scan
     std::vector<PlanarPose> lines, corrected;
@@ -101,7 +102,7 @@ TEST_CASE("a drive whose poses a mapping program corrected gives back its odomet
 }
 
 TEST_CASE("a damaged log is refused or read, and what is read is consistent") {
-  std::mt19937 random(13);
+  std::mt19937 random(test::seed(13));
   std::string good;
   for (int k = 0; k < 12; ++k) {
     const PlanarPose pose{0.1 * k, 0, 0.01 * k};
@@ -110,7 +111,7 @@ TEST_CASE("a damaged log is refused or read, and what is read is consistent") {
   }
   constexpr char kBytes[] = "0123456789.-+e \n\r\tnaifODOMFLASERNEFF#\0\xff";
   int refused = 0, read = 0;
-  for (int round = 0; round < 600; ++round) {
+  for (int round = 0; round < test::rounds(600); ++round) {
     std::string text = good;
     for (int changes = 1 + round % 4; changes > 0; --changes) {
       const size_t at = random() % text.size();
@@ -133,6 +134,6 @@ TEST_CASE("a damaged log is refused or read, and what is read is consistent") {
     for (size_t i = 1; i < log->odometry.size(); ++i) CHECK(log->odometry[i].time_ns >= log->odometry[i - 1].time_ns);
     for (const CarmenScan& scan : log->scans) CHECK(scan.time_ns <= log->end_ns);
   }
-  CHECK(refused > 50);
-  CHECK(read > 50);
+  CHECK(refused >= test::at_scale(50));
+  CHECK(read >= test::at_scale(50));
 }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <random>
 
+#include "tests/property_scale.hpp"
 #include "tests/unit/robot_pose/generated_drive.hpp"
 
 using namespace takt::robot_pose;
@@ -11,10 +12,10 @@ using takt::test::Arrival;
 using takt::test::GeneratedDrive;
 
 TEST_CASE("whatever the order of arrival, the estimate is that of all measurements in the order of their stamps") {
-  std::mt19937_64 random(1);
+  std::mt19937_64 random(takt::test::seed(1));
   size_t late = 0;
-  for (uint64_t seed = 1; seed <= 20; ++seed) {
-    GeneratedDrive drive(seed, 8, {});
+  for (uint64_t seed = 1; seed <= takt::test::rounds(20u); ++seed) {
+    GeneratedDrive drive(takt::test::seed(seed), 8, {});
     for (Arrival& arrival : drive.arrivals)  // up to 0.3 s late, those of one source in their order
       arrival.arrives_ns = arrival.measured.to_ns + 150'000'000 * static_cast<int64_t>(arrival.measured.source) +
                            std::uniform_int_distribution<int64_t>(0, 60'000'000)(random);
@@ -44,5 +45,5 @@ TEST_CASE("whatever the order of arrival, the estimate is that of all measuremen
     CHECK(a.robot_in_map.theta_rad == b.robot_in_map.theta_rad);
     CHECK(a.covariance == b.covariance);
   }
-  CHECK(late > 500);
+  CHECK(late >= takt::test::at_scale(500));
 }

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "rt/trace/blame.hpp"
+#include "tests/property_scale.hpp"
 
 namespace {
 
@@ -159,10 +160,10 @@ bool occupied_by(const Trace& trace, const Piece& piece, int64_t at) {
 }  // namespace
 
 TEST_CASE("parts make up the miss, and every instant holds what was going on then") {
-  RandomNumber random{std::mt19937(7)};
+  RandomNumber random{std::mt19937(takt::test::seed(7))};
   size_t misses = 0, stalls = 0, unexplained = 0;
   std::map<Cause, size_t> met;
-  for (int round = 0; round < 400; ++round) {
+  for (int round = 0; round < takt::test::rounds(400); ++round) {
     const Trace trace = random_trace(random);
     const Evidence evidence(trace);
     for (const JobSpan& job : trace.jobs) {
@@ -198,10 +199,10 @@ TEST_CASE("parts make up the miss, and every instant holds what was going on the
       unexplained += stall > 0 && unattributed > 0;
     }
   }
-  CHECK(misses > 500);
-  CHECK(stalls > 20);
-  CHECK(unexplained > 2);
+  CHECK(misses >= takt::test::at_scale(500));
+  CHECK(stalls >= takt::test::at_scale(20));
+  CHECK(unexplained >= takt::test::at_scale(2));
   for (const Cause cause : {Cause::late, Cause::behind, Cause::lane, Cause::preempted, Cause::throttled, Cause::asleep,
                             Cause::unattributed, Cause::running})
-    CHECK(met[cause] > 20);
+    CHECK(met[cause] >= takt::test::at_scale(20));
 }

@@ -9,6 +9,7 @@
 #include "rt/sched/executor.hpp"
 #include "rt/sched/port_access.hpp"
 #include "tests/nanoseconds.hpp"
+#include "tests/property_scale.hpp"
 
 namespace {
 
@@ -152,8 +153,8 @@ std::vector<Seen> expected(const LatchScene& scene) {
 
 TEST_CASE(
     "every job sees the newest messages with visible_at <= its release, whatever the rates, budgets and offsets") {
-  std::mt19937 random(7);
-  for (int round = 0; round < 200; ++round) {
+  std::mt19937 random(test::seed(7));
+  for (int round = 0; round < test::rounds(200); ++round) {
     CAPTURE(round);
     const LatchScene scene = random_scene(random);
     const std::vector<Seen> got = observed(scene), wanted = expected(scene);

@@ -8,13 +8,14 @@
 
 #include "rt/machine/parse.hpp"
 #include "rt/machine/spread.hpp"
+#include "tests/property_scale.hpp"
 
 using namespace takt::machine;
 using namespace std::string_literals;
 
 TEST_CASE("a list of CPUs survives writing and reading") {
-  std::mt19937 random(1);
-  for (int round = 0; round < 2'000; ++round) {
+  std::mt19937 random(takt::test::seed(1));
+  for (int round = 0; round < takt::test::rounds(2'000); ++round) {
     std::vector<int> cpus;
     const auto one_in = 1 + random() % 8;
     for (int cpu = 0; cpu < 130; ++cpu)
@@ -24,9 +25,9 @@ TEST_CASE("a list of CPUs survives writing and reading") {
 }
 
 TEST_CASE("no text breaks a parser") {
-  std::mt19937 random(2);
+  std::mt19937 random(takt::test::seed(2));
   const std::string letters = "0123456789-,:=.[]() \n\tcpuCONFIG_HZ#yn\\/\0\xff"s;
-  for (int round = 0; round < 20'000; ++round) {
+  for (int round = 0; round < takt::test::rounds(20'000); ++round) {
     std::string text;
     for (auto length = random() % 60; length > 0; --length) text += letters[random() % letters.size()];
     for (const int cpu : parse_cpu_list(text)) CHECK((cpu >= 0 && cpu <= 4095));
@@ -45,8 +46,8 @@ TEST_CASE("no text breaks a parser") {
 }
 
 TEST_CASE("quantiles of a spread are what counting samples gives") {
-  std::mt19937 random(3);
-  for (int round = 0; round < 300; ++round) {
+  std::mt19937 random(takt::test::seed(3));
+  for (int round = 0; round < takt::test::rounds(300); ++round) {
     std::vector<int64_t> ns(1 + random() % 500);
     for (int64_t& sample : ns) sample = static_cast<int64_t>(random() % 1'000) * 1'000;
     // The smallest sample that at least `percent` of all do not exceed, by trying each.

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "rt/sched/quality.hpp"
+#include "tests/property_scale.hpp"
 
 namespace {
 
@@ -67,8 +68,8 @@ class Run {
 }  // namespace
 
 TEST_CASE("level 0 stays as long as the largest load plus half of the range fits") {
-  RandomLoad random(1);
-  for (int round = 0; round < 300; ++round) {
+  RandomLoad random(test::seed(1));
+  for (int round = 0; round < test::rounds(300); ++round) {
     Run run(random.scene());
     const double range = random.uniform(0, 0.6), top = 1 - range / 2;
     for (int k = 0; k < 2000; ++k) {
@@ -79,8 +80,8 @@ TEST_CASE("level 0 stays as long as the largest load plus half of the range fits
 }
 
 TEST_CASE("a constant load with 5 % of noise settles: no level is taken back and left again but blindly") {
-  RandomLoad random(2);
-  for (int round = 0; round < 300; ++round) {
+  RandomLoad random(test::seed(2));
+  for (int round = 0; round < test::rounds(300); ++round) {
     const QualityScene scene = random.scene();
     Run run(scene);
     for (int k = random.whole(0, 20); k > 0; --k) run.job(random.uniform(0, 3));  // whatever went before
@@ -100,8 +101,8 @@ TEST_CASE("a constant load with 5 % of noise settles: no level is taken back and
 }
 
 TEST_CASE("after any past, a load that fits brings level 0 back within the stated bounds") {
-  RandomLoad random(3);
-  for (int round = 0; round < 500; ++round) {
+  RandomLoad random(test::seed(3));
+  for (int round = 0; round < test::rounds(500); ++round) {
     const QualityScene scene = random.scene();
     Run run(scene);
     const double worst = random.uniform(0.5, 5);
@@ -123,8 +124,8 @@ TEST_CASE("after any past, a load that fits brings level 0 back within the state
 
 TEST_CASE(
     "whatever the load does, level 0 is left at most once in a bar, and failing again and again makes it longer") {
-  RandomLoad random(4);
-  for (int round = 0; round < 200; ++round) {
+  RandomLoad random(test::seed(4));
+  for (int round = 0; round < test::rounds(200); ++round) {
     Run run(random.scene());
     const double low = random.uniform(0, 1), high = random.uniform(1, 3), share = random.uniform(0, 0.3);
     int64_t left_ns = -kSecond * 100, taken_ns = left_ns;

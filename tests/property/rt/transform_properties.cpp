@@ -11,6 +11,7 @@
 #include <random>
 
 #include "rt/transform/transform_buffer.hpp"
+#include "tests/property_scale.hpp"
 
 using namespace takt;
 
@@ -78,7 +79,7 @@ Matrix6 covariance(const UncertainPose& p) { return Eigen::Map<const Matrix6>(p.
 
 struct RandomPose {
   std::mt19937 engine;
-  explicit RandomPose(uint32_t seed) : engine(seed) {}
+  explicit RandomPose(uint64_t seed) : engine(seed) {}
   double uniform(double low, double high) { return low + (high - low) * static_cast<double>(engine()) / 4294967296.0; }
   int64_t below(int64_t n) { return static_cast<int64_t>(engine() % static_cast<uint64_t>(n)); }
   UncertainPose pose() {
@@ -106,8 +107,8 @@ void check_equal(const UncertainPose& got, const Rigid& mean, const Matrix6& exp
 }  // namespace
 
 TEST_CASE("composition and inverse agree with matrices and numerical derivatives") {
-  RandomPose random(1);
-  for (int i = 0; i < 300; ++i) {
+  RandomPose random(test::seed(1));
+  for (int i = 0; i < test::rounds(300); ++i) {
     const UncertainPose a = random.pose(), b = random.pose();
     const Rigid ra = rigid(a.transform), rb = rigid(b.transform);
     const Matrix6 ja = jacobian([&](const Rigid& x) { return x * rb; }, ra);
@@ -119,8 +120,8 @@ TEST_CASE("composition and inverse agree with matrices and numerical derivatives
 }
 
 TEST_CASE("composition is associative and the inverse of the inverse is the pose") {
-  RandomPose random(2);
-  for (int i = 0; i < 300; ++i) {
+  RandomPose random(test::seed(2));
+  for (int i = 0; i < test::rounds(300); ++i) {
     const UncertainPose a = random.pose(), b = random.pose(), c = random.pose();
     const UncertainPose left = compose(compose(a, b), c);
     check_equal(compose(a, compose(b, c)), rigid(left.transform), covariance(left));
@@ -129,8 +130,8 @@ TEST_CASE("composition is associative and the inverse of the inverse is the pose
 }
 
 TEST_CASE("interpolation agrees with the exponential map and is an upper bound of the uncertainty") {
-  RandomPose random(3);
-  for (int i = 0; i < 300; ++i) {
+  RandomPose random(test::seed(3));
+  for (int i = 0; i < test::rounds(300); ++i) {
     const UncertainPose a = random.pose(), b = random.pose();
     const Rigid ra = rigid(a.transform), rb = rigid(b.transform);
     const Eigen::Vector3d turn = logarithm(rb.r * ra.r.transpose());
@@ -146,8 +147,8 @@ TEST_CASE("interpolation agrees with the exponential map and is an upper bound o
 }
 
 TEST_CASE("a track answers as a linear search over all it was given would") {
-  for (uint32_t seed = 10; seed < 20; ++seed) {
-    RandomPose random(seed);
+  for (uint32_t seed = 10; seed < 10 + test::rounds(10u); ++seed) {
+    RandomPose random(test::seed(seed));
     const auto capacity = static_cast<size_t>(1 + random.below(8));
     const int64_t gap = 1 + random.below(30);
     PoseTrack track(capacity, gap);
@@ -197,8 +198,8 @@ TEST_CASE("a track answers as a linear search over all it was given would") {
 }
 
 TEST_CASE("any two frames of a random tree are joined as their matrices say") {
-  for (uint32_t seed = 30; seed < 60; ++seed) {
-    RandomPose random(seed);
+  for (uint32_t seed = 30; seed < 30 + test::rounds(30u); ++seed) {
+    RandomPose random(test::seed(seed));
     TransformBuffer buffer;
     constexpr int kFrames = 8;
     std::vector<Rigid> in_root(kFrames);

@@ -10,6 +10,7 @@
 #include "nodes/scan_matching/drive.hpp"
 #include "nodes/scan_matching/occupancy_map.hpp"
 #include "nodes/scan_matching/scan_matcher.hpp"
+#include "tests/property_scale.hpp"
 
 using namespace takt;
 using namespace takt::scan_matching;
@@ -34,8 +35,8 @@ struct Random {
 }  // namespace
 
 TEST_CASE("every cell of the field has the value of its nearest mapped cell, and every bound covers its blocks") {
-  Random random{std::mt19937_64(1)};
-  for (int round = 0; round < 20; ++round) {
+  Random random{std::mt19937_64(test::seed(1))};
+  for (int round = 0; round < test::rounds(20); ++round) {
     const double cell_m = random(0.03, 0.1), sigma_m = random(1, 3) * cell_m;
     ScoreField field(random(1, 3), cell_m, sigma_m);
     const auto points = random.points(static_cast<size_t>(random(0, 40)), 4);
@@ -65,9 +66,9 @@ TEST_CASE("every cell of the field has the value of its nearest mapped cell, and
 }
 
 TEST_CASE("the search finds what trying every candidate finds, equal scores included") {
-  Random random{std::mt19937_64(2)};
+  Random random{std::mt19937_64(test::seed(2))};
   size_t moved = 0;
-  for (int round = 0; round < 24; ++round) {
+  for (int round = 0; round < test::rounds(24); ++round) {
     CAPTURE(round);
     SearchParameters p;
     p.reach_m = random(0.1, 0.6);
@@ -81,8 +82,8 @@ TEST_CASE("the search finds what trying every candidate finds, equal scores incl
     if (room) {
       std::vector<float> ranges;
       DriveParameters drive;
-      cast(furnished_room(static_cast<uint64_t>(round)), {random(-0.5, 0.5), random(-0.5, 0.5), random(-3, 3)}, drive,
-           random.engine, ranges);
+      cast(furnished_room(test::seed(static_cast<uint64_t>(round))),
+           {random(-0.5, 0.5), random(-0.5, 0.5), random(-3, 3)}, drive, random.engine, ranges);
       points_of({-drive.field_rad / 2, drive.field_rad / 180, ranges, {}}, 15, points);
     } else {
       points = random.points(60, 3);
@@ -105,13 +106,13 @@ TEST_CASE("the search finds what trying every candidate finds, equal scores incl
     moved += std::hypot(fast.robot_in_map.x_m - expected.robot_in_map.x_m,
                         fast.robot_in_map.y_m - expected.robot_in_map.y_m) > cell_m;
   }
-  CHECK(moved > 8);
+  CHECK(moved >= test::at_scale(8));
 }
 
 TEST_CASE("the nearest point is the one that looking at every point finds; so is the refined pose, bit by bit") {
-  Random random{std::mt19937_64(3)};
+  Random random{std::mt19937_64(test::seed(3))};
   size_t found = 0;
-  for (int round = 0; round < 20; ++round) {
+  for (int round = 0; round < test::rounds(20); ++round) {
     MapParameters p;
     p.keyframes = 1 + round % 4;
     p.range_max_m = 3;
@@ -139,12 +140,12 @@ TEST_CASE("the nearest point is the one that looking at every point finds; so is
     CHECK(fast.covariance == slow.covariance);
     CHECK(fast.paired == slow.paired);
   }
-  CHECK(found > 500);
+  CHECK(found >= test::at_scale(500));
 }
 
 TEST_CASE("the occupancy map equals one of endless cells, sweep by sweep") {
-  Random random{std::mt19937_64(4)};
-  for (int round = 0; round < 8; ++round) {
+  Random random{std::mt19937_64(test::seed(4))};
+  for (int round = 0; round < test::rounds(8); ++round) {
     OccupancyParameters p;
     p.cell_m = random(0.05, 0.3);
     p.window_m = random(3, 8);

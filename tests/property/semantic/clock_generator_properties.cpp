@@ -8,6 +8,7 @@
 #include <string>
 
 #include "nodes/semantic/clock_generator.hpp"
+#include "tests/property_scale.hpp"
 
 using namespace takt::semantic;
 
@@ -41,10 +42,10 @@ std::map<std::string, std::pair<bool, int>> wanted(const std::vector<Line>& line
 }  // namespace
 
 TEST_CASE("what the clock generator asks for at any time is the last word on each node") {
-  std::mt19937 random(5);
+  std::mt19937 random(takt::test::seed(5));
   const auto below = [&](int n) { return static_cast<int>(random() % static_cast<unsigned>(n)); };
   size_t named = 0;
-  for (int round = 0; round < 300; ++round) {
+  for (int round = 0; round < takt::test::rounds(300); ++round) {
     std::vector<Line> lines;
     std::string text;
     for (int i = below(12); i > 0; --i) {
@@ -70,7 +71,7 @@ TEST_CASE("what the clock generator asks for at any time is the last word on eac
       named += seen.size();
     }
   }
-  CHECK(named > 1000);
+  CHECK(named >= takt::test::at_scale(1000));
 }
 
 namespace {
@@ -105,11 +106,11 @@ bool needed(const RuleText& rule, const std::vector<Around>& looks, int margin_c
 }  // namespace
 
 TEST_CASE("what rules leave of each node at any time is what all looks around so far say") {
-  std::mt19937 random(6);
+  std::mt19937 random(takt::test::seed(6));
   const auto below = [&](int n) { return static_cast<int>(random() % static_cast<unsigned>(n)); };
   const auto letter = [&](char first, int n) { return std::string(1, static_cast<char>(first + below(n))); };
   size_t stopped = 0, paced = 0, full = 0;
-  for (int round = 0; round < 300; ++round) {
+  for (int round = 0; round < takt::test::rounds(300); ++round) {
     std::vector<RuleText> rules;
     std::string text;
     for (int i = 1 + below(5); i > 0; --i) {
@@ -151,7 +152,7 @@ TEST_CASE("what rules leave of each node at any time is what all looks around so
       for (const auto& [node, state] : seen) ++(state.first ? paced : stopped);
     }
   }
-  CHECK(stopped > 1000);
-  CHECK(paced > 1000);
-  CHECK(full > 1000);
+  CHECK(stopped >= takt::test::at_scale(1000));
+  CHECK(paced >= takt::test::at_scale(1000));
+  CHECK(full >= takt::test::at_scale(1000));
 }

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "nodes/semantic/insertion.hpp"
+#include "tests/property_scale.hpp"
 
 using namespace takt::semantic;
 
@@ -45,11 +46,11 @@ double probability(const SemanticMap& map, const Observation& seen, NodeId objec
 }  // namespace
 
 TEST_CASE("what becomes of an observation is what a comparison with every object says") {
-  std::mt19937 random(11);
+  std::mt19937 random(takt::test::seed(11));
   const auto below = [&](size_t n) { return static_cast<size_t>(random() % n); };
   const auto real = [&](double high) { return std::uniform_real_distribution<double>(0, high)(random); };
   size_t merged = 0, created = 0, apart = 0;
-  for (int round = 0; round < 60; ++round) {
+  for (int round = 0; round < takt::test::rounds(60); ++round) {
     SemanticMap map({{300, 1500}, 0.3, 40, 40, 0, 0});
     std::vector<NodeId> attributes, types;
     std::map<std::pair<NodeId, NodeId>, double> weights;
@@ -104,7 +105,7 @@ TEST_CASE("what becomes of an observation is what a comparison with every object
       REQUIRE(there);
     }
   }
-  CHECK(merged > 1000);
-  CHECK(created > 1000);
-  CHECK(apart > 20);
+  CHECK(merged >= takt::test::at_scale(1000));
+  CHECK(created >= takt::test::at_scale(1000));
+  CHECK(apart >= takt::test::at_scale(20));
 }

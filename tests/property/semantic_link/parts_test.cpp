@@ -10,6 +10,7 @@
 #include "hal/semantic_link/clock_map.hpp"
 #include "hal/semantic_link/replay_window.hpp"
 #include "tests/conformance/link_messages.hpp"
+#include "tests/property_scale.hpp"
 
 using namespace takt;
 using namespace takt::semantic_link;
@@ -23,8 +24,8 @@ uint32_t below(std::mt19937& random, uint32_t below) { return static_cast<uint32
 }  // namespace
 
 TEST_CASE("replay window: as a set of all that have come, and the rule for those that are too old") {
-  std::mt19937 random(3);
-  for (int trial = 0; trial < 50; ++trial) {
+  std::mt19937 random(test::seed(3));
+  for (int trial = 0; trial < test::rounds(50); ++trial) {
     ReplayWindow window;
     std::set<uint32_t> seen;
     const uint32_t spread = 1 + below(random, 3000);
@@ -45,8 +46,8 @@ TEST_CASE("replay window: as a set of all that have come, and the rule for those
 
 TEST_CASE(
     "clock map: whatever the ways take, the offset lies within its bound; with the shortest ways it is the truth") {
-  std::mt19937_64 random(5);
-  for (int trial = 0; trial < 2000; ++trial) {
+  std::mt19937_64 random(test::seed(5));
+  for (int trial = 0; trial < test::rounds(2000); ++trial) {
     ClockMap map;
     const auto draw = [&](int64_t most) { return static_cast<int64_t>(random() % static_cast<uint64_t>(most)); };
     const int64_t ahead = draw(4'000'000'000'000) - 2'000'000'000'000, most_way = 1 + draw(30'000'000);
@@ -83,9 +84,9 @@ TEST_CASE("clock map: what no clocks can say changes nothing, and no number over
 }
 
 TEST_CASE("assembly: fragments in any order, again and again, give the message; the newest that is whole wins") {
-  std::mt19937 random(7);
+  std::mt19937 random(test::seed(7));
   constexpr uint32_t kMost = 20'000;
-  for (int trial = 0; trial < 300; ++trial) {
+  for (int trial = 0; trial < test::rounds(300); ++trial) {
     Assembly assembly(kMost);
     const size_t unit = 400 + below(random, 1000);
     uint32_t delivered = 0;

@@ -8,6 +8,7 @@
 
 #include "hal/sim/random.hpp"
 #include "tests/on_each_target.hpp"
+#include "tests/property_scale.hpp"
 #include "tests/unit/sim/acting_world.hpp"
 #include "tests/unit/sim/small_world.hpp"
 
@@ -53,7 +54,7 @@ double reference_depth(const Scene& scene, const Vec3& origin, const Vec3& ray) 
 }
 
 double random_in(uint64_t k, uint64_t what, double low, double high) {
-  return low + (high - low) * uniform(mix(77, k, what));
+  return low + (high - low) * uniform(mix(test::seed(77), k, what));
 }
 
 }  // namespace
@@ -65,7 +66,7 @@ TEST_CASE("depth agrees with a ray caster from random poses") {
   std::vector<uint8_t> image(64 * 48);
   std::vector<float> depth(64 * 48);
   int compared = 0, wrong = 0;
-  for (uint64_t k = 0; k < 40; ++k) {
+  for (uint64_t k = 0; k < test::rounds(40u); ++k) {
     StereoRig rig = test::small_rig();
     rig.tilt_rad = random_in(k, 1, -0.9, 0.5);
     rig.roll_rad = random_in(k, 2, -0.5, 0.5);
@@ -85,9 +86,9 @@ TEST_CASE("depth agrees with a ray caster from random poses") {
       }
     }
   }
-  CHECK(compared > 50'000);
+  CHECK(compared >= test::at_scale(50'000));
   // A pixel may differ where a ray grazes an edge: rounding decides.
-  CHECK(wrong <= compared / 2000);
+  CHECK(wrong <= test::at_most(compared, 1.0 / 2000));
 }
 
 TEST_CASE("what moves is drawn where it stands, in each state, with the same bytes by every SIMD target") {
@@ -127,7 +128,7 @@ TEST_CASE("what moves is drawn where it stands, in each state, with the same byt
     }
   }
   MESSAGE(wrong, " of ", compared, " pixels differ");
-  CHECK(wrong <= compared / 2000);
+  CHECK(wrong <= test::at_most(compared, 1.0 / 2000));
 }
 
 TEST_CASE("laser ranges, level and tilted, agree with small steps through the bitmap, boxes and people") {
@@ -135,7 +136,7 @@ TEST_CASE("laser ranges, level and tilted, agree with small steps through the bi
   const World& world = s->world();
   const WorldObject& box = world.objects[0];
   int compared = 0, on_floor = 0;
-  for (uint64_t k = 0; k < 800; ++k) {
+  for (uint64_t k = 0; k < test::rounds(800u); ++k) {
     const Vec3 origin(random_in(k, 11, 0.2, 5.8), random_in(k, 12, 0.2, 4.8), random_in(k, 14, 0.1, 1.9));
     if (collides(world, origin.head<2>(), 0.05)) continue;
     const double angle = random_in(k, 13, -3.2, 3.2), tilt = k % 2 == 0 ? 0 : random_in(k, 15, -1.2, 0.6), step = 1e-3;
@@ -164,8 +165,8 @@ TEST_CASE("laser ranges, level and tilted, agree with small steps through the bi
     CHECK(got <= expected + 1e-9);
     if (got > expected - 2 * step) ++compared;
   }
-  CHECK(compared > 500);
-  CHECK(on_floor > 100);
+  CHECK(compared >= test::at_scale(500));
+  CHECK(on_floor >= test::at_scale(100));
 }
 
 TEST_CASE("equal seeds give equal bytes, also for a renderer that has drawn other things before") {

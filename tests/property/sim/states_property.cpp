@@ -11,6 +11,7 @@
 #include <random>
 #include <tuple>
 
+#include "tests/property_scale.hpp"
 #include "tests/unit/sim/acting_world.hpp"
 
 using namespace takt;
@@ -259,9 +260,9 @@ std::vector<int64_t> random_releases(Chance& chance) {
 TEST_CASE("states settled job by job are those of a replay of all commands and events") {
   size_t compared = 0, settled_early = 0;
   std::map<uint8_t, int> verdicts;
-  for (uint64_t seed = 0; seed < 120; ++seed) {
+  for (uint64_t seed = 0; seed < test::rounds(120u); ++seed) {
     CAPTURE(seed);
-    Chance chance(seed);
+    Chance chance(test::seed(seed));
     const World world = random_world(chance);
     const auto stage = std::make_shared<Stage>(world, 1);
     std::deque<Simulation> robots;
@@ -331,17 +332,17 @@ TEST_CASE("states settled job by job are those of a replay of all commands and e
   }
   MESSAGE(compared, " states compared, ", settled_early, " settled ahead; ", verdicts[action_state::done], " done, ",
           verdicts[action_state::refused], " refused, ", verdicts[action_state::failed], " failed");
-  CHECK(compared > 500'000);
-  CHECK(settled_early > 10'000);
-  CHECK(verdicts[action_state::done] > 200);
-  CHECK(verdicts[action_state::refused] > 200);
-  CHECK(verdicts[action_state::failed] > 20);
+  CHECK(compared >= test::at_scale(500'000));
+  CHECK(settled_early >= test::at_scale(10'000));
+  CHECK(verdicts[action_state::done] >= test::at_scale(200));
+  CHECK(verdicts[action_state::refused] >= test::at_scale(200));
+  CHECK(verdicts[action_state::failed] >= test::at_scale(20));
 }
 
 TEST_CASE("robots that drive at random do not run into each other") {
   double nearest = 1e9;
-  for (uint64_t seed = 0; seed < 40; ++seed) {
-    Chance chance(seed);
+  for (uint64_t seed = 0; seed < test::rounds(40u); ++seed) {
+    Chance chance(test::seed(seed));
     World world;
     world.map = *parse_rows("########## #........# #........# #........# #........# ##########", 0.5);
     world.clients = {{"a", 1.2, 1.2, 0, {}}, {"b", 3.6, 1.2, 3, {}}, {"c", 2.4, 1.8, 1.5, {}}};

@@ -14,6 +14,7 @@
 #include "nodes/stereo/window_matcher.hpp"
 #include "tests/on_each_target.hpp"
 #include "tests/property/stereo/random_pairs.hpp"
+#include "tests/property_scale.hpp"
 
 using namespace takt;
 using namespace takt::stereo;
@@ -38,8 +39,8 @@ TEST_CASE("random pairs, sizes, costs: equal to the reference on every SIMD targ
   int targets = 0;
   on_each_target([&] {
     ++targets;
-    std::mt19937 random(7);
-    for (int round = 0; round < 60; ++round) {
+    std::mt19937 random(test::seed(7));
+    for (int round = 0; round < test::rounds(60); ++round) {
       const auto pick = [&](int low, int high) { return std::uniform_int_distribution<int>(low, high)(random); };
       const int channels = pick(0, 1) ? 3 : 1;
       const int width = pick(1, round % 6 ? 45 : 200), height = pick(1, round % 6 ? 33 : 9);
@@ -53,8 +54,8 @@ TEST_CASE("random pairs, sizes, costs: equal to the reference on every SIMD targ
 
 TEST_CASE("a search limited after construction: equal to the reference of the smaller range") {
   on_each_target([&] {
-    std::mt19937 random(19);
-    for (int round = 0; round < 30; ++round) {
+    std::mt19937 random(test::seed(19));
+    for (int round = 0; round < test::rounds(30); ++round) {
       const auto pick = [&](int low, int high) { return std::uniform_int_distribution<int>(low, high)(random); };
       const Picture left = random_picture(random, pick(1, 45), pick(1, 33), 1, 256);
       const Picture right = shifted(random, left, pick(0, left.width - 1), pick(0, 100));
@@ -65,8 +66,8 @@ TEST_CASE("a search limited after construction: equal to the reference of the sm
 
 TEST_CASE("rows that are wanted: equal to the reference of the whole image") {
   on_each_target([&] {
-    std::mt19937 random(37);
-    for (int round = 0; round < 40; ++round) {
+    std::mt19937 random(test::seed(37));
+    for (int round = 0; round < test::rounds(40); ++round) {
       const auto pick = [&](int low, int high) { return std::uniform_int_distribution<int>(low, high)(random); };
       const Picture left = random_picture(random, pick(1, 45), pick(2, 40), 1, 256);
       const Picture right = shifted(random, left, pick(0, left.width - 1), pick(0, 100));
@@ -87,7 +88,7 @@ TEST_CASE("rows that are wanted: equal to the reference of the whole image") {
 
 TEST_CASE("search ranges of several register blocks and strips of columns: equal to the reference") {
   on_each_target([&] {
-    std::mt19937 random(11);
+    std::mt19937 random(test::seed(11));
     for (const int disparities : {129, 150, 193, 300, 512})
       for (const auto cost : {CostKind::gradient, CostKind::ssd, CostKind::sad, CostKind::census}) {
         const Picture left = random_picture(random, 347, 3, 3, 256);
@@ -105,7 +106,7 @@ TEST_CASE("search ranges of several register blocks and strips of columns: equal
 }
 
 TEST_CASE("window of 15, minimum filter of 5, the defaults: equal to the reference") {
-  std::mt19937 random(13);
+  std::mt19937 random(test::seed(13));
   MatcherParameters p;
   p.disparities = 40;
   for (const auto cost : {CostKind::gradient, CostKind::ssd, CostKind::sad, CostKind::census})
@@ -127,8 +128,8 @@ TEST_CASE("flat images, where every disparity ties: the smallest wins") {
 
 TEST_CASE("semi-global matching of random pairs: equal to the reference on every SIMD target") {
   on_each_target([&] {
-    std::mt19937 random(23);
-    for (int round = 0; round < 30; ++round) {
+    std::mt19937 random(test::seed(23));
+    for (int round = 0; round < test::rounds(30); ++round) {
       const auto pick = [&](int low, int high) { return std::uniform_int_distribution<int>(low, high)(random); };
       const int channels = pick(0, 1) ? 3 : 1;
       const Picture left = random_picture(random, pick(1, 60), pick(1, 20), channels, round % 3 ? 256 : 3);
@@ -152,8 +153,8 @@ TEST_CASE("semi-global matching of random pairs: equal to the reference on every
 }
 
 TEST_CASE("the general matcher agrees with the fast ones where both serve") {
-  std::mt19937 random(29);
-  for (int round = 0; round < 40; ++round) {
+  std::mt19937 random(test::seed(29));
+  for (int round = 0; round < test::rounds(40); ++round) {
     const auto pick = [&](int low, int high) { return std::uniform_int_distribution<int>(low, high)(random); };
     const int channels = pick(0, 1) ? 3 : 1;
     const Picture left = random_picture(random, pick(1, 45), pick(1, 33), channels, round % 3 ? 256 : 3);
@@ -180,7 +181,7 @@ TEST_CASE("the general matcher agrees with the fast ones where both serve") {
 TEST_CASE(
     "the general matcher equals the reference: every cost and share of it, filtered or not, what lies beside the "
     "winner") {
-  std::mt19937 random(43);
+  std::mt19937 random(test::seed(43));
   for (const CostKind cost :
        {CostKind::gradient, CostKind::ssd, CostKind::sad, CostKind::census, CostKind::rss, CostKind::mixed})
     for (const int n_min : {1, 5})
@@ -188,7 +189,7 @@ TEST_CASE(
         for (const int channels : {1, 3}) {
           if (weight != 1 && cost != CostKind::mixed) continue;
           if (cost == CostKind::rss && channels == 3) continue;  // roots of sums are no whole numbers: the next test
-          for (int round = 0; round < 8; ++round) {
+          for (int round = 0; round < test::rounds(8); ++round) {
             const auto pick = [&](int low, int high) { return std::uniform_int_distribution<int>(low, high)(random); };
             const Picture left = random_picture(random, pick(1, 40), pick(1, 25), channels, round % 3 ? 256 : 4);
             const Picture right = shifted(random, left, pick(0, left.width - 1), pick(0, 100));
@@ -209,9 +210,10 @@ TEST_CASE(
 
 TEST_CASE(
     "cost rss of colours: winner, fraction and uniqueness of the reference's sums, but for the last bits of a float") {
-  std::mt19937 random(47);
+  std::mt19937 random(test::seed(47));
+  size_t kept = 0;
   for (const int n_min : {1, 5})
-    for (int round = 0; round < 12; ++round) {
+    for (int round = 0; round < test::rounds(12); ++round) {
       const auto pick = [&](int low, int high) { return std::uniform_int_distribution<int>(low, high)(random); };
       const Picture left = random_picture(random, pick(6, 40), pick(1, 25), 3, 256);
       const Picture right = shifted(random, left, pick(0, left.width - 1), pick(0, 60));
@@ -227,25 +229,23 @@ TEST_CASE(
       REQUIRE(GeneralMatcher(left.width, left.height, 3, p).match(left.view(), right.view(), found.views(left)));
       const auto sums =
           reference::filtered(reference::window_sums(left.view(), right.view(), p, false), left.width, left.height, p);
-      size_t kept = 0, rejected = 0;
       for (size_t i = 0; i < found.disparity.size(); ++i) {
         const double* at = &sums[i * static_cast<size_t>(p.disparities)];
         const reference::Choice best = reference::winner(at, p, 65535);
-        ++(best.ambiguous ? rejected : kept);
+        kept += !best.ambiguous;
         CHECK(std::abs(found.confidence[i] - reference::confidence(best.sum, p.max_sum(), p)) <= 1);
         CHECK((found.disparity[i] < 0) == best.ambiguous);
         if (found.disparity[i] < 0) continue;
         CHECK(at[found.disparity[i]] <= best.sum + 1e-3);
         if (found.disparity[i] == best.disparity) CHECK(std::abs(found.fraction[i] - best.fraction) <= 1);
       }
-      CHECK(kept + rejected == found.disparity.size());
-      CHECK(kept > 0);
     }
+  CHECK(kept >= test::at_scale(1000));
 }
 
 TEST_CASE("bands of rows on threads give the result of one matcher") {
-  std::mt19937 random(31);
-  for (int round = 0; round < 25; ++round) {
+  std::mt19937 random(test::seed(31));
+  for (int round = 0; round < test::rounds(25); ++round) {
     const auto pick = [&](int low, int high) { return std::uniform_int_distribution<int>(low, high)(random); };
     const int channels = pick(0, 1) ? 3 : 1, height = pick(32, 90);
     const Picture left = random_picture(random, pick(1, 60), height, channels, round % 3 ? 256 : 3);

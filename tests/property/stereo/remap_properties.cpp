@@ -11,6 +11,7 @@
 #include "nodes/stereo/remap.hpp"
 #include "nodes/stereo/remap_reference.hpp"
 #include "tests/on_each_target.hpp"
+#include "tests/property_scale.hpp"
 
 using namespace takt;
 using namespace takt::stereo;
@@ -22,7 +23,7 @@ constexpr uint8_t kUntouched = 0xA5;
 
 class Dice {
  public:
-  explicit Dice(uint32_t seed) : random_(seed) {}
+  explicit Dice(uint64_t seed) : random_(seed) {}
   int pick(int low, int high) { return std::uniform_int_distribution<int>(low, high)(random_); }
   uint8_t pixel() { return static_cast<uint8_t>(pick(0, 3) ? pick(0, 255) : 255 * pick(0, 1)); }
   uint8_t fraction() { return static_cast<uint8_t>(pick(0, 4) ? pick(0, 128) : 128 * pick(0, 1)); }
@@ -98,8 +99,8 @@ constexpr BayerPattern kPatterns[] = {BayerPattern::rggb, BayerPattern::bggr, Ba
 
 TEST_CASE("grey and colour images: resampling equals the integer formula") {
   on_each_target([] {
-    Dice dice(3);
-    for (int round = 0; round < 150; ++round) {
+    Dice dice(test::seed(3));
+    for (int round = 0; round < test::rounds(150); ++round) {
       PaddedPicture in(dice.pick(2, 70), dice.pick(2, 40), dice.pick(0, 1) ? 3 : 1, dice.pick(0, 5));
       in.fill(dice);
       const auto table = round % 2 ? wild_table(dice, in.width, in.height) : smooth_table(dice, in.width, in.height);
@@ -110,9 +111,9 @@ TEST_CASE("grey and colour images: resampling equals the integer formula") {
 
 TEST_CASE("mosaics: debayering and resampling in one equal one after the other, for every colour filter") {
   on_each_target([] {
-    Dice dice(4);
+    Dice dice(test::seed(4));
     for (const BayerPattern pattern : kPatterns)
-      for (int round = 0; round < 60; ++round) {
+      for (int round = 0; round < test::rounds(60); ++round) {
         PaddedPicture in(dice.pick(2, round % 3 ? 30 : 200), dice.pick(2, 30), 1, dice.pick(0, 5));
         in.fill(dice);
         const auto table = round % 2 ? wild_table(dice, in.width, in.height) : smooth_table(dice, in.width, in.height);
@@ -123,8 +124,8 @@ TEST_CASE("mosaics: debayering and resampling in one equal one after the other, 
 
 TEST_CASE("a tall image passes through a window of few rows many times") {
   on_each_target([] {
-    Dice dice(5);
-    for (int round = 0; round < 8; ++round) {
+    Dice dice(test::seed(5));
+    for (int round = 0; round < test::rounds(8); ++round) {
       PaddedPicture in(dice.pick(60, 90), 300, 1, 0);
       in.fill(dice);
       const auto table = smooth_table(dice, in.width, in.height);
@@ -136,7 +137,7 @@ TEST_CASE("a tall image passes through a window of few rows many times") {
 
 TEST_CASE("a table without any source gives black") {
   PaddedPicture in(20, 4, 3, 0);
-  Dice dice(6);
+  Dice dice(test::seed(6));
   in.fill(dice);
   expect_equal(in, BayerPattern::none, std::vector<RemapSource>(80), 3);
 }

@@ -8,6 +8,7 @@
 #include "nodes/traffic_signs/reference.hpp"
 #include "tests/on_each_target.hpp"
 #include "tests/property/traffic_signs/as_opencv.hpp"
+#include "tests/property_scale.hpp"
 #include "tests/temporary_folder.hpp"
 #include "tests/unit/traffic_signs/random_cascade.hpp"
 
@@ -18,7 +19,7 @@ using namespace takt::test;
 namespace {
 
 /// Blobs of several sizes, with places so flat that no window may be looked at.
-cv::Mat1b random_image(uint32_t seed, int width, int height) {
+cv::Mat1b random_image(uint64_t seed, int width, int height) {
   cv::RNG random(seed + 1000);
   cv::Mat1f image(height, width, 128.0f);
   for (int pitch = 4; pitch <= 32; pitch *= 2) {
@@ -60,8 +61,9 @@ TEST_CASE("traffic_signs: a level is what cv::resize and cv::integral make of th
 }
 
 TEST_CASE("traffic_signs: every window passes as many stages as in the obvious form, with every SIMD target") {
-  for (uint32_t seed = 1; seed <= 6; ++seed) {
-    const Cascade cascade = test::random_cascade(seed, 9 + static_cast<int>(seed), 20 - static_cast<int>(seed), 6);
+  for (uint32_t k = 1; k <= test::rounds(6u); ++k) {
+    const auto seed = static_cast<uint32_t>(test::seed(k));
+    const Cascade cascade = test::random_cascade(seed, 9 + static_cast<int>(k), 20 - static_cast<int>(k), 6);
     const cv::Mat1b image = random_image(seed, 90, 70);
     Search search(90, 70, 1.4, {&cascade, 1});
     for (int index = 0; index < search.levels(0); ++index) {
@@ -99,21 +101,22 @@ TEST_CASE("traffic_signs: every window passes as many stages as in the obvious f
 TEST_CASE("traffic_signs: the windows that pass are those of cv::CascadeClassifier") {
   const test::TemporaryFolder folder;
   size_t found = 0;
-  for (uint32_t seed = 1; seed <= 12; ++seed) {
-    const auto file = folder.path / (std::to_string(seed) + ".xml");
-    write_cascade(test::random_cascade(seed, 24, 12 + static_cast<int>(seed), 4), file, "for a test");
-    found += check_equal(file, random_image(seed, 301, 220), 1.1 + 0.03 * seed);
+  for (uint32_t k = 1; k <= test::rounds(12u); ++k) {
+    const auto seed = static_cast<uint32_t>(test::seed(k));
+    const auto file = folder.path / (std::to_string(k) + ".xml");
+    write_cascade(test::random_cascade(seed, 24, 12 + static_cast<int>(k), 4), file, "for a test");
+    found += check_equal(file, random_image(seed, 301, 220), 1.1 + 0.03 * k);
   }
-  CHECK(found > 500);
+  if (test::property_scale() >= 1) CHECK(found > 500);  // a random cascade may let nothing pass, so may the first few
 }
 
 TEST_CASE("traffic_signs: groups are those of cv::groupRectangles") {
-  std::mt19937 random(3);
+  std::mt19937 random(test::seed(3));
   const auto in = [&](int low, int high) {
     return low + static_cast<int>(random() % static_cast<uint32_t>(high - low + 1));
   };
   Grouping grouping(300);
-  for (int round = 0; round < 200; ++round) {
+  for (int round = 0; round < test::rounds(200); ++round) {
     std::vector<Box> boxes;
     std::vector<cv::Rect> theirs;
     for (int cluster = in(1, 12); cluster > 0; --cluster) {
