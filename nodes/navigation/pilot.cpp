@@ -93,6 +93,19 @@ Velocity Pilot::ahead(const PlanarPose& robot) {
   return {speed, approach_rad_s(wanted_rad - moved.theta_rad)};
 }
 
+double Pilot::in_line(double aside_rad) const {
+  return std::max(0.0, 1 - 1.5 * std::abs(aside_rad) / parameters_.turn_first_rad);
+}
+
+double Pilot::corner_m_s(size_t corner) const {
+  if (corner + 1 == way_.size()) return 0;
+  const auto direction = [&](const Place& from, const Place& to) {
+    return std::atan2(to.y_m - from.y_m, to.x_m - from.x_m);
+  };
+  const double sharp = wrapped(direction(way_[corner], way_[corner + 1]) - direction(way_[corner - 1], way_[corner]));
+  return parameters_.limits.speed_m_s * std::max(0.1, in_line(sharp));
+}
+
 Velocity Pilot::follow(const PlanarPose& robot) {
   // How far along the present piece, and how far it is to its end.
   const auto piece = [&] {
@@ -121,17 +134,15 @@ Velocity Pilot::follow(const PlanarPose& robot) {
   const Velocity sideways{0, approach_rad_s(bearing)};
   if (turning_) return sideways;
 
-  // Round a corner as slowly as it is sharp; a stop where it has to be turned to.
-  double allowed = approach_m_s(last ? to_goal_m : std::max(length - done, 0.0));
-  if (!last) {
-    const Place& next = way_[corner_ + 1];
-    const double sharp =
-        wrapped(std::atan2(next.y_m - way_[corner_].y_m, next.x_m - way_[corner_].x_m) - std::atan2(uy, ux));
-    const double corner_m_s =
-        parameters_.limits.speed_m_s * std::max(0.1, 1 - std::abs(sharp) / parameters_.turn_first_rad);
-    allowed = std::min(parameters_.limits.speed_m_s, std::hypot(corner_m_s, allowed));
+  // As slowly as the corners ahead are sharp, and as it is out of line; a stop where it has to be turned to.
+  double allowed = parameters_.limits.speed_m_s, ahead_m = last ? to_goal_m : std::max(length - done, 0.0);
+  for (size_t corner = corner_;; ++corner) {
+    const double before_m_s = approach_m_s(ahead_m);
+    allowed = std::min(allowed, std::hypot(corner_m_s(corner), before_m_s));
+    if (before_m_s >= parameters_.limits.speed_m_s || corner + 1 == way_.size()) break;
+    ahead_m += std::hypot(way_[corner + 1].x_m - way_[corner].x_m, way_[corner + 1].y_m - way_[corner].y_m);
   }
-  return {allowed * std::cos(bearing), sideways.turn_rad_s};
+  return {allowed * in_line(bearing), sideways.turn_rad_s};
 }
 
 }  // namespace takt::navigation

@@ -64,6 +64,10 @@ class Pilot {
   Velocity follow(const PlanarPose& robot);
   Velocity turn(const PlanarPose& robot);
   Velocity ahead(const PlanarPose& robot);
+  /// Share of the speed while the way leads off to the side by an angle: it answers late, and would leave the way.
+  double in_line(double aside_rad) const;
+  /// How fast it may be at a corner of the way; 0 at its end.
+  double corner_m_s(size_t corner) const;
   double approach_m_s(double left_m) const;
   double approach_rad_s(double left_rad) const;
 

@@ -275,3 +275,28 @@ TEST_CASE("what a way was planned round never keeps who drives it from standing,
   CHECK(nearest_m >= robot.clearance_m());
   CHECK(at_rest == 0);
 }
+
+TEST_CASE("corners that follow each other closely do not throw a robot off its way") {
+  const std::vector<Place> ways[] = {{{-0.85, 7.35}, {-2.85, 10.85}, {-2.85, 11.55}, {-2.75, 12.95}, {-2.65, 12.95}},
+                                     {{4.35, 7.95}, {4.05, 12.25}, {4.05, 12.35}, {4.15, 12.35}, {4.15, 12.55}}};
+  for (const std::vector<Place>& way : ways) {
+    LateRobot late{{way[0].x_m, way[0].y_m, 1.6}, {}};
+    Pilot pilot({});
+    REQUIRE(pilot.drive_to(way));
+    double farthest_m = 0;
+    for (int step = 0; step < 2000 && !pilot.standing(); ++step) {
+      late.step(pilot.step(late.pose, 1.0 / 15), 1.0 / 15);
+      double nearest_m = 10;
+      for (size_t i = 1; i < way.size(); ++i) {
+        const double ux = way[i].x_m - way[i - 1].x_m, uy = way[i].y_m - way[i - 1].y_m;
+        const double dx = late.pose.x_m - way[i - 1].x_m, dy = late.pose.y_m - way[i - 1].y_m;
+        const double along = std::clamp((ux * dx + uy * dy) / (ux * ux + uy * uy), 0.0, 1.0);
+        nearest_m = std::min(nearest_m, std::hypot(dx - along * ux, dy - along * uy));
+      }
+      farthest_m = std::max(farthest_m, nearest_m);
+    }
+    CHECK(pilot.standing());
+    MESSAGE("never farther than " << farthest_m << " m from the way");
+    CHECK(farthest_m < 0.05);
+  }
+}
