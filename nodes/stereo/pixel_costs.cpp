@@ -34,16 +34,18 @@ void Features::make(ImageView<const uint8_t> image, bool mirror) {
     for (int x = 0; x < width_; ++x)
       std::copy_n(&image.at(mirror ? width_ - 1 - x : x, y), channels_,
                   pixels_.begin() + static_cast<ptrdiff_t>(at(x, y)) * channels_);
-  if (!derivatives_.empty()) make_derivatives();
+  if (!derivatives_.empty()) make_derivatives(mirror);
   if (!census_.empty()) make_census();
 }
 
-void Features::make_derivatives() {
+/// In a mirror twice_derivative() would saturate the other way round: it is taken as without one.
+void Features::make_derivatives(bool mirror) {
+  const int before = mirror ? 1 : -1;
   auto out = derivatives_.begin();
   for (int y = 0; y < height_; ++y)
     for (int x = 0; x < width_; ++x) {
       if (cost_ == CostKind::gradient) {
-        *out++ = twice_derivative(grey(x - 1, y), grey(x + 1, y));
+        *out++ = twice_derivative(grey(x + before, y), grey(x - before, y));
         *out++ = twice_derivative(grey(x, y - 1), grey(x, y + 1));
         continue;
       }

@@ -29,7 +29,7 @@ class Features {
     return static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x);
   }
   int grey(int x, int y) const;
-  void make_derivatives();
+  void make_derivatives(bool mirror);
   void make_census();
   float squared_difference(const Features& other, size_t i, size_t o) const;
 

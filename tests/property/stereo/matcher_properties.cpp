@@ -178,6 +178,23 @@ TEST_CASE("the general matcher agrees with the fast ones where both serve") {
   }
 }
 
+TEST_CASE("the general matcher of four grey levels, where derivatives saturate: equal to the reference") {
+  std::mt19937 random(test::seed(61));
+  for (int round = 0; round < test::rounds(20); ++round) {
+    const Picture left = random_picture(random, 40, 12, 1, 4), right = shifted(random, left, 5, 30);
+    MatcherParameters p;
+    p.disparities = 12;
+    p.n_square = 3;
+    p.n_min = 1;
+    p.c_max = 64;
+    p.left_right_check = true;
+    Output expected(left);
+    reference::match(left.view(), right.view(), p, expected.views(left));
+    GeneralMatcher general(left.width, left.height, 1, p);
+    expect_equal(general, left, right, p, expected);
+  }
+}
+
 TEST_CASE(
     "the general matcher equals the reference: every cost and share of it, filtered or not, what lies beside the "
     "winner") {
