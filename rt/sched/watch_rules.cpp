@@ -27,7 +27,8 @@ WatchVerdict judge(const WatchRules& rules, const WatchSight& sight) {
   const auto expect = [&](int64_t instant_ns) { verdict.look_again_ns = std::min(verdict.look_again_ns, instant_ns); };
   if (rules.minds_overrun() && !(sight.running && sight.overrun_told)) {
     // A job that is still to come begins at its release, or any moment if that has passed.
-    if (!sight.running) expect(std::max(sight.release_ns, sight.now_ns) + rules.budget_ns);
+    if (!sight.running && sight.release_ns > sight.now_ns) expect(sight.release_ns + rules.budget_ns);
+    else if (!sight.running) expect(sight.now_ns + std::max(rules.budget_ns, kWatchGrain_ns));
     else if (sight.cpu_left_ns <= 0) verdict.overrun = true;
     else expect(sight.now_ns + std::max(sight.cpu_left_ns, kWatchGrain_ns));
   }

@@ -52,8 +52,9 @@ struct WatchVerdict {
 /// half a budget. All of that is seen when somebody looks: it makes no look_again.
 ///
 /// A job cannot have used a budget before that much time has passed: so the next look is due when the earliest thing
-/// can have happened. A running job is looked at no more than once in kWatchGrain_ns, so that one that was preempted
-/// just before its budget ended costs nothing: the enforcement error, beside the watchdog's own wake-up.
+/// can have happened. For its budget a job that runs, or is late to begin, is looked at no more than once in
+/// kWatchGrain_ns, so that one that was preempted just before its budget ended costs nothing: the enforcement error,
+/// beside the watchdog's own wake-up.
 WatchVerdict judge(const WatchRules& rules, const WatchSight& sight);
 
 constexpr int64_t kWatchGrain_ns = 100'000;

@@ -124,3 +124,12 @@ TEST_CASE("nobody looks at a job that none of the rules minds before it hangs") 
   CHECK(judge(rules, {1400, false, 200, 0}).look_again_ns == 1500);
   CHECK(judge(rules, {250, true, 200, 0}).look_again_ns == 1301);
 }
+
+TEST_CASE("a job that is late to begin is looked for once a grain, however small its budget is") {
+  WatchRules rules;
+  rules.budget_ns = 1;
+  rules.deadline_ns = 10 * kWatchGrain_ns;
+  rules.demote = true;
+  CHECK(judge(rules, {100, false, 200, 0}).look_again_ns == 201);
+  CHECK(judge(rules, {250, false, 200, 0}).look_again_ns == 250 + kWatchGrain_ns);
+}
