@@ -4,17 +4,19 @@
 
   gate.py figures TAKT        every line of figures.txt: a `takt eval` on data that it makes itself, against the stored
                               figure; exit 1 if one is worse by more than its tolerance
-  gate.py ratios TAKT_BENCH   every row of targets.txt: its ratio against its target; a ratio is printed, never a reason to
-                              fail (machines are shared), a suite that fails or lacks a row is
+  gate.py ratios TAKT_BENCH [--suite NAME]... [--shard K/N] [--json FILE]
+                              every row of targets.txt: its ratio against its target; exit 1 if one misses it by more than
+                              its null pair shows as noise (the rule stands in ratios.py), or a suite or row is missing
 
 Both say of each line what was found, and exit 2 for a line that they do not understand."""
-import fnmatch
+import argparse
 import json
 import os
 import subprocess
 import sys
-import tempfile
 import time
+
+import ratios
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 
@@ -86,40 +88,41 @@ def compare_figures(takt):
     return 1 if worse else 0
 
 
-def print_ratios(bench):
-    wrong = missed = 0
-    for place, suite, lines in sections("targets.txt"):
-        with tempfile.NamedTemporaryFile(suffix=".json") as file:
-            run = subprocess.run([bench, *suite.split(), "--json", file.name], capture_output=True, text=True, check=False)
-            rows = json.load(file) if run.returncode == 0 else []
-        print(f"takt bench {suite}")
-        if run.returncode != 0:
-            print(f"  {place}: exit {run.returncode}: {run.stderr.strip()}")
-            wrong += 1
-            continue
+def compare_ratios(bench, wanted, shard, json_file):
+    suites = []
+    for _, command, lines in sections("targets.txt"):
+        targets = []
         for place, words in lines:
             if len(words) != 3 or words[1] not in ("<=", ">="):
                 fail(f"{place}: write ROW, <= or >=, the target")
-            target = number(place, words[2])
-            found = [r for r in rows if fnmatch.fnmatch(r["name"], words[0]) and not r["name"].endswith("_null")
-                     and r.get("ratio") is not None]  # some rows have no reference
-            for row in found:
-                met = row["ratio"] <= target if words[1] == "<=" else row["ratio"] >= target
-                missed += not met
-                print(f"  {row['name']:44} {row['ratio']:9.3g} of {row['reference']}, {words[1]} {target:g}: "
-                      + ("met" if met else "MISSED"))
-            if not found:
-                print(f"  {place}: there is no row {words[0]}")
-                wrong += 1
-    print(f"ratios: {missed} missed" + (f", {wrong} could not be had" if wrong else ""))
-    return 1 if wrong else 0
+            targets.append(ratios.Target(place, words[0], words[1], number(place, words[2])))
+        suites.append((command, targets))
+    names = [command.split()[0] for command, _ in suites]
+    for name in wanted:
+        if name not in names:
+            fail(f"targets.txt has no suite `{name}`; there are: {' '.join(names)}")
+    suites = [suite for suite, name in zip(suites, names) if not wanted or name in wanted]
+    if shard:
+        suites = ratios.share(suites, shard)
+        if suites is None:
+            fail(f"--shard {shard}: write K/N, such as 1/4")
+    return 0 if ratios.judge_all(bench, suites, json_file) else 1
 
 
 def main():
-    what = {"figures": compare_figures, "ratios": print_ratios}
-    if len(sys.argv) != 3 or sys.argv[1] not in what:
-        fail("gate.py figures TAKT | ratios TAKT_BENCH")
-    sys.exit(what[sys.argv[1]](sys.argv[2]))
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    commands = parser.add_subparsers(dest="what", required=True)
+    figures = commands.add_parser("figures")
+    figures.add_argument("takt")
+    ratio = commands.add_parser("ratios")
+    ratio.add_argument("bench")
+    ratio.add_argument("--suite", action="append", default=[], metavar="NAME", help="only this suite; repeatable")
+    ratio.add_argument("--shard", metavar="K/N", help="only the K-th of N parts of the suites")
+    ratio.add_argument("--json", metavar="FILE", help="write what was found")
+    given = parser.parse_args()
+    if given.what == "figures":
+        sys.exit(compare_figures(given.takt))
+    sys.exit(compare_ratios(given.bench, given.suite, given.shard, given.json))
 
 
 if __name__ == "__main__":

@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Ratios of `takt bench` against the targets of targets.txt.
+
+A ratio fails if it misses its target by more than its null pair shows as noise. A null pair is the reference measured
+against itself in the same run; its ratio r0 is 1 on a quiet machine.
+
+  noise   max(r0, 1/r0); 1 for a row without a null pair
+  <=      `met` if ratio <= target, `within its null pair` if ratio <= target * noise, else `FAILED`
+  >=      `met` if ratio >= target, `within its null pair` if ratio >= target / noise, else `FAILED`
+
+With a noise above WIDEST hardly anything could fail. A row that only such a noise would excuse is `unclear`: its suite
+runs once more, and the second run decides about this row. There, noise counts as WIDEST at most."""
+import fnmatch
+import json
+import subprocess
+import tempfile
+import time
+from typing import NamedTuple
+
+WIDEST = 1.5
+MET, WITHIN, UNCLEAR, FAILED = "met", "within its null pair", "unclear", "FAILED"
+
+
+class Target(NamedTuple):
+    place: str  # file and line
+    pattern: str  # of row names
+    sense: str  # <= or >=
+    value: float
+
+    def misses_by(self, ratio):
+        """A factor: above 1 the target is missed."""
+        if self.sense == "<=":
+            return ratio / self.value
+        return self.value / ratio if ratio > 0 else float("inf")
+
+
+def is_null(row):
+    return any(part.endswith("_null") for part in row["name"].split("/"))
+
+
+def null_of(row, rows):
+    """The ratio of the row's null pair, or None. It is the row NAME_null, or one of the same reference and the same last
+    part of the name, such as graph/chain10_in_process/futex_threads_null/latency_128_fifo."""
+    def belongs(other):
+        if other["name"] == row["name"] + "_null":
+            return True
+        return (is_null(other) and not other["name"].endswith("_null") and other["reference"] == row["reference"]
+                and other["name"].split("/")[-1] == row["name"].split("/")[-1])
+    ratios = [other["ratio"] for other in rows if belongs(other) and (other["ratio"] or 0) > 0]
+    return ratios[0] if ratios else None
+
+
+def noise_of(null):
+    return 1.0 if null is None else max(null, 1 / null)
+
+
+def judge(target, ratio, null, last=False):
+    """`last`: no other run of the suite follows."""
+    excess, noise = target.misses_by(ratio), noise_of(null)
+    if excess <= 1:
+        return MET
+    if noise > WIDEST and not last:
+        return UNCLEAR if excess <= noise else FAILED
+    return WITHIN if excess <= min(noise, WIDEST) else FAILED
+
+
+def judge_rows(target, rows, last=False):
+    """What was found for each row that the target is about; some rows have no reference, and no ratio."""
+    found = []
+    for row in rows:
+        if not fnmatch.fnmatch(row["name"], target.pattern) or is_null(row) or row["ratio"] is None:
+            continue
+        null = null_of(row, rows)
+        found.append({"name": row["name"], "ratio": row["ratio"], "reference": row["reference"], "sense": target.sense,
+                      "target": target.value, "null": null, "verdict": judge(target, row["ratio"], null, last)})
+    return found
+
+
+def text_of(found):
+    null = "none" if found["null"] is None else f"{found['null']:.3g}"
+    return (f"  {found['name']:52} {found['ratio']:8.3g} of {found['reference']}, {found['sense']} {found['target']:g}, "
+            f"null {null}: {found['verdict']}")
+
+
+def run_suite(bench, command):
+    """(rows, error, seconds) of one run; error is empty if it went well."""
+    began = time.monotonic()
+    with tempfile.NamedTemporaryFile(suffix=".json") as file:
+        run = subprocess.run([bench, *command.split(), "--json", file.name], capture_output=True, text=True, check=False)
+        rows = json.load(file) if run.returncode == 0 else []
+    error = "" if run.returncode == 0 else f"exit {run.returncode}: {run.stderr.strip()}"
+    return rows, error, time.monotonic() - began
+
+
+def judge_suite(bench, command, targets, measure=run_suite):
+    """Runs a suite, a second time where something stays unclear; prints and returns what was found."""
+    rows, error, seconds = measure(bench, command)
+    print(f"takt bench {command} ({seconds:.0f} s)", flush=True)
+    outcome = {"command": command, "seconds": seconds, "runs": 1, "rows": [], "errors": [error] if error else []}
+    if not error:
+        for target in targets:
+            found = judge_rows(target, rows)
+            outcome["rows"] += found
+            if not found:
+                outcome["errors"].append(f"{target.place}: there is no row {target.pattern}")
+    for found in outcome["rows"]:
+        print(text_of(found))
+    unclear = {found["name"] for found in outcome["rows"] if found["verdict"] == UNCLEAR}
+    if unclear:
+        print(f"takt bench {command}: again, for a null pair beyond {WIDEST} would excuse what is unclear", flush=True)
+        rows, error, seconds = measure(bench, command)
+        outcome["runs"], outcome["seconds"] = 2, outcome["seconds"] + seconds
+        again = [found for target in targets for found in judge_rows(target, rows, last=True) if found["name"] in unclear]
+        outcome["rows"] = [found for found in outcome["rows"] if found["name"] not in unclear] + again
+        missing = sorted(unclear - {found["name"] for found in again})
+        if error or missing:
+            outcome["errors"].append(error or f"the second run lacks {', '.join(missing)}")
+        for found in again:
+            print(text_of(found))
+    for error in outcome["errors"]:
+        print(f"  {error}", flush=True)
+    return outcome
+
+
+def share(suites, shard):
+    """The k-th of n parts of a list, for a text `k/n`; None for a text that is none."""
+    part, slash, parts = shard.partition("/")
+    if not (slash and part.isdigit() and parts.isdigit() and 1 <= int(part) <= int(parts)):
+        return None
+    return suites[int(part) - 1::int(parts)]
+
+
+def judge_all(bench, suites, json_file=None):
+    """suites: [(command, [Target])]. True if no ratio failed, and no suite or row is missing."""
+    outcomes = [judge_suite(bench, command, targets) for command, targets in suites]
+    rows = [found for outcome in outcomes for found in outcome["rows"]]
+    errors = sum(len(outcome["errors"]) for outcome in outcomes)
+    count = {verdict: sum(found["verdict"] == verdict for found in rows) for verdict in (MET, WITHIN, FAILED)}
+    print(f"ratios: {count[MET]} met, {count[WITHIN]} within their null pair, {count[FAILED]} failed"
+          + (f", {errors} could not be had" if errors else ""))
+    for found in rows:
+        if found["verdict"] == FAILED:
+            print(text_of(found))
+    if json_file:
+        with open(json_file, "w", encoding="utf-8") as file:
+            json.dump(outcomes, file, indent=1)
+    return count[FAILED] == 0 and errors == 0
