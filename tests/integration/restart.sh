@@ -43,7 +43,9 @@ down = {n["name"]: n["down"] for n in report["nodes"]}
 assert down["stereo"] > 0 and down["object_detection"] > 0 and down["obstacle_stop"] == 0 and down["semantic"] == 0, down
 for n in report["nodes"]:
     lost = n["released"] - n["completed"] - n["skipped"] - n["reused"]
-    assert 0 <= lost <= n["down"] + 1, n  # one: under way at the kill
+    # At the kill, and at the end: under way, or late on a busy machine.
+    waiting = 2 * (1 + int((n["response_ms"]["max"] or 0) * 1e-3 * (n["rate_hz"] or 0)))
+    assert 0 <= lost <= n["down"] + waiting, n
 for e in report["edges"]:  # a restarted reader sees nothing twice, a restarted writer begins no new count
     assert e["received"] + e["dropped"] <= e["sent"], e
 assert not report["ok"]
