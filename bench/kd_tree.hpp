@@ -4,7 +4,7 @@
 #include <nanoflann.hpp>
 #include <span>
 
-#include "rt/msg/messages.hpp"
+#include "rt/msg/point.hpp"
 
 namespace takt::bench {
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "rt/node.hpp"
 
+#include "rt/msg/requests.hpp"
 #include "rt/trace/rings.hpp"
 
 namespace takt {

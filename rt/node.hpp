@@ -17,7 +17,7 @@
 
 #include "rt/level.hpp"
 #include "rt/memory/job_calls.hpp"
-#include "rt/msg/messages.hpp"
+#include "rt/msg/field.hpp"
 #include "rt/param.hpp"
 #include "rt/sched/append_log.hpp"
 #include "rt/shm/transport.hpp"
@@ -26,6 +26,8 @@
 #include "rt/time/rate.hpp"
 
 namespace takt {
+
+struct Requests;  // rt/msg/requests.hpp
 
 /// Thrown by Node::setup: what the node cannot work with. The graph adds file, line and id.
 struct SetupError : std::runtime_error {

@@ -10,7 +10,7 @@
 #include "bench/futex.hpp"
 #include "bench/peers/medium.hpp"
 #include "bench/suite.hpp"
-#include "rt/msg/messages.hpp"
+#include "rt/msg/image.hpp"
 #include "rt/shm/iceoryx_transport.hpp"
 #include "rt/shm/local_transport.hpp"
 

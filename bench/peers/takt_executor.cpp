@@ -8,6 +8,7 @@
 #include "bench/peers/medium.hpp"
 #include "bench/peers/rung_graph.hpp"
 #include "bench/suite.hpp"
+#include "rt/msg/image.hpp"
 #include "rt/node.hpp"
 
 namespace takt::bench {

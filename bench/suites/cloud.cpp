@@ -14,6 +14,7 @@
 #include "bench/suite.hpp"
 #include "nodes/cloud/outlier_filter.hpp"
 #include "nodes/cloud/voxel_reference.hpp"
+#include "rt/msg/point.hpp"
 
 namespace takt::bench {
 

@@ -10,6 +10,8 @@
 #include "bench/suite.hpp"
 #include "nodes/mapping_3d/cloud_mapper.hpp"
 #include "nodes/mapping_3d/generated_world.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/point.hpp"
 
 namespace takt::bench {
 

@@ -13,6 +13,7 @@
 #include "nodes/object_detection/detector.hpp"
 #include "nodes/object_detection/reference.hpp"
 #include "nodes/object_detection/scenes.hpp"
+#include "rt/msg/detections.hpp"
 
 namespace takt::bench {
 

@@ -13,6 +13,7 @@
 #include "bench/suite.hpp"
 #include "graph/cli/outcome.hpp"
 #include "nodes/object_3d/evaluate.hpp"
+#include "rt/msg/point.hpp"
 
 namespace takt::bench {
 

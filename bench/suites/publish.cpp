@@ -15,7 +15,7 @@
 
 #include "bench/instants.hpp"
 #include "bench/suite.hpp"
-#include "rt/msg/messages.hpp"
+#include "rt/msg/image.hpp"
 #include "rt/shm/transport.hpp"
 
 namespace takt::bench {

@@ -14,6 +14,7 @@
 
 #include "bench/interleaved.hpp"
 #include "bench/suite.hpp"
+#include "rt/msg/image.hpp"
 #include "rt/node.hpp"
 #include "rt/record/mcap/file_sink.hpp"
 #include "rt/record/recorder.hpp"

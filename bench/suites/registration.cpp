@@ -10,6 +10,7 @@
 #include "nodes/laser_fusion/genetic_icp.hpp"
 #include "nodes/laser_fusion/laser_fusion.hpp"
 #include "nodes/laser_fusion/matcher.hpp"
+#include "rt/msg/point.hpp"
 #include "rt/time/clock.hpp"
 
 namespace takt::bench {

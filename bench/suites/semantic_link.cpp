@@ -21,6 +21,7 @@
 #include "hal/semantic_link/link_device.hpp"
 #include "hal/semantic_link/server.hpp"
 #include "hal/semantic_link/udp_port.hpp"
+#include "rt/msg/laser_scan.hpp"
 
 namespace takt::bench {
 

@@ -11,6 +11,7 @@
 
 #include "bench/interleaved.hpp"
 #include "bench/suite.hpp"
+#include "rt/msg/odometry.hpp"
 #include "rt/node.hpp"
 #include "rt/sched/executor.hpp"
 #include "rt/sched/port_access.hpp"

@@ -13,7 +13,7 @@
 #include "bench/large_copies.hpp"
 #include "bench/suite.hpp"
 #include "bench/suites/hops.hpp"
-#include "rt/msg/messages.hpp"
+#include "rt/msg/image.hpp"
 
 namespace takt::bench {
 

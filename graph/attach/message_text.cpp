@@ -8,8 +8,14 @@
 #include "nodes/cloud/cloud_file.hpp"
 #include "nodes/picture/clouds.hpp"
 #include "nodes/picture/draw.hpp"
-#include "rt/msg/messages.hpp"
+#include "rt/msg/disparity.hpp"
+#include "rt/msg/grid.hpp"
+#include "rt/msg/image.hpp"
+#include "rt/msg/image_view.hpp"
+#include "rt/msg/point_cloud.hpp"
+#include "rt/msg/robot_task.hpp"
 #include "rt/msg/scalar.hpp"
+#include "rt/msg/text_status.hpp"
 
 namespace takt::attach {
 namespace {

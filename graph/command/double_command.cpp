@@ -22,6 +22,7 @@
 #include "hal/laser/lms400/lms400_double.hpp"
 #include "hal/stream/pseudo_terminal.hpp"
 #include "hal/stream/tcp_listener.hpp"
+#include "rt/msg/geometry.hpp"
 #include "rt/time/clock.hpp"
 
 namespace takt::command {

@@ -12,6 +12,9 @@
 #include "nodes/body_pose/evaluate.hpp"
 #include "nodes/body_pose/floor.hpp"
 #include "nodes/body_pose/picture.hpp"
+#include "rt/msg/body_poses.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/point.hpp"
 #include "rt/quantile.hpp"
 #include "rt/time/clock.hpp"
 

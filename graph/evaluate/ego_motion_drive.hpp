@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "nodes/ego_motion/ego_motion.hpp"
+#include "rt/msg/geometry.hpp"
 
 namespace takt::command {
 

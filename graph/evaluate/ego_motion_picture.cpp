@@ -7,6 +7,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "rt/msg/geometry.hpp"
+
 namespace takt::command {
 namespace {
 

@@ -15,6 +15,7 @@
 #include "nodes/ground_map/pavement_scene.hpp"
 #include "nodes/mapping_3d/pose.hpp"
 #include "nodes/picture/draw.hpp"
+#include "rt/msg/geometry.hpp"
 #include "rt/quantile.hpp"
 #include "rt/time/clock.hpp"
 

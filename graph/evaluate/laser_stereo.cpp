@@ -15,6 +15,7 @@
 
 #include "nodes/stereo/matcher.hpp"
 #include "nodes/stereo/triangulate.hpp"
+#include "rt/msg/point.hpp"
 #include "rt/quantile.hpp"
 
 namespace takt::command {

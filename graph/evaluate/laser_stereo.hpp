@@ -6,6 +6,7 @@
 
 #include "nodes/laser_fusion/generated_pair.hpp"
 #include "nodes/stereo/evaluate.hpp"
+#include "rt/msg/geometry.hpp"
 
 namespace takt::command {
 

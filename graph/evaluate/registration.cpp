@@ -21,6 +21,8 @@
 #include "nodes/laser_fusion/fusion.hpp"
 #include "nodes/picture/clouds.hpp"
 #include "nodes/picture/curves.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/point.hpp"
 #include "rt/time/clock.hpp"
 
 namespace takt::command {

@@ -17,6 +17,7 @@
 #include "hal/sim/random.hpp"
 #include "hal/sim/sim_devices.hpp"
 #include "nodes/obstacle_stop/protected_field.hpp"
+#include "rt/msg/geometry.hpp"
 #include "rt/sched/executor.hpp"
 #include "rt/time/units.hpp"
 

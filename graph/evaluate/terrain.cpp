@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "rt/msg/terrain.hpp"
+
 #include <fmt/format.h>
 
 #include <array>

@@ -10,7 +10,17 @@
 #include "graph/log/recorded_plan.hpp"
 #include "graph/view/markup.hpp"
 #include "rt/memory/aligned_bytes.hpp"
-#include "rt/msg/messages.hpp"
+#include "rt/msg/disparity.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/grid.hpp"
+#include "rt/msg/image.hpp"
+#include "rt/msg/laser_scan.hpp"
+#include "rt/msg/motion.hpp"
+#include "rt/msg/odometry.hpp"
+#include "rt/msg/point.hpp"
+#include "rt/msg/point_cloud.hpp"
+#include "rt/msg/pose.hpp"
+#include "rt/msg/text_status.hpp"
 #include "rt/record/mcap/writer.hpp"
 
 namespace takt::log {

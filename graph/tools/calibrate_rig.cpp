@@ -7,6 +7,7 @@
 #include "hal/camera/rig.hpp"
 #include "hal/sim/simulation.hpp"
 #include "nodes/stereo/rectify.hpp"
+#include "rt/msg/geometry.hpp"
 
 namespace takt::command {
 namespace {

@@ -10,6 +10,7 @@
 #include "graph/cli/outcome.hpp"
 #include "hal/settings/json.hpp"
 #include "nodes/cloud/cloud_file.hpp"
+#include "rt/msg/point.hpp"
 #include "rt/time/clock.hpp"
 
 namespace takt::command {

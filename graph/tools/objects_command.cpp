@@ -17,6 +17,7 @@
 #include "nodes/object_detection/scenes.hpp"
 #include "nodes/object_detection/tuning.hpp"
 #include "nodes/picture/curves.hpp"
+#include "rt/msg/detections.hpp"
 
 namespace takt::command {
 namespace {

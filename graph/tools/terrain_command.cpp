@@ -14,6 +14,7 @@
 #include "nodes/ground_map/terrain_drive.hpp"
 #include "nodes/ground_map/terrain_file.hpp"
 #include "rt/memory/aligned_bytes.hpp"
+#include "rt/msg/grid.hpp"
 #include "rt/record/log_file.hpp"
 #include "rt/record/packed_message.hpp"
 

@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "graph/view/layout_steps.hpp"
+#include "rt/msg/requests.hpp"
 
 namespace takt::view {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <cstdlib>
 
-#include "rt/msg/messages.hpp"
+#include "rt/msg/image.hpp"
 
 namespace takt {
 

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "hal/device.hpp"
-#include "rt/msg/messages.hpp"
+#include "rt/msg/geometry.hpp"
 
 namespace takt {
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include "hal/device.hpp"
+#include "rt/msg/geometry.hpp"
 #include "rt/msg/image_view.hpp"
-#include "rt/msg/messages.hpp"
 
 namespace takt {
 

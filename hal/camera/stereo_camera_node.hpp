@@ -6,6 +6,7 @@
 #include "hal/camera/health.hpp"
 #include "hal/camera/stereo_camera.hpp"
 #include "hal/device_node.hpp"
+#include "rt/msg/image.hpp"
 #include "rt/time/rate.hpp"
 
 namespace takt {

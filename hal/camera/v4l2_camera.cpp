@@ -10,6 +10,8 @@
 #include <cmath>
 #include <cstring>
 
+#include "rt/msg/image.hpp"
+
 namespace takt::v4l2 {
 namespace {
 

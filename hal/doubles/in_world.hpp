@@ -9,6 +9,7 @@
 #include "hal/head/head_double.hpp"
 #include "hal/laser/range_source.hpp"
 #include "hal/sim/simulation.hpp"
+#include "rt/msg/geometry.hpp"
 
 namespace takt::doubles {
 

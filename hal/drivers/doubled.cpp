@@ -9,6 +9,7 @@
 #include "hal/laser/lms400/lms400_double.hpp"
 #include "hal/stream/pseudo_terminal.hpp"
 #include "hal/stream/tcp_listener.hpp"
+#include "rt/msg/geometry.hpp"
 
 namespace takt::hal {
 namespace {

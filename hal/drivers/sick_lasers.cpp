@@ -10,6 +10,7 @@
 #include "hal/laser/stream_laser.hpp"
 #include "hal/stream/serial_port.hpp"
 #include "hal/stream/tcp_connection.hpp"
+#include "rt/msg/geometry.hpp"
 
 namespace takt::hal {
 namespace {

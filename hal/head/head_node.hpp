@@ -4,6 +4,8 @@
 
 #include "hal/device_node.hpp"
 #include "hal/head/camera_head.hpp"
+#include "rt/msg/digital_state.hpp"
+#include "rt/msg/head.hpp"
 
 namespace takt {
 

@@ -4,6 +4,8 @@
 
 #include "hal/device_node.hpp"
 #include "hal/interaction/interaction.hpp"
+#include "rt/msg/robot_task.hpp"
+#include "rt/msg/text_status.hpp"
 
 namespace takt {
 

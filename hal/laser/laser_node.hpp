@@ -5,6 +5,7 @@
 
 #include "hal/device_node.hpp"
 #include "hal/laser/laser_scanner.hpp"
+#include "rt/msg/laser_scan.hpp"
 
 namespace takt {
 

@@ -3,7 +3,7 @@
 #include <span>
 
 #include "hal/device.hpp"
-#include "rt/msg/messages.hpp"
+#include "rt/msg/geometry.hpp"
 
 namespace takt {
 

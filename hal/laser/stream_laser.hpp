@@ -8,6 +8,7 @@
 #include "hal/laser/laser_session.hpp"
 #include "hal/newest.hpp"
 #include "hal/stream/byte_stream.hpp"
+#include "rt/msg/geometry.hpp"
 #include "rt/time/clock.hpp"
 
 namespace takt {

@@ -6,6 +6,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "rt/msg/image.hpp"
+
 namespace takt::replay {
 namespace {
 

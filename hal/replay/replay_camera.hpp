@@ -4,6 +4,7 @@
 
 #include "hal/camera/stereo_camera.hpp"
 #include "hal/replay/stereo_files.hpp"
+#include "rt/msg/geometry.hpp"
 #include "rt/time/clock.hpp"
 #include "rt/time/rate.hpp"
 

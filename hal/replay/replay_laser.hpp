@@ -5,6 +5,7 @@
 
 #include "hal/laser/laser_scanner.hpp"
 #include "hal/replay/log_pace.hpp"
+#include "rt/msg/geometry.hpp"
 
 namespace takt::replay {
 

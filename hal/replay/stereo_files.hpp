@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "hal/device.hpp"
-#include "rt/msg/messages.hpp"
+#include "rt/msg/geometry.hpp"
 
 namespace takt::replay {
 

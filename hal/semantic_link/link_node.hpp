@@ -4,6 +4,7 @@
 
 #include "hal/device_node.hpp"
 #include "hal/semantic_link/link_device.hpp"
+#include "rt/msg/text_status.hpp"
 
 namespace takt::semantic_link {
 

@@ -11,7 +11,7 @@
 
 #include "hal/semantic_link/packet.hpp"
 #include "rt/memory/aligned_bytes.hpp"
-#include "rt/msg/messages.hpp"
+#include "rt/msg/field.hpp"
 
 namespace takt::semantic_link {
 

@@ -7,7 +7,7 @@
 #include "hal/device.hpp"
 #include "hal/settings/json.hpp"
 #include "hal/settings/units.hpp"
-#include "rt/msg/messages.hpp"
+#include "rt/msg/geometry.hpp"
 
 namespace takt {
 

@@ -7,6 +7,7 @@
 #include "hal/base/mobile_base.hpp"
 #include "hal/laser/laser_scanner.hpp"
 #include "hal/sim/simulation.hpp"
+#include "rt/msg/geometry.hpp"
 
 namespace takt::sim {
 

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "hal/sim/random.hpp"
+#include "rt/msg/geometry.hpp"
 
 namespace takt::sim {
 namespace {

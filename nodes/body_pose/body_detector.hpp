@@ -6,6 +6,9 @@
 
 #include "nodes/body_pose/fitter.hpp"
 #include "nodes/body_pose/segmentation.hpp"
+#include "rt/msg/body_poses.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/point.hpp"
 
 namespace takt::body_pose {
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "rt/msg/point.hpp"
 #include "rt/time/clock.hpp"
 
 namespace takt::body_pose {

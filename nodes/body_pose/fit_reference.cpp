@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "nodes/body_pose/fit_rules.hpp"
+#include "rt/msg/point.hpp"
 
 namespace takt::body_pose {
 namespace {

@@ -8,6 +8,7 @@
 #include <span>
 
 #include "nodes/body_pose/skeleton.hpp"
+#include "rt/msg/point.hpp"
 
 namespace takt::body_pose {
 

@@ -5,7 +5,8 @@
 #include <span>
 
 #include "nodes/mapping_3d/pose.hpp"
-#include "rt/msg/messages.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/point.hpp"
 
 namespace takt::body_pose {
 

@@ -6,7 +6,8 @@
 #include <vector>
 
 #include "nodes/body_pose/skeleton.hpp"
-#include "rt/msg/messages.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/point.hpp"
 
 namespace takt::body_pose {
 

@@ -4,6 +4,8 @@
 #include <span>
 
 #include "nodes/body_pose/body_detector.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/point.hpp"
 
 namespace takt::body_pose {
 

@@ -9,7 +9,7 @@
 #include "nodes/cloud/cell_sort.hpp"
 #include "nodes/cloud/outlier_filter.hpp"
 #include "nodes/cloud/voxel_grid.hpp"
-#include "rt/msg/messages.hpp"
+#include "rt/msg/point.hpp"
 
 namespace takt::body_pose {
 

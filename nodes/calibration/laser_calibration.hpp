@@ -9,6 +9,7 @@
 #include "nodes/calibration/room_patches.hpp"
 #include "nodes/laser_fusion/genetic_icp.hpp"
 #include "nodes/laser_fusion/nearest_table.hpp"
+#include "rt/msg/point.hpp"
 
 namespace takt::calibration {
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "nodes/laser_fusion/pose_parameters.hpp"
-#include "rt/msg/messages.hpp"
+#include "rt/msg/point.hpp"
 
 namespace takt::calibration {
 

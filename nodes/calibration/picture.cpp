@@ -6,6 +6,7 @@
 
 #include "nodes/laser_fusion/fusion.hpp"
 #include "nodes/picture/clouds.hpp"
+#include "rt/msg/point.hpp"
 
 namespace takt::calibration {
 namespace {

@@ -7,6 +7,7 @@
 #include "nodes/calibration/laser_sweep.hpp"
 #include "nodes/cloud/voxel_grid.hpp"
 #include "nodes/laser_fusion/rigid_fit.hpp"
+#include "rt/msg/point.hpp"
 
 namespace takt::calibration {
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "nodes/cloud/cloud.hpp"
+#include "rt/msg/point.hpp"
 
 namespace takt::cloud {
 

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "rt/msg/messages.hpp"
+#include "rt/msg/point.hpp"
 
 namespace takt::cloud {
 

@@ -10,6 +10,8 @@
 #include <iterator>
 #include <system_error>
 
+#include "rt/msg/point.hpp"
+
 namespace takt::cloud {
 namespace {
 

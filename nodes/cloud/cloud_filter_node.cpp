@@ -5,6 +5,9 @@
 #include <string>
 
 #include "nodes/cloud/cloud_filter.hpp"
+#include "rt/msg/point.hpp"
+#include "rt/msg/point_cloud.hpp"
+#include "rt/msg/text_status.hpp"
 #include "rt/node.hpp"
 
 namespace takt {

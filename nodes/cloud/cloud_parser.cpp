@@ -12,6 +12,7 @@
 #include <optional>
 
 #include "nodes/cloud/cloud_file.hpp"
+#include "rt/msg/point.hpp"
 
 namespace takt::cloud {
 namespace {

@@ -4,6 +4,7 @@
 #include <span>
 
 #include "nodes/cloud/cell_sort.hpp"
+#include "rt/msg/point.hpp"
 
 namespace takt::cloud {
 

@@ -8,6 +8,7 @@
 
 #include "nodes/cloud/cell_sort.hpp"
 #include "nodes/cloud/count_kernel.hpp"
+#include "rt/msg/point.hpp"
 
 namespace takt::cloud {
 

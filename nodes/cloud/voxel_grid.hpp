@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "nodes/cloud/cell_sort.hpp"
+#include "rt/msg/point.hpp"
 
 namespace takt::cloud {
 

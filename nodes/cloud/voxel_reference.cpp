@@ -6,6 +6,8 @@
 #include <unordered_map>  // replay: tests and benchmarks call this file, no node does
 #include <unordered_set>  // replay: likewise
 
+#include "rt/msg/point.hpp"
+
 namespace takt::cloud {
 namespace {
 

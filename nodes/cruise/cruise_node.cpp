@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 
+#include "rt/msg/velocity_command.hpp"
 #include "rt/node.hpp"
 
 namespace takt {

@@ -15,6 +15,7 @@
 #include "nodes/ego_motion/plane.hpp"
 #include "nodes/ego_motion/refine.hpp"
 #include "nodes/ego_motion/rigid.hpp"
+#include "rt/msg/geometry.hpp"
 
 namespace takt::ego_motion {
 

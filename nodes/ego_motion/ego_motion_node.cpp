@@ -7,6 +7,12 @@
 
 #include "nodes/ego_motion/ego_motion.hpp"
 #include "nodes/mapping_3d/pose.hpp"
+#include "rt/msg/disparity.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/image.hpp"
+#include "rt/msg/motion.hpp"
+#include "rt/msg/odometry.hpp"
+#include "rt/msg/pose.hpp"
 #include "rt/node.hpp"
 #include "rt/transform/transform_buffer.hpp"
 

@@ -3,7 +3,7 @@
 #pragma once
 #include <Eigen/Dense>
 
-#include "rt/msg/messages.hpp"
+#include "rt/msg/geometry.hpp"
 
 namespace takt::ego_motion {
 

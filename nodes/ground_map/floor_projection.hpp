@@ -5,7 +5,7 @@
 #include <array>
 #include <optional>
 
-#include "rt/msg/messages.hpp"
+#include "rt/msg/geometry.hpp"
 #include "rt/transform/planar_pose.hpp"
 
 namespace takt::ground_map {

@@ -8,8 +8,8 @@
 
 #include "nodes/ground_map/confidence.hpp"
 #include "nodes/ground_map/floor_projection.hpp"
+#include "rt/msg/grid.hpp"
 #include "rt/msg/image_view.hpp"
-#include "rt/msg/messages.hpp"
 
 namespace takt::ground_map {
 

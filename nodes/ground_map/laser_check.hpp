@@ -4,7 +4,7 @@
 #pragma once
 #include "nodes/ground_map/floor_projection.hpp"
 #include "nodes/ground_map/texture.hpp"
-#include "rt/msg/messages.hpp"
+#include "rt/msg/laser_scan.hpp"
 
 namespace takt::ground_map {
 

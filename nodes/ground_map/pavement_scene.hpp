@@ -8,7 +8,8 @@
 
 #include "nodes/ground_map/evaluate.hpp"
 #include "nodes/ground_map/floor_projection.hpp"
-#include "rt/msg/messages.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/image_view.hpp"
 
 namespace takt::ground_map {
 

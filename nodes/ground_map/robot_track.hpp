@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "rt/msg/geometry.hpp"
 #include "rt/transform/transform_buffer.hpp"
 
 namespace takt::ground_map {

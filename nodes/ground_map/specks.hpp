@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "nodes/ground_map/ground_grid.hpp"
+#include "rt/msg/laser_scan.hpp"
 #include "rt/transform/planar_pose.hpp"
 
 namespace takt::ground_map {

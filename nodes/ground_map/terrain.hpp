@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "nodes/ground_map/ground_grid.hpp"
+#include "rt/msg/terrain.hpp"
 
 namespace takt::ground_map {
 

@@ -6,6 +6,7 @@
 
 #include "nodes/mapping_3d/head_at.hpp"
 #include "nodes/mapping_3d/pose.hpp"
+#include "rt/msg/geometry.hpp"
 
 namespace takt::head_behaviour {
 

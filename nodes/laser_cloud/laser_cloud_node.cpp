@@ -2,6 +2,9 @@
 #include <optional>
 
 #include "nodes/laser_cloud/sweep_points.hpp"
+#include "rt/msg/laser_scan.hpp"
+#include "rt/msg/odometry.hpp"
+#include "rt/msg/point_cloud.hpp"
 #include "rt/node.hpp"
 #include "rt/transform/transform_buffer.hpp"
 

@@ -3,6 +3,8 @@
 #include <cmath>
 
 #include "nodes/mapping_3d/pose.hpp"
+#include "rt/msg/laser_scan.hpp"
+#include "rt/msg/point.hpp"
 
 namespace takt::laser_cloud {
 

@@ -4,6 +4,8 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 
+#include "rt/msg/point.hpp"
+
 namespace takt::laser_fusion {
 namespace {
 

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "nodes/laser_fusion/generated_room.hpp"
+#include "rt/msg/point.hpp"
 
 namespace takt::laser_fusion {
 namespace {

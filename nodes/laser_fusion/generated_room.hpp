@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "nodes/laser_fusion/pose_parameters.hpp"
+#include "rt/msg/point.hpp"
 
 namespace takt::laser_fusion {
 

@@ -7,6 +7,7 @@
 #include "nodes/laser_fusion/genetic_icp.hpp"
 #include "nodes/laser_fusion/matcher.hpp"
 #include "nodes/laser_fusion/thinning.hpp"
+#include "rt/msg/point.hpp"
 
 namespace takt::laser_fusion {
 

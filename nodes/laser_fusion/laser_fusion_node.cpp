@@ -5,6 +5,9 @@
 #include <string>
 
 #include "nodes/laser_fusion/laser_fusion.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/point_cloud.hpp"
+#include "rt/msg/pose.hpp"
 #include "rt/node.hpp"
 
 namespace takt {

@@ -7,6 +7,7 @@
 
 #include "nodes/laser_fusion/nearest_table.hpp"
 #include "nodes/laser_fusion/pose_judge.hpp"
+#include "rt/msg/point.hpp"
 
 namespace takt::laser_fusion {
 

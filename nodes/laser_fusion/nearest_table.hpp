@@ -9,6 +9,7 @@
 
 #include "nodes/cloud/cloud.hpp"
 #include "nodes/cloud/count_kernel.hpp"
+#include "rt/msg/point.hpp"
 
 namespace takt::laser_fusion {
 

@@ -4,6 +4,7 @@
 #include <span>
 
 #include "nodes/cloud/voxel_grid.hpp"
+#include "rt/msg/point.hpp"
 
 namespace takt::laser_fusion {
 

@@ -9,6 +9,7 @@
 #include <memory>
 
 #include "nodes/load/burn.hpp"
+#include "rt/msg/text_status.hpp"
 #include "rt/node.hpp"
 
 namespace takt {

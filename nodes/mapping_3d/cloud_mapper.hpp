@@ -10,6 +10,8 @@
 
 #include "nodes/mapping_3d/median_fusion.hpp"
 #include "nodes/mapping_3d/tile_map.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/point.hpp"
 
 namespace takt::mapping_3d {
 

@@ -6,7 +6,8 @@
 #include <vector>
 
 #include "nodes/mapping_3d/pose.hpp"
-#include "rt/msg/messages.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/point.hpp"
 
 namespace takt::mapping_3d {
 

@@ -4,6 +4,8 @@
 
 #include "nodes/mapping_3d/evaluate.hpp"
 #include "nodes/mapping_3d/recorded_views.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/point.hpp"
 #include "rt/quantile.hpp"
 #include "rt/time/clock.hpp"
 

@@ -8,6 +8,8 @@
 #include <set>
 
 #include "nodes/mapping_3d/evaluate.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/point.hpp"
 #include "rt/quantile.hpp"
 #include "rt/time/clock.hpp"
 #include "rt/transform/pose_math.hpp"

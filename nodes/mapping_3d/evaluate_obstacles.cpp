@@ -5,6 +5,7 @@
 #include "nodes/cloud/outlier_filter.hpp"
 #include "nodes/mapping_3d/evaluate.hpp"
 #include "nodes/mapping_3d/obstacle_grid.hpp"
+#include "rt/msg/point.hpp"
 
 namespace takt::mapping_3d {
 namespace {

@@ -8,6 +8,8 @@
 #include "nodes/body_pose/ray_casting.hpp"
 #include "nodes/cloud/cloud.hpp"
 #include "nodes/mapping_3d/pose.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/point.hpp"
 
 namespace takt::mapping_3d {
 

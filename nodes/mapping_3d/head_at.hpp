@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 
+#include "rt/msg/head.hpp"
 #include "rt/node.hpp"
 
 namespace takt::mapping_3d {

@@ -5,6 +5,8 @@
 
 #include "nodes/mapping_3d/obstacle_grid.hpp"
 #include "nodes/mapping_3d/tile_map.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/grid.hpp"
 #include "rt/transform/planar_pose.hpp"
 
 namespace takt::mapping_3d {

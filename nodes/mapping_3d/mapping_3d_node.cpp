@@ -16,6 +16,13 @@
 #include "nodes/mapping_3d/map_grid.hpp"
 #include "nodes/mapping_3d/obstacle_grid.hpp"
 #include "nodes/mapping_3d/pose.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/grid.hpp"
+#include "rt/msg/motion.hpp"
+#include "rt/msg/odometry.hpp"
+#include "rt/msg/point.hpp"
+#include "rt/msg/point_cloud.hpp"
+#include "rt/msg/pose.hpp"
 #include "rt/node.hpp"
 #include "rt/transform/transform_buffer.hpp"
 

@@ -9,6 +9,7 @@
 
 #include "nodes/cloud/cloud.hpp"
 #include "nodes/mapping_3d/depth_view.hpp"
+#include "rt/msg/point.hpp"
 
 namespace takt::mapping_3d {
 

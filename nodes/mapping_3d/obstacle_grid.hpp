@@ -8,7 +8,10 @@
 #include <vector>
 
 #include "nodes/mapping_3d/pose.hpp"
-#include "rt/msg/messages.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/grid.hpp"
+#include "rt/msg/image_view.hpp"
+#include "rt/msg/point.hpp"
 
 namespace takt::mapping_3d {
 

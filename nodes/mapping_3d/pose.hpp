@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Where a camera sits on the robot, and poses as matrices for loops over points.
 #pragma once
-#include "rt/msg/messages.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/odometry.hpp"
 
 namespace takt::mapping_3d {
 

@@ -7,6 +7,7 @@
 
 #include "nodes/mapping_3d/depth_view.hpp"
 #include "nodes/mapping_3d/generated_world.hpp"
+#include "rt/msg/geometry.hpp"
 
 namespace takt::mapping_3d {
 

@@ -10,6 +10,8 @@
 
 #include "nodes/cloud/voxel_grid.hpp"
 #include "nodes/mapping_3d/depth_view.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/point.hpp"
 
 namespace takt::mapping_3d {
 

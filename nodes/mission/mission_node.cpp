@@ -9,6 +9,17 @@
 #include "nodes/mission/pointing.hpp"
 #include "nodes/semantic/reports.hpp"
 #include "nodes/semantic/script.hpp"
+#include "rt/msg/body_poses.hpp"
+#include "rt/msg/digital_state.hpp"
+#include "rt/msg/grid.hpp"
+#include "rt/msg/object_reports.hpp"
+#include "rt/msg/odometry.hpp"
+#include "rt/msg/point.hpp"
+#include "rt/msg/point_cloud.hpp"
+#include "rt/msg/pose.hpp"
+#include "rt/msg/requests.hpp"
+#include "rt/msg/robot_task.hpp"
+#include "rt/msg/text_status.hpp"
 #include "rt/node.hpp"
 
 namespace takt {

@@ -4,7 +4,7 @@
 #include <optional>
 #include <span>
 
-#include "rt/msg/messages.hpp"
+#include "rt/msg/body_poses.hpp"
 
 namespace takt::mission {
 

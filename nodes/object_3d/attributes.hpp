@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "nodes/object_3d/outline.hpp"
-#include "rt/msg/messages.hpp"
+#include "rt/msg/point.hpp"
 
 namespace takt::object_3d {
 

@@ -9,6 +9,7 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "rt/msg/point.hpp"
 #include "rt/quantile.hpp"
 #include "rt/time/clock.hpp"
 

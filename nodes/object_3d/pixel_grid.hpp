@@ -5,7 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "rt/msg/messages.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/point.hpp"
 
 namespace takt::object_3d {
 

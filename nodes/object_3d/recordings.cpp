@@ -8,6 +8,8 @@
 #include <stdexcept>
 
 #include "nodes/object_3d/evaluate.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/point.hpp"
 #include "rt/time/clock.hpp"
 
 namespace takt::object_3d {

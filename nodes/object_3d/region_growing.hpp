@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "nodes/cloud/cell_sort.hpp"
+#include "rt/msg/point.hpp"
 
 namespace takt::object_3d {
 

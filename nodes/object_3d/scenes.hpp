@@ -6,6 +6,8 @@
 #include <vector>
 
 #include "nodes/object_3d/finder.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/point.hpp"
 
 namespace takt::object_3d {
 

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "nodes/object_3d/region_growing.hpp"
+#include "rt/msg/point.hpp"
 
 namespace takt::object_3d {
 

@@ -4,7 +4,7 @@
 #include <optional>
 #include <span>
 
-#include "rt/msg/messages.hpp"
+#include "rt/msg/point.hpp"
 
 namespace takt::object_3d {
 

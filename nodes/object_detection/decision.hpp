@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "nodes/object_detection/grid.hpp"
+#include "rt/msg/detections.hpp"
 #include "rt/msg/image_view.hpp"
-#include "rt/msg/messages.hpp"
 
 namespace takt::object_detection {
 

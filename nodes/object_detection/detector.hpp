@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "nodes/object_detection/scale_search.hpp"
+#include "rt/msg/detections.hpp"
 
 namespace takt::object_detection {
 

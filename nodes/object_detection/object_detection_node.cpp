@@ -8,6 +8,8 @@
 
 #include "nodes/object_detection/reloader.hpp"
 #include "nodes/object_detection/revisions.hpp"
+#include "rt/msg/detections.hpp"
+#include "rt/msg/image.hpp"
 #include "rt/node.hpp"
 
 namespace takt {

@@ -12,6 +12,7 @@
 #include "nodes/object_detection/orientation_stage.hpp"
 #include "nodes/object_detection/references.hpp"
 #include "nodes/object_detection/shrink.hpp"
+#include "rt/msg/detections.hpp"
 
 namespace takt::object_detection {
 

@@ -6,7 +6,7 @@
 #include <span>
 
 #include "nodes/object_detection/scenes.hpp"
-#include "rt/msg/messages.hpp"
+#include "rt/msg/detections.hpp"
 
 namespace takt::object_detection {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <span>
 
-#include "rt/msg/messages.hpp"
+#include "rt/msg/geometry.hpp"
 
 namespace takt::obstacle_stop {
 

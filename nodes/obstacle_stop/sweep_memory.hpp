@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "nodes/obstacle_stop/sweep.hpp"
+#include "rt/msg/geometry.hpp"
 #include "rt/transform/planar_pose.hpp"
 
 namespace takt::obstacle_stop {

@@ -6,6 +6,7 @@
 
 #include "nodes/person_tracking/follower.hpp"
 #include "nodes/stereo/matcher.hpp"
+#include "rt/msg/velocity_command.hpp"
 #include "rt/time/clock.hpp"
 #include "rt/time/units.hpp"
 

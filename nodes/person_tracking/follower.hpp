@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "rt/msg/messages.hpp"
+#include "rt/msg/velocity_command.hpp"
 
 namespace takt::person_tracking {
 

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "nodes/person_tracking/follower.hpp"
+#include "rt/msg/velocity_command.hpp"
 
 namespace takt::person_tracking {
 namespace {

@@ -10,6 +10,8 @@
 
 #include "nodes/body_pose/ray_casting.hpp"
 #include "nodes/person_tracking/shirt_place.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/odometry.hpp"
 
 namespace takt::person_tracking {
 

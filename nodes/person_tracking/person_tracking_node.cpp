@@ -9,6 +9,15 @@
 #include "nodes/mapping_3d/head_at.hpp"
 #include "nodes/person_tracking/follower.hpp"
 #include "nodes/person_tracking/person_tracking.hpp"
+#include "rt/msg/body_poses.hpp"
+#include "rt/msg/detections.hpp"
+#include "rt/msg/disparity.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/head.hpp"
+#include "rt/msg/image.hpp"
+#include "rt/msg/odometry.hpp"
+#include "rt/msg/pose.hpp"
+#include "rt/msg/velocity_command.hpp"
 #include "rt/node.hpp"
 
 namespace takt {

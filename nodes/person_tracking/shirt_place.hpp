@@ -7,6 +7,7 @@
 
 #include "nodes/mapping_3d/pose.hpp"
 #include "nodes/person_tracking/shirt_search.hpp"
+#include "rt/msg/geometry.hpp"
 
 namespace takt::person_tracking {
 

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "rt/msg/point.hpp"
+
 namespace takt::picture {
 namespace {
 

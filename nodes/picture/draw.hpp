@@ -4,8 +4,9 @@
 #include <cstdint>
 #include <span>
 
+#include "rt/msg/detections.hpp"
 #include "rt/msg/image_view.hpp"
-#include "rt/msg/messages.hpp"
+#include "rt/msg/point.hpp"
 
 namespace takt::picture {
 

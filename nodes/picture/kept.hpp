@@ -9,7 +9,10 @@
 
 #include "nodes/cloud/cloud.hpp"
 #include "nodes/picture/draw.hpp"
+#include "rt/msg/detections.hpp"
 #include "rt/msg/image_view.hpp"
+#include "rt/msg/point.hpp"
+#include "rt/msg/point_cloud.hpp"
 #include "rt/node.hpp"
 
 namespace takt::picture {

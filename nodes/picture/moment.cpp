@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "nodes/semantic/reports.hpp"
+#include "rt/msg/grid.hpp"
 
 namespace takt::picture {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <numbers>
 
-#include "rt/msg/messages.hpp"
+#include "rt/msg/action.hpp"
 
 namespace takt::robot_client {
 namespace {

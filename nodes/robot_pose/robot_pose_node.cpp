@@ -5,6 +5,9 @@
 
 #include "nodes/mapping_3d/pose.hpp"
 #include "nodes/robot_pose/pose_filter.hpp"
+#include "rt/msg/motion.hpp"
+#include "rt/msg/odometry.hpp"
+#include "rt/msg/pose.hpp"
 #include "rt/node.hpp"
 
 namespace takt {

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/odometry.hpp"
 #include "rt/transform/planar_pose.hpp"
 #include "rt/transform/pose_math.hpp"
 

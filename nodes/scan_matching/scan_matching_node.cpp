@@ -7,6 +7,10 @@
 #include "nodes/scan_matching/loop_closer.hpp"
 #include "nodes/scan_matching/occupancy_map.hpp"
 #include "nodes/scan_matching/scan_matcher.hpp"
+#include "rt/msg/grid.hpp"
+#include "rt/msg/laser_scan.hpp"
+#include "rt/msg/odometry.hpp"
+#include "rt/msg/pose.hpp"
 #include "rt/node.hpp"
 #include "rt/transform/transform_buffer.hpp"
 

@@ -5,6 +5,8 @@
 #include <vector>
 
 #include "nodes/mapping_3d/pose.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/image_view.hpp"
 
 namespace takt::semantic {
 

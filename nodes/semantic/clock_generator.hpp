@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "nodes/semantic/needs.hpp"
+#include "rt/msg/requests.hpp"
 
 namespace takt::semantic {
 

@@ -11,6 +11,13 @@
 #include "nodes/semantic/network_file.hpp"
 #include "nodes/semantic/reports.hpp"
 #include "nodes/semantic/script.hpp"
+#include "rt/msg/grid.hpp"
+#include "rt/msg/head.hpp"
+#include "rt/msg/object_reports.hpp"
+#include "rt/msg/objects_3d.hpp"
+#include "rt/msg/odometry.hpp"
+#include "rt/msg/terrain.hpp"
+#include "rt/msg/text_status.hpp"
 #include "rt/node.hpp"
 #include "rt/transform/transform_buffer.hpp"
 

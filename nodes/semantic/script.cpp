@@ -6,8 +6,6 @@
 #include <cmath>
 #include <optional>
 
-#include "rt/msg/messages.hpp"
-
 namespace takt::semantic {
 namespace {
 

@@ -9,7 +9,7 @@
 #include <tl/expected.hpp>
 #include <vector>
 
-#include "rt/msg/messages.hpp"
+#include "rt/msg/requests.hpp"
 
 namespace takt::semantic {
 

@@ -5,6 +5,16 @@
 #include "nodes/semantic/clock_generator.hpp"
 #include "nodes/semantic/reports.hpp"
 #include "nodes/semantic/status_line.hpp"
+#include "rt/msg/body_poses.hpp"
+#include "rt/msg/detections.hpp"
+#include "rt/msg/digital_state.hpp"
+#include "rt/msg/grid.hpp"
+#include "rt/msg/object_reports.hpp"
+#include "rt/msg/odometry.hpp"
+#include "rt/msg/requests.hpp"
+#include "rt/msg/stop_command.hpp"
+#include "rt/msg/terrain.hpp"
+#include "rt/msg/text_status.hpp"
 #include "rt/node.hpp"
 
 namespace takt {

@@ -5,6 +5,8 @@
 #include <charconv>
 #include <cmath>
 
+#include "rt/msg/stop_command.hpp"
+
 namespace takt::semantic {
 namespace {
 

@@ -5,7 +5,8 @@
 #include <span>
 #include <string_view>
 
-#include "rt/msg/messages.hpp"
+#include "rt/msg/grid.hpp"
+#include "rt/msg/requests.hpp"
 
 namespace takt::semantic {
 

@@ -8,7 +8,8 @@
 
 #include "nodes/stereo/debayer.hpp"
 #include "nodes/stereo/remap.hpp"
-#include "rt/msg/messages.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/image_view.hpp"
 
 namespace takt::stereo {
 

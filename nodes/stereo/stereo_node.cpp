@@ -14,6 +14,10 @@
 #include "nodes/stereo/rectification_monitor.hpp"
 #include "nodes/stereo/rectify.hpp"
 #include "nodes/stereo/triangulate.hpp"
+#include "rt/msg/disparity.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/image.hpp"
+#include "rt/msg/point_cloud.hpp"
 #include "rt/node.hpp"
 #include "rt/transform/pose_math.hpp"
 

@@ -5,7 +5,9 @@
 #include <span>
 
 #include "nodes/stereo/matcher.hpp"
-#include "rt/msg/messages.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/image_view.hpp"
+#include "rt/msg/point.hpp"
 
 namespace takt::stereo {
 

@@ -6,7 +6,8 @@
 #include <vector>
 
 #include "nodes/traffic_signs/colour_regions.hpp"
-#include "rt/msg/messages.hpp"
+#include "rt/msg/image_view.hpp"
+#include "rt/msg/point.hpp"
 
 namespace takt::traffic_signs {
 

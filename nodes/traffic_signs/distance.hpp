@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "nodes/traffic_signs/sign_list.hpp"
-#include "rt/msg/messages.hpp"
+#include "rt/msg/disparity.hpp"
 
 namespace takt::traffic_signs {
 

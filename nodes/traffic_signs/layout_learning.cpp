@@ -4,6 +4,8 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
+#include "rt/msg/point.hpp"
+
 namespace takt::traffic_signs {
 namespace {
 

@@ -6,6 +6,13 @@
 
 #include "nodes/traffic_signs/distance.hpp"
 #include "nodes/traffic_signs/tracks.hpp"
+#include "rt/msg/detections.hpp"
+#include "rt/msg/digital_state.hpp"
+#include "rt/msg/disparity.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/image.hpp"
+#include "rt/msg/point.hpp"
+#include "rt/msg/point_cloud.hpp"
 #include "rt/node.hpp"
 
 namespace takt {

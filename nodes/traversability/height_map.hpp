@@ -7,7 +7,8 @@
 
 #include "nodes/mapping_3d/pose.hpp"
 #include "nodes/mapping_3d/sliding_grid.hpp"
-#include "rt/msg/messages.hpp"
+#include "rt/msg/grid.hpp"
+#include "rt/msg/image_view.hpp"
 
 namespace takt::traversability {
 

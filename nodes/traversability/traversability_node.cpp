@@ -6,6 +6,9 @@
 
 #include "nodes/mapping_3d/map_grid.hpp"
 #include "nodes/traversability/height_map.hpp"
+#include "rt/msg/grid.hpp"
+#include "rt/msg/laser_scan.hpp"
+#include "rt/msg/odometry.hpp"
 #include "rt/node.hpp"
 #include "rt/transform/transform_buffer.hpp"
 

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "rt/hot.hpp"
+#include "rt/msg/requests.hpp"
 #include "rt/sched/param_mail.hpp"
 #include "rt/sched/port_access.hpp"
 #include "rt/sched/watch_rules.hpp"

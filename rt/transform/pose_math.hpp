@@ -8,7 +8,7 @@
 #pragma once
 #include <array>
 
-#include "rt/msg/messages.hpp"
+#include "rt/msg/geometry.hpp"
 
 namespace takt {
 

@@ -16,6 +16,8 @@
 #include "hal/interaction/interaction.hpp"
 #include "hal/laser/laser_scanner.hpp"
 #include "hal/object_sensor/object_sensor.hpp"
+#include "rt/msg/action.hpp"
+#include "rt/msg/object_reports.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 
 namespace takt::test {

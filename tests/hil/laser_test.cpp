@@ -5,6 +5,7 @@
 #include "hal/laser/lms200/session.hpp"
 #include "hal/laser/stream_laser.hpp"
 #include "hal/stream/serial_port.hpp"
+#include "rt/msg/geometry.hpp"
 #include "tests/conformance/devices.hpp"
 #include "tests/hil/guest.hpp"
 

@@ -4,6 +4,7 @@
 // doubled and each late by a time of its own.
 #include <optional>
 
+#include "rt/msg/velocity_command.hpp"
 #include "tests/conformance/private_bus.hpp"
 #include "tests/conformance/semantic_link/feeds.hpp"
 

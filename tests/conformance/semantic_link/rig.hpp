@@ -15,6 +15,8 @@
 #include "hal/semantic_link/server.hpp"
 #include "hal/semantic_link/service_node.hpp"
 #include "hal/semantic_link/udp_port.hpp"
+#include "rt/msg/text_status.hpp"
+#include "rt/msg/velocity_command.hpp"
 #include "rt/sched/port_access.hpp"
 #include "tests/conformance/link_messages.hpp"
 #include "tests/conformance/link_network.hpp"

@@ -8,6 +8,7 @@
 #include "nodes/body_pose/fitter.hpp"
 #include "nodes/body_pose/generated_scene.hpp"
 #include "nodes/body_pose/segmentation.hpp"
+#include "rt/msg/point.hpp"
 #include "tests/property_scale.hpp"
 
 using namespace takt;

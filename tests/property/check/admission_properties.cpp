@@ -9,6 +9,7 @@
 #include <random>
 
 #include "graph/check/check.hpp"
+#include "rt/msg/odometry.hpp"
 #include "rt/sched/executor.hpp"
 #include "rt/sched/port_access.hpp"
 #include "rt/shm/local_transport.hpp"

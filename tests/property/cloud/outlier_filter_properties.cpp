@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "nodes/cloud/outlier_filter.hpp"
+#include "rt/msg/point.hpp"
 #include "tests/property_scale.hpp"
 
 using namespace takt::cloud;

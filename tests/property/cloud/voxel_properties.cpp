@@ -13,6 +13,7 @@
 
 #include "nodes/cloud/cloud_filter.hpp"
 #include "nodes/cloud/voxel_reference.hpp"
+#include "rt/msg/point.hpp"
 #include "tests/property_scale.hpp"
 
 using namespace takt::cloud;

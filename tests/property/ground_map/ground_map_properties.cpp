@@ -15,6 +15,7 @@
 #include "nodes/ground_map/saturation_value.hpp"
 #include "nodes/ground_map/texture.hpp"
 #include "nodes/mapping_3d/pose.hpp"
+#include "rt/msg/geometry.hpp"
 #include "tests/on_each_target.hpp"
 #include "tests/property_scale.hpp"
 

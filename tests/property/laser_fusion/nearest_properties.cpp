@@ -7,6 +7,7 @@
 
 #include "nodes/laser_fusion/generated_pair.hpp"
 #include "nodes/laser_fusion/matcher.hpp"
+#include "rt/msg/point.hpp"
 #include "tests/property_scale.hpp"
 
 using namespace takt;

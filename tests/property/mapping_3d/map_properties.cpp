@@ -10,6 +10,8 @@
 #include "nodes/mapping_3d/generated_world.hpp"
 #include "nodes/mapping_3d/median_fusion.hpp"
 #include "nodes/mapping_3d/tile_map.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/point.hpp"
 #include "rt/transform/pose_math.hpp"
 #include "tests/on_each_target.hpp"
 #include "tests/property_scale.hpp"

@@ -13,6 +13,8 @@
 
 #include "nodes/mapping_3d/grid_window.hpp"
 #include "nodes/mapping_3d/obstacle_grid.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/point.hpp"
 #include "tests/property_scale.hpp"
 
 using namespace takt::mapping_3d;

@@ -7,6 +7,7 @@
 
 #include "nodes/object_3d/outline.hpp"
 #include "nodes/object_3d/segmenter.hpp"
+#include "rt/msg/point.hpp"
 #include "tests/property_scale.hpp"
 
 using namespace takt;

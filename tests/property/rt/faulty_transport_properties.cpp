@@ -8,7 +8,7 @@
 #include <random>
 
 #include "rt/faults/faulty_transport.hpp"
-#include "rt/msg/messages.hpp"
+#include "rt/msg/text_status.hpp"
 #include "tests/nanoseconds.hpp"
 #include "tests/property_scale.hpp"
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <random>
 
+#include "rt/msg/odometry.hpp"
 #include "rt/node.hpp"
 #include "rt/sched/executor.hpp"
 #include "rt/sched/port_access.hpp"

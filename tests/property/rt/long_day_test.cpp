@@ -6,6 +6,7 @@
 #include <deque>
 
 #include "rt/memory/sanitized.hpp"
+#include "rt/msg/odometry.hpp"
 #include "rt/sched/executor.hpp"
 #include "rt/shm/local_transport.hpp"
 #include "tests/unit/rt/plans.hpp"

@@ -10,6 +10,7 @@
 #include <map>
 #include <random>
 
+#include "rt/msg/geometry.hpp"
 #include "rt/transform/transform_buffer.hpp"
 #include "tests/property_scale.hpp"
 

@@ -11,6 +11,7 @@
 #include <random>
 #include <tuple>
 
+#include "rt/msg/action.hpp"
 #include "tests/property_scale.hpp"
 #include "tests/unit/sim/acting_world.hpp"
 

@@ -13,7 +13,11 @@
 #include "graph/attach/message_text.hpp"
 #include "graph/attach/server.hpp"
 #include "graph/compose/composition.hpp"
+#include "rt/msg/grid.hpp"
 #include "rt/msg/messages.hpp"
+#include "rt/msg/odometry.hpp"
+#include "rt/msg/point_cloud.hpp"
+#include "rt/msg/text_status.hpp"
 #include "tests/temporary_folder.hpp"
 
 namespace {

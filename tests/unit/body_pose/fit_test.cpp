@@ -5,6 +5,7 @@
 #include <set>
 
 #include "nodes/body_pose/fitter.hpp"
+#include "rt/msg/point.hpp"
 #include "tests/unit/body_pose/skeletons.hpp"
 
 using namespace takt;

@@ -10,6 +10,7 @@
 #include "nodes/calibration/generated_sweeps.hpp"
 #include "nodes/calibration/picture.hpp"
 #include "nodes/laser_fusion/evaluate.hpp"
+#include "rt/msg/point.hpp"
 #include "tests/temporary_folder.hpp"
 
 using namespace takt;

@@ -5,7 +5,8 @@
 
 #include <vector>
 
-#include "rt/msg/messages.hpp"
+#include "rt/msg/image.hpp"
+#include "rt/msg/image_view.hpp"
 
 using namespace takt;
 

@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "rt/msg/geometry.hpp"
 #include "tests/has.hpp"
 #include "tests/temporary_folder.hpp"
 

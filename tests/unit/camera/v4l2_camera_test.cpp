@@ -6,6 +6,7 @@
 #include <sys/mman.h>
 
 #include "hal/camera/video_double.hpp"
+#include "rt/msg/image.hpp"
 #include "tests/conformance/stereo_camera.hpp"
 #include "tests/nanoseconds.hpp"
 

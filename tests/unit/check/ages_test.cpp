@@ -5,6 +5,7 @@
 
 #include "graph/check/check.hpp"
 #include "graph/check/margins.hpp"
+#include "rt/msg/motion.hpp"
 #include "rt/node.hpp"
 #include "tests/nanoseconds.hpp"
 

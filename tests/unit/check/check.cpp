@@ -4,6 +4,9 @@
 #include <doctest/doctest.h>
 
 #include "plans.hpp"
+#include "rt/msg/grid.hpp"
+#include "rt/msg/motion.hpp"
+#include "rt/msg/pose.hpp"
 #include "rt/node.hpp"
 
 using namespace takt;

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <limits>
 
+#include "rt/msg/point.hpp"
 #include "tests/temporary_folder.hpp"
 
 using namespace takt::cloud;

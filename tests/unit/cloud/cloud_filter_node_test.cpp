@@ -5,6 +5,9 @@
 #include <string>
 
 #include "rt/memory/memory_use.hpp"
+#include "rt/msg/point.hpp"
+#include "rt/msg/point_cloud.hpp"
+#include "rt/msg/text_status.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 
 namespace takt {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "rt/memory/memory_use.hpp"
+#include "rt/msg/point.hpp"
 
 using namespace takt::cloud;
 using takt::Colour;

@@ -5,6 +5,9 @@
 #include <cmath>
 #include <map>
 
+#include "rt/msg/laser_scan.hpp"
+#include "rt/msg/odometry.hpp"
+#include "rt/msg/velocity_command.hpp"
 #include "tests/unit/compose/drive.hpp"
 
 using namespace takt;

@@ -6,6 +6,10 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
+#include "rt/msg/disparity.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/grid.hpp"
+#include "rt/msg/motion.hpp"
 #include "tests/unit/compose/drive.hpp"
 #include "tests/unit/compose/isometry.hpp"
 

@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 
 #include "hal/sim/simulation.hpp"
+#include "rt/msg/geometry.hpp"
 
 namespace takt::test {
 

@@ -4,6 +4,7 @@
 
 #include <doctest/doctest.h>
 
+#include "rt/msg/odometry.hpp"
 #include "rt/sched/executor.hpp"
 #include "rt/sched/port_access.hpp"
 #include "tests/nanoseconds.hpp"

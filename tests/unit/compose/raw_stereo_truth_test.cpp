@@ -7,6 +7,9 @@
 #include <cmath>
 
 #include "nodes/stereo/rectify.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/point.hpp"
+#include "rt/msg/point_cloud.hpp"
 #include "tests/unit/compose/drive.hpp"
 #include "tests/unit/compose/isometry.hpp"
 

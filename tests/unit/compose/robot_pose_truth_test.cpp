@@ -8,6 +8,9 @@
 
 #include "nodes/mapping_3d/pose.hpp"
 #include "nodes/scan_matching/planar.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/odometry.hpp"
+#include "rt/msg/pose.hpp"
 #include "tests/unit/compose/drive.hpp"
 
 using namespace takt;

@@ -8,6 +8,10 @@
 #include <functional>
 
 #include "hal/discovery/discovery.hpp"
+#include "rt/msg/disparity.hpp"
+#include "rt/msg/grid.hpp"
+#include "rt/msg/head.hpp"
+#include "rt/msg/laser_scan.hpp"
 #include "tests/unit/compose/drive.hpp"
 
 using namespace takt;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 
+#include "rt/msg/grid.hpp"
 #include "tests/unit/compose/drive.hpp"
 
 using namespace takt;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 
+#include "rt/msg/velocity_command.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 
 namespace takt {

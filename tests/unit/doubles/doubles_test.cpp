@@ -10,6 +10,7 @@
 #include "hal/head/can_head.hpp"
 #include "hal/sim/lens.hpp"
 #include "hal/sim/sensors.hpp"
+#include "rt/msg/geometry.hpp"
 #include "tests/conformance/stereo_camera.hpp"
 #include "tests/nanoseconds.hpp"
 #include "tests/unit/can/bench.hpp"

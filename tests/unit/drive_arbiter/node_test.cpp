@@ -4,6 +4,9 @@
 #include <string>
 
 #include "rt/memory/memory_use.hpp"
+#include "rt/msg/digital_state.hpp"
+#include "rt/msg/text_status.hpp"
+#include "rt/msg/velocity_command.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 
 namespace takt {

@@ -10,6 +10,7 @@
 
 #include "nodes/ego_motion/evaluate.hpp"
 #include "rt/memory/memory_use.hpp"
+#include "rt/msg/geometry.hpp"
 #include "rt/node.hpp"
 
 namespace takt {

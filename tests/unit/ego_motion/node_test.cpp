@@ -3,6 +3,12 @@
 
 #include <cmath>
 
+#include "rt/msg/disparity.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/image.hpp"
+#include "rt/msg/motion.hpp"
+#include "rt/msg/odometry.hpp"
+#include "rt/msg/pose.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 
 namespace takt {

@@ -9,6 +9,7 @@
 
 #include "graph/evaluate/ego_motion_score.hpp"
 #include "nodes/ego_motion/evaluate.hpp"
+#include "rt/msg/geometry.hpp"
 
 using namespace takt;
 using namespace takt::command;

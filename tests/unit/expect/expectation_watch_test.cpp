@@ -4,6 +4,7 @@
 
 #include <doctest/doctest.h>
 
+#include "rt/msg/odometry.hpp"
 #include "tests/nanoseconds.hpp"
 
 using namespace takt;

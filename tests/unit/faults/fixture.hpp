@@ -4,7 +4,9 @@
 #include <doctest/doctest.h>
 
 #include "graph/faults/scenario.hpp"
-#include "rt/msg/messages.hpp"
+#include "rt/msg/disparity.hpp"
+#include "rt/msg/image.hpp"
+#include "rt/msg/motion.hpp"
 #include "tests/nanoseconds.hpp"
 #include "tests/temporary_folder.hpp"
 

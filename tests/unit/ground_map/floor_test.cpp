@@ -8,6 +8,9 @@
 #include "nodes/ground_map/laser_check.hpp"
 #include "nodes/ground_map/robot_track.hpp"
 #include "nodes/mapping_3d/pose.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/laser_scan.hpp"
+#include "rt/msg/odometry.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 
 using namespace takt;

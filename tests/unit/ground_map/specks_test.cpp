@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "rt/msg/laser_scan.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 
 using namespace takt;

@@ -3,6 +3,7 @@
 
 #include <doctest/doctest.h>
 
+#include "rt/msg/action.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 
 using namespace takt;

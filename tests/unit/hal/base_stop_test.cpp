@@ -2,6 +2,8 @@
 #include <doctest/doctest.h>
 
 #include "hal/base/base_node.hpp"
+#include "rt/msg/stop_command.hpp"
+#include "rt/msg/velocity_command.hpp"
 #include "tests/conformance/fake_writer.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 

@@ -4,6 +4,7 @@
 #include <doctest/doctest.h>
 
 #include "hal/sim/simulation.hpp"
+#include "rt/msg/image.hpp"
 #include "rt/time/rate.hpp"
 #include "tests/conformance/fake_writer.hpp"
 #include "tests/graph_folder.hpp"

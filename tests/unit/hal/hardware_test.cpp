@@ -5,6 +5,8 @@
 #include "hal/base/base_double.hpp"
 #include "hal/drivers.hpp"
 #include "hal/head/head_double.hpp"
+#include "rt/msg/head.hpp"
+#include "rt/msg/odometry.hpp"
 #include "tests/conformance/fake_writer.hpp"
 #include "tests/graph_folder.hpp"
 #include "tests/temporary_folder.hpp"

@@ -6,6 +6,8 @@
 #include <array>
 #include <cmath>
 
+#include "rt/msg/geometry.hpp"
+
 using namespace takt;
 using namespace takt::head_behaviour;
 using mapping_3d::Position;

@@ -5,6 +5,11 @@
 
 #include "nodes/mapping_3d/pose.hpp"
 #include "rt/memory/memory_use.hpp"
+#include "rt/msg/body_poses.hpp"
+#include "rt/msg/digital_state.hpp"
+#include "rt/msg/head.hpp"
+#include "rt/msg/image.hpp"
+#include "rt/msg/pose.hpp"
 #include "tests/nanoseconds.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 

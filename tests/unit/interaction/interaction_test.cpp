@@ -10,6 +10,8 @@
 #include "hal/interaction/interaction_node.hpp"
 #include "hal/interaction/script.hpp"
 #include "hal/stream/pseudo_terminal.hpp"
+#include "rt/msg/robot_task.hpp"
+#include "rt/msg/text_status.hpp"
 #include "tests/conformance/devices.hpp"
 #include "tests/temporary_folder.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"

@@ -8,6 +8,11 @@
 #include <string>
 
 #include "graph/language/catalogue.hpp"
+#include "rt/msg/disparity.hpp"
+#include "rt/msg/image.hpp"
+#include "rt/msg/motion.hpp"
+#include "rt/msg/odometry.hpp"
+#include "rt/msg/velocity_command.hpp"
 #include "tests/temporary_folder.hpp"
 
 namespace takt::test {

@@ -5,7 +5,13 @@
 
 #include <cstring>
 
-#include "rt/msg/messages.hpp"
+#include "rt/msg/action.hpp"
+#include "rt/msg/detections.hpp"
+#include "rt/msg/object_reports.hpp"
+#include "rt/msg/odometry.hpp"
+#include "rt/msg/pose.hpp"
+#include "rt/msg/stop_command.hpp"
+#include "rt/msg/text_status.hpp"
 
 using namespace takt;
 using namespace takt::graph;

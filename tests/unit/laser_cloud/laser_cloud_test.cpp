@@ -5,6 +5,9 @@
 #include <numbers>
 
 #include "rt/memory/memory_use.hpp"
+#include "rt/msg/laser_scan.hpp"
+#include "rt/msg/odometry.hpp"
+#include "rt/msg/point_cloud.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 
 namespace takt {

@@ -11,6 +11,7 @@
 
 #include "nodes/laser_fusion/clusters.hpp"
 #include "nodes/laser_fusion/thinning.hpp"
+#include "rt/msg/point.hpp"
 
 using namespace takt;
 using namespace takt::laser_fusion;

@@ -3,6 +3,9 @@
 #include <doctest/doctest.h>
 
 #include "nodes/laser_fusion/evaluate.hpp"
+#include "rt/msg/point.hpp"
+#include "rt/msg/point_cloud.hpp"
+#include "rt/msg/pose.hpp"
 #include "tests/unit/compose/drive.hpp"
 
 using namespace takt;

@@ -12,6 +12,7 @@
 
 #include "nodes/laser_fusion/evaluate.hpp"
 #include "nodes/laser_fusion/generated_pair.hpp"
+#include "rt/msg/point.hpp"
 
 using namespace takt;
 using namespace takt::laser_fusion;

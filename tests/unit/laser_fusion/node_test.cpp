@@ -7,6 +7,9 @@
 #include "nodes/laser_fusion/evaluate.hpp"
 #include "nodes/laser_fusion/laser_fusion.hpp"
 #include "rt/memory/memory_use.hpp"
+#include "rt/msg/point.hpp"
+#include "rt/msg/point_cloud.hpp"
+#include "rt/msg/pose.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 
 namespace takt {

@@ -9,6 +9,7 @@
 #include "nodes/laser_fusion/evaluate.hpp"
 #include "nodes/laser_fusion/generalised_icp.hpp"
 #include "nodes/laser_fusion/icp.hpp"
+#include "rt/msg/point.hpp"
 
 using namespace takt;
 using namespace takt::laser_fusion;

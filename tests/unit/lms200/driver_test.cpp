@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <string_view>
 
+#include "rt/msg/geometry.hpp"
 #include "tests/conformance/devices.hpp"
 #include "tests/has.hpp"
 #include "tests/nanoseconds.hpp"

@@ -7,6 +7,7 @@
 #include "hal/laser/lms200/session.hpp"
 #include "hal/stream/pseudo_terminal.hpp"
 #include "hal/stream/serial_port.hpp"
+#include "rt/msg/geometry.hpp"
 #include "tests/conformance/laser_line.hpp"
 #include "tests/temporary_folder.hpp"
 

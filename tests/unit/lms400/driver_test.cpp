@@ -11,6 +11,7 @@
 #include "hal/stream/serial_port.hpp"
 #include "hal/stream/tcp_connection.hpp"
 #include "hal/stream/tcp_listener.hpp"
+#include "rt/msg/geometry.hpp"
 #include "tests/conformance/devices.hpp"
 #include "tests/conformance/laser_line.hpp"
 #include "tests/has.hpp"

@@ -6,6 +6,7 @@
 
 #include "nodes/load/burn.hpp"
 #include "rt/memory/memory_use.hpp"
+#include "rt/msg/text_status.hpp"
 #include "tests/nanoseconds.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 

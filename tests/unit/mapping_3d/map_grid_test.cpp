@@ -10,6 +10,8 @@
 
 #include "nodes/mapping_3d/grid_file.hpp"
 #include "nodes/mapping_3d/sliding_grid.hpp"
+#include "rt/msg/grid.hpp"
+#include "rt/msg/point.hpp"
 #include "tests/temporary_folder.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 

@@ -6,6 +6,8 @@
 
 #include "nodes/mapping_3d/obstacle_grid.hpp"
 #include "nodes/mapping_3d/pose.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/point.hpp"
 #include "rt/node.hpp"
 #include "rt/transform/pose_math.hpp"
 

@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "rt/memory/memory_use.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/point.hpp"
 
 using namespace takt;
 using namespace takt::mapping_3d;

@@ -4,6 +4,10 @@
 #include <cmath>
 
 #include "nodes/mapping_3d/pose.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/grid.hpp"
+#include "rt/msg/motion.hpp"
+#include "rt/msg/point_cloud.hpp"
 #include "rt/transform/pose_math.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 

@@ -8,6 +8,8 @@
 
 #include "nodes/mapping_3d/generated_world.hpp"
 #include "rt/memory/memory_use.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/point.hpp"
 
 using namespace takt;
 using namespace takt::mapping_3d;

@@ -13,6 +13,11 @@
 #include "nodes/mapping_3d/obstacle_grid.hpp"
 #include "nodes/mapping_3d/pose.hpp"
 #include "rt/memory/memory_use.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/grid.hpp"
+#include "rt/msg/motion.hpp"
+#include "rt/msg/odometry.hpp"
+#include "rt/msg/point_cloud.hpp"
 #include "rt/transform/pose_math.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 

@@ -8,6 +8,8 @@
 #include "hal/base/base_node.hpp"
 #include "hal/sim/sim_devices.hpp"
 #include "rt/memory/memory_use.hpp"
+#include "rt/msg/odometry.hpp"
+#include "rt/msg/velocity_command.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 #include "tests/unit/sim/small_world.hpp"
 

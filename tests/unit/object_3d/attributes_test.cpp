@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "nodes/object_3d/scenes.hpp"
+#include "rt/msg/point.hpp"
 
 using namespace takt;
 using namespace takt::object_3d;

@@ -7,6 +7,9 @@
 
 #include "nodes/object_3d/scenes.hpp"
 #include "rt/memory/memory_use.hpp"
+#include "rt/msg/detections.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/point.hpp"
 
 using namespace takt;
 using namespace takt::object_3d;

@@ -6,6 +6,9 @@
 
 #include "nodes/object_3d/evaluate.hpp"
 #include "rt/memory/memory_use.hpp"
+#include "rt/msg/detections.hpp"
+#include "rt/msg/objects_3d.hpp"
+#include "rt/msg/point_cloud.hpp"
 #include "tests/graph_folder.hpp"
 #include "tests/temporary_folder.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include "nodes/object_3d/scenes.hpp"
+#include "rt/msg/point_cloud.hpp"
 
 namespace takt::test {
 

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <vector>
 
+#include "rt/msg/detections.hpp"
+
 using namespace takt;
 using namespace takt::object_detection;
 

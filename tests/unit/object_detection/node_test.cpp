@@ -8,6 +8,8 @@
 
 #include "nodes/object_detection/detector.hpp"
 #include "nodes/object_detection/scenes.hpp"
+#include "rt/msg/detections.hpp"
+#include "rt/msg/image.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 #include "tests/unit/object_detection/objects.hpp"
 

@@ -8,6 +8,9 @@
 
 #include "nodes/object_detection/reloader.hpp"
 #include "nodes/object_detection/revisions.hpp"
+#include "rt/msg/detections.hpp"
+#include "rt/msg/image.hpp"
+#include "rt/msg/odometry.hpp"
 #include "rt/record/log_file.hpp"
 #include "rt/record/replayer.hpp"
 #include "rt/sched/param_mail.hpp"

@@ -7,6 +7,10 @@
 #include "hal/base/base_node.hpp"
 #include "hal/laser/laser_node.hpp"
 #include "hal/sim/sim_devices.hpp"
+#include "rt/msg/laser_scan.hpp"
+#include "rt/msg/odometry.hpp"
+#include "rt/msg/stop_command.hpp"
+#include "rt/msg/velocity_command.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 #include "tests/unit/sim/small_world.hpp"
 

@@ -8,6 +8,11 @@
 #include <vector>
 
 #include "rt/memory/memory_use.hpp"
+#include "rt/msg/digital_state.hpp"
+#include "rt/msg/laser_scan.hpp"
+#include "rt/msg/odometry.hpp"
+#include "rt/msg/stop_command.hpp"
+#include "rt/msg/velocity_command.hpp"
 #include "tests/nanoseconds.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 

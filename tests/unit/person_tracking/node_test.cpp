@@ -5,6 +5,11 @@
 
 #include "nodes/person_tracking/evaluate.hpp"
 #include "rt/memory/memory_use.hpp"
+#include "rt/msg/detections.hpp"
+#include "rt/msg/image.hpp"
+#include "rt/msg/odometry.hpp"
+#include "rt/msg/pose.hpp"
+#include "rt/msg/velocity_command.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 
 namespace takt {

@@ -5,6 +5,7 @@
 
 #include "nodes/person_tracking/follower.hpp"
 #include "nodes/person_tracking/person_tracker.hpp"
+#include "rt/msg/velocity_command.hpp"
 
 using namespace takt;
 using namespace takt::person_tracking;

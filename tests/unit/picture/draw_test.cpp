@@ -6,6 +6,8 @@
 #include <array>
 #include <vector>
 
+#include "rt/msg/detections.hpp"
+#include "rt/msg/point.hpp"
 #include "rt/node.hpp"
 
 namespace takt {

@@ -10,6 +10,8 @@
 #include "nodes/picture/moment.hpp"
 #include "nodes/semantic/reports.hpp"
 #include "rt/memory/memory_use.hpp"
+#include "rt/msg/object_reports.hpp"
+#include "rt/msg/text_status.hpp"
 #include "tests/temporary_folder.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 

@@ -9,6 +9,14 @@
 #include <vector>
 
 #include "rt/memory/memory_use.hpp"
+#include "rt/msg/detections.hpp"
+#include "rt/msg/disparity.hpp"
+#include "rt/msg/grid.hpp"
+#include "rt/msg/image.hpp"
+#include "rt/msg/motion.hpp"
+#include "rt/msg/point.hpp"
+#include "rt/msg/point_cloud.hpp"
+#include "rt/msg/terrain.hpp"
 #include "tests/temporary_folder.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 

@@ -7,7 +7,8 @@
 #include <memory>
 #include <new>
 
-#include "rt/msg/messages.hpp"
+#include "rt/msg/point.hpp"
+#include "rt/msg/point_cloud.hpp"
 
 using namespace takt;
 using namespace takt::record;

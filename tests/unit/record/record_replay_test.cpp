@@ -6,6 +6,8 @@
 #include <iterator>
 
 #include "recorded_run.hpp"
+#include "rt/msg/grid.hpp"
+#include "rt/msg/odometry.hpp"
 #include "rt/record/log_file.hpp"
 #include "rt/record/replayer.hpp"
 #include "rt/sched/param_mail.hpp"

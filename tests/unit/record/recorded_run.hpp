@@ -6,6 +6,8 @@
 #include <functional>
 #include <vector>
 
+#include "rt/msg/grid.hpp"
+#include "rt/msg/odometry.hpp"
 #include "rt/node.hpp"
 #include "rt/record/recorder.hpp"
 #include "rt/sched/executor.hpp"

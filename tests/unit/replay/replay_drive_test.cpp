@@ -8,6 +8,7 @@
 
 #include "hal/replay/replay_base.hpp"
 #include "hal/replay/replay_laser.hpp"
+#include "rt/msg/geometry.hpp"
 #include "tests/conformance/devices.hpp"
 #include "tests/has.hpp"
 #include "tests/unit/replay/carmen_file.hpp"

@@ -5,6 +5,12 @@
 #include <cstring>
 #include <numbers>
 
+#include "rt/msg/action.hpp"
+#include "rt/msg/object_reports.hpp"
+#include "rt/msg/odometry.hpp"
+#include "rt/msg/robot_task.hpp"
+#include "rt/msg/text_status.hpp"
+#include "rt/msg/velocity_command.hpp"
 #include "tests/graph_folder.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 

@@ -6,6 +6,9 @@
 
 #include "nodes/robot_pose/pose_filter.hpp"
 #include "rt/memory/memory_use.hpp"
+#include "rt/msg/motion.hpp"
+#include "rt/msg/odometry.hpp"
+#include "rt/msg/pose.hpp"
 #include "tests/nanoseconds.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 

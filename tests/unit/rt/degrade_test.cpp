@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "rt/msg/odometry.hpp"
 #include "rt/node.hpp"
 #include "rt/sched/executor.hpp"
 #include "rt/sched/port_access.hpp"

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <functional>
 
+#include "rt/msg/odometry.hpp"
 #include "rt/node.hpp"
 #include "rt/sched/port_access.hpp"
 #include "tests/nanoseconds.hpp"

@@ -15,7 +15,7 @@
 #include <fstream>
 #include <thread>
 
-#include "rt/msg/messages.hpp"
+#include "rt/msg/image.hpp"
 #include "rt/shm/iceoryx_layout.hpp"
 #include "rt/shm/transport_error.hpp"
 #include "rt/thread_state.hpp"

@@ -10,6 +10,7 @@
 #include <functional>
 #include <set>
 
+#include "rt/msg/image.hpp"
 #include "rt/shm/kill_order.hpp"
 #include "rt/shm/local_transport.hpp"
 #include "transport_conformance.hpp"

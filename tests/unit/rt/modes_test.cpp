@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <thread>
 
+#include "rt/msg/odometry.hpp"
 #include "rt/node.hpp"
 #include "rt/sched/executor.hpp"
 #include "rt/sched/job_watch.hpp"

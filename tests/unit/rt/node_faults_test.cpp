@@ -6,6 +6,7 @@
 
 #include "epoch.hpp"
 #include "plans.hpp"
+#include "rt/msg/odometry.hpp"
 #include "rt/sched/executor.hpp"
 #include "rt/shm/local_transport.hpp"
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Parts of plans for tests of runs.
 #pragma once
+#include "rt/msg/odometry.hpp"
 #include "rt/node.hpp"
 #include "rt/sched/plan.hpp"
 

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Requests to stop and pace nodes, and parameters set between jobs, in virtual time.
+#include "rt/msg/requests.hpp"
+
 #include <doctest/doctest.h>
 
 #include <algorithm>
 #include <cstring>
 
+#include "rt/msg/odometry.hpp"
 #include "rt/node.hpp"
 #include "rt/sched/executor.hpp"
 #include "rt/sched/param_mail.hpp"

@@ -4,6 +4,7 @@
 
 #include <functional>
 
+#include "rt/msg/odometry.hpp"
 #include "rt/node.hpp"
 #include "rt/sched/executor.hpp"
 #include "tests/unit/rt/epoch.hpp"

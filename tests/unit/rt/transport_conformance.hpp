@@ -13,7 +13,8 @@
 #include <thread>
 #include <vector>
 
-#include "rt/msg/messages.hpp"
+#include "rt/msg/image.hpp"
+#include "rt/msg/odometry.hpp"
 #include "rt/shm/transport.hpp"
 
 namespace takt::test {

@@ -5,6 +5,7 @@
 #include <map>
 
 #include "plans.hpp"
+#include "rt/msg/odometry.hpp"
 #include "rt/sched/executor.hpp"
 #include "rt/sched/port_access.hpp"
 #include "rt/shm/local_transport.hpp"

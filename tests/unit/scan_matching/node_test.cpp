@@ -7,6 +7,10 @@
 #include "nodes/mapping_3d/pose.hpp"
 #include "nodes/scan_matching/drive.hpp"
 #include "rt/memory/memory_use.hpp"
+#include "rt/msg/grid.hpp"
+#include "rt/msg/laser_scan.hpp"
+#include "rt/msg/odometry.hpp"
+#include "rt/msg/pose.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 
 namespace takt {

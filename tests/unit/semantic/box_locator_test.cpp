@@ -7,6 +7,8 @@
 #include <cmath>
 #include <random>
 
+#include "rt/msg/geometry.hpp"
+
 using namespace takt;
 using namespace takt::semantic;
 

@@ -5,6 +5,13 @@
 #include <string>
 
 #include "rt/memory/memory_use.hpp"
+#include "rt/msg/grid.hpp"
+#include "rt/msg/head.hpp"
+#include "rt/msg/object_reports.hpp"
+#include "rt/msg/objects_3d.hpp"
+#include "rt/msg/odometry.hpp"
+#include "rt/msg/terrain.hpp"
+#include "rt/msg/text_status.hpp"
 #include "tests/temporary_folder.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 #include "tests/unit/semantic/report_message.hpp"

@@ -6,6 +6,16 @@
 #include <vector>
 
 #include "rt/memory/memory_use.hpp"
+#include "rt/msg/body_poses.hpp"
+#include "rt/msg/detections.hpp"
+#include "rt/msg/digital_state.hpp"
+#include "rt/msg/grid.hpp"
+#include "rt/msg/object_reports.hpp"
+#include "rt/msg/odometry.hpp"
+#include "rt/msg/requests.hpp"
+#include "rt/msg/stop_command.hpp"
+#include "rt/msg/terrain.hpp"
+#include "rt/msg/text_status.hpp"
 #include "tests/nanoseconds.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 #include "tests/unit/semantic/report_message.hpp"

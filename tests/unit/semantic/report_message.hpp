@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "nodes/semantic/reports.hpp"
+#include "rt/msg/object_reports.hpp"
 
 namespace takt::test {
 

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "rt/msg/object_reports.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 #include "tests/unit/semantic/report_message.hpp"
 

@@ -4,6 +4,7 @@
 #include <doctest/doctest.h>
 
 #include "nodes/semantic/clock_generator.hpp"
+#include "rt/msg/requests.hpp"
 #include "tests/nanoseconds.hpp"
 
 using namespace takt;

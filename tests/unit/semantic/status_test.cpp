@@ -4,6 +4,9 @@
 #include <string>
 
 #include "nodes/semantic/status_line.hpp"
+#include "rt/msg/grid.hpp"
+#include "rt/msg/requests.hpp"
+#include "rt/msg/stop_command.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 
 using namespace takt;

@@ -8,6 +8,11 @@
 
 #include "hal/semantic_link/messages.hpp"
 #include "hal/semantic_link/wire.hpp"
+#include "rt/msg/action.hpp"
+#include "rt/msg/laser_scan.hpp"
+#include "rt/msg/object_reports.hpp"
+#include "rt/msg/text_status.hpp"
+#include "rt/msg/velocity_command.hpp"
 #include "tests/conformance/link_messages.hpp"
 
 using namespace takt;

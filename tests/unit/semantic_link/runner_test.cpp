@@ -8,6 +8,7 @@
 #include "hal/semantic_link/link_device.hpp"
 #include "hal/semantic_link/server.hpp"
 #include "hal/semantic_link/udp_port.hpp"
+#include "rt/msg/laser_scan.hpp"
 #include "tests/conformance/link_messages.hpp"
 
 using namespace takt;

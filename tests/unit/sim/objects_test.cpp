@@ -7,6 +7,8 @@
 
 #include "hal/sim/failing_devices.hpp"
 #include "hal/sim/sim_objects.hpp"
+#include "rt/msg/action.hpp"
+#include "rt/msg/object_reports.hpp"
 #include "tests/conformance/devices.hpp"
 #include "tests/has.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"

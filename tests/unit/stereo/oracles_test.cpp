@@ -11,6 +11,8 @@
 #include "nodes/stereo/matcher.hpp"
 #include "nodes/stereo/reference.hpp"
 #include "nodes/stereo/triangulate.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/point.hpp"
 
 using namespace takt;
 using namespace takt::stereo;

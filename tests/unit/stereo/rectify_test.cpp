@@ -13,6 +13,7 @@
 #include <random>
 
 #include "nodes/stereo/remap_reference.hpp"
+#include "rt/msg/geometry.hpp"
 #include "tests/temporary_folder.hpp"
 
 using namespace takt;

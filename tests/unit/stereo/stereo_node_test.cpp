@@ -10,6 +10,10 @@
 #include <vector>
 
 #include "nodes/stereo/rectify.hpp"
+#include "rt/msg/disparity.hpp"
+#include "rt/msg/image.hpp"
+#include "rt/msg/point.hpp"
+#include "rt/msg/point_cloud.hpp"
 #include "rt/node.hpp"
 #include "rt/sched/port_access.hpp"
 #include "tests/temporary_folder.hpp"

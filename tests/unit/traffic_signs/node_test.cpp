@@ -6,6 +6,11 @@
 
 #include "nodes/traffic_signs/sign_detector.hpp"
 #include "nodes/traffic_signs/sign_scenes.hpp"
+#include "rt/msg/detections.hpp"
+#include "rt/msg/digital_state.hpp"
+#include "rt/msg/disparity.hpp"
+#include "rt/msg/image.hpp"
+#include "rt/msg/point_cloud.hpp"
 #include "tests/temporary_folder.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 #include "tests/unit/traffic_signs/signs.hpp"

@@ -4,6 +4,7 @@
 #include <doctest/doctest.h>
 
 #include "nodes/traffic_signs/distance.hpp"
+#include "rt/msg/disparity.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 
 using namespace takt;

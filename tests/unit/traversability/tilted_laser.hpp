@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "nodes/mapping_3d/pose.hpp"
+#include "rt/msg/geometry.hpp"
 
 namespace takt::test {
 

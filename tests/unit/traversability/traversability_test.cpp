@@ -6,6 +6,9 @@
 
 #include "nodes/traversability/height_map.hpp"
 #include "rt/memory/memory_use.hpp"
+#include "rt/msg/grid.hpp"
+#include "rt/msg/laser_scan.hpp"
+#include "rt/msg/odometry.hpp"
 #include "tests/unit/mapping_3d/node_harness.hpp"
 #include "tests/unit/traversability/tilted_laser.hpp"
 

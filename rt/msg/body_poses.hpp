@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "rt/msg/array.hpp"
+#include "rt/msg/field.hpp"
+
+namespace takt {
+
+/// Where a joint of a body is. fitted 1: a point shows it; 0.5: it must be hidden behind one, and its limb has the
+/// length that it should have; 0: it could not be found, and x, y, z are 0.
+struct BodyJoint {
+  float x, y, z, fitted;
+};
+
+/// From a joint along a limb, as from the shoulder through the wrist. dx, dy, dz a unit vector; 0 0 0: a joint of it is
+/// missing.
+struct PointingRay {
+  float x, y, z, dx, dy, dz;
+};
+
+/// One body. Joints as the skeleton file numbers them, joint 0 its start; those beyond its joints are 0.
+struct Body {
+  using scalar = float;
+  static constexpr size_t kMostJoints = 16, kMostPointers = 2;
+  float error;    ///< of the fit (thesis Eq. 3.10), less is better
+  float valid;    ///< 1: lengths and angles pass Eq. 3.11
+  float yaw_rad;  ///< of its frame about the vertical, 0: faces along +y
+  float top_m;    ///< height above the floor
+  BodyJoint joints[kMostJoints];
+  PointingRay pointing[kMostPointers];
+};
+
+/// Bodies and their joints in the robot frame, nearest first. Capacity: count.
+struct BodyPoses {
+  static constexpr std::string_view type_name = "body_poses";
+  int32_t joints = 0;      ///< of the skeleton, its start included
+  int32_t candidates = 0;  ///< clusters that could have been bodies
+  float searched = 1;      ///< share of their poses tried, 0..1: less if the job's time ran out
+  Array<Body> bodies;
+  static std::span<const Field> fields();
+  static void capacities(const Capacity& c, std::span<uint32_t> a) { a[0] = c.count; }
+};
+
+}  // namespace takt

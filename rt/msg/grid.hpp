@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "rt/msg/array.hpp"
+#include "rt/msg/field.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/image_view.hpp"
+
+namespace takt {
+
+/// Two-dimensional occupancy grid. Cell (column, row) covers origin + (column, row) * cell_m. Capacity: width, height.
+struct Grid {
+  static constexpr std::string_view type_name = "grid";
+  static constexpr int16_t unknown = -1;
+  int32_t width = 0, height = 0;
+  double cell_m = 0;
+  double origin_x_m = 0, origin_y_m = 0;
+  Transform grid_in_map;
+  Array<int16_t> cells;  ///< 0 free .. 1000 occupied, `unknown` = -1
+
+  ImageView<int16_t> view() { return {cells.data(), width, height}; }
+  ImageView<const int16_t> view() const { return {cells.data(), width, height}; }
+  static std::span<const Field> fields();
+  static void capacities(const Capacity& c, std::span<uint32_t> a) { a[0] = static_cast<uint32_t>(c.pixels()); }
+};
+
+}  // namespace takt

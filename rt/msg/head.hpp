@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "rt/msg/field.hpp"
+
+namespace takt {
+
+/// State of the camera head: pan about z (left positive), tilt about x (up positive).
+struct HeadState {
+  static constexpr std::string_view type_name = "head_state";
+  double pan_rad = 0, tilt_rad = 0, roll_rad = 0;
+  double pan_rad_s = 0, tilt_rad_s = 0;
+  uint8_t moving = 0;
+  static std::span<const Field> fields();
+  static void capacities(const Capacity&, std::span<uint32_t>) {}
+};
+
+struct HeadCommand {
+  static constexpr std::string_view type_name = "head_command";
+  double pan_rad = 0, tilt_rad = 0;
+  static std::span<const Field> fields();
+  static void capacities(const Capacity&, std::span<uint32_t>) {}
+};
+
+}  // namespace takt

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "rt/msg/array.hpp"
+#include "rt/msg/field.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/image_view.hpp"
+
+namespace takt {
+
+/// What a camera driver found out about a frame at capture (bits of `health`).
+namespace image_health {
+constexpr uint32_t saturated = 1, dark = 2, blurred = 4, unchanging = 8, partial = 16;
+}
+
+/// One 8-bit image. Capacity: width, height, channels.
+struct Image {
+  static constexpr std::string_view type_name = "image";
+  int32_t width = 0, height = 0, channels = 0;
+  uint32_t health = 0;
+  CameraModel camera;
+  Array<uint8_t> pixels;  ///< interleaved, BGR if three channels
+
+  ImageView<uint8_t> view() { return {pixels.data(), width, height, channels}; }
+  ImageView<const uint8_t> view() const { return {pixels.data(), width, height, channels}; }
+  static std::span<const Field> fields();
+  static void capacities(const Capacity& c, std::span<uint32_t> a) {
+    a[0] = static_cast<uint32_t>(c.pixels() * c.channels);
+  }
+};
+
+/// Two 8-bit images of one exposure. Raw from a camera, rectified (camera.focal_px > 0) from the stereo node.
+/// Capacity: width, height, channels.
+struct StereoPair {
+  static constexpr std::string_view type_name = "stereo_pair";
+  int32_t width = 0, height = 0, channels = 0;
+  uint32_t health = 0;
+  uint32_t frame_number = 0;  ///< counted by the device; a gap is a frame lost before the host saw it
+  CameraModel camera;
+  Transform sensor_in_robot;   ///< left camera, head at rest; identity: unknown
+  Array<uint8_t> left, right;  ///< interleaved, BGR if three channels
+
+  ImageView<uint8_t> left_view() { return {left.data(), width, height, channels}; }
+  ImageView<uint8_t> right_view() { return {right.data(), width, height, channels}; }
+  ImageView<const uint8_t> left_view() const { return {left.data(), width, height, channels}; }
+  ImageView<const uint8_t> right_view() const { return {right.data(), width, height, channels}; }
+  static std::span<const Field> fields();
+  static void capacities(const Capacity& c, std::span<uint32_t> a) {
+    a[0] = a[1] = static_cast<uint32_t>(c.pixels() * c.channels);
+  }
+};
+
+}  // namespace takt

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "rt/msg/array.hpp"
+#include "rt/msg/field.hpp"
+#include "rt/msg/geometry.hpp"
+
+namespace takt {
+
+/// One sweep of a laser scanner, in its own plane. Capacity: count (beams).
+struct LaserScan {
+  static constexpr std::string_view type_name = "laser_scan";
+  double first_angle_rad = 0;  ///< of range 0, counter-clockwise from the sensor's forward axis
+  double step_rad = 0;
+  double max_range_m = 0;
+  double sweep_s = 0;  ///< time from the first to the last beam
+  uint32_t scan_number = 0;
+  Transform sensor_in_robot;
+  Array<float> range_m;  ///< 0: no return
+  static std::span<const Field> fields();
+  static void capacities(const Capacity& c, std::span<uint32_t> a) { a[0] = c.count; }
+};
+
+}  // namespace takt

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "rt/msg/array.hpp"
+#include "rt/msg/field.hpp"
+
+namespace takt {
+
+/// What an object is called and of which type it is, as the semantic network has it; ended by 0.
+struct ObjectName {
+  using scalar = char;
+  char name[32] = {};  ///< empty: a thing just seen, which nobody has named yet
+  char type[32] = {};
+};
+struct ObjectPlace {
+  using scalar = float;
+  float x_m, y_m, z_m, yaw_rad;
+  float score;       ///< 0..1: how sure the type is
+  float attributes;  ///< how many of ObjectReports::attributes are its own; they follow those of the object before
+};
+struct ObjectAttribute {
+  using scalar = char;
+  char name[32] = {};
+  char value[32] = {};  ///< as a network file writes it
+};
+
+/// Objects as the semantic network knows them, by names, so that ends with different networks understand each other.
+/// names and places have one entry an object. Capacity: count (objects; eight times as many attributes).
+struct ObjectReports {
+  static constexpr std::string_view type_name = "object_reports";
+  uint8_t in_map = 0;  ///< 0: places in the robot frame; 1: in the map frame
+  Array<ObjectName> names;
+  Array<ObjectPlace> places;
+  Array<ObjectAttribute> attributes;
+  static std::span<const Field> fields();
+  static void capacities(const Capacity& c, std::span<uint32_t> a) {
+    a[0] = a[1] = c.count;
+    a[2] = 8 * c.count;
+  }
+};
+
+}  // namespace takt

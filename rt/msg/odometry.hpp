@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "rt/msg/field.hpp"
+
+namespace takt {
+
+/// State of the mobile base in its drifting odometry frame.
+struct Odometry {
+  static constexpr std::string_view type_name = "odometry";
+  double x_m = 0, y_m = 0, theta_rad = 0;  ///< theta: driving direction from the x axis
+  double speed_m_s = 0, turn_rad_s = 0;
+  static std::span<const Field> fields();
+  static void capacities(const Capacity&, std::span<uint32_t>) {}
+};
+
+}  // namespace takt

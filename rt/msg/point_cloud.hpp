@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "rt/msg/array.hpp"
+#include "rt/msg/field.hpp"
+#include "rt/msg/geometry.hpp"
+#include "rt/msg/point.hpp"
+
+namespace takt {
+
+/// Coloured points in the frame of the sensor. Capacity: count.
+struct PointCloud {
+  static constexpr std::string_view type_name = "point_cloud";
+  Transform sensor_in_robot;
+  CameraModel camera;   ///< of the image the cloud was triangulated from; zero for other sensors
+  int32_t step_px = 0;  ///< one point per step x step pixels of that image; 0 for other sensors
+  Array<Point> points;
+  Array<Colour> colours;  ///< same size as points, or empty
+  static std::span<const Field> fields();
+  static void capacities(const Capacity& c, std::span<uint32_t> a) { a[0] = a[1] = c.count; }
+};
+
+}  // namespace takt

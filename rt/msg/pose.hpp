@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "rt/msg/field.hpp"
+#include "rt/msg/geometry.hpp"
+
+namespace takt {
+
+/// A pose with its covariance (row-major, order x y z rx ry rz).
+struct Pose {
+  static constexpr std::string_view type_name = "pose";
+  Transform transform;
+  double covariance[36] = {};
+  static std::span<const Field> fields();
+  static void capacities(const Capacity&, std::span<uint32_t>) {}
+};
+
+}  // namespace takt

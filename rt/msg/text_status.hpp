@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "rt/msg/array.hpp"
+#include "rt/msg/field.hpp"
+
+namespace takt {
+
+/// Human-readable state. Capacity: count (characters).
+struct TextStatus {
+  static constexpr std::string_view type_name = "text_status";
+  Array<char> text;
+  static std::span<const Field> fields();
+  static void capacities(const Capacity& c, std::span<uint32_t> a) { a[0] = c.count; }
+};
+
+}  // namespace takt
