@@ -56,9 +56,9 @@ wait $run
 code=$?
 [ $code -le 1 ] || fail "a run with closed streams: exit $code"  # 1: a deadline was missed, which is not judged here
 
-expect 2 "does-not-exist" "$takt" run "$work/does-not-exist.yaml"
+expect 2 "does-not-exist" "$takt" run "$work/does-not-exist.yaml" --output "$work/out"
 expect 2 "--for" "$takt" run --for 5
-expect 2 "no such directory" env TAKT_DATA="$work/nothing" "$takt" run "$source/graph/kitti.yaml"
+expect 2 "no such directory" env TAKT_DATA="$work/nothing" "$takt" run "$source/graph/kitti.yaml" --output "$work/out"
 expect 2 "poses.txt" "$takt" eval ego_motion --data "$work"
 expect 2 "either --data DIR or --generated" "$takt" eval ego_motion
 cp "$takt" "$work/takt_alone"
