@@ -3,6 +3,8 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <spawn.h>
+#include <sys/socket.h>
+#include <sys/un.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -19,17 +21,17 @@ namespace takt::test {
 class PrivateBus {
  public:
   PrivateBus() {
-    const std::string socket = (folder_.path / "bus").string(), option = "--address=unix:path=" + socket;
+    const std::string path = (folder_.path / "bus").string(), option = "--address=unix:path=" + path;
     const char* arguments[] = {"dbus-daemon", "--session", "--nofork", "--nopidfile", option.c_str(), nullptr};
     if (posix_spawnp(&daemon_, arguments[0], nullptr, nullptr, const_cast<char**>(arguments), environ) != 0) {
       daemon_ = -1;
       return;
     }
     for (int tries = 0; tries < 1000 && !there_; ++tries) {
-      there_ = access(socket.c_str(), F_OK) == 0;
+      there_ = listens(path);
       if (!there_) poll(nullptr, 0, 10);
     }
-    address_ = "unix:path=" + socket;
+    address_ = "unix:path=" + path;
   }
   ~PrivateBus() { end(); }
   PrivateBus(const PrivateBus&) = delete;
@@ -45,6 +47,18 @@ class PrivateBus {
   }
 
  private:
+  /// The socket is there before its daemon listens; until then who connects is refused.
+  static bool listens(const std::string& path) {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    if (path.size() >= sizeof address.sun_path) return false;
+    path.copy(address.sun_path, path.size());
+    const int probe = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    const bool taken = connect(probe, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
+    close(probe);
+    return taken;
+  }
+
   TemporaryFolder folder_;
   pid_t daemon_ = -1;
   bool there_ = false;

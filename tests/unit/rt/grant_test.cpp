@@ -30,6 +30,7 @@ int64_t slice_ns() {
 
 TEST_CASE("a cooperative worker asks for short turns and stays an ordinary thread, as nice as it was") {
   std::thread([] {
+    apply_default();  // the tests may have been started with another policy (chrt --idle)
     REQUIRE(setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), 3) == 0);
     const int64_t before_ns = slice_ns();
     const Grant grant = apply(cooperative_reservation());
