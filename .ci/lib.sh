@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 # Shared by .ci/run and its steps, which start in the root of the project.
 export CCACHE_MAXSIZE=4G
-base=${TAKT_CI_BASE:-HEAD~1}  # what the change is compared with
+# What the change is compared with; without a commit before it, all is new.
+base=$(git rev-parse --verify -q "${TAKT_CI_BASE:-HEAD~1}" || git hash-object -t tree /dev/null)
+# What a commit's run needs of the Release build.
+commit_targets=(takt takt-eval takt-tools takt-bench takt_nodes_tests)
 
 usage() {
   echo "ci: $1" >&2
@@ -15,10 +18,13 @@ install() {
     { apt-get update >/dev/null && apt-get install -y --no-install-recommends "${@:2}" >/dev/null; }
 }
 
-# changed PATHS...: whether the change touches one of them. Without a commit to compare with, all of them are new.
-changed() {
-  git rev-parse --verify -q "$base" >/dev/null || return 0
-  ! git diff --quiet "$base" HEAD -- "$@"
+# changed PATHS...: whether the change touches one of them; pages do not count.
+changed() { ! git diff --quiet "$base" HEAD -- "$@" ':!*.md'; }
+
+# Properties draw other numbers in each commit; a failure prints the seed, too.
+seed_by_commit() {
+  export TAKT_PROPERTY_SEED=$((16#$(git rev-parse --short=8 HEAD | cut -c1-8)))
+  echo "TAKT_PROPERTY_SCALE=${TAKT_PROPERTY_SCALE:-1} TAKT_PROPERTY_SEED=$TAKT_PROPERTY_SEED"
 }
 
 # build PRESET TARGETS... : configured once, quiet unless it fails.

@@ -156,11 +156,11 @@ struct DeskCommand {
   const char *name, *what, *program;
 };
 constexpr DeskCommand kDeskCommands[] = {
-    {"calibrate", "measures stereo cameras and laser mounts", "takt-tools"},
-    {"cloud", "filters point clouds from files", "takt-tools"},
-    {"objects", "keeps the database of known objects", "takt-tools"},
-    {"terrain", "learns maps of terrain types", "takt-tools"},
-    {"train", "learns cascades of traffic signs", "takt-tools"},
+    {"calibrate", "measures cameras and lasers from recordings", "takt-tools"},
+    {"cloud", "filters point clouds in PLY and PCD files", "takt-tools"},
+    {"objects", "the database of known objects: what is in it, learning, tuning", "takt-tools"},
+    {"terrain", "kinds of terrain that ground_map tells apart", "takt-tools"},
+    {"train", "learns what nodes look for", "takt-tools"},
     {"eval", "measures quality against ground truth", "takt-eval"},
 };
 

@@ -8,7 +8,7 @@ namespace {
 
 constexpr std::string_view kObstacle = "an obstacle stands in the way";
 constexpr double kDriven_m = 0.05, kTurned_rad = 0.05;  // less is no getting on
-constexpr double kPassed_m = 0.2;                      // nearer to where it had to stand it is the same obstacle
+constexpr double kPassed_m = 0.2;                       // nearer to where it had to stand it is the same obstacle
 
 Place place_of(const PlanarPose& robot) { return {robot.x_m, robot.y_m}; }
 

@@ -116,6 +116,15 @@ class Suite(unittest.TestCase):
 
 
 class Whole(unittest.TestCase):
+    def test_suite_that_hangs(self):
+        with tempfile.TemporaryDirectory() as folder:
+            bench = os.path.join(folder, "bench")
+            with open(bench, "w", encoding="utf-8") as file:
+                file.write("#!/bin/sh\nsleep 600 &\nwait\n")
+            os.chmod(bench, 0o755)
+            rows, error, _ = ratios.run_suite(bench, "suite", limit_s=0.3)
+        self.assertEqual((rows, error), ([], "it did not end within 0.3 s"))
+
     def judge_all(self, ratio, name="s/a"):
         """With a program in place of takt-bench: `suite --json FILE` writes one row."""
         with tempfile.TemporaryDirectory() as folder:

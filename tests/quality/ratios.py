@@ -12,12 +12,15 @@ With a noise above WIDEST hardly anything could fail. A row that only such a noi
 runs once more, and the second run decides about this row. There, noise counts as WIDEST at most."""
 import fnmatch
 import json
+import os
+import signal
 import subprocess
 import tempfile
 import time
 from typing import NamedTuple
 
 WIDEST = 1.5
+LONGEST_S = 900  # of a suite: several times what the longest takes on two busy CPUs
 MET, WITHIN, UNCLEAR, FAILED = "met", "within its null pair", "unclear", "FAILED"
 
 
@@ -82,13 +85,24 @@ def text_of(found):
             f"null {null}: {found['verdict']}")
 
 
-def run_suite(bench, command):
-    """(rows, error, seconds) of one run; error is empty if it went well."""
+def run_suite(bench, command, limit_s=LONGEST_S):
+    """(rows, error, seconds) of one run; error is empty if it went well. What hangs is ended, with its processes."""
     began = time.monotonic()
+    rows = []
     with tempfile.NamedTemporaryFile(suffix=".json") as file:
-        run = subprocess.run([bench, *command.split(), "--json", file.name], capture_output=True, text=True, check=False)
-        rows = json.load(file) if run.returncode == 0 else []
-    error = "" if run.returncode == 0 else f"exit {run.returncode}: {run.stderr.strip()}"
+        run = subprocess.Popen([bench, *command.split(), "--json", file.name], stdout=subprocess.DEVNULL,
+                               stderr=subprocess.PIPE, text=True, start_new_session=True)
+        try:
+            said = run.communicate(timeout=limit_s)[1].strip()
+            error = "" if run.returncode == 0 else f"exit {run.returncode}: {said}"
+            if not error:
+                rows = json.load(file)
+        except subprocess.TimeoutExpired:
+            error = f"it did not end within {limit_s:g} s"
+        finally:
+            if run.poll() is None:
+                os.killpg(run.pid, signal.SIGKILL)
+                run.communicate()
     return rows, error, time.monotonic() - began
 
 

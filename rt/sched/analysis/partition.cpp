@@ -22,7 +22,8 @@ struct CoreLoad {
 
 class PartitionSearch {
  public:
-  PartitionSearch(const TaskSet& set, CorePolicy policy) : set_(set), policy_(policy), on_core_(static_cast<size_t>(set.cores)) {
+  PartitionSearch(const TaskSet& set, CorePolicy policy)
+      : set_(set), policy_(policy), on_core_(static_cast<size_t>(set.cores)) {
     for (size_t i = 0; i < set.tasks.size(); ++i) {
       const TimedTask& task = set.tasks[i];
       if (task.core < 0) {

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "tests/recorded/recording.hpp"
+#include "tests/recorded/golden.hpp"
 #include "tests/unit/camera/eyes.hpp"
 #include "tests/unit/can/golden_frames.hpp"
 
@@ -14,9 +13,7 @@ using namespace takt::v4l2;
 using namespace takt::test;
 
 TEST_CASE("frame codec: the vectors are those of the reference") {
-  const auto file = reference("golden/bumblebee_frames.json");
-  std::ifstream stream(file);
-  const auto golden = nlohmann::json::parse(stream);
+  const auto golden = test::golden("bumblebee_frames.json");
   const auto& planes = golden["planes"];
   CHECK(planes["right"] == kRight);
   CHECK(planes["left"] == kLeft);

@@ -2,12 +2,11 @@
 #include <doctest/doctest.h>
 
 #include <cstdio>
-#include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 
 #include "tests/conformance/dbc_file.hpp"
-#include "tests/recorded/recording.hpp"
+#include "tests/recorded/golden.hpp"
 #include "tests/unit/head/golden_messages.hpp"
 
 using namespace takt;
@@ -15,9 +14,7 @@ using namespace takt::can;
 using namespace takt::test;
 
 TEST_CASE("head messages: the whole collection of golden vectors, bit by bit") {
-  const auto file = reference("golden/can_head.json");
-  std::ifstream stream(file);
-  const auto all = nlohmann::json::parse(stream);
+  const auto all = golden("can_head.json");
   const auto text = [](const nlohmann::json& value) { return value.get<std::string>(); };
   for (const auto& golden : all["frames"]) {
     const Message& message = message_of(text(golden["msg"]));

@@ -2,19 +2,16 @@
 #include <doctest/doctest.h>
 
 #include <cstdio>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "tests/recorded/recording.hpp"
+#include "tests/recorded/golden.hpp"
 #include "tests/unit/lms400/frames.hpp"
 
 using namespace takt::lms400;
 using namespace takt::test;
 
 TEST_CASE("the whole collection of golden vectors, bit by bit") {
-  const auto file = reference("golden/lms400_telegrams.json");
-  std::ifstream stream(file);
-  const auto all = nlohmann::json::parse(stream);
+  const auto all = golden("lms400_telegrams.json");
   size_t texts = 0, measurements = 0, streams = 0;
   for (const auto& entry : all["telegrams"]) {
     INFO(entry["id"].get<std::string>());
