@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "rt/msg/odometry.hpp"
+
 namespace takt::mapping_3d {
 
 Affine to_affine(const Transform& t) {

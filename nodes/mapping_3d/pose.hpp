@@ -2,7 +2,10 @@
 // Where a camera sits on the robot, and poses as matrices for loops over points.
 #pragma once
 #include "rt/msg/geometry.hpp"
-#include "rt/msg/odometry.hpp"
+
+namespace takt {
+struct Odometry;
+}
 
 namespace takt::mapping_3d {
 

@@ -86,8 +86,10 @@ float Features::cost(const Features& other, int x, int xo, int y, const MatcherP
     return derivatives_[i * per_pixel + k] - other.derivatives_[o * per_pixel + k];
   };
   switch (cost_) {
-    case CostKind::gradient:
-      return std::min(most, static_cast<float>((std::abs(difference(2, 0)) + std::abs(difference(2, 1)) + 1) / 2));
+    case CostKind::gradient: {
+      const int mean = (std::abs(difference(2, 0)) + std::abs(difference(2, 1)) + 1) / 2;
+      return std::min(most, static_cast<float>(mean));
+    }
     case CostKind::census: return std::min(most, static_cast<float>(std::popcount(census_[i] ^ other.census_[o])));
     case CostKind::ssd: return std::min(most, squared_difference(other, i, o));
     case CostKind::rss: return std::min(most, std::sqrt(squared_difference(other, i, o)));
