@@ -8,6 +8,7 @@
 #include "nodes/person_tracking/shirt_place.hpp"
 #include "rt/memory/memory_use.hpp"
 #include "rt/msg/geometry.hpp"
+#include "rt/msg/odometry.hpp"
 
 using namespace takt;
 using namespace takt::person_tracking;
