@@ -113,7 +113,7 @@ TEST_CASE("a damaged log is refused or read, and what is read is consistent") {
   int refused = 0, read = 0;
   for (int round = 0; round < test::rounds(600); ++round) {
     std::string text = good;
-    for (int changes = 1 + round % 4; changes > 0; --changes) {
+    for (int changes = 1 + round % 4; changes > 0 && !text.empty(); --changes) {
       const size_t at = random() % text.size();
       switch (random() % 4) {
         case 0: text[at] = kBytes[random() % (sizeof kBytes - 1)]; break;
