@@ -132,7 +132,9 @@ TEST_CASE("a smaller view: pixels between those of the object, as OpenCV has the
 TEST_CASE("the cascade equals doing each stage for each window that passed the one before, at each scale") {
   Random random(test::seed(61));
   size_t passed = 0, failed = 0;
-  for (int round = 0; round < test::rounds(12); ++round) {
+  // At any scale: windows pass and fail by whole rounds, and three of these may have none that fails.
+  const int rounds = std::max(test::rounds(12), 12);
+  for (int round = 0; round < rounds; ++round) {
     const std::vector<uint8_t> pixels = random.image(kWidth, kHeight);
     const ImageView<const uint8_t> image(pixels.data(), kWidth, kHeight, 3);
     const auto objects = database(random, pixels);
@@ -161,8 +163,8 @@ TEST_CASE("the cascade equals doing each stage for each window that passed the o
       }
     }
   }
-  CHECK(passed >= test::at_scale(100));
-  CHECK(failed >= test::at_scale(100));
+  CHECK(passed >= 100);
+  CHECK(failed >= 100);
 }
 
 TEST_CASE("with a mask the windows that it touches are as without, the others do not pass") {
