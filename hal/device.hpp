@@ -5,6 +5,7 @@
 #include <string_view>
 #include <tl/expected.hpp>
 
+#include "hal/stamp_law.hpp"
 #include "rt/memory/job_calls.hpp"
 #include "rt/source_state.hpp"
 
@@ -85,6 +86,8 @@ class Device {
     stop();
     return start(now_ns).has_value();
   }
+  /// How old what it gives can be: of hardware before open() from the settings alone, of recordings once they are open.
+  virtual StampLaw stamp_law(const JobTimes& jobs) const = 0;
   /// What was lost on the way, and why nothing comes (see SourceReport); on the job thread.
   virtual SourceCounts counts() const { return {}; }
   virtual const char* trouble() const { return ""; }

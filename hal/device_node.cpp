@@ -16,6 +16,16 @@ void DeviceNode::open_in_setup(const Setup& setup) {
   reopen_tries_ = 0;
 }
 
+std::string DeviceNode::broken_declaration() {
+  if (!declared_ || !declared_->unknown.empty()) return "";
+  const StampLaw now = device().stamp_law({});
+  if (!now.unknown.empty()) return "how old what it gives can be, nobody can tell now: " + now.unknown;
+  if (now.lag_ns() <= declared_->lag_ns()) return "";
+  const auto ms = [](int64_t ns) { return std::to_string(static_cast<double>(ns) / 1e6) + " ms"; };
+  return "what it gives can be " + ms(now.lag_ns()) + " old (it takes " + ms(now.latency_ns) + " and comes every " +
+         ms(now.period_ns) + "); with these settings it was to be " + ms(declared_->lag_ns());
+}
+
 bool DeviceNode::running(Job& job) {
   if (double_) double_->keep_up();
   if (started_) return true;

@@ -29,9 +29,12 @@ class DeviceNode : public Node {
   }
   void finish() override { stop_device(); }
   virtual Device& device() = 0;
-  /// After setup: how long before the planned release of a job the stamp of its message may lie, ns. 0 for a device
-  /// that captures when asked.
-  virtual int64_t stamp_lag_ns() const { return 0; }
+  /// How old what its jobs send can be: of hardware what it told before it was opened.
+  virtual StampLaw stamp_law(const JobTimes& jobs) { return declared_ ? *declared_ : device().stamp_law(jobs); }
+  /// Before the device is opened: what it tells now is what admission counts on.
+  void declare() { declared_ = device().stamp_law({}); }
+  /// Once it is open: why what it tells now is more than it declared; empty if it is not.
+  std::string broken_declaration();
   /// Before setup: what the graph says of the device's health.
   void set_health(const DeviceHealthSettings& settings) { health_settings_ = settings; }
   /// Before the start: what stands at the other end of the device's line lives as long as the node does.
@@ -55,6 +58,7 @@ class DeviceNode : public Node {
   void judge(ReadStatus status, Job& job, bool repeated);
 
   bool opens_ = true, started_ = false;
+  std::optional<StampLaw> declared_;
   DeviceHealthSettings health_settings_;
   DeviceHealth health_{health_settings_};
   RetryDelay retry_;

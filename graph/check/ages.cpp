@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <numeric>
 
-#include "hal/device_node.hpp"
 #include "rt/node.hpp"
 #include "rt/sched/analysis/chain_age.hpp"
 #include "rt/sched/analysis/integers.hpp"
@@ -159,8 +158,9 @@ class Ages {
       chain.push_back(m);
     }
     const TaskPlan& device = plan_.tasks[path.front().task];
-    const auto* hardware = dynamic_cast<const DeviceNode*>(device.node);
-    const int64_t lag = hardware != nullptr ? hardware->stamp_lag_ns() : 0;
+    if (!device.source.unknown.empty())
+      bound.why = fmt::format("how old what {} gives can be is not known: {}", device.name, device.source.unknown);
+    const int64_t lag = device.source.lag_ns;
     const analysis::ChainAge age = analysis::chain_age(chain);
     bound.least_ns = std::max(bound.least_ns, lag + analysis::least_chain_age(chain) / ticks_);
     if (!bound.bound_ns) return;

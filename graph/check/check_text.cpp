@@ -76,6 +76,33 @@ std::string ages_table(const ModeCheck& mode) {
   return text;
 }
 
+/// What admission counts on of each device that gives anything: how old, and how long its job may sleep for it.
+std::string sources_table(const Plan& plan) {
+  std::string text = fmt::format("{:<52} {:>12} {:>12}\n", "stamps of a device, at the release of its job", "old ms",
+                                 "waited ms");
+  for (const TaskPlan& task : plan.tasks) {
+    if (!task.device || task.ports.empty()) continue;
+    const bool known = task.source.unknown.empty();
+    text += fmt::format("{:<52} {:>12} {:>12.3f}\n", known ? task.name : task.name + " (not known)",
+                        column(known ? std::optional(task.source.lag_ns) : std::nullopt), to_ms(task.source.wait_ns));
+  }
+  return text;
+}
+
+Json sources_json(const Plan& plan) {
+  Json list = Json::array();
+  for (const TaskPlan& task : plan.tasks) {
+    if (!task.device || task.ports.empty()) continue;
+    const bool known = task.source.unknown.empty();
+    Json row{{"name", task.name},
+             {"lag_ms", number(known ? std::optional(task.source.lag_ns) : std::nullopt)},
+             {"wait_ms", to_ms(task.source.wait_ns)}};
+    if (!known) row["unknown"] = task.source.unknown;
+    list.push_back(std::move(row));
+  }
+  return list;
+}
+
 std::string modes_text(const CheckResult& result) {
   std::string text;
   for (size_t m = result.modes.size() > 1 ? 0 : 1; m < result.modes.size(); ++m) {
@@ -135,7 +162,7 @@ Json mode_json(const ModeCheck& mode) {
 std::string check_text(const GraphSpec& graph, const Plan& plan, const CheckOptions& options,
                        const CheckResult& result) {
   return head_text(graph, plan, options, result) + nodes_table(plan, result.modes.front()) +
-         ages_table(result.modes.front()) + modes_text(result) + pools_table(plan);
+         sources_table(plan) + ages_table(result.modes.front()) + modes_text(result) + pools_table(plan);
 }
 
 Json check_json(const Plan& plan, const CheckOptions& options, const CheckResult& result) {
@@ -167,6 +194,7 @@ Json check_json(const Plan& plan, const CheckOptions& options, const CheckResult
                              {"margin_ms", number(margin_of(whole, t))},
                              {"utilisation", static_cast<double>(task.budget_ns) * 1e-9 * rate}});
   }
+  json["sources"] = sources_json(plan);
   json["chains"] = ages_json(whole, false);
   json["edges"] = ages_json(whole, true);
   json["modes"] = Json::array();

@@ -120,8 +120,11 @@ class Builder {
     PieceSet result;
     result.set.ticks_per_ns = lanes_.set.ticks_per_ns;
     result.set.cores = lanes_.set.cores;
-    for (size_t l = 0; l < lanes_.lanes.size(); ++l)
-      for (int64_t pass = 0; pass < passes_[l]; ++pass) add(l, pass, members_of(l, pass, seldom, phases), result);
+    for (size_t l = 0; l < lanes_.lanes.size(); ++l) {
+      if (lanes_.set.tasks[l].sporadic) add_sporadic(l, result);
+      else
+        for (int64_t pass = 0; pass < passes_[l]; ++pass) add(l, pass, members_of(l, pass, seldom, phases), result);
+    }
     const auto others = lanes_.set.tasks.begin() + static_cast<ptrdiff_t>(lanes_.lanes.size());
     result.set.tasks.insert(result.set.tasks.end(), others, lanes_.set.tasks.end());
     return result;
@@ -144,6 +147,15 @@ class Builder {
     return members;
   }
 
+  /// All members in every pass, and passes at any time.
+  void add_sporadic(size_t l, PieceSet& result) const {
+    Piece piece{l, Members(lanes_.lanes[l].size())};
+    std::iota(piece.members.begin(), piece.members.end(), size_t{0});
+    piece.woken_ns = lane_wait_ns(plan_, lanes_.lanes[l]);
+    result.set.tasks.push_back(lanes_.set.tasks[l]);
+    result.pieces.push_back(std::move(piece));
+  }
+
   void add(size_t l, int64_t pass, const Members& members, PieceSet& result) const {
     const analysis::TimedTask& whole = lanes_.set.tasks[l];
     const analysis::Ticks ticks = lanes_.set.ticks_per_ns;
@@ -153,7 +165,7 @@ class Builder {
       task.period = whole.period * passes_[l];
       task.offset = whole.offset + whole.period * pass + piece.ready_ns * ticks;
       task.deadline = whole.deadline - piece.ready_ns * ticks;
-      task.jitter = (piece.ready_by_ns - piece.ready_ns) * ticks;
+      task.jitter = (piece.ready_by_ns - piece.ready_ns) * ticks + (piece.ready_ns == 0 ? whole.jitter : 0);
       task.budget = work_until_ns(plan_, lanes_, piece, piece.members.size() - 1, overheads_) * ticks;
       result.set.tasks.push_back(std::move(task));
       result.pieces.push_back(std::move(piece));

@@ -18,6 +18,8 @@ struct Piece {
   /// That instant is the release of its first member: what the pass did before is ready earlier in any case.
   bool prompt = true;
   bool waits = false;  ///< the worker waits within it, too, for an output to become visible
+  /// So long after that instant its work may come, which the response of its task does not count: it is sporadic.
+  int64_t woken_ns = 0;
 };
 
 /// One way in which the members that are not in every pass may fall.

@@ -57,7 +57,7 @@ std::optional<int64_t> PieceBounds::finish_of(const Place& place) const {
                             : bound_of({place.piece, ticks(work_until_ns(plan_, lanes_, piece, place.at, overheads_))});
   if (!response) return std::nullopt;
   if (plan_.policy == Policy::cooperative && place.at > 0) return std::min(*response, finish_in_turn(place));
-  return piece.ready_ns + *response;
+  return piece.ready_ns + piece.woken_ns + *response;
 }
 
 /// Nobody comes between the members of a piece: each begins when the one before is done, and what it follows is seen.

@@ -41,11 +41,13 @@ Json attached_json(const record::LogFile& file, const char* name) {
 }
 
 /// The outputs of the devices as the record has them; everything else is made here.
-class RecordedCapacities final : public graph::CapacityExchange {
+class RecordedFacts final : public graph::FactExchange {
  public:
-  explicit RecordedCapacities(const Json& plan) : plan_(plan) {}
+  explicit RecordedFacts(const Json& plan) : plan_(plan) {}
   void tell(size_t, const std::optional<Capacity>&) override {}
   std::optional<Capacity> wait_for(size_t port) override { return log::capacity_of(plan_, port); }
+  void tell_source(size_t, const SourcePlan&) override {}
+  SourcePlan wait_for_source(size_t) override { return {0, 0, "it is recorded"}; }
 
  private:
   const Json& plan_;
@@ -105,11 +107,11 @@ class Replay {
     recorded_ = attached_json(*file_, "plan.json");
     int code = load(run, prepared_);
     if (code == kOk) {
-      RecordedCapacities capacities(recorded_);
+      RecordedFacts facts(recorded_);
       graph::ComposeOptions how;
       how.output = options_.output;
       how.seed = run.seed;
-      how.exchange = &capacities;
+      how.exchange = &facts;
       how.owns = [&](const std::string& id) {
         return std::none_of(prepared_.graph->devices.begin(), prepared_.graph->devices.end(),
                             [&](const graph::DeviceSpec& device) { return device.id == id; });

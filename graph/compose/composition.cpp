@@ -35,10 +35,15 @@ class Composer {
     if (auto made = make_devices(make_device); !made) return tl::make_unexpected(made.error());
     make_nodes();
     connect();
+    for (size_t t = 0; t < result_.plan.tasks.size(); ++t)
+      if (result_.plan.tasks[t].device && owns(result_.plan.tasks[t].name)) ask_source(t);
     if (auto ready = set_up(); !ready) return tl::make_unexpected(ready.error());
     for (size_t p = 0; p < result_.plan.ports.size(); ++p)
       result_.plan.ports[p].capacity = capacity_of(p).value_or(Capacity{});
     size_ports(result_.plan, options_.observers);
+    for (size_t t = 0; t < result_.plan.tasks.size(); ++t)
+      if (TaskPlan& task = result_.plan.tasks[t]; task.device && !owns(task.name))
+        task.source = options_.exchange->wait_for_source(t);
     return std::move(result_);
   }
 
@@ -66,6 +71,16 @@ class Composer {
   void add_device(const DeviceSpec& device, std::unique_ptr<Node> node) {
     add(device.id, std::move(node), true, device.position);
     if (auto& task = result_.plan.tasks.back(); !task.rate && task.on_task == kNone) task.rate = device.rate;
+  }
+
+  /// Before anything is set up: what is known in advance does not depend on what the device is like today.
+  void ask_source(size_t t) {
+    TaskPlan& task = result_.plan.tasks[t];
+    auto* const hardware = dynamic_cast<DeviceNode*>(task.node);
+    if (hardware == nullptr) return;
+    StampLaw law = hardware->stamp_law({task.rate, task.offset_ns});
+    task.source = {law.lag_ns(), law.wait_ns, std::move(law.unknown)};
+    if (options_.exchange != nullptr) options_.exchange->tell_source(t, task.source);
   }
 
   bool owns(const std::string& id) const { return !options_.owns || options_.owns(id); }
@@ -278,7 +293,9 @@ Composition outline(const GraphSpec& graph, const NodeTypes& types, const Clock&
   return Composer(graph, types, clock, {}).outline();
 }
 
-void complete(Plan& plan, CapacityExchange& exchange, const Observers& observers) {
+void complete(Plan& plan, FactExchange& exchange, const Observers& observers) {
+  for (size_t t = 0; t < plan.tasks.size(); ++t)
+    if (plan.tasks[t].device) plan.tasks[t].source = exchange.wait_for_source(t);
   for (size_t p = 0; p < plan.ports.size(); ++p) plan.ports[p].capacity = exchange.wait_for(p).value_or(Capacity{});
   size_ports(plan, observers);
 }

@@ -21,21 +21,25 @@ struct ComposeError {
 /// Makes the hardware node of a device entry.
 using DeviceFactory = std::function<tl::expected<std::unique_ptr<Node>, ComposeError>(const DeviceSpec&)>;
 
-/// Where the processes of a run tell each other how large their outputs can become.
-class CapacityExchange {
+/// Where the processes of a run tell each other what only the owner of a node knows, so that all have one plan: how
+/// large its outputs can become, and when a hardware node's data come about.
+class FactExchange {
  public:
-  virtual ~CapacityExchange() = default;
+  virtual ~FactExchange() = default;
   /// Nothing: the node could not be set up.
   virtual void tell(size_t port, const std::optional<Capacity>& capacity) = 0;
   /// Waits for the process that owns the port. Throws std::runtime_error if that will never tell.
   virtual std::optional<Capacity> wait_for(size_t port) = 0;
+  virtual void tell_source(size_t task, const SourcePlan& source) = 0;
+  /// Waits as well.
+  virtual SourcePlan wait_for_source(size_t task) = 0;
 };
 
 struct ComposeOptions {
   std::filesystem::path output;  ///< where nodes may write files at the end
   uint64_t seed = 1;
   std::function<bool(const std::string& id)> owns = {};  ///< nodes and devices this process sets up; empty: all
-  CapacityExchange* exchange = nullptr;                  ///< needed where not all are owned
+  FactExchange* exchange = nullptr;                      ///< needed where not all are owned
   Observers observers = {};
 };
 
@@ -53,8 +57,8 @@ tl::expected<Composition, ComposeError> compose(const GraphSpec& graph, const No
 /// The plan as far as it is known before any node is set up: tasks, edges, ports without capacities.
 Composition outline(const GraphSpec& graph, const NodeTypes& types, const Clock& clock);
 
-/// Adds to an outline what the owners of its outputs tell: capacities, hence pools.
-void complete(Plan& plan, CapacityExchange& exchange, const Observers& observers);
+/// Adds to an outline what the owners of its nodes tell: capacities, hence pools, and what is known of sources.
+void complete(Plan& plan, FactExchange& exchange, const Observers& observers);
 
 /// All node types this build knows.
 NodeTypes node_types();

@@ -60,6 +60,20 @@ std::optional<Capacity> BoardExchange::wait_for(size_t port) {
   return record.known.load() == CapacityRecord::kTold ? std::optional(record.capacity) : std::nullopt;
 }
 
+void BoardExchange::tell_source(size_t task, const SourcePlan& source) {
+  SourceFacts& facts = board_.source_facts(task);
+  facts.lag_ns = source.lag_ns;
+  facts.wait_ns = source.wait_ns;
+  facts.unknown = BoundedText<SourceFacts::kLongest>(source.unknown);
+  facts.known.store(true, std::memory_order_release);
+}
+
+SourcePlan BoardExchange::wait_for_source(size_t task) {
+  const SourceFacts& facts = board_.source_facts(task);
+  wait_until([&] { return facts.known.load(std::memory_order_acquire); });
+  return {facts.lag_ns, facts.wait_ns, facts.unknown.c_str()};
+}
+
 bool wait_until(const std::function<bool()>& done, const std::function<bool()>& broken,
                 std::chrono::milliseconds between_looks) {
   while (!done()) {

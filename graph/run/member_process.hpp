@@ -13,12 +13,14 @@
 
 namespace takt::command {
 
-/// Capacities over the board. wait_for() polls: it is used before the start only.
-class BoardExchange final : public graph::CapacityExchange {
+/// Facts over the board. The waits poll: they are used before the start only.
+class BoardExchange final : public graph::FactExchange {
  public:
   explicit BoardExchange(RunBoard& board) : board_(board) {}
   void tell(size_t port, const std::optional<Capacity>& capacity) override;
   std::optional<Capacity> wait_for(size_t port) override;
+  void tell_source(size_t task, const SourcePlan& source) override;
+  SourcePlan wait_for_source(size_t task) override;
 
  private:
   RunBoard& board_;

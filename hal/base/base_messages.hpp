@@ -14,6 +14,7 @@ constexpr uint32_t kWheelCounts = 1u << 24;  ///< counts are modulo this
 enum MessagePlace : size_t { kNodeCommand, kWheels, kMotion, kCommand, kHostHeartbeat, kHeartbeat };
 std::span<const can::Message> messages();
 constexpr can::NodePlaces kPlaces{32, kNodeCommand, kHostHeartbeat, kHeartbeat};
+constexpr int64_t kWheelsCycle_ns = 10'000'000;  ///< GenMsgCycleTime of BASE_Wheels
 
 /// Places of the signals in a message's values.
 struct Wheels {

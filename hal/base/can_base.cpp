@@ -21,7 +21,7 @@ double fastest_wheel_m_s(const CanBaseSettings& settings) {
 }  // namespace
 
 CanBase::CanBase(std::string id, CanBaseSettings settings, const Clock& clock)
-    : HostDriver(std::move(id), settings.interface, clock, messages(), kPlaces),
+    : HostDriver(std::move(id), settings.interface, clock, messages(), kPlaces, kWheelsCycle_ns),
       settings_(std::move(settings)),
       odometry_(settings_.wheels, kWheelCounts, fastest_wheel_m_s(settings_)) {}
 

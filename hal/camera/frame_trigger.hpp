@@ -37,6 +37,8 @@ class FrameTrigger {
   const Pulse* of(int64_t exposed_ns, int64_t within_ns) const;
 
   uint32_t pulses() const { return given_; }
+  /// Null: none yet.
+  const Pulse* newest() const { return given_ == 0 ? nullptr : &pulses_[(given_ - 1) % kKept]; }
   const FrameTriggerSettings& settings() const { return settings_; }
 
  private:

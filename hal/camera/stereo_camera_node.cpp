@@ -17,6 +17,7 @@ void StereoCameraNode::setup(Setup& setup) {
   previous_.assign(static_cast<size_t>(health_samples(format_.width, format_.height, thresholds_.step_px)), 0);
   has_previous_ = false;
   rate_ = setup.rate;
+  at_its_own_rate_ = stamp_law({setup.rate, setup.offset_ns}).period_ns > 0;
   offset_ns_ = setup.offset_ns;
 }
 
@@ -49,7 +50,9 @@ void StereoCameraNode::run(Job& job) {
       static_cast<size_t>(format_.width) * static_cast<size_t>(format_.height) * static_cast<size_t>(format_.channels);
   message->left.resize(bytes);
   message->right.resize(bytes);
-  const StereoFrame frame = camera_->read(message->left_view(), message->right_view(), job.deadline_ns());
+  // Of a camera at a rate of its own what is there: whoever waits for the next frame sleeps as long as it likes.
+  const int64_t until_ns = at_its_own_rate_ ? job.release_ns() : job.deadline_ns();
+  const StereoFrame frame = camera_->read(message->left_view(), message->right_view(), until_ns);
   const bool data = frame.status == ReadStatus::ok || frame.status == ReadStatus::partial;
   HealthReading health;
   if (data) health = assess_health(message->left_view(), thresholds_, previous_, has_previous_);

@@ -32,7 +32,7 @@ class StereoCameraNode final : public DeviceNode {
   std::optional<Rate> rate_;
   int64_t offset_ns_ = 0;
   std::vector<uint8_t> previous_;
-  bool has_previous_ = false;
+  bool has_previous_ = false, at_its_own_rate_ = false;
   int64_t triggered_ns_ = INT64_MIN;
 };
 

@@ -278,6 +278,15 @@ StereoFormat V4l2Camera::format() const {
           camera_in_robot(settings_.rig, 0, 0)};
 }
 
+StampLaw V4l2Camera::stamp_law(const JobTimes&) const {
+  const double period_s = 1 / rate_hz_;
+  const double exposure_s = settings_.exposure_s > 0 ? settings_.exposure_s : settings_.longest_exposure_s;
+  const auto ns = [&](double s) { return std::llround(1e9 * (s > 0 ? s : period_s)); };
+  const int64_t until_here_ns = ns(exposure_s) + ns(settings_.transfer_s);
+  if (trigger_) return {0, 0, until_here_ns, {}};
+  return {until_here_ns, ns(0), 0, {}};
+}
+
 const char* V4l2Camera::trouble() const {
   return untriggered_in_row_ < kIoErrorsToLoss
              ? ""
@@ -372,16 +381,36 @@ StereoFrame V4l2Camera::read(ImageView<uint8_t> left, ImageView<uint8_t> right, 
   if (trigger_ && trigger_->give() != 0) return lose();
   Frame frame;
   Taken taken = take_newest(frame);
-  if (taken == Taken::none) {
-    const int64_t rest_ns = std::min(deadline_ns - kMoving_ns, clock_.now_ns() + kLongestWait_ns) - clock_.now_ns();
-    const short events = rest_ns > 0 ? device_->wait(rest_ns) : static_cast<short>(0);
-    taken = take_newest(frame);
+  if (taken == Taken::none || (taken == Taken::frame && awaits_another(frame))) {
+    const short events = wait(deadline_ns);
+    Frame next;
+    const Taken then = take_newest(next);
+    if (then == Taken::frame && taken == Taken::frame) {
+      ++counters_.skipped;
+      if (!queue(frame.index)) return lose();
+    }
+    if (then == Taken::frame) frame = next;
+    if (then != Taken::none) taken = then;
     if (taken == Taken::none && (events & (POLLERR | POLLHUP | POLLNVAL)) != 0) taken = Taken::lost;
   }
   if (taken == Taken::frame) return deliver(frame, left, right);
   const auto three_periods_ns = static_cast<int64_t>(3e9 / rate_hz_);
   if (taken == Taken::lost || clock_.now_ns() - alive_ns_ > std::max(kSilence_ns, three_periods_ns)) return lose();
   return {};
+}
+
+/// It is of an earlier pulse than the newest: that read ended too early for it.
+bool V4l2Camera::awaits_another(const Frame& frame) const {
+  return trigger_ && static_cast<int32_t>(frame.sequence - (trigger_->pulses() - 1)) < 0;
+}
+
+/// Until there is a frame, not longer than one of the newest pulse can take; what poll() saw.
+short V4l2Camera::wait(int64_t deadline_ns) {
+  const int64_t now_ns = clock_.now_ns();
+  int64_t until_ns = std::min(deadline_ns - kMoving_ns, now_ns + kLongestWait_ns);
+  if (const FrameTrigger::Pulse* pulse = trigger_ ? trigger_->newest() : nullptr)
+    until_ns = std::min(until_ns, pulse->stamp_ns + stamp_law({}).wait_ns);
+  return until_ns > now_ns ? device_->wait(until_ns - now_ns) : static_cast<short>(0);
 }
 
 StereoFrame V4l2Camera::lose() {

@@ -23,6 +23,7 @@ struct V4l2CameraSettings {
   Rate rate{15, 1};          ///< asked for; the device may give another
   uint32_t buffers = 4;      ///< asked for, 2..8
   double exposure_s = 0;     ///< 0: as the device is set
+  double longest_exposure_s = 0, transfer_s = 0;  ///< at most; 0: a whole period each, as long as either can take
   double gain = -1;          ///< in the device's own steps; below 0: as it is set
   double stamp_delay_s = 0;  ///< from the begin of the exposure to the device's stamp
   bool dmabuf = false;       ///< buffers are exported, and lent until the next frame
@@ -65,6 +66,8 @@ class V4l2Camera final : public StereoCamera {
   DeclaredCalls declared_calls() const override;
   SourceCounts counts() const override;
   const char* trouble() const override;
+  /// At a rate of its own: exposure, transfer and a period. Triggered: its jobs wait for the first two.
+  StampLaw stamp_law(const JobTimes&) const override;
   StereoFormat format() const override;
   void trigger(int64_t at_ns) override;
   /// disconnected: the device is gone, its queue has an error, or it gave nothing for three periods and a second.
@@ -110,6 +113,8 @@ class V4l2Camera final : public StereoCamera {
   Taken take_one(Frame& frame);
   Taken take_newest(Frame& frame);
   StereoFrame deliver(const Frame& frame, ImageView<uint8_t> left, ImageView<uint8_t> right);
+  bool awaits_another(const Frame& frame) const;
+  short wait(int64_t deadline_ns);
   StereoFrame lose();
   bool match(Frame& frame);
   uint64_t* left_out(Frame& frame);

@@ -17,6 +17,8 @@ template <class Interface, class Reading>
 class HostDriver : public Interface {
  public:
   static constexpr int64_t kStale_ns = 50'000'000;  ///< older than this a reading is no news (devices.md 4.3)
+  /// Every message of head and base at once, 17 frames of 0.27 ms (devices.md 4.1).
+  static constexpr int64_t kBusDelay_ns = 4'600'000;
 
   DeviceResult open() override {
     if (open_) return {};
@@ -56,6 +58,8 @@ class HostDriver : public Interface {
     if (faulted()) reset_fault();
     return station_.link() == Link::up && !faulted();
   }
+  /// Stamps are those of the arrival: a cycle of the message that makes readings, and what other frames may delay it.
+  StampLaw stamp_law(const JobTimes&) const override { return {0, cycle_ns_ + kBusDelay_ns, 0, {}}; }
   DeclaredCalls declared_calls() const override {
     return {bit(JobCall::socket) | bit(JobCall::file), "frames are taken from and given to a socket that never waits"};
   }
@@ -78,8 +82,9 @@ class HostDriver : public Interface {
 
  protected:
   HostDriver(std::string id, std::string interface, const Clock& clock, std::span<const Message> table,
-             const NodePlaces& places)
+             const NodePlaces& places, int64_t cycle_ns)
       : id_(std::move(id)),
+        cycle_ns_(cycle_ns),
         clock_(clock),
         station_(std::move(interface), clock, table, Sender::host),
         guard_(places),
@@ -133,6 +138,7 @@ class HostDriver : public Interface {
   }
 
   std::string id_;
+  int64_t cycle_ns_;  ///< of the message that makes readings
   const Clock& clock_;
   Station station_;
   NodeGuard guard_;

@@ -355,6 +355,8 @@ NodeResult make_v4l2_camera(const DeviceConfig& config, Settings& settings, cons
   camera.rate = rate_of(settings);
   camera.buffers = static_cast<uint32_t>(settings.count("buffers", camera.buffers, 2, v4l2::V4l2Camera::kMostBuffers));
   camera.exposure_s = settings.quantity("exposure", Dimension::time, camera.exposure_s);
+  camera.longest_exposure_s = settings.quantity("longest_exposure", Dimension::time, camera.longest_exposure_s);
+  camera.transfer_s = settings.quantity("transfer", Dimension::time, camera.transfer_s);
   camera.gain = settings.quantity("gain", Dimension::number, camera.gain);
   camera.stamp_delay_s = settings.quantity("stamp_delay", Dimension::time, camera.stamp_delay_s);
   camera.dmabuf = settings.flag("dmabuf", camera.dmabuf);
@@ -393,8 +395,12 @@ NodeResult make_driver(const DeviceConfig& config, Settings& settings, const Clo
 
 NodeResult make_hardware(const DeviceConfig& config, Settings& settings, const Clock& clock, Seams seams = {}) {
   NodeResult node = make_driver(config, settings, clock, std::move(seams));
-  if (config.plugged) return opened(std::move(node));
-  if (node) (*node)->leave_closed();
+  if (!node) return node;
+  (*node)->declare();
+  if (!config.plugged) (*node)->leave_closed();
+  if (!config.plugged || !(node = opened(std::move(node)))) return node;
+  if (const std::string broken = (*node)->broken_declaration(); !broken.empty())
+    return device_failure(config.id, broken, "make the settings say what the device does: rate, exposure, transfer, baud");
   return node;
 }
 

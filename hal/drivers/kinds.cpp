@@ -79,6 +79,8 @@ constexpr SettingInfo kCamera[] = {
     {"bayer", "v4l2", text, false, "rggb, grbg, gbrg or bggr: debayered to BGR; none (stereo debayers better)"},
     {"buffers", "v4l2", count, false, "frames that wait in the kernel's driver; 4"},
     {"exposure", "v4l2", time, false, "exposure time; as the camera is set"},
+    {"longest_exposure", "v4l2", time, false, "of an automatic exposure; a whole period of its rate"},
+    {"transfer", "v4l2", time, false, "from the end of the exposure until the frame is here; a whole period"},
     {"gain", "v4l2", number, false, "gain in the camera's own steps; as the camera is set"},
     {"stamp_delay", "v4l2", time, false, "from the begin of the exposure to the device's stamp; 0s"},
     {"trigger_line", "v4l2", text, false, "output of a GPIO chip that makes it expose, one pulse a job; none: its rate"},

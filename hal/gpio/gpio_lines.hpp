@@ -33,6 +33,8 @@ class GpioLines final : public DigitalLines {
   DeviceResult start(int64_t epoch_ns) override;
   void stop() override;
   bool restart(int64_t now_ns) override;
+  /// Levels are those of the read.
+  StampLaw stamp_law(const JobTimes&) const override { return {}; }
   DeclaredCalls declared_calls() const override;
   uint32_t count() const override { return static_cast<uint32_t>(lines_.size()); }
   LinesReading read(int64_t wanted_ns) override;

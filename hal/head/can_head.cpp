@@ -28,7 +28,7 @@ HeadRequest next_request(const HeadView& view, const std::optional<HeadAngles>& 
 }
 
 CanHead::CanHead(std::string id, CanHeadSettings settings, const Clock& clock)
-    : HostDriver(std::move(id), settings.interface, clock, messages(), kPlaces),
+    : HostDriver(std::move(id), settings.interface, clock, messages(), kPlaces, kStatusCycle_ns),
       settings_(std::move(settings)),
       limits_(settings_.limits) {}
 

@@ -27,6 +27,7 @@ enum MessagePlace : size_t {
 };
 std::span<const can::Message> messages();
 constexpr can::NodePlaces kPlaces{16, kNodeCommand, kHostHeartbeat, kHeartbeat};
+constexpr int64_t kStatusCycle_ns = 10'000'000;  ///< GenMsgCycleTime of HEAD_PosStatus (devices.md 4.1)
 
 constexpr double kDegree = std::numbers::pi / 180;
 

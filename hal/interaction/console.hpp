@@ -24,6 +24,7 @@ class Console final : public Interaction {
   DeviceResult start(int64_t) override;
   void stop() override { started_ = false; }
   bool restart(int64_t now_ns) override;
+  StampLaw stamp_law(const JobTimes&) const override { return {}; }
   InteractionReading read(int64_t wanted_ns) override;
   bool say(std::string_view text) override;
   void go_on_after(uint32_t number) override { number_ = number; }

@@ -32,6 +32,7 @@ class ScriptedPerson final : public Interaction {
     return {};
   }
   void stop() override { started_ = false; }
+  StampLaw stamp_law(const JobTimes&) const override { return {}; }
   InteractionReading read(int64_t wanted_ns) override;
   bool say(std::string_view) override { return started_; }
 

@@ -15,7 +15,7 @@ struct ScanFormat {
   double sweep_s = 0;  ///< from the first to the last beam
   double rate_hz = 0;  ///< as it comes, on average
   Transform sensor_in_robot;
-  double stamp_lag_s = 0;  ///< how long before a read the stamp of what it gives may lie; 0: sweep_s
+  StampLaw stamps;  ///< stamps are those of the first beam: sweep and sending are in it
 };
 
 struct ScanReading {
@@ -28,7 +28,8 @@ struct ScanReading {
 /// A planar laser scanner (SICK LMS200, LMS400). See Device for the life cycle and the thread rules.
 class LaserScanner : public Device {
  public:
-  virtual ScanFormat format() const = 0;  ///< valid after open()
+  virtual ScanFormat format() const = 0;  ///< valid after open(); of hardware without it, but for what it tells itself
+  StampLaw stamp_law(const JobTimes&) const override { return format().stamps; }
 
   /// Writes the newest complete sweep that was not delivered yet: format().beams ranges in metres, 0 for no return and
   /// for flagged values (dazzled, beyond range; devices.md 1.7). Scanners are free-running: a simulated one has

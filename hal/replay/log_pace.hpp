@@ -16,6 +16,8 @@ struct LogPace {
   int64_t start_ns = 0;  ///< lines before this are left out
 
   int64_t stamp_ns(int64_t epoch_ns, int64_t log_ns) const;
+  /// A time of the log in the run.
+  int64_t in_run_ns(int64_t log_ns) const { return stamp_ns(0, start_ns + log_ns); }
 };
 
 /// Refuses a speed out of range, and a start that leaves nothing or makes a run wait for more than a day. `what` is

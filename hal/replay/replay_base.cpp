@@ -55,7 +55,9 @@ DeviceResult ReplayBase::open() {
 
 void ReplayBase::find_limits() {
   limits_ = {};
+  longest_gap_ns_ = 0;
   for (size_t i = 0; i < readings_.size(); ++i) {
+    if (i > 0) longest_gap_ns_ = std::max(longest_gap_ns_, readings_[i].stamp_ns - readings_[i - 1].stamp_ns);
     limits_.speed_m_s = std::max(limits_.speed_m_s, std::abs(readings_[i].speed_m_s));
     limits_.turn_rad_s = std::max(limits_.turn_rad_s, std::abs(readings_[i].turn_rad_s));
     if (i == 0 || readings_[i].stamp_ns == readings_[i - 1].stamp_ns) continue;

@@ -26,6 +26,8 @@ class ReplayBase final : public MobileBase {
   void close() override;
   DeviceResult start(int64_t epoch_ns) override;
   void stop() override { started_ = false; }
+  /// The longest distance of two lines.
+  StampLaw stamp_law(const JobTimes&) const override { return {0, settings_.pace.in_run_ns(longest_gap_ns_), 0, {}}; }
   BaseLimits limits() const override { return limits_; }
   BaseReading read(int64_t wanted_ns, int64_t deadline_ns) override;
   bool command(double, double, int64_t) override { return false; }
@@ -37,7 +39,7 @@ class ReplayBase final : public MobileBase {
   ReplayBaseSettings settings_;
   std::vector<BaseReading> readings_;  ///< stamps in the time of the log
   BaseLimits limits_;
-  int64_t end_ns_ = 0, epoch_ns_ = 0;
+  int64_t longest_gap_ns_ = 0, end_ns_ = 0, epoch_ns_ = 0;  ///< the first two in the log
   size_t next_ = 0;         ///< first reading that is not due yet
   bool delivered_ = false;  ///< the reading before next_
   bool open_ = false, started_ = false, ended_ = false;

@@ -157,6 +157,16 @@ int64_t ReplayCamera::stamp_of(int64_t frame) const {
   return settings_.rate.release_ns(epoch_ns_, frame);
 }
 
+StampLaw ReplayCamera::stamp_law(const JobTimes& jobs) const {
+  if (!jobs.rate) return StampLaw::none("its jobs have no rate, and each delivers one recorded frame");
+  StampLaw law;
+  for (int64_t frame = 0; frame < frames_; ++frame) {
+    const int64_t released_ns = jobs.rate->release_ns(epoch_ns_ + jobs.offset_ns, frame);
+    law.latency_ns = std::max(law.latency_ns, released_ns - stamp_of(frame));
+  }
+  return law;
+}
+
 void ReplayCamera::trigger(int64_t at_ns) {
   triggered_ns_ = at_ns;
   has_trigger_ = ever_triggered_ = true;

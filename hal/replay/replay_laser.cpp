@@ -18,12 +18,14 @@ DeviceResult ReplayLaser::open() {
       check_pace(id_, settings_.log, settings_.pace, "scan", any ? std::optional(first->time_ns) : std::nullopt);
   if (!usable) return usable;
 
-  format_ = {log->beams, log->first_angle_rad, log->step_rad, log->max_range_m, 0, 0, {}};
+  format_ = {log->beams, log->first_angle_rad, log->step_rad, log->max_range_m, 0, 0, {}, {}};
   if (settings_.max_range_m > 0) format_.max_range_m = settings_.max_range_m;
   format_.sensor_in_robot.y = log->laser_ahead_m;
   if (settings_.sensor_in_robot) format_.sensor_in_robot = *settings_.sensor_in_robot;
   time_ns_.clear();
   for (auto scan = first; scan != log->scans.end(); ++scan) time_ns_.push_back(scan->time_ns);
+  for (size_t i = 1; i < time_ns_.size(); ++i)
+    format_.stamps.period_ns = std::max(format_.stamps.period_ns, settings_.pace.in_run_ns(time_ns_[i] - time_ns_[i - 1]));
   if (const int64_t lasts_ns = time_ns_.back() - time_ns_.front(); lasts_ns > 0)
     format_.rate_hz =
         settings_.pace.speed * static_cast<double>(time_ns_.size() - 1) * 1e9 / static_cast<double>(lasts_ns);

@@ -20,7 +20,7 @@ class ClientNode final : public LinkNode {
   ClientNode(std::unique_ptr<LinkDevice> device, int64_t lag_ns) : LinkNode(std::move(device)), lag_ns_(lag_ns) {}
   void setup(Setup& setup) override;
   void run(Job& job) override;
-  int64_t stamp_lag_ns() const override { return lag_ns_; }
+  StampLaw stamp_law(const JobTimes&) override { return {lag_ns_, 0, 0, {}}; }
 
  private:
   void command(const Job& job);

@@ -19,6 +19,8 @@ class ServiceNode final : public LinkNode {
       : LinkNode(std::move(device)), watchdog_ns_(watchdog_ns) {}
   void setup(Setup& setup) override;
   void run(Job& job) override;
+  /// A client's velocity keeps its stamp, and counts for so long.
+  StampLaw stamp_law(const JobTimes&) override { return {watchdog_ns_, 0, 0, {}}; }
 
  private:
   void command(int64_t now_ns);

@@ -28,6 +28,7 @@ class FailingDevice : public Interface {
   DeviceResult open() override { return inner_->open(); }
   void close() override { inner_->close(); }
   DeclaredCalls declared_calls() const override { return inner_->declared_calls(); }
+  StampLaw stamp_law(const JobTimes& jobs) const override { return inner_->stamp_law(jobs); }
   DeviceResult start(int64_t epoch_ns) override {
     schedule_.begin(epoch_ns);
     plugged_ = true;

@@ -42,6 +42,8 @@ class SimCamera final : public StereoCamera {
   void close() override;
   DeviceResult start(int64_t epoch_ns) override;
   void stop() override;
+  /// Of one that is triggered for each read.
+  StampLaw stamp_law(const JobTimes&) const override { return {}; }
   StereoFormat format() const override;
   void trigger(int64_t at_ns) override;
   StereoFrame read(ImageView<uint8_t> left, ImageView<uint8_t> right, int64_t deadline_ns) override;

@@ -20,9 +20,14 @@ DeviceResult SimLaser::start(int64_t epoch_ns) {
   return {};
 }
 ScanFormat SimLaser::format() const {
-  return {model_.beams,          -model_.fov_rad / 2, model_.fov_rad / (model_.beams - 1),
-          model_.max_range_m,    model_.sweep_s,      0,
-          model_.sensor_in_robot};
+  return {model_.beams,
+          -model_.fov_rad / 2,
+          model_.fov_rad / (model_.beams - 1),
+          model_.max_range_m,
+          model_.sweep_s,
+          0,
+          model_.sensor_in_robot,
+          {static_cast<int64_t>(model_.sweep_s * 1e9), 0, {}}};
 }
 ScanReading SimLaser::read(std::span<float> range_m, int64_t wanted_ns, int64_t deadline_ns) {
   ScanReading reading;

@@ -38,6 +38,7 @@ class SimHead final : public CameraHead {
   void close() override {}
   DeviceResult start(int64_t epoch_ns) override;
   void stop() override { started_ = false; }
+  StampLaw stamp_law(const JobTimes&) const override { return {}; }
   HeadLimits limits() const override { return simulation_.head_limits(); }
   HeadReading read(int64_t wanted_ns, int64_t deadline_ns) override;
   bool command(double pan_rad, double tilt_rad, int64_t at_ns) override;
@@ -57,6 +58,7 @@ class SimBase final : public MobileBase {
   void close() override {}
   DeviceResult start(int64_t epoch_ns) override;
   void stop() override { started_ = false; }
+  StampLaw stamp_law(const JobTimes&) const override { return {}; }
   BaseLimits limits() const override { return {1.4, 1.35, 1.2}; }
   BaseReading read(int64_t wanted_ns, int64_t deadline_ns) override;
   /// Always false while the base drives a path: the command is ignored.
@@ -78,6 +80,7 @@ class SimLines final : public DigitalLines {
   void close() override {}
   DeviceResult start(int64_t epoch_ns) override;
   void stop() override { started_ = false; }
+  StampLaw stamp_law(const JobTimes&) const override { return {}; }
   uint32_t count() const override { return simulation_.line_count(); }
   LinesReading read(int64_t wanted_ns) override;
   bool write(uint32_t, bool, int64_t) override { return false; }  // the simulated lines are inputs

@@ -30,6 +30,7 @@ class SimObjectSensor final : public ObjectSensor {
   void close() override {}
   DeviceResult start(int64_t epoch_ns) override;
   void stop() override { started_ = false; }
+  StampLaw stamp_law(const JobTimes&) const override { return {}; }
   uint32_t most_objects() const override { return static_cast<uint32_t>(sought_.size()); }
   ObjectReading read(ObjectReports& reports, int64_t wanted_ns, int64_t deadline_ns) override;
 
@@ -56,6 +57,7 @@ class SimActor final : public Actor {
   void close() override {}
   DeviceResult start(int64_t epoch_ns) override;
   void stop() override;
+  StampLaw stamp_law(const JobTimes&) const override { return {}; }
   bool command(const ActionCommand& command, int64_t at_ns) override;
   ActorReading read(int64_t wanted_ns, int64_t deadline_ns) override;
 

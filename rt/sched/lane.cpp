@@ -130,6 +130,10 @@ int64_t longest_lead_ns(const Plan& plan, const std::vector<size_t>& members) {
   return std::min(plan.anticipate_ns, lane_span_ns(plan, members) / 20);
 }
 
+int64_t lane_wait_ns(const Plan& plan, const std::vector<size_t>& members) {
+  return plan.tasks[members.front()].source.wait_ns;
+}
+
 int64_t lane_span_ns(const Plan& plan, const std::vector<size_t>& members) {
   const TaskPlan& head = plan.tasks[members.front()];
   if (members.size() == 1) return head.deadline_ns;

@@ -89,6 +89,8 @@ int64_t lane_budget_ns(const Plan& plan, const std::vector<size_t>& members);
 /// Bound of the time before a release at which a worker of that lane may be woken (Plan::anticipate_ns): no more than a
 /// twentieth of what the pass has.
 int64_t longest_lead_ns(const Plan& plan, const std::vector<size_t>& members);
+/// So long after its release a worker of that lane may sleep for what its head, a hardware node, has asked for.
+int64_t lane_wait_ns(const Plan& plan, const std::vector<size_t>& members);
 /// Longest time from the head's release to the last follower's deadline.
 int64_t lane_span_ns(const Plan& plan, const std::vector<size_t>& members);
 

@@ -84,6 +84,7 @@ LaneTasks unplaced(const Plan& plan, const Overheads& o) {
     task.deadline = std::min(task.period, lane_span_ns(plan, lane) * ticks);
     task.budget = pass_ns(plan, lane, o) * ticks;
     task.offset = head.offset_ns * ticks;
+    task.jitter = lane_wait_ns(plan, lane) * ticks;
     result.set.tasks.push_back(std::move(task));
   }
   return result;
@@ -199,9 +200,14 @@ LaneTasks lane_tasks(const Plan& plan, Policy policy, const Overheads& overheads
   LaneTasks result = unplaced(plan, overheads);
   if (policy == Policy::deadline) {
     const std::vector<Reservation> reserved = reservations(plan, policy);
-    for (size_t i = 0; i < result.lanes.size(); ++i)
-      result.set.tasks[i].deadline =
-          std::min(result.set.tasks[i].deadline, reserved[i].deadline_ns * result.set.ticks_per_ns);
+    for (size_t i = 0; i < result.lanes.size(); ++i) {
+      analysis::TimedTask& task = result.set.tasks[i];
+      task.deadline = std::min(task.deadline, reserved[i].deadline_ns * result.set.ticks_per_ns);
+      if (task.jitter == 0) continue;
+      task.period = reserved[i].period_ns * result.set.ticks_per_ns;
+      task.sporadic = true;
+      task.offset = task.jitter = 0;
+    }
   }
   if (policy != Policy::cooperative) charge_leads(plan, policy, result);
   if (policy == Policy::fixed) {
@@ -233,8 +239,8 @@ std::vector<Reservation> reservations(const Plan& plan, Policy policy) {
   for (size_t i = 0; i < lanes.size(); ++i) {
     const int64_t budget_ns = lane_budget_ns(plan, lanes[i]) + longest_lead_ns(plan, lanes[i]);
     if (policy == Policy::deadline) {
-      wanted[i] =
-          deadline_reservation(budget_ns, lane_span_ns(plan, lanes[i]), plan.tasks[lanes[i].front()].rate->period_ns());
+      const int64_t awake_ns = std::max(lane_span_ns(plan, lanes[i]) - lane_wait_ns(plan, lanes[i]), budget_ns);
+      wanted[i] = deadline_reservation(budget_ns, awake_ns, plan.tasks[lanes[i].front()].rate->period_ns());
       wanted[i].reclaims = is_high(plan, lanes[i]);
     }
     wanted[i].policy = policy;

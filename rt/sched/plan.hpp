@@ -54,10 +54,18 @@ struct EdgePlan {
   int64_t max_age_ns = 0;  ///< 0: no bound
 };
 
+/// What is known in advance of when a hardware node's data come about (its driver tells it: hal's StampLaw).
+struct SourcePlan {
+  int64_t lag_ns = 0;   ///< a stamp lies at most so long before the release of the job that sends it
+  int64_t wait_ns = 0;  ///< so long after its release the job may sleep until its data have come
+  std::string unknown;  ///< why there is no bound; empty: these are
+};
+
 struct TaskPlan {
   std::string name;
   Node* node = nullptr;
   bool device = false;  ///< a hardware node; its CPU time is accounted apart
+  SourcePlan source;    ///< of a hardware node
   std::optional<Rate> rate;
   size_t on_task = kNone;  ///< producer whose publication releases this task
   size_t on_port = kNone;  ///< ... of this port

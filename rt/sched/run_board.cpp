@@ -42,7 +42,8 @@ RunBoard::RunBoard(const Plan& plan, size_t processes)
   const size_t tasks = plan.tasks.size(), ports = plan.ports.size();
   bytes_ = room_for<Shared>(1) + room_for<TaskStatistics>(tasks) + room_for<EdgeStatistics>(edges) +
            room_for<PortStatistics>(ports) + room_for<GrantRecord>(tasks) + room_for<ParamMail>(tasks) +
-           room_for<CapacityRecord>(ports) + room_for<ProcessRecord>(processes) + room_for<SourceRecord>(tasks);
+           room_for<CapacityRecord>(ports) + room_for<ProcessRecord>(processes) + room_for<SourceRecord>(tasks) +
+           room_for<SourceFacts>(tasks);
   void* memory = mmap(nullptr, bytes_, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS | MAP_POPULATE, -1, 0);
   if (memory == MAP_FAILED)
     throw std::runtime_error("shared memory of " + std::to_string(bytes_) + " bytes: " + std::strerror(errno));
@@ -56,6 +57,7 @@ RunBoard::RunBoard(const Plan& plan, size_t processes)
   capacities_ = place<CapacityRecord>(at, ports);
   processes_ = place<ProcessRecord>(at, processes);
   sources_ = place<SourceRecord>(at, tasks);
+  source_facts_ = place<SourceFacts>(at, tasks);
 }
 
 RunBoard::~RunBoard() { munmap(memory_, bytes_); }

@@ -57,6 +57,14 @@ struct CapacityRecord {
   Capacity capacity;
 };
 
+/// What is known in advance of a hardware node's data; see SourcePlan.
+struct SourceFacts {
+  static constexpr size_t kLongest = 200;
+  std::atomic<bool> known{false};
+  int64_t lag_ns = 0, wait_ns = 0;
+  BoundedText<kLongest> unknown;
+};
+
 /// What the processes of one run share: statistics, the end of the run, agreement before the start, parameters on their
 /// way. One anonymous shared mapping, made before the processes are; it is gone when the last of them is.
 class RunBoard {
@@ -81,6 +89,7 @@ class RunBoard {
   Grant grant(size_t t) const;
   ParamMail& mail(size_t t) { return mail_[t]; }
   CapacityRecord& capacity(size_t p) { return capacities_[p]; }
+  SourceFacts& source_facts(size_t t) { return source_facts_[t]; }
   ProcessRecord& process(size_t p) { return processes_[p]; }
   const ProcessRecord& process(size_t p) const { return processes_[p]; }
   const SourceRecord& source(size_t t) const { return sources_[t]; }
@@ -147,6 +156,7 @@ class RunBoard {
   CapacityRecord* capacities_ = nullptr;
   ProcessRecord* processes_ = nullptr;
   SourceRecord* sources_ = nullptr;
+  SourceFacts* source_facts_ = nullptr;
 };
 
 }  // namespace takt

@@ -161,12 +161,14 @@ inline void check_streaming_camera(StereoCamera& camera, const Clock& clock,
     uint32_t frames = 0, number = 0;
     for (int k = 0; k < 60 && frames < 10; ++k) {
       pace(clock.now_ns() + period_ns);
-      if (triggered) camera.trigger(clock.now_ns());
+      const int64_t released_ns = clock.now_ns();
+      if (triggered) camera.trigger(released_ns);
       const StereoFrame frame = camera.read(left.view(), right.view(), clock.now_ns() + period_ns);
       if (frame.status == ReadStatus::no_data) continue;
       REQUIRE(frame.status == ReadStatus::ok);
       CHECK(frame.stamp_ns > previous_ns);
       CHECK(frame.stamp_ns <= clock.now_ns());
+      CHECK(released_ns - frame.stamp_ns <= camera.stamp_law({}).lag_ns());
       CHECK((frames == 0 || frame.frame_number > number));
       previous_ns = frame.stamp_ns;
       number = frame.frame_number;

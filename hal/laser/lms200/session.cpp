@@ -53,8 +53,7 @@ ScanFormat Session::format() const {
   format.sweep_s = fov_deg / 360 * static_cast<double>(kTurn_ns) * 1e-9;
   format.rate_hz = 1e9 / static_cast<double>(interval_ns(settings_.baud));
   // The oldest scan that a read can get: measured, sent, and all but followed by the next one.
-  format.stamp_lag_s =
-      static_cast<double>(scan_ns() + telegram_ns(settings_.baud) + interval_ns(settings_.baud)) * 1e-9;
+  format.stamps = {scan_ns() + telegram_ns(settings_.baud), interval_ns(settings_.baud), 0, {}};
   return format;
 }
 

@@ -48,7 +48,7 @@ ScanFormat Session::format() const {
   const double sending_s = static_cast<double>(bytes) * static_cast<double>(byte_time_ns(settings_.baud)) * 1e-9;
   const double interval_s = std::max(1.0, std::ceil(sending_s * scan.rate_hz)) / scan.rate_hz;
   format.rate_hz = 1 / interval_s;
-  format.stamp_lag_s = format.sweep_s + sending_s + interval_s;
+  format.stamps = {std::llround(1e9 * (format.sweep_s + sending_s)), std::llround(1e9 * interval_s), 0, {}};
   return format;
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The driver of a V4L2 camera against its double, call by call, in virtual time.
+#include "hal/camera/stereo_camera_node.hpp"
 #include "hal/camera/v4l2_camera.hpp"
 
 #include <doctest/doctest.h>
@@ -195,6 +196,32 @@ TEST_CASE("v4l2 camera: exposure and gain reach the device in its steps") {
   bench.start();
   CHECK(bench.device.exposure_steps() == 40);
   CHECK(bench.device.gain_steps() == 7);
+}
+
+TEST_CASE("v4l2 camera: how old its frames can be is told without it, and a slower device breaks the word") {
+  auto settings = settings_of(FrameFormat::grey);
+  const StampLaw nothing_said = Bench(settings).driver.stamp_law({});
+  CHECK(nothing_said.latency_ns == 133'333'333 + 1);  // two rounded periods: exposure and transfer
+  CHECK(nothing_said.period_ns == 66'666'667);
+  settings.longest_exposure_s = 0.01;
+  settings.transfer_s = 0.02;
+  const StampLaw said = Bench(settings).driver.stamp_law({});
+  CHECK(said.lag_ns() == 30 * kMs + 66'666'667);
+  CHECK(said.wait_ns == 0);
+  const StampLaw triggered = Bench(settings, "shutter").driver.stamp_law({});
+  CHECK(triggered.lag_ns() == 0);
+  CHECK(triggered.wait_ns == 30 * kMs);
+
+  VirtualClock clock(5'000'000'000);
+  auto slower = settings;
+  slower.rate = Rate{10, 1};
+  VideoDouble device(double_of(slower), fill, clock);
+  StereoCameraNode node(std::make_unique<V4l2Camera>("camera", settings, device.device(), clock));
+  node.declare();
+  CHECK(node.broken_declaration() == "");
+  REQUIRE(node.device().open().has_value());
+  CHECK(node.broken_declaration().find("can be 130.000000 ms old") != std::string::npos);
+  CHECK(node.stamp_law({}).lag_ns() == said.lag_ns());  // what was counted on stays the same
 }
 
 TEST_CASE("v4l2 camera: the stamp is that of the exposure's begin") {

@@ -151,6 +151,34 @@ TEST_CASE("admission: a worker that waits gets no deadline from the kernel that 
   CHECK(answer(plan) == Answer::admitted);
 }
 
+TEST_CASE("admission: a device that sleeps for its data has less time for its work, and its work comes later") {
+  // Up to 20 ms of sleep, then 5 of work; below it 10 of work, whose release it may come to delay.
+  Plan plan = plan_of(Policy::fixed, {0}, {task("camera", 10, 5, 40), task("other", 10, 10, 60)});
+  plan.tasks[0].device = true;
+  plan.tasks[0].source.wait_ns = 20 * kMs;
+  plan.tasks[1].offset_ns = 15 * kMs;
+  const Admission fixed = admit(plan, {});
+  CHECK(fixed.answer == Answer::admitted);
+  CHECK(fixed.nodes[0].response_ns == 25 * kMs);
+  CHECK(fixed.nodes[1].response_ns == 15 * kMs);  // without the sleep nobody would be in its way
+  CHECK(answer(plan_of(Policy::cooperative, {0}, plan.tasks)) == Answer::admitted);
+  // What the kernel is asked for is what is left of the deadline when the thread wakes up.
+  const Plan reserved = plan_of(Policy::deadline, {0}, plan.tasks);
+  CHECK(reservations(reserved, Policy::deadline)[0].deadline_ns == 20 * kMs);
+  const Admission deadline = admit(reserved, {});
+  CHECK(deadline.answer == Answer::admitted);
+  CHECK(*deadline.nodes[0].response_ns >= 25 * kMs);
+  CHECK(*deadline.nodes[0].response_ns <= 40 * kMs);
+  for (const Policy policy : {Policy::fixed, Policy::deadline, Policy::cooperative}) {
+    CAPTURE(to_string(policy));
+    Plan late = plan_of(policy, {0}, plan.tasks);
+    late.tasks[0].source.wait_ns = 36 * kMs;
+    const Admission refused = admit(late, {});
+    CHECK(refused.answer == Answer::not_proven);
+    CHECK(says(refused, "camera: what it asked for may come 36.000 ms after its release"));
+  }
+}
+
 TEST_CASE("admission: who follows each second message is in each second job") {
   for (const Policy policy : {Policy::fixed, Policy::deadline, Policy::cooperative}) {
     CAPTURE(to_string(policy));

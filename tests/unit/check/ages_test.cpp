@@ -83,6 +83,16 @@ TEST_CASE("ages: each job takes what is visible at its release") {
   CHECK(chain.bound().proven());
 }
 
+TEST_CASE("ages: what a device gives has an age of its own; where nobody knows it, nothing is proven") {
+  Chain chain;
+  const int64_t without_ns = *chain.bound().bound_ns;
+  chain.plan.tasks[0].source.lag_ns = 40 * kMs;
+  CHECK(chain.bound().bound_ns == without_ns + 40 * kMs);
+  chain.plan.tasks[0].source.unknown = "it comes when it comes";
+  CHECK_FALSE(chain.bound().bound_ns);
+  CHECK(chain.bound().why == "how old what camera gives can be is not known: it comes when it comes");
+}
+
 TEST_CASE("ages: a let output is visible at the deadline") {
   Chain chain;
   chain.plan.tasks[2].offset_ns = 9 * kMs;
