@@ -64,8 +64,8 @@ class Admitting {
       if (task.budget_ns == 0)
         refuse(Answer::not_proven,
                fmt::format("{}: no budget stated; give it one (`takt profile` measures it)", task.name));
+    if (!ask_about_sources()) return std::move(result_);
     ask_kernel();
-    ask_about_sources();
     ask_about_waits();
     ask_about_lanes();
     if (lanes_admitted_) ask_about_overruns();
@@ -91,15 +91,20 @@ class Admitting {
                                              sum, overheads_.deadline_bandwidth));
   }
 
-  void ask_about_sources() {
-    for (const TaskPlan& task : plan_.tasks)
-      if (task.source.wait_ns > 0 && task.source.wait_ns + task.budget_ns > task.deadline_ns)
-        refuse(Answer::not_proven,
+  /// False: what a device's job sleeps for leaves it no time, so that no analysis need look at it.
+  bool ask_about_sources() {
+    bool time_left = true;
+    for (const TaskPlan& task : plan_.tasks) {
+      if (task.source.wait_ns == 0 || task.source.wait_ns + task.budget_ns <= task.deadline_ns) continue;
+      time_left = false;
+      refuse(Answer::not_proven,
                fmt::format("{}: what it asked for may come {:.3f} ms after its release, and its deadline of {} ms leaves "
                            "its budget of {} ms no time then; say in its settings what it takes at most "
                            "(`takt nodes` lists them), or give it a deadline from {:.3f} ms on",
                            task.name, to_ms(task.source.wait_ns), to_ms(task.deadline_ns), to_ms(task.budget_ns),
                            to_ms(task.source.wait_ns + task.budget_ns)));
+    }
+    return time_left;
   }
 
   /// A worker that has slept within its pass gets a new deadline from the kernel, counted from its waking, and takes
