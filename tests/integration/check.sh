@@ -75,7 +75,7 @@ check 1 more
 told 'a["answer"] == "infeasible" and any("budgets ask for" in p for p in a["problems"])'
 schedule above 's/^(  obstacle_stop: .*budget: )2ms/\151ms/'
 check 1 above
-told 'a["answer"] == "infeasible" and "obstacle_stop: its budget of 51 ms is above its deadline of 50 ms" in a["problems"][0]'
+told 'a["answer"] == "infeasible" and "obstacle_stop: its budget of 51 ms is above its deadline of 38 ms" in a["problems"][0]'
 told '"lower the budget of obstacle_stop" in a["change"]'
 # With the change that is told it is admitted.
 budget=$(python3 -c "import json, re; print(re.search(r'to ([0-9.]+) ms', json.load(open('$work/stdout'))['change']).group(1))")
@@ -92,7 +92,7 @@ told '"the smallest single change" in a["change"] and "raise the max_age of chai
 schedule one 's/^cores: .*/cores: [0]/'
 check 2 one
 told 'a["verdict"] == "Invalid" and not a["admitted"] and "exclusive cpuset" in a["problems"][0]'
-schedule apart 's/^(  obstacle_stop: .*offset: )16ms/\115ms/'
+schedule apart 's/^(  obstacle_stop: .*offset: )40ms/\139ms/'
 cp -r "$source"/graph/{worlds,rigs,objects,objects_3d.txt,terrain.txt,networks,signs,skeletons} "$work/schedules/"
 sed -e '/^  # ACE itself/,/^    lines: /d' -e 's/\(to: obstacle_stop.stop, max_age: \)200ms/\15ms/' "$source/graph/ace.yaml" >"$work/schedules/ace.yaml"
 expect 2 "" "$takt" check "$work/schedules/ace.yaml" --schedule "$work/schedules/apart.yaml" --json

@@ -118,9 +118,10 @@ edit '
   s/head_camera, ground_camera, /head_camera, /
   s/lost: \[head_camera, ground_camera\]/lost: [head_camera]/
   s/(to: ground_map\.grid, max_age: )400ms/\1450ms/
+  s/^ +ground_camera: \{trigger.*\}\}$/  }/
 ' '
   /^  ground_camera: /d
-  s/^(  head_camera: .*deadline: )55ms/\125ms/
+  s/^(  head_camera: .*deadline: )66ms/\125ms/
   s/^(  ground_map: .*offset: )50ms/\130ms/
 '
 grep -q 'ground_camera' "$work/graph/edited.yaml" && fail "ground_camera is still in the graph"
