@@ -20,8 +20,11 @@ std::string DeviceNode::broken_declaration() {
   if (!declared_ || !declared_->unknown.empty()) return "";
   const StampLaw now = device().stamp_law({});
   if (!now.unknown.empty()) return "how old what it gives can be, nobody can tell now: " + now.unknown;
-  if (now.lag_ns() <= declared_->lag_ns()) return "";
   const auto ms = [](int64_t ns) { return std::to_string(static_cast<double>(ns) / 1e6) + " ms"; };
+  if (now.wait_ns > declared_->wait_ns)
+    return "what it is asked for can come after " + ms(now.wait_ns) + "; with these settings it was to be " +
+           ms(declared_->wait_ns);
+  if (now.lag_ns() <= declared_->lag_ns()) return "";
   return "what it gives can be " + ms(now.lag_ns()) + " old (it takes " + ms(now.latency_ns) + " and comes every " +
          ms(now.period_ns) + "); with these settings it was to be " + ms(declared_->lag_ns());
 }

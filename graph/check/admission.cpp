@@ -98,11 +98,11 @@ class Admitting {
       if (task.source.wait_ns == 0 || task.source.wait_ns + task.budget_ns <= task.deadline_ns) continue;
       time_left = false;
       refuse(Answer::not_proven,
-               fmt::format("{}: what it asked for may come {:.3f} ms after its release, and its deadline of {} ms leaves "
-                           "its budget of {} ms no time then; say in its settings what it takes at most "
-                           "(`takt nodes` lists them), or give it a deadline from {:.3f} ms on",
-                           task.name, to_ms(task.source.wait_ns), to_ms(task.deadline_ns), to_ms(task.budget_ns),
-                           to_ms(task.source.wait_ns + task.budget_ns)));
+             fmt::format("{}: what it asked for may come {:.3f} ms after its release, and its deadline of {} ms leaves "
+                         "its budget of {} ms no time then; say in its settings what it takes at most "
+                         "(`takt nodes` lists them), or give it a deadline from {:.3f} ms on",
+                         task.name, to_ms(task.source.wait_ns), to_ms(task.deadline_ns), to_ms(task.budget_ns),
+                         to_ms(task.source.wait_ns + task.budget_ns)));
     }
     return time_left;
   }

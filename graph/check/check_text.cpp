@@ -78,8 +78,8 @@ std::string ages_table(const ModeCheck& mode) {
 
 /// What admission counts on of each device that gives anything: how old, and how long its job may sleep for it.
 std::string sources_table(const Plan& plan) {
-  std::string text = fmt::format("{:<52} {:>12} {:>12}\n", "stamps of a device, at the release of its job", "old ms",
-                                 "waited ms");
+  std::string text =
+      fmt::format("{:<52} {:>12} {:>12}\n", "stamps of a device, at the release of its job", "old ms", "waited ms");
   for (const TaskPlan& task : plan.tasks) {
     if (!task.device || task.ports.empty()) continue;
     const bool known = task.source.unknown.empty();
@@ -161,8 +161,8 @@ Json mode_json(const ModeCheck& mode) {
 
 std::string check_text(const GraphSpec& graph, const Plan& plan, const CheckOptions& options,
                        const CheckResult& result) {
-  return head_text(graph, plan, options, result) + nodes_table(plan, result.modes.front()) +
-         sources_table(plan) + ages_table(result.modes.front()) + modes_text(result) + pools_table(plan);
+  return head_text(graph, plan, options, result) + nodes_table(plan, result.modes.front()) + sources_table(plan) +
+         ages_table(result.modes.front()) + modes_text(result) + pools_table(plan);
 }
 
 Json check_json(const Plan& plan, const CheckOptions& options, const CheckResult& result) {

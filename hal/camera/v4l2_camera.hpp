@@ -23,7 +23,8 @@ struct V4l2CameraSettings {
   Rate rate{15, 1};          ///< asked for; the device may give another
   uint32_t buffers = 4;      ///< asked for, 2..8
   double exposure_s = 0;     ///< 0: as the device is set
-  double longest_exposure_s = 0, transfer_s = 0;  ///< at most; 0: a whole period each, as long as either can take
+  double longest_exposure_s = 0;  ///< of an automatic exposure; 0: a whole period, as long as it can take
+  double transfer_s = 0;          ///< at most, from its end until the frame is here; 0: a whole period
   double gain = -1;          ///< in the device's own steps; below 0: as it is set
   double stamp_delay_s = 0;  ///< from the begin of the exposure to the device's stamp
   bool dmabuf = false;       ///< buffers are exported, and lent until the next frame

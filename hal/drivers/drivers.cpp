@@ -400,7 +400,8 @@ NodeResult make_hardware(const DeviceConfig& config, Settings& settings, const C
   if (!config.plugged) (*node)->leave_closed();
   if (!config.plugged || !(node = opened(std::move(node)))) return node;
   if (const std::string broken = (*node)->broken_declaration(); !broken.empty())
-    return device_failure(config.id, broken, "make the settings say what the device does: rate, exposure, transfer, baud");
+    return device_failure(config.id, broken,
+                          "make the settings say what the device does: rate, exposure, transfer, baud");
   return node;
 }
 

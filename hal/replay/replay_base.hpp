@@ -39,7 +39,8 @@ class ReplayBase final : public MobileBase {
   ReplayBaseSettings settings_;
   std::vector<BaseReading> readings_;  ///< stamps in the time of the log
   BaseLimits limits_;
-  int64_t longest_gap_ns_ = 0, end_ns_ = 0, epoch_ns_ = 0;  ///< the first two in the log
+  int64_t longest_gap_ns_ = 0;  ///< of the log
+  int64_t end_ns_ = 0, epoch_ns_ = 0;
   size_t next_ = 0;         ///< first reading that is not due yet
   bool delivered_ = false;  ///< the reading before next_
   bool open_ = false, started_ = false, ended_ = false;

@@ -25,7 +25,8 @@ DeviceResult ReplayLaser::open() {
   time_ns_.clear();
   for (auto scan = first; scan != log->scans.end(); ++scan) time_ns_.push_back(scan->time_ns);
   for (size_t i = 1; i < time_ns_.size(); ++i)
-    format_.stamps.period_ns = std::max(format_.stamps.period_ns, settings_.pace.in_run_ns(time_ns_[i] - time_ns_[i - 1]));
+    format_.stamps.period_ns =
+        std::max(format_.stamps.period_ns, settings_.pace.in_run_ns(time_ns_[i] - time_ns_[i - 1]));
   if (const int64_t lasts_ns = time_ns_.back() - time_ns_.front(); lasts_ns > 0)
     format_.rate_hz =
         settings_.pace.speed * static_cast<double>(time_ns_.size() - 1) * 1e9 / static_cast<double>(lasts_ns);

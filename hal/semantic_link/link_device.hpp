@@ -22,7 +22,9 @@ class LinkDevice final : public Device {
   void stop() override;
   /// True once the port is there again.
   bool restart(int64_t) override { return exchange_.connected.load(std::memory_order_acquire); }
-  StampLaw stamp_law(const JobTimes&) const override { return StampLaw::none("what it passes on is as old as its sender says"); }
+  StampLaw stamp_law(const JobTimes&) const override {
+    return StampLaw::none("what it passes on is as old as its sender says");
+  }
   DeclaredCalls declared_calls() const override;
 
   /// Hands a message to the thread; flush() says that it is all.

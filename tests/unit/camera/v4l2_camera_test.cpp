@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // The driver of a V4L2 camera against its double, call by call, in virtual time.
-#include "hal/camera/stereo_camera_node.hpp"
 #include "hal/camera/v4l2_camera.hpp"
 
 #include <doctest/doctest.h>
 #include <sys/mman.h>
 
+#include "hal/camera/stereo_camera_node.hpp"
 #include "hal/camera/video_double.hpp"
 #include "rt/msg/image.hpp"
 #include "tests/conformance/stereo_camera.hpp"
@@ -222,6 +222,14 @@ TEST_CASE("v4l2 camera: how old its frames can be is told without it, and a slow
   REQUIRE(node.device().open().has_value());
   CHECK(node.broken_declaration().find("can be 130.000000 ms old") != std::string::npos);
   CHECK(node.stamp_law({}).lag_ns() == said.lag_ns());  // what was counted on stays the same
+
+  settings.transfer_s = 0;  // a period, which is longer there
+  VideoDouble shot(double_of(slower, "shutter"), fill, clock);
+  StereoCameraNode waiting(
+      std::make_unique<V4l2Camera>("camera", settings, shot.device(), clock, trigger_of(shot, "shutter", clock)));
+  waiting.declare();
+  REQUIRE(waiting.device().open().has_value());
+  CHECK(waiting.broken_declaration().find("can come after 110.000000 ms") != std::string::npos);
 }
 
 TEST_CASE("v4l2 camera: the stamp is that of the exposure's begin") {

@@ -69,8 +69,8 @@ TEST_CASE("sim laser, head, base and lines conform") {
   {
     const auto s = test::small_simulation();
     SimLines lines("lines", *s);
-    test::check_digital_lines(lines, 0, [&](uint32_t line, bool level) { s->force_line(line, level ? 1 : 0); },
-                              test::no_pace);
+    test::check_digital_lines(
+        lines, 0, [&](uint32_t line, bool level) { s->force_line(line, level ? 1 : 0); }, test::no_pace);
   }
 }
 
