@@ -86,8 +86,9 @@ std::optional<int64_t> PieceBounds::continuation_of(const Place& before, const P
   Part part = alone(place.piece, occupied_ns(plan_, lanes_.lanes[piece.lane], between, overheads_));
   part.first = false;
   if (const auto ready = finish_of(before), done = finish_of(place); ready && done && !waits_) {
-    part.ready_by = ticks(*ready - piece.ready_ns);
-    part.done_by = ticks(*done - piece.ready_ns);
+    const int64_t begins_ns = piece.ready_ns + piece.woken_ns;
+    part.ready_by = ticks(*ready - begins_ns);
+    part.done_by = ticks(*done - begins_ns);
     part.slack = ticks(plan_.anticipate_ns + overheads_.release_ns);
   }
   return bound_of(part);

@@ -76,10 +76,10 @@ class Composer {
   /// Before anything is set up: what is known in advance does not depend on what the device is like today.
   void ask_source(size_t t) {
     TaskPlan& task = result_.plan.tasks[t];
-    auto* const hardware = dynamic_cast<DeviceNode*>(task.node);
-    if (hardware == nullptr) return;
-    StampLaw law = hardware->stamp_law({task.rate, task.offset_ns});
-    task.source = {law.lag_ns(), law.wait_ns, std::move(law.unknown)};
+    if (auto* const hardware = dynamic_cast<DeviceNode*>(task.node)) {
+      StampLaw law = hardware->stamp_law({task.rate, task.offset_ns});
+      task.source = {law.lag_ns(), law.wait_ns, std::move(law.unknown)};
+    }
     if (options_.exchange != nullptr) options_.exchange->tell_source(t, task.source);
   }
 

@@ -35,7 +35,7 @@ class ReplayCamera final : public StereoCamera {
   DeviceResult start(int64_t epoch_ns) override;
   void stop() override { started_ = false; }
   DeclaredCalls declared_calls() const override;
-  /// Of a frame for each job: by how much the recording runs ahead of the jobs.
+  /// Of a frame for each job: by how much the jobs fall behind the recording.
   StampLaw stamp_law(const JobTimes& jobs) const override;
   StereoFormat format() const override { return format_; }
   void trigger(int64_t at_ns) override;

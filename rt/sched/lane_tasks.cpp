@@ -67,7 +67,7 @@ int64_t member_ns(const Plan& plan, size_t t, const Overheads& o) {
 int64_t pass_ns(const Plan& plan, const std::vector<size_t>& lane, const Overheads& o) {
   std::vector<size_t> members(lane.size());
   std::iota(members.begin(), members.end(), size_t{0});
-  return begin_ns(o) + occupied_ns(plan, lane, members, o);
+  return (lane_wait_ns(plan, lane) > 0 ? 2 : 1) * begin_ns(o) + occupied_ns(plan, lane, members, o);
 }
 
 /// All lanes as they are under `fixed`, not placed yet and without leads.

@@ -161,6 +161,9 @@ TEST_CASE("admission: a device that sleeps for its data has less time for its wo
   CHECK(fixed.answer == Answer::admitted);
   CHECK(fixed.nodes[0].response_ns == 25 * kMs);
   CHECK(fixed.nodes[1].response_ns == 15 * kMs);  // without the sleep nobody would be in its way
+  analysis::Overheads woken;
+  woken.release_ns = kMs;
+  CHECK(admit(plan, woken).nodes[0].response_ns == 27 * kMs);  // for its job, and for its data
   CHECK(answer(plan_of(Policy::cooperative, {0}, plan.tasks)) == Answer::admitted);
   // What the kernel is asked for is what is left of the deadline when the thread wakes up.
   const Plan reserved = plan_of(Policy::deadline, {0}, plan.tasks);

@@ -53,25 +53,25 @@ graph::GraphSpec loaded(const char* file, const char* profile) {
   return std::move(*result.graph);
 }
 
-/// One process of the run: what `owns` names, no device plugged in.
-Plan plan_of(const graph::GraphSpec& graph, graph::ComposeOptions how, graph::Composition& kept) {
-  const MonotonicClock clock;
+/// One process of the run: what `owns` names, no device plugged in. Its nodes live as long as it does.
+struct Process {
+  MonotonicClock clock;
   hal::Devices devices;
+  graph::Composition composition;
+};
+
+void compose_in(Process& process, const graph::GraphSpec& graph, const graph::ComposeOptions& how) {
   const graph::DeviceFactory factory =
       [&](const graph::DeviceSpec& d) -> tl::expected<std::unique_ptr<Node>, graph::ComposeError> {
     hal::DeviceConfig config{d.id, d.kind, d.driver, d.settings, graph.directory, 1};
     config.plugged = false;
-    auto node = hal::make_device(config, devices, clock);
+    auto node = hal::make_device(config, process.devices, process.clock);
     if (node) return std::move(*node);
     return tl::make_unexpected(graph::ComposeError{{{d.position, node.error().text()}}, false});
   };
-  auto composed = graph::compose(graph, graph::node_types(), factory, clock, how);
-  if (!composed) {
-    MESSAGE(graph::to_string(composed.error().problems.front()));
-    return {};
-  }
-  kept = std::move(*composed);
-  return kept.plan;
+  auto composed = graph::compose(graph, graph::node_types(), factory, process.clock, how);
+  if (composed) process.composition = std::move(*composed);
+  else MESSAGE(graph::to_string(composed.error().problems.front()));
 }
 
 void check_equal(const graph::GraphSpec& graph, const Plan& one, const Plan& other) {
@@ -97,8 +97,9 @@ void check_graph(const char* file, const char* profile) {
   const test::TemporaryFolder folder;
   graph::ComposeOptions how;
   how.output = folder.path;
-  graph::Composition whole;
-  const Plan alone = plan_of(graph, how, whole);
+  Process whole;
+  compose_in(whole, graph, how);
+  const Plan& alone = whole.composition.plan;
   REQUIRE_FALSE(alone.tasks.empty());
   for (const TaskPlan& task : alone.tasks)
     if (task.device && !task.ports.empty()) {
@@ -108,18 +109,17 @@ void check_graph(const char* file, const char* profile) {
   std::vector<std::string> adjusted;
   const graph::Partition parts = graph::partition(graph, adjusted);
   SharedFacts facts;
-  std::vector<graph::Composition> kept(parts.names.size());
-  std::vector<Plan> plans(parts.names.size());
+  std::vector<Process> processes(parts.names.size());
   {
-    std::vector<std::jthread> processes;
-    for (size_t p = 0; p < plans.size(); ++p)
-      processes.emplace_back([&, p, how]() mutable {
-        how.owns = [&](const std::string& id) { return parts.process_of.at(id) == p; };
+    std::vector<std::jthread> threads;
+    for (size_t p = 0; p < processes.size(); ++p)
+      threads.emplace_back([&, p, how]() mutable {
+        how.owns = [&, p](const std::string& id) { return parts.process_of.at(id) == p; };
         how.exchange = &facts;
-        plans[p] = plan_of(graph, how, kept[p]);
+        compose_in(processes[p], graph, how);
       });
   }
-  for (const Plan& plan : plans) check_equal(graph, alone, plan);
+  for (const Process& process : processes) check_equal(graph, alone, process.composition.plan);
   const MonotonicClock clock;
   graph::Composition supervisor = graph::outline(graph, graph::node_types(), clock);
   graph::complete(supervisor.plan, facts, {});
