@@ -28,6 +28,7 @@ class ThreadSwitches {
     attributes.sample_type = PERF_SAMPLE_TID | PERF_SAMPLE_TIME | PERF_SAMPLE_CPU;
     attributes.sample_id_all = 1;
     attributes.context_switch = 1;
+    attributes.task = 1;  // a thread that ends is switched from after its event is gone: its end is told instead
     attributes.exclude_kernel = 1;  // what perf_event_paranoid 2 asks for
     attributes.use_clockid = 1;
     attributes.clockid = CLOCK_MONOTONIC;
@@ -58,7 +59,7 @@ class ThreadSwitches {
       perf_event_header header{};
       copy(tail, &header, sizeof header);
       if (header.size < sizeof header) break;
-      if (header.type == PERF_RECORD_SWITCH) take(tail, header, into);
+      if (header.type == PERF_RECORD_SWITCH || header.type == PERF_RECORD_EXIT) take(tail, header, into);
       if (header.type == PERF_RECORD_LOST) {
         uint64_t id_and_count[2] = {};
         copy(tail + sizeof header, id_and_count, sizeof id_and_count);
@@ -75,7 +76,7 @@ class ThreadSwitches {
   }
 
  private:
-  /// The part of a record that says who and when (sample_id_all), in the order of the sample_type bits.
+  /// The end of a record, which says who and when (sample_id_all), in the order of the sample_type bits.
   struct Identity {
     uint32_t process, thread;
     uint64_t time;
@@ -90,10 +91,11 @@ class ThreadSwitches {
   void take(uint64_t at, const perf_event_header& header, Switches& into) {
     Identity identity{};
     if (header.size < sizeof header + sizeof identity) return;
-    copy(at + sizeof header, &identity, sizeof identity);
+    copy(at + header.size - sizeof identity, &identity, sizeof identity);
     const auto now = static_cast<int64_t>(identity.time);
     last_cpu_ = static_cast<int32_t>(identity.cpu);
-    if ((header.misc & PERF_RECORD_MISC_SWITCH_OUT) == 0) {
+    const bool ends = header.type == PERF_RECORD_EXIT || (header.misc & PERF_RECORD_MISC_SWITCH_OUT) != 0;
+    if (!ends) {
       running_since_ = now;
     } else if (running_since_ != 0) {
       const bool preempted = (header.misc & PERF_RECORD_MISC_SWITCH_OUT_PREEMPT) != 0;
