@@ -75,12 +75,17 @@ spread = figures["details"]["release_us"]
 assert spread["samples"] >= 100 and spread["p50"] <= spread["p99"] <= spread["max"], spread
 PY
 }
+if as_nobody true 2>/dev/null; then  # next to ours: what is found is not judged, and most of it is waiting
+  as_nobody "$open/takt" doctor --measure --json >"$work/nobody_measured" 2>&1 &
+  nobody=$!
+fi
 expect 0 "measuring" env TAKT_MACHINE="$work/deep/machine.json" "$takt" doctor --measure
 narrow "$work/stdout"
 check_measured "$work/deep/machine.json"
 expect 3 "set TAKT_MACHINE" env TAKT_MACHINE=/proc/none/machine.json "$takt" doctor --measure
 
-if as_nobody true 2>/dev/null; then
+if [ -n "${nobody:-}" ]; then
+  wait "$nobody" && grep -q measuring "$work/nobody_measured" || { cat "$work/nobody_measured"; fail "nobody cannot measure"; }
   expect 0 "" as_nobody "$open/takt" doctor
   narrow "$work/stdout"
   grep -q "lacks   sched_deadline: refused: Operation not permitted" "$work/stdout" || fail "nobody has SCHED_DEADLINE"
@@ -90,7 +95,6 @@ if as_nobody true 2>/dev/null; then
   check_findings "$work/nobody.json"
   as_nobody_takt() { as_nobody "$open/takt" "$@"; }
   require_rt "$work/nobody.json" as_nobody_takt
-  expect 0 "measuring" as_nobody "$open/takt" doctor --measure --json
   check_measured "$open/home/.cache/takt/machine.json"
 else
   echo "NOT RUN: doctor without privileges; run as root with setpriv"
