@@ -13,7 +13,8 @@ namespace {
 using Candidates = std::array<Candidate, InputPort::kMaxDepth>;
 }
 
-Latch::Latch(const TaskPlan& plan, Transport& transport, RunBoard& board, size_t task) {
+Latch::Latch(const TaskPlan& plan, Transport& transport, RunBoard& board, size_t task)
+    : excesses_(board.excesses()), task_(static_cast<uint32_t>(task)) {
   for (const EdgePlan& edge : plan.edges) {
     Edge& e = edges_.emplace_back();
     e.plan = edge;
@@ -110,6 +111,7 @@ void Latch::account(Edge& edge, size_t count, bool stale, int64_t now_ns) {
   if (count == 0) return;
   const auto& held = PortAccess::held(*edge.input);
   edge.age_ns = now_ns - held[count - 1].stamp_ns;
+  edge.latched_ns = now_ns;
   for (size_t i = 0; i < count; ++i) {
     if (held[i].sequence <= edge.last_seen) continue;
     edge.fresh.dropped += held[i].sequence - edge.last_seen - 1;
@@ -127,7 +129,8 @@ void Latch::release() {
 }
 
 void Latch::count() {
-  for (Edge& edge : edges_) {
+  for (size_t e = 0; e < edges_.size(); ++e) {
+    Edge& edge = edges_[e];
     edge.statistics->received += edge.fresh.received;
     edge.statistics->dropped += edge.fresh.dropped;
     add(edge.statistics->stale, edge.fresh.stale);
@@ -135,6 +138,8 @@ void Latch::count() {
     edge.fresh = {};
     if (edge.age_ns == kNoAge) continue;
     edge.statistics->age.add(edge.age_ns);
+    edge.statistics->age_bound.compare(
+        {Excess::input_age, task_, static_cast<uint32_t>(e), edge.latched_ns, edge.age_ns}, excesses_);
     edge.age_ns = kNoAge;
   }
 }

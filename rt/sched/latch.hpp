@@ -41,6 +41,7 @@ class Latch {
     bool joined = false, requests = false;
     EdgeCounts fresh;         ///< not yet in the statistics
     int64_t age_ns = kNoAge;  ///< the same
+    int64_t latched_ns = 0;   ///< when it had that age
     EdgeStatistics* statistics = nullptr;
   };
 
@@ -49,6 +50,8 @@ class Latch {
   bool take_set(const std::vector<size_t>& group, int64_t stamp_ns, int64_t release_ns, int64_t now_ns);
   void account(Edge& edge, size_t count, bool stale, int64_t now_ns);
 
+  ExcessLog& excesses_;
+  const uint32_t task_;
   std::vector<Edge> edges_;
   std::vector<std::vector<size_t>> joins_;  ///< indexes into edges_
   size_t stale_count_ = 0;

@@ -10,6 +10,7 @@
 #include "rt/sched/mode_log.hpp"
 #include "rt/sched/outage_log.hpp"
 #include "rt/sched/plan.hpp"
+#include "rt/sched/proof_log.hpp"
 #include "rt/sched/source_record.hpp"
 #include "rt/sched/statistics.hpp"
 #include "rt/sched/stop_signal.hpp"
@@ -111,6 +112,12 @@ class RunBoard {
   FaultLog& faults() { return shared_->faults; }
   const FaultLog& faults() const { return shared_->faults; }
 
+  /// What was seen above its proof (ProofBound), and the jobs that used more than their budgets.
+  ExcessLog& excesses() { return shared_->excesses; }
+  const ExcessLog& excesses() const { return shared_->excesses; }
+  OverrunLog& overruns() { return shared_->overruns; }
+  const OverrunLog& overruns() const { return shared_->overruns; }
+
   OutageLog& outages() { return shared_->outages; }
   const OutageLog& outages() const { return shared_->outages; }
   GroupSigns& group() { return shared_->group; }
@@ -128,6 +135,8 @@ class RunBoard {
     StopSignal stop;
     ModeLog modes;
     FaultLog faults;
+    ExcessLog excesses;
+    OverrunLog overruns;
     OutageLog outages;
     GroupSigns group;
     std::atomic<int64_t> epoch_ns{0};

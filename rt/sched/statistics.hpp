@@ -10,6 +10,7 @@
 #include "rt/memory/job_calls.hpp"
 #include "rt/sched/histogram.hpp"
 #include "rt/sched/plan.hpp"
+#include "rt/sched/proof_log.hpp"
 
 namespace takt {
 
@@ -47,6 +48,7 @@ struct TaskStatistics {
   std::array<uint64_t, kJobCalls> rt_violations{};  ///< by JobCall: calls that no job should make, once it is warm
   int64_t cpu_ns = 0, preempted_ns = 0;
   Histogram lateness, exec, response, publish;
+  ProofBound response_bound;
   std::array<JobRecord, 64> jobs{};        ///< ring of the last ones
   std::atomic<uint64_t> job_count{0};      ///< written so far
   std::array<LevelChange, 64> changes{};   ///< ring of the last ones
@@ -69,13 +71,15 @@ struct EdgeStatistics {
   uint64_t last_seen =
       0;          ///< sequence of the newest message latched: whoever takes a dead reader's place goes on there
   Histogram age;  ///< stamp to job start, of the newest latched message
+  ProofBound age_bound;
 };
 
 /// What one output gave.
 struct PortStatistics {
   std::atomic<uint64_t> published{0};  ///< sequence of the newest message, stored before it is out
   Histogram age;                       ///< stamp of a message to the instant from which consumers may see it
-  WriterStatistics writer;             ///< at the end of the run, before anything is torn down
+  ProofBound age_bound;
+  WriterStatistics writer;  ///< at the end of the run, before anything is torn down
 };
 
 /// What the kernel granted the thread that runs a task: Grant without pointers.

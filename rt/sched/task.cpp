@@ -262,8 +262,7 @@ void Task::count_end() {
   add(statistics_.stale_inputs, ended_.stale);
   if (ended_.new_input) add(statistics_.new_inputs);
   for (size_t i = 0; i < sent_stamps_ns_.size(); ++i)
-    if (sent_stamps_ns_[i] != kNothingSent)
-      board_.port(plan_.ports[i]).age.add(end.visible_at_ns - sent_stamps_ns_[i]);
+    if (sent_stamps_ns_[i] != kNothingSent) count_age(plan_.ports[i], end.visible_at_ns, sent_stamps_ns_[i]);
   statistics_.cpu_ns += used.cpu_ns;
   statistics_.allocations += used.allocations;
   if (end.end_of_data) return;
@@ -275,9 +274,12 @@ void Task::count_end() {
   statistics_.publish.add(ended_.publish_took_ns);
   const int64_t response = ended_.published_ns - ended_.release_ns;
   statistics_.response.add(response);
+  statistics_.response_bound.compare(
+      {Excess::response, static_cast<uint32_t>(index_), 0, ended_.published_ns, response}, board_.excesses());
   statistics_.last_response_ns.store(response, std::memory_order_relaxed);
   const bool over_budget = plan_.budget_ns > 0 && exec_ns > plan_.budget_ns;
   if (over_budget) add(statistics_.budget_overruns);
+  if (over_budget) board_.overruns().append({static_cast<uint32_t>(index_), ended_.release_ns, end.finished_ns});
   if (over_budget && watch_ != nullptr) watch_->overran(exec_ns - plan_.budget_ns, end.finished_ns);
   count_level(response);
   if (ended_.no_result) add(statistics_.no_result);
@@ -293,6 +295,14 @@ void Task::count_end() {
   const uint64_t n = statistics_.job_count.load(std::memory_order_relaxed);
   statistics_.jobs[n % statistics_.jobs.size()] = {ended_.release_ns, ended_.started_ns, end.finished_ns, ended_.cpu};
   statistics_.job_count.store(n + 1, std::memory_order_release);
+}
+
+void Task::count_age(size_t port, int64_t visible_at_ns, int64_t stamp_ns) {
+  PortStatistics& statistics = board_.port(port);
+  const int64_t age_ns = visible_at_ns - stamp_ns;
+  statistics.age.add(age_ns);
+  statistics.age_bound.compare({Excess::output_age, static_cast<uint32_t>(port), 0, visible_at_ns, age_ns},
+                               board_.excesses());
 }
 
 void Task::ask_for_safe_stop(const char* why) {

@@ -103,6 +103,7 @@ class Task {
   void trace_end() const;
   void ask_for_safe_stop(const char* why);
   void count_level(int64_t response_ns);
+  void count_age(size_t port, int64_t visible_at_ns, int64_t stamp_ns);
   void settle_output(size_t output, bool late, int64_t now_ns, int64_t visible_at_ns);
 
   const TaskPlan plan_;
