@@ -2,6 +2,7 @@
 // The checks of the machine, one function each: what was found, what it means for Takt, how to change it. Pure: a
 // finding depends on the facts and trials that are handed in, and on nothing else.
 #pragma once
+#include <string>
 #include <vector>
 
 #include "rt/machine/facts.hpp"
@@ -24,6 +25,13 @@ Finding check_transparent_hugepage(const Facts& facts);
 Finding check_swap(const Facts& facts);
 
 // timing_checks.cpp. Sources: the kernel's pm_qos_interface.rst, cpufreq.rst, kernel-parameters.txt.
+/// none | voluntary | lazy | full | rt, and who says so; "": not known.
+struct Preemption {
+  std::string model, source;
+  /// False if it is known that a real-time thread waits for the end of another thread's system call.
+  bool preempts() const { return model != "none" && model != "voluntary"; }
+};
+Preemption preemption_of(const Facts& facts);
 Finding check_cpu_dma_latency(const Facts& facts, const LatencyTrial& trial);
 Finding check_timer_slack(const SlackTrial& trial);
 Finding check_tick(const Facts& facts, const TickTrial& trial);

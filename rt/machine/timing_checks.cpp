@@ -11,12 +11,6 @@
 #include "rt/machine/parse.hpp"
 
 namespace takt::machine {
-namespace {
-
-/// none | voluntary | lazy | full | rt, and who says so.
-struct Preemption {
-  std::string model, source;
-};
 
 Preemption preemption_of(const Facts& facts) {
   if (trimmed(facts.text("/sys/kernel/realtime").value_or("")) == "1") return {"rt", "/sys/kernel/realtime"};
@@ -35,8 +29,6 @@ Preemption preemption_of(const Facts& facts) {
   if (version.find(" PREEMPT ") != std::string::npos) return {"full", "uname -v"};
   return {};
 }
-
-}  // namespace
 
 Finding check_cpu_dma_latency(const Facts& facts, const LatencyTrial& trial) {
   Finding f{"timing", "cpu_dma_latency", Need::every_run, Status::lacks, "", ""};
@@ -92,15 +84,15 @@ Finding check_tick(const Facts& facts, const TickTrial& trial) {
 }
 
 Finding check_preemption(const Facts& facts) {
-  Finding f{"timing", "preemption", Need::advice, Status::unknown, "", ""};
-  f.meaning = "whether a job waits for what another process does in the kernel";
+  Finding f{"timing", "preemption", Need::every_run, Status::unknown, "", ""};
+  f.meaning = "else a job waits for what another process does in the kernel";
   const Preemption found = preemption_of(facts);
   if (found.model.empty()) {
     f.found = "neither uname, debugfs nor the kernel configuration tells";
     return f;
   }
   f.found = found.model + " (" + found.source + ")";
-  f.status = found.model == "rt" || found.model == "full" ? Status::ok : Status::warn;
+  f.status = found.model == "lazy" ? Status::warn : found.preempts() ? Status::ok : Status::lacks;
   if (f.status == Status::ok) return f;
   const bool dynamic = kernel_option(kernel_config(facts), "PREEMPT_DYNAMIC") == "y" || found.source == "debugfs";
   if (dynamic) f.fixes = {shell("echo full | sudo tee /sys/kernel/debug/sched/preempt"), boot("preempt=full")};
