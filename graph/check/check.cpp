@@ -154,6 +154,30 @@ int64_t change_within_ns(const Plan& plan, const std::vector<char>& runs) {
   return ModeLog::kLead_ns + longest_ns;
 }
 
+/// Every lane named the core that the executor puts it on: which one that is depends on the overheads, and on all
+/// lanes, those that a mode leaves out included.
+Plan placed(const Plan& plan, const analysis::Overheads& overheads) {
+  if (plan.policy != Policy::fixed || plan.cores.empty()) return plan;
+  Plan result = plan;
+  const LaneTasks lanes = lane_tasks(plan, plan.policy, overheads);
+  for (size_t l = 0; l < lanes.lanes.size(); ++l)
+    result.tasks[lanes.lanes[l].front()].core = plan.cores[static_cast<size_t>(lanes.set.tasks[l].core)];
+  return result;
+}
+
+/// Under `fixed`, the heads of lanes in the order of their priorities; with other overheads it may be another one.
+std::vector<std::string> order_of_lanes(const Plan& plan, const analysis::Overheads& overheads) {
+  if (plan.policy != Policy::fixed) return {};
+  const LaneTasks lanes = lane_tasks(plan, plan.policy, overheads);
+  std::vector<std::pair<int, std::string>> order;
+  for (size_t l = 0; l < lanes.lanes.size(); ++l)
+    order.emplace_back(-lanes.set.tasks[l].priority, plan.tasks[lanes.lanes[l].front()].name);
+  std::sort(order.begin(), order.end());
+  std::vector<std::string> heads;
+  for (const auto& [priority, head] : order) heads.push_back(head);
+  return heads;
+}
+
 /// The plan in its mode of that index.
 Plan in_mode(const Plan& plan, size_t mode) {
   std::vector<std::string> paused;
@@ -162,10 +186,43 @@ Plan in_mode(const Plan& plan, size_t mode) {
   return without(plan, paused);
 }
 
+/// Why a mode is not admitted; "" if it is. `as_it_runs`: it was analysed in the order of priorities that it runs in.
+std::string why_not(const ModeCheck& mode, bool as_it_runs) {
+  if (mode.admission.answer != Answer::admitted)
+    return mode.admission.reasons.empty() ? std::string(to_string(mode.admission.answer))
+                                          : mode.admission.reasons.front();
+  for (const AgeBound& age : mode.ages)
+    if (!age.proven()) return "the age of " + name_of(age);
+  return as_it_runs ? "" : "other priorities would be needed";
+}
+
+/// Takes the place of an admission by overheads that some jobs exceed, if the worst that were observed admit as well.
+void admit_at_worst(const GraphSpec& graph, const Plan& plan, const CheckMachine& machine, CheckResult& result) {
+  if (!machine.worst || result.answer != Answer::admitted) return;
+  const Plan runs = placed(plan, machine.overheads);
+  std::vector<ModeCheck> modes = result.modes;
+  for (size_t m = 0; m < modes.size(); ++m) {
+    const Plan reduced = in_mode(runs, m);
+    modes[m].admission = admit(reduced, *machine.worst);
+    modes[m].ages = age_bounds(graph, reduced, modes[m].admission.nodes);
+    const std::string why =
+        why_not(modes[m], order_of_lanes(reduced, machine.overheads) == order_of_lanes(reduced, *machine.worst));
+    if (why.empty()) continue;
+    result.notes.push_back(fmt::format(
+        "admitted at p99: with the worst overheads that were observed, and {:.0f} % more, it is not proven ({})",
+        100 * kWorstMargin, why));
+    return;
+  }
+  result.modes = std::move(modes);
+  result.basis = OverheadBasis::worst;
+  result.charged = *machine.worst;
+}
+
 void check_modes(const GraphSpec& graph, const Plan& plan, const CheckOptions& options, CheckResult& result) {
+  const Plan runs = placed(plan, options.machine.overheads);
   for (size_t m = 0; m < std::max<size_t>(plan.modes.size(), 1); ++m) {
     const std::string& name = m == 0 ? plan.mode : plan.modes[m].name;
-    result.modes.push_back(check_mode(graph, in_mode(plan, m), name, options, result));
+    result.modes.push_back(check_mode(graph, m == 0 ? plan : in_mode(runs, m), name, options, result));
     result.modes.back().change_within_ns =
         change_within_ns(plan, m == 0 ? std::vector<char>(plan.tasks.size(), 1) : plan.modes[m].runs);
   }
@@ -255,8 +312,13 @@ CheckResult check(const GraphSpec& graph, const Plan& plan, const CheckOptions& 
   check_modes(graph, plan, options, result);
   result.bandwidth_within_ns = bandwidth_within_ns(reservations(plan, plan.policy));
   result.notes = result.modes.front().admission.notes;
+  result.basis = options.machine.measured ? OverheadBasis::p99 : OverheadBasis::assumed;
+  result.charged = options.machine.overheads;
+  admit_at_worst(graph, plan, options.machine, result);
+  if (options.real_time && plan.policy != Policy::cooperative && !options.machine.not_preemptible.empty())
+    result.notes.push_back(options.machine.not_preemptible);
   result.admitted = result.answer == Answer::admitted && result.verdict != Verdict::invalid;
-  if (result.admitted && options.margins) add_margins(graph, plan, options.machine.overheads, result);
+  if (result.admitted && options.margins) add_margins(graph, plan, result.charged, result);
   result.text = check_text(graph, plan, options, result);
   result.json = check_json(plan, options, result);
   return result;

@@ -51,7 +51,9 @@ struct CheckResult {
   Verdict verdict = Verdict::valid;
   Answer answer = Answer::not_proven;  ///< the worst of all modes
   bool admitted = false;
-  double utilisation = 0;  ///< cores wanted: sum of budget * rate
+  OverheadBasis basis = OverheadBasis::assumed;  ///< of the overheads that `modes` are charged
+  analysis::Overheads charged = {};              ///< these
+  double utilisation = 0;                        ///< cores wanted: sum of budget * rate
   size_t cores = 0;
   uint64_t pool_bytes = 0;
   std::vector<std::string> unbudgeted;  ///< tasks whose budget is not stated: not counted
@@ -73,7 +75,8 @@ struct CheckOptions {
   bool real_time = true;  ///< false: virtual time, in which the machine's cores do not matter
 };
 
-/// Admission, ages and memory of a plan in each of its modes.
+/// Admission, ages and memory of a plan in each of its modes. With the worst overheads that were observed if these
+/// admit it, else with the others.
 CheckResult check(const GraphSpec& graph, const Plan& plan, const CheckOptions& options = {});
 /// The plan without these tasks; who followed one of them is left out as well.
 Plan without(const Plan& plan, const std::vector<std::string>& names);

@@ -8,6 +8,7 @@
 #include "graph/check/machine_figures.hpp"
 #include "hal/settings/json.hpp"
 #include "rt/machine/check_support.hpp"
+#include "rt/machine/checks.hpp"
 #include "rt/machine/parse.hpp"
 
 namespace takt::graph {
@@ -37,6 +38,7 @@ std::vector<int> exclusive_cpus(const machine::Facts& facts) {
 void read_file(const json& root, const std::filesystem::path& file, CheckMachine& found) {
   const MeasuredMachine measured = read_measured_machine(root);  // whole or not at all
   const machine::Identity &where = measured.machine, &here = found.identity;
+  found.worst = worst_overheads(measured, found.overheads, kWorstMargin);
   found.overheads = overheads_of(measured.figures, found.overheads);
   found.measured = true;
   found.overheads_from = "overheads measured";
@@ -48,7 +50,26 @@ void read_file(const json& root, const std::filesystem::path& file, CheckMachine
       file.string(), where.cpu, where.cores, where.kernel, here.cpu, here.cores, here.kernel));
 }
 
+/// What a system call of any process takes then delays a job, and no analysis charges it.
+std::string not_preemptible(const machine::Facts& facts) {
+  const machine::Preemption found = machine::preemption_of(facts);
+  if (found.preempts()) return "";
+  return fmt::format(
+      "the kernel does not preempt a thread within a system call (preemption {}, {}): a job waits for that, and it is "
+      "not charged; `takt doctor` says how to change it",
+      found.model, found.source);
+}
+
 }  // namespace
+
+std::string_view to_string(OverheadBasis basis) {
+  switch (basis) {
+    case OverheadBasis::assumed: return "assumed";
+    case OverheadBasis::p99: return "p99";
+    case OverheadBasis::worst: return "worst";
+  }
+  return "";
+}
 
 analysis::Overheads assumed_overheads(const machine::Facts& facts) {
   analysis::Overheads o;
@@ -82,6 +103,7 @@ CheckMachine check_machine(const machine::Facts& facts, const std::filesystem::p
   found.online = machine::online_cpus(facts);
   found.exclusive = exclusive_cpus(facts);
   found.identity = machine::Identity::of(facts);
+  found.not_preemptible = not_preemptible(facts);
   const auto text = file.empty() ? std::nullopt : facts.text(file.string());
   if (!text) return found;
   try {

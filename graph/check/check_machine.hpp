@@ -2,7 +2,9 @@
 // What a check knows of the machine: its CPUs, and what `takt doctor --measure` found there.
 #pragma once
 #include <filesystem>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "rt/machine/facts.hpp"
@@ -11,8 +13,15 @@
 
 namespace takt::graph {
 
+/// What overheads claim: nobody measured them; one job in a hundred may take longer; none was seen to take longer, and
+/// there is a margin on top.
+enum class OverheadBasis : uint8_t { assumed, p99, worst };
+std::string_view to_string(OverheadBasis basis);
+
 struct CheckMachine {
-  analysis::Overheads overheads;      ///< charged in every analysis
+  analysis::Overheads overheads;  ///< assumed, or 99th percentiles; lanes are put on cores with them
+  /// The worst that was observed, and kWorstMargin of it; nothing: not known. What they admit is admitted with them.
+  std::optional<analysis::Overheads> worst;
   bool measured = false;              ///< else assumed
   std::string overheads_from;         ///< one line: where the figures come from
   std::vector<std::string> warnings;  ///< measured elsewhere, a file that cannot be read
@@ -20,7 +29,12 @@ struct CheckMachine {
   machine::Identity identity;         ///< no cores: not known
   /// CPUs of the exclusive cpuset that this process runs in; empty: it runs in none.
   std::vector<int> exclusive;
+  /// One sentence if a thread in the kernel is not preempted; "": it is, or it is not known.
+  std::string not_preemptible;
 };
+
+/// Of the worst overhead that was observed, so much more is charged: the next run may see a worse one.
+inline constexpr double kWorstMargin = 0.2;
 
 /// Figures for a machine that nobody measured: generous ones for a virtual machine of two cores, a budget enforced on
 /// the kernel's tick, the bandwidth that the kernel's settings allow SCHED_DEADLINE on all CPUs

@@ -21,13 +21,24 @@ std::optional<int64_t> margin_of(const ModeCheck& mode, size_t t) {
   return t < mode.margins_ns.size() ? std::optional(mode.margins_ns[t]) : std::nullopt;
 }
 
+/// What the overheads claim; of assumed ones the line itself says it.
+std::string basis_text(const CheckResult& result) {
+  switch (result.basis) {
+    case OverheadBasis::worst: return fmt::format(": the worst, and {:.0f} % more", 100 * kWorstMargin);
+    case OverheadBasis::p99: return ": p99, 1 job in 100 may take longer";
+    case OverheadBasis::assumed: return "";
+  }
+  return "";
+}
+
 std::string head_text(const GraphSpec& graph, const Plan& plan, const CheckOptions& options,
                       const CheckResult& result) {
   const Admission& admission = result.modes.front().admission;
   const bool invalid = result.verdict == Verdict::invalid;
   std::string text =
-      fmt::format("{}: {} under {} on {} core{}", graph.name, invalid ? "Invalid" : to_string(result.answer),
-                  to_string(plan.policy), result.cores, result.cores == 1 ? "" : "s");
+      fmt::format("{}: {}{} under {} on {} core{}", graph.name, invalid ? "Invalid" : to_string(result.answer),
+                  result.admitted && result.basis == OverheadBasis::p99 ? " at p99" : "", to_string(plan.policy),
+                  result.cores, result.cores == 1 ? "" : "s");
   if (!invalid && !admission.by.empty()) text += fmt::format(" ({})", admission.by);
   text += "\n";
   for (const std::string& problem : result.problems) text += problem + "\n";
@@ -38,9 +49,10 @@ std::string head_text(const GraphSpec& graph, const Plan& plan, const CheckOptio
   text += fmt::format("budgets ask for {:.2f} of {} core{}, pools take {:.1f} MB\n", result.utilisation, result.cores,
                       result.cores == 1 ? "" : "s", static_cast<double>(result.pool_bytes) / 1e6);
   if (!options.machine.overheads_from.empty()) {
-    const analysis::Overheads& o = options.machine.overheads;
-    text += fmt::format("{}\n  a job {:.0f} us + {:.1f} us per input or output, enforcement {:.2f} ms",
-                        options.machine.overheads_from, static_cast<double>(o.release_ns + 2 * o.switch_ns) / 1e3,
+    const analysis::Overheads& o = result.charged;
+    text += fmt::format("{}{}\n  a job {:.0f} us + {:.1f} us per input or output, enforcement {:.2f} ms",
+                        options.machine.overheads_from, basis_text(result),
+                        static_cast<double>(o.release_ns + 2 * o.switch_ns) / 1e3,
                         static_cast<double>(std::max(o.take_ns, o.publish_ns)) / 1e3,
                         to_ms(plan.policy == Policy::fixed ? o.demotion_ns : o.throttled_late_ns()));
     if (plan.policy == Policy::deadline)
@@ -178,8 +190,8 @@ Json check_json(const Plan& plan, const CheckOptions& options, const CheckResult
   if (!whole.change.empty()) json["change"] = whole.change;
   json["utilisation"] = result.utilisation;
   json["cores"] = result.cores;
-  json["overheads"] = {{"measured", options.machine.measured}};
-  json["overheads"].update(overheads_json(options.machine.overheads));
+  json["overheads"] = {{"measured", options.machine.measured}, {"basis", to_string(result.basis)}};
+  json["overheads"].update(overheads_json(result.charged));
   if (result.bandwidth_within_ns > 0) json["bandwidth_within_ms"] = to_ms(result.bandwidth_within_ns);
   json["warnings"] = result.warnings;
   json["nodes"] = Json::array();

@@ -28,6 +28,8 @@ constexpr std::array kTimes{
     TimeFigure{"demotion_us", &MachineFigures::demotion, &Overheads::demotion_ns},
     TimeFigure{"tick_us", &MachineFigures::tick, &Overheads::tick_ns},
 };
+constexpr std::array kPercentiles{kTimes[0], kTimes[1], kTimes[2], kTimes[3]};  // the others are extremes, or medians
+constexpr const char* kWorst = "worst";
 constexpr const char *kMachine = "machine", *kCpu = "cpu", *kCores = "cores", *kKernel = "kernel",
                      *kMeasuredAt = "measured_at", *kBandwidth = "deadline_bandwidth";
 constexpr double kMost_us = 1e9, kMostCores = 1e6;
@@ -58,6 +60,8 @@ Json measured_machine_json(const MeasuredMachine& measured) {
   for (const TimeFigure& time : kTimes)
     if (const auto& us = figures.*time.us) file[time.key] = *us;
   if (figures.deadline_bandwidth) file[kBandwidth] = *figures.deadline_bandwidth;
+  for (const TimeFigure& time : kPercentiles)
+    if (const auto& us = measured.worst.*time.us) file[kWorst][time.key] = *us;
   return file;
 }
 
@@ -67,6 +71,8 @@ MeasuredMachine read_measured_machine(const json& file) {
   if (const json when = file.value(kMeasuredAt, json()); when.is_string()) measured.measured_at = when;
   for (const TimeFigure& time : kTimes) measured.figures.*time.us = figure(file, time.key, kMost_us);
   measured.figures.deadline_bandwidth = figure(file, kBandwidth, kMostCores);
+  if (const json worst = file.value(kWorst, json::object()); worst.is_object())
+    for (const TimeFigure& time : kPercentiles) measured.worst.*time.us = figure(worst, time.key, kMost_us);
   return measured;
 }
 
@@ -75,6 +81,16 @@ Overheads overheads_of(const MachineFigures& figures, Overheads otherwise) {
     if (const auto& us = figures.*time.us) otherwise.*time.ns = static_cast<int64_t>(*us * 1e3);
   otherwise.deadline_bandwidth = figures.deadline_bandwidth.value_or(otherwise.deadline_bandwidth);
   return otherwise;
+}
+
+std::optional<Overheads> worst_overheads(const MeasuredMachine& measured, const Overheads& otherwise, double margin) {
+  Overheads worst = overheads_of(measured.figures, otherwise);
+  for (const TimeFigure& time : kPercentiles) {
+    const auto& us = measured.worst.*time.us;
+    if (!us) return std::nullopt;
+    worst.*time.ns = static_cast<int64_t>(*us * (1 + margin) * 1e3);
+  }
+  return worst;
 }
 
 Json overheads_json(const Overheads& overheads) {

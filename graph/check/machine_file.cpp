@@ -66,6 +66,16 @@ std::optional<double> dearer(const machine::Measured& m, const Figure& figure) {
   return result;
 }
 
+/// The largest samples of what is charged with every job.
+MachineFigures worst_figures(const machine::Measured& m) {
+  MachineFigures worst;
+  if (m.release) worst.release = m.release->lateness.max_us;
+  if (m.context_switch) worst.context_switch = m.context_switch->one_way.max_us;
+  worst.publish = dearer(m, [](const TransferCosts& costs) { return costs[0].publish.max_us; });
+  worst.take = dearer(m, [](const TransferCosts& costs) { return costs[0].take.max_us; });
+  return worst;
+}
+
 std::string row(const std::string& name, const Spread& spread) {
   return fmt::format("  {:<34} {:>9.2f} {:>9} {:>9.2f} {:>8}\n", name, spread.p50_us,
                      spread.has_p99() ? fmt::format("{:.2f}", spread.p99_us) : "-", spread.max_us, spread.samples);
@@ -114,7 +124,7 @@ Json measured_json(const machine::Identity& machine, const std::string& measured
   if (m.watchdog_overrun) figures.demotion = m.watchdog_overrun->max_us;
   figures.tick = m.tick_us;
   if (m.bandwidth) figures.deadline_bandwidth = m.bandwidth->accepted;
-  Json json = graph::measured_machine_json({machine, measured_at, figures});
+  Json json = graph::measured_machine_json({machine, measured_at, figures, worst_figures(m)});
   if (m.release) json["policy"] = to_string(m.release->policy);
   Json& details = json["details"];
   details["release_us"] = m.release ? to_json(m.release->lateness) : Json(nullptr);

@@ -82,6 +82,32 @@ TEST_CASE("overheads: of the file, null as assumed") {
   CHECK(found.overheads_from == "overheads measured 2026-11-21T22:45:00Z");
 }
 
+TEST_CASE("overheads: the worst of the file, with a margin; unknown if one of them is") {
+  test::FakeFacts facts = machine_six();
+  std::string text = kMeasured;
+  CHECK(!check_machine(facts, "/m.json").worst);
+  text.insert(text.rfind('}'), R"(, "worst": {"release_us": 100, "switch_us": 20, "publish_us": 10, "take_us": 5})");
+  facts.files["/m.json"] = text;
+  const CheckMachine found = check_machine(facts, "/m.json");
+  REQUIRE(found.worst);
+  CHECK(found.worst->release_ns == 120'000);
+  CHECK(found.worst->take_ns == 6'000);
+  CHECK(found.worst->per_mb_ns == found.overheads.per_mb_ns);
+  CHECK(found.overheads.release_ns == 60'500);
+  text.replace(text.find("\"take_us\": 5}"), 12, "\"other\": 5");
+  facts.files["/m.json"] = text;
+  CHECK(!check_machine(facts, "/m.json").worst);
+}
+
+TEST_CASE("a kernel that does not preempt is told with who says so") {
+  test::FakeFacts facts = machine_six();
+  CHECK(check_machine(facts, "").not_preemptible.empty());
+  facts.files["/sys/kernel/debug/sched/preempt"] = "none (voluntary) full\n";
+  CHECK(check_machine(facts, "").not_preemptible.find("(preemption voluntary, debugfs)") != std::string::npos);
+  facts.files["/sys/kernel/debug/sched/preempt"] = "none voluntary (full)\n";
+  CHECK(check_machine(facts, "").not_preemptible.empty());
+}
+
 TEST_CASE("overheads: measured on another machine, or not to be read, is a warning") {
   test::FakeFacts facts = machine_six();
   facts.files["/m.json"] = kMeasured;
