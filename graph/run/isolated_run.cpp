@@ -132,9 +132,13 @@ class IsolatedRun {
     graph::complete(plan_, exchange, observers(options_, graph_));
     faults_.make_room(plan_);
     if (!again()) {
-      auto ages = admit(options_, graph_, plan_, machine, adjusted_);
-      if (!ages) throw Refused{ages.error()};
-      ages_ = std::move(*ages);
+      auto proofs = admit(options_, graph_, plan_, machine, adjusted_);
+      if (!proofs) throw Refused{proofs.error()};
+      proofs_ = std::move(*proofs);
+      tell_bounds(graph_, plan_, proofs_, board_);
+    } else {
+      proofs_.policy = plan_.policy;
+      proofs_.why = "all processes were lost, with what was admitted";
     }
     const CpuLatencyHold latency = hold_cpu_dma_latency();
     tell_lacks(latency);
@@ -152,6 +156,7 @@ class IsolatedRun {
     memory_mb_ = proportional_memory_mb(getpid());
     for (size_t p = 0; p < group_.size(); ++p) memory_mb_ += proportional_memory_mb(group_.pid(p));
     for (const pid_t nursery : group_.nurseries()) memory_mb_ += proportional_memory_mb(nursery);
+    const auto watch_of_stalls = watch_stalls(proofs_, plan_, clock_, board_);
     start();
     {
       const attach::Server server({graph_, plan_, board_, *transport_, run});
@@ -164,6 +169,7 @@ class IsolatedRun {
       const RunExpectations::Active expecting(expectations_, plan_, clock_, board_, *transport_);
       watch();
     }
+    if (watch_of_stalls) stalls_ = watch_of_stalls->end();
     probe.reset();
     watchdog_->start();  // whoever waits for feeds does so until the end: reports and traces take their time
     count_chunks();
@@ -376,8 +382,9 @@ class IsolatedRun {
     result.released = released_jobs(plan_, board_, result.epoch_ns, result.end_ns);
     const std::string no_trace = trace_.write(graph_, plan_, board_, result);
     record_.finish(result, trace_.unheard_threads());
-    auto report = make_report({graph_, plan_, board_, result, *transport_, use, options_.clock,
-                               std::string(to_string(plan_.policy)), "subsystem", partition_.names, adjusted_, ages_});
+    auto report =
+        make_report({graph_, plan_, board_, result, *transport_, use, options_.clock,
+                     std::string(to_string(plan_.policy)), "subsystem", partition_.names, adjusted_, proofs_, stalls_});
     report["memory"]["chunks_at_end"] = chunks_at_end_;
     if (const size_t lost = group_.lost_nurseries(); lost > 0)
       problems_.push_back(fmt::format("the process that starts others again was lost {} times and replaced", lost));
@@ -401,7 +408,8 @@ class IsolatedRun {
   RunFaults& faults_;
   RunExpectations expectations_;
   std::vector<std::string> adjusted_, problems_;
-  std::vector<graph::AgeBound> ages_;
+  graph::Proofs proofs_;
+  StallLog stalls_;
   std::vector<std::pair<pid_t, int64_t>> stopped_;  ///< processes, and when they go on
   MonotonicClock clock_;
   graph::Composition plan_source_;  ///< shells of all nodes; the plan points into them

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "graph/run/report.hpp"
-#include "graph/run/commit.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
+#include "graph/run/commit.hpp"
 
 namespace takt::command {
 namespace {
@@ -71,7 +71,14 @@ double cores_of(const RunFacts& facts, size_t t) {
   return static_cast<double>(facts.board.task(t).cpu_ns) / std::max(1.0, facts.result.duration_s() * 1e9);
 }
 
-Json node_json(const RunFacts& facts, size_t t) {
+/// Of a figure for which something was proven, or could have been.
+Json distribution(const Histogram& h, double ns_per_unit, const Json& beside_max) {
+  Json json = distribution(h, ns_per_unit);
+  json.update(beside_max);
+  return json;
+}
+
+Json node_json(const RunFacts& facts, const ProofReport& proofs, size_t t) {
   const TaskPlan& plan = facts.plan.tasks[t];
   const TaskStatistics& s = facts.board.task(t);
   Json node;
@@ -105,7 +112,7 @@ Json node_json(const RunFacts& facts, size_t t) {
   node["lateness_us"] = distribution(s.lateness, 1e3);
   node["lateness_histogram_us"] = coarse_histogram(s.lateness);
   node["exec_ms"] = distribution(s.exec, 1e6);
-  node["response_ms"] = distribution(s.response, 1e6);
+  node["response_ms"] = distribution(s.response, 1e6, proofs.of_response(t));
   node["publish_ms"] = distribution(s.publish, 1e6);
   node["cores"] = cores_of(facts, t);
   node["preempted_ms"] = static_cast<double>(s.preempted_ns) / 1e6;
@@ -116,7 +123,7 @@ Json node_json(const RunFacts& facts, size_t t) {
   return node;
 }
 
-Json edges_json(const RunFacts& facts) {
+Json edges_json(const RunFacts& facts, const ProofReport& proofs) {
   Json edges = Json::array();
   for (size_t t = 0; t < facts.plan.tasks.size(); ++t) {
     const TaskPlan& task = facts.plan.tasks[t];
@@ -130,7 +137,7 @@ Json edges_json(const RunFacts& facts) {
                        {"dropped", s.dropped},
                        {"stale", s.stale.load()},
                        {"exhausted", facts.board.port(task.edges[e].port).writer.pool_empty},
-                       {"age_ms", distribution(s.age, 1e6)}});
+                       {"age_ms", distribution(s.age, 1e6, proofs.of_edge(t, e))}});
     }
   }
   return edges;
@@ -198,22 +205,17 @@ const Histogram* output_age(const RunFacts& facts, const graph::PortName& name) 
   return nullptr;
 }
 
-Json chains_json(const RunFacts& facts) {
+Json chains_json(const RunFacts& facts, const ProofReport& proofs) {
   Json chains = Json::array();
   for (const graph::ChainSpec& chain : facts.graph.chains) {
     const Histogram* age = output_age(facts, chain.to);
     const bool sampled = age != nullptr && age->count() > 0;
-    const auto proven = std::find_if(facts.ages.begin(), facts.ages.end(), [&](const graph::AgeBound& bound) {
-      return !bound.edge && bound.name == chain.name && bound.bound_ns;
-    });
-    const bool as_proven = facts.clock == "virtual" || facts.result.policy_granted == facts.plan.policy;
-    chains.push_back(
-        {{"name", chain.name},
-         {"age_ms", distribution(sampled ? *age : Histogram(), 1e6)},
-         {"bound_ms", static_cast<double>(chain.max_age_ns) / 1e6},
-         {"proven_ms",
-          as_proven && proven != facts.ages.end() ? Json(static_cast<double>(*proven->bound_ns) / 1e6) : Json(nullptr)},
-         {"within", sampled ? Json(age->max_ns() <= chain.max_age_ns) : Json(nullptr)}});
+    const Json proven = proofs.of_chain(chain.name);
+    chains.push_back({{"name", chain.name},
+                      {"age_ms", distribution(sampled ? *age : Histogram(), 1e6, proven)},
+                      {"bound_ms", static_cast<double>(chain.max_age_ns) / 1e6},
+                      {"proven_ms", proven["proven_ms"]},
+                      {"within", sampled ? Json(age->max_ns() <= chain.max_age_ns) : Json(nullptr)}});
   }
   return chains;
 }
@@ -231,7 +233,9 @@ bool kept_its_promises(const Json& nodes) {
 
 Json make_report(const RunFacts& facts) {
   Json nodes = Json::array();
-  for (size_t t = 0; t < facts.plan.tasks.size(); ++t) nodes.push_back(node_json(facts, t));
+  const ProofReport proofs(
+      {facts.graph, facts.plan, facts.board, facts.proofs, facts.stalls, facts.result, facts.clock == "virtual"});
+  for (size_t t = 0; t < facts.plan.tasks.size(); ++t) nodes.push_back(node_json(facts, proofs, t));
   Json report;
   report["graph"] = facts.graph.name;
   report["schedule"] = facts.graph.schedule.name;
@@ -244,15 +248,16 @@ Json make_report(const RunFacts& facts) {
   report["duration_s"] = facts.result.duration_s();
   report["commit"] = kCommit;
   report["machine"] = machine_facts();
-  report["ok"] = kept_its_promises(nodes);
+  report["ok"] = kept_its_promises(nodes) && !proofs.unexplained();
   report["modes"] = modes_json(facts);
   report["transport"] = facts.transport.name();
   report["isolation"] = facts.isolation;
   report["processes"] = facts.processes;
+  report["proofs"] = proofs.json();
   report["nodes"] = std::move(nodes);
   report["devices"] = devices_json(facts);
-  report["edges"] = edges_json(facts);
-  report["chains"] = chains_json(facts);
+  report["edges"] = edges_json(facts, proofs);
+  report["chains"] = chains_json(facts, proofs);
   report["memory"] = {{"shm_mb", static_cast<double>(facts.transport.shared_memory_bytes()) / 1e6},
                       {"rss_mb", facts.use.rss_mb},
                       {"pools", pools_json(facts)}};

@@ -3,9 +3,9 @@
 #include <string>
 #include <vector>
 
-#include "graph/check/ages.hpp"
 #include "graph/compose/composition.hpp"
 #include "graph/run/machine.hpp"
+#include "graph/run/proof_report.hpp"
 #include "hal/settings/json.hpp"
 #include "rt/sched/executor.hpp"
 
@@ -30,7 +30,8 @@ struct RunFacts {
   std::string clock, policy_asked, isolation;
   std::vector<std::string> processes;  ///< names, where there are several
   std::vector<std::string> adjusted;
-  std::vector<graph::AgeBound> ages;  ///< that were proved of the mode of the start, under the policy asked for
+  const graph::Proofs& proofs;  ///< of the policy asked for
+  const StallLog& stalls;
 };
 
 /// The report of design section 6: times in the unit the key says, null where there are no samples.

@@ -40,12 +40,13 @@ std::unique_ptr<Transport> make_transport(const std::string& name, const Plan& p
 
 /// Runs the composed graph in this process; everything it needs exists and is checked.
 int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, RunExpectations& expectations,
-            const std::vector<graph::AgeBound>& ages, std::vector<std::string> adjusted) {
+            const graph::Proofs& proofs, std::vector<std::string> adjusted) {
   const graph::GraphSpec& graph = *prepared.graph;
   graph::Composition& composition = *prepared.composition;
   const auto durations = job_durations(options.durations, composition.plan, options.seed);
   if (!durations) return refuse(durations.error(), kBadInput);
   RunBoard board(composition.plan);
+  tell_bounds(graph, composition.plan, proofs, board);
   RunRecord record(options, composition.plan);
   faults.disturb_disk(record, *prepared.clock, board);
   const auto transport =
@@ -71,6 +72,7 @@ int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, Ru
   const ProcessReading before = ProcessReading::now();
   RunWatchdog watchdog(options, composition.plan, board);
   RunResult result;
+  StallLog stalls;
   {
     const Stoppable stoppable(board);
     std::optional<attach::Server> server;  // virtual time passes too fast to speak to
@@ -85,7 +87,9 @@ int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, Ru
     {
       const RunFaults::Active faulty(faults, composition.plan, *prepared.clock, board);
       const RunExpectations::Active expecting(expectations, composition.plan, *prepared.clock, board, *transport);
+      const auto watch = watch_stalls(proofs, composition.plan, *prepared.clock, board);
       result = executor.run();
+      if (watch) stalls = watch->end();
     }
   }
   const ProcessReading after = ProcessReading::now();
@@ -109,7 +113,8 @@ int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, Ru
                              "none",
                              {},
                              std::move(adjusted),
-                             ages});
+                             proofs,
+                             stalls});
   if (prepared.clock->is_virtual())
     report["simulated"] = {{"policy", to_string(composition.plan.policy)},
                            {"cores", composition.plan.cores.size()},
@@ -148,8 +153,8 @@ int run_in_one_process(const RunOptions& options, Prepared& prepared, RunFaults&
   if (!prepared.clock->is_virtual() || cores.empty()) choose_cores(cores, adjusted);
   const graph::CheckMachine machine = this_machine();
   prepared.composition->plan.overheads = machine.overheads;
-  const auto ages = admit(options, *prepared.graph, prepared.composition->plan, machine, adjusted);
-  if (!ages) return ages.error();
+  const auto proofs = admit(options, *prepared.graph, prepared.composition->plan, machine, adjusted);
+  if (!proofs) return proofs.error();
   const CpuLatencyHold latency = hold_cpu_dma_latency();
   std::vector<std::string> lacks = prepare_process();
   const bool locked = lacks.empty();
@@ -158,7 +163,7 @@ int run_in_one_process(const RunOptions& options, Prepared& prepared, RunFaults&
     return refuse("--require-rt: " + lacks.front(), kDeviceOrSystem);
   adjusted.insert(adjusted.end(), lacks.begin(), lacks.end());
   for (const std::string& line : adjusted) std::fprintf(stderr, "takt: adjusted: %s\n", line.c_str());
-  return execute(options, prepared, faults, expectations, *ages, std::move(adjusted));
+  return execute(options, prepared, faults, expectations, *proofs, std::move(adjusted));
 }
 
 /// One process, or one per subsystem: as the command line says, else the graph.

@@ -73,6 +73,14 @@ std::string policy_text(const Json& report) {
                      report["nodes"].size(), early);
 }
 
+/// ", proven 12.3"; of what is only estimated, that; "" of neither.
+std::string proven_text(const Json& age) {
+  if (!age["proven_ms"].is_null()) return figure(age["proven_ms"], ", proven {:.1f}");
+  return age.contains("estimated_ms") && !age["estimated_ms"].is_null()
+             ? figure(age["estimated_ms"], ", estimated {:.1f}")
+             : "";
+}
+
 std::string record_line(const Json& record, uint64_t lost) {
   std::string text =
       fmt::format("record {}: {} messages, {} jobs, {:.1f} MB, ", record["file"].get<std::string>(),
@@ -87,23 +95,29 @@ std::string record_line(const Json& record, uint64_t lost) {
   return text + (refused.empty() ? "" : " (" + refused + ")") + "\n";
 }
 
+std::string not_ok_text(const Json& report) {
+  const bool not_as_proven = report["proofs"]["verdict"] == "unexplained";
+  return not_as_proven ? "NOT OK: something is not as proven, see the first lines\n"
+                       : "NOT OK: a high-criticality deadline was missed or a node fell behind\n";
+}
+
 }  // namespace
 
 std::string summary_text(const Json& report) {
   const auto word = [&](const char* key) { return report[key].get<std::string>(); };
-  std::string text =
-      fmt::format("\n{} on {}, {:.1f} s ({} profile, {} clock, {} transport{})\n{}\n", word("graph"), word("schedule"),
-                  report["duration_s"].get<double>(), word("profile"), word("clock"), word("transport"),
-                  report["processes"].empty() ? "" : fmt::format(", {} processes", report["processes"].size()),
-                  policy_text(report));
+  std::string text = fmt::format(
+      "\n{}{} on {}, {:.1f} s ({} profile, {} clock, {} transport{})\n{}\n", unexplained_text(report["proofs"]),
+      word("graph"), word("schedule"), report["duration_s"].get<double>(), word("profile"), word("clock"),
+      word("transport"), report["processes"].empty() ? "" : fmt::format(", {} processes", report["processes"].size()),
+      policy_text(report));
   text += fmt::format(fmt::runtime(kRow), "", "", "", "", "", "", "", "exec", "ms", "resp", "late", "us");
   text += fmt::format(fmt::runtime(kRow), "node", "Hz", "rel", "done", "miss", "skip", "stale", "p50", "p99", "p99",
                       "p50", "p99");
   for (const Json& node : report["nodes"]) text += node_line(node);
   for (const Json& chain : report["chains"])
-    text += fmt::format("chain {}: age p50 {} ms, max {} ms, bound {} ms: {}\n", chain["name"].get<std::string>(),
+    text += fmt::format("chain {}: age p50 {} ms, max {} ms{}, bound {} ms: {}\n", chain["name"].get<std::string>(),
                         figure(chain["age_ms"]["p50"], "{:.1f}"), figure(chain["age_ms"]["max"], "{:.1f}"),
-                        figure(chain["bound_ms"], "{:.0f}"),
+                        proven_text(chain["age_ms"]), figure(chain["bound_ms"], "{:.0f}"),
                         chain["within"].is_null()     ? "no sample"
                         : chain["within"].get<bool>() ? "within"
                                                       : "EXCEEDED");
@@ -118,8 +132,9 @@ std::string summary_text(const Json& report) {
                       report["host_stall_ms"].get<int64_t>());
   if (report.contains("record")) text += record_line(report["record"], report["recorder_lost"].get<uint64_t>());
   text += events_text(report);
+  text += proofs_text(report["proofs"]);
   for (const Json& line : report["adjusted"]) text += "adjusted: " + line.get<std::string>() + "\n";
-  text += report["ok"].get<bool>() ? "ok\n" : "NOT OK: a high-criticality deadline was missed or a node fell behind\n";
+  text += report["ok"].get<bool>() ? "ok\n" : not_ok_text(report);
   if (report.contains("scenario")) text += graph::scenario_text(report["scenario"]);
   if (report.contains("expectations")) {
     text += graph::findings_text(report["expectations"]["conditions"]);

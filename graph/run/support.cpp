@@ -18,6 +18,7 @@
 
 #include "graph/check/check.hpp"
 #include "graph/check/machine_file.hpp"
+#include "graph/run/machine.hpp"
 #include "graph/run/prepare.hpp"
 #include "graph/run/report.hpp"
 #include "graph/view/html_report.hpp"
@@ -96,9 +97,8 @@ void choose_cores(std::vector<int>& cores, std::vector<std::string>& adjusted) {
 
 graph::CheckMachine this_machine() { return graph::check_machine(machine::SystemFacts(), graph::machine_file()); }
 
-tl::expected<std::vector<graph::AgeBound>, Exit> admit(const RunOptions& options, const graph::GraphSpec& graph,
-                                                       const Plan& plan, const graph::CheckMachine& machine,
-                                                       std::vector<std::string>& adjusted) {
+tl::expected<graph::Proofs, Exit> admit(const RunOptions& options, const graph::GraphSpec& graph, const Plan& plan,
+                                        const graph::CheckMachine& machine, std::vector<std::string>& adjusted) {
   graph::CheckOptions how;
   how.machine = machine;
   how.real_time = options.clock != "virtual";
@@ -108,13 +108,19 @@ tl::expected<std::vector<graph::AgeBound>, Exit> admit(const RunOptions& options
     return tl::make_unexpected(code);
   };
   if (check.verdict == graph::Verdict::invalid) return refused(check.text, kBadInput);
-  if (check.admitted) return check.modes.front().ages;
-  if (options.unchecked) return {};
+  graph::Proofs proofs = graph::proofs_of(plan, check, machine);
+  if (check.admitted || options.unchecked) return proofs;
   if (plan.policy != Policy::cooperative || check.answer != graph::Answer::not_proven)
     return refused(check.text + "(--unchecked runs it all the same)", kNotOk);
   adjusted.push_back(
       "admission -> none: under the policy cooperative the deadlines are not proven (takt check says why)");
-  return {};
+  return proofs;
+}
+
+std::unique_ptr<StallWatch> watch_stalls(const graph::Proofs& proofs, const Plan& plan, const Clock& clock,
+                                         const RunBoard& board) {
+  if (clock.is_virtual() || plan.policy == Policy::cooperative || proofs.modes.empty()) return nullptr;
+  return std::make_unique<StallWatch>(plan, board, stolen_ns);
 }
 
 std::vector<std::string> prepare_process() {

@@ -1,17 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a run in one process and a run in several have in common.
 #pragma once
+#include <memory>
 #include <string>
 #include <tl/expected.hpp>
 #include <vector>
 
-#include "graph/check/ages.hpp"
 #include "graph/check/check_machine.hpp"
+#include "graph/check/proofs.hpp"
 #include "graph/run/run.hpp"
 #include "hal/settings/json.hpp"
 #include "rt/memory/process_memory.hpp"
 #include "rt/sched/executor.hpp"
 #include "rt/sched/run_board.hpp"
+#include "rt/sched/stall_watch.hpp"
 
 namespace takt::command {
 
@@ -56,14 +58,18 @@ void choose_cores(std::vector<int>& cores, std::vector<std::string>& adjusted);
 /// This machine, with what `takt doctor --measure` left.
 graph::CheckMachine this_machine();
 
-/// Asks the check. The age bounds that it proved (none if it proved nothing): the run may go on; else what was refused
+/// Asks the check. What it proved (nothing, if it did not admit the plan): the run may go on; else what was refused
 /// is on stderr and this is the exit code. --unchecked goes on in spite of everything but Invalid input. So does
 /// `cooperative` in spite of an answer that is not proven, and says so in `adjusted`: it promises no deadline, and no
 /// proof would hold among ordinary threads. The policy that was asked for is the one that is checked; what the kernel
 /// refuses and replaces by `cooperative` later is not asked again.
-tl::expected<std::vector<graph::AgeBound>, Exit> admit(const RunOptions& options, const graph::GraphSpec& graph,
-                                                       const Plan& plan, const graph::CheckMachine& machine,
-                                                       std::vector<std::string>& adjusted);
+tl::expected<graph::Proofs, Exit> admit(const RunOptions& options, const graph::GraphSpec& graph, const Plan& plan,
+                                        const graph::CheckMachine& machine, std::vector<std::string>& adjusted);
+
+/// Looks for stalls of the machine where something was proven and real time passes; else null. Everything given
+/// outlives it.
+std::unique_ptr<StallWatch> watch_stalls(const graph::Proofs& proofs, const Plan& plan, const Clock& clock,
+                                         const RunBoard& board);
 
 /// Memory locked, OpenCV's thread pool off; what was refused.
 std::vector<std::string> prepare_process();

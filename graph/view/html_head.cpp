@@ -64,11 +64,33 @@ std::string with_unit(const Json& value, const char* format) {
   return number(value) ? figure(value, format) : "not recorded";
 }
 
-std::string verdict(const Json& ok) {
+/// A line for each row of that cause.
+std::string above_text(const Json& proofs, bool unexplained) {
+  std::string text;
+  if (const Json& rows = at(proofs, "above_proof"); rows.is_array())
+    for (const Json& row : rows)
+      if ((at(row, "cause") == "unexplained") == unexplained)
+        text += fmt::format("<br>{} {} ms, proven {} ms, {} of {}: {}", escape(words(at(row, "what"))),
+                            figure(at(row, "observed_ms"), "{:.3f}"), figure(at(row, "proven_ms"), "{:.3f}"),
+                            count_text(at(row, "samples_above")), count_text(at(row, "of")),
+                            escape(words(at(row, "cause"))));
+  return text;
+}
+
+std::string verdict(const Json& report) {
+  const Json& ok = at(report, "ok");
   if (!ok.is_boolean()) return "<p class=\"note\">ok or not: not recorded</p>\n";
-  return ok.get<bool>() ? "<p><span class=\"verdict\">ok</span></p>\n"
-                        : "<p><span class=\"verdict broken\">NOT OK</span> a high-criticality deadline was missed or a "
-                          "node fell behind</p>\n";
+  if (ok.get<bool>()) return "<p><span class=\"verdict\">ok</span></p>\n";
+  const std::string above = above_text(at(report, "proofs"), true);
+  return "<p><span class=\"verdict broken\">NOT OK</span> " +
+         (above.empty() ? "a high-criticality deadline was missed or a node fell behind" : "not as proven:" + above) +
+         "</p>\n";
+}
+
+std::string proofs_text(const Json& proofs) {
+  const std::string verdict = words(at(proofs, "verdict"));
+  if (verdict == "none") return "none: " + escape(words(at(proofs, "why")));
+  return escape(or_not_recorded(verdict)) + above_text(proofs, false);
 }
 
 }  // namespace
@@ -77,7 +99,7 @@ std::string head_section(const Json& report, const graph::GraphSpec& graph) {
   const std::string name = words(at(report, "graph"));
   std::string text = fmt::format("<header>\n<h1>{} on {}</h1>\n", escape(name.empty() ? graph.name : name),
                                  escape(or_not_recorded(words(at(report, "schedule")))));
-  text += verdict(at(report, "ok"));
+  text += verdict(report);
   text += "<dl>\n";
   text += fact("profile", escape(or_not_recorded(words(at(report, "profile")))));
   text += fact("mode", escape(modes_text(at(report, "modes"))));
@@ -87,6 +109,7 @@ std::string head_section(const Json& report, const graph::GraphSpec& graph) {
                                           or_not_recorded(words(at(report, "transport")))));
   text += fact("machine", escape(machine_text(at(report, "machine"))));
   text += fact("host stall", with_unit(at(report, "host_stall_ms"), "{:.0f} ms taken by the host in the whole run"));
+  text += fact("proofs", proofs_text(at(report, "proofs")));
   text += fact("recorder lost", with_unit(at(report, "recorder_lost"), "{:.0f} records"));
   text += fact("adjusted", list_text(at(report, "adjusted"), "nothing: it ran as the files say"));
   text += fact("faults", list_text(at(report, "faults"), "none"));
