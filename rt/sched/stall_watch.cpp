@@ -63,8 +63,8 @@ void StealReader::look(int64_t now_ns, StallLog& log) {
   last_total_ns_ = total_ns;
 }
 
-int64_t unused_ns(const RunBoard& board, size_t tasks, int cpu, int64_t from_ns, int64_t to_ns) {
-  constexpr uint64_t kLooked = 16;  // of a ring of 64, so that none is being written meanwhile
+int64_t idle_ns(const RunBoard& board, size_t tasks, int64_t from_ns, int64_t to_ns) {
+  constexpr uint64_t kLooked = 48;  // of a ring of 64, so that none is being written meanwhile
   int64_t left_ns = to_ns - from_ns;
   for (size_t t = 0; t < tasks; ++t) {
     const TaskStatistics& s = board.task(t);
@@ -72,7 +72,7 @@ int64_t unused_ns(const RunBoard& board, size_t tasks, int cpu, int64_t from_ns,
     for (uint64_t n = count; n > count - std::min(count, kLooked); --n) {
       const JobRecord& job = s.jobs[(n - 1) % s.jobs.size()];
       if (job.finish_ns < from_ns) break;
-      if (job.cpu == cpu) left_ns -= overlap_ns(job.start_ns, job.finish_ns, from_ns, to_ns);
+      left_ns -= overlap_ns(job.start_ns, job.finish_ns, from_ns, to_ns);
     }
   }
   return std::max<int64_t>(0, left_ns);
@@ -97,16 +97,19 @@ const StallLog& StallWatch::end() {
 void StallWatch::probe(int core) {
   pthread_setname_np(pthread_self(), "takt-probe");
   if (!become(kProbePriority, core)) return;
+  std::vector<Stall> late;
+  late.reserve(2 * kSettled_ns / kProbe_ns);
   const MonotonicClock clock;
   for (int64_t due_ns = clock.now_ns(); !ended_.load();) {
     due_ns += kProbe_ns;
     sleep_until(due_ns);
     const int64_t now_ns = clock.now_ns();
+    settle(late, now_ns);
     if (now_ns - due_ns < kShortest_ns) continue;
-    const int64_t away_ns = jobs_go_before_ ? unused_ns(board_, tasks_, core, due_ns, now_ns) : now_ns - due_ns;
-    if (away_ns >= kShortest_ns) note({due_ns, now_ns, away_ns, core});
+    late.push_back({due_ns, now_ns, now_ns - due_ns, core});
     due_ns = clock.now_ns();
   }
+  settle(late, INT64_MAX);
 }
 
 void StallWatch::read_steal() {
@@ -125,9 +128,15 @@ void StallWatch::read_steal() {
   reader.look(clock.now_ns(), log_);
 }
 
-void StallWatch::note(const Stall& stall) {
-  const std::lock_guard lock(mutex_);
-  log_.add(stall);
+void StallWatch::settle(std::vector<Stall>& late, int64_t now_ns) {
+  const auto settled = [&](const Stall& stall) { return !jobs_go_before_ || now_ns - kSettled_ns >= stall.to_ns; };
+  for (Stall stall : late) {
+    if (!settled(stall)) continue;
+    if (jobs_go_before_) stall.away_ns = idle_ns(board_, tasks_, stall.from_ns, stall.to_ns);
+    const std::lock_guard lock(mutex_);
+    if (stall.away_ns >= kShortest_ns) log_.add(stall);
+  }
+  std::erase_if(late, settled);
 }
 
 }  // namespace takt

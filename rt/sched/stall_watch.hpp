@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // When the machine was away: the host of a virtual machine ran somebody else, or its kernel let no thread run. Two
 // witnesses. The kernel's steal counter, in steps of its clock tick; and a probe on each core, which sees shorter
-// absences but only while no job of the run has the core.
+// absences, under `deadline` only while no job of the run is under way.
 #pragma once
 #include <atomic>
 #include <cstdint>
@@ -53,15 +53,18 @@ class StealReader {
   int64_t tick_ns_ = 0, last_look_ns_ = 0, last_total_ns_ = 0;
 };
 
-/// What of [from, to] the jobs of a run leave free on that CPU, by the last jobs on the board.
-int64_t unused_ns(const RunBoard& board, size_t tasks, int cpu, int64_t from_ns, int64_t to_ns);
+/// What of [from, to] no job of a run was under way in, by the last jobs on the board. On which CPU does not matter: a
+/// job of SCHED_DEADLINE may have had several.
+int64_t idle_ns(const RunBoard& board, size_t tasks, int64_t from_ns, int64_t to_ns);
 
 /// Looks from the constructor to end(). A probe is a thread of SCHED_FIFO above every lane and every watchdog that
-/// wakes up every kProbe_ns: about 0.1 % of its core. Jobs of SCHED_DEADLINE go before it; the time in which one had
-/// the core is no stall. Where the kernel refuses the policy there is no probe.
+/// wakes up every kProbe_ns: about 0.1 % of its core. Jobs of SCHED_DEADLINE go before it: where it wakes up late, the
+/// time in which one was under way is no stall, as is known once they have ended (kSettled_ns later). Where the kernel
+/// refuses the policy there is no probe.
 class StallWatch {
  public:
   static constexpr int64_t kProbe_ns = 5'000'000, kSteal_ns = 50'000'000, kShortest_ns = 500'000;
+  static constexpr int64_t kSettled_ns = 500'000'000;
 
   /// Probes on the cores of the plan; `stolen_ns`: see StolenTime, empty: not counted. The board outlives this.
   StallWatch(const Plan& plan, const RunBoard& board, std::function<int64_t()> stolen_ns);
@@ -75,7 +78,8 @@ class StallWatch {
  private:
   void probe(int core);
   void read_steal();
-  void note(const Stall& stall);
+  /// Those that have settled, or all: what is left of them without the jobs goes into the log.
+  void settle(std::vector<Stall>& late, int64_t now_ns);
 
   const RunBoard& board_;
   const size_t tasks_;
