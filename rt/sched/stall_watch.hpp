@@ -58,12 +58,12 @@ class StealReader {
 int64_t idle_ns(const RunBoard& board, size_t tasks, int64_t from_ns, int64_t to_ns);
 
 /// Looks from the constructor to end(). A probe is a thread of SCHED_FIFO above every lane and every watchdog that
-/// wakes up every kProbe_ns: about 0.1 % of its core. Jobs of SCHED_DEADLINE go before it: where it wakes up late, the
+/// wakes up every kProbe_ns: some 20 us each. Jobs of SCHED_DEADLINE go before it: where it wakes up late, the
 /// time in which one was under way is no stall, as is known once they have ended (kSettled_ns later). Where the kernel
 /// refuses the policy there is no probe.
 class StallWatch {
  public:
-  static constexpr int64_t kProbe_ns = 5'000'000, kSteal_ns = 50'000'000, kShortest_ns = 500'000;
+  static constexpr int64_t kProbe_ns = 20'000'000, kSteal_ns = 50'000'000, kShortest_ns = 500'000;
   static constexpr int64_t kSettled_ns = 500'000'000;
 
   /// Probes on the cores of the plan; `stolen_ns`: see StolenTime, empty: not counted. The board outlives this.
