@@ -92,7 +92,7 @@ ProofReport::ProofReport(const ProofFacts& facts) : facts_(facts), modes_{0} {
     if (const Excess* sample = facts_.board.excesses().at(i))
       by_figure[{sample->figure, sample->index, sample->edge}].push_back(*sample);
   for (const auto& [figure, samples] : by_figure)
-    for (Row& row : rows_of(samples)) rows_.push_back(std::move(row));
+    for (const Row& row : rows_of(samples)) rows_.push_back(row);
   std::stable_sort(rows_.begin(), rows_.end(), [](const Row& a, const Row& b) { return a.cause > b.cause; });
 }
 
@@ -304,7 +304,8 @@ Json ProofReport::json() const {
                          {"overheads_from", proofs.overheads_from},
                          {"stall_ms", to_ms(proofs.stall_ns)},
                          {"budgets", "kept"},
-                         {"messages", "one of every job"}};
+                         {"messages", "one of every job"},
+                         {"other_programs", "no real-time threads"}};
   int64_t longest_ns = 0;
   for (const Stall& stall : facts_.stalls.stalls()) longest_ns = std::max(longest_ns, stall.away_ns);
   json["stalls"] = {{"count", facts_.stalls.stalls().size() + facts_.stalls.lost()},
