@@ -172,6 +172,8 @@ ExcessCause ProofReport::cause_of(const Excess& sample) const {
   const int64_t from_ns = begin_ns(sample), to_ns = sample.at_ns;
   const bool is_age = sample.figure != Excess::response;
   if (away_ns(facts_.stalls.stalls(), from_ns, to_ns) > facts_.proofs.stall_ns) return ExcessCause::host_stall;
+  // They went on, and found no place in the log.
+  if (facts_.stalls.lost() > 0 && to_ns >= facts_.stalls.stalls().back().to_ns) return ExcessCause::host_stall;
   if (restarted(from_ns, to_ns)) return ExcessCause::restart;
   if (overran(from_ns, to_ns)) return ExcessCause::budget_overrun;
   if (is_age && changed_mode(from_ns, to_ns)) return ExcessCause::mode_change;

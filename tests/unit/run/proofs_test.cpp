@@ -207,6 +207,8 @@ TEST_CASE("proofs: a stall of the host breaks an assumption, and the exit code s
   CHECK(scene.run(20, stalled)["proofs"]["verdict"] == "unexplained");
   scene.stalls = {{kEpoch, kEpoch + 50 * kMs, 50 * kMs, 0}};  // a second earlier
   CHECK(scene.run(20, stalled)["proofs"]["verdict"] == "unexplained");
+  scene.stalls.assign(StallLog::kMost + 1, scene.stalls.front());  // more than are kept: there may have been later ones
+  CHECK(scene.run(20, stalled)["proofs"]["verdict"] == "assumption_broken");
 }
 
 TEST_CASE("proofs: budgets that were not kept, processes that were away, messages that nobody made") {
