@@ -66,6 +66,7 @@ class Admitting {
                fmt::format("{}: no budget stated; give it one (`takt profile` measures it)", task.name));
     if (!ask_about_sources()) return std::move(result_);
     ask_kernel();
+    ask_about_priorities();
     ask_about_waits();
     ask_about_lanes();
     if (lanes_admitted_) ask_about_overruns();
@@ -105,6 +106,20 @@ class Admitting {
                          to_ms(task.source.wait_ns + task.budget_ns)));
     }
     return time_left;
+  }
+
+  /// SCHED_FIFO has 99 priorities; a lane and its watchdog take two of those that Takt uses.
+  void ask_about_priorities() {
+    if (plan_.policy != Policy::fixed) return;
+    for (int core = 0; core < lanes_.set.cores; ++core) {
+      int lanes = 0;
+      for (size_t l = 0; l < lanes_.lanes.size(); ++l) lanes += lanes_.set.tasks[l].core == core;
+      if (lanes > kMostLanesOfCore)
+        refuse(Answer::infeasible,
+               fmt::format("{} lanes share a core, and `fixed` has priorities for {}, each with one for its watchdog; "
+                           "name more `cores`, or let nodes of one rate follow one another (`on`)",
+                           lanes, kMostLanesOfCore));
+    }
   }
 
   /// A worker that has slept within its pass gets a new deadline from the kernel, counted from its waking, and takes

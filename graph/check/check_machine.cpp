@@ -76,6 +76,7 @@ analysis::Overheads assumed_overheads(const machine::Facts& facts) {
   o.release_ns = 100'000;
   o.switch_ns = 5'000;
   o.publish_ns = o.take_ns = 2'000;
+  o.look_ns = 20'000;
   timespec tick{};
   o.tick_ns = clock_getres(CLOCK_MONOTONIC_COARSE, &tick) == 0 ? tick.tv_nsec : 4'000'000;
   o.enforcement_ns = o.demotion_ns = o.tick_ns;

@@ -205,7 +205,7 @@ int64_t work_until_ns(const Plan& plan, const LaneTasks& lanes, const Piece& pie
   const Members& lane = lanes.lanes[piece.lane];
   const bool leads = piece.ready_ns == 0 && plan.policy != Policy::cooperative;
   const bool sleeps = piece.ready_ns == 0 && lane_wait_ns(plan, lane) > 0;
-  return (leads ? longest_lead_ns(plan, lane) : 0) + (sleeps ? 2 : 1) * begin_ns(overheads) +
+  return (leads ? longest_lead_ns(plan, lane) : 0) + (sleeps ? 2 : 1) * begin_ns(overheads) + lanes.looks_ns[piece.lane] +
          occupied_ns(plan, lane, std::span(piece.members).first(place + 1), overheads);
 }
 

@@ -26,6 +26,7 @@ constexpr std::array kTimes{
     TimeFigure{"per_mb_us", &MachineFigures::per_mb, &Overheads::per_mb_ns},
     TimeFigure{"enforcement_us", &MachineFigures::enforcement, &Overheads::enforcement_ns},
     TimeFigure{"demotion_us", &MachineFigures::demotion, &Overheads::demotion_ns},
+    TimeFigure{"look_us", &MachineFigures::look, &Overheads::look_ns},
     TimeFigure{"tick_us", &MachineFigures::tick, &Overheads::tick_ns},
 };
 constexpr std::array kPercentiles{kTimes[0], kTimes[1], kTimes[2], kTimes[3]};  // the others are extremes, or medians

@@ -14,7 +14,7 @@ namespace takt::graph {
 /// What a check charges. Nothing: not measured.
 struct MachineFigures {
   /// us, each in [0, 1e9).
-  std::optional<double> release, context_switch, publish, take, per_mb, enforcement, demotion, tick;
+  std::optional<double> release, context_switch, publish, take, per_mb, enforcement, demotion, look, tick;
   std::optional<double> deadline_bandwidth;  ///< cores, in [0, 1e6)
 };
 
@@ -26,7 +26,7 @@ struct MeasuredMachine {
 };
 
 /// {"machine": {"cpu", "cores", "kernel"}, "measured_at", "release_us", "switch_us", "publish_us", "take_us",
-/// "per_mb_us", "enforcement_us", "demotion_us", "tick_us", "deadline_bandwidth", "worst": {the four that are
+/// "per_mb_us", "enforcement_us", "demotion_us", "look_us", "tick_us", "deadline_bandwidth", "worst": {the four that are
 /// percentiles}}; a figure that was not measured is left out.
 nlohmann::ordered_json measured_machine_json(const MeasuredMachine& measured);
 /// The reverse; other keys are passed over, a figure that is missing or null was not measured. Throws std::exception

@@ -122,6 +122,7 @@ Json measured_json(const machine::Identity& machine, const std::string& measured
   figures.per_mb = dearer(m, per_mb_us);
   if (m.reservation_overrun) figures.enforcement = m.reservation_overrun->max_us;
   if (m.watchdog_overrun) figures.demotion = m.watchdog_overrun->max_us;
+  if (m.watchdog_look) figures.look = m.watchdog_look->p50_us;  // a pass has many
   figures.tick = m.tick_us;
   if (m.bandwidth) figures.deadline_bandwidth = m.bandwidth->accepted;
   Json json = graph::measured_machine_json({machine, measured_at, figures, worst_figures(m)});
@@ -136,6 +137,7 @@ Json measured_json(const machine::Identity& machine, const std::string& measured
                            {"reservation", to_json(m.reservation_overrun)},
                            {"watchdog", to_json(m.watchdog_overrun)},
                            {"cpu_timer", to_json(m.cpu_timer_overrun)}};
+  details["look_us"] = to_json(m.watchdog_look);
   details["other_deadline_threads"] = m.bandwidth ? Json(m.bandwidth->others) : Json(nullptr);
   details["stalls"] = to_json(m.stalls);
   return json;
@@ -158,6 +160,7 @@ std::string measured_text(const machine::Measured& m) {
   add("1 ms reservation overrun by", m.reservation_overrun);
   add("1 ms with a watchdog overrun by", m.watchdog_overrun);
   add("1 ms thread-CPU timer late by", m.cpu_timer_overrun);
+  add("look of a watchdog", m.watchdog_look);
   if (m.tick_us) text += fmt::format("  tick {:.0f} us\n", *m.tick_us);
   if (m.bandwidth)
     text +=

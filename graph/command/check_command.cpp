@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "graph/check/check.hpp"
+#include "graph/check/grantable.hpp"
 #include "graph/run/prepare.hpp"
 #include "graph/run/support.hpp"
 #include "hal/drivers.hpp"
@@ -18,8 +19,12 @@ int check_graph(const RunOptions& options, bool json) {
     return code;
   }
   choose_cores(prepared.composition->plan.cores, prepared.graph->adjusted);
-  const graph::CheckResult result =
-      graph::check(*prepared.graph, prepared.composition->plan, {this_machine(), true, true});
+  graph::CheckResult result = graph::check(*prepared.graph, prepared.composition->plan, {this_machine(), true, true});
+  if (prepared.composition->plan.policy == Policy::deadline) {
+    const std::optional<DeadlineBandwidth> bandwidth = deadline_bandwidth();
+    result.text += graph::grantable_text(bandwidth);
+    result.json["grantable"] = graph::grantable_json(bandwidth);
+  }
   std::fputs(json ? (result.json.dump(2) + "\n").c_str() : result.text.c_str(), stdout);
   if (result.verdict == graph::Verdict::invalid) return kBadInput;
   return result.admitted ? kOk : kNotOk;

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 
 #include "graph/compose/plan_modes.hpp"
 #include "hal/drivers.hpp"
@@ -144,6 +145,9 @@ class Composer {
     result_.plan.cores = graph_.schedule.cores;
     result_.plan.anticipate_ns = graph_.schedule.anticipate_ns;
     result_.plan.mode = graph_.mode;
+    std::set<std::string> subsystems;
+    for (const NodeSpec& node : graph_.nodes) subsystems.insert(node.subsystem);
+    result_.plan.processes = static_cast<int64_t>(subsystems.size()) + 1;  // and one of the devices
     for (const DeviceSpec& spec : graph_.devices) connect_inputs(result_.plan.tasks[task_index_.at(spec.id)], spec);
     for (const NodeSpec& spec : graph_.nodes) connect_inputs(result_.plan.tasks[task_index_.at(spec.id)], spec);
     mark_expected();

@@ -13,6 +13,7 @@ namespace takt::machine {
 
 // policy_checks.cpp. Sources: sched(7), the kernel's sched-deadline.rst and sched-rt-group.rst.
 Finding check_sched_deadline(const Facts& facts, const PolicyTrial& trial);
+Finding check_deadline_bandwidth(const BandwidthTrial& trial);
 Finding check_sched_fifo(const Facts& facts, const PolicyTrial& trial);
 Finding check_rt_runtime(const Facts& facts);
 Finding check_cgroup_rt(const Facts& facts);

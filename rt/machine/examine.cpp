@@ -17,6 +17,7 @@ std::string_view to_string(Status status) {
 
 std::vector<Finding> examine(const Facts& facts, const Trials& trials) {
   return {check_sched_deadline(facts, trials.deadline),
+          check_deadline_bandwidth(trials.bandwidth),
           check_sched_fifo(facts, trials.fixed),
           check_rt_runtime(facts),
           check_cgroup_rt(facts),

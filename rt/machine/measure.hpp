@@ -46,6 +46,8 @@ inline constexpr int64_t kEnforcedBudget_ns = 1'000'000;
 std::optional<Spread> measure_reservation_overrun();
 /// SCHED_FIFO: a watchdog that sleeps on CLOCK_MONOTONIC, reads the thread's CPU clock, and has demoted it.
 std::optional<Spread> measure_watchdog_overrun();
+/// What one look of that watchdog takes from the thread: its timer's interrupt, two switches, the look.
+std::optional<Spread> measure_watchdog_look();
 /// A timer on the thread's own CPU clock; needs no rights.
 std::optional<Spread> measure_cpu_timer_overrun();
 
@@ -75,7 +77,7 @@ struct Measured {
   std::optional<ReleaseCost> release;
   std::optional<SwitchCost> context_switch;
   std::optional<TransferCosts> local, iceoryx;
-  std::optional<Spread> reservation_overrun, watchdog_overrun, cpu_timer_overrun;
+  std::optional<Spread> reservation_overrun, watchdog_overrun, watchdog_look, cpu_timer_overrun;
   std::optional<double> tick_us;
   std::optional<BandwidthLimit> bandwidth;
   std::optional<Stalls> stalls;

@@ -2,6 +2,7 @@
 #include <pthread.h>
 #include <sched.h>
 
+#include <algorithm>
 #include <csignal>
 #include <thread>
 
@@ -145,6 +146,79 @@ Answer watchdog_overrun() {
   return answer;
 }
 
+/// The holes that looks make in the time of a thread on the same CPU.
+class LookedAt {
+ public:
+  LookedAt(int looks, int priority, int core)
+      : thread_([this, looks, priority, core] { work(looks, priority, core); }) {
+    wait_while(ready_, 0);
+  }
+  ~LookedAt() { thread_.join(); }
+  LookedAt(const LookedAt&) = delete;
+  LookedAt& operator=(const LookedAt&) = delete;
+
+  bool granted() const { return granted_; }
+  void look() {
+    static_cast<void>(read_ns(clock_));
+    looks_.fetch_add(1, std::memory_order_relaxed);
+  }
+  /// After the last look.
+  std::vector<int64_t> holes_ns() {
+    wait_while(ready_, 1);
+    return std::move(holes_ns_);
+  }
+
+ private:
+  void work(int looks, int priority, int core) {
+    Reservation wanted;
+    wanted.policy = Policy::fixed;
+    wanted.priority = priority;
+    wanted.core = core;
+    granted_ = apply(wanted).verified && pthread_getcpuclockid(pthread_self(), &clock_) == 0;
+    holes_ns_.reserve(static_cast<size_t>(looks));
+    set_and_wake(ready_, 1);
+    int seen = 0;
+    // A look between the count and the clock is seen with the next count: its hole is the one before.
+    for (int64_t last = now_ns(), hole_before = 0; granted_ && seen < looks;) {
+      const int count = looks_.load(std::memory_order_relaxed);
+      const int64_t now = now_ns(), hole = now - last;
+      if (count != seen) holes_ns_.push_back(std::max(hole, hole_before));
+      seen = count;
+      hole_before = hole;
+      last = now;
+    }
+    set_and_wake(ready_, 2);
+  }
+
+  std::atomic<uint32_t> ready_{0};
+  std::atomic<int> looks_{0};
+  clockid_t clock_{};
+  bool granted_ = false;
+  std::vector<int64_t> holes_ns_;
+  std::thread thread_;  ///< last: it uses all of the above
+};
+
+Answer watchdog_look() {
+  constexpr int kSamples = 300, kWatched = 40, kWatching = 60;
+  prepare_process_memory();
+  const CpuLatencyHold latency = hold_cpu_dma_latency();
+  Reservation watching;
+  watching.policy = Policy::fixed;
+  watching.priority = kWatching;
+  watching.core = sched_getcpu();
+  Answer answer;
+  answer.granted = apply(watching).verified;
+  if (!answer.granted) return answer;
+  LookedAt watched(kSamples, kWatched, watching.core);
+  answer.granted = watched.granted();
+  for (int i = 0; answer.granted && i < kSamples; ++i) {
+    sleep_until(now_ns() + kMs);
+    watched.look();
+  }
+  if (answer.granted) answer.overrun = Spread::of(watched.holes_ns());
+  return answer;
+}
+
 std::atomic<int64_t> g_expired_ns{0};
 extern "C" void cpu_timer_expired(int) { g_expired_ns.store(read_ns(CLOCK_THREAD_CPUTIME_ID)); }
 
@@ -182,6 +256,7 @@ std::optional<Spread> measure_reservation_overrun() {
   return granted(in_child<Answer>(reservation_overrun, kPatience));
 }
 std::optional<Spread> measure_watchdog_overrun() { return granted(in_child<Answer>(watchdog_overrun, kPatience)); }
+std::optional<Spread> measure_watchdog_look() { return granted(in_child<Answer>(watchdog_look, kPatience)); }
 std::optional<Spread> measure_cpu_timer_overrun() { return granted(in_child<Answer>(cpu_timer_overrun, kPatience)); }
 
 }  // namespace takt::machine

@@ -3,7 +3,6 @@
 #include <sys/resource.h>
 
 #include <algorithm>
-#include <list>
 #include <thread>
 
 #include "rt/machine/check_support.hpp"
@@ -13,12 +12,13 @@
 #include "rt/machine/measure_support.hpp"
 #include "rt/machine/parse.hpp"
 #include "rt/memory/process_memory.hpp"
+#include "rt/sched/bandwidth.hpp"
 #include "rt/sched/grant.hpp"
 
 namespace takt::machine {
 namespace {
 
-constexpr int64_t kMs = 1'000'000, kPeriod = 10 * kMs;
+constexpr int64_t kMs = 1'000'000;
 
 struct TickAnswer {
   int64_t tick_ns = 0;
@@ -36,70 +36,10 @@ TickAnswer least_step() {
   return answer;
 }
 
-/// Threads of this machine under SCHED_DEADLINE (6); the field stands behind the name, which may hold anything.
-int64_t deadline_threads(const Facts& facts) {
-  constexpr size_t kPolicyField = 38;  // behind the name: the 41st of proc(5)
-  int64_t count = 0;
-  for (const std::string& process : facts.list("/proc")) {
-    if (!parse_number(process)) continue;
-    for (const std::string& thread : facts.list("/proc/" + process + "/task")) {
-      const std::string stat = facts.text("/proc/" + process + "/task/" + thread + "/stat").value_or("");
-      const size_t name_end = stat.rfind(')');
-      if (name_end == std::string::npos) continue;
-      const auto fields = words_of(std::string_view(stat).substr(name_end + 1));
-      count += fields.size() > kPolicyField && fields[kPolicyField] == "6";
-    }
-  }
-  return count;
-}
-
-bool reserve(int64_t runtime_ns) {
-  Reservation wanted;
-  wanted.policy = Policy::deadline;
-  wanted.runtime_ns = runtime_ns;
-  wanted.deadline_ns = wanted.period_ns = kPeriod;
-  return apply(wanted, 0).error == 0;
-}
-
-/// A sleeping thread that holds as much of `share_ns` per period as the kernel gives it.
-class Holder {
- public:
-  explicit Holder(int64_t share_ns) : thread_([this, share_ns] { hold(share_ns); }) { wait_while(answered_, 0); }
-  ~Holder() {
-    set_and_wake(end_, 1);
-    thread_.join();
-  }
-  Holder(const Holder&) = delete;
-  Holder& operator=(const Holder&) = delete;
-  int64_t held_ns() const { return held_ns_; }
-
- private:
-  void hold(int64_t share_ns) {
-    constexpr int64_t kLeast = 2'000;  // the kernel takes no reservation of less than 1024 ns
-    if (reserve(share_ns)) held_ns_ = share_ns;
-    else if (reserve(kLeast)) held_ns_ = bisect_largest(kLeast, share_ns, 1'000, reserve);
-    set_and_wake(answered_, 1);
-    wait_while(end_, 0);
-  }
-
-  int64_t held_ns_ = 0;
-  std::atomic<uint32_t> answered_{0}, end_{0};
-  std::thread thread_;
-};
-
 BandwidthLimit bandwidth_limit() {
-  const SystemFacts facts;
-  const auto cores = static_cast<int64_t>(std::max<size_t>(online_cpus(facts).size(), 1));
-  const int64_t share_ns = std::clamp<int64_t>(kPeriod * cores / 64, kPeriod / 10, kPeriod * 9 / 10);
   BandwidthLimit limit;
-  limit.others = deadline_threads(facts);
-  std::list<Holder> holders;
-  int64_t held_ns = share_ns, sum_ns = 0;
-  while (held_ns == share_ns && sum_ns <= 2 * cores * kPeriod) {
-    held_ns = holders.emplace_back(share_ns).held_ns();
-    sum_ns += held_ns;
-  }
-  limit.accepted = static_cast<double>(sum_ns) / static_cast<double>(kPeriod);
+  for (const DeadlineHolder& holder : deadline_holders()) limit.others += holder.threads;
+  limit.accepted = free_bandwidth().value_or(0);
   return limit;
 }
 
@@ -196,6 +136,7 @@ Measured measure_all(const std::function<void(const std::string&)>& tell) {
   tell("enforcement of budgets");
   result.reservation_overrun = measure_reservation_overrun();
   result.watchdog_overrun = measure_watchdog_overrun();
+  result.watchdog_look = measure_watchdog_look();
   result.cpu_timer_overrun = measure_cpu_timer_overrun();
   tell("tick and bandwidth");
   result.tick_us = measure_tick();

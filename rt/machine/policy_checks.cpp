@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cerrno>
+#include <cstdio>
 #include <cstring>
 
 #include "rt/machine/check_support.hpp"
@@ -74,6 +75,28 @@ Finding check_sched_deadline(const Facts& facts, const PolicyTrial& trial) {
     f.fixes = grant_rights(facts);
   } else {
     f.fixes = {{"kernel", "3.14 or newer"}};
+  }
+  return f;
+}
+
+Finding check_deadline_bandwidth(const BandwidthTrial& trial) {
+  constexpr double kLittle = 0.1;  // cores
+  Finding f{"policies", "deadline_bandwidth", Need::advice, Status::unknown, "", ""};
+  f.meaning = "cores that a run under policy `deadline` may reserve now";
+  if (!trial.answered) return not_answered(f), f;
+  if (!trial.granted) {
+    f.found = "SCHED_DEADLINE is refused";
+    return f;
+  }
+  char text[96];
+  std::snprintf(text, sizeof text, "%.3f of %.3f cores free", trial.free, trial.limit);
+  f.found = text;
+  if (trial.holders[0] != 0) f.found += std::string("; held by ") + trial.holders.data();
+  f.status = trial.free < kLittle || trial.lost > 0 ? Status::warn : Status::ok;
+  if (trial.lost > 0) {
+    std::snprintf(text, sizeof text, "; %.3f lost: no living thread holds them", trial.lost);
+    f.found += text;
+    f.fixes = {shell(trial.recount.data())};
   }
   return f;
 }

@@ -17,6 +17,7 @@
 #include "rt/machine/facts.hpp"
 #include "rt/machine/measure_support.hpp"
 #include "rt/machine/parse.hpp"
+#include "rt/sched/bandwidth.hpp"
 #include "rt/sched/grant.hpp"
 #include "rt/shm/transport_error.hpp"
 #include "rt/supervise/private_mounts.hpp"
@@ -44,6 +45,20 @@ PolicyTrial try_policy(Policy policy) {
   trial.priority = grant.priority;
   trial.runtime_ns = static_cast<int64_t>(grant.runtime_ms * 1e6);
   trial.period_ns = policy == Policy::deadline ? wanted.period_ns : 0;
+  return trial;
+}
+
+BandwidthTrial try_bandwidth() {
+  BandwidthTrial trial;
+  trial.answered = true;
+  const std::optional<DeadlineBandwidth> found = deadline_bandwidth();
+  if (!found) return trial;
+  trial.granted = true;
+  trial.limit = found->limit;
+  trial.free = found->free;
+  trial.lost = found->lost();
+  std::strncpy(trial.holders.data(), to_text(found->holders).c_str(), trial.holders.size() - 1);
+  std::strncpy(trial.recount.data(), recount_command().c_str(), trial.recount.size() - 1);
   return trial;
 }
 
@@ -153,6 +168,7 @@ Trials try_machine() {
   Trials trials;
   trials.deadline = tried<PolicyTrial>([] { return try_policy(Policy::deadline); });
   trials.fixed = tried<PolicyTrial>([] { return try_policy(Policy::fixed); });
+  trials.bandwidth = tried(try_bandwidth);
   trials.lock = tried(try_lock);
   trials.latency = tried(try_latency);
   trials.slack = tried(try_slack);

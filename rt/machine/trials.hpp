@@ -19,6 +19,15 @@ struct PolicyTrial {
   int64_t runtime_ns = 0, period_ns = 0;  ///< deadline
 };
 
+struct BandwidthTrial {
+  bool answered = false;
+  bool granted = false;             ///< SCHED_DEADLINE is
+  double limit = 0, free = 0;       ///< cores
+  double lost = 0;                  ///< held by no living thread
+  std::array<char, 512> holders{};  ///< who holds the rest, "" if nobody does
+  std::array<char, 128> recount{};  ///< command that makes the kernel count anew
+};
+
 struct LockTrial {
   bool answered = false;
   int error = 0;          ///< of mlockall(MCL_CURRENT | MCL_FUTURE)
@@ -60,6 +69,7 @@ struct DaemonTrial {
 
 struct Trials {
   PolicyTrial deadline, fixed;
+  BandwidthTrial bandwidth;
   LockTrial lock;
   LatencyTrial latency;
   SlackTrial slack;

@@ -4,13 +4,16 @@
 #include <pthread.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cstring>
+#include <limits>
 #include <thread>
 
 #include "rt/memory/memory_use.hpp"
 #include "rt/memory/process_memory.hpp"
 #include "rt/node.hpp"
 #include "rt/sched/anticipation.hpp"
+#include "rt/sched/bandwidth.hpp"
 #include "rt/sched/cooperative.hpp"
 #include "rt/sched/lane_tasks.hpp"
 #include "rt/sched/rendezvous.hpp"
@@ -110,23 +113,54 @@ struct Executor::Crew {
   explicit Crew(size_t lanes) : ready(lanes + 1), started(lanes + 1), grants(lanes) {}
   std::atomic<bool> go{false};
   Rendezvous ready, started;
+  std::vector<Reservation> wanted;  ///< by lane; none under `cooperative`
   std::vector<Grant> grants;
   std::unique_ptr<CooperativeQueue> queue;
   std::unique_ptr<Watchdog> watchdog;
   WorkerThreads workers;
 };
 
+namespace {
+
+/// What the lane asks for. Under `fixed` the watchdogs go above the lanes: a limit (RLIMIT_RTPRIO) that leaves them no
+/// room refuses the policy, since nothing would be enforced.
+Grant apply_below_watchdog(const Reservation& wanted, int64_t patience_ns) {
+  if (wanted.policy == Policy::fixed) {
+    Reservation above = wanted;
+    above.priority = kHighestPriority + 1;
+    if (Grant grant = apply(above); !grant.refused.empty()) return grant;
+  }
+  return apply(wanted, patience_ns);
+}
+
+/// Once all workers hold what they got: EBUSY says neither how much is missing nor who has it.
+void explain_busy(const std::vector<Reservation>& wanted, std::vector<Grant>& grants) {
+  double asked = 0, least_refused = std::numeric_limits<double>::max();
+  for (size_t i = 0; i < grants.size(); ++i) {
+    if (wanted[i].policy != Policy::deadline) return;
+    const double share = static_cast<double>(wanted[i].runtime_ns) / static_cast<double>(wanted[i].period_ns);
+    asked += share;
+    if (grants[i].error == EBUSY) least_refused = std::min(least_refused, share);
+  }
+  if (least_refused > asked) return;
+  const std::string why = "SCHED_DEADLINE was refused (Device or resource busy): " + why_busy(asked, least_refused);
+  for (Grant& grant : grants)
+    if (grant.error == EBUSY) grant.refused = why;
+}
+
+}  // namespace
+
 bool Executor::run_partitioned(Policy policy, RunResult& result) {
-  const std::vector<Reservation> wanted = own_reservations(policy);
+  crew_ = std::make_unique<Crew>(lanes_.size());
+  const std::vector<Reservation>& wanted = crew_->wanted = own_reservations(policy);
   // A process before this one may just have died with the same reservations.
   const int64_t patience_ns = bandwidth_within_ns(wanted) + kBandwidthMargin_ns;
-  crew_ = std::make_unique<Crew>(lanes_.size());
   for (size_t i = 0; i < lanes_.size(); ++i) {
     crew_->workers.start([this, &crew = *crew_, &lane = *lanes_[i], mine = wanted[i], patience_ns, i] {
       name_thread(lane.head().plan().name);
       const trace::Thread traced(options_.trace, lane.head().plan().name);
       prefault_stack();
-      crew.grants[i] = apply(mine, patience_ns);
+      crew.grants[i] = apply_below_watchdog(mine, patience_ns);
       lane.watch().bind(mine);
       crew.ready.arrive_and_wait();
       crew.started.arrive_and_wait();
@@ -157,7 +191,8 @@ bool Executor::run_partitioned(Policy policy, RunResult& result) {
 }
 
 void Executor::agree(Policy policy, RunResult& result) {
-  const std::vector<Grant>& grants = crew_->grants;
+  std::vector<Grant>& grants = crew_->grants;
+  explain_busy(crew_->wanted, grants);
   for (size_t i = 0; i < lanes_.size(); ++i) set_grants(*lanes_[i], grants[i]);
   const bool mine = std::all_of(grants.begin(), grants.end(), [](const Grant& grant) { return grant.refused.empty(); });
   const bool go = options_.gate != nullptr ? options_.gate->all_granted(mine) : mine;
@@ -193,7 +228,9 @@ void Executor::run_cooperative(RunResult& result) {
 
 void Executor::watch(Policy granted) {
   std::vector<Watchdog::Worker> workers;
-  for (const auto& lane : lanes_) workers.push_back({&lane->watch(), lane->members()});
+  for (size_t i = 0; i < lanes_.size(); ++i)
+    workers.push_back(
+        {&lanes_[i]->watch(), lanes_[i]->members(), granted == Policy::fixed ? crew_->wanted[i] : Reservation{}});
   Watchdog::Options options;
   options.granted = granted;
   options.patience_ns = options_.hang_patience_ns;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "rt/sched/grant.hpp"
 
+#include <linux/capability.h>
 #include <linux/sched.h>
 #include <sched.h>
 #include <sys/prctl.h>
@@ -13,6 +14,7 @@
 #include <ctime>
 #include <optional>
 
+#include "rt/capability.hpp"
 #include "rt/thread_state.hpp"
 
 namespace takt {
@@ -28,13 +30,15 @@ struct SchedulingAttributes {
   uint64_t runtime = 0, deadline = 0, period = 0;
 };
 constexpr uint32_t kDeadline = 6;  // SCHED_DEADLINE
-constexpr uint64_t kResetOnFork = 1, kReclaim = 2;
+constexpr uint64_t kResetOnFork = 1, kReclaim = 2, kOfCpufreq = 0x10000000;
 
 /// Of the calling thread (0), or another one.
 int set_attributes(const SchedulingAttributes& a, int thread = 0) {
   return static_cast<int>(syscall(SYS_sched_setattr, thread, &a, 0));
 }
-int get_attributes(SchedulingAttributes& a) { return static_cast<int>(syscall(SYS_sched_getattr, 0, &a, sizeof a, 0)); }
+int get_attributes(SchedulingAttributes& a, int thread = 0) {
+  return static_cast<int>(syscall(SYS_sched_getattr, thread, &a, sizeof a, 0));
+}
 
 std::vector<int> current_cpus() {
   cpu_set_t set;
@@ -49,8 +53,12 @@ std::vector<int> current_cpus() {
 
 std::string refusal(const char* what, int error) {
   std::string text = std::string(what) + " was refused (" + std::strerror(error) + "); ";
+  if (error == EPERM && has_capability(CAP_SYS_NICE))
+    return text +
+           "this process has the right, so its CPUs are too few (SCHED_DEADLINE takes no affinity: all CPUs, or an "
+           "exclusive cpuset) or kernel.sched_rt_runtime_us is 0";
   if (error == EPERM) return text + "run as root, or grant CAP_SYS_NICE: sudo setcap cap_sys_nice,cap_ipc_lock+ep TAKT";
-  if (error == EBUSY) return text + "the budgets exceed what the kernel reserves; lower them in the schedule";
+  if (error == EBUSY) return text + "too much of the CPUs is reserved already";
   return text;
 }
 
@@ -72,6 +80,11 @@ SchedulingAttributes attributes_of(const Reservation& wanted) {
   a.deadline = static_cast<uint64_t>(wanted.deadline_ns);
   a.period = static_cast<uint64_t>(wanted.period_ns);
   return a;
+}
+
+bool put_under(int thread, int policy, int priority) {
+  const sched_param param{priority};
+  return sched_setscheduler(thread, policy | SCHED_RESET_ON_FORK, &param) == 0;
 }
 
 Grant apply_deadline(const Reservation& wanted, int64_t patience_ns) {
@@ -164,20 +177,25 @@ Grant apply(const Reservation& wanted, int64_t patience_ns) {
   return grant;
 }
 
-bool demote_thread(int thread) {
-  const sched_param param{0};
-  return sched_setscheduler(thread, SCHED_OTHER | SCHED_RESET_ON_FORK, &param) == 0;
-}
+bool demote_thread(int thread) { return put_under(thread, SCHED_OTHER, 0); }
 
-bool lift_thread(int thread, int priority) {
-  const sched_param param{priority};
-  return sched_setscheduler(thread, SCHED_FIFO | SCHED_RESET_ON_FORK, &param) == 0;
-}
+bool lift_thread(int thread, int priority) { return put_under(thread, SCHED_FIFO, priority); }
 
 bool take_from_reservation(int thread) {
   if ((sched_getscheduler(thread) & ~SCHED_RESET_ON_FORK) != static_cast<int>(kDeadline)) return false;
   if (!runnable(thread)) return false;
   return lift_thread(thread, kLowestPriority) || demote_thread(thread);
+}
+
+std::optional<Reservation> reservation_of(int thread) {
+  SchedulingAttributes has;
+  if (get_attributes(has, thread) != 0 || has.policy != kDeadline || (has.flags & kOfCpufreq) != 0) return std::nullopt;
+  Reservation reservation;
+  reservation.policy = Policy::deadline;
+  reservation.runtime_ns = static_cast<int64_t>(has.runtime);
+  reservation.deadline_ns = static_cast<int64_t>(has.deadline);
+  reservation.period_ns = static_cast<int64_t>(has.period);
+  return reservation;
 }
 
 bool runnable(int thread) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -8,11 +9,14 @@
 
 namespace takt {
 
-/// The highest SCHED_FIFO priority of a lane under `fixed`. Below the kernel's own interrupt threads (50
+/// The highest SCHED_FIFO priority that lanes and their watchdogs have. Below the kernel's own interrupt threads (50
 /// by default) nothing is gained.
 inline constexpr int kHighestPriority = 80;
 /// Behind all lanes and before ordinary threads.
 inline constexpr int kLowestPriority = 1;
+/// Under `fixed` a lane has every other priority, and its own watchdog the one above: 79 and 80 down to 3 and 4.
+inline constexpr int kLaneStep = 2;
+inline constexpr int kMostLanesOfCore = (kHighestPriority - kLowestPriority) / kLaneStep;
 
 /// What a worker thread asks of the kernel.
 struct Reservation {
@@ -66,13 +70,17 @@ bool demote_thread(int thread);
 /// Lets another thread of this process run before all of the default policy (SCHED_FIFO of that priority). False if the
 /// kernel refuses.
 bool lift_thread(int thread, int priority);
-/// Puts a thread of SCHED_DEADLINE that is runnable, of this process or another one, at kLowestPriority. False if it is not
-/// such a one, or the kernel refuses.
+/// Puts a thread of SCHED_DEADLINE that is runnable, of this process or another one, at kLowestPriority. False if it is
+/// not such a one, or the kernel refuses.
 bool take_from_reservation(int thread);
 /// A thread runs, or would but for its turn or its reservation. Only such a one may be taken out of
-/// SCHED_DEADLINE: where it sleeps, Linux 6.18 never gives its bandwidth back (until sched_rt_runtime_us is written), and
-/// one that is put back by others may never be replenished again: not even SIGKILL ends it then. Both measured.
+/// SCHED_DEADLINE: where it sleeps, Linux 6.18 never gives its bandwidth back (until sched_rt_runtime_us is written).
+/// One that is put back by others, or whose parameters they change while it is throttled, may never be replenished
+/// again: not even SIGKILL ends it then. All measured.
 bool runnable(int thread);
+/// What a thread of any process has of SCHED_DEADLINE; nothing if it is under another policy, or takes no part in its
+/// account (the kernel's own for cpufreq).
+std::optional<Reservation> reservation_of(int thread);
 /// Gives the calling thread back what it had under `fixed` or `deadline`. False if the kernel refuses.
 bool restore_thread(const Reservation& had);
 

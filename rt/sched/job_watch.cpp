@@ -7,6 +7,7 @@
 #include <algorithm>
 
 #include "rt/hot.hpp"
+#include "rt/sched/lookout.hpp"
 #include "rt/sched/stolen_time.hpp"
 #include "rt/time/clock.hpp"
 
@@ -33,19 +34,20 @@ TAKT_HOT void JobWatch::begin(uint32_t member, uint64_t index, int64_t release_n
 }
 
 TAKT_HOT bool JobWatch::end() {
-  if (lifted_until_ns_.load(std::memory_order_relaxed) != 0) settle_down();
+  if (place_.load(std::memory_order_relaxed) != Place::own) settle_down();
   uint64_t state = state_.load(std::memory_order_relaxed);
   const uint64_t serial = state / kPhases;
   state = serial * kPhases + at_work;
   const auto ended = serial * kPhases + idle;
   if (state_.compare_exchange_strong(state, ended, std::memory_order_acq_rel)) return false;
-  // The watchdog demotes this thread. That happens under `fixed` only, where it has the highest priority and is through
-  // in microseconds.
+  // A watchdog demotes this thread. That happens under `fixed` only, where it goes before this thread and is through in
+  // microseconds.
   while (state % kPhases == acting) state = state_.load(std::memory_order_acquire);
   state_.store(ended, std::memory_order_release);
-  if (state % kPhases != demoted) return false;
-  restore_thread(has_);
-  return true;
+  const bool was_demoted = state % kPhases == demoted;
+  if (was_demoted) restore_thread(has_);
+  if (Lookout* lookout = lookout_.load(std::memory_order_acquire)) lookout->wake();
+  return was_demoted;
 }
 
 void JobWatch::overran(int64_t by_ns, int64_t at_ns) {
@@ -59,11 +61,19 @@ int64_t JobWatch::owed_ns(int64_t now_ns) const {
   return now_ns - at_ns > StolenTime::kWindow_ns ? 0 : owed_ns_.load(std::memory_order_relaxed);
 }
 
-/// Takes the reservation back once nothing is owed any more. Refused while the kernel has not given its bandwidth back:
-/// then after the next job.
+std::optional<JobWatch::Place> JobWatch::claim_place() {
+  Place had = place();
+  if (had == Place::moving || !place_.compare_exchange_strong(had, Place::moving, std::memory_order_acq_rel))
+    return std::nullopt;
+  return had;
+}
+
+/// Takes the reservation back once nothing is owed any more. Refused while the kernel has not given its bandwidth back,
+/// or the watchdog moves the thread: then after the next job.
 void JobWatch::settle_down() {
   if (MonotonicClock().now_ns() < lifted_until_ns_.load(std::memory_order_relaxed)) return;
-  if (restore_thread(has_)) lifted_until_ns_.store(0, std::memory_order_release);
+  const std::optional<Place> had = claim_place();
+  if (had) place_.store(restore_thread(has_) ? Place::own : *had, std::memory_order_release);
 }
 
 JobWatch::Running JobWatch::running() const {
@@ -87,15 +97,16 @@ int64_t JobWatch::cpu_ns() const {
   return int64_t{used.tv_sec} * 1'000'000'000 + used.tv_nsec;
 }
 
-bool JobWatch::advance(uint64_t serial, Phase to) {
-  uint64_t state = serial * kPhases + at_work;
+bool JobWatch::advance(uint64_t serial, Phase from, Phase to) {
+  uint64_t state = serial * kPhases + from;
   return state_.compare_exchange_strong(state, serial * kPhases + to, std::memory_order_acq_rel);
 }
 
 bool JobWatch::demote(uint64_t serial) {
-  if (!advance(serial, acting)) return false;
+  const Phase before = advance(serial, at_work, acting) ? at_work : told;
+  if (before == told && !advance(serial, told, acting)) return false;
   const bool done = demote_thread(thread_.load(std::memory_order_acquire));
-  state_.store(serial * kPhases + (done ? demoted : at_work), std::memory_order_release);
+  state_.store(serial * kPhases + (done ? demoted : before), std::memory_order_release);
   return done;
 }
 
@@ -103,22 +114,30 @@ bool JobWatch::lift(int64_t now_ns, int64_t owed_ns, bool behind) {
   const int thread = thread_.load(std::memory_order_acquire);
   const int64_t runtime_ns = this->runtime_ns();
   if (runtime_ns <= 0 || !runnable(thread)) return false;
-  const bool refused = !lift_thread(thread, behind ? kLowestPriority : kHighestPriority);
-  if (refused && !(behind && demote_thread(thread))) return false;
-  place_ = refused ? Place::ordinary : behind ? Place::behind : Place::first;
-  // One period for each budget that is owed, the one under way, and one to be sure.
-  constexpr int64_t kLongest_ns = 30'000'000'000;
-  const int64_t lapse_ns = (owed_ns / runtime_ns + 2) * has_.period_ns;
-  lifted_until_ns_.store(now_ns + std::min(lapse_ns, kLongest_ns), std::memory_order_release);
-  return true;
+  const std::optional<Place> had = claim_place();
+  if (!had) return false;
+  const bool raised = lift_thread(thread, behind ? kLowestPriority : kHighestPriority);
+  const bool done = raised || (behind && demote_thread(thread));
+  if (done) {
+    // One period for each budget that is owed, the one under way, and one to be sure.
+    constexpr int64_t kLongest_ns = 30'000'000'000;
+    const int64_t lapse_ns = (owed_ns / runtime_ns + 2) * has_.period_ns;
+    lifted_until_ns_.store(now_ns + std::min(lapse_ns, kLongest_ns), std::memory_order_release);
+  }
+  const Place now = !raised ? Place::ordinary : behind ? Place::behind : Place::first;
+  place_.store(done ? now : *had, std::memory_order_release);
+  return done;
 }
 
 void JobWatch::drop() {
-  if (demote_thread(thread_.load(std::memory_order_acquire))) place_ = Place::ordinary;
+  const std::optional<Place> had = claim_place();
+  if (!had) return;
+  const bool done = *had != Place::own && demote_thread(thread_.load(std::memory_order_acquire));
+  place_.store(done ? Place::ordinary : *had, std::memory_order_release);
 }
 
 // In one step: nobody ever waits for a watchdog that only tells. Under `deadline` the workers go before it, so a wait
 // could last as long as their budget does.
-bool JobWatch::tell(uint64_t serial) { return advance(serial, told); }
+bool JobWatch::tell(uint64_t serial) { return advance(serial, at_work, told); }
 
 }  // namespace takt

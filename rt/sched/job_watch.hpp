@@ -5,10 +5,13 @@
 #include <atomic>
 #include <cstdint>
 #include <ctime>
+#include <optional>
 
 #include "rt/sched/grant.hpp"
 
 namespace takt {
+
+class Lookout;
 
 /// Between one worker and the watchdog: what the worker runs, and what was done to it. The worker writes a few words at
 /// the begin and the end of a job and makes no system call; only a worker that was demoted makes one, to get back what
@@ -40,6 +43,8 @@ class JobWatch {
   void overran(int64_t by_ns, int64_t at_ns);
 
   // The watchdog's side.
+  /// Is woken when a job has ended that was acted on: until then it has nothing to look at. Null: nobody.
+  void set_lookout(Lookout* lookout) { lookout_.store(lookout, std::memory_order_release); }
   Running running() const;
   int64_t expected_ns() const { return expected_ns_.load(std::memory_order_acquire); }
   /// CPU clock of the worker, ns; -1 if it cannot be read.
@@ -48,40 +53,46 @@ class JobWatch {
   int64_t runtime_ns() const { return runtime_ns_.load(std::memory_order_acquire); }
   /// Reading of its CPU clock at which a whole runtime is used since it rested.
   int64_t reserve_end_ns() const { return rested_cpu_ns_.load(std::memory_order_acquire) + runtime_ns(); }
-  /// Puts the worker behind everybody else until its job ends; false if job `serial` ended before, or the kernel
-  /// refuses.
+  /// Puts the worker behind everybody else until its job ends; false if job `serial` ended or was demoted before, or
+  /// the kernel refuses.
   bool demote(uint64_t serial);
-  /// Lets the worker, which has a reservation, go on under SCHED_FIFO: before all workers, or `behind` all of them (where
-  /// that is refused, as an ordinary thread). The `owed_ns` that it owes the kernel are forgotten only with time
+  /// Lets the worker, which has a reservation, go on under SCHED_FIFO: before all workers, or `behind` all of them
+  /// (where that is refused, as an ordinary thread). The `owed_ns` that it owes the kernel are forgotten only with time
   /// (measured: the kernel keeps the debt of a thread that leaves and comes back). After the first job that ends when
   /// that has passed, the worker takes its reservation back. False if the thread sleeps or the kernel refuses.
   bool lift(int64_t now_ns, int64_t owed_ns, bool behind);
-  /// A lifted worker goes on as an ordinary thread from here on.
+  /// A lifted worker goes on as an ordinary thread from here on, unless it takes its reservation back this moment.
   void drop();
   /// By how much jobs that ended within StolenTime::kWindow_ns overran.
   int64_t owed_ns(int64_t now_ns) const;
   /// The worker was lifted and has not taken its reservation back.
-  bool lifted() const { return lifted_until_ns_.load(std::memory_order_acquire) != 0; }
+  bool lifted() const { return place() != Place::own; }
   /// Where, if it is: before all workers, behind them, or as an ordinary thread.
-  bool first() const { return place_ == Place::first; }
-  bool ordinary() const { return place_ == Place::ordinary; }
+  bool first() const { return place() == Place::first; }
+  bool ordinary() const { return place() == Place::ordinary; }
   /// Notes that the overrun of job `serial` was told; false if the job ended before, was demoted or told already.
   bool tell(uint64_t serial);
 
  private:
   enum Phase : uint64_t { idle, at_work, acting, demoted, told };
-  enum class Place : uint8_t { first, behind, ordinary };
+  /// Where the thread is: under its own reservation, or lifted. `moving`: watchdog or worker change that.
+  enum class Place : uint32_t { own, moving, first, behind, ordinary };
   static constexpr uint64_t kPhases = 8;  // state = serial * kPhases + phase
   void settle_down();
-  /// From `at_work` to that phase; false if job `serial` is in another one.
-  bool advance(uint64_t serial, Phase to);
+  /// From one phase to the other; false if job `serial` is in another one.
+  bool advance(uint64_t serial, Phase from, Phase to);
+  Place place() const { return place_.load(std::memory_order_acquire); }
+  /// To `moving`, by whoever is about to change the thread's policy: the place it had. Nothing if the other side is
+  /// changing it: nobody waits for that, the worker least of all.
+  std::optional<Place> claim_place();
 
   std::atomic<uint64_t> state_{idle};
   std::atomic<uint32_t> member_{0};
   std::atomic<uint64_t> index_{0};
   std::atomic<int64_t> release_ns_{0}, cpu_limit_ns_{0}, expected_ns_{0};
-  std::atomic<int64_t> lifted_until_ns_{0};  ///< 0: it is not
-  Place place_ = Place::first;               ///< where it was lifted to; the watchdog's alone
+  std::atomic<int64_t> lifted_until_ns_{0};
+  std::atomic<Place> place_{Place::own};
+  std::atomic<Lookout*> lookout_{nullptr};
   std::atomic<int64_t> owed_ns_{0}, owed_at_ns_{0}, rested_cpu_ns_{0};
   std::atomic<int> thread_{0};
   std::atomic<clockid_t> clock_{0};

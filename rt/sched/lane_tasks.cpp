@@ -8,6 +8,7 @@
 #include "rt/sched/analysis/integers.hpp"
 #include "rt/sched/analysis/partition.hpp"
 #include "rt/sched/lane.hpp"
+#include "rt/sched/watch_rules.hpp"
 
 namespace takt {
 namespace {
@@ -74,6 +75,7 @@ int64_t pass_ns(const Plan& plan, const std::vector<size_t>& lane, const Overhea
 LaneTasks unplaced(const Plan& plan, const Overheads& o) {
   LaneTasks result;
   result.lanes = lane_members(plan);
+  result.looks_ns.resize(result.lanes.size(), 0);
   result.set.cores = static_cast<int>(std::max<size_t>(plan.cores.size(), 1));
   const int64_t ticks = result.set.ticks_per_ns = ticks_per_ns(plan, result.lanes);
   for (const auto& lane : result.lanes) {
@@ -138,11 +140,19 @@ void charge_longer_leads(const Plan& plan, const LaneTasks& lanes, const std::ve
   }
 }
 
-/// Of a core's tasks, `indexes` in the set, the lanes of high criticality come first. Deadline monotonic order within
-/// them and within the others stays.
-void put_high_first(const Plan& plan, const LaneTasks& lanes, std::vector<size_t> indexes, analysis::TaskSet& set) {
+/// The tasks of a core, the highest priority first.
+std::vector<size_t> of_core_from_top(const analysis::TaskSet& set, int core) {
+  std::vector<size_t> indexes;
+  for (size_t i = 0; i < set.tasks.size(); ++i)
+    if (set.tasks[i].core == core) indexes.push_back(i);
   std::sort(indexes.begin(), indexes.end(),
             [&](size_t a, size_t b) { return set.tasks[a].priority > set.tasks[b].priority; });
+  return indexes;
+}
+
+/// Of a core's tasks, `indexes` in the set from the top, the lanes of high criticality come first. Deadline monotonic
+/// order within them and within the others stays.
+void put_high_first(const Plan& plan, const LaneTasks& lanes, std::vector<size_t> indexes, analysis::TaskSet& set) {
   std::vector<int> priorities;
   for (const size_t i : indexes) priorities.push_back(set.tasks[i].priority);
   std::stable_partition(indexes.begin(), indexes.end(),
@@ -161,14 +171,116 @@ void let_criticality_decide(const Plan& plan, LaneTasks& lanes) {
     return analysis::core_verdict(tasks, analysis::CorePolicy::fixed_priority);
   };
   for (int core = 0; core < lanes.set.cores; ++core) {
-    std::vector<size_t> indexes;
-    for (size_t i = 0; i < lanes.set.tasks.size(); ++i)
-      if (lanes.set.tasks[i].core == core) indexes.push_back(i);
+    const std::vector<size_t> indexes = of_core_from_top(lanes.set, core);
     analysis::TaskSet high_first = lanes.set;
     put_high_first(plan, lanes, indexes, high_first);
     if (verdict(high_first, indexes) == analysis::Verdict::schedulable ||
         verdict(lanes.set, indexes) != analysis::Verdict::schedulable)
       lanes.set = std::move(high_first);
+  }
+}
+
+/// The order on each core as SCHED_FIFO priorities. What no thread stands for takes none.
+void number_priorities(LaneTasks& lanes) {
+  for (int core = 0; core < lanes.set.cores; ++core) {
+    int next = kHighestPriority - 1;
+    for (const size_t i : of_core_from_top(lanes.set, core)) {
+      const bool lane = i < lanes.lanes.size();
+      lanes.set.tasks[i].priority = std::max(next, kLowestPriority + kLaneStep) + (lane ? 0 : 1);
+      if (lane) next -= kLaneStep;
+    }
+  }
+}
+
+/// Members whose budgets a watchdog minds under `fixed`.
+int64_t minded_members(const Plan& plan, const std::vector<size_t>& lane) {
+  return std::count_if(lane.begin(), lane.end(),
+                       [&](size_t t) { return watch_rules(plan.tasks[t], Policy::fixed, 0).minds_overrun(); });
+}
+
+/// What goes before a lane on its core: a task of the set, how often each of its arrivals may preempt the lane, and the
+/// looks that come with it.
+struct Above {
+  size_t task = 0;
+  int64_t times = 1, looks = 0;
+};
+
+/// Looks in one pass while a member runs that is not minded, or the lane waits for an instant: another member may begin
+/// any moment.
+int64_t looks_between_jobs(const Plan& plan, const LaneTasks& lanes, size_t l) {
+  int64_t least_ns = INT64_MAX, others_ns = 0, waits_ns = 0;
+  for (const size_t t : lanes.lanes[l]) {
+    const WatchRules rules = watch_rules(plan.tasks[t], Policy::fixed, 0);
+    if (rules.minds_overrun()) least_ns = std::min(least_ns, rules.budget_ns);
+    else others_ns += rules.budget_ns;
+    const size_t producer = plan.tasks[t].on_task;
+    const bool waits = producer != kNone && plan.tasks[producer].publish == PublishAt::let;
+    if (waits) waits_ns = lanes.set.tasks[l].period / lanes.set.ticks_per_ns;
+  }
+  const int64_t sum_ns = others_ns + waits_ns;
+  return sum_ns / std::max(least_ns, kWatchGrain_ns) + (sum_ns > 0 ? 1 : 0);
+}
+
+/// Looks of a lane's own watchdog in one pass.
+int64_t looks_of_pass(const Plan& plan, const Overheads& o, const LaneTasks& lanes, size_t l,
+                      const std::vector<Above>& above) {
+  int64_t preemptions = 0, looks = 0;
+  for (const Above& one : above) {
+    const analysis::TimedTask& task = lanes.set.tasks[one.task];
+    const int64_t arrivals = (lanes.set.tasks[l].period - 1) / task.period + (task.sporadic ? 2 : 1);
+    preemptions += one.times * arrivals;
+    looks += one.looks * arrivals;
+  }
+  return most_looks(preemptions, looks * o.look_ns) + (minded_members(plan, lanes.lanes[l]) - 1) * most_looks(0, 0) +
+         looks_between_jobs(plan, lanes, l);
+}
+
+/// The watchdogs of the processes, which go before all lanes of any core: one look for a heartbeat and one at the end
+/// of a patience each, and one at each deadline that leads to safe_stop.
+Above add_process_watchdogs(const Plan& plan, const Overheads& o, int core, LaneTasks& lanes) {
+  analysis::TimedTask watchdogs;
+  watchdogs.name = "watchdog";
+  watchdogs.sporadic = true;
+  watchdogs.period = kHeartbeat_ns * lanes.set.ticks_per_ns;
+  int64_t looks = 2 * plan.processes;
+  for (size_t l = 0; l < lanes.lanes.size(); ++l)
+    for (const size_t t : lanes.lanes[l]) {
+      if (plan.tasks[t].on_miss != OnMiss::safe_stop) continue;
+      ++looks;
+      watchdogs.period = std::min(watchdogs.period, lanes.set.tasks[l].period);
+    }
+  watchdogs.deadline = watchdogs.period;
+  watchdogs.budget = std::min(looks * o.look_ns * lanes.set.ticks_per_ns, watchdogs.period);
+  watchdogs.priority = kHighestPriority + 1;
+  watchdogs.core = core;
+  lanes.set.tasks.push_back(std::move(watchdogs));
+  return {lanes.set.tasks.size() - 1, 0, looks};
+}
+
+/// What the watchdogs take from whom. A lane's own one goes just above the lane: its looks delay that lane and those
+/// below, as if the lane did them itself. Lanes above it are only held up by its timer's interrupt, once each time they
+/// are busy: it sets no timer before it has run.
+void charge_looks(const Plan& plan, const Overheads& o, int core, LaneTasks& lanes) {
+  std::vector<size_t> order = of_core_from_top(lanes.set, core);
+  int64_t watched_below = 0;
+  for (const size_t i : order) watched_below += i < lanes.lanes.size() && minded_members(plan, lanes.lanes[i]) > 0;
+  std::vector<Above> above{add_process_watchdogs(plan, o, core, lanes)};
+  for (const size_t i : order) {
+    if (i >= lanes.lanes.size()) {  // ordinary threads, in one go
+      above.push_back({i});
+      continue;
+    }
+    analysis::TimedTask& task = lanes.set.tasks[i];
+    const bool watched = minded_members(plan, lanes.lanes[i]) > 0;
+    if (watched) {
+      --watched_below;
+      lanes.looks_ns[i] = looks_of_pass(plan, o, lanes, i, above) * o.look_ns;
+      task.budget += lanes.looks_ns[i] * lanes.set.ticks_per_ns;
+    }
+    task.blocking += watched_below * o.look_ns * lanes.set.ticks_per_ns;
+    // A member that waits for an instant lets others run, and a watchdog may find its lane idle.
+    const int64_t idle_looks = watched ? 1 + looks_between_jobs(plan, lanes, i) : 0;
+    above.push_back({i, static_cast<int64_t>(lanes.lanes[i].size()), idle_looks});
   }
 }
 
@@ -180,8 +292,6 @@ void place(const Plan& plan, LaneTasks& lanes) {
     set.tasks[i].core = named == plan.cores.end() ? -1 : static_cast<int>(named - plan.cores.begin());
   }
   assign_deadline_monotonic(set);
-  const auto lowest = static_cast<int>(set.tasks.size());
-  for (analysis::TimedTask& task : set.tasks) task.priority = std::max(1, kHighestPriority - (lowest - task.priority));
   set = partition(set, set.cores, analysis::CorePolicy::fixed_priority).set;
   std::vector<double> work(static_cast<size_t>(set.cores), 0.0);
   for (const bool rest : {false, true}) {
@@ -192,6 +302,7 @@ void place(const Plan& plan, LaneTasks& lanes) {
     }
   }
   let_criticality_decide(plan, lanes);
+  number_priorities(lanes);
 }
 
 }  // namespace
@@ -213,6 +324,8 @@ LaneTasks lane_tasks(const Plan& plan, Policy policy, const Overheads& overheads
   if (policy == Policy::fixed) {
     add_ordinary(overheads, result.set);
     place(plan, result);
+    for (int core = 0; core < result.set.cores && overheads.look_ns > 0; ++core)
+      charge_looks(plan, overheads, core, result);
   }
   return result;
 }

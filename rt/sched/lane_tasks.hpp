@@ -15,6 +15,7 @@ namespace takt {
 struct LaneTasks {
   std::vector<std::vector<size_t>> lanes;  ///< as lane_members() gives them
   analysis::TaskSet set;                   ///< the lanes' tasks in the same order, with the names of their heads, first
+  std::vector<int64_t> looks_ns;           ///< by lane: what its own watchdog takes in one pass, part of the budget
 };
 
 /// One task per lane: the head's rate and offset, the lane's span as deadline, the sum of the members' budgets and the
@@ -26,9 +27,10 @@ struct LaneTasks {
 /// Under `deadline` the deadline is that of the reservation. Under `fixed` every task has its core (an index into
 /// Plan::cores) and its SCHED_FIFO priority: on the core that the plan names, else where
 /// `analysis::partition` puts it; what that finds no place for goes where the least work is. On each core deadline
-/// monotonic, lanes with a member of high criticality before all others where all deadlines hold then, too. Behind the
-/// lanes then comes one task per core for ordinary threads, if they have a share. Throws std::logic_error as
-/// lane_members() does.
+/// monotonic, lanes with a member of high criticality before all others where all deadlines hold then, too. Priorities
+/// count from the top of each core, kLaneStep apart; lanes beyond kMostLanesOfCore share the last one. In the list the
+/// lanes are followed by one task per core for ordinary threads, if they have a share, and one for the looks of the
+/// watchdogs that go before all lanes, if these are charged. Throws std::logic_error as lane_members() does.
 LaneTasks lane_tasks(const Plan& plan, Policy policy, const analysis::Overheads& overheads = {});
 
 /// Longest occupation of the thread from the start of the first of these members of a lane (positions in it, ascending)

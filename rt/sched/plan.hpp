@@ -98,6 +98,9 @@ struct Plan {
   analysis::Overheads overheads = {};  ///< of the machine; under `fixed` lanes are put on cores so that these fit, too
   /// A worker may be woken this long before a release to be there in time (Anticipation); 0: none is.
   int64_t anticipate_ns = 0;
+  /// Processes that the run has with the finest isolation, each with a watchdog: the same for every isolation, so that
+  /// what is proven does not depend on it.
+  int64_t processes = 1;
   std::vector<TaskPlan> tasks;
   std::vector<PortPlan> ports;
   std::string mode = "full";    ///< of the start

@@ -20,23 +20,33 @@ WatchRules watch_rules(const TaskPlan& task, Policy granted, int64_t patience_ns
   return rules;
 }
 
-WatchVerdict judge(const WatchRules& rules, const WatchSight& sight) {
+WatchVerdict judge_budget(const WatchRules& rules, const WatchSight& sight) {
+  WatchVerdict verdict;
+  verdict.look_again_ns = std::numeric_limits<int64_t>::max();
+  if (!rules.minds_overrun() || (sight.running && sight.overrun_told)) return verdict;
+  // A job that is still to come begins at its release, or any moment if that has passed.
+  if (!sight.running && sight.release_ns > sight.now_ns) {
+    verdict.look_again_ns = sight.release_ns + rules.budget_ns;
+    return verdict;
+  }
+  const int64_t left_ns = sight.running ? sight.cpu_left_ns : rules.budget_ns;
+  verdict.overrun = left_ns <= 0;
+  if (!verdict.overrun)
+    verdict.look_again_ns = sight.now_ns + std::max(left_ns, sight.stands ? kStandsGrain_ns : kWatchGrain_ns);
+  return verdict;
+}
+
+WatchVerdict judge_clock(const WatchRules& rules, const WatchSight& sight) {
   const int64_t missed_ns = sight.release_ns + rules.deadline_ns + 1, hung_ns = missed_ns + rules.patience_ns;
   WatchVerdict verdict;
   verdict.look_again_ns = std::numeric_limits<int64_t>::max();
-  const auto expect = [&](int64_t instant_ns) { verdict.look_again_ns = std::min(verdict.look_again_ns, instant_ns); };
-  if (rules.minds_overrun() && !(sight.running && sight.overrun_told)) {
-    // A job that is still to come begins at its release, or any moment if that has passed.
-    if (!sight.running && sight.release_ns > sight.now_ns) expect(sight.release_ns + rules.budget_ns);
-    else if (!sight.running) expect(sight.now_ns + std::max(rules.budget_ns, kWatchGrain_ns));
-    else if (sight.cpu_left_ns <= 0) verdict.overrun = true;
-    else expect(sight.now_ns + std::max(sight.cpu_left_ns, kWatchGrain_ns));
-  }
   const auto by_the_clock = [&](bool minds, bool told, int64_t instant_ns, bool& due) {
     if (!minds || (sight.running && told)) return;
     due = sight.running && sight.now_ns >= instant_ns;
+    if (due) return;
     // A job that begins after that instant is seen within a deadline, or tells it itself when it ends.
-    if (!due) expect(instant_ns > sight.now_ns ? instant_ns : sight.now_ns + rules.deadline_ns);
+    const int64_t next_ns = instant_ns > sight.now_ns ? instant_ns : sight.now_ns + rules.deadline_ns;
+    verdict.look_again_ns = std::min(verdict.look_again_ns, next_ns);
   };
   by_the_clock(rules.stop_on_miss, sight.miss_told, missed_ns, verdict.miss);
   by_the_clock(true, sight.hang_told, hung_ns, verdict.hang);
@@ -49,6 +59,14 @@ WatchVerdict judge(const WatchRules& rules, const WatchSight& sight) {
   return verdict;
 }
 
+WatchVerdict judge(const WatchRules& rules, const WatchSight& sight) {
+  WatchVerdict verdict = judge_clock(rules, sight);
+  const WatchVerdict budget = judge_budget(rules, sight);
+  verdict.overrun = budget.overrun;
+  verdict.look_again_ns = std::min(verdict.look_again_ns, budget.look_again_ns);
+  return verdict;
+}
+
 ReserveVerdict judge_reserve(const ReserveSight& sight) {
   constexpr int64_t kLifted_ns = 50'000'000;  // between two looks where nothing can be done now
   if (sight.lifted) return {false, sight.now_ns + kLifted_ns};
@@ -56,8 +74,9 @@ ReserveVerdict judge_reserve(const ReserveSight& sight) {
   if (sight.now_ns < soonest_ns) return {false, soonest_ns};
   const bool in_time = sight.now_ns <= sight.release_ns + sight.deadline_ns;
   if (sight.low && !in_time) return {false, sight.now_ns + kLifted_ns};
-  if (sight.used_up() && sight.stands && sight.owed_ns - sight.left_ns <= sight.deadline_ns)
-    return {true, sight.now_ns + kLifted_ns};
+  // One that owes too much waits for its next replenishment: nothing is to be seen soon there either.
+  if (sight.used_up() && sight.stands)
+    return {sight.owed_ns - sight.left_ns <= sight.deadline_ns, sight.now_ns + kLifted_ns};
   return {false, sight.now_ns + std::max(sight.left_ns, kReserveGrain_ns)};
 }
 

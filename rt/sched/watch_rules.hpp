@@ -14,8 +14,8 @@ struct WatchRules {
   int64_t patience_ns = 0;  ///< a job that has not returned this long after its deadline hangs
   bool demote = false;      ///< budget used up: it goes on with what the others leave
   bool stop_on_overrun = false, stop_on_miss = false;  ///< on_overrun, on_miss: safe_stop
-  bool lift = false;      ///< late through what the host took, or its reservation used up: it goes on beside that
-  bool low = false;       ///< once its reservation is used up: behind all workers, and while it is in time
+  bool lift = false;  ///< late through what the host took, or its reservation used up: it goes on beside that
+  bool low = false;   ///< once its reservation is used up: behind all workers, and while it is in time
 
   bool minds_overrun() const { return demote || stop_on_overrun; }
 };
@@ -38,6 +38,7 @@ struct WatchSight {
   bool lifted = false;    ///< the worker is, still
   bool first = false;     ///< lifted before all workers
   bool ordinary = false;  ///< as an ordinary thread
+  bool stands = false;    ///< its CPU clock has not moved since the look before
 };
 
 struct WatchVerdict {
@@ -45,19 +46,37 @@ struct WatchVerdict {
   int64_t look_again_ns = 0;                                                     ///< nothing can happen before
 };
 
+/// Both of the following at once: for a watchdog that nothing keeps from looking.
+WatchVerdict judge(const WatchRules& rules, const WatchSight& sight);
+
+/// The budget. A job cannot have used a budget before that much time has passed: the next look is due when that can
+/// have happened. A job that runs, or is late to begin, is looked at no more than once in kWatchGrain_ns: that is the
+/// enforcement error, in addition to the watchdog's own wake-up. While its clock stands still (throttled, preempted),
+/// no more than once in kStandsGrain_ns.
+WatchVerdict judge_budget(const WatchRules& rules, const WatchSight& sight);
+
+/// What goes by the clock: a miss, a hang; and under `deadline` what the host took.
+///
 /// The kernel charges a reservation for time that the host took from its CPU, and holds the thread back until that is
 /// paid off, one budget a period: a job that is late while its worker owes something, and no more than the host took,
 /// is lifted out of that, and dropped to be an ordinary thread once it has used more than that. One that was lifted
-/// because its reservation was used up (see judge_reserve) may use as much as its deadline is long, one of low criticality
-/// half a budget. All of that is seen when somebody looks: it makes no look_again.
-///
-/// A job cannot have used a budget before that much time has passed: so the next look is due when the earliest thing
-/// can have happened. For its budget a job that runs, or is late to begin, is looked at no more than once in
-/// kWatchGrain_ns, so that one that was preempted just before its budget ended costs nothing: the enforcement error,
-/// beside the watchdog's own wake-up.
-WatchVerdict judge(const WatchRules& rules, const WatchSight& sight);
+/// because its reservation was used up (see judge_reserve) may use as much as its deadline is long, one of low
+/// criticality half a budget. All of that is seen when somebody looks: it makes no look_again.
+WatchVerdict judge_clock(const WatchRules& rules, const WatchSight& sight);
 
-constexpr int64_t kWatchGrain_ns = 100'000;
+constexpr int64_t kWatchGrain_ns = 100'000, kStandsGrain_ns = 1'000'000;
+
+/// Between two signs of life of a process that somebody outside looks after.
+constexpr int64_t kHeartbeat_ns = 200'000'000;
+
+/// Looks of a lane's own watchdog (see Watchdog) at one job, if the lane is preempted `preemptions` times meanwhile,
+/// and besides for `short_ns` in many short pieces. The watchdog runs only when the lane could. One look may come
+/// before the job has begun, one when the budget could be used up, one within the last grain, and one for what looks
+/// themselves take. Each other one finds that the lane was preempted since the one before, which is at least a grain
+/// ago: short pieces must take half of that to make another look necessary.
+constexpr int64_t most_looks(int64_t preemptions, int64_t short_ns) {
+  return 4 + preemptions + (2 * short_ns + kWatchGrain_ns - 1) / kWatchGrain_ns;
+}
 
 /// The kernel's account is not ours: it begins and ends in the middle of what a worker does around its sleep.
 constexpr int64_t kReserveSlack_ns = 100'000;
@@ -72,7 +91,7 @@ struct ReserveSight {
   int64_t owed_ns = 0;      ///< by how much jobs of the worker overran lately, this one apart
   bool stands = false;      ///< used_up() at the look before, and nothing was used since
   bool lifted = false;
-  bool low = false;       ///< nobody of high criticality is on it
+  bool low = false;  ///< nobody of high criticality is on it
 
   bool used_up() const { return left_ns <= kReserveSlack_ns; }
 };

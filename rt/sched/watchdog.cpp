@@ -1,14 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "rt/sched/watchdog.hpp"
 
-#include <pthread.h>
-
 #include <algorithm>
-#include <chrono>
 #include <cinttypes>
 #include <cstdio>
-
-#include "rt/memory/process_memory.hpp"
 
 namespace takt {
 namespace {
@@ -24,22 +19,35 @@ Watchdog::Watchdog(const Plan& plan, RunBoard& board, const Clock& clock, std::v
       watched_(workers.size()),
       stolen_(options.stolen_ns) {
   for (size_t w = 0; w < workers.size(); ++w) {
-    for (const size_t task : workers[w].tasks)
-      watched_[w].rules.push_back(watch_rules(plan.tasks[task], options.granted, options.patience_ns));
-    watched_[w].low = std::all_of(watched_[w].rules.begin(), watched_[w].rules.end(),
-                                  [](const WatchRules& rules) { return rules.low; });
-    watched_[w].worker = std::move(workers[w]);
+    Watched& watched = watched_[w];
+    for (const size_t task : workers[w].tasks) {
+      const WatchRules rules = watch_rules(plan.tasks[task], options.granted, options.patience_ns);
+      watched.rules.push_back(rules);
+      watched.low = watched.low && rules.low;
+      if (rules.minds_overrun() && (watched.least_budget_ns == 0 || rules.budget_ns < watched.least_budget_ns))
+        watched.least_budget_ns = rules.budget_ns;
+    }
+    watched.worker = std::move(workers[w]);
+    watched.own_lookout = watched.least_budget_ns > 0 && watched.worker.has.priority > 0;
   }
-  thread_ = std::thread([this] { watch(); });
+  Reservation wanted;
+  if (options.priority > 0) wanted.policy = Policy::fixed, wanted.priority = options.priority;
+  lookouts_.push_back(
+      std::make_unique<Lookout>("takt-watchdog", wanted, clock, [this](int64_t now_ns) { return look(now_ns); }));
+  for (Watched& watched : watched_) {
+    if (!watched.own_lookout) continue;
+    wanted = watched.worker.has;
+    wanted.priority += 1;
+    lookouts_.push_back(
+        std::make_unique<Lookout>("watch " + plan.tasks[watched.worker.tasks.front()].name, wanted, clock,
+                                  [this, &watched](int64_t now_ns) { return look_at_budget(watched, now_ns); }));
+    watched.worker.watch->set_lookout(lookouts_.back().get());
+  }
 }
 
 Watchdog::~Watchdog() {
-  {
-    const std::lock_guard lock(mutex_);
-    end_ = true;
-  }
-  ending_.notify_all();
-  thread_.join();
+  for (const Watched& watched : watched_)
+    if (watched.own_lookout) watched.worker.watch->set_lookout(nullptr);
 }
 
 bool Watchdog::hangs(size_t worker) const {
@@ -47,25 +55,8 @@ bool Watchdog::hangs(size_t worker) const {
   return told != 0 && watched_[worker].worker.watch->running().serial == told;
 }
 
-void Watchdog::watch() {
-  pthread_setname_np(pthread_self(), "takt-watchdog");
-  prefault_stack();
-  Reservation wanted;
-  if (options_.priority > 0) wanted.policy = Policy::fixed, wanted.priority = options_.priority;
-  apply(wanted);
-  std::unique_lock lock(mutex_);
-  while (!end_) {
-    lock.unlock();
-    const int64_t next_ns = look(clock_.now_ns());
-    lock.lock();
-    // steady_clock is CLOCK_MONOTONIC here, the runtime's own clock.
-    if (!end_) ending_.wait_until(lock, std::chrono::steady_clock::time_point(std::chrono::nanoseconds(next_ns)));
-  }
-}
-
 int64_t Watchdog::look(int64_t now_ns) {
-  // Never: a year, which the arithmetic of timed waits survives.
-  int64_t next_ns = now_ns + 31'536'000'000'000'000;
+  int64_t next_ns = Lookout::kNever;
   if (options_.granted == Policy::deadline && stolen_.counted()) {
     stolen_.look(now_ns);
     const bool stolen = stolen_.recent_ns() > 0;
@@ -84,21 +75,28 @@ int64_t Watchdog::look(int64_t now_ns) {
   return next_ns;
 }
 
+WatchSight Watchdog::sight_of(const JobWatch& watch, const JobWatch::Running& job, int64_t now_ns) {
+  WatchSight sight;
+  sight.now_ns = now_ns;
+  sight.running = job.serial != 0;
+  sight.release_ns = sight.running ? job.release_ns : watch.expected_ns();
+  sight.overrun_told = sight.running && job.acted;
+  return sight;
+}
+
 int64_t Watchdog::look_at(Watched& watched, int64_t now_ns) {
   const JobWatch& watch = *watched.worker.watch;
   const JobWatch::Running job = watch.running();
-  WatchSight sight;
-  sight.now_ns = now_ns;
-  if (job.serial == 0) {
-    sight.release_ns = watch.expected_ns();
-    int64_t next_ns = std::numeric_limits<int64_t>::max();
-    for (const WatchRules& rules : watched.rules) next_ns = std::min(next_ns, judge(rules, sight).look_again_ns);
+  WatchSight sight = sight_of(watch, job, now_ns);
+  const auto judge_it = [&](const WatchRules& rules) {
+    return watched.own_lookout ? judge_clock(rules, sight) : judge(rules, sight);
+  };
+  if (!sight.running) {
+    int64_t next_ns = Lookout::kNever;
+    for (const WatchRules& rules : watched.rules) next_ns = std::min(next_ns, judge_it(rules).look_again_ns);
     return next_ns;
   }
   const WatchRules& rules = watched.rules[job.member];
-  sight.running = true;
-  sight.release_ns = job.release_ns;
-  sight.overrun_told = job.acted;
   sight.miss_told = watched.miss_told == job.serial;
   sight.hang_told = watched.hang_told.load() == job.serial;
   sight.stolen_ns = rules.lift ? stolen_.recent_ns() : 0;
@@ -107,14 +105,43 @@ int64_t Watchdog::look_at(Watched& watched, int64_t now_ns) {
   sight.ordinary = sight.lifted && watch.ordinary();
   sight.owed_ns = watch.owed_ns(now_ns);
   const bool may_lift = sight.stolen_ns > 0 && now_ns > job.release_ns + rules.deadline_ns;
-  if ((rules.minds_overrun() && !job.acted) || may_lift || sight.lifted) {
+  const bool budget = rules.minds_overrun() && !job.acted && !watched.own_lookout;
+  if (budget || may_lift || sight.lifted) {
     const int64_t used_ns = watch.cpu_ns();
     sight.cpu_left_ns = used_ns < 0 ? 0 : job.cpu_limit_ns - used_ns;
+    sight.stands = used_ns == watched.seen_cpu_ns;
+    watched.seen_cpu_ns = used_ns;
   }
-  const WatchVerdict verdict = judge(rules, sight);
+  const WatchVerdict verdict = judge_it(rules);
   act(watched, job, verdict, now_ns);
   // Acted on: what comes next is known only at another look.
-  return verdict.overrun || verdict.miss || verdict.hang ? now_ns + kWatchGrain_ns : verdict.look_again_ns;
+  if (verdict.overrun || verdict.miss || verdict.hang) return now_ns + kWatchGrain_ns;
+  const bool others = !watched.own_lookout && watched.least_budget_ns > 0 && !rules.minds_overrun();
+  if (!others || sight.hang_told) return verdict.look_again_ns;
+  // Another member of the lane may begin any moment.
+  return std::min(verdict.look_again_ns, now_ns + std::max(watched.least_budget_ns, kStandsGrain_ns));
+}
+
+int64_t Watchdog::look_at_budget(Watched& watched, int64_t now_ns) {
+  const JobWatch& watch = *watched.worker.watch;
+  const JobWatch::Running job = watch.running();
+  WatchSight sight = sight_of(watch, job, now_ns);
+  if (!sight.running) {
+    int64_t next_ns = Lookout::kNever;
+    for (const WatchRules& rules : watched.rules) next_ns = std::min(next_ns, judge_budget(rules, sight).look_again_ns);
+    return next_ns;
+  }
+  if (job.acted) return Lookout::kNever;  // its end wakes this thread
+  const WatchRules& rules = watched.rules[job.member];
+  // Another member of the lane may begin any moment.
+  if (!rules.minds_overrun()) return now_ns + std::max(watched.least_budget_ns, kWatchGrain_ns);
+  const int64_t used_ns = watch.cpu_ns();
+  sight.cpu_left_ns = used_ns < 0 ? 0 : job.cpu_limit_ns - used_ns;
+  sight.now_ns = clock_.now_ns();  // what the look took so far is no time of the job's
+  const WatchVerdict verdict = judge_budget(rules, sight);
+  if (!verdict.overrun) return verdict.look_again_ns;
+  overrun(watched, job, now_ns);
+  return now_ns + kWatchGrain_ns;
 }
 
 int64_t Watchdog::look_at_reserve(Watched& watched, int64_t now_ns) {
@@ -137,8 +164,7 @@ int64_t Watchdog::look_at_reserve(Watched& watched, int64_t now_ns) {
     watched.overdrawn_cpu_ns = sight.used_up() ? cpu_ns : 0;
   }
   const ReserveVerdict verdict = judge_reserve(sight);
-  if (verdict.lift)
-    lift(watched, watched.worker.tasks[member], sight.owed_ns - sight.left_ns, now_ns, watched.low);
+  if (verdict.lift) lift(watched, watched.worker.tasks[member], sight.owed_ns - sight.left_ns, now_ns, watched.low);
   return verdict.look_again_ns;
 }
 
@@ -170,8 +196,25 @@ void Watchdog::act(Watched& watched, const JobWatch::Running& job, const WatchVe
   }
   if (verdict.hang) {
     watched.hang_told.store(job.serial);
-    tell_hang(task, job, now_ns);
+    hang(watched, job, now_ns);
   }
+}
+
+void Watchdog::hang(Watched& watched, const JobWatch::Running& job, int64_t now_ns) {
+  const size_t task = watched.worker.tasks[job.member];
+  if (options_.granted == Policy::fixed) {
+    // It would keep its core from all others of lower priority for ever. Others of its lane wait for it in any case.
+    if (watched.worker.watch->demote(job.serial)) board_.task(task).demoted.fetch_add(1, std::memory_order_relaxed);
+    const bool stops = !watched.low && options_.life == nullptr && plan_.safe_stop != kNone;
+    tell_hang(task, job, now_ns, stops ? "; it is demoted, and safe_stop entered" : "; it is demoted");
+    if (stops) safe_stop(task, job.index, "hangs", now_ns);
+    return;
+  }
+  const bool ends_run = options_.granted == Policy::cooperative && options_.life == nullptr;
+  const Fault fault = tell_hang(task, job, now_ns, ends_run ? "; without real-time policies that ends the run" : "");
+  if (!ends_run) return;  // no writing here: a full pipe would stop all enforcement
+  std::fprintf(stderr, "takt: error: %s\n", fault.what.c_str());
+  board_.stop().raise(now_ns);
 }
 
 void Watchdog::lift(Watched& watched, size_t task, int64_t owed_ns, int64_t now_ns, bool behind) {
@@ -186,8 +229,7 @@ void Watchdog::safe_stop(size_t task, uint64_t job, const char* why, int64_t now
   board_.safe_stop(now_ns + ModeLog::kLead_ns, reason);
 }
 
-void Watchdog::tell_hang(size_t task, const JobWatch::Running& job, int64_t now_ns) {
-  const bool ends_run = options_.granted == Policy::cooperative && options_.life == nullptr;
+Fault Watchdog::tell_hang(size_t task, const JobWatch::Running& job, int64_t now_ns, const char* consequence) {
   Fault fault;
   fault.kind = Fault::hang;
   fault.task = static_cast<uint32_t>(task);
@@ -195,16 +237,13 @@ void Watchdog::tell_hang(size_t task, const JobWatch::Running& job, int64_t now_
   fault.at_ns = now_ns;
   std::snprintf(fault.what.characters.data(), fault.what.characters.size(),
                 "%s: job %" PRIu64 " has not returned %" PRId64 " ms after its release%s",
-                plan_.tasks[task].name.c_str(), job.index, (now_ns - job.release_ns) / 1'000'000,
-                ends_run ? "; without real-time policies that ends the run" : "");
+                plan_.tasks[task].name.c_str(), job.index, (now_ns - job.release_ns) / 1'000'000, consequence);
   board_.faults().append(fault);
   if (options_.life != nullptr) {
     options_.life->hanging_since_ns.store(job.release_ns);
     options_.life->hanging.store(static_cast<uint32_t>(task) + 1);
   }
-  if (!ends_run) return;  // no writing here: a full pipe would stop all enforcement
-  std::fprintf(stderr, "takt: error: %s\n", fault.what.c_str());
-  board_.stop().raise(now_ns);
+  return fault;
 }
 
 }  // namespace takt

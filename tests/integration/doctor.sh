@@ -20,7 +20,7 @@ check_findings() { # JSON: every check has a status, a value and a meaning; a la
   python3 - "$1" <<'PY' || fail "findings of $1"
 import json, sys
 report = json.load(open(sys.argv[1]))
-wanted = {"sched_deadline", "sched_fifo", "rt_runtime", "cgroup_rt", "fair_server", "mlockall", "dev_shm", "swap", "tick",
+wanted = {"sched_deadline", "deadline_bandwidth", "sched_fifo", "rt_runtime", "cgroup_rt", "fair_server", "mlockall", "dev_shm", "swap", "tick",
           "transparent_hugepage", "cpu_dma_latency", "timer_slack", "preemption", "clocksource", "governor", "cpusets",
           "irq_affinity", "host_stall", "iceoryx"}
 assert {c["name"] for c in report["checks"]} == wanted, wanted ^ {c["name"] for c in report["checks"]}

@@ -15,6 +15,7 @@ struct Overheads {
   int64_t per_mb_ns = 0;       ///< more for each megabyte of an input's or output's payload
   int64_t enforcement_ns = 0;  ///< SCHED_DEADLINE: what a thread may run on after its budget is used up
   int64_t demotion_ns = 0;     ///< SCHED_FIFO: the same, until a watchdog that looks in time has demoted it
+  int64_t look_ns = 0;         ///< SCHED_FIFO: one look of a watchdog: its timer, two switches, a CPU clock
   int64_t tick_ns = 0;         ///< the kernel's tick, on which SCHED_DEADLINE looks at budgets
   /// What the kernel gives ordinary threads of each core in every period before those of SCHED_FIFO, where these have
   /// left them less (fair server, throttling); 0: nothing.

@@ -114,6 +114,109 @@ TEST_CASE("an overrun is seen when it happens and at most a grain later, a miss 
   CHECK(hangs >= test::at_scale(300));
 }
 
+namespace {
+
+/// A low job on a core where a high one comes and goes, and between them the low lane's own watchdog, which runs only
+/// when the high one does not; in microseconds.
+struct WatchedCore {
+  static constexpr int64_t kLook = 5;  ///< that long is a look
+  int64_t release = 0, budget = 0, demand = 0;
+  std::vector<std::pair<int64_t, int64_t>> high;  ///< from, to: it has the core
+  static constexpr int64_t kShort = 20;           ///< up to that long it counts by its length
+
+  int64_t now = 0, used = 0, looks = 0, preemptions = 0, short_us = 0, overrun_at = -1;
+  bool ended() const { return used >= demand || overrun_at >= 0; }
+  const std::pair<int64_t, int64_t>* runs_high() const {
+    const auto one =
+        std::find_if(high.begin(), high.end(), [&](const auto& h) { return h.first <= now && now < h.second; });
+    return one == high.end() ? nullptr : &*one;
+  }
+
+  void run() {
+    WatchRules rules;
+    rules.budget_ns = budget * kUs;
+    rules.deadline_ns = rules.patience_ns = 1'000'000 * kUs;
+    rules.demote = true;
+    int64_t next_look = release + budget, looking = 0;
+    for (const std::pair<int64_t, int64_t>* last = nullptr; !ended(); ++now) {
+      if (const auto* one = runs_high()) {
+        const bool is_short = one->second - one->first <= kShort;
+        if (now >= release) preemptions += !is_short && one != last, short_us += is_short;
+        last = one;
+        continue;
+      }
+      if (looking == 0 && now >= next_look) looking = kLook;
+      if (looking > 0) {  // at its end it has seen and decided
+        if (--looking == 0) next_look = look(rules);
+      } else if (now >= release) {
+        ++used;
+      }
+    }
+  }
+  int64_t look(const WatchRules& rules) {
+    ++looks;
+    WatchSight sight;
+    sight.now_ns = (now + 1) * kUs;
+    sight.running = used > 0;
+    sight.release_ns = release * kUs;
+    sight.cpu_left_ns = (budget - used) * kUs;
+    const WatchVerdict verdict = judge_budget(rules, sight);
+    if (verdict.overrun) overrun_at = used;
+    return verdict.look_again_ns / kUs;
+  }
+};
+
+}  // namespace
+
+TEST_CASE("a lane's own watchdog looks no more often than is charged, and stops an overrun within a grain") {
+  std::mt19937 random(test::seed(6));
+  const auto draw = [&](int low, int high) { return std::uniform_int_distribution(low, high)(random); };
+  int overruns = 0, preempted = 0;
+  for (int round = 0; round < test::rounds(2000); ++round) {
+    CAPTURE(round);
+    WatchedCore core;
+    core.release = draw(0, 500);
+    core.budget = draw(50, 4000);
+    core.demand = std::max(1, static_cast<int>(core.budget) + draw(0, 1) * draw(-200, 1000));
+    int64_t at = draw(0, 1000);
+    for (int jobs = draw(0, 12); jobs > 0; --jobs) {
+      const int64_t from = at + draw(1, 1500);
+      at = from + draw(1, 2000);
+      core.high.emplace_back(from, at);
+    }
+    // Looks of other watchdogs.
+    for (int64_t from = draw(0, 2000), n = draw(0, 1) * draw(0, 200); n > 0; --n) {
+      core.high.emplace_back(from, from + draw(1, WatchedCore::kShort));
+      from = core.high.back().second + draw(1, 120);
+    }
+    // Just before the low one's end, which a watchdog of the whole process would have polled through.
+    if (draw(0, 1) == 1 && core.high.empty()) core.high.emplace_back(core.release + core.budget - draw(1, 40), 20'000);
+    core.run();
+    CHECK(core.looks <= most_looks(core.preemptions, core.short_us * kUs));
+    preempted += core.preemptions > 0;
+    const int64_t grain = kWatchGrain_ns / kUs;
+    if (core.demand > core.budget + grain) {
+      CHECK(core.overrun_at >= core.budget);
+      CHECK(core.overrun_at <= core.budget + grain);
+      ++overruns;
+    }
+  }
+  CHECK(overruns >= test::at_scale(200));
+  CHECK(preempted >= test::at_scale(200));
+}
+
+TEST_CASE("a job whose clock stands still is not polled") {
+  WatchRules rules;
+  rules.budget_ns = 1'000 * kUs;
+  rules.demote = true;
+  WatchSight sight;
+  sight.running = true;
+  sight.cpu_left_ns = 10 * kUs;
+  CHECK(judge_budget(rules, sight).look_again_ns == kWatchGrain_ns);
+  sight.stands = true;
+  CHECK(judge_budget(rules, sight).look_again_ns == kStandsGrain_ns);
+}
+
 TEST_CASE("nobody looks at a job that none of the rules minds before it hangs") {
   WatchRules rules;
   rules.budget_ns = 1;

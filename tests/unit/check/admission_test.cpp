@@ -229,8 +229,9 @@ TEST_CASE("admission: fixed priorities are spread over the cores so that each fi
   CHECK(answer(fits) == Answer::admitted);
   const std::vector<Reservation> asked = reservations(fits, Policy::fixed);
   CHECK(asked[0].core == 5);
-  CHECK(asked[1].core == 3);  // first, since its deadline leaves the least
-  CHECK(asked[0].priority > asked[1].priority);
+  CHECK(asked[1].core == 3);                         // first, since its deadline leaves the least
+  CHECK(asked[0].priority == kHighestPriority - 1);  // each core counts from the top
+  CHECK(asked[1].priority == kHighestPriority - 1);
 }
 
 TEST_CASE("admission: under fixed lanes of high criticality go first unless that makes others late") {
@@ -255,6 +256,50 @@ TEST_CASE("admission: under fixed lanes of high criticality go first unless that
   follow(plan, 3, 0);  // one high member makes its lane one
   CHECK(reservations(plan, Policy::fixed).size() == 3);
   CHECK(reservations(plan, Policy::fixed)[0].priority > reservations(plan, Policy::fixed)[1].priority);
+}
+
+TEST_CASE("admission: under fixed each lane has a priority for its watchdog above it, and a core has room for 39") {
+  std::vector<TaskPlan> tasks;
+  for (int i = 0; i < 39; ++i) tasks.push_back(task(("t" + std::to_string(i)).c_str(), 10, 1, 60 + i));
+  Plan plan = plan_of(Policy::fixed, {0}, tasks);
+  const auto priorities = [&] {
+    std::vector<int> all;
+    for (const Reservation& asked : reservations(plan, Policy::fixed)) all.push_back(asked.priority);
+    return all;
+  };
+  CHECK(priorities().front() == kHighestPriority - 1);
+  CHECK(priorities()[1] == kHighestPriority - 3);
+  CHECK(priorities().back() == kLowestPriority + 2);
+  CHECK(answer(plan) == Answer::admitted);
+  plan.tasks.push_back(task("one more", 10, 1, 99));
+  CHECK(priorities().back() == kLowestPriority + 2);
+  CHECK(answer(plan) == Answer::infeasible);
+  CHECK(says(admit(plan, {}), "40 lanes share a core, and `fixed` has priorities for 39"));
+  plan.cores = {0, 1};
+  CHECK(answer(plan) == Answer::admitted);
+}
+
+TEST_CASE("admission: under fixed looks of a watchdog are charged to whom they may delay") {
+  Plan plan = plan_of(Policy::fixed, {0},
+                      {task("guard", 10, 20, 50), task("noise", 10, 10, 100, Criticality::low),
+                       task("late", 10, 10, 100, Criticality::low)});
+  plan.tasks[2].deadline_ns -= 1;
+  const Admission without = admit(plan, {});
+  REQUIRE(without.answer == Answer::admitted);
+  analysis::Overheads o;
+  o.look_ns = 1'000;
+  const Admission with = admit(plan, o);
+  REQUIRE(with.answer == Answer::admitted);
+  const auto more_ns = [&](size_t t) { return *with.nodes[t].response_ns - *without.nodes[t].response_ns; };
+  // The guard: the timers of two lanes below it, and twice the process's watchdog.
+  CHECK(more_ns(0) == 2'000 + 2'000);
+  // Behind it comes the one with the shorter deadline: four looks, one for the guard's preemption, and one for the
+  // looks of the process's watchdog, which take little of a grain.
+  const int64_t late = 4 + 1 + 1;
+  CHECK(more_ns(2) == (late + 2 + 1) * 1'000);
+  CHECK(more_ns(1) == (late + 4 + 1 + 1 + 1 + 2) * 1'000);
+  plan.policy = Policy::deadline;  // its watchdog goes behind all reservations
+  CHECK(*admit(plan, o).nodes[0].response_ns == *admit(plan, {}).nodes[0].response_ns);
 }
 
 TEST_CASE("admission: under fixed who goes behind a longer lead than his own is charged the rest of it") {

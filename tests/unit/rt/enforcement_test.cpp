@@ -6,9 +6,11 @@
 #include <algorithm>
 #include <atomic>
 #include <memory>
+#include <string>
 #include <thread>
 #include <vector>
 
+#include "rt/memory/memory_use.hpp"
 #include "rt/node.hpp"
 #include "rt/sched/executor.hpp"
 #include "rt/sched/watchdog.hpp"
@@ -24,13 +26,15 @@ struct Steady final : Node {
   void run(Job&) override {}
 };
 
-/// From job 3 on (on a busy machine that one may be skipped) it spins until it is let go.
+/// From job 3 on (on a busy machine that one may be skipped) it spins until it is let go, or has used so much.
 struct Spinner final : Node {
   std::atomic<bool> let_go{false};
+  int64_t spin_ns = INT64_MAX / 2;
   void setup(Setup&) override {}
   void run(Job& job) override {
     if (job.index() < 3) return;
-    while (!let_go.load()) {
+    const int64_t until_ns = thread_cpu_ns() + spin_ns;
+    while (!let_go.load() && thread_cpu_ns() < until_ns) {
     }
   }
 };
@@ -44,11 +48,13 @@ struct SpinnerScene {
   std::unique_ptr<RunBoard> board;
   std::unique_ptr<Executor> executor;
 
-  explicit SpinnerScene(Policy policy) {
+  SpinnerScene(Policy policy, Criticality criticality) {
     plan.policy = policy;
     plan.cores = {0, 1};
+    plan.modes = {{"full", {1, 1}}, {"safe_stop", {1, 0}}};
+    plan.safe_stop = 1;
     add(steady, "steady", Criticality::high, 90 * kMs);
-    add(spinner, "spinner", Criticality::low, 50 * kMs);
+    add(spinner, "spinner", criticality, 50 * kMs);
     board = std::make_unique<RunBoard>(plan);
   }
   void add(Node& node, const char* name, Criticality criticality, int64_t deadline_ns) {
@@ -78,7 +84,9 @@ std::vector<std::unique_ptr<SpinnerScene>>& kept_scenes() {
 }
 
 /// Kept for ever: a thread that was given up may use it until the process ends.
-SpinnerScene& new_scene(Policy policy) { return *kept_scenes().emplace_back(std::make_unique<SpinnerScene>(policy)); }
+SpinnerScene& new_scene(Policy policy, Criticality criticality = Criticality::low) {
+  return *kept_scenes().emplace_back(std::make_unique<SpinnerScene>(policy, criticality));
+}
 
 /// The spinner need not spin through all other tests.
 struct LetGo {
@@ -120,6 +128,38 @@ TEST_CASE("under fixed a job that does not return is demoted, and the run goes o
   CHECK(scene.board->task(0).completed.load() + scene.board->task(0).skipped.load() == 15);
   CHECK(scene.board->task(0).demoted.load() == 0);
   MESSAGE("demoted with " << scene.board->task(1).enforcement_error_ns.load() / 1000 << " us beyond its budget");
+}
+
+TEST_CASE("under fixed a high node that does not return is demoted, named, and safe_stop entered") {
+  SpinnerScene& scene = new_scene(Policy::fixed, Criticality::high);
+  const LetGo let_go{scene.spinner};
+  const RunResult result = scene.run(1'500 * kMs);
+  if (result.policy_granted != Policy::fixed) {
+    MESSAGE("NOT RUN: SCHED_FIFO is refused to this user");
+    return;
+  }
+  REQUIRE(result.stuck.size() == 1);
+  CHECK(scene.board->task(1).demoted.load() == 1);
+  REQUIRE(scene.board->faults().size() >= 1);
+  const Fault& fault = *scene.board->faults().at(0);
+  CHECK(fault.kind == Fault::hang);
+  CHECK(fault.task == 1);
+  CHECK(std::string(fault.what.c_str()).find("it is demoted, and safe_stop entered") != std::string::npos);
+  REQUIRE(scene.board->modes().size() >= 1);
+  CHECK(scene.board->modes().change(0)->mode == 1);
+}
+
+TEST_CASE("under fixed the jobs after one that was demoted are watched as it was") {
+  SpinnerScene& scene = new_scene(Policy::fixed);
+  const LetGo let_go{scene.spinner};
+  scene.spinner.spin_ns = 20 * kMs;  // of 5
+  const RunResult result = scene.run(1'500 * kMs, 3'600'000 * kMs);
+  if (result.policy_granted != Policy::fixed) {
+    MESSAGE("NOT RUN: SCHED_FIFO is refused to this user");
+    return;
+  }
+  CHECK(scene.board->task(1).completed.load() >= 4);
+  CHECK(scene.board->task(1).demoted.load() == scene.board->task(1).budget_overruns.load());
 }
 
 TEST_CASE("a demoted job that returns gets its priority back, and its node runs on") {

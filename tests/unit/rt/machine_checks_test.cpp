@@ -65,6 +65,24 @@ TEST_CASE("SCHED_DEADLINE: granted, refused for each of the reasons, no answer")
   CHECK(check_sched_deadline(facts, {}).status == Status::unknown);
 }
 
+TEST_CASE("bandwidth: who holds it, and what nobody holds") {
+  machine::BandwidthTrial trial;
+  CHECK(check_deadline_bandwidth(trial).status == Status::unknown);
+  trial.answered = true;
+  CHECK(says(check_deadline_bandwidth(trial), "refused"));
+  trial.granted = true;
+  trial.limit = 1.8;
+  trial.free = 1.05;
+  std::strcpy(trial.holders.data(), "takt (pid 12, 9 threads) 0.750");
+  CHECK(check_deadline_bandwidth(trial).status == Status::ok);
+  CHECK(says(check_deadline_bandwidth(trial), "1.050 of 1.800 cores free; held by takt (pid 12"));
+  trial.lost = 0.1;
+  std::strcpy(trial.recount.data(), "sudo sysctl kernel.sched_rt_runtime_us=950000");
+  CHECK(check_deadline_bandwidth(trial).status == Status::warn);
+  CHECK(says(check_deadline_bandwidth(trial), "0.100 lost"));
+  CHECK(has_fix(check_deadline_bandwidth(trial), "sched_rt_runtime_us=950000"));
+}
+
 TEST_CASE("SCHED_FIFO: a control group without a real-time share is named") {
   FakeFacts facts;
   CHECK(has_fix(check_sched_fifo(facts, refused(EPERM)), "ada - rtprio 99"));

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the kernel grants to SCHED_DEADLINE before and after threads were taken out of their reservations: lifts [COUNT]
+// At random instants the watchdog's way (JobWatch::lift), COUNT times each (default 1000), of a thread whose jobs
+// compute, sleep as Takt does between jobs, or block in read(). Prints a line for each. Exit 1 if bandwidth was lost;
+// 77 without the right to SCHED_DEADLINE. Nobody else should take or leave reservations meanwhile.
+#include <unistd.h>
+
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <random>
+#include <thread>
+
+#include "rt/memory/memory_use.hpp"
+#include "rt/sched/bandwidth.hpp"
+#include "rt/sched/grant.hpp"
+#include "rt/sched/job_watch.hpp"
+#include "rt/time/clock.hpp"
+
+namespace {
+
+using namespace takt;
+
+constexpr int64_t kMs = 1'000'000;
+
+void pause(int64_t ns) {
+  const timespec rest{ns / 1'000'000'000, ns % 1'000'000'000};
+  nanosleep(&rest, nullptr);
+}
+
+enum class Work : uint8_t { computes, sleeps, reads };
+
+/// A thread with a reservation of 1 ms in 10 that always wants more, and takes it back when it has been lifted.
+class Worker {
+ public:
+  Worker(Work work, int pipe_end) : work_(work), pipe_end_(pipe_end), thread_([this] { run(); }) {
+    while (!ready_.load()) pause(kMs);
+  }
+  ~Worker() {
+    end_.store(true);
+    thread_.join();
+  }
+  bool granted() const { return granted_; }
+  JobWatch& watch() { return watch_; }
+
+ private:
+  void run() {
+    has_ = deadline_reservation(kMs, 10 * kMs, 20 * kMs);
+    granted_ = apply(has_).verified;
+    watch_.bind(has_);
+    ready_.store(true);
+    const MonotonicClock clock;
+    for (uint64_t job = 0; granted_ && !end_.load(); ++job) {
+      watch_.begin(0, job, clock.now_ns(), thread_cpu_ns() + kMs);
+      one_job();
+      watch_.end();
+      watch_.rest(thread_cpu_ns());
+    }
+  }
+  void one_job() {
+    const int64_t until_ns = thread_cpu_ns() + (work_ == Work::computes ? 3 * kMs : kMs / 5);
+    while (thread_cpu_ns() < until_ns) {
+    }
+    if (work_ == Work::sleeps) pause(2 * kMs);
+    char byte = 0;
+    if (work_ == Work::reads) static_cast<void>(!read(pipe_end_, &byte, 1));
+  }
+
+  const Work work_;
+  const int pipe_end_;
+  JobWatch watch_;
+  Reservation has_;
+  bool granted_ = false;
+  std::atomic<bool> ready_{false}, end_{false};
+  std::thread thread_;  // last: it uses all of the above
+};
+
+/// A byte every few milliseconds, so that a reader blocks in between.
+class Feeder {
+ public:
+  Feeder() {
+    if (pipe(ends_.data()) != 0) std::abort();
+    thread_ = std::thread([this] {
+      std::mt19937 random(1);
+      while (!end_.load()) {
+        pause(std::uniform_int_distribution<int64_t>(kMs / 10, 4 * kMs)(random));
+        static_cast<void>(!write(ends_[1], "x", 1));
+      }
+    });
+  }
+  ~Feeder() {
+    end_.store(true);
+    thread_.join();
+    close(ends_[0]);
+    close(ends_[1]);
+  }
+  int reading_end() const { return ends_[0]; }
+
+ private:
+  std::array<int, 2> ends_{};
+  std::atomic<bool> end_{false};
+  std::thread thread_;
+};
+
+int lift_often(Work work, int count, std::mt19937& random) {
+  const Feeder feeder;
+  Worker worker(work, feeder.reading_end());
+  int lifted = 0;
+  for (int i = 0; worker.granted() && lifted < count && i < 100 * count; ++i) {
+    pause(std::uniform_int_distribution<int64_t>(kMs / 10, 8 * kMs)(random));
+    lifted += worker.watch().lift(MonotonicClock().now_ns(), 0, i % 2 == 0);
+  }
+  return lifted;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const int count = argc > 1 ? std::atoi(argv[1]) : 1000;
+  Reservation above;
+  above.policy = Policy::fixed;
+  above.priority = kHighestPriority + 1;
+  if (!apply(above).verified || !free_bandwidth()) {
+    std::puts("NOT RUN: real-time policies are refused to this user");
+    return 77;
+  }
+  std::mt19937 random(7);
+  bool good = true;
+  for (const auto& [work, name] :
+       {std::pair{Work::computes, "computes"}, {Work::sleeps, "sleeps"}, {Work::reads, "reads"}}) {
+    constexpr int64_t kReturned_ns = 100 * kMs;  // by then all that a thread left behind is given back
+    const double before = free_bandwidth().value_or(0);
+    const int lifted = lift_often(work, count, random);
+    pause(kReturned_ns);
+    const double after = free_bandwidth().value_or(0);
+    const bool kept = lifted >= count && std::abs(after - before) < 0.001;
+    std::printf("%-9s %5d lifts: %.4f cores free before, %.4f after%s\n", name, lifted, before, after,
+                kept ? "" : "  FAILED");
+    good = good && kept;
+  }
+  return good ? 0 : 1;
+}
