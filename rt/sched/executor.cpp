@@ -169,7 +169,10 @@ bool Executor::run_partitioned(Policy policy, RunResult& result) {
       Anticipation anticipation(longest_lead_ns(plan_, lane.members()), Anticipation::Beside::workers);
       while (lane.next_release_ns() < stop_.end_ns()) {
         const int64_t release_ns = lane.next_release_ns();
-        if (anticipation.sleep_before(release_ns, clock_, stop_)) {
+        lane.watch().falls_asleep();
+        const bool early = anticipation.sleep_before(release_ns, clock_, stop_);
+        lane.watch().awakes();
+        if (early) {
           lane.rehearse();
           anticipation.stay_awake_until(release_ns, clock_);
         }

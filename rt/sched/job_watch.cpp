@@ -61,6 +61,11 @@ int64_t JobWatch::owed_ns(int64_t now_ns) const {
   return now_ns - at_ns > StolenTime::kWindow_ns ? 0 : owed_ns_.load(std::memory_order_relaxed);
 }
 
+TAKT_HOT void JobWatch::falls_asleep() {
+  Wake awake = Wake::awake;
+  while (!wake_.compare_exchange_weak(awake, Wake::asleep, std::memory_order_acq_rel)) awake = Wake::awake;
+}
+
 std::optional<JobWatch::Place> JobWatch::claim_place() {
   Place had = place();
   if (had == Place::moving || !place_.compare_exchange_strong(had, Place::moving, std::memory_order_acq_rel))
@@ -113,11 +118,15 @@ bool JobWatch::demote(uint64_t serial) {
 bool JobWatch::lift(int64_t now_ns, int64_t owed_ns, bool behind) {
   const int thread = thread_.load(std::memory_order_acquire);
   const int64_t runtime_ns = this->runtime_ns();
-  if (runtime_ns <= 0 || !runnable(thread)) return false;
+  if (runtime_ns <= 0) return false;
   const std::optional<Place> had = claim_place();
   if (!had) return false;
-  const bool raised = lift_thread(thread, behind ? kLowestPriority : kHighestPriority);
-  const bool done = raised || (behind && demote_thread(thread));
+  Wake awake = Wake::awake;
+  const bool held = wake_.compare_exchange_strong(awake, Wake::held, std::memory_order_acq_rel);
+  const bool may = held && runnable(thread);  // it may sleep in its node
+  const bool raised = may && lift_thread(thread, behind ? kLowestPriority : kHighestPriority);
+  const bool done = raised || (may && behind && demote_thread(thread));
+  if (held) wake_.store(Wake::awake, std::memory_order_release);
   if (done) {
     // One period for each budget that is owed, the one under way, and one to be sure.
     constexpr int64_t kLongest_ns = 30'000'000'000;

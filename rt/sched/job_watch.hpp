@@ -31,6 +31,11 @@ class JobWatch {
   void bind(const Reservation& has);
   /// It has done its work, up to this reading of its CPU clock.
   void rest(int64_t cpu_ns) { rested_cpu_ns_.store(cpu_ns, std::memory_order_release); }
+  /// Before the worker sleeps, wherever the runtime itself makes it sleep, and after it: not even a lift that is under
+  /// way meets a sleeping thread then (see runnable()). It waits for that as long as its own reservation lasts at most:
+  /// the watchdog goes on when that is used up.
+  void falls_asleep();
+  void awakes() { wake_.store(Wake::awake, std::memory_order_release); }
   /// No job begins before this instant.
   void expect(int64_t release_ns) { expected_ns_.store(release_ns, std::memory_order_release); }
   /// `cpu_limit_ns`: reading of the thread's CPU clock at which the budget is used up.
@@ -79,6 +84,8 @@ class JobWatch {
   enum class Place : uint32_t { own, moving, first, behind, ordinary };
   static constexpr uint64_t kPhases = 8;  // state = serial * kPhases + phase
   void settle_down();
+  /// `held`: a lift is under way, the worker must not fall asleep.
+  enum class Wake : uint32_t { awake, asleep, held };
   /// From one phase to the other; false if job `serial` is in another one.
   bool advance(uint64_t serial, Phase from, Phase to);
   Place place() const { return place_.load(std::memory_order_acquire); }
@@ -92,6 +99,7 @@ class JobWatch {
   std::atomic<int64_t> release_ns_{0}, cpu_limit_ns_{0}, expected_ns_{0};
   std::atomic<int64_t> lifted_until_ns_{0};
   std::atomic<Place> place_{Place::own};
+  std::atomic<Wake> wake_{Wake::awake};
   std::atomic<Lookout*> lookout_{nullptr};
   std::atomic<int64_t> owed_ns_{0}, owed_at_ns_{0}, rested_cpu_ns_{0};
   std::atomic<int> thread_{0};

@@ -56,7 +56,11 @@ TAKT_HOT void Lane::run_next(const Clock& clock, StopSignal& stop) {
     const size_t producer = followers_[m].producer;
     ran_[m] = ran_[producer] && activates(m, visible_[producer]);
     if (!ran_[m]) continue;
-    if (visible_[producer] > clock.now_ns()) stop.sleep_until(visible_[producer]);
+    if (visible_[producer] > clock.now_ns()) {
+      watch_->falls_asleep();
+      stop.sleep_until(visible_[producer]);
+      watch_->awakes();
+    }
     visible_[m] = tasks_[m]->run(followers_[m].index++, visible_[producer]).visible_at_ns;
   }
   // Page faults are asked for once a pass and stand with its head: asking costs more than an empty job.

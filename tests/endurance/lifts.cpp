@@ -57,13 +57,16 @@ class Worker {
       one_job();
       watch_.end();
       watch_.rest(thread_cpu_ns());
+      if (work_ != Work::sleeps) continue;
+      watch_.falls_asleep();
+      pause(2 * kMs);
+      watch_.awakes();
     }
   }
   void one_job() {
     const int64_t until_ns = thread_cpu_ns() + (work_ == Work::computes ? 3 * kMs : kMs / 5);
     while (thread_cpu_ns() < until_ns) {
     }
-    if (work_ == Work::sleeps) pause(2 * kMs);
     char byte = 0;
     if (work_ == Work::reads) static_cast<void>(!read(pipe_end_, &byte, 1));
   }
