@@ -181,6 +181,8 @@ int run_as_asked(RunOptions options) {
     const std::string lacks = graph::lacks_text(prepared.graph->schedule.policy, options.transport == "iceoryx");
     if (!lacks.empty())
       return refuse("--require-rt: this machine lacks (see `takt doctor`)\n" + lacks, kDeviceOrSystem);
+    if (const std::string note = this_machine().not_preemptible; !note.empty())
+      std::fprintf(stderr, "takt: note: %s\n", note.c_str());
   }
   const bool processes = wanted == "subsystem" && options.clock != "virtual";
   RunFaults faults(options);

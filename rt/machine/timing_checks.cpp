@@ -84,15 +84,15 @@ Finding check_tick(const Facts& facts, const TickTrial& trial) {
 }
 
 Finding check_preemption(const Facts& facts) {
-  Finding f{"timing", "preemption", Need::every_run, Status::unknown, "", ""};
-  f.meaning = "else a job waits for what another process does in the kernel";
+  Finding f{"timing", "preemption", Need::advice, Status::unknown, "", ""};
+  f.meaning = "whether a job waits for what another process does in the kernel";
   const Preemption found = preemption_of(facts);
   if (found.model.empty()) {
     f.found = "neither uname, debugfs nor the kernel configuration tells";
     return f;
   }
   f.found = found.model + " (" + found.source + ")";
-  f.status = found.model == "lazy" ? Status::warn : found.preempts() ? Status::ok : Status::lacks;
+  f.status = found.model == "rt" || found.model == "full" ? Status::ok : Status::warn;
   if (f.status == Status::ok) return f;
   const bool dynamic = kernel_option(kernel_config(facts), "PREEMPT_DYNAMIC") == "y" || found.source == "debugfs";
   if (dynamic) f.fixes = {shell("echo full | sudo tee /sys/kernel/debug/sched/preempt"), boot("preempt=full")};

@@ -115,17 +115,18 @@ bool JobWatch::demote(uint64_t serial) {
   return done;
 }
 
-bool JobWatch::lift(int64_t now_ns, int64_t owed_ns, bool behind) {
+JobWatch::Lift JobWatch::lift(int64_t now_ns, int64_t owed_ns, bool behind) {
   const int thread = thread_.load(std::memory_order_acquire);
   const int64_t runtime_ns = this->runtime_ns();
-  if (runtime_ns <= 0) return false;
+  if (runtime_ns <= 0) return Lift::refused;
   const std::optional<Place> had = claim_place();
-  if (!had) return false;
+  if (!had) return Lift::refused;
   Wake awake = Wake::awake;
   const bool held = wake_.compare_exchange_strong(awake, Wake::held, std::memory_order_acq_rel);
   const bool may = held && runnable(thread);  // it may sleep in its node
   const bool raised = may && lift_thread(thread, behind ? kLowestPriority : kHighestPriority);
   const bool done = raised || (may && behind && demote_thread(thread));
+  const bool slept = done && !runnable(thread);
   if (held) wake_.store(Wake::awake, std::memory_order_release);
   if (done) {
     // One period for each budget that is owed, the one under way, and one to be sure.
@@ -135,7 +136,7 @@ bool JobWatch::lift(int64_t now_ns, int64_t owed_ns, bool behind) {
   }
   const Place now = !raised ? Place::ordinary : behind ? Place::behind : Place::first;
   place_.store(done ? now : *had, std::memory_order_release);
-  return done;
+  return !done ? Lift::refused : slept ? Lift::slept : Lift::done;
 }
 
 void JobWatch::drop() {

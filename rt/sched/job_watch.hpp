@@ -64,8 +64,10 @@ class JobWatch {
   /// Lets the worker, which has a reservation, go on under SCHED_FIFO: before all workers, or `behind` all of them
   /// (where that is refused, as an ordinary thread). The `owed_ns` that it owes the kernel are forgotten only with time
   /// (measured: the kernel keeps the debt of a thread that leaves and comes back). After the first job that ends when
-  /// that has passed, the worker takes its reservation back. False if the thread sleeps or the kernel refuses.
-  bool lift(int64_t now_ns, int64_t owed_ns, bool behind);
+  /// that has passed, the worker takes its reservation back. `refused`: the thread sleeps, or the kernel does.
+  /// `slept`: lifted, and asleep straight afterwards, so perhaps while it was: then its bandwidth is lost.
+  enum class Lift : uint8_t { refused, done, slept };
+  Lift lift(int64_t now_ns, int64_t owed_ns, bool behind);
   /// A lifted worker goes on as an ordinary thread from here on, unless it takes its reservation back this moment.
   void drop();
   /// By how much jobs that ended within StolenTime::kWindow_ns overran.

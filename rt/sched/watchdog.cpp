@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <cinttypes>
 #include <cstdio>
+#include <utility>
+
+#include "rt/sched/bandwidth.hpp"
 
 namespace takt {
 namespace {
@@ -16,6 +19,7 @@ Watchdog::Watchdog(const Plan& plan, RunBoard& board, const Clock& clock, std::v
       board_(board),
       clock_(clock),
       options_(options),
+      recount_(options.granted == Policy::deadline ? recount_command() : ""),
       watched_(workers.size()),
       stolen_(options.stolen_ns) {
   for (size_t w = 0; w < workers.size(); ++w) {
@@ -218,8 +222,22 @@ void Watchdog::hang(Watched& watched, const JobWatch::Running& job, int64_t now_
 }
 
 void Watchdog::lift(Watched& watched, size_t task, int64_t owed_ns, int64_t now_ns, bool behind) {
-  if (watched.worker.watch->lift(now_ns, owed_ns, behind))
-    board_.task(task).lifted.fetch_add(1, std::memory_order_relaxed);
+  const JobWatch::Lift lifted = watched.worker.watch->lift(now_ns, owed_ns, behind);
+  if (lifted == JobWatch::Lift::refused) return;
+  board_.task(task).lifted.fetch_add(1, std::memory_order_relaxed);
+  if (lifted == JobWatch::Lift::slept && !std::exchange(watched.loss_told, true)) tell_loss(task, now_ns);
+}
+
+void Watchdog::tell_loss(size_t task, int64_t now_ns) {
+  Fault fault;
+  fault.kind = Fault::bandwidth;
+  fault.task = static_cast<uint32_t>(task);
+  fault.at_ns = now_ns;
+  std::snprintf(
+      fault.what.characters.data(), fault.what.characters.size(),
+      "%s: it slept as it was taken out of its reservation, which may be lost; takt doctor tells, this ends it: %s",
+      plan_.tasks[task].name.c_str(), recount_.c_str());
+  board_.faults().append(fault);
 }
 
 void Watchdog::safe_stop(size_t task, uint64_t job, const char* why, int64_t now_ns) {

@@ -76,6 +76,7 @@ class Watchdog {
     int64_t least_budget_ns = 0;         ///< of the members whose overruns are minded; 0: there are none
     int64_t seen_cpu_ns = -1;            ///< CPU clock at the last look at a budget
     int64_t overdrawn_cpu_ns = 0;        ///< CPU clock at the last look, if the reservation was used up then
+    bool loss_told = false;              ///< of its reservation
     uint64_t miss_told = 0;              ///< serial of the last job it was told of; 0: none
     std::atomic<uint64_t> hang_told{0};  ///< the same
   };
@@ -91,6 +92,7 @@ class Watchdog {
   void safe_stop(size_t task, uint64_t job, const char* why, int64_t now_ns);
   /// `task` is the one that is late, or would be.
   void lift(Watched& watched, size_t task, int64_t owed_ns, int64_t now_ns, bool behind);
+  void tell_loss(size_t task, int64_t now_ns);
   void hang(Watched& watched, const JobWatch::Running& job, int64_t now_ns);
   Fault tell_hang(size_t task, const JobWatch::Running& job, int64_t now_ns, const char* consequence);
 
@@ -98,6 +100,7 @@ class Watchdog {
   RunBoard& board_;
   const Clock& clock_;
   const Options options_;
+  const std::string recount_;  ///< the command that ends a loss
   std::vector<Watched> watched_;
   StolenTime stolen_;
   std::vector<std::unique_ptr<Lookout>> lookouts_;  ///< last: they use all of the above

@@ -113,7 +113,7 @@ int lift_often(Work work, int count, std::mt19937& random) {
   int lifted = 0;
   for (int i = 0; worker.granted() && lifted < count && i < 100 * count; ++i) {
     pause(std::uniform_int_distribution<int64_t>(kMs / 10, 8 * kMs)(random));
-    lifted += worker.watch().lift(MonotonicClock().now_ns(), 0, i % 2 == 0);
+    lifted += worker.watch().lift(MonotonicClock().now_ns(), 0, i % 2 == 0) != JobWatch::Lift::refused;
   }
   return lifted;
 }
