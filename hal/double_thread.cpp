@@ -40,12 +40,18 @@ void DoubleThread::keep_up() {
   if (!real_time_.load(std::memory_order_relaxed) && in_real_time()) real_time_.store(true, std::memory_order_relaxed);
 }
 
+int64_t DoubleThread::late_ns() {
+  // What is due and not done counts as well: a driver that reads before it gets older data.
+  return std::max({int64_t{0}, clock_.now_ns() - due_ns_.load(), late_ns_.exchange(0)});
+}
+
 void DoubleThread::work(int64_t epoch_ns) {
   pthread_setname_np(pthread_self(), ("double:" + id_).substr(0, 15).c_str());
   take_priority(false);
   bool raised = false;
   Misbehaviour told = Misbehaviour::none;
   for (int64_t next_ns = epoch_ns; !quit_.load();) {
+    due_ns_.store(next_ns);
     const int64_t now_ns = clock_.now_ns();
     if (now_ns < next_ns) {
       std::this_thread::sleep_for(std::chrono::nanoseconds(std::min(next_ns - now_ns, kLongestSleep_ns)));
@@ -55,6 +61,7 @@ void DoubleThread::work(int64_t epoch_ns) {
     const Misbehaviour wanted = failures_.at(now_ns).value_or(Misbehaviour::none);
     if (wanted != told) device_->misbehave(told = wanted);
     device_->run_to(now_ns);
+    late_ns_.store(std::max(late_ns_.load(), clock_.now_ns() - next_ns));
     // In steps from the epoch on; those that were slept through are not made up for.
     const int64_t step_ns = device_->step_ns();
     next_ns = epoch_ns + (clock_.now_ns() - epoch_ns) / step_ns * step_ns + step_ns;

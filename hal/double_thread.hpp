@@ -29,6 +29,8 @@ class DoubleThread {
   void start(int64_t epoch_ns);
   /// In a job of the driver.
   void keep_up();
+  /// How late it was at most since the call before. One thread.
+  int64_t late_ns();
 
  private:
   void work(int64_t epoch_ns);
@@ -39,6 +41,7 @@ class DoubleThread {
   const Clock& clock_;
   std::function<void(int64_t epoch_ns)> on_start_;
   std::atomic<bool> quit_{false}, real_time_{false};
+  std::atomic<int64_t> due_ns_{INT64_MAX}, late_ns_{0};
   std::thread thread_;
 };
 

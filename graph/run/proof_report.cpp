@@ -54,6 +54,7 @@ std::string_view to_string(ExcessCause cause) {
     case ExcessCause::restart: return "restart";
     case ExcessCause::budget_overrun: return "budget_overrun";
     case ExcessCause::mode_change: return "mode_change";
+    case ExcessCause::double_late: return "double_late";
     case ExcessCause::no_message: return "no_message";
     case ExcessCause::unexplained: return "unexplained";
   }
@@ -147,7 +148,7 @@ std::vector<ProofReport::Row> ProofReport::rows_of(const std::vector<Excess>& sa
   std::map<ExcessCause, Row> rows;
   for (const Excess& sample : samples) {
     if (sample.observed_ns <= *proven.bound_ns) continue;  // within the bound of another mode
-    const ExcessCause cause = cause_of(sample);
+    const ExcessCause cause = cause_of(sample, *proven.bound_ns);
     Row& row = rows[cause];
     row.cause = cause;
     row.bound_ns = *proven.bound_ns;
@@ -168,7 +169,7 @@ std::vector<ProofReport::Row> ProofReport::rows_of(const std::vector<Excess>& sa
   return result;
 }
 
-ExcessCause ProofReport::cause_of(const Excess& sample) const {
+ExcessCause ProofReport::cause_of(const Excess& sample, int64_t bound_ns) const {
   const int64_t from_ns = begin_ns(sample), to_ns = sample.at_ns;
   const bool is_age = sample.figure != Excess::response;
   if (away_ns(facts_.stalls.stalls(), from_ns, to_ns) > facts_.proofs.stall_ns) return ExcessCause::host_stall;
@@ -177,6 +178,7 @@ ExcessCause ProofReport::cause_of(const Excess& sample) const {
   if (restarted(from_ns, to_ns)) return ExcessCause::restart;
   if (overran(from_ns, to_ns)) return ExcessCause::budget_overrun;
   if (is_age && changed_mode(from_ns, to_ns)) return ExcessCause::mode_change;
+  if (is_age && double_late(sample, bound_ns)) return ExcessCause::double_late;
   if (is_age && message_missing(sample)) return ExcessCause::no_message;
   return ExcessCause::unexplained;
 }
@@ -211,6 +213,19 @@ bool ProofReport::changed_mode(int64_t from_ns, int64_t to_ns) const {
         change != nullptr && change->from_ns >= from_ns && change->from_ns <= to_ns)
       return true;
   return false;
+}
+
+/// A real device needs no processor of this machine. Only as much as its double was late is excused.
+bool ProofReport::double_late(const Excess& sample, int64_t bound_ns) const {
+  const LateDoubleLog& log = facts_.board.late_doubles();
+  for (size_t i = 0; i < log.size(); ++i) {
+    const LateDouble* late = log.at(i);
+    if (late != nullptr && late->late_ns >= sample.observed_ns - bound_ns && late->at_ns >= begin_ns(sample) &&
+        late->at_ns <= sample.at_ns)
+      return true;
+  }
+  return log.lost() > 0 && log.size() > 0 && log.at(log.size() - 1) != nullptr &&
+         sample.at_ns >= log.at(log.size() - 1)->at_ns;
 }
 
 /// Whether some job that the age depends on published nothing: upstream of the place, up to devices.
@@ -307,6 +322,7 @@ Json ProofReport::json() const {
                          {"stall_ms", to_ms(proofs.stall_ns)},
                          {"budgets", "kept"},
                          {"messages", "one of every job"},
+                         {"doubles", "on time"},
                          {"other_programs", "no real-time threads"}};
   int64_t longest_ns = 0;
   for (const Stall& stall : facts_.stalls.stalls()) longest_ns = std::max(longest_ns, stall.away_ns);

@@ -18,6 +18,7 @@ enum class ExcessCause : uint8_t {
   restart,         ///< a process of the run was away
   budget_overrun,  ///< a job used more than its budget
   mode_change,     ///< of an age: producers began or ended
+  double_late,     ///< of an age: what plays the device on this machine was late by as much
   no_message,      ///< of an age: a job on the way published nothing
   unexplained,
 };
@@ -69,10 +70,11 @@ class ProofReport {
   graph::Proven bound_of(const Excess& sample) const;
   nlohmann::ordered_json beside_max(const graph::Proven& proven) const;
   std::vector<Row> rows_of(const std::vector<Excess>& samples) const;
-  ExcessCause cause_of(const Excess& sample) const;
+  ExcessCause cause_of(const Excess& sample, int64_t bound_ns) const;
   bool overran(int64_t from_ns, int64_t to_ns) const;
   bool restarted(int64_t from_ns, int64_t to_ns) const;
   bool changed_mode(int64_t from_ns, int64_t to_ns) const;
+  bool double_late(const Excess& sample, int64_t bound_ns) const;
   bool message_missing(const Excess& sample) const;
   bool silent(size_t task, size_t port) const;
   int64_t begin_ns(const Excess& sample) const { return sample.at_ns - sample.observed_ns - lookback_ns_; }

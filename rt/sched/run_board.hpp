@@ -112,11 +112,13 @@ class RunBoard {
   FaultLog& faults() { return shared_->faults; }
   const FaultLog& faults() const { return shared_->faults; }
 
-  /// What was seen above its proof (ProofBound), and the jobs that used more than their budgets.
+  /// What was seen above its proof (ProofBound); jobs that used more than their budgets, doubles that were late.
   ExcessLog& excesses() { return shared_->excesses; }
   const ExcessLog& excesses() const { return shared_->excesses; }
   OverrunLog& overruns() { return shared_->overruns; }
   const OverrunLog& overruns() const { return shared_->overruns; }
+  LateDoubleLog& late_doubles() { return shared_->late_doubles; }
+  const LateDoubleLog& late_doubles() const { return shared_->late_doubles; }
 
   OutageLog& outages() { return shared_->outages; }
   const OutageLog& outages() const { return shared_->outages; }
@@ -137,6 +139,7 @@ class RunBoard {
     FaultLog faults;
     ExcessLog excesses;
     OverrunLog overruns;
+    LateDoubleLog late_doubles;
     OutageLog outages;
     GroupSigns group;
     std::atomic<int64_t> epoch_ns{0};

@@ -190,6 +190,23 @@ TEST_CASE("proofs: a planted lag of a device, longer than was told, is unexplain
   CHECK(scene.exit == 1);
 }
 
+TEST_CASE("proofs: a double's lateness excuses as much and no more") {
+  Scene scene;
+  scene.source.lag_ns = 30 * kMs;
+  const Json report = scene.run(20);
+  double most_ms = 0;
+  for (const Json& row : report["proofs"]["above_proof"])
+    most_ms = std::max(most_ms, row["observed_ms"].get<double>() - row["proven_ms"].get<double>());
+  const auto excess_ns = static_cast<int64_t>(most_ms * 1e6) + 1'000;
+  const auto run = [&](int64_t late_ns) {
+    return scene.run(20, [&](int job) { scene.board->late_doubles().append({0, kEpoch + job * kPeriod, late_ns}); });
+  };
+  CHECK(above(run(excess_ns), "double_late").size() == 2);
+  CHECK(scene.exit == 0);
+  CHECK(!above(run(excess_ns - kMs), "unexplained").empty());
+  CHECK(scene.exit == 1);
+}
+
 TEST_CASE("proofs: a stall of the host breaks an assumption, and the exit code stays") {
   Scene scene;
   const auto stalled = [&](int job) { scene.source.takes_ns = job == 10 ? 60 * kMs : 10 * kMs; };
