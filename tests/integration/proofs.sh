@@ -2,9 +2,11 @@
 # Proof = run: proofs.sh TAKT SOURCE [--full] [--shard K/N]. Of graphs x profiles x isolation x policy, `takt check --json` and
 # `takt run --report` come to the same verdict and the same bounds; under a granted policy nothing unexplained is seen above them.
 # The host's stalls stand in the same row. Without --full each pair of values is in some row; with it all rows, in shards.
+# TAKT_PROOF_ROWS=some, as ctest has it: an eighth of them, another one for each TAKT_PROPERTY_SEED, which CI takes from the commit.
 # What cannot run here (a device that is missing, a policy that is refused) is shown as NOT RUN and counted.
 source "$(dirname "$0")/lib.sh" "$@"
 shift 2
+[ "${TAKT_PROOF_ROWS:-}" != some ] || set -- --shard $((${TAKT_PROPERTY_SEED:-0} % 8 + 1))/8
 rows="python3 $source/tests/tools/proof_rows.py"
 graphs=("$source"/graph/{ace,crossing,fine,lasers,people,yard}.yaml "$source/tests/faults/loads.yaml")
 case " $* " in *" --full "*) graphs+=("$source"/graph/{simulator,remote_robot,kitti,carmen}.yaml) ;; esac
@@ -76,7 +78,7 @@ graph_of '{work: 0.1ms}'
 export TAKT_MACHINE=$work/machine.json
 cat >"$TAKT_MACHINE" <<'JSON'
 {"machine": {"cpu": "any", "cores": 2, "kernel": "6.12.0 #1"}, "measured_at": "2026-11-28T08:00:00Z", "release_us": 0.1, "switch_us": 0.1,
- "publish_us": 0.1, "take_us": 0.1, "per_mb_us": 0, "enforcement_us": 4000, "demotion_us": 50, "tick_us": 4000, "deadline_bandwidth": 1.8,
+ "publish_us": 0.1, "take_us": 0.1, "per_mb_us": 0, "enforcement_us": 4000, "demotion_us": 50, "look_us": 0.1, "tick_us": 4000, "deadline_bandwidth": 1.8,
  "worst": {"release_us": 0.1, "switch_us": 0.1, "publish_us": 0.1, "take_us": 0.1}}
 JSON
 planted "a wrong overhead" "age at source.output -> reader.input"
