@@ -44,7 +44,7 @@ bool DeviceNode::running(Job& job) {
 }
 
 bool DeviceNode::accept(ReadStatus status, Job& job, bool marks_damage, bool repeated) {
-  if (double_) job.double_late(double_->late_ns());
+  if (double_) job.source_late(double_->late_ns());
   judge(status, job, repeated);
   if (status == ReadStatus::end_of_data) {
     job.end_of_data();

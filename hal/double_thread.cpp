@@ -61,7 +61,9 @@ void DoubleThread::work(int64_t epoch_ns) {
     const Misbehaviour wanted = failures_.at(now_ns).value_or(Misbehaviour::none);
     if (wanted != told) device_->misbehave(told = wanted);
     device_->run_to(now_ns);
-    late_ns_.store(std::max(late_ns_.load(), clock_.now_ns() - next_ns));
+    const int64_t late_ns = clock_.now_ns() - next_ns;
+    for (int64_t told_ns = late_ns_.load(); told_ns < late_ns && !late_ns_.compare_exchange_weak(told_ns, late_ns);) {
+    }
     // In steps from the epoch on; those that were slept through are not made up for.
     const int64_t step_ns = device_->step_ns();
     next_ns = epoch_ns + (clock_.now_ns() - epoch_ns) / step_ns * step_ns + step_ns;

@@ -99,8 +99,9 @@ class Job {
   /// Says how what this job reads from outside the run stands; the mode of the run may depend on it. Said by each job
   /// that knows; without a word the state stays as it was.
   void source_state(const SourceReport& report) { source_ = report; }
-  /// How late what plays the source on this machine was, at most, since the job before. No proof allows for that.
-  void double_late(int64_t late_ns) { double_late_ns_ = late_ns; }
+  /// How late its source was, at most, since the job before, if that needs a processor of this machine as real ones do
+  /// not. No proof allows for it.
+  void source_late(int64_t late_ns) { source_late_ns_ = late_ns; }
   /// Says that what this node publishes is worse than it looks, or wrong, and why: kept among the faults of the run.
   /// Once when it begins, not in each job. One word a job, cut at 160 characters.
   void results_doubtful(std::string_view why) { notice_.emplace(ResultNotice{false, BoundedText<160>(why)}); }
@@ -118,7 +119,7 @@ class Job {
   bool ended() const { return end_of_data_; }
   bool without_result() const { return no_result_; }
   const std::optional<SourceReport>& source_report() const { return source_; }
-  int64_t double_late_ns() const { return double_late_ns_; }
+  int64_t source_late_ns() const { return source_late_ns_; }
   const std::optional<ResultNotice>& result_notice() const { return notice_; }
   /// In a replay.
   void answer_from(RecordedAnswers& recorded) { recorded_ = &recorded; }
@@ -134,7 +135,7 @@ class Job {
   std::string_view mode_;
   RecordedAnswers* recorded_ = nullptr;
   bool end_of_data_ = false, no_result_ = false;
-  int64_t double_late_ns_ = 0;
+  int64_t source_late_ns_ = 0;
   std::optional<SourceReport> source_;
   std::optional<ResultNotice> notice_;
 };

@@ -153,7 +153,7 @@ std::vector<ProofReport::Row> ProofReport::rows_of(const std::vector<Excess>& sa
     row.cause = cause;
     row.bound_ns = *proven.bound_ns;
     ++row.samples;
-    row.of = samples_of(sample).count();
+    row.of = kept_of(sample).samples.count();
     if (sample.observed_ns > row.largest.observed_ns) row.largest = sample;
     row.stall_ns = std::max(row.stall_ns, away_ns(facts_.stalls.stalls(), begin_ns(sample), sample.at_ns));
   }
@@ -161,7 +161,7 @@ std::vector<ProofReport::Row> ProofReport::rows_of(const std::vector<Excess>& sa
   for (auto& [cause, row] : rows) result.push_back(row);
   if (result.empty()) return result;
   Row& worst = result.back();  // in the order of the causes
-  worst.samples += noted(samples.front()).above() - samples.size();
+  worst.samples += kept_of(samples.front()).bound.above() - samples.size();
   if (worst.cause == ExcessCause::unexplained && facts_.proofs.basis != graph::OverheadBasis::worst) {
     worst.chance = graph::chance_of(worst.samples, worst.of, kShareAbove);
     if (worst.chance >= kUnlikely) worst.cause = ExcessCause::quantile;
@@ -217,9 +217,9 @@ bool ProofReport::changed_mode(int64_t from_ns, int64_t to_ns) const {
 
 /// A real device needs no processor of this machine. Only as much as its double was late is excused.
 bool ProofReport::double_late(const Excess& sample, int64_t bound_ns) const {
-  const LateDoubleLog& log = facts_.board.late_doubles();
+  const LateSourceLog& log = facts_.board.late_sources();
   for (size_t i = 0; i < log.size(); ++i) {
-    const LateDouble* late = log.at(i);
+    const LateSource* late = log.at(i);
     if (late != nullptr && late->late_ns >= sample.observed_ns - bound_ns && late->at_ns >= begin_ns(sample) &&
         late->at_ns <= sample.at_ns)
       return true;
@@ -263,22 +263,20 @@ bool ProofReport::silent(size_t task, size_t port) const {
          s.reused.load() > 0;
 }
 
-const ProofBound& ProofReport::noted(const Excess& sample) const {
+ProofReport::Kept ProofReport::kept_of(const Excess& sample) const {
   switch (sample.figure) {
-    case Excess::response: return facts_.board.task(sample.index).response_bound;
-    case Excess::input_age: return facts_.board.edge(sample.index, sample.edge).age_bound;
+    case Excess::response: {
+      const TaskStatistics& task = facts_.board.task(sample.index);
+      return {task.response_bound, task.response};
+    }
+    case Excess::input_age: {
+      const EdgeStatistics& edge = facts_.board.edge(sample.index, sample.edge);
+      return {edge.age_bound, edge.age};
+    }
     case Excess::output_age: break;
   }
-  return facts_.board.port(sample.index).age_bound;
-}
-
-const Histogram& ProofReport::samples_of(const Excess& sample) const {
-  switch (sample.figure) {
-    case Excess::response: return facts_.board.task(sample.index).response;
-    case Excess::input_age: return facts_.board.edge(sample.index, sample.edge).age;
-    case Excess::output_age: break;
-  }
-  return facts_.board.port(sample.index).age;
+  const PortStatistics& port = facts_.board.port(sample.index);
+  return {port.age_bound, port.age};
 }
 
 std::string ProofReport::name_of(const Excess& sample) const {
@@ -297,7 +295,7 @@ uint64_t ProofReport::figures() const {
   uint64_t count = 0;
   const auto add = [&](Excess::Figure figure, size_t index, size_t edge) {
     const Excess sample{figure, static_cast<uint32_t>(index), static_cast<uint32_t>(edge), 0, 0};
-    count += bound_of(sample).bound_ns && samples_of(sample).count() > 0;
+    count += bound_of(sample).bound_ns && kept_of(sample).samples.count() > 0;
   };
   for (size_t t = 0; t < facts_.plan.tasks.size(); ++t) {
     add(Excess::response, t, 0);

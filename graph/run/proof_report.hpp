@@ -65,6 +65,12 @@ class ProofReport {
     double chance = 0;  ///< that so many or more are above a 99th percentile
   };
 
+  /// What the board has of a sample's figure.
+  struct Kept {
+    const ProofBound& bound;
+    const Histogram& samples;
+  };
+
   bool compared() const { return not_compared_.empty(); }
   graph::Proven largest(const std::function<graph::Proven(size_t)>& of_mode) const;
   graph::Proven bound_of(const Excess& sample) const;
@@ -78,8 +84,7 @@ class ProofReport {
   bool message_missing(const Excess& sample) const;
   bool silent(size_t task, size_t port) const;
   int64_t begin_ns(const Excess& sample) const { return sample.at_ns - sample.observed_ns - lookback_ns_; }
-  const ProofBound& noted(const Excess& sample) const;
-  const Histogram& samples_of(const Excess& sample) const;
+  Kept kept_of(const Excess& sample) const;
   std::string name_of(const Excess& sample) const;
   uint64_t figures() const;
 

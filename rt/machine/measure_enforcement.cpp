@@ -123,11 +123,8 @@ Answer watchdog_overrun() {
   constexpr int kSamples = 300, kWatched = 40, kWatching = 60;
   prepare_process_memory();
   const CpuLatencyHold latency = hold_cpu_dma_latency();
-  Reservation watching;
-  watching.policy = Policy::fixed;
-  watching.priority = kWatching;
   Answer answer;
-  answer.granted = apply(watching).policy == Policy::fixed;
+  answer.granted = apply(fixed_reservation(kWatching)).policy == Policy::fixed;
   if (!answer.granted) return answer;
   Spinner spinner(kWatched);
   answer.granted = spinner.raised();
@@ -170,11 +167,7 @@ class LookedAt {
 
  private:
   void work(int looks, int priority, int core) {
-    Reservation wanted;
-    wanted.policy = Policy::fixed;
-    wanted.priority = priority;
-    wanted.core = core;
-    granted_ = apply(wanted).verified && pthread_getcpuclockid(pthread_self(), &clock_) == 0;
+    granted_ = apply(fixed_reservation(priority, core)).verified && pthread_getcpuclockid(pthread_self(), &clock_) == 0;
     holes_ns_.reserve(static_cast<size_t>(looks));
     set_and_wake(ready_, 1);
     int seen = 0;
@@ -202,14 +195,11 @@ Answer watchdog_look() {
   constexpr int kSamples = 300, kWatched = 40, kWatching = 60;
   prepare_process_memory();
   const CpuLatencyHold latency = hold_cpu_dma_latency();
-  Reservation watching;
-  watching.policy = Policy::fixed;
-  watching.priority = kWatching;
-  watching.core = sched_getcpu();
+  const int core = sched_getcpu();
   Answer answer;
-  answer.granted = apply(watching).verified;
+  answer.granted = apply(fixed_reservation(kWatching, core)).verified;
   if (!answer.granted) return answer;
-  LookedAt watched(kSamples, kWatched, watching.core);
+  LookedAt watched(kSamples, kWatched, core);
   answer.granted = watched.granted();
   for (int i = 0; answer.granted && i < kSamples; ++i) {
     sleep_until(now_ns() + kMs);

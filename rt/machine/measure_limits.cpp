@@ -52,11 +52,7 @@ int64_t preemptions() {
 /// Spins in bursts, so that a real-time thread leaves something to others.
 void watch_cpu(int cpu, int64_t window_ns, Stalls& stalls) {
   constexpr int64_t kBurst = 45 * kMs, kPause = 5 * kMs;
-  Reservation wanted;
-  wanted.policy = Policy::fixed;
-  wanted.priority = 1;
-  wanted.core = cpu;
-  apply(wanted);
+  apply(fixed_reservation(1, cpu));
   for (const int64_t end = now_ns() + window_ns; now_ns() < end;) {
     int64_t before = preemptions();
     const int64_t begin = now_ns();

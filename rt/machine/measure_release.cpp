@@ -67,13 +67,7 @@ ReleaseCost release_cost() {
   return {Policy::cooperative, lateness_under(Policy::cooperative).value_or(Spread{})};
 }
 
-bool pin_and_raise(int cpu) {
-  Reservation wanted;
-  wanted.policy = Policy::fixed;
-  wanted.priority = 80;
-  wanted.core = cpu;
-  return apply(wanted).policy == Policy::fixed;
-}
+bool pin_and_raise(int cpu) { return apply(fixed_reservation(80, cpu)).policy == Policy::fixed; }
 
 SwitchCost switch_cost() {
   prepare_process_memory();

@@ -77,10 +77,7 @@ struct Answer {
 Answer transfer_costs(Transport& transport) {
   Answer answer;
   answer.carried = true;
-  Reservation wanted;  // as a job would: not preempted by what is not real-time
-  wanted.policy = Policy::fixed;
-  wanted.priority = 80;
-  apply(wanted);
+  apply(fixed_reservation(80));  // as a job would: not preempted by what is not real-time
   for (size_t i = 0; i < kTransferBytes.size(); ++i) answer.costs[i] = transfer_cost(transport, i);
   apply_default();
   return answer;

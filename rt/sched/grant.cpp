@@ -150,6 +150,14 @@ Reservation cooperative_reservation() {
   return r;
 }
 
+Reservation fixed_reservation(int priority, int core) {
+  Reservation r;
+  r.policy = Policy::fixed;
+  r.priority = priority;
+  r.core = core;
+  return r;
+}
+
 Reservation deadline_reservation(int64_t budget_ns, int64_t deadline_ns, int64_t period_ns) {
   Reservation r;
   r.policy = Policy::deadline;

@@ -48,6 +48,9 @@ struct Grant {
 /// p99 of releases: 0.67 ms, with turns of 0.5 ms 2.0 ms, as the kernel chooses them (1.4 ms) 2.7 ms.
 Reservation cooperative_reservation();
 
+/// SCHED_FIFO of that priority, 1..99. `core`: the only CPU; -1: any.
+Reservation fixed_reservation(int priority, int core = -1);
+
 /// SCHED_DEADLINE parameters for a lane of that budget, deadline and period. The reservation period is the deadline, or
 /// 0.95 of the period where they are equal: a longer one is replenished on a grid of its own and throttles releases
 /// that fall before it (measured: up to 27 ms late).

@@ -25,18 +25,18 @@ struct Overrun {
   int64_t release_ns = 0, finish_ns = 0;
 };
 
-/// What plays the source of a task was late: a thread of this machine, which no proof allows for.
-struct LateDouble {
+/// The source of a task was late, which no proof allows for (Job::source_late()).
+struct LateSource {
   static constexpr int64_t kShortest_ns = 500'000;
   uint32_t task = 0;
   int64_t at_ns = 0;    ///< end of the job that was told
   int64_t late_ns = 0;  ///< since the job before
 };
 
-inline constexpr size_t kMostExcesses = 2048, kMostOverruns = 1024, kMostLateDoubles = 4096;
+inline constexpr size_t kMostExcesses = 2048, kMostOverruns = 1024, kMostLateSources = 4096;
 using ExcessLog = AppendLog<Excess, kMostExcesses>;
 using OverrunLog = AppendLog<Overrun, kMostOverruns>;
-using LateDoubleLog = AppendLog<LateDouble, kMostLateDoubles>;
+using LateSourceLog = AppendLog<LateSource, kMostLateSources>;
 
 /// Upper bound of one figure, and its samples above that. One thread compares; anybody reads.
 class ProofBound {

@@ -112,13 +112,13 @@ class RunBoard {
   FaultLog& faults() { return shared_->faults; }
   const FaultLog& faults() const { return shared_->faults; }
 
-  /// What was seen above its proof (ProofBound); jobs that used more than their budgets, doubles that were late.
+  /// What was seen above its proof (ProofBound); jobs that used more than their budgets, sources that were late.
   ExcessLog& excesses() { return shared_->excesses; }
   const ExcessLog& excesses() const { return shared_->excesses; }
   OverrunLog& overruns() { return shared_->overruns; }
   const OverrunLog& overruns() const { return shared_->overruns; }
-  LateDoubleLog& late_doubles() { return shared_->late_doubles; }
-  const LateDoubleLog& late_doubles() const { return shared_->late_doubles; }
+  LateSourceLog& late_sources() { return shared_->late_sources; }
+  const LateSourceLog& late_sources() const { return shared_->late_sources; }
 
   OutageLog& outages() { return shared_->outages; }
   const OutageLog& outages() const { return shared_->outages; }
@@ -139,7 +139,7 @@ class RunBoard {
     FaultLog faults;
     ExcessLog excesses;
     OverrunLog overruns;
-    LateDoubleLog late_doubles;
+    LateSourceLog late_sources;
     OutageLog outages;
     GroupSigns group;
     std::atomic<int64_t> epoch_ns{0};

@@ -31,11 +31,7 @@ int64_t overlap_ns(int64_t from_ns, int64_t to_ns, int64_t other_from_ns, int64_
 /// False if the kernel refused.
 bool become(int priority, int core) {
   prefault_stack();
-  Reservation wanted;
-  wanted.policy = Policy::fixed;
-  wanted.priority = priority;
-  wanted.core = core;
-  return apply(wanted).error == 0;
+  return apply(fixed_reservation(priority, core)).error == 0;
 }
 
 }  // namespace

@@ -150,7 +150,7 @@ TAKT_HOT int64_t Task::begin(uint64_t index, int64_t release_ns, int64_t duratio
   ended_.end.end_of_data = job.ended();
   ended_.no_result = job.without_result();
   ended_.source = job.source_report();
-  ended_.double_late_ns = job.double_late_ns();
+  ended_.source_late_ns = job.source_late_ns();
   if (!modelled_) return 0;
   ended_.used = take_thread_use();
   const double cost = plan_.node->levels()[static_cast<size_t>(ended_.level)].cost;
@@ -289,8 +289,8 @@ void Task::count_end() {
   else if (over_budget && plan_.on_overrun == OnOverrun::safe_stop) ask_for_safe_stop("budget exceeded");
   const int64_t from_ns = end.finished_ns + (modelled_ ? 0 : ModeLog::kLead_ns);
   if (ended_.source) board_.tell_source(index_, ended_.index, *ended_.source, end.finished_ns, from_ns);
-  if (ended_.double_late_ns >= LateDouble::kShortest_ns)
-    board_.late_doubles().append({static_cast<uint32_t>(index_), end.finished_ns, ended_.double_late_ns});
+  if (ended_.source_late_ns >= LateSource::kShortest_ns)
+    board_.late_sources().append({static_cast<uint32_t>(index_), end.finished_ns, ended_.source_late_ns});
   const bool skip = end.late && plan_.on_miss == OnMiss::skip, reuse = end.late && plan_.on_miss == OnMiss::reuse_last;
   std::atomic<uint64_t>& counter = skip ? statistics_.skipped : reuse ? statistics_.reused : statistics_.completed;
   add(counter);

@@ -133,7 +133,7 @@ class Task {
     JobEnd end;
     ThreadUse used;
     std::optional<SourceReport> source;
-    int64_t double_late_ns = 0;
+    int64_t source_late_ns = 0;
   } ended_;
   std::vector<int64_t> sent_stamps_ns_;  ///< of the same job, per output; kNothingSent
   static constexpr int64_t kNothingSent = INT64_MIN;

@@ -35,7 +35,7 @@ Watchdog::Watchdog(const Plan& plan, RunBoard& board, const Clock& clock, std::v
     watched.own_lookout = watched.least_budget_ns > 0 && watched.worker.has.priority > 0;
   }
   Reservation wanted;
-  if (options.priority > 0) wanted.policy = Policy::fixed, wanted.priority = options.priority;
+  if (options.priority > 0) wanted = fixed_reservation(options.priority);
   lookouts_.push_back(
       std::make_unique<Lookout>("takt-watchdog", wanted, clock, [this](int64_t now_ns) { return look(now_ns); }));
   for (Watched& watched : watched_) {

@@ -77,11 +77,7 @@ class Probe {
 
  private:
   void watch(int core) {
-    Reservation wanted;
-    wanted.policy = Policy::fixed;
-    wanted.priority = 98;
-    wanted.core = core;
-    apply(wanted);
+    apply(fixed_reservation(98, core));
     const MonotonicClock clock;
     for (int64_t at_ns = clock.now_ns(); !end_.load();) {
       at_ns += kStep_ns;
@@ -320,9 +316,7 @@ int main(int argc, char** argv) {
   const analysis::Overheads overheads = overheads_here(facts);  // forks: before there are threads
   prepare_process_memory();
   const CpuLatencyHold latency = hold_cpu_dma_latency();
-  Reservation above;
-  above.policy = Policy::fixed;
-  above.priority = kHighestPriority + 1;
+  const Reservation above = fixed_reservation(kHighestPriority + 1);
   if (bool granted = false; std::thread([&] { granted = apply(above).verified; }).join(), !granted) {
     std::puts("NOT RUN: SCHED_FIFO is refused to this user");
     return 77;

@@ -199,7 +199,7 @@ TEST_CASE("proofs: a double's lateness excuses as much and no more") {
     most_ms = std::max(most_ms, row["observed_ms"].get<double>() - row["proven_ms"].get<double>());
   const auto excess_ns = static_cast<int64_t>(most_ms * 1e6) + 1'000;
   const auto run = [&](int64_t late_ns) {
-    return scene.run(20, [&](int job) { scene.board->late_doubles().append({0, kEpoch + job * kPeriod, late_ns}); });
+    return scene.run(20, [&](int job) { scene.board->late_sources().append({0, kEpoch + job * kPeriod, late_ns}); });
   };
   CHECK(above(run(excess_ns), "double_late").size() == 2);
   CHECK(scene.exit == 0);
