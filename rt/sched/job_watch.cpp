@@ -78,7 +78,10 @@ std::optional<JobWatch::Place> JobWatch::claim_place() {
 void JobWatch::settle_down() {
   if (MonotonicClock().now_ns() < lifted_until_ns_.load(std::memory_order_relaxed)) return;
   const std::optional<Place> had = claim_place();
-  if (had) place_.store(restore_thread(has_) ? Place::own : *had, std::memory_order_release);
+  if (!had) return;
+  const Place now = restore_thread(has_) ? Place::own : *had;
+  Place moving = Place::moving;  // no longer, if it was rescued meanwhile
+  place_.compare_exchange_strong(moving, now, std::memory_order_acq_rel);
 }
 
 JobWatch::Running JobWatch::running() const {
@@ -137,6 +140,15 @@ JobWatch::Lift JobWatch::lift(int64_t now_ns, int64_t owed_ns, bool behind) {
   const Place now = !raised ? Place::ordinary : behind ? Place::behind : Place::first;
   place_.store(done ? now : *had, std::memory_order_release);
   return !done ? Lift::refused : slept ? Lift::slept : Lift::done;
+}
+
+JobWatch::Lift JobWatch::rescue(int64_t now_ns, bool behind) {
+  const int thread = thread_.load(std::memory_order_acquire);
+  if (!runnable(thread) || !lift_thread(thread, behind ? kLowestPriority : kHighestPriority)) return Lift::refused;
+  lifted_until_ns_.store(now_ns + 2 * has_.period_ns, std::memory_order_release);
+  // It runs again already, and may be through with taking its reservation back: what it noted of that is out of date.
+  place_.store(behind ? Place::behind : Place::first, std::memory_order_release);
+  return runnable(thread) ? Lift::done : Lift::slept;
 }
 
 void JobWatch::drop() {

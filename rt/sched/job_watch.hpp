@@ -56,6 +56,7 @@ class JobWatch {
   int64_t cpu_ns() const;
   /// Runtime of its reservation; 0: it has none.
   int64_t runtime_ns() const { return runtime_ns_.load(std::memory_order_acquire); }
+  int64_t period_ns() const { return has_.period_ns; }
   /// Reading of its CPU clock at which a whole runtime is used since it rested.
   int64_t reserve_end_ns() const { return rested_cpu_ns_.load(std::memory_order_acquire) + runtime_ns(); }
   /// Puts the worker behind everybody else until its job ends; false if job `serial` ended or was demoted before, or
@@ -68,6 +69,10 @@ class JobWatch {
   /// `slept`: lifted, and asleep straight afterwards, so perhaps while it was: then its bandwidth is lost.
   enum class Lift : uint8_t { refused, done, slept };
   Lift lift(int64_t now_ns, int64_t owed_ns, bool behind);
+  /// Lifts a worker that the kernel does not run any more, though it has work and a reservation (see judge_reserve()):
+  /// whatever it was about to do, falling asleep and taking its reservation back included. It goes on from there, and
+  /// takes its reservation back after two periods.
+  Lift rescue(int64_t now_ns, bool behind);
   /// A lifted worker goes on as an ordinary thread from here on, unless it takes its reservation back this moment.
   void drop();
   /// By how much jobs that ended within StolenTime::kWindow_ns overran.
@@ -77,6 +82,8 @@ class JobWatch {
   /// Where, if it is: before all workers, behind them, or as an ordinary thread.
   bool first() const { return place() == Place::first; }
   bool ordinary() const { return place() == Place::ordinary; }
+  /// It takes its reservation back this moment. For the thread that lifts.
+  bool returns() const { return place() == Place::moving; }
   /// Notes that the overrun of job `serial` was told; false if the job ended before, was demoted or told already.
   bool tell(uint64_t serial);
 

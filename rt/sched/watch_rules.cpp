@@ -68,16 +68,16 @@ WatchVerdict judge(const WatchRules& rules, const WatchSight& sight) {
 }
 
 ReserveVerdict judge_reserve(const ReserveSight& sight) {
-  constexpr int64_t kLifted_ns = 50'000'000;  // between two looks where nothing can be done now
-  if (sight.lifted) return {false, sight.now_ns + kLifted_ns};
+  if (sight.lifted) return {false, false, sight.now_ns + kReserveRest_ns};
   const int64_t soonest_ns = sight.release_ns + sight.runtime_ns;
-  if (sight.now_ns < soonest_ns) return {false, soonest_ns};
+  if (sight.now_ns < soonest_ns) return {false, false, soonest_ns};
+  if (sight.stood_ns > 4 * sight.period_ns + kForgotten_ns) return {false, true, sight.now_ns + kReserveRest_ns};
   const bool in_time = sight.now_ns <= sight.release_ns + sight.deadline_ns;
-  if (sight.low && !in_time) return {false, sight.now_ns + kLifted_ns};
+  if (sight.low && !in_time) return {false, false, sight.now_ns + kReserveRest_ns};
   // One that owes too much waits for its next replenishment: nothing is to be seen soon there either.
   if (sight.used_up() && sight.stands)
-    return {sight.owed_ns - sight.left_ns <= sight.deadline_ns, sight.now_ns + kLifted_ns};
-  return {false, sight.now_ns + std::max(sight.left_ns, kReserveGrain_ns)};
+    return {sight.owed_ns - sight.left_ns <= sight.deadline_ns, false, sight.now_ns + kReserveRest_ns};
+  return {false, false, sight.now_ns + std::max(sight.left_ns, kReserveGrain_ns)};
 }
 
 }  // namespace takt

@@ -19,7 +19,10 @@ Watchdog::Watchdog(const Plan& plan, RunBoard& board, const Clock& clock, std::v
       board_(board),
       clock_(clock),
       options_(options),
-      recount_(options.granted == Policy::deadline ? recount_command() : ""),
+      loss_(options.granted == Policy::deadline ? "it slept as it was taken out of its reservation, which may be lost; "
+                                                  "takt doctor tells, this ends it: " +
+                                                      recount_command()
+                                                : ""),
       watched_(workers.size()),
       stolen_(options.stolen_ns) {
   for (size_t w = 0; w < workers.size(); ++w) {
@@ -158,7 +161,8 @@ int64_t Watchdog::look_at_reserve(Watched& watched, int64_t now_ns) {
   sight.release_ns = job.serial != 0 ? job.release_ns : watch.expected_ns();
   sight.deadline_ns = watched.rules[member].deadline_ns;
   sight.runtime_ns = watch.runtime_ns();
-  sight.lifted = watch.lifted();
+  sight.period_ns = watch.period_ns();
+  sight.lifted = watch.lifted() && !watch.returns();
   sight.low = watched.low;
   if (!sight.lifted && now_ns >= sight.release_ns + sight.runtime_ns) {
     const int64_t cpu_ns = watch.cpu_ns();
@@ -166,9 +170,17 @@ int64_t Watchdog::look_at_reserve(Watched& watched, int64_t now_ns) {
     sight.owed_ns = watch.owed_ns(now_ns);
     sight.stands = cpu_ns == watched.overdrawn_cpu_ns;
     watched.overdrawn_cpu_ns = sight.used_up() ? cpu_ns : 0;
+    // Where the host stopped all of this, the time in between says nothing.
+    const int64_t watched_ns = std::min(now_ns - std::max(watched.stood_at_ns, sight.release_ns), kReserveRest_ns);
+    watched.stood_ns = cpu_ns == watched.stood_cpu_ns ? watched.stood_ns + std::max<int64_t>(watched_ns, 0) : 0;
+    watched.stood_cpu_ns = cpu_ns;
+    watched.stood_at_ns = now_ns;
+    sight.stood_ns = watched.stood_ns;
   }
   const ReserveVerdict verdict = judge_reserve(sight);
-  if (verdict.lift) lift(watched, watched.worker.tasks[member], sight.owed_ns - sight.left_ns, now_ns, watched.low);
+  const size_t task = watched.worker.tasks[member];
+  if (verdict.lift) lift(watched, task, sight.owed_ns - sight.left_ns, now_ns, watched.low);
+  if (verdict.rescue) rescue(watched, task, now_ns);
   return verdict.look_again_ns;
 }
 
@@ -225,18 +237,27 @@ void Watchdog::lift(Watched& watched, size_t task, int64_t owed_ns, int64_t now_
   const JobWatch::Lift lifted = watched.worker.watch->lift(now_ns, owed_ns, behind);
   if (lifted == JobWatch::Lift::refused) return;
   board_.task(task).lifted.fetch_add(1, std::memory_order_relaxed);
-  if (lifted == JobWatch::Lift::slept && !std::exchange(watched.loss_told, true)) tell_loss(task, now_ns);
+  if (lifted == JobWatch::Lift::slept && !std::exchange(watched.loss_told, true))
+    tell_bandwidth(task, now_ns, loss_.c_str());
 }
 
-void Watchdog::tell_loss(size_t task, int64_t now_ns) {
+void Watchdog::rescue(Watched& watched, size_t task, int64_t now_ns) {
+  const int64_t stood_ns = std::exchange(watched.stood_ns, 0);
+  if (watched.worker.watch->rescue(now_ns, watched.low) == JobWatch::Lift::refused) return;
+  board_.task(task).lifted.fetch_add(1, std::memory_order_relaxed);
+  char what[120];
+  std::snprintf(what, sizeof what, "the kernel did not run it for %" PRId64 " ms; it goes on beside its reservation",
+                stood_ns / 1'000'000);
+  tell_bandwidth(task, now_ns, what);
+}
+
+void Watchdog::tell_bandwidth(size_t task, int64_t now_ns, const char* what) {
   Fault fault;
   fault.kind = Fault::bandwidth;
   fault.task = static_cast<uint32_t>(task);
   fault.at_ns = now_ns;
-  std::snprintf(
-      fault.what.characters.data(), fault.what.characters.size(),
-      "%s: it slept as it was taken out of its reservation, which may be lost; takt doctor tells, this ends it: %s",
-      plan_.tasks[task].name.c_str(), recount_.c_str());
+  std::snprintf(fault.what.characters.data(), fault.what.characters.size(), "%s: %s", plan_.tasks[task].name.c_str(),
+                what);
   board_.faults().append(fault);
 }
 

@@ -76,6 +76,9 @@ class Watchdog {
     int64_t least_budget_ns = 0;         ///< of the members whose overruns are minded; 0: there are none
     int64_t seen_cpu_ns = -1;            ///< CPU clock at the last look at a budget
     int64_t overdrawn_cpu_ns = 0;        ///< CPU clock at the last look, if the reservation was used up then
+    int64_t stood_cpu_ns = -1;           ///< CPU clock at the last look at a reservation
+    int64_t stood_at_ns = 0;             ///< when that was
+    int64_t stood_ns = 0;                ///< for how long it has shown the same
     bool loss_told = false;              ///< of its reservation
     uint64_t miss_told = 0;              ///< serial of the last job it was told of; 0: none
     std::atomic<uint64_t> hang_told{0};  ///< the same
@@ -86,13 +89,14 @@ class Watchdog {
   /// The look of a lane's own watchdog.
   int64_t look_at_budget(Watched& watched, int64_t now_ns);
   int64_t look_at_reserve(Watched& watched, int64_t now_ns);
+  void rescue(Watched& watched, size_t task, int64_t now_ns);
   /// The job may have ended since it was seen: nothing is done to one that has.
   void overrun(Watched& watched, const JobWatch::Running& job, int64_t now_ns);
   void act(Watched& watched, const JobWatch::Running& job, const WatchVerdict& verdict, int64_t now_ns);
   void safe_stop(size_t task, uint64_t job, const char* why, int64_t now_ns);
   /// `task` is the one that is late, or would be.
   void lift(Watched& watched, size_t task, int64_t owed_ns, int64_t now_ns, bool behind);
-  void tell_loss(size_t task, int64_t now_ns);
+  void tell_bandwidth(size_t task, int64_t now_ns, const char* what);
   void hang(Watched& watched, const JobWatch::Running& job, int64_t now_ns);
   Fault tell_hang(size_t task, const JobWatch::Running& job, int64_t now_ns, const char* consequence);
 
@@ -100,7 +104,7 @@ class Watchdog {
   RunBoard& board_;
   const Clock& clock_;
   const Options options_;
-  const std::string recount_;  ///< the command that ends a loss
+  const std::string loss_;  ///< what is told of bandwidth that may be lost, and the command that ends that
   std::vector<Watched> watched_;
   StolenTime stolen_;
   std::vector<std::unique_ptr<Lookout>> lookouts_;  ///< last: they use all of the above

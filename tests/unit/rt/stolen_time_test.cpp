@@ -135,6 +135,19 @@ TEST_CASE("a reservation that is used up: the worker is lifted once it stands, a
     sight.lifted = true;
     CHECK_FALSE(judge_reserve(sight).lift);
   }
+  SUBCASE("forgotten by the kernel, whatever it owes and however late") {
+    sight.low = true;
+    sight.period_ns = 50 * kMs;
+    sight.now_ns = 600 * kMs;
+    sight.owed_ns = 1000 * kMs;
+    sight.stood_ns = 4 * sight.period_ns + kForgotten_ns;
+    CHECK_FALSE(judge_reserve(sight).rescue);
+    sight.stood_ns += 1;
+    CHECK(judge_reserve(sight).rescue);
+    CHECK_FALSE(judge_reserve(sight).lift);
+    sight.lifted = true;
+    CHECK_FALSE(judge_reserve(sight).rescue);
+  }
   SUBCASE("late, as one of high criticality") {
     sight.now_ns = 151 * kMs;
     CHECK(judge_reserve(sight).lift);
