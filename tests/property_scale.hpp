@@ -49,20 +49,23 @@ T rounds(T n) {
   return std::max(T{1}, static_cast<T>(std::ceil(static_cast<double>(n) * property_scale())));
 }
 
-/// Least number of finds where it is k at scale 1. Fewer rounds vary more: below scale 1 half of the share of k is
-/// asked for, less three standard deviations of so many independent finds.
+/// Whether the numbers drawn are those on which the bounds of a property were set.
+inline bool as_written() { return property_scale() >= 1 && !property_seed(); }
+
+/// Least number of finds where it is k at scale 1 with the seeds of the sources. Fewer rounds and other seeds vary: there
+/// half of the share of k is asked for, less three standard deviations of so many independent finds.
 template <std::integral T>
 T at_scale(T k) {
-  const double scale = property_scale(), share = static_cast<double>(k) * scale;
-  const double least = scale >= 1 ? share : share / 2 - 3 * std::sqrt(share / 2);
+  const double share = static_cast<double>(k) * property_scale();
+  const double least = as_written() ? share : share / 2 - 3 * std::sqrt(share / 2);
   return static_cast<T>(std::max(0.0, std::floor(least)));
 }
 
-/// Most of n that may be exceptions where it is that share at scale 1; below it with room for what few rounds vary.
+/// Most of n that may be exceptions where it is that share in the same case; otherwise with room for what they vary.
 template <std::integral T>
 T at_most(T n, double share) {
   const double most = static_cast<double>(n) * share;
-  return static_cast<T>(property_scale() >= 1 ? most : most + 3 * std::sqrt(most) + 1);
+  return static_cast<T>(as_written() ? most : most + 3 * std::sqrt(most) + 1);
 }
 
 /// Seed of a generator that is k by default; with TAKT_PROPERTY_SEED another one for each k (splitmix64).

@@ -79,7 +79,10 @@ inline void check_laser_scanner(LaserScanner& laser, const LaserPace& pace = {})
   laser.close();
 }
 
-inline void check_camera_head(CameraHead& head, const Pace& pace = no_pace) {
+/// Where an emulated machine stretches the time between sending and arrival, ages say nothing.
+enum class Ages : uint8_t { bounded, stretched };
+
+inline void check_camera_head(CameraHead& head, const Pace& pace = no_pace, Ages ages = Ages::bounded) {
   REQUIRE(head.open().has_value());
   CHECK(head.read(kDeviceEpoch, INT64_MAX).status == ReadStatus::no_data);
   REQUIRE(head.start(kDeviceEpoch).has_value());
@@ -103,7 +106,7 @@ inline void check_camera_head(CameraHead& head, const Pace& pace = no_pace) {
     head.command(0.5, -0.2, at);
     reading = head.read(at, INT64_MAX);
     REQUIRE(reading.status == ReadStatus::ok);
-    check_age(head, reading.stamp_ns, at);
+    if (ages == Ages::bounded) check_age(head, reading.stamp_ns, at);
     fastest = std::max(fastest, std::abs(reading.pan_rad - previous) / 0.02);
     previous = reading.pan_rad;
   }
@@ -152,7 +155,7 @@ inline void check_interaction(Interaction& person, const Pace& pace = no_pace) {
 }
 
 /// `obeys`: the base takes velocity commands (a simulated one may drive a path instead).
-inline void check_mobile_base(MobileBase& base, bool obeys, const Pace& pace = no_pace) {
+inline void check_mobile_base(MobileBase& base, bool obeys, const Pace& pace = no_pace, Ages ages = Ages::bounded) {
   REQUIRE(base.open().has_value());
   CHECK(base.read(kDeviceEpoch, INT64_MAX).status == ReadStatus::no_data);
   REQUIRE(base.start(kDeviceEpoch).has_value());
@@ -174,7 +177,7 @@ inline void check_mobile_base(MobileBase& base, bool obeys, const Pace& pace = n
       if (repeat) CHECK(base.command(speed, 0.0, at) == obeys);
       const BaseReading now = base.read(at, INT64_MAX);
       REQUIRE(now.status == ReadStatus::ok);
-      check_age(base, now.stamp_ns, at);
+      if (ages == Ages::bounded) check_age(base, now.stamp_ns, at);
       CHECK(now.epoch == epoch);
       CHECK(std::abs(now.speed_m_s) <= limits.speed_m_s * 1.02);
       CHECK(std::abs(now.speed_m_s - before.speed_m_s) <= limits.acceleration_m_s2 * 0.02 * 1.05 + 1e-9);

@@ -103,14 +103,16 @@ using BaseBus = Bus<base::CanBase, base::BaseDouble>;
 
 void check_head_on(const char* host, const char* device) {
   HeadBus bus(host, device);
-  test::check_camera_head(bus.driver, bus.pace_and_wait(host, head::messages()[head::kPosStatus]));
+  test::check_camera_head(bus.driver, bus.pace_and_wait(host, head::messages()[head::kPosStatus]),
+                          test::Ages::stretched);
   CHECK(bus.driver.station().counters().damaged == 0);
   CHECK(bus.driver.station().counters().foreign == 0);  // the kernel's filter lets nothing else through
 }
 
 void check_base_on(const char* host, const char* device) {
   BaseBus bus(host, device);
-  test::check_mobile_base(bus.driver, true, bus.pace_and_wait(host, base::messages()[base::kWheels]));
+  test::check_mobile_base(bus.driver, true, bus.pace_and_wait(host, base::messages()[base::kWheels]),
+                          test::Ages::stretched);
   CHECK(bus.driver.station().counters().damaged == 0);
 }
 

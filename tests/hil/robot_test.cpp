@@ -177,7 +177,10 @@ TEST_CASE("hil: takt run on all devices, three of them pulled and put back") {
   const auto all_well = [&] {
     return std::all_of(pulled.begin(), pulled.end(), [&](const auto& name) { return devices.well(name); });
   };
-  REQUIRE(devices.until(all_well));
+  if (!devices.until(all_well)) {
+    run.stop();
+    FAIL(run.output());
+  }
   const auto before = devices.losses();
   const auto lost = [&](const std::string& name) { return devices.losses()[name] == before.at(name) + 1; };
   eyes.reset();

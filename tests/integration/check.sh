@@ -105,4 +105,21 @@ schedule named 's/^policy: deadline/policy: fixed/' 's/^(  stereo: \{rate: 15)/\
 check 0 named
 schedule none 's/^policy: deadline/policy: fixed/' 's/^(  stereo: \{rate: 15)/\1, core: 2/'
 expect 2 "which is none of the schedule's; valid are: 0, 1" "$takt" check "$source/graph/ace.yaml" --schedule "$work/schedules/none.yaml"
+
+# Each graph of the project is admitted in each of its profiles: an analysis that becomes stricter refuses none unnoticed.
+walked=0
+while read -r graph; do
+  for profile in $(python3 -c "import sys; sys.path.insert(0, '$source/tests/tools'); import proof_rows; print(*proof_rows.profiles('$graph'))"); do
+    chosen=()
+    [ "$profile" = - ] || chosen=(--profile "$profile")
+    "$takt" check "$graph" "${chosen[@]}" >"$work/stdout" 2>"$work/stderr"
+    case $? in
+      0) walked=$((walked + 1)) ;;
+      3) echo "NOT RUN: $graph $profile: $(head -n 1 "$work/stderr")" ;;
+      *) fail "$graph $profile: $(head -n 3 "$work/stdout" "$work/stderr")" ;;
+    esac
+  done
+done < <(grep -rl --include='*.yaml' '^subsystems:' "$source"/{graph,tests,bench})
+echo "$walked graphs and profiles admitted"
+[ $walked -ge 30 ] || fail "only $walked graphs were found"
 finish
