@@ -12,7 +12,8 @@ import json, os, subprocess, sys, tempfile
 
 takt, root, args = sys.argv[1], sys.argv[2], sys.argv[3:]
 repeats = int(args[0]) if args else 50
-writer = [(step, "stereo.disparity", None) for step in ("after_loan", "half_written", "inside_publish", "after_publish")]
+writer = [(step, "stereo.disparity", None) for step in ("after_loan", "half_written", "inside_publish", "after_publish",
+                                                              "inside_commit", "after_commit")]
 reader = [(step, "obstacle_stop.stop", "semantic") for step in ("while_held", "inside_release")]
 known = ["local", "iceoryx"], [step for step, _, _ in writer + reader]
 if unknown := [a for a in args[1:] if a not in known[0] + known[1]]:

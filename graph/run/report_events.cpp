@@ -20,6 +20,7 @@ std::string_view to_string(uint32_t kind) {
     case Fault::back: return "back";
     case Fault::doubtful: return "doubtful";
     case Fault::wrong: return "wrong";
+    case Fault::spoiled: return "spoiled";
     case Fault::bandwidth: return "bandwidth";
   }
   return "";

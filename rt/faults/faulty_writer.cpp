@@ -2,16 +2,18 @@
 #include "rt/faults/faulty_writer.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "rt/faults/damage.hpp"
 #include "rt/msg/scalar.hpp"
+#include "rt/shm/commit_ring.hpp"
 
 namespace takt::faults {
 namespace {
 
 constexpr size_t kMostListed = 64;
 
-void add(std::atomic<uint64_t>& counter) { counter.fetch_add(1, std::memory_order_relaxed); }
+void add(std::atomic<uint64_t>& counter, uint64_t by = 1) { counter.fetch_add(by, std::memory_order_relaxed); }
 
 }  // namespace
 
@@ -78,25 +80,52 @@ MessageHeader* FaultyWriter::loan() {
 
 void FaultyWriter::publish(int64_t stamp_ns, int64_t published_ns, int64_t visible_at_ns) {
   if (loaned_ == nullptr) return;
-  Draft draft;
-  draft.number = offered_.fetch_add(1, std::memory_order_relaxed) + 1;
-  draft.stamp_ns = stamp_ns;
-  draft.published_ns = published_ns;
-  draft.visible_at_ns = visible_at_ns;
+  strike_and_send({.stamp_ns = stamp_ns, .published_ns = published_ns, .visible_at_ns = visible_at_ns});
+  conclude(true);
+  hoard(published_ns);
+}
+
+void FaultyWriter::announce(int64_t stamp_ns, uint32_t commit, int64_t delay_ns) {
+  if (loaned_ == nullptr) return;
+  strike_and_send({.stamp_ns = stamp_ns, .published_ns = clock_.now_ns(), .visible_at_ns = delay_ns, .commit = commit});
+}
+
+void FaultyWriter::settle(int64_t published_ns, int64_t visible_at_ns) {
+  inner_->settle(published_ns, visible_at_ns);
+  conclude(visible_at_ns != CommitRing::kNever);
+  hoard(published_ns);
+}
+
+void FaultyWriter::strike_and_send(Draft draft) {
+  offers_ = true;
   for (Strike& strike : strikes_)
     if (!draft.withheld) apply(strike, draft);
   send(draft);
-  hoard(published_ns);
+}
+
+void FaultyWriter::conclude(bool visible) {
+  if (visible && offers_) add(offered_);
+  for (Strike& strike : strikes_) {
+    const Strike::Doing doing = std::exchange(strike.doing, {});
+    // What was held back is gone once it is out; what a withdrawn job had held back it had not made.
+    const bool kept_now = strike.fault.kind == MessageFaultKind::reorder && doing.struck > 0;
+    if (visible ? doing.gave_kept : kept_now) strike.kept.forget();
+    if (!visible) continue;
+    add(strike.count->struck, doing.struck);
+    add(strike.count->withheld, doing.withheld);
+    add(strike.count->added, doing.added);
+  }
+  offers_ = false;
 }
 
 void FaultyWriter::apply(Strike& strike, Draft& draft) {
   const MessageFault& fault = strike.fault;
   const bool covered = covers(strike, draft.published_ns);
   if (fault.kind == MessageFaultKind::freeze && !covered) strike.kept.forget();
-  const bool struck = covered && strikes(fault, draft.number);
+  const bool struck = covered && strikes(fault, number());
   if (fault.kind == MessageFaultKind::reorder) return swap(strike, draft, struck);
   if (!struck) return;
-  const uint64_t seed = mixed(fault.seed, fault.port, ~draft.number);
+  const uint64_t seed = mixed(fault.seed, fault.port, ~number());
   const MessageType& type = *strike.type;
   switch (fault.kind) {
     case MessageFaultKind::drop: draft.withheld = true; break;
@@ -113,14 +142,14 @@ void FaultyWriter::apply(Strike& strike, Draft& draft) {
     case MessageFaultKind::reorder:
     case MessageFaultKind::exhaust: return;  // strikes elsewhere
   }
-  add(strike.count->struck);
-  if (fault.kind == MessageFaultKind::drop) add(strike.count->withheld);
+  ++strike.doing.struck;
+  if (fault.kind == MessageFaultKind::drop) ++strike.doing.withheld;
 }
 
 void FaultyWriter::freeze(Strike& strike, Draft& draft) {
   if (!strike.kept.full()) return strike.kept.keep(loaned_ + 1, draft.stamp_ns);
   strike.kept.write_to(loaned_ + 1);
-  add(strike.count->struck);
+  ++strike.doing.struck;
 }
 
 void FaultyWriter::swap(Strike& strike, Draft& draft, bool struck) {
@@ -131,8 +160,8 @@ void FaultyWriter::swap(Strike& strike, Draft& draft, bool struck) {
   if (!struck) return;
   strike.kept.keep(loaned_ + 1, draft.stamp_ns);
   draft.withheld = true;
-  add(strike.count->struck);
-  add(strike.count->withheld);
+  ++strike.doing.struck;
+  ++strike.doing.withheld;
 }
 
 void FaultyWriter::send(const Draft& draft) {
@@ -140,19 +169,29 @@ void FaultyWriter::send(const Draft& draft) {
   loaned_ = nullptr;
   if (draft.withheld) return inner_->discard();
   const int32_t level = loaned->level;
-  inner_->publish(draft.stamp_ns, draft.published_ns, draft.visible_at_ns);
-  if (draft.twice != nullptr && inner_->repeat(draft.published_ns, draft.visible_at_ns)) add(draft.twice->count->added);
+  put(draft, draft.stamp_ns);
+  if (draft.twice != nullptr && put_again(draft)) ++draft.twice->doing.added;
   if (draft.released_after != nullptr) follow_up(*draft.released_after, draft, level);
 }
 
+void FaultyWriter::put(const Draft& draft, int64_t stamp_ns) {
+  if (draft.commit != 0) inner_->announce(stamp_ns, draft.commit, draft.visible_at_ns);
+  else inner_->publish(stamp_ns, draft.published_ns, draft.visible_at_ns);
+}
+
+bool FaultyWriter::put_again(const Draft& draft) {
+  if (draft.commit != 0) return inner_->announce_again(draft.commit, draft.visible_at_ns);
+  return inner_->repeat(draft.published_ns, draft.visible_at_ns);
+}
+
 void FaultyWriter::follow_up(Strike& strike, const Draft& draft, int32_t level) {
-  strike.kept.forget();
+  strike.doing.gave_kept = true;
   MessageHeader* header = inner_->loan();
   if (header == nullptr) return;  // it stays withheld, and is counted so
   strike.kept.write_to(header + 1);
   header->level = level;
-  inner_->publish(strike.kept.stamp_ns(), draft.published_ns, draft.visible_at_ns);
-  add(strike.count->added);
+  put(draft, strike.kept.stamp_ns());
+  ++strike.doing.added;
 }
 
 void FaultyWriter::discard() {
@@ -161,21 +200,28 @@ void FaultyWriter::discard() {
 }
 
 bool FaultyWriter::repeat(int64_t published_ns, int64_t visible_at_ns) {
+  const bool repeated = strike_and_send_again({.published_ns = published_ns, .visible_at_ns = visible_at_ns});
+  conclude(true);
+  return repeated;
+}
+
+bool FaultyWriter::announce_again(uint32_t commit, int64_t delay_ns) {
+  return strike_and_send_again({.published_ns = clock_.now_ns(), .visible_at_ns = delay_ns, .commit = commit});
+}
+
+bool FaultyWriter::strike_and_send_again(Draft draft) {
   // A message that is not the node's own work: the windows that keep messages away hold for it, too.
-  const uint64_t number = offered_.load(std::memory_order_relaxed) + 1;
-  bool repeated = false;
-  MessageFaultCount* dropped = nullptr;
+  Strike* dropped = nullptr;
   for (Strike& strike : strikes_) {
-    if (!covers(strike, published_ns) || !strikes(strike.fault, number)) continue;
-    if (strike.fault.kind == MessageFaultKind::delay) visible_at_ns += strike.fault.by_ns;
-    if (strike.fault.kind == MessageFaultKind::drop) dropped = strike.count;
+    if (!covers(strike, draft.published_ns) || !strikes(strike.fault, number())) continue;
+    if (strike.fault.kind == MessageFaultKind::delay) draft.visible_at_ns += strike.fault.by_ns;
+    if (strike.fault.kind == MessageFaultKind::drop) dropped = &strike;
   }
-  if (dropped == nullptr) repeated = inner_->repeat(published_ns, visible_at_ns);
-  if (dropped == nullptr && !repeated) return false;
-  offered_.fetch_add(1, std::memory_order_relaxed);
-  if (dropped == nullptr) return true;
-  add(dropped->struck);
-  add(dropped->withheld);
+  const bool repeated = dropped == nullptr && put_again(draft);
+  offers_ = repeated || dropped != nullptr;
+  if (dropped == nullptr) return repeated;
+  ++dropped->doing.struck;
+  ++dropped->doing.withheld;
   return false;
 }
 

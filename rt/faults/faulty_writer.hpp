@@ -53,6 +53,11 @@ class FaultyWriter final : public Writer {
     MessageFaultCount* count = nullptr;
     KeptMessage kept;  ///< of freeze and reorder
     Hoard hoard;       ///< of exhaust
+    /// What it does to the message under way, which may yet be taken back.
+    struct Doing {
+      uint64_t struck = 0, withheld = 0, added = 0;
+      bool gave_kept = false;  ///< what it held back goes out with this one
+    } doing;
   };
 
   FaultyWriter(std::unique_ptr<Writer> inner, std::vector<Strike> strikes, const Clock& clock,
@@ -61,6 +66,10 @@ class FaultyWriter final : public Writer {
 
   MessageHeader* loan() override;
   void publish(int64_t stamp_ns, int64_t published_ns, int64_t visible_at_ns) override;
+  bool announces() const override { return inner_->announces(); }
+  void announce(int64_t stamp_ns, uint32_t commit, int64_t delay_ns) override;
+  bool announce_again(uint32_t commit, int64_t delay_ns) override;
+  void settle(int64_t published_ns, int64_t visible_at_ns) override;
   void discard() override;
   bool repeat(int64_t published_ns, int64_t visible_at_ns) override;
   WriterStatistics statistics() const override { return inner_->statistics(); }
@@ -69,17 +78,23 @@ class FaultyWriter final : public Writer {
  private:
   /// A message on its way, and what the faults have made of it.
   struct Draft {
-    uint64_t number = 0;  ///< from 1 on
     int64_t stamp_ns = 0, published_ns = 0, visible_at_ns = 0;
+    uint32_t commit = 0;               ///< 0: published at once; else visible_at_ns is the delay after it
     bool withheld = false;             ///< not published
     Strike* twice = nullptr;           ///< ... by this fault
     Strike* released_after = nullptr;  ///< the message it holds back follows this one
   };
   bool covers(const Strike& strike, int64_t now_ns) const;
+  uint64_t number() const { return offered_.load(std::memory_order_relaxed) + 1; }
+  void strike_and_send(Draft draft);
+  bool strike_and_send_again(Draft draft);
   void apply(Strike& strike, Draft& draft);
   void swap(Strike& strike, Draft& draft, bool struck);
   void freeze(Strike& strike, Draft& draft);
   void send(const Draft& draft);
+  void put(const Draft& draft, int64_t stamp_ns);
+  bool put_again(const Draft& draft);
+  void conclude(bool visible);
   void follow_up(Strike& strike, const Draft& draft, int32_t level);
   void hoard(int64_t now_ns);
 
@@ -89,6 +104,7 @@ class FaultyWriter final : public Writer {
   const std::atomic<int64_t>& epoch_ns_;
   std::atomic<uint64_t>& offered_;
   MessageHeader* loaned_ = nullptr;
+  bool offers_ = false;  ///< a message is under way
 };
 
 }  // namespace takt::faults

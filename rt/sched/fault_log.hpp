@@ -14,6 +14,7 @@ struct Fault {
     back,       ///< it does again
     doubtful,   ///< a job said that the results of its node are worse than they look
     wrong,      ///< a job said that they are wrong
+    spoiled,    ///< the commit word of its outputs held what nobody writes there
     bandwidth,  ///< what the kernel reserved for the task's thread may be lost
   };
   Kind kind = hang;

@@ -13,13 +13,14 @@ namespace {
 using Candidates = std::array<Candidate, InputPort::kMaxDepth>;
 }
 
-Latch::Latch(const TaskPlan& plan, Transport& transport, RunBoard& board, size_t task)
+Latch::Latch(const TaskPlan& plan, Transport& transport, RunBoard& board, size_t task, const Clock& clock)
     : excesses_(board.excesses()), task_(static_cast<uint32_t>(task)) {
   for (const EdgePlan& edge : plan.edges) {
     Edge& e = edges_.emplace_back();
     e.plan = edge;
     e.input = plan.node->inputs()[edge.input];
     e.reader = transport.make_reader(edge.port);
+    if (CommitRing* commits = board.commits_of_port(edge.port)) e.reader->set_commits(*commits, clock);
     e.requests = e.input == plan.node->control();
     e.statistics = &board.edge(task, edges_.size() - 1);
     e.last_seen = e.statistics->last_seen;

@@ -14,7 +14,7 @@ class InputPort;
 class Latch {
  public:
   /// Counts into the board's edges of task `task`.
-  Latch(const TaskPlan& plan, Transport& transport, RunBoard& board, size_t task);
+  Latch(const TaskPlan& plan, Transport& transport, RunBoard& board, size_t task, const Clock& clock);
   /// Fills only the input `control`, where there is one: what decides whether a job takes place at all.
   void acquire_requests(int64_t release_ns, int64_t now_ns);
   /// Fills the node's other inputs for a job released at `release_ns` that starts at `now_ns`; returns how many are

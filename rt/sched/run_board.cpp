@@ -31,7 +31,7 @@ T* RunBoard::place(std::byte*& at, size_t count) {
 }
 
 RunBoard::RunBoard(const Plan& plan, size_t processes)
-    : process_count_(processes), safe_stop_mode_(plan.safe_stop), mode_rules_(plan.mode_rules) {
+    : process_count_(processes), safe_stop_mode_(plan.safe_stop), mode_rules_(plan.mode_rules), producers_(plan) {
   size_t edges = 0;
   for (const TaskPlan& task : plan.tasks) {
     first_edge_.push_back(edges);
@@ -41,9 +41,9 @@ RunBoard::RunBoard(const Plan& plan, size_t processes)
   }
   const size_t tasks = plan.tasks.size(), ports = plan.ports.size();
   bytes_ = room_for<Shared>(1) + room_for<TaskStatistics>(tasks) + room_for<EdgeStatistics>(edges) +
-           room_for<PortStatistics>(ports) + room_for<GrantRecord>(tasks) + room_for<ParamMail>(tasks) +
-           room_for<CapacityRecord>(ports) + room_for<ProcessRecord>(processes) + room_for<SourceRecord>(tasks) +
-           room_for<SourceFacts>(tasks);
+           room_for<PortStatistics>(ports) + room_for<GrantRecord>(tasks) + room_for<CommitRing>(tasks) +
+           room_for<ParamMail>(tasks) + room_for<CapacityRecord>(ports) + room_for<ProcessRecord>(processes) +
+           room_for<SourceRecord>(tasks) + room_for<SourceFacts>(tasks);
   void* memory = mmap(nullptr, bytes_, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS | MAP_POPULATE, -1, 0);
   if (memory == MAP_FAILED)
     throw std::runtime_error("shared memory of " + std::to_string(bytes_) + " bytes: " + std::strerror(errno));
@@ -53,6 +53,7 @@ RunBoard::RunBoard(const Plan& plan, size_t processes)
   edges_ = place<EdgeStatistics>(at, edges);
   ports_ = place<PortStatistics>(at, ports);
   grants_ = place<GrantRecord>(at, tasks);
+  commits_ = place<CommitRing>(at, tasks);
   mail_ = place<ParamMail>(at, tasks);
   capacities_ = place<CapacityRecord>(at, ports);
   processes_ = place<ProcessRecord>(at, processes);

@@ -14,6 +14,7 @@
 #include "rt/sched/source_record.hpp"
 #include "rt/sched/statistics.hpp"
 #include "rt/sched/stop_signal.hpp"
+#include "rt/shm/commit_ring.hpp"
 #include "rt/shm/kill_order.hpp"
 
 namespace takt {
@@ -88,6 +89,12 @@ class RunBoard {
   const PortStatistics& port(size_t p) const { return ports_[p]; }
   void set_grant(size_t t, const Grant& grant);
   Grant grant(size_t t) const;
+  /// Of the jobs of a task.
+  CommitRing& commits(size_t t) { return commits_[t]; }
+  /// Of the jobs that make what a port carries; null: nobody makes it.
+  CommitRing* commits_of_port(size_t p) {
+    return producers_.find(p) == kNone ? nullptr : &commits_[producers_.find(p)];
+  }
   ParamMail& mail(size_t t) { return mail_[t]; }
   CapacityRecord& capacity(size_t p) { return capacities_[p]; }
   SourceFacts& source_facts(size_t t) { return source_facts_[t]; }
@@ -159,11 +166,13 @@ class RunBoard {
   std::vector<std::string> task_names_;
   std::vector<char> has_source_;  ///< by task: a hardware node
   ModeRules mode_rules_;
+  PortProducers producers_;
   Shared* shared_ = nullptr;
   TaskStatistics* tasks_ = nullptr;
   EdgeStatistics* edges_ = nullptr;
   PortStatistics* ports_ = nullptr;
   GrantRecord* grants_ = nullptr;
+  CommitRing* commits_ = nullptr;
   ParamMail* mail_ = nullptr;
   CapacityRecord* capacities_ = nullptr;
   ProcessRecord* processes_ = nullptr;

@@ -50,7 +50,8 @@ Task::Task(const Plan& plan, size_t index, Transport& transport, const Clock& cl
       board_(board),
       index_(index),
       statistics_(board.task(index)),
-      latch_(plan_, transport, board, index),
+      commits_(board.commits(index)),
+      latch_(plan_, transport, board, index, clock),
       quality_(levels_of(plan_), plan_.budget_ns, plan_.deadline_ns),
       published_(plan_.ports.size()),
       sequences_(plan_.ports.size()),
@@ -62,8 +63,12 @@ Task::Task(const Plan& plan, size_t index, Transport& transport, const Clock& cl
   calls_.heap_limit = plan_.memory_bytes;
   for (const ModePlan& mode : plan.modes) modes_.push_back({mode.name, mode.runs[index] != 0});
   if (modes_.empty()) modes_.push_back({plan.mode, true});
+  // What a task of this name that died had not settled, so that nobody meets two unsettled commits.
+  const CommitRing::Filled left = commits_.recover(clock_);
+  spoiled_told_ = commits_.spoiled();
   for (size_t i = 0; i < plan_.ports.size(); ++i) {
     writers_.push_back(transport.make_writer(plan_.ports[i]));
+    writers_.back()->settle(left.published_ns, left.visible_at_ns);
     sequences_[i] = writers_.back()->go_on_after(board.port(plan_.ports[i]).published.load());
     PortAccess::attach(*plan_.node->outputs()[i], writers_.back().get());
   }
@@ -127,6 +132,8 @@ TAKT_HOT int64_t Task::begin(uint64_t index, int64_t release_ns, int64_t duratio
   // Which releases a mode leaves out is known from outside, but for those that a producer causes.
   if (!mode.runs) return pass_over(started, !plan_.rate), 0;
   if (plan_.disturbance != nullptr && !plan_.disturbance->admits(release_ns)) return pass_over(started, false), 0;
+  // Nothing that follows is looked at before the clock has come to the release (shm/commit_ring.hpp).
+  std::atomic_thread_fence(std::memory_order_seq_cst);
   latch_.acquire_requests(release_ns, started);
   if (!wanted(index)) {
     latch_.release();
@@ -328,16 +335,6 @@ void Task::count_level(int64_t response_ns) {
   quality_.observe({ended_.release_ns, ended_.exec_ns, response_ns, ended_.no_result});
 }
 
-TAKT_HOT void Task::publish(JobEnd& end, int64_t deadline_ns) {
-  // The instant of publication is read once per job: all outputs of a job become visible together.
-  const int64_t now = clock_.now_ns();
-  end.late = now > deadline_ns;
-  end.visible_at_ns = plan_.publish == PublishAt::let ? std::max(now, deadline_ns) : now;
-  for (size_t i = 0; i < writers_.size(); ++i) settle_output(i, end.late, now, end.visible_at_ns);
-  ended_.published_ns = now;
-  ended_.publish_took_ns = clock_.now_ns() - end.finished_ns;
-}
-
 void Task::forget_from(int64_t end_ns) {
   for (Outcome& outcome : outcomes_) {
     if (outcome.counter == nullptr || outcome.release_ns < end_ns) continue;
@@ -345,30 +342,6 @@ void Task::forget_from(int64_t end_ns) {
     if (outcome.late) statistics_.deadline_misses.fetch_sub(1);
     outcome.counter = nullptr;
   }
-}
-
-void Task::settle_output(size_t i, bool late, int64_t now_ns, int64_t visible_at_ns) {
-  OutputPort& output = *plan_.node->outputs()[i];
-  Writer& writer = *writers_[i];
-  published_[i] = false;
-  sent_stamps_ns_[i] = kNothingSent;
-  const auto count_publication = [&] {
-    board_.port(plan_.ports[i]).published.store(sequences_[i] + 1, std::memory_order_relaxed);
-  };
-  const bool withheld = late && (plan_.on_miss == OnMiss::skip || plan_.on_miss == OnMiss::reuse_last);
-  if (PortAccess::sent(output) && !withheld) {
-    PortAccess::set_level(output, ended_.level);
-    count_publication();
-    writer.publish(PortAccess::stamp_ns(output), now_ns, visible_at_ns);
-    published_[i] = true;
-    sent_stamps_ns_[i] = PortAccess::stamp_ns(output);
-  } else {
-    writer.discard();
-    if (withheld && plan_.on_miss == OnMiss::reuse_last) published_[i] = writer.repeat(now_ns, visible_at_ns);
-    if (published_[i]) count_publication();
-  }
-  if (published_[i]) ++sequences_[i];
-  PortAccess::reset(output);
 }
 
 bool Task::published(size_t port) const {

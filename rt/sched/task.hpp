@@ -96,6 +96,14 @@ class Task {
   bool wanted(uint64_t index) const;
   void take_mail();
   void publish(JobEnd& end, int64_t deadline_ns);
+  /// What a commit is of: the messages that the job made, or the former ones again.
+  enum class Offer : uint8_t { made, former };
+  CommitRing::Filled commit(const CommitRing::Terms& terms, Offer offer);
+  void announce(size_t output, uint32_t commit, Offer offer);
+  void settle_output(size_t output, const CommitRing::Filled& out, Offer offer);
+  void pass(MessageStep step) const;
+  /// Tells that a commit word was overwritten.
+  void tell_spoiled();
   void count_end();
   void trace_param(const ParamMail& mail) const;
   void trace_start() const;
@@ -104,7 +112,6 @@ class Task {
   void ask_for_safe_stop(const char* why);
   void count_level(int64_t response_ns);
   void count_age(size_t port, int64_t visible_at_ns, int64_t stamp_ns);
-  void settle_output(size_t output, bool late, int64_t now_ns, int64_t visible_at_ns);
 
   const TaskPlan plan_;
   const Clock& clock_;
@@ -116,7 +123,8 @@ class Task {
   JobWatch* watch_ = nullptr;
   uint32_t member_ = 0;
   JobCalls calls_;
-  uint64_t jobs_run_ = 0;
+  uint64_t jobs_run_ = 0, spoiled_told_ = 0;
+  CommitRing& commits_;
   Latch latch_;
   QualityControl quality_;
   std::vector<std::unique_ptr<Writer>> writers_;

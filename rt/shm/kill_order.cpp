@@ -7,8 +7,9 @@
 
 namespace takt {
 namespace {
-constexpr std::array<std::string_view, kMessageSteps> kNames = {
-    "none", "after_loan", "half_written", "inside_publish", "after_publish", "while_held", "inside_release"};
+constexpr std::array<std::string_view, kMessageSteps> kNames = {"none",           "after_loan",    "half_written",
+                                                                "inside_publish", "after_publish", "inside_commit",
+                                                                "after_commit",   "while_held",    "inside_release"};
 }  // namespace
 
 std::string_view to_string(MessageStep step) { return kNames[static_cast<size_t>(step)]; }
@@ -19,8 +20,9 @@ std::optional<MessageStep> message_step(std::string_view name) {
   return std::nullopt;
 }
 
-void detail::obey(KillOrder& order, std::byte* message, size_t bytes) {
-  const MessageStep step = order.step.load();
+void detail::obey(KillOrder& order, MessageStep step, size_t port, std::byte* message, size_t bytes) {
+  if (const auto hook = step_hook.load()) hook(step, port);
+  if (order.step.load(std::memory_order_acquire) != step || order.port.load(std::memory_order_relaxed) != port) return;
   for (uint32_t left = order.passes.load(); left > 0;)
     if (order.passes.compare_exchange_weak(left, left - 1)) return;
   order.step.store(MessageStep::none);  // whoever takes this process's place has no such order

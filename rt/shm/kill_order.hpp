@@ -15,11 +15,13 @@ enum class MessageStep : uint32_t {
   after_loan,      ///< the writer has a chunk and has written nothing
   half_written,    ///< ... and has written half of it
   inside_publish,  ///< the message is on its way: readers may or may not find it
-  after_publish,   ///< it is out
+  after_publish,   ///< it is out, or announced and waits for the commit of its job
+  inside_commit,   ///< all outputs of the job are announced, and become visible together or never
+  after_commit,    ///< they have become so; this one is about to be settled
   while_held,      ///< a reader has it
   inside_release,  ///< a reader is giving it back
 };
-inline constexpr size_t kMessageSteps = 7;
+inline constexpr size_t kMessageSteps = 9;
 /// The most instants that one step has: those of `inside_publish` in the runtime's own pools.
 inline constexpr uint32_t kInstantsOfStep = 3;
 std::string_view to_string(MessageStep step);
@@ -36,11 +38,16 @@ struct KillOrder {
 
 namespace detail {
 inline constinit std::atomic<KillOrder*> kill_order{nullptr};
-void obey(KillOrder& order, std::byte* message, size_t bytes);
+inline constinit std::atomic<void (*)(MessageStep, size_t)> step_hook{nullptr};
+void obey(KillOrder& order, MessageStep step, size_t port, std::byte* message, size_t bytes);
 }  // namespace detail
 
 /// The order that this process obeys from now on; null: none. It must live until the process ends.
 inline void obey_orders(KillOrder* order) { detail::kill_order.store(order, std::memory_order_release); }
+
+/// For tests: called at every step, with its port, in a process that obeys an order (of `none`, say). Null: not any
+/// more.
+inline void at_every_step(void (*hook)(MessageStep step, size_t port)) { detail::step_hook.store(hook); }
 
 /// Whether this process dies the next time it comes to that step of that port.
 inline bool about_to_die(MessageStep step, size_t port) {
@@ -51,10 +58,8 @@ inline bool about_to_die(MessageStep step, size_t port) {
 
 /// A writer or reader of `port` is at `step`. `message` and `bytes`: what half_written scribbles over. Any thread.
 inline void reached(MessageStep step, size_t port, void* message = nullptr, size_t bytes = 0) {
-  KillOrder* order = detail::kill_order.load(std::memory_order_relaxed);
-  if (order == nullptr || order->step.load(std::memory_order_acquire) != step) return;
-  if (order->port.load(std::memory_order_relaxed) == port)
-    detail::obey(*order, static_cast<std::byte*>(message), bytes);
+  if (KillOrder* order = detail::kill_order.load(std::memory_order_relaxed))
+    detail::obey(*order, step, port, static_cast<std::byte*>(message), bytes);
 }
 
 }  // namespace takt

@@ -43,12 +43,15 @@ void LocalPool::evict(PoolSlot& slot) const {
   if (!in_ring(chunk)) drop(chunk, PoolState::kRing);  // else a repeated message, which another slot still names
 }
 
-void LocalPool::announce(uint32_t chunk, int64_t stamp_ns, int64_t visible_at_ns) const {
+void LocalPool::announce(uint32_t chunk, int64_t stamp_ns, int64_t visible_at_ns, uint32_t commit,
+                         int64_t delay_ns) const {
   const uint64_t sequence = state_->newest.load(std::memory_order_relaxed) + 1;
   PoolSlot& place = slot(sequence);
   evict(place);
   reached(MessageStep::inside_publish, index_);
   place.chunk.store(chunk);
+  place.commit.store(commit);
+  place.delay_ns.store(delay_ns);
   place.stamp_ns.store(stamp_ns);
   place.visible_at_ns.store(visible_at_ns);
   hold(chunk, PoolState::kRing);
@@ -58,6 +61,19 @@ void LocalPool::announce(uint32_t chunk, int64_t stamp_ns, int64_t visible_at_ns
   state_->newest.store(sequence);
   drop(chunk, PoolState::kWriter);
   reached(MessageStep::after_publish, index_);
+}
+
+uint64_t LocalPool::first_announced() const {
+  uint64_t first = state_->newest.load(std::memory_order_relaxed) + 1;
+  while (first > 1 && slot(first - 1).sequence.load() == first - 1 && slot(first - 1).commit.load() != 0) --first;
+  return first;
+}
+
+void LocalPool::withdraw(uint64_t first) const {
+  const uint64_t newest = state_->newest.load(std::memory_order_relaxed);
+  state_->newest.store(first - 1);  // before the slots: reclaim() finds what is left of them
+  for (uint64_t s = newest; s >= first; --s)
+    if (slot(s).sequence.load() == s) evict(slot(s));
 }
 
 uint32_t LocalPool::claim_reader(uint32_t process) const {

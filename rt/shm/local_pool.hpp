@@ -20,8 +20,10 @@ namespace takt {
 struct PoolSlot {
   std::atomic<uint64_t> sequence{0};  ///< 0 while empty or being changed
   std::atomic<uint32_t> chunk{0};
+  std::atomic<uint32_t> commit{0};  ///< of the job that announced it; 0: settled
   std::atomic<int64_t> stamp_ns{0};
-  std::atomic<int64_t> visible_at_ns{0};
+  std::atomic<int64_t> visible_at_ns{0};  ///< once it is settled
+  std::atomic<int64_t> delay_ns{0};       ///< before: how long after its commit
 };
 
 /// One per port.
@@ -89,8 +91,13 @@ class LocalPool {
   }
   uint32_t in_use() const;
 
-  /// Publishes a chunk that the writer holds, as the next message. The writer holds it no longer afterwards.
-  void announce(uint32_t chunk, int64_t stamp_ns, int64_t visible_at_ns) const;
+  /// Publishes a chunk that the writer holds, as the next message; under a commit it only announces it, see PoolSlot.
+  /// The writer holds it no longer afterwards.
+  void announce(uint32_t chunk, int64_t stamp_ns, int64_t visible_at_ns, uint32_t commit, int64_t delay_ns) const;
+  /// Number of the oldest message that is not settled: one more than the newest if there is none.
+  uint64_t first_announced() const;
+  /// Takes back the messages from that one on: none of them has been visible.
+  void withdraw(uint64_t first) const;
   /// Empties a slot.
   void evict(PoolSlot& slot) const;
 

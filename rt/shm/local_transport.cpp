@@ -12,9 +12,11 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <limits>
 #include <stdexcept>
 #include <vector>
 
+#include "rt/shm/commit_ring.hpp"
 #include "rt/shm/kill_order.hpp"
 #include "rt/shm/local_pool.hpp"
 
@@ -22,6 +24,7 @@ namespace takt {
 namespace {
 
 constexpr uint32_t kNoChunk = 0xffffffff;
+constexpr uint32_t kSettled = 0;  // no commit
 
 /// Places parts one after the other, each on a cache line of its own; without memory it only counts.
 class Carver {
@@ -66,12 +69,32 @@ class LocalWriter final : public Writer {
   void publish(int64_t stamp_ns, int64_t published_ns, int64_t visible_at_ns) override {
     if (loaned_ == kNoChunk) return;
     MessageHeader* header = pool_.header(loaned_);
-    header->stamp_ns = stamp_ns;
     header->published_ns = published_ns;
     header->visible_at_ns = visible_at_ns;
-    header->sequence = pool_.state().newest.load(std::memory_order_relaxed) + 1;
-    pool_.announce(loaned_, stamp_ns, visible_at_ns);
-    loaned_ = kNoChunk;
+    put(stamp_ns, visible_at_ns, kSettled, 0);
+  }
+
+  bool announces() const override { return true; }
+
+  void announce(int64_t stamp_ns, uint32_t commit, int64_t delay_ns) override {
+    if (loaned_ != kNoChunk) put(stamp_ns, 0, commit, delay_ns);
+  }
+
+  void settle(int64_t published_ns, int64_t visible_at_ns) override {
+    const uint64_t newest = pool_.state().newest.load(std::memory_order_relaxed);
+    uint64_t sequence = pool_.first_announced();
+    if (visible_at_ns == CommitRing::kNever) return pool_.withdraw(sequence);
+    for (; sequence <= newest; ++sequence) {
+      PoolSlot& slot = pool_.slot(sequence);
+      const int64_t at_ns = visible_at_ns + slot.delay_ns.load(std::memory_order_relaxed);
+      MessageHeader* header = pool_.header(slot.chunk.load(std::memory_order_relaxed));
+      if (header->sequence == sequence) {  // else an old message again, as it was
+        header->published_ns = published_ns;
+        header->visible_at_ns = at_ns;
+      }
+      slot.visible_at_ns.store(at_ns, std::memory_order_relaxed);
+      slot.commit.store(kSettled, std::memory_order_release);
+    }
   }
 
   void discard() override {
@@ -79,16 +102,8 @@ class LocalWriter final : public Writer {
     loaned_ = kNoChunk;
   }
 
-  bool repeat(int64_t, int64_t visible_at_ns) override {
-    const uint64_t newest = pool_.state().newest.load(std::memory_order_relaxed);
-    const PoolSlot& last = pool_.slot(newest);
-    // None yet; or an earlier writer of this port has gone and took its messages along.
-    if (newest == 0 || last.sequence.load() != newest) return false;
-    const uint32_t chunk = last.chunk.load(std::memory_order_relaxed);
-    pool_.hold(chunk, PoolState::kWriter);
-    pool_.announce(chunk, last.stamp_ns.load(std::memory_order_relaxed), visible_at_ns);
-    return true;
-  }
+  bool repeat(int64_t, int64_t visible_at_ns) override { return put_again(visible_at_ns, kSettled, 0); }
+  bool announce_again(uint32_t commit, int64_t delay_ns) override { return put_again(0, commit, delay_ns); }
 
   uint64_t go_on_after(uint64_t) override { return pool_.state().newest.load(); }
 
@@ -104,6 +119,25 @@ class LocalWriter final : public Writer {
   }
 
  private:
+  void put(int64_t stamp_ns, int64_t visible_at_ns, uint32_t commit, int64_t delay_ns) {
+    MessageHeader* header = pool_.header(loaned_);
+    header->stamp_ns = stamp_ns;
+    header->sequence = pool_.state().newest.load(std::memory_order_relaxed) + 1;
+    pool_.announce(loaned_, stamp_ns, visible_at_ns, commit, delay_ns);
+    loaned_ = kNoChunk;
+  }
+
+  bool put_again(int64_t visible_at_ns, uint32_t commit, int64_t delay_ns) {
+    const uint64_t newest = pool_.state().newest.load(std::memory_order_relaxed);
+    const PoolSlot& last = pool_.slot(newest);
+    // None yet; or an earlier writer of this port has gone and took its messages along.
+    if (newest == 0 || last.sequence.load() != newest) return false;
+    const uint32_t chunk = last.chunk.load(std::memory_order_relaxed);
+    pool_.hold(chunk, PoolState::kWriter);
+    pool_.announce(chunk, last.stamp_ns.load(std::memory_order_relaxed), visible_at_ns, commit, delay_ns);
+    return true;
+  }
+
   MessageHeader* begin(MessageHeader* header) {
     reached(MessageStep::after_loan, pool_.index());
     *header = MessageHeader{};
@@ -127,25 +161,26 @@ class LocalReader final : public Reader {
     pool_.return_reader(holder_);
   }
 
+  void set_commits(CommitRing& commits, const Clock& clock) override {
+    commits_ = &commits;
+    clock_ = &clock;
+  }
+
   size_t list(int64_t limit_ns, std::span<Candidate> out) override {
+    limit_ns_ = limit_ns;
     size_t count = 0;
     const uint64_t newest = pool_.state().newest.load();
     const uint64_t oldest = newest > pool_.slots() ? newest - pool_.slots() + 1 : 1;
-    for (uint64_t s = newest; s >= oldest && count < out.size(); --s) {
-      const PoolSlot& slot = pool_.slot(s);
-      if (slot.sequence.load() != s) continue;
-      const Candidate candidate{s, slot.stamp_ns.load(), slot.visible_at_ns.load()};
-      if (slot.sequence.load() != s) continue;  // overwritten while we read it
-      if (candidate.visible_at_ns <= limit_ns) out[count++] = candidate;
-    }
+    for (uint64_t s = newest; s >= oldest && count < out.size(); --s) count += look(s, out[count]);
     return count;
   }
 
   Held take(uint64_t sequence) override {
+    Candidate listed;
+    if (!look(sequence, listed)) return {};
     const PoolSlot& slot = pool_.slot(sequence);
-    if (slot.sequence.load() != sequence) return {};
     const uint32_t chunk = slot.chunk.load();
-    Held held{nullptr, sequence, slot.stamp_ns.load(), slot.visible_at_ns.load(), chunk};
+    Held held{nullptr, sequence, listed.stamp_ns, listed.visible_at_ns, chunk};
     if (!pool_.hold(chunk, holder_)) return {};
     ++holds_[chunk];
     if (slot.sequence.load() != sequence) {  // the chunk may already be somebody else's
@@ -169,6 +204,28 @@ class LocalReader final : public Reader {
   }
 
  private:
+  /// False if the message of that number is gone, or not for a job released at the limit of the last list().
+  bool look(uint64_t sequence, Candidate& out) const {
+    const PoolSlot& slot = pool_.slot(sequence);
+    while (slot.sequence.load() == sequence) {
+      const uint32_t commit = slot.commit.load();
+      out = {sequence, slot.stamp_ns.load(), slot.visible_at_ns.load()};
+      const int64_t delay_ns = slot.delay_ns.load();
+      const int64_t commit_ns = commit == kSettled ? 0 : committed_ns(commit);
+      // Settled, taken back or overwritten while we read it; then the word may have been another commit's.
+      if (slot.sequence.load() != sequence || slot.commit.load() != commit) continue;
+      if (commit_ns == CommitRing::kSpoiled) commits_->note_spoiled();
+      if (commit_ns == CommitRing::kSpoiled || commit_ns == CommitRing::kNever) return false;
+      if (commit != kSettled) out.visible_at_ns = commit_ns + delay_ns;
+      return out.visible_at_ns <= limit_ns_;
+    }
+    return false;
+  }
+
+  int64_t committed_ns(uint32_t commit) const {
+    return commits_ == nullptr ? CommitRing::kNever : commits_->look(commit, limit_ns_, *clock_);
+  }
+
   /// A reader may hold one chunk for several messages, which repeat each other.
   void let_go(uint32_t chunk) {
     if (--holds_[chunk] > 0) return;
@@ -179,6 +236,9 @@ class LocalReader final : public Reader {
   const LocalPool& pool_;
   const uint32_t holder_;
   std::vector<uint32_t> holds_;  ///< by chunk
+  int64_t limit_ns_ = std::numeric_limits<int64_t>::max();
+  CommitRing* commits_ = nullptr;
+  const Clock* clock_ = nullptr;
 };
 
 class LocalTransport final : public Transport {

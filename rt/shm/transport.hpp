@@ -11,6 +11,9 @@
 
 namespace takt {
 
+class Clock;
+class CommitRing;
+
 /// In front of every message in its chunk; written by the runtime only.
 struct alignas(64) MessageHeader {
   int64_t stamp_ns = 0;       ///< time of validity, set once by the device that captured the data
@@ -58,6 +61,25 @@ class Writer {
   virtual void discard() = 0;
   /// Publishes the previous message again, with its old stamp; false if there is none.
   virtual bool repeat(int64_t published_ns, int64_t visible_at_ns) = 0;
+
+  /// Publication in two steps, so that all outputs of a job become visible together (commit_ring.hpp): each is
+  /// announced under the job's commit, and settled once that is filled. False: this back end has no such steps, and
+  /// publishes.
+  virtual bool announces() const { return false; }
+  /// The loaned chunk is complete. It becomes visible `delay_ns` after its commit.
+  virtual void announce(int64_t stamp_ns, uint32_t commit, int64_t delay_ns) {
+    static_cast<void>(stamp_ns), static_cast<void>(commit), static_cast<void>(delay_ns);
+  }
+  /// The same for the previous message, with its old stamp; false if there is none.
+  virtual bool announce_again(uint32_t commit, int64_t delay_ns) {
+    return static_cast<void>(commit), static_cast<void>(delay_ns), false;
+  }
+  /// What stands announced is published; with `visible_at_ns` CommitRing::kNever it is taken back, as if it had not
+  /// been.
+  virtual void settle(int64_t published_ns, int64_t visible_at_ns) {
+    static_cast<void>(published_ns), static_cast<void>(visible_at_ns);
+  }
+
   virtual WriterStatistics statistics() const = 0;
   /// Before the first publication: where an earlier writer of this output, which died, came to. `noted` is what others
   /// noted of that, for back ends that do not know better.
@@ -68,6 +90,11 @@ class Writer {
 class Reader {
  public:
   virtual ~Reader() = default;
+  /// Before list(), for a reader that belongs to a job: the commits of the job that makes this output, and the clock
+  /// that its own releases are told by. Without them what is announced is not listed before it is settled.
+  virtual void set_commits(CommitRing& commits, const Clock& clock) {
+    static_cast<void>(commits), static_cast<void>(clock);
+  }
   /// The messages with visible_at <= limit that can still be taken, newest first; returns how many were listed.
   virtual size_t list(int64_t limit_ns, std::span<Candidate> out) = 0;
   /// Holds one of them; an empty Held if it was overwritten meanwhile.
