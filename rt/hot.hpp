@@ -8,9 +8,11 @@
 
 namespace takt {
 
+/// What two threads write lies this far apart, so that neither waits for the other's cache. Bytes.
+inline constexpr size_t kCacheLine = 64;
+
 /// Asks for what lies there, without waiting for it.
 inline void prefetch(const void* at, size_t bytes) {
-  constexpr size_t kCacheLine = 64;
   for (size_t offset = 0; offset < bytes; offset += kCacheLine)
     __builtin_prefetch(static_cast<const char*>(at) + offset);
 }

@@ -12,9 +12,10 @@ import json, os, subprocess, sys, tempfile
 
 takt, root, args = sys.argv[1], sys.argv[2], sys.argv[3:]
 repeats = int(args[0]) if args else 50
-writer = [(step, "stereo.disparity", None) for step in ("after_loan", "half_written", "inside_publish", "after_publish",
-                                                              "inside_commit", "after_commit")]
-reader = [(step, "obstacle_stop.stop", "semantic") for step in ("while_held", "inside_release")]
+writer = [(step, "stereo.disparity", None) for step in ("inside_loan", "after_loan", "half_written", "inside_publish",
+                                                       "after_publish", "inside_commit", "after_commit")]
+reader = [(step, "obstacle_stop.stop", "semantic") for step in ("inside_take", "while_held", "inside_release")]
+of_own_pools = ("inside_loan", "inside_take")  # iceoryx has no such steps
 known = ["local", "iceoryx"], [step for step, _, _ in writer + reader]
 if unknown := [a for a in args[1:] if a not in known[0] + known[1]]:
     sys.exit(f"kill_steps.sh: {unknown[0]} is neither a transport ({', '.join(known[0])}) nor a step ({', '.join(known[1])})")
@@ -35,7 +36,7 @@ for transport in transports:
     with tempfile.TemporaryDirectory(prefix="steps-") as work:
         calm = run_it(work, transport, 30)
     if calm is None: sys.exit(1)
-    for step, output, who in (of for of in writer + reader if of[0] in steps):
+    for step, output, who in (of for of in writer + reader if of[0] in steps and (transport == "local" or of[0] not in of_own_pools)):
         with tempfile.TemporaryDirectory(prefix="steps-") as work:
             # Given up, by design, is a process that ends 12 times in 30 s, and a group that is lost six times.
             pace = 4 if transport == "local" else 8 if step == "inside_publish" else 5

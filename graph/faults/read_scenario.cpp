@@ -187,7 +187,10 @@ class ScenarioReader {
   void read_step(FaultSpec& fault, const json& value, const std::string& pointer) {
     if (!value.contains("step") || !value["step"].is_string()) return;
     fault.step = message_step(value["step"].get<std::string>()).value_or(MessageStep::none);
-    const bool of_reader = fault.step == MessageStep::while_held || fault.step == MessageStep::inside_release;
+    const bool of_reader = is_of_reader(fault.step);
+    if (run_.iceoryx && (fault.step == MessageStep::inside_loan || fault.step == MessageStep::inside_take))
+      return problem(document_.value_at(child(pointer, "step")),
+                     fmt::format("iceoryx has no step {}; run with --transport local", ticked(to_string(fault.step))));
     if (of_reader != value.contains("reader"))
       return problem(document_.value_at(child(pointer, "step")),
                      fmt::format("{} is a step of {}", ticked(to_string(fault.step)),

@@ -81,10 +81,17 @@ class DaemonProbe {
   std::jthread thread_;
 };
 
+std::vector<size_t> process_of_tasks(const Plan& plan, const graph::Partition& partition) {
+  std::vector<size_t> process;
+  for (const TaskPlan& task : plan.tasks) process.push_back(partition.process_of.at(task.name));
+  return process;
+}
+
 /// By process, the tasks that it runs.
 std::vector<std::vector<size_t>> tasks_of(const Plan& plan, const graph::Partition& partition) {
   std::vector<std::vector<size_t>> tasks(partition.names.size());
-  for (size_t t = 0; t < plan.tasks.size(); ++t) tasks[partition.process_of.at(plan.tasks[t].name)].push_back(t);
+  const std::vector<size_t> process = process_of_tasks(plan, partition);
+  for (size_t t = 0; t < process.size(); ++t) tasks[process[t]].push_back(t);
   return tasks;
 }
 
@@ -100,8 +107,9 @@ class IsolatedRun {
         plan_source_(graph::outline(graph, graph::node_types(), clock_)),
         plan_(plan_source_.plan),
         partition_(graph::partition(graph, adjusted_)),
-        board_(plan_, partition_.names.size()),
+        board_(plan_, partition_.names.size(), process_of_tasks(plan_, partition_)),
         stoppable_(board_),
+        pools_(static_cast<uint32_t>(partition_.names.size()) + 1),
         record_(options, plan_),
         trace_(options, plan_, partition_.names.size()) {}
 
@@ -417,7 +425,7 @@ class IsolatedRun {
   const graph::Partition partition_;
   RunBoard board_;
   const Stoppable stoppable_;
-  const PoolFile pools_;  ///< of the local transport
+  const PoolFile pools_;  ///< of the local transport, for the members and this process
   Policy granted_ = Policy::cooperative;
   int code_ = 0;
   size_t told_ = 0;

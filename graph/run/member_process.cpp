@@ -86,6 +86,7 @@ bool wait_until(const std::function<bool()>& done, const std::function<bool()>& 
 int run_member(const MemberPart& part) {
   const RunOptions& options = part.options;
   RunBoard& board = part.board;
+  board.keep_to(part.process);
   ProcessRecord& record = board.process(part.process);
   record.pid.store(getpid());
   obey_orders(&record.kill);

@@ -83,18 +83,26 @@ ProofReport::ProofReport(const ProofFacts& facts) : facts_(facts), modes_{0} {
     not_compared_ = "the policy " + std::string(takt::to_string(proofs.policy)) + " was not granted";
   for (size_t i = 0; i < facts_.board.modes().size(); ++i)
     if (const ModeLog::Change* change = facts_.board.modes().change(i);
-        change != nullptr && change->from_ns < facts_.result.end_ns)
+        change != nullptr && change->mode < facts_.plan.modes.size() && change->from_ns < facts_.result.end_ns)
       modes_.push_back(change->mode);
   for (const TaskPlan& task : facts_.plan.tasks)
     lookback_ns_ = std::max({lookback_ns_, task.deadline_ns, task.rate ? task.rate->period_ns() : 0});
   if (!compared()) return;
   std::map<std::tuple<uint32_t, uint32_t, uint32_t>, std::vector<Excess>> by_figure;
   for (size_t i = 0; i < facts_.board.excesses().size(); ++i)
-    if (const Excess* sample = facts_.board.excesses().at(i))
+    if (const Excess* sample = facts_.board.excesses().at(i); sample != nullptr && names_a_figure(*sample))
       by_figure[{sample->figure, sample->index, sample->edge}].push_back(*sample);
   for (const auto& [figure, samples] : by_figure)
     for (const Row& row : rows_of(samples)) rows_.push_back(row);
   std::stable_sort(rows_.begin(), rows_.end(), [](const Row& a, const Row& b) { return a.cause > b.cause; });
+}
+
+/// Any process may have written into the log by mistake.
+bool ProofReport::names_a_figure(const Excess& sample) const {
+  if (sample.figure == Excess::output_age) return sample.index < facts_.plan.ports.size();
+  if (sample.index >= facts_.plan.tasks.size()) return false;
+  return sample.figure == Excess::response ||
+         (sample.figure == Excess::input_age && sample.edge < facts_.plan.tasks[sample.index].edges.size());
 }
 
 Proven ProofReport::largest(const std::function<Proven(size_t)>& of_mode) const {

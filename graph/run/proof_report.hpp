@@ -77,6 +77,7 @@ class ProofReport {
   nlohmann::ordered_json beside_max(const graph::Proven& proven) const;
   std::vector<Row> rows_of(const std::vector<Excess>& samples) const;
   ExcessCause cause_of(const Excess& sample, int64_t bound_ns) const;
+  bool names_a_figure(const Excess& sample) const;
   bool overran(int64_t from_ns, int64_t to_ns) const;
   bool restarted(int64_t from_ns, int64_t to_ns) const;
   bool changed_mode(int64_t from_ns, int64_t to_ns) const;

@@ -136,6 +136,7 @@ Json edges_json(const RunFacts& facts, const ProofReport& proofs) {
                        {"received", s.received},
                        {"dropped", s.dropped},
                        {"stale", s.stale.load()},
+                       {"damaged", s.damaged},
                        {"exhausted", facts.board.port(task.edges[e].port).writer.pool_empty},
                        {"age_ms", distribution(s.age, 1e6, proofs.of_edge(t, e))}});
     }
@@ -260,6 +261,7 @@ Json make_report(const RunFacts& facts) {
   report["chains"] = chains_json(facts, proofs);
   report["memory"] = {{"shm_mb", static_cast<double>(facts.transport.shared_memory_bytes()) / 1e6},
                       {"rss_mb", facts.use.rss_mb},
+                      {"board_mb", static_cast<double>(facts.board.bytes()) / 1e6},
                       {"pools", pools_json(facts)}};
   report["cpu"] = cpu_json(facts);
   report["host_stall_ms"] = facts.use.steal_ms;

@@ -21,6 +21,7 @@ std::string_view to_string(uint32_t kind) {
     case Fault::doubtful: return "doubtful";
     case Fault::wrong: return "wrong";
     case Fault::spoiled: return "spoiled";
+    case Fault::damaged: return "damaged";
     case Fault::bandwidth: return "bandwidth";
   }
   return "";
@@ -62,7 +63,9 @@ Json modes_json(const RunFacts& facts) {
       Json::array({{{"name", facts.graph.mode}, {"from_s", 0.0}, {"to_s", seconds(end)}, {"reason", "start"}}});
   for (size_t i = 0; i < facts.board.modes().size(); ++i) {
     const ModeLog::Change* change = facts.board.modes().change(i);
-    if (change == nullptr || change->from_ns >= end || facts.board.modes().repeats(i)) continue;
+    if (change == nullptr || change->mode >= facts.plan.modes.size() || change->from_ns >= end ||
+        facts.board.modes().repeats(i))
+      continue;
     modes.back()["to_s"] = seconds(change->from_ns);
     modes.push_back({{"name", facts.plan.modes[change->mode].name},
                      {"from_s", seconds(change->from_ns)},
@@ -76,7 +79,7 @@ Json faults_json(const RunFacts& facts) {
   Json faults = Json::array();
   for (size_t i = 0; i < facts.board.faults().size(); ++i) {
     const Fault* fault = facts.board.faults().at(i);
-    if (fault == nullptr) continue;
+    if (fault == nullptr || fault->task >= facts.plan.tasks.size()) continue;
     faults.push_back({{"what", fault->what.c_str()},
                       {"kind", to_string(fault->kind)},
                       {"node", facts.plan.tasks[fault->task].name},

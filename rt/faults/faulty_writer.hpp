@@ -70,6 +70,7 @@ class FaultyWriter final : public Writer {
   void announce(int64_t stamp_ns, uint32_t commit, int64_t delay_ns) override;
   bool announce_again(uint32_t commit, int64_t delay_ns) override;
   void settle(int64_t published_ns, int64_t visible_at_ns) override;
+  bool intact() const override { return inner_->intact(); }
   void discard() override;
   bool repeat(int64_t published_ns, int64_t visible_at_ns) override;
   WriterStatistics statistics() const override { return inner_->statistics(); }

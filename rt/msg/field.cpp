@@ -43,4 +43,14 @@ void MessageType::place(void* memory, const Capacity& capacity) const {
   });
 }
 
+bool MessageType::intact(const void* memory, const Capacity& capacity) const {
+  const auto* base = static_cast<const std::byte*>(memory);
+  bool whole = true;
+  walk(*this, capacity, [&](const Field& field, uint32_t count, uint64_t at) {
+    const auto* array = reinterpret_cast<const Array<std::byte>*>(base + field.offset);
+    whole = whole && array->offset == at - field.offset && array->size <= count && array->capacity == count;
+  });
+  return whole;
+}
+
 }  // namespace takt

@@ -114,6 +114,8 @@ struct MessageType {
   uint64_t bytes(const Capacity& capacity) const;
   /// Builds an empty message in `memory` (64-byte aligned, bytes(capacity) long) and places its arrays.
   void place(void* memory, const Capacity& capacity) const;
+  /// Whether every array of the message in `memory` lies where place() put it and has no more elements than fit.
+  bool intact(const void* memory, const Capacity& capacity) const;
 
   template <class T>
   static const MessageType& of();

@@ -81,7 +81,7 @@ void Recorder::take_port(Port& port) {
 
 void Recorder::take_job(const RecordedJob& job) {
   RecordedJob told = job;
-  told.mode = board_.modes().at(job.release_ns);
+  told.mode = board_.mode_at(job.release_ns);
   for (const RecordedJob::Output& output : job.outputs) {
     uint64_t& newest = ports_[ports_of_[job.task][output.output]].told;
     newest = std::max(newest, output.sequence);

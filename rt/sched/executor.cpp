@@ -88,7 +88,8 @@ void Executor::set_grants(const Lane& lane, const Grant& grant) {
 void Executor::start_clockwork(RunResult& result) {
   result.epoch_ns = options_.gate != nullptr ? options_.gate->epoch_ns()
                                              : clock_.now_ns() + (clock_.is_virtual() ? 0 : options_.start_delay_ns);
-  board_.epoch_ns().store(result.epoch_ns);
+  // Where a supervisor has fixed it, that is not this process's to write.
+  if (board_.epoch_ns().load() != result.epoch_ns) board_.epoch_ns().store(result.epoch_ns);
   if (options_.duration_ns > 0) stop_.set_planned_end(result.epoch_ns + options_.duration_ns);
   for (const auto& task : tasks_)
     if (task) task->start(result.epoch_ns, options_.rejoin ? &transport_ : nullptr);
@@ -281,21 +282,10 @@ uint64_t left_out_jobs(const Plan& plan, const RunBoard& board, size_t task, int
   if (!t.rate) return 0;
   const int64_t origin = epoch_ns + t.offset_ns;
   uint64_t jobs = 0;
-  const auto add = [&](uint32_t mode, int64_t from_ns, int64_t to_ns) {
+  board.modes().for_each_part(epoch_ns, end_ns, [&](uint32_t mode, int64_t from_ns, int64_t to_ns) {
     if (mode < plan.modes.size() && !plan.modes[mode].runs[task] && to_ns > from_ns)
       jobs += static_cast<uint64_t>(t.rate->releases_before(origin, to_ns) - t.rate->releases_before(origin, from_ns));
-  };
-  uint32_t mode = 0;
-  int64_t from = epoch_ns;
-  for (size_t i = 0; i < board.modes().size(); ++i) {
-    const ModeLog::Change* change = board.modes().change(i);
-    if (change == nullptr) continue;
-    const int64_t to = std::clamp(change->from_ns, from, std::max(from, end_ns));
-    add(mode, from, to);
-    mode = change->mode;
-    from = to;
-  }
-  add(mode, from, end_ns);
+  });
   return jobs;
 }
 

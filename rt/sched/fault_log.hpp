@@ -15,6 +15,7 @@ struct Fault {
     doubtful,   ///< a job said that the results of its node are worse than they look
     wrong,      ///< a job said that they are wrong
     spoiled,    ///< the commit word of its outputs held what nobody writes there
+    damaged,    ///< a message was written over by its own process: withheld, or lost to a reader
     bandwidth,  ///< what the kernel reserved for the task's thread may be lost
   };
   Kind kind = hang;

@@ -35,7 +35,7 @@ int64_t Histogram::quantile_ns(double fraction) const {
   if (count_ == 0) return 0;
   const auto wanted = std::max<uint64_t>(1, static_cast<uint64_t>(std::ceil(fraction * static_cast<double>(count_))));
   uint64_t seen = 0;
-  for (size_t i = 0; i < buckets_.size(); ++i) {
+  for (size_t i = 0; i + 1 < kBuckets; ++i) {
     seen += buckets_[i];
     if (seen >= wanted) return std::min(upper_edge(i), max_);
   }

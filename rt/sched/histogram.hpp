@@ -6,9 +6,10 @@
 
 namespace takt {
 
-/// Distribution of durations in ns, for runs of any length in fixed memory: buckets 1/128 of an octave wide (figures
-/// are right to 0.8 %), count and maximum exact. Nothing is ever dropped. Negative values count as 0. One writer. Plain
-/// data: may lie in shared memory.
+/// Distribution of durations in ns, for runs of any length in 10.5 kB: 32 buckets an octave, so a quantile is at most
+/// 3.1 % above the sample that it stands for. Count, sum and maximum are exact. Nothing is ever dropped: all samples
+/// beyond 2^45 ns (9.8 h) are in the last bucket, whose edge is the maximum. Negative values count as 0. One writer.
+/// Plain data: may lie in shared memory.
 class Histogram {
  public:
   void add(int64_t ns);
@@ -21,12 +22,12 @@ class Histogram {
   template <class Visitor>
   void for_each(const Visitor& visit) const {
     for (size_t i = 0; i < buckets_.size(); ++i)
-      if (buckets_[i] > 0) visit(upper_edge(i), buckets_[i]);
+      if (buckets_[i] > 0) visit(i + 1 < kBuckets ? upper_edge(i) : max_, buckets_[i]);
   }
 
  private:
-  static constexpr int kSubBits = 7;
-  static constexpr size_t kBuckets = (48 - kSubBits + 1) << kSubBits;
+  static constexpr int kSubBits = 5, kMostBits = 45;
+  static constexpr size_t kBuckets = (size_t{kMostBits - kSubBits + 1} << kSubBits) + 1;
   static size_t bucket_of(uint64_t value);
   static int64_t upper_edge(size_t bucket);
 

@@ -81,15 +81,12 @@ void Lane::go_on(int64_t now_ns, int64_t end_ns) {
 
 void Lane::skip_passed(int64_t now_ns, int64_t end_ns) {
   // `skip` drops every passed release; the other verbs leave one pending, so that a late job is followed at once.
-  const bool all = head().plan().on_miss == OnMiss::skip;
-  const int64_t pending = all ? 0 : 1;
-  while (rate().release_ns(origin_ns_, next_ + pending) <= now_ns && next_release_ns() < end_ns) {
-    if (head().in_mode(next_release_ns_)) {
-      head().statistics().skipped.fetch_add(1, std::memory_order_relaxed);
-      head().trace_skip(static_cast<uint64_t>(next_), next_release_ns_);
-    }
-    go_to(next_ + 1);
-  }
+  const int64_t pending = head().plan().on_miss == OnMiss::skip ? 0 : 1;
+  const int64_t wanted = rate().releases_before(origin_ns_, now_ns + 1) - pending;
+  if (wanted <= next_ || next_release_ns_ >= end_ns) return;
+  const int64_t first = next_;
+  go_to(std::min(wanted, rate().releases_before(origin_ns_, end_ns)));
+  head().skip(first, next_, origin_ns_);
 }
 
 int64_t Lane::begin(const Activation& job, int64_t duration_ns) {

@@ -21,8 +21,8 @@ struct LaneTasks {
 /// One task per lane: the head's rate and offset, the lane's span as deadline, the sum of the members' budgets and the
 /// overheads of their jobs. A lane that waits within (`publish: let` before a follower) occupies its thread meanwhile,
 /// so the wait counts as budget. One whose head sleeps for its data (SourcePlan::wait_ns) is woken twice and does its
-/// work up to that much later, which is jitter. Under `deadline` the kernel gives it a new deadline when it wakes, so it
-/// is a sporadic task with the figures of its reservation, done by the sleep and its response.
+/// work up to that much later, which is jitter. Under `deadline` the kernel gives it a new deadline when it wakes, so
+/// it is a sporadic task with the figures of its reservation, done by the sleep and its response.
 ///
 /// Under `deadline` the deadline is that of the reservation. Under `fixed` every task has its core (an index into
 /// Plan::cores) and its SCHED_FIFO priority: on the core that the plan names, else where

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdio>
+#include <utility>
 
 #include "rt/hot.hpp"
 #include "rt/sched/port_access.hpp"
@@ -14,7 +16,7 @@ using Candidates = std::array<Candidate, InputPort::kMaxDepth>;
 }
 
 Latch::Latch(const TaskPlan& plan, Transport& transport, RunBoard& board, size_t task, const Clock& clock)
-    : excesses_(board.excesses()), task_(static_cast<uint32_t>(task)) {
+    : excesses_(board.excesses()), faults_(board.faults()), task_(static_cast<uint32_t>(task)), name_(plan.name) {
   for (const EdgePlan& edge : plan.edges) {
     Edge& e = edges_.emplace_back();
     e.plan = edge;
@@ -137,12 +139,27 @@ void Latch::count() {
     add(edge.statistics->stale, edge.fresh.stale);
     edge.statistics->last_seen = edge.last_seen;
     edge.fresh = {};
+    if (edge.reader->damaged() != edge.damaged) tell_damage(edge);
     if (edge.age_ns == kNoAge) continue;
     edge.statistics->age.add(edge.age_ns);
     edge.statistics->age_bound.compare(
         {Excess::input_age, task_, static_cast<uint32_t>(e), edge.latched_ns, edge.age_ns}, excesses_);
     edge.age_ns = kNoAge;
   }
+}
+
+void Latch::tell_damage(Edge& edge) {
+  const bool first = edge.statistics->damaged == 0;
+  edge.statistics->damaged += edge.reader->damaged() - std::exchange(edge.damaged, edge.reader->damaged());
+  if (!first) return;  // the report has how many
+  Fault fault;
+  fault.kind = Fault::damaged;
+  fault.task = task_;
+  fault.at_ns = edge.latched_ns;
+  std::snprintf(fault.what.characters.data(), fault.what.characters.size(),
+                "%s.%s: a message is lost: the process of its producer has written over it", name_.c_str(),
+                std::string(edge.input->name()).c_str());
+  faults_.append(fault);
 }
 
 TAKT_HOT void Latch::rehearse(int64_t release_ns) const {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "rt/sched/run_board.hpp"
@@ -37,7 +38,7 @@ class Latch {
     EdgePlan plan;
     InputPort* input = nullptr;
     std::unique_ptr<Reader> reader;
-    uint64_t last_seen = 0;
+    uint64_t last_seen = 0, damaged = 0;
     bool joined = false, requests = false;
     EdgeCounts fresh;         ///< not yet in the statistics
     int64_t age_ns = kNoAge;  ///< the same
@@ -50,8 +51,12 @@ class Latch {
   bool take_set(const std::vector<size_t>& group, int64_t stamp_ns, int64_t release_ns, int64_t now_ns);
   void account(Edge& edge, size_t count, bool stale, int64_t now_ns);
 
+  void tell_damage(Edge& edge);
+
   ExcessLog& excesses_;
+  FaultLog& faults_;
   const uint32_t task_;
+  const std::string name_;  ///< of the task
   std::vector<Edge> edges_;
   std::vector<std::vector<size_t>> joins_;  ///< indexes into edges_
   size_t stale_count_ = 0;

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <utility>
+
 #include "rt/sched/append_log.hpp"
 #include "rt/sched/mode_rules.hpp"
 
@@ -13,8 +15,9 @@ namespace takt {
 /// period after it. So a change is complete, for each task, `lead + max(deadline, period)` after it was asked for.
 class ModeLog {
  public:
-  /// A device that is lost and back takes two of them: one a minute can go on for almost three days. All are kept, since
-  /// how many jobs were to be released is counted from them; when they are used up, the run is in safe_stop for good.
+  /// A device that is lost and back takes two of them: one a minute can go on for almost three days. All are kept,
+  /// since how many jobs were to be released is counted from them; when they are used up, the run is in safe_stop for
+  /// good.
   static constexpr size_t kMost = 8192;
   /// A request made while the run goes on takes effect this much later, so that it is on the board before the first
   /// release it is to hold for.
@@ -32,6 +35,19 @@ class ModeLog {
     for (size_t i = log_.size(); i-- > 0;)
       if (const Change* change = log_.at(i); change != nullptr && change->from_ns <= release_ns) return change->mode;
     return 0;
+  }
+  /// Calls visit(mode, from_ns, to_ns) for each part of [from_ns, to_ns) in which one mode holds, in order.
+  template <class Visitor>
+  void for_each_part(int64_t from_ns, int64_t to_ns, const Visitor& visit) const {
+    uint32_t mode = 0;
+    for (size_t i = 0; i < log_.size(); ++i) {
+      const Change* change = log_.at(i);
+      if (change == nullptr) continue;
+      if (change->from_ns >= to_ns) break;
+      if (change->from_ns > from_ns) visit(mode, std::exchange(from_ns, change->from_ns), change->from_ns);
+      mode = change->mode;
+    }
+    visit(mode, from_ns, to_ns);
   }
   /// The mode that will be in force once all requests have taken effect.
   uint32_t newest() const { return at(INT64_MAX); }

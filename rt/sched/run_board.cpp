@@ -10,28 +10,41 @@
 #include <stdexcept>
 
 namespace takt {
+
 namespace {
 
-constexpr size_t kLine = 64;  // no two records share a cache line
-
-template <class T>
-constexpr size_t room_for(size_t count) {
-  return (sizeof(T) * count + kLine - 1) / kLine * kLine;
-}
+constexpr size_t kPage = 4096;
 
 }  // namespace
 
-template <class T>
-T* RunBoard::place(std::byte*& at, size_t count) {
-  static_assert(alignof(T) <= kLine);
-  T* first = reinterpret_cast<T*>(at);
-  for (size_t i = 0; i < count; ++i) ::new (first + i) T;
-  at += room_for<T>(count);
-  return first;
-}
+/// Makes records one after the other; without memory it only counts.
+class RunBoard::Placer {
+ public:
+  explicit Placer(std::byte* memory) : memory_(memory) {}
+  template <class T>
+  T* make() {
+    static_assert(alignof(T) == kCacheLine, "no two records share a cache line");
+    T* record = memory_ == nullptr ? nullptr : ::new (memory_ + used_) T;
+    used_ += sizeof(T);
+    return record;
+  }
+  template <class T>
+  void make(std::vector<T*>& at, size_t index) {
+    at[index] = make<T>();
+  }
+  size_t to_next_page() { return used_ = (used_ + kPage - 1) / kPage * kPage; }
 
-RunBoard::RunBoard(const Plan& plan, size_t processes)
-    : process_count_(processes), safe_stop_mode_(plan.safe_stop), mode_rules_(plan.mode_rules), producers_(plan) {
+ private:
+  std::byte* memory_;
+  size_t used_ = 0;
+};
+
+RunBoard::RunBoard(const Plan& plan, size_t processes, std::span<const size_t> process_of)
+    : mode_count_(std::max<size_t>(plan.modes.size(), 1)),
+      safe_stop_mode_(plan.safe_stop),
+      mode_rules_(plan.mode_rules),
+      producers_(plan),
+      processes_(processes) {
   size_t edges = 0;
   for (const TaskPlan& task : plan.tasks) {
     first_edge_.push_back(edges);
@@ -39,36 +52,68 @@ RunBoard::RunBoard(const Plan& plan, size_t processes)
     task_names_.push_back(task.name);
     has_source_.push_back(task.device);
   }
-  const size_t tasks = plan.tasks.size(), ports = plan.ports.size();
-  bytes_ = room_for<Shared>(1) + room_for<TaskStatistics>(tasks) + room_for<EdgeStatistics>(edges) +
-           room_for<PortStatistics>(ports) + room_for<GrantRecord>(tasks) + room_for<CommitRing>(tasks) +
-           room_for<ParamMail>(tasks) + room_for<CapacityRecord>(ports) + room_for<ProcessRecord>(processes) +
-           room_for<SourceRecord>(tasks) + room_for<SourceFacts>(tasks);
+  tasks_.resize(plan.tasks.size());
+  grants_.resize(tasks_.size());
+  commits_.resize(tasks_.size());
+  mail_.resize(tasks_.size());
+  sources_.resize(tasks_.size());
+  source_facts_.resize(tasks_.size());
+  edges_.resize(edges);
+  ports_.resize(plan.ports.size());
+  capacities_.resize(plan.ports.size());
+  bytes_ = lay_out(plan, process_of, nullptr);
   void* memory = mmap(nullptr, bytes_, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS | MAP_POPULATE, -1, 0);
   if (memory == MAP_FAILED)
     throw std::runtime_error("shared memory of " + std::to_string(bytes_) + " bytes: " + std::strerror(errno));
-  std::byte* at = memory_ = static_cast<std::byte*>(memory);
-  shared_ = place<Shared>(at, 1);
-  tasks_ = place<TaskStatistics>(at, tasks);
-  edges_ = place<EdgeStatistics>(at, edges);
-  ports_ = place<PortStatistics>(at, ports);
-  grants_ = place<GrantRecord>(at, tasks);
-  commits_ = place<CommitRing>(at, tasks);
-  mail_ = place<ParamMail>(at, tasks);
-  capacities_ = place<CapacityRecord>(at, ports);
-  processes_ = place<ProcessRecord>(at, processes);
-  sources_ = place<SourceRecord>(at, tasks);
-  source_facts_ = place<SourceFacts>(at, tasks);
+  memory_ = static_cast<std::byte*>(memory);
+  lay_out(plan, process_of, memory_);
 }
 
 RunBoard::~RunBoard() { munmap(memory_, bytes_); }
+
+size_t RunBoard::lay_out(const Plan& plan, std::span<const size_t> process_of, std::byte* memory) {
+  Placer placer(memory);
+  shared_ = placer.make<Shared>();
+  for (size_t t = 0; t < tasks_.size(); ++t) placer.make(commits_, t);
+  areas_.assign(1, placer.to_next_page());
+  supervised_ = placer.make<Supervised>();
+  areas_.push_back(placer.to_next_page());
+  const auto process_of_task = [&](size_t t) { return t < process_of.size() ? process_of[t] : 0; };
+  for (size_t process = 0; process < processes_.size(); ++process) {
+    placer.make(processes_, process);
+    for (size_t t = 0; t < tasks_.size(); ++t) {
+      if (process_of_task(t) != process) continue;
+      placer.make(tasks_, t);
+      placer.make(grants_, t);
+      placer.make(mail_, t);
+      placer.make(sources_, t);
+      placer.make(source_facts_, t);
+      for (size_t e = 0; e < plan.tasks[t].edges.size(); ++e) placer.make(edges_, first_edge_[t] + e);
+    }
+    for (size_t p = 0; p < ports_.size(); ++p) {
+      const size_t producer = producers_.find(p);
+      if ((producer == kNone ? 0 : process_of_task(producer)) != process) continue;
+      placer.make(ports_, p);
+      placer.make(capacities_, p);
+    }
+    areas_.push_back(placer.to_next_page());
+  }
+  return areas_.back();
+}
+
+void RunBoard::keep_to(size_t process) const {
+  for (size_t area = 0; area + 1 < areas_.size(); ++area)
+    if (area != process + 1 && mprotect(memory_ + areas_[area], areas_[area + 1] - areas_[area], PROT_READ) != 0)
+      throw std::runtime_error(std::string("the records of other processes cannot be protected: ") +
+                               std::strerror(errno));
+}
 
 void RunBoard::safe_stop(int64_t from_ns, std::string_view reason) {
   if (safe_stop_mode_ != kNone) modes().request(static_cast<uint32_t>(safe_stop_mode_), from_ns, reason);
 }
 
 void RunBoard::set_grant(size_t t, const Grant& grant) {
-  GrantRecord& record = grants_[t];
+  GrantRecord& record = *grants_[t];
   record.policy = grant.policy;
   record.verified = grant.verified;
   record.priority = grant.priority;
@@ -84,7 +129,7 @@ void RunBoard::set_grant(size_t t, const Grant& grant) {
 }
 
 Grant RunBoard::grant(size_t t) const {
-  const GrantRecord& record = grants_[t];
+  const GrantRecord& record = *grants_[t];
   Grant grant;
   grant.policy = record.policy;
   grant.verified = record.verified;

@@ -4,7 +4,9 @@
 #include <cstddef>
 #include <span>
 #include <string>
+#include <vector>
 
+#include "rt/hot.hpp"
 #include "rt/sched/fault_log.hpp"
 #include "rt/sched/grant.hpp"
 #include "rt/sched/mode_log.hpp"
@@ -20,7 +22,7 @@
 namespace takt {
 
 /// A parameter value on its way to a running node. One at a time per task.
-struct ParamMail {
+struct alignas(kCacheLine) ParamMail {
   enum State : uint32_t { empty, posted, taken, refused };
   enum Kind : uint8_t { flag, integer, number, text };
   std::atomic<uint32_t> state{empty};
@@ -40,7 +42,7 @@ struct LifeSigns {
 };
 
 /// How far one process of a run has come, and what it used. A restarted one goes on with the record of the one before.
-struct ProcessRecord {
+struct alignas(kCacheLine) ProcessRecord {
   enum State : uint32_t { starting, composed, joined, agreed, running, finished };
   std::atomic<uint32_t> state{starting};
   std::atomic<uint32_t> problems{0};  ///< why it could not be composed: how many, told on stderr
@@ -53,14 +55,14 @@ struct ProcessRecord {
 };
 
 /// How large the messages of an output can become, once its node is set up.
-struct CapacityRecord {
+struct alignas(kCacheLine) CapacityRecord {
   static constexpr uint32_t kTold = 1, kNeverTold = 2;  ///< the latter: its node could not be set up
   std::atomic<uint32_t> known{0};
   Capacity capacity;
 };
 
 /// What is known in advance of a hardware node's data; see SourcePlan.
-struct SourceFacts {
+struct alignas(kCacheLine) SourceFacts {
   static constexpr size_t kLongest = 200;
   std::atomic<bool> known{false};
   int64_t lag_ns = 0, wait_ns = 0;
@@ -68,43 +70,58 @@ struct SourceFacts {
 };
 
 /// What the processes of one run share: statistics, the end of the run, agreement before the start, parameters on their
-/// way. One anonymous shared mapping, made before the processes are; it is gone when the last of them is.
+/// way. One anonymous shared mapping, made before the processes are; it is gone when the last of them is. No two
+/// records share a cache line, and what only one process writes lies in pages of its own:
+///
+///   RunBoard board(plan, 3, process_of_task);
+///   if (fork() == 0) board.keep_to(1);  // from here on, a stray store of process 1 into 0's or 2's records ends it
+///
+/// Common to all are the logs, the stop and the commit words.
 class RunBoard {
  public:
   enum Decision : uint32_t { undecided, as_asked, cooperative };
   enum Carrier : uint32_t { no_carrier, iceoryx, local };
 
-  /// Only the shape of the plan is used: tasks, edges, ports, and its modes with their rules. Throws std::runtime_error
-  /// if there is no memory.
-  explicit RunBoard(const Plan& plan, size_t processes = 1);
+  /// Only the shape of the plan is used: tasks, edges, ports, and its modes with their rules. `process_of`: by task; by
+  /// default all are of process 0. Throws std::runtime_error if there is no memory.
+  explicit RunBoard(const Plan& plan, size_t processes = 1, std::span<const size_t> process_of = {});
   ~RunBoard();
   RunBoard(const RunBoard&) = delete;
   RunBoard& operator=(const RunBoard&) = delete;
 
-  TaskStatistics& task(size_t t) { return tasks_[t]; }
-  const TaskStatistics& task(size_t t) const { return tasks_[t]; }
-  EdgeStatistics& edge(size_t t, size_t e) { return edges_[first_edge_[t] + e]; }
-  const EdgeStatistics& edge(size_t t, size_t e) const { return edges_[first_edge_[t] + e]; }
-  PortStatistics& port(size_t p) { return ports_[p]; }
-  const PortStatistics& port(size_t p) const { return ports_[p]; }
+  /// In a process of the run, once: the records of all others, and of the supervisor, are read-only from here on.
+  /// Throws std::runtime_error.
+  void keep_to(size_t process) const;
+
+  TaskStatistics& task(size_t t) { return *tasks_[t]; }
+  const TaskStatistics& task(size_t t) const { return *tasks_[t]; }
+  EdgeStatistics& edge(size_t t, size_t e) { return *edges_[first_edge_[t] + e]; }
+  const EdgeStatistics& edge(size_t t, size_t e) const { return *edges_[first_edge_[t] + e]; }
+  PortStatistics& port(size_t p) { return *ports_[p]; }
+  const PortStatistics& port(size_t p) const { return *ports_[p]; }
   void set_grant(size_t t, const Grant& grant);
   Grant grant(size_t t) const;
   /// Of the jobs of a task.
-  CommitRing& commits(size_t t) { return commits_[t]; }
+  CommitRing& commits(size_t t) { return *commits_[t]; }
   /// Of the jobs that make what a port carries; null: nobody makes it.
-  CommitRing* commits_of_port(size_t p) {
-    return producers_.find(p) == kNone ? nullptr : &commits_[producers_.find(p)];
-  }
-  ParamMail& mail(size_t t) { return mail_[t]; }
-  CapacityRecord& capacity(size_t p) { return capacities_[p]; }
-  SourceFacts& source_facts(size_t t) { return source_facts_[t]; }
-  ProcessRecord& process(size_t p) { return processes_[p]; }
-  const ProcessRecord& process(size_t p) const { return processes_[p]; }
-  const SourceRecord& source(size_t t) const { return sources_[t]; }
-  size_t process_count() const { return process_count_; }
+  CommitRing* commits_of_port(size_t p) { return producers_.find(p) == kNone ? nullptr : commits_[producers_.find(p)]; }
+  ParamMail& mail(size_t t) { return *mail_[t]; }
+  CapacityRecord& capacity(size_t p) { return *capacities_[p]; }
+  SourceFacts& source_facts(size_t t) { return *source_facts_[t]; }
+  ProcessRecord& process(size_t p) { return *processes_[p]; }
+  const ProcessRecord& process(size_t p) const { return *processes_[p]; }
+  const SourceRecord& source(size_t t) const { return *sources_[t]; }
+  size_t process_count() const { return processes_.size(); }
+  /// What all of it takes.
+  size_t bytes() const { return bytes_; }
 
   ModeLog& modes() { return shared_->modes; }
   const ModeLog& modes() const { return shared_->modes; }
+  /// Mode of a job released then, among those of the plan whatever the log holds.
+  uint32_t mode_at(int64_t release_ns) const {
+    const uint32_t mode = modes().at(release_ns);
+    return mode < mode_count_ ? mode : 0;
+  }
   /// Asks for the mode `safe_stop`; nothing happens if the run is in it, or the plan has none. Any thread, does not
   /// wait.
   void safe_stop(int64_t from_ns, std::string_view reason);
@@ -127,57 +144,64 @@ class RunBoard {
   LateSourceLog& late_sources() { return shared_->late_sources; }
   const LateSourceLog& late_sources() const { return shared_->late_sources; }
 
-  OutageLog& outages() { return shared_->outages; }
-  const OutageLog& outages() const { return shared_->outages; }
-  GroupSigns& group() { return shared_->group; }
-  const GroupSigns& group() const { return shared_->group; }
+  OutageLog& outages() { return supervised_->outages; }
+  const OutageLog& outages() const { return supervised_->outages; }
+  GroupSigns& group() { return supervised_->group; }
+  const GroupSigns& group() const { return supervised_->group; }
 
   StopSignal& stop() { return shared_->stop; }
-  std::atomic<int64_t>& epoch_ns() { return shared_->epoch_ns; }  ///< 0: not fixed yet
-  std::atomic<uint32_t>& decision() { return shared_->decision; }
-  std::atomic<uint32_t>& carrier() { return shared_->carrier; }  ///< the transport that is up and can be joined
+  std::atomic<int64_t>& epoch_ns() { return supervised_->epoch_ns; }  ///< 0: not fixed yet
+  std::atomic<uint32_t>& decision() { return supervised_->decision; }
+  std::atomic<uint32_t>& carrier() { return supervised_->carrier; }  ///< the transport that is up and can be joined
   /// All processes have finished: nobody reads any more what one of them takes along when it leaves.
-  std::atomic<bool>& dismissed() { return shared_->dismissed; }
+  std::atomic<bool>& dismissed() { return supervised_->dismissed; }
 
  private:
-  struct Shared {
+  /// What every process writes.
+  struct alignas(kCacheLine) Shared {
     StopSignal stop;
-    ModeLog modes;
-    FaultLog faults;
-    ExcessLog excesses;
-    OverrunLog overruns;
-    LateSourceLog late_sources;
+    alignas(kCacheLine) ModeLog modes;
+    alignas(kCacheLine) FaultLog faults;
+    alignas(kCacheLine) ExcessLog excesses;
+    alignas(kCacheLine) OverrunLog overruns;
+    alignas(kCacheLine) LateSourceLog late_sources;
+  };
+  /// What the supervisor writes, and a run without one.
+  struct alignas(kCacheLine) Supervised {
     OutageLog outages;
-    GroupSigns group;
-    std::atomic<int64_t> epoch_ns{0};
+    alignas(kCacheLine) GroupSigns group;
+    alignas(kCacheLine) std::atomic<int64_t> epoch_ns{0};
     std::atomic<uint32_t> decision{undecided};
     std::atomic<uint32_t> carrier{no_carrier};
     std::atomic<bool> dismissed{false};
   };
-  template <class T>
-  T* place(std::byte*& at, size_t count);
+  class Placer;
+  /// Makes all records in `memory`; null: only counts. The bytes that they take.
+  size_t lay_out(const Plan& plan, std::span<const size_t> process_of, std::byte* memory);
   void note_source(size_t t, uint64_t job, SourceState state, int64_t at_ns);
   SourceSet lost_sources() const;
   void follow_mode_rules(bool newly_lost, int64_t from_ns, const char* reason);
 
   std::byte* memory_ = nullptr;
-  size_t bytes_ = 0, process_count_ = 0, safe_stop_mode_ = kNone;
+  size_t bytes_ = 0, mode_count_ = 1, safe_stop_mode_ = kNone;
   std::vector<size_t> first_edge_;
   std::vector<std::string> task_names_;
   std::vector<char> has_source_;  ///< by task: a hardware node
   ModeRules mode_rules_;
   PortProducers producers_;
   Shared* shared_ = nullptr;
-  TaskStatistics* tasks_ = nullptr;
-  EdgeStatistics* edges_ = nullptr;
-  PortStatistics* ports_ = nullptr;
-  GrantRecord* grants_ = nullptr;
-  CommitRing* commits_ = nullptr;
-  ParamMail* mail_ = nullptr;
-  CapacityRecord* capacities_ = nullptr;
-  ProcessRecord* processes_ = nullptr;
-  SourceRecord* sources_ = nullptr;
-  SourceFacts* source_facts_ = nullptr;
+  Supervised* supervised_ = nullptr;
+  std::vector<TaskStatistics*> tasks_;
+  std::vector<EdgeStatistics*> edges_;
+  std::vector<PortStatistics*> ports_;
+  std::vector<GrantRecord*> grants_;
+  std::vector<CommitRing*> commits_;
+  std::vector<ParamMail*> mail_;
+  std::vector<CapacityRecord*> capacities_;
+  std::vector<ProcessRecord*> processes_;
+  std::vector<SourceRecord*> sources_;
+  std::vector<SourceFacts*> source_facts_;
+  std::vector<size_t> areas_;  ///< where that of the supervisor begins, of each process, and the end
 };
 
 }  // namespace takt

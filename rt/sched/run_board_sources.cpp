@@ -13,7 +13,7 @@ constexpr size_t kMostSourceFaults = kMostFaults - 16;
 }  // namespace
 
 void RunBoard::tell_source(size_t t, uint64_t job, const SourceReport& report, int64_t at_ns, int64_t from_ns) {
-  SourceRecord& record = sources_[t];
+  SourceRecord& record = *sources_[t];
   record.tell(report);
   const SourceState before = record.state.load(std::memory_order_acquire);
   if (before == report.state) return follow_mode_rules(false, from_ns, "sources lost");
@@ -30,7 +30,7 @@ void RunBoard::lose_sources(std::span<const size_t> tasks, int64_t at_ns, int64_
   const SourceState dead = SourceState::unattended;
   const char* name = nullptr;
   for (const size_t t : tasks) {
-    const SourceState before = sources_[t].state.load(std::memory_order_acquire);
+    const SourceState before = sources_[t]->state.load(std::memory_order_acquire);
     if (!has_source_[t] || before == dead) continue;
     note_source(t, task(t).job_count.load(std::memory_order_acquire), dead, at_ns);
     if (before == SourceState::ok) name = task_names_[t].c_str();
@@ -42,7 +42,7 @@ void RunBoard::lose_sources(std::span<const size_t> tasks, int64_t at_ns, int64_
 }
 
 void RunBoard::note_source(size_t t, uint64_t job, SourceState state, int64_t at_ns) {
-  SourceRecord& record = sources_[t];
+  SourceRecord& record = *sources_[t];
   const SourceState before = record.state.load(std::memory_order_relaxed);
   const bool lost = before == SourceState::ok, back = state == SourceState::ok;
   if (lost) {
@@ -70,7 +70,7 @@ void RunBoard::note_source(size_t t, uint64_t job, SourceState state, int64_t at
 SourceSet RunBoard::lost_sources() const {
   SourceSet lost = 0;
   for (size_t i = 0; i < mode_rules_.sources.size(); ++i)
-    if (sources_[mode_rules_.sources[i]].state.load(std::memory_order_acquire) != SourceState::ok)
+    if (sources_[mode_rules_.sources[i]]->state.load(std::memory_order_acquire) != SourceState::ok)
       lost |= SourceSet{1} << i;
   return lost;
 }

@@ -3,13 +3,14 @@
 #include <atomic>
 #include <cstdint>
 
+#include "rt/hot.hpp"
 #include "rt/source_state.hpp"
 
 namespace takt {
 
 /// How the source of a task stands: what it reads from outside the run (of a hardware node, its device). Written by the
 /// thread that runs the task, and by the supervisor once the task's process is dead; anybody reads at any time.
-struct SourceRecord {
+struct alignas(kCacheLine) SourceRecord {
   std::atomic<SourceState> state{SourceState::ok};
   std::atomic<int64_t> since_ns{0};       ///< when it came into that state; 0: it was never in another
   std::atomic<int64_t> lost_since_ns{0};  ///< beginning of the loss that goes on; of no meaning while ok

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <cstdint>
 
+#include "rt/hot.hpp"
 #include "rt/level.hpp"
 #include "rt/memory/job_calls.hpp"
 #include "rt/sched/histogram.hpp"
@@ -32,7 +33,7 @@ struct LevelChange {
 };
 
 /// What the jobs of one task did. Written by the thread that runs the task; the atomics may be read at any time.
-struct TaskStatistics {
+struct alignas(kCacheLine) TaskStatistics {
   std::atomic<uint64_t> released{0};  ///< of `on` tasks only; a rate's releases are computed outside the executor
   std::atomic<uint64_t> paused{0};    ///< releases at which requests did not let the task run
   std::atomic<uint64_t> completed{0}, skipped{0}, reused{0}, deadline_misses{0}, budget_overruns{0}, stale_inputs{0};
@@ -65,9 +66,10 @@ struct TaskStatistics {
 };
 
 /// What one edge carried. Every message sent is received, superseded before a job latched it (dropped), or waiting.
-struct EdgeStatistics {
+struct alignas(kCacheLine) EdgeStatistics {
   uint64_t received = 0, dropped = 0;
   std::atomic<uint64_t> stale{0};
+  uint64_t damaged = 0;  ///< messages that were lost since their own process had written over them
   uint64_t last_seen =
       0;          ///< sequence of the newest message latched: whoever takes a dead reader's place goes on there
   Histogram age;  ///< stamp to job start, of the newest latched message
@@ -75,7 +77,7 @@ struct EdgeStatistics {
 };
 
 /// What one output gave.
-struct PortStatistics {
+struct alignas(kCacheLine) PortStatistics {
   std::atomic<uint64_t> published{0};  ///< sequence of the newest message, stored before it is out
   Histogram age;                       ///< stamp of a message to the instant from which consumers may see it
   ProofBound age_bound;
@@ -83,7 +85,7 @@ struct PortStatistics {
 };
 
 /// What the kernel granted the thread that runs a task: Grant without pointers.
-struct GrantRecord {
+struct alignas(kCacheLine) GrantRecord {
   Policy policy = Policy::cooperative;
   bool verified = false;
   int priority = 0;

@@ -315,6 +315,19 @@ void Task::count_age(size_t port, int64_t visible_at_ns, int64_t stamp_ns) {
                                board_.excesses());
 }
 
+void Task::skip(int64_t first, int64_t end, int64_t origin_ns) {
+  const Rate& rate = *plan_.rate;
+  const auto leave_out = [&](uint32_t mode, int64_t from_ns, int64_t to_ns) {
+    if (mode >= modes_.size() || !modes_[mode].runs) return;
+    const int64_t from = rate.releases_before(origin_ns, from_ns), to = rate.releases_before(origin_ns, to_ns);
+    statistics_.skipped.fetch_add(static_cast<uint64_t>(to - from), std::memory_order_relaxed);
+    for (int64_t k = from; trace::on() && k < to; ++k)
+      trace::record({rate.release_ns(origin_ns, k), 0, 0, static_cast<uint32_t>(k), static_cast<uint16_t>(index_),
+                     trace::Kind::skip, 0});
+  };
+  board_.modes().for_each_part(rate.release_ns(origin_ns, first), rate.release_ns(origin_ns, end - 1) + 1, leave_out);
+}
+
 void Task::ask_for_safe_stop(const char* why) {
   char reason[120];
   std::snprintf(reason, sizeof reason, "%s: %s", plan_.name.c_str(), why);

@@ -46,8 +46,6 @@ class Task {
     watch_ = &watch;
     member_ = member;
   }
-  /// False if the mode of that release leaves this task out.
-  bool in_mode(int64_t release_ns) const { return mode_of(release_ns).runs; }
   /// Counts the job that run() has just ended. Apart from it, so that in a lane no follower waits for the counting of
   /// its producer; `page_faults` are those since the last count on this thread.
   void count(uint64_t page_faults);
@@ -57,8 +55,9 @@ class Task {
   /// True if the last job published (or repeated) this port.
   bool published(size_t port) const;
 
-  /// Notes in the trace that this release was skipped.
-  void trace_skip(uint64_t index, int64_t release_ns) const;
+  /// Counts releases `first` to `end` - 1 as skipped, apart from those whose mode leaves this task out. Of a task with
+  /// a rate. Any number of them takes the same time, unless its thread is traced.
+  void skip(int64_t first, int64_t end, int64_t origin_ns);
 
   const TaskPlan& plan() const { return plan_; }
   TaskStatistics& statistics() { return statistics_; }
@@ -82,7 +81,7 @@ class Task {
     std::string name;
     bool runs = true;
   };
-  const Mode& mode_of(int64_t release_ns) const { return modes_[board_.modes().at(release_ns)]; }
+  const Mode& mode_of(int64_t release_ns) const { return modes_[board_.mode_at(release_ns)]; }
   /// The release passes without a job.
   void pass_over(int64_t now_ns, bool count);
   /// Lets the node work, under the eyes of the watchdog.
@@ -99,6 +98,8 @@ class Task {
   /// What a commit is of: the messages that the job made, or the former ones again.
   enum class Offer : uint8_t { made, former };
   CommitRing::Filled commit(const CommitRing::Terms& terms, Offer offer);
+  /// False, and told, if the job wrote where it should not.
+  bool outputs_intact();
   void announce(size_t output, uint32_t commit, Offer offer);
   void settle_output(size_t output, const CommitRing::Filled& out, Offer offer);
   void pass(MessageStep step) const;

@@ -18,7 +18,9 @@ TAKT_HOT void Task::publish(JobEnd& end, int64_t deadline_ns) {
   std::fill(published_.begin(), published_.end(), false);
   std::fill(sent_stamps_ns_.begin(), sent_stamps_ns_.end(), kNothingSent);
   // A job that ends after its deadline has nothing to announce; one that comes too late only now takes it back.
-  if (end.finished_ns <= terms.latest_ns) out = commit(terms, Offer::made);
+  const bool whole = outputs_intact();
+  if (!whole) out = {end.finished_ns, std::max(end.finished_ns, earliest_ns)};
+  else if (end.finished_ns <= terms.latest_ns) out = commit(terms, Offer::made);
   for (size_t i = 0; i < writers_.size(); ++i) {
     if (!published_[i]) writers_[i]->discard();
     PortAccess::reset(*plan_.node->outputs()[i]);
@@ -30,6 +32,21 @@ TAKT_HOT void Task::publish(JobEnd& end, int64_t deadline_ns) {
   ended_.published_ns = out.published_ns;
   ended_.publish_took_ns = clock_.now_ns() - end.finished_ns;
   if (commits_.spoiled() != spoiled_told_) tell_spoiled();
+}
+
+bool Task::outputs_intact() {
+  for (size_t i = 0; i < writers_.size(); ++i) {
+    if (writers_[i]->intact()) continue;
+    ended_.no_result = true;
+    Fault fault = fault_now(Fault::damaged, ended_.index);
+    std::snprintf(fault.what.characters.data(), fault.what.characters.size(),
+                  "%s.%s: job %llu wrote past its message or over its structure; the outputs of the job are withheld",
+                  plan_.name.c_str(), std::string(plan_.node->outputs()[i]->name()).c_str(),
+                  static_cast<unsigned long long>(ended_.index));
+    board_.faults().append(fault);
+    return false;
+  }
+  return true;
 }
 
 CommitRing::Filled Task::commit(const CommitRing::Terms& terms, Offer offer) {

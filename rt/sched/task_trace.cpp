@@ -56,10 +56,6 @@ void Task::trace_inputs() const {
   }
 }
 
-void Task::trace_skip(uint64_t index, int64_t release_ns) const {
-  trace::record({release_ns, 0, 0, static_cast<uint32_t>(index), static_cast<uint16_t>(index_), trace::Kind::skip, 0});
-}
-
 void Task::trace_end() const {
   const JobEnd& end = ended_.end;
   const int64_t deadline_ns = ended_.release_ns + plan_.deadline_ns;

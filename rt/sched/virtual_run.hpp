@@ -43,7 +43,7 @@ class VirtualRun {
     Lane::Activation job = {};
     bool dropped = false;                        ///< the run ended before it started
     std::vector<Lane::Activation> waiting = {};  ///< followers still to run in this pass
-    bool asleep = false;  ///< its worker waits for the release of the follower `job`
+    bool asleep = false;                         ///< its worker waits for the release of the follower `job`
   };
 
   analysis::Ticks begin(const analysis::SimulatedJob& job);

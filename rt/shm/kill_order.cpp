@@ -7,9 +7,9 @@
 
 namespace takt {
 namespace {
-constexpr std::array<std::string_view, kMessageSteps> kNames = {"none",           "after_loan",    "half_written",
-                                                                "inside_publish", "after_publish", "inside_commit",
-                                                                "after_commit",   "while_held",    "inside_release"};
+constexpr std::array<std::string_view, kMessageSteps> kNames = {
+    "none",          "inside_loan",  "after_loan",  "half_written", "inside_publish", "after_publish",
+    "inside_commit", "after_commit", "inside_take", "while_held",   "inside_release"};
 }  // namespace
 
 std::string_view to_string(MessageStep step) { return kNames[static_cast<size_t>(step)]; }
@@ -26,6 +26,7 @@ void detail::obey(KillOrder& order, MessageStep step, size_t port, std::byte* me
   for (uint32_t left = order.passes.load(); left > 0;)
     if (order.passes.compare_exchange_weak(left, left - 1)) return;
   order.step.store(MessageStep::none);  // whoever takes this process's place has no such order
+  if (const KillOrder::Deed deed = order.instead.load()) return deed(order, message, bytes);
   if (step == MessageStep::half_written && message != nullptr) std::memset(message, 0xA5, bytes / 2);
   raise(SIGKILL);
 }

@@ -12,27 +12,36 @@ namespace takt {
 
 enum class MessageStep : uint32_t {
   none,
+  inside_loan,     ///< the writer has looked who holds which chunk, and has taken none yet
   after_loan,      ///< the writer has a chunk and has written nothing
   half_written,    ///< ... and has written half of it
   inside_publish,  ///< the message is on its way: readers may or may not find it
   after_publish,   ///< it is out, or announced and waits for the commit of its job
   inside_commit,   ///< all outputs of the job are announced, and become visible together or never
   after_commit,    ///< they have become so; this one is about to be settled
+  inside_take,     ///< a reader has flagged the chunk, and not looked again whether the message is still there
   while_held,      ///< a reader has it
   inside_release,  ///< a reader is giving it back
 };
-inline constexpr size_t kMessageSteps = 9;
+inline constexpr size_t kMessageSteps = 11;
 /// The most instants that one step has: those of `inside_publish` in the runtime's own pools.
 inline constexpr uint32_t kInstantsOfStep = 3;
 std::string_view to_string(MessageStep step);
 /// None if there is no step of that name.
 std::optional<MessageStep> message_step(std::string_view name);
 
+/// Whether a step is one of a reader; else it is one of the writer.
+constexpr bool is_of_reader(MessageStep step) {
+  return step == MessageStep::inside_take || step == MessageStep::while_held || step == MessageStep::inside_release;
+}
+
 /// "Kill yourself (SIGKILL) when you come to that step of that port." In memory that processes may share; `step` is
 /// stored last.
 struct KillOrder {
+  using Deed = void (*)(KillOrder& order, std::byte* message, size_t bytes);
   std::atomic<uint32_t> port{0};
-  std::atomic<uint32_t> passes{0};  ///< times that the step is passed before
+  std::atomic<uint32_t> passes{0};     ///< times that the step is passed before
+  std::atomic<Deed> instead{nullptr};  ///< what is done instead of the kill: a function of this very program
   std::atomic<MessageStep> step{MessageStep::none};
 };
 

@@ -1,10 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-// The memory of the local transport. A port is an array of chunks and a ring of slots, one per kept message; both lie
-// in one shared-memory file, so that several processes can map it.
+// The memory of the local transport. A port is an array of chunks and a ring of slots, one per kept message; they lie
+// in one shared-memory file, which several processes map. Each word of it has one process that writes it: the state,
+// the ring and the chunks of a port that of its writer; the flags of readers that of the readers.
 //
-// Who holds a chunk is one bit of the chunk's mask: one for the writer that has loaned it, one for the ring that keeps
-// it, one for each reader. A mask of 0 is a free chunk. So there is no free list to corrupt and nothing to lock, and
-// when a process has been killed, at whatever instant, its bits say all that must be taken back from it: see reclaim().
+// A chunk is free if no slot names it, the writer has not loaned it, and no reader flags it. There is no free list to
+// corrupt and nothing to lock, and when a process has been killed, at whatever instant, its pages say all that must be
+// taken back from it: see reclaim_readers() and reclaim_writer().
+//
+// Why no reader ever holds a chunk that the writer fills (hazard pointers: Michael, 2004; the order is Dekker's):
+//   reader  F: sets its flag of the chunk      C: looks whether the slot still has the sequence, else drops the flag
+//   writer  E: empties the slot (evict)        S: looks at all flags (mark_used), once a loan, then chooses a chunk
+// All four are sequentially consistent, so they have one order. F before S: the writer sees the flag and leaves the
+// chunk alone. S before F: then E, S, F, C, and C finds the slot empty or with another sequence. A sequence comes twice
+// only where its first message was withdrawn, which no reader can have listed.
 #pragma once
 #include <array>
 #include <atomic>
@@ -28,98 +36,91 @@ struct PoolSlot {
 
 /// One per port.
 struct alignas(64) PoolState {
-  static constexpr uint32_t kHolders = 64;
-  static constexpr uint32_t kWriter = 0, kRing = 1, kFirstReader = 2;
   std::atomic<uint64_t> newest{0};  ///< sequence of the newest message
   std::atomic<uint64_t> pool_empty{0};
   std::atomic<uint32_t> peak_in_use{0};
+  std::atomic<uint32_t> loaned{0};  ///< 1 + the chunk that the writer has on loan; 0: none
   std::atomic<uint32_t> writer{0};  ///< the process that made the last writer
-  /// By bit: the process whose reader has it; 0: nobody.
-  std::array<std::atomic<uint32_t>, kHolders> readers{};
 };
 
 /// A port as one process sees it.
 class LocalPool {
  public:
-  static constexpr uint64_t bit(uint32_t holder) { return uint64_t{1} << holder; }
+  using Word = std::atomic<uint64_t>;
 
-  LocalPool(const PortPlan& plan, size_t index);
+  /// Processes have the numbers 1 to `processes`.
+  LocalPool(const PortPlan& plan, size_t index, uint32_t processes);
 
-  /// Where a port lies in the file: first what all ports are managed by, then their chunks. `place` is called with the
-  /// bytes of each part and answers where it is.
-  template <class Place>
-  void lay_out_control(Place&& place) {
-    state_ = reinterpret_cast<PoolState*>(place(sizeof(PoolState)));
-    holders_ = reinterpret_cast<std::atomic<uint64_t>*>(place(sizeof(std::atomic<uint64_t>) * chunks_));
-    ring_ = reinterpret_cast<PoolSlot*>(place(sizeof(PoolSlot) * plan_.history));
-  }
-  template <class Place>
-  void lay_out_chunks(Place&& place) {
-    base_ = place(bytes());
-  }
-  /// In fresh memory, once.
-  void construct();
+  /// What lies in pages of the port's writer, and of each process that may read. Zeros mean that all is empty.
+  uint64_t control_bytes() const { return sizeof(PoolState) + sizeof(PoolSlot) * plan_.history; }
+  uint64_t bytes() const { return chunk_bytes_ * chunks_; }
+  uint64_t flag_bytes() const { return sizeof(Word) * (1 + uint64_t{rows_} * words_); }
+  void lay_out_control(std::byte* at);
+  void lay_out_chunks(std::byte* at) { base_ = at; }
+  void lay_out_flags(uint32_t process, std::byte* at);
 
   const PortPlan& plan() const { return plan_; }
   size_t index() const { return index_; }
   uint32_t chunks() const { return chunks_; }
   uint32_t slots() const { return plan_.history; }
   uint64_t chunk_bytes() const { return chunk_bytes_; }
-  uint64_t bytes() const { return chunk_bytes_ * chunks_; }
+  /// Words of a set of chunks, one bit each.
+  uint32_t words() const { return words_; }
   PoolState& state() const { return *state_; }
   MessageHeader* header(uint32_t chunk) const { return reinterpret_cast<MessageHeader*>(base_ + chunk * chunk_bytes_); }
+  /// Marks the end of a chunk before its message is written, and looks whether the mark, the header and the structure
+  /// of the message are what they were.
+  void mark_end(uint32_t chunk) const;
+  bool intact(uint32_t chunk) const;
   uint64_t offset(const MessageHeader* header) const {
     return static_cast<uint64_t>(reinterpret_cast<const std::byte*>(header) - base_);
   }
   PoolSlot& slot(uint64_t sequence) const { return ring_[sequence % plan_.history]; }
 
-  /// Takes a free chunk for the writer; false if it is not free.
-  bool loan(uint32_t chunk) const {
-    uint64_t free = 0;
-    return holders_[chunk].compare_exchange_strong(free, bit(PoolState::kWriter), std::memory_order_acq_rel);
-  }
-  /// A further holder of a chunk; false if nobody has it any more.
-  bool hold(uint32_t chunk, uint32_t holder) const {
-    uint64_t holders = holders_[chunk].load();
-    do {
-      if (holders == 0) return false;
-    } while (!holders_[chunk].compare_exchange_weak(holders, holders | bit(holder)));
-    return true;
-  }
-  void drop(uint32_t chunk, uint32_t holder) const {
-    holders_[chunk].fetch_and(~bit(holder), std::memory_order_acq_rel);
-  }
+  /// Sets exactly the bits of the chunks that are not free; returns how many they are.
+  uint32_t mark_used(std::span<uint64_t> used) const;
   uint32_t in_use() const;
 
-  /// Publishes a chunk that the writer holds, as the next message; under a commit it only announces it, see PoolSlot.
-  /// The writer holds it no longer afterwards.
+  /// Publishes a chunk, on loan or in the ring already, as the next message; under a commit it only announces it, see
+  /// PoolSlot. Nothing is on loan afterwards.
   void announce(uint32_t chunk, int64_t stamp_ns, int64_t visible_at_ns, uint32_t commit, int64_t delay_ns) const;
   /// Number of the oldest message that is not settled: one more than the newest if there is none.
   uint64_t first_announced() const;
   /// Takes back the messages from that one on: none of them has been visible.
   void withdraw(uint64_t first) const;
   /// Empties a slot.
-  void evict(PoolSlot& slot) const;
+  void evict(PoolSlot& slot) const { slot.sequence.exchange(0); }
 
-  /// A bit for a reader of that process. Throws std::runtime_error if there is none left.
-  uint32_t claim_reader(uint32_t process) const;
-  void return_reader(uint32_t holder) const;
-  /// Takes back what a process held that has ended without returning it: chunks on loan or half published, held
-  /// messages, bits of readers. What it had published stays. Once the process is certain to be dead; others may go on
-  /// reading meanwhile. The number of chunks that are free now and were not before.
-  uint32_t reclaim(uint32_t process) const;
+  /// A row of flags, words() long and empty, for a reader of that process. Throws std::runtime_error if there is none
+  /// left.
+  Word* claim_row(uint32_t process) const;
+  void return_row(uint32_t process, Word* row) const;
+  /// Drops what the readers of a process held that has ended without returning it. Once it is certainly dead.
+  void reclaim_readers(uint32_t process) const;
+  /// Brings a port in order whose writer has ended within a publication or with a chunk on loan. What it had published
+  /// stays. Once it is certainly dead; others may go on reading meanwhile.
+  void reclaim_writer() const;
 
  private:
-  bool in_ring(uint32_t chunk) const;
+  using Canary = std::array<uint64_t, 8>;
+  static constexpr uint64_t kCanary = 0x5af0'c3e7'1b96'd8a2;  // no text, no number of any size that a node would write
+  Canary& canary(uint32_t chunk) const {
+    return *reinterpret_cast<Canary*>(base_ + (chunk + 1) * chunk_bytes_ - sizeof(Canary));
+  }
+  struct Flags {
+    Word* claimed = nullptr;  ///< one bit a row
+    Word* rows = nullptr;
+  };
+  void clear(Word* row) const;
 
   PortPlan plan_;
   size_t index_;
   uint64_t chunk_bytes_;
-  uint32_t chunks_;
+  uint32_t chunks_, words_, rows_;
   PoolState* state_ = nullptr;
-  std::atomic<uint64_t>* holders_ = nullptr;
   PoolSlot* ring_ = nullptr;
   std::byte* base_ = nullptr;
+  std::vector<Flags> flags_;  ///< by process
 };
 
 }  // namespace takt

@@ -1,19 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writers and readers over the pools of local_pool.hpp: the writer looks for a free chunk, a reader adds its bit to the
-// holders of one that is not free and then checks that the slot still names that message.
+// Writers and readers over the pools of local_pool.hpp, whose head says why none holds what another one fills.
 #include "rt/shm/local_transport.hpp"
 
-#include <sys/mman.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
-#include <algorithm>
-#include <cerrno>
-#include <cstdio>
-#include <cstdlib>
-#include <cstring>
 #include <limits>
+#include <optional>
 #include <stdexcept>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "rt/shm/commit_ring.hpp"
@@ -26,43 +19,30 @@ namespace {
 constexpr uint32_t kNoChunk = 0xffffffff;
 constexpr uint32_t kSettled = 0;  // no commit
 
-/// Places parts one after the other, each on a cache line of its own; without memory it only counts.
-class Carver {
- public:
-  explicit Carver(std::byte* memory) : memory_(memory) {}
-  std::byte* operator()(uint64_t bytes) {
-    std::byte* at = memory_ == nullptr ? nullptr : memory_ + used_;
-    used_ = round_up(used_ + bytes, 64);
-    return at;
-  }
-  void to_next_page() { used_ = round_up(used_, 4096); }
-  uint64_t used() const { return used_; }
-
- private:
-  static constexpr uint64_t round_up(uint64_t bytes, uint64_t to) { return (bytes + to - 1) / to * to; }
-  std::byte* memory_;
-  uint64_t used_ = 0;
-};
-
 class LocalWriter final : public Writer {
  public:
-  LocalWriter(const LocalPool& pool, uint32_t process) : pool_(pool) { pool.state().writer.store(process); }
+  LocalWriter(const LocalPool& pool, uint32_t process) : pool_(pool), used_(pool.words()) {
+    pool.reclaim_writer();
+    pool.state().writer.store(process);
+  }
   ~LocalWriter() override {
     discard();
     for (uint64_t s = 1; s <= pool_.slots(); ++s) pool_.evict(pool_.slot(s));
   }
 
   MessageHeader* loan() override {
-    for (uint32_t i = 0; i < pool_.chunks() && loaned_ == kNoChunk; ++i) {
-      const uint32_t chunk = (next_ + i) % pool_.chunks();
-      if (!pool_.loan(chunk)) continue;
-      next_ = chunk + 1;
-      loaned_ = chunk;
-      const uint32_t in_use = pool_.in_use();
-      if (in_use > pool_.state().peak_in_use.load(std::memory_order_relaxed)) pool_.state().peak_in_use.store(in_use);
-      return begin(pool_.header(chunk));
+    PoolState& state = pool_.state();
+    if (loaned_ == kNoChunk) {
+      const uint32_t in_use = pool_.mark_used(used_) + 1;
+      reached(MessageStep::inside_loan, pool_.index());
+      loaned_ = next_free();
+      if (loaned_ != kNoChunk) {
+        state.loaned.store(loaned_ + 1, std::memory_order_release);
+        if (in_use > state.peak_in_use.load(std::memory_order_relaxed)) state.peak_in_use.store(in_use);
+        return begin(pool_.header(loaned_));
+      }
     }
-    pool_.state().pool_empty.fetch_add(1, std::memory_order_relaxed);
+    state.pool_empty.fetch_add(1, std::memory_order_relaxed);
     return nullptr;
   }
 
@@ -97,8 +77,10 @@ class LocalWriter final : public Writer {
     }
   }
 
+  bool intact() const override { return loaned_ == kNoChunk || pool_.intact(loaned_); }
+
   void discard() override {
-    if (loaned_ != kNoChunk) pool_.drop(loaned_, PoolState::kWriter);
+    if (loaned_ != kNoChunk) pool_.state().loaned.store(0);
     loaned_ = kNoChunk;
   }
 
@@ -113,7 +95,7 @@ class LocalWriter final : public Writer {
     s.pool_empty = pool_.state().pool_empty.load();
     s.chunks = pool_.chunks();
     s.peak_in_use = pool_.state().peak_in_use.load();
-    s.in_use = pool_.in_use();
+    s.in_use = pool_.mark_used(used_);
     s.bytes = pool_.bytes();
     return s;
   }
@@ -132,16 +114,27 @@ class LocalWriter final : public Writer {
     const PoolSlot& last = pool_.slot(newest);
     // None yet; or an earlier writer of this port has gone and took its messages along.
     if (newest == 0 || last.sequence.load() != newest) return false;
-    const uint32_t chunk = last.chunk.load(std::memory_order_relaxed);
-    pool_.hold(chunk, PoolState::kWriter);
-    pool_.announce(chunk, last.stamp_ns.load(std::memory_order_relaxed), visible_at_ns, commit, delay_ns);
+    pool_.announce(last.chunk.load(std::memory_order_relaxed), last.stamp_ns.load(std::memory_order_relaxed),
+                   visible_at_ns, commit, delay_ns);
     return true;
+  }
+
+  /// The next chunk that is not marked as used, in turn.
+  uint32_t next_free() {
+    for (uint32_t i = 0; i < pool_.chunks(); ++i) {
+      const uint32_t chunk = (next_ + i) % pool_.chunks();
+      if ((used_[chunk / 64] >> chunk % 64 & 1) != 0) continue;
+      next_ = chunk + 1;
+      return chunk;
+    }
+    return kNoChunk;
   }
 
   MessageHeader* begin(MessageHeader* header) {
     reached(MessageStep::after_loan, pool_.index());
     *header = MessageHeader{};
     header->loan_offset = pool_.offset(header);
+    pool_.mark_end(loaned_);
     pool_.plan().type->place(header + 1, pool_.plan().capacity);
     reached(MessageStep::half_written, pool_.index(), header, pool_.chunk_bytes());
     return header;
@@ -149,17 +142,14 @@ class LocalWriter final : public Writer {
 
   const LocalPool& pool_;
   uint32_t loaned_ = kNoChunk, next_ = 0;
+  mutable std::vector<uint64_t> used_;  ///< chunks that were not free when it last looked
 };
 
 class LocalReader final : public Reader {
  public:
   LocalReader(const LocalPool& pool, uint32_t process)
-      : pool_(pool), holder_(pool.claim_reader(process)), holds_(pool.chunks()) {}
-  ~LocalReader() override {
-    for (uint32_t chunk = 0; chunk < holds_.size(); ++chunk)
-      if (holds_[chunk] > 0) pool_.drop(chunk, holder_);
-    pool_.return_reader(holder_);
-  }
+      : pool_(pool), process_(process), row_(pool.claim_row(process)), flags_(pool.words()), holds_(pool.chunks()) {}
+  ~LocalReader() override { pool_.return_row(process_, row_); }
 
   void set_commits(CommitRing& commits, const Clock& clock) override {
     commits_ = &commits;
@@ -181,19 +171,19 @@ class LocalReader final : public Reader {
     const PoolSlot& slot = pool_.slot(sequence);
     const uint32_t chunk = slot.chunk.load();
     Held held{nullptr, sequence, listed.stamp_ns, listed.visible_at_ns, chunk};
-    if (!pool_.hold(chunk, holder_)) return {};
-    ++holds_[chunk];
+    if (chunk >= pool_.chunks()) return {};
+    flag(chunk);
+    reached(MessageStep::inside_take, pool_.index());
     if (slot.sequence.load() != sequence) {  // the chunk may already be somebody else's
       let_go(chunk);
       return {};
     }
-    held.header = pool_.header(chunk);
-    const uint64_t offset = pool_.offset(held.header);
-    if (held.header->loan_offset != offset) {
-      std::fprintf(stderr, "takt: bug: message of %s.%s was loaned at offset %lu and taken at %lu\n",
-                   pool_.plan().node.c_str(), pool_.plan().port.c_str(), held.header->loan_offset, offset);
-      std::abort();
+    if (!pool_.intact(chunk)) {  // its own process wrote there; this one goes on
+      damaged_ += sequence != std::exchange(last_damaged_, sequence);
+      let_go(chunk);
+      return {};
     }
+    held.header = pool_.header(chunk);
     reached(MessageStep::while_held, pool_.index());
     return held;
   }
@@ -202,6 +192,8 @@ class LocalReader final : public Reader {
     if (held) let_go(held.chunk);
     held = {};
   }
+
+  uint64_t damaged() const override { return damaged_; }
 
  private:
   /// False if the message of that number is gone, or not for a job released at the limit of the last list().
@@ -227,51 +219,77 @@ class LocalReader final : public Reader {
   }
 
   /// A reader may hold one chunk for several messages, which repeat each other.
+  void flag(uint32_t chunk) {
+    if (holds_[chunk]++ > 0) return;
+    flags_[chunk / 64] |= uint64_t{1} << chunk % 64;
+    row_[chunk / 64].store(flags_[chunk / 64]);  // step F of local_pool.hpp
+  }
   void let_go(uint32_t chunk) {
     if (--holds_[chunk] > 0) return;
     reached(MessageStep::inside_release, pool_.index());
-    pool_.drop(chunk, holder_);
+    flags_[chunk / 64] &= ~(uint64_t{1} << chunk % 64);
+    row_[chunk / 64].store(flags_[chunk / 64], std::memory_order_release);
   }
 
   const LocalPool& pool_;
-  const uint32_t holder_;
+  const uint32_t process_;
+  LocalPool::Word* const row_;
+  std::vector<uint64_t> flags_;  ///< what row_ says, or has to
   std::vector<uint32_t> holds_;  ///< by chunk
+  uint64_t damaged_ = 0, last_damaged_ = 0;
   int64_t limit_ns_ = std::numeric_limits<int64_t>::max();
   CommitRing* commits_ = nullptr;
   const Clock* clock_ = nullptr;
 };
 
+/// The parts of the file: first the flags of each process, then of each port what its writer manages it by, its chunks.
 class LocalTransport final : public Transport {
  public:
-  /// `fresh`: sizes the file and puts empty ports into it; otherwise another process has.
-  LocalTransport(std::span<const PortPlan> ports, const PoolFile& file, uint32_t process, bool fresh)
-      : process_(process) {
-    for (const PortPlan& port : ports) pools_.emplace_back(port, pools_.size());
-    bytes_ = carve(nullptr);
-    if (bytes_ == 0) return;
-    if (fresh) file.resize(bytes_);
+  enum class How { alone, make, join };
+  LocalTransport(std::span<const PortPlan> ports, const PoolFile& file, uint32_t process, How how)
+      : process_(process), processes_(file.processes()), alone_(how == How::alone) {
+    if (process == 0 || process > processes_)
+      throw std::logic_error("process " + std::to_string(process) + " of " + std::to_string(processes_));
+    for (const PortPlan& port : ports) pools_.emplace_back(port, pools_.size(), processes_);
+    std::vector<uint64_t> parts(processes_);
+    for (const LocalPool& pool : pools_) {
+      for (uint32_t p = 0; p < processes_; ++p) parts[p] += pool.flag_bytes();
+      parts.insert(parts.end(), {pool.control_bytes(), pool.bytes()});
+    }
+    bytes_ = PoolMemory::bytes(parts);
+    if (how != How::join) file.resize(bytes_);
     // Of another size, the same offsets would mean something else, and what lies behind its end would end this process.
     else if (file.bytes() != bytes_) throw std::logic_error("the message pools were made for other ports");
-    map(file);
-    carve(memory_);
-    if (!fresh) return;
-    for (LocalPool& pool : pools_) pool.construct();
-  }
-
-  ~LocalTransport() override {
-    if (memory_ != nullptr) munmap(memory_, bytes_);
+    memory_.emplace(file, parts, alone_ ? PoolMemory::Access::all : PoolMemory::Access::parts);
+    if (!pools_.empty()) memory_->allow_writing(process_ - 1);
+    lay_out();
   }
 
   std::unique_ptr<Writer> make_writer(size_t port) override {
+    memory_->allow_writing(control_of(port));
+    memory_->allow_writing(chunks_of(port));
     return std::make_unique<LocalWriter>(pools_[port], process_);
   }
   std::unique_ptr<Reader> make_reader(size_t port) override {
     return std::make_unique<LocalReader>(pools_[port], process_);
   }
   uint32_t reclaim(uint32_t process) override {
-    uint32_t freed = 0;
-    for (const LocalPool& pool : pools_) freed += pool.reclaim(process);
-    return freed;
+    if (alone_ || process == 0 || process > processes_ || pools_.empty()) return 0;
+    const uint32_t before = chunks_in_use();
+    const PoolMemory::Window flags = memory_->write(process - 1);
+    uint64_t at = 0;
+    for (size_t p = 0; p < pools_.size(); ++p) {
+      LocalPool dead = pools_[p];
+      dead.lay_out_flags(process, flags.at() + at);
+      at += dead.flag_bytes();
+      dead.reclaim_readers(process);
+      if (dead.state().writer.load() != process) continue;
+      const PoolMemory::Window control = memory_->write(control_of(p));
+      dead.lay_out_control(control.at());
+      dead.reclaim_writer();
+    }
+    const uint32_t after = chunks_in_use();
+    return before > after ? before - after : 0;  // others loan and release meanwhile
   }
   uint32_t chunks_in_use() const override {
     uint32_t in_use = 0;
@@ -282,64 +300,44 @@ class LocalTransport final : public Transport {
   const char* name() const override { return "local"; }
 
  private:
-  /// Every process places the ports of the same plan at the same offsets.
-  uint64_t carve(std::byte* memory) {
-    Carver carver(memory);
-    for (LocalPool& pool : pools_) pool.lay_out_control(carver);
-    for (LocalPool& pool : pools_) {
-      carver.to_next_page();
-      pool.lay_out_chunks(carver);
+  size_t control_of(size_t port) const { return processes_ + 2 * port; }
+  size_t chunks_of(size_t port) const { return processes_ + 2 * port + 1; }
+
+  void lay_out() {
+    for (uint32_t process = 1; process <= processes_; ++process) {
+      std::byte* at = memory_->at(process - 1);
+      for (LocalPool& pool : pools_) {
+        pool.lay_out_flags(process, at);
+        at += pool.flag_bytes();
+      }
     }
-    carver.to_next_page();
-    return carver.used();
+    for (size_t p = 0; p < pools_.size(); ++p) {
+      pools_[p].lay_out_control(memory_->at(control_of(p)));
+      pools_[p].lay_out_chunks(memory_->at(chunks_of(p)));
+    }
   }
 
-  void map(const PoolFile& file) {
-    // Populated now, so that no job takes the page fault.
-    void* memory = mmap(nullptr, bytes_, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_POPULATE, file.descriptor(), 0);
-    if (memory == MAP_FAILED)
-      throw std::runtime_error("cannot map " + std::to_string(bytes_ / 1'000'000) + " MB of message pools: " +
-                               std::strerror(errno) + "; lower image sizes or edge depths, or free memory");
-    memory_ = static_cast<std::byte*>(memory);
-  }
-
-  const uint32_t process_;
+  const uint32_t process_, processes_;
+  const bool alone_;
   std::vector<LocalPool> pools_;
-  std::byte* memory_ = nullptr;
+  std::optional<PoolMemory> memory_;
   uint64_t bytes_ = 0;
 };
 
 }  // namespace
 
-PoolFile::PoolFile() : descriptor_(memfd_create("takt", MFD_CLOEXEC)) {
-  if (descriptor_ < 0) throw std::runtime_error(std::string("shared memory: ") + std::strerror(errno));
-}
-
-PoolFile::~PoolFile() { close(descriptor_); }
-
-void PoolFile::resize(uint64_t bytes) const {
-  if (ftruncate(descriptor_, static_cast<off_t>(bytes)) != 0)
-    throw std::runtime_error("shared memory of " + std::to_string(bytes) + " bytes: " + std::strerror(errno));
-}
-
-uint64_t PoolFile::bytes() const {
-  struct stat status {};
-  if (fstat(descriptor_, &status) != 0) throw std::runtime_error(std::string("shared memory: ") + std::strerror(errno));
-  return static_cast<uint64_t>(status.st_size);
-}
-
 std::unique_ptr<Transport> make_local_transport(std::span<const PortPlan> ports) {
-  return std::make_unique<LocalTransport>(ports, PoolFile(), 1, true);
+  return std::make_unique<LocalTransport>(ports, PoolFile(1), 1, LocalTransport::How::alone);
 }
 
 std::unique_ptr<Transport> make_local_transport(std::span<const PortPlan> ports, const PoolFile& file,
                                                 uint32_t process) {
-  return std::make_unique<LocalTransport>(ports, file, process, true);
+  return std::make_unique<LocalTransport>(ports, file, process, LocalTransport::How::make);
 }
 
 std::unique_ptr<Transport> join_local_transport(std::span<const PortPlan> ports, const PoolFile& file,
                                                 uint32_t process) {
-  return std::make_unique<LocalTransport>(ports, file, process, false);
+  return std::make_unique<LocalTransport>(ports, file, process, LocalTransport::How::join);
 }
 
 }  // namespace takt

@@ -6,33 +6,15 @@
 #include <memory>
 #include <span>
 
+#include "rt/shm/pool_memory.hpp"
 #include "rt/shm/transport.hpp"
 
 namespace takt {
 
-/// The anonymous shared-memory file behind the pools. Processes forked while it exists can map it, too; it is gone when
-/// the last of them is.
-class PoolFile {
- public:
-  /// Throws std::runtime_error if the kernel refuses.
-  PoolFile();
-  ~PoolFile();
-  PoolFile(const PoolFile&) = delete;
-  PoolFile& operator=(const PoolFile&) = delete;
-
-  int descriptor() const { return descriptor_; }
-  /// Throws std::runtime_error.
-  void resize(uint64_t bytes) const;
-  /// Its size. Throws std::runtime_error.
-  uint64_t bytes() const;
-
- private:
-  int descriptor_ = -1;
-};
-
-/// Pools in `file`, empty. One process makes them, before any other joins. `process` is the number, from 1, under which
-/// its writers and readers hold chunks; no two processes that live at one time share one. Throws as
-/// make_local_transport(ports) does.
+/// Pools in `file`, which is new. One process makes them, before any other joins. `process` is its number among those
+/// of the file, under which its writers and readers hold chunks; no two processes that live at one time share one. A
+/// process can write to the pools that it makes writers for, and to nothing else of the others: the rest is read-only.
+/// Throws as make_local_transport(ports) does.
 std::unique_ptr<Transport> make_local_transport(std::span<const PortPlan> ports, const PoolFile& file,
                                                 uint32_t process = 1);
 /// The pools that another process made for the same ports. Throws std::logic_error if they were made for others (seen

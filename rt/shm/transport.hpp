@@ -57,6 +57,8 @@ class Writer {
   virtual MessageHeader* loan() = 0;
   /// Publishes the loaned chunk.
   virtual void publish(int64_t stamp_ns, int64_t published_ns, int64_t visible_at_ns) = 0;
+  /// False if something was written past the end of the loaned message, or over its structure.
+  virtual bool intact() const { return true; }
   /// Gives the loaned chunk back unpublished.
   virtual void discard() = 0;
   /// Publishes the previous message again, with its old stamp; false if there is none.
@@ -97,8 +99,10 @@ class Reader {
   }
   /// The messages with visible_at <= limit that can still be taken, newest first; returns how many were listed.
   virtual size_t list(int64_t limit_ns, std::span<Candidate> out) = 0;
-  /// Holds one of them; an empty Held if it was overwritten meanwhile.
+  /// Holds one of them; an empty Held if it was overwritten meanwhile, or is damaged.
   virtual Held take(uint64_t sequence) = 0;
+  /// Messages that take() found damaged: another process wrote where it should not. Counted once each.
+  virtual uint64_t damaged() const { return 0; }
   virtual void release(Held& held) = 0;
 };
 

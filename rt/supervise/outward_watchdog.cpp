@@ -59,7 +59,7 @@ void OutwardWatchdog::end() {
 }
 
 void OutwardWatchdog::look(int64_t now_ns) {
-  const uint32_t mode = board_.modes().at(now_ns);
+  const uint32_t mode = board_.mode_at(now_ns);
   for (size_t i = 0; i < watched_.size(); ++i) {
     Watched& watched = watched_[i];
     const TaskStatistics& statistics = board_.task(watched.task);
@@ -84,7 +84,7 @@ void OutwardWatchdog::feed(int64_t now_ns) {
 }
 
 void OutwardWatchdog::tell_status(int64_t now_ns) {
-  const uint32_t mode = board_.modes().at(now_ns);
+  const uint32_t mode = board_.mode_at(now_ns);
   std::string text = "mode " + (mode < plan_.modes.size() ? plan_.modes[mode].name : plan_.mode);
   for (size_t t = 0; t < plan_.tasks.size(); ++t)
     if (const SourceState state = board_.source(t).state.load(); state != SourceState::ok)

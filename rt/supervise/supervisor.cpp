@@ -144,7 +144,7 @@ uint64_t Supervisor::releases_seen(size_t task) const {
 }
 
 bool Supervisor::all_ran(const Member& member) const {
-  const uint32_t mode = board_.modes().at(clock_.now_ns());
+  const uint32_t mode = board_.mode_at(clock_.now_ns());
   for (size_t i = 0; i < member.tasks.size(); ++i) {
     const size_t t = member.tasks[i];
     const bool waits = !plan_.tasks[t].rate || (mode < plan_.modes.size() && !plan_.modes[mode].runs[t]);
@@ -177,7 +177,7 @@ void Supervisor::watch_return(size_t process, int64_t now_ns) {
 void Supervisor::watch_life(size_t process, int64_t now_ns) {
   Member& member = members_[process];
   const LifeSigns& life = board_.process(process).life;
-  if (const uint32_t hanging = life.hanging.load(); hanging > 0)
+  if (const uint32_t hanging = life.hanging.load(); hanging > 0 && hanging <= plan_.tasks.size())
     return end(process, life.hanging_since_ns.load(),
                ", because a job of " + plan_.tasks[hanging - 1].name + " did not return");
   const int64_t heartbeat_ns = life.heartbeat_ns.load();

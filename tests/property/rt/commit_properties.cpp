@@ -71,7 +71,7 @@ class Interleaving {
 
   /// The producer is preempted at a step; others look meanwhile.
   void between(MessageStep step) {
-    if (step == MessageStep::while_held || step == MessageStep::inside_release) return;
+    if (is_of_reader(step)) return;
     clock_.advance_to(clock_.now_ns() + 1 + static_cast<int64_t>(random_() % busy_ == 0 ? random_() % (3 * kMs) : 0));
     const int64_t before = clock_.now_ns();
     for (PairReader& reader : readers_) {

@@ -149,6 +149,8 @@ TEST_CASE("a step of a message's life belongs to its writer or to a reader of it
   expect_problem(step("step: while_held"), 4, 66, {"`while_held`", "name it as `reader`"}, processes);
   expect_problem(step("step: after_loan, reader: planner"), 4, 66, {"`after_loan`", "leave `reader` out"}, processes);
   expect_problem(step("step: while_held, reader: stereo"), 4, 86, {"`stereo` does not read", "planner"}, processes);
+  expect_problem(step("step: inside_loan"), 4, 66, {"iceoryx has no step `inside_loan`", "--transport local"},
+                 {false, true, false, true});
 }
 
 TEST_CASE("faults that such a run cannot have") {

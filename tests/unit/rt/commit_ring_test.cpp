@@ -222,7 +222,7 @@ TEST_CASE("what an observer sees is settled: it waits for that, and changes noth
   const PairReaders observer(*scene.transport);
   size_t seen = 0;
   const AtEveryStep hook([&](MessageStep step, size_t) {
-    if (step == MessageStep::while_held || step == MessageStep::inside_release) return;
+    if (is_of_reader(step)) return;
     scene.clock.advance_to(scene.clock.now_ns() + 10);
     seen += look_at(*observer.a, kFar).size();
     scene.clock.advance_to(scene.clock.now_ns() + 10);

@@ -10,6 +10,7 @@
 #include <functional>
 #include <set>
 
+#include "commit_scene.hpp"
 #include "rt/msg/image.hpp"
 #include "rt/shm/kill_order.hpp"
 #include "rt/shm/local_transport.hpp"
@@ -156,8 +157,8 @@ void kill_reader(MessageStep step, uint32_t passes) {
 }  // namespace
 
 TEST_CASE("a writer killed at any step leaves whole messages and no chunk taken; the next one goes on") {
-  for (const MessageStep step :
-       {MessageStep::after_loan, MessageStep::half_written, MessageStep::inside_publish, MessageStep::after_publish}) {
+  for (const MessageStep step : {MessageStep::inside_loan, MessageStep::after_loan, MessageStep::half_written,
+                                 MessageStep::inside_publish, MessageStep::after_publish}) {
     const auto name = std::string(to_string(step));
     CAPTURE(name);
     for (int i = 0; i < kRepeats; ++i) kill_writer(step, static_cast<uint32_t>(i % 6));
@@ -165,7 +166,7 @@ TEST_CASE("a writer killed at any step leaves whole messages and no chunk taken;
 }
 
 TEST_CASE("a reader killed at any step takes nothing along, neither from the writer nor from another reader") {
-  for (const MessageStep step : {MessageStep::while_held, MessageStep::inside_release}) {
+  for (const MessageStep step : {MessageStep::inside_take, MessageStep::while_held, MessageStep::inside_release}) {
     const auto name = std::string(to_string(step));
     CAPTURE(name);
     for (int i = 0; i < kRepeats; ++i) kill_reader(step, static_cast<uint32_t>(i % 6));
@@ -179,6 +180,94 @@ TEST_CASE("a killed process that nobody clears up after keeps what it held, and 
   CHECK(stage.transport().reclaim(kVictim + 1) == 0);
   CHECK(stage.transport().reclaim(kVictim) == 1);
   CHECK(stage.transport().chunks_in_use() == 0);
+}
+
+namespace {
+
+/// The pair's task in a process of its own (commit_scene.hpp), job by job, over pools and a board that outlive it.
+class PairStage {
+ public:
+  PairStage() : plan_(pair_plan(node_)), board_(plan_), transport_(make_local_transport(plan_.ports, file_, kSelf)) {}
+
+  Transport& transport() { return *transport_; }
+  RunBoard& board() { return board_; }
+  const Clock& clock() const { return clock_; }
+  const Plan& plan() const { return plan_; }
+
+  /// Runs jobs in a process that dies when it comes to that step of that output; true if it did.
+  bool die_at(MessageStep step, size_t port, uint32_t passes) {
+    KillOrder& order = board_.process(0).kill;
+    order.port.store(static_cast<uint32_t>(port));
+    order.passes.store(passes);
+    order.step.store(step);
+    const pid_t child = fork();
+    REQUIRE(child >= 0);
+    if (child == 0) {
+      obey_orders(&order);
+      try {
+        const auto joined = join_local_transport(plan_.ports, file_, kVictim);
+        run(*joined, 8);
+      } catch (...) {  // else the child would go on with the tests
+      }
+      _exit(0);
+    }
+    int status = 0;
+    REQUIRE(waitpid(child, &status, 0) == child);
+    transport_->reclaim(kVictim);
+    return WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL;
+  }
+
+  void run(Transport& transport, uint64_t jobs) {
+    Task task(plan_, 0, transport, clock_, board_);
+    for (uint64_t n = 0; n < jobs; ++n) {
+      task.run(board_.task(0).completed.load(), clock_.now_ns());
+      task.count(0);
+    }
+  }
+
+ private:
+  MonotonicClock clock_;
+  PairNode node_;
+  Plan plan_;
+  RunBoard board_;
+  PoolFile file_;
+  std::unique_ptr<Transport> transport_;
+};
+
+}  // namespace
+
+TEST_CASE("whatever step a process dies at, both outputs of a job are out or none is, before and after its successor") {
+  for (const MessageStep step : {MessageStep::after_loan, MessageStep::half_written, MessageStep::inside_publish,
+                                 MessageStep::after_publish, MessageStep::inside_commit, MessageStep::after_commit})
+    for (const size_t port : {size_t{0}, size_t{1}})
+      for (uint32_t passes = 0; passes < 8; ++passes) {
+        const auto name = std::string(to_string(step));
+        CAPTURE(name);
+        CAPTURE(port);
+        CAPTURE(passes);
+        PairStage stage;
+        const PairReaders job(stage.transport(), stage.board(), stage.clock()), observer(stage.transport());
+        for (int generation = 0; generation < 2; ++generation) {
+          CAPTURE(generation);
+          REQUIRE(stage.die_at(step, port, passes));
+          // Nobody has settled yet what it left.
+          int64_t now = stage.clock().now_ns();
+          CHECK(look_at(*job.a, now) == look_at(*job.b, now));
+          now = stage.clock().now_ns();
+          CHECK(look_at(*job.a, now) == look_at(*job.b, now));
+        }
+        PairNode node;
+        Plan plan = pair_plan(node);
+        const Task successor(plan, 0, stage.transport(), stage.clock(), stage.board());
+        const int64_t now = stage.clock().now_ns();
+        const std::vector<SeenMessage> left = look_at(*job.a, now);
+        CHECK(left == look_at(*job.b, now));
+        CHECK_MESSAGE(left == look_at(*observer.a, CommitRing::kNever), "visible to jobs and not settled");
+        CHECK(left == look_at(*observer.b, CommitRing::kNever));
+        for (size_t i = 0; i < left.size(); ++i) CHECK(left[i].sequence == left[0].sequence - i);
+        CHECK_MESSAGE(stage.transport().chunks_in_use() == 2 * left.size(), "a chunk nobody has");
+        CHECK(stage.board().commits(0).spoiled() == 0);
+      }
 }
 
 TEST_CASE("steps have names") {

@@ -60,7 +60,7 @@ struct VirtualScene {
   }
   void run(int64_t for_ms = 100, const std::function<int64_t(size_t, uint64_t)>& duration_ns = {}) {
     const auto transport = make_local_transport(plan.ports);
-    board = std::make_unique<RunBoard>(plan);
+    if (!board) board = std::make_unique<RunBoard>(plan);
     Executor::Options options;
     options.duration_ns = for_ms * kMs;
     options.board = board.get();
@@ -155,6 +155,29 @@ TEST_CASE("a job beyond its period: one release stays pending, those before it a
   CHECK(scene.board->task(0).skipped.load() == 1);
   CHECK(scene.board->task(0).deadline_misses.load() == 1);
   CHECK(scene.board->task(0).budget_overruns.load() == 1);
+}
+
+TEST_CASE("of the releases that passed, those that their mode leaves out and those after the end are not skipped") {
+  struct Case {
+    OnMiss verb;
+    int64_t for_ms;
+    uint64_t skipped;
+  };
+  // The first job takes 1250 ms; releases 3 to 5 are left out. One stays pending (at 1200), unless `skip` drops it and
+  // the late job itself.
+  for (const Case& c : {Case{OnMiss::proceed, 2000, 8}, {OnMiss::skip, 2000, 10}, {OnMiss::proceed, 800, 4}}) {
+    VirtualScene scene(Policy::fixed);
+    scene.add("long", 0, 5, 100).on_miss = c.verb;
+    scene.plan.modes = {{"full", {1}}, {"none", {0}}};
+    scene.board = std::make_unique<RunBoard>(scene.plan);
+    ModeLog& modes = scene.board->modes();
+    CHECK(modes.request(1, kEpoch + 250 * kMs, "a test"));
+    CHECK(modes.request(0, kEpoch + 600 * kMs, "a test"));
+    CHECK(modes.request(1, kEpoch + 600 * kMs, "at the same instant"));
+    CHECK(modes.request(0, kEpoch + 600 * kMs, "at the same instant"));
+    scene.run(c.for_ms, [](size_t, uint64_t job) { return job == 0 ? 1250 * kMs : 5 * kMs; });
+    CHECK(scene.board->task(0).skipped.load() == c.skipped);
+  }
 }
 
 TEST_CASE("followers run in the order of their lane, on its CPU time, before its next release") {
