@@ -47,18 +47,20 @@ void JobAssembler::open(Thread& thread, const Event& event) {
   thread.job.index = event.job;
   thread.job.release_ns = event.at_ns;
   thread.job.deadline_ns = event.value;
-  if (const auto changed = params_.find(event.task); changed != params_.end()) {
-    thread.job.params = std::move(changed->second);
-    params_.erase(changed);
-  }
+  // A job that never ends, because its process dies, leaves them to the next one of the task.
+  if (const auto changed = params_.find(event.task); changed != params_.end()) thread.job.params = changed->second;
 }
 
 void JobAssembler::close(Thread& thread, const Event& event) {
   thread.open = false;
   thread.job.published_ns = event.at_ns;
   const bool whole = std::exchange(thread.lost_before, static_cast<uint64_t>(event.extra)) == thread.lost_before;
-  if (whole) take_(thread.job);
-  else ++incomplete_;
+  if (!whole) {
+    ++incomplete_;
+    return;
+  }
+  take_(thread.job);
+  params_.erase(thread.job.task);
 }
 
 void JobAssembler::fill(RecordedJob& job, const Event& event) {
@@ -91,6 +93,9 @@ void JobAssembler::fill(RecordedJob& job, const Event& event) {
 
 void JobAssembler::param(const Event& event) {
   auto& params = params_[event.task];
+  Text& text = texts_[event.task];
+  if (std::exchange(text.at_ns, event.at_ns) != event.at_ns)
+    text.words.clear();  // its process died within the one before
   switch (static_cast<ParamMail::Kind>(event.extra)) {
     case ParamMail::flag: params.push_back({event.port, event.value != 0}); return;
     case ParamMail::integer: params.push_back({event.port, event.value}); return;
@@ -99,8 +104,8 @@ void JobAssembler::param(const Event& event) {
   }
   std::array<char, sizeof event.value + 1> piece{};
   std::memcpy(piece.data(), &event.value, sizeof event.value);
-  text_ += piece.data();
-  if (std::strlen(piece.data()) < sizeof event.value) params.push_back({event.port, std::exchange(text_, {})});
+  text.words += piece.data();
+  if (std::strlen(piece.data()) < sizeof event.value) params.push_back({event.port, std::exchange(text.words, {})});
 }
 
 }  // namespace takt::record

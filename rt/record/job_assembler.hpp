@@ -26,6 +26,11 @@ class JobAssembler {
     bool open = false;         ///< between the release of a job and its end
     uint64_t lost_before = 0;  ///< events, as the last job's end told
   };
+  /// Of a parameter, as far as it has come.
+  struct Text {
+    int64_t at_ns = 0;
+    std::string words;
+  };
   void open(Thread& thread, const trace::Event& event);
   void close(Thread& thread, const trace::Event& event);
   static void fill(RecordedJob& job, const trace::Event& event);
@@ -33,8 +38,8 @@ class JobAssembler {
 
   std::function<void(const RecordedJob&)> take_;
   std::map<int32_t, Thread> threads_;
-  std::map<uint16_t, std::vector<RecordedJob::Param>> params_;  ///< by task: for its next job
-  std::string text_;                                            ///< of a parameter, as far as it has come
+  std::map<uint16_t, std::vector<RecordedJob::Param>> params_;  ///< by task: for its next whole job
+  std::map<uint16_t, Text> texts_;                              ///< by task
   uint64_t incomplete_ = 0;
 };
 

@@ -14,21 +14,22 @@ void copy_text(const std::string& text, std::array<char, N>& into) {
   into[length] = 0;
 }
 
-ParamValue value_of(const ParamMail& mail) {
-  switch (mail.kind) {
-    case ParamMail::flag: return mail.whole != 0;
-    case ParamMail::integer: return mail.whole;
-    case ParamMail::number: return mail.real;
-    case ParamMail::text: return std::string(mail.words.data());
+}  // namespace
+
+ParamValue value_of(const PlainParam& plain) {
+  switch (plain.kind) {
+    case PlainParam::flag: return plain.whole != 0;
+    case PlainParam::integer: return plain.whole;
+    case PlainParam::number: return plain.real;
+    case PlainParam::text: return std::string(plain.words.data());
   }
   return {};
 }
 
-}  // namespace
-
-bool post(ParamMail& mail, size_t param, const ParamValue& value) {
+bool post(ParamMail& mail, size_t param, const ParamValue& value, uint32_t by_user) {
   if (mail.state.load(std::memory_order_acquire) == ParamMail::posted) return false;
   mail.param = static_cast<uint32_t>(param);
+  mail.by_user = by_user;
   if (const auto* flag = std::get_if<bool>(&value)) {
     mail.kind = ParamMail::flag;
     mail.whole = *flag ? 1 : 0;
@@ -48,7 +49,7 @@ bool post(ParamMail& mail, size_t param, const ParamValue& value) {
   return true;
 }
 
-void deliver(ParamMail& mail, Node& node) {
+bool deliver(ParamMail& mail, Node& node) {
   ParamBase& param = *node.params()[mail.param];
   std::string refusal;
   if (!param.live()) {
@@ -56,8 +57,27 @@ void deliver(ParamMail& mail, Node& node) {
   } else if (const auto done = param.set(value_of(mail)); !done) {
     refusal = done.error();
   }
+  if (refusal.empty()) return true;
   copy_text(refusal, mail.refusal);
-  mail.state.store(refusal.empty() ? ParamMail::taken : ParamMail::refused, std::memory_order_release);
+  mail.state.store(ParamMail::refused, std::memory_order_release);
+  return false;
+}
+
+void keep(KeptParam& kept, const PlainParam& value, int64_t at_ns) {
+  const uint32_t next = kept.count.load(std::memory_order_relaxed) + 1;
+  KeptParam::Value& place = kept.places[next % 2];
+  static_cast<PlainParam&>(place) = value;
+  place.at_ns = at_ns;
+  kept.count.store(next, std::memory_order_release);
+}
+
+void take_up(RunBoard& board, size_t task, Node& node) {
+  for (size_t p = 0; p < board.param_count(task); ++p) {
+    KeptParam& kept = board.kept(task, p);
+    const KeptParam::Value* value = kept.newest();
+    // The same parameter accepted it before, so it does again.
+    if (value != nullptr && node.params()[p]->set(value_of(*value))) kept.taken_up.fetch_add(1);
+  }
 }
 
 }  // namespace takt

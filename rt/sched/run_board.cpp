@@ -9,6 +9,8 @@
 #include <new>
 #include <stdexcept>
 
+#include "rt/node.hpp"
+
 namespace takt {
 
 namespace {
@@ -45,13 +47,17 @@ RunBoard::RunBoard(const Plan& plan, size_t processes, std::span<const size_t> p
       mode_rules_(plan.mode_rules),
       producers_(plan),
       processes_(processes) {
-  size_t edges = 0;
+  size_t edges = 0, params = 0;
   for (const TaskPlan& task : plan.tasks) {
     first_edge_.push_back(edges);
     edges += task.edges.size();
+    first_param_.push_back(params);
+    params += task.node != nullptr ? task.node->params().size() : 0;
     task_names_.push_back(task.name);
     has_source_.push_back(task.device);
   }
+  first_param_.push_back(params);
+  kept_.resize(params);
   tasks_.resize(plan.tasks.size());
   grants_.resize(tasks_.size());
   commits_.resize(tasks_.size());
@@ -88,7 +94,8 @@ size_t RunBoard::lay_out(const Plan& plan, std::span<const size_t> process_of, s
       placer.make(mail_, t);
       placer.make(sources_, t);
       placer.make(source_facts_, t);
-      for (size_t e = 0; e < plan.tasks[t].edges.size(); ++e) placer.make(edges_, first_edge_[t] + e);
+      for (size_t e = first_edge_[t]; e < first_edge_[t] + plan.tasks[t].edges.size(); ++e) placer.make(edges_, e);
+      for (size_t i = first_param_[t]; i < first_param_[t + 1]; ++i) placer.make(kept_, i);
     }
     for (size_t p = 0; p < ports_.size(); ++p) {
       const size_t producer = producers_.find(p);

@@ -21,17 +21,39 @@
 
 namespace takt {
 
-/// A parameter value on its way to a running node. One at a time per task.
-struct alignas(kCacheLine) ParamMail {
-  enum State : uint32_t { empty, posted, taken, refused };
+/// A parameter value as plain data.
+struct PlainParam {
   enum Kind : uint8_t { flag, integer, number, text };
-  std::atomic<uint32_t> state{empty};
-  uint32_t param = 0;  ///< index into Node::params()
   Kind kind = number;
+  uint32_t by_user = 0;  ///< uid of the user who gave it
   int64_t whole = 0;
   double real = 0;
-  std::array<char, 128> words{};    ///< ended by 0
+  std::array<char, 128> words{};  ///< ended by 0
+};
+
+/// A parameter value on its way to a running node. One at a time per task.
+struct alignas(kCacheLine) ParamMail : PlainParam {
+  enum State : uint32_t { empty, posted, taken, refused };
+  std::atomic<uint32_t> state{empty};
+  uint32_t param = 0;               ///< index into Node::params()
   std::array<char, 256> refusal{};  ///< why, if refused; ended by 0
+};
+
+/// The newest value that a parameter was given while the graph runs. It outlives the process of its node: the next one
+/// takes it up before its first job. Written by the thread that runs the task, in the place that is not the newest, and
+/// `count` makes it the newest: a kill at any step leaves the value before or this one.
+struct alignas(kCacheLine) KeptParam {
+  struct Value : PlainParam {
+    int64_t at_ns = 0;  ///< when the node accepted it
+  };
+  std::atomic<uint32_t> count{0};     ///< values accepted so far
+  std::atomic<uint32_t> taken_up{0};  ///< how often a restarted process took one up
+  std::array<Value, 2> places;
+  /// Null if there is none. Stays whole until two more values have come.
+  const Value* newest() const {
+    const uint32_t n = count.load(std::memory_order_acquire);
+    return n > 0 ? &places[n % 2] : nullptr;
+  }
 };
 
 /// What a process shows of itself to whoever looks after it.
@@ -82,8 +104,8 @@ class RunBoard {
   enum Decision : uint32_t { undecided, as_asked, cooperative };
   enum Carrier : uint32_t { no_carrier, iceoryx, local };
 
-  /// Only the shape of the plan is used: tasks, edges, ports, and its modes with their rules. `process_of`: by task; by
-  /// default all are of process 0. Throws std::runtime_error if there is no memory.
+  /// Only the shape of the plan is used: tasks, edges, ports, parameters, and its modes with their rules. `process_of`:
+  /// by task; by default all are of process 0. Throws std::runtime_error if there is no memory.
   explicit RunBoard(const Plan& plan, size_t processes = 1, std::span<const size_t> process_of = {});
   ~RunBoard();
   RunBoard(const RunBoard&) = delete;
@@ -106,6 +128,10 @@ class RunBoard {
   /// Of the jobs that make what a port carries; null: nobody makes it.
   CommitRing* commits_of_port(size_t p) { return producers_.find(p) == kNone ? nullptr : commits_[producers_.find(p)]; }
   ParamMail& mail(size_t t) { return *mail_[t]; }
+  size_t param_count(size_t t) const { return first_param_[t + 1] - first_param_[t]; }
+  /// Parameter `param` (index into Node::params()) of a task.
+  KeptParam& kept(size_t t, size_t param) { return *kept_[first_param_[t] + param]; }
+  const KeptParam& kept(size_t t, size_t param) const { return *kept_[first_param_[t] + param]; }
   CapacityRecord& capacity(size_t p) { return *capacities_[p]; }
   SourceFacts& source_facts(size_t t) { return *source_facts_[t]; }
   ProcessRecord& process(size_t p) { return *processes_[p]; }
@@ -151,6 +177,7 @@ class RunBoard {
 
   StopSignal& stop() { return shared_->stop; }
   std::atomic<int64_t>& epoch_ns() { return supervised_->epoch_ns; }  ///< 0: not fixed yet
+  int64_t epoch_ns() const { return supervised_->epoch_ns.load(); }
   std::atomic<uint32_t>& decision() { return supervised_->decision; }
   std::atomic<uint32_t>& carrier() { return supervised_->carrier; }  ///< the transport that is up and can be joined
   /// All processes have finished: nobody reads any more what one of them takes along when it leaves.
@@ -184,7 +211,7 @@ class RunBoard {
 
   std::byte* memory_ = nullptr;
   size_t bytes_ = 0, mode_count_ = 1, safe_stop_mode_ = kNone;
-  std::vector<size_t> first_edge_;
+  std::vector<size_t> first_edge_, first_param_;
   std::vector<std::string> task_names_;
   std::vector<char> has_source_;  ///< by task: a hardware node
   ModeRules mode_rules_;
@@ -201,6 +228,7 @@ class RunBoard {
   std::vector<ProcessRecord*> processes_;
   std::vector<SourceRecord*> sources_;
   std::vector<SourceFacts*> source_facts_;
+  std::vector<KeptParam*> kept_;
   std::vector<size_t> areas_;  ///< where that of the supervisor begins, of each process, and the end
 };
 

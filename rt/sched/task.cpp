@@ -92,6 +92,7 @@ void Task::start(int64_t epoch_ns, Transport* restarted) {
     held.push_back(any ? readers.back()->take(newest.sequence) : Held{});
     if (held.back()) PortAccess::hand_over(*plan_.node->outputs()[i], held.back().message());
   }
+  take_up(board_, index_, *plan_.node);
   plan_.node->start(epoch_ns);
   for (size_t i = 0; i < held.size(); ++i) {
     PortAccess::hand_over(*plan_.node->outputs()[i], nullptr);
@@ -117,8 +118,11 @@ TAKT_HOT bool Task::wanted(uint64_t index) const {
 TAKT_HOT void Task::take_mail() {
   ParamMail& mail = board_.mail(index_);
   if (mail.state.load(std::memory_order_acquire) != ParamMail::posted) return;
-  deliver(mail, *plan_.node);
-  if (trace::on() && mail.state.load(std::memory_order_relaxed) == ParamMail::taken) trace_param(mail);
+  if (!deliver(mail, *plan_.node)) return;
+  if (trace::on()) trace_param(mail);
+  keep(board_.kept(index_, mail.param), mail, ended_.started_ns);
+  // Last: after a kill at any step before, the next process takes the same mail.
+  mail.state.store(ParamMail::taken, std::memory_order_release);
 }
 
 TAKT_HOT int64_t Task::begin(uint64_t index, int64_t release_ns, int64_t duration_ns) {

@@ -62,7 +62,8 @@ class Task {
   const TaskPlan& plan() const { return plan_; }
   TaskStatistics& statistics() { return statistics_; }
   const TaskStatistics& statistics() const { return statistics_; }
-  /// Starts the node. In a process that was restarted, with the newest message of each of its outputs.
+  /// Starts the node. In a process that was restarted, with the newest message of each of its outputs and the values
+  /// that its parameters were given while the graph runs.
   void start(int64_t epoch_ns, Transport* restarted);
   /// After the run: what the writers counted goes onto the board, and what threads of the node used.
   void settle();

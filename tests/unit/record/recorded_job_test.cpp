@@ -128,6 +128,32 @@ TEST_CASE("A parameter of text comes in pieces of eight characters") {
   }
 }
 
+TEST_CASE("A parameter of a job that never ends is told with the next one of its task, once") {
+  Heard heard;
+  heard.add(1, Kind::param, 90, 7, ParamMail::integer, 2);
+  heard.add(1, Kind::release, 100, 200, 0, 0, 1);  // its process dies
+  heard.whole_job(3, 1, 0);
+  heard.whole_job(3, 2, 0);
+  REQUIRE(heard.jobs.size() == 2);
+  CHECK(heard.jobs[0].params == std::vector<RecordedJob::Param>{{2, int64_t{7}}});
+  CHECK(heard.jobs[1].params.empty());
+}
+
+TEST_CASE("A text that its process did not finish is no part of the one that comes next") {
+  Heard heard;
+  const auto piece = [&](int32_t thread, const char* eight, int64_t at_ns) {
+    int64_t value = 0;
+    std::memcpy(&value, eight, 8);
+    heard.add(thread, Kind::param, at_ns, value, ParamMail::text, 3);
+  };
+  piece(1, "half a w", 100);
+  piece(2, "half a w", 200);
+  piece(2, "ord\0\0\0\0", 200);
+  heard.whole_job(2, 1);
+  REQUIRE(heard.jobs.size() == 1);
+  CHECK(heard.jobs[0].params == std::vector<RecordedJob::Param>{{3, std::string("half a word")}});
+}
+
 TEST_CASE("Jobs of several threads are told apart; a job of which an event was lost is counted, not told") {
   Heard heard;
   heard.add(1, Kind::release, 100, 200, 0, 0, 1);

@@ -126,16 +126,17 @@ TEST_CASE("mail sets a parameter between jobs if the node reads it in its jobs o
   ParamMail& mail = board.mail(1);
   REQUIRE(post(mail, 0, 2.5));
   CHECK_FALSE(post(mail, 0, 3.5));  // the first is still on its way
-  deliver(mail, scene.worker);
-  CHECK(mail.state.load() == ParamMail::taken);
+  CHECK(deliver(mail, scene.worker));
+  CHECK(mail.state.load() == ParamMail::posted);  // what must outlive the process is not noted yet
+  mail.state.store(ParamMail::taken);
   CHECK(scene.worker.gain() == 2.5);
   REQUIRE(post(mail, 0, 99.0));
-  deliver(mail, scene.worker);
+  CHECK_FALSE(deliver(mail, scene.worker));
   CHECK(mail.state.load() == ParamMail::refused);
   CHECK(std::string(mail.refusal.data()) == "is 99, must lie in 0..10");
   CHECK(scene.worker.gain() == 2.5);
   REQUIRE(post(mail, 1, int64_t{4}));
-  deliver(mail, scene.worker);
+  CHECK_FALSE(deliver(mail, scene.worker));
   CHECK(mail.state.load() == ParamMail::refused);
   CHECK(std::string(mail.refusal.data()).find("only before the start") != std::string::npos);
   CHECK(scene.worker.size() == 3);
