@@ -13,7 +13,9 @@
 #include <system_error>
 
 #include "graph/attach/message_text.hpp"
+#include "graph/attach/parameters.hpp"
 #include "graph/compose/composition.hpp"
+#include "graph/language/overlay.hpp"
 #include "graph/language/param_text.hpp"
 #include "graph/language/words.hpp"
 #include "rt/memory/sanitized.hpp"
@@ -32,11 +34,18 @@ int64_t now_ns() { return MonotonicClock().now_ns(); }
 
 Json wrong(const std::string& text) { return {{"error", text}}; }
 
-/// True if the other side is this user or root.
-bool trusted(int descriptor) {
+/// The user of the other side; nothing if the kernel does not say.
+std::optional<uid_t> user_of(int descriptor) {
   ucred peer{};
   socklen_t size = sizeof peer;
-  return getsockopt(descriptor, SOL_SOCKET, SO_PEERCRED, &peer, &size) == 0 && (peer.uid == geteuid() || peer.uid == 0);
+  if (getsockopt(descriptor, SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0) return std::nullopt;
+  return peer.uid;
+}
+
+/// True if the other side is this user or root.
+bool trusted(int descriptor) {
+  const auto user = user_of(descriptor);
+  return user && (*user == geteuid() || *user == 0);
 }
 
 }  // namespace
@@ -112,29 +121,34 @@ void Server::serve(int descriptor) {
     if (ready < 0 && errno != EINTR) break;
     if (ready > 0) break;
   }
+  const uint32_t by_user = user_of(descriptor).value_or(geteuid());
   Connection connection(descriptor, 1000);
   while (!ending_.load()) {
     const auto question = connection.read_line();
     if (!question || !question->is_object()) return;
     try {
-      if (!answer(*question, connection)) return;
+      if (!answer(*question, connection, by_user)) return;
     } catch (const std::exception& problem) {  // no question may end the run
       if (!connection.write(wrong(std::string("this cannot be answered: ") + problem.what()))) return;
     }
   }
 }
 
-bool Server::answer(const Json& question, Connection& connection) {
+bool Server::answer(const Json& question, Connection& connection, uint32_t by_user) {
   const std::string what = question.value("do", "");
   if (what == "top") return connection.write(top());
   if (what == "echo") return echo(question, connection);
   if (what == "mode") return connection.write(change_mode(question.value("mode", "")));
-  if (what == "set") return connection.write(set(question.value("param", ""), question.value("value", "")));
+  if (what == "get") return connection.write(get(question.value("param", "")));
+  if (what == "set")
+    return connection.write(
+        set(question.value("param", ""), {question.value("value", ""), question.value("keep", false), by_user}));
+  if (what == "forget") return connection.write(forget(question.value("param", "")));
   if (what == "stop") {
     subject_.board.stop().raise(now_ns());
     return connection.write({{"ok", true}});
   }
-  return connection.write(wrong("unknown question " + what + "; known: top, echo, set, mode, stop"));
+  return connection.write(wrong("unknown question " + what + "; known: top, echo, get, set, forget, mode, stop"));
 }
 
 Json Server::top() const {
@@ -163,6 +177,7 @@ Json Server::top() const {
           {"profile", subject_.graph.profile},
           {"transport", subject_.transport.name()},
           {"running_s", epoch_ns > 0 ? static_cast<double>(std::max<int64_t>(0, now_ns() - epoch_ns)) / 1e9 : 0.0},
+          {"parameters", parameters_json(subject_.graph, subject_.plan, subject_.board)},
           {"nodes", nodes}};
 }
 
@@ -257,19 +272,50 @@ Json Server::change_mode(const std::string& name) {
   return {{"ok", true}};
 }
 
-Json Server::set(const std::string& name, const std::string& text) {
+Json Server::set(const std::string& name, const Wish& wish) {
   const size_t colon = name.find(':');
-  return colon == std::string::npos ? set_one(name, text)
-                                    : set_all(name.substr(0, colon), name.substr(colon + 1), text);
+  return colon == std::string::npos ? set_one(name, wish)
+                                    : set_all(name.substr(0, colon), name.substr(colon + 1), wish);
 }
 
-Json Server::set_all(const std::string& type, const std::string& key, const std::string& text) {
+Json Server::keep(const std::string& name, const std::string& text) {
+  const auto file = graph::overlay_file(graph::state_folder(), subject_.graph.name);
+  const std::lock_guard lock(keeping_);
+  if (const auto kept = graph::change_overlay(file, subject_.graph.name, {{name, text}}); !kept)
+    return wrong(fmt::format("{} has the value now, but not in later runs: {}", name, kept.error()));
+  return {{"ok", true}, {"kept", file.string()}};
+}
+
+Json Server::forget(const std::string& name) {
+  const auto file = graph::overlay_file(graph::state_folder(), subject_.graph.name);
+  const std::lock_guard lock(keeping_);
+  if (const auto done = graph::forget_value(file, subject_.graph.name, name); !done) return wrong(done.error());
+  return {{"ok", true}, {"forgotten", file.string()}};
+}
+
+Json Server::get(const std::string& name) const {
+  if (name.empty())
+    return {{"ok", true}, {"parameters", parameters_json(subject_.graph, subject_.plan, subject_.board)}};
+  std::vector<std::string> names;
+  for (size_t t = 0; t < subject_.plan.tasks.size(); ++t) {
+    const TaskPlan& task = subject_.plan.tasks[t];
+    for (size_t p = 0; p < subject_.board.param_count(t); ++p) {
+      names.push_back(task.name + "." + std::string(task.node->params()[p]->name()));
+      if (names.back() == name)
+        return {{"ok", true},
+                {"parameters", Json::array({parameter_json(subject_.graph, subject_.plan, subject_.board, t, p)})}};
+    }
+  }
+  return wrong(fmt::format("there is no parameter {}{}", graph::ticked(name), graph::alternatives(name, names)));
+}
+
+Json Server::set_all(const std::string& type, const std::string& key, const Wish& wish) {
   std::vector<std::string> types;
   Json answer;
   for (const graph::NodeSpec& spec : subject_.graph.nodes) {
     types.push_back(spec.type);
     if (spec.type != type) continue;
-    const Json one = set_one(spec.id + "." + key, text);
+    const Json one = set_one(spec.id + "." + key, wish);
     if (!answer.contains("error")) answer = one;  // the first that refuses is told, the others are asked all the same
   }
   if (!answer.is_null()) return answer;
@@ -277,7 +323,7 @@ Json Server::set_all(const std::string& type, const std::string& key, const std:
       fmt::format("there is no node of type {}{}", graph::ticked(type), graph::alternatives(type, types, "types")));
 }
 
-Json Server::set_one(const std::string& name, const std::string& text) {
+Json Server::set_one(const std::string& name, const Wish& wish) {
   const size_t dot = name.find('.');
   const std::string id = name.substr(0, dot), key = dot == std::string::npos ? "" : name.substr(dot + 1);
   std::vector<std::string> ids, keys;
@@ -293,19 +339,22 @@ Json Server::set_one(const std::string& name, const std::string& text) {
     ParamBase& param = *shell->params()[p];
     keys.emplace_back(param.name());
     if (param.name() != key) continue;
-    const auto value = graph::parse_param(param, text);
+    const auto value = graph::parse_param(param, wish.text);
     const auto fits = value ? param.set(*value) : tl::make_unexpected(value.error());
     if (!fits) return wrong(fmt::format("parameter {} {}", graph::ticked(name), fits.error()));
-    return post_and_wait(static_cast<size_t>(task - subject_.plan.tasks.begin()), p, *value);
+    const auto index = static_cast<size_t>(task - subject_.plan.tasks.begin());
+    Json answer = post_and_wait(index, p, *value, wish.by_user);
+    return wish.keep && !answer.contains("error") ? keep(name, wish.text) : answer;
   }
   return wrong(fmt::format("node {} (type {}) has no parameter {}{}", graph::ticked(id), graph::ticked(spec->type),
                            graph::ticked(key), graph::alternatives(key, keys)));
 }
 
-Json Server::post_and_wait(size_t task, size_t param, const ParamValue& value) {
+Json Server::post_and_wait(size_t task, size_t param, const ParamValue& value, uint32_t by_user) {
   const std::lock_guard lock(setting_);
   ParamMail& mail = subject_.board.mail(task);
-  if (!post(mail, param, value)) return wrong("the node has not taken the last value yet, or the text is too long");
+  if (!post(mail, param, value, by_user))
+    return wrong("the node has not taken the last value yet, or the text is too long");
   const TaskPlan& plan = subject_.plan.tasks[task];
   const int64_t until = now_ns() + kSlowdown * 2'000'000'000LL;
   while (mail.state.load() == ParamMail::posted && now_ns() < until && !ending_.load()) pause_ms(1);

@@ -26,9 +26,9 @@ struct Subject {
   pid_t run = getpid();  ///< the process that stands for the run
 };
 
-/// Answers top, echo, set, mode and stop for one run, from threads of the default policy that only read the board, hold
-/// one message of an output at a time, and post parameters to be taken between jobs. Only its own user (and root) is
-/// heard.
+/// Answers top, echo, get, set, forget, mode and stop for one run, from threads of the default policy that only read
+/// the board, hold one message of an output at a time, and post parameters to be taken between jobs. Only its own user
+/// (and root) is heard.
 class Server {
  public:
   explicit Server(const Subject& subject);
@@ -46,7 +46,8 @@ class Server {
   void open();
   void accept_clients();
   void serve(int descriptor);
-  bool answer(const nlohmann::ordered_json& question, Connection& connection);
+  /// `by_user`: the uid of who asks.
+  bool answer(const nlohmann::ordered_json& question, Connection& connection, uint32_t by_user);
   nlohmann::ordered_json top() const;
   bool echo(const nlohmann::ordered_json& question, Connection& connection);
   /// The right to listen to an output, given back when it is dropped; null while somebody else has it.
@@ -54,11 +55,21 @@ class Server {
   /// `as`: "png", "ply" or "", for text alone; `items`: of longer arrays so many elements.
   bool stream(size_t port, const std::string& as, size_t items, int64_t count, Connection& connection);
   nlohmann::ordered_json change_mode(const std::string& name);
+  struct Wish {
+    std::string text;      ///< the value, with its unit
+    bool keep = false;     ///< also for later runs
+    uint32_t by_user = 0;  ///< uid
+  };
   /// `name`: NODE.PARAM, or TYPE:PARAM for every node of that type.
-  nlohmann::ordered_json set(const std::string& name, const std::string& text);
-  nlohmann::ordered_json set_one(const std::string& name, const std::string& text);
-  nlohmann::ordered_json set_all(const std::string& type, const std::string& key, const std::string& text);
-  nlohmann::ordered_json post_and_wait(size_t task, size_t param, const ParamValue& value);
+  nlohmann::ordered_json set(const std::string& name, const Wish& wish);
+  nlohmann::ordered_json set_one(const std::string& name, const Wish& wish);
+  nlohmann::ordered_json set_all(const std::string& type, const std::string& key, const Wish& wish);
+  /// Writes the value into the overlay of the graph, once the node has accepted it.
+  nlohmann::ordered_json keep(const std::string& name, const std::string& text);
+  nlohmann::ordered_json forget(const std::string& name);
+  /// The value of one parameter; "": all that differ from the graph's file.
+  nlohmann::ordered_json get(const std::string& name) const;
+  nlohmann::ordered_json post_and_wait(size_t task, size_t param, const ParamValue& value, uint32_t by_user);
   size_t find_port(const std::string& name) const;
   /// Of a node; "" of a device.
   std::string type_of(const std::string& node) const;
@@ -68,7 +79,7 @@ class Server {
   std::filesystem::path path_;
   int listener_ = -1;
   std::atomic<bool> ending_{false};
-  std::mutex setting_, tapping_;
+  std::mutex setting_, keeping_, tapping_;
   std::set<size_t> tapped_;  ///< outputs that somebody listens to: one at a time each
   std::list<Client> clients_;
   std::thread thread_;

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "graph/cli/graph_file.hpp"
 
+#include <fmt/format.h>
+
 #include <cstdio>
 
 #include "graph/cli/outcome.hpp"
 #include "graph/compose/composition.hpp"
+#include "graph/language/overlay.hpp"
 
 namespace takt::command {
 
@@ -18,6 +21,22 @@ std::optional<graph::GraphSpec> load_graph(const std::filesystem::path& file, co
   tell(loaded.problems);
   tell_problems(loaded.problems.size());
   return std::nullopt;
+}
+
+void tell_kept(const graph::GraphSpec& graph) {
+  if (graph.kept.values.empty()) return;
+  std::string values;
+  for (const auto& value : graph.kept.values)
+    values += fmt::format("{}{} {}{}", values.empty() ? "" : ", ", value.name, value.text,
+                          value.overridden ? " (--set wins)" : "");
+  std::fprintf(stderr, "takt: kept values of %s: %s\n", graph.kept.file.c_str(), values.c_str());
+}
+
+void tell_ignored_overlay(const std::string& graph, const std::string& why) {
+  const auto file = graph::overlay_file(graph::state_folder(), graph);
+  std::error_code ignored;
+  if (std::filesystem::exists(file, ignored))
+    std::fprintf(stderr, "takt: %s is not used: %s\n", file.c_str(), why.c_str());
 }
 
 void tell(const std::vector<graph::Problem>& problems) {

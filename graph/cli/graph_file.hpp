@@ -14,6 +14,11 @@ std::filesystem::path graph_file(const std::filesystem::path& asked);
 /// graph_file().
 std::optional<graph::GraphSpec> load_graph(const std::filesystem::path& file, const graph::LoadOptions& options);
 
+/// Says on one line of stderr which values `takt set --keep` left for this graph, if any.
+void tell_kept(const graph::GraphSpec& graph);
+/// The overlay of that graph, if it exists: "takt: FILE is not used: WHY" on stderr.
+void tell_ignored_overlay(const std::string& graph, const std::string& why);
+
 /// Each on a line of stderr.
 void tell(const std::vector<graph::Problem>& problems);
 /// "takt: n problems, nothing was started"

@@ -5,13 +5,17 @@
 #include <fmt/ranges.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <fstream>
 #include <thread>
 
 #include "graph/attach/endpoint.hpp"
+#include "graph/attach/parameters.hpp"
+#include "graph/cli/graph_file.hpp"
 #include "graph/cli/outcome.hpp"
+#include "graph/language/overlay.hpp"
 
 namespace takt::command {
 namespace {
@@ -25,6 +29,7 @@ std::string top_text(const Json& top) {
   std::string text = fmt::format("{} ({} profile, {} transport), running {:.0f} s\n",
                                  top.at("graph").get<std::string>(), top.at("profile").get<std::string>(),
                                  top.at("transport").get<std::string>(), top.at("running_s").get<double>());
+  for (const Json& parameter : top.value("parameters", Json::array())) text += attach::parameter_text(parameter) + "\n";
   text += fmt::format("{:<18} {:>5} {:>10} {:>7} {:>7} {:>7} {:>8} {:>8}\n", "node", "Hz", "completed", "missed",
                       "skipped", "paused", "CPU ms", "resp ms");
   for (const Json& node : top.at("nodes")) {
@@ -87,6 +92,75 @@ int run_question(const AttachOptions& options, const Json& question) {
   return ask(*connection, question, answer);
 }
 
+int run_get(const AttachOptions& options) {
+  auto connection = attached(options.run);
+  if (!connection) return kDeviceOrSystem;
+  Json answer;
+  const int code = ask(*connection, {{"do", "get"}, {"param", options.param}}, answer);
+  if (code != kOk) return code;
+  const Json& parameters = answer.at("parameters");
+  if (options.json) std::printf("%s\n", parameters.dump(2).c_str());
+  else if (parameters.empty()) std::puts("every parameter is as in the graph's file");
+  else
+    for (const Json& parameter : parameters) std::printf("%s\n", attach::parameter_text(parameter).c_str());
+  return kOk;
+}
+
+/// NODE.PARAM, or each that TYPE:PARAM means in that graph.
+std::vector<std::string> names_meant(const graph::GraphSpec& graph, const std::string& param) {
+  const size_t colon = param.find(':');
+  if (colon == std::string::npos) return {param};
+  std::vector<std::string> names;
+  for (const graph::NodeSpec& node : graph.nodes)
+    if (node.type == param.substr(0, colon)) names.push_back(node.id + "." + param.substr(colon + 1));
+  return names;
+}
+
+/// Changes the overlay of a graph that does not run. The graph judges the values, as it would judge --set.
+int keep_for_later(const AttachOptions& options) {
+  auto graph = load_graph(options.graph, options.load);
+  if (!graph) return kBadInput;
+  const std::filesystem::path file = graph::overlay_file(graph::state_folder(), graph->name);
+  if (options.forget) {
+    const auto done = graph::forget_value(file, graph->name, options.param);
+    if (!done) return refuse(done.error(), kBadInput);
+    std::fprintf(stderr, "takt: nothing runs; %s is no longer in %s\n", options.param.c_str(), file.c_str());
+    return kOk;
+  }
+  const std::vector<std::string> names = names_meant(*graph, options.param);
+  if (names.empty()) return refuse(options.param + ": the graph has no node of that type", kBadInput);
+  graph::LoadOptions with = options.load;
+  graph::OverlayChanges changes;
+  for (const std::string& name : names) {
+    const bool node = std::any_of(graph->nodes.begin(), graph->nodes.end(),
+                                  [&](const auto& spec) { return name.starts_with(spec.id + "."); });
+    if (!node) return refuse(name + ": only parameters of nodes are kept (takt show lists the nodes)", kBadInput);
+    with.set.push_back(name + "=" + options.value);
+    changes[name] = options.value;
+  }
+  if (!load_graph(options.graph, with)) return kBadInput;
+  if (const auto done = graph::change_overlay(file, graph->name, changes); !done)
+    return refuse(done.error(), kDeviceOrSystem);
+  std::fprintf(stderr, "takt: nothing runs; kept in %s for the next run of %s\n", file.c_str(), graph->name.c_str());
+  return kOk;
+}
+
+int run_set(const AttachOptions& options) {
+  if ((options.keep || options.forget) && options.run == 0 && attach::running().empty()) return keep_for_later(options);
+  auto connection = attached(options.run);
+  if (!connection) return kDeviceOrSystem;
+  const Json question =
+      options.forget ? Json{{"do", "forget"}, {"param", options.param}}
+                     : Json{{"do", "set"}, {"param", options.param}, {"value", options.value}, {"keep", options.keep}};
+  Json answer;
+  const int code = ask(*connection, question, answer);
+  if (answer.contains("kept")) std::fprintf(stderr, "takt: kept in %s\n", answer["kept"].get<std::string>().c_str());
+  if (answer.contains("forgotten"))
+    std::fprintf(stderr, "takt: taken out of %s; this run goes on with the value it has\n",
+                 answer["forgotten"].get<std::string>().c_str());
+  return code;
+}
+
 CLI::App* add(CLI::App& app, const char* name, const char* purpose, AttachOptions& o) {
   CLI::App* command = app.add_subcommand(name, purpose);
   command->add_option("--run", o.run, "process id of the run, where there are several");
@@ -140,11 +214,24 @@ void add_attach_commands(CLI::App& app, AttachOptions& o, int& exit_code) {
   echo->add_option("--ply", o.ply, "writes the message, a point cloud, as a PLY file")->excludes(png);
   echo->add_option("--count", o.count, "how many messages")->check(CLI::PositiveNumber);
   echo->callback([&] { exit_code = understood([&] { return run_echo(o); }); });
+  CLI::App* get = add(app, "get", "shows a parameter of a running graph, or all that differ from its file", o);
+  get->add_option("param", o.param, "NODE.PARAM");
+  get->add_flag("--json", o.json, "prints JSON");
+  get->callback([&] { exit_code = understood([&] { return run_get(o); }); });
   CLI::App* set = add(app, "set", "sets a parameter of a running node, between two of its jobs", o);
   set->add_option("param", o.param, "NODE.PARAM, or TYPE:PARAM for every node of that type")->required();
-  set->add_option("value", o.value, "with its unit")->required();
-  set->callback([&] {
-    exit_code = understood([&] { return run_question(o, {{"do", "set"}, {"param", o.param}, {"value", o.value}}); });
+  CLI::Option* value = set->add_option("value", o.value, "with its unit");
+  set->add_flag("--keep", o.keep, "also for later runs of the graph; without a running graph for these alone");
+  CLI::Option* forget =
+      set->add_flag("--forget", o.forget, "takes the value of NODE.PARAM out of those kept")->excludes(value);
+  set->add_option("--graph", o.graph, "where nothing runs: the graph file (default graph/ace.yaml)");
+  set->add_option("--profile", o.load.profile, "where nothing runs: the profile that the value must suit");
+  set->footer(
+      "Example: takt set --keep obstacle_stop.deceleration 0.8m/s2\n"
+      "The value holds from the node's next job on, also after a restart of its process.");
+  set->callback([&, value, forget] {
+    if (value->count() + forget->count() == 0) throw CLI::RequiredError("value");
+    exit_code = understood([&] { return run_set(o); });
   });
   CLI::App* mode = add(app, "mode", "changes the mode of a running graph", o);
   mode->add_option("mode", o.mode, "a mode of the graph, full or safe_stop")->required();

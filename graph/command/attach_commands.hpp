@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// `takt top | echo | set | stop`: commands that speak to a graph that is running already.
+// `takt top | echo | get | set | mode | stop`: commands that speak to a graph that is running already.
 #pragma once
 #include <CLI/CLI.hpp>
 #include <filesystem>
@@ -7,6 +7,7 @@
 #include <string>
 
 #include "graph/attach/endpoint.hpp"
+#include "graph/language/graph.hpp"
 
 namespace takt::command {
 
@@ -14,6 +15,9 @@ struct AttachOptions {
   int run = 0;  ///< process id; 0: the only one that runs
   bool once = false, json = false;
   std::string port, param, value, mode;
+  bool keep = false, forget = false;  ///< of set
+  std::filesystem::path graph;        ///< of set --keep and --forget, where nothing runs; empty: the default graph
+  graph::LoadOptions load;
   std::filesystem::path png, ply;  ///< of echo: at most one
   int64_t count = 1;
 };
@@ -27,7 +31,7 @@ int ask(attach::Connection& connection, const nlohmann::ordered_json& question, 
 /// The exit code of `command`, also where the answer of the run is of another kind than it expects.
 int understood(const std::function<int()>& command);
 
-/// Adds the four commands; each sets the exit code: 0 done, 2 refused or unknown, 3 nothing to attach to.
+/// Adds the commands; each sets the exit code: 0 done, 2 refused or unknown, 3 nothing to attach to.
 void add_attach_commands(CLI::App& app, AttachOptions& options, int& exit_code);
 
 }  // namespace takt::command

@@ -20,6 +20,7 @@
 #include "graph/command/replay_command.hpp"
 #include "graph/command/robot_command.hpp"
 #include "graph/command/show_command.hpp"
+#include "graph/language/overlay.hpp"
 #include "graph/run/run.hpp"
 
 namespace {
@@ -47,6 +48,13 @@ void add_load_options(CLI::App& app, std::filesystem::path& graph, takt::graph::
   app.add_option("--policy", load.policy, "deadline | fixed | cooperative instead of the schedule's");
   app.add_option("--mode", load.mode, "a mode of the graph (default full)");
   app.add_option("--set", load.set, "node.param=value, repeatable");
+}
+
+/// For what runs or judges a graph as it will run: with the values that `takt set --keep` left for it.
+void add_overlay_option(CLI::App& app, takt::graph::LoadOptions& load) {
+  load.state = takt::graph::state_folder();
+  app.add_flag_callback(
+      "--no-overlay", [&load] { load.state.clear(); }, "without the values that `takt set --keep` left for the graph");
 }
 
 void add_show(CLI::App& app, takt::command::ShowOptions& o, int& exit_code) {
@@ -78,6 +86,7 @@ void add_explain(CLI::App& app, takt::command::ExplainOptions& o, int& exit_code
 void add_run(CLI::App& app, takt::command::RunOptions& o, int& exit_code) {
   CLI::App* run = app.add_subcommand("run", "runs a graph and reports what happened");
   add_load_options(*run, o.graph, o.load);
+  add_overlay_option(*run, o.load);
   CLI::Option* how_long = run->add_option("--for", o.duration_s,
                                           "how long, e.g. 20s; 0s: until stopped (default: 20s, or as the graph's "
                                           "`expect` says)")
@@ -134,6 +143,7 @@ void add_capture(CLI::App& app, takt::command::CaptureOptions& o, int& exit_code
 void add_profile(CLI::App& app, takt::command::ProfileOptions& o, int& exit_code) {
   CLI::App* profile = app.add_subcommand("profile", "measures execution times and writes budgets into a schedule");
   add_load_options(*profile, o.run.graph, o.run.load);
+  add_overlay_option(*profile, o.run.load);
   profile->add_option("--for", o.run.duration_s, "how long each of the two passes lasts, e.g. 20s")
       ->transform(CLI::Validator(duration, "DURATION"));
   profile->add_option("--seed", o.run.seed, "seed of the simulated world");
@@ -166,7 +176,8 @@ constexpr DeskCommand kDeskCommands[] = {
 
 /// Hands the whole command line over to the program of `command`. Returns only where that cannot be started.
 int become(const DeskCommand& command, char** arguments) {
-  const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe").replace_filename(command.program);
+  const std::filesystem::path program =
+      std::filesystem::read_symlink("/proc/self/exe").replace_filename(command.program);
   const bool names_itself = std::string_view(command.program) == "takt-eval";  // a program of one command
   execv(program.c_str(), names_itself ? arguments + 1 : arguments);
   return takt::command::refuse(program.string() + " cannot be started: " + std::strerror(errno) + "\n  fix: `./takt " +
@@ -204,6 +215,7 @@ int main(int argc, char** argv) {
   add_run(app, run_options, exit_code);
   CLI::App* check = app.add_subcommand("check", "checks a graph and its schedule without running them");
   add_load_options(*check, check_options.graph, check_options.load);
+  add_overlay_option(*check, check_options.load);
   check->add_flag("--json", check_json, "prints the result as JSON");
   check->callback([&] { exit_code = takt::command::check_graph(check_options, check_json); });
   add_show(app, show_options, exit_code);

@@ -107,6 +107,7 @@ class Replay {
     recorded_ = attached_json(*file_, "plan.json");
     int code = load(run, prepared_);
     if (code == kOk) {
+      tell_ignored_overlay(prepared_.graph->name, "the record says which values held");
       RecordedFacts facts(recorded_);
       graph::ComposeOptions how;
       how.output = options_.output;

@@ -45,9 +45,23 @@ struct EdgeSpec {
   Position position;
 };
 
+/// Who chose a value: the graph's file, `takt set --keep` (overlay.hpp), --set.
+enum class ChosenBy : uint8_t { file, kept, command_line };
+
 struct ParamSpec {
   ParamValue value;  ///< converted to the unit the parameter declares
   Position position;
+  ChosenBy by = ChosenBy::file;
+};
+
+/// The values that `takt set --keep` left for this graph.
+struct KeptValues {
+  struct Value {
+    std::string name, text;   ///< "node.param", as it is written
+    bool overridden = false;  ///< by --set
+  };
+  std::filesystem::path file;  ///< empty: there is none
+  std::vector<Value> values;
 };
 
 struct NodeSpec {
@@ -207,6 +221,7 @@ struct GraphSpec {
   std::vector<ModeSpec> modes;
   std::optional<ExpectSpec> expect;
   ScheduleSpec schedule;
+  KeptValues kept;
   std::vector<std::string> adjusted;  ///< what validation changed, for stderr and the report
 };
 
@@ -217,6 +232,7 @@ struct LoadOptions {
   std::string policy;  ///< "": the schedule's
   std::string mode = "full";
   std::vector<std::string> set;  ///< "node.param=value"
+  std::filesystem::path state;   ///< folder whose overlay of the graph is read, see overlay.hpp; empty: none
 };
 
 }  // namespace takt::graph

@@ -26,6 +26,7 @@ Loaded Loader::load(const std::filesystem::path& file) {
     check_profile_ids();
     spec_.profile = choose_profile();
     read_profile_set();
+    read_kept();
     read_set();
     read_params();
     read_devices();

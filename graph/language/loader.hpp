@@ -42,6 +42,8 @@ struct Given {
   Position key, position;
   bool from_device = false;   ///< of a device: it stands in its entry, which all profiles share
   bool from_default = false;  ///< ... or in a profile's `default`, which all devices share
+  ChosenBy by = ChosenBy::file;
+  std::string remedy = {};  ///< what to do if it is wrong, where that is not plain
 };
 
 struct Setting {
@@ -71,9 +73,10 @@ class Loader {
   // read_measured.cpp
   void read_measured(const nlohmann::json& value);
 
-  // read_params.cpp: node types, parameters of nodes, `set` of the profile, --set
+  // read_params.cpp: node types, parameters of nodes, `set` of the profile, values kept by `takt set --keep`, --set
   void make_instances();
   void read_profile_set();
+  void read_kept();
   void read_set();
   void read_params();
   void read_param(NodeSpec& node, Node& instance, const std::string& name, const Given& given);

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "graph/language/loader.hpp"
+#include "graph/language/overlay.hpp"
 #include "graph/language/param_text.hpp"
 #include "graph/language/quantity.hpp"
 
@@ -104,6 +105,34 @@ void Loader::read_profile_set() {
   }
 }
 
+void Loader::read_kept() {
+  const std::filesystem::path file = overlay_file(options_.state, spec_.name);
+  std::error_code ignored;
+  if (file.empty() || spec_.name.empty() || !std::filesystem::exists(file, ignored)) return;
+  spec_.kept.file = file;
+  std::vector<std::string> nodes;
+  for (const auto& node : spec_.nodes) nodes.push_back(node.id);
+  for (const Overlay::Value& kept : read_overlay(file, spec_.name, problems_).values) {
+    const std::string name = kept.node + "." + kept.param;
+    if (std::find(nodes.begin(), nodes.end(), kept.node) == nodes.end()) {
+      problem(kept.key, fmt::format("there is no node {}{}{}", ticked(kept.node), alternatives(kept.node, nodes),
+                                    overlay_remedy(name)));
+      continue;
+    }
+    spec_.kept.values.push_back({name, kept.text});
+    for (const std::string& set : options_.set)
+      if (set.starts_with(name + "=")) spec_.kept.values.back().overridden = true;
+    Setting setting{kept.node, kept.param, {}};
+    setting.given.value = kept.value;
+    setting.given.raw = kept.text;
+    setting.given.key = kept.key;
+    setting.given.position = kept.position;
+    setting.given.by = ChosenBy::kept;
+    setting.given.remedy = overlay_remedy(name);
+    set_.push_back(std::move(setting));
+  }
+}
+
 void Loader::read_set() {
   const Position at{"--set", 0, 0};
   for (const auto& text : options_.set) {
@@ -117,6 +146,7 @@ void Loader::read_set() {
     setting.name = text.substr(dot + 1, equals - dot - 1);
     setting.given.raw = text.substr(equals + 1);
     setting.given.key = setting.given.position = at;
+    setting.given.by = ChosenBy::command_line;
     std::error_code ignored;
     const auto expanded = expand_variables(setting.given.raw, std::filesystem::current_path(ignored));
     const auto value = resolve_scalar(setting.given.raw);
@@ -162,14 +192,15 @@ void Loader::read_param(NodeSpec& node, Node& instance, const std::string& name,
     if (!taken) {
       // Where a range is quoted the unit belongs to it.
       const bool ranged = value.has_value() && !carries_no_unit(param->unit());
-      return problem(given.position, fmt::format("parameter {} of node {} {}{}", ticked(name), ticked(node.id),
-                                                 taken.error(), ranged ? fmt::format(" (in {})", param->unit()) : ""));
+      return problem(given.position,
+                     fmt::format("parameter {} of node {} {}{}{}", ticked(name), ticked(node.id), taken.error(),
+                                 ranged ? fmt::format(" (in {})", param->unit()) : "", given.remedy));
     }
-    node.params[name] = {*value, given.position};
+    node.params[name] = {*value, given.position, given.by};
     return;
   }
-  problem(given.key, fmt::format("node {} (type {}) has no parameter {}{}", ticked(node.id), ticked(node.type),
-                                 ticked(name), alternatives(name, param_names(instance))));
+  problem(given.key, fmt::format("node {} (type {}) has no parameter {}{}{}", ticked(node.id), ticked(node.type),
+                                 ticked(name), alternatives(name, param_names(instance)), given.remedy));
 }
 
 }  // namespace takt::graph

@@ -34,6 +34,14 @@ std::vector<char> whole_ports(const Plan& plan, const std::vector<std::string>& 
   return whole;
 }
 
+/// What a replay gives to --set: kept values first, since --set of the command line wins.
+std::string settings(const RunOptions& options, const graph::GraphSpec& graph) {
+  std::vector<std::string> lines;
+  for (const auto& value : graph.kept.values) lines.push_back(value.name + "=" + value.text);
+  lines.insert(lines.end(), options.load.set.begin(), options.load.set.end());
+  return fmt::format("{}", fmt::join(lines, "\n"));
+}
+
 std::string absolute(const std::filesystem::path& file) {
   std::error_code error;
   return std::filesystem::absolute(file, error).string();
@@ -71,7 +79,7 @@ void RunRecord::begin(const graph::GraphSpec& graph, const Plan& plan, const Run
                 {"mode", options_.load.mode},
                 {"policy_asked", std::string(to_string(graph.schedule.policy))},
                 {"policy_option", options_.load.policy},
-                {"set", fmt::format("{}", fmt::join(options_.load.set, "\n"))},
+                {"set", settings(options_, graph)},
                 {"seed", std::to_string(options_.seed)},
                 {"clock", options_.clock},
                 {"transport", transport.name()},

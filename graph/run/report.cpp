@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "graph/attach/parameters.hpp"
 #include "graph/run/commit.hpp"
 
 namespace takt::command {
@@ -254,6 +255,8 @@ Json make_report(const RunFacts& facts) {
   report["transport"] = facts.transport.name();
   report["isolation"] = facts.isolation;
   report["processes"] = facts.processes;
+  report["parameters"] = attach::parameters_json(facts.graph, facts.plan, facts.board);
+  report["overlay"] = facts.graph.kept.file.empty() ? Json(nullptr) : Json(facts.graph.kept.file.string());
   report["proofs"] = proofs.json();
   report["nodes"] = std::move(nodes);
   report["devices"] = devices_json(facts);

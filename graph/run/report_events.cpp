@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "graph/attach/parameters.hpp"
 #include "graph/run/report.hpp"
 
 namespace takt::command {
@@ -42,6 +43,14 @@ std::string offences(const Json& node) {
     for (const auto& [call, n] : node["rt_violations"].items())
       add(fmt::format("{} in jobs {}", call, n.get<uint64_t>()));
   return text;
+}
+
+/// "parameters: cruise.speed 0.2 m/s (set at 3.1 s)"; empty if all are as in the graph's file.
+std::string parameters_line(const Json& parameters) {
+  std::string text;
+  for (const Json& parameter : parameters)
+    text += (text.empty() ? "parameters: " : ", ") + attach::parameter_text(parameter);
+  return text.empty() ? "" : text + "\n";
 }
 
 /// "900 received, 3 damaged, missing 1; trouble"; empty if the device lost nothing and is well.
@@ -128,7 +137,7 @@ bool hung(const RunBoard& board) {
 }
 
 std::string events_text(const Json& report) {
-  std::string text;
+  std::string text = parameters_line(report["parameters"]);
   const Json& modes = report["modes"];
   for (size_t i = 1; i < modes.size(); ++i)
     text += fmt::format("mode {} from {:.3f} s to {:.3f} s: {}\n", modes[i]["name"].get<std::string>(),

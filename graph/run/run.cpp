@@ -173,6 +173,7 @@ int run_as_asked(RunOptions options) {
     tell_problems(prepared.problems.size());
     return code;
   }
+  if (options.load.state.empty()) tell_ignored_overlay(prepared.graph->name, "this run reads no kept values");
   if (prepared.graph->expect && !options.duration_asked)
     options.duration_s = static_cast<double>(prepared.graph->expect->within_ns) * 1e-9;
   std::vector<std::string> adjusted = prepared.graph->adjusted;

@@ -8,6 +8,7 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 export XDG_RUNTIME_DIR=$work/runtime
 mkdir "$XDG_RUNTIME_DIR"
+export TAKT_STATE_DIR=$work/state  # never what this user has kept
 failures=0
 
 fail() {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Speaking to a running graph: messages as text and pictures, the socket, its questions.
 #include <doctest/doctest.h>
+#include <sched.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -11,13 +12,16 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "graph/attach/message_text.hpp"
+#include "graph/attach/parameters.hpp"
 #include "graph/attach/server.hpp"
 #include "graph/compose/composition.hpp"
+#include "graph/language/overlay.hpp"
 #include "rt/msg/grid.hpp"
 #include "rt/msg/messages.hpp"
 #include "rt/msg/odometry.hpp"
 #include "rt/msg/point_cloud.hpp"
 #include "rt/msg/text_status.hpp"
+#include "rt/sched/param_mail.hpp"
 #include "tests/temporary_folder.hpp"
 
 namespace {
@@ -194,6 +198,54 @@ TEST_CASE("set refuses what the parameter would refuse, before the node sees it"
         std::string::npos);
   CHECK(error("mapping_3d:voxl", "0.2m").find("node `map` (type `mapping_3d`)") != std::string::npos);
   CHECK(scene.board->mail(0).state.load() == ParamMail::empty);
+}
+
+TEST_CASE("a value that the node accepted stands in get and top, and with `keep` in the graph's overlay") {
+  Scene scene;
+  setenv("TAKT_STATE_DIR", (scene.folder.path / "state").c_str(), 1);
+  const auto node = scene.types.find("mapping_3d")->make();
+  for (ParamBase* param : node->params()) param->end_setup();  // nothing was read: all are live
+  scene.plan.tasks[0].node = node.get();
+  scene.spec.nodes[0].params["share"] = {0.3, {}, graph::ChosenBy::command_line};
+  scene.board = std::make_unique<RunBoard>(scene.plan);
+  const attach::Server server({scene.spec, scene.plan, *scene.board, *scene.transport});
+  /// Asks, and does meanwhile what a job of the node does.
+  const auto set = [&](const Json& question) {
+    auto connection = attach::connect_to(getpid());
+    REQUIRE(connection);
+    REQUIRE(connection->write(question));
+    ParamMail& mail = scene.board->mail(0);
+    while (mail.state.load() != ParamMail::posted) sched_yield();
+    REQUIRE(deliver(mail, *node));
+    keep(scene.board->kept(0, mail.param), mail, 2'500'000'000);
+    mail.state.store(ParamMail::taken);
+    return connection->read_line().value_or(Json());
+  };
+  CHECK(set({{"do", "set"}, {"param", "map.voxel"}, {"value", "0.25m"}}) == Json{{"ok", true}});
+  const auto overlay = graph::overlay_file(scene.folder.path / "state", "test");
+  CHECK_FALSE(std::filesystem::exists(overlay));
+  const Json voxel = scene.ask({{"do", "get"}, {"param", "map.voxel"}})["parameters"][0];
+  CHECK(voxel["value"] == 0.25);
+  CHECK(voxel["from"] == "set");
+  CHECK(voxel["at_s"] == 2.5);
+  CHECK(voxel["by_user"] == geteuid());
+  CHECK(attach::parameter_text(voxel) == "map.voxel 0.25 m (set at 2.5 s)");
+  const Json all = scene.ask({{"do", "get"}})["parameters"];
+  REQUIRE(all.size() == 2);
+  CHECK(all == scene.ask({{"do", "top"}})["parameters"]);
+  CHECK(attach::parameter_text(all[1]) == "map.share 0.3 (command line)");
+  CHECK(scene.ask({{"do", "get"}, {"param", "map.slope"}})["parameters"][0]["from"] == "default");
+  CHECK(scene.ask({{"do", "get"}, {"param", "map.slop"}})["error"].get<std::string>().find("`map.slope`") !=
+        std::string::npos);
+  const Json kept = set({{"do", "set"}, {"param", "mapping_3d:voxel"}, {"value", "30cm"}, {"keep", true}});
+  CHECK(kept["kept"] == overlay.string());
+  std::vector<graph::Problem> problems;
+  const graph::Overlay read = graph::read_overlay(overlay, "test", problems);
+  REQUIRE(read.values.size() == 1);
+  CHECK(read.values[0].text == "30cm");
+  CHECK(scene.ask({{"do", "forget"}, {"param", "map.voxel"}})["forgotten"] == overlay.string());
+  CHECK(scene.ask({{"do", "forget"}, {"param", "map.voxel"}}).contains("error"));
+  CHECK(scene.ask({{"do", "get"}, {"param", "map.voxel"}})["parameters"][0]["value"] == 0.3);
 }
 
 TEST_CASE("a socket folder that is open to others is not used") {
