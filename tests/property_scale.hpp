@@ -52,8 +52,8 @@ T rounds(T n) {
 /// Whether the numbers drawn are those on which the bounds of a property were set.
 inline bool as_written() { return property_scale() >= 1 && !property_seed(); }
 
-/// Least number of finds where it is k at scale 1 with the seeds of the sources. Fewer rounds and other seeds vary: there
-/// half of the share of k is asked for, less three standard deviations of so many independent finds.
+/// Least number of finds where it is k at scale 1 with the seeds of the sources. Fewer rounds and other seeds vary:
+/// there half of the share of k is asked for, less three standard deviations of so many independent finds.
 template <std::integral T>
 T at_scale(T k) {
   const double share = static_cast<double>(k) * property_scale();
