@@ -156,9 +156,10 @@ void Latch::tell_damage(Edge& edge) {
   fault.kind = Fault::damaged;
   fault.task = task_;
   fault.at_ns = edge.latched_ns;
+  const std::string_view input = edge.input->name();
   std::snprintf(fault.what.characters.data(), fault.what.characters.size(),
-                "%s.%s: a message is lost: the process of its producer has written over it", name_.c_str(),
-                std::string(edge.input->name()).c_str());
+                "%s.%.*s: a message is lost: the process of its producer has written over it", name_.c_str(),
+                static_cast<int>(input.size()), input.data());
   faults_.append(fault);
 }
 

@@ -39,9 +39,10 @@ bool Task::outputs_intact() {
     if (writers_[i]->intact()) continue;
     ended_.no_result = true;
     Fault fault = fault_now(Fault::damaged, ended_.index);
+    const std::string_view port = plan_.node->outputs()[i]->name();
     std::snprintf(fault.what.characters.data(), fault.what.characters.size(),
-                  "%s.%s: job %llu wrote past its message or over its structure; the outputs of the job are withheld",
-                  plan_.name.c_str(), std::string(plan_.node->outputs()[i]->name()).c_str(),
+                  "%s.%.*s: job %llu wrote past its message or over its structure; the outputs of the job are withheld",
+                  plan_.name.c_str(), static_cast<int>(port.size()), port.data(),
                   static_cast<unsigned long long>(ended_.index));
     board_.faults().append(fault);
     return false;
