@@ -138,9 +138,15 @@ void LocalPool::reclaim_readers(uint32_t process) const {
 }
 
 void LocalPool::reclaim_writer() const {
-  for (uint32_t i = 0; i < plan_.history; ++i)  // a message that had its number is out
-    if (const uint64_t sequence = ring_[i].sequence.load(); sequence > state_->newest.load())
-      state_->newest.store(sequence);
+  constexpr uint64_t kMost = uint64_t{1} << 62;  // no port publishes that many: a stray store
+  if (state_->newest.load() >= kMost) state_->newest.store(0);
+  for (uint32_t i = 0; i < plan_.history; ++i) {
+    const uint64_t sequence = ring_[i].sequence.load();
+    if (sequence == 0) continue;
+    // What the dead process wrote over in its last moments must not lead its successor out of the pool.
+    if (sequence >= kMost || &slot(sequence) != &ring_[i] || ring_[i].chunk.load() >= chunks_) evict(ring_[i]);
+    else if (sequence > state_->newest.load()) state_->newest.store(sequence);  // a message that had its number is out
+  }
   state_->loaned.store(0);
 }
 
