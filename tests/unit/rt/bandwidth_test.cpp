@@ -60,7 +60,10 @@ TEST_CASE("a thread that is taken out of its reservation holds nothing any more,
     CHECK(reservation_of(thread)->runtime_ns == wanted.runtime_ns);
     std::thread([&] { CHECK(lift_thread(thread, kLowestPriority)); }).join();
     CHECK_FALSE(reservation_of(thread).has_value());
-    CHECK(restore_thread(wanted));
+    // Another run may hold for a moment what this thread gave back.
+    constexpr int64_t kPatience_ns = 2'000'000'000;
+    CHECK((restore_thread(wanted) || apply(wanted, kPatience_ns).verified));
+    REQUIRE(reservation_of(thread).has_value());
     CHECK(reservation_of(thread)->period_ns == wanted.period_ns);
   }).join();
 }
