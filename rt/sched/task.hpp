@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <array>
+#include <atomic>
 #include <memory>
 #include <vector>
 
@@ -126,6 +127,7 @@ class Task {
   uint32_t member_ = 0;
   JobCalls calls_;
   uint64_t jobs_run_ = 0, spoiled_told_ = 0;
+  std::atomic<uint64_t> begun_{0};  ///< the job that looks at its inputs
   CommitRing& commits_;
   Latch latch_;
   QualityControl quality_;
