@@ -37,8 +37,12 @@ OrdinaryShare ordinary_share(const Facts& facts, int cpu) {
 std::vector<Fix> grant_rights(const Facts& facts) {
   // Root without the right: a container that was started without it.
   if (facts.is_root()) return {{"shell", "docker run --cap-add SYS_NICE --cap-add IPC_LOCK --ulimit memlock=-1 ..."}};
-  return {shell("sudo setcap cap_sys_nice,cap_ipc_lock+ep " + facts.program()),
-          {"systemd unit", "[Service]\nAmbientCapabilities=CAP_SYS_NICE CAP_IPC_LOCK\nLimitMEMLOCK=infinity"}};
+  // In this order: a change of its group takes the capabilities from a file. Without the mode every user had them.
+  const std::string program = facts.program();
+  return {shell("sudo groupadd -f takt\nsudo usermod -aG takt " + facts.user() + "\nsudo chgrp takt " + program +
+                "\nsudo chmod 0750 " + program + "\nsudo setcap cap_sys_nice,cap_ipc_lock+ep " + program),
+          {"systemd unit (packaging/systemd)",
+           "[Service]\nUser=takt\nAmbientCapabilities=CAP_SYS_NICE CAP_IPC_LOCK\nLimitMEMLOCK=infinity"}};
 }
 
 Fix limits_line(const Facts& facts, const std::string& item) {

@@ -24,7 +24,8 @@ struct OrdinaryShare {
 };
 OrdinaryShare ordinary_share(const Facts& facts, int cpu);
 
-/// The right to real-time policies and locked memory for this program: capabilities, or a unit of systemd.
+/// The right to real-time policies and locked memory for this program: as a file that only its group may run, or as a
+/// unit of systemd.
 std::vector<Fix> grant_rights(const Facts& facts);
 /// Lines for a file of /etc/security/limits.d; "USER" stands for root, who needs none.
 Fix limits_line(const Facts& facts, const std::string& item);

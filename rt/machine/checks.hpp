@@ -19,6 +19,12 @@ Finding check_rt_runtime(const Facts& facts);
 Finding check_cgroup_rt(const Facts& facts);
 Finding check_fair_server(const Facts& facts);
 
+// rights_checks.cpp. Sources: capabilities(7), the kernel's watchdog-api.rst.
+/// Which capabilities the program has, and whether other users of the machine have them through it.
+Finding check_rights(const Facts& facts, const RightsTrial& trial);
+/// Who resets the machine if nobody feeds its watchdog.
+Finding check_watchdog(const WatchdogTrial& trial);
+
 // memory_checks.cpp. Sources: mlock(2), tmpfs(5), the kernel's transhuge.rst.
 Finding check_mlockall(const Facts& facts, const LockTrial& trial);
 Finding check_dev_shm(const SharedMemoryTrial& trial);

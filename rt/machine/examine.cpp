@@ -22,6 +22,7 @@ std::vector<Finding> examine(const Facts& facts, const Trials& trials) {
           check_rt_runtime(facts),
           check_cgroup_rt(facts),
           check_fair_server(facts),
+          check_rights(facts, trials.rights),
           check_mlockall(facts, trials.lock),
           check_dev_shm(trials.shared_memory),
           check_transparent_hugepage(facts),
@@ -35,6 +36,7 @@ std::vector<Finding> examine(const Facts& facts, const Trials& trials) {
           check_cpusets(facts),
           check_irq_affinity(facts),
           check_host_stall(facts),
+          check_watchdog(trials.watchdog),
           check_iceoryx(trials.daemon)};
 }
 

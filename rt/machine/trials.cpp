@@ -6,13 +6,18 @@
 #include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <sys/statvfs.h>
+#include <sys/xattr.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <cstring>
 #include <ctime>
+#include <filesystem>
+#include <system_error>
 
+#include "rt/capability.hpp"
 #include "rt/machine/child.hpp"
 #include "rt/machine/facts.hpp"
 #include "rt/machine/measure_support.hpp"
@@ -157,6 +162,49 @@ DaemonTrial try_daemon() {
   return trial;
 }
 
+RightsTrial try_rights() {
+  RightsTrial trial;
+  const std::string program = SystemFacts().program();
+  struct stat facts {};
+  if (stat(program.c_str(), &facts) != 0) return trial;
+  trial.answered = true;
+  trial.mode = facts.st_mode;
+  trial.by_file = getxattr(program.c_str(), "security.capability", nullptr, 0) > 0;
+  for (const ThreadRights& thread : thread_rights(getpid())) trial.held |= thread.capabilities;
+  return trial;
+}
+
+/// The process that has a device file open; "" if none that may be looked at has. A file's descriptors are links.
+std::string holder_of(const std::string& device, const SystemFacts& facts) {
+  for (const std::string& process : facts.list("/proc")) {
+    if (process.find_first_not_of("0123456789") != std::string::npos) continue;
+    for (const std::string& descriptor : facts.list("/proc/" + process + "/fd")) {
+      std::error_code error;
+      const auto file = std::filesystem::read_symlink("/proc/" + process + "/fd/" + descriptor, error);
+      if (!error && (file == "/dev/" + device || (device == "watchdog0" && file == "/dev/watchdog")))
+        return trimmed(facts.text("/proc/" + process + "/comm").value_or("")) + " (pid " + process + ")";
+    }
+  }
+  return "";
+}
+
+WatchdogTrial try_watchdog() {
+  const SystemFacts facts;
+  WatchdogTrial trial;
+  trial.answered = true;
+  const std::vector<std::string> all = facts.list("/sys/class/watchdog");
+  trial.there = !all.empty();
+  if (!trial.there) return trial;
+  const std::string folder = "/sys/class/watchdog/" + all.front();
+  const auto told = [&](const char* what) { return trimmed(facts.text(folder + "/" + what).value_or("")); };
+  trial.active = told("state") == "active";
+  trial.timeout_s = parse_number(told("timeout")).value_or(0);
+  trial.sees_all = facts.is_root();
+  std::strncpy(trial.name.data(), (all.front() + " (" + told("identity") + ")").c_str(), trial.name.size() - 1);
+  std::strncpy(trial.holder.data(), holder_of(all.front(), facts).c_str(), trial.holder.size() - 1);
+  return trial;
+}
+
 template <class Trial>
 Trial tried(Trial (*body)()) {
   return in_child<Trial>(body).value_or(Trial{});
@@ -175,6 +223,8 @@ Trials try_machine() {
   trials.shared_memory = tried(try_shared_memory);
   trials.tick = tried(try_tick);
   trials.daemon = tried(try_daemon);
+  trials.rights = tried(try_rights);
+  trials.watchdog = tried(try_watchdog);
   return trials;
 }
 

@@ -67,6 +67,24 @@ struct DaemonTrial {
   bool private_room = false;        ///< but a run may take a /tmp and /dev/shm of its own
 };
 
+/// Of the running program and of the thread that asks.
+struct RightsTrial {
+  bool answered = false;
+  uint64_t held = 0;     ///< capabilities, bit by CAP_ number
+  bool by_file = false;  ///< the program's file gives them (setcap); else whoever started it does
+  uint32_t mode = 0;     ///< of that file
+};
+
+/// The watchdog of the machine that comes first.
+struct WatchdogTrial {
+  bool answered = false;
+  bool there = false, active = false;
+  bool sees_all = false;  ///< whoever holds it would have been seen
+  int64_t timeout_s = 0;
+  std::array<char, 64> name{};     ///< "watchdog0 (iTCO_wdt)"
+  std::array<char, 128> holder{};  ///< "systemd (pid 1)"; "" if none was seen
+};
+
 struct Trials {
   PolicyTrial deadline, fixed;
   BandwidthTrial bandwidth;
@@ -76,6 +94,8 @@ struct Trials {
   SharedMemoryTrial shared_memory;
   TickTrial tick;
   DaemonTrial daemon;
+  RightsTrial rights;
+  WatchdogTrial watchdog;
 };
 
 /// All of them; about 0.1 s, never longer than a few seconds.

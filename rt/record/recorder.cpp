@@ -7,6 +7,7 @@
 #include <ctime>
 #include <utility>
 
+#include "rt/capability.hpp"
 #include "rt/record/message_record.hpp"
 #include "rt/time/clock.hpp"
 
@@ -58,6 +59,7 @@ void Recorder::add_channels(const Plan& plan) {
 
 void Recorder::capture_on() {
   pthread_setname_np(pthread_self(), "takt-record");
+  keep_rights(Rights::none);
   while (!ending_.load()) {
     take_ports();
     nanosleep(&kPause, nullptr);
@@ -98,6 +100,7 @@ void Recorder::push(uint16_t channel, uint64_t sequence, int64_t at_ns, std::vec
 
 void Recorder::write_on() {
   pthread_setname_np(pthread_self(), "takt-write");
+  keep_rights(Rights::none);
   int64_t chunk_began_ns = 0;
   while (auto entry = queue_.pop()) {
     const auto at_ns = static_cast<uint64_t>(entry->at_ns);

@@ -9,6 +9,7 @@
 #include <limits>
 #include <thread>
 
+#include "rt/capability.hpp"
 #include "rt/memory/memory_use.hpp"
 #include "rt/memory/process_memory.hpp"
 #include "rt/node.hpp"
@@ -91,8 +92,10 @@ void Executor::start_clockwork(RunResult& result) {
   // Where a supervisor has fixed it, that is not this process's to write.
   if (board_.epoch_ns().load() != result.epoch_ns) board_.epoch_ns().store(result.epoch_ns);
   if (options_.duration_ns > 0) stop_.set_planned_end(result.epoch_ns + options_.duration_ns);
-  for (const auto& task : tasks_)
-    if (task) task->start(result.epoch_ns, options_.rejoin ? &transport_ : nullptr);
+  without_rights([&] {  // the threads of devices
+    for (const auto& task : tasks_)
+      if (task) task->start(result.epoch_ns, options_.rejoin ? &transport_ : nullptr);
+  });
   for (auto& lane : lanes_) {
     if (options_.rejoin) lane->join(result.epoch_ns, clock_.now_ns());
     else lane->set_epoch(result.epoch_ns);
@@ -134,6 +137,13 @@ Grant apply_below_watchdog(const Reservation& wanted, int64_t patience_ns) {
   return apply(wanted, patience_ns);
 }
 
+/// The worker of a restarted process whose bandwidth is not free: SCHED_FIFO until it is, where a lifted one would be.
+Grant go_beside(Lane& lane, const Reservation& wanted, bool behind) {
+  const Grant grant = apply(fixed_reservation(behind ? kLowestPriority : kHighestPriority));
+  if (grant.refused.empty()) lane.watch().bind_beside(wanted, behind);
+  return grant;
+}
+
 /// Once all workers hold what they got: EBUSY says neither how much is missing nor who has it.
 void explain_busy(const std::vector<Reservation>& wanted, std::vector<Grant>& grants) {
   double asked = 0, least_refused = std::numeric_limits<double>::max();
@@ -154,15 +164,22 @@ void explain_busy(const std::vector<Reservation>& wanted, std::vector<Grant>& gr
 bool Executor::run_partitioned(Policy policy, RunResult& result) {
   crew_ = std::make_unique<Crew>(lanes_.size());
   const std::vector<Reservation>& wanted = crew_->wanted = own_reservations(policy);
-  // A process before this one may just have died with the same reservations.
-  const int64_t patience_ns = bandwidth_within_ns(wanted) + kBandwidthMargin_ns;
+  // A process before this one may just have died with the same reservations. One that comes back does not wait: its
+  // jobs are due.
+  const int64_t patience_ns = options_.rejoin ? 0 : bandwidth_within_ns(wanted) + kBandwidthMargin_ns;
   for (size_t i = 0; i < lanes_.size(); ++i) {
     crew_->workers.start([this, &crew = *crew_, &lane = *lanes_[i], mine = wanted[i], patience_ns, i] {
       name_thread(lane.head().plan().name);
       const trace::Thread traced(options_.trace, lane.head().plan().name);
+      keep_rights(Rights::real_time);
       prefault_stack();
       crew.grants[i] = apply_below_watchdog(mine, patience_ns);
       lane.watch().bind(mine);
+      if (options_.rejoin && crew.grants[i].error == EBUSY) {
+        const bool high = std::any_of(lane.members().begin(), lane.members().end(),
+                                      [&](size_t t) { return plan_.tasks[t].criticality == Criticality::high; });
+        crew.grants[i] = go_beside(lane, mine, /*behind=*/!high);
+      }
       crew.ready.arrive_and_wait();
       crew.started.arrive_and_wait();
       if (!crew.go.load()) return;
@@ -206,11 +223,13 @@ void Executor::agree(Policy policy, RunResult& result) {
   result.policy_granted = policy;
   start_clockwork(result);
   watch(policy);
+  if (options_.gives_up_rights) keep_rights(Rights::none);  // workers and watchdogs have theirs
   crew_->go.store(true);
 }
 
 void Executor::run_cooperative(RunResult& result) {
   crew_ = std::make_unique<Crew>(0);
+  if (options_.gives_up_rights) keep_rights(Rights::none);
   int64_t lead_ns = plan_.anticipate_ns;
   for (const auto& lane : lanes_) lead_ns = std::min(lead_ns, longest_lead_ns(plan_, lane->members()));
   crew_->queue = std::make_unique<CooperativeQueue>(lanes_, clock_, stop_, lead_ns);

@@ -40,11 +40,11 @@ int get_attributes(SchedulingAttributes& a, int thread = 0) {
   return static_cast<int>(syscall(SYS_sched_getattr, thread, &a, sizeof a, 0));
 }
 
-std::vector<int> current_cpus() {
+std::vector<int> current_cpus(int thread) {
   cpu_set_t set;
   CPU_ZERO(&set);
   std::vector<int> cpus;
-  if (sched_getaffinity(0, sizeof set, &set) != 0) return cpus;
+  if (sched_getaffinity(thread, sizeof set, &set) != 0) return cpus;
   for (int cpu = 0; cpu < CPU_SETSIZE; ++cpu) {
     if (CPU_ISSET(static_cast<size_t>(cpu), &set)) cpus.push_back(cpu);
   }
@@ -57,7 +57,7 @@ std::string refusal(const char* what, int error) {
     return text +
            "this process has the right, so its CPUs are too few (SCHED_DEADLINE takes no affinity: all CPUs, or an "
            "exclusive cpuset) or kernel.sched_rt_runtime_us is 0";
-  if (error == EPERM) return text + "run as root, or grant CAP_SYS_NICE: sudo setcap cap_sys_nice,cap_ipc_lock+ep TAKT";
+  if (error == EPERM) return text + "run it as the service, as root, or with CAP_SYS_NICE; takt doctor says how";
   if (error == EBUSY) return text + "too much of the CPUs is reserved already";
   return text;
 }
@@ -96,21 +96,13 @@ Grant apply_deadline(const Reservation& wanted, int64_t patience_ns) {
     const timespec pause{0, kBandwidthStep_ns};
     nanosleep(&pause, nullptr);
   }
-  Grant grant;
   if (error != 0) {
+    Grant grant;
     grant.error = error;
     grant.refused = refusal("SCHED_DEADLINE", error);
     return grant;
   }
-  SchedulingAttributes got;
-  if (get_attributes(got) == 0 && got.policy == kDeadline) {
-    grant.policy = Policy::deadline;
-    grant.runtime_ms = static_cast<double>(got.runtime) / 1e6;
-    grant.deadline_ms = static_cast<double>(got.deadline) / 1e6;
-    grant.verified = got.runtime == a.runtime && got.deadline == a.deadline && got.period == a.period &&
-                     (got.flags & kReclaim) == (a.flags & kReclaim);
-  }
-  return grant;
+  return read_back(wanted);
 }
 
 Grant apply_fixed(const Reservation& wanted) {
@@ -122,13 +114,7 @@ Grant apply_fixed(const Reservation& wanted) {
     grant.refused = refusal("SCHED_FIFO", grant.error);
     return grant;
   }
-  SchedulingAttributes got;
-  if (get_attributes(got) == 0 && got.policy == SCHED_FIFO) {
-    grant.policy = Policy::fixed;
-    grant.priority = static_cast<int>(got.priority);
-    grant.verified = grant.priority == wanted.priority;
-  }
-  return grant;
+  return read_back(wanted);
 }
 
 Grant apply_cooperative(const Reservation& wanted) {
@@ -179,9 +165,29 @@ Grant apply(const Reservation& wanted, int64_t patience_ns) {
   if (wanted.policy == Policy::deadline) grant = apply_deadline(wanted, patience_ns);
   else if (wanted.policy == Policy::fixed) grant = apply_fixed(wanted);
   else grant = apply_cooperative(wanted);
-  grant.cpus = current_cpus();
-  if (wanted.policy == Policy::fixed && wanted.core >= 0)
-    grant.verified = grant.verified && grant.cpus == std::vector<int>{wanted.core};
+  grant.cpus = current_cpus(0);
+  return grant;
+}
+
+Grant read_back(const Reservation& wanted, int thread) {
+  Grant grant;
+  grant.cpus = current_cpus(thread);
+  SchedulingAttributes got;
+  if (get_attributes(got, thread) != 0) return grant;
+  if (got.policy == kDeadline) {
+    const SchedulingAttributes asked = attributes_of(wanted);
+    grant.policy = Policy::deadline;
+    grant.runtime_ms = static_cast<double>(got.runtime) / 1e6;
+    grant.deadline_ms = static_cast<double>(got.deadline) / 1e6;
+    grant.verified = wanted.policy == Policy::deadline && got.runtime == asked.runtime &&
+                     got.deadline == asked.deadline && got.period == asked.period &&
+                     (got.flags & kReclaim) == (asked.flags & kReclaim);
+  } else if (got.policy == SCHED_FIFO) {
+    grant.policy = Policy::fixed;
+    grant.priority = static_cast<int>(got.priority);
+    grant.verified =
+        grant.priority == wanted.priority && (wanted.core < 0 || grant.cpus == std::vector<int>{wanted.core});
+  }
   return grant;
 }
 

@@ -66,6 +66,9 @@ int64_t bandwidth_within_ns(const std::vector<Reservation>& reservations);
 /// Applies the reservation to the calling thread and reads it back. Waits up to `patience_ns` for bandwidth.
 Grant apply(const Reservation& reservation, int64_t patience_ns = kBandwidthMargin_ns);
 
+/// What a thread of this process has (0: the calling one), beside what it wanted.
+Grant read_back(const Reservation& wanted, int thread = 0);
+
 /// Puts another thread of this process behind all real-time ones (SCHED_OTHER), where it gets its share beside whatever
 /// else the machine does: behind that as well (SCHED_IDLE) a job could last for minutes, and so could the end of its
 /// process. False if the kernel refuses.

@@ -23,6 +23,12 @@ void JobWatch::bind(const Reservation& has) {
   thread_.store(thread, std::memory_order_release);
 }
 
+void JobWatch::bind_beside(const Reservation& wanted, bool behind) {
+  bind(wanted);
+  refusals_.store(1, std::memory_order_release);
+  place_.store(behind ? Place::behind : Place::first, std::memory_order_release);
+}
+
 TAKT_HOT void JobWatch::begin(uint32_t member, uint64_t index, int64_t release_ns, int64_t cpu_limit_ns) {
   // Release stores: who reads one of them also sees that the job before has ended, and so takes no action on it.
   member_.store(member, std::memory_order_release);
@@ -79,7 +85,9 @@ void JobWatch::settle_down() {
   if (MonotonicClock().now_ns() < lifted_until_ns_.load(std::memory_order_relaxed)) return;
   const std::optional<Place> had = claim_place();
   if (!had) return;
-  const Place now = restore_thread(has_) ? Place::own : *had;
+  const bool back = restore_thread(has_);
+  if (!back) refusals_.fetch_add(1, std::memory_order_acq_rel);
+  const Place now = back ? Place::own : *had;
   Place moving = Place::moving;  // no longer, if it was rescued meanwhile
   place_.compare_exchange_strong(moving, now, std::memory_order_acq_rel);
 }

@@ -29,6 +29,9 @@ class JobWatch {
   // The worker's side.
   /// By the thread that will run the jobs, before the first: what it has, and is given back after a demotion.
   void bind(const Reservation& has);
+  /// The same where the kernel had no bandwidth for it: the thread goes on under SCHED_FIFO as after a lift, and asks
+  /// again after each of its jobs.
+  void bind_beside(const Reservation& wanted, bool behind);
   /// It has done its work, up to this reading of its CPU clock.
   void rest(int64_t cpu_ns) { rested_cpu_ns_.store(cpu_ns, std::memory_order_release); }
   /// Before the worker sleeps, wherever the runtime itself makes it sleep, and after it: not even a lift that is under
@@ -75,6 +78,10 @@ class JobWatch {
   Lift rescue(int64_t now_ns, bool behind);
   /// A lifted worker goes on as an ordinary thread from here on, unless it takes its reservation back this moment.
   void drop();
+  /// How often the thread has asked for its reservation in vain.
+  uint32_t refusals() const { return refusals_.load(std::memory_order_acquire); }
+  /// What the thread has now, read back.
+  Grant grant() const { return read_back(has_, thread_.load(std::memory_order_acquire)); }
   /// By how much jobs that ended within StolenTime::kWindow_ns overran.
   int64_t owed_ns(int64_t now_ns) const;
   /// The worker was lifted and has not taken its reservation back.
@@ -108,6 +115,7 @@ class JobWatch {
   std::atomic<int64_t> release_ns_{0}, cpu_limit_ns_{0}, expected_ns_{0};
   std::atomic<int64_t> lifted_until_ns_{0};
   std::atomic<Place> place_{Place::own};
+  std::atomic<uint32_t> refusals_{0};
   std::atomic<Wake> wake_{Wake::awake};
   std::atomic<Lookout*> lookout_{nullptr};
   std::atomic<int64_t> owed_ns_{0}, owed_at_ns_{0}, rested_cpu_ns_{0};

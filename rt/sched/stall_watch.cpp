@@ -9,6 +9,7 @@
 #include <map>
 #include <utility>
 
+#include "rt/capability.hpp"
 #include "rt/memory/process_memory.hpp"
 #include "rt/sched/grant.hpp"
 #include "rt/sched/run_board.hpp"
@@ -31,7 +32,9 @@ int64_t overlap_ns(int64_t from_ns, int64_t to_ns, int64_t other_from_ns, int64_
 /// False if the kernel refused.
 bool become(int priority, int core) {
   prefault_stack();
-  return apply(fixed_reservation(priority, core)).error == 0;
+  const bool granted = apply(fixed_reservation(priority, core)).error == 0;
+  keep_rights(Rights::none);
+  return granted;
 }
 
 }  // namespace

@@ -35,6 +35,8 @@ Watchdog::Watchdog(const Plan& plan, RunBoard& board, const Clock& clock, std::v
         watched.least_budget_ns = rules.budget_ns;
     }
     watched.worker = std::move(workers[w]);
+    watched.beside = watched.worker.watch->refusals() > 0;
+    watched.beside_since_ns = clock.now_ns();
     watched.own_lookout = watched.least_budget_ns > 0 && watched.worker.has.priority > 0;
   }
   Reservation wanted;
@@ -55,6 +57,15 @@ Watchdog::Watchdog(const Plan& plan, RunBoard& board, const Clock& clock, std::v
 Watchdog::~Watchdog() {
   for (const Watched& watched : watched_)
     if (watched.own_lookout) watched.worker.watch->set_lookout(nullptr);
+  lookouts_.clear();
+  for (Watched& watched : watched_) {
+    look_for_return(watched, clock_.now_ns());
+    if (!watched.beside || !watched.beside_told) continue;
+    char what[120];
+    std::snprintf(what, sizeof what, "it never had its reservation again; it was refused %" PRIu32 " times",
+                  watched.worker.watch->refusals());
+    tell_bandwidth(watched.worker.tasks.front(), clock_.now_ns(), what);
+  }
 }
 
 bool Watchdog::hangs(size_t worker) const {
@@ -177,6 +188,7 @@ int64_t Watchdog::look_at_reserve(Watched& watched, int64_t now_ns) {
     watched.stood_at_ns = now_ns;
     sight.stood_ns = watched.stood_ns;
   }
+  if (watched.beside) look_for_return(watched, now_ns);
   const ReserveVerdict verdict = judge_reserve(sight);
   const size_t task = watched.worker.tasks[member];
   if (verdict.lift) lift(watched, task, sight.owed_ns - sight.left_ns, now_ns, watched.low);
@@ -249,6 +261,31 @@ void Watchdog::rescue(Watched& watched, size_t task, int64_t now_ns) {
   std::snprintf(what, sizeof what, "the kernel did not run it for %" PRId64 " ms; it goes on beside its reservation",
                 stood_ns / 1'000'000);
   tell_bandwidth(task, now_ns, what);
+}
+
+void Watchdog::look_for_return(Watched& watched, int64_t now_ns) {
+  const JobWatch& watch = *watched.worker.watch;
+  if (!watched.beside || watch.returns()) return;
+  const int64_t ms = (now_ns - watched.beside_since_ns) / 1'000'000;
+  const size_t head = watched.worker.tasks.front();
+  char what[160];
+  if (watch.lifted()) {
+    const int64_t usual_ms = (watch.period_ns() + kBandwidthMargin_ns) / 1'000'000;  // as its predecessor gave it back
+    if (watched.beside_told || ms <= usual_ms) return;
+    watched.beside_told = true;
+    std::snprintf(what, sizeof what,
+                  "its reservation is not free %" PRId64
+                  " ms after the restart; its jobs run beside it under "
+                  "SCHED_FIFO, and it asks again after each",
+                  ms);
+    return tell_bandwidth(head, now_ns, what);
+  }
+  watched.beside = false;
+  for (const size_t task : watched.worker.tasks) board_.set_grant(task, watch.grant());
+  if (!watched.beside_told) return;
+  std::snprintf(what, sizeof what, "it has its reservation after %" PRId64 " ms; it was refused %" PRIu32 " times", ms,
+                watch.refusals());
+  tell_bandwidth(head, now_ns, what);
 }
 
 void Watchdog::tell_bandwidth(size_t task, int64_t now_ns, const char* what) {

@@ -33,6 +33,9 @@ namespace takt {
 /// - Under `deadline` a worker that has used up its reservation goes on beside it before it is late (judge_reserve()):
 ///   one with a task of high criticality before all workers of SCHED_FIFO, any other behind them and, once it has used
 ///   half a budget more, as an ordinary thread; counted `lifted` as well.
+/// - A worker of a restarted process that found no bandwidth free goes on beside its reservation in the same way, until
+///   the kernel grants it (JobWatch::bind_beside()). What takes longer than the return of its predecessor's bandwidth
+///   is told as a fault, with the number of refusals.
 /// - `safe_stop` is asked for the moment a budget or a deadline has passed, not when the job ends.
 /// - A job that has not returned `patience` after its deadline hangs: told once, by name. Under `cooperative` that ends
 ///   the run, unless somebody looks after this process.
@@ -70,16 +73,19 @@ class Watchdog {
  private:
   struct Watched {
     Worker worker;
-    std::vector<WatchRules> rules;       ///< by member
-    bool low = true;                     ///< all of them are of low criticality
-    bool own_lookout = false;            ///< its budgets are looked at by a thread of its own
-    int64_t least_budget_ns = 0;         ///< of the members whose overruns are minded; 0: there are none
-    int64_t seen_cpu_ns = -1;            ///< CPU clock at the last look at a budget
-    int64_t overdrawn_cpu_ns = 0;        ///< CPU clock at the last look, if the reservation was used up then
-    int64_t stood_cpu_ns = -1;           ///< CPU clock at the last look at a reservation
-    int64_t stood_at_ns = 0;             ///< when that was
-    int64_t stood_ns = 0;                ///< for how long it has shown the same
-    bool loss_told = false;              ///< of its reservation
+    std::vector<WatchRules> rules;  ///< by member
+    bool low = true;                ///< all of them are of low criticality
+    bool own_lookout = false;       ///< its budgets are looked at by a thread of its own
+    int64_t least_budget_ns = 0;    ///< of the members whose overruns are minded; 0: there are none
+    int64_t seen_cpu_ns = -1;       ///< CPU clock at the last look at a budget
+    int64_t overdrawn_cpu_ns = 0;   ///< CPU clock at the last look, if the reservation was used up then
+    int64_t stood_cpu_ns = -1;      ///< CPU clock at the last look at a reservation
+    int64_t stood_at_ns = 0;        ///< when that was
+    int64_t stood_ns = 0;           ///< for how long it has shown the same
+    bool loss_told = false;         ///< of its reservation
+    bool beside = false;            ///< it came without a reservation, and has none yet
+    int64_t beside_since_ns = 0;
+    bool beside_told = false;
     uint64_t miss_told = 0;              ///< serial of the last job it was told of; 0: none
     std::atomic<uint64_t> hang_told{0};  ///< the same
   };
@@ -90,6 +96,8 @@ class Watchdog {
   int64_t look_at_budget(Watched& watched, int64_t now_ns);
   int64_t look_at_reserve(Watched& watched, int64_t now_ns);
   void rescue(Watched& watched, size_t task, int64_t now_ns);
+  /// Of a worker that came back without its reservation.
+  void look_for_return(Watched& watched, int64_t now_ns);
   /// The job may have ended since it was seen: nothing is done to one that has.
   void overrun(Watched& watched, const JobWatch::Running& job, int64_t now_ns);
   void act(Watched& watched, const JobWatch::Running& job, const WatchVerdict& verdict, int64_t now_ns);

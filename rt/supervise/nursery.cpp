@@ -125,9 +125,7 @@ Nursery::Hand Nursery::fork_first() {
 void Nursery::serve(int answers) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   prctl(PR_SET_NAME, "takt-nursery");
-  signal(SIGINT, SIG_IGN);
-  signal(SIGHUP, SIG_IGN);
-  signal(SIGTERM, SIG_IGN);
+  for (const int end : {SIGINT, SIGHUP, SIGTERM}) signal(end, SIG_IGN);  // as the processes that it forks
   for (Hand& hand : hands_)  // of the maker: whoever keeps them open keeps the other one waiting for an end
     if (std::exchange(hand.pid, 0) != 0) close(hand.socket);
   Ask ask;

@@ -23,9 +23,8 @@ namespace {
 
 int run_member(const std::string& name, const std::function<int()>& body) {
   prctl(PR_SET_NAME, name.substr(0, 15).c_str());
-  signal(SIGINT, SIG_IGN);
-  signal(SIGHUP, SIG_IGN);
-  signal(SIGTERM, SIG_DFL);
+  // A terminal or a service manager sends these to all processes at once. The supervisor ends the run, in order.
+  for (const int end : {SIGINT, SIGHUP, SIGTERM}) signal(end, SIG_IGN);
   int code = 1;
   try {
     code = body();

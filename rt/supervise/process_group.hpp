@@ -30,8 +30,9 @@ class ProcessGroup {
   /// Kills and buries whatever still lives.
   ~ProcessGroup();
 
-  /// Forks a process that runs `body` and exits with its result. It ignores SIGINT and SIGHUP, which a terminal sends
-  /// to the whole group, and dies with the supervisor. Throws std::runtime_error if there can be no more processes.
+  /// Forks a process that runs `body` and exits with its result. It ignores SIGINT, SIGHUP and SIGTERM, which terminals
+  /// and service managers send to the whole group: the supervisor says when it ends. It dies with the supervisor.
+  /// Throws std::runtime_error if there can be no more processes.
   void start(const std::string& name, const std::function<int()>& body);
   /// After the last start and before the first thread: makes restart() possible. Throws std::runtime_error.
   void prepare_restarts();

@@ -297,3 +297,83 @@ TEST_CASE("a worker whose reservation is used up goes on beside it, in its job a
   CHECK(was_lifted);
   CHECK(board.task(0).lifted.load() == 1);
 }
+
+TEST_CASE("a worker that came back without its reservation asks for it after each job, and has it once it is granted") {
+  constexpr int kDeadline = 6;  // SCHED_DEADLINE
+  bool granted = false;
+  int before = 0, after = 0;
+  Grant read_back;
+  JobWatch watch;
+  std::thread([&] {
+    const Reservation wanted = deadline_reservation(kMs, 90 * kMs, 100 * kMs);
+    granted = apply(wanted).policy == Policy::deadline;
+    if (!granted) return;
+    apply(fixed_reservation(kLowestPriority));
+    watch.bind_beside(wanted, /*behind=*/true);
+    CHECK(watch.lifted());
+    before = own_policy();
+    watch.begin(0, 0, 0, kMs);
+    watch.end();
+    after = own_policy();
+    read_back = watch.grant();
+  }).join();
+  if (!granted) {
+    MESSAGE("NOT RUN: SCHED_DEADLINE is refused to this user");
+    return;
+  }
+  CHECK(before == SCHED_FIFO);
+  CHECK(after == kDeadline);
+  CHECK_FALSE(watch.lifted());
+  CHECK(watch.refusals() == 1);
+  CHECK(read_back.policy == Policy::deadline);
+  CHECK(read_back.verified);
+}
+
+TEST_CASE("a worker whose reservation stays refused runs on under SCHED_FIFO; the refusals are counted and told") {
+  Steady node;
+  Plan plan;
+  TaskPlan task;
+  task.name = "guard";
+  task.node = &node;
+  task.rate = Rate{10, 1};
+  task.budget_ns = 5 * kMs;
+  task.deadline_ns = 90 * kMs;
+  task.criticality = Criticality::high;
+  plan.tasks.push_back(task);
+  RunBoard board(plan);
+  MonotonicClock clock;
+  JobWatch watch;
+  bool granted = false;
+  int policy = 0;
+  std::thread([&] {
+    granted = apply(fixed_reservation(kHighestPriority)).refused.empty();
+    if (!granted) return;
+    Reservation never = deadline_reservation(task.budget_ns, task.deadline_ns, task.rate->period_ns());
+    never.runtime_ns = 2 * never.deadline_ns;  // no kernel grants that
+    watch.bind_beside(never, /*behind=*/false);
+    Watchdog::Options options;
+    options.granted = Policy::deadline;
+    options.heartbeat_period_ns = kMs;
+    LifeSigns life;
+    options.life = &life;
+    const Watchdog watchdog(plan, board, clock, {{&watch, {0}}}, options);
+    for (int job = 0; job < 4; ++job) {
+      watch.begin(0, static_cast<uint64_t>(job), clock.now_ns(), INT64_MAX);
+      watch.end();
+    }
+    policy = own_policy();
+    apply_default();  // a real-time thread that waits would be throttled before an ordinary one that is to tell it
+    while (board.faults().size() == 0) std::this_thread::yield();
+  }).join();
+  if (!granted) {
+    MESSAGE("NOT RUN: SCHED_FIFO is refused to this user");
+    return;
+  }
+  CHECK(policy == SCHED_FIFO);
+  CHECK(watch.refusals() == 5);
+  REQUIRE(board.faults().size() == 2);
+  CHECK(board.faults().at(0)->kind == Fault::bandwidth);
+  CHECK(std::string(board.faults().at(0)->what.c_str()).find("guard: its reservation is not free") == 0);
+  CHECK(std::string(board.faults().at(1)->what.c_str()) ==
+        "guard: it never had its reservation again; it was refused 5 times");
+}

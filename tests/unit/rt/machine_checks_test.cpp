@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
+#include <linux/capability.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -56,6 +57,7 @@ TEST_CASE("SCHED_DEADLINE: granted, refused for each of the reasons, no answer")
   const Finding no_right = check_sched_deadline(facts, refused(EPERM));
   CHECK(no_right.status == Status::lacks);
   CHECK(has_fix(no_right, "setcap cap_sys_nice,cap_ipc_lock+ep /opt/takt"));
+  CHECK(has_fix(no_right, "chmod 0750 /opt/takt"));
   CHECK(has_fix(no_right, "AmbientCapabilities"));
   CHECK(has_fix(check_sched_deadline(facts, refused(EBUSY)), "sched_rt_runtime_us"));
   facts.cpus = {1};
@@ -260,6 +262,41 @@ TEST_CASE("interrupts and stolen time") {
   CHECK(stolen.status == Status::warn);
   CHECK(says(stolen, "1.50 %"));
   CHECK(after(facts, {{"/proc/stat", "cpu  500 0 0 500 0 0 0 0 0 0\n"}}, check_host_stall).status == Status::ok);
+}
+
+TEST_CASE("rights: whose they are, and whether every user of the machine has them") {
+  FakeFacts facts;
+  CHECK(check_rights(facts, {}).status == Status::unknown);
+  constexpr uint64_t kBoth = 1U << CAP_SYS_NICE | 1U << CAP_IPC_LOCK;
+  const Finding open = check_rights(facts, {true, kBoth, true, 0755});
+  CHECK(open.status == Status::warn);
+  CHECK(says(open, "CAP_IPC_LOCK CAP_SYS_NICE, by the program's file, which every user"));
+  CHECK(has_fix(open, "chgrp takt /opt/takt"));
+  CHECK(check_rights(facts, {true, kBoth, true, 0750}).status == Status::ok);
+  CHECK(says(check_rights(facts, {true, kBoth, false, 0755}), "by who started it"));
+  CHECK(says(check_rights(facts, {true, 0, false, 0755}), "none"));
+  facts.root = true;
+  CHECK(says(check_rights(facts, {true, ~uint64_t{0}, false, 0755}), "root"));
+}
+
+TEST_CASE("the machine's watchdog: none, free, held, armed by nobody") {
+  machine::WatchdogTrial trial;
+  CHECK(check_watchdog(trial).status == Status::unknown);
+  trial.answered = true;
+  CHECK(says(check_watchdog(trial), "no watchdog device"));
+  trial.there = true;
+  trial.timeout_s = 30;
+  std::strcpy(trial.name.data(), "watchdog0 (softdog)");
+  CHECK(says(check_watchdog(trial), "watchdog0 (softdog), 30 s: nobody holds it"));
+  CHECK(has_fix(check_watchdog(trial), "RuntimeWatchdogSec"));
+  trial.active = true;
+  CHECK(check_watchdog(trial).status == Status::ok);
+  CHECK(says(check_watchdog(trial), "only root sees who holds it"));
+  trial.sees_all = true;
+  CHECK(check_watchdog(trial).status == Status::warn);
+  std::strcpy(trial.holder.data(), "systemd (pid 1)");
+  CHECK(check_watchdog(trial).status == Status::ok);
+  CHECK(says(check_watchdog(trial), "held by systemd (pid 1)"));
 }
 
 TEST_CASE("a run lacks what every run needs and what its own policy needs, and nothing else") {
