@@ -2,58 +2,40 @@
 #include "graph/attach/endpoint.hpp"
 
 #include <sys/socket.h>
-#include <sys/stat.h>
 #include <sys/time.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <cerrno>
 #include <csignal>
-#include <cstdlib>
-#include <cstring>
+#include <utility>
 
 namespace takt::attach {
 namespace {
 
 constexpr size_t kLongestLine = 4'000'000;
 
-std::filesystem::path wanted_folder() {
-  const char* runtime = std::getenv("XDG_RUNTIME_DIR");
-  if (runtime != nullptr && *runtime != 0 && access(runtime, W_OK) == 0) return std::filesystem::path(runtime) / "takt";
-  if (geteuid() == 0 && access("/run", W_OK) == 0) return "/run/takt";
-  return "/tmp/takt." + std::to_string(geteuid());
+/// Where runs are looked for, the own ones first.
+std::vector<SocketFolder> folders() {
+  const Surroundings where = Surroundings::of_this_process();
+  std::string passed_over;
+  std::vector<SocketFolder> all;
+  if (auto own = SocketFolder::own(where, passed_over)) all.push_back(std::move(*own));
+  if (auto service = SocketFolder::of_service(where)) all.push_back(std::move(*service));
+  return all;
 }
 
 }  // namespace
 
-std::filesystem::path socket_folder(std::string& why) {
-  const std::filesystem::path folder = wanted_folder();
-  if (mkdir(folder.c_str(), 0700) != 0 && errno != EEXIST) {
-    why = folder.string() + ": " + std::strerror(errno);
-    return {};
-  }
-  struct stat facts {};
-  if (lstat(folder.c_str(), &facts) != 0 || !S_ISDIR(facts.st_mode) || facts.st_uid != geteuid() ||
-      (facts.st_mode & 077) != 0) {
-    why = folder.string() + " is no folder of this user alone (mode 0700); remove it";
-    return {};
-  }
-  return folder;
-}
-
 std::vector<int> running() {
-  std::string why;
-  std::vector<int> pids;
-  const auto folder = socket_folder(why);
-  std::error_code error;
-  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
-    const int pid = std::atoi(entry.path().stem().c_str());
-    if (entry.path().extension() != ".sock" || pid <= 0) continue;
-    if (kill(pid, 0) == 0 || errno == EPERM) pids.push_back(pid);
-    else std::filesystem::remove(entry.path(), error);  // it was killed
+  for (const SocketFolder& folder : folders()) {
+    std::vector<int> pids;
+    for (const int pid : folder.pids()) {
+      if (kill(pid, 0) == 0 || errno == EPERM) pids.push_back(pid);
+      else folder.remove_socket(pid);  // it was killed
+    }
+    if (!pids.empty()) return pids;
   }
-  std::sort(pids.begin(), pids.end());
-  return pids;
+  return {};
 }
 
 Connection::Connection(int descriptor, int patience_ms) : descriptor_(descriptor) {
@@ -108,31 +90,16 @@ bool Connection::gone() const {
   return recv(descriptor_, &next, 1, MSG_PEEK | MSG_DONTWAIT) == 0;
 }
 
-std::optional<sockaddr_un> address_of(const std::filesystem::path& folder, int pid, std::string& why) {
-  const std::string path = folder / (std::to_string(pid) + ".sock");
-  sockaddr_un address{};
-  address.sun_family = AF_UNIX;
-  if (path.size() >= sizeof address.sun_path) {
-    why = path + " is too long for a socket; choose a shorter XDG_RUNTIME_DIR";
-    return std::nullopt;
-  }
-  std::memcpy(address.sun_path, path.c_str(), path.size());
-  return address;
-}
-
 std::optional<Connection> connect_to(int pid) {
-  std::string why;
-  const auto folder = socket_folder(why);
-  if (folder.empty()) return std::nullopt;
-  const auto address = address_of(folder, pid, why);
-  if (!address) return std::nullopt;
-  const int descriptor = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  if (descriptor < 0) return std::nullopt;
-  if (connect(descriptor, reinterpret_cast<const sockaddr*>(&*address), sizeof *address) != 0) {
+  for (const SocketFolder& folder : folders()) {
+    const int descriptor = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    if (descriptor < 0) return std::nullopt;
+    const sockaddr_un address = folder.address(pid);
+    if (connect(descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0)
+      return Connection(descriptor);
     close(descriptor);
-    return std::nullopt;
   }
-  return Connection(descriptor);
+  return std::nullopt;
 }
 
 }  // namespace takt::attach

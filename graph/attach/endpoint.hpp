@@ -1,23 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where a running graph can be spoken to: a local socket in a folder that belongs to its user alone. A question is one
-// line of JSON; an answer is one line of JSON, whose "bytes" says how many raw bytes follow it.
+// How a running graph is spoken to: over a local socket in a SocketFolder. A question is one line of JSON; an answer is
+// one line of JSON, whose "bytes" says how many raw bytes follow it.
 #pragma once
-#include <sys/un.h>
-
-#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "graph/attach/socket_folder.hpp"
 #include "hal/settings/json.hpp"
 
 namespace takt::attach {
 
-/// Folder of the sockets of this user's runs: $XDG_RUNTIME_DIR/takt, else /run/takt (root), else /tmp/takt.UID. Made
-/// with mode 0700 if it is not there; empty with `why` where it cannot be made or belongs to somebody else.
-std::filesystem::path socket_folder(std::string& why);
-
-/// Process ids of the runs of this user that can be spoken to.
+/// Process ids of the runs that can be spoken to: of this user; if there are none, of the service (see SocketFolder).
 std::vector<int> running();
 
 /// One connection, of either side. Reads and writes block, at most `patience_ms` each.
@@ -45,10 +39,7 @@ class Connection {
   std::string rest_;
 };
 
-/// Where the run with that process id listens, in `folder`; nothing with `why` if the path is too long for a socket.
-std::optional<sockaddr_un> address_of(const std::filesystem::path& folder, int pid, std::string& why);
-
-/// To the run with that process id.
+/// To the run with that process id, of this user or of the service.
 std::optional<Connection> connect_to(int pid);
 
 }  // namespace takt::attach

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <poll.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -18,6 +19,7 @@
 #include "graph/language/overlay.hpp"
 #include "graph/language/param_text.hpp"
 #include "graph/language/words.hpp"
+#include "rt/capability.hpp"
 #include "rt/memory/sanitized.hpp"
 #include "rt/sched/param_mail.hpp"
 
@@ -42,10 +44,10 @@ std::optional<uid_t> user_of(int descriptor) {
   return peer.uid;
 }
 
-/// True if the other side is this user or root.
-bool trusted(int descriptor) {
+/// True if the other side is this user or root; whom the service's group lets in, the socket's mode has decided.
+bool trusted(int descriptor, bool group) {
   const auto user = user_of(descriptor);
-  return user && (*user == geteuid() || *user == 0);
+  return group || (user && (*user == geteuid() || *user == 0));
 }
 
 }  // namespace
@@ -60,29 +62,30 @@ Server::~Server() {
   if (thread_.joinable()) thread_.join();
   for (Client& client : clients_) client.thread.join();
   if (listener_ >= 0) close(listener_);
-  std::error_code ignored;
-  if (!path_.empty()) std::filesystem::remove(path_, ignored);
+  if (folder_) folder_->remove_socket(subject_.run);
 }
 
 void Server::open() {
-  const auto folder = socket_folder(lacks_);
-  if (!lacks_.empty()) return;
-  const auto address = address_of(folder, subject_.run, lacks_);
-  if (!address) return;
-  const std::filesystem::path path = address->sun_path;
-  std::error_code ignored;
-  std::filesystem::remove(path, ignored);  // of a dead process that had our number
-  listener_ = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  if (listener_ < 0 || bind(listener_, reinterpret_cast<const sockaddr*>(&*address), sizeof *address) != 0 ||
-      listen(listener_, static_cast<int>(kMostClients)) != 0) {
-    lacks_ = path.string() + ": " + std::strerror(errno);
+  std::string passed_over;
+  if (auto own = SocketFolder::own(Surroundings::of_this_process(), passed_over)) {
+    folder_.emplace(std::move(*own));
+  } else {
+    lacks_ = passed_over + "; or set XDG_RUNTIME_DIR to a folder of this user (mode 0700)";
     return;
   }
-  path_ = path;
+  if (!passed_over.empty()) note_ = fmt::format("sockets lie in {}: {}", folder_->path().string(), passed_over);
+  folder_->remove_socket(subject_.run);  // of a dead process that had our number
+  listener_ = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+  const sockaddr_un address = folder_->address(subject_.run);
+  if (listener_ < 0 || bind(listener_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
+      chmod(address.sun_path, folder_->for_group() ? 0660 : 0600) != 0 ||
+      listen(listener_, static_cast<int>(kMostClients)) != 0)
+    lacks_ = folder_->path().string() + ": " + std::strerror(errno);
 }
 
 void Server::accept_clients() {
   pthread_setname_np(pthread_self(), "takt-attach");
+  keep_rights(Rights::none);
   while (!ending_.load()) {
     pollfd wait{listener_, POLLIN, 0};
     if (poll(&wait, 1, kLookAgainMs) <= 0) continue;
@@ -96,7 +99,7 @@ void Server::accept_clients() {
         ++client;
       }
     }
-    if (clients_.size() >= kMostClients || !trusted(descriptor)) {
+    if (clients_.size() >= kMostClients || !trusted(descriptor, folder_->for_group())) {
       close(descriptor);
       continue;
     }

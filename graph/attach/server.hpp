@@ -27,8 +27,8 @@ struct Subject {
 };
 
 /// Answers top, echo, get, set, forget, mode and stop for one run, from threads of the default policy that only read
-/// the board, hold one message of an output at a time, and post parameters to be taken between jobs. Only its own user
-/// (and root) is heard.
+/// the board, hold one message of an output at a time, and post parameters to be taken between jobs. Its own user and
+/// root are heard; of the service its group, too, where the mode of its folder says so.
 class Server {
  public:
   explicit Server(const Subject& subject);
@@ -37,6 +37,8 @@ class Server {
   Server& operator=(const Server&) = delete;
   /// Why nobody can attach; empty if all is well.
   const std::string& lacks() const { return lacks_; }
+  /// Which folder was passed over, because somebody else has it; mostly empty.
+  const std::string& note() const { return note_; }
 
  private:
   struct Client {
@@ -76,7 +78,8 @@ class Server {
 
   const Subject subject_;
   std::string lacks_;
-  std::filesystem::path path_;
+  std::string note_;
+  std::optional<SocketFolder> folder_;
   int listener_ = -1;
   std::atomic<bool> ending_{false};
   std::mutex setting_, keeping_, tapping_;

@@ -151,7 +151,7 @@ int run_double(const DoubleOptions& options) {
   const auto device = kind->make({options, **world, clock, rig});
   if (const auto plugged = device->plug_in(); !plugged)
     return refuse(plugged.error().text(), plugged.error().bad_input ? kBadInput : kDeviceOrSystem);
-  for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, [](int) { stopped = true; });
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) std::signal(signal, [](int) { stopped = true; });
   device->run_to(clock.now_ns());  // a camera can be opened once it has given a frame
   std::printf("%s at %s\n", options.device.c_str(),
               options.tcp ? fmt::format("127.0.0.1:{}", *options.tcp).c_str()

@@ -22,6 +22,7 @@
 #include "graph/command/show_command.hpp"
 #include "graph/language/overlay.hpp"
 #include "graph/run/run.hpp"
+#include "rt/capability.hpp"
 
 namespace {
 
@@ -189,6 +190,7 @@ int become(const DeskCommand& command, char** arguments) {
 
 int main(int argc, char** argv) {
   takt::command::hold_standard_streams();
+  takt::keep_rights(takt::Rights::observe);
   for (const DeskCommand& command : kDeskCommands)
     if (argc > 1 && std::string_view(argv[1]) == command.name) return become(command, argv);
   // Files that cannot be read are reported by the commands themselves, with the next step.

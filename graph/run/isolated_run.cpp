@@ -21,9 +21,11 @@
 #include "graph/run/outages.hpp"
 #include "graph/run/prepare.hpp"
 #include "graph/run/report.hpp"
+#include "graph/run/rights.hpp"
 #include "graph/run/support.hpp"
 #include "graph/run/trace.hpp"
 #include "graph/run/watchdog.hpp"
+#include "rt/capability.hpp"
 #include "rt/memory/sanitized.hpp"
 #include "rt/sched/executor.hpp"
 #include "rt/shm/iceoryx_preflight.hpp"
@@ -68,6 +70,7 @@ class DaemonProbe {
  public:
   DaemonProbe(Transport& transport, GroupSigns& signs, const Clock& clock)
       : thread_([&](const std::stop_token& end) {
+          keep_rights(Rights::none);
           while (!end.stop_requested()) {
             transport.ask_daemon();
             signs.heartbeat_ns.store(clock.now_ns());
@@ -168,14 +171,16 @@ class IsolatedRun {
     start();
     {
       const attach::Server server({graph_, plan_, board_, *transport_, run});
-      if (!server.lacks().empty()) adjusted_.push_back("nobody can attach: " + server.lacks());
+      tell_attach(server, adjusted_);
       const LiveTable live(plan_, board_,
                            fmt::format("takt run {} ({}, policy {}, {} processes)", graph_.name, graph_.profile,
                                        to_string(plan_.policy), group_.size()));
       watchdog_.emplace(options_, plan_, board_);
+      RunRights rights(board_, processes(run));
       const RunFaults::Active faulty(faults_, plan_, clock_, board_);
       const RunExpectations::Active expecting(expectations_, plan_, clock_, board_, *transport_);
       watch();
+      rights_ = rights.told();
     }
     if (watch_of_stalls) stalls_ = watch_of_stalls->end();
     probe.reset();
@@ -252,7 +257,7 @@ class IsolatedRun {
 
   void bring_up_transport() {
     if (claim_) {
-      transport_ = make_iceoryx_transport(plan_.ports);
+      without_rights([&] { transport_ = make_iceoryx_transport(plan_.ports); });  // its daemon's threads have none
       claim_.reset();
     } else {
       transport_ = make_local_transport(plan_.ports, pools_, static_cast<uint32_t>(group_.size()) + 1);
@@ -288,6 +293,16 @@ class IsolatedRun {
         adjusted_.push_back(fmt::format("policy {} -> cooperative: {}", to_string(plan_.policy), line));
     }
     board_.decision().store(refused ? RunBoard::cooperative : RunBoard::as_asked);
+  }
+
+  /// All of the run, for which the process `run` stands; this one comes last.
+  std::vector<RunRights::Process> processes(pid_t run) const {
+    std::vector<RunRights::Process> all;
+    for (size_t p = 0; p < group_.size(); ++p) all.push_back({group_.name(p), group_.pid(p)});
+    for (const pid_t nursery : group_.nurseries()) all.push_back({"nursery", nursery});
+    if (run != getpid()) all.push_back({"keeper", run});
+    all.push_back({"supervisor", getpid()});
+    return all;
   }
 
   void start() {
@@ -394,6 +409,7 @@ class IsolatedRun {
         make_report({graph_, plan_, board_, result, *transport_, use, options_.clock,
                      std::string(to_string(plan_.policy)), "subsystem", partition_.names, adjusted_, proofs_, stalls_});
     report["memory"]["chunks_at_end"] = chunks_at_end_;
+    report["rights"] = rights_;
     if (const size_t lost = group_.lost_nurseries(); lost > 0)
       problems_.push_back(fmt::format("the process that starts others again was lost {} times and replaced", lost));
     for (const std::string& problem : problems_) report["faults"].push_back({{"what", problem}});
@@ -418,6 +434,7 @@ class IsolatedRun {
   std::vector<std::string> adjusted_, problems_;
   graph::Proofs proofs_;
   StallLog stalls_;
+  nlohmann::ordered_json rights_;
   std::vector<std::pair<pid_t, int64_t>> stopped_;  ///< processes, and when they go on
   MonotonicClock clock_;
   graph::Composition plan_source_;  ///< shells of all nodes; the plan points into them

@@ -11,6 +11,8 @@
 #include <cstdlib>
 #include <string_view>
 
+#include "rt/capability.hpp"
+
 namespace takt::command {
 namespace {
 
@@ -32,7 +34,10 @@ double ms(const std::atomic<int64_t>& ns) { return static_cast<double>(ns.load(s
 }  // namespace
 
 LiveTable::LiveTable(const Plan& plan, const RunBoard& board, std::string title)
-    : plan_(plan), board_(board), title_(std::move(title)), thread_([this] { show(); }) {}
+    : plan_(plan), board_(board), title_(std::move(title)), thread_([this] {
+        keep_rights(Rights::none);
+        show();
+      }) {}
 
 LiveTable::~LiveTable() {
   ended_.store(1);

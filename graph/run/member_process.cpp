@@ -11,6 +11,7 @@
 #include "graph/run/prepare.hpp"
 #include "graph/run/record.hpp"
 #include "graph/run/support.hpp"
+#include "rt/capability.hpp"
 #include "rt/sched/executor.hpp"
 #include "rt/shm/iceoryx_transport.hpp"
 
@@ -112,9 +113,12 @@ int run_member(const MemberPart& part) {
   record.state.store(ProcessRecord::composed);
   wait_until([&] { return board.carrier().load() != RunBoard::no_carrier; });
   prepare_process();
-  auto joined = board.carrier().load() == RunBoard::local
-                    ? join_local_transport(plan.ports, part.pools, static_cast<uint32_t>(part.process) + 1)
-                    : join_iceoryx_transport(plan.ports, iceoryx_domain(part.supervisor));
+  std::unique_ptr<Transport> joined;
+  without_rights([&] {
+    joined = board.carrier().load() == RunBoard::local
+                 ? join_local_transport(plan.ports, part.pools, static_cast<uint32_t>(part.process) + 1)
+                 : join_iceoryx_transport(plan.ports, iceoryx_domain(part.supervisor));
+  });
   const auto transport = part.faults.inject(std::move(joined), plan, *prepared.clock, board);
   BoardGate gate(board, part.process);
   Executor::Options run;
@@ -124,6 +128,7 @@ int run_member(const MemberPart& part) {
   run.trace = part.rings;
   run.gate = &gate;
   run.rejoin = record.restarts.load() > 0;
+  run.gives_up_rights = true;
   run.life = &record.life;
   run.own = owned(plan, part.partition, part.process);
   Executor executor(plan, *transport, *prepared.clock, run);

@@ -5,10 +5,13 @@
 #include <mutex>
 #include <utility>
 
+#include "rt/capability.hpp"
+
 namespace takt::command {
 
 Periodic::Periodic(std::chrono::nanoseconds period, std::function<void()> look)
     : thread_([period, look = std::move(look)](const std::stop_token& stop) {
+        keep_rights(Rights::none);
         std::mutex mutex;
         std::condition_variable_any ending;
         std::unique_lock lock(mutex);

@@ -8,6 +8,7 @@
 #include <cstdlib>
 
 #include "graph/run/record.hpp"
+#include "rt/capability.hpp"
 
 namespace takt::command {
 namespace {
@@ -44,13 +45,16 @@ int load(const RunOptions& options, Prepared& prepared) {
 }
 
 int compose(const RunOptions& options, const graph::ComposeOptions& how, Prepared& prepared) {
-  auto composition = graph::compose(*prepared.graph, graph::node_types(), device_factory(prepared, options.seed),
-                                    *prepared.clock, how);
-  if (!composition)
-    return refuse(prepared, std::move(composition.error().problems),
-                  composition.error().device_failed ? kDeviceOrSystem : kBadInput);
-  prepared.composition = std::move(*composition);
-  return kOk;
+  int code = kOk;
+  without_rights([&] {  // what devices and libraries start here has none
+    auto composition = graph::compose(*prepared.graph, graph::node_types(), device_factory(prepared, options.seed),
+                                      *prepared.clock, how);
+    if (composition) prepared.composition = std::move(*composition);
+    else
+      code = refuse(prepared, std::move(composition.error().problems),
+                    composition.error().device_failed ? kDeviceOrSystem : kBadInput);
+  });
+  return code;
 }
 
 int prepare_check(const RunOptions& options, Prepared& prepared) {

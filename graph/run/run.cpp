@@ -16,11 +16,14 @@
 #include "graph/run/live_table.hpp"
 #include "graph/run/prepare.hpp"
 #include "graph/run/report.hpp"
+#include "graph/run/rights.hpp"
 #include "graph/run/support.hpp"
 #include "graph/run/trace.hpp"
 #include "graph/run/watchdog.hpp"
 #include "graph/run/world_truth.hpp"
+#include "rt/capability.hpp"
 #include "rt/shm/iceoryx_preflight.hpp"
+#include "rt/supervise/systemd_sink.hpp"
 
 namespace takt::command {
 namespace {
@@ -35,7 +38,9 @@ bool writable(const std::filesystem::path& file) {
 std::unique_ptr<Transport> make_transport(const std::string& name, const Plan& plan) {
   if (name != "iceoryx") return make_local_transport(plan.ports);
   const DaemonClaim claim(IceoryxPlaces::of_this_machine());
-  return make_iceoryx_transport(plan.ports);
+  std::unique_ptr<Transport> transport;
+  without_rights([&] { transport = make_iceoryx_transport(plan.ports); });  // its daemon's threads have none
+  return transport;
 }
 
 /// Runs the composed graph in this process; everything it needs exists and is checked.
@@ -58,6 +63,7 @@ int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, Ru
   run.board = &board;
   run.stolen_ns = stolen_ns;
   run.trace = trace.rings();
+  run.gives_up_rights = true;
   if (prepared.clock->is_virtual()) {
     run.after_step = [&] {
       trace.drain();
@@ -73,17 +79,20 @@ int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, Ru
   RunWatchdog watchdog(options, composition.plan, board);
   RunResult result;
   StallLog stalls;
+  nlohmann::ordered_json held;
   {
     const Stoppable stoppable(board);
     std::optional<attach::Server> server;  // virtual time passes too fast to speak to
     if (!prepared.clock->is_virtual()) server.emplace(attach::Subject{graph, composition.plan, board, *transport});
-    if (server && !server->lacks().empty()) adjusted.push_back("nobody can attach: " + server->lacks());
+    if (server) tell_attach(*server, adjusted);
     const LiveTable live(
         composition.plan, board,
         fmt::format("takt run {} ({}, policy {})", graph.name, graph.profile, to_string(graph.schedule.policy)));
     record.begin(graph, composition.plan, board, *transport, "none");
     trace.collect(composition.plan, record);
     watchdog.start();
+    std::optional<RunRights> rights;
+    if (!prepared.clock->is_virtual()) rights.emplace(board, std::vector<RunRights::Process>{{"all", getpid()}});
     {
       const RunFaults::Active faulty(faults, composition.plan, *prepared.clock, board);
       const RunExpectations::Active expecting(expectations, composition.plan, *prepared.clock, board, *transport);
@@ -91,6 +100,7 @@ int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, Ru
       result = executor.run();
       if (watch) stalls = watch->end();
     }
+    if (rights) held = rights->told();
   }
   const ProcessReading after = ProcessReading::now();
   const std::string no_trace = trace.write(graph, composition.plan, board, result);
@@ -119,6 +129,7 @@ int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, Ru
     report["simulated"] = {{"policy", to_string(composition.plan.policy)},
                            {"cores", composition.plan.cores.size()},
                            {"durations", options.durations}};
+  report["rights"] = std::move(held);
   record.tell(report);
   faults.judge(result, board, run_exit(board, result.policy_granted, report), {}, report);
   expectations.judge(report);
@@ -214,6 +225,13 @@ int run_graph(const RunOptions& options) {
   if (!options.watchdog.empty() && options.clock == "virtual")
     return refuse("--watchdog: a run in virtual time keeps no deadline that a watchdog could guard; leave one out",
                   kBadInput);
+  // Two that reset one machine for different reasons, and only one process can have the device.
+  if (const auto systemd = systemd_sink(); !options.watchdog.empty() && systemd && systemd->timeout_ns() > 0)
+    return refuse(
+        "--watchdog " + options.watchdog.string() +
+            ": systemd watches this run (WatchdogSec=); leave --watchdog out, and let systemd feed the device "
+            "(RuntimeWatchdogSec= in system.conf)",
+        kBadInput);
   const StopOnSignal guard;
   try {
     return run_as_asked(options);

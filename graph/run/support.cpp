@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <sys/mman.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -14,6 +15,7 @@
 #include <cstdlib>
 #include <ctime>
 #include <fstream>
+#include <new>
 #include <opencv2/core/utility.hpp>
 
 #include "graph/check/check.hpp"
@@ -31,7 +33,15 @@ namespace {
 constexpr std::array kSignals{SIGINT, SIGTERM, SIGHUP};
 std::array<struct sigaction, kSignals.size()> g_old{};
 std::atomic<RunBoard*> g_running{nullptr};
-std::atomic<bool> g_stop_asked{false};
+// Shared with the processes forked later: one signal to any of those that listen ends all of them.
+std::atomic<bool>* g_stop_asked = nullptr;
+
+void share_stop_asked() {
+  if (g_stop_asked != nullptr) return;
+  void* memory = mmap(nullptr, sizeof(std::atomic<bool>), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  if (memory == MAP_FAILED) throw std::bad_alloc();
+  g_stop_asked = ::new (memory) std::atomic<bool>(false);
+}
 
 void stop_now(RunBoard& board) {
   timespec now{};
@@ -40,16 +50,18 @@ void stop_now(RunBoard& board) {
 }
 
 extern "C" void stop_running(int) {
-  g_stop_asked.store(true);
+  g_stop_asked->store(true);
   if (RunBoard* board = g_running.load()) stop_now(*board);
 }
 
 }  // namespace
 
 StopOnSignal::StopOnSignal() {
-  g_stop_asked.store(false);
+  share_stop_asked();
+  g_stop_asked->store(false);
   struct sigaction action {};
   action.sa_handler = stop_running;
+  action.sa_flags = SA_RESTART;  // the summary goes through a pipe that may be full: stdio drops what is interrupted
   for (size_t i = 0; i < kSignals.size(); ++i) {
     sigaction(kSignals[i], nullptr, &g_old[i]);
     if (kSignals[i] != SIGHUP || g_old[i].sa_handler != SIG_IGN) sigaction(kSignals[i], &action, nullptr);
@@ -57,14 +69,15 @@ StopOnSignal::StopOnSignal() {
 }
 
 StopOnSignal::~StopOnSignal() {
+  if (asked()) return;  // a second signal must not change how this process ends
   for (size_t i = 0; i < kSignals.size(); ++i) sigaction(kSignals[i], &g_old[i], nullptr);
 }
 
-bool StopOnSignal::asked() { return g_stop_asked.load(); }
+bool StopOnSignal::asked() { return g_stop_asked != nullptr && g_stop_asked->load(); }
 
 Stoppable::Stoppable(RunBoard& board) {
   g_running.store(&board);
-  if (g_stop_asked.load()) stop_now(board);
+  if (StopOnSignal::asked()) stop_now(board);
 }
 
 Stoppable::~Stoppable() { g_running.store(nullptr); }
@@ -126,6 +139,13 @@ std::unique_ptr<StallWatch> watch_stalls(const graph::Proofs& proofs, const Plan
 std::vector<std::string> prepare_process() {
   cv::setNumThreads(1);
   return prepare_process_memory().lacks;
+}
+
+void tell_attach(const attach::Server& server, std::vector<std::string>& adjusted) {
+  const std::string text = server.lacks().empty() ? server.note() : "nobody can attach: " + server.lacks();
+  if (text.empty()) return;
+  adjusted.push_back(text);
+  std::fprintf(stderr, "takt: adjusted: %s\n", text.c_str());
 }
 
 int tell(const RunOptions& options, const graph::GraphSpec& graph, const nlohmann::ordered_json& report) {

@@ -6,6 +6,7 @@
 #include <tl/expected.hpp>
 #include <vector>
 
+#include "graph/attach/server.hpp"
 #include "graph/check/check_machine.hpp"
 #include "graph/check/proofs.hpp"
 #include "graph/run/run.hpp"
@@ -18,14 +19,16 @@
 namespace takt::command {
 
 /// While it lives SIGINT, SIGTERM and SIGHUP end the run cleanly; one that comes while the run is still being prepared
-/// ends it as soon as there is something to end. An ignored SIGHUP (nohup) stays ignored; SIGINT does not: shells
-/// ignore it for whatever a script starts in the background. One at a time.
+/// ends it as soon as there is something to end. Further signals change nothing, up to the exit of the process. An
+/// ignored SIGHUP (nohup) stays ignored; SIGINT does not: shells ignore it for whatever a script starts in the
+/// background. One at a time; throws std::bad_alloc.
 class StopOnSignal {
  public:
   StopOnSignal();
   ~StopOnSignal();
   StopOnSignal(const StopOnSignal&) = delete;
   StopOnSignal& operator=(const StopOnSignal&) = delete;
+  /// In this process, or in one that was forked from it since.
   static bool asked();
 };
 
@@ -73,6 +76,9 @@ std::unique_ptr<StallWatch> watch_stalls(const graph::Proofs& proofs, const Plan
 
 /// Memory locked, OpenCV's thread pool off; what was refused.
 std::vector<std::string> prepare_process();
+
+/// Says why nobody can attach, or which folder was passed over.
+void tell_attach(const attach::Server& server, std::vector<std::string>& adjusted);
 
 /// Prints the summary, writes the files that were asked for; the exit code of the run.
 int tell(const RunOptions& options, const graph::GraphSpec& graph, const nlohmann::ordered_json& report);

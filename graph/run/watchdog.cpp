@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "rt/capability.hpp"
 #include "rt/supervise/systemd_sink.hpp"
 #include "rt/supervise/watchdog_device.hpp"
 #include "rt/time/clock.hpp"
@@ -47,6 +48,7 @@ void RunWatchdog::start() {
 
 void RunWatchdog::loop() {
   pthread_setname_np(pthread_self(), "watchdog-out");
+  keep_rights(Rights::none);
   const MonotonicClock clock;
   while (!ended_.load()) {
     tick(clock.now_ns());

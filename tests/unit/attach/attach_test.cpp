@@ -3,7 +3,6 @@
 #include <doctest/doctest.h>
 #include <sched.h>
 #include <sys/socket.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cstdlib>
@@ -248,15 +247,6 @@ TEST_CASE("a value that the node accepted stands in get and top, and with `keep`
   CHECK(scene.ask({{"do", "get"}, {"param", "map.voxel"}})["parameters"][0]["value"] == 0.3);
 }
 
-TEST_CASE("a socket folder that is open to others is not used") {
-  Folder folder;
-  std::filesystem::create_directory(folder.path / "takt");
-  chmod((folder.path / "takt").c_str(), 0755);
-  std::string why;
-  CHECK(attach::socket_folder(why).empty());
-  CHECK(why.find("of this user alone") != std::string::npos);
-}
-
 TEST_CASE("a question of a wrong kind is refused, and the next one answered") {
   Scene scene;
   const attach::Server server({scene.spec, scene.plan, *scene.board, *scene.transport});
@@ -284,10 +274,11 @@ TEST_CASE("who listens and goes leaves the output to others, even if nothing is 
   writer->publish(1, 0, 0);
   const attach::Server server({scene.spec, scene.plan, *scene.board, *scene.transport});
   std::string why;
-  const auto address = attach::address_of(attach::socket_folder(why), getpid(), why);
-  REQUIRE(address);
+  const auto folder = attach::SocketFolder::own(attach::Surroundings::of_this_process(), why);
+  REQUIRE(folder);
+  const sockaddr_un address = folder->address(getpid());
   const int descriptor = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  REQUIRE(connect(descriptor, reinterpret_cast<const sockaddr*>(&*address), sizeof *address) == 0);
+  REQUIRE(connect(descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0);
   attach::Connection first(descriptor, 3'600'000);  // the end is waited for, however long it takes
   const Json echo{{"do", "echo"}, {"port", "map.obstacles"}};
   REQUIRE(first.write({{"do", "echo"}, {"port", "map.obstacles"}, {"count", 2}}));
@@ -296,11 +287,4 @@ TEST_CASE("who listens and goes leaves the output to others, even if nothing is 
   shutdown(descriptor, SHUT_WR);
   CHECK_FALSE(first.read_line());  // the server hangs up after it has given the output back
   CHECK_FALSE(scene.ask(echo).contains("error"));
-}
-
-TEST_CASE("a path too long for a socket is refused, not cut") {
-  std::string why;
-  CHECK(attach::address_of("/tmp", 7, why)->sun_path == std::string("/tmp/7.sock"));
-  CHECK_FALSE(attach::address_of("/tmp/" + std::string(100, 'x'), 7, why));
-  CHECK(why.find("shorter XDG_RUNTIME_DIR") != std::string::npos);
 }
