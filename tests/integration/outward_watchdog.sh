@@ -110,5 +110,7 @@ expect 3 "watchdog $work/none: cannot be opened: No such file or directory; fix:
 touch "$work/file"
 expect 3 "takes no timeout: Inappropriate ioctl for device; fix: name a watchdog device" \
   "$takt" run "$work/graph.yaml" --isolate none --for 1s --output "$work/out" --watchdog "$work/file"
+expect 2 "--watchdog $work/none: systemd watches this run (WatchdogSec=); leave --watchdog out" \
+  env NOTIFY_SOCKET="$work/notify" WATCHDOG_USEC=1000000 "$takt" run "$work/graph.yaml" --for 1s --output "$work/out" --watchdog "$work/none"
 expect 2 "--watchdog: a run in virtual time" "$takt" run "$work/graph.yaml" --clock virtual --for 1s --output "$work/out" --watchdog "$work/none"
 finish
