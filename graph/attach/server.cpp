@@ -366,7 +366,7 @@ Json Server::post_and_wait(size_t task, size_t param, const ParamValue& value, u
   if (state == ParamMail::posted)
     return wrong(plan.name + " ran no job within 2 s; it takes the value at its next one");
   return wrong(fmt::format("parameter {} of {} {}", graph::ticked(plan.node->params()[param]->name()), plan.name,
-                           mail.refusal.data()));
+                           mail.refusal.text()));
 }
 
 }  // namespace takt::attach

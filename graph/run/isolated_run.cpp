@@ -398,6 +398,7 @@ class IsolatedRun {
   }
 
   int report(const MachineUse& use) {
+    board_.modes().gather();  // what a process asked for last
     RunResult result;
     result.epoch_ns = board_.epoch_ns().load();
     result.end_ns = board_.stop().end_ns();

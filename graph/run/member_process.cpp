@@ -72,7 +72,7 @@ void BoardExchange::tell_source(size_t task, const SourcePlan& source) {
 SourcePlan BoardExchange::wait_for_source(size_t task) {
   const SourceFacts& facts = board_.source_facts(task);
   wait_until([&] { return facts.known.load(std::memory_order_acquire); });
-  return {facts.lag_ns, facts.wait_ns, facts.unknown.c_str()};
+  return {facts.lag_ns, facts.wait_ns, std::string(facts.unknown.text())};
 }
 
 bool wait_until(const std::function<bool()>& done, const std::function<bool()>& broken,

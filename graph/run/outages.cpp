@@ -19,14 +19,14 @@ int64_t end_of(const Outage& outage, const RunResult& result) {
 Json told(const Outage& outage, const std::string& process, std::vector<std::string> nodes, const RunResult& result) {
   const auto seconds = [&](int64_t ns) { return static_cast<double>(ns - result.epoch_ns) / 1e9; };
   const double down_s = static_cast<double>(end_of(outage, result) - outage.from_ns) / 1e9;
-  std::string what = fmt::format("process {} {} at {:.2f} s, ", process, outage.cause.c_str(), seconds(outage.from_ns));
+  std::string what = fmt::format("process {} {} at {:.2f} s, ", process, outage.cause.text(), seconds(outage.from_ns));
   if (outage.back_ns > 0) what += fmt::format("back after {:.2f} s", down_s);
   else what += outage.start_ns > 0 || outage.from_ns >= result.end_ns ? "not back by the end" : "given up";
   Json entry = {{"what", what},
                 {"kind", "outage"},
                 {"process", process},
                 {"nodes", std::move(nodes)},
-                {"cause", outage.cause.c_str()},
+                {"cause", outage.cause.text()},
                 {"at_s", seconds(outage.from_ns)},
                 {"back_s", nullptr},
                 {"down_s", down_s},

@@ -79,7 +79,7 @@ Json modes_json(const RunFacts& facts) {
     modes.push_back({{"name", facts.plan.modes[change->mode].name},
                      {"from_s", seconds(change->from_ns)},
                      {"to_s", seconds(end)},
-                     {"reason", change->reason.c_str()}});
+                     {"reason", change->reason.text()}});
   }
   return modes;
 }
@@ -89,7 +89,7 @@ Json faults_json(const RunFacts& facts) {
   for (size_t i = 0; i < facts.board.faults().size(); ++i) {
     const Fault* fault = facts.board.faults().at(i);
     if (fault == nullptr || fault->task >= facts.plan.tasks.size()) continue;
-    faults.push_back({{"what", fault->what.c_str()},
+    faults.push_back({{"what", fault->what.text()},
                       {"kind", to_string(fault->kind)},
                       {"node", facts.plan.tasks[fault->task].name},
                       {"job", fault->job},
@@ -116,7 +116,7 @@ Json devices_json(const RunFacts& facts) {
                        {"resyncs", counts.resyncs},
                        {"missing", counts.missing},
                        {"unsent", counts.unsent},
-                       {"trouble", source.trouble.load()}});
+                       {"trouble", source.trouble.text()}});
   }
   return devices;
 }

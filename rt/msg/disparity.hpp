@@ -28,6 +28,7 @@ struct DisparityMap {
   ImageView<const uint8_t> confidence_view() const { return {confidence.data(), width, height}; }
   ImageView<uint8_t> fraction_view() { return {fraction.data(), width, height}; }
   ImageView<const uint8_t> fraction_view() const { return {fraction.data(), width, height}; }
+  bool sound() const { return image_fits(width, height, 1, disparity.capacity); }
   static std::span<const Field> fields();
   static void capacities(const Capacity& c, std::span<uint32_t> a) {
     a[0] = a[1] = a[2] = static_cast<uint32_t>(c.pixels());

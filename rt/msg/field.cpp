@@ -50,7 +50,7 @@ bool MessageType::intact(const void* memory, const Capacity& capacity) const {
     const auto* array = reinterpret_cast<const Array<std::byte>*>(base + field.offset);
     whole = whole && array->offset == at - field.offset && array->size <= count && array->capacity == count;
   });
-  return whole;
+  return whole && sound(memory);
 }
 
 }  // namespace takt

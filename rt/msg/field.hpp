@@ -103,18 +103,21 @@ struct Capacity {
 ///   static constexpr std::string_view type_name;
 ///   static std::span<const Field> fields();
 ///   static void capacities(const Capacity&, std::span<uint32_t> per_array);   (one entry per Array field, in order)
+///   bool sound() const;   (if other fields say how far an array is read: whether they stay within its capacity)
 struct MessageType {
   std::string_view name;
   uint32_t header_bytes;
   std::span<const Field> fields;
   void (*construct)(void* memory);
   void (*capacities)(const Capacity&, std::span<uint32_t>);
+  bool (*sound)(const void* memory);
 
   /// Bytes of a message of that capacity: the header and every array, each aligned to 64 B.
   uint64_t bytes(const Capacity& capacity) const;
   /// Builds an empty message in `memory` (64-byte aligned, bytes(capacity) long) and places its arrays.
   void place(void* memory, const Capacity& capacity) const;
-  /// Whether every array of the message in `memory` lies where place() put it and has no more elements than fit.
+  /// Whether every array of the message in `memory` lies where place() put it and has no more elements than fit, and
+  /// the message is sound.
   bool intact(const void* memory, const Capacity& capacity) const;
 
   template <class T>
@@ -123,8 +126,16 @@ struct MessageType {
 
 template <class T>
 const MessageType& MessageType::of() {
-  static const MessageType type{T::type_name, sizeof(T), T::fields(), [](void* memory) { ::new (memory) T; },
-                                [](const Capacity& c, std::span<uint32_t> out) { T::capacities(c, out); }};
+  static const MessageType type{T::type_name,
+                                sizeof(T),
+                                T::fields(),
+                                [](void* memory) { ::new (memory) T; },
+                                [](const Capacity& c, std::span<uint32_t> out) { T::capacities(c, out); },
+                                [](const void* memory) {
+                                  if constexpr (requires(const T& message) { message.sound(); })
+                                    return static_cast<const T*>(memory)->sound();
+                                  return true;
+                                }};
   return type;
 }
 

@@ -23,6 +23,7 @@ struct Grid {
 
   ImageView<int16_t> view() { return {cells.data(), width, height}; }
   ImageView<const int16_t> view() const { return {cells.data(), width, height}; }
+  bool sound() const { return image_fits(width, height, 1, cells.capacity); }
   static std::span<const Field> fields();
   static void capacities(const Capacity& c, std::span<uint32_t> a) { a[0] = static_cast<uint32_t>(c.pixels()); }
 };

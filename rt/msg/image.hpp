@@ -26,6 +26,7 @@ struct Image {
 
   ImageView<uint8_t> view() { return {pixels.data(), width, height, channels}; }
   ImageView<const uint8_t> view() const { return {pixels.data(), width, height, channels}; }
+  bool sound() const { return image_fits(width, height, channels, pixels.capacity); }
   static std::span<const Field> fields();
   static void capacities(const Capacity& c, std::span<uint32_t> a) {
     a[0] = static_cast<uint32_t>(c.pixels() * c.channels);
@@ -47,6 +48,7 @@ struct StereoPair {
   ImageView<uint8_t> right_view() { return {right.data(), width, height, channels}; }
   ImageView<const uint8_t> left_view() const { return {left.data(), width, height, channels}; }
   ImageView<const uint8_t> right_view() const { return {right.data(), width, height, channels}; }
+  bool sound() const { return image_fits(width, height, channels, left.capacity); }
   static std::span<const Field> fields();
   static void capacities(const Capacity& c, std::span<uint32_t> a) {
     a[0] = a[1] = static_cast<uint32_t>(c.pixels() * c.channels);

@@ -27,4 +27,11 @@ struct ImageView {
   operator ImageView<const T>() const { return {data, width, height, channels, stride}; }
 };
 
+/// Whether an image of that size stays within so many elements.
+constexpr bool image_fits(int64_t width, int64_t height, int64_t channels, uint64_t elements) {
+  return width >= 0 && height >= 0 && channels >= 0 &&
+         static_cast<uint64_t>(width) * static_cast<uint64_t>(height) <= elements &&
+         static_cast<uint64_t>(width) * static_cast<uint64_t>(height) * static_cast<uint64_t>(channels) <= elements;
+}
+
 }  // namespace takt

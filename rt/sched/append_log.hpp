@@ -53,7 +53,8 @@ struct BoundedText {
   explicit BoundedText(std::string_view text) {
     std::memcpy(characters.data(), text.data(), std::min(text.size(), kBytes - 1));
   }
-  const char* c_str() const { return characters.data(); }
+  /// Up to the end of the characters, whatever stands there.
+  std::string_view text() const { return {characters.data(), strnlen(characters.data(), kBytes)}; }
 };
 
 }  // namespace takt

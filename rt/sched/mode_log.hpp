@@ -1,11 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <span>
 #include <utility>
 
 #include "rt/sched/append_log.hpp"
 #include "rt/sched/mode_rules.hpp"
 
 namespace takt {
+
+struct ModeEntry {
+  uint32_t mode = 0;  ///< index into Plan::modes
+  int64_t from_ns = 0;
+  ModeOrigin origin = ModeOrigin::other;
+};
 
 /// The mode of a run over time. A change holds for every job released at or after its instant: each task looks it up
 /// at its own planned release, as it latches messages, and nobody is interrupted. What a mode leaves out keeps its
@@ -23,11 +30,8 @@ class ModeLog {
   /// release it is to hold for.
   static constexpr int64_t kLead_ns = 1'000'000;
 
-  struct Change {
-    uint32_t mode = 0;  ///< index into Plan::modes
-    int64_t from_ns = 0;
+  struct Change : ModeEntry {
     BoundedText<120> reason;
-    ModeOrigin origin = ModeOrigin::other;
   };
 
   /// Mode of a job released then; 0, the mode of the start, before the first change.
@@ -36,17 +40,20 @@ class ModeLog {
       if (const Change* change = log_.at(i); change != nullptr && change->from_ns <= release_ns) return change->mode;
     return 0;
   }
-  /// Calls visit(mode, from_ns, to_ns) for each part of [from_ns, to_ns) in which one mode holds, in order.
+  /// Calls visit(mode, from_ns, to_ns) for each part of [from_ns, to_ns) in which one mode holds, in order. `later`:
+  /// what is to come after all of the log.
   template <class Visitor>
-  void for_each_part(int64_t from_ns, int64_t to_ns, const Visitor& visit) const {
+  void for_each_part(int64_t from_ns, int64_t to_ns, const Visitor& visit,
+                     std::span<const ModeEntry> later = {}) const {
     uint32_t mode = 0;
-    for (size_t i = 0; i < log_.size(); ++i) {
-      const Change* change = log_.at(i);
-      if (change == nullptr) continue;
-      if (change->from_ns >= to_ns) break;
-      if (change->from_ns > from_ns) visit(mode, std::exchange(from_ns, change->from_ns), change->from_ns);
-      mode = change->mode;
-    }
+    const auto follow = [&](const ModeEntry& change) {
+      if (change.from_ns >= to_ns) return;
+      if (change.from_ns > from_ns) visit(mode, std::exchange(from_ns, change.from_ns), change.from_ns);
+      mode = change.mode;
+    };
+    for (size_t i = 0; i < log_.size(); ++i)
+      if (const Change* change = log_.at(i); change != nullptr) follow(*change);
+    for (const ModeEntry& change : later) follow(change);
     visit(mode, from_ns, to_ns);
   }
   /// The mode that will be in force once all requests have taken effect.
@@ -67,13 +74,26 @@ class ModeLog {
     // A mode that a rule entered is taken over: the rule will not leave it then.
     if (const ModeInForce now = in_force(); now.mode == mode && now.origin == ModeOrigin::other) return true;
     if (by_hand && !has_room()) return false;
-    return append(mode, from_ns, reason, ModeOrigin::other);
+    return enter({mode, from_ns, ModeOrigin::other}, reason);
   }
   /// The same, asked for by a rule; refused as early as what a person asks for.
   bool request_by_rule(uint32_t mode, int64_t from_ns, std::string_view reason) {
     if (newest() == mode) return true;
-    return has_room() && append(mode, from_ns, reason, ModeOrigin::rule);
+    return has_room() && enter({mode, from_ns, ModeOrigin::rule}, reason);
   }
+  /// Whatever mode is in force. False if it is full.
+  bool enter(const ModeEntry& wanted, std::string_view reason) {
+    const int64_t from_ns = std::max(wanted.from_ns, newest_ns_.load());  // instants never go back
+    if (!log_.append({{wanted.mode, from_ns, wanted.origin}, BoundedText<120>(reason)})) return false;
+    raise(newest_ns_, from_ns);
+    // Looked for in the log it would take the longer the more changes there were, at every job of a device.
+    if (wanted.origin != ModeOrigin::rule) raise(without_rule_, (others_.fetch_add(1) + 1) << 32 | wanted.mode);
+    return true;
+  }
+  /// For a change that is not a safe stop.
+  bool has_room() const { return log_.size() + 8 <= kMost; }
+  /// Instant of the newest change; 0: none.
+  int64_t newest_ns() const { return newest_ns_.load(std::memory_order_acquire); }
   size_t size() const { return log_.size(); }
   /// In the order of their instants; null while it is being written.
   const Change* change(size_t i) const { return log_.at(i); }
@@ -87,15 +107,6 @@ class ModeLog {
   }
 
  private:
-  bool has_room() const { return log_.size() + 8 <= kMost; }
-  bool append(uint32_t mode, int64_t from_ns, std::string_view reason, ModeOrigin origin) {
-    from_ns = std::max(from_ns, newest_ns_.load());  // instants never go back
-    if (!log_.append({mode, from_ns, BoundedText<120>(reason), origin})) return false;
-    raise(newest_ns_, from_ns);
-    // Looked for in the log it would take the longer the more changes there were, at every job of a device.
-    if (origin != ModeOrigin::rule) raise(without_rule_, (others_.fetch_add(1) + 1) << 32 | mode);
-    return true;
-  }
   template <class T>
   static void raise(std::atomic<T>& most, T value) {
     for (T had = most.load(); had < value && !most.compare_exchange_weak(had, value);) {

@@ -1,27 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "rt/sched/param_mail.hpp"
 
-#include <algorithm>
-#include <cstring>
-
 namespace takt {
-namespace {
-
-template <size_t N>
-void copy_text(const std::string& text, std::array<char, N>& into) {
-  const size_t length = std::min(text.size(), N - 1);
-  std::memcpy(into.data(), text.data(), length);
-  into[length] = 0;
-}
-
-}  // namespace
 
 ParamValue value_of(const PlainParam& plain) {
   switch (plain.kind) {
     case PlainParam::flag: return plain.whole != 0;
     case PlainParam::integer: return plain.whole;
     case PlainParam::number: return plain.real;
-    case PlainParam::text: return std::string(plain.words.data());
+    case PlainParam::text: return std::string(plain.words.text());
   }
   return {};
 }
@@ -41,9 +28,9 @@ bool post(ParamMail& mail, size_t param, const ParamValue& value, uint32_t by_us
     mail.real = *real;
   } else {
     const auto& words = std::get<std::string>(value);
-    if (words.size() >= mail.words.size()) return false;
+    if (words.size() >= mail.words.characters.size()) return false;
     mail.kind = ParamMail::text;
-    copy_text(words, mail.words);
+    mail.words = decltype(mail.words)(words);
   }
   mail.state.store(ParamMail::posted, std::memory_order_release);
   return true;
@@ -58,7 +45,7 @@ bool deliver(ParamMail& mail, Node& node) {
     refusal = done.error();
   }
   if (refusal.empty()) return true;
-  copy_text(refusal, mail.refusal);
+  mail.refusal = decltype(mail.refusal)(refusal);
   mail.state.store(ParamMail::refused, std::memory_order_release);
   return false;
 }

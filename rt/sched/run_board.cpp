@@ -67,12 +67,17 @@ RunBoard::RunBoard(const Plan& plan, size_t processes, std::span<const size_t> p
   edges_.resize(edges);
   ports_.resize(plan.ports.size());
   capacities_.resize(plan.ports.size());
+  stop_words_.resize(1 + processes);
+  mode_requests_.resize(processes);
+  entered_requests_.resize(processes);
   bytes_ = lay_out(plan, process_of, nullptr);
   void* memory = mmap(nullptr, bytes_, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS | MAP_POPULATE, -1, 0);
   if (memory == MAP_FAILED)
     throw std::runtime_error("shared memory of " + std::to_string(bytes_) + " bytes: " + std::strerror(errno));
   memory_ = static_cast<std::byte*>(memory);
   lay_out(plan, process_of, memory_);
+  stop_ = std::make_unique<StopSignal>(stop_words_);
+  modes_ = std::make_unique<Modes>(supervised_->modes, mode_requests_, entered_requests_);
 }
 
 RunBoard::~RunBoard() { munmap(memory_, bytes_); }
@@ -83,10 +88,14 @@ size_t RunBoard::lay_out(const Plan& plan, std::span<const size_t> process_of, s
   for (size_t t = 0; t < tasks_.size(); ++t) placer.make(commits_, t);
   areas_.assign(1, placer.to_next_page());
   supervised_ = placer.make<Supervised>();
+  stop_words_[0] = memory != nullptr ? &supervised_->stop : nullptr;
+  for (size_t process = 0; process < processes_.size(); ++process) placer.make(entered_requests_, process);
   areas_.push_back(placer.to_next_page());
   const auto process_of_task = [&](size_t t) { return t < process_of.size() ? process_of[t] : 0; };
   for (size_t process = 0; process < processes_.size(); ++process) {
     placer.make(processes_, process);
+    placer.make(stop_words_, 1 + process);
+    placer.make(mode_requests_, process);
     for (size_t t = 0; t < tasks_.size(); ++t) {
       if (process_of_task(t) != process) continue;
       placer.make(tasks_, t);
@@ -108,7 +117,9 @@ size_t RunBoard::lay_out(const Plan& plan, std::span<const size_t> process_of, s
   return areas_.back();
 }
 
-void RunBoard::keep_to(size_t process) const {
+void RunBoard::keep_to(size_t process) {
+  stop_->speak_as(1 + process);
+  modes_->speak_as(process);
   for (size_t area = 0; area + 1 < areas_.size(); ++area)
     if (area != process + 1 && mprotect(memory_ + areas_[area], areas_[area + 1] - areas_[area], PROT_READ) != 0)
       throw std::runtime_error(std::string("the records of other processes cannot be protected: ") +
@@ -130,9 +141,7 @@ void RunBoard::set_grant(size_t t, const Grant& grant) {
   for (const int cpu : grant.cpus)
     if (cpu >= 0 && static_cast<size_t>(cpu) < record.cpus.size() * 64)
       record.cpus[static_cast<size_t>(cpu) / 64] |= uint64_t{1} << (cpu % 64);
-  const size_t length = std::min(grant.refused.size(), record.refused.size() - 1);
-  std::memcpy(record.refused.data(), grant.refused.data(), length);
-  record.refused[length] = 0;
+  record.refused = BoundedText<512>(grant.refused);
 }
 
 Grant RunBoard::grant(size_t t) const {
@@ -145,7 +154,7 @@ Grant RunBoard::grant(size_t t) const {
   grant.deadline_ms = record.deadline_ms;
   for (size_t cpu = 0; cpu < record.cpus.size() * 64; ++cpu)
     if ((record.cpus[cpu / 64] >> (cpu % 64)) & 1) grant.cpus.push_back(static_cast<int>(cpu));
-  grant.refused = record.refused.data();
+  grant.refused = record.refused.text();
   return grant;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 #include <atomic>
 #include <cstddef>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -9,7 +10,7 @@
 #include "rt/hot.hpp"
 #include "rt/sched/fault_log.hpp"
 #include "rt/sched/grant.hpp"
-#include "rt/sched/mode_log.hpp"
+#include "rt/sched/modes.hpp"
 #include "rt/sched/outage_log.hpp"
 #include "rt/sched/plan.hpp"
 #include "rt/sched/proof_log.hpp"
@@ -28,15 +29,15 @@ struct PlainParam {
   uint32_t by_user = 0;  ///< uid of the user who gave it
   int64_t whole = 0;
   double real = 0;
-  std::array<char, 128> words{};  ///< ended by 0
+  BoundedText<128> words;
 };
 
 /// A parameter value on its way to a running node. One at a time per task.
 struct alignas(kCacheLine) ParamMail : PlainParam {
   enum State : uint32_t { empty, posted, taken, refused };
   std::atomic<uint32_t> state{empty};
-  uint32_t param = 0;               ///< index into Node::params()
-  std::array<char, 256> refusal{};  ///< why, if refused; ended by 0
+  uint32_t param = 0;  ///< index into Node::params()
+  BoundedText<256> refusal;
 };
 
 /// The newest value that a parameter was given while the graph runs. It outlives the process of its node: the next one
@@ -98,7 +99,8 @@ struct alignas(kCacheLine) SourceFacts {
 ///   RunBoard board(plan, 3, process_of_task);
 ///   if (fork() == 0) board.keep_to(1);  // from here on, a stray store of process 1 into 0's or 2's records ends it
 ///
-/// Common to all are the logs, the stop and the commit words.
+/// Common to all are the logs of what was seen, and the commit words. A stop and a mode are asked for in the words of
+/// the process that asks, which all others read.
 class RunBoard {
  public:
   enum Decision : uint32_t { undecided, as_asked, cooperative };
@@ -111,9 +113,9 @@ class RunBoard {
   RunBoard(const RunBoard&) = delete;
   RunBoard& operator=(const RunBoard&) = delete;
 
-  /// In a process of the run, once: the records of all others, and of the supervisor, are read-only from here on.
-  /// Throws std::runtime_error.
-  void keep_to(size_t process) const;
+  /// In a process of the run, once, before it has a second thread: the records of all others, and of the supervisor,
+  /// are read-only from here on. Throws std::runtime_error.
+  void keep_to(size_t process);
 
   TaskStatistics& task(size_t t) { return *tasks_[t]; }
   const TaskStatistics& task(size_t t) const { return *tasks_[t]; }
@@ -141,8 +143,8 @@ class RunBoard {
   /// What all of it takes.
   size_t bytes() const { return bytes_; }
 
-  ModeLog& modes() { return shared_->modes; }
-  const ModeLog& modes() const { return shared_->modes; }
+  Modes& modes() { return *modes_; }
+  const Modes& modes() const { return *modes_; }
   /// Mode of a job released then, among those of the plan whatever the log holds.
   uint32_t mode_at(int64_t release_ns) const {
     const uint32_t mode = modes().at(release_ns);
@@ -175,7 +177,7 @@ class RunBoard {
   GroupSigns& group() { return supervised_->group; }
   const GroupSigns& group() const { return supervised_->group; }
 
-  StopSignal& stop() { return shared_->stop; }
+  StopSignal& stop() { return *stop_; }
   std::atomic<int64_t>& epoch_ns() { return supervised_->epoch_ns; }  ///< 0: not fixed yet
   int64_t epoch_ns() const { return supervised_->epoch_ns.load(); }
   std::atomic<uint32_t>& decision() { return supervised_->decision; }
@@ -186,16 +188,16 @@ class RunBoard {
  private:
   /// What every process writes.
   struct alignas(kCacheLine) Shared {
-    StopSignal stop;
-    alignas(kCacheLine) ModeLog modes;
-    alignas(kCacheLine) FaultLog faults;
+    FaultLog faults;
     alignas(kCacheLine) ExcessLog excesses;
     alignas(kCacheLine) OverrunLog overruns;
     alignas(kCacheLine) LateSourceLog late_sources;
   };
   /// What the supervisor writes, and a run without one.
   struct alignas(kCacheLine) Supervised {
-    OutageLog outages;
+    StopWord stop;
+    ModeLog modes;
+    alignas(kCacheLine) OutageLog outages;
     alignas(kCacheLine) GroupSigns group;
     alignas(kCacheLine) std::atomic<int64_t> epoch_ns{0};
     std::atomic<uint32_t> decision{undecided};
@@ -229,6 +231,11 @@ class RunBoard {
   std::vector<SourceRecord*> sources_;
   std::vector<SourceFacts*> source_facts_;
   std::vector<KeptParam*> kept_;
+  std::vector<StopWord*> stop_words_;  ///< of the supervisor, then by process
+  std::vector<ModeRequests*> mode_requests_;
+  std::vector<EnteredRequests*> entered_requests_;
+  std::unique_ptr<StopSignal> stop_;
+  std::unique_ptr<Modes> modes_;
   std::vector<size_t> areas_;  ///< where that of the supervisor begins, of each process, and the end
 };
 

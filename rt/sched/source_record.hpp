@@ -2,8 +2,10 @@
 #pragma once
 #include <atomic>
 #include <cstdint>
+#include <utility>
 
 #include "rt/hot.hpp"
+#include "rt/sched/append_log.hpp"
 #include "rt/source_state.hpp"
 
 namespace takt {
@@ -18,7 +20,7 @@ struct alignas(kCacheLine) SourceRecord {
   std::atomic<uint64_t> losses{0};        ///< changes from ok to any other state
   std::atomic<uint64_t> reopen_tries{0};
   std::atomic<uint64_t> received{0}, damaged{0}, resyncs{0}, missing{0}, unsent{0};  ///< see SourceCounts
-  std::atomic<const char*> trouble{""};
+  BoundedText<96> trouble;                                                           ///< SourceReport::trouble
 
   void tell(const SourceReport& report) {
     const auto keep = [](auto& to, auto value) { to.store(value, std::memory_order_relaxed); };
@@ -28,7 +30,8 @@ struct alignas(kCacheLine) SourceRecord {
     keep(resyncs, report.counts.resyncs);
     keep(missing, report.counts.missing);
     keep(unsent, report.counts.unsent);
-    keep(trouble, report.trouble);
+    // Copied only when it is another one: these are literals of the driver, and a pointer means nothing to others.
+    if (std::exchange(told_, report.trouble) != report.trouble) trouble = BoundedText<96>(report.trouble);
   }
   SourceCounts counts() const {
     return {received.load(), damaged.load(), resyncs.load(), missing.load(), unsent.load()};
@@ -41,6 +44,9 @@ struct alignas(kCacheLine) SourceRecord {
     const int64_t going_on = now_ns - lost_since_ns.load(std::memory_order_relaxed);
     return over + (going_on > 0 ? going_on : 0);
   }
+
+ private:
+  const char* told_ = nullptr;
 };
 
 }  // namespace takt

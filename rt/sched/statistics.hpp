@@ -91,7 +91,7 @@ struct alignas(kCacheLine) GrantRecord {
   int priority = 0;
   double runtime_ms = 0, deadline_ms = 0;
   std::array<uint64_t, 16> cpus{};  ///< one bit a CPU
-  std::array<char, 512> refused{};
+  BoundedText<512> refused;
 };
 
 }  // namespace takt

@@ -242,8 +242,9 @@ void Task::tell_exception(const Job& job, const char* what) {
 void Task::tell_notice(const Job& job) {
   const ResultNotice& notice = *job.result_notice();
   Fault fault = fault_now(notice.wrong ? Fault::wrong : Fault::doubtful, job.index());
-  std::snprintf(fault.what.characters.data(), fault.what.characters.size(), "%s: %s", plan_.name.c_str(),
-                notice.why.c_str());
+  const std::string_view why = notice.why.text();
+  std::snprintf(fault.what.characters.data(), fault.what.characters.size(), "%s: %.*s", plan_.name.c_str(),
+                static_cast<int>(why.size()), why.data());
   board_.faults().append(fault);
 }
 

@@ -30,9 +30,9 @@ void Task::trace_param(const ParamMail& mail) const {
     case ParamMail::integer: return note(mail.whole);
     case ParamMail::text: break;
   }
-  for (size_t at = 0; at == 0 || std::memchr(mail.words.data() + at - 8, 0, 8) == nullptr; at += 8) {
+  for (size_t at = 0; at == 0 || std::memchr(mail.words.characters.data() + at - 8, 0, 8) == nullptr; at += 8) {
     int64_t piece = 0;
-    std::memcpy(&piece, mail.words.data() + at, sizeof piece);
+    std::memcpy(&piece, mail.words.characters.data() + at, sizeof piece);
     note(piece);
   }
 }

@@ -241,7 +241,7 @@ void Watchdog::hang(Watched& watched, const JobWatch::Running& job, int64_t now_
   const bool ends_run = options_.granted == Policy::cooperative && options_.life == nullptr;
   const Fault fault = tell_hang(task, job, now_ns, ends_run ? "; without real-time policies that ends the run" : "");
   if (!ends_run) return;  // no writing here: a full pipe would stop all enforcement
-  std::fprintf(stderr, "takt: error: %s\n", fault.what.c_str());
+  std::fprintf(stderr, "takt: error: %s\n", std::string(fault.what.text()).c_str());
   board_.stop().raise(now_ns);
 }
 

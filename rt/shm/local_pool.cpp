@@ -42,16 +42,24 @@ void LocalPool::lay_out_flags(uint32_t process, std::byte* at) {
   flags_[process - 1] = {words, words + 1};
 }
 
-uint32_t LocalPool::mark_used(std::span<uint64_t> used) const {
+uint32_t LocalPool::mark(std::span<uint64_t> used, uint32_t trusted) const {
   std::fill(used.begin(), used.end(), 0);
   const auto add = [&](uint32_t chunk) {
     if (chunk < chunks_) used[chunk / kBits] |= uint64_t{1} << chunk % kBits;
   };
-  for (const Flags& flags : flags_)
+  const auto for_each_word = [&](const ProcessFlags& flags, const auto& visit) {
     for (uint64_t rows = flags.claimed->load() & low_bits(rows_); rows != 0; rows &= rows - 1) {
       const Word* row = flags.rows + static_cast<uint32_t>(std::countr_zero(rows)) * words_;
-      for (uint32_t w = 0; w < words_; ++w) used[w] |= row[w].load();
+      for (uint32_t w = 0; w < words_; ++w) visit(w, row[w].load());
     }
+  };
+  for (uint32_t process = 1; process <= flags_.size(); ++process) {
+    const ProcessFlags& flags = flags_[process - 1];
+    uint32_t held = 0;
+    if (trusted != kTrustAll && trusted != process)
+      for_each_word(flags, [&](uint32_t, uint64_t word) { held += static_cast<uint32_t>(std::popcount(word)); });
+    if (held <= plan_.held) for_each_word(flags, [&](uint32_t w, uint64_t word) { used[w] |= word; });
+  }
   used[words_ - 1] &= low_bits(chunks_ - (words_ - 1) * kBits);
   for (uint32_t i = 0; i < plan_.history; ++i)
     if (ring_[i].sequence.load(std::memory_order_relaxed) != 0) add(ring_[i].chunk.load(std::memory_order_relaxed));
@@ -108,7 +116,7 @@ void LocalPool::withdraw(uint64_t first) const {
 }
 
 LocalPool::Word* LocalPool::claim_row(uint32_t process) const {
-  const Flags& flags = flags_[process - 1];
+  const ProcessFlags& flags = flags_[process - 1];
   uint64_t claimed = flags.claimed->load();
   for (;;) {
     const uint64_t free = ~claimed & low_bits(rows_);
@@ -127,12 +135,12 @@ void LocalPool::clear(Word* row) const {
 
 void LocalPool::return_row(uint32_t process, Word* row) const {
   clear(row);
-  const Flags& flags = flags_[process - 1];
+  const ProcessFlags& flags = flags_[process - 1];
   flags.claimed->fetch_and(~(uint64_t{1} << static_cast<uint64_t>(row - flags.rows) / words_));
 }
 
 void LocalPool::reclaim_readers(uint32_t process) const {
-  const Flags& flags = flags_[process - 1];
+  const ProcessFlags& flags = flags_[process - 1];
   for (uint32_t row = 0; row < rows_; ++row) clear(flags.rows + size_t{row} * words_);
   flags.claimed->store(0);
 }

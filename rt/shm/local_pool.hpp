@@ -78,7 +78,10 @@ class LocalPool {
   PoolSlot& slot(uint64_t sequence) const { return ring_[sequence % plan_.history]; }
 
   /// Sets exactly the bits of the chunks that are not free; returns how many they are.
-  uint32_t mark_used(std::span<uint64_t> used) const;
+  uint32_t mark_used(std::span<uint64_t> used) const { return mark(used, kTrustAll); }
+  /// The same for a process that finds none free, though there is one for whatever readers may hold: as if another one
+  /// that flags more chunks than all readers together may hold flagged none. It has written over its flags.
+  uint32_t mark_plausible(std::span<uint64_t> used, uint32_t process) const { return mark(used, process); }
   uint32_t in_use() const;
 
   /// Publishes a chunk, on loan or in the ring already, as the next message; under a commit it only announces it, see
@@ -107,10 +110,12 @@ class LocalPool {
   Canary& canary(uint32_t chunk) const {
     return *reinterpret_cast<Canary*>(base_ + (chunk + 1) * chunk_bytes_ - sizeof(Canary));
   }
-  struct Flags {
+  struct ProcessFlags {
     Word* claimed = nullptr;  ///< one bit a row
     Word* rows = nullptr;
   };
+  static constexpr uint32_t kTrustAll = 0;
+  uint32_t mark(std::span<uint64_t> used, uint32_t trusted) const;
   void clear(Word* row) const;
 
   PortPlan plan_;
@@ -120,7 +125,7 @@ class LocalPool {
   PoolState* state_ = nullptr;
   PoolSlot* ring_ = nullptr;
   std::byte* base_ = nullptr;
-  std::vector<Flags> flags_;  ///< by process
+  std::vector<ProcessFlags> flags_;  ///< by process
 };
 
 }  // namespace takt

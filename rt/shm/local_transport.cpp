@@ -21,7 +21,7 @@ constexpr uint32_t kSettled = 0;  // no commit
 
 class LocalWriter final : public Writer {
  public:
-  LocalWriter(const LocalPool& pool, uint32_t process) : pool_(pool), used_(pool.words()) {
+  LocalWriter(const LocalPool& pool, uint32_t process) : pool_(pool), process_(process), used_(pool.words()) {
     pool.reclaim_writer();
     pool.state().writer.store(process);
   }
@@ -36,9 +36,14 @@ class LocalWriter final : public Writer {
       const uint32_t in_use = pool_.mark_used(used_) + 1;
       reached(MessageStep::inside_loan, pool_.index());
       loaned_ = next_free();
+      if (loaned_ == kNoChunk) {
+        pool_.mark_plausible(used_, process_);
+        loaned_ = next_free();
+      }
       if (loaned_ != kNoChunk) {
         state.loaned.store(loaned_ + 1, std::memory_order_release);
-        if (in_use > state.peak_in_use.load(std::memory_order_relaxed)) state.peak_in_use.store(in_use);
+        if (in_use <= pool_.chunks() && in_use > state.peak_in_use.load(std::memory_order_relaxed))
+          state.peak_in_use.store(in_use);
         return begin(pool_.header(loaned_));
       }
     }
@@ -141,6 +146,7 @@ class LocalWriter final : public Writer {
   }
 
   const LocalPool& pool_;
+  const uint32_t process_;
   uint32_t loaned_ = kNoChunk, next_ = 0;
   mutable std::vector<uint64_t> used_;  ///< chunks that were not free when it last looked
 };
@@ -208,7 +214,9 @@ class LocalReader final : public Reader {
       if (slot.sequence.load() != sequence || slot.commit.load() != commit) continue;
       if (commit_ns == CommitRing::kSpoiled) commits_->note_spoiled();
       if (commit_ns == CommitRing::kSpoiled || commit_ns == CommitRing::kNever) return false;
-      if (commit != kSettled) out.visible_at_ns = commit_ns + delay_ns;
+      // Unsigned: what a stray store left there may be any number.
+      if (commit != kSettled)
+        out.visible_at_ns = static_cast<int64_t>(static_cast<uint64_t>(commit_ns) + static_cast<uint64_t>(delay_ns));
       return out.visible_at_ns <= limit_ns_;
     }
     return false;

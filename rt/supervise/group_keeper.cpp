@@ -47,8 +47,8 @@ void kill_children() {
   }
 }
 
-/// They die with their supervisor, but for one that was just being forked or that has no tie to it; all of them belong to
-/// this process then. Waits until the last one is gone: the next group works on the same board.
+/// They die with their supervisor, but for one that was just being forked or that has no tie to it; all of them belong
+/// to this process then. Waits until the last one is gone: the next group works on the same board.
 void bury_members() {
   pid_t buried = 0;
   for (int tries = 0; tries < 1000 && (buried >= 0 || errno != ECHILD); ++tries) {
@@ -106,7 +106,7 @@ std::optional<int> GroupKeeper::watch(const std::function<int()>& group) {
   if (told) return 128 + WTERMSIG(status);  // it was to end anyway
   signs_.newest_loss = loss;
   signs_.losses.fetch_add(1);
-  if (options_.say) options_.say(std::string(loss.cause.c_str()) + "; all processes are started again");
+  if (options_.say) options_.say(std::string(loss.cause.text()) + "; all processes are started again");
   return std::nullopt;
 }
 

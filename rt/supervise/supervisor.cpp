@@ -40,6 +40,7 @@ Supervisor::Supervisor(const Plan& plan, RunBoard& board, ProcessGroup& group, T
 }
 
 void Supervisor::look() {
+  board_.modes().gather();
   const int64_t now_ns = clock_.now_ns();
   while (const auto end = group_.reap()) note_end(*end, now_ns);
   if (const size_t lost = group_.lost_nurseries(); lost != lost_nurseries_) {
@@ -103,7 +104,7 @@ void Supervisor::all_were_lost(const GroupSigns::Loss& loss) {
     if (member.outage == kNoOutage) member.outage = outages_.add(outage);
     Outage& away = outages_[member.outage];
     if (away.from_ns != loss.from_ns)
-      away.cause = BoundedText<200>(std::string(away.cause.c_str()) + "; then " + loss.cause.c_str());
+      away.cause = BoundedText<200>(std::string(away.cause.text()) + "; then " + std::string(loss.cause.text()));
     away.start_ns = clock_.now_ns();
     away.started = true;
     for (const size_t t : member.tasks) member.releases_before.push_back(releases_seen(t));

@@ -82,7 +82,7 @@ signal_round() { # TRANSPORT WHO SIGNAL TIMES DELAY_MS
   local who=$2 signal=$3 times=$4 delay_ms=$5 before=$failures
   round="$times x SIG$signal to $who after $delay_ms ms ($transport)"
   rm -rf "$work/out" "$work/report.json"
-  "$takt" run "$work/graph.yaml" --for 0s --transport $transport --output "$work/out" --report "$work/report.json" \
+  env --default-signal=HUP "$takt" run "$work/graph.yaml" --for 0s --transport $transport --output "$work/out" --report "$work/report.json" \
     >"$work/run.out" 2>"$work/run.err" &
   run=$!
   local begun=
@@ -110,11 +110,12 @@ signal_round() { # TRANSPORT WHO SIGNAL TIMES DELAY_MS
   echo "$round: $([ $failures -eq $before ] && echo "in order" || echo "NOT in order")"
 }
 
+# SIGHUP ends a run unless it was started with nohup, as this script may be.
 # A signal that comes while the run is prepared: nothing has begun, and that is what is told.
 for delay in 0.05 0.2 0.4; do
   transport=local round="SIGTERM to all while the run is prepared"
   rm -rf "$work/report.json"
-  "$takt" run "$work/graph.yaml" --for 0s --output "$work/out" --report "$work/report.json" >"$work/run.out" 2>"$work/run.err" &
+  env --default-signal=HUP "$takt" run "$work/graph.yaml" --for 0s --output "$work/out" --report "$work/report.json" >"$work/run.out" 2>"$work/run.err" &
   run=$!
   sleep $delay
   send TERM 2 $(everybody)

@@ -97,13 +97,13 @@ TEST_CASE("raw pairs rectified by the calibration of parallel cameras: told that
   REQUIRE_FALSE(drive.faults().empty());
   CHECK(drive.faults().size() <= 2);  // doubtful perhaps on the way
   CHECK(drive.faults().back().kind == Fault::wrong);
-  CHECK(std::string(drive.faults().back().what.c_str()).find("stereo: rows of the rectified pair differ by") == 0);
+  CHECK(std::string(drive.faults().back().what.text()).find("stereo: rows of the rectified pair differ by") == 0);
 }
 
 TEST_CASE("raw pairs without calibration: told once, and nothing is matched") {
   const auto drive = drive_with("");
   REQUIRE(drive.faults().size() == 1);
   CHECK(drive.faults().front().kind == Fault::wrong);
-  CHECK(std::string(drive.faults().front().what.c_str()).find("`calibration` is not set") != std::string::npos);
+  CHECK(std::string(drive.faults().front().what.text()).find("`calibration` is not set") != std::string::npos);
   CHECK(drive.probe().points.empty());
 }

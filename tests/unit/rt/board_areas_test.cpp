@@ -74,3 +74,46 @@ TEST_CASE("a mode that no plan has is the mode of the start") {
   board.modes().request(12'345, 0, "a stray store");
   CHECK(board.mode_at(kEpoch) == 0);
 }
+
+TEST_CASE("a stop and a mode that a process asks for hold in all others at once, and are entered by the supervisor") {
+  PairNode first, second;
+  const Plan plan = [&] {
+    Plan two = plan_of_two_pairs(first, second);
+    two.modes.resize(3);
+    two.safe_stop = 2;
+    return two;
+  }();
+  const size_t process_of[] = {0, 1};
+  RunBoard board(plan, 2, process_of);
+  const auto in_process = [&](size_t process, const std::function<void()>& deed) {
+    const pid_t child = fork();
+    REQUIRE(child >= 0);
+    if (child == 0) {
+      board.keep_to(process);
+      deed();
+      _exit(0);
+    }
+    int status = -1;
+    REQUIRE(waitpid(child, &status, 0) == child);
+    CHECK(status == 0);
+  };
+  in_process(0, [&] { board.modes().request_by_rule(1, kEpoch + 10, "camera lost"); });
+  CHECK(board.mode_at(kEpoch + 9) == 0);
+  CHECK(board.mode_at(kEpoch + 10) == 1);
+  CHECK(board.modes().size() == 0);
+  in_process(1, [&] {
+    if (board.mode_at(kEpoch + 10) != 1) _exit(1);
+    board.safe_stop(kEpoch + 5, "hangs");  // asked for later, so it does not come before
+    board.stop().raise(kEpoch + 3000);
+    board.stop().set_planned_end(0);  // that is the supervisor's
+  });
+  CHECK(board.mode_at(kEpoch + 10) == 1);
+  CHECK(board.mode_at(kEpoch + 11) == 2);
+  CHECK(board.stop().end_ns() == (kEpoch + 3000) / 1000 * 1000);
+  board.modes().gather();
+  board.modes().gather();
+  REQUIRE(board.modes().size() == 2);
+  CHECK(board.modes().change(1)->reason.text() == "hangs");
+  CHECK(board.mode_at(kEpoch + 10) == 1);
+  CHECK(board.mode_at(kEpoch + 11) == 2);
+}

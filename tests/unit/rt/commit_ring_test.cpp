@@ -303,7 +303,7 @@ TEST_CASE("a stray store into the commit word is a fault of the run, named") {
   CHECK(look_at(*job.a, kEpoch).size() == 1);
   REQUIRE(scene.board.faults().size() == 1);
   CHECK(scene.board.faults().at(0)->kind == Fault::spoiled);
-  CHECK(std::string(scene.board.faults().at(0)->what.c_str()).find("pair:") == 0);
+  CHECK(std::string(scene.board.faults().at(0)->what.text()).find("pair:") == 0);
   scene.run();
   CHECK(scene.board.faults().size() == 1);
 }

@@ -144,7 +144,7 @@ TEST_CASE("under fixed a high node that does not return is demoted, named, and s
   const Fault& fault = *scene.board->faults().at(0);
   CHECK(fault.kind == Fault::hang);
   CHECK(fault.task == 1);
-  CHECK(std::string(fault.what.c_str()).find("it is demoted, and safe_stop entered") != std::string::npos);
+  CHECK(std::string(fault.what.text()).find("it is demoted, and safe_stop entered") != std::string::npos);
   REQUIRE(scene.board->modes().size() >= 1);
   CHECK(scene.board->modes().change(0)->mode == 1);
 }
@@ -373,7 +373,7 @@ TEST_CASE("a worker whose reservation stays refused runs on under SCHED_FIFO; th
   CHECK(watch.refusals() == 5);
   REQUIRE(board.faults().size() == 2);
   CHECK(board.faults().at(0)->kind == Fault::bandwidth);
-  CHECK(std::string(board.faults().at(0)->what.c_str()).find("guard: its reservation is not free") == 0);
-  CHECK(std::string(board.faults().at(1)->what.c_str()) ==
+  CHECK(std::string(board.faults().at(0)->what.text()).find("guard: its reservation is not free") == 0);
+  CHECK(std::string(board.faults().at(1)->what.text()) ==
         "guard: it never had its reservation again; it was refused 5 times");
 }

@@ -94,7 +94,7 @@ TEST_CASE("a group whose first process dies is cleared up after, noted and start
   CHECK(scene.shared->groups.load() == 2);
   CHECK(scene.cleaned.size() == 1);
   REQUIRE(scene.shared->signs.losses.load() == 1);
-  CHECK(std::string(scene.loss().cause.c_str()) == "the supervisor was ended by signal 9 (Killed)");
+  CHECK(std::string(scene.loss().cause.text()) == "the supervisor was ended by signal 9 (Killed)");
   REQUIRE(scene.said.size() == 1);
   CHECK(scene.said[0].find("all processes are started again") != std::string::npos);
 }
@@ -109,7 +109,7 @@ TEST_CASE("a group that once gave a sign and gives none any more is ended and st
   CHECK(code == 0);
   REQUIRE(scene.shared->signs.losses.load() == 1);
   CHECK(scene.loss().from_ns == 77);  // lost since it was last heard
-  CHECK(std::string(scene.loss().cause.c_str()) == "the transport's daemon gave no sign of life");
+  CHECK(std::string(scene.loss().cause.text()) == "the transport's daemon gave no sign of life");
 }
 
 TEST_CASE("nobody of a lost group lives on beside the next one") {

@@ -5,7 +5,11 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cstring>
+#include <fstream>
 #include <functional>
+#include <map>
+#include <string>
 
 #include "rt/shm/kill_order.hpp"
 #include "rt/shm/local_transport.hpp"
@@ -55,6 +59,18 @@ class Halves {
   uint64_t value_ = 0;
   bool loaned_ = false;
 };
+
+/// Begin and end of each.
+std::map<uintptr_t, uintptr_t> writable_pools() {
+  std::map<uintptr_t, uintptr_t> pools;
+  std::ifstream maps("/proc/self/maps");
+  for (std::string line; std::getline(maps, line);) {
+    if (line.find("rw-s") == std::string::npos || line.find("memfd:takt") == std::string::npos) continue;
+    const size_t dash = line.find('-');
+    pools[std::stoull(line, nullptr, 16)] = std::stoull(line.substr(dash + 1), nullptr, 16);
+  }
+  return pools;
+}
 
 }  // namespace
 
@@ -177,4 +193,31 @@ TEST_CASE("processes have numbers within those of the file") {
   CHECK_THROWS_AS(join_local_transport(conformance_ports(), file, 0), std::logic_error);
   CHECK_THROWS_AS(join_local_transport(conformance_ports(), file, 3), std::logic_error);
   CHECK(made->reclaim(3) == 0);
+}
+
+TEST_CASE("a process that has written over its flags takes nothing from others") {
+  const PoolFile file(2);
+  const auto made = make_local_transport(conformance_ports(), file, 1);
+  const auto writer = made->make_writer(basic);
+  const pid_t child = fork();
+  REQUIRE(child >= 0);
+  if (child == 0) {
+    const auto before = writable_pools();
+    const auto joined = join_local_transport(conformance_ports(), file, 2);
+    for (const auto& [begin, end] : writable_pools())  // its flags: nothing else is writable to it
+      if (before.count(begin) == 0) std::memset(reinterpret_cast<void*>(begin), 0xff, end - begin);
+    _exit(0);
+  }
+  REQUIRE(waitpid(child, nullptr, 0) == child);
+  CHECK(made->chunks_in_use() >= conformance_ports()[basic].chunks());
+  const auto reader = made->make_reader(basic);
+  for (int64_t i = 1; i <= 100; ++i) {
+    publish(*writer, static_cast<uint64_t>(i), i, i);
+    Held held = reader->take(static_cast<uint64_t>(i));
+    REQUIRE(intact(held, static_cast<uint64_t>(i)));
+    reader->release(held);
+  }
+  CHECK(writer->statistics().pool_empty == 0);
+  made->reclaim(2);
+  CHECK(made->chunks_in_use() <= conformance_ports()[basic].history);
 }

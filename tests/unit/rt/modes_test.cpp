@@ -123,7 +123,7 @@ TEST_CASE("on_miss: safe_stop changes the mode when the first deadline is missed
   CHECK(scene.first.modes.front() == "full");
   CHECK(scene.first.modes.back() == "safe_stop");
   REQUIRE(scene.board->modes().size() == 1);
-  CHECK(std::string(scene.board->modes().change(0)->reason.c_str()) == "first: deadline missed");
+  CHECK(std::string(scene.board->modes().change(0)->reason.text()) == "first: deadline missed");
   CHECK(scene.board->modes().change(0)->from_ns == kEpoch + kMs);
 }
 
@@ -144,7 +144,7 @@ TEST_CASE("a job that throws loses its result and is told; the run goes on") {
   CHECK(scene.first.releases_ms.size() == 10);
   CHECK(scene.board->task(0).no_result.load() == 1);
   REQUIRE(scene.board->faults().size() == 1);
-  CHECK(std::string(scene.board->faults().at(0)->what.c_str()) == "first: job 3 threw: out of luck");
+  CHECK(std::string(scene.board->faults().at(0)->what.text()) == "first: job 3 threw: out of luck");
 }
 
 TEST_CASE("a job that says that its results are doubtful or wrong is told, and they count all the same") {
@@ -161,9 +161,9 @@ TEST_CASE("a job that says that its results are doubtful or wrong is told, and t
   CHECK(doubtful.kind == Fault::doubtful);
   CHECK(doubtful.job == 2);
   CHECK(doubtful.at_ns == kEpoch + 200 * kMs);
-  CHECK(std::string(doubtful.what.c_str()) == "first: blurred");
+  CHECK(std::string(doubtful.what.text()) == "first: blurred");
   CHECK(wrong.kind == Fault::wrong);
-  CHECK(std::string(wrong.what.c_str()) == "first: " + std::string(159, 'x'));
+  CHECK(std::string(wrong.what.text()) == "first: " + std::string(159, 'x'));
 }
 
 TEST_CASE("events beyond the room of a log are counted") {

@@ -133,12 +133,12 @@ TEST_CASE("mail sets a parameter between jobs if the node reads it in its jobs o
   REQUIRE(post(mail, 0, 99.0));
   CHECK_FALSE(deliver(mail, scene.worker));
   CHECK(mail.state.load() == ParamMail::refused);
-  CHECK(std::string(mail.refusal.data()) == "is 99, must lie in 0..10");
+  CHECK(std::string(mail.refusal.text()) == "is 99, must lie in 0..10");
   CHECK(scene.worker.gain() == 2.5);
   REQUIRE(post(mail, 1, int64_t{4}));
   CHECK_FALSE(deliver(mail, scene.worker));
   CHECK(mail.state.load() == ParamMail::refused);
-  CHECK(std::string(mail.refusal.data()).find("only before the start") != std::string::npos);
+  CHECK(std::string(mail.refusal.text()).find("only before the start") != std::string::npos);
   CHECK(scene.worker.size() == 3);
 }
 

@@ -58,7 +58,7 @@ struct SourcesScene {
     for (size_t i = 0; i < board->modes().size(); ++i) {
       const ModeLog::Change& change = *board->modes().change(i);
       all.push_back(plan.modes[change.mode].name + " at " + std::to_string((change.from_ns - kEpoch) / kMs) + ": " +
-                    change.reason.c_str());
+                    std::string(change.reason.text()).c_str());
     }
     return all;
   }
@@ -89,8 +89,8 @@ TEST_CASE("a loss pauses what needs the source, its return lets it go on; report
   CHECK(scene.board->source(1).losses.load() == 0);
   REQUIRE(scene.board->faults().size() == 2);
   CHECK(scene.board->faults().at(0)->kind == Fault::lost);
-  CHECK(std::string(scene.board->faults().at(0)->what.c_str()) == "camera lost: disconnected");
-  CHECK(std::string(scene.board->faults().at(1)->what.c_str()) == "camera is back after 400 ms");
+  CHECK(std::string(scene.board->faults().at(0)->what.text()) == "camera lost: disconnected");
+  CHECK(std::string(scene.board->faults().at(1)->what.text()) == "camera is back after 400 ms");
   CHECK(scene.board->faults().at(1)->task == 0);
 }
 

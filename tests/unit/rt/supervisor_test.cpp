@@ -90,7 +90,7 @@ TEST_CASE("one that dies is noted, cleared up after and started again at once; b
   REQUIRE(scene.board->outages().size() == 1);
   CHECK(scene.outage().process == 0);
   CHECK(scene.outage().from_ns == kBegin + 20'000 * kMs);
-  CHECK(std::string(scene.outage().cause.c_str()) == "was ended by signal 9 (Killed)");
+  CHECK(std::string(scene.outage().cause.text()) == "was ended by signal 9 (Killed)");
   CHECK(scene.cleaned == std::vector<pid_t>{dead});
   CHECK(scene.outage().started);
   CHECK(scene.group.pid(0) > 0);
@@ -122,7 +122,7 @@ TEST_CASE("one that gives no sign of life is ended, while one whose watchdog spe
   REQUIRE(scene.board->outages().size() == 1);
   CHECK(scene.outage().process == 0);
   CHECK(scene.outage().from_ns == kBegin + 10 * kMs);  // away since it was last heard
-  CHECK(std::string(scene.outage().cause.c_str()).find("gave no sign of life for 1.00 s") != std::string::npos);
+  CHECK(std::string(scene.outage().cause.text()).find("gave no sign of life for 1.00 s") != std::string::npos);
 }
 
 TEST_CASE("a job that does not return costs its process a restart") {
@@ -134,7 +134,7 @@ TEST_CASE("a job that does not return costs its process a restart") {
   scene.bury(hung);
   REQUIRE(scene.board->outages().size() == 1);
   CHECK(scene.outage().from_ns == kBegin + 5 * kMs);
-  CHECK(std::string(scene.outage().cause.c_str()).find("a job of first did not return") != std::string::npos);
+  CHECK(std::string(scene.outage().cause.text()).find("a job of first did not return") != std::string::npos);
   CHECK(scene.board->process(0).life.hanging.load() == 0);  // its successor does not hang
 }
 
@@ -164,7 +164,7 @@ TEST_CASE("one that stands still on its way back is ended after the silence, one
     while (waitid(P_PID, static_cast<id_t>(second), &stopped, WSTOPPED | WNOWAIT) != 0) REQUIRE(errno == EINTR);
     until_ended([] {});
     // However late its death is seen, it was ended long before the patience was over.
-    CHECK(std::string(scene.outage().cause.c_str()) == "was ended by signal 9 (Killed)");
+    CHECK(std::string(scene.outage().cause.text()) == "was ended by signal 9 (Killed)");
     CHECK(scene.told("stood still on its way back for 1.00 s"));
   }
   SUBCASE("is busy with something else") {
@@ -217,7 +217,7 @@ TEST_CASE("after the loss of a whole group every process counts as away, one tha
   scene.clock.advance_to(kBegin + 600 * kMs);
   scene.supervisor->all_were_lost(loss);
   REQUIRE(scene.board->outages().size() == 2);
-  CHECK(std::string(scene.outage(0).cause.c_str()) == "was ended by signal 9 (Killed); then the daemon is gone");
+  CHECK(std::string(scene.outage(0).cause.text()) == "was ended by signal 9 (Killed); then the daemon is gone");
   CHECK(scene.outage(1).process == 0);
   for (size_t p = 0; p < 2; ++p) {
     scene.board->process(p).state.store(ProcessRecord::running);

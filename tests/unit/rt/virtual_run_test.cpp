@@ -170,7 +170,7 @@ TEST_CASE("of the releases that passed, those that their mode leaves out and tho
     scene.add("long", 0, 5, 100).on_miss = c.verb;
     scene.plan.modes = {{"full", {1}}, {"none", {0}}};
     scene.board = std::make_unique<RunBoard>(scene.plan);
-    ModeLog& modes = scene.board->modes();
+    Modes& modes = scene.board->modes();
     CHECK(modes.request(1, kEpoch + 250 * kMs, "a test"));
     CHECK(modes.request(0, kEpoch + 600 * kMs, "a test"));
     CHECK(modes.request(1, kEpoch + 600 * kMs, "at the same instant"));

@@ -230,7 +230,7 @@ TEST_CASE("nothing new, another size, or a raw pair without calibration: no resu
   CHECK_FALSE(bench.run());
   REQUIRE(bench.notice());
   CHECK(bench.notice()->wrong);
-  CHECK(std::string(bench.notice()->why.c_str()).find("`calibration` is not set") != std::string::npos);
+  CHECK(std::string(bench.notice()->why.text()).find("`calibration` is not set") != std::string::npos);
   CHECK_FALSE(bench.run());
   CHECK_FALSE(bench.notice());  // once is enough
   bench.pair().camera.focal_px = 100;
@@ -242,7 +242,7 @@ TEST_CASE("nothing new, another size, or a raw pair without calibration: no resu
   fresh.pair().width = 95;
   CHECK_FALSE(fresh.run());
   REQUIRE(fresh.notice());
-  CHECK(std::string(fresh.notice()->why.c_str()) ==
+  CHECK(std::string(fresh.notice()->why.text()) ==
         "a pair of 95 x 40 px and 3 channels is not matched; those of 96 x 40, 3 are");
 }
 
@@ -318,7 +318,7 @@ TEST_CASE("rows that differ are told once, with the figure, if they are watched"
     REQUIRE(told.size() >= 1);
     CHECK(told.size() <= 2);  // doubtful perhaps on the way, then wrong
     CHECK(told.back().wrong);
-    CHECK(std::string(told.back().why.c_str()).find(" px (median of ") != std::string::npos);
+    CHECK(std::string(told.back().why.text()).find(" px (median of ") != std::string::npos);
   }
 }
 
