@@ -6,7 +6,7 @@
 # process there (SIGSEGV), as its own would. The victim changes with each store. Needs the right to write to the memory of its children.
 # Shown: what the stores hit; whether another process ended; whether a store changed a byte of another one's messages or
 # records (each leaves a pattern that is looked for in all of the shared memory); damaged messages, withheld or lost, by name.
-# What all processes write (logs, stop, commit words: docs/limits.md) is left out; with WILD_COMMON=1 it is hit as well.
+# What all processes write (logs of what was seen, commit words: docs/limits.md) counts as the victim's own.
 # Exit 1 if another process ended, or a byte elsewhere changed.
 root=$(readlink -f "$(dirname "$0")/../..")
 export PYTHONPATH="$root/bench/scenarios" PYTHONDONTWRITEBYTECODE=1
@@ -57,11 +57,6 @@ def store(pid, at, data):
     return done
 
 
-def common(m, maps):
-    """The logs, the stop and the commit words: the first part of the board."""
-    return m.kind.startswith("board") and m == next(o for o in maps if o.kind == m.kind)
-
-
 with tempfile.TemporaryDirectory(prefix="wild-") as work:
     log = open(f"{work}/log", "w")
     length = stores * (PAUSE_S + 1.5) + 30
@@ -76,9 +71,8 @@ with tempfile.TemporaryDirectory(prefix="wild-") as work:
         pid = members[name]
         try:
             maps = shared_maps(pid)
-            targets = [m for m in maps if os.environ.get("WILD_COMMON") or not common(m, maps)]
-            if len(targets) < 10: raise ProcessLookupError  # on its way back
-            m = chance.choice(targets)
+            if len(maps) < 10: raise ProcessLookupError  # on its way back
+            m = chance.choice(maps)
             size = int(4 * 2 ** chance.uniform(0, 18))
             at = chance.randrange(m.begin, m.end)
             pattern = chance.randbytes(16)
