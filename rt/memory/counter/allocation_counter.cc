@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // Counts every heap block and mapping the calling thread takes, below operator new: OpenCV and iceoryx allocate with
 // posix_memalign and mmap, which operator new never sees. Takes the place of the C library's functions in the program
-// that links it and hands on to the C library's own entry points, so nothing is looked up and nothing can recurse.
+// that links it.
+//
+// The memory comes from mimalloc, where each thread has a heap of its own and no lock: in the C library's a real-time
+// thread waits for an ordinary one that was preempted inside malloc or free (tests/endurance/allocations.cpp).
 //
 // It also keeps a job from taking more memory than its node may have (JobCalls::heap_limit).
 //
 // Not a part of takt_rt: a program opts in by linking takt_allocation_counter.
 #include <errno.h>
-#include <malloc.h>
+#include <mimalloc.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <sys/mman.h>
@@ -18,17 +21,6 @@
 
 #if !defined(TAKT_SANITIZED)
 
-// Entry points of glibc that stay its own when the public names are replaced (malloc/malloc.c).
-extern "C" {
-void* __libc_malloc(size_t);
-void* __libc_calloc(size_t, size_t);
-void* __libc_realloc(void*, size_t);
-void* __libc_memalign(size_t, size_t);
-void* __libc_valloc(size_t);
-void* __libc_pvalloc(size_t);
-void __libc_free(void*);
-}
-
 namespace {
 
 using takt::JobCall;
@@ -36,6 +28,26 @@ using takt::counter::job;
 
 // Initial-exec: reading it must not itself allocate, as a lazily made thread-local block would.
 __attribute__((tls_model("initial-exec"))) thread_local uint64_t allocations = 0;
+
+// Before the first block, and before the constructors of libraries, which take some: memory is committed as it is
+// needed, where mlockall would put the 32 MiB that each thread's heap reserves into memory at once, and kept.
+void set_up_heap() {
+  mi_option_set(mi_option_eager_commit, 0);
+  mi_option_set(mi_option_allow_decommit, 0);
+}
+__attribute__((section(".preinit_array"), used)) void (*const before_constructors)() = set_up_heap;
+
+// Mappings that the heap itself makes are no mappings of the thread or the job: they are seen as their malloc.
+__attribute__((tls_model("initial-exec"))) thread_local bool in_heap = false;
+
+/// What `call` returns, by the heap.
+template <class F>
+auto from_heap(F call) {
+  in_heap = true;
+  const auto got = call();
+  in_heap = false;
+  return got;
+}
 
 bool power_of_two(size_t n) { return n != 0 && (n & (n - 1)) == 0; }
 
@@ -52,19 +64,18 @@ bool allowed(size_t bytes, JobCall call, const char* function) {
   return false;
 }
 
-void* taken(void* block) {
-  if (job != nullptr && block != nullptr) job->heap_bytes += static_cast<int64_t>(malloc_usable_size(block));
+template <class F>
+void* taken(F call) {
+  void* block = from_heap(call);
+  if (block == nullptr) errno = ENOMEM;
+  else if (job != nullptr) job->heap_bytes += static_cast<int64_t>(mi_usable_size(block));
   return block;
 }
 
-void given_back(void* block) {
-  if (job != nullptr && block != nullptr) job->heap_bytes -= static_cast<int64_t>(malloc_usable_size(block));
-}
-
 void* map(void* address, size_t length, int protection, int flags, int file, off_t offset) {
-  if (!allowed(length, JobCall::mmap, "mmap")) return MAP_FAILED;
+  if (!in_heap && !allowed(length, JobCall::mmap, "mmap")) return MAP_FAILED;
   const long got = syscall(SYS_mmap, address, length, protection, flags, file, offset);
-  if (job != nullptr && got != -1) job->heap_bytes += static_cast<int64_t>(length);
+  if (job != nullptr && !in_heap && got != -1) job->heap_bytes += static_cast<int64_t>(length);
   return reinterpret_cast<void*>(got);
 }
 
@@ -74,20 +85,28 @@ extern "C" {
 
 uint64_t takt_thread_allocations() { return allocations; }
 
-void* malloc(size_t size) { return allowed(size, JobCall::malloc, "malloc") ? taken(__libc_malloc(size)) : nullptr; }
+void* malloc(size_t size) {
+  if (!allowed(size, JobCall::malloc, "malloc")) return nullptr;
+  return taken([=] { return mi_malloc(size); });
+}
 
 void* calloc(size_t count, size_t size) {
   size_t bytes = 0;
   if (__builtin_mul_overflow(count, size, &bytes)) bytes = SIZE_MAX;
-  return allowed(bytes, JobCall::malloc, "calloc") ? taken(__libc_calloc(count, size)) : nullptr;
+  if (!allowed(bytes, JobCall::malloc, "calloc")) return nullptr;
+  return taken([=] { return mi_calloc(count, size); });
 }
 
 void* realloc(void* block, size_t size) {
-  if (size != 0 && !allowed(size, JobCall::malloc, "realloc")) return nullptr;
-  const size_t before = job != nullptr && block != nullptr ? malloc_usable_size(block) : 0;
-  void* got = __libc_realloc(block, size);
-  if (job != nullptr && (got != nullptr || size == 0)) job->heap_bytes -= static_cast<int64_t>(before);
-  return taken(got);
+  if (block != nullptr && size == 0) {
+    free(block);
+    return nullptr;
+  }
+  if (!allowed(size, JobCall::malloc, "realloc")) return nullptr;
+  const size_t before = job != nullptr ? mi_usable_size(block) : 0;
+  void* got = taken([=] { return mi_realloc(block, size); });
+  if (job != nullptr && got != nullptr) job->heap_bytes -= static_cast<int64_t>(before);
+  return got;
 }
 
 void* reallocarray(void* block, size_t count, size_t size) {
@@ -100,12 +119,17 @@ void* reallocarray(void* block, size_t count, size_t size) {
 }
 
 void free(void* block) {
-  given_back(block);
-  __libc_free(block);
+  if (job != nullptr) job->heap_bytes -= static_cast<int64_t>(mi_usable_size(block));
+  in_heap = true;
+  mi_free(block);
+  in_heap = false;
 }
 
+size_t malloc_usable_size(void* block) { return mi_usable_size(block); }
+
 void* memalign(size_t alignment, size_t size) {
-  return allowed(size, JobCall::malloc, "memalign") ? taken(__libc_memalign(alignment, size)) : nullptr;
+  if (!allowed(size, JobCall::malloc, "memalign")) return nullptr;
+  return taken([=] { return mi_memalign(alignment, size); });
 }
 
 void* aligned_alloc(size_t alignment, size_t size) { return memalign(alignment, size); }
@@ -120,9 +144,15 @@ int posix_memalign(void** block, size_t alignment, size_t size) {
   return 0;
 }
 
-void* valloc(size_t size) { return allowed(size, JobCall::malloc, "valloc") ? taken(__libc_valloc(size)) : nullptr; }
+void* valloc(size_t size) {
+  if (!allowed(size, JobCall::malloc, "valloc")) return nullptr;
+  return taken([=] { return mi_valloc(size); });
+}
 
-void* pvalloc(size_t size) { return allowed(size, JobCall::malloc, "pvalloc") ? taken(__libc_pvalloc(size)) : nullptr; }
+void* pvalloc(size_t size) {
+  if (!allowed(size, JobCall::malloc, "pvalloc")) return nullptr;
+  return taken([=] { return mi_pvalloc(size); });
+}
 
 void* mmap(void* address, size_t length, int protection, int flags, int file, off_t offset) {
   return map(address, length, protection, flags, file, offset);
@@ -133,9 +163,9 @@ void* mmap64(void* address, size_t length, int protection, int flags, int file, 
 }
 
 int munmap(void* address, size_t length) {
-  takt::counter::see(JobCall::mmap, "munmap");
+  if (!in_heap) takt::counter::see(JobCall::mmap, "munmap");
   const long done = syscall(SYS_munmap, address, length);
-  if (job != nullptr && done == 0) job->heap_bytes -= static_cast<int64_t>(length);
+  if (job != nullptr && !in_heap && done == 0) job->heap_bytes -= static_cast<int64_t>(length);
   return static_cast<int>(done);
 }
 
