@@ -19,6 +19,9 @@
 
 #include "rt/capability.hpp"
 
+// Defined by takt_allocation_counter where a program links it, null otherwise.
+extern "C" __attribute__((weak)) int takt_reserve_heap();
+
 namespace takt {
 namespace {
 
@@ -44,6 +47,7 @@ __attribute__((noinline)) void touch(size_t bytes) {
 
 ProcessMemory prepare_process_memory() {
   ProcessMemory got;
+  // The C library's heap; programs that link takt_allocation_counter have another one, set up there.
   // One arena: each further one would be grown, and faulted in, by the first job that allocates on its thread.
   const bool threshold = mallopt(M_MMAP_MAX, 0) == 1;
   const bool trim = mallopt(M_TRIM_THRESHOLD, -1) == 1;
@@ -53,6 +57,11 @@ ProcessMemory prepare_process_memory() {
     got.lacks.emplace_back(
         "mallopt: refused; this heap cannot be kept from returning pages. Fix: use glibc's malloc (no sanitizer, no "
         "other allocator)");
+  if (const int reason = takt_reserve_heap != nullptr ? takt_reserve_heap() : 0; reason != 0) {
+    got.malloc = false;
+    got.lacks.push_back(std::string("addresses for large blocks: ") + std::strerror(reason) +
+                        ": jobs that take them fault pages in. Fix: ulimit -v unlimited");
+  }
   pthread_attr_t attributes;
   if (pthread_attr_init(&attributes) == 0) {
     if (pthread_attr_setstacksize(&attributes, kStack) == 0) pthread_setattr_default_np(&attributes);

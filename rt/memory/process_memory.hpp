@@ -9,8 +9,10 @@
 namespace takt {
 
 struct ProcessMemory {
-  bool mlock = false;   ///< all pages, present and future, stay in memory
-  bool malloc = false;  ///< the heap never gives pages back, never maps blocks of their own, and has one arena
+  bool mlock = false;  ///< all pages, present and future, stay in memory
+  /// The C library's heap never gives pages back, never maps blocks of their own, and has one arena. A program that
+  /// links takt_allocation_counter takes nothing from it; there, addresses for large blocks are reserved.
+  bool malloc = false;
   std::vector<std::string> lacks;  ///< what was refused, each with the fix
 };
 

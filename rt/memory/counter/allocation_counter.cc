@@ -29,7 +29,7 @@ using takt::counter::job;
 // Initial-exec: reading it must not itself allocate, as a lazily made thread-local block would.
 __attribute__((tls_model("initial-exec"))) thread_local uint64_t allocations = 0;
 
-// Before the first block, and before the constructors of libraries, which take some: memory is committed as it is
+// Before the first block, and before the constructors of libraries, which take some. Memory is committed as it is
 // needed, where mlockall would put the 32 MiB that each thread's heap reserves into memory at once, and kept.
 void set_up_heap() {
   mi_option_set(mi_option_eager_commit, 0);
@@ -84,6 +84,14 @@ void* map(void* address, size_t length, int protection, int flags, int file, off
 extern "C" {
 
 uint64_t takt_thread_allocations() { return allocations; }
+
+// Reserves addresses, not memory, once per process. Blocks above 16 MiB come from there: elsewhere each of them would
+// be mapped, faulted in and unmapped. Returns 0 or an errno.
+int takt_reserve_heap() {
+  constexpr size_t kAddresses = size_t{4} << 30;
+  static const int reason = from_heap([] { return mi_reserve_os_memory(kAddresses, false, false); });
+  return reason;
+}
 
 void* malloc(size_t size) {
   if (!allowed(size, JobCall::malloc, "malloc")) return nullptr;

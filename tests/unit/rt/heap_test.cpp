@@ -11,6 +11,7 @@
 #include <poll.h>
 #include <pthread.h>
 #include <signal.h>
+#include <sys/mman.h>
 #include <unistd.h>
 
 #include <array>
@@ -21,6 +22,7 @@
 #include <thread>
 
 #include "rt/memory/job_calls.hpp"
+#include "rt/memory/process_memory.hpp"
 #include "tests/unit/rt/opaque_malloc.hpp"
 
 using namespace takt;
@@ -110,12 +112,12 @@ TEST_CASE("whatever takes memory takes it from the heap without locks") {
   REQUIRE(posix_memalign(&aligned, 64, 100) == 0);
   for (void* block : {call_malloc(10), call_calloc(3, 5), call_realloc(nullptr, 1 << 20), aligned,
                       aligned_alloc(32, 64), memalign(4096, 1), valloc(1), pvalloc(1)}) {
-    CHECK(mi_is_in_heap_region(block));
+    CHECK(mi_check_owned(block));
     CHECK(malloc_usable_size(block) == mi_usable_size(block));
     call_free(block);
   }
   void* object = ::operator new(100);
-  CHECK(mi_is_in_heap_region(object));
+  CHECK(mi_check_owned(object));
   ::operator delete(object);
 }
 
@@ -125,7 +127,7 @@ TEST_CASE("memory that the heap maps for a job is charged to the job once, as th
   calls.counts = counts.data();
   calls.heap_limit = 50'000'000;
   const uint64_t before = thread_memory_use().allocations;
-  constexpr size_t kBytes = 40'000'000;  // more than the heap keeps in its segments: a mapping of its own
+  constexpr size_t kBytes = 40'000'000;  // more than one of the heap's segments
   int64_t charged = 0;
   void* block = nullptr;
   {
@@ -141,6 +143,27 @@ TEST_CASE("memory that the heap maps for a job is charged to the job once, as th
   CHECK(thread_memory_use().allocations - before == 1);
   CHECK(counts[static_cast<size_t>(JobCall::malloc)] == 1);
   CHECK(counts[static_cast<size_t>(JobCall::mmap)] == 0);
+}
+
+TEST_CASE("large blocks stay in memory where memory is locked") {
+  const bool locked = prepare_process_memory().mlock;
+  if (!locked) {
+    MESSAGE("NOT RUN: this user may not lock memory");
+    return;
+  }
+  for (const size_t bytes : {size_t{12} << 20, size_t{20} << 20, size_t{70} << 20}) {
+    CAPTURE(bytes);
+    const auto use = [&] {
+      auto* block = static_cast<volatile char*>(call_malloc(bytes));
+      for (size_t at = 0; at < bytes; at += 4096) block[at] = 1;
+      call_free(const_cast<char*>(block));
+    };
+    use();
+    const MemoryUse before = thread_memory_use();
+    use();
+    CHECK((thread_memory_use() - before).page_faults < 16);
+  }
+  munlockall();
 }
 
 TEST_CASE("a block of no bytes is one; one made to have none is freed") {
