@@ -6,12 +6,13 @@
 
 #include <array>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 
 namespace takt {
 
 std::optional<ThreadState> thread_state(pid_t thread) {
-  std::array<char, 512> text{};
+  std::array<char, 1024> text{};
   // /proc/PID/stat would sum up all threads of the process, which takes ten times as long.
   std::snprintf(text.data(), text.size(), "/proc/%d/task/%d/stat", thread, thread);
   const int file = open(text.data(), O_RDONLY | O_CLOEXEC);
@@ -25,6 +26,7 @@ std::optional<ThreadState> thread_state(pid_t thread) {
   ThreadState told;
   if (name_end == nullptr || std::sscanf(name_end, ") %c %*d %*d %*d %*d %*d %u", &told.state, &told.flags) != 2)
     return std::nullopt;
+  told.status = std::atoi(std::strrchr(name_end, ' '));  // the last field
   return told;
 }
 

@@ -156,6 +156,7 @@ struct SubsystemSpec {
   std::string name;
   std::vector<PortName> exports;
   Position position;
+  std::optional<bool> spare = {};  ///< its process has one (compose/spares.hpp); nothing: as its chains need it
 };
 
 /// A figure lies within it, ends included.

@@ -98,9 +98,11 @@ void Loader::read_subsystem(const std::string& name, const json& value, const st
   subsystem.position = graph_.key_at(pointer);
   for (const auto& item : list_at(value, "exports"))
     if (const auto port = port_name(item)) subsystem.exports.push_back(*port);
+  if (const json spare = member(value, "spare", json::value_t::boolean); value.contains("spare"))
+    subsystem.spare = spare.get<bool>();
   spec_.subsystems.push_back(std::move(subsystem));
   for (const auto& [id, node] : value.items())
-    if (id != "exports" && node.is_object()) read_node(id, name, node, child(pointer, id));
+    if (id != "exports" && id != "spare" && node.is_object()) read_node(id, name, node, child(pointer, id));
 }
 
 void Loader::read_node(const std::string& id, const std::string& subsystem, const json& value,

@@ -203,7 +203,7 @@ class Explainer {
     const auto kind = kinds.find(words[0]);
     std::string text = (kind == kinds.end() ? words[0] + " " : kind->second) + ticked(words[1]);
     size_t next = 2;
-    if (words[0] == "subsystems" && words.size() > 2 && words[2] != "exports")
+    if (words[0] == "subsystems" && words.size() > 2 && words[2] != "exports" && words[2] != "spare")
       text = "node " + ticked(words[2]), next = 3;
     for (size_t i = next; i < words.size(); ++i) {
       const bool input = words[i] == "in" && i + 1 < words.size();

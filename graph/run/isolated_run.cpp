@@ -15,6 +15,7 @@
 #include <thread>
 
 #include "graph/attach/server.hpp"
+#include "graph/compose/spares.hpp"
 #include "graph/run/expectations.hpp"
 #include "graph/run/live_table.hpp"
 #include "graph/run/member_process.hpp"
@@ -110,6 +111,7 @@ class IsolatedRun {
         plan_source_(graph::outline(graph, graph::node_types(), clock_)),
         plan_(plan_source_.plan),
         partition_(graph::partition(graph, adjusted_)),
+        spares_(graph::spares(graph, partition_, adjusted_)),
         board_(plan_, partition_.names.size(), process_of_tasks(plan_, partition_)),
         stoppable_(board_),
         pools_(static_cast<uint32_t>(partition_.names.size()) + 1),
@@ -128,15 +130,18 @@ class IsolatedRun {
     const graph::CheckMachine machine = this_machine();
     plan_.overheads = machine.overheads;
     if (again()) forget_processes();
-    for (size_t p = 0; p < partition_.names.size(); ++p)
-      group_.start(partition_.names[p], [this, p, supervisor = getpid()]() -> int {
+    for (size_t p = 0; p < partition_.names.size(); ++p) {
+      const auto body = [this, p, supervisor = getpid()](bool spare) -> int {
         try {
-          return run_member(
-              {options_, graph_, partition_, plan_.overheads, p, supervisor, board_, pools_, trace_.rings(), faults_});
+          return run_member({options_, graph_, partition_, plan_.overheads, p, spare, supervisor, board_, pools_,
+                             trace_.rings(), faults_});
         } catch (const std::exception& problem) {  // as in a run in one process: no memory, no daemon, no thread
           return refuse(fmt::format("process {}: {}", partition_.names[p], problem.what()), kDeviceOrSystem);
         }
-      });
+      };
+      group_.start(
+          partition_.names[p], [body] { return body(false); }, [body] { return body(true); });
+    }
     group_.prepare_restarts();
     wait_for_all(ProcessRecord::composed);
     BoardExchange exchange(board_);
@@ -317,6 +322,10 @@ class IsolatedRun {
     Supervisor::Options how;
     how.clean_up = [](pid_t pid) { remove_iceoryx_leftovers(IceoryxPlaces::of_this_machine(), pid); };
     how.say = [](const std::string& what) { std::fprintf(stderr, "takt: %s\n", what.c_str()); };
+    how.memory_mb = proportional_memory_mb;
+    // Over iceoryx a process is known to the daemon, and there is one of each name.
+    for (const graph::SpareChoice& choice : spares_)
+      how.spares.push_back(choice.wanted && options_.transport != "iceoryx");
     supervisor_.emplace(plan_, board_, group_, *transport_, clock_, tasks_of(plan_, partition_), how);
     if (again()) supervisor_->all_were_lost(board_.group().newest_loss);
     int64_t give_up_ns = INT64_MAX;
@@ -414,6 +423,7 @@ class IsolatedRun {
     if (const size_t lost = group_.lost_nurseries(); lost > 0)
       problems_.push_back(fmt::format("the process that starts others again was lost {} times and replaced", lost));
     for (const std::string& problem : problems_) report["faults"].push_back({{"what", problem}});
+    add_spares(partition_.names, spares_, *supervisor_, report);
     add_outages(board_.outages(), partition_.names, plan_, tasks_of(plan_, partition_), result, report);
     if (!problems_.empty() || board_.outages().size() > 0) report["ok"] = false;
     if (supervisor_->gave_up()) code_ = kDeviceOrSystem;
@@ -441,6 +451,7 @@ class IsolatedRun {
   graph::Composition plan_source_;  ///< shells of all nodes; the plan points into them
   Plan& plan_;
   const graph::Partition partition_;
+  const std::vector<graph::SpareChoice> spares_;
   RunBoard board_;
   const Stoppable stoppable_;
   const PoolFile pools_;  ///< of the local transport, for the members and this process

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "graph/run/member_process.hpp"
 
+#include <linux/futex.h>
+#include <sys/syscall.h>
 #include <unistd.h>
 
 #include <chrono>
@@ -20,18 +22,19 @@ namespace {
 
 class BoardGate final : public StartGate {
  public:
-  BoardGate(RunBoard& board, size_t process) : board_(board), record_(board.process(process)) {}
+  BoardGate(RunBoard& board, size_t process, const Clock& clock)
+      : board_(board), record_(board.process(process)), clock_(clock) {}
   bool all_granted(bool mine) override {
     // After a restart the others will not wait: whoever looks after us tries again.
     if (record_.restarts.load() > 0 && !mine && board_.decision().load() == RunBoard::as_asked)
       throw std::runtime_error("the kernel refused a policy that it had granted before the restart");
     record_.refused.store(!mine);
-    record_.state.store(ProcessRecord::agreed);
+    record_.reach(ProcessRecord::agreed, clock_.now_ns());
     wait_until([&] { return board_.decision().load() != RunBoard::undecided; });
     return board_.decision().load() == RunBoard::as_asked;
   }
   int64_t epoch_ns() override {
-    record_.state.store(ProcessRecord::running);
+    record_.reach(ProcessRecord::running, clock_.now_ns());
     wait_until([&] { return board_.epoch_ns().load() != 0; });
     return board_.epoch_ns().load();
   }
@@ -39,7 +42,31 @@ class BoardGate final : public StartGate {
  private:
   RunBoard& board_;
   ProcessRecord& record_;
+  const Clock& clock_;
 };
+
+/// What a spare composes was told by the process whose place it will take.
+class ToldAlready final : public graph::FactExchange {
+ public:
+  explicit ToldAlready(RunBoard& board) : board_(board) {}
+  void tell(size_t, const std::optional<Capacity>&) override {}
+  std::optional<Capacity> wait_for(size_t port) override { return board_.wait_for(port); }
+  void tell_source(size_t, const SourcePlan&) override {}
+  SourcePlan wait_for_source(size_t task) override { return board_.wait_for_source(task); }
+
+ private:
+  BoardExchange board_;
+};
+
+/// Until the supervisor lets the spare take the place of its process. At a real-time priority behind all lanes, so that
+/// ordinary load keeps it from nothing then; it has no reservation.
+void wait_for_turn(RunBoard& board, size_t process, Policy policy) {
+  if (policy != Policy::cooperative) apply(fixed_reservation(kLowestPriority));
+  std::atomic<int32_t>& takes_over = board.spare_order(process).takes_over;
+  board.spare(process).ready.store(getpid());
+  for (int32_t told; (told = takes_over.load()) != getpid();)
+    syscall(SYS_futex, &takes_over, FUTEX_WAIT, told, nullptr, nullptr, 0);
+}
 
 std::vector<bool> owned(const Plan& plan, const graph::Partition& partition, size_t process) {
   std::vector<bool> own;
@@ -89,20 +116,25 @@ int run_member(const MemberPart& part) {
   RunBoard& board = part.board;
   board.keep_to(part.process);
   ProcessRecord& record = board.process(part.process);
-  record.pid.store(getpid());
-  obey_orders(&record.kill);
+  const auto take_place = [&] {
+    record.pid.store(getpid());
+    obey_orders(&record.kill);
+  };
+  if (!part.spare) take_place();
   Prepared prepared;
   prepared.graph = part.graph;
   prepared.clock = std::make_unique<MonotonicClock>();
   BoardExchange exchange(board);
+  ToldAlready told_already(board);
   graph::ComposeOptions how;
   how.output = options.output;
   how.seed = options.seed;
   how.observers = observers(options, part.graph);
   how.owns = [&](const std::string& id) { return part.partition.process_of.at(id) == part.process; };
   how.exchange = &exchange;
+  if (part.spare) how.exchange = &told_already;
   if (const int code = compose(options, how, prepared); code != kOk) {
-    record.problems.store(static_cast<uint32_t>(prepared.problems.size()));
+    if (!part.spare) record.problems.store(static_cast<uint32_t>(prepared.problems.size()));
     return code;
   }
   Plan& plan = prepared.composition->plan;
@@ -110,7 +142,7 @@ int run_member(const MemberPart& part) {
   std::vector<std::string> told;  // the supervisor says it
   choose_cores(plan.cores, told);
   plan.overheads = part.overheads;
-  record.state.store(ProcessRecord::composed);
+  if (!part.spare) record.reach(ProcessRecord::composed, prepared.clock->now_ns());
   wait_until([&] { return board.carrier().load() != RunBoard::no_carrier; });
   prepare_process();
   std::unique_ptr<Transport> joined;
@@ -119,8 +151,13 @@ int run_member(const MemberPart& part) {
                  ? join_local_transport(plan.ports, part.pools, static_cast<uint32_t>(part.process) + 1)
                  : join_iceoryx_transport(plan.ports, iceoryx_domain(part.supervisor));
   });
+  if (part.spare) {
+    wait_for_turn(board, part.process, plan.policy);
+    take_place();
+    record.reach(ProcessRecord::composed, prepared.clock->now_ns());
+  }
   const auto transport = part.faults.inject(std::move(joined), plan, *prepared.clock, board);
-  BoardGate gate(board, part.process);
+  BoardGate gate(board, part.process, *prepared.clock);
   Executor::Options run;
   run.duration_ns = static_cast<int64_t>(options.duration_s * 1e9);
   run.board = &board;
@@ -129,10 +166,11 @@ int run_member(const MemberPart& part) {
   run.gate = &gate;
   run.rejoin = record.restarts.load() > 0;
   run.gives_up_rights = true;
+  if (part.spare) run.let_go = [] { demote_thread(0); };
   run.life = &record.life;
   run.own = owned(plan, part.partition, part.process);
   Executor executor(plan, *transport, *prepared.clock, run);
-  record.state.store(ProcessRecord::joined);
+  record.reach(ProcessRecord::joined, prepared.clock->now_ns());
   const ProcessReading before = ProcessReading::now();
   const RunResult result = executor.run();
   record.cpu_ns = ProcessReading::now().cpu_ns - before.cpu_ns;
@@ -140,7 +178,7 @@ int run_member(const MemberPart& part) {
   record.simulator_in_jobs_ns += hal::simulator_use().in_jobs_ns;
   for (size_t t = 0; t < plan.tasks.size(); ++t)
     if (run.own[t] && !is_stuck(result, t)) prepared.composition->nodes[t]->finish();
-  record.state.store(ProcessRecord::finished);
+  record.reach(ProcessRecord::finished, prepared.clock->now_ns());
   // A job of another process may still be about to hold what was published here, and the recorder to copy it.
   wait_until([&] { return board.dismissed().load(); });
   // A job that never returns still uses what would now be taken down.

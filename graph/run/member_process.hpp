@@ -37,6 +37,7 @@ struct MemberPart {
   const graph::Partition& partition;
   const analysis::Overheads& overheads;  ///< the supervisor's, so that all put lanes on the same cores
   size_t process = 0;                    ///< index into partition.names
+  bool spare = false;                    ///< it takes the place of the process when that has died
   int supervisor = 0;                    ///< the process whose daemon it may have to join
   RunBoard& board;
   const PoolFile& pools;
@@ -45,7 +46,9 @@ struct MemberPart {
 };
 
 /// One process of an isolated run, as the supervisor's fork enters it: composes its part, joins the transport that the
-/// board names, runs until the board's stop. Returns the exit code.
+/// board names, runs until the board's stop. Returns the exit code. A spare has its part composed, its memory locked
+/// and the pools mapped, and waits then until the board says that the place is its own; before that it writes nothing
+/// that the process uses.
 int run_member(const MemberPart& part);
 
 }  // namespace takt::command

@@ -30,8 +30,16 @@ Json told(const Outage& outage, const std::string& process, std::vector<std::str
                 {"at_s", seconds(outage.from_ns)},
                 {"back_s", nullptr},
                 {"down_s", down_s},
-                {"chunks_freed", outage.freed}};
-  if (outage.back_ns > 0) entry["back_s"] = seconds(outage.back_ns);
+                {"chunks_freed", outage.freed},
+                {"by_spare", outage.by_spare}};
+  if (outage.back_ns > 0) {
+    entry["back_s"] = seconds(outage.back_ns);
+    const auto after_ms = [&](int64_t ns) { return static_cast<double>(ns - outage.from_ns) / 1e6; };
+    entry["phases_ms"] = {{"started", after_ms(outage.start_ns)},
+                          {"composed", after_ms(outage.composed_ns)},
+                          {"joined", after_ms(outage.joined_ns)},
+                          {"running", after_ms(outage.running_ns)}};
+  }
   return entry;
 }
 
@@ -66,6 +74,23 @@ void add_outages(const OutageLog& log, const std::vector<std::string>& processes
     for (const size_t t : tasks_of[p])
       for (Json& node : report["nodes"])
         if (node["name"] == plan.tasks[t].name) node["down"] = missed(plan.tasks[t], p, outages, result);
+}
+
+void add_spares(const std::vector<std::string>& processes, const std::vector<graph::SpareChoice>& choices,
+                const Supervisor& supervisor, Json& report) {
+  report["spares"] = Json::array();
+  for (size_t p = 0; p < processes.size(); ++p) {
+    const SpareUse use = supervisor.spare_use(p);
+    if (!use.wanted) continue;
+    report["spares"].push_back({{"process", processes[p]},
+                                {"why", choices[p].why},
+                                {"takeovers", use.takeovers},
+                                {"not_ready", use.not_ready},
+                                {"lost", use.lost},
+                                {"ready_within_s", static_cast<double>(use.ready_within_ns) / 1e9},
+                                {"memory_mb", use.memory_mb},
+                                {"cpu_s", static_cast<double>(use.cpu_ns) / 1e9}});
+  }
 }
 
 }  // namespace takt::command

@@ -138,6 +138,7 @@ Json edges_json(const RunFacts& facts, const ProofReport& proofs) {
                        {"dropped", s.dropped},
                        {"stale", s.stale.load()},
                        {"damaged", s.damaged},
+                       {"passed_over", s.passed_over.load()},
                        {"exhausted", facts.board.port(task.edges[e].port).writer.pool_empty},
                        {"age_ms", distribution(s.age, 1e6, proofs.of_edge(t, e))}});
     }

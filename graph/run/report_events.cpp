@@ -24,6 +24,7 @@ std::string_view to_string(uint32_t kind) {
     case Fault::spoiled: return "spoiled";
     case Fault::damaged: return "damaged";
     case Fault::bandwidth: return "bandwidth";
+    case Fault::poison: return "poison";
   }
   return "";
 }

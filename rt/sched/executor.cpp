@@ -207,6 +207,7 @@ bool Executor::run_partitioned(Policy policy, RunResult& result) {
     throw;
   }
   crew_->started.arrive_and_wait();
+  if (options_.let_go) options_.let_go();
   join(result);
   return crew_->go.load();
 }

@@ -17,6 +17,7 @@ struct Fault {
     spoiled,    ///< the commit word of its outputs held what nobody writes there
     damaged,    ///< a message was written over by its own process: withheld, or lost to a reader
     bandwidth,  ///< what the kernel reserved for the task's thread may be lost
+    poison,     ///< its process ended twice on one message, which is passed over
   };
   Kind kind = hang;
   uint32_t task = 0;  ///< index into Plan::tasks

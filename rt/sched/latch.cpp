@@ -26,6 +26,8 @@ Latch::Latch(const TaskPlan& plan, Transport& transport, RunBoard& board, size_t
     e.requests = e.input == plan.node->control();
     e.statistics = &board.edge(task, edges_.size() - 1);
     e.last_seen = e.statistics->last_seen;
+    e.pass_over_from = e.statistics->pass_over_from.load();
+    e.pass_over_to = e.statistics->pass_over_to.load();
   }
   for (const auto& group : plan.joins) {
     std::vector<size_t> members;
@@ -62,6 +64,7 @@ void Latch::acquire_newest(Edge& edge, int64_t release_ns, int64_t now_ns) {
   auto& held = PortAccess::held(*edge.input);
   size_t count = 0;
   for (size_t i = listed; i-- > 0;) {  // candidates are newest first, inputs oldest first
+    if (edge.passes_over(candidates[i].sequence)) continue;
     Held message = edge.reader->take(candidates[i].sequence);
     if (message) held[count++] = message;
   }
@@ -87,7 +90,7 @@ bool Latch::take_set(const std::vector<size_t>& group, int64_t stamp_ns, int64_t
     const size_t listed = edge.reader->list(release_ns, candidates);
     const auto* match = std::find_if(candidates.data(), candidates.data() + listed,
                                      [&](const Candidate& c) { return c.stamp_ns == stamp_ns; });
-    if (match == candidates.data() + listed) break;
+    if (match == candidates.data() + listed || edge.passes_over(match->sequence)) break;
     Held message = edge.reader->take(match->sequence);
     if (!message) break;
     PortAccess::held(*edge.input)[0] = message;
@@ -115,6 +118,7 @@ void Latch::account(Edge& edge, size_t count, bool stale, int64_t now_ns) {
   const auto& held = PortAccess::held(*edge.input);
   edge.age_ns = now_ns - held[count - 1].stamp_ns;
   edge.latched_ns = now_ns;
+  edge.statistics->in_hand.store(held[count - 1].sequence, std::memory_order_relaxed);
   for (size_t i = 0; i < count; ++i) {
     if (held[i].sequence <= edge.last_seen) continue;
     edge.fresh.dropped += held[i].sequence - edge.last_seen - 1;

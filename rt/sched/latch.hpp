@@ -39,6 +39,8 @@ class Latch {
     InputPort* input = nullptr;
     std::unique_ptr<Reader> reader;
     uint64_t last_seen = 0, damaged = 0;
+    uint64_t pass_over_from = 0, pass_over_to = 0;  ///< EdgeStatistics
+    bool passes_over(uint64_t sequence) const { return sequence <= pass_over_to && sequence >= pass_over_from; }
     bool joined = false, requests = false;
     EdgeCounts fresh;         ///< not yet in the statistics
     int64_t age_ns = kNoAge;  ///< the same

@@ -22,6 +22,9 @@ struct Outage {
   int64_t start_ns = 0;  ///< when it is, or was, started again; 0: it is given up
   int64_t back_ns = 0;   ///< every task of it with a rate has run a job again; 0: not yet
   bool started = false;
+  bool by_spare = false;  ///< a spare has taken its place
+  /// When its successor had composed its part, had joined the others, and ran; 0: it never did.
+  int64_t composed_ns = 0, joined_ns = 0, running_ns = 0;
   BoundedText<200> cause;  ///< "was ended by signal 9 (Killed)"
 };
 

@@ -46,7 +46,9 @@ RunBoard::RunBoard(const Plan& plan, size_t processes, std::span<const size_t> p
       safe_stop_mode_(plan.safe_stop),
       mode_rules_(plan.mode_rules),
       producers_(plan),
-      processes_(processes) {
+      processes_(processes),
+      spare_signs_(processes),
+      spare_orders_(processes) {
   size_t edges = 0, params = 0;
   for (const TaskPlan& task : plan.tasks) {
     first_edge_.push_back(edges);
@@ -90,12 +92,14 @@ size_t RunBoard::lay_out(const Plan& plan, std::span<const size_t> process_of, s
   supervised_ = placer.make<Supervised>();
   stop_words_[0] = memory != nullptr ? &supervised_->stop : nullptr;
   for (size_t process = 0; process < processes_.size(); ++process) placer.make(entered_requests_, process);
+  for (size_t process = 0; process < processes_.size(); ++process) placer.make(spare_orders_, process);
   areas_.push_back(placer.to_next_page());
   const auto process_of_task = [&](size_t t) { return t < process_of.size() ? process_of[t] : 0; };
   for (size_t process = 0; process < processes_.size(); ++process) {
     placer.make(processes_, process);
     placer.make(stop_words_, 1 + process);
     placer.make(mode_requests_, process);
+    placer.make(spare_signs_, process);
     for (size_t t = 0; t < tasks_.size(); ++t) {
       if (process_of_task(t) != process) continue;
       placer.make(tasks_, t);

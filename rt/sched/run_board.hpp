@@ -67,14 +67,31 @@ struct LifeSigns {
 /// How far one process of a run has come, and what it used. A restarted one goes on with the record of the one before.
 struct alignas(kCacheLine) ProcessRecord {
   enum State : uint32_t { starting, composed, joined, agreed, running, finished };
+  static constexpr size_t kStates = 6;
   std::atomic<uint32_t> state{starting};
-  std::atomic<uint32_t> problems{0};  ///< why it could not be composed: how many, told on stderr
-  std::atomic<bool> refused{false};   ///< a policy was refused to one of its lanes
+  std::array<std::atomic<int64_t>, kStates> reached_ns{};  ///< by state: when it was reached last
+  std::atomic<uint32_t> problems{0};                       ///< why it could not be composed: how many, told on stderr
+  std::atomic<bool> refused{false};                        ///< a policy was refused to one of its lanes
   std::atomic<int32_t> pid{0};
   std::atomic<uint32_t> restarts{0};  ///< it is not the first of its name
   LifeSigns life;
   KillOrder kill;
   int64_t cpu_ns = 0, simulator_cpu_ns = 0, simulator_in_jobs_ns = 0;
+
+  void reach(State now, int64_t at_ns) {
+    reached_ns[now].store(at_ns);
+    state.store(now);
+  }
+};
+
+/// What the spare of a process says of itself, in the pages of that process.
+struct alignas(kCacheLine) SpareSign {
+  std::atomic<int32_t> ready{0};  ///< number of the process that waits, with its part composed; 0: none yet
+};
+
+/// What the supervisor tells the spares of a process. No member can write it.
+struct alignas(kCacheLine) SpareOrder {
+  std::atomic<int32_t> takes_over{0};  ///< number of the process that does; a futex
 };
 
 /// How large the messages of an output can become, once its node is set up.
@@ -138,6 +155,8 @@ class RunBoard {
   SourceFacts& source_facts(size_t t) { return *source_facts_[t]; }
   ProcessRecord& process(size_t p) { return *processes_[p]; }
   const ProcessRecord& process(size_t p) const { return *processes_[p]; }
+  SpareSign& spare(size_t p) { return *spare_signs_[p]; }
+  SpareOrder& spare_order(size_t p) { return *spare_orders_[p]; }
   const SourceRecord& source(size_t t) const { return *sources_[t]; }
   size_t process_count() const { return processes_.size(); }
   /// What all of it takes.
@@ -228,6 +247,8 @@ class RunBoard {
   std::vector<ParamMail*> mail_;
   std::vector<CapacityRecord*> capacities_;
   std::vector<ProcessRecord*> processes_;
+  std::vector<SpareSign*> spare_signs_;
+  std::vector<SpareOrder*> spare_orders_;
   std::vector<SourceRecord*> sources_;
   std::vector<SourceFacts*> source_facts_;
   std::vector<KeptParam*> kept_;

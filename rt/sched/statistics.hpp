@@ -39,6 +39,7 @@ struct alignas(kCacheLine) TaskStatistics {
   std::atomic<uint64_t> completed{0}, skipped{0}, reused{0}, deadline_misses{0}, budget_overruns{0}, stale_inputs{0};
   std::atomic<uint64_t> new_inputs{0};  ///< jobs whose first input was new: distinct input stamps
   std::atomic<uint64_t> no_result{0};
+  std::atomic<uint64_t> in_job{0};  ///< 1 + number of the job under way; 0: none. Stays where a job ended its process
   std::atomic<int64_t> enforcement_error_ns{0};  ///< most CPU time beyond its budget that a job had when it was demoted
   std::atomic<uint64_t> demoted{0};  ///< jobs that used up their budget and gave way to all others; by the watchdog
   std::atomic<uint64_t> lifted{0};   ///< jobs that went on beside a reservation that was used up; likewise
@@ -71,8 +72,12 @@ struct alignas(kCacheLine) EdgeStatistics {
   std::atomic<uint64_t> stale{0};
   uint64_t damaged = 0;  ///< messages that were lost since their own process had written over them
   uint64_t last_seen =
-      0;          ///< sequence of the newest message latched: whoever takes a dead reader's place goes on there
-  Histogram age;  ///< stamp to job start, of the newest latched message
+      0;  ///< sequence of the newest message latched: whoever takes a dead reader's place goes on there
+  std::atomic<uint64_t> in_hand{0};  ///< sequence of the newest message that the job under way has latched
+  /// Messages that no job latches: those of them ended its process twice. By the supervisor, while there is none.
+  std::atomic<uint64_t> pass_over_from{0}, pass_over_to{0};
+  std::atomic<uint64_t> passed_over{0};  ///< how many there were so far
+  Histogram age;                         ///< stamp to job start, of the newest latched message
   ProofBound age_bound;
 };
 

@@ -147,6 +147,7 @@ TAKT_HOT int64_t Task::begin(uint64_t index, int64_t release_ns, int64_t duratio
   calls_.job = index;
   calls_.warm = jobs_run_++ < kWarmUpJobs;
   const JobScope scope(calls_);
+  statistics_.in_job.store(index + 1, std::memory_order_relaxed);
   ended_.stale = latch_.acquire(release_ns, started);
   ended_.new_input = first_input_ != nullptr && first_input_->is_new();
   ended_.level = quality_.level();
@@ -177,6 +178,7 @@ TAKT_HOT JobEnd Task::finish(int modelled_cpu) {
     end.finished_ns = clock_.now_ns();
     publish(end, ended_.release_ns + plan_.deadline_ns);
     latch_.release();
+    statistics_.in_job.store(0, std::memory_order_relaxed);
   }
   if (calls_.heap_refused > 0) tell_refused_memory();
   ended_.cpu = modelled_ ? modelled_cpu : sched_getcpu();

@@ -4,8 +4,10 @@
 #include <dirent.h>
 
 #include <array>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <functional>
 #include <memory>
 #include <optional>
 
@@ -13,20 +15,39 @@
 #include "rt/thread_state.hpp"
 
 namespace takt {
+namespace {
+
+void for_each_thread(pid_t process, const std::function<void(int)>& look) {
+  std::array<char, 32> folder{};
+  std::snprintf(folder.data(), folder.size(), "/proc/%d/task", process);
+  const std::unique_ptr<DIR, int (*)(DIR*)> threads(opendir(folder.data()), closedir);
+  while (const dirent* entry = threads ? readdir(threads.get()) : nullptr)
+    if (const int thread = std::atoi(entry->d_name); thread > 0) look(thread);
+}
+
+}  // namespace
 
 bool is_ending(pid_t process) {
   const std::optional<ThreadState> told = thread_state(process);
   return told && told->ending();
 }
 
+std::optional<int> signal_of_dead(pid_t process) {
+  const std::optional<ThreadState> first = thread_state(process);
+  if (!first || !first->ending_by_signal()) return std::nullopt;
+  bool all = true;
+  for_each_thread(process, [&](int thread) {
+    const std::optional<ThreadState> told = thread_state(thread);
+    all = all && (!told || told->ending());
+  });
+  if (!all) return std::nullopt;
+  return (first->status & 0x7f) != 0 ? first->status & 0x7f : SIGKILL;
+}
+
 size_t hasten_end(pid_t process) {
   if (!is_ending(process)) return 0;
-  std::array<char, 32> folder{};
-  std::snprintf(folder.data(), folder.size(), "/proc/%d/task", process);
-  const std::unique_ptr<DIR, int (*)(DIR*)> threads(opendir(folder.data()), closedir);
   size_t let_go = 0;
-  while (const dirent* entry = threads ? readdir(threads.get()) : nullptr)
-    if (const int thread = std::atoi(entry->d_name); thread > 0) let_go += take_from_reservation(thread);
+  for_each_thread(process, [&](int thread) { let_go += take_from_reservation(thread); });
   return let_go;
 }
 

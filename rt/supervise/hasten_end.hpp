@@ -3,11 +3,16 @@
 #include <sys/types.h>
 
 #include <cstddef>
+#include <optional>
 
 namespace takt {
 
 /// Whether a process is ending: its first thread has ended, or is about to, whatever the others do.
 bool is_ending(pid_t process);
+/// The signal that ends a process, once none of its threads will run any more of its program: what it shares with
+/// others is as it left it, long before the kernel has cleared it up and waitpid(2) answers. SIGKILL where the kernel
+/// does not tell this process; nothing for one that lives, or ends by itself.
+std::optional<int> signal_of_dead(pid_t process);
 
 /// Lets a process that is ending go at once. Its last thread clears up the memory of all of them, which takes 10 to 50
 /// ms of CPU time; if that one has a small reservation under SCHED_DEADLINE, it waits for a period after each bit of

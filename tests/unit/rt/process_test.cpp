@@ -225,3 +225,80 @@ TEST_CASE("both lost at once: no restart, which is told, and nobody waits for ev
   CHECK(group.lost_nurseries() == 2);
   CHECK_FALSE(group.restart(0));
 }
+
+TEST_CASE("a spare takes the place of a process that has ended, once, and waits until then") {
+  RunBoard board(plan_of_two(), 1);
+  Bell waits;
+  ProcessGroup group;
+  group.start(
+      "phoenix", [] { return 7; },
+      [&] {
+        if (!waits.ring()) return 1;
+        while (board.spare_order(0).takes_over.load() != getpid()) std::this_thread::yield();
+        return 9;
+      });
+  group.prepare_restarts();
+  CHECK_FALSE(group.take_over(0));  // there is none
+  REQUIRE(group.start_spare(0));
+  CHECK_FALSE(group.start_spare(0));
+  const pid_t spare = group.spare(0);
+  CHECK(group.alive() == 2);
+  CHECK(wait_for_end(group).code == 7);
+  REQUIRE(waits.wait());
+  REQUIRE(group.take_over(0));
+  CHECK(group.pid(0) == spare);
+  CHECK(group.spare(0) == 0);
+  CHECK_FALSE(group.restart(0));  // it lives
+  board.spare_order(0).takes_over.store(spare);
+  const ProcessGroup::End end = wait_for_end(group);
+  CHECK(end.of == ProcessGroup::End::member);
+  CHECK(end.code == 9);
+  CHECK(group.alive() == 0);
+}
+
+TEST_CASE("a spare that dies is told as one, and the process may have another; one without a body has none") {
+  ProcessGroup group;
+  const auto endless = [] {
+    for (;;) pause();
+    return 0;
+  };
+  group.start("one", endless, endless);
+  group.start("other", endless);
+  CHECK_FALSE(group.start_spare(0));  // nobody can fork it yet
+  group.prepare_restarts();
+  CHECK_FALSE(group.start_spare(1));
+  REQUIRE(group.start_spare(0));
+  const pid_t first = group.spare(0);
+  group.end_spare(0);
+  const ProcessGroup::End end = wait_for_end(group);
+  CHECK(end.of == ProcessGroup::End::spare);
+  CHECK(end.process == 0);
+  CHECK(end.signal == SIGKILL);
+  CHECK(group.pid(0) > 0);
+  REQUIRE(group.start_spare(0));
+  CHECK(group.spare(0) != first);
+}
+
+TEST_CASE("the place of a dead process is free before the kernel has cleared it up, and it is told again then") {
+  ProcessGroup group;
+  group.start("one", [] {
+    for (;;) pause();
+    return 0;
+  });
+  CHECK_FALSE(group.early_end(0));  // it lives
+  const pid_t pid = group.pid(0);
+  kill(pid, SIGBUS);
+  siginfo_t ended;  // waited for, but left for the group to reap
+  while (waitid(P_PID, static_cast<id_t>(pid), &ended, WEXITED | WNOWAIT) != 0) REQUIRE(errno == EINTR);
+  const auto early = group.early_end(0);
+  REQUIRE(early);
+  CHECK(early->signal == SIGBUS);
+  CHECK(early->pid == pid);
+  CHECK(group.pid(0) == 0);
+  CHECK(group.alive() == 1);
+  CHECK_FALSE(group.early_end(0));  // once
+  const ProcessGroup::End end = wait_for_end(group);
+  CHECK(end.of == ProcessGroup::End::cleared);
+  CHECK(end.pid == pid);
+  CHECK(group.alive() == 0);
+}

@@ -20,9 +20,18 @@ using namespace takt;
 using test::Idle, test::kMs;
 constexpr int64_t kBegin = 1000 * kMs;
 
-/// Two processes with a task each, of which the first is of high criticality.
+/// Reads, and does nothing.
+struct Reading final : Node {
+  Input<Odometry> in{this, "in", ""};
+  Output<Odometry> out{this, "out", ""};
+  void setup(Setup&) override {}
+  void run(Job&) override {}
+};
+
+/// Two processes with a task each, of which the first is of high criticality and reads the other one's output.
 struct SupervisorScene {
-  Idle first, second;
+  Reading first;
+  Idle second;
   Plan plan;
   VirtualClock clock{kBegin};
   ProcessGroup group;
@@ -32,24 +41,27 @@ struct SupervisorScene {
   std::vector<std::string> said;
   std::vector<pid_t> cleaned;
 
-  explicit SupervisorScene(const RestartPolicy::Limits& limits = {}) {
+  explicit SupervisorScene(const RestartPolicy::Limits& limits = {}, bool spares = false) {
     test::add_task(plan, first, "first", 0);
     test::add_task(plan, second, "second", 0);
+    plan.tasks[0].edges.push_back({0, 1, 1, 0});
     plan.tasks[0].criticality = Criticality::high;
     plan.modes = {{"full", {1, 1}}, {"safe_stop", {1, 0}}};
     plan.safe_stop = 1;
     board = std::make_unique<RunBoard>(plan, 2);
-    for (const char* name : {"one", "two"})
-      group.start(name, [] {
-        for (;;) pause();
-        return 0;
-      });
+    const auto endless = [] {
+      for (;;) pause();
+      return 0;
+    };
+    for (const char* name : {"one", "two"}) group.start(name, endless, endless);
     group.prepare_restarts();
     transport = make_local_transport(plan.ports);
     Supervisor::Options options;
     options.restarts = limits;
     options.silence_ns = 1000 * kMs;
     options.start_patience_ns = 5000 * kMs;
+    options.spares = {spares, false};
+    options.spare_delay_ns = 200 * kMs;
     options.clean_up = [this](pid_t pid) { cleaned.push_back(pid); };
     options.say = [this](const std::string& what) { said.push_back(what); };
     supervisor = std::make_unique<Supervisor>(plan, *board, group, *transport, clock,
@@ -65,12 +77,27 @@ struct SupervisorScene {
     while (waitid(P_PID, static_cast<id_t>(pid), &ended, WEXITED | WNOWAIT) != 0) REQUIRE(errno == EINTR);
     supervisor->look();
   }
-  void kill_one() {
+  void kill_one(int signal = SIGKILL) {
     const pid_t pid = group.pid(0);
     REQUIRE(pid > 0);
-    kill(pid, SIGKILL);
+    kill(pid, signal);
     bury(pid);
   }
+  /// The first process ends in a job that has messages `from` to `to` in hand, none of which a job before had.
+  void crash_on(uint64_t from, uint64_t to, int signal = SIGBUS) {
+    board->task(0).in_job.store(7);
+    board->edge(0, 0).last_seen = from - 1;
+    board->edge(0, 0).in_hand.store(to);
+    kill_one(signal);
+    CHECK(board->task(0).in_job.load() == 0);
+  }
+  /// It is back at that instant.
+  void back_at(int64_t ms) {
+    board->process(0).reach(ProcessRecord::running, kBegin + ms * kMs);
+    board->task(0).job_count.fetch_add(1);
+    to(ms);
+  }
+  EdgeStatistics& edge() { return board->edge(0, 0); }
   /// The first process is at work again, and has run a job.
   void come_back() {
     board->process(0).state.store(ProcessRecord::running);
@@ -250,4 +277,106 @@ TEST_CASE("a full log of outages keeps those that last apart, and the newest of 
   CHECK(all[1].from_ns == 3);  // the oldest two that were over made room
   CHECK(all[all.size() - 2].process == 1);
   CHECK(all.back().process == 2);
+}
+
+TEST_CASE("a spare is forked once the run is up, takes over at once where it is ready, and another one follows") {
+  SupervisorScene scene({}, true);
+  scene.to(100);
+  CHECK(scene.group.spare(0) == 0);
+  scene.to(200);
+  const pid_t spare = scene.group.spare(0);
+  REQUIRE(spare > 0);
+  CHECK(scene.group.spare(1) == 0);
+  scene.board->spare(0).ready.store(spare);
+  scene.to(300);
+  CHECK(scene.supervisor->spare_use(0).ready);
+  CHECK(scene.supervisor->spare_use(0).ready_within_ns == 100 * kMs);
+  scene.to(1000);  // a process that ends so soon would have to wait without a spare
+  scene.kill_one();
+  CHECK(scene.group.pid(0) == spare);
+  CHECK(scene.board->spare_order(0).takes_over.load() == spare);
+  REQUIRE(scene.board->outages().size() == 1);
+  CHECK(scene.outage().by_spare);
+  CHECK(scene.board->process(0).restarts.load() == 1);
+  scene.to(1100);
+  CHECK(scene.group.spare(0) == 0);  // not before it is back
+  scene.back_at(1200);
+  scene.to(1300);
+  CHECK(scene.group.spare(0) == 0);
+  scene.to(1400);
+  CHECK(scene.group.spare(0) > 0);
+  CHECK(scene.board->spare_order(0).takes_over.load() == 0);
+  CHECK(scene.supervisor->spare_use(0).takeovers == 1);
+  CHECK(scene.supervisor->spare_use(0).lost == 0);
+}
+
+TEST_CASE("without a ready spare a process comes back the ordinary way, which is counted") {
+  SupervisorScene scene({}, true);
+  scene.to(20'000);
+  const pid_t spare = scene.group.spare(0);
+  REQUIRE(spare > 0);
+  scene.kill_one();
+  CHECK(scene.group.pid(0) > 0);
+  CHECK(scene.group.pid(0) != spare);
+  CHECK_FALSE(scene.outage().by_spare);
+  CHECK(scene.supervisor->spare_use(0).not_ready == 1);
+  CHECK(scene.supervisor->spare_use(0).takeovers == 0);
+}
+
+TEST_CASE("a spare that dies is replaced and counted, one that does not become ready in time is ended") {
+  SupervisorScene scene({}, true);
+  scene.to(200);
+  const pid_t first = scene.group.spare(0);
+  REQUIRE(first > 0);
+  kill(first, SIGKILL);
+  scene.bury(first);
+  CHECK(scene.board->outages().size() == 0);
+  CHECK(scene.supervisor->spare_use(0).lost == 1);
+  CHECK(scene.told("the spare of process one was ended by signal 9"));
+  scene.to(201);
+  const pid_t second = scene.group.spare(0);
+  REQUIRE(second > 0);
+  CHECK(second != first);
+  scene.clock.advance_to(kBegin + 100'000 * kMs);
+  scene.supervisor->look();
+  scene.bury(second);
+  CHECK(scene.supervisor->spare_use(0).lost == 2);
+}
+
+TEST_CASE("a message on which a process ends twice within a second is passed over; the next one is a safe stop") {
+  SupervisorScene scene;
+  scene.to(20'000);
+  scene.crash_on(5, 6);
+  CHECK(scene.edge().pass_over_to.load() == 0);
+  scene.back_at(20'100);
+  int64_t second_ms = 21'000;
+  SUBCASE("later than that it is by chance") { second_ms = 21'200; }
+  SUBCASE("on another message it is by chance") { scene.edge().last_seen = 6; }
+  SUBCASE("a kill says nothing of a message") {
+    scene.to(second_ms);
+    scene.crash_on(5, 5, SIGKILL);
+    CHECK(scene.edge().passed_over.load() == 0);
+    return;
+  }
+  SUBCASE("once more") {
+    scene.to(second_ms);
+    scene.crash_on(5, 5);
+    CHECK(scene.edge().pass_over_from.load() == 5);
+    CHECK(scene.edge().pass_over_to.load() == 5);
+    CHECK(scene.edge().passed_over.load() == 1);
+    REQUIRE(scene.board->faults().size() == 1);
+    CHECK(std::string(scene.board->faults().at(0)->what.text()) ==
+          "first.in: process one ended twice on message 5 of second., which it does not get again");
+    CHECK(scene.board->modes().newest() == 0);
+    scene.to(21'100);
+    scene.back_at(21'200);
+    scene.crash_on(5, 6);
+    CHECK(scene.board->modes().newest() == 1);
+    CHECK(scene.edge().passed_over.load() == 1);
+    return;
+  }
+  scene.to(second_ms);
+  scene.crash_on(scene.edge().last_seen + 1, 7);
+  CHECK(scene.edge().passed_over.load() == 0);
+  CHECK(scene.board->modes().newest() == 0);
 }
