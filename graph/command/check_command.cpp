@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "graph/command/check_command.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cstdio>
 
 #include "graph/check/check.hpp"
 #include "graph/check/grantable.hpp"
+#include "graph/compose/spares.hpp"
 #include "graph/run/prepare.hpp"
 #include "graph/run/support.hpp"
 #include "hal/drivers.hpp"
@@ -24,6 +27,18 @@ int check_graph(const RunOptions& options, bool json) {
     const std::optional<DeadlineBandwidth> bandwidth = deadline_bandwidth();
     result.text += graph::grantable_text(bandwidth);
     result.json["grantable"] = graph::grantable_json(bandwidth);
+  }
+  if (prepared.graph->isolation == "subsystem") {
+    std::vector<std::string> adjusted;
+    const graph::Partition partition = graph::partition(*prepared.graph, adjusted);
+    const std::vector<graph::SpareChoice> spares = graph::spares(*prepared.graph, partition, adjusted);
+    for (const std::string& line : adjusted) std::fprintf(stderr, "takt: adjusted: %s\n", line.c_str());
+    result.json["spares"] = nlohmann::ordered_json::array();
+    for (size_t p = 0; p < spares.size(); ++p) {
+      if (spares[p].wanted) result.text += fmt::format("spare of process {}: {}\n", partition.names[p], spares[p].why);
+      result.json["spares"].push_back(
+          {{"process", partition.names[p]}, {"spare", spares[p].wanted}, {"why", spares[p].why}});
+    }
   }
   std::fputs(json ? (result.json.dump(2) + "\n").c_str() : result.text.c_str(), stdout);
   if (result.verdict == graph::Verdict::invalid) return kBadInput;

@@ -75,6 +75,9 @@ std::vector<SpareChoice> spares(const GraphSpec& graph, const Partition& partiti
   for (size_t p = 0; p < choices.size(); ++p) {
     const std::optional<bool> asked = asked_for(graph, partition, p);
     if (asked) choices[p] = {*asked, "the graph says so"};
+    else if (!choices[p].wanted)
+      choices[p].why = fmt::format("no chain to a node of high criticality needs it back within {:.0f} ms",
+                                   static_cast<double>(kReturn_ns) * 1e-6);
     const auto device = std::find_if(graph.devices.begin(), graph.devices.end(),
                                      [&](const DeviceSpec& d) { return partition.process_of.at(d.id) == p; });
     if (device == graph.devices.end()) continue;

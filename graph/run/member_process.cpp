@@ -2,6 +2,7 @@
 #include "graph/run/member_process.hpp"
 
 #include <linux/futex.h>
+#include <sys/prctl.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 
@@ -153,6 +154,7 @@ int run_member(const MemberPart& part) {
   });
   if (part.spare) {
     wait_for_turn(board, part.process, plan.policy);
+    prctl(PR_SET_NAME, part.partition.names[part.process].substr(0, 15).c_str());
     take_place();
     record.reach(ProcessRecord::composed, prepared.clock->now_ns());
   }

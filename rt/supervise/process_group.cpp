@@ -84,7 +84,8 @@ void ProcessGroup::prepare_restarts() {
   nursery_ = std::make_unique<Nursery>([this, supervisor = getpid()](size_t child) {
     die_with(supervisor);
     const Member& member = members_[child % members_.size()];
-    return run_member(member.name, child < members_.size() ? member.body : member.spare_body);
+    if (child < members_.size()) return run_member(member.name, member.body);
+    return run_member(member.name.substr(0, 9) + "-spare", member.spare_body);
   });
 }
 

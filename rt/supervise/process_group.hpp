@@ -47,7 +47,7 @@ class ProcessGroup {
   /// there can be no more processes now.
   bool restart(size_t process);
   /// Forks a process that is to take the place of that one when it dies, and runs its `spare` until then and from then
-  /// on. One at a time for each process. False if there can be none now.
+  /// on. The kernel knows it as NAME-spare. One at a time for each process. False if there can be none now.
   bool start_spare(size_t process);
   /// The process that waits in vain so far; 0: there is none.
   pid_t spare(size_t process) const { return members_[process].spare; }

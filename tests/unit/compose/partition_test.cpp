@@ -3,6 +3,8 @@
 
 #include <doctest/doctest.h>
 
+#include "graph/compose/spares.hpp"
+
 namespace {
 
 using namespace takt;
@@ -48,4 +50,57 @@ TEST_CASE("a chain of such nodes ends up in one process") {
   std::vector<std::string> adjusted;
   CHECK(partition(graph, adjusted).names == std::vector<std::string>{"devices"});
   CHECK(adjusted.size() == 2);
+}
+
+namespace {
+
+/// camera -> stereo -> ego_motion (depth), stereo -> picture (view), with a chain to each end.
+GraphSpec graph_with_chains(int64_t ego_motion_ns, int64_t picture_ns) {
+  GraphSpec graph = graph_of_three();
+  const auto reads = [&](size_t node, const char* from, const char* port) {
+    EdgeSpec edge;
+    edge.from = {from, port};
+    graph.nodes[node].edges.push_back(edge);
+  };
+  reads(0, "camera", "pair");
+  reads(1, "stereo", "disparity");
+  reads(2, "stereo", "disparity");
+  graph.subsystems = {{"depth", {}, {}}, {"view", {}, {}}};
+  graph.schedule.entries["ego_motion"].criticality = Criticality::high;
+  graph.chains.push_back({"motion", {"camera", "pair"}, {"ego_motion", "motion"}, ego_motion_ns, {}});
+  graph.chains.push_back({"show", {"camera", "pair"}, {"picture", "picture"}, picture_ns, {}});
+  return graph;
+}
+
+std::vector<bool> wanted(const GraphSpec& graph, std::vector<std::string>& adjusted) {
+  std::vector<bool> all;
+  for (const SpareChoice& choice : spares(graph, partition(graph, adjusted), adjusted)) all.push_back(choice.wanted);
+  return all;
+}
+
+}  // namespace
+
+TEST_CASE(
+    "a spare by default: on a chain to a node of high criticality that cannot wait for a return, without a device") {
+  std::vector<std::string> adjusted;
+  CHECK(wanted(graph_with_chains(kReturn_ns - 1, kReturn_ns), adjusted) == std::vector<bool>{false, true, false});
+  CHECK(wanted(graph_with_chains(kReturn_ns, kReturn_ns), adjusted) == std::vector<bool>{false, false, false});
+  CHECK(wanted(graph_with_chains(kReturn_ns, 1), adjusted) == std::vector<bool>{false, false, false});  // low
+  CHECK(adjusted.empty());
+  const GraphSpec graph = graph_with_chains(200'000'000, kReturn_ns);
+  CHECK(spares(graph, partition(graph, adjusted), adjusted)[1].why.find("chain motion allows 200 ms") == 0);
+}
+
+TEST_CASE("the graph has the last word on spares, but for a process with a device") {
+  std::vector<std::string> adjusted;
+  GraphSpec graph = graph_with_chains(200'000'000, kReturn_ns);
+  graph.subsystems[0].spare = false;
+  graph.subsystems[1].spare = true;
+  CHECK(wanted(graph, adjusted) == std::vector<bool>{false, false, true});
+  CHECK(adjusted.empty());
+  graph.subsystems[0].spare = true;
+  graph.schedule.entries["stereo"].on = PortName{"camera", "pair"};  // in the process of the camera
+  CHECK(wanted(graph, adjusted) == std::vector<bool>{false, true});
+  REQUIRE(adjusted.size() == 2);
+  CHECK(adjusted[1] == "spare of process devices -> none: it owns device camera, which cannot be opened twice");
 }

@@ -150,6 +150,17 @@ TEST_CASE("Joins name inputs that are there and connected") {
   expect_graph("join: [pair, disparity]", "join: [pair]", "[pair]", {"at least two"});
 }
 
+TEST_CASE("A subsystem has a spare or has none") {
+  expect_graph("exports: [ego_motion.motion]", "spare: maybe\n    exports: [ego_motion.motion]", "maybe",
+               {"`spare` of subsystem `depth` is `maybe`", "wanted: true or false"});
+  const Loaded loaded =
+      Files(with(kGraph, "exports: [ego_motion.motion]", "spare: true\n    exports: [ego_motion.motion]")).load();
+  INFO(all(loaded));
+  REQUIRE(loaded.graph);
+  CHECK(loaded.graph->subsystems[0].spare == true);
+  CHECK_FALSE(loaded.graph->subsystems[1].spare);
+}
+
 TEST_CASE("Unconnected required inputs") {
   expect_graph("in: {motion: ego_motion.motion}", "params: {}", "planner: {type",
                {"input `motion` of node `planner` is not connected", "these give: ego_motion.motion"});
