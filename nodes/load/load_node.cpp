@@ -48,9 +48,19 @@ class LoadNode final : public Node {
     const bool long_one = (job.index() + 1) % static_cast<uint64_t>(every_()) == 0;
     const double share = levels()[static_cast<size_t>(job.level())].cost;
     load::burn(nanoseconds(share * (work_() + (long_one ? extra_() : 0))));
+    if (crash_from_() > 0 && poisoned()) std::abort();
     if (sleep_() > 0) sleep_for(nanoseconds(sleep_()));
     if (!trouble_.due(job.release_ns(), nanoseconds(stuck_every_()))) return;
     load::burn(stuck_for_() > 0 ? nanoseconds(stuck_for_()) : std::numeric_limits<int64_t>::max() / 2);
+  }
+
+  /// The newest message of another load says a number that its process is to end at.
+  bool poisoned() const {
+    if (input_.empty()) return false;
+    const Array<char>& text = input_.newest()->text;
+    int64_t number = 0;
+    std::from_chars(text.data(), text.data() + text.size, number);
+    return number >= crash_from_() && number <= crash_to_();
   }
 
   /// Takes the block and writes to every page of it, as a leak or a careless copy would. It is kept.
@@ -86,6 +96,11 @@ class LoadNode final : public Node {
   Param<double> stuck_for_{this, "stuck_for", 0.0, {0.0, 3600.0}, "s", "CPU time that it spins for; 0: for ever"};
   Param<int> allocate_{this, "allocate", 0, {0, 100'000}, "MB", "memory that one job takes, writes to and keeps"};
   Param<int> allocate_at_{this, "allocate_at", 0, {0, 1'000'000'000}, "1", "number of that job, from 0"};
+  Param<int> crash_from_{
+      this, "crash_from",
+      0,    {0, 1'000'000'000},
+      "1",  "first number in a message of `input` whose job ends the process by SIGABRT; 0: none does"};
+  Param<int> crash_to_{this, "crash_to", 0, {0, 1'000'000'000}, "1", "last of these numbers"};
   Param<int> message_size_{this, "message_size", 64, {20, 16'000'000}, "1", "capacity of the output, characters"};
   Param<bool> flood_{this, "flood", false, "", "fills each message up to the capacity and sends until it is refused"};
 
