@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "graph/command/check_command.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cstdio>
 
@@ -33,12 +31,10 @@ int check_graph(const RunOptions& options, bool json) {
     const graph::Partition partition = graph::partition(*prepared.graph, adjusted);
     const std::vector<graph::SpareChoice> spares = graph::spares(*prepared.graph, partition, adjusted);
     for (const std::string& line : adjusted) std::fprintf(stderr, "takt: adjusted: %s\n", line.c_str());
-    result.json["spares"] = nlohmann::ordered_json::array();
-    for (size_t p = 0; p < spares.size(); ++p) {
-      if (spares[p].wanted) result.text += fmt::format("spare of process {}: {}\n", partition.names[p], spares[p].why);
-      result.json["spares"].push_back(
-          {{"process", partition.names[p]}, {"spare", spares[p].wanted}, {"why", spares[p].why}});
-    }
+    const auto room =
+        graph::takeover_room(prepared.composition->plan, partition, this_machine().overheads.deadline_bandwidth);
+    result.text += graph::spares_text(partition, spares, room);
+    result.json["spares"] = graph::spares_json(partition, spares, room);
   }
   std::fputs(json ? (result.json.dump(2) + "\n").c_str() : result.text.c_str(), stdout);
   if (result.verdict == graph::Verdict::invalid) return kBadInput;

@@ -7,6 +7,9 @@
 #include <optional>
 #include <set>
 
+#include "rt/sched/lane.hpp"
+#include "rt/sched/lane_tasks.hpp"
+
 namespace takt::graph {
 namespace {
 
@@ -87,6 +90,51 @@ std::vector<SpareChoice> spares(const GraphSpec& graph, const Partition& partiti
     choices[p] = {false, fmt::format("it owns device {}", device->id)};
   }
   return choices;
+}
+
+std::vector<TakeoverRoom> takeover_room(const Plan& plan, const Partition& partition, double limit) {
+  if (plan.policy != Policy::deadline) return {};
+  std::vector<TakeoverRoom> room(partition.names.size());
+  const std::vector<std::vector<size_t>> lanes = lane_members(plan);
+  const std::vector<Reservation> wanted = reservations(plan, plan.policy);
+  double reserved = 0;
+  for (size_t i = 0; i < lanes.size(); ++i) {
+    const double share = static_cast<double>(wanted[i].runtime_ns) / static_cast<double>(wanted[i].period_ns);
+    room[partition.process_of.at(plan.tasks[lanes[i].front()].name)].needs += share;
+    reserved += share;
+  }
+  for (TakeoverRoom& of : room) of.free = std::max(0.0, limit - reserved);
+  return room;
+}
+
+std::string spares_text(const Partition& partition, const std::vector<SpareChoice>& choices,
+                        const std::vector<TakeoverRoom>& room) {
+  const auto told = [&](size_t p) {
+    return fmt::format("needs {:.3f} cores beside those of the dead, {:.3f} are free", room[p].needs, room[p].free);
+  };
+  std::string text;
+  size_t largest = choices.size();
+  for (size_t p = 0; p < choices.size(); ++p) {
+    if (choices[p].wanted)
+      text += fmt::format("spare of process {}: {}{}\n", partition.names[p], choices[p].why,
+                          room.empty() ? "" : "; its takeover " + told(p));
+    else if (!room.empty() && !room[p].fits() && (largest == choices.size() || room[p].needs > room[largest].needs))
+      largest = p;
+  }
+  if (largest < choices.size())
+    text += fmt::format("a return of process {} {}: its jobs run under SCHED_FIFO meanwhile\n",
+                        partition.names[largest], told(largest));
+  return text;
+}
+
+nlohmann::ordered_json spares_json(const Partition& partition, const std::vector<SpareChoice>& choices,
+                                   const std::vector<TakeoverRoom>& room) {
+  auto json = nlohmann::ordered_json::array();
+  for (size_t p = 0; p < choices.size(); ++p) {
+    json.push_back({{"process", partition.names[p]}, {"spare", choices[p].wanted}, {"why", choices[p].why}});
+    if (!room.empty()) json.back().update({{"needs_cores", room[p].needs}, {"free_cores", room[p].free}});
+  }
+  return json;
 }
 
 }  // namespace takt::graph

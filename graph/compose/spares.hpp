@@ -5,6 +5,8 @@
 
 #include "graph/compose/partition.hpp"
 #include "graph/language/graph.hpp"
+#include "hal/settings/json.hpp"
+#include "rt/sched/plan.hpp"
 
 namespace takt::graph {
 
@@ -21,5 +23,23 @@ inline constexpr int64_t kReturn_ns = 300'000'000;
 /// on a chain that ends in a node of high criticality and allows less than kReturn_ns. One that owns devices never has:
 /// they cannot be opened twice; where one was asked for, `adjusted` says so.
 std::vector<SpareChoice> spares(const GraphSpec& graph, const Partition& partition, std::vector<std::string>& adjusted);
+
+/// SCHED_DEADLINE bandwidth that the workers of a process ask for when it comes back, and what is free beside all that
+/// the plan reserves, in cores. The dead process holds its own for up to a period more. What is not free then does not
+/// keep the process away: its jobs run under SCHED_FIFO until the kernel grants it.
+struct TakeoverRoom {
+  double needs = 0, free = 0;
+  bool fits() const { return needs <= free; }
+};
+/// By process; empty under another policy than `deadline`. `limit`: cores that the kernel reserves in all.
+std::vector<TakeoverRoom> takeover_room(const Plan& plan, const Partition& partition, double limit);
+
+/// "spare of process robot: why; ..." a line for each process with a spare, and for the others the one with the largest
+/// need that is not free.
+std::string spares_text(const Partition& partition, const std::vector<SpareChoice>& choices,
+                        const std::vector<TakeoverRoom>& room);
+/// [{process, spare, why, needs_cores, free_cores}]; the last two under `deadline` only.
+nlohmann::ordered_json spares_json(const Partition& partition, const std::vector<SpareChoice>& choices,
+                                   const std::vector<TakeoverRoom>& room);
 
 }  // namespace takt::graph

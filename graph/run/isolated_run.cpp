@@ -423,7 +423,8 @@ class IsolatedRun {
     if (const size_t lost = group_.lost_nurseries(); lost > 0)
       problems_.push_back(fmt::format("the process that starts others again was lost {} times and replaced", lost));
     for (const std::string& problem : problems_) report["faults"].push_back({{"what", problem}});
-    add_spares(partition_.names, spares_, *supervisor_, report);
+    add_spares(partition_.names, spares_, graph::takeover_room(plan_, partition_, plan_.overheads.deadline_bandwidth),
+               *supervisor_, report);
     add_outages(board_.outages(), partition_.names, plan_, tasks_of(plan_, partition_), result, report);
     if (!problems_.empty() || board_.outages().size() > 0) report["ok"] = false;
     if (supervisor_->gave_up()) code_ = kDeviceOrSystem;

@@ -77,7 +77,7 @@ void add_outages(const OutageLog& log, const std::vector<std::string>& processes
 }
 
 void add_spares(const std::vector<std::string>& processes, const std::vector<graph::SpareChoice>& choices,
-                const Supervisor& supervisor, Json& report) {
+                const std::vector<graph::TakeoverRoom>& room, const Supervisor& supervisor, Json& report) {
   report["spares"] = Json::array();
   for (size_t p = 0; p < processes.size(); ++p) {
     const SpareUse use = supervisor.spare_use(p);
@@ -90,6 +90,7 @@ void add_spares(const std::vector<std::string>& processes, const std::vector<gra
                                 {"ready_within_s", static_cast<double>(use.ready_within_ns) / 1e9},
                                 {"memory_mb", use.memory_mb},
                                 {"cpu_s", static_cast<double>(use.cpu_ns) / 1e9}});
+    if (!room.empty()) report["spares"].back().update({{"needs_cores", room[p].needs}, {"free_cores", room[p].free}});
   }
 }
 

@@ -21,6 +21,7 @@ void add_outages(const OutageLog& log, const std::vector<std::string>& processes
                  nlohmann::ordered_json& report);
 /// ... and what the spares of processes cost and did.
 void add_spares(const std::vector<std::string>& processes, const std::vector<graph::SpareChoice>& choices,
-                const Supervisor& supervisor, nlohmann::ordered_json& report);
+                const std::vector<graph::TakeoverRoom>& room, const Supervisor& supervisor,
+                nlohmann::ordered_json& report);
 
 }  // namespace takt::command

@@ -104,3 +104,35 @@ TEST_CASE("the graph has the last word on spares, but for a process with a devic
   REQUIRE(adjusted.size() == 2);
   CHECK(adjusted[1] == "spare of process devices -> none: it owns device camera, which cannot be opened twice");
 }
+
+TEST_CASE("room for a takeover: what the process asks for once more, beside what all of them hold") {
+  const GraphSpec graph = graph_of_three();
+  std::vector<std::string> adjusted;
+  const Partition parts = partition(graph, adjusted);
+  Plan plan;
+  plan.policy = Policy::deadline;
+  plan.anticipate_ns = 0;
+  for (const char* name : {"camera", "stereo", "picture", "ego_motion"}) {
+    TaskPlan task;
+    task.name = name;
+    task.rate = Rate{10, 1};
+    task.budget_ns = 10'000'000;
+    task.deadline_ns = 50'000'000;
+    plan.tasks.push_back(task);
+  }
+  const std::vector<TakeoverRoom> room = takeover_room(plan, parts, 1.1);
+  REQUIRE(room.size() == 3);
+  CHECK(room[1].needs == doctest::Approx(0.4));  // two lanes of 10 ms in 50
+  CHECK(room[2].needs == doctest::Approx(0.2));
+  CHECK(room[2].free == doctest::Approx(0.3));
+  CHECK(room[2].fits());
+  CHECK_FALSE(room[1].fits());
+  CHECK(takeover_room(plan, parts, 0.5)[0].free == 0);
+  const std::string text = spares_text(parts, {{false, ""}, {false, ""}, {true, "so it is"}}, room);
+  CHECK(text ==
+        "spare of process view: so it is; its takeover needs 0.200 cores beside those of the dead, 0.300 are free\n"
+        "a return of process depth needs 0.400 cores beside those of the dead, 0.300 are free: its jobs run under "
+        "SCHED_FIFO meanwhile\n");
+  plan.policy = Policy::fixed;
+  CHECK(takeover_room(plan, parts, 1.1).empty());
+}
