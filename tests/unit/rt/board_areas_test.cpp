@@ -37,17 +37,21 @@ TEST_CASE("a process writes its own records and what all share; a store anywhere
       store();
     });
   };
-  const std::function<void()> of_first[] = {
-      [&] { board.task(0).completed.store(7); },  [&] { board.port(1).published.store(7); },
-      [&] { board.mail(0).param = 7; },           [&] { board.set_grant(0, {}); },
-      [&] { board.capacity(0).known.store(1); },  [&] { board.source_facts(0).known.store(true); },
-      [&] { board.process(0).restarts.store(7); }};
+  const std::function<void()> of_first[] = {[&] { board.task(0).completed.store(7); },
+                                            [&] { board.port(1).published.store(7); },
+                                            [&] { board.mail(0).param = 7; },
+                                            [&] { board.set_grant(0, {}); },
+                                            [&] { board.capacity(0).known.store(1); },
+                                            [&] { board.source_facts(0).known.store(true); },
+                                            [&] { board.process(0).restarts.store(7); },
+                                            [&] { board.spare(0).ready.store(7); }};
   const std::function<void()> of_second[] = {
       [&] { board.task(1).completed.store(7); }, [&] { board.edge(1, 0).received = 7; },
       [&] { board.port(2).published.store(7); }, [&] { board.process(1).restarts.store(7); }};
   const std::function<void()> of_supervisor[] = {
       [&] { board.epoch_ns().store(7); }, [&] { board.decision().store(RunBoard::as_asked); },
-      [&] { board.group().heartbeat_ns.store(7); }, [&] { board.dismissed().store(true); }};
+      [&] { board.group().heartbeat_ns.store(7); }, [&] { board.dismissed().store(true); },
+      [&] { board.spare_order(0).takes_over.store(7); }};
   const std::function<void()> of_all[] = {[&] { board.faults().append({}); }, [&] { board.commits(0).note_spoiled(); },
                                           [&] { board.overruns().append({}); }};
   const auto check = [&](std::span<const std::function<void()>> stores, bool first_may, bool second_may) {

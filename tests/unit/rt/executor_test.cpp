@@ -97,9 +97,9 @@ struct ExecutorBench {
     plan.ports[port].held += depth;
     PortAccess::connect(*plan.tasks[to].node->inputs()[input], {});
   }
-  RunResult run(int64_t duration_ns, const std::function<void(Executor&)>& look = {}) {
+  RunResult run(int64_t duration_ns, const std::function<void(Executor&)>& look = {}, RunBoard* board = nullptr) {
     const auto transport = make_local_transport(plan.ports);
-    Executor executor(plan, *transport, clock, {duration_ns, 0, false});
+    Executor executor(plan, *transport, clock, {duration_ns, 0, false, board});
     const RunResult result = executor.run();
     if (look) look(executor);
     return result;
@@ -197,6 +197,37 @@ TEST_CASE("a join latches the newest set with equal stamps, none is stale") {
     CHECK(sink.seen[k].b[0] == slow_index);
     CHECK(sink.seen[k].a[0] == 2 * slow_index);
   }
+}
+
+TEST_CASE("messages that are to be passed over are latched by no job, neither alone nor in a join") {
+  ExecutorBench bench;
+  IndexSource source;
+  NotingSink sink, joined;
+  const size_t from = bench.add(source, "source", Rate{10, 1}, 0, kMs);
+  const size_t to = bench.add(sink, "sink", Rate{10, 1}, 50 * kMs, kMs);
+  bench.edge(from, to, 0, 2);
+  const size_t both = bench.add(joined, "joined", Rate{10, 1}, 50 * kMs, kMs);
+  bench.edge(from, both, 0);
+  bench.edge(from, both, 1);
+  bench.plan.tasks[both].joins = {{0, 1}};
+  RunBoard board(bench.plan);
+  for (EdgeStatistics* edge : {&board.edge(to, 0), &board.edge(both, 1)}) {
+    edge->pass_over_from.store(4);  // the source's jobs 3 and 4
+    edge->pass_over_to.store(5);
+  }
+  bench.run(1000 * kMs, {}, &board);
+  REQUIRE(sink.seen.size() == 10);
+  CHECK(sink.seen[2].a == std::vector<double>{1, 2});
+  CHECK(sink.seen[3].a == std::vector<double>{2});
+  CHECK(sink.seen[4].a.empty());
+  CHECK(sink.seen[4].stale);
+  CHECK(sink.seen[5].a == std::vector<double>{5});
+  CHECK(sink.seen[6].a == std::vector<double>{5, 6});
+  REQUIRE(joined.seen.size() == 10);
+  for (const size_t k : {3, 4}) CHECK(joined.seen[k].a == std::vector<double>{2});  // the newest whole set
+  CHECK(joined.seen[5].a == std::vector<double>{5});
+  CHECK(board.edge(to, 0).in_hand.load() == 10);
+  CHECK(board.task(to).in_job.load() == 0);
 }
 
 TEST_CASE("an input older than max_age is stale but still seen") {

@@ -13,11 +13,13 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <optional>
 #include <string>
 #include <thread>
 #include <utility>
 
 #include "rt/sched/grant.hpp"
+#include "rt/thread_state.hpp"
 
 namespace {
 
@@ -115,6 +117,24 @@ TEST_CASE("threads without a reservation stay as they are") {
   CHECK(sched_getscheduler(process.told.thread) == before);
 }
 
+TEST_CASE(
+    "a process is dead once no thread of it will run its program again: not while one has yet to come to its end") {
+  const Process process(Policy::deadline);  // a used-up reservation keeps its second thread from that for a while
+  CHECK_FALSE(signal_of_dead(process.pid));
+  kill(process.pid, SIGUSR1);
+  std::optional<int> signal;
+  while (!(signal = signal_of_dead(process.pid))) std::this_thread::yield();
+  CHECK(*signal == SIGUSR1);
+  const std::optional<ThreadState> second = thread_state(process.told.thread);
+  CHECK((!second || second->ending()));
+}
+
+TEST_CASE("one that ends by itself is not dead before the kernel says so") {
+  const Process process(Policy::cooperative);
+  process.end_first_thread();
+  CHECK_FALSE(signal_of_dead(process.pid));
+}
+
 TEST_CASE("a process that is not there is not ending") {
   const pid_t gone = fork();
   REQUIRE(gone >= 0);
@@ -122,4 +142,5 @@ TEST_CASE("a process that is not there is not ending") {
   REQUIRE(waitpid(gone, nullptr, 0) == gone);
   CHECK_FALSE(is_ending(gone));
   CHECK(hasten_end(gone) == 0);
+  CHECK_FALSE(signal_of_dead(gone));
 }
