@@ -2,6 +2,7 @@
 #include "rt/capability.hpp"
 
 #include <linux/capability.h>
+#include <sched.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/syscall.h>
@@ -67,7 +68,11 @@ void keep_rights(Rights rights, bool memory_limited) {
 void without_rights(const std::function<void()>& work) {
   if (geteuid() == 0 || !has_any()) return work();
   std::exception_ptr problem;
+  const int policy = sched_getscheduler(0);
+  sched_param priority{};
+  sched_getparam(0, &priority);
   std::thread([&] {
+    if (priority.sched_priority > 0) sched_setscheduler(0, policy, &priority);
     keep_rights(Rights::none);
     try {
       work();

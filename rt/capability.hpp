@@ -34,7 +34,8 @@ bool locked_memory_is_limited();
 /// Nothing happens to root, nor where the kernel refuses; thread_rights() tells.
 void keep_rights(Rights rights, bool memory_limited = locked_memory_is_limited());
 
-/// Runs `work` without any rights; on a thread of its own if the calling one has some. Throws what `work` throws.
+/// Runs `work` without any rights; on a thread of its own, of the same priority, if the calling one has some. Throws what
+/// `work` throws.
 void without_rights(const std::function<void()>& work);
 
 /// What a thread could use of the capabilities (its permitted ones), bit by CAP_ number.

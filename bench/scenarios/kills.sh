@@ -199,9 +199,10 @@ with tempfile.TemporaryDirectory(prefix="kills-") as work:
         while not victims(run.pid) and run.poll() is None: time.sleep(0.01)  # all of them are being started again
         if run.poll() is not None: break
         name, pid = chance.choice(sorted(victims(run.pid)))
+        at = time.monotonic_ns()
         try: os.kill(pid, signal.SIGKILL)
         except ProcessLookupError: continue
-        struck.append((time.monotonic_ns(), name))
+        struck.append((at, name))
     time.sleep(max(0, last + 5 - time.monotonic()))
     late = open_things(run.pid) if run.poll() is None else []
     code = run.wait()

@@ -142,7 +142,7 @@ class IsolatedRun {
       group_.start(
           partition_.names[p], [body] { return body(false); }, [body] { return body(true); });
     }
-    group_.prepare_restarts();
+    group_.prepare_restarts(plan_.policy != Policy::cooperative);
     wait_for_all(ProcessRecord::composed);
     BoardExchange exchange(board_);
     graph::complete(plan_, exchange, observers(options_, graph_));
@@ -351,7 +351,9 @@ class IsolatedRun {
       give_up_ns = now + kPatienceNs;
       return false;
     };
+    const bool real_time = granted_ != Policy::cooperative && lift_thread(0, kSupervisorPriority);
     wait_until(ended, {}, std::chrono::milliseconds(5));
+    if (real_time) demote_thread(0);
   }
 
   /// Nobody is there any more: what is taken now, beyond what outputs keep in memory of our own, stays taken. Over

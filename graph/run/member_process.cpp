@@ -168,7 +168,10 @@ int run_member(const MemberPart& part) {
   run.gate = &gate;
   run.rejoin = record.restarts.load() > 0;
   run.gives_up_rights = true;
-  if (part.spare) run.let_go = [] { demote_thread(0); };
+  // On its way back it has a real-time priority, from the nursery or since it waited as a spare.
+  const bool at_work_later = plan.policy != Policy::cooperative && board.decision().load() == RunBoard::as_asked;
+  if (run.rejoin && at_work_later) run.let_go = [] { demote_thread(0); };
+  else if (run.rejoin) demote_thread(0);
   run.life = &record.life;
   run.own = owned(plan, part.partition, part.process);
   Executor executor(plan, *transport, *prepared.clock, run);

@@ -2,6 +2,7 @@
 #include "rt/supervise/hasten_end.hpp"
 
 #include <dirent.h>
+#include <sched.h>
 
 #include <array>
 #include <csignal>
@@ -25,6 +26,10 @@ void for_each_thread(pid_t process, const std::function<void(int)>& look) {
     if (const int thread = std::atoi(entry->d_name); thread > 0) look(thread);
 }
 
+bool is_ordinary(int thread) {
+  return (sched_getscheduler(thread) & ~SCHED_RESET_ON_FORK) == SCHED_OTHER && runnable(thread);
+}
+
 }  // namespace
 
 bool is_ending(pid_t process) {
@@ -45,9 +50,13 @@ std::optional<int> signal_of_dead(pid_t process) {
 }
 
 size_t hasten_end(pid_t process) {
-  if (!is_ending(process)) return 0;
+  const std::optional<ThreadState> first = thread_state(process);
+  if (!first || !first->ending()) return 0;
+  const bool killed = first->ending_by_signal();  // else another thread may go on with its program
   size_t let_go = 0;
-  for_each_thread(process, [&](int thread) { let_go += take_from_reservation(thread); });
+  for_each_thread(process, [&](int thread) {
+    let_go += take_from_reservation(thread) || (killed && is_ordinary(thread) && lift_thread(thread, kLowestPriority));
+  });
   return let_go;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "rt/supervise/nursery.hpp"
 
+#include <sched.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/socket.h>
@@ -88,7 +89,7 @@ void wait_for_adoption(pid_t in_between, pid_t maker) {
 
 }  // namespace
 
-Nursery::Nursery(Body body) : body_(std::move(body)), maker_(getpid()) {
+Nursery::Nursery(Body body, int priority) : body_(std::move(body)), priority_(priority), maker_(getpid()) {
   if (prctl(PR_SET_CHILD_SUBREAPER, 1) != 0) refuse("");
   void* memory =
       mmap(nullptr, sizeof(Order) * kOrders, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS | MAP_POPULATE, -1, 0);
@@ -125,6 +126,8 @@ Nursery::Hand Nursery::fork_first() {
 void Nursery::serve(int answers) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   prctl(PR_SET_NAME, "takt-nursery");
+  const sched_param real_time{priority_};
+  if (priority_ > 0) sched_setscheduler(0, SCHED_FIFO, &real_time);
   for (const int end : {SIGINT, SIGHUP, SIGTERM}) signal(end, SIG_IGN);  // as the processes that it forks
   for (Hand& hand : hands_)  // of the maker: whoever keeps them open keeps the other one waiting for an end
     if (std::exchange(hand.pid, 0) != 0) close(hand.socket);

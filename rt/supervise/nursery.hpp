@@ -14,8 +14,8 @@
 
 namespace takt {
 
-/// Processes that have no threads, made while their maker had none either, and fork for it whenever it asks: a fork of a
-/// process with threads is unsafe, since only the calling thread lives on, and a lock that another one had is never
+/// Processes that have no threads, made while their maker had none either, and fork for it whenever it asks: a fork of
+/// a process with threads is unsafe, since only the calling thread lives on, and a lock that another one had is never
 /// opened again. What they fork become children of the maker. One works, a spare waits: if the one dies, or does not
 /// answer in time, the spare takes its place and forks a new spare of itself. Made before the maker has threads; one
 /// thread at a time.
@@ -24,9 +24,9 @@ class Nursery {
   using Body = std::function<int(size_t child)>;
   static constexpr int64_t kPatience_ns = kSlowdown * 500'000'000LL;  ///< for an answer
 
-  /// `body` runs in the children, with what the maker's memory held when the nursery was made. Throws
-  /// std::runtime_error.
-  explicit Nursery(Body body);
+  /// `body` runs in the children, with what the maker's memory held when the nursery was made. `priority`: SCHED_FIFO
+  /// of the nursery, which the children begin with; 0, or without the right to it: none. Throws std::runtime_error.
+  explicit Nursery(Body body, int priority = 0);
   /// Ends it; its children stay.
   ~Nursery();
   Nursery(const Nursery&) = delete;
@@ -69,6 +69,7 @@ class Nursery {
   void let_spare_work();
 
   const Body body_;
+  const int priority_;
   const pid_t maker_;
   Order* orders_ = nullptr;
   size_t asked_ = 0, lost_ = 0;

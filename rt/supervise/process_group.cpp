@@ -76,17 +76,21 @@ void ProcessGroup::start(const std::string& name, const std::function<int()>& bo
     die_with(supervisor);
     run_member(name, body);
   }
-  members_.push_back({name, pid, body, spare, false, 0});
+  members_.push_back({name, pid, body, spare, 0});
 }
 
-void ProcessGroup::prepare_restarts() {
+void ProcessGroup::prepare_restarts(bool real_time) {
   std::fflush(nullptr);
-  nursery_ = std::make_unique<Nursery>([this, supervisor = getpid()](size_t child) {
+  const auto body = [this, real_time, supervisor = getpid()](size_t child) {
     die_with(supervisor);
     const Member& member = members_[child % members_.size()];
-    if (child < members_.size()) return run_member(member.name, member.body);
+    const bool spare = child >= members_.size();
+    if (real_time && spare) demote_thread(0);
+    if (real_time && !spare) lift_thread(0, kLowestPriority);
+    if (!spare) return run_member(member.name, member.body);
     return run_member(member.name.substr(0, 9) + "-spare", member.spare_body);
-  });
+  };
+  nursery_ = std::make_unique<Nursery>(body, real_time ? kSupervisorPriority : 0);
 }
 
 bool ProcessGroup::restart(size_t process) {
@@ -118,7 +122,6 @@ std::optional<ProcessGroup::End> ProcessGroup::early_end(size_t process) {
     return std::nullopt;
   }
   dead_.push_back({process, std::exchange(member.pid, 0)});
-  member.ending = false;
   return End{process, dead_.back().pid, -1, *signal};
 }
 
@@ -147,7 +150,6 @@ std::optional<ProcessGroup::End> ProcessGroup::reap() {
     if (auto end = reap(member.pid)) {
       end->process = i;
       member.pid = 0;
-      member.ending = false;
       return end;
     }
     if (auto end = reap(member.spare)) {
@@ -170,8 +172,7 @@ std::optional<ProcessGroup::End> ProcessGroup::reap() {
 
 void ProcessGroup::hasten_ends() {
   for (Member& member : members_) {
-    // Most end within one look; who does not waits for something.
-    if (member.pid > 0 && std::exchange(member.ending, is_ending(member.pid)) && member.ending) hasten_end(member.pid);
+    if (member.pid > 0) hasten_end(member.pid);
   }
   for (const Dead& dead : dead_) hasten_end(dead.pid);
 }

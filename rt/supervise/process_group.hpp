@@ -8,9 +8,13 @@
 #include <string>
 #include <vector>
 
+#include "rt/sched/grant.hpp"
 #include "rt/supervise/nursery.hpp"
 
 namespace takt {
+
+/// SCHED_FIFO priority of those who start others again: behind all lanes, and before whoever is on his way back.
+inline constexpr int kSupervisorPriority = kLowestPriority + 1;
 
 /// The processes of one run, children of the supervisor. Made before the supervisor has any thread, because only the
 /// calling thread survives a fork; restarted at any time. One thread at a time.
@@ -41,8 +45,11 @@ class ProcessGroup {
   /// Throws std::runtime_error if there can be no more processes. `spare`: what a spare of it runs, see start_spare();
   /// empty: it has none.
   void start(const std::string& name, const std::function<int()>& body, const std::function<int()>& spare = {});
-  /// After the last start and before the first thread: makes restart() possible. Throws std::runtime_error.
-  void prepare_restarts();
+  /// After the last start and before the first thread: makes restart() possible. `real_time`: at kSupervisorPriority,
+  /// and what is restarted comes back at kLowestPriority, before ordinary load; without the right to that as others.
+  /// Its first thread keeps that priority, those that it makes do not have it. Spares have none. Throws
+  /// std::runtime_error.
+  void prepare_restarts(bool real_time = false);
   /// Runs the body of an ended process again, with what this process's memory held at prepare_restarts(). False if
   /// there can be no more processes now.
   bool restart(size_t process);
@@ -78,7 +85,6 @@ class ProcessGroup {
     std::string name;
     pid_t pid = 0;
     std::function<int()> body, spare_body;
-    bool ending = false;  ///< as seen at the last look
     pid_t spare = 0;
   };
   /// One that is dead, and not cleared up yet.
