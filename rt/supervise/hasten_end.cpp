@@ -46,7 +46,9 @@ std::optional<int> signal_of_dead(pid_t process) {
     all = all && (!told || told->ending());
   });
   if (!all) return std::nullopt;
-  return (first->status & 0x7f) != 0 ? first->status & 0x7f : SIGKILL;
+  // The kernel looks at the status before it looks at the flags, so only a second answer is sure to have it.
+  const std::optional<ThreadState> again = thread_state(process);
+  return again && (again->status & 0x7f) != 0 ? again->status & 0x7f : SIGKILL;
 }
 
 size_t hasten_end(pid_t process) {
