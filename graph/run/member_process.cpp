@@ -32,7 +32,12 @@ class BoardGate final : public StartGate {
     record_.refused.store(!mine);
     record_.reach(ProcessRecord::agreed, clock_.now_ns());
     wait_until([&] { return board_.decision().load() != RunBoard::undecided; });
-    return board_.decision().load() == RunBoard::as_asked;
+    const bool as_asked = board_.decision().load() == RunBoard::as_asked;
+    // It only waits from here on, until the end of the run. When the process is killed, ordinary load must not keep
+    // this thread from ending: its place is not free before.
+    if (as_asked) lift_thread(0, kLowestPriority);
+    else demote_thread(0);
+    return as_asked;
   }
   int64_t epoch_ns() override {
     record_.reach(ProcessRecord::running, clock_.now_ns());
@@ -168,16 +173,14 @@ int run_member(const MemberPart& part) {
   run.gate = &gate;
   run.rejoin = record.restarts.load() > 0;
   run.gives_up_rights = true;
-  // On its way back it has a real-time priority, from the nursery or since it waited as a spare.
-  const bool at_work_later = plan.policy != Policy::cooperative && board.decision().load() == RunBoard::as_asked;
-  if (run.rejoin && at_work_later) run.let_go = [] { demote_thread(0); };
-  else if (run.rejoin) demote_thread(0);
   run.life = &record.life;
   run.own = owned(plan, part.partition, part.process);
   Executor executor(plan, *transport, *prepared.clock, run);
   record.reach(ProcessRecord::joined, prepared.clock->now_ns());
   const ProcessReading before = ProcessReading::now();
+  if (plan.policy == Policy::cooperative) demote_thread(0);  // one on its way back had a real-time priority
   const RunResult result = executor.run();
+  demote_thread(0);
   record.cpu_ns = ProcessReading::now().cpu_ns - before.cpu_ns;
   record.simulator_cpu_ns += hal::simulator_use().cpu_ns;
   record.simulator_in_jobs_ns += hal::simulator_use().in_jobs_ns;

@@ -2,6 +2,7 @@
 #include "rt/sched/executor.hpp"
 
 #include <pthread.h>
+#include <sched.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -29,6 +30,25 @@ void start_counting() {
   take_thread_use();
   take_page_faults();
 }
+
+/// While it lives, threads that this one makes begin at its priority, if that is a real-time one: else workers of a
+/// process on its way back would have to wait among ordinary threads until they can ask for their own.
+class PassesPriorityOn {
+ public:
+  PassesPriorityOn() : policy_(sched_getscheduler(0)) {
+    sched_getparam(0, &priority_);
+    if (priority_.sched_priority > 0) sched_setscheduler(0, policy_ & ~SCHED_RESET_ON_FORK, &priority_);
+  }
+  ~PassesPriorityOn() {
+    if (priority_.sched_priority > 0) sched_setscheduler(0, policy_, &priority_);
+  }
+  PassesPriorityOn(const PassesPriorityOn&) = delete;
+  PassesPriorityOn& operator=(const PassesPriorityOn&) = delete;
+
+ private:
+  const int policy_;
+  sched_param priority_{};
+};
 
 void name_thread(const std::string& name) { pthread_setname_np(pthread_self(), name.substr(0, 15).c_str()); }
 
@@ -168,6 +188,7 @@ bool Executor::run_partitioned(Policy policy, RunResult& result) {
   // jobs are due.
   const int64_t patience_ns = options_.rejoin ? 0 : bandwidth_within_ns(wanted) + kBandwidthMargin_ns;
   for (size_t i = 0; i < lanes_.size(); ++i) {
+    const PassesPriorityOn at_once;
     crew_->workers.start([this, &crew = *crew_, &lane = *lanes_[i], mine = wanted[i], patience_ns, i] {
       name_thread(lane.head().plan().name);
       const trace::Thread traced(options_.trace, lane.head().plan().name);
@@ -207,7 +228,6 @@ bool Executor::run_partitioned(Policy policy, RunResult& result) {
     throw;
   }
   crew_->started.arrive_and_wait();
-  if (options_.let_go) options_.let_go();
   join(result);
   return crew_->go.load();
 }

@@ -61,8 +61,6 @@ class Executor {
     std::vector<bool> own = {};           ///< by task: this process runs it; empty: all
     bool rejoin = false;                  ///< a process before this one ran the same tasks, and died
     bool gives_up_rights = false;         ///< the thread that calls run() needs none once all are at work
-    /// Called by run() once the workers are let go; may be empty.
-    std::function<void()> let_go = {};
     LifeSigns* life = nullptr;  ///< of a process that somebody looks after, see Watchdog::Options
     /// A job that has not returned this long after its deadline hangs.
     int64_t hang_patience_ns = kSlowdown * 750'000'000LL;
