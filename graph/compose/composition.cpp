@@ -27,6 +27,22 @@ size_t index_of(const Ports& ports, std::string_view name) {
   return kNone;
 }
 
+std::unique_ptr<Node> make_node(const NodeSpec& spec, const NodeTypes& types) {
+  std::unique_ptr<Node> node = types.find(spec.type)->make();
+  for (ParamBase* param : node->params()) {
+    // Ranges were checked when the graph was loaded; a refusal here is a bug in the checker.
+    if (const auto it = spec.params.find(std::string(param->name())); it != spec.params.end())
+      if (!param->set(it->second.value)) std::abort();
+  }
+  return node;
+}
+
+void give_setup(Node& node, const TaskPlan& task, size_t t, const GraphSpec& graph, const Clock& clock,
+                const ComposeOptions& options) {
+  Setup setup{clock, graph.directory, options.output, options.seed + t, task.rate, task.offset_ns};
+  node.setup(setup);
+}
+
 class Composer {
  public:
   Composer(const GraphSpec& graph, const NodeTypes& types, const Clock& clock, const ComposeOptions& options)
@@ -93,15 +109,7 @@ class Composer {
   }
 
   void make_nodes() {
-    for (const NodeSpec& spec : graph_.nodes) {
-      std::unique_ptr<Node> node = types_.find(spec.type)->make();
-      for (ParamBase* param : node->params()) {
-        // Ranges were checked when the graph was loaded; a refusal here is a bug in the checker.
-        if (const auto it = spec.params.find(std::string(param->name())); it != spec.params.end())
-          if (!param->set(it->second.value)) std::abort();
-      }
-      add(spec.id, std::move(node), false, spec.position);
-    }
+    for (const NodeSpec& spec : graph_.nodes) add(spec.id, make_node(spec, types_), false, spec.position);
   }
 
   void add(const std::string& id, std::unique_ptr<Node> node, bool device, const Position& position) {
@@ -271,9 +279,8 @@ class Composer {
 
   bool call_setup(size_t t, ComposeError& error) {
     TaskPlan& task = result_.plan.tasks[t];
-    Setup setup{clock_, graph_.directory, options_.output, options_.seed + t, task.rate, task.offset_ns};
     try {
-      task.node->setup(setup);
+      give_setup(*task.node, task, t, graph_, clock_, options_);
       return true;
     } catch (const std::exception& problem) {
       error.problems.push_back({positions_[t], fmt::format("{}: {}", task.name, problem.what())});
@@ -295,6 +302,23 @@ class Composer {
 
 Composition outline(const GraphSpec& graph, const NodeTypes& types, const Clock& clock) {
   return Composer(graph, types, clock, {}).outline();
+}
+
+std::unique_ptr<Node> make_again(const GraphSpec& graph, const NodeTypes& types, const Clock& clock,
+                                 const ComposeOptions& options, const Plan& plan, size_t t) {
+  const TaskPlan& task = plan.tasks[t];
+  const auto spec =
+      std::find_if(graph.nodes.begin(), graph.nodes.end(), [&](const NodeSpec& node) { return node.id == task.name; });
+  if (spec == graph.nodes.end()) throw SetupError(task.name + " is no node of the graph");
+  std::unique_ptr<Node> node = make_node(*spec, types);
+  for (size_t i = 0; i < node->outputs().size(); ++i)
+    if (task.node->outputs()[i]->connected()) PortAccess::mark_read(*node->outputs()[i]);
+  for (size_t i = 0; i < node->inputs().size(); ++i)
+    if (const InputPort& before = *task.node->inputs()[i]; before.connected())
+      PortAccess::connect(*node->inputs()[i], before.capacity());
+  give_setup(*node, task, t, graph, clock, options);
+  for (ParamBase* param : node->params()) param->end_setup();
+  return node;
 }
 
 void complete(Plan& plan, FactExchange& exchange, const Observers& observers) {

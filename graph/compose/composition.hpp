@@ -54,6 +54,11 @@ tl::expected<Composition, ComposeError> compose(const GraphSpec& graph, const No
                                                 const DeviceFactory& make_device, const Clock& clock,
                                                 const ComposeOptions& options);
 
+/// The node of a task once more, set up as compose() had done it: what a process that was started again has. `options`
+/// as compose() was given; the plan's node is read, and stays as it is. Throws SetupError.
+std::unique_ptr<Node> make_again(const GraphSpec& graph, const NodeTypes& types, const Clock& clock,
+                                 const ComposeOptions& options, const Plan& plan, size_t task);
+
 /// The plan as far as it is known before any node is set up: tasks, edges, ports without capacities.
 Composition outline(const GraphSpec& graph, const NodeTypes& types, const Clock& clock);
 

@@ -17,8 +17,11 @@
 namespace takt::log {
 namespace {
 
+using record::ModeChange;
+using record::RecordedEvent;
 using record::RecordedJob;
 using record::Recorder;
+using record::Restart;
 
 /// Which jobs and messages stay.
 class Selection {
@@ -35,14 +38,35 @@ class Selection {
     }
     for (const RecordedJob& job : log.jobs())
       for_each_published(job, [&](const Place& message) { makers_[message] = &job; });
+    for (const RecordedEvent& event : log.events()) {
+      if (std::holds_alternative<Restart>(event.what)) restarts_[event.task].push_back(&event);
+      if (event.at_ns >= from_ns && event.at_ns < to_ns && !std::holds_alternative<Restart>(event.what))
+        events_.insert(&event);
+    }
+    keep_mode_before(from_ns);
     std::vector<const RecordedJob*> open;
     for (const RecordedJob& job : log.jobs())
       if (job.release_ns >= from_ns && job.release_ns < to_ns) open.push_back(&job);
     while (!open.empty()) {
       const RecordedJob& job = *open.back();
       open.pop_back();
-      if (jobs_.insert({job.task, job.index}).second) keep(job, open);
+      if (!jobs_.insert({job.task, job.index}).second) continue;
+      keep(job, open);
+      if (const RecordedEvent* restart = last_restart(job)) keep(*restart, open);
+      if (const RecordedEvent* restart = job.cut_off ? restart_after(job) : nullptr) keep(*restart, open);
     }
+  }
+
+  bool keeps(const RecordedEvent& event) const {
+    return std::any_of(events_.begin(), events_.end(), [&](const RecordedEvent* kept) { return *kept == event; });
+  }
+  /// What its node went on from.
+  const RecordedEvent* last_restart(const RecordedJob& job) const {
+    const RecordedEvent* last = nullptr;
+    if (const auto mine = restarts_.find(job.task); mine != restarts_.end())
+      for (const RecordedEvent* event : mine->second)
+        if (event->at_ns <= job.start_ns && (last == nullptr || event->at_ns > last->at_ns)) last = event;
+    return last;
   }
 
   bool keeps(const RecordedJob& job) const { return jobs_.contains({job.task, job.index}); }
@@ -50,6 +74,23 @@ class Selection {
 
  private:
   using Place = std::pair<uint16_t, uint64_t>;  ///< channel and sequence
+  /// Which says what came out of it.
+  const RecordedEvent* restart_after(const RecordedJob& job) const {
+    const RecordedEvent* next = nullptr;
+    if (const auto mine = restarts_.find(job.task); mine != restarts_.end())
+      for (const RecordedEvent* event : mine->second)
+        if (event->at_ns > job.start_ns && (next == nullptr || event->at_ns < next->at_ns)) next = event;
+    return next;
+  }
+  /// The state at the begin of the cut.
+  void keep_mode_before(int64_t from_ns) {
+    const RecordedEvent* last = nullptr;
+    for (const RecordedEvent& event : log_.events())
+      if (std::holds_alternative<ModeChange>(event.what) && event.at_ns < from_ns &&
+          (last == nullptr || event.at_ns >= last->at_ns))
+        last = &event;
+    if (last != nullptr) events_.insert(last);
+  }
   struct Channels {
     std::vector<uint16_t> edges, outputs;
   };
@@ -72,37 +113,52 @@ class Selection {
   /// What the job held and published stays; `open` gets the jobs that must make what is there by hash only.
   void keep(const RecordedJob& job, std::vector<const RecordedJob*>& open) {
     for_each_published(job, [&](const Place& message) { messages_.insert(message); });
-    for_each_held(job, [&](const Place& message) {
-      messages_.insert(message);
-      const auto known = log_.messages(message.first).find(message.second);
-      const bool whole = known != log_.messages(message.first).end() && known->second.whole;
-      const auto maker = makers_.find(message);
-      if (!whole && maker != makers_.end()) open.push_back(maker->second);
-    });
+    for_each_held(job, [&](const Place& message) { need(message, open); });
+  }
+
+  /// What the restarted node was handed over stays.
+  void keep(const RecordedEvent& restart, std::vector<const RecordedJob*>& open) {
+    if (!events_.insert(&restart).second || restart.task >= channels_.size()) return;
+    const std::vector<uint16_t>& outputs = channels_[restart.task].outputs;
+    for (const Restart::Output& output : std::get<Restart>(restart.what).outputs)
+      if (output.output < outputs.size() && output.handed_over > 0)
+        need(Place{outputs[output.output], output.handed_over}, open);
+  }
+
+  void need(const Place& message, std::vector<const RecordedJob*>& open) {
+    messages_.insert(message);
+    const auto known = log_.messages(message.first).find(message.second);
+    const bool whole = known != log_.messages(message.first).end() && known->second.whole;
+    const auto maker = makers_.find(message);
+    if (!whole && maker != makers_.end()) open.push_back(maker->second);
   }
 
   const record::LogFile& log_;
   std::vector<Channels> channels_;  ///< by task
   std::map<Place, const RecordedJob*> makers_;
+  std::map<uint16_t, std::vector<const RecordedEvent*>> restarts_;  ///< by task
+  std::set<const RecordedEvent*> events_;
   std::set<Place> messages_;
   std::set<std::pair<uint16_t, uint32_t>> jobs_;  ///< task and index
 };
 
-/// Parameters that jobs left out had set, for the next job of the node that stays.
+/// Parameters that jobs left out had set, for the next job of the node that stays. A restart forgets them.
 class Carried {
  public:
   void add(const RecordedJob& left_out) {
-    for (const RecordedJob::Param& param : left_out.params) set_[left_out.task][param.param] = param.value;
+    for (const RecordedJob::Param& param : left_out.params)
+      set_[left_out.task][param.param] = {left_out.start_ns, param.value};
   }
-  void give(RecordedJob& next) {
+  void give(RecordedJob& next, const RecordedEvent* last_restart) {
     std::vector<RecordedJob::Param> params;
-    for (const auto& [param, value] : set_[next.task]) params.push_back({param, value});
+    for (const auto& [param, set] : set_[next.task])
+      if (last_restart == nullptr || set.first >= last_restart->at_ns) params.push_back({param, set.second});
     next.params.insert(next.params.begin(), params.begin(), params.end());
     set_[next.task].clear();
   }
 
  private:
-  std::map<uint16_t, std::map<uint16_t, ParamValue>> set_;  ///< by task and parameter
+  std::map<uint16_t, std::map<uint16_t, std::pair<int64_t, ParamValue>>> set_;  ///< by task and parameter, when
 };
 
 /// Schemas and channels under the ids that they have: the Recorder counts them from 1, as the Writer does.
@@ -144,20 +200,23 @@ tl::expected<Cut, std::string> cut_log(const record::LogFile& log, int64_t from_
 
   Cut cut;
   Carried carried;
-  const uint16_t jobs_channel = log.channel(Recorder::kJobs);
+  const uint16_t jobs_channel = log.channel(Recorder::kJobs), events_channel = log.channel(Recorder::kEvents);
   std::vector<std::byte> packed;
   const auto walked = log.container().for_each([&](const mcap::Message& message) {
     if (message.channel == jobs_channel) {
-      auto job = record::unpack_job(message.data);
+      auto job = record::unpack_job(message.data, log.format());
       if (!job) return true;
       if (!selection.keeps(*job)) return carried.add(*job), true;
-      carried.give(*job);
+      carried.give(*job, selection.last_restart(*job));
       packed.clear();
-      record::pack(*job, packed);
+      record::pack(*job, packed, log.format());
       mcap::Message kept = message;
       kept.data = packed;
       note(file.write(kept));
       ++cut.jobs;
+    } else if (events_channel != 0 && message.channel == events_channel) {
+      const auto event = record::unpack_event(message.data);
+      if (event && selection.keeps(*event)) note(file.write(message)), ++cut.events;
     } else if (const auto held = record::unpack_message(message.data);
                held && selection.keeps(message.channel, held->sequence)) {
       note(file.write(message));

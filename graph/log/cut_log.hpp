@@ -10,12 +10,14 @@
 namespace takt::log {
 
 struct Cut {
-  uint64_t jobs = 0, messages = 0, bytes = 0;  ///< written
+  uint64_t jobs = 0, messages = 0, events = 0, bytes = 0;  ///< written
 };
 
 /// Writes the part of a record that its jobs released in [from_ns, to_ns) need: these jobs, the messages that they held
 /// or published, earlier jobs that made what they held where the record has it by hash only, all that the head says,
-/// and with the next job of a node the parameters that jobs left out had set. Nodes that remember what was left out
+/// and with the next job of a node the parameters that jobs left out had set. Of the events: those of that time, the
+/// last restart of a node before each of its jobs with the messages that it was handed over, the mode at the begin.
+/// Nodes that remember what was left out
 /// make other messages when the cut is replayed. Error: the file takes no more, or part of the record is damaged.
 tl::expected<Cut, std::string> cut_log(const record::LogFile& log, int64_t from_ns, int64_t to_ns, mcap::Sink& sink);
 

@@ -22,6 +22,7 @@
 #include "rt/msg/pose.hpp"
 #include "rt/msg/text_status.hpp"
 #include "rt/record/mcap/writer.hpp"
+#include "rt/record/recorder.hpp"
 
 namespace takt::log {
 namespace {
@@ -163,14 +164,18 @@ Json odometry(const Origin& from, const void* message) {
   return pose_in(from, "odometry", t);
 }
 
-Json text(const Origin& from, const void* message) {
-  const auto& m = *static_cast<const TextStatus*>(message);
-  return {{"timestamp", time_json(from.stamp_ns)},
+Json log_json(int64_t at_ns, const std::string& name, const std::string& text) {
+  return {{"timestamp", time_json(at_ns)},
           {"level", 2},  // INFO
-          {"message", std::string(m.text.data(), m.text.size)},
-          {"name", from.node},
+          {"message", text},
+          {"name", name},
           {"file", ""},
           {"line", 0}};
+}
+
+Json text(const Origin& from, const void* message) {
+  const auto& m = *static_cast<const TextStatus*>(message);
+  return log_json(from.stamp_ns, from.node, std::string(m.text.data(), m.text.size));
 }
 
 Json transform(const Origin& from, const Transform& t) {
@@ -249,6 +254,7 @@ class Export {
       const MessageType* type = type_named(plan["ports"][p].value("type", ""));
       if (type != nullptr) export_port(plan["ports"][p].value("name", ""), *type, capacity_of(plan, p));
     }
+    export_events(plan);
     keep(file_.finish());
     if (!refused_.empty()) return tl::make_unexpected(refused_);
     result_.bytes = file_.written_bytes();
@@ -273,10 +279,25 @@ class Export {
     }
   }
 
+  void export_events(const Json& plan) {
+    for (size_t i = 0; i < log_.events().size(); ++i) {
+      const record::RecordedEvent& event = log_.events()[i];
+      const Json json = log_json(event.at_ns, event_node(event, plan), event_text(event, plan));
+      record::MessageRecord at;
+      at.sequence = i;
+      at.stamp_ns = at.published_ns = event.at_ns;
+      write("foxglove.Log", record::Recorder::kEvents, at, json);
+    }
+  }
+
   void write(const Form& form, const std::string& port, const record::MessageRecord& message, const Json& json) {
-    const std::string topic = form.topic.starts_with("/") ? form.topic : port + form.topic;
+    write(form.schema, form.topic.starts_with("/") ? form.topic : port + form.topic, message, json);
+  }
+
+  void write(const std::string& schema_name, const std::string& topic, const record::MessageRecord& message,
+             const Json& json) {
     auto [channel, added] = channels_.try_emplace(topic, uint16_t{0});
-    if (added) channel->second = file_.add_channel(schema(form.schema, json), topic, "json", {});
+    if (added) channel->second = file_.add_channel(schema(schema_name, json), topic, "json", {});
     const std::string text = json.dump();
     keep(file_.write({channel->second, static_cast<uint32_t>(message.sequence),
                       static_cast<uint64_t>(message.published_ns), static_cast<uint64_t>(message.stamp_ns),

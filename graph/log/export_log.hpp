@@ -17,7 +17,8 @@ struct Exported {
 
 /// Writes what the record holds with all fields as MCAP with messages in JSON that other programs show: images, clouds,
 /// scans, grids, poses and texts in Foxglove's well-known schemas (a pair as `NODE.PORT.left` and `.right`, where a
-/// sensor sits on the robot as a transform on `/tf`), everything else by its own fields. Stamps are those of the data.
+/// sensor sits on the robot as a transform on `/tf`), everything else by its own fields. Events are foxglove.Log on
+/// `takt/events`. Stamps are those of the data.
 /// Error: the file takes no more, or the record does not hold its plan.
 tl::expected<Exported, std::string> export_log(record::LogFile& log, mcap::Sink& sink);
 

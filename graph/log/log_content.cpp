@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <map>
 
 #include "rt/record/recorder.hpp"
 
@@ -25,7 +26,7 @@ uint64_t count(const mcap::Metadata& facts, const char* name) {
 std::vector<mcap::Channel> port_channels(const LogFile& log) {
   std::vector<mcap::Channel> channels;
   for (const mcap::Channel& channel : log.container().channels())
-    if (channel.topic != Recorder::kJobs) channels.push_back(channel);
+    if (channel.topic != Recorder::kJobs && channel.topic != Recorder::kEvents) channels.push_back(channel);
   std::sort(channels.begin(), channels.end(),
             [](const mcap::Channel& a, const mcap::Channel& b) { return a.topic < b.topic; });
   return channels;
@@ -56,7 +57,7 @@ double span_s(const LogFile& log) {
 }
 
 struct NodeFigures {
-  uint64_t jobs = 0, late = 0, degraded = 0;
+  uint64_t jobs = 0, late = 0, degraded = 0, cut_off = 0, restarts = 0;
   std::vector<int64_t> exec_ns, age_ns;
 };
 
@@ -81,6 +82,10 @@ std::vector<std::pair<std::string, NodeFigures>> figures(const LogFile& log) {
   for (const RecordedJob& job : log.jobs()) {
     if (job.task >= all.size()) continue;
     NodeFigures& node = all[job.task].second;
+    if (job.cut_off) {
+      ++node.cut_off;
+      continue;
+    }
     ++node.jobs;
     node.late += job.late ? 1 : 0;
     node.degraded += job.level > 0 ? 1 : 0;
@@ -92,6 +97,8 @@ std::vector<std::pair<std::string, NodeFigures>> figures(const LogFile& log) {
       if (newest != messages.end()) node.age_ns.push_back(job.start_ns - newest->second.stamp_ns);
     }
   }
+  for (const record::RecordedEvent& event : log.events())
+    if (event.task < all.size()) all[event.task].second.restarts += std::holds_alternative<record::Restart>(event.what);
   return all;
 }
 
@@ -131,6 +138,27 @@ void compare_channel(LogFile& from, LogFile& to, const mcap::Channel& channel, L
     line += fmt::format(", {} only in the first, {} only in the second", a.size() - both, b.size() - both);
   if (different > 0) line += fmt::format("; first {}{}", first, where_they_part(from, to, channel, first));
   result.lines.push_back(line);
+}
+
+/// How often each kind of event happened, and the restarts one by one.
+std::map<std::string, uint64_t> event_counts(const LogFile& log) {
+  std::map<std::string, uint64_t> counts;
+  for (const record::RecordedEvent& event : log.events()) ++counts[record::name_of(event.kind)];
+  return counts;
+}
+
+/// Also where they are the same in number: what they say may differ.
+void compare_events(const LogFile& from, const LogFile& to, LogDifference& result) {
+  if (from.events() == to.events()) return;
+  result.same = false;
+  auto before = event_counts(from), after = event_counts(to);
+  for (const auto& [kind, count] : after) before.try_emplace(kind, 0);
+  for (const auto& [kind, count] : before)
+    if (count != after[kind]) result.lines.push_back(fmt::format("events: {} {} -> {}", kind, count, after[kind]));
+  const auto [x, y] = std::mismatch(from.events().begin(), from.events().end(), to.events().begin(), to.events().end());
+  const auto& first = x != from.events().end() ? *x : *y;
+  result.lines.push_back(fmt::format("events: the first that differs is number {} ({})", x - from.events().begin() + 1,
+                                     record::name_of(first.kind)));
 }
 
 void compare_jobs(const LogFile& from, const LogFile& to, LogDifference& result) {
@@ -176,7 +204,8 @@ std::string content_hash(const LogFile& log) {
       all.insert(all.end(), bytes.begin(), bytes.end());
     }
   }
-  for (const RecordedJob* job : sorted_jobs(log)) record::pack(*job, all);
+  for (const RecordedJob* job : sorted_jobs(log)) record::pack(*job, all, log.format());
+  for (const record::RecordedEvent& event : log.events()) record::pack(event, all);
   return fmt::format("{:016x}", record::hash_of(all));
 }
 
@@ -198,7 +227,12 @@ Json content_json(LogFile& log) {
   }
   Json nodes = Json::array();
   for (auto& [name, node] : figures(log))
-    nodes.push_back({{"name", name}, {"jobs", node.jobs}, {"late", node.late}, {"degraded", node.degraded}});
+    nodes.push_back({{"name", name},
+                     {"jobs", node.jobs},
+                     {"late", node.late},
+                     {"degraded", node.degraded},
+                     {"cut_off", node.cut_off},
+                     {"restarts", node.restarts}});
   Json lost;
   if (!end.empty())
     lost = {{"overwritten", count(end, "lost_overwritten")},
@@ -206,8 +240,10 @@ Json content_json(LogFile& log) {
             {"not_written", count(end, "lost_not_written")},
             {"jobs", count(end, "lost_jobs")},
             {"threads", count(end, "lost_threads")}};
-  return {{"facts", facts},    {"end", end},   {"duration_s", span_s(log)}, {"nodes", nodes},
-          {"ports", channels}, {"lost", lost}, {"damages", log.damages()},  {"hash", content_hash(log)}};
+  return {{"facts", facts},           {"end", end},        {"duration_s", span_s(log)},
+          {"nodes", nodes},           {"ports", channels}, {"events", event_counts(log)},
+          {"format", log.format()},   {"lost", lost},      {"damages", log.damages()},
+          {"hash", content_hash(log)}};
 }
 
 std::string content_text(const Json& content) {
@@ -223,10 +259,17 @@ std::string content_text(const Json& content) {
     text += fmt::format("{:<34}{:<24}{:>9}{:>9}{:>10.1f}  {}\n", port["port"].get<std::string>(),
                         port["type"].get<std::string>(), port["messages"].get<uint64_t>(),
                         port["missing"].get<uint64_t>(), port["mb"].get<double>(), port["fields"].get<std::string>());
-  text += fmt::format("\n{:<34}{:>9}{:>9}{:>10}\n", "node", "jobs", "late", "degraded");
+  text +=
+      fmt::format("\n{:<34}{:>9}{:>9}{:>10}{:>9}{:>10}\n", "node", "jobs", "late", "degraded", "cut off", "restarts");
   for (const Json& node : content["nodes"])
-    text += fmt::format("{:<34}{:>9}{:>9}{:>10}\n", node["name"].get<std::string>(), node["jobs"].get<uint64_t>(),
-                        node["late"].get<uint64_t>(), node["degraded"].get<uint64_t>());
+    text += fmt::format("{:<34}{:>9}{:>9}{:>10}{:>9}{:>10}\n", node["name"].get<std::string>(),
+                        node["jobs"].get<uint64_t>(), node["late"].get<uint64_t>(), node["degraded"].get<uint64_t>(),
+                        node["cut_off"].get<uint64_t>(), node["restarts"].get<uint64_t>());
+  if (content["format"] == 1) text += "\nformat 1: restarts and other events are not in it\n";
+  std::string events;
+  for (const auto& [kind, number] : content["events"].items())
+    events += fmt::format("{}{} {}", events.empty() ? "\nevents: " : ", ", number.get<uint64_t>(), kind);
+  if (!events.empty()) text += events + "\n";
   const Json& lost = content["lost"];
   if (lost.is_null()) text += "\nthe record has no end: what it lost is not known\n";
   else
@@ -242,6 +285,7 @@ std::string content_text(const Json& content) {
 LogDifference difference(LogFile& from, LogFile& to) {
   LogDifference result;
   compare_jobs(from, to, result);
+  compare_events(from, to, result);
   for (const mcap::Channel& channel : port_channels(from)) {
     if (to.channel(channel.topic) != 0) {
       compare_channel(from, to, channel, result);

@@ -40,6 +40,20 @@ std::string folder_hash(const std::filesystem::path& folder) {
   return hash_text(all);
 }
 
+std::string value_text(const ParamValue& value) {
+  if (const auto* flag = std::get_if<bool>(&value)) return *flag ? "true" : "false";
+  if (const auto* whole = std::get_if<int64_t>(&value)) return std::to_string(*whole);
+  if (const auto* real = std::get_if<double>(&value)) return fmt::format("{}", *real);
+  return std::get<std::string>(value);
+}
+
+/// The name of element `index` of a list or an object of the plan; its number if there is none.
+std::string name_at(const Json& all, size_t index) {
+  if (index >= all.size()) return std::to_string(index);
+  if (all.is_object()) return std::next(all.items().begin(), static_cast<ptrdiff_t>(index)).key();
+  return all[index].is_string() ? all[index].get<std::string>() : all[index].value("name", "");
+}
+
 /// The task without what may differ.
 Json structure_of(Json task) {
   task.erase("params");
@@ -58,6 +72,23 @@ Json plan_json(const Plan& plan) {
          {"capacity", {port.capacity.width, port.capacity.height, port.capacity.channels, port.capacity.count}}});
   for (const ModePlan& mode : plan.modes) modes.push_back(mode.name);
   return {{"tasks", tasks}, {"ports", ports}, {"mode", plan.mode}, {"modes", modes}};
+}
+
+std::string event_node(const record::RecordedEvent& event, const Json& plan) {
+  return event.task == record::RecordedEvent::kNoTask ? "" : name_at(plan.value("tasks", Json::array()), event.task);
+}
+
+std::string event_text(const record::RecordedEvent& event, const Json& plan) {
+  if (std::holds_alternative<record::Restart>(event.what)) return fmt::format("restart before job {}", event.job);
+  if (const auto* set = std::get_if<record::ParameterSet>(&event.what)) {
+    const Json tasks = plan.value("tasks", Json::array());
+    const Json params = event.task < tasks.size() ? tasks[event.task].value("params", Json::object()) : Json::object();
+    return fmt::format("{} set to {}{}{}", name_at(params, set->param), value_text(set->value),
+                       set->who.empty() ? "" : " by ", set->who);
+  }
+  if (const auto* change = std::get_if<record::ModeChange>(&event.what))
+    return fmt::format("mode {}: {}", name_at(plan.value("modes", Json::array()), change->mode), change->reason);
+  return record::name_of(event.kind);
 }
 
 std::optional<std::string> structure_differs(const Json& recorded, const Json& plan) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "hal/settings/json.hpp"
+#include "rt/record/recorded_event.hpp"
 #include "rt/sched/plan.hpp"
 
 namespace takt::log {
@@ -26,6 +27,11 @@ std::vector<std::string> changed_params(const Json& recorded, const Json& plan);
 
 /// Capacity of port `index` in a recorded plan. Throws nlohmann's exception if the record does not say.
 Capacity capacity_of(const Json& recorded, size_t index);
+
+/// An event in words: "restart before job 26", "bias set to 0.25"; names are those of the plan, as far as it has them.
+std::string event_text(const record::RecordedEvent& event, const Json& plan);
+/// The node that it happened to; empty: none.
+std::string event_node(const record::RecordedEvent& event, const Json& plan);
 
 /// Hash of each file or folder that a parameter of the plan's nodes names (kPath), as hexadecimal digits, by the path
 /// as it stands there. A folder is all files below it, by name.

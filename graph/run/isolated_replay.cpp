@@ -23,9 +23,18 @@ std::string written(const ReplayResult& result) {
   json first;
   if (result.first)
     first = {result.first->node, result.first->port, result.first->job, result.first->release_ns, result.first->what};
-  return json{{"jobs", result.jobs},   {"messages", result.messages},         {"compared", result.compared},
-              {"whole", result.whole}, {"different", result.different},       {"lacking", result.lacking},
-              {"first", first},        {"different_of", result.different_of}, {"recorded_ns", result.recorded_ns}}
+  return json{{"jobs", result.jobs},
+              {"messages", result.messages},
+              {"compared", result.compared},
+              {"whole", result.whole},
+              {"different", result.different},
+              {"lacking", result.lacking},
+              {"restarts", result.restarts},
+              {"uncommitted", result.uncommitted},
+              {"unmade", result.unmade},
+              {"first", first},
+              {"different_of", result.different_of},
+              {"recorded_ns", result.recorded_ns}}
       .dump();
 }
 
@@ -36,6 +45,7 @@ ReplayResult parsed(const std::string& text) {
   result.jobs = part["jobs"], result.messages = part["messages"];
   result.compared = part["compared"], result.whole = part["whole"];
   result.different = part["different"], result.lacking = part["lacking"];
+  result.restarts = part["restarts"], result.uncommitted = part["uncommitted"], result.unmade = part["unmade"];
   if (const json& first = part["first"]; !first.is_null())
     result.first = {first[0], first[1], first[2], first[3], first[4]};
   part["different_of"].get_to(result.different_of);
@@ -47,6 +57,7 @@ void add(ReplayResult& sum, const ReplayResult& part) {
   sum.jobs += part.jobs, sum.messages += part.messages;
   sum.compared += part.compared, sum.whole += part.whole;
   sum.different += part.different, sum.lacking += part.lacking;
+  sum.restarts += part.restarts, sum.uncommitted += part.uncommitted, sum.unmade += part.unmade;
   if (part.first && (!sum.first || part.first->release_ns < sum.first->release_ns)) sum.first = part.first;
   sum.different_of.insert(part.different_of.begin(), part.different_of.end());
   sum.recorded_ns = std::max(sum.recorded_ns, part.recorded_ns);

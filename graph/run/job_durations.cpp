@@ -34,7 +34,7 @@ std::map<std::string, std::vector<int64_t>> recorded(const record::LogFile& log,
   std::map<std::string, const Node*> nodes;
   for (const TaskPlan& task : plan.tasks) nodes[task.name] = task.node;
   for (const record::RecordedJob& job : log.jobs()) {
-    if (job.task >= tasks.size()) continue;  // damaged
+    if (job.task >= tasks.size() || job.cut_off) continue;  // damaged; or nobody knows what it would have taken
     const std::string name = tasks[job.task].value("name", "");
     const auto node = nodes.find(name);
     if (node == nodes.end()) continue;

@@ -72,8 +72,7 @@ void RunRecord::begin(const graph::GraphSpec& graph, const Plan& plan, const Run
   if (make_disk_) disk_ = make_disk_(*file_);
   mcap::Sink& sink = disk_ ? *disk_ : *file_;
   record::Head head;
-  head.facts = {{"format", "1"},
-                {"graph", absolute(graph.file)},
+  head.facts = {{"graph", absolute(graph.file)},
                 {"schedule", absolute(graph.schedule.file)},
                 {"profile", graph.profile},
                 {"mode", options_.load.mode},
@@ -114,6 +113,7 @@ void RunRecord::tell(nlohmann::ordered_json& report) const {
   report["record"] = {{"file", options_.record.filename().string()},
                       {"messages", written_.messages},
                       {"jobs", written_.jobs},
+                      {"events", written_.events},
                       {"mb", static_cast<double>(written_.bytes) / 1e6},
                       {"lost",
                        {{"overwritten", written_.overwritten},

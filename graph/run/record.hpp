@@ -30,8 +30,8 @@ class RunRecord {
   /// What stands between recorder and file, made once that is open; null: nothing. Before begin().
   using Disk = std::function<std::unique_ptr<mcap::Sink>(mcap::Sink& file)>;
   void on_disk(Disk disk) { make_disk_ = std::move(disk); }
-  void take(int32_t thread, const trace::Event& event) {
-    if (recorder_) recorder_->take(thread, event);
+  void take(int32_t ring, const trace::Event& event) {
+    if (recorder_) recorder_->take(ring, event);
   }
   /// Virtual time: after every job.
   void capture() {

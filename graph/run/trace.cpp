@@ -51,8 +51,7 @@ void RunTrace::collect(const Plan& plan, RunRecord& record) {
   how.best = best_source(options_);
   how.by_caller = options_.clock == "virtual";
   if (options_.trace.empty()) how.records_kept = 0;
-  if (record.wanted())
-    how.listener = [&record](int32_t thread, const trace::Event& event) { record.take(thread, event); };
+  if (record.wanted()) how.listener = [&record](int32_t ring, const trace::Event& event) { record.take(ring, event); };
   collector_ = std::make_unique<trace::Collector>(*rings_, std::move(how));
 }
 

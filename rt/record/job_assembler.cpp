@@ -24,46 +24,112 @@ RecordedJob::Input& input_of(RecordedJob& job, const Event& event) {
 }  // namespace
 
 void JobAssembler::add(int32_t id, const Event& event) {
-  Thread& thread = threads_[id];
-  if (event.kind == Kind::param) return param(event);
-  if (event.kind == Kind::release) return open(thread, event);
-  const bool answers = event.kind == Kind::answer;
-  // What belongs to no job in hand: a skipped release, or the rest of a job whose beginning is lost.
-  if (!thread.open || (!answers && (event.task != thread.job.task || event.job != thread.job.index))) {
-    if (event.kind == Kind::publish && event.value == 0) {
-      thread.lost_before = static_cast<uint64_t>(event.extra);
-      ++incomplete_;
-    }
-    return;
+  Ring& ring = rings_[id];
+  switch (event.kind) {
+    case Kind::param: return param(event);
+    case Kind::release: return open(ring, event);
+    case Kind::handed:
+    case Kind::seen:
+    case Kind::restart: return restart(ring, event);
+    default: break;
   }
-  if (event.kind == Kind::publish && event.value == 0) return close(thread, event);
-  fill(thread.job, event);
-}
-
-void JobAssembler::open(Thread& thread, const Event& event) {
-  if (std::exchange(thread.open, true)) ++incomplete_;
-  thread.job = {};
-  thread.job.task = event.task;
-  thread.job.index = event.job;
-  thread.job.release_ns = event.at_ns;
-  thread.job.deadline_ns = event.value;
-  // A job that never ends, because its process dies, leaves them to the next one of the task.
-  if (const auto changed = params_.find(event.task); changed != params_.end()) thread.job.params = changed->second;
-}
-
-void JobAssembler::close(Thread& thread, const Event& event) {
-  thread.open = false;
-  thread.job.published_ns = event.at_ns;
-  const bool whole = std::exchange(thread.lost_before, static_cast<uint64_t>(event.extra)) == thread.lost_before;
-  if (!whole) {
+  const bool answers = event.kind == Kind::answer, ends = event.kind == Kind::publish && event.value == 0;
+  const auto found = ring.open.find(answers ? ring.at_work : event.task);
+  // What belongs to no job in hand: a skipped release, or the rest of a job whose beginning is lost.
+  if (found == ring.open.end() || (!answers && event.job != found->second.job.index)) {
+    if (!ends) return;
+    ring.lost = event.extra;
     ++incomplete_;
     return;
   }
-  take_(thread.job);
-  params_.erase(thread.job.task);
+  if (!ends) return fill(found->second, event);
+  close(ring, found->second, event);
+  ring.open.erase(found);
 }
 
-void JobAssembler::fill(RecordedJob& job, const Event& event) {
+void JobAssembler::end() {
+  for (auto& [id, ring] : rings_) {
+    for (const auto& [task, open] : ring.open) cut_off(open);
+    ring.open.clear();
+  }
+}
+
+void JobAssembler::open(Ring& ring, const Event& event) {
+  const auto [slot, fresh] = ring.open.try_emplace(event.task);
+  Open& open = slot->second;
+  // Its thread died, and another goes on with its ring; or its end is lost.
+  if (!fresh) {
+    open.whole = open.whole && open.lost == event.extra;
+    cut_off(open);
+    open = {};
+  }
+  // What was lost between two jobs may have been a parameter.
+  open.whole = std::exchange(ring.lost, event.extra) == event.extra;
+  open.lost = event.extra;
+  ring.at_work = event.task;
+  open.job.task = event.task;
+  open.job.index = event.job;
+  open.job.release_ns = event.at_ns;
+  open.job.deadline_ns = event.value;
+  for (Given& given : params_[event.task])
+    if (given.at_ns >= restarted_ns_[event.task]) open.job.params.push_back(std::move(given.param));
+  params_[event.task].clear();
+}
+
+void JobAssembler::close(Ring& ring, Open& open, const Event& event) {
+  ring.lost = event.extra;
+  open.job.published_ns = event.at_ns;
+  if (open.job.visible_at_ns == 0) open.job.visible_at_ns = event.at_ns;
+  if (open.whole && open.lost == event.extra) take_job_(open.job);
+  else ++incomplete_;
+}
+
+void JobAssembler::cut_off(const Open& open) {
+  if (!open.whole) {
+    ++incomplete_;
+    return;
+  }
+  RecordedJob job = open.job;
+  job.cut_off = true;
+  if (job.published_ns == 0) job.published_ns = job.finish_ns == 0 ? job.start_ns : job.finish_ns;
+  job.visible_at_ns = job.published_ns;
+  job.outputs = open.offered;
+  take_job_(job);
+}
+
+void JobAssembler::offer(Open& open, const Event& event) {
+  open.whole = open.whole && open.lost == event.extra >> 1;
+  open.job.finish_ns = event.at_ns;
+  // The last word counts: a message that came too late is taken back, and the one before it offered again.
+  std::erase_if(open.offered, [&](const RecordedJob::Output& before) { return before.output == event.port; });
+  open.offered.push_back({event.port, (event.extra & 1) != 0, static_cast<uint64_t>(event.value)});
+}
+
+void JobAssembler::restart(Ring& ring, const Event& event) {
+  Restart* under_way = std::get_if<Restart>(&ring.restart.what);
+  if (under_way == nullptr || ring.restart.task != event.task || ring.restart.job != event.job) {
+    ring.restart = {static_cast<uint16_t>(EventKind::restart), event.task, event.job, event.at_ns, Restart{}};
+    under_way = &std::get<Restart>(ring.restart.what);
+  }
+  const auto number = static_cast<uint64_t>(event.value);
+  if (event.kind == Kind::handed)
+    under_way->outputs.push_back({event.port, number, static_cast<uint64_t>(event.extra)});
+  if (event.kind == Kind::seen) under_way->seen.push_back({event.port, number});
+  if (event.kind != Kind::restart) return;
+  under_way->level = static_cast<int32_t>(event.value);
+  restarted_ns_[event.task] = event.at_ns;
+  if (const auto before = ring.open.find(event.task); before != ring.open.end()) {
+    before->second.whole = before->second.whole && before->second.lost == event.extra;
+    cut_off(before->second);
+    ring.open.erase(before);
+  }
+  if (std::exchange(ring.lost, event.extra) == event.extra) take_event_(ring.restart);
+  else ++incomplete_;
+  ring.restart = {};
+}
+
+void JobAssembler::fill(Open& open, const Event& event) {
+  RecordedJob& job = open.job;
   const auto number = static_cast<uint64_t>(event.value);
   switch (event.kind) {
     case Kind::start:
@@ -87,25 +153,31 @@ void JobAssembler::fill(RecordedJob& job, const Event& event) {
     case Kind::miss: job.late = true; break;
     case Kind::publish: job.outputs.push_back({event.port, false, number}); break;
     case Kind::repeat: job.outputs.push_back({event.port, true, number}); break;
+    case Kind::offer: return offer(open, event);
+    case Kind::visible: job.visible_at_ns = event.value; break;
     default: break;
   }
 }
 
 void JobAssembler::param(const Event& event) {
-  auto& params = params_[event.task];
-  Text& text = texts_[event.task];
-  if (std::exchange(text.at_ns, event.at_ns) != event.at_ns)
-    text.words.clear();  // its process died within the one before
   switch (static_cast<ParamMail::Kind>(event.extra)) {
-    case ParamMail::flag: params.push_back({event.port, event.value != 0}); return;
-    case ParamMail::integer: params.push_back({event.port, event.value}); return;
-    case ParamMail::number: params.push_back({event.port, std::bit_cast<double>(event.value)}); return;
+    case ParamMail::flag: return give(event, event.value != 0);
+    case ParamMail::integer: return give(event, event.value);
+    case ParamMail::number: return give(event, std::bit_cast<double>(event.value));
     case ParamMail::text: break;
   }
+  if (const std::pair of(event.task, event.at_ns); std::exchange(text_of_, of) != of)
+    text_.clear();  // whoever noted the rest of it died
   std::array<char, sizeof event.value + 1> piece{};
   std::memcpy(piece.data(), &event.value, sizeof event.value);
-  text.words += piece.data();
-  if (std::strlen(piece.data()) < sizeof event.value) params.push_back({event.port, std::exchange(text.words, {})});
+  text_ += piece.data();
+  if (std::strlen(piece.data()) < sizeof event.value) give(event, std::exchange(text_, {}));
+}
+
+void JobAssembler::give(const Event& event, ParamValue value) {
+  params_[event.task].push_back({event.at_ns, {event.port, value}});
+  take_event_({static_cast<uint16_t>(EventKind::parameter), event.task, event.job, event.at_ns,
+               ParameterSet{event.port, std::move(value), {}}});
 }
 
 }  // namespace takt::record

@@ -2,6 +2,7 @@
 #include "rt/record/log_file.hpp"
 
 #include <algorithm>
+#include <cstdlib>
 
 #include "rt/record/recorder.hpp"
 
@@ -16,7 +17,14 @@ tl::expected<LogFile, std::string> LogFile::open(const std::filesystem::path& fi
     if (named.name == Recorder::kEnd) log.end_ = named.map;
   }
   if (log.facts_.empty()) return tl::make_unexpected(file.string() + " is no record of takt run --record");
+  if (const auto format = log.facts_.find("format"); format != log.facts_.end())
+    log.format_ = std::atoi(format->second.c_str());
+  if (log.format_ < 1 || log.format_ > kFormat)
+    return tl::make_unexpected(file.string() + " is a record of format " + log.facts_["format"] +
+                               "; this program reads formats 1 to " + std::to_string(kFormat) +
+                               ". Use the version of Takt that recorded it (commit " + log.facts_["commit"] + ")");
   log.jobs_channel_ = log.channel(Recorder::kJobs);
+  log.events_channel_ = log.channel(Recorder::kEvents);
   log.index();
   return log;
 }
@@ -41,9 +49,15 @@ void LogFile::index() {
 
 void LogFile::index(const mcap::Message& message, Known known) {
   if (message.channel == jobs_channel_) {
-    auto job = unpack_job(message.data);
+    auto job = unpack_job(message.data, format_);
     if (job) jobs_.push_back(std::move(*job));
     else damages_.push_back("a job: " + job.error());
+    return;
+  }
+  if (events_channel_ != 0 && message.channel == events_channel_) {
+    auto event = unpack_event(message.data);
+    if (event) events_.push_back(std::move(*event));
+    else damages_.push_back("an event: " + event.error());
     return;
   }
   const auto record = unpack_message(message.data);

@@ -11,6 +11,7 @@
 
 #include "rt/record/mcap/reader.hpp"
 #include "rt/record/message_record.hpp"
+#include "rt/record/recorded_event.hpp"
 #include "rt/record/recorded_job.hpp"
 
 namespace takt::record {
@@ -18,18 +19,23 @@ namespace takt::record {
 /// A record that was opened: what the Recorder wrote, found by port and sequence. One thread at a time.
 class LogFile {
  public:
-  /// Error: not a record of Takt, or not readable. One that lacks its end is opened as far as it goes.
+  /// Error: not a record of Takt, of a later format, or not readable. One that lacks its end is opened as far as it
+  /// goes.
   static tl::expected<LogFile, std::string> open(const std::filesystem::path& file);
 
   const mcap::Reader& container() const { return container_; }
   /// What the head and the end of the record state; empty without an end.
   const mcap::Metadata& facts() const { return facts_; }
   const mcap::Metadata& end() const { return end_; }
+  /// 1 to kFormat. Format 1 has no events.
+  int format() const { return format_; }
   /// An attachment as text; nothing if there is none of that name.
   std::optional<std::string_view> attached(std::string_view name) const;
 
   /// In the order of the file.
   const std::vector<RecordedJob>& jobs() const { return jobs_; }
+  /// In the order of the file: those of a task are in the order of their instants.
+  const std::vector<RecordedEvent>& events() const { return events_; }
   /// Channel of "NODE.PORT"; 0 if the record has none.
   uint16_t channel(std::string_view port) const;
   /// A message that is there, without its fields.
@@ -55,8 +61,10 @@ class LogFile {
 
   mcap::Reader container_;
   mcap::Metadata facts_, end_;
-  uint16_t jobs_channel_ = 0;
+  int format_ = 1;
+  uint16_t jobs_channel_ = 0, events_channel_ = 0;
   std::vector<RecordedJob> jobs_;
+  std::vector<RecordedEvent> events_;
   std::map<uint16_t, std::map<uint64_t, Known>> messages_;  ///< by channel and sequence
   std::vector<std::string> damages_;
   static constexpr size_t kChunksKept = 48;

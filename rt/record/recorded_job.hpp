@@ -12,6 +12,9 @@
 
 namespace takt::record {
 
+/// The format that this program writes; it reads this one and those before it. README.md says what each has.
+inline constexpr int kFormat = 2;
+
 struct RecordedJob {
   /// Consecutive messages that an edge held, oldest first.
   struct Run {
@@ -47,6 +50,10 @@ struct RecordedJob {
   int32_t level = 0;
   uint32_t mode = 0;  ///< index into Plan::modes
   bool late = false;
+  int64_t visible_at_ns = 0;  ///< of what it published; 0 in format 1, which does not say
+  /// Its process ended during it. `outputs` are those that it was about to publish: which of them came out, the next
+  /// restart of the task says (Restart::Output::newest). Without an output nothing of it came out.
+  bool cut_off = false;
   std::vector<Param> params;  ///< changed just before this job
   std::vector<Input> inputs;  ///< only of edges that held something or were stale
   std::vector<Answer> answers;
@@ -55,9 +62,10 @@ struct RecordedJob {
 };
 
 /// Little-endian bytes, in the order of the members; a vector is its number of elements (u32) and the elements.
-void pack(const RecordedJob& job, std::vector<std::byte>& to);
+/// `visible_at_ns` and `cut_off` come last, and not in format 1.
+void pack(const RecordedJob& job, std::vector<std::byte>& to, int format = kFormat);
 /// Error: the bytes end too early or too late, or hold a value that there is not.
-tl::expected<RecordedJob, std::string> unpack_job(std::span<const std::byte> packed);
+tl::expected<RecordedJob, std::string> unpack_job(std::span<const std::byte> packed, int format = kFormat);
 
 /// How pack() lays a job out, for readers of a record.
 const char* job_layout();

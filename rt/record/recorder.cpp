@@ -27,13 +27,20 @@ Recorder::Recorder(const Plan& plan, const RunBoard& board, Transport& transport
       board_(board),
       file_(sink, options_.file),
       queue_(options_.queue_bytes),
-      jobs_([this](const RecordedJob& job) { take_job(job); }) {
+      jobs_([this](const RecordedJob& job) { take_job(job); },
+            [this](const RecordedEvent& event) { take_event(event); }) {
   note(file_.begin("", "takt"));
-  note(file_.metadata(kFacts, head.facts));
+  mcap::Metadata facts = head.facts;
+  facts["format"] = std::to_string(kFormat);
+  note(file_.metadata(kFacts, facts));
   for (const mcap::Attachment& attached : head.files) note(file_.attach(attached));
   add_channels(plan);
   for (size_t p = 0; p < plan.ports.size(); ++p) ports_[p].follower.emplace(transport.make_reader(p));
-  for (const TaskPlan& task : plan.tasks) ports_of_.push_back(task.ports);
+  for (const TaskPlan& task : plan.tasks) {
+    ports_of_.push_back(task.ports);
+    std::vector<size_t>& edges = edges_of_.emplace_back();
+    for (const EdgePlan& edge : task.edges) edges.push_back(edge.port);
+  }
   writing_ = std::thread([this] { write_on(); });
   if (!options_.by_caller) capturing_ = std::thread([this] { capture_on(); });
 }
@@ -44,6 +51,7 @@ Recorder::~Recorder() {
 
 void Recorder::add_channels(const Plan& plan) {
   jobs_channel_ = file_.add_channel(file_.add_schema("takt.Job", "text", job_layout()), kJobs, kEncoding, {});
+  events_channel_ = file_.add_channel(file_.add_schema("takt.Event", "text", event_layout()), kEvents, kEncoding, {});
   std::map<std::string_view, uint16_t> schemas;
   for (size_t p = 0; p < plan.ports.size(); ++p) {
     const PortPlan& port = plan.ports[p];
@@ -70,6 +78,18 @@ void Recorder::capture_on() {
 
 void Recorder::take_ports() {
   for (Port& port : ports_) take_port(port);
+  take_modes();
+}
+
+void Recorder::take_modes() {
+  const Modes& modes = board_.modes();
+  for (; modes_taken_ < modes.size(); ++modes_taken_) {
+    const ModeLog::Change* change = modes.change(modes_taken_);
+    if (change == nullptr) return;  // it is being written
+    if (modes.repeats(modes_taken_)) continue;
+    take_event({static_cast<uint16_t>(EventKind::mode), RecordedEvent::kNoTask, 0, change->from_ns,
+                ModeChange{change->mode, std::string(change->reason.text())}});
+  }
 }
 
 void Recorder::take_port(Port& port) {
@@ -84,14 +104,27 @@ void Recorder::take_port(Port& port) {
 void Recorder::take_job(const RecordedJob& job) {
   RecordedJob told = job;
   told.mode = board_.mode_at(job.release_ns);
-  for (const RecordedJob::Output& output : job.outputs) {
-    uint64_t& newest = ports_[ports_of_[job.task][output.output]].told;
-    newest = std::max(newest, output.sequence);
-  }
+  // What a job that was cut off offered need not have come out; whoever held it, tells.
+  for (const RecordedJob::Output& output : job.outputs)
+    if (!job.cut_off) tell(ports_of_[job.task][output.output], output.sequence);
+  for (const RecordedJob::Input& input : job.inputs)
+    if (!input.held.empty())
+      tell(edges_of_[job.task][input.edge], input.held.back().first + input.held.back().count - 1);
   std::vector<std::byte> data = queue_.buffer(job_bytes_);
   pack(told, data);
   job_bytes_ = data.size();
   push(jobs_channel_, job.index, job.published_ns, std::move(data));
+}
+
+void Recorder::tell(size_t port, uint64_t sequence) {
+  uint64_t& newest = ports_[port].told;
+  newest = std::max(newest, sequence);
+}
+
+void Recorder::take_event(const RecordedEvent& event) {
+  std::vector<std::byte> data;
+  pack(event, data);
+  push(events_channel_, event.job, event.at_ns, std::move(data));
 }
 
 void Recorder::push(uint16_t channel, uint64_t sequence, int64_t at_ns, std::vector<std::byte> data) {
@@ -128,7 +161,8 @@ void Recorder::take_rest() {
 
 RecordResult Recorder::finish(mcap::Metadata facts, uint64_t unheard_threads) {
   take_rest();
-  // What its writer took along.
+  jobs_.end();
+  // What its writer took along, or never settled before it died.
   for (const Port& port : ports_) {
     const uint64_t seen = port.follower->seen();
     result_.overwritten += std::max(port.told, seen) - seen;
@@ -140,9 +174,13 @@ RecordResult Recorder::finish(mcap::Metadata facts, uint64_t unheard_threads) {
   result_.unheard_threads = unheard_threads;
   result_.not_written = file_.lost();
   const auto& written = file_.statistics();
-  const auto jobs = written.channel_messages.find(jobs_channel_);
-  result_.jobs = jobs == written.channel_messages.end() ? 0 : jobs->second;
-  result_.messages = written.messages - result_.jobs;
+  const auto count = [&](uint16_t channel) {
+    const auto found = written.channel_messages.find(channel);
+    return found == written.channel_messages.end() ? 0 : found->second;
+  };
+  result_.jobs = count(jobs_channel_);
+  result_.events = count(events_channel_);
+  result_.messages = written.messages - result_.jobs - result_.events;
   facts["lost_overwritten"] = std::to_string(result_.overwritten);
   facts["lost_no_room"] = std::to_string(result_.no_room);
   facts["lost_not_written"] = std::to_string(result_.not_written);

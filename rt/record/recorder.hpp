@@ -22,13 +22,13 @@ struct Head {
 
 /// What a record lacks, and what it cost.
 struct RecordResult {
-  uint64_t messages = 0, jobs = 0;  ///< written
-  uint64_t overwritten = 0;         ///< messages that were gone before they were read
-  uint64_t no_room = 0;             ///< messages and jobs that found the queue full
-  uint64_t not_written = 0;         ///< ... that the file did not take
-  uint64_t incomplete_jobs = 0;     ///< of which an event was lost
-  uint64_t unheard_threads = 0;     ///< that ran jobs and had nowhere to note them: none of these jobs is there
-  uint64_t bytes = 0;               ///< of the file
+  uint64_t messages = 0, jobs = 0, events = 0;  ///< written
+  uint64_t overwritten = 0;                     ///< messages that were gone before they were read
+  uint64_t no_room = 0;                         ///< messages and jobs that found the queue full
+  uint64_t not_written = 0;                     ///< ... that the file did not take
+  uint64_t incomplete_jobs = 0;                 ///< of which an event was lost, and restarts
+  uint64_t unheard_threads = 0;  ///< that ran jobs and had nowhere to note them: none of these jobs is there
+  uint64_t bytes = 0;            ///< of the file
   int64_t capture_cpu_ns = 0, write_cpu_ns = 0;
   std::string refused;  ///< why the file did not take something; empty: it took all
   uint64_t lost() const { return overwritten + no_room + not_written + incomplete_jobs + unheard_threads; }
@@ -39,10 +39,11 @@ struct RecordResult {
 /// keep up with is counted.
 ///
 /// Every message stands in the file with its header and hash, those of the chosen ports with all fields. Channels:
-/// "NODE.PORT" for the ports, kJobs for the jobs.
+/// "NODE.PORT" for the ports, kJobs for the jobs, kEvents for what happened beside them.
 class Recorder {
  public:
   static constexpr const char* kJobs = "takt/jobs";
+  static constexpr const char* kEvents = "takt/events";
   static constexpr const char* kEncoding = "takt";
   static constexpr const char* kFacts = "takt";    ///< metadata: those of the head
   static constexpr const char* kEnd = "takt end";  ///< metadata: those given at the end, and what was lost
@@ -61,8 +62,8 @@ class Recorder {
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
 
-  /// The next event of a thread that runs jobs. One thread at a time.
-  void take(int32_t thread, const trace::Event& event) { jobs_.add(thread, event); }
+  /// The next event of a ring. One thread at a time.
+  void take(int32_t ring, const trace::Event& event) { jobs_.add(ring, event); }
   /// Copies what has been published since. Only with `by_caller`; after every job.
   void capture() { take_ports(); }
   /// After the last job: copies what is left, so that those who published it may go.
@@ -76,13 +77,16 @@ class Recorder {
     const MessageType* type = nullptr;
     uint16_t channel = 0;
     bool whole = false;
-    uint64_t told = 0;  ///< the newest that a job says it has published
+    uint64_t told = 0;  ///< the newest that a job says it has published or held
     size_t bytes = 0;   ///< of the last message, packed
   };
   void add_channels(const Plan& plan);
   void take_ports();
   void take_port(Port& port);
   void take_job(const RecordedJob& job);
+  void take_event(const RecordedEvent& event);
+  void take_modes();
+  void tell(size_t port, uint64_t sequence);
   void push(uint16_t channel, uint64_t sequence, int64_t at_ns, std::vector<std::byte> data);
   void capture_on();
   void write_on();
@@ -94,8 +98,9 @@ class Recorder {
   WriteQueue queue_;
   JobAssembler jobs_;
   std::vector<Port> ports_;
-  std::vector<std::vector<size_t>> ports_of_;  ///< by task
-  uint16_t jobs_channel_ = 0;
+  std::vector<std::vector<size_t>> ports_of_, edges_of_;  ///< by task: ports written and read
+  uint16_t jobs_channel_ = 0, events_channel_ = 0;
+  size_t modes_taken_ = 0;
   size_t job_bytes_ = 0;  ///< of the last job, packed
   std::atomic<uint64_t> no_room_{0};
   RecordResult result_;

@@ -13,16 +13,6 @@
 namespace takt::record {
 namespace {
 
-/// By start; a job that starts when another publishes may hold what that one made.
-std::vector<const RecordedJob*> in_order(const std::vector<RecordedJob>& jobs) {
-  std::vector<const RecordedJob*> order;
-  for (const RecordedJob& job : jobs) order.push_back(&job);
-  std::stable_sort(order.begin(), order.end(), [](const RecordedJob* a, const RecordedJob* b) {
-    return std::pair(a->start_ns, a->published_ns) < std::pair(b->start_ns, b->published_ns);
-  });
-  return order;
-}
-
 template <class Each>
 void for_each_held(const RecordedJob& record, const Each& each) {
   for (const RecordedJob::Input& input : record.inputs)
@@ -133,13 +123,18 @@ Replayer::Replayer(const Plan& plan, LogFile& log, const Options& options)
     const TaskPlan& task = plan_.tasks[t];
     last_seen_.emplace_back(task.edges.size(), uint64_t{0});
     if (!runs(t)) continue;
-    for (size_t i = 0; i < task.ports.size(); ++i) {
-      Port& port = ports_[task.ports[i]];
-      port.writer = std::make_unique<PortWriter>(*this, task.ports[i]);
-      PortAccess::attach(*task.node->outputs()[i], port.writer.get());
-    }
+    for (const size_t port : task.ports) ports_[port].writer = std::make_unique<PortWriter>(*this, port);
+    attach_writers(t);
   }
+  note_restarts();
+  select_jobs();
   count_uses();
+}
+
+void Replayer::attach_writers(size_t t) {
+  const TaskPlan& task = plan_.tasks[t];
+  for (size_t i = 0; i < task.ports.size(); ++i)
+    PortAccess::attach(*task.node->outputs()[i], ports_[task.ports[i]].writer.get());
 }
 
 Replayer::~Replayer() {
@@ -167,9 +162,64 @@ bool Replayer::fits(const RecordedJob& job) const {
          job.level >= 0 && static_cast<size_t>(job.level) < task.node->levels().size();
 }
 
-void Replayer::count_uses() {
+void Replayer::note_restarts() {
+  restarts_.resize(plan_.tasks.size());
+  for (const RecordedEvent& event : log_.events())
+    if (std::holds_alternative<Restart>(event.what) && event.task < plan_.tasks.size() && runs(event.task))
+      restarts_[event.task].events.push_back(&event);
+  for (Restarts& of_task : restarts_)
+    std::stable_sort(of_task.events.begin(), of_task.events.end(),
+                     [](const RecordedEvent* a, const RecordedEvent* b) { return a->at_ns < b->at_ns; });
+}
+
+/// The first one after the job began.
+const Restart* Replayer::next_restart(const RecordedJob& job) const {
+  for (const RecordedEvent* event : restarts_[job.task].events)
+    if (event->at_ns > job.start_ns) return &std::get<Restart>(event->what);
+  return nullptr;
+}
+
+void Replayer::keep_committed(const RecordedJob& job) {
+  RecordedJob committed = job;
+  // Without a restart after it nobody says so: then what came out is what others held.
+  if (const Restart* after = next_restart(job))
+    std::erase_if(committed.outputs, [&](const RecordedJob::Output& offered) {
+      return std::none_of(after->outputs.begin(), after->outputs.end(), [&](const Restart::Output& output) {
+        return output.output == offered.output && offered.sequence <= output.newest;
+      });
+    });
+  if (committed.outputs.empty()) result_.uncommitted += counts(job.task);
+  else order_.push_back(&committed_.emplace_back(std::move(committed)));
+}
+
+/// By start; a job that starts when another publishes may hold what that one made.
+void Replayer::select_jobs() {
   for (const RecordedJob& job : log_.jobs()) {
-    if (!fits(job) || !runs(job.task)) continue;
+    if (!fits(job)) result_.lacking += job.task >= plan_.tasks.size() || counts(job.task);
+    else if (!runs(job.task)) continue;
+    else if (job.cut_off) keep_committed(job);
+    else order_.push_back(&job);
+  }
+  std::stable_sort(order_.begin(), order_.end(), [](const RecordedJob* a, const RecordedJob* b) {
+    return std::pair(a->start_ns, a->published_ns) < std::pair(b->start_ns, b->published_ns);
+  });
+}
+
+template <class Each>
+void Replayer::for_each_handed_over(const RecordedEvent& restart, const Each& each) const {
+  const std::vector<size_t>& ports = plan_.tasks[restart.task].ports;
+  for (const Restart::Output& output : std::get<Restart>(restart.what).outputs)
+    if (output.output < ports.size() && output.handed_over > 0) each(output.output, output.handed_over);
+}
+
+void Replayer::count_uses() {
+  for (const Restarts& of_task : restarts_)
+    for (const RecordedEvent* restart : of_task.events)
+      for_each_handed_over(*restart, [&](uint16_t output, uint64_t sequence) {
+        ++ports_[plan_.tasks[restart->task].ports[output]].uses[sequence];
+      });
+  for (const RecordedJob* selected : order_) {
+    const RecordedJob& job = *selected;
     for_each_held(job, [&](uint16_t edge, uint64_t sequence) {
       ++ports_[plan_.tasks[job.task].edges[edge].port].uses[sequence];
     });
@@ -181,20 +231,59 @@ void Replayer::count_uses() {
 
 ReplayResult Replayer::run(const std::function<bool()>& stop) {
   int64_t first = INT64_MAX, last = INT64_MIN;
-  for (const RecordedJob* record : in_order(log_.jobs())) {
+  for (const RecordedJob* record : order_) {
     if (stop && stop()) break;
-    if (!fits(*record)) {
-      result_.lacking += record->task >= plan_.tasks.size() || counts(record->task);
-      continue;
-    }
-    if (!runs(record->task)) continue;
     if (options_.pace) options_.pace(record->release_ns);
     first = std::min(first, record->release_ns);
     last = std::max(last, record->published_ns);
+    restart_before(*record);
     run_job(*record);
   }
   if (last > first) result_.recorded_ns = last - first;
+  count_unmade();
   return result_;
+}
+
+/// What the task went through between its last job and this one.
+void Replayer::restart_before(const RecordedJob& job) {
+  Restarts& mine = restarts_[job.task];
+  for (; mine.done < mine.events.size() && mine.events[mine.done]->at_ns <= job.start_ns; ++mine.done)
+    mine.failed = !restart(*mine.events[mine.done]);
+}
+
+bool Replayer::restart(const RecordedEvent& event) {
+  const TaskPlan& task = plan_.tasks[event.task];
+  const Restart& restart = std::get<Restart>(event.what);
+  bool whole = options_.renew != nullptr;
+  if (whole) {
+    options_.renew(event.task);
+    attach_writers(event.task);
+  }
+  for_each_handed_over(event, [&](uint16_t output, uint64_t sequence) {
+    const Stored* message = stored(task.ports[output], sequence);
+    whole = whole && message != nullptr;
+    if (whole) PortAccess::hand_over(*task.node->outputs()[output], message->message());
+  });
+  if (whole) {
+    clock_.advance_to(event.at_ns);
+    task.node->start(options_.epoch_ns);
+    result_.restarts += counts(event.task);
+  }
+  for (OutputPort* output : task.node->outputs()) PortAccess::hand_over(*output, nullptr);
+  for_each_handed_over(event, [&](uint16_t output, uint64_t sequence) { use(task.ports[output], sequence); });
+  for (const Restart::Seen& seen : restart.seen)
+    if (seen.edge < task.edges.size()) last_seen_[event.task][seen.edge] = seen.sequence;
+  return whole;
+}
+
+/// Of the nodes that run: what a job lost in the record made, and cannot be made again.
+void Replayer::count_unmade() {
+  for (size_t t = 0; t < plan_.tasks.size(); ++t) {
+    if (!runs(t) || !counts(t)) continue;
+    for (const size_t port : plan_.tasks[t].ports)
+      for (const auto& [sequence, known] : log_.messages(ports_[port].channel))
+        result_.unmade += !known.whole && !ports_[port].remade.contains(sequence);
+  }
 }
 
 void Replayer::run_job(const RecordedJob& record) {
@@ -203,7 +292,7 @@ void Replayer::run_job(const RecordedJob& record) {
   for (const RecordedJob::Param& changed : record.params)
     if (auto done = task.node->params()[changed.param]->set(changed.value); !done)
       tell(record, kNone, "a parameter of the record is refused: " + done.error());
-  if (fill_inputs(record)) {
+  if (!restarts_[record.task].failed && fill_inputs(record)) {
     const std::string& mode = record.mode < plan_.modes.size() ? plan_.modes[record.mode].name : plan_.mode;
     Job job(clock_, record.index, record.release_ns, record.deadline_ns, record.level, mode);
     answers_->begin(record);
@@ -279,15 +368,18 @@ std::shared_ptr<Replayer::Stored> Replayer::buffer(size_t p) {
 void Replayer::let_go(const RecordedJob& record) {
   const TaskPlan& task = plan_.tasks[record.task];
   for (const EdgePlan& edge : task.edges) PortAccess::set_held(*task.node->inputs()[edge.input], 0, true, 0);
-  for_each_held(record, [&](uint16_t edge, uint64_t sequence) {
-    Port& port = ports_[task.edges[edge].port];
-    if (--port.uses[sequence] > 0) return;
-    port.uses.erase(sequence);
-    const auto message = port.messages.find(sequence);
-    if (message == port.messages.end()) return;
-    if (message->second.use_count() == 1) port.spare.push_back(std::move(message->second));
-    port.messages.erase(message);
-  });
+  for_each_held(record, [&](uint16_t edge, uint64_t sequence) { use(task.edges[edge].port, sequence); });
+}
+
+/// One who was still to need the message has had it.
+void Replayer::use(size_t p, uint64_t sequence) {
+  Port& port = ports_[p];
+  if (--port.uses[sequence] > 0) return;
+  port.uses.erase(sequence);
+  const auto message = port.messages.find(sequence);
+  if (message == port.messages.end()) return;
+  if (message->second.use_count() == 1) port.spare.push_back(std::move(message->second));
+  port.messages.erase(message);
 }
 
 void Replayer::settle(const RecordedJob& record) {
@@ -309,7 +401,8 @@ void Replayer::settle_output(const RecordedJob& record, const RecordedJob::Outpu
   const int64_t stamp_ns = PortAccess::stamp_ns(output);
   std::shared_ptr<Stored> made = port.writer->take();
   PortAccess::reset(output);
-  const bool withheld = record.late && (task.on_miss == OnMiss::skip || task.on_miss == OnMiss::reuse_last);
+  const bool withheld =
+      record.cut_off || (record.late && (task.on_miss == OnMiss::skip || task.on_miss == OnMiss::reuse_last));
   if (told != nullptr && told->repeated) {
     made = port.newest;
     if (made == nullptr) return;
@@ -322,8 +415,10 @@ void Replayer::settle_output(const RecordedJob& record, const RecordedJob::Outpu
     MessageHeader& header = *made->header;
     header.stamp_ns = stamp_ns;
     header.published_ns = record.published_ns;
-    header.visible_at_ns =
-        task.publish == PublishAt::let ? std::max(record.published_ns, record.deadline_ns) : record.published_ns;
+    header.visible_at_ns = record.visible_at_ns;
+    if (record.visible_at_ns == 0)  // format 1
+      header.visible_at_ns =
+          task.publish == PublishAt::let ? std::max(record.published_ns, record.deadline_ns) : record.published_ns;
     header.sequence = told->sequence;
     header.level = record.level;
     result_.messages += counts(record.task);

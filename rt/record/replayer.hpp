@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <map>
 #include <memory>
@@ -28,6 +29,9 @@ struct ReplayResult {
   uint64_t whole = 0;               ///< of them, field by field
   uint64_t different = 0;           ///< messages, or jobs that sent something else than in the record
   uint64_t lacking = 0;             ///< jobs without all that they were given: lost or damaged in the record; not run
+  uint64_t restarts = 0;            ///< of tasks, done again
+  uint64_t uncommitted = 0;         ///< jobs whose process died before anything of them came out; not run
+  uint64_t unmade = 0;              ///< messages recorded by their hash only that no recorded job made: not compared
   std::optional<Divergence> first;  ///< of the differences
   std::map<std::string, uint64_t> different_of;  ///< by node
   int64_t recorded_ns = 0;                       ///< from the first release to the last publication
@@ -37,6 +41,9 @@ struct ReplayResult {
 /// the answers that it had; a job that asks something else is told its start, and the time from there to its deadline.
 /// Messages of devices, and of jobs that the record does not have, come from the record, others from the jobs that are
 /// run. One thread.
+///
+/// Where a task was restarted its node is replaced by a fresh one, which goes on from the messages that the restarted
+/// one was handed over. What its process had not published when it died stays away.
 class Replayer {
  public:
   struct Options {
@@ -47,6 +54,10 @@ class Replayer {
     int64_t from_ns = INT64_MIN;  ///< differences of earlier jobs are not told; they run, for what they leave behind
     /// Called before each job with its planned release: where a replay at the recorded pace waits. May be empty.
     std::function<void(int64_t)> pace = {};
+    int64_t epoch_ns = 0;  ///< of the run: what Node::start() of a restarted node is given
+    /// Puts a fresh node, set up as before the run, in the place that the plan has for that task. May throw. Empty:
+    /// jobs of a restarted task count as lacking.
+    std::function<void(size_t)> renew = {};
   };
   /// `plan` is that of the record, with nodes set up (devices: shells); both must live as long as this.
   Replayer(const Plan& plan, LogFile& log, const Options& options);
@@ -67,7 +78,18 @@ class Replayer {
   bool counts(size_t task) const { return options_.told.empty() || options_.told[task] != 0; }
   /// False if a damaged record names what the plan does not have.
   bool fits(const RecordedJob& job) const;
+  void note_restarts();
+  void select_jobs();
   void count_uses();
+  template <class Each>
+  void for_each_handed_over(const RecordedEvent& restart, const Each& each) const;
+  const Restart* next_restart(const RecordedJob& job) const;
+  void keep_committed(const RecordedJob& job);
+  void attach_writers(size_t task);
+  void restart_before(const RecordedJob& job);
+  bool restart(const RecordedEvent& restart);
+  void use(size_t port, uint64_t sequence);
+  void count_unmade();
   void run_job(const RecordedJob& record);
   bool fill_inputs(const RecordedJob& record);
   Stored* stored(size_t port, uint64_t sequence);
@@ -86,6 +108,15 @@ class Replayer {
   const std::unique_ptr<Answers> answers_;
   std::vector<Port> ports_;
   std::vector<std::vector<uint64_t>> last_seen_;  ///< by task and edge
+  /// By task, in their order, and how many are done.
+  struct Restarts {
+    std::vector<const RecordedEvent*> events;
+    size_t done = 0;
+    bool failed = false;  ///< the last one: no job can be run until the next
+  };
+  std::vector<Restarts> restarts_;
+  std::vector<const RecordedJob*> order_;
+  std::deque<RecordedJob> committed_;  ///< of those that were cut off: with what came out
   ReplayResult result_;
 };
 

@@ -90,9 +90,11 @@ void Task::start(int64_t epoch_ns, Transport* restarted) {
     Candidate newest;
     const bool any = readers.back()->list(INT64_MAX, std::span(&newest, 1)) > 0;
     held.push_back(any ? readers.back()->take(newest.sequence) : Held{});
+    handed_.push_back(held.back() ? newest.sequence : 0);
     if (held.back()) PortAccess::hand_over(*plan_.node->outputs()[i], held.back().message());
   }
   take_up(board_, index_, *plan_.node);
+  restarted_ = restarted != nullptr;
   plan_.node->start(epoch_ns);
   for (size_t i = 0; i < held.size(); ++i) {
     PortAccess::hand_over(*plan_.node->outputs()[i], nullptr);
@@ -132,6 +134,7 @@ TAKT_HOT int64_t Task::begin(uint64_t index, int64_t release_ns, int64_t duratio
   ended_.index = index;
   ended_.release_ns = release_ns;
   ended_.started_ns = started;
+  if (std::exchange(restarted_, false) && trace::on()) trace_restart();
   take_mail();
   // Which releases a mode leaves out is known from outside, but for those that a producer causes.
   if (!mode.runs) return pass_over(started, !plan_.rate), 0;

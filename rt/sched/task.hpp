@@ -112,6 +112,8 @@ class Task {
   void trace_start() const;
   void trace_inputs() const;
   void trace_end() const;
+  void trace_offer(size_t output, bool repeat) const;
+  void trace_restart() const;
   void ask_for_safe_stop(const char* why);
   void count_level(int64_t response_ns);
   void count_age(size_t port, int64_t visible_at_ns, int64_t stamp_ns);
@@ -134,6 +136,8 @@ class Task {
   std::vector<std::unique_ptr<Writer>> writers_;
   std::vector<bool> published_;
   std::vector<uint64_t> sequences_;  ///< of the newest message of each output
+  std::vector<uint64_t> handed_;     ///< by output: the message that the restarted node went on from; 0: none
+  bool restarted_ = false;           ///< and no job has begun since
   /// The job that run() has ended and count() not yet counted.
   struct Ended {
     bool ran = false, paused = false, new_input = false, no_result = false;

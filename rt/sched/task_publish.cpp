@@ -7,6 +7,7 @@
 #include "rt/hot.hpp"
 #include "rt/sched/port_access.hpp"
 #include "rt/sched/task.hpp"
+#include "rt/trace/rings.hpp"
 
 namespace takt {
 
@@ -80,6 +81,8 @@ void Task::pass(MessageStep step) const {
 void Task::announce(size_t i, uint32_t commit, Offer offer) {
   OutputPort& output = *plan_.node->outputs()[i];
   Writer& writer = *writers_[i];
+  // Before anybody can see it: whatever becomes of this process now, the message can be made again.
+  if (trace::on()) trace_offer(i, offer == Offer::former);
   // Stored before it is out: a successor that has no other source goes on after it.
   board_.port(plan_.ports[i]).published.store(sequences_[i] + 1, std::memory_order_relaxed);
   if (offer == Offer::made) PortAccess::set_level(output, ended_.level);

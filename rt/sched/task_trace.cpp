@@ -14,7 +14,8 @@ namespace takt {
 void Task::trace_start() const {
   const auto task = static_cast<uint16_t>(index_);
   const auto job = static_cast<uint32_t>(ended_.index);
-  trace::record({ended_.release_ns, ended_.release_ns + plan_.deadline_ns, 0, job, task, trace::Kind::release, 0});
+  const auto lost = static_cast<int64_t>(trace::lost());
+  trace::record({ended_.release_ns, ended_.release_ns + plan_.deadline_ns, lost, job, task, trace::Kind::release, 0});
   trace::record({ended_.started_ns, 0, modelled_ ? 0 : sched_getcpu(), job, task, trace::Kind::start,
                  static_cast<uint8_t>(ended_.level)});
 }
@@ -56,6 +57,24 @@ void Task::trace_inputs() const {
   }
 }
 
+void Task::trace_offer(size_t output, bool repeat) const {
+  const auto lost = static_cast<int64_t>(trace::lost());
+  trace::record({ended_.end.finished_ns, static_cast<int64_t>(sequences_[output] + 1), 2 * lost + (repeat ? 1 : 0),
+                 static_cast<uint32_t>(ended_.index), static_cast<uint16_t>(index_), trace::Kind::offer,
+                 static_cast<uint8_t>(output)});
+}
+
+void Task::trace_restart() const {
+  const auto note = [&](trace::Kind kind, size_t port, uint64_t value, uint64_t extra) {
+    trace::record({ended_.started_ns, static_cast<int64_t>(value), static_cast<int64_t>(extra),
+                   static_cast<uint32_t>(ended_.index), static_cast<uint16_t>(index_), kind,
+                   static_cast<uint8_t>(port)});
+  };
+  for (size_t i = 0; i < handed_.size(); ++i) note(trace::Kind::handed, i, handed_[i], sequences_[i]);
+  for (size_t e = 0; e < plan_.edges.size(); ++e) note(trace::Kind::seen, e, latch_.statistics(e).last_seen, 0);
+  note(trace::Kind::restart, 0, static_cast<uint64_t>(quality_.level()), trace::lost());
+}
+
 void Task::trace_end() const {
   const JobEnd& end = ended_.end;
   const int64_t deadline_ns = ended_.release_ns + plan_.deadline_ns;
@@ -73,6 +92,7 @@ void Task::trace_end() const {
       note(trace::Kind::publish, ended_.published_ns, static_cast<int64_t>(sequences_[i]), sent_stamps_ns_[i], i);
     else if (published_[i]) note(trace::Kind::repeat, ended_.published_ns, static_cast<int64_t>(sequences_[i]), 0, i);
   }
+  if (end.visible_at_ns != ended_.published_ns) note(trace::Kind::visible, ended_.published_ns, end.visible_at_ns);
   note(trace::Kind::publish, ended_.published_ns, 0, static_cast<int64_t>(trace::lost()));
 }
 

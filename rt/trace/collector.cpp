@@ -88,7 +88,7 @@ void Collector::drain() {
   follow_new_threads();
   for (size_t i = 0; i < recording_.threads.size(); ++i)
     rings_.ring(i).drain([&, thread = recording_.threads[i].id](const Event& event) {
-      if (options_.listener) options_.listener(thread, event);
+      if (options_.listener) options_.listener(static_cast<int32_t>(i), event);
       recording_.events.push_back({thread, event});
     });
   if (source_) source_->drain(recording_.switches);

@@ -36,7 +36,8 @@ class Collector {
     size_t records_kept = 4'000'000;  ///< of each kind, about 160 MB; beyond that the oldest go, counted
     bool by_caller =
         false;  ///< virtual time: events are taken in drain() only, on the caller's thread; no clock is read
-    /// Hears every event as it is taken, thread and event.
+    /// Hears every event as it is taken, with the number of its ring. A ring outlives its thread, and goes to the one
+    /// that takes the place of a thread that died.
     std::function<void(int32_t, const Event&)> listener = {};
   };
   /// In the process that outlives the others, after they were forked. Opens the best source that is granted.

@@ -20,13 +20,18 @@ enum class Kind : uint8_t {
   stale,
   repeat,
   answer,
-  param
+  param,
+  offer,
+  visible,
+  handed,
+  seen,
+  restart
 };
 
 /// One event of one job. `value` and `extra` by kind:
 ///
 /// | kind    | at                | value             | extra              | port            |
-/// | release | planned release   | absolute deadline | -                  | -               |
+/// | release | planned release   | absolute deadline | events lost so far | -               |
 /// | start   | start             | -                 | CPU                | level           |
 /// | latch   | start             | sequence          | stamp              | index of edge   |
 /// | finish  | end of run()      | CPU time, ns      | CPU                | -               |
@@ -41,11 +46,21 @@ enum class Kind : uint8_t {
 /// | repeat  | publication       | sequence          | -                  | index of output |
 /// | answer  | -                 | answer            | Question           | -, and no task  |
 /// | param   | start             | 8 bytes of value  | ParamMail::Kind    | index           |
+/// | offer   | end of run()      | sequence          | 2 x lost, + repeat | index of output |
+/// | visible | publication       | visible_at        | -                  | -               |
+/// | handed  | start             | handed over, or 0 | newest sequence    | index of output |
+/// | seen    | start             | newest latched    | -                  | index of edge   |
+/// | restart | start             | level             | events lost so far | -               |
 ///
 /// Instants are CLOCK_MONOTONIC, ns. `latch` tells the newest message of an edge, `held` each run of consecutive ones
 /// where there are several. Every finished job gives one more `publish` for its end, with sequence 0 and as `extra` the
 /// events that its thread has lost so far: none may lack between two of them. What a job was given (`param` before its
 /// release) comes first, then its answers, then the rest. A text is as many `param` events as it fills, to its final 0.
+///
+/// `offer` comes before the message is announced to anybody. So what it takes to make a message again lies in the ring
+/// before the first reader can see it, and a process may die at any instant. `visible` comes only where visible_at is
+/// not the publication. `handed` and `seen` of all outputs and edges, then `restart`, come before the first job of a
+/// task whose process was started again.
 struct Event {
   int64_t at_ns = 0, value = 0, extra = 0;
   uint32_t job = 0;

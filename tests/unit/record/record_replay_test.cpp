@@ -54,7 +54,9 @@ TEST_CASE("Every message and every job of a run is in its record") {
   CHECK(record.result.jobs == 90 + 30 + 30);
   LogFile log = record.open();
   CHECK(log.damages().empty());
-  CHECK(log.facts().at("format") == "1");
+  CHECK(log.facts().at("format") == "2");
+  CHECK(log.format() == 2);
+  CHECK(log.events().empty());
   CHECK(log.end().at("epoch_ns") == "1000000000");
   CHECK(log.end().at("lost_overwritten") == "0");
   CHECK(log.jobs().size() == 150);

@@ -3,6 +3,7 @@
 
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstring>
@@ -34,21 +35,31 @@ RecordedJob full_job() {
   job.inputs = {{0, false, {{7, 3}, {12, 1}}}, {2, true, {}}};
   job.answers = {{Question::time_left, -17}, {Question::chunk, 0}, {Question::now, INT64_MAX}};
   job.outputs = {{0, false, 9}, {1, true, 11}};
+  job.visible_at_ns = 6'200;
+  job.cut_off = true;
   return job;
 }
 
 struct Heard {
   std::vector<RecordedJob> jobs;
-  JobAssembler assembler{[this](const RecordedJob& job) { jobs.push_back(job); }};
-  void add(int32_t thread, Kind kind, int64_t at_ns, int64_t value = 0, int64_t extra = 0, uint8_t port = 0,
+  std::vector<RecordedEvent> events;
+  JobAssembler assembler{[this](const RecordedJob& job) { jobs.push_back(job); },
+                         [this](const RecordedEvent& event) { events.push_back(event); }};
+  void add(int32_t ring, Kind kind, int64_t at_ns, int64_t value = 0, int64_t extra = 0, uint8_t port = 0,
            uint32_t job = 1, uint16_t task = 4) {
-    assembler.add(thread, Event{at_ns, value, extra, job, task, kind, port});
+    assembler.add(ring, Event{at_ns, value, extra, job, task, kind, port});
   }
-  void whole_job(int32_t thread, uint32_t job, int64_t lost = 0) {
-    add(thread, Kind::release, 100, 200, 0, 0, job);
-    add(thread, Kind::start, 110, 0, 0, 0, job);
-    add(thread, Kind::finish, 120, 9, 0, 0, job);
-    add(thread, Kind::publish, 125, 0, lost, 0, job);
+  /// `lost`: events of the ring, when it began and when it ended.
+  void whole_job(int32_t ring, uint32_t job, int64_t lost = 0, int64_t lost_at_end = -1) {
+    add(ring, Kind::release, 100, 200, lost, 0, job);
+    add(ring, Kind::start, 110, 0, 0, 0, job);
+    add(ring, Kind::finish, 120, 9, 0, 0, job);
+    add(ring, Kind::publish, 125, 0, lost_at_end < 0 ? lost : lost_at_end, 0, job);
+  }
+  void restart(int32_t ring, uint32_t job, int64_t at_ns, uint64_t newest) {
+    add(ring, Kind::handed, at_ns, static_cast<int64_t>(newest), static_cast<int64_t>(newest), 0, job);
+    add(ring, Kind::seen, at_ns, 17, 0, 2, job);
+    add(ring, Kind::restart, at_ns, 1, 0, 0, job);
   }
 };
 
@@ -63,6 +74,20 @@ TEST_CASE("A job that is packed and unpacked is the same") {
     CHECK(*again == job);
     CHECK(std::signbit(job.params.empty() ? -0.0 : std::get<double>(again->params[2].value)));
   }
+}
+
+TEST_CASE("A job of format 1 says neither when it became visible nor that it was cut off") {
+  std::vector<std::byte> first, second;
+  pack(full_job(), first, 1);
+  pack(full_job(), second);
+  CHECK(first.size() + 9 == second.size());
+  const auto again = unpack_job(first, 1);
+  REQUIRE(again);
+  RecordedJob told = full_job();
+  told.visible_at_ns = 0;
+  told.cut_off = false;
+  CHECK(*again == told);
+  CHECK_FALSE(unpack_job(first, 2));
 }
 
 TEST_CASE("Bytes that are no job are refused, wherever they end") {
@@ -106,6 +131,8 @@ TEST_CASE("The events of a job make its record") {
   CHECK(job.cpu_ns == 33);
   CHECK(job.level == 1);
   CHECK(job.late);
+  CHECK(job.visible_at_ns == 205);
+  CHECK_FALSE(job.cut_off);
   CHECK(job.params == std::vector<RecordedJob::Param>{{2, 2.5}});
   CHECK(job.inputs ==
         std::vector<RecordedJob::Input>{{1, true, {}}, {0, false, {{5, 2}, {8, 1}}}, {2, false, {{3, 1}}}});
@@ -162,7 +189,7 @@ TEST_CASE("Jobs of several threads are told apart; a job of which an event was l
   heard.add(2, Kind::publish, 126, 0, 0, 0, 2);
   CHECK(heard.jobs.size() == 2);
   SUBCASE("within") {
-    heard.whole_job(1, 3, 2);
+    heard.whole_job(1, 3, 0, 2);
     CHECK(heard.jobs.size() == 2);
     CHECK(heard.assembler.incomplete() == 1);
     heard.whole_job(1, 4, 2);
@@ -190,4 +217,96 @@ TEST_CASE("Jobs of several threads are told apart; a job of which an event was l
     CHECK(heard.jobs.size() == 3);
     CHECK(heard.assembler.incomplete() == 0);
   }
+}
+
+TEST_CASE("Members of a lane end together: the answers are those of the one at work") {
+  Heard heard;
+  heard.add(1, Kind::release, 100, 200, 0, 0, 1, 4);
+  heard.add(1, Kind::offer, 110, 6, 0, 0, 1, 4);
+  heard.add(1, Kind::release, 110, 300, 0, 0, 9, 5);
+  heard.add(1, Kind::answer, 0, 40, static_cast<int64_t>(Question::now), 0, 9, trace::kNoTask);
+  heard.add(1, Kind::publish, 111, 6, 77, 0, 1, 4);
+  heard.add(1, Kind::publish, 111, 0, 0, 0, 1, 4);
+  heard.add(1, Kind::publish, 120, 0, 0, 0, 9, 5);
+  REQUIRE(heard.jobs.size() == 2);
+  CHECK(heard.jobs[0].task == 4);
+  CHECK(heard.jobs[0].answers.empty());
+  CHECK(heard.jobs[0].outputs == std::vector<RecordedJob::Output>{{0, false, 6}});
+  CHECK(heard.jobs[1].answers.size() == 1);
+  CHECK(heard.assembler.incomplete() == 0);
+}
+
+TEST_CASE("A job that its process did not live to end is told, with what it was about to publish") {
+  Heard heard;
+  heard.whole_job(1, 1);
+  heard.add(1, Kind::release, 300, 400, 0, 0, 2);
+  heard.add(1, Kind::start, 310, 0, 0, 0, 2);
+  heard.add(1, Kind::offer, 350, 6, 0, 0, 2);
+  heard.add(1, Kind::offer, 350, 9, 0, 1, 2);
+  SUBCASE("once its ring goes on") { heard.restart(1, 4, 500, 6); }
+  SUBCASE("once another of its task begins in its ring, which the first one after the restart need not") {
+    heard.whole_job(1, 5);
+  }
+  SUBCASE("else at the end: its task goes on in another ring") {
+    heard.restart(2, 4, 500, 6);
+    heard.whole_job(2, 4);
+    CHECK(heard.jobs.size() == 2);
+    heard.assembler.end();
+    std::swap(heard.jobs[1], heard.jobs.back());
+  }
+  SUBCASE("and if it had told of a part of it when it died") {
+    heard.add(1, Kind::publish, 360, 6, 77, 0, 2);
+    heard.assembler.end();
+  }
+  SUBCASE("the last offer of an output counts") {
+    heard.add(1, Kind::offer, 355, 6, 1, 0, 2);
+    heard.assembler.end();
+    REQUIRE(heard.jobs.size() == 2);
+    CHECK(heard.jobs[1].outputs == std::vector<RecordedJob::Output>{{1, false, 9}, {0, true, 6}});
+    heard.jobs[1].outputs = {{0, false, 6}, {1, false, 9}};
+    heard.jobs[1].finish_ns = heard.jobs[1].published_ns = 350;
+  }
+  REQUIRE(heard.jobs.size() >= 2);
+  const RecordedJob& job = heard.jobs[1];
+  CHECK(job.cut_off);
+  CHECK(job.index == 2);
+  CHECK(job.finish_ns == 350);
+  CHECK(job.published_ns == 350);
+  CHECK(job.outputs == std::vector<RecordedJob::Output>{{0, false, 6}, {1, false, 9}});
+  CHECK(heard.assembler.incomplete() == 0);
+}
+
+TEST_CASE("A job that was cut off and lost an event is counted, not told") {
+  Heard heard;
+  heard.add(1, Kind::release, 300, 400, 0, 0, 2);
+  SUBCASE("before its offer") { heard.add(1, Kind::offer, 350, 6, 2 * 1, 0, 2); }
+  SUBCASE("before the next in its ring") { heard.add(1, Kind::release, 500, 600, 1, 0, 3); }
+  heard.assembler.end();
+  CHECK(std::none_of(heard.jobs.begin(), heard.jobs.end(), [](const RecordedJob& job) { return job.index == 2; }));
+  CHECK(heard.assembler.incomplete() > 0);
+}
+
+TEST_CASE("A restart says what its task went on from, and forgets what was set before it") {
+  Heard heard;
+  heard.add(1, Kind::param, 100, std::bit_cast<int64_t>(2.5), ParamMail::number, 2);
+  heard.restart(1, 7, 500, 6);
+  heard.add(1, Kind::param, 500, std::bit_cast<int64_t>(3.5), ParamMail::number, 3, 7);
+  heard.whole_job(1, 7);
+  REQUIRE(heard.events.size() == 3);
+  CHECK(heard.events[0] == RecordedEvent{2, 4, 1, 100, ParameterSet{2, 2.5, ""}});
+  CHECK(heard.events[1] == RecordedEvent{1, 4, 7, 500, Restart{1, 0, {{0, 6, 6}}, {{2, 17}}}});
+  REQUIRE(heard.jobs.size() == 1);
+  CHECK(heard.jobs[0].params == std::vector<RecordedJob::Param>{{3, 3.5}});
+}
+
+TEST_CASE("A text that its thread did not live to note to its end leaves nothing in the next one") {
+  Heard heard;
+  int64_t piece = 0;
+  std::memcpy(&piece, "eightcha", 8);
+  heard.add(1, Kind::param, 100, piece, ParamMail::text, 3);
+  std::memcpy(&piece, "short\0\0\0", 8);
+  heard.add(1, Kind::param, 600, piece, ParamMail::text, 3, 7);
+  heard.whole_job(1, 7);
+  REQUIRE(heard.jobs.size() == 1);
+  CHECK(heard.jobs[0].params == std::vector<RecordedJob::Param>{{3, std::string("short")}});
 }

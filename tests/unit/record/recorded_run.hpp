@@ -40,6 +40,9 @@ struct Filter final : Node {
     grid.reserve({4, 2, 1, 0});
     gain();
   }
+  void start(int64_t) override {
+    if (const Grid* last = grid.handed_over()) sum = last->cell_m;
+  }
   void run(Job& job) override {
     for (size_t i = 0; i < odometry.size(); ++i)
       if (odometry.is_new(i)) sum += gain() * odometry[i].x_m;
@@ -112,14 +115,12 @@ inline record::RecordResult record_run(const Plan& plan, mcap::Sink& sink, int64
   VirtualClock clock(1'000'000'000);
   const auto transport = make_local_transport(plan.ports);
   how.by_caller = true;
-  record::Head told = head;
-  told.facts["format"] = "1";
-  record::Recorder recorder(plan, board, *transport, sink, told, std::move(how));
+  record::Recorder recorder(plan, board, *transport, sink, head, std::move(how));
   trace::Rings rings(4);
   trace::Collector::Options heard;
   heard.best = trace::Source::none;
   heard.by_caller = true;
-  heard.listener = [&](int32_t thread, const trace::Event& event) { recorder.take(thread, event); };
+  heard.listener = [&](int32_t ring, const trace::Event& event) { recorder.take(ring, event); };
   trace::Collector collector(rings, heard);
   Executor::Options run;
   run.duration_ns = seconds * 1'000'000'000;
