@@ -142,23 +142,37 @@ class Selection {
   std::set<std::pair<uint16_t, uint32_t>> jobs_;  ///< task and index
 };
 
-/// Parameters that jobs left out had set, for the next job of the node that stays. A restart forgets them.
+/// Parameters that jobs left out had set, for the next job of the node that stays. What a node took up at a restart
+/// stands there, not here.
 class Carried {
  public:
-  void add(const RecordedJob& left_out) {
-    for (const RecordedJob::Param& param : left_out.params)
-      set_[left_out.task][param.param] = {left_out.start_ns, param.value};
+  Carried(const record::LogFile& log, const Selection& selection) {
+    std::vector<const RecordedJob*> jobs;
+    for (const RecordedJob& job : log.jobs()) jobs.push_back(&job);
+    // In the file, one that was cut off may stand behind later ones.
+    std::stable_sort(jobs.begin(), jobs.end(),
+                     [](const RecordedJob* a, const RecordedJob* b) { return a->start_ns < b->start_ns; });
+    std::map<uint16_t, std::map<uint16_t, std::pair<int64_t, ParamValue>>> set;  // by task and parameter, when
+    for (const RecordedJob* job : jobs) {
+      auto& mine = set[job->task];
+      if (!selection.keeps(*job)) {
+        for (const RecordedJob::Param& param : job->params) mine[param.param] = {job->start_ns, param.value};
+        continue;
+      }
+      const RecordedEvent* restart = selection.last_restart(*job);
+      for (const auto& [param, given] : mine)
+        if (restart == nullptr || given.first >= restart->at_ns)
+          given_[{job->task, job->index}].push_back({param, given.second});
+      mine.clear();
+    }
   }
-  void give(RecordedJob& next, const RecordedEvent* last_restart) {
-    std::vector<RecordedJob::Param> params;
-    for (const auto& [param, set] : set_[next.task])
-      if (last_restart == nullptr || set.first >= last_restart->at_ns) params.push_back({param, set.second});
-    next.params.insert(next.params.begin(), params.begin(), params.end());
-    set_[next.task].clear();
+  void give(RecordedJob& job) const {
+    if (const auto found = given_.find({job.task, job.index}); found != given_.end())
+      job.params.insert(job.params.begin(), found->second.begin(), found->second.end());
   }
 
  private:
-  std::map<uint16_t, std::map<uint16_t, std::pair<int64_t, ParamValue>>> set_;  ///< by task and parameter, when
+  std::map<std::pair<uint16_t, uint32_t>, std::vector<RecordedJob::Param>> given_;  ///< by task and index
 };
 
 /// Schemas and channels under the ids that they have: the Recorder counts them from 1, as the Writer does.
@@ -199,15 +213,14 @@ tl::expected<Cut, std::string> cut_log(const record::LogFile& log, int64_t from_
     return tl::make_unexpected(std::string("its channels are not numbered as takt does"));
 
   Cut cut;
-  Carried carried;
+  const Carried carried(log, selection);
   const uint16_t jobs_channel = log.channel(Recorder::kJobs), events_channel = log.channel(Recorder::kEvents);
   std::vector<std::byte> packed;
   const auto walked = log.container().for_each([&](const mcap::Message& message) {
     if (message.channel == jobs_channel) {
       auto job = record::unpack_job(message.data, log.format());
-      if (!job) return true;
-      if (!selection.keeps(*job)) return carried.add(*job), true;
-      carried.give(*job, selection.last_restart(*job));
+      if (!job || !selection.keeps(*job)) return true;
+      carried.give(*job);
       packed.clear();
       record::pack(*job, packed, log.format());
       mcap::Message kept = message;

@@ -54,6 +54,11 @@ std::string name_at(const Json& all, size_t index) {
   return all[index].is_string() ? all[index].get<std::string>() : all[index].value("name", "");
 }
 
+std::string param_name(size_t task, size_t param, const Json& plan) {
+  const Json tasks = plan.value("tasks", Json::array());
+  return name_at(task < tasks.size() ? tasks[task].value("params", Json::object()) : Json::object(), param);
+}
+
 /// The task without what may differ.
 Json structure_of(Json task) {
   task.erase("params");
@@ -79,13 +84,15 @@ std::string event_node(const record::RecordedEvent& event, const Json& plan) {
 }
 
 std::string event_text(const record::RecordedEvent& event, const Json& plan) {
-  if (std::holds_alternative<record::Restart>(event.what)) return fmt::format("restart before job {}", event.job);
-  if (const auto* set = std::get_if<record::ParameterSet>(&event.what)) {
-    const Json tasks = plan.value("tasks", Json::array());
-    const Json params = event.task < tasks.size() ? tasks[event.task].value("params", Json::object()) : Json::object();
-    return fmt::format("{} set to {}{}{}", name_at(params, set->param), value_text(set->value),
-                       set->who.empty() ? "" : " by ", set->who);
+  if (const auto* restart = std::get_if<record::Restart>(&event.what)) {
+    std::string text = fmt::format("restart before job {}", event.job);
+    for (const auto& kept : restart->params)
+      text += fmt::format(", {} still {}", param_name(event.task, kept.param, plan), value_text(kept.value));
+    return text;
   }
+  if (const auto* set = std::get_if<record::ParameterSet>(&event.what))
+    return fmt::format("{} set to {}{}{}", param_name(event.task, set->param, plan), value_text(set->value),
+                       set->who.empty() ? "" : " by ", set->who);
   if (const auto* change = std::get_if<record::ModeChange>(&event.what))
     return fmt::format("mode {}: {}", name_at(plan.value("modes", Json::array()), change->mode), change->reason);
   return record::name_of(event.kind);

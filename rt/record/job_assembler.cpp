@@ -26,10 +26,13 @@ RecordedJob::Input& input_of(RecordedJob& job, const Event& event) {
 void JobAssembler::add(int32_t id, const Event& event) {
   Ring& ring = rings_[id];
   switch (event.kind) {
-    case Kind::param: return param(event);
+    case Kind::param:
+      if (auto value = value_of(ring, event)) param(event, std::move(*value));
+      return;
     case Kind::release: return open(ring, event);
     case Kind::handed:
     case Kind::seen:
+    case Kind::kept:
     case Kind::restart: return restart(ring, event);
     default: break;
   }
@@ -71,17 +74,19 @@ void JobAssembler::open(Ring& ring, const Event& event) {
   open.job.index = event.job;
   open.job.release_ns = event.at_ns;
   open.job.deadline_ns = event.value;
-  for (Given& given : params_[event.task])
-    if (given.at_ns >= restarted_ns_[event.task]) open.job.params.push_back(std::move(given.param));
-  params_[event.task].clear();
+  open.job.params = params_[event.task];
 }
 
 void JobAssembler::close(Ring& ring, Open& open, const Event& event) {
   ring.lost = event.extra;
   open.job.published_ns = event.at_ns;
   if (open.job.visible_at_ns == 0) open.job.visible_at_ns = event.at_ns;
-  if (open.whole && open.lost == event.extra) take_job_(open.job);
-  else ++incomplete_;
+  if (!open.whole || open.lost != event.extra) {
+    ++incomplete_;
+    return;
+  }
+  take_job_(open.job);
+  params_[event.task].clear();
 }
 
 void JobAssembler::cut_off(const Open& open) {
@@ -107,7 +112,8 @@ void JobAssembler::offer(Open& open, const Event& event) {
 
 void JobAssembler::restart(Ring& ring, const Event& event) {
   Restart* under_way = std::get_if<Restart>(&ring.restart.what);
-  if (under_way == nullptr || ring.restart.task != event.task || ring.restart.job != event.job) {
+  const RecordedEvent& before = ring.restart;
+  if (under_way == nullptr || before.task != event.task || before.job != event.job || before.at_ns != event.at_ns) {
     ring.restart = {static_cast<uint16_t>(EventKind::restart), event.task, event.job, event.at_ns, Restart{}};
     under_way = &std::get<Restart>(ring.restart.what);
   }
@@ -115,13 +121,16 @@ void JobAssembler::restart(Ring& ring, const Event& event) {
   if (event.kind == Kind::handed)
     under_way->outputs.push_back({event.port, number, static_cast<uint64_t>(event.extra)});
   if (event.kind == Kind::seen) under_way->seen.push_back({event.port, number});
+  if (event.kind == Kind::kept)
+    if (auto value = value_of(ring, event)) under_way->params.push_back({event.port, std::move(*value)});
   if (event.kind != Kind::restart) return;
   under_way->level = static_cast<int32_t>(event.value);
   restarted_ns_[event.task] = event.at_ns;
-  if (const auto before = ring.open.find(event.task); before != ring.open.end()) {
-    before->second.whole = before->second.whole && before->second.lost == event.extra;
-    cut_off(before->second);
-    ring.open.erase(before);
+  params_[event.task].clear();
+  if (const auto died = ring.open.find(event.task); died != ring.open.end()) {
+    died->second.whole = died->second.whole && died->second.lost == event.extra;
+    cut_off(died->second);
+    ring.open.erase(died);
   }
   if (std::exchange(ring.lost, event.extra) == event.extra) take_event_(ring.restart);
   else ++incomplete_;
@@ -159,25 +168,28 @@ void JobAssembler::fill(Open& open, const Event& event) {
   }
 }
 
-void JobAssembler::param(const Event& event) {
-  switch (static_cast<ParamMail::Kind>(event.extra)) {
-    case ParamMail::flag: return give(event, event.value != 0);
-    case ParamMail::integer: return give(event, event.value);
-    case ParamMail::number: return give(event, std::bit_cast<double>(event.value));
-    case ParamMail::text: break;
+/// Once its last piece has come.
+std::optional<ParamValue> JobAssembler::value_of(Ring& ring, const Event& event) {
+  switch (static_cast<PlainParam::Kind>(event.extra & 0xff)) {
+    case PlainParam::flag: return event.value != 0;
+    case PlainParam::integer: return event.value;
+    case PlainParam::number: return std::bit_cast<double>(event.value);
+    case PlainParam::text: break;
   }
-  if (const std::pair of(event.task, event.at_ns); std::exchange(text_of_, of) != of)
-    text_.clear();  // whoever noted the rest of it died
+  if (const std::pair of(event.task, event.at_ns); std::exchange(ring.text_of, of) != of)
+    ring.text.clear();  // its process died within the one before
   std::array<char, sizeof event.value + 1> piece{};
   std::memcpy(piece.data(), &event.value, sizeof event.value);
-  text_ += piece.data();
-  if (std::strlen(piece.data()) < sizeof event.value) give(event, std::exchange(text_, {}));
+  ring.text += piece.data();
+  if (std::strlen(piece.data()) == sizeof event.value) return std::nullopt;
+  return std::exchange(ring.text, {});
 }
 
-void JobAssembler::give(const Event& event, ParamValue value) {
-  params_[event.task].push_back({event.at_ns, {event.port, value}});
+void JobAssembler::param(const Event& event, ParamValue value) {
+  // The ring of a process that died may be read after that of the next one.
+  if (event.at_ns >= restarted_ns_[event.task]) params_[event.task].push_back({event.port, value});
   take_event_({static_cast<uint16_t>(EventKind::parameter), event.task, event.job, event.at_ns,
-               ParameterSet{event.port, std::move(value), {}}});
+               ParameterSet{event.port, std::move(value), "uid " + std::to_string(event.extra >> 8)}});
 }
 
 }  // namespace takt::record

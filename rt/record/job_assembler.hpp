@@ -2,6 +2,9 @@
 #pragma once
 #include <functional>
 #include <map>
+#include <optional>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "rt/record/recorded_event.hpp"
@@ -40,10 +43,8 @@ class JobAssembler {
     uint16_t at_work = trace::kNoTask;
     int64_t lost = 0;  ///< events, as it last told
     RecordedEvent restart;
-  };
-  struct Given {
-    int64_t at_ns = 0;
-    RecordedJob::Param param;
+    std::string text;                        ///< of a parameter, as far as it has come
+    std::pair<uint16_t, int64_t> text_of{};  ///< task and instant
   };
   void open(Ring& ring, const trace::Event& event);
   void close(Ring& ring, Open& open, const trace::Event& event);
@@ -51,16 +52,14 @@ class JobAssembler {
   static void fill(Open& open, const trace::Event& event);
   static void offer(Open& open, const trace::Event& event);
   void restart(Ring& ring, const trace::Event& event);
-  void param(const trace::Event& event);
-  void give(const trace::Event& event, ParamValue value);
+  void param(const trace::Event& event, ParamValue value);
+  static std::optional<ParamValue> value_of(Ring& ring, const trace::Event& event);
 
   TakeJob take_job_;
   TakeEvent take_event_;
   std::map<int32_t, Ring> rings_;
-  std::map<uint16_t, std::vector<Given>> params_;  ///< by task: for its next job
-  std::map<uint16_t, int64_t> restarted_ns_;       ///< by task: what was given before is gone
-  std::string text_;                               ///< of a parameter, as far as it has come
-  std::pair<uint16_t, int64_t> text_of_{};         ///< task and instant
+  std::map<uint16_t, std::vector<RecordedJob::Param>> params_;  ///< by task: for its next whole job
+  std::map<uint16_t, int64_t> restarted_ns_;  ///< by task: what is to be had of a value set before, the restart says
   uint64_t incomplete_ = 0;
 };
 

@@ -23,6 +23,7 @@ struct Body {
     at.number(restart.level), at.number(restart.phase);
     at.list(restart.outputs, [&](auto& o) { at.number(o.output), at.number(o.handed_over), at.number(o.newest); });
     at.list(restart.seen, [&](auto& seen) { at.number(seen.edge), at.number(seen.sequence); });
+    at.list(restart.params, [&](auto& param) { at.number(param.param), at.value(param.value); });
   }
   template <class P>
   requires std::is_same_v<std::remove_const_t<P>, ParameterSet>
@@ -70,8 +71,8 @@ tl::expected<RecordedEvent, std::string> unpack_event(std::span<const std::byte>
 const char* event_layout() {
   return "u16 kind, u16 task (65535: none), u32 job, i64 at_ns, and by kind: "
          "1 restart: i32 level, u32 phase (0), [u16 output, u64 handed_over, u64 newest] outputs, [u16 edge, u64 "
-         "sequence] seen; "
-         "2 parameter: u16 param, u8 kind (0 flag, 1 integer, 2 number, 3 text), value, text who; "
+         "sequence] seen, [u16 param, u8 kind (0 flag, 1 integer, 2 number, 3 text), value] params; "
+         "2 parameter: u16 param, u8 kind, value, text who; "
          "3 mode: u32 mode, text reason; "
          "4 request, 5 mark, 6 snapshot, 7 machine_lost, 8 level: reserved; pass over kinds and bytes behind that you "
          "do not know; little-endian, [..] is u32 count and the elements, text is u32 bytes and the bytes";

@@ -12,7 +12,7 @@
 #include <variant>
 #include <vector>
 
-#include "rt/node.hpp"
+#include "rt/record/recorded_job.hpp"
 
 namespace takt::record {
 
@@ -48,6 +48,7 @@ struct Restart {
   uint32_t phase = 0;  ///< reserved: where the quality controller stood
   std::vector<Output> outputs;
   std::vector<Seen> seen;
+  std::vector<RecordedJob::Param> params;  ///< set before, and taken up before Node::start()
   bool operator==(const Restart&) const = default;
 };
 
@@ -55,7 +56,7 @@ struct Restart {
 struct ParameterSet {
   uint16_t param = 0;  ///< index into Node::params()
   ParamValue value;
-  std::string who;  ///< empty: not told
+  std::string who;  ///< "uid 1000"; empty: not told
   bool operator==(const ParameterSet&) const = default;
 };
 

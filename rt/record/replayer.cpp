@@ -259,6 +259,10 @@ bool Replayer::restart(const RecordedEvent& event) {
     options_.renew(event.task);
     attach_writers(event.task);
   }
+  whole = whole && std::all_of(restart.params.begin(), restart.params.end(), [&](const RecordedJob::Param& kept) {
+            const auto& params = task.node->params();
+            return kept.param < params.size() && params[kept.param]->set(kept.value);
+          });
   for_each_handed_over(event, [&](uint16_t output, uint64_t sequence) {
     const Stored* message = stored(task.ports[output], sequence);
     whole = whole && message != nullptr;

@@ -121,7 +121,7 @@ TAKT_HOT void Task::take_mail() {
   ParamMail& mail = board_.mail(index_);
   if (mail.state.load(std::memory_order_acquire) != ParamMail::posted) return;
   if (!deliver(mail, *plan_.node)) return;
-  if (trace::on()) trace_param(mail);
+  if (trace::on()) trace_param(trace::Kind::param, mail.param, mail);
   keep(board_.kept(index_, mail.param), mail, ended_.started_ns);
   // Last: after a kill at any step before, the next process takes the same mail.
   mail.state.store(ParamMail::taken, std::memory_order_release);

@@ -12,6 +12,7 @@
 #include "rt/sched/quality.hpp"
 #include "rt/sched/run_board.hpp"
 #include "rt/time/clock.hpp"
+#include "rt/trace/event.hpp"
 
 namespace takt {
 
@@ -108,7 +109,7 @@ class Task {
   /// Tells that a commit word was overwritten.
   void tell_spoiled();
   void count_end();
-  void trace_param(const ParamMail& mail) const;
+  void trace_param(trace::Kind kind, size_t param, const PlainParam& given) const;
   void trace_start() const;
   void trace_inputs() const;
   void trace_end() const;

@@ -20,20 +20,21 @@ void Task::trace_start() const {
                  static_cast<uint8_t>(ended_.level)});
 }
 
-void Task::trace_param(const ParamMail& mail) const {
+void Task::trace_param(trace::Kind kind, size_t param, const PlainParam& given) const {
   const auto note = [&](int64_t value) {
-    trace::record({ended_.started_ns, value, mail.kind, static_cast<uint32_t>(ended_.index),
-                   static_cast<uint16_t>(index_), trace::Kind::param, static_cast<uint8_t>(mail.param)});
+    trace::record({ended_.started_ns, value, given.kind | int64_t{given.by_user} << 8,
+                   static_cast<uint32_t>(ended_.index), static_cast<uint16_t>(index_), kind,
+                   static_cast<uint8_t>(param)});
   };
-  switch (mail.kind) {
-    case ParamMail::number: return note(std::bit_cast<int64_t>(mail.real));
-    case ParamMail::flag:
-    case ParamMail::integer: return note(mail.whole);
-    case ParamMail::text: break;
+  switch (given.kind) {
+    case PlainParam::number: return note(std::bit_cast<int64_t>(given.real));
+    case PlainParam::flag:
+    case PlainParam::integer: return note(given.whole);
+    case PlainParam::text: break;
   }
-  for (size_t at = 0; at == 0 || std::memchr(mail.words.characters.data() + at - 8, 0, 8) == nullptr; at += 8) {
+  for (size_t at = 0; at == 0 || std::memchr(given.words.characters.data() + at - 8, 0, 8) == nullptr; at += 8) {
     int64_t piece = 0;
-    std::memcpy(&piece, mail.words.characters.data() + at, sizeof piece);
+    std::memcpy(&piece, given.words.characters.data() + at, sizeof piece);
     note(piece);
   }
 }
@@ -72,6 +73,9 @@ void Task::trace_restart() const {
   };
   for (size_t i = 0; i < handed_.size(); ++i) note(trace::Kind::handed, i, handed_[i], sequences_[i]);
   for (size_t e = 0; e < plan_.edges.size(); ++e) note(trace::Kind::seen, e, latch_.statistics(e).last_seen, 0);
+  // What start() took up: only this thread keeps another value, and has taken none yet.
+  for (size_t p = 0; p < board_.param_count(index_); ++p)
+    if (const KeptParam::Value* kept = board_.kept(index_, p).newest()) trace_param(trace::Kind::kept, p, *kept);
   note(trace::Kind::restart, 0, static_cast<uint64_t>(quality_.level()), trace::lost());
 }
 

@@ -90,6 +90,8 @@ TEST_CASE("A cut goes on from the last restart before it, with the message that 
   const record::ReplayResult result = replayed(part);
   CHECK(result.restarts > 0);
   CHECK(result.compared > 6);
+  INFO((result.first ? result.first->node + ", job " + std::to_string(result.first->job) + ": " + result.first->what
+                     : ""));
   CHECK(result.different == 0);
   CHECK(result.lacking == 0);
 }
@@ -112,7 +114,7 @@ TEST_CASE("Events are exported as log lines") {
     return true;
   }));
   CHECK(lines.size() == 8);
-  CHECK(std::count(lines.begin(), lines.end(), "filter: bias set to 0.5") == 1);
+  CHECK(std::count(lines.begin(), lines.end(), "filter: bias set to 0.5 by uid 0") == 1);
   CHECK(std::count_if(lines.begin(), lines.end(),
                       [](const std::string& line) { return line.starts_with("filter: restart before job "); }) == 2);
 }

@@ -10,8 +10,8 @@ namespace {
 
 const std::vector<RecordedEvent>& all_known() {
   static const std::vector<RecordedEvent> events{
-      {1, 3, 70'000, 5'000, Restart{2, 0, {{0, 7, 9}, {1, 0, 0}}, {{4, 12}}}},
-      {2, 3, 70'001, 6'000, ParameterSet{1, ParamValue(std::string("half a word")), "1000"}},
+      {1, 3, 70'000, 5'000, Restart{2, 0, {{0, 7, 9}, {1, 0, 0}}, {{4, 12}}, {{1, 0.5}, {3, std::string("words")}}}},
+      {2, 3, 70'001, 6'000, ParameterSet{1, ParamValue(std::string("half a word")), "uid 1000"}},
       {2, 0, 1, 6'000, ParameterSet{0, ParamValue(false), ""}},
       {3, RecordedEvent::kNoTask, 0, 7'000, ModeChange{2, "deadline missed"}}};
   return events;

@@ -288,13 +288,13 @@ TEST_CASE("A job that was cut off and lost an event is counted, not told") {
 
 TEST_CASE("A restart says what its task went on from, and forgets what was set before it") {
   Heard heard;
-  heard.add(1, Kind::param, 100, std::bit_cast<int64_t>(2.5), ParamMail::number, 2);
+  heard.add(1, Kind::param, 100, std::bit_cast<int64_t>(2.5), ParamMail::number | 1000 << 8, 2);
   heard.restart(1, 7, 500, 6);
   heard.add(1, Kind::param, 500, std::bit_cast<int64_t>(3.5), ParamMail::number, 3, 7);
   heard.whole_job(1, 7);
   REQUIRE(heard.events.size() == 3);
-  CHECK(heard.events[0] == RecordedEvent{2, 4, 1, 100, ParameterSet{2, 2.5, ""}});
-  CHECK(heard.events[1] == RecordedEvent{1, 4, 7, 500, Restart{1, 0, {{0, 6, 6}}, {{2, 17}}}});
+  CHECK(heard.events[0] == RecordedEvent{2, 4, 1, 100, ParameterSet{2, 2.5, "uid 1000"}});
+  CHECK(heard.events[1] == RecordedEvent{1, 4, 7, 500, Restart{1, 0, {{0, 6, 6}}, {{2, 17}}, {}}});
   REQUIRE(heard.jobs.size() == 1);
   CHECK(heard.jobs[0].params == std::vector<RecordedJob::Param>{{3, 3.5}});
 }
@@ -309,4 +309,49 @@ TEST_CASE("A text that its thread did not live to note to its end leaves nothing
   heard.whole_job(1, 7);
   REQUIRE(heard.jobs.size() == 1);
   CHECK(heard.jobs[0].params == std::vector<RecordedJob::Param>{{3, std::string("short")}});
+}
+
+TEST_CASE("A restart says which values its node took up; the next job has only what was set after it") {
+  Heard heard;
+  const auto noted = [&](Kind kind, int64_t at_ns, const char* eight) {
+    int64_t piece = 0;
+    std::memcpy(&piece, eight, 8);
+    heard.add(1, kind, at_ns, piece, ParamMail::text | 1000 << 8, 3, 7);
+  };
+  noted(Kind::param, 100, "eightcha");  // its process died in the middle of the text
+  heard.add(1, Kind::handed, 500, 6, 6, 0, 7);
+  noted(Kind::kept, 500, "eightcha");
+  noted(Kind::kept, 500, "racters\0");
+  heard.add(1, Kind::kept, 500, 5, ParamMail::integer, 4, 7);
+  heard.add(1, Kind::restart, 500, 0, 0, 0, 7);
+  noted(Kind::param, 500, "short\0\0\0");
+  // That of the process before comes late where its thread had another ring.
+  heard.add(2, Kind::param, 100, 9, ParamMail::integer, 4);
+  heard.whole_job(1, 7);
+  heard.whole_job(1, 8);
+  REQUIRE(heard.events.size() == 3);
+  CHECK(std::get<Restart>(heard.events[0].what).params ==
+        std::vector<RecordedJob::Param>{{3, std::string("eightcharacters")}, {4, int64_t{5}}});
+  REQUIRE(heard.jobs.size() == 2);
+  CHECK(heard.jobs[0].params == std::vector<RecordedJob::Param>{{3, std::string("short")}});
+  CHECK(heard.jobs[1].params.empty());
+  CHECK(heard.assembler.incomplete() == 0);
+}
+
+TEST_CASE("What was set before a job that lost an event is told with the next whole one") {
+  Heard heard;
+  heard.add(1, Kind::param, 90, 7, ParamMail::integer, 2);
+  heard.whole_job(1, 1, 0, 2);
+  heard.whole_job(1, 2, 2);
+  REQUIRE(heard.jobs.size() == 1);
+  CHECK(heard.jobs[0].params == std::vector<RecordedJob::Param>{{2, int64_t{7}}});
+}
+
+TEST_CASE("Two processes that died while they noted the same restart leave one") {
+  Heard heard;
+  heard.add(1, Kind::handed, 400, 6, 6, 0, 7);
+  heard.restart(1, 7, 500, 6);
+  REQUIRE(heard.events.size() == 1);
+  CHECK(std::get<Restart>(heard.events[0].what).outputs.size() == 1);
+  CHECK(heard.events[0].at_ns == 500);
 }
