@@ -4,7 +4,7 @@
 # Default: 60 s, 20 kills, 10 sets, seed 1. The main graph runs with a process for each subsystem and is recorded. Its processes
 # are killed at random instants, every second one at a random step of a message of a random output; values are set in between.
 # Then every job runs again, in one process and in as many as the run had. Exit 1 if a message differs or cannot be compared,
-# if the recorder lost something, or if fewer kills struck.
+# or if fewer kills struck; 3 if nothing differs, but the recorder lost something, as where its thread got no CPU for 250 ms.
 root=$(readlink -f "$(dirname "$0")/../..")
 exec python3 - "${TAKT:-$root/takt}" "$root" "$@" <<'PY'
 import json, os, random, re, subprocess, sys, tempfile, time
@@ -59,12 +59,15 @@ with tempfile.TemporaryDirectory(prefix="restarts-") as work:
           f"events {info['events']}, lost {record['lost']}", flush=True)
     print(f"{struck} kills struck, {len(outages)} outages, {done} values set, {sum(n['cut_off'] for n in info['nodes'])} jobs cut off, "
           f"{sum(n['restarts'] for n in info['nodes'])} tasks started again", flush=True)
-    if report["recorder_lost"]: wrong("the recorder lost something")
     if struck < 0.8 * kills or done < sets: wrong(f"{struck} of {kills} kills, {done} of {sets} values")
     for more in ([], ["--isolate", "subsystem"]):
         replay = subprocess.run([takt, "replay", f"{work}/run.mcap", "--compare", "--output", f"{work}/again"] + more, capture_output=True, text=True)
         print(replay.stdout.strip(), flush=True)
-        if replay.returncode != 0 or not re.search(r"; 0 differ$", replay.stdout, re.M): wrong(f"replay {more}: exit {replay.returncode} {replay.stderr}")
+        same = re.search(r"; 0 differ$", replay.stdout, re.M)
+        if not same or replay.returncode != 0 and not report["recorder_lost"]: wrong(f"replay {more}: exit {replay.returncode} {replay.stderr}")
+    if report["recorder_lost"]:
+        print("the recorder lost something: this run shows little")
+        code = code or 3
     if code and os.environ.get("KEEP"): subprocess.run(["cp", "-r", work, os.environ["KEEP"]])
 sys.exit(code)
 PY

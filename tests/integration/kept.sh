@@ -52,7 +52,7 @@ scan_lost() {
 
 echo "=== kill -9 of each process"
 name=killed
-start_run $name --isolate subsystem --for 0s --report "$work/$name.json"
+start_run $name --isolate subsystem --for 0s --record "$work/$name.mcap" --report "$work/$name.json"
 for line in "${sets[@]}"; do
   words=($line)
   expect 0 "" "$takt" set "${words[1]}" "${words[2]}" --run $run
@@ -84,6 +84,16 @@ assert sorted(parameters) == ["obstacle_stop.beams_min", "obstacle_stop.scan_age
 assert all(p["from"] == "set" and p["at_s"] > 0 and p["taken_up"] == 1 and p["by_user"] == os.getuid() for p in parameters.values()), parameters
 assert parameters["person_tracking.distance"]["value"] == 1.7 and parameters["person_tracking.distance"]["unit"] == "m", parameters
 PY
+
+echo "=== replayed: restarted nodes go on with the values they took up"
+expect 0 "" "$takt" replay "$work/$name.mcap" --compare --output "$work/out"
+prints " 0 differ"
+prints " restarts of nodes done again"
+expect 0 "" "$takt" replay "$work/$name.mcap" --compare --isolate subsystem --output "$work/out"
+prints " 0 differ"
+expect 0 "" "$takt" log export "$work/$name.mcap" -o "$work/export.mcap"
+expect 0 "" "$takt" log info "$work/$name.mcap"
+prints " restart"
 
 echo "=== kept, and replayed"
 name=kept
