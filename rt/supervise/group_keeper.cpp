@@ -47,8 +47,8 @@ void kill_children() {
   }
 }
 
-/// They die with their supervisor, but for one that was just being forked or that has no tie to it; all of them belong
-/// to this process then. Waits until the last one is gone: the next group works on the same board.
+/// They die with their supervisor, but for one that was just being forked or that has no tie to it; all of them belong to
+/// this process then. Waits until the last one is gone: the next group works on the same board.
 void bury_members() {
   pid_t buried = 0;
   for (int tries = 0; tries < 1000 && (buried >= 0 || errno != ECHILD); ++tries) {

@@ -53,7 +53,9 @@ Supervisor::Supervisor(const Plan& plan, RunBoard& board, ProcessGroup& group, T
 void Supervisor::let_end() {
   ending_ = true;
   for (size_t p = 0; p < members_.size(); ++p) {
-    members_[p].spare.use.cpu_ns += group_.spare_cpu_ns(p);
+    const int64_t cpu_ns = group_.spare_cpu_ns(p);
+    members_[p].spare.use.cpu_ns += cpu_ns;
+    lost_cpu_ns_ += cpu_ns;
     group_.end_spare(p);
   }
 }
@@ -177,6 +179,7 @@ void Supervisor::note_spare_end(const ProcessGroup::End& end, int64_t now_ns) {
   Member::Spare& spare = members_[end.process].spare;
   if (ending_) return;
   spare.use.cpu_ns += end.cpu_ns;
+  lost_cpu_ns_ += end.cpu_ns;
   spare.use.ready = false;
   if (members_[end.process].given_up) return;
   ++spare.use.lost;

@@ -70,7 +70,7 @@ class Supervisor {
   SpareUse spare_use(size_t process) const;
   /// A process was given up.
   bool gave_up() const { return gave_up_; }
-  /// CPU time of processes that have died, ns.
+  /// CPU time of processes that have died, and of spares that were not needed, ns.
   int64_t lost_cpu_ns() const { return lost_cpu_ns_; }
 
  private:
@@ -90,8 +90,8 @@ class Supervisor {
     int64_t away_since_ns = 0;  ///< ... and since when it had not been there
     bool hung = false;          ///< ... for a job that did not return
     bool given_up = false;
-    std::vector<Suspect> suspects,
-        passed_over;  ///< at its last crash; of these, what its life after that one was spared
+    std::vector<Suspect> suspects;     ///< at its last crash
+    std::vector<Suspect> passed_over;  ///< what its life after that one is spared
     struct Spare {
       SpareUse use;
       RestartPolicy policy;
