@@ -9,7 +9,6 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <ctime>
 #include <memory>
 #include <optional>
 #include <thread>
@@ -17,6 +16,7 @@
 #include "graph/attach/server.hpp"
 #include "graph/compose/spares.hpp"
 #include "graph/run/expectations.hpp"
+#include "graph/run/iceoryx_daemon.hpp"
 #include "graph/run/live_table.hpp"
 #include "graph/run/member_process.hpp"
 #include "graph/run/outages.hpp"
@@ -31,9 +31,7 @@
 #include "rt/sched/executor.hpp"
 #include "rt/shm/iceoryx_preflight.hpp"
 #include "rt/shm/local_transport.hpp"
-#include "rt/shm/transport_error.hpp"
 #include "rt/supervise/group_keeper.hpp"
-#include "rt/supervise/private_mounts.hpp"
 #include "rt/supervise/process_group.hpp"
 #include "rt/supervise/supervisor.hpp"
 
@@ -46,43 +44,6 @@ constexpr int64_t kPatienceNs = kSlowdown * 3'000'000'000LL;  // for the process
 /// Ends the run with an exit code before it began.
 struct Refused {
   int code;
-};
-
-/// The claim on a place for an iceoryx daemon, if need be a private one. Throws TransportError.
-std::unique_ptr<DaemonClaim> find_room_for_daemon(std::vector<std::string>& adjusted) {
-  const auto claimed = [] {
-    auto claim = std::make_unique<DaemonClaim>(IceoryxPlaces::of_this_machine());
-    iceoryx_preflight(IceoryxPlaces::of_this_machine(), 0);
-    return claim;
-  };
-  try {
-    return claimed();
-  } catch (const TransportError& taken) {
-    const std::string refused = enter_private_mounts();
-    if (!refused.empty()) throw TransportError(fmt::format("{} ({} was refused)", taken.what(), refused));
-    adjusted.push_back("/tmp and /dev/shm -> private ones: another iceoryx daemon is running on this machine");
-    return claimed();
-  }
-}
-
-/// Asks the daemon of the transport again and again, and leaves a sign of life each time it has answered. Afterwards no
-/// sign is expected: what the supervisor still has to do, such as its report, may take longer.
-class DaemonProbe {
- public:
-  DaemonProbe(Transport& transport, GroupSigns& signs, const Clock& clock)
-      : thread_([&](const std::stop_token& end) {
-          keep_rights(Rights::none);
-          while (!end.stop_requested()) {
-            transport.ask_daemon();
-            signs.heartbeat_ns.store(clock.now_ns());
-            const timespec pause{0, 200'000'000};
-            nanosleep(&pause, nullptr);
-          }
-          signs.heartbeat_ns.store(0);
-        }) {}
-
- private:
-  std::jthread thread_;
 };
 
 std::vector<size_t> process_of_tasks(const Plan& plan, const graph::Partition& partition) {

@@ -67,13 +67,19 @@ ModeInForce Modes::in_force() const {
 }
 
 bool Modes::request(uint32_t mode, int64_t from_ns, std::string_view reason, bool by_hand) {
-  if (own_ == nullptr) return gather(), log_.request(mode, from_ns, reason, by_hand);
+  if (own_ == nullptr) {
+    if (any_news()) enter_all(std::unique_lock(gathering_));
+    return log_.request(mode, from_ns, reason, by_hand);
+  }
   if (const ModeInForce now = in_force(); now.mode == mode && now.origin == ModeOrigin::other) return true;
   return (!by_hand || log_.has_room()) && ask(mode, from_ns, reason, ModeOrigin::other);
 }
 
 bool Modes::request_by_rule(uint32_t mode, int64_t from_ns, std::string_view reason) {
-  if (own_ == nullptr) return gather(), log_.request_by_rule(mode, from_ns, reason);
+  if (own_ == nullptr) {
+    if (any_news()) enter_all(std::unique_lock(gathering_));
+    return log_.request_by_rule(mode, from_ns, reason);
+  }
   if (newest() == mode) return true;
   return log_.has_room() && ask(mode, from_ns, reason, ModeOrigin::rule);
 }
@@ -93,22 +99,27 @@ bool Modes::ask(uint32_t mode, int64_t from_ns, std::string_view reason, ModeOri
   return true;
 }
 
+uint64_t Modes::news(size_t process, size_t request) const {
+  const uint64_t word = requests_[process]->requests[request].word.load(std::memory_order_acquire);
+  return word == entered_[process]->words[request].load(std::memory_order_relaxed) ? 0 : word;
+}
+
+bool Modes::any_news() const {
+  for (size_t process = 0; process < requests_.size(); ++process)
+    for (size_t i = 0; i < ModeRequests::kKept; ++i)
+      if (news(process, i) != 0) return true;
+  return false;
+}
+
 void Modes::gather() {
-  const auto news = [&](size_t process, size_t i) -> uint64_t {
-    const uint64_t word = requests_[process]->requests[i].word.load(std::memory_order_acquire);
-    return word == entered_[process]->words[i].load(std::memory_order_relaxed) ? 0 : word;
-  };
-  const auto none = [&] {
-    for (size_t process = 0; process < requests_.size(); ++process)
-      for (size_t i = 0; i < ModeRequests::kKept; ++i)
-        if (news(process, i) != 0) return false;
-    return true;
-  };
-  if (none()) return;
+  if (any_news()) enter_all(std::unique_lock(gathering_, std::try_to_lock));
+}
+
+void Modes::enter_all(std::unique_lock<std::mutex> turn) {
+  if (!turn) return;
   struct New : ModeEntry {
     BoundedText<120> reason;
   };
-  const std::lock_guard lock(gathering_);
   std::vector<New> all;
   for (size_t process = 0; process < requests_.size(); ++process)
     for (size_t i = 0; i < ModeRequests::kKept; ++i) {

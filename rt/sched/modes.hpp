@@ -33,7 +33,8 @@ struct alignas(kCacheLine) EnteredRequests {
 ///   modes.request(safe_stop, now_ns + ModeLog::kLead_ns, "guard: missed its deadline");
 ///   const uint32_t mode = modes.at(release_ns);
 ///
-/// Any thread, none waits; only gather() and what the supervisor asks for take turns. See ModeLog for the rules.
+/// Any thread, none waits but what the supervisor asks for while another of its threads gathers. See ModeLog for the
+/// rules.
 class Modes {
  public:
   /// `log` and `entered` are the supervisor's; `requests` and `entered` by process.
@@ -42,7 +43,8 @@ class Modes {
 
   /// From here on this process is one of those that ask. Before there is a second thread.
   void speak_as(size_t process) { own_ = requests_[process]; }
-  /// By the supervisor, every few ms: enters into the log what processes have asked for.
+  /// By the supervisor, every few ms: enters into the log what processes have asked for. Does not wait for another of
+  /// its threads that is at it.
   void gather();
 
   uint32_t at(int64_t release_ns) const;
@@ -67,6 +69,9 @@ class Modes {
     size_t count = 0;
   };
   Unmerged unmerged() const;
+  uint64_t news(size_t process, size_t request) const;
+  bool any_news() const;
+  void enter_all(std::unique_lock<std::mutex> turn);
   bool ask(uint32_t mode, int64_t from_ns, std::string_view reason, ModeOrigin origin);
 
   ModeLog& log_;
