@@ -49,7 +49,7 @@ expect 2 "is the record itself" "$takt" log cut "$work/cut.mcap" -o "$work/cut.m
 echo "=== records of format 1"
 old=$source/tests/integration/records
 mkdir "$work/old"
-cp "$old"/*.yaml "$source"/graph/worlds/lab.* "$work/old/"
+cp -L "$old"/*.yaml "$old"/lab.* "$work/old/"
 while read -r name content jobs; do
   tells 0 "content $content" "$takt" log info "$old/$name.mcap"
   tells 0 "format 1" "$takt" log info "$old/$name.mcap"
