@@ -14,6 +14,7 @@
 #include "rt/sched/param_mail.hpp"
 #include "rt/shm/kill_order.hpp"
 #include "rt/shm/local_transport.hpp"
+#include "rt/supervise/nursery.hpp"
 #include "tests/unit/record/recorded_run.hpp"
 
 namespace takt::test {
@@ -53,8 +54,8 @@ class RestartedRun {
       : gain_(gain),
         board_(graph_.plan, 1),
         transport_(make_local_transport(graph_.plan.ports, file_, kSelf)),
-        recorder_(graph_.plan, board_, *transport_, sink, head, with_caller(std::move(how))),
-        rings_(3 * lives) {
+        rings_(3 * lives),
+        recorder_(graph_.plan, board_, *transport_, sink, head, with_caller(std::move(how))) {
     trace::Collector::Options heard;
     heard.best = trace::Source::none;
     heard.by_caller = true;
@@ -70,9 +71,8 @@ class RestartedRun {
     shared_->order.port.store(life.port);
     shared_->order.passes.store(life.passes);
     shared_->order.step.store(life.step);
-    const pid_t child = fork();
-    REQUIRE(child >= 0);
-    if (child == 0) run_child();
+    const pid_t child = nursery_.fork_child(0);
+    REQUIRE(child > 0);
     int status = 0;
     REQUIRE(waitpid(child, &status, 0) == child);
     const bool killed = WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL;
@@ -80,7 +80,7 @@ class RestartedRun {
     collector_->drain();
     transport_->reclaim(kVictim);
     recorder_.capture();
-    began_ = true;
+    shared_->began.store(true);
     return killed;
   }
   uint64_t sets() const { return sets_; }
@@ -94,6 +94,7 @@ class RestartedRun {
   struct Shared {
     KillOrder order;
     std::atomic<int64_t> last_ns{kEpoch};
+    std::atomic<bool> began{false};
   };
   static record::Recorder::Options with_caller(record::Recorder::Options how) {
     how.by_caller = true;
@@ -110,7 +111,7 @@ class RestartedRun {
     obey_orders(&shared_->order);
     try {
       LongGraph graph(gain_);
-      const int64_t from_ns = shared_->last_ns.load() + (began_ ? 150 * kMs : 0);
+      const int64_t from_ns = shared_->last_ns.load() + (shared_->began ? 150 * kMs : 0);
       VirtualClock clock(from_ns);
       const auto transport = join_local_transport(graph.plan.ports, file_, kVictim);
       EpochGate gate;
@@ -118,7 +119,7 @@ class RestartedRun {
       how.board = &board_;
       how.trace = &rings_;
       how.gate = &gate;
-      how.rejoin = began_;
+      how.rejoin = shared_->began;
       how.after_step = [&] {
         shared_->last_ns.store(clock.now_ns());
         if (clock.now_ns() > from_ns + kLongestLife) raise(SIGKILL);
@@ -135,11 +136,12 @@ class RestartedRun {
   RunBoard board_;
   PoolFile file_{kVictim};
   std::unique_ptr<Transport> transport_;
-  record::Recorder recorder_;
-  trace::Rings rings_;
-  std::optional<trace::Collector> collector_;
   Shared* shared_ = map();
-  bool began_ = false;
+  trace::Rings rings_;
+  /// Before the recorder has its thread, which may hold a lock of the allocator at a fork.
+  Nursery nursery_{[this](size_t) -> int { run_child(); }};
+  record::Recorder recorder_;
+  std::optional<trace::Collector> collector_;
   uint64_t sets_ = 0;
 };
 
