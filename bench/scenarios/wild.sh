@@ -7,7 +7,7 @@
 # Shown: what the stores hit; whether another process ended; whether a store changed a byte of another one's messages or
 # records (each leaves a pattern that is looked for in all of the shared memory); damaged messages, withheld or lost, by name.
 # What all processes write (logs of what was seen, commit words: docs/limits.md) counts as the victim's own.
-# Exit 1 if another process ended, or a byte elsewhere changed.
+# The spare of a victim takes its place, so its own name is gone for a while. Exit 1 if another process ended, or a byte elsewhere changed.
 root=$(readlink -f "$(dirname "$0")/../..")
 export PYTHONPATH="$root/bench/scenarios" PYTHONDONTWRITEBYTECODE=1
 exec python3 - "${TAKT:-$root/takt}" "$@" <<'PY'
@@ -92,7 +92,7 @@ with tempfile.TemporaryDirectory(prefix="wild-") as work:
                 if not any(k == kind and begin <= offset < end for k, begin, end in own): wrong.append((name, kind, offset))
         time.sleep(PAUSE_S / 2)
         now = {processes.name(p): p for p in processes.children(run.pid)}
-        strangers += [other for other, p in members.items() if other != name and now.get(other) != p]
+        strangers += [other for other, p in members.items() if other not in (name, name + "-spare") and now.get(other) != p]
         time.sleep(PAUSE_S / 2)
     survived = run.poll() is None
     if survived: run.send_signal(signal.SIGINT)

@@ -97,7 +97,7 @@ TEST_CASE("rights are read thread by thread, with names") {
       const auto all = thread_rights(getpid());
       const auto mine =
           std::find_if(all.begin(), all.end(), [](const ThreadRights& t) { return t.name == "of no right"; });
-      code = all.size() == 2 && mine != all.end() && mine->capabilities == 0 ? kGood : 1;
+      code = all.size() >= 2 && mine != all.end() && mine->capabilities == 0 ? kGood : 1;
     }).join();
     return code;
   }));

@@ -86,7 +86,7 @@ struct SupervisorScene {
     bury(pid);
   }
   /// The first process ends in a job that has messages `from` to `to` in hand, none of which a job before had.
-  void crash_on(uint64_t from, uint64_t to, int signal = SIGBUS) {
+  void crash_on(uint64_t from, uint64_t to, int signal = SIGUSR1) {
     board->task(0).in_job.store(7);
     board->edge(0, 0).last_seen = from - 1;
     board->edge(0, 0).in_hand.store(to);
