@@ -221,11 +221,7 @@ class Admitting {
     }
   }
 
-  bool high(size_t lane) const {
-    const auto& members = lanes_.lanes[lane];
-    return std::any_of(members.begin(), members.end(),
-                       [&](size_t t) { return plan_.tasks[t].criticality == Criticality::high; });
-  }
+  bool high(size_t lane) const { return any_high(plan_, lanes_.lanes[lane]); }
 
   int64_t excess_ns() const {
     return plan_.policy == Policy::fixed ? overheads_.demotion_ns + (overheads_.demotion_ns > 0 ? kWatchGrain_ns : 0)

@@ -13,7 +13,7 @@ namespace takt::graph {
 /// Whether a process of a run has a spare: a second process with its part composed, which takes its place when it dies.
 struct SpareChoice {
   bool wanted = false;
-  std::string why;  ///< "chain stop (200 ms) allows less than the 0.5 s that a return takes without one"
+  std::string why;  ///< "chain stop allows 200 ms, a return without a spare takes 300"
 };
 
 /// How long a process is away without a spare, from kill to first publication: what its readers' ages must allow.

@@ -196,11 +196,8 @@ bool Executor::run_partitioned(Policy policy, RunResult& result) {
       prefault_stack();
       crew.grants[i] = apply_below_watchdog(mine, patience_ns);
       lane.watch().bind(mine);
-      if (options_.rejoin && crew.grants[i].error == EBUSY) {
-        const bool high = std::any_of(lane.members().begin(), lane.members().end(),
-                                      [&](size_t t) { return plan_.tasks[t].criticality == Criticality::high; });
-        crew.grants[i] = go_beside(lane, mine, /*behind=*/!high);
-      }
+      if (options_.rejoin && crew.grants[i].error == EBUSY)
+        crew.grants[i] = go_beside(lane, mine, /*behind=*/!any_high(plan_, lane.members()));
       crew.ready.arrive_and_wait();
       crew.started.arrive_and_wait();
       if (!crew.go.load()) return;

@@ -121,11 +121,6 @@ void add_ordinary(const Overheads& o, analysis::TaskSet& set) {
   }
 }
 
-bool is_high(const Plan& plan, const std::vector<size_t>& lane) {
-  return std::any_of(lane.begin(), lane.end(),
-                     [&](size_t t) { return plan.tasks[t].criticality == Criticality::high; });
-}
-
 /// In deadline monotonic order nobody behind has a shorter lead, so that his own covers how much earlier than released
 /// one of those before him may begin. In another order the rest of that is charged once, as blocking. `order`: the
 /// tasks of a core, the highest priority first.
@@ -156,7 +151,7 @@ void put_high_first(const Plan& plan, const LaneTasks& lanes, std::vector<size_t
   std::vector<int> priorities;
   for (const size_t i : indexes) priorities.push_back(set.tasks[i].priority);
   std::stable_partition(indexes.begin(), indexes.end(),
-                        [&](size_t i) { return i < lanes.lanes.size() && is_high(plan, lanes.lanes[i]); });
+                        [&](size_t i) { return i < lanes.lanes.size() && any_high(plan, lanes.lanes[i]); });
   for (size_t k = 0; k < indexes.size(); ++k) set.tasks[indexes[k]].priority = priorities[k];
   charge_longer_leads(plan, lanes, indexes, set);
 }
@@ -307,6 +302,11 @@ void place(const Plan& plan, LaneTasks& lanes) {
 
 }  // namespace
 
+bool any_high(const Plan& plan, std::span<const size_t> tasks) {
+  return std::any_of(tasks.begin(), tasks.end(),
+                     [&](size_t t) { return plan.tasks[t].criticality == Criticality::high; });
+}
+
 LaneTasks lane_tasks(const Plan& plan, Policy policy, const Overheads& overheads) {
   LaneTasks result = unplaced(plan, overheads);
   if (policy == Policy::deadline) {
@@ -354,7 +354,7 @@ std::vector<Reservation> reservations(const Plan& plan, Policy policy) {
     if (policy == Policy::deadline) {
       const int64_t awake_ns = std::max(lane_span_ns(plan, lanes[i]) - lane_wait_ns(plan, lanes[i]), budget_ns);
       wanted[i] = deadline_reservation(budget_ns, awake_ns, plan.tasks[lanes[i].front()].rate->period_ns());
-      wanted[i].reclaims = is_high(plan, lanes[i]);
+      wanted[i].reclaims = any_high(plan, lanes[i]);
     }
     wanted[i].policy = policy;
     if (policy != Policy::fixed) continue;

@@ -41,6 +41,9 @@ int64_t occupied_ns(const Plan& plan, const std::vector<size_t>& lane, std::span
 /// What comes before that where a thread has slept: it is woken, and goes to sleep again.
 inline int64_t begin_ns(const analysis::Overheads& overheads) { return overheads.release_ns + 2 * overheads.switch_ns; }
 
+/// One of these is of high criticality.
+bool any_high(const Plan& plan, std::span<const size_t> tasks);
+
 /// What each lane asks of the kernel under that policy, in the order of lane_members(). Depends on the plan alone, its
 /// overheads included, so that every process of a run comes to the same.
 std::vector<Reservation> reservations(const Plan& plan, Policy policy);

@@ -29,31 +29,40 @@ bool earlier(const ModeEntry& a, const ModeEntry& b) { return a.from_ns < b.from
 
 }  // namespace
 
-Modes::Unmerged Modes::unmerged() const {
-  Unmerged all;
+template <class Visitor>
+void Modes::for_each_unmerged(const Visitor& visit) const {
   // Before the requests: one that is entered meanwhile is seen as well here, and never missed by both.
   const int64_t merged_until_ns = log_.newest_ns();
   for (const ModeRequests* asked : requests_) {
     const uint64_t count = asked->count.load(std::memory_order_acquire);
-    for (uint64_t i = count; i > 0 && count - i < ModeRequests::kKept && all.count < all.changes.size(); --i) {
+    for (uint64_t i = count; i > 0 && count - i < ModeRequests::kKept; --i) {
       const auto change = valid(asked->requests[(i - 1) % ModeRequests::kKept]);
       if (!change) continue;
       if (change->from_ns <= merged_until_ns) break;
-      const auto end = all.changes.begin() + static_cast<std::ptrdiff_t>(all.count);
-      const auto place = std::upper_bound(all.changes.begin(), end, *change, earlier);
-      std::move_backward(place, end, end + 1);
-      *place = *change;
-      ++all.count;
+      visit(*change);
     }
   }
+}
+
+Modes::Unmerged Modes::unmerged() const {
+  Unmerged all;
+  for_each_unmerged([&](const ModeEntry& change) {
+    if (all.count == all.changes.size()) return;
+    const auto end = all.changes.begin() + static_cast<std::ptrdiff_t>(all.count);
+    const auto place = std::upper_bound(all.changes.begin(), end, change, earlier);
+    std::move_backward(place, end, end + 1);
+    *place = change;
+    ++all.count;
+  });
   return all;
 }
 
-uint32_t Modes::at(int64_t release_ns) const {
-  const Unmerged asked = unmerged();
-  for (size_t i = asked.count; i-- > 0;)
-    if (asked.changes[i].from_ns <= release_ns) return asked.changes[i].mode;
-  return log_.at(release_ns);
+TAKT_HOT uint32_t Modes::at(int64_t release_ns) const {
+  std::optional<ModeEntry> newest;
+  for_each_unmerged([&](const ModeEntry& change) {
+    if (change.from_ns <= release_ns && (!newest || change.from_ns >= newest->from_ns)) newest = change;
+  });
+  return newest ? newest->mode : log_.at(release_ns);
 }
 
 ModeInForce Modes::in_force() const {

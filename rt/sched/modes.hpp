@@ -68,6 +68,8 @@ class Modes {
     std::array<ModeEntry, 32> changes;  ///< in the order of their instants; more at once are a matter of the log
     size_t count = 0;
   };
+  template <class Visitor>
+  void for_each_unmerged(const Visitor& visit) const;
   Unmerged unmerged() const;
   uint64_t news(size_t process, size_t request) const;
   bool any_news() const;

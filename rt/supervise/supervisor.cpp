@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "rt/node.hpp"
+#include "rt/sched/lane_tasks.hpp"
 
 namespace takt {
 namespace {
@@ -264,10 +265,8 @@ void Supervisor::give_up(size_t process, int64_t now_ns, const std::string& caus
   gave_up_ = true;
   members_[process].given_up = true;
   group_.end_spare(process);
-  const Member& member = members_[process];
-  const bool high = std::any_of(member.tasks.begin(), member.tasks.end(),
-                                [&](size_t t) { return plan_.tasks[t].criticality == Criticality::high; });
-  if (high) board_.safe_stop(now_ns + ModeLog::kLead_ns, "process " + group_.name(process) + " was given up");
+  if (any_high(plan_, members_[process].tasks))
+    board_.safe_stop(now_ns + ModeLog::kLead_ns, "process " + group_.name(process) + " was given up");
   if (options_.say)
     options_.say("process " + group_.name(process) + " " + cause + " for the " +
                  std::to_string(options_.restarts.most_in_window) + "th time within " +

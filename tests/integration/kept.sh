@@ -3,21 +3,7 @@
 # Deadlines are not judged here.
 source "$(dirname "$0")/lib.sh" "$@"
 
-member() { pgrep -x "$1" -P "$run$(pgrep -P $run | sed 's/^/,/' | tr -d '\n')"; }
-told() { # TEXT: waits until the run has said it
-  for ((i = 0; i < 600; ++i)); do
-    grep -qF -- "$1" "$work/$name.err" && return
-    sleep 0.1
-  done
-  cat "$work/$name.err"
-  fail "run $name never said '$1'"
-}
-end_run() { # CODES
-  expect 0 "" "$takt" stop --run $run
-  wait $run
-  local got=$?
-  [[ " $* " == *" $got "* ]] || { tail -n 30 "$work/$name.out"; fail "run $name: exit $got instead of $*"; }
-}
+told() { said "$1" "$work/$name.err"; }
 prints() { grep -qF -- "$1" "$work/stdout" || { cat "$work/stdout"; fail "stdout lacks '$1'"; }; }
 python() { python3 - "$@" || fail "the report is wrong"; }
 overlay=$TAKT_STATE_DIR/overlays/ace.yaml

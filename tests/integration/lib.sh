@@ -56,6 +56,27 @@ start_run() {
   fail "run $name ended before it could be attached to"
 }
 
+# The process NAME of the run. Over iceoryx there is a keeper in front of the supervisor.
+member() { pgrep -x "$1" -P "$run$(pgrep -P $run | sed 's/^/,/' | tr -d '\n')"; }
+
+# said TEXT FILE [TIMES]: waits until the text stands there so often.
+said() {
+  for ((i = 0; i < 600; ++i)); do
+    [ "$(grep -cF -- "$1" "$2")" -ge "${3:-1}" ] && return
+    sleep 0.1
+  done
+  cat "$2"
+  fail "${2##*/} never said '$1'"
+}
+
+# end_run CODES: the run $run, started as $name, ends as it is told to, with one of these.
+end_run() {
+  expect 0 "" "$takt" stop --run $run
+  wait $run
+  local got=$?
+  [[ " $* " == *" $got "* ]] || { tail -n 30 "$work/$name.out"; fail "run $name: exit $got instead of $*"; }
+}
+
 finish() {
   [ $failures -eq 0 ] && echo "all passed"
   exit $((failures > 0))

@@ -3,22 +3,7 @@
 # so. Deadlines are not judged here: a shared machine would make that a coin toss.
 source "$(dirname "$0")/lib.sh" "$@"
 
-# Over iceoryx there is a keeper in front of the supervisor.
-member() { pgrep -x "$1" -P "$run$(pgrep -P $run | sed 's/^/,/' | tr -d '\n')"; }
-told() { # TEXT: waits until the run has said it
-  for ((i = 0; i < 600; ++i)); do
-    grep -qF -- "$1" "$work/$name.err" && return
-    sleep 0.1
-  done
-  cat "$work/$name.err"
-  fail "run $name never said '$1'"
-}
-end_run() { # CODES
-  expect 0 "" "$takt" stop --run $run
-  wait $run
-  local got=$?
-  [[ " $* " == *" $got "* ]] || fail "run $name: exit $got instead of $*"
-}
+told() { said "$1" "$work/$name.err"; }
 
 for transport in local iceoryx; do
   name=$transport

@@ -27,14 +27,7 @@ modes:
   safe_stop: {without: [other]}
 YAML
 }
-told() { # TEXT [TIMES]: waits until the run has said it so often
-  for ((i = 0; i < 600; ++i)); do
-    [ "$(grep -cF -- "$1" "$work/$name.err")" -ge "${2:-1}" ] && return
-    sleep 0.05
-  done
-  cat "$work/$name.err"
-  fail "run $name never said '$1'"
-}
+told() { said "$1" "$work/$name.err" "${2:-1}"; }
 # The process PID... whose name is $1, once there is one that waits (its threads are known by then).
 pid() {
   for ((i = 0; i < 200; ++i)); do

@@ -22,24 +22,16 @@ nodes:
   other: {rate: 10, budget: 8ms, deadline: 90ms}
 YAML
 
-told() { # TEXT FILE: waits until it has been said
-  for ((i = 0; i < 600; ++i)); do
-    grep -qF -- "$1" "$2" && return
-    sleep 0.05
-  done
-  cat "$work/run.err"
-  fail "never said '$1'"
-}
 completed() { "$takt" top --json --once --run $run | python3 -c 'import json, sys; print(sum(n["completed"] for n in json.load(sys.stdin)["nodes"] if n["name"] == "guard"))'; }
 
 policy=deadline
 start_run run "$work/graph.yaml" --for 0s --report "$work/report.json"
 grep -q "policy deadline -> cooperative" "$work/run.err" && { kill $run; wait $run; echo "NOT RUN: SCHED_DEADLINE is refused"; exit 77; }
 coproc stranger { exec python3 "$source/tests/tools/bandwidth_stranger.py" >"$work/stranger" 2>&1; }
-told taken "$work/stranger"
+said taken "$work/stranger"
 sleep 1
 kill -KILL "$(pgrep -x guard -P $run)"
-told "process guard is back" "$work/run.err"
+said "process guard is back" "$work/run.err"
 sleep 1.5  # longer than its own bandwidth could have been under way
 before=$(completed)
 sleep 1
