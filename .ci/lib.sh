@@ -21,6 +21,15 @@ install() {
 # changed PATHS...: whether the change touches one of them; pages do not count.
 changed() { ! git diff --quiet "$base" HEAD -- "$@" ':!*.md'; }
 
+# what_failed STEP LOG: how each test that failed ended (ctest prints its output below its line), and the step's last lines.
+what_failed() {
+  printf '\n=== %s, what failed\n' "$1"
+  awk '/ Test +#[0-9]+: /{if (n) print kept; n = /\*\*\*/; kept = $0; lines = 0; next}
+    n { if (++lines <= 60) kept = kept "\n" $0; else { sub(/\n[^\n]*/, "", kept); kept = kept "\n" $0 } } END { if (n) print kept }' "$2" |
+    cut -c1-300
+  tail -n 15 "$2"
+}
+
 # Properties draw other numbers in each commit; a failure prints the seed, too.
 seed_by_commit() {
   export TAKT_PROPERTY_SEED=$((16#$(git rev-parse --short=8 HEAD | cut -c1-8)))
