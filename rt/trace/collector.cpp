@@ -8,6 +8,7 @@
 #include <ctime>
 #include <fstream>
 #include <sstream>
+#include <utility>
 
 #include "rt/time/clock.hpp"
 
@@ -86,8 +87,8 @@ void Collector::collect() {
 
 void Collector::drain() {
   follow_new_threads();
-  for (size_t i = 0; i < recording_.threads.size(); ++i)
-    rings_.ring(i).drain([&, thread = recording_.threads[i].id](const Event& event) {
+  for (size_t i = 0; i < writers_.size(); ++i)
+    rings_.ring(i).drain([&, thread = writers_[i]](const Event& event) {
       if (options_.listener) options_.listener(static_cast<int32_t>(i), event);
       recording_.events.push_back({thread, event});
     });
@@ -107,9 +108,11 @@ void Collector::add(const Slice& slice) {
 
 void Collector::follow_new_threads() {
   std::vector<int32_t> fresh;
-  for (size_t i = recording_.threads.size(); i < rings_.claimed(); ++i) {
+  for (size_t i = 0; i < rings_.claimed(); ++i) {
     const int32_t writer = rings_.ring(i).writer.load(std::memory_order_acquire);
     if (writer == 0) break;  // it is being claimed
+    if (i == writers_.size()) writers_.push_back(0);
+    if (std::exchange(writers_[i], writer) == writer) continue;
     recording_.threads.push_back({writer, rings_.ring(i).name.data()});
     fresh.push_back(writer);
   }

@@ -62,6 +62,7 @@ class Collector {
   Rings& rings_;
   const Options options_;
   Recording recording_;
+  std::vector<int32_t> writers_;  ///< thread of each ring; another one, once it has taken a dead one's place
   std::unique_ptr<SwitchSource> source_;
   std::vector<int64_t> steal_ticks_;  ///< per CPU of the options
   int64_t steal_read_ns_ = 0;

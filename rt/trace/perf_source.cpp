@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <csignal>
 #include <cstring>
 #include <ctime>
 #include <vector>
@@ -135,7 +136,12 @@ class PerfSource final : public SwitchSource {
     }
   }
   void drain(Switches& into) override {
-    for (const auto& thread : threads_) thread->drain(into, lost_);
+    // A killed process's threads would hold their descriptors and pages for the rest of the run.
+    std::erase_if(threads_, [&](const auto& thread) {
+      const bool gone = kill(thread->thread(), 0) != 0 && errno == ESRCH;
+      thread->drain(into, lost_);
+      return gone;
+    });
   }
   void finish(int64_t now_ns, Switches& into) override {
     for (const auto& thread : threads_) thread->finish(now_ns, into);

@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <atomic>
+#include <csignal>
+#include <filesystem>
+#include <iterator>
 #include <semaphore>
 #include <string>
 #include <thread>
@@ -44,4 +48,33 @@ TEST_CASE("a thread that ends has no CPU from then on") {
     CHECK(slice.to_ns <= ended_ns + 1'000'000);
     CHECK(slice.end != Slice::End::open);
   }
+}
+
+TEST_CASE("of a process that was killed nothing stays open") {
+  std::string why_not;
+  const auto source = open_perf(why_not);
+  if (!source) {
+    MESSAGE("NOT RUN: " << why_not);
+    return;
+  }
+  const auto descriptors = [] {
+    return std::distance(std::filesystem::directory_iterator("/proc/self/fd"), std::filesystem::directory_iterator());
+  };
+  const auto before = descriptors();
+  const pid_t child = fork();
+  REQUIRE(child >= 0);
+  if (child == 0) {
+    pause();
+    _exit(0);
+  }
+  const int32_t ids[] = {child};
+  source->follow(ids);
+  Switches switches;
+  source->drain(switches);
+  CHECK(descriptors() == before + 1);
+  REQUIRE(kill(child, SIGKILL) == 0);
+  REQUIRE(waitpid(child, nullptr, 0) == child);
+  source->drain(switches);
+  CHECK(descriptors() == before);
+  CHECK(source->lost() == 0);
 }

@@ -10,6 +10,7 @@
 #include <thread>
 #include <vector>
 
+#include "rt/trace/collector.hpp"
 #include "rt/trace/rings.hpp"
 
 using namespace takt::trace;
@@ -98,4 +99,30 @@ TEST_CASE("what a killed process noted is still there") {
   CHECK(events[0].value == 1);
   CHECK(events[1].kind == Kind::mode);
   CHECK(events[1].task == kNoTask);
+}
+
+TEST_CASE("who takes a dead thread's ring is another thread of the recording") {
+  Rings rings(2);
+  Collector collector(rings, {.best = Source::none, .by_caller = true});
+  pid_t children[2];
+  for (const pid_t& child : children) {
+    const auto index = static_cast<uint16_t>(&child - children);
+    REQUIRE((children[index] = fork()) >= 0);
+    if (child == 0) {
+      const Thread traced(&rings, "child");
+      level_change(index, 0, 0, 1000 + index);
+      raise(SIGKILL);
+    }
+    REQUIRE(waitpid(child, nullptr, 0) == child);
+    collector.drain();
+  }
+  CHECK(rings.claimed() == 1);
+  const Recording recording = collector.finish();
+  REQUIRE(recording.threads.size() == 2);
+  REQUIRE(recording.events.size() == 2);
+  for (size_t i = 0; i < 2; ++i) {
+    CHECK(recording.threads[i].id == children[i]);
+    CHECK(recording.events[i].thread == children[i]);
+    CHECK(recording.events[i].event.task == i);
+  }
 }
