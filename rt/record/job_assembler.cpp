@@ -144,6 +144,8 @@ void JobAssembler::fill(Open& open, const Event& event) {
     case Kind::start:
       job.start_ns = event.at_ns;
       job.level = event.port;
+      // As the job saw it: a mode that is asked for too late for it may hold from before its release.
+      job.mode = static_cast<uint32_t>(event.value);
       break;
     case Kind::stale: input_of(job, event).stale = true; break;
     case Kind::latch: input_of(job, event).held = {{number, 1}}; break;

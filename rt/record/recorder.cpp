@@ -102,8 +102,6 @@ void Recorder::take_port(Port& port) {
 }
 
 void Recorder::take_job(const RecordedJob& job) {
-  RecordedJob told = job;
-  told.mode = board_.mode_at(job.release_ns);
   // What a job that was cut off offered need not have come out; whoever held it, tells.
   for (const RecordedJob::Output& output : job.outputs)
     if (!job.cut_off) tell(ports_of_[job.task][output.output], output.sequence);
@@ -111,7 +109,7 @@ void Recorder::take_job(const RecordedJob& job) {
     if (!input.held.empty())
       tell(edges_of_[job.task][input.edge], input.held.back().first + input.held.back().count - 1);
   std::vector<std::byte> data = queue_.buffer(job_bytes_);
-  pack(told, data);
+  pack(job, data);
   job_bytes_ = data.size();
   push(jobs_channel_, job.index, job.published_ns, std::move(data));
 }

@@ -129,9 +129,10 @@ TAKT_HOT void Task::take_mail() {
 
 TAKT_HOT int64_t Task::begin(uint64_t index, int64_t release_ns, int64_t duration_ns) {
   const int64_t started = clock_.now_ns();
-  const Mode& mode = mode_of(release_ns);
   ended_ = {};
   ended_.index = index;
+  ended_.mode = board_.mode_at(release_ns);
+  const Mode& mode = modes_[ended_.mode];
   ended_.release_ns = release_ns;
   ended_.started_ns = started;
   if (std::exchange(restarted_, false) && trace::on()) trace_restart();

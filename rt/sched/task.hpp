@@ -84,7 +84,6 @@ class Task {
     std::string name;
     bool runs = true;
   };
-  const Mode& mode_of(int64_t release_ns) const { return modes_[board_.mode_at(release_ns)]; }
   /// The release passes without a job.
   void pass_over(int64_t now_ns, bool count);
   /// Lets the node work, under the eyes of the watchdog.
@@ -143,6 +142,7 @@ class Task {
   struct Ended {
     bool ran = false, paused = false, new_input = false, no_result = false;
     size_t stale = 0;
+    uint32_t mode = 0;  ///< index into Plan::modes, as the job sees it
     uint64_t index = 0;
     int64_t release_ns = 0, started_ns = 0, published_ns = 0, publish_took_ns = 0;
     int64_t exec_ns = 0;  ///< what counts against the budget: CPU time, or what the job was taken to need

@@ -16,7 +16,7 @@ void Task::trace_start() const {
   const auto job = static_cast<uint32_t>(ended_.index);
   const auto lost = static_cast<int64_t>(trace::lost());
   trace::record({ended_.release_ns, ended_.release_ns + plan_.deadline_ns, lost, job, task, trace::Kind::release, 0});
-  trace::record({ended_.started_ns, 0, modelled_ ? 0 : sched_getcpu(), job, task, trace::Kind::start,
+  trace::record({ended_.started_ns, ended_.mode, modelled_ ? 0 : sched_getcpu(), job, task, trace::Kind::start,
                  static_cast<uint8_t>(ended_.level)});
 }
 

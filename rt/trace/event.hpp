@@ -33,7 +33,7 @@ enum class Kind : uint8_t {
 ///
 /// | kind    | at                | value             | extra              | port            |
 /// | release | planned release   | absolute deadline | events lost so far | -               |
-/// | start   | start             | -                 | CPU                | level           |
+/// | start   | start             | number of mode    | CPU                | level           |
 /// | latch   | start             | sequence          | stamp              | index of edge   |
 /// | finish  | end of run()      | CPU time, ns      | CPU                | -               |
 /// | publish | publication       | sequence          | stamp              | index of output |

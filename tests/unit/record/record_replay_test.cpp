@@ -146,6 +146,29 @@ TEST_CASE("A parameter that is set while the run goes on is set again before the
   CHECK(again.filter.bias() == 0.25);
 }
 
+TEST_CASE("A mode that was asked for too late for a job is not that of the job in its record") {
+  const test::TemporaryFolder folder;
+  test::SmallGraph recorded, again;
+  for (test::SmallGraph* graph : {&recorded, &again})
+    graph->plan.modes = {{"full", {1, 1, 1}}, {"cautious", {1, 1, 1}}};
+  RunBoard* run = nullptr;
+  recorded.filter.meanwhile = [&](const Job& job) {
+    if (job.index() == 7) CHECK(run->modes().request(1, job.release_ns() - 1, "by a process that was held up"));
+  };
+  {
+    auto sink = mcap::FileSink::open(folder.path / "run.mcap");
+    REQUIRE(sink);
+    test::record_run(recorded.plan, *sink, 2, {}, {}, [&](RunBoard& board) { run = &board; });
+  }
+  auto log = LogFile::open(folder.path / "run.mcap");
+  REQUIRE(log);
+  for (const RecordedJob& job : log->jobs())
+    if (job.task == 1) CHECK(job.mode == (job.index > 7 ? 1 : 0));
+  const ReplayResult result = Replayer(again.plan, *log, {}).run();
+  CHECK(result.different == 0);
+  CHECK(result.compared > 20);
+}
+
 TEST_CASE("Some nodes run anew, the rest comes from the record") {
   const Record record;
   test::SmallGraph graph;

@@ -36,6 +36,7 @@ struct Filter final : Node {
   Param<double> gain{this, "gain", 2.0, "1", ""};
   Param<double> bias{this, "bias", 0.0, "1", ""};  ///< may be set while it runs
   double sum = 0;
+  std::function<void(const Job&)> meanwhile = {};  ///< what happens while a job is under way
   void setup(Setup&) override {
     grid.reserve({4, 2, 1, 0});
     gain();
@@ -51,6 +52,8 @@ struct Filter final : Node {
     message->width = 4;
     message->height = 2;
     message->cell_m = sum + bias();
+    message->grid_in_map.x = static_cast<double>(job.mode().size());
+    if (meanwhile) meanwhile(job);
     message->origin_x_m = static_cast<double>(job.now_ns() % 1000);
     message->origin_y_m = static_cast<double>(job.time_left_ns());
     message->cells.resize(8);
