@@ -62,7 +62,7 @@ class Collector {
   Rings& rings_;
   const Options options_;
   Recording recording_;
-  std::vector<int32_t> writers_;  ///< thread of each ring; another one, once it has taken a dead one's place
+  std::vector<int32_t> writers_;  ///< by ring; what a dead thread noted in its last 20 ms is its successor's
   std::unique_ptr<SwitchSource> source_;
   std::vector<int64_t> steal_ticks_;  ///< per CPU of the options
   int64_t steal_read_ns_ = 0;

@@ -7,6 +7,7 @@
 #include <csignal>
 #include <filesystem>
 #include <iterator>
+#include <memory>
 #include <semaphore>
 #include <string>
 #include <thread>
@@ -17,14 +18,22 @@
 using namespace takt;
 using namespace takt::trace;
 
+namespace {
+
+/// Null, and that is said, where the kernel refuses it.
+std::unique_ptr<SwitchSource> perf_if_granted() {
+  std::string why_not;
+  auto source = open_perf(why_not);
+  if (!source) MESSAGE("NOT RUN: " << why_not);
+  return source;
+}
+
+}  // namespace
+
 // Else its last time on a CPU would go on to the end of the recording, and be blamed for what others did there.
 TEST_CASE("a thread that ends has no CPU from then on") {
-  std::string why_not;
-  const auto source = open_perf(why_not);
-  if (!source) {
-    MESSAGE("NOT RUN: " << why_not);
-    return;
-  }
+  const auto source = perf_if_granted();
+  if (!source) return;
   std::atomic<int32_t> id{0};
   std::binary_semaphore followed{0};
   std::thread thread([&] {
@@ -51,12 +60,8 @@ TEST_CASE("a thread that ends has no CPU from then on") {
 }
 
 TEST_CASE("of a process that was killed nothing stays open") {
-  std::string why_not;
-  const auto source = open_perf(why_not);
-  if (!source) {
-    MESSAGE("NOT RUN: " << why_not);
-    return;
-  }
+  const auto source = perf_if_granted();
+  if (!source) return;
   const auto descriptors = [] {
     return std::distance(std::filesystem::directory_iterator("/proc/self/fd"), std::filesystem::directory_iterator());
   };
