@@ -7,7 +7,8 @@
 # Shown: what the stores hit; whether another process ended; whether a store changed a byte of another one's messages or
 # records (each leaves a pattern that is looked for in all of the shared memory); damaged messages, withheld or lost, by name.
 # What all processes write (logs of what was seen, commit words: docs/limits.md) counts as the victim's own.
-# The spare of a victim takes its place, so its own name is gone for a while. Exit 1 if another process ended, or a byte elsewhere changed.
+# The spare of a victim takes its place, so its own name is gone for a while. Exit 1 if another process ended, or a byte
+# elsewhere changed.
 root=$(readlink -f "$(dirname "$0")/../..")
 export PYTHONPATH="$root/bench/scenarios" PYTHONDONTWRITEBYTECODE=1
 exec python3 - "${TAKT:-$root/takt}" "$@" <<'PY'

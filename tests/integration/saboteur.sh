@@ -37,8 +37,9 @@ for policy in deadline fixed; do
   judge "$report" 'refused["flooder.output"] > nodes["flooder"]["completed"] / 2' "$policy: the flooder is not named"
   grep -q '^flooder.output: [0-9]* messages refused$' "$work/stdout" || fail "$policy: the summary does not name the flooder"
   judge "$report" 'report["memory"]["rss_mb"] < 800' "$policy: the hoarder got its memory"
-  # One for the job that hangs, not one a look; CPU time that the host takes from a guest counts as a job's, so another may overrun.
-  judge "$report" '1 <= nodes["spinner"]["budget_overruns"] <= 3' "$policy: the overrun of the spinner is not counted once"
+  # Another one only if a job that did return used more than its 4 ms, as where the host takes time that counts as a job's.
+  judge "$report" 'nodes["spinner"]["budget_overruns"] == 1 or nodes["spinner"]["exec_ms"]["max"] > 4 and nodes["spinner"]["budget_overruns"] <= 3' \
+    "$policy: the overrun of the spinner is not counted once"
   [ $policy = deadline ] || judge "$report" 'nodes["spinner"]["demoted"] == 1' "the spinner was not demoted"
 done
 

@@ -5,9 +5,9 @@
   prose.py ROOT            # all pages together, and the ten longest sentences; exit 1 above a limit
   prose.py ROOT FILE...    # each of these pages, and all their sentences that are too long
 
-Counted are sentences of paragraphs, list items and table cells, and what has no full stop if it is too long for one; not code,
-headings or the addresses of links. Limits: 18 words a sentence on average, 2 % of the sentences above 35 words, and none of the words below, which a
-reader of English as a second language stumbles over.
+Counted are sentences of paragraphs, list items and table cells, and any text without a full stop that is too long for a
+sentence; not code, headings or addresses of links. Limits: 18 words a sentence on average, 2 % of the sentences above 35
+words, and none of the words below, which readers of English as a second language stumble over.
 """
 import pathlib
 import re
@@ -16,7 +16,7 @@ import sys
 
 MEAN, LONG, LONG_SHARE = 18.0, 35, 0.02
 STUMBLE = {
-    r"\bis told\b|\bare told\b|\btold (?:of|as|with|by|in|how|what|which)\b": "reported, printed, logged, returned",
+    r"\btold\b": "reported, printed, logged, returned",
     r"\bbeside\b": "next to, in addition to, under load",
     r"\bwhoever\b|\bwho does so\b": "the caller, the user, the reader",
     r"\bat the begin\b": "at startup",
@@ -88,7 +88,8 @@ def main():
     found, stumbles = read(root, names)
     if chosen:
         for name in names:
-            print("%s: %d sentences, %.1f words, %.1f %% long" % (name, *(lambda n, m, l: (n, m, 100 * l))(*figures([f for f in found if f[1] == name]))))
+            count, mean, long = figures([f for f in found if f[1] == name])
+            print(f"{name}: {count} sentences, {mean:.1f} words, {100 * long:.1f} % long")
     for n, name, s in sorted(found, reverse=True)[: None if chosen else 10]:
         if n > LONG or not chosen:
             print(f"  {n} words, {name}: {s[:160]}")
