@@ -60,6 +60,12 @@ measure_machine() { # once, as soon as there is a compiler
   machine_ms=$((($(date +%s%N) - start) / 1000000))
   echo "this machine: $(nproc) cores, two compilations side by side in $machine_ms ms (shares: $nominal_ms ms)"
 }
+measure_again() { # it may have become slower since
+  local before=$machine_ms
+  machine_ms=
+  measure_machine
+  [ "${machine_ms:-0}" -gt "${before:-0}" ] || machine_ms=$before
+}
 allowed_s() { echo $((${machine_ms:-0} > nominal_ms ? $1 * machine_ms / nominal_ms : $1)); }
 
 # take_shard K N: the steps of shard K; the longest first, each to the shard that has least to do.
