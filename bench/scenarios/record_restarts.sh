@@ -4,7 +4,7 @@
 # Default: 60 s, 20 kills, 10 sets, seed 1. The main graph runs with a process for each subsystem and is recorded. Its processes
 # are killed at random instants, every second one at a random step of a message of a random output; values are set in between.
 # Then every job runs again, in one process and in as many as the run had. Exit 1 if a message differs or cannot be compared,
-# or if fewer kills struck; 3 if nothing differs, but the recorder lost something, as where its thread got no CPU for 250 ms.
+# or if fewer kills struck; 3 if nothing differs, but the recorder lost something, as where the machine stood for 250 ms.
 root=$(readlink -f "$(dirname "$0")/../..")
 exec python3 - "${TAKT:-$root/takt}" "$root" "$@" <<'PY'
 import json, os, random, re, subprocess, sys, tempfile, time
@@ -66,7 +66,9 @@ with tempfile.TemporaryDirectory(prefix="restarts-") as work:
         same = re.search(r"; 0 differ$", replay.stdout, re.M)
         if not same or replay.returncode != 0 and not report["recorder_lost"]: wrong(f"replay {more}: exit {replay.returncode} {replay.stderr}")
     if report["recorder_lost"]:
-        print("the recorder lost something: this run shows little")
+        missing = ", ".join(f"{port['missing']} of {port['port']}" for port in info["ports"] if port["missing"])
+        print(f"the recorder lost something: this run shows little. Missing: {missing or 'nothing between others'}; "
+              f"its thread was away for {record['longest_pause_ms']:.0f} ms at most")
         code = code or 3
     if code and os.environ.get("KEEP"): subprocess.run(["cp", "-r", work, os.environ["KEEP"]])
 sys.exit(code)

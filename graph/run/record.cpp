@@ -95,6 +95,8 @@ void RunRecord::begin(const graph::GraphSpec& graph, const Plan& plan, const Run
   record::Recorder::Options how;
   how.whole = whole_ports(plan, options_.record_ports);
   how.by_caller = options_.clock == "virtual";
+  // Behind all lanes, before all that is ordinary. Beside workers that are ordinary themselves it is one of them.
+  if (plan.policy != Policy::cooperative) how.priority = kLowestPriority;
   recorder_ = std::make_unique<record::Recorder>(plan, board, transport, sink, head, std::move(how));
 }
 
@@ -122,6 +124,7 @@ void RunRecord::tell(nlohmann::ordered_json& report) const {
                         {"jobs", written_.incomplete_jobs},
                         {"threads", written_.unheard_threads}}},
                       {"refused", written_.refused},
+                      {"longest_pause_ms", static_cast<double>(written_.longest_pause_ns) / 1e6},
                       {"cpu_ms",
                        {{"copying", static_cast<double>(written_.capture_cpu_ns) / 1e6},
                         {"writing", static_cast<double>(written_.write_cpu_ns) / 1e6}}}};

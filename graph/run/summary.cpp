@@ -88,9 +88,11 @@ std::string record_line(const Json& record, uint64_t lost) {
   if (lost == 0) return text + "nothing lost\n";
   const Json& why = record["lost"];
   text += fmt::format(
-      "LOST {}: {} overwritten, {} found the queue full, {} not written, {} jobs incomplete, {} threads unheard", lost,
-      why["overwritten"].get<uint64_t>(), why["no_room"].get<uint64_t>(), why["not_written"].get<uint64_t>(),
-      why["jobs"].get<uint64_t>(), why["threads"].get<uint64_t>());
+      "LOST {}: {} overwritten (its thread was away for {:.0f} ms at most), {} found the queue full, {} not written, "
+      "{} jobs incomplete, {} threads unheard",
+      lost, why["overwritten"].get<uint64_t>(), record["longest_pause_ms"].get<double>(),
+      why["no_room"].get<uint64_t>(), why["not_written"].get<uint64_t>(), why["jobs"].get<uint64_t>(),
+      why["threads"].get<uint64_t>());
   const auto refused = record["refused"].get<std::string>();
   return text + (refused.empty() ? "" : " (" + refused + ")") + "\n";
 }

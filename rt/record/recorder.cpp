@@ -9,6 +9,7 @@
 
 #include "rt/capability.hpp"
 #include "rt/record/message_record.hpp"
+#include "rt/sched/grant.hpp"
 #include "rt/time/clock.hpp"
 
 namespace takt::record {
@@ -66,13 +67,21 @@ void Recorder::add_channels(const Plan& plan) {
 }
 
 void Recorder::capture_on() {
+  if (options_.priority > 0) lift_thread(0, options_.priority);
   pthread_setname_np(pthread_self(), "takt-record");
   keep_rights(Rights::none);
-  while (!ending_.load()) {
+  const MonotonicClock clock;
+  int64_t looked_ns = clock.now_ns();
+  const auto look = [&] {
+    const int64_t now_ns = clock.now_ns();
+    result_.longest_pause_ns = std::max(result_.longest_pause_ns, now_ns - std::exchange(looked_ns, now_ns));
     take_ports();
+  };
+  while (!ending_.load()) {
+    look();
     nanosleep(&kPause, nullptr);
   }
-  take_ports();
+  look();
   result_.capture_cpu_ns = thread_cpu_ns();
 }
 

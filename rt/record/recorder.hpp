@@ -29,6 +29,7 @@ struct RecordResult {
   uint64_t incomplete_jobs = 0;                 ///< of which an event was lost, and restarts
   uint64_t unheard_threads = 0;  ///< that ran jobs and had nowhere to note them: none of these jobs is there
   uint64_t bytes = 0;            ///< of the file
+  int64_t longest_pause_ns = 0;  ///< between two looks at the outputs; 0 in virtual time
   int64_t capture_cpu_ns = 0, write_cpu_ns = 0;
   std::string refused;  ///< why the file did not take something; empty: it took all
   uint64_t lost() const { return overwritten + no_room + not_written + incomplete_jobs + unheard_threads; }
@@ -52,6 +53,9 @@ class Recorder {
     std::vector<char> whole = {};  ///< by port: with all fields
     size_t queue_bytes = 128 << 20;
     bool by_caller = false;  ///< virtual time: nothing is done but in capture(), which waits for the file
+    /// SCHED_FIFO priority of the thread that copies. With 0, or where the kernel refuses, it is an ordinary one, which
+    /// a loaded machine may keep waiting until messages are overwritten.
+    int priority = 0;
     mcap::Writer::Options file = {};
   };
 

@@ -1,15 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 // A run is recorded, the record read, its jobs run again.
 #include <doctest/doctest.h>
+#include <sched.h>
 
+#include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <thread>
 
 #include "recorded_run.hpp"
 #include "rt/msg/grid.hpp"
 #include "rt/msg/odometry.hpp"
 #include "rt/record/log_file.hpp"
 #include "rt/record/replayer.hpp"
+#include "rt/sched/grant.hpp"
 #include "rt/sched/param_mail.hpp"
 #include "tests/temporary_folder.hpp"
 
@@ -43,6 +47,16 @@ ReplayResult replay(const Record& record, test::SmallGraph& graph, Replayer::Opt
 std::string bytes_of(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), {}};
+}
+
+/// A thread of this process; 0: there is none of that name.
+pid_t thread_named(const std::string& name) {
+  for (const auto& thread : std::filesystem::directory_iterator("/proc/self/task")) {
+    std::string its;
+    std::getline(std::ifstream(thread.path() / "comm"), its);
+    if (its == name) return std::stoi(thread.path().filename());
+  }
+  return 0;
 }
 
 }  // namespace
@@ -279,6 +293,15 @@ TEST_CASE("Beside a run in real time the recorder reads by itself; what finds no
     const RecordResult result = write(recorder);
     CHECK(result.messages == 10);
     CHECK(result.lost() == 0);
+  }
+  SUBCASE("before ordinary threads, as far as the kernel grants it") {
+    bool granted = false;
+    std::thread([&] { granted = lift_thread(0, kLowestPriority); }).join();
+    Recorder recorder(graph.plan, board, *transport, *sink, {}, {.priority = kLowestPriority});
+    pid_t copying = 0;
+    while (copying == 0) copying = thread_named("takt-record");
+    CHECK((sched_getscheduler(copying) & ~SCHED_RESET_ON_FORK) == (granted ? SCHED_FIFO : SCHED_OTHER));
+    CHECK(write(recorder).lost() == 0);
   }
   SUBCASE("no room") {
     Recorder recorder(graph.plan, board, *transport, *sink, {}, {.queue_bytes = 1});
