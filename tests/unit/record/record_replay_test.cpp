@@ -3,7 +3,6 @@
 #include <doctest/doctest.h>
 #include <sched.h>
 
-#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <thread>
@@ -15,6 +14,7 @@
 #include "rt/record/replayer.hpp"
 #include "rt/sched/grant.hpp"
 #include "rt/sched/param_mail.hpp"
+#include "tests/own_threads.hpp"
 #include "tests/temporary_folder.hpp"
 
 using namespace takt;
@@ -47,16 +47,6 @@ ReplayResult replay(const Record& record, test::SmallGraph& graph, Replayer::Opt
 std::string bytes_of(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), {}};
-}
-
-/// A thread of this process; 0: there is none of that name.
-pid_t thread_named(const std::string& name) {
-  for (const auto& thread : std::filesystem::directory_iterator("/proc/self/task")) {
-    std::string its;
-    std::getline(std::ifstream(thread.path() / "comm"), its);
-    if (its == name) return std::stoi(thread.path().filename());
-  }
-  return 0;
 }
 
 }  // namespace
@@ -299,7 +289,7 @@ TEST_CASE("Beside a run in real time the recorder reads by itself; what finds no
     std::thread([&] { granted = lift_thread(0, kLowestPriority); }).join();
     Recorder recorder(graph.plan, board, *transport, *sink, {}, {.priority = kLowestPriority});
     pid_t copying = 0;
-    while (copying == 0) copying = thread_named("takt-record");
+    while (copying == 0) copying = test::own_threads()["takt-record"];  // it takes its name last
     CHECK((sched_getscheduler(copying) & ~SCHED_RESET_ON_FORK) == (granted ? SCHED_FIFO : SCHED_OTHER));
     CHECK(write(recorder).lost() == 0);
   }

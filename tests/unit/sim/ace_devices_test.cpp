@@ -8,7 +8,6 @@
 #include <barrier>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <set>
 #include <thread>
 
@@ -16,6 +15,7 @@
 #include "hal/sim/sim_devices.hpp"
 #include "tests/conformance/stereo_camera.hpp"
 #include "tests/graph_folder.hpp"
+#include "tests/own_threads.hpp"
 #include "tests/unit/sim/small_world.hpp"
 
 using namespace takt;
@@ -277,12 +277,7 @@ TEST_CASE("both cameras render ahead in threads of their own, while all else mov
   CHECK(ace.ground_camera->rendered_ahead() == ground.size());
   CHECK(ace.ground_camera->cost().in_read_ns == 0);
   CHECK(ace.head_camera->rendered_ahead() > 0);
-  std::set<std::string> threads;
-  for (const auto& task : std::filesystem::directory_iterator("/proc/self/task")) {
-    std::string name;
-    std::getline(std::ifstream(task.path() / "comm") >> std::ws, name);
-    threads.insert(name);
-  }
+  const auto threads = test::own_threads();
   CHECK(threads.count("sim:head_camera") == 1);
   CHECK(threads.count("sim:ground_came") == 1);
 }
