@@ -70,6 +70,7 @@ int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, Ru
       record.capture();
       faults.look();
       expectations.look();
+      if (options.witness != nullptr) options.witness->look();
     };
     run.job_duration_ns = faults.durations(*durations, composition.plan);
     run.ran = [&](const trace::Slice& slice) { trace.ran(slice); };
@@ -85,10 +86,13 @@ int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, Ru
     std::optional<attach::Server> server;  // virtual time passes too fast to speak to
     if (!prepared.clock->is_virtual()) server.emplace(attach::Subject{graph, composition.plan, board, *transport});
     if (server) tell_attach(*server, adjusted);
-    const LiveTable live(
-        composition.plan, board,
-        fmt::format("takt run {} ({}, policy {})", graph.name, graph.profile, to_string(graph.schedule.policy)));
+    std::optional<LiveTable> live;
+    if (options.witness == nullptr)
+      live.emplace(
+          composition.plan, board,
+          fmt::format("takt run {} ({}, policy {})", graph.name, graph.profile, to_string(graph.schedule.policy)));
     record.begin(graph, composition.plan, board, *transport, "none");
+    if (options.witness != nullptr) options.witness->begin(composition.plan, *transport);
     trace.collect(composition.plan, record);
     watchdog.start();
     std::optional<RunRights> rights;
@@ -136,6 +140,7 @@ int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, Ru
   int code = tell_faults(options, graph, board, result.policy_granted, report);
   code = expectations.exit_code(faults.exit_code(code, report), report);
   if (!no_trace.empty()) code = refuse(no_trace, kBadInput);
+  if (options.witness != nullptr) options.witness->end(report);
   if (result.stuck.empty()) watchdog.end();
   // A job that never returns still uses what would now be taken down.
   if (!result.stuck.empty()) end_process(code, options.transport);
@@ -173,7 +178,8 @@ int run_in_one_process(const RunOptions& options, Prepared& prepared, RunFaults&
   if (options.require_rt && (!locked || latency.refused()))
     return refuse("--require-rt: " + lacks.front(), kDeviceOrSystem);
   adjusted.insert(adjusted.end(), lacks.begin(), lacks.end());
-  for (const std::string& line : adjusted) std::fprintf(stderr, "takt: adjusted: %s\n", line.c_str());
+  if (options.witness == nullptr)
+    for (const std::string& line : adjusted) std::fprintf(stderr, "takt: adjusted: %s\n", line.c_str());
   return execute(options, prepared, faults, expectations, *proofs, std::move(adjusted));
 }
 

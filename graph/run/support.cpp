@@ -149,7 +149,7 @@ void tell_attach(const attach::Server& server, std::vector<std::string>& adjuste
 }
 
 int tell(const RunOptions& options, const graph::GraphSpec& graph, const nlohmann::ordered_json& report) {
-  std::fputs(summary_text(report).c_str(), stdout);
+  if (options.witness == nullptr) std::fputs(summary_text(report).c_str(), stdout);
   const auto write = [](const std::filesystem::path& file, const std::string& text) {
     return file.empty() || static_cast<bool>(std::ofstream(file) << text << std::flush);
   };
