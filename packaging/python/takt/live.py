@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Speaks to a running graph over its local socket, as `takt echo`, `set`, `mode` and `fault` do."""
+"""Speaks to a running graph over its local socket, as `takt echo`, `set` and `mode` do."""
 import json
 import os
 import socket
@@ -132,10 +132,6 @@ class Connection:
     def mode(self, name):
         """Changes the mode of the run: mode("safe_stop")."""
         self.ask(do="mode", mode=name)
-
-    def fault(self, device, name, on=True):
-        """Switches a misbehaviour of a simulated device or a double: fault("front_laser", "silent", True)."""
-        self.ask(do="fault", device=device, name=name, on=bool(on))
 
     def stop(self):
         """Ends the run cleanly."""

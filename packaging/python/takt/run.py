@@ -38,7 +38,6 @@ class Run:
 
         with takt.Run("graph.yaml", profile="doubles") as run:
             run.set("cruise.speed", "0.3m/s")
-            run.fault("front_laser", "silent", True)
             run.wait_for("obstacle_stop.stop", lambda m: m["reasons"] != 0, within_s=5)
         assert run.exit_code == 0, run.stderr
 
@@ -141,10 +140,6 @@ class Run:
     def mode(self, name):
         """Changes the mode: mode("safe_stop")."""
         self._live().mode(name)
-
-    def fault(self, device, name, on=True):
-        """Switches a misbehaviour of a device: fault("front_laser", "silent", True)."""
-        self._live().fault(device, name, on)
 
     def top(self):
         """Rates, counts and states of devices, as Connection.top."""
