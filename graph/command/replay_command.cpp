@@ -16,10 +16,10 @@
 #include "graph/log/cut_log.hpp"
 #include "graph/log/log_content.hpp"
 #include "graph/log/recorded_plan.hpp"
-#include "graph/run/commit.hpp"
 #include "graph/run/isolated_replay.hpp"
 #include "graph/run/prepare.hpp"
 #include "graph/run/support.hpp"
+#include "rt/abi.hpp"
 #include "rt/record/replayer.hpp"
 
 namespace takt::command {
@@ -143,7 +143,7 @@ class Replay {
       std::fprintf(stderr, "takt: %s\n", param.c_str());
     if (fact(file_->facts(), "program") != log::file_hash("/proc/self/exe"))
       std::fprintf(stderr, "takt: this is another program (commit %s) than the one that recorded (commit %s)\n",
-                   kCommit, fact(file_->facts(), "commit").c_str());
+                   version().commit, fact(file_->facts(), "commit").c_str());
   }
 
   record::ReplayResult replay() {

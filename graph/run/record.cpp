@@ -11,8 +11,8 @@
 
 #include "graph/language/words.hpp"
 #include "graph/log/recorded_plan.hpp"
-#include "graph/run/commit.hpp"
 #include "graph/run/machine.hpp"
+#include "rt/abi.hpp"
 
 namespace takt::command {
 namespace {
@@ -84,7 +84,7 @@ void RunRecord::begin(const graph::GraphSpec& graph, const Plan& plan, const Run
                 {"clock", options_.clock},
                 {"transport", transport.name()},
                 {"isolation", isolation},
-                {"commit", kCommit},
+                {"commit", version().commit},
                 {"program", log::file_hash("/proc/self/exe")},
                 {"simd", hwy::TargetName(hwy::SupportedTargets() & -hwy::SupportedTargets())},
                 {"machine", machine_facts().dump()}};

@@ -4,7 +4,7 @@
 #include <span>
 #include <string_view>
 
-#include "rt/msg/field.hpp"
+#include "rt/msg/field_list.hpp"
 #include "rt/msg/geometry.hpp"
 
 namespace takt {
@@ -14,8 +14,7 @@ struct Pose {
   static constexpr std::string_view type_name = "pose";
   Transform transform;
   double covariance[36] = {};
-  static std::span<const Field> fields();
-  static void capacities(const Capacity&, std::span<uint32_t>) {}
+  TAKT_FIELDS(Pose, (transform), (covariance, ""))
 };
 
 }  // namespace takt

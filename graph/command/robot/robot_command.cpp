@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "graph/command/robot_command.hpp"
+#include "graph/command/robot/robot_command.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

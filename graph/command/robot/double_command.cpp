@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "graph/command/double_command.hpp"
+#include "graph/command/robot/double_command.hpp"
 
 #include <fmt/format.h>
 #include <poll.h>

@@ -11,8 +11,8 @@
 #include <thread>
 #include <vector>
 
-#include "graph/command/capture_command.hpp"
-#include "graph/command/devices_command.hpp"
+#include "graph/command/robot/capture_command.hpp"
+#include "graph/command/robot/devices_command.hpp"
 #include "graph/run/run.hpp"
 #include "hal/can/station.hpp"
 #include "hal/head/head_messages.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "graph/command/devices_command.hpp"
+#include "graph/command/robot/devices_command.hpp"
 
 #include <fmt/format.h>
 
