@@ -84,6 +84,7 @@ void add_run(CLI::App& app, RunOptions& o, int& exit_code) {
       ->check(CLI::IsMember({"none", "subsystem"}));
   run->add_option("--report", o.report, "writes the report as JSON");
   run->add_option("--html", o.html, "writes the report as one page to be read offline");
+  run->add_option("--junit", o.junit, "writes the verdict as JUnit XML, for CI servers");
   run->add_option("--trace", o.trace, "writes a trace for https://ui.perfetto.dev and `takt explain`");
   run->add_option("--trace-source", o.trace_source,
                   "how preemption is seen: auto (the best granted) | tracefs | perf | none")

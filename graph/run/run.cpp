@@ -206,7 +206,8 @@ int run_as_asked(RunOptions options) {
   RunFaults faults(options);
   if (const int code = faults.load(*prepared.graph, *prepared.clock, processes); code != kOk) return code;
   if (!processes) return run_in_one_process(options, prepared, faults, adjusted);
-  const KeptPlace report(options.report), page(options.html), trace(options.trace), record(options.record);
+  const KeptPlace report(options.report), page(options.html), verdict(options.junit), trace(options.trace),
+      record(options.record);
   return run_isolated(options, *prepared.graph, faults, std::move(adjusted));
 }
 
@@ -218,14 +219,13 @@ int run_graph(const RunOptions& options) {
   if (error)
     return refuse(fmt::format("--output {}: {}; choose a writable folder", options.output.string(), error.message()),
                   kBadInput);
-  if (!options.report.empty() && !writable(options.report))
-    return refuse("--report " + options.report.string() + ": cannot be written; choose another place", kBadInput);
-  if (!options.html.empty() && !writable(options.html))
-    return refuse("--html " + options.html.string() + ": cannot be written; choose another place", kBadInput);
-  if (!options.trace.empty() && !writable(options.trace))
-    return refuse("--trace " + options.trace.string() + ": cannot be written; choose another place", kBadInput);
-  if (!options.record.empty() && !writable(options.record))
-    return refuse("--record " + options.record.string() + ": cannot be written; choose another place", kBadInput);
+  for (const auto& [option, file] : {std::pair("--report", options.report),
+                                     {"--html", options.html},
+                                     {"--junit", options.junit},
+                                     {"--trace", options.trace},
+                                     {"--record", options.record}})
+    if (!file.empty() && !writable(file))
+      return refuse(fmt::format("{} {}: cannot be written; choose another place", option, file.string()), kBadInput);
   if (options.durations != "budgets" && options.clock != "virtual")
     return refuse("--durations: only jobs in virtual time take what they are told; add --clock virtual", kBadInput);
   if (!options.watchdog.empty() && options.clock == "virtual")

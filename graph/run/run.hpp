@@ -36,7 +36,7 @@ struct RunOptions {
   std::string clock = "real", isolate;
   std::string durations = "budgets";  ///< of jobs in virtual time, see job_durations()
   std::string transport = "local";    ///< local | iceoryx
-  std::filesystem::path report, html, trace, record, output = "out";
+  std::filesystem::path report, html, junit, trace, record, output = "out";
   std::filesystem::path faults;           ///< scenario of faults that the run is given; empty: none
   std::vector<std::string> record_ports;  ///< NODE.PORT: with all fields, beside devices and small ones; "all"
   std::string trace_source = "auto";      ///< of preemption: auto (the best there is), tracefs, perf, none

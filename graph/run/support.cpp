@@ -22,6 +22,7 @@
 #include "graph/check/machine_file.hpp"
 #include "graph/run/machine.hpp"
 #include "graph/run/prepare.hpp"
+#include "graph/run/junit.hpp"
 #include "graph/run/report.hpp"
 #include "graph/view/html_report.hpp"
 #include "rt/machine/facts.hpp"
@@ -157,6 +158,8 @@ int tell(const RunOptions& options, const graph::GraphSpec& graph, const nlohman
     return refuse("cannot write the report to " + options.report.string() + "; choose a writable --report", kBadInput);
   if (!options.html.empty() && !write(options.html, view::html_report(report, graph, options.output)))
     return refuse("cannot write the page to " + options.html.string() + "; choose a writable --html", kBadInput);
+  if (!options.junit.empty() && !write(options.junit, junit_text(report)))
+    return refuse("cannot write the verdict to " + options.junit.string() + "; choose a writable --junit", kBadInput);
   return report["ok"].get<bool>() ? kOk : kNotOk;
 }
 
