@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "graph/testing.hpp"
+
 #include <doctest/doctest.h>
 
 #include <fstream>
 #include <string>
 
-#include "graph/testing.hpp"
 #include "rt/msg/pose.hpp"
 #include "rt/msg/text_status.hpp"
 #include "tests/has.hpp"

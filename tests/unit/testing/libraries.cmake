@@ -1,2 +1,0 @@
-# SPDX-License-Identifier: Apache-2.0
-set(ROOM_LABEL nodes)  # links every processing node
