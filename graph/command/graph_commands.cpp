@@ -16,6 +16,7 @@ void add_load_options(CLI::App& app, std::filesystem::path& graph, graph::LoadOp
   app.add_option("--schedule", load.schedule, "schedule file instead of the graph's");
   app.add_option("--policy", load.policy, "deadline | fixed | cooperative instead of the schedule's");
   app.add_option("--mode", load.mode, "a mode of the graph (default full)");
+  app.add_option("--params", load.params, "parameter file of this robot: constants, parameters, device settings");
   app.add_option("--set", load.set, "node.param=value, repeatable");
 }
 

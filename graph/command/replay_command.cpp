@@ -95,6 +95,10 @@ class Replay {
       throw Refused{fmt::format("the graph {} of the record is not there; name it: takt replay {} GRAPH",
                                 run.graph.string(), options_.log.string())};
     if (options_.graph.empty()) run.load.schedule = fact(facts, "schedule");
+    run.load.params = options_.params.empty() ? std::filesystem::path(fact(facts, "params")) : options_.params;
+    if (!run.load.params.empty() && !std::filesystem::exists(run.load.params))
+      throw Refused{fmt::format("the parameter file {} of the record is not there; name it: --params FILE",
+                                run.load.params.string())};
     run.load.profile = fact(facts, "profile");
     run.load.mode = fact(facts, "mode");
     run.load.policy = fact(facts, "policy_option");
@@ -137,8 +141,9 @@ class Replay {
         throw Refused{fmt::format("{} is not what it was when the record was made", (graph.directory / path).string())};
     if (const std::string cut = fact(file_->facts(), "cut"); !cut.empty())
       std::fprintf(stderr, "takt: this is %s; nodes begin here without what they remembered\n", cut.c_str());
-    if (log::file_text(graph.file) != file_->attached("graph.yaml"))
-      std::fprintf(stderr, "takt: %s has changed since the record was made\n", graph.file.c_str());
+    for (size_t i = 0; i < graph.files.size(); ++i)
+      if (log::file_text(graph.files[i]) != file_->attached(i == 0 ? "graph.yaml" : log::part_name(i)))
+        std::fprintf(stderr, "takt: %s has changed since the record was made\n", graph.files[i].c_str());
     for (const std::string& param : log::changed_params(recorded_, plan))
       std::fprintf(stderr, "takt: %s\n", param.c_str());
     if (fact(file_->facts(), "program") != log::file_hash("/proc/self/exe"))
@@ -330,6 +335,7 @@ void add_replay(CLI::App& app, ReplayOptions& o, int& exit_code) {
   replay->add_option("graph", o.graph, "graph file instead of that of the record");
   replay->add_flag("--compare", o.compare, "bit by bit with the record; exit 1 on the first message that differs");
   replay->add_option("--live", o.live, "runs only these nodes, with the rest from the record")->delimiter(',');
+  replay->add_option("--params", o.params, "parameter file of the robot instead of that of the record");
   replay->add_option("--set", o.set, "node.param=value, repeatable");
   replay->add_option("--from", o.from_s, "tells and paces only what was released so many seconds into the run");
   replay->add_option("--isolate", o.isolate, "none (one process) | subsystem: as many as the run had")

@@ -10,7 +10,8 @@ namespace takt::command {
 
 struct ReplayOptions {
   std::filesystem::path log;
-  std::filesystem::path graph;  ///< empty: that of the record
+  std::filesystem::path graph;   ///< empty: that of the record
+  std::filesystem::path params;  ///< parameter file; empty: that of the record
   std::filesystem::path output = "out";
   bool compare = false, recorded_pace = false;
   std::string isolate = "none";   ///< none | subsystem: a process for each, as in a run

@@ -20,14 +20,17 @@ namespace takt::graph {
 struct Position {
   std::string file;
   int line = 0, column = 0;
+  std::string use = {};  ///< of a value that came from a constant: "constant `speed`, used at FILE:LINE:COLUMN"
 };
+/// "file:line:column"; the file alone where there is no line.
+std::string to_string(const Position& position);
 
 /// One thing wrong with the input. `text` names the id at fault, the value and the valid choices.
 struct Problem {
   Position position;
   std::string text;
 };
-/// "file:line:column: error: text".
+/// "file:line:column: error: text", and where the value is used if it stands elsewhere.
 std::string to_string(const Problem& problem);
 
 /// node.port or device.port.
@@ -214,6 +217,8 @@ struct ExpectSpec {
 struct GraphSpec {
   std::string name, file, profile, mode = "full";
   std::filesystem::path directory;
+  std::vector<std::string> files;  ///< the graph's, those it includes, then the parameter file
+  std::string params_file;         ///< of this robot; empty: none
   std::string isolation = "none";  ///< none | subsystem
   std::vector<DeviceSpec> devices;
   std::vector<NodeSpec> nodes;
@@ -233,6 +238,7 @@ struct LoadOptions {
   std::string policy;  ///< "": the schedule's
   std::string mode = "full";
   std::vector<std::string> set;  ///< "node.param=value"
+  std::filesystem::path params;  ///< parameter file of this robot; empty: none
   std::filesystem::path state;   ///< folder whose overlay of the graph is read, see overlay.hpp; empty: none
 };
 

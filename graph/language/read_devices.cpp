@@ -36,8 +36,7 @@ std::vector<std::string> setting_names(const DeviceKindEntry& kind, const Device
 }
 
 /// The value in the setting's unit (a path absolute), or what is wrong.
-tl::expected<json, std::string> convert(const DeviceSetting& setting, const Given& given,
-                                        const std::filesystem::path& directory) {
+tl::expected<json, std::string> convert(const DeviceSetting& setting, const Given& given) {
   using Kind = DeviceSetting::Kind;
   const auto is_not = [&](const char* wanted) {
     return tl::make_unexpected(fmt::format("is `{}`, {} is wanted", given.raw, wanted));
@@ -64,7 +63,9 @@ tl::expected<json, std::string> convert(const DeviceSetting& setting, const Give
   if (setting.kind != Kind::path) return json(text);
   if (text.empty()) return is_not("a path");
   std::error_code ignored;
-  const auto base = given.position.file == "--set" ? std::filesystem::current_path(ignored) : directory;
+  const auto base = given.position.file == "--set"
+                        ? std::filesystem::current_path(ignored)
+                        : std::filesystem::absolute(given.position.file, ignored).parent_path();
   return json((base / text).lexically_normal().string());
 }
 
@@ -239,7 +240,7 @@ void Loader::read_device(DeviceSpec& device, std::set<std::string>& unclaimed) {
 }
 
 void Loader::fill_setting(DeviceSpec& device, const DeviceSetting& setting, const Given& given) {
-  const auto value = convert(setting, given, spec_.directory);
+  const auto value = convert(setting, given);
   if (!value)
     return problem(given.position,
                    fmt::format("setting {} of device {} {}", ticked(setting.name), ticked(device.id), value.error()));

@@ -147,6 +147,8 @@ Json asset_hashes(const Plan& plan, const std::filesystem::path& directory) {
   return hashes;
 }
 
+std::string part_name(size_t i) { return fmt::format("part_{}.yaml", i); }
+
 std::string file_hash(const std::filesystem::path& file) { return hash_text(file_text(file)); }
 
 std::string file_text(const std::filesystem::path& file) {

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <list>
 #include <stdexcept>
 
 #include "graph/language/words.hpp"
@@ -75,6 +76,7 @@ void RunRecord::begin(const graph::GraphSpec& graph, const Plan& plan, const Run
   record::Head head;
   head.facts = {{"graph", absolute(graph.file)},
                 {"schedule", absolute(graph.schedule.file)},
+                {"params", graph.params_file.empty() ? "" : absolute(graph.params_file)},
                 {"profile", graph.profile},
                 {"mode", options_.load.mode},
                 {"policy_asked", std::string(to_string(graph.schedule.policy))},
@@ -90,9 +92,13 @@ void RunRecord::begin(const graph::GraphSpec& graph, const Plan& plan, const Run
                 {"machine", machine_facts().dump()}};
   const std::string texts[]{log::file_text(graph.file), log::file_text(graph.schedule.file),
                             log::plan_json(plan).dump(), log::asset_hashes(plan, graph.directory).dump()};
+  std::list<std::string> parts;  // the head refers to them
   const char* names[]{"graph.yaml", "schedule.yaml", "plan.json", "assets.json"};
   for (size_t i = 0; i < std::size(texts); ++i)
     head.files.push_back({0, 0, names[i], i < 2 ? "application/yaml" : "application/json", mcap::bytes_of(texts[i])});
+  for (size_t i = 1; i < graph.files.size(); ++i)  // what it includes, and the parameter file
+    head.files.push_back({0, 0, log::part_name(i), "application/yaml",
+                          mcap::bytes_of(parts.emplace_back(log::file_text(graph.files[i])))});
   record::Recorder::Options how;
   how.whole = whole_ports(plan, options_.record_ports);
   how.by_caller = options_.clock == "virtual";
