@@ -49,7 +49,7 @@ std::string absolute(const std::filesystem::path& file) {
 
 }  // namespace
 
-graph::Observers observers(const RunOptions& options, const graph::GraphSpec& graph) {
+Observers observers(const RunOptions& options, const graph::GraphSpec& graph) {
   const uint32_t followers =
       (options.record.empty() ? 0u : 1u) + (graph.expect ? 1u : 0u) + (options.witness ? 1u : 0u);
   return {1, followers, kUndisturbedNs};

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Installed as <takt/msg/field_list.hpp>: core, stable.
 // Declares the fields of a message, once, in its class:
 //
 //   struct Wheel {

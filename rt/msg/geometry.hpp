@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Installed as <takt/msg/geometry.hpp>: core, stable.
 // What several messages share: a rigid transform, a camera model. Units of all messages are SI unless a name says
 // otherwise. Frames (thesis Fig. 4.11): robot frame x right, y forward, z up; camera frame x right, y down, z forward;
 // map frame z up.

@@ -2,7 +2,7 @@
 // A message travels as a chunk that starts with our MessageHeader. iceoryx cannot publish a chunk twice, so a repeated
 // message travels as a *note* (a header and the sequence it stands for) over a second, tiny publisher of the same
 // output; notes can therefore never push messages out of a reader's queue. The reader merges both by sequence.
-#include "rt/shm/iceoryx_ports.hpp"
+#include "rt/shm/iceoryx/ports.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "graph/compose/plan_ports.hpp"
+#include "rt/sched/plan_ports.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-namespace takt::graph {
+namespace takt {
 namespace {
 
 /// Messages a producer can publish within a span, at most.
@@ -97,4 +97,4 @@ void size_ports(Plan& plan, const Observers& observers) {
   }
 }
 
-}  // namespace takt::graph
+}  // namespace takt

@@ -2,7 +2,7 @@
 #pragma once
 #include "rt/sched/plan.hpp"
 
-namespace takt::graph {
+namespace takt {
 
 /// Who reads outputs beside the edges of the graph.
 struct Observers {
@@ -15,4 +15,4 @@ struct Observers {
 /// job must latch is overwritten while that job is late within its deadline, and for those that look on.
 void size_ports(Plan& plan, const Observers& observers = {});
 
-}  // namespace takt::graph
+}  // namespace takt

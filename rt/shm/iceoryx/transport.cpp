@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "rt/shm/iceoryx_transport.hpp"
-
 #include <sched.h>
 #include <unistd.h>
 
@@ -17,9 +15,12 @@
 #include "iceoryx_posh/popo/untyped_subscriber.hpp"
 #include "iceoryx_posh/roudi/iceoryx_roudi_components.hpp"
 #include "iceoryx_posh/runtime/posh_runtime_single_process.hpp"
+#include "rt/abi.hpp"
+#include "rt/shm/iceoryx/component.hpp"
+#include "rt/shm/iceoryx/ports.hpp"
 #include "rt/shm/iceoryx_layout.hpp"
-#include "rt/shm/iceoryx_ports.hpp"
 #include "rt/shm/iceoryx_preflight.hpp"
+#include "rt/shm/iceoryx_transport.hpp"
 #include "rt/shm/transport_error.hpp"
 
 namespace takt {
@@ -189,18 +190,14 @@ class JoinedTransport final : public PortsOverIceoryx {
   }
 };
 
-}  // namespace
+std::unique_ptr<Transport> make(std::span<const PortPlan> ports) { return std::make_unique<IceoryxTransport>(ports); }
 
-std::string iceoryx_runtime_prefix(int pid) { return "takt-" + std::to_string(pid) + "-"; }
-
-std::string iceoryx_domain(int daemon_pid) { return "graph-" + std::to_string(daemon_pid); }
-
-std::unique_ptr<Transport> make_iceoryx_transport(std::span<const PortPlan> ports) {
-  return std::make_unique<IceoryxTransport>(ports);
-}
-
-std::unique_ptr<Transport> join_iceoryx_transport(std::span<const PortPlan> ports, const std::string& domain) {
+std::unique_ptr<Transport> join(std::span<const PortPlan> ports, const std::string& domain) {
   return std::make_unique<JoinedTransport>(ports, domain);
 }
 
+}  // namespace
 }  // namespace takt
+
+extern "C" const takt::IceoryxComponent takt_iceoryx;
+const takt::IceoryxComponent takt_iceoryx{takt::kAbi, takt::make, takt::join};
