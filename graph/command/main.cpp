@@ -7,6 +7,7 @@
 #include <opencv2/core/utils/logger.hpp>
 #include <string_view>
 
+#include "graph/ace/ace_registry.hpp"
 #include "graph/cli/outcome.hpp"
 #include "graph/command/attach_commands.hpp"
 #include "graph/command/capture_command.hpp"
@@ -58,22 +59,22 @@ void add_overlay_option(CLI::App& app, takt::graph::LoadOptions& load) {
       "--no-overlay", [&load] { load.state.clear(); }, "without the values that `takt set --keep` left for the graph");
 }
 
-void add_show(CLI::App& app, takt::command::ShowOptions& o, int& exit_code) {
+void add_show(CLI::App& app, const takt::Registry& registry, takt::command::ShowOptions& o, int& exit_code) {
   CLI::App* show = app.add_subcommand("show", "draws a graph, or lists what each node reads");
   add_load_options(*show, o.graph, o.load);
   CLI::Option* svg = show->add_option("--svg", o.svg, "writes the picture as an SVG file");
   show->add_flag("--dot", o.dot, "prints Graphviz text")->excludes(svg);
-  show->callback([&] { exit_code = takt::command::show_graph(o); });
+  show->callback([&] { exit_code = takt::command::show_graph(registry, o); });
 }
 
-void add_report(CLI::App& app, takt::command::RenderOptions& o, int& exit_code) {
+void add_report(CLI::App& app, const takt::Registry& registry, takt::command::RenderOptions& o, int& exit_code) {
   CLI::App* report = app.add_subcommand("report", "makes a page for people from the report of a run");
   report->add_option("report", o.report, "what `takt run --report` wrote")->required();
   report->add_option("graph", o.graph, "graph file of the run (default graph/ace.yaml)");
   report->add_option("--schedule", o.schedule, "schedule file of the run, if it was not the graph's");
   report->add_option("--html", o.html, "writes the page to this file")->required();
   report->add_option("--output", o.output, "folder with the pictures of the run (default out)");
-  report->callback([&] { exit_code = takt::command::render_report(o); });
+  report->callback([&] { exit_code = takt::command::render_report(registry, o); });
 }
 
 void add_explain(CLI::App& app, takt::command::ExplainOptions& o, int& exit_code) {
@@ -84,7 +85,7 @@ void add_explain(CLI::App& app, takt::command::ExplainOptions& o, int& exit_code
   explain->callback([&] { exit_code = takt::command::explain_misses(o); });
 }
 
-void add_run(CLI::App& app, takt::command::RunOptions& o, int& exit_code) {
+void add_run(CLI::App& app, const takt::Registry& registry, takt::command::RunOptions& o, int& exit_code) {
   CLI::App* run = app.add_subcommand("run", "runs a graph and reports what happened");
   add_load_options(*run, o.graph, o.load);
   add_overlay_option(*run, o.load);
@@ -120,7 +121,7 @@ void add_run(CLI::App& app, takt::command::RunOptions& o, int& exit_code) {
                 "exit 3 where the machine lacks what `takt doctor` checks for such a run");
   run->callback([&, how_long] {
     o.duration_asked = how_long->count() > 0;
-    exit_code = takt::command::run_graph(o);
+    exit_code = takt::command::run_graph(registry, o);
   });
 }
 
@@ -141,7 +142,7 @@ void add_capture(CLI::App& app, takt::command::CaptureOptions& o, int& exit_code
   capture->callback([&] { exit_code = takt::command::capture_device(o); });
 }
 
-void add_profile(CLI::App& app, takt::command::ProfileOptions& o, int& exit_code) {
+void add_profile(CLI::App& app, const takt::Registry& registry, takt::command::ProfileOptions& o, int& exit_code) {
   CLI::App* profile = app.add_subcommand("profile", "measures execution times and writes budgets into a schedule");
   add_load_options(*profile, o.run.graph, o.run.load);
   add_overlay_option(*profile, o.run.load);
@@ -159,7 +160,7 @@ void add_profile(CLI::App& app, takt::command::ProfileOptions& o, int& exit_code
   in_place->excludes(write)->excludes(compare);
   write->excludes(compare);
   keep->excludes(compare);
-  profile->callback([&] { exit_code = takt::command::profile_graph(o); });
+  profile->callback([&] { exit_code = takt::command::profile_graph(registry, o); });
 }
 
 /// A command of another program, which stands next to this one: no run needs it, so nobody waits for it to be built.
@@ -213,27 +214,28 @@ int main(int argc, char** argv) {
   bool devices_json = false;
   takt::command::CaptureOptions capture;
   int exit_code = 0;
+  const takt::Registry registry = takt::ace_registry();
 
-  add_run(app, run_options, exit_code);
+  add_run(app, registry, run_options, exit_code);
   CLI::App* check = app.add_subcommand("check", "checks a graph and its schedule without running them");
   add_load_options(*check, check_options.graph, check_options.load);
   add_overlay_option(*check, check_options.load);
   check->add_flag("--json", check_json, "prints the result as JSON");
-  check->callback([&] { exit_code = takt::command::check_graph(check_options, check_json); });
-  add_show(app, show_options, exit_code);
-  add_report(app, render_options, exit_code);
+  check->callback([&] { exit_code = takt::command::check_graph(registry, check_options, check_json); });
+  add_show(app, registry, show_options, exit_code);
+  add_report(app, registry, render_options, exit_code);
   add_explain(app, explain_options, exit_code);
   CLI::App* nodes =
       app.add_subcommand("nodes", "lists node types and device kinds, or one with its ports and parameters");
   nodes->add_option("type", type, "node type");
-  nodes->callback([&] { exit_code = takt::command::print_nodes(type); });
-  takt::command::add_attach_commands(app, attach, exit_code);
+  nodes->callback([&] { exit_code = takt::command::print_nodes(registry, type); });
+  takt::command::add_attach_commands(app, registry, attach, exit_code);
   takt::command::add_robot(app, robot, exit_code);
   takt::command::add_doctor(app, doctor, exit_code);
   add_devices(app, devices_json, exit_code);
   add_capture(app, capture, exit_code);
-  add_profile(app, profile, exit_code);
-  takt::command::add_replay(app, replay, exit_code);
+  add_profile(app, registry, profile, exit_code);
+  takt::command::add_replay(app, registry, replay, exit_code);
   takt::command::add_log(app, log, exit_code);
   takt::command::add_double(app, device_double, exit_code);
   for (const DeskCommand& command : kDeskCommands) app.add_subcommand(command.name, command.what);  // for the list only

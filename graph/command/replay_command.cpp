@@ -71,7 +71,7 @@ void force_simd(const std::string& recorded) {
 
 class Replay {
  public:
-  explicit Replay(const ReplayOptions& options) : options_(options) {}
+  Replay(const Registry& registry, const ReplayOptions& options) : options_(options), prepared_(registry) {}
 
   int run() {
     auto file = record::LogFile::open(options_.log);
@@ -174,7 +174,7 @@ class Replay {
   void renew(size_t task) {
     graph::Composition& composition = *prepared_.composition;
     auto fresh =
-        graph::make_again(*prepared_.graph, graph::node_types(), *prepared_.clock, composed_, composition.plan, task);
+        graph::make_again(*prepared_.graph, prepared_.registry, *prepared_.clock, composed_, composition.plan, task);
     composition.plan.tasks[task].node = fresh.get();
     composition.nodes[task] = std::move(fresh);
   }
@@ -305,7 +305,7 @@ class Replay {
 
 }  // namespace
 
-int replay(const ReplayOptions& options) {
+int replay(const Registry& registry, const ReplayOptions& options) {
   std::error_code error;
   std::filesystem::create_directories(options.output, error);
   if (error)
@@ -313,7 +313,7 @@ int replay(const ReplayOptions& options) {
                   kBadInput);
   const StopOnSignal guard;
   try {
-    return Replay(options).run();
+    return Replay(registry, options).run();
   } catch (const Refused& refused) {
     return refuse(refused.why, kBadInput);
   } catch (const std::runtime_error& problem) {  // processes
@@ -324,7 +324,7 @@ int replay(const ReplayOptions& options) {
   }
 }
 
-void add_replay(CLI::App& app, ReplayOptions& o, int& exit_code) {
+void add_replay(CLI::App& app, const Registry& registry, ReplayOptions& o, int& exit_code) {
   CLI::App* replay = app.add_subcommand("replay", "runs the jobs of a record again, with what they were given");
   replay->add_option("log", o.log, "what `takt run --record` wrote")->required();
   replay->add_option("graph", o.graph, "graph file instead of that of the record");
@@ -336,7 +336,7 @@ void add_replay(CLI::App& app, ReplayOptions& o, int& exit_code) {
       ->check(CLI::IsMember({"none", "subsystem"}));
   replay->add_flag("--recorded-pace", o.recorded_pace, "as fast as it was, instead of as fast as possible");
   replay->add_option("--output", o.output, "folder for pictures and other results (default out)");
-  replay->callback([&] { exit_code = command::replay(o); });
+  replay->callback([&] { exit_code = command::replay(registry, o); });
 }
 
 }  // namespace takt::command

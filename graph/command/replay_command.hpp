@@ -22,8 +22,8 @@ struct ReplayOptions {
 /// `takt replay LOG [GRAPH]`: runs every job of a record again, with the inputs and answers that it had. Exit 1 if
 /// --compare finds a message that is not bit by bit the recorded one, or the record lacks what a job was given; 2 if
 /// the record, its graph or a file that the graph names cannot be used.
-int replay(const ReplayOptions& options);
+int replay(const Registry& registry, const ReplayOptions& options);
 
-void add_replay(CLI::App& app, ReplayOptions& options, int& exit_code);
+void add_replay(CLI::App& app, const Registry& registry, ReplayOptions& options, int& exit_code);
 
 }  // namespace takt::command

@@ -239,7 +239,7 @@ struct LoadOptions {
 }  // namespace takt::graph
 
 namespace takt {
-class NodeTypes;
+struct Registry;
 }
 
 namespace takt::graph {
@@ -251,6 +251,6 @@ struct Loaded {
 
 /// Reads the graph and its schedule, checks all of it (syntax, schema, ids, types, units, ranges, hierarchy, cycles)
 /// and returns every problem, not just the first. Never throws.
-Loaded load(const std::filesystem::path& file, const LoadOptions& options, const NodeTypes& types);
+Loaded load(const std::filesystem::path& file, const LoadOptions& options, const Registry& registry);
 
 }  // namespace takt::graph
