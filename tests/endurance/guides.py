@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Follows the guides (README.md, docs/guides.md) to the letter: guides.py [CLONE]
+"""Follows the guides (docs/guides.md) to the letter: guides.py [CLONE]
 
 Writes their files, makes their edits with the words that they give, and runs their commands, whose output it prints. Not
 part of `takt test`, since it builds everything: in a clone of its own, which goes afterwards, or in CLONE, which keeps the
@@ -13,7 +13,7 @@ import tempfile
 import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-README, GUIDES = "README.md", "docs/guides.md"
+GUIDES = "docs/guides.md"
 
 
 class Clone:
@@ -54,17 +54,17 @@ class Clone:
 
 def follow_node(clone):
     print("\n== a node")
-    (clone.folder / "nodes/brightness/CMakeLists.txt").write_text(clone.said(README, r"`(takt_room\(brightness [^`]*)`") + "\n")
+    (clone.folder / "nodes/brightness/CMakeLists.txt").write_text(clone.said(GUIDES, r"`(takt_room\(brightness [^`]*)`") + "\n")
     types = "graph/compose/node_types.cpp"
     clone.insert(types, "namespace takt {\n", "void register_brightness(NodeTypes& types);\n")
     clone.insert(types, "  register_mission(types);\n", "  register_brightness(types);\n")
-    clone.insert("graph/compose/CMakeLists.txt", "USES takt_language", " " + clone.said(README, r"and name `(takt_brightness)`"))
-    clone.insert("graph/crossing.yaml", "  street:\n", "    " + clone.said(README, r"`(brightness: \{type[^`]*)`") + "\n")
-    clone.insert("schedules/crossing.yaml", "nodes:\n", "  " + clone.said(README, r"`(brightness: \{rate[^`]*)`") + "\n")
+    clone.insert("graph/compose/CMakeLists.txt", "USES takt_language", " " + clone.said(GUIDES, r"and name `(takt_brightness)`"))
+    clone.insert("graph/crossing.yaml", "  street:\n", "    " + clone.said(GUIDES, r"`(brightness: \{type[^`]*)`") + "\n")
+    clone.insert("schedules/crossing.yaml", "nodes:\n", "  " + clone.said(GUIDES, r"`(brightness: \{rate[^`]*)`") + "\n")
     clone.run("./takt nodes brightness", output="gain")
-    echo = clone.said(README, r"`(\./takt echo brightness\.image [^`]*)`")
+    echo = clone.said(GUIDES, r"`(\./takt echo brightness\.image [^`]*)`")
     # 1 is a deadline that this machine missed, which is not the guide's.
-    clone.run(f"{clone.said(README, r'While `([^`]*)` goes on')} --for 12s || [ $? -eq 1 ]", output="brightness", beside=(6, echo))
+    clone.run(f"{clone.said(GUIDES, r'While `([^`]*)` goes on')} --for 12s || [ $? -eq 1 ]", output="brightness", beside=(6, echo))
     clone.run("file bright.png || ls -l bright.png", output="bright.png")
 
 
@@ -104,7 +104,7 @@ def follow_evaluation(clone):
 
 def follow(folder):
     clone = Clone(folder)
-    subprocess.run([sys.executable, ROOT / "tests/tools/code_blocks.py", folder, clone.folder / README, clone.folder / GUIDES], check=True)
+    subprocess.run([sys.executable, ROOT / "tests/tools/code_blocks.py", folder, clone.folder / GUIDES], check=True)
     for guide in (follow_node, follow_driver, follow_evaluation): guide(clone)
     print(f"\n{clone.failed} commands failed" if clone.failed else "\nall guides work as written")
     return clone.failed > 0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# What no other script runs: every other command that the README shows, once and small, as a user starts it. How good its
+# What no other script runs: every other command that docs/commands.md shows, once and small, as a user starts it. How good its
 # figures are, the tests of its room know.
 source "$(dirname "$0")/lib.sh" "$@"
 unset TAKT_DATA  # what is recorded is another test's

@@ -199,11 +199,11 @@ def check_commands():
         for number, command in shown_commands(path.read_text()):
             for what in wrong_in(command, takt, bench):
                 tell(path, number, f"`{command}`: {what}")
-    readme = source / "README.md"
-    for number, line in enumerate(readme.read_text().splitlines(), 1):
+    reference = source / "docs" / "commands.md"
+    for number, line in enumerate(reference.read_text().splitlines(), 1):
         for option in re.findall(r"`(--[a-z][\w-]*)", line):
             if option not in options:
-                tell(readme, number, f"there is no option {option}")
+                tell(reference, number, f"there is no option {option}")
     scripts = "\n".join(path.read_text() for path in (source / "tests" / "integration").glob("*.sh"))
     for leaf in takt.leaves():
         if not re.search(r'\$takt"? ' + " ".join(leaf) + r"\b", scripts):

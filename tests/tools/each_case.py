@@ -16,6 +16,7 @@ Per program the number of runs and failures; of each failure the cases and the c
 nothing to run here (tests/recorded without recordings) and is listed as skipped.
 """
 import argparse
+import collections
 import concurrent.futures
 import os
 import pathlib
@@ -23,6 +24,7 @@ import re
 import shlex
 import subprocess
 import sys
+import tempfile
 
 KINDS = ("unit", "property", "conformance", "recorded")
 SKIPPED = 77
@@ -89,9 +91,11 @@ class Run:
 
     def problem(self):
         """What went wrong: one line, then texts of detail; empty if nothing did."""
-        code, text = call([self.program, *self.arguments, "--duration=true", *FLAGS])
-        # One line per case that was executed; what a case prints may stand before it.
-        executed = [name for name in re.findall(r"\d\.\d{6} s: (.*)$", text, re.M) if name in self.cases]
+        with tempfile.NamedTemporaryFile("r", errors="replace") as report:  # apart from what cases and their children print
+            code, text = call([self.program, *self.arguments, "--duration=true", f"--out={report.name}", *FLAGS])
+            told = report.read()
+        executed = re.findall(r"^\d+\.\d{6} s: (.*)$", told, re.M)
+        text += told
         failed = [block for block in re.split(r"^=+\n", text, flags=re.M) if re.search(r" (FATAL )?ERROR: ", block)]
         if code != 0:
             names = list(dict.fromkeys(re.findall(r"^TEST CASE:  (.*)$", "\n".join(failed), re.M)))
@@ -100,7 +104,9 @@ class Run:
             how = f"signal {-code}" if code < 0 else f"exit {code}"
             return [f"{'; '.join(names) or 'in no case that it names'} ({how})"] + (failed or [text])
         if sorted(executed) != sorted(self.cases):
-            return [f"executed {len(executed)} cases, not these {len(self.cases)}: {'; '.join(self.cases[:3])}", text]
+            listed, ran = collections.Counter(self.cases), collections.Counter(executed)
+            differ = sorted((listed - ran) + (ran - listed))
+            return [f"executed {len(executed)} cases of {len(self.cases)}; not as often as listed: {'; '.join(differ)}", text]
         return []
 
     def command(self):

@@ -188,20 +188,23 @@ bool in_pieces(const Plan& plan) {
   });
 }
 
+/// A bound is far from what was seen if it is more than so many times that.
+constexpr double kFar = 2;
+
 struct Tally {
   double largest = 0, sum = 0;
-  int count = 0, above_two = 0;
+  int count = 0, far = 0;
   void add(int64_t bound_ns, int64_t seen_ns) {
     if (seen_ns <= 0) return;
     const double ratio = static_cast<double>(bound_ns) / static_cast<double>(seen_ns);
     largest = std::max(largest, ratio);
     sum += ratio;
     ++count;
-    above_two += ratio > 2;
+    far += ratio > kFar;
   }
   void print(const char* what) const {
-    std::printf("%s: bound / observed %.3f on average, at most %.3f, above 2 for %d of %d\n", what, sum / count,
-                largest, above_two, count);
+    std::printf("%s: bound / observed %.3f on average, at most %.3f, above %.0f for %d of %d\n", what, sum / count,
+                largest, kFar, far, count);
   }
 };
 
@@ -212,6 +215,13 @@ struct Compared {
 
   explicit Compared(size_t tasks) {
     for (Seen* each : {&bound, &seen}) each->response_ns.resize(tasks), each->age_ns.resize(tasks);
+  }
+
+  /// Whether a bound of a response is far from what was seen so far.
+  bool far() const {
+    for (size_t t = 0; t < bound.response_ns.size(); ++t)
+      if (static_cast<double>(bound.response_ns[t]) > kFar * static_cast<double>(seen.response_ns[t])) return true;
+    return false;
   }
 
   void compare(const Scene& scene, Random& random) {
@@ -245,7 +255,9 @@ struct Compared {
 }  // namespace
 
 TEST_CASE("what a run does stays within what admission proved, and is not far from it") {
-  constexpr int kPhases = 8, kTries = 100;  // what few phases allow, few were seen of
+  // What few phases allow, few were seen of; and two lanes may meet in few of all phases: where a bound looks far, more
+  // of them are tried before it counts as far.
+  constexpr int kPhases = 8, kMorePhases = 64, kTries = 100;
   Random random{std::mt19937(test::seed(70))};
   Tally one_core, pieces, more_cores, ages;
   int admitted[3] = {};
@@ -255,7 +267,8 @@ TEST_CASE("what a run does stays within what admission proved, and is not far fr
     const Plan& plan = scene.plan;
     CAPTURE(to_string(plan.policy));
     Compared compared(plan.tasks.size());
-    for (int phase = 0; phase < kTries && compared.admitted < kPhases; ++phase) {
+    const auto enough = [&] { return compared.admitted >= (compared.far() ? kMorePhases : kPhases); };
+    for (int phase = 0; phase < kTries && !enough(); ++phase) {
       CAPTURE(phase);
       if (phase > 0) scene.shift(random);
       compared.compare(scene, random);
@@ -275,7 +288,7 @@ TEST_CASE("what a run does stays within what admission proved, and is not far fr
   more_cores.print("response, two cores");
   ages.print("age of a chain");
   for (const int plans : admitted) CHECK(plans >= test::at_scale(60));
-  CHECK(one_core.largest <= 2);
-  CHECK(pieces.largest <= 2);
+  CHECK(one_core.largest <= kFar);
+  CHECK(pieces.largest <= kFar);
   CHECK(ages.largest <= 3);
 }
