@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "hal/device_node.hpp"
+#include "hal/device_types.hpp"
 #include "hal/settings/json.hpp"
 #include "rt/time/clock.hpp"
 
@@ -52,40 +53,14 @@ class Devices {
   std::unique_ptr<OwnFolder> folder_;
 };
 
-enum class SettingKind : uint8_t { path, length, angle, speed, turn_rate, time, rate, count, number, flag, text, map };
-std::string_view to_text(SettingKind kind);
-
-/// One key that a device entry (or its profile entry) may have. `driver` empty: the same for every driver of the kind.
-struct SettingInfo {
-  std::string_view name, driver;
-  SettingKind kind;
-  bool required;
-  std::string_view doc;
-  bool place = false;  ///< says where the device is: a double brings its own
-};
-struct DriverInfo {
-  std::string_view name, doc;
-};
-struct DeviceKind {
-  std::string_view name, doc;
-  std::span<const DriverInfo> drivers;
-  std::span<const SettingInfo> settings;
-};
-
-/// A double takes what the driver at the other end of its line takes, but for where the device is.
-bool takes(std::string_view driver, const SettingInfo& setting);
-
-/// Every device kind with its drivers and settings, for the checker and `takt nodes`.
-std::span<const DeviceKind> device_kinds();
-
 /// The node of a device kind without a device: ports to look at and to connect, never set up or run. Throws
-/// std::logic_error for a kind that device_kinds() does not have.
+/// std::logic_error for a kind that has none.
 std::unique_ptr<DeviceNode> make_shell(std::string_view kind);
 
 /// Makes the node of a device and opens the device (hardware only if it is `plugged`): everything that can be wrong
 /// with files and settings is told here. Errors list the valid alternatives.
-tl::expected<std::unique_ptr<DeviceNode>, DeviceError> make_device(const DeviceConfig& config, Devices& devices,
-                                                                   const Clock& clock);
+tl::expected<std::unique_ptr<DeviceNode>, DeviceError> make_device(const DeviceTypes& types, const DeviceConfig& config,
+                                                                   Devices& devices, const Clock& clock);
 
 /// CPU time that the simulator's rendering has used in this process so far (0 without a simulated camera).
 struct SimulatorUse {

@@ -2,13 +2,21 @@
 #include "graph/command/graph_commands.hpp"
 
 #include <filesystem>
+#include <functional>
 
+#include "graph/cli/graph_file.hpp"
 #include "graph/cli/set_option.hpp"
 #include "graph/command/check_command.hpp"
 #include "graph/language/overlay.hpp"
 
 namespace takt::command {
 namespace {
+
+int with_plugins(plugin::Plugins& plugins, const std::filesystem::path& graph, graph::LoadOptions& load,
+                 const std::function<int(const Registry&)>& command) {
+  const int code = plugins.load(graph_file(graph), load);
+  return code == kOk ? command(plugins.registry()) : code;
+}
 
 void add_load_options(CLI::App& app, std::filesystem::path& graph, graph::LoadOptions& load) {
   app.add_option("graph", graph, "graph file (default graph/ace.yaml)");
@@ -18,6 +26,7 @@ void add_load_options(CLI::App& app, std::filesystem::path& graph, graph::LoadOp
   app.add_option("--mode", load.mode, "a mode of the graph (default full)");
   app.add_option("--params", load.params, "parameter file of this robot: constants, parameters, device settings");
   app.add_option("--set", load.set, "node.param=value, repeatable");
+  add_plugin_option(app, load.plugin_files);
 }
 
 /// For what runs or judges a graph as it will run: with the values that `takt set --keep` left for it.
@@ -27,22 +36,27 @@ void add_overlay_option(CLI::App& app, graph::LoadOptions& load) {
       "--no-overlay", [&load] { load.state.clear(); }, "without the values that `takt set --keep` left for the graph");
 }
 
-void add_show(CLI::App& app, ShowOptions& o, int& exit_code) {
+void add_show(CLI::App& app, plugin::Plugins& plugins, ShowOptions& o, int& exit_code) {
   CLI::App* show = app.add_subcommand("show", "draws a graph, or lists what each node reads");
   add_load_options(*show, o.graph, o.load);
   CLI::Option* svg = show->add_option("--svg", o.svg, "writes the picture as an SVG file");
   show->add_flag("--dot", o.dot, "prints Graphviz text")->excludes(svg);
-  show->callback([&] { exit_code = show_graph(o); });
+  show->callback([&] {
+    exit_code = with_plugins(plugins, o.graph, o.load, [&](const Registry& known) { return show_graph(known, o); });
+  });
 }
 
-void add_report(CLI::App& app, RenderOptions& o, int& exit_code) {
+void add_report(CLI::App& app, plugin::Plugins& plugins, RenderOptions& o, int& exit_code) {
   CLI::App* report = app.add_subcommand("report", "makes a page for people from the report of a run");
   report->add_option("report", o.report, "what `takt run --report` wrote")->required();
   report->add_option("graph", o.graph, "graph file of the run (default graph/ace.yaml)");
   report->add_option("--schedule", o.schedule, "schedule file of the run, if it was not the graph's");
   report->add_option("--html", o.html, "writes the page to this file")->required();
   report->add_option("--output", o.output, "folder with the pictures of the run (default out)");
-  report->callback([&] { exit_code = render_report(o); });
+  report->callback([&] {
+    graph::LoadOptions load;
+    exit_code = with_plugins(plugins, o.graph, load, [&](const Registry& known) { return render_report(known, o); });
+  });
 }
 
 void add_explain(CLI::App& app, ExplainOptions& o, int& exit_code) {
@@ -53,22 +67,29 @@ void add_explain(CLI::App& app, ExplainOptions& o, int& exit_code) {
   explain->callback([&] { exit_code = explain_misses(o); });
 }
 
-void add_check(CLI::App& app, RunOptions& o, bool& json, int& exit_code) {
+void add_check(CLI::App& app, plugin::Plugins& plugins, RunOptions& o, bool& json, int& exit_code) {
   CLI::App* check = app.add_subcommand("check", "checks a graph and its schedule without running them");
   add_load_options(*check, o.graph, o.load);
   add_overlay_option(*check, o.load);
   check->add_flag("--json", json, "prints the result as JSON");
-  check->callback([&] { exit_code = check_graph(o, json); });
+  check->callback([&] {
+    exit_code =
+        with_plugins(plugins, o.graph, o.load, [&](const Registry& known) { return check_graph(known, o, json); });
+  });
 }
 
-void add_nodes(CLI::App& app, std::string& type, int& exit_code) {
+void add_nodes(CLI::App& app, plugin::Plugins& plugins, NodesOptions& o, int& exit_code) {
   CLI::App* nodes =
       app.add_subcommand("nodes", "lists node types and device kinds, or one with its ports and parameters");
-  nodes->add_option("type", type, "node type");
-  nodes->callback([&] { exit_code = print_nodes(type); });
+  nodes->add_option("type", o.type, "node type");
+  add_plugin_option(*nodes, o.load.plugin_files);
+  nodes->callback([&] {
+    exit_code = plugins.load({}, o.load);
+    if (exit_code == kOk) exit_code = print_nodes(plugins.registry(), o.type);
+  });
 }
 
-void add_run(CLI::App& app, RunOptions& o, int& exit_code) {
+void add_run(CLI::App& app, plugin::Plugins& plugins, RunOptions& o, int& exit_code) {
   CLI::App* run = app.add_subcommand("run", "runs a graph and reports what happened");
   add_load_options(*run, o.graph, o.load);
   add_overlay_option(*run, o.load);
@@ -105,11 +126,11 @@ void add_run(CLI::App& app, RunOptions& o, int& exit_code) {
                 "exit 3 where the machine lacks what `takt doctor` checks for such a run");
   run->callback([&, how_long] {
     o.duration_asked = how_long->count() > 0;
-    exit_code = run_graph(o);
+    exit_code = with_plugins(plugins, o.graph, o.load, [&](const Registry& known) { return run_graph(known, o); });
   });
 }
 
-void add_profile(CLI::App& app, ProfileOptions& o, int& exit_code) {
+void add_profile(CLI::App& app, plugin::Plugins& plugins, ProfileOptions& o, int& exit_code) {
   CLI::App* profile = app.add_subcommand("profile", "measures execution times and writes budgets into a schedule");
   add_load_options(*profile, o.run.graph, o.run.load);
   add_overlay_option(*profile, o.run.load);
@@ -127,19 +148,26 @@ void add_profile(CLI::App& app, ProfileOptions& o, int& exit_code) {
   in_place->excludes(write)->excludes(compare);
   write->excludes(compare);
   keep->excludes(compare);
-  profile->callback([&] { exit_code = profile_graph(o); });
+  profile->callback([&] {
+    exit_code =
+        with_plugins(plugins, o.run.graph, o.run.load, [&](const Registry& known) { return profile_graph(known, o); });
+  });
 }
 
 }  // namespace
 
-void add_graph_commands(CLI::App& app, GraphOptions& o, int& exit_code) {
-  add_run(app, o.run, exit_code);
-  add_check(app, o.check, o.check_json, exit_code);
-  add_show(app, o.show, exit_code);
-  add_report(app, o.render, exit_code);
+void add_plugin_option(CLI::App& app, std::vector<std::filesystem::path>& files) {
+  app.add_option("--plugin", files, "shared module with node types, devices or messages, repeatable");
+}
+
+void add_graph_commands(CLI::App& app, plugin::Plugins& plugins, GraphOptions& o, int& exit_code) {
+  add_run(app, plugins, o.run, exit_code);
+  add_check(app, plugins, o.check, o.check_json, exit_code);
+  add_show(app, plugins, o.show, exit_code);
+  add_report(app, plugins, o.render, exit_code);
   add_explain(app, o.explain, exit_code);
-  add_nodes(app, o.type, exit_code);
-  add_profile(app, o.profile, exit_code);
+  add_nodes(app, plugins, o.nodes, exit_code);
+  add_profile(app, plugins, o.profile, exit_code);
 }
 
 }  // namespace takt::command

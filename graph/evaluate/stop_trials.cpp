@@ -11,6 +11,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "graph/ace/ace_registry.hpp"
 #include "graph/compose/composition.hpp"
 #include "hal/laser/laser_node.hpp"
 #include "hal/settings/settings.hpp"
@@ -312,7 +313,7 @@ StopTrials::StopTrials(graph::GraphSpec yard, Vision vision, uint64_t seed)
     : yard_(std::move(yard)),
       vision_(vision),
       seed_(seed),
-      types_(graph::node_types()),
+      registry_(ace_registry()),
       textures_(sim::textures_of(seed)) {
   // In virtual time it is said below what a job takes: it need not be spent.
   for (graph::NodeSpec& node : yard_.nodes)
@@ -339,7 +340,7 @@ StopOutcome StopTrials::run(const StopTrial& trial) {
     if (!world) return failed(world.error());
     if (!person) person.emplace(trial, **world);
     if (spec.kind != "laser_scanner") {
-      auto node = hal::make_device(config, devices, clock);
+      auto node = hal::make_device(registry_.devices, config, devices, clock);
       if (!node) return failed(node.error());
       return std::move(*node);
     }
@@ -348,7 +349,7 @@ StopOutcome StopTrials::run(const StopTrial& trial) {
     scanner = model.sensor_in_robot = settings.mount("mount");
     return std::make_unique<LaserNode>(std::make_unique<LaserWithPerson>(model, **world, *person));
   };
-  auto composition = graph::compose(yard_, types_, factory, clock, {std::filesystem::path(), seed_});
+  auto composition = graph::compose(yard_, registry_, factory, clock, {std::filesystem::path(), seed_});
   if (!composition) throw std::runtime_error(graph::to_string(composition.error().problems.front()));
   const Plan& plan = composition->plan;
   const auto transport = make_local_transport(plan.ports);

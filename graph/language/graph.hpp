@@ -231,6 +231,16 @@ struct GraphSpec {
   std::vector<std::string> adjusted;  ///< what validation changed, for stderr and the report
 };
 
+/// A plug-in that a graph file asks for.
+struct PluginName {
+  std::filesystem::path file, directory;  ///< as it stands there; of the graph file
+  Position position;
+};
+/// A plug-in that was loaded: part of a record.
+struct PluginFact {
+  std::string name, hash;  ///< of the file
+};
+
 /// What the command line adds to the files.
 struct LoadOptions {
   std::string profile;  ///< "": the graph's default_profile, else sim
@@ -240,12 +250,14 @@ struct LoadOptions {
   std::vector<std::string> set;  ///< "node.param=value"
   std::filesystem::path params;  ///< parameter file of this robot; empty: none
   std::filesystem::path state;   ///< folder whose overlay of the graph is read, see overlay.hpp; empty: none
+  std::vector<std::filesystem::path> plugin_files = {};  ///< of --plugin
+  std::vector<PluginFact> plugins = {};                  ///< all that were loaded for this graph, see graph/plugins
 };
 
 }  // namespace takt::graph
 
 namespace takt {
-class NodeTypes;
+struct Registry;
 }
 
 namespace takt::graph {
@@ -255,8 +267,12 @@ struct Loaded {
   std::vector<Problem> problems;
 };
 
+/// Those that `plugins` of the file names; they are loaded before the file is. Nothing of a file that cannot be read:
+/// load() says why.
+std::vector<PluginName> plugins_of(const std::filesystem::path& file);
+
 /// Reads the graph and its schedule, checks all of it (syntax, schema, ids, types, units, ranges, hierarchy, cycles)
 /// and returns every problem, not just the first. Never throws.
-Loaded load(const std::filesystem::path& file, const LoadOptions& options, const NodeTypes& types);
+Loaded load(const std::filesystem::path& file, const LoadOptions& options, const Registry& registry);
 
 }  // namespace takt::graph

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "graph/language/catalogue.hpp"
+#include "graph/language/registry.hpp"
 #include "hal/drivers.hpp"
 
 namespace takt::graph {
@@ -61,9 +62,9 @@ void add(std::vector<DeviceSetting>& settings, const hal::SettingInfo& info) {
 
 }  // namespace
 
-DeviceCatalogue hal_catalogue() {
-  DeviceCatalogue catalogue;
-  for (const auto& info : hal::device_kinds()) {
+DeviceCatalogue catalogue(const hal::DeviceTypes& types) {
+  DeviceCatalogue known;
+  for (const auto& info : types.all()) {
     DeviceKindEntry kind;
     kind.name = info.name;
     kind.doc = info.doc;
@@ -75,14 +76,13 @@ DeviceCatalogue hal_catalogue() {
       for (auto& driver : kind.drivers)
         if (!setting.driver.empty() && hal::takes(driver.name, setting)) add(driver.settings, setting);
     }
-    catalogue.kinds[kind.name] = std::move(kind);
+    known.kinds[kind.name] = std::move(kind);
   }
-  return catalogue;
+  return known;
 }
 
-Loaded load(const std::filesystem::path& file, const LoadOptions& options, const NodeTypes& types) {
-  static const DeviceCatalogue devices = hal_catalogue();
-  return load(file, options, types, devices);
+Loaded load(const std::filesystem::path& file, const LoadOptions& options, const Registry& registry) {
+  return load(file, options, registry.nodes, catalogue(registry.devices));
 }
 
 }  // namespace takt::graph

@@ -80,7 +80,8 @@ std::string Loader::choose_profile() {
   const bool asked = !options_.profile.empty(), named = default_profile.is_string();
   const std::string chosen = asked ? options_.profile : named ? default_profile.get<std::string>() : "sim";
   if (std::find(names.begin(), names.end(), chosen) != names.end()) return chosen;
-  if (!asked && !named && names.empty()) return chosen;  // every device then names its driver itself
+  // Every device then names its driver itself; a record names the default.
+  if (!named && names.empty() && chosen == "sim") return chosen;
   const Position at = asked ? Position{"--profile", 0, 0} : graph_.value_at(named ? "/default_profile" : "/profiles");
   const std::string hint = asked || named ? "" : "; name one with `default_profile` or --profile";
   problem(at, fmt::format("graph {} has no profile {}{}{}", ticked(spec_.name), ticked(chosen),

@@ -57,7 +57,7 @@ std::vector<graph::Restart> restarts_of(const OutageLog& outages, const std::vec
 
 int RunFaults::load(graph::GraphSpec& graph, const Clock& clock, bool processes) {
   if (!wanted()) return kOk;
-  const graph::Composition outline = graph::outline(graph, graph::node_types(), clock);
+  const graph::Composition outline = graph::outline(graph, registry_, clock);
   graph::RunKind kind;
   kind.virtual_time = clock.is_virtual();
   kind.processes = processes;

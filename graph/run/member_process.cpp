@@ -127,7 +127,7 @@ int run_member(const MemberPart& part) {
     obey_orders(&record.kill);
   };
   if (!part.spare) take_place();
-  Prepared prepared;
+  Prepared prepared(part.registry);
   prepared.graph = part.graph;
   prepared.clock = std::make_unique<MonotonicClock>();
   BoardExchange exchange(board);

@@ -43,6 +43,13 @@ std::string settings(const RunOptions& options, const graph::GraphSpec& graph) {
   return fmt::format("{}", fmt::join(lines, "\n"));
 }
 
+/// "NAME HASH", a line for each.
+std::string plugins(const RunOptions& options) {
+  std::string lines;
+  for (const auto& plugin : options.load.plugins) lines += fmt::format("{} {}\n", plugin.name, plugin.hash);
+  return lines;
+}
+
 std::string absolute(const std::filesystem::path& file) {
   std::error_code error;
   return std::filesystem::absolute(file, error).string();
@@ -82,6 +89,7 @@ void RunRecord::begin(const graph::GraphSpec& graph, const Plan& plan, const Run
                 {"policy_asked", std::string(to_string(graph.schedule.policy))},
                 {"policy_option", options_.load.policy},
                 {"set", settings(options_, graph)},
+                {"plugins", plugins(options_)},
                 {"seed", std::to_string(options_.seed)},
                 {"clock", options_.clock},
                 {"transport", transport.name()},

@@ -256,7 +256,7 @@ Json make_report(const RunFacts& facts) {
   report["transport"] = facts.transport.name();
   report["isolation"] = facts.isolation;
   report["processes"] = facts.processes;
-  report["parameters"] = attach::parameters_json(facts.graph, facts.plan, facts.board);
+  report["parameters"] = attach::parameters_json(facts.registry.nodes, facts.graph, facts.plan, facts.board);
   report["overlay"] = facts.graph.kept.file.empty() ? Json(nullptr) : Json(facts.graph.kept.file.string());
   report["proofs"] = proofs.json();
   report["nodes"] = std::move(nodes);

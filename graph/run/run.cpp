@@ -84,7 +84,8 @@ int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, Ru
   {
     const Stoppable stoppable(board);
     std::optional<attach::Server> server;  // virtual time passes too fast to speak to
-    if (!prepared.clock->is_virtual()) server.emplace(attach::Subject{graph, composition.plan, board, *transport});
+    if (!prepared.clock->is_virtual())
+      server.emplace(attach::Subject{prepared.registry, graph, composition.plan, board, *transport});
     if (server) tell_attach(*server, adjusted);
     std::optional<LiveTable> live;
     if (options.witness == nullptr)
@@ -116,7 +117,8 @@ int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, Ru
   const hal::SimulatorUse simulator = hal::simulator_use();
   const MachineUse use{after.cpu_ns - before.cpu_ns, simulator.cpu_ns, simulator.in_jobs_ns,
                        after.steal_ms - before.steal_ms, after.rss_mb};
-  auto report = make_report({graph,
+  auto report = make_report({prepared.registry,
+                             graph,
                              composition.plan,
                              board,
                              result,
@@ -137,7 +139,7 @@ int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, Ru
   record.tell(report);
   faults.judge(result, board, run_exit(board, result.policy_granted, report), {}, report);
   expectations.judge(report);
-  int code = tell_faults(options, graph, board, result.policy_granted, report);
+  int code = tell_faults(prepared.registry, options, graph, board, result.policy_granted, report);
   code = expectations.exit_code(faults.exit_code(code, report), report);
   if (!no_trace.empty()) code = refuse(no_trace, kBadInput);
   if (options.witness != nullptr) options.witness->end(report);
@@ -184,8 +186,8 @@ int run_in_one_process(const RunOptions& options, Prepared& prepared, RunFaults&
 }
 
 /// One process, or one per subsystem: as the command line says, else the graph.
-int run_as_asked(RunOptions options) {
-  Prepared prepared;
+int run_as_asked(const Registry& registry, RunOptions options) {
+  Prepared prepared(registry);
   if (const int code = load(options, prepared); code != kOk) {
     tell_problems(prepared.problems.size());
     return code;
@@ -203,17 +205,17 @@ int run_as_asked(RunOptions options) {
       std::fprintf(stderr, "takt: note: %s\n", note.c_str());
   }
   const bool processes = wanted == "subsystem" && options.clock != "virtual";
-  RunFaults faults(options);
+  RunFaults faults(registry, options);
   if (const int code = faults.load(*prepared.graph, *prepared.clock, processes); code != kOk) return code;
   if (!processes) return run_in_one_process(options, prepared, faults, adjusted);
   const KeptPlace report(options.report), page(options.html), verdict(options.junit), trace(options.trace),
       record(options.record);
-  return run_isolated(options, *prepared.graph, faults, std::move(adjusted));
+  return run_isolated(registry, options, *prepared.graph, faults, std::move(adjusted));
 }
 
 }  // namespace
 
-int run_graph(const RunOptions& options) {
+int run_graph(const Registry& registry, const RunOptions& options) {
   std::error_code error;
   std::filesystem::create_directories(options.output, error);
   if (error)
@@ -240,7 +242,7 @@ int run_graph(const RunOptions& options) {
         kBadInput);
   const StopOnSignal guard;
   try {
-    return run_as_asked(options);
+    return run_as_asked(registry, options);
   } catch (const std::invalid_argument& problem) {  // more ports or edges than the transport carries
     return refuse(problem.what(), kBadInput);
   } catch (const std::exception& problem) {  // PolicyRefused, TransportError, no memory

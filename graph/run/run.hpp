@@ -49,6 +49,6 @@ struct RunOptions {
 };
 
 /// `takt run`: loads, checks, composes, runs, reports. Returns the exit code.
-int run_graph(const RunOptions& options);
+int run_graph(const Registry& registry, const RunOptions& options);
 
 }  // namespace takt::command

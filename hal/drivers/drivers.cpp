@@ -483,12 +483,10 @@ std::unique_ptr<DeviceNode> make_shell(std::string_view kind) {
   throw std::logic_error("device kind " + std::string(kind) + " has no node in hal/drivers/drivers.cpp");
 }
 
-NodeResult make_device(const DeviceConfig& config, Devices& devices, const Clock& clock) {
-  const auto kinds = device_kinds();
-  const auto kind =
-      std::find_if(kinds.begin(), kinds.end(), [&](const DeviceKind& k) { return k.name == config.kind; });
-  if (kind == kinds.end())
-    return device_error(config.id, "unknown device kind `" + config.kind + "`", "known kinds: " + names(kinds));
+NodeResult make_device(const DeviceTypes& types, const DeviceConfig& config, Devices& devices, const Clock& clock) {
+  const DeviceKind* const kind = types.find(config.kind);
+  if (kind == nullptr)
+    return device_error(config.id, "unknown device kind `" + config.kind + "`", "known kinds: " + names(types.all()));
   const auto driver = std::find_if(kind->drivers.begin(), kind->drivers.end(),
                                    [&](const DriverInfo& d) { return d.name == config.driver; });
   if (driver == kind->drivers.end())

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+
 #include "hal/drivers.hpp"
 
 namespace takt::hal {
@@ -83,7 +85,8 @@ constexpr SettingInfo kCamera[] = {
     {"transfer", "v4l2", time, false, "from the end of the exposure until the frame is here; a whole period"},
     {"gain", "v4l2", number, false, "gain in the camera's own steps; as the camera is set"},
     {"stamp_delay", "v4l2", time, false, "from the begin of the exposure to the device's stamp; 0s"},
-    {"trigger_line", "v4l2", text, false, "output of a GPIO chip that makes it expose, one pulse a job; none: its rate"},
+    {"trigger_line", "v4l2", text, false,
+     "output of a GPIO chip that makes it expose, one pulse a job; none: its rate"},
     {"trigger_chip", "v4l2", path, false, "the chip of that line; /dev/gpiochip0", true},
     {"trigger_pulse", "v4l2", time, false, "so long the line is high, at most 1ms; 0.1ms"},
     {"dmabuf", "v4l2", flag, false, "buffers are exported as DMABUFs for import; false"},
@@ -211,7 +214,14 @@ constexpr DeviceKind kKinds[] = {
 
 }  // namespace
 
-std::span<const DeviceKind> device_kinds() { return kKinds; }
+void register_devices(DeviceTypes& types) {
+  for (const DeviceKind& kind : kKinds) types.add(kind);
+}
+
+const DeviceKind* DeviceTypes::find(std::string_view kind) const {
+  const auto found = std::find_if(kinds_.begin(), kinds_.end(), [&](const DeviceKind& k) { return k.name == kind; });
+  return found == kinds_.end() ? nullptr : &*found;
+}
 
 bool takes(std::string_view driver, const SettingInfo& setting) {
   if (setting.driver.empty() || setting.driver == driver) return true;

@@ -6,7 +6,8 @@ expect 0 "" "$takt"
 grep -q "^Subcommands:" "$work/stdout" || fail "without arguments there is no help"
 "$takt" --help | cmp -s - "$work/stdout" || fail "takt without arguments is not takt --help"
 expect 0 "" "$takt" --version
-grep -qE "^takt [0-9]+\.[0-9]+\.[0-9]+ " "$work/stdout" || fail "no version: $(cat "$work/stdout")"
+grep -qE "^takt [0-9]+\.[0-9]+\.[0-9]+ \(commit .+\)$" "$work/stdout" || fail "no version: $(cat "$work/stdout")"
+grep -qE "^ABI: declarations=.*;compiler=.*;NDEBUG=" "$work/stdout" || fail "no ABI: $(cat "$work/stdout")"
 
 # A program of the user's, in PATH: with its own arguments, exit code and name.
 mkdir "$work/bin"

@@ -9,7 +9,7 @@ class App;
 
 namespace takt::command {
 
-/// Adds them; what is returned holds their options (MoreCommands of graph/command/program.hpp).
+/// Adds them; what is returned holds their options (takt::MoreCommands).
 std::shared_ptr<void> add_robot_commands(CLI::App& app, int& exit_code);
 
 }  // namespace takt::command

@@ -3,6 +3,7 @@
 
 #include <doctest/doctest.h>
 
+#include "graph/ace/ace_registry.hpp"
 #include "hal/sim/simulation.hpp"
 #include "rt/msg/image.hpp"
 #include "rt/time/rate.hpp"
@@ -25,7 +26,7 @@ DeviceConfig config(const std::string& kind, const std::string& driver, nlohmann
 std::string error(const DeviceConfig& c) {
   Devices devices;
   VirtualClock clock;
-  const auto node = make_device(c, devices, clock);
+  const auto node = make_device(ace_registry().devices, c, devices, clock);
   return node ? "" : node.error().text();
 }
 const nlohmann::json kWorld = {{"world", "worlds/lab.xml"}};
@@ -49,7 +50,7 @@ TEST_CASE("unknown kinds, drivers and settings list the valid ones") {
 
 TEST_CASE("every simulated kind can be made with every setting that its listing calls required, and no other") {
   VirtualClock clock;
-  for (const DeviceKind& kind : device_kinds()) {
+  for (const DeviceKind& kind : ace_registry().devices.all()) {
     if (kind.drivers.front().name != "sim") continue;
     Devices devices;
     nlohmann::json settings = nlohmann::json::object();
@@ -57,7 +58,8 @@ TEST_CASE("every simulated kind can be made with every setting that its listing 
       if (!setting.required || (!setting.driver.empty() && setting.driver != "sim")) continue;
       settings[std::string(setting.name)] = setting.name == "world" ? "worlds/lab.xml" : "rigs/xb3.yaml";
     }
-    const auto node = make_device(config(std::string(kind.name), "sim", settings), devices, clock);
+    const auto node =
+        make_device(ace_registry().devices, config(std::string(kind.name), "sim", settings), devices, clock);
     CHECK_MESSAGE(node.has_value(), (node ? "" : node.error().text()));
     for (const SettingInfo& setting : kind.settings) CHECK_FALSE(setting.doc.empty());
   }
@@ -68,7 +70,7 @@ TEST_CASE("a job of the camera node sends one pair with the stamp of its release
   Devices devices;
   auto settings = kWorld;
   settings["rig"] = "rigs/xb3.yaml";
-  auto made = make_device(config("stereo_camera", "sim", settings), devices, clock);
+  auto made = make_device(ace_registry().devices, config("stereo_camera", "sim", settings), devices, clock);
   REQUIRE(made.has_value());
   DeviceNode& node = **made;
   Setup setup{clock, graph_folder(), {}, 1, Rate{15, 1}};
@@ -101,7 +103,8 @@ TEST_CASE("a replayed camera ends the run after its last frame") {
   Devices devices;
   const auto image = (graph_folder() / "worlds/lab.pgm").string();
   auto made =
-      make_device(config("stereo_camera", "replay",
+      make_device(ace_registry().devices,
+                  config("stereo_camera", "replay",
                          {{"left", image}, {"right", image}, {"focal", 100}, {"baseline", "0.1m"}, {"frames", 2}}),
                   devices, clock);
   REQUIRE_MESSAGE(made.has_value(), (made ? "" : made.error().text()));
@@ -131,7 +134,8 @@ TEST_CASE("laser and base nodes replay a CARMEN log and end with it") {
   for (const auto& [kind, sends] : std::initializer_list<std::pair<const char*, std::vector<bool>>>{
            {"laser_scanner", {true, false, true, false, false}}, {"mobile_base", {true, true, true, true, false}}}) {
     Devices devices;
-    auto made = make_device(config(kind, "replay", {{"log", log.path.string()}, {"start", "0s"}}), devices, clock);
+    auto made = make_device(ace_registry().devices,
+                            config(kind, "replay", {{"log", log.path.string()}, {"start", "0s"}}), devices, clock);
     REQUIRE_MESSAGE(made.has_value(), (made ? "" : made.error().text()));
     DeviceNode& node = **made;
     Setup setup{clock, graph_folder(), {}, 1, Rate{15, 1}};
@@ -187,7 +191,7 @@ TEST_CASE("laser, head, base and line nodes send one message a job, and share on
                                                                   {"digital_lines", "state"},
                                                                   {"object_sensor", "objects"},
                                                                   {"actor", "outcome"}}) {
-    auto made = make_device(config(kind, "sim", kWorld), devices, clock);
+    auto made = make_device(ace_registry().devices, config(kind, "sim", kWorld), devices, clock);
     REQUIRE_MESSAGE(made.has_value(), (made ? "" : made.error().text()));
     DeviceNode& node = **made;
     Setup setup{clock, graph_folder(), {}, 1, Rate{15, 1}};
@@ -253,7 +257,7 @@ TEST_CASE("settings of the SICK drivers") {
                               {"mount", {{"z", "0.25m"}}}});
   Devices devices;
   VirtualClock clock;
-  const auto node = make_device(absent, devices, clock);
+  const auto node = make_device(ace_registry().devices, absent, devices, clock);
   REQUIRE_FALSE(node);
   CHECK_FALSE(node.error().bad_input);
   CHECK(has(node.error().text(), "/dev/none: No such file"));
@@ -296,7 +300,8 @@ TEST_CASE("settings of a semantic service and of its link") {
   Devices devices;
   VirtualClock clock;
   const auto service = [&](const char* robot) {
-    return make_device(config("semantic_service", "udp", {{"address", "127.0.0.1:47113"}, {"robot", robot}}), devices,
+    return make_device(ace_registry().devices,
+                       config("semantic_service", "udp", {{"address", "127.0.0.1:47113"}, {"robot", robot}}), devices,
                        clock);
   };
   const auto ace = service("ace"), again = service("ace"), eve = service("eve");

@@ -2,6 +2,7 @@
 // Real hardware from a graph's device entry to a message: with doubles where there is none.
 #include <doctest/doctest.h>
 
+#include "graph/ace/ace_registry.hpp"
 #include "hal/base/base_double.hpp"
 #include "hal/drivers.hpp"
 #include "hal/head/head_double.hpp"
@@ -20,7 +21,8 @@ namespace {
 tl::expected<std::unique_ptr<DeviceNode>, DeviceError> made(const std::string& kind, const std::string& driver,
                                                             nlohmann::json settings, const Clock& clock) {
   Devices devices;
-  return make_device({"thing", kind, driver, std::move(settings), graph_folder(), 1}, devices, clock);
+  return make_device(ace_registry().devices, {"thing", kind, driver, std::move(settings), graph_folder(), 1}, devices,
+                     clock);
 }
 
 /// A node on a double: jobs of 20 ms until it has sent a message; then its stamp's age.

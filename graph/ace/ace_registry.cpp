@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The one place that names every processing node; a new node folder adds its line here.
-#include "graph/compose/composition.hpp"
+#include "graph/ace/ace_registry.hpp"
 
 namespace takt {
 void register_stereo(NodeTypes& types);
@@ -30,12 +30,10 @@ void register_laser_cloud(NodeTypes& types);
 void register_robot_client(NodeTypes& types);
 void register_cruise(NodeTypes& types);
 void register_mission(NodeTypes& types);
-}  // namespace takt
 
-namespace takt::graph {
-
-NodeTypes node_types() {
-  NodeTypes types;
+Registry ace_registry() {
+  Registry registry;
+  NodeTypes& types = registry.nodes;
   register_stereo(types);
   register_ego_motion(types);
   register_mapping_3d(types);
@@ -63,7 +61,8 @@ NodeTypes node_types() {
   register_robot_client(types);
   register_cruise(types);
   register_mission(types);
-  return types;
+  hal::register_devices(registry.devices);
+  return registry;
 }
 
-}  // namespace takt::graph
+}  // namespace takt
