@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Installed as <takt/main.hpp>: graph, experimental.
 // A program of your own with all commands of Takt: run, check, nodes, replay, top ...
 //
 //   int main(int argc, char** argv) {

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Installed as <takt/plugin.hpp>: graph, experimental.
 // Node types, devices and messages of your own for the stock `takt`, without a program of your own.
 //
 //   void register_blink(takt::Registry& registry) { registry.nodes.add<Blink>("blink", "..."); }

@@ -2,7 +2,7 @@
 // Installed as <takt/graph_testing.hpp>: graph, experimental.
 // Runs a whole graph in virtual time, for the tests of a graph, in any test framework.
 //
-//   takt::GraphTest test("hello.yaml");
+//   takt::GraphTest test("hello.yaml", registry);  // what the program knows: graph/language/registry.hpp
 //   test.watch("doubler.out");
 //   CHECK(test.run_for(2.0) == 0);  // seconds of virtual time; 0 is the exit code of `takt run`
 //   CHECK(test.count("doubler.out") == 20);
@@ -24,9 +24,12 @@
 
 namespace takt {
 
+struct Registry;
+
 class GraphTest {
  public:
-  explicit GraphTest(std::filesystem::path graph);
+  /// `registry` lives longer than the test.
+  GraphTest(std::filesystem::path graph, const Registry& registry);
   ~GraphTest();
   GraphTest(const GraphTest&) = delete;
   GraphTest& operator=(const GraphTest&) = delete;

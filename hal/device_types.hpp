@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Installed as <takt/hal/device_types.hpp>: hal, experimental.
 // Which device kinds and drivers there are.
 #pragma once
 #include <cstdint>

@@ -66,6 +66,7 @@ class Scratch {
 }  // namespace
 
 struct GraphTest::State final : command::RunWitness {
+  const Registry* registry = nullptr;
   struct Message {
     int64_t stamp_ns;
     test::Chunk chunk;
@@ -125,7 +126,8 @@ struct GraphTest::State final : command::RunWitness {
   }
 };
 
-GraphTest::GraphTest(std::filesystem::path graph) : state_(std::make_unique<State>()) {
+GraphTest::GraphTest(std::filesystem::path graph, const Registry& registry) : state_(std::make_unique<State>()) {
+  state_->registry = &registry;
   state_->options.graph = std::move(graph);
   state_->options.clock = "virtual";
   state_->options.isolate = "none";
@@ -152,7 +154,7 @@ int GraphTest::run_for(double seconds) {
   options.duration_s = seconds;
   std::optional<Scratch> scratch;
   if (options.output.empty()) options.output = scratch.emplace().path();
-  const int code = command::run_graph(options);
+  const int code = command::run_graph(*state_->registry, options);
   if (!state_->wrong.empty()) throw std::logic_error(std::exchange(state_->wrong, {}));
   return code;
 }

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <string>
 
+#include "graph/ace/ace_registry.hpp"
 #include "rt/msg/pose.hpp"
 #include "rt/msg/text_status.hpp"
 #include "tests/has.hpp"
@@ -40,6 +41,11 @@ nodes:
   }
 };
 
+const Registry& known() {
+  static const Registry registry = ace_registry();
+  return registry;
+}
+
 template <class Call>
 std::string error_of(Call call) {
   try {
@@ -59,7 +65,7 @@ std::string text_of(const GraphTest& test, std::string_view port, size_t i) {
 
 TEST_CASE("GraphTest: every message of a port and the figures of the report, the same in each run") {
   const CountingGraph counting;
-  GraphTest test(counting.graph);
+  GraphTest test(counting.graph, known());
   test.watch("first.output");
   test.watch("second.output");
   for (int repeat = 0; repeat < 2; ++repeat) {
@@ -80,7 +86,7 @@ TEST_CASE("GraphTest: every message of a port and the figures of the report, the
 
 TEST_CASE("GraphTest: parameters, and what a job needs in virtual time") {
   const CountingGraph counting;
-  GraphTest test(counting.graph);
+  GraphTest test(counting.graph, known());
   test.watch("first.output");
   test.set("first.message_size=20");
   test.set("first.flood=true");
@@ -91,17 +97,17 @@ TEST_CASE("GraphTest: parameters, and what a job needs in virtual time") {
 
 TEST_CASE("GraphTest: a graph that cannot run gives the exit code of takt run") {
   const CountingGraph counting;
-  GraphTest test(counting.graph);
+  GraphTest test(counting.graph, known());
   test.set("third.work=1ms");
   CHECK(test.run_for(1) == 2);
   CHECK(test::has(error_of([&] { test.figure("ok"); }), "no run has come to its end"));
-  GraphTest missing(counting.folder.path / "none.yaml");
+  GraphTest missing(counting.folder.path / "none.yaml", known());
   CHECK(missing.run_for(1) == 2);
 }
 
 TEST_CASE("GraphTest: a wrong use is answered with the valid choices") {
   const CountingGraph counting;
-  GraphTest test(counting.graph);
+  GraphTest test(counting.graph, known());
   test.watch("first.output");
   REQUIRE(test.run_for(0.3) == 0);
   CHECK(test::has(error_of([&] { test.figure("nodes/third/completed"); }), "no third among first, second"));
@@ -109,7 +115,7 @@ TEST_CASE("GraphTest: a wrong use is answered with the valid choices") {
   CHECK(test::has(error_of([&] { test.count("second.output"); }), "watch(\"second.output\") before the run"));
   CHECK(test::has(error_of([&] { test.stamp_ns("first.output", 3); }), "sent 3 messages; there is no message 3"));
   CHECK(test::has(error_of([&] { test.message<Pose>("first.output", 0); }), "carries text_status, not pose"));
-  GraphTest other(counting.graph);
+  GraphTest other(counting.graph, known());
   other.watch("first.out");
   CHECK(test::has(error_of([&] { other.run_for(0.3); }), "no output first.out; it has first.output, second.output"));
 }
