@@ -34,7 +34,7 @@ endfunction()
 
 # Rooms belong to the package of their floor. Only those that `takt` links are installed: what is for its desk programs
 # alone is not built with it.
-takt_closure(rooms takt_command)
+takt_closure(rooms takt_command takt_robot_commands takt_ace)
 list(REMOVE_ITEM rooms takt_rt takt_analysis takt_with_iceoryx)
 foreach(package record hal graph ace)
   set(TAKT_ROOMS_${package})
