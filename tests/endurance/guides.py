@@ -55,10 +55,10 @@ class Clone:
 def follow_node(clone):
     print("\n== a node")
     (clone.folder / "nodes/brightness/CMakeLists.txt").write_text(clone.said(GUIDES, r"`(takt_room\(brightness [^`]*)`") + "\n")
-    types = "graph/compose/node_types.cpp"
+    types = "graph/ace/ace_registry.cpp"
     clone.insert(types, "namespace takt {\n", "void register_brightness(NodeTypes& types);\n")
     clone.insert(types, "  register_mission(types);\n", "  register_brightness(types);\n")
-    clone.insert("graph/compose/CMakeLists.txt", "USES takt_language", " " + clone.said(GUIDES, r"and name `(takt_brightness)`"))
+    clone.insert("graph/ace/CMakeLists.txt", "USES takt_language", " " + clone.said(GUIDES, r"and name `(takt_brightness)`"))
     clone.insert("graph/crossing.yaml", "  street:\n", "    " + clone.said(GUIDES, r"`(brightness: \{type[^`]*)`") + "\n")
     clone.insert("schedules/crossing.yaml", "nodes:\n", "  " + clone.said(GUIDES, r"`(brightness: \{rate[^`]*)`") + "\n")
     clone.run("./takt nodes brightness", output="gain")

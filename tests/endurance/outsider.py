@@ -123,7 +123,7 @@ def main():
     if asked.here and asked.root or asked.build and not asked.here: parser.error("--root has no --here, and --build needs it")
     assert steps_of("# A\n```sh\ncd x\nb \\\n c\n```\n```text\nd\n```\n") == [("A", "cd x"), ("A", "b  c")]
     steps = steps_of((ROOT / PAGE).read_text())
-    if not any("takt new" in command for _, command in steps): sys.exit(f"{PAGE} no longer shows `takt new`")
+    if not any("cp -r examples/" in command for _, command in steps): sys.exit(f"{PAGE} no longer copies an example")
     with tempfile.TemporaryDirectory(prefix="takt_outsider.") as scratch:
         if asked.here:
             home = pathlib.Path(scratch)
@@ -134,7 +134,7 @@ def main():
             debian = (asked.root or pathlib.Path(scratch) / "debian").resolve()
             make_debian(debian)
             home = debian / "root"
-            for old in ("takt", "takt-0.2", "robot"): shutil.rmtree(home / old, ignore_errors=True)
+            for old in ("takt", "takt-0.2", "kitchen"): shutil.rmtree(home / old, ignore_errors=True)
             check_out(home, None)
             with Mounted(debian): rows = follow(Shell(home, "/root", ["chroot", str(debian), "env", "-i", "PATH=/usr/sbin:/usr/bin:/sbin:/bin", "LC_ALL=C.UTF-8"]), None)
     print("\n" + table(rows))
