@@ -165,7 +165,7 @@ class Replay {
         std::fprintf(stderr, "takt: %s has changed since the record was made\n", graph.files[i].c_str());
     for (const std::string& param : log::changed_params(recorded_, plan))
       std::fprintf(stderr, "takt: %s\n", param.c_str());
-    if (fact(file_->facts(), "program") != log::file_hash("/proc/self/exe"))
+    if (fact(file_->facts(), "program") != log::program_hash())
       std::fprintf(stderr, "takt: this is another program (commit %s) than the one that recorded (commit %s)\n",
                    version().commit, fact(file_->facts(), "commit").c_str());
   }

@@ -43,6 +43,9 @@ std::string part_name(size_t i);
 /// Hash of a file, as hexadecimal digits; that of nothing if it cannot be read.
 std::string file_hash(const std::filesystem::path& file);
 
+/// Hash of this program and of the libtakt_core that it runs with: jobs are the work of both.
+std::string program_hash();
+
 /// All of a file; empty if it cannot be read.
 std::string file_text(const std::filesystem::path& file);
 

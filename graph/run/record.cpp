@@ -95,7 +95,7 @@ void RunRecord::begin(const graph::GraphSpec& graph, const Plan& plan, const Run
                 {"transport", transport.name()},
                 {"isolation", isolation},
                 {"commit", version().commit},
-                {"program", log::file_hash("/proc/self/exe")},
+                {"program", log::program_hash()},
                 {"simd", hwy::TargetName(hwy::SupportedTargets() & -hwy::SupportedTargets())},
                 {"machine", machine_facts().dump()}};
   const std::string texts[]{log::file_text(graph.file), log::file_text(graph.schedule.file),
