@@ -6,5 +6,5 @@
 
 inline void register_kitchen(takt::Registry& registry) {
   registry.nodes.add<Oven>("oven", takt::Layer::sensor, "a temperature that rises");
-  registry.nodes.add<Alarm>("alarm", takt::Layer::processing, "passes on temperatures above a limit");
+  registry.nodes.add<Alarm>("alarm", takt::Layer::perception, "passes on temperatures above a limit");
 }
