@@ -1,12 +1,66 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which device kinds and drivers there are.
+// Which device kinds and drivers there are, and the way from a graph's device entry to a hardware node.
+//
+//     void register_tube(hal::DeviceTypes& types) {  // in the driver's folder; its CMakeLists.txt says REGISTERS tube
+//       types.add("laser_scanner", {"tube", "a scanner in a tube", hal::hardware(make_tube)},
+//                 {{"radius", "tube", hal::SettingKind::length, true, "of the tube"}});
+//     }
 #pragma once
-#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
 #include <span>
+#include <string>
 #include <string_view>
+#include <typeindex>
 #include <vector>
 
+#include "hal/device_node.hpp"
+#include "hal/settings/json.hpp"
+#include "hal/settings/settings.hpp"
+#include "hal/simulated.hpp"
+#include "rt/time/clock.hpp"
+
 namespace takt::hal {
+
+class OwnFolder;
+
+/// What a device needs to exist.
+struct DeviceConfig {
+  std::string id, kind, driver;
+  nlohmann::json settings;          ///< one object; values with a unit as text ("0.24m") or as numbers in SI
+  std::filesystem::path directory;  ///< relative paths in the settings start here
+  uint64_t seed = 0;
+  bool plugged =
+      true;  ///< false: hardware need not be there. Its node knows sizes from settings and files, and never runs
+};
+
+/// What the devices of one process share. Must outlive the nodes. Composition thread only.
+class Devices {
+ public:
+  Devices();
+  ~Devices();
+  /// What the drivers of one folder share, made when it is first asked for.
+  template <class T>
+  T& shared() {
+    std::shared_ptr<void>& own = shared_[typeid(T)];
+    if (!own) own = std::make_shared<T>();
+    return *static_cast<T*>(own.get());
+  }
+  /// A folder of this process for the lines of doubles, made when it is first asked for; empty if that failed.
+  const std::filesystem::path& folder();
+  /// The simulated world of these devices, which lives as long as they do; the first one offered counts.
+  void offer(const SimulatedWorld& world);
+  /// Null: nothing is simulated.
+  const SimulatedWorld* simulated() const { return simulated_; }
+  SimulatorUse simulator_use() const { return simulated_ == nullptr ? SimulatorUse{} : simulated_->use(); }
+
+ private:
+  std::map<std::type_index, std::shared_ptr<void>> shared_;
+  const SimulatedWorld* simulated_ = nullptr;
+  std::unique_ptr<OwnFolder> folder_;
+};
 
 enum class SettingKind : uint8_t { path, length, angle, speed, turn_rate, time, rate, count, number, flag, text, map };
 std::string_view to_text(SettingKind kind);
@@ -19,31 +73,66 @@ struct SettingInfo {
   std::string_view doc;
   bool place = false;  ///< says where the device is: a double brings its own
 };
+
+using NodeResult = tl::expected<std::unique_ptr<DeviceNode>, DeviceError>;
+/// Makes the node and opens the device. What is wrong with settings is returned, with the valid alternatives.
+using MakeDevice =
+    std::function<NodeResult(const DeviceConfig& config, Settings& settings, Devices& devices, const Clock& clock)>;
+/// The maker of a driver of real hardware from one of its closed node: what the device states before it is opened
+/// binds it, and one that is not plugged stays closed.
+MakeDevice hardware(MakeDevice closed);
+
+/// What stands behind a driver.
+enum class DriverSort : uint8_t { simulated, recorded, hardware, doubled };
+
 struct DriverInfo {
   std::string_view name, doc;
+  MakeDevice make;
+  DriverSort sort = DriverSort::hardware;
 };
+
 struct DeviceKind {
   std::string_view name, doc;
-  std::span<const DriverInfo> drivers;
-  std::span<const SettingInfo> settings;
+  /// The node without a device: ports to look at and to connect, never set up or run.
+  std::function<std::unique_ptr<DeviceNode>()> shell;
+  std::vector<DriverInfo> drivers;
+  std::vector<SettingInfo> settings;
+
+  /// Null: there is none of that name.
+  const DriverInfo* driver(std::string_view called) const;
+  /// A double takes what the driver at the other end of its line takes, but for where the device is.
+  bool takes(std::string_view driver, const SettingInfo& setting) const;
+  bool takes(std::string_view driver, std::string_view setting) const;
 };
 
-/// A double takes what the driver at the other end of its line takes, but for where the device is.
-bool takes(std::string_view driver, const SettingInfo& setting);
-
-/// The device kinds of a program. A value: no list of the process.
+/// The device kinds of a program. A value: no list of the process. Not changed once it is used; reading is safe in any
+/// thread.
 class DeviceTypes {
  public:
-  void add(const DeviceKind& kind) { kinds_.push_back(kind); }
+  /// Throws std::logic_error if there is such a kind.
+  void add(DeviceKind kind);
+  /// A driver of a kind, which may be added later; settings that have a driver are those of this one. Throws
+  /// std::logic_error if the kind has such a driver.
+  void add(std::string_view kind, DriverInfo driver, std::vector<SettingInfo> settings);
+  /// By name.
   std::span<const DeviceKind> all() const { return kinds_; }
   /// Null: there is none of that name.
   const DeviceKind* find(std::string_view kind) const;
 
  private:
+  struct Addition {
+    std::string_view kind;
+    DriverInfo driver;
+    std::vector<SettingInfo> settings;
+  };
+  DeviceKind* known(std::string_view kind);
+  static void join(DeviceKind& kind, Addition addition);
   std::vector<DeviceKind> kinds_;
+  std::vector<Addition> waiting_;  ///< drivers whose kind is not there yet
 };
 
-/// The devices of the tree.
-void register_devices(DeviceTypes& types);
+/// Makes the node of a device and opens the device (hardware only if it is `plugged`): everything that can be wrong
+/// with files and settings is told here. Errors list the valid alternatives.
+NodeResult make_device(const DeviceTypes& types, const DeviceConfig& config, Devices& devices, const Clock& clock);
 
 }  // namespace takt::hal

@@ -8,7 +8,7 @@
 #include "graph/check/ages.hpp"
 #include "graph/check/check_machine.hpp"
 #include "graph/language/graph.hpp"
-#include "hal/drivers.hpp"
+#include "hal/device_types.hpp"
 #include "hal/settings/json.hpp"
 #include "rt/node.hpp"
 #include "rt/sched/plan.hpp"

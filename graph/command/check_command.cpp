@@ -9,7 +9,7 @@
 #include "graph/compose/spares.hpp"
 #include "graph/run/prepare.hpp"
 #include "graph/run/support.hpp"
-#include "hal/drivers.hpp"
+#include "hal/device_types.hpp"
 
 namespace takt::command {
 

@@ -8,7 +8,7 @@
 #include <set>
 
 #include "graph/compose/plan_modes.hpp"
-#include "hal/drivers.hpp"
+#include "hal/device_types.hpp"
 #include "rt/sched/port_access.hpp"
 
 namespace takt::graph {
@@ -65,7 +65,7 @@ class Composer {
   }
 
   Composition outline() {
-    for (const DeviceSpec& device : graph_.devices) add_device(device, hal::make_shell(device.kind));
+    for (const DeviceSpec& device : graph_.devices) add_device(device, registry_.devices.find(device.kind)->shell());
     make_nodes();
     connect();
     return std::move(result_);
@@ -75,7 +75,7 @@ class Composer {
   tl::expected<void, ComposeError> make_devices(const DeviceFactory& make_device) {
     for (const DeviceSpec& device : graph_.devices) {
       if (!owns(device.id)) {
-        add_device(device, hal::make_shell(device.kind));
+        add_device(device, registry_.devices.find(device.kind)->shell());
         continue;
       }
       auto node = make_device(device);

@@ -17,6 +17,7 @@
 #include "hal/settings/settings.hpp"
 #include "hal/sim/random.hpp"
 #include "hal/sim/sim_devices.hpp"
+#include "hal/sim/worlds.hpp"
 #include "nodes/obstacle_stop/protected_field.hpp"
 #include "rt/msg/geometry.hpp"
 #include "rt/sched/executor.hpp"
@@ -336,7 +337,7 @@ StopOutcome StopTrials::run(const StopTrial& trial) {
     const auto failed = [&](const DeviceError& error) {
       return tl::make_unexpected(graph::ComposeError{{{spec.position, error.text()}}, !error.bad_input});
     };
-    const auto world = devices.world(config);
+    const auto world = sim::world_of(config, devices);
     if (!world) return failed(world.error());
     if (!person) person.emplace(trial, **world);
     if (spec.kind != "laser_scanner") {
@@ -354,7 +355,7 @@ StopOutcome StopTrials::run(const StopTrial& trial) {
   const Plan& plan = composition->plan;
   const auto transport = make_local_transport(plan.ports);
   RunBoard board(plan);
-  Referee referee(*devices.first_world(), *person, scanner);
+  Referee referee(*sim::first_world(devices), *person, scanner);
   Executor::Options options;
   options.duration_ns = static_cast<int64_t>((trial.appears_s + kLongest_s + 1) * 1e9);
   options.board = &board;

@@ -7,7 +7,7 @@
 
 #include "graph/language/graph.hpp"
 #include "graph/language/registry.hpp"
-#include "hal/drivers.hpp"
+#include "hal/device_types.hpp"
 #include "hal/sim/simulation.hpp"
 #include "rt/node.hpp"
 

@@ -4,7 +4,7 @@
 
 #include "graph/language/catalogue.hpp"
 #include "graph/language/registry.hpp"
-#include "hal/drivers.hpp"
+#include "hal/device_types.hpp"
 
 namespace takt::graph {
 namespace {
@@ -12,8 +12,8 @@ namespace {
 using Kind = DeviceSetting::Kind;
 
 /// Ports of a hardware node, asked of the node itself.
-std::vector<DevicePort> ports_of(std::string_view kind) {
-  const auto node = hal::make_shell(kind);
+std::vector<DevicePort> ports_of(const hal::DeviceKind& kind) {
+  const auto node = kind.shell();
   std::vector<DevicePort> ports;
   for (const auto* input : node->inputs())
     ports.push_back({std::string(input->name()), &input->type(), true, std::string(input->doc())});
@@ -68,13 +68,13 @@ DeviceCatalogue catalogue(const hal::DeviceTypes& types) {
     DeviceKindEntry kind;
     kind.name = info.name;
     kind.doc = info.doc;
-    kind.ports = ports_of(info.name);
+    kind.ports = ports_of(info);
     for (const auto& driver : info.drivers)
       kind.drivers.push_back({std::string(driver.name), std::string(driver.doc), {}});
     for (const auto& setting : info.settings) {
       if (setting.driver.empty()) add(kind.settings, setting);
       for (auto& driver : kind.drivers)
-        if (!setting.driver.empty() && hal::takes(driver.name, setting)) add(driver.settings, setting);
+        if (!setting.driver.empty() && info.takes(driver.name, setting)) add(driver.settings, setting);
     }
     known.kinds[kind.name] = std::move(kind);
   }

@@ -7,7 +7,7 @@
 #include "graph/compose/composition.hpp"
 #include "graph/language/registry.hpp"
 #include "graph/run/run.hpp"
-#include "hal/drivers.hpp"
+#include "hal/device_types.hpp"
 
 namespace takt::command {
 

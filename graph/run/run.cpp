@@ -110,7 +110,7 @@ int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, Ru
     if (!is_stuck(result, t)) composition.nodes[t]->finish();
   for (const std::string& refused : result.refused)
     adjusted.push_back(fmt::format("policy {} -> cooperative: {}", to_string(graph.schedule.policy), refused));
-  const hal::SimulatorUse simulator = hal::simulator_use();
+  const hal::SimulatorUse simulator = prepared.devices.simulator_use();
   const MachineUse use{after.cpu_ns - before.cpu_ns, simulator.cpu_ns, simulator.in_jobs_ns,
                        after.steal_ms - before.steal_ms, after.rss_mb};
   auto report = make_report({prepared.registry,
@@ -160,7 +160,7 @@ int run_in_one_process(const RunOptions& options, Prepared& prepared, RunFaults&
   }
   faults.make_room(prepared.composition->plan);
   RunExpectations expectations(options, *prepared.graph);
-  if (const int code = expectations.bind(world_truth(prepared.devices.first_world())); code != kOk) return code;
+  if (const int code = expectations.bind(world_truth(prepared.devices.simulated())); code != kOk) return code;
   // In virtual time the cores of the schedule need not be there.
   std::vector<int>& cores = prepared.composition->plan.cores;
   if (!prepared.clock->is_virtual() || cores.empty()) choose_cores(cores, adjusted);

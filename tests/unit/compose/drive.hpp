@@ -11,8 +11,9 @@
 #include "graph/ace/ace_registry.hpp"
 #include "graph/compose/composition.hpp"
 #include "hal/camera/rig.hpp"
-#include "hal/drivers.hpp"
+#include "hal/device_types.hpp"
 #include "hal/sim/simulation.hpp"
+#include "hal/sim/worlds.hpp"
 #include "rt/sched/executor.hpp"
 #include "tests/graph_folder.hpp"
 #include "tests/temporary_folder.hpp"
@@ -78,7 +79,7 @@ class Drive {
       if (const auto* probe = dynamic_cast<const Probe*>(node.get())) probe_ = probe;
     REQUIRE(probe_ != nullptr);
   }
-  const sim::Simulation& world() { return *devices_.first_world(); }
+  const sim::Simulation& world() { return *sim::first_world(devices_); }
   const Probe& probe() const { return *probe_; }
   const std::vector<Fault>& faults() const { return faults_; }
 

@@ -142,7 +142,7 @@ TEST_CASE("ace on the robot: what is wrong with settings is told without a devic
     hal::DeviceConfig config = config_of(*device, graph);
     config.plugged = false;
     config.settings[setting] = value;
-    const auto node = hal::make_device(types.devices, config, devices, clock);
+    const auto node = hal::make_device(ace_registry().devices, config, devices, clock);
     REQUIRE_FALSE(node.has_value());
     return node.error().text();
   };

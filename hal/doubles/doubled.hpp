@@ -5,10 +5,10 @@
 #include <string>
 
 #include "hal/camera/video_device.hpp"
+#include "hal/device_types.hpp"
 #include "hal/double_thread.hpp"
-#include "hal/drivers.hpp"
 #include "hal/gpio/line_chip.hpp"
-#include "hal/settings/settings.hpp"
+#include "hal/sim/simulation.hpp"
 
 namespace takt::hal {
 
@@ -23,17 +23,12 @@ struct Doubled {
   DeviceConfig config;
   std::unique_ptr<DoubleThread> thread;
   Seams seams;
+  /// Makes the driver, closed.
+  NodeResult (*driver)(const DeviceConfig&, Settings&, Devices&, const Clock&, Seams) = nullptr;
 };
 
 /// The double of that device in that world, plugged in. Lines that need a file have it in `folder`.
 tl::expected<Doubled, DeviceError> make_double(const DeviceConfig& config, Settings& settings, sim::Simulation& world,
                                                const std::filesystem::path& folder, const Clock& clock);
-
-// What doubles and other drivers read alike.
-
-/// The setting `rate`; 15 Hz.
-Rate rate_of(Settings& settings);
-/// Whether the base of the world drives its path or obeys, as the setting `drive` says.
-void choose_drive(Settings& settings, sim::Simulation& world);
 
 }  // namespace takt::hal

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hal/drivers/semantic_links.hpp"
-
+// Device kinds semantic_service and semantic_link. Each end opens its own port, which is no hardware.
 #include <cmath>
 #include <fstream>
+#include <map>
 
+#include "hal/device_types.hpp"
 #include "hal/semantic_link/client.hpp"
 #include "hal/semantic_link/client_node.hpp"
 #include "hal/semantic_link/dbus_port.hpp"
@@ -11,11 +12,11 @@
 #include "hal/semantic_link/service_node.hpp"
 #include "hal/semantic_link/udp_port.hpp"
 
-namespace takt::hal {
+namespace takt {
 namespace {
 
+using namespace hal;
 using namespace semantic_link;
-using NodeResult = tl::expected<std::unique_ptr<DeviceNode>, DeviceError>;
 
 /// Where a link goes, of whichever driver, and the key of its checks.
 struct Place {
@@ -93,7 +94,20 @@ NodeResult opened(std::shared_ptr<LinkRunner> runner, Exchange& exchange, int64_
   return std::make_unique<NodeClass>(std::move(device), time_ns);
 }
 
-}  // namespace
+/// The servers of one process, one per address: services at the same one share it, each with a robot of its own.
+class SemanticServers {
+ public:
+  /// Errors are left in `settings`, or are those of the port.
+  tl::expected<std::unique_ptr<DeviceNode>, DeviceError> make_service(const DeviceConfig& config, Settings& settings,
+                                                                      const Clock& clock);
+
+ private:
+  struct Shared {
+    std::weak_ptr<semantic_link::LinkRunner> runner;
+    semantic_link::Server* server = nullptr;
+  };
+  std::map<std::string, Shared> servers_;
+};
 
 NodeResult SemanticServers::make_service(const DeviceConfig& config, Settings& settings, const Clock& clock) {
   const std::string robot = robot_of(settings);
@@ -115,7 +129,7 @@ NodeResult SemanticServers::make_service(const DeviceConfig& config, Settings& s
   return opened<ServiceNode>(std::move(runner), *exchange, watchdog_ns);
 }
 
-NodeResult make_semantic_link(const DeviceConfig& config, Settings& settings, const Clock& clock) {
+NodeResult make_link(const DeviceConfig& config, Settings& settings, Devices&, const Clock& clock) {
   const std::string robot = robot_of(settings);
   const int64_t lag_ns = time_of(settings, "lag", 0.2);
   Place place = place_of(config, settings, false);
@@ -125,4 +139,52 @@ NodeResult make_semantic_link(const DeviceConfig& config, Settings& settings, co
   return opened<ClientNode>(std::make_shared<LinkRunner>(config.id, std::move(client), clock), exchange, lag_ns);
 }
 
-}  // namespace takt::hal
+NodeResult make_service(const DeviceConfig& config, Settings& settings, Devices& devices, const Clock& clock) {
+  return devices.shared<SemanticServers>().make_service(config, settings, clock);
+}
+
+}  // namespace
+
+void register_semantic_link(DeviceTypes& types) {
+  using enum SettingKind;
+  types.add({"semantic_service",
+             "a robot for a client elsewhere: takes what it sees, gives what it is to do",
+             [] { return std::make_unique<semantic_link::ServiceNode>(nullptr, 0); },
+             {},
+             {
+                 {"robot", "", text, true, "name of the robot, at both ends the same"},
+                 {"watchdog", "", time, false, "without a velocity of the client for so long it is zero; 300ms"},
+             }});
+  types.add(
+      "semantic_service", {"udp", "UDP, on this machine or beyond", make_service},
+      {
+          {"address", "udp", text, false, "numbers and port of the server; 127.0.0.1:4700"},
+          {"key", "udp", path, false, "file with 32 hexadecimal digits, at both ends the same; needed beyond loopback"},
+      });
+  types.add("semantic_service", {"dbus", "a D-Bus, on this machine", make_service},
+            {
+                {"bus", "dbus", text, false, "session, system, or an address such as unix:path=/run/bus; session"},
+                {"service", "dbus", text, false, "name of the server on the bus; io.takt.semantic"},
+            });
+  types.add({"semantic_link",
+             "a robot elsewhere: gives what it sees, takes what it is to do",
+             [] { return std::make_unique<semantic_link::ClientNode>(nullptr, 0); },
+             {},
+             {
+                 {"robot", "", text, true, "name of the robot, at both ends the same"},
+                 {"lag", "", time, false, "objects, scans and odometry that are older are not sent; 200ms"},
+             }});
+  types.add(
+      "semantic_link", {"udp", "UDP, on this machine or beyond", make_link},
+      {
+          {"address", "udp", text, false, "numbers and port of the server; 127.0.0.1:4700"},
+          {"key", "udp", path, false, "file with 32 hexadecimal digits, at both ends the same; needed beyond loopback"},
+      });
+  types.add("semantic_link", {"dbus", "a D-Bus, on this machine", make_link},
+            {
+                {"bus", "dbus", text, false, "session, system, or an address such as unix:path=/run/bus; session"},
+                {"service", "dbus", text, false, "name of the server on the bus; io.takt.semantic"},
+            });
+}
+
+}  // namespace takt

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hal/drivers.hpp"
-
 #include <doctest/doctest.h>
 
 #include "graph/ace/ace_registry.hpp"
+#include "hal/device_types.hpp"
 #include "hal/sim/simulation.hpp"
+#include "hal/sim/worlds.hpp"
 #include "rt/msg/image.hpp"
 #include "rt/time/rate.hpp"
 #include "tests/conformance/fake_writer.hpp"
@@ -34,10 +34,9 @@ const nlohmann::json kWorld = {{"world", "worlds/lab.xml"}};
 }  // namespace
 
 TEST_CASE("unknown kinds, drivers and settings list the valid ones") {
-  CHECK(has(
-      error(config("radar", "sim", kWorld)),
-      "stereo_camera, laser_scanner, camera_head, mobile_base, digital_lines, object_sensor, actor, semantic_service, "
-      "semantic_link"));
+  CHECK(has(error(config("radar", "sim", kWorld)),
+            "actor, camera_head, digital_lines, interaction, laser_scanner, mobile_base, object_sensor, semantic_link, "
+            "semantic_service, stereo_camera"));
   CHECK(has(error(config("stereo_camera", "v4l", kWorld)), "known drivers: sim, replay, v4l2"));
   CHECK(has(error(config("laser_scanner", "sim", {{"world", "worlds/lab.xml"}, {"beans", 3}})),
             "unknown setting `beans`"));
@@ -50,7 +49,8 @@ TEST_CASE("unknown kinds, drivers and settings list the valid ones") {
 
 TEST_CASE("every simulated kind can be made with every setting that its listing calls required, and no other") {
   VirtualClock clock;
-  for (const DeviceKind& kind : ace_registry().devices.all()) {
+  const Registry registry = ace_registry();
+  for (const DeviceKind& kind : registry.devices.all()) {
     if (kind.drivers.front().name != "sim") continue;
     Devices devices;
     nlohmann::json settings = nlohmann::json::object();
@@ -203,7 +203,7 @@ TEST_CASE("laser, head, base and line nodes send one message a job, and share on
     CHECK(PortAccess::sent(*node.outputs()[0]));
     CHECK_FALSE(job.without_result());
   }
-  CHECK(devices.first_world() != nullptr);
+  CHECK(sim::first_world(devices) != nullptr);
 }
 
 TEST_CASE("devices of one world file and seed share it; its first client may be named or not") {
@@ -218,7 +218,7 @@ TEST_CASE("devices of one world file and seed share it; its first client may be 
   const auto world = [&](const char* client, uint64_t seed) {
     DeviceConfig wanted = config("mobile_base", "sim", {{"world", file}, {"client", client}});
     wanted.seed = seed;
-    const auto made = devices.world(wanted);
+    const auto made = sim::world_of(wanted, devices);
     REQUIRE_MESSAGE(made.has_value(), (made ? "" : made.error().text()));
     return *made;
   };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hal/drivers/own_folder.hpp"
+#include "hal/own_folder.hpp"
 
 #include <fcntl.h>
 #include <stdlib.h>

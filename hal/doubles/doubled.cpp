@@ -1,12 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hal/drivers/doubled.hpp"
+#include "hal/doubles/doubled.hpp"
 
 #include <cmath>
 #include <utility>
 
+#include "hal/base/can_base_driver.hpp"
+#include "hal/camera/v4l2_driver.hpp"
 #include "hal/doubles/in_world.hpp"
+#include "hal/driver_parts.hpp"
+#include "hal/gpio/gpio_driver.hpp"
+#include "hal/head/can_head_driver.hpp"
+#include "hal/laser/lms200/driver.hpp"
 #include "hal/laser/lms200/lms200_double.hpp"
+#include "hal/laser/lms400/driver.hpp"
 #include "hal/laser/lms400/lms400_double.hpp"
+#include "hal/sim/worlds.hpp"
 #include "hal/stream/pseudo_terminal.hpp"
 #include "hal/stream/tcp_listener.hpp"
 #include "rt/msg/geometry.hpp"
@@ -37,6 +45,11 @@ struct Order {
   }
 };
 
+template <auto make>
+NodeResult without_seams(const DeviceConfig& config, Settings& settings, Devices& devices, const Clock& clock, Seams) {
+  return make(config, settings, devices, clock);
+}
+
 Made make_laser(Order& order) {
   Transform mount = order.settings.mount("mount");
   if (!order.settings.has("mount")) mount.z = 0.25;
@@ -45,10 +58,12 @@ Made make_laser(Order& order) {
   const int64_t now_ns = order.clock.now_ns();
   order.doubled.config.driver = model;
   if (model == "lms200") {
+    order.doubled.driver = without_seams<make_lms200>;
     order.tell("port", order.file().string());
     return {std::make_unique<lms200::Lms200Double>(std::make_unique<PseudoTerminal>(order.file()), source, now_ns), {}};
   }
   if (model == "lms400") {
+    order.doubled.driver = without_seams<make_lms400>;
     auto listener = std::make_unique<TcpListener>(uint16_t{0});
     const TcpListener& line = *listener;
     auto device = std::make_unique<lms400::Lms400Double>(std::move(listener), source, 0, now_ns);
@@ -63,14 +78,16 @@ Made make_laser(Order& order) {
 
 Made make_head(Order& order) {
   order.doubled.config.driver = "can";
+  order.doubled.driver = without_seams<make_can_head>;
   const std::string interface = "unix:" + order.file().string();
   order.tell("interface", interface);
   return {std::make_unique<head::HeadDouble>(interface, order.clock, doubles::neck_in(order.world)), {}};
 }
 
 Made make_base(Order& order) {
-  choose_drive(order.settings, order.world);
+  sim::choose_drive(order.settings, order.world);
   order.doubled.config.driver = "can";
+  order.doubled.driver = without_seams<make_can_base>;
   const std::string interface = "unix:" + order.file().string();
   order.tell("interface", interface);
   return {std::make_unique<base::BaseDouble>(interface, order.clock, doubles::body_in(order.world)), {}};
@@ -78,6 +95,9 @@ Made make_base(Order& order) {
 
 Made make_lines(Order& order) {
   order.doubled.config.driver = "gpio";
+  order.doubled.driver = [](const DeviceConfig& config, Settings& settings, Devices&, const Clock& clock, Seams seams) {
+    return make_gpio_lines(config, settings, clock, std::move(seams.chip));
+  };
   order.tell("chip", "the double's");
   std::vector<std::string> names;
   for (size_t i = 0; i < gpio::kMostLines; ++i) names.push_back("line" + std::to_string(i));
@@ -94,6 +114,9 @@ Made make_lines(Order& order) {
 Made make_camera(Order& order) {
   Settings& settings = order.settings;
   order.doubled.config.driver = "v4l2";
+  order.doubled.driver = [](const DeviceConfig& config, Settings& settings, Devices&, const Clock& clock, Seams seams) {
+    return make_v4l2_camera(config, settings, clock, std::move(seams.video), std::move(seams.chip));
+  };
   order.tell("path", "the double's");
   const auto file = settings.path("rig", true);
   if (settings.error()) return {};
@@ -144,19 +167,11 @@ Made make_of_kind(Order& order) {
 
 }  // namespace
 
-void choose_drive(Settings& settings, sim::Simulation& world) {
-  const std::string drive = settings.text("drive", world.path().empty() ? "command" : "path");
-  if (drive == "command") world.set_drive(sim::Drive::command);
-  else if (drive != "path") settings.fail("`drive` is `" + drive + "`", "use path or command");
-  else if (world.path().empty())
-    settings.fail("`drive: path`, but the world's client has no <path>", "add one, or use drive: command");
-}
-
 tl::expected<Doubled, DeviceError> make_double(const DeviceConfig& config, Settings& settings, sim::Simulation& world,
                                                const std::filesystem::path& folder, const Clock& clock) {
   if (clock.is_virtual())
     return device_error(config.id, "a double lives in real time only", "use --clock real, or the driver `sim`");
-  Doubled doubled{config, nullptr, {}};
+  Doubled doubled{config, nullptr, {}, nullptr};
   Order order{settings, world, folder, clock, doubled};
   Made made = make_of_kind(order);
   if (settings.error()) return tl::unexpected(*settings.error());

@@ -1,18 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hal/drivers/sick_lasers.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
+#include "hal/laser/laser_node.hpp"
+#include "hal/laser/lms200/driver.hpp"
 #include "hal/laser/lms200/session.hpp"
-#include "hal/laser/lms400/session.hpp"
 #include "hal/laser/stream_laser.hpp"
 #include "hal/stream/serial_port.hpp"
-#include "hal/stream/tcp_connection.hpp"
 #include "rt/msg/geometry.hpp"
 
 namespace takt::hal {
+
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
@@ -44,7 +43,7 @@ void set_range(Settings& settings, lms200::SessionSettings& session) {
 
 }  // namespace
 
-std::unique_ptr<LaserScanner> make_lms200(const DeviceConfig& config, Settings& settings, const Clock& clock) {
+NodeResult make_lms200(const DeviceConfig& config, Settings& settings, Devices&, const Clock& clock) {
   lms200::SessionSettings session;
   session.variant = variant_of(settings);
   set_range(settings, session);
@@ -59,38 +58,27 @@ std::unique_ptr<LaserScanner> make_lms200(const DeviceConfig& config, Settings& 
                   "use baud 500000, or resolution 0.5deg");
   const auto port = settings.path("port", true);
   const Transform mount = settings.mount("mount");
-  if (settings.error()) return nullptr;
-  return std::make_unique<StreamLaser>(config.id, std::make_unique<SerialPort>(config.id, port),
-                                       std::make_unique<lms200::Session>(session), mount, clock);
-}
-
-std::unique_ptr<LaserScanner> make_lms400(const DeviceConfig& config, Settings& settings, const Clock& clock) {
-  lms400::SessionSettings session;
-  lms400::ScanConfiguration& scan = session.scan;
-  scan.rate_hz = settings.quantity("scan_rate", Dimension::rate, scan.rate_hz);
-  scan.step_deg = degrees(settings, "resolution", scan.step_deg);
-  scan.fov_deg = degrees(settings, "fov", scan.fov_deg);
-  scan.first_deg = 90 - scan.fov_deg / 2;
-  session.max_range_m = settings.quantity("range", Dimension::length, session.max_range_m);
-  if (!(scan.rate_hz >= 200 && scan.rate_hz <= 500) || !(scan.step_deg >= 0.0999 && scan.step_deg <= 1.0001) ||
-      !(scan.fov_deg >= scan.step_deg && scan.fov_deg <= 70.0001) || !(session.max_range_m > 0))
-    settings.fail("`scan_rate`, `resolution`, `fov` or `range` is out of range",
-                  "scan_rate 200..500Hz, resolution 0.1..1deg, fov up to 70deg, range positive");
-  const std::string address = settings.text("address", "");
-  if (address.empty() == !settings.has("port"))
-    settings.fail("give `address` or `port`",
-                  "address: 192.168.0.1:2111 on a network, port: /dev/ttyUSB0 on a serial line");
-  std::unique_ptr<ByteStream> stream;
-  if (settings.has("port")) {
-    session.baud = static_cast<uint32_t>(settings.count("baud", 115200, 9600, 1'000'000));
-    stream = std::make_unique<SerialPort>(config.id, settings.path("port", true));
-  } else {
-    stream = std::make_unique<TcpConnection>(config.id, address);
-  }
-  const Transform mount = settings.mount("mount");
-  if (settings.error()) return nullptr;
-  return std::make_unique<StreamLaser>(config.id, std::move(stream), std::make_unique<lms400::Session>(session), mount,
-                                       clock);
+  if (settings.error()) return tl::unexpected(*settings.error());
+  return std::make_unique<LaserNode>(
+      std::make_unique<StreamLaser>(config.id, std::make_unique<SerialPort>(config.id, port),
+                                    std::make_unique<lms200::Session>(session), mount, clock));
 }
 
 }  // namespace takt::hal
+
+namespace takt {
+
+void register_lms200(hal::DeviceTypes& types) {
+  using enum hal::SettingKind;
+  types.add("laser_scanner", {"lms200", "a SICK LMS 200 on a serial line", hal::hardware(hal::make_lms200)},
+            {
+                {"port", "lms200", path, true, "serial line, for instance /dev/ttyS1", true},
+                {"baud", "lms200", count, false, "9600, 19200, 38400 or 500000; 38400"},
+                {"fov", "lms200", angle, false, "100deg or 180deg; 180deg"},
+                {"resolution", "lms200", angle, false, "1deg, 0.5deg or 0.25deg; 0.5deg"},
+                {"range", "lms200", length, false, "8m, 16m, 32m or 80m; 8m"},
+                {"blinded_max", "lms200", number, false, "share of blinded beams above which a scan is refused; 0.1"},
+            });
+}
+
+}  // namespace takt
