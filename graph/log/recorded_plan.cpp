@@ -8,7 +8,6 @@
 #include <iterator>
 #include <map>
 
-#include "rt/msg/messages.hpp"
 #include "rt/node.hpp"
 #include "rt/record/message_record.hpp"
 
@@ -152,12 +151,6 @@ std::string file_hash(const std::filesystem::path& file) { return hash_text(file
 std::string file_text(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), {}};
-}
-
-const MessageType* type_named(std::string_view name) {
-  for (const MessageType* type : message_types())
-    if (type->name == name) return type;
-  return nullptr;
 }
 
 }  // namespace takt::log
