@@ -82,12 +82,19 @@ function(takt_unite target)
   set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE ${TAKT_FILES_AT_ONCE})
 endfunction()
 
-# One library per room: takt_room(stereo SOURCES a.cpp b.cpp APART b.cpp USES takt_rt opencv_core REGISTERS stereo)
+# One library per room: takt_room(stereo SOURCES a.cpp b.cpp APART b.cpp USES takt_rt opencv_core REGISTERS stereo). It is
+# an archive, or what its second word says: SHARED or OBJECT.
 # REGISTERS NAME: the room has `void register_NAME(NodeTypes&)`, or what its floor calls TAKT_REGISTRY_PART: the type, and
 # the member of a Registry. takt_registry() makes the function that calls them all.
 function(takt_room name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;APART;USES;REGISTERS" ${ARGN})
-  add_library(takt_${name} STATIC ${ARG_SOURCES})
+  cmake_parse_arguments(ARG "SHARED;OBJECT" "" "SOURCES;APART;USES;REGISTERS" ${ARGN})
+  set(kind STATIC)
+  if(ARG_SHARED)
+    set(kind SHARED)
+  elseif(ARG_OBJECT)
+    set(kind OBJECT)
+  endif()
+  add_library(takt_${name} ${kind} ${ARG_SOURCES})
   target_link_libraries(takt_${name} PUBLIC ${ARG_USES})
   takt_unite(takt_${name} ${ARG_APART})
   takt_use_parsed(takt_${name})

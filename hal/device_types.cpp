@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hal/device_types.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
+#include "hal/devices.hpp"
 #include "hal/own_folder.hpp"
 
 namespace takt::hal {

@@ -1,66 +1,30 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which device kinds and drivers there are, and the way from a graph's device entry to a hardware node.
+// Installed as <takt/hal/device_types.hpp>: hal, experimental.
+// Which device kinds and drivers there are.
 //
 //     void register_tube(hal::DeviceTypes& types) {  // in the driver's folder; its CMakeLists.txt says REGISTERS tube
 //       types.add("laser_scanner", {"tube", "a scanner in a tube", hal::hardware(make_tube)},
 //                 {{"radius", "tube", hal::SettingKind::length, true, "of the tube"}});
 //     }
 #pragma once
-#include <filesystem>
+#include <cstdint>
 #include <functional>
-#include <map>
 #include <memory>
 #include <span>
-#include <string>
 #include <string_view>
-#include <typeindex>
 #include <vector>
 
 #include "hal/device_node.hpp"
-#include "hal/settings/json.hpp"
-#include "hal/settings/settings.hpp"
-#include "hal/simulated.hpp"
-#include "rt/time/clock.hpp"
+
+namespace takt {
+class Clock;
+class Settings;
+}  // namespace takt
 
 namespace takt::hal {
 
-class OwnFolder;
-
-/// What a device needs to exist.
-struct DeviceConfig {
-  std::string id, kind, driver;
-  nlohmann::json settings;          ///< one object; values with a unit as text ("0.24m") or as numbers in SI
-  std::filesystem::path directory;  ///< relative paths in the settings start here
-  uint64_t seed = 0;
-  bool plugged =
-      true;  ///< false: hardware need not be there. Its node knows sizes from settings and files, and never runs
-};
-
-/// What the devices of one process share. Must outlive the nodes. Composition thread only.
-class Devices {
- public:
-  Devices();
-  ~Devices();
-  /// What the drivers of one folder share, made when it is first asked for.
-  template <class T>
-  T& shared() {
-    std::shared_ptr<void>& own = shared_[typeid(T)];
-    if (!own) own = std::make_shared<T>();
-    return *static_cast<T*>(own.get());
-  }
-  /// A folder of this process for the lines of doubles, made when it is first asked for; empty if that failed.
-  const std::filesystem::path& folder();
-  /// The simulated world of these devices, which lives as long as they do; the first one offered counts.
-  void offer(const SimulatedWorld& world);
-  /// Null: nothing is simulated.
-  const SimulatedWorld* simulated() const { return simulated_; }
-  SimulatorUse simulator_use() const { return simulated_ == nullptr ? SimulatorUse{} : simulated_->use(); }
-
- private:
-  std::map<std::type_index, std::shared_ptr<void>> shared_;
-  const SimulatedWorld* simulated_ = nullptr;
-  std::unique_ptr<OwnFolder> folder_;
-};
+struct DeviceConfig;
+class Devices;
 
 enum class SettingKind : uint8_t { path, length, angle, speed, turn_rate, time, rate, count, number, flag, text, map };
 std::string_view to_text(SettingKind kind);
@@ -130,9 +94,5 @@ class DeviceTypes {
   std::vector<DeviceKind> kinds_;
   std::vector<Addition> waiting_;  ///< drivers whose kind is not there yet
 };
-
-/// Makes the node of a device and opens the device (hardware only if it is `plugged`): everything that can be wrong
-/// with files and settings is told here. Errors list the valid alternatives.
-NodeResult make_device(const DeviceTypes& types, const DeviceConfig& config, Devices& devices, const Clock& clock);
 
 }  // namespace takt::hal

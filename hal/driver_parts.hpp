@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Installed as <takt/hal/driver_parts.hpp>: hal, experimental.
 // What drivers' own registrations have in common.
 #pragma once
 #include <memory>
@@ -6,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "hal/device_types.hpp"
+#include "hal/devices.hpp"
 #include "hal/settings/failures.hpp"
 #include "rt/time/rate.hpp"
 

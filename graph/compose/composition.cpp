@@ -8,7 +8,7 @@
 #include <set>
 
 #include "graph/compose/plan_modes.hpp"
-#include "hal/device_types.hpp"
+#include "hal/devices.hpp"
 #include "rt/sched/port_access.hpp"
 
 namespace takt::graph {

@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "graph/compose/plan_ports.hpp"
+#include "rt/sched/plan_ports.hpp"
 #include "graph/language/graph.hpp"
 #include "graph/language/registry.hpp"
 #include "rt/node.hpp"

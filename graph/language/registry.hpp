@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Installed as <takt/registry.hpp>: graph, experimental.
 #pragma once
 #include "hal/device_types.hpp"
 #include "rt/node.hpp"

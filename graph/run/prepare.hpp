@@ -7,7 +7,7 @@
 #include "graph/compose/composition.hpp"
 #include "graph/language/registry.hpp"
 #include "graph/run/run.hpp"
-#include "hal/device_types.hpp"
+#include "hal/devices.hpp"
 
 namespace takt::command {
 

@@ -6,7 +6,7 @@
 #include <algorithm>
 
 #include "graph/attach/parameters.hpp"
-#include "graph/run/commit.hpp"
+#include "rt/abi.hpp"
 
 namespace takt::command {
 namespace {
@@ -249,7 +249,7 @@ Json make_report(const RunFacts& facts) {
   if (facts.clock == "real" && facts.plan.anticipate_ns > 0)
     report["anticipate_us"] = static_cast<double>(facts.plan.anticipate_ns) / 1e3;
   report["duration_s"] = facts.result.duration_s();
-  report["commit"] = kCommit;
+  report["commit"] = version().commit;
   report["machine"] = machine_facts();
   report["ok"] = kept_its_promises(nodes) && !proofs.unexplained();
   report["modes"] = modes_json(facts);

@@ -70,6 +70,7 @@ int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, Ru
       record.capture();
       faults.look();
       expectations.look();
+      if (options.witness != nullptr) options.witness->look();
     };
     run.job_duration_ns = faults.durations(*durations, composition.plan);
     run.ran = [&](const trace::Slice& slice) { trace.ran(slice); };
@@ -86,10 +87,13 @@ int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, Ru
     if (!prepared.clock->is_virtual())
       server.emplace(attach::Subject{prepared.registry, graph, composition.plan, board, *transport});
     if (server) tell_attach(*server, adjusted);
-    const LiveTable live(
-        composition.plan, board,
-        fmt::format("takt run {} ({}, policy {})", graph.name, graph.profile, to_string(graph.schedule.policy)));
+    std::optional<LiveTable> live;
+    if (options.witness == nullptr)
+      live.emplace(
+          composition.plan, board,
+          fmt::format("takt run {} ({}, policy {})", graph.name, graph.profile, to_string(graph.schedule.policy)));
     record.begin(graph, composition.plan, board, *transport, "none");
+    if (options.witness != nullptr) options.witness->begin(composition.plan, *transport);
     trace.collect(composition.plan, record);
     watchdog.start();
     std::optional<RunRights> rights;
@@ -138,6 +142,7 @@ int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, Ru
   int code = tell_faults(prepared.registry, options, graph, board, result.policy_granted, report);
   code = expectations.exit_code(faults.exit_code(code, report), report);
   if (!no_trace.empty()) code = refuse(no_trace, kBadInput);
+  if (options.witness != nullptr) options.witness->end(report);
   if (result.stuck.empty()) watchdog.end();
   // A job that never returns still uses what would now be taken down.
   if (!result.stuck.empty()) end_process(code, options.transport);
@@ -175,7 +180,8 @@ int run_in_one_process(const RunOptions& options, Prepared& prepared, RunFaults&
   if (options.require_rt && (!locked || latency.refused()))
     return refuse("--require-rt: " + lacks.front(), kDeviceOrSystem);
   adjusted.insert(adjusted.end(), lacks.begin(), lacks.end());
-  for (const std::string& line : adjusted) std::fprintf(stderr, "takt: adjusted: %s\n", line.c_str());
+  if (options.witness == nullptr)
+    for (const std::string& line : adjusted) std::fprintf(stderr, "takt: adjusted: %s\n", line.c_str());
   return execute(options, prepared, faults, expectations, *proofs, std::move(adjusted));
 }
 
@@ -202,7 +208,8 @@ int run_as_asked(const Registry& registry, RunOptions options) {
   RunFaults faults(registry, options);
   if (const int code = faults.load(*prepared.graph, *prepared.clock, processes); code != kOk) return code;
   if (!processes) return run_in_one_process(options, prepared, faults, adjusted);
-  const KeptPlace report(options.report), page(options.html), trace(options.trace), record(options.record);
+  const KeptPlace report(options.report), page(options.html), verdict(options.junit), trace(options.trace),
+      record(options.record);
   return run_isolated(registry, options, *prepared.graph, faults, std::move(adjusted));
 }
 
@@ -214,14 +221,13 @@ int run_graph(const Registry& registry, const RunOptions& options) {
   if (error)
     return refuse(fmt::format("--output {}: {}; choose a writable folder", options.output.string(), error.message()),
                   kBadInput);
-  if (!options.report.empty() && !writable(options.report))
-    return refuse("--report " + options.report.string() + ": cannot be written; choose another place", kBadInput);
-  if (!options.html.empty() && !writable(options.html))
-    return refuse("--html " + options.html.string() + ": cannot be written; choose another place", kBadInput);
-  if (!options.trace.empty() && !writable(options.trace))
-    return refuse("--trace " + options.trace.string() + ": cannot be written; choose another place", kBadInput);
-  if (!options.record.empty() && !writable(options.record))
-    return refuse("--record " + options.record.string() + ": cannot be written; choose another place", kBadInput);
+  for (const auto& [option, file] : {std::pair("--report", options.report),
+                                     {"--html", options.html},
+                                     {"--junit", options.junit},
+                                     {"--trace", options.trace},
+                                     {"--record", options.record}})
+    if (!file.empty() && !writable(file))
+      return refuse(fmt::format("{} {}: cannot be written; choose another place", option, file.string()), kBadInput);
   if (options.durations != "budgets" && options.clock != "virtual")
     return refuse("--durations: only jobs in virtual time take what they are told; add --clock virtual", kBadInput);
   if (!options.watchdog.empty() && options.clock == "virtual")

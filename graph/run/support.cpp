@@ -22,6 +22,7 @@
 #include "graph/check/machine_file.hpp"
 #include "graph/run/machine.hpp"
 #include "graph/run/prepare.hpp"
+#include "graph/run/junit.hpp"
 #include "graph/run/report.hpp"
 #include "graph/view/html_report.hpp"
 #include "rt/machine/facts.hpp"
@@ -150,7 +151,7 @@ void tell_attach(const attach::Server& server, std::vector<std::string>& adjuste
 
 int tell(const Registry& registry, const RunOptions& options, const graph::GraphSpec& graph,
          const nlohmann::ordered_json& report) {
-  std::fputs(summary_text(report).c_str(), stdout);
+  if (options.witness == nullptr) std::fputs(summary_text(report).c_str(), stdout);
   const auto write = [](const std::filesystem::path& file, const std::string& text) {
     return file.empty() || static_cast<bool>(std::ofstream(file) << text << std::flush);
   };
@@ -158,6 +159,8 @@ int tell(const Registry& registry, const RunOptions& options, const graph::Graph
     return refuse("cannot write the report to " + options.report.string() + "; choose a writable --report", kBadInput);
   if (!options.html.empty() && !write(options.html, view::html_report(registry, report, graph, options.output)))
     return refuse("cannot write the page to " + options.html.string() + "; choose a writable --html", kBadInput);
+  if (!options.junit.empty() && !write(options.junit, junit_text(report)))
+    return refuse("cannot write the verdict to " + options.junit.string() + "; choose a writable --junit", kBadInput);
   return report["ok"].get<bool>() ? kOk : kNotOk;
 }
 

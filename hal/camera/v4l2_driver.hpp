@@ -2,7 +2,7 @@
 #pragma once
 #include "hal/camera/health.hpp"
 #include "hal/camera/video_device.hpp"
-#include "hal/device_types.hpp"
+#include "hal/devices.hpp"
 #include "hal/gpio/line_chip.hpp"
 
 namespace takt::hal {

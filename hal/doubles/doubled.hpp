@@ -5,7 +5,7 @@
 #include <string>
 
 #include "hal/camera/video_device.hpp"
-#include "hal/device_types.hpp"
+#include "hal/devices.hpp"
 #include "hal/double_thread.hpp"
 #include "hal/gpio/line_chip.hpp"
 #include "hal/sim/simulation.hpp"

@@ -4,7 +4,7 @@
 #include <fstream>
 #include <map>
 
-#include "hal/device_types.hpp"
+#include "hal/devices.hpp"
 #include "hal/semantic_link/client.hpp"
 #include "hal/semantic_link/client_node.hpp"
 #include "hal/semantic_link/dbus_port.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include "hal/device_types.hpp"
+#include "hal/devices.hpp"
 #include "hal/sim/simulation.hpp"
 
 namespace takt::sim {

@@ -11,7 +11,7 @@
 #include "graph/ace/ace_registry.hpp"
 #include "graph/compose/composition.hpp"
 #include "hal/camera/rig.hpp"
-#include "hal/device_types.hpp"
+#include "hal/devices.hpp"
 #include "hal/sim/simulation.hpp"
 #include "hal/sim/worlds.hpp"
 #include "rt/sched/executor.hpp"

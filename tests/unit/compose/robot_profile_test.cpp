@@ -39,7 +39,7 @@ graph::Composition composed(const graph::GraphSpec& graph, const Registry& types
       [&](const graph::DeviceSpec& spec) -> tl::expected<std::unique_ptr<Node>, graph::ComposeError> {
     hal::DeviceConfig config = config_of(spec, graph);
     change(config);
-    auto node = hal::make_device(types.devices, config, devices, clock);
+    auto node = hal::make_device(known.devices, config, devices, clock);
     if (!node) FAIL(node.error().text());
     return std::move(*node);
   };
@@ -134,6 +134,7 @@ TEST_CASE("ace on the robot: every node is set up while no device is plugged in,
 
 TEST_CASE("ace on the robot: what is wrong with settings is told without a device, too") {
   const graph::GraphSpec graph = robot();
+  const Registry known = ace_registry();
   hal::Devices devices;
   const MonotonicClock clock;
   const auto told = [&](const char* id, const char* setting, const nlohmann::json& value) {
@@ -142,7 +143,7 @@ TEST_CASE("ace on the robot: what is wrong with settings is told without a devic
     hal::DeviceConfig config = config_of(*device, graph);
     config.plugged = false;
     config.settings[setting] = value;
-    const auto node = hal::make_device(ace_registry().devices, config, devices, clock);
+    const auto node = hal::make_device(known.devices, config, devices, clock);
     REQUIRE_FALSE(node.has_value());
     return node.error().text();
   };

@@ -4,7 +4,8 @@
 #include <doctest/doctest.h>
 
 #include "rt/msg/action.hpp"
-#include "tests/unit/mapping_3d/node_harness.hpp"
+#include "rt/sched/port_access.hpp"
+#include "rt/testing.hpp"
 
 using namespace takt;
 

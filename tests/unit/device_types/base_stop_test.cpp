@@ -4,8 +4,9 @@
 #include "hal/base/base_node.hpp"
 #include "rt/msg/stop_command.hpp"
 #include "rt/msg/velocity_command.hpp"
+#include "rt/sched/port_access.hpp"
+#include "rt/testing.hpp"
 #include "tests/conformance/fake_writer.hpp"
-#include "tests/unit/mapping_3d/node_harness.hpp"
 
 using namespace takt;
 

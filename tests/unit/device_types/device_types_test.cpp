@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hal/device_types.hpp"
-
 #include <doctest/doctest.h>
 
 #include <stdexcept>
+
+#include "hal/devices.hpp"
 
 using namespace takt;
 using namespace takt::hal;

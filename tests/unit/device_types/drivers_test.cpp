@@ -2,7 +2,7 @@
 #include <doctest/doctest.h>
 
 #include "graph/ace/ace_registry.hpp"
-#include "hal/device_types.hpp"
+#include "hal/devices.hpp"
 #include "hal/sim/simulation.hpp"
 #include "hal/sim/worlds.hpp"
 #include "rt/msg/image.hpp"

@@ -4,7 +4,7 @@
 
 #include "graph/ace/ace_registry.hpp"
 #include "hal/base/base_double.hpp"
-#include "hal/device_types.hpp"
+#include "hal/devices.hpp"
 #include "hal/head/head_double.hpp"
 #include "rt/msg/head.hpp"
 #include "rt/msg/odometry.hpp"
