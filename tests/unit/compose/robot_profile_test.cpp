@@ -39,7 +39,7 @@ graph::Composition composed(const graph::GraphSpec& graph, const Registry& types
       [&](const graph::DeviceSpec& spec) -> tl::expected<std::unique_ptr<Node>, graph::ComposeError> {
     hal::DeviceConfig config = config_of(spec, graph);
     change(config);
-    auto node = hal::make_device(known.devices, config, devices, clock);
+    auto node = hal::make_device(types.devices, config, devices, clock);
     if (!node) FAIL(node.error().text());
     return std::move(*node);
   };
