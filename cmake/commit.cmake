@@ -7,6 +7,6 @@ if(NOT commit)
   set(commit unknown)
 endif()
 file(CONFIGURE OUTPUT ${OUTPUT} CONTENT
-"#include \"graph/run/commit.hpp\"
-const char* const takt::command::kCommit = \"@commit@\";
+"#include \"rt/abi.hpp\"
+takt::Version takt::version() { return {\"@NUMBER@\", \"@commit@\", kAbi}; }
 " @ONLY)

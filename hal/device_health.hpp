@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Installed as <takt/hal/device_health.hpp>: hal, experimental.
 #pragma once
 #include <cstdint>
 #include <optional>

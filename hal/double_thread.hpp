@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Installed as <takt/hal/double_thread.hpp>: hal, experimental.
 #pragma once
 #include <atomic>
 #include <functional>

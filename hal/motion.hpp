@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Installed as <takt/hal/motion.hpp>: hal, experimental.
 // How simulated mechanisms move.
 #pragma once
 #include <algorithm>

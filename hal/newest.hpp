@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Installed as <takt/hal/newest.hpp>: hal, experimental.
 #pragma once
 #include <array>
 #include <atomic>

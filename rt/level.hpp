@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Installed as <takt/level.hpp>: core, stable.
 // Quality levels: how a node says that it can do its work in a cheaper way.
 #pragma once
 #include <cstddef>

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Installed as <takt/node.hpp>: core, stable.
 // What a node author needs: Node, Input<T>, Output<T>, Param<T>, Setup, Job. A node declares its ports and parameters
 // as members; the runtime calls setup() and start() once, run() once per job on one thread at a time, finish() after
 // the last job.

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Installed as <takt/source_state.hpp>: core, stable.
 #pragma once
 #include <cstdint>
 

@@ -42,7 +42,8 @@ const char* word(graph::ChosenBy by) {
 
 }  // namespace
 
-Json parameter_json(const graph::GraphSpec& graph, const Plan& plan, const RunBoard& board, size_t task, size_t param) {
+Json parameter_json(const NodeTypes& types, const graph::GraphSpec& graph, const Plan& plan, const RunBoard& board,
+                    size_t task, size_t param) {
   const TaskPlan& owner = plan.tasks[task];
   const ParamBase& declared = *owner.node->params()[param];  // its name and unit never change
   const std::string name(declared.name());
@@ -60,20 +61,20 @@ Json parameter_json(const graph::GraphSpec& graph, const Plan& plan, const RunBo
     entry["from"] = word(given->by);
   } else if (const graph::NodeSpec* spec = spec_of(graph, owner.name)) {
     // Not from the node itself: a job of it may be at work.
-    entry["value"] = graph::node_types().find(spec->type)->make()->params()[param]->value_text();
+    entry["value"] = types.find(spec->type)->make()->params()[param]->value_text();
     entry["from"] = "default";
   }
   return entry;
 }
 
-Json parameters_json(const graph::GraphSpec& graph, const Plan& plan, const RunBoard& board) {
+Json parameters_json(const NodeTypes& types, const graph::GraphSpec& graph, const Plan& plan, const RunBoard& board) {
   Json entries = Json::array();
   for (size_t t = 0; t < plan.tasks.size(); ++t) {
     for (size_t p = 0; p < board.param_count(t); ++p) {
       const std::string name(plan.tasks[t].node->params()[p]->name());
       const graph::ParamSpec* given = given_value(graph, plan.tasks[t].name, name);
       if (board.kept(t, p).newest() != nullptr || (given != nullptr && given->by != graph::ChosenBy::file))
-        entries.push_back(parameter_json(graph, plan, board, t, p));
+        entries.push_back(parameter_json(types, graph, plan, board, t, p));
     }
   }
   return entries;

@@ -180,7 +180,7 @@ Json Server::top() const {
           {"profile", subject_.graph.profile},
           {"transport", subject_.transport.name()},
           {"running_s", epoch_ns > 0 ? static_cast<double>(std::max<int64_t>(0, now_ns() - epoch_ns)) / 1e9 : 0.0},
-          {"parameters", parameters_json(subject_.graph, subject_.plan, subject_.board)},
+          {"parameters", parameters_json(subject_.registry.nodes, subject_.graph, subject_.plan, subject_.board)},
           {"nodes", nodes}};
 }
 
@@ -298,7 +298,8 @@ Json Server::forget(const std::string& name) {
 
 Json Server::get(const std::string& name) const {
   if (name.empty())
-    return {{"ok", true}, {"parameters", parameters_json(subject_.graph, subject_.plan, subject_.board)}};
+    return {{"ok", true},
+            {"parameters", parameters_json(subject_.registry.nodes, subject_.graph, subject_.plan, subject_.board)}};
   std::vector<std::string> names;
   for (size_t t = 0; t < subject_.plan.tasks.size(); ++t) {
     const TaskPlan& task = subject_.plan.tasks[t];
@@ -306,7 +307,8 @@ Json Server::get(const std::string& name) const {
       names.push_back(task.name + "." + std::string(task.node->params()[p]->name()));
       if (names.back() == name)
         return {{"ok", true},
-                {"parameters", Json::array({parameter_json(subject_.graph, subject_.plan, subject_.board, t, p)})}};
+                {"parameters", Json::array({parameter_json(subject_.registry.nodes, subject_.graph, subject_.plan,
+                                                           subject_.board, t, p)})}};
     }
   }
   return wrong(fmt::format("there is no parameter {}{}", graph::ticked(name), graph::alternatives(name, names)));
@@ -335,7 +337,7 @@ Json Server::set_one(const std::string& name, const Wish& wish) {
                                  [&](const graph::NodeSpec& s) { return s.id == id; });
   if (spec == subject_.graph.nodes.end())
     return wrong(fmt::format("there is no node {}{}", graph::ticked(id), graph::alternatives(id, ids)));
-  const auto shell = graph::node_types().find(spec->type)->make();
+  const auto shell = subject_.registry.nodes.find(spec->type)->make();
   const auto task = std::find_if(subject_.plan.tasks.begin(), subject_.plan.tasks.end(),
                                  [&](const TaskPlan& t) { return t.name == id; });
   for (size_t p = 0; p < shell->params().size(); ++p) {

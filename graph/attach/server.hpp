@@ -12,6 +12,7 @@
 
 #include "graph/attach/endpoint.hpp"
 #include "graph/language/graph.hpp"
+#include "graph/language/registry.hpp"
 #include "rt/sched/run_board.hpp"
 #include "rt/shm/transport.hpp"
 
@@ -19,6 +20,7 @@ namespace takt::attach {
 
 /// What a running graph lets others see and change. All of it outlives the server.
 struct Subject {
+  const Registry& registry;
   const graph::GraphSpec& graph;
   const Plan& plan;  ///< composed with at least one tap
   RunBoard& board;

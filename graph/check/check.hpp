@@ -8,7 +8,7 @@
 #include "graph/check/ages.hpp"
 #include "graph/check/check_machine.hpp"
 #include "graph/language/graph.hpp"
-#include "hal/drivers.hpp"
+#include "hal/device_types.hpp"
 #include "hal/settings/json.hpp"
 #include "rt/node.hpp"
 #include "rt/sched/plan.hpp"
@@ -84,7 +84,7 @@ Plan without(const Plan& plan, const std::vector<std::string>& names);
 CheckResult check_failed(const std::vector<Problem>& problems);
 
 /// `takt nodes`: every device kind with its drivers; drivers and settings of one.
-std::string devices_text();
+std::string devices_text(const hal::DeviceTypes& types);
 std::string device_text(const hal::DeviceKind& kind);
 /// `takt nodes`: every type with its layer and purpose.
 std::string nodes_text(const NodeTypes& types);

@@ -47,9 +47,9 @@ std::string node_text(const NodeType& type) {
   return text;
 }
 
-std::string devices_text() {
+std::string devices_text(const hal::DeviceTypes& types) {
   std::string text = "device kinds\n";
-  for (const hal::DeviceKind& kind : hal::device_kinds()) {
+  for (const hal::DeviceKind& kind : types.all()) {
     std::string drivers;
     for (const hal::DriverInfo& driver : kind.drivers)
       drivers += fmt::format("{}{}", drivers.empty() ? "" : ", ", driver.name);

@@ -6,8 +6,8 @@
 #include <cstdio>
 
 #include "graph/cli/outcome.hpp"
-#include "graph/compose/composition.hpp"
 #include "graph/language/overlay.hpp"
+#include "graph/language/registry.hpp"
 
 namespace takt::command {
 
@@ -15,8 +15,9 @@ std::filesystem::path graph_file(const std::filesystem::path& asked) {
   return asked.empty() ? shipped("graph/ace.yaml") : asked;
 }
 
-std::optional<graph::GraphSpec> load_graph(const std::filesystem::path& file, const graph::LoadOptions& options) {
-  graph::Loaded loaded = graph::load(graph_file(file), options, graph::node_types());
+std::optional<graph::GraphSpec> load_graph(const Registry& registry, const std::filesystem::path& file,
+                                           const graph::LoadOptions& options) {
+  graph::Loaded loaded = graph::load(graph_file(file), options, registry);
   if (loaded.graph) return std::move(loaded.graph);
   tell(loaded.problems);
   tell_problems(loaded.problems.size());

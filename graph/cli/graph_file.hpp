@@ -12,7 +12,8 @@ namespace takt::command {
 std::filesystem::path graph_file(const std::filesystem::path& asked);
 /// Loads only, no device is opened; nothing if the input is wrong, which is then written to stderr. `file` as for
 /// graph_file().
-std::optional<graph::GraphSpec> load_graph(const std::filesystem::path& file, const graph::LoadOptions& options);
+std::optional<graph::GraphSpec> load_graph(const Registry& registry, const std::filesystem::path& file,
+                                           const graph::LoadOptions& options);
 
 /// Says on one line of stderr which values `takt set --keep` left for this graph, if any.
 void tell_kept(const graph::GraphSpec& graph);

@@ -8,4 +8,7 @@ namespace takt::command {
 /// within low..high.
 double set_number(const std::string& text, const std::string& value, double low, double high);
 
+/// For CLI::Validator: makes seconds ("90") of a duration with its unit ("1.5min", "0s"). The error, or "".
+std::string duration(std::string& text);
+
 }  // namespace takt::command

@@ -117,8 +117,9 @@ std::vector<std::string> names_meant(const graph::GraphSpec& graph, const std::s
 }
 
 /// Changes the overlay of a graph that does not run. The graph judges the values, as it would judge --set.
-int keep_for_later(const AttachOptions& options) {
-  auto graph = load_graph(options.graph, options.load);
+int keep_for_later(plugin::Plugins& plugins, AttachOptions& options) {
+  if (const int code = plugins.load(graph_file(options.graph), options.load); code != kOk) return code;
+  auto graph = load_graph(plugins.registry(), options.graph, options.load);
   if (!graph) return kBadInput;
   const std::filesystem::path file = graph::overlay_file(graph::state_folder(), graph->name);
   if (options.forget) {
@@ -138,15 +139,16 @@ int keep_for_later(const AttachOptions& options) {
     with.set.push_back(name + "=" + options.value);
     changes[name] = options.value;
   }
-  if (!load_graph(options.graph, with)) return kBadInput;
+  if (!load_graph(plugins.registry(), options.graph, with)) return kBadInput;
   if (const auto done = graph::change_overlay(file, graph->name, changes); !done)
     return refuse(done.error(), kDeviceOrSystem);
   std::fprintf(stderr, "takt: nothing runs; kept in %s for the next run of %s\n", file.c_str(), graph->name.c_str());
   return kOk;
 }
 
-int run_set(const AttachOptions& options) {
-  if ((options.keep || options.forget) && options.run == 0 && attach::running().empty()) return keep_for_later(options);
+int run_set(plugin::Plugins& plugins, AttachOptions& options) {
+  if ((options.keep || options.forget) && options.run == 0 && attach::running().empty())
+    return keep_for_later(plugins, options);
   auto connection = attached(options.run);
   if (!connection) return kDeviceOrSystem;
   const Json question =
@@ -203,7 +205,7 @@ int understood(const std::function<int()>& command) {
   }
 }
 
-void add_attach_commands(CLI::App& app, AttachOptions& o, int& exit_code) {
+void add_attach_commands(CLI::App& app, plugin::Plugins& plugins, AttachOptions& o, int& exit_code) {
   CLI::App* top = add(app, "top", "shows what a running graph does", o);
   top->add_flag("--once", o.once, "shows it once");
   top->add_flag("--json", o.json, "one JSON object a line");
@@ -231,7 +233,7 @@ void add_attach_commands(CLI::App& app, AttachOptions& o, int& exit_code) {
       "The value holds from the node's next job on, also after a restart of its process.");
   set->callback([&, value, forget] {
     if (value->count() + forget->count() == 0) throw CLI::RequiredError("value");
-    exit_code = understood([&] { return run_set(o); });
+    exit_code = understood([&] { return run_set(plugins, o); });
   });
   CLI::App* mode = add(app, "mode", "changes the mode of a running graph", o);
   mode->add_option("mode", o.mode, "a mode of the graph, full or safe_stop")->required();

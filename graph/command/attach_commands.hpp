@@ -8,6 +8,7 @@
 
 #include "graph/attach/endpoint.hpp"
 #include "graph/language/graph.hpp"
+#include "graph/plugins/plugins.hpp"
 
 namespace takt::command {
 
@@ -32,6 +33,6 @@ int ask(attach::Connection& connection, const nlohmann::ordered_json& question, 
 int understood(const std::function<int()>& command);
 
 /// Adds the commands; each sets the exit code: 0 done, 2 refused or unknown, 3 nothing to attach to.
-void add_attach_commands(CLI::App& app, AttachOptions& options, int& exit_code);
+void add_attach_commands(CLI::App& app, plugin::Plugins& plugins, AttachOptions& options, int& exit_code);
 
 }  // namespace takt::command

@@ -9,12 +9,12 @@
 #include "graph/compose/spares.hpp"
 #include "graph/run/prepare.hpp"
 #include "graph/run/support.hpp"
-#include "hal/drivers.hpp"
+#include "hal/device_types.hpp"
 
 namespace takt::command {
 
-int check_graph(const RunOptions& options, bool json) {
-  Prepared prepared;
+int check_graph(const Registry& registry, const RunOptions& options, bool json) {
+  Prepared prepared(registry);
   if (const int code = prepare_check(options, prepared); code != kOk) {
     if (json) std::printf("%s\n", graph::check_failed(prepared.problems).json.dump(2).c_str());
     return code;
@@ -41,13 +41,11 @@ int check_graph(const RunOptions& options, bool json) {
   return result.admitted ? kOk : kNotOk;
 }
 
-int print_nodes(const std::string& type) {
-  const NodeTypes types = graph::node_types();
-  const auto kinds = hal::device_kinds();
-  const auto kind = std::find_if(kinds.begin(), kinds.end(), [&](const hal::DeviceKind& k) { return k.name == type; });
-  const std::string all = graph::nodes_text(types) + graph::devices_text();
-  if (const NodeType* found = types.find(type)) std::fputs(graph::node_text(*found).c_str(), stdout);
-  else if (kind != kinds.end()) std::fputs(graph::device_text(*kind).c_str(), stdout);
+int print_nodes(const Registry& registry, const std::string& type) {
+  const hal::DeviceKind* const kind = registry.devices.find(type);
+  const std::string all = graph::nodes_text(registry.nodes) + graph::devices_text(registry.devices);
+  if (const NodeType* found = registry.nodes.find(type)) std::fputs(graph::node_text(*found).c_str(), stdout);
+  else if (kind != nullptr) std::fputs(graph::device_text(*kind).c_str(), stdout);
   else if (type.empty()) std::fputs(all.c_str(), stdout);
   else {
     std::fprintf(stderr, "takt: error: node type or device kind \"%s\" is unknown; valid are:\n%s", type.c_str(),

@@ -3,7 +3,6 @@
 #include <CLI/CLI.hpp>
 #include <string>
 
-
 namespace takt::command {
 
 struct DoctorOptions {

@@ -52,8 +52,9 @@ void unthrottled(Plan& plan, const std::vector<NodeProfile>& nodes) {
 
 /// One pass: composes the graph anew, since nodes and devices carry state, and runs it. Exit code, kOk if it ran.
 template <class Change, class Take>
-int pass(const RunOptions& options, const char* name, const Change& change, const Take& take) {
-  Prepared prepared;
+int pass(const Registry& registry, const RunOptions& options, const char* name, const Change& change,
+         const Take& take) {
+  Prepared prepared(registry);
   if (const int code = load(options, prepared); code != kOk) return tell_problems(prepared.problems.size()), code;
   graph::ComposeOptions how;
   how.output = options.output;
@@ -87,7 +88,7 @@ int pass(const RunOptions& options, const char* name, const Change& change, cons
   return StopOnSignal::asked() ? refuse("stopped: nothing was written", kNotOk) : static_cast<int>(kOk);
 }
 
-int measure(const RunOptions& options, Profile& profile) {
+int measure(const Registry& registry, const RunOptions& options, Profile& profile) {
   const CpuLatencyHold latency = hold_cpu_dma_latency();
   std::vector<std::string> lacks = prepare_process();
   if (!latency.granted()) lacks.push_back(latency.lacks());
@@ -102,9 +103,9 @@ int measure(const RunOptions& options, Profile& profile) {
       profile.nodes[t].alone = board.task(t).exec;
     }
   };
-  if (const int code = pass(options, "each job alone", alone, take_alone); code != kOk) return code;
+  if (const int code = pass(registry, options, "each job alone", alone, take_alone); code != kOk) return code;
   return pass(
-      options, "all nodes together", [&](Plan& plan) { unthrottled(plan, profile.nodes); },
+      registry, options, "all nodes together", [&](Plan& plan) { unthrottled(plan, profile.nodes); },
       [&](const graph::GraphSpec&, const Plan& plan, const RunBoard& board, const RunResult& result) {
         profile.policy = result.policy_granted;
         for (size_t t = 0; t < plan.tasks.size(); ++t) profile.nodes[t].together = board.task(t).exec;
@@ -147,7 +148,7 @@ int compare(const ProfileOptions& options, double tolerance, const Profile& prof
 
 }  // namespace
 
-int profile_graph(const ProfileOptions& options) {
+int profile_graph(const Registry& registry, const ProfileOptions& options) {
   const auto tolerance = parse_tolerance(options.tolerance);
   if (!tolerance) return refuse("--tolerance " + options.tolerance + " is no share; write for instance 20%", kBadInput);
   if (!options.compare.empty() && options.run.load.schedule)
@@ -161,7 +162,7 @@ int profile_graph(const ProfileOptions& options) {
   const StopOnSignal guard;
   try {
     Profile profile;
-    if (const int code = measure(run, profile); code != kOk) return code;
+    if (const int code = measure(registry, run, profile); code != kOk) return code;
     if (!options.compare.empty()) return compare(options, *tolerance, profile);
     std::fputs(profile_text(profile.nodes, options.quantile, options.margin).c_str(), stdout);
     std::printf("together under policy %s\n", std::string(to_string(profile.policy)).c_str());

@@ -25,6 +25,6 @@ struct ProfileOptions {
 /// they are in the run, and inputs are real ones. Together: as the schedule says, on all of its
 /// cores and under its policy, with budgets large enough not to throttle what is being measured. In both passes a job
 /// may finish late and nothing degrades.
-int profile_graph(const ProfileOptions& options);
+int profile_graph(const Registry& registry, const ProfileOptions& options);
 
 }  // namespace takt::command

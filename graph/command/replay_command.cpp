@@ -10,16 +10,17 @@
 #include <optional>
 #include <sstream>
 
+#include "graph/command/graph_commands.hpp"
 #include "graph/compose/composition.hpp"
 #include "graph/compose/partition.hpp"
 #include "graph/language/words.hpp"
 #include "graph/log/cut_log.hpp"
 #include "graph/log/log_content.hpp"
 #include "graph/log/recorded_plan.hpp"
-#include "graph/run/commit.hpp"
 #include "graph/run/isolated_replay.hpp"
 #include "graph/run/prepare.hpp"
 #include "graph/run/support.hpp"
+#include "rt/abi.hpp"
 #include "rt/record/replayer.hpp"
 
 namespace takt::command {
@@ -71,7 +72,8 @@ void force_simd(const std::string& recorded) {
 
 class Replay {
  public:
-  explicit Replay(const ReplayOptions& options) : options_(options) {}
+  Replay(plugin::Plugins& plugins, const ReplayOptions& options)
+      : options_(options), plugins_(plugins), prepared_(plugins.registry()) {}
 
   int run() {
     auto file = record::LogFile::open(options_.log);
@@ -95,6 +97,10 @@ class Replay {
       throw Refused{fmt::format("the graph {} of the record is not there; name it: takt replay {} GRAPH",
                                 run.graph.string(), options_.log.string())};
     if (options_.graph.empty()) run.load.schedule = fact(facts, "schedule");
+    run.load.params = options_.params.empty() ? std::filesystem::path(fact(facts, "params")) : options_.params;
+    if (!run.load.params.empty() && !std::filesystem::exists(run.load.params))
+      throw Refused{fmt::format("the parameter file {} of the record is not there; name it: --params FILE",
+                                run.load.params.string())};
     run.load.profile = fact(facts, "profile");
     run.load.mode = fact(facts, "mode");
     run.load.policy = fact(facts, "policy_option");
@@ -105,7 +111,11 @@ class Replay {
     run.output = options_.output;
     run.seed = std::strtoull(fact(facts, "seed").c_str(), nullptr, 10);
     recorded_ = attached_json(*file_, "plan.json");
-    int code = load(run, prepared_);
+    run.load.plugin_files = options_.plugin_files;
+    int code = plugins_.load(run.graph, run.load);
+    if (code != kOk) return code;
+    check_plugins(run.load.plugins);
+    code = load(run, prepared_);
     if (code == kOk) {
       tell_ignored_overlay(prepared_.graph->name, "the record says which values held");
       RecordedFacts facts(recorded_);
@@ -124,6 +134,19 @@ class Replay {
     return code;
   }
 
+  /// Throws where one is missing that the record was made with; says where one is another file now.
+  void check_plugins(const std::vector<graph::PluginFact>& loaded) const {
+    std::istringstream recorded(fact(file_->facts(), "plugins"));
+    for (std::string name, hash; recorded >> name >> hash;) {
+      const auto found = std::find_if(loaded.begin(), loaded.end(),
+                                      [&](const graph::PluginFact& plugin) { return plugin.name == name; });
+      if (found == loaded.end())
+        throw Refused{fmt::format("the record was made with the plug-in {}; name it: --plugin FILE", name)};
+      if (found->hash != hash)
+        std::fprintf(stderr, "takt: plug-in %s is not what it was when the record was made\n", name.c_str());
+    }
+  }
+
   /// Says what is not as it was; throws where that makes a replay impossible.
   void check_sameness() {
     const graph::GraphSpec& graph = *prepared_.graph;
@@ -137,13 +160,14 @@ class Replay {
         throw Refused{fmt::format("{} is not what it was when the record was made", (graph.directory / path).string())};
     if (const std::string cut = fact(file_->facts(), "cut"); !cut.empty())
       std::fprintf(stderr, "takt: this is %s; nodes begin here without what they remembered\n", cut.c_str());
-    if (log::file_text(graph.file) != file_->attached("graph.yaml"))
-      std::fprintf(stderr, "takt: %s has changed since the record was made\n", graph.file.c_str());
+    for (size_t i = 0; i < graph.files.size(); ++i)
+      if (log::file_text(graph.files[i]) != file_->attached(i == 0 ? "graph.yaml" : log::part_name(i)))
+        std::fprintf(stderr, "takt: %s has changed since the record was made\n", graph.files[i].c_str());
     for (const std::string& param : log::changed_params(recorded_, plan))
       std::fprintf(stderr, "takt: %s\n", param.c_str());
-    if (fact(file_->facts(), "program") != log::file_hash("/proc/self/exe"))
+    if (fact(file_->facts(), "program") != log::program_hash())
       std::fprintf(stderr, "takt: this is another program (commit %s) than the one that recorded (commit %s)\n",
-                   kCommit, fact(file_->facts(), "commit").c_str());
+                   version().commit, fact(file_->facts(), "commit").c_str());
   }
 
   record::ReplayResult replay() {
@@ -174,7 +198,7 @@ class Replay {
   void renew(size_t task) {
     graph::Composition& composition = *prepared_.composition;
     auto fresh =
-        graph::make_again(*prepared_.graph, graph::node_types(), *prepared_.clock, composed_, composition.plan, task);
+        graph::make_again(*prepared_.graph, prepared_.registry, *prepared_.clock, composed_, composition.plan, task);
     composition.plan.tasks[task].node = fresh.get();
     composition.nodes[task] = std::move(fresh);
   }
@@ -294,6 +318,7 @@ class Replay {
   }
 
   const ReplayOptions& options_;
+  plugin::Plugins& plugins_;
   MonotonicClock clock_;
   std::optional<record::LogFile> file_;
   Json recorded_;
@@ -305,7 +330,7 @@ class Replay {
 
 }  // namespace
 
-int replay(const ReplayOptions& options) {
+int replay(plugin::Plugins& plugins, const ReplayOptions& options) {
   std::error_code error;
   std::filesystem::create_directories(options.output, error);
   if (error)
@@ -313,7 +338,7 @@ int replay(const ReplayOptions& options) {
                   kBadInput);
   const StopOnSignal guard;
   try {
-    return Replay(options).run();
+    return Replay(plugins, options).run();
   } catch (const Refused& refused) {
     return refuse(refused.why, kBadInput);
   } catch (const std::runtime_error& problem) {  // processes
@@ -324,19 +349,21 @@ int replay(const ReplayOptions& options) {
   }
 }
 
-void add_replay(CLI::App& app, ReplayOptions& o, int& exit_code) {
+void add_replay(CLI::App& app, plugin::Plugins& plugins, ReplayOptions& o, int& exit_code) {
   CLI::App* replay = app.add_subcommand("replay", "runs the jobs of a record again, with what they were given");
   replay->add_option("log", o.log, "what `takt run --record` wrote")->required();
   replay->add_option("graph", o.graph, "graph file instead of that of the record");
   replay->add_flag("--compare", o.compare, "bit by bit with the record; exit 1 on the first message that differs");
   replay->add_option("--live", o.live, "runs only these nodes, with the rest from the record")->delimiter(',');
+  replay->add_option("--params", o.params, "parameter file of the robot instead of that of the record");
   replay->add_option("--set", o.set, "node.param=value, repeatable");
+  add_plugin_option(*replay, o.plugin_files);
   replay->add_option("--from", o.from_s, "tells and paces only what was released so many seconds into the run");
   replay->add_option("--isolate", o.isolate, "none (one process) | subsystem: as many as the run had")
       ->check(CLI::IsMember({"none", "subsystem"}));
   replay->add_flag("--recorded-pace", o.recorded_pace, "as fast as it was, instead of as fast as possible");
   replay->add_option("--output", o.output, "folder for pictures and other results (default out)");
-  replay->callback([&] { exit_code = command::replay(o); });
+  replay->callback([&] { exit_code = command::replay(plugins, o); });
 }
 
 }  // namespace takt::command

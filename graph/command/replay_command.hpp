@@ -6,24 +6,28 @@
 #include <string>
 #include <vector>
 
+#include "graph/plugins/plugins.hpp"
+
 namespace takt::command {
 
 struct ReplayOptions {
   std::filesystem::path log;
-  std::filesystem::path graph;  ///< empty: that of the record
+  std::filesystem::path graph;   ///< empty: that of the record
+  std::filesystem::path params;  ///< parameter file; empty: that of the record
   std::filesystem::path output = "out";
   bool compare = false, recorded_pace = false;
   std::string isolate = "none";   ///< none | subsystem: a process for each, as in a run
   std::vector<std::string> live;  ///< nodes that run; empty: all. What the others made comes from the record
   std::vector<std::string> set;   ///< "node.param=value", after those of the record
-  double from_s = 0;              ///< since the epoch of the run
+  std::vector<std::filesystem::path> plugin_files;  ///< beside those that the graph names
+  double from_s = 0;                                ///< since the epoch of the run
 };
 
 /// `takt replay LOG [GRAPH]`: runs every job of a record again, with the inputs and answers that it had. Exit 1 if
 /// --compare finds a message that is not bit by bit the recorded one, or the record lacks what a job was given; 2 if
 /// the record, its graph or a file that the graph names cannot be used.
-int replay(const ReplayOptions& options);
+int replay(plugin::Plugins& plugins, const ReplayOptions& options);
 
-void add_replay(CLI::App& app, ReplayOptions& options, int& exit_code);
+void add_replay(CLI::App& app, plugin::Plugins& plugins, ReplayOptions& options, int& exit_code);
 
 }  // namespace takt::command

@@ -72,22 +72,22 @@ int compare_names(const Json& report, const graph::GraphSpec& graph) {
 
 }  // namespace
 
-int show_graph(const ShowOptions& options) {
-  const auto graph = load_graph(options.graph, options.load);
+int show_graph(const Registry& registry, const ShowOptions& options) {
+  const auto graph = load_graph(registry, options.graph, options.load);
   if (!graph) return kBadInput;
-  const view::Diagram diagram = view::make_diagram(*graph, graph::node_types(), graph::hal_catalogue());
+  const view::Diagram diagram = view::make_diagram(*graph, registry);
   if (!options.svg.empty()) return write_file(options.svg, view::graph_svg(diagram));
   std::fputs((options.dot ? view::graph_dot(diagram) : view::graph_listing(diagram)).c_str(), stdout);
   return kOk;
 }
 
-int render_report(const RenderOptions& options) {
+int render_report(const Registry& registry, const RenderOptions& options) {
   const Json report = read_report(options.report);
   if (report.is_null()) return kBadInput;
-  const auto graph = load_graph(options.graph, load_options(report, options));
+  const auto graph = load_graph(registry, options.graph, load_options(report, options));
   if (!graph) return kBadInput;
   if (const int code = compare_names(report, *graph); code != kOk) return code;
-  return write_file(options.html, view::html_report(report, *graph, options.output));
+  return write_file(options.html, view::html_report(registry, report, *graph, options.output));
 }
 
 }  // namespace takt::command

@@ -15,7 +15,7 @@ struct ShowOptions {
 };
 
 /// `takt show`: draws a graph; no device is opened. 0, or 2 for input that `takt check` would call invalid.
-int show_graph(const ShowOptions& options);
+int show_graph(const Registry& registry, const ShowOptions& options);
 
 struct RenderOptions {
   std::filesystem::path report, graph, html, output = "out";
@@ -23,6 +23,6 @@ struct RenderOptions {
 };
 
 /// `takt report`: a page from the report of an earlier run. 0, or 2 if report, graph or schedule do not fit.
-int render_report(const RenderOptions& options);
+int render_report(const Registry& registry, const RenderOptions& options);
 
 }  // namespace takt::command

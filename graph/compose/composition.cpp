@@ -8,7 +8,7 @@
 #include <set>
 
 #include "graph/compose/plan_modes.hpp"
-#include "hal/drivers.hpp"
+#include "hal/devices.hpp"
 #include "rt/sched/port_access.hpp"
 
 namespace takt::graph {
@@ -45,8 +45,8 @@ void give_setup(Node& node, const TaskPlan& task, size_t t, const GraphSpec& gra
 
 class Composer {
  public:
-  Composer(const GraphSpec& graph, const NodeTypes& types, const Clock& clock, const ComposeOptions& options)
-      : graph_(graph), types_(types), clock_(clock), options_(options) {}
+  Composer(const GraphSpec& graph, const Registry& registry, const Clock& clock, const ComposeOptions& options)
+      : graph_(graph), registry_(registry), clock_(clock), options_(options) {}
 
   tl::expected<Composition, ComposeError> compose(const DeviceFactory& make_device) {
     if (auto made = make_devices(make_device); !made) return tl::make_unexpected(made.error());
@@ -65,7 +65,7 @@ class Composer {
   }
 
   Composition outline() {
-    for (const DeviceSpec& device : graph_.devices) add_device(device, hal::make_shell(device.kind));
+    for (const DeviceSpec& device : graph_.devices) add_device(device, registry_.devices.find(device.kind)->shell());
     make_nodes();
     connect();
     return std::move(result_);
@@ -75,7 +75,7 @@ class Composer {
   tl::expected<void, ComposeError> make_devices(const DeviceFactory& make_device) {
     for (const DeviceSpec& device : graph_.devices) {
       if (!owns(device.id)) {
-        add_device(device, hal::make_shell(device.kind));
+        add_device(device, registry_.devices.find(device.kind)->shell());
         continue;
       }
       auto node = make_device(device);
@@ -109,7 +109,7 @@ class Composer {
   }
 
   void make_nodes() {
-    for (const NodeSpec& spec : graph_.nodes) add(spec.id, make_node(spec, types_), false, spec.position);
+    for (const NodeSpec& spec : graph_.nodes) add(spec.id, make_node(spec, registry_.nodes), false, spec.position);
   }
 
   void add(const std::string& id, std::unique_ptr<Node> node, bool device, const Position& position) {
@@ -289,7 +289,7 @@ class Composer {
   }
 
   const GraphSpec& graph_;
-  const NodeTypes& types_;
+  const Registry& registry_;
   const Clock& clock_;
   const ComposeOptions options_;
   Composition result_;
@@ -300,17 +300,17 @@ class Composer {
 
 }  // namespace
 
-Composition outline(const GraphSpec& graph, const NodeTypes& types, const Clock& clock) {
-  return Composer(graph, types, clock, {}).outline();
+Composition outline(const GraphSpec& graph, const Registry& registry, const Clock& clock) {
+  return Composer(graph, registry, clock, {}).outline();
 }
 
-std::unique_ptr<Node> make_again(const GraphSpec& graph, const NodeTypes& types, const Clock& clock,
+std::unique_ptr<Node> make_again(const GraphSpec& graph, const Registry& registry, const Clock& clock,
                                  const ComposeOptions& options, const Plan& plan, size_t t) {
   const TaskPlan& task = plan.tasks[t];
   const auto spec =
       std::find_if(graph.nodes.begin(), graph.nodes.end(), [&](const NodeSpec& node) { return node.id == task.name; });
   if (spec == graph.nodes.end()) throw SetupError(task.name + " is no node of the graph");
-  std::unique_ptr<Node> node = make_node(*spec, types);
+  std::unique_ptr<Node> node = make_node(*spec, registry.nodes);
   for (size_t i = 0; i < node->outputs().size(); ++i)
     if (task.node->outputs()[i]->connected()) PortAccess::mark_read(*node->outputs()[i]);
   for (size_t i = 0; i < node->inputs().size(); ++i)
@@ -328,10 +328,10 @@ void complete(Plan& plan, FactExchange& exchange, const Observers& observers) {
   size_ports(plan, observers);
 }
 
-tl::expected<Composition, ComposeError> compose(const GraphSpec& graph, const NodeTypes& types,
+tl::expected<Composition, ComposeError> compose(const GraphSpec& graph, const Registry& registry,
                                                 const DeviceFactory& make_device, const Clock& clock,
                                                 const ComposeOptions& options) {
-  return Composer(graph, types, clock, options).compose(make_device);
+  return Composer(graph, registry, clock, options).compose(make_device);
 }
 
 }  // namespace takt::graph

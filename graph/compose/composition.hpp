@@ -5,8 +5,9 @@
 #include <memory>
 #include <vector>
 
-#include "graph/compose/plan_ports.hpp"
+#include "rt/sched/plan_ports.hpp"
 #include "graph/language/graph.hpp"
+#include "graph/language/registry.hpp"
 #include "rt/node.hpp"
 #include "rt/sched/plan.hpp"
 
@@ -50,22 +51,19 @@ struct Composition {
 };
 
 /// Every process of a run composes the same plan; what it does not own stays an empty shell with ports.
-tl::expected<Composition, ComposeError> compose(const GraphSpec& graph, const NodeTypes& types,
+tl::expected<Composition, ComposeError> compose(const GraphSpec& graph, const Registry& registry,
                                                 const DeviceFactory& make_device, const Clock& clock,
                                                 const ComposeOptions& options);
 
 /// The node of a task once more, set up as compose() had done it: what a process that was started again has. `options`
 /// as compose() was given; the plan's node is read, and stays as it is. Throws SetupError.
-std::unique_ptr<Node> make_again(const GraphSpec& graph, const NodeTypes& types, const Clock& clock,
+std::unique_ptr<Node> make_again(const GraphSpec& graph, const Registry& registry, const Clock& clock,
                                  const ComposeOptions& options, const Plan& plan, size_t task);
 
 /// The plan as far as it is known before any node is set up: tasks, edges, ports without capacities.
-Composition outline(const GraphSpec& graph, const NodeTypes& types, const Clock& clock);
+Composition outline(const GraphSpec& graph, const Registry& registry, const Clock& clock);
 
 /// Adds to an outline what the owners of its nodes tell: capacities, hence pools, and what is known of sources.
 void complete(Plan& plan, FactExchange& exchange, const Observers& observers);
-
-/// All node types this build knows.
-NodeTypes node_types();
 
 }  // namespace takt::graph

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "graph/ace/ace_registry.hpp"
 #include "graph/cli/graph_file.hpp"
 #include "graph/cli/outcome.hpp"
 #include "graph/evaluate/evaluations.hpp"
@@ -51,7 +52,7 @@ struct Table {
 std::optional<Table> measure(const EvalObstacleStopOptions& o, Vision vision) {
   graph::LoadOptions load;
   if (vision == Vision::absent) load.mode = "blind";
-  auto yard = load_graph(shipped("graph/yard.yaml"), load);
+  auto yard = load_graph(ace_registry(), shipped("graph/yard.yaml"), load);
   if (!yard) return std::nullopt;
   StopTrials trials(std::move(*yard), vision, o.seed);
   Table table;

@@ -11,11 +11,13 @@
 #include <stdexcept>
 #include <utility>
 
+#include "graph/ace/ace_registry.hpp"
 #include "graph/compose/composition.hpp"
 #include "hal/laser/laser_node.hpp"
 #include "hal/settings/settings.hpp"
 #include "hal/sim/random.hpp"
 #include "hal/sim/sim_devices.hpp"
+#include "hal/sim/worlds.hpp"
 #include "nodes/obstacle_stop/protected_field.hpp"
 #include "rt/msg/geometry.hpp"
 #include "rt/sched/executor.hpp"
@@ -312,7 +314,7 @@ StopTrials::StopTrials(graph::GraphSpec yard, Vision vision, uint64_t seed)
     : yard_(std::move(yard)),
       vision_(vision),
       seed_(seed),
-      types_(graph::node_types()),
+      registry_(ace_registry()),
       textures_(sim::textures_of(seed)) {
   // In virtual time it is said below what a job takes: it need not be spent.
   for (graph::NodeSpec& node : yard_.nodes)
@@ -335,11 +337,11 @@ StopOutcome StopTrials::run(const StopTrial& trial) {
     const auto failed = [&](const DeviceError& error) {
       return tl::make_unexpected(graph::ComposeError{{{spec.position, error.text()}}, !error.bad_input});
     };
-    const auto world = devices.world(config);
+    const auto world = sim::world_of(config, devices);
     if (!world) return failed(world.error());
     if (!person) person.emplace(trial, **world);
     if (spec.kind != "laser_scanner") {
-      auto node = hal::make_device(config, devices, clock);
+      auto node = hal::make_device(registry_.devices, config, devices, clock);
       if (!node) return failed(node.error());
       return std::move(*node);
     }
@@ -348,12 +350,12 @@ StopOutcome StopTrials::run(const StopTrial& trial) {
     scanner = model.sensor_in_robot = settings.mount("mount");
     return std::make_unique<LaserNode>(std::make_unique<LaserWithPerson>(model, **world, *person));
   };
-  auto composition = graph::compose(yard_, types_, factory, clock, {std::filesystem::path(), seed_});
+  auto composition = graph::compose(yard_, registry_, factory, clock, {std::filesystem::path(), seed_});
   if (!composition) throw std::runtime_error(graph::to_string(composition.error().problems.front()));
   const Plan& plan = composition->plan;
   const auto transport = make_local_transport(plan.ports);
   RunBoard board(plan);
-  Referee referee(*devices.first_world(), *person, scanner);
+  Referee referee(*sim::first_world(devices), *person, scanner);
   Executor::Options options;
   options.duration_ns = static_cast<int64_t>((trial.appears_s + kLongest_s + 1) * 1e9);
   options.board = &board;

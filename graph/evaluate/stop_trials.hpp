@@ -6,7 +6,8 @@
 #include <string_view>
 
 #include "graph/language/graph.hpp"
-#include "hal/drivers.hpp"
+#include "graph/language/registry.hpp"
+#include "hal/device_types.hpp"
 #include "hal/sim/simulation.hpp"
 #include "rt/node.hpp"
 
@@ -71,7 +72,7 @@ class StopTrials {
   graph::GraphSpec yard_;
   const Vision vision_;
   const uint64_t seed_;
-  const NodeTypes types_;
+  const Registry registry_;
   const std::shared_ptr<const sim::TextureSet> textures_;  ///< kept, so that the worlds of all trials share them
 };
 

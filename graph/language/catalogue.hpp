@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "graph/language/graph.hpp"
+#include "hal/device_types.hpp"
 #include "rt/node.hpp"
 
 namespace takt::graph {
@@ -50,7 +51,7 @@ struct DeviceCatalogue {
 Loaded load(const std::filesystem::path& file, const LoadOptions& options, const NodeTypes& types,
             const DeviceCatalogue& devices);
 
-/// The devices that this build knows.
-DeviceCatalogue hal_catalogue();
+/// The devices of a registry, as the loader sees them.
+DeviceCatalogue catalogue(const hal::DeviceTypes& types);
 
 }  // namespace takt::graph

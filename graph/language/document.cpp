@@ -20,8 +20,9 @@ constexpr size_t kLargestFile = 1 << 20, kLongestScalar = 1000, kDeepest = 32;
 /// Builds JSON and marks from parser events, so that duplicate keys are seen, which a YAML tree would hide.
 class Builder final : public YAML::EventHandler {
  public:
-  Builder(Document& document, const std::filesystem::path& directory, std::vector<Problem>& problems)
-      : document_(document), directory_(directory), problems_(problems) {}
+  Builder(Document& document, const std::filesystem::path& directory, std::vector<Problem>& problems,
+          Constants constants)
+      : document_(document), directory_(directory), problems_(problems), constants_(constants) {}
 
   void OnDocumentStart(const YAML::Mark&) override {}
   void OnDocumentEnd() override {}
@@ -86,11 +87,12 @@ class Builder final : public YAML::EventHandler {
   }
 
   void text(const Position& at, const std::string& value) {
-    const auto expanded = expand_variables(value, directory_);
+    const auto expanded = expand_variables(value, directory_, constants_);
     if (!expanded) {
       problem(at, ticked(value) + " " + expanded.error());
       return scalar(at, json(value), value);
     }
+    if (!next_lost() && expanded->find("${") != std::string::npos) document_.unresolved[next_pointer()] = *expanded;
     scalar(at, json(*expanded), value);
   }
 
@@ -182,6 +184,7 @@ class Builder final : public YAML::EventHandler {
   Document& document_;
   const std::filesystem::path& directory_;
   std::vector<Problem>& problems_;
+  Constants constants_;
   std::vector<Level> levels_;
 };
 
@@ -250,7 +253,7 @@ std::string Document::raw(const std::string& pointer) const {
 }
 
 Document parse_document(std::string_view text, const std::string& name, const std::filesystem::path& directory,
-                        std::vector<Problem>& problems) {
+                        std::vector<Problem>& problems, Constants constants) {
   const Position start{name, 1, 1};
   Document document;
   document.file = name;
@@ -262,14 +265,14 @@ Document parse_document(std::string_view text, const std::string& name, const st
   try {
     std::istringstream stream{std::string(text)};
     YAML::Parser parser(stream);
-    Builder builder(document, directory, problems);
+    Builder builder(document, directory, problems, constants);
     if (!parser.HandleNextDocument(builder)) {
       add(problems, start, "the file is empty; it begins with `takt: 1`");
     } else if (parser) {
       Document rest;
       rest.file = name;
       std::vector<Problem> ignored;
-      Builder second(rest, directory, ignored);
+      Builder second(rest, directory, ignored, constants);
       if (parser.HandleNextDocument(second))
         add(problems, rest.value_at(""), "a second YAML document (---); one file holds one graph or schedule");
     }
@@ -286,7 +289,8 @@ Document parse_document(std::string_view text, const std::string& name, const st
   return document;
 }
 
-Document read_document(const std::filesystem::path& file, const Position& wanted_from, std::vector<Problem>& problems) {
+Document read_document(const std::filesystem::path& file, const Position& wanted_from, std::vector<Problem>& problems,
+                       Constants constants) {
   Document nothing;
   nothing.file = file.string();
   const auto fail = [&](const std::string& why) {
@@ -302,7 +306,7 @@ Document read_document(const std::filesystem::path& file, const Position& wanted
   std::ifstream stream(file, std::ios::binary);
   const std::string text{std::istreambuf_iterator<char>(stream), {}};
   if (!stream) return fail("no permission, or a read error");
-  return parse_document(text, file.string(), file.parent_path(), problems);
+  return parse_document(text, file.string(), file.parent_path(), problems, constants);
 }
 
 }  // namespace takt::graph

@@ -25,9 +25,10 @@ struct Mark {
 class Document {
  public:
   std::string file;
-  nlohmann::json root;                ///< null if the file could not be read at all
-  std::map<std::string, Mark> marks;  ///< by JSON pointer (RFC 6901)
-  std::set<std::string> broken;       ///< pointers whose value was reported already and is null or absent
+  nlohmann::json root;                            ///< null if the file could not be read at all
+  std::map<std::string, Mark> marks;              ///< by JSON pointer (RFC 6901)
+  std::map<std::string, std::string> unresolved;  ///< texts with ${constant}, by pointer; see Constants::later
+  std::set<std::string> broken;                   ///< pointers whose value was reported already and is null or absent
 
   /// Position of the value; of its nearest parent if there is none.
   Position value_at(const std::string& pointer) const;
@@ -43,19 +44,24 @@ class Document {
 std::string child(const std::string& pointer, std::string_view key);
 std::string child(const std::string& pointer, size_t index);
 
+/// What becomes of ${name} in a text, where name is a word of lower-case letters: an error, or it is left for the
+/// caller (in Document::unresolved).
+enum class Constants : uint8_t { none, later };
+
 /// Reads and parses; what is wrong is appended to `problems` (all that can be found), each with its position.
 /// `wanted_from` is where the file was asked for, for the error if it cannot be read.
-Document read_document(const std::filesystem::path& file, const Position& wanted_from, std::vector<Problem>& problems);
+Document read_document(const std::filesystem::path& file, const Position& wanted_from, std::vector<Problem>& problems,
+                       Constants constants = Constants::none);
 /// The same for text already in memory; `name` stands in the positions, relative paths start at `directory`.
 Document parse_document(std::string_view text, const std::string& name, const std::filesystem::path& directory,
-                        std::vector<Problem>& problems);
+                        std::vector<Problem>& problems, Constants constants = Constants::none);
 
 /// A plain (unquoted) scalar as JSON, or why YAML readers disagree about it.
 tl::expected<nlohmann::json, std::string> resolve_scalar(const std::string& text);
 
 /// Replaces ${TAKT_DATA} by the environment variable (which must be set) and ${TAKT_DATA:-path} by the variable or, if
 /// it is unset, by the path relative to `directory`.
-tl::expected<std::string, std::string> expand_variables(const std::string& text,
-                                                        const std::filesystem::path& directory);
+tl::expected<std::string, std::string> expand_variables(const std::string& text, const std::filesystem::path& directory,
+                                                        Constants constants = Constants::none);
 
 }  // namespace takt::graph

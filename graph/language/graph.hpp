@@ -20,14 +20,17 @@ namespace takt::graph {
 struct Position {
   std::string file;
   int line = 0, column = 0;
+  std::string use = {};  ///< of a value that came from a constant: "constant `speed`, used at FILE:LINE:COLUMN"
 };
+/// "file:line:column"; the file alone where there is no line.
+std::string to_string(const Position& position);
 
 /// One thing wrong with the input. `text` names the id at fault, the value and the valid choices.
 struct Problem {
   Position position;
   std::string text;
 };
-/// "file:line:column: error: text".
+/// "file:line:column: error: text", and where the value is used if it stands elsewhere.
 std::string to_string(const Problem& problem);
 
 /// node.port or device.port.
@@ -214,6 +217,8 @@ struct ExpectSpec {
 struct GraphSpec {
   std::string name, file, profile, mode = "full";
   std::filesystem::path directory;
+  std::vector<std::string> files;  ///< the graph's, those it includes, then the parameter file
+  std::string params_file;         ///< of this robot; empty: none
   std::string isolation = "none";  ///< none | subsystem
   std::vector<DeviceSpec> devices;
   std::vector<NodeSpec> nodes;
@@ -226,6 +231,16 @@ struct GraphSpec {
   std::vector<std::string> adjusted;  ///< what validation changed, for stderr and the report
 };
 
+/// A plug-in that a graph file asks for.
+struct PluginName {
+  std::filesystem::path file, directory;  ///< as it stands there; of the graph file
+  Position position;
+};
+/// A plug-in that was loaded: part of a record.
+struct PluginFact {
+  std::string name, hash;  ///< of the file
+};
+
 /// What the command line adds to the files.
 struct LoadOptions {
   std::string profile;  ///< "": the graph's default_profile, else sim
@@ -233,13 +248,16 @@ struct LoadOptions {
   std::string policy;  ///< "": the schedule's
   std::string mode = "full";
   std::vector<std::string> set;  ///< "node.param=value"
+  std::filesystem::path params;  ///< parameter file of this robot; empty: none
   std::filesystem::path state;   ///< folder whose overlay of the graph is read, see overlay.hpp; empty: none
+  std::vector<std::filesystem::path> plugin_files = {};  ///< of --plugin
+  std::vector<PluginFact> plugins = {};                  ///< all that were loaded for this graph, see graph/plugins
 };
 
 }  // namespace takt::graph
 
 namespace takt {
-class NodeTypes;
+struct Registry;
 }
 
 namespace takt::graph {
@@ -249,8 +267,12 @@ struct Loaded {
   std::vector<Problem> problems;
 };
 
+/// Those that `plugins` of the file names; they are loaded before the file is. Nothing of a file that cannot be read:
+/// load() says why.
+std::vector<PluginName> plugins_of(const std::filesystem::path& file);
+
 /// Reads the graph and its schedule, checks all of it (syntax, schema, ids, types, units, ranges, hierarchy, cycles)
 /// and returns every problem, not just the first. Never throws.
-Loaded load(const std::filesystem::path& file, const LoadOptions& options, const NodeTypes& types);
+Loaded load(const std::filesystem::path& file, const LoadOptions& options, const Registry& registry);
 
 }  // namespace takt::graph

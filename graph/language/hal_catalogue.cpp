@@ -3,7 +3,8 @@
 #include <algorithm>
 
 #include "graph/language/catalogue.hpp"
-#include "hal/drivers.hpp"
+#include "graph/language/registry.hpp"
+#include "hal/device_types.hpp"
 
 namespace takt::graph {
 namespace {
@@ -11,8 +12,8 @@ namespace {
 using Kind = DeviceSetting::Kind;
 
 /// Ports of a hardware node, asked of the node itself.
-std::vector<DevicePort> ports_of(std::string_view kind) {
-  const auto node = hal::make_shell(kind);
+std::vector<DevicePort> ports_of(const hal::DeviceKind& kind) {
+  const auto node = kind.shell();
   std::vector<DevicePort> ports;
   for (const auto* input : node->inputs())
     ports.push_back({std::string(input->name()), &input->type(), true, std::string(input->doc())});
@@ -61,28 +62,27 @@ void add(std::vector<DeviceSetting>& settings, const hal::SettingInfo& info) {
 
 }  // namespace
 
-DeviceCatalogue hal_catalogue() {
-  DeviceCatalogue catalogue;
-  for (const auto& info : hal::device_kinds()) {
+DeviceCatalogue catalogue(const hal::DeviceTypes& types) {
+  DeviceCatalogue known;
+  for (const auto& info : types.all()) {
     DeviceKindEntry kind;
     kind.name = info.name;
     kind.doc = info.doc;
-    kind.ports = ports_of(info.name);
+    kind.ports = ports_of(info);
     for (const auto& driver : info.drivers)
       kind.drivers.push_back({std::string(driver.name), std::string(driver.doc), {}});
     for (const auto& setting : info.settings) {
       if (setting.driver.empty()) add(kind.settings, setting);
       for (auto& driver : kind.drivers)
-        if (!setting.driver.empty() && hal::takes(driver.name, setting)) add(driver.settings, setting);
+        if (!setting.driver.empty() && info.takes(driver.name, setting)) add(driver.settings, setting);
     }
-    catalogue.kinds[kind.name] = std::move(kind);
+    known.kinds[kind.name] = std::move(kind);
   }
-  return catalogue;
+  return known;
 }
 
-Loaded load(const std::filesystem::path& file, const LoadOptions& options, const NodeTypes& types) {
-  static const DeviceCatalogue devices = hal_catalogue();
-  return load(file, options, types, devices);
+Loaded load(const std::filesystem::path& file, const LoadOptions& options, const Registry& registry) {
+  return load(file, options, registry.nodes, catalogue(registry.devices));
 }
 
 }  // namespace takt::graph

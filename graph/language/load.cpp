@@ -7,25 +7,27 @@
 
 namespace takt::graph {
 
+std::string to_string(const Position& at) {
+  return at.line > 0 ? at.file + ":" + std::to_string(at.line) + ":" + std::to_string(at.column) : at.file;
+}
+
 std::string to_string(const Problem& problem) {
-  const Position& at = problem.position;
-  std::string text = at.file;
-  if (at.line > 0) text += ":" + std::to_string(at.line) + ":" + std::to_string(at.column);
-  return text + ": error: " + problem.text;
+  const std::string& use = problem.position.use;
+  return to_string(problem.position) + ": error: " + problem.text + (use.empty() ? "" : " (" + use + ")");
 }
 
 Loaded Loader::load(const std::filesystem::path& file) {
   spec_.file = file.string();
   std::error_code ignored;
   spec_.directory = std::filesystem::absolute(file, ignored).parent_path();
-  graph_ = read_document(file, {file.string(), 0, 0}, problems_);
-  if (!graph_.root.is_null()) validate(graph_, Schema::graph, problems_);
+  read_files(file);
   if (graph_.root.is_object()) {
     read_graph();
     make_instances();
     check_profile_ids();
     spec_.profile = choose_profile();
     read_profile_set();
+    read_robot();
     read_kept();
     read_set();
     read_params();
@@ -42,7 +44,8 @@ Loaded Loader::load(const std::filesystem::path& file) {
   }
   // By file (the graph first), then by place; what two stages found alike is said once.
   const auto key = [&](const Problem& p) {
-    return std::tuple(p.position.file != graph_.file, p.position.file, p.position.line, p.position.column, p.text);
+    return std::tuple(p.position.file != graph_.file, p.position.file, p.position.line, p.position.column, p.text,
+                      p.position.use);
   };
   std::sort(problems_.begin(), problems_.end(), [&](const Problem& a, const Problem& b) { return key(a) < key(b); });
   problems_.erase(std::unique(problems_.begin(), problems_.end(),

@@ -51,6 +51,12 @@ struct Setting {
   Given given;
 };
 
+struct Constant {
+  nlohmann::json value;
+  std::string raw;
+  Position position;
+};
+
 class Loader {
  public:
   Loader(const LoadOptions& options, const NodeTypes& types, const DeviceCatalogue& catalogue)
@@ -59,6 +65,17 @@ class Loader {
   Loaded load(const std::filesystem::path& file);
 
  private:
+  // read_parts.cpp: the files of the graph as one document, with their constants
+  void read_files(const std::filesystem::path& file);
+  void take_constants(Document& document, bool of_robot);
+  void fill_constants(Document& document);
+  std::optional<nlohmann::json> filled_in(const std::string& text, Mark& mark);
+  void read_robot();
+  void read_robot_values(const std::string& id, const std::string& prefix, const nlohmann::json& values,
+                         const std::string& pointer);
+  /// In the order of the files.
+  bool before(const Position& a, const Position& b) const;
+
   // read_graph.cpp: JSON -> GraphSpec
   void read_graph();
   void read_subsystem(const std::string& name, const nlohmann::json& value, const std::string& pointer);
@@ -137,7 +154,8 @@ class Loader {
 
   void problem(const Position& at, std::string text) { problems_.push_back({at, std::move(text)}); }
   std::vector<std::string> ids() const;
-  Given given(const std::string& pointer, const nlohmann::json& value) const;
+  Given given(const std::string& pointer, const nlohmann::json& value) const { return given(graph_, pointer, value); }
+  static Given given(const Document& document, const std::string& pointer, const nlohmann::json& value);
   /// Position of the last item of a list (or of a list in it) that reads `text`.
   Position item_at(const std::string& pointer, std::string_view text) const;
   /// Position of the value of a key of the schedule.
@@ -149,13 +167,14 @@ class Loader {
   const LoadOptions& options_;
   const NodeTypes& types_;
   const DeviceCatalogue& catalogue_;
-  Document graph_, schedule_;
+  Document graph_, schedule_, params_;
   GraphSpec spec_;
   std::vector<Problem> problems_;
   std::map<std::string, Position> claimed_;  ///< ids of nodes and devices
   std::map<std::string, Part> parts_;
   std::map<std::string, std::unique_ptr<Node>> instances_;  ///< by node id, with default parameters
   std::vector<Setting> set_;
+  std::map<std::string, Constant> constants_;
 };
 
 }  // namespace takt::graph

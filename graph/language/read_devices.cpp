@@ -36,8 +36,7 @@ std::vector<std::string> setting_names(const DeviceKindEntry& kind, const Device
 }
 
 /// The value in the setting's unit (a path absolute), or what is wrong.
-tl::expected<json, std::string> convert(const DeviceSetting& setting, const Given& given,
-                                        const std::filesystem::path& directory) {
+tl::expected<json, std::string> convert(const DeviceSetting& setting, const Given& given) {
   using Kind = DeviceSetting::Kind;
   const auto is_not = [&](const char* wanted) {
     return tl::make_unexpected(fmt::format("is `{}`, {} is wanted", given.raw, wanted));
@@ -64,7 +63,9 @@ tl::expected<json, std::string> convert(const DeviceSetting& setting, const Give
   if (setting.kind != Kind::path) return json(text);
   if (text.empty()) return is_not("a path");
   std::error_code ignored;
-  const auto base = given.position.file == "--set" ? std::filesystem::current_path(ignored) : directory;
+  const auto base = given.position.file == "--set"
+                        ? std::filesystem::current_path(ignored)
+                        : std::filesystem::absolute(given.position.file, ignored).parent_path();
   return json((base / text).lexically_normal().string());
 }
 
@@ -79,7 +80,8 @@ std::string Loader::choose_profile() {
   const bool asked = !options_.profile.empty(), named = default_profile.is_string();
   const std::string chosen = asked ? options_.profile : named ? default_profile.get<std::string>() : "sim";
   if (std::find(names.begin(), names.end(), chosen) != names.end()) return chosen;
-  if (!asked && !named && names.empty()) return chosen;  // every device then names its driver itself
+  // Every device then names its driver itself; a record names the default.
+  if (!named && names.empty() && chosen == "sim") return chosen;
   const Position at = asked ? Position{"--profile", 0, 0} : graph_.value_at(named ? "/default_profile" : "/profiles");
   const std::string hint = asked || named ? "" : "; name one with `default_profile` or --profile";
   problem(at, fmt::format("graph {} has no profile {}{}{}", ticked(spec_.name), ticked(chosen),
@@ -239,7 +241,7 @@ void Loader::read_device(DeviceSpec& device, std::set<std::string>& unclaimed) {
 }
 
 void Loader::fill_setting(DeviceSpec& device, const DeviceSetting& setting, const Given& given) {
-  const auto value = convert(setting, given, spec_.directory);
+  const auto value = convert(setting, given);
   if (!value)
     return problem(given.position,
                    fmt::format("setting {} of device {} {}", ticked(setting.name), ticked(device.id), value.error()));

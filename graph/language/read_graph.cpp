@@ -51,9 +51,9 @@ std::optional<int64_t> Loader::read_time(const Document& document, const json& v
 bool Loader::claim_id(const std::string& id, const Position& at) {
   const auto [it, fresh] = claimed_.emplace(id, at);
   if (!fresh)
-    problem(at, fmt::format("duplicate id {}; it stands first at {}:{}:{}; ids of nodes and devices are unique in the "
+    problem(at, fmt::format("duplicate id {}; it stands first at {}; ids of nodes and devices are unique in the "
                             "whole graph",
-                            ticked(id), it->second.file, it->second.line, it->second.column));
+                            ticked(id), to_string(it->second)));
   return fresh;
 }
 
@@ -79,9 +79,7 @@ void Loader::read_graph() {
   for (const auto& [name, value] : subsystems.items())
     if (value.is_object()) read_subsystem(name, value, child("/subsystems", name));
   // Order of the file, not of the alphabet: the first to claim an id keeps it, and reports read like the file.
-  const auto by_position = [](const auto& a, const auto& b) {
-    return std::pair(a.position.line, a.position.column) < std::pair(b.position.line, b.position.column);
-  };
+  const auto by_position = [&](const auto& a, const auto& b) { return before(a.position, b.position); };
   std::sort(spec_.devices.begin(), spec_.devices.end(), by_position);
   std::sort(spec_.subsystems.begin(), spec_.subsystems.end(), by_position);
   std::sort(spec_.nodes.begin(), spec_.nodes.end(), by_position);
@@ -190,9 +188,8 @@ void Loader::read_modes(const json& value) {
     spec_.modes.push_back(std::move(spec));
   }
   // The first of the file that covers a loss is taken.
-  std::sort(spec_.modes.begin(), spec_.modes.end(), [](const ModeSpec& a, const ModeSpec& b) {
-    return std::pair(a.position.line, a.position.column) < std::pair(b.position.line, b.position.column);
-  });
+  std::sort(spec_.modes.begin(), spec_.modes.end(),
+            [&](const ModeSpec& a, const ModeSpec& b) { return before(a.position, b.position); });
 }
 
 }  // namespace takt::graph

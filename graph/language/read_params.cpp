@@ -55,12 +55,12 @@ std::vector<std::string> param_names(const Node& node) {
 
 }  // namespace
 
-Given Loader::given(const std::string& pointer, const json& value) const {
+Given Loader::given(const Document& document, const std::string& pointer, const json& value) {
   Given result;
   result.value = value;
-  result.raw = graph_.raw(pointer);
-  result.key = graph_.key_at(pointer);
-  result.position = graph_.value_at(pointer);
+  result.raw = document.raw(pointer);
+  result.key = document.key_at(pointer);
+  result.position = document.value_at(pointer);
   return result;
 }
 
@@ -196,6 +196,15 @@ void Loader::read_param(NodeSpec& node, Node& instance, const std::string& name,
                      fmt::format("parameter {} of node {} {}{}{}", ticked(name), ticked(node.id), taken.error(),
                                  ranged ? fmt::format(" (in {})", param->unit()) : "", given.remedy));
     }
+    // A path of another file than the graph's starts there.
+    std::error_code ignored;
+    if (const auto* path = std::get_if<std::string>(&*value); path != nullptr && !path->empty() &&
+                                                              param->unit() == kPath && given.by == ChosenBy::file &&
+                                                              given.position.file != graph_.file)
+      *value = (std::filesystem::absolute(given.position.file, ignored).parent_path() / *path)
+                   .lexically_normal()
+                   .lexically_proximate(spec_.directory.lexically_normal())
+                   .string();
     node.params[name] = {*value, given.position, given.by};
     return;
   }

@@ -49,7 +49,7 @@ std::optional<std::filesystem::path> Loader::schedule_path(Position& wanted_from
   wanted_from = graph_.value_at("/schedule");
   const json named = graph_.root.is_object() ? graph_.root.value("schedule", json()) : json();
   if (named.is_string() && !named.get<std::string>().empty())
-    return (std::filesystem::path(graph_.file).parent_path() / named.get<std::string>()).lexically_normal();
+    return (std::filesystem::path(wanted_from.file).parent_path() / named.get<std::string>()).lexically_normal();
   if (!graph_.marks.contains("/schedule"))
     problem(graph_.value_at(""), "the graph names no schedule; add `schedule: PATH`, or call with --schedule FILE");
   return std::nullopt;

@@ -27,6 +27,11 @@ bool is_decimal(std::string_view s) {
   return s.size() < 64 && std::regex_match(s.begin(), s.end(), form);
 }
 
+bool is_constant(const std::string& name) {
+  static const std::regex form("[a-z][a-z0-9_]*");
+  return name.size() < 64 && std::regex_match(name, form);
+}
+
 /// What some YAML reader takes for a number and another for text, or reads with another value.
 std::string trap(const std::string& s) {
   static const std::regex octal_or_leading_zero("[-+]?0[0-9_]+(\\.[0-9]*)?"), other_base("[-+]?0[xXoObB][0-9a-fA-F_]+"),
@@ -75,8 +80,8 @@ tl::expected<json, std::string> resolve_scalar(const std::string& s) {
   return json(s);
 }
 
-tl::expected<std::string, std::string> expand_variables(const std::string& text,
-                                                        const std::filesystem::path& directory) {
+tl::expected<std::string, std::string> expand_variables(const std::string& text, const std::filesystem::path& directory,
+                                                        Constants constants) {
   std::string result;
   for (size_t at = 0;;) {
     const size_t begin = text.find("${", at);
@@ -87,6 +92,11 @@ tl::expected<std::string, std::string> expand_variables(const std::string& text,
     const std::string inside = text.substr(begin + 2, end - begin - 2);
     const size_t colon = inside.find(":-");
     const std::string name = inside.substr(0, colon);
+    if (constants == Constants::later && colon == std::string::npos && is_constant(name)) {
+      result += "${" + name + "}";
+      at = end + 1;
+      continue;
+    }
     if (name != "TAKT_DATA")
       return tl::make_unexpected("names the variable " + ticked("${" + name + "}") +
                                  "; only ${TAKT_DATA} and ${TAKT_DATA:-path} are expanded");

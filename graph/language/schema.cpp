@@ -18,9 +18,9 @@ namespace {
 using nlohmann::json;
 
 const json& schema_json(Schema schema) {
-  static const std::array<json, kSchemas> parsed{json::parse(schema_text(Schema::graph)),
-                                                 json::parse(schema_text(Schema::schedule)),
-                                                 json::parse(schema_text(Schema::faults))};
+  static const std::array<json, kSchemas> parsed{
+      json::parse(schema_text(Schema::graph)), json::parse(schema_text(Schema::schedule)),
+      json::parse(schema_text(Schema::faults)), json::parse(schema_text(Schema::params))};
   return parsed[static_cast<size_t>(schema)];
 }
 
@@ -32,7 +32,8 @@ const valijson::Schema& compiled(Schema schema) {
     parser.populateSchema(adapter, *result);
     return result;
   };
-  static const std::array compiled{compile(Schema::graph), compile(Schema::schedule), compile(Schema::faults)};
+  static const std::array compiled{compile(Schema::graph), compile(Schema::schedule), compile(Schema::faults),
+                                   compile(Schema::params)};
   return *compiled[static_cast<size_t>(schema)];
 }
 
@@ -188,7 +189,7 @@ class Explainer {
       words.push_back(pointer.substr(at + 1, end - at - 1));
       at = end;
     }
-    static constexpr std::array kWholes{"the graph", "the schedule", "the scenario"};
+    static constexpr std::array kWholes{"the graph", "the schedule", "the scenario", "the parameter file"};
     const std::string whole = kWholes[static_cast<size_t>(which_)];
     if (words.empty()) return whole;
     if (words.size() == 1) return ticked(words[0]) + " of " + whole;

@@ -8,8 +8,8 @@
 
 namespace takt::graph {
 
-enum class Schema : uint8_t { graph, schedule, faults };
-inline constexpr size_t kSchemas = 3;
+enum class Schema : uint8_t { graph, schedule, faults, params };
+inline constexpr size_t kSchemas = 4;
 
 /// The schema's text as it is shipped to editors.
 std::string_view schema_text(Schema schema);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "graph/log/recorded_plan.hpp"
 
+#include <dlfcn.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -8,6 +9,7 @@
 #include <iterator>
 #include <map>
 
+#include "rt/abi.hpp"
 #include "rt/msg/messages.hpp"
 #include "rt/node.hpp"
 #include "rt/record/message_record.hpp"
@@ -147,7 +149,15 @@ Json asset_hashes(const Plan& plan, const std::filesystem::path& directory) {
   return hashes;
 }
 
+std::string part_name(size_t i) { return fmt::format("part_{}.yaml", i); }
+
 std::string file_hash(const std::filesystem::path& file) { return hash_text(file_text(file)); }
+
+std::string program_hash() {
+  Dl_info core{};
+  const bool found = dladdr(reinterpret_cast<const void*>(&version), &core) != 0;
+  return hash_text(file_text("/proc/self/exe") + (found ? file_text(core.dli_fname) : ""));
+}
 
 std::string file_text(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);

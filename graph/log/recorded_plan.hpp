@@ -37,8 +37,14 @@ std::string event_node(const record::RecordedEvent& event, const Json& plan);
 /// as it stands there. A folder is all files below it, by name.
 Json asset_hashes(const Plan& plan, const std::filesystem::path& directory);
 
+/// Name in a record of file `i` of GraphSpec::files, i > 0: "part_1.yaml".
+std::string part_name(size_t i);
+
 /// Hash of a file, as hexadecimal digits; that of nothing if it cannot be read.
 std::string file_hash(const std::filesystem::path& file);
+
+/// Hash of this program and of the libtakt_core that it runs with: jobs are the work of both.
+std::string program_hash();
 
 /// All of a file; empty if it cannot be read.
 std::string file_text(const std::filesystem::path& file);

@@ -14,11 +14,11 @@ namespace takt::command {
 namespace {
 
 /// Writes the failures of devices into their settings, as simulated devices and doubles read them.
-int fail_devices(const graph::Scenario& scenario, graph::GraphSpec& graph) {
+int fail_devices(const hal::DeviceTypes& types, const graph::Scenario& scenario, graph::GraphSpec& graph) {
   for (const graph::DeviceFailure& failure : graph::device_failures(scenario)) {
     const auto device = std::find_if(graph.devices.begin(), graph.devices.end(),
                                      [&](const graph::DeviceSpec& d) { return d.id == failure.device; });
-    if (device->driver != "sim" && device->driver != "double")
+    if (!types.find(device->kind)->takes(device->driver, "failures"))
       return refuse(fmt::format("--faults: device {} has the driver {}, which cannot be told to fail; `sim` and "
                                 "`double` can",
                                 failure.device, device->driver),
@@ -57,7 +57,7 @@ std::vector<graph::Restart> restarts_of(const OutageLog& outages, const std::vec
 
 int RunFaults::load(graph::GraphSpec& graph, const Clock& clock, bool processes) {
   if (!wanted()) return kOk;
-  const graph::Composition outline = graph::outline(graph, graph::node_types(), clock);
+  const graph::Composition outline = graph::outline(graph, registry_, clock);
   graph::RunKind kind;
   kind.virtual_time = clock.is_virtual();
   kind.processes = processes;
@@ -69,7 +69,7 @@ int RunFaults::load(graph::GraphSpec& graph, const Clock& clock, bool processes)
     tell_problems(loaded.problems.size());
     return kBadInput;
   }
-  if (const int code = fail_devices(*loaded.scenario, graph); code != kOk) return code;
+  if (const int code = fail_devices(registry_.devices, *loaded.scenario, graph); code != kOk) return code;
   injection_ =
       std::make_unique<graph::Injection>(std::move(*loaded.scenario), graph, outline.plan.ports.size(), processes);
   return kOk;

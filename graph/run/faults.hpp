@@ -16,7 +16,7 @@ namespace takt::command {
 /// The scenario of a run, if one was asked for (`--faults`); else every call does nothing.
 class RunFaults {
  public:
-  explicit RunFaults(const RunOptions& options) : options_(options) {}
+  RunFaults(const Registry& registry, const RunOptions& options) : registry_(registry), options_(options) {}
   bool wanted() const { return !options_.faults.empty(); }
   /// Before anything is opened and before there are other processes: devices that are to fail are told so in the graph.
   /// What is wrong is on stderr and the exit code returned. `processes`: one per subsystem.
@@ -59,6 +59,7 @@ class RunFaults {
   void begin(const Plan& plan, const Clock& clock, RunBoard& board);
   void end();
 
+  const Registry& registry_;
   const RunOptions& options_;
   std::unique_ptr<graph::Injection> injection_;
   std::optional<graph::HealthWatch> health_;

@@ -62,14 +62,15 @@ std::vector<std::vector<size_t>> tasks_of(const Plan& plan, const graph::Partiti
 
 class IsolatedRun {
  public:
-  IsolatedRun(const RunOptions& options, const graph::GraphSpec& graph, RunFaults& faults,
+  IsolatedRun(const Registry& registry, const RunOptions& options, const graph::GraphSpec& graph, RunFaults& faults,
               std::vector<std::string> adjusted)
-      : options_(options),
+      : registry_(registry),
+        options_(options),
         graph_(graph),
         faults_(faults),
         expectations_(options, graph),
         adjusted_(std::move(adjusted)),
-        plan_source_(graph::outline(graph, graph::node_types(), clock_)),
+        plan_source_(graph::outline(graph, registry, clock_)),
         plan_(plan_source_.plan),
         partition_(graph::partition(graph, adjusted_)),
         spares_(graph::spares(graph, partition_, adjusted_)),
@@ -94,8 +95,8 @@ class IsolatedRun {
     for (size_t p = 0; p < partition_.names.size(); ++p) {
       const auto body = [this, p, supervisor = getpid()](bool spare) -> int {
         try {
-          return run_member({options_, graph_, partition_, plan_.overheads, p, spare, supervisor, board_, pools_,
-                             trace_.rings(), faults_});
+          return run_member({registry_, options_, graph_, partition_, plan_.overheads, p, spare, supervisor, board_,
+                             pools_, trace_.rings(), faults_});
         } catch (const std::exception& problem) {  // as in a run in one process: no memory, no daemon, no thread
           return refuse(fmt::format("process {}: {}", partition_.names[p], problem.what()), kDeviceOrSystem);
         }
@@ -136,7 +137,7 @@ class IsolatedRun {
     const auto watch_of_stalls = watch_stalls(proofs_, plan_, clock_, board_);
     start();
     {
-      const attach::Server server({graph_, plan_, board_, *transport_, run});
+      const attach::Server server({registry_, graph_, plan_, board_, *transport_, run});
       tell_attach(server, adjusted_);
       const LiveTable live(plan_, board_,
                            fmt::format("takt run {} ({}, policy {}, {} processes)", graph_.name, graph_.profile,
@@ -379,7 +380,7 @@ class IsolatedRun {
     const std::string no_trace = trace_.write(graph_, plan_, board_, result);
     record_.finish(result, trace_.unheard_threads());
     auto report =
-        make_report({graph_, plan_, board_, result, *transport_, use, options_.clock,
+        make_report({registry_, graph_, plan_, board_, result, *transport_, use, options_.clock,
                      std::string(to_string(plan_.policy)), "subsystem", partition_.names, adjusted_, proofs_, stalls_});
     report["memory"]["chunks_at_end"] = chunks_at_end_;
     report["rights"] = rights_;
@@ -395,13 +396,14 @@ class IsolatedRun {
     const int exit = code_ != 0 ? code_ : report["ok"].get<bool>() ? kOk : kNotOk;
     faults_.judge(result, board_, exit, partition_.names, report);
     expectations_.judge(report);
-    tell(options_, graph_, report);
+    tell(registry_, options_, graph_, report);
     if (code_ == 0) watchdog_->end();  // else nobody says that all is well
     if (!no_trace.empty()) return refuse(no_trace, kBadInput);
     return expectations_.exit_code(faults_.exit_code(exit, report), report);
   }
 
   std::unique_ptr<DaemonClaim> claim_;  ///< of iceoryx, until its daemon is there
+  const Registry& registry_;
   const RunOptions& options_;
   const graph::GraphSpec& graph_;
   RunFaults& faults_;
@@ -441,9 +443,9 @@ void take_over_notifications(pid_t keeper) {
 
 }  // namespace
 
-int run_isolated(const RunOptions& options, const graph::GraphSpec& graph, RunFaults& faults,
+int run_isolated(const Registry& registry, const RunOptions& options, const graph::GraphSpec& graph, RunFaults& faults,
                  std::vector<std::string> adjusted) {
-  IsolatedRun run(options, graph, faults, std::move(adjusted));
+  IsolatedRun run(registry, options, graph, faults, std::move(adjusted));
   const auto as_supervisor = [&, keeper = getpid()] {
     try {
       return run.run(keeper);

@@ -12,7 +12,7 @@ namespace takt::command {
 /// daemon), the epoch, the report, and the order in which everything ends; returns the exit code. Before this process
 /// has any other thread. Throws TransportError if the command line asks for iceoryx and there is no room for its
 /// daemon.
-int run_isolated(const RunOptions& options, const graph::GraphSpec& graph, RunFaults& faults,
+int run_isolated(const Registry& registry, const RunOptions& options, const graph::GraphSpec& graph, RunFaults& faults,
                  std::vector<std::string> adjusted);
 
 }  // namespace takt::command

@@ -127,7 +127,7 @@ int run_member(const MemberPart& part) {
     obey_orders(&record.kill);
   };
   if (!part.spare) take_place();
-  Prepared prepared;
+  Prepared prepared(part.registry);
   prepared.graph = part.graph;
   prepared.clock = std::make_unique<MonotonicClock>();
   BoardExchange exchange(board);
@@ -182,8 +182,8 @@ int run_member(const MemberPart& part) {
   const RunResult result = executor.run();
   demote_thread(0);
   record.cpu_ns = ProcessReading::now().cpu_ns - before.cpu_ns;
-  record.simulator_cpu_ns += hal::simulator_use().cpu_ns;
-  record.simulator_in_jobs_ns += hal::simulator_use().in_jobs_ns;
+  record.simulator_cpu_ns += prepared.devices.simulator_use().cpu_ns;
+  record.simulator_in_jobs_ns += prepared.devices.simulator_use().in_jobs_ns;
   for (size_t t = 0; t < plan.tasks.size(); ++t)
     if (run.own[t] && !is_stuck(result, t)) prepared.composition->nodes[t]->finish();
   record.reach(ProcessRecord::finished, prepared.clock->now_ns());

@@ -32,6 +32,7 @@ bool wait_until(const std::function<bool()>& done, const std::function<bool()>& 
 
 /// What one process of an isolated run is given.
 struct MemberPart {
+  const Registry& registry;
   const RunOptions& options;
   const graph::GraphSpec& graph;
   const graph::Partition& partition;

@@ -23,7 +23,7 @@ graph::DeviceFactory device_factory(Prepared& prepared, uint64_t seed) {
   return [&prepared, seed](const graph::DeviceSpec& spec) -> tl::expected<std::unique_ptr<Node>, graph::ComposeError> {
     const hal::DeviceConfig config{spec.id, spec.kind,       spec.driver, spec.settings, prepared.graph->directory,
                                    seed,    prepared.plugged};
-    auto node = hal::make_device(config, prepared.devices, *prepared.clock);
+    auto node = hal::make_device(prepared.registry.devices, config, prepared.devices, *prepared.clock);
     if (node) return std::move(*node);
     graph::ComposeError error;
     error.problems.push_back({spec.position, node.error().text()});
@@ -35,7 +35,7 @@ graph::DeviceFactory device_factory(Prepared& prepared, uint64_t seed) {
 }  // namespace
 
 int load(const RunOptions& options, Prepared& prepared) {
-  graph::Loaded loaded = graph::load(graph_file(options.graph), options.load, graph::node_types());
+  graph::Loaded loaded = graph::load(graph_file(options.graph), options.load, prepared.registry);
   if (!loaded.graph) return refuse(prepared, std::move(loaded.problems), kBadInput);
   prepared.graph = std::move(loaded.graph);
   tell_kept(*prepared.graph);
@@ -47,7 +47,7 @@ int load(const RunOptions& options, Prepared& prepared) {
 int compose(const RunOptions& options, const graph::ComposeOptions& how, Prepared& prepared) {
   int code = kOk;
   without_rights([&] {  // what devices and libraries start here has none
-    auto composition = graph::compose(*prepared.graph, graph::node_types(), device_factory(prepared, options.seed),
+    auto composition = graph::compose(*prepared.graph, prepared.registry, device_factory(prepared, options.seed),
                                       *prepared.clock, how);
     if (composition) prepared.composition = std::move(*composition);
     else

@@ -5,13 +5,16 @@
 
 #include "graph/cli/graph_file.hpp"
 #include "graph/compose/composition.hpp"
+#include "graph/language/registry.hpp"
 #include "graph/run/run.hpp"
-#include "hal/drivers.hpp"
+#include "hal/devices.hpp"
 
 namespace takt::command {
 
 /// A graph that is loaded, checked and composed, with everything it refers to. Order matters: nodes go before devices.
 struct Prepared {
+  explicit Prepared(const Registry& with) : registry(with) {}
+  const Registry& registry;
   std::optional<graph::GraphSpec> graph;
   std::unique_ptr<Clock> clock;
   hal::Devices devices;

@@ -7,12 +7,13 @@
 
 #include <algorithm>
 #include <iterator>
+#include <list>
 #include <stdexcept>
 
 #include "graph/language/words.hpp"
 #include "graph/log/recorded_plan.hpp"
-#include "graph/run/commit.hpp"
 #include "graph/run/machine.hpp"
+#include "rt/abi.hpp"
 
 namespace takt::command {
 namespace {
@@ -42,6 +43,13 @@ std::string settings(const RunOptions& options, const graph::GraphSpec& graph) {
   return fmt::format("{}", fmt::join(lines, "\n"));
 }
 
+/// "NAME HASH", a line for each.
+std::string plugins(const RunOptions& options) {
+  std::string lines;
+  for (const auto& plugin : options.load.plugins) lines += fmt::format("{} {}\n", plugin.name, plugin.hash);
+  return lines;
+}
+
 std::string absolute(const std::filesystem::path& file) {
   std::error_code error;
   return std::filesystem::absolute(file, error).string();
@@ -49,8 +57,9 @@ std::string absolute(const std::filesystem::path& file) {
 
 }  // namespace
 
-graph::Observers observers(const RunOptions& options, const graph::GraphSpec& graph) {
-  const uint32_t followers = (options.record.empty() ? 0u : 1u) + (graph.expect ? 1u : 0u);
+Observers observers(const RunOptions& options, const graph::GraphSpec& graph) {
+  const uint32_t followers =
+      (options.record.empty() ? 0u : 1u) + (graph.expect ? 1u : 0u) + (options.witness ? 1u : 0u);
   return {1, followers, kUndisturbedNs};
 }
 
@@ -74,24 +83,30 @@ void RunRecord::begin(const graph::GraphSpec& graph, const Plan& plan, const Run
   record::Head head;
   head.facts = {{"graph", absolute(graph.file)},
                 {"schedule", absolute(graph.schedule.file)},
+                {"params", graph.params_file.empty() ? "" : absolute(graph.params_file)},
                 {"profile", graph.profile},
                 {"mode", options_.load.mode},
                 {"policy_asked", std::string(to_string(graph.schedule.policy))},
                 {"policy_option", options_.load.policy},
                 {"set", settings(options_, graph)},
+                {"plugins", plugins(options_)},
                 {"seed", std::to_string(options_.seed)},
                 {"clock", options_.clock},
                 {"transport", transport.name()},
                 {"isolation", isolation},
-                {"commit", kCommit},
-                {"program", log::file_hash("/proc/self/exe")},
+                {"commit", version().commit},
+                {"program", log::program_hash()},
                 {"simd", hwy::TargetName(hwy::SupportedTargets() & -hwy::SupportedTargets())},
                 {"machine", machine_facts().dump()}};
   const std::string texts[]{log::file_text(graph.file), log::file_text(graph.schedule.file),
                             log::plan_json(plan).dump(), log::asset_hashes(plan, graph.directory).dump()};
+  std::list<std::string> parts;  // the head refers to them
   const char* names[]{"graph.yaml", "schedule.yaml", "plan.json", "assets.json"};
   for (size_t i = 0; i < std::size(texts); ++i)
     head.files.push_back({0, 0, names[i], i < 2 ? "application/yaml" : "application/json", mcap::bytes_of(texts[i])});
+  for (size_t i = 1; i < graph.files.size(); ++i)  // what it includes, and the parameter file
+    head.files.push_back({0, 0, log::part_name(i), "application/yaml",
+                          mcap::bytes_of(parts.emplace_back(log::file_text(graph.files[i])))});
   record::Recorder::Options how;
   how.whole = whole_ports(plan, options_.record_ports);
   how.by_caller = options_.clock == "virtual";

@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "graph/compose/plan_ports.hpp"
+#include "rt/sched/plan_ports.hpp"
 #include "graph/run/run.hpp"
 #include "hal/settings/json.hpp"
 #include "rt/record/mcap/file_sink.hpp"
@@ -16,7 +16,7 @@ namespace takt::command {
 
 /// Who reads the outputs of a run beside its edges: `takt echo`; the recorder, and what follows the conditions of the
 /// graph, if there are any.
-graph::Observers observers(const RunOptions& options, const graph::GraphSpec& graph);
+Observers observers(const RunOptions& options, const graph::GraphSpec& graph);
 
 /// The record of a run, if one was asked for (`--record`); else every call does nothing.
 class RunRecord {

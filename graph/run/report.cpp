@@ -6,7 +6,7 @@
 #include <algorithm>
 
 #include "graph/attach/parameters.hpp"
-#include "graph/run/commit.hpp"
+#include "rt/abi.hpp"
 
 namespace takt::command {
 namespace {
@@ -249,14 +249,14 @@ Json make_report(const RunFacts& facts) {
   if (facts.clock == "real" && facts.plan.anticipate_ns > 0)
     report["anticipate_us"] = static_cast<double>(facts.plan.anticipate_ns) / 1e3;
   report["duration_s"] = facts.result.duration_s();
-  report["commit"] = kCommit;
+  report["commit"] = version().commit;
   report["machine"] = machine_facts();
   report["ok"] = kept_its_promises(nodes) && !proofs.unexplained();
   report["modes"] = modes_json(facts);
   report["transport"] = facts.transport.name();
   report["isolation"] = facts.isolation;
   report["processes"] = facts.processes;
-  report["parameters"] = attach::parameters_json(facts.graph, facts.plan, facts.board);
+  report["parameters"] = attach::parameters_json(facts.registry.nodes, facts.graph, facts.plan, facts.board);
   report["overlay"] = facts.graph.kept.file.empty() ? Json(nullptr) : Json(facts.graph.kept.file.string());
   report["proofs"] = proofs.json();
   report["nodes"] = std::move(nodes);

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "graph/compose/composition.hpp"
+#include "graph/language/registry.hpp"
 #include "graph/run/machine.hpp"
 #include "graph/run/proof_report.hpp"
 #include "hal/settings/json.hpp"
@@ -21,6 +22,7 @@ struct MachineUse {
 
 /// Everything a finished run can be reported from.
 struct RunFacts {
+  const Registry& registry;
   const graph::GraphSpec& graph;
   const Plan& plan;
   const RunBoard& board;

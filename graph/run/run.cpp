@@ -70,6 +70,7 @@ int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, Ru
       record.capture();
       faults.look();
       expectations.look();
+      if (options.witness != nullptr) options.witness->look();
     };
     run.job_duration_ns = faults.durations(*durations, composition.plan);
     run.ran = [&](const trace::Slice& slice) { trace.ran(slice); };
@@ -83,12 +84,16 @@ int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, Ru
   {
     const Stoppable stoppable(board);
     std::optional<attach::Server> server;  // virtual time passes too fast to speak to
-    if (!prepared.clock->is_virtual()) server.emplace(attach::Subject{graph, composition.plan, board, *transport});
+    if (!prepared.clock->is_virtual())
+      server.emplace(attach::Subject{prepared.registry, graph, composition.plan, board, *transport});
     if (server) tell_attach(*server, adjusted);
-    const LiveTable live(
-        composition.plan, board,
-        fmt::format("takt run {} ({}, policy {})", graph.name, graph.profile, to_string(graph.schedule.policy)));
+    std::optional<LiveTable> live;
+    if (options.witness == nullptr)
+      live.emplace(
+          composition.plan, board,
+          fmt::format("takt run {} ({}, policy {})", graph.name, graph.profile, to_string(graph.schedule.policy)));
     record.begin(graph, composition.plan, board, *transport, "none");
+    if (options.witness != nullptr) options.witness->begin(composition.plan, *transport);
     trace.collect(composition.plan, record);
     watchdog.start();
     std::optional<RunRights> rights;
@@ -109,10 +114,11 @@ int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, Ru
     if (!is_stuck(result, t)) composition.nodes[t]->finish();
   for (const std::string& refused : result.refused)
     adjusted.push_back(fmt::format("policy {} -> cooperative: {}", to_string(graph.schedule.policy), refused));
-  const hal::SimulatorUse simulator = hal::simulator_use();
+  const hal::SimulatorUse simulator = prepared.devices.simulator_use();
   const MachineUse use{after.cpu_ns - before.cpu_ns, simulator.cpu_ns, simulator.in_jobs_ns,
                        after.steal_ms - before.steal_ms, after.rss_mb};
-  auto report = make_report({graph,
+  auto report = make_report({prepared.registry,
+                             graph,
                              composition.plan,
                              board,
                              result,
@@ -133,9 +139,10 @@ int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, Ru
   record.tell(report);
   faults.judge(result, board, run_exit(board, result.policy_granted, report), {}, report);
   expectations.judge(report);
-  int code = tell_faults(options, graph, board, result.policy_granted, report);
+  int code = tell_faults(prepared.registry, options, graph, board, result.policy_granted, report);
   code = expectations.exit_code(faults.exit_code(code, report), report);
   if (!no_trace.empty()) code = refuse(no_trace, kBadInput);
+  if (options.witness != nullptr) options.witness->end(report);
   if (result.stuck.empty()) watchdog.end();
   // A job that never returns still uses what would now be taken down.
   if (!result.stuck.empty()) end_process(code, options.transport);
@@ -158,7 +165,7 @@ int run_in_one_process(const RunOptions& options, Prepared& prepared, RunFaults&
   }
   faults.make_room(prepared.composition->plan);
   RunExpectations expectations(options, *prepared.graph);
-  if (const int code = expectations.bind(world_truth(prepared.devices.first_world())); code != kOk) return code;
+  if (const int code = expectations.bind(world_truth(prepared.devices.simulated())); code != kOk) return code;
   // In virtual time the cores of the schedule need not be there.
   std::vector<int>& cores = prepared.composition->plan.cores;
   if (!prepared.clock->is_virtual() || cores.empty()) choose_cores(cores, adjusted);
@@ -173,13 +180,14 @@ int run_in_one_process(const RunOptions& options, Prepared& prepared, RunFaults&
   if (options.require_rt && (!locked || latency.refused()))
     return refuse("--require-rt: " + lacks.front(), kDeviceOrSystem);
   adjusted.insert(adjusted.end(), lacks.begin(), lacks.end());
-  for (const std::string& line : adjusted) std::fprintf(stderr, "takt: adjusted: %s\n", line.c_str());
+  if (options.witness == nullptr)
+    for (const std::string& line : adjusted) std::fprintf(stderr, "takt: adjusted: %s\n", line.c_str());
   return execute(options, prepared, faults, expectations, *proofs, std::move(adjusted));
 }
 
 /// One process, or one per subsystem: as the command line says, else the graph.
-int run_as_asked(RunOptions options) {
-  Prepared prepared;
+int run_as_asked(const Registry& registry, RunOptions options) {
+  Prepared prepared(registry);
   if (const int code = load(options, prepared); code != kOk) {
     tell_problems(prepared.problems.size());
     return code;
@@ -197,29 +205,29 @@ int run_as_asked(RunOptions options) {
       std::fprintf(stderr, "takt: note: %s\n", note.c_str());
   }
   const bool processes = wanted == "subsystem" && options.clock != "virtual";
-  RunFaults faults(options);
+  RunFaults faults(registry, options);
   if (const int code = faults.load(*prepared.graph, *prepared.clock, processes); code != kOk) return code;
   if (!processes) return run_in_one_process(options, prepared, faults, adjusted);
-  const KeptPlace report(options.report), page(options.html), trace(options.trace), record(options.record);
-  return run_isolated(options, *prepared.graph, faults, std::move(adjusted));
+  const KeptPlace report(options.report), page(options.html), verdict(options.junit), trace(options.trace),
+      record(options.record);
+  return run_isolated(registry, options, *prepared.graph, faults, std::move(adjusted));
 }
 
 }  // namespace
 
-int run_graph(const RunOptions& options) {
+int run_graph(const Registry& registry, const RunOptions& options) {
   std::error_code error;
   std::filesystem::create_directories(options.output, error);
   if (error)
     return refuse(fmt::format("--output {}: {}; choose a writable folder", options.output.string(), error.message()),
                   kBadInput);
-  if (!options.report.empty() && !writable(options.report))
-    return refuse("--report " + options.report.string() + ": cannot be written; choose another place", kBadInput);
-  if (!options.html.empty() && !writable(options.html))
-    return refuse("--html " + options.html.string() + ": cannot be written; choose another place", kBadInput);
-  if (!options.trace.empty() && !writable(options.trace))
-    return refuse("--trace " + options.trace.string() + ": cannot be written; choose another place", kBadInput);
-  if (!options.record.empty() && !writable(options.record))
-    return refuse("--record " + options.record.string() + ": cannot be written; choose another place", kBadInput);
+  for (const auto& [option, file] : {std::pair("--report", options.report),
+                                     {"--html", options.html},
+                                     {"--junit", options.junit},
+                                     {"--trace", options.trace},
+                                     {"--record", options.record}})
+    if (!file.empty() && !writable(file))
+      return refuse(fmt::format("{} {}: cannot be written; choose another place", option, file.string()), kBadInput);
   if (options.durations != "budgets" && options.clock != "virtual")
     return refuse("--durations: only jobs in virtual time take what they are told; add --clock virtual", kBadInput);
   if (!options.watchdog.empty() && options.clock == "virtual")
@@ -234,7 +242,7 @@ int run_graph(const RunOptions& options) {
         kBadInput);
   const StopOnSignal guard;
   try {
-    return run_as_asked(options);
+    return run_as_asked(registry, options);
   } catch (const std::invalid_argument& problem) {  // more ports or edges than the transport carries
     return refuse(problem.what(), kBadInput);
   } catch (const std::exception& problem) {  // PolicyRefused, TransportError, no memory

@@ -5,8 +5,27 @@
 
 #include "graph/cli/outcome.hpp"
 #include "graph/language/graph.hpp"
+#include "hal/settings/json.hpp"
+
+namespace takt {
+struct Plan;
+class Transport;
+}  // namespace takt
 
 namespace takt::command {
+
+/// A program that looks on while a run goes in virtual time, called on the thread of the run. The run then prints
+/// nothing but errors.
+class RunWitness {
+ public:
+  virtual ~RunWitness() = default;
+  /// The pools are there, no job has run. Plan and transport live until end().
+  virtual void begin(const Plan& plan, Transport& transport) = 0;
+  /// After every half of a job.
+  virtual void look() = 0;
+  /// The run is over and judged.
+  virtual void end(const nlohmann::ordered_json& report) = 0;
+};
 
 struct RunOptions {
   std::filesystem::path graph;  ///< empty: graph/ace.yaml of the project
@@ -17,18 +36,19 @@ struct RunOptions {
   std::string clock = "real", isolate;
   std::string durations = "budgets";  ///< of jobs in virtual time, see job_durations()
   std::string transport = "local";    ///< local | iceoryx
-  std::filesystem::path report, html, trace, record, output = "out";
+  std::filesystem::path report, html, junit, trace, record, output = "out";
   std::filesystem::path faults;           ///< scenario of faults that the run is given; empty: none
   std::vector<std::string> record_ports;  ///< NODE.PORT: with all fields, beside devices and small ones; "all"
   std::string trace_source = "auto";      ///< of preemption: auto (the best there is), tracefs, perf, none
   uint64_t seed = 1;
   std::filesystem::path watchdog;  ///< device that resets the machine unless the run is well; empty: none
   int watchdog_timeout_s = 10;     ///< asked of it
+  RunWitness* witness = nullptr;   ///< asks for `clock` virtual
   /// A policy named on the command line, or --require-rt: refused means exit 3, not another policy.
   bool policy_required() const { return require_rt || !load.policy.empty(); }
 };
 
 /// `takt run`: loads, checks, composes, runs, reports. Returns the exit code.
-int run_graph(const RunOptions& options);
+int run_graph(const Registry& registry, const RunOptions& options);
 
 }  // namespace takt::command

@@ -22,6 +22,7 @@
 #include "graph/check/machine_file.hpp"
 #include "graph/run/machine.hpp"
 #include "graph/run/prepare.hpp"
+#include "graph/run/junit.hpp"
 #include "graph/run/report.hpp"
 #include "graph/view/html_report.hpp"
 #include "rt/machine/facts.hpp"
@@ -148,22 +149,25 @@ void tell_attach(const attach::Server& server, std::vector<std::string>& adjuste
   std::fprintf(stderr, "takt: adjusted: %s\n", text.c_str());
 }
 
-int tell(const RunOptions& options, const graph::GraphSpec& graph, const nlohmann::ordered_json& report) {
-  std::fputs(summary_text(report).c_str(), stdout);
+int tell(const Registry& registry, const RunOptions& options, const graph::GraphSpec& graph,
+         const nlohmann::ordered_json& report) {
+  if (options.witness == nullptr) std::fputs(summary_text(report).c_str(), stdout);
   const auto write = [](const std::filesystem::path& file, const std::string& text) {
     return file.empty() || static_cast<bool>(std::ofstream(file) << text << std::flush);
   };
   if (!write(options.report, report.dump(2) + "\n"))
     return refuse("cannot write the report to " + options.report.string() + "; choose a writable --report", kBadInput);
-  if (!options.html.empty() && !write(options.html, view::html_report(report, graph, options.output)))
+  if (!options.html.empty() && !write(options.html, view::html_report(registry, report, graph, options.output)))
     return refuse("cannot write the page to " + options.html.string() + "; choose a writable --html", kBadInput);
+  if (!options.junit.empty() && !write(options.junit, junit_text(report)))
+    return refuse("cannot write the verdict to " + options.junit.string() + "; choose a writable --junit", kBadInput);
   return report["ok"].get<bool>() ? kOk : kNotOk;
 }
 
-int tell_faults(const RunOptions& options, const graph::GraphSpec& graph, const RunBoard& board, Policy granted,
-                nlohmann::ordered_json& report) {
+int tell_faults(const Registry& registry, const RunOptions& options, const graph::GraphSpec& graph,
+                const RunBoard& board, Policy granted, nlohmann::ordered_json& report) {
   const bool failed = run_exit(board, granted, report) == kDeviceOrSystem;
-  const int told = tell(options, graph, report);
+  const int told = tell(registry, options, graph, report);
   return failed ? static_cast<int>(kDeviceOrSystem) : told;
 }
 

@@ -81,12 +81,13 @@ std::vector<std::string> prepare_process();
 void tell_attach(const attach::Server& server, std::vector<std::string>& adjusted);
 
 /// Prints the summary, writes the files that were asked for; the exit code of the run.
-int tell(const RunOptions& options, const graph::GraphSpec& graph, const nlohmann::ordered_json& report);
+int tell(const Registry& registry, const RunOptions& options, const graph::GraphSpec& graph,
+         const nlohmann::ordered_json& report);
 
 /// The same of a run in which nodes may have done what they must not. A job that hung under `cooperative` is a failure
 /// of the run, exit 3.
-int tell_faults(const RunOptions& options, const graph::GraphSpec& graph, const RunBoard& board, Policy granted,
-                nlohmann::ordered_json& report);
+int tell_faults(const Registry& registry, const RunOptions& options, const graph::GraphSpec& graph,
+                const RunBoard& board, Policy granted, nlohmann::ordered_json& report);
 
 /// The exit code of such a run if everything can be written; corrects "ok" in the report.
 int run_exit(const RunBoard& board, Policy granted, nlohmann::ordered_json& report);

@@ -7,7 +7,7 @@
 #include <fstream>
 
 #include "graph/explain/trace_file.hpp"
-#include "graph/run/commit.hpp"
+#include "rt/abi.hpp"
 #include "rt/machine/facts.hpp"
 
 namespace takt::command {
@@ -72,7 +72,7 @@ std::string RunTrace::write(const graph::GraphSpec& graph, const Plan& plan, con
                      {"profile", graph.profile},
                      {"clock", options_.clock},
                      {"policy_asked", to_string(graph.schedule.policy)},
-                     {"commit", kCommit},
+                     {"commit", version().commit},
                      {"collector_cpu_ms", static_cast<double>(recording.collector_cpu_ns) / 1e6}};
   std::ofstream file(options_.trace, std::ios::binary);
   explain::write_trace(file, head, trace);

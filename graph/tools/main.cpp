@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// takt-tools, which `takt calibrate`, `cloud`, `objects`, `terrain` and `train` become: work at a desk, apart from `takt`
-// because no run needs it.
+// takt-tools, which `takt calibrate`, `cloud`, `objects`, `terrain` and `train` become: work at a desk, apart from
+// `takt` because no run needs it. Called by a link takt-NAME to it, it is the command NAME.
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <filesystem>
 #include <opencv2/core/utils/logger.hpp>
+#include <string>
+#include <vector>
 
 #include "graph/cli/outcome.hpp"
 #include "graph/tools/calibrate_command.hpp"
@@ -28,8 +32,12 @@ int main(int argc, char** argv) {
   takt::command::add_objects(app, objects, exit_code);
   takt::command::add_terrain(app, terrain, exit_code);
   takt::command::add_train(app, train, exit_code);
+  std::vector<std::string> words(argv + 1, argv + argc);
+  const std::string name = std::filesystem::path(argv[0]).filename();
+  if (name.starts_with("takt-") && name != "takt-tools") words.insert(words.begin(), name.substr(5));
+  std::reverse(words.begin(), words.end());  // CLI11 takes the last one first
   try {
-    app.parse(argc, argv);
+    app.parse(std::move(words));
   } catch (const CLI::ParseError& error) {
     exit_code = app.exit(error) == 0 ? 0 : takt::command::kBadInput;
   }

@@ -57,8 +57,8 @@ std::string subtitle_of(const GraphSpec& graph) {
 
 class Maker {
  public:
-  Maker(const GraphSpec& graph, const NodeTypes& types, const graph::DeviceCatalogue& devices)
-      : graph_(graph), types_(types), devices_(devices) {}
+  Maker(const GraphSpec& graph, const Registry& registry)
+      : graph_(graph), types_(registry.nodes), devices_(graph::catalogue(registry.devices)) {}
 
   Diagram make() {
     result_.name = graph_.name;
@@ -140,7 +140,7 @@ class Maker {
 
   const GraphSpec& graph_;
   const NodeTypes& types_;
-  const graph::DeviceCatalogue& devices_;
+  const graph::DeviceCatalogue devices_;
   Diagram result_;
   std::map<std::string, size_t> index_;
 };
@@ -173,9 +173,7 @@ std::string Diagram::to_text(const DiagramEdge& edge) const {
   return boxes[edge.to_box].id + "." + input_of(edge).name;
 }
 
-Diagram make_diagram(const GraphSpec& graph, const NodeTypes& types, const graph::DeviceCatalogue& devices) {
-  return Maker(graph, types, devices).make();
-}
+Diagram make_diagram(const GraphSpec& graph, const Registry& registry) { return Maker(graph, registry).make(); }
 
 std::string time_text(int64_t ns) {
   const auto value = static_cast<double>(ns);

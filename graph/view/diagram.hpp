@@ -9,6 +9,7 @@
 
 #include "graph/language/catalogue.hpp"
 #include "graph/language/graph.hpp"
+#include "graph/language/registry.hpp"
 #include "rt/node.hpp"
 
 namespace takt::view {
@@ -64,7 +65,7 @@ struct Diagram {
 };
 
 /// `graph` must have been loaded with these types and devices. Edges from what the mode leaves out are not shown.
-Diagram make_diagram(const graph::GraphSpec& graph, const NodeTypes& types, const graph::DeviceCatalogue& devices);
+Diagram make_diagram(const graph::GraphSpec& graph, const Registry& registry);
 
 /// "66.67 ms", "1.5 s", "250 us".
 std::string time_text(int64_t ns);

@@ -3,16 +3,15 @@
 
 #include <fmt/format.h>
 
-#include "graph/compose/composition.hpp"
 #include "graph/view/graph_pictures.hpp"
 #include "graph/view/html_parts.hpp"
 #include "graph/view/markup.hpp"
 
 namespace takt::view {
 
-std::string html_report(const nlohmann::ordered_json& report, const graph::GraphSpec& graph,
+std::string html_report(const Registry& registry, const nlohmann::ordered_json& report, const graph::GraphSpec& graph,
                         const std::filesystem::path& output) {
-  const std::string picture = graph_svg(make_diagram(graph, graph::node_types(), graph::hal_catalogue()));
+  const std::string picture = graph_svg(make_diagram(graph, registry));
   std::string page = fmt::format(
       "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>{} - run report</title>\n"

@@ -13,7 +13,7 @@ namespace takt::view {
 /// pictures
 /// (*.png) that lie in the folder `output`. What the report does not hold is shown as "not recorded"; a report of
 /// another shape never throws.
-std::string html_report(const nlohmann::ordered_json& report, const graph::GraphSpec& graph,
+std::string html_report(const Registry& registry, const nlohmann::ordered_json& report, const graph::GraphSpec& graph,
                         const std::filesystem::path& output);
 
 }  // namespace takt::view

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Installed as <takt/hal/settings/settings.hpp>: hal, experimental.
 #pragma once
 #include <filesystem>
 #include <optional>

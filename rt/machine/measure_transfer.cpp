@@ -6,7 +6,7 @@
 #include "rt/machine/measure.hpp"
 #include "rt/machine/measure_support.hpp"
 #include "rt/memory/process_memory.hpp"
-#include "rt/msg/array.hpp"
+#include "rt/msg/field_list.hpp"
 #include "rt/sched/grant.hpp"
 #include "rt/shm/iceoryx_preflight.hpp"
 #include "rt/shm/transport.hpp"
@@ -23,11 +23,7 @@ constexpr int64_t kEver = std::numeric_limits<int64_t>::max();
 struct Block {
   static constexpr std::string_view type_name = "block";
   Array<uint8_t> bytes;
-  static std::span<const Field> fields() {
-    static const Field list[] = {TAKT_FIELD(Block, bytes, "1")};
-    return list;
-  }
-  static void capacities(const Capacity& c, std::span<uint32_t> a) { a[0] = c.count; }
+  TAKT_FIELDS(Block, (bytes, "1"))
 };
 
 std::vector<PortPlan> ports() {

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Installed as <takt/job_calls.hpp>: core, stable.
 // Calls that no job should make: they block, allocate or enter the kernel for longer than anybody can say. They are
 // seen where a program links takt_allocation_counter (see there), by taking the place of the C library's functions.
 #pragma once

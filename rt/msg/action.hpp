@@ -4,7 +4,7 @@
 #include <span>
 #include <string_view>
 
-#include "rt/msg/field.hpp"
+#include "rt/msg/field_list.hpp"
 
 namespace takt {
 
@@ -14,8 +14,7 @@ struct ActionCommand {
   uint32_t number = 0;       ///< 0: none yet
   char action[32] = {};      ///< ended by 0
   char objects[4][32] = {};  ///< names of the objects, in the order of the action's roles; empty: no such role
-  static std::span<const Field> fields();
-  static void capacities(const Capacity&, std::span<uint32_t>) {}
+  TAKT_FIELDS(ActionCommand, (number, "1"), (action, ""), (objects, ""))
 };
 
 /// What became of an action (ActionOutcome::state).
@@ -30,8 +29,7 @@ struct ActionOutcome {
   uint8_t state = action_state::none;
   double duration_s = 0;  ///< so far, or of the whole
   char reason[128] = {};  ///< why it was refused or has failed; ended by 0
-  static std::span<const Field> fields();
-  static void capacities(const Capacity&, std::span<uint32_t>) {}
+  TAKT_FIELDS(ActionOutcome, (number, "1"), (state, ""), (duration_s, "s"), (reason, ""))
 };
 
 }  // namespace takt

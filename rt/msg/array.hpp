@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Installed as <takt/msg/array.hpp>: core, stable.
 #pragma once
 #include <cstddef>
 #include <cstdint>

@@ -6,7 +6,7 @@
 #include <string_view>
 
 #include "rt/msg/array.hpp"
-#include "rt/msg/field.hpp"
+#include "rt/msg/field_list.hpp"
 
 namespace takt {
 
@@ -41,8 +41,7 @@ struct BodyPoses {
   int32_t candidates = 0;  ///< clusters that could have been bodies
   float searched = 1;      ///< share of their poses tried, 0..1: less if the job's time ran out
   Array<Body> bodies;
-  static std::span<const Field> fields();
-  static void capacities(const Capacity& c, std::span<uint32_t> a) { a[0] = c.count; }
+  TAKT_FIELDS(BodyPoses, (joints, "1"), (candidates, "1"), (searched, "1"), (bodies, ""))
 };
 
 }  // namespace takt

@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "rt/msg/array.hpp"
-#include "rt/msg/field.hpp"
+#include "rt/msg/field_list.hpp"
 
 namespace takt {
 
@@ -20,8 +20,7 @@ struct Detections {
   int32_t image_width = 0, image_height = 0;
   float searched = 1;  ///< share of the image, 0..1: less if the job's time ran out
   Array<Detection> boxes;
-  static std::span<const Field> fields();
-  static void capacities(const Capacity& c, std::span<uint32_t> a) { a[0] = c.count; }
+  TAKT_FIELDS(Detections, (image_width, "px"), (image_height, "px"), (searched, "1"), (boxes, "px"))
 };
 
 }  // namespace takt

@@ -4,7 +4,7 @@
 #include <span>
 #include <string_view>
 
-#include "rt/msg/field.hpp"
+#include "rt/msg/field_list.hpp"
 
 namespace takt {
 
@@ -12,8 +12,7 @@ namespace takt {
 struct DigitalState {
   static constexpr std::string_view type_name = "digital_state";
   uint32_t levels = 0, changed = 0;
-  static std::span<const Field> fields();
-  static void capacities(const Capacity&, std::span<uint32_t>) {}
+  TAKT_FIELDS(DigitalState, (levels, ""), (changed, ""))
 };
 
 }  // namespace takt

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
+// Installed as <takt/msg/disparity.hpp>: core, stable.
 #pragma once
 #include <cstdint>
 #include <span>
 #include <string_view>
 
 #include "rt/msg/array.hpp"
-#include "rt/msg/field.hpp"
+#include "rt/msg/field_list.hpp"
 #include "rt/msg/geometry.hpp"
 #include "rt/msg/image_view.hpp"
 
@@ -29,10 +30,9 @@ struct DisparityMap {
   ImageView<uint8_t> fraction_view() { return {fraction.data(), width, height}; }
   ImageView<const uint8_t> fraction_view() const { return {fraction.data(), width, height}; }
   bool sound() const { return image_fits(width, height, 1, disparity.capacity); }
-  static std::span<const Field> fields();
-  static void capacities(const Capacity& c, std::span<uint32_t> a) {
-    a[0] = a[1] = a[2] = static_cast<uint32_t>(c.pixels());
-  }
+  TAKT_FIELDS(DisparityMap, (width, "px"), (height, "px"), (disparities, "px"), (camera),
+              (disparity, "px", capacity.pixels()), (confidence, "1", capacity.pixels()),
+              (fraction, "1/64 px", capacity.pixels()))
 };
 
 }  // namespace takt

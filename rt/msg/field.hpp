@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Installed as <takt/msg/field.hpp>: core, stable.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -13,7 +14,7 @@ namespace takt {
 
 enum class Scalar : uint8_t { u8, i16, u16, i32, u32, i64, u64, f32, f64 };
 
-/// One field of a message, declared once beside the message and shared by checker, recorder, diff and export.
+/// One field of a message, declared in its class (rt/msg/field_list.hpp) and shared by checker, recorder, diff and export.
 /// A field is `count` scalars at `offset` in the header (count 0: an Array of elements of `element_bytes`).
 struct Field {
   std::string_view name;
@@ -83,13 +84,6 @@ struct Describe<Array<T>> {
 
 }  // namespace detail
 
-/// TAKT_FIELD(StereoPair, camera.focal_px, "px") describes one (possibly nested) member.
-#define TAKT_FIELD(Message, member, unit) \
-  ::takt::detail::Describe<decltype(Message::member)>::field(#member, unit, offsetof(Message, member))
-#define TAKT_NESTED_FIELD(Message, outer, inner, unit)                                                \
-  ::takt::detail::Describe<decltype(decltype(Message::outer)::inner)>::field(#outer "." #inner, unit, \
-                                                                             offsetof(Message, outer.inner))
-
 /// How large a message may become on one port; what each number means is said by the message type.
 struct Capacity {
   uint32_t width = 0;
@@ -101,8 +95,7 @@ struct Capacity {
 
 /// Type-erased description of a message type; `of<T>()` makes it from
 ///   static constexpr std::string_view type_name;
-///   static std::span<const Field> fields();
-///   static void capacities(const Capacity&, std::span<uint32_t> per_array);   (one entry per Array field, in order)
+///   TAKT_FIELDS(T, ...)
 ///   bool sound() const;   (if other fields say how far an array is read: whether they stay within its capacity)
 struct MessageType {
   std::string_view name;

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
+// Installed as <takt/msg/grid.hpp>: core, stable.
 #pragma once
 #include <cstdint>
 #include <span>
 #include <string_view>
 
 #include "rt/msg/array.hpp"
-#include "rt/msg/field.hpp"
+#include "rt/msg/field_list.hpp"
 #include "rt/msg/geometry.hpp"
 #include "rt/msg/image_view.hpp"
 
@@ -24,8 +25,8 @@ struct Grid {
   ImageView<int16_t> view() { return {cells.data(), width, height}; }
   ImageView<const int16_t> view() const { return {cells.data(), width, height}; }
   bool sound() const { return image_fits(width, height, 1, cells.capacity); }
-  static std::span<const Field> fields();
-  static void capacities(const Capacity& c, std::span<uint32_t> a) { a[0] = static_cast<uint32_t>(c.pixels()); }
+  TAKT_FIELDS(Grid, (width, "1"), (height, "1"), (cell_m, "m"), (origin_x_m, "m"), (origin_y_m, "m"), (grid_in_map),
+              (cells, "1", capacity.pixels()))
 };
 
 }  // namespace takt

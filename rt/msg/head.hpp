@@ -4,7 +4,7 @@
 #include <span>
 #include <string_view>
 
-#include "rt/msg/field.hpp"
+#include "rt/msg/field_list.hpp"
 
 namespace takt {
 
@@ -14,15 +14,14 @@ struct HeadState {
   double pan_rad = 0, tilt_rad = 0, roll_rad = 0;
   double pan_rad_s = 0, tilt_rad_s = 0;
   uint8_t moving = 0;
-  static std::span<const Field> fields();
-  static void capacities(const Capacity&, std::span<uint32_t>) {}
+  TAKT_FIELDS(HeadState, (pan_rad, "rad"), (tilt_rad, "rad"), (roll_rad, "rad"), (pan_rad_s, "rad/s"),
+              (tilt_rad_s, "rad/s"), (moving, ""))
 };
 
 struct HeadCommand {
   static constexpr std::string_view type_name = "head_command";
   double pan_rad = 0, tilt_rad = 0;
-  static std::span<const Field> fields();
-  static void capacities(const Capacity&, std::span<uint32_t>) {}
+  TAKT_FIELDS(HeadCommand, (pan_rad, "rad"), (tilt_rad, "rad"))
 };
 
 }  // namespace takt

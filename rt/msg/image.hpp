@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
+// Installed as <takt/msg/image.hpp>: core, stable.
 #pragma once
 #include <cstdint>
 #include <span>
 #include <string_view>
 
 #include "rt/msg/array.hpp"
-#include "rt/msg/field.hpp"
+#include "rt/msg/field_list.hpp"
 #include "rt/msg/geometry.hpp"
 #include "rt/msg/image_view.hpp"
 
@@ -27,10 +28,8 @@ struct Image {
   ImageView<uint8_t> view() { return {pixels.data(), width, height, channels}; }
   ImageView<const uint8_t> view() const { return {pixels.data(), width, height, channels}; }
   bool sound() const { return image_fits(width, height, channels, pixels.capacity); }
-  static std::span<const Field> fields();
-  static void capacities(const Capacity& c, std::span<uint32_t> a) {
-    a[0] = static_cast<uint32_t>(c.pixels() * c.channels);
-  }
+  TAKT_FIELDS(Image, (width, "px"), (height, "px"), (channels, "1"), (health, ""), (camera),
+              (pixels, "1", capacity.pixels() * capacity.channels))
 };
 
 /// Two 8-bit images of one exposure. Raw from a camera, rectified (camera.focal_px > 0) from the stereo node.
@@ -49,10 +48,9 @@ struct StereoPair {
   ImageView<const uint8_t> left_view() const { return {left.data(), width, height, channels}; }
   ImageView<const uint8_t> right_view() const { return {right.data(), width, height, channels}; }
   bool sound() const { return image_fits(width, height, channels, left.capacity); }
-  static std::span<const Field> fields();
-  static void capacities(const Capacity& c, std::span<uint32_t> a) {
-    a[0] = a[1] = static_cast<uint32_t>(c.pixels() * c.channels);
-  }
+  TAKT_FIELDS(StereoPair, (width, "px"), (height, "px"), (channels, "1"), (health, ""), (frame_number, "1"), (camera),
+              (sensor_in_robot), (left, "1", capacity.pixels() * capacity.channels),
+              (right, "1", capacity.pixels() * capacity.channels))
 };
 
 }  // namespace takt

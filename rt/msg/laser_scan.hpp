@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
+// Installed as <takt/msg/laser_scan.hpp>: core, stable.
 #pragma once
 #include <cstdint>
 #include <span>
 #include <string_view>
 
 #include "rt/msg/array.hpp"
-#include "rt/msg/field.hpp"
+#include "rt/msg/field_list.hpp"
 #include "rt/msg/geometry.hpp"
 
 namespace takt {
@@ -20,8 +21,8 @@ struct LaserScan {
   uint32_t scan_number = 0;
   Transform sensor_in_robot;
   Array<float> range_m;  ///< 0: no return
-  static std::span<const Field> fields();
-  static void capacities(const Capacity& c, std::span<uint32_t> a) { a[0] = c.count; }
+  TAKT_FIELDS(LaserScan, (first_angle_rad, "rad"), (step_rad, "rad"), (max_range_m, "m"), (sweep_s, "s"),
+              (scan_number, "1"), (sensor_in_robot), (range_m, "m"))
 };
 
 }  // namespace takt

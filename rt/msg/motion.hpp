@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
+// Installed as <takt/msg/motion.hpp>: core, stable.
 #pragma once
 #include <cstdint>
 #include <span>
 #include <string_view>
 
-#include "rt/msg/field.hpp"
+#include "rt/msg/field_list.hpp"
 #include "rt/msg/geometry.hpp"
 
 namespace takt {
@@ -20,8 +21,8 @@ struct Motion {
   int32_t corners = 0, matched = 0, inliers = 0;
   uint8_t valid = 0;     ///< 0: confidence too low, the motion was predicted instead of measured
   uint8_t keyframe = 0;  ///< 1: first frame, nothing to compare with
-  static std::span<const Field> fields();
-  static void capacities(const Capacity&, std::span<uint32_t>) {}
+  TAKT_FIELDS(Motion, (from_stamp_ns, "ns"), (camera_in_previous), (pose), (confidence, "1"), (rms_px, "px"),
+              (corners, "1"), (matched, "1"), (inliers, "1"), (valid, ""), (keyframe, ""))
 };
 
 }  // namespace takt

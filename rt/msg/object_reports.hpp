@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "rt/msg/array.hpp"
-#include "rt/msg/field.hpp"
+#include "rt/msg/field_list.hpp"
 
 namespace takt {
 
@@ -35,11 +35,7 @@ struct ObjectReports {
   Array<ObjectName> names;
   Array<ObjectPlace> places;
   Array<ObjectAttribute> attributes;
-  static std::span<const Field> fields();
-  static void capacities(const Capacity& c, std::span<uint32_t> a) {
-    a[0] = a[1] = c.count;
-    a[2] = 8 * c.count;
-  }
+  TAKT_FIELDS(ObjectReports, (in_map, ""), (names, ""), (places, ""), (attributes, "", 8 * capacity.count))
 };
 
 }  // namespace takt

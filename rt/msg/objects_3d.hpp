@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "rt/msg/array.hpp"
-#include "rt/msg/field.hpp"
+#include "rt/msg/field_list.hpp"
 
 namespace takt {
 
@@ -32,8 +32,8 @@ struct Objects3d {
   uint8_t supported = 0;                               ///< 1: a support was found
   double support_a = 0, support_b = 0, support_m = 0;  ///< z = a x + b y + support_m, robot frame
   Array<Object3d> objects;                             ///< in the order of their seeds
-  static std::span<const Field> fields();
-  static void capacities(const Capacity& c, std::span<uint32_t> a) { a[0] = c.count; }
+  TAKT_FIELDS(Objects3d, (searched, "1"), (supported, ""), (support_a, "1"), (support_b, "1"), (support_m, "m"),
+              (objects, ""))
 };
 
 }  // namespace takt

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
+// Installed as <takt/msg/odometry.hpp>: core, stable.
 #pragma once
 #include <cstdint>
 #include <span>
 #include <string_view>
 
-#include "rt/msg/field.hpp"
+#include "rt/msg/field_list.hpp"
 
 namespace takt {
 
@@ -13,8 +14,7 @@ struct Odometry {
   static constexpr std::string_view type_name = "odometry";
   double x_m = 0, y_m = 0, theta_rad = 0;  ///< theta: driving direction from the x axis
   double speed_m_s = 0, turn_rad_s = 0;
-  static std::span<const Field> fields();
-  static void capacities(const Capacity&, std::span<uint32_t>) {}
+  TAKT_FIELDS(Odometry, (x_m, "m"), (y_m, "m"), (theta_rad, "rad"), (speed_m_s, "m/s"), (turn_rad_s, "rad/s"))
 };
 
 }  // namespace takt

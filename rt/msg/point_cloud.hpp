@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
+// Installed as <takt/msg/point_cloud.hpp>: core, stable.
 #pragma once
 #include <cstdint>
 #include <span>
 #include <string_view>
 
 #include "rt/msg/array.hpp"
-#include "rt/msg/field.hpp"
+#include "rt/msg/field_list.hpp"
 #include "rt/msg/geometry.hpp"
 #include "rt/msg/point.hpp"
 
@@ -19,8 +20,7 @@ struct PointCloud {
   int32_t step_px = 0;  ///< one point per step x step pixels of that image; 0 for other sensors
   Array<Point> points;
   Array<Colour> colours;  ///< same size as points, or empty
-  static std::span<const Field> fields();
-  static void capacities(const Capacity& c, std::span<uint32_t> a) { a[0] = a[1] = c.count; }
+  TAKT_FIELDS(PointCloud, (sensor_in_robot), (camera), (step_px, "px"), (points, "m"), (colours, "1"))
 };
 
 }  // namespace takt

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
+// Installed as <takt/msg/pose.hpp>: core, stable.
 #pragma once
 #include <cstdint>
 #include <span>
 #include <string_view>
 
-#include "rt/msg/field.hpp"
+#include "rt/msg/field_list.hpp"
 #include "rt/msg/geometry.hpp"
 
 namespace takt {
@@ -14,8 +15,7 @@ struct Pose {
   static constexpr std::string_view type_name = "pose";
   Transform transform;
   double covariance[36] = {};
-  static std::span<const Field> fields();
-  static void capacities(const Capacity&, std::span<uint32_t>) {}
+  TAKT_FIELDS(Pose, (transform), (covariance, ""))
 };
 
 }  // namespace takt

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
+// Installed as <takt/msg/requests.hpp>: core, stable.
 #pragma once
 #include <cstdint>
 #include <span>
 #include <string_view>
 
 #include "rt/msg/array.hpp"
-#include "rt/msg/field.hpp"
+#include "rt/msg/field_list.hpp"
 
 namespace takt {
 
@@ -22,8 +23,7 @@ struct Request {
 struct Requests {
   static constexpr std::string_view type_name = "requests";
   Array<Request> wanted;
-  static std::span<const Field> fields();
-  static void capacities(const Capacity& c, std::span<uint32_t> a) { a[0] = c.count; }
+  TAKT_FIELDS(Requests, (wanted, ""))
 };
 
 }  // namespace takt

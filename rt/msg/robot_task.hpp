@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "rt/msg/array.hpp"
-#include "rt/msg/field.hpp"
+#include "rt/msg/field_list.hpp"
 
 namespace takt {
 
@@ -15,8 +15,7 @@ struct RobotTask {
   static constexpr std::string_view type_name = "task";
   uint32_t number = 0;  ///< 0: none yet; another number is another task, its text may be the same
   Array<char> text;
-  static std::span<const Field> fields();
-  static void capacities(const Capacity& c, std::span<uint32_t> a) { a[0] = c.count; }
+  TAKT_FIELDS(RobotTask, (number, "1"), (text, ""))
 };
 
 }  // namespace takt

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Installed as <takt/msg/scalar.hpp>: core, experimental.
 // What can be done with the scalars of a message whose type is known by its descriptors only.
 #pragma once
 #include <cstddef>

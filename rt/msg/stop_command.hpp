@@ -4,7 +4,7 @@
 #include <span>
 #include <string_view>
 
-#include "rt/msg/field.hpp"
+#include "rt/msg/field_list.hpp"
 
 namespace takt {
 
@@ -20,8 +20,7 @@ struct StopCommand {
   double nearest_m = 0;   ///< of the returns in the protected area; 0: none
   double scan_age_s = 0;  ///< of the oldest scan used, at the job's release
   bool stop() const { return reasons != 0; }
-  static std::span<const Field> fields();
-  static void capacities(const Capacity&, std::span<uint32_t>) {}
+  TAKT_FIELDS(StopCommand, (reasons, ""), (nearest_m, "m"), (scan_age_s, "s"))
 };
 
 }  // namespace takt

@@ -4,7 +4,7 @@
 #include <span>
 #include <string_view>
 
-#include "rt/msg/field.hpp"
+#include "rt/msg/field_list.hpp"
 
 namespace takt {
 
@@ -19,8 +19,7 @@ struct Terrain {
   uint8_t kind = terrain_kind::unknown;  ///< the strongest hypothesis
   float hypotheses[5] = {};              ///< 0..1 for each terrain_kind
   float correlations[4] = {};            ///< -1..1 of the newest map with that of a kind; 0: too little is known
-  static std::span<const Field> fields();
-  static void capacities(const Capacity&, std::span<uint32_t>) {}
+  TAKT_FIELDS(Terrain, (kind, ""), (hypotheses, "1"), (correlations, "1"))
 };
 
 }  // namespace takt

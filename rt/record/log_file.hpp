@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Installed as <takt/record/log_file.hpp>: record, experimental.
 #pragma once
 #include <deque>
 #include <filesystem>

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Installed as <takt/record/message_record.hpp>: record, experimental.
 // A message of a port as a record keeps it: its header, and either all its fields or a hash of them.
 #pragma once
 #include <cstddef>

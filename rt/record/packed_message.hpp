@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Installed as <takt/record/packed_message.hpp>: record, experimental.
 // A message as the bytes that a record holds: its fields one after the other as the descriptors list them, without
 // padding and without the unused part of its arrays. Little-endian. A field is its scalars; an array is its number of
 // elements (u32) and the elements. So equal messages have equal bytes wherever they lay.

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Installed as <takt/record/recorded_event.hpp>: record, experimental.
 // What happened in a run beside its jobs and messages, as a record keeps it.
 //
 //   for (const RecordedEvent& event : log.events())

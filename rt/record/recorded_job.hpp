@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Installed as <takt/record/recorded_job.hpp>: record, experimental.
 // What a job was given and what it did, as a record keeps it: enough to run it again.
 #pragma once
 #include <cstddef>

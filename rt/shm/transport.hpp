@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Installed as <takt/transport.hpp>: core, experimental.
 // The transport interface: how a message gets from one output to its inputs without being copied. Two back ends: local
 // (one run's own memory, no daemon; between processes see local_transport.hpp) and iceoryx.
 #pragma once

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Installed as <takt/transport_error.hpp>: core, experimental.
 #pragma once
 #include <stdexcept>
 

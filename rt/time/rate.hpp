@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Installed as <takt/time/rate.hpp>: core, stable.
 #pragma once
 #include <cstdint>
 #include <optional>

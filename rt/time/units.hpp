@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Installed as <takt/time/units.hpp>: core, stable.
 // Nanoseconds in the units of texts and equations.
 #pragma once
 #include <cstdint>

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Installed as <takt/transform/planar_pose.hpp>: core, experimental.
 // Poses in the plane.
 #pragma once
 #include <cmath>

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Installed as <takt/transform/pose_math.hpp>: core, experimental.
 // Rigid poses with uncertainty: composition, inverse, interpolation. Plain values, no allocation.
 //
 // Error model: a pose child-in-parent is known up to a small translation dt and rotation dr, both along the axes of the

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Installed as <takt/transform/transform_buffer.hpp>: core, experimental.
 // Where frames were, at the stamp of the data. A node owns one buffer and fills it only from its own latched inputs, so
 // that the latch rule and replay hold. There is no "latest": whoever asks names a stamp, and gets a pose or a reason.
 #pragma once

@@ -18,7 +18,7 @@
 #include "hal/object_sensor/object_sensor.hpp"
 #include "rt/msg/action.hpp"
 #include "rt/msg/object_reports.hpp"
-#include "tests/unit/mapping_3d/node_harness.hpp"
+#include "rt/testing.hpp"
 
 namespace takt::test {
 

@@ -55,10 +55,6 @@ class Clone:
 def follow_node(clone):
     print("\n== a node")
     (clone.folder / "nodes/brightness/CMakeLists.txt").write_text(clone.said(GUIDES, r"`(takt_room\(brightness [^`]*)`") + "\n")
-    types = "graph/compose/node_types.cpp"
-    clone.insert(types, "namespace takt {\n", "void register_brightness(NodeTypes& types);\n")
-    clone.insert(types, "  register_mission(types);\n", "  register_brightness(types);\n")
-    clone.insert("graph/compose/CMakeLists.txt", "USES takt_language", " " + clone.said(GUIDES, r"and name `(takt_brightness)`"))
     clone.insert("graph/crossing.yaml", "  street:\n", "    " + clone.said(GUIDES, r"`(brightness: \{type[^`]*)`") + "\n")
     clone.insert("schedules/crossing.yaml", "nodes:\n", "  " + clone.said(GUIDES, r"`(brightness: \{rate[^`]*)`") + "\n")
     clone.run("./takt nodes brightness", output="gain")
@@ -70,12 +66,7 @@ def follow_node(clone):
 
 def follow_driver(clone):
     print("\n== a driver")
-    clone.insert("hal/drivers/kinds.cpp", "constexpr DriverInfo kLaserDrivers[] = {", clone.said(GUIDES, r"add `([^`]*)` to `kLaserDrivers`") + "\n")
-    clone.insert("hal/drivers/kinds.cpp", "constexpr SettingInfo kLaser[] = {\n", "    " + clone.said(GUIDES, r"and `(\{\"radius\"[^`]*)` to `kLaser`") + "\n")
-    drivers = "hal/drivers/drivers.cpp"
-    clone.insert(drivers, '#include "hal/drivers.hpp"\n', '#include "hal/laser/tube_laser.hpp"\n')
-    clone.insert(drivers, "NodeResult make_driver(const DeviceConfig& config, Settings& settings, const Clock& clock, Seams seams) {\n",
-                 clone.said(GUIDES, r"begin `make_driver` with\n\n(.*?;\n)\n"))
+    (clone.folder / "hal/laser/tube/CMakeLists.txt").write_text(clone.said(GUIDES, r"`(takt_room\(tube [^`]*)`") + "\n")
     clone.insert("graph/lasers.yaml", "\nprofiles:\n", "  " + clone.said(GUIDES, r"below `profiles:`\n\n *(tube: [^\n]*)\n") + "\n")
     clone.run(clone.said(GUIDES, r"Then `([^`]*)` runs the suite"), output="100% tests passed")
     clone.run(clone.said(GUIDES, r"`(\./takt nodes laser_scanner)`"), output="a scanner in a tube")

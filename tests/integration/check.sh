@@ -123,7 +123,7 @@ while read -r graph; do
       *) fail "$graph $profile: $(head -n 3 "$work/stdout" "$work/stderr")" ;;
     esac
   done
-done < <(grep -rl --include='*.yaml' '^subsystems:' "$source"/{graph,tests,bench})
+done < <(grep -rl --include='*.yaml' '^subsystems:' "$source"/{graph,tests,bench} | xargs grep -L '^plugins:')  # those: plugin.sh
 echo "$walked graphs and profiles admitted"
 [ $walked -ge 25 ] || fail "only $walked graphs were found"
 finish

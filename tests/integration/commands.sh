@@ -26,6 +26,7 @@ writes() {
 
 tells robot_client "$takt" nodes
 tells disparities "$takt" nodes stereo
+[ ! -x "$(dirname "$takt")/takt-bench" ] || tells "what to measure" "$takt" bench --help
 expect 0 "" "$takt" devices --json
 python3 -m json.tool "$work/stdout" >/dev/null || fail "devices: no JSON"
 

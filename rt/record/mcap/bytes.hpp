@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Installed as <takt/record/mcap/bytes.hpp>: record, experimental.
 // Little-endian bytes of MCAP records: written into a buffer, read with every length checked.
 #pragma once
 #include <bit>

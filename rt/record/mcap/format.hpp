@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Installed as <takt/record/mcap/format.hpp>: record, experimental.
 // The MCAP container as its public format specification (version 0) has it: what is in a file, apart from the bytes.
 #pragma once
 #include <array>

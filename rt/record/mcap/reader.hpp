@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Installed as <takt/record/mcap/reader.hpp>: record, experimental.
 #pragma once
 #include <cstdint>
 #include <filesystem>

@@ -10,6 +10,7 @@
 #include <memory>
 #include <opencv2/imgcodecs.hpp>
 
+#include "graph/ace/ace_registry.hpp"
 #include "graph/attach/message_text.hpp"
 #include "graph/attach/parameters.hpp"
 #include "graph/attach/server.hpp"
@@ -56,7 +57,7 @@ struct Folder : test::TemporaryFolder {
 /// The shipped graph, as far as it is known without any device, with one output that this test writes.
 struct Scene {
   Folder folder;
-  NodeTypes types = graph::node_types();
+  Registry registry = ace_registry();
   graph::GraphSpec spec;
   Plan plan;
   std::unique_ptr<RunBoard> board;
@@ -129,7 +130,7 @@ TEST_CASE("every message type becomes JSON with one entry a field, and those tha
 TEST_CASE("top, stop and unknown questions over the socket") {
   Scene scene;
   scene.board->task(0).completed.store(17);
-  const attach::Server server({scene.spec, scene.plan, *scene.board, *scene.transport});
+  const attach::Server server({scene.registry, scene.spec, scene.plan, *scene.board, *scene.transport});
   REQUIRE(server.lacks().empty());
   CHECK(attach::running() == std::vector<int>{getpid()});
   const Json top = scene.ask({{"do", "top"}});
@@ -155,7 +156,7 @@ TEST_CASE("echo gives each new message once, and lets it go") {
     writer->publish(1, 0, 0);
   };
   publish(500);
-  const attach::Server server({scene.spec, scene.plan, *scene.board, *scene.transport});
+  const attach::Server server({scene.registry, scene.spec, scene.plan, *scene.board, *scene.transport});
   auto connection = attach::connect_to(getpid());
   REQUIRE(connection);
   REQUIRE(connection->write({{"do", "echo"}, {"port", "map.obstacles"}, {"as", "png"}, {"count", 2}}));
@@ -185,7 +186,7 @@ TEST_CASE("echo gives each new message once, and lets it go") {
 
 TEST_CASE("set refuses what the parameter would refuse, before the node sees it") {
   Scene scene;
-  const attach::Server server({scene.spec, scene.plan, *scene.board, *scene.transport});
+  const attach::Server server({scene.registry, scene.spec, scene.plan, *scene.board, *scene.transport});
   const auto error = [&](const char* param, const char* value) {
     return scene.ask({{"do", "set"}, {"param", param}, {"value", value}}).value("error", "");
   };
@@ -202,12 +203,12 @@ TEST_CASE("set refuses what the parameter would refuse, before the node sees it"
 TEST_CASE("a value that the node accepted stands in get and top, and with `keep` in the graph's overlay") {
   Scene scene;
   setenv("TAKT_STATE_DIR", (scene.folder.path / "state").c_str(), 1);
-  const auto node = scene.types.find("mapping_3d")->make();
+  const auto node = scene.registry.nodes.find("mapping_3d")->make();
   for (ParamBase* param : node->params()) param->end_setup();  // nothing was read: all are live
   scene.plan.tasks[0].node = node.get();
   scene.spec.nodes[0].params["share"] = {0.3, {}, graph::ChosenBy::command_line};
   scene.board = std::make_unique<RunBoard>(scene.plan);
-  const attach::Server server({scene.spec, scene.plan, *scene.board, *scene.transport});
+  const attach::Server server({scene.registry, scene.spec, scene.plan, *scene.board, *scene.transport});
   /// Asks, and does meanwhile what a job of the node does.
   const auto set = [&](const Json& question) {
     auto connection = attach::connect_to(getpid());
@@ -249,7 +250,7 @@ TEST_CASE("a value that the node accepted stands in get and top, and with `keep`
 
 TEST_CASE("a question of a wrong kind is refused, and the next one answered") {
   Scene scene;
-  const attach::Server server({scene.spec, scene.plan, *scene.board, *scene.transport});
+  const attach::Server server({scene.registry, scene.spec, scene.plan, *scene.board, *scene.transport});
   auto connection = attach::connect_to(getpid());
   REQUIRE(connection);
   for (const Json& question :
@@ -272,7 +273,7 @@ TEST_CASE("who listens and goes leaves the output to others, even if nothing is 
   const auto writer = scene.transport->make_writer(0);
   writer->loan();
   writer->publish(1, 0, 0);
-  const attach::Server server({scene.spec, scene.plan, *scene.board, *scene.transport});
+  const attach::Server server({scene.registry, scene.spec, scene.plan, *scene.board, *scene.transport});
   std::string why;
   const auto folder = attach::SocketFolder::own(attach::Surroundings::of_this_process(), why);
   REQUIRE(folder);

@@ -7,7 +7,8 @@
 #include "rt/msg/body_poses.hpp"
 #include "rt/msg/point.hpp"
 #include "rt/msg/point_cloud.hpp"
-#include "tests/unit/mapping_3d/node_harness.hpp"
+#include "rt/sched/port_access.hpp"
+#include "rt/testing.hpp"
 
 namespace takt {
 void register_body_pose(NodeTypes& types);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 
+#include "graph/ace/ace_registry.hpp"
 #include "rt/msg/laser_scan.hpp"
 #include "rt/msg/odometry.hpp"
 #include "rt/msg/velocity_command.hpp"
@@ -81,11 +82,11 @@ std::vector<std::string> names(const Plan& plan, SourceSet set) {
 Plan plan_of_ace(const std::string& mode) {
   graph::LoadOptions options;
   options.mode = mode;
-  const graph::Loaded loaded = graph::load(test::graph_folder() / "ace.yaml", options, graph::node_types());
+  const graph::Loaded loaded = graph::load(test::graph_folder() / "ace.yaml", options, ace_registry());
   for (const auto& problem : loaded.problems) MESSAGE(graph::to_string(problem));
   REQUIRE(loaded.graph);
   static VirtualClock clock;
-  Plan plan = graph::outline(*loaded.graph, graph::node_types(), clock).plan;
+  Plan plan = graph::outline(*loaded.graph, ace_registry(), clock).plan;
   for (TaskPlan& task : plan.tasks) task.node = nullptr;  // the composition is gone
   return plan;
 }

@@ -8,10 +8,12 @@
 #include <string_view>
 #include <vector>
 
+#include "graph/ace/ace_registry.hpp"
 #include "graph/compose/composition.hpp"
 #include "hal/camera/rig.hpp"
-#include "hal/drivers.hpp"
+#include "hal/devices.hpp"
 #include "hal/sim/simulation.hpp"
+#include "hal/sim/worlds.hpp"
 #include "rt/sched/executor.hpp"
 #include "tests/graph_folder.hpp"
 #include "tests/temporary_folder.hpp"
@@ -34,7 +36,7 @@ struct DriveGraph {
 };
 
 /// The nodes of a graph once it has run for `ns`, on one core under `cooperative`; what its jobs said goes to `faults`.
-inline std::vector<std::unique_ptr<Node>> drive(const DriveGraph& own, const NodeTypes& types, int64_t ns,
+inline std::vector<std::unique_ptr<Node>> drive(const DriveGraph& own, const Registry& registry, int64_t ns,
                                                 VirtualClock& clock, hal::Devices& devices,
                                                 std::vector<Fault>& faults) {
   using namespace std::string_literals;
@@ -44,17 +46,17 @@ inline std::vector<std::unique_ptr<Node>> drive(const DriveGraph& own, const Nod
   for (size_t at; (at = text.find('@')) != std::string::npos;) text.replace(at, 1, graph_folder().string());
   const TemporaryFolder folder;
   folder.write("schedule.yaml", "takt: 1\nname: drive\npolicy: cooperative\ncores: [0]\nnodes:"s.append(own.schedule));
-  graph::Loaded loaded = graph::load(folder.write("graph.yaml", text), {}, types);
+  graph::Loaded loaded = graph::load(folder.write("graph.yaml", text), {}, registry);
   for (const auto& problem : loaded.problems) MESSAGE(graph::to_string(problem));
   REQUIRE(loaded.graph);
   const graph::DeviceFactory factory =
       [&](const graph::DeviceSpec& spec) -> tl::expected<std::unique_ptr<Node>, graph::ComposeError> {
-    auto node =
-        hal::make_device({spec.id, spec.kind, spec.driver, spec.settings, loaded.graph->directory, 1}, devices, clock);
+    auto node = hal::make_device(
+        registry.devices, {spec.id, spec.kind, spec.driver, spec.settings, loaded.graph->directory, 1}, devices, clock);
     REQUIRE(node);
     return std::move(*node);
   };
-  auto composition = graph::compose(*loaded.graph, types, factory, clock, {folder.path, 1});
+  auto composition = graph::compose(*loaded.graph, registry, factory, clock, {folder.path, 1});
   REQUIRE(composition);
   const auto transport = make_local_transport(composition->plan.ports);
   Executor executor(composition->plan, *transport, clock, {ns, 0, false});
@@ -70,14 +72,14 @@ class Drive {
  public:
   /// Runs the graph for `ns`; its node type `probe` is Probe.
   Drive(const DriveGraph& graph, int64_t ns) {
-    NodeTypes types = graph::node_types();
-    types.add<Probe>("probe", Layer::storage, "test");
-    nodes_ = drive(graph, types, ns, clock_, devices_, faults_);
+    Registry registry = ace_registry();
+    registry.nodes.add<Probe>("probe", Layer::storage, "test");
+    nodes_ = drive(graph, registry, ns, clock_, devices_, faults_);
     for (const auto& node : nodes_)
       if (const auto* probe = dynamic_cast<const Probe*>(node.get())) probe_ = probe;
     REQUIRE(probe_ != nullptr);
   }
-  const sim::Simulation& world() { return *devices_.first_world(); }
+  const sim::Simulation& world() { return *sim::first_world(devices_); }
   const Probe& probe() const { return *probe_; }
   const std::vector<Fault>& faults() const { return faults_; }
 

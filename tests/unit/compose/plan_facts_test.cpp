@@ -8,6 +8,7 @@
 #include <mutex>
 #include <thread>
 
+#include "graph/ace/ace_registry.hpp"
 #include "graph/check/check.hpp"
 #include "graph/compose/partition.hpp"
 #include "tests/unit/compose/drive.hpp"
@@ -47,7 +48,7 @@ class SharedFacts final : public graph::FactExchange {
 graph::GraphSpec loaded(const char* file, const char* profile) {
   graph::LoadOptions options;
   options.profile = profile;
-  graph::Loaded result = graph::load(test::graph_folder() / file, options, graph::node_types());
+  graph::Loaded result = graph::load(test::graph_folder() / file, options, ace_registry());
   for (const auto& problem : result.problems) MESSAGE(graph::to_string(problem));
   REQUIRE(result.graph);
   return std::move(*result.graph);
@@ -65,11 +66,11 @@ void compose_in(Process& process, const graph::GraphSpec& graph, const graph::Co
       [&](const graph::DeviceSpec& d) -> tl::expected<std::unique_ptr<Node>, graph::ComposeError> {
     hal::DeviceConfig config{d.id, d.kind, d.driver, d.settings, graph.directory, 1};
     config.plugged = false;
-    auto node = hal::make_device(config, process.devices, process.clock);
+    auto node = hal::make_device(ace_registry().devices, config, process.devices, process.clock);
     if (node) return std::move(*node);
     return tl::make_unexpected(graph::ComposeError{{{d.position, node.error().text()}}, false});
   };
-  auto composed = graph::compose(graph, graph::node_types(), factory, process.clock, how);
+  auto composed = graph::compose(graph, ace_registry(), factory, process.clock, how);
   if (composed) process.composition = std::move(*composed);
   else MESSAGE(graph::to_string(composed.error().problems.front()));
 }
@@ -121,7 +122,7 @@ void check_graph(const char* file, const char* profile) {
   }
   for (const Process& process : processes) check_equal(graph, alone, process.composition.plan);
   const MonotonicClock clock;
-  graph::Composition supervisor = graph::outline(graph, graph::node_types(), clock);
+  graph::Composition supervisor = graph::outline(graph, ace_registry(), clock);
   graph::complete(supervisor.plan, facts, {});
   check_equal(graph, alone, supervisor.plan);
 }

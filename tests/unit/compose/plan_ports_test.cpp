@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Pools that the graph sizes, in runs that need all of them.
-#include "graph/compose/plan_ports.hpp"
+#include "rt/sched/plan_ports.hpp"
 
 #include <doctest/doctest.h>
 
@@ -86,7 +86,7 @@ TEST_CASE("a joined message is kept until the partner with its stamp can be ther
     chain.edge(source, sink, 0);
     chain.edge(two, sink, 1);
     chain.plan.tasks[sink].joins = {{0, 1}};
-    graph::size_ports(chain.plan);
+    size_ports(chain.plan);
     const auto transport = make_local_transport(chain.plan.ports);
     Executor executor(chain.plan, *transport, chain.clock, {20'000 * kMs, 0, false});
     executor.run();
@@ -109,7 +109,7 @@ TEST_CASE("a join in a loop is sized by the way from the device, and ends") {
   chain.edge(source, sink, 0);
   chain.edge(loop, sink, 1);
   chain.plan.tasks[sink].joins = {{0, 1}};
-  graph::size_ports(chain.plan);
+  size_ports(chain.plan);
   CHECK(chain.plan.ports[0].history >= 1 + 2 + 2 + 3);
   CHECK(chain.plan.ports[0].history < 20);
 }

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <functional>
 
+#include "graph/ace/ace_registry.hpp"
 #include "hal/discovery/discovery.hpp"
 #include "rt/msg/disparity.hpp"
 #include "rt/msg/grid.hpp"
@@ -21,7 +22,7 @@ namespace {
 graph::GraphSpec robot() {
   graph::LoadOptions options;
   options.profile = "robot";
-  graph::Loaded loaded = graph::load(test::graph_folder() / "ace.yaml", options, graph::node_types());
+  graph::Loaded loaded = graph::load(test::graph_folder() / "ace.yaml", options, ace_registry());
   for (const auto& problem : loaded.problems) MESSAGE(graph::to_string(problem));
   REQUIRE(loaded.graph);
   return std::move(*loaded.graph);
@@ -31,14 +32,14 @@ hal::DeviceConfig config_of(const graph::DeviceSpec& device, const graph::GraphS
   return {device.id, device.kind, device.driver, device.settings, graph.directory, 1};
 }
 
-graph::Composition composed(const graph::GraphSpec& graph, const NodeTypes& types, hal::Devices& devices,
+graph::Composition composed(const graph::GraphSpec& graph, const Registry& types, hal::Devices& devices,
                             const Clock& clock, const std::filesystem::path& folder,
                             const std::function<void(hal::DeviceConfig&)>& change) {
   const graph::DeviceFactory factory =
       [&](const graph::DeviceSpec& spec) -> tl::expected<std::unique_ptr<Node>, graph::ComposeError> {
     hal::DeviceConfig config = config_of(spec, graph);
     change(config);
-    auto node = hal::make_device(config, devices, clock);
+    auto node = hal::make_device(types.devices, config, devices, clock);
     if (!node) FAIL(node.error().text());
     return std::move(*node);
   };
@@ -118,7 +119,7 @@ TEST_CASE("ace on the robot: every node is set up while no device is plugged in,
   const graph::GraphSpec graph = robot();
   hal::Devices devices;
   const MonotonicClock clock;
-  const auto composition = composed(graph, graph::node_types(), devices, clock, folder.path,
+  const auto composition = composed(graph, ace_registry(), devices, clock, folder.path,
                                     [](hal::DeviceConfig& config) { config.plugged = false; });
   for (const char* camera : {"head_camera", "ground_camera"}) {
     const Capacity& images = port_of(composition.plan, camera, "pair").capacity;
@@ -133,6 +134,7 @@ TEST_CASE("ace on the robot: every node is set up while no device is plugged in,
 
 TEST_CASE("ace on the robot: what is wrong with settings is told without a device, too") {
   const graph::GraphSpec graph = robot();
+  const Registry known = ace_registry();
   hal::Devices devices;
   const MonotonicClock clock;
   const auto told = [&](const char* id, const char* setting, const nlohmann::json& value) {
@@ -141,7 +143,7 @@ TEST_CASE("ace on the robot: what is wrong with settings is told without a devic
     hal::DeviceConfig config = config_of(*device, graph);
     config.plugged = false;
     config.settings[setting] = value;
-    const auto node = hal::make_device(config, devices, clock);
+    const auto node = hal::make_device(known.devices, config, devices, clock);
     REQUIRE_FALSE(node.has_value());
     return node.error().text();
   };
@@ -184,7 +186,7 @@ profiles:
   robot:
     stop: {type: obstacle_stop, in: {scan: laser.scan, lines: lines.state}}
 )");
-  const graph::Loaded loaded = graph::load(file, {}, graph::node_types());
+  const graph::Loaded loaded = graph::load(file, {}, ace_registry());
   for (const auto& problem : loaded.problems) MESSAGE(graph::to_string(problem));
   CHECK(loaded.graph);
 }
@@ -195,8 +197,8 @@ TEST_CASE("ace on the robot: raw pairs become disparities and a ground map, with
   add_probe(graph);
   graph.schedule.policy = Policy::cooperative;
   graph.schedule.cores = {0, 1};
-  NodeTypes types = graph::node_types();
-  types.add<Probe>("probe", Layer::storage, "test");
+  Registry types = ace_registry();
+  types.nodes.add<Probe>("probe", Layer::storage, "test");
   hal::Devices devices;
   VirtualClock clock{1'000'000'000};
   const auto composition = composed(graph, types, devices, clock, folder.path, [](hal::DeviceConfig& config) {

@@ -9,7 +9,8 @@
 #include "rt/msg/motion.hpp"
 #include "rt/msg/odometry.hpp"
 #include "rt/msg/pose.hpp"
-#include "tests/unit/mapping_3d/node_harness.hpp"
+#include "rt/sched/port_access.hpp"
+#include "rt/testing.hpp"
 
 namespace takt {
 void register_ego_motion(NodeTypes& types);

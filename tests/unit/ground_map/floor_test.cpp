@@ -11,7 +11,7 @@
 #include "rt/msg/geometry.hpp"
 #include "rt/msg/laser_scan.hpp"
 #include "rt/msg/odometry.hpp"
-#include "tests/unit/mapping_3d/node_harness.hpp"
+#include "rt/testing.hpp"
 
 using namespace takt;
 using namespace takt::ground_map;

@@ -18,11 +18,12 @@
 #include "rt/msg/motion.hpp"
 #include "rt/msg/odometry.hpp"
 #include "rt/msg/terrain.hpp"
+#include "rt/sched/port_access.hpp"
+#include "rt/testing.hpp"
 #include "rt/transform/pose_math.hpp"
 #include "tests/nanoseconds.hpp"
 #include "tests/temporary_folder.hpp"
 #include "tests/unit/ground_map/camera.hpp"
-#include "tests/unit/mapping_3d/node_harness.hpp"
 
 namespace takt {
 void register_ground_map(NodeTypes& types);

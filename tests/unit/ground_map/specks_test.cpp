@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "rt/msg/laser_scan.hpp"
-#include "tests/unit/mapping_3d/node_harness.hpp"
+#include "rt/testing.hpp"
 
 using namespace takt;
 using namespace takt::ground_map;

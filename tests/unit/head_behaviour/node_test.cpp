@@ -10,8 +10,9 @@
 #include "rt/msg/head.hpp"
 #include "rt/msg/image.hpp"
 #include "rt/msg/pose.hpp"
+#include "rt/sched/port_access.hpp"
+#include "rt/testing.hpp"
 #include "tests/nanoseconds.hpp"
-#include "tests/unit/mapping_3d/node_harness.hpp"
 
 namespace takt {
 void register_head_behaviour(NodeTypes& types);

@@ -12,9 +12,10 @@
 #include "hal/stream/pseudo_terminal.hpp"
 #include "rt/msg/robot_task.hpp"
 #include "rt/msg/text_status.hpp"
+#include "rt/sched/port_access.hpp"
+#include "rt/testing.hpp"
 #include "tests/conformance/devices.hpp"
 #include "tests/temporary_folder.hpp"
-#include "tests/unit/mapping_3d/node_harness.hpp"
 
 using namespace takt;
 

@@ -8,7 +8,8 @@
 #include "rt/msg/laser_scan.hpp"
 #include "rt/msg/odometry.hpp"
 #include "rt/msg/point_cloud.hpp"
-#include "tests/unit/mapping_3d/node_harness.hpp"
+#include "rt/sched/port_access.hpp"
+#include "rt/testing.hpp"
 
 namespace takt {
 void register_laser_cloud(NodeTypes& types);

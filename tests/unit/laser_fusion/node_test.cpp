@@ -10,7 +10,8 @@
 #include "rt/msg/point.hpp"
 #include "rt/msg/point_cloud.hpp"
 #include "rt/msg/pose.hpp"
-#include "tests/unit/mapping_3d/node_harness.hpp"
+#include "rt/sched/port_access.hpp"
+#include "rt/testing.hpp"
 
 namespace takt {
 void register_laser_fusion(NodeTypes& types);

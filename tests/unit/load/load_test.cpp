@@ -7,8 +7,8 @@
 #include "nodes/load/burn.hpp"
 #include "rt/memory/memory_use.hpp"
 #include "rt/msg/text_status.hpp"
+#include "rt/testing.hpp"
 #include "tests/nanoseconds.hpp"
-#include "tests/unit/mapping_3d/node_harness.hpp"
 
 namespace takt {
 void register_load(NodeTypes& types);

@@ -12,8 +12,8 @@
 #include "nodes/mapping_3d/sliding_grid.hpp"
 #include "rt/msg/grid.hpp"
 #include "rt/msg/point.hpp"
+#include "rt/testing.hpp"
 #include "tests/temporary_folder.hpp"
-#include "tests/unit/mapping_3d/node_harness.hpp"
 
 using namespace takt;
 using namespace takt::mapping_3d;

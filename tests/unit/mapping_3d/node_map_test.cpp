@@ -18,9 +18,10 @@
 #include "rt/msg/point.hpp"
 #include "rt/msg/point_cloud.hpp"
 #include "rt/msg/pose.hpp"
+#include "rt/sched/port_access.hpp"
+#include "rt/testing.hpp"
 #include "rt/transform/pose_math.hpp"
 #include "tests/temporary_folder.hpp"
-#include "tests/unit/mapping_3d/node_harness.hpp"
 
 namespace takt {
 void register_mapping_3d(NodeTypes& types);

@@ -18,8 +18,9 @@
 #include "rt/msg/motion.hpp"
 #include "rt/msg/odometry.hpp"
 #include "rt/msg/point_cloud.hpp"
+#include "rt/sched/port_access.hpp"
+#include "rt/testing.hpp"
 #include "rt/transform/pose_math.hpp"
-#include "tests/unit/mapping_3d/node_harness.hpp"
 
 namespace takt {
 void register_mapping_3d(NodeTypes& types);

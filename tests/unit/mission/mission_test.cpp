@@ -11,7 +11,7 @@
 #include "nodes/mission/pointing.hpp"
 #include "rt/memory/memory_use.hpp"
 #include "rt/msg/body_poses.hpp"
-#include "tests/unit/mapping_3d/node_harness.hpp"
+#include "rt/testing.hpp"
 
 using namespace takt;
 using namespace takt::mission;

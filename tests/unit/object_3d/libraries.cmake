@@ -1,3 +1,3 @@
 # SPDX-License-Identifier: Apache-2.0
 # The node also runs in a graph.
-set(ROOM_TEST_LIBRARIES takt_object_3d_evaluate takt_compose takt_allocation_counter)
+set(ROOM_TEST_LIBRARIES takt_object_3d_evaluate takt_allocation_counter takt_compose takt_ace)

@@ -9,9 +9,10 @@
 #include "rt/msg/detections.hpp"
 #include "rt/msg/objects_3d.hpp"
 #include "rt/msg/point_cloud.hpp"
+#include "rt/sched/port_access.hpp"
+#include "rt/testing.hpp"
 #include "tests/graph_folder.hpp"
 #include "tests/temporary_folder.hpp"
-#include "tests/unit/mapping_3d/node_harness.hpp"
 #include "tests/unit/object_3d/scene_cloud.hpp"
 
 namespace takt {

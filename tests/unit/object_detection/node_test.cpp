@@ -10,7 +10,8 @@
 #include "nodes/object_detection/scenes.hpp"
 #include "rt/msg/detections.hpp"
 #include "rt/msg/image.hpp"
-#include "tests/unit/mapping_3d/node_harness.hpp"
+#include "rt/sched/port_access.hpp"
+#include "rt/testing.hpp"
 #include "tests/unit/object_detection/objects.hpp"
 
 namespace takt {

@@ -14,8 +14,9 @@
 #include "rt/record/log_file.hpp"
 #include "rt/record/replayer.hpp"
 #include "rt/sched/param_mail.hpp"
+#include "rt/sched/port_access.hpp"
+#include "rt/testing.hpp"
 #include "tests/temporary_folder.hpp"
-#include "tests/unit/mapping_3d/node_harness.hpp"
 #include "tests/unit/record/recorded_run.hpp"
 
 namespace takt {

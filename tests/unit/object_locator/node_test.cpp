@@ -13,9 +13,10 @@
 #include "rt/msg/head.hpp"
 #include "rt/msg/image.hpp"
 #include "rt/msg/object_reports.hpp"
+#include "rt/sched/port_access.hpp"
+#include "rt/testing.hpp"
 #include "tests/nanoseconds.hpp"
 #include "tests/temporary_folder.hpp"
-#include "tests/unit/mapping_3d/node_harness.hpp"
 
 namespace takt {
 void register_object_locator(NodeTypes& types);

@@ -11,7 +11,8 @@
 #include "rt/msg/odometry.hpp"
 #include "rt/msg/stop_command.hpp"
 #include "rt/msg/velocity_command.hpp"
-#include "tests/unit/mapping_3d/node_harness.hpp"
+#include "rt/sched/port_access.hpp"
+#include "rt/testing.hpp"
 #include "tests/unit/sim/small_world.hpp"
 
 namespace takt {

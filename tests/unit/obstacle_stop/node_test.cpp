@@ -13,8 +13,9 @@
 #include "rt/msg/odometry.hpp"
 #include "rt/msg/stop_command.hpp"
 #include "rt/msg/velocity_command.hpp"
+#include "rt/sched/port_access.hpp"
+#include "rt/testing.hpp"
 #include "tests/nanoseconds.hpp"
-#include "tests/unit/mapping_3d/node_harness.hpp"
 
 namespace takt {
 void register_obstacle_stop(NodeTypes& types);

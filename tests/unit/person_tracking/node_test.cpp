@@ -10,7 +10,8 @@
 #include "rt/msg/odometry.hpp"
 #include "rt/msg/pose.hpp"
 #include "rt/msg/velocity_command.hpp"
-#include "tests/unit/mapping_3d/node_harness.hpp"
+#include "rt/sched/port_access.hpp"
+#include "rt/testing.hpp"
 
 namespace takt {
 void register_person_tracking(NodeTypes& types);

@@ -12,8 +12,9 @@
 #include "rt/memory/memory_use.hpp"
 #include "rt/msg/object_reports.hpp"
 #include "rt/msg/text_status.hpp"
+#include "rt/sched/port_access.hpp"
+#include "rt/testing.hpp"
 #include "tests/temporary_folder.hpp"
-#include "tests/unit/mapping_3d/node_harness.hpp"
 
 namespace takt {
 void register_moments(NodeTypes& types);

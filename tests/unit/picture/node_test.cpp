@@ -17,8 +17,9 @@
 #include "rt/msg/point.hpp"
 #include "rt/msg/point_cloud.hpp"
 #include "rt/msg/terrain.hpp"
+#include "rt/sched/port_access.hpp"
+#include "rt/testing.hpp"
 #include "tests/temporary_folder.hpp"
-#include "tests/unit/mapping_3d/node_harness.hpp"
 
 namespace takt {
 void register_picture(NodeTypes& types);

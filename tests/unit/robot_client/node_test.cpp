@@ -11,8 +11,9 @@
 #include "rt/msg/robot_task.hpp"
 #include "rt/msg/text_status.hpp"
 #include "rt/msg/velocity_command.hpp"
+#include "rt/sched/port_access.hpp"
+#include "rt/testing.hpp"
 #include "tests/graph_folder.hpp"
-#include "tests/unit/mapping_3d/node_harness.hpp"
 
 namespace takt {
 void register_robot_client(NodeTypes& types);

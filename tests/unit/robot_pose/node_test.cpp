@@ -9,8 +9,9 @@
 #include "rt/msg/motion.hpp"
 #include "rt/msg/odometry.hpp"
 #include "rt/msg/pose.hpp"
+#include "rt/sched/port_access.hpp"
+#include "rt/testing.hpp"
 #include "tests/nanoseconds.hpp"
-#include "tests/unit/mapping_3d/node_harness.hpp"
 
 namespace takt {
 void register_robot_pose(NodeTypes& types);

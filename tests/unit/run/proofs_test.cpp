@@ -2,6 +2,7 @@
 // What was proven beside what is seen, on jobs whose time is told: planted errors are found, and each cause is named.
 #include <doctest/doctest.h>
 
+#include "graph/ace/ace_registry.hpp"
 #include "graph/run/report.hpp"
 #include "graph/run/support.hpp"
 #include "rt/memory/memory_use.hpp"
@@ -110,13 +111,14 @@ struct Scene {
     }
     StallLog log;
     for (const Stall& stall : stalls) log.add(stall);
+    static const Registry known = ace_registry();
     RunResult result;
     result.epoch_ns = kEpoch;
     result.end_ns = kEpoch + jobs * kPeriod;
     result.policy_granted = granted;
     result.released = {static_cast<uint64_t>(jobs), static_cast<uint64_t>(jobs)};
     Json report = command::make_report(
-        RunFacts{graph, plan, *board, result, *transport, {}, "real", "fixed", "none", {}, {}, proofs, log});
+        RunFacts{known, graph, plan, *board, result, *transport, {}, "real", "fixed", "none", {}, {}, proofs, log});
     exit = command::run_exit(*board, granted, report);
     return report;
   }

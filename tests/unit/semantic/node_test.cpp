@@ -16,8 +16,9 @@
 #include "rt/msg/stop_command.hpp"
 #include "rt/msg/terrain.hpp"
 #include "rt/msg/text_status.hpp"
+#include "rt/sched/port_access.hpp"
+#include "rt/testing.hpp"
 #include "tests/nanoseconds.hpp"
-#include "tests/unit/mapping_3d/node_harness.hpp"
 #include "tests/unit/semantic/report_message.hpp"
 
 namespace takt {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "rt/msg/object_reports.hpp"
-#include "tests/unit/mapping_3d/node_harness.hpp"
+#include "rt/testing.hpp"
 #include "tests/unit/semantic/report_message.hpp"
 
 using namespace takt;

@@ -7,7 +7,7 @@
 #include "rt/msg/grid.hpp"
 #include "rt/msg/requests.hpp"
 #include "rt/msg/stop_command.hpp"
-#include "tests/unit/mapping_3d/node_harness.hpp"
+#include "rt/testing.hpp"
 
 using namespace takt;
 using namespace takt::semantic;

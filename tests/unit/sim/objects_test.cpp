@@ -9,9 +9,9 @@
 #include "hal/sim/sim_objects.hpp"
 #include "rt/msg/action.hpp"
 #include "rt/msg/object_reports.hpp"
+#include "rt/testing.hpp"
 #include "tests/conformance/devices.hpp"
 #include "tests/has.hpp"
-#include "tests/unit/mapping_3d/node_harness.hpp"
 #include "tests/unit/sim/acting_world.hpp"
 
 using namespace takt;

@@ -11,8 +11,9 @@
 #include "rt/msg/disparity.hpp"
 #include "rt/msg/image.hpp"
 #include "rt/msg/point_cloud.hpp"
+#include "rt/sched/port_access.hpp"
+#include "rt/testing.hpp"
 #include "tests/temporary_folder.hpp"
-#include "tests/unit/mapping_3d/node_harness.hpp"
 #include "tests/unit/traffic_signs/signs.hpp"
 
 namespace takt {

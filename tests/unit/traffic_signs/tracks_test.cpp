@@ -5,7 +5,7 @@
 
 #include "nodes/traffic_signs/distance.hpp"
 #include "rt/msg/disparity.hpp"
-#include "tests/unit/mapping_3d/node_harness.hpp"
+#include "rt/testing.hpp"
 
 using namespace takt;
 using namespace takt::traffic_signs;

@@ -9,7 +9,8 @@
 #include "rt/msg/grid.hpp"
 #include "rt/msg/laser_scan.hpp"
 #include "rt/msg/odometry.hpp"
-#include "tests/unit/mapping_3d/node_harness.hpp"
+#include "rt/sched/port_access.hpp"
+#include "rt/testing.hpp"
 #include "tests/unit/traversability/tilted_laser.hpp"
 
 namespace takt {

@@ -7,6 +7,7 @@
 #include <random>
 #include <string>
 
+#include "graph/ace/ace_registry.hpp"
 #include "graph/compose/composition.hpp"
 #include "graph/view/diagram.hpp"
 #include "tests/graph_folder.hpp"
@@ -14,15 +15,13 @@
 namespace takt::test {
 
 inline graph::GraphSpec load_ace() {
-  auto loaded = graph::load(takt::test::graph_folder() / "ace.yaml", {}, graph::node_types());
+  auto loaded = graph::load(takt::test::graph_folder() / "ace.yaml", {}, ace_registry());
   for (const auto& problem : loaded.problems) MESSAGE(graph::to_string(problem));
   REQUIRE(loaded.graph);
   return *loaded.graph;
 }
 
-inline view::Diagram ace_diagram() {
-  return view::make_diagram(load_ace(), graph::node_types(), graph::hal_catalogue());
-}
+inline view::Diagram ace_diagram() { return view::make_diagram(load_ace(), ace_registry()); }
 
 /// `devices` devices and `nodes` nodes in rooms; edges mostly forward, some against the order, some to devices.
 inline view::Diagram random_diagram(unsigned seed, size_t devices, size_t nodes, size_t edges) {

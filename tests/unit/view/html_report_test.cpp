@@ -65,7 +65,7 @@ Json full_report() {
 
 TEST_CASE("The page shows what the report holds") {
   const test::TemporaryFolder folder;
-  const std::string page = html_report(full_report(), test::load_ace(), folder.path);
+  const std::string page = html_report(ace_registry(), full_report(), test::load_ace(), folder.path);
   for (const char* words :
        {"<!DOCTYPE html>", "ace on thesis", "NOT OK", "deadline granted (asked deadline), verified",
         "read back for 2 of 2 nodes", "20.0 s", "Some CPU", "60 ms taken by the host",
@@ -86,7 +86,7 @@ TEST_CASE("The page shows what the report holds") {
 TEST_CASE("The page is self-contained") {
   const test::TemporaryFolder folder;
   folder.write("left.png", "\x89PNG\r\n\x1a\n<not much>");
-  const std::string page = html_report(full_report(), test::load_ace(), folder.path);
+  const std::string page = html_report(ace_registry(), full_report(), test::load_ace(), folder.path);
   CHECK_FALSE(has(page, "<script"));
   CHECK_FALSE(has(page, "<link"));
   CHECK_FALSE(has(page, "url("));
@@ -101,7 +101,7 @@ TEST_CASE("The page is self-contained") {
 TEST_CASE("Histograms and timeline are drawn from the report") {
   const test::TemporaryFolder folder;
   const auto graph = test::load_ace();
-  const std::string page = html_report(full_report(), graph, folder.path);
+  const std::string page = html_report(ace_registry(), full_report(), graph, folder.path);
   CHECK(has(page, "up to 64 µs: 180 jobs"));
   CHECK(test::count(page, "class=\"bar\"") == 6);
   CHECK(has(page, ">core 0</text>"));
@@ -113,7 +113,7 @@ TEST_CASE("Histograms and timeline are drawn from the report") {
   CHECK(test::count(page, "late deadline\" d=\"M") == 1);
   Json report = full_report();
   report["timeline"][1]["finish_ms"] = 1109.0;
-  CHECK(test::count(html_report(report, graph, folder.path), "late deadline\" d=\"M") == 0);
+  CHECK(test::count(html_report(ace_registry(), report, graph, folder.path), "late deadline\" d=\"M") == 0);
 }
 
 TEST_CASE("Buckets too fine to be seen are added up, none is lost") {
@@ -123,7 +123,7 @@ TEST_CASE("Buckets too fine to be seen are added up, none is lost") {
   Json fine = Json::array();
   for (int i = 0; i < 700; ++i) fine.push_back({40 * std::pow(2, i / 128.0), i % 3});
   report["nodes"][0]["lateness_histogram_us"] = fine;
-  const std::string page = html_report(report, test::load_ace(), folder.path);
+  const std::string page = html_report(ace_registry(), report, test::load_ace(), folder.path);
   int jobs = 0;
   size_t bars = 0;
   for (size_t at = page.find("<title>up to "); at != std::string::npos; at = page.find("<title>up to ", at + 1), ++bars)
@@ -140,7 +140,7 @@ TEST_CASE("Jobs that overlap on one core stand in two lanes") {
     report["timeline"][2]["cpu"] = 0;
     report["timeline"][1]["start_ms"] = second_start_ms;
     report["timeline"][1]["finish_ms"] = 1090.0;
-    const std::string page = html_report(report, graph, folder.path);
+    const std::string page = html_report(ace_registry(), report, graph, folder.path);
     const size_t at = page.find("class=\"lane\""), height = page.find("height=\"", at);
     return std::stod(page.substr(height + 8));
   };
@@ -153,7 +153,7 @@ TEST_CASE("Pictures of the output folder are inlined") {
   folder.write("a<b.png", std::string("\x89PNG\r\n\x1a\n") + "abc");
   folder.write("fake.png", "GIF89a");
   folder.write("notes.txt", "text");
-  const std::string page = html_report(full_report(), test::load_ace(), folder.path);
+  const std::string page = html_report(ace_registry(), full_report(), test::load_ace(), folder.path);
   CHECK(has(page, "src=\"data:image/png;base64,iVBORw0KGgphYg==\"><figcaption>track.png</figcaption>"));
   CHECK(has(page, "src=\"data:image/png;base64,iVBORw0KGgphYmM=\"><figcaption>a&lt;b.png</figcaption>"));
   CHECK(has(page, "fake.png: is no PNG image"));
@@ -169,11 +169,12 @@ TEST_CASE("What the report lacks is said, key by key") {
     report.erase(key);
     const std::string erased = key;
     CAPTURE(erased);
-    const size_t with = test::count(html_report(full, graph, folder.path), "not recorded");
+    const size_t with = test::count(html_report(ace_registry(), full, graph, folder.path), "not recorded");
     const bool in_graph_too = key == "graph";
-    CHECK(test::count(html_report(report, graph, folder.path), "not recorded") >= with + (in_graph_too ? 0 : 1));
+    CHECK(test::count(html_report(ace_registry(), report, graph, folder.path), "not recorded") >=
+          with + (in_graph_too ? 0 : 1));
   }
-  const std::string empty = html_report(Json::object(), graph, folder.path);
+  const std::string empty = html_report(ace_registry(), Json::object(), graph, folder.path);
   CHECK(test::count(empty, "not recorded") >= 15);
   CHECK(has(empty, "<svg xmlns"));
 }
@@ -185,7 +186,7 @@ TEST_CASE("A histogram or timeline that is missing is said; an empty one has no 
   report["nodes"][0].erase("lateness_histogram_us");
   report["nodes"][1]["lateness_histogram_us"] = Json::array();
   report["timeline"] = Json::array();
-  const std::string page = html_report(report, graph, folder.path);
+  const std::string page = html_report(ace_registry(), report, graph, folder.path);
   CHECK(has(page, "<h3>stereo</h3>\n<p class=\"note\">not recorded</p>"));
   CHECK(has(page, "<h3>ego_motion</h3>\n<p class=\"note\">no sample</p>"));
   CHECK(has(page, "no job in this second"));
@@ -195,7 +196,9 @@ TEST_CASE("Values of the wrong kind never throw") {
   const test::TemporaryFolder folder;
   const auto graph = test::load_ace();
   const Json full = full_report();
-  const auto survives = [&](const Json& report) { CHECK(has(html_report(report, graph, folder.path), "</html>")); };
+  const auto survives = [&](const Json& report) {
+    CHECK(has(html_report(ace_registry(), report, graph, folder.path), "</html>"));
+  };
   for (const Json& wrong : {Json(nullptr), Json("text"), Json(-1.5), Json(1e300),
                             Json::array({1, "a", nullptr, Json::array()}), Json::object({{"a", 1}}), Json(true)}) {
     survives(wrong);
@@ -212,7 +215,7 @@ TEST_CASE("Values of the wrong kind never throw") {
     for (const auto& [key, value] : full["timeline"][0].items()) {
       Json report = full;
       report["timeline"][0][key] = wrong;
-      CHECK(html_report(report, graph, folder.path).size() < 2'000'000);
+      CHECK(html_report(ace_registry(), report, graph, folder.path).size() < 2'000'000);
     }
   }
 }

@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "fixture.hpp"
+#include "graph/ace/ace_registry.hpp"
 #include "graph/view/graph_pictures.hpp"
 #include "graph/view/markup.hpp"
 #include "tests/graph_folder.hpp"
@@ -157,9 +158,9 @@ TEST_CASE("The listing wraps long ids") {
 TEST_CASE("What a mode leaves out is not drawn, and its edges neither") {
   graph::LoadOptions options;
   options.mode = "no_stereo";
-  const auto loaded = graph::load(takt::test::graph_folder() / "ace.yaml", options, graph::node_types());
+  const auto loaded = graph::load(takt::test::graph_folder() / "ace.yaml", options, ace_registry());
   REQUIRE(loaded.graph);
-  const Diagram diagram = make_diagram(*loaded.graph, graph::node_types(), graph::hal_catalogue());
+  const Diagram diagram = make_diagram(*loaded.graph, ace_registry());
   CHECK(diagram.boxes.size() == loaded.graph->nodes.size() + loaded.graph->devices.size());
   for (const auto& box : diagram.boxes) CHECK(box.id != "stereo");
 }

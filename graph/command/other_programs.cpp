@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "graph/command/other_programs.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <sstream>
+
+#include "graph/cli/outcome.hpp"
+#include "graph/language/words.hpp"
+
+namespace takt::command {
+namespace {
+
+constexpr DeskCommand kDeskCommands[] = {
+    {"bench", "measures the runtime and the algorithms against references", "takt-bench"},
+    {"calibrate", "measures cameras and lasers from recordings", "takt-tools"},
+    {"cloud", "filters point clouds in PLY and PCD files", "takt-tools"},
+    {"eval", "measures quality against ground truth", "takt-eval"},
+    {"objects", "the database of known objects: what is in it, learning, tuning", "takt-tools"},
+    {"terrain", "kinds of terrain that ground_map tells apart", "takt-tools"},
+    {"train", "learns what nodes look for", "takt-tools"},
+};
+
+std::vector<std::filesystem::path> program_folders() {
+  std::error_code unreadable;
+  const auto beside = std::filesystem::read_symlink("/proc/self/exe", unreadable).parent_path();
+  std::vector<std::filesystem::path> folders{beside.parent_path() / "libexec/takt", beside};
+  const char* path = std::getenv("PATH");
+  std::istringstream parts(path != nullptr ? path : "");
+  for (std::string part; std::getline(parts, part, ':');) folders.emplace_back(part.empty() ? "." : part);
+  return folders;
+}
+
+}  // namespace
+
+std::span<const DeskCommand> desk_commands() { return kDeskCommands; }
+
+std::filesystem::path other_program(std::string_view name) {
+  if (name.empty() || name.find('/') != std::string_view::npos) return {};
+  for (const auto& folder : program_folders()) {
+    auto program = folder / fmt::format("takt-{}", name);
+    std::error_code ignored;
+    if (std::filesystem::is_regular_file(program, ignored) && access(program.c_str(), X_OK) == 0) return program;
+  }
+  return {};
+}
+
+int become_other_program(char** arguments, std::vector<std::string> own) {
+  const std::string name = arguments[1];
+  if (const auto program = other_program(name); !program.empty()) {
+    std::string first = program.string();
+    arguments[1] = first.data();  // which the program takes for its name
+    execv(program.c_str(), arguments + 1);
+    return refuse(fmt::format("{} cannot be started: {}", program.string(), std::strerror(errno)), kDeviceOrSystem);
+  }
+  const auto* desk = std::find_if(std::begin(kDeskCommands), std::end(kDeskCommands),
+                                  [&](const DeskCommand& command) { return command.name == name; });
+  if (desk != std::end(kDeskCommands))
+    return refuse(fmt::format("takt-{0} is neither in libexec/takt, nor beside this program, nor in PATH\n"
+                              "  fix: `./takt {0}` of a checkout builds it (target {1})",
+                              name, desk->target),
+                  kDeviceOrSystem);
+  for (const DeskCommand& command : kDeskCommands) own.emplace_back(command.name);
+  return refuse(
+      fmt::format("there is no command `{0}`, and no program takt-{0} in libexec/takt, beside this program or "
+                  "in PATH{1}",
+                  name, graph::alternatives(name, std::move(own), "commands are")),
+      kBadInput);
+}
+
+}  // namespace takt::command

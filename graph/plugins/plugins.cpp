@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "graph/plugins/plugins.hpp"
+
+#include <dlfcn.h>
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <poll.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <optional>
+
+#include "graph/cli/graph_file.hpp"
+#include "graph/cli/outcome.hpp"
+#include "graph/log/recorded_plan.hpp"
+#include "graph/plugin.hpp"
+
+namespace takt::plugin {
+namespace {
+
+using Result = tl::expected<void, std::string>;
+using Clock = std::chrono::steady_clock;
+
+size_t threads() {
+  size_t count = 0;
+  for ([[maybe_unused]] const auto& task : std::filesystem::directory_iterator("/proc/self/task")) ++count;
+  return count;
+}
+
+/// The trial also makes a node of each type that is new: constructors declare ports, and may fail, too.
+void make_new_nodes(const Registry& before, const Registry& after) {
+  for (const auto& [name, type] : after.nodes.all())
+    if (before.nodes.find(name) == nullptr) type.make();
+}
+
+Result load_here(const std::filesystem::path& file, Registry& registry, bool trial) {
+  const size_t threads_before = threads();
+  void* const library = dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
+  if (library == nullptr) {
+    const char* why = dlerror();
+    return tl::make_unexpected(fmt::format("cannot be loaded: {}", why != nullptr ? why : "the linker says no more"));
+  }
+  const auto add = reinterpret_cast<void (*)(Registry&)>(dlsym(library, "takt_plugin_register"));
+  if (add == nullptr) return tl::make_unexpected("has no function takt_plugin_register: TAKT_PLUGIN is missing");
+  try {
+    const std::optional<Registry> before = trial ? std::optional(registry) : std::nullopt;
+    add(registry);
+    if (trial) make_new_nodes(*before, registry);
+  } catch (const std::exception& error) {
+    return tl::make_unexpected(fmt::format("registers nothing: {}", error.what()));
+  } catch (...) {
+    return tl::make_unexpected("registers nothing: it throws what is no std::exception");
+  }
+  if (const size_t now = threads(); now > threads_before)
+    return tl::make_unexpected(
+        fmt::format("leaves {} thread{} behind, and processes must still be forked; a node makes "
+                    "its threads in start()",
+                    now - threads_before, now - threads_before == 1 ? "" : "s"));
+  return {};
+}
+
+/// Ends the process: the answer in the pipe is the error and a zero; only a zero if there is none.
+[[noreturn]] void try_in_child(const std::filesystem::path& file, Registry& registry, int answer) {
+  prctl(PR_SET_PDEATHSIG, SIGKILL);
+  setpgid(0, 0);  // ends together with processes of its own
+  const rlimit no_core{0, 0};
+  setrlimit(RLIMIT_CORE, &no_core);
+  dup2(STDERR_FILENO, STDOUT_FILENO);  // what it prints is no part of this command's output
+  const Result result = load_here(file, registry, true);
+  const std::string text = result ? std::string() : result.error();
+  const auto written = write(answer, text.c_str(), text.size() + 1);
+  _exit(written == static_cast<ssize_t>(text.size()) + 1 ? 0 : 1);
+}
+
+/// What the child says, without its zero; nothing if it never ends its answer. `late` if it had no time left.
+std::optional<std::string> answer_of(int pipe, std::chrono::milliseconds patience, bool& late) {
+  std::string text;
+  const auto until = Clock::now() + patience;
+  while (true) {
+    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(until - Clock::now()).count();
+    pollfd ready{pipe, POLLIN, 0};
+    const int polled = poll(&ready, 1, left > 0 ? static_cast<int>(left) : 0);
+    if (polled < 0 && errno == EINTR) continue;
+    late = polled == 0;
+    if (polled <= 0) return std::nullopt;
+    char bytes[512];
+    const ssize_t got = read(pipe, bytes, sizeof bytes);
+    if (got <= 0) return std::nullopt;
+    text.append(bytes, static_cast<size_t>(got));
+    if (text.back() == '\0') return text.substr(0, text.size() - 1);
+  }
+}
+
+std::string ending(int status) {
+  if (WIFSIGNALED(status))
+    return fmt::format("crashes while it is loaded: signal {} ({})", WTERMSIG(status), strsignal(WTERMSIG(status)));
+  return fmt::format("ends the process while it is loaded (exit {})", WEXITSTATUS(status));
+}
+
+Result try_out(const std::filesystem::path& file, Registry& registry, std::chrono::milliseconds patience) {
+  int ends[2];
+  if (pipe2(ends, O_CLOEXEC) != 0) return tl::make_unexpected(fmt::format("no pipe: {}", std::strerror(errno)));
+  std::fflush(nullptr);
+  const pid_t child = fork();
+  if (child == 0) try_in_child(file, registry, ends[1]);
+  const int fork_error = errno;
+  close(ends[1]);
+  bool late = false;
+  const auto answer = child > 0 ? answer_of(ends[0], patience, late) : std::nullopt;
+  close(ends[0]);
+  if (child < 0) return tl::make_unexpected(fmt::format("no process to try it in: {}", std::strerror(fork_error)));
+  if (late) kill(child, SIGKILL);
+  int status = 0;
+  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  kill(-child, SIGKILL);  // what it left running
+  if (late)
+    return tl::make_unexpected(
+        fmt::format("is still not loaded after {} s: an endless loop in an initialiser or in its function?",
+                    std::chrono::duration<double>(patience).count()));
+  if (!answer) return tl::make_unexpected(ending(status));
+  if (!answer->empty()) return tl::make_unexpected(*answer);
+  return {};
+}
+
+}  // namespace
+
+tl::expected<std::filesystem::path, std::string> find(const std::filesystem::path& file,
+                                                      const std::vector<std::filesystem::path>& folders) {
+  std::string looked;
+  for (const auto& folder : folders) {
+    const auto candidate = folder / file;  // an absolute file stays what it is
+    std::error_code ignored;
+    if (std::filesystem::is_regular_file(candidate, ignored)) return std::filesystem::absolute(candidate);
+    if (file.is_absolute()) break;
+    looked += fmt::format("{}{}", looked.empty() ? "; looked in " : ", ", folder.empty() ? "." : folder.string());
+  }
+  return tl::make_unexpected(fmt::format("plug-in {}: no such file{}", file.string(), looked));
+}
+
+std::filesystem::path folder() {
+  std::error_code unreadable;
+  return std::filesystem::read_symlink("/proc/self/exe", unreadable).parent_path().parent_path() / "lib/takt/plugins";
+}
+
+tl::expected<std::string, std::string> abi_of(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  const std::string content{std::istreambuf_iterator<char>(stream), {}};
+  if (!stream.is_open() || content.empty()) return tl::make_unexpected("cannot be read, or is empty");
+  const std::string begin = fmt::format("{}{}", kMark, "declarations=");
+  const size_t at = content.find(begin);
+  if (at == std::string::npos) return tl::make_unexpected("is no plug-in of Takt: TAKT_PLUGIN is missing");
+  return std::string(content.c_str() + at + kMark.size());
+}
+
+tl::expected<void, std::string> load(const std::filesystem::path& file, Registry& registry,
+                                     std::chrono::milliseconds patience) {
+  const auto named = [&](const std::string& why) {
+    return tl::make_unexpected(fmt::format("plug-in {}: {}", file.string(), why));
+  };
+  const auto abi = abi_of(file);
+  if (!abi) return named(abi.error());
+  if (*abi != kAbi)
+    return named(
+        fmt::format("was built for another Takt: {}; build it again with this one", abi_difference(*abi, kAbi)));
+  if (const Result tried = try_out(file, registry, patience); !tried) return named(tried.error());
+  if (const Result loaded = load_here(file, registry, false); !loaded) return named(loaded.error());
+  return {};
+}
+
+tl::expected<void, std::string> Plugins::add(const std::filesystem::path& file, const std::filesystem::path& beside) {
+  const std::string name = file.filename();
+  if (std::any_of(loaded_.begin(), loaded_.end(), [&](const auto& loaded) { return loaded.name == name; })) return {};
+  const auto found = find(file, {beside, folder()});
+  if (!found) return tl::make_unexpected(found.error());
+  const auto result = plugin::load(*found, registry_);
+  if (result) loaded_.push_back({name, log::file_hash(*found)});
+  return result;
+}
+
+int Plugins::load(const std::filesystem::path& graph, graph::LoadOptions& options) {
+  std::vector<graph::Problem> problems;
+  for (const auto& file : options.plugin_files)
+    if (const auto added = add(file, ""); !added) problems.push_back({{"--plugin", 0, 0}, added.error()});
+  if (!graph.empty())
+    for (const graph::PluginName& named : graph::plugins_of(graph))
+      if (const auto added = add(named.file, named.directory); !added)
+        problems.push_back({named.position, added.error()});
+  options.plugins = loaded_;
+  if (problems.empty()) return command::kOk;
+  command::tell(problems);
+  command::tell_problems(problems.size());
+  return command::kBadInput;
+}
+
+}  // namespace takt::plugin

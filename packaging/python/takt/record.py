@@ -1,0 +1,277 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Reads the records of `takt run --record FILE`: MCAP, with the layout of each message type in the file."""
+import array
+import json
+import struct
+import zlib
+
+from . import zstd
+
+try:
+    import numpy
+except ImportError:
+    numpy = None
+
+_MAGIC = b"\x89MCAP0\r\n"
+_SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _ATTACHMENT, _METADATA, _DATA_END = 3, 4, 5, 6, 9, 12, 15
+_NEWEST_FORMAT = 2
+_HEAD = struct.Struct("<QqqqiBQ")
+_SCALARS = {"u8": ("B", "u1"), "i16": ("h", "<i2"), "u16": ("H", "<u2"), "i32": ("i", "<i4"), "u32": ("I", "<u4"),
+            "i64": ("q", "<i8"), "u64": ("Q", "<u8"), "f32": ("f", "<f4"), "f64": ("d", "<f8")}
+
+
+class RecordError(ValueError):
+    """The file is no record, is damaged, or lacks what was asked for."""
+
+
+class _Reader:
+    def __init__(self, data, what):
+        self.data, self.at, self.what = memoryview(data), 0, what
+
+    def bytes(self, count):
+        if self.at + count > len(self.data):
+            raise RecordError(f"{self.what} ends too early")
+        self.at += count
+        return self.data[self.at - count:self.at]
+
+    def number(self, letter):
+        return struct.unpack("<" + letter, self.bytes(struct.calcsize("<" + letter)))[0]
+
+    def text(self):
+        return bytes(self.bytes(self.number("I"))).decode("utf-8", "replace")
+
+    def map(self):
+        inner, found = _Reader(self.bytes(self.number("I")), self.what), {}
+        while inner.at < len(inner.data):
+            key = inner.text()
+            found[key] = inner.text()
+        return found
+
+
+def _vector(data, scalar, width):
+    """Scalars that lie in `data`; rows of `width` if that is more than 1."""
+    letter, dtype = _SCALARS[scalar]
+    if numpy is not None:
+        flat = numpy.frombuffer(data, dtype=dtype)
+        return flat.reshape(-1, width) if width > 1 else flat
+    flat = array.array(letter, bytes(data))
+    return [flat[i:i + width] for i in range(0, len(flat), width)] if width > 1 else flat
+
+
+def text(values):
+    """The text that an array of bytes holds, as in fields of type text: text(port["text"][0])."""
+    return bytes(values).decode("utf-8", "replace")
+
+
+class Port:
+    """The messages of one output, in their order.
+
+        scans = record["front_laser.scan"]
+        for message in scans:
+            print(message["stamp_ns"], message["range_m"])
+
+    `stamps_ns`, `published_ns`, `sequences` and `levels` are arrays with one entry for each message; times are those of
+    the monotonic clock, in ns. `units` has the unit of each field. `port["FIELD"]` is one array for a scalar, a list of
+    arrays for anything longer. `whole` is False if the record kept only hashes: then fields raise RecordError.
+    """
+
+    def __init__(self, name, type_name, layout, whole):
+        self.name, self.type, self.whole = name, type_name, whole
+        self._fields = layout
+        self._heads, self._bodies = [], []
+        self._columns = None
+
+    def __len__(self):
+        return len(self._heads)
+
+    def __repr__(self):
+        return f"<takt.Port {self.name}: {len(self)} messages of type {self.type}>"
+
+    @property
+    def fields(self):
+        """Names of the fields, in the order of the type."""
+        return [field["name"] for field in self._fields]
+
+    @property
+    def units(self):
+        return {field["name"]: field["unit"] for field in self._fields}
+
+    sequences = property(lambda self: self._head(0, "u64"))
+    stamps_ns = property(lambda self: self._head(1, "i64"))
+    published_ns = property(lambda self: self._head(2, "i64"))
+    visible_at_ns = property(lambda self: self._head(3, "i64"))
+    levels = property(lambda self: self._head(4, "i32"))
+
+    def __getitem__(self, field):
+        if field not in self.fields:
+            raise RecordError(f"{self.name} has no field {field}; its fields: {', '.join(self.fields)}")
+        if not self.whole:
+            raise RecordError(f"{self.name} is recorded by hash only; record it with: --record-port {self.name}")
+        if self._columns is None:
+            messages = [self._unpack(body) for body in self._bodies]
+            self._columns = {name: [message[name] for message in messages] for name in self.fields}
+            for spec in self._fields:
+                if spec.get("count") == 1:
+                    self._columns[spec["name"]] = self._flat(self._columns[spec["name"]], spec["scalar"])
+        return self._columns[field]
+
+    def __iter__(self):
+        """Each message as a dict of its header and fields."""
+        keys = ("sequence", "stamp_ns", "published_ns", "visible_at_ns", "level")
+        for head, body in zip(self._heads, self._bodies):
+            yield dict(zip(keys, head)) | (self._unpack(body) if self.whole else {})
+
+    def _head(self, index, scalar):
+        return self._flat([head[index] for head in self._heads], scalar)
+
+    @staticmethod
+    def _flat(values, scalar):
+        letter, dtype = _SCALARS[scalar]
+        return numpy.array(values, dtype=dtype) if numpy is not None else array.array(letter, values)
+
+    def _add(self, data):
+        if len(data) < _HEAD.size:
+            raise RecordError(f"a message of {self.name} ends too early")
+        *head, whole, _ = _HEAD.unpack_from(data)
+        self.whole = self.whole and bool(whole)
+        self._heads.append(head)
+        self._bodies.append(data[_HEAD.size:])
+
+    def _unpack(self, body):
+        reader, message = _Reader(body, f"a message of {self.name}"), {}
+        for field in self._fields:
+            scalar, width = field["scalar"], field.get("array_of") or 1
+            count = reader.number("I") * width if "array_of" in field else field["count"]
+            data = reader.bytes(count * struct.calcsize("<" + _SCALARS[scalar][0]))
+            value = _vector(data, scalar, width)
+            message[field["name"]] = value[0] if field.get("count") == 1 else value
+        if reader.at != len(body):
+            raise RecordError(f"a message of {self.name} has {len(body) - reader.at} bytes that its layout does not")
+        return message
+
+
+class Record:
+    """A record that was read. `ports`: {"NODE.PORT": Port}; `info`: what was run; `attachments`: {name: bytes}, among
+    them graph.yaml and plan.json; `jobs` and `events`: how many are in it; `missing`: why the file is not whole (its
+    process was killed), else "". All up to there was read."""
+
+    def __init__(self):
+        self.ports, self.info, self.attachments = {}, {}, {}
+        self.jobs = self.events = 0
+        self.missing = "the file has no end"
+        self._schemas, self._channels, self._unpack = {}, {}, None
+
+    def __getitem__(self, port):
+        if port not in self.ports:
+            raise RecordError(f"the record has no port {port}; its ports: {', '.join(sorted(self.ports))}")
+        return self.ports[port]
+
+    def _take(self, op, fields):
+        if op == _SCHEMA:
+            number, name, encoding = fields.number("H"), fields.text(), fields.text()
+            self._schemas[number] = (name, encoding, fields.text())
+        elif op == _CHANNEL:
+            number, schema, topic, encoding = fields.number("H"), fields.number("H"), fields.text(), fields.text()
+            self._open_channel(number, schema, topic, encoding, fields.map())
+        elif op == _MESSAGE:
+            channel = fields.number("H")
+            fields.bytes(20)
+            self._message(channel, fields.data[fields.at:])
+        elif op == _CHUNK:
+            self._chunk(fields)
+        elif op == _ATTACHMENT:
+            fields.bytes(16)
+            name, _ = fields.text(), fields.text()
+            self.attachments[name] = bytes(fields.bytes(fields.number("Q")))
+        elif op == _METADATA:
+            name = fields.text()
+            found = fields.map()
+            if name == "takt" and int(found.get("format", "1")) > _NEWEST_FORMAT:
+                raise RecordError(f"the record has format {found['format']}, and this reader knows up to "
+                                  f"{_NEWEST_FORMAT}; use the takt of commit {found.get('commit', '?')}")
+            self.info.update(found)
+
+    def _open_channel(self, number, schema, topic, encoding, metadata):
+        if number in self._channels:
+            return
+        name, _, data = self._schemas.get(schema, ("", "", ""))
+        if name in ("takt.Job", "takt.Event"):
+            self._channels[number] = name
+            return
+        if encoding != "takt":
+            raise RecordError(f"{topic} has encoding {encoding}, not takt: this is an export; read the record itself")
+        whole = metadata.get("fields") != "hash"
+        self._channels[number] = self.ports[topic] = Port(topic, name.removeprefix("takt."),
+                                                          json.loads(data)["fields"], whole)
+
+    def _message(self, channel, data):
+        to = self._channels.get(channel)
+        if isinstance(to, Port):
+            to._add(data)
+        elif to == "takt.Job":
+            self.jobs += 1
+        elif to == "takt.Event":
+            self.events += 1
+        else:
+            raise RecordError(f"a message is of channel {channel}, which the file does not have")
+
+    def _chunk(self, fields):
+        fields.bytes(16)
+        size, crc, compression = fields.number("Q"), fields.number("I"), fields.text()
+        stored = fields.bytes(fields.number("Q"))
+        if compression not in ("", "zstd"):
+            raise RecordError(f"a chunk is compressed by {compression}; zstd alone is known")
+        if compression:
+            self._unpack = self._unpack or zstd.unpacker()
+            stored = self._unpack(bytes(stored), size)
+        if crc and zlib.crc32(stored) != crc:
+            raise ValueError("a chunk is damaged: its CRC does not fit")
+        self._records(_Reader(stored, "a chunk"))
+
+    def _records(self, reader):
+        while reader.at < len(reader.data):
+            op = reader.number("B")
+            self._take(op, _Reader(reader.bytes(reader.number("Q")), "a record"))
+            if op == _DATA_END:
+                self.missing = ""
+                return
+
+
+def read_record(path):
+    """Reads a record into memory.
+
+        record = takt.read_record("run.mcap")
+        for name, port in record.ports.items():
+            print(name, port.type, len(port))
+
+    Raises RecordError if the file is no record of Takt or has a newer format, ImportError if zstd is missing. A file of
+    a killed run is read up to its end or its first damaged chunk; `Record.missing` says so.
+    """
+    with open(path, "rb") as file:
+        data = file.read()
+    if not data.startswith(_MAGIC):
+        raise RecordError(f"{path} is no MCAP file; takt run --record FILE writes one")
+    record, reader = Record(), _Reader(data, "the file")
+    reader.at = len(_MAGIC)
+    try:
+        while record.missing and reader.at < len(data):
+            start = reader.at
+            op, size = reader.number("B"), reader.number("Q")
+            if reader.at + size > len(data):
+                record.missing = f"the file is cut off at byte {start}"
+                break
+            try:
+                record._records(_Reader(data[start:reader.at + size], "a record"))
+            except RecordError as problem:
+                raise RecordError(f"{path}: {problem}") from None
+            except ValueError as problem:
+                record.missing = f"{problem}, at byte {start}"
+                break
+            reader.at += size
+    except RecordError as problem:
+        if str(problem) != "the file ends too early":
+            raise
+        record.missing = "the file is cut off"
+    if not record._schemas and not record.info:
+        raise RecordError(f"{path} holds nothing of Takt")
+    return record

@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: Apache-2.0
+# Plug-ins in the stock command: found, refused with the reason, tried before they are loaded, contained in their jobs.
+source "$(dirname "$0")/lib.sh" "$@"
+built=$3
+
+cp "$source"/tests/integration/plugin/*.yaml "$built/libblink.so" "$work/"
+graph=$work/blink.yaml
+run() { "$takt" run "$graph" --for 1s --clock virtual --output "$work/out" "$@"; }
+
+# By the graph, by the command line, and from the plug-in folder of an installation.
+expect 0 "" run --report "$work/report.json" --record "$work/blink.mcap"
+python3 - "$work/report.json" <<'PY' || fail "the nodes of the plug-in did not run"
+import json, sys
+nodes = {n["name"]: n["completed"] for n in json.load(open(sys.argv[1]))["nodes"]}
+assert nodes == {"blinker": 20, "watcher": 20}, nodes
+PY
+expect 0 "" "$takt" check "$graph"
+expect 0 "" "$takt" show "$graph"
+expect 0 "" "$takt" nodes blinker --plugin "$work/libblink.so"
+grep -q "says on and off in turn" "$work/stdout" || fail "takt nodes --plugin does not know blinker"
+expect 2 "blinker" "$takt" nodes blinker
+grep -v "^plugins:" "$graph" >"$work/bare.yaml"
+expect 2 "blinker" "$takt" check "$work/bare.yaml"
+expect 0 "" "$takt" check "$work/bare.yaml" --plugin "$work/libblink.so"
+expect 0 "" "$takt" check "$graph" --plugin "$work/libblink.so"  # twice is once
+mkdir -p "$work/prefix/bin" "$work/prefix/lib/takt/plugins"
+cp "$takt" "$work/prefix/bin/takt"
+mv "$work/libblink.so" "$work/prefix/lib/takt/plugins/"
+expect 0 "" "$work/prefix/bin/takt" check "$graph"
+expect 2 "blink.yaml:5:11: error: plug-in libblink.so: no such file; looked in $work" run
+cp "$built/libblink.so" "$work/"
+
+# A record says which plug-ins it was made with.
+expect 0 "" "$takt" replay "$work/blink.mcap" --compare --output "$work/out"
+grep -qE "compared ([0-9]+) of \1 messages.* 0 differ" "$work/stdout" || fail "replay: $(cat "$work/stdout")"
+expect 0 "" "$takt" log info "$work/blink.mcap"
+rm "$work/libblink.so"
+expect 2 "libblink.so" "$takt" replay "$work/blink.mcap" --compare --output "$work/out"
+expect 0 "" "$takt" replay "$work/blink.mcap" --compare --output "$work/out" --plugin "$built/libblink.so"
+cp "$built/libblink.so" "$work/"
+printf 'x' >>"$work/libblink.so"  # runs as before, but is another file
+expect 0 "libblink.so is not what it was when the record was made" "$takt" replay "$work/blink.mcap" --compare --output "$work/out"
+cp "$built/libblink.so" "$work/"
+
+# What is no plug-in, or one for another Takt.
+refused() { # refused TEXT COMMAND...: exit 2, and nothing was started
+  local text=$1
+  shift
+  rm -rf "$work/out"
+  expect 2 "$text" "$@"
+  [ ! -e "$work/out" ] || fail "it was started: $*"
+}
+echo "words" >"$work/words.so"
+refused "is no plug-in of Takt: TAKT_PLUGIN is missing" run --plugin "$work/words.so"
+: >"$work/empty.so"
+refused "cannot be read, or is empty" run --plugin "$work/empty.so"
+refused "no such file" run --plugin "$work/none.so"
+refused "was built for another Takt: " run --plugin "$built/libblink_avx.so"
+grep -qE "another Takt: (vectors is AVX, here|EIGEN_MAX_ALIGN_BYTES is)" "$work/stderr" || fail "it does not say what differs"
+sed -E 's/(takt plug-in, ABI: [^\x00]*compiler=[a-z]* )1/\19/' "$built/libblink.so" >"$work/other.so"
+refused "compiler is" run --plugin "$work/other.so"
+cp "$built/libblink.so" "$work/half.so"
+printf 'XXXX' | dd of="$work/half.so" conv=notrunc status=none
+refused "cannot be loaded: " run --plugin "$work/half.so"
+
+# What goes wrong while it is loaded goes wrong in a child.
+while read -r trouble text; do
+  BLINK=${trouble//_/ } refused "$text" run
+  BLINK=${trouble//_/ } refused "$text" "$takt" check "$graph"
+done <<'END'
+crash crashes while it is loaded: signal 6
+throw_early crashes while it is loaded: signal 6
+exit ends the process while it is loaded (exit 0)
+throw registers nothing: the lamp is missing
+taken registers nothing: 
+thread leaves 1 thread behind
+END
+BLINK=loop refused "is still not loaded after 10 s" run
+BLINK=fork refused "registers nothing: the lamp is missing" run
+[ -z "$(pgrep -f "^$takt run $graph")" ] || fail "a process of the plug-in's trial lives on"
+
+# In its jobs it is contained as every node is.
+for trouble in throw crash loop; do
+  "$takt" run "$graph" --for 3s --isolate subsystem --policy cooperative --set blinker.trouble=$trouble --output "$work/out" \
+    --report "$work/$trouble.json" >"$work/stdout" 2>"$work/stderr"
+  code=$?
+  echo "--- $trouble: exit $code"
+  python3 - "$work/$trouble.json" $trouble <<'PY' || { tail -n 20 "$work/stderr"; fail "$trouble of a plug-in's node is not contained"; }
+import json, sys
+report = json.load(open(sys.argv[1]))
+nodes = {n["name"]: n for n in report["nodes"]}
+assert nodes["watcher"]["completed"] >= nodes["watcher"]["released"] - 1 >= 50, nodes["watcher"]
+assert report["faults"], "nothing is said of it"
+PY
+done
+finish

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+// A plug-in for plugin.sh, as a stranger writes it. The environment variable BLINK says what goes wrong while it is
+// loaded, the parameter `trouble` what goes wrong in the job of that number.
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <stdexcept>
+#include <string_view>
+#include <thread>
+
+#include "graph/plugin.hpp"
+#include "rt/msg/text_status.hpp"
+#include "rt/node.hpp"
+
+namespace {
+
+bool asked_for(std::string_view trouble) {
+  const char* const word = std::getenv("BLINK");
+  return word != nullptr && word == trouble;
+}
+
+volatile int endless = 1;
+
+struct Initialiser {
+  Initialiser() {
+    if (asked_for("crash")) std::abort();
+    if (asked_for("exit")) std::exit(0);
+    if (asked_for("throw early")) throw std::runtime_error("nobody can catch this");
+    while (asked_for("loop") && endless != 0) {
+    }
+    if (asked_for("thread")) std::thread([] { pause(); }).detach();
+    if (asked_for("fork") && fork() == 0) pause();
+  }
+} const initialiser;
+
+void put(takt::Array<char>& text, std::string_view words) {
+  text.resize(words.size());
+  std::copy(words.begin(), words.end(), text.data());
+}
+
+class Blinker final : public takt::Node {
+ public:
+  void setup(takt::Setup&) override { light_.reserve({0, 0, 1, 3}); }
+  void run(takt::Job& job) override {
+    if (job.index() == static_cast<uint64_t>(at_())) cause_trouble();
+    takt::TextStatus* const message = light_.loan();
+    if (message == nullptr) return job.no_result();
+    put(message->text, job.index() % 2 == 0 ? "on" : "off");
+    light_.send(job.release_ns());
+  }
+
+ private:
+  void cause_trouble() {
+    switch (trouble_()) {
+      case 1: throw std::runtime_error("a node of a plug-in throws");
+      case 2: std::abort();
+      case 3:
+        while (endless != 0) {
+        }
+        break;
+      default: break;
+    }
+  }
+
+  takt::Output<takt::TextStatus> light_{this, "light", "on or off"};
+  takt::Choice trouble_{this, "trouble", "none", {"none", "throw", "crash", "loop"}, "in job number `at`"};
+  takt::Param<int> at_{this, "at", 5, {0, 1000}, "", "the job in which it happens"};
+};
+
+class Watcher final : public takt::Node {
+ public:
+  void setup(takt::Setup&) override { seen_.reserve({0, 0, 1, 3}); }
+  void run(takt::Job& job) override {
+    takt::TextStatus* const message = seen_.loan();
+    if (message == nullptr) return job.no_result();
+    put(message->text, light_.empty() ? "no" : "yes");
+    seen_.send(light_.empty() ? job.release_ns() : light_.stamp_ns());
+  }
+
+ private:
+  takt::Input<takt::TextStatus> light_{this, "light", "of a blinker"};
+  takt::Output<takt::TextStatus> seen_{this, "seen", "whether it was seen"};
+};
+
+void register_blink(takt::Registry& registry) {
+  if (asked_for("throw") || asked_for("fork")) throw std::runtime_error("the lamp is missing");
+  registry.nodes.add<Blinker>("blinker", takt::Layer::processing, "says on and off in turn");
+  registry.nodes.add<Watcher>("watcher", takt::Layer::processing, "looks at a blinker");
+  if (asked_for("taken")) registry.nodes.add<Watcher>("stereo", takt::Layer::processing, "a name of Takt's own");
+}
+
+}  // namespace
+
+TAKT_PLUGIN(register_blink)

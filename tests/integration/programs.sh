@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: Apache-2.0
+# The command itself: its version, its help, and the programs that it becomes.
+source "$(dirname "$0")/lib.sh" "$@"
+
+expect 0 "" "$takt"
+grep -q "^Subcommands:" "$work/stdout" || fail "without arguments there is no help"
+"$takt" --help | cmp -s - "$work/stdout" || fail "takt without arguments is not takt --help"
+expect 0 "" "$takt" --version
+grep -qE "^takt [0-9]+\.[0-9]+\.[0-9]+ \(commit .+\)$" "$work/stdout" || fail "no version: $(cat "$work/stdout")"
+grep -qE "^ABI: declarations=.*;compiler=.*;NDEBUG=" "$work/stdout" || fail "no ABI: $(cat "$work/stdout")"
+
+# A program of the user's, in PATH: with its own arguments, exit code and name.
+mkdir "$work/bin"
+printf '#!/bin/sh\necho "$0 has $# arguments: $*"\nexit 7\n' >"$work/bin/takt-hello"
+chmod +x "$work/bin/takt-hello"
+expect 7 "" env PATH="$work/bin:$PATH" "$takt" hello --for "two words"
+grep -qxF "$work/bin/takt-hello has 2 arguments: --for two words" "$work/stdout" || fail "takt-hello got: $(cat "$work/stdout")"
+printf 'no program\n' >"$work/bin/takt-hello"
+expect 3 "takt-hello cannot be started: Exec format error" env PATH="$work/bin:$PATH" "$takt" hello
+chmod -x "$work/bin/takt-hello"
+expect 2 "there is no command \`hello\`" env PATH="$work/bin:$PATH" "$takt" hello
+
+expect 2 "did you mean \`replay\`?" "$takt" repaly
+expect 2 "did you mean \`eval\`?" "$takt" evil
+expect 2 "no program takt-../bin/ls" "$takt" ../bin/ls
+expect 2 "" "$takt" ""
+
+# The desk commands: each is a link to its program, which may be absent.
+for name in bench calibrate cloud eval objects terrain train; do
+  program=$(dirname "$takt")/takt-$name
+  [ -x "$program" ] || { echo "NOT RUN: $program is not built"; continue; }
+  expect 0 "" "$takt" $name --help
+done
+cp "$takt" "$work/takt"
+for name in bench calibrate cloud eval objects terrain train; do
+  expect 3 "fix: \`./takt $name\` of a checkout builds it" env PATH=/usr/bin:/bin "$work/takt" $name
+done
+finish
