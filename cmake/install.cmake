@@ -3,7 +3,7 @@
 #   bin/takt  libexec/takt/  lib/  include/takt/  share/takt/  lib/cmake/takt/  lib/pkgconfig/
 include(CMakePackageConfigHelpers)
 set(share ${CMAKE_INSTALL_DATADIR}/takt)  # which bin/takt finds beside itself
-install(DIRECTORY graph/objects graph/signs graph/worlds graph/rigs graph/schema graph/skeletons graph/networks DESTINATION ${share}/graph)
+install(DIRECTORY graph/objects graph/signs graph/worlds graph/rigs graph/schema graph/skeletons graph/networks graph/new DESTINATION ${share}/graph)
 install(FILES graph/objects_3d.txt graph/terrain.txt DESTINATION ${share}/graph)
 install(DIRECTORY schedules DESTINATION ${share})
 file(GLOB graphs ${PROJECT_SOURCE_DIR}/graph/*.yaml)
