@@ -60,7 +60,7 @@ faults:
   - {kind: silent, target: front, from: 1s, to: 2s}
   - {kind: drop, target: front.distance, from: 2500ms, to: 3s}
 expect:
-  rates: {smoother: {at_least: 16, at_most: 17}}
+  rates: {smoother: {at_least: 13, at_most: 14}}
   recovery: 200ms
 EOF
 expect 0 "" "$takt" run my_robot.yaml --clock virtual --for 3s --faults silent.yaml
