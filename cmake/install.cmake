@@ -3,9 +3,11 @@
 #   bin/takt  libexec/takt/  lib/  include/takt/  share/takt/  lib/cmake/takt/  lib/pkgconfig/
 include(CMakePackageConfigHelpers)
 set(share ${CMAKE_INSTALL_DATADIR}/takt)  # found by graph/language/share.hpp, as its like in the build folder is
-file(MAKE_DIRECTORY ${PROJECT_BINARY_DIR}/share)
-file(CREATE_LINK ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR}/share/takt SYMBOLIC)
-install(DIRECTORY graph/objects graph/signs graph/worlds graph/rigs graph/schema graph/skeletons graph/networks DESTINATION ${share}/graph)
+file(MAKE_DIRECTORY ${PROJECT_BINARY_DIR}/share/takt)
+foreach(folder graph schedules)
+  file(CREATE_LINK ${PROJECT_SOURCE_DIR}/${folder} ${PROJECT_BINARY_DIR}/share/takt/${folder} SYMBOLIC)
+endforeach()
+install(DIRECTORY graph/objects graph/signs graph/worlds graph/rigs graph/schema graph/skeletons graph/networks graph/new DESTINATION ${share}/graph)
 install(FILES graph/objects_3d.txt graph/terrain.txt DESTINATION ${share}/graph)
 install(DIRECTORY schedules DESTINATION ${share})
 file(GLOB graphs ${PROJECT_SOURCE_DIR}/graph/*.yaml)
