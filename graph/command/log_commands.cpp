@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "graph/command/log_commands.hpp"
 
+#include <fmt/format.h>
+
 #include <cstdio>
 #include <optional>
 
@@ -65,7 +67,13 @@ int log_export(const LogOptions& options) {
     if (exported->hash_only > 0)
       std::printf("%llu messages were recorded by their hash only; record them whole with --record-port\n",
                   static_cast<unsigned long long>(exported->hash_only));
-    return kOk;
+    if (!exported->own_fields.empty())
+      std::printf("by their own fields, as Foxglove has no schema for them: %s\n",
+                  fmt::format("{}", fmt::join(exported->own_fields, ", ")).c_str());
+    if (exported->unreadable == 0) return kOk;
+    std::printf("%llu messages cannot be read and are not in it; the first: %s\n",
+                static_cast<unsigned long long>(exported->unreadable), exported->first_unreadable.c_str());
+    return kNotOk;
   });
 }
 

@@ -7,7 +7,7 @@
 #include <map>
 
 #include "graph/attach/message_text.hpp"
-#include "graph/log/recorded_plan.hpp"
+#include "graph/log/recorded_type.hpp"
 #include "graph/view/markup.hpp"
 #include "rt/memory/aligned_bytes.hpp"
 #include "rt/msg/disparity.hpp"
@@ -20,6 +20,7 @@
 #include "rt/msg/point.hpp"
 #include "rt/msg/point_cloud.hpp"
 #include "rt/msg/pose.hpp"
+#include "rt/msg/scalar.hpp"
 #include "rt/msg/text_status.hpp"
 #include "rt/record/mcap/writer.hpp"
 #include "rt/record/recorder.hpp"
@@ -202,38 +203,70 @@ struct Form {
   std::function<Json(const Origin&, const void*)> make;
 };
 
-std::vector<Form> forms_of(const MessageType& type) {
-  static const std::map<std::string_view, std::vector<Form>> known{
-      {Image::type_name, {{"", "foxglove.RawImage", image}}},
-      {StereoPair::type_name,
+/// A type that has forms, and these.
+struct Shown {
+  const MessageType* type;
+  std::vector<Form> forms;
+};
+
+/// Null: messages of this type, as the record describes it, are shown by their own fields.
+const Shown* shown(const RecordedType& recorded) {
+  static const std::vector<Shown> known{
+      {&MessageType::of<Image>(), {{"", "foxglove.RawImage", image}}},
+      {&MessageType::of<StereoPair>(),
        {{".left", "foxglove.RawImage", left_image}, {".right", "foxglove.RawImage", right_image}}},
-      {DisparityMap::type_name, {{"", "foxglove.RawImage", disparity_image}}},
-      {PointCloud::type_name,
+      {&MessageType::of<DisparityMap>(), {{"", "foxglove.RawImage", disparity_image}}},
+      {&MessageType::of<PointCloud>(),
        {{"", "foxglove.PointCloud", cloud}, {"/tf", "foxglove.FrameTransform", cloud_transform}}},
-      {LaserScan::type_name, {{"", "foxglove.LaserScan", scan}, {"/tf", "foxglove.FrameTransform", scan_transform}}},
-      {Grid::type_name, {{"", "foxglove.Grid", grid}}},
-      {Pose::type_name, {{"", "foxglove.PoseInFrame", pose}}},
-      {Motion::type_name, {{"", "foxglove.PoseInFrame", motion}}},
-      {Odometry::type_name, {{"", "foxglove.PoseInFrame", odometry}}},
-      {TextStatus::type_name, {{"", "foxglove.Log", text}}}};
-  if (const auto found = known.find(type.name); found != known.end()) return found->second;
-  return {{"", "takt." + std::string(type.name), [&type](const Origin& from, const void* message) {
-             Json json = attach::message_json(type, message, SIZE_MAX);
-             json["timestamp"] = time_json(from.stamp_ns);
-             return json;
-           }}};
+      {&MessageType::of<LaserScan>(),
+       {{"", "foxglove.LaserScan", scan}, {"/tf", "foxglove.FrameTransform", scan_transform}}},
+      {&MessageType::of<Grid>(), {{"", "foxglove.Grid", grid}}},
+      {&MessageType::of<Pose>(), {{"", "foxglove.PoseInFrame", pose}}},
+      {&MessageType::of<Motion>(), {{"", "foxglove.PoseInFrame", motion}}},
+      {&MessageType::of<Odometry>(), {{"", "foxglove.PoseInFrame", odometry}}},
+      {&MessageType::of<TextStatus>(), {{"", "foxglove.Log", text}}}};
+  for (const Shown& one : known)
+    if (one.type->name == recorded.name() && recorded.same_fields(one.type->fields)) return &one;
+  return nullptr;
+}
+
+Json scalars_schema(Scalar scalar, size_t count) {
+  const Json one{{"type", scalar == Scalar::f32 || scalar == Scalar::f64 ? "number" : "integer"}};
+  if (count == 1) return one;
+  return {{"type", "array"}, {"items", one}};
+}
+
+/// JSON Schema of what packed_json() makes of a field.
+Json field_schema(const Field& field) {
+  if (field.text) return {{"type", "string"}};
+  if (!field.is_array()) return scalars_schema(field.scalar, field.count);
+  const Json element = scalars_schema(field.scalar, field.element_bytes / scalar_bytes(field.scalar));
+  const Json first{{"type", "array"}, {"items", element}};
+  return {{"type", "object"}, {"properties", {{"size", {{"type", "integer"}}}, {"first", first}}}};
+}
+
+/// JSON Schema of messages that are shown by their own fields. Units are the descriptions.
+Json own_schema(const RecordedType& type) {
+  const Json whole{{"type", "integer"}};
+  Json properties = Json::object();
+  for (const Field& field : type.fields()) {
+    Json& schema = properties[std::string(field.name)] = field_schema(field);
+    if (!field.unit.empty()) schema["description"] = field.unit;
+  }
+  properties["timestamp"] = {{"type", "object"}, {"properties", {{"sec", whole}, {"nsec", whole}}}};
+  return {{"type", "object"}, {"properties", properties}};
 }
 
 /// JSON Schema of a message, from one.
-Json schema_of(const Json& value, const std::string& name = "") {
+Json schema_from(const Json& value, const std::string& name = "") {
   if (value.is_object()) {
     Json properties = Json::object();
-    for (const auto& [key, member] : value.items()) properties[key] = schema_of(member, key);
+    for (const auto& [key, member] : value.items()) properties[key] = schema_from(member, key);
     return {{"type", "object"}, {"properties", properties}};
   }
   if (value.is_array()) {
     Json schema{{"type", "array"}};
-    schema["items"] = value.empty() ? Json{{"type", "number"}} : schema_of(value.front());
+    schema["items"] = value.empty() ? Json{{"type", "number"}} : schema_from(value.front());
     return schema;
   }
   if (value.is_string() && name == "data") return {{"type", "string"}, {"contentEncoding", "base64"}};
@@ -251,8 +284,9 @@ class Export {
     if (!plan.is_object() || !plan.contains("ports")) return tl::make_unexpected("the record does not hold its plan");
     keep(file_.begin("", "takt log export"));
     for (size_t p = 0; p < plan["ports"].size(); ++p) {
-      const MessageType* type = type_named(plan["ports"][p].value("type", ""));
-      if (type != nullptr) export_port(plan["ports"][p].value("name", ""), *type, capacity_of(plan, p));
+      const std::string port = plan["ports"][p].value("name", "");
+      if (const mcap::Channel* channel = channel_of(log_, port)) export_port(*channel, capacity_of(plan, p));
+      else unreadable(port, "the record has no such channel");
     }
     export_events(plan);
     keep(file_.finish());
@@ -262,21 +296,51 @@ class Export {
   }
 
  private:
-  void export_port(const std::string& port, const MessageType& type, const Capacity& capacity) {
-    const AlignedBytes memory = aligned_bytes(type.bytes(capacity));
-    const uint16_t channel = log_.channel(port);
-    const std::vector<Form> forms = forms_of(type);
-    for (const auto& [sequence, known] : log_.messages(channel)) {
-      if (!known.whole) {
+  void export_port(const mcap::Channel& channel, const Capacity& capacity) {
+    const mcap::Schema* schema = schema_of(log_, channel);
+    const auto type = schema != nullptr ? RecordedType::read(*schema)
+                                        : tl::make_unexpected(std::string("the record does not describe its type"));
+    const Shown* known = type ? shown(*type) : nullptr;
+    if (type && known == nullptr) result_.own_fields.insert(type->name());
+    const AlignedBytes memory = aligned_bytes(known != nullptr ? known->type->bytes(capacity) : 0);
+    for (const auto& [sequence, there] : log_.messages(channel.id)) {
+      if (!there.whole) {
         ++result_.hash_only;
         continue;
       }
-      const auto message = log_.message(channel, sequence);
-      type.place(memory.get(), capacity);
-      if (!message || !record::unpack(type, message->data, memory.get())) continue;
-      const Origin from{port.substr(0, port.find('.')), message->stamp_ns};
-      for (const Form& form : forms) write(form, port, *message, form.make(from, memory.get()));
+      const auto message = log_.message(channel.id, sequence);
+      const auto written = !message           ? tl::make_unexpected(std::string("it cannot be read"))
+                           : !type            ? tl::make_unexpected(type.error())
+                           : known != nullptr ? export_shown(*known, channel.topic, capacity, memory.get(), *message)
+                                              : export_own_fields(*type, channel.topic, *message);
+      if (!written) unreadable(channel.topic, written.error());
     }
+  }
+
+  tl::expected<void, std::string> export_shown(const Shown& shown, const std::string& port, const Capacity& capacity,
+                                               void* memory, const record::MessageRecord& message) {
+    shown.type->place(memory, capacity);
+    if (const auto filled = record::unpack(*shown.type, message.data, memory); !filled) return filled;
+    const Origin from{port.substr(0, port.find('.')), message.stamp_ns};
+    for (const Form& form : shown.forms) {
+      const Json json = form.make(from, memory);
+      write(form.schema, form.topic.starts_with("/") ? form.topic : port + form.topic, message, json,
+            [&] { return schema_from(json); });
+    }
+    return {};
+  }
+
+  tl::expected<void, std::string> export_own_fields(const RecordedType& type, const std::string& port,
+                                                    const record::MessageRecord& message) {
+    auto json = attach::packed_json(type.fields(), message.data, SIZE_MAX);
+    if (!json) return tl::make_unexpected(json.error());
+    (*json)["timestamp"] = time_json(message.stamp_ns);
+    write("takt." + type.name(), port, message, *json, [&] { return own_schema(type); });
+    return {};
+  }
+
+  void unreadable(const std::string& port, const std::string& why) {
+    if (result_.unreadable++ == 0) result_.first_unreadable = port + ": " + why;
   }
 
   void export_events(const Json& plan) {
@@ -286,29 +350,25 @@ class Export {
       record::MessageRecord at;
       at.sequence = i;
       at.stamp_ns = at.published_ns = event.at_ns;
-      write("foxglove.Log", record::Recorder::kEvents, at, json);
+      write("foxglove.Log", record::Recorder::kEvents, at, json, [&] { return schema_from(json); });
     }
   }
 
-  void write(const Form& form, const std::string& port, const record::MessageRecord& message, const Json& json) {
-    write(form.schema, form.topic.starts_with("/") ? form.topic : port + form.topic, message, json);
-  }
-
   void write(const std::string& schema_name, const std::string& topic, const record::MessageRecord& message,
-             const Json& json) {
+             const Json& json, const std::function<Json()>& schema_json) {
     auto [channel, added] = channels_.try_emplace(topic, uint16_t{0});
-    if (added) channel->second = file_.add_channel(schema(schema_name, json), topic, "json", {});
-    const std::string text = json.dump();
+    if (added) channel->second = file_.add_channel(schema(schema_name, schema_json), topic, "json", {});
+    const std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace);  // a text may be no UTF-8
     keep(file_.write({channel->second, static_cast<uint32_t>(message.sequence),
                       static_cast<uint64_t>(message.published_ns), static_cast<uint64_t>(message.stamp_ns),
                       mcap::bytes_of(text)}));
     ++result_.messages;
   }
 
-  uint16_t schema(const std::string& name, const Json& sample) {
+  uint16_t schema(const std::string& name, const std::function<Json()>& json) {
     const auto [schema, added] = schemas_.try_emplace(name, uint16_t{0});
     if (added) {
-      Json text = schema_of(sample);
+      Json text = json();
       text["title"] = name;
       schema->second = file_.add_schema(name, "jsonschema", text.dump());
     }

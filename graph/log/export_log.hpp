@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <cstdint>
+#include <set>
 #include <string>
 #include <tl/expected.hpp>
 
@@ -13,11 +14,15 @@ struct Exported {
   uint64_t messages = 0;   ///< written
   uint64_t hash_only = 0;  ///< of which the record does not have the fields: a replay can make them
   uint64_t bytes = 0;
+  std::set<std::string> own_fields;  ///< types without a schema of Foxglove's: their messages are shown field by field
+  uint64_t unreadable = 0;           ///< messages that the record has whole and that cannot be read, and lost channels
+  std::string first_unreadable;      ///< the port and why
 };
 
 /// Writes what the record holds with all fields as MCAP with messages in JSON that other programs show: images, clouds,
 /// scans, grids, poses and texts in Foxglove's well-known schemas (a pair as `NODE.PORT.left` and `.right`, where a
-/// sensor sits on the robot as a transform on `/tf`), everything else by its own fields. Events are foxglove.Log on
+/// sensor sits on the robot as a transform on `/tf`), everything else by the fields that the record describes, whether
+/// this program was built with the type or not. Events are foxglove.Log on
 /// `takt/events`. Stamps are those of the data.
 /// Error: the file takes no more, or the record does not hold its plan.
 tl::expected<Exported, std::string> export_log(record::LogFile& log, mcap::Sink& sink);

@@ -23,6 +23,7 @@ struct Field {
   uint32_t offset;
   uint32_t count;
   uint32_t element_bytes;
+  bool text = false;  ///< an Array<char>
   bool is_array() const { return count == 0; }
 };
 
@@ -78,7 +79,8 @@ struct Describe<Array<T>> {
             scalar_of<typename ElementScalar<T>::type>(),
             static_cast<uint32_t>(offset),
             0,
-            static_cast<uint32_t>(sizeof(T))};
+            static_cast<uint32_t>(sizeof(T)),
+            std::is_same_v<T, char>};
   }
 };
 
