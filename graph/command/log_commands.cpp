@@ -8,6 +8,7 @@
 
 #include "graph/cli/outcome.hpp"
 #include "graph/log/cut_log.hpp"
+#include "graph/log/echo_log.hpp"
 #include "graph/log/export_log.hpp"
 #include "graph/log/log_content.hpp"
 
@@ -95,6 +96,25 @@ int log_cut(const LogOptions& options) {
   });
 }
 
+int log_echo(const LogOptions& options) {
+  return guarded([&]() -> int {
+    auto log = open(options.file);
+    if (!log) return kBadInput;
+    const auto echoed = log::echo_log(*log, options.ports, options.items, [](const log::Json& line) {
+      std::puts(line.dump(-1, ' ', false, log::Json::error_handler_t::replace).c_str());  // a text may be no UTF-8
+    });
+    if (!echoed) return refuse(options.file.string() + ": " + echoed.error(), kBadInput);
+    if (echoed->hash_only > 0)
+      std::fprintf(stderr,
+                   "takt: %llu messages were recorded by their hash only; record them whole with --record-port\n",
+                   static_cast<unsigned long long>(echoed->hash_only));
+    if (echoed->unreadable == 0) return kOk;
+    return refuse(fmt::format("{} messages cannot be read and are left out; the first: {}", echoed->unreadable,
+                              echoed->first_unreadable),
+                  kNotOk);
+  });
+}
+
 void add_log(CLI::App& app, LogOptions& o, int& exit_code) {
   CLI::App* log = app.add_subcommand("log", "looks into records");
   log->require_subcommand(1);
@@ -106,6 +126,12 @@ void add_log(CLI::App& app, LogOptions& o, int& exit_code) {
   diff->add_option("from", o.file, "a record")->required();
   diff->add_option("to", o.other, "another one")->required();
   diff->callback([&] { exit_code = log_diff(o); });
+  CLI::App* echo = log->add_subcommand("echo", "its messages, one JSON object a line");
+  echo->add_option("file", o.file, "a record")->required();
+  echo->add_option("ports", o.ports, "NODE.PORT (default: all)");
+  echo->add_option("--items", o.items, "of longer arrays so many elements (default 8)");
+  echo->footer("Example: takt log echo run.mcap base.odometry");
+  echo->callback([&] { exit_code = log_echo(o); });
   CLI::App* exported = log->add_subcommand("export", "as MCAP with JSON in Foxglove's schemas");
   exported->add_option("file", o.file, "a record")->required();
   exported->add_option("-o,--output", o.output, "the file to write")->required();

@@ -253,7 +253,8 @@ Json own_schema(const RecordedType& type) {
     Json& schema = properties[std::string(field.name)] = field_schema(field);
     if (!field.unit.empty()) schema["description"] = field.unit;
   }
-  properties["timestamp"] = {{"type", "object"}, {"properties", {{"sec", whole}, {"nsec", whole}}}};
+  if (!properties.contains("timestamp"))
+    properties["timestamp"] = {{"type", "object"}, {"properties", {{"sec", whole}, {"nsec", whole}}}};
   return {{"type", "object"}, {"properties", properties}};
 }
 
@@ -297,9 +298,7 @@ class Export {
 
  private:
   void export_port(const mcap::Channel& channel, const Capacity& capacity) {
-    const mcap::Schema* schema = schema_of(log_, channel);
-    const auto type = schema != nullptr ? RecordedType::read(*schema)
-                                        : tl::make_unexpected(std::string("the record does not describe its type"));
+    const auto type = type_of(log_, channel);
     const Shown* known = type ? shown(*type) : nullptr;
     if (type && known == nullptr) result_.own_fields.insert(type->name());
     const AlignedBytes memory = aligned_bytes(known != nullptr ? known->type->bytes(capacity) : 0);
@@ -334,7 +333,7 @@ class Export {
                                                     const record::MessageRecord& message) {
     auto json = attach::packed_json(type.fields(), message.data, SIZE_MAX);
     if (!json) return tl::make_unexpected(json.error());
-    (*json)["timestamp"] = time_json(message.stamp_ns);
+    if (!json->contains("timestamp")) (*json)["timestamp"] = time_json(message.stamp_ns);
     write("takt." + type.name(), port, message, *json, [&] { return own_schema(type); });
     return {};
   }

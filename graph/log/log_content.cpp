@@ -115,9 +115,7 @@ std::string where_they_part(LogFile& from, LogFile& to, const mcap::Channel& cha
   if (reference->stamp_ns != other->stamp_ns)
     return fmt::format(": stamp {} instead of {}", other->stamp_ns, reference->stamp_ns);
   if (!reference->whole || !other->whole) return ": by its hash";
-  const mcap::Schema *schema = schema_of(from, channel), *others = schema_of(to, *channel_of(to, channel.topic));
-  if (schema == nullptr || others == nullptr) return ": the fields are not described";
-  const auto type = RecordedType::read(*schema), other_type = RecordedType::read(*others);
+  const auto type = type_of(from, channel), other_type = type_of(to, *channel_of(to, channel.topic));
   if (!type || !other_type) return ": " + (type ? other_type.error() : type.error());
   if (!type->same_fields(other_type->fields())) return fmt::format(": {} has other fields in the second", type->name());
   const auto part = record::first_difference(type->fields(), reference->data, other->data);

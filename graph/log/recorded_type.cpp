@@ -87,6 +87,12 @@ const mcap::Schema* schema_of(const record::LogFile& log, const mcap::Channel& c
   return found == all.end() ? nullptr : &*found;
 }
 
+tl::expected<RecordedType, std::string> type_of(const record::LogFile& log, const mcap::Channel& channel) {
+  const mcap::Schema* schema = schema_of(log, channel);
+  if (schema == nullptr) return tl::make_unexpected(std::string("the record does not describe its type"));
+  return RecordedType::read(*schema);
+}
+
 const mcap::Channel* channel_of(const record::LogFile& log, std::string_view port) {
   const auto& all = log.container().channels();
   const auto found = std::find_if(all.begin(), all.end(), [&](const auto& channel) { return channel.topic == port; });

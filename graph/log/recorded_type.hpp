@@ -13,7 +13,7 @@ namespace takt::log {
 /// A message type as a record describes it. It is enough to print, compare and export messages of types that this
 /// program was not built with:
 ///
-///   const auto type = RecordedType::read(*schema_of(log, channel));
+///   const auto type = type_of(log, channel);
 ///   if (type) json = attach::packed_json(type->fields(), message.data, 8);
 ///
 /// Offsets of its fields are 0: a record packs them one after the other.
@@ -31,6 +31,8 @@ class RecordedType {
   std::span<const Field> fields() const { return fields_; }
   /// Whether messages of both have the same bytes with the same meaning. Units and offsets may differ.
   bool same_fields(std::span<const Field> others) const;
+  /// Whether it is this type of the program: name and fields.
+  bool is(const MessageType& type) const { return type.name == name_ && same_fields(type.fields); }
 
  private:
   RecordedType() = default;
@@ -41,6 +43,8 @@ class RecordedType {
 
 /// What the record says of the messages of a channel; null if it says nothing.
 const mcap::Schema* schema_of(const record::LogFile& log, const mcap::Channel& channel);
+/// The type of its messages. Error: the record does not describe it.
+tl::expected<RecordedType, std::string> type_of(const record::LogFile& log, const mcap::Channel& channel);
 /// The channel of "NODE.PORT"; null if the record has none.
 const mcap::Channel* channel_of(const record::LogFile& log, std::string_view port);
 

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "graph/log/cut_log.hpp"
+#include "graph/log/echo_log.hpp"
 #include "graph/log/export_log.hpp"
 #include "graph/log/log_content.hpp"
 #include "graph/log/recorded_type.hpp"
@@ -61,7 +62,7 @@ template <class Message = Wheel>
 struct WheelRun {
   test::TemporaryFolder folder;
   std::optional<record::LogFile> log;
-  explicit WheelRun(double speed_m_s = 1.5) {
+  explicit WheelRun(double speed_m_s = 1.5, std::vector<char> whole = {}) {
     WheelDevice<Message> device;
     device.speed_m_s = speed_m_s;
     Plan plan;
@@ -71,7 +72,8 @@ struct WheelRun {
     const std::string text = plan_json(plan).dump();
     auto sink = mcap::FileSink::open(folder.path / "run.mcap");
     REQUIRE(sink);
-    test::record_run(plan, *sink, 1, {}, {{}, {{0, 0, "plan.json", "application/json", mcap::bytes_of(text)}}});
+    test::record_run(plan, *sink, 1, {.whole = whole},
+                     {{}, {{0, 0, "plan.json", "application/json", mcap::bytes_of(text)}}});
     log.emplace(open("run.mcap"));
   }
   record::LogFile open(const char* name) const {
@@ -168,6 +170,41 @@ TEST_CASE("The content, a cut and the differences of records of an unknown type"
   CHECK(kept >= 3);
   CHECK(kept < 10);
   CHECK(made.exported().messages == kept);
+}
+
+TEST_CASE("An echo gives all fields of an unknown type, as many elements as asked for, and names the ports that there are") {
+  WheelRun made;
+  const std::string left[]{"left.wheel"}, wrong[]{"left.weel"};
+  std::vector<Json> lines;
+  const auto keep = [&](const Json& line) { lines.push_back(line); };
+  const auto echoed = echo_log(*made.log, left, 8, keep);
+  REQUIRE(echoed);
+  CHECK(echoed->messages == 10);
+  CHECK(echoed->hash_only == 0);
+  CHECK(echoed->unreadable == 0);
+  REQUIRE(lines.size() == 10);
+  CHECK(lines[2]["type"] == "wheel");
+  CHECK(lines[2]["sequence"] == 3);
+  CHECK(lines[2]["message"] ==
+        Json{{"speed_m_s", 1.5}, {"ticks", {0, 2}}, {"current_a", {{"size", 1}, {"first", {0.25}}}}, {"note", "ok\xff"}});
+  REQUIRE(echo_log(*made.log, {}, 0, keep));
+  REQUIRE(lines.size() == 20);
+  CHECK(lines[10]["message"]["current_a"] == Json{{"size", 1}, {"first", Json::array()}});
+  const auto refused = echo_log(*made.log, wrong, 8, keep);
+  REQUIRE_FALSE(refused);
+  CHECK(refused.error() ==
+        "the record has no output `left.weel`; did you mean `left.wheel`? outputs of this record: left.wheel");
+}
+
+TEST_CASE("An echo has the hash of a message that was recorded by it") {
+  WheelRun made(1.5, {0});
+  size_t hashes = 0;
+  const auto echoed = echo_log(*made.log, {}, 8, [&](const Json& line) {
+    hashes += line["hash"].get<std::string>().size() == 16 && !line.contains("message");
+  });
+  REQUIRE(echoed);
+  CHECK(echoed->hash_only == 10);
+  CHECK(hashes == 10);
 }
 
 TEST_CASE("Two records that describe one type by other fields are not compared number by number") {
