@@ -55,13 +55,13 @@ int log_diff(const LogOptions& options) {
   });
 }
 
-int log_export(const LogOptions& options) {
+int log_export(const Registry& registry, const LogOptions& options) {
   return guarded([&]() -> int {
     auto log = open(options.file);
     if (!log) return kBadInput;
     auto sink = mcap::FileSink::open(options.output);
     if (!sink) return refuse("--output " + sink.error() + "; choose another place", kBadInput);
-    const auto exported = log::export_log(*log, *sink);
+    const auto exported = log::export_log(*log, graph::message_types(registry), *sink);
     if (!exported) return refuse(options.output.string() + ": " + exported.error(), kBadInput);
     std::printf("%llu messages, %.1f MB\n", static_cast<unsigned long long>(exported->messages),
                 static_cast<double>(exported->bytes) / 1e6);
@@ -115,7 +115,7 @@ int log_echo(const LogOptions& options) {
   });
 }
 
-void add_log(CLI::App& app, LogOptions& o, int& exit_code) {
+void add_log(CLI::App& app, const Registry& registry, LogOptions& o, int& exit_code) {
   CLI::App* log = app.add_subcommand("log", "looks into records");
   log->require_subcommand(1);
   CLI::App* info = log->add_subcommand("info", "what is in a record, what it lost, its hash");
@@ -141,7 +141,7 @@ void add_log(CLI::App& app, LogOptions& o, int& exit_code) {
   cut->add_option("--from", o.from_s, "seconds into the run of the first release")->check(CLI::Range(0.0, 1e9));
   cut->add_option("--to", o.to_s, "seconds into the run, behind the last release")->check(CLI::Range(0.0, 1e9));
   cut->callback([&] { exit_code = log_cut(o); });
-  exported->callback([&] { exit_code = log_export(o); });
+  exported->callback([&] { exit_code = log_export(registry, o); });
 }
 
 }  // namespace takt::command

@@ -56,7 +56,7 @@ int run(int argc, char** argv, const std::function<void(Registry&)>& fill, const
   add_attach_commands(app, plugins, attach, exit_code);
   add_doctor(app, doctor, exit_code);
   add_replay(app, plugins, replay, exit_code);
-  add_log(app, log, exit_code);
+  add_log(app, registry, log, exit_code);
   const auto options_of_more = more ? more(app, exit_code) : nullptr;
   auto own = names(app);
   if (argc > 1 && argv[1][0] != '-' && std::find(own.begin(), own.end(), argv[1]) == own.end())

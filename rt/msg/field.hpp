@@ -12,10 +12,12 @@
 
 namespace takt {
 
+class Viewer;  // rt/msg/viewer.hpp
+
 enum class Scalar : uint8_t { u8, i16, u16, i32, u32, i64, u64, f32, f64 };
 
-/// One field of a message, declared in its class (rt/msg/field_list.hpp) and shared by checker, recorder, diff and export.
-/// A field is `count` scalars at `offset` in the header (count 0: an Array of elements of `element_bytes`).
+/// One field of a message, declared in its class (rt/msg/field_list.hpp) and shared by checker, recorder, diff and
+/// export. A field is `count` scalars at `offset` in the header (count 0: an Array of elements of `element_bytes`).
 struct Field {
   std::string_view name;
   std::string_view unit;  ///< SI symbol, "px", "1" for a pure number, "" for flags and text
@@ -84,6 +86,14 @@ struct Describe<Array<T>> {
   }
 };
 
+/// Null if T has no show().
+template <class T>
+auto show_of() -> void (*)(const void*, Viewer&) {
+  if constexpr (requires(const T& message, Viewer& to) { message.show(to); })
+    return [](const void* memory, Viewer& to) { static_cast<const T*>(memory)->show(to); };
+  else return nullptr;
+}
+
 }  // namespace detail
 
 /// How large a message may become on one port; what each number means is said by the message type.
@@ -99,6 +109,7 @@ struct Capacity {
 ///   static constexpr std::string_view type_name;
 ///   TAKT_FIELDS(T, ...)
 ///   bool sound() const;   (if other fields say how far an array is read: whether they stay within its capacity)
+///   void show(Viewer&) const;   (if there is more to see than fields: rt/msg/viewer.hpp)
 struct MessageType {
   std::string_view name;
   uint32_t header_bytes;
@@ -106,6 +117,7 @@ struct MessageType {
   void (*construct)(void* memory);
   void (*capacities)(const Capacity&, std::span<uint32_t>);
   bool (*sound)(const void* memory);
+  void (*show)(const void* memory, Viewer& to);  ///< null: it has nothing but its fields
 
   /// Bytes of a message of that capacity: the header and every array, each aligned to 64 B.
   uint64_t bytes(const Capacity& capacity) const;
@@ -130,7 +142,8 @@ const MessageType& MessageType::of() {
                                   if constexpr (requires(const T& message) { message.sound(); })
                                     return static_cast<const T*>(memory)->sound();
                                   return true;
-                                }};
+                                },
+                                detail::show_of<T>()};
   return type;
 }
 

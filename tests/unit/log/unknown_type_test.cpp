@@ -12,6 +12,7 @@
 #include "graph/log/log_content.hpp"
 #include "graph/log/recorded_type.hpp"
 #include "tests/temporary_folder.hpp"
+#include "tests/unit/log/known_types.hpp"
 #include "tests/unit/record/recorded_run.hpp"
 
 using namespace takt;
@@ -25,20 +26,19 @@ struct Wheel {
   int32_t ticks[2] = {};
   Array<float> current_a;
   Array<char> note;
-  static std::span<const Field> fields() {
-    static constexpr auto list =
-        std::to_array<Field>({detail::Describe<double>::field("speed_m_s", "m/s", offsetof(Wheel, speed_m_s)),
-                              detail::Describe<int32_t[2]>::field("ticks", "1", offsetof(Wheel, ticks)),
-                              detail::Describe<Array<float>>::field("current_a", "A", offsetof(Wheel, current_a)),
-                              detail::Describe<Array<char>>::field("note", "", offsetof(Wheel, note))});
-    return list;
-  }
-  static void capacities(const Capacity& c, std::span<uint32_t> a) { a[0] = a[1] = c.count; }
+  TAKT_FIELDS(Wheel, (speed_m_s, "m/s"), (ticks, "1"), (current_a, "A"), (note, ""))
 };
 
 /// A type of that name is known to this program, with other fields.
 struct OtherGrid : Wheel {
   static constexpr std::string_view type_name = "grid";
+};
+
+/// Another declaration of the name.
+struct OtherWheel {
+  static constexpr std::string_view type_name = "wheel";
+  int32_t turns = 0;
+  TAKT_FIELDS(OtherWheel, (turns, "1"))
 };
 
 template <class Message>
@@ -66,7 +66,7 @@ struct WheelRun {
     WheelDevice<Message> device;
     device.speed_m_s = speed_m_s;
     Plan plan;
-    test::add_task(plan, device, "left", 100'000'000, {0, 0, 1, 4});
+    test::add_task(plan, device, "left", 0, {0, 0, 1, 4});
     plan.ports[0].port = "wheel";
     plan.ports[0].history = plan.ports[0].held = 4;
     const std::string text = plan_json(plan).dump();
@@ -84,7 +84,7 @@ struct WheelRun {
   Exported exported() {
     auto sink = mcap::FileSink::open(folder.path / "export.mcap");
     REQUIRE(sink);
-    const auto done = export_log(*log, *sink);
+    const auto done = export_log(*log, test::known_types(), *sink);
     REQUIRE_MESSAGE(done, done.error());
     return *done;
   }
@@ -158,7 +158,7 @@ TEST_CASE("The content, a cut and the differences of records of an unknown type"
   CHECK_FALSE(apart.same);
   REQUIRE(apart.lines.size() == 1);
   CHECK(apart.lines[0] ==
-        "left.wheel: 10 of 10 common messages differ; first 1: speed_m_s (byte 0) is 2.5 instead of 1.5");
+        "left.wheel: 10 of 10 common messages differ; first 1: speed_m_s (byte 6) is 2.5 instead of 1.5");
   {
     auto sink = mcap::FileSink::open(made.folder.path / "cut.mcap");
     REQUIRE(sink);
@@ -172,7 +172,8 @@ TEST_CASE("The content, a cut and the differences of records of an unknown type"
   CHECK(made.exported().messages == kept);
 }
 
-TEST_CASE("An echo gives all fields of an unknown type, as many elements as asked for, and names the ports that there are") {
+TEST_CASE(
+    "An echo gives all fields of an unknown type, as many elements as asked for, and names the ports that there are") {
   WheelRun made;
   const std::string left[]{"left.wheel"}, wrong[]{"left.weel"};
   std::vector<Json> lines;
@@ -185,8 +186,9 @@ TEST_CASE("An echo gives all fields of an unknown type, as many elements as aske
   REQUIRE(lines.size() == 10);
   CHECK(lines[2]["type"] == "wheel");
   CHECK(lines[2]["sequence"] == 3);
-  CHECK(lines[2]["message"] ==
-        Json{{"speed_m_s", 1.5}, {"ticks", {0, 2}}, {"current_a", {{"size", 1}, {"first", {0.25}}}}, {"note", "ok\xff"}});
+  CHECK(
+      lines[2]["message"] ==
+      Json{{"speed_m_s", 1.5}, {"ticks", {0, 2}}, {"current_a", {{"size", 1}, {"first", {0.25}}}}, {"note", "ok\xff"}});
   REQUIRE(echo_log(*made.log, {}, 0, keep));
   REQUIRE(lines.size() == 20);
   CHECK(lines[10]["message"]["current_a"] == Json{{"size", 1}, {"first", Json::array()}});
@@ -217,7 +219,7 @@ TEST_CASE("Two records that describe one type by other fields are not compared n
     }
   } device;
   Plan plan;
-  test::add_task(plan, device, "left", 100'000'000, {0, 0, 1, 4});
+  test::add_task(plan, device, "left", 0, {0, 0, 1, 4});
   plan.ports[0].port = "wheel";
   plan.ports[0].history = plan.ports[0].held = 4;
   const std::string text = plan_json(plan).dump();
@@ -230,6 +232,39 @@ TEST_CASE("Two records that describe one type by other fields are not compared n
   const LogDifference apart = difference(*wheel.log, grid);
   REQUIRE(apart.lines.size() == 1);
   CHECK(apart.lines[0].ends_with(": grid has other fields in the second"));
+}
+
+TEST_CASE("Two types of one name in one record keep their fields") {
+  const test::TemporaryFolder folder;
+  WheelDevice<Wheel> wheel;
+  struct OtherDevice final : Node {
+    Output<OtherWheel> wheel{this, "wheel", ""};
+    void setup(Setup&) override {}
+    void run(Job& job) override {
+      OtherWheel* message = wheel.loan();
+      if (message == nullptr) return;
+      message->turns = static_cast<int32_t>(job.index());
+      wheel.send(job.release_ns());
+    }
+  } other;
+  Plan plan;
+  test::add_task(plan, wheel, "left", 0, {0, 0, 1, 4});
+  test::add_task(plan, other, "right", 50'000'000);
+  for (PortPlan& port : plan.ports) port.port = "wheel", port.history = port.held = 4;
+  {
+    auto sink = mcap::FileSink::open(folder.path / "run.mcap");
+    REQUIRE(sink);
+    test::record_run(plan, *sink, 1);
+  }
+  const auto log = record::LogFile::open(folder.path / "run.mcap");
+  REQUIRE(log);
+  std::vector<Json> lines;
+  const auto echoed = echo_log(*log, {}, 8, [&](const Json& line) { lines.push_back(line); });
+  REQUIRE(echoed);
+  CHECK(echoed->unreadable == 0);
+  REQUIRE(lines.size() == 20);
+  CHECK(lines[0]["message"]["speed_m_s"] == 1.5);
+  CHECK(lines[3]["message"] == Json{{"turns", 1}});
 }
 
 TEST_CASE("A recorded type that cannot be understood names the field at fault") {
