@@ -1,8 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include <optional>
-#include <string>
-
 #include "hal/settings/json.hpp"
 #include "rt/msg/field.hpp"
 
@@ -11,12 +8,5 @@ namespace takt::attach {
 /// A message as one JSON object by its field descriptors: scalars as numbers, texts as text, of longer arrays the size
 /// and the first `items` elements.
 nlohmann::ordered_json message_json(const MessageType& type, const void* message, size_t items = 8);
-
-/// The message as a PNG file: images as they are, stereo pairs side by side, disparities and grids in false colours.
-/// Nothing if its type cannot be seen.
-std::optional<std::string> message_png(const MessageType& type, const void* message);
-
-/// A point cloud as a binary PLY file, in the frame of its sensor. Nothing if the message is none.
-std::optional<std::string> message_ply(const MessageType& type, const void* message);
 
 }  // namespace takt::attach
