@@ -226,6 +226,10 @@ std::shared_ptr<void> Server::claim_tap(size_t port) {
 
 bool Server::stream(size_t port, const std::string& as, size_t items, int64_t count, Connection& connection) {
   const PortPlan& plan = subject_.plan.ports[port];
+  const Pictures& pictures = subject_.registry.pictures;
+  const Draw draw = as == "png" ? pictures.png : as == "ply" ? pictures.ply : nullptr;
+  if (draw == nullptr && !as.empty())
+    return connection.write(wrong(fmt::format("this program does not draw messages; leave --{} out", as)));
   const auto reader = subject_.transport.make_reader(port);
   uint64_t seen = 0;
   for (int64_t sent = 0; sent < count && !ending_.load();) {
@@ -245,9 +249,7 @@ bool Server::stream(size_t port, const std::string& as, size_t items, int64_t co
               {"stamp_ns", held.stamp_ns},
               {"age_ms", static_cast<double>(now_ns() - held.stamp_ns) / 1e6},
               {"message", message_json(*plan.type, held.message(), items)}};
-    const auto file = as == "png"   ? message_png(*plan.type, held.message())
-                      : as == "ply" ? message_ply(*plan.type, held.message())
-                                    : std::string();
+    const auto file = draw != nullptr ? draw(*plan.type, held.message()) : std::string();
     seen = held.sequence;
     holding.reset();
     if (!file)

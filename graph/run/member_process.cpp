@@ -150,7 +150,7 @@ int run_member(const MemberPart& part) {
   plan.overheads = part.overheads;
   if (!part.spare) record.reach(ProcessRecord::composed, prepared.clock->now_ns());
   wait_until([&] { return board.carrier().load() != RunBoard::no_carrier; });
-  prepare_process();
+  prepare_process(part.registry);
   std::unique_ptr<Transport> joined;
   without_rights([&] {
     joined = board.carrier().load() == RunBoard::local

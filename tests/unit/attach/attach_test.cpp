@@ -17,6 +17,7 @@
 #include "graph/compose/composition.hpp"
 #include "graph/language/message_types.hpp"
 #include "graph/language/overlay.hpp"
+#include "graph/pictures/pictures.hpp"
 #include "rt/msg/grid.hpp"
 #include "rt/msg/image.hpp"
 #include "rt/msg/odometry.hpp"
@@ -124,7 +125,7 @@ TEST_CASE("every message type becomes JSON with one entry a field, and those tha
   grid.message->width = 4;
   grid.message->height = 3;
   grid.message->cells.resize(12);
-  const auto png = attach::message_png(MessageType::of<Grid>(), grid.message);
+  const auto png = message_png(MessageType::of<Grid>(), grid.message);
   REQUIRE(png);
   const cv::Mat image = cv::imdecode(std::vector<char>(png->begin(), png->end()), cv::IMREAD_COLOR);
   CHECK(image.cols == 4 * 6);
@@ -142,15 +143,15 @@ TEST_CASE("every message type becomes JSON with one entry a field, and those tha
   CHECK(both.cols == 6);
   CHECK(both.rows == 2);
   Built<Odometry> odometry({});
-  CHECK_FALSE(attach::message_png(MessageType::of<Odometry>(), odometry.message));
+  CHECK_FALSE(message_png(MessageType::of<Odometry>(), odometry.message));
   Built<PointCloud> cloud({.count = 2});
   cloud.message->points.push_back({1, 2, 3});
   cloud.message->colours.push_back({4, 5, 6});
-  const auto ply = attach::message_ply(MessageType::of<PointCloud>(), cloud.message);
+  const auto ply = message_ply(MessageType::of<PointCloud>(), cloud.message);
   REQUIRE(ply);
   CHECK(ply->find("element vertex 1\n") != std::string::npos);
   CHECK(ply->ends_with("\6\5\4"));
-  CHECK_FALSE(attach::message_ply(MessageType::of<Odometry>(), odometry.message));
+  CHECK_FALSE(message_ply(MessageType::of<Odometry>(), odometry.message));
 }
 
 TEST_CASE("a type that no room knows is seen as it shows itself") {
