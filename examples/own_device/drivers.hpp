@@ -4,9 +4,10 @@
 #include <fcntl.h>
 #include <unistd.h>
 
-#include <cmath>
+#include <array>
 #include <cstdlib>
 #include <string>
+#include <takt/hal/settings/failures.hpp>
 
 #include "thermometer.hpp"
 
@@ -42,7 +43,8 @@ class SysfsThermometer final : public Thermometer {
   int file_ = -1;
 };
 
-/// The simulated double: a room that gets warmer by `slope` degrees a second. The same data in each run.
+/// The simulated double: a room that gets warmer by `slope` degrees a second. The same data in each run. It can be
+/// silent: `takt fault wall silent on`.
 class SimulatedThermometer final : public Thermometer {
  public:
   explicit SimulatedThermometer(double slope) : slope_(slope) {}
@@ -53,11 +55,14 @@ class SimulatedThermometer final : public Thermometer {
     return {};
   }
   void stop() override {}
+  takt::FaultSwitch* faults() override { return &failures_.by_hand(); }
   Reading read(int64_t now_ns) override {
+    if (failures_.at(now_ns)) return {takt::ReadStatus::no_data, 0, now_ns};
     return {takt::ReadStatus::ok, 20 + slope_ * static_cast<double>(now_ns - epoch_ns_) * 1e-9, now_ns};
   }
 
  private:
   double slope_;
+  takt::FailureSchedule failures_{{}, std::array{takt::Misbehaviour::silent}};
   int64_t epoch_ns_ = 0;
 };
