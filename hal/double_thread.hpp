@@ -29,6 +29,8 @@ class DoubleThread {
 
   /// Begins to live at the epoch. Later calls change nothing.
   void start(int64_t epoch_ns);
+  /// What it can be told to do wrong while it lives.
+  FaultSwitch& faults() { return failures_.by_hand(); }
   /// In a job of the driver.
   void keep_up();
   /// How late it was at most since the call before. One thread.

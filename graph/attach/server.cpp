@@ -146,12 +146,18 @@ bool Server::answer(const Json& question, Connection& connection, uint32_t by_us
   if (what == "set")
     return connection.write(
         set(question.value("param", ""), {question.value("value", ""), question.value("keep", false), by_user}));
+  if (what == "fault") {
+    const std::string device = question.value("device", ""), fault = question.value("fault", "");
+    return connection.write(fault.empty() ? faults(device)
+                                          : switch_fault(device, fault, question.value("on", true), by_user));
+  }
   if (what == "forget") return connection.write(forget(question.value("param", "")));
   if (what == "stop") {
     subject_.board.stop().raise(now_ns());
     return connection.write({{"ok", true}});
   }
-  return connection.write(wrong("unknown question " + what + "; known: top, echo, get, set, forget, mode, stop"));
+  return connection.write(
+      wrong("unknown question " + what + "; known: top, echo, get, set, forget, fault, mode, stop"));
 }
 
 Json Server::top() const {

@@ -28,9 +28,9 @@ struct Subject {
   pid_t run = getpid();  ///< the process that stands for the run
 };
 
-/// Answers top, echo, get, set, forget, mode and stop for one run, from threads of the default policy that only read
-/// the board, hold one message of an output at a time, and post parameters to be taken between jobs. Its own user and
-/// root are heard; of the service its group, too, where the mode of its folder says so.
+/// Answers top, echo, get, set, forget, fault, mode and stop for one run, from threads of the default policy that only
+/// read the board, hold one message of an output at a time, and post parameters to be taken between jobs. Its own user
+/// and root are heard; of the service its group, too, where the mode of its folder says so.
 class Server {
  public:
   explicit Server(const Subject& subject);
@@ -73,6 +73,12 @@ class Server {
   nlohmann::ordered_json forget(const std::string& name);
   /// The value of one parameter; "": all that differ from the graph's file.
   nlohmann::ordered_json get(const std::string& name) const;
+  /// Of `device` ("": of each), what can be made to go wrong and what is switched on.
+  nlohmann::ordered_json faults(const std::string& device) const;
+  /// Switches one of them.
+  nlohmann::ordered_json switch_fault(const std::string& device, const std::string& fault, bool on, uint32_t by_user);
+  /// Why there is nothing to switch: unknown, or not simulated.
+  nlohmann::ordered_json not_switchable(const std::string& device) const;
   nlohmann::ordered_json post_and_wait(size_t task, size_t param, const ParamValue& value, uint32_t by_user);
   size_t find_port(const std::string& name) const;
   /// Of a node; "" of a device.
