@@ -2,10 +2,9 @@
 #include "graph/attach/message_text.hpp"
 
 #include <algorithm>
+#include <cstring>
 
-#include "rt/msg/robot_task.hpp"
 #include "rt/msg/scalar.hpp"
-#include "rt/msg/text_status.hpp"
 
 namespace takt::attach {
 namespace {
@@ -22,13 +21,14 @@ Json scalars(Scalar scalar, const std::byte* at, size_t count) {
   return list;
 }
 
-Json array_json(const Field& field, const std::byte* at, size_t element_bytes, size_t items) {
-  const Array<std::byte>& array = any_array(at);
-  const std::byte* data = array.data();
+/// An array of `size` elements.
+Json array_json(const Field& field, const std::byte* data, size_t size, size_t items) {
+  if (field.text) return std::string(reinterpret_cast<const char*>(data), size);
   Json first = Json::array();
-  for (size_t i = 0; i < std::min<size_t>(array.size, items); ++i)
-    first.push_back(scalars(field.scalar, data + i * element_bytes, element_bytes / scalar_bytes(field.scalar)));
-  return {{"size", array.size}, {"first", first}};
+  const size_t bytes = field.element_bytes;
+  for (size_t i = 0; i < std::min(size, items); ++i)
+    first.push_back(scalars(field.scalar, data + i * bytes, bytes / scalar_bytes(field.scalar)));
+  return {{"size", size}, {"first", first}};
 }
 
 }  // namespace
@@ -40,13 +40,33 @@ nlohmann::ordered_json message_json(const MessageType& type, const void* message
     const std::string name(field.name);
     if (!field.is_array()) {
       json[name] = scalars(field.scalar, bytes + field.offset, field.count);
-    } else if (type.name == TextStatus::type_name || type.name == RobotTask::type_name) {
-      const auto& text = *reinterpret_cast<const Array<char>*>(bytes + field.offset);
-      json[name] = std::string(text.data(), text.size);
     } else {
-      json[name] = array_json(field, bytes + field.offset, field.element_bytes, items);
+      const Array<std::byte>& array = any_array(bytes + field.offset);
+      json[name] = array_json(field, array.data(), array.size, items);
     }
   }
+  return json;
+}
+
+tl::expected<nlohmann::ordered_json, std::string> packed_json(std::span<const Field> fields,
+                                                              std::span<const std::byte> packed, size_t items) {
+  Json json;
+  size_t at = 0;
+  for (const Field& field : fields) {
+    uint32_t count = field.count;
+    if (field.is_array()) {
+      if (packed.size() - at < sizeof count) return tl::make_unexpected(std::string(field.name) + " is cut off");
+      std::memcpy(&count, packed.data() + at, sizeof count);
+      at += sizeof count;
+    }
+    const size_t bytes = size_t{count} * field.element_bytes;
+    if (packed.size() - at < bytes) return tl::make_unexpected(std::string(field.name) + " is cut off");
+    const std::byte* data = packed.data() + at;
+    json[std::string(field.name)] =
+        field.is_array() ? array_json(field, data, count, items) : scalars(field.scalar, data, count);
+    at += bytes;
+  }
+  if (at != packed.size()) return tl::make_unexpected(std::to_string(packed.size() - at) + " bytes too many");
   return json;
 }
 

@@ -8,66 +8,73 @@
 #include "nodes/cloud/cloud_file.hpp"
 #include "nodes/picture/clouds.hpp"
 #include "nodes/picture/draw.hpp"
-#include "rt/msg/disparity.hpp"
-#include "rt/msg/grid.hpp"
-#include "rt/msg/image.hpp"
-#include "rt/msg/image_view.hpp"
-#include "rt/msg/point_cloud.hpp"
+#include "rt/msg/viewer.hpp"
 
 namespace takt {
 namespace {
 
 constexpr int kPixelsPerCell = 6;
 
-cv::Mat wrap(ImageView<const uint8_t> view) {
-  return {view.height, view.width, view.channels == 3 ? CV_8UC3 : CV_8UC1, const_cast<uint8_t*>(view.data)};
-}
+/// What can be drawn, side by side; the first sets height and colours, and what has others is left out.
+class Drawing final : public Viewer {
+ public:
+  void picture(const ImageView<const uint8_t>& view, std::string_view) override {
+    add({view.height, view.width, view.channels == 3 ? CV_8UC3 : CV_8UC1, const_cast<uint8_t*>(view.data)});
+  }
+  void disparity(const ImageView<const int16_t>& map, int disparities) override {
+    cv::Mat out(map.height, map.width, CV_8UC3);
+    picture::draw_disparity(map, disparities, {out.data, out.cols, out.rows, 3});
+    add(out);
+  }
+  void grid(const Cells& grid) override {
+    cv::Mat out(grid.cells.height * kPixelsPerCell, grid.cells.width * kPixelsPerCell, CV_8UC3);
+    picture::draw_grid(grid.cells, kPixelsPerCell, {out.data, out.cols, out.rows, 3});
+    add(out);
+  }
+  void cloud(std::span<const Point> points, std::span<const Colour> colours) override {
+    const cloud::CloudView view{points, colours};
+    add(picture::draw_clouds({&view, 1}));
+  }
+  const cv::Mat& all() const { return all_; }
 
-cv::Mat draw(const DisparityMap& map) {
-  cv::Mat out(map.height, map.width, CV_8UC3);
-  picture::draw_disparity(map.view(), map.disparities, {out.data, out.cols, out.rows, 3});
-  return out;
-}
+ private:
+  void add(const cv::Mat& image) {
+    if (all_.empty()) all_ = image;
+    else if (image.rows == all_.rows && image.type() == all_.type()) cv::hconcat(all_, image, all_);
+  }
+  cv::Mat all_;
+};
 
-cv::Mat draw(const Grid& grid) {
-  cv::Mat out(grid.height * kPixelsPerCell, grid.width * kPixelsPerCell, CV_8UC3);
-  picture::draw_grid(grid.view(), kPixelsPerCell, {out.data, out.cols, out.rows, 3});
-  return out;
-}
+/// The first cloud.
+class CloudFile final : public Viewer {
+ public:
+  void cloud(std::span<const Point> points, std::span<const Colour> colours) override {
+    if (!ply) ply = cloud::ply_of({points, colours}, cloud::Encoding::binary);
+  }
+  std::optional<std::string> ply;
+};
 
-cv::Mat draw(const StereoPair& pair) {
-  cv::Mat both;
-  cv::hconcat(wrap(pair.left_view()), wrap(pair.right_view()), both);
-  return both;
-}
-
-cv::Mat draw(const PointCloud& cloud) {
-  const cloud::CloudView view{cloud.points.items(), cloud.colours.items()};
-  return picture::draw_clouds({&view, 1});
-}
-
-cv::Mat picture_of(const MessageType& type, const void* message) {
-  if (type.name == Image::type_name) return wrap(static_cast<const Image*>(message)->view());
-  if (type.name == StereoPair::type_name) return draw(*static_cast<const StereoPair*>(message));
-  if (type.name == DisparityMap::type_name) return draw(*static_cast<const DisparityMap*>(message));
-  if (type.name == Grid::type_name) return draw(*static_cast<const Grid*>(message));
-  if (type.name == PointCloud::type_name) return draw(*static_cast<const PointCloud*>(message));
-  return {};
+bool show(const MessageType& type, const void* message, Viewer& to) {
+  const bool shown = type.show != nullptr && type.sound(message);
+  if (shown) type.show(message, to);
+  return shown;
 }
 
 }  // namespace
 
 std::optional<std::string> message_png(const MessageType& type, const void* message) {
-  const cv::Mat image = picture_of(type, message);
+  Drawing drawing;
   std::vector<uint8_t> png;
-  if (image.empty() || !cv::imencode(".png", image, png, {cv::IMWRITE_PNG_COMPRESSION, 1})) return std::nullopt;
+  if (!show(type, message, drawing) || drawing.all().empty() ||
+      !cv::imencode(".png", drawing.all(), png, {cv::IMWRITE_PNG_COMPRESSION, 1}))
+    return std::nullopt;
   return std::string(png.begin(), png.end());
 }
 
 std::optional<std::string> message_ply(const MessageType& type, const void* message) {
-  if (type.name != PointCloud::type_name) return std::nullopt;
-  const auto& cloud = *static_cast<const PointCloud*>(message);
-  return cloud::ply_of({cloud.points.items(), cloud.colours.items()}, cloud::Encoding::binary);
+  CloudFile file;
+  if (!show(type, message, file)) return std::nullopt;
+  return file.ply;
 }
 
 void register_pictures(Registry& registry) { registry.pictures = {message_png, message_ply}; }

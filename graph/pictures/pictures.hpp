@@ -16,11 +16,12 @@
 
 namespace takt {
 
-/// The message as a PNG file: images as they are, stereo pairs side by side, disparities and grids in false colours.
-/// Nothing if its type cannot be seen.
+/// The message as a PNG file, as it shows itself (rt/msg/viewer.hpp): images as they are, those of a stereo pair side
+/// by side, disparities and grids in false colours, clouds from above and from the side. Nothing if it shows none of
+/// these, or is not sound.
 std::optional<std::string> message_png(const MessageType& type, const void* message);
 
-/// A point cloud as a binary PLY file, in the frame of its sensor. Nothing if the message is none.
+/// The point cloud that the message shows, as a binary PLY file, in the frame of its sensor. Nothing if it shows none.
 std::optional<std::string> message_ply(const MessageType& type, const void* message);
 
 void register_pictures(Registry& registry);
