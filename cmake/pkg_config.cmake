@@ -10,7 +10,6 @@ string(REPLACE takt::room_ takt_ roots "${TAKT_ROOMS_record};${TAKT_ROOMS_hal};$
 takt_closure(linked ${roots})
 set(TAKT_PC_REQUIRES takt-core)
 set(TAKT_PC_ROOMS)
-set(TAKT_PC_LIBS)
 foreach(room ${linked})
   get_target_property(type ${room} TYPE)
   if(room IN_LIST rooms AND type STREQUAL STATIC_LIBRARY)
@@ -27,9 +26,6 @@ foreach(room ${linked})
 endforeach()
 list(REMOVE_DUPLICATES TAKT_PC_REQUIRES)
 list(JOIN TAKT_PC_REQUIRES " " TAKT_PC_REQUIRES)
-foreach(library ${OpenCV_LIBS})  # opencv4.pc would link all modules that there are
-  string(APPEND TAKT_PC_LIBS " -l${library}")
-endforeach()
 
 foreach(package core graph)
   configure_file(cmake/takt-${package}.pc.in takt-${package}.pc @ONLY)

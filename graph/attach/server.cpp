@@ -12,6 +12,7 @@
 #include <chrono>
 #include <cstring>
 #include <system_error>
+#include <thread>
 
 #include "graph/attach/message_text.hpp"
 #include "graph/attach/parameters.hpp"
@@ -29,6 +30,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 constexpr size_t kMostClients = 8;
 constexpr int kLookAgainMs = 100;
+constexpr size_t kClientStack = 2 << 20;  // it draws pictures, with libraries
 
 void pause_ms(int ms) { std::this_thread::sleep_for(std::chrono::milliseconds(ms)); }
 
@@ -54,7 +56,7 @@ bool trusted(int descriptor, bool group) {
 
 Server::Server(const Subject& subject) : subject_(subject) {
   open();
-  if (lacks_.empty()) thread_ = std::thread([this] { accept_clients(); });
+  if (lacks_.empty()) thread_ = OwnThread([this] { accept_clients(); });
 }
 
 Server::~Server() {
@@ -105,10 +107,12 @@ void Server::accept_clients() {
     }
     Client& client = clients_.emplace_back();
     try {
-      client.thread = std::thread([this, descriptor, &client] {
-        serve(descriptor);
-        client.done.store(true);
-      });
+      client.thread = OwnThread(
+          [this, descriptor, &client] {
+            serve(descriptor);
+            client.done.store(true);
+          },
+          kClientStack);
     } catch (const std::system_error&) {  // no more threads: the run goes on unheard
       clients_.pop_back();
       close(descriptor);

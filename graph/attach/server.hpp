@@ -8,11 +8,11 @@
 #include <mutex>
 #include <set>
 #include <string>
-#include <thread>
 
 #include "graph/attach/endpoint.hpp"
 #include "graph/language/graph.hpp"
 #include "graph/language/registry.hpp"
+#include "rt/own_thread.hpp"
 #include "rt/sched/run_board.hpp"
 #include "rt/shm/transport.hpp"
 
@@ -44,7 +44,7 @@ class Server {
 
  private:
   struct Client {
-    std::thread thread;
+    OwnThread thread;
     std::atomic<bool> done{false};
   };
   void open();
@@ -93,7 +93,7 @@ class Server {
   std::mutex setting_, keeping_, tapping_;
   std::set<size_t> tapped_;  ///< outputs that somebody listens to: one at a time each
   std::list<Client> clients_;
-  std::thread thread_;
+  OwnThread thread_;
 };
 
 }  // namespace takt::attach
