@@ -2,8 +2,12 @@
 # What `cmake --install` puts where. Programs that were not built are left out; `./takt run` builds all that others link.
 #   bin/takt  libexec/takt/  lib/  include/takt/  share/takt/  lib/cmake/takt/  lib/pkgconfig/
 include(CMakePackageConfigHelpers)
-set(share ${CMAKE_INSTALL_DATADIR}/takt)  # which bin/takt finds beside itself
-install(DIRECTORY graph/objects graph/signs graph/worlds graph/rigs graph/schema graph/skeletons graph/networks DESTINATION ${share}/graph)
+set(share ${CMAKE_INSTALL_DATADIR}/takt)  # found by graph/language/share.hpp, as its like in the build folder is
+file(MAKE_DIRECTORY ${PROJECT_BINARY_DIR}/share/takt)
+foreach(folder graph schedules)
+  file(CREATE_LINK ${PROJECT_SOURCE_DIR}/${folder} ${PROJECT_BINARY_DIR}/share/takt/${folder} SYMBOLIC)
+endforeach()
+install(DIRECTORY graph/objects graph/signs graph/worlds graph/rigs graph/schema graph/skeletons graph/networks graph/new DESTINATION ${share}/graph)
 install(FILES graph/objects_3d.txt graph/terrain.txt DESTINATION ${share}/graph)
 install(DIRECTORY schedules DESTINATION ${share})
 file(GLOB graphs ${PROJECT_SOURCE_DIR}/graph/*.yaml)
@@ -104,10 +108,4 @@ write_basic_package_version_file(taktConfigVersion.cmake COMPATIBILITY SameMinor
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/taktConfig.cmake ${CMAKE_CURRENT_BINARY_DIR}/taktConfigVersion.cmake
   cmake/dependencies.cmake DESTINATION ${package})
 
-# pkg-config: core, whose only other needs are headers of the system.
-set(TAKT_PC_FLAGS)
-if(TAKT_CPU_FLAGS)
-  set(TAKT_PC_FLAGS "-Wl,-u,takt_require_cpu ")
-endif()
-configure_file(cmake/takt-core.pc.in takt-core.pc @ONLY)
-install(FILES ${CMAKE_CURRENT_BINARY_DIR}/takt-core.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+include(cmake/pkg_config.cmake)

@@ -155,9 +155,13 @@ class Replay {
       throw Refused{"this graph cannot run the jobs of the record: " + *differs};
     const Json assets = attached_json(*file_, "assets.json");
     const Json hashes = log::asset_hashes(prepared_.composition->plan, graph.directory);
-    for (const auto& [path, hash] : assets.items())
-      if (hashes.value(path, "") != hash)
-        throw Refused{fmt::format("{} is not what it was when the record was made", (graph.directory / path).string())};
+    const auto places = log::assets(prepared_.composition->plan, graph.directory);
+    for (const auto& [name, hash] : assets.items()) {
+      if (hashes.value(name, "") == hash) continue;
+      const auto place = places.find(name);
+      throw Refused{fmt::format("{} is not what it was when the record was made",
+                                (place == places.end() ? graph.directory / name : place->second).string())};
+    }
     if (const std::string cut = fact(file_->facts(), "cut"); !cut.empty())
       std::fprintf(stderr, "takt: this is %s; nodes begin here without what they remembered\n", cut.c_str());
     for (size_t i = 0; i < graph.files.size(); ++i)

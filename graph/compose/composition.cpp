@@ -8,6 +8,7 @@
 #include <set>
 
 #include "graph/compose/plan_modes.hpp"
+#include "graph/language/share.hpp"
 #include "hal/devices.hpp"
 #include "rt/sched/port_access.hpp"
 
@@ -31,8 +32,11 @@ std::unique_ptr<Node> make_node(const NodeSpec& spec, const NodeTypes& types) {
   std::unique_ptr<Node> node = types.find(spec.type)->make();
   for (ParamBase* param : node->params()) {
     // Ranges were checked when the graph was loaded; a refusal here is a bug in the checker.
-    if (const auto it = spec.params.find(std::string(param->name())); it != spec.params.end())
+    if (const auto it = spec.params.find(std::string(param->name())); it != spec.params.end()) {
       if (!param->set(it->second.value)) std::abort();
+    } else if (param->unit() == kPath) {
+      if (!param->set(default_asset(*param))) std::abort();
+    }
   }
   return node;
 }

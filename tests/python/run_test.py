@@ -68,6 +68,14 @@ class RunTest(unittest.TestCase):
         with self.assertRaisesRegex(takt.Error, "not going on"):
             run.set("cruise.speed", "0.3m/s")
 
+    def test_reports_of_every_format_so_far_are_read_and_no_later_one(self):
+        sample = pathlib.Path(__file__).resolve().parents[1] / "samples" / "report.json"
+        self.assertEqual(takt.read_report(sample)["graph"], "guard")
+        later = self.folder / "later.json"
+        later.write_text('{"format": 2}')
+        with self.assertRaisesRegex(takt.Error, "format 2.*up to 1"):
+            takt.read_report(later)
+
     def test_what_does_not_come_true_is_told_with_the_last_message(self):
         with takt.Run("graph.yaml") as run:
             with self.assertRaisesRegex(AssertionError, r"obstacle_stop.stop .* 3 seen, the last: {'reasons': 3}"):

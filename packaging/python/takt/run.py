@@ -15,10 +15,18 @@ class RunFailed(RuntimeError):
     """The run did not start, or ended too early; the text has what it printed to stderr."""
 
 
+_NEWEST_REPORT = 1
+
+
 def read_report(path):
-    """The report of `takt run --report FILE`, or of --json, as a dict: read_report("report.json")["ok"]."""
+    """The report of `takt run --report FILE`, or of --json, as a dict: read_report("report.json")["ok"]. Raises Error for
+    one of a later format."""
     with open(path, encoding="utf-8") as file:
-        return json.load(file)
+        report = json.load(file)
+    if report.get("format", 1) > _NEWEST_REPORT:
+        raise Error(f"the report has format {report['format']}, and this reader knows up to {_NEWEST_REPORT}; "
+                    "use a later takt")
+    return report
 
 
 def _descends_from(pid, ancestor):
