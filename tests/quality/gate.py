@@ -12,10 +12,8 @@
 
 Both say of each line what was found, and exit 2 for a line that they do not understand."""
 import argparse
-import datetime
 import json
 import os
-import platform
 import subprocess
 import sys
 import time
@@ -108,8 +106,6 @@ def compare_figures(gate, evaluate):
 
 def write_gate(gate, path=GATE):
     """Stores what compare_figures found, a figure a line; returns the text."""
-    commit = subprocess.run(["git", "-C", HERE, "rev-parse", "--short=8", "HEAD"], capture_output=True, text=True, check=True)
-    taken = {"machine": f"{os.cpu_count()} CPUs, {platform.machine()}", "date": str(datetime.date.today()), "commit": commit.stdout.strip()}
     evaluations = []
     for evaluation in gate["evaluations"]:
         figures = []
@@ -117,7 +113,7 @@ def write_gate(gate, path=GATE):
             found = figure.pop("found", None)
             figures.append(json.dumps(figure if found is None else {**figure, "stored": float(f"{found:.4g}")}))
         evaluations.append(f'  {{"eval": {json.dumps(evaluation["eval"])}, "figures": [\n   ' + ",\n   ".join(figures) + "]}")
-    head = "".join(f" {json.dumps(key)}: {json.dumps(value)},\n" for key, value in {**gate, **taken}.items() if key != "evaluations")
+    head = "".join(f" {json.dumps(key)}: {json.dumps(value)},\n" for key, value in {**gate, **ratios.taken()}.items() if key != "evaluations")
     with open(path, "w", encoding="utf-8") as file:
         file.write("{\n" + head + ' "evaluations": [\n' + ",\n".join(evaluations) + "]\n}\n")
 

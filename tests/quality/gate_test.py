@@ -202,7 +202,8 @@ class Whole(unittest.TestCase):
         self.assertTrue(self.judge_all(0.9)[0])
         good, report = self.judge_all(1.1)
         self.assertFalse(good)
-        self.assertEqual(report[0]["rows"][0]["verdict"], FAILED)
+        self.assertEqual(report["suites"][0]["rows"][0]["verdict"], FAILED)
+        self.assertLessEqual({"title", "machine", "date", "commit"}, report.keys())
         self.assertFalse(self.judge_all(0.9, "s/b")[0])
 
     def test_shares(self):

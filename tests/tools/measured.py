@@ -8,7 +8,8 @@ measured.py SOURCE --check    exit 1 if the page differs from the files
 Each file NN_NAME.json is a section, in the order of NN: title, machine, date, and rows of what, command (one or a list), printed,
 target, met, data, and where there is one n, note, commit, date, machine. `data` says what a figure was measured on: `none` (no
 data matter), `generated`, `recorded`, or `held out` (nothing was chosen on them, or on others like them). `, chosen on` behind the
-first ones: parameters were chosen on the same data. 99_gate.json has the figures that tests/quality/gate.py measures again.
+first ones: parameters were chosen on the same data. 99_gate.json has the figures that tests/quality/gate.py measures again,
+98_ratios.json, where it is there, what `gate.py ratios --json` wrote.
 """
 import json
 import pathlib
@@ -77,10 +78,22 @@ def gate_lines(section):
     yield from table(("command", "figure in its JSON", "better is", "stored", "tolerance"), rows)
 
 
+def ratio_lines(section):
+    yield from ["", f"## {section['title']}", "", f"Taken {section['date']} at {section['commit']} on {section['machine']}.", ""]
+    rows = [
+        (code(f"takt bench {suite['command']}"), row["name"], f"{row['ratio']:.3g}", row["reference"], f"{row['sense']} {row['target']:g}",
+         "-" if row["null"] is None else f"{row['null']:.3g}", row["verdict"])
+        for suite in section["suites"]
+        for row in suite["rows"]
+    ]
+    yield from table(("command", "row", "ratio", "of", "target", "null pair", "verdict"), rows)
+
+
 def page(sections):
     """The lines of the page, from nothing but the sections."""
     for section in sections:
-        yield from (gate_lines if "evaluations" in section else section_lines)(section)
+        kind = gate_lines if "evaluations" in section else ratio_lines if "suites" in section else section_lines
+        yield from kind(section)
 
 
 def main():

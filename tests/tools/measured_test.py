@@ -48,6 +48,13 @@ class Measured(unittest.TestCase):
         self.run_script()
         self.assertEqual(self.run_script("--check")[0], 0)
 
+    def test_ratios(self):
+        row = {"name": "rectify/colour", "ratio": 0.62, "reference": "OpenCV", "sense": "<=", "target": 1, "null": None, "verdict": "met"}
+        section = {"title": "Ratios", "machine": "2 CPUs", "date": "2026-11-29", "commit": "0", "suites": [{"command": "rectify", "rows": [row]}]}
+        (self.root / FILES / "98_ratios.json").write_text(json.dumps(section))
+        self.assertEqual(self.run_script()[0], 0)
+        self.assertIn("| `takt bench rectify` | rectify/colour | 0.62 | OpenCV | &lt;= 1 | - | met |", (self.root / PAGE).read_text())
+
     def test_wrong_rows(self):
         for cells, words in (({"met": "maybe"}, "met `maybe`; write yes |"), ({"data": "real"}, "data `real`; write none |"),
                              ({"met": "no"}, "met `no`: write into note"), ({"remark": "-"}, "keys remark: a row needs")):
