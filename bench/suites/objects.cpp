@@ -13,7 +13,7 @@
 #include "nodes/object_detection/detector.hpp"
 #include "nodes/object_detection/reference.hpp"
 #include "nodes/object_detection/scenes.hpp"
-#include "rt/msg/detections.hpp"
+#include "rt/msg/ace/detections.hpp"
 
 namespace takt::bench {
 

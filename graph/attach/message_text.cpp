@@ -2,20 +2,15 @@
 #include "graph/attach/message_text.hpp"
 
 #include <algorithm>
+#include <cstring>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
 #include "nodes/cloud/cloud_file.hpp"
 #include "nodes/picture/clouds.hpp"
 #include "nodes/picture/draw.hpp"
-#include "rt/msg/disparity.hpp"
-#include "rt/msg/grid.hpp"
-#include "rt/msg/image.hpp"
-#include "rt/msg/image_view.hpp"
-#include "rt/msg/point_cloud.hpp"
-#include "rt/msg/robot_task.hpp"
 #include "rt/msg/scalar.hpp"
-#include "rt/msg/text_status.hpp"
+#include "rt/msg/viewer.hpp"
 
 namespace takt::attach {
 namespace {
@@ -34,49 +29,59 @@ Json scalars(Scalar scalar, const std::byte* at, size_t count) {
   return list;
 }
 
-Json array_json(const Field& field, const std::byte* at, size_t element_bytes, size_t items) {
-  const Array<std::byte>& array = any_array(at);
-  const std::byte* data = array.data();
+/// An array of `size` elements.
+Json array_json(const Field& field, const std::byte* data, size_t size, size_t items) {
+  if (field.text) return std::string(reinterpret_cast<const char*>(data), size);
   Json first = Json::array();
-  for (size_t i = 0; i < std::min<size_t>(array.size, items); ++i)
-    first.push_back(scalars(field.scalar, data + i * element_bytes, element_bytes / scalar_bytes(field.scalar)));
-  return {{"size", array.size}, {"first", first}};
+  const size_t bytes = field.element_bytes;
+  for (size_t i = 0; i < std::min(size, items); ++i)
+    first.push_back(scalars(field.scalar, data + i * bytes, bytes / scalar_bytes(field.scalar)));
+  return {{"size", size}, {"first", first}};
 }
 
-cv::Mat wrap(ImageView<const uint8_t> view) {
-  return {view.height, view.width, view.channels == 3 ? CV_8UC3 : CV_8UC1, const_cast<uint8_t*>(view.data)};
-}
+/// What can be drawn, side by side; the first sets height and colours, and what has others is left out.
+class Drawing final : public Viewer {
+ public:
+  void picture(const ImageView<const uint8_t>& view, std::string_view) override {
+    add({view.height, view.width, view.channels == 3 ? CV_8UC3 : CV_8UC1, const_cast<uint8_t*>(view.data)});
+  }
+  void disparity(const ImageView<const int16_t>& map, int disparities) override {
+    cv::Mat out(map.height, map.width, CV_8UC3);
+    picture::draw_disparity(map, disparities, {out.data, out.cols, out.rows, 3});
+    add(out);
+  }
+  void grid(const Cells& grid) override {
+    cv::Mat out(grid.cells.height * kPixelsPerCell, grid.cells.width * kPixelsPerCell, CV_8UC3);
+    picture::draw_grid(grid.cells, kPixelsPerCell, {out.data, out.cols, out.rows, 3});
+    add(out);
+  }
+  void cloud(std::span<const Point> points, std::span<const Colour> colours) override {
+    const cloud::CloudView view{points, colours};
+    add(picture::draw_clouds({&view, 1}));
+  }
+  const cv::Mat& all() const { return all_; }
 
-cv::Mat draw(const DisparityMap& map) {
-  cv::Mat out(map.height, map.width, CV_8UC3);
-  picture::draw_disparity(map.view(), map.disparities, {out.data, out.cols, out.rows, 3});
-  return out;
-}
+ private:
+  void add(const cv::Mat& image) {
+    if (all_.empty()) all_ = image;
+    else if (image.rows == all_.rows && image.type() == all_.type()) cv::hconcat(all_, image, all_);
+  }
+  cv::Mat all_;
+};
 
-cv::Mat draw(const Grid& grid) {
-  cv::Mat out(grid.height * kPixelsPerCell, grid.width * kPixelsPerCell, CV_8UC3);
-  picture::draw_grid(grid.view(), kPixelsPerCell, {out.data, out.cols, out.rows, 3});
-  return out;
-}
+/// The first cloud.
+class CloudFile final : public Viewer {
+ public:
+  void cloud(std::span<const Point> points, std::span<const Colour> colours) override {
+    if (!ply) ply = cloud::ply_of({points, colours}, cloud::Encoding::binary);
+  }
+  std::optional<std::string> ply;
+};
 
-cv::Mat draw(const StereoPair& pair) {
-  cv::Mat both;
-  cv::hconcat(wrap(pair.left_view()), wrap(pair.right_view()), both);
-  return both;
-}
-
-cv::Mat draw(const PointCloud& cloud) {
-  const cloud::CloudView view{cloud.points.items(), cloud.colours.items()};
-  return picture::draw_clouds({&view, 1});
-}
-
-cv::Mat picture_of(const MessageType& type, const void* message) {
-  if (type.name == Image::type_name) return wrap(static_cast<const Image*>(message)->view());
-  if (type.name == StereoPair::type_name) return draw(*static_cast<const StereoPair*>(message));
-  if (type.name == DisparityMap::type_name) return draw(*static_cast<const DisparityMap*>(message));
-  if (type.name == Grid::type_name) return draw(*static_cast<const Grid*>(message));
-  if (type.name == PointCloud::type_name) return draw(*static_cast<const PointCloud*>(message));
-  return {};
+bool show(const MessageType& type, const void* message, Viewer& to) {
+  const bool shown = type.show != nullptr && type.sound(message);
+  if (shown) type.show(message, to);
+  return shown;
 }
 
 }  // namespace
@@ -88,27 +93,49 @@ nlohmann::ordered_json message_json(const MessageType& type, const void* message
     const std::string name(field.name);
     if (!field.is_array()) {
       json[name] = scalars(field.scalar, bytes + field.offset, field.count);
-    } else if (type.name == TextStatus::type_name || type.name == RobotTask::type_name) {
-      const auto& text = *reinterpret_cast<const Array<char>*>(bytes + field.offset);
-      json[name] = std::string(text.data(), text.size);
     } else {
-      json[name] = array_json(field, bytes + field.offset, field.element_bytes, items);
+      const Array<std::byte>& array = any_array(bytes + field.offset);
+      json[name] = array_json(field, array.data(), array.size, items);
     }
   }
   return json;
 }
 
+tl::expected<nlohmann::ordered_json, std::string> packed_json(std::span<const Field> fields,
+                                                              std::span<const std::byte> packed, size_t items) {
+  Json json;
+  size_t at = 0;
+  for (const Field& field : fields) {
+    uint32_t count = field.count;
+    if (field.is_array()) {
+      if (packed.size() - at < sizeof count) return tl::make_unexpected(std::string(field.name) + " is cut off");
+      std::memcpy(&count, packed.data() + at, sizeof count);
+      at += sizeof count;
+    }
+    const size_t bytes = size_t{count} * field.element_bytes;
+    if (packed.size() - at < bytes) return tl::make_unexpected(std::string(field.name) + " is cut off");
+    const std::byte* data = packed.data() + at;
+    json[std::string(field.name)] =
+        field.is_array() ? array_json(field, data, count, items) : scalars(field.scalar, data, count);
+    at += bytes;
+  }
+  if (at != packed.size()) return tl::make_unexpected(std::to_string(packed.size() - at) + " bytes too many");
+  return json;
+}
+
 std::optional<std::string> message_png(const MessageType& type, const void* message) {
-  const cv::Mat image = picture_of(type, message);
+  Drawing drawing;
   std::vector<uint8_t> png;
-  if (image.empty() || !cv::imencode(".png", image, png, {cv::IMWRITE_PNG_COMPRESSION, 1})) return std::nullopt;
+  if (!show(type, message, drawing) || drawing.all().empty() ||
+      !cv::imencode(".png", drawing.all(), png, {cv::IMWRITE_PNG_COMPRESSION, 1}))
+    return std::nullopt;
   return std::string(png.begin(), png.end());
 }
 
 std::optional<std::string> message_ply(const MessageType& type, const void* message) {
-  if (type.name != PointCloud::type_name) return std::nullopt;
-  const auto& cloud = *static_cast<const PointCloud*>(message);
-  return cloud::ply_of({cloud.points.items(), cloud.colours.items()}, cloud::Encoding::binary);
+  CloudFile file;
+  if (!show(type, message, file)) return std::nullopt;
+  return file.ply;
 }
 
 }  // namespace takt::attach

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "graph/command/log_commands.hpp"
 
+#include <fmt/format.h>
+
 #include <cstdio>
 #include <optional>
 
 #include "graph/cli/outcome.hpp"
 #include "graph/log/cut_log.hpp"
+#include "graph/log/echo_log.hpp"
 #include "graph/log/export_log.hpp"
 #include "graph/log/log_content.hpp"
 
@@ -52,20 +55,26 @@ int log_diff(const LogOptions& options) {
   });
 }
 
-int log_export(const LogOptions& options) {
+int log_export(const Registry& registry, const LogOptions& options) {
   return guarded([&]() -> int {
     auto log = open(options.file);
     if (!log) return kBadInput;
     auto sink = mcap::FileSink::open(options.output);
     if (!sink) return refuse("--output " + sink.error() + "; choose another place", kBadInput);
-    const auto exported = log::export_log(*log, *sink);
+    const auto exported = log::export_log(*log, graph::message_types(registry), *sink);
     if (!exported) return refuse(options.output.string() + ": " + exported.error(), kBadInput);
     std::printf("%llu messages, %.1f MB\n", static_cast<unsigned long long>(exported->messages),
                 static_cast<double>(exported->bytes) / 1e6);
     if (exported->hash_only > 0)
       std::printf("%llu messages were recorded by their hash only; record them whole with --record-port\n",
                   static_cast<unsigned long long>(exported->hash_only));
-    return kOk;
+    if (!exported->own_fields.empty())
+      std::printf("by their own fields, as Foxglove has no schema for them: %s\n",
+                  fmt::format("{}", fmt::join(exported->own_fields, ", ")).c_str());
+    if (exported->unreadable == 0) return kOk;
+    std::printf("%llu messages cannot be read and are not in it; the first: %s\n",
+                static_cast<unsigned long long>(exported->unreadable), exported->first_unreadable.c_str());
+    return kNotOk;
   });
 }
 
@@ -87,7 +96,26 @@ int log_cut(const LogOptions& options) {
   });
 }
 
-void add_log(CLI::App& app, LogOptions& o, int& exit_code) {
+int log_echo(const LogOptions& options) {
+  return guarded([&]() -> int {
+    auto log = open(options.file);
+    if (!log) return kBadInput;
+    const auto echoed = log::echo_log(*log, options.ports, options.items, [](const log::Json& line) {
+      std::puts(line.dump(-1, ' ', false, log::Json::error_handler_t::replace).c_str());  // a text may be no UTF-8
+    });
+    if (!echoed) return refuse(options.file.string() + ": " + echoed.error(), kBadInput);
+    if (echoed->hash_only > 0)
+      std::fprintf(stderr,
+                   "takt: %llu messages were recorded by their hash only; record them whole with --record-port\n",
+                   static_cast<unsigned long long>(echoed->hash_only));
+    if (echoed->unreadable == 0) return kOk;
+    return refuse(fmt::format("{} messages cannot be read and are left out; the first: {}", echoed->unreadable,
+                              echoed->first_unreadable),
+                  kNotOk);
+  });
+}
+
+void add_log(CLI::App& app, const Registry& registry, LogOptions& o, int& exit_code) {
   CLI::App* log = app.add_subcommand("log", "looks into records");
   log->require_subcommand(1);
   CLI::App* info = log->add_subcommand("info", "what is in a record, what it lost, its hash");
@@ -100,6 +128,12 @@ void add_log(CLI::App& app, LogOptions& o, int& exit_code) {
   diff->add_option("to", o.other, "another one")->required();
   diff->footer("Example: takt log diff run.mcap again.mcap");
   diff->callback([&] { exit_code = log_diff(o); });
+  CLI::App* echo = log->add_subcommand("echo", "its messages, one JSON object a line");
+  echo->add_option("file", o.file, "a record")->required();
+  echo->add_option("ports", o.ports, "NODE.PORT (default: all)");
+  echo->add_option("--items", o.items, "of longer arrays so many elements (default 8)");
+  echo->footer("Example: takt log echo run.mcap base.odometry");
+  echo->callback([&] { exit_code = log_echo(o); });
   CLI::App* exported = log->add_subcommand("export", "as MCAP with JSON in Foxglove's schemas");
   exported->add_option("file", o.file, "a record")->required();
   exported->add_option("-o,--output", o.output, "the file to write")->required();
@@ -111,7 +145,7 @@ void add_log(CLI::App& app, LogOptions& o, int& exit_code) {
   cut->footer("Example: takt log cut run.mcap -o short.mcap --from 2 --to 4");
   cut->callback([&] { exit_code = log_cut(o); });
   exported->footer("Example: takt log export run.mcap -o foxglove.mcap");
-  exported->callback([&] { exit_code = log_export(o); });
+  exported->callback([&] { exit_code = log_export(registry, o); });
 }
 
 }  // namespace takt::command

@@ -2,12 +2,18 @@
 #pragma once
 #include <CLI/CLI.hpp>
 #include <filesystem>
+#include <string>
+#include <vector>
+
+#include "graph/language/registry.hpp"
 
 namespace takt::command {
 
 struct LogOptions {
   std::filesystem::path file, other, output;
   bool json = false;
+  std::vector<std::string> ports;
+  size_t items = 8;
   double from_s = 0, to_s = 1e9;  ///< since the epoch of the run
 };
 
@@ -16,13 +22,18 @@ int log_info(const LogOptions& options);
 /// `takt log diff A B`. Exit 0 if they hold the same, 1 if not, 2 if one is no record.
 int log_diff(const LogOptions& options);
 
-/// `takt log export FILE -o OUT`: for programs that know Foxglove's schemas. Exit 0, 2 if FILE is no record or OUT
-/// cannot be written.
-int log_export(const LogOptions& options);
+/// `takt log export FILE -o OUT`: for programs that know Foxglove's schemas; types of the registry as they
+/// show themselves. Exit 0, 1 if some messages cannot be read,
+/// 2 if FILE is no record or OUT cannot be written.
+int log_export(const Registry& registry, const LogOptions& options);
 
 /// `takt log cut FILE -o OUT [--from S] [--to S]`: a shorter record that can be replayed. Exit 0, 2 as above.
 int log_cut(const LogOptions& options);
 
-void add_log(CLI::App& app, LogOptions& options, int& exit_code);
+/// `takt log echo FILE [NODE.PORT...]`: its messages, one JSON object a line. Exit 0, 1 if some cannot be read, 2 if
+/// FILE is no record or has no such port.
+int log_echo(const LogOptions& options);
+
+void add_log(CLI::App& app, const Registry& registry, LogOptions& options, int& exit_code);
 
 }  // namespace takt::command

@@ -58,7 +58,7 @@ int run(int argc, char** argv, const std::function<void(Registry&)>& fill, const
   add_attach_commands(app, plugins, attach, exit_code);
   add_doctor(app, doctor, exit_code);
   add_replay(app, plugins, replay, exit_code);
-  add_log(app, log, exit_code);
+  add_log(app, registry, log, exit_code);
   add_new(app, project, exit_code);
   const auto options_of_more = more ? more(app, exit_code) : nullptr;
   auto own = names(app);

@@ -12,7 +12,7 @@
 #include "nodes/body_pose/evaluate.hpp"
 #include "nodes/body_pose/floor.hpp"
 #include "nodes/body_pose/picture.hpp"
-#include "rt/msg/body_poses.hpp"
+#include "rt/msg/ace/body_poses.hpp"
 #include "rt/msg/geometry.hpp"
 #include "rt/msg/point.hpp"
 #include "rt/quantile.hpp"

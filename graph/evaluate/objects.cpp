@@ -11,7 +11,7 @@
 #include "nodes/object_detection/evaluate.hpp"
 #include "nodes/object_detection/photographs.hpp"
 #include "nodes/object_detection/tally.hpp"
-#include "rt/msg/detections.hpp"
+#include "rt/msg/ace/detections.hpp"
 #include "rt/quantile.hpp"
 #include "rt/time/clock.hpp"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "rt/msg/terrain.hpp"
+#include "rt/msg/ace/terrain.hpp"
 
 #include <fmt/format.h>
 

@@ -27,6 +27,16 @@ bool layers_fit(Layer from, Layer to) {
   return static_cast<int>(to) == static_cast<int>(from) + 1;
 }
 
+/// Whether a message of one type may be read as one of the other: plug-ins bring declarations of their own.
+bool same_layout(const MessageType& a, const MessageType& b) {
+  return &a == &b || (a.header_bytes == b.header_bytes &&
+                      std::equal(a.fields.begin(), a.fields.end(), b.fields.begin(), b.fields.end(),
+                                 [](const Field& x, const Field& y) {
+                                   return x.name == y.name && x.scalar == y.scalar && x.offset == y.offset &&
+                                          x.count == y.count && x.element_bytes == y.element_bytes;
+                                 }));
+}
+
 }  // namespace
 
 const PortInfo* Part::input(std::string_view name) const { return find(inputs, name); }
@@ -118,6 +128,12 @@ void Loader::check_edge(const std::string& id, const Part& to, const EdgeSpec& e
   if (input != nullptr && input->type->name != output->type->name)
     problem(edge.position, fmt::format("type mismatch: {} gives {}, but input {} takes {}", ticked(edge.from.text()),
                                        ticked(output->type->name), what, ticked(input->type->name)));
+  else if (input != nullptr && !same_layout(*input->type, *output->type))
+    problem(
+        edge.position,
+        fmt::format("type mismatch: {} and input {} both call their type {}, but with other fields; build program and "
+                    "plug-ins with one declaration of it, or give one of the two types another name",
+                    ticked(edge.from.text()), what, ticked(input->type->name)));
   if (layers_) check_layer(id, from, to, edge);
   check_hierarchy(from, to, edge);
 }

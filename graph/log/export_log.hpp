@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <cstdint>
+#include <set>
 #include <string>
 #include <tl/expected.hpp>
 
+#include "graph/language/message_types.hpp"
 #include "rt/record/log_file.hpp"
 #include "rt/record/mcap/file_sink.hpp"
 
@@ -13,13 +15,18 @@ struct Exported {
   uint64_t messages = 0;   ///< written
   uint64_t hash_only = 0;  ///< of which the record does not have the fields: a replay can make them
   uint64_t bytes = 0;
+  std::set<std::string> own_fields;  ///< types that show nothing of themselves: their messages are there field by field
+  uint64_t unreadable = 0;           ///< messages that the record has whole and that cannot be read, and lost channels
+  std::string first_unreadable;      ///< the port and why
 };
 
-/// Writes what the record holds with all fields as MCAP with messages in JSON that other programs show: images, clouds,
-/// scans, grids, poses and texts in Foxglove's well-known schemas (a pair as `NODE.PORT.left` and `.right`, where a
-/// sensor sits on the robot as a transform on `/tf`), everything else by its own fields. Events are foxglove.Log on
-/// `takt/events`. Stamps are those of the data.
+/// Writes what the record holds with all fields as MCAP with messages in JSON that other programs show. Of `types`,
+/// what a message shows of itself (rt/msg/viewer.hpp), in Foxglove's well-known schemas: a pair as `NODE.PORT.left` and
+/// `.right`, where a sensor sits on the robot as a transform on `/tf`. Everything else by the fields that the record
+/// describes, whether this program was built with the type or not. Events are foxglove.Log on `takt/events`. Stamps are
+/// those of the data.
 /// Error: the file takes no more, or the record does not hold its plan.
-tl::expected<Exported, std::string> export_log(record::LogFile& log, mcap::Sink& sink);
+tl::expected<Exported, std::string> export_log(record::LogFile& log, const graph::MessageTypes& types,
+                                               mcap::Sink& sink);
 
 }  // namespace takt::log

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <map>
 
+#include "graph/log/recorded_type.hpp"
 #include "rt/record/recorder.hpp"
 
 namespace takt::log {
@@ -103,21 +104,21 @@ std::vector<std::pair<std::string, NodeFigures>> figures(const LogFile& log) {
 }
 
 std::string schema_name(const LogFile& log, const mcap::Channel& channel) {
-  for (const mcap::Schema& schema : log.container().schemas())
-    if (schema.id == channel.schema) return schema.name;
-  return "";
+  const mcap::Schema* schema = schema_of(log, channel);
+  return schema == nullptr ? "" : schema->name;
 }
 
 /// The first field in which two messages of one channel differ, where both are there with all fields.
 std::string where_they_part(LogFile& from, LogFile& to, const mcap::Channel& channel, uint64_t sequence) {
-  const std::string schema = schema_name(from, channel), prefix = "takt.";
-  const MessageType* type = schema.starts_with(prefix) ? type_named(schema.substr(prefix.size())) : nullptr;
   const auto reference = from.message(channel.id, sequence), other = to.message(to.channel(channel.topic), sequence);
-  if (type == nullptr || !reference || !other) return "";
+  if (!reference || !other) return "";
   if (reference->stamp_ns != other->stamp_ns)
     return fmt::format(": stamp {} instead of {}", other->stamp_ns, reference->stamp_ns);
   if (!reference->whole || !other->whole) return ": by its hash";
-  const auto part = record::first_difference(*type, reference->data, other->data);
+  const auto type = type_of(from, channel), other_type = type_of(to, *channel_of(to, channel.topic));
+  if (!type || !other_type) return ": " + (type ? other_type.error() : type.error());
+  if (!type->same_fields(other_type->fields())) return fmt::format(": {} has other fields in the second", type->name());
+  const auto part = record::first_difference(type->fields(), reference->data, other->data);
   return part ? fmt::format(": {} (byte {}) is {}", part->field, part->byte, part->values) : "";
 }
 

@@ -11,7 +11,6 @@
 
 #include "graph/language/share.hpp"
 #include "rt/abi.hpp"
-#include "rt/msg/messages.hpp"
 #include "rt/node.hpp"
 #include "rt/record/message_record.hpp"
 
@@ -168,12 +167,6 @@ std::string program_hash() {
 std::string file_text(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), {}};
-}
-
-const MessageType* type_named(std::string_view name) {
-  for (const MessageType* type : message_types())
-    if (type->name == name) return type;
-  return nullptr;
 }
 
 }  // namespace takt::log

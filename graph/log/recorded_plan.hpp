@@ -53,7 +53,4 @@ std::string program_hash();
 /// All of a file; empty if it cannot be read.
 std::string file_text(const std::filesystem::path& file);
 
-/// By the name that a record has for it; null if this program does not know it.
-const MessageType* type_named(std::string_view name);
-
 }  // namespace takt::log

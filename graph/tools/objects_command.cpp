@@ -17,7 +17,7 @@
 #include "nodes/object_detection/scenes.hpp"
 #include "nodes/object_detection/tuning.hpp"
 #include "nodes/picture/curves.hpp"
-#include "rt/msg/detections.hpp"
+#include "rt/msg/ace/detections.hpp"
 
 namespace takt::command {
 namespace {

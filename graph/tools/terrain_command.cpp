@@ -11,6 +11,7 @@
 
 #include "graph/cli/outcome.hpp"
 #include "graph/log/recorded_plan.hpp"
+#include "graph/log/recorded_type.hpp"
 #include "nodes/ground_map/terrain_drive.hpp"
 #include "nodes/ground_map/terrain_file.hpp"
 #include "rt/memory/aligned_bytes.hpp"
@@ -69,14 +70,15 @@ MeasuredMaps recorded_maps(const TerrainOptions& options) {
   for (const std::string& text : options.pick) picks.push_back(pick_of(text));
   auto log = record::LogFile::open(options.record);
   if (!log) throw std::runtime_error(log.error());
+  const MessageType& type = MessageType::of<Grid>();
+  const mcap::Channel* recorded = log::channel_of(*log, options.port);
   const auto plan = log::Json::parse(log->attached("plan.json").value_or("{\"ports\": []}"));
   const auto& ports = plan.at("ports");
-  const auto port = std::find_if(ports.begin(), ports.end(), [&](const log::Json& p) {
-    return p.value("name", "") == options.port && p.value("type", "") == Grid::type_name;
-  });
-  if (port == ports.end())
+  const auto port =
+      std::find_if(ports.begin(), ports.end(), [&](const log::Json& p) { return p.value("name", "") == options.port; });
+  const auto described = recorded != nullptr ? log::type_of(*log, *recorded) : tl::make_unexpected(std::string());
+  if (port == ports.end() || !described || !described->is(type))
     throw std::runtime_error(fmt::format("{}: has no grids of {}", options.record.string(), options.port));
-  const MessageType& type = MessageType::of<Grid>();
   const Capacity capacity = log::capacity_of(plan, static_cast<size_t>(port - ports.begin()));
   const AlignedBytes memory = aligned_bytes(type.bytes(capacity));
   const uint16_t channel = log->channel(options.port);

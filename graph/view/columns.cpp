@@ -2,7 +2,6 @@
 #include <algorithm>
 
 #include "graph/view/layout_steps.hpp"
-#include "rt/msg/requests.hpp"
 
 namespace takt::view {
 namespace {
@@ -26,7 +25,7 @@ class Columns {
  private:
   /// Commands to devices and requests to nodes go against the data.
   static bool gives_data(const Diagram& diagram, const DiagramEdge& edge) {
-    return !diagram.boxes[edge.to_box].device && diagram.type_of(edge) != Requests::type_name;
+    return !diagram.boxes[edge.to_box].device && !edge.control;
   }
 
   enum class State : uint8_t { fresh, under_way, done };

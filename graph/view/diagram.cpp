@@ -113,6 +113,7 @@ class Maker {
     const size_t to = index_.at(id);
     for (auto& [edge, spec] : found) {
       edge.to_box = to;
+      edge.control = spec->input == "control";  // every node has this input, and no other one of that name
       edge.input = result_.boxes[to].inputs.size();
       result_.boxes[edge.from_box].outputs[edge.output].read = true;
       result_.boxes[to].inputs.push_back(input_of(id, *spec, joins));

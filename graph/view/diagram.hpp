@@ -43,6 +43,7 @@ struct DiagramBox {
 /// Indexes into Diagram::boxes and the inputs and outputs there.
 struct DiagramEdge {
   size_t from_box = 0, output = 0, to_box = 0, input = 0;
+  bool control = false;  ///< requests to stop, start or pace a node
 };
 
 struct DiagramChain {

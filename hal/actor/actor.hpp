@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include "hal/device.hpp"
-#include "rt/msg/action.hpp"
+#include "rt/msg/ace/action.hpp"
 
 namespace takt {
 

@@ -4,7 +4,7 @@
 
 #include "hal/actor/actor.hpp"
 #include "hal/device_node.hpp"
-#include "rt/msg/action.hpp"
+#include "rt/msg/ace/action.hpp"
 
 namespace takt {
 

@@ -4,8 +4,8 @@
 
 #include "hal/base/mobile_base.hpp"
 #include "hal/device_node.hpp"
+#include "rt/msg/ace/stop_command.hpp"
 #include "rt/msg/odometry.hpp"
-#include "rt/msg/stop_command.hpp"
 #include "rt/msg/velocity_command.hpp"
 
 namespace takt {

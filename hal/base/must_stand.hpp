@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include "rt/msg/stop_command.hpp"
+#include "rt/msg/ace/stop_command.hpp"
 #include "rt/node.hpp"
 
 namespace takt {

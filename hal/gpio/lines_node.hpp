@@ -4,7 +4,7 @@
 
 #include "hal/device_node.hpp"
 #include "hal/gpio/digital_lines.hpp"
-#include "rt/msg/digital_state.hpp"
+#include "rt/msg/ace/digital_state.hpp"
 
 namespace takt {
 

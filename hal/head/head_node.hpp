@@ -4,8 +4,8 @@
 
 #include "hal/device_node.hpp"
 #include "hal/head/camera_head.hpp"
-#include "rt/msg/digital_state.hpp"
-#include "rt/msg/head.hpp"
+#include "rt/msg/ace/digital_state.hpp"
+#include "rt/msg/ace/head.hpp"
 
 namespace takt {
 

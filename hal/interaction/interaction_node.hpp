@@ -4,7 +4,7 @@
 
 #include "hal/device_node.hpp"
 #include "hal/interaction/interaction.hpp"
-#include "rt/msg/robot_task.hpp"
+#include "rt/msg/ace/robot_task.hpp"
 #include "rt/msg/text_status.hpp"
 
 namespace takt {

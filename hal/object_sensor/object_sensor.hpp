@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include "hal/device.hpp"
-#include "rt/msg/object_reports.hpp"
+#include "rt/msg/ace/object_reports.hpp"
 
 namespace takt {
 

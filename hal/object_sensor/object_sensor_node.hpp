@@ -4,7 +4,7 @@
 
 #include "hal/device_node.hpp"
 #include "hal/object_sensor/object_sensor.hpp"
-#include "rt/msg/object_reports.hpp"
+#include "rt/msg/ace/object_reports.hpp"
 
 namespace takt {
 

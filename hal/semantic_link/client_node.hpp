@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include "hal/semantic_link/link_node.hpp"
-#include "rt/msg/action.hpp"
+#include "rt/msg/ace/action.hpp"
+#include "rt/msg/ace/object_reports.hpp"
+#include "rt/msg/ace/robot_task.hpp"
+#include "rt/msg/ace/stop_command.hpp"
 #include "rt/msg/laser_scan.hpp"
-#include "rt/msg/object_reports.hpp"
 #include "rt/msg/odometry.hpp"
-#include "rt/msg/robot_task.hpp"
-#include "rt/msg/stop_command.hpp"
 #include "rt/msg/text_status.hpp"
 #include "rt/msg/velocity_command.hpp"
 

@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "hal/sim/world.hpp"
-#include "rt/msg/action.hpp"
+#include "rt/msg/ace/action.hpp"
 
 namespace takt::sim {
 

@@ -12,8 +12,8 @@
 #include "hal/laser/laser_scanner.hpp"
 #include "hal/object_sensor/object_sensor.hpp"
 #include "hal/settings/failures.hpp"
-#include "rt/msg/action.hpp"
-#include "rt/msg/object_reports.hpp"
+#include "rt/msg/ace/action.hpp"
+#include "rt/msg/ace/object_reports.hpp"
 #include "rt/time/clock.hpp"
 
 namespace takt::sim {

@@ -3,8 +3,8 @@
 #include "hal/actor/actor.hpp"
 #include "hal/object_sensor/object_sensor.hpp"
 #include "hal/sim/simulation.hpp"
-#include "rt/msg/action.hpp"
-#include "rt/msg/object_reports.hpp"
+#include "rt/msg/ace/action.hpp"
+#include "rt/msg/ace/object_reports.hpp"
 
 namespace takt::sim {
 

@@ -6,7 +6,7 @@
 
 #include "nodes/body_pose/fitter.hpp"
 #include "nodes/body_pose/segmentation.hpp"
-#include "rt/msg/body_poses.hpp"
+#include "rt/msg/ace/body_poses.hpp"
 #include "rt/msg/geometry.hpp"
 #include "rt/msg/point.hpp"
 

@@ -5,7 +5,7 @@
 
 #include "nodes/body_pose/body_detector.hpp"
 #include "nodes/body_pose/floor.hpp"
-#include "rt/msg/body_poses.hpp"
+#include "rt/msg/ace/body_poses.hpp"
 #include "rt/msg/geometry.hpp"
 #include "rt/msg/point.hpp"
 #include "rt/msg/point_cloud.hpp"

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "rt/msg/body_poses.hpp"
+#include "rt/msg/ace/body_poses.hpp"
 
 namespace takt::body_pose {
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "nodes/drive_arbiter/vision_state.hpp"
-#include "rt/msg/digital_state.hpp"
+#include "rt/msg/ace/digital_state.hpp"
 #include "rt/msg/text_status.hpp"
 #include "rt/msg/velocity_command.hpp"
 #include "rt/node.hpp"

@@ -15,14 +15,14 @@
 #include "nodes/mapping_3d/head_at.hpp"
 #include "nodes/mapping_3d/pose.hpp"
 #include "nodes/stereo/rectify.hpp"
+#include "rt/msg/ace/head.hpp"
+#include "rt/msg/ace/terrain.hpp"
 #include "rt/msg/geometry.hpp"
 #include "rt/msg/grid.hpp"
-#include "rt/msg/head.hpp"
 #include "rt/msg/image.hpp"
 #include "rt/msg/laser_scan.hpp"
 #include "rt/msg/motion.hpp"
 #include "rt/msg/odometry.hpp"
-#include "rt/msg/terrain.hpp"
 #include "rt/node.hpp"
 
 namespace takt {

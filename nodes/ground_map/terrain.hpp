@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "nodes/ground_map/ground_grid.hpp"
-#include "rt/msg/terrain.hpp"
+#include "rt/msg/ace/terrain.hpp"
 
 namespace takt::ground_map {
 

@@ -5,7 +5,7 @@
 #include <random>
 
 #include "nodes/ground_map/ground_detector.hpp"
-#include "rt/msg/terrain.hpp"
+#include "rt/msg/ace/terrain.hpp"
 
 namespace takt::ground_map {
 namespace {

@@ -4,9 +4,9 @@
 
 #include "nodes/head_behaviour/eyelids.hpp"
 #include "nodes/head_behaviour/gaze.hpp"
-#include "rt/msg/body_poses.hpp"
-#include "rt/msg/digital_state.hpp"
-#include "rt/msg/head.hpp"
+#include "rt/msg/ace/body_poses.hpp"
+#include "rt/msg/ace/digital_state.hpp"
+#include "rt/msg/ace/head.hpp"
 #include "rt/msg/image.hpp"
 #include "rt/msg/pose.hpp"
 #include "rt/node.hpp"

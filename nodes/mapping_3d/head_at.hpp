@@ -4,7 +4,7 @@
 #include <cmath>
 #include <optional>
 
-#include "rt/msg/head.hpp"
+#include "rt/msg/ace/head.hpp"
 #include "rt/node.hpp"
 
 namespace takt::mapping_3d {

@@ -4,7 +4,7 @@
 #include <optional>
 #include <span>
 
-#include "rt/msg/body_poses.hpp"
+#include "rt/msg/ace/body_poses.hpp"
 
 namespace takt::mission {
 

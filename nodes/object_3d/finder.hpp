@@ -12,7 +12,7 @@
 #include "nodes/object_3d/seeds.hpp"
 #include "nodes/object_3d/segmenter.hpp"
 #include "nodes/object_3d/support.hpp"
-#include "rt/msg/detections.hpp"
+#include "rt/msg/ace/detections.hpp"
 #include "rt/msg/geometry.hpp"
 #include "rt/msg/point.hpp"
 

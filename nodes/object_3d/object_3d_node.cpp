@@ -6,8 +6,8 @@
 #include <string>
 
 #include "nodes/object_3d/finder.hpp"
-#include "rt/msg/detections.hpp"
-#include "rt/msg/objects_3d.hpp"
+#include "rt/msg/ace/detections.hpp"
+#include "rt/msg/ace/objects_3d.hpp"
 #include "rt/msg/point_cloud.hpp"
 #include "rt/node.hpp"
 

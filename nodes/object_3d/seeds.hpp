@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "nodes/object_3d/pixel_grid.hpp"
-#include "rt/msg/detections.hpp"
+#include "rt/msg/ace/detections.hpp"
 #include "rt/msg/point.hpp"
 
 namespace takt::object_3d {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "nodes/object_detection/grid.hpp"
-#include "rt/msg/detections.hpp"
+#include "rt/msg/ace/detections.hpp"
 #include "rt/msg/image_view.hpp"
 
 namespace takt::object_detection {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "nodes/object_detection/scale_search.hpp"
-#include "rt/msg/detections.hpp"
+#include "rt/msg/ace/detections.hpp"
 
 namespace takt::object_detection {
 

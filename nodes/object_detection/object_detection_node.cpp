@@ -8,7 +8,7 @@
 
 #include "nodes/object_detection/reloader.hpp"
 #include "nodes/object_detection/revisions.hpp"
-#include "rt/msg/detections.hpp"
+#include "rt/msg/ace/detections.hpp"
 #include "rt/msg/image.hpp"
 #include "rt/node.hpp"
 
@@ -163,9 +163,7 @@ class ObjectDetectionNode final : public Node {
       0.7,  {0.5, 1.0},
       "1",  "size, of the views' edge, down to which objects are found: views are compared with at that size"};
   Param<double> tolerance_{
-      this, "tolerance",
-      0.4,  {0.0, 0.75},
-      "1",  "share of an object that may be hidden; added to automatic thresholds"};
+      this, "tolerance", 0.4, {0.0, 0.75}, "1", "share of an object that may be hidden; added to automatic thresholds"};
   Param<double> threshold_scale_{
       this, "threshold_scale", 1.0, {0.05, 4.0}, "1", "factor on the thresholds of the database"};
   Param<double> min_score_{this,       "min_score", 0.3,

@@ -12,7 +12,7 @@
 #include "nodes/object_detection/orientation_stage.hpp"
 #include "nodes/object_detection/references.hpp"
 #include "nodes/object_detection/shrink.hpp"
-#include "rt/msg/detections.hpp"
+#include "rt/msg/ace/detections.hpp"
 
 namespace takt::object_detection {
 

@@ -6,7 +6,7 @@
 #include <span>
 
 #include "nodes/object_detection/scenes.hpp"
-#include "rt/msg/detections.hpp"
+#include "rt/msg/ace/detections.hpp"
 
 namespace takt::object_detection {
 

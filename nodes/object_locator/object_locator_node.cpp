@@ -11,12 +11,12 @@
 #include "nodes/object_detection/database.hpp"
 #include "nodes/semantic/box_locator.hpp"
 #include "nodes/semantic/reports.hpp"
-#include "rt/msg/detections.hpp"
+#include "rt/msg/ace/detections.hpp"
+#include "rt/msg/ace/head.hpp"
+#include "rt/msg/ace/object_reports.hpp"
 #include "rt/msg/disparity.hpp"
 #include "rt/msg/geometry.hpp"
-#include "rt/msg/head.hpp"
 #include "rt/msg/image.hpp"
-#include "rt/msg/object_reports.hpp"
 #include "rt/node.hpp"
 
 namespace takt {

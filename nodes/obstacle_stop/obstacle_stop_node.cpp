@@ -8,11 +8,11 @@
 #include "nodes/obstacle_stop/protected_field.hpp"
 #include "nodes/obstacle_stop/stop_state.hpp"
 #include "nodes/obstacle_stop/sweep_memory.hpp"
-#include "rt/msg/digital_state.hpp"
+#include "rt/msg/ace/digital_state.hpp"
+#include "rt/msg/ace/stop_command.hpp"
 #include "rt/msg/geometry.hpp"
 #include "rt/msg/laser_scan.hpp"
 #include "rt/msg/odometry.hpp"
-#include "rt/msg/stop_command.hpp"
 #include "rt/msg/velocity_command.hpp"
 #include "rt/node.hpp"
 

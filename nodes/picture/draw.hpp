@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <span>
 
-#include "rt/msg/detections.hpp"
+#include "rt/msg/ace/detections.hpp"
 #include "rt/msg/image_view.hpp"
 #include "rt/msg/point.hpp"
 

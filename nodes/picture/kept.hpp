@@ -9,7 +9,7 @@
 
 #include "nodes/cloud/cloud.hpp"
 #include "nodes/picture/draw.hpp"
-#include "rt/msg/detections.hpp"
+#include "rt/msg/ace/detections.hpp"
 #include "rt/msg/image_view.hpp"
 #include "rt/msg/point.hpp"
 #include "rt/msg/point_cloud.hpp"

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "nodes/picture/kept.hpp"
-#include "rt/msg/detections.hpp"
-#include "rt/msg/object_reports.hpp"
+#include "rt/msg/ace/detections.hpp"
+#include "rt/msg/ace/object_reports.hpp"
 #include "rt/transform/planar_pose.hpp"
 
 namespace takt::picture {

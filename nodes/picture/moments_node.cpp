@@ -9,10 +9,10 @@
 
 #include "nodes/picture/moment.hpp"
 #include "nodes/semantic/reports.hpp"
-#include "rt/msg/detections.hpp"
+#include "rt/msg/ace/detections.hpp"
+#include "rt/msg/ace/object_reports.hpp"
 #include "rt/msg/grid.hpp"
 #include "rt/msg/image.hpp"
-#include "rt/msg/object_reports.hpp"
 #include "rt/msg/odometry.hpp"
 #include "rt/msg/text_status.hpp"
 #include "rt/node.hpp"

@@ -14,13 +14,13 @@
 #include "nodes/picture/clouds.hpp"
 #include "nodes/picture/draw.hpp"
 #include "nodes/picture/kept.hpp"
-#include "rt/msg/detections.hpp"
+#include "rt/msg/ace/detections.hpp"
+#include "rt/msg/ace/terrain.hpp"
 #include "rt/msg/disparity.hpp"
 #include "rt/msg/grid.hpp"
 #include "rt/msg/image.hpp"
 #include "rt/msg/motion.hpp"
 #include "rt/msg/point_cloud.hpp"
-#include "rt/msg/terrain.hpp"
 #include "rt/node.hpp"
 
 namespace takt {

@@ -5,7 +5,7 @@
 
 #include <numbers>
 
-#include "rt/msg/action.hpp"
+#include "rt/msg/ace/action.hpp"
 
 namespace takt::robot_client {
 namespace {

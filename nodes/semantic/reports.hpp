@@ -7,7 +7,7 @@
 
 #include "nodes/mapping_3d/pose.hpp"
 #include "nodes/semantic/similarity.hpp"
-#include "rt/msg/object_reports.hpp"
+#include "rt/msg/ace/object_reports.hpp"
 
 namespace takt::semantic {
 

@@ -5,7 +5,7 @@
 #include <charconv>
 #include <cmath>
 
-#include "rt/msg/stop_command.hpp"
+#include "rt/msg/ace/stop_command.hpp"
 
 namespace takt::semantic {
 namespace {

@@ -6,8 +6,8 @@
 
 #include "nodes/traffic_signs/distance.hpp"
 #include "nodes/traffic_signs/tracks.hpp"
-#include "rt/msg/detections.hpp"
-#include "rt/msg/digital_state.hpp"
+#include "rt/msg/ace/detections.hpp"
+#include "rt/msg/ace/digital_state.hpp"
 #include "rt/msg/disparity.hpp"
 #include "rt/msg/geometry.hpp"
 #include "rt/msg/image.hpp"

@@ -9,6 +9,7 @@
 #include "rt/msg/field_list.hpp"
 #include "rt/msg/geometry.hpp"
 #include "rt/msg/image_view.hpp"
+#include "rt/msg/viewer.hpp"
 
 namespace takt {
 
@@ -30,6 +31,7 @@ struct DisparityMap {
   ImageView<uint8_t> fraction_view() { return {fraction.data(), width, height}; }
   ImageView<const uint8_t> fraction_view() const { return {fraction.data(), width, height}; }
   bool sound() const { return image_fits(width, height, 1, disparity.capacity); }
+  void show(Viewer& to) const { to.disparity(view(), disparities); }
   TAKT_FIELDS(DisparityMap, (width, "px"), (height, "px"), (disparities, "px"), (camera),
               (disparity, "px", capacity.pixels()), (confidence, "1", capacity.pixels()),
               (fraction, "1/64 px", capacity.pixels()))

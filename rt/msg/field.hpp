@@ -12,10 +12,12 @@
 
 namespace takt {
 
+class Viewer;  // rt/msg/viewer.hpp
+
 enum class Scalar : uint8_t { u8, i16, u16, i32, u32, i64, u64, f32, f64 };
 
-/// One field of a message, declared in its class (rt/msg/field_list.hpp) and shared by checker, recorder, diff and export.
-/// A field is `count` scalars at `offset` in the header (count 0: an Array of elements of `element_bytes`).
+/// One field of a message, declared in its class (rt/msg/field_list.hpp) and shared by checker, recorder, diff and
+/// export. A field is `count` scalars at `offset` in the header (count 0: an Array of elements of `element_bytes`).
 struct Field {
   std::string_view name;
   std::string_view unit;  ///< SI symbol, "px", "1" for a pure number, "" for flags and text
@@ -23,6 +25,7 @@ struct Field {
   uint32_t offset;
   uint32_t count;
   uint32_t element_bytes;
+  bool text = false;  ///< an Array<char>
   bool is_array() const { return count == 0; }
 };
 
@@ -78,9 +81,18 @@ struct Describe<Array<T>> {
             scalar_of<typename ElementScalar<T>::type>(),
             static_cast<uint32_t>(offset),
             0,
-            static_cast<uint32_t>(sizeof(T))};
+            static_cast<uint32_t>(sizeof(T)),
+            std::is_same_v<T, char>};
   }
 };
+
+/// Null if T has no show().
+template <class T>
+auto show_of() -> void (*)(const void*, Viewer&) {
+  if constexpr (requires(const T& message, Viewer& to) { message.show(to); })
+    return [](const void* memory, Viewer& to) { static_cast<const T*>(memory)->show(to); };
+  else return nullptr;
+}
 
 }  // namespace detail
 
@@ -97,6 +109,7 @@ struct Capacity {
 ///   static constexpr std::string_view type_name;
 ///   TAKT_FIELDS(T, ...)
 ///   bool sound() const;   (if other fields say how far an array is read: whether they stay within its capacity)
+///   void show(Viewer&) const;   (if there is more to see than fields: rt/msg/viewer.hpp)
 struct MessageType {
   std::string_view name;
   uint32_t header_bytes;
@@ -104,6 +117,7 @@ struct MessageType {
   void (*construct)(void* memory);
   void (*capacities)(const Capacity&, std::span<uint32_t>);
   bool (*sound)(const void* memory);
+  void (*show)(const void* memory, Viewer& to);  ///< null: it has nothing but its fields
 
   /// Bytes of a message of that capacity: the header and every array, each aligned to 64 B.
   uint64_t bytes(const Capacity& capacity) const;
@@ -128,7 +142,8 @@ const MessageType& MessageType::of() {
                                   if constexpr (requires(const T& message) { message.sound(); })
                                     return static_cast<const T*>(memory)->sound();
                                   return true;
-                                }};
+                                },
+                                detail::show_of<T>()};
   return type;
 }
 

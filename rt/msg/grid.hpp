@@ -9,6 +9,7 @@
 #include "rt/msg/field_list.hpp"
 #include "rt/msg/geometry.hpp"
 #include "rt/msg/image_view.hpp"
+#include "rt/msg/viewer.hpp"
 
 namespace takt {
 
@@ -25,6 +26,7 @@ struct Grid {
   ImageView<int16_t> view() { return {cells.data(), width, height}; }
   ImageView<const int16_t> view() const { return {cells.data(), width, height}; }
   bool sound() const { return image_fits(width, height, 1, cells.capacity); }
+  void show(Viewer& to) const { to.grid({view(), cell_m, origin_x_m, origin_y_m}); }
   TAKT_FIELDS(Grid, (width, "1"), (height, "1"), (cell_m, "m"), (origin_x_m, "m"), (origin_y_m, "m"), (grid_in_map),
               (cells, "1", capacity.pixels()))
 };

@@ -9,6 +9,7 @@
 #include "rt/msg/field_list.hpp"
 #include "rt/msg/geometry.hpp"
 #include "rt/msg/image_view.hpp"
+#include "rt/msg/viewer.hpp"
 
 namespace takt {
 
@@ -28,6 +29,7 @@ struct Image {
   ImageView<uint8_t> view() { return {pixels.data(), width, height, channels}; }
   ImageView<const uint8_t> view() const { return {pixels.data(), width, height, channels}; }
   bool sound() const { return image_fits(width, height, channels, pixels.capacity); }
+  void show(Viewer& to) const { to.picture(view()); }
   TAKT_FIELDS(Image, (width, "px"), (height, "px"), (channels, "1"), (health, ""), (camera),
               (pixels, "1", capacity.pixels() * capacity.channels))
 };
@@ -48,6 +50,10 @@ struct StereoPair {
   ImageView<const uint8_t> left_view() const { return {left.data(), width, height, channels}; }
   ImageView<const uint8_t> right_view() const { return {right.data(), width, height, channels}; }
   bool sound() const { return image_fits(width, height, channels, left.capacity); }
+  void show(Viewer& to) const {
+    to.picture(left_view(), "left");
+    to.picture(right_view(), "right");
+  }
   TAKT_FIELDS(StereoPair, (width, "px"), (height, "px"), (channels, "1"), (health, ""), (frame_number, "1"), (camera),
               (sensor_in_robot), (left, "1", capacity.pixels() * capacity.channels),
               (right, "1", capacity.pixels() * capacity.channels))

@@ -8,6 +8,7 @@
 #include "rt/msg/array.hpp"
 #include "rt/msg/field_list.hpp"
 #include "rt/msg/geometry.hpp"
+#include "rt/msg/viewer.hpp"
 
 namespace takt {
 
@@ -21,6 +22,10 @@ struct LaserScan {
   uint32_t scan_number = 0;
   Transform sensor_in_robot;
   Array<float> range_m;  ///< 0: no return
+  void show(Viewer& to) const {
+    to.scan({first_angle_rad, step_rad, range_m.items()});
+    to.mounted(sensor_in_robot);
+  }
   TAKT_FIELDS(LaserScan, (first_angle_rad, "rad"), (step_rad, "rad"), (max_range_m, "m"), (sweep_s, "s"),
               (scan_number, "1"), (sensor_in_robot), (range_m, "m"))
 };

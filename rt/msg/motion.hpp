@@ -7,6 +7,7 @@
 
 #include "rt/msg/field_list.hpp"
 #include "rt/msg/geometry.hpp"
+#include "rt/msg/viewer.hpp"
 
 namespace takt {
 
@@ -21,6 +22,7 @@ struct Motion {
   int32_t corners = 0, matched = 0, inliers = 0;
   uint8_t valid = 0;     ///< 0: confidence too low, the motion was predicted instead of measured
   uint8_t keyframe = 0;  ///< 1: first frame, nothing to compare with
+  void show(Viewer& to) const { to.pose(pose, "first_camera"); }
   TAKT_FIELDS(Motion, (from_stamp_ns, "ns"), (camera_in_previous), (pose), (confidence, "1"), (rms_px, "px"),
               (corners, "1"), (matched, "1"), (inliers, "1"), (valid, ""), (keyframe, ""))
 };

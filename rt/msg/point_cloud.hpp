@@ -9,6 +9,7 @@
 #include "rt/msg/field_list.hpp"
 #include "rt/msg/geometry.hpp"
 #include "rt/msg/point.hpp"
+#include "rt/msg/viewer.hpp"
 
 namespace takt {
 
@@ -20,6 +21,10 @@ struct PointCloud {
   int32_t step_px = 0;  ///< one point per step x step pixels of that image; 0 for other sensors
   Array<Point> points;
   Array<Colour> colours;  ///< same size as points, or empty
+  void show(Viewer& to) const {
+    to.cloud(points.items(), colours.items());
+    to.mounted(sensor_in_robot);
+  }
   TAKT_FIELDS(PointCloud, (sensor_in_robot), (camera), (step_px, "px"), (points, "m"), (colours, "1"))
 };
 

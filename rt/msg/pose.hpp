@@ -7,6 +7,7 @@
 
 #include "rt/msg/field_list.hpp"
 #include "rt/msg/geometry.hpp"
+#include "rt/msg/viewer.hpp"
 
 namespace takt {
 
@@ -15,6 +16,7 @@ struct Pose {
   static constexpr std::string_view type_name = "pose";
   Transform transform;
   double covariance[36] = {};
+  void show(Viewer& to) const { to.pose(transform, "map"); }
   TAKT_FIELDS(Pose, (transform), (covariance, ""))
 };
 

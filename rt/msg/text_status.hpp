@@ -7,6 +7,7 @@
 
 #include "rt/msg/array.hpp"
 #include "rt/msg/field_list.hpp"
+#include "rt/msg/viewer.hpp"
 
 namespace takt {
 
@@ -14,6 +15,7 @@ namespace takt {
 struct TextStatus {
   static constexpr std::string_view type_name = "text_status";
   Array<char> text;
+  void show(Viewer& to) const { to.text({text.data(), text.size}); }
   TAKT_FIELDS(TextStatus, (text, ""))
 };
 

@@ -66,7 +66,9 @@ std::string layout_of(const MessageType& type) {
     text += R"({"name": ")" + std::string(field.name) + R"(", "unit": ")" + std::string(field.unit) +
             R"(", "scalar": ")" + std::string(name_of(field.scalar)) + R"(", )";
     // An array is its number of elements (u32) and the elements, each of some scalars.
-    if (field.is_array()) text += R"("array_of": )" + std::to_string(field.element_bytes / scalar) + "}";
+    if (field.is_array())
+      text +=
+          R"("array_of": )" + std::to_string(field.element_bytes / scalar) + (field.text ? R"(, "text": true})" : "}");
     else text += R"("count": )" + std::to_string(field.count) + "}";
   }
   return text + "]}";

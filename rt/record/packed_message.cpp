@@ -150,9 +150,9 @@ tl::expected<void, std::string> unpack(const MessageType& type, Bytes packed, vo
   return {};
 }
 
-std::optional<Difference> first_difference(const MessageType& type, Bytes reference, Bytes other) {
+std::optional<Difference> first_difference(std::span<const Field> fields, Bytes reference, Bytes other) {
   Comparison comparison(reference, other);
-  for (const Field& field : type.fields)
+  for (const Field& field : fields)
     if (auto found = comparison.field(field)) return found;
   return comparison.rest();
 }

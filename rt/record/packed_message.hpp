@@ -37,9 +37,9 @@ struct Difference {
   std::string values;  ///< "0.25 instead of 0.5"
 };
 
-/// Nothing: the same bytes. `other` is told against `reference`; bytes that are no message of the type differ in the
-/// field in which they end.
-std::optional<Difference> first_difference(const MessageType& type, std::span<const std::byte> reference,
+/// `fields`: those of the type, their offsets do not matter. Nothing: the same bytes. `other` is told against
+/// `reference`; bytes that are no message of the type differ in the field in which they end.
+std::optional<Difference> first_difference(std::span<const Field> fields, std::span<const std::byte> reference,
                                            std::span<const std::byte> other);
 
 }  // namespace takt::record

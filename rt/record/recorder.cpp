@@ -53,14 +53,14 @@ Recorder::~Recorder() {
 void Recorder::add_channels(const Plan& plan) {
   jobs_channel_ = file_.add_channel(file_.add_schema("takt.Job", "text", job_layout()), kJobs, kEncoding, {});
   events_channel_ = file_.add_channel(file_.add_schema("takt.Event", "text", event_layout()), kEvents, kEncoding, {});
-  std::map<std::string_view, uint16_t> schemas;
+  std::map<std::pair<std::string_view, std::string>, uint16_t> schemas;  // two types may share a name
   for (size_t p = 0; p < plan.ports.size(); ++p) {
     const PortPlan& port = plan.ports[p];
     Port& mine = ports_.emplace_back();
     mine.type = port.type;
     mine.whole = options_.whole.empty() || options_.whole[p] != 0;
-    const auto [schema, added] = schemas.try_emplace(port.type->name, uint16_t{0});
-    if (added) schema->second = file_.add_schema("takt." + std::string(port.type->name), "json", layout_of(*port.type));
+    const auto [schema, added] = schemas.try_emplace({port.type->name, layout_of(*port.type)}, uint16_t{0});
+    if (added) schema->second = file_.add_schema("takt." + std::string(port.type->name), "json", schema->first.second);
     mine.channel = file_.add_channel(schema->second, port.node + "." + port.port, kEncoding,
                                      {{"fields", mine.whole ? "all" : "hash"}});
   }

@@ -448,7 +448,7 @@ void Replayer::compare(const RecordedJob& record, size_t p, const Stored& made, 
     return;
   }
   ++result_.whole;
-  if (const auto difference = first_difference(*plan_.ports[p].type, told->data, packed))
+  if (const auto difference = first_difference(plan_.ports[p].type->fields, told->data, packed))
     tell(record, p, difference->field + " (byte " + std::to_string(difference->byte) + ") is " + difference->values);
 }
 

@@ -16,8 +16,8 @@
 #include "hal/interaction/interaction.hpp"
 #include "hal/laser/laser_scanner.hpp"
 #include "hal/object_sensor/object_sensor.hpp"
-#include "rt/msg/action.hpp"
-#include "rt/msg/object_reports.hpp"
+#include "rt/msg/ace/action.hpp"
+#include "rt/msg/ace/object_reports.hpp"
 #include "rt/testing.hpp"
 
 namespace takt::test {

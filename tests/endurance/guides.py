@@ -64,6 +64,12 @@ def follow_node(clone):
     clone.run("file bright.png || ls -l bright.png", output="bright.png")
 
 
+def follow_message(clone):
+    print("\n== a message")
+    (clone.folder / "nodes/sharpness/CMakeLists.txt").write_text(clone.said(GUIDES, r"`(takt_room\(sharpness [^`]*)`") + "\n")
+    clone.run("./takt nodes sharpness", output="sharpness +sharpness")
+
+
 def follow_driver(clone):
     print("\n== a driver")
     (clone.folder / "hal/laser/tube/CMakeLists.txt").write_text(clone.said(GUIDES, r"`(takt_room\(tube [^`]*)`") + "\n")
@@ -96,7 +102,7 @@ def follow_evaluation(clone):
 def follow(folder):
     clone = Clone(folder)
     subprocess.run([sys.executable, ROOT / "tests/tools/code_blocks.py", folder, clone.folder / GUIDES], check=True)
-    for guide in (follow_node, follow_driver, follow_evaluation): guide(clone)
+    for guide in (follow_node, follow_message, follow_driver, follow_evaluation): guide(clone)
     print(f"\n{clone.failed} commands failed" if clone.failed else "\nall guides work as written")
     return clone.failed > 0
 

@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""added_files.py SOURCE [--build]: adds the node and the driver of docs/guides.md to a copy of the tree.
+"""added_files.py SOURCE [--build]: adds the node, the message and the driver of docs/guides.md to a copy of the tree.
 
 Prints the files that each addition made or changed. Fails if one lies outside the new folder, or if the stock programs
-do not register it. `--build` also compiles `takt` of the copy and looks for both in `takt nodes`.
+do not register it. `--build` also compiles `takt` of the copy and looks for all of them in `takt nodes`; the message is
+the type of a port there.
 """
 import argparse
 import hashlib
@@ -18,6 +19,12 @@ ADDITIONS = {  # folder: (its CMakeLists.txt, the call in ace_registry(), what t
         "register_brightness(registry.nodes)",
         "brightness",
         "factor on every channel",
+    ),
+    "nodes/sharpness": (  # a message, and the node that publishes it
+        "takt_room(sharpness SOURCES sharpness_node.cpp USES takt_rt REGISTERS sharpness)",
+        "register_sharpness(registry.nodes)",
+        "sharpness",
+        "out  sharpness      sharpness      of the left image",
     ),
     "hal/laser/tube": (
         "takt_room(tube SOURCES register.cpp USES takt_laser REGISTERS tube)",

@@ -12,7 +12,7 @@
 #include "graph/cli/outcome.hpp"
 #include "graph/command/attach_commands.hpp"
 #include "nodes/robot_client/task.hpp"
-#include "rt/msg/object_reports.hpp"
+#include "rt/msg/ace/object_reports.hpp"
 
 namespace takt::command {
 namespace {

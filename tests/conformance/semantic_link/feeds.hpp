@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include "hal/sim/sim_devices.hpp"
+#include "rt/msg/ace/object_reports.hpp"
 #include "rt/msg/laser_scan.hpp"
-#include "rt/msg/object_reports.hpp"
 #include "rt/msg/odometry.hpp"
 #include "rt/msg/velocity_command.hpp"
 #include "tests/conformance/semantic_link/rig.hpp"

@@ -11,7 +11,7 @@
 #include <random>
 #include <tuple>
 
-#include "rt/msg/action.hpp"
+#include "rt/msg/ace/action.hpp"
 #include "tests/property_scale.hpp"
 #include "tests/unit/sim/acting_world.hpp"
 

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // compare.mjs RECORD EXPORT: every number of every whole image, disparity, cloud, scan and grid of a record, read by the
-// layout that its schema states, against the same message of its export, read as Foxglove's schemas say. Nothing of
-// takt takes part. Prints how many numbers of each topic were compared; ends with an error at the first that differs.
+// layout that its schema states, against the same message of its export, read as Foxglove's schemas say; of poses and
+// texts that they are there; of every other type all fields, which the export has by name. Nothing of takt takes part.
+// Prints how many numbers of each topic were compared; ends with an error at the first that differs.
 import { forEachRecord } from "./mcap_file.mjs";
 
 const [recordFile, exportFile] = process.argv.slice(2);
@@ -16,7 +17,7 @@ function number(view, scalar, at) {
   return view[scalars[scalar][1]](at, true);
 }
 
-/// The fields of a recorded message; arrays as {scalar, width, view, at, size}.
+/// The fields of a recorded message; arrays as {scalar, width, view, at, size, fixed, text}.
 function unpack(layout, data) {
   const view = new DataView(data.buffer, data.byteOffset, data.byteLength);
   const message = {};
@@ -24,11 +25,11 @@ function unpack(layout, data) {
   for (const field of layout.fields) {
     const bytes = scalars[field.scalar][0];
     if (field.array_of === undefined) {
-      message[field.name] = number(view, field.scalar, at);
+      message[field.name] = field.count === 1 ? number(view, field.scalar, at) : { scalar: field.scalar, width: 1, view, at, size: field.count, fixed: true };
       at += field.count * bytes;
     } else {
       const size = view.getUint32(at, true);
-      message[field.name] = { scalar: field.scalar, width: field.array_of, view, at: at + 4, size };
+      message[field.name] = { scalar: field.scalar, width: field.array_of, view, at: at + 4, size, text: field.text };
       at += 4 + size * field.array_of * bytes;
     }
   }
@@ -122,14 +123,41 @@ const forms = {
   },
 };
 
+/// Poses and texts: what Foxglove's schemas say of them is more, and less, than the fields.
+const onlyThere = new Set(["takt.pose", "takt.motion", "takt.odometry", "takt.text_status"]);
+
+/// A number of JSON, which has no infinity and no NaN, against one of the record.
+function sameNumber(topic, what, got, wanted) {
+  const number = Number(wanted);
+  same(topic, what, got, Number.isFinite(number) ? number : null);
+}
+
+/// A message by its own fields.
+function ownFields(topic, message) {
+  const json = next(topic);
+  for (const [name, field] of Object.entries(message)) {
+    const value = json[name];
+    if (typeof field !== "object") sameNumber(topic, name, value, field);
+    else if (field.text) {
+      same(topic, name, value, new TextDecoder().decode(new Uint8Array(field.view.buffer, field.view.byteOffset + field.at, field.size)));
+    } else {
+      if (!field.fixed) same(topic, `${name}.size`, value.size, field.size);
+      const elements = (field.fixed ? value : value.first).flat();
+      same(topic, `numbers of ${name}`, elements.length, field.size * field.width);
+      elements.forEach((got, i) => sameNumber(topic, `${name} ${i}`, got, element(field, Math.floor(i / field.width), i % field.width)));
+    }
+  }
+}
+
 const channels = new Map(), schemas = new Map();
 forEachRecord(recordFile, (record) => {
   if (record.type === "Schema") schemas.set(record.id, record);
   if (record.type === "Channel") channels.set(record.id, record);
   if (record.type !== "Message") return;
-  const channel = channels.get(record.channelId), schema = schemas.get(channel.schemaId), form = forms[schema.name];
-  if (form === undefined || record.data[kWholeAt] === 0) return;
-  form(channel.topic, unpack(JSON.parse(new TextDecoder().decode(schema.data)), record.data));
+  const channel = channels.get(record.channelId), schema = schemas.get(channel.schemaId);
+  if (schema.encoding !== "json" || record.data[kWholeAt] === 0) return;  // jobs and events; by its hash
+  if (onlyThere.has(schema.name)) return void next(channel.topic);
+  (forms[schema.name] ?? ownFields)(channel.topic, unpack(JSON.parse(new TextDecoder().decode(schema.data)), record.data));
 });
 for (const [topic, count] of taken)
   if (exported.get(topic).length !== count) throw new Error(`${topic}: the export has messages that the record has not`);

@@ -15,12 +15,14 @@
 #include "graph/attach/parameters.hpp"
 #include "graph/attach/server.hpp"
 #include "graph/compose/composition.hpp"
+#include "graph/language/message_types.hpp"
 #include "graph/language/overlay.hpp"
 #include "rt/msg/grid.hpp"
-#include "rt/msg/messages.hpp"
+#include "rt/msg/image.hpp"
 #include "rt/msg/odometry.hpp"
 #include "rt/msg/point_cloud.hpp"
 #include "rt/msg/text_status.hpp"
+#include "rt/msg/velocity_command.hpp"
 #include "rt/sched/param_mail.hpp"
 #include "tests/temporary_folder.hpp"
 
@@ -46,6 +48,15 @@ template <class T>
 struct Built : Placed {
   explicit Built(const Capacity& capacity) : Placed(MessageType::of<T>(), capacity), message(static_cast<T*>(start)) {}
   T* message;
+};
+
+struct Thermogram {
+  static constexpr std::string_view type_name = "thermogram";
+  int32_t width = 0, height = 0;
+  Array<uint8_t> pixels;
+  bool sound() const { return image_fits(width, height, 1, pixels.capacity); }
+  void show(Viewer& to) const { to.picture({pixels.data(), width, height}); }
+  TAKT_FIELDS(Thermogram, (width, "px"), (height, "px"), (pixels, "1", capacity.pixels()))
 };
 
 /// A folder for sockets that is ours alone, named by the environment as at a login. In /tmp, because the path of a
@@ -102,7 +113,10 @@ TEST_CASE("a message becomes JSON by its field descriptors") {
 }
 
 TEST_CASE("every message type becomes JSON with one entry a field, and those that can be seen a picture") {
-  for (const MessageType* type : message_types()) {
+  const Registry registry = ace_registry();
+  const graph::MessageTypes types = graph::message_types(registry);
+  CHECK(types.size() >= 20);
+  for (const auto& [name, type] : types) {
     const Placed placed(*type, {.width = 4, .height = 2, .channels = 1, .count = 3});
     CHECK(attach::message_json(*type, placed.start).size() == type->fields.size());
   }
@@ -115,6 +129,18 @@ TEST_CASE("every message type becomes JSON with one entry a field, and those tha
   const cv::Mat image = cv::imdecode(std::vector<char>(png->begin(), png->end()), cv::IMREAD_COLOR);
   CHECK(image.cols == 4 * 6);
   CHECK(image.rows == 3 * 6);
+  grid.message->width = 5;  // more cells than there are: it is not sound
+  CHECK_FALSE(attach::message_png(MessageType::of<Grid>(), grid.message));
+  Built<StereoPair> pair({.width = 3, .height = 2});
+  pair.message->width = 3;
+  pair.message->height = 2;
+  pair.message->channels = 1;
+  const auto side_by_side = attach::message_png(MessageType::of<StereoPair>(), pair.message);
+  REQUIRE(side_by_side);
+  const cv::Mat both =
+      cv::imdecode(std::vector<char>(side_by_side->begin(), side_by_side->end()), cv::IMREAD_UNCHANGED);
+  CHECK(both.cols == 6);
+  CHECK(both.rows == 2);
   Built<Odometry> odometry({});
   CHECK_FALSE(attach::message_png(MessageType::of<Odometry>(), odometry.message));
   Built<PointCloud> cloud({.count = 2});
@@ -125,6 +151,20 @@ TEST_CASE("every message type becomes JSON with one entry a field, and those tha
   CHECK(ply->find("element vertex 1\n") != std::string::npos);
   CHECK(ply->ends_with("\6\5\4"));
   CHECK_FALSE(attach::message_ply(MessageType::of<Odometry>(), odometry.message));
+}
+
+TEST_CASE("a type that no room knows is seen as it shows itself") {
+  Built<Thermogram> hot({.width = 2, .height = 3});
+  hot.message->width = 2;
+  hot.message->height = 3;
+  for (uint8_t i = 0; i < 6; ++i) hot.message->pixels.push_back(static_cast<uint8_t>(40 * i));
+  const auto png = attach::message_png(MessageType::of<Thermogram>(), hot.message);
+  REQUIRE(png);
+  const cv::Mat image = cv::imdecode(std::vector<char>(png->begin(), png->end()), cv::IMREAD_UNCHANGED);
+  REQUIRE(image.size() == cv::Size(2, 3));
+  CHECK(image.at<uint8_t>(2, 1) == 200);
+  CHECK_FALSE(attach::message_ply(MessageType::of<Thermogram>(), hot.message));
+  CHECK(MessageType::of<VelocityCommand>().show == nullptr);
 }
 
 TEST_CASE("top, stop and unknown questions over the socket") {

@@ -8,7 +8,7 @@
 #include "nodes/body_pose/floor.hpp"
 #include "nodes/body_pose/picture.hpp"
 #include "rt/memory/memory_use.hpp"
-#include "rt/msg/body_poses.hpp"
+#include "rt/msg/ace/body_poses.hpp"
 #include "rt/msg/point.hpp"
 #include "tests/unit/body_pose/skeletons.hpp"
 

@@ -4,7 +4,7 @@
 #include "nodes/body_pose/generated_scene.hpp"
 #include "nodes/mapping_3d/pose.hpp"
 #include "rt/memory/memory_use.hpp"
-#include "rt/msg/body_poses.hpp"
+#include "rt/msg/ace/body_poses.hpp"
 #include "rt/msg/point.hpp"
 #include "rt/msg/point_cloud.hpp"
 #include "rt/sched/port_access.hpp"

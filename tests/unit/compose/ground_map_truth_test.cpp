@@ -8,8 +8,8 @@
 #include <set>
 #include <vector>
 
+#include "rt/msg/ace/terrain.hpp"
 #include "rt/msg/grid.hpp"
-#include "rt/msg/terrain.hpp"
 #include "tests/unit/compose/drive.hpp"
 
 using namespace takt;

@@ -8,10 +8,10 @@
 #include <cstring>
 #include <sstream>
 
-#include "rt/msg/action.hpp"
-#include "rt/msg/object_reports.hpp"
+#include "rt/msg/ace/action.hpp"
+#include "rt/msg/ace/object_reports.hpp"
+#include "rt/msg/ace/robot_task.hpp"
 #include "rt/msg/odometry.hpp"
-#include "rt/msg/robot_task.hpp"
 #include "rt/msg/text_status.hpp"
 #include "tests/unit/compose/drive.hpp"
 

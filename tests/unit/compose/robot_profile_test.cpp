@@ -9,9 +9,9 @@
 
 #include "graph/ace/ace_registry.hpp"
 #include "hal/discovery/discovery.hpp"
+#include "rt/msg/ace/head.hpp"
 #include "rt/msg/disparity.hpp"
 #include "rt/msg/grid.hpp"
-#include "rt/msg/head.hpp"
 #include "rt/msg/laser_scan.hpp"
 #include "tests/unit/compose/drive.hpp"
 

@@ -3,7 +3,7 @@
 
 #include <doctest/doctest.h>
 
-#include "rt/msg/action.hpp"
+#include "rt/msg/ace/action.hpp"
 #include "rt/sched/port_access.hpp"
 #include "rt/testing.hpp"
 

@@ -2,7 +2,7 @@
 #include <doctest/doctest.h>
 
 #include "hal/base/base_node.hpp"
-#include "rt/msg/stop_command.hpp"
+#include "rt/msg/ace/stop_command.hpp"
 #include "rt/msg/velocity_command.hpp"
 #include "rt/sched/port_access.hpp"
 #include "rt/testing.hpp"

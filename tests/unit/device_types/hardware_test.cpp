@@ -6,7 +6,7 @@
 #include "hal/base/base_double.hpp"
 #include "hal/devices.hpp"
 #include "hal/head/head_double.hpp"
-#include "rt/msg/head.hpp"
+#include "rt/msg/ace/head.hpp"
 #include "rt/msg/odometry.hpp"
 #include "tests/conformance/fake_writer.hpp"
 #include "tests/graph_folder.hpp"

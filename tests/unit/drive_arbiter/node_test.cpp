@@ -4,7 +4,7 @@
 #include <string>
 
 #include "rt/memory/memory_use.hpp"
-#include "rt/msg/digital_state.hpp"
+#include "rt/msg/ace/digital_state.hpp"
 #include "rt/msg/text_status.hpp"
 #include "rt/msg/velocity_command.hpp"
 #include "rt/testing.hpp"

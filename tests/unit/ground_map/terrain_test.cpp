@@ -10,7 +10,7 @@
 
 #include "nodes/ground_map/terrain_drive.hpp"
 #include "nodes/ground_map/terrain_file.hpp"
-#include "rt/msg/terrain.hpp"
+#include "rt/msg/ace/terrain.hpp"
 
 using namespace takt;
 using namespace takt::ground_map;

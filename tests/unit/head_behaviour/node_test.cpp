@@ -5,9 +5,9 @@
 
 #include "nodes/mapping_3d/pose.hpp"
 #include "rt/memory/memory_use.hpp"
-#include "rt/msg/body_poses.hpp"
-#include "rt/msg/digital_state.hpp"
-#include "rt/msg/head.hpp"
+#include "rt/msg/ace/body_poses.hpp"
+#include "rt/msg/ace/digital_state.hpp"
+#include "rt/msg/ace/head.hpp"
 #include "rt/msg/image.hpp"
 #include "rt/msg/pose.hpp"
 #include "rt/sched/port_access.hpp"

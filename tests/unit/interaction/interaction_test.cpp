@@ -10,7 +10,7 @@
 #include "hal/interaction/interaction_node.hpp"
 #include "hal/interaction/script.hpp"
 #include "hal/stream/pseudo_terminal.hpp"
-#include "rt/msg/robot_task.hpp"
+#include "rt/msg/ace/robot_task.hpp"
 #include "rt/msg/text_status.hpp"
 #include "rt/sched/port_access.hpp"
 #include "rt/testing.hpp"

@@ -8,6 +8,16 @@ using namespace takt;
 using namespace takt::test;
 using namespace takt::graph;
 
+namespace {
+
+struct OtherPair {
+  static constexpr std::string_view type_name = "stereo_pair";
+  double width = 0;
+  TAKT_FIELDS(OtherPair, (width, "px"))
+};
+
+}  // namespace
+
 TEST_CASE("Misspelt output and input ports") {
   expect_graph("disparity: {from: stereo.disparity,", "disparity: {from: stereo.disparty,", "stereo.disparty",
                {"`stereo`", "no output `disparty`", "did you mean `disparity`?", "disparity, rectified"});
@@ -131,6 +141,14 @@ TEST_CASE("YAML traps are named") {
 TEST_CASE("Type mismatch") {
   expect_graph("disparity: {from: stereo.disparity,", "disparity: {from: stereo.rectified,", "stereo.rectified, depth",
                {"type mismatch", "`stereo_pair`", "`disparity`", "`ego_motion`"});
+}
+
+TEST_CASE("Two declarations of one type with other fields") {
+  const Files files;
+  DeviceCatalogue devices = fake_devices();
+  devices.kinds["stereo_camera"].ports[0].type = &MessageType::of<OtherPair>();
+  expect(load(files.folder() / "graph.yaml", {}, fake_types(), devices), "graph.yaml", 14, 39,
+         {"`camera.pair` and input `pair` of node `stereo` both call their type `stereo_pair`, but with other fields"});
 }
 
 TEST_CASE("An edge must go to the same, the next or the storage layer, in a graph that asks for it") {

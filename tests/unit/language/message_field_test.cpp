@@ -5,12 +5,12 @@
 
 #include <cstring>
 
-#include "rt/msg/action.hpp"
-#include "rt/msg/detections.hpp"
-#include "rt/msg/object_reports.hpp"
+#include "rt/msg/ace/action.hpp"
+#include "rt/msg/ace/detections.hpp"
+#include "rt/msg/ace/object_reports.hpp"
+#include "rt/msg/ace/stop_command.hpp"
 #include "rt/msg/odometry.hpp"
 #include "rt/msg/pose.hpp"
-#include "rt/msg/stop_command.hpp"
 #include "rt/msg/text_status.hpp"
 
 using namespace takt;

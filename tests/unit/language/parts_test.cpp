@@ -80,7 +80,7 @@ TEST_CASE("plug-ins that included files name are looked for beside these; all li
   CHECK(named[2].file == "../own.so");
   const std::string wrong = kRobot + "plugins: [robot.so, [nested.so]]\n";
   test::expect_at(Split(kHead + "plugins: [own.so]\n", wrong).load(), "robot.yaml", wrong, "[nested.so]",
-                  {"`plugins`", "a shared module"});
+                  {"plugins `2` is a list", "a shared module"});
   const std::string none = kRobot + "plugins: robot.so\n";
   test::expect_at(Split(kHead + "plugins: [own.so]\n", none).load(), "robot.yaml", none, "plugins", {"plugins"});
   files.write("parts/robot.yaml", kRobot + "include: [../graph.yaml]\nplugins: [robot.so]\n");  // ends all the same

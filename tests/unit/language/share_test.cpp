@@ -32,7 +32,7 @@ struct Home {
   Home& operator=(const Home&) = delete;
 };
 
-struct Reader final : Node {
+struct AssetReader final : Node {
   void setup(Setup&) override {}
   void run(Job&) override {}
   Param<std::string> signs{this, "signs", "signs", kPath, ""}, own{this, "own", "own/data.txt", kPath, ""},
@@ -50,7 +50,7 @@ TEST_CASE("a default of the share folder is found there, another one stays as it
   test::TemporaryFolder folder;
   std::filesystem::create_directories(folder.path / "graph/signs");
   const Home home(folder.path);
-  const Reader node;
+  const AssetReader node;
   CHECK(default_asset(node.signs) == folder.path / "graph/signs");
   CHECK(default_asset(node.own) == "own/data.txt");
   CHECK(default_asset(node.none).empty());
@@ -58,7 +58,7 @@ TEST_CASE("a default of the share folder is found there, another one stays as it
 
 TEST_CASE("a record calls an asset of the share folder by its name there, wherever it is") {
   test::TemporaryFolder here, there;
-  Reader node;
+  AssetReader node;
   for (const auto* folder : {&here, &there}) {
     std::filesystem::create_directories(folder->path / "graph/signs");
     const Home home(folder->path);

@@ -8,6 +8,7 @@
 #include "graph/log/export_log.hpp"
 #include "graph/log/log_content.hpp"
 #include "tests/temporary_folder.hpp"
+#include "tests/unit/log/known_types.hpp"
 #include "tests/unit/record/restarted_run.hpp"
 
 using namespace takt;
@@ -100,7 +101,7 @@ TEST_CASE("Events are exported as log lines") {
   Restarted run(kTwoKills);
   auto sink = mcap::FileSink::open(run.folder.path / "export.mcap");
   REQUIRE(sink);
-  REQUIRE(export_log(*run.log, *sink));
+  REQUIRE(export_log(*run.log, test::known_types(), *sink));
   const auto reader = mcap::Reader::open(run.folder.path / "export.mcap");
   REQUIRE(reader);
   std::vector<std::string> lines;

@@ -7,6 +7,7 @@
 #include "graph/log/export_log.hpp"
 #include "graph/log/log_content.hpp"
 #include "tests/temporary_folder.hpp"
+#include "tests/unit/log/known_types.hpp"
 #include "tests/unit/record/recorded_run.hpp"
 
 using namespace takt;
@@ -102,7 +103,7 @@ TEST_CASE("An export has every whole message in JSON, with a schema") {
   Made made({}, {.whole = {1, 1, 0}});
   auto sink = mcap::FileSink::open(made.folder.path / "export.mcap");
   REQUIRE(sink);
-  const auto exported = export_log(*made.log, *sink);
+  const auto exported = export_log(*made.log, test::known_types(), *sink);
   REQUIRE(exported);
   CHECK(exported->messages == 77 + 30);
   CHECK(exported->hash_only == 30);
@@ -140,7 +141,7 @@ TEST_CASE("A record without its plan cannot be exported") {
   auto log = record::LogFile::open(folder.path / "run.mcap");
   REQUIRE(log);
   auto out = mcap::FileSink::open(folder.path / "export.mcap");
-  const auto exported = export_log(*log, *out);
+  const auto exported = export_log(*log, test::known_types(), *out);
   REQUIRE_FALSE(exported);
   CHECK(exported.error() == "the record does not hold its plan");
 }

@@ -10,7 +10,7 @@
 
 #include "nodes/mission/pointing.hpp"
 #include "rt/memory/memory_use.hpp"
-#include "rt/msg/body_poses.hpp"
+#include "rt/msg/ace/body_poses.hpp"
 #include "rt/testing.hpp"
 
 using namespace takt;

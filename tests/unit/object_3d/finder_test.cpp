@@ -7,7 +7,7 @@
 
 #include "nodes/object_3d/scenes.hpp"
 #include "rt/memory/memory_use.hpp"
-#include "rt/msg/detections.hpp"
+#include "rt/msg/ace/detections.hpp"
 #include "rt/msg/geometry.hpp"
 #include "rt/msg/point.hpp"
 

@@ -6,8 +6,8 @@
 
 #include "nodes/object_3d/evaluate.hpp"
 #include "rt/memory/memory_use.hpp"
-#include "rt/msg/detections.hpp"
-#include "rt/msg/objects_3d.hpp"
+#include "rt/msg/ace/detections.hpp"
+#include "rt/msg/ace/objects_3d.hpp"
 #include "rt/msg/point_cloud.hpp"
 #include "rt/sched/port_access.hpp"
 #include "rt/testing.hpp"

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <vector>
 
-#include "rt/msg/objects_3d.hpp"
+#include "rt/msg/ace/objects_3d.hpp"
 #include "rt/msg/point_cloud.hpp"
 #include "rt/node.hpp"
 #include "tests/unit/object_3d/scene_cloud.hpp"

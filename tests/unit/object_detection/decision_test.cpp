@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "rt/msg/detections.hpp"
+#include "rt/msg/ace/detections.hpp"
 
 using namespace takt;
 using namespace takt::object_detection;

@@ -8,7 +8,7 @@
 
 #include "hal/sim/simulation.hpp"
 #include "nodes/object_detection/detector.hpp"
-#include "rt/msg/detections.hpp"
+#include "rt/msg/ace/detections.hpp"
 #include "tests/graph_folder.hpp"
 
 using namespace takt;

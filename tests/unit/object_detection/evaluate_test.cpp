@@ -4,7 +4,7 @@
 #include <doctest/doctest.h>
 
 #include "nodes/object_detection/tally.hpp"
-#include "rt/msg/detections.hpp"
+#include "rt/msg/ace/detections.hpp"
 #include "tests/unit/object_detection/objects.hpp"
 
 using namespace takt::object_detection;

@@ -10,7 +10,7 @@
 #include "nodes/object_detection/revisions.hpp"
 #include "nodes/object_detection/scenes.hpp"
 #include "nodes/object_detection/tally.hpp"
-#include "rt/msg/detections.hpp"
+#include "rt/msg/ace/detections.hpp"
 #include "tests/temporary_folder.hpp"
 #include "tests/unit/object_detection/objects.hpp"
 

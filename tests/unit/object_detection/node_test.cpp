@@ -8,7 +8,7 @@
 
 #include "nodes/object_detection/detector.hpp"
 #include "nodes/object_detection/scenes.hpp"
-#include "rt/msg/detections.hpp"
+#include "rt/msg/ace/detections.hpp"
 #include "rt/msg/image.hpp"
 #include "rt/sched/port_access.hpp"
 #include "rt/testing.hpp"

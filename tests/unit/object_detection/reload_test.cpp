@@ -8,7 +8,7 @@
 
 #include "nodes/object_detection/reloader.hpp"
 #include "nodes/object_detection/revisions.hpp"
-#include "rt/msg/detections.hpp"
+#include "rt/msg/ace/detections.hpp"
 #include "rt/msg/image.hpp"
 #include "rt/msg/odometry.hpp"
 #include "rt/record/log_file.hpp"

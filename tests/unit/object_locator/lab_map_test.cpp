@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "nodes/semantic/reports.hpp"
-#include "rt/msg/object_reports.hpp"
+#include "rt/msg/ace/object_reports.hpp"
 #include "rt/transform/planar_pose.hpp"
 #include "tests/unit/compose/drive.hpp"
 

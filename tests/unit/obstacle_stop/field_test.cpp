@@ -8,7 +8,7 @@
 
 #include "nodes/obstacle_stop/protected_field.hpp"
 #include "nodes/obstacle_stop/stop_state.hpp"
-#include "rt/msg/stop_command.hpp"
+#include "rt/msg/ace/stop_command.hpp"
 
 using namespace takt;
 using namespace takt::obstacle_stop;

@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "rt/memory/memory_use.hpp"
-#include "rt/msg/digital_state.hpp"
+#include "rt/msg/ace/digital_state.hpp"
+#include "rt/msg/ace/stop_command.hpp"
 #include "rt/msg/laser_scan.hpp"
 #include "rt/msg/odometry.hpp"
-#include "rt/msg/stop_command.hpp"
 #include "rt/msg/velocity_command.hpp"
 #include "rt/sched/port_access.hpp"
 #include "rt/testing.hpp"

@@ -5,7 +5,7 @@
 
 #include "nodes/person_tracking/evaluate.hpp"
 #include "rt/memory/memory_use.hpp"
-#include "rt/msg/detections.hpp"
+#include "rt/msg/ace/detections.hpp"
 #include "rt/msg/image.hpp"
 #include "rt/msg/odometry.hpp"
 #include "rt/msg/pose.hpp"

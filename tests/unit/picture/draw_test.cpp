@@ -6,7 +6,7 @@
 #include <array>
 #include <vector>
 
-#include "rt/msg/detections.hpp"
+#include "rt/msg/ace/detections.hpp"
 #include "rt/msg/point.hpp"
 #include "rt/node.hpp"
 

@@ -10,7 +10,7 @@
 #include "nodes/picture/moment.hpp"
 #include "nodes/semantic/reports.hpp"
 #include "rt/memory/memory_use.hpp"
-#include "rt/msg/object_reports.hpp"
+#include "rt/msg/ace/object_reports.hpp"
 #include "rt/msg/text_status.hpp"
 #include "rt/sched/port_access.hpp"
 #include "rt/testing.hpp"

@@ -9,14 +9,14 @@
 #include <vector>
 
 #include "rt/memory/memory_use.hpp"
-#include "rt/msg/detections.hpp"
+#include "rt/msg/ace/detections.hpp"
+#include "rt/msg/ace/terrain.hpp"
 #include "rt/msg/disparity.hpp"
 #include "rt/msg/grid.hpp"
 #include "rt/msg/image.hpp"
 #include "rt/msg/motion.hpp"
 #include "rt/msg/point.hpp"
 #include "rt/msg/point_cloud.hpp"
-#include "rt/msg/terrain.hpp"
 #include "rt/sched/port_access.hpp"
 #include "rt/testing.hpp"
 #include "tests/temporary_folder.hpp"

@@ -69,7 +69,7 @@ TEST_CASE("packed message: what is packed is unpacked, into a message of another
   CHECK(again->points[6].x == 0.1f * 6.0f);
   CHECK(again->colours[6].r == 6);
   CHECK(again.packed() == bytes);
-  CHECK_FALSE(first_difference(cloud_type(), bytes, bytes));
+  CHECK_FALSE(first_difference(cloud_type().fields, bytes, bytes));
 }
 
 TEST_CASE("packed message: neither padding nor unused elements are in it") {
@@ -85,19 +85,19 @@ TEST_CASE("packed message: a difference is named by field, element and values") 
   fill(cloud);
   const Bytes before = cloud.packed();
   cloud->points[5].y = 2.5f;
-  auto found = first_difference(cloud_type(), before, cloud.packed());
+  auto found = first_difference(cloud_type().fields, before, cloud.packed());
   REQUIRE(found);
   CHECK(found->field == "points[5]");
   CHECK(found->values == "2.5 instead of 2");
   CHECK(before[found->byte] != cloud.packed()[found->byte]);
   cloud->step_px = 5;  // earlier in the message
-  found = first_difference(cloud_type(), before, cloud.packed());
+  found = first_difference(cloud_type().fields, before, cloud.packed());
   REQUIRE(found);
   CHECK(found->field == "step_px");
   CHECK(found->values == "5 instead of 4");
   cloud->step_px = 4;
   cloud->points.push_back({1, 2, 3});
-  found = first_difference(cloud_type(), before, cloud.packed());
+  found = first_difference(cloud_type().fields, before, cloud.packed());
   REQUIRE(found);
   CHECK(found->field == "points.size");
   CHECK(found->values == "8 instead of 7");
@@ -111,13 +111,13 @@ TEST_CASE("packed message: bytes that are no message of the type are refused, wh
     CAPTURE(size);
     const Bytes cut(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(size));
     CHECK_FALSE(unpack(cloud_type(), cut, again.get()));
-    CHECK(first_difference(cloud_type(), bytes, cut));
-    CHECK(first_difference(cloud_type(), cut, bytes));
+    CHECK(first_difference(cloud_type().fields, bytes, cut));
+    CHECK(first_difference(cloud_type().fields, cut, bytes));
   }
   Bytes longer = bytes;
   longer.push_back(std::byte{0});
   CHECK(unpack(cloud_type(), longer, again.get()).error().find("1 bytes too many") != std::string::npos);
-  CHECK(first_difference(cloud_type(), bytes, longer)->field == "length");
+  CHECK(first_difference(cloud_type().fields, bytes, longer)->field == "length");
   Placed<PointCloud> small({0, 0, 1, 6});
   CHECK(unpack(cloud_type(), bytes, small.get()).error() ==
         "point_cloud.points has 7 elements, and there is room for 6");

@@ -10,7 +10,7 @@
 
 #include "nodes/semantic/network_file.hpp"
 #include "rt/memory/memory_use.hpp"
-#include "rt/msg/action.hpp"
+#include "rt/msg/ace/action.hpp"
 #include "rt/time/clock.hpp"
 #include "tests/unit/planner/cup_and_bottles.hpp"
 

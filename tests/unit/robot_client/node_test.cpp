@@ -5,10 +5,10 @@
 #include <cstring>
 #include <numbers>
 
-#include "rt/msg/action.hpp"
-#include "rt/msg/object_reports.hpp"
+#include "rt/msg/ace/action.hpp"
+#include "rt/msg/ace/object_reports.hpp"
+#include "rt/msg/ace/robot_task.hpp"
 #include "rt/msg/odometry.hpp"
-#include "rt/msg/robot_task.hpp"
 #include "rt/msg/text_status.hpp"
 #include "rt/msg/velocity_command.hpp"
 #include "rt/sched/port_access.hpp"

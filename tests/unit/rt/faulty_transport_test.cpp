@@ -10,7 +10,7 @@
 #include "rt/faults/damage.hpp"
 #include "rt/memory/aligned_bytes.hpp"
 #include "rt/memory/memory_use.hpp"
-#include "rt/msg/digital_state.hpp"
+#include "rt/msg/ace/digital_state.hpp"
 #include "rt/msg/image.hpp"
 #include "rt/msg/text_status.hpp"
 #include "tests/unit/rt/epoch.hpp"

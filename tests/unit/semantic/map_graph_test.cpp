@@ -3,7 +3,7 @@
 // keeps them.
 #include <doctest/doctest.h>
 
-#include "rt/msg/objects_3d.hpp"
+#include "rt/msg/ace/objects_3d.hpp"
 #include "rt/msg/odometry.hpp"
 #include "tests/unit/compose/drive.hpp"
 #include "tests/unit/object_3d/table_probe.hpp"

@@ -5,12 +5,12 @@
 #include <string>
 
 #include "rt/memory/memory_use.hpp"
+#include "rt/msg/ace/head.hpp"
+#include "rt/msg/ace/object_reports.hpp"
+#include "rt/msg/ace/objects_3d.hpp"
+#include "rt/msg/ace/terrain.hpp"
 #include "rt/msg/grid.hpp"
-#include "rt/msg/head.hpp"
-#include "rt/msg/object_reports.hpp"
-#include "rt/msg/objects_3d.hpp"
 #include "rt/msg/odometry.hpp"
-#include "rt/msg/terrain.hpp"
 #include "rt/msg/text_status.hpp"
 #include "rt/sched/port_access.hpp"
 #include "rt/testing.hpp"

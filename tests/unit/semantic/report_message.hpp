@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "nodes/semantic/reports.hpp"
-#include "rt/msg/object_reports.hpp"
+#include "rt/msg/ace/object_reports.hpp"
 
 namespace takt::test {
 

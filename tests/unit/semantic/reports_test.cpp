@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "rt/msg/object_reports.hpp"
+#include "rt/msg/ace/object_reports.hpp"
 #include "rt/testing.hpp"
 #include "tests/unit/semantic/report_message.hpp"
 

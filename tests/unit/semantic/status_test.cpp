@@ -4,9 +4,9 @@
 #include <string>
 
 #include "nodes/semantic/status_line.hpp"
+#include "rt/msg/ace/stop_command.hpp"
 #include "rt/msg/grid.hpp"
 #include "rt/msg/requests.hpp"
-#include "rt/msg/stop_command.hpp"
 #include "rt/testing.hpp"
 
 using namespace takt;

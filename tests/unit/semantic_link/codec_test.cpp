@@ -8,9 +8,9 @@
 
 #include "hal/semantic_link/messages.hpp"
 #include "hal/semantic_link/wire.hpp"
-#include "rt/msg/action.hpp"
+#include "rt/msg/ace/action.hpp"
+#include "rt/msg/ace/object_reports.hpp"
 #include "rt/msg/laser_scan.hpp"
-#include "rt/msg/object_reports.hpp"
 #include "rt/msg/text_status.hpp"
 #include "rt/msg/velocity_command.hpp"
 #include "tests/conformance/link_messages.hpp"

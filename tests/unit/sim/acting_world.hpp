@@ -5,7 +5,7 @@
 #include <cstring>
 
 #include "hal/sim/simulation.hpp"
-#include "rt/msg/action.hpp"
+#include "rt/msg/ace/action.hpp"
 #include "tests/nanoseconds.hpp"
 #include "tests/temporary_folder.hpp"
 

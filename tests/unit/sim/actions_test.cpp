@@ -3,7 +3,7 @@
 #include <doctest/doctest.h>
 
 #include "hal/sim/sim_devices.hpp"
-#include "rt/msg/action.hpp"
+#include "rt/msg/ace/action.hpp"
 #include "tests/has.hpp"
 #include "tests/unit/sim/acting_world.hpp"
 

@@ -7,8 +7,8 @@
 
 #include "hal/sim/failing_devices.hpp"
 #include "hal/sim/sim_objects.hpp"
-#include "rt/msg/action.hpp"
-#include "rt/msg/object_reports.hpp"
+#include "rt/msg/ace/action.hpp"
+#include "rt/msg/ace/object_reports.hpp"
 #include "rt/testing.hpp"
 #include "tests/conformance/devices.hpp"
 #include "tests/has.hpp"

@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "nodes/traffic_signs/sign_drawing.hpp"
-#include "rt/msg/detections.hpp"
+#include "rt/msg/ace/detections.hpp"
 #include "rt/msg/point.hpp"
 #include "rt/msg/point_cloud.hpp"
 #include "tests/unit/compose/drive.hpp"

@@ -6,8 +6,8 @@
 
 #include "nodes/traffic_signs/sign_detector.hpp"
 #include "nodes/traffic_signs/sign_scenes.hpp"
-#include "rt/msg/detections.hpp"
-#include "rt/msg/digital_state.hpp"
+#include "rt/msg/ace/detections.hpp"
+#include "rt/msg/ace/digital_state.hpp"
 #include "rt/msg/disparity.hpp"
 #include "rt/msg/image.hpp"
 #include "rt/msg/point_cloud.hpp"

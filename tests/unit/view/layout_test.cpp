@@ -133,10 +133,9 @@ TEST_CASE("A cycle ends, and goes forward as far as it can") {
 
 TEST_CASE("Requests and commands go against the data and move nothing to the right") {
   Diagram diagram = test::random_diagram(1, 1, 3, 0);
-  diagram.boxes[3].outputs[0].type = "requests";
-  diagram.edges = {{0, 0, 1, 0}, {0, 0, 2, 0}, {2, 0, 3, 0}, {3, 0, 1, 1}, {3, 0, 0, 0}};
+  diagram.edges = {{0, 0, 1, 0}, {0, 0, 2, 0}, {2, 0, 3, 0}, {3, 0, 1, 1, true}, {3, 0, 0, 0}};
   CHECK(assign_columns(diagram) == std::vector<int>{0, 1, 1, 2});
-  diagram.boxes[3].outputs[0].type = "motion";
+  diagram.edges[3].control = false;
   CHECK(assign_columns(diagram) == std::vector<int>{0, 3, 1, 2});
 }
 

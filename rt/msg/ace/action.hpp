@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Installed as <takt/ace/action.hpp>: ace, experimental.
 #pragma once
 #include <cstdint>
 #include <span>
