@@ -234,16 +234,19 @@ void add_attach_commands(CLI::App& app, plugin::Plugins& plugins, AttachOptions&
   CLI::App* top = add(app, "top", "shows what a running graph does", o);
   top->add_flag("--once", o.once, "shows it once");
   top->add_flag("--json", o.json, "one JSON object a line");
+  top->footer("Example: takt top");
   top->callback([&] { exit_code = understood([&] { return run_top(o); }); });
   CLI::App* echo = add(app, "echo", "shows messages of a running graph", o);
   echo->add_option("port", o.port, "NODE.PORT")->required();
   CLI::Option* png = echo->add_option("--png", o.png, "writes the message as a picture");
   echo->add_option("--ply", o.ply, "writes the message, a point cloud, as a PLY file")->excludes(png);
   echo->add_option("--count", o.count, "how many messages")->check(CLI::PositiveNumber);
+  echo->footer("Example: takt echo stereo.disparity --png disparity.png");
   echo->callback([&] { exit_code = understood([&] { return run_echo(o); }); });
   CLI::App* get = add(app, "get", "shows a parameter of a running graph, or all that differ from its file", o);
   get->add_option("param", o.param, "NODE.PARAM");
   get->add_flag("--json", o.json, "prints JSON");
+  get->footer("Example: takt get obstacle_stop.deceleration");
   get->callback([&] { exit_code = understood([&] { return run_get(o); }); });
   CLI::App* set = add(app, "set", "sets a parameter of a running node, between two of its jobs", o);
   set->add_option("param", o.param, "NODE.PARAM, or TYPE:PARAM for every node of that type")->required();
@@ -274,8 +277,10 @@ void add_attach_commands(CLI::App& app, plugin::Plugins& plugins, AttachOptions&
   });
   CLI::App* mode = add(app, "mode", "changes the mode of a running graph", o);
   mode->add_option("mode", o.mode, "a mode of the graph, full or safe_stop")->required();
+  mode->footer("Example: takt mode safe_stop");
   mode->callback([&] { exit_code = understood([&] { return run_question(o, {{"do", "mode"}, {"mode", o.mode}}); }); });
   CLI::App* stop = add(app, "stop", "ends a running graph cleanly", o);
+  stop->footer("Example: takt stop");
   stop->callback([&] { exit_code = understood([&] { return run_question(o, {{"do", "stop"}}); }); });
 }
 

@@ -140,6 +140,7 @@ int make_project(const fs::path& templates, const std::string& name) {
 void add_new(CLI::App& app, NewOptions& options, int& exit_code) {
   CLI::App* command = app.add_subcommand("new", "makes a project of your own: node, message, device, graph, test");
   command->add_option("name", options.name, "of the project, its folder and its program")->required();
+  command->footer("Example: takt new robot");
   command->callback([&] { exit_code = make_project(shipped("graph/new"), options.name); });
 }
 

@@ -363,6 +363,9 @@ void add_replay(CLI::App& app, plugin::Plugins& plugins, ReplayOptions& o, int& 
       ->check(CLI::IsMember({"none", "subsystem"}));
   replay->add_flag("--recorded-pace", o.recorded_pace, "as fast as it was, instead of as fast as possible");
   replay->add_option("--output", o.output, "folder for pictures and other results (default out)");
+  replay->footer(
+      "Example: takt replay run.mcap --compare\n"
+      "Example: takt replay run.mcap --live ground_map --set ground_map.votes_min=7");
   replay->callback([&] { exit_code = command::replay(plugins, o); });
 }
 

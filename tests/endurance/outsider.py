@@ -5,14 +5,16 @@
     outsider.py                  in a bare Debian 12 (debootstrap, chroot), made for this and removed afterwards; needs root
     outsider.py --root FOLDER    in that bare Debian, which is made if it is not there, and stays
     outsider.py --here           on this machine, in a home of its own
+    outsider.py --page PAGE      another page, such as docs/start.md
 
 Every line of the page's ```sh blocks is a step, run by one shell after the other in a folder of its own; what a step exports
-and where it changes to holds for the next ones. A checkout of the last commit lies there as ~/takt. With --build FOLDER that
-finished build of this checkout is installed, and Takt is not built: an hour less. At the end it prints what the project and the
-smallest program on `core` cost (tests/tools/hello_cost.py). Exit 1 if a step fails, or something costs too much."""
+and where it changes to holds for the next ones. A block with a here-document or a background job is one step. A checkout of the last commit lies there as ~/takt. With --build FOLDER that
+finished build of this checkout is installed, and Takt is not built: an hour less. Without --page it prints at the end what the
+project and the smallest program on `core` cost (tests/tools/hello_cost.py). Exit 1 if a step fails, or something costs too much."""
 import argparse
 import os
 import pathlib
+import re
 import shlex
 import shutil
 import subprocess
@@ -21,22 +23,25 @@ import tempfile
 import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-PAGE = "docs/own_project.md"
+PAGES = ("docs/own_project.md", "docs/start.md")
 LIMIT_S = 3600
 
 
 def steps_of(text):
     """[(heading, command)]; a line that ends with \\ goes on in the next one."""
-    steps, heading, inside, command = [], "", False, ""
+    steps, heading, block = [], "", None
     for line in text.splitlines():
-        if line.startswith("```"): inside = line == "```sh"
-        elif not inside and line.startswith("#"): heading = line.lstrip("# ")
-        elif inside and line.strip():
-            command += line.rstrip("\\") if line.endswith("\\") else line
-            if not line.endswith("\\"):
-                steps.append((heading, command))
-                command = ""
+        if line.startswith("```"):
+            if block: steps += [(heading, command) for command in commands_of("\n".join(block))]
+            block = [] if line == "```sh" else None
+        elif block is not None: block.append(line)
+        elif line.startswith("#"): heading = line.lstrip("# ")
     return steps
+
+
+def commands_of(block):
+    if "<<" in block or re.search(r"[^&]&$", block, flags=re.M): return ["set -e\n" + block]
+    return [line for line in block.replace("\\\n", "").splitlines() if line.strip()]
 
 
 class Shell:
@@ -128,6 +133,7 @@ COSTS = (
 
 
 def table(rows):
+    rows = [(heading, command.removeprefix("set -e\n").splitlines()[0], seconds, code) for heading, command, seconds, code in rows]
     width = max(len(command) for _, command, _, _ in rows)
     lines = [f"{'step':>4}  {'command':<{width}}  {'seconds':>8}  exit"]
     lines += [f"{number:>4}  {command:<{width}}  {seconds:>8.1f}  {code}" for number, (_, command, seconds, code) in enumerate(rows, 1)]
@@ -135,15 +141,15 @@ def table(rows):
     return "\n".join(lines)
 
 
-def outsider(home, seen_as, enter, build):
+def outsider(page, home, seen_as, enter, build):
     """Exit code of all."""
     check_out(home, build)
     shell = Shell(home, seen_as, enter)
-    steps = steps_of((ROOT / PAGE).read_text())
+    steps = steps_of((ROOT / page).read_text())
     rows = follow(shell, steps, build)
     print("\n" + table(rows) + "\n", flush=True)
     failed = [row for row in rows if row[3]]
-    if not failed: failed = [row for row in (step(shell, "cost", command) for command in COSTS) if row[3]]
+    if not failed and page == PAGES[0]: failed = [row for row in (step(shell, "cost", command) for command in COSTS) if row[3]]
     for _, command, _, code in failed: print(f"FAILED with exit {code}: {command}")
     return 1 if failed else 0
 
@@ -153,19 +159,21 @@ def main():
     parser.add_argument("--here", action="store_true")
     parser.add_argument("--root", type=pathlib.Path)
     parser.add_argument("--build", type=pathlib.Path)
+    parser.add_argument("--page", choices=PAGES, default=PAGES[0])
     asked = parser.parse_args()
     if asked.here and asked.root: parser.error("--root has no --here")
     build = asked.build and asked.build.resolve()
     if build and not (build / "cmake_install.cmake").exists(): parser.error(f"{build} is no build folder")
     assert steps_of("# A\n```sh\ncd x\nb \\\n c\n```\n```text\nd\n```\n") == [("A", "cd x"), ("A", "b  c")]
-    if not any(command.startswith("takt new robot") for _, command in steps_of((ROOT / PAGE).read_text())): sys.exit(f"{PAGE} no longer makes a project robot")
+    assert steps_of("```sh\na &\nwait\n```\n") == [("", "set -e\na &\nwait")]
+    if not any(command.startswith("takt new robot") for _, command in steps_of((ROOT / asked.page).read_text())): sys.exit(f"{asked.page} no longer makes a project robot")
     with tempfile.TemporaryDirectory(prefix="takt_outsider.") as scratch:
-        if asked.here: return outsider(pathlib.Path(scratch), scratch, ["env", "-u", "TAKT_HOME", "-u", "CMAKE_PREFIX_PATH"], build)
+        if asked.here: return outsider(asked.page, pathlib.Path(scratch), scratch, ["env", "-u", "TAKT_HOME", "-u", "CMAKE_PREFIX_PATH"], build)
         if os.geteuid() != 0: sys.exit("a chroot needs root; or use --here")
         debian = (asked.root or pathlib.Path(scratch) / "debian").resolve()
         make_debian(debian)
         enter = ["chroot", str(debian), "env", "-i", "PATH=/usr/sbin:/usr/bin:/sbin:/bin", "LC_ALL=C.UTF-8"]
-        with Mounted(debian, (ROOT, build) if build else ()): return outsider(debian / "root", "/root", enter, build)
+        with Mounted(debian, (ROOT, build) if build else ()): return outsider(asked.page, debian / "root", "/root", enter, build)
 
 
 sys.exit(main())
