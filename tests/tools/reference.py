@@ -36,7 +36,8 @@ class Help:
     def __init__(self, text):
         self.purpose, self.sections, self.remarks = [], {}, []
         into, section = self.purpose, None
-        for line in text.splitlines():
+        lines = text.splitlines()
+        for line, after in zip(lines, [*lines[1:], ""]):
             heading = re.fullmatch(r"(Positionals|Options|Subcommands):", line)
             if heading:
                 section = self.sections[heading.group(1)] = []
@@ -45,8 +46,10 @@ class Help:
             elif section is not None and line.startswith(" " * COLUMN):
                 section[-1][1].append(line[COLUMN:])
             elif section is not None and line.startswith("  "):
+                # What is too long to have its meaning next to it has it below; so have choices, after a colon.
                 name, meaning = line[:COLUMN], line[COLUMN:]
-                section.append((name.strip(), [meaning]) if name.endswith(" ") else (line.strip(), []))
+                alone = not name.endswith(" ") or (after.startswith(" " * COLUMN) and not meaning.endswith(":"))
+                section.append((line.strip(), []) if alone else (name.strip(), [meaning]))
             elif line:
                 section = None
                 into.append(line)
