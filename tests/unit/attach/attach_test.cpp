@@ -165,7 +165,7 @@ TEST_CASE("a type that no room knows is seen as it shows itself") {
   REQUIRE(image.size() == cv::Size(2, 3));
   CHECK(image.at<uint8_t>(2, 1) == 200);
   CHECK_FALSE(message_ply(MessageType::of<Thermogram>(), hot.message));
-  CHECK(MessageType::of<VelocityCommand>().show == nullptr);
+  CHECK((MessageType::of<VelocityCommand>().show == nullptr));
 }
 
 TEST_CASE("top, stop and unknown questions over the socket") {
