@@ -36,7 +36,7 @@ std::span<const Suite> suites() {
       {"publish", "what a reader that never comes, or keeps all it gets, costs a writer", run_publish},
       {"release", "lateness of the five rates against clock_nanosleep, idle and under load", run_release,
        release_conditions},
-      {"release_loads", "the same per rate, policy and load, beside cyclictest; ten minutes", run_release_loads,
+      {"release_loads", "the same per rate, policy and load, next to cyclictest; ten minutes", run_release_loads,
        release_loads_conditions},
       {"graph", "ten nodes, seven hops: in one process, as ten processes, and over other libraries", run_graph},
       {"trace", "what tracing costs a job and a run, against the same without", run_trace},

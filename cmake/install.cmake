@@ -2,8 +2,12 @@
 # What `cmake --install` puts where. Programs that were not built are left out; `./takt run` builds all that others link.
 #   bin/takt  libexec/takt/  lib/  include/takt/  share/takt/  lib/cmake/takt/  lib/pkgconfig/
 include(CMakePackageConfigHelpers)
-set(share ${CMAKE_INSTALL_DATADIR}/takt)  # which bin/takt finds beside itself
-install(DIRECTORY graph/objects graph/signs graph/worlds graph/rigs graph/schema graph/skeletons graph/networks DESTINATION ${share}/graph)
+set(share ${CMAKE_INSTALL_DATADIR}/takt)  # found by graph/language/share.hpp, as its like in the build folder is
+file(MAKE_DIRECTORY ${PROJECT_BINARY_DIR}/share/takt)
+foreach(folder graph schedules)
+  file(CREATE_LINK ${PROJECT_SOURCE_DIR}/${folder} ${PROJECT_BINARY_DIR}/share/takt/${folder} SYMBOLIC)
+endforeach()
+install(DIRECTORY graph/objects graph/signs graph/worlds graph/rigs graph/schema graph/skeletons graph/networks graph/new DESTINATION ${share}/graph)
 install(FILES graph/objects_3d.txt graph/terrain.txt DESTINATION ${share}/graph)
 install(DIRECTORY schedules DESTINATION ${share})
 file(GLOB graphs ${PROJECT_SOURCE_DIR}/graph/*.yaml)
@@ -32,8 +36,9 @@ function(takt_closure out)
   set(${out} ${found} PARENT_SCOPE)
 endfunction()
 
-# Rooms belong to the package of their floor. Only those that `takt` links are installed: what is for its desk programs
-# alone is not built with it.
+# What every program with Takt's commands links belongs to the package of its floor; the robot's devices, nodes and commands
+# are `ace`. Only rooms that `takt` links are installed: what is for its desk programs alone is not built with it.
+takt_closure(common takt_command)
 takt_closure(rooms takt_command takt_robot_commands takt_ace)
 list(REMOVE_ITEM rooms takt_rt takt_analysis takt_with_iceoryx)
 foreach(package record hal graph ace)
@@ -42,14 +47,11 @@ endforeach()
 foreach(room ${rooms})
   get_target_property(folder ${room} SOURCE_DIR)
   file(RELATIVE_PATH folder ${PROJECT_SOURCE_DIR} ${folder})
+  set(package ace)
   if(folder MATCHES "^rt/record")
     set(package record)
-  elseif(folder MATCHES "^hal")
-    set(package hal)
-  elseif(folder MATCHES "^graph" AND NOT folder MATCHES "^graph/ace")
-    set(package graph)
-  else()
-    set(package ace)
+  elseif(room IN_LIST common AND folder MATCHES "^(hal|graph)/?")
+    set(package ${CMAKE_MATCH_1})
   endif()
   string(REGEX REPLACE "^takt_" "" name ${room})
   set_target_properties(${room} PROPERTIES EXPORT_NAME room_${name})
@@ -104,10 +106,4 @@ write_basic_package_version_file(taktConfigVersion.cmake COMPATIBILITY SameMinor
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/taktConfig.cmake ${CMAKE_CURRENT_BINARY_DIR}/taktConfigVersion.cmake
   cmake/dependencies.cmake DESTINATION ${package})
 
-# pkg-config: core, whose only other needs are headers of the system.
-set(TAKT_PC_FLAGS)
-if(TAKT_CPU_FLAGS)
-  set(TAKT_PC_FLAGS "-Wl,-u,takt_require_cpu ")
-endif()
-configure_file(cmake/takt-core.pc.in takt-core.pc @ONLY)
-install(FILES ${CMAKE_CURRENT_BINARY_DIR}/takt-core.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+include(cmake/pkg_config.cmake)

@@ -22,6 +22,8 @@ struct DeviceError {
   std::string text() const { return id + ": " + what + (fix.empty() ? "" : "\n  fix: " + fix); }
 };
 
+class FaultSwitch;
+
 using DeviceResult = tl::expected<void, DeviceError>;
 
 inline tl::unexpected<DeviceError> device_error(std::string id, std::string what, std::string fix) {
@@ -92,6 +94,8 @@ class Device {
   /// What was lost on the way, and why nothing comes (see SourceReport); on the job thread.
   virtual SourceCounts counts() const { return {}; }
   virtual const char* trouble() const { return ""; }
+  /// Of simulated devices: what can be made to go wrong with it while it runs (`takt fault`). Null: nothing.
+  virtual FaultSwitch* faults() { return nullptr; }
   /// Calls that reads, triggers and commands make although no job should, and why; known once the device is open.
   virtual DeclaredCalls declared_calls() const { return {}; }
 };

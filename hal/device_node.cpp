@@ -1,7 +1,30 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "hal/device_node.hpp"
 
+#include <algorithm>
+
 namespace takt {
+
+FaultParam::FaultParam(DeviceNode* owner)
+    : ParamBase(owner, kName, "", "what goes wrong with a simulated device or double; takt fault switches it"),
+      owner_(*owner) {}
+
+tl::expected<void, std::string> FaultParam::set(const ParamValue& value) {
+  FaultSwitch* const faults = owner_.faults();
+  if (faults == nullptr) return tl::make_unexpected("cannot be set: the device is not simulated");
+  const std::string word = std::holds_alternative<std::string>(value) ? std::get<std::string>(value) : "";
+  const auto fault =
+      static_cast<Misbehaviour>(std::find(kMisbehaviours.begin(), kMisbehaviours.end(), word) - kMisbehaviours.begin());
+  if (!faults->set(fault))
+    return tl::make_unexpected("is " + word + ", must be none or one of " + names_of(faults_of(faults->known())));
+  on_ = fault;
+  return {};
+}
+
+uint32_t DeviceNode::known_faults() {
+  const FaultSwitch* const known = faults();
+  return known == nullptr ? 0 : known->known();
+}
 
 void DeviceNode::open_in_setup(const Setup& setup) {
   if (!opens_) return;

@@ -10,6 +10,24 @@
 
 namespace takt {
 
+class DeviceNode;
+
+/// What `takt fault` has switched on: `none`, or a fault that the simulated device or double knows. A parameter, so
+/// that it outlives the process and stands in the record. Hardware refuses every value.
+class FaultParam final : public ParamBase {
+ public:
+  static constexpr std::string_view kName = "fault";
+  explicit FaultParam(DeviceNode* owner);
+  tl::expected<void, std::string> set(const ParamValue& value) override;
+  std::string value_text() const override { return std::string(to_text(on_)); }
+  std::string range_text() const override { return ""; }
+  std::string kind() const override { return "choice"; }
+
+ private:
+  DeviceNode& owner_;
+  Misbehaviour on_ = Misbehaviour::none;
+};
+
 /// A node that feeds a device's data into the graph. The runtime starts the device at the epoch and stops it after the
 /// last job. Each job judges the device by what it read, and says so to the runtime. A device that did not start, or
 /// that says it is gone, is tried again by the jobs, ever more seldom (RetryDelay).
@@ -40,6 +58,10 @@ class DeviceNode : public Node {
   void set_health(const DeviceHealthSettings& settings) { health_settings_ = settings; }
   /// Before the start: what stands at the other end of the device's line lives as long as the node does.
   void live_with(std::unique_ptr<DoubleThread> device) { double_ = std::move(device); }
+  /// Of its double or simulated device; null: nothing can be made to go wrong with it.
+  FaultSwitch* faults() { return double_ ? &double_->faults() : device().faults(); }
+  /// The bits of these (fault_bits); 0: none.
+  uint32_t known_faults();
   /// Before setup: the device is not opened there. Such a node tells its capacities, and never runs.
   void leave_closed() { opens_ = false; }
 
@@ -58,6 +80,7 @@ class DeviceNode : public Node {
  private:
   void judge(ReadStatus status, Job& job, bool repeated);
 
+  FaultParam fault_{this};
   bool opens_ = true, started_ = false;
   std::optional<StampLaw> declared_;
   DeviceHealthSettings health_settings_;

@@ -7,8 +7,6 @@
 #include <chrono>
 #include <utility>
 
-#include "hal/device_thread.hpp"
-
 namespace takt {
 namespace {
 
@@ -36,9 +34,7 @@ void DoubleThread::start(int64_t epoch_ns) {
   thread_ = std::thread([this, epoch_ns] { work(epoch_ns); });
 }
 
-void DoubleThread::keep_up() {
-  if (!real_time_.load(std::memory_order_relaxed) && in_real_time()) real_time_.store(true, std::memory_order_relaxed);
-}
+void DoubleThread::keep_up() { priority_.follow(); }
 
 int64_t DoubleThread::late_ns() {
   // What is due and not done counts as well: a driver that reads before it gets older data.
@@ -47,8 +43,6 @@ int64_t DoubleThread::late_ns() {
 
 void DoubleThread::work(int64_t epoch_ns) {
   pthread_setname_np(pthread_self(), ("double:" + id_).substr(0, 15).c_str());
-  take_priority(false);
-  bool raised = false;
   Misbehaviour told = Misbehaviour::none;
   for (int64_t next_ns = epoch_ns; !quit_.load();) {
     due_ns_.store(next_ns);
@@ -57,7 +51,7 @@ void DoubleThread::work(int64_t epoch_ns) {
       std::this_thread::sleep_for(std::chrono::nanoseconds(std::min(next_ns - now_ns, kLongestSleep_ns)));
       continue;
     }
-    if (!raised && real_time_.load(std::memory_order_relaxed)) take_priority(raised = true);
+    priority_.keep(clock_);
     const Misbehaviour wanted = failures_.at(now_ns).value_or(Misbehaviour::none);
     if (wanted != told) device_->misbehave(told = wanted);
     device_->run_to(now_ns);

@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "hal/device_double.hpp"
+#include "hal/device_thread.hpp"
 #include "hal/settings/failures.hpp"
 #include "rt/time/clock.hpp"
 
@@ -28,6 +29,8 @@ class DoubleThread {
 
   /// Begins to live at the epoch. Later calls change nothing.
   void start(int64_t epoch_ns);
+  /// What it can be told to do wrong while it lives.
+  FaultSwitch& faults() { return failures_.by_hand(); }
   /// In a job of the driver.
   void keep_up();
   /// How late it was at most since the call before. One thread.
@@ -41,7 +44,8 @@ class DoubleThread {
   FailureSchedule failures_;
   const Clock& clock_;
   std::function<void(int64_t epoch_ns)> on_start_;
-  std::atomic<bool> quit_{false}, real_time_{false};
+  std::atomic<bool> quit_{false};
+  DevicePriority priority_;
   std::atomic<int64_t> due_ns_{INT64_MAX}, late_ns_{0};
   std::thread thread_;
 };

@@ -22,12 +22,12 @@ std::string interface_of(Settings& settings);
 /// A time of at most so long, both in s.
 int64_t time_ns(Settings& settings, const char* name, double fallback_s, double most_s);
 
-/// The device as it is, or behind one that fails as the setting `failures` says.
+/// The device behind one that fails as the setting `failures` and `takt fault` say.
 template <class Failing, class Interface, class... More>
 std::unique_ptr<Interface> with_failures(std::unique_ptr<Interface> device, Settings& settings, More&&... more) {
   auto windows = parse_failures(settings.text("failures", ""));
   if (!windows) settings.fail("`failures`: " + windows.error(), "correct `failures`");
-  if (!windows || windows->empty()) return device;
+  if (!windows) return device;
   return std::make_unique<Failing>(std::move(device), FailureSchedule(std::move(*windows)),
                                    std::forward<More>(more)...);
 }

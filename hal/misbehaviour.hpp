@@ -9,6 +9,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 namespace takt {
 
@@ -51,6 +52,27 @@ constexpr std::string_view to_text(Misbehaviour how) { return kMisbehaviours[sta
 inline std::optional<Misbehaviour> misbehaviour_of(std::string_view word, std::span<const Misbehaviour> known) {
   const auto found = std::find_if(known.begin(), known.end(), [&](Misbehaviour how) { return to_text(how) == word; });
   return found == known.end() ? std::nullopt : std::optional(*found);
+}
+
+/// One bit for each of these, `none` left out.
+constexpr uint32_t fault_bits(std::span<const Misbehaviour> faults) {
+  static_assert(kMisbehaviours.size() <= 32);
+  uint32_t bits = 0;
+  for (const Misbehaviour how : faults)
+    if (how != Misbehaviour::none) bits |= uint32_t{1} << static_cast<uint32_t>(how);
+  return bits;
+}
+
+constexpr bool has(uint32_t fault_bits, Misbehaviour how) {
+  return (fault_bits >> static_cast<uint32_t>(how) & 1) != 0;
+}
+
+/// In the order of Misbehaviour.
+inline std::vector<Misbehaviour> faults_of(uint32_t bits) {
+  std::vector<Misbehaviour> faults;
+  for (uint8_t how = 1; how < kMisbehaviours.size(); ++how)
+    if (has(bits, static_cast<Misbehaviour>(how))) faults.push_back(static_cast<Misbehaviour>(how));
+  return faults;
 }
 
 /// "silent, unplugged, frozen": the names of all of these.

@@ -16,8 +16,8 @@ class Node;
 /// A parameter value as it comes from outside, already in the unit the parameter declares (SI).
 using ParamValue = std::variant<bool, int64_t, double, std::string>;
 
-/// Instead of a unit: the text names a file or folder that the node reads, relative to the graph; part of what a record
-/// must be replayed with.
+/// Instead of a unit: the text names a file or folder that the node reads, relative to the graph; a default first to
+/// graph/ of Takt's share folder. It is part of what a record must be replayed with.
 inline constexpr std::string_view kPath = "path";
 
 /// Name, default, unit, range and meaning of a parameter, declared once as a member of its node and used by the loader,

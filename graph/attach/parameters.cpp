@@ -7,6 +7,7 @@
 
 #include "graph/compose/composition.hpp"
 #include "graph/language/quantity.hpp"
+#include "hal/misbehaviour.hpp"
 #include "rt/sched/param_mail.hpp"
 
 namespace takt::attach {
@@ -62,6 +63,9 @@ Json parameter_json(const NodeTypes& types, const graph::GraphSpec& graph, const
   } else if (const graph::NodeSpec* spec = spec_of(graph, owner.name)) {
     // Not from the node itself: a job of it may be at work.
     entry["value"] = types.find(spec->type)->make()->params()[param]->value_text();
+    entry["from"] = "default";
+  } else {
+    entry["value"] = to_text(Misbehaviour::none);  // the one parameter of a device
     entry["from"] = "default";
   }
   return entry;

@@ -12,6 +12,7 @@
 #include <chrono>
 #include <cstring>
 #include <system_error>
+#include <thread>
 
 #include "graph/attach/message_text.hpp"
 #include "graph/attach/parameters.hpp"
@@ -29,6 +30,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 constexpr size_t kMostClients = 8;
 constexpr int kLookAgainMs = 100;
+constexpr size_t kClientStack = 2 << 20;  // it draws pictures, with libraries
 
 void pause_ms(int ms) { std::this_thread::sleep_for(std::chrono::milliseconds(ms)); }
 
@@ -54,7 +56,7 @@ bool trusted(int descriptor, bool group) {
 
 Server::Server(const Subject& subject) : subject_(subject) {
   open();
-  if (lacks_.empty()) thread_ = std::thread([this] { accept_clients(); });
+  if (lacks_.empty()) thread_ = OwnThread([this] { accept_clients(); });
 }
 
 Server::~Server() {
@@ -105,10 +107,12 @@ void Server::accept_clients() {
     }
     Client& client = clients_.emplace_back();
     try {
-      client.thread = std::thread([this, descriptor, &client] {
-        serve(descriptor);
-        client.done.store(true);
-      });
+      client.thread = OwnThread(
+          [this, descriptor, &client] {
+            serve(descriptor);
+            client.done.store(true);
+          },
+          kClientStack);
     } catch (const std::system_error&) {  // no more threads: the run goes on unheard
       clients_.pop_back();
       close(descriptor);
@@ -146,12 +150,18 @@ bool Server::answer(const Json& question, Connection& connection, uint32_t by_us
   if (what == "set")
     return connection.write(
         set(question.value("param", ""), {question.value("value", ""), question.value("keep", false), by_user}));
+  if (what == "fault") {
+    const std::string device = question.value("device", ""), fault = question.value("fault", "");
+    return connection.write(fault.empty() ? faults(device)
+                                          : switch_fault(device, fault, question.value("on", true), by_user));
+  }
   if (what == "forget") return connection.write(forget(question.value("param", "")));
   if (what == "stop") {
     subject_.board.stop().raise(now_ns());
     return connection.write({{"ok", true}});
   }
-  return connection.write(wrong("unknown question " + what + "; known: top, echo, get, set, forget, mode, stop"));
+  return connection.write(
+      wrong("unknown question " + what + "; known: top, echo, get, set, forget, fault, mode, stop"));
 }
 
 Json Server::top() const {
@@ -226,6 +236,10 @@ std::shared_ptr<void> Server::claim_tap(size_t port) {
 
 bool Server::stream(size_t port, const std::string& as, size_t items, int64_t count, Connection& connection) {
   const PortPlan& plan = subject_.plan.ports[port];
+  const Pictures& pictures = subject_.registry.pictures;
+  const Draw draw = as == "png" ? pictures.png : as == "ply" ? pictures.ply : nullptr;
+  if (draw == nullptr && !as.empty())
+    return connection.write(wrong(fmt::format("this program does not draw messages; leave --{} out", as)));
   const auto reader = subject_.transport.make_reader(port);
   uint64_t seen = 0;
   for (int64_t sent = 0; sent < count && !ending_.load();) {
@@ -245,9 +259,7 @@ bool Server::stream(size_t port, const std::string& as, size_t items, int64_t co
               {"stamp_ns", held.stamp_ns},
               {"age_ms", static_cast<double>(now_ns() - held.stamp_ns) / 1e6},
               {"message", message_json(*plan.type, held.message(), items)}};
-    const auto file = as == "png"   ? message_png(*plan.type, held.message())
-                      : as == "ply" ? message_ply(*plan.type, held.message())
-                                    : std::string();
+    const auto file = draw != nullptr ? draw(*plan.type, held.message()) : std::string();
     seen = held.sequence;
     holding.reset();
     if (!file)

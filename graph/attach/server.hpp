@@ -8,11 +8,11 @@
 #include <mutex>
 #include <set>
 #include <string>
-#include <thread>
 
 #include "graph/attach/endpoint.hpp"
 #include "graph/language/graph.hpp"
 #include "graph/language/registry.hpp"
+#include "rt/own_thread.hpp"
 #include "rt/sched/run_board.hpp"
 #include "rt/shm/transport.hpp"
 
@@ -28,9 +28,9 @@ struct Subject {
   pid_t run = getpid();  ///< the process that stands for the run
 };
 
-/// Answers top, echo, get, set, forget, mode and stop for one run, from threads of the default policy that only read
-/// the board, hold one message of an output at a time, and post parameters to be taken between jobs. Its own user and
-/// root are heard; of the service its group, too, where the mode of its folder says so.
+/// Answers top, echo, get, set, forget, fault, mode and stop for one run, from threads of the default policy that only
+/// read the board, hold one message of an output at a time, and post parameters to be taken between jobs. Its own user
+/// and root are heard; of the service its group, too, where the mode of its folder says so.
 class Server {
  public:
   explicit Server(const Subject& subject);
@@ -44,7 +44,7 @@ class Server {
 
  private:
   struct Client {
-    std::thread thread;
+    OwnThread thread;
     std::atomic<bool> done{false};
   };
   void open();
@@ -73,6 +73,12 @@ class Server {
   nlohmann::ordered_json forget(const std::string& name);
   /// The value of one parameter; "": all that differ from the graph's file.
   nlohmann::ordered_json get(const std::string& name) const;
+  /// Of `device` ("": of each), what can be made to go wrong and what is switched on.
+  nlohmann::ordered_json faults(const std::string& device) const;
+  /// Switches one of them.
+  nlohmann::ordered_json switch_fault(const std::string& device, const std::string& fault, bool on, uint32_t by_user);
+  /// Why there is nothing to switch: unknown, or not simulated.
+  nlohmann::ordered_json not_switchable(const std::string& device) const;
   nlohmann::ordered_json post_and_wait(size_t task, size_t param, const ParamValue& value, uint32_t by_user);
   size_t find_port(const std::string& name) const;
   /// Of a node; "" of a device.
@@ -87,7 +93,7 @@ class Server {
   std::mutex setting_, keeping_, tapping_;
   std::set<size_t> tapped_;  ///< outputs that somebody listens to: one at a time each
   std::list<Client> clients_;
-  std::thread thread_;
+  OwnThread thread_;
 };
 
 }  // namespace takt::attach

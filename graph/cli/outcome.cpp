@@ -6,8 +6,9 @@
 
 #include <cerrno>
 #include <cstdio>
-#include <cstdlib>
 #include <cstring>
+
+#include "graph/language/share.hpp"
 
 namespace takt::command {
 
@@ -31,11 +32,8 @@ int with_output(int code) {
 }
 
 std::filesystem::path shipped(const std::filesystem::path& relative) {
-  if (const char* home = std::getenv("TAKT_HOME")) return std::filesystem::path(home) / relative;
-  std::error_code error;
-  const auto program = std::filesystem::read_symlink("/proc/self/exe", error);
-  const auto installed = program.parent_path().parent_path() / "share/takt" / relative;
-  return std::filesystem::exists(installed, error) ? installed : relative;
+  const std::filesystem::path share = graph::share_folder();
+  return share.empty() ? relative : share / relative;
 }
 
 }  // namespace takt::command

@@ -19,7 +19,7 @@ void hold_standard_streams();
 /// disk), the reason on stderr and kDeviceOrSystem instead of kOk. A reader that has gone (`| head`) wanted no more.
 int with_output(int code);
 
-/// A file or folder that the command ships with: beside the launcher, or in share/takt beside an installed bin/.
+/// A file or folder that Takt ships with (graph/language/share.hpp).
 std::filesystem::path shipped(const std::filesystem::path& relative);
 
 }  // namespace takt::command

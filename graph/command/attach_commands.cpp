@@ -163,6 +163,31 @@ int run_set(plugin::Plugins& plugins, AttachOptions& options) {
   return code;
 }
 
+/// One line for each device.
+std::string faults_text(const Json& devices) {
+  std::string text = fmt::format("{:<18} {:<14} {}\n", "device", "on", "faults");
+  for (const Json& device : devices)
+    text +=
+        fmt::format("{:<18} {:<14} {}\n", device.at("device").get<std::string>(), device.at("on").get<std::string>(),
+                    fmt::join(device.at("faults").get<std::vector<std::string>>(), ", "));
+  return text;
+}
+
+int run_fault(const AttachOptions& options) {
+  auto connection = attached(options.run);
+  if (!connection) return kDeviceOrSystem;
+  Json question{{"do", "fault"}, {"device", options.device}};
+  if (!options.fault.empty()) question.update({{"fault", options.fault}, {"on", options.on == "on"}});
+  Json answer;
+  const int code = ask(*connection, question, answer);
+  if (code != kOk || !options.fault.empty()) return code;
+  const Json& devices = answer.at("devices");
+  if (options.json) std::printf("%s\n", devices.dump(2).c_str());
+  else if (devices.empty()) std::puts("no device of this run is simulated, so none has faults to switch");
+  else std::fputs(faults_text(devices).c_str(), stdout);
+  return kOk;
+}
+
 CLI::App* add(CLI::App& app, const char* name, const char* purpose, AttachOptions& o) {
   CLI::App* command = app.add_subcommand(name, purpose);
   command->add_option("--run", o.run, "process id of the run, where there are several");
@@ -209,16 +234,19 @@ void add_attach_commands(CLI::App& app, plugin::Plugins& plugins, AttachOptions&
   CLI::App* top = add(app, "top", "shows what a running graph does", o);
   top->add_flag("--once", o.once, "shows it once");
   top->add_flag("--json", o.json, "one JSON object a line");
+  top->footer("Example: takt top");
   top->callback([&] { exit_code = understood([&] { return run_top(o); }); });
   CLI::App* echo = add(app, "echo", "shows messages of a running graph", o);
   echo->add_option("port", o.port, "NODE.PORT")->required();
   CLI::Option* png = echo->add_option("--png", o.png, "writes the message as a picture");
   echo->add_option("--ply", o.ply, "writes the message, a point cloud, as a PLY file")->excludes(png);
   echo->add_option("--count", o.count, "how many messages")->check(CLI::PositiveNumber);
+  echo->footer("Example: takt echo stereo.disparity --png disparity.png");
   echo->callback([&] { exit_code = understood([&] { return run_echo(o); }); });
   CLI::App* get = add(app, "get", "shows a parameter of a running graph, or all that differ from its file", o);
   get->add_option("param", o.param, "NODE.PARAM");
   get->add_flag("--json", o.json, "prints JSON");
+  get->footer("Example: takt get obstacle_stop.deceleration");
   get->callback([&] { exit_code = understood([&] { return run_get(o); }); });
   CLI::App* set = add(app, "set", "sets a parameter of a running node, between two of its jobs", o);
   set->add_option("param", o.param, "NODE.PARAM, or TYPE:PARAM for every node of that type")->required();
@@ -235,10 +263,24 @@ void add_attach_commands(CLI::App& app, plugin::Plugins& plugins, AttachOptions&
     if (value->count() + forget->count() == 0) throw CLI::RequiredError("value");
     exit_code = understood([&] { return run_set(plugins, o); });
   });
+  CLI::App* fault = add(app, "fault", "switches a fault of a simulated device on or off, or lists the faults", o);
+  fault->add_option("device", o.device, "device of the graph; left out: all are listed");
+  CLI::Option* name = fault->add_option("fault", o.fault, "what goes wrong with it; left out: the device's are listed");
+  CLI::Option* on = fault->add_option("on", o.on, "on or off")->check(CLI::IsMember({"on", "off"}));
+  fault->add_flag("--json", o.json, "prints the list as JSON");
+  fault->footer(
+      "Example: takt fault front_laser silent on\n"
+      "The fault holds from the device's next job on. A device has one at a time: another one takes its place.");
+  fault->callback([&, name, on] {
+    if (name->count() > on->count()) throw CLI::RequiredError("on or off");
+    exit_code = understood([&] { return run_fault(o); });
+  });
   CLI::App* mode = add(app, "mode", "changes the mode of a running graph", o);
   mode->add_option("mode", o.mode, "a mode of the graph, full or safe_stop")->required();
+  mode->footer("Example: takt mode safe_stop");
   mode->callback([&] { exit_code = understood([&] { return run_question(o, {{"do", "mode"}, {"mode", o.mode}}); }); });
   CLI::App* stop = add(app, "stop", "ends a running graph cleanly", o);
+  stop->footer("Example: takt stop");
   stop->callback([&] { exit_code = understood([&] { return run_question(o, {{"do", "stop"}}); }); });
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// `takt top | echo | get | set | mode | stop`: commands that speak to a graph that is running already.
+// `takt top | echo | get | set | fault | mode | stop`: commands that speak to a graph that is running already.
 #pragma once
 #include <CLI/CLI.hpp>
 #include <filesystem>
@@ -16,6 +16,7 @@ struct AttachOptions {
   int run = 0;  ///< process id; 0: the only one that runs
   bool once = false, json = false;
   std::string port, param, value, mode;
+  std::string device, fault, on;      ///< of fault; `on`: "on" or "off"
   bool keep = false, forget = false;  ///< of set
   std::filesystem::path graph;        ///< of set --keep and --forget, where nothing runs; empty: the default graph
   graph::LoadOptions load;

@@ -46,6 +46,7 @@ void add_doctor(CLI::App& app, DoctorOptions& o, int& exit_code) {
   CLI::App* doctor = app.add_subcommand("doctor", "tries what Takt asks of this machine, and says what to change");
   doctor->add_flag("--measure", o.measure, "measures what the checks of a schedule charge (about 20 s)");
   doctor->add_flag("--json", o.json, "prints the result as JSON");
+  doctor->footer("Example: takt doctor --measure");
   doctor->callback([&] { exit_code = run_doctor(o); });
 }
 

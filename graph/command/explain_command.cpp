@@ -9,6 +9,7 @@
 #include <fstream>
 
 #include "graph/cli/outcome.hpp"
+#include "graph/explain/file_format.hpp"
 #include "graph/explain/miss_svg.hpp"
 #include "graph/explain/sentence.hpp"
 
@@ -96,6 +97,10 @@ int explain_misses(const ExplainOptions& options) {
                               options.file.string()),
                   kBadInput);
   const Json file = Json::parse(in, nullptr, false);
+  const bool is_trace = file.is_object() && file.contains("otherData");
+  if (const auto later = is_trace ? explain::later_format(file["otherData"], explain::kTraceFormat)
+                                  : explain::later_format(file, explain::kReportFormat))
+    return refuse(fmt::format("{} {}", options.file.string(), *later), kBadInput);
   if (file.is_object() && file.contains("nodes") && file["nodes"].is_array()) return explain_report(options, file);
   const auto trace = explain::read_trace(file);
   if (trace) return explain_trace(options, trace->trace);

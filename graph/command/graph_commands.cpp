@@ -41,6 +41,7 @@ void add_show(CLI::App& app, plugin::Plugins& plugins, ShowOptions& o, int& exit
   add_load_options(*show, o.graph, o.load);
   CLI::Option* svg = show->add_option("--svg", o.svg, "writes the picture as an SVG file");
   show->add_flag("--dot", o.dot, "prints Graphviz text")->excludes(svg);
+  show->footer("Example: takt show graph/ace.yaml --svg ace.svg");
   show->callback([&] {
     exit_code = with_plugins(plugins, o.graph, o.load, [&](const Registry& known) { return show_graph(known, o); });
   });
@@ -53,6 +54,7 @@ void add_report(CLI::App& app, plugin::Plugins& plugins, RenderOptions& o, int& 
   report->add_option("--schedule", o.schedule, "schedule file of the run, if it was not the graph's");
   report->add_option("--html", o.html, "writes the page to this file")->required();
   report->add_option("--output", o.output, "folder with the pictures of the run (default out)");
+  report->footer("Example: takt report run.json graph/ace.yaml --html run.html");
   report->callback([&] {
     graph::LoadOptions load;
     exit_code = with_plugins(plugins, o.graph, load, [&](const Registry& known) { return render_report(known, o); });
@@ -63,7 +65,8 @@ void add_explain(CLI::App& app, ExplainOptions& o, int& exit_code) {
   CLI::App* explain = app.add_subcommand("explain", "says why jobs missed their deadlines, one sentence each");
   explain->add_option("file", o.file, "what `takt run --trace` wrote (or --report, which says less)")->required();
   explain->add_option("node", o.node, "only this node");
-  explain->add_option("--svg", o.svg, "draws the largest of the misses told");
+  explain->add_option("--svg", o.svg, "draws the largest of the misses printed");
+  explain->footer("Example: takt explain trace.json");
   explain->callback([&] { exit_code = explain_misses(o); });
 }
 
@@ -72,6 +75,10 @@ void add_check(CLI::App& app, plugin::Plugins& plugins, RunOptions& o, bool& jso
   add_load_options(*check, o.graph, o.load);
   add_overlay_option(*check, o.load);
   check->add_flag("--json", json, "prints the result as JSON");
+  check->footer(
+      "Example: takt check graph/ace.yaml --policy fixed\n"
+      "Of every mode: response bounds and margins, age bounds of chains, memory; of a refused schedule the smallest\n"
+      "change that makes it fit. Exit 0: admitted, 1: infeasible or not proven, 2: invalid.");
   check->callback([&] {
     exit_code =
         with_plugins(plugins, o.graph, o.load, [&](const Registry& known) { return check_graph(known, o, json); });
@@ -83,6 +90,7 @@ void add_nodes(CLI::App& app, plugin::Plugins& plugins, NodesOptions& o, int& ex
       app.add_subcommand("nodes", "lists node types and device kinds, or one with its ports and parameters");
   nodes->add_option("type", o.type, "node type");
   add_plugin_option(*nodes, o.load.plugin_files);
+  nodes->footer("Example: takt nodes stereo");
   nodes->callback([&] {
     exit_code = plugins.load({}, o.load);
     if (exit_code == kOk) exit_code = print_nodes(plugins.registry(), o.type);
@@ -124,6 +132,12 @@ void add_run(CLI::App& app, plugin::Plugins& plugins, RunOptions& o, int& exit_c
   run->add_flag("--unchecked", o.unchecked, "runs what the check refuses");
   run->add_flag("--require-rt", o.require_rt,
                 "exit 3 where the machine lacks what `takt doctor` checks for such a run");
+  run->footer(
+      "Example: takt run graph/kitti.yaml --html run.html\n"
+      "Example: takt run --clock virtual --record run.mcap\n"
+      "Where the kernel refuses a policy that only the schedule asks for, the run falls back to `cooperative` and says "
+      "so.\n"
+      "A policy from the command line ends with exit 3 instead.");
   run->callback([&, how_long] {
     o.duration_asked = how_long->count() > 0;
     exit_code = with_plugins(plugins, o.graph, o.load, [&](const Registry& known) { return run_graph(known, o); });
@@ -148,6 +162,9 @@ void add_profile(CLI::App& app, plugin::Plugins& plugins, ProfileOptions& o, int
   in_place->excludes(write)->excludes(compare);
   write->excludes(compare);
   keep->excludes(compare);
+  profile->footer(
+      "Example: takt profile graph/ace.yaml --write measured.yaml\n"
+      "Example: takt profile --compare schedules/thesis.yaml");
   profile->callback([&] {
     exit_code =
         with_plugins(plugins, o.run.graph, o.run.load, [&](const Registry& known) { return profile_graph(known, o); });

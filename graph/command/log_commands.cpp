@@ -121,10 +121,12 @@ void add_log(CLI::App& app, const Registry& registry, LogOptions& o, int& exit_c
   CLI::App* info = log->add_subcommand("info", "what is in a record, what it lost, its hash");
   info->add_option("file", o.file, "what `takt run --record` wrote")->required();
   info->add_flag("--json", o.json, "prints it as JSON");
+  info->footer("Example: takt log info run.mcap");
   info->callback([&] { exit_code = log_info(o); });
   CLI::App* diff = log->add_subcommand("diff", "how two records differ: exit 1 if they do");
   diff->add_option("from", o.file, "a record")->required();
   diff->add_option("to", o.other, "another one")->required();
+  diff->footer("Example: takt log diff run.mcap again.mcap");
   diff->callback([&] { exit_code = log_diff(o); });
   CLI::App* echo = log->add_subcommand("echo", "its messages, one JSON object a line");
   echo->add_option("file", o.file, "a record")->required();
@@ -140,7 +142,9 @@ void add_log(CLI::App& app, const Registry& registry, LogOptions& o, int& exit_c
   cut->add_option("-o,--output", o.output, "the file to write")->required();
   cut->add_option("--from", o.from_s, "seconds into the run of the first release")->check(CLI::Range(0.0, 1e9));
   cut->add_option("--to", o.to_s, "seconds into the run, behind the last release")->check(CLI::Range(0.0, 1e9));
+  cut->footer("Example: takt log cut run.mcap -o short.mcap --from 2 --to 4");
   cut->callback([&] { exit_code = log_cut(o); });
+  exported->footer("Example: takt log export run.mcap -o foxglove.mcap");
   exported->callback([&] { exit_code = log_export(registry, o); });
 }
 

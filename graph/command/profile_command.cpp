@@ -90,7 +90,7 @@ int pass(const Registry& registry, const RunOptions& options, const char* name, 
 
 int measure(const Registry& registry, const RunOptions& options, Profile& profile) {
   const CpuLatencyHold latency = hold_cpu_dma_latency();
-  std::vector<std::string> lacks = prepare_process();
+  std::vector<std::string> lacks = prepare_process(registry);
   if (!latency.granted()) lacks.push_back(latency.lacks());
   for (const std::string& line : lacks) std::fprintf(stderr, "takt: adjusted: %s\n", line.c_str());
   const auto take_alone = [&](const graph::GraphSpec& graph, const Plan& plan, const RunBoard& board,

@@ -11,6 +11,7 @@
 #include "graph/command/doctor_command.hpp"
 #include "graph/command/graph_commands.hpp"
 #include "graph/command/log_commands.hpp"
+#include "graph/command/new_command.hpp"
 #include "graph/command/other_programs.hpp"
 #include "graph/command/replay_command.hpp"
 #include "graph/main.hpp"
@@ -52,11 +53,13 @@ int run(int argc, char** argv, const std::function<void(Registry&)>& fill, const
   DoctorOptions doctor;
   ReplayOptions replay;
   LogOptions log;
+  NewOptions project;
   add_graph_commands(app, plugins, graph, exit_code);
   add_attach_commands(app, plugins, attach, exit_code);
   add_doctor(app, doctor, exit_code);
   add_replay(app, plugins, replay, exit_code);
   add_log(app, registry, log, exit_code);
+  add_new(app, project, exit_code);
   const auto options_of_more = more ? more(app, exit_code) : nullptr;
   auto own = names(app);
   if (argc > 1 && argv[1][0] != '-' && std::find(own.begin(), own.end(), argv[1]) == own.end())

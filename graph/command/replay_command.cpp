@@ -2,7 +2,6 @@
 #include "graph/command/replay_command.hpp"
 
 #include <fmt/format.h>
-#include <hwy/highway.h>
 
 #include <algorithm>
 #include <cstdio>
@@ -55,19 +54,16 @@ class RecordedFacts final : public graph::FactExchange {
 };
 
 /// SIMD code of another width may round differently: the target of the record, or none.
-void force_simd(const std::string& recorded) {
-  const int64_t best = hwy::SupportedTargets() & -hwy::SupportedTargets();
-  if (recorded.empty() || recorded == hwy::TargetName(best)) return;
-  for (int64_t left = hwy::SupportedTargets(); left != 0; left &= left - 1) {
-    const int64_t target = left & -left;
-    if (recorded != hwy::TargetName(target)) continue;
-    hwy::DisableTargets(target - 1);  // a lower bit is a better target
-    std::fprintf(stderr, "takt: SIMD target %s as in the record, not this machine's %s\n", recorded.c_str(),
-                 hwy::TargetName(best));
-    return;
-  }
-  throw Refused{fmt::format("the record was made with the SIMD target {}, which this CPU (best: {}) does not have",
-                            recorded, hwy::TargetName(best))};
+void force_simd(const VectorTargets& vectors, const std::string& recorded) {
+  const auto names = vectors.names != nullptr ? vectors.names() : std::vector<std::string>{};
+  if (recorded.empty() || names.empty() || recorded == names.front()) return;
+  const auto found = std::find(names.begin(), names.end(), recorded);
+  if (found == names.end())
+    throw Refused{fmt::format("the record was made with the SIMD target {}, which this CPU (best: {}) does not have",
+                              recorded, names.front())};
+  vectors.leave_out(static_cast<size_t>(found - names.begin()));
+  std::fprintf(stderr, "takt: SIMD target %s as in the record, not this machine's %s\n", recorded.c_str(),
+               names.front().c_str());
 }
 
 class Replay {
@@ -81,7 +77,7 @@ class Replay {
     file_.emplace(std::move(*file));
     for (const std::string& damage : file_->damages())
       std::fprintf(stderr, "takt: the record is not whole: %s\n", damage.c_str());
-    force_simd(fact(file_->facts(), "simd"));
+    force_simd(plugins_.registry().vectors, fact(file_->facts(), "simd"));
     if (const int code = compose(); code != kOk) return code;
     check_sameness();
     const record::ReplayResult result = replay();
@@ -155,9 +151,13 @@ class Replay {
       throw Refused{"this graph cannot run the jobs of the record: " + *differs};
     const Json assets = attached_json(*file_, "assets.json");
     const Json hashes = log::asset_hashes(prepared_.composition->plan, graph.directory);
-    for (const auto& [path, hash] : assets.items())
-      if (hashes.value(path, "") != hash)
-        throw Refused{fmt::format("{} is not what it was when the record was made", (graph.directory / path).string())};
+    const auto places = log::assets(prepared_.composition->plan, graph.directory);
+    for (const auto& [name, hash] : assets.items()) {
+      if (hashes.value(name, "") == hash) continue;
+      const auto place = places.find(name);
+      throw Refused{fmt::format("{} is not what it was when the record was made",
+                                (place == places.end() ? graph.directory / name : place->second).string())};
+    }
     if (const std::string cut = fact(file_->facts(), "cut"); !cut.empty())
       std::fprintf(stderr, "takt: this is %s; nodes begin here without what they remembered\n", cut.c_str());
     for (size_t i = 0; i < graph.files.size(); ++i)
@@ -363,6 +363,9 @@ void add_replay(CLI::App& app, plugin::Plugins& plugins, ReplayOptions& o, int& 
       ->check(CLI::IsMember({"none", "subsystem"}));
   replay->add_flag("--recorded-pace", o.recorded_pace, "as fast as it was, instead of as fast as possible");
   replay->add_option("--output", o.output, "folder for pictures and other results (default out)");
+  replay->footer(
+      "Example: takt replay run.mcap --compare\n"
+      "Example: takt replay run.mcap --live ground_map --set ground_map.votes_min=7");
   replay->callback([&] { exit_code = command::replay(plugins, o); });
 }
 

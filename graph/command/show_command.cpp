@@ -8,6 +8,7 @@
 #include <fstream>
 #include <system_error>
 
+#include "graph/explain/file_format.hpp"
 #include "graph/run/prepare.hpp"
 #include "graph/view/graph_pictures.hpp"
 #include "graph/view/html_report.hpp"
@@ -36,6 +37,10 @@ Json read_report(const std::filesystem::path& file) {
     return nullptr;
   }
   Json report = Json::parse(in, nullptr, false);
+  if (const auto later = explain::later_format(report, explain::kReportFormat)) {
+    refuse(fmt::format("{} {}", file.string(), *later), kBadInput);
+    return nullptr;
+  }
   const auto word = [&](const char* key) { return report.contains(key) && report[key].is_string(); };
   if (report.is_object() && word("graph") && word("schedule")) return report;
   refuse(fmt::format("{}: is no report of a run; name a file that `takt run --report FILE` wrote", file.string()),

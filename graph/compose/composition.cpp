@@ -8,6 +8,7 @@
 #include <set>
 
 #include "graph/compose/plan_modes.hpp"
+#include "graph/language/share.hpp"
 #include "hal/devices.hpp"
 #include "rt/sched/port_access.hpp"
 
@@ -31,8 +32,11 @@ std::unique_ptr<Node> make_node(const NodeSpec& spec, const NodeTypes& types) {
   std::unique_ptr<Node> node = types.find(spec.type)->make();
   for (ParamBase* param : node->params()) {
     // Ranges were checked when the graph was loaded; a refusal here is a bug in the checker.
-    if (const auto it = spec.params.find(std::string(param->name())); it != spec.params.end())
+    if (const auto it = spec.params.find(std::string(param->name())); it != spec.params.end()) {
       if (!param->set(it->second.value)) std::abort();
+    } else if (param->unit() == kPath) {
+      if (!param->set(default_asset(*param))) std::abort();
+    }
   }
   return node;
 }
@@ -95,7 +99,7 @@ class Composer {
     TaskPlan& task = result_.plan.tasks[t];
     if (auto* const hardware = dynamic_cast<DeviceNode*>(task.node)) {
       StampLaw law = hardware->stamp_law({task.rate, task.offset_ns});
-      task.source = {law.lag_ns(), law.wait_ns, std::move(law.unknown)};
+      task.source = {law.lag_ns(), law.wait_ns, std::move(law.unknown), hardware->known_faults()};
     }
     if (options_.exchange != nullptr) options_.exchange->tell_source(t, task.source);
   }

@@ -25,7 +25,7 @@ void call(CLI::App& task, Options& options, int& exit_code) {
 }
 
 void add_stereo(CLI::App& eval, EvalStereoOptions& o, int& exit_code) {
-  CLI::App* app = eval.add_subcommand("stereo", "bad pixels of dense stereo against ground truth, beside OpenCV");
+  CLI::App* app = eval.add_subcommand("stereo", "bad pixels of dense stereo against ground truth, next to OpenCV");
   auto* scene = app->add_option("--scene", o.scene,
                                 "folder with a pair and a laser's points as ground truth (data/clouds/laser_stereo)");
   auto* left = app->add_option("--left", o.left, "left rectified image");
@@ -195,7 +195,7 @@ void add_ground(CLI::App& eval, EvalGroundOptions& o, int& exit_code) {
       ->check(CLI::Range(0, 255));
   app->add_option("--ignore", o.ignore, "class ids that are not counted")->delimiter(',')->check(CLI::Range(0, 255));
   app->add_option("--learn", o.learn,
-                  "images that teach instead, e.g. 'first*' (default: each its own, and beside it the other drives)");
+                  "images that teach instead, e.g. 'first*' (default: each its own, and next to it the other drives)");
   app->add_option("--set", o.set, "parameter=value of the ground_map node, repeatable");
   app->add_option("--seed", o.seed, "seed of the generated pavement (default 1)");
   app->add_option("--frames", o.frames, "images along the generated drive (default 60)")->check(CLI::Range(1, 100000));
@@ -296,7 +296,7 @@ void add_mapping(CLI::App& eval, EvalMappingOptions& o, int& exit_code) {
   app->add_option("--views", o.views, "that are fused (default 5)")->check(CLI::Range(1, 16));
   app->add_option("--seed", o.seed, "of everything generated (default 1)");
   app->add_option("--out", o.out, "PLY or PCD file of the room's map");
-  app->add_option("--grid", o.grid, "YAML file of the room's occupancy grid, its PNG beside it");
+  app->add_option("--grid", o.grid, "YAML file of the room's occupancy grid, its PNG next to it");
   app->add_option("--picture", o.picture, "PNG of the room's map, from above and from the side");
   call(*app, o, exit_code);
 }

@@ -20,7 +20,7 @@ namespace {
 using namespace scan_matching;
 using Json = nlohmann::ordered_json;
 
-/// theta of a log is the driving direction, which is the robot's y axis (algorithm reference 21.9).
+/// theta of a log is the driving direction, which is the robot's y axis (C-9).
 PlanarPose robot(const PlanarPose& logged) { return {logged.x_m, logged.y_m, logged.theta_rad - std::numbers::pi / 2}; }
 
 /// Scans that have a corrected pose, which is that of the scanner: it is the body here, carried along by the robot's

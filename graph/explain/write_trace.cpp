@@ -6,6 +6,7 @@
 #include <map>
 #include <set>
 
+#include "graph/explain/file_format.hpp"
 #include "graph/explain/trace_file.hpp"
 #include "rt/sched/lane.hpp"
 
@@ -45,6 +46,7 @@ class Writer {
   std::string us_long(int64_t ns) const { return fmt::format("{:.3f}", static_cast<double>(ns) / 1e3); }
 
   Json facts(Json head) const {
+    head["format"] = kTraceFormat;
     head["source_of_preemption"] = trace::to_string(trace_.source);
     head["source_note"] = trace_.source_note;
     head["lost"] = {{"events", trace_.losses.events},

@@ -134,16 +134,20 @@ void Loader::check_edge(const std::string& id, const Part& to, const EdgeSpec& e
         fmt::format("type mismatch: {} and input {} both call their type {}, but with other fields; build program and "
                     "plug-ins with one declaration of it, or give one of the two types another name",
                     ticked(edge.from.text()), what, ticked(input->type->name)));
-  check_layer_and_hierarchy(id, from, to, edge);
+  if (layers_) check_layer(id, from, to, edge);
+  check_hierarchy(from, to, edge);
 }
 
-void Loader::check_layer_and_hierarchy(const std::string& id, const Part& from, const Part& to, const EdgeSpec& edge) {
-  // Commands to devices and requests have no layer (design 3).
-  if (to.known && !to.device && edge.input != "control" && !layers_fit(from.layer, to.layer))
-    problem(edge.position,
-            fmt::format("edge from {} (layer {}) to {} (layer {}): an edge goes to the same, the next or the storage "
-                        "layer (sensor, perception, processing, storage)",
-                        ticked(edge.from.text()), to_string(from.layer), ticked(id), to_string(to.layer)));
+void Loader::check_layer(const std::string& id, const Part& from, const Part& to, const EdgeSpec& edge) {
+  // Commands to devices and requests have no layer.
+  if (!to.known || to.device || edge.input == "control" || layers_fit(from.layer, to.layer)) return;
+  problem(edge.position,
+          fmt::format("edge from {} (layer {}) to {} (layer {}): an edge goes to the same, the next or the storage "
+                      "layer (sensor, perception, processing, storage), as `layers: thesis` asks for",
+                      ticked(edge.from.text()), to_string(from.layer), ticked(id), to_string(to.layer)));
+}
+
+void Loader::check_hierarchy(const Part& from, const Part& to, const EdgeSpec& edge) {
   if (from.device || from.subsystem == to.subsystem) return;
   const auto subsystem = std::find_if(spec_.subsystems.begin(), spec_.subsystems.end(),
                                       [&](const SubsystemSpec& s) { return s.name == from.subsystem; });

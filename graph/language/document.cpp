@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "graph/language/words.hpp"
+#include "rt/abi.hpp"
 
 namespace takt::graph {
 namespace {
@@ -283,6 +284,15 @@ Document parse_document(std::string_view text, const std::string& name, const st
   } catch (const std::exception& error) {
     add(problems, start, std::string("no valid YAML: ") + error.what());
     document.root = json();
+  }
+  if (document.root.is_object() && document.root.value("takt", json()).is_number_integer() &&
+      document.root["takt"] > kLanguage) {  // what else is wrong with it, is not wrong for a later Takt
+    problems.erase(problems.begin() + static_cast<std::ptrdiff_t>(before), problems.end());
+    document.newer = true;
+    document.root = json();
+    add(problems, document.value_at("/takt"),
+        "the file is of version " + document.raw("/takt") + " of the language, and this is Takt " + version().number +
+            ", which reads version " + std::to_string(kLanguage) + "; use a later Takt");
   }
   if (document.root.is_null() && problems.size() == before)
     add(problems, document.value_at(""), "the file holds no value; it begins with `takt: 1`");

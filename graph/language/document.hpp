@@ -22,10 +22,14 @@ struct Mark {
   std::string raw;  ///< a scalar as it stands in the file, before ${TAKT_DATA} is expanded
 };
 
+/// The version of the language of graph, schedule, parameter, scenario and overlay files: the `1` of `takt: 1`.
+inline constexpr int kLanguage = 1;
+
 class Document {
  public:
   std::string file;
   nlohmann::json root;                            ///< null if the file could not be read at all
+  bool newer = false;                             ///< it could not, being of a later version than kLanguage
   std::map<std::string, Mark> marks;              ///< by JSON pointer (RFC 6901)
   std::map<std::string, std::string> unresolved;  ///< texts with ${constant}, by pointer; see Constants::later
   std::set<std::string> broken;                   ///< pointers whose value was reported already and is null or absent
@@ -55,6 +59,9 @@ Document read_document(const std::filesystem::path& file, const Position& wanted
 /// The same for text already in memory; `name` stands in the positions, relative paths start at `directory`.
 Document parse_document(std::string_view text, const std::string& name, const std::filesystem::path& directory,
                         std::vector<Problem>& problems, Constants constants = Constants::none);
+
+/// The file that `include` of a document names.
+std::filesystem::path included_file(const Document& from, const std::string& name);
 
 /// A plain (unquoted) scalar as JSON, or why YAML readers disagree about it.
 tl::expected<nlohmann::json, std::string> resolve_scalar(const std::string& text);

@@ -233,7 +233,7 @@ struct GraphSpec {
 
 /// A plug-in that a graph file asks for.
 struct PluginName {
-  std::filesystem::path file, directory;  ///< as it stands there; of the graph file
+  std::filesystem::path file, directory;  ///< as it stands there; of the file that names it
   Position position;
 };
 /// A plug-in that was loaded: part of a record.
@@ -267,8 +267,8 @@ struct Loaded {
   std::vector<Problem> problems;
 };
 
-/// Those that `plugins` of the file names; they are loaded before the file is. Nothing of a file that cannot be read:
-/// load() says why.
+/// Those that `plugins` of the file and of all that it includes name; they are loaded before the file is. Nothing of a
+/// file that cannot be read: load() says why.
 std::vector<PluginName> plugins_of(const std::filesystem::path& file);
 
 /// Reads the graph and its schedule, checks all of it (syntax, schema, ids, types, units, ranges, hierarchy, cycles)

@@ -126,7 +126,8 @@ class Loader {
   void make_parts();
   void check_edges();
   void check_edge(const std::string& id, const Part& to, const EdgeSpec& edge);
-  void check_layer_and_hierarchy(const std::string& id, const Part& from, const Part& to, const EdgeSpec& edge);
+  void check_layer(const std::string& id, const Part& from, const Part& to, const EdgeSpec& edge);
+  void check_hierarchy(const Part& from, const Part& to, const EdgeSpec& edge);
   void check_exports();
   void check_unconnected(const std::string& id, const Part& part);
   void check_joins();
@@ -170,6 +171,7 @@ class Loader {
   Document graph_, schedule_, params_;
   GraphSpec spec_;
   std::vector<Problem> problems_;
+  bool layers_ = false;                      ///< the graph asks for `layers: thesis`
   std::map<std::string, Position> claimed_;  ///< ids of nodes and devices
   std::map<std::string, Part> parts_;
   std::map<std::string, std::unique_ptr<Node>> instances_;  ///< by node id, with default parameters

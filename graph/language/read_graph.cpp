@@ -61,6 +61,7 @@ void Loader::read_graph() {
   const json& root = graph_.root;
   spec_.name = text_at(root, "name");
   if (const std::string word = text_at(root, "isolation"); !word.empty()) spec_.isolation = word;
+  layers_ = text_at(root, "layers") == "thesis";
   const json devices = map_at(root, "devices");
   for (const auto& [id, value] : devices.items()) {
     const std::string pointer = child("/devices", id);

@@ -31,6 +31,7 @@ class Parts {
 
   Document read(const std::filesystem::path& file, const Position& wanted_from) {
     Document whole = read_document(file, wanted_from, problems_, Constants::later);
+    newer_ = newer_ || whole.newer;
     files_.push_back(file.string());
     if (!whole.root.is_object()) return whole;
     open_.push_back(canonical_path(file));
@@ -41,6 +42,9 @@ class Parts {
     return whole;
   }
 
+  /// One of the files is of a later version: what the others lack means nothing.
+  bool newer() const { return newer_; }
+
  private:
   void problem(const Position& at, std::string text) { problems_.push_back({at, std::move(text)}); }
 
@@ -49,7 +53,7 @@ class Parts {
     if (whole.broken.contains(pointer)) return;
     if (name.find("${") != std::string::npos)
       return problem(at, ticked(name) + ": a path of `include` takes no constants; write the path out");
-    const std::filesystem::path file = (std::filesystem::path(whole.file).parent_path() / name).lexically_normal();
+    const std::filesystem::path file = included_file(whole, name);
     const std::filesystem::path key = canonical_path(file);
     if (std::find(open_.begin(), open_.end(), key) != open_.end()) {
       std::string from =
@@ -79,6 +83,7 @@ class Parts {
       }
       const int levels = merged_levels(key);
       if (!whole.root.contains(key)) take(whole, part, pointer);
+      else if (key == "plugins") append(whole, part, pointer);
       else if (levels > 0) merge_map(whole, part, pointer, levels);
       else if (whole.value_at(pointer).file != whole.file) twice(whole, part, pointer);  // else: its own word wins
     }
@@ -98,6 +103,14 @@ class Parts {
     }
   }
 
+  /// Both lists are one.
+  void append(Document& whole, const Document& part, const std::string& pointer) {
+    const json::json_pointer where(pointer);
+    if (!whole.root.at(where).is_array() || !part.root.at(where).is_array()) return twice(whole, part, pointer);
+    for (size_t i = 0; i < part.root.at(where).size(); ++i)
+      take(whole, part, child(pointer, i), child(pointer, whole.root.at(where).size()));
+  }
+
   void twice(const Document& whole, const Document& part, const std::string& pointer) {
     const size_t slash = pointer.rfind('/');
     const std::string in = slash == 0 ? "the graph" : ticked(pointer.substr(1, slash - 1));
@@ -106,16 +119,19 @@ class Parts {
   }
 
   static void take(Document& whole, const Document& part, const std::string& pointer) {
-    const json::json_pointer where(pointer);
-    whole.root[where] = part.root.at(where);
+    take(whole, part, pointer, pointer);
+  }
+  static void take(Document& whole, const Document& part, const std::string& pointer, const std::string& to_pointer) {
+    whole.root[json::json_pointer(to_pointer)] = part.root.at(json::json_pointer(pointer));
     const auto copy = [&](const auto& from, auto& to) {
       for (const auto& [place, what] : from)
-        if (place == pointer || place.starts_with(pointer + "/")) to[place] = what;
+        if (place == pointer || place.starts_with(pointer + "/")) to[to_pointer + place.substr(pointer.size())] = what;
     };
     copy(part.marks, whole.marks);
     copy(part.unresolved, whole.unresolved);
   }
 
+  bool newer_ = false;
   std::vector<std::string>& files_;
   std::vector<Problem>& problems_;
   std::vector<std::filesystem::path> open_;          ///< from the graph to the file that is read
@@ -124,13 +140,22 @@ class Parts {
 
 }  // namespace
 
+std::filesystem::path included_file(const Document& from, const std::string& name) {
+  return (std::filesystem::path(from.file).parent_path() / name).lexically_normal();
+}
+
 bool Loader::before(const Position& a, const Position& b) const {
   const auto rank = [&](const Position& at) { return std::find(spec_.files.begin(), spec_.files.end(), at.file); };
   return std::tuple(rank(a), a.line, a.column) < std::tuple(rank(b), b.line, b.column);
 }
 
 void Loader::read_files(const std::filesystem::path& file) {
-  graph_ = Parts(spec_.files, problems_).read(file, {file.string(), 0, 0});
+  Parts parts(spec_.files, problems_);
+  graph_ = parts.read(file, {file.string(), 0, 0});
+  if (parts.newer()) {
+    graph_.root = json();
+    return;
+  }
   if (options_.params.empty()) {
     take_constants(graph_, false);
   } else {

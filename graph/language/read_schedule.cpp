@@ -229,14 +229,6 @@ void Loader::check_schedule() {
               fmt::format("node {} has no entry in the schedule {}; give it a rate in Hz (rate: 15) or a "
                           "port that releases it (on: id.port) there",
                           ticked(node.id), ticked(spec_.schedule.file)));
-  const bool high = std::any_of(spec_.nodes.begin(), spec_.nodes.end(), [&](const NodeSpec& node) {
-    const auto entry = entries.find(node.id);
-    return entry != entries.end() && entry->second.criticality == Criticality::high;
-  });
-  if (!high && !spec_.nodes.empty())
-    problem(schedule_.key_at("/nodes"),
-            "no node has criticality high, devices apart; name at least one that must never give way "
-            "(criticality: high)");
   for (const auto& [id, entry] : entries)
     if (entry.on) check_on(id, entry);
   check_on_cycles();

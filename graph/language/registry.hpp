@@ -1,10 +1,29 @@
 // SPDX-License-Identifier: Apache-2.0
 // Installed as <takt/registry.hpp>: graph, experimental.
 #pragma once
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
 #include "hal/device_types.hpp"
 #include "rt/node.hpp"
 
 namespace takt {
+
+/// Draws a message: a file, or nothing if it cannot be seen.
+using Draw = std::optional<std::string> (*)(const MessageType& type, const void* message);
+/// For `takt echo --png` and `--ply`. Null: this program does not draw (graph/pictures/pictures.hpp does).
+struct Pictures {
+  Draw png = nullptr, ply = nullptr;
+};
+
+/// Between which vector instructions nodes choose when they start. Results may depend on it, so records name it. Null:
+/// no node of this program chooses.
+struct VectorTargets {
+  std::vector<std::string> (*names)() = nullptr;  ///< of what this machine has, the best first: that one is taken
+  void (*leave_out)(size_t count) = nullptr;      ///< the best so many are no longer taken; before nodes are made
+};
 
 /// What a program knows: its node types and devices. Everything that reads or runs a graph takes one.
 ///
@@ -17,6 +36,9 @@ namespace takt {
 struct Registry {
   NodeTypes nodes;
   hal::DeviceTypes devices;
+  Pictures pictures;
+  VectorTargets vectors;
+  std::vector<void (*)()> before_jobs;  ///< called in each process that runs jobs, before it makes threads
 };
 
 }  // namespace takt

@@ -9,6 +9,7 @@
 #include <iterator>
 #include <map>
 
+#include "graph/language/share.hpp"
 #include "rt/abi.hpp"
 #include "rt/node.hpp"
 #include "rt/record/message_record.hpp"
@@ -23,7 +24,7 @@ Json task_json(const Plan& plan, const TaskPlan& task) {
                      {"from", plan.ports[edge.port].node + "." + plan.ports[edge.port].port},
                      {"depth", edge.depth}});
   for (const size_t port : task.ports) outputs.push_back(plan.ports[port].port);
-  for (const ParamBase* param : task.node->params()) params[std::string(param->name())] = param->value_text();
+  for (const ParamBase* param : task.node->params()) params[std::string(param->name())] = graph::recorded_text(*param);
   return {{"name", task.name}, {"device", task.device}, {"edges", edges}, {"outputs", outputs}, {"params", params}};
 }
 
@@ -118,6 +119,7 @@ std::optional<std::string> structure_differs(const Json& recorded, const Json& p
 std::vector<std::string> changed_params(const Json& recorded, const Json& plan) {
   std::vector<std::string> changed;
   for (size_t t = 0; t < plan.at("tasks").size(); ++t) {
+    if (plan.at("tasks")[t].at("device").get<bool>()) continue;  // a replay does not run it
     const Json &then = recorded.at("tasks")[t].at("params"), &now = plan.at("tasks")[t].at("params");
     for (const auto& [name, value] : now.items()) {
       const std::string before = then.value(name, "nothing");
@@ -134,16 +136,21 @@ Capacity capacity_of(const Json& recorded, size_t index) {
   return {numbers.at(0), numbers.at(1), numbers.at(2), numbers.at(3)};
 }
 
+std::map<std::string, std::filesystem::path> assets(const Plan& plan, const std::filesystem::path& directory) {
+  std::map<std::string, std::filesystem::path> places;
+  for (const TaskPlan& task : plan.tasks)
+    for (const ParamBase* param : task.node->params())
+      if (param->unit() == kPath && !param->value_text().empty())
+        places[graph::recorded_text(*param)] = directory / param->value_text();
+  return places;
+}
+
 Json asset_hashes(const Plan& plan, const std::filesystem::path& directory) {
   Json hashes = Json::object();
   std::error_code error;
-  for (const TaskPlan& task : plan.tasks) {
-    for (const ParamBase* param : task.node->params()) {
-      if (param->unit() != kPath || param->value_text().empty()) continue;
-      const auto path = directory / param->value_text();
-      if (std::filesystem::is_directory(path, error)) hashes[param->value_text()] = folder_hash(path);
-      else if (std::filesystem::is_regular_file(path, error)) hashes[param->value_text()] = file_hash(path);
-    }
+  for (const auto& [name, place] : assets(plan, directory)) {
+    if (std::filesystem::is_directory(place, error)) hashes[name] = folder_hash(place);
+    else if (std::filesystem::is_regular_file(place, error)) hashes[name] = file_hash(place);
   }
   return hashes;
 }

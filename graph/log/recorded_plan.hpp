@@ -3,6 +3,7 @@
 // is still the same one.
 #pragma once
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -33,8 +34,11 @@ std::string event_text(const record::RecordedEvent& event, const Json& plan);
 /// The node that it happened to; empty: none.
 std::string event_node(const record::RecordedEvent& event, const Json& plan);
 
-/// Hash of each file or folder that a parameter of the plan's nodes names (kPath), as hexadecimal digits, by the path
-/// as it stands there. A folder is all files below it, by name.
+/// Where each file or folder is that a parameter of the plan's nodes names (kPath); by the name that a record has for
+/// it (graph/language/share.hpp).
+std::map<std::string, std::filesystem::path> assets(const Plan& plan, const std::filesystem::path& directory);
+
+/// Hashes of these, as hexadecimal digits; none of what is not there. A folder is all files below it, by name.
 Json asset_hashes(const Plan& plan, const std::filesystem::path& directory);
 
 /// Name in a record of file `i` of GraphSpec::files, i > 0: "part_1.yaml".

@@ -2,9 +2,9 @@
 #pragma once
 #include <memory>
 #include <string>
-#include <thread>
 #include <vector>
 
+#include "rt/own_thread.hpp"
 #include "rt/sched/outage_log.hpp"
 #include "rt/shm/iceoryx_preflight.hpp"
 #include "rt/shm/transport.hpp"
@@ -23,7 +23,7 @@ class DaemonProbe {
   DaemonProbe(Transport& transport, GroupSigns& signs, const Clock& clock);
 
  private:
-  std::jthread thread_;
+  OwnThread thread_;
 };
 
 }  // namespace takt::command

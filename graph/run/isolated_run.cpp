@@ -77,7 +77,7 @@ class IsolatedRun {
         board_(plan_, partition_.names.size(), process_of_tasks(plan_, partition_)),
         stoppable_(board_),
         pools_(static_cast<uint32_t>(partition_.names.size()) + 1),
-        record_(options, plan_),
+        record_(registry, options, plan_),
         trace_(options, plan_, partition_.names.size()) {}
 
   ~IsolatedRun() { take_down(); }
@@ -233,7 +233,7 @@ class IsolatedRun {
   }
 
   void tell_lacks(const CpuLatencyHold& latency) {
-    std::vector<std::string> lacks = prepare_process();
+    std::vector<std::string> lacks = prepare_process(registry_);
     const bool locked = lacks.empty();
     if (!latency.granted()) lacks.push_back(latency.lacks());
     if (options_.require_rt && (!locked || latency.refused()))

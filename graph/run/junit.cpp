@@ -2,10 +2,11 @@
 #include "graph/run/junit.hpp"
 
 #include <fmt/format.h>
-#include <tinyxml2.h>
 
 #include <algorithm>
 #include <vector>
+
+#include "graph/view/markup.hpp"
 
 namespace takt::command {
 namespace {
@@ -59,27 +60,18 @@ std::vector<Case> cases_of(const Json& report) {
 std::string junit_text(const Json& report) {
   const std::vector<Case> cases = cases_of(report);
   const std::string graph = report["graph"];
-  tinyxml2::XMLPrinter xml;
-  xml.PushHeader(false, true);
-  xml.OpenElement("testsuite");
-  xml.PushAttribute("name", ("takt." + graph).c_str());
-  xml.PushAttribute("tests", static_cast<unsigned>(cases.size()));
-  xml.PushAttribute("failures", static_cast<unsigned>(std::count_if(
-                                    cases.begin(), cases.end(), [](const Case& one) { return !one.failure.empty(); })));
-  xml.PushAttribute("time", report["duration_s"].get<double>());
+  const auto failures = std::count_if(cases.begin(), cases.end(), [](const Case& one) { return !one.failure.empty(); });
+  const std::string name = view::escape("takt." + graph);
+  std::string xml = fmt::format(
+      "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuite name=\"{}\" tests=\"{}\" failures=\"{}\" time=\"{}\">\n",
+      name, cases.size(), failures, report["duration_s"].get<double>());
   for (const Case& one : cases) {
-    xml.OpenElement("testcase");
-    xml.PushAttribute("classname", ("takt." + graph + "." + one.suite).c_str());
-    xml.PushAttribute("name", one.name.c_str());
-    if (!one.failure.empty()) {
-      xml.OpenElement("failure");
-      xml.PushAttribute("message", one.failure.c_str());
-      xml.CloseElement();
-    }
-    xml.CloseElement();
+    xml += fmt::format("  <testcase classname=\"{}.{}\" name=\"{}\"", name, one.suite, view::escape(one.name));
+    xml += one.failure.empty()
+               ? "/>\n"
+               : fmt::format(">\n    <failure message=\"{}\"/>\n  </testcase>\n", view::escape(one.failure));
   }
-  xml.CloseElement();
-  return std::string(xml.CStr()) + "\n";
+  return xml + "</testsuite>\n";
 }
 
 }  // namespace takt::command

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <atomic>
-#include <thread>
 
+#include "rt/own_thread.hpp"
 #include "rt/sched/run_board.hpp"
 
 namespace takt::command {
@@ -27,7 +27,7 @@ class LiveTable {
   const std::string title_;
   int drawn_lines_ = 0;
   std::atomic<uint32_t> ended_{0};
-  std::thread thread_;
+  OwnThread thread_;
 };
 
 }  // namespace takt::command

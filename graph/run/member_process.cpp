@@ -99,13 +99,14 @@ void BoardExchange::tell_source(size_t task, const SourcePlan& source) {
   facts.lag_ns = source.lag_ns;
   facts.wait_ns = source.wait_ns;
   facts.unknown = BoundedText<SourceFacts::kLongest>(source.unknown);
+  facts.faults = source.faults;
   facts.known.store(true, std::memory_order_release);
 }
 
 SourcePlan BoardExchange::wait_for_source(size_t task) {
   const SourceFacts& facts = board_.source_facts(task);
   wait_until([&] { return facts.known.load(std::memory_order_acquire); });
-  return {facts.lag_ns, facts.wait_ns, std::string(facts.unknown.text())};
+  return {facts.lag_ns, facts.wait_ns, std::string(facts.unknown.text()), facts.faults};
 }
 
 bool wait_until(const std::function<bool()>& done, const std::function<bool()>& broken,
@@ -150,7 +151,7 @@ int run_member(const MemberPart& part) {
   plan.overheads = part.overheads;
   if (!part.spare) record.reach(ProcessRecord::composed, prepared.clock->now_ns());
   wait_until([&] { return board.carrier().load() != RunBoard::no_carrier; });
-  prepare_process();
+  prepare_process(part.registry);
   std::unique_ptr<Transport> joined;
   without_rights([&] {
     joined = board.carrier().load() == RunBoard::local

@@ -2,7 +2,8 @@
 #pragma once
 #include <chrono>
 #include <functional>
-#include <thread>
+
+#include "rt/own_thread.hpp"
 
 namespace takt::command {
 
@@ -12,7 +13,7 @@ class Periodic {
   Periodic(std::chrono::nanoseconds period, std::function<void()> look);
 
  private:
-  std::jthread thread_;
+  OwnThread thread_;
 };
 
 }  // namespace takt::command

@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <hwy/highway.h>
 
 #include <algorithm>
 #include <iterator>
@@ -63,7 +62,8 @@ Observers observers(const RunOptions& options, const graph::GraphSpec& graph) {
   return {1, followers, kUndisturbedNs};
 }
 
-RunRecord::RunRecord(const RunOptions& options, const Plan& plan) : options_(options) {
+RunRecord::RunRecord(const Registry& registry, const RunOptions& options, const Plan& plan)
+    : registry_(registry), options_(options) {
   std::vector<std::string> names;
   for (const PortPlan& port : plan.ports) names.push_back(port.node + "." + port.port);
   for (const std::string& name : options_.record_ports)
@@ -96,7 +96,7 @@ void RunRecord::begin(const graph::GraphSpec& graph, const Plan& plan, const Run
                 {"isolation", isolation},
                 {"commit", version().commit},
                 {"program", log::program_hash()},
-                {"simd", hwy::TargetName(hwy::SupportedTargets() & -hwy::SupportedTargets())},
+                {"simd", registry_.vectors.names != nullptr ? registry_.vectors.names().front() : ""},
                 {"machine", machine_facts().dump()}};
   const std::string texts[]{log::file_text(graph.file), log::file_text(graph.schedule.file),
                             log::plan_json(plan).dump(), log::asset_hashes(plan, graph.directory).dump()};

@@ -5,12 +5,12 @@
 #include <optional>
 #include <string>
 
-#include "rt/sched/plan_ports.hpp"
 #include "graph/run/run.hpp"
 #include "hal/settings/json.hpp"
 #include "rt/record/mcap/file_sink.hpp"
 #include "rt/record/recorder.hpp"
 #include "rt/sched/executor.hpp"
+#include "rt/sched/plan_ports.hpp"
 
 namespace takt::command {
 
@@ -22,7 +22,7 @@ Observers observers(const RunOptions& options, const graph::GraphSpec& graph);
 class RunRecord {
  public:
   /// Throws std::invalid_argument if --record-port names an output that the plan does not have.
-  RunRecord(const RunOptions& options, const Plan& plan);
+  RunRecord(const Registry& registry, const RunOptions& options, const Plan& plan);
   bool wanted() const { return !options_.record.empty(); }
   /// Before the first job, once the ports have their memory. Throws std::runtime_error if the file cannot be made.
   void begin(const graph::GraphSpec& graph, const Plan& plan, const RunBoard& board, Transport& transport,
@@ -47,6 +47,7 @@ class RunRecord {
   void tell(nlohmann::ordered_json& report) const;
 
  private:
+  const Registry& registry_;
   const RunOptions& options_;
   std::optional<mcap::FileSink> file_;
   Disk make_disk_;

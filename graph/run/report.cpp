@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "graph/attach/parameters.hpp"
+#include "graph/explain/file_format.hpp"
 #include "rt/abi.hpp"
 
 namespace takt::command {
@@ -240,6 +241,7 @@ Json make_report(const RunFacts& facts) {
       {facts.graph, facts.plan, facts.board, facts.proofs, facts.stalls, facts.result, facts.clock == "virtual"});
   for (size_t t = 0; t < facts.plan.tasks.size(); ++t) nodes.push_back(node_json(facts, proofs, t));
   Json report;
+  report["format"] = explain::kReportFormat;
   report["graph"] = facts.graph.name;
   report["schedule"] = facts.graph.schedule.name;
   report["profile"] = facts.graph.profile;

@@ -3,10 +3,10 @@
 #include <sys/types.h>
 
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "hal/settings/json.hpp"
+#include "rt/own_thread.hpp"
 #include "rt/sched/run_board.hpp"
 
 namespace takt::command {
@@ -27,7 +27,7 @@ class RunRights {
 
  private:
   nlohmann::ordered_json read_;
-  std::jthread thread_;  ///< last: it uses all of the above
+  OwnThread thread_;  ///< last: it uses all of the above
 };
 
 }  // namespace takt::command

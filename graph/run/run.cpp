@@ -52,7 +52,7 @@ int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, Ru
   if (!durations) return refuse(durations.error(), kBadInput);
   RunBoard board(composition.plan);
   tell_bounds(graph, composition.plan, proofs, board);
-  RunRecord record(options, composition.plan);
+  RunRecord record(prepared.registry, options, composition.plan);
   faults.disturb_disk(record, *prepared.clock, board);
   const auto transport =
       faults.inject(make_transport(options.transport, composition.plan), composition.plan, *prepared.clock, board);
@@ -174,7 +174,7 @@ int run_in_one_process(const RunOptions& options, Prepared& prepared, RunFaults&
   const auto proofs = admit(options, *prepared.graph, prepared.composition->plan, machine, adjusted);
   if (!proofs) return proofs.error();
   const CpuLatencyHold latency = hold_cpu_dma_latency();
-  std::vector<std::string> lacks = prepare_process();
+  std::vector<std::string> lacks = prepare_process(prepared.registry);
   const bool locked = lacks.empty();
   if (!latency.granted()) lacks.push_back(latency.lacks());
   if (options.require_rt && (!locked || latency.refused()))

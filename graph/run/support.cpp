@@ -16,13 +16,12 @@
 #include <ctime>
 #include <fstream>
 #include <new>
-#include <opencv2/core/utility.hpp>
 
 #include "graph/check/check.hpp"
 #include "graph/check/machine_file.hpp"
+#include "graph/run/junit.hpp"
 #include "graph/run/machine.hpp"
 #include "graph/run/prepare.hpp"
-#include "graph/run/junit.hpp"
 #include "graph/run/report.hpp"
 #include "graph/view/html_report.hpp"
 #include "rt/machine/facts.hpp"
@@ -137,8 +136,8 @@ std::unique_ptr<StallWatch> watch_stalls(const graph::Proofs& proofs, const Plan
   return std::make_unique<StallWatch>(plan, board, stolen_ns);
 }
 
-std::vector<std::string> prepare_process() {
-  cv::setNumThreads(1);
+std::vector<std::string> prepare_process(const Registry& registry) {
+  for (const auto prepare : registry.before_jobs) prepare();
   return prepare_process_memory().lacks;
 }
 

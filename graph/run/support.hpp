@@ -75,7 +75,7 @@ std::unique_ptr<StallWatch> watch_stalls(const graph::Proofs& proofs, const Plan
                                          const RunBoard& board);
 
 /// Memory locked, OpenCV's thread pool off; what was refused.
-std::vector<std::string> prepare_process();
+std::vector<std::string> prepare_process(const Registry& registry);
 
 /// Says why nobody can attach, or which folder was passed over.
 void tell_attach(const attach::Server& server, std::vector<std::string>& adjusted);

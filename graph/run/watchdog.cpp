@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <thread>
 
 #include "rt/capability.hpp"
 #include "rt/supervise/systemd_sink.hpp"
@@ -43,7 +44,7 @@ int64_t RunWatchdog::tick_interval_ns() const {
 }
 
 void RunWatchdog::start() {
-  if (outward_) thread_ = std::thread([this] { loop(); });
+  if (outward_) thread_ = OwnThread([this] { loop(); });
 }
 
 void RunWatchdog::loop() {

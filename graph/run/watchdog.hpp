@@ -2,10 +2,10 @@
 #pragma once
 #include <atomic>
 #include <memory>
-#include <thread>
 #include <vector>
 
 #include "graph/run/run.hpp"
+#include "rt/own_thread.hpp"
 #include "rt/supervise/outward_watchdog.hpp"
 
 namespace takt::command {
@@ -37,7 +37,7 @@ class RunWatchdog {
   std::vector<std::unique_ptr<WatchdogSink>> sinks_;
   std::unique_ptr<OutwardWatchdog> outward_;  ///< null: nobody listens
   std::atomic<bool> ended_{false};
-  std::thread thread_;
+  OwnThread thread_;
 };
 
 }  // namespace takt::command

@@ -18,8 +18,8 @@ struct TerrainOptions {
   uint64_t seed = 1;
 };
 
-/// `takt terrain learn`: from measured maps of each kind of terrain the one that ground_map compares with (algorithm
-/// reference 7.6). 0 done, 2 bad input.
+/// `takt terrain learn`: from measured maps of each kind of terrain the one that ground_map compares with.
+/// 0 done, 2 bad input.
 void add_terrain(CLI::App& app, TerrainOptions& options, int& exit_code);
 
 }  // namespace takt::command

@@ -8,7 +8,7 @@
 namespace takt::base {
 namespace {
 
-constexpr double kSpeed_m_s = 1.4, kAcceleration_m_s2 = 1.35;        // devices.md 5
+constexpr double kSpeed_m_s = 1.4, kAcceleration_m_s2 = 1.35;        // D-5
 constexpr double kTurn_rad_s = 1.2, kTurnAcceleration_rad_s2 = 2.5;  // as the simulated base
 constexpr double kStep_s = static_cast<double>(can::NodeDouble::kStep_ns) * 1e-9;
 /// Where the counters stand when the power comes: soon they wrap.

@@ -10,7 +10,7 @@ namespace {
 
 /// Slower is no motion that the wheels would have to show.
 constexpr double kMoves_m_s = 0.05, kTurns_rad_s = 0.1;
-/// How long a command holds: the base's own watchdog (devices.md 5).
+/// How long a command holds: the base's own watchdog (D-5).
 constexpr int64_t kCommandHolds_ns = 200'000'000;
 
 /// The rim of the outer wheel at full speed in the tightest curve.

@@ -13,7 +13,7 @@ namespace takt::base {
 struct CanBaseSettings {
   std::string interface;
   WheelGeometry wheels{};
-  BaseLimits limits{1.4, 1.35, 1.2};  ///< devices.md 5; the turn rate is our choice
+  BaseLimits limits{1.4, 1.35, 1.2};  ///< D-5; the turn rate is our choice
 };
 
 /// The mobile base on a CAN bus. Odometry is counted here, from the wheels' encoders.

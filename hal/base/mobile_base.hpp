@@ -27,7 +27,7 @@ class MobileBase : public Device {
   virtual BaseReading read(int64_t wanted_ns, int64_t deadline_ns) = 0;
 
   /// Sets the wanted speeds from `at_ns` on. Values beyond the limits are clamped, and false returned. The base stops
-  /// by itself when no command comes for 200 ms (devices.md 5): repeat it every job.
+  /// by itself when no command comes for 200 ms (D-5): repeat it every job.
   virtual bool command(double speed_m_s, double turn_rad_s, int64_t at_ns) = 0;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// From the bytes of a stereo camera's frame to two images: pure functions (devices.md 3).
+// From the bytes of a stereo camera's frame to two images: pure functions (D-3).
 #pragma once
 #include <cstddef>
 #include <cstdint>

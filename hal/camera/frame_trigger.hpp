@@ -16,7 +16,7 @@ struct FrameTriggerSettings {
 };
 
 /// The line that makes a camera expose. It numbers its pulses and knows which of them a frame is of: by the stamps,
-/// since a frame may get lost (devices.md 9). On the thread that owns the camera.
+/// since a frame may get lost (D-9). On the thread that owns the camera.
 class FrameTrigger {
  public:
   struct Pulse {

@@ -11,7 +11,7 @@ namespace takt {
 struct HealthThresholds {
   int step_px = 8;                      ///< one pixel in step_px x step_px is looked at
   int saturated_level = 250;            ///< a pixel at or above is saturated ...
-  double saturated_fraction = 0.05;     ///< ... and more than this makes the frame saturated (algorithms.md 15.4)
+  double saturated_fraction = 0.05;     ///< ... and more than this makes the frame saturated (R-15.4)
   double dark_mean = 20.0;              ///< mean level below which the frame is dark
   double blurred_gradient = 1.5;        ///< mean |I(x+1) - I(x-1)| / 2 below which the frame is blurred or featureless
   double unchanging_difference = 0.25;  ///< mean |I - previous I| below which the frame repeats (a sensor adds noise)

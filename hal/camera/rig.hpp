@@ -15,7 +15,7 @@ struct StereoRig {
   int width = 640, height = 480, channels = 3;
   double hfov_rad = 0;
   double baseline_m = 0;
-  double focal_px = 0, cu_px = 0, cv_px = 0;  ///< f = (W / 2) / tan(hfov / 2); centre of the image (algorithms.md 0.3)
+  double focal_px = 0, cu_px = 0, cv_px = 0;  ///< f = (W / 2) / tan(hfov / 2); centre of the image (R-0.3)
   bool rectified = true;
   std::array<double, 5> distortion{};  ///< k1 k2 p1 p2 k3 (Brown); used only if not rectified
   std::array<double, 3>

@@ -18,16 +18,16 @@ namespace takt::v4l2 {
 
 struct V4l2CameraSettings {
   std::string path;
-  StereoRig rig;             ///< its width and height are those of one eye
-  FrameLayout layout;        ///< format, eyes and mosaic; the rest is the rig's and the device's
-  Rate rate{15, 1};          ///< asked for; the device may give another
-  uint32_t buffers = 4;      ///< asked for, 2..8
-  double exposure_s = 0;     ///< 0: as the device is set
+  StereoRig rig;                  ///< its width and height are those of one eye
+  FrameLayout layout;             ///< format, eyes and mosaic; the rest is the rig's and the device's
+  Rate rate{15, 1};               ///< asked for; the device may give another
+  uint32_t buffers = 4;           ///< asked for, 2..8
+  double exposure_s = 0;          ///< 0: as the device is set
   double longest_exposure_s = 0;  ///< of an automatic exposure; 0: a whole period, as long as it can take
   double transfer_s = 0;          ///< at most, from its end until the frame is here; 0: a whole period
-  double gain = -1;          ///< in the device's own steps; below 0: as it is set
-  double stamp_delay_s = 0;  ///< from the begin of the exposure to the device's stamp
-  bool dmabuf = false;       ///< buffers are exported, and lent until the next frame
+  double gain = -1;               ///< in the device's own steps; below 0: as it is set
+  double stamp_delay_s = 0;       ///< from the begin of the exposure to the device's stamp
+  bool dmabuf = false;            ///< buffers are exported, and lent until the next frame
 };
 
 /// What was lost on the way.
@@ -51,7 +51,7 @@ struct V4l2Counters {
 class V4l2Camera final : public StereoCamera {
  public:
   static constexpr uint32_t kMostBuffers = 8;
-  static constexpr int kIoErrorsToLoss = 3;  ///< in a row (devices.md 8)
+  static constexpr int kIoErrorsToLoss = 3;  ///< in a row (D-8)
 
   /// Without a trigger it runs at its own rate.
   V4l2Camera(std::string id, V4l2CameraSettings settings, std::unique_ptr<VideoDevice> device, const Clock& clock,

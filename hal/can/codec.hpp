@@ -33,7 +33,7 @@ struct Message {
   bool is_protected;
   std::span<const Signal> signals;
 
-  uint16_t data_id() const { return static_cast<uint16_t>(0xA000u | id); }  ///< devices.md 4.2
+  uint16_t data_id() const { return static_cast<uint16_t>(0xA000u | id); }  ///< D-4.2
 };
 constexpr size_t kMostSignals = 20;
 

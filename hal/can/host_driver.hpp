@@ -16,8 +16,8 @@ namespace takt::can {
 template <class Interface, class Reading>
 class HostDriver : public Interface {
  public:
-  static constexpr int64_t kStale_ns = 50'000'000;  ///< older than this a reading is no news (devices.md 4.3)
-  /// Every message of head and base at once, 17 frames of 0.27 ms (devices.md 4.1).
+  static constexpr int64_t kStale_ns = 50'000'000;  ///< older than this a reading is no news (D-4.3)
+  /// Every message of head and base at once, 17 frames of 0.27 ms (D-4.1).
   static constexpr int64_t kBusDelay_ns = 4'600'000;
 
   DeviceResult open() override {

@@ -33,7 +33,7 @@ struct Incoming {
 class Station {
  public:
   static constexpr size_t kMostMessages = 24;
-  static constexpr size_t kMostRestarts = 5;  ///< of a controller in a minute (devices.md 6)
+  static constexpr size_t kMostRestarts = 5;  ///< of a controller in a minute (D-6)
   static constexpr int kMostFrames = 256;     ///< looked at without a pause: a babbling bus does not hold up a job
 
   /// `table` must outlive it.

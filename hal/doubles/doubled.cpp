@@ -175,7 +175,8 @@ tl::expected<Doubled, DeviceError> make_double(const DeviceConfig& config, Setti
   Order order{settings, world, folder, clock, doubled};
   Made made = make_of_kind(order);
   if (settings.error()) return tl::unexpected(*settings.error());
-  auto failures = parse_failures(settings.text("failures", ""), made.device->known());
+  const auto known = made.device->known();
+  auto failures = parse_failures(settings.text("failures", ""), known);
   if (!failures) settings.fail("`failures`: " + failures.error(), "correct `failures`");
   if (settings.error()) return tl::unexpected(*settings.error());
   if (const auto plugged = made.device->plug_in(); !plugged) return tl::unexpected(plugged.error());
@@ -184,7 +185,7 @@ tl::expected<Doubled, DeviceError> make_double(const DeviceConfig& config, Setti
     if (own) own(epoch_ns);
   };
   doubled.thread = std::make_unique<DoubleThread>(config.id, std::move(made.device),
-                                                  FailureSchedule(std::move(*failures)), clock, on_start);
+                                                  FailureSchedule(std::move(*failures), known), clock, on_start);
   return doubled;
 }
 

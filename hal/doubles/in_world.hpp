@@ -13,7 +13,7 @@
 
 namespace takt::doubles {
 
-/// A scanner that is mounted there (yaw only: the world is scanned in a plane), with noise of 5 mm (devices.md 1.9).
+/// A scanner that is mounted there (yaw only: the world is scanned in a plane), with noise of 5 mm (D-1.9).
 RangeSource ranges_in(const sim::Simulation& world, const Transform& sensor_in_robot);
 
 /// The head of the world: acts at once, at the world's accelerations.

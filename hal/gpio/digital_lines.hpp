@@ -13,7 +13,7 @@ struct LinesReading {
 };
 
 /// Digital inputs and outputs (emergency stop, camera trigger). Inputs that stop the robot are active-low, so that a
-/// broken wire stops it (devices.md 9). See Device for the life cycle and the thread rules.
+/// broken wire stops it (D-9). See Device for the life cycle and the thread rules.
 class DigitalLines : public Device {
  public:
   virtual uint32_t count() const = 0;  ///< lines in use, 1..32; valid after open()

@@ -29,7 +29,7 @@ class CameraHead : public Device {
   virtual HeadReading read(int64_t wanted_ns, int64_t deadline_ns) = 0;
 
   /// Sets the target. Angles beyond the limits are clamped, and false returned, so that the caller can report it.
-  /// Heads stop by themselves when commands cease for 100 ms (devices.md 4.3): repeat the target every job.
+  /// Heads stop by themselves when commands cease for 100 ms (D-4.3): repeat the target every job.
   virtual bool command(double pan_rad, double tilt_rad, int64_t at_ns) = 0;
 
   /// Closes the lids before the cameras, or opens them; in force until the next read, so repeat it every job. A head

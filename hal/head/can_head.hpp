@@ -9,7 +9,7 @@
 
 namespace takt::head {
 
-/// devices.md 4.1, less the soft margins: how far, fast and hard the head may be moved.
+/// D-4.1, less the soft margins: how far, fast and hard the head may be moved.
 constexpr HeadLimits kDefaultLimits{118 * kDegree, 43 * kDegree, 200 * kDegree, 150 * kDegree, 1000 * kDegree};
 
 struct CanHeadSettings {

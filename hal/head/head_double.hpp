@@ -23,7 +23,7 @@ void move_axes(const std::optional<std::array<double, 2>>& target_rad, const std
                int64_t now_ns, Axes& axes);
 
 /// The camera head as its host sees it on the bus: the messages of ace_head.dbc in their cycles, the states, limits and
-/// watchdogs of devices.md 4.3, mechanics and eyelids that take their time. Booted it is not homed.
+/// watchdogs of D-4.3, mechanics and eyelids that take their time. Booted it is not homed.
 class HeadDouble final : public can::NodeDouble {
  public:
   static constexpr int64_t kSetpointStale_ns = 100'000'000;

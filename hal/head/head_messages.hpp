@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The camera head's messages (ace_head.dbc, devices.md 4). The identifiers and layouts are this project's own.
+// The camera head's messages (ace_head.dbc, D-4). The identifiers and layouts are this project's own.
 #pragma once
 #include <cstdint>
 #include <numbers>
@@ -27,7 +27,7 @@ enum MessagePlace : size_t {
 };
 std::span<const can::Message> messages();
 constexpr can::NodePlaces kPlaces{16, kNodeCommand, kHostHeartbeat, kHeartbeat};
-constexpr int64_t kStatusCycle_ns = 10'000'000;  ///< GenMsgCycleTime of HEAD_PosStatus (devices.md 4.1)
+constexpr int64_t kStatusCycle_ns = 10'000'000;  ///< GenMsgCycleTime of HEAD_PosStatus (D-4.1)
 
 constexpr double kDegree = std::numbers::pi / 180;
 

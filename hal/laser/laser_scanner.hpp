@@ -32,7 +32,7 @@ class LaserScanner : public Device {
   StampLaw stamp_law(const JobTimes&) const override { return format().stamps; }
 
   /// Writes the newest complete sweep that was not delivered yet: format().beams ranges in metres, 0 for no return and
-  /// for flagged values (dazzled, beyond range; devices.md 1.7). Scanners are free-running: a simulated one has
+  /// for flagged values (dazzled, beyond range; D-1.7). Scanners are free-running: a simulated one has
   /// always just ended a sweep at `wanted_ns`. Returns at the latest at `deadline_ns`.
   virtual ScanReading read(std::span<float> range_m, int64_t wanted_ns, int64_t deadline_ns) = 0;
 };

@@ -9,8 +9,6 @@
 #include <chrono>
 #include <cstring>
 
-#include "hal/device_thread.hpp"
-
 namespace takt {
 namespace {
 
@@ -104,7 +102,7 @@ ScanReading StreamLaser::read(std::span<float> range_m, int64_t wanted_ns, int64
   ScanReading reading;
   if (!started_ || wanted_ns > deadline_ns) return reading;
   if (clock_.is_virtual()) step();
-  else if (!real_time_.load(std::memory_order_relaxed) && in_real_time()) real_time_.store(true);
+  else priority_.follow();
   const uint64_t damaged = damaged_.load(std::memory_order_relaxed) + resyncs_.load(std::memory_order_relaxed);
   if (const Delivery* newest = newest_.take()) {
     const std::vector<float>& range = newest->scan.range_m;
@@ -122,10 +120,8 @@ ScanReading StreamLaser::read(std::span<float> range_m, int64_t wanted_ns, int64
 
 void StreamLaser::work() {
   pthread_setname_np(pthread_self(), ("laser:" + id_).substr(0, 15).c_str());
-  take_priority(false);
-  bool raised = false;
   while (!quit_.load()) {
-    if (!raised && real_time_.load(std::memory_order_relaxed)) take_priority(raised = true);
+    priority_.keep(clock_);
     const int64_t until_ns = step();
     wait_for_bytes(has_line_ ? stream_->descriptor() : -1, until_ns - clock_.now_ns());
   }

@@ -5,6 +5,7 @@
 #include <string>
 #include <thread>
 
+#include "hal/device_thread.hpp"
 #include "hal/laser/laser_session.hpp"
 #include "hal/newest.hpp"
 #include "hal/stream/byte_stream.hpp"
@@ -71,7 +72,8 @@ class StreamLaser final : public LaserScanner {
 
   // Between the threads.
   Newest<Delivery> newest_;
-  std::atomic<bool> connected_{false}, quit_{false}, real_time_{false};
+  std::atomic<bool> connected_{false}, quit_{false};
+  DevicePriority priority_;
   std::atomic<uint64_t> received_{0}, missing_{0}, damaged_{0}, resyncs_{0};
   std::atomic<const char*> trouble_{""};
   uint64_t damage_seen_ = 0;  ///< damaged or resynchronised

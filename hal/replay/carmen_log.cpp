@@ -15,7 +15,7 @@ namespace takt::replay {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-constexpr double kLmsRange_m = 80.0;     // what an LMS 200 can tell in its cm mode (devices.md 1.7)
+constexpr double kLmsRange_m = 80.0;     // what an LMS 200 can tell in its cm mode (D-1.7)
 constexpr double kLatestStamp_s = 4e9;   // int64 ns hold twice as much
 constexpr double kLargestDelay_s = 5.0;  // of a late stamp; more is a clock that was set, or two logs in one file
 constexpr size_t kTrailer = 3;           // ipc_time host logger_time

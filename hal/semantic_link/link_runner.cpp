@@ -9,8 +9,6 @@
 #include <algorithm>
 #include <array>
 
-#include "hal/device_thread.hpp"
-
 namespace takt::semantic_link {
 
 LinkRunner::LinkRunner(std::string name, std::unique_ptr<LinkEnd> end, const Clock& clock)
@@ -46,15 +44,13 @@ void LinkRunner::wake() {
 
 void LinkRunner::poll() {
   if (clock_.is_virtual()) end_->step();
-  else if (!real_time_.load(std::memory_order_relaxed) && in_real_time()) real_time_.store(true);
+  else priority_.follow();
 }
 
 void LinkRunner::work() {
   pthread_setname_np(pthread_self(), ("link:" + name_).substr(0, 15).c_str());
-  take_priority(false);
-  bool raised = false;
   while (!quit_.load()) {
-    if (!raised && real_time_.load(std::memory_order_relaxed)) take_priority(raised = true);
+    priority_.keep(clock_);
     const int64_t wait_ns = end_->step() - clock_.now_ns();
     std::array<pollfd, 2> events{pollfd{bell_.get(), POLLIN, 0}, end_->wait()};
     const timespec time{0, static_cast<long>(std::clamp<int64_t>(wait_ns, 0, 250'000'000))};

@@ -5,6 +5,7 @@
 #include <string>
 #include <thread>
 
+#include "hal/device_thread.hpp"
 #include "hal/semantic_link/link_end.hpp"
 #include "hal/stream/descriptor.hpp"
 
@@ -36,7 +37,8 @@ class LinkRunner {
   const Clock& clock_;
   Descriptor bell_;
   int users_ = 0;
-  std::atomic<bool> quit_{false}, real_time_{false};
+  std::atomic<bool> quit_{false};
+  DevicePriority priority_;
   std::thread thread_;
 };
 

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Installed as <takt/hal/settings/failures.hpp>: hal, experimental.
 #pragma once
+#include <atomic>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <tl/expected.hpp>
@@ -25,12 +27,38 @@ struct FailureWindow {
 tl::expected<std::vector<FailureWindow>, std::string> parse_failures(
     std::string_view text, std::span<const Misbehaviour> known = kCommonFailures);
 
-/// When a device fails. Where windows overlap, the first one counts.
+/// The one fault that somebody has switched on while the graph runs (`takt fault`). Set by the thread of the device's
+/// jobs, read by any.
+class FaultSwitch {
+ public:
+  /// `known`: all that can be switched on; `none` among them is passed over.
+  explicit FaultSwitch(std::span<const Misbehaviour> known) : known_(fault_bits(known)) {}
+  /// See fault_bits().
+  uint32_t known() const { return known_; }
+  /// `none` switches off. False: the device does not know it, and nothing changes.
+  bool set(Misbehaviour fault) {
+    if (fault != Misbehaviour::none && !has(known_, fault)) return false;
+    on_.store(fault, std::memory_order_relaxed);
+    return true;
+  }
+  /// `none`: nothing is switched on.
+  Misbehaviour on() const { return on_.load(std::memory_order_relaxed); }
+
+ private:
+  uint32_t known_;
+  std::atomic<Misbehaviour> on_{Misbehaviour::none};
+};
+
+/// When a device fails. A fault that is switched on counts before all windows; where these overlap, the first one.
 class FailureSchedule {
  public:
-  explicit FailureSchedule(std::vector<FailureWindow> windows) : windows_(std::move(windows)) {}
+  /// `known`: what can be switched on; see FaultSwitch.
+  explicit FailureSchedule(std::vector<FailureWindow> windows, std::span<const Misbehaviour> known = kCommonFailures)
+      : windows_(std::move(windows)), by_hand_(std::make_unique<FaultSwitch>(known)) {}
+  FaultSwitch& by_hand() { return *by_hand_; }
   void begin(int64_t epoch_ns) { epoch_ns_ = epoch_ns; }
   std::optional<Misbehaviour> at(int64_t now_ns) const {
+    if (const Misbehaviour fault = by_hand_->on(); fault != Misbehaviour::none) return fault;
     for (const FailureWindow& window : windows_)
       if (now_ns - epoch_ns_ >= window.from_ns && now_ns - epoch_ns_ < window.to_ns) return window.failure;
     return std::nullopt;
@@ -38,6 +66,7 @@ class FailureSchedule {
 
  private:
   std::vector<FailureWindow> windows_;
+  std::unique_ptr<FaultSwitch> by_hand_;  ///< where it stays while the schedule moves
   int64_t epoch_ns_ = 0;
 };
 

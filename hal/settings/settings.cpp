@@ -78,7 +78,7 @@ Transform Settings::mount(const std::string& name) {
   transform.x = inner.quantity("x", Dimension::length, 0);
   transform.y = inner.quantity("y", Dimension::length, 0);
   transform.z = inner.quantity("z", Dimension::length, 0);
-  // R = Rz(yaw) Rx(pitch) Ry(roll), algorithms.md 0.2.
+  // R = Rz(yaw) Rx(pitch) Ry(roll), R-0.2.
   const double yaw = inner.quantity("yaw", Dimension::angle, 0) / 2,
                pitch = inner.quantity("pitch", Dimension::angle, 0) / 2,
                roll = inner.quantity("roll", Dimension::angle, 0) / 2;

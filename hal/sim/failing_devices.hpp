@@ -35,6 +35,7 @@ class FailingDevice : public Interface {
     return inner_->start(epoch_ns);
   }
   void stop() override { inner_->stop(); }
+  FaultSwitch* faults() override { return &schedule_.by_hand(); }
   bool restart(int64_t now_ns) override { return plugged_ = schedule_.at(now_ns) != Misbehaviour::unplugged; }
 
  protected:

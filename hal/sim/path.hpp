@@ -7,7 +7,7 @@
 
 namespace takt::sim {
 
-/// Pose and speed of the robot; theta is the driving direction from the map's x axis (algorithms.md 21.9).
+/// Pose and speed of the robot; theta is the driving direction from the map's x axis (C-9).
 struct RobotState {
   double x_m = 0, y_m = 0, theta_rad = 0;
   double speed_m_s = 0, turn_rad_s = 0;

@@ -18,14 +18,14 @@ struct PendingCommand {
 
 /// A command acts so long after it was given. Everything up to that horizon is therefore settled before it happens.
 constexpr int64_t kLatencyNs = 100'000'000;
-/// m, m/s, m/s^2 (algorithms.md 13).
+/// m, m/s, m/s^2.
 constexpr double kFootprintRadius = 0.48, kMaxSpeed = 1.4, kMaxAcceleration = 1.35;
 
 /// One robot of a world: base and head over time. Either has one writer, the driver that owns it, and lock-free
 /// readers.
 class Robot {
  public:
-  static constexpr int64_t kWatchdogNs = 200'000'000;  ///< base stops without commands (devices.md 5)
+  static constexpr int64_t kWatchdogNs = 200'000'000;  ///< base stops without commands (D-5)
 
   /// `index`: which client of the stage's world it is. The stage must outlive it.
   Robot(const Stage& stage, size_t index);
@@ -66,7 +66,7 @@ class Robot {
   uint32_t base_command_count_ = 0, head_command_count_ = 0;
 };
 
-/// x, y, theta moved along an exact arc (algorithms.md 13).
+/// x, y, theta moved along an exact arc.
 void integrate_arc(double speed_m_s, double turn_rad_s, double dt_s, double& x_m, double& y_m, double& theta_rad);
 
 }  // namespace takt::sim

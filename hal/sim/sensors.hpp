@@ -16,7 +16,7 @@ struct LaserModel {
   double fov_rad = 3.14159265358979323846;
   double max_range_m = 8.0;
   double sigma_m = 0.01;
-  double sweep_s = 0.00666;  ///< half a turn at 75 Hz (devices.md 1.9)
+  double sweep_s = 0.00666;  ///< half a turn at 75 Hz (D-1.9)
   Transform sensor_in_robot;
 };
 

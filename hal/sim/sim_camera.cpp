@@ -7,7 +7,6 @@
 #include <chrono>
 #include <cstring>
 
-#include "hal/device_thread.hpp"
 #include "hal/sim/random.hpp"
 
 namespace takt::sim {
@@ -99,7 +98,7 @@ void SimCamera::request(int64_t at_ns, Request& into) const {
 void SimCamera::trigger(int64_t at_ns) {
   starting_ = starting_ && at_ns - clock_.now_ns() < std::min(kLatestStartNs, settings_.rate.release_ns(0, 1) / 2);
   triggered_ns_ = at_ns;
-  if (!real_time_.load(std::memory_order_relaxed) && in_real_time()) real_time_.store(true, std::memory_order_relaxed);
+  priority_.follow();
   ever_triggered_ = true;
   has_trigger_ = !starting_;
   ++triggers_;
@@ -111,15 +110,14 @@ void SimCamera::trigger(int64_t at_ns) {
 
 void SimCamera::work() {
   pthread_setname_np(pthread_self(), ("sim:" + id_).substr(0, 15).c_str());
-  take_priority(false);  // frames that come late for it are drawn by read()
-  bool raised = false;
   const StereoRig& rig = settings_.rig;
   uint32_t seen = 0;
+  priority_.keep(clock_);  // frames that come late for it are drawn by read()
   for (;;) {
     asked_.wait(seen, std::memory_order_acquire);
     if (quit_.load()) return;
     seen = asked_.load(std::memory_order_acquire);
-    if (!raised && real_time_.load(std::memory_order_relaxed)) take_priority(raised = true);
+    priority_.keep(clock_);
     const int64_t at_ns = asked_at_ns_.load(std::memory_order_relaxed);
     wait_until_settled(at_ns, seen);
     if (quit_.load()) return;

@@ -8,6 +8,7 @@
 
 #include "hal/camera/rig.hpp"
 #include "hal/camera/stereo_camera.hpp"
+#include "hal/device_thread.hpp"
 #include "hal/sim/lens.hpp"
 #include "hal/sim/simulation.hpp"
 #include "rt/time/clock.hpp"
@@ -90,7 +91,8 @@ class SimCamera final : public StereoCamera {
   std::atomic<int64_t> asked_at_ns_{0};
   Request made_, wanted_;
   std::atomic<uint32_t> asked_{0}, done_{0};
-  std::atomic<bool> quit_{false}, real_time_{false};
+  std::atomic<bool> quit_{false};
+  DevicePriority priority_;
   std::thread worker_;
   CostCounter cost_;
 };

@@ -10,7 +10,7 @@ namespace takt::sim {
 
 /// A perception that knows the truth, as far as it is told to tell it.
 struct PerceptionModel {
-  double fov_rad = 1.1519, range_m = 5;  ///< algorithms.md 13
+  double fov_rad = 1.1519, range_m = 5;  ///< R-13
   double sigma_m = 0;                    ///< of a place, along each level axis
   double miss = 0;                       ///< probability that an object in view is not reported
   double unknown = 0;                    ///< probability that an attribute in view is not

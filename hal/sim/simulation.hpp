@@ -89,7 +89,7 @@ class Simulation {
   /// Where the object is, in the map; a carried one is where its robot is. Nothing: there is none, or it is away.
   std::optional<Vec2> position(std::string_view object, int64_t at_ns) const;
 
-  /// Whether an object is within the robot's field of view, and nothing hides it (algorithms.md 13). `snapshot` is
+  /// Whether an object is within the robot's field of view, and nothing hides it. `snapshot` is
   /// that of the instant; `placed` is where the object then stands, if it is seen.
   bool sees(size_t object, int64_t at_ns, double fov_rad, double range_m, const Snapshot& snapshot,
             Placed& placed) const;

@@ -26,7 +26,7 @@ struct Whereabouts {
   double yaw_rad = 0;
 };
 
-/// The state of a world's objects over time (algorithms.md 10.4): what the world began with, what its events changed,
+/// The state of a world's objects over time: what the world began with, what its events changed,
 /// and what each robot's actions did. One writer per robot, lock-free readers. All that a variable can become is
 /// numbered at the beginning, so that nothing allocates later. Instants count from the epoch of the run.
 class States {

@@ -105,7 +105,7 @@ struct RoleMove {
   std::string role, to;
 };
 
-/// How near the robot's centre must be to everything that an action is about, m (algorithms.md 13).
+/// How near the robot's centre must be to everything that an action is about, m.
 constexpr double kReach = 0.8;
 
 struct WorldAction {
@@ -134,7 +134,7 @@ struct WorldEvent {
   double yaw_rad = 0;
 };
 
-/// The simulated world (algorithms.md section 13) as it begins, and what can happen in it; what has happened is in a
+/// The simulated world as it begins, and what can happen in it; what has happened is in a
 /// Stage.
 struct World {
   std::string name;
@@ -159,7 +159,7 @@ tl::expected<Bitmap, std::string> parse_rows(const std::string& text, double cel
 /// Floor, ceiling, walls (one rectangle for each straight run of cell borders), and the objects as they begin.
 Scene build_scene(const World& world, std::shared_ptr<const TextureSet> textures);
 
-/// Of a robot as others see it, m (algorithms.md 13).
+/// Of a robot as others see it, m.
 constexpr double kRobotLength = 0.78, kRobotWidth = 0.56;
 
 /// Names of all terrains under a robot's outline, looked at every 0.1 m at most: "crossing, floor".

@@ -253,7 +253,7 @@ void Segmentation::grow() {
   }
 }
 
-/// Validation of a cluster before the fit (algorithm reference 4.1).
+/// Validation of a cluster before the fit.
 bool Segmentation::plausible(size_t label) const {
   int count = 0;
   double x = 0, y = 0, z = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which points of a cloud could be persons (thesis Sec. 3.3.2, 3.3.4; algorithm reference 3.1, 3.2, 4.1). Floor frame:
+// Which points of a cloud could be persons (thesis Sec. 3.3.2, 3.3.4; ). Floor frame:
 // z up, floor z = 0. Seeds are heads: peaks of the scene seen from above that are as wide as a head.
 #pragma once
 #include <cstdint>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What vision is for at present, and who drives then (thesis App. A; algorithm reference 15.4).
+// What vision is for at present, and who drives then (thesis App. A; ).
 #pragma once
 #include <array>
 #include <cstdint>

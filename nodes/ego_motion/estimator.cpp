@@ -150,7 +150,7 @@ Estimate MotionEstimator::estimate(std::span<const Observation> all, const Optic
       const auto planar = planar_least_squares(all, optics, p_.form);
       if (!planar) return e;
       e.T = to_rigid(*planar);
-      // The linear T is off for large turns: finish with the exact rotation (algorithm reference, 8.2).
+      // The linear T is off for large turns: finish with the exact rotation.
       const bool large = std::abs(planar->alpha_rad) > 0.05 && p_.form == Form::multiplied;
       if (large && !solve(all_, use_.data(), false, 2, e.T)) return e;
     } else if (!solve(all_, use_.data(), false, 10, e.T = start)) {

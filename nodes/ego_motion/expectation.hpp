@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What motion is to be expected before the images are compared, and how far it may be off: the answer where they say
-// nothing (algorithm reference 8.2, step 6).
+// nothing (R-8.2, step 6).
 #pragma once
 #include <cstdint>
 #include <optional>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // How far the verdict on a pixel can be trusted: blooming and hard shadow borders look like the end of the floor
-// (thesis Sec. 4.2.1, limits; algorithm reference 7.7).
+// (thesis Sec. 4.2.1, limits; ).
 #pragma once
 #include <array>
 #include <cstdint>

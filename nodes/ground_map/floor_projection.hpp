@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// From pixels to the flat floor and back (thesis Eq. 4.5 - 4.8, in the exact form of algorithm reference 7.5 and for
+// From pixels to the flat floor and back (thesis Eq. 4.5 - 4.8, in the exact form of and for
 // any pose of the camera).
 #pragma once
 #include <array>

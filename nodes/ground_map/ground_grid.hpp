@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// From the mask of one image to cells, and from many images to an occupancy grid (thesis Sec. 4.2.2, 4.2.3; algorithm
-// reference 7.5).
+// From the mask of one image to cells, and from many images to an occupancy grid (thesis Sec. 4.2.2, 4.2.3; ).
 #pragma once
 #include <cstdint>
 #include <span>
@@ -19,7 +18,7 @@ constexpr int16_t kFree = 0, kOccupied = 1000, kUnknown = Grid::unknown;
 enum class Votes : uint8_t {
   columns,  ///< image columns: free where one runs through the cell on ground, blocked where its ground ends in the
             ///< cell
-  pixels,   ///< ground pixels for free, first pixels that are not for blocked (algorithm reference 7.5)
+  pixels,   ///< ground pixels for free, first pixels that are not for blocked (R-7.5)
 };
 
 struct GridParameters {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whether a low laser scanner sees something standing in the reference area (thesis Sec. 4.2.1; algorithm
-// reference 7.1).
+// Whether a low laser scanner sees something standing in the reference area (thesis Sec. 4.2.1; ).
 #pragma once
 #include "nodes/ground_map/floor_projection.hpp"
 #include "nodes/ground_map/texture.hpp"

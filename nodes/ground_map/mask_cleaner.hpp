@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Clean-up of the mask of single pixels (thesis Sec. 4.2.1; algorithm reference 7.5): box average, then only what hangs
+// Clean-up of the mask of single pixels (thesis Sec. 4.2.1; ): box average, then only what hangs
 // together with the reference area.
 #pragma once
 #include <cstdint>

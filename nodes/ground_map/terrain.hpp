@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the floor around the robot is like, from the occupancy grid: the cells around it, heading up, are compared with
-// a learnt map of each kind, and counters decide (algorithm reference 7.6).
+// a learnt map of each kind, and counters decide.
 #pragma once
 #include <array>
 #include <cstdint>

@@ -83,7 +83,7 @@ void TextureMemory::add(const Descriptor& descriptor) {
 }
 
 // Every rectangle of weight w is four corners of a difference image; its two-dimensional prefix sum holds at each
-// (s, v) the weights of all rectangles around it (algorithm reference 7.4).
+// (s, v) the weights of all rectangles around it.
 void TextureMemory::rebuild() {
   std::fill(sums_.begin(), sums_.end(), 0);
   const auto corner = [&](int s, int v) -> int32_t& {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The texture of the floor before the robot: reference area, descriptor of one frame, memory of many (thesis
-// Sec. 4.2.1; algorithm reference 7.1 - 7.4).
+// Sec. 4.2.1; R-7.1 - R-7.4).
 #pragma once
 #include <array>
 #include <cstdint>
@@ -34,7 +34,7 @@ class ReferenceArea {
   int64_t pixels_ = 0;
 };
 
-/// Pixels of the reference area for which t_m is meant: that of a 640 x 480 image (algorithm reference 21.7).
+/// Pixels of the reference area for which t_m is meant: that of a 640 x 480 image (C-7).
 constexpr int64_t kDefaultAreaPx = 24576;
 
 /// Inclusive ranges of saturation and value.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // When the lids before the cameras are closed: against the sun, and for a moment while somebody deals with the robot
-// (thesis App. A; algorithm reference 15.4).
+// (thesis App. A; ).
 #pragma once
 #include <cstdint>
 #include <optional>

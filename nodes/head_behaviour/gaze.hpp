@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whom the robot looks at, and how its head must stand for that (thesis App. A; algorithm reference 15.4).
+// Whom the robot looks at, and how its head must stand for that (thesis App. A; ).
 #pragma once
 #include <optional>
 #include <span>

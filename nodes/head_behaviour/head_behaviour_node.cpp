@@ -98,7 +98,7 @@ class HeadBehaviourNode final : public Node {
   Param<double> blink_every_{this,         "blink_every", BlinkParameters{}.every_s,
                              {0.0, 600.0}, "s",           "while there is a partner, on average; 0: never"};
   Param<double> blink_{this,        "blink", BlinkParameters{}.closed_s,
-                       {0.05, 5.0}, "s",     "how long a blink's lid is told shut"};
+                       {0.05, 5.0}, "s",     "how long a blink commands the lid shut"};
 
   std::optional<Gaze> gaze_;
   SunGuard sun_;

@@ -11,7 +11,7 @@ namespace takt::laser_fusion {
 using ego_motion::Rigid;
 
 /// x, y, z (m); yaw Psi about z, pitch Theta about x, roll Phi about y (rad): R = Rz(Psi) Rx(Theta) Ry(Phi)
-/// (thesis Fig. 4.11; order of the algorithm reference 0.2).
+/// (thesis Fig. 4.11; order of ).
 using PoseParameters = std::array<double, 6>;
 enum Parameter : uint8_t { kX, kY, kZ, kYaw, kPitch, kRoll };
 

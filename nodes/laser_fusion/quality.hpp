@@ -11,7 +11,7 @@
 
 namespace takt::laser_fusion {
 
-/// truncated: mean of min(d, cut) over the fixed points, m; pairs are at most cut apart (algorithm reference 21.4).
+/// truncated: mean of min(d, cut) over the fixed points, m; pairs are at most cut apart (C-4).
 /// thesis: Eq. 4.18, 1..4 and above; pairs are at most half the range of all distances apart (E-28), which lets wrong
 /// poses score better than the true one.
 enum class Metric : uint8_t { truncated, thesis };

@@ -8,7 +8,7 @@
 
 namespace takt::laser_fusion {
 
-/// Fewer pairs than this determine no pose one could trust (algorithm reference 21.4).
+/// Fewer pairs than this determine no pose one could trust (C-4).
 constexpr size_t kLeastPairs = 6;
 
 /// What the fit needs to know of pairs (p1, p2), p1 = R p2 + t but for noise.

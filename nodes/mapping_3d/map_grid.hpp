@@ -20,7 +20,7 @@ struct GridView {
 GridView view_of(const Grid& grid);
 
 /// Adds another grid of the same map frame, wherever and however finely it lies and is turned: unknown yields to known,
-/// otherwise the larger counts (algorithm reference 8.4, 15.6).
+/// otherwise the larger counts.
 void fuse(const GridView& other, Grid& into);
 
 /// A grid with memory of its own, for maps in files.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One depth image from several views (thesis Alg. 4.1 as repaired in algorithm reference 8.3, E-26, and 21.3): of each
+// One depth image from several views (thesis Alg. 4.1 as repaired in, E-26, and C-3): of each
 // pixel the nearest depth that other views contradict no more often than they see something there or nearer.
 #pragma once
 #include <algorithm>
@@ -16,7 +16,7 @@ namespace takt::mapping_3d {
 struct FusionParameters {
   double steps = 1;       ///< depths are alike within so many disparity steps (Z^2 / (f B)) ...
   double least_m = 0.01;  ///< ... and within this
-  bool refine = true;     ///< at the end the median of the depths alike (21.3): without, the result lies too near
+  bool refine = true;     ///< at the end the median of the depths alike (C-3): without, the result lies too near
   int support = 2;        ///< a depth that fewer views saw is dropped; with as few views: all of them
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Obstacles around the robot from a point cloud (thesis Sec. 4.3.4; algorithm reference 8.4).
+// Obstacles around the robot from a point cloud (thesis Sec. 4.3.4; ).
 // Robot frame: x right, y forward, z up, floor z = 0.
 #pragma once
 #include <array>

@@ -42,7 +42,7 @@ inline bool is_known(const Transform& t) {
 Transform turned_by_head(const Transform& at_rest, double pan_rad, double tilt_rad);
 
 /// The robot frame in the odometry frame: theta is the driving direction, which is the robot's y axis, so that its x
-/// axis points to theta - 90 degrees (algorithm reference 21.9).
+/// axis points to theta - 90 degrees (C-9).
 Transform robot_in_odometry(const Odometry& odometry);
 
 }  // namespace takt::mapping_3d

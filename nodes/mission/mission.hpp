@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The robot finds its way through a town by asking (thesis App. A; algorithm reference 15.4, 15.5): asks a pedestrian,
+// The robot finds its way through a town by asking (thesis App. A; ): asks a pedestrian,
 // reads where he points, drives that way on the pavement, stops before a crossing, follows whoever wears the chessboard
 // across it, and drives on. Plain data, one step a job.
 #pragma once
@@ -27,7 +27,7 @@ struct MissionParameters {
   double stop_before_m = 3.5;  ///< so far from the sign of a crossing the robot waits
   double cross_least_m = 3;    ///< no crossing is narrower; behind its sign
   double stand_s = 3;          ///< whoever is followed so far and stands so long has led across
-  double leader_after_s = 4;  ///< standing without whoever leads in sight, the robot looks elsewhere
+  double leader_after_s = 4;   ///< standing without whoever leads in sight, the robot looks elsewhere
   double follow_within_s = 120;
   double patience_s = 30;  ///< without getting on along the direction
   int crossings = 1;       ///< on the way

@@ -191,12 +191,12 @@ class MissionNode final : public Node {
   Output<TextStatus> wanted_{this, "wanted", "search, pose or tracking, for drive_arbiter; with every job"};
   Output<Requests> requests_{this, "requests", "nodes that this state of vision does not need; with every job"};
   Output<TextStatus> status_{this, "status", "one line: state, task or trouble, crossings, direction"};
-  Param<std::string> pedestrian_{this, "pedestrian", "human", "", "type of whoever can be asked"};
+  Param<std::string> pedestrian_{this, "pedestrian", "human", "", "type of those that can be asked"};
   Param<std::string> search_nodes_{this, "search_nodes", "", "", "nodes that run in the state search only"};
   Param<std::string> pose_nodes_{this, "pose_nodes", "", "", "nodes that run in the state pose only"};
   Param<std::string> tracking_nodes_{this, "tracking_nodes", "", "", "nodes that run in the state tracking only"};
   Param<double> view_{this,       "view", MissionParameters{}.view_m,
-                      {0.0, 5.0}, "m",    "from so far off all of whoever was asked is seen; nearer, it steps back"};
+                      {0.0, 5.0}, "m",    "from so far off the whole person asked is seen; nearer, it steps back"};
   Param<int> readings_{this, "readings", 8, {1, kMostReadings}, "", "of his arm, until the direction counts"};
   Param<double> stop_before_{this,        "stop_before", MissionParameters{}.stop_before_m,
                              {0.5, 20.0}, "m",           "so far from the sign of a crossing it waits"};

@@ -12,7 +12,7 @@ struct Cell {
   bool operator==(const Cell&) const = default;
 };
 
-/// Cells 0 free .. 1000 occupied, -1 unknown (algorithm reference 0.4, 21), those of row 0 with the least y; axes of
+/// Cells 0 free .. 1000 occupied, -1 unknown (E-21), those of row 0 with the least y; axes of
 /// the map frame. Cell (column, row) covers origin + (column, row) * cell_m.
 struct OccupancyView {
   ImageView<const int16_t> cells;
@@ -28,7 +28,7 @@ struct OccupancyView {
   double middle_y_m(const Cell& cell) const { return origin_y_m + (cell.row + 0.5) * cell_m; }
 };
 
-/// More than this is occupied (algorithm reference 15.3).
+/// More than this is occupied.
 constexpr int16_t kHalfOccupied = 500;
 constexpr int16_t kUnknownCell = -1;
 

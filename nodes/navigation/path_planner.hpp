@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The cheapest way over an occupancy grid (algorithm reference 15.3; the thesis names the block and prints no
+// The cheapest way over an occupancy grid (R-15.3; the thesis names the block and prints no
 // algorithm): A* over 8 neighbours, obstacles grown by the robot's radius.
 #pragma once
 #include <cmath>

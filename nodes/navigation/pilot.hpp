@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The behaviours of the base (thesis App. A; algorithm reference 15.4): drive along a way to a place, rotate, drive
+// The behaviours of the base (thesis App. A; ): drive along a way to a place, rotate, drive
 // straight ahead; speeds and accelerations within limits.
 #pragma once
 #include <optional>
@@ -33,7 +33,7 @@ struct Velocity {
 
 enum class Behaviour : uint8_t { stand, drive_to, rotate, straight_ahead };
 
-/// Poses: theta is the driving direction from the map's x axis (algorithm reference 21.9). Memory is taken by the
+/// Poses: theta is the driving direction from the map's x axis (C-9). Memory is taken by the
 /// constructor. One thread at a time.
 class Pilot {
  public:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What an object is like (thesis Sec. 3.3.3; algorithm reference 3.3): spatial, topological and colour attributes of
+// What an object is like (thesis Sec. 3.3.3; ): spatial, topological and colour attributes of
 // the points that one viewpoint shows of it.
 #pragma once
 #include <array>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// From attributes to a class, or to "unknown" (algorithm reference 3.4, 3.5). Everything is learnt by the constructor;
+// From attributes to a class, or to "unknown". Everything is learnt by the constructor;
 // classify() allocates nothing. One thread at a time.
 #pragma once
 #include <memory>

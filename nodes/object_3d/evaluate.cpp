@@ -23,7 +23,7 @@ double pct(size_t part, size_t whole) {
   return whole == 0 ? 0 : 100.0 * static_cast<double>(part) / static_cast<double>(whole);
 }
 
-/// Extents along the principal horizontal axes, as algorithm reference 3.3 has them.
+/// Extents along the principal horizontal axes, as has them.
 std::pair<double, double> extents_by_axes(const Scene& scene, std::span<const uint32_t> points) {
   const mapping_3d::Affine mount = mapping_3d::to_affine(scene.sensor_in_robot);
   std::vector<Eigen::Vector2d> flat;

@@ -152,7 +152,7 @@ class Object3dNode final : public Node {
   Param<double> reach_up_{this, "reach_up", 0.35, {0.0, 5.0}, "m", "of the cylinder above its seed"};
   Param<double> reach_down_{this, "reach_down", 0.6, {0.0, 5.0}, "m", "of the cylinder below its seed"};
   Param<int> points_min_{this, "points_min", 60, {3, 100'000}, "", "points of an object"};
-  Param<double> beside_{this, "beside", 0.10, {0.0, 5.0}, "m", "gap between two things beside one another"};
+  Param<double> beside_{this, "beside", 0.10, {0.0, 5.0}, "m", "gap between two things side by side"};
   Param<std::string> training_{this, "training", "", kPath, "file with what to learn from; empty: all are unknown"};
   Choice classifier_kind_{this,
                           "classifier",

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// From one seed to the points of its object (thesis Alg. 3.2, indices repaired, E-07; algorithm reference 3.2): what
+// From one seed to the points of its object (thesis Alg. 3.2, indices repaired, E-07; ): what
 // hangs together point by point and lies within reach of the seed.
 #pragma once
 #include <cmath>

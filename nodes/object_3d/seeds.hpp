@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where regions begin (algorithm reference 3.1): components of a colour, the boxes of a detector. Both work on the
+// Where regions begin: components of a colour, the boxes of a detector. Both work on the
 // pixels of a cloud.
 #pragma once
 #include <optional>

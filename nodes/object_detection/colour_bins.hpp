@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Image preparation of the stages that look at colour: each pixel's indices I_ch (algorithm reference 6.1, bins after
-// 21.7) and I_cch.
+// Image preparation of the stages that look at colour: each pixel's indices I_ch (R-6.1, bins after
+// C-7) and I_cch.
 #pragma once
 #include <cstddef>
 #include <cstdint>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // First stage of the histogram cascade: the colour histogram of every search window against those of all references
-// (thesis Sec. 3.4.2; algorithm reference 6.1, 6.2, 6.5).
+// (thesis Sec. 3.4.2; ).
 #pragma once
 #include <cstdint>
 #include <span>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pairs of pixels by their colours and their distance (thesis Sec. 3.4.2; algorithm reference 6.4).
+// Pairs of pixels by their colours and their distance (thesis Sec. 3.4.2; ).
 #pragma once
 #include <cstddef>
 #include <cstdint>

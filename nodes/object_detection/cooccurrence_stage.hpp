@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Third stage of the histogram cascade: colour co-occurrences of the windows that passed the first two (thesis Sec.
-// 3.4.2; algorithm reference 6.4, 6.5).
+// 3.4.2; ).
 #pragma once
 #include <cstdint>
 #include <span>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The object database: a folder with a list, objects.txt, and the reference views it names (algorithm reference 6.8).
+// The object database: a folder with a list, objects.txt, and the reference views it names.
 #pragma once
 #include <array>
 #include <cstdint>

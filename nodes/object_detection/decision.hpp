@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the errors of a stage mean: which windows pass, and which objects are there (thesis Eq. 3.18, in the OR form of
-// algorithm reference 6.7).
+//
 #pragma once
 #include <algorithm>
 #include <cstdint>

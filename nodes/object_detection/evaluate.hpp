@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How much the first stage excludes and what it misses, on generated scenes (algorithm reference 6.10: 75 - 80 % of the
+// How much the first stage excludes and what it misses, on generated scenes (R-6.10: 75 - 80 % of the
 // windows in the original).
 #pragma once
 #include <cstdint>

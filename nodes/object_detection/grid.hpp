@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where the search windows lie (thesis Eq. 3.16, 3.17, corrected: algorithm reference 6.6 and 21.8).
+// Where the search windows lie (thesis Eq. 3.16, 3.17, corrected: and C-8).
 #pragma once
 #include <cstddef>
 

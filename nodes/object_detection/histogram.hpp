@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Histograms of reference views and their comparison, in the obvious form (thesis Sec. 3.4.2; algorithm reference 6.2 -
+// Histograms of reference views and their comparison, in the obvious form (thesis Sec. 3.4.2; R-6.2 -
 // 6.5, 6.8). The search over windows is in the stages.
 #pragma once
 #include <cstdint>
@@ -45,11 +45,11 @@ uint32_t missing_mass(std::span<const uint32_t> window, std::span<const uint32_t
 /// The same over the reference's mass: 0 = all found, 1 = nothing found; 0 for a reference without mass.
 double intersection_error(const Histogram& window, const Histogram& reference);
 
-/// Largest thresholds that automatic_threshold gives: of colours, orientations, and co-occurrences, which lose more. Those
-/// of the algorithm reference (0.6 in 6.8, 0.75 in 21.7) are for views compared with at their full size.
+/// Largest thresholds that automatic_threshold gives: of colours, orientations, and co-occurrences, which lose more.
+/// Those of others (0.6 in, 0.75 in C-7) are for views compared with at their full size.
 constexpr double kColourCap = 0.5, kOrientationCap = 0.5, kCooccurrenceCap = 0.64;
 /// Start value of an object's threshold: 1.25 times the 90 % quantile (nearest rank) of the error of every view against
-/// every other view of the object (algorithm reference 6.8), and `tolerance` on top, at most `cap`, which is also the
+/// every other view of the object, and `tolerance` on top, at most `cap`, which is also the
 /// value for a single view. The views say nothing of what a scene takes away: an occlusion of a share q takes about q
 /// of the reference's mass (6.8); that is the tolerance. Of pairs of pixels both must be seen: there it is
 /// 1 - (1 - q)^2.

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Image preparation of the second stage: each pixel's orientation index I_hog (thesis Eq. 3.12, 3.13; algorithm
-// reference 6.3).
+// Image preparation of the second stage: each pixel's orientation index I_hog (thesis Eq. 3.12, 3.13; ).
 #pragma once
 #include <cstddef>
 #include <cstdint>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Second stage of the histogram cascade: histograms of oriented gradients of the windows that passed the first one
-// (thesis Sec. 3.4.2; algorithm reference 6.3, 6.5).
+// (thesis Sec. 3.4.2; ).
 #pragma once
 #include <cstdint>
 #include <span>

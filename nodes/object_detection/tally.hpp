@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What detections are worth, against scenes whose objects are known (algorithm reference 6.10).
+// What detections are worth, against scenes whose objects are known.
 #pragma once
 #include <array>
 #include <cstddef>

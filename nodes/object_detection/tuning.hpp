@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Thresholds from images with and without an object (algorithm reference 6.8: "per object and stage, by experiment").
+// Thresholds from images with and without an object (R-6.8: "per object and stage, by experiment").
 #pragma once
 #include <array>
 #include <span>

@@ -127,7 +127,7 @@ class ObjectLocatorNode final : public Node {
     return false;
   }
 
-  static constexpr int64_t kFarthest_ns = 250'000'000;  ///< from an image to its disparities (algorithm reference 14.3)
+  static constexpr int64_t kFarthest_ns = 250'000'000;  ///< from an image to its disparities (R-14.3)
 
   Input<Detections> detections_{this, "detections", "boxes in the left image; class_id as `database` counts"};
   Input<DisparityMap> disparity_{this, "disparity", "the one nearest in time is used, at most 0.25 s away; depth 4"};

@@ -126,7 +126,7 @@ class ObstacleStopNode final : public Node {
     const Odometry* odometry = present_odometry();
     if (!odometry || !std::isfinite(odometry->x_m + odometry->y_m + odometry->theta_rad)) return std::nullopt;
     const double since_s = static_cast<double>(at_ns - odometry_.stamp_ns()) * 1e-9;
-    // The robot drives along its y axis, whose direction an odometry gives (algorithm reference 21.9).
+    // The robot drives along its y axis, whose direction an odometry gives (C-9).
     return compose({odometry->x_m, odometry->y_m, odometry->theta_rad - std::numbers::pi / 2},
                    {0, odometry->speed_m_s * since_s, odometry->turn_rad_s * since_s});
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How the robot follows a person (algorithm reference 15.5).
+// How the robot follows a person.
 #pragma once
 #include <algorithm>
 #include <cmath>

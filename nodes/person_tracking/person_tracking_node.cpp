@@ -213,7 +213,8 @@ class PersonTrackingNode final : public Node {
   Param<double> distance_{this, "distance", FollowerParameters{}.distance_m, {0.3, 10.0}, "m", "that the robot keeps"};
   Param<double> speed_gain_{this,        "speed_gain", FollowerParameters{}.speed_gain,
                             {0.0, 10.0}, "1",          "m/s per metre too far"};
-  Param<double> turn_gain_{this, "turn_gain", FollowerParameters{}.turn_gain, {0.0, 10.0}, "1", "rad/s per rad beside"};
+  Param<double> turn_gain_{this,        "turn_gain", FollowerParameters{}.turn_gain,
+                           {0.0, 10.0}, "1",         "rad/s per rad off the direction"};
   Param<double> speed_max_{this, "speed_max", FollowerParameters{}.speed_max_m_s, {0.0, 2.0}, "m/s", "limit"};
   Param<double> turn_max_{this, "turn_max", FollowerParameters{}.turn_max_rad_s, {0.0, 3.0}, "rad/s", "limit"};
   Param<double> reverse_max_{this,       "reverse_max", FollowerParameters{}.reverse_max_m_s,

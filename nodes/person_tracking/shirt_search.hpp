@@ -16,7 +16,7 @@ struct ExpectedBoard {
   double width_px = 0, height_px = 0, square_px = 0;
 };
 
-/// The expected box, enlarged by half (algorithm reference 15.5).
+/// The expected box, enlarged by half.
 Region region_around(const ExpectedBoard& expected);
 
 class ShirtSearch {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A task as the searches see it: state variables with numbered values, actions with all roles filled, places to drive
-// to (thesis Sec. 5.2.4; algorithm reference 12.1). Only what can matter for the goals is in it, so that a task in a
+// to (thesis Sec. 5.2.4; ). Only what can matter for the goals is in it, so that a task in a
 // large network stays small. Built when a goal comes and not in a job: these functions allocate.
 #pragma once
 #include <functional>

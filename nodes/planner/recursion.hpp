@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The thesis's recursive search (Alg. 5.1, corrected: algorithm reference 12.2): goal by goal the action that is
-// cheapest with what it requires first. Quick and not optimal (21.6).
+// The thesis's recursive search (Alg. 5.1, corrected: ): goal by goal the action that is
+// cheapest with what it requires first. Quick and not optimal (C-6).
 #pragma once
 #include "nodes/planner/plan.hpp"
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The plan that costs least: A* over the values of the state variables and the place of the robot (algorithm reference
-// 21.6).
+// The plan that costs least: A* over the values of the state variables and the place of the robot (C-6).
 #pragma once
 #include "nodes/navigation/indexed_heap.hpp"
 #include "nodes/planner/plan.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The semantic robot client (thesis Sec. 5.3.3; algorithm reference 15.1, 15.2): takes tasks, plans, drives, acts,
+// The semantic robot client (thesis Sec. 5.3.3; ): takes tasks, plans, drives, acts,
 // compares what it finds with what it expects, and says what it does. Plain data in and out, one step a job.
 #pragma once
 #include "nodes/robot_client/deliberation.hpp"

@@ -261,7 +261,7 @@ class RobotClientNode final : public Node {
   Output<ActionCommand> action_{this, "action", "the newest action to be carried out, with every job"};
   Output<TextStatus> plan_{this, "plan", "the plan, what its steps were to take and took; when it changes"};
   Output<TextStatus> status_{this, "status", "one line: state, task, step, what is left"};
-  Output<TextStatus> speech_{this, "speech", "what it says to whoever gave the task"};
+  Output<TextStatus> speech_{this, "speech", "what it says to the giver of the task"};
   Output<RobotTask> taken_{this, "taken", "number of the newest task taken; its text while it is under way"};
   Output<ObjectReports> map_{this, "map", "all that it knows of objects; when it changes"};
 

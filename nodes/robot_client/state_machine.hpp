@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The states of the robot client (thesis Fig. 5.7, arrows as reconstructed in the algorithm reference 15.1), as a
+// The states of the robot client (thesis Fig. 5.7, arrows as reconstructed in ), as a
 // table.
 #pragma once
 #include <cstdint>

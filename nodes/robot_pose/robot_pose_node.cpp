@@ -147,7 +147,7 @@ class RobotPoseNode final : public Node {
   Input<Pose> scan_pose_{this, "scan_pose", "of scan_matching; depth 16", Need::optional};
   Output<Pose> pose_{this, "pose",
                      "robot where the wheels' odometry, or else the first measurement, began; with covariance"};
-  Output<Odometry> joined_{this, "odometry", "the same as an odometry, for whoever takes one"};
+  Output<Odometry> joined_{this, "odometry", "the same as an odometry, for nodes that take one"};
 
   Param<double> acceleration_{
       this, "acceleration", 0.5, {0.001, 100.0}, "", "by how many m/s the speed changes in a second"};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Two-dimensional occupancy grid of what the scanner saw, around the robot (algorithm reference 7.5, update; Elfes
+// Two-dimensional occupancy grid of what the scanner saw, around the robot (R-7.5, update; Elfes
 // 1989).
 #pragma once
 #include <cstdint>

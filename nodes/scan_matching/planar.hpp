@@ -23,7 +23,7 @@ inline Transform to_transform(const PlanarPose& p) {
   return {p.x_m, p.y_m, 0, std::cos(p.theta_rad / 2), 0, 0, std::sin(p.theta_rad / 2)};
 }
 
-/// Without speeds. The robot drives along its y axis, whose direction an odometry gives (algorithm reference 21.9).
+/// Without speeds. The robot drives along its y axis, whose direction an odometry gives (C-9).
 inline Odometry to_odometry(const PlanarPose& p) { return {p.x_m, p.y_m, wrapped(p.theta_rad + std::numbers::pi / 2)}; }
 
 /// Where x, y and theta stand in a covariance of six.

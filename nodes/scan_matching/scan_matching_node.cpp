@@ -172,7 +172,7 @@ class ScanMatchingNode final : public Node {
                             Need::optional};
   Output<Pose> pose_{this, "pose",
                      "robot in the frame where odometry, or else the first scan, began; covariance of all steps"};
-  Output<Odometry> moved_{this, "odometry", "the same as an odometry, for whoever takes one"};
+  Output<Odometry> moved_{this, "odometry", "the same as an odometry, for nodes that take one"};
   Output<Grid> map_{this, "map", "occupancy of the map frame's cells around the robot"};
   Output<Pose> correction_{this, "correction",
                            "with each pose: when the robot's place was known last, and where: at the first scan, or "

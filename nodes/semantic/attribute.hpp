@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Values of attributes: their kinds, how far apart two are, and as text (thesis Sec. 5.2.2, 5.2.3; algorithm reference
-// 10.4, 11.1).
+// Values of attributes: their kinds, how far apart two are, and as text (thesis Sec. 5.2.2, 5.2.3; ).
 #pragma once
 #include <cstdint>
 #include <span>

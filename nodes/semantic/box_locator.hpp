@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// From a box in the image to a place before the camera (algorithm reference 14.3).
+// From a box in the image to a place before the camera.
 #pragma once
 #include <optional>
 #include <vector>

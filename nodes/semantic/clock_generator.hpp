@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which nodes run at what pace at present (thesis Sec. 2.2, 5.3.2; algorithm reference 14.1, 14.2): the semantic
+// Which nodes run at what pace at present (thesis Sec. 2.2, 5.3.2; ): the semantic
 // processing starts, stops and clocks the others. It asks; the runtime obeys at the nodes' own releases.
 #pragma once
 #include <span>

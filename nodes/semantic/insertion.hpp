@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What becomes of an observation: merged with the object that it most probably is of, or a new object (thesis Sec.
-// 5.2.3; algorithm reference 11.2); and of objects whose place is seen free: removed, the thesis's future work.
+// 5.2.3; ); and of objects whose place is seen free: removed, the thesis's future work.
 #pragma once
 #include "nodes/semantic/similarity.hpp"
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which nodes are needed where the robot is: body poses near humans, signs near crossings (thesis Sec. 5.3.2; algorithm
-// reference 14).
+// Which nodes are needed where the robot is: body poses near humans, signs near crossings (thesis Sec. 5.3.2; R-14).
 #pragma once
 #include <optional>
 #include <span>

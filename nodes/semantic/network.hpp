@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The semantic network: objects, attributes, types and actions, and which are connected (thesis Sec. 5.2.1; algorithm
-// reference 10.1 to 10.3).
+// The semantic network: objects, attributes, types and actions, and which are connected (thesis Sec. 5.2.1;
+//
 #pragma once
 #include <string_view>
 #include <tl/expected.hpp>

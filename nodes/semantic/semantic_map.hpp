@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The semantic map: an occupancy grid with terrain, the semantic network, and links between cells and objects both ways
-// (thesis Sec. 5.2.1, 5.2.2; algorithm reference 10).
+// (thesis Sec. 5.2.1, 5.2.2; R-10).
 #pragma once
 #include <optional>
 
@@ -77,7 +77,7 @@ class SemanticMap {
   const Action& action(NodeId node) const { return actions_[record_[node]]; }
   /// The largest that one of the types gives the attribute; 1 where none does.
   double weight(std::span<const NodeId> types, NodeId attribute) const;
-  /// The type of that name, made if it is unknown (algorithm reference 11.2).
+  /// The type of that name, made if it is unknown.
   tl::expected<NodeId, NetworkError> type_named(std::string_view name);
 
   // What there is -----------------------------------------------------------------------------------------------------

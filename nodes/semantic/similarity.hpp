@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// How probable it is that two descriptions are of one object (thesis Eq. 5.13 to 5.19; algorithm reference 11.1 as
-// corrected by 21.5).
+// How probable it is that two descriptions are of one object (thesis Eq. 5.13 to 5.19; as
+// corrected by C-5).
 #pragma once
 #include "nodes/semantic/semantic_map.hpp"
 

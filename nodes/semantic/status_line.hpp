@@ -10,7 +10,7 @@
 
 namespace takt::semantic {
 
-/// How far the robot can drive straight on before the nearest occupied cell (more than half, algorithm reference 15.3)
+/// How far the robot can drive straight on before the nearest occupied cell (more than half, R-15.3)
 /// that reaches into a strip of that width about the y axis; 0 if it stands in one. None if the strip is free or
 /// unknown. The grid lies in the robot frame (x right, y forward).
 std::optional<double> free_way_m(const Grid& grid, double strip_m);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Whether an image shows what a reference image shows, by SIFT: the baseline that the thesis dropped (Sec. 3.4.1;
-// algorithm reference 5.1). For measurements, never in a job: OpenCV allocates.
+// For measurements, never in a job: OpenCV allocates.
 #pragma once
 #include <opencv2/core.hpp>
 #include <opencv2/features2d.hpp>

@@ -179,7 +179,7 @@ HWY_INLINE int find(const uint8_t* totals, uint8_t value) {
   }
 }
 
-/// Second best total at more than one pixel from d is not far enough above the best (algorithm reference 1.6).
+/// Second best total at more than one pixel from d is not far enough above the best.
 bool ambiguous(const PathRow& row, int best, int d) {
   auto second = static_cast<uint8_t>(3 * (row.c_max + row.p2));
   for (int e = 0; e < row.disparities; ++e)

@@ -221,7 +221,8 @@ class Rows {
   }
 
   /// Columns are counted from first_column here, and what changes in the loop are few locals: a fifth of the time goes
-  /// with addresses otherwise. Told that the loop runs at least once, GCC keeps them in registers with AVX2, too (15 %).
+  /// with addresses otherwise. Told that the loop runs at least once, GCC keeps them in registers with AVX2, too (15
+  /// %).
   template <bool kNew, bool kOutside>
   HWY_INLINE void walk_registers(int from, int to) {
     if (from >= to) return;
@@ -293,7 +294,7 @@ class Rows {
     return static_cast<uint32_t>(fraction_of(at[-1], static_cast<int>(best), at[1]));
   }
 
-  /// Second best sum at more than one pixel from d is not far enough above the best (algorithm reference 1.6).
+  /// Second best sum at more than one pixel from d is not far enough above the best.
   HWY_INLINE uint32_t ambiguous(uint32_t best, int d) const {
     const int low = std::max(0, d - 1), high = std::min(d + 1, groups() * kLanes - 1);
     uint16_t kept[3];

@@ -257,7 +257,7 @@ class StereoNode final : public Node {
                     {0, 255}, "",      "truncation of the cost; 0: 10 for gradient, 24 for census, 50 for the others"};
   Param<double> intensity_weight_{this, "intensity_weight",
                                   1.0,  {0.0, 1.0},
-                                  "1",  "w of cost mixed: share of the intensities beside the derivatives"};
+                                  "1",  "w of cost mixed: share of the intensities next to the derivatives"};
   Choice aggregation_{this,
                       "aggregation",
                       "square",

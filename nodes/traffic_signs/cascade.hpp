@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A boosted cascade of Haar features and its file, in OpenCV's format (thesis Sec. 3.4.1; algorithm reference 5.2).
+// A boosted cascade of Haar features and its file, in OpenCV's format (thesis Sec. 3.4.1; ).
 #pragma once
 #include <array>
 #include <filesystem>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where an image has the saturated colours of signs (algorithm reference 21.11): a row of windows without them is not
+// Where an image has the saturated colours of signs (C-11): a row of windows without them is not
 // searched.
 #pragma once
 #include <array>

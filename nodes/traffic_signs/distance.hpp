@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How far a sign is and whether it has the size of one (algorithm reference 5.4).
+// How far a sign is and whether it has the size of one.
 #pragma once
 #include <vector>
 

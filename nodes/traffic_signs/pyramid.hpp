@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// An image at many scales, each with the sums that a sliding window needs (algorithm reference 5.2).
+// An image at many scales, each with the sums that a sliding window needs.
 #pragma once
 #include <cstddef>
 #include <cstdint>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cascades slid over all scales of an image, row of windows by row of windows (algorithm reference 5.2, 21.11).
+// Cascades slid over all scales of an image, row of windows by row of windows (R-5.2, C-11).
 #pragma once
 #include <cstdint>
 #include <span>

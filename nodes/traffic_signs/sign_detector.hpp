@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// All cascades over one image, where signs may be and as far as time allows (algorithm reference 5.2, 21.11).
+// All cascades over one image, where signs may be and as far as time allows (R-5.2, C-11).
 #pragma once
 #include <cstdint>
 #include <optional>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A sign counts once it was seen in consecutive images: a false one mostly shows in a single one (thesis Sec. 3.5.4;
-// algorithm reference 5.3).
+//
 #pragma once
 #include <span>
 #include <vector>

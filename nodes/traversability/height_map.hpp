@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where the robot can drive, from the heights that a tilted laser scanner sweeps (algorithm reference 15.6).
+// Where the robot can drive, from the heights that a tilted laser scanner sweeps.
 #pragma once
 #include <cstdint>
 #include <span>

@@ -16,8 +16,9 @@ struct ProcessMemory {
   std::vector<std::string> lacks;  ///< what was refused, each with the fix
 };
 
-/// Once, before worker threads start; those get stacks of 2 MB. Without it, a large block that OpenCV takes and frees
-/// in every job is mapped, faulted in page by page and unmapped again.
+/// Once, before worker threads start; those get stacks of 2 MB, as all threads do that do not ask for another size
+/// (OwnThread). Without it, a large block that OpenCV takes and frees in every job is mapped, faulted in page by page
+/// and unmapped again.
 ProcessMemory prepare_process_memory();
 
 /// Touches the next `bytes` of the calling thread's stack (at most half of what is left of it), so that no job takes

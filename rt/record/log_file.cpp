@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdlib>
 
+#include "rt/abi.hpp"
 #include "rt/record/recorder.hpp"
 
 namespace takt::record {
@@ -21,8 +22,9 @@ tl::expected<LogFile, std::string> LogFile::open(const std::filesystem::path& fi
     log.format_ = std::atoi(format->second.c_str());
   if (log.format_ < 1 || log.format_ > kFormat)
     return tl::make_unexpected(file.string() + " is a record of format " + log.facts_["format"] +
-                               "; this program reads formats 1 to " + std::to_string(kFormat) +
-                               ". Use the version of Takt that recorded it (commit " + log.facts_["commit"] + ")");
+                               ", and this is Takt " + version().number + ", which reads formats 1 to " +
+                               std::to_string(kFormat) + "; use a later Takt (commit " + log.facts_["commit"] +
+                               " wrote the file)");
   log.jobs_channel_ = log.channel(Recorder::kJobs);
   log.events_channel_ = log.channel(Recorder::kEvents);
   log.index();

@@ -42,8 +42,8 @@ Recorder::Recorder(const Plan& plan, const RunBoard& board, Transport& transport
     std::vector<size_t>& edges = edges_of_.emplace_back();
     for (const EdgePlan& edge : task.edges) edges.push_back(edge.port);
   }
-  writing_ = std::thread([this] { write_on(); });
-  if (!options_.by_caller) capturing_ = std::thread([this] { capture_on(); });
+  writing_ = OwnThread([this] { write_on(); });
+  if (!options_.by_caller) capturing_ = OwnThread([this] { capture_on(); });
 }
 
 Recorder::~Recorder() {

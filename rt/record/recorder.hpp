@@ -3,9 +3,9 @@
 #include <atomic>
 #include <optional>
 #include <string>
-#include <thread>
 #include <vector>
 
+#include "rt/own_thread.hpp"
 #include "rt/record/job_assembler.hpp"
 #include "rt/record/mcap/writer.hpp"
 #include "rt/record/write_queue.hpp"
@@ -109,7 +109,7 @@ class Recorder {
   std::atomic<uint64_t> no_room_{0};
   RecordResult result_;
   std::atomic<bool> ending_{false};
-  std::thread capturing_, writing_;
+  OwnThread capturing_, writing_;
 };
 
 }  // namespace takt::record

@@ -1,32 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "rt/sched/lookout.hpp"
 
+#include <pthread.h>
+
 #include <algorithm>
 #include <chrono>
-#include <system_error>
 
 #include "rt/memory/process_memory.hpp"
 
 namespace takt {
 namespace {
-constexpr size_t kLookoutStack = 256 << 10;           // locked whole; a process may have many of these threads
 constexpr int64_t kYear_ns = 31'536'000'000'000'000;  // instead of never: the arithmetic of timed waits survives it
 }  // namespace
 
 Lookout::Lookout(const std::string& name, const Reservation& wanted, const Clock& clock,
                  std::function<int64_t(int64_t)> look)
-    : name_(name.substr(0, 15)), wanted_(wanted), clock_(clock), look_(std::move(look)) {
-  pthread_attr_t attributes;
-  pthread_attr_init(&attributes);
-  pthread_attr_setstacksize(&attributes, kLookoutStack);
-  const auto begin = [](void* lookout) -> void* {
-    static_cast<Lookout*>(lookout)->work();
-    return nullptr;
-  };
-  const int error = pthread_create(&thread_, &attributes, begin, this);
-  pthread_attr_destroy(&attributes);
-  if (error != 0) throw std::system_error(error, std::generic_category(), "thread " + name_);
-}
+    : name_(name.substr(0, 15)), wanted_(wanted), clock_(clock), look_(std::move(look)), thread_([this] { work(); }) {}
 
 Lookout::~Lookout() {
   {
@@ -34,7 +23,7 @@ Lookout::~Lookout() {
     end_ = true;
   }
   changed_.notify_all();
-  pthread_join(thread_, nullptr);
+  thread_.join();
 }
 
 void Lookout::wake() {

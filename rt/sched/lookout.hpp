@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include <pthread.h>
-
 #include <condition_variable>
 #include <functional>
 #include <mutex>
 #include <string>
 
+#include "rt/own_thread.hpp"
 #include "rt/sched/grant.hpp"
 #include "rt/time/clock.hpp"
 
@@ -38,7 +37,7 @@ class Lookout {
   std::mutex mutex_;
   std::condition_variable changed_;
   bool woken_ = false, end_ = false;
-  pthread_t thread_{};
+  OwnThread thread_;  // the last: it uses the others
 };
 
 }  // namespace takt

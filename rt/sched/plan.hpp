@@ -59,6 +59,7 @@ struct SourcePlan {
   int64_t lag_ns = 0;   ///< a stamp lies at most so long before the release of the job that sends it
   int64_t wait_ns = 0;  ///< so long after its release the job may sleep until its data have come
   std::string unknown;  ///< why there is no bound; empty: these are
+  uint32_t faults = 0;  ///< bits of what can be made to go wrong with it while it runs; hal gives them their names
 };
 
 struct TaskPlan {

@@ -88,7 +88,7 @@ StallWatch::StallWatch(const Plan& plan, const RunBoard& board, std::function<in
 
 const StallLog& StallWatch::end() {
   ended_.store(true);
-  for (std::thread& thread : threads_) thread.join();
+  for (OwnThread& thread : threads_) thread.join();
   threads_.clear();
   return log_;
 }

@@ -7,9 +7,9 @@
 #include <cstdint>
 #include <functional>
 #include <mutex>
-#include <thread>
 #include <vector>
 
+#include "rt/own_thread.hpp"
 #include "rt/sched/plan.hpp"
 
 namespace takt {
@@ -88,7 +88,7 @@ class StallWatch {
   std::atomic<bool> ended_{false};
   std::mutex mutex_;
   StallLog log_;
-  std::vector<std::thread> threads_;
+  std::vector<OwnThread> threads_;
 };
 
 }  // namespace takt

@@ -51,7 +51,7 @@ Collector::Collector(Rings& rings, Options options) : rings_(rings), options_(st
   if (options_.by_caller) return;
   recording_.first_ns = steal_read_ns_ = now_ns();
   steal_ticks_ = steal_ticks(options_.cpus);
-  thread_ = std::thread([this] { collect(); });
+  thread_ = OwnThread([this] { collect(); });
 }
 
 Collector::~Collector() {

@@ -2,8 +2,8 @@
 #pragma once
 #include <atomic>
 #include <functional>
-#include <thread>
 
+#include "rt/own_thread.hpp"
 #include "rt/trace/rings.hpp"
 #include "rt/trace/switch_source.hpp"
 
@@ -67,7 +67,7 @@ class Collector {
   std::vector<int64_t> steal_ticks_;  ///< per CPU of the options
   int64_t steal_read_ns_ = 0;
   std::atomic<bool> ended_{false};
-  std::thread thread_;
+  OwnThread thread_;
 };
 
 /// Jobs, slices and marks from what was noted: `tasks`, `ports`, policy, epoch and end are for the caller to add.

@@ -5,13 +5,16 @@
     outsider.py                  in a bare Debian 12 (debootstrap, chroot), made for this and removed afterwards; needs root
     outsider.py --root FOLDER    in that bare Debian, which is made if it is not there, and stays
     outsider.py --here           on this machine, in a home of its own
+    outsider.py --page PAGE      another page, such as docs/start.md
 
 Every line of the page's ```sh blocks is a step, run by one shell after the other in a folder of its own; what a step exports
-and where it changes to holds for the next ones. A checkout of the last commit lies there as ~/takt. With --build FOLDER it
-takes that finished build for its own: what is timed then is not Takt's build. Exit 1 if a step fails."""
+and where it changes to holds for the next ones. A block with a here-document or a background job is one step. A checkout of the last commit lies there as ~/takt. With --build FOLDER that
+finished build of this checkout is installed, and Takt is not built: an hour less. Without --page it prints at the end what the
+project and the smallest program on `core` cost (tests/tools/hello_cost.py). Exit 1 if a step fails, or something costs too much."""
 import argparse
 import os
 import pathlib
+import re
 import shlex
 import shutil
 import subprocess
@@ -20,22 +23,25 @@ import tempfile
 import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-PAGE = "docs/own_project.md"
+PAGES = ("docs/own_project.md", "docs/start.md")
 LIMIT_S = 3600
 
 
 def steps_of(text):
     """[(heading, command)]; a line that ends with \\ goes on in the next one."""
-    steps, heading, inside, command = [], "", False, ""
+    steps, heading, block = [], "", None
     for line in text.splitlines():
-        if line.startswith("```"): inside = line == "```sh"
-        elif not inside and line.startswith("#"): heading = line.lstrip("# ")
-        elif inside and line.strip():
-            command += line.rstrip("\\") if line.endswith("\\") else line
-            if not line.endswith("\\"):
-                steps.append((heading, command))
-                command = ""
+        if line.startswith("```"):
+            if block: steps += [(heading, command) for command in commands_of("\n".join(block))]
+            block = [] if line == "```sh" else None
+        elif block is not None: block.append(line)
+        elif line.startswith("#"): heading = line.lstrip("# ")
     return steps
+
+
+def commands_of(block):
+    if "<<" in block or re.search(r"[^&]&$", block, flags=re.M): return ["set -e\n" + block]
+    return [line for line in block.replace("\\\n", "").splitlines() if line.strip()]
 
 
 class Shell:
@@ -66,47 +72,68 @@ def make_debian(folder):
 
 
 class Mounted:
-    """What programs of a bare system expect to be there, while this lives."""
+    """What programs of a bare system expect to be there, and these folders of this machine, while this lives."""
 
-    PLACES = ("proc", "sys", "dev", "dev/shm")
+    PLACES = ("/proc", "/sys", "/dev", "/dev/shm")
 
-    def __init__(self, folder):
-        self.folder, self.mounted = folder, []
+    def __init__(self, folder, shown=()):
+        self.folder, self.shown, self.mounted = folder, shown, []
 
     def __enter__(self):
-        for place in self.PLACES:
-            subprocess.run(["mount", "--bind", f"/{place}", str(self.folder / place)], check=True)
-            self.mounted.append(self.folder / place)
+        for place in (*self.PLACES, *self.shown):
+            there = self.folder / str(place).lstrip("/")
+            there.mkdir(parents=True, exist_ok=True)
+            subprocess.run(["mount", "--bind", str(place), str(there)], check=True)
+            self.mounted.append(there)
         shutil.copy("/etc/resolv.conf", self.folder / "etc/resolv.conf")
         return self
 
     def __exit__(self, *_):
         for place in reversed(self.mounted): subprocess.run(["umount", "--lazy", str(place)], check=False)
+        if str(self.folder) not in pathlib.Path("/proc/self/mountinfo").read_text(): return
+        print(f"something is still mounted below {self.folder}: it stays, and so does what is mounted", flush=True)
+        os._exit(1)
 
 
 def check_out(home, build):
-    checkout = home / "takt"
-    subprocess.run(["git", "clone", "--quiet", str(ROOT), str(checkout)], check=True)
+    """The last commit as ~/takt, with that finished build as its own."""
+    for old in ("takt", "takt-0.2", "robot", "hello_core"): shutil.rmtree(home / old, ignore_errors=True)
+    subprocess.run(["git", "clone", "--quiet", str(ROOT), str(home / "takt")], check=True)
     if build:
-        (checkout / "build").mkdir()
-        (checkout / "build/release").symlink_to(build.resolve())
+        (home / "takt/build").mkdir()
+        (home / "takt/build/release").symlink_to(build)
 
 
-def follow(shell, built):
-    """The rows of the table: (heading, command, seconds, exit code)."""
+def step(shell, heading, command):
+    """A row of the table: (heading, command, seconds, exit code)."""
+    print(f"$ {command}", flush=True)
+    code, said, seconds = shell.run(command)
+    lines = said.rstrip().splitlines()
+    print("\n".join(f"  {line}" for line in (lines if code or len(lines) <= 8 else lines[:3] + ["..."] + lines[-4:])), flush=True)
+    return heading, command, seconds, code
+
+
+def follow(shell, steps, built):
+    """The rows of the table, up to the first step that fails."""
     rows = []
-    for heading, command in steps_of((ROOT / PAGE).read_text()):
-        if built and command.startswith("./takt "): continue  # it would build
-        print(f"$ {command}", flush=True)
-        code, said, seconds = shell.run(command)
-        rows.append((heading, command, seconds, code))
-        lines = said.rstrip().splitlines()
-        print("\n".join(f"  {line}" for line in (lines if code or len(lines) <= 8 else lines[:3] + ["..."] + lines[-4:])), flush=True)
-        if code: break
+    for heading, command in steps:
+        # What was built already is not built again; what it needs of the system is installed.
+        if built and command.startswith("./takt "): command = "TAKT_BUILD=$HOME/packages ./takt packages"
+        rows.append(step(shell, heading, command))
+        if rows[-1][3]: break
     return rows
 
 
+# What the hello programs cost: the project that the page has made, and the smallest one on `core`.
+COSTS = (
+    "python3 ~/takt/tests/tools/hello_cost.py ~/robot/build/robot ~/robot/robot.yaml",
+    "cp -r ~/takt/examples/hello_core ~ && cmake -S ~/hello_core -B ~/hello_core/build && cmake --build ~/hello_core/build",
+    "python3 ~/takt/tests/tools/hello_cost.py ~/hello_core/build/hello_core",
+)
+
+
 def table(rows):
+    rows = [(heading, command.removeprefix("set -e\n").splitlines()[0], seconds, code) for heading, command, seconds, code in rows]
     width = max(len(command) for _, command, _, _ in rows)
     lines = [f"{'step':>4}  {'command':<{width}}  {'seconds':>8}  exit"]
     lines += [f"{number:>4}  {command:<{width}}  {seconds:>8.1f}  {code}" for number, (_, command, seconds, code) in enumerate(rows, 1)]
@@ -114,32 +141,39 @@ def table(rows):
     return "\n".join(lines)
 
 
+def outsider(page, home, seen_as, enter, build):
+    """Exit code of all."""
+    check_out(home, build)
+    shell = Shell(home, seen_as, enter)
+    steps = steps_of((ROOT / page).read_text())
+    rows = follow(shell, steps, build)
+    print("\n" + table(rows) + "\n", flush=True)
+    failed = [row for row in rows if row[3]]
+    if not failed and page == PAGES[0]: failed = [row for row in (step(shell, "cost", command) for command in COSTS) if row[3]]
+    for _, command, _, code in failed: print(f"FAILED with exit {code}: {command}")
+    return 1 if failed else 0
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--here", action="store_true")
     parser.add_argument("--root", type=pathlib.Path)
     parser.add_argument("--build", type=pathlib.Path)
+    parser.add_argument("--page", choices=PAGES, default=PAGES[0])
     asked = parser.parse_args()
-    if asked.here and asked.root or asked.build and not asked.here: parser.error("--root has no --here, and --build needs it")
+    if asked.here and asked.root: parser.error("--root has no --here")
+    build = asked.build and asked.build.resolve()
+    if build and not (build / "cmake_install.cmake").exists(): parser.error(f"{build} is no build folder")
     assert steps_of("# A\n```sh\ncd x\nb \\\n c\n```\n```text\nd\n```\n") == [("A", "cd x"), ("A", "b  c")]
-    steps = steps_of((ROOT / PAGE).read_text())
-    if not any("cp -r examples/" in command for _, command in steps): sys.exit(f"{PAGE} no longer copies an example")
+    assert steps_of("```sh\na &\nwait\n```\n") == [("", "set -e\na &\nwait")]
+    if not any(command.startswith("takt new robot") for _, command in steps_of((ROOT / asked.page).read_text())): sys.exit(f"{asked.page} no longer makes a project robot")
     with tempfile.TemporaryDirectory(prefix="takt_outsider.") as scratch:
-        if asked.here:
-            home = pathlib.Path(scratch)
-            check_out(home, asked.build)
-            rows = follow(Shell(home, str(home), ["env", "-u", "TAKT_HOME", "-u", "CMAKE_PREFIX_PATH"]), asked.build)
-        else:
-            if os.geteuid() != 0: sys.exit("a chroot needs root; or use --here")
-            debian = (asked.root or pathlib.Path(scratch) / "debian").resolve()
-            make_debian(debian)
-            home = debian / "root"
-            for old in ("takt", "takt-0.2", "kitchen"): shutil.rmtree(home / old, ignore_errors=True)
-            check_out(home, None)
-            with Mounted(debian): rows = follow(Shell(home, "/root", ["chroot", str(debian), "env", "-i", "PATH=/usr/sbin:/usr/bin:/sbin:/bin", "LC_ALL=C.UTF-8"]), None)
-    print("\n" + table(rows))
-    done = len(rows) == len(steps) - (sum(command.startswith("./takt ") for _, command in steps) if asked.build else 0)
-    if rows[-1][3] or not done: sys.exit(f"step {len(rows)} failed: {rows[-1][1]}")
+        if asked.here: return outsider(asked.page, pathlib.Path(scratch), scratch, ["env", "-u", "TAKT_HOME", "-u", "CMAKE_PREFIX_PATH"], build)
+        if os.geteuid() != 0: sys.exit("a chroot needs root; or use --here")
+        debian = (asked.root or pathlib.Path(scratch) / "debian").resolve()
+        make_debian(debian)
+        enter = ["chroot", str(debian), "env", "-i", "PATH=/usr/sbin:/usr/bin:/sbin:/bin", "LC_ALL=C.UTF-8"]
+        with Mounted(debian, (ROOT, build) if build else ()): return outsider(asked.page, debian / "root", "/root", enter, build)
 
 
-main()
+sys.exit(main())

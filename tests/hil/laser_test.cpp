@@ -47,7 +47,7 @@ struct Laser {
 TEST_CASE("hil: laser_scanner lms200 at 38400 baud on usb-serial (ftdi_sio)") {
   const SuiteClock clock;
   Laser laser(38400, clock);
-  // A sweep every 16 turns of the mirror (devices.md 1.9). Each read waits for the one that follows the last.
+  // A sweep every 16 turns of the mirror (D-1.9). Each read waits for the one that follows the last.
   const auto advance_to = [&](int64_t to_ns) {
     clock.go_to(to_ns);
     const uint64_t before = laser.driver->counts().received;

@@ -23,7 +23,7 @@ expect() {
   local got=$?
   echo "--- ${*##*/}"
   head -n 12 "$work/stderr"
-  [ $got -eq "$code" ] || fail "exit $got instead of $code: $*"
+  [ $got -eq "$code" ] || { tail -n 20 "$work/stdout" "$work/stderr"; fail "exit $got instead of $code: $*"; }
   [ -z "$text" ] || grep -qF -- "$text" "$work/stderr" || fail "stderr lacks '$text': $*"
 }
 

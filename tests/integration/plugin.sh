@@ -30,6 +30,15 @@ expect 0 "" "$work/prefix/bin/takt" check "$graph"
 expect 2 "blink.yaml:5:11: error: plug-in libblink.so: no such file; looked in $work" run
 cp "$built/libblink.so" "$work/"
 
+# By a file that the graph includes: beside that file, and its errors point there.
+mkdir -p "$work/whole/parts"
+cp "$work/blink.yaml" "$work/blink_schedule.yaml" "$work/libblink.so" "$work/whole/parts/"
+printf 'takt: 1\nname: whole\ninclude: [parts/blink.yaml]\n' >"$work/whole/whole.yaml"
+expect 0 "" "$takt" check "$work/whole/whole.yaml"
+rm "$work/whole/parts/libblink.so"
+expect 2 "whole/parts/blink.yaml:5:11: error: plug-in libblink.so: no such file; looked in $work/whole/parts" \
+  "$takt" check "$work/whole/whole.yaml"
+
 # A record says which plug-ins it was made with.
 expect 0 "" "$takt" replay "$work/blink.mcap" --compare --output "$work/out"
 grep -qE "compared ([0-9]+) of \1 messages.* 0 differ" "$work/stdout" || fail "replay: $(cat "$work/stdout")"

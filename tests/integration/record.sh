@@ -46,39 +46,6 @@ tells 0 "cut: 1.000 s to 2.000 s" "$takt" log info "$work/cut.mcap"
 tells 0 " 0 differ" "$takt" replay "$work/cut.mcap" --compare --live stereo,object_detection --output "$work/out"
 expect 2 "is the record itself" "$takt" log cut "$work/cut.mcap" -o "$work/cut.mcap"
 
-echo "=== records of format 1"
-old=$source/tests/integration/records
-mkdir "$work/old"
-cp -L "$old"/*.yaml "$old"/lab.* "$work/old/"
-while read -r name content jobs; do
-  tells 0 "content $content" "$takt" log info "$old/$name.mcap"
-  tells 0 "format 1" "$takt" log info "$old/$name.mcap"
-  tells 0 "the same" "$takt" log diff "$old/$name.mcap" "$old/$name.mcap"
-  tells 0 "messages" "$takt" log export "$old/$name.mcap" -o "$work/old/export.mcap"
-  tells 0 "jobs" "$takt" log cut "$old/$name.mcap" --from 0.5 --to 1 -o "$work/old/cut.mcap"
-  tells 0 "cut: 0.500 s to 1.000 s" "$takt" log info "$work/old/cut.mcap"
-  "$takt" replay "$old/$name.mcap" "$work/old/graph.yaml" --compare --output "$work/out" >"$work/replay.txt" 2>&1
-  code=$?
-  if [ $code -eq 2 ] && grep -q "SIMD target" "$work/replay.txt"; then
-    echo "NOT RUN: $(cat "$work/replay.txt")"
-    continue
-  fi
-  grep -q "replayed $jobs jobs" "$work/replay.txt" || fail "replay of $name.mcap: $(cat "$work/replay.txt")"
-  if [ "$name" = restarted ]; then
-    [ $code -eq 1 ] && grep -q "format 1 does not tell where a process was started again" "$work/replay.txt" ||
-      fail "replay of a restart in format 1, exit $code: $(cat "$work/replay.txt")"
-  else
-    grep -q " 0 differ" "$work/replay.txt" || fail "replay of $name.mcap: $(cat "$work/replay.txt")"
-  fi
-done <<END
-virtual c7f31d1b9153a670 15
-restarted 1e3d17a692097cec 43
-killed fdd23bb8214c07c1 31
-END
-sed 's/format\x01\x00\x00\x001/format\x01\x00\x00\x009/' "$old/virtual.mcap" >"$work/old/later.mcap"
-expect 2 "is a record of format 9; this program reads formats 1 to 2. Use the version of Takt that recorded it" \
-  "$takt" log info "$work/old/later.mcap"
-
 echo "=== a changed parameter is named"
 rm -rf "$work/graph" "$work/schedules"
 mkdir -p "$work/graph" "$work/schedules"

@@ -47,7 +47,7 @@ class LiveTest(unittest.TestCase):
                 file.flush()
 
     def test_questions(self):
-        self.answers = {"set": [{"ok": True}], "mode": [{"ok": True}],
+        self.answers = {"set": [{"ok": True}], "mode": [{"ok": True}], "fault": [{"ok": True}],
                         "get": [{"parameters": [{"value": 0.3}]}]}
         self.listen()
         self.assertEqual(takt.running(), [os.getpid()])
@@ -59,6 +59,8 @@ class LiveTest(unittest.TestCase):
         self.assertEqual(self.questions[0], {"do": "set", "param": "cruise.speed", "value": "0.3m/s", "keep": False})
         self.assertEqual(self.questions[1]["value"], "true")
         self.assertEqual(self.questions[2], {"do": "mode", "mode": "safe_stop"})
+        run.fault("front_laser", "silent", on=False)
+        self.assertEqual(self.questions[-1], {"do": "fault", "device": "front_laser", "fault": "silent", "on": False})
 
     def test_a_refusal_is_raised(self):
         self.answers = {"mode": [{"error": "its modes: full, safe_stop"}]}

@@ -9,7 +9,7 @@ from unittest import mock
 import takt
 from takt import zstd
 
-RECORDS = pathlib.Path(__file__).parents[1] / "integration" / "records"
+RECORDS = pathlib.Path(__file__).parents[1] / "samples"
 
 
 class RecordTest(unittest.TestCase):
@@ -21,7 +21,7 @@ class RecordTest(unittest.TestCase):
         return path
 
     def test_fields_and_stamps_by_port(self):
-        record = takt.read_record(RECORDS / "virtual.mcap")
+        record = takt.read_record(RECORDS / "format_1.mcap")
         self.assertEqual(record.missing, "")
         self.assertEqual(record.jobs, 45)
         self.assertEqual(sorted(record.ports), ["base.odometry", "front_laser.scan", "obstacle_stop.stop"])
@@ -35,32 +35,32 @@ class RecordTest(unittest.TestCase):
         self.assertEqual([message["x_m"] for message in messages], list(odometry["x_m"]))
 
     def test_arrays(self):
-        scan = takt.read_record(RECORDS / "virtual.mcap")["front_laser.scan"]
+        scan = takt.read_record(RECORDS / "format_1.mcap")["front_laser.scan"]
         ranges = scan["range_m"]
         self.assertEqual(len(ranges), 15)
         self.assertEqual(len(ranges[0]), 181)
         self.assertAlmostEqual(ranges[0][0], 2.045624, places=5)
 
     def test_without_numpy_the_same(self):
-        with_it = takt.read_record(RECORDS / "virtual.mcap")["base.odometry"]
+        with_it = takt.read_record(RECORDS / "format_1.mcap")["base.odometry"]
         with mock.patch("takt.record.numpy", None):
-            without = takt.read_record(RECORDS / "virtual.mcap")["base.odometry"]
+            without = takt.read_record(RECORDS / "format_1.mcap")["base.odometry"]
             self.assertEqual(list(without["x_m"]), list(with_it["x_m"]))
 
     def test_unknown_names_have_the_valid_choices(self):
-        record = takt.read_record(RECORDS / "virtual.mcap")
+        record = takt.read_record(RECORDS / "format_1.mcap")
         with self.assertRaisesRegex(takt.RecordError, "base.odometry, front_laser.scan"):
             record["rear_laser.scan"]
         with self.assertRaisesRegex(takt.RecordError, "its fields: x_m, y_m"):
             record["base.odometry"]["z_m"]
 
     def test_a_killed_run_is_read_to_its_end(self):
-        record = takt.read_record(RECORDS / "killed.mcap")
+        record = takt.read_record(RECORDS / "format_1_killed.mcap")
         self.assertEqual(record.missing, "the file has no end")
         self.assertEqual(len(record["front_laser.scan"]), 32)
 
     def test_a_file_cut_anywhere_says_so(self):
-        data = (RECORDS / "virtual.mcap").read_bytes()
+        data = (RECORDS / "format_1.mcap").read_bytes()
         for at in range(len(data) // 5, len(data), len(data) // 9):
             record = takt.read_record(self.written(data[:at]))
             messages = sum(map(len, record.ports.values()))
@@ -68,31 +68,37 @@ class RecordTest(unittest.TestCase):
         self.assertIn("cut off", takt.read_record(self.written(data[:len(data) // 5])).missing)
 
     def test_a_damaged_chunk_says_so(self):
-        data = bytearray((RECORDS / "virtual.mcap").read_bytes())
+        data = bytearray((RECORDS / "format_1.mcap").read_bytes())
         data[data.index(b"zstd") + 500] ^= 0x10
         record = takt.read_record(self.written(data))
         self.assertIn("damaged", record.missing)
+
+    def test_every_format_so_far(self):
+        for path in RECORDS.glob("format_*.mcap"):
+            record = takt.read_record(path)
+            self.assertEqual(record.info.get("format", "1"), path.stem.split("_")[1])
+            self.assertGreater(len(record["obstacle_stop.stop"]), 0)
 
     def test_no_record(self):
         with self.assertRaisesRegex(takt.RecordError, "no MCAP file"):
             takt.read_record(RECORDS / "graph.yaml")
 
     def test_each_way_to_unpack(self):
-        stored = pathlib.Path(RECORDS / "virtual.mcap").read_bytes()
-        expected = len(takt.read_record(RECORDS / "virtual.mcap")["base.odometry"])
+        stored = pathlib.Path(RECORDS / "format_1.mcap").read_bytes()
+        expected = len(takt.read_record(RECORDS / "format_1.mcap")["base.odometry"])
         self.assertIn(b"zstd", stored)
         ways = [lambda: zstd._by_library("libzstd.so.1")]
         if shutil.which("zstd"):
             ways.append(lambda: zstd._by_command(shutil.which("zstd")))
         for way in ways:
             with mock.patch("takt.zstd.unpacker", way):
-                self.assertEqual(len(takt.read_record(RECORDS / "virtual.mcap")["base.odometry"]), expected)
+                self.assertEqual(len(takt.read_record(RECORDS / "format_1.mcap")["base.odometry"]), expected)
 
     def test_without_any_zstd_it_says_what_to_install(self):
         with mock.patch("takt.zstd._by_library", side_effect=OSError), mock.patch("shutil.which", return_value=None), \
                 mock.patch.dict("sys.modules", zstandard=None):
             with self.assertRaisesRegex(ImportError, "python3-zstandard, libzstd1, zstd"):
-                takt.read_record(RECORDS / "virtual.mcap")
+                takt.read_record(RECORDS / "format_1.mcap")
 
 
 if __name__ == "__main__":

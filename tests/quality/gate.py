@@ -2,8 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Measures again what the project says of itself, and compares.
 
-  gate.py figures TAKT        every line of figures.txt: a `takt eval` on data that it makes itself, against the stored
-                              figure; exit 1 if one is worse by more than its tolerance
+  gate.py figures TAKT [--store]
+                              every figure of measured/99_gate.json: a `takt eval` on data that it makes itself, against the
+                              stored figure; exit 1 if one differs by more than its tolerance, for better or worse. With
+                              --store those are stored, with machine, date and commit; then run tests/tools/measured.py
   gate.py ratios TAKT_BENCH [--suite NAME]... [--shard K/N] [--json FILE]
                               every row of targets.txt: its ratio against its target; exit 1 if one misses it by more than
                               its null pair shows as noise (the rule stands in ratios.py), or a suite or row is missing
@@ -19,6 +21,7 @@ import time
 import ratios
 
 HERE = os.path.dirname(os.path.abspath(__file__))
+GATE = os.path.join(HERE, "measured", "99_gate.json")
 
 
 def fail(what):
@@ -60,32 +63,59 @@ def at(document, path):
     return document if isinstance(document, (int, float)) and not isinstance(document, bool) else None
 
 
-def compare_figures(takt):
-    worse = 0
-    for place, command, lines in sections("figures.txt"):
+def evaluated(takt, command):
+    """(the JSON of that `takt eval`, nothing) or (nothing, what went wrong)."""
+    run = subprocess.run([takt, "eval", *command.split(), "--json"], capture_output=True, text=True, check=False)
+    return (json.loads(run.stdout), "") if run.returncode == 0 else (None, f"exit {run.returncode}: {run.stderr.strip()}")
+
+
+def read_gate(path=GATE):
+    """What is stored; exit 2 with the figure at fault where it is not understood."""
+    with open(path, encoding="utf-8") as file:
+        gate = json.load(file)
+    for evaluation in gate["evaluations"]:
+        for figure in evaluation["figures"]:
+            numbers = [figure.get(key) for key in ("stored", "tolerance")]
+            if figure.get("better") not in ("higher", "lower") or not all(type(n) in (int, float) for n in numbers):
+                fail(f"{path}: takt eval {evaluation['eval']}: {figure.get('path')}: write path, better (higher or lower), "
+                     "and as numbers stored and tolerance")
+    return gate
+
+
+def compare_figures(gate, evaluate):
+    """How many figures differ; each is printed. `evaluate` takes a command, and returns as `evaluated` does."""
+    differ = 0
+    for evaluation in gate["evaluations"]:
         began = time.monotonic()
-        run = subprocess.run([takt, "eval", *command.split(), "--json"], capture_output=True, text=True, check=False)
-        if run.returncode != 0:
-            print(f"{place}: takt eval {command}: exit {run.returncode}: {run.stderr.strip()}")
-            worse += 1
-            continue
-        print(f"takt eval {command} ({time.monotonic() - began:.0f} s)")
-        document = json.loads(run.stdout)
-        for place, words in lines:
-            if len(words) != 4 or words[1] not in ("higher", "lower"):
-                fail(f"{place}: write PATH, higher or lower (which is better), the stored figure, its tolerance")
-            path, better, stored, tolerance = words[0], words[1], number(place, words[2]), number(place, words[3])
-            got = at(document, path.replace("~", " "))
+        document, wrong = evaluate(evaluation["eval"])
+        print(f"takt eval {evaluation['eval']} ({time.monotonic() - began:.0f} s){': ' + wrong if wrong else ''}")
+        for figure in evaluation["figures"]:
+            stored, tolerance, got = figure["stored"], figure["tolerance"], at(document, figure["path"])
             if got is None:
-                verdict, worse = "there is no such figure", worse + 1
+                verdict = "there is no such figure"
+            elif abs(got - stored) <= tolerance:
+                verdict = "ok"
             else:
-                gain = got - stored if better == "higher" else stored - got
-                verdict = "ok" if abs(gain) <= tolerance else "BETTER: store it" if gain > 0 else "WORSE"
-                worse += verdict == "WORSE"
-                got = f"{got:.4g}"
-            print(f"  {path:44} {got or '-':>9}  stored {stored:g} +- {tolerance:g}: {verdict}")
-    print("figures: " + (f"{worse} worse" if worse else "none is worse"))
-    return 1 if worse else 0
+                verdict = "BETTER: store it" if (got > stored) == (figure["better"] == "higher") else "WORSE"
+                figure["found"] = got
+            differ += verdict != "ok"
+            print(f"  {figure['path']:44} {'-' if got is None else f'{got:.4g}':>9}  stored {stored:g} +- {tolerance:g}: {verdict}")
+    print("figures: " + (f"{differ} differ" if differ else "all as stored"))
+    return differ
+
+
+def write_gate(gate, path=GATE):
+    """Stores what compare_figures found, a figure a line; returns the text."""
+    evaluations = []
+    for evaluation in gate["evaluations"]:
+        figures = []
+        for figure in evaluation["figures"]:
+            found = figure.pop("found", None)
+            figures.append(json.dumps(figure if found is None else {**figure, "stored": float(f"{found:.4g}")}))
+        evaluations.append(f'  {{"eval": {json.dumps(evaluation["eval"])}, "figures": [\n   ' + ",\n   ".join(figures) + "]}")
+    head = "".join(f" {json.dumps(key)}: {json.dumps(value)},\n" for key, value in {**gate, **ratios.taken()}.items() if key != "evaluations")
+    with open(path, "w", encoding="utf-8") as file:
+        file.write("{\n" + head + ' "evaluations": [\n' + ",\n".join(evaluations) + "]\n}\n")
 
 
 def compare_ratios(bench, wanted, shard, json_file):
@@ -114,6 +144,7 @@ def main():
     commands = parser.add_subparsers(dest="what", required=True)
     figures = commands.add_parser("figures")
     figures.add_argument("takt")
+    figures.add_argument("--store", action="store_true", help="store the figures that differ, and exit 0")
     ratio = commands.add_parser("ratios")
     ratio.add_argument("bench")
     ratio.add_argument("--suite", action="append", default=[], metavar="NAME", help="only this suite; repeatable")
@@ -121,7 +152,11 @@ def main():
     ratio.add_argument("--json", metavar="FILE", help="write what was found")
     given = parser.parse_args()
     if given.what == "figures":
-        sys.exit(compare_figures(given.takt))
+        gate = read_gate()
+        differ = compare_figures(gate, lambda command: evaluated(given.takt, command))
+        if given.store:
+            write_gate(gate)
+        sys.exit(1 if differ and not given.store else 0)
     sys.exit(compare_ratios(given.bench, given.suite, given.shard, given.json))
 
 

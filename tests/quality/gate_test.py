@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""The verdicts of ratios.py on rows that stand here; no benchmark runs."""
+"""The verdicts of gate.py and ratios.py on figures and rows that stand here; nothing is measured."""
 import contextlib
 import io
 import json
@@ -8,6 +8,7 @@ import os
 import tempfile
 import unittest
 
+import gate
 import ratios
 from ratios import FAILED, MET, UNCLEAR, WITHIN, Target, judge, null_of
 
@@ -29,6 +30,67 @@ def quietly(call, *arguments, **named):
     with contextlib.redirect_stdout(io.StringIO()) as out:
         result = call(*arguments, **named)
     return result, out.getvalue()
+
+
+class Figures(unittest.TestCase):
+    """compare_figures with an evaluation that says what stands in 99_gate.json, and with one figure of it made wrong."""
+
+    def setUp(self):
+        self.gate = gate.read_gate()
+        self.said = {evaluation["eval"]: {f["path"]: f["stored"] for f in evaluation["figures"]} for evaluation in self.gate["evaluations"]}
+
+    def differ(self):
+        def nested(command):
+            document = {}
+            for path, value in self.said[command].items():
+                *steps, last = path.split("/")
+                place = document
+                for step in steps:
+                    place = place.setdefault(step, {})
+                place[last] = value
+            return document, ""
+
+        return quietly(gate.compare_figures, self.gate, nested)
+
+    def test_as_stored(self):
+        self.assertEqual(self.differ()[0], 0)
+
+    def test_one_wrong_figure(self):
+        for evaluation in self.gate["evaluations"]:
+            for figure in evaluation["figures"]:
+                right = figure["stored"]
+                for wrong in (right + 1.01 * figure["tolerance"] + 1e-6, right - 1.01 * figure["tolerance"] - 1e-6):
+                    figure["stored"] = wrong
+                    self.assertEqual(self.differ()[0], 1, figure)
+                figure["stored"] = right
+
+    def test_no_such_figure(self):
+        self.gate["evaluations"][0]["figures"][0]["path"] += "/none"
+        self.assertIn("there is no such figure", self.differ()[1])
+
+    def test_failed_evaluation(self):
+        count = sum(len(evaluation["figures"]) for evaluation in self.gate["evaluations"])
+        self.assertEqual(quietly(gate.compare_figures, self.gate, lambda command: (None, "exit 3"))[0], count)
+
+    def test_store(self):
+        command, path = self.gate["evaluations"][0]["eval"], self.gate["evaluations"][0]["figures"][0]["path"]
+        self.said[command][path] = 77.123456
+        self.assertEqual(self.differ()[0], 1)
+        with tempfile.TemporaryDirectory() as folder:
+            gate.write_gate(self.gate, os.path.join(folder, "gate.json"))
+            stored = gate.read_gate(os.path.join(folder, "gate.json"))
+        self.assertEqual(stored["evaluations"][0]["figures"][0]["stored"], 77.12)
+        self.assertEqual(stored["evaluations"][1:], gate.read_gate()["evaluations"][1:])
+
+    def test_bad_file(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "gate.json")
+            with open(path, "w", encoding="utf-8") as file:
+                json.dump({"evaluations": [{"eval": "stereo", "figures": [{"path": "a", "better": "lower", "stored": "0.9", "tolerance": 1}]}]}, file)
+            with self.assertRaises(SystemExit) as refused, contextlib.redirect_stderr(io.StringIO()) as said:
+                gate.read_gate(path)
+        self.assertEqual(refused.exception.code, 2)
+        self.assertIn("takt eval stereo: a:", said.getvalue())
 
 
 class Verdict(unittest.TestCase):
@@ -140,7 +202,8 @@ class Whole(unittest.TestCase):
         self.assertTrue(self.judge_all(0.9)[0])
         good, report = self.judge_all(1.1)
         self.assertFalse(good)
-        self.assertEqual(report[0]["rows"][0]["verdict"], FAILED)
+        self.assertEqual(report["suites"][0]["rows"][0]["verdict"], FAILED)
+        self.assertLessEqual({"title", "machine", "date", "commit"}, report.keys())
         self.assertFalse(self.judge_all(0.9, "s/b")[0])
 
     def test_shares(self):

@@ -10,9 +10,11 @@ against itself in the same run; its ratio r0 is 1 on a quiet machine.
 
 With a noise above WIDEST hardly anything could fail. A row that only such a noise would excuse is `unclear`: its suite
 runs once more, and the second run decides about this row. There, noise counts as WIDEST at most."""
+import datetime
 import fnmatch
 import json
 import os
+import platform
 import signal
 import subprocess
 import tempfile
@@ -144,6 +146,13 @@ def share(suites, shard):
     return suites[int(part) - 1::int(parts)]
 
 
+def taken():
+    """What belongs to each figure: machine, date, commit of this checkout."""
+    commit = subprocess.run(["git", "-C", os.path.dirname(os.path.abspath(__file__)), "rev-parse", "--short=8", "HEAD"],
+                            capture_output=True, text=True, check=False).stdout.strip()
+    return {"machine": f"{os.cpu_count()} CPUs, {platform.machine()}", "date": str(datetime.date.today()), "commit": commit or "unknown"}
+
+
 def judge_all(bench, suites, json_file=None):
     """suites: [(command, [Target])]. True if no ratio failed, and no suite or row is missing."""
     outcomes = [judge_suite(bench, command, targets) for command, targets in suites]
@@ -157,5 +166,5 @@ def judge_all(bench, suites, json_file=None):
             print(text_of(found))
     if json_file:
         with open(json_file, "w", encoding="utf-8") as file:
-            json.dump(outcomes, file, indent=1)
+            json.dump({"title": "Ratios of the benchmarks against their targets", **taken(), "suites": outcomes}, file, indent=1)
     return count[FAILED] == 0 and errors == 0

@@ -4,6 +4,7 @@
 documents.py messages SOURCE          docs/faq.md is indexed by messages that the code can say
 documents.py links SOURCE             what documents link to exists, and so does what the scripts of bench/scenarios use; bench/README.md
                                       names each of them
+documents.py errata SOURCE            codes such as E-19 in documents and sources stand in docs/thesis_errata.md
 documents.py figures SOURCE           our figures in docs/thesis.md stand in the READMEs that their row links to
 documents.py commands SOURCE TAKT...  commands and options in documents are known to the programs TAKT (takt, takt-bench),
                                       files named in them exist, and a test runs every command of takt
@@ -125,6 +126,23 @@ def check_figures():
                 tell(thesis, number, f"{figure} stands in none of the documents linked")
 
 
+# Codes of docs/thesis_errata.md.
+
+CODE = re.compile(r"(?<![\w-])(?:[EA]-\d\d|[CRD]-\d+(?:\.\d+)?)(?![\w-])")
+
+
+def check_errata():
+    if CODE.findall("(E-19, R-7.5 and D-1), A-13; CODE-13, E-1900") != ["E-19", "R-7.5", "D-1", "A-13"]:
+        mistakes.append("the check does not see codes")
+    page = source / "docs" / "thesis_errata.md"
+    known = {line.split(" | ")[0].removeprefix("| ") for line in page.read_text().splitlines()}
+    sources = [path for folder in ("rt", "hal", "nodes", "graph", "tests", "bench") for path in (source / folder).rglob("*.[ch]pp")]
+    for path in documents + sources:
+        for number, line in enumerate(path.read_text().splitlines(), 1):
+            for code in set(CODE.findall(line)) - known:
+                tell(path, number, f"{code} does not stand in docs/thesis_errata.md")
+
+
 # Commands.
 
 FILE = re.compile(r"(?:graph|tests|schedules|bench|nodes|hal|docs)/[\w./-]+\.\w+")
@@ -210,6 +228,6 @@ def check_commands():
             mistakes.append(f"no script in tests/integration runs `takt {' '.join(leaf)}`")
 
 
-{"messages": check_messages, "links": check_links, "figures": check_figures, "commands": check_commands}[kind]()
+{"messages": check_messages, "links": check_links, "figures": check_figures, "errata": check_errata, "commands": check_commands}[kind]()
 print("\n".join(mistakes) or f"{kind}: nothing wrong")
 sys.exit(1 if mistakes else 0)

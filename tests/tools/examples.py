@@ -9,8 +9,9 @@
 Every ```sh block of examples/NAME/README.md is run by bash in a copy of the example's folder, which goes afterwards. The
 ```text block that follows it is what must be printed, line by line: `...` in a line stands for any text, a line of `...` alone
 for any number of lines. A block must end with exit 0; `echo "exit $?"` shows another one. All blocks of a README share the
-folder. PATH, CMAKE_PREFIX_PATH and PKG_CONFIG_PATH lead to the prefix. Exit 1: an example prints something else (the first
-difference is shown), or has no block."""
+folder. PATH, CMAKE_PREFIX_PATH and PKG_CONFIG_PATH lead to the prefix. An example whose README has `<!-- needs: COMMAND -->`
+is skipped where there is no such command. Exit 1: an example prints something else (the first difference is shown), or has no
+block. 77: all were skipped."""
 import os
 import pathlib
 import re
@@ -23,6 +24,7 @@ import time
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "examples"
 BLOCK = re.compile(r"^```(sh|text)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+NEEDS = re.compile(r"^<!-- needs: (\S+) -->$", re.MULTILINE)
 LIMIT_S = 300
 
 
@@ -95,9 +97,14 @@ def run_example(example, prefix):
     return 0
 
 
+def missing_commands(readme):
+    return [command for command in NEEDS.findall(readme) if shutil.which(command) is None]
+
+
 def check_itself():
     """What this program must see."""
     text = "a\n```sh\nls\n```\nb\n```text\none 1\n...\nlast\n```\n```sh\ntrue\n```\n"
+    assert missing_commands(text) == [] and missing_commands("<!-- needs: sh -->\n<!-- needs: no-such-one -->\n") == ["no-such-one"]
     assert steps_of(text) == [("ls\n", "one 1\n...\nlast\n"), ("true\n", None)]
     for printed, expected, same in (("one 1\nlast\n", "one ...\n...\nlast\n", True), ("one 1\nx\ny\nlast\n", "one ...\n...\nlast\n", True), ("one\n", "two\n", False),
                                     ("one\ntwo\n", "one\n", False), ("one\n", "one\ntwo\n", False), ("a.b\n", "a+b\n", False), ("x\nx\ny\n", "...\nx\ny\n", True), ("", "", True)):
@@ -126,6 +133,11 @@ def main(arguments):
     if unknown: sys.exit(f"no example {', '.join(unknown)}; there are {', '.join(path.name for path in every)}")
     chosen = [path for path in every if not names or path.name in names]
     failed = check_readmes(chosen)
+    for example in list(chosen):
+        if missing := missing_commands((example / "README.md").read_text()):
+            print(f"SKIPPED {example.name}: this machine has no {', '.join(missing)}")
+            chosen.remove(example)
+    if not chosen: return 1 if failed else 77
     if install:
         with tempfile.TemporaryDirectory(prefix="takt_prefix.") as prefix:
             subprocess.run(["cmake", "--install", arguments[1], "--prefix", prefix], check=True, stdout=subprocess.DEVNULL)

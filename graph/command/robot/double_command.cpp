@@ -183,6 +183,10 @@ void add_double(CLI::App& app, DoubleOptions& o, int& exit_code) {
   command->add_option("--baud", o.baud, "of an lms400 on a serial line (default 115200)");
   command->add_option("--world", o.world, "what it sees (default graph/worlds/lab.xml)");
   command->add_option("--seed", o.seed, "of that world's noise (default 1)");
+  command->footer(
+      "Example: takt double lms200 --pty /tmp/lms200\n"
+      "Example: takt double base --can vcan0\n"
+      "A driver opens it as the device itself. Words on the standard input break it.");
   command->callback([&] { exit_code = run_double(o); });
 }
 

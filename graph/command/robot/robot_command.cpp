@@ -235,29 +235,30 @@ void add_robot(CLI::App& app, RobotOptions& o, int& exit_code) {
   robot->require_subcommand(1);
   robot->add_option("--run", o.run, "process id of the run, where several have a robot");
   robot->add_option("--node", o.node, "the robot client, where there are several");
-  const auto add = [&](const char* name, const char* purpose, auto run) {
+  const auto add = [&](const char* name, const char* purpose, const char* example, auto run) {
     CLI::App* command = robot->add_subcommand(name, purpose);
+    command->footer(fmt::format("Example: takt robot {}{}", name, example));
     command->callback([&exit_code, run] { exit_code = run(); });
     return command;
   };
-  add("goal", "wants states: cup_1.level=full", [&] { return hand_in(o, "goal "); })
+  add("goal", "wants states: cup_1.level=full", " cup_1.level=full", [&] { return hand_in(o, "goal "); })
       ->add_option("facts", o.words, "OBJECT.ATTRIBUTE=VALUE, several")
       ->required();
-  add("tell", "tells what is so: cup_1.level=empty", [&] { return hand_in(o, "tell "); })
+  add("tell", "tells what is so: cup_1.level=empty", " cup_1.level=empty", [&] { return hand_in(o, "tell "); })
       ->add_option("facts", o.words, "OBJECT.ATTRIBUTE=VALUE, several")
       ->required();
-  add("task", "any task: drive 3 1 | rotate 90deg | ahead 0.5 | explore | do fill cup_1 bottle_2 | stop",
+  add("task", "any task: drive 3 1 | rotate 90deg | ahead 0.5 | explore | do fill cup_1 bottle_2 | stop", " drive 3 1",
       [&] { return hand_in(o, ""); })
       ->add_option("words", o.words, "the task")
       ->required();
-  add("ask", "what the robot knows of an object", [&] { return answer_about(o); })
+  add("ask", "what the robot knows of an object", " cup_1", [&] { return answer_about(o); })
       ->add_option("object", o.object, "OBJECT or OBJECT.ATTRIBUTE")
       ->required();
-  add("plan", "the plan, what its steps were to take and took", [&] { return print_text(o, ".plan"); });
-  add("map", "what the robot knows of objects", [&] {
+  add("plan", "the plan, what its steps were to take and took", "", [&] { return print_text(o, ".plan"); });
+  add("map", "what the robot knows of objects", "", [&] {
     return print_map(o);
   })->add_option("--dot", o.dot, "writes it for Graphviz (neato -n) as well");
-  add("watch", "what the robot does, line by line as it changes", [&] { return watch(o); });
+  add("watch", "what the robot does, line by line as it changes", "", [&] { return watch(o); });
 }
 
 }  // namespace takt::command

@@ -23,6 +23,7 @@ struct Options {
 void add_devices(CLI::App& app, bool& json, int& exit_code) {
   CLI::App* devices = app.add_subcommand("devices", "lists what is plugged in, and a line of the graph file for each");
   devices->add_flag("--json", json, "prints the list as JSON");
+  devices->footer("Example: takt devices");
   devices->callback([&] { exit_code = list_devices(json); });
 }
 
@@ -34,6 +35,9 @@ void add_capture(CLI::App& app, CaptureOptions& o, int& exit_code) {
       ->transform(CLI::Validator(duration, "DURATION"));
   capture->add_option("--scanner", o.scanner, "lms200 | lms400: it is asked for scans meanwhile");
   capture->add_option("--baud", o.baud, "of a serial line (default 38400)");
+  capture->footer(
+      "Example: takt capture /dev/ttyUSB0 scans.bin --scanner lms200\n"
+      "Frames of a CAN bus are written as candump writes them, of a line or connection the bytes.");
   capture->callback([&] { exit_code = capture_device(o); });
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is said to an LMS 2xx, and what it answers (SICK 8007954 chapter 7, devices.md 1.5 and 1.6). Pure functions over
+// What is said to an LMS 2xx, and what it answers (SICK 8007954 chapter 7, D-1.5 and D-1.6). Pure functions over
 // bytes.
 #pragma once
 #include <array>

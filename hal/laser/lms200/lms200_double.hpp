@@ -7,7 +7,7 @@
 
 namespace takt::lms200 {
 
-/// An LMS 200 at the end of a serial line, as devices.md 1 describes it: ACK and NAK, every command of `Command`, the
+/// An LMS 200 at the end of a serial line, as D-1 describes it: ACK and NAK, every command of `Command`, the
 /// modes of `Mode`, baud rates, the power-on telegram after a reset; a mirror of 75 turns a second, whose scan is sent
 /// if the line is free when it is complete, and is lost otherwise. A command cuts off what is being sent. Replies take
 /// as long as those of a recorded scanner took.

@@ -31,7 +31,7 @@ lms200::Variant variant_of(Settings& settings) {
   return variant;
 }
 
-/// Of the measuring modes with fields (devices.md 1.7), the one that reaches so far.
+/// Of the measuring modes with fields (D-1.7), the one that reaches so far.
 void set_range(Settings& settings, lms200::SessionSettings& session) {
   const double range_m = settings.quantity("range", Dimension::length, 8.0);
   if (range_m == 8) session.measuring_mode = 0x00;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scans of an LMS 2xx (reply B0h; SICK 8007954 chapter 7, devices.md 1.7). Pure functions over bytes.
+// Scans of an LMS 2xx (reply B0h; SICK 8007954 chapter 7, D-1.7). Pure functions over bytes.
 #pragma once
 #include <cstdint>
 #include <optional>

@@ -9,7 +9,7 @@
 
 namespace takt::lms200 {
 
-inline constexpr int64_t kTurn_ns = 13'320'000;  ///< of the mirror (devices.md 1.9)
+inline constexpr int64_t kTurn_ns = 13'320'000;  ///< of the mirror (D-1.9)
 
 struct SessionSettings {
   uint32_t baud = 38400;  ///< one of kBauds; where the line cannot do it, the highest one below

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Framing of the SICK LMS 2xx on its serial line (SICK 8007954, devices.md 1.2, 1.3 and 1.10). Pure functions over
+// Framing of the SICK LMS 2xx on its serial line (SICK 8007954, D-1.2, D-1.3 and D-1.10). Pure functions over
 // bytes: no I/O, no time, no exceptions, no heap.
 #pragma once
 #include <array>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Framing of the SICK LMS 400: four bytes 02h, length (four bytes, high one first), payload, exclusive or of the
-// payload ("CoLa B" around plain text; devices.md 2.2 and 2.6). Pure functions over bytes: no I/O, no time, no
+// payload ("CoLa B" around plain text; D-2.2 and D-2.6). Pure functions over bytes: no I/O, no time, no
 // exceptions, no heap.
 #pragma once
 #include <array>

@@ -7,7 +7,7 @@
 
 namespace takt::lms400 {
 
-/// An LMS 400 at the end of a connection or a serial line, as far as devices.md 2 knows it: login, scan configuration
+/// An LMS 400 at the end of a connection or a serial line, as far as D-2 knows it: login, scan configuration
 /// with the answer of what became of it, Run, start and stop of the stream, filters taken but without effect. Methods
 /// are answered twice. A scan is sent if the line is free when it is complete, and is lost otherwise. How long the real
 /// one takes to answer is not known; this one takes 2 ms.

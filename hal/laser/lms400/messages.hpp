@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What stands in the frames of an LMS 400: text of commands and answers, and measurements (devices.md 2.3 and 2.4).
+// What stands in the frames of an LMS 400: text of commands and answers, and measurements (D-2.3 and D-2.4).
 // Pure functions over bytes; spans and texts point into the payload.
 #pragma once
 #include <cstdint>

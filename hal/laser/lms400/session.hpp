@@ -16,7 +16,7 @@ struct SessionSettings {
   uint32_t baud = 0;         ///< 0: a connection without a rate
 };
 
-/// Beams of a scan: field of view by step, without one more at its end (devices.md 2.4).
+/// Beams of a scan: field of view by step, without one more at its end (D-2.4).
 uint32_t beams_of(const ScanConfiguration& scan);
 
 /// The host's side of a conversation with an LMS 400: stops what a dead client has left streaming, logs in, sets rate,

@@ -129,6 +129,14 @@ class Connection:
         """The value a parameter has now."""
         return self.ask(do="get", param=param)["parameters"][0]["value"]
 
+    def fault(self, device, fault, on=True):
+        """Switches a fault of a simulated device or double: fault("front_laser", "silent"); `on=False` ends it."""
+        self.ask(do="fault", device=device, fault=fault, on=on)
+
+    def faults(self):
+        """What can be switched: {"front_laser": ["silent", "unplugged", "garbage", "frozen"]}."""
+        return {device["device"]: device["faults"] for device in self.ask(do="fault")["devices"]}
+
     def mode(self, name):
         """Changes the mode of the run: mode("safe_stop")."""
         self.ask(do="mode", mode=name)

@@ -15,10 +15,18 @@ class RunFailed(RuntimeError):
     """The run did not start, or ended too early; the text has what it printed to stderr."""
 
 
+_NEWEST_REPORT = 1
+
+
 def read_report(path):
-    """The report of `takt run --report FILE`, or of --json, as a dict: read_report("report.json")["ok"]."""
+    """The report of `takt run --report FILE`, or of --json, as a dict: read_report("report.json")["ok"]. Raises Error for
+    one of a later format."""
     with open(path, encoding="utf-8") as file:
-        return json.load(file)
+        report = json.load(file)
+    if report.get("format", 1) > _NEWEST_REPORT:
+        raise Error(f"the report has format {report['format']}, and this reader knows up to {_NEWEST_REPORT}; "
+                    "use a later takt")
+    return report
 
 
 def _descends_from(pid, ancestor):
@@ -38,6 +46,7 @@ class Run:
 
         with takt.Run("graph.yaml", profile="doubles") as run:
             run.set("cruise.speed", "0.3m/s")
+            run.fault("front_laser", "silent")
             run.wait_for("obstacle_stop.stop", lambda m: m["reasons"] != 0, within_s=5)
         assert run.exit_code == 0, run.stderr
 
@@ -137,6 +146,14 @@ class Run:
         """The value a parameter has now."""
         return self._live().get(param)
 
+    def fault(self, device, fault, on=True):
+        """As Connection.fault: fault("front_laser", "silent"); `on=False` ends it."""
+        self._live().fault(device, fault, on)
+
+    def faults(self):
+        """As Connection.faults."""
+        return self._live().faults()
+
     def mode(self, name):
         """Changes the mode: mode("safe_stop")."""
         self._live().mode(name)
@@ -170,6 +187,36 @@ class Run:
             except TimeoutError:
                 break
         raise AssertionError(f"no message of {port} came true within {within_s:g} s; {seen} seen, the last: {last}")
+
+    def wait_for_device(self, device, state="ok", within_s=10.0):
+        """Waits until a device is in that state: ok, silent, disconnected, garbage, frozen, unattended.
+
+        Raises AssertionError with its state if that does not happen within `within_s`, Error for an unknown device.
+        """
+        end = time.monotonic() + within_s
+        while True:
+            states = {node["name"]: node["device"]["state"] for node in self.top()["nodes"] if "device" in node}
+            if device not in states:
+                raise Error(f"there is no device {device}; devices: {', '.join(states)}")
+            if states[device] == state:
+                return
+            if time.monotonic() >= end:
+                raise AssertionError(f"{device} is {states[device]}, not {state} within {within_s:g} s")
+            time.sleep(0.02)
+
+    def wait_for_end(self, within_s=60.0):
+        """Waits until the run ends by itself, as a graph does whose `expect` is decided. Then `report` is there.
+
+            run.wait_for_end(within_s=20)
+            assert run.report["expectations"]["met"]
+
+        Raises AssertionError if it still runs after `within_s`.
+        """
+        try:
+            self._process.wait(within_s)
+        except subprocess.TimeoutExpired:
+            raise AssertionError(f"the run did not end by itself within {within_s:g} s") from None
+        self._end()
 
     def record(self):
         """The record of the run, after the block; see read_record()."""

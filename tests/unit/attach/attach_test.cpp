@@ -17,6 +17,7 @@
 #include "graph/compose/composition.hpp"
 #include "graph/language/message_types.hpp"
 #include "graph/language/overlay.hpp"
+#include "graph/pictures/pictures.hpp"
 #include "rt/msg/grid.hpp"
 #include "rt/msg/image.hpp"
 #include "rt/msg/odometry.hpp"
@@ -124,33 +125,33 @@ TEST_CASE("every message type becomes JSON with one entry a field, and those tha
   grid.message->width = 4;
   grid.message->height = 3;
   grid.message->cells.resize(12);
-  const auto png = attach::message_png(MessageType::of<Grid>(), grid.message);
+  const auto png = message_png(MessageType::of<Grid>(), grid.message);
   REQUIRE(png);
   const cv::Mat image = cv::imdecode(std::vector<char>(png->begin(), png->end()), cv::IMREAD_COLOR);
   CHECK(image.cols == 4 * 6);
   CHECK(image.rows == 3 * 6);
   grid.message->width = 5;  // more cells than there are: it is not sound
-  CHECK_FALSE(attach::message_png(MessageType::of<Grid>(), grid.message));
+  CHECK_FALSE(message_png(MessageType::of<Grid>(), grid.message));
   Built<StereoPair> pair({.width = 3, .height = 2});
   pair.message->width = 3;
   pair.message->height = 2;
   pair.message->channels = 1;
-  const auto side_by_side = attach::message_png(MessageType::of<StereoPair>(), pair.message);
+  const auto side_by_side = message_png(MessageType::of<StereoPair>(), pair.message);
   REQUIRE(side_by_side);
   const cv::Mat both =
       cv::imdecode(std::vector<char>(side_by_side->begin(), side_by_side->end()), cv::IMREAD_UNCHANGED);
   CHECK(both.cols == 6);
   CHECK(both.rows == 2);
   Built<Odometry> odometry({});
-  CHECK_FALSE(attach::message_png(MessageType::of<Odometry>(), odometry.message));
+  CHECK_FALSE(message_png(MessageType::of<Odometry>(), odometry.message));
   Built<PointCloud> cloud({.count = 2});
   cloud.message->points.push_back({1, 2, 3});
   cloud.message->colours.push_back({4, 5, 6});
-  const auto ply = attach::message_ply(MessageType::of<PointCloud>(), cloud.message);
+  const auto ply = message_ply(MessageType::of<PointCloud>(), cloud.message);
   REQUIRE(ply);
   CHECK(ply->find("element vertex 1\n") != std::string::npos);
   CHECK(ply->ends_with("\6\5\4"));
-  CHECK_FALSE(attach::message_ply(MessageType::of<Odometry>(), odometry.message));
+  CHECK_FALSE(message_ply(MessageType::of<Odometry>(), odometry.message));
 }
 
 TEST_CASE("a type that no room knows is seen as it shows itself") {
@@ -158,12 +159,12 @@ TEST_CASE("a type that no room knows is seen as it shows itself") {
   hot.message->width = 2;
   hot.message->height = 3;
   for (uint8_t i = 0; i < 6; ++i) hot.message->pixels.push_back(static_cast<uint8_t>(40 * i));
-  const auto png = attach::message_png(MessageType::of<Thermogram>(), hot.message);
+  const auto png = message_png(MessageType::of<Thermogram>(), hot.message);
   REQUIRE(png);
   const cv::Mat image = cv::imdecode(std::vector<char>(png->begin(), png->end()), cv::IMREAD_UNCHANGED);
   REQUIRE(image.size() == cv::Size(2, 3));
   CHECK(image.at<uint8_t>(2, 1) == 200);
-  CHECK_FALSE(attach::message_ply(MessageType::of<Thermogram>(), hot.message));
+  CHECK_FALSE(message_ply(MessageType::of<Thermogram>(), hot.message));
   CHECK((MessageType::of<VelocityCommand>().show == nullptr));
 }
 

@@ -160,8 +160,17 @@ TEST_CASE("takt nodes shows ports and parameters with default, unit, range and m
   for (const char* words : {"mapper", "processing", "makes maps"}) CHECK(list.find(words) != std::string::npos);
   const std::string text = node_text(*types.find("mapper"));
   for (const char* words :
-       {"where it is (optional)", "grid", "farthest cell", " 8 m ", "1..20", "sum | max", "how cells grow"}) {
+       {"where it is (optional)", "grid", "farthest cell", "1..20", "sum | max", "how cells grow"}) {
     CAPTURE(words);
     CHECK(text.find(words) != std::string::npos);
   }
+  // Below its heading, behind two blanks: docs/reference is made from that.
+  const auto column = [&](const char* words) {
+    const size_t at = text.find(words);
+    REQUIRE(at != std::string::npos);
+    return at - text.rfind('\n', at);
+  };
+  CHECK(column("valid") == column("1..20"));
+  CHECK(column("valid") == column("sum | max"));
+  CHECK(column("meaning") == column("  how cells grow") + 2);
 }

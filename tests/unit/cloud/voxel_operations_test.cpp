@@ -147,7 +147,7 @@ TEST_CASE("interpolation closes a hole with the weighted mean of its nearest poi
   CHECK(filled(26, 7, 1.42).buffer.size() == points.size() + 1);
 }
 
-TEST_CASE("voxels over and under a plane are gaps, too, and filled within it (reference 2.2, taken at its word)") {
+TEST_CASE("voxels over and under a plane are gaps, too, and filled within it (R-2.2, taken at its word)") {
   const auto points = plane(3);
   VoxelGrid grid(points.size());
   grid.fill({points, {}}, kEdge);

@@ -107,7 +107,7 @@ Eigen::Isometry2d map_in_world(const sim::Simulation& world) {
   return Eigen::Translation2d(start.x_m, start.y_m) * Eigen::Rotation2Dd(start.theta_rad);
 }
 
-/// One image by the world's true depth: each column upwards until something stands (algorithm reference A-12), within
+/// One image by the world's true depth: each column upwards until something stands, within
 /// the range of ground_map.
 std::map<Cell, Columns> look(const sim::Simulation& world, const StereoRig& rig, int64_t stamp_ns) {
   std::vector<float> depth(static_cast<size_t>(rig.width) * static_cast<size_t>(rig.height));

@@ -8,6 +8,7 @@
 #include <random>
 #include <sstream>
 
+#include "graph/explain/file_format.hpp"
 #include "graph/explain/miss_svg.hpp"
 #include "graph/explain/sentence.hpp"
 #include "tests/unit/rt/trace_fixture.hpp"
@@ -214,4 +215,15 @@ TEST_CASE("a report says how often and how long, and that it cannot say why") {
   CHECK(text.find("longest response not known") != std::string::npos);
   CHECK(explain::report_sentence(Json::parse(R"({"name":"n","deadline_misses":0})")).empty());
   CHECK(explain::report_sentence(Json::parse(R"({"name":3,"deadline_misses":"x"})")).empty());
+}
+
+TEST_CASE("a trace says its format; a later one is refused with the Takt that it needs, one without is the first") {
+  const Json head = written(sample())["otherData"];
+  CHECK(head["format"] == explain::kTraceFormat);
+  CHECK_FALSE(explain::later_format(head, explain::kTraceFormat));
+  CHECK_FALSE(explain::later_format(Json::parse(R"({"graph":"g"})"), 1));
+  const auto later = explain::later_format(Json::parse(R"({"format":3,"commit":"abc"})"), 2);
+  REQUIRE(later);
+  CHECK(later->find("is of format 3") == 0);
+  CHECK(later->find("reads format 2; use a later Takt (commit abc wrote the file)") != std::string::npos);
 }

@@ -107,7 +107,7 @@ TEST_CASE("a laser return above the reference area means that something stands t
   CHECK(area_is_free(*scan, projection, area));
 }
 
-TEST_CASE("odometry drives along the robot's y axis (21.9)") {
+TEST_CASE("odometry drives along the robot's y axis (C-9)") {
   Odometry odometry;
   odometry.x_m = 3;
   odometry.y_m = 4;

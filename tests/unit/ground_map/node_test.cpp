@@ -261,7 +261,7 @@ TEST_CASE("ground_map: the confidence of each pixel, and the kind of terrain fro
   CHECK(confidence.message().view().at(10, 10) == 64);  // as if flooded
 }
 
-TEST_CASE("ground_map: odometry moves the window, and cells stay where they are in the map (21.9)") {
+TEST_CASE("ground_map: odometry moves the window, and cells stay where they are in the map (C-9)") {
   Bench bench({"odometry"});
   FloorPair pair(3.1), nearer(2.1);
   test::Box<Odometry> a, b;

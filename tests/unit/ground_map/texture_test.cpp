@@ -32,7 +32,7 @@ TEST_CASE("saturation and value of plain colours") {
   CHECK(saturation_value(100, 150, 200).saturation == 128);  // 127.5
 }
 
-TEST_CASE("the default reference area of a 640 x 480 image is the area that t_m is meant for (21.7)") {
+TEST_CASE("the default reference area of a 640 x 480 image is the area that t_m is meant for (C-7)") {
   const ReferenceArea area(640, 480, {});
   CHECK(area.pixels() == kDefaultAreaPx);
   CHECK(area.spans().front().y == 374);

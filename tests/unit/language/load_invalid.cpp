@@ -101,7 +101,9 @@ TEST_CASE("Unknown keys and wrong types, with the valid ones") {
   expect_graph("depth: 3", "depth: 65", "65", {"`depth` of input `disparity` of node `ego_motion`", "1 to 64"});
   expect_graph("depth: 3", "depth: three", "three", {"an integer from 1 to 64"});
   expect_graph("max_age: 150ms", "max_age: 150", "150}", {"`max_age` of input `disparity`", "write 150ms"});
-  expect_graph("takt: 1", "takt: 2", "2", {"`takt` of the graph is `2`", "1"});
+  expect_graph("takt: 1", "takt: 0", "0", {"`takt` of the graph is `0`", "1"});
+  expect_graph("takt: 1\n", "takt: 2\nfuture: {}\n", "2", {"version 2", "reads version 1", "a later Takt"});
+  expect_schedule("takt: 1\n", "takt: 2\nfuture: {}\n", "2", {"version 2", "reads version 1", "a later Takt"});
   expect_graph("name: tiny\n", "", "takt", {"the graph lacks `name`"});
   expect_graph("blind: {without: [stereo, ego_motion, planner, base]}", "blind: {}", "blind",
                {"mode `blind` lacks `without`"});
@@ -149,11 +151,14 @@ TEST_CASE("Two declarations of one type with other fields") {
          {"`camera.pair` and input `pair` of node `stereo` both call their type `stereo_pair`, but with other fields"});
 }
 
-TEST_CASE("An edge must go to the same, the next or the storage layer") {
+TEST_CASE("An edge must go to the same, the next or the storage layer, in a graph that asks for it") {
   std::string text = with(kGraph, "in: {pair: stereo.rectified,", "in: {guess: planner.guess, pair: stereo.rectified,");
   text = with(text, "exports: [planner.velocity]", "exports: [planner.velocity, planner.guess]");
-  expect(Files(text).load(), "graph.yaml", 17, 19,
-         {"`planner.guess` (layer processing)", "`ego_motion` (layer perception)"});
+  CHECK(Files(text).load().graph);
+  expect(Files(with(text, "name: tiny\n", "name: tiny\nlayers: thesis\n")).load(), "graph.yaml", 18, 19,
+         {"`planner.guess` (layer processing)", "`ego_motion` (layer perception)", "`layers: thesis`"});
+  CHECK(Files(with(kGraph, "name: tiny\n", "name: tiny\nlayers: thesis\n")).load().graph);
+  expect_graph("name: tiny\n", "name: tiny\nlayers: these\n", "these", {"these", "thesis"});
 }
 
 TEST_CASE("An edge against the hierarchy") {

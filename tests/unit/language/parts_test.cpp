@@ -67,6 +67,26 @@ TEST_CASE("a relative path starts at the file it stands in") {
   CHECK_MESSAGE(moved.load().graph, all(moved.load()));
 }
 
+TEST_CASE("plug-ins that included files name are looked for beside these; all lists are one") {
+  const Split files(kHead + "plugins: [own.so]\n", kRobot + "plugins: [robot.so, ../own.so]\n");
+  REQUIRE_MESSAGE(files.load().graph, all(files.load()));
+  const std::vector<PluginName> named = plugins_of(files.folder() / "graph.yaml");
+  REQUIRE(named.size() == 3);
+  CHECK(named[0].file == "own.so");
+  CHECK(named[0].directory == files.folder());
+  CHECK(named[1].file == "robot.so");
+  CHECK(named[1].directory == files.folder() / "parts");
+  CHECK(named[1].position.file == (files.folder() / "parts/robot.yaml").string());
+  CHECK(named[2].file == "../own.so");
+  const std::string wrong = kRobot + "plugins: [robot.so, [nested.so]]\n";
+  test::expect_at(Split(kHead + "plugins: [own.so]\n", wrong).load(), "robot.yaml", wrong, "[nested.so]",
+                  {"plugins `2` is a list", "a shared module"});
+  const std::string none = kRobot + "plugins: robot.so\n";
+  test::expect_at(Split(kHead + "plugins: [own.so]\n", none).load(), "robot.yaml", none, "plugins", {"plugins"});
+  files.write("parts/robot.yaml", kRobot + "include: [../graph.yaml]\nplugins: [robot.so]\n");  // ends all the same
+  CHECK(plugins_of(files.folder() / "graph.yaml").size() == 2);
+}
+
 TEST_CASE("an error in an included file points there") {
   const std::string wrong = with(kRobot, "driver: v4l2", "driver: v4l3");
   LoadOptions robot;
@@ -77,7 +97,9 @@ TEST_CASE("an error in an included file points there") {
   const std::string bare = with(kRobot, "takt: 1\n", "");
   test::expect(Split(kHead, bare).load(), "robot.yaml", 1, 1, {"`takt: 1` is missing"});
   const std::string newer = with(kRobot, "takt: 1\n", "takt: 2\n");
-  test::expect(Split(kHead, newer).load(), "robot.yaml", 1, 7, {"takt must be 1"});
+  test::expect(Split(kHead, newer).load(), "robot.yaml", 1, 7, {"version 2", "reads version 1", "a later Takt"});
+  const std::string older = with(kRobot, "takt: 1\n", "takt: 0\n");
+  test::expect(Split(kHead, older).load(), "robot.yaml", 1, 7, {"takt must be 1"});
 }
 
 TEST_CASE("a missing file, one that is included twice and one that includes itself are reported where they are named") {

@@ -139,7 +139,7 @@ TEST_CASE("ICP brings similar clouds together from a small offset, and never mak
       matcher.set(pair.laser.points, pair.vision.points);
       const IcpResult found = icp(matcher, {}, {});
       CHECK(found.quality.score < matcher.evaluate({}).score);
-      if (metric == Metric::thesis) continue;  // whose best pose may be another one (algorithm reference 21.4)
+      if (metric == Metric::thesis) continue;  // whose best pose may be another one (C-4)
       const PoseError error = error_of(found.moving_in_fixed, pair.vision_in_laser);
       CHECK(error.m < 0.06);  // the noise of 1000 points, none of which is seen twice
       CHECK(error.rad < 0.03);

@@ -107,7 +107,7 @@ TEST_CASE("a depth needs the support of two views, of one where there is no othe
   CHECK(one.fuse(0, {})[kMiddle] == 2);
 }
 
-TEST_CASE("without the median at the end the result lies too near, with it the bias goes (21.3)") {
+TEST_CASE("without the median at the end the result lies too near, with it the bias goes (C-3)") {
   std::mt19937 random(2);
   std::normal_distribution<float> noise(0, 0.03f);
   Views views(7, 0.01, 0);

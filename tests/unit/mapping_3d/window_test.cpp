@@ -221,7 +221,7 @@ TEST_CASE("odometry and motion give the same grid on the same drive, with turns 
     CHECK(compose(start, {a.grid_in_map, {}}).transform.x == doctest::Approx(b.grid_in_map.x));
     CHECK(b.grid_in_map.x == doctest::Approx(robot.x));
     CHECK(b.grid_in_map.y == doctest::Approx(robot.y));
-    // Forward is the robot's y: theta - 90 degrees (algorithm reference 21.9).
+    // Forward is the robot's y: theta - 90 degrees (C-9).
     const double step_m = uniform(0, 0.7), theta = robot.heading + std::numbers::pi / 2;
     robot.x += step_m * std::cos(theta);
     robot.y += step_m * std::sin(theta);

@@ -17,7 +17,7 @@ struct Expected {
   Mode to;
 };
 
-/// Algorithm reference 15.1, row by row; drive and action come back to whoever called them.
+/// row by row; drive and action come back to whoever called them.
 const std::vector<Expected> kThesis{
     {{idle}, Event::plan_task, {planning}},
     {{idle}, Event::drive_to, {drive, idle}},

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Numeric oracles 2 to 6 of the algorithm reference (section 20), and the edges of the interface.
+// Numeric oracles 2 to 6 (examples with known results), and the edges of the interface.
 #include <doctest/doctest.h>
 
 #include <cmath>

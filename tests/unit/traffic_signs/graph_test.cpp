@@ -60,7 +60,7 @@ constexpr test::DriveGraph kGraph{
       type: traffic_signs
       in: {pair: stereo.rectified, disparity: stereo.disparity}
       join: [pair, disparity]
-      params: {signs: @/signs, budget: 1s}
+      params: {budget: 1s}  # the signs are those of the share folder, not beside this graph
     probe:
       type: probe
       in: {detections: traffic_signs.detections, places: traffic_signs.places}

@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: Apache-2.0
+# takt-core.pc: core, whose only other needs are headers of the system. takt-graph.pc: the graph package with what it links.
+# Included by install.cmake, which says what is installed.
+set(TAKT_PC_FLAGS)
+if(TAKT_CPU_FLAGS)
+  set(TAKT_PC_FLAGS "-Wl,-u,takt_require_cpu ")
+endif()
+
+string(REPLACE takt::room_ takt_ roots "${TAKT_ROOMS_record};${TAKT_ROOMS_hal};${TAKT_ROOMS_graph}")
+takt_closure(linked ${roots})
+set(TAKT_PC_REQUIRES takt-core)
+set(TAKT_PC_ROOMS)
+foreach(room ${linked})
+  get_target_property(type ${room} TYPE)
+  if(room IN_LIST rooms AND type STREQUAL STATIC_LIBRARY)
+    string(APPEND TAKT_PC_ROOMS "-l${room} ")
+  endif()
+  get_target_property(links ${room} LINK_LIBRARIES)
+  foreach(link ${links})
+    if(link MATCHES "^PkgConfig::(.*)")
+      list(APPEND TAKT_PC_REQUIRES ${${CMAKE_MATCH_1}_MODULE_NAME})
+    elseif(link MATCHES "^(fmt|yaml-cpp)")
+      list(APPEND TAKT_PC_REQUIRES ${CMAKE_MATCH_1})
+    endif()
+  endforeach()
+endforeach()
+list(REMOVE_DUPLICATES TAKT_PC_REQUIRES)
+list(JOIN TAKT_PC_REQUIRES " " TAKT_PC_REQUIRES)
+
+foreach(package core graph)
+  configure_file(cmake/takt-${package}.pc.in takt-${package}.pc @ONLY)
+  install(FILES ${CMAKE_CURRENT_BINARY_DIR}/takt-${package}.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+endforeach()
