@@ -7,11 +7,13 @@
 
 #include <thread>
 
+#include "tests/nanoseconds.hpp"
+
 using namespace takt;
 
 namespace {
 
-constexpr int64_t kMs = 1'000'000;
+using takt::test::kMs;
 
 int policy() { return sched_getscheduler(0) & ~SCHED_RESET_ON_FORK; }
 
