@@ -83,14 +83,14 @@ def value_text(value, meaning):
     value = re.sub(r" ?\.\.\.| ?REQUIRED", "", value).strip()
     sort, _, valid = value.partition(":")
     among = re.fullmatch(r"\{(.*)\}", valid)
-    within = re.fullmatch(r"\w+ in \[(.*) - (.*)\]", valid)
+    within = re.fullmatch(r"\w+ in \[(.*) - (.*)\]( x \d+)?", valid)
     if among:
         words = among.group(1).split(",")
         text = "word" if all(re.search(rf"\b{re.escape(word)}\b", meaning) for word in words) else " | ".join(words)
     else:
         text = {"TEXT": "text", "INT": "whole number", "UINT": "whole number", "FLOAT": "number"}.get(sort, sort.replace("FLOAT", "number"))
         if within:
-            text += f" {within.group(1)}..{within.group(2)}"
+            text += f" {within.group(1)}..{within.group(2)}{within.group(3) or ''}"
         elif valid:
             text = {"POSITIVE": f"{text} > 0", "DURATION": "time", "DIR": "folder"}.get(valid, f"{text} ({valid})")
     return text + (", several" if several else "") + (", required" if required else "")
