@@ -37,6 +37,7 @@ class Lamp final : public Device {
 class LampNode final : public DeviceNode {
  public:
   Device& device() override { return lamp_; }
+  void setup(Setup&) override {}
   void run(Job&) override {}
 
  private:
