@@ -32,11 +32,16 @@ class FailingDevice : public Interface {
   DeviceResult start(int64_t epoch_ns) override {
     schedule_.begin(epoch_ns);
     plugged_ = true;
-    return inner_->start(epoch_ns);
+    const DeviceResult result = inner_->start(epoch_ns);
+    started_ = result.has_value();
+    return result;
   }
   void stop() override { inner_->stop(); }
   FaultSwitch* faults() override { return &schedule_.by_hand(); }
-  bool restart(int64_t now_ns) override { return plugged_ = schedule_.at(now_ns) != Misbehaviour::unplugged; }
+  bool restart(int64_t now_ns) override {
+    plugged_ = schedule_.at(now_ns) != Misbehaviour::unplugged;
+    return plugged_ && (started_ || start(now_ns).has_value());
+  }
 
  protected:
   Interface& inner() { return *inner_; }
@@ -70,7 +75,7 @@ class FailingDevice : public Interface {
  private:
   std::unique_ptr<Interface> inner_;
   FailureSchedule schedule_;
-  bool plugged_ = true;
+  bool plugged_ = true, started_ = false;
 };
 
 class FailingCamera final : public FailingDevice<StereoCamera> {
