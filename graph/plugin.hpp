@@ -2,7 +2,9 @@
 // Installed as <takt/plugin.hpp>: graph, experimental.
 // Node types, devices and messages of your own for the stock `takt`, without a program of your own.
 //
-//   void register_blink(takt::Registry& registry) { registry.nodes.add<Blink>("blink", takt::Layer::processing, "..."); }
+//   void register_blink(takt::Registry& registry) {
+//     registry.nodes.add<Blink>("blink", takt::Layer::processing, "...");
+//   }
 //   TAKT_PLUGIN(register_blink)
 //
 // Built as a shared module, and named by `plugins: [blink.so]` of a graph or by `takt run --plugin blink.so`. The same

@@ -5,11 +5,11 @@
 #include <memory>
 #include <vector>
 
-#include "rt/sched/plan_ports.hpp"
 #include "graph/language/graph.hpp"
 #include "graph/language/registry.hpp"
 #include "rt/node.hpp"
 #include "rt/sched/plan.hpp"
+#include "rt/sched/plan_ports.hpp"
 
 namespace takt::graph {
 

@@ -31,8 +31,8 @@ void pack(const MessageType& type, const Held& held, bool whole, std::vector<std
 /// `data` points into `packed`. Error: too short.
 tl::expected<MessageRecord, std::string> unpack_message(std::span<const std::byte> packed);
 
-/// The fields of the type as JSON text: name, unit, scalar, number of elements, whether it is text; so that a record can
-/// be read without this program.
+/// The fields of the type as JSON text: name, unit, scalar, number of elements, whether it is text; so that a record
+/// can be read without this program.
 std::string layout_of(const MessageType& type);
 
 }  // namespace takt::record

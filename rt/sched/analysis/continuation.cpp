@@ -52,8 +52,8 @@ class Search {
         if (!effort_.spend(1)) return false;
         const Ticks ahead = edf_ ? release + own_.deadline + piece_.slack - (at - other.jitter + other.deadline) : 1;
         if (ahead < 0) break;  // due later, as all that follow
-        // What is ready at the release and goes before the job has been served before this one did anything; of two that
-        // are due together one goes first until it is done.
+        // What is ready at the release and goes before the job has been served before this one did anything; of two
+        // that are due together one goes first until it is done.
         if (at != release || piece_.slack > 0) instants.push_back(at);
       }
     }
