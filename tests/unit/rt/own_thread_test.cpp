@@ -14,7 +14,9 @@ TEST_CASE("a thread of the runtime's own has the stack that it asks for, and is 
   size_t left = 0;
   OwnThread([&] { left = stack_left(); }).join();
   CHECK(left > OwnThread::kStack / 2);
+#if !defined(TAKT_SANITIZED)  // which gives threads stacks of another size
   CHECK(left <= OwnThread::kStack);
+#endif
   OwnThread([&] { left = stack_left(); }, 4 << 20).join();
   CHECK(left > 2 << 20);
 
