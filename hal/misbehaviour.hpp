@@ -70,7 +70,7 @@ constexpr bool has(uint32_t fault_bits, Misbehaviour how) {
 /// In the order of Misbehaviour.
 inline std::vector<Misbehaviour> faults_of(uint32_t bits) {
   std::vector<Misbehaviour> faults;
-  for (uint8_t how = 1; how < kMisbehaviours.size(); ++how)
+  for (size_t how = 1; how < kMisbehaviours.size(); ++how)
     if (has(bits, static_cast<Misbehaviour>(how))) faults.push_back(static_cast<Misbehaviour>(how));
   return faults;
 }

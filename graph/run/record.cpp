@@ -9,6 +9,7 @@
 #include <list>
 #include <stdexcept>
 
+#include "graph/language/registry.hpp"
 #include "graph/language/words.hpp"
 #include "graph/log/recorded_plan.hpp"
 #include "graph/run/machine.hpp"

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "rt/node.hpp"
+
 namespace takt {
 namespace {
 
