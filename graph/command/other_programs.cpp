@@ -61,13 +61,13 @@ int become_other_program(char** arguments, std::vector<std::string> own) {
   const auto* desk = std::find_if(std::begin(kDeskCommands), std::end(kDeskCommands),
                                   [&](const DeskCommand& command) { return command.name == name; });
   if (desk != std::end(kDeskCommands))
-    return refuse(fmt::format("takt-{0} is neither in libexec/takt, nor beside this program, nor in PATH\n"
+    return refuse(fmt::format("takt-{0} is neither in libexec/takt, nor next to this program, nor in PATH\n"
                               "  fix: `./takt {0}` of a checkout builds it (target {1})",
                               name, desk->target),
                   kDeviceOrSystem);
   for (const DeskCommand& command : kDeskCommands) own.emplace_back(command.name);
   return refuse(
-      fmt::format("there is no command `{0}`, and no program takt-{0} in libexec/takt, beside this program or "
+      fmt::format("there is no command `{0}`, and no program takt-{0} in libexec/takt, next to this program or "
                   "in PATH{1}",
                   name, graph::alternatives(name, std::move(own), "commands are")),
       kBadInput);

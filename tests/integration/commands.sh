@@ -9,12 +9,12 @@ answers() {
   expect 0 "" "$@"
   [ -s "$work/stdout" ] || fail "nothing on stdout: $*"
 }
-# tells TEXT COMMAND...: exit 0, and TEXT on stdout.
-tells() {
+# shows TEXT COMMAND...: exit 0, and TEXT on stdout.
+shows() {
   local text=$1
   shift
   expect 0 "" "$@"
-  grep -qF -- "$text" "$work/stdout" || fail "stdout lacks '$text': $*"
+  prints "$text"
 }
 # writes FILE COMMAND...: exit 0, and FILE holds something.
 writes() {
@@ -24,9 +24,9 @@ writes() {
   [ -s "$file" ] || fail "$file is empty or absent: $*"
 }
 
-tells robot_client "$takt" nodes
-tells disparities "$takt" nodes stereo
-[ ! -x "$(dirname "$takt")/takt-bench" ] || tells "what to measure" "$takt" bench --help
+shows robot_client "$takt" nodes
+shows disparities "$takt" nodes stereo
+[ ! -x "$(dirname "$takt")/takt-bench" ] || shows "what to measure" "$takt" bench --help
 expect 0 "" "$takt" devices --json
 python3 -m json.tool "$work/stdout" >/dev/null || fail "devices: no JSON"
 
@@ -46,9 +46,9 @@ writes "$work/signs/stop.xml" "$takt" train cascade --sign stop --out "$work/sig
 
 cp -r "$source/graph/objects" "$work/objects"
 view=$(ls "$work"/objects/*/*.png | head -n 1)
-tells red_box "$takt" objects list "$work/objects"
+shows red_box "$takt" objects list "$work/objects"
 answers "$takt" objects add "$work/objects" copy "$view"
-tells copy "$takt" objects list "$work/objects"
+shows copy "$takt" objects list "$work/objects"
 sed -i '/^object green_box/{n;s/.*/threshold auto auto auto 0.4/}' "$work/objects/objects.txt"
 answers "$takt" objects tune "$work/objects" --object green_box --scenes 1 --write
 grep -A 1 '^object green_box' "$work/objects/objects.txt" | grep -qE '^threshold( 0[.0-9]+| 1){3} 0\.4$' || fail "tune --write: not its three thresholds before the one of the layout"
@@ -183,14 +183,14 @@ judge() {
 }
 
 pair=(--left "$work/left.ppm" --right "$work/right.ppm" --gt "$work/truth.pgm")
-tells "level half_range" "$takt" eval stereo "${pair[@]}" --disparities 32
-tells "adaptive weight" "$takt" eval stereo "${pair[@]}" --disparities 16 --variants
+shows "level half_range" "$takt" eval stereo "${pair[@]}" --disparities 32
+shows "adaptive weight" "$takt" eval stereo "${pair[@]}" --disparities 16 --variants
 answers "$takt" eval stereo "${pair[@]}" --disparities 32 --set cost=rss --json
 judge 'r["bad_1px_pct"] < 5 and r["known_px"] == 160 * 60 and r["confidence_right"] > 0.9'
 answers "$takt" eval stereo --scene "$work/scene" --disparities 32 --json
 judge 'r["bad_1px_pct"] < 5 and r["known_px"] == 121 * 51'  # the wall is 120 by 50 px
 writes "$work/noise.png" "$takt" eval stereo --sweep noise --disparities 16 --picture "$work/noise.png"
-tells corners "$takt" eval ego_motion --generated --frames 3
+shows corners "$takt" eval ego_motion --generated --frames 3
 writes "$work/head.yaml" "$takt" calibrate stereo "$work/boards" --square 0.03 --left 'left*.ppm' --right 'right*.ppm' \
   --out "$work/head.yaml" --picture "$work/head.png" --json
 judge 'abs(r["calibration"]["baseline"] - 0.1) < 0.002 and r["calibration"]["epipolar_px"]["median"] < 0.3 and not r["rejected"]'

@@ -4,7 +4,6 @@
 source "$(dirname "$0")/lib.sh" "$@"
 
 told() { said "$1" "$work/$name.err"; }
-prints() { grep -qF -- "$1" "$work/stdout" || { cat "$work/stdout"; fail "stdout lacks '$1'"; }; }
 python() { python3 - "$@" || fail "the report is wrong"; }
 overlay=$TAKT_STATE_DIR/overlays/ace.yaml
 

@@ -27,6 +27,16 @@ expect() {
   [ -z "$text" ] || grep -qF -- "$text" "$work/stderr" || fail "stderr lacks '$text': $*"
 }
 
+# prints TEXT: the last command did, on stdout.
+prints() { grep -qF -- "$1" "$work/stdout" || { cat "$work/stdout"; fail "stdout lacks '$1'"; }; }
+
+# tells EXIT TEXT COMMAND...: as expect, with what it prints on stdout.
+tells() {
+  local code=$1 text=$2
+  shift 2
+  expect "$code" "$text" bash -c '"$@" >&2' takt "$@"
+}
+
 # figure KEY: the first one of that name in the JSON of the last command; those of variants and baseline come later.
 figure() { sed -n "s/^ *\"$1\": \([-0-9.e]*\),*$/\1/p" "$work/stdout" | head -n 1; }
 at_most() { awk "BEGIN {exit !($(figure "$1") <= $2)}" || fail "$1 is $(figure "$1"), more than $2"; }

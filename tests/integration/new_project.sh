@@ -8,10 +8,10 @@ cmake --install "$3" --prefix "$work/prefix" >"$work/install.log" || fail "canno
 takt=$work/prefix/bin/takt
 cd "$work" || exit 1
 
-# The name of the placeholder's file, of which another name contains a part.
+# A name that contains one of the templates' own words.
 expect 0 "" "$takt" new my_robot
 [ "$(find my_robot -mindepth 1 | wc -l)" -le 7 ] || fail "more than seven files: $(ls my_robot)"
-! grep -r @NAME@ my_robot || fail "a placeholder is left"
+! grep -r @NAME@ my_robot || fail "a name is not filled in"
 expect 2 "my_robot is there already" "$takt" new my_robot
 expect 2 "\`2robot\` is no name of a project" "$takt" new 2robot
 expect 2 "\`class\` is a word of C++" "$takt" new class

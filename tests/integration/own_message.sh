@@ -4,31 +4,26 @@
 source "$(dirname "$0")/lib.sh" "$@"
 kitchen=$3
 
-prints() { # prints EXIT TEXT COMMAND...: as expect, with what it prints on stdout
-  local code=$1 text=$2
-  shift 2
-  expect "$code" "$text" bash -c '"$@" >&2' takt "$@"
-}
 
 record() { # record NAME LIMIT
-  prints 0 "nothing lost" "$kitchen" run "$source/examples/own_message/kitchen.yaml" --clock virtual --for 3s \
+  tells 0 "nothing lost" "$kitchen" run "$source/examples/own_message/kitchen.yaml" --clock virtual --for 3s \
     --set "alarm.limit=$2" --record "$work/$1.mcap" --output "$work/out"
 }
 
 echo "=== takt log info|echo|export|diff|cut"
 record run 30degC
 record lower 29degC
-prints 2 "type" "$takt" replay "$work/run.mcap" --output "$work/out"  # this takt does not have the nodes
+tells 2 "type" "$takt" replay "$work/run.mcap" --output "$work/out"  # this takt does not have the nodes
 "$takt" log info "$work/run.mcap" --json >"$work/info.json" || fail "log info"
 "$takt" log echo "$work/run.mcap" --items 1000000000 >"$work/lines" || fail "log echo"
-prints 0 '"message":{"celsius":30.5,"number":21}' "$takt" log echo "$work/run.mcap" alarm.hot
-prints 2 'did you mean `alarm.hot`' "$takt" log echo "$work/run.mcap" alarm.hat
-prints 0 "temperature" "$takt" log export "$work/run.mcap" -o "$work/export.mcap"
+tells 0 '"message":{"celsius":30.5,"number":21}' "$takt" log echo "$work/run.mcap" alarm.hot
+tells 2 'did you mean `alarm.hot`' "$takt" log echo "$work/run.mcap" alarm.hat
+tells 0 "temperature" "$takt" log export "$work/run.mcap" -o "$work/export.mcap"
 grep -q "cannot be read\|hash only" "$work/stderr" && fail "the export leaves messages out"
-prints 0 "the same" "$takt" log diff "$work/run.mcap" "$work/run.mcap"
-prints 1 "alarm.hot: 9 of 9 common messages differ, 0 only in the first, 2 only in the second; first 1: stamp" \
+tells 0 "the same" "$takt" log diff "$work/run.mcap" "$work/run.mcap"
+tells 1 "alarm.hot: 9 of 9 common messages differ, 0 only in the first, 2 only in the second; first 1: stamp" \
   "$takt" log diff "$work/run.mcap" "$work/lower.mcap"
-prints 0 "jobs" "$takt" log cut "$work/run.mcap" --from 1 --to 2 -o "$work/cut.mcap"
+tells 0 "jobs" "$takt" log cut "$work/run.mcap" --from 1 --to 2 -o "$work/cut.mcap"
 "$takt" log echo "$work/cut.mcap" oven.inside >"$work/cut"
 "$takt" log echo "$work/cut.mcap" oven.inside | grep -vxFf "$work/lines" && fail "the cut holds messages that the record does not"
 [ "$(wc -l <"$work/cut")" -ge 10 ] && [ "$(wc -l <"$work/cut")" -lt 30 ] || fail "the cut has $(wc -l <"$work/cut") temperatures"
@@ -62,7 +57,7 @@ until "$takt" top --once --run $run >/dev/null 2>&1; do
   kill -0 $run 2>/dev/null || { fail "the run ended before it could be attached to"; break; }
   sleep 0.1
 done
-prints 0 '"celsius":' "$takt" echo oven.inside --run $run
+tells 0 '"celsius":' "$takt" echo oven.inside --run $run
 expect 0 "" "$takt" stop --run $run
 wait $run || fail "the live run: exit $?"
 finish

@@ -3,11 +3,6 @@
 # a changed parameter is named; a killed run and a full disk leave a record that says what it lacks.
 source "$(dirname "$0")/lib.sh" "$@"
 
-tells() { # tells EXIT TEXT COMMAND...: as expect, with what it prints on stdout
-  local code=$1 text=$2
-  shift 2
-  expect "$code" "$text" bash -c '"$@" >&2' takt "$@"
-}
 
 echo "=== virtual time: two runs, one content"
 for i in 1 2; do

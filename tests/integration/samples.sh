@@ -7,11 +7,6 @@ mkdir "$work/old"
 cp -L "$old"/*.yaml "$old"/lab.* "$work/old/"
 output=(--output "$work/out")
 
-tells() { # tells EXIT TEXT COMMAND...: as expect, with what it prints on stdout
-  local code=$1 text=$2
-  shift 2
-  expect "$code" "$text" bash -c '"$@" >&2' takt "$@"
-}
 
 # later FILE TEXT COMMAND...: exit 2, and of the errors there is one
 later() {

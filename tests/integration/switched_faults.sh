@@ -33,7 +33,6 @@ nodes:
   obstacle_stop: {rate: 15, offset: 20ms, deadline: 60ms, criticality: high}
 YAML
 
-prints() { grep -qF -- "$1" "$work/stdout" || { cat "$work/stdout"; fail "stdout lacks '$1'"; }; }
 switch() { expect 0 "" "$takt" fault "$@" --run $run; }
 # is DEVICE STATE: waits until the run says so of the device
 is() {
