@@ -42,11 +42,6 @@ struct Bench : test::CanBench<CanBase, BaseDouble> {
 
 }  // namespace
 
-TEST_CASE("can base conforms") {
-  Bench bench;
-  test::check_mobile_base(bench.driver, true, [&](int64_t at_ns) { bench.pace(at_ns); });
-}
-
 TEST_CASE("can base: the table is that of the DBC file") {
   test::check_table(messages(), std::filesystem::path(TAKT_SOURCE_DIR) / "hal/base/ace_base.dbc");
 }

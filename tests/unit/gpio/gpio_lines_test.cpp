@@ -1,64 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // The driver of GPIO lines against a double of the chip, call by call, in virtual time.
-#include "hal/gpio/gpio_lines.hpp"
-
 #include <doctest/doctest.h>
 
 #include <random>
 
-#include "hal/gpio/chip_double.hpp"
-#include "tests/conformance/devices.hpp"
-#include "tests/nanoseconds.hpp"
+#include "tests/unit/gpio/bench.hpp"
 
 using namespace takt;
 using namespace takt::gpio;
 
-namespace {
-
 using test::kMs;
-enum Offset : uint32_t { kFree, kStop, kButton, kLamp, kLids, kTrigger };
-
-struct Bench {
-  VirtualClock clock{1'000'000'000};
-  ChipDouble chip{{"free", "estop", "button", "lamp", "eyelid_power", "camera_trigger"}, clock};
-  GpioLines driver;
-
-  explicit Bench(int64_t debounce_ns = 5 * kMs)
-      : driver("lines",
-               {.chip = "/dev/gpiochip9",
-                .inputs = {"estop", "2"},
-                .outputs = {"lamp"},
-                .powered = {"eyelid_power"},
-                .trigger = "camera_trigger",
-                .debounce_ns = debounce_ns},
-               chip.chip(), clock) {
-    chip.set(kStop, true);
-  }
-  void start() {
-    REQUIRE(driver.open().has_value());
-    REQUIRE(driver.start(clock.now_ns()).has_value());
-  }
-  LinesReading read(int64_t after_ms) {
-    clock.advance_to(clock.now_ns() + after_ms * kMs);
-    return driver.read(clock.now_ns());
-  }
-};
-
-}  // namespace
-
-TEST_CASE("gpio lines conform") {
-  for (const int64_t debounce_ns : {int64_t{0}, 5 * kMs}) {
-    Bench bench(debounce_ns);
-    // Each change is given the time that it takes to count.
-    test::check_digital_lines(
-        bench.driver, 0,
-        [&](uint32_t, bool level) {
-          bench.chip.set(kStop, level);
-          bench.clock.advance_to(bench.clock.now_ns() + 10 * kMs);
-        },
-        [&](int64_t at_ns) { bench.clock.advance_to(std::max(at_ns, bench.clock.now_ns())); });
-  }
-}
 
 TEST_CASE("gpio lines: a stop counts at once, its release only when it lasts") {
   Bench bench;

@@ -46,11 +46,6 @@ struct Bench : test::CanBench<CanHead, HeadDouble> {
 
 }  // namespace
 
-TEST_CASE("can head conforms") {
-  Bench bench;
-  test::check_camera_head(bench.driver, [&](int64_t at_ns) { bench.pace(at_ns); });
-}
-
 TEST_CASE("can head: what it asks the head for next") {
   const HeadAngles target{10, 5};
   HeadView view;

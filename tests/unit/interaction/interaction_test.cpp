@@ -1,8 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
-#include <fcntl.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include <fstream>
 
@@ -14,10 +11,11 @@
 #include "rt/msg/text_status.hpp"
 #include "rt/sched/port_access.hpp"
 #include "rt/testing.hpp"
-#include "tests/conformance/devices.hpp"
 #include "tests/temporary_folder.hpp"
+#include "tests/unit/interaction/fifo.hpp"
 
 using namespace takt;
+using test::Fifo;
 
 namespace {
 
@@ -28,32 +26,7 @@ std::string contents(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-/// A FIFO, written to by somebody else.
-struct Fifo {
-  test::TemporaryFolder folder;
-  std::filesystem::path in = folder.path / "tasks", out = folder.path / "speech";
-  Fifo() { REQUIRE(mkfifo(in.c_str(), 0600) == 0); }
-  void write(const std::string& text) const {
-    const int fd = open(in.c_str(), O_WRONLY | O_NONBLOCK | O_CLOEXEC);
-    REQUIRE(fd >= 0);
-    CHECK(::write(fd, text.data(), text.size()) == static_cast<ssize_t>(text.size()));
-    close(fd);
-  }
-};
-
 }  // namespace
-
-TEST_CASE("the conformance suite: script and console") {
-  ScriptedPerson script({{2 * test::kDevicePeriod, "goal cup_1.level=full"}, {4 * test::kDevicePeriod, "stop"}},
-                        [](int64_t epoch_ns) { return epoch_ns; });
-  test::check_interaction(script);
-  const Fifo fifo;
-  Console console("person", {fifo.in, fifo.out});
-  test::check_interaction(console, [&](int64_t at_ns) {
-    if (at_ns == test::kDeviceEpoch + 2 * test::kDevicePeriod) fifo.write("goal cup_1.level=full\n");
-    if (at_ns == test::kDeviceEpoch + 4 * test::kDevicePeriod) fifo.write("stop\n");
-  });
-}
 
 TEST_CASE("scripts and their mistakes") {
   const auto script = parse_task_script(" 2s goal cup_1.level=full; 500 ms  stop");

@@ -6,20 +6,14 @@
 
 #include "hal/sim/sim_camera.hpp"
 #include "hal/sim/sim_devices.hpp"
-#include "tests/conformance/devices.hpp"
 #include "tests/conformance/stereo_camera.hpp"
 #include "tests/unit/sim/small_world.hpp"
 
 using namespace takt;
 using namespace takt::sim;
+using test::path_world;
 
 namespace {
-
-World path_world() {
-  World world = test::small_world();
-  world.clients[0].path = test::small_path();
-  return world;
-}
 
 constexpr int64_t kHour = 3'600'000'000'000;
 
@@ -32,47 +26,6 @@ std::vector<uint8_t> exposure(Simulation& s, const Clock& clock, int64_t epoch_n
 }
 
 }  // namespace
-
-TEST_CASE("sim camera conforms") {
-  // One world for each camera, as the world keeps the epoch of its first user.
-  std::vector<std::unique_ptr<Simulation>> worlds;
-  const auto make = [&](const Clock& clock) -> std::unique_ptr<StereoCamera> {
-    worlds.push_back(std::make_unique<Simulation>(path_world(), 0, 3));
-    return std::make_unique<SimCamera>("camera", SimCameraSettings{test::small_rig(), {}, {15, 1}, true},
-                                       *worlds.back(), clock);
-  };
-  test::check_stereo_camera(make);
-  test::check_free_running_camera(make);
-}
-
-TEST_CASE("sim laser, head, base and lines conform") {
-  {
-    const auto s = test::small_simulation();
-    SimLaser laser("laser", {}, *s);
-    test::check_laser_scanner(laser);
-  }
-  {
-    const auto s = test::small_simulation();
-    SimHead head("head", *s);
-    test::check_camera_head(head);
-  }
-  {
-    const auto s = test::small_simulation();
-    SimBase base("base", {}, *s);
-    test::check_mobile_base(base, true);
-  }
-  {
-    Simulation s(path_world(), 0, 3);
-    SimBase base("base", {}, s);
-    test::check_mobile_base(base, false);
-  }
-  {
-    const auto s = test::small_simulation();
-    SimLines lines("lines", *s);
-    test::check_digital_lines(
-        lines, 0, [&](uint32_t line, bool level) { s->force_line(line, level ? 1 : 0); }, test::no_pace);
-  }
-}
 
 TEST_CASE("what the camera sees depends on seed and exposure only, not on the thread that rendered it") {
   MonotonicClock real;

@@ -7,10 +7,8 @@
 
 #include "hal/sim/failing_devices.hpp"
 #include "hal/sim/sim_objects.hpp"
-#include "rt/msg/ace/action.hpp"
 #include "rt/msg/ace/object_reports.hpp"
 #include "rt/testing.hpp"
-#include "tests/conformance/devices.hpp"
 #include "tests/has.hpp"
 #include "tests/unit/sim/acting_world.hpp"
 
@@ -68,31 +66,6 @@ std::string error_of(PerceptionModel model) {
 }
 
 }  // namespace
-
-TEST_CASE("object sensor and actor conform, also behind what would make them fail") {
-  const auto failures = [] { return FailureSchedule(*parse_failures("silent 900s..901s")); };
-  const ActionCommand good = test::action_command(1, "open", "bottle"), bad = test::action_command(2, "open", "crate");
-  {
-    Simulation s(test::acting_stage(kEye), 2);
-    SimObjectSensor sensor("sensor", {}, s);
-    test::check_object_sensor(sensor);
-  }
-  {
-    Simulation s(test::acting_stage(kEye), 2);
-    FailingObjectSensor sensor(std::make_unique<SimObjectSensor>("sensor", PerceptionModel{}, s), failures());
-    test::check_object_sensor(sensor);
-  }
-  {
-    Simulation s(test::acting_stage(), 0);
-    SimActor actor("actor", s);
-    test::check_actor(actor, good, bad);
-  }
-  {
-    Simulation s(test::acting_stage(), 0);
-    FailingActor actor(std::make_unique<SimActor>("actor", s), failures());
-    test::check_actor(actor, good, bad);
-  }
-}
 
 TEST_CASE("an object is reported with its name, place in the robot frame and attributes of the instant") {
   Sensor sensor({}, R"(<event at="2s" object="cup" attr="level" value="full"/>

@@ -49,4 +49,11 @@ inline sim::PathRequest small_path() {
   return {{{1.5, 2.5}, {2.3, 1.5}, {3.2, 1.4}, {3.3, 2.6}, {2.6, 3.6}, {1.7, 3.4}}, 0.4, 0.35, 0.3, true};
 }
 
+/// Of one client that drives along small_path().
+inline sim::World path_world() {
+  sim::World world = small_world();
+  world.clients[0].path = small_path();
+  return world;
+}
+
 }  // namespace takt::test
