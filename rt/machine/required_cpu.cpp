@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// In every program: a processor older than the build's floor (TAKT_CPU) ends it with a sentence in place of SIGILL.
-// This file alone is compiled for any x86-64, and its check runs before all other initialisation.
+// In every program: a processor older than the build's floor (TAKT_CPU) ends it with a sentence in place of SIGILL. This
+// file alone is compiled for any x86-64, and its check runs before all other initialisation.
 #ifdef TAKT_REQUIRES_CPU
 #include <unistd.h>
 
