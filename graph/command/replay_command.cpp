@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <ctime>
+#include <functional>
 #include <optional>
 #include <sstream>
 
@@ -68,16 +69,23 @@ void force_simd(const VectorTargets& vectors, const std::string& recorded) {
 
 class Replay {
  public:
-  Replay(plugin::Plugins& plugins, const ReplayOptions& options)
-      : options_(options), plugins_(plugins), prepared_(plugins.registry()) {}
+  Replay(const Registry& registry, const ReplayOptions& options) : options_(options), prepared_(registry) {}
 
-  int run() {
+  /// Reads the record: what it says of its run. Throws Refused, as run() does.
+  RunOptions& open() {
     auto file = record::LogFile::open(options_.log);
     if (!file) throw Refused{file.error()};
     file_.emplace(std::move(*file));
     for (const std::string& damage : file_->damages())
       std::fprintf(stderr, "takt: the record is not whole: %s\n", damage.c_str());
-    force_simd(plugins_.registry().vectors, fact(file_->facts(), "simd"));
+    read_options();
+    return run_;
+  }
+
+  /// After open(), once `registry` has the plug-ins that its options name.
+  int run() {
+    check_plugins(run_.load.plugins);
+    force_simd(prepared_.registry.vectors, fact(file_->facts(), "simd"));
     if (const int code = compose(); code != kOk) return code;
     check_sameness();
     const record::ReplayResult result = replay();
@@ -85,9 +93,9 @@ class Replay {
   }
 
  private:
-  int compose() {
+  void read_options() {
     const mcap::Metadata& facts = file_->facts();
-    RunOptions run;
+    RunOptions& run = run_;
     run.graph = options_.graph.empty() ? std::filesystem::path(fact(facts, "graph")) : options_.graph;
     if (!std::filesystem::exists(run.graph))
       throw Refused{fmt::format("the graph {} of the record is not there; name it: takt replay {} GRAPH",
@@ -106,24 +114,24 @@ class Replay {
     run.clock = fact(facts, "clock");
     run.output = options_.output;
     run.seed = std::strtoull(fact(facts, "seed").c_str(), nullptr, 10);
-    recorded_ = attached_json(*file_, "plan.json");
     run.load.plugin_files = options_.plugin_files;
-    int code = plugins_.load(run.graph, run.load);
-    if (code != kOk) return code;
-    check_plugins(run.load.plugins);
-    code = load(run, prepared_);
+    recorded_ = attached_json(*file_, "plan.json");
+  }
+
+  int compose() {
+    int code = load(run_, prepared_);
     if (code == kOk) {
       tell_ignored_overlay(prepared_.graph->name, "the record says which values held");
       RecordedFacts facts(recorded_);
       graph::ComposeOptions& how = composed_;
       how.output = options_.output;
-      how.seed = run.seed;
+      how.seed = run_.seed;
       how.exchange = &facts;
       how.owns = [this](const std::string& id) {
         return std::none_of(prepared_.graph->devices.begin(), prepared_.graph->devices.end(),
                             [&](const graph::DeviceSpec& device) { return device.id == id; });
       };
-      code = command::compose(run, how, prepared_);
+      code = command::compose(run_, how, prepared_);
       how.exchange = nullptr;
     }
     if (code != kOk) tell_problems(prepared_.problems.size());
@@ -318,7 +326,7 @@ class Replay {
   }
 
   const ReplayOptions& options_;
-  plugin::Plugins& plugins_;
+  RunOptions run_;  ///< of the record, and what the command line says
   MonotonicClock clock_;
   std::optional<record::LogFile> file_;
   Json recorded_;
@@ -328,17 +336,10 @@ class Replay {
   size_t processes_ = 1;
 };
 
-}  // namespace
-
-int replay(plugin::Plugins& plugins, const ReplayOptions& options) {
-  std::error_code error;
-  std::filesystem::create_directories(options.output, error);
-  if (error)
-    return refuse(fmt::format("--output {}: {}; choose a writable folder", options.output.string(), error.message()),
-                  kBadInput);
-  const StopOnSignal guard;
+/// The exit code of `command`, also where it is refused.
+int judged(const ReplayOptions& options, const std::function<int()>& command) {
   try {
-    return Replay(plugins, options).run();
+    return command();
   } catch (const Refused& refused) {
     return refuse(refused.why, kBadInput);
   } catch (const std::runtime_error& problem) {  // processes
@@ -347,6 +348,24 @@ int replay(plugin::Plugins& plugins, const ReplayOptions& options) {
     return refuse(fmt::format("{}: what it says of its graph cannot be read: {}", options.log.string(), problem.what()),
                   kBadInput);
   }
+}
+
+}  // namespace
+
+int replay(plugin::Plugins& plugins, const ReplayOptions& options) {
+  std::error_code error;
+  std::filesystem::create_directories(options.output, error);
+  if (error)
+    return refuse(fmt::format("--output {}: {}; choose a writable folder", options.output.string(), error.message()),
+                  kBadInput);
+  return judged(options, [&] {
+    Replay replay(plugins.registry(), options);
+    RunOptions& run = replay.open();
+    return plugins.carry_out(run.graph, run.load, [&](const Registry&) {
+      const StopOnSignal guard;
+      return judged(options, [&] { return replay.run(); });
+    });
+  });
 }
 
 void add_replay(CLI::App& app, plugin::Plugins& plugins, ReplayOptions& o, int& exit_code) {

@@ -41,8 +41,25 @@ std::unique_ptr<Node> make_node(const NodeSpec& spec, const NodeTypes& types) {
   return node;
 }
 
+/// What the registry's `setting_up` is told while it lives: whose setup it is that crashes or never returns.
+class Told {
+ public:
+  Told(const Registry& registry, const Position& at, const std::string& node) : told_(registry.setting_up) {
+    if (told_) told_(to_string(Problem{at, node}));
+  }
+  ~Told() {
+    if (told_) told_({});
+  }
+  Told(const Told&) = delete;
+  Told& operator=(const Told&) = delete;
+
+ private:
+  const std::function<void(std::string_view)>& told_;
+};
+
 void give_setup(Node& node, const TaskPlan& task, size_t t, const GraphSpec& graph, const Clock& clock,
-                const ComposeOptions& options) {
+                const ComposeOptions& options, const Registry& registry, const Position& at) {
+  const Told told(registry, at, task.name);
   Setup setup{clock, graph.directory, options.output, options.seed + t, task.rate, task.offset_ns};
   node.setup(setup);
 }
@@ -284,7 +301,7 @@ class Composer {
   bool call_setup(size_t t, ComposeError& error) {
     TaskPlan& task = result_.plan.tasks[t];
     try {
-      give_setup(*task.node, task, t, graph_, clock_, options_);
+      give_setup(*task.node, task, t, graph_, clock_, options_, registry_, positions_[t]);
       return true;
     } catch (const std::exception& problem) {
       error.problems.push_back({positions_[t], fmt::format("{}: {}", task.name, problem.what())});
@@ -320,7 +337,7 @@ std::unique_ptr<Node> make_again(const GraphSpec& graph, const Registry& registr
   for (size_t i = 0; i < node->inputs().size(); ++i)
     if (const InputPort& before = *task.node->inputs()[i]; before.connected())
       PortAccess::connect(*node->inputs()[i], before.capacity());
-  give_setup(*node, task, t, graph, clock, options);
+  give_setup(*node, task, t, graph, clock, options, registry, spec->position);
   for (ParamBase* param : node->params()) param->end_setup();
   return node;
 }

@@ -2,8 +2,10 @@
 // Installed as <takt/registry.hpp>: graph, experimental.
 #pragma once
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "hal/device_types.hpp"
@@ -39,6 +41,9 @@ struct Registry {
   Pictures pictures;
   VectorTargets vectors;
   std::vector<void (*)()> before_jobs;  ///< called in each process that runs jobs, before it makes threads
+  /// Called before the setup of each node with "FILE:LINE:COLUMN: error: NODE", and with "" after it; empty: nobody
+  /// asks.
+  std::function<void(std::string_view node)> setting_up = {};
 };
 
 }  // namespace takt

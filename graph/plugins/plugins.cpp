@@ -23,6 +23,7 @@
 #include "graph/cli/outcome.hpp"
 #include "graph/log/recorded_plan.hpp"
 #include "graph/plugin.hpp"
+#include "graph/plugins/child.hpp"
 
 namespace takt::plugin {
 namespace {
@@ -68,14 +69,17 @@ Result load_here(const std::filesystem::path& file, Registry& registry, bool tri
   return {};
 }
 
-/// Ends the process: the answer in the pipe is the error and a zero; only a zero if there is none.
-[[noreturn]] void try_in_child(const std::filesystem::path& file, Registry& registry, int answer) {
+/// Ends the process: the answer in the pipe is the error and a zero; only a zero if there is none. Those `before` it
+/// have passed their trial.
+[[noreturn]] void try_in_child(const std::filesystem::path& file, const std::vector<Plugin>& before, Registry& registry,
+                               int answer) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
-  setpgid(0, 0);  // ends together with processes of its own
   const rlimit no_core{0, 0};
   setrlimit(RLIMIT_CORE, &no_core);
   dup2(STDERR_FILENO, STDOUT_FILENO);  // what it prints is no part of this command's output
-  const Result result = load_here(file, registry, true);
+  Result result;
+  for (size_t i = 0; i < before.size() && result; ++i) result = load_here(before[i].file, registry, false);
+  if (result) result = load_here(file, registry, true);
   const std::string text = result ? std::string() : result.error();
   const auto written = write(answer, text.c_str(), text.size() + 1);
   _exit(written == static_cast<ssize_t>(text.size()) + 1 ? 0 : 1);
@@ -106,12 +110,14 @@ std::string ending(int status) {
   return fmt::format("ends the process while it is loaded (exit {})", WEXITSTATUS(status));
 }
 
-Result try_out(const std::filesystem::path& file, Registry& registry, std::chrono::milliseconds patience) {
+Result try_out(const std::filesystem::path& file, const std::vector<Plugin>& before, Registry& registry,
+               std::chrono::milliseconds patience) {
   int ends[2];
   if (pipe2(ends, O_CLOEXEC) != 0) return tl::make_unexpected(fmt::format("no pipe: {}", std::strerror(errno)));
   std::fflush(nullptr);
+  const Orphans orphans;
   const pid_t child = fork();
-  if (child == 0) try_in_child(file, registry, ends[1]);
+  if (child == 0) try_in_child(file, before, registry, ends[1]);
   const int fork_error = errno;
   close(ends[1]);
   bool late = false;
@@ -122,7 +128,6 @@ Result try_out(const std::filesystem::path& file, Registry& registry, std::chron
   int status = 0;
   while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }
-  kill(-child, SIGKILL);  // what it left running
   if (late)
     return tl::make_unexpected(
         fmt::format("is still not loaded after {} s: an endless loop in an initialiser or in its function?",
@@ -130,6 +135,14 @@ Result try_out(const std::filesystem::path& file, Registry& registry, std::chron
   if (!answer) return tl::make_unexpected(ending(status));
   if (!answer->empty()) return tl::make_unexpected(*answer);
   return {};
+}
+
+/// On stderr; the exit code.
+int tell(const std::vector<graph::Problem>& problems) {
+  if (problems.empty()) return command::kOk;
+  command::tell(problems);
+  command::tell_problems(problems.size());
+  return command::kBadInput;
 }
 
 }  // namespace
@@ -162,8 +175,8 @@ tl::expected<std::string, std::string> abi_of(const std::filesystem::path& file)
   return std::string(content.c_str() + at + kMark.size());
 }
 
-tl::expected<void, std::string> load(const std::filesystem::path& file, Registry& registry,
-                                     std::chrono::milliseconds patience) {
+tl::expected<void, std::string> judge(const std::filesystem::path& file, const std::vector<Plugin>& before,
+                                      Registry& registry, std::chrono::milliseconds patience) {
   const auto named = [&](const std::string& why) {
     return tl::make_unexpected(fmt::format("plug-in {}: {}", file.string(), why));
   };
@@ -172,34 +185,59 @@ tl::expected<void, std::string> load(const std::filesystem::path& file, Registry
   if (*abi != kAbi)
     return named(
         fmt::format("was built for another Takt: {}; build it again with this one", abi_difference(*abi, kAbi)));
-  if (const Result tried = try_out(file, registry, patience); !tried) return named(tried.error());
-  if (const Result loaded = load_here(file, registry, false); !loaded) return named(loaded.error());
+  if (const Result tried = try_out(file, before, registry, patience); !tried) return named(tried.error());
   return {};
 }
 
-tl::expected<void, std::string> Plugins::add(const std::filesystem::path& file, const std::filesystem::path& beside) {
+tl::expected<void, std::string> Plugins::add(const std::filesystem::path& file, const std::filesystem::path& beside,
+                                             const graph::Position& position) {
   const std::string name = file.filename();
-  if (std::any_of(loaded_.begin(), loaded_.end(), [&](const auto& loaded) { return loaded.name == name; })) return {};
+  if (std::any_of(found_.begin(), found_.end(), [&](const auto& plugin) { return plugin.fact.name == name; }))
+    return {};
   const auto found = find(file, {beside, folder()});
   if (!found) return tl::make_unexpected(found.error());
-  const auto result = plugin::load(*found, registry_);
-  if (result) loaded_.push_back({name, log::file_hash(*found)});
+  const auto result = judge(*found, found_, registry_);
+  if (result) found_.push_back({*found, position, {name, log::file_hash(*found)}});
   return result;
 }
 
-int Plugins::load(const std::filesystem::path& graph, graph::LoadOptions& options) {
+int Plugins::find_all(const std::filesystem::path& graph, graph::LoadOptions& options) {
   std::vector<graph::Problem> problems;
-  for (const auto& file : options.plugin_files)
-    if (const auto added = add(file, ""); !added) problems.push_back({{"--plugin", 0, 0}, added.error()});
+  const auto take = [&](const std::filesystem::path& file, const std::filesystem::path& beside,
+                        const graph::Position& position) {
+    if (const auto added = add(file, beside, position); !added) problems.push_back({position, added.error()});
+  };
+  for (const auto& file : options.plugin_files) take(file, "", {"--plugin", 0, 0});
   if (!graph.empty())
-    for (const graph::PluginName& named : graph::plugins_of(graph))
-      if (const auto added = add(named.file, named.directory); !added)
-        problems.push_back({named.position, added.error()});
-  options.plugins = loaded_;
-  if (problems.empty()) return command::kOk;
-  command::tell(problems);
-  command::tell_problems(problems.size());
-  return command::kBadInput;
+    for (const graph::PluginName& named : graph::plugins_of(graph)) take(named.file, named.directory, named.position);
+  options.plugins.clear();
+  for (const Plugin& plugin : found_) options.plugins.push_back(plugin.fact);
+  return tell(problems);
+}
+
+int Plugins::load_here() {
+  std::vector<graph::Problem> problems;
+  for (const Plugin& plugin : found_)
+    if (const Result loaded = plugin::load_here(plugin.file, registry_, false); !loaded)
+      problems.push_back({plugin.position, fmt::format("plug-in {}: {}", plugin.file.string(), loaded.error())});
+  return tell(problems);
+}
+
+int Plugins::load(const std::filesystem::path& graph, graph::LoadOptions& options) {
+  const int code = find_all(graph, options);
+  return code == command::kOk ? load_here() : code;
+}
+
+int Plugins::carry_out(const std::filesystem::path& graph, graph::LoadOptions& options,
+                       const std::function<int(const Registry&)>& command) {
+  if (const int code = find_all(graph, options); code != command::kOk) return code;
+  if (found_.empty()) return command(registry_);
+  std::vector<std::string> names;
+  for (const Plugin& plugin : found_) names.push_back(plugin.fact.name);
+  return in_child(registry_, names, [&] {
+    const int code = load_here();
+    return code == command::kOk ? command(registry_) : code;
+  });
 }
 
 }  // namespace takt::plugin

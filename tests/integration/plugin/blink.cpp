@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // A plug-in for plugin.sh, as a stranger writes it. The environment variable BLINK says what goes wrong while it is
-// loaded, the parameter `trouble` what goes wrong in the job of that number.
+// loaded or in the setup of a blinker, the parameter `trouble` what goes wrong in the job of that number.
 #include <unistd.h>
 
 #include <algorithm>
+#include <csignal>
 #include <cstdlib>
 #include <stdexcept>
 #include <string_view>
@@ -34,6 +35,20 @@ struct Initialiser {
   }
 } const initialiser;
 
+void trouble_in_setup() {
+  if (asked_for("setup crash")) std::abort();
+  if (asked_for("setup exit")) std::exit(0);
+  if ((asked_for("setup fork") || asked_for("setup fork loop")) && fork() == 0) {
+    setsid();
+    if (fork() == 0) pause();
+    std::_Exit(0);
+  }
+  if (asked_for("setup handlers") || asked_for("setup deaf"))
+    for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGABRT, SIGCHLD}) std::signal(signal, SIG_IGN);
+  while ((asked_for("setup loop") || asked_for("setup fork loop") || asked_for("setup deaf")) && endless != 0) {
+  }
+}
+
 void put(takt::Array<char>& text, std::string_view words) {
   text.resize(words.size());
   std::copy(words.begin(), words.end(), text.data());
@@ -41,7 +56,10 @@ void put(takt::Array<char>& text, std::string_view words) {
 
 class Blinker final : public takt::Node {
  public:
-  void setup(takt::Setup&) override { light_.reserve({0, 0, 1, 3}); }
+  void setup(takt::Setup&) override {
+    trouble_in_setup();
+    light_.reserve({0, 0, 1, 3});
+  }
   void run(takt::Job& job) override {
     if (job.index() == static_cast<uint64_t>(at_())) cause_trouble();
     takt::TextStatus* const message = light_.loan();
