@@ -135,8 +135,8 @@ void add_run(CLI::App& app, plugin::Plugins& plugins, RunOptions& o, int& exit_c
       "A policy from the command line ends with exit 3 instead.");
   run->callback([&, how_long] {
     o.duration_asked = how_long->count() > 0;
-    exit_code = plugins.load(graph_file(o.graph), o.load);
-    if (exit_code == kOk) exit_code = run_graph(plugins.registry(), o);
+    exit_code =
+        plugins.supervise(graph_file(o.graph), o.load, [&](const Registry& known) { return run_graph(known, o); });
   });
 }
 

@@ -146,6 +146,7 @@ class Composer {
       port.node = id;
       port.port = output->name();
       port.type = &output->type();
+      if (is_described(*port.type)) port.counts.emplace();
       result_.plan.ports.push_back(port);
     }
     task_index_[id] = result_.plan.tasks.size();
@@ -291,9 +292,11 @@ class Composer {
     if (sound) sound = call_setup(t, error);
     for (ParamBase* param : task.node->params()) param->end_setup();
     if (options_.exchange != nullptr) {
-      for (const size_t port : task.ports)
-        options_.exchange->tell(port,
-                                sound ? std::optional(output_of(result_.plan.ports[port]).capacity()) : std::nullopt);
+      for (const size_t port : task.ports) {
+        const OutputPort& output = output_of(result_.plan.ports[port]);
+        if (sound) options_.exchange->tell_counts(port, counts_of(output.type(), output.capacity()));
+        options_.exchange->tell(port, sound ? std::optional(output.capacity()) : std::nullopt);
+      }
     }
     return sound;
   }
@@ -345,7 +348,10 @@ std::unique_ptr<Node> make_again(const GraphSpec& graph, const Registry& registr
 void complete(Plan& plan, FactExchange& exchange, const Observers& observers) {
   for (size_t t = 0; t < plan.tasks.size(); ++t)
     if (plan.tasks[t].device) plan.tasks[t].source = exchange.wait_for_source(t);
-  for (size_t p = 0; p < plan.ports.size(); ++p) plan.ports[p].capacity = exchange.wait_for(p).value_or(Capacity{});
+  for (size_t p = 0; p < plan.ports.size(); ++p) {
+    plan.ports[p].capacity = exchange.wait_for(p).value_or(Capacity{});
+    if (plan.ports[p].counts) plan.ports[p].counts = exchange.counts(p);
+  }
   size_ports(plan, observers);
 }
 

@@ -44,6 +44,15 @@ struct Registry {
   /// Called before the setup of each node with "FILE:LINE:COLUMN: error: NODE", and with "" after it; empty: nobody
   /// asks.
   std::function<void(std::string_view node)> setting_up = {};
+  /// Where nodes are known by their description only: what a process that runs jobs knows, into which this loads the
+  /// plug-ins then. Throws std::runtime_error. See of_jobs().
+  std::function<const Registry&()> load_for_jobs = {};
 };
+
+/// The registry with which jobs are run: `registry`, unless that has descriptions in the place of plug-ins. Once a
+/// process, which makes no other process from then on.
+inline const Registry& of_jobs(const Registry& registry) {
+  return registry.load_for_jobs ? registry.load_for_jobs() : registry;
+}
 
 }  // namespace takt

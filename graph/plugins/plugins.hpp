@@ -25,6 +25,9 @@ inline constexpr std::chrono::milliseconds kPatience{10'000};
 tl::expected<std::filesystem::path, std::string> find(const std::filesystem::path& file,
                                                       const std::vector<std::filesystem::path>& folders);
 
+/// Whether the command line or the graph file names any.
+bool are_named(const std::filesystem::path& graph, const graph::LoadOptions& options);
+
 /// The plug-in folder of the installation: lib/takt/plugins beside the bin/ of this program.
 std::filesystem::path folder();
 
@@ -36,13 +39,15 @@ struct Plugin {
   std::filesystem::path file;
   graph::Position position;  ///< that named it
   graph::PluginFact fact;
+  std::string description;  ///< graph/plugins/description.hpp
 };
 
 /// Whether `file` can be loaded after those `before` it: its ABI is read, then a child process loads it. A plug-in that
 /// crashes there, ends the process, throws, takes longer than `patience`, or leaves threads behind is an error. This
-/// process, which has one thread, never runs it. `registry` is that of the program, and stays as it is.
-tl::expected<void, std::string> judge(const std::filesystem::path& file, const std::vector<Plugin>& before,
-                                      Registry& registry, std::chrono::milliseconds patience = kPatience);
+/// process, which has one thread, never runs it. What it adds, as data. `registry` is that of the program, and stays as
+/// it is.
+tl::expected<std::string, std::string> judge(const std::filesystem::path& file, const std::vector<Plugin>& before,
+                                             Registry& registry, std::chrono::milliseconds patience = kPatience);
 
 /// The plug-ins of this program. One thread.
 class Plugins {
@@ -54,15 +59,17 @@ class Plugins {
   /// nothing of them is ever loaded here. The exit code; what is wrong stands on stderr then.
   int carry_out(const std::filesystem::path& graph, graph::LoadOptions& options,
                 const std::function<int(const Registry&)>& command);
-  /// Loads the same into this process, for the rest of its life.
-  int load(const std::filesystem::path& graph, graph::LoadOptions& options);
+  /// Carries out a command that makes processes for jobs. It is given a registry with descriptions of the plug-ins;
+  /// each process that runs jobs loads them by of_jobs().
+  int supervise(const std::filesystem::path& graph, graph::LoadOptions& options,
+                const std::function<int(const Registry&)>& command);
   const Registry& registry() const { return registry_; }
 
  private:
   tl::expected<void, std::string> add(const std::filesystem::path& file, const std::filesystem::path& beside,
                                       const graph::Position& position);
   int find_all(const std::filesystem::path& graph, graph::LoadOptions& options);
-  int load_here();
+  std::vector<graph::Problem> load_here();
 
   Registry& registry_;
   std::vector<Plugin> found_;

@@ -141,6 +141,56 @@ wait $profile
 [ $? -eq 1 ] && grep -q "stopped: nothing was written" "$work/stderr" || fail "a profile does not end as it is told to"
 none_left
 
+# A run in several processes: supervisor and nursery know it by its description, the processes for its nodes load it.
+loaded_in() { grep -q libblink.so "/proc/$1/maps"; }
+apart() { # apart NAME: such a run of $work/NAME.yaml
+  name=$1
+  start_run "$name" "$work/$name.yaml" --isolate subsystem --for 0s --record "$work/$name.mcap" --report "$work/$name.json"
+  loaded_in "$run" && fail "the supervisor has loaded the plug-in"
+  local nurseries lamp
+  nurseries=$(pgrep -x takt-nursery -P "$run")
+  [ -n "$nurseries" ] || fail "there is no nursery"
+  for nursery in $nurseries; do loaded_in "$nursery" && fail "a nursery has loaded the plug-in"; done
+  lamp=$(member lamp)
+  loaded_in "$lamp" || fail "the process lamp has not loaded the plug-in"
+  loaded_in "$(member eye)" || fail "the process eye has not loaded the plug-in"
+  expect 0 "" "$takt" echo blinker.light --count 2 --run $run
+  prints '"words": "o'
+  expect 2 "is no picture" "$takt" echo blinker.light --png "$work/glow.png" --run $run
+  expect 0 "" "$takt" set blinker.brightness 200 --run $run
+  expect 2 "must lie in 0..255" "$takt" set blinker.brightness 256 --run $run
+  expect 2 "must lie in -3.14159..3.14159" "$takt" set blinker.angle 181deg --run $run
+  kill -KILL "$lamp"
+  said "process lamp is back" "$work/$name.err"
+  lamp=$(member lamp)
+  loaded_in "$lamp" || fail "the process lamp has not loaded the plug-in again"
+  expect 0 "" "$takt" echo blinker.light --run $run
+  prints '"brightness": 200'
+  end_run "0 1"
+  expect 0 "" "$takt" log echo "$work/$name.mcap" watcher.seen
+  said '"words":"yes"' "$work/stdout"
+  for isolate in none subsystem; do
+    expect 0 "" "$takt" replay "$work/$name.mcap" --compare --isolate $isolate --output "$work/out"
+    grep -qE "compared ([0-9]+) of \1 messages.* 0 differ" "$work/stdout" || fail "replay: $(cat "$work/stdout")"
+  done
+  "$takt" replay "$work/$name.mcap" --isolate subsystem --recorded-pace --output "$work/out" >"$work/stdout" 2>&1 &
+  run=$!
+  until lamp=$(member lamp) && loaded_in "$lamp"; do kill -0 $run || break; sleep 0.1; done
+  loaded_in $run && fail "the process that supervises a replay has loaded the plug-in"
+  wait $run || fail "replay --isolate subsystem: $(cat "$work/stdout")"
+}
+cp "$graph" "$work/several.yaml"
+apart several
+sed 's/^  lamp:/&\n    spare: true/' "$graph" >"$work/spared.yaml"
+apart spared
+python3 - "$work/several.json" "$work/report.json" <<'PY' || fail "the plan of several processes is another one"
+import json, sys
+several, whole = (json.load(open(name)) for name in sys.argv[1:])
+assert several["isolation"] == "subsystem", several["isolation"]
+sizes = lambda report: {pool["port"]: pool["bytes"] for pool in report["memory"]["pools"]}
+assert sizes(several) == sizes(whole), (sizes(several), sizes(whole))
+PY
+
 # In its jobs it is contained as every node is.
 for trouble in throw crash loop; do
   "$takt" run "$graph" --for 3s --isolate subsystem --policy cooperative --set blinker.trouble=$trouble --output "$work/out" \
