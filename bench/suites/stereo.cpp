@@ -108,12 +108,13 @@ std::vector<Row> run_stereo(const Options& options) {
       if (!matcher.match(view(left), view(right), out)) throw CannotRun("the matcher refused its input");
     };
   };
-  // OpenCV wants a multiple of 16. No rejection, so that all search alike; its matchers leave as many columns out.
+  // OpenCV wants a multiple of 16; 63 is its sample's pre-filter. No rejection, so that all search alike; its matchers
+  // leave as many columns out.
   constexpr int kRange = (kDisparities + 15) / 16 * 16;
   const auto block = cv::StereoBM::create(kRange, parameters.n_square);
   block->setTextureThreshold(0);
   block->setUniquenessRatio(0);
-  const auto global = cv::StereoSGBM::create(0, kRange, 5, 600, 2400, 1, 0, 0, 0, 0, cv::StereoSGBM::MODE_SGBM_3WAY);
+  const auto global = cv::StereoSGBM::create(0, kRange, 5, 600, 2400, 1, 63, 0, 0, 0, cv::StereoSGBM::MODE_SGBM_3WAY);
   const auto with_block = [&] { block->compute(scene.left_grey, scene.right_grey, theirs); };
   const auto with_global = [&] { global->compute(scene.left, scene.right, theirs); };
   const cv::Mat wide_left = padded(scene.left, kRange), wide_right = padded(scene.right, kRange);

@@ -94,9 +94,16 @@ class ImageTest {
     detector.analyse(view(image));
     detector.classify(writable(mask_));
     times_.push_back(static_cast<double>(thread_cpu_ns() - start) / 1e6);
-    ground_map::add(score_, view(mask_), view(truth));
+    least_light_ = std::min(least_light_, detector.light());
+    if (detector.too_dark()) ++too_dark_;
+    else ground_map::add(score_, view(mask_), view(truth));
   }
-  Json row() const { return ground_row(score_, nullptr, quantile(times_, 0.5)); }
+  Json row() const {
+    Json out = ground_row(score_, nullptr, quantile(times_, 0.5));
+    out["least_light"] = least_light_;
+    out["too_dark"] = too_dark_;
+    return out;
+  }
 
  private:
   cv::Size size_;
@@ -104,6 +111,8 @@ class ImageTest {
   cv::Mat mask_;
   MaskScore score_;
   std::vector<double> times_;
+  double least_light_ = 255;
+  size_t too_dark_ = 0;
 };
 
 /// What is chosen on the images of one drive: the most recall that keeps the precision wanted, else the most precision.
@@ -255,6 +264,10 @@ void print(const Json& out) {
   if (out.contains("variants"))
     for (const auto& [name, row] : out["variants"].items()) print_row(name, row);
   print_row("bottom 40 % is ground", out["baseline"]);
+  if (out.contains("least_light"))
+    std::printf(
+        "light of the reference area: at least %.0f of 255; %zu of %zu images too dark to be judged (light_min)\n",
+        out["least_light"].get<double>(), out["too_dark"].get<size_t>(), out["frames"].get<size_t>());
   if (out.contains("grid")) print_cells(out["grid"]["confusion"]);
   if (!out.contains("projection")) return;
   std::printf("floor from pixels: off by at most %.1e m at any turn of the head\n",

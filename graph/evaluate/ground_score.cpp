@@ -21,14 +21,15 @@ GroundParameters ground_parameters(const std::vector<std::string>& set) {
     else if (key == "n_b") p.memory_entries = static_cast<int>(set_number(text, value, 1, 10000));
     else if (key == "t_w") p.t_w = set_number(text, value, 0, 5000);
     else if (key == "mean_size") p.mean_size = static_cast<int>(set_number(text, value, 1, 31));
+    else if (key == "light_min") p.light_min = set_number(text, value, 0, 255);
     else if (key == "doubt") p.doubt.doubtful = static_cast<uint8_t>(kSure * set_number(text, value, 0, 1) + 0.5);
     else if (text == "votes=columns") all.grid.votes = Votes::columns;
     else if (text == "votes=pixels") all.grid.votes = Votes::pixels;
     else
-      throw std::runtime_error(
-          fmt::format("--set {}: valid are t_m, n_b, t_w, mean_size and doubt with a number, votes=columns and "
-                      "votes=pixels",
-                      text));
+      throw std::runtime_error(fmt::format(
+          "--set {}: valid are t_m, n_b, t_w, mean_size, light_min and doubt with a number, votes=columns and "
+          "votes=pixels",
+          text));
   }
   if (p.mean_size % 2 == 0) throw std::runtime_error(fmt::format("--set mean_size={}: must be odd", p.mean_size));
   all.grid.beyond_px = p.mean_size / 2;

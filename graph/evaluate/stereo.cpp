@@ -145,8 +145,8 @@ Json measure(const EvalStereoOptions& options) {
   std::fill(middle.pixels.begin(), middle.pixels.end(), static_cast<float>(p.disparities) / 2);
   out["baseline"] = row(stereo::score(middle, truth), 0);
   out["baseline"]["name"] = "half the search range everywhere";
-  for (const auto peer :
-       {stereo::Peer::block_matching, stereo::Peer::block_matching_unfiltered, stereo::Peer::semi_global})
+  for (const auto peer : {stereo::Peer::block_matching, stereo::Peer::block_matching_unfiltered,
+                          stereo::Peer::semi_global, stereo::Peer::semi_global_equal_light})
     out["peers"][stereo::to_string(peer)] = run_peer(peer, left, right, truth, p.disparities);
   return out;
 }

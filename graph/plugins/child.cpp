@@ -22,6 +22,7 @@
 
 #include "graph/cli/graph_file.hpp"
 #include "graph/cli/outcome.hpp"
+#include "rt/machine/limits.hpp"
 #include "rt/sched/append_log.hpp"
 
 namespace takt::plugin {
@@ -67,7 +68,7 @@ Progress& share_progress() {
   try {
     code = command();
   } catch (const std::exception& problem) {
-    command::refuse(problem.what(), command::kDeviceOrSystem);
+    command::refuse(machine::explain(problem), command::kDeviceOrSystem);
   }
   std::exit(command::with_output(code));
 }
@@ -196,8 +197,7 @@ int in_child(Registry& registry, const std::vector<std::string>& plugins, const 
     Watch watch(progress);
     const pid_t parent = getpid(), child = fork();
     if (child < 0)
-      return command::refuse(fmt::format("no process for the plug-ins: {}", std::strerror(errno)),
-                             command::kDeviceOrSystem);
+      return command::refuse(machine::explain("no process for the plug-ins", errno), command::kDeviceOrSystem);
     if (child == 0) {
       watch.restore();
       be_the_child(parent, registry, command);

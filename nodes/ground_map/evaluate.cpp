@@ -27,7 +27,8 @@ void map_image(ImageView<const uint8_t> image, const FloorProjection& in_robot, 
   if (area_free) detector.learn();
   detector.classify(mask, in_robot);
   grid.centre(robot);
-  grid.observe(mask, in_robot.moved(robot_in_map), robot, detector.confidence());
+  if (detector.too_dark()) grid.see_nothing();
+  else grid.observe(mask, in_robot.moved(robot_in_map), robot, detector.confidence());
   grid.accumulate();
 }
 

@@ -2,6 +2,8 @@
 #include "nodes/ground_map/ground_detector.hpp"
 
 #include <algorithm>
+#include <array>
+#include <numeric>
 
 #include "nodes/ground_map/saturation_value.hpp"
 
@@ -11,6 +13,7 @@ GroundDetector::GroundDetector(int width, int height, const DetectorParameters& 
     : width_(width),
       height_(height),
       t_m_(parameters.t_m),
+      light_min_(parameters.light_min),
       area_(width, height, parameters.trapezoid),
       memory_(parameters.memory_entries, parameters.t_w),
       confidence_(parameters.doubt),
@@ -31,7 +34,17 @@ void GroundDetector::analyse(ImageView<const uint8_t> image) {
   }
 }
 
+double GroundDetector::light() const {
+  int64_t sum = 0;
+  for (const RowSpan& span : area_.spans()) {
+    const uint8_t* row = view(value_).row(span.y);
+    sum += std::accumulate(row + span.first, row + span.last, int64_t{0});
+  }
+  return static_cast<double>(sum) / static_cast<double>(area_.pixels());
+}
+
 bool GroundDetector::learn() {
+  if (too_dark()) return false;
   const auto descriptor = describe(view(saturation_), view(value_), area_, t_m_);
   if (descriptor) recall(*descriptor);
   return descriptor.has_value();
@@ -42,9 +55,16 @@ void GroundDetector::recall(const Descriptor& descriptor) {
   confidence_.rebuild(memory_.table());
 }
 
-Confidence GroundDetector::confidence() const { return {confidence_.table(), view(saturation_), view(value_)}; }
+Confidence GroundDetector::confidence() const {
+  static constexpr std::array<uint8_t, 256 * 256> kNothingSure{};
+  return {too_dark() ? kNothingSure.data() : confidence_.table(), view(saturation_), view(value_)};
+}
 
 void GroundDetector::classify(ImageView<uint8_t> mask, const std::optional<FloorProjection>& camera) {
+  if (too_dark()) {
+    for (int y = 0; y < height_; ++y) std::fill_n(mask.row(y), width_, uint8_t{0});
+    return;
+  }
   // Pointers of its own: bytes that are written could otherwise be those of the vectors themselves.
   const uint8_t *table = memory_.table(), *s = saturation_.data(), *v = value_.data();
   uint8_t* out = raw_.data();

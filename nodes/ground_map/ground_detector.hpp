@@ -18,6 +18,7 @@ struct DetectorParameters {
   int memory_entries = 500;  ///< N_b: 100 s of frames
   double t_w = 0.9;          ///< weight above which a pixel is ground
   int mean_size = 9;         ///< px, odd: edge of the box average
+  double light_min = 50;     ///< of light(), 0..255: a darker image says nothing
   DoubtParameters doubt;
 };
 
@@ -28,7 +29,11 @@ class GroundDetector {
 
   /// Takes an image of the constructor's size, BGR or grey (saturation 0), for the two calls below.
   void analyse(ImageView<const uint8_t> image);
-  /// Adds the texture of the reference area to the memory; false if no bin was full enough.
+  /// Mean value of the reference area, 0..255.
+  double light() const;
+  /// Darker than the detector was judged on: nothing is ground then, nothing is sure, and nothing is to be learnt.
+  bool too_dark() const { return light() < light_min_; }
+  /// Adds the texture of the reference area to the memory; false if it is too dark or no bin was full enough.
   bool learn();
   /// 255 ground, 0 not. Before the first entry nothing is ground, and above the horizon of `camera` never.
   void classify(ImageView<uint8_t> mask, const std::optional<FloorProjection>& camera = std::nullopt);
@@ -49,7 +54,7 @@ class GroundDetector {
   ImageView<const uint8_t> view(const std::vector<uint8_t>& plane) const { return {plane.data(), width_, height_}; }
 
   int width_, height_;
-  double t_m_;
+  double t_m_, light_min_;
   ReferenceArea area_;
   TextureMemory memory_;
   ConfidenceTable confidence_;

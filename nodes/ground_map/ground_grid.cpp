@@ -121,6 +121,8 @@ void GroundGrid::observe(ImageView<const uint8_t> mask, const FloorProjection& p
   }
 }
 
+void GroundGrid::see_nothing() { std::fill(observation_.begin(), observation_.end(), kUnknown); }
+
 void GroundGrid::accumulate() {
   for (size_t i = 0; i < map_.size(); ++i) {
     if (observation_[i] == kUnknown) continue;

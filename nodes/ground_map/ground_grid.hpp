@@ -51,6 +51,8 @@ class GroundGrid {
   /// `robot` is the position that range_max is counted from, `projection` leads to the map frame.
   void observe(ImageView<const uint8_t> mask, const FloorProjection& projection, const FloorPoint& robot,
                const Confidence& confidence = {});
+  /// An observation in which every cell is unknown.
+  void see_nothing();
   /// Adds the observation to the map: unknown starts at 500, blocked + up times the mean confidence of its votes, free
   /// - down, within 0..1000.
   void accumulate();

@@ -85,6 +85,7 @@ class GroundMapNode final : public Node {
     detector_->analyse(left_of(pair));
     if (may_learn(pair, projection)) detector_->learn();
     detector_->classify(ground(), projection);
+    if (detector_->too_dark()) job.results_doubtful("too dark to tell ground: light_min");
     const bool mask_given = give_mask(pair) && give_confidence(pair);
     const bool grid_given =
         !projection || !chosen->robot_in_map || give_grid(*projection, planar(*chosen->robot_in_map));
@@ -238,14 +239,16 @@ class GroundMapNode final : public Node {
     if (!grid_.connected() && !terrain_.connected()) return true;
     GroundGrid& grid = *grid_cells_;
     grid.centre({robot.x_m, robot.y_m});
-    const bool knows_ground = detector_->memory().size() > 0;  // before that "not ground" means nothing
-    if (knows_ground) {
+    // Before it has learnt, and in the dark, "not ground" means nothing.
+    const bool knows_ground = detector_->memory().size() > 0 && !detector_->too_dark();
+    if (!knows_ground) grid.see_nothing();
+    else {
       grid.observe(ground(), projection.moved(robot), {robot.x_m, robot.y_m}, detector_->confidence());
       grid.accumulate();
       clear_specks();
     }
     // Without poses images cannot be laid over one another: what one image shows is all there is.
-    const auto cells = has_pose_input() || !knows_ground ? grid.map() : grid.observation();
+    const auto cells = has_pose_input() ? grid.map() : grid.observation();
     return give_terrain(cells, robot) && (!grid_.connected() || give_cells(cells));
   }
 
@@ -344,6 +347,7 @@ class GroundMapNode final : public Node {
     p.memory_entries = n_b_;
     p.t_w = t_w_;
     p.mean_size = mean_size_;
+    p.light_min = light_min_;
     p.doubt = {bloom_, shade_deepest_, shade_faintest_, shade_saturation_,
                static_cast<uint8_t>(std::lround(doubt_ * kSure))};
     return p;
@@ -384,6 +388,8 @@ class GroundMapNode final : public Node {
   Param<int> n_b_{this, "n_b", 500, {1, 10000}, "", "frames remembered; 100 s times the rate"};
   Param<double> t_w_{this, "t_w", 0.9, {0.0, 5000.0}, "1", "sum of weights above which a pixel is ground"};
   Param<int> mean_size_{this, "mean_size", 9, {1, 31}, "px", "edge of the box average, odd"};
+  Param<double> light_min_{
+      this, "light_min", 50.0, {0.0, 255.0}, "1", "mean value of the reference area below which an image says nothing"};
   Param<int> bloom_{this, "bloom", 250, {1, 256}, "1", "value from which on a pixel may have bloomed"};
   Param<double> shade_deepest_{this, "shade_deepest", 0.3, {0.01, 1.0}, "1", "least light that a shadow leaves"};
   Param<double> shade_faintest_{this, "shade_faintest", 0.85, {0.01, 1.0}, "1", "most light that a shadow leaves"};

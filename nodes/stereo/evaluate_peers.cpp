@@ -24,10 +24,12 @@ double thread_time_ms() {
   return 1e3 * static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_nsec);
 }
 
+bool is_semi_global(Peer peer) { return peer == Peer::semi_global || peer == Peer::semi_global_equal_light; }
+
 cv::Ptr<cv::StereoMatcher> make(Peer peer, int range, int channels) {
-  if (peer == Peer::semi_global)
-    return cv::StereoSGBM::create(0, range, 5, 8 * channels * 25, 32 * channels * 25, 1, 0, 0, 0, 0,
-                                  cv::StereoSGBM::MODE_SGBM_3WAY);
+  if (is_semi_global(peer))
+    return cv::StereoSGBM::create(0, range, 5, 8 * channels * 25, 32 * channels * 25, 1,
+                                  peer == Peer::semi_global ? 63 : 0, 0, 0, 0, cv::StereoSGBM::MODE_SGBM_3WAY);
   auto matcher = cv::StereoBM::create(range, 15);
   if (peer == Peer::block_matching_unfiltered) {
     matcher->setTextureThreshold(0);
@@ -42,9 +44,10 @@ const char* to_string(Peer peer) {
   switch (peer) {
     case Peer::block_matching: return "stereo_bm_15";
     case Peer::block_matching_unfiltered: return "stereo_bm_15_unfiltered";
-    case Peer::semi_global: break;
+    case Peer::semi_global: return "stereo_sgbm_3way_5";
+    case Peer::semi_global_equal_light: break;
   }
-  return "stereo_sgbm_3way_5";
+  return "stereo_sgbm_3way_5_cap_0";
 }
 
 DisparityImage run_peer(Peer peer, ImageView<const uint8_t> left, ImageView<const uint8_t> right, int disparities,
@@ -52,7 +55,7 @@ DisparityImage run_peer(Peer peer, ImageView<const uint8_t> left, ImageView<cons
   if (left.width != right.width || left.height != right.height || left.channels != right.channels || disparities < 1)
     throw std::invalid_argument("the left and the right image must have one size, and the search range at least 1 px");
   const int range = (disparities + 15) / 16 * 16;
-  const bool grey = peer != Peer::semi_global;
+  const bool grey = !is_semi_global(peer);
   const cv::Mat l = padded(left, range, grey), r = padded(right, range, grey);
   cv::Mat fixed;
   const auto matcher = make(peer, range, left.channels);

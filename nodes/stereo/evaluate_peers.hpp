@@ -8,7 +8,8 @@ namespace takt::stereo {
 enum class Peer : uint8_t {
   block_matching,             ///< cv::StereoBM, block 15, as it comes
   block_matching_unfiltered,  ///< the same without its texture and uniqueness filters
-  semi_global                 ///< cv::StereoSGBM, 3-way, block 5, P1 = 8 c b^2, P2 = 32 c b^2
+  semi_global,  ///< cv::StereoSGBM, 3-way, block 5, P1 = 8 c b^2, P2 = 32 c b^2, preFilterCap 63 as in OpenCV's sample
+  semi_global_equal_light  ///< with preFilterCap 0: better where both images are exposed alike, else much worse
 };
 const char* to_string(Peer peer);
 

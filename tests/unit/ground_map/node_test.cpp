@@ -141,7 +141,7 @@ TEST_CASE("ground_map: images it cannot use give no result") {
 TEST_CASE("ground_map: a frame that the camera calls bad teaches nothing, but is classified") {
   for (const uint32_t bad : {image_health::saturated, image_health::dark, image_health::blurred}) {
     Bench bench;
-    FloorPair known(3), other(3, 40);
+    FloorPair known(3), other(3, 70);
     other->health = bad;
     test::latch(bench.port("pair"), other, 100, 1);
     CHECK(bench.run());
@@ -294,6 +294,30 @@ TEST_CASE("ground_map: odometry moves the window, and cells stay where they are 
   CHECK(bench.run());
   CHECK(bench.mask->sent());
   CHECK_FALSE(bench.grid->sent());
+}
+
+TEST_CASE("ground_map: a darker image than it was judged on says nothing, and teaches nothing") {
+  Bench alone, moving({"odometry"});
+  FloorPair light(3.1), dark(2.2, 49), light_again(2.2);
+  test::Box<Odometry> here;
+  here->theta_rad = std::numbers::pi / 2;  // ahead is the map's y axis
+  for (Bench* bench : {&alone, &moving}) {
+    if (bench == &moving)
+      for (int k = 0; k < 3; ++k) test::latch(bench->port("odometry"), here, (100 + 100 * k) * kMs, k + 1, k);
+    test::latch(bench->port("pair"), light, 100 * kMs, 1);
+    CHECK(bench->run());
+    const int16_t wall = bench->cell(0.1, 3.1);
+    CHECK(bench->cell(0.1, 2.5) < 500);
+    test::latch(bench->port("pair"), dark, 200 * kMs, 2);
+    CHECK(bench->run());
+    CHECK(bench->mask_at(160, 230) == 0);
+    // What the map has from lighter images stays; without a map there is nothing.
+    CHECK(bench->cell(0.1, 3.1) == (bench == &moving ? wall : Grid::unknown));
+    CHECK(bench->cell(0.1, 2.5) == (bench == &moving ? 400 : Grid::unknown));
+    test::latch(bench->port("pair"), light_again, 300 * kMs, 3);
+    CHECK(bench->run());
+    CHECK(bench->cell(0.1, 2.3) >= 600);
+  }
 }
 
 TEST_CASE("ground_map: motion is that of the camera, conjugated with its mount (E-25), and goes before odometry") {
