@@ -25,6 +25,7 @@
 #include "graph/plugin.hpp"
 #include "graph/plugins/child.hpp"
 #include "graph/plugins/description.hpp"
+#include "rt/machine/limits.hpp"
 
 namespace takt::plugin {
 namespace {
@@ -117,7 +118,7 @@ std::string ending(int status) {
 tl::expected<std::string, std::string> try_out(const std::filesystem::path& file, const std::vector<Plugin>& before,
                                                Registry& registry, std::chrono::milliseconds patience) {
   int ends[2];
-  if (pipe2(ends, O_CLOEXEC) != 0) return tl::make_unexpected(fmt::format("no pipe: {}", std::strerror(errno)));
+  if (pipe2(ends, O_CLOEXEC) != 0) return tl::make_unexpected(machine::explain("no pipe", errno));
   std::fflush(nullptr);
   const Orphans orphans;
   const pid_t child = fork();
@@ -127,7 +128,7 @@ tl::expected<std::string, std::string> try_out(const std::filesystem::path& file
   bool late = false;
   const auto answer = child > 0 ? answer_of(ends[0], patience, late) : std::nullopt;
   close(ends[0]);
-  if (child < 0) return tl::make_unexpected(fmt::format("no process to try it in: {}", std::strerror(fork_error)));
+  if (child < 0) return tl::make_unexpected(machine::explain("no process to try it in", fork_error));
   if (late) kill(child, SIGKILL);
   int status = 0;
   while (waitpid(child, &status, 0) < 0 && errno == EINTR) {

@@ -91,7 +91,8 @@ TEST_CASE("limits, stamps, levels and calls of a node are described exactly, and
   CHECK(node->allowed_calls() == bit(JobCall::sleep));
   CHECK(node->control() == node->inputs().back());
   const auto takes = [&](size_t param, double value) { return node->params()[param]->set(value).has_value(); };
-  for (const auto& [param, low, high] : {std::tuple(0, -std::numbers::pi, std::numbers::pi), {1, 1e-30 / 3, 1.0 / 3}}) {
+  for (const auto& [param, low, high] :
+       {std::tuple(size_t{0}, -std::numbers::pi, std::numbers::pi), {size_t{1}, 1e-30 / 3, 1.0 / 3}}) {
     CHECK(takes(param, low));
     CHECK(takes(param, high));
     CHECK_FALSE(takes(param, std::nextafter(low, -1e9)));
