@@ -11,6 +11,13 @@
 #include "graph/language/share.hpp"
 
 namespace takt::command {
+namespace {
+
+void (*g_ended)() = nullptr;
+
+}  // namespace
+
+void at_end(void (*ended)()) { g_ended = ended; }
 
 int refuse(const std::string& text, Exit code) {
   std::fprintf(stderr, "takt: error: %s\n", text.c_str());
@@ -23,6 +30,7 @@ void hold_standard_streams() {
 }
 
 int with_output(int code) {
+  if (g_ended != nullptr) g_ended();
   errno = 0;
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return code;
   if (errno == EPIPE) return code;

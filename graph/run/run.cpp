@@ -208,7 +208,12 @@ int run_as_asked(const Registry& registry, RunOptions options) {
   const bool processes = wanted == "subsystem" && options.clock != "virtual";
   RunFaults faults(registry, options);
   if (const int code = faults.load(*prepared.graph, *prepared.clock, processes); code != kOk) return code;
-  if (!processes) return run_in_one_process(options, prepared, faults, adjusted);
+  if (!processes) {
+    Prepared whole(of_jobs(registry));
+    whole.graph = std::move(prepared.graph);
+    whole.clock = std::move(prepared.clock);
+    return run_in_one_process(options, whole, faults, adjusted);
+  }
   const KeptPlace report(options.report), page(options.html), verdict(options.junit), trace(options.trace),
       record(options.record);
   return run_isolated(registry, options, *prepared.graph, faults, std::move(adjusted));
