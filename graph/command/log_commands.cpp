@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <optional>
 
+#include "graph/cli/file_option.hpp"
 #include "graph/cli/outcome.hpp"
 #include "graph/log/cut_log.hpp"
 #include "graph/log/echo_log.hpp"
@@ -119,27 +120,27 @@ void add_log(CLI::App& app, const Registry& registry, LogOptions& o, int& exit_c
   CLI::App* log = app.add_subcommand("log", "looks into records");
   log->require_subcommand(1);
   CLI::App* info = log->add_subcommand("info", "what is in a record, what it lost, its hash");
-  info->add_option("file", o.file, "what `takt run --record` wrote")->required();
+  reads_file(info->add_option("file", o.file, "what `takt run --record` wrote"), UINT64_MAX)->required();
   info->add_flag("--json", o.json, "prints it as JSON");
   info->footer("Example: takt log info run.mcap");
   info->callback([&] { exit_code = log_info(o); });
   CLI::App* diff = log->add_subcommand("diff", "how two records differ: exit 1 if they do");
-  diff->add_option("from", o.file, "a record")->required();
-  diff->add_option("to", o.other, "another one")->required();
+  reads_file(diff->add_option("from", o.file, "a record"), UINT64_MAX)->required();
+  reads_file(diff->add_option("to", o.other, "another one"), UINT64_MAX)->required();
   diff->footer("Example: takt log diff run.mcap again.mcap");
   diff->callback([&] { exit_code = log_diff(o); });
   CLI::App* echo = log->add_subcommand("echo", "its messages, one JSON object a line");
-  echo->add_option("file", o.file, "a record")->required();
+  reads_file(echo->add_option("file", o.file, "a record"), UINT64_MAX)->required();
   echo->add_option("ports", o.ports, "NODE.PORT (default: all)");
   echo->add_option("--items", o.items, "of longer arrays so many elements (default 8)");
   echo->footer("Example: takt log echo run.mcap base.odometry");
   echo->callback([&] { exit_code = log_echo(o); });
   CLI::App* exported = log->add_subcommand("export", "as MCAP with JSON in Foxglove's schemas");
-  exported->add_option("file", o.file, "a record")->required();
-  exported->add_option("-o,--output", o.output, "the file to write")->required();
+  reads_file(exported->add_option("file", o.file, "a record"), UINT64_MAX)->required();
+  writes_file(exported->add_option("-o,--output", o.output, "the file to write"))->required();
   CLI::App* cut = log->add_subcommand("cut", "a shorter record: the jobs of some seconds and what they held");
-  cut->add_option("file", o.file, "a record")->required();
-  cut->add_option("-o,--output", o.output, "the file to write")->required();
+  reads_file(cut->add_option("file", o.file, "a record"), UINT64_MAX)->required();
+  writes_file(cut->add_option("-o,--output", o.output, "the file to write"))->required();
   cut->add_option("--from", o.from_s, "seconds into the run of the first release")->check(CLI::Range(0.0, 1e9));
   cut->add_option("--to", o.to_s, "seconds into the run, behind the last release")->check(CLI::Range(0.0, 1e9));
   cut->footer("Example: takt log cut run.mcap -o short.mcap --from 2 --to 4");

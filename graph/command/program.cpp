@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "graph/cli/boundary.hpp"
 #include "graph/cli/outcome.hpp"
 #include "graph/command/attach_commands.hpp"
 #include "graph/command/doctor_command.hpp"
@@ -82,9 +83,10 @@ int run(int argc, char** argv, const std::function<void(Registry&)>& fill, const
 namespace takt {
 
 int main(int argc, char** argv, const std::function<void(Registry&)>& fill, const MoreCommands& more) {
-  command::hold_standard_streams();
-  keep_rights(Rights::observe);
-  return command::with_output(command::run(argc, argv, fill, more));
+  return command::at_boundary(argc, argv, [&] {
+    keep_rights(Rights::observe);
+    return command::run(argc, argv, fill, more);
+  });
 }
 
 }  // namespace takt

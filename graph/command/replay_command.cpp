@@ -9,6 +9,7 @@
 #include <optional>
 #include <sstream>
 
+#include "graph/cli/file_option.hpp"
 #include "graph/command/graph_commands.hpp"
 #include "graph/compose/composition.hpp"
 #include "graph/compose/partition.hpp"
@@ -17,6 +18,7 @@
 #include "graph/log/log_content.hpp"
 #include "graph/log/recorded_plan.hpp"
 #include "graph/run/isolated_replay.hpp"
+#include "graph/run/outputs.hpp"
 #include "graph/run/prepare.hpp"
 #include "graph/run/support.hpp"
 #include "rt/abi.hpp"
@@ -331,11 +333,8 @@ class Replay {
 }  // namespace
 
 int replay(plugin::Plugins& plugins, const ReplayOptions& options) {
-  std::error_code error;
-  std::filesystem::create_directories(options.output, error);
-  if (error)
-    return refuse(fmt::format("--output {}: {}; choose a writable folder", options.output.string(), error.message()),
-                  kBadInput);
+  std::vector<WriterLock> locks;
+  if (const int code = claim_folder(options.output, locks); code != kOk) return code;
   const StopOnSignal guard;
   try {
     return Replay(plugins, options).run();
@@ -351,18 +350,18 @@ int replay(plugin::Plugins& plugins, const ReplayOptions& options) {
 
 void add_replay(CLI::App& app, plugin::Plugins& plugins, ReplayOptions& o, int& exit_code) {
   CLI::App* replay = app.add_subcommand("replay", "runs the jobs of a record again, with what they were given");
-  replay->add_option("log", o.log, "what `takt run --record` wrote")->required();
-  replay->add_option("graph", o.graph, "graph file instead of that of the record");
+  reads_file(replay->add_option("log", o.log, "what `takt run --record` wrote"), UINT64_MAX)->required();
+  reads_file(replay->add_option("graph", o.graph, "graph file instead of that of the record"));
   replay->add_flag("--compare", o.compare, "bit by bit with the record; exit 1 on the first message that differs");
   replay->add_option("--live", o.live, "runs only these nodes, with the rest from the record")->delimiter(',');
-  replay->add_option("--params", o.params, "parameter file of the robot instead of that of the record");
+  reads_file(replay->add_option("--params", o.params, "parameter file of the robot instead of that of the record"));
   replay->add_option("--set", o.set, "node.param=value, repeatable");
   add_plugin_option(*replay, o.plugin_files);
   replay->add_option("--from", o.from_s, "tells and paces only what was released so many seconds into the run");
   replay->add_option("--isolate", o.isolate, "none (one process) | subsystem: as many as the run had")
       ->check(CLI::IsMember({"none", "subsystem"}));
   replay->add_flag("--recorded-pace", o.recorded_pace, "as fast as it was, instead of as fast as possible");
-  replay->add_option("--output", o.output, "folder for pictures and other results (default out)");
+  writes_folder(replay->add_option("--output", o.output, "folder for pictures and other results (default out)"));
   replay->footer(
       "Example: takt replay run.mcap --compare\n"
       "Example: takt replay run.mcap --live ground_map --set ground_map.votes_min=7");
