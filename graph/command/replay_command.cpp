@@ -15,6 +15,7 @@
 #include "graph/compose/partition.hpp"
 #include "graph/language/words.hpp"
 #include "graph/log/cut_log.hpp"
+#include "graph/log/damages.hpp"
 #include "graph/log/log_content.hpp"
 #include "graph/log/recorded_plan.hpp"
 #include "graph/run/isolated_replay.hpp"
@@ -79,11 +80,15 @@ class Replay {
     file_.emplace(std::move(*file));
     for (const std::string& damage : file_->damages())
       std::fprintf(stderr, "takt: the record is not whole: %s\n", damage.c_str());
+    damaged_ = !options_.allow_damage && !file_->damages().empty();
     force_simd(plugins_.registry().vectors, fact(file_->facts(), "simd"));
     if (const int code = compose(); code != kOk) return code;
     check_sameness();
     const record::ReplayResult result = replay();
-    return tell(result);
+    const int code = tell(result);
+    if (code == kOk && damaged_)
+      return refuse(log::damages_text(options_.log, *file_) + "; --allow-damage goes on with what is left", kNotOk);
+    return code;
   }
 
  private:
@@ -302,7 +307,11 @@ class Replay {
                  result.unmade);
     // A record without an end lacks the last jobs, as it says.
     const bool lacking = result.lacking > 0 || (result.unmade > 0 && !file_->end().empty());
+    if (result.jobs == 0 && !StopOnSignal::asked())
+      return refuse(options_.log.string() + ": nothing was replayed, the record has no job to be run", kNotOk);
     if (!options_.compare) return lacking ? kNotOk : kOk;
+    if (result.compared == 0 && !StopOnSignal::asked())
+      return refuse(options_.log.string() + ": nothing was compared", kNotOk);
     fmt::print("compared {} of {} messages: {} field by field, {} by hash; {} differ\n", result.compared,
                result.messages, result.whole, result.compared - result.whole, result.different);
     if (result.first) {
@@ -327,6 +336,7 @@ class Replay {
   Prepared prepared_;
   graph::ComposeOptions composed_;
   int64_t took_ns_ = 0;
+  bool damaged_ = false;  ///< and that is not allowed
   size_t processes_ = 1;
 };
 
@@ -353,6 +363,7 @@ void add_replay(CLI::App& app, plugin::Plugins& plugins, ReplayOptions& o, int& 
   reads_file(replay->add_option("log", o.log, "what `takt run --record` wrote"), UINT64_MAX)->required();
   reads_file(replay->add_option("graph", o.graph, "graph file instead of that of the record"));
   replay->add_flag("--compare", o.compare, "bit by bit with the record; exit 1 on the first message that differs");
+  replay->add_flag("--allow-damage", o.allow_damage, "a record that is damaged or cut off is no failure");
   replay->add_option("--live", o.live, "runs only these nodes, with the rest from the record")->delimiter(',');
   reads_file(replay->add_option("--params", o.params, "parameter file of the robot instead of that of the record"));
   replay->add_option("--set", o.set, "node.param=value, repeatable");

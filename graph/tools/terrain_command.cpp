@@ -12,6 +12,7 @@
 #include "graph/cli/boundary.hpp"
 #include "graph/cli/file_option.hpp"
 #include "graph/cli/outcome.hpp"
+#include "graph/log/damages.hpp"
 #include "graph/log/recorded_plan.hpp"
 #include "graph/log/recorded_type.hpp"
 #include "nodes/ground_map/terrain_drive.hpp"
@@ -73,6 +74,8 @@ MeasuredMaps recorded_maps(const TerrainOptions& options) {
   for (const std::string& text : options.pick) picks.push_back(pick_of(text));
   auto log = record::LogFile::open(options.record);
   if (!log) throw std::runtime_error(log.error());
+  if (const std::string damages = log::damages_text(options.record, *log); !damages.empty() && !options.allow_damage)
+    throw std::runtime_error(damages + "; --allow-damage goes on with what is left");
   const MessageType& type = MessageType::of<Grid>();
   const mcap::Channel* recorded = log::channel_of(*log, options.port);
   const auto plan = log::Json::parse(log->attached("plan.json").value_or("{\"ports\": []}"));
@@ -155,6 +158,7 @@ void add_terrain(CLI::App& app, TerrainOptions& o, int& exit_code) {
   writes_file(learn_app->add_option("--out", o.out, "file for parameter terrain_maps of ground_map"))->required();
   CLI::Option* record =
       reads_file(learn_app->add_option("--record", o.record, "takes maps from this record of a run"), UINT64_MAX);
+  learn_app->add_flag("--allow-damage", o.allow_damage, "a record that is damaged or cut off is no failure");
   learn_app->add_option("--port", o.port, "of the record (default ground_map.around)")->needs(record);
   CLI::Option* pick = learn_app->add_option("--pick", o.pick, "KIND=FROM..TO: when it shows what, in s; repeatable");
   pick->needs(record);
