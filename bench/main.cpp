@@ -10,6 +10,8 @@
 #include <string>
 
 #include "bench/suite.hpp"
+#include "graph/cli/boundary.hpp"
+#include "graph/cli/file_option.hpp"
 #include "graph/cli/outcome.hpp"
 #include "hal/settings/json.hpp"
 
@@ -65,23 +67,20 @@ void describe_machine() {
                geteuid() == 0 ? "" : "; not root: real-time policies may be refused, see column granted");
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  takt::command::hold_standard_streams();
+int run(int argc, char** argv) {
   CLI::App app("Benchmarks of Takt against named references, measured in the same run in pairs A B A B");
   std::string suite_name, json_file, list;
   Options options;
   for (const Suite& suite : suites()) list += "\n  " + std::string(suite.name) + ": " + std::string(suite.what);
   app.add_option("suite", suite_name, "what to measure:" + list)->required();
-  app.add_option("--json", json_file, "write the rows to this file as one JSON array");
+  takt::command::writes_file(app.add_option("--json", json_file, "write the rows to this file as one JSON array"));
   app.add_option("--rounds", options.rounds, "interleaved rounds (default: the suite's own)")
       ->check(CLI::Range(1, 10000));
   app.add_option("--only", options.only, "one condition of a suite that has several (release, release_loads)");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return takt::command::with_output(app.exit(error) == 0 ? 0 : 2);
+    return app.exit(error) == 0 ? 0 : 2;
   }
   const Suite* chosen = nullptr;
   for (const Suite& suite : suites())
@@ -103,15 +102,14 @@ int main(int argc, char** argv) {
     return 3;
   }
   for (const Row& row : rows) print(row);
-  if (json_file.empty()) return takt::command::with_output(0);
+  if (json_file.empty()) return 0;
   nlohmann::json array = nlohmann::json::array();
   for (const Row& row : rows) array.push_back(to_json(row));
-  std::ofstream out(json_file);
-  out << array.dump(1) << '\n';
-  out.flush();
-  if (!out) {
-    std::cerr << "takt-bench: cannot write " << json_file << "; choose a writable --json\n";
-    return 2;
-  }
-  return takt::command::with_output(0);
+  return takt::command::write_output(json_file, array.dump(1) + "\n", "--json");
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return takt::command::at_boundary(argc, argv, [&] { return run(argc, argv); });
 }

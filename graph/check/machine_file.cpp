@@ -12,6 +12,7 @@
 #include <fstream>
 
 #include "graph/check/machine_figures.hpp"
+#include "rt/file/output_file.hpp"
 
 namespace takt::graph {
 namespace {
@@ -182,21 +183,8 @@ std::string cannot_write(const std::filesystem::path& file) {
 
 std::string write_whole(const std::filesystem::path& file, const std::string& text) {
   if (std::string why = cannot_write(file); !why.empty()) return why;
-  std::error_code error;
-  const std::filesystem::path part = file.string() + "." + std::to_string(getpid());
-  errno = 0;
-  std::ofstream out(part);
-  if (!out || !(out << text << std::flush)) {
-    const std::string why = std::strerror(errno);
-    std::filesystem::remove(part, error);
-    return why;
-  }
-  out.close();
-  std::filesystem::rename(part, file, error);
-  if (!error) return "";
-  const std::string why = error.message();
-  std::filesystem::remove(part, error);
-  return why;
+  const auto done = takt::write_file(file, text);
+  return done ? "" : done.error().what.substr(file.string().size() + 2);
 }
 
 std::string utc_now() {

@@ -1,42 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "graph/cli/outcome.hpp"
 
-#include <fcntl.h>
-#include <unistd.h>
+#include <fmt/format.h>
 
-#include <cerrno>
 #include <cstdio>
-#include <cstring>
 
 #include "graph/language/share.hpp"
 
 namespace takt::command {
-namespace {
-
-void (*g_ended)() = nullptr;
-
-}  // namespace
-
-void at_end(void (*ended)()) { g_ended = ended; }
 
 int refuse(const std::string& text, Exit code) {
   std::fprintf(stderr, "takt: error: %s\n", text.c_str());
   return code;
 }
 
-void hold_standard_streams() {
-  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
-    if (fcntl(stream, F_GETFD) < 0) open("/dev/null", O_RDWR);  // gets the lowest number that is free: this one
+int refuse(const OutputFailure& failure, const std::string& option) {
+  const char* advice = failure.system ? "make room" : "choose another place";
+  return refuse(fmt::format("{}{}{}; {}", option, option.empty() ? "" : " ", failure.what, advice),
+                failure.system ? kDeviceOrSystem : kBadInput);
 }
 
-int with_output(int code) {
-  if (g_ended != nullptr) g_ended();
-  errno = 0;
-  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return code;
-  if (errno == EPIPE) return code;
-  const std::string reason = errno != 0 ? std::strerror(errno) : "an earlier write failed";
-  refuse("stdout could not take all that was printed: " + reason, kDeviceOrSystem);
-  return code == kOk ? kDeviceOrSystem : code;
+int write_output(const std::filesystem::path& file, std::string_view content, const std::string& option) {
+  const auto done = write_file(file, content);
+  return done ? static_cast<int>(kOk) : refuse(done.error(), option);
 }
 
 std::filesystem::path shipped(const std::filesystem::path& relative) {

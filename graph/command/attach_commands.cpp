@@ -8,11 +8,12 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
-#include <fstream>
 #include <thread>
 
 #include "graph/attach/endpoint.hpp"
 #include "graph/attach/parameters.hpp"
+#include "graph/cli/boundary.hpp"
+#include "graph/cli/file_option.hpp"
 #include "graph/cli/graph_file.hpp"
 #include "graph/cli/outcome.hpp"
 #include "graph/language/overlay.hpp"
@@ -54,7 +55,7 @@ int run_top(const AttachOptions& options) {
     if (redraw) std::fputs("\x1b[H\x1b[2J", stdout);
     std::fputs(options.json ? (line->dump() + "\n").c_str() : top_text(*line).c_str(), stdout);
     std::fflush(stdout);
-    if (options.once) return kOk;
+    if (options.once || output_gone()) return kOk;
     std::this_thread::sleep_for(kRefresh);
   }
 }
@@ -73,11 +74,10 @@ int run_echo(const AttachOptions& options) {
     std::fflush(stdout);
     if (bytes > 0) {
       const auto file = connection->read_bytes(bytes);
-      std::ofstream out(path, std::ios::binary);
-      if (!file || !(out << *file))
-        return refuse(fmt::format("{} cannot be written; choose another --{}", path.string(), as), kBadInput);
+      if (!file) return refuse("the run ended in the middle of a message", kDeviceOrSystem);
+      if (const int code_of_file = write_output(path, *file, "--" + as); code_of_file != kOk) return code_of_file;
     }
-    if (shown + 1 == options.count) return kOk;
+    if (shown + 1 == options.count || output_gone()) return kOk;
     const auto line = connection->read_line();
     if (!line) return kOk;  // the run has ended
     answer = *line;
@@ -238,8 +238,8 @@ void add_attach_commands(CLI::App& app, plugin::Plugins& plugins, AttachOptions&
   top->callback([&] { exit_code = understood([&] { return run_top(o); }); });
   CLI::App* echo = add(app, "echo", "shows messages of a running graph", o);
   echo->add_option("port", o.port, "NODE.PORT")->required();
-  CLI::Option* png = echo->add_option("--png", o.png, "writes the message as a picture");
-  echo->add_option("--ply", o.ply, "writes the message, a point cloud, as a PLY file")->excludes(png);
+  CLI::Option* png = writes_file(echo->add_option("--png", o.png, "writes the message as a picture"));
+  writes_file(echo->add_option("--ply", o.ply, "writes the message, a point cloud, as a PLY file"))->excludes(png);
   echo->add_option("--count", o.count, "how many messages")->check(CLI::PositiveNumber);
   echo->footer("Example: takt echo stereo.disparity --png disparity.png");
   echo->callback([&] { exit_code = understood([&] { return run_echo(o); }); });
@@ -254,7 +254,7 @@ void add_attach_commands(CLI::App& app, plugin::Plugins& plugins, AttachOptions&
   set->add_flag("--keep", o.keep, "also for later runs of the graph; without a running graph for these alone");
   CLI::Option* forget =
       set->add_flag("--forget", o.forget, "takes the value of NODE.PARAM out of those kept")->excludes(value);
-  set->add_option("--graph", o.graph, "where nothing runs: the graph file (default graph/ace.yaml)");
+  reads_file(set->add_option("--graph", o.graph, "where nothing runs: the graph file (default graph/ace.yaml)"));
   set->add_option("--profile", o.load.profile, "where nothing runs: the profile that the value must suit");
   set->footer(
       "Example: takt set --keep obstacle_stop.deceleration 0.8m/s2\n"

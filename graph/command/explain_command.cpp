@@ -59,8 +59,7 @@ int explain_trace(const ExplainOptions& options, const trace::Trace& trace) {
   if (worst == nullptr) tell_none(options);
   tell_gaps(trace);
   if (options.svg.empty() || worst == nullptr) return kOk;
-  if (std::ofstream(options.svg) << explain::miss_svg(evidence, *worst) << std::flush) return kOk;
-  return refuse(fmt::format("{}: cannot be written; choose another place", options.svg.string()), kBadInput);
+  return write_output(options.svg, explain::miss_svg(evidence, *worst), "--svg");
 }
 
 int explain_report(const ExplainOptions& options, const Json& report) {

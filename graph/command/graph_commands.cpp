@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 
+#include "graph/cli/file_option.hpp"
 #include "graph/cli/graph_file.hpp"
 #include "graph/cli/set_option.hpp"
 #include "graph/command/check_command.hpp"
@@ -13,12 +14,13 @@ namespace takt::command {
 namespace {
 
 void add_load_options(CLI::App& app, std::filesystem::path& graph, graph::LoadOptions& load) {
-  app.add_option("graph", graph, "graph file (default graph/ace.yaml)");
+  reads_file(app.add_option("graph", graph, "graph file (default graph/ace.yaml)"));
   app.add_option("--profile", load.profile, "sim | replay | robot, as the graph defines them");
-  app.add_option("--schedule", load.schedule, "schedule file instead of the graph's");
+  reads_file(app.add_option("--schedule", load.schedule, "schedule file instead of the graph's"));
   app.add_option("--policy", load.policy, "deadline | fixed | cooperative instead of the schedule's");
   app.add_option("--mode", load.mode, "a mode of the graph (default full)");
-  app.add_option("--params", load.params, "parameter file of this robot: constants, parameters, device settings");
+  reads_file(
+      app.add_option("--params", load.params, "parameter file of this robot: constants, parameters, device settings"));
   app.add_option("--set", load.set, "node.param=value, repeatable");
   add_plugin_option(app, load.plugin_files);
 }
@@ -33,7 +35,7 @@ void add_overlay_option(CLI::App& app, graph::LoadOptions& load) {
 void add_show(CLI::App& app, plugin::Plugins& plugins, ShowOptions& o, int& exit_code) {
   CLI::App* show = app.add_subcommand("show", "draws a graph, or lists what each node reads");
   add_load_options(*show, o.graph, o.load);
-  CLI::Option* svg = show->add_option("--svg", o.svg, "writes the picture as an SVG file");
+  CLI::Option* svg = writes_file(show->add_option("--svg", o.svg, "writes the picture as an SVG file"));
   show->add_flag("--dot", o.dot, "prints Graphviz text")->excludes(svg);
   show->footer("Example: takt show graph/ace.yaml --svg ace.svg");
   show->callback([&] {
@@ -44,11 +46,11 @@ void add_show(CLI::App& app, plugin::Plugins& plugins, ShowOptions& o, int& exit
 
 void add_report(CLI::App& app, plugin::Plugins& plugins, RenderOptions& o, int& exit_code) {
   CLI::App* report = app.add_subcommand("report", "makes a page for people from the report of a run");
-  report->add_option("report", o.report, "what `takt run --report` wrote")->required();
-  report->add_option("graph", o.graph, "graph file of the run (default graph/ace.yaml)");
-  report->add_option("--schedule", o.schedule, "schedule file of the run, if it was not the graph's");
-  report->add_option("--html", o.html, "writes the page to this file")->required();
-  report->add_option("--output", o.output, "folder with the pictures of the run (default out)");
+  reads_file(report->add_option("report", o.report, "what `takt run --report` wrote"))->required();
+  reads_file(report->add_option("graph", o.graph, "graph file of the run (default graph/ace.yaml)"));
+  reads_file(report->add_option("--schedule", o.schedule, "schedule file of the run, if it was not the graph's"));
+  writes_file(report->add_option("--html", o.html, "writes the page to this file"))->required();
+  reads_folder(report->add_option("--output", o.output, "folder with the pictures of the run (default out)"));
   report->footer("Example: takt report run.json graph/ace.yaml --html run.html");
   report->callback([&] {
     graph::LoadOptions load;
@@ -59,9 +61,10 @@ void add_report(CLI::App& app, plugin::Plugins& plugins, RenderOptions& o, int& 
 
 void add_explain(CLI::App& app, ExplainOptions& o, int& exit_code) {
   CLI::App* explain = app.add_subcommand("explain", "says why jobs missed their deadlines, one sentence each");
-  explain->add_option("file", o.file, "what `takt run --trace` wrote (or --report, which says less)")->required();
+  reads_file(explain->add_option("file", o.file, "what `takt run --trace` wrote (or --report, which says less)"))
+      ->required();
   explain->add_option("node", o.node, "only this node");
-  explain->add_option("--svg", o.svg, "draws the largest of the misses printed");
+  writes_file(explain->add_option("--svg", o.svg, "draws the largest of the misses printed"));
   explain->footer("Example: takt explain trace.json");
   explain->callback([&] { exit_code = explain_misses(o); });
 }
@@ -107,18 +110,19 @@ void add_run(CLI::App& app, plugin::Plugins& plugins, RunOptions& o, int& exit_c
       ->check(CLI::IsMember({"local", "iceoryx"}));
   run->add_option("--isolate", o.isolate, "none (one process) | subsystem")
       ->check(CLI::IsMember({"none", "subsystem"}));
-  run->add_option("--report", o.report, "writes the report as JSON");
-  run->add_option("--html", o.html, "writes the report as one page to be read offline");
-  run->add_option("--junit", o.junit, "writes the verdict as JUnit XML, for CI servers");
-  run->add_option("--trace", o.trace, "writes a trace for https://ui.perfetto.dev and `takt explain`");
+  writes_file(run->add_option("--report", o.report, "writes the report as JSON"));
+  writes_file(run->add_option("--html", o.html, "writes the report as one page to be read offline"));
+  writes_file(run->add_option("--junit", o.junit, "writes the verdict as JUnit XML, for CI servers"));
+  writes_file(run->add_option("--trace", o.trace, "writes a trace for https://ui.perfetto.dev and `takt explain`"));
   run->add_option("--trace-source", o.trace_source,
                   "how preemption is seen: auto (the best granted) | tracefs | perf | none")
       ->check(CLI::IsMember({"auto", "tracefs", "perf", "none"}));
-  run->add_option("--record", o.record, "writes an MCAP record for `takt replay` and `takt log`");
+  writes_file(run->add_option("--record", o.record, "writes an MCAP record for `takt replay` and `takt log`"));
   run->add_option("--record-port", o.record_ports,
                   "NODE.PORT (or all): its messages whole, as those of devices and small ones are; repeatable");
-  run->add_option("--faults", o.faults, "a scenario: injects its faults and exits 0 exactly if what it expects is met");
-  run->add_option("--output", o.output, "folder for pictures and other results (default out)");
+  reads_file(run->add_option("--faults", o.faults,
+                             "a scenario: injects its faults and exits 0 exactly if what it expects is met"));
+  writes_folder(run->add_option("--output", o.output, "folder for pictures and other results (default out)"));
   run->add_option("--seed", o.seed, "seed of the simulated world");
   run->add_option("--watchdog", o.watchdog,
                   "device (/dev/watchdog) that resets the machine unless all high-criticality nodes are well");
@@ -149,9 +153,11 @@ void add_profile(CLI::App& app, plugin::Plugins& plugins, ProfileOptions& o, int
   profile->add_option("--seed", o.run.seed, "seed of the simulated world");
   profile->add_option("--quantile", o.quantile, "of the execution times (default 0.99)")->check(CLI::Range(0.01, 1.0));
   profile->add_option("--margin", o.margin, "budget = margin x quantile (default 1.2)")->check(CLI::Range(0.1, 100.0));
-  CLI::Option* write = profile->add_option("--write", o.write, "writes the schedule with the budgets to this file");
+  CLI::Option* write =
+      writes_file(profile->add_option("--write", o.write, "writes the schedule with the budgets to this file"));
   CLI::Option* in_place = profile->add_flag("--in-place", o.in_place, "writes them into the schedule itself");
-  CLI::Option* compare = profile->add_option("--compare", o.compare, "compares with this schedule: exit 1 if above");
+  CLI::Option* compare =
+      reads_file(profile->add_option("--compare", o.compare, "compares with this schedule: exit 1 if above"));
   CLI::Option* keep =
       profile->add_flag("--keep-budgets", o.keep_budgets, "writes what was measured, and leaves budgets");
   profile->add_option("--tolerance", o.tolerance, "by how much a node may be above (default 20%)")->needs(compare);
@@ -170,7 +176,7 @@ void add_profile(CLI::App& app, plugin::Plugins& plugins, ProfileOptions& o, int
 }  // namespace
 
 void add_plugin_option(CLI::App& app, std::vector<std::filesystem::path>& files) {
-  app.add_option("--plugin", files, "shared module with node types, devices or messages, repeatable");
+  reads_file(app.add_option("--plugin", files, "shared module with node types, devices or messages, repeatable"));
 }
 
 void add_graph_commands(CLI::App& app, plugin::Plugins& plugins, GraphOptions& o, int& exit_code) {

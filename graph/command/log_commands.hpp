@@ -9,15 +9,17 @@
 
 namespace takt::command {
 
+/// All of these commands end with exit code 1, too, if a record is damaged or cut off, unless `allow_damage`, and if
+/// there was nothing to be compared, written or shown.
 struct LogOptions {
   std::filesystem::path file, other, output;
-  bool json = false;
+  bool json = false, allow_damage = false;
   std::vector<std::string> ports;
   size_t items = 8;
   double from_s = 0, to_s = 1e9;  ///< since the epoch of the run
 };
 
-/// `takt log info FILE`: what a record holds and lacks. Exit 0, 2 if it is none.
+/// `takt log info FILE`: what a record holds and lacks. Exit 0, 2 if it is no record.
 int log_info(const LogOptions& options);
 /// `takt log diff A B`. Exit 0 if they hold the same, 1 if not, 2 if one is no record.
 int log_diff(const LogOptions& options);

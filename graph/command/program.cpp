@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "graph/cli/boundary.hpp"
 #include "graph/cli/outcome.hpp"
 #include "graph/command/attach_commands.hpp"
 #include "graph/command/doctor_command.hpp"
@@ -18,7 +19,6 @@
 #include "graph/plugins/plugins.hpp"
 #include "rt/abi.hpp"
 #include "rt/capability.hpp"
-#include "rt/machine/limits.hpp"
 
 namespace takt::command {
 namespace {
@@ -83,10 +83,10 @@ int run(int argc, char** argv, const std::function<void(Registry&)>& fill, const
 namespace takt {
 
 int main(int argc, char** argv, const std::function<void(Registry&)>& fill, const MoreCommands& more) {
-  command::hold_standard_streams();
-  machine::explain_what_nobody_catches();
-  keep_rights(Rights::observe);
-  return command::with_output(command::run(argc, argv, fill, more));
+  return command::at_boundary(argc, argv, [&] {
+    keep_rights(Rights::observe);
+    return command::run(argc, argv, fill, more);
+  });
 }
 
 }  // namespace takt

@@ -10,14 +10,17 @@
 #include <optional>
 #include <sstream>
 
+#include "graph/cli/file_option.hpp"
 #include "graph/command/graph_commands.hpp"
 #include "graph/compose/composition.hpp"
 #include "graph/compose/partition.hpp"
 #include "graph/language/words.hpp"
 #include "graph/log/cut_log.hpp"
+#include "graph/log/damages.hpp"
 #include "graph/log/log_content.hpp"
 #include "graph/log/recorded_plan.hpp"
 #include "graph/run/isolated_replay.hpp"
+#include "graph/run/outputs.hpp"
 #include "graph/run/prepare.hpp"
 #include "graph/run/support.hpp"
 #include "rt/abi.hpp"
@@ -78,6 +81,7 @@ class Replay {
     file_.emplace(std::move(*file));
     for (const std::string& damage : file_->damages())
       std::fprintf(stderr, "takt: the record is not whole: %s\n", damage.c_str());
+    damaged_ = !options_.allow_damage && !file_->damages().empty();
     read_options();
     return run_;
   }
@@ -86,7 +90,7 @@ class Replay {
   int run(const Registry& registry) {
     force_simd(registry.vectors, fact(file_->facts(), "simd"));
     if (const int code = rehearse(registry); code != kOk) return code;
-    return tell(replay([this](const ReplayPart& part) { return replay(part.how); }));
+    return judge(replay([this](const ReplayPart& part) { return replay(part.how); }));
   }
 
   /// All but the jobs.
@@ -104,7 +108,7 @@ class Replay {
     prepared_.emplace(registry);
     if (const int code = load(run_, *prepared_); code != kOk) return code;
     prepared_->composition = graph::outline(*prepared_->graph, registry, *prepared_->clock);
-    return tell(replay([&](const ReplayPart& part) {
+    return judge(replay([&](const ReplayPart& part) {
       prepared_.emplace(of_jobs(registry));
       if (compose() != kOk) throw std::runtime_error("it cannot be composed again");
       return replay(part.how);
@@ -312,6 +316,12 @@ class Replay {
     };
   }
 
+  int judge(const record::ReplayResult& result) const {
+    const int code = tell(result);
+    if (code != kOk || !damaged_) return code;
+    return refuse(log::damages_text(options_.log, *file_) + "; --allow-damage goes on with what is left", kNotOk);
+  }
+
   int tell(const record::ReplayResult& result) const {
     const double recorded_s = static_cast<double>(result.recorded_ns) / 1e9;
     const double took_s = static_cast<double>(took_ns_) / 1e9;
@@ -326,7 +336,11 @@ class Replay {
                  result.unmade);
     // A record without an end lacks the last jobs, as it says.
     const bool lacking = result.lacking > 0 || (result.unmade > 0 && !file_->end().empty());
+    if (result.jobs == 0 && !StopOnSignal::asked())
+      return refuse(options_.log.string() + ": nothing was replayed, the record has no job to be run", kNotOk);
     if (!options_.compare) return lacking ? kNotOk : kOk;
+    if (result.compared == 0 && !StopOnSignal::asked())
+      return refuse(options_.log.string() + ": nothing was compared", kNotOk);
     fmt::print("compared {} of {} messages: {} field by field, {} by hash; {} differ\n", result.compared,
                result.messages, result.whole, result.compared - result.whole, result.different);
     if (result.first) {
@@ -351,6 +365,7 @@ class Replay {
   std::optional<Prepared> prepared_;
   graph::ComposeOptions composed_;
   int64_t took_ns_ = 0;
+  bool damaged_ = false;  ///< and that is not allowed
   size_t processes_ = 1;
 };
 
@@ -371,11 +386,8 @@ int judged(const ReplayOptions& options, const std::function<int()>& command) {
 }  // namespace
 
 int replay(plugin::Plugins& plugins, const ReplayOptions& options) {
-  std::error_code error;
-  std::filesystem::create_directories(options.output, error);
-  if (error)
-    return refuse(fmt::format("--output {}: {}; choose a writable folder", options.output.string(), error.message()),
-                  kBadInput);
+  std::vector<WriterLock> locks;
+  if (const int code = claim_folder(options.output, locks); code != kOk) return code;
   return judged(options, [&] {
     Replay replay(options);
     RunOptions& run = replay.open();
@@ -395,18 +407,19 @@ int replay(plugin::Plugins& plugins, const ReplayOptions& options) {
 
 void add_replay(CLI::App& app, plugin::Plugins& plugins, ReplayOptions& o, int& exit_code) {
   CLI::App* replay = app.add_subcommand("replay", "runs the jobs of a record again, with what they were given");
-  replay->add_option("log", o.log, "what `takt run --record` wrote")->required();
-  replay->add_option("graph", o.graph, "graph file instead of that of the record");
+  reads_file(replay->add_option("log", o.log, "what `takt run --record` wrote"), UINT64_MAX)->required();
+  reads_file(replay->add_option("graph", o.graph, "graph file instead of that of the record"));
   replay->add_flag("--compare", o.compare, "bit by bit with the record; exit 1 on the first message that differs");
+  replay->add_flag("--allow-damage", o.allow_damage, "a record that is damaged or cut off is no failure");
   replay->add_option("--live", o.live, "runs only these nodes, with the rest from the record")->delimiter(',');
-  replay->add_option("--params", o.params, "parameter file of the robot instead of that of the record");
+  reads_file(replay->add_option("--params", o.params, "parameter file of the robot instead of that of the record"));
   replay->add_option("--set", o.set, "node.param=value, repeatable");
   add_plugin_option(*replay, o.plugin_files);
   replay->add_option("--from", o.from_s, "tells and paces only what was released so many seconds into the run");
   replay->add_option("--isolate", o.isolate, "none (one process) | subsystem: as many as the run had")
       ->check(CLI::IsMember({"none", "subsystem"}));
   replay->add_flag("--recorded-pace", o.recorded_pace, "as fast as it was, instead of as fast as possible");
-  replay->add_option("--output", o.output, "folder for pictures and other results (default out)");
+  writes_folder(replay->add_option("--output", o.output, "folder for pictures and other results (default out)"));
   replay->footer(
       "Example: takt replay run.mcap --compare\n"
       "Example: takt replay run.mcap --live ground_map --set ground_map.votes_min=7");

@@ -15,7 +15,7 @@ struct ReplayOptions {
   std::filesystem::path graph;   ///< empty: that of the record
   std::filesystem::path params;  ///< parameter file; empty: that of the record
   std::filesystem::path output = "out";
-  bool compare = false, recorded_pace = false;
+  bool compare = false, recorded_pace = false, allow_damage = false;
   std::string isolate = "none";   ///< none | subsystem: a process for each, as in a run
   std::vector<std::string> live;  ///< nodes that run; empty: all. What the others made comes from the record
   std::vector<std::string> set;   ///< "node.param=value", after those of the record
@@ -24,7 +24,8 @@ struct ReplayOptions {
 };
 
 /// `takt replay LOG [GRAPH]`: runs every job of a record again, with the inputs and answers that it had. Exit 1 if
-/// --compare finds a message that is not bit by bit the recorded one, or the record lacks what a job was given; 2 if
+/// --compare finds a message that is not bit by bit the recorded one or compares none, if there is no job to be run, if
+/// the record lacks what a job was given or is damaged or cut off (unless `allow_damage`); 2 if
 /// the record, its graph or a file that the graph names cannot be used.
 int replay(plugin::Plugins& plugins, const ReplayOptions& options);
 

@@ -3,10 +3,8 @@
 
 #include <fmt/format.h>
 
-#include <cerrno>
 #include <cstdio>
 #include <fstream>
-#include <system_error>
 
 #include "graph/explain/file_format.hpp"
 #include "graph/run/prepare.hpp"
@@ -17,16 +15,6 @@ namespace takt::command {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-int write_file(const std::filesystem::path& file, const std::string& text) {
-  errno = 0;
-  std::ofstream out(file, std::ios::binary);
-  out << text;
-  out.close();
-  if (out) return kOk;
-  const std::string reason = errno != 0 ? std::generic_category().message(errno) : "cannot be written";
-  return refuse(fmt::format("{}: {}; choose another place", file.string(), reason), kBadInput);
-}
 
 /// The report, or null after the reason was written to stderr.
 Json read_report(const std::filesystem::path& file) {
@@ -81,7 +69,7 @@ int show_graph(const Registry& registry, const ShowOptions& options) {
   const auto graph = load_graph(registry, options.graph, options.load);
   if (!graph) return kBadInput;
   const view::Diagram diagram = view::make_diagram(*graph, registry);
-  if (!options.svg.empty()) return write_file(options.svg, view::graph_svg(diagram));
+  if (!options.svg.empty()) return write_output(options.svg, view::graph_svg(diagram), "--svg");
   std::fputs((options.dot ? view::graph_dot(diagram) : view::graph_listing(diagram)).c_str(), stdout);
   return kOk;
 }
@@ -92,7 +80,7 @@ int render_report(const Registry& registry, const RenderOptions& options) {
   const auto graph = load_graph(registry, options.graph, load_options(report, options));
   if (!graph) return kBadInput;
   if (const int code = compare_names(report, *graph); code != kOk) return code;
-  return write_file(options.html, view::html_report(registry, report, *graph, options.output));
+  return write_output(options.html, view::html_report(registry, report, *graph, options.output), "--html");
 }
 
 }  // namespace takt::command

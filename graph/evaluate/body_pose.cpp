@@ -12,6 +12,7 @@
 #include "nodes/body_pose/evaluate.hpp"
 #include "nodes/body_pose/floor.hpp"
 #include "nodes/body_pose/picture.hpp"
+#include "nodes/picture/image_file.hpp"
 #include "rt/msg/ace/body_poses.hpp"
 #include "rt/msg/geometry.hpp"
 #include "rt/msg/point.hpp"
@@ -30,9 +31,7 @@ Skeleton skeleton_of(const EvalBodyPoseOptions& options) {
   return read_skeleton(options.skeleton.empty() ? shipped("graph/skeletons/human.txt") : options.skeleton);
 }
 
-void write(const std::string& file, const cv::Mat& picture) {
-  if (!cv::imwrite(file, picture)) throw std::runtime_error(file + ": cannot be written");
-}
+void write(const std::string& file, const cv::Mat& picture) { require_written(picture::write_image(file, picture)); }
 
 // A Kinect's depth image ---------------------------------------------------------------------------------------------
 

@@ -14,6 +14,7 @@
 #include "graph/evaluate/evaluations.hpp"
 #include "nodes/ego_motion/evaluate.hpp"
 #include "nodes/stereo/matcher.hpp"
+#include "rt/file/input_file.hpp"
 #include "rt/quantile.hpp"
 #include "rt/time/clock.hpp"
 
@@ -31,6 +32,7 @@ std::vector<double> numbers(const std::string& line) {
 
 /// P0 and P1 of a KITTI calib.txt: 3x4 row-major projection matrices.
 CameraModel read_calibration(const std::filesystem::path& file) {
+  if (std::filesystem::exists(file)) require_readable<BadData>(file);
   std::ifstream in(file);
   if (!in) throw BadData(fmt::format("{}: cannot be read; --data wants calib.txt with P0: and P1:", file.string()));
   std::vector<double> p0, p1;
@@ -48,6 +50,7 @@ CameraModel read_calibration(const std::filesystem::path& file) {
 }
 
 std::vector<Rigid> read_poses(const std::filesystem::path& file) {
+  if (std::filesystem::exists(file)) require_readable<BadData>(file);
   std::ifstream in(file);
   if (!in) throw BadData(fmt::format("{}: cannot be read; --data wants poses.txt, a 3x4 matrix a line", file.string()));
   std::vector<Rigid> poses;

@@ -7,6 +7,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "nodes/picture/image_file.hpp"
 #include "rt/msg/geometry.hpp"
 
 namespace takt::command {
@@ -16,14 +17,7 @@ using namespace ego_motion;
 
 const cv::Scalar kBlue(255, 140, 60), kGreen(60, 220, 60), kRed(60, 60, 255);
 
-void write(const std::string& file, const cv::Mat& image) {
-  bool written = false;
-  try {
-    written = cv::imwrite(file, image);
-  } catch (const cv::Exception&) {
-  }
-  if (!written) throw BadData(fmt::format("--picture {}: cannot be written; it wants a name that ends in .png", file));
-}
+void write(const std::string& file, const cv::Mat& image) { require_written(picture::write_image(file, image)); }
 
 }  // namespace
 

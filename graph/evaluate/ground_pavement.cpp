@@ -15,6 +15,7 @@
 #include "nodes/ground_map/pavement_scene.hpp"
 #include "nodes/mapping_3d/pose.hpp"
 #include "nodes/picture/draw.hpp"
+#include "nodes/picture/image_file.hpp"
 #include "rt/msg/geometry.hpp"
 #include "rt/quantile.hpp"
 #include "rt/time/clock.hpp"
@@ -64,7 +65,7 @@ void write_picture(const std::string& file, const cv::Mat& image, const cv::Mat&
   image.copyTo(left);
   picture::draw_mask(view(mask), writable(left));
   picture::draw_grid(grid.map(), scale, writable(right));
-  if (!cv::imwrite(file, out)) throw std::runtime_error(fmt::format("{}: cannot be written", file));
+  require_written(picture::write_image(file, out));
 }
 
 /// What the ground map makes of a drive with one set of parameters.

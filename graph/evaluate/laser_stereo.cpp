@@ -15,6 +15,7 @@
 
 #include "nodes/stereo/matcher.hpp"
 #include "nodes/stereo/triangulate.hpp"
+#include "rt/file/input_file.hpp"
 #include "rt/msg/point.hpp"
 #include "rt/quantile.hpp"
 
@@ -36,8 +37,8 @@ class CalibrationFile {
   explicit CalibrationFile(std::filesystem::path file) : file_(std::move(file)) {}
 
   Eigen::MatrixXd matrix(const std::string& name, int rows, int columns) const {
+    require_readable<std::invalid_argument>(file_);
     std::ifstream in(file_);
-    if (!in) throw std::invalid_argument(file_.string() + ": cannot be read");
     for (std::string line; std::getline(in, line);) {
       if (line.rfind(name + ":", 0) != 0) continue;
       std::istringstream numbers(line.substr(name.size() + 1));

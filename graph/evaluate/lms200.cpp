@@ -13,6 +13,7 @@
 #include "hal/laser/lms200/commands.hpp"
 #include "hal/laser/lms200/scan.hpp"
 #include "hal/settings/json.hpp"
+#include "rt/file/input_file.hpp"
 
 namespace takt::command {
 namespace {
@@ -33,8 +34,8 @@ std::vector<std::string> fields_of(const std::string& line) {
 }
 
 std::ifstream open_file(const std::filesystem::path& file) {
+  require_readable(file);
   std::ifstream stream(file, std::ios::binary);
-  if (!stream) throw std::runtime_error(file.string() + ": cannot be opened");
   return stream;
 }
 

@@ -3,11 +3,13 @@
 #include <CLI/CLI.hpp>
 #include <opencv2/core/utils/logger.hpp>
 
+#include "graph/cli/boundary.hpp"
 #include "graph/cli/outcome.hpp"
 #include "graph/evaluate/command_line.hpp"
 
-int main(int argc, char** argv) {
-  takt::command::hold_standard_streams();
+namespace {
+
+int run(int argc, char** argv) {
   // Files that cannot be read are reported by the evaluations themselves, with the next step.
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
   CLI::App eval{"measures quality against ground truth", "takt eval"};
@@ -19,5 +21,11 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     exit_code = eval.exit(error) == 0 ? 0 : takt::command::kBadInput;
   }
-  return takt::command::with_output(exit_code);
+  return exit_code;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return takt::command::at_boundary(argc, argv, [&] { return run(argc, argv); });
 }

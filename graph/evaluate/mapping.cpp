@@ -12,6 +12,7 @@
 #include "nodes/mapping_3d/evaluate.hpp"
 #include "nodes/mapping_3d/grid_file.hpp"
 #include "nodes/picture/clouds.hpp"
+#include "nodes/picture/image_file.hpp"
 
 namespace takt::command {
 namespace {
@@ -150,14 +151,7 @@ void write(const EvalMappingOptions& o, const RedundancyFigures& room) {
       throw std::runtime_error("--grid " + written.error());
   if (o.picture.empty()) return;
   const cloud::CloudView view = room.map.view();
-  bool written = false;
-  try {
-    written = cv::imwrite(o.picture, picture::draw_clouds({&view, 1}));
-  } catch (const cv::Exception&) {  // a name whose ending tells no format
-  }
-  if (!written)
-    throw std::runtime_error(
-        fmt::format("--picture {}: cannot be written; it wants a name that ends in .png", o.picture));
+  require_written(picture::write_image(o.picture, picture::draw_clouds({&view, 1})));
 }
 
 }  // namespace

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cstdio>
-#include <fstream>
 #include <opencv2/core.hpp>
+#include <sstream>
 
 #include "graph/cli/outcome.hpp"
 #include "graph/evaluate/evaluations.hpp"
 #include "hal/settings/json.hpp"
 #include "nodes/object_3d/evaluate.hpp"
+#include "rt/file/output_file.hpp"
 
 namespace takt::command {
 namespace {
@@ -35,9 +36,9 @@ Results measure_all(const EvalObjects3dOptions& o) {
   r.classified = compare_classifiers(training, known, strange);
   r.labelled = label_scenes(training, scenes, o.seed * 10 + 4, o.samples);
   if (!o.write.empty()) {
-    std::ofstream file(o.write);
+    std::ostringstream file;
     write_training(file, training);
-    if (!file.flush()) throw std::runtime_error(o.write.string() + ": cannot be written");
+    require_written(write_file(o.write, file.str()));
   }
   if (!o.data.empty())
     for (const double colour_max : kMeasured) r.matched.emplace_back(colour_max, match_recordings(o.data, colour_max));

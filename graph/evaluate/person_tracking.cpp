@@ -9,6 +9,7 @@
 #include "graph/evaluate/percent.hpp"
 #include "hal/settings/json.hpp"
 #include "nodes/person_tracking/evaluate.hpp"
+#include "nodes/picture/image_file.hpp"
 #include "rt/quantile.hpp"
 
 namespace takt::command {
@@ -52,7 +53,7 @@ void draw(const std::string& file, uint64_t seed) {
       cv::circle(picture, cv::Point2f(corner.x, corner.y), 2, {0, 0, 255}, cv::FILLED);
     cv::rectangle(picture, {board.box.x, board.box.y, board.box.width, board.box.height}, {0, 200, 0}, 2);
   }
-  if (!cv::imwrite(file, picture)) throw std::runtime_error(file + ": cannot be written");
+  require_written(picture::write_image(file, picture));
 }
 
 }  // namespace

@@ -21,6 +21,8 @@
 #include "nodes/laser_fusion/fusion.hpp"
 #include "nodes/picture/clouds.hpp"
 #include "nodes/picture/curves.hpp"
+#include "nodes/picture/image_file.hpp"
+#include "rt/file/input_file.hpp"
 #include "rt/msg/geometry.hpp"
 #include "rt/msg/point.hpp"
 #include "rt/time/clock.hpp"
@@ -44,8 +46,8 @@ cloud::Cloud read(const std::filesystem::path& file) {
 
 /// Four rows of four numbers.
 Rigid read_pose(const std::filesystem::path& file) {
+  require_readable<std::invalid_argument>(file);
   std::ifstream in(file);
-  if (!in) throw std::invalid_argument(file.string() + ": cannot be read");
   double m[16] = {};
   for (int i = 0; i < 16; ++i)
     if (!(in >> m[i]))
@@ -139,14 +141,8 @@ void write_results(const EvalRegistrationOptions& o, const cloud::Cloud& target,
   if (o.picture.empty()) return;
   const cloud::Cloud before = laid_over(target, source, {}), after = laid_over(target, source, r.refined);
   const cloud::CloudView views[] = {before.view(), after.view(), result.confidence.view(), result.coloured.view()};
-  bool written = false;
-  try {
-    written = cv::imwrite(o.picture, picture::draw_clouds(std::span(views).first(source.colours.empty() ? 3 : 4)));
-  } catch (const cv::Exception&) {  // a name whose ending tells no format
-  }
-  if (!written)
-    throw std::invalid_argument(
-        fmt::format("--picture {}: cannot be written; it wants a name that ends in .png", o.picture));
+  require_written(
+      picture::write_image(o.picture, picture::draw_clouds(std::span(views).first(source.colours.empty() ? 3 : 4))));
 }
 
 Json errors(const Rigid& found, const Rigid& reference) {

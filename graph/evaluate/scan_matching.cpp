@@ -11,6 +11,7 @@
 #include "hal/replay/carmen_log.hpp"
 #include "hal/settings/json.hpp"
 #include "nodes/picture/draw.hpp"
+#include "nodes/picture/image_file.hpp"
 #include "nodes/scan_matching/evaluate.hpp"
 #include "nodes/scan_matching/occupancy_map.hpp"
 
@@ -135,13 +136,7 @@ void write_map(const std::string& file, const Drive& drive, const std::vector<Pl
   for (size_t i = 0; i < poses.size(); ++i) map.add(poses[i], drive.sweep(i));
   cv::Mat image(map.side(), map.side(), CV_8UC3);
   picture::draw_grid(map.cells(), 1, {image.data, image.cols, image.rows, 3, static_cast<ptrdiff_t>(image.step)});
-  bool written = false;
-  try {
-    written = cv::imwrite(file, image);
-  } catch (const cv::Exception&) {
-  }
-  if (!written)
-    throw std::runtime_error(fmt::format("--picture {}: cannot be written; it wants a name that ends in .png", file));
+  require_written(picture::write_image(file, image));
 }
 
 }  // namespace

@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <cstdio>
-#include <fstream>
 
 #include "graph/cli/outcome.hpp"
 #include "graph/evaluate/evaluations.hpp"
@@ -12,6 +11,7 @@
 #include "nodes/semantic/evaluate.hpp"
 #include "nodes/semantic/network_file.hpp"
 #include "nodes/semantic/network_text.hpp"
+#include "rt/file/output_file.hpp"
 #include "rt/quantile.hpp"
 
 namespace takt::command {
@@ -118,11 +118,8 @@ int tell(const EvalSemanticOptions& o) {
 
 // A network from a file ----------------------------------------------------------------------------------------------
 
-void write(const std::filesystem::path& file, const char* option, const std::string& text) {
-  if (file.empty()) return;
-  std::ofstream stream(file, std::ios::binary);
-  stream << text;
-  if (!stream.flush()) throw std::invalid_argument(fmt::format("{} {}: cannot be written", option, file.string()));
+void write(const std::filesystem::path& file, const std::string& text) {
+  if (!file.empty()) require_written(write_file(file, text));
 }
 
 /// "cup_1.level=full".
@@ -150,8 +147,8 @@ int show_network(const EvalSemanticOptions& o) {
   SemanticMap map({});
   if (const auto read = read_network(o.network, map); !read)
     throw std::invalid_argument(fmt::format("{}", fmt::join(read.error(), "\n")));
-  write(o.dot, "--dot", to_dot(map));
-  write(o.graphml, "--graphml", to_graphml(map));
+  write(o.dot, to_dot(map));
+  write(o.graphml, to_graphml(map));
   Json out;
   for (const Kind kind : {Kind::object, Kind::attribute, Kind::type, Kind::action})
     out[std::string(to_string(kind)) + "s"] = map.all(kind).size();

@@ -15,6 +15,7 @@
 #include "graph/evaluate/evaluations.hpp"
 #include "hal/settings/json.hpp"
 #include "nodes/traffic_signs/evaluate.hpp"
+#include "rt/file/input_file.hpp"
 
 namespace takt::command {
 namespace {
@@ -38,8 +39,8 @@ size_t recorded_sign(const std::vector<SignModel>& signs, const std::string& nam
 class Table {
  public:
   explicit Table(fs::path file) : file_(std::move(file)) {
+    require_readable<std::invalid_argument>(file_);
     std::ifstream in(file_);
-    if (!in) throw std::invalid_argument(file_.string() + ": cannot be read");
     for (std::string line; std::getline(in, line);) {
       if (!line.empty() && line.back() == '\r') line.pop_back();
       std::istringstream cells(line);

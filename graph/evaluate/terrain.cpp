@@ -13,6 +13,7 @@
 #include "nodes/ground_map/terrain_drive.hpp"
 #include "nodes/ground_map/terrain_file.hpp"
 #include "nodes/picture/draw.hpp"
+#include "nodes/picture/image_file.hpp"
 
 namespace takt::command {
 namespace {
@@ -84,7 +85,7 @@ void write_maps(const std::string& file, const TerrainMaps& maps) {
     picture::draw_grid({maps.cells[kind].data(), maps.shape.columns, maps.shape.rows}, kScale,
                        {part.data, width, height, 3, static_cast<ptrdiff_t>(part.step)});
   }
-  if (!cv::imwrite(file, out)) throw std::runtime_error(file + ": cannot be written");
+  require_written(picture::write_image(file, out));
 }
 
 }  // namespace

@@ -124,6 +124,7 @@ std::string where_they_part(LogFile& from, LogFile& to, const mcap::Channel& cha
 
 void compare_channel(LogFile& from, LogFile& to, const mcap::Channel& channel, LogDifference& result) {
   const auto &a = from.messages(channel.id), &b = to.messages(to.channel(channel.topic));
+  result.messages += a.size() + b.size();
   uint64_t both = 0, different = 0, first = 0;
   for (const auto& [sequence, known] : a) {
     const auto other = b.find(sequence);

@@ -27,6 +27,7 @@ std::string content_hash(const record::LogFile& log);
 struct LogDifference {
   std::vector<std::string> lines;
   bool same = true;
+  uint64_t messages = 0;  ///< of both, that were looked at
 };
 LogDifference difference(record::LogFile& from, record::LogFile& to);
 

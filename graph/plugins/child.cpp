@@ -20,6 +20,7 @@
 #include <iterator>
 #include <new>
 
+#include "graph/cli/boundary.hpp"
 #include "graph/cli/graph_file.hpp"
 #include "graph/cli/outcome.hpp"
 #include "rt/machine/limits.hpp"

@@ -158,7 +158,7 @@ void RunFaults::judge(const RunResult& result, const RunBoard& board, int exit,
 }
 
 int RunFaults::exit_code(int told, const nlohmann::ordered_json& report) const {
-  if (!injection_ || told == kBadInput) return told;  // a file that could not be written
+  if (!injection_ || told == kBadInput) return told;
   return report["scenario"]["met"].get<bool>() ? kOk : kNotOk;
 }
 

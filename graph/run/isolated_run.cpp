@@ -20,6 +20,7 @@
 #include "graph/run/live_table.hpp"
 #include "graph/run/member_process.hpp"
 #include "graph/run/outages.hpp"
+#include "graph/run/outputs.hpp"
 #include "graph/run/prepare.hpp"
 #include "graph/run/report.hpp"
 #include "graph/run/rights.hpp"
@@ -393,7 +394,7 @@ class IsolatedRun {
     result.end_ns = board_.stop().end_ns();
     result.policy_granted = granted_;
     result.released = released_jobs(plan_, board_, result.epoch_ns, result.end_ns);
-    const std::string no_trace = trace_.write(graph_, plan_, board_, result);
+    trace_.write(graph_, plan_, board_, result);
     record_.finish(result, trace_.unheard_threads());
     auto report =
         make_report({registry_, graph_, plan_, board_, result, *transport_, use, options_.clock,
@@ -414,8 +415,7 @@ class IsolatedRun {
     expectations_.judge(report);
     tell(registry_, options_, graph_, report);
     if (code_ == 0) watchdog_->end();  // else nobody says that all is well
-    if (!no_trace.empty()) return refuse(no_trace, kBadInput);
-    return expectations_.exit_code(faults_.exit_code(exit, report), report);
+    return std::max(expectations_.exit_code(faults_.exit_code(exit, report), report), options_.outputs->code);
   }
 
   std::unique_ptr<DaemonClaim> claim_;  ///< of iceoryx, until its daemon is there

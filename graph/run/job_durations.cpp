@@ -4,11 +4,13 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <cstdio>
 #include <map>
 #include <span>
 #include <utility>
 #include <vector>
 
+#include "graph/log/damages.hpp"
 #include "graph/log/recorded_plan.hpp"
 #include "rt/node.hpp"
 #include "rt/record/log_file.hpp"
@@ -49,6 +51,8 @@ std::map<std::string, std::vector<int64_t>> recorded(const record::LogFile& log,
 tl::expected<JobDurations, std::string> recorded(const std::filesystem::path& file, const Plan& plan) {
   const auto log = record::LogFile::open(file);
   if (!log) return tl::make_unexpected("--durations: " + log.error());
+  if (const std::string damages = log::damages_text(file, *log); !damages.empty())
+    std::fprintf(stderr, "takt: --durations %s\n", damages.c_str());
   const log::Json json = log::Json::parse(log->attached("plan.json").value_or(""), nullptr, false);
   if (!json.is_object() || !json.contains("tasks") || !json["tasks"].is_array())
     return tl::make_unexpected(fmt::format("--durations {}: the record holds no readable plan.json", file.string()));

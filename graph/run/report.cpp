@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "graph/attach/parameters.hpp"
+#include "graph/cli/boundary.hpp"
 #include "graph/explain/file_format.hpp"
 #include "rt/abi.hpp"
 
@@ -272,6 +273,7 @@ Json make_report(const RunFacts& facts) {
   report["cpu"] = cpu_json(facts);
   report["host_stall_ms"] = facts.use.steal_ms;
   report["recorder_lost"] = 0;  // RunRecord::tell knows better
+  report["unsaid_lines"] = unsaid_lines();
   report["adjusted"] = facts.adjusted;
   report["faults"] = faults_json(facts);
   report["timeline"] = timeline_json(facts);

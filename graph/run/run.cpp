@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <optional>
 
@@ -14,6 +15,7 @@
 #include "graph/run/isolated_run.hpp"
 #include "graph/run/job_durations.hpp"
 #include "graph/run/live_table.hpp"
+#include "graph/run/outputs.hpp"
 #include "graph/run/prepare.hpp"
 #include "graph/run/report.hpp"
 #include "graph/run/rights.hpp"
@@ -28,13 +30,6 @@
 
 namespace takt::command {
 namespace {
-
-/// Whether a file can be written there, without making it yet.
-bool writable(const std::filesystem::path& file) {
-  if (access(file.c_str(), F_OK) == 0) return access(file.c_str(), W_OK) == 0;
-  const auto folder = file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
-  return access(folder.c_str(), W_OK) == 0;
-}
 
 std::unique_ptr<Transport> make_transport(const std::string& name, const Plan& plan) {
   if (name != "iceoryx") return make_local_transport(plan.ports);
@@ -109,7 +104,7 @@ int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, Ru
     if (rights) held = rights->told();
   }
   const ProcessReading after = ProcessReading::now();
-  const std::string no_trace = trace.write(graph, composition.plan, board, result);
+  trace.write(graph, composition.plan, board, result);
   record.finish(result, trace.unheard_threads());
   for (size_t t = 0; t < composition.nodes.size(); ++t)
     if (!is_stuck(result, t)) composition.nodes[t]->finish();
@@ -142,7 +137,7 @@ int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, Ru
   expectations.judge(report);
   int code = tell_faults(prepared.registry, options, graph, board, result.policy_granted, report);
   code = expectations.exit_code(faults.exit_code(code, report), report);
-  if (!no_trace.empty()) code = refuse(no_trace, kBadInput);
+  code = std::max(code, options.outputs->code);
   if (options.witness != nullptr) options.witness->end(report);
   if (result.stuck.empty()) watchdog.end();
   // A job that never returns still uses what would now be taken down.
@@ -214,26 +209,13 @@ int run_as_asked(const Registry& registry, RunOptions options) {
     whole.clock = std::move(prepared.clock);
     return run_in_one_process(options, whole, faults, adjusted);
   }
-  const KeptPlace report(options.report), page(options.html), verdict(options.junit), trace(options.trace),
-      record(options.record);
+  const KeptPlace record(options.record);
   return run_isolated(registry, options, *prepared.graph, faults, std::move(adjusted));
 }
 
 }  // namespace
 
 int run_graph(const Registry& registry, const RunOptions& options) {
-  std::error_code error;
-  std::filesystem::create_directories(options.output, error);
-  if (error)
-    return refuse(fmt::format("--output {}: {}; choose a writable folder", options.output.string(), error.message()),
-                  kBadInput);
-  for (const auto& [option, file] : {std::pair("--report", options.report),
-                                     {"--html", options.html},
-                                     {"--junit", options.junit},
-                                     {"--trace", options.trace},
-                                     {"--record", options.record}})
-    if (!file.empty() && !writable(file))
-      return refuse(fmt::format("{} {}: cannot be written; choose another place", option, file.string()), kBadInput);
   if (options.durations != "budgets" && options.clock != "virtual")
     return refuse("--durations: only jobs in virtual time take what they are told; add --clock virtual", kBadInput);
   if (!options.watchdog.empty() && options.clock == "virtual")
@@ -246,9 +228,11 @@ int run_graph(const Registry& registry, const RunOptions& options) {
             ": systemd watches this run (WatchdogSec=); leave --watchdog out, and let systemd feed the device "
             "(RuntimeWatchdogSec= in system.conf)",
         kBadInput);
+  RunOptions claimed = options;
+  if (const int code = claim_outputs(claimed); code != kOk) return code;
   const StopOnSignal guard;
   try {
-    return run_as_asked(registry, options);
+    return run_as_asked(registry, claimed);
   } catch (const std::invalid_argument& problem) {  // more ports or edges than the transport carries
     return refuse(problem.what(), kBadInput);
   } catch (const std::exception& problem) {  // PolicyRefused, TransportError, no memory

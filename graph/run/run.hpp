@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <filesystem>
+#include <memory>
 #include <string>
 
 #include "graph/cli/outcome.hpp"
@@ -27,6 +28,8 @@ class RunWitness {
   virtual void end(const nlohmann::ordered_json& report) = 0;
 };
 
+struct RunOutputs;  // graph/run/outputs.hpp
+
 struct RunOptions {
   std::filesystem::path graph;  ///< empty: graph/ace.yaml of the project
   graph::LoadOptions load;
@@ -41,9 +44,10 @@ struct RunOptions {
   std::vector<std::string> record_ports;  ///< NODE.PORT: with all fields, beside devices and small ones; "all"
   std::string trace_source = "auto";      ///< of preemption: auto (the best there is), tracefs, perf, none
   uint64_t seed = 1;
-  std::filesystem::path watchdog;  ///< device that resets the machine unless the run is well; empty: none
-  int watchdog_timeout_s = 10;     ///< asked of it
-  RunWitness* witness = nullptr;   ///< asks for `clock` virtual
+  std::filesystem::path watchdog;       ///< device that resets the machine unless the run is well; empty: none
+  int watchdog_timeout_s = 10;          ///< asked of it
+  RunWitness* witness = nullptr;        ///< asks for `clock` virtual
+  std::shared_ptr<RunOutputs> outputs;  ///< the files above, as long as the run has them; made by run_graph()
   /// A policy named on the command line, or --require-rt: refused means exit 3, not another policy.
   bool policy_required() const { return require_rt || !load.policy.empty(); }
 };

@@ -133,6 +133,8 @@ std::string summary_text(const Json& report) {
                       report["memory"]["shm_mb"].get<double>(), report["memory"]["rss_mb"].get<double>(),
                       report["host_stall_ms"].get<int64_t>());
   if (report.contains("record")) text += record_line(report["record"], report["recorder_lost"].get<uint64_t>());
+  if (const auto lines = report.value("unsaid_lines", uint64_t{0}); lines > 0)
+    text += fmt::format("stderr: {} lines could not be written\n", lines);
   text += events_text(report);
   text += proofs_text(report["proofs"]);
   for (const Json& line : report["adjusted"]) text += "adjusted: " + line.get<std::string>() + "\n";

@@ -14,13 +14,13 @@
 #include <cstdio>
 #include <cstdlib>
 #include <ctime>
-#include <fstream>
 #include <new>
 
 #include "graph/check/check.hpp"
 #include "graph/check/machine_file.hpp"
 #include "graph/run/junit.hpp"
 #include "graph/run/machine.hpp"
+#include "graph/run/outputs.hpp"
 #include "graph/run/prepare.hpp"
 #include "graph/run/report.hpp"
 #include "graph/view/html_report.hpp"
@@ -151,15 +151,10 @@ void tell_attach(const attach::Server& server, std::vector<std::string>& adjuste
 int tell(const Registry& registry, const RunOptions& options, const graph::GraphSpec& graph,
          const nlohmann::ordered_json& report) {
   if (options.witness == nullptr) std::fputs(summary_text(report).c_str(), stdout);
-  const auto write = [](const std::filesystem::path& file, const std::string& text) {
-    return file.empty() || static_cast<bool>(std::ofstream(file) << text << std::flush);
-  };
-  if (!write(options.report, report.dump(2) + "\n"))
-    return refuse("cannot write the report to " + options.report.string() + "; choose a writable --report", kBadInput);
-  if (!options.html.empty() && !write(options.html, view::html_report(registry, report, graph, options.output)))
-    return refuse("cannot write the page to " + options.html.string() + "; choose a writable --html", kBadInput);
-  if (!options.junit.empty() && !write(options.junit, junit_text(report)))
-    return refuse("cannot write the verdict to " + options.junit.string() + "; choose a writable --junit", kBadInput);
+  RunOutputs& outputs = *options.outputs;
+  outputs.write(outputs.report, report.dump(2) + "\n", "--report");
+  if (outputs.html) outputs.write(outputs.html, view::html_report(registry, report, graph, options.output), "--html");
+  if (outputs.junit) outputs.write(outputs.junit, junit_text(report), "--junit");
   return report["ok"].get<bool>() ? kOk : kNotOk;
 }
 

@@ -80,7 +80,7 @@ std::vector<std::string> prepare_process(const Registry& registry);
 /// Says why nobody can attach, or which folder was passed over.
 void tell_attach(const attach::Server& server, std::vector<std::string>& adjusted);
 
-/// Prints the summary, writes the files that were asked for; the exit code of the run.
+/// Prints the summary, writes the files that were asked for; the exit code of the run, if all could be written.
 int tell(const Registry& registry, const RunOptions& options, const graph::GraphSpec& graph,
          const nlohmann::ordered_json& report);
 

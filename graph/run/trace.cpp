@@ -4,9 +4,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <fstream>
 
 #include "graph/explain/trace_file.hpp"
+#include "graph/run/outputs.hpp"
 #include "rt/abi.hpp"
 #include "rt/machine/facts.hpp"
 
@@ -55,12 +55,11 @@ void RunTrace::collect(const Plan& plan, RunRecord& record) {
   collector_ = std::make_unique<trace::Collector>(*rings_, std::move(how));
 }
 
-std::string RunTrace::write(const graph::GraphSpec& graph, const Plan& plan, const RunBoard& board,
-                            const RunResult& result) {
-  if (!collector_) return "";
+void RunTrace::write(const graph::GraphSpec& graph, const Plan& plan, const RunBoard& board, const RunResult& result) {
+  if (!collector_) return;
   const trace::Recording recording = collector_->finish();
   collector_.reset();
-  if (options_.trace.empty()) return "";
+  if (options_.trace.empty()) return;
   trace::Trace trace = trace::assemble(recording);
   trace.policy = to_string(result.policy_granted);
   trace.epoch_ns = result.epoch_ns;
@@ -74,10 +73,8 @@ std::string RunTrace::write(const graph::GraphSpec& graph, const Plan& plan, con
                      {"policy_asked", to_string(graph.schedule.policy)},
                      {"commit", version().commit},
                      {"collector_cpu_ms", static_cast<double>(recording.collector_cpu_ns) / 1e6}};
-  std::ofstream file(options_.trace, std::ios::binary);
-  explain::write_trace(file, head, trace);
-  file.close();
-  return file ? "" : "cannot write the trace to " + options_.trace.string() + "; choose a writable --trace";
+  explain::write_trace(options_.outputs->trace->stream(), head, trace);
+  options_.outputs->write(options_.outputs->trace, "", "--trace");
 }
 
 }  // namespace takt::command

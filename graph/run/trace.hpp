@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <memory>
-#include <string>
 
 #include "graph/run/record.hpp"
 #include "graph/run/run.hpp"
@@ -27,8 +26,8 @@ class RunTrace {
   void drain() {
     if (collector_) collector_->drain();
   }
-  /// Ends collecting and writes the trace, if one was asked for; "" or why it could not be written.
-  std::string write(const graph::GraphSpec& graph, const Plan& plan, const RunBoard& board, const RunResult& result);
+  /// Ends collecting and writes the trace, if one was asked for; see RunOutputs::write().
+  void write(const graph::GraphSpec& graph, const Plan& plan, const RunBoard& board, const RunResult& result);
   /// Threads that found no room for their events.
   size_t unheard_threads() const { return rings_ ? rings_->refused() : 0; }
 

@@ -9,6 +9,8 @@
 #include <optional>
 #include <stdexcept>
 
+#include "graph/cli/boundary.hpp"
+#include "graph/cli/file_option.hpp"
 #include "graph/cli/outcome.hpp"
 #include "hal/replay/stereo_files.hpp"
 #include "hal/settings/json.hpp"
@@ -16,6 +18,7 @@
 #include "nodes/calibration/epipolar.hpp"
 #include "nodes/calibration/image_pairs.hpp"
 #include "nodes/calibration/picture.hpp"
+#include "nodes/picture/image_file.hpp"
 #include "nodes/stereo/rectification_monitor.hpp"
 
 namespace takt::command {
@@ -167,14 +170,7 @@ void write_files(const CalibrateOptions& options, const Outcome& out) {
   const auto whole = std::find_if(pairs.begin(), pairs.end(), [](const RectifiedPair& p) { return !p.left.empty(); });
   const cv::Mat picture =
       draw_calibration(whole == pairs.end() ? pairs.front() : *whole, out.recording.views, out.result);
-  bool written = false;
-  try {
-    written = cv::imwrite(options.picture.string(), picture);
-  } catch (const cv::Exception&) {  // a name whose ending tells no format
-  }
-  if (!written)
-    throw BadInput(fmt::format("{}: cannot be written; choose another place, and a name that ends in .png",
-                               options.picture.string()));
+  require_written(picture::write_image(options.picture, picture));
 }
 
 double baseline(const stereo::StereoCalibration& c) { return cv::norm(cv::Vec3d(c.translation_m.data())); }
@@ -294,7 +290,7 @@ int calibrate_stereo(const CalibrateOptions& options) {
     for (const std::string& doubt : out.doubts) std::fprintf(stderr, "takt: warning: %s\n", doubt.c_str());
     return kOk;
   } catch (const std::exception& error) {
-    return refuse(error.what(), kBadInput);
+    return refuse(error);
   }
 }
 
@@ -304,15 +300,15 @@ void add_calibrate(CLI::App& app, CalibrateOptions& o, int& exit_code) {
   CLI::App* calibrate = app.add_subcommand("calibrate", "measures cameras and lasers from recordings");
   calibrate->require_subcommand(1);
   CLI::App* stereo = calibrate->add_subcommand("stereo", "lenses and pose of a stereo camera, from pairs of pictures");
-  stereo->add_option("folder", o.folder, "folder with the pairs")->required();
+  reads_folder(stereo->add_option("folder", o.folder, "folder with the pairs"))->required();
   stereo->add_option("--board", o.board, "inner corners of the chessboard, COLUMNSxROWS (default 9x6)");
   stereo->add_option("--square", o.square_m, "edge of its squares, m (default: unknown)")->check(CLI::PositiveNumber);
   stereo->add_option("--left", o.left, "names of the left images (default left*.jpg)");
   stereo->add_option("--right", o.right, "names of the right images (default right*.jpg)");
-  stereo->add_option("--out", o.out,
-                     "writes the calibration to this file (.yaml), for `calibration` of the stereo node");
-  stereo->add_option("--picture", o.picture,
-                     "writes a picture (.png): a rectified pair with epipolar lines, and where corners were");
+  writes_file(stereo->add_option("--out", o.out,
+                                 "writes the calibration to this file (.yaml), for `calibration` of the stereo node"));
+  writes_file(stereo->add_option(
+      "--picture", o.picture, "writes a picture (.png): a rectified pair with epipolar lines, and where corners were"));
   stereo->add_flag("--json", o.json, "one JSON object on stdout");
   stereo->callback([&] { exit_code = calibrate_stereo(o); });
   add_calibrate_lasers(*calibrate, o.lasers, exit_code);

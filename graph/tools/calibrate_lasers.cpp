@@ -3,16 +3,18 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <fstream>
 #include <numbers>
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
 
+#include "graph/cli/boundary.hpp"
+#include "graph/cli/file_option.hpp"
 #include "graph/cli/outcome.hpp"
 #include "graph/tools/calibrate_command.hpp"
 #include "hal/settings/json.hpp"
 #include "nodes/calibration/generated_sweeps.hpp"
 #include "nodes/calibration/picture.hpp"
+#include "nodes/picture/image_file.hpp"
 #include "rt/quantile.hpp"
 
 namespace takt::command {
@@ -83,20 +85,11 @@ void print(const LaserRecording& recording, const std::vector<CalibratedScanner>
 void write_results(const CalibrateLasersOptions& o, const LaserRecording& recording,
                    const std::vector<CalibratedScanner>& scanners) {
   if (!o.out.empty()) {
-    std::ofstream out(o.out);
-    out << "# takt calibrate lasers: `mount` of each scanner\n";
-    for (const CalibratedScanner& s : scanners) out << s.name << ": " << mount_text(s.mount) << "\n";
-    if (!out.flush()) throw std::invalid_argument(fmt::format("--out {}: cannot be written", o.out.string()));
+    std::string out = "# takt calibrate lasers: `mount` of each scanner\n";
+    for (const CalibratedScanner& s : scanners) out += fmt::format("{}: {}\n", s.name, mount_text(s.mount));
+    require_written(write_file(o.out, out));
   }
-  if (o.picture.empty()) return;
-  bool written = false;
-  try {
-    written = cv::imwrite(o.picture.string(), draw_calibration(recording, scanners));
-  } catch (const cv::Exception&) {  // a name whose ending tells no format
-  }
-  if (!written)
-    throw std::invalid_argument(
-        fmt::format("--picture {}: cannot be written; it wants a name that ends in .png", o.picture.string()));
+  if (!o.picture.empty()) require_written(picture::write_image(o.picture, draw_calibration(recording, scanners)));
 }
 
 int calibrate_recording(const CalibrateLasersOptions& o) {
@@ -174,7 +167,7 @@ int calibrate(const CalibrateLasersOptions& o) {
       throw std::invalid_argument("lasers wants a recording, or --sweep noise or --generate FILE");
     return calibrate_recording(o);
   } catch (const std::exception& error) {
-    return refuse(error.what(), kBadInput);
+    return refuse(error);
   }
 }
 
@@ -183,15 +176,17 @@ int calibrate(const CalibrateLasersOptions& o) {
 void add_calibrate_lasers(CLI::App& calibrate_app, CalibrateLasersOptions& o, int& exit_code) {
   CLI::App* app = calibrate_app.add_subcommand(
       "lasers", "mounts of laser scanners, from their sweeps of a room while the robot turns on the spot");
-  app->add_option("recording", o.recording, "text file with the sweeps (docs/calibration.md)");
+  reads_file(app->add_option("recording", o.recording, "text file with the sweeps (docs/calibration.md)"));
   app->add_option("--sweep", o.sweep, "noise: errors on generated sweeps with 0, 1 and 5 mm of noise")
       ->check(CLI::IsMember({"noise"}));
   app->add_option("--runs", o.runs, "of the sweep, for each noise (default 20)")->check(CLI::Range(1, 10000));
-  app->add_option("--generate", o.generate, "writes a generated recording to this file and tells its true mounts");
+  writes_file(
+      app->add_option("--generate", o.generate, "writes a generated recording to this file and tells its true mounts"));
   app->add_option("--seed", o.seed, "of the search and of generated sweeps (default 1)");
-  app->add_option("--out", o.out, "writes the mounts to this file, as graphs want them");
-  app->add_option("--picture", o.picture,
-                  "PNG: the room with the mounts known beforehand, with those found, and the distances that are left");
+  writes_file(app->add_option("--out", o.out, "writes the mounts to this file, as graphs want them"));
+  writes_file(app->add_option(
+      "--picture", o.picture,
+      "PNG: the room with the mounts known beforehand, with those found, and the distances that are left"));
   app->add_flag("--json", o.json, "one JSON object on stdout");
   app->callback([&] { exit_code = calibrate(o); });
 }

@@ -2,6 +2,8 @@
 #include <cstdio>
 #include <stdexcept>
 
+#include "graph/cli/boundary.hpp"
+#include "graph/cli/file_option.hpp"
 #include "graph/cli/outcome.hpp"
 #include "graph/tools/calibrate_command.hpp"
 #include "hal/camera/rig.hpp"
@@ -54,8 +56,8 @@ int calibrate_rig(const CalibrateRigOptions& o) {
 void add_calibrate_rig(CLI::App& calibrate, CalibrateRigOptions& o, int& exit_code) {
   CLI::App* app = calibrate.add_subcommand(
       "rig", "the calibration of a simulated camera, exactly, from the rig file that describes it");
-  app->add_option("rig", o.rig, "rig file of raw pairs")->required();
-  app->add_option("--out", o.out, "writes the calibration to this file (.yaml)")->required();
+  reads_file(app->add_option("rig", o.rig, "rig file of raw pairs"))->required();
+  writes_file(app->add_option("--out", o.out, "writes the calibration to this file (.yaml)"))->required();
   app->callback([&] { exit_code = calibrate_rig(o); });
 }
 

@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <optional>
 
+#include "graph/cli/file_option.hpp"
 #include "graph/cli/outcome.hpp"
 #include "hal/settings/json.hpp"
 #include "nodes/cloud/cloud_file.hpp"
@@ -131,13 +132,13 @@ void add_cloud(CLI::App& app, CloudOptions& o, int& exit_code) {
   CLI::App* command =
       app.add_subcommand("cloud", "filters point clouds in PLY and PCD files; the steps are done in the order listed");
   const CLI::Range edge(1e-3, 1e3);
-  command->add_option("files", o.files, "PLY or PCD files")->required();
+  reads_file(command->add_option("files", o.files, "PLY or PCD files"))->required();
   command->add_option("--outliers", o.outliers, "RADIUS:OTHERS: drops points with fewer others within the radius (m)");
   command->add_option("--interpolate", o.steps.interpolate.edge_m, "fills gaps between voxels of this edge (m)")
       ->check(edge);
   command->add_option("--smooth", o.steps.smooth.edge_m, "convolves voxels of this edge (m)")->check(edge);
   command->add_option("--reduce", o.steps.reduce_edge_m, "one point for each voxel of this edge (m)")->check(edge);
-  command->add_option("--out", o.out, "writes the result to this file, .ply or .pcd");
+  writes_file(command->add_option("--out", o.out, "writes the result to this file, .ply or .pcd"));
   command->add_flag("--ascii", o.ascii, "writes it as text instead of binary");
   command->add_flag("--json", o.json, "prints one JSON array, an object for each file");
   command->callback([&] { exit_code = run_cloud(o); });

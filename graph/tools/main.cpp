@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "graph/cli/boundary.hpp"
 #include "graph/cli/outcome.hpp"
 #include "graph/tools/calibrate_command.hpp"
 #include "graph/tools/cloud_command.hpp"
@@ -15,8 +16,9 @@
 #include "graph/tools/terrain_command.hpp"
 #include "graph/tools/train_command.hpp"
 
-int main(int argc, char** argv) {
-  takt::command::hold_standard_streams();
+namespace {
+
+int run(int argc, char** argv) {
   // Files that cannot be read are reported by the commands themselves, with the next step.
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
   CLI::App app{"Takt: tools for the desk", "takt"};
@@ -41,5 +43,11 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     exit_code = app.exit(error) == 0 ? 0 : takt::command::kBadInput;
   }
-  return takt::command::with_output(exit_code);
+  return exit_code;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return takt::command::at_boundary(argc, argv, [&] { return run(argc, argv); });
 }

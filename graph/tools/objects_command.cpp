@@ -9,6 +9,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "graph/cli/boundary.hpp"
+#include "graph/cli/file_option.hpp"
 #include "graph/cli/outcome.hpp"
 #include "nodes/object_detection/cut_out.hpp"
 #include "nodes/object_detection/detector.hpp"
@@ -17,6 +19,7 @@
 #include "nodes/object_detection/scenes.hpp"
 #include "nodes/object_detection/tuning.hpp"
 #include "nodes/picture/curves.hpp"
+#include "nodes/picture/image_file.hpp"
 #include "rt/msg/ace/detections.hpp"
 
 namespace takt::command {
@@ -206,8 +209,7 @@ void test(const ObjectsOptions& o) {
       std::string name = file.stem().string() + "." + database[index].label() + ".png";
       std::replace(name.begin(), name.end(), ' ', '_');
       const ErrorMaps maps = error_maps(view_of(image), references, index, o.size_px, DetectorParameters{});
-      if (!cv::imwrite((o.maps / name).string(), map_picture(image, maps, own)))
-        throw std::runtime_error((o.maps / name).string() + " cannot be written");
+      require_written(picture::write_image(o.maps / name, map_picture(image, maps, own)));
     }
   }
 }
@@ -224,7 +226,7 @@ void add_objects(CLI::App& app, ObjectsOptions& o, int& exit_code) {
   objects->require_subcommand(1);
   const auto command = [&](const char* name, const char* doc, void (*act)(const ObjectsOptions&)) {
     CLI::App* sub = objects->add_subcommand(name, doc);
-    sub->add_option("database", o.database, "folder with objects.txt")->required();
+    reads_folder(sub->add_option("database", o.database, "folder with objects.txt"))->required();
     sub->add_option("--size", o.size_px, "edge of the views, px (default 48)")->check(CLI::Range(4, 254));
     sub->callback([&o, &exit_code, act] {
       try {
@@ -232,7 +234,7 @@ void add_objects(CLI::App& app, ObjectsOptions& o, int& exit_code) {
         act(o);
         exit_code = kOk;
       } catch (const std::exception& error) {
-        exit_code = refuse(error.what(), kBadInput);
+        exit_code = refuse(error);
       }
     });
     return sub;
@@ -243,26 +245,30 @@ void add_objects(CLI::App& app, ObjectsOptions& o, int& exit_code) {
   command("list", "entries with classes, views, thresholds", list);
   CLI::App* sub = command("add", "learns views of an object from images, cut out or before one colour", add);
   sub->add_option("name", o.name, "of the object")->required();
-  sub->add_option("images", o.images,
-                  "each one view: transparent or exactly black where it is not the object, or before one colour")
+  reads_file(
+      sub->add_option("images", o.images,
+                      "each one view: transparent or exactly black where it is not the object, or before one colour"))
       ->required();
   sub->add_option("--attribute", o.attributes, "ATTRIBUTE=VALUE of the object in these images, repeatable");
   sub->add_flag("--test", o.test_view, "as test views, which only measurements use");
   sub = command("tune", "thresholds from images with and without an object", tune);
   one_object(sub);
-  sub->add_option("--positives", o.positives, "images that show it somewhere (default: test views in made scenes)");
-  sub->add_option("--negatives", o.negatives, "images that do not (default: made scenes with the other objects)");
+  reads_file(sub->add_option("--positives", o.positives,
+                             "images that show it somewhere (default: test views in made scenes)"));
+  reads_file(
+      sub->add_option("--negatives", o.negatives, "images that do not (default: made scenes with the other objects)"));
   sub->add_option("--scenes", o.scenes, "how many of each are made (default 30)")->check(CLI::Range(1, 10000));
   sub->add_option("--seed", o.seed, "of the made scenes (default 1)");
   sub->add_option("--miss", o.miss, "share of the positives that the first two stages may lose (default 0.05)")
       ->check(CLI::Range(0.0, 0.9));
-  sub->add_option("--roc", o.roc, "PNG: detected against false positives over the last stage's threshold");
+  writes_file(sub->add_option("--roc", o.roc, "PNG: detected against false positives over the last stage's threshold"));
   sub->add_flag("--write", o.write, "puts the thresholds into objects.txt");
   sub = command("test", "what is found in images", test);
-  sub->add_option("images", o.images, "PNG, JPEG ...")->required();
+  reads_file(sub->add_option("images", o.images, "PNG, JPEG ..."))->required();
   one_object(sub);
   sub->add_option("--min-score", o.min_score, "smallest score (default 0.3)")->check(CLI::Range(0.0, 1.0));
-  sub->add_option("--maps", o.maps, "folder for pictures: the image and the errors of the three stages, per object");
+  writes_folder(sub->add_option("--maps", o.maps,
+                                "folder for pictures: the image and the errors of the three stages, per object"));
   command("publish", "copies the database as a revision that running nodes can change to", publish);
 }
 

@@ -7,13 +7,17 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
+#include <sstream>
 
+#include "graph/cli/boundary.hpp"
+#include "graph/cli/file_option.hpp"
 #include "graph/cli/outcome.hpp"
+#include "graph/log/damages.hpp"
 #include "graph/log/recorded_plan.hpp"
 #include "graph/log/recorded_type.hpp"
 #include "nodes/ground_map/terrain_drive.hpp"
 #include "nodes/ground_map/terrain_file.hpp"
+#include "rt/file/output_file.hpp"
 #include "rt/memory/aligned_bytes.hpp"
 #include "rt/msg/grid.hpp"
 #include "rt/record/log_file.hpp"
@@ -70,6 +74,8 @@ MeasuredMaps recorded_maps(const TerrainOptions& options) {
   for (const std::string& text : options.pick) picks.push_back(pick_of(text));
   auto log = record::LogFile::open(options.record);
   if (!log) throw std::runtime_error(log.error());
+  if (const std::string damages = log::damages_text(options.record, *log); !damages.empty() && !options.allow_damage)
+    throw std::runtime_error(damages + "; --allow-damage goes on with what is left");
   const MessageType& type = MessageType::of<Grid>();
   const mcap::Channel* recorded = log::channel_of(*log, options.port);
   const auto plan = log::Json::parse(log->attached("plan.json").value_or("{\"ports\": []}"));
@@ -104,12 +110,6 @@ MeasuredMaps recorded_maps(const TerrainOptions& options) {
   return maps;
 }
 
-std::ofstream created(const std::filesystem::path& file) {
-  std::ofstream out(file);
-  if (!out) throw std::runtime_error(file.string() + ": cannot be written");
-  return out;
-}
-
 TerrainLearning learning(const TerrainOptions& options) {
   if (!options.maps.empty()) return read_terrain(options.maps);
   const MeasuredMaps maps = options.record.empty() ? generated_maps(options) : recorded_maps(options);
@@ -117,10 +117,11 @@ TerrainLearning learning(const TerrainOptions& options) {
   for (size_t kind = 0; kind < kTerrainKinds; ++kind)
     for (const auto& map : maps.of[kind]) learning.add(kind, map);
   if (!options.measured.empty()) {
-    std::ofstream out = created(options.measured);
+    std::ostringstream out;
     write_terrain_shape(out, maps.shape);
     for (size_t kind = 0; kind < kTerrainKinds; ++kind)
       for (const auto& map : maps.of[kind]) write_terrain_map(out, maps.shape, kind, map);
+    require_written(write_file(options.measured, out.str()));
   }
   return learning;
 }
@@ -129,7 +130,7 @@ int learn(const TerrainOptions& options) {
   try {
     const TerrainLearning learnt_from = learning(options);
     const TerrainMaps maps = learnt_from.learnt();
-    std::ofstream out = created(options.out);
+    std::ostringstream out;
     out << "# takt terrain learn: the mean of each cell over measured maps of a kind\n";
     write_terrain_shape(out, maps.shape);
     std::printf("%-10s %6s %14s\n", "kind", "maps", "known cells %");
@@ -139,9 +140,10 @@ int learn(const TerrainOptions& options) {
       std::printf("%-10s %6d %14.1f\n", std::string(kTerrainNames[kind]).c_str(), learnt_from.maps(kind),
                   100 - 100 * static_cast<double>(unknown) / static_cast<double>(maps.shape.cells()));
     }
+    require_written(write_file(options.out, out.str()));
     return kOk;
   } catch (const std::exception& error) {
-    return refuse(error.what(), kBadInput);
+    return refuse(error);
   }
 }
 
@@ -151,14 +153,17 @@ void add_terrain(CLI::App& app, TerrainOptions& o, int& exit_code) {
   CLI::App* terrain = app.add_subcommand("terrain", "kinds of terrain that ground_map tells apart");
   terrain->require_subcommand(1);
   CLI::App* learn_app = terrain->add_subcommand("learn", "learns the map of each kind from measured ones");
-  CLI::Option* maps = learn_app->add_option("maps", o.maps, "file with measured maps (default: a drive is generated)");
-  learn_app->add_option("--out", o.out, "file for parameter terrain_maps of ground_map")->required();
-  CLI::Option* record = learn_app->add_option("--record", o.record, "takes maps from this record of a run");
+  CLI::Option* maps =
+      reads_file(learn_app->add_option("maps", o.maps, "file with measured maps (default: a drive is generated)"));
+  writes_file(learn_app->add_option("--out", o.out, "file for parameter terrain_maps of ground_map"))->required();
+  CLI::Option* record =
+      reads_file(learn_app->add_option("--record", o.record, "takes maps from this record of a run"), UINT64_MAX);
+  learn_app->add_flag("--allow-damage", o.allow_damage, "a record that is damaged or cut off is no failure");
   learn_app->add_option("--port", o.port, "of the record (default ground_map.around)")->needs(record);
   CLI::Option* pick = learn_app->add_option("--pick", o.pick, "KIND=FROM..TO: when it shows what, in s; repeatable");
   pick->needs(record);
   record->needs(pick)->excludes(maps);
-  learn_app->add_option("--measured", o.measured, "writes all maps that it learns from, to choose by hand")
+  writes_file(learn_app->add_option("--measured", o.measured, "writes all maps that it learns from, to choose by hand"))
       ->excludes(maps);
   learn_app->add_option("--each", o.each, "maps of each kind from the generated drive (default 20)")
       ->check(CLI::Range(1, 1000))

@@ -14,6 +14,7 @@ struct TerrainOptions {
   std::vector<std::string> pick;   ///< "KIND=FROM..TO", s from the port's first message on
   std::filesystem::path out;       ///< one of each kind
   std::filesystem::path measured;  ///< those that were learnt from; empty: not written
+  bool allow_damage = false;       ///< of the record
   int each = 20;                   ///< maps of each kind from the generated drive
   uint64_t seed = 1;
 };

@@ -5,12 +5,14 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <fstream>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "graph/cli/boundary.hpp"
+#include "graph/cli/file_option.hpp"
 #include "graph/cli/outcome.hpp"
 #include "nodes/picture/curves.hpp"
+#include "nodes/picture/image_file.hpp"
 #include "nodes/traffic_signs/flat_sign.hpp"
 #include "nodes/traffic_signs/layout_learning.hpp"
 #include "nodes/traffic_signs/sign_scenes.hpp"
@@ -50,13 +52,13 @@ TrainingSet set_for(SignClass sign, const std::vector<SignScene>& scenes, uint64
 }
 
 void write_curve(const std::string& stem, const StageCurve& curve) {
-  std::ofstream table(stem + ".csv");
-  table << "stages,missed_pct,false_positives_per_million_windows\n";
+  std::string table = "stages,missed_pct,false_positives_per_million_windows\n";
   std::vector<double> stages;
   for (size_t i = 0; i < curve.missed_pct.size(); ++i) {
     stages.push_back(static_cast<double>(i + 1));
-    table << fmt::format("{},{:.2f},{:.3f}\n", i + 1, curve.missed_pct[i], curve.false_positives_per_million[i]);
+    table += fmt::format("{},{:.2f},{:.3f}\n", i + 1, curve.missed_pct[i], curve.false_positives_per_million[i]);
   }
+  require_written(write_file(stem + ".csv", table));
   picture::write_curves(
       stem + ".png", "stages", stages,
       {{"missed %", curve.missed_pct}, {"false positives per million windows", curve.false_positives_per_million}});
@@ -105,7 +107,7 @@ int train(const TrainCascadeOptions& o) {
     }
     return kOk;
   } catch (const std::exception& error) {
-    return refuse(error.what(), kBadInput);
+    return refuse(error);
   }
 }
 
@@ -118,10 +120,10 @@ int draw(const SignPictureOptions& o) {
     flat.colour.copyTo(plate(cv::Rect({(plate.cols - size.width) / 2, (plate.rows - size.height) / 2}, size)),
                        flat.opaque);
     cv::resize(plate, plate, {o.size, o.size}, 0, 0, cv::INTER_AREA);
-    if (!cv::imwrite(o.file.string(), plate)) return refuse(o.file.string() + ": cannot be written", kBadInput);
+    require_written(picture::write_image(o.file, plate));
     return kOk;
   } catch (const std::exception& error) {
-    return refuse(error.what(), kBadInput);
+    return refuse(error);
   }
 }
 
@@ -134,7 +136,7 @@ void add_train(CLI::App& app, TrainOptions& options, int& exit_code) {
   CLI::App* cascade =
       train_app->add_subcommand("cascade", "Haar cascades of traffic signs, from signs drawn by the program");
   cascade->add_option("--sign", o.signs, "class, several times for several (default all)");
-  cascade->add_option("--out", o.out, "folder for NAME.xml, NAME.layout, NAME.csv, NAME.png (default .)")
+  writes_folder(cascade->add_option("--out", o.out, "folder for NAME.xml, NAME.layout, NAME.csv, NAME.png (default .)"))
       ->check(CLI::ExistingDirectory);
   cascade->add_option("--stages", o.stages, "at most (default 16)")->check(CLI::Range(1, 200));
   cascade->add_option("--positives", o.positives, "windows with the sign (default 3000)")
@@ -146,7 +148,7 @@ void add_train(CLI::App& app, TrainOptions& options, int& exit_code) {
   SignPictureOptions& p = options.picture;
   CLI::App* picture = train_app->add_subcommand("picture", "draws a sign, for a board of a simulated world");
   picture->add_option("sign", p.sign, "class")->required();
-  picture->add_option("file", p.file, "picture to write (.ppm, .png)")->required();
+  writes_file(picture->add_option("file", p.file, "picture to write (.ppm, .png)"))->required();
   picture->add_option("--size", p.size, "px a side (default 128)")->check(CLI::Range(16, 1024));
   picture->add_option("--seed", p.seed, "of the sign's look (default 1)");
   picture->callback([&] { exit_code = draw(p); });

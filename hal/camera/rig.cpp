@@ -8,6 +8,7 @@
 #include <set>
 
 #include "hal/settings/units.hpp"
+#include "rt/file/input_file.hpp"
 
 namespace takt {
 namespace {
@@ -121,10 +122,10 @@ StereoRig read_rig(Keys& keys) {
 
 tl::expected<StereoRig, DeviceError> load_rig(const std::string& device_id, const std::filesystem::path& file) {
   Keys keys{file.string(), device_id, {}, {}};
+  if (const std::string why = why_unreadable(file, kLargestText); !why.empty())
+    return device_error(device_id, file.string() + ": the rig file " + why, "correct `rig:` of the device");
   try {
     keys.map = YAML::LoadFile(file.string());
-  } catch (const YAML::BadFile&) {
-    return device_error(device_id, file.string() + ": the rig file cannot be opened", "correct `rig:` of the device");
   } catch (const YAML::Exception& e) {
     return device_error(device_id, file.string() + ":" + std::to_string(e.mark.line + 1) + ": " + e.msg,
                         "correct the YAML");

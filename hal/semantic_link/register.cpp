@@ -11,6 +11,7 @@
 #include "hal/semantic_link/server.hpp"
 #include "hal/semantic_link/service_node.hpp"
 #include "hal/semantic_link/udp_port.hpp"
+#include "rt/file/input_file.hpp"
 
 namespace takt {
 namespace {
@@ -30,6 +31,10 @@ Key read_key(Settings& settings) {
   Key key{};
   const auto file = settings.path("key", false);
   if (file.empty()) return key;
+  if (const std::string why = why_unreadable(file, kLargestText); !why.empty()) {
+    settings.fail(file.string() + ": " + why, "name the file of the key");
+    return key;
+  }
   std::ifstream in(file);
   std::string digits;
   in >> digits;

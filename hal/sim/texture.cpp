@@ -7,6 +7,7 @@
 #include <map>
 
 #include "hal/sim/random.hpp"
+#include "rt/file/input_file.hpp"
 
 namespace takt::sim {
 namespace {
@@ -215,8 +216,9 @@ std::string_view material_names() {
 }
 
 tl::expected<Texture, std::string> load_picture(const std::filesystem::path& file, double edge_m) {
+  if (const std::string why = why_unreadable(file); !why.empty())
+    return tl::unexpected("the picture " + file.string() + " " + why);
   std::ifstream in(file, std::ios::binary);
-  if (!in) return tl::unexpected("the picture " + file.string() + " cannot be opened");
   std::string magic;
   int width = 0, height = 0, peak = 0;
   in >> magic >> width >> height >> peak;

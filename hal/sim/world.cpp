@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "hal/sim/placed.hpp"
+#include "rt/file/input_file.hpp"
 
 namespace takt::sim {
 namespace {
@@ -94,8 +95,9 @@ std::string token(std::istream& in) {
 }  // namespace
 
 tl::expected<Bitmap, std::string> load_pgm(const std::filesystem::path& file, double cell_m) {
+  if (const std::string why = why_unreadable(file); !why.empty())
+    return tl::unexpected("the map " + file.string() + " " + why);
   std::ifstream in(file, std::ios::binary);
-  if (!in) return tl::unexpected("the map " + file.string() + " cannot be opened");
   const std::string magic = token(in), width = token(in), height = token(in), peak = token(in);
   Bitmap map;
   map.cell_m = cell_m;

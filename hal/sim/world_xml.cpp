@@ -7,6 +7,7 @@
 
 #include "hal/settings/units.hpp"
 #include "hal/sim/world.hpp"
+#include "rt/file/input_file.hpp"
 
 namespace takt::sim {
 namespace {
@@ -394,15 +395,13 @@ struct Loader {
 }  // namespace
 
 tl::expected<World, DeviceError> load_world(const std::string& device_id, const std::filesystem::path& file) {
+  if (const std::string why = why_unreadable(file, kLargestText); !why.empty())
+    return device_error(device_id, file.string() + ": the world file " + why, "correct `world:` of the device");
   tinyxml2::XMLDocument document;
-  if (document.LoadFile(file.string().c_str()) != tinyxml2::XML_SUCCESS) {
-    const bool missing = document.ErrorID() == tinyxml2::XML_ERROR_FILE_NOT_FOUND;
+  if (document.LoadFile(file.string().c_str()) != tinyxml2::XML_SUCCESS)
     return device_error(device_id,
-                        file.string() + (missing ? ": the world file cannot be opened"
-                                                 : std::string(":").append(std::to_string(document.ErrorLineNum())) +
-                                                       ": no well-formed XML"),
-                        missing ? "correct `world:` of the device" : "correct the XML");
-  }
+                        file.string() + ":" + std::to_string(document.ErrorLineNum()) + ": no well-formed XML",
+                        "correct the XML");
   Loader loader{device_id, file.string(), {}, {}};
   const Element* root = document.RootElement();
   if (std::string(root->Name()) != "world") loader.fail(root, "the root element is not <world>", "see worlds/lab.xml");

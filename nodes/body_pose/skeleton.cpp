@@ -7,6 +7,8 @@
 #include <map>
 #include <sstream>
 
+#include "rt/file/input_file.hpp"
+
 namespace takt::body_pose {
 namespace {
 
@@ -57,6 +59,7 @@ class Reader {
   }
 
   void parse(const std::filesystem::path& file) {
+    require_readable<SkeletonError>(file);
     std::ifstream in(file);
     if (!in) fail("cannot be read; a skeleton is a text file, such as graph/skeletons/human.txt");
     for (std::string text; std::getline(in, text);) {

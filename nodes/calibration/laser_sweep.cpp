@@ -12,6 +12,9 @@
 #include <stdexcept>
 #include <string_view>
 
+#include "rt/file/input_file.hpp"
+#include "rt/file/output_file.hpp"
+
 namespace takt::calibration {
 namespace {
 
@@ -132,8 +135,8 @@ std::vector<Point> in_room(const LaserSweep& sweep, const Rigid& mount, size_t s
 }
 
 LaserRecording read_laser_recording(const std::filesystem::path& file) {
+  require_readable<std::invalid_argument>(file);
   std::ifstream in(file);
-  if (!in) throw std::invalid_argument(file.string() + ": cannot be read");
   Reader reader;
   std::string line;
   for (int number = 1; std::getline(in, line); ++number) try {
@@ -148,7 +151,7 @@ LaserRecording read_laser_recording(const std::filesystem::path& file) {
 
 void write_laser_recording(const std::filesystem::path& file, const LaserRecording& recording,
                            const BeamAngles& beams) {
-  std::ofstream out(file);
+  std::ostringstream out;
   out << fmt::format("object {}\nbeams {} {}\n", recording.object_height_m, beams.first_rad / kDegree,
                      beams.step_rad / kDegree);
   for (const LaserSweep& sweep : recording.sweeps) {
@@ -170,7 +173,7 @@ void write_laser_recording(const std::filesystem::path& file, const LaserRecordi
     }
     out << "\n";
   }
-  if (!out.flush()) throw std::invalid_argument(file.string() + ": cannot be written");
+  require_written(write_file(file, out.str()));
 }
 
 }  // namespace takt::calibration

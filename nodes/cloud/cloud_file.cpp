@@ -10,6 +10,7 @@
 #include <iterator>
 #include <system_error>
 
+#include "rt/file/output_file.hpp"
 #include "rt/msg/point.hpp"
 
 namespace takt::cloud {
@@ -93,11 +94,8 @@ tl::expected<void, std::string> write_cloud(const std::filesystem::path& file, c
   const std::string ending = file.extension().string();
   if (ending != ".ply" && ending != ".pcd")
     return tl::make_unexpected(fmt::format("{}: clouds are written to files ending in .ply or .pcd", file.string()));
-  errno = 0;
-  std::ofstream out(file, std::ios::binary);
-  out << (ending == ".ply" ? ply_of(cloud, encoding) : pcd_of(cloud, encoding));
-  out.close();
-  if (!out) return tl::make_unexpected(fmt::format("{}: {}; choose another place", file.string(), reason()));
+  if (const auto done = write_file(file, ending == ".ply" ? ply_of(cloud, encoding) : pcd_of(cloud, encoding)); !done)
+    return tl::make_unexpected(done.error().what + "; choose another place");
   return {};
 }
 

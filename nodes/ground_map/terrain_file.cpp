@@ -10,6 +10,8 @@
 #include <iterator>
 #include <sstream>
 
+#include "rt/file/input_file.hpp"
+
 namespace takt::ground_map {
 namespace {
 
@@ -100,6 +102,7 @@ class TerrainParser {
 TerrainLearning parse_terrain(std::istream& text, const std::string& name) { return TerrainParser(text, name).parse(); }
 
 TerrainLearning read_terrain(const std::filesystem::path& file) {
+  if (std::filesystem::exists(file)) require_readable<TerrainError>(file);
   std::ifstream in(file);
   if (!in)
     throw TerrainError(file.string() + ": cannot be read; maps of terrain are a text file, see `takt terrain learn`");

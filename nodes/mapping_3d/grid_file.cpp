@@ -5,9 +5,11 @@
 #include <yaml-cpp/yaml.h>
 
 #include <cmath>
-#include <fstream>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
+
+#include "nodes/picture/image_file.hpp"
+#include "rt/file/input_file.hpp"
 
 namespace takt::mapping_3d {
 namespace {
@@ -45,6 +47,7 @@ T value(const YAML::Node& file, const char* key, const char* what) {
 }
 
 GridMap parse(const std::filesystem::path& path) {
+  if (const std::string why = why_unreadable(path, kLargestText); !why.empty()) throw std::runtime_error(why);
   const YAML::Node file = YAML::LoadFile(path.string());
   if (!file.IsMap()) throw std::runtime_error("a map with the keys image, resolution, origin is expected");
   GridMap map;
@@ -78,19 +81,13 @@ tl::expected<void, std::string> write_grid(const std::filesystem::path& yaml, co
   cv::Mat image(map.height, map.width, CV_8UC1);
   for (int y = 0; y < map.height; ++y)
     for (int x = 0; x < map.width; ++x) image.at<uint8_t>(map.height - 1 - y, x) = level_of(map.view().at(x, y));
-  bool written = false;
-  try {
-    written = cv::imwrite(picture.string(), image);
-  } catch (const cv::Exception&) {  // an empty grid, or no such folder
-  }
-  if (!written) return tl::unexpected(picture.string() + ": cannot be written");
-  std::ofstream out(yaml);
-  out << fmt::format(
-      "image: {}\nmode: trinary\nresolution: {}\norigin: [{}, {}, {}]\nnegate: 0\noccupied_thresh: {}\nfree_thresh: "
-      "{}\n",
-      picture.filename().string(), map.cell_m, map.corner.x_m, map.corner.y_m, map.corner.theta_rad, kOccupiedAbove,
-      kFreeBelow);
-  if (!out.flush()) return tl::unexpected(yaml.string() + ": cannot be written");
+  if (const auto done = picture::write_image(picture, image); !done) return tl::unexpected(done.error().what);
+  const auto done =
+      write_file(yaml, fmt::format("image: {}\nmode: trinary\nresolution: {}\norigin: [{}, {}, {}]\nnegate: 0\n"
+                                   "occupied_thresh: {}\nfree_thresh: {}\n",
+                                   picture.filename().string(), map.cell_m, map.corner.x_m, map.corner.y_m,
+                                   map.corner.theta_rad, kOccupiedAbove, kFreeBelow));
+  if (!done) return tl::unexpected(done.error().what);
   return {};
 }
 

@@ -8,6 +8,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
 
+#include "rt/file/input_file.hpp"
+
 namespace takt::mapping_3d {
 namespace {
 
@@ -18,8 +20,8 @@ constexpr double kBaseline_m = 0.24, kNoise_px = 0.2, kWrong = 0.02, kMissing = 
 }  // namespace
 
 std::vector<RecordedView> read_recorded_views(const std::filesystem::path& folder) {
+  require_readable(folder / "pose.txt");
   std::ifstream poses(folder / "pose.txt");
-  if (!poses) throw std::runtime_error((folder / "pose.txt").string() + ": cannot be read");
   std::vector<RecordedView> views;
   Transform pose;
   while (poses >> pose.x >> pose.y >> pose.z >> pose.qx >> pose.qy >> pose.qz >> pose.qw) {

@@ -8,6 +8,8 @@
 #include <fstream>
 #include <sstream>
 
+#include "rt/file/input_file.hpp"
+
 namespace takt::object_3d {
 namespace {
 
@@ -109,6 +111,7 @@ class Parser {
 Training parse_training(std::istream& text, const std::string& name) { return Parser(name).parse(text); }
 
 Training read_training(const std::filesystem::path& file) {
+  if (std::filesystem::exists(file)) require_readable<TrainingError>(file);
   std::ifstream in(file);
   if (!in)
     throw TrainingError(file.string() +

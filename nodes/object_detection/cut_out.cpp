@@ -9,6 +9,9 @@
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
+#include "nodes/picture/image_file.hpp"
+#include "rt/file/input_file.hpp"
+
 namespace takt::object_detection {
 namespace {
 
@@ -66,6 +69,7 @@ ReferenceView scaled_view(const cv::Mat3b& image, const cv::Mat1b& object, int s
 }
 
 cv::Mat read_image(const std::filesystem::path& file, int flags) {
+  require_readable(file, kLargestInput);
   cv::Mat image;
   try {
     image = cv::imread(file.string(), flags);
@@ -129,12 +133,7 @@ ReferenceView learn_view(const std::filesystem::path& file, int side_px) {
 
 void write_view(const ReferenceView& view, const std::filesystem::path& file) {
   const cv::Mat image(view.side_px, view.side_px, CV_8UC3, const_cast<uint8_t*>(view.pixels.data()));
-  bool written = false;
-  try {
-    written = cv::imwrite(file.string(), image);
-  } catch (const cv::Exception&) {
-  }
-  if (!written) throw std::runtime_error(file.string() + " cannot be written");
+  require_written(picture::write_image(file, image));
 }
 
 }  // namespace takt::object_detection

@@ -7,6 +7,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <sstream>
 
+#include "rt/file/input_file.hpp"
+
 namespace takt::object_detection {
 namespace {
 
@@ -19,6 +21,7 @@ class Reader {
       : folder_(folder), list_(folder / list), side_px_(side_px), test_views_(test_views) {}
 
   std::vector<DatabaseObject> read() {
+    if (std::filesystem::exists(list_)) require_readable<DatabaseError>(list_);
     std::ifstream in(list_);
     if (!in)
       throw DatabaseError(list_.string() +

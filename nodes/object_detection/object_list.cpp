@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "nodes/object_detection/cut_out.hpp"
+#include "rt/file/input_file.hpp"
 
 namespace takt::object_detection {
 namespace {
@@ -31,6 +32,7 @@ std::string label_of(std::vector<std::string> words) {
 }  // namespace
 
 ObjectList::ObjectList(const std::filesystem::path& folder) : folder_(folder) {
+  require_readable<DatabaseError>(folder / "objects.txt");
   std::ifstream in(folder / "objects.txt");
   for (std::string line; std::getline(in, line);) lines_.push_back(line);
 }

@@ -8,6 +8,8 @@
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
+#include "nodes/picture/image_file.hpp"
+
 namespace takt::picture {
 namespace {
 
@@ -44,14 +46,7 @@ void write_curves(const std::string& file, const std::string& parameter, const s
   for (int i = 0; i < count; ++i)
     label(image, fmt::format("{:g}", values[static_cast<size_t>(i)]), {kLeft + kStep * i - 6, height - 18});
   label(image, parameter, {4, height - 18});
-  bool written = false;
-  try {
-    written = cv::imwrite(file, image);
-  } catch (const cv::Exception&) {
-  }
-  if (!written)
-    throw std::invalid_argument(
-        fmt::format("--picture {}: cannot be written; it wants a name that ends in .png", file));
+  require_written(write_image(file, image));
 }
 
 }  // namespace takt::picture

@@ -2,11 +2,12 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 #include <opencv2/imgcodecs.hpp>
+#include <sstream>
 #include <string>
 
+#include "nodes/picture/image_file.hpp"
 #include "nodes/picture/moment.hpp"
 #include "nodes/semantic/reports.hpp"
 #include "rt/msg/ace/detections.hpp"
@@ -62,7 +63,7 @@ class MomentsNode final : public Node {
     if (used_ == 0) return;
     std::error_code ignored;
     std::filesystem::create_directories(directory_, ignored);  // what is written then says whether it worked
-    std::ofstream page(directory_ / "index.html");
+    std::ostringstream page;
     page << "<!doctype html><meta charset=\"utf-8\"><title>what the robot knew</title>\n"
             "<style>body{font:15px sans-serif;margin:2em}img{max-width:100%;border:1px solid #ccc}</style>\n"
             "<h1>What the robot knew</h1>\n<p>What its camera saw, its map, and the semantic network, whenever the "
@@ -71,7 +72,7 @@ class MomentsNode final : public Node {
     if (left_out_ > 0)
       page << "<p>" << left_out_ << " more are not shown: the node keeps the first " << moments_.size()
            << " (parameter most).</p>\n";
-    if (!page.flush()) complain(directory_ / "index.html");
+    complain(write_file(directory_ / "index.html", page.str()));
   }
 
  private:
@@ -153,23 +154,19 @@ class MomentsNode final : public Node {
       keep_boxes(detections_[*found.boxes], into.boxes);
   }
 
-  void write(size_t i, std::ofstream& page) const {
+  void write(size_t i, std::ostream& page) const {
     const Moment& moment = moments_[i];
     const std::string file = (i < 9 ? "0" : "") + std::to_string(i + 1) + ".png";
-    bool written = false;
-    try {
-      written = cv::imwrite((directory_ / file).string(), draw_moment(moment));
-    } catch (const cv::Exception&) {
-    }
-    if (!written) complain(directory_ / file);
+    complain(write_image(directory_ / file, draw_moment(moment)));
     char at[32];
     std::snprintf(at, sizeof at, "%.1f s", static_cast<double>(moment.at_ns - moments_[0].at_ns) * 1e-9);
     page << "<h2>" << at << (moment.said.empty() ? "" : ": \"" + as_text(moment.said) + "\"") << "</h2>\n<img src=\""
          << file << "\" alt=\"camera image, map and network\">\n<pre>" << as_text(moment.plan) << "</pre>\n";
   }
 
-  static void complain(const std::filesystem::path& file) {
-    std::cerr << "moments: cannot write " << file.string() << ": check that the directory exists and is writable\n";
+  static void complain(const tl::expected<void, OutputFailure>& done) {
+    if (!done)
+      std::cerr << "moments: " << done.error().what << "; check that the folder exists, is writable and has room\n";
   }
 
   Input<ObjectReports> reports_{this, "reports", "what is known, in the map frame"};

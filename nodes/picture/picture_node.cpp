@@ -13,6 +13,7 @@
 #include "nodes/ground_map/terrain.hpp"
 #include "nodes/picture/clouds.hpp"
 #include "nodes/picture/draw.hpp"
+#include "nodes/picture/image_file.hpp"
 #include "nodes/picture/kept.hpp"
 #include "rt/msg/ace/detections.hpp"
 #include "rt/msg/ace/terrain.hpp"
@@ -150,13 +151,8 @@ class PictureNode final : public Node {
 
   void write(const char* name, const cv::Mat& image) const {
     const std::string path = (directory_ / name).string();
-    bool written = false;
-    try {
-      written = cv::imwrite(path, image);
-    } catch (const cv::Exception&) {
-    }
-    if (!written)
-      std::cerr << "picture: cannot write " << path << ": check that the directory exists and is writable\n";
+    if (const auto done = write_image(path, image); !done)
+      std::cerr << "picture: " << done.error().what << "; check that the folder exists, is writable and has room\n";
   }
 
   Input<StereoPair> pair_{this, "pair", "its left image is written as left.png", Need::optional};

@@ -9,6 +9,8 @@
 #include <iterator>
 #include <set>
 
+#include "rt/file/input_file.hpp"
+
 namespace takt::semantic {
 namespace {
 
@@ -250,10 +252,11 @@ tl::expected<void, std::vector<std::string>> parse_network(const std::string& te
 }
 
 tl::expected<void, std::vector<std::string>> read_network(const std::filesystem::path& file, SemanticMap& map) {
+  if (const std::string why = why_unreadable(file, kLargestText); !why.empty())
+    return tl::make_unexpected(std::vector<std::string>{file.string() + ":1:1: " + why});
   std::ifstream stream(file, std::ios::binary);
   const std::string text{std::istreambuf_iterator<char>(stream), {}};
-  if (!stream || text.empty())
-    return tl::make_unexpected(std::vector<std::string>{file.string() + ":1:1: cannot be read, or is empty"});
+  if (!stream) return tl::make_unexpected(std::vector<std::string>{file.string() + ":1:1: cannot be read"});
   return parse_network(text, file.string(), map);
 }
 

@@ -10,6 +10,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "rt/file/output_file.hpp"
+
 namespace takt::stereo {
 namespace {
 
@@ -131,13 +133,13 @@ void write_calibration(const std::filesystem::path& path, const StereoCalibratio
   if (extension != ".yaml" && extension != ".yml" && extension != ".xml")
     refuse(path.string() + ": must end in .yaml, .yml or .xml");
   try {
-    cv::FileStorage file(path.string(), cv::FileStorage::WRITE);
-    if (!file.isOpened()) refuse(path.string() + ": cannot be written; choose another place");
+    cv::FileStorage file(path.string(), cv::FileStorage::WRITE | cv::FileStorage::MEMORY);  // its format by the name
     file.writeComment(comment);
     file << "image_size" << std::vector<int>{c.width, c.height};
     file << "M1" << matrix(c.left_matrix, 3) << "D1" << matrix(c.left_distortion, 1);
     file << "M2" << matrix(c.right_matrix, 3) << "D2" << matrix(c.right_distortion, 1);
     file << "R" << matrix(c.rotation, 3) << "T" << matrix(c.translation_m, 3);
+    require_written(write_file(path, file.releaseAndGetString()));
   } catch (const cv::Exception& e) {
     refuse(path.string() + ": " + e.err);
   }

@@ -7,6 +7,8 @@
 #include <fstream>
 
 #include "nodes/traffic_signs/cascade.hpp"
+#include "rt/file/input_file.hpp"
+#include "rt/file/output_file.hpp"
 
 namespace takt::traffic_signs {
 namespace {
@@ -20,10 +22,9 @@ class Reader {
   explicit Reader(const std::filesystem::path& file) : file_(file) {}
 
   Cascade read() {
+    require_readable<CascadeError>(file_);
     tinyxml2::XMLDocument document;
     if (document.LoadFile(file_.string().c_str()) != tinyxml2::XML_SUCCESS) {
-      if (document.ErrorID() == tinyxml2::XML_ERROR_FILE_NOT_FOUND)
-        throw CascadeError(file_.string() + ": cannot be read");
       fail(document.ErrorLineNum(), std::string("is no XML: ") + document.ErrorName());
     }
     const Element* storage = document.FirstChildElement("opencv_storage");
@@ -157,7 +158,7 @@ Cascade read_cascade(const std::filesystem::path& file) { return Reader(file).re
 void write_cascade(const Cascade& cascade, const std::filesystem::path& file, const std::string& comment) {
   size_t most = 0;
   for (const Stage& stage : cascade.stages) most = std::max(most, stage.stumps.size());
-  std::ofstream out(file);
+  std::ostringstream out;
   out << "<?xml version=\"1.0\"?>\n<!-- " << comment << " -->\n<opencv_storage>\n"
       << "<cascade "
          "type_id=\"opencv-cascade-classifier\">\n<stageType>BOOST</stageType>\n<featureType>HAAR</featureType>\n"
@@ -182,7 +183,7 @@ void write_cascade(const Cascade& cascade, const std::filesystem::path& file, co
     out << "</rects><tilted>0</tilted></_>\n";
   }
   out << "</features></cascade>\n</opencv_storage>\n";
-  if (!out.flush()) throw CascadeError(file.string() + ": cannot be written");
+  require_written(write_file(file, out.str()));
 }
 
 }  // namespace takt::traffic_signs

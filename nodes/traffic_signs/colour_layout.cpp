@@ -6,6 +6,8 @@
 #include <string>
 
 #include "nodes/traffic_signs/cascade.hpp"
+#include "rt/file/input_file.hpp"
+#include "rt/file/output_file.hpp"
 
 namespace takt::traffic_signs {
 namespace {
@@ -17,8 +19,8 @@ constexpr int kLeastPlain = 10;
 }  // namespace
 
 ColourLayout read_layout(const std::filesystem::path& file) {
+  require_readable<CascadeError>(file);
   std::ifstream in(file);
-  if (!in) throw CascadeError(file.string() + ": cannot be read");
   ColourLayout layout;
   int number = 0;
   const auto fail = [&](const std::string& what) {
@@ -46,13 +48,13 @@ ColourLayout read_layout(const std::filesystem::path& file) {
 }
 
 void write_layout(const ColourLayout& layout, const std::filesystem::path& file, const std::string& comment) {
-  std::ofstream out(file);
+  std::ostringstream out;
   out << "# " << comment << '\n';
   for (size_t i = 0; i < layout.cells.size(); ++i) {
     out << kLetters[static_cast<size_t>(layout.cells[i])];
     if ((i + 1) % static_cast<size_t>(layout.columns) == 0) out << '\n';
   }
-  if (!out.flush()) throw CascadeError(file.string() + ": cannot be written");
+  require_written(write_file(file, out.str()));
 }
 
 Colour cell_colour(ImageView<const uint8_t> bgr, const Box& box, int columns, int rows, int column, int row) {

@@ -5,10 +5,13 @@
 #include <fstream>
 #include <sstream>
 
+#include "rt/file/input_file.hpp"
+
 namespace takt::traffic_signs {
 
 std::vector<SignModel> read_signs(const std::filesystem::path& folder) {
   const auto list = folder / "signs.txt";
+  if (std::filesystem::exists(list)) require_readable<CascadeError>(list);
   std::ifstream in(list);
   if (!in) throw CascadeError(list.string() + ": cannot be read; a folder of signs holds this list of them");
   std::vector<SignModel> signs;

@@ -21,9 +21,6 @@ struct IceoryxPlaces {
   static IceoryxPlaces of_this_machine();
 };
 
-/// Process that holds an flock on `file`, if the kernel tells.
-std::optional<pid_t> lock_holder(const std::filesystem::path& file, const std::filesystem::path& locks);
-
 /// Removes the socket and the lock of the iceoryx runtime of a process that was killed.
 void remove_iceoryx_leftovers(const IceoryxPlaces& places, pid_t dead);
 

@@ -15,6 +15,7 @@
 #include <thread>
 #include <utility>
 
+#include "graph/cli/file_option.hpp"
 #include "graph/run/prepare.hpp"
 #include "hal/camera/loopback_double.hpp"
 #include "hal/doubles/in_world.hpp"
@@ -177,11 +178,11 @@ void add_double(CLI::App& app, DoubleOptions& o, int& exit_code) {
   command->add_option("--can", o.can,
                       "CAN interface of a head or a base, such as vcan0; unix:PATH where there is no CAN");
   command->add_option("--video", o.video, "device file of v4l2loopback that a camera's frames are written to");
-  command->add_option("--rig", o.rig, "lens, size and mount of a camera (default graph/rigs/xb3.yaml)");
+  reads_file(command->add_option("--rig", o.rig, "lens, size and mount of a camera (default graph/rigs/xb3.yaml)"));
   command->add_option("--rate", o.rate_hz, "frames of a camera per second (default 15)")
       ->check(CLI::Range(0.01, 200.0));
   command->add_option("--baud", o.baud, "of an lms400 on a serial line (default 115200)");
-  command->add_option("--world", o.world, "what it sees (default graph/worlds/lab.xml)");
+  reads_file(command->add_option("--world", o.world, "what it sees (default graph/worlds/lab.xml)"));
   command->add_option("--seed", o.seed, "of that world's noise (default 1)");
   command->footer(
       "Example: takt double lms200 --pty /tmp/lms200\n"

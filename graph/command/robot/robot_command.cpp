@@ -7,8 +7,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
-#include <fstream>
 
+#include "graph/cli/file_option.hpp"
 #include "graph/cli/outcome.hpp"
 #include "graph/command/attach_commands.hpp"
 #include "nodes/robot_client/task.hpp"
@@ -155,11 +155,8 @@ int print_map(const RobotOptions& o) {
     Json message;
     if (const int code = echo(connection, client + ".map", message); code != kOk) return code;
     const auto objects = objects_of(message);
-    if (!o.dot.empty()) {
-      std::ofstream out(o.dot);
-      if (!(out << dot_of(objects)))
-        return refuse(o.dot.string() + " cannot be written; choose another --dot", kBadInput);
-    }
+    if (!o.dot.empty())
+      if (const int code = write_output(o.dot, dot_of(objects), "--dot"); code != kOk) return code;
     std::printf("%-20s %-12s %8s %8s  %s\n", "object", "type", "x m", "y m", "states");
     for (const KnownObject& object : objects)
       std::printf("%-20s %-12s %8.2f %8.2f  %s\n", object.name.c_str(), object.type.c_str(), object.x_m, object.y_m,

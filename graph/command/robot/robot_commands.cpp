@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <opencv2/core/utils/logger.hpp>
 
+#include "graph/cli/file_option.hpp"
 #include "graph/cli/set_option.hpp"
 #include "graph/command/robot/capture_command.hpp"
 #include "graph/command/robot/devices_command.hpp"
@@ -30,7 +31,7 @@ void add_devices(CLI::App& app, bool& json, int& exit_code) {
 void add_capture(CLI::App& app, CaptureOptions& o, int& exit_code) {
   CLI::App* capture = app.add_subcommand("capture", "writes what a device says to a file");
   capture->add_option("device", o.device, "can0, /dev/ttyUSB0, or 192.168.0.1:2111")->required();
-  capture->add_option("file", o.file, "file to be written")->required();
+  writes_file(capture->add_option("file", o.file, "file to be written"))->required();
   capture->add_option("--for", o.duration_s, "how long, e.g. 20s (default 10s)")
       ->transform(CLI::Validator(duration, "DURATION"));
   capture->add_option("--scanner", o.scanner, "lms200 | lms400: it is asked for scans meanwhile");

@@ -15,6 +15,7 @@
 #include <fstream>
 #include <thread>
 
+#include "rt/file/lock_holder.hpp"
 #include "rt/msg/image.hpp"
 #include "rt/shm/iceoryx_layout.hpp"
 #include "rt/shm/transport_error.hpp"

@@ -92,7 +92,8 @@ TEST_CASE("every mistake of a file is told, where it stands and with what is val
         "n.yaml:8:54: `on`: `yes` is no value of it; valid: true, false\n");
   CHECK(mistakes("takt_network: [1\n").starts_with("n.yaml:2:1: "));
   SemanticMap map(small());
-  CHECK(read_network("/nowhere.yaml", map).error().front() == "/nowhere.yaml:1:1: cannot be read, or is empty");
+  CHECK(read_network("/nowhere.yaml", map).error().front() ==
+        "/nowhere.yaml:1:1: cannot be read: No such file or directory");
 }
 
 TEST_CASE("a network as DOT and as GraphML: every node and every link once") {

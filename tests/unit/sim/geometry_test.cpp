@@ -130,7 +130,7 @@ TEST_CASE("pictures that are none are refused") {
   CHECK(error("P6 16 32 255\n").find("is no PPM") != std::string::npos);
   CHECK(error("P6 20 20 255\n").find("16, 32 ... 1024") != std::string::npos);
   CHECK(error("P6 16 16 255\n123").find("ends early") != std::string::npos);
-  CHECK(load_picture(folder.path / "none.ppm", 1.0).error().find("cannot be opened") != std::string::npos);
+  CHECK(load_picture(folder.path / "none.ppm", 1.0).error().find("cannot be read") != std::string::npos);
 }
 
 TEST_CASE("true disparity is f B / depth") {

@@ -88,5 +88,6 @@ TEST_CASE("traffic_signs: a mistake in a cascade file is named with its line and
   CHECK(says(mistake.error("<internalNodes>0 -1 ", "<internalNodes>0 -1 40"), "must be a whole number of 0..39"));
   CHECK(says(mistake.error("</features>", ""), "is no XML"));
   CHECK(says(mistake.error("<features>", "<feature>") + mistake.error("opencv_storage", "storage"), "is no XML"));
-  CHECK_THROWS_WITH_AS(read_cascade("/nonexistent.xml"), "/nonexistent.xml: cannot be read", CascadeError);
+  CHECK_THROWS_WITH_AS(read_cascade("/nonexistent.xml"), doctest::Contains("/nonexistent.xml: cannot be read"),
+                       CascadeError);
 }
