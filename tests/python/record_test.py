@@ -7,7 +7,7 @@ import unittest
 from unittest import mock
 
 import takt
-from takt import zstd
+from takt import unpacking
 
 RECORDS = pathlib.Path(__file__).parents[1] / "samples"
 
@@ -87,15 +87,15 @@ class RecordTest(unittest.TestCase):
         stored = pathlib.Path(RECORDS / "format_1.mcap").read_bytes()
         expected = len(takt.read_record(RECORDS / "format_1.mcap")["base.odometry"])
         self.assertIn(b"zstd", stored)
-        ways = [lambda: zstd._by_library("libzstd.so.1")]
+        ways = [unpacking._by_library]
         if shutil.which("zstd"):
-            ways.append(lambda: zstd._by_command(shutil.which("zstd")))
+            ways.append(unpacking._by_command)
         for way in ways:
-            with mock.patch("takt.zstd.unpacker", way):
+            with mock.patch("takt.unpacking.unpacker", way):
                 self.assertEqual(len(takt.read_record(RECORDS / "format_1.mcap")["base.odometry"]), expected)
 
     def test_without_any_zstd_it_says_what_to_install(self):
-        with mock.patch("takt.zstd._by_library", side_effect=OSError), mock.patch("shutil.which", return_value=None), \
+        with mock.patch("takt.unpacking._by_library", side_effect=OSError), mock.patch("shutil.which", return_value=None), \
                 mock.patch.dict("sys.modules", zstandard=None):
             with self.assertRaisesRegex(ImportError, "python3-zstandard, libzstd1, zstd"):
                 takt.read_record(RECORDS / "format_1.mcap")
