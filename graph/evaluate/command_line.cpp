@@ -288,7 +288,7 @@ void add_obstacle_stop(CLI::App& eval, EvalObstacleStopOptions& o, int& exit_cod
 
 void add_mapping(CLI::App& eval, EvalMappingOptions& o, int& exit_code) {
   CLI::App* app = eval.add_subcommand("mapping", "fused clouds, maps and obstacle grids against generated worlds");
-  app->add_option("--data", o.data, "folder with recorded depth images (depth/1.png ..) and their poses (pose.txt)");
+  app->add_option("--data", o.data, "recorded depth images and poses: depth/1.png .. and pose.txt, or a TUM RGB-D recording");
   app->add_option("--minutes", o.minutes, "of the long drive (default 30; 0: none)")->check(CLI::Range(0.0, 600.0));
   app->add_option("--runs", o.runs, "generated windows and scenes of a kind (default 20)")
       ->check(CLI::Range(1, 10'000));
