@@ -98,7 +98,7 @@ cv::Mat decode(const std::filesystem::path& file, int mode, const Head& head) {
                      : "";
   std::error_code failed;
   if (!std::filesystem::is_regular_file(file, failed))
-    refuse(file, failed ? failed.message() : std::filesystem::exists(file, failed) ? "is no file" : "does not exist");
+    refuse(file, "cannot be read: " + (failed ? failed.message() : std::string("is no file")));
   if (const auto size = std::filesystem::file_size(file, failed); !failed && size < head.least_bytes)
     refuse(file, "is too short for what it claims, " + std::to_string(size) + " bytes" + claim);
   cv::Mat image;
