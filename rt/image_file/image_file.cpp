@@ -150,7 +150,7 @@ uint32_t largest_value(const std::filesystem::path& file, const cv::Mat& image, 
         (values.all & of_bits(kMostBits - head.significant)) == 0 || values.brightest > of_bits(head.significant);
     return on_top ? of_bits(kMostBits) : of_bits(head.significant);
   }
-  const int used = std::bit_width(values.brightest);
+  const auto used = static_cast<int>(std::bit_width(values.brightest));
   if (used == kMostBits || used == 0 || head.significant == kMostBits) return of_bits(kMostBits);
   refuse(file, "16-bit image, brightest value " + std::to_string(values.brightest) +
                    ", and the file does not say how many bits count: say `bits: " + std::to_string(std::max(used, 8)) +
