@@ -18,6 +18,7 @@
 #include "graph/plugins/plugins.hpp"
 #include "rt/abi.hpp"
 #include "rt/capability.hpp"
+#include "rt/machine/limits.hpp"
 
 namespace takt::command {
 namespace {
@@ -83,6 +84,7 @@ namespace takt {
 
 int main(int argc, char** argv, const std::function<void(Registry&)>& fill, const MoreCommands& more) {
   command::hold_standard_streams();
+  machine::explain_what_nobody_catches();
   keep_rights(Rights::observe);
   return command::with_output(command::run(argc, argv, fill, more));
 }

@@ -12,12 +12,14 @@
 #include "hal/device_node.hpp"
 #include "hal/devices.hpp"
 #include "hal/reads_files.hpp"
+#include "rt/machine/limits.hpp"
 #include "rt/sched/port_access.hpp"
 
 namespace takt::graph {
 namespace {
 
 constexpr int64_t kSecond = 1'000'000'000;
+constexpr int64_t kLeastRoom = 16'000'000;  ///< bytes; setups take some of memory at once
 
 /// Ports of the plan by name.
 using PortIndex = std::map<std::string, size_t>;
@@ -290,9 +292,12 @@ class Composer {
     TaskPlan& task = result_.plan.tasks[t];
     try {
       give_setup(*task.node, task, t, graph_, clock_, options_);
+      // Beyond the limit of a control group the kernel kills instead of refusing.
+      if (const auto room = machine::memory_room(); room && room->free < kLeastRoom) throw std::bad_alloc();
       return true;
     } catch (const std::exception& problem) {
-      error.problems.push_back({positions_[t], fmt::format("{}: {}", task.name, problem.what())});
+      error.problems.push_back({positions_[t], fmt::format("{}: {}", task.name, machine::explain(problem))});
+      error.device_failed = error.device_failed || machine::scarce(problem);
       return false;
     }
   }

@@ -22,6 +22,7 @@
 #include "graph/run/watchdog.hpp"
 #include "graph/run/world_truth.hpp"
 #include "rt/capability.hpp"
+#include "rt/machine/limits.hpp"
 #include "rt/shm/iceoryx_preflight.hpp"
 #include "rt/supervise/systemd_sink.hpp"
 
@@ -247,7 +248,7 @@ int run_graph(const Registry& registry, const RunOptions& options) {
   } catch (const std::invalid_argument& problem) {  // more ports or edges than the transport carries
     return refuse(problem.what(), kBadInput);
   } catch (const std::exception& problem) {  // PolicyRefused, TransportError, no memory
-    return refuse(problem.what(), kDeviceOrSystem);
+    return refuse(machine::explain(problem), kDeviceOrSystem);
   }
 }
 
