@@ -11,6 +11,7 @@
 #include <opencv2/core.hpp>
 #include <span>
 #include <stdexcept>
+#include <string_view>
 #include <vector>
 
 namespace takt::stereo {
@@ -22,7 +23,9 @@ using Vector3 = cv::Vec3d;
 
 constexpr uint64_t kLargestFile = 1 << 20;
 
-[[noreturn]] void refuse(const std::string& what) { throw std::invalid_argument("stereo calibration: " + what); }
+constexpr std::string_view kPrefix = "stereo calibration: ";  // as rectify.cpp begins
+
+[[noreturn]] void refuse(const std::string& what) { throw std::invalid_argument(std::string(kPrefix) + what); }
 
 /// A file as a tree, whose errors name file and line.
 class File {
@@ -321,6 +324,17 @@ StereoCalibration from_ros(const File& file) {
   return c;
 }
 
+StereoCalibration from_file(const File& file) {
+  if (file.has("cam0")) return from_kalibr(file);
+  if (file.has("T_BS")) return from_euroc(file);
+  if (file.has("camera_matrix") && file.has("projection_matrix")) return from_ros(file);
+  if (file.has("camera_matrix"))
+    refuse(file.path().string() +
+           ": describes one camera; a pair with rectification_matrix and projection_matrix is needed: "
+           "calibrate both cameras together (ROS camera_calibration, or `takt calibrate`)");
+  return from_opencv(file);
+}
+
 /// What yaml-cpp refuses, a key in place of a list say, with the file's name.
 template <class Read>
 StereoCalibration guarded(const fs::path& path, const Read& read) {
@@ -347,17 +361,13 @@ cv::Mat coefficients(const std::array<double, 5>& first, const std::array<double
 }  // namespace
 
 StereoCalibration read_calibration(const fs::path& path) {
-  return guarded(path, [&] {
-    const File file(path);
-    if (file.has("cam0")) return from_kalibr(file);
-    if (file.has("T_BS")) return from_euroc(file);
-    if (file.has("camera_matrix") && file.has("projection_matrix")) return from_ros(file);
-    if (file.has("camera_matrix"))
-      refuse(path.string() +
-             ": describes one camera; a pair with rectification_matrix and projection_matrix is needed: "
-             "calibrate both cameras together (ROS camera_calibration, or `takt calibrate`)");
-    return from_opencv(file);
-  });
+  const StereoCalibration calibration = guarded(path, [&] { return from_file(File(path)); });
+  try {
+    check_calibration(calibration);
+  } catch (const std::invalid_argument& problem) {
+    refuse(path.string() + ": " + std::string(problem.what()).substr(kPrefix.size()));
+  }
+  return calibration;
 }
 
 StereoCalibration read_intrinsics(const fs::path& path) {

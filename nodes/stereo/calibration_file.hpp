@@ -19,8 +19,7 @@ namespace takt::stereo {
 /// radtan or none | | EuRoC | mav0/cam0/sensor.yaml; cam1/sensor.yaml is the right camera |
 ///
 /// Throws std::invalid_argument naming file, line, key and value: for a form that is none of these, coefficients that
-/// are none of OpenCV's (fisheye), numbers that do not fit their matrix, and values that cannot be meant (see
-/// rectification_tables()).
+/// are none of OpenCV's (fisheye), numbers that do not fit their matrix, and what check_calibration() refuses.
 StereoCalibration read_calibration(const std::filesystem::path& file);
 
 /// The matrices and distortions alone (M1, D1, M2, D2), as OpenCV's samples keep them in a file of their own. Throws as

@@ -36,33 +36,6 @@ void doubt(const StereoCalibration& c) {
              std::to_string(c.width) + " x " + std::to_string(c.height) + "; was it calibrated at another resolution?");
 }
 
-void check(const StereoCalibration& c) {
-  if (c.width < 16 || c.width > 8192 || c.height < 16 || c.height > 8192)
-    refuse("image size is " + std::to_string(c.width) + " x " + std::to_string(c.height) +
-           ", each must lie in 16..8192");
-  check_finite("left_matrix", c.left_matrix);
-  check_finite("right_matrix", c.right_matrix);
-  check_finite("left_distortion", c.left_distortion);
-  check_finite("right_distortion", c.right_distortion);
-  check_finite("left_more", c.left_more);
-  check_finite("right_more", c.right_more);
-  check_finite("rotation", c.rotation);
-  check_finite("translation_m", c.translation_m);
-  for (const auto* m : {&c.left_matrix, &c.right_matrix})
-    if (!((*m)[0] > 0) || !((*m)[4] > 0))
-      refuse("focal lengths are " + std::to_string((*m)[0]) + " and " + std::to_string((*m)[4]) +
-             " px, must be positive");
-  for (size_t i = 0; i < 3; ++i)
-    for (size_t j = i; j < 3; ++j) {
-      double dot = 0;
-      for (size_t k = 0; k < 3; ++k) dot += c.rotation[3 * i + k] * c.rotation[3 * j + k];
-      if (std::abs(dot - (i == j ? 1 : 0)) > 1e-3)
-        refuse("rotation is not orthonormal: rows " + std::to_string(i) + " and " + std::to_string(j) +
-               " have the product " + std::to_string(dot));
-    }
-  doubt(c);
-}
-
 cv::Mat matrix(std::span<const double> values, int rows) {
   cv::Mat m(rows, static_cast<int>(values.size()) / rows, CV_64F);
   std::memcpy(m.data, values.data(), values.size_bytes());
@@ -99,8 +72,35 @@ std::vector<RemapSource> sources(const cv::Mat& matrix, const cv::Mat& distortio
 
 }  // namespace
 
+void check_calibration(const StereoCalibration& c) {
+  if (c.width < 16 || c.width > 8192 || c.height < 16 || c.height > 8192)
+    refuse("image size is " + std::to_string(c.width) + " x " + std::to_string(c.height) +
+           ", each must lie in 16..8192");
+  check_finite("left_matrix", c.left_matrix);
+  check_finite("right_matrix", c.right_matrix);
+  check_finite("left_distortion", c.left_distortion);
+  check_finite("right_distortion", c.right_distortion);
+  check_finite("left_more", c.left_more);
+  check_finite("right_more", c.right_more);
+  check_finite("rotation", c.rotation);
+  check_finite("translation_m", c.translation_m);
+  for (const auto* m : {&c.left_matrix, &c.right_matrix})
+    if (!((*m)[0] > 0) || !((*m)[4] > 0))
+      refuse("focal lengths are " + std::to_string((*m)[0]) + " and " + std::to_string((*m)[4]) +
+             " px, must be positive");
+  for (size_t i = 0; i < 3; ++i)
+    for (size_t j = i; j < 3; ++j) {
+      double dot = 0;
+      for (size_t k = 0; k < 3; ++k) dot += c.rotation[3 * i + k] * c.rotation[3 * j + k];
+      if (std::abs(dot - (i == j ? 1 : 0)) > 1e-3)
+        refuse("rotation is not orthonormal: rows " + std::to_string(i) + " and " + std::to_string(j) +
+               " have the product " + std::to_string(dot));
+    }
+  doubt(c);
+}
+
 RectificationTables rectification_tables(const StereoCalibration& c) {
-  check(c);
+  check_calibration(c);
   const cv::Mat k1 = matrix(c.left_matrix, 3), k2 = matrix(c.right_matrix, 3),
                 d1 = distortion(c.left_distortion, c.left_more), d2 = distortion(c.right_distortion, c.right_more);
   const cv::Size size(c.width, c.height);
@@ -122,7 +122,7 @@ RectificationTables rectification_tables(const StereoCalibration& c) {
 }
 
 RectificationTables undistortion_table(const StereoCalibration& c) {
-  check(c);
+  check_calibration(c);
   const auto& m = c.left_matrix;
   const double focal = (m[0] + m[4]) / 2;
   const std::array<double, 9> ideal{focal, 0, m[2], 0, focal, m[5], 0, 0, 1};

@@ -21,6 +21,11 @@ struct StereoCalibration {
   std::array<double, 3> translation_m{};                        ///< right camera beside the left: x about -baseline
 };
 
+/// Throws std::invalid_argument for values that are not finite, sizes outside 16..8192, focal lengths that are not
+/// positive, a rotation that is none, and values that cannot be meant: a baseline outside 1 mm to 10 m, a principal
+/// point outside the image.
+void check_calibration(const StereoCalibration& calibration);
+
 /// Model of the rectified images, and where each of their pixels comes from (width x height, row by row).
 struct RectificationTables {
   CameraModel camera;
@@ -28,10 +33,8 @@ struct RectificationTables {
   std::vector<RemapSource> left, right;
 };
 
-/// The tables that bring epipolar lines onto rows (thesis Sec. 3.5.2). Throws std::invalid_argument for values that are
-/// not finite, sizes outside 16..8192, focal lengths that are not positive, a rotation that is none, cameras that do
-/// not stand left and right of each other, and values that cannot be meant: a baseline outside 1 mm to 10 m, a
-/// principal point outside the image.
+/// The tables that bring epipolar lines onto rows (thesis Sec. 3.5.2). Throws as check_calibration(), and for cameras
+/// that do not stand left and right of each other.
 RectificationTables rectification_tables(const StereoCalibration& calibration);
 
 /// The table that undistorts the left image alone (`right` is empty): the camera keeps its direction and its matrix, as
