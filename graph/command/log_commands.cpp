@@ -22,7 +22,11 @@ namespace {
 
 std::optional<record::LogFile> open(const std::filesystem::path& file) {
   auto log = record::LogFile::open(file);
-  if (log) return std::move(*log);
+  if (log) {
+    for (const std::string& left : log->left_out())
+      std::fprintf(stderr, "takt: %s: left out: %s\n", file.c_str(), left.c_str());
+    return std::move(*log);
+  }
   refuse(log.error(), kBadInput);
   return std::nullopt;
 }

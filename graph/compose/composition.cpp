@@ -9,7 +9,9 @@
 
 #include "graph/compose/plan_modes.hpp"
 #include "graph/language/share.hpp"
+#include "hal/device_node.hpp"
 #include "hal/devices.hpp"
+#include "hal/reads_files.hpp"
 #include "rt/machine/limits.hpp"
 #include "rt/sched/port_access.hpp"
 
@@ -103,6 +105,9 @@ class Composer {
       }
       auto node = make_device(device);
       if (!node) return tl::make_unexpected(node.error());
+      if (auto* const hardware = dynamic_cast<DeviceNode*>(node->get()))
+        if (const auto* const reader = dynamic_cast<const ReadsFiles*>(&hardware->device()))
+          for (const std::string& left : reader->left_out()) result_.left_out.push_back(device.id + ": " + left);
       add_device(device, std::move(*node));
     }
     return {};

@@ -54,6 +54,9 @@ struct ComposeOptions {
 struct Composition {
   std::vector<std::unique_ptr<Node>> nodes;
   Plan plan;
+  /// What devices of this process left out of the files that they read (ReadsFiles), each with the device's id before
+  /// it.
+  std::vector<std::string> left_out;
 };
 
 /// Every process of a run composes the same plan; what it does not own stays an empty shell with ports.

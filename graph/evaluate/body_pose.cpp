@@ -13,6 +13,7 @@
 #include "nodes/body_pose/floor.hpp"
 #include "nodes/body_pose/picture.hpp"
 #include "nodes/picture/image_file.hpp"
+#include "rt/image_file/image_file.hpp"
 #include "rt/msg/ace/body_poses.hpp"
 #include "rt/msg/geometry.hpp"
 #include "rt/msg/point.hpp"
@@ -62,7 +63,7 @@ std::vector<Point> moved(std::vector<Point> points, const Transform& camera_in_f
 }
 
 Json measure_depth(const EvalBodyPoseOptions& options) {
-  const cv::Mat depth = cv::imread(options.depth.string(), cv::IMREAD_UNCHANGED);
+  const cv::Mat depth = read_values(options.depth);
   if (depth.type() != CV_16UC1)
     throw std::runtime_error(options.depth.string() + ": must be an image of one channel of 16 bit, depth in mm");
   const std::vector<Point> points = points_of(depth);
@@ -75,7 +76,7 @@ Json measure_depth(const EvalBodyPoseOptions& options) {
   const double time_ms = static_cast<double>(thread_cpu_ns() - start) / 1e6;
   if (!options.picture.empty()) {
     cv::Mat image;
-    if (!options.colour.empty()) image = cv::imread(options.colour.string(), cv::IMREAD_COLOR);
+    if (!options.colour.empty()) image = read_image(options.colour, Channels::colour);
     if (image.size() != depth.size()) {
       depth.convertTo(image, CV_8U, 255.0 / 6000);
       cv::cvtColor(image, image, cv::COLOR_GRAY2BGR);

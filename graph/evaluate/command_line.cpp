@@ -33,7 +33,7 @@ void add_stereo(CLI::App& eval, EvalStereoOptions& o, int& exit_code) {
   auto* left = reads_file(app->add_option("--left", o.left, "left rectified image"));
   auto* right = reads_file(app->add_option("--right", o.right, "right rectified image"))->needs(left);
   auto* truth =
-      reads_file(app->add_option("--gt", o.truth, "ground truth of the left image, 0: unknown"))->needs(right);
+      reads_file(app->add_option("--gt", o.truth, "ground truth of the left image, 0: unknown; an image, or PFM"))->needs(right);
   left->needs(truth)->excludes(scene);
   app->add_option("--sweep", o.sweep, "on generated pairs: error against noise, or against the window's edge")
       ->check(CLI::IsMember({"noise", "window"}))
@@ -303,8 +303,8 @@ void add_obstacle_stop(CLI::App& eval, EvalObstacleStopOptions& o, int& exit_cod
 
 void add_mapping(CLI::App& eval, EvalMappingOptions& o, int& exit_code) {
   CLI::App* app = eval.add_subcommand("mapping", "fused clouds, maps and obstacle grids against generated worlds");
-  reads_folder(app->add_option("--data", o.data,
-                               "folder with recorded depth images (depth/1.png ..) and their poses (pose.txt)"));
+  reads_folder(app->add_option(
+      "--data", o.data, "recorded depth images and poses: depth/1.png .. and pose.txt, or a TUM RGB-D recording"));
   app->add_option("--minutes", o.minutes, "of the long drive (default 30; 0: none)")->check(CLI::Range(0.0, 600.0));
   app->add_option("--runs", o.runs, "generated windows and scenes of a kind (default 20)")
       ->check(CLI::Range(1, 10'000));

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <sstream>
 #include <string>
@@ -15,6 +14,8 @@
 #include "nodes/ego_motion/evaluate.hpp"
 #include "nodes/stereo/matcher.hpp"
 #include "rt/file/input_file.hpp"
+#include "rt/image_file/image_file.hpp"
+#include "rt/image_file/image_list.hpp"
 #include "rt/quantile.hpp"
 #include "rt/time/clock.hpp"
 
@@ -70,17 +71,17 @@ std::vector<Rigid> read_poses(const std::filesystem::path& file) {
 }
 
 std::vector<std::filesystem::path> images(const std::filesystem::path& folder) {
-  std::vector<std::filesystem::path> files;
-  std::error_code error;
-  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) files.push_back(entry.path());
-  if (files.empty()) throw BadData(fmt::format("{}: no images; --data wants image_l/ and image_r/", folder.string()));
-  std::sort(files.begin(), files.end());
-  return files;
+  ImageList list;
+  if (std::filesystem::is_directory(folder)) list = list_images(folder);
+  if (list.files.empty())
+    throw BadData(fmt::format("{}: no images; --data wants image_l/ and image_r/", folder.string()));
+  if (const std::string left = left_out_text(folder, list); !left.empty())
+    std::fprintf(stderr, "takt: %s\n", left.c_str());
+  return list.files;
 }
 
 cv::Mat read_grey(const std::filesystem::path& file, double scale) {
-  cv::Mat image = cv::imread(file.string(), cv::IMREAD_GRAYSCALE);
-  if (image.empty()) throw BadData(fmt::format("{}: cannot be decoded", file.string()));
+  cv::Mat image = read_image(file, Channels::grey);
   if (scale != 1) cv::resize(image, image, {}, scale, scale, cv::INTER_AREA);
   return image;
 }

@@ -12,6 +12,7 @@
 #include "graph/cli/outcome.hpp"
 #include "graph/evaluate/ground_score.hpp"
 #include "hal/settings/json.hpp"
+#include "rt/image_file/image_file.hpp"
 #include "rt/quantile.hpp"
 #include "rt/time/clock.hpp"
 
@@ -49,8 +50,9 @@ std::vector<LabelledImage> labelled_images(const EvalGroundOptions& options) {
 }
 
 cv::Mat read(const std::filesystem::path& file, int mode, cv::Size size) {
-  cv::Mat image = cv::imread(file.string(), mode);
-  if (image.empty()) throw std::runtime_error(fmt::format("{}: cannot be read or decoded", file.string()));
+  cv::Mat image = mode == cv::IMREAD_UNCHANGED
+                      ? read_values(file)
+                      : read_image(file, mode == cv::IMREAD_COLOR ? Channels::colour : Channels::grey);
   if (!size.empty() && image.size() != size)
     throw std::runtime_error(
         fmt::format("{}: {} x {}, expected {} x {}", file.string(), image.cols, image.rows, size.width, size.height));

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <fstream>
 #include <map>
-#include <opencv2/imgcodecs.hpp>
 #include <sstream>
 #include <stdexcept>
 #include <tuple>
@@ -16,6 +15,7 @@
 #include "nodes/stereo/matcher.hpp"
 #include "nodes/stereo/triangulate.hpp"
 #include "rt/file/input_file.hpp"
+#include "rt/image_file/image_file.hpp"
 #include "rt/msg/point.hpp"
 #include "rt/quantile.hpp"
 
@@ -65,11 +65,7 @@ Rigid laser_in_camera(const std::filesystem::path& folder, const Eigen::MatrixXd
   return {rectify * turn, rectify * shift + camera};
 }
 
-cv::Mat read_image(const std::filesystem::path& file) {
-  cv::Mat image = cv::imread(file.string(), cv::IMREAD_COLOR);
-  if (image.empty()) throw std::invalid_argument(fmt::format("{}: cannot be read or decoded", file.string()));
-  return image;
-}
+cv::Mat read_image(const std::filesystem::path& file) { return read_image(file, Channels::colour); }
 
 /// Left and right.
 std::pair<cv::Mat, cv::Mat> read_images(const std::filesystem::path& folder) {

@@ -163,8 +163,12 @@ int evaluate(const EvalMappingOptions& o) {
   runs.runs = o.runs;
   runs.seed = o.seed;
   results.fusion("generated walks", "", evaluate_generated(runs));
-  if (!o.data.empty())
-    results.fusion("recorded views, each left out in turn", "recorded_", evaluate_recorded(o.data, o.seed));
+  if (!o.data.empty()) {
+    std::vector<std::string> left_out;
+    const FusionEvaluation recorded = evaluate_recorded(o.data, o.seed, left_out);
+    for (const std::string& left : left_out) std::fprintf(stderr, "takt: %s\n", left.c_str());
+    results.fusion("recorded views, each left out in turn", "recorded_", recorded);
+  }
   MapperParameters p;
   p.views = o.views;
   const RedundancyFigures room = evaluate_redundancy(p, o.clouds, o.seed);

@@ -3,7 +3,6 @@
 #include <cstdio>
 #include <limits>
 #include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
 
 #include "graph/cli/outcome.hpp"
 #include "graph/evaluate/evaluations.hpp"
@@ -11,6 +10,7 @@
 #include "nodes/object_detection/evaluate.hpp"
 #include "nodes/object_detection/photographs.hpp"
 #include "nodes/object_detection/tally.hpp"
+#include "rt/image_file/image_file.hpp"
 #include "rt/msg/ace/detections.hpp"
 #include "rt/quantile.hpp"
 #include "rt/time/clock.hpp"
@@ -119,7 +119,7 @@ Surroundings surroundings(const EvalObjectsOptions& options, const SceneParamete
   for (const cv::String& file : files) {
     const auto same = [&](const auto& negative) { return std::filesystem::equivalent(negative, std::string(file)); };
     if (std::any_of(options.negatives.begin(), options.negatives.end(), same)) continue;
-    const cv::Mat image = cv::imread(file, cv::IMREAD_UNCHANGED);
+    const cv::Mat image = read_values(std::string(file));
     if (image.type() != CV_8UC3 || image.cols != p.width || image.rows != p.height) continue;
     const bool learnt = options.negatives.empty() && number++ % 2 == 1;
     (learnt ? all.negatives : all.backgrounds).push_back(read_photograph(std::string(file)));

@@ -41,6 +41,9 @@ constexpr double kSigmaOfCut = 0.4;  // 0.10 m at the cut of 0.25 m
 cloud::Cloud read(const std::filesystem::path& file) {
   auto cloud = cloud::read_cloud(file);
   if (!cloud) throw std::invalid_argument(cloud.error());
+  // The reference pose is that of absolute coordinates.
+  if (const std::string rounded = cloud::add_origin(*cloud); !rounded.empty()) cloud->left_out.push_back(rounded);
+  for (const std::string& left : cloud->left_out) std::fprintf(stderr, "takt: %s: %s\n", file.c_str(), left.c_str());
   return std::move(*cloud);
 }
 

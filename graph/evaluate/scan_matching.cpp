@@ -29,6 +29,7 @@ PlanarPose robot(const PlanarPose& logged) { return {logged.x_m, logged.y_m, log
 Drive read_drive(const EvalScanMatchingOptions& options) {
   const auto log = replay::load_carmen_log("takt eval scan_matching", options.log);
   if (!log) throw std::runtime_error(log.error().text());
+  for (const std::string& left : log->left_out) std::fprintf(stderr, "takt: %s\n", left.c_str());
   Drive drive;
   drive.first_angle_rad = log->first_angle_rad;
   drive.step_rad = log->step_rad;

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cstdio>
 #include <map>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "graph/cli/outcome.hpp"
@@ -10,6 +9,8 @@
 #include "hal/settings/json.hpp"
 #include "nodes/object_detection/scenes.hpp"
 #include "nodes/sift/sift_match.hpp"
+#include "rt/image_file/image_file.hpp"
+#include "rt/image_file/image_list.hpp"
 #include "rt/quantile.hpp"
 #include "rt/time/clock.hpp"
 
@@ -105,16 +106,13 @@ Scores measure_pictures(const EvalSiftOptions& o) {
     for (const auto& file : std::filesystem::directory_iterator(folder)) {
       const std::string name = file.path().stem().string();
       auto& frame = last[folder.path().filename().string()][name.substr(0, name.find('_'))];
-      if (frame.empty() || frame.filename() < file.path().filename()) frame = file.path();
+      if (frame.empty() || in_numeric_order(frame.filename().string(), file.path().filename().string()))
+        frame = file.path();
     }
   }
   if (last.size() < 2)
     throw std::runtime_error(o.data.string() + ": must hold a folder of pictures for each of two classes or more");
-  const auto read = [](const std::filesystem::path& file) {
-    const cv::Mat image = cv::imread(file.string(), cv::IMREAD_COLOR);
-    if (image.empty()) throw std::runtime_error(file.string() + ": cannot be read or is no image");
-    return image;
-  };
+  const auto read = [](const std::filesystem::path& file) { return read_image(file, Channels::colour); };
   Matcher matcher;
   std::vector<Known> known;
   for (const auto& [name, tracks] : last)

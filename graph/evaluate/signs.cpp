@@ -7,7 +7,6 @@
 #include <cstdio>
 #include <fstream>
 #include <map>
-#include <opencv2/imgcodecs.hpp>
 #include <optional>
 #include <sstream>
 
@@ -16,6 +15,7 @@
 #include "hal/settings/json.hpp"
 #include "nodes/traffic_signs/evaluate.hpp"
 #include "rt/file/input_file.hpp"
+#include "rt/image_file/image_file.hpp"
 
 namespace takt::command {
 namespace {
@@ -91,11 +91,7 @@ class Table {
   std::vector<std::vector<std::string>> rows_;
 };
 
-cv::Mat3b read_image(const fs::path& file) {
-  const cv::Mat3b image = cv::imread(file.string(), cv::IMREAD_COLOR);
-  if (image.empty()) throw std::invalid_argument(file.string() + ": is no image that can be read");
-  return image;
-}
+cv::Mat3b read_image(const fs::path& file) { return read_image(file, Channels::colour); }
 
 std::vector<Sighting> search(const std::vector<SignModel>& signs, const cv::Mat3b& image) {
   SignDetector detector(image.cols, image.rows, signs, {});

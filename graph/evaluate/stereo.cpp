@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstdio>
 #include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
 #include "graph/cli/outcome.hpp"
@@ -17,6 +17,7 @@
 #include "nodes/stereo/evaluate_peers.hpp"
 #include "nodes/stereo/half_resolution.hpp"
 #include "nodes/stereo/matcher.hpp"
+#include "rt/image_file/image_file.hpp"
 #include "rt/quantile.hpp"
 #include "rt/time/clock.hpp"
 
@@ -30,18 +31,20 @@ struct BadData : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-cv::Mat read(const std::filesystem::path& file, int mode) {
-  cv::Mat image = cv::imread(file.string(), mode);
-  if (image.empty()) throw BadData(fmt::format("{}: cannot be read or decoded", file.string()));
-  return image;
-}
-
 ImageView<const uint8_t> view(const cv::Mat& m) {
   return {m.data, m.cols, m.rows, m.channels(), static_cast<ptrdiff_t>(m.step)};
 }
 
 stereo::DisparityImage read_truth(const std::filesystem::path& file, double scale) {
-  const cv::Mat truth = read(file, cv::IMREAD_ANYDEPTH | cv::IMREAD_GRAYSCALE);
+  if (file.extension() == ".pfm") {  // 0 in ground truth: unknown
+    const cv::Mat1f values = read_floats(file);
+    stereo::DisparityImage image{values.cols, values.rows, {}};
+    for (const float value : values)
+      image.pixels.push_back(std::isfinite(value) ? value / static_cast<float>(scale) : 0);
+    return image;
+  }
+  cv::Mat truth = read_values(file);
+  if (truth.channels() > 1) cv::cvtColor(truth, truth, cv::COLOR_BGR2GRAY);
   if (truth.depth() == CV_16U)
     return stereo::ground_truth(ImageView<const uint16_t>{truth.ptr<uint16_t>(), truth.cols, truth.rows, 1,
                                                           static_cast<ptrdiff_t>(truth.step1())},
@@ -115,7 +118,7 @@ void print_row(const char* name, const Json& r) {
 /// What is matched, and what should come out.
 LaserTruth read_pair(const EvalStereoOptions& options) {
   if (!options.scene.empty()) return read_laser_truth(options.scene);
-  LaserTruth pair{read(options.left, cv::IMREAD_COLOR), read(options.right, cv::IMREAD_COLOR),
+  LaserTruth pair{read_image(options.left, Channels::colour), read_image(options.right, Channels::colour),
                   read_truth(options.truth, options.truth_scale)};
   if (pair.left.size() != pair.right.size())
     throw BadData(fmt::format("{} and {} differ in size", options.left.string(), options.right.string()));

@@ -175,14 +175,11 @@ class Carried {
   std::map<std::pair<uint16_t, uint32_t>, std::vector<RecordedJob::Param>> given_;  ///< by task and index
 };
 
-/// Schemas and channels under the ids that they have: the Recorder counts them from 1, as the Writer does.
-bool copy_definitions(const mcap::Reader& from, mcap::Writer& to) {
-  bool same = true;
-  for (const mcap::Schema& schema : from.schemas())
-    same &= to.add_schema(schema.name, schema.encoding, schema.data) == schema.id;
+/// Schemas and channels under the ids that they have: the Reader counts them from 1, as the Writer does.
+void copy_definitions(const mcap::Reader& from, mcap::Writer& to) {
+  for (const mcap::Schema& schema : from.schemas()) to.add_schema(schema.name, schema.encoding, schema.data);
   for (const mcap::Channel& channel : from.channels())
-    same &= to.add_channel(channel.schema, channel.topic, channel.encoding, channel.metadata) == channel.id;
-  return same;
+    to.add_channel(channel.schema, channel.topic, channel.encoding, channel.metadata);
 }
 
 }  // namespace
@@ -209,8 +206,9 @@ tl::expected<Cut, std::string> cut_log(const record::LogFile& log, int64_t from_
                              content_hash(log));
   note(file.metadata(Recorder::kFacts, facts));
   for (const mcap::Attachment& attachment : log.container().attachments()) note(file.attach(attachment));
-  if (!copy_definitions(log.container(), file))
-    return tl::make_unexpected(std::string("its channels are not numbered as takt does"));
+  for (const mcap::Reader::Named& other : log.container().metadata())
+    if (other.name != Recorder::kFacts && other.name != Recorder::kEnd) note(file.metadata(other.name, other.map));
+  copy_definitions(log.container(), file);
 
   Cut cut;
   const Carried carried(log, selection);
@@ -231,7 +229,7 @@ tl::expected<Cut, std::string> cut_log(const record::LogFile& log, int64_t from_
       const auto event = record::unpack_event(message.data);
       if (event && selection.keeps(*event)) note(file.write(message)), ++cut.events;
     } else if (const auto held = record::unpack_message(message.data);
-               held && selection.keeps(message.channel, held->sequence)) {
+               message.channel != 0 && held && selection.keeps(message.channel, held->sequence)) {
       note(file.write(message));
       ++cut.messages;
     }

@@ -10,7 +10,6 @@
 #include "graph/language/words.hpp"
 #include "graph/log/recorded_type.hpp"
 #include "rt/record/message_record.hpp"
-#include "rt/record/recorder.hpp"
 
 namespace takt::log {
 namespace {
@@ -26,7 +25,7 @@ tl::expected<std::map<uint16_t, Port>, std::string> chosen(const record::LogFile
   std::vector<std::string> known;
   std::map<uint16_t, Port> ports;
   for (const mcap::Channel& channel : log.container().channels()) {
-    if (channel.topic == record::Recorder::kJobs || channel.topic == record::Recorder::kEvents) continue;
+    if (!record::LogFile::of_a_port(channel)) continue;
     known.push_back(channel.topic);
     if (!wanted.empty() && std::find(wanted.begin(), wanted.end(), channel.topic) == wanted.end()) continue;
     ports.emplace(channel.id, Port{&channel, type_of(log, channel)});

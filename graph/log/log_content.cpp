@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <map>
+#include <set>
 
 #include "graph/log/recorded_type.hpp"
 #include "rt/record/recorder.hpp"
@@ -15,7 +16,6 @@ namespace {
 
 using record::LogFile;
 using record::RecordedJob;
-using record::Recorder;
 
 Json plan_of(const LogFile& log) { return Json::parse(log.attached("plan.json").value_or("")); }
 
@@ -27,10 +27,19 @@ uint64_t count(const mcap::Metadata& facts, const char* name) {
 std::vector<mcap::Channel> port_channels(const LogFile& log) {
   std::vector<mcap::Channel> channels;
   for (const mcap::Channel& channel : log.container().channels())
-    if (channel.topic != Recorder::kJobs && channel.topic != Recorder::kEvents) channels.push_back(channel);
+    if (LogFile::of_a_port(channel)) channels.push_back(channel);
   std::sort(channels.begin(), channels.end(),
             [](const mcap::Channel& a, const mcap::Channel& b) { return a.topic < b.topic; });
   return channels;
+}
+
+/// Those of the plan: another writer may leave out a channel without messages.
+std::set<std::string> planned_ports(const LogFile& log) {
+  std::set<std::string> ports;
+  const Json plan = Json::parse(log.attached("plan.json").value_or(""), nullptr, false);
+  if (plan.is_object() && plan.contains("ports"))
+    for (const Json& port : plan["ports"]) ports.insert(port.value("name", ""));
+  return ports;
 }
 
 std::vector<const RecordedJob*> sorted_jobs(const LogFile& log) {
@@ -198,9 +207,11 @@ std::string content_hash(const LogFile& log) {
   std::vector<std::byte> all;
   append(all, log.attached("plan.json").value_or(""));
   append(all, log.attached("assets.json").value_or(""));
-  for (const mcap::Channel& channel : port_channels(log)) {
-    append(all, channel.topic);
-    for (const auto& [sequence, known] : log.messages(channel.id)) {
+  std::set<std::string> ports = planned_ports(log);
+  for (const mcap::Channel& channel : port_channels(log)) ports.insert(channel.topic);
+  for (const std::string& port : ports) {
+    append(all, port);
+    for (const auto& [sequence, known] : log.messages(log.channel(port))) {
       const uint64_t numbers[]{sequence, static_cast<uint64_t>(known.stamp_ns), known.hash};
       const auto bytes = std::as_bytes(std::span(numbers));
       all.insert(all.end(), bytes.begin(), bytes.end());
@@ -242,9 +253,16 @@ Json content_json(LogFile& log) {
             {"not_written", count(end, "lost_not_written")},
             {"jobs", count(end, "lost_jobs")},
             {"threads", count(end, "lost_threads")}};
-  return {{"facts", facts},           {"end", end},        {"duration_s", span_s(log)},
-          {"nodes", nodes},           {"ports", channels}, {"events", event_counts(log)},
-          {"format", log.format()},   {"lost", lost},      {"damages", log.damages()},
+  return {{"facts", facts},
+          {"end", end},
+          {"duration_s", span_s(log)},
+          {"nodes", nodes},
+          {"ports", channels},
+          {"events", event_counts(log)},
+          {"format", log.format()},
+          {"lost", lost},
+          {"damages", log.damages()},
+          {"left_out", log.left_out()},
           {"hash", content_hash(log)}};
 }
 
@@ -281,6 +299,7 @@ std::string content_text(const Json& content) {
         lost["overwritten"].get<uint64_t>(), lost["no_room"].get<uint64_t>(), lost["not_written"].get<uint64_t>(),
         lost["jobs"].get<uint64_t>(), lost["threads"].get<uint64_t>());
   for (const Json& damage : content["damages"]) text += "not whole: " + damage.get<std::string>() + "\n";
+  for (const Json& left : content["left_out"]) text += "left out: " + left.get<std::string>() + "\n";
   return text + "content " + content["hash"].get<std::string>() + "\n";
 }
 
@@ -288,19 +307,18 @@ LogDifference difference(LogFile& from, LogFile& to) {
   LogDifference result;
   compare_jobs(from, to, result);
   compare_events(from, to, result);
+  // Another writer may leave out a channel without messages.
+  const auto only_in = [&](const LogFile& log, const mcap::Channel& channel, const char* which) {
+    if (log.messages(channel.id).empty()) return;
+    result.same = false;
+    result.lines.push_back(fmt::format("{}: only in the {}", channel.topic, which));
+  };
   for (const mcap::Channel& channel : port_channels(from)) {
-    if (to.channel(channel.topic) != 0) {
-      compare_channel(from, to, channel, result);
-      continue;
-    }
-    result.same = false;
-    result.lines.push_back(channel.topic + ": only in the first");
+    if (to.channel(channel.topic) != 0) compare_channel(from, to, channel, result);
+    else only_in(from, channel, "first");
   }
-  for (const mcap::Channel& channel : port_channels(to)) {
-    if (from.channel(channel.topic) != 0) continue;
-    result.same = false;
-    result.lines.push_back(channel.topic + ": only in the second");
-  }
+  for (const mcap::Channel& channel : port_channels(to))
+    if (from.channel(channel.topic) == 0) only_in(to, channel, "second");
   return result;
 }
 

@@ -95,7 +95,9 @@ tl::expected<RecordedType, std::string> type_of(const record::LogFile& log, cons
 
 const mcap::Channel* channel_of(const record::LogFile& log, std::string_view port) {
   const auto& all = log.container().channels();
-  const auto found = std::find_if(all.begin(), all.end(), [&](const auto& channel) { return channel.topic == port; });
+  const auto found = std::find_if(all.begin(), all.end(), [&](const auto& channel) {
+    return channel.topic == port && record::LogFile::of_a_port(channel);
+  });
   return found == all.end() ? nullptr : &*found;
 }
 

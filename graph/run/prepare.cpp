@@ -49,8 +49,10 @@ int compose(const RunOptions& options, const graph::ComposeOptions& how, Prepare
   without_rights([&] {  // what devices and libraries start here has none
     auto composition = graph::compose(*prepared.graph, prepared.registry, device_factory(prepared, options.seed),
                                       *prepared.clock, how);
-    if (composition) prepared.composition = std::move(*composition);
-    else
+    if (composition) {
+      prepared.composition = std::move(*composition);
+      for (const std::string& left : prepared.composition->left_out) std::fprintf(stderr, "takt: %s\n", left.c_str());
+    } else
       code = refuse(prepared, std::move(composition.error().problems),
                     composition.error().device_failed ? kDeviceOrSystem : kBadInput);
   });

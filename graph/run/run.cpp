@@ -132,6 +132,7 @@ int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, Ru
                            {"cores", composition.plan.cores.size()},
                            {"durations", options.durations}};
   report["rights"] = std::move(held);
+  report["left_out"] = composition.left_out;
   record.tell(report);
   faults.judge(result, board, run_exit(board, result.policy_granted, report), {}, report);
   expectations.judge(report);

@@ -19,6 +19,7 @@
 #include "nodes/calibration/image_pairs.hpp"
 #include "nodes/calibration/picture.hpp"
 #include "nodes/picture/image_file.hpp"
+#include "nodes/stereo/calibration_file.hpp"
 #include "nodes/stereo/rectification_monitor.hpp"
 
 namespace takt::command {

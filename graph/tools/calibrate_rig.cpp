@@ -8,6 +8,7 @@
 #include "graph/tools/calibrate_command.hpp"
 #include "hal/camera/rig.hpp"
 #include "hal/sim/simulation.hpp"
+#include "nodes/stereo/calibration_file.hpp"
 #include "nodes/stereo/rectify.hpp"
 #include "rt/msg/geometry.hpp"
 

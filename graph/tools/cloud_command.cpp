@@ -34,6 +34,7 @@ struct CloudReport {
   std::vector<StepReport> steps;
   size_t room = 0, lost = 0;  ///< of the result; points that found none
   cloud::Cloud result;
+  std::vector<std::string> left_out;
 };
 
 /// "0.2:10"; nothing if it is something else.
@@ -53,7 +54,8 @@ constexpr size_t kGrowth = 4;
 
 CloudReport filtered(const std::filesystem::path& file, const cloud::Cloud& cloud, const cloud::FilterSteps& steps) {
   const size_t room = std::min(kLargestCloud, kGrowth * cloud.points.size());
-  CloudReport report{file, cloud.points.size(), !cloud.colours.empty(), {}, room, 0, {}};
+  CloudReport report{file, cloud.points.size(), !cloud.colours.empty(), {}, room, 0, {}, cloud.left_out};
+  report.result.origin = cloud.origin;
   report.result.points.resize(room);
   if (report.coloured) report.result.colours.resize(room);
   cloud::CloudBuffer buffer(report.result.points, report.result.colours);
@@ -82,11 +84,17 @@ Json to_json(const CloudReport& report) {
           {"coloured", report.coloured},
           {"steps", steps},
           {"points_out", report.result.points.size()},
-          {"lost", report.lost}};
+          {"lost", report.lost},
+          {"origin", report.result.origin},
+          {"left_out", report.left_out}};
 }
 
 void print(const CloudReport& report) {
   std::printf("%s: %zu points%s\n", report.file.string().c_str(), report.points, report.coloured ? ", coloured" : "");
+  for (const std::string& left : report.left_out) std::printf("  %s\n", left.c_str());
+  if (const auto& origin = report.result.origin; origin != std::array<double, 3>{})
+    std::printf("  origin %.0f %.0f %.0f m: taken off, and added again where the cloud is written\n", origin[0],
+                origin[1], origin[2]);
   for (const StepReport& step : report.steps)
     std::printf("  %-12s %9zu points %9.2f ms%s\n", step.name.c_str(), step.points, step.ms,
                 step.unusable > 0 ? fmt::format("  {} not finite or too far away", step.unusable).c_str() : "");

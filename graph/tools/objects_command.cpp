@@ -20,6 +20,7 @@
 #include "nodes/object_detection/tuning.hpp"
 #include "nodes/picture/curves.hpp"
 #include "nodes/picture/image_file.hpp"
+#include "rt/image_file/image_file.hpp"
 #include "rt/msg/ace/detections.hpp"
 
 namespace takt::command {
@@ -33,11 +34,7 @@ using object_detection::Attribute, object_detection::CascadeReferences, object_d
 using object_detection::kHistogramStages, object_detection::learn_view, object_detection::make_scene,
     object_detection::publish_revision, object_detection::read_database;
 
-cv::Mat3b read_image(const std::filesystem::path& file) {
-  const cv::Mat image = cv::imread(file.string(), cv::IMREAD_COLOR);
-  if (image.empty()) throw std::runtime_error(file.string() + " cannot be read or is no image");
-  return image;
-}
+cv::Mat3b read_image(const std::filesystem::path& file) { return takt::read_image(file, Channels::colour); }
 
 ImageView<const uint8_t> view_of(const cv::Mat3b& image) { return {image.data, image.cols, image.rows, 3}; }
 

@@ -18,6 +18,8 @@
 namespace takt::can {
 namespace {
 
+static_assert(sizeof(canfd_frame) + 1 == sizeof(Reception::packet));
+
 constexpr std::string_view kUnix = "unix:";
 constexpr size_t kMostFilters = 32;
 
@@ -59,6 +61,7 @@ int Port::open_can(std::span<const uint32_t> ids) {
   if ((count > 0 && setsockopt(descriptor_, SOL_CAN_RAW, CAN_RAW_FILTER, filters.data(),
                                static_cast<socklen_t>(count * sizeof(can_filter))) != 0) ||
       !set(descriptor_, SOL_CAN_RAW, CAN_RAW_ERR_FILTER, every_error) ||
+      (fd_ && !set(descriptor_, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, 1)) ||
       !set(descriptor_, SOL_SOCKET, SO_TIMESTAMPNS, 1) || !set(descriptor_, SOL_SOCKET, SO_RXQ_OVFL, 1)) {
     return errno;
   }
@@ -117,8 +120,7 @@ Reception Port::receive() {
     reception.status = listener_ >= 0 ? PortStatus::nothing : PortStatus::gone;
     return reception;
   }
-  // One byte more than a frame has: a longer packet is seen to be longer.
-  std::array<uint8_t, sizeof(WireFrame) + 1> bytes;
+  auto& bytes = reception.packet;
   alignas(cmsghdr) std::array<uint8_t, CMSG_SPACE(sizeof(timespec)) + CMSG_SPACE(sizeof(uint32_t))> control;
   iovec part{bytes.data(), bytes.size()};
   msghdr message{};
@@ -152,7 +154,8 @@ Reception Port::receive() {
     std::memcpy(&stamp, CMSG_DATA(c), sizeof(stamp));
     reception.stamp_ns = stamp_of(to_ns(stamp));
   }
-  const auto frame = from_wire({bytes.data(), static_cast<size_t>(count)});
+  reception.packet_bytes = static_cast<size_t>(count);
+  const auto frame = from_wire({bytes.data(), reception.packet_bytes});
   reception.status = frame ? PortStatus::ok : PortStatus::malformed;
   if (frame) reception.frame = *frame;
   return reception;

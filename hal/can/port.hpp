@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <array>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -24,6 +25,10 @@ struct Reception {
   PortStatus status = PortStatus::nothing;
   Frame frame;
   int64_t stamp_ns = 0;  ///< when the kernel got it, on the runtime's clock
+  /// The packet as it came, whatever the status says of it: at most that of an FD frame and a byte more, by which a
+  /// longer one is seen to be longer.
+  std::array<uint8_t, 73> packet;
+  size_t packet_bytes = 0;
 };
 
 /// One end of a CAN bus: a raw socket of SocketCAN (`can0`), or, for tests and where the kernel has no CAN, a Unix
@@ -39,6 +44,8 @@ class Port {
   Port& operator=(const Port&) = delete;
 
   const std::string& interface() const { return interface_; }
+  /// Before open(): FD frames are received as well; receive() calls them malformed, `packet` has them.
+  void want_fd() { fd_ = true; }
   /// Only frames with these identifiers are received, at most 32, or every one if there are none; and all error frames.
   /// 0 or an errno. Open already: nothing changes.
   int open(std::span<const uint32_t> ids);
@@ -59,6 +66,7 @@ class Port {
   std::string interface_;
   const Clock& clock_;
   End end_;
+  bool fd_ = false;
   int descriptor_ = -1, listener_ = -1;
   uint64_t overflows_ = 0;
   uint32_t socket_overflows_ = 0;   ///< of the socket that is open, as the kernel counts them

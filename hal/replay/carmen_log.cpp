@@ -5,6 +5,7 @@
 #include <charconv>
 #include <cmath>
 #include <fstream>
+#include <map>
 #include <numbers>
 #include <optional>
 #include <string_view>
@@ -50,9 +51,18 @@ class Parser {
     for (std::string text; std::getline(in, text);) {
       ++line_;
       split(text, words_);
-      if (!words_.empty() && words_[0][0] != '#' && !message()) return tl::unexpected(*error_);
+      if (words_.empty() || words_[0][0] == '#') continue;
+      if (!in.eof()) {
+        if (!message()) return tl::unexpected(*error_);
+      } else if (!last_message()) {
+        return tl::unexpected(*error_);
+      }
     }
-    if (!settle_odometry(false) || !set_times()) return tl::unexpected(*error_);
+    if (!settle_odometry(false)) return tl::unexpected(*error_);
+    if (log_.odometry.empty()) use_scan_poses();
+    choose_times();
+    if (!set_times()) return tl::unexpected(*error_);
+    tell_rest();
     return std::move(log_);
   }
 
@@ -62,6 +72,7 @@ class Parser {
     Kind kind;
     int line;
     double time_s;
+    double sent_s;  ///< by the clock of who sent the message; NaN: not stated
   };
   /// An ODOM line whose meaning the next line decides.
   struct Pending {
@@ -69,7 +80,32 @@ class Parser {
     int line;
     double time_s;
     bool timed;  ///< time_s is a time
+    double sent_s;
   };
+
+  /// Of a last line without its end: its time is a part of one.
+  bool cut_off() const {
+    double time_s = 0;
+    return !entries_.empty() && parse_number(words_.back(), time_s) && entries_.back().time_s > time_s;
+  }
+  /// In a line without its end: what cannot be read is what a logger that was killed had not written yet.
+  bool last_message() {
+    if (!settle_odometry(words_[0] == "NEFF")) return false;
+    if (!cut_off() && message() && (!pending_ || pending_->timed)) return true;
+    error_.reset();
+    pending_.reset();
+    log_.range_m.resize(log_.scans.size() * log_.beams);
+    if (scan_poses_.size() > log_.scans.size()) scan_poses_.pop_back();
+    note("line " + std::to_string(line_) + " is cut off and left out");
+    return true;
+  }
+  void note(const std::string& what) { log_.left_out.push_back(file_.string() + ": " + what); }
+  double sent_s() const {
+    double time_s = 0;
+    return words_.size() >= kTrailer && parse_number(words_[words_.size() - kTrailer], time_s) && is_time(time_s)
+               ? time_s
+               : std::nan("");
+  }
 
   bool fail(int line, const std::string& what, std::string fix) {
     const std::string where = line > 0 ? file_.string() + ":" + std::to_string(line) : file_.string();
@@ -95,6 +131,15 @@ class Parser {
     return fail("word " + std::to_string(word + 1) + " of " + std::string(words_[0]) + " is `" +
                 std::string(words_[word]) + "`, no finite number");
   }
+  /// As number(); 0 for inf and NaN, which some writers have for no return.
+  bool range(size_t word, double& value) {
+    const std::string_view text = words_[word];
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (error != std::errc{} || end != text.data() + text.size() || std::isfinite(value)) return number(word, value);
+    value = 0;
+    ++no_numbers_;
+    return true;
+  }
   bool count(size_t word, uint32_t low, uint32_t high, uint32_t& value) {
     double parsed = 0;
     if (!number(word, parsed)) return false;
@@ -118,17 +163,23 @@ class Parser {
   bool message() {
     const std::string_view name = words_[0];
     if (!settle_odometry(name == "NEFF")) return false;
-    const bool ok = name == "ODOM"        ? odometry()
-                    : name == "FLASER"    ? flaser()
-                    : name == "RAWLASER1" ? rawlaser()
-                    : name == "PARAM"     ? parameter()
-                                          : true;
+    const bool ok = name == "ODOM"          ? odometry()
+                    : name == "FLASER"      ? flaser()
+                    : name == "RAWLASER1"   ? rawlaser(false)
+                    : name == "ROBOTLASER1" ? rawlaser(true)
+                    : name == "PARAM"       ? parameter()
+                                            : pass_over();
     after_scan_ = name == "FLASER" && name == scan_message_;
     return ok;
   }
 
+  bool pass_over() {
+    ++passed_over_[std::string(words_[0])];
+    return true;
+  }
+
   bool odometry() {
-    Pending line{{}, line_, 0, false};
+    Pending line{{}, line_, 0, false, sent_s()};
     if (!has_words(7 + kTrailer) || !pose(1, line.pose)) return false;
     line.timed = parse_number(words_.back(), line.time_s) && is_time(line.time_s);
     pending_ = line;
@@ -151,13 +202,13 @@ class Parser {
     if (!line.timed) return fail(line.line, "ODOM ends with no time", "delete the line, or record the log again");
     odometry_ = compose(logged_in_odometry_, line.pose);
     log_.odometry.push_back({0, odometry_});
-    entries_.push_back({Kind::odometry, line.line, line.time_s});
+    entries_.push_back({Kind::odometry, line.line, line.time_s, line.sent_s});
     return true;
   }
 
   bool flaser() {
     if (scan_message_.empty()) scan_message_ = words_[0];
-    if (scan_message_ != words_[0]) return true;
+    if (scan_message_ != words_[0]) return pass_over();
     uint32_t beams = 0;
     CarmenScan scan;
     if (words_.size() < 2) return fail("FLASER has no count of ranges");
@@ -165,18 +216,81 @@ class Parser {
     return geometry(beams, -kPi / 2, flaser_step(beams), kLmsRange_m) && pose(2 + beams, scan.logged) && add(scan, 2);
   }
 
-  bool rawlaser() {
+  /// RAWLASER1, or ROBOTLASER1, which has poses and limits behind it.
+  bool rawlaser(bool of_robot) {
+    constexpr size_t kPosesAndLimits = 11;
     if (scan_message_.empty()) scan_message_ = words_[0];
-    if (scan_message_ != words_[0]) return true;
-    if (words_.size() < 9) return fail("RAWLASER1 has no count of ranges");
+    if (scan_message_ != words_[0]) return pass_over();
+    const std::string name(words_[0]);
+    if (words_.size() < 9) return fail(name + " has no count of ranges");
     uint32_t beams = 0, remissions = 0;
     double first = 0, step = 0, range = 0;
     if (!number(2, first) || !number(4, step) || !number(5, range) || !count(8, kFewestBeams, kMostBeams, beams))
       return false;
-    if (step <= 0 || range <= 0) return fail("angular step and largest range of RAWLASER1 must be positive");
-    if (words_.size() <= 9 + beams) return fail("RAWLASER1 has fewer than " + std::to_string(beams) + " ranges");
-    if (!count(9 + beams, 0, kMostBeams, remissions) || !has_words(10 + beams + remissions + kTrailer)) return false;
-    return geometry(beams, first, step, range) && add({}, 9);
+    if (step <= 0 || range <= 0) return fail("angular step and largest range of " + name + " must be positive");
+    if (words_.size() <= 9 + beams) return fail(name + " has fewer than " + std::to_string(beams) + " ranges");
+    if (!count(9 + beams, 0, kMostBeams, remissions)) return false;
+    const size_t poses = 10 + beams + remissions;
+    CarmenScan scan;
+    if (!has_words(poses + (of_robot ? kPosesAndLimits : 0) + kTrailer) || !geometry(beams, first, step, range))
+      return false;
+    if (of_robot) {
+      PlanarPose robot;
+      if (!pose(poses, scan.logged) || !pose(poses + 3, robot)) return false;
+      if (log_.scans.empty() && log_.laser_ahead_m == 0) log_.laser_ahead_m = between(robot, scan.logged).x_m;
+      scan_poses_.push_back(robot);
+    }
+    return add(scan, 9);
+  }
+
+  /// The odometry of a log without lines ODOM.
+  void use_scan_poses() {
+    if (scan_poses_.empty() || scan_poses_.size() != log_.scans.size()) return;
+    std::vector<Entry> both;
+    for (size_t i = 0; i < entries_.size(); ++i) {
+      Entry odometry = entries_[i];
+      odometry.kind = Kind::odometry;
+      both.push_back(odometry);
+      both.push_back(entries_[i]);
+      log_.odometry.push_back({0, scan_poses_[i]});
+      log_.scans[i].odometry = scan_poses_[i];
+    }
+    entries_ = std::move(both);
+    note("has no ODOM lines; the poses of its " + std::to_string(scan_poses_.size()) +
+         " ROBOTLASER1 lines are the odometry");
+  }
+
+  /// The logger's times, unless those of the senders tell lines apart that have one time of the logger.
+  void choose_times() {
+    const auto distinct = [&](auto time_of) {
+      size_t count = 0;
+      for (size_t i = 1; i < entries_.size(); ++i) count += time_of(entries_[i]) > time_of(entries_[i - 1]) ? 1 : 0;
+      return count;
+    };
+    const size_t logged = distinct([](const Entry&e) { return e.time_s; }),
+                 sent = distinct([](const Entry&e) { return e.sent_s; });
+    const bool all =
+        std::all_of(entries_.begin(), entries_.end(), [](const Entry& e) { return !std::isnan(e.sent_s); });
+    if (!all || sent <= 2 * logged) return;
+    for (Entry& entry : entries_) entry.time_s = entry.sent_s;
+    note("the logger's times are coarse (" + std::to_string(logged + 1) + " for " + std::to_string(entries_.size()) +
+         " lines); those of the senders are used");
+  }
+
+  /// What was not taken as it is.
+  void tell_rest() {
+    if (log_.without_time > 0)
+      note(std::to_string(log_.without_time) + " of " + std::to_string(entries_.size()) +
+           " scans and ODOM lines are left out: they have no time of their own (the first that differs is " +
+           std::to_string(static_cast<double>(first_known_ns_) * 1e-9) + " s)");
+    if (log_.late_stamps > 0)
+      note(std::to_string(log_.late_stamps) + " times were stamped late, or too coarsely, and are spread evenly");
+    if (no_numbers_ > 0) note(std::to_string(no_numbers_) + " ranges are inf or NaN: no return");
+    if (passed_over_.empty()) return;
+    std::string others;
+    for (const auto& [name, count] : passed_over_)
+      others += (others.empty() ? "" : ", ") + std::to_string(count) + " " + name.substr(0, 40);
+    note("messages that are not read: " + others);
   }
 
   bool geometry(uint32_t beams, double first, double step, double range) {
@@ -197,17 +311,17 @@ class Parser {
     if (!number(words_.size() - 1, time_s)) return false;
     if (!is_time(time_s)) return fail("the logger's time is " + std::string(words_.back()) + " s");
     for (size_t i = 0; i < log_.beams; ++i) {
-      if (!number(first_range + i, range)) return false;
+      if (!this->range(first_range + i, range)) return false;
       log_.range_m.push_back(static_cast<float>(range));
     }
     scan.odometry = odometry_;
     log_.scans.push_back(scan);
-    entries_.push_back({Kind::scan, line_, time_s});
+    entries_.push_back({Kind::scan, line_, time_s, sent_s()});
     return true;
   }
 
   bool parameter() {
-    if (words_.size() < 3 || words_[1] != "robot_frontlaser_offset") return true;
+    if (words_.size() < 3 || words_[1] != "robot_frontlaser_offset") return pass_over();
     return number(2, log_.laser_ahead_m);
   }
 
@@ -229,6 +343,7 @@ class Parser {
     }
     const LineTimes lines = repair_late_stamps(seconds);
     log_.late_stamps = lines.late;
+    if (lines.first_known < lines.time_ns.size()) first_known_ns_ = lines.time_ns[lines.first_known];
     size_t odometry = 0, scan = 0, lost_odometry = 0, lost_scans = 0;
     for (size_t i = 0; i < entries_.size(); ++i) {
       const int64_t time_ns = lines.time_ns[instant_of[i]];
@@ -253,6 +368,10 @@ class Parser {
   CarmenLog log_;
   std::vector<Entry> entries_;
   std::string scan_message_;
+  std::vector<PlanarPose> scan_poses_;  ///< of the robot, from ROBOTLASER1
+  std::map<std::string, uint64_t> passed_over_;
+  uint64_t no_numbers_ = 0;
+  int64_t first_known_ns_ = 0;
   std::optional<Pending> pending_;
   bool after_scan_ = false, pending_repeats_scan_ = false;
   PlanarPose odometry_;            ///< newest

@@ -13,7 +13,7 @@ int64_t LogPace::stamp_ns(int64_t epoch_ns, int64_t log_ns) const {
 
 DeviceResult check_pace(const std::string& id, const std::filesystem::path& file, const LogPace& pace,
                         const std::string& what, std::optional<int64_t> first_ns) {
-  constexpr double kDay_s = 86'400.0;
+  constexpr double kPatience_s = 10.0;
   if (!(pace.speed >= 0.001 && pace.speed <= 1000.0))
     return device_error(id, "`speed` is " + std::to_string(pace.speed), "use 0.001 to 1000; 1 is as recorded");
   const double start_s = static_cast<double>(pace.start_ns) * 1e-9;
@@ -21,10 +21,10 @@ DeviceResult check_pace(const std::string& id, const std::filesystem::path& file
     return device_error(id, file.string() + ": no " + what + " at or after " + std::to_string(start_s) + " s",
                         "choose another log, or an earlier `start`");
   const double wait_s = static_cast<double>(*first_ns - pace.start_ns) * 1e-9;
-  if (wait_s / pace.speed > kDay_s)
+  if (wait_s / pace.speed > kPatience_s)
     return device_error(
         id, file.string() + ": the first " + what + " comes " + std::to_string(wait_s) + " s of the log after `start`",
-        "add `start: " + std::to_string(start_s + wait_s) + "s`");
+        "add `start: " + std::to_string(start_s + wait_s) + "s` (the same for all devices of the log)");
   return {};
 }
 

@@ -20,7 +20,7 @@ struct LogPace {
   int64_t in_run_ns(int64_t log_ns) const { return stamp_ns(0, start_ns + log_ns); }
 };
 
-/// Refuses a speed out of range, and a start that leaves nothing or makes a run wait for more than a day. `what` is
+/// Refuses a speed out of range, and a start that leaves nothing or makes a run wait for more than 10 s. `what` is
 /// wanted of the log ("scan"), `first_ns` the time of the first one at or after the start.
 DeviceResult check_pace(const std::string& device_id, const std::filesystem::path& file, const LogPace& pace,
                         const std::string& what, std::optional<int64_t> first_ns);

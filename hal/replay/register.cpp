@@ -27,6 +27,8 @@ NodeResult make_replay_camera(const DeviceConfig& config, Settings& settings, De
   camera.shrink = static_cast<int>(settings.count("shrink", 1, 1, 16));
   camera.channels = static_cast<int>(settings.count("channels", 0, 0, 3));
   if (camera.channels == 2) settings.fail("setting `channels` is 2", "use 1 (grey) or 3 (BGR)");
+  camera.bits = static_cast<int>(settings.count("bits", 0, 0, 16));
+  if (camera.bits > 0 && camera.bits < 8) settings.fail("setting `bits` is below 8", "give 8 to 16, or leave it out");
   camera.rate = rate_of(settings);
   std::unique_ptr<StereoCamera> device = std::make_unique<replay::ReplayCamera>(config.id, camera, clock);
   return opened<StereoCameraNode>(std::move(device), settings, thresholds_of(settings));
@@ -69,7 +71,8 @@ void register_replay(DeviceTypes& types) {
       {
           {"rig", "replay", path, false, "ignored: the recording brings its calibration"},
           {"directory", "replay", path, false,
-           "KITTI layout (image_l/, image_r/, calib.txt, times.txt), or a Middlebury pair (im2, im6 ...)"},
+           "image_l/, image_r/, calib.txt, times.txt, or a recording of KITTI odometry, KITTI raw, EuRoC or "
+           "Middlebury"},
           {"left", "replay", path, false, "left image of a single pair"},
           {"right", "replay", path, false, "right image of a single pair"},
           {"focal", "replay", number, false, "focal length of the single pair, px"},
@@ -79,6 +82,7 @@ void register_replay(DeviceTypes& types) {
           {"frames", "replay", count, false, "how often the single pair is delivered; 1"},
           {"shrink", "replay", count, false, "images are made smaller by this whole factor when they are loaded; 1"},
           {"channels", "replay", count, false, "1 grey, 3 BGR; as the files"},
+          {"bits", "replay", count, false, "bits that count in 16-bit images, 8 to 16; as the file says"},
       });
   types.add("laser_scanner", {"replay", "the scans of a CARMEN log", make_replay_laser, DriverSort::recorded},
             {

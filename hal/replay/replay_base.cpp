@@ -42,6 +42,12 @@ DeviceResult ReplayBase::open() {
   if (open_) return {};
   const auto log = load_carmen_log(id_, settings_.log);
   if (!log) return tl::unexpected(log.error());
+  if (log->odometry.empty())
+    return device_error(
+        id_,
+        settings_.log.string() + ": holds no ODOM line" + (log->left_out.empty() ? "" : "\n  " + log->left_out.back()),
+        "choose a log with ODOM or ROBOTLASER1");
+  left_out_ = log->left_out;
   readings_ = readings_of(log->odometry, settings_.pace.speed);
   std::erase_if(readings_, [this](const BaseReading& r) { return r.stamp_ns < settings_.pace.start_ns; });
   const auto usable = check_pace(id_, settings_.log, settings_.pace, "ODOM line",

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "hal/base/mobile_base.hpp"
+#include "hal/reads_files.hpp"
 #include "hal/replay/log_pace.hpp"
 
 namespace takt::replay {
@@ -16,7 +17,7 @@ struct ReplayBaseSettings {
 /// there is no newer one. Speeds are the movement since the newest line that is at least kDifference_s of the log
 /// older, over the time of the run that lies between; limits() are the largest that occur. Commands are refused. After
 /// the last line of the log: end_of_data.
-class ReplayBase final : public MobileBase {
+class ReplayBase final : public MobileBase, public ReadsFiles {
  public:
   /// Long enough for stamps that jitter by tens of milliseconds, short against what a base takes to change its speed.
   static constexpr double kDifference_s = 0.25;
@@ -32,7 +33,10 @@ class ReplayBase final : public MobileBase {
   BaseReading read(int64_t wanted_ns, int64_t deadline_ns) override;
   bool command(double, double, int64_t) override { return false; }
 
+  std::vector<std::string> left_out() const override { return left_out_; }
+
  private:
+  std::vector<std::string> left_out_;
   void find_limits();
 
   std::string id_;

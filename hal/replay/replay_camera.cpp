@@ -3,9 +3,10 @@
 
 #include <algorithm>
 #include <cstring>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "hal/replay/recording_layout.hpp"
+#include "rt/image_file/image_file.hpp"
 #include "rt/msg/image.hpp"
 
 namespace takt::replay {
@@ -18,9 +19,14 @@ void copy(const cv::Mat& from, ImageView<uint8_t> to) {
   for (int y = 0; y < to.height; ++y) std::memcpy(to.row(y), from.ptr(y), row);
 }
 
-cv::Mat decode(const std::filesystem::path& file, int channels, int shrink) {
-  const int mode = channels == 1 ? cv::IMREAD_GRAYSCALE : channels == 3 ? cv::IMREAD_COLOR : cv::IMREAD_ANYCOLOR;
-  cv::Mat image = cv::imread(file.string(), mode);
+/// Throws ImageError.
+cv::Mat decode(const std::filesystem::path& file, int channels, const ReplayCameraSettings& settings) {
+  const int shrink = settings.shrink;
+  cv::Mat image = read_image(file,
+                             channels == 1   ? Channels::grey
+                             : channels == 3 ? Channels::colour
+                                             : Channels::as_file,
+                             settings.bits);
   if (shrink == 1 || image.cols < shrink || image.rows < shrink) return image;
   cv::Mat small;
   // Whole blocks only, so that a pixel of the small image is the mean of shrink x shrink pixels.
@@ -69,6 +75,12 @@ DeviceResult ReplayCamera::find_files() {
       pair && !std::filesystem::exists(settings_.directory / "image_l")) {
     settings_.left = pair->first;
     settings_.right = pair->second;
+    std::vector<std::string> left_out;
+    if (const auto camera = middlebury_camera(settings_.directory / "calib.txt", left_out);
+        camera && settings_.camera.focal_px == 0) {
+      settings_.camera = *camera;
+      files_.left_out = std::move(left_out);
+    }
     settings_.directory.clear();
   }
   if (!settings_.directory.empty()) {
@@ -85,7 +97,7 @@ DeviceResult ReplayCamera::find_files() {
     return device_error(id_, "`focal` (px) and `baseline` (m) of the pair must be positive",
                         "give both; they belong to the calibration of the images");
   }
-  files_ = StereoFiles{{settings_.left}, {settings_.right}, {}, settings_.camera};
+  files_ = StereoFiles{{settings_.left}, {settings_.right}, {}, settings_.camera, true, std::move(files_.left_out)};
   return {};
 }
 
@@ -110,10 +122,10 @@ DeviceResult ReplayCamera::decode_all() {
     cv::Mat pair[2];
     for (int side = 0; side < 2; ++side) {
       const auto& file = side == 0 ? files_.left[i] : files_.right[i];
-      pair[side] = decode(file, channels, settings_.shrink);
-      if (pair[side].empty() || pair[side].depth() != CV_8U) {
-        return device_error(id_, file.string() + ": cannot be decoded as an 8-bit image",
-                            "record or copy the file again");
+      try {
+        pair[side] = decode(file, channels, settings_);
+      } catch (const ImageError& problem) {
+        return device_error(id_, problem.what(), "correct the setting or the file, or record it again");
       }
       if (i == 0 && side == 0) {
         size = pair[0].size();
@@ -134,9 +146,12 @@ DeviceResult ReplayCamera::decode_all() {
     }
   }
   const bool centre_given = files_.camera.cu_px != 0 || files_.camera.cv_px != 0;
-  format_ = {size.width, size.height, channels, true, shrunk(files_.camera, settings_.shrink), settings_.rate.hz(), {}};
+  format_ = {size.width,          size.height, channels, files_.rectified, shrunk(files_.camera, settings_.shrink),
+             settings_.rate.hz(), {}};
   // A single pair names the centre of its image unless told otherwise.
-  if (!centre_given) {
+  if (!files_.rectified) {
+    format_.camera = {};
+  } else if (!centre_given) {
     format_.camera.cu_px = (size.width - 1) / 2.0;
     format_.camera.cv_px = (size.height - 1) / 2.0;
   }
@@ -191,8 +206,12 @@ StereoFrame ReplayCamera::read(ImageView<uint8_t> left, ImageView<uint8_t> right
   cv::Mat decoded[2] = {store_->left[index], store_->right[index]};
   if (decoded[0].empty()) {
     // Larger than memory_limit: the price is a file read and an allocation in the job, as the settings allow.
-    decoded[0] = decode(files_.left[index], format_.channels, settings_.shrink);
-    decoded[1] = decode(files_.right[index], format_.channels, settings_.shrink);
+    try {
+      decoded[0] = decode(files_.left[index], format_.channels, settings_);
+      decoded[1] = decode(files_.right[index], format_.channels, settings_);
+    } catch (const ImageError&) {
+      decoded[0] = cv::Mat();  // the frame is partial
+    }
   }
   frame.frame_number = static_cast<uint32_t>(next_);
   frame.stamp_ns = stamp_of(next_++);

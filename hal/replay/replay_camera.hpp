@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "hal/camera/stereo_camera.hpp"
+#include "hal/reads_files.hpp"
 #include "hal/replay/stereo_files.hpp"
 #include "rt/msg/geometry.hpp"
 #include "rt/time/clock.hpp"
@@ -17,6 +18,7 @@ struct ReplayCameraSettings {
   int64_t frames = 1;
   int shrink = 1;                        ///< 1..16: images become smaller by this factor, the camera model with them
   int channels = 0;                      ///< 0: as the files; 1 or 3: converted
+  int bits = 0;                          ///< of images of more than 8 bits; 0: as the file says (read_image())
   Rate rate{15, 1};                      ///< where no times.txt tells the stamps
   uint64_t memory_limit = 512ull << 20;  ///< decoded frames up to this size are held in memory from open() on
 };
@@ -25,7 +27,7 @@ struct ReplayCameraSettings {
 /// trigger(t) asks for the next frame and is its exposure's instant only as a release: frames are never skipped, each
 /// trigger delivers the next one with its recorded stamp. Nobody triggers: a frame is delivered once the clock has
 /// reached its stamp. After the last frame: end_of_data.
-class ReplayCamera final : public StereoCamera {
+class ReplayCamera final : public StereoCamera, public ReadsFiles {
  public:
   ReplayCamera(std::string id, ReplayCameraSettings settings, const Clock& clock);
   ~ReplayCamera() override;
@@ -41,6 +43,7 @@ class ReplayCamera final : public StereoCamera {
   void trigger(int64_t at_ns) override;
   StereoFrame read(ImageView<uint8_t> left, ImageView<uint8_t> right, int64_t deadline_ns) override;
   int64_t frames() const { return frames_; }
+  std::vector<std::string> left_out() const override { return files_.left_out; }
 
  private:
   struct Store;

@@ -11,6 +11,11 @@ DeviceResult ReplayLaser::open() {
   if (open_) return {};
   auto log = load_carmen_log(id_, settings_.log);
   if (!log) return tl::unexpected(log.error());
+  if (log->scans.empty())
+    return device_error(
+        id_, settings_.log.string() + ": holds no scan" + (log->left_out.empty() ? "" : "\n  " + log->left_out.back()),
+        "choose a log with FLASER, RAWLASER1 or ROBOTLASER1");
+  left_out_ = log->left_out;
   const auto first = std::find_if(log->scans.begin(), log->scans.end(),
                                   [this](const CarmenScan& scan) { return scan.time_ns >= settings_.pace.start_ns; });
   const bool any = first != log->scans.end();

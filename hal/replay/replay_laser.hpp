@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "hal/laser/laser_scanner.hpp"
+#include "hal/reads_files.hpp"
 #include "hal/replay/log_pace.hpp"
 #include "rt/msg/geometry.hpp"
 
@@ -19,7 +20,7 @@ struct ReplayLaserSettings {
 /// The front laser scanner of a recorded drive. A read delivers the newest scan at or before the wanted instant that
 /// was not delivered yet; scan_number is its place in the log, so that a gap is a scan that nobody read in time. A log
 /// stamps a scan as a whole: sweep_s is 0. After the last line of the log: end_of_data.
-class ReplayLaser final : public LaserScanner {
+class ReplayLaser final : public LaserScanner, public ReadsFiles {
  public:
   ReplayLaser(std::string id, ReplayLaserSettings settings) : id_(std::move(id)), settings_(std::move(settings)) {}
   DeviceResult open() override;
@@ -31,7 +32,10 @@ class ReplayLaser final : public LaserScanner {
   /// Scans from the start of the replay to the end of the log.
   size_t scans() const { return time_ns_.size(); }
 
+  std::vector<std::string> left_out() const override { return left_out_; }
+
  private:
+  std::vector<std::string> left_out_;
   std::string id_;
   ReplayLaserSettings settings_;
   ScanFormat format_;

@@ -7,34 +7,28 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
+#include <map>
 #include <sstream>
+
+#include "hal/replay/frame_times.hpp"
+#include "hal/replay/recording_layout.hpp"
+#include "rt/image_file/image_list.hpp"
 
 namespace takt::replay {
 namespace {
 
 namespace fs = std::filesystem;
 
-bool is_image(const fs::path& file) {
-  std::string extension = file.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](char c) { return static_cast<char>(std::tolower(static_cast<unsigned char>(c))); });
-  return extension == ".png" || extension == ".jpg" || extension == ".jpeg" || extension == ".pgm" ||
-         extension == ".ppm";
-}
-
-tl::expected<std::vector<fs::path>, DeviceError> images(const std::string& id, const fs::path& directory) {
-  std::error_code failed;
-  std::vector<fs::path> found;
-  for (fs::directory_iterator it(directory, failed), end; !failed && it != end; it.increment(failed)) {
-    if (is_image(it->path())) found.push_back(it->path());
+tl::expected<ImageList, DeviceError> images(const std::string& id, const fs::path& directory) {
+  try {
+    ImageList list = list_images(directory);
+    if (!list.files.empty()) return list;
+    return device_error(id, directory.string() + ": holds no image (PNG, JPEG, PGM, PPM, BMP, TIFF)",
+                        "put the frames there, numbered in order");
+  } catch (const fs::filesystem_error& failed) {
+    return device_error(id, directory.string() + ": " + failed.code().message(),
+                        "the recording needs image_l/ and image_r/");
   }
-  if (failed)
-    return device_error(id, directory.string() + ": " + failed.message(), "the recording needs image_l/ and image_r/");
-  if (found.empty())
-    return device_error(id, directory.string() + ": holds no PNG, JPEG, PGM or PPM image",
-                        "put the frames there, named in order");
-  std::sort(found.begin(), found.end());
-  return found;
 }
 
 bool parse_number(const std::string& word, double& value) {
@@ -48,19 +42,21 @@ struct Projection {
   bool found = false;
 };
 
-tl::expected<CameraModel, DeviceError> read_calibration(const std::string& id, const fs::path& file) {
+tl::expected<CameraModel, DeviceError> read_calibration(const std::string& id, const RecordingLayout& layout) {
+  const fs::path& file = layout.calibration;
+  const std::string &left = layout.left_row, &right = layout.right_row;
   std::ifstream in(file);
   if (!in)
     return device_error(id, file.string() + ": cannot be opened",
-                        "the recording needs calib.txt with rows P0: and P1:");
+                        "the recording needs it, with rows " + left + " and " + right);
   std::array<Projection, 2> camera;
   std::string line;
   for (int number = 1; std::getline(in, line); ++number) {
     std::istringstream words(line);
     std::string key, word;
     words >> key;
-    if (key != "P0:" && key != "P1:") continue;
-    Projection& row = camera[key == "P0:" ? 0 : 1];
+    if (key != left && key != right) continue;
+    Projection& row = camera[key == left ? 0 : 1];
     size_t count = 0;
     while (words >> word) {
       double value = 0;
@@ -89,42 +85,60 @@ tl::expected<CameraModel, DeviceError> read_calibration(const std::string& id, c
   }
   for (size_t i = 0; i < 2; ++i) {
     if (!camera[i].found)
-      return device_error(id, file.string() + ": no row P" + std::to_string(i) + ":",
+      return device_error(id, file.string() + ": no row " + (i == 0 ? left : right),
                           "add it: twelve numbers, row-major");
   }
   const double baseline = (camera[0].p[3] - camera[1].p[3]) / camera[0].p[0];
   if (baseline <= 0) {
     return device_error(id, file.string() + ": the baseline is " + std::to_string(baseline) + " m",
-                        "swap left and right, or correct P1(0,3) = -f B");
+                        "swap left and right, or correct " + right + " (0,3) = -f B");
   }
   return CameraModel{camera[0].p[0], camera[0].p[2], camera[0].p[6], baseline};
 }
 
-tl::expected<std::vector<int64_t>, DeviceError> read_times(const std::string& id, const fs::path& file, size_t frames) {
-  std::vector<int64_t> stamps;
-  std::ifstream in(file);
-  std::string line;
-  double first = 0;
-  for (int number = 1; std::getline(in, line); ++number) {
-    while (!line.empty() && std::isspace(static_cast<unsigned char>(line.back()))) line.pop_back();
-    if (line.empty()) continue;
-    double seconds = 0;
-    if (!parse_number(line, seconds))
-      return device_error(id, file.string() + ":" + std::to_string(number) + ": `" + line + "` is no number",
-                          "one time in seconds a line");
-    if (stamps.empty()) first = seconds;
-    const int64_t stamp = std::llround((seconds - first) * 1e9);
-    if (!stamps.empty() && stamp <= stamps.back())
-      return device_error(id, file.string() + ":" + std::to_string(number) + ": time does not rise",
-                          "sort the recording");
-    stamps.push_back(stamp);
+DeviceResult check_pairs(const std::string& id, const StereoFiles& files) {
+  const auto folder = [](const std::vector<fs::path>& side) { return side.front().parent_path().string(); };
+  if (files.left.size() != files.right.size())
+    return device_error(id,
+                        folder(files.left) + " holds " + std::to_string(files.left.size()) + " images, " +
+                            folder(files.right) + " " + std::to_string(files.right.size()),
+                        "complete the recording: each left image needs its right one");
+  for (size_t i = 0; i < files.left.size(); ++i)
+    if (files.left[i].stem() != files.right[i].stem())
+      return device_error(id, files.left[i].string() + ": its partner is " + files.right[i].string(),
+                          "name both images of a pair alike");
+  return {};
+}
+
+/// Images whose names are their times, in ns: those that have a partner. The others are counted.
+DeviceResult pair_by_time(const std::string& id, StereoFiles& files) {
+  std::map<std::string, fs::path> right;
+  for (const fs::path& file : files.right) right[file.stem().string()] = file;
+  StereoFiles paired;
+  int64_t first_ns = 0;
+  for (const fs::path& file : files.left) {
+    const std::string stem = file.stem().string();
+    const auto partner = right.find(stem);
+    if (partner == right.end()) continue;
+    int64_t ns = 0;
+    const auto [end, error] = std::from_chars(stem.data(), stem.data() + stem.size(), ns);
+    if (error != std::errc{} || end != stem.data() + stem.size())
+      return device_error(id, file.string() + ": its name is no time in ns", "name the images as EuRoC does");
+    if (paired.left.empty()) first_ns = ns;
+    paired.left.push_back(file);
+    paired.right.push_back(partner->second);
+    paired.stamp_ns.push_back(ns - first_ns);
   }
-  if (stamps.size() != frames) {
-    return device_error(
-        id, file.string() + ": " + std::to_string(stamps.size()) + " times for " + std::to_string(frames) + " frames",
-        "one line per frame, or delete the file and give `rate`");
-  }
-  return stamps;
+  if (paired.left.empty())
+    return device_error(id, files.left.front().parent_path().string() + ": no image has a partner of its name",
+                        "copy both cameras of one recording");
+  const size_t alone = files.left.size() + files.right.size() - 2 * paired.left.size();
+  if (alone > 0)
+    files.left_out.push_back(files.left.front().parent_path().string() + ": " + std::to_string(alone) +
+                             " images of one camera are left out: the other one has none of that time");
+  files.left = std::move(paired.left), files.right = std::move(paired.right),
+  files.stamp_ns = std::move(paired.stamp_ns);
+  return {};
 }
 
 }  // namespace
@@ -133,28 +147,37 @@ tl::expected<StereoFiles, DeviceError> list_directory(const std::string& id, con
   if (!fs::is_directory(directory))
     return device_error(id, directory.string() + ": no such directory",
                         "correct `directory`; a ${TAKT_DATA} in it is expanded");
-  auto left = images(id, directory / "image_l"), right = images(id, directory / "image_r");
+  if (is_rgbd(directory))
+    return device_error(id, directory.string() + ": a TUM RGB-D recording has colour and depth of one camera, no pairs",
+                        "use a recording of two cameras; takt eval mapping --data reads depth images");
+  const auto layout = find_layout(directory);
+  if (!layout)
+    return device_error(
+        id, directory.string() + ": is no recording of stereo pairs",
+        "known are image_l/ and image_r/, KITTI odometry (image_0/ ...), KITTI raw (image_00/data/ ...), "
+        "EuRoC (mav0/cam0/data/ ...) and Middlebury (im0.png ...)");
+  auto left = images(id, layout->left), right = images(id, layout->right);
   if (!left) return tl::unexpected(left.error());
   if (!right) return tl::unexpected(right.error());
-  if (left->size() != right->size()) {
-    return device_error(id,
-                        directory.string() + ": image_l holds " + std::to_string(left->size()) + " images, image_r " +
-                            std::to_string(right->size()),
-                        "complete the recording: each left image needs its right one");
+  StereoFiles files;
+  files.left_out = layout->left_out;
+  for (const auto& [side, list] : {std::pair(&layout->left, &*left), std::pair(&layout->right, &*right)})
+    if (std::string text = left_out_text(*side, *list); !text.empty()) files.left_out.push_back(std::move(text));
+  files.left = std::move(left->files);
+  files.right = std::move(right->files);
+  if (const auto paired = layout->times.empty() ? pair_by_time(id, files) : check_pairs(id, files); !paired)
+    return tl::unexpected(paired.error());
+  files.rectified = !layout->calibration.empty();
+  if (files.rectified) {
+    auto camera = read_calibration(id, *layout);
+    if (!camera) return tl::unexpected(camera.error());
+    files.camera = *camera;
   }
-  for (size_t i = 0; i < left->size(); ++i) {
-    if ((*left)[i].stem() != (*right)[i].stem()) {
-      return device_error(id, (*left)[i].string() + ": its partner is " + (*right)[i].string(),
-                          "name both images of a pair alike");
-    }
-  }
-  auto camera = read_calibration(id, directory / "calib.txt");
-  if (!camera) return tl::unexpected(camera.error());
-  StereoFiles files{std::move(*left), std::move(*right), {}, *camera};
-  if (fs::exists(directory / "times.txt")) {
-    auto stamps = read_times(id, directory / "times.txt", files.left.size());
-    if (!stamps) return tl::unexpected(stamps.error());
-    files.stamp_ns = std::move(*stamps);
+  if (!layout->times.empty() && fs::exists(layout->times)) {
+    auto times = read_frame_times(id, layout->times, files.left.size());
+    if (!times) return tl::unexpected(times.error());
+    files.stamp_ns = std::move(times->stamp_ns);
+    if (!times->note.empty()) files.left_out.push_back(std::move(times->note));
   }
   return files;
 }
@@ -190,8 +213,10 @@ tl::expected<void, std::string> check_complete(const fs::path& file) {
   } else if (head[0] == 0xFF && head[1] == 0xD8) {
     if (tail(64).find("\xFF\xD9") == std::string::npos)
       return tl::unexpected(std::string("is a truncated JPEG (no end marker)"));
-  } else if (head[0] != 'P' || head[1] < '2' || head[1] > '6') {
-    return tl::unexpected(std::string("is no PNG, JPEG, PGM or PPM image"));
+  } else if (const std::string_view start(reinterpret_cast<const char*>(head.data()), 4);
+             (head[0] != 'P' || head[1] < '2' || head[1] > '6') && !start.starts_with("BM") &&
+             start != std::string_view("II*\0", 4) && start != std::string_view("MM\0*", 4)) {
+    return tl::unexpected(std::string("is no PNG, JPEG, PGM, PPM, BMP or TIFF image"));
   }
   return {};
 }

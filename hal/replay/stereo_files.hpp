@@ -17,10 +17,13 @@ struct StereoFiles {
   std::vector<std::filesystem::path> left, right;
   std::vector<int64_t> stamp_ns;  ///< since the first frame; empty without times.txt
   CameraModel camera;             ///< zero: not rectified or unknown
+  bool rectified = true;
+  std::vector<std::string> left_out;  ///< see ReadsFiles
 };
 
-/// KITTI layout: image_l/ and image_r/ (sorted by name, same number and same names), calib.txt with rows P0 and P1 (3 x
-/// 4, row-major; P1(0,3) = -f B), times.txt optional (seconds, one a line, rising).
+/// A recording as find_layout() knows them. Takt's own form, as an example: image_l/ and image_r/ (in numeric order,
+/// same number and same names), calib.txt with rows P0 and P1 (3 x 4, row-major; P1(0,3) = -f B), times.txt optional
+/// (read_frame_times()).
 tl::expected<StereoFiles, DeviceError> list_directory(const std::string& device_id,
                                                       const std::filesystem::path& directory);
 
@@ -29,8 +32,8 @@ tl::expected<StereoFiles, DeviceError> list_directory(const std::string& device_
 std::optional<std::pair<std::filesystem::path, std::filesystem::path>> middlebury_pair(
     const std::filesystem::path& directory);
 
-/// Refuses files that are not complete PNG (ends with IEND), JPEG (ends with EOI), PGM or PPM images; looks at the
-/// first and last bytes only.
+/// Refuses files that are not complete PNG (ends with IEND), JPEG (ends with EOI), PGM, PPM, BMP or TIFF images; looks
+/// at the first and last bytes only.
 tl::expected<void, std::string> check_complete(const std::filesystem::path& file);
 
 }  // namespace takt::replay

@@ -4,10 +4,11 @@
 #include <fmt/format.h>
 
 #include <map>
-#include <opencv2/imgcodecs.hpp>
 #include <optional>
 #include <stdexcept>
 #include <string_view>
+
+#include "rt/image_file/image_file.hpp"
 
 namespace takt::calibration {
 namespace {
@@ -74,8 +75,12 @@ std::vector<GreyPair> read_pairs(const std::vector<ImagePair>& files) {
   std::vector<GreyPair> pairs;
   cv::Size size;
   const auto read = [&](const fs::path& file) {
-    cv::Mat image = cv::imread(file.string(), cv::IMREAD_GRAYSCALE);
-    if (image.empty()) refuse(fmt::format("{}: cannot be read or decoded", file.string()));
+    cv::Mat image;
+    try {
+      image = read_image(file, Channels::grey);
+    } catch (const ImageError& problem) {
+      refuse(problem.what());
+    }
     if (size.empty()) size = image.size();
     if (image.size() != size)
       refuse(fmt::format("{}: {} x {} px, but {} has {} x {}; all images must be of one size", file.string(),

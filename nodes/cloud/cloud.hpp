@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Point clouds as plain data: what the operations of this room read and fill.
 #pragma once
+#include <array>
 #include <cmath>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "rt/msg/point.hpp"
@@ -21,6 +23,7 @@ inline bool usable(const Point& p, float farthest_m = kFarthest_m) {
 struct CloudView {
   std::span<const Point> points;
   std::span<const Colour> colours;
+  std::array<double, 3> origin{};  ///< m, what is to be added to each point
   bool coloured() const { return colours.size() == points.size(); }
 };
 
@@ -28,7 +31,10 @@ struct CloudView {
 struct Cloud {
   std::vector<Point> points;
   std::vector<Colour> colours;
-  CloudView view() const { return {points, colours}; }
+  /// m, what is to be added to each point: of a file whose coordinates (UTM, say) a float would round to decimetres.
+  std::array<double, 3> origin{};
+  std::vector<std::string> left_out{};  ///< what was not taken from its file, a sentence each
+  CloudView view() const { return {points, colours, origin}; }
 };
 
 /// A cloud to fill, in memory of a fixed size. Points that no longer fit are counted, not written.
@@ -56,7 +62,7 @@ class CloudBuffer {
   size_t lost() const { return lost_; }
   std::span<Point> points() { return points_.first(size_); }
   std::span<Colour> colours() { return colours_.empty() ? colours_ : colours_.first(size_); }
-  CloudView view() const { return {points_.first(size_), colours_.empty() ? colours_ : colours_.first(size_)}; }
+  CloudView view() const { return {points_.first(size_), colours_.empty() ? colours_ : colours_.first(size_), {}}; }
 
  private:
   std::span<Point> points_;

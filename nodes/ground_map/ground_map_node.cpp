@@ -14,6 +14,7 @@
 #include "nodes/ground_map/terrain_file.hpp"
 #include "nodes/mapping_3d/head_at.hpp"
 #include "nodes/mapping_3d/pose.hpp"
+#include "nodes/stereo/calibration_file.hpp"
 #include "nodes/stereo/rectify.hpp"
 #include "rt/msg/ace/head.hpp"
 #include "rt/msg/ace/terrain.hpp"

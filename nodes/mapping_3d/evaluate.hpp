@@ -40,7 +40,8 @@ FusionEvaluation evaluate_generated(const FusionRuns& runs);
 /// Recorded depth images with poses (depth/1.png .., pose.txt): each in turn is left out, and what the others say of
 /// its view is held against it. The single view is the one that sees most of it. All get the noise of a stereo camera
 /// first. Throws std::runtime_error naming the file.
-FusionEvaluation evaluate_recorded(const std::filesystem::path& folder, uint64_t seed);
+FusionEvaluation evaluate_recorded(const std::filesystem::path& folder, uint64_t seed,
+                                   std::vector<std::string>& left_out);
 
 /// What a map keeps of what was seen, and how true it is.
 struct MapFigures {

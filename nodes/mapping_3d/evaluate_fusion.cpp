@@ -151,8 +151,9 @@ FusionEvaluation evaluate_generated(const FusionRuns& runs) {
   return comparison.result();
 }
 
-FusionEvaluation evaluate_recorded(const std::filesystem::path& folder, uint64_t seed) {
-  const std::vector<RecordedView> recorded = read_recorded_views(folder);
+FusionEvaluation evaluate_recorded(const std::filesystem::path& folder, uint64_t seed,
+                                   std::vector<std::string>& left_out) {
+  const std::vector<RecordedView> recorded = read_recorded_views(folder, left_out);
   Lot lot(seed, 0);
   std::vector<std::vector<float>> noisy;
   for (const RecordedView& view : recorded) noisy.push_back(with_stereo_noise(view, lot));

@@ -10,6 +10,7 @@
 
 #include "nodes/picture/image_file.hpp"
 #include "rt/file/input_file.hpp"
+#include "rt/image_file/image_file.hpp"
 
 namespace takt::mapping_3d {
 namespace {
@@ -64,8 +65,7 @@ GridMap parse(const std::filesystem::path& path) {
   if (!(meaning.free_below < meaning.occupied_above))
     throw std::runtime_error("free_thresh must lie below occupied_thresh");
   const std::filesystem::path picture = path.parent_path() / value<std::string>(file, "image", "file name");
-  const cv::Mat image = cv::imread(picture.string(), cv::IMREAD_GRAYSCALE);
-  if (image.empty()) throw std::runtime_error("image " + picture.string() + " cannot be read");
+  const cv::Mat image = read_image(picture, Channels::grey);
   map.width = image.cols, map.height = image.rows;
   map.cells.reserve(static_cast<size_t>(image.cols) * static_cast<size_t>(image.rows));
   for (int y = image.rows; y-- > 0;)

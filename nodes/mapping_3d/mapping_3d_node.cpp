@@ -146,8 +146,10 @@ class MappingNode final : public Node {
     p.map.tiles = static_cast<size_t>(tiles_());
     mapper_.emplace(p, cloud_.capacity().count);
     if (!load_().empty()) {
-      const auto cloud = cloud::read_cloud(read(load_));
+      auto cloud = cloud::read_cloud(read(load_));
       if (!cloud) throw SetupError("load: " + cloud.error());
+      if (const std::string rounded = cloud::add_origin(*cloud); !rounded.empty())
+        throw SetupError("load: " + rounded + "; take an offset off, the map is in the robot's frame");
       mapper_->load(cloud->view());
     }
     fused_cloud_.reserve(cloud_.capacity());

@@ -3,11 +3,11 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <map>
-#include <opencv2/imgcodecs.hpp>
 #include <set>
 #include <stdexcept>
 
 #include "nodes/object_3d/evaluate.hpp"
+#include "rt/image_file/image_file.hpp"
 #include "rt/msg/geometry.hpp"
 #include "rt/msg/point.hpp"
 #include "rt/time/clock.hpp"
@@ -19,12 +19,6 @@ namespace {
 const CameraModel kKinect{525, 319.5, 239.5, 0.075};
 constexpr int kTableLabels = 9, kLabelsPerObject = 10;
 constexpr double kTable_m = 0.75;
-
-cv::Mat read(const std::filesystem::path& file, int flags) {
-  cv::Mat image = cv::imread(file.string(), flags);
-  if (image.empty()) throw std::runtime_error(file.string() + ": cannot be read or is no image");
-  return image;
-}
 
 struct Recording {
   std::vector<Point> points;
@@ -51,9 +45,9 @@ Transform level(const std::vector<Eigen::Vector3d>& table) {
 }
 
 Recording read_recording(const std::filesystem::path& folder, const std::string& name) {
-  const cv::Mat3b picture = read(folder / (name + "_rgb.png"), cv::IMREAD_COLOR);
-  const cv::Mat depth = read(folder / (name + "_depth_mm.png"), cv::IMREAD_UNCHANGED);
-  const cv::Mat label = read(folder / (name + "_label.png"), cv::IMREAD_UNCHANGED);
+  const cv::Mat3b picture = read_image(folder / (name + "_rgb.png"), Channels::colour);
+  const cv::Mat depth = read_values(folder / (name + "_depth_mm.png"));
+  const cv::Mat label = read_values(folder / (name + "_label.png"));
   if (depth.type() != CV_16UC1 || label.type() != CV_8UC1 || depth.size() != picture.size() ||
       label.size() != depth.size())
     throw std::runtime_error((folder / name).string() +

@@ -11,6 +11,7 @@
 
 #include "nodes/picture/image_file.hpp"
 #include "rt/file/input_file.hpp"
+#include "rt/image_file/image_file.hpp"
 
 namespace takt::object_detection {
 namespace {
@@ -68,17 +69,6 @@ ReferenceView scaled_view(const cv::Mat3b& image, const cv::Mat1b& object, int s
   return view;
 }
 
-cv::Mat read_image(const std::filesystem::path& file, int flags) {
-  require_readable(file, kLargestInput);
-  cv::Mat image;
-  try {
-    image = cv::imread(file.string(), flags);
-  } catch (const cv::Exception&) {
-  }
-  if (image.empty()) throw std::runtime_error(file.string() + " cannot be read or is no image");
-  return image;
-}
-
 /// Square with the object's box in its middle, which may reach beyond the image.
 cv::Rect square_around(const cv::Mat1b& object) {
   const cv::Rect box = cv::boundingRect(object);
@@ -97,14 +87,14 @@ cv::Mat part(const cv::Mat& image, const cv::Rect& wanted) {
 }  // namespace
 
 ReferenceView cut_out(const std::filesystem::path& file, int side_px) {
-  const cv::Mat3b image = read_image(file, cv::IMREAD_COLOR);
+  const cv::Mat3b image = read_image(file, Channels::colour);
   ReferenceView view = scaled_view(image, before_plain_background(image), side_px);
   view.file = file;
   return view;
 }
 
 ReferenceView learn_view(const std::filesystem::path& file, int side_px) {
-  const cv::Mat read = read_image(file, cv::IMREAD_UNCHANGED);
+  const cv::Mat read = read_values(file);
   if (read.depth() != CV_8U || (read.channels() != 3 && read.channels() != 4))
     throw std::runtime_error(file.string() + " must have three channels of 8 bit, or four: colour and transparency");
   cv::Mat3b image;

@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <fstream>
 #include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <sstream>
 
 #include "rt/file/input_file.hpp"
+#include "rt/image_file/image_file.hpp"
 
 namespace takt::object_detection {
 namespace {
@@ -137,10 +137,10 @@ class Reader {
     if (!side_px_) return view;
     cv::Mat image;
     try {
-      image = cv::imread(view.file.string(), cv::IMREAD_UNCHANGED);
-    } catch (const cv::Exception&) {
+      image = read_values(view.file);
+    } catch (const ImageError& problem) {
+      fail(std::string("view ") + problem.what());
     }
-    if (image.empty()) fail("view " + view.file.string() + " cannot be read or is no image");
     if (image.type() != CV_8UC3)
       fail("view " + view.file.string() + " must have three channels of 8 bit (no transparency; background is black)");
     if (image.cols != *side_px_ || image.rows != *side_px_)
@@ -187,10 +187,10 @@ std::vector<Photograph> read_backgrounds(const std::filesystem::path& folder, co
 Photograph read_photograph(const std::filesystem::path& file) {
   cv::Mat image;
   try {
-    image = cv::imread(file.string(), cv::IMREAD_COLOR);
-  } catch (const cv::Exception&) {
+    image = read_image(file, Channels::colour);
+  } catch (const ImageError& problem) {
+    throw DatabaseError(std::string("background ") + problem.what());
   }
-  if (image.empty()) throw DatabaseError("background " + file.string() + " cannot be read or is no image");
   return {file, image.cols, image.rows, {image.datastart, image.dataend}};
 }
 

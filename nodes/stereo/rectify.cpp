@@ -10,8 +10,6 @@
 #include <stdexcept>
 #include <string>
 
-#include "rt/file/output_file.hpp"
-
 namespace takt::stereo {
 namespace {
 
@@ -24,28 +22,18 @@ void check_finite(const char* name, std::span<const double> values) {
              ", must be finite; calibrate again");
 }
 
-void check(const StereoCalibration& c) {
-  if (c.width < 16 || c.width > 8192 || c.height < 16 || c.height > 8192)
-    refuse("image size is " + std::to_string(c.width) + " x " + std::to_string(c.height) +
-           ", each must lie in 16..8192");
-  check_finite("left_matrix", c.left_matrix);
-  check_finite("right_matrix", c.right_matrix);
-  check_finite("left_distortion", c.left_distortion);
-  check_finite("right_distortion", c.right_distortion);
-  check_finite("rotation", c.rotation);
-  check_finite("translation_m", c.translation_m);
+/// Values that cannot be meant: metres and millimetres, or columns, were taken for each other.
+void doubt(const StereoCalibration& c) {
+  constexpr double kShortest_m = 1e-3, kLongest_m = 10;
+  const double baseline = std::hypot(c.translation_m[0], c.translation_m[1], c.translation_m[2]);
+  if (baseline > kLongest_m || (baseline > 0 && baseline < kShortest_m))
+    refuse("translation_m is a baseline of " + std::to_string(baseline) +
+           " m, which cannot be meant (1 mm to 10 m); it counts in metres: 120 mm is 0.12");
   for (const auto* m : {&c.left_matrix, &c.right_matrix})
-    if (!((*m)[0] > 0) || !((*m)[4] > 0))
-      refuse("focal lengths are " + std::to_string((*m)[0]) + " and " + std::to_string((*m)[4]) +
-             " px, must be positive");
-  for (size_t i = 0; i < 3; ++i)
-    for (size_t j = i; j < 3; ++j) {
-      double dot = 0;
-      for (size_t k = 0; k < 3; ++k) dot += c.rotation[3 * i + k] * c.rotation[3 * j + k];
-      if (std::abs(dot - (i == j ? 1 : 0)) > 1e-3)
-        refuse("rotation is not orthonormal: rows " + std::to_string(i) + " and " + std::to_string(j) +
-               " have the product " + std::to_string(dot));
-    }
+    if ((*m)[2] < 0 || (*m)[2] > c.width || (*m)[5] < 0 || (*m)[5] > c.height || (*m)[0] > 100.0 * c.width)
+      refuse("a camera with focal length " + std::to_string((*m)[0]) + " px and principal point " +
+             std::to_string((*m)[2]) + ", " + std::to_string((*m)[5]) + " px cannot be meant for images of " +
+             std::to_string(c.width) + " x " + std::to_string(c.height) + "; was it calibrated at another resolution?");
 }
 
 cv::Mat matrix(std::span<const double> values, int rows) {
@@ -54,38 +42,12 @@ cv::Mat matrix(std::span<const double> values, int rows) {
   return m;
 }
 
-template <size_t kCount>
-void read(const cv::FileStorage& file, const std::string& path, const char* key, std::array<double, kCount>& out) {
-  const cv::FileNode node = file[key];
-  if (node.empty()) refuse(path + ": key " + key + " is missing; M1, D1, M2, D2, R, T and image_size are needed");
-  cv::Mat m;
-  node >> m;
-  if (m.total() != kCount)
-    refuse(path + ": key " + key + " has " + std::to_string(m.total()) + " numbers, must have " +
-           std::to_string(kCount));
-  m.convertTo(m, CV_64F);
-  std::memcpy(out.data(), m.data, sizeof out);
-}
-
-void read_cameras(const cv::FileStorage& file, const std::string& path, StereoCalibration& c) {
-  read(file, path, "M1", c.left_matrix);
-  read(file, path, "D1", c.left_distortion);
-  read(file, path, "M2", c.right_matrix);
-  read(file, path, "D2", c.right_distortion);
-}
-
-template <class Keys>
-StereoCalibration read_file(const std::filesystem::path& path, const Keys& read_keys) {
-  StereoCalibration c;
-  if (!std::filesystem::exists(path)) refuse(path.string() + ": no such file; check parameter `calibration`");
-  try {
-    const cv::FileStorage file(path.string(), cv::FileStorage::READ);
-    if (!file.isOpened()) refuse(path.string() + ": cannot be read as OpenCV YAML or XML");
-    read_keys(file, c);
-  } catch (const cv::Exception& e) {
-    refuse(path.string() + ": " + e.err);
-  }
-  return c;
+/// As OpenCV takes it: five coefficients, or all 14.
+cv::Mat distortion(const std::array<double, 5>& first, const std::array<double, 9>& more) {
+  std::vector<double> all(first.begin(), first.end());
+  if (std::any_of(more.begin(), more.end(), [](double value) { return value != 0; }))
+    all.insert(all.end(), more.begin(), more.end());
+  return matrix(all, 1);
 }
 
 /// Sources of the pixels of one rectified image, as OpenCV computes them.
@@ -110,45 +72,37 @@ std::vector<RemapSource> sources(const cv::Mat& matrix, const cv::Mat& distortio
 
 }  // namespace
 
-StereoCalibration read_calibration(const std::filesystem::path& path) {
-  return read_file(path, [&](const cv::FileStorage& file, StereoCalibration& c) {
-    read_cameras(file, path.string(), c);
-    read(file, path.string(), "R", c.rotation);
-    read(file, path.string(), "T", c.translation_m);
-    std::vector<int> size;
-    file["image_size"] >> size;
-    if (size.size() != 2) refuse(path.string() + ": key image_size must be [width, height]");
-    c.width = size[0];
-    c.height = size[1];
-  });
-}
-
-StereoCalibration read_intrinsics(const std::filesystem::path& path) {
-  return read_file(path,
-                   [&](const cv::FileStorage& file, StereoCalibration& c) { read_cameras(file, path.string(), c); });
-}
-
-void write_calibration(const std::filesystem::path& path, const StereoCalibration& c, const std::string& comment) {
-  const std::string extension = path.extension().string();
-  if (extension != ".yaml" && extension != ".yml" && extension != ".xml")
-    refuse(path.string() + ": must end in .yaml, .yml or .xml");
-  try {
-    cv::FileStorage file(path.string(), cv::FileStorage::WRITE | cv::FileStorage::MEMORY);  // its format by the name
-    file.writeComment(comment);
-    file << "image_size" << std::vector<int>{c.width, c.height};
-    file << "M1" << matrix(c.left_matrix, 3) << "D1" << matrix(c.left_distortion, 1);
-    file << "M2" << matrix(c.right_matrix, 3) << "D2" << matrix(c.right_distortion, 1);
-    file << "R" << matrix(c.rotation, 3) << "T" << matrix(c.translation_m, 3);
-    require_written(write_file(path, file.releaseAndGetString()));
-  } catch (const cv::Exception& e) {
-    refuse(path.string() + ": " + e.err);
-  }
+void check_calibration(const StereoCalibration& c) {
+  if (c.width < 16 || c.width > 8192 || c.height < 16 || c.height > 8192)
+    refuse("image size is " + std::to_string(c.width) + " x " + std::to_string(c.height) +
+           ", each must lie in 16..8192");
+  check_finite("left_matrix", c.left_matrix);
+  check_finite("right_matrix", c.right_matrix);
+  check_finite("left_distortion", c.left_distortion);
+  check_finite("right_distortion", c.right_distortion);
+  check_finite("left_more", c.left_more);
+  check_finite("right_more", c.right_more);
+  check_finite("rotation", c.rotation);
+  check_finite("translation_m", c.translation_m);
+  for (const auto* m : {&c.left_matrix, &c.right_matrix})
+    if (!((*m)[0] > 0) || !((*m)[4] > 0))
+      refuse("focal lengths are " + std::to_string((*m)[0]) + " and " + std::to_string((*m)[4]) +
+             " px, must be positive");
+  for (size_t i = 0; i < 3; ++i)
+    for (size_t j = i; j < 3; ++j) {
+      double dot = 0;
+      for (size_t k = 0; k < 3; ++k) dot += c.rotation[3 * i + k] * c.rotation[3 * j + k];
+      if (std::abs(dot - (i == j ? 1 : 0)) > 1e-3)
+        refuse("rotation is not orthonormal: rows " + std::to_string(i) + " and " + std::to_string(j) +
+               " have the product " + std::to_string(dot));
+    }
+  doubt(c);
 }
 
 RectificationTables rectification_tables(const StereoCalibration& c) {
-  check(c);
-  const cv::Mat k1 = matrix(c.left_matrix, 3), k2 = matrix(c.right_matrix, 3), d1 = matrix(c.left_distortion, 1),
-                d2 = matrix(c.right_distortion, 1);
+  check_calibration(c);
+  const cv::Mat k1 = matrix(c.left_matrix, 3), k2 = matrix(c.right_matrix, 3),
+                d1 = distortion(c.left_distortion, c.left_more), d2 = distortion(c.right_distortion, c.right_more);
   const cv::Size size(c.width, c.height);
   cv::Mat r1, r2, p1, p2, q;
   cv::stereoRectify(k1, d1, k2, d2, size, matrix(c.rotation, 3), matrix(c.translation_m, 3), r1, r2, p1, p2, q,
@@ -168,14 +122,14 @@ RectificationTables rectification_tables(const StereoCalibration& c) {
 }
 
 RectificationTables undistortion_table(const StereoCalibration& c) {
-  check(c);
+  check_calibration(c);
   const auto& m = c.left_matrix;
   const double focal = (m[0] + m[4]) / 2;
   const std::array<double, 9> ideal{focal, 0, m[2], 0, focal, m[5], 0, 0, 1};
   RectificationTables tables;
   tables.camera = {focal, m[2], m[5], std::hypot(c.translation_m[0], c.translation_m[1], c.translation_m[2])};
-  tables.left = sources(matrix(m, 3), matrix(c.left_distortion, 1), cv::Mat::eye(3, 3, CV_64F), matrix(ideal, 3),
-                        {c.width, c.height});
+  tables.left = sources(matrix(m, 3), distortion(c.left_distortion, c.left_more), cv::Mat::eye(3, 3, CV_64F),
+                        matrix(ideal, 3), {c.width, c.height});
   return tables;
 }
 

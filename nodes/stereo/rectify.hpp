@@ -2,8 +2,6 @@
 #pragma once
 #include <array>
 #include <cstdint>
-#include <filesystem>
-#include <string>
 #include <vector>
 
 #include "nodes/stereo/debayer.hpp"
@@ -18,20 +16,15 @@ struct StereoCalibration {
   int width = 0, height = 0;                                    ///< px, of the raw and of the rectified images
   std::array<double, 9> left_matrix{}, right_matrix{};          ///< fu 0 cu / 0 fv cv / 0 0 1, px
   std::array<double, 5> left_distortion{}, right_distortion{};  ///< k1 k2 p1 p2 k3
+  std::array<double, 9> left_more{}, right_more{};              ///< k4 k5 k6 s1 s2 s3 s4 tx ty of OpenCV
   std::array<double, 9> rotation{1, 0, 0, 0, 1, 0, 0, 0, 1};    ///< p_right = rotation p_left + translation
   std::array<double, 3> translation_m{};                        ///< right camera beside the left: x about -baseline
 };
 
-/// Reads a calibration in OpenCV's YAML or XML form: M1, D1, M2, D2 (as written by its stereo calibration), R, T
-/// (metres) and image_size [width, height]. Throws std::invalid_argument naming file, key and value.
-StereoCalibration read_calibration(const std::filesystem::path& file);
-
-/// The matrices and distortions alone (M1, D1, M2, D2), as OpenCV's samples keep them in a file of their own.
-StereoCalibration read_intrinsics(const std::filesystem::path& file);
-
-/// Writes it in the same form, with one line of comment. Throws std::invalid_argument naming the file.
-void write_calibration(const std::filesystem::path& file, const StereoCalibration& calibration,
-                       const std::string& comment);
+/// Throws std::invalid_argument for values that are not finite, sizes outside 16..8192, focal lengths that are not
+/// positive, a rotation that is none, and values that cannot be meant: a baseline outside 1 mm to 10 m, a principal
+/// point outside the image.
+void check_calibration(const StereoCalibration& calibration);
 
 /// Model of the rectified images, and where each of their pixels comes from (width x height, row by row).
 struct RectificationTables {
@@ -40,9 +33,8 @@ struct RectificationTables {
   std::vector<RemapSource> left, right;
 };
 
-/// The tables that bring epipolar lines onto rows (thesis Sec. 3.5.2). Throws std::invalid_argument for values that are
-/// not finite, sizes outside 16..8192, focal lengths that are not positive, a rotation that is none, or cameras that do
-/// not stand left and right of each other.
+/// The tables that bring epipolar lines onto rows (thesis Sec. 3.5.2). Throws as check_calibration(), and for cameras
+/// that do not stand left and right of each other.
 RectificationTables rectification_tables(const StereoCalibration& calibration);
 
 /// The table that undistorts the left image alone (`right` is empty): the camera keeps its direction and its matrix, as

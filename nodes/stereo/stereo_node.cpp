@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "nodes/stereo/band_matcher.hpp"
+#include "nodes/stereo/calibration_file.hpp"
 #include "nodes/stereo/half_resolution.hpp"
 #include "nodes/stereo/matcher.hpp"
 #include "nodes/stereo/rectification_monitor.hpp"

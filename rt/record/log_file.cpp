@@ -40,16 +40,37 @@ void LogFile::index() {
       damages_.push_back(records.error());
       continue;
     }
-    const auto walked = mcap::Reader::for_each_in(*records, [&](const mcap::Message& message) {
+    const auto walked = container_.for_each_in(*records, [&](const mcap::Message& message) {
       const auto offset = static_cast<uint64_t>(message.data.data() - records->data());
       index(message, {0, 0, false, number, static_cast<uint32_t>(message.data.size()), offset});
       return true;
     });
-    if (!walked) damages_.push_back("chunk " + std::to_string(number) + ": " + walked.error());
+    if (!walked) damages_.push_back("the chunk at byte " + std::to_string(chunks[number].at) + ": " + walked.error());
   }
+  check_channels();
+}
+
+void LogFile::check_channels() {
+  left_out_ = container_.left_out();
+  for (const auto& [id, count] : foreign_) {
+    const std::string messages = std::to_string(count) + " messages ";
+    if (id == 0) damages_.push_back(messages + "of channels that no channel record describes");
+    else
+      left_out_.push_back(messages + "of " + container_.channels()[id - 1U].topic + ", whose encoding is `" +
+                          container_.channels()[id - 1U].encoding + "`, not `" + Recorder::kEncoding + "`");
+  }
+  std::map<std::string_view, int> topics;
+  for (const mcap::Channel& channel : container_.channels())
+    if (channel.encoding == Recorder::kEncoding && ++topics[channel.topic] == 2)
+      damages_.push_back("two channels have the topic " + channel.topic +
+                         " and different descriptions; the first is read");
 }
 
 void LogFile::index(const mcap::Message& message, Known known) {
+  if (message.channel == 0 || container_.channels()[message.channel - 1U].encoding != Recorder::kEncoding) {
+    ++foreign_[message.channel];
+    return;
+  }
   if (message.channel == jobs_channel_) {
     auto job = unpack_job(message.data, format_);
     if (job) jobs_.push_back(std::move(*job));
@@ -80,9 +101,14 @@ std::optional<std::string_view> LogFile::attached(std::string_view name) const {
   return std::nullopt;
 }
 
+bool LogFile::of_a_port(const mcap::Channel& channel) {
+  return channel.encoding == Recorder::kEncoding && channel.topic != Recorder::kJobs &&
+         channel.topic != Recorder::kEvents;
+}
+
 uint16_t LogFile::channel(std::string_view port) const {
   for (const mcap::Channel& channel : container_.channels())
-    if (channel.topic == port) return channel.id;
+    if (channel.topic == port && channel.encoding == Recorder::kEncoding) return channel.id;
   return 0;
 }
 

@@ -37,6 +37,8 @@ class LogFile {
   const std::vector<RecordedJob>& jobs() const { return jobs_; }
   /// In the order of the file: those of a task are in the order of their instants.
   const std::vector<RecordedEvent>& events() const { return events_; }
+  /// Whether a channel of the file has messages of a port, as the Recorder writes them.
+  static bool of_a_port(const mcap::Channel& channel);
   /// Channel of "NODE.PORT"; 0 if the record has none.
   uint16_t channel(std::string_view port) const;
   /// A message that is there, without its fields.
@@ -53,11 +55,14 @@ class LogFile {
   std::optional<MessageRecord> message(uint16_t channel, uint64_t sequence);
   /// What is damaged or missing in the file; empty if it is whole.
   const std::vector<std::string>& damages() const { return damages_; }
+  /// What is in the file, undamaged, and is not read: records of unknown kinds, messages of other encodings.
+  const std::vector<std::string>& left_out() const { return left_out_; }
 
  private:
   explicit LogFile(mcap::Reader container) : container_(std::move(container)) {}
   void index();
   void index(const mcap::Message& message, Known known);
+  void check_channels();
   const std::vector<std::byte>* chunk(uint32_t number);
 
   mcap::Reader container_;
@@ -67,7 +72,8 @@ class LogFile {
   std::vector<RecordedJob> jobs_;
   std::vector<RecordedEvent> events_;
   std::map<uint16_t, std::map<uint64_t, Known>> messages_;  ///< by channel and sequence
-  std::vector<std::string> damages_;
+  std::vector<std::string> damages_, left_out_;
+  std::map<uint16_t, uint64_t> foreign_;  ///< messages by channel (0: one that nothing describes)
   static constexpr size_t kChunksKept = 48;
   std::unordered_map<uint32_t, std::vector<std::byte>> unpacked_;
   std::deque<uint32_t> order_;  ///< of the chunks in hand, oldest first

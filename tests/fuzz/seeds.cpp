@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // fuzz_seeds FOLDER: inputs that the fuzz targets begin with: whole conversations and their telegrams alone, made by
 // the codecs themselves, and the golden vectors; all of them also cut, doubled and with flipped bits.
+#include "tests/fuzz/seeds.hpp"
+
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
@@ -20,7 +22,7 @@
 #include "tests/unit/lms400/golden.hpp"
 
 using namespace takt;
-using Bytes = std::vector<uint8_t>;
+using takt::fuzz::Bytes, takt::fuzz::Seeds;
 
 namespace {
 
@@ -28,59 +30,6 @@ Bytes copy(std::span<const uint8_t> bytes) { return {bytes.begin(), bytes.end()}
 std::span<const uint8_t> bytes_of(std::string_view text) {
   return {reinterpret_cast<const uint8_t*>(text.data()), text.size()};
 }
-
-/// As tests/fuzz/session.hpp reads it: bytes that come at once, after a pause.
-Bytes piece(const Bytes& bytes, uint8_t pause) {
-  Bytes all{static_cast<uint8_t>(uint32_t{pause} << 5 | bytes.size() >> 8), static_cast<uint8_t>(bytes.size())};
-  all.insert(all.end(), bytes.begin(), bytes.end());
-  return all;
-}
-
-class Seeds {
- public:
-  explicit Seeds(std::filesystem::path folder) : folder_(std::move(folder)) {
-    std::filesystem::create_directories(folder_);
-  }
-  void add(const Bytes& bytes) {
-    std::ofstream file(folder_ / ("seed" + std::to_string(count_++)), std::ios::binary);
-    file.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-  }
-  /// Each part alone, then all of them as they come one after the other.
-  void add_conversation(const std::vector<Bytes>& parts) {
-    Bytes all;
-    for (const Bytes& part : parts) {
-      add(part);
-      const Bytes next = piece(part, 2);
-      all.insert(all.end(), next.begin(), next.end());
-    }
-    add(all);
-  }
-  /// As it is; cut after a third, two thirds and before its end; twice; with one bit flipped near the begin, in the
-  /// middle, at the end; joined to its own begin.
-  void add_and_spoil(const Bytes& bytes) {
-    add(bytes);
-    const auto end = [&](size_t size) { return bytes.begin() + static_cast<ptrdiff_t>(size); };
-    for (const size_t size : {bytes.size() / 3, 2 * bytes.size() / 3, bytes.size() - 1}) {
-      add({bytes.begin(), end(size)});
-      Bytes joined(bytes.begin(), end(size));
-      joined.insert(joined.end(), bytes.begin(), bytes.end());
-      add(joined);
-    }
-    Bytes twice = bytes;
-    twice.insert(twice.end(), bytes.begin(), bytes.end());
-    add(twice);
-    for (const size_t at : {std::min<size_t>(2, bytes.size() - 1), bytes.size() / 2, bytes.size() - 1}) {
-      Bytes flipped = bytes;
-      flipped[at] ^= 0x10;
-      add(flipped);
-    }
-  }
-  size_t count() const { return count_; }
-
- private:
-  std::filesystem::path folder_;
-  size_t count_ = 0;
-};
 
 Bytes bytes_of_hex(std::string_view hex) {
   Bytes bytes;
@@ -247,7 +196,9 @@ int main(int argc, char** argv) {
   can_seeds(can_inputs);
   camera_seeds(camera_inputs);
   semantic_link_seeds(link_inputs);
-  std::printf("seeds: %zu for lms200, %zu for lms400, %zu for can, %zu for camera, %zu for semantic_link\n",
-              lms200_inputs.count(), lms400_inputs.count(), can_inputs.count(), camera_inputs.count(),
-              link_inputs.count());
+  const size_t of_files = takt::fuzz::file_seeds(folder);
+  std::printf(
+      "seeds: %zu for lms200, %zu for lms400, %zu for can, %zu for camera, %zu for semantic_link, %zu for files\n",
+      lms200_inputs.count(), lms400_inputs.count(), can_inputs.count(), camera_inputs.count(), link_inputs.count(),
+      of_files);
 }

@@ -37,6 +37,29 @@ expect 0 "" "$takt" capture "unix:$work/can" "$work/frames.log" --for 1s
 kill $double
 wait $double
 
+# Every sort of frame, as candump -L writes it; a packet that is none is counted.
+python3 - "$work/bus" <<'PY' &
+import socket, struct, sys, time
+bus = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+bus.bind(sys.argv[1])
+bus.listen(1)
+host, _ = bus.accept()
+classic = lambda number, data: struct.pack("<IB3x8s", number, len(data), data)
+for packet in (classic(0x7F, b"\1\2"), classic(0x80000000 | 0x18DA10F1, b"\3"), classic(0x40000201, b""),
+               classic(0x20000010, bytes(8)), struct.pack("<IBB2x64s", 0x1F0, 12, 1, b"\xbb" * 12), b"none"):
+    host.send(packet)
+time.sleep(2)
+PY
+bus=$!
+for _ in $(seq 100); do [ -S "$work/bus" ] && break; sleep 0.1; done
+expect 0 "" "$takt" capture "unix:$work/bus" "$work/bus.log" --for 1s
+kill $bus
+wait $bus
+prints "5 frames (1 extended, 1 remote, 1 error, 1 FD)"
+prints "1 packets are no CAN frames"
+[ "$(cut -d' ' -f3 "$work/bus.log" | tr '\n' ' ')" = \
+  "07F#0102 18DA10F1#03 201#R 20000010#0000000000000000 1F0##1BBBBBBBBBBBBBBBBBBBBBBBB " ] || fail "frames: $(cat "$work/bus.log")"
+
 writes "$work/sweeps.txt" "$takt" calibrate lasers --generate "$work/sweeps.txt"
 writes "$work/mounts.yaml" "$takt" calibrate lasers "$work/sweeps.txt" --out "$work/mounts.yaml"
 

@@ -2,12 +2,13 @@
 """Reading records: those of earlier formats, cut off and damaged ones, with each way to unpack zstd."""
 import pathlib
 import shutil
+import struct
 import tempfile
 import unittest
 from unittest import mock
 
 import takt
-from takt import zstd
+from takt import unpacking
 
 RECORDS = pathlib.Path(__file__).parents[1] / "samples"
 
@@ -79,6 +80,33 @@ class RecordTest(unittest.TestCase):
             self.assertEqual(record.info.get("format", "1"), path.stem.split("_")[1])
             self.assertGreater(len(record["obstacle_stop.stop"]), 0)
 
+    def test_what_is_not_read_is_counted(self):
+        data = (RECORDS / "format_2.mcap").read_bytes()
+        header_end = 8 + 9 + struct.unpack_from("<Q", data, 9)[0]
+        text = lambda words: struct.pack("<I", len(words)) + words
+        record = lambda op, fields: bytes([op]) + struct.pack("<Q", len(fields)) + fields
+        foreign = (record(0x90, b"private") + record(4, struct.pack("<HH", 900, 0) + text(b"/scan") + text(b"cdr") + text(b""))
+                   + record(5, struct.pack("<HIQQ", 900, 1, 2, 3) + b"data") + record(12, text(b"other") + text(b"")))
+        read = takt.read_record(self.written(data[:header_end] + foreign + data[header_end:]))
+        self.assertEqual(read.missing, "")
+        self.assertEqual(read.left_out, ["1 messages of /scan, whose encoding is cdr, not takt",
+                                         "1 records of kind 144, which the format (version 0) does not have"])
+        plain = takt.read_record(RECORDS / "format_2.mcap")
+        self.assertEqual(plain.left_out, [])
+        self.assertEqual(list(read["base.odometry"].stamps_ns), list(plain["base.odometry"].stamps_ns))
+
+    def test_lz4(self):
+        try:
+            unpack = unpacking.unpacker("lz4")
+        except ImportError as problem:
+            self.skipTest(str(problem))
+        content = b"a stored block"
+        frame = struct.pack("<IBBBI", 0x184D2204, 0x60, 0x40, 0x82, len(content) | 1 << 31) + content + bytes(4)
+        self.assertEqual(bytes(unpack(frame, len(content))), content)
+        for damaged, size in ((frame[:-6], len(content)), (frame, len(content) + 1), (b"none of it", 4)):
+            with self.assertRaisesRegex(ValueError, "lz4 data is damaged"):
+                unpack(damaged, size)
+
     def test_no_record(self):
         with self.assertRaisesRegex(takt.RecordError, "no MCAP file"):
             takt.read_record(RECORDS / "graph.yaml")
@@ -87,15 +115,15 @@ class RecordTest(unittest.TestCase):
         stored = pathlib.Path(RECORDS / "format_1.mcap").read_bytes()
         expected = len(takt.read_record(RECORDS / "format_1.mcap")["base.odometry"])
         self.assertIn(b"zstd", stored)
-        ways = [lambda: zstd._by_library("libzstd.so.1")]
+        ways = [unpacking._by_library]
         if shutil.which("zstd"):
-            ways.append(lambda: zstd._by_command(shutil.which("zstd")))
+            ways.append(unpacking._by_command)
         for way in ways:
-            with mock.patch("takt.zstd.unpacker", way):
+            with mock.patch("takt.unpacking.unpacker", way):
                 self.assertEqual(len(takt.read_record(RECORDS / "format_1.mcap")["base.odometry"]), expected)
 
     def test_without_any_zstd_it_says_what_to_install(self):
-        with mock.patch("takt.zstd._by_library", side_effect=OSError), mock.patch("shutil.which", return_value=None), \
+        with mock.patch("takt.unpacking._by_library", side_effect=OSError), mock.patch("shutil.which", return_value=None), \
                 mock.patch.dict("sys.modules", zstandard=None):
             with self.assertRaisesRegex(ImportError, "python3-zstandard, libzstd1, zstd"):
                 takt.read_record(RECORDS / "format_1.mcap")

@@ -10,9 +10,11 @@
 #include <cstring>
 #include <fstream>
 #include <memory>
+#include <span>
 #include <utility>
 
 #include "graph/run/support.hpp"
+#include "hal/can/candump.hpp"
 #include "hal/can/port.hpp"
 #include "hal/laser/lms200/session.hpp"
 #include "hal/laser/lms400/session.hpp"
@@ -33,11 +35,21 @@ int64_t realtime_ns() {
 }
 
 /// "(1700000000.123456) can0 190#E841B50BE6FB0E02"
-std::string candump_line(const std::string& interface, const can::Frame& frame, int64_t realtime_ns) {
-  std::string line = fmt::format("({}.{:06}) {} {:0{}X}#", realtime_ns / 1'000'000'000, realtime_ns / 1000 % 1'000'000,
-                                 interface, frame.id, (frame.id & can::kErrorFlag) != 0 ? 8 : 3);
-  for (size_t i = 0; i < frame.length; ++i) line += fmt::format("{:02X}", frame.data[i]);
-  return line + "\n";
+std::string candump_line(const std::string& interface, const std::string& frame, int64_t realtime_ns) {
+  return fmt::format("({}.{:06}) {} {}\n", realtime_ns / 1'000'000'000, realtime_ns / 1000 % 1'000'000, interface,
+                     frame);
+}
+
+/// "25 frames (5 extended, 5 remote, 5 error, 5 FD)"
+std::string frames_text(const std::array<uint64_t, can::kFrameSorts>& counts) {
+  constexpr std::array<const char*, can::kFrameSorts> kNames{"", "extended", "remote", "error", "FD"};
+  std::string special;
+  uint64_t all = counts[0];
+  for (size_t i = 1; i < counts.size(); ++i) {
+    all += counts[i];
+    if (counts[i] > 0) special += fmt::format("{}{} {}", special.empty() ? "" : ", ", counts[i], kNames[i]);
+  }
+  return fmt::format("{} frames{}", all, special.empty() ? "" : " (" + special + ")");
 }
 
 int failed(const std::string& what, const std::string& fix, int code) {
@@ -68,23 +80,27 @@ int capture_bus(const CaptureOptions& options, std::ofstream& file) {
   const std::string& interface = options.device;
   const Span span(options.duration_s);
   can::Port port(interface, span.clock);
+  port.want_fd();
   if (const int error = port.open({}); error != 0)
     return failed(interface + ": " + std::strerror(error), can::advice(interface, error), kDeviceOrSystem);
-  uint64_t frames = 0;
+  std::array<uint64_t, can::kFrameSorts> frames{};
+  uint64_t strange = 0;
   bool gone = false;
   while (!gone && !span.over()) {
     const can::Reception reception = port.receive();
-    if (reception.status == can::PortStatus::ok) {
+    if (reception.packet_bytes > 0) {
       const int64_t age_ns = span.clock.now_ns() - reception.stamp_ns;
-      file << candump_line(interface, reception.frame, realtime_ns() - age_ns);
-      ++frames;
+      const auto frame = can::candump_text(std::span(reception.packet).first(reception.packet_bytes));
+      if (frame) file << candump_line(interface, frame->text, realtime_ns() - age_ns);
+      (frame ? frames[static_cast<size_t>(frame->sort)] : strange) += 1;
     } else if (reception.status == can::PortStatus::nothing || reception.status == can::PortStatus::down) {
       poll(nullptr, 0, 1);
     }
     gone = reception.status == can::PortStatus::gone;
   }
   if (port.overflows() > 0) fmt::print("{} frames came faster than they were taken and are lost\n", port.overflows());
-  return written(options, file, fmt::format("{} frames", frames), gone);
+  if (strange > 0) fmt::print("{} packets are no CAN frames (classic or FD) and are left out\n", strange);
+  return written(options, file, frames_text(frames), gone);
 }
 
 int listen(const CaptureOptions& options, std::unique_ptr<ByteStream> line, std::ofstream& file) {

@@ -5,7 +5,7 @@ import json
 import struct
 import zlib
 
-from . import zstd
+from . import unpacking
 
 try:
     import numpy
@@ -13,7 +13,8 @@ except ImportError:
     numpy = None
 
 _MAGIC = b"\x89MCAP0\r\n"
-_SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _ATTACHMENT, _METADATA, _DATA_END = 3, 4, 5, 6, 9, 12, 15
+_HEADER, _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _ATTACHMENT, _METADATA, _DATA_END = 1, 2, 3, 4, 5, 6, 9, 12, 15
+_TAIL = 1 + 8 + 20 + 8  # footer record and magic
 _NEWEST_FORMAT = 2
 _HEAD = struct.Struct("<QqqqiBQ")
 _SCALARS = {"u8": ("B", "u1"), "i16": ("h", "<i2"), "u16": ("H", "<u2"), "i32": ("i", "<i4"), "u32": ("I", "<u4"),
@@ -153,13 +154,16 @@ class Port:
 class Record:
     """A record that was read. `ports`: {"NODE.PORT": Port}; `info`: what was run; `attachments`: {name: bytes}, among
     them graph.yaml and plan.json; `jobs` and `events`: how many are in it; `missing`: why the file is not whole (its
-    process was killed), else "". All up to there was read."""
+    process was killed), else "". All up to there was read. `left_out`: what is in the file and was not read, a sentence
+    each: messages of other encodings, records that MCAP (version 0) does not have."""
 
     def __init__(self):
         self.ports, self.info, self.attachments = {}, {}, {}
         self.jobs = self.events = 0
+        self.left_out = []
         self.missing = "the file has no end"
-        self._schemas, self._channels, self._unpack = {}, {}, None
+        self._schemas, self._channels, self._unpack = {}, {}, {}
+        self._foreign, self._unknown = {}, {}
 
     def __getitem__(self, port):
         if port not in self.ports:
@@ -186,10 +190,14 @@ class Record:
         elif op == _METADATA:
             name = fields.text()
             found = fields.map()
+            if name not in ("takt", "takt end"):
+                return  # another program's
             if name == "takt" and int(found.get("format", "1")) > _NEWEST_FORMAT:
                 raise RecordError(f"the record has format {found['format']}, and this reader knows up to "
                                   f"{_NEWEST_FORMAT}; use the takt of commit {found.get('commit', '?')}")
             self.info.update(found)
+        elif op < _HEADER or op > _DATA_END:
+            self._unknown[op] = self._unknown.get(op, 0) + 1
 
     def _open_channel(self, number, schema, topic, encoding, metadata):
         if number in self._channels:
@@ -199,7 +207,11 @@ class Record:
             self._channels[number] = name
             return
         if encoding != "takt":
-            raise RecordError(f"{topic} has encoding {encoding}, not takt: this is an export; read the record itself")
+            self._channels[number] = (topic, encoding)
+            return
+        if topic in self.ports:  # as a file has it that was merged of two
+            self._channels[number] = self.ports[topic]
+            return
         whole = metadata.get("fields") != "hash"
         self._channels[number] = self.ports[topic] = Port(topic, name.removeprefix("takt."),
                                                           json.loads(data)["fields"], whole)
@@ -212,6 +224,8 @@ class Record:
             self.jobs += 1
         elif to == "takt.Event":
             self.events += 1
+        elif isinstance(to, tuple):
+            self._foreign[to] = self._foreign.get(to, 0) + 1
         else:
             raise RecordError(f"a message is of channel {channel}, which the file does not have")
 
@@ -219,11 +233,12 @@ class Record:
         fields.bytes(16)
         size, crc, compression = fields.number("Q"), fields.number("I"), fields.text()
         stored = fields.bytes(fields.number("Q"))
-        if compression not in ("", "zstd"):
-            raise RecordError(f"a chunk is compressed by {compression}; zstd alone is known")
+        if compression not in ("", "lz4", "zstd"):
+            raise RecordError(f"a chunk is compressed by {compression}; known: lz4, zstd, none")
         if compression:
-            self._unpack = self._unpack or zstd.unpacker()
-            stored = self._unpack(bytes(stored), size)
+            if compression not in self._unpack:
+                self._unpack[compression] = unpacking.unpacker(compression)
+            stored = self._unpack[compression](bytes(stored), size)
         if crc and zlib.crc32(stored) != crc:
             raise ValueError("a chunk is damaged: its CRC does not fit")
         self._records(_Reader(stored, "a chunk"))
@@ -236,6 +251,31 @@ class Record:
                 self.missing = ""
                 return
 
+    def _summary(self, data):
+        """Schemas and channels that stand at the end: a writer may put those without messages only there."""
+        foot = _Reader(data[-_TAIL:], "the file")
+        if not data.endswith(_MAGIC) or len(data) < _TAIL or foot.number("B") != _FOOTER or foot.number("Q") != 20:
+            return
+        start = foot.number("Q")
+        reader = _Reader(data[start:-_TAIL] if start else b"", "the summary")
+        while reader.at < len(reader.data):
+            op = reader.number("B")
+            fields = _Reader(reader.bytes(reader.number("Q")), "a record of the summary")
+            if op in (_SCHEMA, _CHANNEL):
+                self._take(op, fields)
+
+    def _check(self, path):
+        if self._foreign and not self.info:
+            topic, encoding = next(iter(self._foreign))
+            raise RecordError(f"{path}: {topic} has encoding {encoding}, not takt: this is an export; read the record "
+                              "itself")
+        if not self._schemas and not self.info:
+            raise RecordError(f"{path} holds nothing of Takt")
+        self.left_out = [f"{count} messages of {topic}, whose encoding is {encoding}, not takt"
+                         for (topic, encoding), count in self._foreign.items()]
+        self.left_out += [f"{count} records of kind {op}, which the format (version 0) does not have"
+                          for op, count in self._unknown.items()]
+
 
 def read_record(path):
     """Reads a record into memory.
@@ -244,7 +284,7 @@ def read_record(path):
         for name, port in record.ports.items():
             print(name, port.type, len(port))
 
-    Raises RecordError if the file is no record of Takt or has a newer format, ImportError if zstd is missing. A file of
+    Raises RecordError if the file is no record of Takt or has a newer format, ImportError if a chunk cannot be unpacked here. A file of
     a killed run is read up to its end or its first damaged chunk; `Record.missing` says so.
     """
     with open(path, "rb") as file:
@@ -253,6 +293,10 @@ def read_record(path):
         raise RecordError(f"{path} is no MCAP file; takt run --record FILE writes one")
     record, reader = Record(), _Reader(data, "the file")
     reader.at = len(_MAGIC)
+    try:
+        record._summary(data)
+    except RecordError:
+        pass  # what it repeats is in the data section
     try:
         while record.missing and reader.at < len(data):
             start = reader.at
@@ -272,6 +316,5 @@ def read_record(path):
         if str(problem) != "the file ends too early":
             raise
         record.missing = "the file is cut off"
-    if not record._schemas and not record.info:
-        raise RecordError(f"{path} holds nothing of Takt")
+    record._check(path)
     return record

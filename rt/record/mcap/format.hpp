@@ -49,7 +49,7 @@ struct Channel {
 };
 
 struct Message {
-  uint16_t channel = 0;
+  uint16_t channel = 0;  ///< as read: 0 if no record describes it
   uint32_t sequence = 0;
   uint64_t log_ns = 0, publish_ns = 0;
   Bytes data;
@@ -66,7 +66,7 @@ struct ChunkIndex {
   uint64_t offset = 0, length = 0;    ///< of the chunk record in the file, with its opcode and length
   std::map<uint16_t, uint64_t> message_index_offsets;
   uint64_t message_index_length = 0;
-  std::string compression;  ///< "" or "zstd"
+  std::string compression;  ///< "", "zstd" or, of other writers, "lz4"
   uint64_t compressed_size = 0, uncompressed_size = 0;
 };
 

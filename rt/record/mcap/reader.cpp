@@ -2,6 +2,7 @@
 #include "rt/record/mcap/reader.hpp"
 
 #include <fcntl.h>
+#include <lz4frame.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -20,13 +21,16 @@ namespace {
 constexpr uint64_t kHead = 1 + 8;  // opcode and length
 constexpr uint64_t kMostUnpacked = uint64_t{1} << 31;
 constexpr uint64_t kFooterFields = 8 + 8 + 4;
+/// A run of messages outside chunks ends when it is as large: a reader takes one into memory as a whole.
+constexpr size_t kRunBytes = 1 << 20;
+/// What a chunk may claim of memory: more than that must be this many times its packed size at most.
+constexpr uint64_t kTrusted = 64 << 20, kMostRatio = 4096;
 
 Chunk get_chunk(Bytes from, uint64_t at) {
   ByteReader fields(from);
   Chunk chunk;
   chunk.at = at;
-  chunk.start_ns = fields.number<uint64_t>();
-  chunk.end_ns = fields.number<uint64_t>();
+  fields.bytes(2 * sizeof(uint64_t));  // first and last instant
   chunk.uncompressed_size = fields.number<uint64_t>();
   chunk.crc = fields.number<uint32_t>();
   chunk.compression = fields.text();
@@ -34,14 +38,53 @@ Chunk get_chunk(Bytes from, uint64_t at) {
   return chunk;
 }
 
-/// A record of the same id again must say the same: then it is the copy of the summary.
+/// Keeps a definition under an id that counts from 1; `ids` says which, by that of the file. A record of the same id
+/// again must say the same: then it is a copy, as in the summary.
 template <class Definition>
-void keep_once(std::vector<Definition>& list, Definition definition) {
-  const auto known =
-      std::find_if(list.begin(), list.end(), [&](const Definition& other) { return other.id == definition.id; });
-  if (known == list.end()) list.push_back(std::move(definition));
-  else if (!(*known == definition))
-    throw std::runtime_error("two definitions have the id " + std::to_string(known->id));
+void keep_once(std::vector<Definition>& list, std::map<uint16_t, uint16_t>& ids, Definition definition) {
+  const uint16_t id_in_file = definition.id;
+  const auto same = [&](Definition other) {
+    other.id = definition.id;
+    return other == definition;
+  };
+  if (const auto known = ids.find(id_in_file); known != ids.end()) {
+    if (!same(list[known->second - 1U]))
+      throw std::runtime_error("two definitions have the id " + std::to_string(id_in_file));
+    return;
+  }
+  const auto twin = std::find_if(list.begin(), list.end(), same);
+  if (twin == list.end() && list.size() == UINT16_MAX) throw std::runtime_error("more than 65535 definitions");
+  ids[id_in_file] = static_cast<uint16_t>(twin - list.begin() + 1);
+  if (twin != list.end()) return;
+  definition.id = static_cast<uint16_t>(list.size() + 1);
+  list.push_back(std::move(definition));
+}
+
+/// Calls each(op, fields, at) for every record; stops if it answers false. Throws TooShort.
+template <class Each>
+void for_each_record(Bytes records, const Each& each) {
+  for (size_t at = 0; at < records.size();) {
+    ByteReader rest(records.subspan(at));
+    const auto op = static_cast<Op>(rest.number<uint8_t>());
+    const Bytes fields = rest.bytes(rest.number<uint64_t>());
+    if (!each(op, fields, at)) return;
+    at += kHead + fields.size();
+  }
+}
+
+bool unpack_lz4(Bytes packed, std::vector<std::byte>& to) {
+  LZ4F_dctx* context = nullptr;
+  if (LZ4F_isError(LZ4F_createDecompressionContext(&context, LZ4F_VERSION)) != 0) return false;
+  size_t made = 0, used = 0, wanted = 1;
+  while (wanted != 0) {
+    size_t room = to.size() - made, rest = packed.size() - used;
+    wanted = LZ4F_decompress(context, to.data() + made, &room, packed.data() + used, &rest, nullptr);
+    if (LZ4F_isError(wanted) != 0 || (room == 0 && rest == 0)) break;
+    made += room;
+    used += rest;
+  }
+  LZ4F_freeDecompressionContext(context);
+  return wanted == 0 && made == to.size();
 }
 
 bool has_magic(Bytes file, size_t at) {
@@ -72,6 +115,9 @@ Reader::Reader(Reader&& other) noexcept
       missing_(std::move(other.missing_)),
       schemas_(std::move(other.schemas_)),
       channels_(std::move(other.channels_)),
+      schema_ids_(std::move(other.schema_ids_)),
+      channel_ids_(std::move(other.channel_ids_)),
+      left_out_(std::move(other.left_out_)),
       chunks_(std::move(other.chunks_)),
       attachments_(std::move(other.attachments_)),
       metadata_(std::move(other.metadata_)) {}
@@ -82,46 +128,124 @@ Reader::~Reader() {
 
 void Reader::scan() {
   uint64_t at = kMagic.size();
+  const auto note = [&](const std::string& problem) {
+    if (missing_.empty()) missing_ = problem;
+  };
+  bool ended = false;
   try {
-    for (bool data_section = true; data_section;) {
-      ByteReader rest(file_.subspan(static_cast<size_t>(at)));
-      const auto op = static_cast<Op>(rest.number<uint8_t>());
-      const Bytes fields = rest.bytes(rest.number<uint64_t>());
-      if (op == Op::data_end) {
-        missing_ = check_end(at, at + kHead + fields.size());
-        data_section = false;
-      } else {
-        take(op, fields, at);
+    for_each_record(file_.subspan(kMagic.size()), [&](Op op, Bytes fields, size_t from) {
+      at = kMagic.size() + from;
+      ended = op == Op::data_end || op == Op::footer;
+      if (op == Op::data_end) note(check_end(at, at + kHead + fields.size()));
+      if (op == Op::footer) note("the data section of the file has no end record");
+      try {
+        if (!ended) take(op, fields, at);
+      } catch (const std::exception& problem) {  // the next record can be found all the same
+        note("byte " + std::to_string(at) + ": " + problem.what());
       }
       at += kHead + fields.size();
-    }
+      return !ended;
+    });
+    if (!ended) note("the file lacks its summary or footer");
   } catch (const TooShort&) {
-    missing_ = "the file ends within a record: " + std::to_string(file_.size() - at) + " bytes after byte " +
-               std::to_string(at) + " cannot be read, and there is no summary";
-  } catch (const std::exception& problem) {
-    missing_ = "byte " + std::to_string(at) + ": " + problem.what();
+    note("the file ends within a record: " + std::to_string(file_.size() - at) + " bytes after byte " +
+         std::to_string(at) + " cannot be read, and there is no summary");
   }
+  take_definitions_in_chunks();
+  name_unknown();
 }
 
 void Reader::take(Op op, Bytes fields, uint64_t at) {
-  if (op == Op::header) {
-    ByteReader head(fields);
-    profile_ = head.text();
-    written_by_ = head.text();
+  switch (op) {
+    case Op::header: {
+      ByteReader head(fields);
+      profile_ = head.text();
+      written_by_ = head.text();
+      break;
+    }
+    case Op::schema:
+    case Op::channel: take_definition(op, fields); break;
+    case Op::message: take_message(fields, at); break;
+    case Op::chunk:
+      chunks_.push_back(get_chunk(fields, at));
+      chunk_has_index_ = false;
+      break;
+    case Op::message_index:
+      indexed_.insert(ByteReader(fields).number<uint16_t>());
+      chunks_with_index_ += chunk_has_index_ ? 0 : 1;
+      chunk_has_index_ = true;
+      break;
+    case Op::attachment: attachments_.push_back(get_attachment(fields)); break;
+    case Op::metadata: {
+      ByteReader entry(fields);
+      std::string name = entry.text();
+      metadata_.push_back({std::move(name), entry.metadata()});
+      break;
+    }
+    default: take_unknown(op);
   }
-  if (op == Op::schema) keep_once(schemas_, get_schema(fields));
-  if (op == Op::channel) keep_once(channels_, get_channel(fields));
-  if (op == Op::chunk) chunks_.push_back(get_chunk(fields, at));
-  if (op == Op::attachment) attachments_.push_back(get_attachment(fields));
-  if (op == Op::metadata) {
-    ByteReader entry(fields);
-    std::string name = entry.text();
-    metadata_.push_back({std::move(name), entry.metadata()});
-  }
-  // Others, of later versions too, are passed over.
 }
 
-std::string Reader::check_end(uint64_t data_end_at, uint64_t summary_at) const {
+void Reader::take_definition(Op op, Bytes fields) {
+  if (op == Op::schema) {
+    keep_once(schemas_, schema_ids_, get_schema(fields));
+  } else {
+    Channel channel = get_channel(fields);
+    const auto schema = schema_ids_.find(channel.schema);
+    channel.schema = schema == schema_ids_.end() ? uint16_t{0} : schema->second;
+    keep_once(channels_, channel_ids_, std::move(channel));
+  }
+}
+
+/// One outside a chunk: with those that lie right before it, it is a chunk that is not packed.
+void Reader::take_message(Bytes fields, uint64_t at) {
+  const uint64_t size = kHead + fields.size();
+  Chunk* run = chunks_.empty() ? nullptr : &chunks_.back();
+  const bool goes_on =
+      run != nullptr && run->loose && run->at + run->stored.size() == at && run->stored.size() < kRunBytes;
+  if (!goes_on) {
+    run = &chunks_.emplace_back();
+    run->at = at;
+    run->loose = true;
+  }
+  run->uncompressed_size += size;
+  run->stored = file_.subspan(static_cast<size_t>(run->at), static_cast<size_t>(run->uncompressed_size));
+}
+
+/// Unpacking takes time: only if a channel may stand nowhere else. Indexes name the channels that have messages.
+void Reader::take_definitions_in_chunks() {
+  const auto packed = static_cast<size_t>(
+      std::count_if(chunks_.begin(), chunks_.end(), [](const Chunk& chunk) { return !chunk.loose; }));
+  if (packed == chunks_with_index_ &&
+      std::all_of(indexed_.begin(), indexed_.end(), [&](uint16_t id) { return channel_ids_.contains(id); }))
+    return;
+  for (const Chunk& chunk : chunks_) {
+    const auto records = chunk.loose ? tl::expected<std::vector<std::byte>, std::string>{} : unpack(chunk);
+    if (!records) continue;  // for_each() says so
+    try {
+      for_each_record(*records, [&](Op op, Bytes fields, size_t) {
+        if (op == Op::schema || op == Op::channel) take_definition(op, fields);
+        else if (op != Op::message) take_unknown(op);
+        return true;
+      });
+    } catch (const std::exception& problem) {
+      if (missing_.empty()) missing_ = "the chunk at byte " + std::to_string(chunk.at) + ": " + problem.what();
+    }
+  }
+}
+
+void Reader::take_unknown(Op op) {
+  if (op < Op::header || op > Op::data_end) ++unknown_[static_cast<unsigned>(op)];
+}
+
+void Reader::name_unknown() {
+  for (const auto& [op, count] : unknown_)
+    left_out_.push_back(std::to_string(count) + " records of kind " + std::to_string(op) +
+                        ", which the format (version 0) does not have");
+}
+
+/// Takes the definitions of the summary as well, if it is whole: a writer may put some only there.
+std::string Reader::check_end(uint64_t data_end_at, uint64_t summary_at) {
   const uint64_t tail = kHead + kFooterFields + kMagic.size();
   if (file_.size() < summary_at + tail || !has_magic(file_, file_.size() - kMagic.size()))
     return "the file lacks its summary or footer";
@@ -141,6 +265,15 @@ std::string Reader::check_end(uint64_t data_end_at, uint64_t summary_at) const {
     return "the CRC of the data section does not fit";
   if (summary_crc != 0 && summary_crc != crc_of(0, section(summary_at, footer_at + kHead + 16)))
     return "the CRC of the summary does not fit";
+  try {
+    for_each_record(section(summary_at, footer_at), [&](Op op, Bytes fields, size_t) {
+      if (op == Op::schema || op == Op::channel) take_definition(op, fields);
+      else take_unknown(op);
+      return true;
+    });
+  } catch (const std::exception& problem) {
+    return std::string("the summary: ") + problem.what();
+  }
   return "";
 }
 
@@ -150,35 +283,42 @@ tl::expected<std::vector<std::byte>, std::string> Reader::unpack(const Chunk& ch
   };
   std::vector<std::byte> records;
   if (chunk.uncompressed_size > kMostUnpacked) return wrong("is larger than 2 GB");
+  if (chunk.uncompressed_size > std::max(kTrusted, kMostRatio * chunk.stored.size()))
+    return wrong("is damaged: it claims " + std::to_string(chunk.uncompressed_size) + " bytes of " +
+                 std::to_string(chunk.stored.size()));
   if (chunk.compression.empty()) {
     records.assign(chunk.stored.begin(), chunk.stored.end());
   } else if (chunk.compression == "zstd") {
-    // The size is a claim of the file: memory is taken only where the packed data agrees.
-    const auto claimed = ZSTD_getFrameContentSize(chunk.stored.data(), chunk.stored.size());
-    if (claimed != ZSTD_CONTENTSIZE_UNKNOWN && claimed != chunk.uncompressed_size) return wrong("is damaged");
     records.resize(static_cast<size_t>(chunk.uncompressed_size));
     const size_t size = ZSTD_decompress(records.data(), records.size(), chunk.stored.data(), chunk.stored.size());
     if (ZSTD_isError(size) != 0) return wrong("is damaged: " + std::string(ZSTD_getErrorName(size)));
     records.resize(size);
+  } else if (chunk.compression == "lz4") {
+    records.resize(static_cast<size_t>(chunk.uncompressed_size));
+    if (!unpack_lz4(chunk.stored, records)) return wrong("is damaged: its lz4 frame cannot be unpacked");
   } else {
-    return wrong("is compressed with " + chunk.compression + "; this build reads zstd and plain ones");
+    return wrong("is compressed with " + chunk.compression + "; known: lz4, zstd, none");
   }
   if (records.size() != chunk.uncompressed_size || (chunk.crc != 0 && chunk.crc != crc_of(0, records)))
     return wrong("is damaged: its CRC does not fit");
   return records;
 }
 
-tl::expected<bool, std::string> Reader::for_each_in(Bytes records, const std::function<bool(const Message&)>& each) {
+tl::expected<bool, std::string> Reader::for_each_in(Bytes records,
+                                                    const std::function<bool(const Message&)>& each) const {
+  bool go_on = true;
   try {
-    for (ByteReader rest(records); rest.left() > 0;) {
-      const auto op = static_cast<Op>(rest.number<uint8_t>());
-      const Bytes fields = rest.bytes(rest.number<uint64_t>());
-      if (op == Op::message && !each(get_message(fields))) return false;
-    }
+    for_each_record(records, [&](Op op, Bytes fields, size_t) {
+      if (op != Op::message) return true;
+      Message message = get_message(fields);
+      const auto channel = channel_ids_.find(message.channel);
+      message.channel = channel == channel_ids_.end() ? uint16_t{0} : channel->second;
+      return go_on = each(message);
+    });
   } catch (const TooShort& problem) {
     return tl::unexpected(std::string(problem.what()));
   }
-  return true;
+  return go_on;
 }
 
 tl::expected<void, std::string> Reader::for_each(const std::function<bool(const Message&)>& each) const {

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "nodes/stereo/calibration_file.hpp"
 #include "nodes/stereo/rectify.hpp"
 
 #include <doctest/doctest.h>

@@ -4,8 +4,11 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <cstring>
 #include <string>
+#include <vector>
 
+#include "hal/can/candump.hpp"
 #include "hal/can/end_to_end.hpp"
 #include "tests/unit/can/golden_frames.hpp"
 
@@ -41,6 +44,37 @@ TEST_CASE("can: sixteen bytes there and back; what no classic frame has is refus
   CHECK_FALSE(changed(3, 0x80));  // extended
   CHECK_FALSE(changed(3, 0x40));  // remote
   CHECK(changed(4, 2)->data == std::array<uint8_t, 8>{0xE8, 0x41});
+}
+
+TEST_CASE("can: every sort of frame as candump writes it") {
+  const auto packet = [](uint32_t id, size_t size, uint8_t length, std::string_view data, uint8_t flags = 0,
+                         uint8_t code = 0) {
+    std::vector<uint8_t> bytes(size);
+    std::memcpy(bytes.data(), &id, sizeof id);
+    bytes[4] = length, bytes[5] = flags, bytes[7] = code;
+    const auto content = test::bytes_of(data);
+    std::copy(content.begin(), content.end(), bytes.begin() + 8);
+    return bytes;
+  };
+  const auto text = [&](FrameSort sort, const std::vector<uint8_t>& bytes) {
+    const auto frame = candump_text(bytes);
+    REQUIRE(frame);
+    CHECK(frame->sort == sort);
+    return frame->text;
+  };
+  CHECK(text(FrameSort::standard, packet(0x190, 16, 8, "E841B50BE6FB0E02")) == "190#E841B50BE6FB0E02");
+  CHECK(text(FrameSort::standard, packet(0x5, 16, 0, "")) == "005#");
+  CHECK(text(FrameSort::standard, packet(0x5, 16, 8, "0102030405060708", 0, 12)) == "005#0102030405060708_C");
+  CHECK(text(FrameSort::extended, packet(0x98FEF100, 16, 3, "010203")) == "18FEF100#010203");
+  CHECK(text(FrameSort::extended, packet(0x80000001, 16, 1, "AB")) == "00000001#AB");
+  CHECK(text(FrameSort::remote, packet(0x40000123, 16, 0, "")) == "123#R");
+  CHECK(text(FrameSort::remote, packet(0xC0000123, 16, 5, "")) == "00000123#R5");
+  CHECK(text(FrameSort::error, packet(0x20000004, 16, 8, "0004000000000000")) == "20000004#0004000000000000");
+  CHECK(text(FrameSort::fd, packet(0x321, 72, 12, "AAAAAAAAAAAAAAAAAAAAAAAA", 1)) == "321##1AAAAAAAAAAAAAAAAAAAAAAAA");
+  CHECK(text(FrameSort::fd, packet(0x80000321, 72, 0, "", 4)) == "00000321##4");
+  CHECK_FALSE(candump_text(packet(0x190, 16, 9, "")));
+  CHECK_FALSE(candump_text(packet(0x190, 72, 65, "")));
+  for (const size_t size : {0UL, 8UL, 15UL, 17UL, 71UL, 73UL}) CHECK_FALSE(candump_text(std::vector<uint8_t>(size)));
 }
 
 TEST_CASE("can: what the error frames say") {

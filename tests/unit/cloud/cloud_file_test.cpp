@@ -2,7 +2,9 @@
 #include "nodes/cloud/cloud_file.hpp"
 
 #include <doctest/doctest.h>
+#include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -121,15 +123,16 @@ TEST_CASE("errors name the place and what was expected there") {
   const std::string xyz = vertex + "property float z\nend_header\n";
   CHECK(error_of("") == "a:1: the file ends, expected the first line of a PLY or PCD file");
   CHECK(error_of("\x01pl\xff\n") ==
-        "a:1: `?pl?`, expected FIELDS, SIZE, TYPE, COUNT, WIDTH, HEIGHT, VIEWPOINT, POINTS, DATA ascii or DATA binary");
-  CHECK(error_of("ply\nformat binary_big_endian 1.0\n") ==
-        "a:2: format binary_big_endian, expected ascii or binary_little_endian");
+        "a:1: `?pl?`, expected FIELDS, SIZE, TYPE, COUNT, WIDTH, HEIGHT, VIEWPOINT, POINTS, DATA ascii, DATA binary or "
+        "DATA binary_compressed");
+  CHECK(error_of("ply\nformat binary_middle_endian 1.0\n") ==
+        "a:2: format binary_middle_endian, expected ascii, binary_little_endian or binary_big_endian");
   CHECK(error_of(ply + "element vertex many\n") == "a:3: `many`, expected a count");
   CHECK(error_of(ply + "element vertex 2\nproperty real x\n") ==
         "a:4: `real`, expected a type: char, uchar, short, ushort, int, uint, float, double");
   CHECK(error_of(ply + "end_header\n") == "a:3: the header ends without `element vertex`");
   CHECK(error_of("ply\n" + xyz) ==
-        "a:6: the header ends without a line `format`, expected ascii or binary_little_endian");
+        "a:6: the header ends without a line `format`, expected ascii, binary_little_endian or binary_big_endian");
   CHECK(error_of(ply + vertex + "end_header\n1 2\n3 4\n") == "a:6: vertex has no column z, expected x, y and z");
   CHECK(error_of(ply + xyz + "1 2 3\n1 2\n") == "a:9: 2 values, expected more");
   CHECK(error_of(ply + xyz + "1 2 3\n1 2 3 4\n") == "a:9: 4 values, expected 3");
@@ -147,10 +150,150 @@ TEST_CASE("errors name the place and what was expected there") {
         "a:5: TYPE F of SIZE 3, expected F of 4 or 8, or I or U of 1, 2, 4 or 8");
   CHECK(error_of("FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 3\nHEIGHT 2\nPOINTS 5\nDATA ascii\n") ==
         "a:7: 5 POINTS, expected WIDTH times HEIGHT, 3 times 2");
-  CHECK(
-      error_of("FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nDATA binary_compressed\n") ==
-      "a:4: `DATA binary_compressed`, expected FIELDS, SIZE, TYPE, COUNT, WIDTH, HEIGHT, VIEWPOINT, POINTS, DATA ascii "
-      "or DATA binary");
+  CHECK(error_of("FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nDATA packed\n") ==
+        "a:4: `DATA packed`, expected FIELDS, SIZE, TYPE, COUNT, WIDTH, HEIGHT, VIEWPOINT, POINTS, DATA ascii, DATA "
+        "binary or DATA binary_compressed");
+}
+
+namespace {
+
+std::string swapped(std::string bytes) {
+  std::reverse(bytes.begin(), bytes.end());
+  return bytes;
+}
+
+bool reports(const Cloud& cloud, const std::string& words) {
+  return std::any_of(cloud.left_out.begin(), cloud.left_out.end(),
+                     [&](const std::string& left) { return left.find(words) != std::string::npos; });
+}
+
+std::string ply(const std::string& columns, const std::string& rows, int count = 1) {
+  return "ply\nformat ascii 1.0\nelement vertex " + std::to_string(count) +
+         "\nproperty float x\nproperty float y\nproperty float z\n" + columns + "end_header\n" + rows;
+}
+
+std::string colours(const std::string& type, const std::string& r, const std::string& g, const std::string& b) {
+  return "property " + type + " " + r + "\nproperty " + type + " " + g + "\nproperty " + type + " " + b + "\n";
+}
+
+void check_colour(const Cloud& cloud, int r, int g, int b) {
+  REQUIRE(cloud.colours.size() == cloud.points.size());
+  CHECK(cloud.colours[0].r == r);
+  CHECK(cloud.colours[0].g == g);
+  CHECK(cloud.colours[0].b == b);
+}
+
+}  // namespace
+
+TEST_CASE("colours of other programs: names, floats, 16 bits, 255.0; what cannot be used costs the colours alone") {
+  check_colour(parsed(ply(colours("uchar", "diffuse_red", "diffuse_green", "diffuse_blue"), "0 0 1 10 20 30\n")), 10,
+               20, 30);
+  check_colour(parsed(ply(colours("uchar", "r", "g", "b"), "0 0 1 10 20 30\n")), 10, 20, 30);
+  check_colour(parsed(ply(colours("uchar", "Red", "Green", "Blue"), "0 0 1 255.0 0.0 3.0\n")), 255, 0, 3);
+  const Cloud floats = parsed(ply(colours("float", "red", "green", "blue"), "0 0 1 0.5 0.2 1\n"));
+  check_colour(floats, 128, 51, 255);
+  CHECK(reports(floats, "values of 0 to 1,"));
+  check_colour(parsed(ply(colours("double", "red", "green", "blue"), "0 0 1 200 7 1\n")), 200, 7, 1);
+  const Cloud wide = parsed(ply(colours("ushort", "red", "green", "blue"), "0 0 1 257 25700 65535\n"));
+  check_colour(wide, 1, 100, 255);
+  CHECK(reports(wide, "values of 0 to 65535"));
+  const Cloud beyond = parsed(ply(colours("float", "red", "green", "blue"), "0 0 1 -0.5 nan 1\n"));
+  check_colour(beyond, 0, 0, 255);
+  CHECK(reports(beyond, "2 values of colours lie outside"));
+  const Cloud none = parsed(
+      ply("property uchar red\nproperty ushort green\nproperty uchar blue\nproperty float nx\n", "0 0 1 1 2 3 4\n"));
+  CHECK(none.colours.empty());
+  CHECK(reports(none, "columns that are not read: nx, red, green, blue"));
+}
+
+TEST_CASE("numbers of other programs: denormals, rows that are not lines, a byte order mark, blanks, big endian") {
+  const Cloud small = parsed(ply("", "1e-46 -1e-400 1\n"));
+  CHECK(small.points[0].x == 0);
+  CHECK(small.points[0].z == 1);
+  const Cloud stream = parsed(ply("", "0 0 1 0 0.1\n1 0.1 0 1", 3));
+  CHECK(stream.points[1].y == 0.1f);
+  CHECK(reports(stream, "rows are not lines"));
+  CHECK(parsed(ply("element face 1\nproperty list uchar int i\n", "0 0 1 0 0 2\n3 0 1 1\n", 2)).points.size() == 2);
+  // A row too long is no stream: it would not come out even.
+  CHECK(error_of(ply("", "0 0 1\n0 0 1 7\n", 2)).find("4 values, expected 3") != std::string::npos);
+  CHECK(parsed("\xEF\xBB\xBF" + ply("", "0 0 1\n")).points.size() == 1);
+  std::string blank = ply("", "0 0 1 \n");
+  CHECK(parsed(blank.insert(3, " ")).points.size() == 1);
+  const Cloud big = parsed(
+      "ply\nformat binary_big_endian 1.0\nelement vertex 1\nproperty float x\nproperty double y\n"
+      "property short z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n" +
+      swapped(raw(1.5f)) + swapped(raw(-2.25)) + swapped(raw(int16_t{300})) + raw(uint8_t{1}, uint8_t{2}, uint8_t{3}));
+  CHECK(big.points[0].x == 1.5f);
+  CHECK(big.points[0].y == -2.25f);
+  CHECK(big.points[0].z == 300);
+  check_colour(big, 1, 2, 3);
+}
+
+TEST_CASE("binary_compressed PCD: columns by LZF; damage is noticed") {
+  // Two points: x 1 1, y 2 2, z 3 3; the second of each column repeats the first (4 bytes back).
+  std::string packed;
+  for (const float value : {1.f, 2.f, 3.f}) packed += char{3} + raw(value) + std::string{char{0x40}, char{3}};
+  const std::string head =
+      "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 2\nHEIGHT 1\nPOINTS 2\nDATA binary_compressed\n";
+  const std::string whole = head + raw(static_cast<uint32_t>(packed.size()), uint32_t{24}) + packed;
+  const Cloud cloud = parsed(whole);
+  REQUIRE(cloud.points.size() == 2);
+  for (const Point& p : cloud.points) {
+    CHECK(p.x == 1);
+    CHECK(p.y == 2);
+    CHECK(p.z == 3);
+  }
+  CHECK(error_of(head + raw(uint32_t{7}, uint32_t{25}) + packed).find("25 bytes of columns, expected 2 rows of 12") !=
+        std::string::npos);
+  CHECK(error_of(whole.substr(0, whole.size() - 1)).find("packed bytes were announced") != std::string::npos);
+  for (size_t i = 0; i < packed.size(); ++i) {  // any control byte: refused, or other numbers, never beyond the memory
+    std::string damaged = whole;
+    damaged[whole.size() - 1 - i] = static_cast<char>(0xFF);
+    static_cast<void>(parse_cloud(damaged, "a"));
+  }
+}
+
+TEST_CASE("coordinates of surveyors keep their millimetres: an origin is taken off and carried along") {
+  const takt::test::TemporaryFolder folder;
+  const std::string head = "element vertex 2\nproperty double x\nproperty double y\nproperty double z\nend_header\n";
+  const double x = 512345.123, y = 5312345.678;
+  const std::string binary = "ply\nformat binary_little_endian 1.0\n" + head + raw(x, y, 1.5, x + 0.01, y, 1.5);
+  const std::string text =
+      "ply\nformat ascii 1.0\n" + head + "512345.123 5312345.678 1.5\n512345.133 5312345.678 1.5\n";
+  for (const std::string& bytes : {binary, text})
+    for (const char* name : {"far.ply", "far.pcd"})
+      for (const Encoding encoding : {Encoding::ascii, Encoding::binary}) {
+        Cloud cloud = parsed(bytes);
+        CHECK(cloud.origin == std::array<double, 3>{512345, 5312345, 0});
+        REQUIRE(write_cloud(folder.path / name, cloud.view(), encoding));
+        const auto back = read_cloud(folder.path / name);
+        REQUIRE(back);
+        CHECK(back->origin == cloud.origin);
+        CHECK(std::abs(static_cast<double>(back->points[1].x) - 0.133) < 1e-5);
+        CHECK(std::abs(static_cast<double>(back->points[1].y) - 0.678) < 1e-5);
+        CHECK(back->points[1].z == 1.5f);
+        CHECK(add_origin(cloud).find("rounded to steps of 0.5 m") != std::string::npos);
+        CHECK(cloud.points[0].y == 5312345.5f);
+      }
+  const Cloud floats = parsed(
+      "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
+      "property float z\nend_header\n" +
+      raw(1.f, 5312345.678f, 0.f));
+  CHECK(reports(floats, "steps of 0.5 m in the file itself"));
+  CHECK(reports(parsed(ply("", "0 0 1\nnan 0 1\n1e5 0 1\n2e5 0.1 1\n0.1 0 1\n", 5)), "1 points are not finite"));
+  Cloud near = parsed(ply("", "0 0 1\n"));
+  CHECK(near.origin == std::array<double, 3>{});
+  CHECK(add_origin(near).empty());
+}
+
+TEST_CASE("a cloud from a pipe") {
+  int ends[2];
+  REQUIRE(pipe(ends) == 0);
+  const std::string bytes = ply("", "0 0 1\n");
+  REQUIRE(write(ends[1], bytes.data(), bytes.size()) == static_cast<ssize_t>(bytes.size()));
+  close(ends[1]);
+  CHECK(read_cloud("/dev/fd/" + std::to_string(ends[0])).has_value());
+  close(ends[0]);
 }
 
 TEST_CASE("files that cannot be read or written are named") {

@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
+#include "nodes/stereo/calibration_file.hpp"
 #include "nodes/stereo/rectify.hpp"
 #include "rt/msg/geometry.hpp"
 #include "rt/msg/point.hpp"

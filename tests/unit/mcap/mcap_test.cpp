@@ -3,6 +3,7 @@
 #include <doctest/doctest.h>
 
 #include <fstream>
+#include <functional>
 #include <iterator>
 #include <random>
 
@@ -225,4 +226,94 @@ TEST_CASE("mcap: a file on disk is what memory would hold") {
   const std::string text(std::istreambuf_iterator<char>(file), {});
   const auto bytes = sample(50, Compression::zstd);
   CHECK(text == std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
+}
+
+namespace {
+
+void put_magic(std::vector<std::byte>& to) { ByteWriter(to).bytes(std::as_bytes(std::span(kMagic))); }
+
+/// A file as another writer may leave it: definitions and messages where `fill` puts them, then the end without a
+/// summary.
+std::vector<std::byte> foreign(const std::function<void(std::vector<std::byte>&)>& fill) {
+  std::vector<std::byte> file;
+  put_magic(file);
+  put_record(file, Op::header, [](ByteWriter& to) { to.text(""), to.text("another"); });
+  fill(file);
+  put_record(file, Op::data_end, [](ByteWriter& to) { to.number(uint32_t{0}); });
+  put_record(file, Op::footer,
+             [](ByteWriter& to) { to.number(uint64_t{0}), to.number(uint64_t{0}), to.number(uint32_t{0}); });
+  put_magic(file);
+  return file;
+}
+
+Message numbered(uint16_t channel, uint32_t sequence) {
+  return {channel, sequence, sequence, sequence, bytes_of("data")};
+}
+
+}  // namespace
+
+TEST_CASE("mcap: ids are those of the reader, whatever they are in the file; equal channels are one") {
+  const test::TemporaryFolder folder;
+  const auto reader = Reader::open(written(folder, foreign([](auto& to) {
+                                             put(to, Schema{500, "pose", "jsonschema", "{}"});
+                                             put(to, Channel{0, 500, "a", "takt", {}});
+                                             put(to, numbered(0, 1));
+                                             put(to, Channel{77, 0, "b", "json", {}});
+                                             put(to, Channel{78, 500, "a", "takt", {}});
+                                             put(to, numbered(77, 2)), put(to, numbered(78, 3)),
+                                                 put(to, numbered(0, 4));
+                                           })));
+  REQUIRE(reader);
+  CHECK(reader->missing() == "");
+  CHECK(reader->left_out().empty());
+  REQUIRE(reader->channels().size() == 2);
+  CHECK(reader->channels()[0] == Channel{1, 1, "a", "takt", {}});
+  CHECK(reader->channels()[1] == Channel{2, 0, "b", "json", {}});
+  std::vector<uint16_t> channels;
+  for (const Kept& kept : messages_of(*reader)) channels.push_back(kept.channel);
+  CHECK(channels == std::vector<uint16_t>{1, 2, 1, 1});
+  CHECK(reader->chunks().size() == 2);  // a run of messages each
+}
+
+TEST_CASE("mcap: what is not read is counted: unknown records, messages that no channel describes") {
+  const test::TemporaryFolder folder;
+  const auto reader = Reader::open(written(folder, foreign([](auto& to) {
+                                             put(to, Channel{4, 0, "a", "takt", {}});
+                                             put(to, numbered(4, 1)), put(to, numbered(5, 2));
+                                             for (int i = 0; i < 3; ++i)
+                                               put_record(to, static_cast<Op>(0x91),
+                                                          [](ByteWriter& fields) { fields.text("private"); });
+                                             put(to, numbered(4, 3));
+                                           })));
+  REQUIRE(reader);
+  CHECK(reader->missing() == "");
+  REQUIRE(reader->left_out().size() == 1);
+  CHECK(reader->left_out()[0].find("3 records of kind 145") != std::string::npos);
+  std::vector<uint16_t> channels;
+  for (const Kept& kept : messages_of(*reader)) channels.push_back(kept.channel);
+  CHECK(channels == std::vector<uint16_t>{1, 0, 1});
+}
+
+TEST_CASE("mcap: a damaged record costs itself alone") {
+  const test::TemporaryFolder folder;
+  const auto reader = Reader::open(
+      written(folder, foreign([](auto& to) {
+                put(to, Channel{1, 0, "a", "takt", {}});
+                put_record(to, Op::channel, [](ByteWriter& fields) { fields.number(uint16_t{2}); });  // ends too early
+                put(to, Channel{1, 0, "other", "takt", {}});  // of an id that is taken
+                put(to, numbered(1, 1));
+              })));
+  REQUIRE(reader);
+  CHECK(reader->missing().find("ends before its fields do") != std::string::npos);
+  CHECK(messages_of(*reader).size() == 1);
+  const auto claims = Reader::open(written(folder, foreign([](auto& to) {
+                                             ChunkIndex chunk;
+                                             chunk.uncompressed_size = uint64_t{1} << 30;
+                                             chunk.compression = "zstd";
+                                             put_chunk_head(to, chunk, 0);
+                                           })));
+  REQUIRE(claims);
+  std::string error;
+  CHECK(messages_of(*claims, &error).empty());
+  CHECK(error.find("it claims 1073741824 bytes of 0") != std::string::npos);
 }

@@ -85,7 +85,7 @@ TEST_CASE("mistakes name file and line and what is valid") {
              "objects.txt:2: unknown word `views`; valid are object, threshold");
   check_says(folder.error("view good.png\n"), "objects.txt:1: `view` stands before");
   check_says(folder.error("object cup\n\nview absent.png\n"), "objects.txt:3: view ");
-  check_says(folder.error("object cup\nview absent.png\n"), "absent.png cannot be read");
+  check_says(folder.error("object cup\nview absent.png\n"), "absent.png: cannot be read");
   check_says(folder.error("object cup\nview objects.txt\n"), "is no image");
   check_says(folder.error("object cup\nobject can\nview good.png\n"), "objects.txt:2: object `cup` has no view");
   check_says(folder.error("object cup\nview good.png\nobject can\n"), "objects.txt:3: object `can` has no view");

@@ -3,6 +3,7 @@
 
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -140,12 +141,12 @@ TEST_CASE("mistakes are told with file and line") {
   CHECK(has(error(good + "ODOM 1 x 3 0 0 0 1 host 1\n"), ":2: word 3 of ODOM is `x`"));
   CHECK(has(error(good + "ODOM 1 nan 3 0 0 0 1 host 1\n"), ":2: word 3 of ODOM is `nan`"));
   CHECK(has(error(good + "ODOM 1 2 3 0 0 0 1 host soon\n" + good), ":2: ODOM ends with no time"));
-  CHECK(has(error(good + "ODOM 1 2 3 0 0 0 1 host -1"), ":2: ODOM ends with no time"));
+  CHECK(has(error(good + "ODOM 1 2 3 0 0 0 1 host -1\n"), ":2: ODOM ends with no time"));
   CHECK(has(error(good + "FLASER\n"), ":2: FLASER has no count"));
   CHECK(has(error("FLASER 1 1 0 0 0 0 0 0 1 host 1\n"), ":1: word 2 of FLASER is 1, not a count from 2 to 4096"));
   CHECK(has(error("FLASER 1e9 1 0 0 0 0 0 0 1 host 1\n"), "not a count"));
   CHECK(has(error("FLASER 3 1 1 0 0 0 0 0 0 1 host 1\n"), ":1: FLASER has 13 words, needs 14"));
-  CHECK(has(error("FLASER 2 1 inf 0 0 0 0 0 0 1 host 1\n"), ":1: word 4 of FLASER is `inf`"));
+  CHECK(has(error("FLASER 2 1 infx 0 0 0 0 0 0 1 host 1\n"), ":1: word 4 of FLASER is `infx`"));
   CHECK(has(error("FLASER 2 1 1 0 0 0 0 0 0 1 host 1e300\n"), ":1: the logger's time"));
   CHECK(has(error(flaser_line(1, 5, 1) + flaser_line(2, 6, 1)), ":2: a scan of 6 beams unlike the first"));
   CHECK(has(error("RAWLASER1 0 -1.5 3 0.02\n"), ":1: RAWLASER1 has no count"));
@@ -162,4 +163,76 @@ TEST_CASE("mistakes are told with file and line") {
   const CarmenFile file(good);
   CHECK(has(load_carmen_log("laser", file.path, 10).error().what, "at most 10 are read"));
   CHECK_FALSE(load_carmen_log("laser", std::filesystem::temp_directory_path()).has_value());
+}
+
+namespace {
+
+bool reports(const CarmenLog& log, const std::string& words) {
+  return std::any_of(log.left_out.begin(), log.left_out.end(),
+                     [&](const std::string& left) { return has(left, words); });
+}
+
+std::string robotlaser_line(double time_s, int beams, double first, const PlanarPose& laser, const PlanarPose& robot) {
+  return "ROBOTLASER1 0 -1.5 3 0.02 25.5 0.01 0" + ranges_text(beams, first) + " 1 9" + pose_text(laser) +
+         pose_text(robot) + " 0 0 1 1 1e6" + trailer(time_s);
+}
+
+}  // namespace
+
+TEST_CASE("ROBOTLASER1 brings its geometry and its poses, which are the odometry where there are no ODOM lines") {
+  const std::string scans =
+      robotlaser_line(1, 3, 0.5, {1.3, 2, 0}, {1, 2, 0}) + robotlaser_line(2, 3, 0.6, {2.3, 2, 0}, {2, 2, 0});
+  const CarmenLog alone = loaded(scans);
+  CHECK(alone.beams == 3);
+  CHECK(alone.first_angle_rad == -1.5);
+  CHECK(alone.max_range_m == 25.5);
+  CHECK(alone.laser_ahead_m == doctest::Approx(0.3));
+  REQUIRE(alone.scans.size() == 2);
+  CHECK(alone.scans[1].time_ns == 2'000'000'000);
+  CHECK(alone.scans[1].logged.x_m == 2.3);
+  CHECK(alone.range_m[3] == 0.6f);
+  REQUIRE(alone.odometry.size() == 2);
+  CHECK(alone.odometry[1].time_ns == 2'000'000'000);
+  CHECK(alone.odometry[1].pose.x_m == 2);
+  CHECK(reports(alone, "no ODOM lines; the poses of its 2 ROBOTLASER1"));
+  const CarmenLog both = loaded(odom_line(0.9, {7, 0, 0}) + scans);
+  REQUIRE(both.odometry.size() == 1);
+  CHECK(both.scans[0].odometry.x_m == 7);
+  CHECK(has(error("ROBOTLASER1 0 -1.5 3 0.02 25 0.01 0 2 1 1 0 1 host 1\n"), ":1: ROBOTLASER1 has 15 words, needs 26"));
+}
+
+TEST_CASE("a last line that is cut off is left out and reported, wherever it is cut") {
+  const std::string whole = odom_line(1001, {1, 2, 0.5}) + flaser_line(1001.25, 4, 1), last = flaser_line(1001.5, 4, 1);
+  for (size_t length = 1; length < last.size() - 1; ++length) {
+    CAPTURE(length);
+    const CarmenLog log = loaded(whole + last.substr(0, length));
+    CHECK(log.odometry.size() == 1);
+    const bool taken = log.scans.size() == 2;  // its time lacks digits that mean little
+    REQUIRE(log.scans.size() == (taken ? 2 : 1));
+    // A part of a name is another message, which is counted.
+    CHECK((taken || reports(log, "line 3 is cut off") || reports(log, "messages that are not read: 1 ")));
+    if (taken) CHECK(log.scans[1].time_ns >= 1'001'000'000'000);
+  }
+}
+
+TEST_CASE("what is left out of a log is counted: infinite ranges, other messages, lines without a time") {
+  const CarmenLog log = loaded("PARAM a b c 0 host 0\nSYNC x 0 host 0\nSYNC x 0 host 0\n" + odom_line(1, {}) +
+                               "FLASER 4 inf 1 -inf nan 0 0 0 0 0 0 1.1 host 1.1\n" + rawlaser_line(1.2, 4, 1));
+  CHECK(log.range_m == std::vector<float>{0, 1, 0, 0});
+  CHECK(reports(log, "3 ranges are inf or NaN"));
+  CHECK(reports(log, "messages that are not read: 1 PARAM, 1 RAWLASER1, 2 SYNC"));
+  // Six digits since 1970: the times of the senders help, where they are finer.
+  std::string coarse, hopeless;
+  for (int i = 0; i < 40; ++i) {
+    const std::string line = "ODOM 0 0 0 0 0 0 ", end = i < 36 ? " host 1.13486e+09\n" : " host 1.13487e+09\n";
+    coarse += line + number(1134864990 + 0.25 * i) + end;
+    hopeless += line + (i < 36 ? "1.13486e+09" : "1.13487e+09") + end;
+  }
+  const CarmenLog fine = loaded(coarse);
+  CHECK(fine.odometry.size() == 40);
+  CHECK(fine.odometry[39].time_ns - fine.odometry[0].time_ns == 9'750'000'000);
+  CHECK(reports(fine, "the logger's times are coarse (2 for 40 lines)"));
+  const CarmenLog few = loaded(hopeless);
+  CHECK(few.without_time == 35);
+  CHECK(reports(few, "35 of 40 scans and ODOM lines are left out"));
 }

@@ -184,12 +184,15 @@ TEST_CASE("the laser stands where the log says, unless the graph says otherwise"
 
 TEST_CASE("logs that give nothing are refused before the start") {
   const CarmenFile drive_only(odom_line(1, {})), scans_only(flaser_line(1, 4, 1)), late(flaser_line(1e9, 4, 1));
-  CHECK(has(laser_error(drive_only), "no scan at or after 0"));
-  CHECK(has(base_error(scans_only), "no ODOM line at or after 0"));
+  CHECK(has(laser_error(drive_only), "holds no scan"));
+  CHECK(has(base_error(scans_only), "holds no ODOM line"));
   CHECK(has(laser_error(scans_only, pace(1, 1.5)), "no scan at or after 1.5"));
   CHECK(has(laser_error(scans_only, pace(0, 0)), "`speed` is 0"));
   CHECK(has(laser_error(scans_only, pace(std::nan(""), 0)), "`speed` is"));
   CHECK(has(laser_error(late), "`start: 1000000000.0"));
   CHECK(laser_error(late, pace(1, 1e9)) == "");
+  const CarmenFile minutes(flaser_line(1000.5, 4, 1));
+  CHECK(has(laser_error(minutes), "add `start: 1000.5"));
+  CHECK(laser_error(minutes, pace(200, 0)) == "");
   CHECK(laser_error(scans_only, pace(1, -5)) == "");
 }

@@ -4,6 +4,7 @@
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
 
+#include "hal/replay/frame_times.hpp"
 #include "hal/replay/replay_camera.hpp"
 #include "tests/conformance/stereo_camera.hpp"
 #include "tests/has.hpp"
@@ -148,7 +149,8 @@ TEST_CASE("bad recordings are refused before start, with the file at fault") {
   {
     const Recording r;
     fs::remove(r.path / "image_r/000003.png");
-    CHECK(has(r.error(), "image_l holds 4 images, image_r 3"));
+    CHECK(has(r.error(), "image_l holds 4 images"));
+    CHECK(has(r.error(), "image_r 3"));
     fs::remove_all(r.path / "image_r");
     CHECK(has(r.error(), "image_r"));
   }
@@ -225,4 +227,192 @@ TEST_CASE("a single pair is repeated") {
   }
   camera.trigger(4);
   CHECK(camera.read(left.view(), right.view(), INT64_MAX).status == ReadStatus::end_of_data);
+}
+
+TEST_CASE("images of more than 8 bits are scaled, or refused with the setting that helps") {
+  const Recording r;
+  const auto fill = [&](const std::string& end, unsigned brightest) {
+    for (const char* side : {"image_l", "image_r"})
+      for (int k = 0; k < 4; ++k) {
+        fs::remove(r.path / side / ("00000" + std::to_string(k) + ".png"));
+        cv::Mat1w image(24, 32, static_cast<uint16_t>(brightest));
+        if (end == ".png") cv::imwrite((r.path / side / (std::to_string(k) + end)).string(), image);
+        else {
+          std::string text = "P5\n32 24\n1023\n";
+          for (int i = 0; i < 24 * 32; ++i)
+            text += {static_cast<char>(brightest >> 8U), static_cast<char>(brightest & 255U)};
+          std::ofstream(r.path / side / (std::to_string(k) + end), std::ios::binary) << text;
+        }
+      }
+  };
+  const auto first_pixel = [&](int bits) {
+    VirtualClock clock;
+    auto settings = r.settings();
+    settings.bits = bits;
+    ReplayCamera camera("camera", settings, clock);
+    const auto opened = camera.open();
+    if (!opened) return opened.error().text();
+    REQUIRE(camera.start(0).has_value());
+    std::vector<uint8_t> left(24 * 32), right(24 * 32);
+    camera.trigger(0);
+    CHECK(camera.read({left.data(), 32, 24, 1}, {right.data(), 32, 24, 1}, 0).status == ReadStatus::ok);
+    return std::to_string(left[0]);
+  };
+  fill(".pgm", 1020);
+  CHECK(first_pixel(0) == "254");
+  for (const char* side : {"image_l", "image_r"})
+    for (int k = 0; k < 4; ++k) fs::remove(r.path / side / (std::to_string(k) + ".pgm"));
+  fill(".png", 1020);
+  CHECK(has(first_pixel(0), "brightest value 1020"));
+  CHECK(has(first_pixel(0), "say `bits: 10`"));
+  CHECK(first_pixel(10) == "254");
+}
+
+TEST_CASE("times in s, ms, us, ns or as dates give the same stamps, and the unit is reported") {
+  const test::TemporaryFolder folder;
+  const std::vector<int64_t> expected{0, 100'000'000, 200'000'000, 350'000'000};
+  const auto stamps = [&](const std::string& text) {
+    const auto times = read_frame_times("camera", folder.write("times.txt", text), 4);
+    REQUIRE(times.has_value());
+    CHECK(times->stamp_ns == expected);
+    return times->note;
+  };
+  CHECK(stamps("0.0\n0.1\n0.2\n0.35\n").empty());
+  CHECK(stamps("1.7e9\n1700000000.1\n1700000000.2\n1700000000.35\n").empty());
+  CHECK(has(stamps("7000\n7100\n7200\n7350\n"), "4 times are read as ms"));
+  CHECK(has(stamps("0\n100000\n200000\n350000\n"), "read as us"));
+  CHECK(has(
+      stamps(
+          "#timestamp [ns],filename\n1403636579763555584,a.png\n1403636579863555584,b.png\n1403636579963555584,c.png\n"
+          "1403636580113555584,d.png\n"),
+      "read as ns"));
+  CHECK(stamps("2011-09-26 23:59:59.900000000\n2011-09-27 00:00:00.000000000\n2011-09-27 00:00:00.100000000\n"
+               "2011-09-27T00:00:00.250000000\n")
+            .empty());
+  const auto doubted = read_frame_times("camera", folder.write("times.txt", "0\n3\n6\n9\n"), 4);
+  REQUIRE(doubted.has_value());
+  CHECK(has(doubted->note, "unusual"));
+  CHECK(doubted->stamp_ns.back() == 9'000'000'000);
+}
+
+TEST_CASE("frames are read in the order of their numbers; files that are no images are reported") {
+  const Recording r(12);
+  for (const char* side : {"image_l", "image_r"})
+    for (int k = 0; k < 12; ++k)
+      fs::rename(r.path / side / ("00000" + std::to_string(k) + ".png"), r.path / side / (std::to_string(k) + ".png"));
+  r.write("image_l/notes.txt", "a note");
+  const auto files = list_directory("camera", r.path);
+  REQUIRE(files.has_value());
+  for (size_t k = 0; k < 12; ++k) CHECK(files->left[k].stem() == std::to_string(k));
+  REQUIRE(files->left_out.size() == 1);
+  CHECK(has(files->left_out[0], "notes.txt"));
+}
+
+namespace {
+
+/// Folders of two small images each, by names.
+struct Foreign : takt::test::TemporaryFolder {
+  void images(const std::string& folder, const std::vector<std::string>& names) const {
+    fs::create_directories(path / folder);
+    for (const std::string& name : names) cv::imwrite((path / folder / name).string(), cv::Mat1b(8, 10, uint8_t{7}));
+  }
+  StereoFiles files(const fs::path& folder) const {
+    auto listed = list_directory("camera", folder);
+    REQUIRE_MESSAGE(listed.has_value(), (listed ? "" : listed.error().text()));
+    return std::move(*listed);
+  }
+};
+
+bool reports(const StereoFiles& files, const std::string& words) {
+  return std::any_of(files.left_out.begin(), files.left_out.end(), [&](const auto& left) { return has(left, words); });
+}
+
+}  // namespace
+
+TEST_CASE("KITTI odometry: grey images, else colour; what is not read is reported") {
+  const Foreign r;
+  r.images("image_2", {"000000.png", "000001.png"});
+  r.images("image_3", {"000000.png", "000001.png"});
+  r.write("calib.txt",
+          "P0: 1 0 5 0 0 1 4 0 0 0 1 0\nP1: 1 0 5 -1 0 1 4 0 0 0 1 0\n"
+          "P2: 10 0 5 6 0 10 4 0 0 0 1 0\nP3: 10 0 5 1 0 10 4 0 0 0 1 0\nTr: 1 0 0 0 0 1 0 0 0 0 1 0\n");
+  r.write("times.txt", "0.000000e+00\n1.037875e-01\n");
+  fs::create_directory(r.path / "velodyne");
+  const StereoFiles colour = r.files(r.path);
+  CHECK(colour.left[1].parent_path().filename() == "image_2");
+  CHECK(colour.camera.focal_px == 10);
+  CHECK(colour.camera.baseline_m == doctest::Approx(0.5));
+  CHECK(colour.stamp_ns == std::vector<int64_t>{0, 103'787'500});
+  CHECK(reports(colour, "as KITTI odometry; not read: velodyne"));
+  r.images("image_0", {"000000.png"});
+  r.images("image_1", {"000000.png"});
+  r.write("times.txt", "0\n");
+  const StereoFiles grey = r.files(r.path);
+  CHECK(grey.camera.baseline_m == doctest::Approx(1));
+  CHECK(reports(grey, "not read: image_2, image_3, velodyne"));
+}
+
+TEST_CASE("KITTI raw: the calibration of the day, times as dates") {
+  const Foreign r;
+  for (const char* camera : {"image_00", "image_01"}) {
+    r.images(std::string("drive/") + camera + "/data", {"0000000000.png", "0000000001.png"});
+    r.write(std::string("drive/") + camera + "/timestamps.txt",
+            "2011-09-26 14:02:22.000000000\n2011-09-26 14:02:22.103800000\n");
+  }
+  fs::create_directory(r.path / "drive/oxts");
+  CHECK(has(list_directory("camera", r.path / "drive").error().what, "calib_cam_to_cam.txt: cannot be opened"));
+  r.write("calib_cam_to_cam.txt",
+          "calib_time: 09-Jan-2012 13:57:47\nP_rect_00: 20 0 5 0 0 20 4 0 0 0 1 0\n"
+          "P_rect_01: 20 0 5 -10 0 20 4 0 0 0 1 0\n");
+  const StereoFiles files = r.files(r.path / "drive");
+  CHECK(files.camera.baseline_m == doctest::Approx(0.5));
+  CHECK(files.stamp_ns == std::vector<int64_t>{0, 103'800'000});
+  CHECK(reports(files, "as KITTI raw; not read: oxts"));
+}
+
+TEST_CASE("EuRoC: times from the names, images without a partner are counted, nothing is rectified") {
+  const Foreign r;
+  r.images("mav0/cam0/data", {"1403636579763555584.png", "1403636579813555456.png", "1403636579863555584.png"});
+  r.images("mav0/cam1/data", {"1403636579763555584.png", "1403636579863555584.png"});
+  fs::create_directory(r.path / "mav0/imu0");
+  for (const fs::path& folder : {r.path, r.path / "mav0"}) {
+    const StereoFiles files = r.files(folder);
+    CHECK(files.stamp_ns == std::vector<int64_t>{0, 100'000'000});
+    CHECK_FALSE(files.rectified);
+    CHECK(reports(files, "as EuRoC; not read: imu0"));
+    CHECK(reports(files, "1 images of one camera are left out"));
+    CHECK(reports(files, "cam0/sensor.yaml"));
+  }
+  VirtualClock clock;
+  ReplayCameraSettings settings;
+  settings.directory = r.path;
+  ReplayCamera camera("camera", settings, clock);
+  REQUIRE(camera.open().has_value());
+  CHECK_FALSE(camera.format().rectified);
+  CHECK(camera.format().camera.focal_px == 0);
+  CHECK(camera.left_out().size() == 3);
+}
+
+TEST_CASE("Middlebury 2014: calib.txt brings the camera; TUM RGB-D and folders of no form are refused with words") {
+  const Foreign r;
+  r.images("", {"im0.png", "im1.png"});
+  r.write("calib.txt",
+          "cam0=[3997.684 0 1176.728; 0 3997.684 1011.728; 0 0 1]\n"
+          "cam1=[3997.684 0 1307.839; 0 3997.684 1011.728; 0 0 1]\ndoffs=131.111\nbaseline=193.001\nwidth=10\n");
+  VirtualClock clock;
+  ReplayCameraSettings settings;
+  settings.directory = r.path;
+  ReplayCamera camera("camera", settings, clock);
+  REQUIRE(camera.open().has_value());
+  CHECK(camera.format().camera.focal_px == 3997.684);
+  CHECK(camera.format().camera.cv_px == 1011.728);
+  CHECK(camera.format().camera.baseline_m == doctest::Approx(0.193001));
+  REQUIRE(camera.left_out().size() == 1);
+  CHECK(has(camera.left_out()[0], "doffs=131.111"));
+  const Foreign tum;
+  tum.write("rgb.txt", "");
+  tum.write("depth.txt", "");
+  CHECK(has(list_directory("camera", tum.path).error().text(), "TUM RGB-D"));
+  const Foreign none;
+  CHECK(has(list_directory("camera", none.path).error().text(), "mav0/cam0/data"));
 }

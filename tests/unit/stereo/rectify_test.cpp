@@ -12,6 +12,7 @@
 #include <opencv2/imgproc.hpp>
 #include <random>
 
+#include "nodes/stereo/calibration_file.hpp"
 #include "nodes/stereo/remap_reference.hpp"
 #include "rt/msg/geometry.hpp"
 #include "tests/temporary_folder.hpp"

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "nodes/stereo/calibration_file.hpp"
 #include "nodes/stereo/rectify.hpp"
 #include "rt/msg/disparity.hpp"
 #include "rt/msg/image.hpp"

@@ -8,6 +8,7 @@
 #include "graph/tools/calibrate_command.hpp"
 #include "graph/run/run.hpp"
 #include "nodes/calibration/generated_sweeps.hpp"
+#include "nodes/stereo/calibration_file.hpp"
 #include "nodes/stereo/rectify.hpp"
 #include "tests/graph_folder.hpp"
 #include "tests/temporary_folder.hpp"
