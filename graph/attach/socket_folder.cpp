@@ -15,6 +15,8 @@
 #include <memory>
 #include <utility>
 
+#include "rt/machine/limits.hpp"
+
 namespace takt::attach {
 namespace {
 
@@ -79,6 +81,7 @@ std::optional<SocketFolder> SocketFolder::open(const std::filesystem::path& path
   const int error = errno;
   struct stat facts {};
   if (descriptor < 0) {
+    if (error == EMFILE || error == ENFILE) return refused(machine::explain("cannot be opened", error));
     if (lstat(path.c_str(), &facts) != 0) return refused(std::strerror(error));
     const char* kind = S_ISLNK(facts.st_mode)   ? "a link"
                        : S_ISDIR(facts.st_mode) ? "a folder"

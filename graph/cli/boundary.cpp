@@ -19,11 +19,13 @@
 #include <system_error>
 
 #include "graph/cli/outcome.hpp"
+#include "rt/machine/limits.hpp"
 
 namespace takt::command {
 namespace {
 
-std::string g_command_line;                       // set before any thread is made
+std::string g_command_line;  // set before any thread is made
+void (*g_ended)() = nullptr;
 std::atomic<uint64_t>* g_unsaid_lines = nullptr;  // shared with the processes forked later
 
 void hold_standard_streams() {
@@ -78,15 +80,6 @@ std::string command_line(int argc, char** argv) {
   return line;
 }
 
-int with_output(int code) {
-  errno = 0;
-  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return code;
-  if (errno == EPIPE) return code;
-  const std::string reason = errno != 0 ? std::strerror(errno) : "an earlier write failed";
-  refuse("stdout could not take all that was printed: " + reason, kDeviceOrSystem);
-  return code == kOk ? kDeviceOrSystem : code;
-}
-
 /// Of an error of a library: without what it says of its own sources.
 std::string reason_of(const std::exception& error) {
   std::string text = error.what();
@@ -117,10 +110,23 @@ bool speaks_for_itself(const std::exception& error) {
 
 }  // namespace
 
+void at_end(void (*ended)()) { g_ended = ended; }
+
+int with_output(int code) {
+  if (g_ended != nullptr) g_ended();
+  errno = 0;
+  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return code;
+  if (errno == EPIPE) return code;
+  const std::string reason = errno != 0 ? std::strerror(errno) : "an earlier write failed";
+  refuse("stdout could not take all that was printed: " + reason, kDeviceOrSystem);
+  return code == kOk ? kDeviceOrSystem : code;
+}
+
 int refuse(const std::exception& error) {
   if (const auto* output = dynamic_cast<const OutputError*>(&error))
     return refuse(OutputFailure{output->what(), output->system}, "");
-  if (dynamic_cast<const std::bad_alloc*>(&error) != nullptr) return refuse_command("no more memory", kDeviceOrSystem);
+  if (dynamic_cast<const std::bad_alloc*>(&error) != nullptr)
+    return refuse_command(machine::explain(error), kDeviceOrSystem);
   return speaks_for_itself(error) ? refuse(error.what(), kBadInput) : refuse_command(reason_of(error), kBadInput);
 }
 
@@ -128,6 +134,7 @@ int at_boundary(int argc, char** argv, const std::function<int()>& body) {
   hold_standard_streams();
   outlive_failed_writes();
   count_unsaid_lines();
+  machine::explain_what_nobody_catches();
   g_command_line = command_line(argc, argv);
   int code = kDeviceOrSystem;
   try {

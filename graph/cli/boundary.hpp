@@ -16,12 +16,18 @@ namespace takt::command {
 /// - A closed stdin, stdout or stderr leads to /dev/null from now on. Else the next file or device to be opened would
 ///   get its number, and with it what is printed.
 /// - SIGPIPE and SIGXFSZ end nothing any more: the write fails with EPIPE or EFBIG, as on a full disk. Programs that
-/// are
-///   started from here get back what this one found.
+///   are started from here get back what this one found.
 /// - What stderr does not take is counted (unsaid_lines()), in this process and those forked from it.
 /// - An exception ends the command with one line that says what failed in which command, and exit code 2 or 3.
 /// - What stdout did not take makes exit code 0 a 3. A reader that has gone (`| head`) wanted no more.
 int at_boundary(int argc, char** argv, const std::function<int()>& body);
+
+/// For the end of what stands for main() in another process, which at_boundary() has for its own: writes out what
+/// stdout still holds. The code again, or, where stdout could not take all, the reason on stderr and kDeviceOrSystem
+/// for kOk.
+int with_output(int code);
+/// Has `ended` called by each with_output() of this process: a process that ends without it did not end by itself.
+void at_end(void (*ended)());
 
 /// Lines for stderr that nobody could read: its reader has gone, its disk is full.
 uint64_t unsaid_lines();

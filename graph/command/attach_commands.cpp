@@ -117,9 +117,8 @@ std::vector<std::string> names_meant(const graph::GraphSpec& graph, const std::s
 }
 
 /// Changes the overlay of a graph that does not run. The graph judges the values, as it would judge --set.
-int keep_for_later(plugin::Plugins& plugins, AttachOptions& options) {
-  if (const int code = plugins.load(graph_file(options.graph), options.load); code != kOk) return code;
-  auto graph = load_graph(plugins.registry(), options.graph, options.load);
+int keep_for_later(const Registry& registry, const AttachOptions& options) {
+  auto graph = load_graph(registry, options.graph, options.load);
   if (!graph) return kBadInput;
   const std::filesystem::path file = graph::overlay_file(graph::state_folder(), graph->name);
   if (options.forget) {
@@ -139,7 +138,7 @@ int keep_for_later(plugin::Plugins& plugins, AttachOptions& options) {
     with.set.push_back(name + "=" + options.value);
     changes[name] = options.value;
   }
-  if (!load_graph(plugins.registry(), options.graph, with)) return kBadInput;
+  if (!load_graph(registry, options.graph, with)) return kBadInput;
   if (const auto done = graph::change_overlay(file, graph->name, changes); !done)
     return refuse(done.error(), kDeviceOrSystem);
   std::fprintf(stderr, "takt: nothing runs; kept in %s for the next run of %s\n", file.c_str(), graph->name.c_str());
@@ -148,7 +147,8 @@ int keep_for_later(plugin::Plugins& plugins, AttachOptions& options) {
 
 int run_set(plugin::Plugins& plugins, AttachOptions& options) {
   if ((options.keep || options.forget) && options.run == 0 && attach::running().empty())
-    return keep_for_later(plugins, options);
+    return plugins.carry_out(graph_file(options.graph), options.load,
+                             [&](const Registry& known) { return keep_for_later(known, options); });
   auto connection = attached(options.run);
   if (!connection) return kDeviceOrSystem;
   const Json question =

@@ -13,12 +13,6 @@
 namespace takt::command {
 namespace {
 
-int with_plugins(plugin::Plugins& plugins, const std::filesystem::path& graph, graph::LoadOptions& load,
-                 const std::function<int(const Registry&)>& command) {
-  const int code = plugins.load(graph_file(graph), load);
-  return code == kOk ? command(plugins.registry()) : code;
-}
-
 void add_load_options(CLI::App& app, std::filesystem::path& graph, graph::LoadOptions& load) {
   reads_file(app.add_option("graph", graph, "graph file (default graph/ace.yaml)"));
   app.add_option("--profile", load.profile, "sim | replay | robot, as the graph defines them");
@@ -45,7 +39,8 @@ void add_show(CLI::App& app, plugin::Plugins& plugins, ShowOptions& o, int& exit
   show->add_flag("--dot", o.dot, "prints Graphviz text")->excludes(svg);
   show->footer("Example: takt show graph/ace.yaml --svg ace.svg");
   show->callback([&] {
-    exit_code = with_plugins(plugins, o.graph, o.load, [&](const Registry& known) { return show_graph(known, o); });
+    exit_code =
+        plugins.carry_out(graph_file(o.graph), o.load, [&](const Registry& known) { return show_graph(known, o); });
   });
 }
 
@@ -59,7 +54,8 @@ void add_report(CLI::App& app, plugin::Plugins& plugins, RenderOptions& o, int& 
   report->footer("Example: takt report run.json graph/ace.yaml --html run.html");
   report->callback([&] {
     graph::LoadOptions load;
-    exit_code = with_plugins(plugins, o.graph, load, [&](const Registry& known) { return render_report(known, o); });
+    exit_code =
+        plugins.carry_out(graph_file(o.graph), load, [&](const Registry& known) { return render_report(known, o); });
   });
 }
 
@@ -83,8 +79,8 @@ void add_check(CLI::App& app, plugin::Plugins& plugins, RunOptions& o, bool& jso
       "Of every mode: response bounds and margins, age bounds of chains, memory; of a refused schedule the smallest\n"
       "change that makes it fit. Exit 0: admitted, 1: infeasible or not proven, 2: invalid.");
   check->callback([&] {
-    exit_code =
-        with_plugins(plugins, o.graph, o.load, [&](const Registry& known) { return check_graph(known, o, json); });
+    exit_code = plugins.carry_out(graph_file(o.graph), o.load,
+                                  [&](const Registry& known) { return check_graph(known, o, json); });
   });
 }
 
@@ -95,8 +91,7 @@ void add_nodes(CLI::App& app, plugin::Plugins& plugins, NodesOptions& o, int& ex
   add_plugin_option(*nodes, o.load.plugin_files);
   nodes->footer("Example: takt nodes stereo");
   nodes->callback([&] {
-    exit_code = plugins.load({}, o.load);
-    if (exit_code == kOk) exit_code = print_nodes(plugins.registry(), o.type);
+    exit_code = plugins.carry_out({}, o.load, [&](const Registry& known) { return print_nodes(known, o.type); });
   });
 }
 
@@ -144,7 +139,8 @@ void add_run(CLI::App& app, plugin::Plugins& plugins, RunOptions& o, int& exit_c
       "A policy from the command line ends with exit 3 instead.");
   run->callback([&, how_long] {
     o.duration_asked = how_long->count() > 0;
-    exit_code = with_plugins(plugins, o.graph, o.load, [&](const Registry& known) { return run_graph(known, o); });
+    exit_code =
+        plugins.supervise(graph_file(o.graph), o.load, [&](const Registry& known) { return run_graph(known, o); });
   });
 }
 
@@ -172,8 +168,8 @@ void add_profile(CLI::App& app, plugin::Plugins& plugins, ProfileOptions& o, int
       "Example: takt profile graph/ace.yaml --write measured.yaml\n"
       "Example: takt profile --compare schedules/thesis.yaml");
   profile->callback([&] {
-    exit_code =
-        with_plugins(plugins, o.run.graph, o.run.load, [&](const Registry& known) { return profile_graph(known, o); });
+    exit_code = plugins.carry_out(graph_file(o.run.graph), o.run.load,
+                                  [&](const Registry& known) { return profile_graph(known, o); });
   });
 }
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <ctime>
+#include <functional>
 #include <optional>
 #include <sstream>
 
@@ -71,30 +72,53 @@ void force_simd(const VectorTargets& vectors, const std::string& recorded) {
 
 class Replay {
  public:
-  Replay(plugin::Plugins& plugins, const ReplayOptions& options)
-      : options_(options), plugins_(plugins), prepared_(plugins.registry()) {}
+  explicit Replay(const ReplayOptions& options) : options_(options) {}
 
-  int run() {
+  /// Reads the record: what it says of its run. Throws Refused, as all others do.
+  RunOptions& open() {
     auto file = record::LogFile::open(options_.log);
     if (!file) throw Refused{file.error()};
     file_.emplace(std::move(*file));
     for (const std::string& damage : file_->damages())
       std::fprintf(stderr, "takt: the record is not whole: %s\n", damage.c_str());
     damaged_ = !options_.allow_damage && !file_->damages().empty();
-    force_simd(plugins_.registry().vectors, fact(file_->facts(), "simd"));
-    if (const int code = compose(); code != kOk) return code;
-    check_sameness();
-    const record::ReplayResult result = replay();
-    const int code = tell(result);
-    if (code == kOk && damaged_)
-      return refuse(log::damages_text(options_.log, *file_) + "; --allow-damage goes on with what is left", kNotOk);
+    read_options();
+    return run_;
+  }
+
+  /// After open(), with a registry that knows what its options name.
+  int run(const Registry& registry) {
+    force_simd(registry.vectors, fact(file_->facts(), "simd"));
+    if (const int code = rehearse(registry); code != kOk) return code;
+    return judge(replay([this](const ReplayPart& part) { return replay(part.how); }));
+  }
+
+  /// All but the jobs.
+  int rehearse(const Registry& registry) {
+    check_plugins(run_.load.plugins);
+    prepared_.emplace(registry);
+    const int code = compose();
+    if (code == kOk) check_sameness();
     return code;
   }
 
+  /// After a rehearsal in another process: `registry` has descriptions, and each process of the replay loads plug-ins.
+  int run_apart(const Registry& registry) {
+    force_simd(registry.vectors, fact(file_->facts(), "simd"));
+    prepared_.emplace(registry);
+    if (const int code = load(run_, *prepared_); code != kOk) return code;
+    prepared_->composition = graph::outline(*prepared_->graph, registry, *prepared_->clock);
+    return judge(replay([&](const ReplayPart& part) {
+      prepared_.emplace(of_jobs(registry));
+      if (compose() != kOk) throw std::runtime_error("it cannot be composed again");
+      return replay(part.how);
+    }));
+  }
+
  private:
-  int compose() {
+  void read_options() {
     const mcap::Metadata& facts = file_->facts();
-    RunOptions run;
+    RunOptions& run = run_;
     run.graph = options_.graph.empty() ? std::filesystem::path(fact(facts, "graph")) : options_.graph;
     if (!std::filesystem::exists(run.graph))
       throw Refused{fmt::format("the graph {} of the record is not there; name it: takt replay {} GRAPH",
@@ -113,27 +137,27 @@ class Replay {
     run.clock = fact(facts, "clock");
     run.output = options_.output;
     run.seed = std::strtoull(fact(facts, "seed").c_str(), nullptr, 10);
-    recorded_ = attached_json(*file_, "plan.json");
     run.load.plugin_files = options_.plugin_files;
-    int code = plugins_.load(run.graph, run.load);
-    if (code != kOk) return code;
-    check_plugins(run.load.plugins);
-    code = load(run, prepared_);
+    recorded_ = attached_json(*file_, "plan.json");
+  }
+
+  int compose() {
+    int code = load(run_, *prepared_);
     if (code == kOk) {
-      tell_ignored_overlay(prepared_.graph->name, "the record says which values held");
+      tell_ignored_overlay(prepared_->graph->name, "the record says which values held");
       RecordedFacts facts(recorded_);
       graph::ComposeOptions& how = composed_;
       how.output = options_.output;
-      how.seed = run.seed;
+      how.seed = run_.seed;
       how.exchange = &facts;
       how.owns = [this](const std::string& id) {
-        return std::none_of(prepared_.graph->devices.begin(), prepared_.graph->devices.end(),
+        return std::none_of(prepared_->graph->devices.begin(), prepared_->graph->devices.end(),
                             [&](const graph::DeviceSpec& device) { return device.id == id; });
       };
-      code = command::compose(run, how, prepared_);
+      code = command::compose(run_, how, *prepared_);
       how.exchange = nullptr;
     }
-    if (code != kOk) tell_problems(prepared_.problems.size());
+    if (code != kOk) tell_problems(prepared_->problems.size());
     return code;
   }
 
@@ -152,13 +176,13 @@ class Replay {
 
   /// Says what is not as it was; throws where that makes a replay impossible.
   void check_sameness() {
-    const graph::GraphSpec& graph = *prepared_.graph;
-    const Json plan = log::plan_json(prepared_.composition->plan);
+    const graph::GraphSpec& graph = *prepared_->graph;
+    const Json plan = log::plan_json(prepared_->composition->plan);
     if (const auto differs = log::structure_differs(recorded_, plan))
       throw Refused{"this graph cannot run the jobs of the record: " + *differs};
     const Json assets = attached_json(*file_, "assets.json");
-    const Json hashes = log::asset_hashes(prepared_.composition->plan, graph.directory);
-    const auto places = log::assets(prepared_.composition->plan, graph.directory);
+    const Json hashes = log::asset_hashes(prepared_->composition->plan, graph.directory);
+    const auto places = log::assets(prepared_->composition->plan, graph.directory);
     for (const auto& [name, hash] : assets.items()) {
       if (hashes.value(name, "") == hash) continue;
       const auto place = places.find(name);
@@ -177,10 +201,9 @@ class Replay {
                    version().commit, fact(file_->facts(), "commit").c_str());
   }
 
-  record::ReplayResult replay() {
+  record::ReplayResult replay(const std::function<record::ReplayResult(const ReplayPart&)>& run_part) {
     const std::vector<ReplayPart> parts = this->parts();
     const int64_t before_ns = clock_.now_ns();
-    const auto run_part = [&](const ReplayPart& part) { return replay(part.how); };
     processes_ = parts.size();
     auto result = options_.isolate == "subsystem" ? replay_isolated(parts, run_part) : run_part(parts.front());
     took_ns_ = clock_.now_ns() - before_ns;
@@ -189,12 +212,12 @@ class Replay {
 
   /// Runs the jobs of some nodes, in this process.
   record::ReplayResult replay(record::Replayer::Options how) {
-    const std::vector<TaskPlan>& tasks = prepared_.composition->plan.tasks;
+    const std::vector<TaskPlan>& tasks = prepared_->composition->plan.tasks;
     how.epoch_ns = log::epoch_ns(*file_);
     for (const TaskPlan& task : tasks)
       if (!task.device) task.node->start(how.epoch_ns);
     how.renew = [this](size_t task) { renew(task); };
-    record::Replayer replayer(prepared_.composition->plan, *file_, how);
+    record::Replayer replayer(prepared_->composition->plan, *file_, how);
     auto result = replayer.run([] { return StopOnSignal::asked(); });
     for (size_t t = 0; t < tasks.size(); ++t)  // pictures: each by one process
       if (!tasks[t].device && (how.told.empty() || how.told[t] != 0)) tasks[t].node->finish();
@@ -203,9 +226,9 @@ class Replay {
 
   /// As the process of the node was started again in the run.
   void renew(size_t task) {
-    graph::Composition& composition = *prepared_.composition;
+    graph::Composition& composition = *prepared_->composition;
     auto fresh =
-        graph::make_again(*prepared_.graph, prepared_.registry, *prepared_.clock, composed_, composition.plan, task);
+        graph::make_again(*prepared_->graph, prepared_->registry, *prepared_->clock, composed_, composition.plan, task);
     composition.plan.tasks[task].node = fresh.get();
     composition.nodes[task] = std::move(fresh);
   }
@@ -218,9 +241,9 @@ class Replay {
     const std::vector<char> live = live_tasks();
     how.run = live;
     if (options_.isolate != "subsystem") return {{"all", how}};
-    const std::vector<TaskPlan>& tasks = prepared_.composition->plan.tasks;
+    const std::vector<TaskPlan>& tasks = prepared_->composition->plan.tasks;
     std::vector<std::string> adjusted;
-    const graph::Partition partition = graph::partition(*prepared_.graph, adjusted);
+    const graph::Partition partition = graph::partition(*prepared_->graph, adjusted);
     std::vector<ReplayPart> parts;
     for (size_t process = 0; process < partition.names.size(); ++process) {
       how.told.assign(tasks.size(), 0);
@@ -236,7 +259,7 @@ class Replay {
 
   /// By task: the nodes of --live with_producers(); empty: all.
   std::vector<char> live_tasks() const {
-    const Plan& plan = prepared_.composition->plan;
+    const Plan& plan = prepared_->composition->plan;
     if (options_.live.empty()) return {};
     std::vector<char> runs(plan.tasks.size(), 0);
     std::vector<std::string> names;
@@ -262,7 +285,7 @@ class Replay {
 
   /// True if a producer had to be added.
   bool add_producers(size_t task, std::vector<char>& runs) const {
-    const Plan& plan = prepared_.composition->plan;
+    const Plan& plan = prepared_->composition->plan;
     bool added = false;
     for (const EdgePlan& edge : plan.tasks[task].edges) {
       const PortPlan& port = plan.ports[edge.port];
@@ -291,6 +314,12 @@ class Replay {
       while (!StopOnSignal::asked() && clock_.now_ns() < until_ns)
         clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr);
     };
+  }
+
+  int judge(const record::ReplayResult& result) const {
+    const int code = tell(result);
+    if (code != kOk || !damaged_) return code;
+    return refuse(log::damages_text(options_.log, *file_) + "; --allow-damage goes on with what is left", kNotOk);
   }
 
   int tell(const record::ReplayResult& result) const {
@@ -329,25 +358,21 @@ class Replay {
   }
 
   const ReplayOptions& options_;
-  plugin::Plugins& plugins_;
+  RunOptions run_;  ///< of the record, and what the command line says
   MonotonicClock clock_;
   std::optional<record::LogFile> file_;
   Json recorded_;
-  Prepared prepared_;
+  std::optional<Prepared> prepared_;
   graph::ComposeOptions composed_;
   int64_t took_ns_ = 0;
   bool damaged_ = false;  ///< and that is not allowed
   size_t processes_ = 1;
 };
 
-}  // namespace
-
-int replay(plugin::Plugins& plugins, const ReplayOptions& options) {
-  std::vector<WriterLock> locks;
-  if (const int code = claim_folder(options.output, locks); code != kOk) return code;
-  const StopOnSignal guard;
+/// The exit code of `command`, also where it is refused.
+int judged(const ReplayOptions& options, const std::function<int()>& command) {
   try {
-    return Replay(plugins, options).run();
+    return command();
   } catch (const Refused& refused) {
     return refuse(refused.why, kBadInput);
   } catch (const std::runtime_error& problem) {  // processes
@@ -356,6 +381,28 @@ int replay(plugin::Plugins& plugins, const ReplayOptions& options) {
     return refuse(fmt::format("{}: what it says of its graph cannot be read: {}", options.log.string(), problem.what()),
                   kBadInput);
   }
+}
+
+}  // namespace
+
+int replay(plugin::Plugins& plugins, const ReplayOptions& options) {
+  std::vector<WriterLock> locks;
+  if (const int code = claim_folder(options.output, locks); code != kOk) return code;
+  return judged(options, [&] {
+    Replay replay(options);
+    RunOptions& run = replay.open();
+    const auto stoppable = [&](const std::function<int()>& part) {
+      const StopOnSignal guard;
+      return judged(options, part);
+    };
+    const bool apart = options.isolate == "subsystem" && plugin::are_named(run.graph, run.load);
+    const int code = plugins.carry_out(run.graph, run.load, [&](const Registry& known) {
+      return stoppable([&] { return apart ? replay.rehearse(known) : replay.run(known); });
+    });
+    if (!apart || code != kOk) return code;
+    return plugins.supervise(run.graph, run.load,
+                             [&](const Registry& known) { return stoppable([&] { return replay.run_apart(known); }); });
+  });
 }
 
 void add_replay(CLI::App& app, plugin::Plugins& plugins, ReplayOptions& o, int& exit_code) {

@@ -10,12 +10,14 @@
 #include "graph/compose/plan_modes.hpp"
 #include "graph/language/share.hpp"
 #include "hal/devices.hpp"
+#include "rt/machine/limits.hpp"
 #include "rt/sched/port_access.hpp"
 
 namespace takt::graph {
 namespace {
 
 constexpr int64_t kSecond = 1'000'000'000;
+constexpr int64_t kLeastRoom = 16'000'000;  ///< bytes; setups take some of memory at once
 
 /// Ports of the plan by name.
 using PortIndex = std::map<std::string, size_t>;
@@ -41,8 +43,25 @@ std::unique_ptr<Node> make_node(const NodeSpec& spec, const NodeTypes& types) {
   return node;
 }
 
+/// What the registry's `setting_up` is told while it lives: whose setup it is that crashes or never returns.
+class Told {
+ public:
+  Told(const Registry& registry, const Position& at, const std::string& node) : told_(registry.setting_up) {
+    if (told_) told_(to_string(Problem{at, node}));
+  }
+  ~Told() {
+    if (told_) told_({});
+  }
+  Told(const Told&) = delete;
+  Told& operator=(const Told&) = delete;
+
+ private:
+  const std::function<void(std::string_view)>& told_;
+};
+
 void give_setup(Node& node, const TaskPlan& task, size_t t, const GraphSpec& graph, const Clock& clock,
-                const ComposeOptions& options) {
+                const ComposeOptions& options, const Registry& registry, const Position& at) {
+  const Told told(registry, at, task.name);
   Setup setup{clock, graph.directory, options.output, options.seed + t, task.rate, task.offset_ns};
   node.setup(setup);
 }
@@ -129,6 +148,7 @@ class Composer {
       port.node = id;
       port.port = output->name();
       port.type = &output->type();
+      if (is_described(*port.type)) port.counts.emplace();
       result_.plan.ports.push_back(port);
     }
     task_index_[id] = result_.plan.tasks.size();
@@ -274,9 +294,11 @@ class Composer {
     if (sound) sound = call_setup(t, error);
     for (ParamBase* param : task.node->params()) param->end_setup();
     if (options_.exchange != nullptr) {
-      for (const size_t port : task.ports)
-        options_.exchange->tell(port,
-                                sound ? std::optional(output_of(result_.plan.ports[port]).capacity()) : std::nullopt);
+      for (const size_t port : task.ports) {
+        const OutputPort& output = output_of(result_.plan.ports[port]);
+        if (sound) options_.exchange->tell_counts(port, counts_of(output.type(), output.capacity()));
+        options_.exchange->tell(port, sound ? std::optional(output.capacity()) : std::nullopt);
+      }
     }
     return sound;
   }
@@ -284,10 +306,13 @@ class Composer {
   bool call_setup(size_t t, ComposeError& error) {
     TaskPlan& task = result_.plan.tasks[t];
     try {
-      give_setup(*task.node, task, t, graph_, clock_, options_);
+      give_setup(*task.node, task, t, graph_, clock_, options_, registry_, positions_[t]);
+      // Beyond the limit of a control group the kernel kills instead of refusing.
+      if (const auto room = machine::memory_room(); room && room->free < kLeastRoom) throw std::bad_alloc();
       return true;
     } catch (const std::exception& problem) {
-      error.problems.push_back({positions_[t], fmt::format("{}: {}", task.name, problem.what())});
+      error.problems.push_back({positions_[t], fmt::format("{}: {}", task.name, machine::explain(problem))});
+      error.device_failed = error.device_failed || machine::scarce(problem);
       return false;
     }
   }
@@ -320,7 +345,7 @@ std::unique_ptr<Node> make_again(const GraphSpec& graph, const Registry& registr
   for (size_t i = 0; i < node->inputs().size(); ++i)
     if (const InputPort& before = *task.node->inputs()[i]; before.connected())
       PortAccess::connect(*node->inputs()[i], before.capacity());
-  give_setup(*node, task, t, graph, clock, options);
+  give_setup(*node, task, t, graph, clock, options, registry, spec->position);
   for (ParamBase* param : node->params()) param->end_setup();
   return node;
 }
@@ -328,7 +353,10 @@ std::unique_ptr<Node> make_again(const GraphSpec& graph, const Registry& registr
 void complete(Plan& plan, FactExchange& exchange, const Observers& observers) {
   for (size_t t = 0; t < plan.tasks.size(); ++t)
     if (plan.tasks[t].device) plan.tasks[t].source = exchange.wait_for_source(t);
-  for (size_t p = 0; p < plan.ports.size(); ++p) plan.ports[p].capacity = exchange.wait_for(p).value_or(Capacity{});
+  for (size_t p = 0; p < plan.ports.size(); ++p) {
+    plan.ports[p].capacity = exchange.wait_for(p).value_or(Capacity{});
+    if (plan.ports[p].counts) plan.ports[p].counts = exchange.counts(p);
+  }
   size_ports(plan, observers);
 }
 

@@ -29,6 +29,12 @@ class FactExchange {
   virtual ~FactExchange() = default;
   /// Nothing: the node could not be set up.
   virtual void tell(size_t port, const std::optional<Capacity>& capacity) = 0;
+  /// Before that, if there is a capacity: what it comes to, for processes that know the type by its description only.
+  virtual void tell_counts(size_t port, const ArrayCounts& counts) {
+    static_cast<void>(port), static_cast<void>(counts);
+  }
+  /// After wait_for().
+  virtual ArrayCounts counts(size_t port) { return static_cast<void>(port), ArrayCounts{}; }
   /// Waits for the process that owns the port. Throws std::runtime_error if that will never tell.
   virtual std::optional<Capacity> wait_for(size_t port) = 0;
   virtual void tell_source(size_t task, const SourcePlan& source) = 0;

@@ -2,8 +2,10 @@
 // Installed as <takt/registry.hpp>: graph, experimental.
 #pragma once
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "hal/device_types.hpp"
@@ -39,6 +41,18 @@ struct Registry {
   Pictures pictures;
   VectorTargets vectors;
   std::vector<void (*)()> before_jobs;  ///< called in each process that runs jobs, before it makes threads
+  /// Called before the setup of each node with "FILE:LINE:COLUMN: error: NODE", and with "" after it; empty: nobody
+  /// asks.
+  std::function<void(std::string_view node)> setting_up = {};
+  /// Where nodes are known by their description only: what a process that runs jobs knows, into which this loads the
+  /// plug-ins then. Throws std::runtime_error. See of_jobs().
+  std::function<const Registry&()> load_for_jobs = {};
 };
+
+/// The registry with which jobs are run: `registry`, unless that has descriptions in the place of plug-ins. Once a
+/// process, which makes no other process from then on.
+inline const Registry& of_jobs(const Registry& registry) {
+  return registry.load_for_jobs ? registry.load_for_jobs() : registry;
+}
 
 }  // namespace takt

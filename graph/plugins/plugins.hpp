@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// Plug-ins of a program (graph/plugin.hpp): found, judged, tried in a child process, then loaded.
+// Plug-ins of a program (graph/plugin.hpp): found, judged, tried in a child process, then loaded: in a child process,
+// too, or in this one.
 //
 //   Plugins plugins(registry);
-//   if (const int code = plugins.load(file, options.load); code != command::kOk) return code;
-//   return run_graph(registry, options);
+//   return plugins.carry_out(file, options.load, [&](const Registry& known) { return check_graph(known, options); });
 #pragma once
 #include <chrono>
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <tl/expected.hpp>
 #include <vector>
@@ -24,33 +25,54 @@ inline constexpr std::chrono::milliseconds kPatience{10'000};
 tl::expected<std::filesystem::path, std::string> find(const std::filesystem::path& file,
                                                       const std::vector<std::filesystem::path>& folders);
 
+/// Whether the command line or the graph file names any.
+bool are_named(const std::filesystem::path& graph, const graph::LoadOptions& options);
+
 /// The plug-in folder of the installation: lib/takt/plugins beside the bin/ of this program.
 std::filesystem::path folder();
 
 /// The ABI that a plug-in was built with; none of its code runs. The error says why `file` is no plug-in.
 tl::expected<std::string, std::string> abi_of(const std::filesystem::path& file);
 
-/// Loads `file` into this process for the rest of its life, and lets it add to `registry`. A child process does so
-/// first: a plug-in that crashes, ends the process, throws, takes longer than `patience`, or leaves threads behind is
-/// an error, and this process never runs it. The calling thread must be the only one that uses `registry`.
-tl::expected<void, std::string> load(const std::filesystem::path& file, Registry& registry,
-                                     std::chrono::milliseconds patience = kPatience);
+/// A plug-in that has passed its trial.
+struct Plugin {
+  std::filesystem::path file;
+  graph::Position position;  ///< that named it
+  graph::PluginFact fact;
+  std::string description;  ///< graph/plugins/description.hpp
+};
 
-/// The plug-ins of this program; what they register lands in `registry`. One thread.
+/// Whether `file` can be loaded after those `before` it: its ABI is read, then a child process loads it. A plug-in that
+/// crashes there, ends the process, throws, takes longer than `patience`, or leaves threads behind is an error. This
+/// process, which has one thread, never runs it. What it adds, as data. `registry` is that of the program, and stays as
+/// it is.
+tl::expected<std::string, std::string> judge(const std::filesystem::path& file, const std::vector<Plugin>& before,
+                                             Registry& registry, std::chrono::milliseconds patience = kPatience);
+
+/// The plug-ins of this program. One thread.
 class Plugins {
  public:
   explicit Plugins(Registry& registry) : registry_(registry) {}
-  /// Loads those of `options.plugin_files` (looked for from the working folder), then those that the graph file names
-  /// (beside it), unless one of that file name is loaded already; each else from folder(). An empty graph names none.
-  /// Fills `options.plugins`. The exit code; what is wrong stands on stderr then.
-  int load(const std::filesystem::path& graph, graph::LoadOptions& options);
+  /// Carries out a command with the plug-ins of `options.plugin_files` (looked for from the working folder), then those
+  /// that the graph file names (beside it), unless there is one of that file name already; each else from folder(). An
+  /// empty graph names none. Fills `options.plugins`. Where there are any, the command happens in a child process, and
+  /// nothing of them is ever loaded here. The exit code; what is wrong stands on stderr then.
+  int carry_out(const std::filesystem::path& graph, graph::LoadOptions& options,
+                const std::function<int(const Registry&)>& command);
+  /// Carries out a command that makes processes for jobs. It is given a registry with descriptions of the plug-ins;
+  /// each process that runs jobs loads them by of_jobs().
+  int supervise(const std::filesystem::path& graph, graph::LoadOptions& options,
+                const std::function<int(const Registry&)>& command);
   const Registry& registry() const { return registry_; }
 
  private:
-  tl::expected<void, std::string> add(const std::filesystem::path& file, const std::filesystem::path& beside);
+  tl::expected<void, std::string> add(const std::filesystem::path& file, const std::filesystem::path& beside,
+                                      const graph::Position& position);
+  int find_all(const std::filesystem::path& graph, graph::LoadOptions& options);
+  std::vector<graph::Problem> load_here();
 
   Registry& registry_;
-  std::vector<graph::PluginFact> loaded_;
+  std::vector<Plugin> found_;
 };
 
 }  // namespace takt::plugin

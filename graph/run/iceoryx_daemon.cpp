@@ -22,7 +22,7 @@ std::unique_ptr<DaemonClaim> find_room_for_daemon(std::vector<std::string>& adju
   } catch (const TransportError& taken) {
     const std::string refused = enter_private_mounts();
     if (!refused.empty()) throw TransportError(fmt::format("{} ({} was refused)", taken.what(), refused));
-    adjusted.push_back("/tmp and /dev/shm -> private ones: another iceoryx daemon is running on this machine");
+    adjusted.push_back(fmt::format("/tmp and /dev/shm -> private ones: {}", taken.what()));
     return claimed();
   }
 }

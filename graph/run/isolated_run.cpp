@@ -28,6 +28,7 @@
 #include "graph/run/trace.hpp"
 #include "graph/run/watchdog.hpp"
 #include "rt/capability.hpp"
+#include "rt/machine/limits.hpp"
 #include "rt/memory/sanitized.hpp"
 #include "rt/sched/executor.hpp"
 #include "rt/shm/iceoryx_preflight.hpp"
@@ -39,7 +40,9 @@
 namespace takt::command {
 namespace {
 
-constexpr int64_t kStartDelayNs = 100'000'000;                // devices start between the agreement and the epoch
+constexpr int64_t kStartDelayNs = 100'000'000;  // devices start between the agreement and the epoch
+// Without memory the kernel ends processes of low nodes first, then the others, the supervisor last.
+constexpr int kGoesFirst = 500, kGoesLate = 200;
 constexpr int64_t kPatienceNs = kSlowdown * 3'000'000'000LL;  // for the processes to end after the stop
 
 /// Ends the run with an exit code before it began.
@@ -95,11 +98,12 @@ class IsolatedRun {
     if (again()) forget_processes();
     for (size_t p = 0; p < partition_.names.size(); ++p) {
       const auto body = [this, p, supervisor = getpid()](bool spare) -> int {
+        machine::go_first_without_memory(is_high(p) ? kGoesLate : kGoesFirst);
         try {
           return run_member({registry_, options_, graph_, partition_, plan_.overheads, p, spare, supervisor, board_,
                              pools_, trace_.rings(), faults_});
         } catch (const std::exception& problem) {  // as in a run in one process: no memory, no daemon, no thread
-          return refuse(fmt::format("process {}: {}", partition_.names[p], problem.what()), kDeviceOrSystem);
+          return refuse(fmt::format("process {}: {}", partition_.names[p], machine::explain(problem)), kDeviceOrSystem);
         }
       };
       group_.start(
@@ -206,6 +210,12 @@ class IsolatedRun {
     throw Refused{code_};
   }
 
+  bool is_high(size_t process) const {
+    return std::any_of(plan_.tasks.begin(), plan_.tasks.end(), [&](const TaskPlan& task) {
+      return task.criticality == Criticality::high && partition_.process_of.at(task.name) == process;
+    });
+  }
+
   /// Notes how processes ended; true if one ended that should not have.
   bool collect_ends() {
     while (const auto end = group_.reap()) {
@@ -214,13 +224,19 @@ class IsolatedRun {
       if (ending_) continue;
       code_ = std::max(code_, end->signal != 0 ? static_cast<int>(kDeviceOrSystem) : end->code);
       if (end->signal != 0)
-        problems_.push_back(fmt::format("process {} was ended by signal {} ({})", group_.name(end->process),
-                                        end->signal, strsignal(end->signal)));
+        problems_.push_back(fmt::format("process {} was ended by signal {} ({}){}", group_.name(end->process),
+                                        end->signal, strsignal(end->signal), memory_note()));
       else if (board_.process(end->process).problems.load() == 0)
         problems_.push_back(fmt::format("process {} ended with code {}", group_.name(end->process), end->code));
       for (; told_ < problems_.size(); ++told_) std::fprintf(stderr, "takt: error: %s\n", problems_[told_].c_str());
     }
     return code_ != 0;
+  }
+
+  /// Where the kernel killed since the control group has no more memory.
+  std::string memory_note() const {
+    if (machine::memory_kills() <= memory_kills_before_) return "";
+    return fmt::format(": no more memory ({})", machine::limit_on(machine::Scarce::memory));
   }
 
   void bring_up_transport() {
@@ -423,6 +439,7 @@ class IsolatedRun {
   const PoolFile pools_;  ///< of the local transport, for the members and this process
   Policy granted_ = Policy::cooperative;
   int code_ = 0;
+  int64_t memory_kills_before_ = machine::memory_kills();
   size_t told_ = 0;
   bool ending_ = false;
   double memory_mb_ = 0;

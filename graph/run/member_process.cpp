@@ -128,7 +128,8 @@ int run_member(const MemberPart& part) {
     obey_orders(&record.kill);
   };
   if (!part.spare) take_place();
-  Prepared prepared(part.registry);
+  const Registry& registry = of_jobs(part.registry);
+  Prepared prepared(registry);
   prepared.graph = part.graph;
   prepared.clock = std::make_unique<MonotonicClock>();
   BoardExchange exchange(board);
@@ -151,7 +152,7 @@ int run_member(const MemberPart& part) {
   plan.overheads = part.overheads;
   if (!part.spare) record.reach(ProcessRecord::composed, prepared.clock->now_ns());
   wait_until([&] { return board.carrier().load() != RunBoard::no_carrier; });
-  prepare_process(part.registry);
+  prepare_process(registry);
   std::unique_ptr<Transport> joined;
   without_rights([&] {
     joined = board.carrier().load() == RunBoard::local

@@ -18,6 +18,8 @@ class BoardExchange final : public graph::FactExchange {
  public:
   explicit BoardExchange(RunBoard& board) : board_(board) {}
   void tell(size_t port, const std::optional<Capacity>& capacity) override;
+  void tell_counts(size_t port, const ArrayCounts& counts) override { board_.capacity(port).counts = counts; }
+  ArrayCounts counts(size_t port) override { return board_.capacity(port).counts; }
   std::optional<Capacity> wait_for(size_t port) override;
   void tell_source(size_t task, const SourcePlan& source) override;
   SourcePlan wait_for_source(size_t task) override;

@@ -24,6 +24,7 @@
 #include "graph/run/watchdog.hpp"
 #include "graph/run/world_truth.hpp"
 #include "rt/capability.hpp"
+#include "rt/machine/limits.hpp"
 #include "rt/shm/iceoryx_preflight.hpp"
 #include "rt/supervise/systemd_sink.hpp"
 
@@ -202,7 +203,12 @@ int run_as_asked(const Registry& registry, RunOptions options) {
   const bool processes = wanted == "subsystem" && options.clock != "virtual";
   RunFaults faults(registry, options);
   if (const int code = faults.load(*prepared.graph, *prepared.clock, processes); code != kOk) return code;
-  if (!processes) return run_in_one_process(options, prepared, faults, adjusted);
+  if (!processes) {
+    Prepared whole(of_jobs(registry));
+    whole.graph = std::move(prepared.graph);
+    whole.clock = std::move(prepared.clock);
+    return run_in_one_process(options, whole, faults, adjusted);
+  }
   const KeptPlace record(options.record);
   return run_isolated(registry, options, *prepared.graph, faults, std::move(adjusted));
 }
@@ -230,7 +236,7 @@ int run_graph(const Registry& registry, const RunOptions& options) {
   } catch (const std::invalid_argument& problem) {  // more ports or edges than the transport carries
     return refuse(problem.what(), kBadInput);
   } catch (const std::exception& problem) {  // PolicyRefused, TransportError, no memory
-    return refuse(problem.what(), kDeviceOrSystem);
+    return refuse(machine::explain(problem), kDeviceOrSystem);
   }
 }
 

@@ -176,6 +176,7 @@ bool is_stuck(const RunResult& result, size_t task) {
 }
 
 void end_process(int code, const std::string& transport) {
+  code = with_output(code);
   std::fflush(nullptr);
   if (transport == "iceoryx") remove_iceoryx_leftovers(IceoryxPlaces::of_this_machine(), getpid());
   std::_Exit(code);

@@ -3,6 +3,7 @@
 
 #include <pwd.h>
 #include <sched.h>
+#include <sys/resource.h>
 #include <unistd.h>
 #include <zlib.h>
 
@@ -45,6 +46,13 @@ std::vector<int> SystemFacts::allowed_cpus() const {
   for (int cpu = 0; cpu < CPU_SETSIZE; ++cpu)
     if (CPU_ISSET(static_cast<size_t>(cpu), &set)) cpus.push_back(cpu);
   return cpus;
+}
+
+std::optional<int64_t> SystemFacts::limit(int resource) const {
+  rlimit found{};
+  if (getrlimit(static_cast<__rlimit_resource_t>(resource), &found) != 0 || found.rlim_cur == RLIM_INFINITY)
+    return std::nullopt;
+  return static_cast<int64_t>(found.rlim_cur);
 }
 
 bool SystemFacts::is_root() const { return geteuid() == 0; }

@@ -187,7 +187,8 @@ bool Executor::run_partitioned(Policy policy, RunResult& result) {
   // A process before this one may just have died with the same reservations. One that comes back does not wait: its
   // jobs are due.
   const int64_t patience_ns = options_.rejoin ? 0 : bandwidth_within_ns(wanted) + kBandwidthMargin_ns;
-  for (size_t i = 0; i < lanes_.size(); ++i) {
+  size_t begun = 0;
+  const auto begin_lane = [&](size_t i) {
     const PassesPriorityOn at_once;
     crew_->workers.start([this, &crew = *crew_, &lane = *lanes_[i], mine = wanted[i], patience_ns, i] {
       name_thread(lane.head().plan().name);
@@ -216,11 +217,16 @@ bool Executor::run_partitioned(Policy policy, RunResult& result) {
         lane.run_next(clock_, stop_);
       }
     });
-  }
-  crew_->ready.arrive_and_wait();
+  };
   try {
+    for (; begun < lanes_.size(); ++begun) begin_lane(begun);
+    crew_->ready.arrive_and_wait();
     agree(policy, result);
-  } catch (...) {  // a device that cannot start: the workers must not wait for ever
+  } catch (...) {  // too many threads, a device that cannot start: the workers must not wait for ever
+    if (begun < lanes_.size()) {
+      for (Rendezvous* meeting : {&crew_->ready, &crew_->started}) meeting->leave(lanes_.size() - begun);
+      crew_->ready.arrive_and_wait();
+    }
     crew_->started.arrive_and_wait();
     throw;
   }
@@ -253,7 +259,7 @@ void Executor::run_cooperative(RunResult& result) {
   crew_->queue = std::make_unique<CooperativeQueue>(lanes_, clock_, stop_, lead_ns);
   watch(Policy::cooperative);
   const size_t workers = std::clamp<size_t>(plan_.cores.size(), 1, std::max<size_t>(lanes_.size(), 1));
-  for (size_t i = 0; i < workers; ++i) {
+  const auto begin_worker = [&](size_t i) {
     crew_->workers.start([this, &queue = *crew_->queue, i] {
       name_thread("takt-worker-" + std::to_string(i));
       const trace::Thread traced(options_.trace, "takt-worker-" + std::to_string(i));
@@ -262,6 +268,12 @@ void Executor::run_cooperative(RunResult& result) {
       start_counting();
       queue.work();
     });
+  };
+  try {
+    for (size_t i = 0; i < workers; ++i) begin_worker(i);
+  } catch (...) {  // too many threads: those that were begun must not work on
+    stop_.raise(clock_.now_ns());
+    throw;
   }
   stop_.sleep_until(stop_.end_ns());
   join(result);

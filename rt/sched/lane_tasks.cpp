@@ -47,7 +47,7 @@ int64_t ticks_per_ns(const Plan& plan, const std::vector<std::vector<size_t>>& l
 }
 
 int64_t port_bytes(const PortPlan& port) {
-  return port.type == nullptr ? 0 : static_cast<int64_t>(port.type->bytes(port.capacity));
+  return port.type == nullptr ? 0 : static_cast<int64_t>(port.message_bytes());
 }
 
 /// What the runtime adds to one job of a task.

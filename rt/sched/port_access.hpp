@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <utility>
+#include <vector>
+
 #include "rt/node.hpp"
 
 namespace takt {
@@ -10,6 +13,9 @@ class PortAccess {
   static void connect(InputPort& input, const Capacity& capacity) {
     input.connected_ = true;
     input.capacity_ = capacity;
+  }
+  static void stamped_by(OutputPort& output, std::vector<const InputPort*> inputs) {
+    output.stamped_by_ = std::move(inputs);
   }
   static void mark_read(OutputPort& output) { output.connected_ = true; }
   static void attach(OutputPort& output, Writer* writer) { output.writer_ = writer; }

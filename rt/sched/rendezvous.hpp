@@ -18,6 +18,13 @@ class Rendezvous {
     complete_.wait(lock, [this] { return missing_ == 0; });
   }
 
+  /// So many of them will never come.
+  void leave(size_t threads) {
+    const std::lock_guard lock(mutex_);
+    missing_ -= threads;
+    if (missing_ == 0) complete_.notify_all();
+  }
+
  private:
   std::mutex mutex_;
   std::condition_variable complete_;

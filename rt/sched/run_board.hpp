@@ -99,6 +99,7 @@ struct alignas(kCacheLine) CapacityRecord {
   static constexpr uint32_t kTold = 1, kNeverTold = 2;  ///< the latter: its node could not be set up
   std::atomic<uint32_t> known{0};
   Capacity capacity;
+  ArrayCounts counts{};
 };
 
 /// What is known in advance of a hardware node's data; see SourcePlan.

@@ -156,6 +156,10 @@ void iceoryx_preflight(const IceoryxPlaces& places, uint64_t needed_bytes) {
     struct stat status {};
     if (stat(file.c_str(), &status) == 0) reclaimed += static_cast<uint64_t>(status.st_blocks) * 512;
   }
+  for (const auto& folder : {places.run, places.shm})
+    if (access(folder.c_str(), W_OK) != 0 && errno != ENOENT)
+      throw TransportError(folder.string() + " cannot be written: " + std::strerror(errno) +
+                           ". iceoryx has its files there: mount a tmpfs, or run without --transport iceoryx");
   struct statvfs room {};
   if (statvfs(places.shm.c_str(), &room) != 0)
     throw TransportError(places.shm.string() + ": " + std::strerror(errno) + ". Mount it: sudo mount -t tmpfs tmpfs " +

@@ -74,7 +74,7 @@ void LocalPool::mark_end(uint32_t chunk) const { canary(chunk).fill(kCanary ^ ch
 bool LocalPool::intact(uint32_t chunk) const {
   const Canary& end = canary(chunk);
   return std::all_of(end.begin(), end.end(), [&](uint64_t word) { return word == (kCanary ^ chunk); }) &&
-         header(chunk)->loan_offset == offset(header(chunk)) && plan_.type->intact(header(chunk) + 1, plan_.capacity);
+         header(chunk)->loan_offset == offset(header(chunk)) && plan_.intact(header(chunk) + 1);
 }
 
 uint32_t LocalPool::in_use() const {

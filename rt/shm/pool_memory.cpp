@@ -7,9 +7,10 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <cstring>
 #include <stdexcept>
 #include <string>
+
+#include "rt/machine/limits.hpp"
 
 namespace takt {
 namespace {
@@ -17,13 +18,14 @@ namespace {
 constexpr uint64_t kPage = 4096;
 constexpr uint64_t pages(uint64_t bytes) { return (bytes + kPage - 1) / kPage * kPage; }
 
-[[noreturn]] void refuse(const std::string& what) { throw std::runtime_error(what + ": " + std::strerror(errno)); }
+[[noreturn]] void refuse(const std::string& what) { throw std::runtime_error(machine::explain(what, errno)); }
 
 void* map_or_throw(void* at, uint64_t bytes, int protection, int flags, int file, uint64_t offset) {
   void* memory = mmap(at, bytes, protection, flags, file, static_cast<off_t>(offset));
   if (memory == MAP_FAILED)
-    throw std::runtime_error("cannot map " + std::to_string(bytes / 1'000'000) + " MB of message pools: " +
-                             std::strerror(errno) + "; lower image sizes or edge depths, or free memory");
+    throw std::runtime_error(
+        machine::explain("cannot map " + std::to_string(bytes / 1'000'000) + " MB of message pools", errno) +
+        "; lower image sizes or edge depths, or free memory");
   return memory;
 }
 
@@ -46,6 +48,11 @@ PoolFile::~PoolFile() {
 }
 
 void PoolFile::resize(uint64_t bytes) const {
+  // Its pages are touched next: beyond the limit the kernel would kill a process instead of refusing.
+  if (const auto room = machine::memory_room(); room && static_cast<int64_t>(bytes) > room->free)
+    throw std::runtime_error("the message pools need " + std::to_string(bytes / 1'000'000) + " MB, " +
+                             std::to_string(room->free / 1'000'000) + " MB are left (" +
+                             machine::limit_on(machine::Scarce::memory) + "); lower image sizes or edge depths");
   if (ftruncate(writing_, static_cast<off_t>(bytes)) != 0)
     refuse("shared memory of " + std::to_string(bytes) + " bytes");
   // Not against writing: a process that takes a dead one's place maps what that one wrote.

@@ -5,10 +5,11 @@
 #pragma once
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 
-#include "rt/msg/field.hpp"
+#include "rt/msg/layout.hpp"
 
 namespace takt {
 
@@ -115,8 +116,13 @@ struct PortPlan {
   uint32_t history = 1;  ///< messages kept for consumers that start late
   uint32_t held = 0;     ///< sum over consumers of the messages each may hold at once
   uint32_t readers = 0;
+  std::optional<ArrayCounts> counts = {};  ///< where the type is described: what the owner says; else its type knows
   uint32_t chunks() const { return history + held + 2; }  ///< + one loaned, + one being evicted
-  uint64_t chunk_bytes() const { return sizeof(MessageHeader) + type->bytes(capacity); }
+  uint64_t message_bytes() const { return counts ? bytes_of(*type, *counts) : type->bytes(capacity); }
+  uint64_t chunk_bytes() const { return sizeof(MessageHeader) + message_bytes(); }
+  bool intact(const void* message) const {
+    return counts ? takt::intact(*type, message, *counts) : type->intact(message, capacity);
+  }
 };
 
 /// Memory of all ports of one graph. Made before start, outlives all writers and readers.

@@ -14,6 +14,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "rt/machine/limits.hpp"
 #include "rt/supervise/hasten_end.hpp"
 
 namespace takt {
@@ -29,7 +30,7 @@ void wait_a_step(int64_t ns = kStep_ns) {
 pid_t fork_group(const std::function<int()>& group) {
   std::fflush(nullptr);  // or both processes write what is buffered
   const pid_t keeper = getpid(), pid = fork();
-  if (pid < 0) throw std::runtime_error(std::string("the group's process: fork: ") + std::strerror(errno));
+  if (pid < 0) throw std::runtime_error(machine::explain("the group's process: fork", errno));
   if (pid > 0) return pid;
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (getppid() != keeper) _exit(1);
@@ -47,8 +48,8 @@ void kill_children() {
   }
 }
 
-/// They die with their supervisor, but for one that was just being forked or that has no tie to it; all of them belong to
-/// this process then. Waits until the last one is gone: the next group works on the same board.
+/// They die with their supervisor, but for one that was just being forked or that has no tie to it; all of them belong
+/// to this process then. Waits until the last one is gone: the next group works on the same board.
 void bury_members() {
   pid_t buried = 0;
   for (int tries = 0; tries < 1000 && (buried >= 0 || errno != ECHILD); ++tries) {

@@ -18,11 +18,13 @@
 #include <string>
 #include <utility>
 
+#include "rt/machine/limits.hpp"
+
 namespace takt {
 namespace {
 
 [[noreturn]] void refuse(const char* what) {
-  throw std::runtime_error(std::string("restarts of processes: ") + what + std::strerror(errno));
+  throw std::runtime_error(machine::explain(std::string("restarts of processes") + what, errno));
 }
 
 /// The maker's end, and the other one.
@@ -93,7 +95,7 @@ Nursery::Nursery(Body body, int priority) : body_(std::move(body)), priority_(pr
   if (prctl(PR_SET_CHILD_SUBREAPER, 1) != 0) refuse("");
   void* memory =
       mmap(nullptr, sizeof(Order) * kOrders, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS | MAP_POPULATE, -1, 0);
-  if (memory == MAP_FAILED) refuse("shared memory: ");
+  if (memory == MAP_FAILED) refuse(": shared memory");
   orders_ = static_cast<Order*>(memory);
   for (size_t i = 0; i < kOrders; ++i) ::new (orders_ + i) Order;
   for (Hand& hand : hands_) hand = fork_first();
@@ -114,7 +116,7 @@ Nursery::Hand Nursery::fork_first() {
   std::array<int, 2> ends{};
   if (!make_line(ends)) refuse("");
   const pid_t pid = fork();
-  if (pid < 0) refuse("fork: ");
+  if (pid < 0) refuse(": fork");
   if (pid == 0) {
     close(ends[0]);
     serve(ends[1]);

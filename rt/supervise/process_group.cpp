@@ -16,6 +16,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "rt/machine/limits.hpp"
 #include "rt/supervise/hasten_end.hpp"
 
 namespace takt {
@@ -29,7 +30,7 @@ int run_member(const std::string& name, const std::function<int()>& body) {
   try {
     code = body();
   } catch (const std::exception& problem) {
-    std::fprintf(stderr, "takt: error: process %s: %s\n", name.c_str(), problem.what());
+    std::fprintf(stderr, "takt: error: process %s: %s\n", name.c_str(), machine::explain(problem).c_str());
   } catch (...) {  // else it would go on in the supervisor's code above the fork
     std::fprintf(stderr, "takt: error: process %s: unknown exception\n", name.c_str());
   }
@@ -71,7 +72,7 @@ ProcessGroup::~ProcessGroup() {
 void ProcessGroup::start(const std::string& name, const std::function<int()>& body, const std::function<int()>& spare) {
   std::fflush(nullptr);  // or both processes write what is buffered
   const pid_t supervisor = getpid(), pid = fork();
-  if (pid < 0) throw std::runtime_error("process " + name + ": fork: " + std::strerror(errno));
+  if (pid < 0) throw std::runtime_error(machine::explain("process " + name + ": fork", errno));
   if (pid == 0) {
     die_with(supervisor);
     run_member(name, body);

@@ -88,6 +88,109 @@ BLINK=loop refused "is still not loaded after 10 s" run
 BLINK=fork refused "registers nothing: the lamp is missing" run
 [ -z "$(pgrep -f "^$takt run $graph")" ] || fail "a process of the plug-in's trial lives on"
 
+# Any command but `run` has it in a child only: what a setup does there is told by node, and nothing is left behind.
+blinker=$work/blink.yaml:$(awk '/^    blinker:/ {print NR}' "$graph")
+none_left() { sleep 0.1; [ -z "$(pgrep -f "^$takt ")" ] || fail "a process is left behind: $(pgrep -af "^$takt ")"; }
+commands=("check $graph" "profile $graph --for 1s" "replay $work/blink.mcap --output $work/out")
+while read -r trouble text; do
+  for words in "${commands[@]}"; do
+    # shellcheck disable=SC2086
+    BLINK=${trouble//_/ } expect 2 "$blinker" "$takt" $words
+    grep -qF "error: blinker: its setup $text; plug-ins: libblink.so" "$work/stderr" || fail "not said: $text"
+    none_left
+  done
+done <<'END'
+setup_crash crashes: signal 6 (Aborted)
+setup_exit ends the process (exit 0)
+END
+BLINK="setup loop" expect 2 "error: blinker: its setup does not return within 30 s" "$takt" check "$graph"
+none_left
+for trouble in "setup fork" "setup handlers"; do
+  BLINK=$trouble expect 0 "" "$takt" check "$graph"
+  none_left
+done
+diff <("$takt" check "$graph" 2>&1) <(BLINK="setup handlers" "$takt" check "$graph" 2>&1) || fail "check prints something else"
+
+# ended TROUBLE SIGNAL CODE TEXT: a check whose setup never returns ends by the signal, with its child.
+ended() {
+  BLINK=$1 "$takt" check "$graph" >"$work/stdout" 2>"$work/stderr" &
+  local check=$!
+  until pgrep -P $check >/dev/null && grep -q libblink.so "/proc/$(pgrep -n -P $check)/maps" 2>/dev/null; do sleep 0.1; done
+  sleep 0.5  # by now it is in the setup
+  grep -q libblink.so /proc/$check/maps && fail "the parent has loaded the plug-in"
+  kill -s "$2" $check
+  wait $check
+  local got=$?
+  [ $got -eq "$3" ] || fail "exit $got instead of $3 after $2"
+  [ -z "$4" ] || grep -qF "$4" "$work/stderr" || fail "not said: $4"
+  none_left
+}
+ended "setup loop" TERM 143 ""
+ended "setup fork loop" TERM 143 ""
+ended "setup deaf" TERM 143 "error: blinker: its setup did not end within 10 s of signal 15 and was killed"
+BLINK="setup loop" timeout -s INT 2 "$takt" check "$graph"
+none_left
+BLINK="setup loop" timeout -s KILL 2 "$takt" check "$graph"
+none_left
+"$takt" profile "$graph" --for 20s >"$work/stdout" 2>"$work/stderr" &
+profile=$!
+until grep -q "takt profile: each job alone" "$work/stderr"; do sleep 0.1; done
+sleep 1
+kill -TERM $profile
+wait $profile
+[ $? -eq 1 ] && grep -q "stopped: nothing was written" "$work/stderr" || fail "a profile does not end as it is told to"
+none_left
+
+# A run in several processes: supervisor and nursery know it by its description, the processes for its nodes load it.
+loaded_in() { grep -q libblink.so "/proc/$1/maps"; }
+apart() { # apart NAME: such a run of $work/NAME.yaml
+  name=$1
+  start_run "$name" "$work/$name.yaml" --isolate subsystem --for 0s --record "$work/$name.mcap" --report "$work/$name.json"
+  loaded_in "$run" && fail "the supervisor has loaded the plug-in"
+  local nurseries lamp
+  nurseries=$(pgrep -x takt-nursery -P "$run")
+  [ -n "$nurseries" ] || fail "there is no nursery"
+  for nursery in $nurseries; do loaded_in "$nursery" && fail "a nursery has loaded the plug-in"; done
+  lamp=$(member lamp)
+  loaded_in "$lamp" || fail "the process lamp has not loaded the plug-in"
+  loaded_in "$(member eye)" || fail "the process eye has not loaded the plug-in"
+  expect 0 "" "$takt" echo blinker.light --count 2 --run $run
+  prints '"words": "o'
+  expect 2 "is no picture" "$takt" echo blinker.light --png "$work/glow.png" --run $run
+  expect 0 "" "$takt" set blinker.brightness 200 --run $run
+  expect 2 "must lie in 0..255" "$takt" set blinker.brightness 256 --run $run
+  expect 2 "must lie in -3.14159..3.14159" "$takt" set blinker.angle 181deg --run $run
+  kill -KILL "$lamp"
+  said "process lamp is back" "$work/$name.err"
+  lamp=$(member lamp)
+  loaded_in "$lamp" || fail "the process lamp has not loaded the plug-in again"
+  expect 0 "" "$takt" echo blinker.light --run $run
+  prints '"brightness": 200'
+  end_run "0 1"
+  expect 0 "" "$takt" log echo "$work/$name.mcap" watcher.seen
+  said '"words":"yes"' "$work/stdout"
+  for isolate in none subsystem; do
+    expect 0 "" "$takt" replay "$work/$name.mcap" --compare --isolate $isolate --output "$work/out"
+    grep -qE "compared ([0-9]+) of \1 messages.* 0 differ" "$work/stdout" || fail "replay: $(cat "$work/stdout")"
+  done
+  "$takt" replay "$work/$name.mcap" --isolate subsystem --recorded-pace --output "$work/out" >"$work/stdout" 2>&1 &
+  run=$!
+  until lamp=$(member lamp) && loaded_in "$lamp"; do kill -0 $run || break; sleep 0.1; done
+  loaded_in $run && fail "the process that supervises a replay has loaded the plug-in"
+  wait $run || fail "replay --isolate subsystem: $(cat "$work/stdout")"
+}
+cp "$graph" "$work/several.yaml"
+apart several
+sed 's/^  lamp:/&\n    spare: true/' "$graph" >"$work/spared.yaml"
+apart spared
+python3 - "$work/several.json" "$work/report.json" <<'PY' || fail "the plan of several processes is another one"
+import json, sys
+several, whole = (json.load(open(name)) for name in sys.argv[1:])
+assert several["isolation"] == "subsystem", several["isolation"]
+sizes = lambda report: {pool["port"]: pool["bytes"] for pool in report["memory"]["pools"]}
+assert sizes(several) == sizes(whole), (sizes(several), sizes(whole))
+PY
+
 # In its jobs it is contained as every node is.
 for trouble in throw crash loop; do
   "$takt" run "$graph" --for 3s --isolate subsystem --policy cooperative --set blinker.trouble=$trouble --output "$work/out" \

@@ -1,3 +1,3 @@
 # SPDX-License-Identifier: Apache-2.0
 set(ROOM_LABEL nodes)  # runs every processing node
-set(ROOM_TEST_LIBRARIES takt_ace takt_discovery)
+set(ROOM_TEST_LIBRARIES takt_ace takt_discovery takt_plugins)

@@ -11,6 +11,7 @@
 #include "graph/ace/ace_registry.hpp"
 #include "graph/check/check.hpp"
 #include "graph/compose/partition.hpp"
+#include "graph/plugins/description.hpp"
 #include "tests/unit/compose/drive.hpp"
 
 using namespace takt;
@@ -22,6 +23,8 @@ class SharedFacts final : public graph::FactExchange {
  public:
   void tell(size_t port, const std::optional<Capacity>& capacity) override { put(capacities_, port, capacity); }
   std::optional<Capacity> wait_for(size_t port) override { return get(capacities_, port); }
+  void tell_counts(size_t port, const ArrayCounts& counts) override { put(counts_, port, counts); }
+  ArrayCounts counts(size_t port) override { return get(counts_, port); }
   void tell_source(size_t task, const SourcePlan& source) override { put(sources_, task, source); }
   SourcePlan wait_for_source(size_t task) override { return get(sources_, task); }
 
@@ -42,13 +45,22 @@ class SharedFacts final : public graph::FactExchange {
   std::mutex mutex_;
   std::condition_variable changed_;
   std::map<size_t, std::optional<Capacity>> capacities_;
+  std::map<size_t, ArrayCounts> counts_;
   std::map<size_t, SourcePlan> sources_;
 };
 
-graph::GraphSpec loaded(const char* file, const char* profile) {
+/// All of the robot, as if it were of a plug-in that this process must not load.
+const Registry& described() {
+  static Registry known;
+  static plugin::Descriptions descriptions(known);
+  if (known.nodes.all().empty()) descriptions.add(plugin::describe(Registry{}, ace_registry()));
+  return known;
+}
+
+graph::GraphSpec loaded(const char* file, const char* profile, const Registry& registry) {
   graph::LoadOptions options;
   options.profile = profile;
-  graph::Loaded result = graph::load(test::graph_folder() / file, options, ace_registry());
+  graph::Loaded result = graph::load(test::graph_folder() / file, options, registry);
   for (const auto& problem : result.problems) MESSAGE(graph::to_string(problem));
   REQUIRE(result.graph);
   return std::move(*result.graph);
@@ -94,7 +106,7 @@ void check_equal(const graph::GraphSpec& graph, const Plan& one, const Plan& oth
 void check_graph(const char* file, const char* profile) {
   CAPTURE(file);
   CAPTURE(profile);
-  const graph::GraphSpec graph = loaded(file, profile);
+  const graph::GraphSpec graph = loaded(file, profile, ace_registry());
   const test::TemporaryFolder folder;
   graph::ComposeOptions how;
   how.output = folder.path;
@@ -122,9 +134,13 @@ void check_graph(const char* file, const char* profile) {
   }
   for (const Process& process : processes) check_equal(graph, alone, process.composition.plan);
   const MonotonicClock clock;
-  graph::Composition supervisor = graph::outline(graph, ace_registry(), clock);
-  graph::complete(supervisor.plan, facts, {});
-  check_equal(graph, alone, supervisor.plan);
+  const Registry robot = ace_registry();
+  for (const Registry* known : {&robot, &described()}) {
+    const graph::GraphSpec of_supervisor = loaded(file, profile, *known);
+    graph::Composition supervisor = graph::outline(of_supervisor, *known, clock);
+    graph::complete(supervisor.plan, facts, {});
+    check_equal(of_supervisor, alone, supervisor.plan);
+  }
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A machine made of text, for the checks.
 #pragma once
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <string>
@@ -13,6 +14,7 @@ namespace takt::test {
 struct FakeFacts final : machine::Facts {
   std::map<std::string, std::string> files;
   std::vector<int> cpus{0, 1};
+  std::map<int, int64_t> limits;
   bool root = false;
 
   FakeFacts() { files["/sys/devices/system/cpu/online"] = "0-1\n"; }
@@ -35,6 +37,10 @@ struct FakeFacts final : machine::Facts {
     return names;
   }
   std::vector<int> allowed_cpus() const override { return cpus; }
+  std::optional<int64_t> limit(int resource) const override {
+    const auto it = limits.find(resource);
+    return it == limits.end() ? std::nullopt : std::optional(it->second);
+  }
   bool is_root() const override { return root; }
   std::string user() const override { return root ? "root" : "ada"; }
   std::string program() const override { return "/opt/takt"; }

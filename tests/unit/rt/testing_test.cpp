@@ -7,6 +7,7 @@
 #include <string>
 
 #include "rt/memory/memory_use.hpp"
+#include "rt/msg/joint_state.hpp"
 #include "rt/msg/pose.hpp"
 #include "rt/msg/text_status.hpp"
 #include "tests/has.hpp"
@@ -170,6 +171,22 @@ TEST_CASE("NodeTest: counts what a job allocates, and names the calls that no jo
   test.run();
   CHECK(test.allocations() == 2);
   CHECK(test.forbidden_calls().empty());
+}
+
+TEST_CASE("the state of an arm's joints: one entry each, and what is not measured is empty") {
+  test::Box<JointState> arm({0, 0, 1, 7});
+  for (int joint = 0; joint < 7; ++joint) {
+    JointName name;
+    name.text[0] = static_cast<char>('a' + joint);
+    CHECK(arm->names.push_back(name));
+    CHECK(arm->position_rad.push_back(0.1 * joint));
+  }
+  CHECK_FALSE(arm->position_rad.push_back(0));  // the capacity counts joints
+  const MessageType& type = MessageType::of<JointState>();
+  CHECK(type.intact(&*arm, {0, 0, 1, 7}));
+  CHECK(arm->effort_nm.empty());
+  CHECK(std::string_view(arm->names[6].text) == "g");
+  CHECK(type.fields.size() == 4);
 }
 
 TEST_CASE("NodeTest: a wrong use is answered with the valid choices") {
