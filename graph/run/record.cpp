@@ -13,6 +13,7 @@
 #include "graph/language/words.hpp"
 #include "graph/log/recorded_plan.hpp"
 #include "graph/run/machine.hpp"
+#include "graph/run/outputs.hpp"
 #include "rt/abi.hpp"
 
 namespace takt::command {
@@ -127,6 +128,10 @@ void RunRecord::finish(const RunResult& result, uint64_t unheard_threads) {
 
 void RunRecord::tell(nlohmann::ordered_json& report) const {
   if (!wanted()) return;
+  if (written_.messages + written_.jobs == 0 && written_.not_written > 0)
+    options_.outputs->code =
+        refuse(fmt::format("--record {}: nothing was written: {}", options_.record.string(), written_.refused),
+               kDeviceOrSystem);
   report["recorder_lost"] = written_.lost();
   report["record"] = {{"file", options_.record.filename().string()},
                       {"messages", written_.messages},

@@ -32,7 +32,7 @@ tl::expected<void, std::string> FileSink::append(std::span<const Bytes> parts) {
       if (written <= 0) {
         const int reason = written < 0 ? errno : ENOSPC;
         // What cannot be taken back is cut off by readers: the record is not complete.
-        if (ftruncate(descriptor_, static_cast<off_t>(size_)) != 0) return tl::unexpected(std::strerror(errno));
+        [[maybe_unused]] const int kept = ftruncate(descriptor_, static_cast<off_t>(size_));
         return tl::unexpected(std::strerror(reason));
       }
       rest = rest.subspan(static_cast<size_t>(written));
