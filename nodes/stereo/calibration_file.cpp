@@ -95,7 +95,8 @@ class File {
     return found;
   }
   double number(const YAML::Node& node, const std::string& key) const {
-    if (!node.IsDefined() || node.IsNull()) bad(node, "key " + key + " has no value; was the file cut off?");
+    if (!node.IsDefined() || node.IsNull() || (node.IsScalar() && node.Scalar().empty()))
+      bad(node, "key " + key + " has no value; was the file cut off?");
     try {
       return node.as<double>();
     } catch (const YAML::Exception&) {

@@ -157,6 +157,8 @@ TEST_CASE("files that are none, cut off, or say what cannot be meant are refused
   tabs.replace(tabs.find("   data"), 3, "\t");
   CHECK(has(bench.error(tabs), "line 8 begins with a tab"));
   CHECK(has(bench.error(good.substr(0, good.find("   data"))), "key M1 has no data; was the file cut off?"));
+  CHECK(has(bench.error(good.substr(0, good.find("D1: !!opencv-matrix") + 19)),
+            "key D1 has no value; was the file cut off?"));
   CHECK(has(bench.error(opencv("0., 0., 0., 0., 0.", 5, "300000000")), "9 numbers for 300000000 rows of 3"));
   CHECK(has(bench.error(opencv("0., 0., x, 0., 0.", 5)), "`x` is no number (key D1)"));
   CHECK(has(bench.error(opencv("0., 0., 0., 0., 0.", 5, "3", "-120., 0., 0.")),
