@@ -48,6 +48,7 @@ struct ComposeOptions {
   std::function<bool(const std::string& id)> owns = {};  ///< nodes and devices this process sets up; empty: all
   FactExchange* exchange = nullptr;                      ///< needed where not all are owned
   Observers observers = {};
+  bool quiet = false;  ///< a spare: what was left out of files is not told once more
 };
 
 /// Nodes in the order of the plan's tasks; the plan points into them.

@@ -141,10 +141,12 @@ int run_member(const MemberPart& part) {
   how.owns = [&](const std::string& id) { return part.partition.process_of.at(id) == part.process; };
   how.exchange = &exchange;
   if (part.spare) how.exchange = &told_already;
+  how.quiet = part.spare;
   if (const int code = compose(options, how, prepared); code != kOk) {
     if (!part.spare) record.problems.store(static_cast<uint32_t>(prepared.problems.size()));
     return code;
   }
+  part.left_out.tell(part.spare ? std::vector<std::string>{} : prepared.composition->left_out);
   Plan& plan = prepared.composition->plan;
   part.faults.make_room(plan);
   std::vector<std::string> told;  // the supervisor says it

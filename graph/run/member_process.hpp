@@ -7,6 +7,7 @@
 #include "graph/compose/partition.hpp"
 #include "graph/run/faults.hpp"
 #include "graph/run/run.hpp"
+#include "graph/run/told_lines.hpp"
 #include "rt/sched/run_board.hpp"
 #include "rt/shm/local_transport.hpp"
 #include "rt/trace/rings.hpp"
@@ -46,6 +47,7 @@ struct MemberPart {
   const PoolFile& pools;
   trace::Rings* rings = nullptr;  ///< null: not traced
   RunFaults& faults;
+  ToldLines& left_out;
 };
 
 /// One process of an isolated run, as the supervisor's fork enters it: composes its part, joins the transport that the

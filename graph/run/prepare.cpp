@@ -51,7 +51,8 @@ int compose(const RunOptions& options, const graph::ComposeOptions& how, Prepare
                                       *prepared.clock, how);
     if (composition) {
       prepared.composition = std::move(*composition);
-      for (const std::string& left : prepared.composition->left_out) std::fprintf(stderr, "takt: %s\n", left.c_str());
+      for (const std::string& left : prepared.composition->left_out)
+        if (!how.quiet) std::fprintf(stderr, "takt: %s\n", left.c_str());
     } else
       code = refuse(prepared, std::move(composition.error().problems),
                     composition.error().device_failed ? kDeviceOrSystem : kBadInput);

@@ -68,6 +68,13 @@ drive() {
   run drive
 }
 row 0 "line 7 is cut off and left out" "cut log" drive cut.log
+# In processes of their own as well: the report has what each device left out.
+"$takt" run drive.yaml --isolate subsystem --policy cooperative --for 500ms --output "$work/out" --report "$work/report.json" >/dev/null 2>&1
+python3 - "$work/report.json" <<'PY' || fail "the report of several processes: $(grep -A4 left_out "$work/report.json")"
+import json, sys
+left = json.load(open(sys.argv[1]))["left_out"]
+assert len(left) == 2 and all("line 7 is cut off" in line for line in left), left
+PY
 row 0 "2 ranges are inf or NaN" "ranges inf and nan" drive inf.log
 row 0 "has no ODOM lines; the poses of its 4 ROBOTLASER1" ROBOTLASER1 drive robotlaser.log
 row 2 'add `start: 1000.' "begins late" drive late.log
