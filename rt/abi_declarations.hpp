@@ -2,4 +2,4 @@
 // Installed as <takt/abi_declarations.hpp>: core, stable.
 // Written by `tests/tools/api.py . --write`: a hash of all public headers.
 #pragma once
-#define TAKT_ABI_DECLARATIONS "19e69e16f53f"
+#define TAKT_ABI_DECLARATIONS "aa640c64348b"

@@ -33,7 +33,8 @@ void add_stereo(CLI::App& eval, EvalStereoOptions& o, int& exit_code) {
   auto* left = reads_file(app->add_option("--left", o.left, "left rectified image"));
   auto* right = reads_file(app->add_option("--right", o.right, "right rectified image"))->needs(left);
   auto* truth =
-      reads_file(app->add_option("--gt", o.truth, "ground truth of the left image, 0: unknown; an image, or PFM"))->needs(right);
+      reads_file(app->add_option("--gt", o.truth, "ground truth of the left image, 0: unknown; an image, or PFM"))
+          ->needs(right);
   left->needs(truth)->excludes(scene);
   app->add_option("--sweep", o.sweep, "on generated pairs: error against noise, or against the window's edge")
       ->check(CLI::IsMember({"noise", "window"}))

@@ -232,7 +232,7 @@ def call(command, places, place, path):
             at = words.index(place)
             del words[at : at + 2]
         if (command, place) == ("terrain learn", "--record"):
-            words = ["--out", fresh("new.txt"), "--pick", "asphalt=0..1"]
+            words = ["--out", fresh("new.txt"), "--pick", "left=0..1"]
         return [takt, *command.split(), *words, place, path]
     stand_ins = {"FILE": INPUTS["CLOUD"], "FOLDER": source / "graph/objects", "NEW-FILE": fresh("new.yaml")}
     words = [path if name == place else stand_ins[wants] for name, wants, required in places

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "nodes/stereo/calibration_file.hpp"
 #include "nodes/stereo/rectify.hpp"
 
 #include <doctest/doctest.h>
@@ -12,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "nodes/stereo/calibration_file.hpp"
 #include "tests/recorded/recording.hpp"
 #include "tests/temporary_folder.hpp"
 

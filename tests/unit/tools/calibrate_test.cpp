@@ -5,8 +5,8 @@
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
 
-#include "graph/tools/calibrate_command.hpp"
 #include "graph/run/run.hpp"
+#include "graph/tools/calibrate_command.hpp"
 #include "nodes/calibration/generated_sweeps.hpp"
 #include "nodes/stereo/calibration_file.hpp"
 #include "nodes/stereo/rectify.hpp"
