@@ -176,7 +176,9 @@ void add_profile(CLI::App& app, plugin::Plugins& plugins, ProfileOptions& o, int
 }  // namespace
 
 void add_plugin_option(CLI::App& app, std::vector<std::filesystem::path>& files) {
-  reads_file(app.add_option("--plugin", files, "shared module with node types, devices or messages, repeatable"));
+  // Also one of the plug-in folder of the installation: whether it can be read is seen when it is found.
+  app.add_option("--plugin", files, "shared module with node types, devices or messages, repeatable")
+      ->type_name("FILE");
 }
 
 void add_graph_commands(CLI::App& app, plugin::Plugins& plugins, GraphOptions& o, int& exit_code) {

@@ -25,6 +25,7 @@
 #include "graph/plugin.hpp"
 #include "graph/plugins/child.hpp"
 #include "graph/plugins/description.hpp"
+#include "rt/file/input_file.hpp"
 #include "rt/machine/limits.hpp"
 
 namespace takt::plugin {
@@ -175,9 +176,9 @@ std::filesystem::path folder() {
 }
 
 tl::expected<std::string, std::string> abi_of(const std::filesystem::path& file) {
+  if (const std::string why = why_unreadable(file, kLargestText); !why.empty()) return tl::make_unexpected(why);
   std::ifstream stream(file, std::ios::binary);
   const std::string content{std::istreambuf_iterator<char>(stream), {}};
-  if (!stream.is_open() || content.empty()) return tl::make_unexpected("cannot be read, or is empty");
   const std::string begin = fmt::format("{}{}", kMark, "declarations=");
   const size_t at = content.find(begin);
   if (at == std::string::npos) return tl::make_unexpected("is no plug-in of Takt: TAKT_PLUGIN is missing");

@@ -203,13 +203,15 @@ int run_as_asked(const Registry& registry, RunOptions options) {
   }
   const bool processes = wanted == "subsystem" && options.clock != "virtual";
   RunFaults faults(registry, options);
-  if (const int code = faults.load(*prepared.graph, *prepared.clock, processes); code != kOk) return code;
+  const auto loaded = [&](Prepared& of) { return faults.load(*of.graph, *of.clock, processes); };  // and keeps both
   if (!processes) {
     Prepared whole(of_jobs(registry));
     whole.graph = std::move(prepared.graph);
     whole.clock = std::move(prepared.clock);
-    return run_in_one_process(options, whole, faults, adjusted);
+    const int code = loaded(whole);
+    return code == kOk ? run_in_one_process(options, whole, faults, adjusted) : code;
   }
+  if (const int code = loaded(prepared); code != kOk) return code;
   const KeptPlace record(options.record);
   return run_isolated(registry, options, *prepared.graph, faults, std::move(adjusted));
 }

@@ -32,7 +32,7 @@ std::string label_of(std::vector<std::string> words) {
 }  // namespace
 
 ObjectList::ObjectList(const std::filesystem::path& folder) : folder_(folder) {
-  require_readable<DatabaseError>(folder / "objects.txt");
+  if (std::filesystem::exists(folder / "objects.txt")) require_readable<DatabaseError>(folder / "objects.txt");
   std::ifstream in(folder / "objects.txt");
   for (std::string line; std::getline(in, line);) lines_.push_back(line);
 }

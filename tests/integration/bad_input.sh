@@ -66,7 +66,7 @@ expect 2 "no file is named like left*.jpg" "$takt" calibrate stereo "$work"
 expect 2 "calib_cam_to_cam.txt: cannot be read" "$takt" eval stereo --scene "$work"
 expect 2 "--scene excludes --sweep" "$takt" eval stereo --scene "$work" --sweep noise
 expect 2 "xb3.yaml: the pairs are rectified already" "$takt" calibrate rig "$source/graph/rigs/xb3.yaml" --out "$work/rig.yaml"
-expect 2 "none.yaml: the rig file cannot be opened" "$takt" calibrate rig "$work/none.yaml" --out "$work/rig.yaml"
+expect 2 "none.yaml cannot be read: No such file or directory" "$takt" calibrate rig "$work/none.yaml" --out "$work/rig.yaml"
 
 # A recording of our own, with one thing wrong at a time.
 "$takt" run --clock virtual --for 1s --output "$work/pictures" >/dev/null 2>&1 || fail "the run that makes the pictures"

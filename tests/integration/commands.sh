@@ -98,7 +98,7 @@ rates 4 --count 4 --passages 1
 printf 'file,class,x,y,w,h\nsigns/00001_00000.png,stop,0,none,96,96\n' >"$work/wrong.csv"
 expect 2 "wrong.csv:2: \`y\` is \`none\`" "$takt" eval signs --scenes "$work/signs" --boxes "$work/wrong.csv"
 expect 2 "labels.csv:1: has no column \`x\`" "$takt" eval signs --scenes "$work/signs" --boxes "$work/labels.csv"
-expect 2 "names no image in" "$takt" eval signs --crops "$work/views" --labels "$work/labels.csv"
+expect 2 "is an empty folder" "$takt" eval signs --crops "$work/views" --labels "$work/labels.csv"
 mkdir "$work/photographs"
 for i in 0 1 2; do cp "$work/out/left.png" "$work/photographs/$i.png"; done
 angle=0

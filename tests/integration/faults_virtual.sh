@@ -40,7 +40,7 @@ sed 's/^seed: .*/seed: 100/' tests/faults/all_at_once.yaml >"$work/other_seed.ya
 expect 1 '' "$takt" log diff "$work/again1.mcap" "$work/other.mcap"
 
 # What cannot be run is refused before anything starts, with the place and the way out.
-expect 2 'no such file' "$takt" run tests/faults/loads.yaml --clock virtual --faults "$work/none.yaml"
+expect 2 'none.yaml cannot be read: No such file' "$takt" run tests/faults/loads.yaml --clock virtual --faults "$work/none.yaml"
 expect 2 'real_cpu_hog.yaml:6:12: error: `cpu_hog` exists in real time only' \
   "$takt" run tests/faults/loads.yaml --clock virtual --faults tests/faults/real_cpu_hog.yaml
 expect 2 '`kill` needs a process to strike' \

@@ -32,7 +32,7 @@ expect 2 "--pty PATH or --tcp PORT" "$takt" double lms200
 expect 2 "--video PATH" "$takt" double camera --can vcan0
 expect 3 "modprobe v4l2loopback" "$takt" double camera --video "$work/none"
 
-expect 2 "cannot be opened" "$takt" eval lms200 --rx "$work/none" --index "$work/none"
+expect 2 "none cannot be read: No such file" "$takt" eval lms200 --rx "$work/none" --index "$work/none"
 
 double front lms200 --pty "$work/front"
 double floor lms400 --tcp "$port"
@@ -40,7 +40,7 @@ double floor lms400 --tcp "$port"
 # What they say, asked for scans meanwhile: taken from the file as it was from the line.
 expect 0 "" "$takt" capture "$work/front" "$work/front.rx.bin" --scanner lms200 --baud 500000 --for 5s
 cat "$work/stdout"
-: >"$work/none.csv"
+echo 'time,direction,offset,length,command,crc' >"$work/none.csv"  # of a capture
 expect 0 "" "$takt" eval lms200 --rx "$work/front.rx.bin" --index "$work/none.csv" --json
 python3 -c 'import json, sys; r = json.load(open(sys.argv[1])); print(r); sys.exit(r["scans"] < 10)' "$work/stdout" || fail "the captured bytes hold no scans"
 expect 0 "" "$takt" capture "127.0.0.1:$port" "$work/floor.rx.bin" --scanner lms400 --for 5s

@@ -62,7 +62,7 @@ refused() { # refused TEXT COMMAND...: exit 2, and nothing was started
 echo "words" >"$work/words.so"
 refused "is no plug-in of Takt: TAKT_PLUGIN is missing" run --plugin "$work/words.so"
 : >"$work/empty.so"
-refused "cannot be read, or is empty" run --plugin "$work/empty.so"
+refused "is empty" run --plugin "$work/empty.so"
 refused "no such file" run --plugin "$work/none.so"
 refused "was built for another Takt: " run --plugin "$built/libblink_avx.so"
 grep -qE "another Takt: (vectors is AVX, here|EIGEN_MAX_ALIGN_BYTES is)" "$work/stderr" || fail "it does not say what differs"

@@ -24,7 +24,11 @@ int run(const std::string& arguments) {
   CalibrateOptions options;
   int exit_code = -1;
   add_calibrate(app, options, exit_code);
-  app.parse(arguments);
+  try {
+    app.parse(arguments);
+  } catch (const CLI::ParseError&) {  // a file that is not there; as main() answers it
+    return kBadInput;
+  }
   return exit_code;
 }
 
