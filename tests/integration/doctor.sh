@@ -41,7 +41,8 @@ require_rt() { # JSON RUNNER...: refused for exactly what doctor says is lacking
   local missing
   missing=$(lacking "$1")
   shift
-  "$@" run --require-rt --policy deadline --for 1s --isolate none --output "$open/home/out" >"$work/stdout" 2>"$work/stderr"
+  runs=$((${runs:-0} + 1))  # each with a folder of its own: they are of different users
+  "$@" run --require-rt --policy deadline --for 1s --isolate none --output "$open/home/out$runs" >"$work/stdout" 2>"$work/stderr"
   local code=$?
   if [ -z "$missing" ]; then
     [ $code -le 1 ] || [ $code -eq 3 ] || fail "--require-rt: exit $code"  # 3: the kernel may refuse all budgets together

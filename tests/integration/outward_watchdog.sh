@@ -57,16 +57,17 @@ expect 0 "" timeout 60 "$takt" run "$work/graph.yaml" --isolate none --for 1s --
 # A trace that takes three seconds to be written, since nobody reads it before: the last judgement counts until the end.
 for isolation in none subsystem; do
   listen late
-  rm -f "$work/trace"
-  mkfifo "$work/trace"
+  rm -f "$work/read"
+  exec 9> >(until [ -e "$work/read" ]; do sleep 0.1; done; cat >/dev/null)
   NOTIFY_SOCKET=$work/notify WATCHDOG_USEC=1000000 timeout 60 "$takt" run "$work/graph.yaml" --isolate $isolation --for 1s --output "$work/out" \
-    --trace "$work/trace" >"$work/late.out" 2>"$work/late.err" &
+    --trace /dev/fd/9 >"$work/late.out" 2>"$work/late.err" &
   run=$!
   until grep -q READY=1 "$work/late.heard" || ! kill -0 $run 2>/dev/null; do sleep 0.05; done
   sleep 4
   grep -q STOPPING=1 "$work/late.heard" && fail "isolation $isolation: the end is told before it is there"
-  cat "$work/trace" >/dev/null
+  touch "$work/read"
   wait $run || { cat "$work/late.err"; fail "isolation $isolation: the run with a slow trace is not ok"; }
+  exec 9>&-
   hush
   [ "$(count late WATCHDOG=1)" -ge 8 ] || { cat "$work/late.heard"; fail "isolation $isolation: not fed while the trace is written"; }
   [ "$(count late STOPPING=1)" -eq 1 ] || fail "isolation $isolation: the end is not told"

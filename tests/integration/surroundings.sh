@@ -32,7 +32,7 @@ shut() {
 
 echo "=== memory and files"
 for isolate in none subsystem; do under "-v 300000" 3 "RLIMIT_AS 307 MB: ulimit -v unlimited" --isolate $isolate; done
-under "-n 8" "0 1" "RLIMIT_NOFILE 8: ulimit -n" --isolate subsystem
+under "-n 8" "0 1 3" "RLIMIT_NOFILE 8: ulimit -n" --isolate subsystem
 under "-v 700000" 3 "takt: error: " --isolate none  # when threads begin, there is not even memory for more words
 
 echo "=== processes and threads, of a user"
