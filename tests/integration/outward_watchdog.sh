@@ -58,12 +58,12 @@ expect 0 "" timeout 60 "$takt" run "$work/graph.yaml" --isolate none --for 1s --
 for isolation in none subsystem; do
   listen late
   rm -f "$work/read"
-  exec 9> >(until [ -e "$work/read" ]; do sleep 0.1; done; cat >/dev/null)
-  NOTIFY_SOCKET=$work/notify WATCHDOG_USEC=1000000 timeout 60 "$takt" run "$work/graph.yaml" --isolate $isolation --for 1s --output "$work/out" \
+  exec 9> >(python3 -c 'import fcntl; fcntl.fcntl(0, 1031, 4096)'; until [ -e "$work/read" ]; do sleep 0.1; done; cat >/dev/null)  # F_SETPIPE_SZ
+  NOTIFY_SOCKET=$work/notify WATCHDOG_USEC=1000000 timeout 60 "$takt" run "$work/graph.yaml" --isolate $isolation --for 3s --output "$work/out" \
     --trace /dev/fd/9 >"$work/late.out" 2>"$work/late.err" &
   run=$!
   until grep -q READY=1 "$work/late.heard" || ! kill -0 $run 2>/dev/null; do sleep 0.05; done
-  sleep 4
+  sleep 6
   grep -q STOPPING=1 "$work/late.heard" && fail "isolation $isolation: the end is told before it is there"
   touch "$work/read"
   wait $run || { cat "$work/late.err"; fail "isolation $isolation: the run with a slow trace is not ok"; }
