@@ -108,12 +108,11 @@ function(takt_room name)
 endfunction()
 
 # Adds every folder of this one that holds a CMakeLists.txt.
-macro(takt_rooms)
-  file(GLOB rooms LIST_DIRECTORIES true CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*)
+macro(takt_rooms)  # also one whose CMakeLists.txt comes later than its folder
+  file(GLOB rooms CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*/CMakeLists.txt)
   foreach(room ${rooms})
-    if(EXISTS ${room}/CMakeLists.txt)
-      add_subdirectory(${room})
-    endif()
+    cmake_path(GET room PARENT_PATH room)
+    add_subdirectory(${room})
   endforeach()
 endmacro()
 

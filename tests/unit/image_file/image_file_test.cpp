@@ -125,7 +125,7 @@ TEST_CASE("what is not read is refused with the file's name") {
   cv::imwrite((folder.path / "c.png").string(), ramp(1023));
   CHECK(has(error_of(folder.path / "c.png", 8), "1023, which has more than 8 bits"));
   CHECK(has(error_of(folder.path / "none.png"), "No such file"));
-  CHECK(has(error_of(folder.path), "is no file"));
+  CHECK(has(error_of(folder.path), "is a folder"));
   CHECK(has(error_of(folder.write("text.png", "no image")), "is no image"));
   for (const char* head : {"P5\n60000 60000\n255\n", "P6\n60000 60000\n65535\n", "P5\n30000 30000\n255\n"})
     CHECK(has(error_of(folder.write("huge.pgm", head)), "000 px"));
