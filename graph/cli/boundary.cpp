@@ -125,8 +125,7 @@ int with_output(int code) {
 int refuse(const std::exception& error) {
   if (const auto* output = dynamic_cast<const OutputError*>(&error))
     return refuse(OutputFailure{output->what(), output->system}, "");
-  if (dynamic_cast<const std::bad_alloc*>(&error) != nullptr)
-    return refuse_command(machine::explain(error), kDeviceOrSystem);
+  if (machine::scarce(error)) return refuse_command(machine::explain(error), kDeviceOrSystem);
   return speaks_for_itself(error) ? refuse(error.what(), kBadInput) : refuse_command(reason_of(error), kBadInput);
 }
 

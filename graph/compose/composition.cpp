@@ -313,7 +313,7 @@ class Composer {
     try {
       give_setup(*task.node, task, t, graph_, clock_, options_, registry_, positions_[t]);
       // Beyond the limit of a control group the kernel kills instead of refusing.
-      if (const auto room = machine::memory_room(); room && room->free < kLeastRoom) throw std::bad_alloc();
+      if (const auto room = machine::memory_room(); room && *room < kLeastRoom) throw std::bad_alloc();
       return true;
     } catch (const std::exception& problem) {
       error.problems.push_back({positions_[t], fmt::format("{}: {}", task.name, machine::explain(problem))});

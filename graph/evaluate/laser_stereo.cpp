@@ -65,11 +65,10 @@ Rigid laser_in_camera(const std::filesystem::path& folder, const Eigen::MatrixXd
   return {rectify * turn, rectify * shift + camera};
 }
 
-cv::Mat read_image(const std::filesystem::path& file) { return read_image(file, Channels::colour); }
-
 /// Left and right.
 std::pair<cv::Mat, cv::Mat> read_images(const std::filesystem::path& folder) {
-  std::pair pair(read_image(folder / "image_02.png"), read_image(folder / "image_03.png"));
+  std::pair pair(read_image(folder / "image_02.png", Channels::colour),
+                 read_image(folder / "image_03.png", Channels::colour));
   if (pair.first.size() != pair.second.size())
     throw std::invalid_argument(folder.string() + ": image_02.png and image_03.png differ in size");
   return pair;

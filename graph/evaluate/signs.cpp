@@ -91,8 +91,6 @@ class Table {
   std::vector<std::vector<std::string>> rows_;
 };
 
-cv::Mat3b read_image(const fs::path& file) { return read_image(file, Channels::colour); }
-
 std::vector<Sighting> search(const std::vector<SignModel>& signs, const cv::Mat3b& image) {
   SignDetector detector(image.cols, image.rows, signs, {});
   detector.run({image.ptr(), image.cols, image.rows, 3}, {}, {}, [] { return true; });
@@ -211,7 +209,7 @@ Json judge_crops(const std::vector<SignModel>& signs, const EvalSignsOptions& o)
   const size_t guess = most_frequent(signs, shown);
   TrackScores all(signs.size()), unseen(signs.size()), guessed(signs.size());
   for (const auto& [path, sign] : crops) {
-    const cv::Mat3b crop = read_image(path);
+    const cv::Mat3b crop = read_image(path, Channels::colour);
     cv::Mat3b image;
     cv::copyMakeBorder(crop, image, kPad_px, kPad_px, kPad_px, kPad_px, cv::BORDER_REPLICATE);
     Box box = in_the_middle(sign, crop.size()).box;
@@ -249,7 +247,7 @@ Json judge_scenes(const std::vector<SignModel>& signs, const EvalSignsOptions& o
   if (images.empty()) throw std::invalid_argument(o.boxes.string() + " names no image in " + o.scenes.string());
   Judged judged(most_frequent(signs, shown), signs.size());
   for (const auto& [path, there] : images) {
-    const cv::Mat3b image = read_image(path);
+    const cv::Mat3b image = read_image(path, Channels::colour);
     score_image(there, search(signs, image), judged.found);
     const Sighting middle = in_the_middle(judged.guess, image.size());
     score_image(there, {&middle, 1}, judged.guessed);

@@ -203,15 +203,16 @@ int run_as_asked(const Registry& registry, RunOptions options) {
   }
   const bool processes = wanted == "subsystem" && options.clock != "virtual";
   RunFaults faults(registry, options);
-  const auto loaded = [&](Prepared& of) { return faults.load(*of.graph, *of.clock, processes); };  // and keeps both
+  // They keep references to the graph and the clock that they are loaded with.
+  const auto load_faults = [&](Prepared& of) { return faults.load(*of.graph, *of.clock, processes); };
   if (!processes) {
     Prepared whole(of_jobs(registry));
     whole.graph = std::move(prepared.graph);
     whole.clock = std::move(prepared.clock);
-    const int code = loaded(whole);
+    const int code = load_faults(whole);
     return code == kOk ? run_in_one_process(options, whole, faults, adjusted) : code;
   }
-  if (const int code = loaded(prepared); code != kOk) return code;
+  if (const int code = load_faults(prepared); code != kOk) return code;
   const KeptPlace record(options.record);
   return run_isolated(registry, options, *prepared.graph, faults, std::move(adjusted));
 }

@@ -34,8 +34,6 @@ using object_detection::Attribute, object_detection::CascadeReferences, object_d
 using object_detection::kHistogramStages, object_detection::learn_view, object_detection::make_scene,
     object_detection::publish_revision, object_detection::read_database;
 
-cv::Mat3b read_image(const std::filesystem::path& file) { return takt::read_image(file, Channels::colour); }
-
 ImageView<const uint8_t> view_of(const cv::Mat3b& image) { return {image.data, image.cols, image.rows, 3}; }
 
 /// "bottle closed=true", attributes by name.
@@ -99,7 +97,8 @@ std::vector<ErrorMaps> maps_of(const std::vector<std::filesystem::path>& files, 
                                const std::function<Scene(uint64_t)>& scene) {
   std::vector<ErrorMaps> maps;
   for (const auto& file : files)
-    maps.push_back(error_maps(view_of(read_image(file)), references, object, o.size_px, DetectorParameters{}));
+    maps.push_back(
+        error_maps(view_of(read_image(file, Channels::colour)), references, object, o.size_px, DetectorParameters{}));
   for (int i = 0; files.empty() && i < o.scenes; ++i)
     maps.push_back(
         error_maps(scene(static_cast<uint64_t>(i)).view(), references, object, o.size_px, DetectorParameters{}));
@@ -184,7 +183,7 @@ void test(const ObjectsOptions& o) {
   const CascadeReferences references = cascade_references(database, DetectorParameters{});
   if (!o.maps.empty()) std::filesystem::create_directories(o.maps);
   for (const auto& file : o.images) {
-    const cv::Mat3b image = read_image(file);
+    const cv::Mat3b image = read_image(file, Channels::colour);
     Detector detector(image.cols, image.rows, database, DetectorParameters{});
     detector.run(view_of(image));
     std::vector<Detection> boxes(Detector::kMostDetections);

@@ -32,15 +32,12 @@ void GroundDetector::analyse(ImageView<const uint8_t> image) {
       std::copy_n(image.row(y), width_, v);
     }
   }
-}
-
-double GroundDetector::light() const {
   int64_t sum = 0;
   for (const RowSpan& span : area_.spans()) {
     const uint8_t* row = view(value_).row(span.y);
     sum += std::accumulate(row + span.first, row + span.last, int64_t{0});
   }
-  return static_cast<double>(sum) / static_cast<double>(area_.pixels());
+  light_ = static_cast<double>(sum) / static_cast<double>(std::max<int64_t>(area_.pixels(), 1));
 }
 
 bool GroundDetector::learn() {

@@ -29,10 +29,10 @@ class GroundDetector {
 
   /// Takes an image of the constructor's size, BGR or grey (saturation 0), for the two calls below.
   void analyse(ImageView<const uint8_t> image);
-  /// Mean value of the reference area, 0..255.
-  double light() const;
+  /// Mean value of the reference area of the image analysed last, 0..255.
+  double light() const { return light_; }
   /// Darker than the detector was judged on: nothing is ground then, nothing is sure, and nothing is to be learnt.
-  bool too_dark() const { return light() < light_min_; }
+  bool too_dark() const { return light_ < light_min_; }
   /// Adds the texture of the reference area to the memory; false if it is too dark or no bin was full enough.
   bool learn();
   /// 255 ground, 0 not. Before the first entry nothing is ground, and above the horizon of `camera` never.
@@ -54,7 +54,7 @@ class GroundDetector {
   ImageView<const uint8_t> view(const std::vector<uint8_t>& plane) const { return {plane.data(), width_, height_}; }
 
   int width_, height_;
-  double t_m_, light_min_;
+  double t_m_, light_min_, light_ = 0;
   ReferenceArea area_;
   TextureMemory memory_;
   ConfidenceTable confidence_;

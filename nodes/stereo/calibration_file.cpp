@@ -14,6 +14,7 @@
 #include <string_view>
 #include <vector>
 
+#include "nodes/stereo/opencv_calibration.hpp"
 #include "rt/file/input_file.hpp"
 #include "rt/file/output_file.hpp"
 
@@ -349,19 +350,6 @@ StereoCalibration guarded(const fs::path& path, const Read& read) {
   }
 }
 
-cv::Mat row(std::span<const double> values, int rows) {
-  cv::Mat m(rows, static_cast<int>(values.size()) / rows, CV_64F);
-  std::memcpy(m.data, values.data(), values.size_bytes());
-  return m;
-}
-
-cv::Mat coefficients(const std::array<double, 5>& first, const std::array<double, 9>& more) {
-  std::vector<double> all(first.begin(), first.end());
-  if (std::any_of(more.begin(), more.end(), [](double value) { return value != 0; }))
-    all.insert(all.end(), more.begin(), more.end());
-  return row(all, 1);
-}
-
 }  // namespace
 
 StereoCalibration read_calibration(const fs::path& path) {
@@ -390,9 +378,9 @@ void write_calibration(const fs::path& path, const StereoCalibration& c, const s
     cv::FileStorage file(path.string(), cv::FileStorage::WRITE | cv::FileStorage::MEMORY);  // its format by the name
     file.writeComment(comment);
     file << "image_size" << std::vector<int>{c.width, c.height};
-    file << "M1" << row(c.left_matrix, 3) << "D1" << coefficients(c.left_distortion, c.left_more);
-    file << "M2" << row(c.right_matrix, 3) << "D2" << coefficients(c.right_distortion, c.right_more);
-    file << "R" << row(c.rotation, 3) << "T" << row(c.translation_m, 3);
+    file << "M1" << opencv_matrix(c.left_matrix, 3) << "D1" << opencv_distortion(c.left_distortion, c.left_more);
+    file << "M2" << opencv_matrix(c.right_matrix, 3) << "D2" << opencv_distortion(c.right_distortion, c.right_more);
+    file << "R" << opencv_matrix(c.rotation, 3) << "T" << opencv_matrix(c.translation_m, 3);
     require_written(write_file(path, file.releaseAndGetString()));
   } catch (const cv::Exception& e) {
     refuse(path.string() + ": " + e.err);

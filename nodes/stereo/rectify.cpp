@@ -10,6 +10,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "nodes/stereo/opencv_calibration.hpp"
+
 namespace takt::stereo {
 namespace {
 
@@ -34,20 +36,6 @@ void doubt(const StereoCalibration& c) {
       refuse("a camera with focal length " + std::to_string((*m)[0]) + " px and principal point " +
              std::to_string((*m)[2]) + ", " + std::to_string((*m)[5]) + " px cannot be meant for images of " +
              std::to_string(c.width) + " x " + std::to_string(c.height) + "; was it calibrated at another resolution?");
-}
-
-cv::Mat matrix(std::span<const double> values, int rows) {
-  cv::Mat m(rows, static_cast<int>(values.size()) / rows, CV_64F);
-  std::memcpy(m.data, values.data(), values.size_bytes());
-  return m;
-}
-
-/// As OpenCV takes it: five coefficients, or all 14.
-cv::Mat distortion(const std::array<double, 5>& first, const std::array<double, 9>& more) {
-  std::vector<double> all(first.begin(), first.end());
-  if (std::any_of(more.begin(), more.end(), [](double value) { return value != 0; }))
-    all.insert(all.end(), more.begin(), more.end());
-  return matrix(all, 1);
 }
 
 /// Sources of the pixels of one rectified image, as OpenCV computes them.
@@ -101,12 +89,13 @@ void check_calibration(const StereoCalibration& c) {
 
 RectificationTables rectification_tables(const StereoCalibration& c) {
   check_calibration(c);
-  const cv::Mat k1 = matrix(c.left_matrix, 3), k2 = matrix(c.right_matrix, 3),
-                d1 = distortion(c.left_distortion, c.left_more), d2 = distortion(c.right_distortion, c.right_more);
+  const cv::Mat k1 = opencv_matrix(c.left_matrix, 3), k2 = opencv_matrix(c.right_matrix, 3),
+                d1 = opencv_distortion(c.left_distortion, c.left_more),
+                d2 = opencv_distortion(c.right_distortion, c.right_more);
   const cv::Size size(c.width, c.height);
   cv::Mat r1, r2, p1, p2, q;
-  cv::stereoRectify(k1, d1, k2, d2, size, matrix(c.rotation, 3), matrix(c.translation_m, 3), r1, r2, p1, p2, q,
-                    cv::CALIB_ZERO_DISPARITY, 0);
+  cv::stereoRectify(k1, d1, k2, d2, size, opencv_matrix(c.rotation, 3), opencv_matrix(c.translation_m, 3), r1, r2, p1,
+                    p2, q, cv::CALIB_ZERO_DISPARITY, 0);
   const double focal = p1.at<double>(0, 0), baseline = -p2.at<double>(0, 3) / focal;
   if (!(focal > 0) || !(baseline > 0) || p2.at<double>(1, 3) != 0)
     refuse("translation_m is " + std::to_string(c.translation_m[0]) + ", " + std::to_string(c.translation_m[1]) + ", " +
@@ -128,8 +117,8 @@ RectificationTables undistortion_table(const StereoCalibration& c) {
   const std::array<double, 9> ideal{focal, 0, m[2], 0, focal, m[5], 0, 0, 1};
   RectificationTables tables;
   tables.camera = {focal, m[2], m[5], std::hypot(c.translation_m[0], c.translation_m[1], c.translation_m[2])};
-  tables.left = sources(matrix(m, 3), distortion(c.left_distortion, c.left_more), cv::Mat::eye(3, 3, CV_64F),
-                        matrix(ideal, 3), {c.width, c.height});
+  tables.left = sources(opencv_matrix(m, 3), opencv_distortion(c.left_distortion, c.left_more),
+                        cv::Mat::eye(3, 3, CV_64F), opencv_matrix(ideal, 3), {c.width, c.height});
   return tables;
 }
 

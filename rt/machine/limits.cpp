@@ -147,10 +147,9 @@ std::string limit_on(Scarce what, const Facts& facts) {
   return files_limit(facts);
 }
 
-std::optional<MemoryRoom> memory_room(const Facts& facts) {
+std::optional<int64_t> memory_room(const Facts& facts) {
   const auto group = memory_group(facts);
-  if (!group) return std::nullopt;
-  return MemoryRoom{group->group, group->limit, group->free()};
+  return group ? std::optional(group->free()) : std::nullopt;
 }
 
 int64_t memory_kills(const Facts& facts) {

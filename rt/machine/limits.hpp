@@ -21,12 +21,8 @@ enum class Scarce : uint8_t { tasks, memory, files };
 /// "RLIMIT_NPROC 20 (ulimit -u; ...)". Empty if none is set. Any thread; reads files.
 std::string limit_on(Scarce what, const Facts& facts = SystemFacts());
 
-/// Limit of the control group on memory, and how much of it is free, bytes; nothing if there is none.
-struct MemoryRoom {
-  std::string group;
-  int64_t limit = 0, free = 0;
-};
-std::optional<MemoryRoom> memory_room(const Facts& facts = SystemFacts());
+/// Bytes that are free below the memory limit of the control group; nothing if it has none.
+std::optional<int64_t> memory_room(const Facts& facts = SystemFacts());
 /// How many processes the kernel has killed in this control group since it has more than its memory; 0 if it does not
 /// say.
 int64_t memory_kills(const Facts& facts = SystemFacts());

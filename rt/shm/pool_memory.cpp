@@ -49,9 +49,9 @@ PoolFile::~PoolFile() {
 
 void PoolFile::resize(uint64_t bytes) const {
   // Its pages are touched next: beyond the limit the kernel would kill a process instead of refusing.
-  if (const auto room = machine::memory_room(); room && static_cast<int64_t>(bytes) > room->free)
+  if (const auto room = machine::memory_room(); room && static_cast<int64_t>(bytes) > *room)
     throw std::runtime_error("the message pools need " + std::to_string(bytes / 1'000'000) + " MB, " +
-                             std::to_string(room->free / 1'000'000) + " MB are left (" +
+                             std::to_string(*room / 1'000'000) + " MB are left (" +
                              machine::limit_on(machine::Scarce::memory) + "); lower image sizes or edge depths");
   if (ftruncate(writing_, static_cast<off_t>(bytes)) != 0)
     refuse("shared memory of " + std::to_string(bytes) + " bytes");
