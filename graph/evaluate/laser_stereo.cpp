@@ -23,7 +23,7 @@ namespace takt::command {
 namespace {
 
 using Eigen::Matrix3d, Eigen::Vector3d;
-using laser_fusion::CloudPair, laser_fusion::Rigid;
+using laser_fusion::Rigid;
 
 constexpr float kNearest_m = 3, kFarthest_m = 20;
 constexpr float kAside = 0.84f, kUpwards = 0.25f;  // tangents of 40 and 14 degrees

@@ -13,6 +13,7 @@
 #include "rt/capability.hpp"
 #include "rt/memory/memory_use.hpp"
 #include "rt/memory/process_memory.hpp"
+#include "rt/memory/sanitized.hpp"
 #include "rt/node.hpp"
 #include "rt/sched/anticipation.hpp"
 #include "rt/sched/bandwidth.hpp"
@@ -286,7 +287,9 @@ void Executor::watch(Policy granted) {
         {&lanes_[i]->watch(), lanes_[i]->members(), granted == Policy::fixed ? crew_->wanted[i] : Reservation{}});
   Watchdog::Options options;
   options.granted = granted;
-  options.patience_ns = options_.hang_patience_ns;
+  const bool ordinary = granted == Policy::cooperative && options_.life == nullptr;
+  options.patience_ns = options_.hang_patience_ns > 0 ? options_.hang_patience_ns
+                                                      : kSlowdown * (ordinary ? 3'000'000'000LL : 750'000'000LL);
   options.stolen_ns = options_.stolen_ns;
   options.life = options_.life;
   options.priority = granted == Policy::cooperative ? 0 : kHighestPriority + 1;

@@ -7,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "rt/memory/sanitized.hpp"
 #include "rt/sched/grant.hpp"
 #include "rt/sched/lane.hpp"
 #include "rt/sched/run_board.hpp"
@@ -61,9 +60,10 @@ class Executor {
     std::vector<bool> own = {};           ///< by task: this process runs it; empty: all
     bool rejoin = false;                  ///< a process before this one ran the same tasks, and died
     bool gives_up_rights = false;         ///< the thread that calls run() needs none once all are at work
-    LifeSigns* life = nullptr;  ///< of a process that somebody looks after, see Watchdog::Options
-    /// A job that has not returned this long after its deadline hangs.
-    int64_t hang_patience_ns = kSlowdown * 750'000'000LL;
+    LifeSigns* life = nullptr;            ///< of a process that somebody looks after, see Watchdog::Options
+    /// A job that has not returned this long after its deadline hangs. 0: 0.75 s; as one of many ordinary threads on a
+    /// busy machine 3 s, for there a hang ends the run.
+    int64_t hang_patience_ns = 0;
     std::function<int64_t()> stolen_ns = {};  ///< see StolenTime; empty: no job is lifted
     // Virtual time: see VirtualRun::Options.
     std::function<int64_t(size_t task, uint64_t job)> job_duration_ns = {};

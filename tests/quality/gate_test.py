@@ -188,11 +188,11 @@ class Whole(unittest.TestCase):
         self.assertEqual((rows, error), ([], "it did not end within 0.3 s"))
 
     def judge_all(self, ratio, name="s/a"):
-        """With a program in place of takt-bench: `suite --json FILE` writes one row."""
+        """With a program in place of takt-bench: `suite --json FILE` writes one row, into a file beside it that it renames."""
         with tempfile.TemporaryDirectory() as folder:
             bench, report = os.path.join(folder, "bench"), os.path.join(folder, "report.json")
             with open(bench, "w", encoding="utf-8") as file:
-                file.write(f"#!/bin/sh\necho '{json.dumps([row(name, ratio)])}' >\"$3\"\n")
+                file.write(f"#!/bin/sh\necho '{json.dumps([row(name, ratio)])}' >\"$3.new\"\nmv \"$3.new\" \"$3\"\n")
             os.chmod(bench, 0o755)
             good, _ = quietly(ratios.judge_all, bench, [("suite", [at_most(1.0, "s/a")])], report)
             with open(report, encoding="utf-8") as file:

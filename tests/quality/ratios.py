@@ -91,14 +91,16 @@ def run_suite(bench, command, limit_s=LONGEST_S):
     """(rows, error, seconds) of one run; error is empty if it went well. What hangs is ended, with its processes."""
     began = time.monotonic()
     rows = []
-    with tempfile.NamedTemporaryFile(suffix=".json") as file:
-        run = subprocess.Popen([bench, *command.split(), "--json", file.name], stdout=subprocess.DEVNULL,
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.path.join(folder, "rows.json")
+        run = subprocess.Popen([bench, *command.split(), "--json", path], stdout=subprocess.DEVNULL,
                                stderr=subprocess.PIPE, text=True, start_new_session=True)
         try:
             said = run.communicate(timeout=limit_s)[1].strip()
             error = "" if run.returncode == 0 else f"exit {run.returncode}: {said}"
             if not error:
-                rows = json.load(file)
+                with open(path) as file:
+                    rows = json.load(file)
         except subprocess.TimeoutExpired:
             error = f"it did not end within {limit_s:g} s"
         finally:
