@@ -2,6 +2,7 @@
 #include "nodes/object_detection/revisions.hpp"
 
 #include <unistd.h>
+#define XXH_INLINE_ALL
 #include <xxhash.h>
 
 #include <algorithm>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "rt/record/message_record.hpp"
 
-#define XXH_STATIC_LINKING_ONLY  // a state that lies on the stack
+#define XXH_INLINE_ALL  // no library to be found by whoever links this one; a state that lies on the stack
 #include <xxhash.h>
 
 #include "rt/msg/scalar.hpp"

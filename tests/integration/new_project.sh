@@ -25,6 +25,8 @@ expect 0 "" cmake --build build -j2
 echo "built in $((($(date +%s%N) - began) / 1000000)) ms"
 expect 0 "" ctest --test-dir build --no-tests=error
 takt=build/my_robot
+libraries=$(ldd "$takt" | grep -vc linux-vdso)
+[ "$libraries" -le 12 ] || fail "it needs $libraries shared libraries, more than 12: $(ldd "$takt")"
 
 expect 0 "" "$takt" check my_robot.yaml
 expect 0 "" "$takt" check my_robot.yaml --profile robot  # the hardware need not be there
