@@ -193,7 +193,8 @@ void add_registration(CLI::App& eval, EvalRegistrationOptions& o, int& exit_code
   app->add_option("--sigma", o.sigma_m, "of match probabilities, m (default 0.4 of the cut)")
       ->check(CLI::PositiveNumber);
   app->add_option("--seed", o.seed, "of the search, of generated pairs and of displacements (default 1)");
-  writes_file(app->add_option("--out", o.out, "writes the target with the source's colours (.ply, .pcd)"));
+  writes_file(app->add_option("--out", o.out, "writes the target with the source's colours (.ply, .pcd)"))
+      ->excludes("--sweep");
   writes_file(
       app->add_option("--picture", o.picture,
                       "PNG: before, after, match probability from red to green, colours; or the curves of a sweep"));

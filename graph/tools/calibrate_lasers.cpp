@@ -183,7 +183,9 @@ void add_calibrate_lasers(CLI::App& calibrate_app, CalibrateLasersOptions& o, in
   writes_file(
       app->add_option("--generate", o.generate, "writes a generated recording to this file and tells its true mounts"));
   app->add_option("--seed", o.seed, "of the search and of generated sweeps (default 1)");
-  writes_file(app->add_option("--out", o.out, "writes the mounts to this file, as graphs want them"));
+  writes_file(app->add_option("--out", o.out, "writes the mounts to this file, as graphs want them"))
+      ->excludes("--sweep")
+      ->excludes("--generate");
   writes_file(app->add_option(
       "--picture", o.picture,
       "PNG: the room with the mounts known beforehand, with those found, and the distances that are left"));

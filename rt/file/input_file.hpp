@@ -20,8 +20,7 @@ constexpr uint64_t kLargestInput = uint64_t{16} << 30;
 constexpr uint64_t kLargestText = uint64_t{1} << 30;
 
 /// Why `file` cannot be read: "is a folder, a file is expected", "is empty" ... ; "" if it can. What the shell hands
-/// over
-/// (/dev/stdin, <(command)) can be read, a named pipe cannot. Opens nothing.
+/// over (/dev/stdin, <(command)) can be read, a named pipe cannot. Opens nothing.
 std::string why_unreadable(const std::filesystem::path& file, uint64_t most_bytes = kLargestInput);
 
 /// The same of a folder whose files are to be read; one without any entry "is an empty folder".

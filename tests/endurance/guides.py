@@ -77,7 +77,9 @@ def follow_driver(clone):
     clone.run(clone.said(GUIDES, r"Then `([^`]*)` runs the suite"), output="100% tests passed")
     clone.run(clone.said(GUIDES, r"`(\./takt nodes laser_scanner)`"), output="a scanner in a tube")
     clone.run(clone.said(GUIDES, r"`(\./takt run graph/lasers.yaml --profile tube [^`]*)`") + " || [ $? -eq 1 ]", output="front_laser")
-    in_the_profile, of_the_device = r"lasers\.yaml:15:", r"lasers\.yaml:10:"
+    lines = (clone.folder / "graph/lasers.yaml").read_text().splitlines()
+    in_the_profile, of_the_device = (rf"lasers\.yaml:{next(n for n, line in enumerate(lines, 1) if word in line)}:"
+                                     for word in ("radius: 2m}", "front_laser: {kind"))
     for wrong, command, line in (("2cm3", clone.said(GUIDES, r"refused by `([^`]*)`"), in_the_profile),
                                  ("-1m", "./takt run graph/lasers.yaml --profile tube --for 1s", of_the_device)):
         clone.replace("graph/lasers.yaml", "radius: 2m}", f"radius: {wrong}}}")

@@ -12,7 +12,8 @@ names. It prints how many it tried, and counts
   nothing  exit code 0
   unnamed  an error that does not name the file
 All four must be 0; else it prints the commands, and the exit code is 1. A command of which no whole call stands in
-WHOLE, although it writes files, is a mistake, too. The commit's run tries some kinds in each place, others in the next one, and leaves out the slow commands.
+WHOLE, although it writes files, is a mistake, too. The commit's run tries some kinds in each place, others in the next
+one, and leaves out the slow commands.
 """
 import concurrent.futures
 import os
@@ -80,6 +81,15 @@ WHOLE = {
     "objects list": "SOURCE/graph/objects",
     "echo": "x.y",
     "robot map": "",
+    "bench": "semantic --rounds 1",
+}
+# Where a place wants another call than that of its command.
+INSTEAD = {
+    ("terrain learn", "--record"): "--out NEW --pick left=0..1",
+    ("eval registration", "--out"): "--source PLANES --target PLANES --reference IDENTITY --generations 10",
+    ("calibrate lasers", "--out"): "SWEEPS",
+    ("calibrate lasers", "--picture"): "SWEEPS",
+    ("objects tune", "--roc"): "SOURCE/graph/objects --scenes 1 --object red_box",
 }
 SLOW = {"eval sift", "eval signs", "eval obstacle_stop", "eval stereo", "eval ego_motion", "eval objects", "eval objects3d", "eval body_pose", "eval person_tracking", "profile",
         "eval registration", "eval ground", "eval terrain", "eval scan_matching", "eval mapping", "calibrate lasers",
@@ -227,12 +237,10 @@ def stand_in(text):
 def call(command, places, place, path):
     """The command with the path in that place, and as much of the rest as it takes to come there."""
     if place.startswith("-"):
-        words = stand_in(WHOLE.get(command, ""))
+        words = stand_in(INSTEAD.get((command, place), WHOLE.get(command, "")))
         if place in words:
             at = words.index(place)
             del words[at : at + 2]
-        if (command, place) == ("terrain learn", "--record"):
-            words = ["--out", fresh("new.txt"), "--pick", "left=0..1"]
         return [takt, *command.split(), *words, place, path]
     stand_ins = {"FILE": INPUTS["CLOUD"], "FOLDER": source / "graph/objects", "NEW-FILE": fresh("new.yaml")}
     words = [path if name == place else stand_ins[wants] for name, wants, required in places
@@ -245,7 +253,8 @@ def call(command, places, place, path):
 
 
 INPUTS = {"SOURCE": source, "RECORD": work / "run.mcap", "REPORT": work / "run.json", "TRACE": work / "run_trace.json",
-          "CLOUD": work / "cloud.ply"}
+          "CLOUD": work / "cloud.ply", "PLANES": work / "planes.ply", "IDENTITY": work / "identity.txt",
+          "SWEEPS": work / "sweeps.txt"}
 
 
 def prepare():
@@ -256,6 +265,12 @@ def prepare():
                       "--report", INPUTS["REPORT"], "--trace", INPUTS["TRACE"]])
     if code != 0:
         sys.exit(f"boundary: the run for the inputs ended with {code}: {text}")
+    points = [f"{x / 10} {y / 10} {z / 10}" for x in range(20) for y in range(20) for z in range(20) if 0 in (x, y, z)]
+    INPUTS["PLANES"].write_text(f"ply\nformat ascii 1.0\nelement vertex {len(points)}\nproperty float x\nproperty float y\n"
+                                "property float z\nend_header\n" + "\n".join(points) + "\n")
+    INPUTS["IDENTITY"].write_text("1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n")
+    if full:
+        run([takt, "calibrate", "lasers", "--generate", INPUTS["SWEEPS"]])
 
 
 def try_place(command, places, place, kind, wants):
