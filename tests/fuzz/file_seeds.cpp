@@ -138,6 +138,29 @@ void image_seeds(Seeds& seeds) {
   seeds.add_and_spoil({std::begin(png), std::end(png)});
 }
 
+/// Graph, form feed, schedule.
+void graph_seeds(Seeds& seeds) {
+  constexpr std::string_view graph =
+      "takt: 1\nname: tiny\nconstants: {far: 20m}\ndefault_profile: sim\n"
+      "devices:\n  eye: {kind: sensor, rate: 15, mount: {x: 30cm}, in: {wanted: b.out}}\n"
+      "profiles:\n  sim: {default: {driver: sim}, set: {a.count: 3}}\n"
+      "subsystems:\n  one:\n    exports: [a.out]\n    spare: true\n"
+      "    a: {type: relay, in: {in: {from: eye.motion, depth: 3, max_age: 150ms}}, params: {range: '${far}'}}\n"
+      "  two:\n    b: {type: relay, in: {in: a.out}, params: {table: x}}\n"
+      "chains:\n  c: {from: eye.motion, to: b.out, max_age: 300ms}\n"
+      "modes:\n  short: {without: [b]}\n  safe_stop: {lost: [eye]}\n"
+      "expect:\n  within: 3s\n  all:\n    - {port: b.out, messages: 3, from: 1s}\n    - {port: a.out, field: yaw_rad, "
+      "at_least: 10deg}\n  rates: {a: 14}\n";
+  constexpr std::string_view schedule =
+      "\ftakt: 1\nname: s\npolicy: deadline\ncores: [0, 1]\n"
+      "nodes:\n  eye: {rate: 15, deadline: 20ms, budget: 1ms}\n  a: {rate: 1/3, offset: 2ms, criticality: high, "
+      "on_miss: "
+      "safe_stop, memory: 2MB}\n  b: {on: a.out, every: 2, min_interval: 1ms, deadline: 30ms, publish: let}\n";
+  seeds.add_and_spoil(of(std::string(graph) + std::string(schedule)));
+  seeds.add(of(std::string(graph)));
+  seeds.add(of("include: [other.yaml]\n" + std::string(graph) + std::string(schedule)));
+}
+
 }  // namespace
 
 size_t file_seeds(const std::filesystem::path& folder) {
@@ -152,6 +175,7 @@ size_t file_seeds(const std::filesystem::path& folder) {
   make("carmen", carmen_seeds);
   make("calibration", calibration_seeds);
   make("image", image_seeds);
+  make("graph", graph_seeds);
   return count;
 }
 
