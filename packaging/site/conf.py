@@ -5,7 +5,7 @@ import re
 import subprocess
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-PAGES = subprocess.run(["git", "ls-files", "*.md"], cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()
+PAGES = subprocess.run(["git", "ls-files", "*.md", ":!.github"], cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()
 ROOMS = [  # caption in the contents, pages
     ("Documents", [p for p in PAGES if p.startswith("docs/") and p != "docs/README.md"]),
     ("Nodes", [p for p in PAGES if p.startswith("nodes/")]),
