@@ -49,7 +49,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   }();
   static const graph::DeviceCatalogue catalogue = devices();
   const auto part = static_cast<size_t>(std::find(data, data + size, '\f') - data);
-  const fuzz::MemoryFile graph(data, part), schedule(data + part, size - part);
+  const size_t behind = std::min(part + 1, size);
+  const fuzz::MemoryFile graph(data, part), schedule(data + behind, size - behind);
   graph::LoadOptions options;
   options.schedule = schedule.path();
   const graph::Loaded loaded = graph::load(graph.path(), options, types, catalogue);
