@@ -269,8 +269,7 @@ def prepare():
     INPUTS["PLANES"].write_text(f"ply\nformat ascii 1.0\nelement vertex {len(points)}\nproperty float x\nproperty float y\n"
                                 "property float z\nend_header\n" + "\n".join(points) + "\n")
     INPUTS["IDENTITY"].write_text("1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n")
-    if full:
-        run([takt, "calibrate", "lasers", "--generate", INPUTS["SWEEPS"]])
+    run([takt, "calibrate", "lasers", "--generate", INPUTS["SWEEPS"]])
 
 
 def try_place(command, places, place, kind, wants):
