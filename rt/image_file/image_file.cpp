@@ -79,20 +79,30 @@ Head png_head(std::istream& in) {
   return head;
 }
 
+[[noreturn]] void refuse(const std::filesystem::path& file, const std::string& what) {
+  throw ImageError(file.string() + ": " + what);
+}
+
+constexpr std::string_view kPng = "\x89PNG\r\n\x1a\n";
+
+/// OpenCV tries every decoder that it has, and a damaged file ends the process in one of them (DICOM's).
+bool known(std::string_view start) {
+  using namespace std::string_view_literals;
+  constexpr std::array kStarts{kPng, "\xff\xd8\xff"sv, "BM"sv, "II*\0"sv, "MM\0*"sv, "RIFF"sv, "PF"sv, "Pf"sv};
+  const bool pnm = start[0] == 'P' && start[1] >= '1' && start[1] <= '6';
+  return pnm || std::any_of(kStarts.begin(), kStarts.end(), [&](auto begin) { return start.starts_with(begin); });
+}
+
 Head head_of(const std::filesystem::path& file) {
   require_readable<ImageError>(file, kLargestInput);
   std::ifstream in(file, std::ios::binary);
-  std::array<char, 8> magic{};
-  in.read(magic.data(), magic.size());
-  if (std::memcmp(magic.data(), "\x89PNG\r\n\x1a\n", 8) == 0) return png_head(in);
+  std::array<char, 8> start{};
+  in.read(start.data(), start.size());
+  const std::string_view magic(start.data(), start.size());
+  if (!known(magic)) refuse(file, "is no image of a known kind: PNG, JPEG, PGM, PPM, PBM, PFM, BMP, TIFF, WebP");
+  if (magic == kPng) return png_head(in);
   in.clear();
-  if (magic[0] == 'P' && (magic[1] == '2' || magic[1] == '3' || magic[1] == '5' || magic[1] == '6'))
-    return pnm_head(in, magic[1]);
-  return {};
-}
-
-[[noreturn]] void refuse(const std::filesystem::path& file, const std::string& what) {
-  throw ImageError(file.string() + ": " + what);
+  return magic[0] == 'P' && magic[1] != '1' && magic[1] != '4' && magic[1] < 'F' ? pnm_head(in, magic[1]) : Head{};
 }
 
 cv::Mat decode(const std::filesystem::path& file, int mode, const Head& head) {

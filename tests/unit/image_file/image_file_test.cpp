@@ -127,6 +127,8 @@ TEST_CASE("what is not read is refused with the file's name") {
   CHECK(has(error_of(folder.path / "none.png"), "No such file"));
   CHECK(has(error_of(folder.path), "is a folder"));
   CHECK(has(error_of(folder.write("text.png", "no image")), "is no image"));
+  // A decoder of OpenCV ends the process over it.
+  CHECK(has(error_of(folder.write("dicom.png", std::string(128, ' ') + "DICM")), "is no image of a known kind"));
   for (const char* head : {"P5\n60000 60000\n255\n", "P6\n60000 60000\n65535\n", "P5\n30000 30000\n255\n"})
     CHECK(has(error_of(folder.write("huge.pgm", head)), "000 px"));
   std::string claims = png(folder, ramp(1023), 10);
