@@ -156,12 +156,22 @@ bool Server::answer(const Json& question, Connection& connection, uint32_t by_us
                                           : switch_fault(device, fault, question.value("on", true), by_user));
   }
   if (what == "forget") return connection.write(forget(question.value("param", "")));
+  if (what == "mark") return connection.write(mark(question.value("words", ""), by_user));
   if (what == "stop") {
     subject_.board.stop().raise(now_ns());
     return connection.write({{"ok", true}});
   }
   return connection.write(
-      wrong("unknown question " + what + "; known: top, echo, get, set, forget, fault, mode, stop"));
+      wrong("unknown question " + what + "; known: top, echo, get, set, forget, fault, mark, mode, stop"));
+}
+
+Json Server::mark(const std::string& words, uint32_t by_user) {
+  Mark mark{now_ns(), by_user, BoundedText<200>(words)};
+  if (words.empty()) return wrong("a mark needs words");
+  if (mark.words.text() != words) return wrong("a mark has at most 199 bytes");
+  if (!subject_.board.marks().append(mark)) return wrong(fmt::format("this run has {} marks already", kMostMarks));
+  const double at_s = static_cast<double>(mark.at_ns - subject_.board.epoch_ns().load()) / 1e9;
+  return {{"ok", true}, {"at_s", at_s}};
 }
 
 Json Server::top() const {

@@ -28,7 +28,7 @@ struct Subject {
   pid_t run = getpid();  ///< the process that stands for the run
 };
 
-/// Answers top, echo, get, set, forget, fault, mode and stop for one run, from threads of the default policy that only
+/// Answers top, echo, get, set, forget, fault, mark, mode and stop for one run, from threads of the default policy that only
 /// read the board, hold one message of an output at a time, and post parameters to be taken between jobs. Its own user
 /// and root are heard; of the service its group, too, where the mode of its folder says so.
 class Server {
@@ -59,6 +59,7 @@ class Server {
   /// `as`: "png", "ply" or "", for text alone; `items`: of longer arrays so many elements.
   bool stream(size_t port, const std::string& as, size_t items, int64_t count, Connection& connection);
   nlohmann::ordered_json change_mode(const std::string& name);
+  nlohmann::ordered_json mark(const std::string& words, uint32_t by_user);
   struct Wish {
     std::string text;      ///< the value, with its unit
     bool keep = false;     ///< also for later runs

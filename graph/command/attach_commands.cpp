@@ -279,6 +279,12 @@ void add_attach_commands(CLI::App& app, plugin::Plugins& plugins, AttachOptions&
   mode->add_option("mode", o.mode, "a mode of the graph, full or safe_stop")->required();
   mode->footer("Example: takt mode safe_stop");
   mode->callback([&] { exit_code = understood([&] { return run_question(o, {{"do", "mode"}, {"mode", o.mode}}); }); });
+  CLI::App* mark = add(app, "mark", "sets a mark in what a running graph records, and freezes its ring", o);
+  mark->add_option("words", o.words, "what happened")->required();
+  mark->footer("Example: takt mark \"it turned left into the door\"");
+  mark->callback([&] {
+    exit_code = understood([&] { return run_question(o, {{"do", "mark"}, {"words", o.words}}); });
+  });
   CLI::App* stop = add(app, "stop", "ends a running graph cleanly", o);
   stop->footer("Example: takt stop");
   stop->callback([&] { exit_code = understood([&] { return run_question(o, {{"do", "stop"}}); }); });

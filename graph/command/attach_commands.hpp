@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// `takt top | echo | get | set | fault | mode | stop`: commands that speak to a graph that is running already.
+// `takt top | echo | get | set | fault | mark | mode | stop`: commands that speak to a graph that is running already.
 #pragma once
 #include <CLI/CLI.hpp>
 #include <filesystem>
@@ -15,7 +15,7 @@ namespace takt::command {
 struct AttachOptions {
   int run = 0;  ///< process id; 0: the only one that runs
   bool once = false, json = false;
-  std::string port, param, value, mode;
+  std::string port, param, value, mode, words;
   std::string device, fault, on;      ///< of fault; `on`: "on" or "off"
   bool keep = false, forget = false;  ///< of set
   std::filesystem::path graph;        ///< of set --keep and --forget, where nothing runs; empty: the default graph

@@ -11,6 +11,7 @@
 
 #include "graph/cli/file_option.hpp"
 #include "graph/cli/outcome.hpp"
+#include "graph/flight/left_runs.hpp"
 #include "graph/log/cut_log.hpp"
 #include "graph/log/damages.hpp"
 #include "graph/log/echo_log.hpp"
@@ -143,6 +144,20 @@ int log_cut(const LogOptions& options) {
   });
 }
 
+int log_rescue(const LogOptions& options) {
+  NewLog made;
+  if (const int code = make(options.output, made); code != kOk) return code;
+  const auto rescued = flight::rescue(options.file, *made.sink);
+  if (!rescued) return refuse(rescued.error(), kBadInput);
+  for (const std::string& damage : rescued->joined.damages) std::fprintf(stderr, "takt: %s\n", damage.c_str());
+  if (const auto done = made.claim->finish(); !done) return refuse(done.error(), "--output");
+  std::printf("%s: %llu messages of %.1f s, %.1f MB, from %zu files\n", rescued->run.c_str(),
+              static_cast<unsigned long long>(rescued->joined.messages),
+              static_cast<double>(rescued->joined.last_ns - rescued->joined.first_ns) / 1e9,
+              static_cast<double>(rescued->joined.bytes) / 1e6, rescued->files.size());
+  return kOk;
+}
+
 int log_echo(const LogOptions& options) {
   return guarded([&]() -> int {
     auto log = open(options.file);
@@ -193,6 +208,12 @@ void add_log(CLI::App& app, const Registry& registry, LogOptions& o, int& exit_c
   cut->add_option("--to", o.to_s, "seconds into the run, behind the last release")->check(CLI::Range(0.0, 1e9));
   cut->footer("Example: takt log cut run.mcap -o short.mcap --from 2 --to 4");
   cut->callback([&] { exit_code = log_cut(o); });
+  CLI::App* rescue = log->add_subcommand("rescue", "one record of what the ring of the last run in a folder still has");
+  reads_folder(rescue->add_option("folder", o.file, "OUTPUT/flight/ring of a run that may have been killed"))
+      ->required();
+  writes_file(rescue->add_option("-o,--output", o.output, "the file to write"))->required();
+  rescue->footer("Example: takt log rescue out/flight/ring -o last.mcap");
+  rescue->callback([&] { exit_code = log_rescue(o); });
   for (CLI::App* command : {info, diff, echo, exported, cut})
     command->add_flag("--allow-damage", o.allow_damage, "a record that is damaged or cut off is no failure");
   exported->footer("Example: takt log export run.mcap -o foxglove.mcap");

@@ -214,6 +214,25 @@ struct ExpectSpec {
   FigureExpectations figures;
 };
 
+/// The part `record` of a graph: what its runs keep of themselves at any time, and for how long.
+struct RecordSpec {
+  enum class Keep : uint8_t { all, hash, nothing };
+  struct Port {
+    PortName port;
+    Keep keep = Keep::all;
+    uint32_t every = 1;    ///< all fields of each so many-th message
+    int64_t pause_ns = 0;  ///< ... or of one in so much time
+    Position position;
+  };
+  bool ring = false;                    ///< runs keep one unless they are told otherwise
+  int64_t disk_bytes = 2'000'000'000;   ///< of all files of the ring, never more
+  int64_t memory_bytes = 256'000'000;   ///< of images and clouds, which are kept in memory only
+  int64_t keep_ns = 3600'000'000'000;   ///< what is older goes
+  int64_t before_ns = 5'000'000'000, after_ns = 2'000'000'000;  ///< around what freezes the ring
+  std::vector<Port> ports;              ///< those that the graph has a rule for
+  Position position;
+};
+
 struct GraphSpec {
   std::string name, file, profile, mode = "full";
   std::filesystem::path directory;
@@ -226,6 +245,7 @@ struct GraphSpec {
   std::vector<ChainSpec> chains;
   std::vector<ModeSpec> modes;
   std::optional<ExpectSpec> expect;
+  RecordSpec record;
   ScheduleSpec schedule;
   KeptValues kept;
   std::vector<std::string> adjusted;  ///< what validation changed, for stderr and the report

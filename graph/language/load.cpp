@@ -39,6 +39,7 @@ Loaded Loader::load(const std::filesystem::path& file) {
     check_schedule();
     check_modes();
     read_expect();
+    read_record();
     apply_mode();
     tell_what_is_not_enforced();
   }

@@ -145,6 +145,11 @@ class Loader {
   bool check_keys(const nlohmann::json& value, const std::string& pointer, std::string_view what,
                   const std::vector<std::string>& valid);
 
+  // read_record.cpp: what runs keep of themselves
+  void read_record();
+  void read_record_size(const nlohmann::json& value, std::string_view key, int64_t least, int64_t& bytes);
+  void read_record_port(const std::string& name);
+
   // check_graph.cpp
   void check_chains();
   void check_modes();

@@ -97,6 +97,8 @@ std::string event_text(const record::RecordedEvent& event, const Json& plan) {
                        set->who.empty() ? "" : " by ", set->who);
   if (const auto* change = std::get_if<record::ModeChange>(&event.what))
     return fmt::format("mode {}: {}", name_at(plan.value("modes", Json::array()), change->mode), change->reason);
+  if (const auto* mark = std::get_if<record::MarkSet>(&event.what))
+    return fmt::format("mark: {}{}{}", mark->words, mark->who.empty() ? "" : " by ", mark->who);
   return record::name_of(event.kind);
 }
 

@@ -130,8 +130,8 @@ class IsolatedRun {
     if (options_.transport == "iceoryx") probe.emplace(*transport_, board_.group(), clock_);
     agree_on_policy();
     faults_.disturb_disk(record_, clock_, board_);
-    if (!again()) record_.begin(graph_, plan_, board_, *transport_, "subsystem");
-    else if (record_.wanted()) adjusted_.push_back("the record ends where the group of processes was lost");
+    if (!again()) record_.begin(graph_, plan_, board_, *transport_, "subsystem", partition_.names);
+    else if (record_.listens()) adjusted_.push_back("the record ends where the group of processes was lost");
     trace_.collect(plan_, record_);
     wait_for_all(ProcessRecord::running);
     const int64_t steal_before_ms = ProcessReading::now().steal_ms, cpu_before_ns = ProcessReading::now().cpu_ns;

@@ -5,8 +5,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <iterator>
-#include <list>
 #include <stdexcept>
 
 #include "graph/language/registry.hpp"
@@ -24,17 +22,23 @@ constexpr int64_t kUndisturbedNs = 250'000'000;
 /// Outputs whose messages are smaller are recorded with all fields.
 constexpr uint64_t kSmallBytes = 64 * 1024;
 
-/// By port: recorded with all fields. Devices always are, or nothing could be replayed.
-std::vector<char> whole_ports(const Plan& plan, const std::vector<std::string>& also) {
+/// By port. Those of devices always have all fields, or nothing could be replayed.
+std::vector<record::PortRule> port_rules(const Plan& plan, const std::vector<std::string>& also) {
   const auto named = [&](const std::string& name) { return std::find(also.begin(), also.end(), name) != also.end(); };
-  std::vector<char> whole(plan.ports.size(), 0);
+  std::vector<record::PortRule> rules(plan.ports.size());
   for (size_t p = 0; p < plan.ports.size(); ++p)
-    whole[p] = plan.ports[p].chunk_bytes() <= kSmallBytes || named("all") ||
-               named(plan.ports[p].node + "." + plan.ports[p].port);
+    if (plan.ports[p].chunk_bytes() > kSmallBytes && !named("all") &&
+        !named(plan.ports[p].node + "." + plan.ports[p].port))
+      rules[p].keep = record::PortRule::hash;
   for (const TaskPlan& task : plan.tasks)
-    for (const size_t port : task.ports) whole[port] |= static_cast<char>(task.device);
-  return whole;
+    for (const size_t port : task.ports)
+      if (task.device) rules[port].keep = record::PortRule::all;
+  return rules;
 }
+
+/// Behind all lanes, before all that is ordinary. Beside workers that are ordinary themselves a recorder is one of
+/// them.
+int priority_on(const Plan& plan) { return plan.policy != Policy::cooperative ? kLowestPriority : 0; }
 
 /// What a replay gives to --set: kept values first, since --set of the command line wins.
 std::string settings(const RunOptions& options, const graph::GraphSpec& graph) {
@@ -59,8 +63,9 @@ std::string absolute(const std::filesystem::path& file) {
 }  // namespace
 
 Observers observers(const RunOptions& options, const graph::GraphSpec& graph) {
-  const uint32_t followers =
-      (options.record.empty() ? 0u : 1u) + (graph.expect ? 1u : 0u) + (options.witness ? 1u : 0u);
+  const uint32_t followers = (options.record.empty() ? 0u : 1u) +
+                             (options.keep_ring ? flight::FlightRecorder::kFollowers : 0u) + (graph.expect ? 1u : 0u) +
+                             (options.witness ? 1u : 0u);
   return {1, followers, kUndisturbedNs};
 }
 
@@ -75,13 +80,24 @@ RunRecord::RunRecord(const Registry& registry, const RunOptions& options, const 
 }
 
 void RunRecord::begin(const graph::GraphSpec& graph, const Plan& plan, const RunBoard& board, Transport& transport,
-                      const std::string& isolation) {
-  if (!wanted()) return;
-  auto file = mcap::FileSink::open(options_.record);
-  if (!file) throw std::runtime_error("--record " + file.error() + "; choose another place");
-  file_.emplace(std::move(*file));
-  if (make_disk_) disk_ = make_disk_(*file_);
-  mcap::Sink& sink = disk_ ? *disk_ : *file_;
+                      const std::string& isolation, std::vector<std::string> processes) {
+  if (!listens()) return;
+  const record::Head head = head_of(graph, plan, transport, isolation);
+  if (wanted()) begin_file(plan, board, transport, head);
+  if (!options_.keep_ring) return;
+  flight::FlightRecorder::Options how;
+  how.folder = options_.output / "flight";
+  how.processes = std::move(processes);
+  how.by_caller = options_.clock == "virtual";
+  how.priority = priority_on(plan);
+  how.say = [](const std::string& line) { std::fprintf(stderr, "takt: %s\n", line.c_str()); };
+  flight_ = std::make_unique<flight::FlightRecorder>(graph, plan, board, transport, head, std::move(how));
+  if (!flight_->lacks().empty()) std::fprintf(stderr, "takt: adjusted: no ring: %s\n", flight_->lacks().c_str());
+  for (const std::string& doubt : flight_->doubts()) std::fprintf(stderr, "takt: note: %s\n", doubt.c_str());
+}
+
+record::Head RunRecord::head_of(const graph::GraphSpec& graph, const Plan& plan, const Transport& transport,
+                                const std::string& isolation) {
   record::Head head;
   head.facts = {{"graph", absolute(graph.file)},
                 {"schedule", absolute(graph.schedule.file)},
@@ -100,33 +116,43 @@ void RunRecord::begin(const graph::GraphSpec& graph, const Plan& plan, const Run
                 {"program", log::program_hash()},
                 {"simd", registry_.vectors.names != nullptr ? registry_.vectors.names().front() : ""},
                 {"machine", machine_facts().dump()}};
-  const std::string texts[]{log::file_text(graph.file), log::file_text(graph.schedule.file),
-                            log::plan_json(plan).dump(), log::asset_hashes(plan, graph.directory).dump()};
-  std::list<std::string> parts;  // the head refers to them
-  const char* names[]{"graph.yaml", "schedule.yaml", "plan.json", "assets.json"};
-  for (size_t i = 0; i < std::size(texts); ++i)
-    head.files.push_back({0, 0, names[i], i < 2 ? "application/yaml" : "application/json", mcap::bytes_of(texts[i])});
+  const auto attach = [&](std::string name, const char* type, std::string text) {
+    head.files.push_back({0, 0, std::move(name), type, mcap::bytes_of(texts_.emplace_back(std::move(text)))});
+  };
+  attach("graph.yaml", "application/yaml", log::file_text(graph.file));
+  attach("schedule.yaml", "application/yaml", log::file_text(graph.schedule.file));
+  attach("plan.json", "application/json", log::plan_json(plan).dump());
+  attach("assets.json", "application/json", log::asset_hashes(plan, graph.directory).dump());
   for (size_t i = 1; i < graph.files.size(); ++i)  // what it includes, and the parameter file
-    head.files.push_back({0, 0, log::part_name(i), "application/yaml",
-                          mcap::bytes_of(parts.emplace_back(log::file_text(graph.files[i])))});
+    attach(log::part_name(i), "application/yaml", log::file_text(graph.files[i]));
+  return head;
+}
+
+void RunRecord::begin_file(const Plan& plan, const RunBoard& board, Transport& transport, const record::Head& head) {
+  auto file = mcap::FileSink::open(options_.record);
+  if (!file) throw std::runtime_error("--record " + file.error() + "; choose another place");
+  file_.emplace(std::move(*file));
+  if (make_disk_) disk_ = make_disk_(*file_);
+  mcap::Sink& sink = disk_ ? *disk_ : *file_;
   record::Recorder::Options how;
-  how.whole = whole_ports(plan, options_.record_ports);
+  how.ports = port_rules(plan, options_.record_ports);
   how.by_caller = options_.clock == "virtual";
-  // Behind all lanes, before all that is ordinary. Beside workers that are ordinary themselves it is one of them.
-  if (plan.policy != Policy::cooperative) how.priority = kLowestPriority;
+  how.priority = priority_on(plan);
   recorder_ = std::make_unique<record::Recorder>(plan, board, transport, sink, head, std::move(how));
 }
 
 void RunRecord::finish(const RunResult& result, uint64_t unheard_threads) {
+  const mcap::Metadata facts{{"epoch_ns", std::to_string(result.epoch_ns)},
+                             {"end_ns", std::to_string(result.end_ns)},
+                             {"policy_granted", std::string(to_string(result.policy_granted))}};
+  if (flight_) flight_->finish(facts, unheard_threads);
   if (!recorder_) return;
-  written_ = recorder_->finish({{"epoch_ns", std::to_string(result.epoch_ns)},
-                                {"end_ns", std::to_string(result.end_ns)},
-                                {"policy_granted", std::string(to_string(result.policy_granted))}},
-                               unheard_threads);
+  written_ = recorder_->finish(facts, unheard_threads);
   recorder_.reset();
 }
 
 void RunRecord::tell(nlohmann::ordered_json& report) const {
+  if (flight_) report["flight"] = flight_->told();
   if (!wanted()) return;
   if (written_.messages + written_.jobs == 0 && written_.not_written > 0)
     options_.outputs->code =

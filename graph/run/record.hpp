@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <functional>
+#include <list>
 #include <memory>
 #include <optional>
 #include <string>
 
+#include "graph/flight/flight_recorder.hpp"
 #include "graph/run/run.hpp"
 #include "hal/settings/json.hpp"
 #include "rt/record/mcap/file_sink.hpp"
@@ -18,41 +20,53 @@ namespace takt::command {
 /// graph, if there are any.
 Observers observers(const RunOptions& options, const graph::GraphSpec& graph);
 
-/// The record of a run, if one was asked for (`--record`); else every call does nothing.
+/// What a run records: into a file, if one was asked for (`--record`), and into the ring, if it keeps one. Without
+/// either every call does nothing.
 class RunRecord {
  public:
   /// Throws std::invalid_argument if --record-port names an output that the plan does not have.
   RunRecord(const Registry& registry, const RunOptions& options, const Plan& plan);
   bool wanted() const { return !options_.record.empty(); }
+  /// Somebody hears what jobs note.
+  bool listens() const { return wanted() || options_.keep_ring; }
   /// Before the first job, once the ports have their memory. Throws std::runtime_error if the file cannot be made.
   void begin(const graph::GraphSpec& graph, const Plan& plan, const RunBoard& board, Transport& transport,
-             const std::string& isolation);
+             const std::string& isolation, std::vector<std::string> processes = {});
   /// What stands between recorder and file, made once that is open; null: nothing. Before begin().
   using Disk = std::function<std::unique_ptr<mcap::Sink>(mcap::Sink& file)>;
   void on_disk(Disk disk) { make_disk_ = std::move(disk); }
   void take(int32_t ring, const trace::Event& event) {
     if (recorder_) recorder_->take(ring, event);
+    if (flight_) flight_->take(ring, event);
   }
   /// Virtual time: after every job.
   void capture() {
     if (recorder_) recorder_->capture();
+    if (flight_) flight_->capture();
   }
   /// After the last job, before those who published leave.
   void take_rest() {
     if (recorder_) recorder_->take_rest();
+    if (flight_) flight_->take_rest();
   }
   /// After the last event was taken; `unheard_threads` noted none.
   void finish(const RunResult& result, uint64_t unheard_threads);
-  /// Adds "record" and "recorder_lost" to the report.
+  /// Adds "record" and "recorder_lost" to the report, and "flight" of the ring.
   void tell(nlohmann::ordered_json& report) const;
 
  private:
+  record::Head head_of(const graph::GraphSpec& graph, const Plan& plan, const Transport& transport,
+                       const std::string& isolation);
+  void begin_file(const Plan& plan, const RunBoard& board, Transport& transport, const record::Head& head);
+
   const Registry& registry_;
   const RunOptions& options_;
   std::optional<mcap::FileSink> file_;
   Disk make_disk_;
   std::unique_ptr<mcap::Sink> disk_;
+  std::list<std::string> texts_;  ///< the head's files
   std::unique_ptr<record::Recorder> recorder_;
+  std::unique_ptr<flight::FlightRecorder> flight_;
   record::RecordResult written_;
 };
 

@@ -40,7 +40,7 @@ RunTrace::RunTrace(const RunOptions& options, const Plan& plan, size_t processes
   // One for each lane and, if the policy is refused after all, one for each cooperative worker: no process has more
   // than it has lanes, or one. Some for those of restarted processes that find none of their name.
   constexpr size_t kSpare = 8;
-  if (!options.trace.empty() || !options.record.empty())
+  if (!options.trace.empty() || !options.record.empty() || options.keep_ring)
     rings_ = std::make_unique<trace::Rings>(2 * plan.tasks.size() + processes + kSpare);
 }
 
@@ -51,7 +51,7 @@ void RunTrace::collect(const Plan& plan, RunRecord& record) {
   how.best = best_source(options_);
   how.by_caller = options_.clock == "virtual";
   if (options_.trace.empty()) how.records_kept = 0;
-  if (record.wanted()) how.listener = [&record](int32_t ring, const trace::Event& event) { record.take(ring, event); };
+  if (record.listens()) how.listener = [&record](int32_t ring, const trace::Event& event) { record.take(ring, event); };
   collector_ = std::make_unique<trace::Collector>(*rings_, std::move(how));
 }
 

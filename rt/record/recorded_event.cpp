@@ -31,6 +31,9 @@ struct Body {
   template <class M>
   requires std::is_same_v<std::remove_const_t<M>, ModeChange>
   void operator()(M& change) { at.number(change.mode), at.text(change.reason); }
+  template <class M>
+  requires std::is_same_v<std::remove_const_t<M>, MarkSet>
+  void operator()(M& mark) { at.text(mark.words), at.text(mark.who); }
 };
 
 }  // namespace
@@ -40,8 +43,9 @@ std::string name_of(uint16_t kind) {
                                                     "mark",    "snapshot",  "machine_lost", "level"};
   if (kind == 0 || kind > names.size()) return "unknown kind " + std::to_string(kind);
   const std::string name = names[kind - 1];
-  return kind < static_cast<uint16_t>(EventKind::request) ? name
-                                                          : "reserved kind " + std::to_string(kind) + " (" + name + ")";
+  const bool written =
+      kind < static_cast<uint16_t>(EventKind::request) || kind == static_cast<uint16_t>(EventKind::mark);
+  return written ? name : "reserved kind " + std::to_string(kind) + " (" + name + ")";
 }
 
 void pack(const RecordedEvent& event, std::vector<std::byte>& to) {
@@ -59,6 +63,7 @@ tl::expected<RecordedEvent, std::string> unpack_event(std::span<const std::byte>
       case EventKind::restart: event.what = Restart{}; break;
       case EventKind::parameter: event.what = ParameterSet{}; break;
       case EventKind::mode: event.what = ModeChange{}; break;
+      case EventKind::mark: event.what = MarkSet{}; break;
       default: break;
     }
     std::visit(Body<PackIn>{in}, event.what);
@@ -74,7 +79,8 @@ const char* event_layout() {
          "sequence] seen, [u16 param, u8 kind (0 flag, 1 integer, 2 number, 3 text), value] params; "
          "2 parameter: u16 param, u8 kind, value, text who; "
          "3 mode: u32 mode, text reason; "
-         "4 request, 5 mark, 6 snapshot, 7 machine_lost, 8 level: reserved; pass over kinds and bytes behind that you "
+         "5 mark: text words, text who; "
+         "4 request, 6 snapshot, 7 machine_lost, 8 level: reserved; pass over kinds and bytes behind that you "
          "do not know; little-endian, [..] is u32 count and the elements, text is u32 bytes and the bytes";
 }
 

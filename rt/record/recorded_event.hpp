@@ -24,7 +24,7 @@ enum class EventKind : uint16_t {
   parameter,     ///< a parameter was set while the run went on
   mode,          ///< the mode changes
   request,       ///< reserved: start, stop or pace
-  mark,          ///< reserved: a mark that a person or a node set
+  mark,          ///< words that a person set
   snapshot,      ///< reserved: the state of a node
   machine_lost,  ///< reserved: another machine of the run went away
   level,         ///< reserved: a task's quality level changes; jobs tell theirs
@@ -68,13 +68,20 @@ struct ModeChange {
   bool operator==(const ModeChange&) const = default;
 };
 
+struct MarkSet {
+  std::string words;
+  std::string who;  ///< as of ParameterSet
+  bool operator==(const MarkSet&) const = default;
+};
+
 struct RecordedEvent {
   static constexpr uint16_t kNoTask = UINT16_MAX;
   uint16_t kind = 0;        ///< EventKind, or one that this program does not know
   uint16_t task = kNoTask;  ///< index into Plan::tasks
   uint32_t job = 0;         ///< Job::index() of the job that begins next; 0 without a task
   int64_t at_ns = 0;
-  std::variant<std::monostate, Restart, ParameterSet, ModeChange> what;  ///< monostate: of a kind that is not known
+  std::variant<std::monostate, Restart, ParameterSet, ModeChange, MarkSet>
+      what;  ///< monostate: of a kind that is not known
   bool operator==(const RecordedEvent&) const = default;
 };
 

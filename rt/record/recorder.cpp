@@ -22,26 +22,34 @@ constexpr int64_t kChunkNs = 1'000'000'000;
 
 }  // namespace
 
-Recorder::Recorder(const Plan& plan, const RunBoard& board, Transport& transport, mcap::Sink& sink, const Head& head,
+Recorder::Recorder(const Plan& plan, const RunBoard& board, Transport& transport, Splits& splits, Head head,
                    Options options)
+    : Recorder(plan, board, transport, nullptr, &splits, std::move(head), std::move(options)) {}
+
+Recorder::Recorder(const Plan& plan, const RunBoard& board, Transport& transport, mcap::Sink& sink, Head head,
+                   Options options)
+    : Recorder(plan, board, transport, std::make_unique<OneFile>(sink), nullptr, std::move(head), std::move(options)) {}
+
+Recorder::Recorder(const Plan& plan, const RunBoard& board, Transport& transport, std::unique_ptr<Splits> own,
+                   Splits* splits, Head head, Options options)
     : options_(std::move(options)),
       board_(board),
-      file_(sink, options_.file),
+      own_splits_(std::move(own)),
+      splits_(own_splits_ ? *own_splits_ : *splits),
+      head_(std::move(head)),
       queue_(options_.queue_bytes),
       jobs_([this](const RecordedJob& job) { take_job(job); },
             [this](const RecordedEvent& event) { take_event(event); }) {
-  note(file_.begin("", "takt"));
-  mcap::Metadata facts = head.facts;
-  facts["format"] = std::to_string(kFormat);
-  note(file_.metadata(kFacts, facts));
-  for (const mcap::Attachment& attached : head.files) note(file_.attach(attached));
-  add_channels(plan);
-  for (size_t p = 0; p < plan.ports.size(); ++p) ports_[p].follower.emplace(transport.make_reader(p));
+  head_.facts["format"] = std::to_string(kFormat);
+  define_channels(plan);
+  for (size_t p = 0; p < plan.ports.size(); ++p)
+    if (ports_[p].rule.keep != PortRule::nothing) ports_[p].follower.emplace(transport.make_reader(p));
   for (const TaskPlan& task : plan.tasks) {
     ports_of_.push_back(task.ports);
     std::vector<size_t>& edges = edges_of_.emplace_back();
     for (const EdgePlan& edge : task.edges) edges.push_back(edge.port);
   }
+  begin_file(0);
   writing_ = OwnThread([this] { write_on(); });
   if (!options_.by_caller) capturing_ = OwnThread([this] { capture_on(); });
 }
@@ -50,20 +58,58 @@ Recorder::~Recorder() {
   if (writing_.joinable()) finish({});
 }
 
-void Recorder::add_channels(const Plan& plan) {
-  jobs_channel_ = file_.add_channel(file_.add_schema("takt.Job", "text", job_layout()), kJobs, kEncoding, {});
-  events_channel_ = file_.add_channel(file_.add_schema("takt.Event", "text", event_layout()), kEvents, kEncoding, {});
+uint16_t Recorder::define_schema(std::string name, std::string encoding, std::string data) {
+  const auto id = static_cast<uint16_t>(schemas_.size() + 1);
+  schemas_.push_back({id, std::move(name), std::move(encoding), std::move(data)});
+  return id;
+}
+
+uint16_t Recorder::define(uint16_t schema, std::string topic, mcap::Metadata metadata) {
+  const auto id = static_cast<uint16_t>(channels_.size() + 1);
+  channels_.push_back({id, schema, std::move(topic), kEncoding, std::move(metadata)});
+  return id;
+}
+
+/// The same in every file, whatever it holds, so that files can be joined.
+void Recorder::define_channels(const Plan& plan) {
+  jobs_channel_ = define(define_schema("takt.Job", "text", job_layout()), kJobs, {});
+  events_channel_ = define(define_schema("takt.Event", "text", event_layout()), kEvents, {});
   std::map<std::pair<std::string_view, std::string>, uint16_t> schemas;  // two types may share a name
   for (size_t p = 0; p < plan.ports.size(); ++p) {
     const PortPlan& port = plan.ports[p];
     Port& mine = ports_.emplace_back();
     mine.type = port.type;
-    mine.whole = options_.whole.empty() || options_.whole[p] != 0;
+    if (!options_.ports.empty()) mine.rule = options_.ports[p];
     const auto [schema, added] = schemas.try_emplace({port.type->name, layout_of(*port.type)}, uint16_t{0});
-    if (added) schema->second = file_.add_schema("takt." + std::string(port.type->name), "json", schema->first.second);
-    mine.channel = file_.add_channel(schema->second, port.node + "." + port.port, kEncoding,
-                                     {{"fields", mine.whole ? "all" : "hash"}});
+    if (added) schema->second = define_schema("takt." + std::string(port.type->name), "json", schema->first.second);
+    mine.channel = define(schema->second, port.node + "." + port.port,
+                          {{"fields", mine.rule.keep == PortRule::all ? "all" : "hash"}});
   }
+}
+
+void Recorder::begin_file(int64_t at_ns) {
+  file_began_ns_ = at_ns;
+  mcap::Sink* sink = splits_.next(at_ns);
+  if (sink == nullptr) return;
+  file_.emplace(*sink, options_.file);
+  bool begun = note(file_->begin("", "takt")) && note(file_->metadata(kFacts, head_.facts));
+  for (const mcap::Attachment& attached : head_.files) begun = note(file_->attach(attached)) && begun;
+  for (const mcap::Schema& schema : schemas_) file_->add_schema(schema.name, schema.encoding, schema.data);
+  for (const mcap::Channel& channel : channels_)
+    file_->add_channel(channel.schema, channel.topic, channel.encoding, channel.metadata);
+  if (!begun && !own_splits_) file_.reset();  // what follows could not be read; the next one is tried
+}
+
+void Recorder::end_file() {
+  if (!file_) return;
+  note(file_->flush());
+  note(file_->metadata(kEnd, last_facts_));
+  note(file_->finish());
+  for (const auto& [channel, count] : file_->statistics().channel_messages) written_[channel] += count;
+  result_.not_written += file_->lost();
+  result_.bytes += file_->written_bytes();
+  ++result_.files;
+  file_.reset();
 }
 
 void Recorder::capture_on() {
@@ -88,6 +134,17 @@ void Recorder::capture_on() {
 void Recorder::take_ports() {
   for (Port& port : ports_) take_port(port);
   take_modes();
+  take_marks();
+}
+
+void Recorder::take_marks() {
+  const MarkLog& marks = board_.marks();
+  for (; marks_taken_ < marks.size(); ++marks_taken_) {
+    const Mark* mark = marks.at(marks_taken_);
+    if (mark == nullptr) return;  // it is being written
+    take_event({static_cast<uint16_t>(EventKind::mark), RecordedEvent::kNoTask, 0, mark->at_ns,
+                MarkSet{std::string(mark->words.text()), "uid " + std::to_string(mark->by_user)}});
+  }
 }
 
 void Recorder::take_modes() {
@@ -102,10 +159,17 @@ void Recorder::take_modes() {
 }
 
 void Recorder::take_port(Port& port) {
+  if (!port.follower) return;
   result_.overwritten += port.follower->take([&](const Held& held) {
-    std::vector<std::byte> data = queue_.buffer(port.bytes);
-    pack(*port.type, held, port.whole, data);
-    port.bytes = data.size();
+    if (options_.listener.message) options_.listener.message(static_cast<size_t>(&port - ports_.data()), held);
+    const int64_t at_ns = held.header->published_ns;
+    const bool whole =
+        port.rule.keep == PortRule::all && held.sequence % port.rule.every == 0 &&
+        (port.rule.pause_ns == 0 || port.whole_ns == INT64_MIN || at_ns - port.whole_ns >= port.rule.pause_ns);
+    if (whole) port.whole_ns = at_ns;
+    std::vector<std::byte> data = queue_.buffer(whole ? port.bytes : 0);
+    pack(*port.type, held, whole, data);
+    if (whole) port.bytes = data.size();
     push(port.channel, held.sequence, held.header->published_ns, std::move(data));
   });
 }
@@ -117,6 +181,8 @@ void Recorder::take_job(const RecordedJob& job) {
   for (const RecordedJob::Input& input : job.inputs)
     if (!input.held.empty())
       tell(edges_of_[job.task][input.edge], input.held.back().first + input.held.back().count - 1);
+  if (options_.listener.job) options_.listener.job(job);
+  if (!options_.jobs) return;
   std::vector<std::byte> data = queue_.buffer(job_bytes_);
   pack(job, data);
   job_bytes_ = data.size();
@@ -129,6 +195,8 @@ void Recorder::tell(size_t port, uint64_t sequence) {
 }
 
 void Recorder::take_event(const RecordedEvent& event) {
+  if (options_.listener.event) options_.listener.event(event);
+  if (!options_.jobs) return;
   std::vector<std::byte> data;
   pack(event, data);
   push(events_channel_, event.job, event.at_ns, std::move(data));
@@ -143,21 +211,34 @@ void Recorder::write_on() {
   keep_rights(Rights::none);
   int64_t chunk_began_ns = 0;
   while (auto entry = queue_.pop()) {
-    const auto at_ns = static_cast<uint64_t>(entry->at_ns);
-    note(file_.write({entry->channel, static_cast<uint32_t>(entry->sequence), at_ns, at_ns, entry->data}));
+    write(*entry);
     // In the run's own time, so that a virtual run always gives the same chunks.
     if (entry->at_ns - chunk_began_ns >= kChunkNs) {
-      note(file_.flush());
+      if (file_) note(file_->flush());
+      splits_.settle(entry->at_ns);
       chunk_began_ns = entry->at_ns;
+      if (!file_ || splits_.ends(file_->written_bytes(), file_began_ns_, entry->at_ns)) {
+        last_facts_ = {{"epoch_ns", std::to_string(board_.epoch_ns())}, {"goes_on", "in the next file"}};
+        end_file();
+        begin_file(entry->at_ns);
+      }
     }
     queue_.recycle(std::move(entry->data));
   }
-  note(file_.flush());
+  if (file_) note(file_->flush());
   result_.write_cpu_ns = thread_cpu_ns();
 }
 
-void Recorder::note(const mcap::Writer::Done& done) {
+void Recorder::write(const WriteQueue::Entry& entry) {
+  if (file_began_ns_ == 0) file_began_ns_ = entry.at_ns;
+  const auto at_ns = static_cast<uint64_t>(entry.at_ns);
+  if (file_) note(file_->write({entry.channel, static_cast<uint32_t>(entry.sequence), at_ns, at_ns, entry.data}));
+  else ++result_.not_written;
+}
+
+bool Recorder::note(const mcap::Writer::Done& done) {
   if (!done && result_.refused.empty()) result_.refused = done.error();
+  return done.has_value();
 }
 
 void Recorder::take_rest() {
@@ -171,6 +252,7 @@ RecordResult Recorder::finish(mcap::Metadata facts, uint64_t unheard_threads) {
   jobs_.end();
   // What its writer took along, or never settled before it died.
   for (const Port& port : ports_) {
+    if (!port.follower) continue;
     const uint64_t seen = port.follower->seen();
     result_.overwritten += std::max(port.told, seen) - seen;
   }
@@ -179,23 +261,17 @@ RecordResult Recorder::finish(mcap::Metadata facts, uint64_t unheard_threads) {
   result_.no_room = no_room_.load();
   result_.incomplete_jobs = jobs_.incomplete();
   result_.unheard_threads = unheard_threads;
-  result_.not_written = file_.lost();
-  const auto& written = file_.statistics();
-  const auto count = [&](uint16_t channel) {
-    const auto found = written.channel_messages.find(channel);
-    return found == written.channel_messages.end() ? 0 : found->second;
-  };
-  result_.jobs = count(jobs_channel_);
-  result_.events = count(events_channel_);
-  result_.messages = written.messages - result_.jobs - result_.events;
   facts["lost_overwritten"] = std::to_string(result_.overwritten);
   facts["lost_no_room"] = std::to_string(result_.no_room);
-  facts["lost_not_written"] = std::to_string(result_.not_written);
+  facts["lost_not_written"] = std::to_string(result_.not_written + (file_ ? file_->lost() : 0));
   facts["lost_jobs"] = std::to_string(result_.incomplete_jobs);
   facts["lost_threads"] = std::to_string(result_.unheard_threads);
-  note(file_.metadata(kEnd, facts));
-  note(file_.finish());
-  result_.bytes = file_.written_bytes();
+  last_facts_ = std::move(facts);
+  end_file();
+  result_.jobs = written_[jobs_channel_];
+  result_.events = written_[events_channel_];
+  for (const auto& [channel, count] : written_) result_.messages += count;
+  result_.messages -= result_.jobs + result_.events;
   return result_;
 }
 

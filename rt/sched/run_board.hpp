@@ -10,6 +10,7 @@
 #include "rt/hot.hpp"
 #include "rt/sched/fault_log.hpp"
 #include "rt/sched/grant.hpp"
+#include "rt/sched/mark_log.hpp"
 #include "rt/sched/modes.hpp"
 #include "rt/sched/outage_log.hpp"
 #include "rt/sched/plan.hpp"
@@ -193,6 +194,10 @@ class RunBoard {
   LateSourceLog& late_sources() { return shared_->late_sources; }
   const LateSourceLog& late_sources() const { return shared_->late_sources; }
 
+  /// Set by the process that answers those who attach.
+  MarkLog& marks() { return supervised_->marks; }
+  const MarkLog& marks() const { return supervised_->marks; }
+
   OutageLog& outages() { return supervised_->outages; }
   const OutageLog& outages() const { return supervised_->outages; }
   GroupSigns& group() { return supervised_->group; }
@@ -219,6 +224,7 @@ class RunBoard {
     StopWord stop;
     ModeLog modes;
     alignas(kCacheLine) OutageLog outages;
+    alignas(kCacheLine) MarkLog marks;
     alignas(kCacheLine) GroupSigns group;
     alignas(kCacheLine) std::atomic<int64_t> epoch_ns{0};
     std::atomic<uint32_t> decision{undecided};

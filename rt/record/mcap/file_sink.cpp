@@ -43,4 +43,6 @@ tl::expected<void, std::string> FileSink::append(std::span<const Bytes> parts) {
   return {};
 }
 
+void FileSink::settle() const { [[maybe_unused]] const int done = fdatasync(descriptor_); }
+
 }  // namespace takt::mcap

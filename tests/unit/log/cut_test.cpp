@@ -39,7 +39,7 @@ struct Scene {
     REQUIRE(sink);
     const std::string plan = plan_json(graph.plan).dump();
     int steps = 0;
-    test::record_run(graph.plan, *sink, 3, {.whole = {1, 0, 1}},
+    test::record_run(graph.plan, *sink, 3, {.ports = test::with_fields({1, 0, 1})},
                      {{}, {{0, 0, "plan.json", "application/json", mcap::bytes_of(plan)}}}, [&](RunBoard& board) {
                        if (bias != 0 && ++steps == 40) CHECK(post(board.mail(1), 1, ParamValue(bias)));
                      });

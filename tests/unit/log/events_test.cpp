@@ -36,7 +36,7 @@ struct Restarted {
     auto sink = mcap::FileSink::open(folder.path / "run.mcap");
     REQUIRE(sink);
     const std::string plan = plan_json(test::LongGraph().plan).dump();
-    test::RestartedRun run(*sink, {.whole = {1, 0, 1}}, lives.size(), head_of(plan), 0.0);
+    test::RestartedRun run(*sink, {.ports = test::with_fields({1, 0, 1})}, lives.size(), head_of(plan), 0.0);
     for (const test::Life& life : lives) run.live(life);
     run.finish();
     log.emplace(opened(folder.path / "run.mcap"));

@@ -41,7 +41,7 @@ std::optional<mcap::Channel> channel_of(const mcap::Reader& reader, const std::s
 }  // namespace
 
 TEST_CASE("The content of a record: ports, nodes, nothing lost") {
-  Made made({}, {.whole = {1, 0, 1}});
+  Made made({}, {.ports = test::with_fields({1, 0, 1})});
   const Json content = content_json(*made.log);
   REQUIRE(content["ports"].size() == 3);
   CHECK(content["ports"][0]["port"] == "base.odometry");
@@ -100,7 +100,7 @@ TEST_CASE("A plan of today is the recorded one, or the first thing that differs 
 }
 
 TEST_CASE("An export has every whole message in JSON, with a schema") {
-  Made made({}, {.whole = {1, 1, 0}});
+  Made made({}, {.ports = test::with_fields({1, 1, 0})});
   auto sink = mcap::FileSink::open(made.folder.path / "export.mcap");
   REQUIRE(sink);
   const auto exported = export_log(*made.log, test::known_types(), *sink);

@@ -72,7 +72,7 @@ struct WheelRun {
     const std::string text = plan_json(plan).dump();
     auto sink = mcap::FileSink::open(folder.path / "run.mcap");
     REQUIRE(sink);
-    test::record_run(plan, *sink, 1, {.whole = whole},
+    test::record_run(plan, *sink, 1, {.ports = test::with_fields(whole)},
                      {{}, {{0, 0, "plan.json", "application/json", mcap::bytes_of(text)}}});
     log.emplace(open("run.mcap"));
   }

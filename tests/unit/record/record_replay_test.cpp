@@ -98,7 +98,7 @@ TEST_CASE("A replay runs the jobs of all nodes but the devices, and every byte i
 }
 
 TEST_CASE("Messages of which only the hash was recorded are made again and compared by it") {
-  const Record record({.whole = {1, 0, 0}});
+  const Record record({.ports = test::with_fields({1, 0, 0})});
   test::SmallGraph graph;
   ReplayResult result = replay(record, graph);
   CHECK(result.compared == 60);
@@ -188,7 +188,7 @@ TEST_CASE("Some nodes run anew, the rest comes from the record") {
     CHECK(result.different == 0);
   }
   SUBCASE("its reader, but the grids are known by their hash only") {
-    const Record hashes({.whole = {1, 0, 1}});
+    const Record hashes({.ports = test::with_fields({1, 0, 1})});
     const ReplayResult result = replay(hashes, graph, {.run = {0, 0, 1}});
     CHECK(result.jobs == 0);
     CHECK(result.lacking == 30);

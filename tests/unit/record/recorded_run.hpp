@@ -108,17 +108,24 @@ struct SmallGraph {
   }
 };
 
-/// Runs a plan for `seconds` of virtual time and records it. Writers leave before the record ends; with `copied_ns`
-/// nothing published later is copied.
-inline record::RecordResult record_run(const Plan& plan, mcap::Sink& sink, int64_t seconds,
-                                       record::Recorder::Options how = {}, const record::Head& head = {},
-                                       const std::function<void(RunBoard&)>& meanwhile = {},
-                                       int64_t copied_ns = INT64_MAX) {
+/// By port: whether its messages are recorded with all fields, else by their hashes.
+inline std::vector<record::PortRule> with_fields(const std::vector<char>& all) {
+  std::vector<record::PortRule> rules(all.size());
+  for (size_t p = 0; p < all.size(); ++p) rules[p].keep = all[p] != 0 ? record::PortRule::all : record::PortRule::hash;
+  return rules;
+}
+
+/// Runs a plan for `seconds` of virtual time and records it into that place. Writers leave before the record ends; with
+/// `copied_ns` nothing published later is copied.
+template <class Place>  // mcap::Sink, record::Splits
+record::RecordResult record_run(const Plan& plan, Place& place, int64_t seconds, record::Recorder::Options how = {},
+                                const record::Head& head = {}, const std::function<void(RunBoard&)>& meanwhile = {},
+                                int64_t copied_ns = INT64_MAX) {
   RunBoard board(plan);
   VirtualClock clock(1'000'000'000);
   const auto transport = make_local_transport(plan.ports);
   how.by_caller = true;
-  record::Recorder recorder(plan, board, *transport, sink, head, std::move(how));
+  record::Recorder recorder(plan, board, *transport, place, head, std::move(how));
   trace::Rings rings(4);
   trace::Collector::Options heard;
   heard.best = trace::Source::none;

@@ -48,7 +48,7 @@ void perform(const std::vector<test::Life>& lives, std::vector<char> whole) {
   const auto file = folder.path / "run.mcap";
   auto sink = mcap::FileSink::open(file);
   REQUIRE(sink);
-  test::RestartedRun run(*sink, {.whole = std::move(whole)}, lives.size());
+  test::RestartedRun run(*sink, {.ports = test::with_fields(whole)}, lives.size());
   for (const test::Life& life : lives) run.live(life);
   const RecordResult result = run.finish();
   CHECK(result.lost() == 0);

@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "graph/flight/freezer.hpp"
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <initializer_list>
+#include <system_error>
+
+#include "rt/record/join.hpp"
+
+namespace takt::flight {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Files are joined by code that is not the runtime's own loops.
+constexpr size_t kStack = 1 << 20;
+constexpr size_t kMostWaiting = 64;
+constexpr auto kLook = std::chrono::milliseconds(100);
+
+std::vector<fs::directory_entry> oldest_first(const fs::path& folder) {
+  std::vector<fs::directory_entry> files;
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error))
+    if (entry.path().extension() == ".mcap") files.push_back(entry);
+  std::sort(files.begin(), files.end(), [](const auto& a, const auto& b) {
+    std::error_code ignored;
+    return std::pair(a.last_write_time(ignored), a.path()) < std::pair(b.last_write_time(ignored), b.path());
+  });
+  return files;
+}
+
+}  // namespace
+
+Freezer::Freezer(record::Ring& disk, record::Ring* memory, Options options)
+    : disk_(disk), memory_(memory), options_(std::move(options)), thread_([this] { work(); }, kStack) {}
+
+Freezer::~Freezer() {
+  if (thread_.joinable()) finish();
+}
+
+void Freezer::freeze(Cause cause) {
+  const std::lock_guard lock(mutex_);
+  const auto same = [&](const Frozen& other) {
+    return other.cause.kind == cause.kind && other.cause.subject == cause.subject &&
+           cause.at_ns < other.cause.at_ns + options_.after_ns;
+  };
+  if (const auto known = std::find_if(waiting_.begin(), waiting_.end(), same); known != waiting_.end()) {
+    ++known->more;
+    return;
+  }
+  Frozen frozen;
+  frozen.cause = std::move(cause);
+  if (waiting_.size() < kMostWaiting) {
+    waiting_.push_back(std::move(frozen));
+    changed_.notify_one();
+    return;
+  }
+  frozen.refused = fmt::format("{} others wait to be written", kMostWaiting);
+  done_.push_back(std::move(frozen));
+}
+
+std::vector<Frozen> Freezer::finish() {
+  {
+    const std::lock_guard lock(mutex_);
+    ending_ = true;
+    changed_.notify_one();
+  }
+  thread_.join();
+  return std::move(done_);
+}
+
+bool Freezer::ready(const Frozen& frozen) {
+  const int64_t to_ns = frozen.cause.at_ns + options_.after_ns;
+  const auto has = [&](record::Ring* ring) {
+    if (ring == nullptr) return true;
+    const auto files = ring->files();
+    if (files.empty() || files.back().began_ns >= to_ns) return !files.empty();
+    if (files.back().ended_ns >= to_ns) ring->part();
+    return false;
+  };
+  const bool on_disk = has(&disk_);
+  return has(memory_) && on_disk;
+}
+
+void Freezer::work() {
+  setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), 19);
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    changed_.wait_for(lock, kLook, [&] { return ending_; });
+    while (!waiting_.empty() && (ending_ || ready(waiting_.front()))) {
+      Frozen frozen = waiting_.front();
+      lock.unlock();
+      write(frozen);
+      lock.lock();
+      frozen.more = waiting_.front().more;
+      waiting_.pop_front();
+      done_.push_back(frozen);
+      lock.unlock();
+      if (options_.told) options_.told(frozen);
+      lock.lock();
+    }
+    if (ending_ && waiting_.empty()) return;
+  }
+}
+
+std::vector<fs::path> Freezer::files_for(int64_t from_ns, int64_t to_ns) const {
+  std::vector<record::Ring::File> found;
+  for (const record::Ring* ring : std::initializer_list<const record::Ring*>{&disk_, memory_}) {
+    if (ring == nullptr) continue;
+    const auto files = ring->files();
+    for (size_t i = 0; i < files.size(); ++i) {
+      const bool newest = i + 1 == files.size(), of_this_run = newest || files[i].ended_ns > 0;
+      if (of_this_run && files[i].began_ns < to_ns && (newest || files[i].ended_ns >= from_ns))
+        found.push_back(files[i]);
+    }
+  }
+  std::stable_sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.began_ns < b.began_ns; });
+  std::vector<fs::path> paths;
+  for (const auto& file : found) paths.push_back(file.path);
+  return paths;
+}
+
+std::string Freezer::make_room() {
+  std::error_code error;
+  fs::create_directories(options_.folder, error);
+  if (error) return fmt::format("{}: {}", options_.folder.string(), error.message());
+  auto files = oldest_first(options_.folder);
+  uint64_t bytes = 0;
+  for (const auto& file : files) bytes += file.file_size(error);
+  size_t gone = 0;
+  // A file may take as much as both rings hold.
+  const uint64_t needed = disk_.bytes() + (memory_ != nullptr ? memory_->bytes() : 0);
+  while (bytes + needed > options_.most_bytes && files.size() - gone > options_.at_least) {
+    bytes -= files[gone].file_size(error);
+    fs::remove(files[gone++].path(), error);
+  }
+  return "";
+}
+
+void Freezer::write(Frozen& frozen) {
+  const int64_t from_ns = frozen.cause.at_ns - options_.before_ns, to_ns = frozen.cause.at_ns + options_.after_ns;
+  if (frozen.refused = make_room(); !frozen.refused.empty()) return;
+  const fs::path file = options_.folder / fmt::format("{}-{:04}-{}.mcap", options_.name, ++number_, frozen.cause.kind);
+  const fs::path part = file.string() + ".part";
+  auto sink = mcap::FileSink::open(part);
+  if (!sink) {
+    frozen.refused = sink.error();
+    return;
+  }
+  record::JoinOptions how;
+  how.from_ns = from_ns;
+  how.to_ns = to_ns;
+  how.metadata.push_back({"takt frozen",
+                          {{"kind", frozen.cause.kind},
+                           {"subject", frozen.cause.subject},
+                           {"what", frozen.cause.what},
+                           {"at_ns", std::to_string(frozen.cause.at_ns)},
+                           {"from_ns", std::to_string(from_ns)},
+                           {"to_ns", std::to_string(to_ns)}}});
+  const auto joined = record::join(files_for(from_ns, to_ns), *sink, how);
+  std::error_code error;
+  if (joined) fs::rename(part, file, error);
+  if (!joined || error) {
+    frozen.refused = joined ? fmt::format("{}: {}", file.string(), error.message()) : joined.error();
+    fs::remove(part, error);
+    return;
+  }
+  frozen.file = file;
+  frozen.messages = joined->messages;
+  frozen.bytes = joined->bytes;
+  frozen.first_ns = joined->first_ns;
+  frozen.last_ns = joined->last_ns;
+}
+
+}  // namespace takt::flight

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <atomic>
+#include <condition_variable>
+#include <deque>
+#include <filesystem>
+#include <functional>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "graph/flight/triggers.hpp"
+#include "hal/settings/json.hpp"
+#include "rt/own_thread.hpp"
+#include "rt/record/ring.hpp"
+
+namespace takt::flight {
+
+/// A cause, and what became of it.
+struct Frozen {
+  Cause cause;
+  uint64_t more = 0;           ///< of its kind and subject, within its window
+  std::filesystem::path file;  ///< empty: nothing was written
+  std::string refused;         ///< why not, or what the file lacks
+  uint64_t messages = 0, bytes = 0;
+  int64_t first_ns = 0, last_ns = 0;
+};
+
+/// Writes a file for each cause: what the rings hold from `before_ns` before it to `after_ns` behind it, on a thread
+/// of the lowest priority.
+class Freezer {
+ public:
+  struct Options {
+    std::filesystem::path folder;  ///< of the files; made with the first one
+    std::string name;              ///< of the run: NAME-0001-miss.mcap
+    int64_t before_ns = 0, after_ns = 0;
+    uint64_t most_bytes = 2'000'000'000;  ///< of all files of the folder, those of earlier runs, too; the oldest go
+    size_t at_least = 20;                 ///< ... but never the newest so many: then nothing more is frozen
+    std::function<void(const Frozen&)> told = {};  ///< called once for each, on the freezer's thread
+  };
+  /// Both rings outlive this; `memory` may be null.
+  Freezer(record::Ring& disk, record::Ring* memory, Options options);
+  ~Freezer();
+  Freezer(const Freezer&) = delete;
+  Freezer& operator=(const Freezer&) = delete;
+
+  /// Any thread; takes as long as a lock.
+  void freeze(Cause cause);
+  /// The rings hold all there will be: writes what is left and ends. Once.
+  std::vector<Frozen> finish();
+
+ private:
+  void work();
+  /// The rings have what a cause needs, in files that nobody writes to any more. Sees to that.
+  bool ready(const Frozen& frozen);
+  void write(Frozen& frozen);
+  std::vector<std::filesystem::path> files_for(int64_t from_ns, int64_t to_ns) const;
+  /// Empty, or why there is none for a file.
+  std::string make_room();
+
+  record::Ring& disk_;
+  record::Ring* memory_;
+  const Options options_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<Frozen> waiting_;
+  std::vector<Frozen> done_;
+  size_t number_ = 0;
+  bool ending_ = false;
+  OwnThread thread_;
+};
+
+}  // namespace takt::flight

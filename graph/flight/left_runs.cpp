@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "graph/flight/left_runs.hpp"
+
+#include <signal.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <system_error>
+
+namespace takt::flight {
+namespace {
+
+namespace fs = std::filesystem;
+
+const fs::path kMemory = "/dev/shm";
+constexpr std::string_view kPrefix = "takt-flight-", kEnding = "-000000.mcap";
+
+bool dead(const std::string& place) {
+  const int process = std::atoi(place.substr(place.rfind('-') + 1).c_str());
+  return process > 0 && kill(process, 0) != 0 && errno == ESRCH;
+}
+
+bool mine(const fs::path& place) {
+  struct stat status {};
+  return lstat(place.c_str(), &status) == 0 && status.st_uid == geteuid() && S_ISDIR(status.st_mode);
+}
+
+/// Files of a ring, the oldest first.
+std::vector<fs::path> records_in(const fs::path& folder) {
+  std::vector<std::pair<fs::file_time_type, fs::path>> found;
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error))
+    if (entry.path().extension() == ".mcap" && entry.path().filename().string().size() > kEnding.size())
+      found.emplace_back(entry.last_write_time(error), entry.path());
+  std::sort(found.begin(), found.end());
+  std::vector<fs::path> paths;
+  for (auto& [written, path] : found) paths.push_back(std::move(path));
+  return paths;
+}
+
+std::string run_of(const fs::path& file) {
+  const std::string name = file.filename().string();
+  return name.substr(0, name.size() - kEnding.size());
+}
+
+}  // namespace
+
+fs::path memory_place(const std::string& run) { return kMemory / (std::string(kPrefix) + run); }
+
+tl::expected<Rescued, std::string> rescue(const fs::path& folder, mcap::Sink& sink) {
+  const std::vector<fs::path> all = records_in(folder);
+  if (all.empty()) return tl::unexpected(folder.string() + ": no run has left anything here");
+  Rescued rescued;
+  rescued.run = run_of(all.back());
+  for (const fs::path& file : all)
+    if (run_of(file) == rescued.run) rescued.files.push_back(file);
+  for (const fs::path& file : records_in(memory_place(rescued.run))) rescued.files.push_back(file);
+  auto joined = record::join(rescued.files, sink, {});
+  if (!joined) return tl::unexpected(joined.error());
+  rescued.joined = std::move(*joined);
+  return rescued;
+}
+
+std::vector<fs::path> clear_memory() {
+  std::vector<std::pair<fs::file_time_type, fs::path>> left;
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(kMemory, error))
+    if (const std::string name = entry.path().filename().string();
+        name.starts_with(kPrefix) && dead(name) && mine(entry.path()))
+      left.emplace_back(entry.last_write_time(error), entry.path());
+  std::sort(left.begin(), left.end());
+  std::vector<fs::path> cleared;
+  for (size_t i = 0; i + 1 < left.size(); ++i)
+    if (fs::remove_all(left[i].second, error); !error) cleared.push_back(left[i].second);
+  return cleared;
+}
+
+}  // namespace takt::flight

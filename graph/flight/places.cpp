@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "graph/flight/places.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <system_error>
+
+namespace takt::flight {
+namespace {
+
+using record::PortRule;
+
+PortRule rule_of(const graph::RecordSpec::Port& port) {
+  using Keep = graph::RecordSpec::Keep;
+  PortRule rule;
+  rule.keep = port.keep == Keep::all ? PortRule::all : port.keep == Keep::hash ? PortRule::hash : PortRule::nothing;
+  rule.every = port.every;
+  rule.pause_ns = port.pause_ns;
+  return rule;
+}
+
+/// Messages of a port that are kept with all fields, a second.
+double kept_hz(const PortRule& rule, double rate_hz) {
+  if (rule.keep != PortRule::all) return 0;
+  const double hz = rate_hz / rule.every;
+  return rule.pause_ns > 0 ? std::min(hz, 1e9 / static_cast<double>(rule.pause_ns)) : hz;
+}
+
+}  // namespace
+
+bool Places::in_memory() const {
+  return std::any_of(memory.begin(), memory.end(), [](const PortRule& rule) { return rule.keep == PortRule::all; });
+}
+
+Places places(const graph::RecordSpec& spec, const Plan& plan) {
+  Places places;
+  places.disk.resize(plan.ports.size());
+  places.memory.assign(plan.ports.size(), {PortRule::nothing});
+  const PortProducers producers(plan);
+  for (size_t p = 0; p < plan.ports.size(); ++p) {
+    const PortPlan& port = plan.ports[p];
+    PortRule& rule = places.disk[p];
+    for (const graph::RecordSpec::Port& given : spec.ports)
+      if (given.port.node == port.node && given.port.port == port.port) rule = rule_of(given);
+    const size_t task = producers.find(p);
+    const double rate_hz = task == kNone ? 0 : effective_rate_hz(plan, task);
+    const double bytes_s = kept_hz(rule, rate_hz) * static_cast<double>(port.chunk_bytes());
+    if (bytes_s <= kMostOnDisk) {
+      places.disk_bytes_s += bytes_s;
+      continue;
+    }
+    places.memory_bytes_s += bytes_s;
+    places.memory[p] = rule;
+    rule = {PortRule::hash};
+  }
+  return places;
+}
+
+std::vector<std::string> doubts(const graph::RecordSpec& spec, const Places& places,
+                                const std::filesystem::path& folder) {
+  std::vector<std::string> doubts;
+  const double window_s = static_cast<double>(spec.before_ns + spec.after_ns) / 1e9;
+  const auto room = [&](const std::filesystem::path& place, int64_t wanted) {
+    std::error_code error;
+    const auto space = std::filesystem::space(place, error);
+    if (!error && space.available < static_cast<uint64_t>(wanted))
+      doubts.push_back(fmt::format("record: {} has {:.0f} MB left, less than the {:.0f} MB that the ring may take",
+                                   place.string(), static_cast<double>(space.available) / 1e6,
+                                   static_cast<double>(wanted) / 1e6));
+  };
+  room(folder, spec.disk_bytes);
+  if (!places.in_memory()) return doubts;
+  room("/dev/shm", spec.memory_bytes);
+  const double held_s = static_cast<double>(spec.memory_bytes) / places.memory_bytes_s;
+  if (held_s < window_s)
+    doubts.push_back(
+        fmt::format("record: `memory` of {:.0f} MB may hold {:.1f} s of images and clouds ({:.1f} MB/s), less than "
+                    "`before` and `after` of {:.1f} s",
+                    static_cast<double>(spec.memory_bytes) / 1e6, held_s, places.memory_bytes_s / 1e6, window_s));
+  return doubts;
+}
+
+}  // namespace takt::flight

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "graph/language/graph.hpp"
+#include "rt/record/recorder.hpp"
+
+namespace takt::flight {
+
+/// What the ring keeps of each port, and where: small messages with all fields on disk; of images and clouds their
+/// hashes on disk, and in memory all fields.
+struct Places {
+  std::vector<record::PortRule> disk, memory;   ///< by port
+  double disk_bytes_s = 0, memory_bytes_s = 0;  ///< at most, from the ports' capacities and rates
+  bool in_memory() const;                       ///< at least one port is
+};
+
+/// A port that can give more than this lies in memory.
+inline constexpr double kMostOnDisk = 1e6;  ///< bytes a second
+
+Places places(const graph::RecordSpec& spec, const Plan& plan);
+
+/// Where these sizes do not suffice for these times, or the file systems for these sizes: a sentence each.
+std::vector<std::string> doubts(const graph::RecordSpec& spec, const Places& places,
+                                const std::filesystem::path& folder);
+
+}  // namespace takt::flight

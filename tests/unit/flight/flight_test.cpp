@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a run keeps of itself, what freezes it, and what is left of it after a kill.
+#include <doctest/doctest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+
+#include "graph/flight/flight_recorder.hpp"
+#include "graph/flight/left_runs.hpp"
+#include "rt/record/log_file.hpp"
+#include "tests/temporary_folder.hpp"
+#include "tests/unit/record/recorded_run.hpp"
+
+using namespace takt;
+using namespace takt::flight;
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr int64_t kSecond = 1'000'000'000, kEpoch = kSecond;
+
+graph::GraphSpec graph_with(int64_t before_ns, int64_t after_ns) {
+  graph::GraphSpec graph;
+  graph.name = "small";
+  graph.record.before_ns = before_ns;
+  graph.record.after_ns = after_ns;
+  graph.chains.push_back({"whole", {"base", "odometry"}, {"reader", "seen"}, 30'000'000, {}});
+  return graph;
+}
+
+/// A run of so many seconds in virtual time, with its recorder; `meanwhile` is called after each half of a job.
+nlohmann::ordered_json fly(const graph::GraphSpec& graph, const Plan& plan, const fs::path& folder, int64_t seconds,
+                           const std::function<void(RunBoard&, int64_t)>& meanwhile = {}) {
+  RunBoard board(plan);
+  VirtualClock clock(kEpoch);
+  const auto transport = make_local_transport(plan.ports);
+  FlightRecorder::Options how;
+  how.folder = folder;
+  how.by_caller = true;
+  FlightRecorder recorder(graph, plan, board, *transport, {}, how);
+  REQUIRE(recorder.lacks() == "");
+  trace::Rings rings(4);
+  trace::Collector::Options heard;
+  heard.best = trace::Source::none;
+  heard.by_caller = true;
+  heard.listener = [&](int32_t ring, const trace::Event& event) { recorder.take(ring, event); };
+  trace::Collector collector(rings, heard);
+  Executor::Options run;
+  run.duration_ns = seconds * kSecond;
+  run.board = &board;
+  run.trace = &rings;
+  run.after_step = [&] {
+    collector.drain();
+    recorder.capture();
+    if (meanwhile) meanwhile(board, clock.now_ns());
+  };
+  Executor(plan, *transport, clock, run).run();
+  collector.finish();
+  recorder.finish({{"epoch_ns", std::to_string(kEpoch)}}, 0);
+  return recorder.told();
+}
+
+record::LogFile open(const fs::path& file) {
+  auto log = record::LogFile::open(file);
+  REQUIRE_MESSAGE(log, log.error());
+  return std::move(*log);
+}
+
+const mcap::Metadata& metadata(const record::LogFile& log, std::string_view name) {
+  for (const auto& one : log.container().metadata())
+    if (one.name == name) return one.map;
+  FAIL("no metadata " << name);
+  std::abort();
+}
+
+}  // namespace
+
+TEST_CASE("Small ports are kept on disk, large ones in memory and by their hash on disk") {
+  using enum record::PortRule::Keep;
+  test::SmallGraph small;
+  small.plan.ports[1].capacity = {2000, 1000, 1, 0};  // 4 MB at 10 Hz
+  graph::RecordSpec spec;
+  Places places = flight::places(spec, small.plan);
+  CHECK(places.disk[0].keep == all);
+  CHECK(places.memory[0].keep == nothing);
+  CHECK(places.disk[1].keep == hash);
+  CHECK(places.memory[1].keep == all);
+  CHECK(places.in_memory());
+  CHECK(places.memory_bytes_s == doctest::Approx(40e6).epsilon(0.1));
+  // One in ten seconds is little enough for the disk.
+  spec.ports.push_back({{"filter", "grid"}, graph::RecordSpec::Keep::all, 1, 10 * kSecond, {}});
+  places = flight::places(spec, small.plan);
+  CHECK(places.disk[1].pause_ns == 10 * kSecond);
+  CHECK(!places.in_memory());
+  spec.ports.front() = {{"filter", "grid"}, graph::RecordSpec::Keep::nothing, 1, 0, {}};
+  CHECK(flight::places(spec, small.plan).disk[1].keep == nothing);
+}
+
+TEST_CASE("Misses of high nodes, old chains, modes and marks are causes") {
+  test::SmallGraph small;
+  small.plan.tasks[1].criticality = Criticality::high;
+  small.plan.modes = {{"full", {}}, {"slow", {}}};
+  const Triggers triggers(graph_with(0, 0), small.plan);
+  record::RecordedJob job;
+  job.task = 1, job.index = 81, job.late = true;
+  job.deadline_ns = 5 * kSecond, job.finish_ns = 5 * kSecond + 14'200'000;
+  const auto miss = triggers.of(job);
+  REQUIRE(miss);
+  CHECK(miss->what == small.plan.tasks[1].name + " missed the deadline of job 81 by 14.2 ms");
+  CHECK(miss->at_ns == job.finish_ns);
+  job.task = 2;
+  CHECK(!triggers.of(job));
+  job.task = 1, job.late = false;
+  CHECK(!triggers.of(job));
+
+  MessageHeader header;
+  header.published_ns = 2 * kSecond;
+  const auto aged = [&](int64_t age_ns) { return Held{&header, 1, 2 * kSecond - age_ns, 2 * kSecond, 0}; };
+  CHECK(!triggers.of(2, aged(30'000'000)));
+  const auto old = triggers.of(2, aged(31'000'000));
+  REQUIRE(old);
+  CHECK(old->what == "chain whole: reader.seen was 31.0 ms old, bound 30.0 ms");
+  CHECK(!triggers.of(0, aged(90'000'000)));
+
+  record::RecordedEvent event;
+  event.what = record::ModeChange{1, "guard: silent"};
+  CHECK(triggers.of(event)->what == "mode slow: guard: silent");
+  event.what = record::MarkSet{"turned left", "uid 0"};
+  CHECK(triggers.of(event)->kind == "mark");
+  event.what = record::ParameterSet{};
+  CHECK(!triggers.of(event));
+}
+
+TEST_CASE("A mark freezes the seconds around it") {
+  const test::TemporaryFolder folder;
+  test::SmallGraph small;
+  size_t marks = 0;
+  const auto graph = graph_with(3 * kSecond, 2 * kSecond);
+  const auto told = fly(graph, small.plan, folder.path, 20, [&](RunBoard& board, int64_t now_ns) {
+    if (now_ns >= kEpoch + 10 * kSecond && marks == 0)
+      board.marks().append({now_ns, 7, BoundedText<200>("it turned left")}), ++marks;
+    if (now_ns >= kEpoch + 11 * kSecond && marks == 1)
+      board.marks().append({now_ns, 7, BoundedText<200>("it turned left")}), ++marks;
+  });
+  CHECK(told["disk"]["lost"] == 0);
+  CHECK(told["disk"]["refused"] == "");
+  REQUIRE(told["frozen"].size() == 1);
+  const auto& frozen = told["frozen"][0];
+  CHECK(frozen["refused"] == "");
+  CHECK(frozen["more"] == 1);
+  CHECK(frozen["at_s"].get<double>() == doctest::Approx(10).epsilon(0.01));
+  const record::LogFile log = open(folder.path / "frozen" / frozen["file"].get<std::string>());
+  CHECK(log.damages().empty());
+  CHECK(metadata(log, "takt frozen").at("what") == "mark: it turned left");
+  CHECK(log.jobs().size() == doctest::Approx(5 * (30 + 10 + 10)).epsilon(0.02));
+  for (const record::RecordedJob& job : log.jobs()) {
+    CHECK(job.published_ns >= kEpoch + 7 * kSecond);
+    CHECK(job.published_ns < kEpoch + 12 * kSecond + 100'000'000);
+  }
+  CHECK(log.events().size() == 2);
+}
+
+TEST_CASE("Each cause of its own has its file, and the newest files stay") {
+  const test::TemporaryFolder folder;
+  record::RingLimits limits;
+  auto ring = record::Ring::open(folder.path / "ring", "run", limits);
+  REQUIRE(ring);
+  test::SmallGraph small;
+  REQUIRE(test::record_run(small.plan, **ring, 10).lost() == 0);
+  const auto freeze = [&](uint64_t most_bytes, size_t at_least, int count) {
+    Freezer::Options how{folder.path / "frozen", "run", kSecond, kSecond, most_bytes, at_least};
+    Freezer freezer(**ring, nullptr, how);
+    for (int i = 0; i < count; ++i) freezer.freeze({"mark", std::to_string(i), "", kEpoch + (2 + i) * kSecond});
+    return freezer.finish();
+  };
+  const auto files = [&] {
+    return std::distance(fs::directory_iterator(folder.path / "frozen"), fs::directory_iterator());
+  };
+  for (const Frozen& one : freeze(1'000'000'000, 3, 5)) CHECK(one.refused == "");
+  CHECK(files() == 5);
+  freeze(0, 3, 4);  // no room at all: three stay, and the one that is written
+  CHECK(files() == 4);
+}
+
+TEST_CASE("What a killed run left is rescued, as far as it was written") {
+  const test::TemporaryFolder folder;
+  test::SmallGraph small;
+  const pid_t child = fork();
+  if (child == 0) {
+    auto graph = graph_with(kSecond, kSecond);
+    fly(graph, small.plan, folder.path, 30, [](RunBoard&, int64_t now_ns) {
+      if (now_ns > kEpoch + 20 * kSecond) usleep(300'000), _exit(9);
+    });
+    _exit(0);
+  }
+  int status = 0;
+  REQUIRE(waitpid(child, &status, 0) == child);
+  REQUIRE(WEXITSTATUS(status) == 9);
+  const fs::path file = folder.path / "rescued.mcap";
+  auto sink = mcap::FileSink::open(file);
+  REQUIRE(sink);
+  const auto rescued = rescue(folder.path / "ring", *sink);
+  REQUIRE_MESSAGE(rescued, rescued.error());
+  CHECK(rescued->run.starts_with("small-"));
+  CHECK(rescued->joined.last_ns >= kEpoch + 19 * kSecond - 100'000'000);
+  const record::LogFile log = open(file);
+  CHECK(log.damages().empty());
+  CHECK(log.jobs().size() >= 18 * (30 + 10 + 10));
+}
+
+TEST_CASE("Of nothing nothing is rescued") {
+  const test::TemporaryFolder folder;
+  auto sink = mcap::FileSink::open(folder.path / "rescued.mcap");
+  REQUIRE(sink);
+  CHECK(rescue(folder.path, *sink).error().find("no run has left anything here") != std::string::npos);
+  CHECK(rescue(folder.path / "none", *sink).error().find("no run has left anything here") != std::string::npos);
+}
