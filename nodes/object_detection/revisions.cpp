@@ -2,13 +2,13 @@
 #include "nodes/object_detection/revisions.hpp"
 
 #include <unistd.h>
-#define XXH_INLINE_ALL
-#include <xxhash.h>
 
 #include <algorithm>
 #include <cstdio>
 #include <fstream>
 #include <iterator>
+
+#include "rt/xxhash.hpp"
 
 namespace takt::object_detection {
 namespace {

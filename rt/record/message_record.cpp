@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "rt/record/message_record.hpp"
 
-#define XXH_INLINE_ALL  // no library to be found by whoever links this one; a state that lies on the stack
-#include <xxhash.h>
-
 #include "rt/msg/scalar.hpp"
 #include "rt/record/mcap/bytes.hpp"
+#include "rt/xxhash.hpp"
 
 namespace takt::record {
 
