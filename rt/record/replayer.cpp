@@ -309,6 +309,9 @@ void Replayer::run_job(const RecordedJob& record) {
     settle(record);
   } else {
     result_.lacking += counts(record.task);
+    // It makes nothing; the record may have it.
+    for (const RecordedJob::Output& output : record.outputs)
+      if (output.output < task.ports.size()) ports_[task.ports[output.output]].remade.erase(output.sequence);
   }
   let_go(record);
 }

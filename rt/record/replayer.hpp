@@ -39,8 +39,8 @@ struct ReplayResult {
 
 /// Runs the jobs of a record again, one after the other, in the order in which they started: each with the inputs and
 /// the answers that it had; a job that asks something else is told its start, and the time from there to its deadline.
-/// Messages of devices, and of jobs that the record does not have, come from the record, others from the jobs that are
-/// run. One thread.
+/// Messages of devices, and of jobs that the record does not have or that cannot be run, come from the record, others
+/// from the jobs that are run. One thread.
 ///
 /// Where a task was restarted its node is replaced by a fresh one, which goes on from the messages that the restarted
 /// one was handed over. What its process had not published when it died stays away.

@@ -10,6 +10,7 @@
 #include "recorded_run.hpp"
 #include "rt/msg/grid.hpp"
 #include "rt/msg/odometry.hpp"
+#include "rt/record/join.hpp"
 #include "rt/record/log_file.hpp"
 #include "rt/record/replayer.hpp"
 #include "rt/sched/grant.hpp"
@@ -215,6 +216,26 @@ TEST_CASE("A job that asks or sends something else than in the record is told") 
   CHECK(result.first->node == "filter");
   CHECK(result.first->what == "asked for time_left where the record has now");
   CHECK(result.lacking == 30);  // the reader's jobs had grids that nobody makes now
+}
+
+TEST_CASE("A window out of a record replays from the first job on that has its inputs") {
+  const Record record;
+  Record window;
+  {
+    auto sink = mcap::FileSink::open(window.file);
+    REQUIRE(sink);
+    JoinOptions how;
+    how.from_ns = 2'500'000'000;  // of a run from 1 s to 4 s
+    REQUIRE(join({record.file}, *sink, how));
+  }
+  test::SmallGraph graph;
+  REQUIRE(graph.filter.gain.set(0.0));  // else it remembers what was before
+  const ReplayResult result = replay(window, graph);
+  CHECK(result.jobs + result.lacking == 30);
+  // Of the filter what is older than its inputs; of the reader nothing: it is given the grids of the record.
+  CHECK(result.lacking >= 1);
+  CHECK(result.lacking <= 3);
+  CHECK(result.different_of.count("reader") == 0);
 }
 
 TEST_CASE("Jobs that name what the plan does not have are not run") {
