@@ -88,8 +88,10 @@ constexpr std::string_view kPng = "\x89PNG\r\n\x1a\n";
 /// OpenCV tries every decoder that it has, and a damaged file ends the process in one of them (DICOM's).
 bool known(std::string_view start) {
   using namespace std::string_view_literals;
-  constexpr std::array kStarts{kPng, "\xff\xd8\xff"sv, "BM"sv, "II*\0"sv, "MM\0*"sv, "RIFF"sv, "PF"sv, "Pf"sv};
-  const bool pnm = start[0] == 'P' && start[1] >= '1' && start[1] <= '6';
+  constexpr std::array kStarts{kPng, "\xff\xd8\xff"sv, "BM"sv, "II*\0"sv, "MM\0*"sv};
+  // As its own decoders of these want them.
+  const bool pnm = start[0] == 'P' && "123456Ff"sv.find(start[1]) != std::string_view::npos &&
+                   std::isspace(static_cast<unsigned char>(start[2])) != 0;
   return pnm || std::any_of(kStarts.begin(), kStarts.end(), [&](auto begin) { return start.starts_with(begin); });
 }
 
@@ -99,7 +101,7 @@ Head head_of(const std::filesystem::path& file) {
   std::array<char, 8> start{};
   in.read(start.data(), start.size());
   const std::string_view magic(start.data(), start.size());
-  if (!known(magic)) refuse(file, "is no image of a known kind: PNG, JPEG, PGM, PPM, PBM, PFM, BMP, TIFF, WebP");
+  if (!known(magic)) refuse(file, "is no image of a known kind: PNG, JPEG, PGM, PPM, PBM, PFM, BMP, TIFF");
   if (magic == kPng) return png_head(in);
   in.clear();
   return magic[0] == 'P' && magic[1] != '1' && magic[1] != '4' && magic[1] < 'F' ? pnm_head(in, magic[1]) : Head{};
