@@ -41,11 +41,7 @@ nlohmann::ordered_json fly(const graph::GraphSpec& graph, const Plan& plan, cons
   FlightRecorder recorder(graph, plan, board, *transport, {}, how);
   REQUIRE(recorder.lacks() == "");
   trace::Rings rings(4);
-  trace::Collector::Options heard;
-  heard.best = trace::Source::none;
-  heard.by_caller = true;
-  heard.listener = [&](int32_t ring, const trace::Event& event) { recorder.take(ring, event); };
-  trace::Collector collector(rings, heard);
+  trace::Collector collector(rings, test::heard_by(recorder));
   Executor::Options run;
   run.duration_ns = seconds * kSecond;
   run.board = &board;

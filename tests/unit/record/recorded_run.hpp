@@ -115,6 +115,16 @@ inline std::vector<record::PortRule> with_fields(const std::vector<char>& all) {
   return rules;
 }
 
+/// A recorder, or what has some, hears what a collector takes in virtual time.
+template <class Recorder>
+trace::Collector::Options heard_by(Recorder& recorder) {
+  trace::Collector::Options heard;
+  heard.best = trace::Source::none;
+  heard.by_caller = true;
+  heard.listener = [&](int32_t ring, const trace::Event& event) { recorder.take(ring, event); };
+  return heard;
+}
+
 /// Runs a plan for `seconds` of virtual time and records it into that place. Writers leave before the record ends; with
 /// `copied_ns` nothing published later is copied.
 template <class Place>  // mcap::Sink, record::Splits
@@ -127,11 +137,7 @@ record::RecordResult record_run(const Plan& plan, Place& place, int64_t seconds,
   how.by_caller = true;
   record::Recorder recorder(plan, board, *transport, place, head, std::move(how));
   trace::Rings rings(4);
-  trace::Collector::Options heard;
-  heard.best = trace::Source::none;
-  heard.by_caller = true;
-  heard.listener = [&](int32_t ring, const trace::Event& event) { recorder.take(ring, event); };
-  trace::Collector collector(rings, heard);
+  trace::Collector collector(rings, heard_by(recorder));
   Executor::Options run;
   run.duration_ns = seconds * 1'000'000'000;
   run.board = &board;
