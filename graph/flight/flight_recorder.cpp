@@ -54,6 +54,8 @@ FlightRecorder::FlightRecorder(const graph::GraphSpec& graph, const Plan& plan, 
     limits.split_ns = 1'000'000'000;
     limits.durable = false;
     auto memory = record::Ring::open(in_memory_, name, limits);
+    auto lock = WriterLock::of_folder(in_memory_);
+    if (lock) memory_lock_.emplace(std::move(*lock));
     if (memory) memory_ = std::move(*memory);
     else doubts_.push_back("record: no images and clouds are kept: " + memory.error());
   }
@@ -135,6 +137,7 @@ nlohmann::ordered_json FlightRecorder::told() const {
                       {"more", one.more},
                       {"file", one.file.filename().string()},
                       {"mb", static_cast<double>(one.bytes) / 1e6},
+                      {"damages", one.damages},
                       {"refused", one.refused}});
   const auto ring = [](const record::Ring* of, const record::RecordResult& kept) -> nlohmann::ordered_json {
     if (of == nullptr) return nullptr;

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,7 @@
 #include "graph/flight/places.hpp"
 #include "graph/flight/triggers.hpp"
 #include "hal/settings/json.hpp"
+#include "rt/file/output_file.hpp"
 #include "rt/record/recorder.hpp"
 #include "rt/record/ring.hpp"
 
@@ -60,6 +62,7 @@ class FlightRecorder {
   std::string lacks_;
   std::vector<std::string> doubts_;
   std::filesystem::path in_memory_;
+  std::optional<WriterLock> memory_lock_;
   std::unique_ptr<record::Ring> disk_, memory_;
   std::unique_ptr<Freezer> freezer_;
   std::unique_ptr<record::Recorder> recorder_, images_;

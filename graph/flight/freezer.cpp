@@ -22,18 +22,6 @@ constexpr size_t kStack = 1 << 20;
 constexpr size_t kMostWaiting = 64;
 constexpr auto kLook = std::chrono::milliseconds(100);
 
-std::vector<fs::directory_entry> oldest_first(const fs::path& folder) {
-  std::vector<fs::directory_entry> files;
-  std::error_code error;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error))
-    if (entry.path().extension() == ".mcap") files.push_back(entry);
-  std::sort(files.begin(), files.end(), [](const auto& a, const auto& b) {
-    std::error_code ignored;
-    return std::pair(a.last_write_time(ignored), a.path()) < std::pair(b.last_write_time(ignored), b.path());
-  });
-  return files;
-}
-
 }  // namespace
 
 Freezer::Freezer(record::Ring& disk, record::Ring* memory, Options options)
@@ -129,15 +117,15 @@ std::string Freezer::make_room() {
   std::error_code error;
   fs::create_directories(options_.folder, error);
   if (error) return fmt::format("{}: {}", options_.folder.string(), error.message());
-  auto files = oldest_first(options_.folder);
+  const auto files = record::records_in(options_.folder);
   uint64_t bytes = 0;
-  for (const auto& file : files) bytes += file.file_size(error);
+  for (const auto& file : files) bytes += file.bytes;
   size_t gone = 0;
   // A file may take as much as both rings hold.
   const uint64_t needed = disk_.bytes() + (memory_ != nullptr ? memory_->bytes() : 0);
   while (bytes + needed > options_.most_bytes && files.size() - gone > options_.at_least) {
-    bytes -= files[gone].file_size(error);
-    fs::remove(files[gone++].path(), error);
+    bytes -= files[gone].bytes;
+    fs::remove(files[gone++].path, error);
   }
   return "";
 }
@@ -171,10 +159,8 @@ void Freezer::write(Frozen& frozen) {
     return;
   }
   frozen.file = file;
-  frozen.messages = joined->messages;
   frozen.bytes = joined->bytes;
-  frozen.first_ns = joined->first_ns;
-  frozen.last_ns = joined->last_ns;
+  frozen.damages = joined->damages;
 }
 
 }  // namespace takt::flight

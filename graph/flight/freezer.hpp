@@ -19,11 +19,11 @@ namespace takt::flight {
 /// A cause, and what became of it.
 struct Frozen {
   Cause cause;
-  uint64_t more = 0;           ///< of its kind and subject, within its window
-  std::filesystem::path file;  ///< empty: nothing was written
-  std::string refused;         ///< why not, or what the file lacks
-  uint64_t messages = 0, bytes = 0;
-  int64_t first_ns = 0, last_ns = 0;
+  uint64_t more = 0;                 ///< of its kind and subject, within its window
+  std::filesystem::path file;        ///< empty: nothing was written
+  std::string refused;               ///< why not
+  std::vector<std::string> damages;  ///< of the ring: what of it could not be read
+  uint64_t bytes = 0;
 };
 
 /// Writes a file for each cause: what the rings hold from `before_ns` before it to `after_ns` behind it, on a thread
@@ -35,7 +35,7 @@ class Freezer {
     std::string name;              ///< of the run: NAME-0001-miss.mcap
     int64_t before_ns = 0, after_ns = 0;
     uint64_t most_bytes = 2'000'000'000;  ///< of all files of the folder, those of earlier runs, too; the oldest go
-    size_t at_least = 20;                 ///< ... but never the newest so many: then nothing more is frozen
+    size_t at_least = 20;                 ///< ... but the newest so many stay, whatever they take
     std::function<void(const Frozen&)> told = {};  ///< called once for each, on the freezer's thread
   };
   /// Both rings outlive this; `memory` may be null.

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "graph/flight/left_runs.hpp"
 
-#include <signal.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <cstdlib>
 #include <system_error>
+
+#include "rt/file/output_file.hpp"
+#include "rt/record/ring.hpp"
 
 namespace takt::flight {
 namespace {
@@ -17,27 +18,9 @@ namespace fs = std::filesystem;
 const fs::path kMemory = "/dev/shm";
 constexpr std::string_view kPrefix = "takt-flight-", kEnding = "-000000.mcap";
 
-bool dead(const std::string& place) {
-  const int process = std::atoi(place.substr(place.rfind('-') + 1).c_str());
-  return process > 0 && kill(process, 0) != 0 && errno == ESRCH;
-}
-
 bool mine(const fs::path& place) {
   struct stat status {};
   return lstat(place.c_str(), &status) == 0 && status.st_uid == geteuid() && S_ISDIR(status.st_mode);
-}
-
-/// Files of a ring, the oldest first.
-std::vector<fs::path> records_in(const fs::path& folder) {
-  std::vector<std::pair<fs::file_time_type, fs::path>> found;
-  std::error_code error;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error))
-    if (entry.path().extension() == ".mcap" && entry.path().filename().string().size() > kEnding.size())
-      found.emplace_back(entry.last_write_time(error), entry.path());
-  std::sort(found.begin(), found.end());
-  std::vector<fs::path> paths;
-  for (auto& [written, path] : found) paths.push_back(std::move(path));
-  return paths;
 }
 
 std::string run_of(const fs::path& file) {
@@ -50,13 +33,15 @@ std::string run_of(const fs::path& file) {
 fs::path memory_place(const std::string& run) { return kMemory / (std::string(kPrefix) + run); }
 
 tl::expected<Rescued, std::string> rescue(const fs::path& folder, mcap::Sink& sink) {
-  const std::vector<fs::path> all = records_in(folder);
+  std::vector<fs::path> all;
+  for (const record::RingFile& file : record::records_in(folder))
+    if (file.path.filename().string().size() > kEnding.size()) all.push_back(file.path);
   if (all.empty()) return tl::unexpected(folder.string() + ": no run has left anything here");
   Rescued rescued;
   rescued.run = run_of(all.back());
   for (const fs::path& file : all)
     if (run_of(file) == rescued.run) rescued.files.push_back(file);
-  for (const fs::path& file : records_in(memory_place(rescued.run))) rescued.files.push_back(file);
+  for (const record::RingFile& file : record::records_in(memory_place(rescued.run))) rescued.files.push_back(file.path);
   auto joined = record::join(rescued.files, sink, {});
   if (!joined) return tl::unexpected(joined.error());
   rescued.joined = std::move(*joined);
@@ -67,8 +52,8 @@ std::vector<fs::path> clear_memory() {
   std::vector<std::pair<fs::file_time_type, fs::path>> left;
   std::error_code error;
   for (const fs::directory_entry& entry : fs::directory_iterator(kMemory, error))
-    if (const std::string name = entry.path().filename().string();
-        name.starts_with(kPrefix) && dead(name) && mine(entry.path()))
+    if (entry.path().filename().string().starts_with(kPrefix) && mine(entry.path()) &&
+        WriterLock::of_folder(entry.path()))
       left.emplace_back(entry.last_write_time(error), entry.path());
   std::sort(left.begin(), left.end());
   std::vector<fs::path> cleared;

@@ -23,7 +23,8 @@ struct Rescued {
 /// has not been started anew, in memory. Error: there is none, or the sink refuses it.
 tl::expected<Rescued, std::string> rescue(const std::filesystem::path& folder, mcap::Sink& sink);
 
-/// Takes away what dead processes of this user left in memory, but for the newest of them; the places.
+/// Takes away what runs of this user left in memory that are over, but for the newest of them; the places. A run that
+/// goes on has a WriterLock on its place.
 std::vector<std::filesystem::path> clear_memory();
 
 }  // namespace takt::flight

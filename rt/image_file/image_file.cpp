@@ -104,7 +104,8 @@ Head head_of(const std::filesystem::path& file) {
   if (!known(magic)) refuse(file, "is no image of a known kind: PNG, JPEG, PGM, PPM, PBM, PFM, BMP, TIFF");
   if (magic == kPng) return png_head(in);
   in.clear();
-  return magic[0] == 'P' && magic[1] != '1' && magic[1] != '4' && magic[1] < 'F' ? pnm_head(in, magic[1]) : Head{};
+  const bool has_maxval = magic[0] == 'P' && std::string_view("2356").find(magic[1]) != std::string_view::npos;
+  return has_maxval ? pnm_head(in, magic[1]) : Head{};
 }
 
 cv::Mat decode(const std::filesystem::path& file, int mode, const Head& head) {

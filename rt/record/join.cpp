@@ -88,9 +88,8 @@ class Join {
   void begin() {
     note(writer_.begin("", "takt"));
     const mcap::Reader& last = parts_.back().reader;
-    write_metadata(last, Recorder::kFacts);
+    note(writer_.metadata(Recorder::kFacts, named(last, Recorder::kFacts)));
     for (const mcap::Attachment& attachment : last.attachments()) note(writer_.attach(attachment));
-    for (const mcap::Attachment& attachment : options_.attachments) note(writer_.attach(attachment));
     std::map<std::pair<std::string, std::string>, uint16_t> schemas;
     for (const auto& [channel, schema] : channels_) {
       uint16_t id = 0;
@@ -103,16 +102,9 @@ class Join {
     }
   }
 
-  void write_metadata(const mcap::Reader& from, const char* name) {
-    const auto instead = std::find_if(options_.metadata.begin(), options_.metadata.end(),
-                                      [&](const auto& one) { return one.name == name; });
-    note(writer_.metadata(name, instead != options_.metadata.end() ? instead->map : named(from, name)));
-  }
-
   void end() {
-    write_metadata(parts_.back().reader, Recorder::kEnd);
-    for (const auto& one : options_.metadata)
-      if (one.name != Recorder::kFacts && one.name != Recorder::kEnd) note(writer_.metadata(one.name, one.map));
+    note(writer_.metadata(Recorder::kEnd, named(parts_.back().reader, Recorder::kEnd)));
+    for (const auto& one : options_.metadata) note(writer_.metadata(one.name, one.map));
     note(writer_.finish());
   }
 

@@ -18,8 +18,7 @@ namespace takt::record {
 struct JoinOptions {
   /// Publications in [from, to), of the run's time; others stay away.
   int64_t from_ns = INT64_MIN, to_ns = INT64_MAX;
-  std::vector<mcap::Reader::Named> metadata = {};  ///< in addition, and instead of those of the same name
-  std::vector<mcap::Attachment> attachments = {};
+  std::vector<mcap::Reader::Named> metadata = {};  ///< in addition
 };
 
 struct Joined {

@@ -215,7 +215,7 @@ void Recorder::write_on() {
     // In the run's own time, so that a virtual run always gives the same chunks.
     if (entry->at_ns - chunk_began_ns >= kChunkNs) {
       if (file_) note(file_->flush());
-      splits_.settle(entry->at_ns);
+      note(splits_.settle(entry->at_ns));
       chunk_began_ns = entry->at_ns;
       if (!file_ || splits_.ends(file_->written_bytes(), file_began_ns_, entry->at_ns)) {
         last_facts_ = {{"epoch_ns", std::to_string(board_.epoch_ns())}, {"goes_on", "in the next file"}};

@@ -10,6 +10,20 @@
 namespace takt::record {
 namespace fs = std::filesystem;
 
+std::vector<RingFile> records_in(const fs::path& folder) {
+  std::vector<std::pair<fs::file_time_type, RingFile>> found;
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error))
+    if (entry.path().extension() == ".mcap" && entry.is_regular_file(error))
+      found.push_back({entry.last_write_time(error), {entry.path(), 0, 0, entry.file_size(error)}});
+  std::sort(found.begin(), found.end(), [](const auto& a, const auto& b) {
+    return std::pair(a.first, a.second.path) < std::pair(b.first, b.second.path);
+  });
+  std::vector<RingFile> files;
+  for (auto& [written, file] : found) files.push_back(std::move(file));
+  return files;
+}
+
 /// The newest file. It is made with its first bytes, so that a disk that is gone and comes back is asked again.
 class Ring::Sink final : public mcap::Sink {
  public:
@@ -29,9 +43,7 @@ class Ring::Sink final : public mcap::Sink {
     if (done) ring_.grow(bytes);
     return done;
   }
-  void settle() const {
-    if (file_) file_->settle();
-  }
+  mcap::Writer::Done settle() const { return file_ ? file_->settle() : mcap::Writer::Done{}; }
 
  private:
   Ring& ring_;
@@ -47,7 +59,10 @@ tl::expected<std::unique_ptr<Ring>, std::string> Ring::open(const fs::path& fold
   limits.bytes = std::max(limits.bytes, RingLimits::kLeastBytes);
   limits.split_bytes = std::min(limits.split_bytes, limits.bytes / 8);
   std::unique_ptr<Ring> ring(new Ring(folder, std::move(name), limits));
-  ring->find_left_files();
+  for (File& left : records_in(folder)) {
+    ring->bytes_ += left.bytes;
+    ring->files_.push_back(std::move(left));
+  }
   ring->make_room(0);
   return ring;
 }
@@ -56,21 +71,6 @@ Ring::Ring(fs::path folder, std::string name, RingLimits limits)
     : folder_(std::move(folder)), name_(std::move(name)), limits_(limits) {}
 
 Ring::~Ring() = default;
-
-void Ring::find_left_files() {
-  std::vector<std::pair<fs::file_time_type, File>> left;
-  std::error_code error;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder_, error))
-    if (entry.path().extension() == ".mcap" && entry.is_regular_file(error))
-      left.push_back({entry.last_write_time(error), {entry.path(), 0, 0, entry.file_size(error)}});
-  std::sort(left.begin(), left.end(), [](const auto& a, const auto& b) {
-    return std::pair(a.first, a.second.path) < std::pair(b.first, b.second.path);
-  });
-  for (auto& [written, file] : left) {
-    bytes_ += file.bytes;
-    files_.push_back(std::move(file));
-  }
-}
 
 mcap::Sink* Ring::next(int64_t at_ns) {
   part_.store(false);
@@ -89,10 +89,11 @@ bool Ring::ends(uint64_t bytes, int64_t began_ns, int64_t at_ns) const {
   return part_.load() || bytes >= limits_.split_bytes || at_ns - began_ns >= limits_.split_ns;
 }
 
-void Ring::settle(int64_t at_ns) {
-  if (limits_.durable && sink_ != nullptr) sink_->settle();
+mcap::Writer::Done Ring::settle(int64_t at_ns) {
+  auto done = limits_.durable && sink_ != nullptr ? sink_->settle() : mcap::Writer::Done{};
   const std::lock_guard lock(mutex_);
   if (!files_.empty()) files_.back().ended_ns = std::max(files_.back().ended_ns, at_ns);
+  return done;
 }
 
 bool Ring::make_room(uint64_t bytes) {

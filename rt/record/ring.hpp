@@ -18,6 +18,16 @@
 
 namespace takt::record {
 
+/// A record of a folder.
+struct RingFile {
+  std::filesystem::path path;
+  int64_t began_ns = 0, ended_ns = 0;  ///< of the run's time; both 0 in one that an earlier run left
+  uint64_t bytes = 0;
+};
+
+/// Files NAME.mcap of a folder, the one that was written first in front; none if it cannot be read.
+std::vector<RingFile> records_in(const std::filesystem::path& folder);
+
 struct RingLimits {
   uint64_t bytes = 2'000'000'000;      ///< of all files of the folder, at every instant; at least kLeastBytes
   int64_t age_ns = 3'600'000'000'000;  ///< what is older goes; of the run's own time
@@ -32,11 +42,7 @@ struct RingLimits {
 /// room. next(), ends(), settle() on one thread; files() and bytes() on any.
 class Ring final : public Splits {
  public:
-  struct File {
-    std::filesystem::path path;
-    int64_t began_ns = 0, ended_ns = 0;  ///< of this run's time; both 0 in one that an earlier run left
-    uint64_t bytes = 0;
-  };
+  using File = RingFile;
 
   /// Makes the folder, and room in it. Error: why it cannot be made.
   static tl::expected<std::unique_ptr<Ring>, std::string> open(const std::filesystem::path& folder, std::string name,
@@ -45,7 +51,7 @@ class Ring final : public Splits {
 
   mcap::Sink* next(int64_t at_ns) override;
   bool ends(uint64_t bytes, int64_t began_ns, int64_t at_ns) const override;
-  void settle(int64_t at_ns) override;
+  mcap::Writer::Done settle(int64_t at_ns) override;
 
   /// The file in hand is to end at the next opportunity: afterwards all that was published so far lies in files that
   /// nobody writes to. Any thread.
@@ -62,7 +68,6 @@ class Ring final : public Splits {
  private:
   class Sink;
   Ring(std::filesystem::path folder, std::string name, RingLimits limits);
-  void find_left_files();
   /// Drops the oldest until so many bytes fit; false: they do not even without all others.
   bool make_room(uint64_t bytes);
   bool drop_oldest();

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <utility>
 
-#include "rt/record/mcap/file_sink.hpp"
+#include "rt/record/mcap/writer.hpp"
 
 namespace takt::record {
 
@@ -19,7 +19,7 @@ class Splits {
   virtual bool ends(uint64_t bytes, int64_t began_ns, int64_t at_ns) const = 0;
   /// The file has what was published until `at_ns`, and keeps it through a loss of power. About once a second of the
   /// run.
-  virtual void settle(int64_t at_ns) = 0;
+  virtual mcap::Writer::Done settle(int64_t at_ns) = 0;
 };
 
 /// One file, that somebody else has opened.
@@ -28,7 +28,7 @@ class OneFile final : public Splits {
   explicit OneFile(mcap::Sink& sink) : sink_(&sink) {}
   mcap::Sink* next(int64_t) override { return std::exchange(sink_, nullptr); }
   bool ends(uint64_t, int64_t, int64_t) const override { return false; }
-  void settle(int64_t) override {}
+  mcap::Writer::Done settle(int64_t) override { return {}; }
 
  private:
   mcap::Sink* sink_;

@@ -43,6 +43,9 @@ tl::expected<void, std::string> FileSink::append(std::span<const Bytes> parts) {
   return {};
 }
 
-void FileSink::settle() const { [[maybe_unused]] const int done = fdatasync(descriptor_); }
+tl::expected<void, std::string> FileSink::settle() const {
+  if (fdatasync(descriptor_) == 0 || errno == EINVAL) return {};  // EINVAL: nothing that could be lost, as a pipe
+  return tl::unexpected(std::strerror(errno));
+}
 
 }  // namespace takt::mcap

@@ -27,8 +27,8 @@ class FileSink final : public Sink {
   FileSink& operator=(FileSink&&) = delete;
   ~FileSink() override;
   tl::expected<void, std::string> append(std::span<const Bytes> parts) override;
-  /// Waits until what was appended survives a loss of power, where the file system can.
-  void settle() const;
+  /// Waits until what was appended survives a loss of power. Error: the disk could not take it.
+  tl::expected<void, std::string> settle() const;
 
  private:
   explicit FileSink(int descriptor) : descriptor_(descriptor) {}
