@@ -1,11 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "rt/node.hpp"
 
+#include <algorithm>
+
+#include "rt/msg/node_state.hpp"
 #include "rt/msg/requests.hpp"
 #include "rt/trace/rings.hpp"
 
 namespace takt {
 namespace {
+
+constexpr size_t kMostState = 256 << 20;  ///< bytes
 
 void note_answer(Question question, int64_t value, uint32_t job) {
   trace::record({0, value, static_cast<int64_t>(question), job, trace::kNoTask, trace::Kind::answer, 0});
@@ -31,9 +36,15 @@ OutputPort::OutputPort(Node* owner, std::string_view name, const MessageType& ty
 
 void* OutputPort::loan_message() {
   if (writer_ == nullptr) return nullptr;
+  void* const message = loan_chunk();  // none where this job has sent its message already
+  if (message == nullptr) note_answer(Question::chunk, 0, 0);
+  return message;
+}
+
+void* OutputPort::loan_chunk() {
   if (loaned_ != nullptr && !sent_) return loaned_ + 1;
-  MessageHeader* chunk = writer_->loan();  // none where this job has sent its message already
-  if (chunk == nullptr) return note_answer(Question::chunk, 0, 0), nullptr;
+  MessageHeader* chunk = writer_ != nullptr ? writer_->loan() : nullptr;
+  if (chunk == nullptr) return nullptr;
   loaned_ = chunk;
   return loaned_ + 1;
 }
@@ -60,6 +71,37 @@ Levels::Levels(Node* owner, std::initializer_list<QualityLevel> levels) {
 void Node::accept_requests() {
   control_ =
       std::make_unique<Input<Requests>>(this, "control", "requests to stop, start or pace this node", Need::optional);
+}
+
+void Node::publish_state() {
+  state_ = std::make_unique<Output<NodeState>>(this, "state", "what this node remembers, for a replay");
+}
+
+void Node::size_state() {
+  StateArchive measured = StateArchive::measuring();
+  remember(measured);
+  state_layout_ = measured.layout();
+  state_->reserve({.count = static_cast<uint32_t>(std::min<size_t>(measured.bytes(), kMostState))});
+}
+
+bool Node::save_state(int64_t stamp_ns) {
+  auto* const out = static_cast<NodeState*>(state_->loan_chunk());
+  if (out == nullptr) return false;
+  StateArchive saved = StateArchive::saving(std::as_writable_bytes(std::span(out->bytes.data(), out->bytes.capacity)));
+  remember(saved);
+  out->layout = saved.failed() ? 0 : state_layout_;
+  out->bytes.resize(saved.failed() ? 0 : saved.bytes());
+  state_->send(stamp_ns);
+  return true;
+}
+
+tl::expected<void, std::string> Node::load_state(const NodeState& state) {
+  if (state.layout == 0) return tl::unexpected(std::string("it did not fit into its message"));
+  if (state.layout != state_layout_) return tl::unexpected(std::string("it is that of another version of the node"));
+  StateArchive loaded = StateArchive::loading(std::as_bytes(state.bytes.items()));
+  remember(loaded);
+  if (loaded.failed() || !loaded.at_end()) return tl::unexpected(std::string("its bytes do not fit the node"));
+  return {};
 }
 
 std::string_view to_string(Layer layer) {

@@ -14,6 +14,8 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <tl/expected.hpp>
+#include <type_traits>
 #include <vector>
 
 #include "rt/level.hpp"
@@ -23,12 +25,14 @@
 #include "rt/sched/append_log.hpp"
 #include "rt/shm/transport.hpp"
 #include "rt/source_state.hpp"
+#include "rt/state_archive.hpp"
 #include "rt/time/clock.hpp"
 #include "rt/time/rate.hpp"
 
 namespace takt {
 
-struct Requests;  // rt/msg/requests.hpp
+struct NodeState;  // rt/msg/node_state.hpp
+struct Requests;   // rt/msg/requests.hpp
 
 /// Thrown by Node::setup: what the node cannot work with. The graph adds file, line and id.
 struct SetupError : std::runtime_error {
@@ -226,9 +230,11 @@ class OutputPort {
 
  protected:
   void* loan_message();
+  void* loan_chunk();  ///< without a note if there is none
   const void* handed_over_ = nullptr;
 
  private:
+  friend class Node;
   friend class PortAccess;
   std::string_view name_, doc_;
   const MessageType* type_;
@@ -267,6 +273,10 @@ class Node {
   virtual void start(int64_t epoch_ns) { static_cast<void>(epoch_ns); }
   /// One job. No allocation, lock, file or socket call, logging or exception in here.
   virtual void run(Job& job) = 0;
+  /// What the node carries from one job to the next (rt/state_archive.hpp); nothing, if it is declared with nothing in it. Saved
+  /// behind a job every few seconds of a run that is recorded, and loaded where a replay begins in the middle: after
+  /// start(), without allocating while it saves. A node that does not declare this begins there as after a restart.
+  virtual void remember(StateArchive& state) { state.fail(); }
   /// CPU time that threads of the node have taken beside its jobs, ns; asked after the last job.
   virtual int64_t helper_cpu_ns() const { return 0; }
   /// After the last job, on the main thread. Files may be written.
@@ -276,6 +286,19 @@ class Node {
   void accept_requests();
   /// Null if the node takes no requests.
   const Input<Requests>* control() const { return control_.get(); }
+  /// The class of this node declares what it remembers.
+  void declare_state() { declares_state_ = true; }
+  bool declares_state() const { return declares_state_; }
+  /// Gives such a node its last output, `state`, which the runtime fills. Before setup.
+  void publish_state();
+  /// After setup: sizes that output.
+  void size_state();
+  /// In a job: saves into that output. False: it is not sent, since no chunk is free.
+  bool save_state(int64_t stamp_ns);
+  /// After start(), in a replay. Error: why these bytes are not those of such a node.
+  tl::expected<void, std::string> load_state(const NodeState& state);
+  /// Null if there is none.
+  const Output<NodeState>* state() const { return state_.get(); }
 
   /// In the constructor or in setup: jobs of this node make calls that no job should, and why. They are not counted as
   /// violations.
@@ -299,6 +322,9 @@ class Node {
   std::vector<ParamBase*> params_;
   std::vector<QualityLevel> levels_{{"full", 1.0}};
   std::unique_ptr<Input<Requests>> control_;
+  std::unique_ptr<Output<NodeState>> state_;
+  uint64_t state_layout_ = 0;
+  bool declares_state_ = false;
   uint32_t allowed_calls_ = 0;
   std::string_view reason_of_calls_;
 };
@@ -324,6 +350,8 @@ class NodeTypes {
     insert({std::move(name), layer, std::move(doc), [] {
               auto node = std::make_unique<T>();
               node->accept_requests();
+              if constexpr (requires { &T::remember; })
+                if constexpr (!std::is_same_v<decltype(&T::remember), void (Node::*)(StateArchive&)>) node->declare_state();
               return node;
             }});
   }

@@ -144,6 +144,7 @@ class Replay {
   int compose() {
     int code = load(run_, *prepared_);
     if (code == kOk) {
+      take_snapshots();
       tell_ignored_overlay(prepared_->graph->name, "the record says which values held");
       RecordedFacts facts(recorded_);
       graph::ComposeOptions& how = composed_;
@@ -159,6 +160,13 @@ class Replay {
     }
     if (code != kOk) tell_problems(prepared_->problems.size());
     return code;
+  }
+
+  /// Nodes say what they remember if they did so in the run.
+  void take_snapshots() {
+    graph::RecordSpec& spec = prepared_->graph->record;
+    spec.snapshot_ns = std::strtoll(fact(file_->facts(), "snapshots_ns").c_str(), nullptr, 10);
+    spec.recorded = spec.snapshot_ns > 0;
   }
 
   /// Throws where one is missing that the record was made with; says where one is another file now.
@@ -236,7 +244,8 @@ class Replay {
   /// One for each process.
   std::vector<ReplayPart> parts() const {
     record::Replayer::Options how;
-    if (options_.from_s > 0) how.from_ns = log::epoch_ns(*file_) + static_cast<int64_t>(options_.from_s * 1e9);
+    if (options_.from_s > 0) how.begin_ns = how.from_ns = at(options_.from_s);
+    if (options_.until_s) how.end_ns = at(*options_.until_s);
     if (options_.recorded_pace) how.pace = pace(how.from_ns);
     const std::vector<char> live = live_tasks();
     how.run = live;
@@ -256,6 +265,8 @@ class Replay {
     }
     return parts;
   }
+
+  int64_t at(double s) const { return log::epoch_ns(*file_) + static_cast<int64_t>(s * 1e9); }
 
   /// By task: the nodes of --live with_producers(); empty: all.
   std::vector<char> live_tasks() const {
@@ -328,6 +339,10 @@ class Replay {
     fmt::print("replayed {} jobs in {} process{}, {:.1f} s in {:.1f} s ({:.1f}x real time)\n", result.jobs, processes_,
                processes_ == 1 ? "" : "es", recorded_s, took_s, took_s > 0 ? recorded_s / took_s : 0.0);
     if (result.restarts > 0) fmt::print("{} restarts of nodes done again\n", result.restarts);
+    if (result.begun > 0) fmt::print("{} nodes went on from a snapshot\n", result.begun);
+    if (result.begun_afresh > 0)
+      fmt::print("{} nodes began without what they remember ({}); what they make may differ\n", result.begun_afresh,
+                 result.stateless);
     if (result.uncommitted > 0)
       fmt::print("{} jobs were not run: their process was lost before they published\n", result.uncommitted);
     if (result.lacking > 0) fmt::print("{} jobs were not run: the record lost what they were given\n", result.lacking);
@@ -415,7 +430,8 @@ void add_replay(CLI::App& app, plugin::Plugins& plugins, ReplayOptions& o, int& 
   reads_file(replay->add_option("--params", o.params, "parameter file of the robot instead of that of the record"));
   replay->add_option("--set", o.set, "node.param=value, repeatable");
   add_plugin_option(*replay, o.plugin_files);
-  replay->add_option("--from", o.from_s, "tells and paces only what was released so many seconds into the run");
+  replay->add_option("--from", o.from_s, "begins so many seconds into the run, from the snapshots before that");
+  replay->add_option("--until", o.until_s, "ends so many seconds into the run");
   replay->add_option("--isolate", o.isolate, "none (one process) | subsystem: as many as the run had")
       ->check(CLI::IsMember({"none", "subsystem"}));
   replay->add_flag("--recorded-pace", o.recorded_pace, "as fast as it was, instead of as fast as possible");

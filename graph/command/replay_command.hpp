@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,7 @@ struct ReplayOptions {
   std::vector<std::string> set;   ///< "node.param=value", after those of the record
   std::vector<std::filesystem::path> plugin_files;  ///< beside those that the graph names
   double from_s = 0;                                ///< since the epoch of the run
+  std::optional<double> until_s = {};               ///< likewise
 };
 
 /// `takt replay LOG [GRAPH]`: runs every job of a record again, with the inputs and answers that it had. Exit 1 if

@@ -32,8 +32,9 @@ size_t index_of(const Ports& ports, std::string_view name) {
   return kNone;
 }
 
-std::unique_ptr<Node> make_node(const NodeSpec& spec, const NodeTypes& types) {
+std::unique_ptr<Node> make_node(const NodeSpec& spec, const NodeTypes& types, bool with_state) {
   std::unique_ptr<Node> node = types.find(spec.type)->make();
+  if (with_state && node->declares_state()) node->publish_state();
   for (ParamBase* param : node->params()) {
     // Ranges were checked when the graph was loaded; a refusal here is a bug in the checker.
     if (const auto it = spec.params.find(std::string(param->name())); it != spec.params.end()) {
@@ -66,6 +67,7 @@ void give_setup(Node& node, const TaskPlan& task, size_t t, const GraphSpec& gra
   const Told told(registry, at, task.name);
   Setup setup{clock, graph.directory, options.output, options.seed + t, task.rate, task.offset_ns};
   node.setup(setup);
+  if (node.state() != nullptr) node.size_state();
 }
 
 class Composer {
@@ -137,7 +139,9 @@ class Composer {
   }
 
   void make_nodes() {
-    for (const NodeSpec& spec : graph_.nodes) add(spec.id, make_node(spec, registry_.nodes), false, spec.position);
+    for (const NodeSpec& spec : graph_.nodes) {
+      add(spec.id, make_node(spec, registry_.nodes, graph_.record.state_every_ns() > 0), false, spec.position);
+    }
   }
 
   void add(const std::string& id, std::unique_ptr<Node> node, bool device, const Position& position) {
@@ -146,6 +150,7 @@ class Composer {
     task.node = node.get();
     task.device = device;
     if (const auto it = graph_.schedule.entries.find(id); it != graph_.schedule.entries.end()) fill(task, it->second);
+    if (node->state() != nullptr) task.state_every_ns = graph_.record.state_every_ns();
     for (const OutputPort* output : node->outputs()) {
       port_index_[id + "." + std::string(output->name())] = result_.plan.ports.size();
       task.ports.push_back(result_.plan.ports.size());
@@ -344,7 +349,7 @@ std::unique_ptr<Node> make_again(const GraphSpec& graph, const Registry& registr
   const auto spec =
       std::find_if(graph.nodes.begin(), graph.nodes.end(), [&](const NodeSpec& node) { return node.id == task.name; });
   if (spec == graph.nodes.end()) throw SetupError(task.name + " is no node of the graph");
-  std::unique_ptr<Node> node = make_node(*spec, registry.nodes);
+  std::unique_ptr<Node> node = make_node(*spec, registry.nodes, task.node->state() != nullptr);
   for (size_t i = 0; i < node->outputs().size(); ++i)
     if (task.node->outputs()[i]->connected()) PortAccess::mark_read(*node->outputs()[i]);
   for (size_t i = 0; i < node->inputs().size(); ++i)

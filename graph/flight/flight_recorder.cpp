@@ -59,7 +59,16 @@ FlightRecorder::FlightRecorder(const graph::GraphSpec& graph, const Plan& plan, 
     if (memory) memory_ = std::move(*memory);
     else doubts_.push_back("record: no images and clouds are kept: " + memory.error());
   }
-  Freezer::Options freezing{options_.folder / "frozen", name, spec.before_ns, spec.after_ns};
+  Freezer::Options freezing;
+  freezing.folder = options_.folder / "frozen";
+  freezing.name = name;
+  freezing.before_ns = spec.before_ns;
+  freezing.after_ns = spec.after_ns;
+  freezing.snapshot_every_ns = spec.state_every_ns();
+  for (const TaskPlan& task : plan.tasks) {
+    auto& edges = freezing.edges.emplace_back();
+    for (const EdgePlan& edge : task.edges) edges.push_back(plan.ports[edge.port].node + "." + plan.ports[edge.port].port);
+  }
   freezing.told = [this](const Frozen& frozen) { tell(frozen); };
   freezer_ = std::make_unique<Freezer>(*disk_, memory_.get(), std::move(freezing));
   const auto note = [this](const std::optional<Cause>& cause) {
@@ -71,6 +80,7 @@ FlightRecorder::FlightRecorder(const graph::GraphSpec& graph, const Plan& plan, 
   how.queue_bytes = kQueueBytes;
   how.file.chunk_bytes = kChunkBytes;
   how.ports = places_.disk;
+  how.snapshot_every_ns = spec.state_every_ns();
   how.listener = {[this, note](const record::RecordedJob& job) { note(triggers_.of(job)); },
                   [this, note](size_t port, const Held& held) { note(triggers_.of(port, held)); },
                   [this, note](const record::RecordedEvent& event) { note(triggers_.of(event)); }};

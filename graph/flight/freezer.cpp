@@ -20,6 +20,10 @@ namespace fs = std::filesystem;
 /// Files are joined by code that is not the runtime's own loops.
 constexpr size_t kStack = 1 << 20;
 constexpr size_t kMostWaiting = 64;
+/// A task that has a job as seldom as this has a snapshot in each file.
+constexpr int64_t kSlowest_ns = 1'000'000'000;
+/// A file of the ring has each message that stood when it began, so a little more than its length is enough.
+constexpr int64_t kStandsFor_ns = 65'000'000'000;
 constexpr auto kLook = std::chrono::milliseconds(100);
 
 }  // namespace
@@ -141,8 +145,9 @@ void Freezer::write(Frozen& frozen) {
     return;
   }
   record::JoinOptions how;
-  how.from_ns = from_ns;
+  how.from_ns = from_ns - (options_.snapshot_every_ns > 0 ? options_.snapshot_every_ns + kSlowest_ns : 0);
   how.to_ns = to_ns;
+  how.edges = options_.edges;
   how.metadata.push_back({"takt frozen",
                           {{"kind", frozen.cause.kind},
                            {"subject", frozen.cause.subject},
@@ -150,7 +155,12 @@ void Freezer::write(Frozen& frozen) {
                            {"at_ns", std::to_string(frozen.cause.at_ns)},
                            {"from_ns", std::to_string(from_ns)},
                            {"to_ns", std::to_string(to_ns)}}});
-  const auto joined = record::join(files_for(from_ns, to_ns), *sink, how);
+  const std::vector<fs::path> files = files_for(how.from_ns, to_ns);
+  how.older = files_for(how.from_ns - kStandsFor_ns, to_ns);
+  std::erase_if(how.older, [&](const fs::path& older) {
+    return std::find(files.begin(), files.end(), older) != files.end();
+  });
+  const auto joined = record::join(files, *sink, how);
   std::error_code error;
   if (joined) fs::rename(part, file, error);
   if (!joined || error) {

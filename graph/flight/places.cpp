@@ -44,7 +44,9 @@ Places places(const graph::RecordSpec& spec, const Plan& plan) {
     for (const graph::RecordSpec::Port& given : spec.ports)
       if (given.port.node == port.node && given.port.port == port.port) rule = rule_of(given);
     const size_t task = producers.find(p);
-    const double rate_hz = task == kNone ? 0 : effective_rate_hz(plan, task);
+    double rate_hz = task == kNone ? 0 : effective_rate_hz(plan, task);
+    if (task != kNone && plan.tasks[task].state_every_ns > 0 && plan.tasks[task].ports.back() == p)
+      rate_hz = std::min(rate_hz, 1e9 / static_cast<double>(plan.tasks[task].state_every_ns));
     const double bytes_s = kept_hz(rule, rate_hz) * static_cast<double>(port.chunk_bytes());
     if (bytes_s <= kMostOnDisk) {
       places.disk_bytes_s += bytes_s;

@@ -229,8 +229,12 @@ struct RecordSpec {
   int64_t memory_bytes = 256'000'000;   ///< of images and clouds, which are kept in memory only
   int64_t keep_ns = 3600'000'000'000;   ///< what is older goes
   int64_t before_ns = 5'000'000'000, after_ns = 2'000'000'000;  ///< around what freezes the ring
+  int64_t snapshot_ns = 2'000'000'000;  ///< nodes say what they remember once in so much time; 0: never
+  bool recorded = false;                ///< not of the file: this run is recorded, or replays what was
   std::vector<Port> ports;              ///< those that the graph has a rule for
   Position position;
+  /// 0: nodes have no output for what they remember.
+  int64_t state_every_ns() const { return recorded ? snapshot_ns : 0; }
 };
 
 struct GraphSpec {

@@ -32,6 +32,8 @@ void Loader::read_record() {
   time("keep", 1'000'000'000, spec.keep_ns);
   time("before", 0, spec.before_ns);
   time("after", 0, spec.after_ns);
+  if (record.contains("snapshots") && graph_.raw("/record/snapshots") == "none") spec.snapshot_ns = 0;
+  else time("snapshots", 1'000'000'000, spec.snapshot_ns);
   const json ports = record.value("ports", json::object());
   if (!ports.is_object()) return;
   for (const auto& [name, ignored] : ports.items()) read_record_port(name);

@@ -22,6 +22,7 @@ class Writer {
     Json json = ports(*node);
     json.update({{"name", type.name}, {"layer", type.layer}, {"doc", type.doc}});
     json["control"] = node->control() != nullptr;
+    json["state"] = node->declares_state();
     json["calls"] = node->allowed_calls(), json["reason"] = node->reason_of_calls();
     json["levels"] = Json::array();
     for (const QualityLevel& level : node->levels())

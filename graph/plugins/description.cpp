@@ -60,6 +60,7 @@ class DescribedNode final : public Described<Node> {
     static_assert(kMaxLevels == 4);
     if (const auto calls = json.at("calls").get<uint32_t>(); calls != 0) may(calls, text(json, "reason"));
     if (json.at("control").get<bool>()) accept_requests();
+    if (json.value("state", false)) declare_state();
   }
 
  private:

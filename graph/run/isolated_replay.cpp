@@ -32,6 +32,9 @@ std::string written(const ReplayResult& result) {
               {"restarts", result.restarts},
               {"uncommitted", result.uncommitted},
               {"unmade", result.unmade},
+              {"begun", result.begun},
+              {"begun_afresh", result.begun_afresh},
+              {"stateless", result.stateless},
               {"first", first},
               {"different_of", result.different_of},
               {"recorded_ns", result.recorded_ns}}
@@ -46,6 +49,7 @@ ReplayResult parsed(const std::string& text) {
   result.compared = part["compared"], result.whole = part["whole"];
   result.different = part["different"], result.lacking = part["lacking"];
   result.restarts = part["restarts"], result.uncommitted = part["uncommitted"], result.unmade = part["unmade"];
+  result.begun = part["begun"], result.begun_afresh = part["begun_afresh"], result.stateless = part["stateless"];
   if (const json& first = part["first"]; !first.is_null())
     result.first = {first[0], first[1], first[2], first[3], first[4]};
   part["different_of"].get_to(result.different_of);
@@ -58,6 +62,8 @@ void add(ReplayResult& sum, const ReplayResult& part) {
   sum.compared += part.compared, sum.whole += part.whole;
   sum.different += part.different, sum.lacking += part.lacking;
   sum.restarts += part.restarts, sum.uncommitted += part.uncommitted, sum.unmade += part.unmade;
+  sum.begun += part.begun, sum.begun_afresh += part.begun_afresh;
+  if (sum.stateless.empty()) sum.stateless = part.stateless;
   if (part.first && (!sum.first || part.first->release_ns < sum.first->release_ns)) sum.first = part.first;
   sum.different_of.insert(part.different_of.begin(), part.different_of.end());
   sum.recorded_ns = std::max(sum.recorded_ns, part.recorded_ns);

@@ -30,9 +30,11 @@ std::vector<record::PortRule> port_rules(const Plan& plan, const std::vector<std
     if (plan.ports[p].chunk_bytes() > kSmallBytes && !named("all") &&
         !named(plan.ports[p].node + "." + plan.ports[p].port))
       rules[p].keep = record::PortRule::hash;
-  for (const TaskPlan& task : plan.tasks)
+  for (const TaskPlan& task : plan.tasks) {
     for (const size_t port : task.ports)
       if (task.device) rules[port].keep = record::PortRule::all;
+    if (task.state_every_ns > 0) rules[task.ports.back()].keep = record::PortRule::all;
+  }
   return rules;
 }
 
@@ -83,7 +85,7 @@ void RunRecord::begin(const graph::GraphSpec& graph, const Plan& plan, const Run
                       const std::string& isolation, std::vector<std::string> processes) {
   if (!listens()) return;
   const record::Head head = head_of(graph, plan, transport, isolation);
-  if (wanted()) begin_file(plan, board, transport, head);
+  if (wanted()) begin_file(graph.record.state_every_ns(), plan, board, transport, head);
   if (!options_.keep_ring) return;
   flight::FlightRecorder::Options how;
   how.folder = options_.output / "flight";
@@ -109,6 +111,7 @@ record::Head RunRecord::head_of(const graph::GraphSpec& graph, const Plan& plan,
                 {"set", settings(options_, graph)},
                 {"plugins", plugins(options_)},
                 {"seed", std::to_string(options_.seed)},
+                {"snapshots_ns", std::to_string(graph.record.state_every_ns())},
                 {"clock", options_.clock},
                 {"transport", transport.name()},
                 {"isolation", isolation},
@@ -128,7 +131,7 @@ record::Head RunRecord::head_of(const graph::GraphSpec& graph, const Plan& plan,
   return head;
 }
 
-void RunRecord::begin_file(const Plan& plan, const RunBoard& board, Transport& transport, const record::Head& head) {
+void RunRecord::begin_file(int64_t snapshot_every_ns, const Plan& plan, const RunBoard& board, Transport& transport, const record::Head& head) {
   auto file = mcap::FileSink::open(options_.record);
   if (!file) throw std::runtime_error("--record " + file.error() + "; choose another place");
   file_.emplace(std::move(*file));
@@ -138,6 +141,7 @@ void RunRecord::begin_file(const Plan& plan, const RunBoard& board, Transport& t
   how.ports = port_rules(plan, options_.record_ports);
   how.by_caller = options_.clock == "virtual";
   how.priority = priority_on(plan);
+  how.snapshot_every_ns = snapshot_every_ns;
   recorder_ = std::make_unique<record::Recorder>(plan, board, transport, sink, head, std::move(how));
 }
 

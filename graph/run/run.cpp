@@ -192,6 +192,7 @@ int run_as_asked(const Registry& registry, RunOptions options) {
   if (options.load.state.empty()) tell_ignored_overlay(prepared.graph->name, "this run reads no kept values");
   options.keep_ring = options.ring == "on" || (options.ring == "auto" && options.clock != "virtual" &&
                                                options.witness == nullptr && prepared.graph->record.ring);
+  prepared.graph->record.recorded = options.keep_ring || !options.record.empty();
   if (prepared.graph->expect && !options.duration_asked)
     options.duration_s = static_cast<double>(prepared.graph->expect->within_ns) * 1e-9;
   std::vector<std::string> adjusted = prepared.graph->adjusted;

@@ -44,7 +44,7 @@ class ObstacleStopNode final : public Node {
       const Sweep sweep{scan->first_angle_rad, scan->step_rad, scan->sensor_in_robot, scan->range_m.items()};
       lost = lost || !has_geometry(sweep);
       seen = look(sweep, stamp_ns);
-      if (!lost) remember(sweep, stamp_ns);
+      if (!lost) keep(sweep, stamp_ns);
     }
     uint32_t reasons = lost || seen.blinded ? stop_reason::scan_lost : 0;
     if (seen.blocked) reasons |= stop_reason::obstacle;
@@ -104,7 +104,7 @@ class ObstacleStopNode final : public Node {
     return sweep;
   }
 
-  void remember(const Sweep& sweep, int64_t stamp_ns) {
+  void keep(const Sweep& sweep, int64_t stamp_ns) {
     if (const auto robot = robot_in_odometry(stamp_ns)) memory_.add(sweep, *robot, stamp_ns);
   }
 

@@ -2,6 +2,8 @@
 #include "rt/record/join.hpp"
 
 #include <algorithm>
+#include <cstdlib>
+#include <deque>
 #include <map>
 #include <set>
 #include <utility>
@@ -15,12 +17,26 @@ namespace {
 
 namespace fs = std::filesystem;
 using Place = std::pair<uint16_t, uint64_t>;  ///< channel of the joined record, and sequence
+constexpr uint64_t kMostHeld = 64;            ///< by an edge
 
 class Join {
+  struct Part {
+    fs::path file;
+    mcap::Reader reader;
+    std::map<uint16_t, uint16_t> channel;  ///< of the joined record, by that of the file
+  };
+
  public:
   Join(mcap::Sink& sink, const JoinOptions& options) : options_(options), writer_(sink, {}) {}
 
   void open(const std::vector<fs::path>& files) {
+    open(options_.older, parts_);
+    older_ = parts_.size();
+    open(files, parts_);
+    if (older_ == parts_.size()) parts_.clear();
+  }
+
+  void open(const std::vector<fs::path>& files, std::deque<Part>& parts) {
     for (const fs::path& file : files) {
       auto reader = mcap::Reader::open(file);
       if (!reader) {
@@ -29,7 +45,7 @@ class Join {
       }
       if (!reader->missing().empty()) damages_.insert(file.string() + ": " + reader->missing());
       if (reader->channels().empty()) continue;  // it ended before its first message
-      parts_.push_back({file, std::move(*reader), {}});
+      parts.push_back({file, std::move(*reader), {}});
     }
   }
 
@@ -37,7 +53,13 @@ class Join {
     if (parts_.empty()) return tl::unexpected("none of the files holds a message" + first_damage());
     if (const std::string why = define(); !why.empty()) return tl::unexpected(why);
     begin();
-    find_whole_messages();
+    if (!options_.edges.empty())
+      for (size_t i = older_; i < parts_.size(); ++i) find_held(parts_[i]);
+    for (size_t i = older_; i < parts_.size(); ++i) find_whole_messages(parts_[i]);
+    const bool all_there =
+        std::all_of(held_.begin(), held_.end(), [this](const Place& place) { return whole_.contains(place); });
+    for (; all_there && older_ > 0; --older_) parts_.pop_front();
+    for (size_t i = 0; i < older_; ++i) find_whole_messages(parts_[i]);
     for (const Part& part : parts_) copy(part);
     note(writer_.flush());
     end();
@@ -47,16 +69,15 @@ class Join {
     return std::move(joined_);
   }
 
- private:
-  struct Part {
-    fs::path file;
-    mcap::Reader reader;
-    std::map<uint16_t, uint16_t> channel;  ///< of the joined record, by that of the file
-  };
 
+ private:
   std::string first_damage() const { return damages_.empty() ? "" : ": " + *damages_.begin(); }
   void note(const mcap::Writer::Done& done) {
     if (!done && refused_.empty()) refused_ = done.error();
+  }
+  static std::string text(const mcap::Metadata& of, const char* key) {
+    const auto found = of.find(key);
+    return found == of.end() ? "" : found->second;
   }
   static const mcap::Metadata& named(const mcap::Reader& reader, std::string_view name) {
     static const mcap::Metadata none;
@@ -119,20 +140,39 @@ class Join {
     for (const mcap::Chunk& chunk : part.reader.chunks())
       if (const auto records = part.reader.unpack(chunk))
         static_cast<void>(part.reader.for_each_in(*records, [&](const mcap::Message& message) {
-          if (message.channel > 0 && within(message)) each(part.channel.at(message.channel), message);
+          if (message.channel == 0) return true;
+          const uint16_t channel = part.channel.at(message.channel);
+          if (within(message) || held_.contains({channel, message.sequence})) each(channel, message);
           return refused_.empty();
         }));
       else damages_.insert(part.file.string() + ": " + records.error());
   }
 
-  void find_whole_messages() {
-    for (const Part& part : parts_)
-      for_each(part, [&](uint16_t channel, const mcap::Message& message) {
-        if (!of_a_port(channel)) return;
-        const auto record = unpack_message(message.data);
-        if (!record) damages_.insert(part.file.string() + ": a message: " + record.error());
-        else if (record->whole) whole_.insert({channel, record->sequence});
-      });
+  /// By jobs of that time.
+  void find_held(const Part& part) {
+    const int format = std::max(1, std::atoi(text(named(part.reader, Recorder::kFacts), "format").c_str()));
+    for_each(part, [&](uint16_t channel, const mcap::Message& message) {
+      if (channels_[channel - 1U].first.topic != Recorder::kJobs || !within(message)) return;
+      const auto job = unpack_job(message.data, format);
+      if (!job || job->task >= options_.edges.size()) return;
+      for (const RecordedJob::Input& input : job->inputs) {
+        if (input.edge >= options_.edges[job->task].size()) continue;
+        const auto port = ids_.find(options_.edges[job->task][input.edge]);
+        if (port == ids_.end()) continue;
+        for (const RecordedJob::Run& run : input.held)
+          for (uint64_t i = 0; i < std::min(run.count, kMostHeld); ++i)
+            held_.insert({port->second, static_cast<uint32_t>(run.first + i)});
+      }
+    });
+  }
+
+  void find_whole_messages(const Part& part) {
+    for_each(part, [&](uint16_t channel, const mcap::Message& message) {
+      if (!of_a_port(channel)) return;
+      const auto record = unpack_message(message.data);
+      if (!record) damages_.insert(part.file.string() + ": a message: " + record.error());
+      else if (record->whole) whole_.insert({channel, record->sequence});
+    });
   }
 
   void copy(const Part& part) {
@@ -156,10 +196,12 @@ class Join {
   const JoinOptions& options_;
   mcap::Writer writer_;
   std::string refused_;
-  std::vector<Part> parts_;
+  std::deque<Part> parts_;
   std::map<std::string, uint16_t> ids_;
   std::vector<std::pair<mcap::Channel, const mcap::Schema*>> channels_;
+  std::set<Place> held_;  ///< as the file numbers it
   std::set<Place> whole_, written_;
+  size_t older_ = 0;  ///< of the parts: they have only what is held
   std::set<std::string> damages_;
   Joined joined_;
 };

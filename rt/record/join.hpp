@@ -18,6 +18,10 @@ namespace takt::record {
 struct JoinOptions {
   /// Publications in [from, to), of the run's time; others stay away.
   int64_t from_ns = INT64_MIN, to_ns = INT64_MAX;
+  /// By task and edge: topic of the port it reads. What jobs of that time held is taken along, however old it is: from
+  /// the files, else from `older`.
+  std::vector<std::vector<std::string>> edges = {};
+  std::vector<std::filesystem::path> older = {};
   std::vector<mcap::Reader::Named> metadata = {};  ///< in addition
 };
 

@@ -10,7 +10,15 @@
 namespace takt::record {
 
 tl::expected<LogFile, std::string> LogFile::open(const std::filesystem::path& file) {
-  auto container = mcap::Reader::open(file);
+  auto log = open(file, true);
+  if (log) log->read(INT64_MIN, INT64_MAX);
+  return log;
+}
+
+tl::expected<LogFile, std::string> LogFile::open_head(const std::filesystem::path& file) { return open(file, false); }
+
+tl::expected<LogFile, std::string> LogFile::open(const std::filesystem::path& file, bool all) {
+  auto container = mcap::Reader::open(file, all);
   if (!container) return tl::make_unexpected(container.error());
   LogFile log(std::move(*container));
   for (const auto& named : log.container_.metadata()) {
@@ -27,27 +35,38 @@ tl::expected<LogFile, std::string> LogFile::open(const std::filesystem::path& fi
                                " wrote the file)");
   log.jobs_channel_ = log.channel(Recorder::kJobs);
   log.events_channel_ = log.channel(Recorder::kEvents);
-  log.index();
+  if (!log.container_.missing().empty()) log.damages_.push_back(log.container_.missing());
   return log;
 }
 
-void LogFile::index() {
-  if (!container_.missing().empty()) damages_.push_back(container_.missing());
+void LogFile::read(int64_t from_ns, int64_t to_ns) {
   const std::vector<mcap::Chunk>& chunks = container_.chunks();
-  for (uint32_t number = 0; number < chunks.size(); ++number) {
-    const auto records = container_.unpack(chunks[number]);
-    if (!records) {
-      damages_.push_back(records.error());
-      continue;
-    }
-    const auto walked = container_.for_each_in(*records, [&](const mcap::Message& message) {
-      const auto offset = static_cast<uint64_t>(message.data.data() - records->data());
-      index(message, {0, 0, false, number, static_cast<uint32_t>(message.data.size()), offset});
-      return true;
-    });
-    if (!walked) damages_.push_back("the chunk at byte " + std::to_string(chunks[number].at) + ": " + walked.error());
-  }
+  const auto within = [&](const mcap::Chunk& chunk) {
+    return (from_ns <= 0 || chunk.last_ns >= static_cast<uint64_t>(from_ns)) &&
+           (to_ns == INT64_MAX || (to_ns > 0 && chunk.first_ns < static_cast<uint64_t>(to_ns)));
+  };
+  first_read_ = static_cast<uint32_t>(std::find_if(chunks.begin(), chunks.end(), within) - chunks.begin());
+  for (uint32_t number = first_read_; number < chunks.size(); ++number)
+    if (within(chunks[number])) index(number, false);
   check_channels();
+}
+
+bool LogFile::look_back() {
+  if (first_read_ == 0) return false;
+  index(--first_read_, true);
+  return true;
+}
+
+void LogFile::index(uint32_t number, bool only_ports) {
+  const mcap::Chunk& chunk = container_.chunks()[number];
+  const auto records = container_.unpack(chunk);
+  if (!records) return damages_.push_back(records.error());
+  const auto walked = container_.for_each_in(*records, [&](const mcap::Message& message) {
+    const auto offset = static_cast<uint64_t>(message.data.data() - records->data());
+    index(message, {0, 0, false, number, static_cast<uint32_t>(message.data.size()), offset}, only_ports);
+    return true;
+  });
+  if (!walked) damages_.push_back("the chunk at byte " + std::to_string(chunk.at) + ": " + walked.error());
 }
 
 void LogFile::check_channels() {
@@ -66,11 +85,12 @@ void LogFile::check_channels() {
                          " and different descriptions; the first is read");
 }
 
-void LogFile::index(const mcap::Message& message, Known known) {
+void LogFile::index(const mcap::Message& message, Known known, bool only_ports) {
   if (message.channel == 0 || container_.channels()[message.channel - 1U].encoding != Recorder::kEncoding) {
     ++foreign_[message.channel];
     return;
   }
+  if (only_ports && (message.channel == jobs_channel_ || message.channel == events_channel_)) return;
   if (message.channel == jobs_channel_) {
     auto job = unpack_job(message.data, format_);
     if (job) jobs_.push_back(std::move(*job));
@@ -131,8 +151,10 @@ const std::vector<std::byte>* LogFile::chunk(uint32_t number) {
 }
 
 std::optional<MessageRecord> LogFile::message(uint16_t channel, uint64_t sequence) {
-  const std::map<uint64_t, Known>& all = messages(channel);
-  const auto known = all.find(sequence);
+  const std::map<uint64_t, Known>& all = messages_[channel];
+  auto known = all.find(sequence);
+  const auto earlier = [&] { return all.empty() || all.begin()->first > sequence; };
+  while (known == all.end() && earlier() && look_back()) known = all.find(sequence);
   if (known == all.end()) return std::nullopt;
   const std::vector<std::byte>* records = chunk(known->second.chunk);
   if (records == nullptr) return std::nullopt;

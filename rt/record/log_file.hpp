@@ -23,6 +23,11 @@ class LogFile {
   /// Error: not a record of Takt, of a later format, or not readable. One that lacks its end is opened as far as it
   /// goes.
   static tl::expected<LogFile, std::string> open(const std::filesystem::path& file);
+  /// Without jobs, events and messages: those of a part of the run come with read().
+  static tl::expected<LogFile, std::string> open_head(const std::filesystem::path& file);
+  /// After open_head(), once: what was published from `from_ns` until `to_ns`, and some of what lies beside it. Of
+  /// earlier messages, message() finds those with all fields.
+  void read(int64_t from_ns, int64_t to_ns);
 
   const mcap::Reader& container() const { return container_; }
   /// What the head and the end of the record state; empty without an end.
@@ -60,14 +65,18 @@ class LogFile {
 
  private:
   explicit LogFile(mcap::Reader container) : container_(std::move(container)) {}
-  void index();
-  void index(const mcap::Message& message, Known known);
+  static tl::expected<LogFile, std::string> open(const std::filesystem::path& file, bool all);
+  void index(uint32_t chunk, bool only_ports);
+  /// Takes in the chunk before those that were read; false: there is none.
+  bool look_back();
+  void index(const mcap::Message& message, Known known, bool only_ports);
   void check_channels();
   const std::vector<std::byte>* chunk(uint32_t number);
 
   mcap::Reader container_;
   mcap::Metadata facts_, end_;
   int format_ = 1;
+  uint32_t first_read_ = 0;  ///< chunks before it were not read
   uint16_t jobs_channel_ = 0, events_channel_ = 0;
   std::vector<RecordedJob> jobs_;
   std::vector<RecordedEvent> events_;

@@ -25,6 +25,9 @@ struct Body {
     at.list(restart.seen, [&](auto& seen) { at.number(seen.edge), at.number(seen.sequence); });
     at.list(restart.params, [&](auto& param) { at.number(param.param), at.value(param.value); });
   }
+  template <class S>
+  requires std::is_same_v<std::remove_const_t<S>, Snapshot>
+  void operator()(S& snapshot) { (*this)(snapshot.from), at.number(snapshot.state); }
   template <class P>
   requires std::is_same_v<std::remove_const_t<P>, ParameterSet>
   void operator()(P& set) { at.number(set.param), at.value(set.value), at.text(set.who); }
@@ -43,8 +46,9 @@ std::string name_of(uint16_t kind) {
                                                     "mark",    "snapshot",  "machine_lost", "level"};
   if (kind == 0 || kind > names.size()) return "unknown kind " + std::to_string(kind);
   const std::string name = names[kind - 1];
-  const bool written =
-      kind < static_cast<uint16_t>(EventKind::request) || kind == static_cast<uint16_t>(EventKind::mark);
+  const bool written = kind < static_cast<uint16_t>(EventKind::request) ||
+                       kind == static_cast<uint16_t>(EventKind::mark) ||
+                       kind == static_cast<uint16_t>(EventKind::snapshot);
   return written ? name : "reserved kind " + std::to_string(kind) + " (" + name + ")";
 }
 
@@ -64,6 +68,7 @@ tl::expected<RecordedEvent, std::string> unpack_event(std::span<const std::byte>
       case EventKind::parameter: event.what = ParameterSet{}; break;
       case EventKind::mode: event.what = ModeChange{}; break;
       case EventKind::mark: event.what = MarkSet{}; break;
+      case EventKind::snapshot: event.what = Snapshot{}; break;
       default: break;
     }
     std::visit(Body<PackIn>{in}, event.what);
@@ -80,7 +85,8 @@ const char* event_layout() {
          "2 parameter: u16 param, u8 kind, value, text who; "
          "3 mode: u32 mode, text reason; "
          "5 mark: text words, text who; "
-         "4 request, 6 snapshot, 7 machine_lost, 8 level: reserved; pass over kinds and bytes behind that you "
+         "6 snapshot: as 1, u64 state; "
+         "4 request, 7 machine_lost, 8 level: reserved; pass over kinds and bytes behind that you "
          "do not know; little-endian, [..] is u32 count and the elements, text is u32 bytes and the bytes";
 }
 

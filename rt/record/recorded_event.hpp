@@ -25,7 +25,7 @@ enum class EventKind : uint16_t {
   mode,          ///< the mode changes
   request,       ///< reserved: start, stop or pace
   mark,          ///< words that a person set
-  snapshot,      ///< reserved: the state of a node
+  snapshot,      ///< where a replay may begin: what a task went on from, behind one of its jobs
   machine_lost,  ///< reserved: another machine of the run went away
   level,         ///< reserved: a task's quality level changes; jobs tell theirs
 };
@@ -51,6 +51,13 @@ struct Restart {
   std::vector<Seen> seen;
   std::vector<RecordedJob::Param> params;  ///< set before, and taken up before Node::start()
   bool operator==(const Restart&) const = default;
+};
+
+/// As if the task had been started again there, and had then been given what it remembered.
+struct Snapshot {
+  Restart from;
+  uint64_t state = 0;  ///< sequence of the task's last output, `state`; 0: its node does not say what it remembers
+  bool operator==(const Snapshot&) const = default;
 };
 
 /// The job that comes next has it among its own parameters as well.
@@ -80,7 +87,7 @@ struct RecordedEvent {
   uint16_t task = kNoTask;  ///< index into Plan::tasks
   uint32_t job = 0;         ///< Job::index() of the job that begins next; 0 without a task
   int64_t at_ns = 0;
-  std::variant<std::monostate, Restart, ParameterSet, ModeChange, MarkSet>
+  std::variant<std::monostate, Restart, ParameterSet, ModeChange, MarkSet, Snapshot>
       what;  ///< monostate: of a kind that is not known
   bool operator==(const RecordedEvent&) const = default;
 };

@@ -19,6 +19,8 @@ namespace {
 constexpr timespec kPause{0, 5'000'000};
 /// So much of a run is lost at most with a process that is killed.
 constexpr int64_t kChunkNs = 1'000'000'000;
+/// A message older than this is not expected to be followed by the next one soon.
+constexpr int64_t kStandsNs = 2'000'000'000;
 
 }  // namespace
 
@@ -39,7 +41,8 @@ Recorder::Recorder(const Plan& plan, const RunBoard& board, Transport& transport
       head_(std::move(head)),
       queue_(options_.queue_bytes),
       jobs_([this](const RecordedJob& job) { take_job(job); },
-            [this](const RecordedEvent& event) { take_event(event); }) {
+            [this](const RecordedEvent& event) { take_event(event); }),
+      snapshots_(plan, options_.snapshot_every_ns) {
   head_.facts["format"] = std::to_string(kFormat);
   define_channels(plan);
   for (size_t p = 0; p < plan.ports.size(); ++p)
@@ -132,9 +135,23 @@ void Recorder::capture_on() {
 }
 
 void Recorder::take_ports() {
+  repeat_old();
   for (Port& port : ports_) take_port(port);
   take_modes();
   take_marks();
+}
+
+/// What stands for long is in each file, so that jobs that hold it can be run from that file alone.
+void Recorder::repeat_old() {
+  const int64_t begun_ns = file_begun_ns_.exchange(0);
+  if (begun_ns == 0) return;
+  for (Port& port : ports_)
+    if (port.follower && port.rule.keep == PortRule::all && begun_ns - port.seen_ns > kStandsNs)
+      port.follower->again([&](const Held& held) {
+        std::vector<std::byte> data = queue_.buffer(port.bytes);
+        pack(*port.type, held, true, data);
+        push(port.channel, held.sequence, begun_ns, std::move(data));
+      });
 }
 
 void Recorder::take_marks() {
@@ -162,7 +179,7 @@ void Recorder::take_port(Port& port) {
   if (!port.follower) return;
   result_.overwritten += port.follower->take([&](const Held& held) {
     if (options_.listener.message) options_.listener.message(static_cast<size_t>(&port - ports_.data()), held);
-    const int64_t at_ns = held.header->published_ns;
+    const int64_t at_ns = port.seen_ns = held.header->published_ns;
     const bool whole =
         port.rule.keep == PortRule::all && held.sequence % port.rule.every == 0 &&
         (port.rule.pause_ns == 0 || port.whole_ns == INT64_MIN || at_ns - port.whole_ns >= port.rule.pause_ns);
@@ -187,6 +204,7 @@ void Recorder::take_job(const RecordedJob& job) {
   pack(job, data);
   job_bytes_ = data.size();
   push(jobs_channel_, job.index, job.published_ns, std::move(data));
+  if (const auto snapshot = snapshots_.after(job)) take_event(*snapshot);
 }
 
 void Recorder::tell(size_t port, uint64_t sequence) {
@@ -197,6 +215,7 @@ void Recorder::tell(size_t port, uint64_t sequence) {
 void Recorder::take_event(const RecordedEvent& event) {
   if (options_.listener.event) options_.listener.event(event);
   if (!options_.jobs) return;
+  snapshots_.note(event);
   std::vector<std::byte> data;
   pack(event, data);
   push(events_channel_, event.job, event.at_ns, std::move(data));
@@ -221,6 +240,7 @@ void Recorder::write_on() {
         last_facts_ = {{"epoch_ns", std::to_string(board_.epoch_ns())}, {"goes_on", "in the next file"}};
         end_file();
         begin_file(entry->at_ns);
+        file_begun_ns_.store(entry->at_ns);
       }
     }
     queue_.recycle(std::move(entry->data));

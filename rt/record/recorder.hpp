@@ -10,6 +10,7 @@
 #include "rt/own_thread.hpp"
 #include "rt/record/job_assembler.hpp"
 #include "rt/record/mcap/writer.hpp"
+#include "rt/record/snapshots.hpp"
 #include "rt/record/splits.hpp"
 #include "rt/record/write_queue.hpp"
 #include "rt/sched/run_board.hpp"
@@ -81,6 +82,7 @@ class Recorder {
     int priority = 0;
     mcap::Writer::Options file = {};
     Listener listener = {};
+    int64_t snapshot_every_ns = 0;  ///< 0: the record has no places where a replay could begin
   };
 
   /// Before the first job, after the ports have their memory. The splits must live until finish().
@@ -107,6 +109,7 @@ class Recorder {
     uint16_t channel = 0;
     PortRule rule;
     int64_t whole_ns = INT64_MIN;  ///< publication of the last one with all fields
+    int64_t seen_ns = INT64_MIN;   ///< publication of the newest one
     uint64_t told = 0;             ///< the newest that a job says it has published or held
     size_t bytes = 0;              ///< of the last message, packed
   };
@@ -117,6 +120,7 @@ class Recorder {
   uint16_t define_schema(std::string name, std::string encoding, std::string data);
   void take_ports();
   void take_port(Port& port);
+  void repeat_old();
   void take_job(const RecordedJob& job);
   void take_event(const RecordedEvent& event);
   void take_modes();
@@ -143,6 +147,7 @@ class Recorder {
   std::map<uint16_t, uint64_t> written_;  ///< messages by channel, in all files
   WriteQueue queue_;
   JobAssembler jobs_;
+  Snapshots snapshots_;
   std::vector<Port> ports_;
   std::vector<std::vector<size_t>> ports_of_, edges_of_;  ///< by task: ports written and read
   uint16_t jobs_channel_ = 0, events_channel_ = 0;
@@ -151,6 +156,7 @@ class Recorder {
   std::atomic<uint64_t> no_room_{0};
   RecordResult result_;
   std::atomic<bool> ending_{false};
+  std::atomic<int64_t> file_begun_ns_{0};  ///< a file whose first messages are still to come: since when; 0: none
   OwnThread capturing_, writing_;
 };
 

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "rt/memory/aligned_bytes.hpp"
+#include "rt/msg/node_state.hpp"
 #include "rt/sched/port_access.hpp"
 
 namespace takt::record {
@@ -18,6 +19,11 @@ void for_each_held(const RecordedJob& record, const Each& each) {
   for (const RecordedJob::Input& input : record.inputs)
     for (const RecordedJob::Run& run : input.held)
       for (uint64_t sequence = run.first; sequence < run.first + run.count; ++sequence) each(input.edge, sequence);
+}
+
+const Restart& restart_of(const RecordedEvent& event) {
+  const auto* const snapshot = std::get_if<Snapshot>(&event.what);
+  return snapshot != nullptr ? snapshot->from : std::get<Restart>(event.what);
 }
 
 const char* to_string(Question question) {
@@ -56,6 +62,7 @@ struct Replayer::Port {
   std::map<uint64_t, std::shared_ptr<Stored>> messages;
   std::shared_ptr<Stored> newest;
   std::vector<std::shared_ptr<Stored>> spare;
+  uint64_t before = 0;  ///< the newest one that is not made again
   std::unique_ptr<PortWriter> writer;
   std::vector<std::byte> packed;
 };
@@ -126,6 +133,7 @@ Replayer::Replayer(const Plan& plan, LogFile& log, const Options& options)
     for (const size_t port : task.ports) ports_[port].writer = std::make_unique<PortWriter>(*this, port);
     attach_writers(t);
   }
+  begin_tasks();
   note_restarts();
   select_jobs();
   count_uses();
@@ -162,11 +170,42 @@ bool Replayer::fits(const RecordedJob& job) const {
          job.level >= 0 && static_cast<size_t>(job.level) < task.node->levels().size();
 }
 
+void Replayer::begin_tasks() {
+  std::vector<char> runs;
+  for (size_t t = 0; t < plan_.tasks.size(); ++t) runs.push_back(this->runs(t) ? 1 : 0);
+  beginnings_ = beginnings(plan_, log_, runs, options_.begin_ns);
+  for (size_t t = 0; t < runs.size(); ++t) {
+    if (runs[t] == 0) continue;
+    const Beginning& mine = beginnings_[t];
+    const bool afresh = mine.in_the_middle || (mine.snapshot != nullptr && std::get<Snapshot>(mine.snapshot->what).state == 0);
+    if (afresh && counts(t) && result_.begun_afresh++ == 0)
+      result_.stateless = plan_.tasks[t].name + (mine.in_the_middle ? ": the record has no snapshot of it"
+                                                                   : ": its type does not say what it remembers");
+    if (mine.snapshot == nullptr) continue;
+    result_.begun += counts(t);
+    for (const Restart::Output& output : std::get<Snapshot>(mine.snapshot->what).from.outputs)
+      if (output.output < plan_.tasks[t].ports.size()) ports_[plan_.tasks[t].ports[output.output]].before = output.newest;
+  }
+}
+
+bool Replayer::is_state(size_t task, size_t output) const {
+  return plan_.tasks[task].node->outputs()[output] == plan_.tasks[task].node->state();
+}
+
+/// What a task goes through before a job. Snapshots: that where it begins, and those with which it could go on after
+/// jobs that could not be run.
+bool Replayer::applies(const RecordedEvent& event) const {
+  if (event.task >= plan_.tasks.size() || !runs(event.task) || event.at_ns < beginnings_[event.task].at_ns())
+    return false;
+  const auto* const snapshot = std::get_if<Snapshot>(&event.what);
+  return snapshot != nullptr ? &event == beginnings_[event.task].snapshot || snapshot->state > 0
+                             : std::holds_alternative<Restart>(event.what);
+}
+
 void Replayer::note_restarts() {
   restarts_.resize(plan_.tasks.size());
   for (const RecordedEvent& event : log_.events())
-    if (std::holds_alternative<Restart>(event.what) && event.task < plan_.tasks.size() && runs(event.task))
-      restarts_[event.task].events.push_back(&event);
+    if (applies(event)) restarts_[event.task].events.push_back(&event);
   for (Restarts& of_task : restarts_)
     std::stable_sort(of_task.events.begin(), of_task.events.end(),
                      [](const RecordedEvent* a, const RecordedEvent* b) { return a->at_ns < b->at_ns; });
@@ -175,7 +214,8 @@ void Replayer::note_restarts() {
 /// The first one after the job began.
 const Restart* Replayer::next_restart(const RecordedJob& job) const {
   for (const RecordedEvent* event : restarts_[job.task].events)
-    if (event->at_ns > job.start_ns) return &std::get<Restart>(event->what);
+    if (event->at_ns > job.start_ns && std::holds_alternative<Restart>(event->what))
+      return &std::get<Restart>(event->what);
   return nullptr;
 }
 
@@ -196,7 +236,7 @@ void Replayer::keep_committed(const RecordedJob& job) {
 void Replayer::select_jobs() {
   for (const RecordedJob& job : log_.jobs()) {
     if (!fits(job)) result_.lacking += job.task >= plan_.tasks.size() || counts(job.task);
-    else if (!runs(job.task)) continue;
+    else if (!runs(job.task) || job.index < beginnings_[job.task].job() || job.release_ns >= options_.end_ns) continue;
     else if (job.cut_off) keep_committed(job);
     else order_.push_back(&job);
   }
@@ -205,10 +245,13 @@ void Replayer::select_jobs() {
   });
 }
 
+/// A node that is told what it remembered needs no more.
 template <class Each>
-void Replayer::for_each_handed_over(const RecordedEvent& restart, const Each& each) const {
-  const std::vector<size_t>& ports = plan_.tasks[restart.task].ports;
-  for (const Restart::Output& output : std::get<Restart>(restart.what).outputs)
+void Replayer::for_each_handed_over(const RecordedEvent& event, const Each& each) const {
+  const auto* const snapshot = std::get_if<Snapshot>(&event.what);
+  if (snapshot != nullptr && (snapshot->state > 0 || &event != beginnings_[event.task].snapshot)) return;
+  const std::vector<size_t>& ports = plan_.tasks[event.task].ports;
+  for (const Restart::Output& output : restart_of(event).outputs)
     if (output.output < ports.size() && output.handed_over > 0) each(output.output, output.handed_over);
 }
 
@@ -225,7 +268,8 @@ void Replayer::count_uses() {
     });
     const std::vector<size_t>& ports = plan_.tasks[job.task].ports;
     for (const RecordedJob::Output& output : job.outputs)
-      if (output.output < ports.size()) ports_[ports[output.output]].remade.insert(output.sequence);
+      if (output.output < ports.size() && !is_state(job.task, output.output))
+        ports_[ports[output.output]].remade.insert(output.sequence);
   }
 }
 
@@ -247,13 +291,33 @@ ReplayResult Replayer::run(const std::function<bool()>& stop) {
 /// What the task went through between its last job and this one.
 void Replayer::restart_before(const RecordedJob& job) {
   Restarts& mine = restarts_[job.task];
-  for (; mine.done < mine.events.size() && mine.events[mine.done]->at_ns <= job.start_ns; ++mine.done)
-    mine.failed = !restart(*mine.events[mine.done]);
+  for (; mine.done < mine.events.size() && mine.events[mine.done]->at_ns <= job.start_ns; ++mine.done) {
+    const RecordedEvent& event = *mine.events[mine.done];
+    if (std::holds_alternative<Restart>(event.what)) mine.failed = !restart(event);
+    else if (mine.failed || &event == beginnings_[job.task].snapshot) mine.failed = !begin_at(event);
+  }
+}
+
+/// Of a node that runs for the first time, or has gone astray.
+bool Replayer::begin_at(const RecordedEvent& event) {
+  const auto& [from, state] = std::get<Snapshot>(event.what);
+  if (!restart(event)) return false;
+  if (state == 0) return true;
+  Node& node = *plan_.tasks[event.task].node;
+  Port& port = ports_[plan_.tasks[event.task].ports.back()];
+  const Stored* const message = node.state() != nullptr ? stored(plan_.tasks[event.task].ports.back(), state) : nullptr;
+  const auto loaded = message == nullptr ? tl::unexpected(std::string("the record lacks it"))
+                                         : node.load_state(*static_cast<const NodeState*>(message->message()));
+  port.messages.erase(state);
+  if (loaded || &event != beginnings_[event.task].snapshot) return loaded.has_value();
+  if (counts(event.task) && result_.begun_afresh++ == 0)
+    result_.stateless = plan_.tasks[event.task].name + ": what it remembered cannot be loaded: " + loaded.error();
+  return restart(event);  // half loaded is worse
 }
 
 bool Replayer::restart(const RecordedEvent& event) {
   const TaskPlan& task = plan_.tasks[event.task];
-  const Restart& restart = std::get<Restart>(event.what);
+  const Restart& restart = restart_of(event);
   bool whole = options_.renew != nullptr;
   if (whole) {
     options_.renew(event.task);
@@ -271,7 +335,7 @@ bool Replayer::restart(const RecordedEvent& event) {
   if (whole) {
     clock_.advance_to(event.at_ns);
     task.node->start(options_.epoch_ns);
-    result_.restarts += counts(event.task);
+    result_.restarts += counts(event.task) && std::holds_alternative<Restart>(event.what);
   }
   for (OutputPort* output : task.node->outputs()) PortAccess::hand_over(*output, nullptr);
   for_each_handed_over(event, [&](uint16_t output, uint64_t sequence) { use(task.ports[output], sequence); });
@@ -283,10 +347,10 @@ bool Replayer::restart(const RecordedEvent& event) {
 /// Of the nodes that run: what a job lost in the record made, and cannot be made again.
 void Replayer::count_unmade() {
   for (size_t t = 0; t < plan_.tasks.size(); ++t) {
-    if (!runs(t) || !counts(t)) continue;
+    if (!runs(t) || !counts(t) || options_.end_ns != INT64_MAX) continue;
     for (const size_t port : plan_.tasks[t].ports)
       for (const auto& [sequence, known] : log_.messages(ports_[port].channel))
-        result_.unmade += !known.whole && !ports_[port].remade.contains(sequence);
+        result_.unmade += !known.whole && sequence > ports_[port].before && !ports_[port].remade.contains(sequence);
   }
 }
 
@@ -309,6 +373,10 @@ void Replayer::run_job(const RecordedJob& record) {
     settle(record);
   } else {
     result_.lacking += counts(record.task);
+    const Restarts& mine = restarts_[record.task];
+    const bool goes_on = std::any_of(mine.events.begin() + static_cast<ptrdiff_t>(mine.done), mine.events.end(),
+                                     [](const RecordedEvent* e) { return std::holds_alternative<Snapshot>(e->what); });
+    if (goes_on) restarts_[record.task].failed = true;  // what it would make now is nobody's
     // It makes nothing; the record may have it.
     for (const RecordedJob::Output& output : record.outputs)
       if (output.output < task.ports.size()) ports_[task.ports[output.output]].remade.erase(output.sequence);
@@ -393,6 +461,7 @@ void Replayer::settle(const RecordedJob& record) {
   if (const std::string strange = answers_->strange(); !strange.empty()) tell(record, kNone, strange);
   const TaskPlan& task = plan_.tasks[record.task];
   for (size_t i = 0; i < task.ports.size(); ++i) {
+    if (is_state(record.task, i)) continue;  // its padding may hold anything
     const auto told = std::find_if(record.outputs.begin(), record.outputs.end(),
                                    [&](const RecordedJob::Output& output) { return output.output == i; });
     settle_output(record, told == record.outputs.end() ? nullptr : &*told, i);
@@ -412,7 +481,7 @@ void Replayer::settle_output(const RecordedJob& record, const RecordedJob::Outpu
       record.cut_off || (record.late && (task.on_miss == OnMiss::skip || task.on_miss == OnMiss::reuse_last));
   if (told != nullptr && told->repeated) {
     made = port.newest;
-    if (made == nullptr) return;
+    if (made == nullptr) return static_cast<void>(ports_[p].remade.erase(told->sequence));  // the record has it
   } else if (told == nullptr) {
     if (sent && !withheld) tell(record, p, "was sent; in the record nothing is");
     return;

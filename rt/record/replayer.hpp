@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "rt/record/beginnings.hpp"
 #include "rt/record/log_file.hpp"
 #include "rt/sched/plan.hpp"
 #include "rt/time/clock.hpp"
@@ -31,6 +32,9 @@ struct ReplayResult {
   uint64_t lacking = 0;             ///< jobs without all that they were given: lost or damaged in the record; not run
   uint64_t restarts = 0;            ///< of tasks, done again
   uint64_t uncommitted = 0;         ///< jobs whose process died before anything of them came out; not run
+  uint64_t begun = 0;   ///< tasks that went on from a snapshot
+  uint64_t begun_afresh = 0;  ///< of tasks in the middle of the run: without what their nodes remember
+  std::string stateless;      ///< one of those, and why
   uint64_t unmade = 0;              ///< messages recorded by their hash only that no recorded job made: not compared
   std::optional<Divergence> first;  ///< of the differences
   std::map<std::string, uint64_t> different_of;  ///< by node
@@ -52,6 +56,10 @@ class Replayer {
     /// By task: counts and differences are of these; empty: of all that run.
     std::vector<char> told = {};
     int64_t from_ns = INT64_MIN;  ///< differences of earlier jobs are not told; they run, for what they leave behind
+    /// Jobs from here on are run, and those before them that it takes, from the last snapshots on. In a record that
+    /// lacks its first jobs nothing before its first snapshots is.
+    int64_t begin_ns = INT64_MIN;
+    int64_t end_ns = INT64_MAX;  ///< released until then
     /// Called before each job with its planned release: where a replay at the recorded pace waits. May be empty.
     std::function<void(int64_t)> pace = {};
     int64_t epoch_ns = 0;  ///< of the run: what Node::start() of a restarted node is given
@@ -79,15 +87,19 @@ class Replayer {
   /// False if a damaged record names what the plan does not have.
   bool fits(const RecordedJob& job) const;
   void note_restarts();
+  void begin_tasks();
+  bool begin_at(const RecordedEvent& snapshot);
+  bool applies(const RecordedEvent& event) const;
   void select_jobs();
   void count_uses();
   template <class Each>
-  void for_each_handed_over(const RecordedEvent& restart, const Each& each) const;
+  void for_each_handed_over(const RecordedEvent& event, const Each& each) const;
   const Restart* next_restart(const RecordedJob& job) const;
   void keep_committed(const RecordedJob& job);
   void attach_writers(size_t task);
   void restart_before(const RecordedJob& job);
-  bool restart(const RecordedEvent& restart);
+  bool restart(const RecordedEvent& event);
+  bool is_state(size_t task, size_t output) const;
   void use(size_t port, uint64_t sequence);
   void count_unmade();
   void run_job(const RecordedJob& record);
@@ -115,6 +127,7 @@ class Replayer {
     bool failed = false;  ///< the last one: no job can be run until the next
   };
   std::vector<Restarts> restarts_;
+  std::vector<Beginning> beginnings_;  ///< by task
   std::vector<const RecordedJob*> order_;
   std::deque<RecordedJob> committed_;  ///< of those that were cut off: with what came out
   ReplayResult result_;

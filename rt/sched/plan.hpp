@@ -85,6 +85,7 @@ struct TaskPlan {
   std::vector<std::vector<size_t>> joins;  ///< groups of indexes into Node::inputs()
   std::vector<size_t> ports;               ///< per output of the node: index into Plan::ports
   Disturbance* disturbance = nullptr;      ///< null: none
+  int64_t state_every_ns = 0;              ///< its last output, `state`, has one message in so much time; 0: none
 };
 
 /// A mode that the run can change to: the tasks it leaves out are paused and keep what they have reserved.

@@ -162,6 +162,7 @@ TAKT_HOT int64_t Task::begin(uint64_t index, int64_t release_ns, int64_t duratio
   const CpuBudget cpu{plan_.budget_ns, last_thread_use_ns(), modelled_ ? nullptr : &thread_cpu_ns};
   Job job(clock_, index, release_ns, release_ns + plan_.deadline_ns, ended_.level, mode.name, cpu);
   work(job, release_ns);
+  if (plan_.state_every_ns > 0) save_state();
   if (job.result_notice()) tell_notice(job);
   ended_.ran = true;
   ended_.end.end_of_data = job.ended();
@@ -227,6 +228,11 @@ TAKT_HOT void Task::work(Job& job, int64_t release_ns) {
     job.no_result();
   }
   if (watch_ != nullptr) watch_->end();
+}
+
+/// In the job, so that what it costs is seen and proven with it.
+TAKT_HOT void Task::save_state() {
+  if (state_is_due()) plan_.node->save_state(ended_.release_ns);
 }
 
 Fault Task::fault_now(Fault::Kind kind, uint64_t job) const {

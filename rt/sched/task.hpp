@@ -100,6 +100,9 @@ class Task {
   /// What a commit is of: the messages that the job made, or the former ones again.
   enum class Offer : uint8_t { made, former };
   CommitRing::Filled commit(const CommitRing::Terms& terms, Offer offer);
+  /// Saves what the node remembers, if the time has come for it.
+  void save_state();
+  bool state_is_due() const { return ended_.release_ns / plan_.state_every_ns != state_slot_; }
   /// False, and told, if the job wrote where it should not.
   bool outputs_intact();
   void announce(size_t output, uint32_t commit, Offer offer);
@@ -138,6 +141,7 @@ class Task {
   std::vector<uint64_t> sequences_;  ///< of the newest message of each output
   std::vector<uint64_t> handed_;     ///< by output: the message that the restarted node went on from; 0: none
   bool restarted_ = false;           ///< and no job has begun since
+  int64_t state_slot_ = -1;          ///< of TaskPlan::state_every_ns: that of the last state that came out
   /// The job that run() has ended and count() not yet counted.
   struct Ended {
     bool ran = false, paused = false, new_input = false, no_result = false;

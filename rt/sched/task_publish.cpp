@@ -103,6 +103,8 @@ void Task::settle_output(size_t i, const CommitRing::Filled& out, Offer offer) {
   if (published_[i]) ++sequences_[i];
   else board_.port(plan_.ports[i]).published.store(sequences_[i], std::memory_order_relaxed);
   if (published_[i] && offer == Offer::made) sent_stamps_ns_[i] = stamp_ns;
+  if (plan_.state_every_ns > 0 && i + 1 == writers_.size() && published_[i] && offer == Offer::made)
+    state_slot_ = ended_.release_ns / plan_.state_every_ns;
 }
 
 void Task::tell_spoiled() {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <span>
 #include <utility>
 
 #include "rt/node.hpp"
@@ -39,6 +40,17 @@ class Follower {
       reader_->release(held);
     }
     return gone;
+  }
+  /// visit(const Held&) for the newest message, if it is one that take() came to.
+  template <class Visit>
+  void again(const Visit& visit) {
+    Candidate newest;
+    if (seen_ == 0 || reader_->list(std::numeric_limits<int64_t>::max(), std::span(&newest, 1)) == 0) return;
+    if (newest.sequence > seen_) return;
+    if (Held held = reader_->take(newest.sequence)) {
+      visit(std::as_const(held));
+      reader_->release(held);
+    }
   }
   /// Sequence of the newest message that it came to; 0: none yet.
   uint64_t seen() const { return seen_; }

@@ -19,6 +19,7 @@ struct Chunk {
   uint64_t at = 0;  ///< of its (first) record in the file
   uint64_t uncompressed_size = 0;
   uint32_t crc = 0;
+  uint64_t first_ns = 0, last_ns = UINT64_MAX;  ///< instants of its messages, as its writer says
   std::string compression;
   bool loose = false;  ///< messages outside chunks
   Bytes stored;
@@ -37,7 +38,8 @@ struct Chunk {
 class Reader {
  public:
   /// Error: the file cannot be opened, or is none of this format. A file that lacks its end is no error.
-  static tl::expected<Reader, std::string> open(const std::filesystem::path& file);
+  /// `all`: also whether the CRC of the whole file fits, which takes as long as reading it; chunks have their own.
+  static tl::expected<Reader, std::string> open(const std::filesystem::path& file, bool all = true);
   Reader(Reader&& other) noexcept;
   Reader& operator=(Reader&&) = delete;
   ~Reader();
@@ -73,7 +75,7 @@ class Reader {
   tl::expected<void, std::string> for_each(const std::function<bool(const Message&)>& each) const;
 
  private:
-  explicit Reader(Bytes file) : file_(file) {}
+  Reader(Bytes file, bool all) : file_(file), all_(all) {}
   void scan();
   void take(Op op, Bytes fields, uint64_t at);
   void take_definition(Op op, Bytes fields);
@@ -85,6 +87,7 @@ class Reader {
   std::string check_end(uint64_t data_end_at, uint64_t summary_at);
 
   Bytes file_;
+  const bool all_;
   std::string profile_, written_by_, missing_;
   std::vector<Schema> schemas_;
   std::vector<Channel> channels_;
