@@ -201,6 +201,7 @@ Json Server::top() const {
           {"transport", subject_.transport.name()},
           {"running_s", epoch_ns > 0 ? static_cast<double>(std::max<int64_t>(0, now_ns() - epoch_ns)) / 1e9 : 0.0},
           {"parameters", parameters_json(subject_.registry.nodes, subject_.graph, subject_.plan, subject_.board)},
+          {"frozen", subject_.frozen ? subject_.frozen() : std::vector<std::string>{}},
           {"nodes", nodes}};
 }
 

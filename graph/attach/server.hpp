@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <functional>
 #include <list>
 #include <memory>
 #include <mutex>
@@ -26,11 +27,13 @@ struct Subject {
   RunBoard& board;
   Transport& transport;
   pid_t run = getpid();  ///< the process that stands for the run
+  /// What froze the ring of the run, a sentence each. Any thread.
+  std::function<std::vector<std::string>()> frozen = {};
 };
 
-/// Answers top, echo, get, set, forget, fault, mark, mode and stop for one run, from threads of the default policy that only
-/// read the board, hold one message of an output at a time, and post parameters to be taken between jobs. Its own user
-/// and root are heard; of the service its group, too, where the mode of its folder says so.
+/// Answers top, echo, get, set, forget, fault, mark, mode and stop for one run, from threads of the default policy that
+/// only read the board, hold one message of an output at a time, and post parameters to be taken between jobs. Its own
+/// user and root are heard; of the service its group, too, where the mode of its folder says so.
 class Server {
  public:
   explicit Server(const Subject& subject);

@@ -24,12 +24,16 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr auto kRefresh = std::chrono::milliseconds(500);
+constexpr size_t kFrozenShown = 3;
 
 /// Throws Json::exception for an answer that is none, as a run of another version may give.
 std::string top_text(const Json& top) {
   std::string text = fmt::format("{} ({} profile, {} transport), running {:.0f} s\n",
                                  top.at("graph").get<std::string>(), top.at("profile").get<std::string>(),
                                  top.at("transport").get<std::string>(), top.at("running_s").get<double>());
+  const Json frozen = top.value("frozen", Json::array());
+  for (size_t i = frozen.size() - std::min<size_t>(frozen.size(), kFrozenShown); i < frozen.size(); ++i)
+    text += "frozen: " + frozen[i].get<std::string>() + "\n";
   for (const Json& parameter : top.value("parameters", Json::array())) text += attach::parameter_text(parameter) + "\n";
   text += fmt::format("{:<18} {:>5} {:>10} {:>7} {:>7} {:>7} {:>8} {:>8}\n", "node", "Hz", "completed", "missed",
                       "skipped", "paused", "CPU ms", "resp ms");

@@ -7,6 +7,7 @@
 #include "graph/check/check.hpp"
 #include "graph/check/grantable.hpp"
 #include "graph/compose/spares.hpp"
+#include "graph/flight/places.hpp"
 #include "graph/run/prepare.hpp"
 #include "graph/run/support.hpp"
 #include "hal/device_types.hpp"
@@ -35,6 +36,12 @@ int check_graph(const Registry& registry, const RunOptions& options, bool json) 
         graph::takeover_room(prepared.composition->plan, partition, this_machine().overheads.deadline_bandwidth);
     result.text += graph::spares_text(partition, spares, room);
     result.json["spares"] = graph::spares_json(partition, spares, room);
+  }
+  if (prepared.graph->record.recorded) {
+    const graph::RecordSpec& ring = prepared.graph->record;
+    const std::filesystem::path folder = options.output.parent_path().empty() ? "." : options.output.parent_path();
+    result.text += flight::ring_text(ring, prepared.composition->plan, folder);
+    result.json["ring"] = flight::ring_json(ring, prepared.composition->plan, folder);
   }
   std::fputs(json ? (result.json.dump(2) + "\n").c_str() : result.text.c_str(), stdout);
   if (result.verdict == graph::Verdict::invalid) return kBadInput;

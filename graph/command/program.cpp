@@ -53,12 +53,14 @@ int run(int argc, char** argv, const std::function<void(Registry&)>& fill, const
   AttachOptions attach;
   DoctorOptions doctor;
   ReplayOptions replay;
+  BisectOptions bisect;
   LogOptions log;
   NewOptions project;
   add_graph_commands(app, plugins, graph, exit_code);
   add_attach_commands(app, plugins, attach, exit_code);
   add_doctor(app, doctor, exit_code);
   add_replay(app, plugins, replay, exit_code);
+  add_bisect(app, plugins, bisect, exit_code);
   add_log(app, registry, log, exit_code);
   add_new(app, project, exit_code);
   const auto options_of_more = more ? more(app, exit_code) : nullptr;

@@ -1,28 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <CLI/CLI.hpp>
-#include <cstdint>
-#include <filesystem>
-#include <optional>
 #include <string>
-#include <vector>
 
 #include "graph/plugins/plugins.hpp"
+#include "graph/rewind/recorded_run.hpp"
 
 namespace takt::command {
 
-struct ReplayOptions {
-  std::filesystem::path log;
-  std::filesystem::path graph;   ///< empty: that of the record
-  std::filesystem::path params;  ///< parameter file; empty: that of the record
-  std::filesystem::path output = "out";
-  bool compare = false, recorded_pace = false, allow_damage = false;
-  std::string isolate = "none";   ///< none | subsystem: a process for each, as in a run
-  std::vector<std::string> live;  ///< nodes that run; empty: all. What the others made comes from the record
-  std::vector<std::string> set;   ///< "node.param=value", after those of the record
-  std::vector<std::filesystem::path> plugin_files;  ///< beside those that the graph names
-  double from_s = 0;                                ///< since the epoch of the run
-  std::optional<double> until_s = {};               ///< likewise
+struct ReplayOptions : rewind::ReplayOptions {
+  bool inspect = false;
+  std::string until_condition;  ///< of --break
 };
 
 /// `takt replay LOG [GRAPH]`: runs every job of a record again, with the inputs and answers that it had. Exit 1 if
@@ -30,6 +18,17 @@ struct ReplayOptions {
 /// the record lacks what a job was given or is damaged or cut off (unless `allow_damage`); 2 if
 /// the record, its graph or a file that the graph names cannot be used.
 int replay(plugin::Plugins& plugins, const ReplayOptions& options);
+
+struct BisectOptions : rewind::ReplayOptions {
+  std::string condition;
+  bool json = false;
+};
+
+/// `takt bisect RECORD CONDITION`: the first job from which on it does not hold, in few replays. Exit 0: found; 1: it
+/// holds to the end; 2 as above.
+int bisect(plugin::Plugins& plugins, const BisectOptions& options);
+
+void add_bisect(CLI::App& app, plugin::Plugins& plugins, BisectOptions& options, int& exit_code);
 
 void add_replay(CLI::App& app, plugin::Plugins& plugins, ReplayOptions& options, int& exit_code);
 

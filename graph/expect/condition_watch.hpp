@@ -14,6 +14,8 @@ class ConditionWatch {
   explicit ConditionWatch(const ConditionSpec& spec);
   const ConditionSpec& spec() const { return spec_; }
 
+  /// Whether a value is as the test of the condition says.
+  static bool passes(const ConditionSpec& spec, const FieldValue& value);
   /// What it is about was so then: of one message, or in the world. Nothing: it had no value.
   void see(const std::optional<FieldValue>& value, int64_t at_ns);
 
@@ -30,13 +32,13 @@ class ConditionWatch {
   bool must_come_true() const;
   /// At the end of the run.
   Finding finding() const;
+  /// "obstacle_stop.stop reasons"; "at least 1 m/s".
+  std::string what() const;
+  std::string test_text() const;
 
  private:
   bool counts(int64_t at_ns) const { return at_ns >= spec_.from_ns && (!spec_.to_ns || at_ns < *spec_.to_ns); }
-  static bool passes(const ConditionSpec& spec, const FieldValue& value);
   bool met() const;
-  std::string what() const;
-  std::string test_text() const;
   std::string expected() const;
   std::string observed() const;
 

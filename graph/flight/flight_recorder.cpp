@@ -17,6 +17,9 @@ namespace fs = std::filesystem;
 /// A second's worth of what is small.
 constexpr size_t kQueueBytes = 8 << 20, kImageQueueBytes = 64 << 20;
 constexpr size_t kChunkBytes = 256 << 10;
+constexpr size_t kSentences = 20;
+/// Until a window is written, and for the snapshots before it.
+constexpr int64_t kWait_ns = 10'000'000'000;
 
 /// "ace-20261129-184012-4711": runs sort by their start.
 std::string name_of_run(const std::string& graph) {
@@ -45,12 +48,12 @@ FlightRecorder::FlightRecorder(const graph::GraphSpec& graph, const Plan& plan, 
   }
   disk_ = std::move(*disk);
   doubts_ = flight::doubts(spec, places_, options_.folder);
-  if (places_.in_memory() && spec.memory_bytes > 0) {
+  if (const int64_t memory_bytes = memory_to_use(spec); places_.in_memory() && memory_bytes > 0) {
     in_memory_ = memory_place(name);
     for (const fs::path& cleared : clear_memory())
       if (options_.say)
         options_.say(fmt::format("removed what a run that was killed left in memory: {}", cleared.string()));
-    limits.bytes = static_cast<uint64_t>(spec.memory_bytes);
+    limits.bytes = static_cast<uint64_t>(memory_bytes);
     limits.split_ns = 1'000'000'000;
     limits.durable = false;
     auto memory = record::Ring::open(in_memory_, name, limits);
@@ -64,11 +67,17 @@ FlightRecorder::FlightRecorder(const graph::GraphSpec& graph, const Plan& plan, 
   freezing.name = name;
   freezing.before_ns = spec.before_ns;
   freezing.after_ns = spec.after_ns;
+  freezing.most_bytes = static_cast<uint64_t>(spec.frozen_bytes);
   freezing.snapshot_every_ns = spec.state_every_ns();
   for (const TaskPlan& task : plan.tasks) {
     auto& edges = freezing.edges.emplace_back();
-    for (const EdgePlan& edge : task.edges) edges.push_back(plan.ports[edge.port].node + "." + plan.ports[edge.port].port);
+    for (const EdgePlan& edge : task.edges)
+      edges.push_back(plan.ports[edge.port].node + "." + plan.ports[edge.port].port);
   }
+  evidence_ = std::make_unique<Evidence>(graph, plan, board, spec.before_ns + spec.after_ns + kWait_ns);
+  freezing.say = [this](const Cause& cause, int64_t from_ns, int64_t to_ns) {
+    return evidence_->say(cause, from_ns, to_ns);
+  };
   freezing.told = [this](const Frozen& frozen) { tell(frozen); };
   freezer_ = std::make_unique<Freezer>(*disk_, memory_.get(), std::move(freezing));
   const auto note = [this](const std::optional<Cause>& cause) {
@@ -98,6 +107,7 @@ FlightRecorder::~FlightRecorder() { finish({}, 0); }
 
 void FlightRecorder::take(int32_t ring, const trace::Event& event) {
   if (recorder_) recorder_->take(ring, event);
+  if (evidence_) evidence_->note(ring, event);
   look_for_outages();
 }
 
@@ -131,10 +141,20 @@ void FlightRecorder::finish(const mcap::Metadata& facts, uint64_t unheard_thread
   if (!in_memory_.empty()) fs::remove_all(in_memory_, error);
 }
 
-void FlightRecorder::tell(const Frozen& frozen) const {
+std::vector<std::string> FlightRecorder::sentences() const {
+  const std::lock_guard lock(mutex_);
+  return sentences_;
+}
+
+void FlightRecorder::tell(const Frozen& frozen) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (sentences_.size() == kSentences) sentences_.erase(sentences_.begin());
+    sentences_.push_back(frozen.file.empty() ? fmt::format("not: {}", frozen.refused) : frozen.sentence);
+  }
   if (!options_.say) return;
   if (frozen.file.empty()) options_.say(fmt::format("not frozen ({}): {}", frozen.cause.what, frozen.refused));
-  else options_.say(fmt::format("frozen: {} ({})", frozen.file.string(), frozen.cause.what));
+  else options_.say(fmt::format("frozen: {} ({})", frozen.file.string(), frozen.sentence));
 }
 
 nlohmann::ordered_json FlightRecorder::told() const {
@@ -143,6 +163,7 @@ nlohmann::ordered_json FlightRecorder::told() const {
     frozen.push_back({{"kind", one.cause.kind},
                       {"subject", one.cause.subject},
                       {"what", one.cause.what},
+                      {"sentence", one.sentence},
                       {"at_s", static_cast<double>(one.cause.at_ns - board_.epoch_ns()) / 1e9},
                       {"more", one.more},
                       {"file", one.file.filename().string()},

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
@@ -48,26 +49,31 @@ class FlightRecorder {
   void capture();
   void take_rest();
   void finish(const mcap::Metadata& facts, uint64_t unheard_threads);
+  /// Of all that was frozen so far. Any thread.
+  std::vector<std::string> sentences() const;
   /// For the report's key `flight`.
   nlohmann::ordered_json told() const;
 
  private:
   void look_for_outages();
-  void tell(const Frozen& frozen) const;
+  void tell(const Frozen& frozen);
 
   const Options options_;
   const RunBoard& board_;
-  const Triggers triggers_;
+  Triggers triggers_;
   Places places_;
   std::string lacks_;
   std::vector<std::string> doubts_;
   std::filesystem::path in_memory_;
   std::optional<WriterLock> memory_lock_;
   std::unique_ptr<record::Ring> disk_, memory_;
+  std::unique_ptr<Evidence> evidence_;
   std::unique_ptr<Freezer> freezer_;
   std::unique_ptr<record::Recorder> recorder_, images_;
   record::RecordResult kept_, kept_images_;
   std::vector<Frozen> frozen_;
+  mutable std::mutex mutex_;
+  std::vector<std::string> sentences_;  ///< the newest ones
   size_t outages_seen_ = 0;
 };
 

@@ -148,18 +148,25 @@ void Freezer::write(Frozen& frozen) {
   how.from_ns = from_ns - (options_.snapshot_every_ns > 0 ? options_.snapshot_every_ns + kSlowest_ns : 0);
   how.to_ns = to_ns;
   how.edges = options_.edges;
+  const Said said = options_.say ? options_.say(frozen.cause, how.from_ns, to_ns) : Said{frozen.cause.what, {}, {}};
+  frozen.sentence = said.sentence;
+  const auto attach = [&](const char* name, const std::string& text) {
+    if (!text.empty()) how.attachments.push_back({0, 0, name, "application/json", mcap::bytes_of(text)});
+  };
+  attach("trace.json", said.trace);
+  attach("report.json", said.report);
   how.metadata.push_back({"takt frozen",
                           {{"kind", frozen.cause.kind},
                            {"subject", frozen.cause.subject},
                            {"what", frozen.cause.what},
+                           {"sentence", said.sentence},
                            {"at_ns", std::to_string(frozen.cause.at_ns)},
                            {"from_ns", std::to_string(from_ns)},
                            {"to_ns", std::to_string(to_ns)}}});
   const std::vector<fs::path> files = files_for(how.from_ns, to_ns);
   how.older = files_for(how.from_ns - kStandsFor_ns, to_ns);
-  std::erase_if(how.older, [&](const fs::path& older) {
-    return std::find(files.begin(), files.end(), older) != files.end();
-  });
+  std::erase_if(how.older,
+                [&](const fs::path& older) { return std::find(files.begin(), files.end(), older) != files.end(); });
   const auto joined = record::join(files, *sink, how);
   std::error_code error;
   if (joined) fs::rename(part, file, error);

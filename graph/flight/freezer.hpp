@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "graph/flight/evidence.hpp"
 #include "graph/flight/triggers.hpp"
 #include "hal/settings/json.hpp"
 #include "rt/own_thread.hpp"
@@ -22,6 +23,7 @@ struct Frozen {
   uint64_t more = 0;                 ///< of its kind and subject, within its window
   std::filesystem::path file;        ///< empty: nothing was written
   std::string refused;               ///< why not
+  std::string sentence;              ///< as Said has it
   std::vector<std::string> damages;  ///< of the ring: what of it could not be read
   uint64_t bytes = 0;
 };
@@ -38,6 +40,7 @@ class Freezer {
     std::vector<std::vector<std::string>> edges;  ///< as of record::JoinOptions
     uint64_t most_bytes = 2'000'000'000;  ///< of all files of the folder, those of earlier runs, too; the oldest go
     size_t at_least = 20;                 ///< ... but the newest so many stay, whatever they take
+    std::function<Said(const Cause&, int64_t from_ns, int64_t to_ns)> say = {};  ///< on the freezer's thread
     std::function<void(const Frozen&)> told = {};  ///< called once for each, on the freezer's thread
   };
   /// Both rings outlive this; `memory` may be null.

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <system_error>
 
+#include "rt/record/ring.hpp"
+
 namespace takt::flight {
 namespace {
 
@@ -59,6 +61,14 @@ Places places(const graph::RecordSpec& spec, const Plan& plan) {
   return places;
 }
 
+int64_t memory_to_use(const graph::RecordSpec& spec) {
+  std::error_code error;
+  const auto space = std::filesystem::space("/dev/shm", error);
+  const int64_t most = error ? 0 : static_cast<int64_t>(space.available / 2);
+  const int64_t used = std::min(spec.memory_bytes, most);
+  return used >= static_cast<int64_t>(record::RingLimits::kLeastBytes) ? used : 0;
+}
+
 std::vector<std::string> doubts(const graph::RecordSpec& spec, const Places& places,
                                 const std::filesystem::path& folder) {
   std::vector<std::string> doubts;
@@ -73,14 +83,41 @@ std::vector<std::string> doubts(const graph::RecordSpec& spec, const Places& pla
   };
   room(folder, spec.disk_bytes);
   if (!places.in_memory()) return doubts;
-  room("/dev/shm", spec.memory_bytes);
-  const double held_s = static_cast<double>(spec.memory_bytes) / places.memory_bytes_s;
+  const int64_t memory = memory_to_use(spec);
+  if (memory < spec.memory_bytes)
+    doubts.push_back(
+        fmt::format("record: {:.0f} MB of /dev/shm are used instead of `memory` {:.0f} MB: half of what is free",
+                    static_cast<double>(memory) / 1e6, static_cast<double>(spec.memory_bytes) / 1e6));
+  const double held_s = static_cast<double>(memory) / places.memory_bytes_s;
   if (held_s < window_s)
     doubts.push_back(
-        fmt::format("record: `memory` of {:.0f} MB may hold {:.1f} s of images and clouds ({:.1f} MB/s), less than "
+        fmt::format("record: {:.0f} MB of memory may hold {:.1f} s of images and clouds ({:.1f} MB/s), less than "
                     "`before` and `after` of {:.1f} s",
-                    static_cast<double>(spec.memory_bytes) / 1e6, held_s, places.memory_bytes_s / 1e6, window_s));
+                    static_cast<double>(memory) / 1e6, held_s, places.memory_bytes_s / 1e6, window_s));
   return doubts;
+}
+
+std::string ring_text(const graph::RecordSpec& spec, const Plan& plan, const std::filesystem::path& folder) {
+  const Places kept = places(spec, plan);
+  const auto mb = [](auto bytes) { return static_cast<double>(bytes) / 1e6; };
+  std::string text = fmt::format("ring: at most {:.0f} MB of disk, for {:.2f} MB/s of small messages beside the jobs",
+                                 mb(spec.disk_bytes), mb(kept.disk_bytes_s));
+  if (kept.in_memory())
+    text +=
+        fmt::format("; {:.0f} MB of memory, for {:.1f} MB/s of images and clouds: {:.1f} s", mb(memory_to_use(spec)),
+                    mb(kept.memory_bytes_s), static_cast<double>(memory_to_use(spec)) / kept.memory_bytes_s);
+  text += "\n";
+  for (const std::string& doubt : doubts(spec, kept, folder)) text += "note: " + doubt + "\n";
+  return text;
+}
+
+nlohmann::ordered_json ring_json(const graph::RecordSpec& spec, const Plan& plan, const std::filesystem::path& folder) {
+  const Places kept = places(spec, plan);
+  return {{"disk_mb", static_cast<double>(spec.disk_bytes) / 1e6},
+          {"disk_mb_s", kept.disk_bytes_s / 1e6},
+          {"memory_mb", static_cast<double>(memory_to_use(spec)) / 1e6},
+          {"memory_mb_s", kept.memory_bytes_s / 1e6},
+          {"doubts", doubts(spec, kept, folder)}};
 }
 
 }  // namespace takt::flight

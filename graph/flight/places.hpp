@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "graph/language/graph.hpp"
+#include "hal/settings/json.hpp"
 #include "rt/record/recorder.hpp"
 
 namespace takt::flight {
@@ -22,8 +23,15 @@ inline constexpr double kMostOnDisk = 1e6;  ///< bytes a second
 
 Places places(const graph::RecordSpec& spec, const Plan& plan);
 
+/// Of the memory asked for, what leaves others as much of /dev/shm as is free; 0: less than a ring needs.
+int64_t memory_to_use(const graph::RecordSpec& spec);
+
 /// Where these sizes do not suffice for these times, or the file systems for these sizes: a sentence each.
 std::vector<std::string> doubts(const graph::RecordSpec& spec, const Places& places,
                                 const std::filesystem::path& folder);
+
+/// What a ring of that graph takes and keeps: lines of `takt check`, and its key `ring`.
+std::string ring_text(const graph::RecordSpec& spec, const Plan& plan, const std::filesystem::path& folder);
+nlohmann::ordered_json ring_json(const graph::RecordSpec& spec, const Plan& plan, const std::filesystem::path& folder);
 
 }  // namespace takt::flight

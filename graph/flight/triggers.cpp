@@ -3,6 +3,10 @@
 
 #include <fmt/format.h>
 
+#include <utility>
+
+#include "graph/expect/condition_watch.hpp"
+
 namespace takt::flight {
 namespace {
 
@@ -15,6 +19,15 @@ Triggers::Triggers(const graph::GraphSpec& graph, const Plan& plan) : plan_(plan
     for (size_t p = 0; p < plan.ports.size(); ++p)
       if (plan.ports[p].node == chain.to.node && plan.ports[p].port == chain.to.port)
         chains_[p].push_back({chain.name, chain.max_age_ns});
+  for (const graph::ConditionSpec& spec : graph.record.freeze)
+    for (size_t p = 0; p < plan.ports.size(); ++p) {
+      if (plan.ports[p].node != spec.port.node || plan.ports[p].port != spec.port.port) continue;
+      const graph::ConditionWatch watch(spec);
+      Condition condition{spec, {}, watch.what() + " " + watch.test_text()};
+      if (spec.of == graph::ConditionSpec::Of::field)
+        condition.field = graph::find_field(*plan.ports[p].type, spec.field).value();  // read_expect.cpp looked
+      conditions_[p].push_back(std::move(condition));
+    }
 }
 
 std::optional<Cause> Triggers::of(const record::RecordedJob& job) const {
@@ -24,10 +37,25 @@ std::optional<Cause> Triggers::of(const record::RecordedJob& job) const {
   return Cause{"miss", task.name,
                fmt::format("{} missed the deadline of job {} by {:.1f} ms", task.name, job.index,
                            ms(job.finish_ns - job.deadline_ns)),
-               job.finish_ns};
+               job.finish_ns, job.index};
 }
 
-std::optional<Cause> Triggers::of(size_t port, const Held& held) const {
+std::optional<Cause> Triggers::look(Condition& condition, const Held& held) const {
+  std::optional<graph::FieldValue> value = ++condition.messages;
+  if (condition.field) value = graph::value_of(*condition.field, held.message());
+  const bool passed = value && graph::ConditionWatch::passes(condition.spec, *value);
+  if (std::exchange(condition.passed, passed) || !passed) return std::nullopt;
+  const auto* const number = std::get_if<double>(&*value);
+  return Cause{"condition", condition.spec.port.text(),
+               fmt::format("{}: {}", condition.text,
+                           number != nullptr ? fmt::format("{:g}", *number) : std::get<std::string>(*value)),
+               held.header->published_ns};
+}
+
+std::optional<Cause> Triggers::of(size_t port, const Held& held) {
+  if (const auto conditions = conditions_.find(port); conditions != conditions_.end())
+    for (Condition& condition : conditions->second)
+      if (auto cause = look(condition, held)) return cause;
   const auto chains = chains_.find(port);
   if (chains == chains_.end()) return std::nullopt;
   const int64_t age_ns = std::max(held.header->published_ns, held.visible_at_ns) - held.stamp_ns;

@@ -224,14 +224,16 @@ struct RecordSpec {
     int64_t pause_ns = 0;  ///< ... or of one in so much time
     Position position;
   };
-  bool ring = false;                    ///< runs keep one unless they are told otherwise
-  int64_t disk_bytes = 2'000'000'000;   ///< of all files of the ring, never more
-  int64_t memory_bytes = 256'000'000;   ///< of images and clouds, which are kept in memory only
-  int64_t keep_ns = 3600'000'000'000;   ///< what is older goes
+  bool ring = true;                      ///< runs in real time keep one unless they are told otherwise
+  int64_t disk_bytes = 2'000'000'000;    ///< of all files of the ring, never more
+  int64_t memory_bytes = 256'000'000;    ///< of images and clouds, which are kept in memory only
+  int64_t frozen_bytes = 2'000'000'000;  ///< of all frozen files; the oldest go, but for the newest 20
+  int64_t keep_ns = 3600'000'000'000;    ///< what is older goes
   int64_t before_ns = 5'000'000'000, after_ns = 2'000'000'000;  ///< around what freezes the ring
   int64_t snapshot_ns = 2'000'000'000;  ///< nodes say what they remember once in so much time; 0: never
   bool recorded = false;                ///< not of the file: this run is recorded, or replays what was
   std::vector<Port> ports;              ///< those that the graph has a rule for
+  std::vector<ConditionSpec> freeze;    ///< conditions on ports that freeze the ring once they pass
   Position position;
   /// 0: nodes have no output for what they remember.
   int64_t state_every_ns() const { return recorded ? snapshot_ns : 0; }
@@ -250,6 +252,7 @@ struct GraphSpec {
   std::vector<ModeSpec> modes;
   std::optional<ExpectSpec> expect;
   RecordSpec record;
+  std::vector<ConditionSpec> asked;  ///< LoadOptions::conditions
   ScheduleSpec schedule;
   KeptValues kept;
   std::vector<std::string> adjusted;  ///< what validation changed, for stderr and the report
@@ -275,6 +278,7 @@ struct LoadOptions {
   std::filesystem::path params;  ///< parameter file of this robot; empty: none
   std::filesystem::path state;   ///< folder whose overlay of the graph is read, see overlay.hpp; empty: none
   std::vector<std::filesystem::path> plugin_files = {};  ///< of --plugin
+  std::vector<std::string> conditions = {};              ///< as in `expect`, on ports: GraphSpec::asked
   std::vector<PluginFact> plugins = {};                  ///< all that were loaded for this graph, see graph/plugins
 };
 

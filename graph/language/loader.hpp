@@ -135,6 +135,9 @@ class Loader {
   // read_expect.cpp: what the run must show
   void read_expect();
   std::optional<ConditionSpec> read_condition(const nlohmann::json& value, const std::string& pointer);
+  /// Of a run that may have no world, and goes on: one on a port.
+  std::optional<ConditionSpec> read_plain_condition(const nlohmann::json& value, const std::string& pointer);
+  void read_asked();
   bool read_port_condition(ConditionSpec& condition, const nlohmann::json& value, const std::string& pointer);
   bool read_world_condition(ConditionSpec& condition, const nlohmann::json& value, const std::string& pointer);
   bool read_distance(ConditionSpec& condition, const nlohmann::json& value, const std::string& pointer);

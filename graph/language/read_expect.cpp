@@ -71,6 +71,28 @@ std::optional<ConditionSpec> Loader::read_condition(const json& value, const std
   return sound ? std::optional(std::move(condition)) : std::nullopt;
 }
 
+std::optional<ConditionSpec> Loader::read_plain_condition(const json& value, const std::string& pointer) {
+  const size_t before = problems_.size();
+  std::optional<ConditionSpec> condition;
+  if (value.is_object()) condition = read_condition(value, pointer);
+  const bool plain = condition && condition->port.node.size() > 0;
+  if (!plain && problems_.size() == before)
+    problem(graph_.value_at(pointer),
+            "this is no condition on a port, such as {port: base.odometry, field: speed_m_s, at_least: 1m/s}; keys: "
+            "port, field, messages, is, contains, at_least, at_most, holds, from, to");
+  return plain ? condition : std::nullopt;
+}
+
+void Loader::read_asked() {
+  for (const std::string& text : options_.conditions) {
+    const bool braced = text.find_first_not_of(' ') != std::string::npos && text[text.find_first_not_of(' ')] == '{';
+    Document asked = parse_document(braced ? text : "{" + text + "}", "condition", {}, problems_);
+    std::swap(graph_, asked);
+    if (auto condition = read_plain_condition(graph_.root, "")) spec_.asked.push_back(std::move(*condition));
+    std::swap(graph_, asked);
+  }
+}
+
 bool Loader::check_keys(const json& value, const std::string& pointer, std::string_view what,
                         const std::vector<std::string>& valid) {
   bool sound = true;

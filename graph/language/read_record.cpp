@@ -20,6 +20,7 @@ void Loader::read_record() {
   spec.ring = !record.contains("ring") || record["ring"] != json(false);
   read_record_size(record, "disk", 16, spec.disk_bytes);
   read_record_size(record, "memory", 0, spec.memory_bytes);
+  read_record_size(record, "frozen", 1, spec.frozen_bytes);
   const auto time = [&](std::string_view key, int64_t least_ns, int64_t& into) {
     const auto ns = read_time(graph_, record, "/record", key, "`record`");
     if (!ns) return;
@@ -34,6 +35,10 @@ void Loader::read_record() {
   time("after", 0, spec.after_ns);
   if (record.contains("snapshots") && graph_.raw("/record/snapshots") == "none") spec.snapshot_ns = 0;
   else time("snapshots", 1'000'000'000, spec.snapshot_ns);
+  const json freeze = record.value("freeze", json::array());
+  for (size_t i = 0; freeze.is_array() && i < freeze.size(); ++i)
+    if (auto condition = read_plain_condition(freeze[i], child("/record/freeze", i)))
+      spec.freeze.push_back(std::move(*condition));
   const json ports = record.value("ports", json::object());
   if (!ports.is_object()) return;
   for (const auto& [name, ignored] : ports.items()) read_record_port(name);

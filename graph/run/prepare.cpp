@@ -64,10 +64,14 @@ int prepare_check(const RunOptions& options, Prepared& prepared) {
   prepared.plugged = false;
   int code = load(options, prepared);
   if (code == kOk) {
+    // As a run would, so that what is checked is what runs.
+    RunOptions as_run = options;
+    as_run.keep_ring = keeps_ring(options, *prepared.graph);
+    prepared.graph->record.recorded = as_run.keep_ring;
     graph::ComposeOptions how;
     how.output = options.output;
     how.seed = options.seed;
-    how.observers = observers(options, *prepared.graph);
+    how.observers = observers(as_run, *prepared.graph);
     code = compose(options, how, prepared);
   }
   if (code != kOk) tell_problems(prepared.problems.size());

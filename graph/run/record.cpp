@@ -64,6 +64,11 @@ std::string absolute(const std::filesystem::path& file) {
 
 }  // namespace
 
+bool keeps_ring(const RunOptions& options, const graph::GraphSpec& graph) {
+  return options.ring == "on" ||
+         (options.ring == "auto" && options.clock != "virtual" && options.witness == nullptr && graph.record.ring);
+}
+
 Observers observers(const RunOptions& options, const graph::GraphSpec& graph) {
   const uint32_t followers = (options.record.empty() ? 0u : 1u) +
                              (options.keep_ring ? flight::FlightRecorder::kFollowers : 0u) + (graph.expect ? 1u : 0u) +
@@ -131,7 +136,8 @@ record::Head RunRecord::head_of(const graph::GraphSpec& graph, const Plan& plan,
   return head;
 }
 
-void RunRecord::begin_file(int64_t snapshot_every_ns, const Plan& plan, const RunBoard& board, Transport& transport, const record::Head& head) {
+void RunRecord::begin_file(int64_t snapshot_every_ns, const Plan& plan, const RunBoard& board, Transport& transport,
+                           const record::Head& head) {
   auto file = mcap::FileSink::open(options_.record);
   if (!file) throw std::runtime_error("--record " + file.error() + "; choose another place");
   file_.emplace(std::move(*file));

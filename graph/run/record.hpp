@@ -20,6 +20,9 @@ namespace takt::command {
 /// graph, if there are any.
 Observers observers(const RunOptions& options, const graph::GraphSpec& graph);
 
+/// Whether a run keeps a ring: as the command line says, else the graph; in virtual time only if asked to.
+bool keeps_ring(const RunOptions& options, const graph::GraphSpec& graph);
+
 /// What a run records: into a file, if one was asked for (`--record`), and into the ring, if it keeps one. Without
 /// either every call does nothing.
 class RunRecord {
@@ -51,13 +54,16 @@ class RunRecord {
   }
   /// After the last event was taken; `unheard_threads` noted none.
   void finish(const RunResult& result, uint64_t unheard_threads);
+  /// What froze the ring so far, the newest last: a sentence each.
+  std::vector<std::string> frozen() const { return flight_ ? flight_->sentences() : std::vector<std::string>{}; }
   /// Adds "record" and "recorder_lost" to the report, and "flight" of the ring.
   void tell(nlohmann::ordered_json& report) const;
 
  private:
   record::Head head_of(const graph::GraphSpec& graph, const Plan& plan, const Transport& transport,
                        const std::string& isolation);
-  void begin_file(int64_t snapshot_every_ns, const Plan& plan, const RunBoard& board, Transport& transport, const record::Head& head);
+  void begin_file(int64_t snapshot_every_ns, const Plan& plan, const RunBoard& board, Transport& transport,
+                  const record::Head& head);
 
   const Registry& registry_;
   const RunOptions& options_;

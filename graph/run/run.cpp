@@ -79,16 +79,17 @@ int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, Ru
   nlohmann::ordered_json held;
   {
     const Stoppable stoppable(board);
+    record.begin(graph, composition.plan, board, *transport, "none");
     std::optional<attach::Server> server;  // virtual time passes too fast to speak to
     if (!prepared.clock->is_virtual())
-      server.emplace(attach::Subject{prepared.registry, graph, composition.plan, board, *transport});
+      server.emplace(attach::Subject{prepared.registry, graph, composition.plan, board, *transport, getpid(),
+                                     [&record] { return record.frozen(); }});
     if (server) tell_attach(*server, adjusted);
     std::optional<LiveTable> live;
     if (options.witness == nullptr)
       live.emplace(
           composition.plan, board,
           fmt::format("takt run {} ({}, policy {})", graph.name, graph.profile, to_string(graph.schedule.policy)));
-    record.begin(graph, composition.plan, board, *transport, "none");
     if (options.witness != nullptr) options.witness->begin(composition.plan, *transport);
     trace.collect(composition.plan, record);
     watchdog.start();
@@ -190,8 +191,7 @@ int run_as_asked(const Registry& registry, RunOptions options) {
     return code;
   }
   if (options.load.state.empty()) tell_ignored_overlay(prepared.graph->name, "this run reads no kept values");
-  options.keep_ring = options.ring == "on" || (options.ring == "auto" && options.clock != "virtual" &&
-                                               options.witness == nullptr && prepared.graph->record.ring);
+  options.keep_ring = keeps_ring(options, *prepared.graph);
   prepared.graph->record.recorded = options.keep_ring || !options.record.empty();
   if (prepared.graph->expect && !options.duration_asked)
     options.duration_s = static_cast<double>(prepared.graph->expect->within_ns) * 1e-9;

@@ -69,7 +69,6 @@ class Join {
     return std::move(joined_);
   }
 
-
  private:
   std::string first_damage() const { return damages_.empty() ? "" : ": " + *damages_.begin(); }
   void note(const mcap::Writer::Done& done) {
@@ -111,6 +110,7 @@ class Join {
     const mcap::Reader& last = parts_.back().reader;
     note(writer_.metadata(Recorder::kFacts, named(last, Recorder::kFacts)));
     for (const mcap::Attachment& attachment : last.attachments()) note(writer_.attach(attachment));
+    for (const mcap::Attachment& attachment : options_.attachments) note(writer_.attach(attachment));
     std::map<std::pair<std::string, std::string>, uint16_t> schemas;
     for (const auto& [channel, schema] : channels_) {
       uint16_t id = 0;

@@ -22,7 +22,8 @@ struct JoinOptions {
   /// the files, else from `older`.
   std::vector<std::vector<std::string>> edges = {};
   std::vector<std::filesystem::path> older = {};
-  std::vector<mcap::Reader::Named> metadata = {};  ///< in addition
+  std::vector<mcap::Reader::Named> metadata = {};  ///< in addition, as
+  std::vector<mcap::Attachment> attachments = {};  ///< these
 };
 
 struct Joined {

@@ -2,13 +2,9 @@
 #include "rt/record/replayer.hpp"
 
 #include <algorithm>
-#include <cstring>
-#include <new>
-#include <set>
 #include <utility>
 
-#include "rt/memory/aligned_bytes.hpp"
-#include "rt/msg/node_state.hpp"
+#include "rt/record/replayer_parts.hpp"
 #include "rt/sched/port_access.hpp"
 
 namespace takt::record {
@@ -19,11 +15,6 @@ void for_each_held(const RecordedJob& record, const Each& each) {
   for (const RecordedJob::Input& input : record.inputs)
     for (const RecordedJob::Run& run : input.held)
       for (uint64_t sequence = run.first; sequence < run.first + run.count; ++sequence) each(input.edge, sequence);
-}
-
-const Restart& restart_of(const RecordedEvent& event) {
-  const auto* const snapshot = std::get_if<Snapshot>(&event.what);
-  return snapshot != nullptr ? snapshot->from : std::get<Restart>(event.what);
 }
 
 const char* to_string(Question question) {
@@ -37,35 +28,6 @@ const char* to_string(Question question) {
 }
 
 }  // namespace
-
-/// A message in memory of its own.
-struct Replayer::Stored {
-  explicit Stored(const PortPlan& port) : bytes(port.chunk_bytes()), memory(aligned_bytes(bytes)) { place(port); }
-  /// Empty again. What a node does not write itself is no zero by chance.
-  void place(const PortPlan& port) {
-    std::memset(memory.get(), 0xA5, bytes);
-    header = ::new (memory.get()) MessageHeader{};
-    port.type->place(memory.get() + sizeof(MessageHeader), port.capacity);
-  }
-  void* message() { return header + 1; }
-  const void* message() const { return header + 1; }
-
-  size_t bytes;
-  AlignedBytes memory;
-  MessageHeader* header = nullptr;
-};
-
-struct Replayer::Port {
-  uint16_t channel = 0;
-  std::set<uint64_t> remade;          ///< sequences that the jobs to be run published in the record
-  std::map<uint64_t, uint64_t> uses;  ///< jobs that are still to hold it, by sequence
-  std::map<uint64_t, std::shared_ptr<Stored>> messages;
-  std::shared_ptr<Stored> newest;
-  std::vector<std::shared_ptr<Stored>> spare;
-  uint64_t before = 0;  ///< the newest one that is not made again
-  std::unique_ptr<PortWriter> writer;
-  std::vector<std::byte> packed;
-};
 
 class Replayer::Answers final : public RecordedAnswers {
  public:
@@ -170,53 +132,8 @@ bool Replayer::fits(const RecordedJob& job) const {
          job.level >= 0 && static_cast<size_t>(job.level) < task.node->levels().size();
 }
 
-void Replayer::begin_tasks() {
-  std::vector<char> runs;
-  for (size_t t = 0; t < plan_.tasks.size(); ++t) runs.push_back(this->runs(t) ? 1 : 0);
-  beginnings_ = beginnings(plan_, log_, runs, options_.begin_ns);
-  for (size_t t = 0; t < runs.size(); ++t) {
-    if (runs[t] == 0) continue;
-    const Beginning& mine = beginnings_[t];
-    const bool afresh = mine.in_the_middle || (mine.snapshot != nullptr && std::get<Snapshot>(mine.snapshot->what).state == 0);
-    if (afresh && counts(t) && result_.begun_afresh++ == 0)
-      result_.stateless = plan_.tasks[t].name + (mine.in_the_middle ? ": the record has no snapshot of it"
-                                                                   : ": its type does not say what it remembers");
-    if (mine.snapshot == nullptr) continue;
-    result_.begun += counts(t);
-    for (const Restart::Output& output : std::get<Snapshot>(mine.snapshot->what).from.outputs)
-      if (output.output < plan_.tasks[t].ports.size()) ports_[plan_.tasks[t].ports[output.output]].before = output.newest;
-  }
-}
-
 bool Replayer::is_state(size_t task, size_t output) const {
   return plan_.tasks[task].node->outputs()[output] == plan_.tasks[task].node->state();
-}
-
-/// What a task goes through before a job. Snapshots: that where it begins, and those with which it could go on after
-/// jobs that could not be run.
-bool Replayer::applies(const RecordedEvent& event) const {
-  if (event.task >= plan_.tasks.size() || !runs(event.task) || event.at_ns < beginnings_[event.task].at_ns())
-    return false;
-  const auto* const snapshot = std::get_if<Snapshot>(&event.what);
-  return snapshot != nullptr ? &event == beginnings_[event.task].snapshot || snapshot->state > 0
-                             : std::holds_alternative<Restart>(event.what);
-}
-
-void Replayer::note_restarts() {
-  restarts_.resize(plan_.tasks.size());
-  for (const RecordedEvent& event : log_.events())
-    if (applies(event)) restarts_[event.task].events.push_back(&event);
-  for (Restarts& of_task : restarts_)
-    std::stable_sort(of_task.events.begin(), of_task.events.end(),
-                     [](const RecordedEvent* a, const RecordedEvent* b) { return a->at_ns < b->at_ns; });
-}
-
-/// The first one after the job began.
-const Restart* Replayer::next_restart(const RecordedJob& job) const {
-  for (const RecordedEvent* event : restarts_[job.task].events)
-    if (event->at_ns > job.start_ns && std::holds_alternative<Restart>(event->what))
-      return &std::get<Restart>(event->what);
-  return nullptr;
 }
 
 void Replayer::keep_committed(const RecordedJob& job) {
@@ -245,16 +162,6 @@ void Replayer::select_jobs() {
   });
 }
 
-/// A node that is told what it remembered needs no more.
-template <class Each>
-void Replayer::for_each_handed_over(const RecordedEvent& event, const Each& each) const {
-  const auto* const snapshot = std::get_if<Snapshot>(&event.what);
-  if (snapshot != nullptr && (snapshot->state > 0 || &event != beginnings_[event.task].snapshot)) return;
-  const std::vector<size_t>& ports = plan_.tasks[event.task].ports;
-  for (const Restart::Output& output : restart_of(event).outputs)
-    if (output.output < ports.size() && output.handed_over > 0) each(output.output, output.handed_over);
-}
-
 void Replayer::count_uses() {
   for (const Restarts& of_task : restarts_)
     for (const RecordedEvent* restart : of_task.events)
@@ -281,67 +188,11 @@ ReplayResult Replayer::run(const std::function<bool()>& stop) {
     first = std::min(first, record->release_ns);
     last = std::max(last, record->published_ns);
     restart_before(*record);
-    run_job(*record);
+    if (!run_job(*record)) break;
   }
   if (last > first) result_.recorded_ns = last - first;
   count_unmade();
   return result_;
-}
-
-/// What the task went through between its last job and this one.
-void Replayer::restart_before(const RecordedJob& job) {
-  Restarts& mine = restarts_[job.task];
-  for (; mine.done < mine.events.size() && mine.events[mine.done]->at_ns <= job.start_ns; ++mine.done) {
-    const RecordedEvent& event = *mine.events[mine.done];
-    if (std::holds_alternative<Restart>(event.what)) mine.failed = !restart(event);
-    else if (mine.failed || &event == beginnings_[job.task].snapshot) mine.failed = !begin_at(event);
-  }
-}
-
-/// Of a node that runs for the first time, or has gone astray.
-bool Replayer::begin_at(const RecordedEvent& event) {
-  const auto& [from, state] = std::get<Snapshot>(event.what);
-  if (!restart(event)) return false;
-  if (state == 0) return true;
-  Node& node = *plan_.tasks[event.task].node;
-  Port& port = ports_[plan_.tasks[event.task].ports.back()];
-  const Stored* const message = node.state() != nullptr ? stored(plan_.tasks[event.task].ports.back(), state) : nullptr;
-  const auto loaded = message == nullptr ? tl::unexpected(std::string("the record lacks it"))
-                                         : node.load_state(*static_cast<const NodeState*>(message->message()));
-  port.messages.erase(state);
-  if (loaded || &event != beginnings_[event.task].snapshot) return loaded.has_value();
-  if (counts(event.task) && result_.begun_afresh++ == 0)
-    result_.stateless = plan_.tasks[event.task].name + ": what it remembered cannot be loaded: " + loaded.error();
-  return restart(event);  // half loaded is worse
-}
-
-bool Replayer::restart(const RecordedEvent& event) {
-  const TaskPlan& task = plan_.tasks[event.task];
-  const Restart& restart = restart_of(event);
-  bool whole = options_.renew != nullptr;
-  if (whole) {
-    options_.renew(event.task);
-    attach_writers(event.task);
-  }
-  whole = whole && std::all_of(restart.params.begin(), restart.params.end(), [&](const RecordedJob::Param& kept) {
-            const auto& params = task.node->params();
-            return kept.param < params.size() && params[kept.param]->set(kept.value);
-          });
-  for_each_handed_over(event, [&](uint16_t output, uint64_t sequence) {
-    const Stored* message = stored(task.ports[output], sequence);
-    whole = whole && message != nullptr;
-    if (whole) PortAccess::hand_over(*task.node->outputs()[output], message->message());
-  });
-  if (whole) {
-    clock_.advance_to(event.at_ns);
-    task.node->start(options_.epoch_ns);
-    result_.restarts += counts(event.task) && std::holds_alternative<Restart>(event.what);
-  }
-  for (OutputPort* output : task.node->outputs()) PortAccess::hand_over(*output, nullptr);
-  for_each_handed_over(event, [&](uint16_t output, uint64_t sequence) { use(task.ports[output], sequence); });
-  for (const Restart::Seen& seen : restart.seen)
-    if (seen.edge < task.edges.size()) last_seen_[event.task][seen.edge] = seen.sequence;
-  return whole;
 }
 
 /// Of the nodes that run: what a job lost in the record made, and cannot be made again.
@@ -354,8 +205,13 @@ void Replayer::count_unmade() {
   }
 }
 
-void Replayer::run_job(const RecordedJob& record) {
+const MessageHeader* Replayer::newest(size_t port) const {
+  return ports_[port].newest != nullptr ? ports_[port].newest->header : nullptr;
+}
+
+bool Replayer::run_job(const RecordedJob& record) {
   const TaskPlan& task = plan_.tasks[record.task];
+  bool go_on = true;
   clock_.advance_to(record.start_ns);
   for (const RecordedJob::Param& changed : record.params)
     if (auto done = task.node->params()[changed.param]->set(changed.value); !done)
@@ -371,6 +227,7 @@ void Replayer::run_job(const RecordedJob& record) {
     }
     result_.jobs += counts(record.task);
     settle(record);
+    go_on = !options_.visit || options_.visit(*this, record);
   } else {
     result_.lacking += counts(record.task);
     const Restarts& mine = restarts_[record.task];
@@ -382,6 +239,7 @@ void Replayer::run_job(const RecordedJob& record) {
       if (output.output < task.ports.size()) ports_[task.ports[output.output]].remade.erase(output.sequence);
   }
   let_go(record);
+  return go_on;
 }
 
 bool Replayer::fill_inputs(const RecordedJob& record) {

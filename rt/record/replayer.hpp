@@ -32,9 +32,9 @@ struct ReplayResult {
   uint64_t lacking = 0;             ///< jobs without all that they were given: lost or damaged in the record; not run
   uint64_t restarts = 0;            ///< of tasks, done again
   uint64_t uncommitted = 0;         ///< jobs whose process died before anything of them came out; not run
-  uint64_t begun = 0;   ///< tasks that went on from a snapshot
-  uint64_t begun_afresh = 0;  ///< of tasks in the middle of the run: without what their nodes remember
-  std::string stateless;      ///< one of those, and why
+  uint64_t begun = 0;               ///< tasks that went on from a snapshot
+  uint64_t begun_afresh = 0;        ///< of tasks in the middle of the run: without what their nodes remember
+  std::string stateless;            ///< one of those, and why
   uint64_t unmade = 0;              ///< messages recorded by their hash only that no recorded job made: not compared
   std::optional<Divergence> first;  ///< of the differences
   std::map<std::string, uint64_t> different_of;  ///< by node
@@ -66,6 +66,8 @@ class Replayer {
     /// Puts a fresh node, set up as before the run, in the place that the plan has for that task. May throw. Empty:
     /// jobs of a restarted task count as lacking.
     std::function<void(size_t)> renew = {};
+    /// Called behind each job that was run, while its inputs are still there; false: the replay ends.
+    std::function<bool(const Replayer&, const RecordedJob&)> visit = {};
   };
   /// `plan` is that of the record, with nodes set up (devices: shells); both must live as long as this.
   Replayer(const Plan& plan, LogFile& log, const Options& options);
@@ -75,6 +77,8 @@ class Replayer {
 
   /// Once. Stops early if `stop` answers true.
   ReplayResult run(const std::function<bool()>& stop = {});
+  /// The newest message that a job made for that port; null: none yet. In visit().
+  const MessageHeader* newest(size_t port) const;
 
  private:
   struct Port;
@@ -102,7 +106,8 @@ class Replayer {
   bool is_state(size_t task, size_t output) const;
   void use(size_t port, uint64_t sequence);
   void count_unmade();
-  void run_job(const RecordedJob& record);
+  /// False: visit() has seen enough.
+  bool run_job(const RecordedJob& record);
   bool fill_inputs(const RecordedJob& record);
   Stored* stored(size_t port, uint64_t sequence);
   Stored* load(size_t port, uint64_t sequence);

@@ -97,7 +97,7 @@ TEST_CASE("Misses of high nodes, old chains, modes and marks are causes") {
   test::SmallGraph small;
   small.plan.tasks[1].criticality = Criticality::high;
   small.plan.modes = {{"full", {}}, {"slow", {}}};
-  const Triggers triggers(graph_with(0, 0), small.plan);
+  Triggers triggers(graph_with(0, 0), small.plan);
   record::RecordedJob job;
   job.task = 1, job.index = 81, job.late = true;
   job.deadline_ns = 5 * kSecond, job.finish_ns = 5 * kSecond + 14'200'000;
@@ -126,6 +126,38 @@ TEST_CASE("Misses of high nodes, old chains, modes and marks are causes") {
   CHECK(triggers.of(event)->kind == "mark");
   event.what = record::ParameterSet{};
   CHECK(!triggers.of(event));
+}
+
+TEST_CASE("The first message that passes a condition is a cause, and the first again after one that did not") {
+  test::SmallGraph small;
+  auto graph = graph_with(0, 0);
+  graph::ConditionSpec fast;
+  fast.of = graph::ConditionSpec::Of::field;
+  fast.port = {"base", "odometry"};
+  fast.field = "speed_m_s";
+  fast.unit = "m/s";
+  fast.bound.at_least = 2;
+  graph::ConditionSpec third;
+  third.port = {"reader", "seen"};
+  third.bound.at_least = 3;
+  graph.record.freeze = {fast, third};
+  Triggers triggers(graph, small.plan);
+  struct {
+    MessageHeader header;
+    Odometry odometry;
+  } message;
+  const auto causes = [&](size_t port, std::initializer_list<double> speeds) {
+    std::string all;
+    for (const double speed : speeds) {
+      message.odometry.speed_m_s = speed;
+      const auto cause = triggers.of(port, Held{&message.header, 1, 0, 0, 0});
+      all += cause ? "[" + cause->what + "]" : ".";
+    }
+    return all;
+  };
+  CHECK(causes(0, {1, 2.5, 3, 1, 2}) ==
+        ".[base.odometry speed_m_s at least 2 m/s: 2.5]..[base.odometry speed_m_s at least 2 m/s: 2]");
+  CHECK(causes(2, {0, 0, 0, 0}) == "..[messages of reader.seen at least 3: 3].");
 }
 
 TEST_CASE("A mark freezes the seconds around it") {

@@ -1,0 +1,312 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "graph/rewind/recorded_run.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <ctime>
+#include <sstream>
+#include <stdexcept>
+
+#include "graph/compose/partition.hpp"
+#include "graph/language/words.hpp"
+#include "graph/log/cut_log.hpp"
+#include "graph/log/recorded_plan.hpp"
+#include "graph/run/outputs.hpp"
+#include "graph/run/support.hpp"
+#include "rt/abi.hpp"
+
+namespace takt::rewind {
+namespace {
+
+using command::kOk;
+using command::Prepared;
+using command::ReplayPart;
+using command::RunOptions;
+using command::StopOnSignal;
+using command::tell_ignored_overlay;
+using command::tell_problems;
+using log::fact;
+using log::Json;
+
+Json attached_json(const record::LogFile& file, const char* name) {
+  const auto text = file.attached(name);
+  Json json = text ? Json::parse(*text, nullptr, false) : Json();
+  if (json.is_discarded() || !json.is_object()) throw Refused{fmt::format("the record holds no readable {}", name)};
+  return json;
+}
+
+/// The outputs of the devices as the record has them; everything else is made here.
+class RecordedFacts final : public graph::FactExchange {
+ public:
+  explicit RecordedFacts(const Json& plan) : plan_(plan) {}
+  void tell(size_t, const std::optional<Capacity>&) override {}
+  std::optional<Capacity> wait_for(size_t port) override { return log::capacity_of(plan_, port); }
+  void tell_source(size_t, const SourcePlan&) override {}
+  SourcePlan wait_for_source(size_t) override { return {0, 0, "it is recorded"}; }
+
+ private:
+  const Json& plan_;
+};
+
+/// A replay from an instant on looks for snapshots in so many intervals before it.
+constexpr int64_t kIntervals = 5;
+/// A job that was released before the end of a part is published until then.
+constexpr int64_t kLatest_ns = 5'000'000'000;
+
+}  // namespace
+
+/// SIMD code of another width may round differently: the target of the record, or none.
+void RecordedRun::force_simd(const VectorTargets& vectors) const {
+  const std::string recorded = fact(file_->facts(), "simd");
+  const auto names = vectors.names != nullptr ? vectors.names() : std::vector<std::string>{};
+  if (recorded.empty() || names.empty() || recorded == names.front()) return;
+  const auto found = std::find(names.begin(), names.end(), recorded);
+  if (found == names.end())
+    throw Refused{fmt::format("the record was made with the SIMD target {}, which this CPU (best: {}) does not have",
+                              recorded, names.front())};
+  vectors.leave_out(static_cast<size_t>(found - names.begin()));
+  std::fprintf(stderr, "takt: SIMD target %s as in the record, not this machine's %s\n", recorded.c_str(),
+               names.front().c_str());
+}
+
+command::RunOptions& RecordedRun::open() {
+  const bool part = options_.from_s > 0 || options_.until_s;
+  auto file = part ? record::LogFile::open_head(options_.log) : record::LogFile::open(options_.log);
+  if (!file) throw Refused{file.error()};
+  file_.emplace(std::move(*file));
+  if (part) read_part();
+  for (const std::string& damage : file_->damages())
+    std::fprintf(stderr, "takt: the record is not whole: %s\n", damage.c_str());
+  read_options();
+  return run_;
+}
+
+/// A record without an end does not say when its run began, and is read whole.
+void RecordedRun::read_part() {
+  if (fact(file_->end(), "epoch_ns").empty()) return file_->read(INT64_MIN, INT64_MAX);
+  const int64_t snapshots_ns = std::strtoll(fact(file_->facts(), "snapshots_ns").c_str(), nullptr, 10);
+  const bool begins_late = options_.from_s > 0 && snapshots_ns > 0;
+  file_->read(begins_late ? at(options_.from_s) - kIntervals * snapshots_ns : INT64_MIN,
+              options_.until_s ? at(*options_.until_s) + kLatest_ns : INT64_MAX);
+}
+
+int RecordedRun::compose(const Registry& registry) {
+  force_simd(registry.vectors);
+  check_plugins(run_.load.plugins);
+  prepared_.emplace(registry);
+  const int code = compose();
+  if (code == command::kOk) check_sameness();
+  return code;
+}
+
+int RecordedRun::outline(const Registry& registry) {
+  force_simd(registry.vectors);
+  prepared_.emplace(registry);
+  if (const int code = load(run_, *prepared_); code != command::kOk) return code;
+  take_snapshots();
+  prepared_->composition = graph::outline(*prepared_->graph, registry, *prepared_->clock);
+  return command::kOk;
+}
+
+void RecordedRun::compose_again() {
+  const Registry& registry = prepared_->registry;
+  prepared_.emplace(of_jobs(registry));
+  if (compose() != command::kOk) throw std::runtime_error("it cannot be composed again");
+}
+
+int64_t RecordedRun::epoch_ns() const { return log::epoch_ns(*file_); }
+
+void RecordedRun::read_options() {
+  const mcap::Metadata& facts = file_->facts();
+  RunOptions& run = run_;
+  run.graph = options_.graph.empty() ? std::filesystem::path(fact(facts, "graph")) : options_.graph;
+  if (!std::filesystem::exists(run.graph))
+    throw Refused{fmt::format("the graph {} of the record is not there; name it: takt replay {} GRAPH",
+                              run.graph.string(), options_.log.string())};
+  if (options_.graph.empty()) run.load.schedule = fact(facts, "schedule");
+  run.load.params = options_.params.empty() ? std::filesystem::path(fact(facts, "params")) : options_.params;
+  if (!run.load.params.empty() && !std::filesystem::exists(run.load.params))
+    throw Refused{fmt::format("the parameter file {} of the record is not there; name it: --params FILE",
+                              run.load.params.string())};
+  run.load.profile = fact(facts, "profile");
+  run.load.mode = fact(facts, "mode");
+  run.load.policy = fact(facts, "policy_option");
+  std::istringstream settings(fact(facts, "set"));
+  for (std::string line; std::getline(settings, line);) run.load.set.push_back(line);
+  run.load.set.insert(run.load.set.end(), options_.set.begin(), options_.set.end());
+  run.clock = fact(facts, "clock");
+  run.output = options_.output;
+  run.load.conditions = options_.conditions;
+  run.seed = std::strtoull(fact(facts, "seed").c_str(), nullptr, 10);
+  run.load.plugin_files = options_.plugin_files;
+  recorded_ = attached_json(*file_, "plan.json");
+}
+
+int RecordedRun::compose() {
+  int code = load(run_, *prepared_);
+  if (code == kOk) {
+    take_snapshots();
+    tell_ignored_overlay(prepared_->graph->name, "the record says which values held");
+    RecordedFacts facts(recorded_);
+    graph::ComposeOptions& how = composed_;
+    how.output = options_.output;
+    how.seed = run_.seed;
+    how.exchange = &facts;
+    how.owns = [this](const std::string& id) {
+      return std::none_of(prepared_->graph->devices.begin(), prepared_->graph->devices.end(),
+                          [&](const graph::DeviceSpec& device) { return device.id == id; });
+    };
+    code = command::compose(run_, how, *prepared_);
+    how.exchange = nullptr;
+  }
+  if (code != kOk) tell_problems(prepared_->problems.size());
+  return code;
+}
+
+void RecordedRun::take_snapshots() {
+  graph::RecordSpec& spec = prepared_->graph->record;
+  spec.snapshot_ns = std::strtoll(fact(file_->facts(), "snapshots_ns").c_str(), nullptr, 10);
+  spec.recorded = spec.snapshot_ns > 0;
+}
+
+void RecordedRun::check_plugins(const std::vector<graph::PluginFact>& loaded) const {
+  std::istringstream recorded(fact(file_->facts(), "plugins"));
+  for (std::string name, hash; recorded >> name >> hash;) {
+    const auto found = std::find_if(loaded.begin(), loaded.end(),
+                                    [&](const graph::PluginFact& plugin) { return plugin.name == name; });
+    if (found == loaded.end())
+      throw Refused{fmt::format("the record was made with the plug-in {}; name it: --plugin FILE", name)};
+    if (found->hash != hash)
+      std::fprintf(stderr, "takt: plug-in %s is not what it was when the record was made\n", name.c_str());
+  }
+}
+
+void RecordedRun::check_sameness() {
+  const graph::GraphSpec& graph = *prepared_->graph;
+  const Json plan = log::plan_json(prepared_->composition->plan);
+  if (const auto differs = log::structure_differs(recorded_, plan))
+    throw Refused{"this graph cannot run the jobs of the record: " + *differs};
+  const Json assets = attached_json(*file_, "assets.json");
+  const Json hashes = log::asset_hashes(prepared_->composition->plan, graph.directory);
+  const auto places = log::assets(prepared_->composition->plan, graph.directory);
+  for (const auto& [name, hash] : assets.items()) {
+    if (hashes.value(name, "") == hash) continue;
+    const auto place = places.find(name);
+    throw Refused{fmt::format("{} is not what it was when the record was made",
+                              (place == places.end() ? graph.directory / name : place->second).string())};
+  }
+  if (const std::string cut = fact(file_->facts(), "cut"); !cut.empty())
+    std::fprintf(stderr, "takt: this is %s; nodes begin here without what they remembered\n", cut.c_str());
+  for (size_t i = 0; i < graph.files.size(); ++i)
+    if (log::file_text(graph.files[i]) != file_->attached(i == 0 ? "graph.yaml" : log::part_name(i)))
+      std::fprintf(stderr, "takt: %s has changed since the record was made\n", graph.files[i].c_str());
+  for (const std::string& param : log::changed_params(recorded_, plan))
+    std::fprintf(stderr, "takt: %s\n", param.c_str());
+  if (fact(file_->facts(), "program") != log::program_hash())
+    std::fprintf(stderr, "takt: this is another program (commit %s) than the one that recorded (commit %s)\n",
+                 version().commit, fact(file_->facts(), "commit").c_str());
+}
+
+record::ReplayResult RecordedRun::run(record::Replayer::Options how) {
+  const std::vector<TaskPlan>& tasks = prepared_->composition->plan.tasks;
+  how.epoch_ns = log::epoch_ns(*file_);
+  for (const TaskPlan& task : tasks)
+    if (!task.device) task.node->start(how.epoch_ns);
+  how.renew = [this](size_t task) { renew(task); };
+  record::Replayer replayer(prepared_->composition->plan, *file_, how);
+  auto result = replayer.run([] { return StopOnSignal::asked(); });
+  for (size_t t = 0; t < tasks.size(); ++t)  // pictures: each by one process
+    if (!tasks[t].device && (how.told.empty() || how.told[t] != 0)) tasks[t].node->finish();
+  return result;
+}
+
+void RecordedRun::renew(size_t task) {
+  graph::Composition& composition = *prepared_->composition;
+  auto fresh =
+      graph::make_again(*prepared_->graph, prepared_->registry, *prepared_->clock, composed_, composition.plan, task);
+  composition.plan.tasks[task].node = fresh.get();
+  composition.nodes[task] = std::move(fresh);
+}
+
+std::vector<ReplayPart> RecordedRun::parts() const {
+  record::Replayer::Options how;
+  if (options_.from_s > 0) how.begin_ns = how.from_ns = at(options_.from_s);
+  if (options_.until_s) how.end_ns = at(*options_.until_s);
+  if (options_.recorded_pace) how.pace = pace(how.from_ns);
+  const std::vector<char> live = live_tasks();
+  how.run = live;
+  if (options_.isolate != "subsystem") return {{"all", how}};
+  const std::vector<TaskPlan>& tasks = prepared_->composition->plan.tasks;
+  std::vector<std::string> adjusted;
+  const graph::Partition partition = graph::partition(*prepared_->graph, adjusted);
+  std::vector<ReplayPart> parts;
+  for (size_t process = 0; process < partition.names.size(); ++process) {
+    how.told.assign(tasks.size(), 0);
+    for (size_t t = 0; t < tasks.size(); ++t)
+      how.told[t] =
+          !tasks[t].device && (live.empty() || live[t] != 0) && partition.process_of.at(tasks[t].name) == process;
+    if (std::count(how.told.begin(), how.told.end(), 1) == 0) continue;  // the devices'
+    how.run = with_producers(how.told);
+    parts.push_back({partition.names[process], how});
+  }
+  return parts;
+}
+
+std::vector<char> RecordedRun::live_tasks() const {
+  const Plan& plan = prepared_->composition->plan;
+  if (options_.live.empty()) return {};
+  std::vector<char> runs(plan.tasks.size(), 0);
+  std::vector<std::string> names;
+  for (const TaskPlan& task : plan.tasks)
+    if (!task.device) names.push_back(task.name);
+  for (const std::string& id : options_.live) {
+    const auto task = std::find_if(plan.tasks.begin(), plan.tasks.end(),
+                                   [&](const TaskPlan& t) { return t.name == id && !t.device; });
+    if (task == plan.tasks.end())
+      throw Refused{fmt::format("--live {}: there is no such node{}", graph::ticked(id),
+                                graph::alternatives(id, names, "nodes of the graph"))};
+    runs[static_cast<size_t>(task - plan.tasks.begin())] = 1;
+  }
+  return with_producers(runs);
+}
+
+std::vector<char> RecordedRun::with_producers(std::vector<char> runs) const {
+  for (size_t t = 0; t < runs.size(); ++t)
+    if (runs[t] != 0 && add_producers(t, runs)) t = SIZE_MAX;  // from the first one again
+  return runs;
+}
+
+bool RecordedRun::add_producers(size_t task, std::vector<char>& runs) const {
+  const Plan& plan = prepared_->composition->plan;
+  bool added = false;
+  for (const EdgePlan& edge : plan.tasks[task].edges) {
+    const PortPlan& port = plan.ports[edge.port];
+    const auto& messages = file_->messages(file_->channel(port.node + "." + port.port));
+    const bool whole = std::all_of(messages.begin(), messages.end(), [](const auto& m) { return m.second.whole; });
+    for (size_t t = 0; t < runs.size(); ++t) {
+      const auto& ports = plan.tasks[t].ports;
+      if (whole || runs[t] != 0 || std::find(ports.begin(), ports.end(), edge.port) == ports.end()) continue;
+      if (options_.isolate != "subsystem")  // there each process runs what it needs
+        std::fprintf(stderr, "takt: %s runs, too: its %s is in the record by hash only\n", port.node.c_str(),
+                     port.port.c_str());
+      runs[t] = 1;
+      added = true;
+    }
+  }
+  return added;
+}
+
+std::function<void(int64_t)> RecordedRun::pace(int64_t from_ns) const {
+  return [this, from_ns, origin_ns = int64_t{0}](int64_t release_ns) mutable {
+    if (release_ns < from_ns) return;
+    if (origin_ns == 0) origin_ns = clock_.now_ns() - release_ns;
+    const int64_t until_ns = origin_ns + release_ns;
+    const timespec until{until_ns / 1'000'000'000, until_ns % 1'000'000'000};
+    while (!StopOnSignal::asked() && clock_.now_ns() < until_ns)
+      clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr);
+  };
+}
+
+}  // namespace takt::rewind
