@@ -12,6 +12,7 @@ class Smoother final : public takt::Node {
 
   void setup(takt::Setup&) override {}
   void run(takt::Job& job) override;
+  void remember(takt::StateArchive& archive) override { TAKT_STATE(archive, speed_m_s_); }
 
  private:
   double speed_m_s_ = 0;

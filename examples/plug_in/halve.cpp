@@ -15,6 +15,7 @@ class Halve final : public takt::Node {
     command->turn_rad_s = in.newest()->turn_rad_s / 2;
     out.send(in.stamp_ns());
   }
+  void remember(takt::StateArchive&) override {}
 };
 
 void register_halve(takt::Registry& registry) {

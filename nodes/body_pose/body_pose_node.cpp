@@ -56,6 +56,8 @@ class BodyPoseNode final : public Node {
     bodies_.send(cloud_.stamp_ns());
   }
 
+  void remember(StateArchive&) override {}
+
  private:
   /// What the cloud says; where it says nothing, what the floor in it says.
   static std::optional<Transform> mount_of(const PointCloud& cloud) {

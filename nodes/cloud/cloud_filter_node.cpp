@@ -84,6 +84,8 @@ class CloudFilterNode final : public Node {
     status_.send(in_.stamp_ns());
   }
 
+  void remember(StateArchive&) override {}
+
  private:
   static constexpr size_t kPointsOfNMin = 1'200'000;
   static constexpr double kShortest_m = 1e-3;

@@ -22,6 +22,8 @@ class CruiseNode final : public Node {
     velocity_.send(job.release_ns());
   }
 
+  void remember(StateArchive&) override {}
+
  private:
   static int64_t nanoseconds(double seconds) { return std::llround(seconds * 1e9); }
 

@@ -43,6 +43,8 @@ class DriveArbiterNode final : public Node {
     state_.send(job.release_ns());
   }
 
+  void remember(StateArchive& archive) override { TAKT_STATE(archive, said_, refused_levels_); }
+
  private:
   /// The word that was last understood; the parameter's while nobody says one.
   VisionState present() {

@@ -98,6 +98,15 @@ void EgoMotion::reset() {
   flows_.clear();
 }
 
+void EgoMotion::remember(StateArchive& archive) {
+  TAKT_STATE(archive, tracked_, expectation_, has_previous_, resumed_, stamp_ns_, steps_, pose_);
+  archive(previous_.image());
+  if (!archive.loads() || archive.failed()) return;
+  if (tracked_.size() > static_cast<size_t>(p_.corners.maximum)) return archive.fail();
+  current_.build(previous_.image().view(), p_.brightness);
+  previous_.swap(current_);
+}
+
 // Disparity at (x, y) of the current left image, searched between whole disparities first..last; negative: not found.
 double EgoMotion::measure_disparity(double x, double y, int first, int last) const {
   const Level& left = current_.level(0);

@@ -16,6 +16,7 @@
 #include "nodes/ego_motion/refine.hpp"
 #include "nodes/ego_motion/rigid.hpp"
 #include "rt/msg/geometry.hpp"
+#include "rt/state_archive.hpp"
 
 namespace takt::ego_motion {
 
@@ -98,6 +99,8 @@ class EgoMotion {
   /// All matches of the last step, and those that entered the estimate.
   std::span<const Flow> flows() const { return flows_; }
   std::span<const Observation> observations() const { return observations_; }
+  /// With the last image, a byte a pixel.
+  void remember(StateArchive& archive);
 
  private:
   struct Located {

@@ -90,6 +90,8 @@ class EgoMotionNode final : public Node {
     motion_.send(stamp);
   }
 
+  void remember(StateArchive& archive) override { TAKT_STATE(archive, ego_, robot_, last_stamp_ns_, has_stamp_); }
+
  private:
   static std::string size(const Capacity& c) { return std::to_string(c.width) + " x " + std::to_string(c.height); }
 

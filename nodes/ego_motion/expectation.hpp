@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "nodes/ego_motion/rigid.hpp"
+#include "rt/state_archive.hpp"
 #include "rt/transform/pose_math.hpp"
 
 namespace takt::ego_motion {
@@ -32,6 +33,7 @@ class Expectation {
 
   void measured(const Rigid& motion, int64_t interval_ns);
   void unmeasured(int64_t interval_ns, const std::optional<Rigid>& odometry);
+  void remember(StateArchive& archive) { TAKT_STATE(archive, last_, known_, last_s_, measured_s_, unseen_s_); }
 
  private:
   ExpectationParameters p_;

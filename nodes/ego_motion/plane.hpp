@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "rt/msg/image_view.hpp"
+#include "rt/state_archive.hpp"
 
 namespace takt::ego_motion {
 
@@ -25,6 +26,10 @@ class Plane {
   uint8_t* row(int y) { return pixels_.data() + stride_ * y; }
   const uint8_t* row(int y) const { return pixels_.data() + stride_ * y; }
   ImageView<const uint8_t> view() const { return {pixels_.data(), width_, height_, 1, stride_}; }
+  /// Without the padding.
+  void remember(StateArchive& archive) {
+    for (int y = 0; y < height_; ++y) archive.raw(row(y), static_cast<size_t>(width_));
+  }
 
  private:
   int width_ = 0, height_ = 0;
@@ -68,6 +73,8 @@ class Pyramid {
   int levels() const { return static_cast<int>(levels_.size()); }
   const Level& level(int l) const { return levels_[static_cast<size_t>(l)]; }
   void swap(Pyramid& other) noexcept { levels_.swap(other.levels_); }
+  /// The image of the first level, from which all others are made.
+  Plane& image() { return levels_.front().image; }
 
  private:
   std::vector<Level> levels_;

@@ -4,6 +4,7 @@
 #include <Eigen/Dense>
 
 #include "rt/msg/geometry.hpp"
+#include "rt/state_archive.hpp"
 
 namespace takt::ego_motion {
 
@@ -15,6 +16,7 @@ struct Rigid {
   Rigid inverse() const { return {R.transpose(), -(R.transpose() * t)}; }
   Rigid operator*(const Rigid& child) const { return {R * child.R, R * child.t + t}; }
   Eigen::Vector3d operator*(const Eigen::Vector3d& p) const { return R * p + t; }
+  void remember(StateArchive& archive) { TAKT_STATE(archive, R, t); }
 };
 
 using Twist = Eigen::Matrix<double, 6, 1>;  ///< translation (m), then rotation vector (rad)

@@ -9,6 +9,7 @@
 #include "nodes/ground_map/mask_cleaner.hpp"
 #include "nodes/ground_map/texture.hpp"
 #include "rt/msg/image_view.hpp"
+#include "rt/state_archive.hpp"
 
 namespace takt::ground_map {
 
@@ -43,6 +44,10 @@ class GroundDetector {
 
   /// Adds a texture that an earlier process learnt, or another detector.
   void recall(const Descriptor& descriptor);
+  void remember(StateArchive& archive) {
+    TAKT_STATE(archive, memory_);
+    if (archive.loads() && !archive.failed()) confidence_.rebuild(memory_.table());
+  }
 
   const ReferenceArea& area() const { return area_; }
   const TextureMemory& memory() const { return memory_; }

@@ -9,6 +9,7 @@
 #include "nodes/ground_map/floor_projection.hpp"
 #include "rt/msg/grid.hpp"
 #include "rt/msg/image_view.hpp"
+#include "rt/state_archive.hpp"
 
 namespace takt::ground_map {
 
@@ -65,6 +66,7 @@ class GroundGrid {
   ImageView<const int16_t> observation() const { return {observation_.data(), window_.cells, window_.cells}; }
   ImageView<const int16_t> map() const { return {map_.data(), window_.cells, window_.cells}; }
   ImageView<int16_t> map() { return {map_.data(), window_.cells, window_.cells}; }
+  void remember(StateArchive& archive) { TAKT_STATE(archive, window_.column, window_.row, map_); }
 
  private:
   struct Tally {

@@ -94,6 +94,10 @@ class GroundMapNode final : public Node {
     if (!mask_given || !grid_given) job.no_result();
   }
 
+  void remember(StateArchive& archive) override {
+    TAKT_STATE(archive, detector_, grid_cells_, classifier_, track_, last_stamp_ns_);
+  }
+
  private:
   bool has_pose_input() const { return motion_.connected() || odometry_.connected(); }
 

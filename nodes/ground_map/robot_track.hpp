@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "rt/msg/geometry.hpp"
+#include "rt/state_archive.hpp"
 #include "rt/transform/transform_buffer.hpp"
 
 namespace takt::ground_map {
@@ -21,6 +22,7 @@ class RobotTrack {
   std::optional<Transform> at(int64_t stamp_ns) const;
   /// After the last pose, at constant motion as between the last two.
   std::optional<Transform> predicted(int64_t stamp_ns) const;
+  void remember(StateArchive& archive) { TAKT_STATE(archive, track_, last_, before_); }
 
  private:
   PoseTrack track_;

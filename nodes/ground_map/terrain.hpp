@@ -11,6 +11,7 @@
 
 #include "nodes/ground_map/ground_grid.hpp"
 #include "rt/msg/ace/terrain.hpp"
+#include "rt/state_archive.hpp"
 
 namespace takt::ground_map {
 
@@ -89,6 +90,7 @@ class TerrainClassifier {
   const Terrain& answer() const { return answer_; }
   /// What the newest cells alone say.
   size_t believed() const { return believed_; }
+  void remember(StateArchive& archive) { TAKT_STATE(archive, counters_, believed_, answer_); }
 
  private:
   TerrainMaps maps_;

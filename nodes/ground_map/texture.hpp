@@ -10,6 +10,7 @@
 
 #include "nodes/ground_map/floor_projection.hpp"
 #include "rt/msg/image_view.hpp"
+#include "rt/state_archive.hpp"
 
 namespace takt::ground_map {
 
@@ -73,6 +74,13 @@ class TextureMemory {
   const uint8_t* table() const { return table_.data(); }
   /// The sum must be above this.
   int32_t limit() const { return limit_; }
+  void remember(StateArchive& archive) {
+    TAKT_STATE(archive, ring_, newest_, filled_);
+    if (!archive.loads() || archive.failed()) return;
+    const int capacity = static_cast<int>(ring_.size());
+    if (newest_ < -1 || newest_ >= capacity || filled_ < 0 || filled_ > capacity) archive.fail();
+    else rebuild();
+  }
 
  private:
   static constexpr size_t kStride = 258;  ///< a border before, so that the prefix sum needs no case, and one behind

@@ -6,6 +6,8 @@
 #include <optional>
 #include <random>
 
+#include "rt/state_archive.hpp"
+
 namespace takt::head_behaviour {
 
 struct SunParameters {
@@ -23,6 +25,7 @@ class SunGuard {
   /// An image of that stamp with more than 5 % of its pixels saturated, or not.
   void see(bool saturated, int64_t stamp_ns, int64_t now_ns);
   bool closed(int64_t now_ns) const { return now_ns < open_from_ns_; }
+  void remember(StateArchive& archive) { TAKT_STATE(archive, open_from_ns_, seen_ns_, saturated_); }
 
  private:
   SunParameters parameters_;
@@ -42,6 +45,7 @@ class Blinker {
   Blinker(const BlinkParameters& parameters, uint64_t seed)
       : parameters_(parameters), random_(static_cast<std::minstd_rand::result_type>(seed)) {}
   bool closed(bool has_partner, int64_t now_ns);
+  void remember(StateArchive& archive) { TAKT_STATE(archive, random_, next_ns_); }
 
  private:
   BlinkParameters parameters_;

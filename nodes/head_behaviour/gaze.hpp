@@ -7,6 +7,7 @@
 #include "nodes/mapping_3d/head_at.hpp"
 #include "nodes/mapping_3d/pose.hpp"
 #include "rt/msg/geometry.hpp"
+#include "rt/state_archive.hpp"
 
 namespace takt::head_behaviour {
 
@@ -37,6 +38,7 @@ class Gaze {
   const std::optional<mapping_3d::Position>& partner() const { return partner_; }
   /// How the head is to stand, within its limits; straight ahead without a partner.
   mapping_3d::HeadAngles look(const Transform& camera_at_rest);
+  void remember(StateArchive& archive) { TAKT_STATE(archive, partner_, seen_ns_, angles_); }
 
  private:
   GazeParameters parameters_;

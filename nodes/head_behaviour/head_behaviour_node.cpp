@@ -44,6 +44,8 @@ class HeadBehaviourNode final : public Node {
     if (!lids_sent || !command_sent) job.no_result();
   }
 
+  void remember(StateArchive& archive) override { TAKT_STATE(archive, gaze_, sun_, blinker_, lid_levels_); }
+
  private:
   /// Who is followed first, so that he is the partner of two who are equally near.
   void look_for_faces() {

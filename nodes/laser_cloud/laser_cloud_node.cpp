@@ -32,6 +32,8 @@ class LaserCloudNode final : public Node {
     cloud_.send(last_stamp_ns_);
   }
 
+  void remember(StateArchive& archive) override { TAKT_STATE(archive, track_, last_stamp_ns_); }
+
  private:
   /// The scanner's pose in the odometry frame; without odometry the robot stands still.
   std::optional<UncertainPose> scanner(size_t i) const {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "nodes/laser_fusion/pose_judge.hpp"
+#include "rt/state_archive.hpp"
 
 namespace takt::laser_fusion {
 
@@ -45,6 +46,17 @@ class GeneticIcp {
   uint32_t generation() const { return generation_; }
   Rigid best() const { return to_rigid(best_); }
   const Quality& quality() const { return quality_; }  ///< of the best; never worse than before
+  /// For the clouds that the judge has.
+  void remember(StateArchive& archive) {
+    TAKT_STATE(archive, random_, population_, oldest_, start_, current_, best_, quality_, leader_, last_gain_, scores_,
+               generation_);
+    if (!archive.loads() || archive.failed() || population_.empty()) return;
+    if (population_.size() > parameters_.population || oldest_ >= population_.size()) archive.fail();
+    else judge_->evaluate(to_rigid(current_));  // its pairs are those of the present pose
+  }
+  void room(StateArchive& archive) const {
+    archive.room(sizeof *this + population_.capacity() * sizeof(PoseParameters));
+  }
 
   /// Some tenths of a millisecond with 1000 + 1000 points.
   static constexpr uint32_t kPortion = 8;

@@ -37,15 +37,43 @@ void LaserFusion::begin(std::span<const Point> laser, const cloud::CloudView& vi
   copied(laser, laser_);
   copied(vision.points, all_vision_);
   copied(vision.coloured() ? vision.colours : std::span<const Colour>(), all_colours_);
-  fused_.clear();
   start_ = vision_in_laser;
   seed_ = seed;
   coloured_ = coloured;
+  begin_again();
+}
+
+void LaserFusion::begin_again() {
+  fused_.clear();
+  portions_ = {};
   thinning_.begin({all_vision_, all_colours_}, parameters_.vision_voxel_m, {vision_, vision_colours_});
   stage_ = Stage::take_vision;
 }
 
+void LaserFusion::remember(StateArchive& archive) {
+  Stage stage = stage_;
+  std::array<uint32_t, 2> portions = portions_;
+  TAKT_STATE(archive, stage);
+  if (archive.loads()) stage_ = Stage::idle;
+  if (stage == Stage::idle) {
+    genetic_.room(archive);
+    return archive.room(laser_.capacity() * sizeof(Point) + all_vision_.capacity() * (sizeof(Point) + sizeof(Colour)) +
+                        sizeof *this);
+  }
+  TAKT_STATE(archive, portions, laser_, all_vision_, all_colours_, start_, seed_, coloured_);
+  if (archive.loads() && !archive.failed()) {
+    begin_again();
+    for (uint32_t i = 0; i < portions[0]; ++i) go_on();
+  }
+  TAKT_STATE(archive, genetic_);
+  if (!archive.loads() || archive.failed() || stage <= Stage::search) return;
+  if (coloured_) begin_colours();
+  for (uint32_t i = 0; i < portions[1]; ++i) go_on();
+  stage_ = stage;
+}
+
 void LaserFusion::go_on() {
+  if (stage_ != Stage::search) ++portions_[stage_ < Stage::search ? 0 : 1];
   switch (stage_) {
     case Stage::take_vision:
       if (!thinning_.go_on(grid_)) return;

@@ -8,6 +8,7 @@
 #include "nodes/laser_fusion/matcher.hpp"
 #include "nodes/laser_fusion/thinning.hpp"
 #include "rt/msg/point.hpp"
+#include "rt/state_archive.hpp"
 
 namespace takt::laser_fusion {
 
@@ -58,6 +59,9 @@ class LaserFusion {
     stage_ = Stage::idle;
     return fused_;
   }
+  /// A search under way with both clouds as they came, up to 27 B a point; what is made of them is made again when it
+  /// is loaded.
+  void remember(StateArchive& archive);
 
  private:
   enum class Stage : uint8_t {
@@ -75,6 +79,7 @@ class LaserFusion {
   };
 
   void go_on();
+  void begin_again();
   void thin(Stage stage, std::span<const Point> points, std::vector<Point>& out);
   void drop_clusters(Stage stage, std::span<Point> points);
   void search_or_end();
@@ -83,6 +88,7 @@ class LaserFusion {
 
   LaserFusionParameters parameters_;
   Stage stage_ = Stage::idle;
+  std::array<uint32_t, 2> portions_{};  ///< of the pair so far: before the search, and after it
   std::vector<Point> laser_, all_vision_, vision_, few_laser_, few_vision_;
   std::vector<Colour> all_colours_, vision_colours_;
   std::vector<FusedPoint> fused_;

@@ -72,6 +72,10 @@ class LaserFusionNode final : public Node {
     if (fusion_->done()) tell_clouds(job);
   }
 
+  void remember(StateArchive& archive) override {
+    TAKT_STATE(archive, fusion_, laser_stamp_ns_, vision_stamp_ns_, laser_in_robot_);
+  }
+
  private:
   /// Takes a pair of clouds of which one is new; false without.
   bool begin() {

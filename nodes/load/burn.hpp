@@ -2,6 +2,8 @@
 #pragma once
 #include <cstdint>
 
+#include "rt/state_archive.hpp"
+
 namespace takt::load {
 
 /// Keeps the calling thread computing until it has used `cpu_ns` more of CPU time, by its own CPU clock: so the work is
@@ -14,6 +16,7 @@ void burn(int64_t cpu_ns);
 class Trouble {
  public:
   bool due(int64_t release_ns, int64_t every_ns);
+  void remember(StateArchive& archive) { TAKT_STATE(archive, begun_, last_ns_); }
 
  private:
   bool begun_ = false;

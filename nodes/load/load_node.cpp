@@ -43,6 +43,8 @@ class LoadNode final : public Node {
     }
   }
 
+  void remember(StateArchive& archive) override { TAKT_STATE(archive, trouble_); }
+
  private:
   void spend(Job& job) {
     const bool long_one = (job.index() + 1) % static_cast<uint64_t>(every_()) == 0;

@@ -24,6 +24,21 @@ DepthView CloudMapper::Kept::view() {
           std::span(colour).first(coloured ? camera.pixels() : 0)};
 }
 
+void CloudMapper::Kept::remember(StateArchive& archive) {
+  TAKT_STATE(archive, camera, camera_in_map, stamp_ns, coloured);
+  const size_t pixels = camera.pixels();
+  if (pixels > depth_m.size()) return archive.fail();
+  archive.raw(depth_m.data(), pixels * sizeof(float));
+  if (coloured) archive.raw(colour.data(), pixels * sizeof(Colour));
+}
+
+void CloudMapper::remember(StateArchive& archive) {
+  TAKT_STATE(archive, newest_, views_, map_);
+  if (newest_ >= ring_.size() || views_ > ring_.size()) return archive.fail();
+  archive.room(ring_.size() * (sizeof(Kept) + depth_m_.size() * (sizeof(float) + sizeof(Colour))));
+  for (size_t age = 0; age < views_; ++age) archive(ring_[(newest_ + ring_.size() - age) % ring_.size()]);
+}
+
 void CloudMapper::add_view(const cloud::CloudView& cloud, const DepthCamera& camera, const Transform& camera_in_map,
                            int64_t stamp_ns) {
   if (views_ > 0 && (ring_[newest_].camera != camera || ring_[newest_].coloured != cloud.coloured())) views_ = 0;

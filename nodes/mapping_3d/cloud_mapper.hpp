@@ -12,6 +12,7 @@
 #include "nodes/mapping_3d/tile_map.hpp"
 #include "rt/msg/geometry.hpp"
 #include "rt/msg/point.hpp"
+#include "rt/state_archive.hpp"
 
 namespace takt::mapping_3d {
 
@@ -75,6 +76,8 @@ class CloudMapper {
     views_ = 0;
     unjudged_.reset();
   }
+  /// The views that there are, 7 B a pixel each, and the map. What is fused is not in it: the next view makes it anew.
+  void remember(StateArchive& archive);
 
  private:
   struct Kept {
@@ -86,6 +89,7 @@ class CloudMapper {
     bool coloured = false;
 
     DepthView view();
+    void remember(StateArchive& archive);
   };
 
   MapperParameters p_;

@@ -71,6 +71,18 @@ void GridWindow::resume(std::span<const int16_t> cells, const Transform& robot_i
                                           quarters_.origin_m + (row + 0.5) * quarters_.cell_m, 0));
 }
 
+void GridWindow::remember(StateArchive& archive) {
+  TAKT_STATE(archive, newest_, views_);
+  if (newest_ >= ring_.size() || views_ > ring_.size()) return archive.fail();
+  for (const View& unused : std::span(ring_).subspan(views_))
+    archive.room(sizeof unused + unused.cells.size() * sizeof(int16_t) + unused.points.capacity() * sizeof(Position));
+  for (size_t age = 0; age < views_; ++age) {
+    View& view = ring_[(newest_ + ring_.size() - age) % ring_.size()];
+    archive(view);
+    if (view.cells.size() != regridded_.size()) return archive.fail();
+  }
+}
+
 void GridWindow::regrid(const View& old, const Transform& robot_in_map) {
   const UncertainPose from_map = inverse({robot_in_map, {}});
   const Affine to_robot = to_affine(from_map.transform);

@@ -10,6 +10,7 @@
 #include "nodes/mapping_3d/pose.hpp"
 #include "rt/msg/geometry.hpp"
 #include "rt/msg/point.hpp"
+#include "rt/state_archive.hpp"
 
 namespace takt::mapping_3d {
 
@@ -35,12 +36,15 @@ class GridWindow {
 
   /// After the map frame has changed.
   void forget() { views_ = 0; }
+  /// The views that there are.
+  void remember(StateArchive& archive);
 
  private:
   struct View {
     Transform robot_in_map;
     std::vector<int16_t> cells;
     std::vector<Position> points;
+    void remember(StateArchive& archive) { TAKT_STATE(archive, robot_in_map, cells, points); }
   };
   /// Sums of the points in one quarter of a cell, robot frame.
   struct Quarter {

@@ -123,6 +123,10 @@ class MappingNode final : public Node {
       std::cerr << "mapping_3d: " << written.error() << '\n';
   }
 
+  void remember(StateArchive& archive) override {
+    TAKT_STATE(archive, views_, mapper_, map_from_poses_, pending_, right_until_ns_, track_, last_stamp_ns_);
+  }
+
  private:
   /// The map is made if somebody wants it.
   void set_up_map(Setup& setup) {

@@ -6,6 +6,8 @@
 #include <span>
 #include <vector>
 
+#include "rt/state_archive.hpp"
+
 namespace takt::mapping_3d {
 
 /// Cells of the plane in a square window that follows the robot by whole cells. Column and row count from the window's
@@ -60,6 +62,7 @@ class SlidingGrid {
   const Cell& at(int64_t column, int64_t row) const { return cells_[index(column, row)]; }
   std::span<Cell> cells() { return cells_; }
   std::span<const Cell> cells() const { return cells_; }
+  void remember(StateArchive& archive) { TAKT_STATE(archive, first_column_, first_row_, cells_); }
 
  private:
   double cell_m_;

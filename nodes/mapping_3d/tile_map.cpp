@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstddef>
 #include <map>
 #include <utility>
 
@@ -35,6 +36,13 @@ void merge(const Point& place, const Colour& colour, MapPoint& into) {
   into.seen = static_cast<uint8_t>(std::min<int>(Tile::kMostSeen, into.seen + 1));
   into.missing = 0;
 }
+
+/// What remember() says of a point, without the padding behind it, and of a slot of the table.
+constexpr size_t kPointBytes = offsetof(MapPoint, missing) + 1;
+struct Entry {
+  uint16_t slot, at;
+};
+static_assert(std::bit_ceil(2 * MapParameters{}.tile_points) <= 1 << 16);
 
 }  // namespace
 
@@ -92,6 +100,28 @@ void Tile::compact() {
   std::fill(table_.begin(), table_.end(), 0u);
   for (size_t i = 0; i < points_.size(); ++i)
     table_[slot_of(size_.voxel_of(points_[i].place))] = static_cast<uint32_t>(i + 1);
+}
+
+// The table as it is: a point that has moved to the border of its voxel stays in the slot that it was given.
+void Tile::remember(StateArchive& archive) {
+  TAKT_STATE(archive, used_);
+  archive.room(sizeof *this + points_.capacity() * (kPointBytes + sizeof(Entry)));
+  if (!used_) return;
+  auto count = static_cast<uint32_t>(points_.size());
+  TAKT_STATE(archive, loose_, in_map_, stamp_ns_, reach_m_, count);
+  if (count > points_.capacity()) return archive.fail();
+  if (archive.loads()) points_.resize(count);
+  for (MapPoint& point : points_) archive.raw(&point, kPointBytes);
+  if (archive.loads()) std::fill(table_.begin(), table_.end(), 0u);
+  auto taken = static_cast<uint32_t>(std::count_if(table_.begin(), table_.end(), [](uint32_t at) { return at != 0; }));
+  TAKT_STATE(archive, taken);
+  for (uint32_t slot = 0; taken > 0 && !archive.failed(); --taken, ++slot) {
+    while (!archive.loads() && table_[slot] == 0) ++slot;
+    Entry entry{static_cast<uint16_t>(slot), static_cast<uint16_t>(archive.loads() ? 0 : table_[slot])};
+    archive(entry);
+    if (entry.slot >= table_.size() || entry.at > points_.size()) return archive.fail();
+    if (archive.loads()) table_[entry.slot] = entry.at;
+  }
 }
 
 // TileMap -----------------------------------------------------------------------------------------------------------

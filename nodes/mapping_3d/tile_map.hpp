@@ -12,6 +12,7 @@
 #include "nodes/mapping_3d/depth_view.hpp"
 #include "rt/msg/geometry.hpp"
 #include "rt/msg/point.hpp"
+#include "rt/state_archive.hpp"
 
 namespace takt::mapping_3d {
 
@@ -63,6 +64,8 @@ class Tile {
   bool add(const Point& place, const Colour& colour);
   /// Makes room: forgets what is gone.
   void compact();
+  /// 21 B a point. Of tiles of at most 32768 points.
+  void remember(StateArchive& archive);
 
  private:
   size_t slot_of(const cloud::VoxelIndex& voxel) const;
@@ -144,6 +147,7 @@ class TileMap {
   size_t points() const;
   size_t bytes() const;
   uint64_t dropped() const { return dropped_; }  ///< points of tiles that made room
+  void remember(StateArchive& archive) { TAKT_STATE(archive, tiles_, dropped_, first_judged_); }
 
  private:
   /// A tile that may hold what is being added.

@@ -46,7 +46,7 @@ void Mission::enter(State state) {
 }
 
 void Mission::fail(std::string_view trouble) {
-  trouble_ = trouble;
+  trouble_size_ = trouble.copy(trouble_.data(), trouble_.size());
   tell("stop");
   enter(State::failed);
 }

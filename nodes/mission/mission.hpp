@@ -8,6 +8,7 @@
 
 #include "nodes/drive_arbiter/vision_state.hpp"
 #include "nodes/mission/way_ahead.hpp"
+#include "rt/state_archive.hpp"
 #include "rt/transform/planar_pose.hpp"
 
 namespace takt::mission {
@@ -71,7 +72,13 @@ class Mission {
   std::optional<double> direction_rad() const { return direction_rad_; }
   int crossed() const { return crossed_; }
   /// Why it has failed.
-  std::string_view trouble() const { return trouble_; }
+  std::string_view trouble() const { return {trouble_.data(), trouble_size_}; }
+  void remember(StateArchive& archive) {
+    TAKT_STATE(archive, state_, now_ns_, entered_ns_, number_, text_, size_, trouble_, trouble_size_, pedestrian_,
+               asked_, crossed_, readings_rad_, read_, direction_rad_, began_, farthest_m_, sign_, to_cross_m_,
+               got_on_ns_, standing_ns_, waiting_ns_, leader_ns_, leader_looks_);
+    if (size_ > text_.size() || trouble_size_ > trouble_.size() || read_ > readings_rad_.size()) archive.fail();
+  }
 
  private:
   void enter(State state);
@@ -93,7 +100,8 @@ class Mission {
   uint32_t number_ = 0;
   std::array<char, 96> text_{};
   size_t size_ = 0;
-  std::string_view trouble_;
+  std::array<char, 48> trouble_{};
+  size_t trouble_size_ = 0;
 
   std::optional<navigation::Place> pedestrian_;  ///< where one was seen last
   int asked_ = 0, crossed_ = 0;

@@ -77,6 +77,8 @@ class MissionNode final : public Node {
     status_.send(job.release_ns());
   }
 
+  void remember(StateArchive& archive) override { TAKT_STATE(archive, mission_); }
+
  private:
   /// A node that runs in one state of vision only.
   struct Paced {

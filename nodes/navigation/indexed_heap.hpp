@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "rt/state_archive.hpp"
+
 namespace takt::navigation {
 
 /// Numbers 0..n-1, each at most once, least key first; of equal keys the least number. A key may fall while its number
@@ -48,10 +50,20 @@ class IndexedHeap {
     return number;
   }
 
+  void remember(StateArchive& archive) {
+    if (archive.loads()) clear();
+    TAKT_STATE(archive, heap_);
+    for (size_t at = 0; at < heap_.size() && archive.loads() && !archive.failed(); ++at) {
+      if (heap_[at].number >= place_.size()) return archive.fail();
+      place_[heap_[at].number] = static_cast<uint32_t>(at);
+    }
+  }
+
  private:
   struct Entry {
     Key key;
     uint32_t number;
+    void remember(StateArchive& archive) { TAKT_STATE(archive, key, number); }
     bool operator<(const Entry& other) const { return std::tie(key, number) < std::tie(other.key, other.number); }
   };
   static constexpr uint32_t kOut = std::numeric_limits<uint32_t>::max();

@@ -61,6 +61,31 @@ bool PathPlanner::look(const OccupancyView& grid) {
   return true;
 }
 
+void PathPlanner::remember(StateArchive& archive) {
+  OccupancyView grid = grid_;
+  TAKT_STATE(archive, grid.cells.width, grid.cells.height, grid.cell_m, grid.origin_x_m, grid.origin_y_m, cost_,
+             expanded_);
+  archive.room(apart_.size() / 4 + 1);
+  const auto width = static_cast<size_t>(std::max(0, grid.cells.width)),
+             height = static_cast<size_t>(std::max(0, grid.cells.height));
+  if (width > apart_.size() || height > apart_.size() || width * height > apart_.size()) return archive.fail();
+  std::vector<int16_t> cells(archive.loads() ? width * height : 0);
+  for (size_t i = 0; i < width * height && !archive.failed(); i += 4) {
+    uint8_t four = 0;
+    const size_t end = std::min(i + 4, width * height);
+    for (size_t at = i; at < end && !archive.loads(); ++at)
+      four = static_cast<uint8_t>(four | (apart_[at] == 0 ? 1 : unknown_[at] != 0 ? 2 : 0) << 2 * (at - i));
+    archive(four);
+    for (size_t at = i; at < end && archive.loads(); ++at) {
+      const int what = four >> 2 * (at - i) & 3;
+      cells[at] = what == 1 ? int16_t{1000} : what == 2 ? kUnknownCell : int16_t{0};
+    }
+  }
+  if (!archive.loads() || archive.failed() || cells.empty()) return;
+  grid.cells.data = cells.data();
+  look(grid);
+}
+
 /// First along each column, then over the columns as far as the clearance reaches.
 void PathPlanner::grow_obstacles() {
   const int width = grid_.cells.width, height = grid_.cells.height;

@@ -10,6 +10,7 @@
 
 #include "nodes/navigation/indexed_heap.hpp"
 #include "nodes/navigation/occupancy_view.hpp"
+#include "rt/state_archive.hpp"
 
 namespace takt::navigation {
 
@@ -61,6 +62,8 @@ class PathPlanner {
   /// Of the newest way, m of known cells.
   double cost_m() const { return static_cast<double>(cost_) / kStraight * grid_.cell_m; }
   size_t expanded() const { return expanded_; }
+  /// The grid, two bits a cell.
+  void remember(StateArchive& archive);
 
   /// For tests: cost of the newest search as a sum of steps; whether the robot may not be there.
   int64_t cost() const { return cost_; }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "nodes/navigation/path_planner.hpp"
+#include "rt/state_archive.hpp"
 #include "rt/transform/planar_pose.hpp"
 
 namespace takt::navigation {
@@ -58,6 +59,9 @@ class Pilot {
   bool standing() const { return behaviour_ == Behaviour::stand && sent_.speed_m_s == 0 && sent_.turn_rad_s == 0; }
   /// What is left of the way, from the corner that it heads for.
   std::span<const Place> way_left() const { return std::span(way_).subspan(std::min(corner_, way_.size())); }
+  void remember(StateArchive& archive) {
+    TAKT_STATE(archive, behaviour_, way_, corner_, direction_rad_, turning_, begin_, left_, last_theta_rad_, sent_);
+  }
 
  private:
   Velocity wanted(const PlanarPose& robot);

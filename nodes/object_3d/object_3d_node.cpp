@@ -83,6 +83,8 @@ class Object3dNode final : public Node {
     objects_.send(cloud_.stamp_ns());
   }
 
+  void remember(StateArchive&) override {}
+
  private:
   /// Those on the image that the cloud was made of.
   std::span<const Detection> boxes() const {

@@ -8,6 +8,7 @@
 
 #include "nodes/object_detection/scale_search.hpp"
 #include "rt/msg/ace/detections.hpp"
+#include "rt/state_archive.hpp"
 
 namespace takt::object_detection {
 
@@ -69,6 +70,7 @@ class Detector {
   size_t detections(double min_score, std::span<Detection> out);
   /// Of grid(): 255 where a window passes, or its middle lies in one that passes at another scale, else 0.
   void region_of_interest(ImageView<uint8_t> roi) const;
+  void remember(StateArchive& archive) { TAKT_STATE(archive, first_row_); }
 
  private:
   struct Row {

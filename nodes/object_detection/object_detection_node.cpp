@@ -4,6 +4,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <sstream>
 #include <string>
 
 #include "nodes/object_detection/reloader.hpp"
@@ -57,6 +58,7 @@ class ObjectDetectionNode final : public Node {
       throw SetupError(error.what());
     }
     for (std::string* name : {&in_use_, &asked_, &refused_}) name->reserve(Reloader::kLongestRevision);
+    taken_.reserve(kHistory);
     virtual_time_ = setup.clock.is_virtual();
     may(bit(JobCall::sleep), "in virtual time and in a replay a job waits for the database that it changes to");
     mask_sums_.emplace(mask_.connected() ? mask_.capacity().pixels() : 0);
@@ -96,7 +98,28 @@ class ObjectDetectionNode final : public Node {
     if ((detections_.connected() && found == nullptr) || (roi_.connected() && roi == nullptr)) job.no_result();
   }
 
+  void remember(StateArchive& archive) override {
+    TAKT_STATE(archive, in_use_, asked_, refused_, taken_, rest_, building_);
+    if (archive.loads() && !archive.failed() && !take_up_again()) archive.fail();
+    if (!archive.failed()) TAKT_STATE(archive, detector_);
+  }
+
  private:
+  /// Detector and class ids are those that all revisions so far lead to. False: one of them cannot be read any more.
+  bool take_up_again() {
+    try {
+      std::istringstream lines(taken_);
+      std::string revision;
+      for (std::string line; std::getline(lines, line);) detector_ = build_(revision = line);
+      if (revision != in_use_) detector_ = build_(in_use_);
+    } catch (const std::exception&) {
+      return false;
+    }
+    reloader_.emplace(build_);
+    if (building_) reloader_->ask(asked_);
+    return true;
+  }
+
   /// The database changes between two images: once the new one is complete, in one step. One that cannot be used is
   /// asked for again now and then: it may have been wanted before it was published.
   void follow_revision(Job& job) {
@@ -114,6 +137,7 @@ class ObjectDetectionNode final : public Node {
     building_ = false;
     if (reloader_->exchange(detector_)) {
       in_use_.assign(asked_);
+      if (!in_use_.empty() && taken_.size() + in_use_.size() < taken_.capacity()) (taken_ += in_use_) += '\n';
       refused_.clear();
     } else {
       if (refused_ != asked_) job.results_doubtful(reloader_->error());
@@ -174,8 +198,10 @@ class ObjectDetectionNode final : public Node {
 
   std::function<std::unique_ptr<Detector>(const std::string&)> build_;
   std::unique_ptr<Detector> detector_;
-  static constexpr int kRest = 16;        ///< jobs until what could not be used is asked for again
-  std::string in_use_, asked_, refused_;  ///< revisions; refused: the last that could not be used, said once
+  static constexpr size_t kHistory = 16'384;  ///< characters
+  static constexpr int kRest = 16;            ///< jobs until what could not be used is asked for again
+  std::string in_use_, asked_, refused_;      ///< revisions; refused: the last that could not be used, said once
+  std::string taken_;  ///< all that were in use but that of the start, a line each, as far as there is room
   int rest_ = 0;
   bool building_ = false, virtual_time_ = false;
   std::optional<MaskSums> mask_sums_;

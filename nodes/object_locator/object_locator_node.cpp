@@ -75,6 +75,8 @@ class ObjectLocatorNode final : public Node {
     reports_.send(stamp_ns);
   }
 
+  void remember(StateArchive&) override {}
+
  private:
   /// Null: none is near enough, or it is not as large as it says.
   const DisparityMap* map_nearest_to(int64_t stamp_ns) const {

@@ -59,6 +59,8 @@ class ObstacleStopNode final : public Node {
     stop_.send(stamp_ns);
   }
 
+  void remember(StateArchive& archive) override { TAKT_STATE(archive, memory_, field_, line_); }
+
  private:
   static int64_t nanoseconds(double seconds) { return std::llround(seconds * 1e9); }
 

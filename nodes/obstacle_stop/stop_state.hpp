@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <optional>
 
+#include "rt/state_archive.hpp"
+
 namespace takt::obstacle_stop {
 
 /// Hysteresis of the protected field: a reason to stop stays in force until the field has been seen free for
@@ -13,6 +15,7 @@ class FieldState {
   FieldState(uint32_t initial, int64_t release_after_ns) : held_(initial), release_after_ns_(release_after_ns) {}
   /// `reasons` of this job (bits of stop_reason; 0: the scan shows a free field); returns those in force.
   uint32_t update(uint32_t reasons, int64_t scan_stamp_ns);
+  void remember(StateArchive& archive) { TAKT_STATE(archive, held_, free_since_ns_); }
 
  private:
   uint32_t held_;
@@ -28,6 +31,7 @@ class LineState {
   /// One reading that was not seen before; bits as in DigitalState.
   void see(uint32_t levels, uint32_t changed, int64_t now_ns);
   bool stops(int64_t now_ns) const { return low_ || (held_until_ns_ && now_ns < *held_until_ns_); }
+  void remember(StateArchive& archive) { TAKT_STATE(archive, low_, held_until_ns_); }
 
  private:
   uint32_t line_;

@@ -38,6 +38,14 @@ void SweepMemory::add(const Sweep& sweep, const PlanarPose& robot, int64_t stamp
   kept.stamp_ns = stamp_ns;
 }
 
+void SweepMemory::remember(StateArchive& archive) {
+  TAKT_STATE(archive, kept_, count_, newest_);
+  const bool fits = std::all_of(kept_.begin(), kept_.end(), [&](const Kept& kept) {
+    return kept.range_m.size() == moved_in_m_.size() && kept.beams <= moved_in_m_.size();
+  });
+  if (!fits || count_ > kSweeps || newest_ >= kSweeps) archive.fail();
+}
+
 std::span<const float> SweepMemory::moved_in(const Sweep& sweep, const PlanarPose& robot, int64_t stamp_ns,
                                              double reach_m) {
   const size_t beams = std::min(sweep.range_m.size(), moved_in_m_.size());

@@ -8,6 +8,7 @@
 
 #include "nodes/obstacle_stop/sweep.hpp"
 #include "rt/msg/geometry.hpp"
+#include "rt/state_archive.hpp"
 #include "rt/transform/planar_pose.hpp"
 
 namespace takt::obstacle_stop {
@@ -28,6 +29,8 @@ class SweepMemory {
   /// Keeps it, unless it is older than the newest kept or too soon after it: kSweeps of them share the span.
   void add(const Sweep& sweep, const PlanarPose& robot, int64_t stamp_ns);
 
+  void remember(StateArchive& archive);
+
   static constexpr size_t kSweeps = 8;
   static constexpr double kAside_rad = 0.035;  ///< 2 degrees: turn of the robot during a sweep, odometry, mounts
   static constexpr double kDeeper_m = 0.15;    ///< noise of both ranges, odometry
@@ -41,6 +44,9 @@ class SweepMemory {
     int64_t stamp_ns = 0;
     size_t beams = 0;
     std::vector<float> range_m;  ///< of the beams, and room for more
+    void remember(StateArchive& archive) {
+      TAKT_STATE(archive, first_angle_rad, step_rad, mount, robot, stamp_ns, beams, range_m);
+    }
   };
   bool saw_through(const Kept& earlier, const PlanarPoint& in_odometry) const;
 

@@ -7,6 +7,7 @@
 #include <span>
 
 #include "nodes/person_tracking/shirt_place.hpp"
+#include "rt/state_archive.hpp"
 
 namespace takt::person_tracking {
 
@@ -21,6 +22,7 @@ struct Estimate {
   Eigen::Matrix4d covariance = Eigen::Matrix4d::Identity();
   Eigen::Vector2d position() const { return state.head<2>(); }
   Eigen::Vector2d velocity() const { return state.tail<2>(); }
+  void remember(StateArchive& archive) { TAKT_STATE(archive, state, covariance); }
 };
 
 /// x(t + dt) = F x(t) + w, w of covariance Q. Two steps of dt are one of 2 dt.
@@ -37,6 +39,7 @@ class PersonFilter {
   double distance2(const Place& seen) const;
   const Estimate& estimate() const { return now_; }
   Estimate after(double dt_s) const;
+  void remember(StateArchive& archive) { TAKT_STATE(archive, now_); }
 
  private:
   FilterParameters p_;

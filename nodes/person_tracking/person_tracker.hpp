@@ -6,6 +6,7 @@
 #include <span>
 
 #include "nodes/person_tracking/person_filter.hpp"
+#include "rt/state_archive.hpp"
 #include "rt/time/units.hpp"
 
 namespace takt::person_tracking {
@@ -41,6 +42,9 @@ class PersonTracker {
   Estimate at(int64_t stamp_ns) const;
   double unseen_s(int64_t now_ns) const { return to_seconds(now_ns - seen_ns_); }
   uint32_t number() const { return number_; }  ///< counts persons, those found again included
+  void remember(StateArchive& archive) {
+    TAKT_STATE(archive, filter_, stamp_ns_, seen_ns_, shirt_ns_, seen_in_a_row_, tracked_, sight_, shirt_, number_);
+  }
 
  private:
   /// Index of the place nearest to the expected one, within the gate, sure or lately seen; the list's size if there is

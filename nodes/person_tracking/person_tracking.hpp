@@ -5,6 +5,7 @@
 
 #include "nodes/person_tracking/person_tracker.hpp"
 #include "nodes/person_tracking/shirt_search.hpp"
+#include "rt/state_archive.hpp"
 
 namespace takt::person_tracking {
 
@@ -45,6 +46,7 @@ class PersonTracking {
   const Board& shirt() const { return boards_[board_of_[tracker_.shirt()]]; }
   const Place& shirt_place() const { return places_[tracker_.shirt()]; }
   const PersonTrackingParameters& parameters() const { return p_; }
+  void remember(StateArchive& archive) { TAKT_STATE(archive, tracker_, height_m_, wide_, high_); }
 
  private:
   static constexpr size_t kMost = ChessboardFinder::kLevels * ChessboardFinder::kMostBoards;

@@ -63,6 +63,8 @@ class PersonTrackingNode final : public Node {
     if (!looks || !sent) job.no_result();
   }
 
+  void remember(StateArchive& archive) override { TAKT_STATE(archive, tracking_); }
+
  private:
   static bool is_known(const Transform& t) {
     return t.x != 0 || t.y != 0 || t.z != 0 || t.qx != 0 || t.qy != 0 || t.qz != 0;

@@ -14,6 +14,7 @@
 #include "rt/msg/point.hpp"
 #include "rt/msg/point_cloud.hpp"
 #include "rt/node.hpp"
+#include "rt/state_archive.hpp"
 
 namespace takt::picture {
 
@@ -102,6 +103,7 @@ class KeptTrack {
   }
 
   std::span<const TrackPoint> points() const { return points_; }
+  void remember(StateArchive& archive) { TAKT_STATE(archive, points_, stride_, skip_); }
 
  private:
   std::vector<TrackPoint> points_;

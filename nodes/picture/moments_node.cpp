@@ -75,6 +75,9 @@ class MomentsNode final : public Node {
     complain(write_file(directory_ / "index.html", page.str()));
   }
 
+  /// The moments are left out: those of a replay are its own.
+  void remember(StateArchive& archive) override { TAKT_STATE(archive, before_); }
+
  private:
   static constexpr size_t kMostCharacters = 2048;
 
@@ -91,6 +94,7 @@ class MomentsNode final : public Node {
       copy(attributes, attributes_);
       return true;
     }
+    void remember(StateArchive& archive) { TAKT_STATE(archive, names_, attributes_); }
 
    private:
     static bool equal(const ObjectName& a, const ObjectName& b) {

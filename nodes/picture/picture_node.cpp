@@ -86,6 +86,9 @@ class PictureNode final : public Node {
     }
   }
 
+  /// What the next messages bring anew is left out.
+  void remember(StateArchive& archive) override { TAKT_STATE(archive, kind_, track_, mask_stamp_ns_); }
+
  private:
   static size_t elements_of(const InputPort& port) {
     return port.connected() ? port.capacity().pixels() * port.capacity().channels : 0;

@@ -5,6 +5,7 @@
 #include <map>
 
 #include "nodes/semantic/network.hpp"
+#include "rt/state_archive.hpp"
 
 namespace takt::planner {
 
@@ -30,12 +31,17 @@ class ActionCosts {
   void each(Visit visit) const {
     for (const auto& [action, learned] : learned_) visit(action, learned.mean_s, learned.times);
   }
+  void remember(StateArchive& archive) {
+    TAKT_STATE(archive, learned_);
+    archive.room(kMostRemembered * (sizeof(NodeId) + sizeof(Learned)));
+  }
 
  private:
   struct Learned {
-    double mean_s;
-    uint32_t count, times;
+    double mean_s = 0;
+    uint32_t count = 0, times = 0;
   };
+  static constexpr size_t kMostRemembered = 256;
   std::map<NodeId, Learned> learned_;
 };
 

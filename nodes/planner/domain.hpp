@@ -7,6 +7,7 @@
 
 #include "nodes/planner/action_costs.hpp"
 #include "nodes/semantic/semantic_map.hpp"
+#include "rt/state_archive.hpp"
 
 namespace takt::planner {
 
@@ -28,6 +29,7 @@ struct Variable {
   NodeId object = semantic::kNoNode, attribute = semantic::kNoNode;
   std::vector<semantic::Value> values;
   std::vector<std::vector<uint32_t>> achievers;  ///< by value: the actions that give it
+  void remember(StateArchive& archive) { TAKT_STATE(archive, object, attribute, values, achievers); }
 };
 
 /// One action with an object in each role. The robot drives to the objects in the order of the roles and is at the last
@@ -38,6 +40,7 @@ struct GroundAction {
   std::vector<uint32_t> places;
   std::vector<Fact> required, results;  ///< ascending by variable
   int64_t cost_ns = 0;
+  void remember(StateArchive& archive) { TAKT_STATE(archive, action, objects, places, required, results, cost_ns); }
 };
 
 enum class CostMode : uint8_t {
@@ -61,6 +64,9 @@ struct DomainParameters {
   std::function<bool(std::span<const NodeId>)> within_reach = nullptr;
 };
 
+/// Straight lines at that speed, whole ns upwards.
+Travel straight_lines(double speed_m_s);
+
 struct Domain {
   CostMode cost_mode = CostMode::sequential;
   Travel travel;
@@ -78,10 +84,12 @@ struct Domain {
   void find_achievers();
   /// Of an action, the robot being at `from`.
   int64_t drive_ns(uint32_t from, const GroundAction& action) const;
+  /// With a travel_table_ns, or along straight lines of the usual speed.
+  void remember(StateArchive& archive) {
+    TAKT_STATE(archive, cost_mode, places, variables, actions, goals, goal_places, travel_table_ns);
+    if (archive.loads() && !travel) travel = straight_lines(DomainParameters{}.speed_m_s);
+  }
 };
-
-/// Straight lines at that speed, whole ns upwards.
-Travel straight_lines(double speed_m_s);
 
 /// What can matter for the goals: actions that give a wanted value, whatever these require, and so on. The error names
 /// the goal that cannot be meant, or the limit.

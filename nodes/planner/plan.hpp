@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include "nodes/planner/domain.hpp"
+#include "rt/state_archive.hpp"
 
 namespace takt::planner {
 
@@ -24,6 +25,7 @@ struct Plan {
   std::vector<Step> steps;
   size_t expanded = 0;  ///< states, or candidates of the recursion
   bool exists() const { return cost_ns >= 0; }
+  void remember(StateArchive& archive) { TAKT_STATE(archive, verdict, cost_ns, bound_ns, steps, expanded); }
 };
 
 /// When a search ends early.

@@ -33,6 +33,7 @@ class Planner {
   /// True once it is over.
   bool go_on(const Effort& effort) { return method_ == Method::recursive || search_.go_on(effort); }
   const Plan& best_so_far() const { return search_.plan(); }
+  void remember(StateArchive& archive, const Domain& domain) { search_.remember(archive, domain); }
 
  private:
   Method method_;

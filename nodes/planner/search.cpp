@@ -199,6 +199,23 @@ void Search::begin(const Domain& domain, const Plan& known) {
   if (const auto left = left_ns({}, 0); left && *left < limit_ns_) open_.put(0, {*left, 0});
 }
 
+void Search::remember(StateArchive& archive, const Domain& domain) {
+  TAKT_STATE(archive, open_, limit_ns_, full_, plan_);
+  archive.room(kMostSteps * sizeof(Step) + capacity_.states * sizeof(State) + capacity_.changes * sizeof(Fact) +
+               capacity_.actions * sizeof(uint32_t) + goal_ns_.capacity() * sizeof(int64_t));
+  if (archive.loads()) domain_ = &domain;
+  if (open_.empty() || archive.failed()) return;
+  TAKT_STATE(archive, states_, changes_, worth_, goal_ns_);
+  if (!archive.loads() || archive.failed()) return;
+  std::fill(slots_.begin(), slots_.end(), kNone);
+  if (states_.size() > capacity_.states || changes_.size() > capacity_.changes) return archive.fail();
+  for (uint32_t number = 0; number < states_.size(); ++number) {
+    const State& state = states_[number];
+    if (state.count > changes_.size() || state.first > changes_.size() - state.count) return archive.fail();
+    slot_of(state) = number;
+  }
+}
+
 bool Search::go_on(const Effort& effort) {
   for (size_t expanded = 0; !open_.empty(); ++expanded) {
     plan_.bound_ns = std::max(plan_.bound_ns, open_.least().first);

@@ -3,6 +3,7 @@
 #pragma once
 #include "nodes/navigation/indexed_heap.hpp"
 #include "nodes/planner/plan.hpp"
+#include "rt/state_archive.hpp"
 
 namespace takt::planner {
 
@@ -33,6 +34,8 @@ class Search {
   bool go_on(const Effort& effort);
   /// The best so far and what is proved.
   const Plan& plan() const { return plan_; }
+  /// A search under way in `domain`, or the plan of one that is over.
+  void remember(StateArchive& archive, const Domain& domain);
 
  private:
   /// Differs from the beginning in `count` variables from `first` on, ascending.

@@ -12,6 +12,7 @@ namespace {
 
 constexpr double kMoved_m = 0.2;  // an object that was driven to, and is elsewhere now
 constexpr size_t kMostRecords = 64, kMostExploringTroubles = 5;
+constexpr size_t kMostText = 16'384, kMostValues = 10'000;  // that is remembered
 
 }  // namespace
 
@@ -20,6 +21,15 @@ Client::Client(Knowledge& knowledge, const ClientParameters& parameters)
       parameters_(parameters),
       driving_(parameters.driving),
       deliberation_(knowledge, parameters.deliberation) {}
+
+void Client::remember(StateArchive& archive) {
+  TAKT_STATE(archive, driving_, deliberation_, costs_, mode_, robot_, now_ns_, time_s_, halted_, news_, shut_since_ns_,
+             next_plan_ns_, task_, task_text_, trouble_, legs_, troubles_, nothing_left_, acted_, deed_, goals_, plans_,
+             step_, first_record_, records_, expected_, driven_, settling_, acted_ns_, since_s_, targets_, command_,
+             speech_, plan_revision_);
+  archive.room(kMostText + kMostRecords * 2 * sizeof(StepRecord) + planner::kMostSteps * sizeof(StepRecord) +
+               kMostFacts * sizeof(planner::Goal) + kMostValues * sizeof(uint32_t) + kMostRoles * sizeof(Place));
+}
 
 // Tasks ---------------------------------------------------------------------------------------------------------------
 

@@ -5,6 +5,7 @@
 #include "nodes/robot_client/deliberation.hpp"
 #include "nodes/robot_client/driving.hpp"
 #include "nodes/robot_client/state_machine.hpp"
+#include "rt/state_archive.hpp"
 
 namespace takt::robot_client {
 
@@ -82,6 +83,8 @@ class Client {
   void write_plan(std::string& into) const;
   /// Rises whenever the plan's text has changed.
   uint32_t plan_revision() const { return plan_revision_; }
+  /// After the knowledge.
+  void remember(StateArchive& archive);
 
  private:
   void fire(Event event) { mode_ = next(mode_, event).value_or(mode_); }

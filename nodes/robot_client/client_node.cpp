@@ -109,6 +109,12 @@ class RobotClientNode final : public Node {
     if (map_sent_ != knowledge_->revision()) send_map(now_ns);
   }
 
+  void remember(StateArchive& archive) override {
+    TAKT_STATE(archive, knowledge_, client_, track_, looked_ns_, last_words_, last_ns_, task_number_, plan_sent_,
+               map_sent_, restarted_, told_of_grid_);
+    archive.room(kCharacters);
+  }
+
  private:
   /// Reports in the robot frame count once the robot's pose is known at their stamp.
   void look(const ObjectReports& reports, int64_t stamp_ns) {

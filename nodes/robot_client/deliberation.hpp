@@ -5,6 +5,7 @@
 #include "nodes/planner/planner.hpp"
 #include "nodes/robot_client/knowledge.hpp"
 #include "nodes/robot_client/stand_off.hpp"
+#include "rt/state_archive.hpp"
 
 namespace takt::robot_client {
 
@@ -23,6 +24,7 @@ struct StandOff {
   Place place;
   double direction_rad = 0;  ///< towards the objects
   bool reachable = false;
+  void remember(StateArchive& archive) { TAKT_STATE(archive, objects, place, direction_rad, reachable); }
 };
 
 /// Takes memory in begin() and for plans. One thread at a time.
@@ -41,9 +43,16 @@ class Deliberation {
   size_t portions() const { return portions_; }
   /// "bottle_3 cannot be got at" where that may be why there is no plan; empty where all can.
   std::string out_of_reach() const;
+  /// What is thought about may take kRoom; the search for a plan has its own.
+  void remember(StateArchive& archive) {
+    TAKT_STATE(archive, stage_, robot_, domain_, stand_offs_, from_robot_ns_, at_, next_, portions_);
+    archive.room(kRoom);
+    planner_.remember(archive, domain_);
+  }
 
  private:
   enum class Stage : uint8_t { stand_offs, travel, search };
+  static constexpr size_t kRoom = 1'000'000;  ///< bytes
   size_t places() const { return domain_.places.size(); }
   int64_t& travel_ns(size_t from, size_t to) { return domain_.travel_table_ns[from * places() + to]; }
   void find_stand_offs();

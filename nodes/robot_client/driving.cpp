@@ -30,7 +30,7 @@ void Driving::begin(Kind kind) {
   pilot_.stand();
   kind_ = kind;
   progress_ = Progress::under_way;
-  reason_ = {};
+  reason_.clear();
   begun_ = false;
   closed_s_ = standing_s_ = halted_s_ = 0;
   backs_ = 0;

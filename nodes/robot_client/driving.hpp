@@ -5,6 +5,7 @@
 #include <array>
 
 #include "nodes/robot_client/stand_off.hpp"
+#include "rt/state_archive.hpp"
 
 namespace takt::robot_client {
 
@@ -63,6 +64,12 @@ class Driving {
   std::string_view reason() const { return reason_; }
   /// Along the way, m.
   double left_m(const PlanarPose& robot) const;
+  void remember(StateArchive& archive) {
+    TAKT_STATE(archive, planner_, pilot_, seen_grid_, new_grid_, kind_, targets_, count_, reach_m_, amount_, progress_,
+               reason_, begun_, closed_s_, halted_s_, halted_at_, backs_, backing_, standing_s_, got_on_, way_, area_,
+               explored_, explored_count_);
+    if (count_ > kMostTargets) archive.fail();
+  }
 
   static constexpr size_t kMostTargets = 4;
 
@@ -89,7 +96,7 @@ class Driving {
   size_t count_ = 0;
   double reach_m_ = 0, amount_ = 0;
   Progress progress_ = Progress::arrived;
-  std::string_view reason_;
+  std::string reason_;
   bool begun_ = false;   ///< the pilot has the leg
   double closed_s_ = 0;  ///< for so long there is no way
   double halted_s_ = 0;  ///< for so long it has been made to stand, all in all, or has drawn back

@@ -8,6 +8,7 @@
 #include "nodes/planner/domain.hpp"
 #include "nodes/robot_client/task.hpp"
 #include "nodes/semantic/semantic_map.hpp"
+#include "rt/state_archive.hpp"
 
 namespace takt::robot_client {
 
@@ -69,6 +70,7 @@ class Knowledge {
   void append(const Deed& deed, std::string& into) const;
   /// "cup_1.level=full".
   std::string to_text(const planner::Goal& fact) const;
+  void remember(StateArchive& archive) { TAKT_STATE(archive, map_, revision_); }
 
  private:
   std::string names(semantic::Kind kind) const;

@@ -13,6 +13,8 @@
 #include <tl/expected.hpp>
 #include <vector>
 
+#include "rt/state_archive.hpp"
+
 namespace takt::robot_client {
 
 enum class Verb : uint8_t { goal, act, drive, rotate, ahead, explore, tell, stop };
@@ -20,6 +22,7 @@ enum class Verb : uint8_t { goal, act, drive, rotate, ahead, explore, tell, stop
 /// OBJECT.ATTRIBUTE=VALUE, as it was written.
 struct FactText {
   std::string object, attribute, value;
+  void remember(StateArchive& archive) { TAKT_STATE(archive, object, attribute, value); }
 };
 
 struct Task {
@@ -28,6 +31,7 @@ struct Task {
   std::vector<std::string> words;  ///< of do: the action, its objects
   double x_m = 0, y_m = 0;         ///< of drive
   double amount = 0;               ///< of rotate rad (left positive), of ahead m
+  void remember(StateArchive& archive) { TAKT_STATE(archive, verb, facts, words, x_m, y_m, amount); }
 };
 
 constexpr size_t kMostFacts = 8, kMostWords = 5;

@@ -23,6 +23,11 @@ PoseFilter::PoseFilter(const FilterParameters& parameters, size_t history) : p_(
   base_.cloned_ns.fill(INT64_MIN);
 }
 
+void PoseFilter::remember(StateArchive& archive) {
+  TAKT_STATE(archive, begun_, base_, entries_);
+  if (archive.loads() && entries_.size() > history_) archive.fail();
+}
+
 void PoseFilter::begin_at(const PlanarPose& robot_in_map, const Covariance& covariance) {
   base_.mean.head<3>() << robot_in_map.x_m, robot_in_map.y_m, robot_in_map.theta_rad;
   base_.covariance.topLeftCorner<3, 3>() = covariance;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "nodes/scan_matching/planar.hpp"
+#include "rt/state_archive.hpp"
 
 namespace takt::robot_pose {
 
@@ -25,6 +26,10 @@ struct Measured {
   PlanarPose robot_in_previous;                    ///< at to_ns, in the robot's frame at from_ns
   Covariance covariance = Covariance::Identity();  ///< positive definite
   bool valid = true;  ///< false: nothing was measured in this interval, the next one begins at to_ns
+
+  void remember(StateArchive& archive) {
+    TAKT_STATE(archive, source, from_ns, to_ns, robot_in_previous, covariance, valid);
+  }
 };
 
 /// What became of a measurement.
@@ -71,6 +76,7 @@ class PoseFilter {
   Estimate newest() const;
   /// At a stamp not before that: predicted at constant speed and turn rate.
   Estimate predicted(int64_t stamp_ns) const;
+  void remember(StateArchive& archive);
 
  private:
   static constexpr int kNow = 5;  ///< x, y, theta, speed, turn rate
@@ -83,10 +89,12 @@ class PoseFilter {
     Vector mean = Vector::Zero();
     Matrix covariance = Matrix::Zero();
     std::array<int64_t, kSources> cloned_ns;  ///< when a source's last pose was; INT64_MIN: never
+    void remember(StateArchive& archive) { TAKT_STATE(archive, stamp_ns, used_ns, mean, covariance, cloned_ns); }
   };
   struct Entry {
     Measured measured;
     State after;
+    void remember(StateArchive& archive) { TAKT_STATE(archive, measured, after); }
   };
 
   void predict(State& state, int64_t stamp_ns) const;

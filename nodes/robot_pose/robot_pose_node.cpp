@@ -58,6 +58,10 @@ class RobotPoseNode final : public Node {
     if (!all) job.no_result();
   }
 
+  void remember(StateArchive& archive) override {
+    TAKT_STATE(archive, filter_, last_wheels_, last_scan_, wheels_ns_, scan_ns_, resumed_);
+  }
+
  private:
   void take(const Measured& measured) {
     if (!filter_->begun() && !resumed_ && measured.source == Source::wheels)

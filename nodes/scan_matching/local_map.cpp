@@ -52,10 +52,22 @@ void LocalMap::add(const PlanarPose& robot_in_map, std::span<const SurfacePoint>
   points = points.first(std::min(points.size(), most_points_));
   for (const SurfacePoint& p : points) points_.push_back(transformed(robot_in_map, p));
   counts_.push_back(points.size());
-  field_.draw(points_, robot_in_map.x_m, robot_in_map.y_m);
-  x0_m_ = robot_in_map.x_m - buckets_ / 2.0 * edge_m_;
-  y0_m_ = robot_in_map.y_m - buckets_ / 2.0 * edge_m_;
+  lay_out(robot_in_map.x_m, robot_in_map.y_m);
+}
+
+void LocalMap::lay_out(double x_m, double y_m) {
+  middle_x_m_ = x_m;
+  middle_y_m_ = y_m;
+  field_.draw(points_, x_m, y_m);
+  x0_m_ = x_m - buckets_ / 2.0 * edge_m_;
+  y0_m_ = y_m - buckets_ / 2.0 * edge_m_;
   sort_into_buckets();
+}
+
+void LocalMap::remember(StateArchive& archive) {
+  TAKT_STATE(archive, points_, counts_, middle_x_m_, middle_y_m_);
+  if (archive.loads() && points_.size() > order_.size()) archive.fail();
+  if (archive.loads() && !archive.failed() && !empty()) lay_out(middle_x_m_, middle_y_m_);
 }
 
 void LocalMap::clear() {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "nodes/scan_matching/score_field.hpp"
+#include "rt/state_archive.hpp"
 
 namespace takt::scan_matching {
 
@@ -39,12 +40,15 @@ class LocalMap {
   const SurfacePoint* nearest(const SurfacePoint& point) const;
   /// The same by looking at every point.
   const SurfacePoint* nearest_reference(const SurfacePoint& point) const;
+  void remember(StateArchive& archive);
 
  private:
   int bucket(double offset_m) const { return static_cast<int>(std::floor(offset_m / edge_m_)); }
   bool in_buckets(const SurfacePoint& p) const;
   size_t bucket_of(const SurfacePoint& p) const;
   void sort_into_buckets();
+  /// Makes what follows from the points: field and buckets about that place.
+  void lay_out(double x_m, double y_m);
 
   MapParameters p_;
   size_t most_points_;  ///< of one keyframe
@@ -53,7 +57,7 @@ class LocalMap {
   std::vector<size_t> counts_;  ///< points of each keyframe
   double edge_m_;               ///< of a bucket; not less than the gate
   int buckets_;                 ///< along an edge
-  double x0_m_ = 0, y0_m_ = 0;
+  double middle_x_m_ = 0, middle_y_m_ = 0, x0_m_ = 0, y0_m_ = 0;
   std::vector<uint32_t> starts_, order_;  ///< order_[starts_[b] .. starts_[b + 1]): points in bucket b
 };
 

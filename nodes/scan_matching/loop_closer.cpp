@@ -63,6 +63,15 @@ std::optional<Closure> LoopCloser::step(const PlanarPose& robot_in_track, std::s
   return closed;
 }
 
+void LoopCloser::remember(StateArchive& archive) {
+  TAKT_STATE(archive, first_, count_, map_from_track_, last_, kept_, found_, way_m_, right_until_m_);
+  if (first_ >= ring_.size() || count_ > ring_.size()) return archive.fail();
+  for (size_t i = 0; i < count_; ++i) archive(anchor(i));
+  // Of those to come.
+  for (size_t i = count_; i < ring_.size(); ++i)
+    archive.room(sizeof(Anchor) + anchor(i).points.capacity() * sizeof(SurfacePoint));
+}
+
 void LoopCloser::keep(const PlanarPose& robot_in_map, std::span<const SurfacePoint> points) {
   if (count_ == ring_.size()) first_ = (first_ + 1) % ring_.size();
   else ++count_;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "nodes/scan_matching/point_to_line.hpp"
+#include "rt/state_archive.hpp"
 
 namespace takt::scan_matching {
 
@@ -39,12 +40,15 @@ class LoopCloser {
   std::optional<Closure> step(const PlanarPose& robot_in_track, std::span<const SurfacePoint> points);
 
   PlanarPose robot_in_map(const PlanarPose& robot_in_track) const { return compose(map_from_track_, robot_in_track); }
+  /// Up to 12 kB for each scan that was kept.
+  void remember(StateArchive& archive);
 
  private:
   struct Anchor {
     PlanarPose robot_in_map;
     double way_m = 0;
     std::vector<SurfacePoint> points;
+    void remember(StateArchive& archive) { TAKT_STATE(archive, robot_in_map, way_m, points); }
   };
   void keep(const PlanarPose& robot_in_map, std::span<const SurfacePoint> points);
   /// Counted from the oldest.

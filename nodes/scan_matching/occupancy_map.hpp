@@ -9,6 +9,7 @@
 #include "nodes/scan_matching/scan_points.hpp"
 #include "rt/msg/grid.hpp"
 #include "rt/msg/image_view.hpp"
+#include "rt/state_archive.hpp"
 
 namespace takt::scan_matching {
 
@@ -38,6 +39,7 @@ class OccupancyMap {
   double origin_x_m() const { return cells_.origin_x_m(); }
   double origin_y_m() const { return cells_.origin_y_m(); }
   ImageView<const int16_t> cells() const { return {cells_.cells().data(), side(), side()}; }
+  void remember(StateArchive& archive) { TAKT_STATE(archive, cells_); }
 
  private:
   struct Cell {

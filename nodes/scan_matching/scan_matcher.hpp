@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "nodes/scan_matching/point_to_line.hpp"
+#include "rt/state_archive.hpp"
 
 namespace takt::scan_matching {
 
@@ -67,6 +68,9 @@ class ScanMatcher {
   /// Of the last scan, robot frame.
   std::span<const SurfacePoint> points() const { return points_; }
   const LocalMap& map() const { return map_; }
+  void remember(StateArchive& archive) {
+    TAKT_STATE(archive, map_, pose_, keyframe_, last_step_, accumulated_, last_dt_s_, refused_, unsure_m_, unsure_rad_);
+  }
 
  private:
   Expected expect(double dt_s, const std::optional<PlanarPose>& moved) const;

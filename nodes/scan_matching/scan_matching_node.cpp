@@ -71,6 +71,10 @@ class ScanMatchingNode final : public Node {
     if (!all) job.no_result();
   }
 
+  void remember(StateArchive& archive) override {
+    TAKT_STATE(archive, matcher_, closer_, known_, occupancy_, wheels_, last_stamp_ns_, placed_);
+  }
+
  private:
   /// The newest scan, not matched before, at which the odometry is known. Where it is not known yet a scan waits for
   /// the next job, unless the odometry has fallen silent: then the scan goes without.

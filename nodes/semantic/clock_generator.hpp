@@ -7,6 +7,7 @@
 
 #include "nodes/semantic/needs.hpp"
 #include "rt/msg/requests.hpp"
+#include "rt/state_archive.hpp"
 
 namespace takt::semantic {
 
@@ -31,6 +32,7 @@ class ClockGenerator {
   /// first naming.
   std::span<const Request> deviating() const { return {deviating_.data(), count_}; }
   size_t nodes() const { return nodes_.size(); }
+  void remember(StateArchive& archive) { TAKT_STATE(archive, needs_, nodes_, next_); }
 
  private:
   struct NodeState {

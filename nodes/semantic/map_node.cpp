@@ -97,6 +97,10 @@ class SemanticMapNode final : public Node {
     known_.send(newest_ns());
   }
 
+  void remember(StateArchive& archive) override {
+    TAKT_STATE(archive, map_, track_, last_things_ns_, last_reports_ns_, last_terrain_ns_, misfits_);
+  }
+
  private:
   void find_types() {
     const auto names = parse_node_list(classes_());

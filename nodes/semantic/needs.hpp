@@ -5,6 +5,7 @@
 #include <span>
 
 #include "nodes/semantic/script.hpp"
+#include "rt/state_archive.hpp"
 
 namespace takt::semantic {
 
@@ -36,6 +37,7 @@ class Needs {
 
   std::span<const Rule> rules() const { return rules_; }
   bool needed(size_t rule) const { return states_[rule].needed; }
+  void remember(StateArchive& archive) { TAKT_STATE(archive, states_); }
 
  private:
   struct State {

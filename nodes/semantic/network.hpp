@@ -6,6 +6,7 @@
 #include <tl/expected.hpp>
 
 #include "nodes/semantic/slices.hpp"
+#include "rt/state_archive.hpp"
 
 namespace takt::semantic {
 
@@ -71,6 +72,10 @@ class Network {
   size_t capacity() const { return most_; }
   /// Ids are below this; not each is in use.
   NodeId end() const { return static_cast<NodeId>(nodes_.size()); }
+  void remember(StateArchive& archive) {
+    TAKT_STATE(archive, nodes_, free_, by_name_, links_);
+    if (nodes_.size() > most_) archive.fail();
+  }
 
  private:
   struct Node {

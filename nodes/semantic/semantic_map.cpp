@@ -9,6 +9,30 @@ namespace {
 
 constexpr size_t kUnforeseenTypes = 256;  ///< that a run may add without taking memory
 
+/// Of a grid the rows and columns in which some cell is not `empty`.
+template <class T>
+void remember_box(StateArchive& archive, std::vector<T>& cells, int columns, T empty) {
+  const int rows = static_cast<int>(cells.size()) / columns;
+  std::array<int, 4> box{rows, 0, columns, 0};  // first row, one past the last, the same of columns
+  const auto row = [&](int r) { return cells.data() + static_cast<ptrdiff_t>(r) * columns; };
+  const auto known = [empty](T cell) { return cell != empty; };
+  for (int r = 0; r < rows; ++r) {
+    const T *const begin = row(r), *const end = begin + columns, *const first = std::find_if(begin, end, known);
+    if (first == end) continue;
+    const T* last = end;
+    while (!known(last[-1])) --last;
+    box = {std::min(box[0], r), r + 1, std::min(box[2], static_cast<int>(first - begin)),
+           std::max(box[3], static_cast<int>(last - begin))};
+  }
+  archive(box);
+  archive.room(cells.size() * sizeof(T));
+  const bool fits = std::min(box[0], box[2]) >= 0 && box[1] <= rows && box[3] <= columns;
+  if (!fits) return archive.fail();
+  if (archive.loads()) std::fill(cells.begin(), cells.end(), empty);
+  if (box[2] >= box[3]) return;
+  for (int r = box[0]; r < box[1]; ++r) archive.raw(row(r) + box[2], static_cast<size_t>(box[3] - box[2]) * sizeof(T));
+}
+
 }  // namespace
 
 SemanticMap::SemanticMap(const MapParameters& parameters)
@@ -25,6 +49,28 @@ SemanticMap::SemanticMap(const MapParameters& parameters)
            parameters.cell_m,
            parameters.origin_x_m,
            parameters.origin_y_m};
+}
+
+void SemanticMap::remember(StateArchive& archive) {
+  TAKT_STATE(archive, network_, types_);
+  if (archive.failed()) return;
+  archive.room(record_.size() * sizeof(uint32_t) + objects_.size() * (sizeof(NodeId) + sizeof(Object)));
+  archive.raw(record_.data(), network_.end() * sizeof(uint32_t));
+  remember_objects(archive);
+  remember_box(archive, occupancy_, parameters_.columns, navigation::kUnknownCell);
+  remember_box(archive, terrain_, parameters_.columns, Terrain{0});
+}
+
+/// In which order those of a cell are linked stands in themselves.
+void SemanticMap::remember_objects(StateArchive& archive) {
+  if (archive.loads()) std::fill(first_.begin(), first_.end(), kNoNode);
+  for (NodeId node = 0; node < network_.end() && !archive.failed(); ++node) {
+    if (!network_.exists(node) || network_.kind(node) != Kind::object) continue;
+    Object& object = objects_[node];
+    archive.raw(&object, sizeof object);
+    if (archive.failed() || object.cell >= first_.size()) return archive.fail();
+    if (archive.loads() && object.previous == kNoNode) first_[object.cell] = node;
+  }
 }
 
 // What there can be ---------------------------------------------------------------------------------------------------

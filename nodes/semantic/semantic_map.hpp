@@ -7,6 +7,7 @@
 #include "nodes/navigation/occupancy_view.hpp"
 #include "nodes/semantic/attribute.hpp"
 #include "nodes/semantic/network.hpp"
+#include "rt/state_archive.hpp"
 
 namespace takt::semantic {
 
@@ -128,6 +129,8 @@ class SemanticMap {
   }
 
   const Network& network() const { return network_; }
+  /// Network, objects, and of the grids the box in which something is known. Attributes and actions follow from setup.
+  void remember(StateArchive& archive);
   /// Objects, attributes, types or actions, ascending.
   std::vector<NodeId> all(Kind kind) const;
 
@@ -135,6 +138,7 @@ class SemanticMap {
   struct Type {
     std::vector<std::pair<NodeId, double>> weights;
     uint32_t last_number = 0;  ///< of an object's name
+    void remember(StateArchive& archive) { TAKT_STATE(archive, weights, last_number); }
   };
   tl::expected<NodeId, NetworkError> add(Kind kind, std::string_view name, size_t record);
   tl::expected<NodeId, NetworkError> add_numbered(NodeId type);
@@ -144,6 +148,7 @@ class SemanticMap {
   navigation::Cell clamped(double x_m, double y_m) const;
   void link(NodeId object, uint32_t cell);
   void unlink(NodeId object);
+  void remember_objects(StateArchive& archive);
 
   MapParameters parameters_;
   Network network_;

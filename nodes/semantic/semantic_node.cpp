@@ -69,6 +69,8 @@ class SemanticNode final : public Node {
     }
   }
 
+  void remember(StateArchive& archive) override { TAKT_STATE(archive, generator_, first_ns_); }
+
  private:
   static constexpr std::string_view kPerson = "person";  ///< what bodies are
 

@@ -40,6 +40,13 @@ void Slices::release(Slice& slice) {
   slice = {};
 }
 
+void Slices::remember(StateArchive& archive) {
+  TAKT_STATE(archive, used_, free_);
+  archive.room(items_.size() * sizeof(uint32_t));
+  if (used_ > items_.size()) return archive.fail();
+  archive.raw(items_.data(), used_ * sizeof(uint32_t));
+}
+
 uint32_t Slices::take(uint8_t order) {
   if (order >= kOrders) return kNone;
   if (const uint32_t first = free_[order]; first != kNone) {

@@ -8,6 +8,8 @@
 #include <span>
 #include <vector>
 
+#include "rt/state_archive.hpp"
+
 namespace takt::semantic {
 
 /// Slices of powers of two; those given back serve others of their size or, halved, smaller ones. Growth alone leaves
@@ -26,6 +28,8 @@ class Slices {
   void erase(Slice& slice, uint32_t item);
   void release(Slice& slice);
   std::span<const uint32_t> items(const Slice& slice) const { return {items_.data() + slice.first, slice.size}; }
+  /// What of the array was given out so far.
+  void remember(StateArchive& archive);
 
  private:
   static constexpr uint8_t kEmpty = 255, kSmallest = 2, kOrders = 31;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "rt/msg/image_view.hpp"
+#include "rt/state_archive.hpp"
 
 namespace takt::stereo {
 
@@ -37,6 +38,7 @@ class RectificationMonitor {
   std::optional<double> row_error_px();
   /// Points that the median is taken of.
   size_t points() const { return errors_.size(); }
+  void remember(StateArchive& archive) { TAKT_STATE(archive, pairs_, errors_, oldest_); }
 
  private:
   struct Place {
@@ -68,6 +70,7 @@ class RowErrorAlarm {
 
   /// Doubtful or wrong where that is worse than what was told in this episode.
   std::optional<RowTrust> update(double row_error_px);
+  void remember(StateArchive& archive) { TAKT_STATE(archive, told_); }
 
  private:
   RowTrust told_ = RowTrust::good;

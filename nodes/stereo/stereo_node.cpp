@@ -79,6 +79,8 @@ class StereoNode final : public Node {
     if (disparity_.connected() || cloud_.connected()) match_and_send(job, left, right);
   }
 
+  void remember(StateArchive& archive) override { TAKT_STATE(archive, monitor_, alarm_, told_of_misfit_); }
+
  private:
   MatcherParameters parameters(int disparities) const {
     MatcherParameters p;

@@ -9,6 +9,7 @@
 #include "nodes/traffic_signs/colour_regions.hpp"
 #include "nodes/traffic_signs/search.hpp"
 #include "nodes/traffic_signs/sign_list.hpp"
+#include "rt/state_archive.hpp"
 
 namespace takt::traffic_signs {
 
@@ -68,6 +69,7 @@ class SignDetector {
   float searched() const { return searched_; }
   /// Whether all of what was expected was searched.
   bool focused() const { return focused_; }
+  void remember(StateArchive& archive) { TAKT_STATE(archive, next_); }
 
  private:
   struct Row {

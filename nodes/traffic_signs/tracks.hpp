@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "nodes/traffic_signs/sign_detector.hpp"
+#include "rt/state_archive.hpp"
 
 namespace takt::traffic_signs {
 
@@ -36,6 +37,7 @@ class Tracks {
   /// The last sighting of each track.
   std::span<const Sighting> expected() const { return expected_; }
   bool any_confirmed() const;
+  void remember(StateArchive& archive) { TAKT_STATE(archive, tracks_, expected_); }
 
  private:
   TrackParameters parameters_;

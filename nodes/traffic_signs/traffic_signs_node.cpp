@@ -64,6 +64,8 @@ class TrafficSignsNode final : public Node {
     if (!send(*pair, map, stamp)) job.no_result();
   }
 
+  void remember(StateArchive& archive) override { TAKT_STATE(archive, detector_, tracks_, crossing_level_); }
+
  private:
   /// Sightings without those whose size is known and no sign's.
   std::span<const Sighting> plausible(const DisparityMap* map) {

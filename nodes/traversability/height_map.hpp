@@ -9,6 +9,7 @@
 #include "nodes/mapping_3d/sliding_grid.hpp"
 #include "rt/msg/grid.hpp"
 #include "rt/msg/image_view.hpp"
+#include "rt/state_archive.hpp"
 
 namespace takt::traversability {
 
@@ -51,6 +52,7 @@ class HeightMap {
   /// differs from that of the next known cell in one of the four directions, at most two away, by more than step_m and
   /// than `slope` climbs on the way; up or down. `cells`: side() squared.
   void judge(ImageView<int16_t> cells) const;
+  void remember(StateArchive& archive) { TAKT_STATE(archive, cells_); }
 
  private:
   /// Sums over points, places relative to the middle of the cell.

@@ -44,6 +44,8 @@ class TraversabilityNode final : public Node {
     if (last_stamp_ns_ == before_ns || !give(driveable_, false) || !give(fused_, true)) job.no_result();
   }
 
+  void remember(StateArchive& archive) override { TAKT_STATE(archive, heights_, track_, last_stamp_ns_); }
+
  private:
   /// A scan counts once the odometry is known at its stamp.
   void add(size_t i) {

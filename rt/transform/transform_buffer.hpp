@@ -9,6 +9,7 @@
 #include <tl/expected.hpp>
 #include <vector>
 
+#include "rt/state_archive.hpp"
 #include "rt/transform/pose_math.hpp"
 
 namespace takt {
@@ -53,6 +54,7 @@ class PoseTrack {
   /// At exactly that stamp, or interpolated between its two neighbours if they are at most max_gap apart. O(log n).
   tl::expected<UncertainPose, TransformError> at(int64_t stamp_ns) const;
   size_t size() const { return poses_.size(); }
+  void remember(StateArchive& archive) { TAKT_STATE(archive, poses_); }
 
  private:
   size_t capacity_;
