@@ -97,7 +97,9 @@ class Replay {
                  result.stateless);
     if (result.uncommitted > 0)
       fmt::print("{} jobs were not run: their process was lost before they published\n", result.uncommitted);
-    if (result.lacking > 0) fmt::print("{} jobs were not run: the record lost what they were given\n", result.lacking);
+    if (result.lacking > 0)
+      fmt::print("{} jobs were not run: the record lost what they were given ({})\n", result.lacking,
+                 result.first_lacking.empty() ? "their node did not begin" : result.first_lacking);
     if (result.unmade > 0)
       fmt::print("{} messages are not compared: the record has their hash only, and lacks the jobs that made them\n",
                  result.unmade);

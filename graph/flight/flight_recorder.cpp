@@ -68,7 +68,7 @@ FlightRecorder::FlightRecorder(const graph::GraphSpec& graph, const Plan& plan, 
   freezing.before_ns = spec.before_ns;
   freezing.after_ns = spec.after_ns;
   freezing.most_bytes = static_cast<uint64_t>(spec.frozen_bytes);
-  freezing.snapshot_every_ns = spec.state_every_ns();
+  freezing.lead_ns = lead_ns(spec);
   for (const TaskPlan& task : plan.tasks) {
     auto& edges = freezing.edges.emplace_back();
     for (const EdgePlan& edge : task.edges)

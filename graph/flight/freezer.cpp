@@ -20,8 +20,6 @@ namespace fs = std::filesystem;
 /// Files are joined by code that is not the runtime's own loops.
 constexpr size_t kStack = 1 << 20;
 constexpr size_t kMostWaiting = 64;
-/// A task that has a job as seldom as this has a snapshot in each file.
-constexpr int64_t kSlowest_ns = 1'000'000'000;
 /// A file of the ring has each message that stood when it began, so a little more than its length is enough.
 constexpr int64_t kStandsFor_ns = 65'000'000'000;
 constexpr auto kLook = std::chrono::milliseconds(100);
@@ -145,7 +143,7 @@ void Freezer::write(Frozen& frozen) {
     return;
   }
   record::JoinOptions how;
-  how.from_ns = from_ns - (options_.snapshot_every_ns > 0 ? options_.snapshot_every_ns + kSlowest_ns : 0);
+  how.from_ns = from_ns - options_.lead_ns;
   how.to_ns = to_ns;
   how.edges = options_.edges;
   const Said said = options_.say ? options_.say(frozen.cause, how.from_ns, to_ns) : Said{frozen.cause.what, {}, {}};

@@ -36,7 +36,7 @@ class Freezer {
     std::filesystem::path folder;  ///< of the files; made with the first one
     std::string name;              ///< of the run: NAME-0001-miss.mcap
     int64_t before_ns = 0, after_ns = 0;
-    int64_t snapshot_every_ns = 0;                ///< what a file has before that time, so that a replay can begin
+    int64_t lead_ns = 0;                          ///< what a file has before that time, so that a replay can begin
     std::vector<std::vector<std::string>> edges;  ///< as of record::JoinOptions
     uint64_t most_bytes = 2'000'000'000;  ///< of all files of the folder, those of earlier runs, too; the oldest go
     size_t at_least = 20;                 ///< ... but the newest so many stay, whatever they take

@@ -13,6 +13,11 @@ namespace {
 
 using record::PortRule;
 
+/// A task that has a job as seldom as this has a snapshot in each file.
+constexpr int64_t kSlowest_ns = 1'000'000'000;
+/// As long may it take until a window has been copied out of memory.
+constexpr int64_t kWritten_ns = 2'000'000'000;
+
 PortRule rule_of(const graph::RecordSpec::Port& port) {
   using Keep = graph::RecordSpec::Keep;
   PortRule rule;
@@ -43,22 +48,30 @@ Places places(const graph::RecordSpec& spec, const Plan& plan) {
   for (size_t p = 0; p < plan.ports.size(); ++p) {
     const PortPlan& port = plan.ports[p];
     PortRule& rule = places.disk[p];
+    bool asked = false;
     for (const graph::RecordSpec::Port& given : spec.ports)
-      if (given.port.node == port.node && given.port.port == port.port) rule = rule_of(given);
+      if (given.port.node == port.node && given.port.port == port.port) rule = rule_of(given), asked = true;
     const size_t task = producers.find(p);
     double rate_hz = task == kNone ? 0 : effective_rate_hz(plan, task);
-    if (task != kNone && plan.tasks[task].state_every_ns > 0 && plan.tasks[task].ports.back() == p)
-      rate_hz = std::min(rate_hz, 1e9 / static_cast<double>(plan.tasks[task].state_every_ns));
+    const bool state = task != kNone && plan.tasks[task].state_every_ns > 0 && plan.tasks[task].ports.back() == p;
+    if (state) rate_hz = std::min(rate_hz, 1e9 / static_cast<double>(plan.tasks[task].state_every_ns));
     const double bytes_s = kept_hz(rule, rate_hz) * static_cast<double>(port.chunk_bytes());
     if (bytes_s <= kMostOnDisk) {
       places.disk_bytes_s += bytes_s;
       continue;
     }
-    places.memory_bytes_s += bytes_s;
-    places.memory[p] = rule;
+    // A replay makes again what a node made of what devices gave it.
+    if (asked || state || task == kNone || plan.tasks[task].device || spec.state_every_ns() == 0) {
+      places.memory_bytes_s += bytes_s;
+      places.memory[p] = rule;
+    }
     rule = {PortRule::hash};
   }
   return places;
+}
+
+int64_t lead_ns(const graph::RecordSpec& spec) {
+  return spec.state_every_ns() > 0 ? 2 * spec.state_every_ns() + kSlowest_ns : 0;
 }
 
 int64_t memory_to_use(const graph::RecordSpec& spec) {
@@ -72,7 +85,7 @@ int64_t memory_to_use(const graph::RecordSpec& spec) {
 std::vector<std::string> doubts(const graph::RecordSpec& spec, const Places& places,
                                 const std::filesystem::path& folder) {
   std::vector<std::string> doubts;
-  const double window_s = static_cast<double>(spec.before_ns + spec.after_ns) / 1e9;
+  const double window_s = static_cast<double>(lead_ns(spec) + spec.before_ns + spec.after_ns + kWritten_ns) / 1e9;
   const auto room = [&](const std::filesystem::path& place, int64_t wanted) {
     std::error_code error;
     const auto space = std::filesystem::space(place, error);
@@ -91,8 +104,8 @@ std::vector<std::string> doubts(const graph::RecordSpec& spec, const Places& pla
   const double held_s = static_cast<double>(memory) / places.memory_bytes_s;
   if (held_s < window_s)
     doubts.push_back(
-        fmt::format("record: {:.0f} MB of memory may hold {:.1f} s of images and clouds ({:.1f} MB/s), less than "
-                    "`before` and `after` of {:.1f} s",
+        fmt::format("record: {:.0f} MB of memory may hold {:.1f} s of images and clouds ({:.1f} MB/s), less than the "
+                    "{:.1f} s of a frozen file with its snapshots",
                     static_cast<double>(memory) / 1e6, held_s, places.memory_bytes_s / 1e6, window_s));
   return doubts;
 }

@@ -11,7 +11,7 @@
 namespace takt::flight {
 
 /// What the ring keeps of each port, and where: small messages with all fields on disk; of images and clouds their
-/// hashes on disk, and in memory all fields.
+/// hashes on disk, and of those of devices, and where the graph asks for it, all fields in memory.
 struct Places {
   std::vector<record::PortRule> disk, memory;   ///< by port
   double disk_bytes_s = 0, memory_bytes_s = 0;  ///< at most, from the ports' capacities and rates
@@ -22,6 +22,10 @@ struct Places {
 inline constexpr double kMostOnDisk = 1e6;  ///< bytes a second
 
 Places places(const graph::RecordSpec& spec, const Plan& plan);
+
+/// So much before the time that is asked for lies in a frozen file: a snapshot of each task that has a job a second,
+/// and one before it for those whose messages others need from there on.
+int64_t lead_ns(const graph::RecordSpec& spec);
 
 /// Of the memory asked for, what leaves others as much of /dev/shm as is free; 0: less than a ring needs.
 int64_t memory_to_use(const graph::RecordSpec& spec);

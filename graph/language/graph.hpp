@@ -226,11 +226,11 @@ struct RecordSpec {
   };
   bool ring = true;                      ///< runs in real time keep one unless they are told otherwise
   int64_t disk_bytes = 2'000'000'000;    ///< of all files of the ring, never more
-  int64_t memory_bytes = 256'000'000;    ///< of images and clouds, which are kept in memory only
+  int64_t memory_bytes = 512'000'000;    ///< of images and clouds, which are kept in memory only
   int64_t frozen_bytes = 2'000'000'000;  ///< of all frozen files; the oldest go, but for the newest 20
   int64_t keep_ns = 3600'000'000'000;    ///< what is older goes
-  int64_t before_ns = 5'000'000'000, after_ns = 2'000'000'000;  ///< around what freezes the ring
-  int64_t snapshot_ns = 2'000'000'000;  ///< nodes say what they remember once in so much time; 0: never
+  int64_t before_ns = 3'000'000'000, after_ns = 2'000'000'000;  ///< around what freezes the ring
+  int64_t snapshot_ns = 1'000'000'000;  ///< nodes say what they remember once in so much time; 0: never
   bool recorded = false;                ///< not of the file: this run is recorded, or replays what was
   std::vector<Port> ports;              ///< those that the graph has a rule for
   std::vector<ConditionSpec> freeze;    ///< conditions on ports that freeze the ring once they pass

@@ -50,6 +50,13 @@ class RecordedFacts final : public graph::FactExchange {
   const Json& plan_;
 };
 
+/// Of a frozen file, the begin of what it was written for; else that of the run.
+int64_t frozen_from_ns(const record::LogFile& file) {
+  for (const auto& named : file.container().metadata())
+    if (named.name == "takt frozen") return std::strtoll(fact(named.map, "from_ns").c_str(), nullptr, 10);
+  return INT64_MIN;
+}
+
 /// A replay from an instant on looks for snapshots in so many intervals before it.
 constexpr int64_t kIntervals = 5;
 /// A job that was released before the end of a part is published until then.
@@ -232,6 +239,7 @@ void RecordedRun::renew(size_t task) {
 
 std::vector<ReplayPart> RecordedRun::parts() const {
   record::Replayer::Options how;
+  how.begin_ns = frozen_from_ns(*file_);  // what lies before that are snapshots
   if (options_.from_s > 0) how.begin_ns = how.from_ns = at(options_.from_s);
   if (options_.until_s) how.end_ns = at(*options_.until_s);
   if (options_.recorded_pace) how.pace = pace(how.from_ns);

@@ -35,6 +35,7 @@ std::string written(const ReplayResult& result) {
               {"begun", result.begun},
               {"begun_afresh", result.begun_afresh},
               {"stateless", result.stateless},
+              {"first_lacking", result.first_lacking},
               {"first", first},
               {"different_of", result.different_of},
               {"recorded_ns", result.recorded_ns}}
@@ -50,6 +51,7 @@ ReplayResult parsed(const std::string& text) {
   result.different = part["different"], result.lacking = part["lacking"];
   result.restarts = part["restarts"], result.uncommitted = part["uncommitted"], result.unmade = part["unmade"];
   result.begun = part["begun"], result.begun_afresh = part["begun_afresh"], result.stateless = part["stateless"];
+  result.first_lacking = part["first_lacking"];
   if (const json& first = part["first"]; !first.is_null())
     result.first = {first[0], first[1], first[2], first[3], first[4]};
   part["different_of"].get_to(result.different_of);
@@ -64,6 +66,7 @@ void add(ReplayResult& sum, const ReplayResult& part) {
   sum.restarts += part.restarts, sum.uncommitted += part.uncommitted, sum.unmade += part.unmade;
   sum.begun += part.begun, sum.begun_afresh += part.begun_afresh;
   if (sum.stateless.empty()) sum.stateless = part.stateless;
+  if (sum.first_lacking.empty()) sum.first_lacking = part.first_lacking;
   if (part.first && (!sum.first || part.first->release_ns < sum.first->release_ns)) sum.first = part.first;
   sum.different_of.insert(part.different_of.begin(), part.different_of.end());
   sum.recorded_ns = std::max(sum.recorded_ns, part.recorded_ns);

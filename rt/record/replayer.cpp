@@ -257,6 +257,10 @@ bool Replayer::fill_inputs(const RecordedJob& record) {
         const Stored* message = stored(edge.port, sequence);
         if (message == nullptr) {
           whole = false;
+          if (result_.first_lacking.empty() && counts(record.task))
+            result_.first_lacking = task.name + " job " + std::to_string(record.index) + ": " +
+                                    plan_.ports[edge.port].node + "." + plan_.ports[edge.port].port + " " +
+                                    std::to_string(sequence);
           continue;
         }
         const MessageHeader& header = *message->header;

@@ -30,6 +30,7 @@ struct ReplayResult {
   uint64_t whole = 0;               ///< of them, field by field
   uint64_t different = 0;           ///< messages, or jobs that sent something else than in the record
   uint64_t lacking = 0;             ///< jobs without all that they were given: lost or damaged in the record; not run
+  std::string first_lacking;        ///< "stereo job 81: head_camera.pair 122"
   uint64_t restarts = 0;            ///< of tasks, done again
   uint64_t uncommitted = 0;         ///< jobs whose process died before anything of them came out; not run
   uint64_t begun = 0;               ///< tasks that went on from a snapshot
