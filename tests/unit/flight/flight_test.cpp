@@ -198,7 +198,12 @@ TEST_CASE("Each cause of its own has its file, and the newest files stay") {
   test::SmallGraph small;
   REQUIRE(test::record_run(small.plan, **ring, 10).lost() == 0);
   const auto freeze = [&](uint64_t most_bytes, size_t at_least, int count) {
-    Freezer::Options how{folder.path / "frozen", "run", kSecond, kSecond, most_bytes, at_least};
+    Freezer::Options how;
+    how.folder = folder.path / "frozen";
+    how.name = "run";
+    how.before_ns = how.after_ns = kSecond;
+    how.most_bytes = most_bytes;
+    how.at_least = at_least;
     Freezer freezer(**ring, nullptr, how);
     for (int i = 0; i < count; ++i) freezer.freeze({"mark", std::to_string(i), "", kEpoch + (2 + i) * kSecond});
     return freezer.finish();

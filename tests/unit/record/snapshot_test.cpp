@@ -16,10 +16,10 @@ using namespace takt::record;
 
 namespace {
 
-constexpr int64_t kEpoch = 1'000'000'000, kSecond = 1'000'000'000;
+constexpr int64_t kEpoch = 1'000'000'000, kOneSecond = 1'000'000'000;
 
 /// Sums up what comes; the sum stands in what it makes.
-struct Sum final : Node {
+struct RunningSum final : Node {
   Input<Odometry> odometry{this, "odometry", ""};
   Output<Odometry> sum{this, "sum", ""};
   double total = 0;
@@ -41,18 +41,18 @@ struct Sum final : Node {
 };
 
 /// A device, a sum, and a sum of the sums at a tenth of the rate.
-struct Graph {
+struct RememberingGraph {
   test::OdometryDevice device;
-  Sum first, second;
+  RunningSum first, second;
   Plan plan;
-  explicit Graph(bool second_declares = true, bool says_other = false) {
+  explicit RememberingGraph(bool second_declares = true, bool says_other = false) {
     second.says_other = says_other;
     test::add_task(plan, device, "base", 0);
     test::add_task(plan, first, "first", 10'000'000);
     test::add_task(plan, second, "second", 55'000'000);
     plan.tasks[0].device = true;
     plan.tasks[2].rate = Rate{1, 1};
-    plan.tasks[2].deadline_ns = kSecond;
+    plan.tasks[2].deadline_ns = kOneSecond;
     plan.tasks[1].edges.push_back({0, 0, 4, 0});
     plan.tasks[2].edges.push_back({0, 1, 16, 0});
     for (size_t p = 0; p < plan.ports.size(); ++p) plan.ports[p].port = plan.tasks[p].node->outputs()[0]->name();
@@ -66,7 +66,7 @@ struct Graph {
       task.node->setup(setup);
       if (task.node->state() == nullptr) continue;
       task.node->size_state();
-      task.state_every_ns = kSecond;
+      task.state_every_ns = kOneSecond;
       task.ports.push_back(plan.ports.size());
       PortPlan port;
       port.node = task.name;
@@ -83,15 +83,15 @@ struct Graph {
 };
 
 /// `only_hash`: of what the nodes make.
-struct Record {
+struct RememberedRun {
   test::TemporaryFolder folder;
   std::filesystem::path file = folder.path / "run.mcap";
-  explicit Record(bool only_hash = false, bool second_declares = true, int64_t seconds = 20) {
+  explicit RememberedRun(bool only_hash = false, bool second_declares = true, int64_t seconds = 20) {
     auto sink = mcap::FileSink::open(file);
     REQUIRE(sink);
-    Graph graph(second_declares);
+    RememberingGraph graph(second_declares);
     Recorder::Options how;
-    how.snapshot_every_ns = kSecond;
+    how.snapshot_every_ns = kOneSecond;
     how.file.chunk_bytes = 2000;
     if (only_hash) how.ports = test::with_fields({1, 0, 0, 1, 1});
     CHECK(test::record_run(graph.plan, *sink, seconds, std::move(how)).lost() == 0);
@@ -103,7 +103,7 @@ struct Record {
   }
 };
 
-ReplayResult replay(LogFile& log, Graph& graph, Replayer::Options how) {
+ReplayResult replay_part(LogFile& log, RememberingGraph& graph, Replayer::Options how) {
   how.epoch_ns = kEpoch;
   how.renew = [&](size_t t) { (t == 1 ? graph.first : graph.second).total = 0; };
   return Replayer(graph.plan, log, how).run();
@@ -113,13 +113,13 @@ ReplayResult replay(LogFile& log, Graph& graph, Replayer::Options how) {
 
 TEST_CASE("A replay that begins anywhere makes what the run made, and no more jobs than it must") {
   for (const bool only_hash : {false, true}) {
-    const Record record(only_hash);
+    const RememberedRun record(only_hash);
     for (int64_t from_ms = 0; from_ms < 19'000; from_ms += 371) {
-      Graph graph;
+      RememberingGraph graph;
       LogFile log = record.open();
       Replayer::Options how;
       how.begin_ns = kEpoch + from_ms * 1'000'000;
-      const ReplayResult result = replay(log, graph, how);
+      const ReplayResult result = replay_part(log, graph, how);
       CAPTURE(from_ms);
       CHECK(result.different == 0);
       CHECK(result.lacking == 0);
@@ -134,17 +134,17 @@ TEST_CASE("A replay that begins anywhere makes what the run made, and no more jo
 }
 
 TEST_CASE("A part of a file is enough for a part of a replay") {
-  const Record record;
+  const RememberedRun record;
   auto log = LogFile::open_head(record.file);
   REQUIRE(log);
   CHECK(log->jobs().empty());
-  log->read(kEpoch + 8 * kSecond, kEpoch + 15 * kSecond);
+  log->read(kEpoch + 8 * kOneSecond, kEpoch + 15 * kOneSecond);
   CHECK(log->jobs().size() < 400);
-  Graph graph;
+  RememberingGraph graph;
   Replayer::Options how;
-  how.begin_ns = kEpoch + 11 * kSecond;
-  how.end_ns = kEpoch + 12 * kSecond;
-  const ReplayResult result = replay(*log, graph, how);
+  how.begin_ns = kEpoch + 11 * kOneSecond;
+  how.end_ns = kEpoch + 12 * kOneSecond;
+  const ReplayResult result = replay_part(*log, graph, how);
   CHECK(result.different == 0);
   CHECK(result.lacking == 0);
   CHECK(result.begun == 2);
@@ -153,19 +153,19 @@ TEST_CASE("A part of a file is enough for a part of a replay") {
 }
 
 TEST_CASE("A window of files begins at its first snapshots, and takes along what its jobs held") {
-  const Record record;
+  const RememberedRun record;
   test::TemporaryFolder folder;
   auto sink = mcap::FileSink::open(folder.path / "window.mcap");
   REQUIRE(sink);
   JoinOptions how;
-  how.from_ns = kEpoch + 7 * kSecond + 300'000'000;
-  how.to_ns = kEpoch + 13 * kSecond;
+  how.from_ns = kEpoch + 7 * kOneSecond + 300'000'000;
+  how.to_ns = kEpoch + 13 * kOneSecond;
   how.edges = {{}, {"base.odometry"}, {"first.sum"}};
   REQUIRE(join({record.file}, *sink, how));
   auto log = LogFile::open(folder.path / "window.mcap");
   REQUIRE(log);
-  Graph graph;
-  const ReplayResult result = replay(*log, graph, {});
+  RememberingGraph graph;
+  const ReplayResult result = replay_part(*log, graph, {});
   CHECK(result.different == 0);
   CHECK(result.lacking == 0);
   CHECK(result.begun == 2);
@@ -173,12 +173,12 @@ TEST_CASE("A window of files begins at its first snapshots, and takes along what
 }
 
 TEST_CASE("A node that does not say what it remembers begins afresh, and that is told") {
-  const Record record(false, false);
+  const RememberedRun record(false, false);
   LogFile log = record.open();
-  Graph graph(false);
+  RememberingGraph graph(false);
   Replayer::Options how;
-  how.begin_ns = kEpoch + 10 * kSecond;
-  const ReplayResult result = replay(log, graph, how);
+  how.begin_ns = kEpoch + 10 * kOneSecond;
+  const ReplayResult result = replay_part(log, graph, how);
   CHECK(result.begun == 2);
   CHECK(result.begun_afresh == 1);
   CHECK(result.stateless.starts_with("second: "));
@@ -187,26 +187,26 @@ TEST_CASE("A node that does not say what it remembers begins afresh, and that is
 }
 
 TEST_CASE("What another version of a node remembered is not loaded") {
-  const Record record;
+  const RememberedRun record;
   LogFile log = record.open();
-  Graph graph(true, true);
+  RememberingGraph graph(true, true);
   Replayer::Options how;
-  how.begin_ns = kEpoch + 10 * kSecond;
-  const ReplayResult result = replay(log, graph, how);
-  CHECK(result.begun_afresh == 2);
+  how.begin_ns = kEpoch + 10 * kOneSecond;
+  const ReplayResult result = replay_part(log, graph, how);
+  CHECK(result.begun_afresh == 1);
   CHECK(result.stateless.find("another version") != std::string::npos);
 }
 
 TEST_CASE("A visitor sees each job and may end the replay") {
-  const Record record;
+  const RememberedRun record;
   LogFile log = record.open();
-  Graph graph;
+  RememberingGraph graph;
   Replayer::Options how;
-  how.begin_ns = kEpoch + 10 * kSecond;
+  how.begin_ns = kEpoch + 10 * kOneSecond;
   size_t seen = 0;
   how.visit = [&](const Replayer& replayer, const RecordedJob& job) {
     if (job.task == 1) CHECK(replayer.newest(1) != nullptr);
     return ++seen < 5;
   };
-  CHECK(replay(log, graph, how).jobs == 5);
+  CHECK(replay_part(log, graph, how).jobs == 5);
 }
