@@ -74,7 +74,10 @@ void Node::accept_requests() {
 }
 
 void Node::publish_state() {
-  state_ = std::make_unique<Output<NodeState>>(this, "state", "what this node remembers, for a replay");
+  const bool taken =  // by an output of its own
+      std::any_of(outputs_.begin(), outputs_.end(), [](const OutputPort* port) { return port->name() == "state"; });
+  state_ = std::make_unique<Output<NodeState>>(this, taken ? "remembered" : "state",
+                                               "what this node remembers, for a replay");
 }
 
 void Node::size_state() {

@@ -105,7 +105,6 @@ void Tile::compact() {
 // The table as it is: a point that has moved to the border of its voxel stays in the slot that it was given.
 void Tile::remember(StateArchive& archive) {
   TAKT_STATE(archive, used_);
-  archive.room(sizeof *this + points_.capacity() * (kPointBytes + sizeof(Entry)));
   if (!used_) return;
   auto count = static_cast<uint32_t>(points_.size());
   TAKT_STATE(archive, loose_, in_map_, stamp_ns_, reach_m_, count);
@@ -125,6 +124,14 @@ void Tile::remember(StateArchive& archive) {
 }
 
 // TileMap -----------------------------------------------------------------------------------------------------------
+
+void TileMap::remember(StateArchive& archive) {
+  size_t all = 0;
+  for (const Tile& tile : tiles_) all += tile.used() ? tile.points().size() : 0;
+  archive.room(tiles_.size() * sizeof(Tile) + kMostRemembered * (kPointBytes + sizeof(Entry)));
+  if (all > kMostRemembered) return archive.fail();
+  TAKT_STATE(archive, tiles_, dropped_, first_judged_);
+}
 
 TileMap::TileMap(const MapParameters& parameters) : p_(parameters) {
   tiles_.reserve(p_.tiles);

@@ -147,7 +147,9 @@ class TileMap {
   size_t points() const;
   size_t bytes() const;
   uint64_t dropped() const { return dropped_; }  ///< points of tiles that made room
-  void remember(StateArchive& archive) { TAKT_STATE(archive, tiles_, dropped_, first_judged_); }
+  /// Of a map of at most kMostRemembered points: a job should not take milliseconds to save one.
+  void remember(StateArchive& archive);
+  static constexpr size_t kMostRemembered = 1 << 18;
 
  private:
   /// A tile that may hold what is being added.
