@@ -12,6 +12,8 @@
 
 #include "graph/cli/file_option.hpp"
 #include "graph/command/graph_commands.hpp"
+#include "graph/command/recorded_options.hpp"
+#include "graph/command/what_if_command.hpp"
 #include "graph/compose/composition.hpp"
 #include "graph/compose/partition.hpp"
 #include "graph/language/words.hpp"
@@ -31,18 +33,6 @@ namespace {
 
 using log::fact;
 using log::Json;
-
-/// Ends the command with a reason.
-struct Refused {
-  std::string why;
-};
-
-Json attached_json(const record::LogFile& file, const char* name) {
-  const auto text = file.attached(name);
-  Json json = text ? Json::parse(*text, nullptr, false) : Json();
-  if (json.is_discarded() || !json.is_object()) throw Refused{fmt::format("the record holds no readable {}", name)};
-  return json;
-}
 
 /// The outputs of the devices as the record has them; everything else is made here.
 class RecordedFacts final : public graph::FactExchange {
@@ -82,7 +72,8 @@ class Replay {
     for (const std::string& damage : file_->damages())
       std::fprintf(stderr, "takt: the record is not whole: %s\n", damage.c_str());
     damaged_ = !options_.allow_damage && !file_->damages().empty();
-    read_options();
+    run_ = recorded_options(*file_, options_);
+    recorded_ = attached_json(*file_, "plan.json");
     return run_;
   }
 
@@ -116,31 +107,6 @@ class Replay {
   }
 
  private:
-  void read_options() {
-    const mcap::Metadata& facts = file_->facts();
-    RunOptions& run = run_;
-    run.graph = options_.graph.empty() ? std::filesystem::path(fact(facts, "graph")) : options_.graph;
-    if (!std::filesystem::exists(run.graph))
-      throw Refused{fmt::format("the graph {} of the record is not there; name it: takt replay {} GRAPH",
-                                run.graph.string(), options_.log.string())};
-    if (options_.graph.empty()) run.load.schedule = fact(facts, "schedule");
-    run.load.params = options_.params.empty() ? std::filesystem::path(fact(facts, "params")) : options_.params;
-    if (!run.load.params.empty() && !std::filesystem::exists(run.load.params))
-      throw Refused{fmt::format("the parameter file {} of the record is not there; name it: --params FILE",
-                                run.load.params.string())};
-    run.load.profile = fact(facts, "profile");
-    run.load.mode = fact(facts, "mode");
-    run.load.policy = fact(facts, "policy_option");
-    std::istringstream settings(fact(facts, "set"));
-    for (std::string line; std::getline(settings, line);) run.load.set.push_back(line);
-    run.load.set.insert(run.load.set.end(), options_.set.begin(), options_.set.end());
-    run.clock = fact(facts, "clock");
-    run.output = options_.output;
-    run.seed = std::strtoull(fact(facts, "seed").c_str(), nullptr, 10);
-    run.load.plugin_files = options_.plugin_files;
-    recorded_ = attached_json(*file_, "plan.json");
-  }
-
   int compose() {
     int code = load(run_, *prepared_);
     if (code == kOk) {
@@ -369,23 +335,10 @@ class Replay {
   size_t processes_ = 1;
 };
 
-/// The exit code of `command`, also where it is refused.
-int judged(const ReplayOptions& options, const std::function<int()>& command) {
-  try {
-    return command();
-  } catch (const Refused& refused) {
-    return refuse(refused.why, kBadInput);
-  } catch (const std::runtime_error& problem) {  // processes
-    return refuse(problem.what(), kDeviceOrSystem);
-  } catch (const Json::exception& problem) {
-    return refuse(fmt::format("{}: what it says of its graph cannot be read: {}", options.log.string(), problem.what()),
-                  kBadInput);
-  }
-}
-
 }  // namespace
 
 int replay(plugin::Plugins& plugins, const ReplayOptions& options) {
+  if (options.asks_what_if() || options.json || !options.report.empty()) return what_if(plugins, options);
   std::vector<WriterLock> locks;
   if (const int code = claim_folder(options.output, locks); code != kOk) return code;
   return judged(options, [&] {
@@ -406,7 +359,8 @@ int replay(plugin::Plugins& plugins, const ReplayOptions& options) {
 }
 
 void add_replay(CLI::App& app, plugin::Plugins& plugins, ReplayOptions& o, int& exit_code) {
-  CLI::App* replay = app.add_subcommand("replay", "runs the jobs of a record again, with what they were given");
+  CLI::App* replay =
+      app.add_subcommand("replay", "runs the jobs of a record again, or predicts them on another schedule");
   reads_file(replay->add_option("log", o.log, "what `takt run --record` wrote"), UINT64_MAX)->required();
   reads_file(replay->add_option("graph", o.graph, "graph file instead of that of the record"));
   replay->add_flag("--compare", o.compare, "bit by bit with the record; exit 1 on the first message that differs");
@@ -420,8 +374,10 @@ void add_replay(CLI::App& app, plugin::Plugins& plugins, ReplayOptions& o, int& 
       ->check(CLI::IsMember({"none", "subsystem"}));
   replay->add_flag("--recorded-pace", o.recorded_pace, "as fast as it was, instead of as fast as possible");
   writes_folder(replay->add_option("--output", o.output, "folder for pictures and other results (default out)"));
+  add_what_if_options(*replay, o);
   replay->footer(
       "Example: takt replay run.mcap --compare\n"
+      "Example: takt replay run.mcap --schedule other.yaml --cores 1 --speed 0.5\n"
       "Example: takt replay run.mcap --live ground_map --set ground_map.votes_min=7");
   replay->callback([&] { exit_code = command::replay(plugins, o); });
 }

@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,12 @@ struct ReplayOptions {
   std::vector<std::string> set;   ///< "node.param=value", after those of the record
   std::vector<std::filesystem::path> plugin_files;  ///< beside those that the graph names
   double from_s = 0;                                ///< since the epoch of the run
+  // A what-if; see what_if_command.hpp.
+  std::filesystem::path schedule, report;  ///< empty: that of the record; none is written
+  std::optional<int> cores;
+  std::optional<double> speed;
+  bool json = false;
+  bool asks_what_if() const { return !schedule.empty() || cores || speed; }
 };
 
 /// `takt replay LOG [GRAPH]`: runs every job of a record again, with the inputs and answers that it had. Exit 1 if

@@ -1,0 +1,296 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "graph/what_if/recorded_run.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <map>
+#include <optional>
+#include <tuple>
+
+#include "graph/log/cut_log.hpp"
+#include "graph/log/log_content.hpp"
+#include "rt/msg/requests.hpp"
+#include "rt/node.hpp"
+
+namespace takt::what_if {
+namespace {
+
+using record::LogFile;
+using record::RecordedJob;
+
+/// A record that begins later than this after its epoch has not the beginning of its run.
+constexpr int64_t kWhole_ns = 1'000'000'000;
+
+/// Stamps of the messages of one port by sequence.
+class Stamps {
+ public:
+  explicit Stamps(const std::map<uint64_t, LogFile::Known>& messages) {
+    if (messages.empty()) return;
+    first_ = messages.begin()->first;
+    stamps_.resize(static_cast<size_t>(messages.rbegin()->first - first_ + 1), kUnknown);
+    for (const auto& [sequence, known] : messages) stamps_[static_cast<size_t>(sequence - first_)] = known.stamp_ns;
+  }
+  std::optional<int64_t> of(uint64_t sequence) const {
+    if (sequence < first_ || sequence - first_ >= stamps_.size()) return std::nullopt;
+    const int64_t stamp_ns = stamps_[static_cast<size_t>(sequence - first_)];
+    return stamp_ns == kUnknown ? std::nullopt : std::optional(stamp_ns);
+  }
+  /// A message that was published again has a sequence of its own, under which the record does not have it.
+  void repeat(uint64_t sequence) {
+    const auto before_ns = of(sequence - 1);
+    if (!before_ns || of(sequence)) return;
+    if (sequence - first_ >= stamps_.size()) stamps_.resize(static_cast<size_t>(sequence - first_ + 1), kUnknown);
+    stamps_[static_cast<size_t>(sequence - first_)] = *before_ns;
+  }
+
+ private:
+  static constexpr int64_t kUnknown = INT64_MIN;
+  uint64_t first_ = 0;
+  std::vector<int64_t> stamps_;
+};
+
+/// Calls visit(edge, back, sequence) for what a job held, the newest message of each edge first, until it says false.
+template <class Visit>
+void for_each_held(const RecordedJob& job, const Visit& visit) {
+  for (const RecordedJob::Input& input : job.inputs) {
+    uint16_t back = 0;
+    for (auto run = input.held.rbegin(); run != input.held.rend(); ++run)
+      for (uint64_t n = run->count; n-- > 0;) visit(input.edge, back++, run->first + n);
+  }
+}
+
+class Reading {
+ public:
+  Reading(LogFile& log, const Plan& plan) : log_(log), plan_(plan) {
+    for (const PortPlan& port : plan_.ports) {
+      channels_.push_back(log_.channel(port.node + "." + port.port));
+      stamps_.emplace_back(log_.messages(channels_.back()));
+    }
+    run_.tasks.resize(plan_.tasks.size());
+    for (const TaskPlan& task : plan_.tasks) {
+      RecordedFigures& figures = run_.figures.emplace_back();
+      figures.edge_age.resize(task.edges.size());
+      figures.output_age.resize(task.ports.size());
+    }
+  }
+
+  RecordedRun read() {
+    find_window();
+    const std::vector<const RecordedJob*> jobs = jobs_by_release();
+    for (const RecordedJob* job : jobs)
+      for (const RecordedJob::Output& output : job->outputs)
+        if (output.repeated) stamps_[plan_.tasks[job->task].ports[output.output]].repeat(output.sequence);
+    for (const RecordedJob* job : jobs) {
+      if (job->cut_off) ++run_.cut_off;
+      else take(*job);
+    }
+    for (const record::RecordedEvent& event : log_.events())
+      if (const auto* change = std::get_if<record::ModeChange>(&event.what);
+          change != nullptr && !caused_by_schedule(*change))
+        run_.modes.push_back(event);
+    std::stable_sort(run_.modes.begin(), run_.modes.end(),
+                     [](const auto& a, const auto& b) { return a.at_ns < b.at_ns; });
+    return std::move(run_);
+  }
+
+ private:
+  bool known(const RecordedJob& job) const {
+    if (job.task >= plan_.tasks.size()) return false;
+    const TaskPlan& task = plan_.tasks[job.task];
+    const bool inputs = std::all_of(job.inputs.begin(), job.inputs.end(),
+                                    [&](const auto& input) { return input.edge < task.edges.size(); });
+    return inputs && std::all_of(job.outputs.begin(), job.outputs.end(),
+                                 [&](const auto& output) { return output.output < task.ports.size(); });
+  }
+
+  std::vector<const RecordedJob*> jobs_by_release() {
+    std::vector<const RecordedJob*> jobs;
+    withholds_.assign(plan_.tasks.size(), 1);
+    for (const RecordedJob& job : log_.jobs()) {
+      if (!known(job) || job.release_ns < run_.from_ns) continue;
+      if (plan_.tasks[job.task].rate && job.release_ns >= run_.end_ns) continue;
+      jobs.push_back(&job);
+      if (job.late && makes_something(job)) withholds_[job.task] = 0;
+    }
+    std::stable_sort(jobs.begin(), jobs.end(),
+                     [](const RecordedJob* a, const RecordedJob* b) { return a->release_ns < b->release_ns; });
+    return jobs;
+  }
+
+  void find_window() {
+    int64_t first = INT64_MAX, last = INT64_MIN;
+    for (const RecordedJob& job : log_.jobs()) {
+      first = std::min(first, job.release_ns);
+      last = std::max(last, job.release_ns);
+    }
+    run_.epoch_ns = log::fact(log_.end(), "epoch_ns").empty() ? epoch_by_devices() : log::epoch_ns(log_);
+    if (first > last) first = last = run_.epoch_ns;
+    run_.from_ns = first - run_.epoch_ns > kWhole_ns ? first : run_.epoch_ns;
+    const int64_t stated = std::atoll(log::fact(log_.end(), "end_ns").c_str());
+    run_.end_ns = stated > run_.from_ns && stated - last <= kWhole_ns ? stated : last + 1;
+    // A cut has jobs of before as well, whose messages it needs.
+    double from_s = 0, to_s = 0;
+    const std::string cut = log::fact(log_.facts(), "cut");
+    if (std::sscanf(cut.c_str(), "%lf s to %lf s", &from_s, &to_s) != 2) return;
+    const auto instant = [&](double s) { return run_.epoch_ns + static_cast<int64_t>(std::llround(s * 1e9)); };
+    run_.from_ns = std::max(run_.epoch_ns, instant(from_s));
+    run_.end_ns = std::min(instant(to_s), last + kWhole_ns);
+    if (stated > run_.from_ns) run_.end_ns = std::min(run_.end_ns, stated);
+  }
+
+  /// Of a record without an end, which may begin late: devices count their releases from the epoch on, and one of them
+  /// at least has no offset.
+  int64_t epoch_by_devices() const {
+    struct Span {
+      const RecordedJob *first = nullptr, *last = nullptr;
+    };
+    std::vector<Span> spans(plan_.tasks.size());
+    for (const RecordedJob& job : log_.jobs()) {
+      if (job.task >= spans.size() || !plan_.tasks[job.task].device || !plan_.tasks[job.task].rate) continue;
+      Span& span = spans[job.task];
+      if (span.first == nullptr || job.index < span.first->index) span.first = &job;
+      if (span.last == nullptr || job.index > span.last->index) span.last = &job;
+    }
+    int64_t epoch_ns = INT64_MAX;
+    for (const auto& [first, last] : spans) {
+      if (first == last) continue;
+      const double period_ns = static_cast<double>(last->release_ns - first->release_ns) / (last->index - first->index);
+      epoch_ns = std::min<int64_t>(epoch_ns, first->release_ns - std::llround(period_ns * first->index));
+    }
+    return epoch_ns == INT64_MAX ? log::epoch_ns(log_) : epoch_ns;
+  }
+
+  /// The other schedule decides by itself whether that happens.
+  bool caused_by_schedule(const record::ModeChange& change) const {
+    return change.mode == plan_.safe_stop &&
+           (change.reason.ends_with(": deadline missed") || change.reason.ends_with(": budget exceeded"));
+  }
+
+  static bool makes_something(const RecordedJob& job) {
+    return std::any_of(job.outputs.begin(), job.outputs.end(), [](const auto& output) { return !output.repeated; });
+  }
+
+  void take(const RecordedJob& job) {
+    RecordedTask& task = run_.tasks[job.task];
+    const auto& levels = plan_.tasks[job.task].node->levels();
+    const auto level = static_cast<size_t>(std::max(job.level, 0));
+    const double cost = level < levels.size() ? levels[level].cost : 1.0;
+    RecordedPart part;
+    part.release_ns = job.release_ns;
+    part.visible_ns = job.visible_at_ns != 0 ? job.visible_at_ns : job.published_ns;  // format 1 has none
+    part.full_ns = at_full_quality_ns(job.cpu_ns, cost);
+    part.first = static_cast<uint32_t>(task.said.size());
+    note(job, part.visible_ns);
+    // What `skip` and `reuse_last` held back is not in the record: what the job before it said stands for it.
+    const bool withheld = job.late && withholds_[job.task] != 0 && !makes_something(job);
+    for (const RecordedJob::Output& output : job.outputs)
+      if (!output.repeated) task.said.push_back(said(job, output));
+    part.count = static_cast<uint32_t>(task.said.size()) - part.first;
+    if (withheld && !task.parts.empty())
+      std::tie(part.first, part.count) = std::pair(task.parts.back().first, task.parts.back().count);
+    task.parts.push_back(part);
+  }
+
+  /// The figures that a run would have counted.
+  void note(const RecordedJob& job, int64_t visible_ns) {
+    RecordedFigures& figures = run_.figures[job.task];
+    const TaskPlan& task = plan_.tasks[job.task];
+    ++figures.jobs;
+    figures.deadline_misses += job.late;
+    figures.lateness.add(job.start_ns - job.release_ns);
+    figures.exec.add(job.cpu_ns);
+    figures.response.add(job.published_ns - job.release_ns);
+    for_each_held(job, [&](uint16_t edge, uint16_t back, uint64_t sequence) {
+      if (const auto stamp_ns = stamps_[task.edges[edge].port].of(sequence); back == 0 && stamp_ns)
+        figures.edge_age[edge].add(job.start_ns - *stamp_ns);
+    });
+    for (const RecordedJob::Output& output : job.outputs)
+      if (const auto stamp_ns = stamps_[task.ports[output.output]].of(output.sequence); stamp_ns && !output.repeated)
+        figures.output_age[output.output].add(visible_ns - *stamp_ns);
+  }
+
+  Said said(const RecordedJob& job, const RecordedJob::Output& output) {
+    const size_t port = plan_.tasks[job.task].ports[output.output];
+    Said said{output.output, {}, {}};
+    if (const auto stamp_ns = stamps_[port].of(output.sequence)) said.stamp = origin(job, output.output, *stamp_ns);
+    else ++run_.unknown_stamps, said.stamp = newest_input(job, output.output);
+    if (plan_.ports[port].type->name == Requests::type_name) said.content = content(port, output.sequence);
+    return said;
+  }
+
+  bool carries(const RecordedJob& job, uint16_t edge, uint16_t output) const {
+    const TaskPlan& task = plan_.tasks[job.task];
+    const InputPort& input = *task.node->inputs()[task.edges[edge].input];
+    return !task.device && &input != task.node->control() && task.node->outputs()[output]->stamped_by(input);
+  }
+
+  /// Of the messages that the job held the one with that stamp, or the nearest. What is not older than the release can
+  /// be none of them: a device's, or the node's own.
+  StampOrigin origin(const RecordedJob& job, uint16_t output, int64_t stamp_ns) const {
+    if (stamp_ns > job.release_ns && stamp_ns >= job.start_ns)
+      return {StampOrigin::start, 0, 0, stamp_ns - job.start_ns};
+    StampOrigin best{StampOrigin::release, 0, 0, stamp_ns - job.release_ns};
+    if (stamp_ns >= job.release_ns) return best;
+    std::pair<int64_t, uint16_t> least{INT64_MAX, 0};
+    for_each_held(job, [&](uint16_t edge, uint16_t back, uint64_t sequence) {
+      const auto held_ns = stamps_[plan_.tasks[job.task].edges[edge].port].of(sequence);
+      if (!held_ns || !carries(job, edge, output)) return;
+      const std::pair<int64_t, uint16_t> far{std::abs(stamp_ns - *held_ns), back};
+      if (far >= least) return;
+      least = far;
+      best = {StampOrigin::input, edge, back, stamp_ns - *held_ns};
+    });
+    return best;
+  }
+
+  StampOrigin newest_input(const RecordedJob& job, uint16_t output) const {
+    for (const RecordedJob::Input& input : job.inputs)
+      if (!input.held.empty() && carries(job, input.edge, output)) return {StampOrigin::input, input.edge, 0, 0};
+    return {};
+  }
+
+  /// Once for equal messages: requests change seldom.
+  std::shared_ptr<const std::vector<std::byte>> content(size_t port, uint64_t sequence) {
+    const auto& messages = log_.messages(channels_[port]);
+    const auto known = messages.find(sequence);
+    if (known == messages.end() || !known->second.whole) return nullptr;
+    auto& bytes = contents_[known->second.hash];
+    if (bytes) return bytes;
+    if (const auto message = log_.message(channels_[port], sequence))
+      bytes = std::make_shared<const std::vector<std::byte>>(message->data.begin(), message->data.end());
+    return bytes;
+  }
+
+  LogFile& log_;
+  const Plan& plan_;
+  std::vector<uint16_t> channels_;
+  std::vector<Stamps> stamps_;
+  std::vector<char> withholds_;  ///< by task: its late jobs publish nothing of their own
+  std::map<uint64_t, std::shared_ptr<const std::vector<std::byte>>> contents_;  ///< by hash
+  RecordedRun run_;
+};
+
+}  // namespace
+
+const RecordedPart* RecordedTask::nearest(int64_t release_ns) const {
+  if (parts.empty()) return nullptr;
+  const auto after = std::lower_bound(parts.begin(), parts.end(), release_ns,
+                                      [](const RecordedPart& part, int64_t ns) { return part.release_ns < ns; });
+  if (after == parts.begin()) return &*after;
+  const auto before = after - 1;
+  if (after == parts.end() || release_ns - before->release_ns <= after->release_ns - release_ns) return &*before;
+  return &*after;
+}
+
+int64_t at_full_quality_ns(int64_t cpu_ns, double cost) {
+  if (!(cost > 0)) return cpu_ns;
+  auto full_ns = static_cast<int64_t>(static_cast<double>(cpu_ns) / cost);
+  while (static_cast<int64_t>(static_cast<double>(full_ns) * cost) < cpu_ns) ++full_ns;
+  return full_ns;
+}
+
+RecordedRun read_recorded_run(LogFile& log, const Plan& plan) { return Reading(log, plan).read(); }
+
+}  // namespace takt::what_if
