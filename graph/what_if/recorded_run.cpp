@@ -11,6 +11,7 @@
 
 #include "graph/log/cut_log.hpp"
 #include "graph/log/log_content.hpp"
+#include "graph/what_if/habits.hpp"
 #include "rt/msg/requests.hpp"
 #include "rt/node.hpp"
 
@@ -23,69 +24,23 @@ using record::RecordedJob;
 /// A record that begins later than this after its epoch has not the beginning of its run.
 constexpr int64_t kWhole_ns = 1'000'000'000;
 
-/// Stamps of the messages of one port by sequence.
-class Stamps {
- public:
-  explicit Stamps(const std::map<uint64_t, LogFile::Known>& messages) {
-    if (messages.empty()) return;
-    first_ = messages.begin()->first;
-    stamps_.resize(static_cast<size_t>(messages.rbegin()->first - first_ + 1), kUnknown);
-    for (const auto& [sequence, known] : messages) stamps_[static_cast<size_t>(sequence - first_)] = known.stamp_ns;
-  }
-  std::optional<int64_t> of(uint64_t sequence) const {
-    if (sequence < first_ || sequence - first_ >= stamps_.size()) return std::nullopt;
-    const int64_t stamp_ns = stamps_[static_cast<size_t>(sequence - first_)];
-    return stamp_ns == kUnknown ? std::nullopt : std::optional(stamp_ns);
-  }
-  /// A message that was published again has a sequence of its own, under which the record does not have it.
-  void repeat(uint64_t sequence) {
-    const auto before_ns = of(sequence - 1);
-    if (!before_ns || of(sequence)) return;
-    if (sequence - first_ >= stamps_.size()) stamps_.resize(static_cast<size_t>(sequence - first_ + 1), kUnknown);
-    stamps_[static_cast<size_t>(sequence - first_)] = *before_ns;
-  }
-
- private:
-  static constexpr int64_t kUnknown = INT64_MIN;
-  uint64_t first_ = 0;
-  std::vector<int64_t> stamps_;
-};
-
-/// Calls visit(edge, back, sequence) for what a job held, the newest message of each edge first, until it says false.
-template <class Visit>
-void for_each_held(const RecordedJob& job, const Visit& visit) {
-  for (const RecordedJob::Input& input : job.inputs) {
-    uint16_t back = 0;
-    for (auto run = input.held.rbegin(); run != input.held.rend(); ++run)
-      for (uint64_t n = run->count; n-- > 0;) visit(input.edge, back++, run->first + n);
-  }
-}
-
 class Reading {
  public:
-  Reading(LogFile& log, const Plan& plan) : log_(log), plan_(plan) {
-    for (const PortPlan& port : plan_.ports) {
-      channels_.push_back(log_.channel(port.node + "." + port.port));
-      stamps_.emplace_back(log_.messages(channels_.back()));
-    }
+  Reading(LogFile& log, const Plan& plan) : log_(log), plan_(plan), last_(plan.tasks.size()) {
     run_.tasks.resize(plan_.tasks.size());
     for (const TaskPlan& task : plan_.tasks) {
       RecordedFigures& figures = run_.figures.emplace_back();
       figures.edge_age.resize(task.edges.size());
       figures.output_age.resize(task.ports.size());
+      last_[run_.figures.size() - 1].resize(task.ports.size());
     }
   }
 
   RecordedRun read() {
     find_window();
     const std::vector<const RecordedJob*> jobs = jobs_by_release();
-    for (const RecordedJob* job : jobs)
-      for (const RecordedJob::Output& output : job->outputs)
-        if (output.repeated) stamps_[plan_.tasks[job->task].ports[output.output]].repeat(output.sequence);
-    for (const RecordedJob* job : jobs) {
-      if (job->cut_off) ++run_.cut_off;
-      else take(*job);
-    }
+    const Habits habits(log_, plan_, jobs);
+    habits.for_each_job([&](const RecordedJob& job, const Seen& seen) { take(job, seen, habits); });
     for (const record::RecordedEvent& event : log_.events())
       if (const auto* change = std::get_if<record::ModeChange>(&event.what);
           change != nullptr && !caused_by_schedule(*change))
@@ -107,12 +62,11 @@ class Reading {
 
   std::vector<const RecordedJob*> jobs_by_release() {
     std::vector<const RecordedJob*> jobs;
-    withholds_.assign(plan_.tasks.size(), 1);
     for (const RecordedJob& job : log_.jobs()) {
       if (!known(job) || job.release_ns < run_.from_ns) continue;
       if (plan_.tasks[job.task].rate && job.release_ns >= run_.end_ns) continue;
-      jobs.push_back(&job);
-      if (job.late && makes_something(job)) withholds_[job.task] = 0;
+      if (job.cut_off) ++run_.cut_off;
+      else jobs.push_back(&job);
     }
     std::stable_sort(jobs.begin(), jobs.end(),
                      [](const RecordedJob* a, const RecordedJob* b) { return a->release_ns < b->release_ns; });
@@ -168,11 +122,7 @@ class Reading {
            (change.reason.ends_with(": deadline missed") || change.reason.ends_with(": budget exceeded"));
   }
 
-  static bool makes_something(const RecordedJob& job) {
-    return std::any_of(job.outputs.begin(), job.outputs.end(), [](const auto& output) { return !output.repeated; });
-  }
-
-  void take(const RecordedJob& job) {
+  void take(const RecordedJob& job, const Seen& seen, const Habits& habits) {
     RecordedTask& task = run_.tasks[job.task];
     const auto& levels = plan_.tasks[job.task].node->levels();
     const auto level = static_cast<size_t>(std::max(job.level, 0));
@@ -182,19 +132,22 @@ class Reading {
     part.visible_ns = job.visible_at_ns != 0 ? job.visible_at_ns : job.published_ns;  // format 1 has none
     part.full_ns = at_full_quality_ns(job.cpu_ns, cost);
     part.first = static_cast<uint32_t>(task.said.size());
-    note(job, part.visible_ns);
-    // What `skip` and `reuse_last` held back is not in the record: what the job before it said stands for it.
-    const bool withheld = job.late && withholds_[job.task] != 0 && !makes_something(job);
-    for (const RecordedJob::Output& output : job.outputs)
-      if (!output.repeated) task.said.push_back(said(job, output));
+    note(job, part.visible_ns, habits);
+    for (uint16_t o = 0; o < last_[job.task].size(); ++o) {
+      std::optional<Said>& last = last_[job.task][o];
+      if (const RecordedJob::Output* output = made(job, o)) task.said.push_back(*(last = said(job, *output, habits)));
+      else if (last && habits.if_new(job.task, o) && habits.only_old(job, seen, o))
+        task.said.push_back(*last);  // should there be something new in another run
+    }
     part.count = static_cast<uint32_t>(task.said.size()) - part.first;
-    if (withheld && !task.parts.empty())
+    // What was held back is not in the record: what the job before it said stands for it.
+    if (habits.withheld(job) && !task.parts.empty())
       std::tie(part.first, part.count) = std::pair(task.parts.back().first, task.parts.back().count);
     task.parts.push_back(part);
   }
 
   /// The figures that a run would have counted.
-  void note(const RecordedJob& job, int64_t visible_ns) {
+  void note(const RecordedJob& job, int64_t visible_ns, const Habits& habits) {
     RecordedFigures& figures = run_.figures[job.task];
     const TaskPlan& task = plan_.tasks[job.task];
     ++figures.jobs;
@@ -203,71 +156,43 @@ class Reading {
     figures.exec.add(job.cpu_ns);
     figures.response.add(job.published_ns - job.release_ns);
     for_each_held(job, [&](uint16_t edge, uint16_t back, uint64_t sequence) {
-      if (const auto stamp_ns = stamps_[task.edges[edge].port].of(sequence); back == 0 && stamp_ns)
+      if (const auto stamp_ns = habits.stamps(task.edges[edge].port).of(sequence); back == 0 && stamp_ns)
         figures.edge_age[edge].add(job.start_ns - *stamp_ns);
     });
     for (const RecordedJob::Output& output : job.outputs)
-      if (const auto stamp_ns = stamps_[task.ports[output.output]].of(output.sequence); stamp_ns && !output.repeated)
+      if (const auto stamp_ns = habits.stamps(task.ports[output.output]).of(output.sequence);
+          stamp_ns && !output.repeated)
         figures.output_age[output.output].add(visible_ns - *stamp_ns);
   }
 
-  Said said(const RecordedJob& job, const RecordedJob::Output& output) {
+  Said said(const RecordedJob& job, const RecordedJob::Output& output, const Habits& habits) {
     const size_t port = plan_.tasks[job.task].ports[output.output];
-    Said said{output.output, {}, {}};
-    if (const auto stamp_ns = stamps_[port].of(output.sequence)) said.stamp = origin(job, output.output, *stamp_ns);
-    else ++run_.unknown_stamps, said.stamp = newest_input(job, output.output);
+    const auto stamp_ns = habits.stamps(port).of(output.sequence);
+    run_.unknown_stamps += !stamp_ns;
+    Said said;
+    said.output = output.output;
+    said.stamp = stamp_ns ? habits.origin(job, output.output, *stamp_ns) : habits.newest_input(job, output.output);
+    said.if_new = habits.if_new(job.task, output.output);
     if (plan_.ports[port].type->name == Requests::type_name) said.content = content(port, output.sequence);
     return said;
   }
 
-  bool carries(const RecordedJob& job, uint16_t edge, uint16_t output) const {
-    const TaskPlan& task = plan_.tasks[job.task];
-    const InputPort& input = *task.node->inputs()[task.edges[edge].input];
-    return !task.device && &input != task.node->control() && task.node->outputs()[output]->stamped_by(input);
-  }
-
-  /// Of the messages that the job held the one with that stamp, or the nearest. What is not older than the release can
-  /// be none of them: a device's, or the node's own.
-  StampOrigin origin(const RecordedJob& job, uint16_t output, int64_t stamp_ns) const {
-    if (stamp_ns > job.release_ns && stamp_ns >= job.start_ns)
-      return {StampOrigin::start, 0, 0, stamp_ns - job.start_ns};
-    StampOrigin best{StampOrigin::release, 0, 0, stamp_ns - job.release_ns};
-    if (stamp_ns >= job.release_ns) return best;
-    std::pair<int64_t, uint16_t> least{INT64_MAX, 0};
-    for_each_held(job, [&](uint16_t edge, uint16_t back, uint64_t sequence) {
-      const auto held_ns = stamps_[plan_.tasks[job.task].edges[edge].port].of(sequence);
-      if (!held_ns || !carries(job, edge, output)) return;
-      const std::pair<int64_t, uint16_t> far{std::abs(stamp_ns - *held_ns), back};
-      if (far >= least) return;
-      least = far;
-      best = {StampOrigin::input, edge, back, stamp_ns - *held_ns};
-    });
-    return best;
-  }
-
-  StampOrigin newest_input(const RecordedJob& job, uint16_t output) const {
-    for (const RecordedJob::Input& input : job.inputs)
-      if (!input.held.empty() && carries(job, input.edge, output)) return {StampOrigin::input, input.edge, 0, 0};
-    return {};
-  }
-
   /// Once for equal messages: requests change seldom.
   std::shared_ptr<const std::vector<std::byte>> content(size_t port, uint64_t sequence) {
-    const auto& messages = log_.messages(channels_[port]);
+    const uint16_t channel = log_.channel(plan_.ports[port].node + "." + plan_.ports[port].port);
+    const auto& messages = log_.messages(channel);
     const auto known = messages.find(sequence);
     if (known == messages.end() || !known->second.whole) return nullptr;
     auto& bytes = contents_[known->second.hash];
     if (bytes) return bytes;
-    if (const auto message = log_.message(channels_[port], sequence))
+    if (const auto message = log_.message(channel, sequence))
       bytes = std::make_shared<const std::vector<std::byte>>(message->data.begin(), message->data.end());
     return bytes;
   }
 
   LogFile& log_;
   const Plan& plan_;
-  std::vector<uint16_t> channels_;
-  std::vector<Stamps> stamps_;
-  std::vector<char> withholds_;  ///< by task: its late jobs publish nothing of their own
+  std::vector<std::vector<std::optional<Said>>> last_;                          ///< by task and output
   std::map<uint64_t, std::shared_ptr<const std::vector<std::byte>>> contents_;  ///< by hash
   RecordedRun run_;
 };

@@ -26,10 +26,11 @@ struct StampOrigin {
   int64_t offset_ns = 0;  ///< the stamp minus that instant
 };
 
-/// One message that a job published.
+/// One message that a job published, or would publish.
 struct Said {
   uint16_t output = 0;  ///< index into TaskPlan::ports
   StampOrigin stamp;
+  bool if_new = false;  ///< only if the message that its stamp came from is new to the job
   std::shared_ptr<const std::vector<std::byte>> content;  ///< packed; null unless the message is a request
 };
 

@@ -32,7 +32,7 @@ void StandIn::run(Job& job) {
   bool sent = false;
   for (uint32_t i = 0; i < count; ++i) {
     const Said& said = recorded_.said[part_->first + i];
-    const auto stamp = stamp_ns(said.stamp, job);
+    const auto stamp = stamp_ns(said, job);
     Port& output = outputs_[said.output];
     void* message = stamp ? output.loan() : nullptr;
     if (message == nullptr) continue;
@@ -43,14 +43,16 @@ void StandIn::run(Job& job) {
   if (!sent && !outputs_.empty()) job.no_result();
 }
 
-/// Nothing: the message that it was made of is not there.
-std::optional<int64_t> StandIn::stamp_ns(const StampOrigin& origin, const Job& job) const {
+/// Nothing: the message that it would be made of is not there.
+std::optional<int64_t> StandIn::stamp_ns(const Said& said, const Job& job) const {
+  const StampOrigin& origin = said.stamp;
   if (origin.of == StampOrigin::release) return job.release_ns() + origin.offset_ns;
   if (origin.of == StampOrigin::start) return job.now_ns() + origin.offset_ns;
   const InputPort& input = *inputs()[real_.edges[origin.edge].input];
   if (input.empty()) return std::nullopt;
-  const size_t back = std::min<size_t>(origin.back, input.size() - 1);
-  return input.stamp_ns(input.size() - 1 - back) + origin.offset_ns;
+  const size_t from = input.size() - 1 - std::min<size_t>(origin.back, input.size() - 1);
+  if (said.if_new && !input.is_new(from)) return std::nullopt;
+  return input.stamp_ns(from) + origin.offset_ns;
 }
 
 }  // namespace takt::what_if

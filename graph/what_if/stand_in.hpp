@@ -38,7 +38,7 @@ class StandIn final : public Node {
     using OutputPort::OutputPort;
     void* loan() { return loan_message(); }
   };
-  std::optional<int64_t> stamp_ns(const StampOrigin& origin, const Job& job) const;
+  std::optional<int64_t> stamp_ns(const Said& said, const Job& job) const;
 
   const TaskPlan& real_;
   const RecordedTask& recorded_;

@@ -29,10 +29,11 @@ struct Relay final : Node {
   Input<Odometry> in{this, "in", ""};
   Output<Odometry> out{this, "out", ""};
   Levels levels{this, {{"full", 1.0}, {"half", 0.53}, {"poor", 0.2}}};
-  bool oldest = false;  ///< its results are of the oldest message that it holds
+  bool oldest = false;    ///< its results are of the oldest message that it holds
+  bool only_new = false;  ///< it has some for new input only
   void setup(Setup&) override {}
   void run(Job& job) override {
-    if (in.empty() || out.loan() == nullptr) return job.no_result();
+    if (in.empty() || (only_new && !in.is_new()) || out.loan() == nullptr) return job.no_result();
     out.send(in.stamp_ns(oldest ? 0 : in.size() - 1));
   }
 };
