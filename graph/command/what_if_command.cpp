@@ -19,6 +19,7 @@
 #include "graph/run/report.hpp"
 #include "graph/run/support.hpp"
 #include "graph/what_if/comparison.hpp"
+#include "rt/file/input_file.hpp"
 #include "rt/sched/plan_ports.hpp"
 
 namespace takt::command {
@@ -33,7 +34,7 @@ constexpr double kSlowest = 0.001, kFastest = 1000;
 std::string wrong_options(const ReplayOptions& o) {
   if (!o.asks_what_if() && (o.json || !o.report.empty()))
     return fmt::format("{}: only a what-if has a report; add --schedule, --cores or --speed",
-                       o.json ? "--json" : "--report");
+                       o.json ? "--json" : "--report " + o.report.string());
   if (!o.asks_what_if()) return "";
   for (const auto& [given, option] : {std::pair(o.compare, "--compare"),
                                       {!o.live.empty(), "--live"},
@@ -91,8 +92,8 @@ class WhatIf {
  private:
   int load_schedule(Prepared& prepared) {
     const std::filesystem::path& asked = options_.schedule;
-    if (!asked.empty() && !std::filesystem::is_regular_file(asked))
-      throw Refused{fmt::format("--schedule {}: there is no such file{}", asked.string(), choices(prepared.registry))};
+    if (const std::string why = asked.empty() ? "" : why_unreadable(asked); !why.empty())
+      throw Refused{fmt::format("--schedule {} {}{}", asked.string(), why, choices(prepared.registry))};
     const int code = load(run_, prepared);
     if (code == kOk) return code;
     tell_problems(prepared.problems.size());

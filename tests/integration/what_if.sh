@@ -40,8 +40,9 @@ expect 0 "" "$takt" replay "$work/cut.mcap" --cores 2
 prints "1.0 s, predicted from"
 
 # What cannot be used, with the option at fault and the valid choices.
-what_if 2 "--schedule $work/none.yaml: there is no such file; schedules of this graph: " --schedule "$work/none.yaml"
+what_if 2 "--schedule $work/none.yaml cannot be read: No such file or directory; schedules of this graph: " --schedule "$work/none.yaml"
 grep -q "schedules/thesis.yaml" "$work/stderr" || fail "no schedule is offered"
+what_if 2 "--schedule $work is a folder, a file is expected; schedules of this graph: " --schedule "$work"
 what_if 2 "kitti.yaml: this is no schedule of the graph of the record" --schedule "$source/schedules/kitti.yaml"
 grep -q 'node `stereo_wide` has no entry in the schedule' "$work/stderr" || fail "the missing node is not named"
 what_if 2 "--cores 0: choose 1 to 64" --cores 0
