@@ -10,31 +10,24 @@ namespace takt::what_if {
 
 using record::RecordedJob;
 
-const RecordedJob::Output* made(const RecordedJob& job, uint16_t output) {
+const RecordedJob::Output* made(const RecordedJob& job, size_t output) {
   const auto found = std::find_if(job.outputs.begin(), job.outputs.end(), [&](const RecordedJob::Output& said) {
     return said.output == output && !said.repeated;
   });
   return found == job.outputs.end() ? nullptr : &*found;
 }
 
-Stamps::Stamps(const std::map<uint64_t, record::LogFile::Known>& messages) {
-  if (messages.empty()) return;
-  first_ = messages.begin()->first;
-  stamps_.resize(static_cast<size_t>(messages.rbegin()->first - first_ + 1), kUnknown);
-  for (const auto& [sequence, known] : messages) stamps_[static_cast<size_t>(sequence - first_)] = known.stamp_ns;
+Stamps::Stamps(const std::map<uint64_t, record::LogFile::Known>& messages) : stamps_(messages.size()) {
+  for (const auto& [sequence, known] : messages) stamps_.emplace(sequence, known.stamp_ns);
 }
 
 std::optional<int64_t> Stamps::of(uint64_t sequence) const {
-  if (sequence < first_ || sequence - first_ >= stamps_.size()) return std::nullopt;
-  const int64_t stamp_ns = stamps_[static_cast<size_t>(sequence - first_)];
-  return stamp_ns == kUnknown ? std::nullopt : std::optional(stamp_ns);
+  const auto found = stamps_.find(sequence);
+  return found == stamps_.end() ? std::nullopt : std::optional(found->second);
 }
 
 void Stamps::repeat(uint64_t sequence) {
-  const auto before_ns = of(sequence - 1);
-  if (!before_ns || of(sequence)) return;
-  if (sequence - first_ >= stamps_.size()) stamps_.resize(static_cast<size_t>(sequence - first_ + 1), kUnknown);
-  stamps_[static_cast<size_t>(sequence - first_)] = *before_ns;
+  if (const auto before_ns = of(sequence - 1)) stamps_.try_emplace(sequence, *before_ns);
 }
 
 Habits::Habits(const record::LogFile& log, const Plan& plan, const std::vector<const RecordedJob*>& jobs)
@@ -84,12 +77,12 @@ bool Habits::withheld(const RecordedJob& job) const {
          std::all_of(job.outputs.begin(), job.outputs.end(), [](const auto& output) { return output.repeated; });
 }
 
-bool Habits::if_new(size_t task, uint16_t output) const {
+bool Habits::if_new(size_t task, size_t output) const {
   const Habit& habit = habits_[task][output];
   return habit.waited && !habit.from_old;
 }
 
-bool Habits::only_old(const RecordedJob& job, const Seen& seen, uint16_t output) const {
+bool Habits::only_old(const RecordedJob& job, const Seen& seen, size_t output) const {
   const Habit& habit = habits_[job.task][output];
   bool any = false, fresh = false;
   for_each_held(job, [&](uint16_t edge, uint16_t, uint64_t n) {
@@ -118,7 +111,7 @@ void Habits::learn_origins(const RecordedJob& job, const Seen& seen) {
 }
 
 void Habits::learn_pauses(const RecordedJob& job, const Seen& seen) {
-  for (uint16_t o = 0; o < habits_[job.task].size() && !withheld(job); ++o)
+  for (size_t o = 0; o < habits_[job.task].size() && !withheld(job); ++o)
     if (made(job, o) == nullptr && only_old(job, seen, o)) habits_[job.task][o].waited = true;
 }
 

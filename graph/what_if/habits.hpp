@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -24,7 +25,7 @@ void for_each_held(const record::RecordedJob& job, const Visit& visit) {
 }
 
 /// What a job made itself on an output; null: nothing, or only the message before once more.
-const record::RecordedJob::Output* made(const record::RecordedJob& job, uint16_t output);
+const record::RecordedJob::Output* made(const record::RecordedJob& job, size_t output);
 
 /// Stamps of the messages of one port by sequence.
 class Stamps {
@@ -36,9 +37,7 @@ class Stamps {
   void repeat(uint64_t sequence);
 
  private:
-  static constexpr int64_t kUnknown = INT64_MIN;
-  uint64_t first_ = 0;
-  std::vector<int64_t> stamps_;
+  std::unordered_map<uint64_t, int64_t> stamps_;
 };
 
 /// By edge: the newest message that earlier jobs of the task held.
@@ -70,9 +69,9 @@ class Habits {
   /// The job was late, and its outputs were held back: on_miss is `skip` or `reuse_last`, as far as the record shows.
   bool withheld(const record::RecordedJob& job) const;
   /// The task publishes that output for new input only: it did not where it held old messages, and never of one.
-  bool if_new(size_t task, uint16_t output) const;
+  bool if_new(size_t task, size_t output) const;
   /// Of the edges that stamps of that output come from, the job held messages that earlier jobs had held, and no other.
-  bool only_old(const record::RecordedJob& job, const Seen& seen, uint16_t output) const;
+  bool only_old(const record::RecordedJob& job, const Seen& seen, size_t output) const;
 
  private:
   struct Habit {

@@ -11,6 +11,7 @@
 
 #include "graph/log/cut_log.hpp"
 #include "graph/log/log_content.hpp"
+#include "graph/run/job_durations.hpp"
 #include "graph/what_if/habits.hpp"
 #include "rt/msg/requests.hpp"
 #include "rt/node.hpp"
@@ -23,6 +24,8 @@ using record::RecordedJob;
 
 /// A record that begins later than this after its epoch has not the beginning of its run.
 constexpr int64_t kWhole_ns = 1'000'000'000;
+/// No job takes longer, whatever a damaged record says.
+constexpr int64_t kLongest_ns = 86'400'000'000'000;
 
 class Reading {
  public:
@@ -51,11 +54,15 @@ class Reading {
   }
 
  private:
+  /// False if a damaged record names what the plan does not have.
   bool known(const RecordedJob& job) const {
     if (job.task >= plan_.tasks.size()) return false;
     const TaskPlan& task = plan_.tasks[job.task];
-    const bool inputs = std::all_of(job.inputs.begin(), job.inputs.end(),
-                                    [&](const auto& input) { return input.edge < task.edges.size(); });
+    const bool inputs = std::all_of(job.inputs.begin(), job.inputs.end(), [&](const RecordedJob::Input& input) {
+      return input.edge < task.edges.size() &&
+             std::all_of(input.held.begin(), input.held.end(),
+                         [](const RecordedJob::Run& run) { return run.count <= InputPort::kMaxDepth; });
+    });
     return inputs && std::all_of(job.outputs.begin(), job.outputs.end(),
                                  [&](const auto& output) { return output.output < task.ports.size(); });
   }
@@ -130,10 +137,10 @@ class Reading {
     RecordedPart part;
     part.release_ns = job.release_ns;
     part.visible_ns = job.visible_at_ns != 0 ? job.visible_at_ns : job.published_ns;  // format 1 has none
-    part.full_ns = at_full_quality_ns(job.cpu_ns, cost);
+    part.full_ns = command::at_full_quality_ns(std::clamp<int64_t>(job.cpu_ns, 0, kLongest_ns), cost);
     part.first = static_cast<uint32_t>(task.said.size());
     note(job, part.visible_ns, habits);
-    for (uint16_t o = 0; o < last_[job.task].size(); ++o) {
+    for (size_t o = 0; o < last_[job.task].size(); ++o) {
       std::optional<Said>& last = last_[job.task][o];
       if (const RecordedJob::Output* output = made(job, o)) task.said.push_back(*(last = said(job, *output, habits)));
       else if (last && habits.if_new(job.task, o) && habits.only_old(job, seen, o))
@@ -207,13 +214,6 @@ const RecordedPart* RecordedTask::nearest(int64_t release_ns) const {
   const auto before = after - 1;
   if (after == parts.end() || release_ns - before->release_ns <= after->release_ns - release_ns) return &*before;
   return &*after;
-}
-
-int64_t at_full_quality_ns(int64_t cpu_ns, double cost) {
-  if (!(cost > 0)) return cpu_ns;
-  auto full_ns = static_cast<int64_t>(static_cast<double>(cpu_ns) / cost);
-  while (static_cast<int64_t>(static_cast<double>(full_ns) * cost) < cpu_ns) ++full_ns;
-  return full_ns;
 }
 
 RecordedRun read_recorded_run(LogFile& log, const Plan& plan) { return Reading(log, plan).read(); }

@@ -72,7 +72,4 @@ struct RecordedRun {
 /// where a job published requests.
 RecordedRun read_recorded_run(record::LogFile& log, const Plan& plan);
 
-/// The shortest time at full quality that comes to `cpu_ns` at a level of that cost, as Task::begin works it out.
-int64_t at_full_quality_ns(int64_t cpu_ns, double cost);
-
 }  // namespace takt::what_if

@@ -4,6 +4,7 @@
 #include "graph/what_if/what_if.hpp"
 
 #include "graph/log/cut_log.hpp"
+#include "graph/run/job_durations.hpp"
 #include "recorded_scene.hpp"
 
 using namespace takt;
@@ -266,7 +267,7 @@ TEST_CASE("The time at full quality comes back to the recorded one at the same l
     const double cost = 0.05 + 0.95 * static_cast<double>(random() % 1000) / 1000;
     const auto full = static_cast<int64_t>(random() % 100'000'000);
     const auto cpu = static_cast<int64_t>(static_cast<double>(full) * cost);
-    const int64_t again = at_full_quality_ns(cpu, cost);
+    const int64_t again = command::at_full_quality_ns(cpu, cost);
     CHECK(static_cast<int64_t>(static_cast<double>(again) * cost) == cpu);
     CHECK(again <= full);
   }
