@@ -181,7 +181,8 @@ std::string comparison_text(const Json& comparison) {
   text += fmt::format("{:<16} {:>11} {:>9} {:>35}\n", "", "jobs", "misses", "response, ms");
   text += row(kNodeRow, "node", "rec", "pred", "rec", "pred", "p50", "pred", "p99", "pred", "max", "pred");
   for (size_t i = 0; i < is["nodes"].size(); ++i) text += node_line(was["nodes"][i], is["nodes"][i]);
-  text += "\n" + row(kChainRow, "chain: age, ms", "p50", "pred", "p99", "pred", "max", "pred", "bound", "verdict");
+  if (!is["chains"].empty())
+    text += "\n" + row(kChainRow, "chain: age, ms", "p50", "pred", "p99", "pred", "max", "pred", "bound", "verdict");
   for (size_t i = 0; i < is["chains"].size(); ++i) text += chain_line(was["chains"][i], is["chains"][i]);
   text += fmt::format("\nCPU {:.2f} cores in jobs\n", is["cpu"]["utilisation"].get<double>());
   for (const Json& line : is["adjusted"]) text += "adjusted: " + line.get<std::string>() + "\n";
