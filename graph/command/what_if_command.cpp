@@ -76,8 +76,7 @@ class WhatIf {
     std::vector<std::string> adjusted = prepared.graph->adjusted;
     choose_cores(plan, adjusted);
     const what_if::RecordedRun recorded = what_if::read_recorded_run(file_, plan);
-    if (std::none_of(recorded.tasks.begin(), recorded.tasks.end(),
-                     [](const auto& task) { return !task.parts.empty(); }))
+    if (std::none_of(recorded.tasks.begin(), recorded.tasks.end(), [](const auto& task) { return !task.jobs.empty(); }))
       return refuse(options_.log.string() + ": the record has no job whose time could be taken", kNotOk);
     RunBoard board(plan);
     const what_if::Prediction prediction =

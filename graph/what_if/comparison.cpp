@@ -111,6 +111,8 @@ std::string doubts_text(const Json& asked) {
     text += fmt::format("{} recorded jobs are left out: their process died in them\n", jobs);
   if (const auto messages = asked["unknown_stamps"].get<uint64_t>(); messages > 0)
     text += fmt::format("{} messages are not in the record: they get the stamp of the newest input\n", messages);
+  if (const auto messages = asked["unknown_requests"].get<uint64_t>(); messages > 0)
+    text += fmt::format("{} requests are in the record by hash only: they ask for nothing\n", messages);
   return text;
 }
 
@@ -150,16 +152,21 @@ Json recorded_json(const RecordedRun& recorded, const Plan& plan, const graph::G
                                 lost("lost_jobs") + lost("lost_threads")}};
 }
 
-Json comparison_json(const Question& question, const Plan& plan, const RecordedRun& recorded,
-                     const Prediction& prediction, Json recorded_report, Json predicted_report) {
+Json comparison_json(const Asked& asked, const Plan& plan, const RecordedRun& recorded, const Prediction& prediction,
+                     Json recorded_report, Json predicted_report) {
   Json borrowed = Json::object();
   for (size_t t = 0; t < plan.tasks.size(); ++t)
     if (prediction.borrowed[t] > 0) borrowed[plan.tasks[t].name] = prediction.borrowed[t];
   Json comparison;
-  comparison["what_if"] = {{"record", question.record},        {"schedule", question.schedule},
-                           {"policy", to_string(plan.policy)}, {"cores", plan.cores.size()},
-                           {"speed", question.speed},          {"borrowed_jobs", borrowed},
-                           {"cut_off_jobs", recorded.cut_off}, {"unknown_stamps", recorded.unknown_stamps}};
+  comparison["what_if"] = {{"record", asked.record},
+                           {"schedule", asked.schedule},
+                           {"policy", to_string(plan.policy)},
+                           {"cores", plan.cores.size()},
+                           {"speed", asked.speed},
+                           {"borrowed_jobs", borrowed},
+                           {"cut_off_jobs", recorded.cut_off},
+                           {"unknown_stamps", recorded.unknown_stamps},
+                           {"unknown_requests", recorded.unknown_requests}};
   const Json& nodes = predicted_report["nodes"];
   comparison["ok"] = predicted_report.contains("expectations") ? predicted_report["expectations"]["met"].get<bool>()
                                                                : std::none_of(nodes.begin(), nodes.end(), broken);

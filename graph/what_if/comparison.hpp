@@ -10,7 +10,7 @@
 namespace takt::what_if {
 
 /// What was asked.
-struct Question {
+struct Asked {
   std::string record, schedule;  ///< files
   double speed = 1;
 };
@@ -21,7 +21,7 @@ nlohmann::ordered_json recorded_json(const RecordedRun& recorded, const Plan& pl
 
 /// {what_if, ok, recorded, predicted}. `predicted` is the report of the predicted run. `ok`: every node of high
 /// criticality kept its deadlines; where the graph expects something, whether that is met.
-nlohmann::ordered_json comparison_json(const Question& question, const Plan& plan, const RecordedRun& recorded,
+nlohmann::ordered_json comparison_json(const Asked& asked, const Plan& plan, const RecordedRun& recorded,
                                        const Prediction& prediction, nlohmann::ordered_json recorded_report,
                                        nlohmann::ordered_json predicted_report);
 

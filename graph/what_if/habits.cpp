@@ -11,8 +11,8 @@ namespace takt::what_if {
 using record::RecordedJob;
 
 const RecordedJob::Output* made(const RecordedJob& job, size_t output) {
-  const auto found = std::find_if(job.outputs.begin(), job.outputs.end(), [&](const RecordedJob::Output& said) {
-    return said.output == output && !said.repeated;
+  const auto found = std::find_if(job.outputs.begin(), job.outputs.end(), [&](const RecordedJob::Output& one) {
+    return one.output == output && !one.repeated;
   });
   return found == job.outputs.end() ? nullptr : &*found;
 }

@@ -134,23 +134,24 @@ class Reading {
     const auto& levels = plan_.tasks[job.task].node->levels();
     const auto level = static_cast<size_t>(std::max(job.level, 0));
     const double cost = level < levels.size() ? levels[level].cost : 1.0;
-    RecordedPart part;
-    part.release_ns = job.release_ns;
-    part.visible_ns = job.visible_at_ns != 0 ? job.visible_at_ns : job.published_ns;  // format 1 has none
-    part.full_ns = command::at_full_quality_ns(std::clamp<int64_t>(job.cpu_ns, 0, kLongest_ns), cost);
-    part.first = static_cast<uint32_t>(task.said.size());
-    note(job, part.visible_ns, habits);
+    PastJob past;
+    past.release_ns = job.release_ns;
+    past.visible_ns = job.visible_at_ns != 0 ? job.visible_at_ns : job.published_ns;  // format 1 has none
+    past.full_ns = command::at_full_quality_ns(std::clamp<int64_t>(job.cpu_ns, 0, kLongest_ns), cost);
+    past.first = static_cast<uint32_t>(task.published.size());
+    note(job, past.visible_ns, habits);
     for (size_t o = 0; o < last_[job.task].size(); ++o) {
-      std::optional<Said>& last = last_[job.task][o];
-      if (const RecordedJob::Output* output = made(job, o)) task.said.push_back(*(last = said(job, *output, habits)));
+      std::optional<Publication>& last = last_[job.task][o];
+      if (const RecordedJob::Output* output = made(job, o))
+        task.published.push_back(*(last = publication(job, *output, habits)));
       else if (last && habits.if_new(job.task, o) && habits.only_old(job, seen, o))
-        task.said.push_back(*last);  // should there be something new in another run
+        task.published.push_back(*last);  // should there be something new in another run
     }
-    part.count = static_cast<uint32_t>(task.said.size()) - part.first;
-    // What was held back is not in the record: what the job before it said stands for it.
-    if (habits.withheld(job) && !task.parts.empty())
-      std::tie(part.first, part.count) = std::pair(task.parts.back().first, task.parts.back().count);
-    task.parts.push_back(part);
+    past.count = static_cast<uint32_t>(task.published.size()) - past.first;
+    // What was held back is not in the record: what the job before it published stands for it.
+    if (habits.withheld(job) && !task.jobs.empty())
+      std::tie(past.first, past.count) = std::pair(task.jobs.back().first, task.jobs.back().count);
+    task.jobs.push_back(past);
   }
 
   /// The figures that a run would have counted.
@@ -172,16 +173,18 @@ class Reading {
         figures.output_age[output.output].add(visible_ns - *stamp_ns);
   }
 
-  Said said(const RecordedJob& job, const RecordedJob::Output& output, const Habits& habits) {
+  Publication publication(const RecordedJob& job, const RecordedJob::Output& output, const Habits& habits) {
     const size_t port = plan_.tasks[job.task].ports[output.output];
     const auto stamp_ns = habits.stamps(port).of(output.sequence);
     run_.unknown_stamps += !stamp_ns;
-    Said said;
-    said.output = output.output;
-    said.stamp = stamp_ns ? habits.origin(job, output.output, *stamp_ns) : habits.newest_input(job, output.output);
-    said.if_new = habits.if_new(job.task, output.output);
-    if (plan_.ports[port].type->name == Requests::type_name) said.content = content(port, output.sequence);
-    return said;
+    Publication made;
+    made.output = output.output;
+    made.stamp = stamp_ns ? habits.origin(job, output.output, *stamp_ns) : habits.newest_input(job, output.output);
+    made.if_new = habits.if_new(job.task, output.output);
+    if (plan_.ports[port].type->name != Requests::type_name) return made;
+    made.content = content(port, output.sequence);
+    run_.unknown_requests += made.content == nullptr;
+    return made;
   }
 
   /// Once for equal messages: requests change seldom.
@@ -199,20 +202,20 @@ class Reading {
 
   LogFile& log_;
   const Plan& plan_;
-  std::vector<std::vector<std::optional<Said>>> last_;                          ///< by task and output
+  std::vector<std::vector<std::optional<Publication>>> last_;                   ///< by task and output
   std::map<uint64_t, std::shared_ptr<const std::vector<std::byte>>> contents_;  ///< by hash
   RecordedRun run_;
 };
 
 }  // namespace
 
-const RecordedPart* RecordedTask::nearest(int64_t release_ns) const {
-  if (parts.empty()) return nullptr;
-  const auto after = std::lower_bound(parts.begin(), parts.end(), release_ns,
-                                      [](const RecordedPart& part, int64_t ns) { return part.release_ns < ns; });
-  if (after == parts.begin()) return &*after;
+const PastJob* RecordedTask::nearest(int64_t release_ns) const {
+  if (jobs.empty()) return nullptr;
+  const auto after = std::lower_bound(jobs.begin(), jobs.end(), release_ns,
+                                      [](const PastJob& past, int64_t ns) { return past.release_ns < ns; });
+  if (after == jobs.begin()) return &*after;
   const auto before = after - 1;
-  if (after == parts.end() || release_ns - before->release_ns <= after->release_ns - release_ns) return &*before;
+  if (after == jobs.end() || release_ns - before->release_ns <= after->release_ns - release_ns) return &*before;
   return &*after;
 }
 

@@ -3,7 +3,7 @@
 //
 //   record::LogFile log = ...;
 //   const RecordedRun run = read_recorded_run(log, plan);
-//   const RecordedPart* part = run.tasks[t].nearest(release_ns);  // part->full_ns, part->said
+//   const PastJob* past = run.tasks[t].nearest(release_ns);  // past->full_ns, ...
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -27,7 +27,7 @@ struct StampOrigin {
 };
 
 /// One message that a job published, or would publish.
-struct Said {
+struct Publication {
   uint16_t output = 0;  ///< index into TaskPlan::ports
   StampOrigin stamp;
   bool if_new = false;  ///< only if the message that its stamp came from is new to the job
@@ -35,19 +35,19 @@ struct Said {
 };
 
 /// One recorded job.
-struct RecordedPart {
+struct PastJob {
   int64_t release_ns = 0;
   int64_t visible_ns = 0;         ///< from when consumers could see what it published
   int64_t full_ns = 0;            ///< what it would have taken at full quality
-  uint32_t first = 0, count = 0;  ///< of RecordedTask::said
+  uint32_t first = 0, count = 0;  ///< of RecordedTask::published
 };
 
 /// The jobs of one node, by release.
 struct RecordedTask {
-  std::vector<RecordedPart> parts;
-  std::vector<Said> said;
+  std::vector<PastJob> jobs;
+  std::vector<Publication> published;
   /// The job whose release is nearest, the earlier one of two; null if the record has none.
-  const RecordedPart* nearest(int64_t release_ns) const;
+  const PastJob* nearest(int64_t release_ns) const;
 };
 
 /// What a record says of one node; the same figures as of a run.
@@ -64,8 +64,9 @@ struct RecordedRun {
   std::vector<RecordedTask> tasks;  ///< by task of the plan
   std::vector<RecordedFigures> figures;
   std::vector<record::RecordedEvent> modes;  ///< changes of mode that no deadline and no budget caused
-  uint64_t cut_off = 0;         ///< jobs whose process died in them: nobody knows what they would have taken
-  uint64_t unknown_stamps = 0;  ///< messages that the record does not have, not even by hash
+  uint64_t cut_off = 0;           ///< jobs whose process died in them: nobody knows what they would have taken
+  uint64_t unknown_stamps = 0;    ///< messages that the record does not have, not even by hash
+  uint64_t unknown_requests = 0;  ///< requests that it does not have with their fields: they ask for nothing then
 };
 
 /// `plan`: of the graph of the record, its tasks and ports in the order that they had. The file is read once more

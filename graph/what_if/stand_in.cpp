@@ -28,15 +28,15 @@ StandIn::StandIn(const TaskPlan& real, const RecordedTask& recorded) : real_(rea
 }
 
 void StandIn::run(Job& job) {
-  const uint32_t count = part_ == nullptr ? 0 : part_->count;
+  const uint32_t count = past_ == nullptr ? 0 : past_->count;
   bool sent = false;
   for (uint32_t i = 0; i < count; ++i) {
-    const Said& said = recorded_.said[part_->first + i];
-    const auto stamp = stamp_ns(said, job);
-    Port& output = outputs_[said.output];
-    void* message = stamp ? output.loan() : nullptr;
-    if (message == nullptr) continue;
-    if (said.content && !record::unpack(output.type(), *said.content, message)) continue;
+    const Publication& message = recorded_.published[past_->first + i];
+    const auto stamp = stamp_ns(message, job);
+    Port& output = outputs_[message.output];
+    void* loaned = stamp ? output.loan() : nullptr;
+    if (loaned == nullptr) continue;
+    if (message.content && !record::unpack(output.type(), *message.content, loaned)) continue;
     output.send(*stamp);
     sent = true;
   }
@@ -44,14 +44,14 @@ void StandIn::run(Job& job) {
 }
 
 /// Nothing: the message that it would be made of is not there.
-std::optional<int64_t> StandIn::stamp_ns(const Said& said, const Job& job) const {
-  const StampOrigin& origin = said.stamp;
+std::optional<int64_t> StandIn::stamp_ns(const Publication& message, const Job& job) const {
+  const StampOrigin& origin = message.stamp;
   if (origin.of == StampOrigin::release) return job.release_ns() + origin.offset_ns;
   if (origin.of == StampOrigin::start) return job.now_ns() + origin.offset_ns;
   const InputPort& input = *inputs()[real_.edges[origin.edge].input];
   if (input.empty()) return std::nullopt;
   const size_t from = input.size() - 1 - std::min<size_t>(origin.back, input.size() - 1);
-  if (said.if_new && !input.is_new(from)) return std::nullopt;
+  if (message.if_new && !input.is_new(from)) return std::nullopt;
   return input.stamp_ns(from) + origin.offset_ns;
 }
 

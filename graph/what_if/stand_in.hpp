@@ -29,8 +29,8 @@ class StandIn final : public Node {
   void run(Job& job) override;
 
   /// The recorded job that its next one plays; null: it takes no time and publishes nothing.
-  void play(const RecordedPart* part) { part_ = part; }
-  const RecordedPart* played() const { return part_; }
+  void play(const PastJob* past) { past_ = past; }
+  const PastJob* played() const { return past_; }
 
  private:
   class Port final : public OutputPort {
@@ -38,13 +38,13 @@ class StandIn final : public Node {
     using OutputPort::OutputPort;
     void* loan() { return loan_message(); }
   };
-  std::optional<int64_t> stamp_ns(const Said& said, const Job& job) const;
+  std::optional<int64_t> stamp_ns(const Publication& message, const Job& job) const;
 
   const TaskPlan& real_;
   const RecordedTask& recorded_;
   std::deque<InputPort> inputs_;
   std::deque<Port> outputs_;
-  const RecordedPart* part_ = nullptr;
+  const PastJob* past_ = nullptr;
 };
 
 }  // namespace takt::what_if

@@ -23,9 +23,9 @@ class AtEpoch final : public StartGate {
   const int64_t epoch_ns_;
 };
 
-class Performance {
+class Simulation {
  public:
-  Performance(const Plan& plan, const RecordedRun& recorded, const PredictOptions& options, RunBoard& board)
+  Simulation(const Plan& plan, const RecordedRun& recorded, const PredictOptions& options, RunBoard& board)
       : plan_(plan), recorded_(recorded), options_(options), board_(board), clock_(recorded.from_ns) {
     prediction_.borrowed.resize(plan.tasks.size());
     for (size_t t = 0; t < plan.tasks.size(); ++t) {
@@ -42,13 +42,12 @@ class Performance {
     const auto transport = make_local_transport(blank_ports());
     AtEpoch gate(recorded_.epoch_ns);
     Executor::Options run;
-    run.duration_ns = recorded_.end_ns - recorded_.epoch_ns;
+    run.duration_ns = std::max<int64_t>(1, recorded_.end_ns - recorded_.epoch_ns);  // 0: without an end
     run.board = &board_;
     run.gate = &gate;
     run.rejoin = recorded_.from_ns > recorded_.epoch_ns;
     run.job_duration_ns = [this](size_t task, uint64_t job) { return play(task, job); };
     prediction_.run = Executor(plan_, *transport, clock_, run).run();
-    prediction_.shared_memory_bytes = transport->shared_memory_bytes();
     if (run.rejoin) leave_out_before();
     return std::move(prediction_);
   }
@@ -71,18 +70,18 @@ class Performance {
     enter_modes();
     if (options_.stopped && options_.stopped()) board_.stop().raise(clock_.now_ns());
     const int64_t release_ns = recorded_release_ns(task, job);
-    const RecordedPart* part = recorded_.tasks[task].nearest(release_ns);
-    stand_ins_[task]->play(part);
-    if (part == nullptr) return 0;
-    prediction_.borrowed[task] += std::abs(part->release_ns - release_ns) > reach_ns_[task];
-    return std::llround(static_cast<double>(part->full_ns) / options_.speed);
+    const PastJob* past = recorded_.tasks[task].nearest(release_ns);
+    stand_ins_[task]->play(past);
+    if (past == nullptr) return 0;
+    prediction_.borrowed[task] += std::abs(past->release_ns - release_ns) > reach_ns_[task];
+    return std::llround(static_cast<double>(past->full_ns) / options_.speed);
   }
 
   /// When the job would have been released in the record: a follower when the job that its producer plays was visible.
   int64_t recorded_release_ns(size_t t, uint64_t job) const {
     const TaskPlan& task = plan_.tasks[t];
     if (task.rate) return task.rate->release_ns(recorded_.epoch_ns + task.offset_ns, static_cast<int64_t>(job));
-    const RecordedPart* producer = stand_ins_[task.on_task]->played();
+    const PastJob* producer = stand_ins_[task.on_task]->played();
     return producer != nullptr ? producer->visible_ns : clock_.now_ns();
   }
 
@@ -121,7 +120,7 @@ class Performance {
 }  // namespace
 
 Prediction predict(const Plan& plan, const RecordedRun& recorded, const PredictOptions& options, RunBoard& board) {
-  return Performance(plan, recorded, options, board).run();
+  return Simulation(plan, recorded, options, board).run();
 }
 
 }  // namespace takt::what_if

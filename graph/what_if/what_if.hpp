@@ -23,7 +23,6 @@ struct Prediction {
   RunResult run;
   /// By task: jobs for which the record has no job within half a period. They take the time of the nearest one.
   std::vector<uint64_t> borrowed;
-  uint64_t shared_memory_bytes = 0;
 };
 
 /// Plays the recorded jobs under policy, cores, rates, offsets and deadlines of `plan`, whose tasks and ports are those
