@@ -10,6 +10,7 @@
 
 #include "graph/cli/file_option.hpp"
 #include "graph/command/graph_commands.hpp"
+#include "graph/command/what_if_command.hpp"
 #include "graph/log/damages.hpp"
 #include "graph/rewind/bisect.hpp"
 #include "graph/rewind/inspector.hpp"
@@ -20,8 +21,8 @@
 namespace takt::command {
 namespace {
 
+using rewind::judged;
 using rewind::RecordedRun;
-using rewind::Refused;
 
 class Replay {
  public:
@@ -155,20 +156,6 @@ int tell_break(const BisectOptions& options, const RecordedRun& run, const rewin
   return found.first ? kOk : kNotOk;
 }
 
-/// The exit code of `command`, also where it is refused.
-int judged(const rewind::ReplayOptions& options, const std::function<int()>& command) {
-  try {
-    return command();
-  } catch (const Refused& refused) {
-    return refuse(refused.why, kBadInput);
-  } catch (const std::runtime_error& problem) {  // processes
-    return refuse(problem.what(), kDeviceOrSystem);
-  } catch (const log::Json::exception& problem) {
-    return refuse(fmt::format("{}: what it says of its graph cannot be read: {}", options.log.string(), problem.what()),
-                  kBadInput);
-  }
-}
-
 }  // namespace
 
 int bisect(plugin::Plugins& plugins, const BisectOptions& options) {
@@ -186,6 +173,7 @@ int bisect(plugin::Plugins& plugins, const BisectOptions& options) {
 }
 
 int replay(plugin::Plugins& plugins, const ReplayOptions& options) {
+  if (options.asks_what_if() || options.json || !options.report.empty()) return what_if(plugins, options);
   std::vector<WriterLock> locks;
   if (const int code = claim_folder(options.output, locks); code != kOk) return code;
   return judged(options, [&] {
@@ -206,7 +194,8 @@ int replay(plugin::Plugins& plugins, const ReplayOptions& options) {
 }
 
 void add_replay(CLI::App& app, plugin::Plugins& plugins, ReplayOptions& o, int& exit_code) {
-  CLI::App* replay = app.add_subcommand("replay", "runs the jobs of a record again, with what they were given");
+  CLI::App* replay =
+      app.add_subcommand("replay", "runs the jobs of a record again, or predicts them on another schedule");
   reads_file(replay->add_option("log", o.log, "what `takt run --record` wrote"), UINT64_MAX)->required();
   reads_file(replay->add_option("graph", o.graph, "graph file instead of that of the record"));
   replay->add_flag("--compare", o.compare, "bit by bit with the record; exit 1 on the first message that differs");
@@ -225,8 +214,10 @@ void add_replay(CLI::App& app, plugin::Plugins& plugins, ReplayOptions& o, int& 
       ->check(CLI::IsMember({"none", "subsystem"}));
   replay->add_flag("--recorded-pace", o.recorded_pace, "as fast as it was, instead of as fast as possible");
   writes_folder(replay->add_option("--output", o.output, "folder for pictures and other results (default out)"));
+  add_what_if_options(*replay, o);
   replay->footer(
       "Example: takt replay run.mcap --compare\n"
+      "Example: takt replay run.mcap --schedule other.yaml --cores 1 --speed 0.5\n"
       "Example: takt replay run.mcap --live ground_map --set ground_map.votes_min=7\n"
       "Example: takt replay run.mcap --from 95 --inspect");
   replay->callback([&] {

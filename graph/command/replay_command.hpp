@@ -11,6 +11,12 @@ namespace takt::command {
 struct ReplayOptions : rewind::ReplayOptions {
   bool inspect = false;
   std::string until_condition;  ///< of --break
+  // A what-if; see what_if_command.hpp.
+  std::filesystem::path schedule, report;  ///< empty: that of the record; none is written
+  std::optional<int> cores;
+  std::optional<double> speed;
+  bool json = false;
+  bool asks_what_if() const { return !schedule.empty() || cores || speed; }
 };
 
 /// `takt replay LOG [GRAPH]`: runs every job of a record again, with the inputs and answers that it had. Exit 1 if

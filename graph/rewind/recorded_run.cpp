@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cstdio>
 #include <ctime>
-#include <sstream>
 #include <stdexcept>
 
 #include "graph/compose/partition.hpp"
@@ -23,19 +22,11 @@ namespace {
 using command::kOk;
 using command::Prepared;
 using command::ReplayPart;
-using command::RunOptions;
 using command::StopOnSignal;
 using command::tell_ignored_overlay;
 using command::tell_problems;
 using log::fact;
 using log::Json;
-
-Json attached_json(const record::LogFile& file, const char* name) {
-  const auto text = file.attached(name);
-  Json json = text ? Json::parse(*text, nullptr, false) : Json();
-  if (json.is_discarded() || !json.is_object()) throw Refused{fmt::format("the record holds no readable {}", name)};
-  return json;
-}
 
 /// The outputs of the devices as the record has them; everything else is made here.
 class RecordedFacts final : public graph::FactExchange {
@@ -86,7 +77,8 @@ command::RunOptions& RecordedRun::open() {
   if (part) read_part();
   for (const std::string& damage : file_->damages())
     std::fprintf(stderr, "takt: the record is not whole: %s\n", damage.c_str());
-  read_options();
+  run_ = recorded_options(*file_, options_);
+  recorded_ = attached_json(*file_, "plan.json");
   return run_;
 }
 
@@ -112,7 +104,7 @@ int RecordedRun::outline(const Registry& registry) {
   force_simd(registry.vectors);
   prepared_.emplace(registry);
   if (const int code = load(run_, *prepared_); code != command::kOk) return code;
-  take_snapshots();
+  remember_as_recorded(*prepared_->graph, *file_);
   prepared_->composition = graph::outline(*prepared_->graph, registry, *prepared_->clock);
   return command::kOk;
 }
@@ -125,36 +117,10 @@ void RecordedRun::compose_again() {
 
 int64_t RecordedRun::epoch_ns() const { return log::epoch_ns(*file_); }
 
-void RecordedRun::read_options() {
-  const mcap::Metadata& facts = file_->facts();
-  RunOptions& run = run_;
-  run.graph = options_.graph.empty() ? std::filesystem::path(fact(facts, "graph")) : options_.graph;
-  if (!std::filesystem::exists(run.graph))
-    throw Refused{fmt::format("the graph {} of the record is not there; name it: takt replay {} GRAPH",
-                              run.graph.string(), options_.log.string())};
-  if (options_.graph.empty()) run.load.schedule = fact(facts, "schedule");
-  run.load.params = options_.params.empty() ? std::filesystem::path(fact(facts, "params")) : options_.params;
-  if (!run.load.params.empty() && !std::filesystem::exists(run.load.params))
-    throw Refused{fmt::format("the parameter file {} of the record is not there; name it: --params FILE",
-                              run.load.params.string())};
-  run.load.profile = fact(facts, "profile");
-  run.load.mode = fact(facts, "mode");
-  run.load.policy = fact(facts, "policy_option");
-  std::istringstream settings(fact(facts, "set"));
-  for (std::string line; std::getline(settings, line);) run.load.set.push_back(line);
-  run.load.set.insert(run.load.set.end(), options_.set.begin(), options_.set.end());
-  run.clock = fact(facts, "clock");
-  run.output = options_.output;
-  run.load.conditions = options_.conditions;
-  run.seed = std::strtoull(fact(facts, "seed").c_str(), nullptr, 10);
-  run.load.plugin_files = options_.plugin_files;
-  recorded_ = attached_json(*file_, "plan.json");
-}
-
 int RecordedRun::compose() {
   int code = load(run_, *prepared_);
   if (code == kOk) {
-    take_snapshots();
+    remember_as_recorded(*prepared_->graph, *file_);
     tell_ignored_overlay(prepared_->graph->name, "the record says which values held");
     RecordedFacts facts(recorded_);
     graph::ComposeOptions& how = composed_;
@@ -170,12 +136,6 @@ int RecordedRun::compose() {
   }
   if (code != kOk) tell_problems(prepared_->problems.size());
   return code;
-}
-
-void RecordedRun::take_snapshots() {
-  graph::RecordSpec& spec = prepared_->graph->record;
-  spec.snapshot_ns = std::strtoll(fact(file_->facts(), "snapshots_ns").c_str(), nullptr, 10);
-  spec.recorded = spec.snapshot_ns > 0;
 }
 
 void RecordedRun::check_plugins(const std::vector<graph::PluginFact>& loaded) const {

@@ -10,33 +10,13 @@
 
 #include "graph/compose/composition.hpp"
 #include "graph/log/log_content.hpp"
+#include "graph/rewind/recorded_options.hpp"
 #include "graph/run/isolated_replay.hpp"
 #include "graph/run/prepare.hpp"
-#include "graph/run/run.hpp"
 #include "rt/record/replayer.hpp"
 #include "rt/time/clock.hpp"
 
 namespace takt::rewind {
-
-struct ReplayOptions {
-  std::filesystem::path log;
-  std::filesystem::path graph;   ///< empty: that of the record
-  std::filesystem::path params;  ///< parameter file; empty: that of the record
-  std::filesystem::path output = "out";
-  bool compare = false, recorded_pace = false, allow_damage = false;
-  std::string isolate = "none";   ///< none | subsystem: a process for each, as in a run
-  std::vector<std::string> live;  ///< nodes that run; empty: all. What the others made comes from the record
-  std::vector<std::string> set;   ///< "node.param=value", after those of the record
-  std::vector<std::filesystem::path> plugin_files;  ///< beside those that the graph names
-  double from_s = 0;                                ///< since the epoch of the run
-  std::optional<double> until_s = {};               ///< likewise
-  std::vector<std::string> conditions = {};         ///< in the language of `expect`: graph().asked
-};
-
-/// Ends the command with a reason.
-struct Refused {
-  std::string why;
-};
 
 /// One thread at a time; open() comes first, then compose(). What makes a replay impossible throws Refused.
 class RecordedRun {
@@ -71,10 +51,8 @@ class RecordedRun {
 
  private:
   void read_part();
-  void read_options();
   void force_simd(const VectorTargets& vectors) const;
   int compose();
-  void take_snapshots();
   void check_plugins(const std::vector<graph::PluginFact>& loaded) const;
   void check_sameness();
   void renew(size_t task);

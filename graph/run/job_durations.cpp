@@ -42,8 +42,7 @@ std::map<std::string, std::vector<int64_t>> recorded(const record::LogFile& log,
     if (node == nodes.end()) continue;
     const auto& levels = node->second->levels();
     const auto level = static_cast<size_t>(job.level);
-    const double cost = level < levels.size() && levels[level].cost > 0 ? levels[level].cost : 1.0;
-    times[name].push_back(static_cast<int64_t>(static_cast<double>(job.cpu_ns) / cost));
+    times[name].push_back(at_full_quality_ns(job.cpu_ns, level < levels.size() ? levels[level].cost : 1.0));
   }
   return times;
 }
@@ -74,6 +73,13 @@ tl::expected<JobDurations, std::string> job_durations(const std::string& how, co
   if (how == "budgets") return JobDurations{};
   if (how == "random") return random(plan, seed);
   return recorded(how, plan);
+}
+
+int64_t at_full_quality_ns(int64_t cpu_ns, double cost) {
+  if (!(cost > 0)) return cpu_ns;
+  auto full_ns = static_cast<int64_t>(static_cast<double>(cpu_ns) / cost);
+  while (static_cast<int64_t>(static_cast<double>(full_ns) * cost) < cpu_ns) ++full_ns;
+  return full_ns;
 }
 
 }  // namespace takt::command

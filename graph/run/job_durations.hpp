@@ -19,4 +19,7 @@ using JobDurations = std::function<int64_t(size_t task, uint64_t job)>;
 /// request). Error: no readable record, or one that does not know a node.
 tl::expected<JobDurations, std::string> job_durations(const std::string& how, const Plan& plan, uint64_t seed);
 
+/// The shortest time at full quality that comes to `cpu_ns` at a level of that cost, as Task::begin works it out.
+int64_t at_full_quality_ns(int64_t cpu_ns, double cost);
+
 }  // namespace takt::command

@@ -16,16 +16,6 @@ namespace {
 using Json = nlohmann::ordered_json;
 constexpr uint64_t kSamplesForP999 = 1000;
 
-Json distribution(const Histogram& h, double ns_per_unit) {
-  const auto figure = [&](int64_t ns) {
-    return h.count() ? Json(static_cast<double>(ns) / ns_per_unit) : Json(nullptr);
-  };
-  return {{"p50", figure(h.quantile_ns(0.5))},
-          {"p99", figure(h.quantile_ns(0.99))},
-          {"p999", h.count() >= kSamplesForP999 ? figure(h.quantile_ns(0.999)) : Json(nullptr)},
-          {"max", figure(h.max_ns())}};
-}
-
 /// [[upper edge, samples], ...] with edges at 1, 2, 5 of each decade: what a picture needs.
 Json coarse_histogram(const Histogram& h) {
   Json bars = Json::array();
@@ -75,7 +65,7 @@ double cores_of(const RunFacts& facts, size_t t) {
 }
 
 /// Of a figure for which something was proven, or could have been.
-Json distribution(const Histogram& h, double ns_per_unit, const Json& beside_max) {
+Json distribution_beside(const Histogram& h, double ns_per_unit, const Json& beside_max) {
   Json json = distribution(h, ns_per_unit);
   json.update(beside_max);
   return json;
@@ -115,7 +105,7 @@ Json node_json(const RunFacts& facts, const ProofReport& proofs, size_t t) {
   node["lateness_us"] = distribution(s.lateness, 1e3);
   node["lateness_histogram_us"] = coarse_histogram(s.lateness);
   node["exec_ms"] = distribution(s.exec, 1e6);
-  node["response_ms"] = distribution(s.response, 1e6, proofs.of_response(t));
+  node["response_ms"] = distribution_beside(s.response, 1e6, proofs.of_response(t));
   node["publish_ms"] = distribution(s.publish, 1e6);
   node["cores"] = cores_of(facts, t);
   node["preempted_ms"] = static_cast<double>(s.preempted_ns) / 1e6;
@@ -142,7 +132,7 @@ Json edges_json(const RunFacts& facts, const ProofReport& proofs) {
                        {"damaged", s.damaged},
                        {"passed_over", s.passed_over.load()},
                        {"exhausted", facts.board.port(task.edges[e].port).writer.pool_empty},
-                       {"age_ms", distribution(s.age, 1e6, proofs.of_edge(t, e))}});
+                       {"age_ms", distribution_beside(s.age, 1e6, proofs.of_edge(t, e))}});
     }
   }
   return edges;
@@ -217,7 +207,7 @@ Json chains_json(const RunFacts& facts, const ProofReport& proofs) {
     const bool sampled = age != nullptr && age->count() > 0;
     const Json proven = proofs.of_chain(chain.name);
     chains.push_back({{"name", chain.name},
-                      {"age_ms", distribution(sampled ? *age : Histogram(), 1e6, proven)},
+                      {"age_ms", distribution_beside(sampled ? *age : Histogram(), 1e6, proven)},
                       {"bound_ms", static_cast<double>(chain.max_age_ns) / 1e6},
                       {"proven_ms", proven["proven_ms"]},
                       {"within", sampled ? Json(age->max_ns() <= chain.max_age_ns) : Json(nullptr)}});
@@ -235,6 +225,16 @@ bool kept_its_promises(const Json& nodes) {
 }
 
 }  // namespace
+
+Json distribution(const Histogram& h, double ns_per_unit) {
+  const auto figure = [&](int64_t ns) {
+    return h.count() ? Json(static_cast<double>(ns) / ns_per_unit) : Json(nullptr);
+  };
+  return {{"p50", figure(h.quantile_ns(0.5))},
+          {"p99", figure(h.quantile_ns(0.99))},
+          {"p999", h.count() >= kSamplesForP999 ? figure(h.quantile_ns(0.999)) : Json(nullptr)},
+          {"max", figure(h.max_ns())}};
+}
 
 Json make_report(const RunFacts& facts) {
   Json nodes = Json::array();

@@ -39,6 +39,8 @@ struct RunFacts {
 /// The report of design section 6: times in the unit the key says, null where there are no samples.
 nlohmann::ordered_json make_report(const RunFacts& facts);
 
+/// {p50, p99, p999, max} in a unit of so many ns; null without samples, p999 also below 1,000 of them.
+nlohmann::ordered_json distribution(const Histogram& h, double ns_per_unit);
 /// The mode over time: [{name, from_s, to_s, reason}], the first being that of the start; seconds since the epoch.
 nlohmann::ordered_json modes_json(const RunFacts& facts);
 /// What nodes did and should not have done: [{what, kind, node, job, at_s}].

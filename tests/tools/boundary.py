@@ -85,6 +85,7 @@ WHOLE = {
 }
 # Where a place wants another call than that of its command.
 INSTEAD = {
+    ("replay", "--report"): "RECORD --cores 1",
     ("terrain learn", "--record"): "--out NEW --pick left=0..1",
     ("eval registration", "--out"): "--source PLANES --target PLANES --reference IDENTITY --generations 10",
     ("calibrate lasers", "--out"): "SWEEPS",
