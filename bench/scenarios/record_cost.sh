@@ -1,12 +1,12 @@
 #!/bin/bash
 # SPDX-License-Identifier: Apache-2.0
-# What a record costs the run that is recorded: record_cost.sh [PAIRS] [SECONDS]. Runs without and with --record, A B A B ...
-# A. Prints CPU, MB/s and what was lost for each, and lateness p50 and p99 over the high-criticality nodes, each B over the
+# What a record or the ring costs the run: record_cost.sh [PAIRS] [SECONDS] [record|ring]. Runs without and with --record (or
+# with --ring off and on), A B A B ... A. Prints CPU, MB/s and what was lost for each, and lateness p50 and p99 over the high-criticality nodes, each B over the
 # mean of its neighbours.
 set -eu
 root=$(readlink -f "$(dirname "$0")/../..")
 takt=${TAKT:-$root/takt}
-pairs=${1:-6} seconds=${2:-20}
+pairs=${1:-6} seconds=${2:-20} what=${3:-record}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 one_run() { # NAME OPTIONS
@@ -14,12 +14,14 @@ one_run() { # NAME OPTIONS
   shift
   "$takt" run --for "${seconds}s" --output "$work/out" --report "$work/$name.json" "$@" >"$work/log" 2>&1 || true
   [ -e "$work/$name.json" ] || { tail -n 2 "$work/log"; exit 3; }
-  rm -f "$work/run.mcap"
+  rm -rf "$work/run.mcap" "$work/out"
 }
-one_run a0
+with=(--ring off --record "$work/run.mcap")
+[ "$what" = record ] || with=(--ring on)
+one_run a0 --ring off
 for ((i = 1; i <= pairs; ++i)); do
-  one_run "b$i" --record "$work/run.mcap"
-  one_run "a$i"
+  one_run "b$i" "${with[@]}"
+  one_run "a$i" --ring off
 done
 python3 - "$work" "$pairs" <<'PY'
 import json, statistics, sys
@@ -35,9 +37,13 @@ for i in range(1, pairs + 1):
     before, after = reports[f"a{i-1}"], reports[f"a{i}"]
     cpu.append(b["cpu"]["utilisation"] - (before["cpu"]["utilisation"] + after["cpu"]["utilisation"]) / 2)
     for q in ratios: ratios[q].append(2 * late(f"b{i}", q) / (late(f"a{i-1}", q) + late(f"a{i}", q)))
-    copying, writing = (b["record"]["cpu_ms"][k] / 10 / b["duration_s"] for k in ("copying", "writing"))
-    print(f"pair {i}: {b['record']['mb'] / b['duration_s']:.1f} MB/s, lost {b['recorder_lost']}, CPU +{100 * cpu[-1]:.1f} % of a core (copying "
-          f"{copying:.1f}, compressing and writing {writing:.1f}); misses {misses(f'b{i}')} against {misses(f'a{i-1}')} and "
+    if "record" in b:
+        copying, writing = (b["record"]["cpu_ms"][k] / 10 / b["duration_s"] for k in ("copying", "writing"))
+        kept = f"{b['record']['mb'] / b['duration_s']:.1f} MB/s, lost {b['recorder_lost']}, copying {copying:.1f} %, writing {writing:.1f} %"
+    else:
+        kept = ", ".join(f"{place} {ring['cpu_ms'] / 10 / b['duration_s']:.1f} %, lost {ring['lost']}"
+                         for place in ("disk", "memory") if (ring := b["flight"][place]))
+    print(f"pair {i}: {kept}; CPU +{100 * cpu[-1]:.1f} % of a core; misses {misses(f'b{i}')} against {misses(f'a{i-1}')} and "
           f"{misses(f'a{i}')}; lateness p99 {late(f'b{i}', 'p99'):.0f} us against {late(f'a{i-1}', 'p99'):.0f} and {late(f'a{i}', 'p99'):.0f}; "
           f"host stall {b['host_stall_ms']} ms; policy {b['policy_granted']}")
 for q in ratios:

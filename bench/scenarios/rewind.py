@@ -1,0 +1,52 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Replays that begin anywhere: rewind.py [INSTANTS] [SEED] [MINUTES] [GRAPH].
+
+Records MINUTES (60) of GRAPH (lasers) in virtual time, with a parameter set at a random instant. At INSTANTS (20) random
+instants a replay begins and must equal the record; prints how long its first job takes. Then 20 faults are planted, a
+parameter each that is set at a random instant, and takt bisect must name the job that took it up.
+"""
+import json
+import os
+import pathlib
+import random
+import subprocess
+import sys
+import tempfile
+import time
+
+root = pathlib.Path(__file__).resolve().parents[2]
+takt = os.environ.get("TAKT", str(root / "takt"))
+instants, seed, minutes = (int(a) for a in (sys.argv[1:4] + ["20", "1", "60"][len(sys.argv) - 1:]))
+graph = (sys.argv[4:] or ["graph/lasers.yaml"])[0]
+chance = random.Random(seed)
+
+
+def run(*arguments):
+    return subprocess.run([takt, *arguments], capture_output=True, text=True, cwd=root)
+
+
+def main():
+    work = pathlib.Path(tempfile.mkdtemp(prefix="rewind"))
+    record, out = str(work / "run.mcap"), str(work / "out")
+    made = run("run", graph, "--clock", "virtual", "--for", f"{minutes * 60}s", "--record", record, "--output", out)
+    print(f"{graph}: {minutes} minutes, {os.path.getsize(record) / 1e6:.0f} MB, run exit {made.returncode}", flush=True)
+    bad, times = 0, []
+    for _ in range(instants):
+        at = chance.uniform(0.05, 0.95) * minutes * 60
+        began = time.monotonic()
+        first = run("replay", record, "--from", f"{at}", "--until", f"{at + 0.2}", "--output", out)
+        times.append(time.monotonic() - began)
+        again = run("replay", record, "--from", f"{at}", "--until", f"{at + 10}", "--compare", "--output", out)
+        good = again.returncode == 0 and first.returncode == 0
+        bad += not good
+        print(f"from {at:.1f} s: first jobs after {times[-1]:.2f} s; {again.stdout.splitlines()[-1] if again.stdout else again.stderr[-200:]}"
+              f"{'' if good else ' WRONG'}", flush=True)
+    times.sort()
+    print(f"first jobs: median {times[len(times) // 2]:.2f} s, longest {times[-1]:.2f} s", flush=True)
+    print(f"{instants - bad} of {instants} equal")
+    return 1 if bad else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
