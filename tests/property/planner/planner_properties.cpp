@@ -2,10 +2,12 @@
 #include <doctest/doctest.h>
 
 #include <map>
+#include <memory>
 #include <queue>
 #include <random>
 
 #include "nodes/planner/planner.hpp"
+#include "tests/going_on.hpp"
 #include "tests/property_scale.hpp"
 
 using namespace takt::planner;
@@ -222,6 +224,41 @@ TEST_CASE("a search in portions of any size ends with the plan of one that is no
     const Plan& last = portions.best_so_far();
     REQUIRE(last.verdict == plan.verdict);
     REQUIRE(last.cost_ns == plan.cost_ns);
+    REQUIRE(last.expanded == plan.expanded);
+    REQUIRE(last.steps.size() == plan.steps.size());
+    for (size_t i = 0; i < plan.steps.size(); ++i) REQUIRE(last.steps[i].action == plan.steps[i].action);
+  }
+  CHECK(interrupted >= takt::test::at_scale(50));
+}
+
+namespace {
+
+/// A planner that goes on in another one after each portion.
+struct Interrupted {
+  const Domain& domain;
+  Planner planner{{Method::best, {}, {6'000, 60'000}}};
+  void remember(takt::StateArchive& archive) { planner.remember(archive, domain); }
+};
+
+}  // namespace
+
+TEST_CASE("a search that goes on from what was remembered ends as one that is not interrupted") {
+  Planner whole({Method::best, {}, {6'000, 60'000}});
+  size_t interrupted = 0;
+  for (uint32_t seed = 1; seed <= takt::test::rounds(100u); ++seed) {
+    RandomTask task(takt::test::seed(seed));
+    const auto domain = ground(task.map, task.goals, task.robot, {});
+    REQUIRE(domain);
+    const Plan plan = whole.plan(*domain);
+    auto now = std::make_unique<Interrupted>(*domain);
+    now->planner.begin(*domain, {});
+    for (; !now->planner.go_on({1 + seed % 3, {}}); ++interrupted)
+      now = takt::test::going_on(*now, std::make_unique<Interrupted>(*domain));
+    now = takt::test::going_on(*now, std::make_unique<Interrupted>(*domain));
+    const Plan& last = now->planner.best_so_far();
+    REQUIRE(last.verdict == plan.verdict);
+    REQUIRE(last.cost_ns == plan.cost_ns);
+    REQUIRE(last.bound_ns == plan.bound_ns);
     REQUIRE(last.expanded == plan.expanded);
     REQUIRE(last.steps.size() == plan.steps.size());
     for (size_t i = 0; i < plan.steps.size(); ++i) REQUIRE(last.steps[i].action == plan.steps[i].action);

@@ -12,6 +12,7 @@
 #include "rt/msg/pose.hpp"
 #include "rt/sched/port_access.hpp"
 #include "rt/testing.hpp"
+#include "tests/going_on.hpp"
 
 namespace takt {
 void register_laser_fusion(NodeTypes& types);
@@ -160,6 +161,34 @@ TEST_CASE("a fusion that is stopped before every portion gives what one gives in
     REQUIRE(one[i].confidence == other[i].confidence);
     REQUIRE(one[i].colour.g == other[i].colour.g);
   }
+}
+
+TEST_CASE("a fusion that goes on from what was remembered gives what one gives in one go") {
+  const CloudPair pair = generate_pair({.points = 3000, .offset_m = 0.3, .offset_rad = 0.3}, 4);
+  const LaserFusionParameters parameters{.search_points = 300, .vision_points = 2000, .genetic = {.generations = 300}};
+  const auto make = [&] { return std::make_unique<LaserFusion>(3000, 3000, parameters); };
+  auto in_one_go = make(), interrupted = make();
+  in_one_go->begin(pair.laser.points, pair.vision.view(), {}, 1);
+  CHECK(in_one_go->run([] { return true; }));
+  interrupted->begin(pair.laser.points, pair.vision.view(), {}, 1);
+  int portions = 0;
+  for (int left = 0; !interrupted->run([&] { return left-- > 0; }); left = 5, ++portions)
+    interrupted = test::going_on(*interrupted, make());
+  CHECK(portions > 10);
+  interrupted = test::going_on(*interrupted, make());
+  CHECK(interrupted->generation() == in_one_go->generation());
+  CHECK(interrupted->share() == in_one_go->share());
+  CHECK(interrupted->vision_in_laser().t == in_one_go->vision_in_laser().t);
+  CHECK(interrupted->vision_in_laser().R == in_one_go->vision_in_laser().R);
+  const auto one = in_one_go->finish(), other = interrupted->finish();
+  REQUIRE(one.size() == other.size());
+  for (size_t i = 0; i < one.size(); ++i) {
+    REQUIRE(one[i].point.x == other[i].point.x);
+    REQUIRE(one[i].confidence == other[i].confidence);
+    REQUIRE(one[i].colour.g == other[i].colour.g);
+  }
+  interrupted = test::going_on(*interrupted, make());
+  CHECK(interrupted->idle());
 }
 
 TEST_CASE("laser_fusion starts from where the sensors are mounted, and holds what is locked") {

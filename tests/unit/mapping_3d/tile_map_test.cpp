@@ -4,12 +4,15 @@
 #include <doctest/doctest.h>
 
 #include <cmath>
+#include <memory>
+#include <random>
 #include <vector>
 
 #include "nodes/mapping_3d/generated_world.hpp"
 #include "rt/memory/memory_use.hpp"
 #include "rt/msg/geometry.hpp"
 #include "rt/msg/point.hpp"
+#include "tests/going_on.hpp"
 
 using namespace takt;
 using namespace takt::mapping_3d;
@@ -116,6 +119,37 @@ TEST_CASE("what is looked through goes, once it was missing more often than seen
   for (size_t v = 18; v < 21; ++v) depth[v * 40 + 21] = 2.0f;
   for (int i = 0; i < 20; ++i) map.clear_seen_through(view, 0.01, 0.1, 10);
   CHECK(map.points() == 5);
+}
+
+TEST_CASE("a map that goes on from what was remembered is the same point by point") {
+  const DepthCamera camera{40, 40, 40, 19.5, 19.5, 0.01};
+  std::vector<float> depth(camera.pixels(), 3.0f);
+  MapParameters p;
+  p.tiles = 5;
+  p.tile_points = 600;
+  p.tile_m = 1;
+  auto straight = std::make_unique<TileMap>(p), interrupted = std::make_unique<TileMap>(p);
+  std::mt19937 random(1);
+  for (int step = 0; step < 120; ++step) {
+    std::vector<Point> points = square(0.5f + 0.02f * static_cast<float>(step % 7));
+    for (Point& point : points) point.x += static_cast<float>(random() % 1000) * 1e-4f;  // also to borders of voxels
+    Transform sensor = at(0.1 * (step % 70), 0);
+    for (TileMap* map : {straight.get(), interrupted.get()}) {
+      map->add({points, {}}, sensor, step);
+      int tiles = 0;
+      if (step % 5 == 0)
+        map->clear_seen_through({camera, sensor, depth, {}}, 0.01, 0.1, 10, [&] { return tiles++ < 2; });
+      if (step % 30 == 29) map->correct(step - 20, step, sensor, at(sensor.x + 0.013, 0.02));
+      if (step % 4 == 0) map->join_laid([&] { return tiles++ < 4; });
+    }
+    interrupted = test::going_on(*interrupted, std::make_unique<TileMap>(p));
+    std::vector<Position> places[2];
+    for (const auto& [map, into] : {std::pair{straight.get(), &places[0]}, {interrupted.get(), &places[1]}})
+      map->for_each([&, into = into](const Position& at, const MapPoint&) { into->push_back(at); });
+    REQUIRE(places[0].size() == places[1].size());
+    for (size_t i = 0; i < places[0].size(); ++i) REQUIRE(places[0][i].x_m == places[1][i].x_m);
+  }
+  CHECK(straight->dropped() == interrupted->dropped());
 }
 
 TEST_CASE("a map that has time for a few tiles a view holds in the end what one without haste does") {

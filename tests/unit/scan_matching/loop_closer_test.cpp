@@ -4,10 +4,12 @@
 #include <doctest/doctest.h>
 
 #include <cmath>
+#include <memory>
 
 #include "nodes/scan_matching/drive.hpp"
 #include "nodes/scan_matching/evaluate.hpp"
 #include "rt/memory/memory_use.hpp"
+#include "tests/going_on.hpp"
 
 using namespace takt;
 using namespace takt::scan_matching;
@@ -26,8 +28,9 @@ struct Looped {
 };
 
 /// The closer behind a matcher whose every step is off by `wrong`. Scans from `seen_from` on are those of `other`.
-Looped follow(const Drive& drive, const PlanarPose& wrong, const Drive* other = nullptr, size_t seen_from = 0) {
-  LoopCloser closer(drive.beams, {}, {});
+Looped follow(const Drive& drive, const PlanarPose& wrong, const Drive* other = nullptr, size_t seen_from = 0,
+              size_t goes_on_after = SIZE_MAX) {
+  auto going = std::make_unique<LoopCloser>(drive.beams, MapParameters{}, ClosureParameters{});
   std::vector<SurfacePoint> points;
   points.reserve(drive.beams);
   PlanarPose track;
@@ -35,6 +38,9 @@ Looped follow(const Drive& drive, const PlanarPose& wrong, const Drive* other = 
   for (size_t i = 0; i < drive.scans.size(); ++i) {
     if (i > 0) track = compose(track, compose(drive.moved_truly(i), wrong));
     points_of((other && i >= seen_from ? *other : drive).sweep(i), 15, points);
+    if (i > 0 && i % goes_on_after == 0)
+      going = test::going_on(*going, std::make_unique<LoopCloser>(drive.beams, MapParameters{}, ClosureParameters{}));
+    LoopCloser& closer = *going;
     const auto allocations = thread_memory_use().allocations;
     const auto closure = closer.step(track, points);
     if (counting_allocations()) CHECK(thread_memory_use().allocations == allocations);
@@ -45,7 +51,7 @@ Looped follow(const Drive& drive, const PlanarPose& wrong, const Drive* other = 
     out.first_left_m = off_m(drive, i, closure->actual);
   }
   out.track_off_m = off_m(drive, drive.scans.size() - 1, track);
-  out.map_off_m = off_m(drive, drive.scans.size() - 1, closer.robot_in_map(track));
+  out.map_off_m = off_m(drive, drive.scans.size() - 1, going->robot_in_map(track));
   return out;
 }
 
@@ -66,6 +72,15 @@ TEST_CASE("a robot that comes back where it was is told where it is, and goes on
   }
 }
 
+TEST_CASE("a robot that goes on from what was remembered is told the same, bit for bit") {
+  const Drive drive = make_drive(furnished_room(1), rounds(400), {}, 1);
+  const Looped straight = follow(drive, kDrifting), interrupted = follow(drive, kDrifting, nullptr, 0, 7);
+  CHECK(straight.closures > 0);
+  CHECK(interrupted.closures == straight.closures);
+  CHECK(interrupted.first_left_m == straight.first_left_m);
+  CHECK(interrupted.map_off_m == straight.map_off_m);
+}
+
 TEST_CASE("without an error nothing is corrected") {
   const Drive drive = make_drive(furnished_room(1), rounds(300), {}, 1);
   CHECK(follow(drive, {}).closures == 0);
@@ -74,7 +89,8 @@ TEST_CASE("without an error nothing is corrected") {
 TEST_CASE("a place that looks otherwise is no known one") {
   std::vector<Wall> smaller = furnished_room(2);
   for (Wall& w : smaller) w = {0.6 * w.x0_m, 0.6 * w.y0_m, 0.6 * w.x1_m, 0.6 * w.y1_m};
-  const Drive drive = make_drive(furnished_room(1), rounds(190), {}, 1), other = make_drive(smaller, rounds(190), {}, 1);
+  const Drive drive = make_drive(furnished_room(1), rounds(190), {}, 1),
+              other = make_drive(smaller, rounds(190), {}, 1);
   CHECK(follow(drive, kDrifting, &other, 95).closures == 0);  // less than 10 m in either
   CHECK(follow(drive, kDrifting).closures > 0);
 }
