@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "graph/command/log_pull.hpp"
+#include "graph/command/log_serve.hpp"
 #include "graph/language/registry.hpp"
 
 namespace takt::command {
@@ -19,6 +20,7 @@ struct LogOptions {
   size_t items = 8;
   double from_s = 0, to_s = 1e9;  ///< since the epoch of the run
   LogPullOptions pull;
+  LogServeOptions serve;
 };
 
 /// `takt log info FILE`: what a record holds and lacks. Exit 0, 2 if it is no record.
