@@ -75,7 +75,7 @@ int log_serve(const LogServeOptions& options) {
   if (!served) return refuse(served.error(), kBadInput);
   if (!output.gone() && !served->refused.empty())
     return refuse("stdout could not take the record: " + served->refused, kDeviceOrSystem);
-  say_served(fmt::format("{}: {}: {} messages, {:.1f} MB, from {} files, {} gaps", served->run,
+  say_served(fmt::format("{}: {}: {} messages, {:.1f} MB, from {} files; gaps: {}", served->run,
                          output.gone() ? "the reader has gone" : served->end, served->messages,
                          static_cast<double>(served->bytes) / 1e6, served->files, served->gaps));
   return served->gaps > 0 && !output.gone() ? kNotOk : kOk;
