@@ -214,6 +214,8 @@ void add_log(CLI::App& app, const Registry& registry, LogOptions& o, int& exit_c
   writes_file(rescue->add_option("-o,--output", o.output, "the file to write"))->required();
   rescue->footer("Example: takt log rescue out/flight/ring -o last.mcap");
   rescue->callback([&] { exit_code = log_rescue(o); });
+  add_log_pull(*log, o.pull, exit_code);
+  add_log_serve(*log, o.serve, exit_code);
   for (CLI::App* command : {info, diff, echo, exported, cut})
     command->add_flag("--allow-damage", o.allow_damage, "a record that is damaged or cut off is no failure");
   exported->footer("Example: takt log export run.mcap -o foxglove.mcap");

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "graph/command/log_pull.hpp"
+#include "graph/command/log_serve.hpp"
 #include "graph/language/registry.hpp"
 
 namespace takt::command {
@@ -17,6 +19,8 @@ struct LogOptions {
   std::vector<std::string> ports;
   size_t items = 8;
   double from_s = 0, to_s = 1e9;  ///< since the epoch of the run
+  LogPullOptions pull;
+  LogServeOptions serve;
 };
 
 /// `takt log info FILE`: what a record holds and lacks. Exit 0, 2 if it is no record.

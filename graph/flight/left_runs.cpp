@@ -16,16 +16,11 @@ namespace {
 namespace fs = std::filesystem;
 
 const fs::path kMemory = "/dev/shm";
-constexpr std::string_view kPrefix = "takt-flight-", kEnding = "-000000.mcap";
+constexpr std::string_view kPrefix = "takt-flight-";
 
 bool mine(const fs::path& place) {
   struct stat status {};
   return lstat(place.c_str(), &status) == 0 && status.st_uid == geteuid() && S_ISDIR(status.st_mode);
-}
-
-std::string run_of(const fs::path& file) {
-  const std::string name = file.filename().string();
-  return name.substr(0, name.size() - kEnding.size());
 }
 
 }  // namespace
@@ -35,12 +30,12 @@ fs::path memory_place(const std::string& run) { return kMemory / (std::string(kP
 tl::expected<Rescued, std::string> rescue(const fs::path& folder, mcap::Sink& sink) {
   std::vector<fs::path> all;
   for (const record::RingFile& file : record::records_in(folder))
-    if (file.path.filename().string().size() > kEnding.size()) all.push_back(file.path);
+    if (!record::name_of(file.path).run.empty()) all.push_back(file.path);
   if (all.empty()) return tl::unexpected(folder.string() + ": no run has left anything here");
   Rescued rescued;
-  rescued.run = run_of(all.back());
+  rescued.run = record::name_of(all.back()).run;
   for (const fs::path& file : all)
-    if (run_of(file) == rescued.run) rescued.files.push_back(file);
+    if (record::name_of(file).run == rescued.run) rescued.files.push_back(file);
   for (const record::RingFile& file : record::records_in(memory_place(rescued.run))) rescued.files.push_back(file.path);
   auto joined = record::join(rescued.files, sink, {});
   if (!joined) return tl::unexpected(joined.error());

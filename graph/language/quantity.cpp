@@ -45,7 +45,10 @@ constexpr std::array kUnits{Unit{"m", "m", 1, 1, 1},
                             Unit{"B", "B", 1, 1, 1},
                             Unit{"kB", "B", 1000, 1, 1},
                             Unit{"MB", "B", 1'000'000, 1, 1},
-                            Unit{"GB", "B", 1'000'000'000, 1, 1}};
+                            Unit{"GB", "B", 1'000'000'000, 1, 1},
+                            Unit{"B/s", "B/s", 1, 1, 1},
+                            Unit{"kB/s", "B/s", 1000, 1, 1},
+                            Unit{"MB/s", "B/s", 1'000'000, 1, 1}};
 
 const Unit* find_unit(std::string_view word) {
   const auto it = std::find_if(kUnits.begin(), kUnits.end(), [&](const Unit& u) { return u.word == word; });

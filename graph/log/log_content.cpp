@@ -8,6 +8,7 @@
 #include <map>
 #include <set>
 
+#include "graph/log/cut_log.hpp"
 #include "graph/log/recorded_type.hpp"
 #include "rt/record/recorder.hpp"
 
@@ -151,6 +152,19 @@ void compare_channel(LogFile& from, LogFile& to, const mcap::Channel& channel, L
   result.lines.push_back(line);
 }
 
+/// What `takt log serve` could not send.
+Json gaps_of(const LogFile& log) {
+  Json gaps = Json::array();
+  for (const auto& one : log.container().metadata()) {
+    if (one.name != "takt gap") continue;
+    const auto at_s = [&](const char* key) {
+      return static_cast<double>(static_cast<int64_t>(count(one.map, key)) - epoch_ns(log)) / 1e9;
+    };
+    gaps.push_back({{"from_s", at_s("from_ns")}, {"to_s", at_s("to_ns")}, {"what", fact(one.map, "what")}});
+  }
+  return gaps;
+}
+
 /// How often each kind of event happened, and the restarts one by one.
 std::map<std::string, uint64_t> event_counts(const LogFile& log) {
   std::map<std::string, uint64_t> counts;
@@ -247,7 +261,7 @@ Json content_json(LogFile& log) {
                      {"cut_off", node.cut_off},
                      {"restarts", node.restarts}});
   Json lost;
-  if (!end.empty())
+  if (end.contains("lost_overwritten"))
     lost = {{"overwritten", count(end, "lost_overwritten")},
             {"no_room", count(end, "lost_no_room")},
             {"not_written", count(end, "lost_not_written")},
@@ -261,6 +275,7 @@ Json content_json(LogFile& log) {
           {"events", event_counts(log)},
           {"format", log.format()},
           {"lost", lost},
+          {"gaps", gaps_of(log)},
           {"damages", log.damages()},
           {"left_out", log.left_out()},
           {"hash", content_hash(log)}};
@@ -291,13 +306,16 @@ std::string content_text(const Json& content) {
     events += fmt::format("{}{} {}", events.empty() ? "\nevents: " : ", ", number.get<uint64_t>(), kind);
   if (!events.empty()) text += events + "\n";
   const Json& lost = content["lost"];
-  if (lost.is_null()) text += "\nthe record has no end: what it lost is not known\n";
+  if (lost.is_null()) text += "\nthe record lacks the end of its run: what was lost is not known\n";
   else
     text += fmt::format(
         "\nlost: {} messages overwritten, {} records found the queue full, {} not written, {} jobs "
         "incomplete, {} threads unheard\n",
         lost["overwritten"].get<uint64_t>(), lost["no_room"].get<uint64_t>(), lost["not_written"].get<uint64_t>(),
         lost["jobs"].get<uint64_t>(), lost["threads"].get<uint64_t>());
+  for (const Json& gap : content["gaps"])
+    text += fmt::format("gap from {:.3f} to {:.3f} s: {}\n", gap["from_s"].get<double>(), gap["to_s"].get<double>(),
+                        gap["what"].get<std::string>());
   for (const Json& damage : content["damages"]) text += "not whole: " + damage.get<std::string>() + "\n";
   for (const Json& left : content["left_out"]) text += "left out: " + left.get<std::string>() + "\n";
   return text + "content " + content["hash"].get<std::string>() + "\n";

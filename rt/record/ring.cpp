@@ -3,12 +3,18 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <cstdlib>
 #include <optional>
 #include <system_error>
 #include <utility>
 
 namespace takt::record {
 namespace fs = std::filesystem;
+namespace {
+
+constexpr int kDigits = 6;  ///< at least, of the number of a file
+
+}  // namespace
 
 std::vector<RingFile> records_in(const fs::path& folder) {
   std::vector<std::pair<fs::file_time_type, RingFile>> found;
@@ -22,6 +28,15 @@ std::vector<RingFile> records_in(const fs::path& folder) {
   std::vector<RingFile> files;
   for (auto& [written, file] : found) files.push_back(std::move(file));
   return files;
+}
+
+RingName name_of(const fs::path& file) {
+  const std::string name = file.stem().string();
+  const size_t number_at = name.rfind('-') + 1;
+  if (file.extension() != ".mcap" || number_at < 2 || name.size() < number_at + kDigits ||
+      name.find_first_not_of("0123456789", number_at) != std::string::npos)
+    return {};
+  return {name.substr(0, number_at - 1), std::strtoull(name.c_str() + number_at, nullptr, 10)};
 }
 
 /// The newest file. It is made with its first bytes, so that a disk that is gone and comes back is asked again.
@@ -78,8 +93,8 @@ mcap::Sink* Ring::next(int64_t at_ns) {
   if (!files_.empty() && sink_ != nullptr && files_.back().bytes == 0) files_.pop_back();  // nothing could be written
   while (!files_.empty() && files_.front().ended_ns > 0 && files_.front().ended_ns < at_ns - limits_.age_ns)
     if (!drop_oldest()) break;
-  char number[16];
-  std::snprintf(number, sizeof number, "-%06llu.mcap", static_cast<unsigned long long>(++number_));
+  char number[32];
+  std::snprintf(number, sizeof number, "-%0*llu.mcap", kDigits, static_cast<unsigned long long>(++number_));
   files_.push_back({folder_ / (name_ + number), at_ns, at_ns, 0});
   sink_ = std::make_unique<Sink>(*this, files_.back().path);
   return sink_.get();

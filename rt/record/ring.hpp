@@ -28,6 +28,13 @@ struct RingFile {
 /// Files NAME.mcap of a folder, the one that was written first in front; none if it cannot be read.
 std::vector<RingFile> records_in(const std::filesystem::path& folder);
 
+/// Of RUN-000001.mcap; a file that is named otherwise is of no run.
+struct RingName {
+  std::string run;
+  uint64_t number = 0;
+};
+RingName name_of(const std::filesystem::path& file);
+
 struct RingLimits {
   uint64_t bytes = 2'000'000'000;      ///< of all files of the folder, at every instant; at least kLeastBytes
   int64_t age_ns = 3'600'000'000'000;  ///< what is older goes; of the run's own time

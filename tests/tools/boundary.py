@@ -50,6 +50,8 @@ WHOLE = {
     "log echo": "RECORD",
     "log export": "RECORD --output NEW",
     "log cut": "RECORD --output NEW",
+    "log pull": "robot:out --ssh false --output OUT",
+    "log serve": "SOURCE/graph",
     "devices": "",
     "capture": "unix:/nowhere/can NEW --for 0.1s",
     "cloud": "CLOUD",

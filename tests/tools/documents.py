@@ -146,7 +146,7 @@ def check_errata():
 # Commands.
 
 FILE = re.compile(r"(?:graph|tests|schedules|bench|nodes|hal|docs)/[\w./-]+\.\w+")
-NO_COMMANDS = ("takt end",)  # metadata of a record
+NO_COMMANDS = ("takt end", "takt gap", "takt served")  # metadata of a record
 PLACEHOLDER = re.compile(r"[A-Z_]+(?:[.:].*)?$")
 
 

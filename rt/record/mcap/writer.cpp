@@ -131,7 +131,8 @@ void Writer::count_chunk(const ChunkIndex& index) {
   statistics_.messages += chunk_messages_;
   ++statistics_.chunks;
   for (const auto& [channel, entries] : indexed_) statistics_.channel_messages[channel] += entries.size();
-  put(chunk_indexes_, index);
+  if (chunks_indexed_) put(chunk_indexes_, index);
+  if (chunk_indexes_.size() > options_.most_index_bytes) chunk_indexes_ = {}, chunks_indexed_ = false;
   chunk_messages_ = 0;  // it is written
   drop_chunk();
 }

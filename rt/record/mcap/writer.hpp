@@ -26,6 +26,8 @@ class Writer {
     size_t chunk_bytes = 1 << 20;  ///< a chunk ends with the message that makes it as large, before compression
     Compression compression = Compression::zstd;  ///< of chunks that it makes a fifth smaller, by samples
     int level = 1;                                ///< of zstd
+    /// Of chunks in the summary, which is in memory until the end. With more there is none, and readers read on.
+    size_t most_index_bytes = SIZE_MAX;
   };
   using Done = tl::expected<void, std::string>;
 
@@ -70,6 +72,7 @@ class Writer {
   uint64_t chunk_start_ns_ = 0, chunk_end_ns_ = 0, chunk_messages_ = 0, lost_ = 0;
   /// Records for the summary, as they lie in it: of chunks there are tens of thousands.
   std::vector<std::byte> chunk_indexes_, attachment_indexes_, metadata_indexes_;
+  bool chunks_indexed_ = true;
   Statistics statistics_;
 };
 

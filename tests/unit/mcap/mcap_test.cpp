@@ -9,6 +9,7 @@
 
 #include "rt/record/mcap/reader.hpp"
 #include "rt/record/mcap/records.hpp"
+#include "rt/record/mcap/tail.hpp"
 #include "rt/record/mcap/writer.hpp"
 #include "tests/temporary_folder.hpp"
 
@@ -316,4 +317,53 @@ TEST_CASE("mcap: a damaged record costs itself alone") {
   std::string error;
   CHECK(messages_of(*claims, &error).empty());
   CHECK(error.find("it claims 1073741824 bytes of 0") != std::string::npos);
+}
+
+TEST_CASE("A tail gives each record once, when its last byte is there") {
+  const test::TemporaryFolder folder;
+  const std::vector<std::byte> bytes = sample(40, Compression::zstd);
+  const auto file = folder.path / "grows.mcap";
+  std::ofstream out(file, std::ios::binary);
+  auto tail = Tail::open(file);
+  REQUIRE(tail);
+  uint64_t end = kMagic.size(), count = 0;
+  for (size_t size = 0; size < bytes.size(); ++size) {
+    out.put(static_cast<char>(bytes[size])).flush();
+    const auto record = tail->next();
+    REQUIRE_MESSAGE(record, record.error());
+    if (!*record) continue;
+    CHECK((*record)->at == end);
+    end += 9 + (*record)->fields.size();
+    REQUIRE(end == size + 1);
+    ++count;
+    if ((*record)->op == Op::footer) break;
+  }
+  CHECK(count > 40 / 20);
+  CHECK(end + kMagic.size() == bytes.size());
+}
+
+TEST_CASE("A tail stops at what is no record, and at what is no MCAP file") {
+  const test::TemporaryFolder folder;
+  CHECK(!Tail::open(folder.path / "none"));
+  CHECK(!Tail::open(folder.write("text", "no MCAP file"))->next());
+  std::string damaged(reinterpret_cast<const char*>(kMagic.data()), kMagic.size());
+  auto tail = Tail::open(folder.write("damaged", damaged + std::string(9, '\x7f')));
+  REQUIRE(tail);
+  CHECK(tail->next().error() == "at byte 8 there is no record");
+}
+
+TEST_CASE("A summary without the index of its chunks takes bounded memory, and the file is whole") {
+  const test::TemporaryFolder folder;
+  MemorySink all, some;
+  for (MemorySink* sink : {&all, &some}) {
+    Writer writer(*sink, {.chunk_bytes = 256, .most_index_bytes = sink == &some ? 500 : SIZE_MAX});
+    begin(writer);
+    for (uint32_t i = 0; i < 50; ++i) REQUIRE(writer.write(as_message(message_of(i))));
+    REQUIRE(writer.finish());
+  }
+  CHECK(some.bytes.size() < all.bytes.size());
+  const auto reader = Reader::open(written(folder, some.bytes));
+  REQUIRE(reader);
+  CHECK(reader->missing() == "");
+  CHECK(messages_of(*reader).size() == 50);
 }

@@ -145,3 +145,14 @@ TEST_CASE("Of a port by rule: nothing, hashes, or all fields of some messages") 
   CHECK(count(2, true) == 6);
   CHECK(count(2, false) == 24);
 }
+
+TEST_CASE("The name of a file tells its run and its number") {
+  const auto is = [](const char* file, const char* run, uint64_t number) {
+    const RingName name = name_of(file);
+    return name.run == run && name.number == number;
+  };
+  CHECK(is("out/ring/ace-20261129-184012-4711-000012.mcap", "ace-20261129-184012-4711", 12));
+  CHECK(is("a-1234567.mcap", "a", 1234567));
+  for (const char* file : {"a-00001.mcap", "-000001.mcap", "000001.mcap", "a-00001x.mcap", "a-000001.part", "a", ""})
+    CHECK(is(file, "", 0));
+}
