@@ -26,7 +26,7 @@ std::string what_happened(const PulledFile& file) {
     case PulledFile::there: return "on the robot";
     case PulledFile::here: return "already here";
     case PulledFile::open: return "left out: the run writes it, or was killed meanwhile (takt log rescue)";
-    case PulledFile::gone: return "gone: the run has removed it meanwhile";
+    case PulledFile::gone: return "gone: the run has removed it meanwhile, or it may not be read";
     case PulledFile::other: return "left out: here is another file of that name";
     case PulledFile::fetched: break;
   }

@@ -95,9 +95,12 @@ class Pull {
     return *line;
   }
 
+  [[noreturn]] static void interrupted() {
+    throw Failure(Pulled::broken, "interrupted; the same command goes on from here");
+  }
+
   [[noreturn]] void lost() {
-    constexpr const char* kGoesOn = "the same command goes on from here";
-    if (stopped()) throw Failure(Pulled::broken, fmt::format("interrupted; {}", kGoesOn));
+    if (stopped()) interrupted();
     const int code = robot_->end();
     if (code == 127)
       throw Failure(Pulled::system,
@@ -106,7 +109,8 @@ class Pull {
                                 options_.ssh));
     if (greeted_)
       throw Failure(Pulled::system,
-                    fmt::format("the connection to {} has ended (exit {} of ssh); {}", pulled_.host, code, kGoesOn));
+                    fmt::format("the connection to {} has ended (exit {} of ssh); the same command goes on from here",
+                                pulled_.host, code));
     throw Failure(Pulled::system,
                   fmt::format("{} cannot be reached (exit {} of ssh, which says why above); try: {} {} true",
                               pulled_.host, code, options_.ssh, pulled_.host));
@@ -115,10 +119,8 @@ class Pull {
   /// Passes over what the login of the user prints.
   void greet() {
     robot_->say(
-        "for tool in stat head tail sha256sum; do command -v $tool >/dev/null || echo \"takt lacks $tool\"; done; "
-        "echo; "
-        "echo '" +
-        std::string(kReady) + "'");
+        "for tool in stat head tail tr sha256sum; do command -v $tool >/dev/null || echo \"takt lacks $tool\"; done");
+    robot_->say("echo; echo '" + std::string(kReady) + "'");
     std::string lacks;
     for (std::string said; (said = line()) != kReady;)
       if (said.starts_with("takt lacks ")) lacks += said.substr(10);
@@ -149,9 +151,9 @@ class Pull {
     robot_->say("for f in frozen/*.mcap; do s=$(stat -L -c %s \"$f\" 2>/dev/null) && echo \"whole $s $f\"; done");
     if (options_.ring)
       robot_->say(
-          "for f in ring/*.mcap; do case $(tail -c 7 \"$f\" 2>/dev/null | head -c 5) in MCAP0) e=whole;; *) e=open;; "
-          "esac; "
-          "s=$(stat -L -c %s \"$f\" 2>/dev/null) && echo \"$e $s $f\"; done");
+          "for f in ring/*.mcap; do case $(tail -c 7 \"$f\" 2>/dev/null | head -c 5 | tr -d '\\000') in MCAP0) "
+          "e=whole;; "
+          "*) e=open;; esac; s=$(stat -L -c %s \"$f\" 2>/dev/null) && echo \"$e $s $f\"; done");
     robot_->say("echo '" + std::string(kEnd) + "'");
     for (std::string said; (said = line()) != kEnd;) {
       PulledFile file;
@@ -250,11 +252,12 @@ class Pull {
     }
   }
 
-  static std::string hash_here(const fs::path& file) {
+  std::string hash_here(const fs::path& file) const {
     auto shell = RemoteShell::here();
     if (!shell) throw Failure(Pulled::system, shell.error());
     shell->say("sha256sum <" + shell_word(file.string()) + "; exit");
     const auto said = shell->line();
+    if (!said && stopped()) interrupted();
     if (!said) throw Failure(Pulled::system, "sha256sum is missing here; install coreutils");
     return said->substr(0, 64);
   }

@@ -59,8 +59,8 @@ struct Pulled {
   std::string error;  ///< why not all that is there is here
 };
 
-/// Frozen files, the oldest first. On the robot nothing is changed; it needs sh, stat, head, tail, sha256sum. A file
-/// gets its name once its SHA-256 is the robot's; until then it is NAME.part, and the next pull goes on with that.
+/// Frozen files, the oldest first. On the robot nothing is changed; it needs sh, stat, head, tail, tr, sha256sum. A
+/// file gets its name once its SHA-256 is the robot's; until then it is NAME.part, and the next pull goes on with that.
 Pulled pull(const PullOptions& options);
 
 /// How long a transfer waits that must not be faster, after so many bytes in so much time.

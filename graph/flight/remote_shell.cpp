@@ -33,7 +33,9 @@ std::string shell_word(std::string_view text) {
 tl::expected<RemoteShell, std::string> RemoteShell::here() { return start({"sh"}); }
 
 tl::expected<RemoteShell, std::string> RemoteShell::over(const std::string& ssh, const std::string& host) {
-  return start({"sh", "-c", "exec " + ssh + " \"$@\"", "sh", host, "nice -n 19 sh"});
+  auto shell = start({"sh", "-c", "exec " + ssh + " \"$@\"", "sh", host, "sh"});
+  if (shell) shell->say("renice -n 19 -p $$ >/dev/null 2>&1");
+  return shell;
 }
 
 tl::expected<RemoteShell, std::string> RemoteShell::start(const std::vector<std::string>& words) {

@@ -56,7 +56,8 @@ bool Tail::read(uint64_t at, uint64_t size) {
 tl::expected<std::optional<Tail::Record>, std::string> Tail::next() {
   if (at_ == 0) {
     if (!read(0, kMagic.size())) return std::nullopt;
-    if (std::memcmp(buffer_.data(), kMagic.data(), kMagic.size()) != 0) return tl::unexpected(std::string("it is no MCAP file"));
+    if (std::memcmp(buffer_.data(), kMagic.data(), kMagic.size()) != 0)
+      return tl::unexpected(std::string("it is no MCAP file"));
     at_ = kMagic.size();
   }
   if (!read(at_, kHead)) return std::nullopt;

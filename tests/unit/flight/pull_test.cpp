@@ -255,7 +255,7 @@ TEST_CASE("What is missing is named") {
                   "`/nowhere/ssh 2>/dev/null` cannot be started; install it"));
   CHECK(test::has(error(options, "sh -c 'echo Welcome; exit 255'"), "user@robot cannot be reached (exit 255 of ssh"));
   CHECK(test::has(error(options, "sh -c 'PATH=/nowhere; exec /bin/sh'"),
-                  "user@robot lacks stat head tail sha256sum; install coreutils there"));
+                  "user@robot lacks stat head tail tr sha256sum; install coreutils there"));
   CHECK(error(options, ("sh -c " + shell_word("echo Welcome; printf hello; " + options.ssh)).c_str()) == "");
   options.from += "/none";
   CHECK(test::has(error(options), "user@robot has no folder"));
