@@ -2,7 +2,11 @@
 #include "graph/log/recorded_plan.hpp"
 
 #include <dlfcn.h>
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <fstream>
@@ -159,12 +163,24 @@ Json asset_hashes(const Plan& plan, const std::filesystem::path& directory) {
 
 std::string part_name(size_t i) { return fmt::format("part_{}.yaml", i); }
 
-std::string file_hash(const std::filesystem::path& file) { return hash_text(file_text(file)); }
+/// Mapped: a run would keep the memory that a copy of a large file takes.
+std::string file_hash(const std::filesystem::path& file) {
+  const int descriptor = open(file.c_str(), O_RDONLY | O_CLOEXEC);
+  struct stat status {};
+  const bool there = descriptor >= 0 && fstat(descriptor, &status) == 0 && status.st_size > 0;
+  const auto size = static_cast<size_t>(there ? status.st_size : 0);
+  void* const memory = there ? mmap(nullptr, size, PROT_READ, MAP_PRIVATE, descriptor, 0) : MAP_FAILED;
+  if (descriptor >= 0) close(descriptor);
+  if (memory == MAP_FAILED) return hash_text("");
+  const uint64_t hash = record::hash_of({static_cast<const std::byte*>(memory), size});
+  munmap(memory, size);
+  return fmt::format("{:016x}", hash);
+}
 
 std::string program_hash() {
   Dl_info core{};
   const bool found = dladdr(reinterpret_cast<const void*>(&version), &core) != 0;
-  return hash_text(file_text("/proc/self/exe") + (found ? file_text(core.dli_fname) : ""));
+  return hash_text(file_hash("/proc/self/exe") + (found ? file_hash(core.dli_fname) : ""));
 }
 
 std::string file_text(const std::filesystem::path& file) {

@@ -32,6 +32,17 @@ prints "  state "
 prints "  param "
 printf 'go nobody 3\n' | expect 1 'there is no node `nobody`' "$takt" replay "$record" --output "$work/again" --inspect
 
-# What breaks at 7 s is found with few replays.
-expect 0 "" "$takt" bisect "$record" 'port: robot_pose.pose, field: stamp, at_most: 0' || true
+# A laser falls silent for good: the first job that asks for the stop is found with few replays.
+cat >"$work/silent.yaml" <<'YAML'
+takt: 1
+name: silent
+faults: [{kind: silent, target: front_laser, from: 7s, to: 1000s}]
+expect: {}
+YAML
+"$takt" run graph/lasers.yaml --clock virtual --for 20s --record "$work/silent.mcap" --faults "$work/silent.yaml" --output "$work/out" \
+  >"$work/stdout" 2>&1
+expect 0 "" "$takt" bisect "$work/silent.mcap" 'port: obstacle_stop.stop, field: reasons, at_most: 0'
+prints "first broken: obstacle_stop job 10"
+expect 1 "" "$takt" bisect "$work/silent.mcap" 'port: obstacle_stop.stop, field: reasons, at_least: 0'
+prints "it holds at the end"
 finish
