@@ -16,6 +16,7 @@
 #include "rt/sched/param_mail.hpp"
 #include "rt/sched/port_access.hpp"
 #include "rt/testing.hpp"
+#include "tests/going_on.hpp"
 #include "tests/temporary_folder.hpp"
 #include "tests/unit/record/recorded_run.hpp"
 
@@ -165,6 +166,31 @@ TEST_CASE(
   const record::ReplayResult replayed = record::Replayer(again.plan, *log, {}).run();
   CHECK(replayed.compared >= 110);
   CHECK(replayed.different == 0);
+}
+
+TEST_CASE("object_detection goes on from what was remembered with the revision and the class ids that it had") {
+  const Database database;
+  const test::TemporaryFolder folder;
+  ReloadScene scene(database), later(database);
+  auto sink = mcap::FileSink::open(folder.path / "run.mcap");
+  REQUIRE(sink);
+  size_t changes = 0;
+  uint64_t jobs = 0;
+  test::record_run(scene.plan, *sink, 2, {}, {}, [&](RunBoard& board) {
+    const uint64_t done = board.task(1).completed.load();
+    if (done == jobs || changes == 3) return;
+    jobs = done;
+    CHECK(post(board.mail(1), scene.revision, ParamValue(database.revisions[++changes % 2])));
+  });
+  REQUIRE(scene.reader.revision.back() == 1);
+  later.node->start(0);
+  later.node = test::going_on(*scene.node, std::move(later.node));
+  test::set(*later.node, "revision", database.revisions[1]);
+  auto other = mcap::FileSink::open(folder.path / "later.mcap");
+  REQUIRE(other);
+  test::record_run(later.plan, *other, 1);
+  REQUIRE(later.reader.revision.size() >= 5);
+  for (const int seen : later.reader.revision) CHECK(seen == 1);
 }
 
 TEST_CASE(
