@@ -59,7 +59,10 @@ class PersonTrackingNode final : public Node {
     const int64_t stamp_ns = looks ? pair_.stamp_ns() : job.release_ns();
     const auto robot = robot_at(stamp_ns);
     bool sent = send_command(robot, stamp_ns);
-    if (looks) sent = send_person(robot, stamp_ns) & send_shirts(*pair, stamp_ns) & sent;
+    if (looks) {
+      const bool person_sent = send_person(robot, stamp_ns), shirts_sent = send_shirts(*pair, stamp_ns);
+      sent = sent && person_sent && shirts_sent;
+    }
     if (!looks || !sent) job.no_result();
   }
 

@@ -89,7 +89,8 @@ class SemanticNode final : public Node {
   Surroundings surroundings() {
     Surroundings around;
     near_.clear();
-    if (add_reports() | add_bodies()) around.objects = near_;
+    const bool reports = add_reports(), bodies = add_bodies();
+    if (reports || bodies) around.objects = near_;
     if (is_fresh(crossing_)) around.crossing = (crossing_.newest()->levels & 1) != 0;
     if (is_fresh(terrain_))
       around.crossing = around.crossing.value_or(false) || terrain_.newest()->kind == terrain_kind::crossing;
