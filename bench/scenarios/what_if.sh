@@ -18,23 +18,21 @@ trap 'rm -rf "$work"' EXIT
 export XDG_RUNTIME_DIR=$work  # no other run is in the way
 cat >"$work/what_if.py" <<'PY'
 import json, subprocess, sys
-from fractions import Fraction
-from schedule_lines import Schedule, in_us, seconds
+from schedule_lines import Schedule
 root, takt, work, *words = sys.argv[1:]
 inputs, virtual = "inputs" in words, "virtual" in words
 LENGTH = next((int(word) for word in words if word.isdigit()), 10 if virtual else 20)
 CLOCK = ["--clock", "virtual", "--durations", "random", "--seed", "1"] if virtual else []
 SLOW = {"stereo": "10", "object_detection": "5", "traffic_signs": "2", "stereo_wide": "2", "body_pose": "2"}
-TIGHT = {"stereo": "7ms", "ego_motion": "6ms", "ground_map": "5ms", "object_detection": "4ms", "mapping_3d": "15ms"}
+# Near what half of the jobs take, so that some are late. Their budgets stay: the kernel would grant no reservations for that.
+TIGHT = ({"stereo": "14ms", "ego_motion": "9ms", "ground_map": "6ms", "object_detection": "9ms", "mapping_3d": "22ms"} if virtual else
+         {"stereo": "5700us", "ego_motion": "4100us", "ground_map": "1700us", "object_detection": "5ms", "mapping_3d": "9ms"})
 
 
 def changed(name, policy, cores, rates={}, deadlines={}):
     made = Schedule(f"{root}/schedules/thesis.yaml")
     for node, rate in rates.items(): made.change(node, rate=rate)
-    for node, deadline in deadlines.items():
-        made.change(node, deadline=deadline)
-        # The kernel takes no budget above its deadline. Drawn times are shares of the budget, which stays then.
-        if not virtual: made.change(node, budget=in_us(min(seconds(made.nodes[node]["budget"]), seconds(deadline))))
+    for node, deadline in deadlines.items(): made.change(node, deadline=deadline)
     made.lines = [f"policy: {policy}\ncores: {cores}" if line.startswith("policy:") else line for line in made.lines]
     made.write(f"{work}/{name}.yaml")
     return name, len(cores)
@@ -42,9 +40,9 @@ def changed(name, policy, cores, rates={}, deadlines={}):
 
 VARIANTS = [
     changed("thesis", "deadline", [0, 1]),
-    changed("tight", "deadline", [0, 1], deadlines=TIGHT),  # shorter than some responses: there are misses
     changed("slow", "deadline", [0, 1], rates=SLOW),
     changed("fixed", "fixed", [0, 1]),
+    changed("tight", "fixed", [0, 1], deadlines=TIGHT),
     changed("fixed_one", "fixed", [0]),
     changed("slow_one", "fixed", [0], rates=SLOW),
     changed("tight_one", "fixed", [0], deadlines=TIGHT),
@@ -62,7 +60,9 @@ def run(name, *more):
     call("run", f"{root}/graph/ace.yaml", "--for", f"{LENGTH}s", "--schedule", f"{work}/{name}.yaml", "--unchecked", *CLOCK, "--output", f"{work}/out",
          "--report", f"{work}/{name}.json", *more)
     report = json.load(open(f"{work}/{name}.json"))
-    if not virtual and report["policy_granted"] != report["policy_asked"]: sys.exit(3)
+    if not virtual and report["policy_granted"] != report["policy_asked"]:
+        print(f"{name}: the policy {report['policy_asked']} was refused: {report['adjusted']}", file=sys.stderr)
+        sys.exit(3)
     return report
 
 
