@@ -110,6 +110,9 @@ int log_export(const Registry& registry, const LogOptions& options) {
     if (const auto done = made.claim->finish(); !done) return refuse(done.error(), "--output");
     std::printf("%llu messages, %.1f MB\n", static_cast<unsigned long long>(exported->messages),
                 static_cast<double>(exported->bytes) / 1e6);
+    if (exported->states > 0)
+      std::printf("%llu states of nodes were left out: only a replay reads them\n",
+                  static_cast<unsigned long long>(exported->states));
     if (exported->hash_only > 0)
       std::printf("%llu messages were recorded by their hash only; record them whole with --record-port\n",
                   static_cast<unsigned long long>(exported->hash_only));

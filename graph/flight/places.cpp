@@ -18,15 +18,6 @@ constexpr int64_t kSlowest_ns = 1'000'000'000;
 /// As long may it take until a window has been copied out of memory.
 constexpr int64_t kWritten_ns = 2'000'000'000;
 
-PortRule rule_of(const graph::RecordSpec::Port& port) {
-  using Keep = graph::RecordSpec::Keep;
-  PortRule rule;
-  rule.keep = port.keep == Keep::all ? PortRule::all : port.keep == Keep::hash ? PortRule::hash : PortRule::nothing;
-  rule.every = port.every;
-  rule.pause_ns = port.pause_ns;
-  return rule;
-}
-
 /// Messages of a port that are kept with all fields, a second.
 double kept_hz(const PortRule& rule, double rate_hz) {
   if (rule.keep != PortRule::all) return 0;
@@ -50,7 +41,7 @@ Places places(const graph::RecordSpec& spec, const Plan& plan) {
     PortRule& rule = places.disk[p];
     bool asked = false;
     for (const graph::RecordSpec::Port& given : spec.ports)
-      if (given.port.node == port.node && given.port.port == port.port) rule = rule_of(given), asked = true;
+      if (given.port.node == port.node && given.port.port == port.port) rule = given.rule, asked = true;
     const size_t task = producers.find(p);
     double rate_hz = task == kNone ? 0 : effective_rate_hz(plan, task);
     const bool state = task != kNone && plan.tasks[task].state_every_ns > 0 && plan.tasks[task].ports.back() == p;

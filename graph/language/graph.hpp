@@ -11,6 +11,7 @@
 #include "hal/settings/json.hpp"
 #include "rt/machine/identity.hpp"
 #include "rt/param.hpp"
+#include "rt/record/port_rule.hpp"
 #include "rt/sched/plan.hpp"
 #include "rt/time/rate.hpp"
 
@@ -216,12 +217,9 @@ struct ExpectSpec {
 
 /// The part `record` of a graph: what its runs keep of themselves at any time, and for how long.
 struct RecordSpec {
-  enum class Keep : uint8_t { all, hash, nothing };
   struct Port {
     PortName port;
-    Keep keep = Keep::all;
-    uint32_t every = 1;    ///< all fields of each so many-th message
-    int64_t pause_ns = 0;  ///< ... or of one in so much time
+    record::PortRule rule;
     Position position;
   };
   bool ring = true;                      ///< runs in real time keep one unless they are told otherwise

@@ -61,40 +61,40 @@ void Loader::read_record_size(const json& value, std::string_view key, int64_t l
 void Loader::read_record_port(const std::string& name) {
   const std::string at = child("/record/ports", name);
   const size_t dot = std::min(name.find('.'), name.size());
-  RecordSpec::Port rule;
-  rule.port = {name.substr(0, dot), name.substr(std::min(name.size(), dot + 1))};
-  rule.position = graph_.key_at(at);
-  const auto part = parts_.find(rule.port.node);
+  RecordSpec::Port given;
+  given.port = {name.substr(0, dot), name.substr(std::min(name.size(), dot + 1))};
+  given.position = graph_.key_at(at);
+  const auto part = parts_.find(given.port.node);
   if (part == parts_.end())
-    return problem(rule.position,
+    return problem(given.position,
                    fmt::format("`record` has a rule for {}, but there is no node or device {}{}", ticked(name),
-                               ticked(rule.port.node), alternatives(rule.port.node, ids())));
+                               ticked(given.port.node), alternatives(given.port.node, ids())));
   if (!part->second.known) return;
-  if (part->second.output(rule.port.port) == nullptr)
-    return problem(rule.position, fmt::format("`record` has a rule for {}, but {} has no output {}{}", ticked(name),
-                                              ticked(rule.port.node), ticked(rule.port.port),
-                                              alternatives(rule.port.port, part->second.output_names(),
-                                                           "outputs of " + ticked(rule.port.node))));
+  if (part->second.output(given.port.port) == nullptr)
+    return problem(given.position, fmt::format("`record` has a rule for {}, but {} has no output {}{}", ticked(name),
+                                               ticked(given.port.node), ticked(given.port.port),
+                                               alternatives(given.port.port, part->second.output_names(),
+                                                            "outputs of " + ticked(given.port.node))));
   const std::string word = graph_.raw(at);
   constexpr std::string_view kEvery = "every ";
-  if (word == "none") rule.keep = RecordSpec::Keep::nothing;
-  else if (word == "hash") rule.keep = RecordSpec::Keep::hash;
+  if (word == "none") given.rule.keep = record::PortRule::nothing;
+  else if (word == "hash") given.rule.keep = record::PortRule::hash;
   else if (word.starts_with(kEvery)) {
     const auto count = parse_in_unit(std::string_view(word).substr(kEvery.size()), "1");
     if (!count || *count < 1 || *count > 1e6 || *count != std::floor(*count))
       return problem(graph_.value_at(at), fmt::format("{} of `record` is {}; `every` takes a whole number from 1 to "
                                                       "1000000, as in `every 5`",
                                                       ticked(name), ticked(word)));
-    rule.every = static_cast<uint32_t>(*count);
+    given.rule.every = static_cast<uint32_t>(*count);
   } else if (word != "all") {
     const auto pause_ns = parse_duration_ns(word);
     if (!pause_ns || *pause_ns <= 0)
       return problem(graph_.value_at(at),
                      fmt::format("{} of `record` is {}; valid: all, hash, none, `every N`, or a time such as 1s",
                                  ticked(name), ticked(word)));
-    rule.pause_ns = *pause_ns;
+    given.rule.pause_ns = *pause_ns;
   }
-  spec_.record.ports.push_back(std::move(rule));
+  spec_.record.ports.push_back(std::move(given));
 }
 
 }  // namespace takt::graph

@@ -8,6 +8,7 @@
 #include "graph/log/foxglove.hpp"
 #include "graph/log/recorded_type.hpp"
 #include "rt/memory/aligned_bytes.hpp"
+#include "rt/msg/node_state.hpp"
 #include "rt/msg/scalar.hpp"
 #include "rt/record/mcap/writer.hpp"
 #include "rt/record/recorder.hpp"
@@ -84,6 +85,10 @@ class Export {
  private:
   void export_port(const mcap::Channel& channel, const Capacity& capacity) {
     const auto type = type_of(log_, channel);
+    if (type && type->name() == NodeState::type_name) {
+      result_.states += log_.messages(channel.id).size();
+      return;
+    }
     const MessageType* shown = type ? shown_type(*type) : nullptr;
     if (type && shown == nullptr) result_.own_fields.insert(type->name());
     const AlignedBytes memory = aligned_bytes(shown != nullptr ? shown->bytes(capacity) : 0);

@@ -13,6 +13,7 @@ namespace takt::log {
 
 struct Exported {
   uint64_t messages = 0;   ///< written
+  uint64_t states = 0;     ///< of nodes, which only a replay reads: left out
   uint64_t hash_only = 0;  ///< of which the record does not have the fields: a replay can make them
   uint64_t bytes = 0;
   std::set<std::string> own_fields;  ///< types that show nothing of themselves: their messages are there field by field

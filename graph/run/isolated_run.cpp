@@ -171,6 +171,7 @@ class IsolatedRun {
     ending_ = true;
     group_.kill_all();
     wait_until([&] { return collect_ends(), group_.alive() == 0; });
+    record_.let_go();
     transport_.reset();
   }
 

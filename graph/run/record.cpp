@@ -13,6 +13,7 @@
 #include "graph/run/machine.hpp"
 #include "graph/run/outputs.hpp"
 #include "rt/abi.hpp"
+#include "rt/machine/limits.hpp"
 
 namespace takt::command {
 namespace {
@@ -98,7 +99,12 @@ void RunRecord::begin(const graph::GraphSpec& graph, const Plan& plan, const Run
   how.by_caller = options_.clock == "virtual";
   how.priority = priority_on(plan);
   how.say = [](const std::string& line) { std::fprintf(stderr, "takt: %s\n", line.c_str()); };
-  flight_ = std::make_unique<flight::FlightRecorder>(graph, plan, board, transport, head, std::move(how));
+  try {
+    flight_ = std::make_unique<flight::FlightRecorder>(graph, plan, board, transport, head, std::move(how));
+  } catch (const std::exception& problem) {  // no thread, no memory: the run is worth more
+    std::fprintf(stderr, "takt: adjusted: no ring: %s\n", machine::explain(problem).c_str());
+    return;
+  }
   if (!flight_->lacks().empty()) std::fprintf(stderr, "takt: adjusted: no ring: %s\n", flight_->lacks().c_str());
   for (const std::string& doubt : flight_->doubts()) std::fprintf(stderr, "takt: note: %s\n", doubt.c_str());
 }

@@ -52,6 +52,9 @@ class RunRecord {
     if (recorder_) recorder_->take_rest();
     if (flight_) flight_->take_rest();
   }
+  /// Reads the transport no more, whatever else is still to come. Without finish() before, what was recorded has an end
+  /// that says nothing.
+  void let_go() { recorder_.reset(), flight_.reset(); }
   /// After the last event was taken; `unheard_threads` noted none.
   void finish(const RunResult& result, uint64_t unheard_threads);
   /// What froze the ring so far, the newest last: a sentence each.

@@ -48,10 +48,10 @@ int execute(const RunOptions& options, Prepared& prepared, RunFaults& faults, Ru
   if (!durations) return refuse(durations.error(), kBadInput);
   RunBoard board(composition.plan);
   tell_bounds(graph, composition.plan, proofs, board);
-  RunRecord record(prepared.registry, options, composition.plan);
-  faults.disturb_disk(record, *prepared.clock, board);
   const auto transport =
       faults.inject(make_transport(options.transport, composition.plan), composition.plan, *prepared.clock, board);
+  RunRecord record(prepared.registry, options, composition.plan);  // reads from the transport
+  faults.disturb_disk(record, *prepared.clock, board);
   RunTrace trace(options, composition.plan, 1);  // ends first: it speaks to the record
   Executor::Options run;
   run.duration_ns = static_cast<int64_t>(options.duration_s * 1e9);

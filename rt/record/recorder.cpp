@@ -54,7 +54,14 @@ Recorder::Recorder(const Plan& plan, const RunBoard& board, Transport& transport
   }
   begin_file(0);
   writing_ = OwnThread([this] { write_on(); });
-  if (!options_.by_caller) capturing_ = OwnThread([this] { capture_on(); });
+  if (options_.by_caller) return;
+  try {
+    capturing_ = OwnThread([this] { capture_on(); });
+  } catch (...) {  // no more threads: the other one would wait for ever
+    queue_.close();
+    writing_.join();
+    throw;
+  }
 }
 
 Recorder::~Recorder() {

@@ -10,6 +10,7 @@
 #include "rt/own_thread.hpp"
 #include "rt/record/job_assembler.hpp"
 #include "rt/record/mcap/writer.hpp"
+#include "rt/record/port_rule.hpp"
 #include "rt/record/snapshots.hpp"
 #include "rt/record/splits.hpp"
 #include "rt/record/write_queue.hpp"
@@ -22,18 +23,6 @@ namespace takt::record {
 struct Head {
   mcap::Metadata facts;
   std::vector<mcap::Attachment> files;  ///< their data must live as long as the recorder
-};
-
-/// What is recorded of the messages of a port.
-struct PortRule {
-  enum Keep : uint8_t {
-    nothing,
-    hash,  ///< header and hash
-    all,   ///< and, of some, all fields
-  };
-  Keep keep = all;
-  uint32_t every = 1;    ///< all fields of each so many-th message, by its sequence
-  int64_t pause_ns = 0;  ///< ... and of none sooner than this after the last one that has them
 };
 
 /// What a record lacks, and what it cost.

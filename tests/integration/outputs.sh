@@ -42,7 +42,9 @@ expect 0 "" "$takt" log info "$work/one.mcap"
 expect 2 "this command itself, for another option," "$takt" run "$source/graph/lasers.yaml" --for 1s --clock virtual --output "$work/out" --report "$work/x.json" --html "$work/x.json"
 
 echo "=== limits of files, readers that go away"
-expect 0 "" bash -c "ulimit -f 1000; '$takt' run '$source/graph/lasers.yaml' --clock virtual --for 60s --record '$work/limited.mcap' --output '$work/out'"
+sed "s|worlds/|$source/graph/worlds/|; s|\.\./schedules|$source/schedules|" "$source/graph/lasers.yaml" >"$work/small.yaml"
+echo 'record: {snapshots: none}' >>"$work/small.yaml"  # pools lie in files, too
+expect 0 "" bash -c "ulimit -f 1000; '$takt' run '$work/small.yaml' --clock virtual --for 60s --record '$work/limited.mcap' --output '$work/out'"
 prints "not written"
 prints "(File too large)"
 expect 1 "is not whole" "$takt" log info "$work/limited.mcap"

@@ -100,8 +100,8 @@ until [ "$(stat -c %s "$work/killed.mcap" 2>/dev/null || echo 0)" -gt 20000000 ]
 done
 kill -9 "$run"
 wait "$run" 2>/dev/null
-tells 1 "the record has no end" "$takt" log info "$work/killed.mcap"
-tells 0 "the record has no end" "$takt" log info --allow-damage "$work/killed.mcap"
+tells 1 "the record lacks the end of its run" "$takt" log info "$work/killed.mcap"
+tells 0 "the record lacks the end of its run" "$takt" log info --allow-damage "$work/killed.mcap"
 "$takt" replay "$work/killed.mcap" --compare --allow-damage --output "$work/out" >"$work/replay.txt" 2>&1
 grep -q " 0 differ" "$work/replay.txt" || fail "a cut record has other bytes: $(cat "$work/replay.txt")"
 

@@ -45,6 +45,7 @@ WHOLE = {
     "nodes": "obstacle_stop",
     "doctor": "",
     "replay": "RECORD --output OUT",
+    "bisect": 'RECORD {"port":"obstacle_stop.stop","field":"reasons","at_least":0}',
     "log info": "RECORD",
     "log diff": "RECORD RECORD",
     "log echo": "RECORD",

@@ -85,11 +85,11 @@ TEST_CASE("Small ports are kept on disk, large ones in memory and by their hash 
   CHECK(places.in_memory());
   CHECK(places.memory_bytes_s == doctest::Approx(40e6).epsilon(0.1));
   // One in ten seconds is little enough for the disk.
-  spec.ports.push_back({{"filter", "grid"}, graph::RecordSpec::Keep::all, 1, 10 * kSecond, {}});
+  spec.ports.push_back({{"filter", "grid"}, {all, 1, 10 * kSecond}, {}});
   places = flight::places(spec, small.plan);
   CHECK(places.disk[1].pause_ns == 10 * kSecond);
   CHECK(!places.in_memory());
-  spec.ports.front() = {{"filter", "grid"}, graph::RecordSpec::Keep::nothing, 1, 0, {}};
+  spec.ports.front() = {{"filter", "grid"}, {nothing, 1, 0}, {}};
   CHECK(flight::places(spec, small.plan).disk[1].keep == nothing);
 }
 
