@@ -10,6 +10,7 @@
 #include <initializer_list>
 #include <system_error>
 
+#include "rt/capability.hpp"
 #include "rt/record/join.hpp"
 
 namespace takt::flight {
@@ -78,6 +79,7 @@ bool Freezer::ready(const Frozen& frozen) {
 }
 
 void Freezer::work() {
+  keep_rights(Rights::none);
   setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), 19);
   std::unique_lock lock(mutex_);
   for (;;) {

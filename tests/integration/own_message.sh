@@ -30,8 +30,8 @@ tells 0 "jobs" "$takt" log cut "$work/run.mcap" --from 1 --to 2 -o "$work/cut.mc
 python3 - "$work" <<'PY' || fail "something of the record is not shown"
 import json, sys
 work = sys.argv[1]
-ports = {port["port"]: port for port in json.load(open(f"{work}/info.json"))["ports"]}
-lines = [json.loads(line) for line in open(f"{work}/lines")]
+ports = {port["port"]: port for port in json.load(open(f"{work}/info.json"))["ports"] if port["type"] != "takt.node_state"}
+lines = [line for line in map(json.loads, open(f"{work}/lines")) if line["type"] != "node_state"]
 assert {name: port["type"] for name, port in ports.items()} == {"oven.inside": "takt.temperature", "alarm.hot": "takt.temperature"}, ports
 assert {name: port["messages"] for name, port in ports.items()} == {"oven.inside": 30, "alarm.hot": 9}, ports
 inside = [line["message"] for line in lines if line["port"] == "oven.inside"]
