@@ -31,8 +31,8 @@ namespace takt {
 
 /// Goes through the members that an object remembers. Known are: what can be copied as bytes and has no pointers in it,
 /// strings, std::vector, deque, array, pair, optional, map, set, unique_ptr (there in both, or in neither), matrices of
-/// Eigen, and whatever has a `void remember(StateArchive&)` itself or as a function beside it. What follows from setup and
-/// parameters, or is made anew in each job, is left out. One thread.
+/// Eigen, and whatever has a `void remember(StateArchive&)` itself or as a function beside it. What follows from setup
+/// and parameters, or is made anew in each job, is left out. One thread.
 class StateArchive {
  public:
   /// How many bytes save() takes at most: elements of a container count with its capacity.
@@ -117,15 +117,25 @@ class StateArchive {
     if constexpr (requires { value.remember(*this); }) value.remember(*this);
     else if constexpr (requires { remember(*this, value); }) remember(*this, value);
     else if constexpr (std::is_arithmetic_v<T>) number(value);
-    else if constexpr (requires { typename T::PlainObject; value.rows(); }) matrix(value);
+    else if constexpr (requires {
+                         typename T::PlainObject;
+                         value.rows();
+                       })
+      matrix(value);
     else container(value);
   }
   template <class T>
   void number(T& value) {
     note(sizeof(T));
-    if (way_ != Way::tell) return move(&value, sizeof value);
-    if constexpr (std::is_same_v<T, bool>) tell(value ? "true" : "false");
-    else tell(std::to_string(value));
+    if (way_ == Way::tell) return tell(std::is_same_v<T, bool> ? (value ? "true" : "false") : std::to_string(value));
+    if constexpr (std::is_same_v<T, bool>) {
+      uint8_t byte = value ? 1 : 0;
+      move(&byte, sizeof byte);
+      if (byte > 1) return fail();
+      value = byte == 1;
+    } else {
+      move(&value, sizeof value);
+    }
   }
   template <class T>
   void matrix(T& value) {
@@ -232,12 +242,17 @@ class StateArchive {
   template <class T>
   void container(T& value) {
     static_assert(kPlain<T>, "give this type a `void remember(StateArchive&)`: it cannot be copied as bytes");
-    static_assert(!requires { value.data(); value.size(); }, "a view is not remembered: what it points to may be");
+    static_assert(
+        !requires {
+          value.data();
+          value.size();
+        },
+        "a view is not remembered: what it points to may be");
     raw(&value, sizeof value);
   }
   template <class T>
   void elements(std::span<T> all) {
-    if constexpr (kPlain<T> && !requires(T& one, StateArchive& s) { one.remember(s); }) {
+    if constexpr (kPlain<T> && !requires(T & one, StateArchive & s) { one.remember(s); }) {
       if (!failed_) raw(all.data(), all.size_bytes());
     } else {
       for (T& element : all)
