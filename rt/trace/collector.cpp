@@ -10,6 +10,7 @@
 #include <sstream>
 #include <utility>
 
+#include "rt/capability.hpp"
 #include "rt/time/clock.hpp"
 
 namespace takt::trace {
@@ -76,6 +77,7 @@ Recording Collector::finish() {
 
 void Collector::collect() {
   pthread_setname_np(pthread_self(), "takt-trace");
+  if (options_.best == Source::none) keep_rights(Rights::none);  // perf opens a counter for each new thread
   while (!ended_.load()) {
     drain();
     nanosleep(&kPause, nullptr);
