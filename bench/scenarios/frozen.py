@@ -55,8 +55,9 @@ def inject(kind, number, run, work):
 def main():
     work = pathlib.Path(tempfile.mkdtemp(prefix="frozen"))
     graph = root / "graph" / f".frozen_{os.getpid()}.yaml"
-    graph.write_text((root / "graph/ace.yaml").read_text() +
-                     "\nrecord: {before: 2s, after: 1s, frozen: 60GB, disk: 2GB, memory: 600MB}\n")
+    kept = "record: {before: 2s, after: 1s, frozen: 60GB, disk: 2GB, memory: 700MB}"
+    graph.write_text("\n".join(kept if line.startswith("record:") else line
+                               for line in (root / "graph/ace.yaml").read_text().split("\n")))
     done = []
     try:
         with open(work / "log", "w") as log:
