@@ -25,16 +25,12 @@ count, seed, gap_s = int((sys.argv[1:] or ["200"])[0]), int((sys.argv[2:] or ["1
 chance = random.Random(seed)
 
 
-def monotonic_ns():
-    return time.clock_gettime_ns(time.CLOCK_MONOTONIC)
-
-
 def member(run, name):
     """The process of that subsystem."""
     return next((pid for pid in family(run.pid) if process_name(pid) == name and alive(pid)), None)
 
 
-def inject(kind, number, run, work):
+def inject(kind, number, run):
     """What was done, as the frozen file should say it."""
     if kind == "mark":
         subprocess.run([takt, "mark", f"number {number}", "--run", str(run.pid)], check=True, stdout=subprocess.DEVNULL)
@@ -66,9 +62,8 @@ def main():
             time.sleep(8)
             for number in range(count):
                 kind = ["mark", "miss", "outage"][chance.randrange(3)]
-                at_ns = monotonic_ns()
-                what = inject(kind, number, run, work)
-                done.append((kind, what, at_ns))
+                what = inject(kind, number, run)
+                done.append((kind, what))
                 time.sleep(gap_s * chance.uniform(0.8, 1.2))
                 if run.poll() is not None:
                     print(f"the run ended with {run.returncode}:\n{(work / 'log').read_text()[-2000:]}")
@@ -89,7 +84,7 @@ def judge(work, done):
           f"{len(frozen)} frozen; policy {report['policy_granted']}")
     bad = 0
     left = list(frozen)
-    for kind, what, at_ns in done:
+    for kind, what in done:
         match = next((one for one in left if one["kind"] == kind and what is not None and
                       (what in one["what"] or what in one["subject"])), None)
         if match is None:

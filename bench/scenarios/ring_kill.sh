@@ -22,7 +22,7 @@ info = json.loads(subprocess.run([takt, "log", "info", file, "--json"], capture_
 lines = subprocess.run([takt, "log", "echo", file, "base.odometry"], capture_output=True, text=True).stdout.splitlines()
 last_ns = json.loads(lines[-1])["stamp_ns"] if lines else 0
 missing_s = (int(killed_ns) - last_ns) / 1e9 if int(killed_ns) and last_ns else 0
-good = differ == "0" and missing_s <= 1.3
+good = differ == "0" and missing_s <= 1
 print(f"{what}: {len(lines)} odometries, {sum(n['jobs'] for n in info['nodes'])} jobs, the last {missing_s:.2f} s are missing; "
       f"{differ} differ{'' if good else ' WRONG'}", flush=True)
 sys.exit(not good)

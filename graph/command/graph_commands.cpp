@@ -122,7 +122,7 @@ void add_run(CLI::App& app, plugin::Plugins& plugins, RunOptions& o, int& exit_c
                   "NODE.PORT (or all): its messages whole, as those of devices and small ones are; repeatable");
   run->add_option("--ring", o.ring,
                   "on | off: keeps the newest part of the run in OUTPUT/flight, frozen by misses, losses and marks "
-                  "(default: on in real time where the graph has `record`)")
+                  "(default: on in real time)")
       ->check(CLI::IsMember({"auto", "on", "off"}));
   reads_file(run->add_option("--faults", o.faults,
                              "a scenario: injects its faults and exits 0 exactly if what it expects is met"));

@@ -38,8 +38,8 @@ trace::Trace Evidence::trace_of(int64_t from_ns, int64_t to_ns) const {
   trace.end_ns = to_ns;
   trace.source_note = "a ring notes what jobs say, not who had the CPUs";
   explain::describe(plan_, trace);
-  const auto before = [&](const trace::JobSpan& job) { return job.finish_ns < from_ns || job.start_ns >= to_ns; };
-  std::erase_if(trace.jobs, before);
+  std::erase_if(trace.jobs,
+                [&](const trace::JobSpan& job) { return job.finish_ns < from_ns || job.start_ns >= to_ns; });
   return trace;
 }
 

@@ -62,24 +62,8 @@ FlightRecorder::FlightRecorder(const graph::GraphSpec& graph, const Plan& plan, 
     if (memory) memory_ = std::move(*memory);
     else doubts_.push_back("record: no images and clouds are kept: " + memory.error());
   }
-  Freezer::Options freezing;
-  freezing.folder = options_.folder / "frozen";
-  freezing.name = name;
-  freezing.before_ns = spec.before_ns;
-  freezing.after_ns = spec.after_ns;
-  freezing.most_bytes = static_cast<uint64_t>(spec.frozen_bytes);
-  freezing.lead_ns = lead_ns(spec);
-  for (const TaskPlan& task : plan.tasks) {
-    auto& edges = freezing.edges.emplace_back();
-    for (const EdgePlan& edge : task.edges)
-      edges.push_back(plan.ports[edge.port].node + "." + plan.ports[edge.port].port);
-  }
   evidence_ = std::make_unique<Evidence>(graph, plan, board, spec.before_ns + spec.after_ns + kWait_ns);
-  freezing.say = [this](const Cause& cause, int64_t from_ns, int64_t to_ns) {
-    return evidence_->say(cause, from_ns, to_ns);
-  };
-  freezing.told = [this](const Frozen& frozen) { tell(frozen); };
-  freezer_ = std::make_unique<Freezer>(*disk_, memory_.get(), std::move(freezing));
+  freezer_ = std::make_unique<Freezer>(*disk_, memory_.get(), freezing(spec, plan, name));
   const auto note = [this](const std::optional<Cause>& cause) {
     if (cause) freezer_->freeze(*cause);
   };
@@ -101,6 +85,26 @@ FlightRecorder::FlightRecorder(const graph::GraphSpec& graph, const Plan& plan, 
   how.file.compression = mcap::Compression::none;
   how.listener = {};
   images_ = std::make_unique<record::Recorder>(plan, board, transport, *memory_, head, std::move(how));
+}
+
+Freezer::Options FlightRecorder::freezing(const graph::RecordSpec& spec, const Plan& plan, const std::string& run) {
+  Freezer::Options freezing;
+  freezing.folder = options_.folder / "frozen";
+  freezing.name = run;
+  freezing.before_ns = spec.before_ns;
+  freezing.after_ns = spec.after_ns;
+  freezing.most_bytes = static_cast<uint64_t>(spec.frozen_bytes);
+  freezing.lead_ns = lead_ns(spec);
+  for (const TaskPlan& task : plan.tasks) {
+    auto& edges = freezing.edges.emplace_back();
+    for (const EdgePlan& edge : task.edges)
+      edges.push_back(plan.ports[edge.port].node + "." + plan.ports[edge.port].port);
+  }
+  freezing.say = [this](const Cause& cause, int64_t from_ns, int64_t to_ns) {
+    return evidence_->say(cause, from_ns, to_ns);
+  };
+  freezing.told = [this](const Frozen& frozen) { tell(frozen); };
+  return freezing;
 }
 
 FlightRecorder::~FlightRecorder() { finish({}, 0); }

@@ -55,6 +55,7 @@ class FlightRecorder {
   nlohmann::ordered_json told() const;
 
  private:
+  Freezer::Options freezing(const graph::RecordSpec& spec, const Plan& plan, const std::string& run);
   void look_for_outages();
   void tell(const Frozen& frozen);
 
@@ -67,13 +68,13 @@ class FlightRecorder {
   std::filesystem::path in_memory_;
   std::optional<WriterLock> memory_lock_;
   std::unique_ptr<record::Ring> disk_, memory_;
+  mutable std::mutex mutex_;
+  std::vector<std::string> sentences_;  ///< the newest ones
   std::unique_ptr<Evidence> evidence_;
   std::unique_ptr<Freezer> freezer_;
   std::unique_ptr<record::Recorder> recorder_, images_;
   record::RecordResult kept_, kept_images_;
   std::vector<Frozen> frozen_;
-  mutable std::mutex mutex_;
-  std::vector<std::string> sentences_;  ///< the newest ones
   size_t outages_seen_ = 0;
 };
 

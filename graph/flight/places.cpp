@@ -7,6 +7,7 @@
 #include <system_error>
 
 #include "rt/record/ring.hpp"
+#include "rt/sched/plan_ports.hpp"
 
 namespace takt::flight {
 namespace {
@@ -43,9 +44,8 @@ Places places(const graph::RecordSpec& spec, const Plan& plan) {
     for (const graph::RecordSpec::Port& given : spec.ports)
       if (given.port.node == port.node && given.port.port == port.port) rule = given.rule, asked = true;
     const size_t task = producers.find(p);
-    double rate_hz = task == kNone ? 0 : effective_rate_hz(plan, task);
-    const bool state = task != kNone && plan.tasks[task].state_every_ns > 0 && plan.tasks[task].ports.back() == p;
-    if (state) rate_hz = std::min(rate_hz, 1e9 / static_cast<double>(plan.tasks[task].state_every_ns));
+    const bool state = task != kNone && is_state_port(plan.tasks[task], p);
+    const double rate_hz = task == kNone ? 0 : messages_s(plan, p);
     const double bytes_s = kept_hz(rule, rate_hz) * static_cast<double>(port.chunk_bytes());
     if (bytes_s <= kMostOnDisk) {
       places.disk_bytes_s += bytes_s;

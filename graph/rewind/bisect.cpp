@@ -24,11 +24,8 @@ class Bisection {
   }
 
   Bisected find() {
-    size_t held = 0, broken = instants_.size();  // of the instants: held is before the break, as far as is known
-    // The last interval decides whether there is anything to be found.
-    told_.broken_at_end = look(instants_.size() - 1, true).has_value();
-    if (told_.broken_at_end) broken = instants_.size() - 1;
-    if (!told_.broken_at_end) return told_;
+    size_t held = 0, broken = instants_.size() - 1;  // of the instants: the break lies between, as far as is known
+    if (!look(broken, true)) return told_;           // it holds at the end
     while (held + 1 < broken && !command::StopOnSignal::asked()) {
       const size_t middle = held + (broken - held) / 2;
       (look(middle, false) ? broken : held) = middle;

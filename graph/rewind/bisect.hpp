@@ -18,8 +18,7 @@ struct FoundBreak {
 struct Bisected {
   std::string condition;
   size_t replays = 0;
-  int64_t replayed_ns = 0;  ///< of recorded time, all of them together
-  bool broken_at_end = false;
+  int64_t replayed_ns = 0;          ///< of recorded time, all of them together
   std::optional<FoundBreak> first;  ///< none: nothing breaks it, as far as was looked
 };
 

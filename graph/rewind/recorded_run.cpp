@@ -20,7 +20,6 @@ namespace takt::rewind {
 namespace {
 
 using command::kOk;
-using command::Prepared;
 using command::ReplayPart;
 using command::StopOnSignal;
 using command::tell_ignored_overlay;

@@ -33,8 +33,7 @@ std::vector<record::PortRule> port_rules(const Plan& plan, const std::vector<std
       rules[p].keep = record::PortRule::hash;
   for (const TaskPlan& task : plan.tasks) {
     for (const size_t port : task.ports)
-      if (task.device) rules[port].keep = record::PortRule::all;
-    if (task.state_every_ns > 0) rules[task.ports.back()].keep = record::PortRule::all;
+      if (task.device || is_state_port(task, port)) rules[port].keep = record::PortRule::all;
   }
   return rules;
 }

@@ -43,7 +43,7 @@ struct RunOptions {
   std::filesystem::path faults;           ///< scenario of faults that the run is given; empty: none
   std::vector<std::string> record_ports;  ///< NODE.PORT: with all fields, beside devices and small ones; "all"
   std::string trace_source = "auto";      ///< of preemption: auto (the best there is), tracefs, perf, none
-  std::string ring = "auto";              ///< auto (in real time, as the graph says), on, off
+  std::string ring = "auto";              ///< auto (on in real time, unless the graph says no), on, off
   bool keep_ring = false;                 ///< what that comes to; by run_graph()
   uint64_t seed = 1;
   std::filesystem::path watchdog;       ///< device that resets the machine unless the run is well; empty: none

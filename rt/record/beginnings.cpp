@@ -61,8 +61,8 @@ class Search {
   /// At its last snapshot until then; false: there is none.
   bool begin_before(size_t task, int64_t at_ns) {
     const auto& all = snapshots_[task];
-    const auto after =
-        std::upper_bound(all.begin(), all.end(), at_ns, [](int64_t at, const auto* event) { return at < event->at_ns; });
+    const auto after = std::upper_bound(all.begin(), all.end(), at_ns,
+                                        [](int64_t at, const auto* event) { return at < event->at_ns; });
     found_[task].snapshot = after == all.begin() ? nullptr : *std::prev(after);
     return after != all.begin();
   }

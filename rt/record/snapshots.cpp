@@ -37,10 +37,10 @@ std::optional<RecordedEvent> Snapshots::after(const RecordedJob& job) {
   Snapshot snapshot;
   snapshot.state = state;
   snapshot.from.level = job.level;
-  for (uint16_t i = 0; i < task.newest.size(); ++i)
-    if (task.newest[i] > 0) snapshot.from.outputs.push_back({i, task.newest[i], task.newest[i]});
-  for (uint16_t i = 0; i < task.seen.size(); ++i)
-    if (task.seen[i] > 0) snapshot.from.seen.push_back({i, task.seen[i]});
+  for (size_t i = 0; i < task.newest.size(); ++i)
+    if (task.newest[i] > 0) snapshot.from.outputs.push_back({static_cast<uint16_t>(i), task.newest[i], task.newest[i]});
+  for (size_t i = 0; i < task.seen.size(); ++i)
+    if (task.seen[i] > 0) snapshot.from.seen.push_back({static_cast<uint16_t>(i), task.seen[i]});
   for (const auto& [param, value] : task.params) snapshot.from.params.push_back({param, value});
   return RecordedEvent{static_cast<uint16_t>(EventKind::snapshot), job.task, job.index + 1, job.published_ns,
                        std::move(snapshot)};

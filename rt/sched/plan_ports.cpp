@@ -70,16 +70,14 @@ int64_t partners_oldest_ns(const Plan& plan, const TaskPlan& task, const EdgePla
   return oldest;
 }
 
-/// Messages of that port in a second, at most.
+}  // namespace
+
 double messages_s(const Plan& plan, size_t port) {
   const size_t t = producer_of(plan, port);
   const TaskPlan& task = plan.tasks[t];
   const double rate = effective_rate_hz(plan, t);
-  const bool state = task.state_every_ns > 0 && task.ports.back() == port;
-  return state ? std::min(rate, 1e9 / static_cast<double>(task.state_every_ns)) : rate;
+  return is_state_port(task, port) ? std::min(rate, 1e9 / static_cast<double>(task.state_every_ns)) : rate;
 }
-
-}  // namespace
 
 void size_ports(Plan& plan, const Observers& observers) {
   const uint32_t readers = observers.taps + observers.followers;
@@ -87,8 +85,7 @@ void size_ports(Plan& plan, const Observers& observers) {
     PortPlan& port = plan.ports[p];
     port.held += readers;
     port.readers += readers;
-    if (observers.followers > 0)
-      port.history = messages_within(observers.kept_ns, messages_s(plan, p));
+    if (observers.followers > 0) port.history = messages_within(observers.kept_ns, messages_s(plan, p));
   }
   for (const TaskPlan& task : plan.tasks) {
     for (const EdgePlan& edge : task.edges) {
