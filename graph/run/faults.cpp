@@ -88,7 +88,9 @@ std::unique_ptr<Transport> RunFaults::inject(std::unique_ptr<Transport> transpor
 
 void RunFaults::disturb_disk(RunRecord& record, const Clock& clock, RunBoard& board) {
   if (!injection_) return;
-  record.on_disk([this, &clock, &board](mcap::Sink& file) { return injection_->disk(file, clock, board.epoch_ns()); });
+  record.on_disk([this, &clock = record.disk_clock(clock), &board](mcap::Sink& file) {
+    return injection_->disk(file, clock, board.epoch_ns());
+  });
 }
 
 std::vector<graph::ProcessStrike> RunFaults::due(int64_t now_ns) {

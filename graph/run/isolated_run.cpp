@@ -31,6 +31,7 @@
 #include "rt/machine/limits.hpp"
 #include "rt/memory/sanitized.hpp"
 #include "rt/sched/executor.hpp"
+#include "rt/sched/watchdog.hpp"
 #include "rt/shm/iceoryx_preflight.hpp"
 #include "rt/shm/local_transport.hpp"
 #include "rt/supervise/group_keeper.hpp"
@@ -301,6 +302,8 @@ class IsolatedRun {
   /// Until all processes have ended. One that dies is started again beside the others, until the end of the run.
   void watch() {
     Supervisor::Options how;
+    how.silence_ns = Watchdog::patience_ns(granted_);
+    board_.group().ordinary.store(granted_ == Policy::cooperative);
     how.clean_up = [](pid_t pid) { remove_iceoryx_leftovers(IceoryxPlaces::of_this_machine(), pid); };
     how.say = [](const std::string& what) { std::fprintf(stderr, "takt: %s\n", what.c_str()); };
     how.memory_mb = proportional_memory_mb;

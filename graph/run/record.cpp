@@ -151,6 +151,7 @@ void RunRecord::begin_file(int64_t snapshot_every_ns, const Plan& plan, const Ru
   record::Recorder::Options how;
   how.ports = port_rules(plan, options_.record_ports);
   how.by_caller = options_.clock == "virtual";
+  how.written_at = &written_at_;
   how.priority = priority_on(plan);
   how.snapshot_every_ns = snapshot_every_ns;
   recorder_ = std::make_unique<record::Recorder>(plan, board, transport, sink, head, std::move(how));

@@ -13,6 +13,7 @@
 #include "rt/record/recorder.hpp"
 #include "rt/sched/executor.hpp"
 #include "rt/sched/plan_ports.hpp"
+#include "rt/time/clock.hpp"
 
 namespace takt::command {
 
@@ -38,6 +39,8 @@ class RunRecord {
   /// What stands between recorder and file, made once that is open; null: nothing. Before begin().
   using Disk = std::function<std::unique_ptr<mcap::Sink>(mcap::Sink& file)>;
   void on_disk(Disk disk) { make_disk_ = std::move(disk); }
+  /// What that has for the time: a virtual run is ahead of its file, by as much as threads happen to be late.
+  const Clock& disk_clock(const Clock& of_run) const { return of_run.is_virtual() ? written_at_ : of_run; }
   void take(int32_t ring, const trace::Event& event) {
     if (recorder_) recorder_->take(ring, event);
     if (flight_) flight_->take(ring, event);
@@ -73,6 +76,7 @@ class RunRecord {
   std::optional<mcap::FileSink> file_;
   Disk make_disk_;
   std::unique_ptr<mcap::Sink> disk_;
+  VirtualClock written_at_;
   std::list<std::string> texts_;  ///< the head's files
   std::unique_ptr<record::Recorder> recorder_;
   std::unique_ptr<flight::FlightRecorder> flight_;

@@ -10,7 +10,6 @@
 #include "rt/capability.hpp"
 #include "rt/record/message_record.hpp"
 #include "rt/sched/grant.hpp"
-#include "rt/time/clock.hpp"
 
 namespace takt::record {
 namespace {
@@ -258,6 +257,7 @@ void Recorder::write_on() {
 
 void Recorder::write(const WriteQueue::Entry& entry) {
   if (file_began_ns_ == 0) file_began_ns_ = entry.at_ns;
+  if (options_.written_at != nullptr) options_.written_at->advance_to(entry.at_ns);
   const auto at_ns = static_cast<uint64_t>(entry.at_ns);
   if (file_) note(file_->write({entry.channel, static_cast<uint32_t>(entry.sequence), at_ns, at_ns, entry.data}));
   else ++result_.not_written;

@@ -16,6 +16,7 @@
 #include "rt/record/write_queue.hpp"
 #include "rt/sched/run_board.hpp"
 #include "rt/shm/follower.hpp"
+#include "rt/time/clock.hpp"
 
 namespace takt::record {
 
@@ -71,7 +72,8 @@ class Recorder {
     int priority = 0;
     mcap::Writer::Options file = {};
     Listener listener = {};
-    int64_t snapshot_every_ns = 0;  ///< 0: the record has no places where a replay could begin
+    VirtualClock* written_at = nullptr;  ///< moved to when what is being written was published
+    int64_t snapshot_every_ns = 0;       ///< 0: the record has no places where a replay could begin
   };
 
   /// Before the first job, after the ports have their memory. The splits must live until finish().

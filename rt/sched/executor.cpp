@@ -287,9 +287,7 @@ void Executor::watch(Policy granted) {
         {&lanes_[i]->watch(), lanes_[i]->members(), granted == Policy::fixed ? crew_->wanted[i] : Reservation{}});
   Watchdog::Options options;
   options.granted = granted;
-  const bool ordinary = granted == Policy::cooperative && options_.life == nullptr;
-  options.patience_ns = options_.hang_patience_ns > 0 ? options_.hang_patience_ns
-                                                      : kSlowdown * (ordinary ? 3'000'000'000LL : 750'000'000LL);
+  options.patience_ns = options_.hang_patience_ns > 0 ? options_.hang_patience_ns : Watchdog::patience_ns(granted);
   options.stolen_ns = options_.stolen_ns;
   options.life = options_.life;
   options.priority = granted == Policy::cooperative ? 0 : kHighestPriority + 1;

@@ -61,8 +61,7 @@ class Executor {
     bool rejoin = false;                  ///< a process before this one ran the same tasks, and died
     bool gives_up_rights = false;         ///< the thread that calls run() needs none once all are at work
     LifeSigns* life = nullptr;            ///< of a process that somebody looks after, see Watchdog::Options
-    /// A job that has not returned this long after its deadline hangs. 0: 0.75 s; as one of many ordinary threads on a
-    /// busy machine 3 s, for there a hang ends the run.
+    /// A job that has not returned this long after its deadline hangs. 0: as Watchdog::patience_ns() says.
     int64_t hang_patience_ns = 0;
     std::function<int64_t()> stolen_ns = {};  ///< see StolenTime; empty: no job is lifted
     // Virtual time: see VirtualRun::Options.

@@ -72,6 +72,7 @@ struct GroupSigns {
     BoundedText<200> cause;
   };
   std::atomic<int64_t> heartbeat_ns{0};  ///< when the daemon of its transport last answered; 0: no answer is expected
+  std::atomic<bool> ordinary{true};      ///< its threads have no real-time policy (yet), and may be kept waiting
   Loss newest_loss;                      ///< written by the keeper, while there is no group
   std::atomic<uint64_t> losses{0};       ///< groups that were lost
 };

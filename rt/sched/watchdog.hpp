@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "rt/memory/sanitized.hpp"
 #include "rt/sched/job_watch.hpp"
 #include "rt/sched/lookout.hpp"
 #include "rt/sched/run_board.hpp"
@@ -45,6 +46,11 @@ namespace takt {
 /// one wake-up a job, and one every 50 ms, 5 ms while the host takes time: behind all reservations.
 class Watchdog {
  public:
+  /// How long a job may be late, or a process give no sign of life, until it counts as hung: 0.75 s, and 3 s where what
+  /// runs are ordinary threads, which a busy machine keeps waiting.
+  static constexpr int64_t patience_ns(Policy granted) {
+    return kSlowdown * (granted == Policy::cooperative ? 3'000'000'000LL : 750'000'000LL);
+  }
   struct Worker {
     JobWatch* watch = nullptr;
     std::vector<size_t> tasks;  ///< members of its lane: indexes into Plan::tasks
@@ -52,7 +58,7 @@ class Watchdog {
   };
   struct Options {
     Policy granted = Policy::cooperative;
-    int64_t patience_ns = 750'000'000;
+    int64_t patience_ns = Watchdog::patience_ns(Policy::deadline);
     int priority = 0;                         ///< SCHED_FIFO; 0: none
     std::function<int64_t()> stolen_ns = {};  ///< see StolenTime
     /// Where somebody outside looks after this process: at least every `heartbeat_period` the instant of a look is left

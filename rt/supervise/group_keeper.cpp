@@ -91,7 +91,8 @@ std::optional<int> GroupKeeper::watch(const std::function<int()>& group) {
       told = true;
     }
     const int64_t heartbeat_ns = signs_.heartbeat_ns.load();
-    if (silence.look(heartbeat_ns, clock_.now_ns()) <= options_.silence_ns || loss.from_ns != 0) continue;
+    const int64_t patience_ns = (signs_.ordinary.load() ? 3 : 1) * options_.silence_ns;
+    if (silence.look(heartbeat_ns, clock_.now_ns()) <= patience_ns || loss.from_ns != 0) continue;
     loss.from_ns = heartbeat_ns;
     loss.cause = BoundedText<200>("the transport's daemon gave no sign of life");
     kill(pid, SIGKILL);  // its members go with it

@@ -20,7 +20,8 @@ namespace takt {
 class GroupKeeper {
  public:
   struct Options {
-    int64_t silence_ns = kSlowdown * 1'000'000'000LL;  ///< without a sign, while one is expected
+    /// Without a sign, while one is expected; three times as long where nothing has a real-time policy.
+    int64_t silence_ns = kSlowdown * 1'000'000'000LL;
     RestartPolicy::Limits restarts{.most_in_window = 6};
     std::function<bool()> stop_asked = {};     ///< then the group is asked to end, too; may be empty
     std::function<void(pid_t)> clean_up = {};  ///< after the group's first process has ended by a signal; may be empty

@@ -132,7 +132,9 @@ void Supervisor::judge_crash(size_t process, int64_t ended_ns, int64_t now_ns) {
   Member& member = members_[process];
   const std::vector<Suspect> before = std::exchange(member.suspects, in_hand(member));
   const std::vector<Suspect> passed = std::exchange(member.passed_over, {});
-  if (ended_ns - board_.process(process).reached_ns[ProcessRecord::running].load() > options_.poison_ns) return;
+  if (ended_ns - board_.process(process).reached_ns[ProcessRecord::running].load() >
+      options_.silence_ns + options_.poison_ns)
+    return;
   const auto of_same_input = [](const Suspect& a) {
     return [&](const Suspect& b) { return a.task == b.task && a.edge == b.edge; };
   };

@@ -6,6 +6,7 @@
 
 #include "rt/memory/sanitized.hpp"
 #include "rt/sched/run_board.hpp"
+#include "rt/sched/watchdog.hpp"
 #include "rt/shm/transport.hpp"
 #include "rt/supervise/process_group.hpp"
 #include "rt/supervise/restart_policy.hpp"
@@ -39,15 +40,15 @@ class Supervisor {
  public:
   struct Options {
     RestartPolicy::Limits restarts;
-    int64_t silence_ns = kSlowdown * 750'000'000LL;
+    int64_t silence_ns = Watchdog::patience_ns(Policy::deadline);
     /// For a restarted process that is at work to come back to its first jobs; one that stands still has `silence`.
     int64_t start_patience_ns = kSlowdown * 5'000'000'000LL;
     /// After a process has ended by a signal, before its place is taken; may be empty.
     std::function<void(pid_t)> clean_up = {};
     /// One line for the person in front of the terminal; may be empty.
     std::function<void(const std::string&)> say = {};
-    int64_t poison_ns = kSlowdown * 1'000'000'000LL;  ///< from the return of a process to its second end
-    std::vector<bool> spares = {};                    ///< by process: it has one; empty: none has
+    int64_t poison_ns = kSlowdown * 250'000'000LL;  ///< and the silence: from a return to the second end
+    std::vector<bool> spares = {};                  ///< by process: it has one; empty: none has
     /// Of a process that has just become ready as a spare; may be empty.
     std::function<double(pid_t)> memory_mb = {};
     /// Between the begin of the run, or the return of a process, and the fork of its spare: it must not stand in the

@@ -40,15 +40,16 @@ sed 's/^seed: .*/seed: 100/' tests/faults/all_at_once.yaml >"$work/other_seed.ya
 expect 1 '' "$takt" log diff "$work/again1.mcap" "$work/other.mcap"
 
 # What cannot be run is refused before anything starts, with the place and the way out.
-expect 2 'none.yaml cannot be read: No such file' "$takt" run tests/faults/loads.yaml --clock virtual --faults "$work/none.yaml"
+run() { "$takt" run --output "$work/out" "$@"; }
+expect 2 'none.yaml cannot be read: No such file' run tests/faults/loads.yaml --clock virtual --faults "$work/none.yaml"
 expect 2 'real_cpu_hog.yaml:6:12: error: `cpu_hog` exists in real time only' \
-  "$takt" run tests/faults/loads.yaml --clock virtual --faults tests/faults/real_cpu_hog.yaml
+  run tests/faults/loads.yaml --clock virtual --faults tests/faults/real_cpu_hog.yaml
 expect 2 '`kill` needs a process to strike' \
-  "$takt" run tests/faults/loads.yaml --isolate none --faults tests/faults/kill_front.yaml
-expect 2 'run with --record FILE' "$takt" run tests/faults/loads.yaml --clock virtual --faults tests/faults/full_disk.yaml
+  run tests/faults/loads.yaml --isolate none --faults tests/faults/kill_front.yaml
+expect 2 'run with --record FILE' run tests/faults/loads.yaml --clock virtual --faults tests/faults/full_disk.yaml
 printf 'takt: 1\nname: blind\nfaults: [{kind: silent, target: head_camera}]\n' >"$work/blind.yaml"
 expect 2 'has the driver replay, which cannot be told to fail' \
-  "$takt" run graph/ace.yaml --profile replay --clock virtual --faults "$work/blind.yaml"
+  run graph/ace.yaml --profile replay --clock virtual --faults "$work/blind.yaml"
 printf 'takt: 1\nname: typo\nfaults: [{kind: drop, target: front_lazer.scan}]\n' >"$work/typo.yaml"
-expect 2 'did you mean `front_laser.scan`?' "$takt" run graph/ace.yaml --clock virtual --faults "$work/typo.yaml"
+expect 2 'did you mean `front_laser.scan`?' run graph/ace.yaml --clock virtual --faults "$work/typo.yaml"
 finish

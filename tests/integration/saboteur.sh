@@ -48,7 +48,7 @@ done
 expect 3 "ms after its release; without real-time policies that ends the run" timeout 60 "$takt" run "$graph" --policy cooperative --for 20s --output "$work/out" \
   --report "$work/hang.json"
 judge "$work/hang.json" 'report["ok"] is False and ("spinner", "hang") in faults' "a hang is not in the report"
-expect 1 "because a job of spinner did not return" timeout 60 "$takt" run "$graph" --policy cooperative --for 6s --isolate subsystem \
+expect 1 "because a job of spinner did not return" timeout 60 "$takt" run "$graph" --policy cooperative --for 10s --isolate subsystem \
   --output "$work/out" --report "$work/hang.json"
 judge "$work/hang.json" '("spinner", "hang") in faults' "a hang in a process of its own is not in the report"
 

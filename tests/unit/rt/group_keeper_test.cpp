@@ -112,6 +112,21 @@ TEST_CASE("a group that once gave a sign and gives none any more is ended and st
   CHECK(std::string(scene.loss().cause.text()) == "the transport's daemon gave no sign of life");
 }
 
+TEST_CASE("a group of ordinary threads may be silent for three times as long") {
+  for (const bool ordinary : {false, true}) {
+    GroupScene scene;
+    scene.shared->signs.ordinary.store(ordinary);
+    scene.shared->signs.heartbeat_ns.store(77);
+    const int64_t begun_ns = scene.clock.now_ns();
+    scene.keep([&](int number) {
+      if (number == 2) return 0;
+      scene.shared->signs.heartbeat_ns.store(77);
+      return wait_for_ever();
+    });
+    CHECK((scene.clock.now_ns() - begun_ns > 3000 * kMs) == ordinary);
+  }
+}
+
 TEST_CASE("nobody of a lost group lives on beside the next one") {
   GroupScene scene;
   const auto code = scene.keep([&](int number) {

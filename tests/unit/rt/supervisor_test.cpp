@@ -63,7 +63,7 @@ struct SupervisorScene {
     options.spares = {spares, false};
     options.spare_delay_ns = 200 * kMs;
     options.spare_patience_ns = 30'000 * kMs;
-    options.poison_ns = 1000 * kMs;
+    options.poison_ns = 0;  // beside the silence
     options.clean_up = [this](pid_t pid) { cleaned.push_back(pid); };
     options.say = [this](const std::string& what) { said.push_back(what); };
     supervisor = std::make_unique<Supervisor>(plan, *board, group, *transport, clock,
