@@ -4,7 +4,8 @@
 
 The main graph runs in several processes with windows of 3 s. Every GAP_S seconds (9) one of three things happens: a mark
 is set, the process of obstacle_stop is stopped until it misses, or a process is killed. Each must give a frozen file that
-names it and replays without a difference. Exit 1 if one does not.
+names it and replays without a difference, and the ring's folders, looked at ten times a second, must never be larger than they
+may. Exit 1 if one does not.
 """
 import json
 import os
@@ -18,11 +19,13 @@ import time
 
 from processes import alive, family
 from processes import name as process_name
+from ring_sizes import Sizes
 
 root = pathlib.Path(__file__).resolve().parents[2]
 takt = os.environ.get("TAKT", str(root / "takt"))
 count, seed, gap_s = int((sys.argv[1:] or ["200"])[0]), int((sys.argv[2:] or ["1"])[0]), float((sys.argv[3:] or ["9"])[0])
 chance = random.Random(seed)
+LIMITS_MB = {"disk": 2000, "memory": 700}
 
 
 def member(run, name):
@@ -51,7 +54,7 @@ def inject(kind, number, run):
 def main():
     work = pathlib.Path(tempfile.mkdtemp(prefix="frozen"))
     graph = root / "graph" / f".frozen_{os.getpid()}.yaml"
-    kept = "record: {before: 2s, after: 1s, frozen: 60GB, disk: 2GB, memory: 700MB}"
+    kept = "record: {{before: 2s, after: 1s, frozen: 60GB, disk: {disk}MB, memory: {memory}MB}}".format(**LIMITS_MB)
     graph.write_text("\n".join(kept if line.startswith("record:") else line
                                for line in (root / "graph/ace.yaml").read_text().split("\n")))
     done = []
@@ -60,6 +63,7 @@ def main():
             run = subprocess.Popen([takt, "run", str(graph), "--for", "0s", "--ring", "on", "--output", str(work / "out"),
                                     "--report", str(work / "report.json")], stdout=log, stderr=log)
             time.sleep(8)
+            sizes = Sizes(work / "out/flight/ring", LIMITS_MB)
             for number in range(count):
                 kind = ["mark", "miss", "outage"][chance.randrange(3)]
                 what = inject(kind, number, run)
@@ -68,13 +72,14 @@ def main():
                 if run.poll() is not None:
                     print(f"the run ended with {run.returncode}:\n{(work / 'log').read_text()[-2000:]}")
                     return 1
+            within = sizes.kept_within()
             run.send_signal(signal.SIGINT)
             run.wait()
         bad = judge(work, done)
     finally:
         graph.unlink()
     print(f"{len(done) - bad} of {len(done)} frozen, named and replayed")
-    return 1 if bad else 0
+    return 1 if bad or not within else 0
 
 
 def judge(work, done):

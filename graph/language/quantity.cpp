@@ -179,12 +179,12 @@ tl::expected<int64_t, std::string> parse_duration_ns(std::string_view text) {
   const auto q = parse_quantity(text);
   if (!q) return tl::make_unexpected(q.error() + "; a time is wanted, such as 15ms or 1/15 s");
   if (q->unit.empty())
-    return tl::make_unexpected(fmt::format("is {0} without a unit; write {0}ms (units: s | ms | us | ns)", trim(text)));
+    return tl::make_unexpected(fmt::format("is {0} without a unit; write {0}ms (units: {1})", trim(text), unit_hint("s")));
   const Unit* unit = find_unit(q->unit);
   if (unit == nullptr || unit->dimension != "s")
     return tl::make_unexpected(
-        fmt::format("is `{}`, but {} is no unit of time (units: s | ms | us | ns)", trim(text), ticked(q->unit)));
-  const Wide scale = 1'000'000'000 / unit->denominator;
+        fmt::format("is `{}`, but {} is no unit of time (units: {})", trim(text), ticked(q->unit), unit_hint("s")));
+  const Wide scale = 1'000'000'000 / unit->denominator * unit->numerator;
   if (std::abs(q->value()) * static_cast<double>(scale) > 1e17)
     return tl::make_unexpected("is `" + trim(text) + "`, longer than three years");
   const Wide twice = q->numerator * scale * 2 + (q->numerator < 0 ? -q->denominator : q->denominator);

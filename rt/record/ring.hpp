@@ -41,7 +41,7 @@ struct RingLimits {
   uint64_t split_bytes = 64 << 20;     ///< a file ends once it is as large; at most an eighth of `bytes`
   int64_t split_ns = 60'000'000'000;   ///< ... or as long
   bool durable = true;                 ///< settle() waits for the disk; pointless in memory
-  static constexpr uint64_t kLeastBytes = 16 << 20;
+  static constexpr uint64_t kLeastBytes = 16'000'000;
 };
 
 /// Files NAME-000001.mcap, NAME-000002.mcap ... The oldest go first, and files that an earlier run left in the folder

@@ -3,6 +3,7 @@
 
 #include <doctest/doctest.h>
 
+#include <cmath>
 #include <numbers>
 
 using namespace takt;
@@ -55,6 +56,20 @@ TEST_CASE("Durations are exact in nanoseconds") {
   CHECK(parse_duration_ns("15m").error().find("no unit of time") != std::string::npos);
   CHECK(!parse_duration_ns("1e15s"));
   CHECK(!parse_duration_ns("soon"));
+  CHECK(parse_duration_ns("1.5h").value() == 5'400'000'000'000);
+  CHECK(parse_duration_ns("1/3 min").value() == 20'000'000'000);
+}
+
+TEST_CASE("Each unit of time is worth the same to durations as to parameters, and is named where one is missing") {
+  const std::vector<std::string> units = units_like("s");
+  REQUIRE(units.size() > 4);
+  const std::string missing = parse_duration_ns("3").error(), wrong = parse_duration_ns("3kg").error();
+  for (const std::string& unit : units) {
+    CAPTURE(unit);
+    const double seconds = parse_in_unit("3" + unit, "s").value();
+    CHECK(parse_duration_ns("3" + unit).value() == std::llround(seconds * 1e9));
+    for (const std::string& told : {missing, wrong}) CHECK((told + " ").find(" " + unit) != std::string::npos);
+  }
 }
 
 TEST_CASE("Rates are exact fractions without a unit") {

@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How much the ring of a run takes, looked at from outside: for scenarios that keep one for long."""
+import pathlib
+import threading
+
+
+def in_memory(ring):
+    """Where the images of the run lie whose job events lie in that folder; None before there are any."""
+    file = max(ring.glob("*.mcap"), default=None)
+    return file and pathlib.Path("/dev/shm") / f"takt-flight-{file.stem.rsplit('-', 1)[0]}"
+
+
+def size_mb(folder):
+    total = 0
+    for file in folder.glob("*.mcap") if folder else []:
+        try:
+            total += file.stat().st_size
+        except FileNotFoundError:  # it had to go for a newer one
+            pass
+    return total / 1e6
+
+
+class Sizes(threading.Thread):
+    """The most that the ring in that folder (OUTPUT/flight/ring) took on disk and in memory, looked at ten times a second."""
+
+    def __init__(self, ring, limits_mb):
+        super().__init__(daemon=True)
+        self.ring, self.limits_mb, self.ended = ring, limits_mb, threading.Event()
+        self.most_mb = dict.fromkeys(limits_mb, 0.0)
+        self.looks = 0
+        self.start()
+
+    def run(self):
+        while not self.ended.wait(0.1):
+            self.looks += 1
+            for place, folder in (("disk", self.ring), ("memory", in_memory(self.ring))):
+                if place in self.most_mb:
+                    self.most_mb[place] = max(self.most_mb[place], size_mb(folder))
+
+    def kept_within(self):
+        """Ends the looking, prints what it saw; false if a place was ever above its limit, or never used."""
+        self.ended.set()
+        for place, mb in self.most_mb.items():
+            print(f"{place}: at most {mb:.1f} MB of {self.limits_mb[place]} in {self.looks} looks")
+        return all(0 < mb <= self.limits_mb[place] for place, mb in self.most_mb.items())
