@@ -179,7 +179,8 @@ tl::expected<int64_t, std::string> parse_duration_ns(std::string_view text) {
   const auto q = parse_quantity(text);
   if (!q) return tl::make_unexpected(q.error() + "; a time is wanted, such as 15ms or 1/15 s");
   if (q->unit.empty())
-    return tl::make_unexpected(fmt::format("is {0} without a unit; write {0}ms (units: {1})", trim(text), unit_hint("s")));
+    return tl::make_unexpected(
+        fmt::format("is {0} without a unit; write {0}ms (units: {1})", trim(text), unit_hint("s")));
   const Unit* unit = find_unit(q->unit);
   if (unit == nullptr || unit->dimension != "s")
     return tl::make_unexpected(
