@@ -96,6 +96,11 @@ class Replay {
     if (result.begun_afresh > 0)
       fmt::print("{} nodes began without what they remember ({}); what they make may differ\n", result.begun_afresh,
                  result.stateless);
+    for (const mcap::Channel& channel : run_.log().container().channels())
+      if (const auto fields = channel.metadata.find("fields");
+          fields != channel.metadata.end() && fields->second.starts_with("jpeg"))
+        fmt::print("{} was recorded as {}: its pictures, and what nodes make of them, are not those of the run\n",
+                   channel.topic, fields->second);
     if (result.uncommitted > 0)
       fmt::print("{} jobs were not run: their process was lost before they published\n", result.uncommitted);
     if (result.lacking > 0)

@@ -43,6 +43,7 @@ Places places(const graph::RecordSpec& spec, const Plan& plan) {
     bool asked = false;
     for (const graph::RecordSpec::Port& given : spec.ports)
       if (given.port.node == port.node && given.port.port == port.port) rule = given.rule, asked = true;
+    places.memory[p].jpeg = rule.jpeg;  // both parts of a ring are of one format, and can be joined
     const size_t task = producers.find(p);
     const bool state = task != kNone && is_state_port(plan.tasks[task], p);
     const double rate_hz = task == kNone ? 0 : messages_s(plan, p);
@@ -56,7 +57,7 @@ Places places(const graph::RecordSpec& spec, const Plan& plan) {
       places.memory_bytes_s += bytes_s;
       places.memory[p] = rule;
     }
-    rule = {PortRule::hash};
+    rule.keep = PortRule::hash;
   }
   return places;
 }

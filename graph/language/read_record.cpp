@@ -4,13 +4,51 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "graph/language/loader.hpp"
 #include "graph/language/quantity.hpp"
+#include "rt/record/picture_codec.hpp"
 
 namespace takt::graph {
 
 using nlohmann::json;
+
+namespace {
+
+/// What follows `word` and a blank as a whole number from 1 to `most`; nothing if it is none.
+std::optional<uint32_t> number_after(std::string_view text, std::string_view word, double most) {
+  if (!text.starts_with(word) || !text.substr(word.size()).starts_with(' ')) return std::nullopt;
+  const auto number = parse_in_unit(text.substr(word.size()), "1");
+  if (!number || *number < 1 || *number > most || *number != std::floor(*number)) return std::nullopt;
+  return static_cast<uint32_t>(*number);
+}
+
+/// Takes one word of a port's rule in; what is wrong with it, or "".
+std::string read_record_rule(std::string_view word, record::PortRule& rule) {
+  constexpr uint8_t kJpegQuality = 85;
+  if (word == "none") rule.keep = record::PortRule::nothing;
+  else if (word == "hash") rule.keep = record::PortRule::hash;
+  else if (word == "jpeg") rule.jpeg = kJpegQuality;
+  else if (word.starts_with("jpeg ")) {
+    const auto quality = number_after(word, "jpeg", 100);
+    if (!quality) return "`jpeg` takes a quality from 1 to 100, as in `jpeg 85`";
+    rule.jpeg = static_cast<uint8_t>(*quality);
+  } else if (word.starts_with("every ")) {
+    const auto every = number_after(word, "every", 1e6);
+    if (!every) return "`every` takes a whole number from 1 to 1000000, as in `every 5`";
+    rule.every = *every;
+  } else if (word != "all") {
+    const auto pause_ns = parse_duration_ns(word);
+    if (!pause_ns || *pause_ns <= 0)
+      return "valid: all, hash, none, `every N`, a time such as 1s, `jpeg` or `jpeg QUALITY`, or several of these with "
+             "commas between them";
+    rule.pause_ns = *pause_ns;
+  }
+  return "";
+}
+
+}  // namespace
 
 void Loader::read_record() {
   const json record = graph_.root.value("record", json());
@@ -57,7 +95,6 @@ void Loader::read_record_size(const json& value, std::string_view key, int64_t l
                       megabytes ? fmt::format("must be at least {} MB", least_mb) : megabytes.error()));
 }
 
-/// `all`, `hash`, `none`, `every 5`, or a time: one message with all fields in so much of it.
 void Loader::read_record_port(const std::string& name) {
   const std::string at = child("/record/ports", name);
   const size_t dot = std::min(name.find('.'), name.size());
@@ -70,30 +107,25 @@ void Loader::read_record_port(const std::string& name) {
                    fmt::format("`record` has a rule for {}, but there is no node or device {}{}", ticked(name),
                                ticked(given.port.node), alternatives(given.port.node, ids())));
   if (!part->second.known) return;
-  if (part->second.output(given.port.port) == nullptr)
+  const PortInfo* port = part->second.output(given.port.port);
+  if (port == nullptr)
     return problem(given.position, fmt::format("`record` has a rule for {}, but {} has no output {}{}", ticked(name),
                                                ticked(given.port.node), ticked(given.port.port),
                                                alternatives(given.port.port, part->second.output_names(),
                                                             "outputs of " + ticked(given.port.node))));
-  const std::string word = graph_.raw(at);
-  constexpr std::string_view kEvery = "every ";
-  if (word == "none") given.rule.keep = record::PortRule::nothing;
-  else if (word == "hash") given.rule.keep = record::PortRule::hash;
-  else if (word.starts_with(kEvery)) {
-    const auto count = parse_in_unit(std::string_view(word).substr(kEvery.size()), "1");
-    if (!count || *count < 1 || *count > 1e6 || *count != std::floor(*count))
-      return problem(graph_.value_at(at), fmt::format("{} of `record` is {}; `every` takes a whole number from 1 to "
-                                                      "1000000, as in `every 5`",
-                                                      ticked(name), ticked(word)));
-    given.rule.every = static_cast<uint32_t>(*count);
-  } else if (word != "all") {
-    const auto pause_ns = parse_duration_ns(word);
-    if (!pause_ns || *pause_ns <= 0)
-      return problem(graph_.value_at(at),
-                     fmt::format("{} of `record` is {}; valid: all, hash, none, `every N`, or a time such as 1s",
-                                 ticked(name), ticked(word)));
-    given.rule.pause_ns = *pause_ns;
+  const std::string text = graph_.raw(at);
+  for (size_t from = 0; from <= text.size();) {
+    const size_t comma = std::min(text.find(',', from), text.size());
+    std::string_view word = std::string_view(text).substr(from, comma - from);
+    while (word.starts_with(' ')) word.remove_prefix(1);
+    while (word.ends_with(' ')) word.remove_suffix(1);
+    if (const std::string wrong = read_record_rule(word, given.rule); !wrong.empty())
+      return problem(graph_.value_at(at), fmt::format("{} of `record` is {}; {}", ticked(name), ticked(word), wrong));
+    from = comma + 1;
   }
+  if (given.rule.jpeg > 0 && port->type != nullptr && !record::may_have_pictures(port->type->fields))
+    return problem(graph_.value_at(at), fmt::format("{} of `record` is {}, but its messages ({}) have no pictures",
+                                                    ticked(name), ticked(text), port->type->name));
   spec_.record.ports.push_back(std::move(given));
 }
 

@@ -61,10 +61,13 @@ tl::expected<Echoed, std::string> echo_log(const record::LogFile& log, std::span
   const auto ports = chosen(log, wanted);
   if (!ports) return tl::make_unexpected(ports.error());
   Echoed result;
+  std::vector<std::byte> plain;
   const auto walked = log.container().for_each([&](const mcap::Message& raw) {
     const auto port = ports->find(raw.channel);
     if (port == ports->end()) return true;
-    const auto message = record::unpack_message(raw.data);
+    auto message = record::unpack_message(raw.data);
+    if (const auto read = message ? record::uncode(*message, plain) : tl::expected<void, std::string>(); !read)
+      message = tl::make_unexpected(read.error());
     const tl::expected<Json, std::string> line =
         message.and_then([&](const auto& there) { return message_line(port->second, there, items); });
     if (line) {

@@ -23,8 +23,9 @@ constexpr int64_t kUndisturbedNs = 250'000'000;
 /// Outputs whose messages are smaller are recorded with all fields.
 constexpr uint64_t kSmallBytes = 64 * 1024;
 
-/// By port. Those of devices always have all fields, or nothing could be replayed.
-std::vector<record::PortRule> port_rules(const Plan& plan, const std::vector<std::string>& also) {
+/// By port. Those of devices always have all fields, or nothing could be replayed; pictures as the graph says.
+std::vector<record::PortRule> port_rules(const Plan& plan, const std::vector<std::string>& also,
+                                         const std::vector<graph::RecordSpec::Port>& rules_of_graph) {
   const auto named = [&](const std::string& name) { return std::find(also.begin(), also.end(), name) != also.end(); };
   std::vector<record::PortRule> rules(plan.ports.size());
   for (size_t p = 0; p < plan.ports.size(); ++p)
@@ -35,6 +36,10 @@ std::vector<record::PortRule> port_rules(const Plan& plan, const std::vector<std
     for (const size_t port : task.ports)
       if (task.device || is_state_port(task, port)) rules[port].keep = record::PortRule::all;
   }
+  for (const graph::RecordSpec::Port& given : rules_of_graph)
+    for (size_t p = 0; p < plan.ports.size(); ++p)
+      if (plan.ports[p].node == given.port.node && plan.ports[p].port == given.port.port)
+        rules[p].jpeg = given.rule.jpeg;
   return rules;
 }
 
@@ -90,7 +95,7 @@ void RunRecord::begin(const graph::GraphSpec& graph, const Plan& plan, const Run
                       const std::string& isolation, std::vector<std::string> processes) {
   if (!listens()) return;
   const record::Head head = head_of(graph, plan, transport, isolation);
-  if (wanted()) begin_file(graph.record.state_every_ns(), plan, board, transport, head);
+  if (wanted()) begin_file(graph.record, plan, board, transport, head);
   if (!options_.keep_ring) return;
   flight::FlightRecorder::Options how;
   how.folder = options_.output / "flight";
@@ -141,7 +146,7 @@ record::Head RunRecord::head_of(const graph::GraphSpec& graph, const Plan& plan,
   return head;
 }
 
-void RunRecord::begin_file(int64_t snapshot_every_ns, const Plan& plan, const RunBoard& board, Transport& transport,
+void RunRecord::begin_file(const graph::RecordSpec& spec, const Plan& plan, const RunBoard& board, Transport& transport,
                            const record::Head& head) {
   auto file = mcap::FileSink::open(options_.record);
   if (!file) throw std::runtime_error("--record " + file.error() + "; choose another place");
@@ -149,11 +154,11 @@ void RunRecord::begin_file(int64_t snapshot_every_ns, const Plan& plan, const Ru
   if (make_disk_) disk_ = make_disk_(*file_);
   mcap::Sink& sink = disk_ ? *disk_ : *file_;
   record::Recorder::Options how;
-  how.ports = port_rules(plan, options_.record_ports);
+  how.ports = port_rules(plan, options_.record_ports, spec.ports);
   how.by_caller = options_.clock == "virtual";
   how.written_at = &written_at_;
   how.priority = priority_on(plan);
-  how.snapshot_every_ns = snapshot_every_ns;
+  how.snapshot_every_ns = spec.state_every_ns();
   recorder_ = std::make_unique<record::Recorder>(plan, board, transport, sink, head, std::move(how));
 }
 

@@ -68,7 +68,7 @@ class RunRecord {
  private:
   record::Head head_of(const graph::GraphSpec& graph, const Plan& plan, const Transport& transport,
                        const std::string& isolation);
-  void begin_file(int64_t snapshot_every_ns, const Plan& plan, const RunBoard& board, Transport& transport,
+  void begin_file(const graph::RecordSpec& spec, const Plan& plan, const RunBoard& board, Transport& transport,
                   const record::Head& head);
 
   const Registry& registry_;

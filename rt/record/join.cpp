@@ -98,8 +98,8 @@ class Join {
         if (added)
           channels_.push_back({channel, channel.schema > 0 ? &part.reader.schemas()[channel.schema - 1U] : nullptr});
         else if (const auto fields = channel.metadata.find("fields");
-                 fields != channel.metadata.end() && fields->second == "all")
-          channels_[place->second - 1U].first.metadata["fields"] = "all";
+                 fields != channel.metadata.end() && fields->second != "hash")
+          channels_[place->second - 1U].first.metadata["fields"] = fields->second;
       }
     }
     return "";

@@ -63,7 +63,7 @@ void LogFile::index(uint32_t number, bool only_ports) {
   if (!records) return damages_.push_back(records.error());
   const auto walked = container_.for_each_in(*records, [&](const mcap::Message& message) {
     const auto offset = static_cast<uint64_t>(message.data.data() - records->data());
-    index(message, {0, 0, false, number, static_cast<uint32_t>(message.data.size()), offset}, only_ports);
+    index(message, {0, 0, false, false, number, static_cast<uint32_t>(message.data.size()), offset}, only_ports);
     return true;
   });
   if (!walked) damages_.push_back("the chunk at byte " + std::to_string(chunk.at) + ": " + walked.error());
@@ -111,6 +111,7 @@ void LogFile::index(const mcap::Message& message, Known known, bool only_ports) 
   known.stamp_ns = record->stamp_ns;
   known.hash = record->hash;
   known.whole = record->whole;
+  known.coded = record->coded;
   messages_[message.channel][record->sequence] = known;
 }
 
@@ -158,9 +159,10 @@ std::optional<MessageRecord> LogFile::message(uint16_t channel, uint64_t sequenc
   if (known == all.end()) return std::nullopt;
   const std::vector<std::byte>* records = chunk(known->second.chunk);
   if (records == nullptr) return std::nullopt;
-  const auto record =
+  auto record =
       unpack_message(std::span(*records).subspan(static_cast<size_t>(known->second.offset), known->second.size));
-  return record ? std::optional(*record) : std::nullopt;
+  if (!record || !uncode(*record, plain_)) return std::nullopt;
+  return *record;
 }
 
 }  // namespace takt::record

@@ -33,7 +33,7 @@ class LogFile {
   /// What the head and the end of the record state; empty without an end.
   const mcap::Metadata& facts() const { return facts_; }
   const mcap::Metadata& end() const { return end_; }
-  /// 1 to kFormat. Format 1 has no events.
+  /// 1 to kFormat. Format 1 has no events, format 2 no JPEG.
   int format() const { return format_; }
   /// An attachment as text; nothing if there is none of that name.
   std::optional<std::string_view> attached(std::string_view name) const;
@@ -50,13 +50,13 @@ class LogFile {
   struct Known {
     int64_t stamp_ns = 0;
     uint64_t hash = 0;
-    bool whole = false;
+    bool whole = false, coded = false;
     uint32_t chunk = 0, size = 0;  ///< where it lies: bytes at `offset` among the records of the chunk
     uint64_t offset = 0;
   };
   /// Of a channel by sequence; empty if there is none.
   const std::map<uint64_t, Known>& messages(uint16_t channel) const;
-  /// Nothing if it is not there. Its data is valid until the next call.
+  /// Nothing if it is not there. Its data is valid until the next call; never coded.
   std::optional<MessageRecord> message(uint16_t channel, uint64_t sequence);
   /// What is damaged or missing in the file; empty if it is whole.
   const std::vector<std::string>& damages() const { return damages_; }
@@ -85,7 +85,8 @@ class LogFile {
   std::map<uint16_t, uint64_t> foreign_;  ///< messages by channel (0: one that nothing describes)
   static constexpr size_t kChunksKept = 48;
   std::unordered_map<uint32_t, std::vector<std::byte>> unpacked_;
-  std::deque<uint32_t> order_;  ///< of the chunks in hand, oldest first
+  std::vector<std::byte> plain_;  ///< of the last message that was coded
+  std::deque<uint32_t> order_;    ///< of the chunks in hand, oldest first
 };
 
 }  // namespace takt::record

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "rt/record/message_record.hpp"
 
+#include <utility>
+
 #include "rt/msg/scalar.hpp"
 #include "rt/record/mcap/bytes.hpp"
 #include "rt/xxhash.hpp"
@@ -10,6 +12,11 @@ namespace takt::record {
 uint64_t hash_of(std::span<const std::byte> packed) { return XXH3_64bits(packed.data(), packed.size()); }
 
 namespace {
+
+/// What a message has of its fields.
+constexpr uint8_t kHash = 0, kAll = 1, kCoded = 2;
+constexpr size_t kFieldsAt = 4 * 8 + 4;  ///< where that stands
+constexpr size_t kHeadBytes = kFieldsAt + 1 + 8;
 
 /// hash_of() without packing: what is recorded by its hash only is not copied.
 uint64_t hash_in_place(const MessageType& type, const void* message) {
@@ -29,11 +36,21 @@ void pack(const MessageType& type, const Held& held, bool whole, std::vector<std
   out.number(static_cast<uint64_t>(held.header->published_ns));
   out.number(static_cast<uint64_t>(held.header->visible_at_ns));
   out.number(static_cast<uint32_t>(held.header->level));
-  out.number(static_cast<uint8_t>(whole));
+  out.number(whole ? kAll : kHash);
   out.number(hash_in_place(type, held.message()));
   if (!whole) return;
   to.reserve(to.size() + packed_bytes(type, held.message()));
   pack(type, held.message(), to);
+}
+
+void code(const MessageType& type, std::span<const std::byte> message, PictureCoder& coder,
+          std::vector<std::byte>& to) {
+  const auto head = message.first(kHeadBytes), packed = message.subspan(kHeadBytes);
+  const size_t from = to.size();
+  to.insert(to.end(), head.begin(), head.end());
+  if (head[kFieldsAt] == std::byte{kHash}) return;
+  to[from + kFieldsAt] = std::byte{kCoded};
+  coder.code(type.fields, packed, to);
 }
 
 tl::expected<MessageRecord, std::string> unpack_message(std::span<const std::byte> packed) {
@@ -45,13 +62,24 @@ tl::expected<MessageRecord, std::string> unpack_message(std::span<const std::byt
     record.published_ns = static_cast<int64_t>(in.number<uint64_t>());
     record.visible_at_ns = static_cast<int64_t>(in.number<uint64_t>());
     record.level = static_cast<int32_t>(in.number<uint32_t>());
-    record.whole = in.number<uint8_t>() != 0;
+    const auto fields = in.number<uint8_t>();
+    record.whole = fields != kHash;
+    record.coded = fields == kCoded;
     record.hash = in.number<uint64_t>();
     record.data = in.bytes(in.left());
   } catch (const mcap::TooShort& problem) {
     return tl::make_unexpected(std::string(problem.what()));
   }
   return record;
+}
+
+tl::expected<void, std::string> uncode(MessageRecord& record, std::vector<std::byte>& plain) {
+  if (!record.coded) return {};
+  auto packed = plain_of(record.data);
+  if (!packed) return tl::make_unexpected(packed.error());
+  plain = std::move(*packed);
+  record.data = plain;
+  return {};
 }
 
 std::string layout_of(const MessageType& type) {

@@ -14,6 +14,7 @@ struct PortRule {
   Keep keep = all;
   uint32_t every = 1;    ///< all fields of each so many-th message, by its sequence
   int64_t pause_ns = 0;  ///< ... and of none sooner than this after the last one that has them
+  uint8_t jpeg = 0;      ///< their pictures as JPEG of that quality, 1 to 100; 0: as they are
 };
 
 }  // namespace takt::record

@@ -14,7 +14,8 @@
 namespace takt::record {
 
 /// The format that this program writes; it reads this one and those before it. README.md says what each has.
-inline constexpr int kFormat = 2;
+inline constexpr int kFormat = 3;  ///< pictures may be JPEG
+inline constexpr int kFormatWithoutJpeg = 2;
 
 struct RecordedJob {
   /// Consecutive messages that an edge held, oldest first.

@@ -42,8 +42,8 @@ Recorder::Recorder(const Plan& plan, const RunBoard& board, Transport& transport
       jobs_([this](const RecordedJob& job) { take_job(job); },
             [this](const RecordedEvent& event) { take_event(event); }),
       snapshots_(plan, options_.snapshot_every_ns) {
-  head_.facts["format"] = std::to_string(kFormat);
   define_channels(plan);
+  head_.facts["format"] = std::to_string(coded_.empty() ? kFormatWithoutJpeg : kFormat);
   for (size_t p = 0; p < plan.ports.size(); ++p)
     if (ports_[p].rule.keep != PortRule::nothing) ports_[p].follower.emplace(transport.make_reader(p));
   for (const TaskPlan& task : plan.tasks) {
@@ -91,8 +91,10 @@ void Recorder::define_channels(const Plan& plan) {
     if (!options_.ports.empty()) mine.rule = options_.ports[p];
     const auto [schema, added] = schemas.try_emplace({port.type->name, layout_of(*port.type)}, uint16_t{0});
     if (added) schema->second = define_schema("takt." + std::string(port.type->name), "json", schema->first.second);
+    const std::string all = mine.rule.jpeg > 0 ? "jpeg " + std::to_string(mine.rule.jpeg) : "all";
     mine.channel = define(schema->second, port.node + "." + port.port,
-                          {{"fields", mine.rule.keep == PortRule::all ? "all" : "hash"}});
+                          {{"fields", mine.rule.keep == PortRule::all ? all : "hash"}});
+    if (mine.rule.jpeg > 0) coded_.emplace(mine.channel, Coded{port.type, PictureCoder(mine.rule.jpeg)});
   }
 }
 
@@ -259,8 +261,16 @@ void Recorder::write(const WriteQueue::Entry& entry) {
   if (file_began_ns_ == 0) file_began_ns_ = entry.at_ns;
   if (options_.written_at != nullptr) options_.written_at->advance_to(entry.at_ns);
   const auto at_ns = static_cast<uint64_t>(entry.at_ns);
-  if (file_) note(file_->write({entry.channel, static_cast<uint32_t>(entry.sequence), at_ns, at_ns, entry.data}));
+  if (file_) note(file_->write({entry.channel, static_cast<uint32_t>(entry.sequence), at_ns, at_ns, as_kept(entry)}));
   else ++result_.not_written;
+}
+
+std::span<const std::byte> Recorder::as_kept(const WriteQueue::Entry& entry) {
+  const auto coded = coded_.find(entry.channel);
+  if (coded == coded_.end()) return entry.data;
+  kept_.clear();
+  code(*coded->second.type, entry.data, coded->second.coder, kept_);
+  return kept_;
 }
 
 bool Recorder::note(const mcap::Writer::Done& done) {

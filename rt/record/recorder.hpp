@@ -2,6 +2,7 @@
 #pragma once
 #include <atomic>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -10,6 +11,7 @@
 #include "rt/own_thread.hpp"
 #include "rt/record/job_assembler.hpp"
 #include "rt/record/mcap/writer.hpp"
+#include "rt/record/picture_codec.hpp"
 #include "rt/record/port_rule.hpp"
 #include "rt/record/snapshots.hpp"
 #include "rt/record/splits.hpp"
@@ -94,6 +96,11 @@ class Recorder {
   RecordResult finish(mcap::Metadata facts, uint64_t unheard_threads = 0);
 
  private:
+  /// A channel whose pictures become JPEG.
+  struct Coded {
+    const MessageType* type;
+    PictureCoder coder;
+  };
   struct Port {
     std::optional<Follower> follower;
     const MessageType* type = nullptr;
@@ -123,6 +130,7 @@ class Recorder {
   void begin_file(int64_t at_ns);
   void end_file();
   void write(const WriteQueue::Entry& entry);
+  std::span<const std::byte> as_kept(const WriteQueue::Entry& entry);
   bool note(const mcap::Writer::Done& done);
 
   const Options options_;
@@ -136,10 +144,12 @@ class Recorder {
   int64_t file_began_ns_ = 0;
   mcap::Metadata last_facts_;             ///< for the end of each file
   std::map<uint16_t, uint64_t> written_;  ///< messages by channel, in all files
+  std::vector<std::byte> kept_;           ///< of the message in hand, with its pictures as JPEG
   WriteQueue queue_;
   JobAssembler jobs_;
   Snapshots snapshots_;
   std::vector<Port> ports_;
+  std::map<uint16_t, Coded> coded_;
   std::vector<std::vector<size_t>> ports_of_, edges_of_;  ///< by task: ports written and read
   uint16_t jobs_channel_ = 0, events_channel_ = 0;
   size_t modes_taken_ = 0, marks_taken_ = 0;

@@ -377,8 +377,10 @@ void Replayer::compare(const RecordedJob& record, size_t p, const Stored& made, 
   if (told->stamp_ns != made.header->stamp_ns)
     return tell(record, p,
                 "stamp is " + std::to_string(made.header->stamp_ns) + " instead of " + std::to_string(told->stamp_ns));
-  if (!told->whole) {
-    if (hash_of(packed) != told->hash) tell(record, p, "differs (the record has only its hash)");
+  if (!told->whole || told->coded) {
+    if (hash_of(packed) != told->hash)
+      tell(record, p,
+           "differs (the record has only its hash" + std::string(told->coded ? " and pictures as JPEG)" : ")"));
     return;
   }
   ++result_.whole;

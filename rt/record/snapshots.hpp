@@ -23,7 +23,7 @@ class Snapshots {
  private:
   struct Task {
     bool device = false, says_state = false;
-    int64_t slot = -1;  ///< interval of the last one
+    int64_t slot = -1;                   ///< interval of the last one
     std::vector<uint64_t> seen, newest;  ///< by edge, by output
     std::map<uint16_t, ParamValue> params;
   };

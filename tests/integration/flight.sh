@@ -18,7 +18,9 @@ refused '`keep` of `record` is 1ms; it must be at least 1 s' '{keep: 1ms}'
 refused 'there is no node or device `nobody`' '{ports: {nobody.x: all}}'
 refused '`obstacle_stop` has no output `go`' '{ports: {obstacle_stop.go: all}}'
 refused '`every` takes a whole number' '{ports: {obstacle_stop.stop: every 0}}'
-refused 'valid: all, hash, none, `every N`, or a time such as 1s' '{ports: {obstacle_stop.stop: often}}'
+refused 'valid: all, hash, none, `every N`, a time such as 1s, `jpeg`' '{ports: {obstacle_stop.stop: often}}'
+refused '`jpeg` takes a quality from 1 to 100' '{ports: {front_laser.scan: jpeg 101}}'
+refused 'is `every 2, jpeg`, but its messages (laser_scan) have no pictures' '{ports: {front_laser.scan: "every 2, jpeg"}}'
 graph_with '{before: 1s, after: 1s, keep: 10min, ports: {obstacle_stop.stop: every 5, base.odometry: 1s, floor_laser.scan: none}}'
 expect 0 "" "$takt" check "$work/graph.yaml"
 

@@ -91,6 +91,20 @@ else
   echo "NOT RUN: the reference reader needs node, npm and its registry: $(tail -n 1 "$work/npm.txt" 2>/dev/null)"
 fi
 
+echo "=== pictures as JPEG"
+sed 's/^record:.*/record: {ports: {head_camera.pair: jpeg, ground_camera.pair: jpeg 95}}/' "$work/graph/ace.yaml" >"$work/graph/jpeg.yaml"
+cmp -s "$work/graph/ace.yaml" "$work/graph/jpeg.yaml" && fail "the edit of record changed nothing"
+for name in ace jpeg; do
+  tells 0 "nothing lost" "$takt" run "$work/graph/$name.yaml" --clock virtual --isolate none --for 400ms --record "$work/$name.mcap" \
+    --output "$work/out"
+done
+[ $((4 * $(stat -c %s "$work/jpeg.mcap"))) -lt "$(stat -c %s "$work/ace.mcap")" ] || fail "JPEG is not a quarter: $(ls -l "$work"/*.mcap)"
+tells 0 "jpeg 85" "$takt" log info "$work/jpeg.mcap"
+tells 1 "ground_camera.pair was recorded as jpeg 95" "$takt" replay "$work/jpeg.mcap" --compare --output "$work/out"
+tells 0 '"width":640' "$takt" log echo "$work/jpeg.mcap" head_camera.pair
+# The hashes are those of the run, so all that was not made into JPEG is the same.
+tells 0 "the same" "$takt" log diff "$work/ace.mcap" "$work/jpeg.mcap"
+
 echo "=== a killed run"
 "$takt" run --isolate none --policy cooperative --for 20s --record "$work/killed.mcap" --output "$work/out" >/dev/null 2>&1 &
 run=$!

@@ -66,6 +66,14 @@ format_1_restarted 1 1e3d17a692097cec 43
 format_1_killed 1 fdd23bb8214c07c1 31
 format_2 2 9b1e1541a7fc930e 6
 END
+tells 0 "jpeg 60" "$takt" log info "$old/format_3.mcap"
+tells 0 "content 7e00235c22f0afc3" "$takt" log info "$old/format_3.mcap"
+tells 0 '"width":70' "$takt" log echo "$old/format_3.mcap" eyes.pair
+tells 0 "the same" "$takt" log diff "$old/format_3.mcap" "$old/format_3.mcap"
+tells 0 "messages" "$takt" log export "$old/format_3.mcap" -o "$work/old/export.mcap"
+cp "$old"/camera*.yaml "$work/old/"
+tells 1 "nothing was compared" "$takt" replay "$old/format_3.mcap" "$work/old/camera.yaml" --compare "${output[@]}"
+tells 1 "eyes.pair was recorded as jpeg 60" "$takt" replay "$old/format_3.mcap" "$work/old/camera.yaml" --compare "${output[@]}"
 sed 's/format\x01\x00\x00\x001/format\x01\x00\x00\x009/' "$old/format_1.mcap" >"$work/old/later.mcap"
 later "$work/old/later.mcap" "is a record of format 9, and this is Takt " "$takt" log info "$work/old/later.mcap"
 

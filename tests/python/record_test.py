@@ -78,7 +78,19 @@ class RecordTest(unittest.TestCase):
         for path in RECORDS.glob("format_*.mcap"):
             record = takt.read_record(path)
             self.assertEqual(record.info.get("format", "1"), path.stem.split("_")[1])
-            self.assertGreater(len(record["obstacle_stop.stop"]), 0)
+            self.assertGreater(len(record["eyes.pair" if path.stem == "format_3" else "obstacle_stop.stop"]), 0)
+
+    def test_pictures_as_jpeg(self):
+        port = takt.read_record(RECORDS / "format_3.mcap")["eyes.pair"]
+        try:
+            message = next(iter(port))
+        except takt.RecordError as problem:
+            self.assertIn("install python3-pil or python3-opencv", str(problem))
+            return
+        self.assertEqual((message["width"], message["height"], message["channels"]), (70, 50, 1))
+        self.assertEqual(len(message["left"]), 70 * 50)
+        self.assertGreater(max(message["left"]) - min(message["left"]), 50)
+        self.assertEqual(bytes(message["left"]), bytes(message["right"]))
 
     def test_what_is_not_read_is_counted(self):
         data = (RECORDS / "format_2.mcap").read_bytes()

@@ -15,8 +15,9 @@ except ImportError:
 _MAGIC = b"\x89MCAP0\r\n"
 _HEADER, _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _ATTACHMENT, _METADATA, _DATA_END = 1, 2, 3, 4, 5, 6, 9, 12, 15
 _TAIL = 1 + 8 + 20 + 8  # footer record and magic
-_NEWEST_FORMAT = 2
+_NEWEST_FORMAT = 3
 _HEAD = struct.Struct("<QqqqiBQ")
+_HASH, _CODED = 0, 2  # what a message has of its fields: none, all with pictures as JPEG; 1: all
 _SCALARS = {"u8": ("B", "u1"), "i16": ("h", "<i2"), "u16": ("H", "<u2"), "i32": ("i", "<i4"), "u32": ("I", "<u4"),
             "i64": ("q", "<i8"), "u64": ("Q", "<u8"), "f32": ("f", "<f4"), "f64": ("d", "<f8")}
 
@@ -47,6 +48,40 @@ class _Reader:
             key = inner.text()
             found[key] = inner.text()
         return found
+
+
+def _pixels(jpeg, name):
+    """Pixels of a JPEG as a record has them: grey, or blue, green, red."""
+    try:
+        import cv2
+    except ImportError:
+        cv2 = None
+    if cv2 is not None and numpy is not None:
+        image = cv2.imdecode(numpy.frombuffer(jpeg, dtype="u1"), cv2.IMREAD_UNCHANGED)
+        if image is None:
+            raise RecordError(f"a JPEG in a message of {name} is damaged")
+        return image.tobytes()
+    try:
+        import io
+
+        from PIL import Image
+    except ImportError:
+        raise RecordError(f"{name} has its pictures as JPEG: install python3-pil or python3-opencv") from None
+    image = Image.open(io.BytesIO(jpeg))
+    if image.mode == "L":
+        return image.tobytes()
+    return Image.merge("RGB", image.convert("RGB").split()[::-1]).tobytes()
+
+
+def _plain(kept, name):
+    """The fields of a message whose pictures are JPEG: bytes as they were and JPEGs, by turns."""
+    reader, plain = _Reader(kept, f"a message of {name}"), []
+    while reader.at < len(reader.data):
+        plain.append(bytes(reader.bytes(reader.number("I"))))
+        jpeg = bytes(reader.bytes(reader.number("I")))
+        if jpeg:
+            plain.append(_pixels(jpeg, name))
+    return b"".join(plain)
 
 
 def _vector(data, scalar, width):
@@ -133,12 +168,13 @@ class Port:
     def _add(self, data):
         if len(data) < _HEAD.size:
             raise RecordError(f"a message of {self.name} ends too early")
-        *head, whole, _ = _HEAD.unpack_from(data)
-        self.whole = self.whole and bool(whole)
+        *head, fields, _ = _HEAD.unpack_from(data)
+        self.whole = self.whole and fields != _HASH
         self._heads.append(head)
-        self._bodies.append(data[_HEAD.size:])
+        self._bodies.append((data[_HEAD.size:], fields == _CODED))
 
-    def _unpack(self, body):
+    def _unpack(self, kept):
+        body = _plain(kept[0], self.name) if kept[1] else kept[0]
         reader, message = _Reader(body, f"a message of {self.name}"), {}
         for field in self._fields:
             scalar, width = field["scalar"], field.get("array_of") or 1
