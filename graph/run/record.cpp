@@ -170,6 +170,11 @@ void RunRecord::finish(const RunResult& result, uint64_t unheard_threads) {
   if (!recorder_) return;
   written_ = recorder_->finish(facts, unheard_threads);
   recorder_.reset();
+  if (const auto there = file_->still_there(); !there && written_.refused.empty()) {
+    written_.refused = there.error();
+    options_.outputs->code =
+        refuse(fmt::format("--record {}: {}", options_.record.string(), there.error()), kDeviceOrSystem);
+  }
 }
 
 void RunRecord::tell(nlohmann::ordered_json& report) const {

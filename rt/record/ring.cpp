@@ -50,6 +50,8 @@ class Ring::Sink final : public mcap::Sink {
     if (!ring_.make_room(bytes))
       return tl::unexpected(path_.string() + ": the folder may take " + std::to_string(ring_.limits_.bytes) + " bytes");
     if (!file_) {
+      std::error_code error;
+      fs::create_directories(path_.parent_path(), error);  // somebody may have cleared it away
       auto opened = mcap::FileSink::open(path_);
       if (!opened) return tl::unexpected(opened.error());
       file_.emplace(std::move(*opened));
@@ -58,7 +60,12 @@ class Ring::Sink final : public mcap::Sink {
     if (done) ring_.grow(bytes);
     return done;
   }
-  mcap::Writer::Done settle() const { return file_ ? file_->settle() : mcap::Writer::Done{}; }
+  mcap::Writer::Done settle() const {
+    if (!file_) return {};
+    auto done = file_->still_there();
+    if (done && ring_.limits_.durable) done = file_->settle();
+    return done ? done : tl::unexpected(path_.string() + ": " + done.error());
+  }
 
  private:
   Ring& ring_;
@@ -105,7 +112,8 @@ bool Ring::ends(uint64_t bytes, int64_t began_ns, int64_t at_ns) const {
 }
 
 mcap::Writer::Done Ring::settle(int64_t at_ns) {
-  auto done = limits_.durable && sink_ != nullptr ? sink_->settle() : mcap::Writer::Done{};
+  auto done = sink_ != nullptr ? sink_->settle() : mcap::Writer::Done{};
+  if (!done) part();  // a file of its own may fare better
   const std::lock_guard lock(mutex_);
   if (!files_.empty()) files_.back().ended_ns = std::max(files_.back().ended_ns, at_ns);
   return done;

@@ -119,6 +119,16 @@ tells 0 "the record lacks the end of its run" "$takt" log info --allow-damage "$
 "$takt" replay "$work/killed.mcap" --compare --allow-damage --output "$work/out" >"$work/replay.txt" 2>&1
 grep -q " 0 differ" "$work/replay.txt" || fail "a cut record has other bytes: $(cat "$work/replay.txt")"
 
+echo "=== a record that is deleted while it is written"
+"$takt" run --isolate none --policy cooperative --for 2s --record "$work/deleted.mcap" --output "$work/out" >"$work/run.txt" 2>&1 &
+run=$!
+until [ -s "$work/deleted.mcap" ]; do kill -0 "$run" 2>/dev/null || break; read -rt 0.1 <> <(:) || true; done
+rm "$work/deleted.mcap"
+wait "$run"
+code=$?
+[ $code -eq 3 ] || fail "exit $code of a run whose record was deleted"
+grep -q "deleted.mcap: the file was deleted" "$work/run.txt" || fail "a deleted record is not told: $(cat "$work/run.txt")"
+
 echo "=== a full disk"
 if mkdir "$work/small" && mount -t tmpfs -o size=20m none "$work/small" 2>/dev/null; then
   "$takt" run --isolate none --policy cooperative --for 3s --record "$work/small/run.mcap" --output "$work/out" >"$work/run.txt" 2>&1

@@ -2,6 +2,7 @@
 #include "rt/record/mcap/file_sink.hpp"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -46,6 +47,12 @@ tl::expected<void, std::string> FileSink::append(std::span<const Bytes> parts) {
 tl::expected<void, std::string> FileSink::settle() const {
   if (fdatasync(descriptor_) == 0 || errno == EINVAL) return {};  // EINVAL: nothing that could be lost, as a pipe
   return tl::unexpected(std::strerror(errno));
+}
+
+tl::expected<void, std::string> FileSink::still_there() const {
+  struct stat file {};
+  if (fstat(descriptor_, &file) == 0 && file.st_nlink > 0) return {};
+  return tl::unexpected(std::string("the file was deleted"));
 }
 
 }  // namespace takt::mcap

@@ -29,6 +29,8 @@ class FileSink final : public Sink {
   tl::expected<void, std::string> append(std::span<const Bytes> parts) override;
   /// Waits until what was appended survives a loss of power. Error: the disk could not take it.
   tl::expected<void, std::string> settle() const;
+  /// Error: nobody can find it any more, the file was deleted.
+  tl::expected<void, std::string> still_there() const;
 
  private:
   explicit FileSink(int descriptor) : descriptor_(descriptor) {}

@@ -88,17 +88,38 @@ TEST_CASE("What does not fit even alone is refused, and what fits later is taken
   CHECK(bytes_in(folder.path) == kMB);
 }
 
-TEST_CASE("A folder that is gone is asked again with each file") {
+TEST_CASE("A folder that cannot be made is asked for again with each file") {
   const test::TemporaryFolder folder;
   const auto place = folder.path / "ring";
   const auto ring = ring_in(place, {});
   std::filesystem::remove_all(place);
+  std::ofstream(place) << "in its way";
   const std::vector<std::byte> data(1000);
   const mcap::Bytes parts[]{data};
   CHECK(!ring->next(0)->append(parts));
-  std::filesystem::create_directories(place);
+  std::filesystem::remove(place);
   CHECK(ring->next(1)->append(parts));
   CHECK(ring->files().size() == 1);
+}
+
+TEST_CASE("A file that somebody deleted is told when it settles, and the next one is made, with its folder") {
+  const test::TemporaryFolder folder;
+  for (const bool durable : {true, false}) {
+    const auto ring = ring_in(folder.path / "ring", {.bytes = 20 * kMB, .durable = durable});
+    const std::vector<std::byte> data(1000);
+    const mcap::Bytes parts[]{data};
+    REQUIRE(ring->next(0)->append(parts));
+    CHECK(ring->settle(1'000'000'000));
+    CHECK(!ring->ends(1000, 0, 1'000'000'000));
+    std::filesystem::remove_all(folder.path / "ring");
+    const auto settled = ring->settle(2'000'000'000);
+    REQUIRE(!settled);
+    CHECK(settled.error().ends_with("run-000001.mcap: the file was deleted"));
+    CHECK(ring->ends(1000, 0, 2'000'000'000));
+    REQUIRE(ring->next(2'000'000'000)->append(parts));
+    CHECK(ring->settle(3'000'000'000));
+    CHECK(bytes_in(folder.path / "ring") == 1000);
+  }
 }
 
 TEST_CASE("Each file of a recorded ring opens alone, and together they hold every job") {
