@@ -5,6 +5,7 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <fstream>
 
 #include "recorded_run.hpp"
 #include "rt/record/log_file.hpp"
