@@ -54,7 +54,7 @@ bool trusted(int descriptor, bool group) {
 
 }  // namespace
 
-Server::Server(const Subject& subject) : subject_(subject) {
+Server::Server(const Subject& subject) : subject_(subject), taps_(subject.transport, subject.plan.ports) {
   open();
   if (lacks_.empty()) thread_ = OwnThread([this] { accept_clients(); });
 }
@@ -231,18 +231,7 @@ bool Server::echo(const Json& question, Connection& connection) {
   const Json items = question.value("items", Json(8U));
   if (!count.is_number_integer() || !items.is_number_unsigned())
     return connection.write(wrong("count and items have to be whole numbers"));
-  const auto tap = claim_tap(port);
-  if (!tap) return connection.write(wrong("somebody else listens to " + name + " already"));
   return stream(port, as, items.get<size_t>(), count.get<int64_t>(), connection);
-}
-
-std::shared_ptr<void> Server::claim_tap(size_t port) {
-  const std::lock_guard lock(tapping_);
-  if (!tapped_.insert(port).second) return nullptr;
-  return {this, [port](Server* server) {
-            const std::lock_guard last(server->tapping_);
-            server->tapped_.erase(port);
-          }};
 }
 
 bool Server::stream(size_t port, const std::string& as, size_t items, int64_t count, Connection& connection) {
@@ -251,32 +240,27 @@ bool Server::stream(size_t port, const std::string& as, size_t items, int64_t co
   const Draw draw = as == "png" ? pictures.png : as == "ply" ? pictures.ply : nullptr;
   if (draw == nullptr && !as.empty())
     return connection.write(wrong(fmt::format("this program does not draw messages; leave --{} out", as)));
-  const auto reader = subject_.transport.make_reader(port);
+  const auto tap = taps_.at(port);
   uint64_t seen = 0;
   for (int64_t sent = 0; sent < count && !ending_.load();) {
-    Candidate newest;
-    const bool listed = reader->list(now_ns(), {&newest, 1}) == 1 && newest.sequence > seen;
-    Held held = listed ? reader->take(newest.sequence) : Held{};
-    if (!held) {
+    const auto message = tap->newer_than(seen, now_ns());
+    if (message == nullptr) {
       if (connection.gone()) return false;
       pause_ms(2);
       continue;
     }
-    const auto let_go = [&reader](Held* message) { reader->release(*message); };
-    std::unique_ptr<Held, decltype(let_go)> holding(&held, let_go);
-    Json line{{"type", plan.type->name},
-              {"sequence", held.sequence},
-              {"level", held.header->level},
-              {"stamp_ns", held.stamp_ns},
-              {"age_ms", static_cast<double>(now_ns() - held.stamp_ns) / 1e6},
-              {"message", message_json(*plan.type, held.message(), items)}};
-    const auto file = draw != nullptr ? draw(*plan.type, held.message()) : std::string();
-    seen = held.sequence;
-    holding.reset();
+    seen = message->sequence;
+    const auto file = draw != nullptr ? message->drawn(draw) : std::string();
     if (!file)
       return connection.write(wrong(fmt::format("a message of type {} is no {}; leave --{} out", plan.type->name,
                                                 as == "png" ? "picture" : "point cloud", as)));
-    line["bytes"] = file->size();
+    const Json line{{"type", plan.type->name},
+                    {"sequence", message->sequence},
+                    {"level", message->level},
+                    {"stamp_ns", message->stamp_ns},
+                    {"age_ms", static_cast<double>(now_ns() - message->stamp_ns) / 1e6},
+                    {"message", message_json(*plan.type, message->message(), items)},
+                    {"bytes", file->size()}};
     if (!connection.write(line, *file)) return false;
     ++sent;
   }

@@ -7,10 +7,10 @@
 #include <list>
 #include <memory>
 #include <mutex>
-#include <set>
 #include <string>
 
 #include "graph/attach/endpoint.hpp"
+#include "graph/attach/taps.hpp"
 #include "graph/language/graph.hpp"
 #include "graph/language/registry.hpp"
 #include "rt/own_thread.hpp"
@@ -32,7 +32,7 @@ struct Subject {
 };
 
 /// Answers top, echo, get, set, forget, fault, mark, mode and stop for one run, from threads of the default policy that
-/// only read the board, hold one message of an output at a time, and post parameters to be taken between jobs. Its own
+/// only read the board, hold one message of an output at a time while they copy it, and post parameters to be taken between jobs. Its own
 /// user and root are heard; of the service its group, too, where the mode of its folder says so.
 class Server {
  public:
@@ -57,8 +57,6 @@ class Server {
   bool answer(const nlohmann::ordered_json& question, Connection& connection, uint32_t by_user);
   nlohmann::ordered_json top() const;
   bool echo(const nlohmann::ordered_json& question, Connection& connection);
-  /// The right to listen to an output, given back when it is dropped; null while somebody else has it.
-  std::shared_ptr<void> claim_tap(size_t port);
   /// `as`: "png", "ply" or "", for text alone; `items`: of longer arrays so many elements.
   bool stream(size_t port, const std::string& as, size_t items, int64_t count, Connection& connection);
   nlohmann::ordered_json change_mode(const std::string& name);
@@ -94,8 +92,8 @@ class Server {
   std::optional<SocketFolder> folder_;
   int listener_ = -1;
   std::atomic<bool> ending_{false};
-  std::mutex setting_, keeping_, tapping_;
-  std::set<size_t> tapped_;  ///< outputs that somebody listens to: one at a time each
+  std::mutex setting_, keeping_;
+  Taps taps_;
   std::list<Client> clients_;
   OwnThread thread_;
 };

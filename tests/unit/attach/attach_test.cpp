@@ -213,12 +213,7 @@ TEST_CASE("echo gives each new message once, and lets it go") {
   CHECK((*second)["message"]["cells"]["first"][0] == 700);
   CHECK(connection->read_bytes((*second)["bytes"].get<size_t>()));
   CHECK(writer->statistics().in_use == 2);  // what the ring keeps, nothing else
-  const auto shown = [&](const Json& question) {
-    Json answer;
-    do answer = scene.ask(question);  // until the one before has let go of the output
-    while (answer.contains("error"));
-    return answer["message"]["cells"]["first"].size();
-  };
+  const auto shown = [&](const Json& question) { return scene.ask(question)["message"]["cells"]["first"].size(); };
   CHECK(shown({{"do", "echo"}, {"port", "map.obstacles"}}) == 8);
   CHECK(shown({{"do", "echo"}, {"port", "map.obstacles"}, {"items", 100U}}) == 12);
   const std::string wrong = scene.ask({{"do", "echo"}, {"port", "map.obstacle"}})["error"];
@@ -309,24 +304,40 @@ TEST_CASE("a question of a wrong kind is refused, and the next one answered") {
   CHECK((*top)["running_s"] == 0.0);  // no epoch yet
 }
 
-TEST_CASE("who listens and goes leaves the output to others, even if nothing is published") {
+TEST_CASE("several listen to one output: each message is drawn once, and who goes is not missed") {
   Scene scene;
+  static std::atomic<int> drawings{0};
+  drawings.store(0);
+  scene.registry.pictures.png = [](const MessageType&, const void*) {
+    drawings.fetch_add(1);
+    return std::optional<std::string>("picture");
+  };
   const auto writer = scene.transport->make_writer(0);
-  writer->loan();
-  writer->publish(1, 0, 0);
+  const auto publish = [&] { writer->loan(), writer->publish(1, 0, 0); };
   const attach::Server server({scene.registry, scene.spec, scene.plan, *scene.board, *scene.transport});
-  std::string why;
-  const auto folder = attach::SocketFolder::own(attach::Surroundings::of_this_process(), why);
-  REQUIRE(folder);
-  const sockaddr_un address = folder->address(getpid());
-  const int descriptor = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  REQUIRE(connect(descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0);
-  attach::Connection first(descriptor, 3'600'000);  // the end is waited for, however long it takes
-  const Json echo{{"do", "echo"}, {"port", "map.obstacles"}};
-  REQUIRE(first.write({{"do", "echo"}, {"port", "map.obstacles"}, {"count", 2}}));
-  REQUIRE(first.read_line());  // and now it waits for a second message
-  CHECK(scene.ask(echo)["error"].get<std::string>().find("somebody else") != std::string::npos);
-  shutdown(descriptor, SHUT_WR);
-  CHECK_FALSE(first.read_line());  // the server hangs up after it has given the output back
-  CHECK_FALSE(scene.ask(echo).contains("error"));
+  publish();
+  std::vector<attach::Connection> clients;
+  for (int i = 0; i < 3; ++i) {
+    auto client = attach::connect_to(getpid());
+    REQUIRE(client);
+    REQUIRE(client->write({{"do", "echo"}, {"port", "map.obstacles"}, {"as", "png"}, {"count", 2}}));
+    clients.push_back(std::move(*client));
+  }
+  const auto all_see = [&](uint64_t sequence) {
+    for (attach::Connection& client : clients) {
+      const auto line = client.read_line();
+      REQUIRE(line);
+      CHECK((*line)["sequence"] == sequence);
+      CHECK(client.read_bytes((*line)["bytes"].get<size_t>()) == "picture");
+    }
+  };
+  all_see(1);
+  CHECK(drawings.load() == 1);
+  clients.pop_back();
+  publish();
+  all_see(2);
+  CHECK(drawings.load() == 2);
+  clients.clear();
+  CHECK_FALSE(scene.ask({{"do", "echo"}, {"port", "map.obstacles"}}).contains("error"));
+  CHECK(writer->statistics().in_use == 2);  // what the ring keeps, nothing else
 }
