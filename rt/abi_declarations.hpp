@@ -2,4 +2,4 @@
 // Installed as <takt/abi_declarations.hpp>: core, stable.
 // Written by `tests/tools/api.py . --write`: a hash of all public headers.
 #pragma once
-#define TAKT_ABI_DECLARATIONS "ab9f58e6b52f"
+#define TAKT_ABI_DECLARATIONS "949e1cefcdf2"

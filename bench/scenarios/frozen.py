@@ -26,6 +26,7 @@ takt = os.environ.get("TAKT", str(root / "takt"))
 count, seed, gap_s = int((sys.argv[1:] or ["200"])[0]), int((sys.argv[2:] or ["1"])[0]), float((sys.argv[3:] or ["9"])[0])
 chance = random.Random(seed)
 LIMITS_MB = {"disk": 2000, "memory": 700}
+A_RUN = 50  # injections: their files, a quarter of a gigabyte each, are judged before the disk has no room for more
 
 
 def member(run, name):
@@ -52,34 +53,42 @@ def inject(kind, number, run):
 
 
 def main():
-    work = pathlib.Path(tempfile.mkdtemp(prefix="frozen"))
     graph = root / "graph" / f".frozen_{os.getpid()}.yaml"
     kept = "record: {{before: 2s, after: 1s, frozen: 60GB, disk: {disk}MB, memory: {memory}MB}}".format(**LIMITS_MB)
     graph.write_text("\n".join(kept if line.startswith("record:") else line
                                for line in (root / "graph/ace.yaml").read_text().split("\n")))
-    done = []
+    bad = 0
     try:
-        with open(work / "log", "w") as log:
-            run = subprocess.Popen([takt, "run", str(graph), "--for", "0s", "--ring", "on", "--output", str(work / "out"),
-                                    "--report", str(work / "report.json")], stdout=log, stderr=log)
-            time.sleep(8)
-            sizes = Sizes(work / "out/flight/ring", LIMITS_MB)
-            for number in range(count):
-                kind = ["mark", "miss", "outage"][chance.randrange(3)]
-                what = inject(kind, number, run)
-                done.append((kind, what))
-                time.sleep(gap_s * chance.uniform(0.8, 1.2))
-                if run.poll() is not None:
-                    print(f"the run ended with {run.returncode}:\n{(work / 'log').read_text()[-2000:]}")
-                    return 1
-            within = sizes.kept_within()
-            run.send_signal(signal.SIGINT)
-            run.wait()
-        bad = judge(work, done)
+        for first in range(0, count, A_RUN):
+            bad += one_run(graph, range(first, min(count, first + A_RUN)))
     finally:
         graph.unlink()
-    print(f"{len(done) - bad} of {len(done)} frozen, named and replayed")
-    return 1 if bad or not within else 0
+    print(f"{count - bad} of {count} frozen, named and replayed")
+    return 1 if bad else 0
+
+
+def one_run(graph, numbers):
+    """How many of them are not as they should be; all, if the run ends or its ring grows too large."""
+    work = pathlib.Path(tempfile.mkdtemp(prefix="frozen"))
+    done = []
+    with open(work / "log", "w") as log:
+        run = subprocess.Popen([takt, "run", str(graph), "--for", "0s", "--ring", "on", "--output", str(work / "out"),
+                                "--report", str(work / "report.json")], stdout=log, stderr=log)
+        time.sleep(8)
+        sizes = Sizes(work / "out/flight/ring", LIMITS_MB)
+        for number in numbers:
+            kind = ["mark", "miss", "outage"][chance.randrange(3)]
+            what = inject(kind, number, run)
+            done.append((kind, what))
+            time.sleep(gap_s * chance.uniform(0.8, 1.2))
+            if run.poll() is not None:
+                print(f"the run ended with {run.returncode}:\n{(work / 'log').read_text()[-2000:]}")
+                return len(numbers)
+        within = sizes.kept_within()
+        run.send_signal(signal.SIGINT)
+        run.wait()
+    bad = judge(work, done)
+    return bad if within else len(numbers)
 
 
 def judge(work, done):

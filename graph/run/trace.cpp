@@ -39,9 +39,9 @@ trace::Source best_source(const RunOptions& options) {
 RunTrace::RunTrace(const RunOptions& options, const Plan& plan, size_t processes) : options_(options) {
   // One for each lane and, if the policy is refused after all, one for each cooperative worker: no process has more
   // than it has lanes, or one. Some for those of restarted processes that find none of their name.
-  constexpr size_t kSpare = 8;
+  const size_t spare = processes > 1 ? 8 : 0;
   if (!options.trace.empty() || !options.record.empty() || options.keep_ring)
-    rings_ = std::make_unique<trace::Rings>(2 * plan.tasks.size() + processes + kSpare);
+    rings_ = std::make_unique<trace::Rings>(2 * plan.tasks.size() + processes + spare);
 }
 
 void RunTrace::collect(const Plan& plan, RunRecord& record) {

@@ -5,6 +5,7 @@
 
 #include "rt/msg/scalar.hpp"
 #include "rt/record/mcap/bytes.hpp"
+#include "rt/record/picture_codec.hpp"
 #include "rt/xxhash.hpp"
 
 namespace takt::record {

@@ -10,10 +10,11 @@
 #include <vector>
 
 #include "rt/record/packed_message.hpp"
-#include "rt/record/picture_codec.hpp"
 #include "rt/shm/transport.hpp"
 
 namespace takt::record {
+
+class PictureCoder;  // rt/record/picture_codec.hpp
 
 struct MessageRecord {
   uint64_t sequence = 0;
