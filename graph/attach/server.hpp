@@ -32,8 +32,8 @@ struct Subject {
 };
 
 /// Answers top, echo, get, set, forget, fault, mark, mode and stop for one run, from threads of the default policy that
-/// only read the board, hold one message of an output at a time while they copy it, and post parameters to be taken between jobs. Its own
-/// user and root are heard; of the service its group, too, where the mode of its folder says so.
+/// only read the board, hold one message of an output at a time while they copy it, and post parameters to be taken
+/// between jobs. Its own user and root are heard; of the service its group, too, where the mode of its folder says so.
 class Server {
  public:
   explicit Server(const Subject& subject);

@@ -36,7 +36,10 @@ for option in --record=one.mcap --report=one.json --trace=one_trace.json --html=
 done
 expect 2 "process $run writes to it" "$takt" run "$source/graph/lasers.yaml" --for 1s --output "$work/writer"
 expect 2 "process $run writes to it" "$takt" log cut "$work/lasers.mcap" -o "$work/one.mcap"
-kill -INT $run && wait $run || fail "the first run: exit $?"
+kill -INT $run
+wait $run
+code=$?
+[ $code -le 1 ] || fail "the first run: exit $code"  # 1: a deadline was missed, as ordinary threads may
 expect 0 "" "$takt" log info "$work/one.mcap"
 [ -s "$work/one.json" ] && [ -s "$work/one_trace.json" ] && [ ! -e "$work/one.json.part" ] || fail "the files of the first run: $(ls "$work")"
 expect 2 "this command itself, for another option," "$takt" run "$source/graph/lasers.yaml" --for 1s --clock virtual --output "$work/out" --report "$work/x.json" --html "$work/x.json"

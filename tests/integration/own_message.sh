@@ -59,5 +59,5 @@ until "$takt" top --once --run $run >/dev/null 2>&1; do
 done
 tells 0 '"celsius":' "$takt" echo oven.inside --run $run
 expect 0 "" "$takt" stop --run $run
-wait $run || fail "the live run: exit $?"
+wait $run || [ $? -eq 1 ] || fail "the live run failed"  # 1: a deadline was missed, as ordinary threads may
 finish
