@@ -16,8 +16,8 @@ Tapped::Tapped(const PortPlan& port, const Held& held)
 
 const std::optional<std::string>& Tapped::drawn(Draw draw) const {
   const std::lock_guard lock(drawing_);
-  const auto [made, fresh] = drawn_.try_emplace(draw);
-  if (fresh) made->second = draw(type_, message());
+  auto made = drawn_.find(draw);
+  if (made == drawn_.end()) made = drawn_.emplace(draw, draw(type_, message())).first;
   return made->second;
 }
 

@@ -23,7 +23,6 @@ namespace takt::attach {
 class Tapped {
  public:
   Tapped(const PortPlan& port, const Held& held);
-  const MessageType& type() const { return type_; }
   const void* message() const { return memory_.get(); }
   /// What that makes of it, made once for all; nothing: it is none of that kind.
   const std::optional<std::string>& drawn(Draw draw) const;

@@ -32,6 +32,12 @@ bool Places::in_memory() const {
   return std::any_of(memory.begin(), memory.end(), [](const PortRule& rule) { return rule.keep == PortRule::all; });
 }
 
+const PortRule* rule_of(const graph::RecordSpec& spec, const PortPlan& port) {
+  for (const graph::RecordSpec::Port& given : spec.ports)
+    if (given.port.node == port.node && given.port.port == port.port) return &given.rule;
+  return nullptr;
+}
+
 Places places(const graph::RecordSpec& spec, const Plan& plan) {
   Places places;
   places.disk.resize(plan.ports.size());
@@ -40,9 +46,8 @@ Places places(const graph::RecordSpec& spec, const Plan& plan) {
   for (size_t p = 0; p < plan.ports.size(); ++p) {
     const PortPlan& port = plan.ports[p];
     PortRule& rule = places.disk[p];
-    bool asked = false;
-    for (const graph::RecordSpec::Port& given : spec.ports)
-      if (given.port.node == port.node && given.port.port == port.port) rule = given.rule, asked = true;
+    const PortRule* asked = rule_of(spec, port);
+    if (asked != nullptr) rule = *asked;
     places.memory[p].jpeg = rule.jpeg;  // both parts of a ring are of one format, and can be joined
     const size_t task = producers.find(p);
     const bool state = task != kNone && is_state_port(plan.tasks[task], p);
@@ -53,7 +58,7 @@ Places places(const graph::RecordSpec& spec, const Plan& plan) {
       continue;
     }
     // A replay makes again what a node made of what devices gave it.
-    if (asked || state || task == kNone || plan.tasks[task].device || spec.state_every_ns() == 0) {
+    if (asked != nullptr || state || task == kNone || plan.tasks[task].device || spec.state_every_ns() == 0) {
       places.memory_bytes_s += bytes_s;
       places.memory[p] = rule;
     }

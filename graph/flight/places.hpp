@@ -27,6 +27,9 @@ Places places(const graph::RecordSpec& spec, const Plan& plan);
 /// and one before it for those whose messages others need from there on.
 int64_t lead_ns(const graph::RecordSpec& spec);
 
+/// The graph's rule for that output; null: it has none.
+const record::PortRule* rule_of(const graph::RecordSpec& spec, const PortPlan& port);
+
 /// Of the memory asked for, what leaves others as much of /dev/shm as is free; 0: less than a ring needs.
 int64_t memory_to_use(const graph::RecordSpec& spec);
 

@@ -123,6 +123,9 @@ void Loader::read_record_port(const std::string& name) {
       return problem(graph_.value_at(at), fmt::format("{} of `record` is {}; {}", ticked(name), ticked(word), wrong));
     from = comma + 1;
   }
+  if (given.rule.keep != record::PortRule::all && text.find(',') != std::string::npos)
+    return problem(graph_.value_at(at),
+                   fmt::format("{} of `record` is {}; `none` and `hash` stand alone", ticked(name), ticked(text)));
   if (given.rule.jpeg > 0 && port->type != nullptr && !record::may_have_pictures(port->type->fields))
     return problem(graph_.value_at(at), fmt::format("{} of `record` is {}, but its messages ({}) have no pictures",
                                                     ticked(name), ticked(text), port->type->name));

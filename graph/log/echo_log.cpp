@@ -66,8 +66,8 @@ tl::expected<Echoed, std::string> echo_log(const record::LogFile& log, std::span
     const auto port = ports->find(raw.channel);
     if (port == ports->end()) return true;
     auto message = record::unpack_message(raw.data);
-    if (const auto read = message ? record::uncode(*message, plain) : tl::expected<void, std::string>(); !read)
-      message = tl::make_unexpected(read.error());
+    if (message)
+      if (const auto read = record::uncode(*message, plain); !read) message = tl::make_unexpected(read.error());
     const tl::expected<Json, std::string> line =
         message.and_then([&](const auto& there) { return message_line(port->second, there, items); });
     if (line) {

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "graph/flight/places.hpp"
 #include "graph/language/registry.hpp"
 #include "graph/language/words.hpp"
 #include "graph/log/recorded_plan.hpp"
@@ -25,7 +26,7 @@ constexpr uint64_t kSmallBytes = 64 * 1024;
 
 /// By port. Those of devices always have all fields, or nothing could be replayed; pictures as the graph says.
 std::vector<record::PortRule> port_rules(const Plan& plan, const std::vector<std::string>& also,
-                                         const std::vector<graph::RecordSpec::Port>& rules_of_graph) {
+                                         const graph::RecordSpec& spec) {
   const auto named = [&](const std::string& name) { return std::find(also.begin(), also.end(), name) != also.end(); };
   std::vector<record::PortRule> rules(plan.ports.size());
   for (size_t p = 0; p < plan.ports.size(); ++p)
@@ -36,10 +37,8 @@ std::vector<record::PortRule> port_rules(const Plan& plan, const std::vector<std
     for (const size_t port : task.ports)
       if (task.device || is_state_port(task, port)) rules[port].keep = record::PortRule::all;
   }
-  for (const graph::RecordSpec::Port& given : rules_of_graph)
-    for (size_t p = 0; p < plan.ports.size(); ++p)
-      if (plan.ports[p].node == given.port.node && plan.ports[p].port == given.port.port)
-        rules[p].jpeg = given.rule.jpeg;
+  for (size_t p = 0; p < plan.ports.size(); ++p)
+    if (const record::PortRule* rule = flight::rule_of(spec, plan.ports[p])) rules[p].jpeg = rule->jpeg;
   return rules;
 }
 
@@ -154,7 +153,7 @@ void RunRecord::begin_file(const graph::RecordSpec& spec, const Plan& plan, cons
   if (make_disk_) disk_ = make_disk_(*file_);
   mcap::Sink& sink = disk_ ? *disk_ : *file_;
   record::Recorder::Options how;
-  how.ports = port_rules(plan, options_.record_ports, spec.ports);
+  how.ports = port_rules(plan, options_.record_ports, spec);
   how.by_caller = options_.clock == "virtual";
   how.written_at = &written_at_;
   how.priority = priority_on(plan);

@@ -31,8 +31,9 @@ struct SpareUse {
 /// restart policy says, and joins the others, which go on meanwhile: nobody holds a lock that another one could wait
 /// for. A process hangs if one of its jobs does (see Watchdog), or if it gives no sign of life for `silence`.
 ///
-/// One that ends twice within `poison` on the same message (by a signal that nobody sent, or by a job that hangs) does
-/// not get that message a third time; if it ends on the next one as well, the run goes into safe_stop.
+/// One that ends on a message (by a signal that nobody sent, or by a job that hangs), and again on the same one within
+/// `silence` and `poison` of its return, does not get that message a third time; if it ends on the next one as well,
+/// the run goes into safe_stop.
 ///
 /// A process that comes too often is given up: its tasks stay away, and if one of them is of high criticality the run
 /// goes into safe_stop. One thread at a time: that of the process group.
@@ -47,7 +48,7 @@ class Supervisor {
     std::function<void(pid_t)> clean_up = {};
     /// One line for the person in front of the terminal; may be empty.
     std::function<void(const std::string&)> say = {};
-    int64_t poison_ns = kSlowdown * 250'000'000LL;  ///< and the silence: from a return to the second end
+    int64_t poison_ns = kSlowdown * 250'000'000LL;  ///< beyond the silence, which a job that hangs lasts
     std::vector<bool> spares = {};                  ///< by process: it has one; empty: none has
     /// Of a process that has just become ready as a spare; may be empty.
     std::function<double(pid_t)> memory_mb = {};
