@@ -3,16 +3,19 @@
 #include <pthread.h>
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <optional>
+#include <span>
 #include <stop_token>
 
 #include "rt/memory/sanitized.hpp"
 
 namespace takt {
 
-/// A thread of the runtime's own, with a small stack. Where memory is locked, every stack is resident as a whole;
-/// threads that run jobs, and those of devices and libraries, have 2 MB (prepare_process_memory()).
+/// A thread of the runtime's own, with a small stack. Where memory is locked, the stacks of other threads are resident
+/// as a whole (prepare_process_memory()): those that run jobs, and those of devices and libraries, have 2 MB. Of this
+/// one only what it uses is, unless it says that it must not wait for a page.
 ///
 ///     OwnThread thread([this](const std::stop_token& end) { while (!end.stop_requested()) look(); });
 class OwnThread {
@@ -24,10 +27,12 @@ class OwnThread {
   static constexpr size_t kStack = 256 << 10;
 #endif
 
+  enum class Stack : uint8_t { as_used, resident };
+
   OwnThread() = default;
   /// Throws std::system_error if there are too many threads. An exception that leaves `work` ends the process.
-  explicit OwnThread(std::function<void()> work, size_t stack_bytes = kStack);
-  explicit OwnThread(const std::function<void(const std::stop_token&)>& work, size_t stack_bytes = kStack);
+  explicit OwnThread(std::function<void()> work, size_t stack_bytes = kStack, Stack stack = Stack::as_used);
+  explicit OwnThread(const std::function<void(const std::stop_token&)>& work);
   OwnThread(OwnThread&& other) noexcept;
   OwnThread& operator=(OwnThread&& other) noexcept;
   /// Asks it to end, and waits for that.
@@ -41,6 +46,7 @@ class OwnThread {
   void stop();
   std::optional<pthread_t> thread_;
   std::stop_source end_{std::nostopstate};
+  std::span<std::byte> stack_;  ///< its own; empty: the library's
 };
 
 }  // namespace takt

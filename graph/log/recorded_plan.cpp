@@ -2,13 +2,10 @@
 #include "graph/log/recorded_plan.hpp"
 
 #include <dlfcn.h>
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/mman.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <fstream>
 #include <iterator>
 #include <map>
@@ -17,6 +14,7 @@
 #include "rt/abi.hpp"
 #include "rt/node.hpp"
 #include "rt/record/message_record.hpp"
+#include "rt/xxhash.hpp"
 
 namespace takt::log {
 namespace {
@@ -163,18 +161,15 @@ Json asset_hashes(const Plan& plan, const std::filesystem::path& directory) {
 
 std::string part_name(size_t i) { return fmt::format("part_{}.yaml", i); }
 
-/// Mapped: a run would keep the memory that a copy of a large file takes.
+/// Block by block: where memory is locked, a mapping or a copy of the file would be resident as a whole.
 std::string file_hash(const std::filesystem::path& file) {
-  const int descriptor = open(file.c_str(), O_RDONLY | O_CLOEXEC);
-  struct stat status {};
-  const bool there = descriptor >= 0 && fstat(descriptor, &status) == 0 && status.st_size > 0;
-  const auto size = static_cast<size_t>(there ? status.st_size : 0);
-  void* const memory = there ? mmap(nullptr, size, PROT_READ, MAP_PRIVATE, descriptor, 0) : MAP_FAILED;
-  if (descriptor >= 0) close(descriptor);
-  if (memory == MAP_FAILED) return hash_text("");
-  const uint64_t hash = record::hash_of({static_cast<const std::byte*>(memory), size});
-  munmap(memory, size);
-  return fmt::format("{:016x}", hash);
+  std::ifstream in(file, std::ios::binary);
+  std::array<char, 16384> block;
+  XXH3_state_t state;
+  XXH3_64bits_reset(&state);
+  while (in.read(block.data(), block.size()) || in.gcount() > 0)
+    XXH3_64bits_update(&state, block.data(), static_cast<size_t>(in.gcount()));
+  return fmt::format("{:016x}", XXH3_64bits_digest(&state));
 }
 
 std::string program_hash() {

@@ -80,7 +80,7 @@ Json modes_json(const RunFacts& facts) {
     modes.push_back({{"name", facts.plan.modes[change->mode].name},
                      {"from_s", seconds(change->from_ns)},
                      {"to_s", seconds(end)},
-                     {"reason", change->reason.text()}});
+                     {"reason", facts.board.modes().reason(i)}});
   }
   return modes;
 }

@@ -37,11 +37,11 @@ trace::Source best_source(const RunOptions& options) {
 }  // namespace
 
 RunTrace::RunTrace(const RunOptions& options, const Plan& plan, size_t processes) : options_(options) {
-  // One for each lane and, if the policy is refused after all, one for each cooperative worker: no process has more
-  // than it has lanes, or one. Some for those of restarted processes that find none of their name.
+  // One for each lane, or for each cooperative worker: no process has more than it has lanes, or one. Some for those of
+  // restarted processes that find none of their name.
   const size_t spare = processes > 1 ? 8 : 0;
   if (!options.trace.empty() || !options.record.empty() || options.keep_ring)
-    rings_ = std::make_unique<trace::Rings>(2 * plan.tasks.size() + processes + spare);
+    rings_ = std::make_unique<trace::Rings>(plan.tasks.size() + processes + spare);
 }
 
 void RunTrace::collect(const Plan& plan, RunRecord& record) {

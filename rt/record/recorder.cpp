@@ -179,7 +179,7 @@ void Recorder::take_modes() {
     if (change == nullptr) return;  // it is being written
     if (modes.repeats(modes_taken_)) continue;
     take_event({static_cast<uint16_t>(EventKind::mode), RecordedEvent::kNoTask, 0, change->from_ns,
-                ModeChange{change->mode, std::string(change->reason.text())}});
+                ModeChange{change->mode, modes.reason(modes_taken_)}});
   }
 }
 

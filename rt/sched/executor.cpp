@@ -193,7 +193,6 @@ bool Executor::run_partitioned(Policy policy, RunResult& result) {
     const PassesPriorityOn at_once;
     crew_->workers.start([this, &crew = *crew_, &lane = *lanes_[i], mine = wanted[i], patience_ns, i] {
       name_thread(lane.head().plan().name);
-      const trace::Thread traced(options_.trace, lane.head().plan().name);
       keep_rights(Rights::real_time);
       prefault_stack();
       crew.grants[i] = apply_below_watchdog(mine, patience_ns);
@@ -203,6 +202,8 @@ bool Executor::run_partitioned(Policy policy, RunResult& result) {
       crew.ready.arrive_and_wait();
       crew.started.arrive_and_wait();
       if (!crew.go.load()) return;
+      const trace::Thread traced(options_.trace,
+                                 lane.head().plan().name);  // not before: cooperative workers need rings
       start_counting();
       Anticipation anticipation(longest_lead_ns(plan_, lane.members()), Anticipation::Beside::workers);
       while (lane.next_release_ns() < stop_.end_ns()) {

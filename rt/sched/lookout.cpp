@@ -15,7 +15,11 @@ constexpr int64_t kYear_ns = 31'536'000'000'000'000;  // instead of never: the a
 
 Lookout::Lookout(const std::string& name, const Reservation& wanted, const Clock& clock,
                  std::function<int64_t(int64_t)> look)
-    : name_(name.substr(0, 15)), wanted_(wanted), clock_(clock), look_(std::move(look)), thread_([this] { work(); }) {}
+    : name_(name.substr(0, 15)),
+      wanted_(wanted),
+      clock_(clock),
+      look_(std::move(look)),
+      thread_([this] { work(); }, OwnThread::kStack, OwnThread::Stack::resident) {}
 
 Lookout::~Lookout() {
   {

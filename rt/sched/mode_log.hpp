@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <array>
 #include <span>
+#include <string>
 #include <utility>
 
 #include "rt/sched/append_log.hpp"
@@ -30,8 +32,11 @@ class ModeLog {
   /// release it is to hold for.
   static constexpr int64_t kLead_ns = 1'000'000;
 
+  /// Of so many changes, the newest ones, the reason is kept. A record has all of them.
+  static constexpr size_t kReasons = 512;
+
   struct Change : ModeEntry {
-    BoundedText<120> reason;
+    uint32_t words = 0;  ///< number of its reason
   };
 
   /// Mode of a job released then; 0, the mode of the start, before the first change.
@@ -84,7 +89,9 @@ class ModeLog {
   /// Whatever mode is in force. False if it is full.
   bool enter(const ModeEntry& wanted, std::string_view reason) {
     const int64_t from_ns = std::max(wanted.from_ns, newest_ns_.load());  // instants never go back
-    if (!log_.append({{wanted.mode, from_ns, wanted.origin}, BoundedText<120>(reason)})) return false;
+    const uint32_t words = words_.fetch_add(1, std::memory_order_acq_rel);
+    reasons_[words % kReasons] = BoundedText<120>(reason);
+    if (!log_.append({{wanted.mode, from_ns, wanted.origin}, words})) return false;
     raise(newest_ns_, from_ns);
     // Looked for in the log it would take the longer the more changes there were, at every job of a device.
     if (wanted.origin != ModeOrigin::rule) raise(without_rule_, (others_.fetch_add(1) + 1) << 32 | wanted.mode);
@@ -97,6 +104,16 @@ class ModeLog {
   size_t size() const { return log_.size(); }
   /// In the order of their instants; null while it is being written.
   const Change* change(size_t i) const { return log_.at(i); }
+  /// Why; empty while it is being written.
+  std::string reason(size_t i) const {
+    const Change* asked = change(i);
+    if (asked == nullptr) return {};
+    const std::string words(reasons_[asked->words % kReasons].text());
+    // Those that are being written may be written over it meanwhile.
+    if (words_.load(std::memory_order_acquire) - asked->words + kAtOnce > kReasons)
+      return "(reasons of the newest " + std::to_string(kReasons - kAtOnce) + " changes are kept)";
+    return words;
+  }
   /// A rule asked for the mode that was in force already: so does each process whose devices come back at that instant.
   bool repeats(size_t i) const {
     const Change* asked = change(i);
@@ -113,7 +130,11 @@ class ModeLog {
     }
   }
 
+  static constexpr size_t kAtOnce = 64;  ///< more threads than change the mode at one instant
+
   AppendLog<Change, kMost> log_;
+  std::array<BoundedText<120>, kReasons> reasons_{};
+  std::atomic<uint32_t> words_{0};
   std::atomic<int64_t> newest_ns_{0};
   std::atomic<uint64_t> others_{0};        ///< changes that no rule asked for
   std::atomic<uint64_t> without_rule_{0};  ///< the mode of the newest of them, its number above it

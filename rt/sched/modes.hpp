@@ -61,6 +61,7 @@ class Modes {
   /// Of the log.
   size_t size() const { return log_.size(); }
   const ModeLog::Change* change(size_t i) const { return log_.change(i); }
+  std::string reason(size_t i) const { return log_.reason(i); }
   bool repeats(size_t i) const { return log_.repeats(i); }
 
  private:

@@ -82,8 +82,9 @@ StallWatch::StallWatch(const Plan& plan, const RunBoard& board, std::function<in
       tasks_(plan.tasks.size()),
       jobs_go_before_(plan.policy == Policy::deadline),
       stolen_ns_(std::move(stolen_ns)) {
-  for (const int core : plan.cores) threads_.emplace_back([this, core] { probe(core); });
-  if (stolen_ns_) threads_.emplace_back([this] { read_steal(); });
+  const auto begin = [&](auto work) { threads_.emplace_back(work, OwnThread::kStack, OwnThread::Stack::resident); };
+  for (const int core : plan.cores) begin([this, core] { probe(core); });
+  if (stolen_ns_) begin([this] { read_steal(); });
 }
 
 const StallLog& StallWatch::end() {

@@ -14,13 +14,12 @@
 
 namespace takt::trace {
 
-Rings::Rings(size_t count) : count_(count), bytes_(sizeof(Ring) * (count + 1)) {
-  static_assert(sizeof(Shared) <= sizeof(Ring));
+Rings::Rings(size_t count) : count_(count), bytes_(sizeof(Shared) + sizeof(Ring) * count) {
   void* memory = mmap(nullptr, bytes_, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS | MAP_POPULATE, -1, 0);
   if (memory == MAP_FAILED)
     throw std::runtime_error("trace: shared memory of " + std::to_string(bytes_) + " bytes: " + std::strerror(errno));
   shared_ = new (memory) Shared;
-  rings_ = reinterpret_cast<Ring*>(static_cast<std::byte*>(memory) + sizeof(Ring));
+  rings_ = reinterpret_cast<Ring*>(shared_ + 1);
   for (size_t i = 0; i < count; ++i) new (rings_ + i) Ring;
 }
 

@@ -27,7 +27,7 @@ class Rings {
   size_t refused() const;
 
  private:
-  struct Shared {
+  struct alignas(Ring) Shared {
     std::atomic<size_t> next{0};
   };
   size_t count_, bytes_;

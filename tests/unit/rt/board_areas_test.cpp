@@ -117,7 +117,7 @@ TEST_CASE("a stop and a mode that a process asks for hold in all others at once,
   board.modes().gather();
   board.modes().gather();
   REQUIRE(board.modes().size() == 2);
-  CHECK(board.modes().change(1)->reason.text() == "hangs");
+  CHECK(board.modes().reason(1) == "hangs");
   CHECK(board.mode_at(kEpoch + 10) == 1);
   CHECK(board.mode_at(kEpoch + 11) == 2);
 }

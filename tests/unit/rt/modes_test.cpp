@@ -104,6 +104,16 @@ TEST_CASE("a mode that rules have left again and again is still the one to go ba
   CHECK(log.in_force().before == 4);
 }
 
+TEST_CASE("of many changes the newest reasons are kept, and an older one says that it is not") {
+  ModeLog log;
+  constexpr size_t kChanges = 2 * ModeLog::kReasons;
+  for (uint32_t i = 0; i < kChanges; ++i) CHECK(log.request(1 + i % 2, i, "reason " + std::to_string(i)));
+  CHECK(log.reason(kChanges - 1) == "reason " + std::to_string(kChanges - 1));
+  CHECK(log.reason(kChanges - 448) == "reason " + std::to_string(kChanges - 448));
+  CHECK(log.reason(kChanges - 449) == "(reasons of the newest 448 changes are kept)");
+  CHECK(log.reason(0) == log.reason(kChanges - 449));
+}
+
 TEST_CASE("a person cannot use up all changes: a safe stop has its place") {
   ModeLog log;
   uint32_t asked = 0;
@@ -123,7 +133,7 @@ TEST_CASE("on_miss: safe_stop changes the mode when the first deadline is missed
   CHECK(scene.first.modes.front() == "full");
   CHECK(scene.first.modes.back() == "safe_stop");
   REQUIRE(scene.board->modes().size() == 1);
-  CHECK(std::string(scene.board->modes().change(0)->reason.text()) == "first: deadline missed");
+  CHECK(scene.board->modes().reason(0) == "first: deadline missed");
   CHECK(scene.board->modes().change(0)->from_ns == kEpoch + kMs);
 }
 

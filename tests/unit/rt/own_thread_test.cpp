@@ -2,8 +2,10 @@
 #include "rt/own_thread.hpp"
 
 #include <doctest/doctest.h>
+#include <sys/mman.h>
 
 #include <atomic>
+#include <cstdint>
 #include <thread>
 
 #include "rt/memory/process_memory.hpp"
@@ -19,6 +21,26 @@ TEST_CASE("a thread of the runtime's own has the stack that it asks for, and is 
 #endif
   OwnThread([&] { left = stack_left(); }, 4 << 20).join();
   CHECK(left > 2 << 20);
+
+  // What it does not use of its stack is not resident, also where all memory is locked.
+  const auto resident = [](OwnThread::Stack stack) {
+    int pages = 0;
+    const auto count = [&] {
+      const auto top = reinterpret_cast<uintptr_t>(__builtin_frame_address(0)) & ~uintptr_t{4095};
+      for (uintptr_t page = 8; page < 24; ++page) {
+        unsigned char seen = 0;
+        REQUIRE(mincore(reinterpret_cast<void*>(top - page * 4096), 4096, &seen) == 0);
+        pages += seen & 1;
+      }
+    };
+    OwnThread(count, OwnThread::kStack, stack).join();
+    return pages;
+  };
+  const bool locked = mlockall(MCL_FUTURE) == 0;
+  CHECK(resident(OwnThread::Stack::as_used) < 2);
+  if (locked) CHECK(resident(OwnThread::Stack::resident) == 16);
+  else MESSAGE("not shown: this user may not lock memory");
+  munlockall();
 
   std::atomic<int> ended{0};
   {

@@ -58,7 +58,7 @@ struct SourcesScene {
     for (size_t i = 0; i < board->modes().size(); ++i) {
       const ModeLog::Change& change = *board->modes().change(i);
       all.push_back(plan.modes[change.mode].name + " at " + std::to_string((change.from_ns - kEpoch) / kMs) + ": " +
-                    std::string(change.reason.text()).c_str());
+                    board->modes().reason(i));
     }
     return all;
   }
