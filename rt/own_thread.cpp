@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "rt/own_thread.hpp"
 
-#include <sys/mman.h>
-
 #include <cerrno>
 #include <memory>
 #include <system_error>
 #include <utility>
+
+#include "rt/memory/map_as_used.hpp"
 
 namespace takt {
 namespace {
@@ -20,15 +20,12 @@ void* run(void* work) noexcept {
   return nullptr;
 }
 
-/// With a page below that ends who comes there. Where all memory is locked (MCL_FUTURE), what can be written to is made
-/// resident at once: so that is allowed only when the lock is off.
-std::span<std::byte> pages_as_used(size_t bytes) {
-  void* memory = mmap(nullptr, bytes, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE | MAP_STACK, -1, 0);
+/// With a page below that ends who comes there.
+std::span<std::byte> stack_as_used(size_t bytes) {
+  void* memory = map_as_used(bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE | MAP_STACK);
   if (memory == MAP_FAILED) throw std::system_error(errno, std::generic_category(), "stack of a thread");
-  munlock(memory, bytes);
-  const std::span pages(static_cast<std::byte*>(memory), bytes);
-  mprotect(pages.subspan(kGuard).data(), bytes - kGuard, PROT_READ | PROT_WRITE);
-  return pages;
+  mprotect(memory, kGuard, PROT_NONE);
+  return {static_cast<std::byte*>(memory), bytes};
 }
 
 void give_back(std::span<std::byte> pages) {
@@ -42,7 +39,7 @@ OwnThread::OwnThread(Work work, size_t stack_bytes, Stack stack) {
   pthread_attr_t attributes;
   pthread_attr_init(&attributes);
   if (stack == Stack::as_used) {
-    stack_ = pages_as_used(stack_bytes);
+    stack_ = stack_as_used(stack_bytes);
     pthread_attr_setstack(&attributes, stack_.data(), stack_.size());
   } else {
     pthread_attr_setstacksize(&attributes, stack_bytes);

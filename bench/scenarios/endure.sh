@@ -10,7 +10,7 @@
 root=$(readlink -f "$(dirname "$0")/../..")
 export PYTHONPATH="$root/bench/scenarios" PYTHONDONTWRITEBYTECODE=1
 exec python3 - "${TAKT:-$root/takt}" "$root" "$@" <<'PY'
-import host_probe, json, os, processes, random, subprocess, sys, tempfile, time
+import collections, host_probe, json, os, processes, random, subprocess, sys, tempfile, time
 
 takt, root, args = sys.argv[1], sys.argv[2], sys.argv[3:]
 minutes = float(args[0]) if args else 30
@@ -60,12 +60,12 @@ with tempfile.TemporaryDirectory(prefix="endure-") as work:
                             "--record", f"{work}/record.mcap", "--record-port", "front_laser.scan", *options], stdout=log, stderr=log)
 
     def resident_mb():
-        """Proportional set size of all processes of the run."""
-        total = 0
+        """Proportional set size of each process of the run, by name."""
+        found = collections.Counter()
         for pid in processes.family(run.pid):
-            try: total += int(next(l for l in open(f"/proc/{pid}/smaps_rollup") if l.startswith("Pss:")).split()[1])
+            try: found[processes.name(pid)] += int(next(l for l in open(f"/proc/{pid}/smaps_rollup") if l.startswith("Pss:")).split()[1]) / 1024
             except (OSError, StopIteration): pass
-        return total / 1024
+        return found
 
     samples = []
     while run.poll() is None:
@@ -79,8 +79,9 @@ with tempfile.TemporaryDirectory(prefix="endure-") as work:
     traced = options[options.index("--trace") + 1] if "--trace" in options else None
     why = subprocess.run([takt, "explain", traced, "obstacle_stop"], capture_output=True, text=True).stdout if traced else ""
 tenth = max(1, len(samples) // 10)
-middle = lambda part: sorted(part)[len(part) // 2]
-early, late = middle(samples[tenth:2 * tenth] or samples), middle(samples[-tenth - 1:-1] or samples)
+middle = lambda part: sorted(part, key=lambda sample: sample.total())[len(part) // 2]
+before, after = middle(samples[tenth:2 * tenth] or samples), middle(samples[-tenth - 1:-1] or samples)
+early, late = before.total(), after.total()
 outages = [f for f in report["faults"] if f.get("kind") == "outage"]
 back = sorted(f["down_s"] for f in outages if f["back_s"] is not None)
 faults = report["scenario"]["faults"]
@@ -97,7 +98,7 @@ if len(outages) != len(back): bad.append("a process did not come back")
 if idle := [f"{f['kind']} {f['target']}" for f in faults if f["struck"] == 0]: bad.append(f"did not strike: {idle}")
 bad += [f"{row['what']}: expected {row['expected']}, observed {row['observed']}" for row in report["scenario"]["expectations"] if not row["met"]]
 if run.returncode not in (0, 1): bad.append(f"exit {run.returncode}")
-if not traced and late > 1.05 * early + 5: bad.append(f"memory grew from {early:.0f} to {late:.0f} MB")
+if not traced and late > 1.05 * early + 5: bad.append(f"memory grew from {early:.0f} to {late:.0f} MB: " + ", ".join(f"{name} {before[name]:.0f} to {after[name]:.0f}" for name in sorted(before | after)))
 for what in bad: print("FAILED:", what)
 sys.exit(bool(bad))
 PY

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "graph/attach/endpoint.hpp"
 
+#include <poll.h>
 #include <sys/socket.h>
 #include <sys/time.h>
 #include <unistd.h>
@@ -83,6 +84,12 @@ bool Connection::write(const nlohmann::ordered_json& line, const std::string& by
     sent += static_cast<size_t>(count);
   }
   return true;
+}
+
+bool Connection::readable(int wait_ms) const {
+  if (rest_.find('\n') != std::string::npos) return true;
+  pollfd wait{descriptor_, POLLIN, 0};
+  return poll(&wait, 1, wait_ms) > 0;
 }
 
 bool Connection::gone() const {

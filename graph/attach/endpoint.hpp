@@ -30,6 +30,8 @@ class Connection {
   std::optional<nlohmann::ordered_json> read_line();
   std::optional<std::string> read_bytes(size_t count);
   bool write(const nlohmann::ordered_json& line, const std::string& bytes = "");
+  /// True if a line may be there, or the end; waits for it so long.
+  bool readable(int wait_ms) const;
   /// True if the other side has gone. Does not wait.
   bool gone() const;
 

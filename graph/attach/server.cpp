@@ -14,6 +14,8 @@
 #include <system_error>
 #include <thread>
 
+#include "graph/attach/describe.hpp"
+#include "graph/attach/follow.hpp"
 #include "graph/attach/message_text.hpp"
 #include "graph/attach/parameters.hpp"
 #include "graph/compose/composition.hpp"
@@ -145,6 +147,8 @@ bool Server::answer(const Json& question, Connection& connection, uint32_t by_us
   const std::string what = question.value("do", "");
   if (what == "top") return connection.write(top());
   if (what == "echo") return echo(question, connection);
+  if (what == "describe") return connection.write(describe_json(subject_));
+  if (what == "follow") return Follow(subject_, taps_, connection).run(ending_), false;
   if (what == "mode") return connection.write(change_mode(question.value("mode", "")));
   if (what == "get") return connection.write(get(question.value("param", "")));
   if (what == "set")
@@ -161,8 +165,8 @@ bool Server::answer(const Json& question, Connection& connection, uint32_t by_us
     subject_.board.stop().raise(now_ns());
     return connection.write({{"ok", true}});
   }
-  return connection.write(
-      wrong("unknown question " + what + "; known: top, echo, get, set, forget, fault, mark, mode, stop"));
+  return connection.write(wrong("unknown question " + what +
+                                "; known: top, echo, describe, follow, get, set, forget, fault, mark, mode, stop"));
 }
 
 Json Server::mark(const std::string& words, uint32_t by_user) {
@@ -211,27 +215,15 @@ std::string Server::type_of(const std::string& node) const {
   return "";
 }
 
-size_t Server::find_port(const std::string& name) const {
-  for (size_t p = 0; p < subject_.plan.ports.size(); ++p)
-    if (subject_.plan.ports[p].node + "." + subject_.plan.ports[p].port == name) return p;
-  return kNone;
-}
-
 bool Server::echo(const Json& question, Connection& connection) {
-  const std::string name = question.value("port", "");
-  const size_t port = find_port(name);
-  if (port == kNone) {
-    std::vector<std::string> known;
-    for (const PortPlan& plan : subject_.plan.ports) known.push_back(plan.node + "." + plan.port);
-    return connection.write(wrong(fmt::format("there is no output {}{}", graph::ticked(name),
-                                              graph::alternatives(name, known, "outputs of this graph"))));
-  }
+  const auto port = find_port(subject_.plan, question.value("port", ""));
+  if (!port) return connection.write(wrong(port.error()));
   const std::string as = question.value("as", "");
   const Json count = question.value("count", Json(1));
   const Json items = question.value("items", Json(8U));
   if (!count.is_number_integer() || !items.is_number_unsigned())
     return connection.write(wrong("count and items have to be whole numbers"));
-  return stream(port, as, items.get<size_t>(), count.get<int64_t>(), connection);
+  return stream(*port, as, items.get<size_t>(), count.get<int64_t>(), connection);
 }
 
 bool Server::stream(size_t port, const std::string& as, size_t items, int64_t count, Connection& connection) {

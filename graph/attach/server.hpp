@@ -1,39 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include <unistd.h>
-
 #include <atomic>
-#include <functional>
 #include <list>
 #include <memory>
 #include <mutex>
 #include <string>
 
 #include "graph/attach/endpoint.hpp"
+#include "graph/attach/subject.hpp"
 #include "graph/attach/taps.hpp"
-#include "graph/language/graph.hpp"
-#include "graph/language/registry.hpp"
 #include "rt/own_thread.hpp"
-#include "rt/sched/run_board.hpp"
-#include "rt/shm/transport.hpp"
 
 namespace takt::attach {
 
-/// What a running graph lets others see and change. All of it outlives the server.
-struct Subject {
-  const Registry& registry;
-  const graph::GraphSpec& graph;
-  const Plan& plan;  ///< composed with at least one tap
-  RunBoard& board;
-  Transport& transport;
-  pid_t run = getpid();  ///< the process that stands for the run
-  /// What froze the ring of the run, a sentence each. Any thread.
-  std::function<std::vector<std::string>()> frozen = {};
-};
-
-/// Answers top, echo, get, set, forget, fault, mark, mode and stop for one run, from threads of the default policy that
-/// only read the board, hold one message of an output at a time while they copy it, and post parameters to be taken
-/// between jobs. Its own user and root are heard; of the service its group, too, where the mode of its folder says so.
+/// Answers top, echo, describe, follow, get, set, forget, fault, mark, mode and stop for one run, from threads of the
+/// default policy that only read the board, hold one message of an output at a time while they copy it, and post
+/// parameters to be taken between jobs. Its own user and root are heard; of the service its group, too, where the mode
+/// of its folder says so.
 class Server {
  public:
   explicit Server(const Subject& subject);
@@ -82,7 +65,6 @@ class Server {
   /// Why there is nothing to switch: unknown, or not simulated.
   nlohmann::ordered_json not_switchable(const std::string& device) const;
   nlohmann::ordered_json post_and_wait(size_t task, size_t param, const ParamValue& value, uint32_t by_user);
-  size_t find_port(const std::string& name) const;
   /// Of a node; "" of a device.
   std::string type_of(const std::string& node) const;
 

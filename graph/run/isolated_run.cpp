@@ -143,8 +143,9 @@ class IsolatedRun {
     const auto watch_of_stalls = watch_stalls(proofs_, plan_, clock_, board_);
     start();
     {
-      const attach::Server server(
-          {registry_, graph_, plan_, board_, *transport_, run, [this] { return record_.frozen(); }});
+      const attach::Server server({registry_, graph_, plan_, board_, *transport_, run,
+                                   [this] { return record_.frozen(); }, partition_.names,
+                                   process_of_tasks(plan_, partition_)});
       tell_attach(server, adjusted_);
       const LiveTable live(plan_, board_,
                            fmt::format("takt run {} ({}, policy {}, {} processes)", graph_.name, graph_.profile,

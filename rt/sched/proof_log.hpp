@@ -2,6 +2,8 @@
 // What was seen above its proof: plain data in the memory that the processes of a run share. A sample within its bound
 // costs one comparison.
 #pragma once
+#include <optional>
+
 #include "rt/sched/append_log.hpp"
 
 namespace takt {
@@ -50,6 +52,11 @@ class ProofBound {
     if (sample.observed_ns > bound_ns_.load(std::memory_order_relaxed)) note(sample, log);
   }
   uint64_t above() const { return above_.load(); }
+  /// Nothing: none is set.
+  std::optional<int64_t> bound_ns() const {
+    const int64_t bound_ns = bound_ns_.load(std::memory_order_relaxed);
+    return bound_ns < INT64_MAX ? std::optional(bound_ns) : std::nullopt;
+  }
 
  private:
   void note(const Excess& sample, ExcessLog& log) {

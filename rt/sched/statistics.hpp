@@ -20,6 +20,11 @@ inline void add(std::atomic<uint64_t>& counter, uint64_t by = 1) {
   counter.store(counter.load(std::memory_order_relaxed) + by, std::memory_order_relaxed);
 }
 
+/// Where one thread keeps the largest value, and the others only look.
+inline void keep_largest(std::atomic<int64_t>& largest, int64_t value) {
+  if (value > largest.load(std::memory_order_relaxed)) largest.store(value, std::memory_order_relaxed);
+}
+
 /// One finished job, for timelines.
 struct JobRecord {
   int64_t release_ns = 0, start_ns = 0, finish_ns = 0;
@@ -45,7 +50,7 @@ struct alignas(kCacheLine) TaskStatistics {
   std::atomic<uint64_t> lifted{0};   ///< jobs that went on beside a reservation that was used up; likewise
   std::array<std::atomic<uint64_t>, kMaxLevels> at_level{};  ///< jobs by quality level
   std::atomic<int32_t> last_level{0};
-  std::atomic<int64_t> last_exec_ns{0}, last_response_ns{0};
+  std::atomic<int64_t> last_exec_ns{0}, last_response_ns{0}, largest_response_ns{0};
   uint64_t allocations = 0, page_faults = 0;
   std::array<uint64_t, kJobCalls> rt_violations{};  ///< by JobCall: calls that no job should make, once it is warm
   int64_t cpu_ns = 0, preempted_ns = 0;
@@ -85,6 +90,7 @@ struct alignas(kCacheLine) EdgeStatistics {
 struct alignas(kCacheLine) PortStatistics {
   std::atomic<uint64_t> published{0};  ///< sequence of the newest message, stored before it is out
   Histogram age;                       ///< stamp of a message to the instant from which consumers may see it
+  std::atomic<int64_t> last_age_ns{0}, largest_age_ns{0};  ///< of these, for who looks on
   ProofBound age_bound;
   WriterStatistics writer;  ///< at the end of the run, before anything is torn down
 };

@@ -303,6 +303,7 @@ void Task::count_end() {
   statistics_.response_bound.compare(
       {Excess::response, static_cast<uint32_t>(index_), 0, ended_.published_ns, response}, board_.excesses());
   statistics_.last_response_ns.store(response, std::memory_order_relaxed);
+  keep_largest(statistics_.largest_response_ns, response);
   const bool over_budget = plan_.budget_ns > 0 && exec_ns > plan_.budget_ns;
   if (over_budget) add(statistics_.budget_overruns);
   if (over_budget) board_.overruns().append({static_cast<uint32_t>(index_), ended_.release_ns, end.finished_ns});
@@ -329,6 +330,8 @@ void Task::count_age(size_t port, int64_t visible_at_ns, int64_t stamp_ns) {
   PortStatistics& statistics = board_.port(port);
   const int64_t age_ns = visible_at_ns - stamp_ns;
   statistics.age.add(age_ns);
+  statistics.last_age_ns.store(age_ns, std::memory_order_relaxed);
+  keep_largest(statistics.largest_age_ns, age_ns);
   statistics.age_bound.compare({Excess::output_age, static_cast<uint32_t>(port), 0, visible_at_ns, age_ns},
                                board_.excesses());
 }

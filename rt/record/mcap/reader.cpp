@@ -11,6 +11,7 @@
 #include <cstring>
 #include <utility>
 
+#include "rt/memory/map_as_used.hpp"
 #include "rt/record/mcap/chunks.hpp"
 #include "rt/record/mcap/records.hpp"
 
@@ -55,7 +56,7 @@ tl::expected<Reader, std::string> Reader::open(const std::filesystem::path& file
   struct stat status {};
   void* memory = MAP_FAILED;
   if (fstat(descriptor, &status) == 0 && status.st_size > 0)
-    memory = mmap(nullptr, static_cast<size_t>(status.st_size), PROT_READ, MAP_PRIVATE, descriptor, 0);
+    memory = map_as_used(static_cast<size_t>(status.st_size), PROT_READ, MAP_PRIVATE, descriptor);
   close(descriptor);
   if (memory == MAP_FAILED) return tl::unexpected(file.string() + ": is empty or cannot be mapped");
   Reader reader(Bytes(static_cast<const std::byte*>(memory), static_cast<size_t>(status.st_size)), all);
