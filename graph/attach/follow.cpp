@@ -102,7 +102,10 @@ bool Follow::send_state(int64_t now) {
   if (state_every_ns_ == 0) return looks_.empty() ? !connection_.gone() : true;
   if (now < next_state_ns_) return true;
   next_state_ns_ = now + state_every_ns_;
-  return connection_.write({{"state", state_json(subject_)}, {"jobs", jobs_.take()}, {"events", events_.take()}});
+  return connection_.write({{"state", state_json(subject_)},
+                            {"epoch_ns", subject_.board.epoch_ns().load()},
+                            {"jobs", jobs_.take()},
+                            {"events", events_.take()}});
 }
 
 }  // namespace takt::attach

@@ -19,7 +19,7 @@ namespace takt::attach {
 /// and is sent the newest message of each such output, as a record packs it, and how the run stands:
 ///
 ///   {"message": "head_camera.pair", "sequence": 12, "stamp_ns": ..., "level": 0, "age_ms": 4.1, "bytes": 614437}
-///   {"state": {...}, "jobs": [...], "events": [...]}    {"error": "there is no output ..."}
+///   {"state": {...}, "epoch_ns": ..., "jobs": [...], "events": [...]}    {"error": "there is no output ..."}
 ///
 /// What he does not read within a second ends the connection. On a thread of its own, which holds no lock of a job.
 class Follow {
