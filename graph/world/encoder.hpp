@@ -77,7 +77,7 @@ Form log_form(int64_t at_ns, std::string_view name, std::string_view text);
 /// "NODE.PORT" and the topic of a form: "NODE.PORT.left", "/tf".
 std::string topic_of(std::string_view port, std::string_view form_topic);
 
-/// "takt_msgs/msg/LaserScan" of "laser_scan".
+/// "takt_msgs/msg/" and the name in the form that ROS 2 allows: of "laser_scan" it is "takt_msgs/msg/LaserScan".
 std::string own_schema(std::string_view type_name);
 
 /// The definition of a schema and of all that it uses, as ros2msg. `fields`: of the message's type, which decide what
