@@ -31,7 +31,10 @@ struct DisparityMap {
   ImageView<uint8_t> fraction_view() { return {fraction.data(), width, height}; }
   ImageView<const uint8_t> fraction_view() const { return {fraction.data(), width, height}; }
   bool sound() const { return image_fits(width, height, 1, disparity.capacity); }
-  void show(Viewer& to) const { to.disparity(view(), disparities); }
+  void show(Viewer& to) const {
+    to.disparity(view(), disparities);
+    if (camera.focal_px > 0) to.camera({camera, width, height});
+  }
   TAKT_FIELDS(DisparityMap, (width, "px"), (height, "px"), (disparities, "px"), (camera),
               (disparity, "px", capacity.pixels()), (confidence, "1", capacity.pixels()),
               (fraction, "1/64 px", capacity.pixels()))

@@ -29,7 +29,10 @@ struct Image {
   ImageView<uint8_t> view() { return {pixels.data(), width, height, channels}; }
   ImageView<const uint8_t> view() const { return {pixels.data(), width, height, channels}; }
   bool sound() const { return image_fits(width, height, channels, pixels.capacity); }
-  void show(Viewer& to) const { to.picture(view()); }
+  void show(Viewer& to) const {
+    to.picture(view());
+    if (camera.focal_px > 0) to.camera({camera, width, height});
+  }
   TAKT_FIELDS(Image, (width, "px"), (height, "px"), (channels, "1"), (health, ""), (camera),
               (pixels, "1", capacity.pixels() * capacity.channels))
 };
@@ -53,6 +56,9 @@ struct StereoPair {
   void show(Viewer& to) const {
     to.picture(left_view(), "left");
     to.picture(right_view(), "right");
+    if (!(camera.focal_px > 0)) return;
+    to.camera({camera, width, height}, "left");
+    to.camera({camera, width, height, camera.baseline_m}, "right");
   }
   TAKT_FIELDS(StereoPair, (width, "px"), (height, "px"), (channels, "1"), (health, ""), (frame_number, "1"), (camera),
               (sensor_in_robot), (left, "1", capacity.pixels() * capacity.channels),

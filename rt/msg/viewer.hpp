@@ -12,6 +12,7 @@
 #pragma once
 #include <cstdint>
 #include <span>
+#include <string>
 #include <string_view>
 
 #include "rt/msg/geometry.hpp"
@@ -34,6 +35,20 @@ class Viewer {
     double origin_x_m = 0, origin_y_m = 0;  ///< corner of cell (0, 0) in the robot frame
   };
 
+  /// How the pixels of a picture lie in space.
+  struct Camera {
+    CameraModel model;
+    int width = 0, height = 0;
+    double right_of_first_m = 0;  ///< of the second camera of a rectified pair: its baseline
+  };
+  /// An object, a person: something that has a place.
+  struct Thing {
+    std::string name;
+    Transform pose;                                     ///< the middle of its box
+    double length_m = 0, width_m = 0, height_m = 0;     ///< of the box, along x, y, z of its pose; 0: not known
+    double confidence = 1;                              ///< 0..1
+  };
+
   virtual ~Viewer() = default;
   /// Grey if it has one channel, BGR if three. `part` tells several pictures of a message apart: "left".
   virtual void picture(const ImageView<const uint8_t>&, std::string_view part = "") { static_cast<void>(part); }
@@ -48,6 +63,10 @@ class Viewer {
   virtual void text(std::string_view) {}
   /// Where the sensor sits on the robot.
   virtual void mounted(const Transform& sensor_in_robot) { static_cast<void>(sensor_in_robot); }
+  /// Of the picture that has the same `part`. Only said of rectified pictures.
+  virtual void camera(const Camera&, std::string_view part = "") { static_cast<void>(part); }
+  /// All things that the message is about, in a frame: "robot". Its fields say more of them.
+  virtual void things(std::span<const Thing>, std::string_view frame) { static_cast<void>(frame); }
 };
 
 }  // namespace takt

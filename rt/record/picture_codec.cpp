@@ -7,7 +7,6 @@
 #include <cstdint>
 #include <cstring>
 #include <memory>
-#include <utility>
 
 #include "rt/record/mcap/bytes.hpp"
 
@@ -16,7 +15,6 @@ namespace {
 
 using Bytes = std::span<const std::byte>;
 
-constexpr int kLargest = 65'500;  ///< width and height of a JPEG
 /// Pixels of one byte of a JPEG: 256 columns of 8 rows need 12 bits at least, so what claims more is damaged.
 constexpr uint64_t kMostPixels = 1024;
 
@@ -62,29 +60,10 @@ bool may_have_pictures(std::span<const Field> fields) {
   return std::any_of(fields.begin(), fields.end(), is_picture);
 }
 
-PictureCoder::PictureCoder(int quality) : quality_(quality) {}
-
-PictureCoder::PictureCoder(PictureCoder&& other) noexcept
-    : quality_(other.quality_),
-      compressor_(std::exchange(other.compressor_, nullptr)),
-      buffer_(std::exchange(other.buffer_, nullptr)),
-      room_(other.room_) {}
-
-PictureCoder::~PictureCoder() {
-  if (compressor_ != nullptr) tjDestroy(compressor_);
-  if (buffer_ != nullptr) tjFree(buffer_);
-}
-
 bool PictureCoder::append_jpeg(Bytes pixels, int width, int height, int channels, std::vector<std::byte>& to) {
-  if (compressor_ == nullptr) compressor_ = tjInitCompress();
-  const int sampling = channels == 1 ? TJSAMP_GRAY : quality_ < 90 ? TJSAMP_420 : TJSAMP_444;
-  unsigned long bytes = room_;
-  if (compressor_ == nullptr ||
-      tjCompress2(compressor_, plain(pixels), width, 0, height, channels == 1 ? TJPF_GRAY : TJPF_BGR, &buffer_, &bytes,
-                  sampling, quality_, 0) != 0)
-    return false;
-  room_ = std::max(room_, bytes);
-  append_counted(std::as_bytes(std::span(buffer_, bytes)), to);
+  const auto jpeg = compressor_.compress({plain(pixels), width, height, channels});
+  if (jpeg.empty()) return false;
+  append_counted(std::as_bytes(jpeg), to);
   return true;
 }
 
@@ -102,7 +81,7 @@ void PictureCoder::code(std::span<const Field> fields, Bytes packed, std::vector
     const auto count = static_cast<uint32_t>(number_at(packed, at));
     at += sizeof count;
     const uint64_t bytes = uint64_t{count} * field.element_bytes;
-    const bool fits = is_picture(field) && std::min(width, height) > 0 && std::max(width, height) <= kLargest &&
+    const bool fits = is_picture(field) && std::min(width, height) > 0 && std::max(width, height) <= kLargestJpeg &&
                       (channels == 1 || channels == 3) && int64_t{width} * height * channels == count;
     if (fits) {
       const size_t before = to.size();

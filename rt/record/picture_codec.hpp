@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "rt/msg/field.hpp"
+#include "rt/record/jpeg_compressor.hpp"
 
 namespace takt::record {
 
@@ -26,10 +27,7 @@ bool may_have_pictures(std::span<const Field> fields);
 class PictureCoder {
  public:
   /// `quality`: 1 to 100; colours have half the resolution below 90.
-  explicit PictureCoder(int quality);
-  ~PictureCoder();
-  PictureCoder(PictureCoder&& other) noexcept;
-  PictureCoder& operator=(PictureCoder&&) = delete;
+  explicit PictureCoder(int quality) : compressor_(quality) {}
 
   /// Appends what is kept of a packed message. What is no picture, or is none that fits, is kept as it is.
   void code(std::span<const Field> fields, std::span<const std::byte> packed, std::vector<std::byte>& to);
@@ -37,10 +35,7 @@ class PictureCoder {
  private:
   bool append_jpeg(std::span<const std::byte> pixels, int width, int height, int channels, std::vector<std::byte>& to);
 
-  int quality_;
-  void* compressor_ = nullptr;       ///< of libjpeg-turbo, made with the first picture
-  unsigned char* buffer_ = nullptr;  ///< its own
-  unsigned long room_ = 0;
+  JpegCompressor compressor_;
 };
 
 /// The packed message. Error: damaged.

@@ -1,12 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // Installed as <takt/ace/object_reports.hpp>: ace, experimental.
 #pragma once
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include "rt/msg/array.hpp"
 #include "rt/msg/field_list.hpp"
+#include "rt/msg/viewer.hpp"
 
 namespace takt {
 
@@ -36,6 +41,18 @@ struct ObjectReports {
   Array<ObjectName> names;
   Array<ObjectPlace> places;
   Array<ObjectAttribute> attributes;
+  void show(Viewer& to) const {
+    std::vector<Viewer::Thing> things;
+    for (uint32_t i = 0; i < std::min(names.size, places.size); ++i) {
+      const ObjectPlace& p = places[i];
+      const auto text = [](const char(&of)[32]) { return std::string(of, std::find(of, of + 32, '\0')); };
+      const std::string name = text(names[i].name), type = text(names[i].type);
+      things.push_back({name.empty() ? type : name + " (" + type + ")",
+                        {.x = p.x_m, .y = p.y_m, .z = p.z_m, .qw = std::cos(p.yaw_rad / 2), .qz = std::sin(p.yaw_rad / 2)},
+                        0, 0, 0, p.score});
+    }
+    to.things(things, in_map != 0 ? "map" : "robot");
+  }
   TAKT_FIELDS(ObjectReports, (in_map, ""), (names, ""), (places, ""), (attributes, "", 8 * capacity.count))
 };
 

@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // Installed as <takt/ace/objects_3d.hpp>: ace, experimental.
 #pragma once
+#include <cmath>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include "rt/msg/array.hpp"
 #include "rt/msg/field_list.hpp"
+#include "rt/msg/viewer.hpp"
 
 namespace takt {
 
@@ -33,6 +37,15 @@ struct Objects3d {
   uint8_t supported = 0;                               ///< 1: a support was found
   double support_a = 0, support_b = 0, support_m = 0;  ///< z = a x + b y + support_m, robot frame
   Array<Object3d> objects;                             ///< in the order of their seeds
+  /// Names are numbers of classes: their words are in the file that the classifier reads.
+  void show(Viewer& to) const {
+    std::vector<Viewer::Thing> things;
+    for (const Object3d& o : objects.items())
+      things.push_back({o.class_id >= 0 && o.class_id < 1e6f ? "class " + std::to_string(static_cast<int>(o.class_id)) : "unknown",
+                        {.x = o.x_m, .y = o.y_m, .z = o.z_m, .qw = std::cos(o.yaw_rad / 2), .qz = std::sin(o.yaw_rad / 2)},
+                        o.length_m, o.width_m, o.height_m, o.score});
+    to.things(things, "robot");
+  }
   TAKT_FIELDS(Objects3d, (searched, "1"), (supported, ""), (support_a, "1"), (support_b, "1"), (support_m, "m"),
               (objects, ""))
 };
