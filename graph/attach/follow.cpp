@@ -54,9 +54,12 @@ void Follow::run(const std::atomic<bool>& ending) {
 bool Follow::take_wish() {
   const auto wish = connection_.read_line();
   if (!wish || !wish->is_object()) return false;
+  for (const char* key : {"add", "drop"})
+    if (wish->contains(key) && !wish->at(key).is_string())
+      return connection_.write({{"error", fmt::format("{} names an output", key)}});
   if (wish->contains("add")) return add(*wish);
   if (wish->contains("drop")) {
-    if (const auto port = find_port(subject_.plan, wish->value("drop", ""))) looks_.erase(*port);
+    if (const auto port = find_port(subject_.plan, wish->at("drop"))) looks_.erase(*port);
     return true;
   }
   if (wish->contains("state_every_ms")) {
@@ -68,7 +71,7 @@ bool Follow::take_wish() {
 }
 
 bool Follow::add(const Json& wish) {
-  const auto port = find_port(subject_.plan, wish.value("add", ""));
+  const auto port = find_port(subject_.plan, wish.at("add"));
   if (!port) return connection_.write({{"error", port.error()}});
   Look& look = looks_[*port];
   if (!look.tap) look.tap = taps_.at(*port);

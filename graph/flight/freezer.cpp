@@ -59,6 +59,7 @@ std::vector<Frozen> Freezer::finish() {
   {
     const std::lock_guard lock(mutex_);
     ending_ = true;
+    end_by_ = std::chrono::steady_clock::now() + options_.patience;
     changed_.notify_one();
   }
   thread_.join();
@@ -86,8 +87,11 @@ void Freezer::work() {
     changed_.wait_for(lock, kLook, [&] { return ending_; });
     while (!waiting_.empty() && (ending_ || ready(waiting_.front()))) {
       Frozen frozen = waiting_.front();
+      const bool too_late = ending_ && std::chrono::steady_clock::now() >= end_by_;
       lock.unlock();
-      write(frozen);
+      if (too_late)
+        frozen.refused = fmt::format("it was not written within {} s of the run's end", options_.patience.count());
+      else write(frozen);
       lock.lock();
       frozen.more = waiting_.front().more;
       waiting_.pop_front();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <deque>
 #include <filesystem>
@@ -40,6 +41,7 @@ class Freezer {
     std::vector<std::vector<std::string>> edges;  ///< as of record::JoinOptions
     uint64_t most_bytes = 2'000'000'000;  ///< of all files of the folder, those of earlier runs, too; the oldest go
     size_t at_least = 20;                 ///< ... but the newest so many stay, whatever they take
+    std::chrono::seconds patience{30};    ///< finish() goes on writing so long; what is left then is not written
     std::function<Said(const Cause&, int64_t from_ns, int64_t to_ns)> say = {};  ///< on the freezer's thread
     std::function<void(const Frozen&)> told = {};  ///< called once for each, on the freezer's thread
   };
@@ -51,7 +53,7 @@ class Freezer {
 
   /// Any thread; takes as long as a lock.
   void freeze(Cause cause);
-  /// The rings hold all there will be: writes what is left and ends. Once.
+  /// The rings hold all there will be: writes what is left, as long as Options::patience says, and ends. Once.
   std::vector<Frozen> finish();
 
  private:
@@ -72,6 +74,7 @@ class Freezer {
   std::vector<Frozen> done_;
   size_t number_ = 0;
   bool ending_ = false;
+  std::chrono::steady_clock::time_point end_by_;  ///< once it is ending
   OwnThread thread_;
 };
 

@@ -66,8 +66,7 @@ Json service_json(size_t id) {
 
 class FoxgloveSession final : public Session {
  public:
-  FoxgloveSession(const Room& room, uint64_t number, bool may_change)
-      : Session(room, number), may_change_(may_change) {
+  FoxgloveSession(const Room& room, uint64_t number, bool may_change) : Session(room, number), may_change_(may_change) {
     send(Json{{"op", "serverInfo"},
               {"name", "takt"},
               {"capabilities", {"parameters", "parametersSubscribe", "services", "connectionGraph"}},
@@ -121,12 +120,13 @@ class FoxgloveSession final : public Session {
       auto at = subscriptions_.upper_bound(last_);
       if (at == subscriptions_.end()) at = subscriptions_.begin();
       last_ = at->first;
-      if (at->second.channel == 0) continue;
-      const auto shown = room().hub.newer(at->second.view, at->second.seen);
-      if (!shown || shown->parts.empty()) continue;
-      at->second.seen = shown->version;
-      const Hub::Part& part = shown->parts.front();
-      return Message{frame_of(message_data(at->first, part.stamp_ns, *part.frame)), true};
+      for (auto& [view, seen] : at->second.seen) {
+        const auto shown = room().hub.newer(view, seen);
+        if (!shown || shown->parts.empty()) continue;
+        seen = shown->version;
+        const Hub::Part& part = shown->parts.front();
+        return Message{frame_of(message_data(at->first, part.stamp_ns, *part.frame)), true};
+      }
     }
     return std::nullopt;
   }
@@ -136,16 +136,13 @@ class FoxgloveSession final : public Session {
 
  private:
   struct Subscription {
-    uint32_t channel = 0;  ///< 0: the events
-    View view;
-    uint64_t seen = 0;
+    uint32_t channel = 0;           ///< 0: the events
+    std::map<View, uint64_t> seen;  ///< of each that tells of it, the version that was sent
   };
 
-  void tell(int level, const std::string& text) {
-    send(Json{{"op", "status"}, {"level", level}, {"message", text}});
-  }
+  void tell(int level, const std::string& text) { send(Json{{"op", "status"}, {"level", level}, {"message", text}}); }
   void let_go(const Subscription& subscription) const {
-    if (subscription.channel != 0) room().hub.leave(subscription.view, kMostHz);
+    for (const auto& [view, seen] : subscription.seen) room().hub.leave(view, kMostHz);
   }
 
   void begin_graph() {
@@ -190,8 +187,10 @@ class FoxgloveSession final : public Session {
         continue;
       }
       const Channel& of = channels_[made.channel - 1];
-      made.view = {of.port, std::string(View::kCdr) + of.topic};
-      room().hub.look(made.view, kMostHz);
+      for (const std::string& port : of.ports) {
+        made.seen.emplace(cdr_view(port, of), 0);
+        room().hub.look(cdr_view(port, of), kMostHz);
+      }
     }
   }
 
@@ -209,8 +208,8 @@ class FoxgloveSession final : public Session {
     const int64_t at_ns = at.is_number() ? static_cast<int64_t>(at.get<double>() * 1e9) : 0;
     const world::Form form =
         world::log_form(at_ns, event.value("node", ""), event.value("kind", "") + ": " + event.value("text", ""));
-    send(frame_of(message_data(subscription, at_ns,
-                               {reinterpret_cast<const char*>(form.bytes.data()), form.bytes.size()})),
+    send(frame_of(
+             message_data(subscription, at_ns, {reinterpret_cast<const char*>(form.bytes.data()), form.bytes.size()})),
          true);
   }
 

@@ -22,8 +22,8 @@ class Gate {
   Gate(std::vector<std::string> hosts, int port) : hosts_(std::move(hosts)), port_(port) {}
   /// The header Host: "localhost:8765", "[::1]:8765". Empty: refused.
   bool host(std::string_view header) const;
-  /// The header Origin: "http://localhost:8765". Programs that are no browser send none: let in. Those of `origins` are,
-  /// too: Foxglove's.
+  /// The header Origin: "http://localhost:8765". Programs that are no browser send none: let in. Those of `origins`
+  /// are, too: Foxglove's.
   bool origin(std::string_view header) const;
   std::vector<std::string> origins = {};
 

@@ -30,17 +30,21 @@ using Frame = std::shared_ptr<const std::string>;
 
 inline Frame frame_of(std::string bytes) { return std::make_shared<const std::string>(std::move(bytes)); }
 
-/// An output, and how it is wanted: a `kind` of the page, or a topic of Foxglove behind `kCdr`.
+/// An output, and how it is wanted: a `kind` of the page, or what cdr_view() makes of a topic.
 struct View {
-  static constexpr std::string_view kCdr = "cdr:";
   std::string port, as;
   auto operator<=>(const View&) const = default;
 };
 
-/// A topic that Foxglove can subscribe.
+/// A topic that Foxglove can subscribe. Several outputs may tell of "/tf".
 struct Channel {
-  std::string port, topic, schema, definition;
+  std::vector<std::string> ports;
+  std::string topic, schema, definition;
 };
+
+inline View cdr_view(std::string port, const Channel& channel) {
+  return {std::move(port), "cdr " + channel.schema + " " + channel.topic};
+}
 
 class Hub {
  public:

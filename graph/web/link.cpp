@@ -6,10 +6,12 @@
 
 #include <algorithm>
 #include <chrono>
+#include <set>
 #include <thread>
 
 #include "graph/attach/message_text.hpp"
 #include "graph/web/page_frames.hpp"
+#include "graph/web/specimen.hpp"
 #include "graph/world/encoder.hpp"
 #include "rt/record/packed_message.hpp"
 #include "rt/time/clock.hpp"
@@ -21,6 +23,15 @@ constexpr int kLookMs = 20;
 constexpr auto kRetry = std::chrono::milliseconds(300);
 constexpr size_t kItems = 64;  ///< of an array, for views by value
 constexpr size_t kStack = 2 << 20;
+
+/// Several outputs tell of one topic: one channel.
+void add(Channel channel, std::vector<Channel>& channels) {
+  const auto twin = std::find_if(channels.begin(), channels.end(), [&](const Channel& other) {
+    return other.topic == channel.topic && other.schema == channel.schema;
+  });
+  if (twin == channels.end()) channels.push_back(std::move(channel));
+  else twin->ports.push_back(channel.ports.front());
+}
 
 double seconds(int64_t ns) { return static_cast<double>(ns) / 1e9; }
 
@@ -83,7 +94,7 @@ bool Link::describe(attach::Connection& connection) {
     port["shows"] = std::move(shows);
     port.erase("layout");
     const std::string name = port.value("name", "");
-    for (Channel& channel : channels_of(name, made)) channels.push_back(std::move(channel));
+    for (Channel& channel : channels_of(name, made)) add(std::move(channel), channels);
     ports_.emplace(name, std::move(made));
   }
   hub_.set_graph(std::move(*graph), std::move(channels));
@@ -108,14 +119,16 @@ Link::Port Link::port_of(const Json& port) const {
 std::vector<Channel> Link::channels_of(const std::string& name, const Port& port) const {
   std::vector<Channel> channels;
   if (port.type != nullptr && port.type->show != nullptr) {
-    port.type->place(port.memory.get(), port.capacity);
-    for (const world::Outline& outline : encoder_.outline(*port.type, port.memory.get()))
-      channels.push_back({name, world::topic_of(name, outline.topic), outline.schema,
+    const AlignedBytes message = specimen(*port.type, port.capacity);
+    for (const world::Outline& outline : encoder_.outline(*port.type, message.get()))
+      channels.push_back({{name},
+                          world::topic_of(name, outline.topic),
+                          outline.schema,
                           world::schema_text(outline.schema, port.recorded->fields())});
   }
   if (!channels.empty() || !port.recorded) return channels;
   const std::string schema = world::own_schema(port.recorded->name());
-  return {{name, name, schema, world::schema_text(schema, port.recorded->fields())}};
+  return {{{name}, name, schema, world::schema_text(schema, port.recorded->fields())}};
 }
 
 bool Link::tell_wishes(attach::Connection& connection) {
@@ -123,8 +136,7 @@ bool Link::tell_wishes(attach::Connection& connection) {
   if (wants == wants_) return true;
   wants_ = wants;
   std::map<std::string, double> most_hz;
-  for (const Hub::Want& want : hub_.wanted())
-    most_hz[want.view.port] = std::max(most_hz[want.view.port], want.most_hz);
+  for (const Hub::Want& want : hub_.wanted()) most_hz[want.view.port] = std::max(most_hz[want.view.port], want.most_hz);
   for (auto& [name, port] : ports_) {
     const auto wanted = most_hz.find(name);
     const double hz = wanted == most_hz.end() ? -1 : wanted->second;
@@ -166,26 +178,36 @@ void Link::show(const std::string& name, Port& port, const Json& line, const std
                       epoch_ns_,
                       line.value("level", 0),
                       static_cast<double>(MonotonicClock().now_ns() - stamp_ns) / 1e6};
+  bool topics = false;
   for (const Hub::Want& want : hub_.wanted()) {
     if (want.view.port != name) continue;
     if (want.view.as == "value") show_value(want.view, port, line, packed);
-    else if (want.view.as.starts_with(View::kCdr)) show_topic(want.view, port, fill(), stamp_ns, bytes);
+    else if (want.view.as.starts_with("cdr ")) topics = true;
     else if (fill()) hub_.put(want.view, page_frames(*port.type, port.memory.get(), want.view.as, origin));
   }
+  if (topics && port.recorded) show_topics(name, port, fill(), stamp_ns, bytes);
 }
 
-void Link::show_topic(const View& view, const Port& port, bool filled, int64_t stamp_ns,
-                      std::span<const std::byte> packed) {
-  const std::string topic = view.as.substr(View::kCdr.size());
+void Link::show_topics(const std::string& name, const Port& port, bool filled, int64_t stamp_ns,
+                       std::span<const std::byte> packed) {
+  std::set<std::string> wanted;
+  for (const Hub::Want& want : hub_.wanted())
+    if (want.view.port == name) wanted.insert(want.view.as);
   const auto put = [&](const world::Form& form) {
-    hub_.put(view, {{stamp_ns, frame_of({reinterpret_cast<const char*>(form.bytes.data()), form.bytes.size()})}});
+    const View view = cdr_view(name, {{}, world::topic_of(name, form.topic), form.schema, {}});
+    if (wanted.contains(view.as))
+      hub_.put(view, {{stamp_ns, frame_of({reinterpret_cast<const char*>(form.bytes.data()), form.bytes.size()})}});
   };
+  const auto ends_with_topic = [&](std::string_view behind) {
+    const std::string end = " " + world::topic_of(name, behind);
+    return std::any_of(wanted.begin(), wanted.end(), [&](const std::string& as) { return as.ends_with(end); });
+  };
+  const std::string node = name.substr(0, name.find('.'));
   if (filled && port.type->show != nullptr)
-    for (const world::Form& form :
-         encoder_.forms(*port.type, port.memory.get(), view.port.substr(0, view.port.find('.')), stamp_ns,
-                        [&](std::string_view behind) { return world::topic_of(view.port, behind) == topic; }))
-      return put(form);
-  if (topic != view.port || !port.recorded) return;
+    for (const world::Form& form : encoder_.forms(*port.type, port.memory.get(), node, stamp_ns, ends_with_topic))
+      put(form);
+  const View own = cdr_view(name, {{}, name, world::own_schema(port.recorded->name()), {}});
+  if (!wanted.contains(own.as)) return;
   if (const auto form = world::own_form(port.recorded->name(), port.recorded->fields(), packed, stamp_ns)) put(*form);
 }
 

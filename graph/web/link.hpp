@@ -52,7 +52,8 @@ class Link {
   bool take(attach::Connection& connection, const Json& line);
   void show(const std::string& name, Port& port, const Json& line, const std::string& packed);
   void show_value(const View& view, const Port& port, const Json& line, const std::string& packed);
-  void show_topic(const View& view, const Port& port, bool filled, int64_t stamp_ns, std::span<const std::byte> packed);
+  void show_topics(const std::string& name, const Port& port, bool filled, int64_t stamp_ns,
+                   std::span<const std::byte> packed);
   void take_state(const Json& line);
 
   Hub& hub_;

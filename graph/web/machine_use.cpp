@@ -62,10 +62,9 @@ Json MachineUse::look(const std::vector<int>& pids, int64_t now_ns) {
   const int64_t stalled_ms = stolen_ms();
   if (stalled_before_ms_ < 0) stalled_before_ms_ = stalled_ms;
   const double seconds = static_cast<double>(now_ns - looked_ns_) / 1e9;
-  Json use{{"cpu", looked_ns_ > 0 && seconds > 0
-                       ? Json(static_cast<double>(std::max<int64_t>(used, 0)) /
-                              static_cast<double>(sysconf(_SC_CLK_TCK)) / seconds)
-                       : Json(nullptr)},
+  Json use{{"cpu", looked_ns_ > 0 && seconds > 0 ? Json(static_cast<double>(std::max<int64_t>(used, 0)) /
+                                                        static_cast<double>(sysconf(_SC_CLK_TCK)) / seconds)
+                                                 : Json(nullptr)},
            {"memory_mb", static_cast<double>((own + shared) * sysconf(_SC_PAGESIZE)) / 1e6},
            {"host_stall_ms", stalled_ms - stalled_before_ms_}};
   cpu_ticks_ = std::move(ticks);

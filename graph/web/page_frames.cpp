@@ -6,7 +6,7 @@
 #include <span>
 
 #include "graph/web/jpeg.hpp"
-#include "rt/memory/aligned_bytes.hpp"
+#include "graph/web/specimen.hpp"
 #include "rt/msg/viewer.hpp"
 
 namespace takt::web {
@@ -64,8 +64,7 @@ class PageViewer final : public Viewer {
   void grid(const Cells& grid) override {
     if (!wants("grid")) return;
     std::string bytes;
-    for (int y = 0; y < grid.cells.height; ++y)
-      append(bytes, grid.cells.row(y), static_cast<size_t>(grid.cells.width));
+    for (int y = 0; y < grid.cells.height; ++y) append(bytes, grid.cells.row(y), static_cast<size_t>(grid.cells.width));
     add("",
         {{"width", grid.cells.width},
          {"height", grid.cells.height},
@@ -123,11 +122,9 @@ class PageViewer final : public Viewer {
 
 std::vector<std::string> kinds_of(const MessageType& type, const Capacity& capacity) {
   if (type.show == nullptr) return {};
-  const AlignedBytes memory = aligned_bytes(type.bytes(capacity));
-  type.place(memory.get(), capacity);
   const Origin nowhere;
   PageViewer viewer("", nowhere);
-  if (type.sound(memory.get())) type.show(memory.get(), viewer);
+  type.show(specimen(type, capacity).get(), viewer);
   return viewer.kinds;
 }
 

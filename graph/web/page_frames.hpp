@@ -19,7 +19,7 @@ struct Origin {
 };
 
 /// What messages of that type can be seen as, beside their fields: of "picture", "disparity", "cloud", "scan", "grid"
-/// and "pose". An empty message is asked.
+/// and "pose". A specimen is asked.
 std::vector<std::string> kinds_of(const MessageType& type, const Capacity& capacity);
 
 /// Frames of that kind; none: the message shows nothing of it. `message` is sound. Takes as long as a JPEG.

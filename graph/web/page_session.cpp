@@ -12,7 +12,7 @@ namespace takt::web {
 namespace {
 
 constexpr size_t kMostLooks = 64;
-constexpr double kMostHz = 60;
+constexpr double kScreenHz = 60;
 constexpr std::array<std::string_view, 7> kKinds{"picture", "disparity", "cloud", "scan", "grid", "pose", "value"};
 /// Questions that change the run.
 constexpr std::array<std::string_view, 5> kChanges{"set", "forget", "mode", "mark", "stop"};
@@ -23,9 +23,15 @@ bool among(const std::array<std::string_view, N>& words, std::string_view word) 
   return std::find(words.begin(), words.end(), word) != words.end();
 }
 
+/// Empty: there is none, or it is no text.
+std::string text(const Json& of, const char* key) {
+  const auto found = of.find(key);
+  return found != of.end() && found->is_string() ? found->get<std::string>() : "";
+}
+
 bool changes(const Json& question) {
-  const std::string what = question.value("do", "");
-  return among(kChanges, what) || (what == "fault" && !question.value("fault", "").empty());
+  const std::string what = text(question, "do");
+  return among(kChanges, what) || (what == "fault" && question.contains("fault"));
 }
 
 class PageSession final : public Session {
@@ -83,13 +89,14 @@ class PageSession final : public Session {
     return std::nullopt;
   }
   void tell_dropped(uint64_t count) override {
-    send(Json{{"op", "events"},
-              {"events", Json::array({{{"at_s", nullptr},
-                                       {"kind", "log"},
-                                       {"node", ""},
-                                       {"text", std::to_string(count) +
-                                                    " messages of the server were dropped: this browser was too "
-                                                    "slow"}}})}});
+    send(Json{
+        {"op", "events"},
+        {"events",
+         Json::array({{{"at_s", nullptr},
+                       {"kind", "log"},
+                       {"node", ""},
+                       {"text", std::to_string(count) + " messages of the server were dropped: this browser was too "
+                                                        "slow"}}})}});
   }
 
  private:
@@ -98,10 +105,6 @@ class PageSession final : public Session {
     uint64_t seen = 0;
   };
 
-  static std::string text(const Json& of, const char* key) {
-    const auto found = of.find(key);
-    return found != of.end() && found->is_string() ? found->get<std::string>() : "";
-  }
   bool may_look() const { return may_change_ || !room().token_to_look; }
 
   void greet() {
@@ -116,8 +119,7 @@ class PageSession final : public Session {
       return;
     }
     send(Json{{"op", "hello"}, {"may_change", may_change_}, {"graph", graph}});
-    if (const Json events = room().hub.events(); !events.empty())
-      send(Json{{"op", "events"}, {"events", events}});
+    if (const Json events = room().hub.events(); !events.empty()) send(Json{{"op", "events"}, {"events", events}});
   }
 
   void take_token(const std::string& token) {
@@ -128,9 +130,9 @@ class PageSession final : public Session {
   void look_at(const Json& said) {
     const View view{text(said, "port"), text(said, "as")};
     if (!may_look() || !among(kKinds, view.as) || looks_.size() >= kMostLooks || looks_.contains(view)) return;
-    const Json hz = said.value("most_hz", Json(kMostHz));
+    const Json hz = said.value("most_hz", Json(kScreenHz));
     Look& look = looks_[view];
-    look.most_hz = hz.is_number() ? std::clamp(hz.get<double>(), 0.1, kMostHz) : kMostHz;
+    look.most_hz = hz.is_number() ? std::clamp(hz.get<double>(), 0.1, kScreenHz) : kScreenHz;
     room().hub.look(view, look.most_hz);
   }
 

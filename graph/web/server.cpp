@@ -42,8 +42,7 @@ class Server::Inside {
   Inside(Hub& hub, Ask ask, const ServerOptions& options, Gate gate)
       : gate_(std::move(gate)),
         asking_(std::move(ask), [this] { wake(); }),
-        room_{hub, options.token, options.token_to_look,
-              [this](uint64_t session, Json question, Asking::Then then) {
+        room_{hub, options.token, options.token_to_look, [this](uint64_t session, Json question, Asking::Then then) {
                 asking_.ask(session, std::move(question), std::move(then));
               }} {
     lws_set_log_level(LLL_ERR, nullptr);
@@ -119,11 +118,16 @@ class Server::Inside {
     }
   }
 
+  static int refuse(lws* connection, unsigned status, const char* why) {
+    return lws_return_http_status(connection, status, why) != 0 || lws_http_transaction_completed(connection) != 0 ? -1
+                                                                                                                   : 0;
+  }
+
   int answer_http(lws* connection, std::string_view path) {
     if (!gate_.host(header_of(connection, WSI_TOKEN_HOST)))
-      return lws_return_http_status(connection, HTTP_STATUS_FORBIDDEN, "not under this name");
+      return refuse(connection, HTTP_STATUS_FORBIDDEN, "not under this name");
     const PageFile* file = page_file(path);
-    if (file == nullptr) return lws_return_http_status(connection, HTTP_STATUS_NOT_FOUND, "there is no such page");
+    if (file == nullptr) return refuse(connection, HTTP_STATUS_NOT_FOUND, "there is no such page");
     std::array<unsigned char, LWS_PRE + 2048> buffer{};
     unsigned char *begin = buffer.data() + LWS_PRE, *at = begin, *end = buffer.data() + buffer.size();
     if (lws_add_http_common_headers(connection, HTTP_STATUS_OK, file->type, file->bytes.size(), &at, end) != 0 ||
@@ -179,7 +183,11 @@ class Server::Inside {
     incoming += bytes;
     if (lws_is_final_fragment(connection) == 0 || lws_remaining_packet_payload(connection) > 0) return true;
     const std::string message = std::exchange(incoming, "");
-    if (!peer->second.session->receive(message, lws_frame_is_binary(connection) != 0)) return false;
+    try {
+      if (!peer->second.session->receive(message, lws_frame_is_binary(connection) != 0)) return false;
+    } catch (const Json::exception&) {  // a member of another kind than the protocol has
+      return false;
+    }
     lws_callback_on_writable(connection);
     return true;
   }

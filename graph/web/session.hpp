@@ -16,7 +16,7 @@ namespace takt::web {
 /// What every session uses. Outlives them.
 struct Room {
   Hub& hub;
-  std::string token;     ///< lets change the run
+  std::string token;           ///< lets change the run
   bool token_to_look = false;  ///< looking needs it, too
   /// Asks the run without waiting; `then` is called later, on the server's thread, unless the session has ended.
   std::function<void(uint64_t session, Json question, std::function<void(Json answer)> then)> ask;

@@ -217,6 +217,28 @@ TEST_CASE("Each cause of its own has its file, and the newest files stay") {
   CHECK(files() == 4);
 }
 
+TEST_CASE("A run that ends with much to write does not wait for it for ever, and says what is missing") {
+  const test::TemporaryFolder folder;
+  auto ring = record::Ring::open(folder.path / "ring", "run", {});
+  REQUIRE(ring);
+  Freezer::Options how;
+  how.folder = folder.path / "frozen";
+  how.name = "run";
+  how.patience = std::chrono::seconds(0);
+  how.after_ns = 1'000'000'000;
+  std::vector<std::string> told;
+  how.told = [&](const Frozen& frozen) { told.push_back(frozen.refused); };
+  Freezer freezer(**ring, nullptr, how);
+  for (const char* node : {"a", "b", "c"}) freezer.freeze({"miss", node, "", 5'000'000'000});
+  const std::vector<Frozen> all = freezer.finish();
+  REQUIRE(all.size() == 3);
+  for (const Frozen& frozen : all) {
+    CHECK(frozen.file.empty());
+    CHECK(frozen.refused == "it was not written within 0 s of the run's end");
+  }
+  CHECK(told.size() == 3);
+}
+
 TEST_CASE("What a killed run left is rescued, as far as it was written") {
   const test::TemporaryFolder folder;
   test::SmallGraph small;
