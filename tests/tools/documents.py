@@ -18,7 +18,7 @@ import subprocess
 import sys
 
 kind, source = sys.argv[1], pathlib.Path(sys.argv[2])
-documents = sorted(path for path in source.rglob("*.md") if not {"build", "out"} & set(path.relative_to(source).parts))
+documents = sorted(path for path in source.rglob("*.md") if not {"build", "out", "node_modules"} & set(path.relative_to(source).parts))
 mistakes = []
 
 

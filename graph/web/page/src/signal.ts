@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+// A list of listeners. `on` returns the function that takes the listener off again.
+export class Signal<T = void> {
+  private readonly listeners = new Set<(value: T) => void>();
+
+  on(listener: (value: T) => void): () => void {
+    this.listeners.add(listener);
+    return () => this.listeners.delete(listener);
+  }
+
+  emit(value: T): void {
+    for (const listener of [...this.listeners]) listener(value);
+  }
+}
