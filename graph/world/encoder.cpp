@@ -52,8 +52,8 @@ Form own(std::string_view type_name, std::span<const Field> fields, int64_t stam
 }
 
 /// The definitions that need no fields.
-using WellKnown = std::tuple<CompressedImage, RawImage, CameraCalibration, CloudOfPoints, Scan, GridOfCells, PoseInFrame,
-                             PosesInFrame, FrameTransform, FrameTransforms, Log, SceneUpdate>;
+using WellKnown = std::tuple<CompressedImage, RawImage, CameraCalibration, CloudOfPoints, Scan, GridOfCells,
+                             PoseInFrame, PosesInFrame, FrameTransform, FrameTransforms, Log, SceneUpdate>;
 
 template <class... S>
 std::string well_known(std::string_view schema, const std::tuple<S...>*) {

@@ -58,8 +58,8 @@ class Encoder {
   std::vector<Form> forms(const MessageType& type, const void* message, std::string_view node, int64_t stamp_ns,
                           const Wanted& wanted = {}) const;
 
-  /// Topics and schemas of what forms() would give for this message, at no cost to speak of: what there is to subscribe.
-  /// An empty message may show less than a full one.
+  /// Topics and schemas of what forms() would give for this message, at no cost to speak of: what there is to
+  /// subscribe. An empty message may show less than a full one.
   std::vector<Outline> outline(const MessageType& type, const void* message) const;
 
  private:
