@@ -210,9 +210,8 @@ void add_log(CLI::App& app, const Registry& registry, LogOptions& o, int& exit_c
   reads_file(exported->add_option("file", o.file, "a record"), UINT64_MAX)->required();
   writes_file(exported->add_option("-o,--output", o.output, "the file to write"))->required();
   exported
-      ->add_option(
-          "--encoding", o.encoding,
-          "json: pictures raw; cdr, as ROS 2 has it (schemas as ros2msg): pictures as JPEG, a tenth of the size")
+      ->add_option("--encoding", o.encoding,
+                   "json, with raw pictures; or cdr, the bytes of ROS 2 with ros2msg schemas, with pictures as JPEG")
       ->check(CLI::IsMember({"json", "cdr"}))
       ->capture_default_str();
   CLI::App* cut = log->add_subcommand("cut", "a shorter record: the jobs of some seconds and what they held");
