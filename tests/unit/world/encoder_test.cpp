@@ -223,7 +223,10 @@ TEST_CASE("A scan, where its sensor sits, a pose, a text") {
   CHECK(log["message"] == "hi");
   CHECK(log["name"] == "eye");
   CHECK(log["level"] == 2);
-  CHECK(read(log_form(kStamp_ns, "cruise", "started"), "Log")["name"] == "cruise");
+  CHECK(read(log_form(kStamp_ns, "cruise", "started"), "Log")["level"] == 2);
+  const Json lost = read(log_form(kStamp_ns, "cruise", "lost", LogLevel::error), "Log");
+  CHECK(lost["name"] == "cruise");
+  CHECK(lost["level"] == 4);
 }
 
 TEST_CASE("A cloud has 16 bytes a point, white where it has no colour; a grid its cells") {
