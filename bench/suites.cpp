@@ -29,6 +29,7 @@ std::vector<Row> run_semantic(const Options&);
 std::vector<Row> run_semantic_link(const Options&);
 std::vector<Row> run_ground(const Options&);
 std::vector<Row> run_fusion(const Options&);
+std::vector<Row> run_world(const Options&);
 
 std::span<const Suite> suites() {
   static const auto list = std::to_array<Suite>({
@@ -56,6 +57,8 @@ std::span<const Suite> suites() {
       {"semantic_link", "a scan to a client elsewhere, over UDP and D-Bus; against a bare socket", run_semantic_link},
       {"ground", "the ground map at 640x480: stages against brute force and OpenCV, a whole image", run_ground},
       {"fusion", "median fusion of depth images against its plain definition; a cloud's way into the map", run_fusion},
+      {"world", "messages as CDR for other programs: JPEG against bare libjpeg-turbo, a cloud against a copy",
+       run_world},
   });
   return list;
 }

@@ -103,7 +103,9 @@ int log_export(const Registry& registry, const LogOptions& options) {
     if (!log) return kBadInput;
     NewLog made;
     if (const int code = make(options.output, made); code != kOk) return code;
-    const auto exported = log::export_log(*log, graph::message_types(registry), *made.sink);
+    const auto exported =
+        log::export_log(*log, graph::message_types(registry),
+                        options.encoding == "cdr" ? log::cdr_encoding() : log::json_encoding(), *made.sink);
     if (!exported) return refuse(options.output.string() + ": " + exported.error(), kBadInput);
     if (exported->messages + exported->hash_only == 0)
       return whole(options, refuse(options.file.string() + ": has no message to be exported", kNotOk), {&*log});
@@ -116,6 +118,9 @@ int log_export(const Registry& registry, const LogOptions& options) {
     if (exported->hash_only > 0)
       std::printf("%llu messages were recorded by their hash only; record them whole with --record-port\n",
                   static_cast<unsigned long long>(exported->hash_only));
+    if (exported->showed_nothing > 0)
+      std::printf("%llu messages show nothing, such as a picture without pixels, and were left out\n",
+                  static_cast<unsigned long long>(exported->showed_nothing));
     if (!exported->own_fields.empty())
       std::printf("by their own fields, as Foxglove has no schema for them: %s\n",
                   fmt::format("{}", fmt::join(exported->own_fields, ", ")).c_str());
@@ -201,9 +206,14 @@ void add_log(CLI::App& app, const Registry& registry, LogOptions& o, int& exit_c
   echo->add_option("--items", o.items, "of longer arrays so many elements (default 8)");
   echo->footer("Example: takt log echo run.mcap base.odometry");
   echo->callback([&] { exit_code = log_echo(o); });
-  CLI::App* exported = log->add_subcommand("export", "as MCAP with JSON in Foxglove's schemas");
+  CLI::App* exported = log->add_subcommand("export", "as MCAP in Foxglove's schemas, with JSON or CDR");
   reads_file(exported->add_option("file", o.file, "a record"), UINT64_MAX)->required();
   writes_file(exported->add_option("-o,--output", o.output, "the file to write"))->required();
+  exported
+      ->add_option("--encoding", o.encoding,
+                   "json, with raw pictures; or cdr, the bytes of ROS 2 with ros2msg schemas, with pictures as JPEG")
+      ->check(CLI::IsMember({"json", "cdr"}))
+      ->capture_default_str();
   CLI::App* cut = log->add_subcommand("cut", "a shorter record: the jobs of some seconds and what they held");
   reads_file(cut->add_option("file", o.file, "a record"), UINT64_MAX)->required();
   writes_file(cut->add_option("-o,--output", o.output, "the file to write"))->required();
@@ -221,7 +231,7 @@ void add_log(CLI::App& app, const Registry& registry, LogOptions& o, int& exit_c
   add_log_serve(*log, o.serve, exit_code);
   for (CLI::App* command : {info, diff, echo, exported, cut})
     command->add_flag("--allow-damage", o.allow_damage, "a record that is damaged or cut off is no failure");
-  exported->footer("Example: takt log export run.mcap -o foxglove.mcap");
+  exported->footer("Example: takt log export run.mcap -o foxglove.mcap --encoding cdr");
   exported->callback([&] { exit_code = log_export(registry, o); });
 }
 

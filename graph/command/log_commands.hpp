@@ -15,6 +15,7 @@ namespace takt::command {
 /// there was nothing to be compared, written or shown.
 struct LogOptions {
   std::filesystem::path file, other, output;
+  std::string encoding = "json";  ///< of an export: json, cdr
   bool json = false, allow_damage = false;
   std::vector<std::string> ports;
   size_t items = 8;
@@ -28,9 +29,9 @@ int log_info(const LogOptions& options);
 /// `takt log diff A B`. Exit 0 if they hold the same, 1 if not, 2 if one is no record.
 int log_diff(const LogOptions& options);
 
-/// `takt log export FILE -o OUT`: for programs that know Foxglove's schemas; types of the registry as they
-/// show themselves. Exit 0, 1 if some messages cannot be read,
-/// 2 if FILE is no record or OUT cannot be written.
+/// `takt log export FILE -o OUT [--encoding json|cdr]`: for programs that know Foxglove's schemas; types of the
+/// registry as they show themselves. Exit 0, 1 if some messages cannot be read, 2 if FILE is no record or OUT cannot be
+/// written.
 int log_export(const Registry& registry, const LogOptions& options);
 
 /// `takt log cut FILE -o OUT [--from S] [--to S]`: a shorter record that can be replayed. Exit 0, 2 as above.

@@ -9,7 +9,8 @@ namespace takt::world {
 static_assert(std::endian::native == std::endian::little, "numbers are written as they lie in memory");
 
 CdrWriter::CdrWriter(std::span<std::byte> to) : to_(to) {
-  constexpr std::byte header[kHeaderBytes]{std::byte{0}, std::byte{1}, std::byte{0}, std::byte{0}};  // CDR_LE, no options
+  constexpr std::byte header[kHeaderBytes]{std::byte{0}, std::byte{1}, std::byte{0},
+                                           std::byte{0}};  // CDR_LE, no options
   numbers(header, kHeaderBytes, 1);
 }
 

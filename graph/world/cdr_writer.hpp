@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Plain CDR, little-endian, as DDS and ROS 2 write a message (XCDR version 1): a header of four bytes, then values, each
-// aligned to its own size as counted from behind the header.
+// Plain CDR, little-endian, as DDS and ROS 2 write a message (XCDR version 1): a header of four bytes, then values,
+// each aligned to its own size as counted from behind the header.
 //
 //   CdrWriter counted({});                       // writes nothing: how many bytes are needed
 //   write(counted, message);

@@ -52,8 +52,8 @@ Form own(std::string_view type_name, std::span<const Field> fields, int64_t stam
 }
 
 /// The definitions that need no fields.
-using WellKnown = std::tuple<CompressedImage, RawImage, CameraCalibration, CloudOfPoints, Scan, GridOfCells, PoseInFrame,
-                             PosesInFrame, FrameTransform, FrameTransforms, Log, SceneUpdate>;
+using WellKnown = std::tuple<CompressedImage, RawImage, CameraCalibration, CloudOfPoints, Scan, GridOfCells,
+                             PoseInFrame, PosesInFrame, FrameTransform, FrameTransforms, Log, SceneUpdate>;
 
 template <class... S>
 std::string well_known(std::string_view schema, const std::tuple<S...>*) {
@@ -109,8 +109,9 @@ tl::expected<Form, std::string> own_form(std::string_view type_name, std::span<c
              [&](const Field& field) { return pieces[static_cast<size_t>(&field - fields.data())]; });
 }
 
-Form log_form(int64_t at_ns, std::string_view name, std::string_view text) {
-  return {"", full_name(Log::schema_name), encoded(Log{time_of(at_ns), kInfo, text, name, "", 0})};
+Form log_form(int64_t at_ns, std::string_view name, std::string_view text, LogLevel level) {
+  return {"", full_name(Log::schema_name),
+          encoded(Log{time_of(at_ns), static_cast<uint8_t>(level), text, name, "", 0})};
 }
 
 std::string topic_of(std::string_view port, std::string_view form_topic) {

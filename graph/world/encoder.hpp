@@ -58,8 +58,8 @@ class Encoder {
   std::vector<Form> forms(const MessageType& type, const void* message, std::string_view node, int64_t stamp_ns,
                           const Wanted& wanted = {}) const;
 
-  /// Topics and schemas of what forms() would give for this message, at no cost to speak of: what there is to subscribe.
-  /// An empty message may show less than a full one.
+  /// Topics and schemas of what forms() would give for this message, at no cost to speak of: what there is to
+  /// subscribe. An empty message may show less than a full one.
   std::vector<Outline> outline(const MessageType& type, const void* message) const;
 
  private:
@@ -71,8 +71,10 @@ Form own_form(const MessageType& type, const void* message, int64_t stamp_ns);
 /// The same of a message as a record holds it (rt/record/packed_message.hpp). Error: it is cut off or too long.
 tl::expected<Form, std::string> own_form(std::string_view type_name, std::span<const Field> fields,
                                          std::span<const std::byte> packed, int64_t stamp_ns);
-/// A line of a log: an event, a text. Topic "".
-Form log_form(int64_t at_ns, std::string_view name, std::string_view text);
+/// As Foxglove's schema numbers them.
+enum class LogLevel : uint8_t { debug = 1, info, warning, error, fatal };
+/// A line of a log: an event, a text. Topic "". `name`: the node that it is about.
+Form log_form(int64_t at_ns, std::string_view name, std::string_view text, LogLevel level = LogLevel::info);
 
 /// "NODE.PORT" and the topic of a form: "NODE.PORT.left", "/tf".
 std::string topic_of(std::string_view port, std::string_view form_topic);

@@ -36,8 +36,10 @@ std::string_view scalar_name(Scalar scalar) {
 std::string comment(const Field& field) {
   std::string text(field.unit);
   const size_t scalars = field.element_bytes / scalar_bytes(field.scalar);
-  if (field.is_array() && scalars > 1) text += (text.empty() ? "" : ", ") + std::to_string(scalars) + " for each element";
-  std::replace_if(text.begin(), text.end(), [](char c) { return static_cast<unsigned char>(c) < ' '; }, ' ');
+  if (field.is_array() && scalars > 1)
+    text += (text.empty() ? "" : ", ") + std::to_string(scalars) + " for each element";
+  std::replace_if(
+      text.begin(), text.end(), [](char c) { return static_cast<unsigned char>(c) < ' '; }, ' ');
   return text.empty() ? "" : "  # " + text;
 }
 
@@ -83,8 +85,7 @@ std::vector<std::string> legal_names(std::span<const Field> fields) {
 std::string own_definition(std::span<const Field> fields) {
   const std::vector<std::string> names = legal_names(fields);
   std::string text = type_text<Time>() + " timestamp\n";
-  for (size_t i = 0; i < fields.size(); ++i)
-    text += field_type(fields[i]) + " " + names[i] + comment(fields[i]) + "\n";
+  for (size_t i = 0; i < fields.size(); ++i) text += field_type(fields[i]) + " " + names[i] + comment(fields[i]) + "\n";
   std::vector<std::string_view> named{"takt_msgs"};
   detail::add_used<Time>(named, text);
   return text;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// SceneUpdate: things in space, with all that Foxglove's schema has, since a definition without it would be another one.
+// SceneUpdate: things in space, with all that Foxglove's schema has, since a definition without it would be another
+// one.
 #pragma once
 #include "graph/world/schemas.hpp"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A schema is a struct whose members are listed once. Both its definition and its bytes are made from that list, so they
-// cannot disagree:
+// A schema is a struct whose members are listed once. Both its definition and its bytes are made from that list, so
+// they cannot disagree:
 //
 //   struct Quaternion {
 //     double x = 0, y = 0, z = 0, w = 1;
@@ -39,8 +39,8 @@ struct Member {
 #define TAKT_SCHEMA_MEMBER(S, member) \
   ::takt::world::Member { #member, &S::member }
 /// `schema`: "package/Name". Members have the names that the schema gives them.
-#define TAKT_SCHEMA(S, schema, ...)                                                                            \
-  static constexpr std::string_view schema_name = schema;                                                      \
+#define TAKT_SCHEMA(S, schema, ...)                       \
+  static constexpr std::string_view schema_name = schema; \
   static constexpr auto members() { return std::tuple{TAKT_FOR_EACH(TAKT_SCHEMA_MEMBER, S, __VA_ARGS__)}; }
 
 template <class T>
@@ -79,7 +79,8 @@ constexpr std::string_view number_name() {
   if constexpr (std::is_same_v<T, bool>) return "bool";
   else if constexpr (std::is_floating_point_v<T>) return sizeof(T) == 4 ? "float32" : "float64";
   else {
-    constexpr std::string_view names[2][4]{{"uint8", "uint16", "uint32", "uint64"}, {"int8", "int16", "int32", "int64"}};
+    constexpr std::string_view names[2][4]{{"uint8", "uint16", "uint32", "uint64"},
+                                           {"int8", "int16", "int32", "int64"}};
     return names[std::is_signed_v<T> ? 1 : 0][sizeof(T) == 1 ? 0 : sizeof(T) == 2 ? 1 : sizeof(T) == 4 ? 2 : 3];
   }
 }
@@ -105,7 +106,8 @@ template <class T>
 void write(CdrWriter& to, const T& value) {
   if constexpr (std::is_arithmetic_v<T>) to.number(value);
   else if constexpr (std::is_same_v<T, std::string_view>) to.text(value);
-  else if constexpr (Schema<T>) for_each_member(value, [&](std::string_view, const auto& member) { write(to, member); });
+  else if constexpr (Schema<T>)
+    for_each_member(value, [&](std::string_view, const auto& member) { write(to, member); });
   else if constexpr (detail::Fixed<T>::value) to.numbers(value.data(), value.size(), sizeof value[0]);
   else if constexpr (Packed<T>) {
     to.count(value.size());

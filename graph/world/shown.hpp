@@ -50,10 +50,9 @@ class Shown final : public Viewer {
     if (std::min(map.width, map.height) > 0) raw_image(map, "16UC1", "", "disparity");
   }
   void cloud(std::span<const Point> points, std::span<const Colour> colours) override {
-    static constexpr PackedElementField kFields[]{{"x", 0, Numeric::f32},     {"y", 4, Numeric::f32},
-                                                  {"z", 8, Numeric::f32},     {"red", 12, Numeric::u8},
-                                                  {"green", 13, Numeric::u8}, {"blue", 14, Numeric::u8},
-                                                  {"alpha", 15, Numeric::u8}};
+    static constexpr PackedElementField kFields[]{
+        {"x", 0, Numeric::f32},     {"y", 4, Numeric::f32},    {"z", 8, Numeric::f32},    {"red", 12, Numeric::u8},
+        {"green", 13, Numeric::u8}, {"blue", 14, Numeric::u8}, {"alpha", 15, Numeric::u8}};
     whole_ = true;
     show("", "cloud", [&] {
       return CloudOfPoints{time_, node_, {}, PackedPoints::kStride, kFields, {points, colours}};
@@ -63,7 +62,7 @@ class Shown final : public Viewer {
     whole_ = true;
     const auto steps = static_cast<double>(scan.range_m.empty() ? 0 : scan.range_m.size() - 1);
     show("", "scan", [&] {
-      return world::Scan{time_, node_, {}, scan.first_angle_rad, scan.first_angle_rad + steps * scan.step_rad,
+      return world::Scan{time_,          node_, {}, scan.first_angle_rad, scan.first_angle_rad + steps * scan.step_rad,
                          {scan.range_m}, {}};
     });
   }

@@ -44,9 +44,9 @@ class Viewer {
   /// An object, a person: something that has a place.
   struct Thing {
     std::string name;
-    Transform pose;                                     ///< the middle of its box
-    double length_m = 0, width_m = 0, height_m = 0;     ///< of the box, along x, y, z of its pose; 0: not known
-    double confidence = 1;                              ///< 0..1
+    Transform pose;                                  ///< the middle of its box
+    double length_m = 0, width_m = 0, height_m = 0;  ///< of the box, along x, y, z of its pose; 0: not known
+    double confidence = 1;                           ///< 0..1
   };
 
   virtual ~Viewer() = default;

@@ -47,9 +47,13 @@ struct ObjectReports {
       const ObjectPlace& p = places[i];
       const auto text = [](const char(&of)[32]) { return std::string(of, std::find(of, of + 32, '\0')); };
       const std::string name = text(names[i].name), type = text(names[i].type);
-      things.push_back({name.empty() ? type : name + " (" + type + ")",
-                        {.x = p.x_m, .y = p.y_m, .z = p.z_m, .qw = std::cos(p.yaw_rad / 2), .qz = std::sin(p.yaw_rad / 2)},
-                        0, 0, 0, p.score});
+      things.push_back(
+          {name.empty() ? type : name + " (" + type + ")",
+           {.x = p.x_m, .y = p.y_m, .z = p.z_m, .qw = std::cos(p.yaw_rad / 2), .qz = std::sin(p.yaw_rad / 2)},
+           0,
+           0,
+           0,
+           p.score});
     }
     to.things(things, in_map != 0 ? "map" : "robot");
   }

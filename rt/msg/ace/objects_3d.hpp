@@ -41,9 +41,13 @@ struct Objects3d {
   void show(Viewer& to) const {
     std::vector<Viewer::Thing> things;
     for (const Object3d& o : objects.items())
-      things.push_back({o.class_id >= 0 && o.class_id < 1e6f ? "class " + std::to_string(static_cast<int>(o.class_id)) : "unknown",
-                        {.x = o.x_m, .y = o.y_m, .z = o.z_m, .qw = std::cos(o.yaw_rad / 2), .qz = std::sin(o.yaw_rad / 2)},
-                        o.length_m, o.width_m, o.height_m, o.score});
+      things.push_back(
+          {o.class_id >= 0 && o.class_id < 1e6f ? "class " + std::to_string(static_cast<int>(o.class_id)) : "unknown",
+           {.x = o.x_m, .y = o.y_m, .z = o.z_m, .qw = std::cos(o.yaw_rad / 2), .qz = std::sin(o.yaw_rad / 2)},
+           o.length_m,
+           o.width_m,
+           o.height_m,
+           o.score});
     to.things(things, "robot");
   }
   TAKT_FIELDS(Objects3d, (searched, "1"), (supported, ""), (support_a, "1"), (support_b, "1"), (support_m, "m"),

@@ -101,7 +101,7 @@ TEST_CASE("Events are exported as log lines") {
   Restarted run(kTwoKills);
   auto sink = mcap::FileSink::open(run.folder.path / "export.mcap");
   REQUIRE(sink);
-  REQUIRE(export_log(*run.log, test::known_types(), *sink));
+  REQUIRE(export_log(*run.log, test::known_types(), json_encoding(), *sink));
   const auto reader = mcap::Reader::open(run.folder.path / "export.mcap");
   REQUIRE(reader);
   std::vector<std::string> lines;

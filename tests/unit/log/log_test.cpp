@@ -103,7 +103,7 @@ TEST_CASE("An export has every whole message in JSON, with a schema") {
   Made made({}, {.ports = test::with_fields({1, 1, 0})});
   auto sink = mcap::FileSink::open(made.folder.path / "export.mcap");
   REQUIRE(sink);
-  const auto exported = export_log(*made.log, test::known_types(), *sink);
+  const auto exported = export_log(*made.log, test::known_types(), json_encoding(), *sink);
   REQUIRE(exported);
   CHECK(exported->messages == 77 + 30);
   CHECK(exported->hash_only == 30);
@@ -141,7 +141,7 @@ TEST_CASE("A record without its plan cannot be exported") {
   auto log = record::LogFile::open(folder.path / "run.mcap");
   REQUIRE(log);
   auto out = mcap::FileSink::open(folder.path / "export.mcap");
-  const auto exported = export_log(*log, test::known_types(), *out);
+  const auto exported = export_log(*log, test::known_types(), json_encoding(), *out);
   REQUIRE_FALSE(exported);
   CHECK(exported.error() == "the record does not hold its plan");
 }

@@ -84,7 +84,7 @@ struct WheelRun {
   Exported exported() {
     auto sink = mcap::FileSink::open(folder.path / "export.mcap");
     REQUIRE(sink);
-    const auto done = export_log(*log, test::known_types(), *sink);
+    const auto done = export_log(*log, test::known_types(), json_encoding(), *sink);
     REQUIRE_MESSAGE(done, done.error());
     return *done;
   }

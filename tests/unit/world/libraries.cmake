@@ -1,0 +1,3 @@
+# SPDX-License-Identifier: Apache-2.0
+set(ROOM_TEST_LIBRARIES nlohmann_json::nlohmann_json)
+set(ROOM_THREADS TRUE)
