@@ -4,7 +4,7 @@ export CCACHE_MAXSIZE=4G
 # What the change is compared with; without a commit before it, all is new.
 base=$(git rev-parse --verify -q "${TAKT_CI_BASE:-HEAD~1}" || git hash-object -t tree /dev/null)
 # What a commit's run needs of the Release build.
-commit_targets=(takt takt-eval takt-tools takt-bench takt_nodes_tests)
+commit_targets=(takt takt-eval takt-tools takt-web takt-bench takt_nodes_tests)
 
 usage() {
   echo "ci: $1" >&2

@@ -85,7 +85,10 @@ file(RELATIVE_PATH lib_from_libexec ${CMAKE_INSTALL_FULL_LIBEXECDIR}/takt ${CMAK
 # A program with capabilities of its own (setcap) ignores $ORIGIN: it finds the library where the prefix was to be.
 set_target_properties(takt PROPERTIES INSTALL_RPATH "$ORIGIN/${lib_from_bin};${CMAKE_INSTALL_FULL_LIBDIR}")
 install(TARGETS takt RUNTIME OPTIONAL)
-foreach(program takt-eval takt-tools takt-bench)
+foreach(program takt-eval takt-tools takt-bench takt-web)
+  if(NOT TARGET ${program})
+    continue()  # its library is not there
+  endif()
   set_target_properties(${program} PROPERTIES INSTALL_RPATH "$ORIGIN/${lib_from_libexec};${CMAKE_INSTALL_FULL_LIBDIR}")
 endforeach()
 set_target_properties(takt_iceoryx PROPERTIES INSTALL_RPATH "$ORIGIN")

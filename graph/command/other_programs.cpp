@@ -24,6 +24,7 @@ constexpr DeskCommand kDeskCommands[] = {
     {"objects", "the database of known objects: what is in it, learning, tuning", "takt-tools"},
     {"terrain", "kinds of terrain that ground_map tells apart", "takt-tools"},
     {"train", "learns what nodes look for", "takt-tools"},
+    {"web", "shows a running graph in a browser and to Foxglove", "takt-web"},
 };
 
 std::vector<std::filesystem::path> program_folders() {

@@ -5,9 +5,9 @@
 #include <cstring>
 #include <span>
 
-#include "graph/web/jpeg.hpp"
 #include "graph/web/specimen.hpp"
 #include "rt/msg/viewer.hpp"
+#include "rt/record/jpeg_compressor.hpp"
 
 namespace takt::web {
 namespace {
@@ -17,6 +17,13 @@ constexpr size_t kMostPoints = 30'000;  ///< of a cloud: more is not seen, and i
 template <class T>
 void append(std::string& bytes, const T* from, size_t count) {
   bytes.append(reinterpret_cast<const char*>(from), count * sizeof(T));
+}
+
+/// As a file; empty: it is no picture that JPEG can hold.
+std::string jpeg_of(const ImageView<const uint8_t>& image) {
+  thread_local record::JpegCompressor compressor(75);
+  const auto file = compressor.compress(image);
+  return {reinterpret_cast<const char*>(file.data()), file.size()};
 }
 
 /// Makes frames of one kind, or (kind "") only notes which kinds there are.
