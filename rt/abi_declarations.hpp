@@ -2,4 +2,4 @@
 // Installed as <takt/abi_declarations.hpp>: core, stable.
 // Written by `tests/tools/api.py . --write`: a hash of all public headers.
 #pragma once
-#define TAKT_ABI_DECLARATIONS "949e1cefcdf2"
+#define TAKT_ABI_DECLARATIONS "fb893630cb71"
