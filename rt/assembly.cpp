@@ -63,10 +63,10 @@ struct Assembly::Inside {
     Setup setup{clock, directories[t], std::filesystem::current_path(), t, task.rate, task.offset_ns};
     try {
       task.node->setup(setup);
+      task.node->end_setup();
     } catch (const SetupError& problem) {
       throw SetupError(task.name + ": " + problem.what());
     }
-    for (ParamBase* param : task.node->params()) param->end_setup();
     for (size_t o = 0; o < task.ports.size(); ++o)
       plan.ports[task.ports[o]].capacity = task.node->outputs()[o]->capacity();
   }

@@ -2,6 +2,8 @@
 #include "rt/node.hpp"
 
 #include <algorithm>
+#include <exception>
+#include <utility>
 
 #include "rt/msg/node_state.hpp"
 #include "rt/msg/requests.hpp"
@@ -66,6 +68,29 @@ Levels::Levels(Node* owner, std::initializer_list<QualityLevel> levels) {
     if (!(level->cost > 0) || !(level->cost < (level - 1)->cost))
       throw std::logic_error("quality level " + std::string(level->name) + " must cost less than the one before it");
   owner->levels_ = levels;
+}
+
+void Node::end_setup() {
+  std::vector<ParamBase*> read;
+  for (ParamBase* param : params_)
+    if (std::exchange(param->used_, false)) read.push_back(param);
+  changed();
+  for (ParamBase* param : params_) param->live_ = param->fixed().empty();
+  for (ParamBase* param : read) param->live_ = param->live_ && param->used_;
+}
+
+tl::expected<void, std::string> Node::change(size_t index, const ParamValue& value) {
+  ParamBase& param = *params_[index];
+  const ParamValue before = param.value();
+  if (auto done = param.set(value); !done) return done;
+  try {
+    changed();
+  } catch (const std::exception& problem) {
+    static_cast<void>(param.set(before));  // it had that value
+    changed();
+    return tl::unexpected(std::string(problem.what()));
+  }
+  return {};
 }
 
 void Node::accept_requests() {

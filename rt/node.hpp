@@ -273,14 +273,29 @@ class Node {
   virtual void start(int64_t epoch_ns) { static_cast<void>(epoch_ns); }
   /// One job. No allocation, lock, file or socket call, logging or exception in here.
   virtual void run(Job& job) = 0;
-  /// What the node carries from one job to the next (rt/state_archive.hpp); nothing, if it is declared with nothing in it. Saved
-  /// behind a job every few seconds of a run that is recorded, and loaded where a replay begins in the middle: after
-  /// start(), without allocating while it saves. A node that does not declare this begins there as after a restart.
+  /// Makes anew what setup() made of parameters, and keeps all else; reads each such parameter, which makes it live:
+  ///
+  ///   void setup(Setup&) override { limits_ = Limits(speed_, turn_); }
+  ///   void changed() override { limits_ = Limits(speed_, turn_); }
+  ///
+  /// Called once after setup(), then when a value was set: between two jobs, on the thread of these. It takes no memory
+  /// (a parameter that is a text may), and its time is part of the next job. What it throws says why the values do not
+  /// go together: the new one is refused, and it is called again with the one before.
+  virtual void changed() {}
+  /// What the node carries from one job to the next (rt/state_archive.hpp); nothing, if it is declared with nothing in
+  /// it. Saved behind a job every few seconds of a run that is recorded, and loaded where a replay begins in the
+  /// middle: after start(), without allocating while it saves. A node that does not declare this begins there as after
+  /// a restart.
   virtual void remember(StateArchive& state) { state.fail(); }
   /// CPU time that threads of the node have taken beside its jobs, ns; asked after the last job.
   virtual int64_t helper_cpu_ns() const { return 0; }
   /// After the last job, on the main thread. Files may be written.
   virtual void finish() {}
+
+  /// After setup(): calls changed(), and finds out which parameters are live. Throws what changed() does.
+  void end_setup();
+  /// Sets parameter `index` of params() between two jobs; or says why not, and all is as before.
+  tl::expected<void, std::string> change(size_t index, const ParamValue& value);
 
   /// Gives the node its last input, `control`: requests to stop, start or pace it, which the runtime obeys.
   void accept_requests();
@@ -351,7 +366,8 @@ class NodeTypes {
               auto node = std::make_unique<T>();
               node->accept_requests();
               if constexpr (requires { &T::remember; })
-                if constexpr (!std::is_same_v<decltype(&T::remember), void (Node::*)(StateArchive&)>) node->declare_state();
+                if constexpr (!std::is_same_v<decltype(&T::remember), void (Node::*)(StateArchive&)>)
+                  node->declare_state();
               return node;
             }});
   }

@@ -47,8 +47,8 @@ tl::expected<T, std::string> convert(const ParamValue& value) {
 
 }  // namespace
 
-ParamBase::ParamBase(Node* owner, std::string_view name, std::string_view unit, std::string_view doc)
-    : name_(name), unit_(unit), doc_(doc) {
+ParamBase::ParamBase(Node* owner, std::string_view name, std::string_view unit, std::string_view doc, Fixed fixed)
+    : name_(name), unit_(unit), doc_(doc), fixed_(fixed.why.empty() && unit == kPath ? kReadAtStart.why : fixed.why) {
   owner->params_.push_back(this);
 }
 
@@ -60,6 +60,12 @@ tl::expected<void, std::string> Param<T>::set(const ParamValue& value) {
     return tl::make_unexpected("is " + text_of(*converted) + ", must lie in " + range_text());
   value_ = std::move(*converted);
   return {};
+}
+
+template <class T>
+ParamValue Param<T>::value() const {
+  if constexpr (std::is_same_v<T, int>) return int64_t{value_};
+  else return value_;
 }
 
 template <class T>
@@ -86,8 +92,8 @@ template class Param<bool>;
 template class Param<std::string>;
 
 Choice::Choice(Node* owner, std::string_view name, std::string_view value, std::vector<std::string_view> words,
-               std::string_view doc)
-    : ParamBase(owner, name, "", doc), words_(std::move(words)) {
+               std::string_view doc, Fixed fixed)
+    : ParamBase(owner, name, "", doc, fixed), words_(std::move(words)) {
   if (!set(std::string(value))) throw std::logic_error("default of a choice is not among its words");
 }
 

@@ -88,6 +88,7 @@ bool run(Node& node, uint64_t index) {
 void set_up(Node& node, const std::filesystem::path& output) {
   Setup setup{standing_clock, ".", output, 0, std::nullopt, 0};
   node.setup(setup);
+  node.end_setup();
 }
 
 void NodeRun::before_start(std::string_view what) const {
@@ -95,9 +96,13 @@ void NodeRun::before_start(std::string_view what) const {
 }
 
 void NodeRun::set(std::string_view name, const ParamValue& value) {
-  if (started_ && !named(node_->params(), "parameter", name).live())
-    throw std::logic_error(std::string(name) + " is read in setup(): set it before the first job");
-  test::set(*node_, name, value);
+  if (!started_) return test::set(*node_, name, value);
+  const ParamBase& param = named(node_->params(), "parameter", name);
+  if (!param.live())
+    throw std::logic_error(std::string(name) +
+                           " is fixed, or setup() reads it and changed() does not: set it before the first job");
+  if (const auto done = node_->change(place_of(node_->params(), &param), value); !done)
+    throw std::logic_error(std::string(name) + " " + done.error());
 }
 
 void NodeRun::connect(std::string_view name, const Capacity& capacity) {
@@ -139,7 +144,7 @@ void NodeRun::start() {
     if (read(port)) PortAccess::mark_read(*port);
   Setup setup{clock_, read_, write_, seed_, rate_, 0};
   node_->setup(setup);
-  for (ParamBase* param : node_->params()) param->end_setup();
+  node_->end_setup();
   for (OutputPort* port : node_->outputs()) {
     outputs_.push_back(std::make_unique<ChunkWriter>(*port, read(port)));
     outputs_.back()->refuses = true;

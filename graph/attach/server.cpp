@@ -343,6 +343,7 @@ Json Server::set_one(const std::string& name, const Wish& wish) {
     ParamBase& param = *shell->params()[p];
     keys.emplace_back(param.name());
     if (param.name() != key) continue;
+    if (!param.fixed().empty()) return wrong(fmt::format("parameter {} {}", graph::ticked(name), fixed_text(param)));
     const auto value = graph::parse_param(param, wish.text);
     const auto fits = value ? param.set(*value) : tl::make_unexpected(value.error());
     if (!fits) return wrong(fmt::format("parameter {} {}", graph::ticked(name), fits.error()));

@@ -53,7 +53,7 @@ std::string nodes_text(const NodeTypes& types) {
 
 std::string node_text(const NodeType& type) {
   const std::unique_ptr<Node> node = type.make();
-  std::vector<Row> ports, params{row("parameter", "default", "unit", "valid", "meaning")};
+  std::vector<Row> ports, params{row("parameter", "default", "unit", "valid", "in a run", "meaning")};
   for (const InputPort* input : node->inputs())
     ports.push_back(row("in", input->name(), input->type().name,
                         fmt::format("{}{}", input->doc(), input->need() == Need::optional ? " (optional)" : "")));
@@ -66,7 +66,8 @@ std::string node_text(const NodeType& type) {
         row(fmt::format("level {}", l), level.name, fmt::format("{:g} of the CPU time", level.cost), level.doc));
   }
   for (const ParamBase* param : node->params())
-    params.push_back(row(param->name(), param->value_text(), param->unit(), param->range_text(), param->doc()));
+    params.push_back(row(param->name(), param->value_text(), param->unit(), param->range_text(),
+                         param->fixed().empty() ? "live" : param->fixed(), param->doc()));
   return fmt::format("{} ({} layer): {}\n", type.name, to_string(type.layer), type.doc) + columns(ports) +
          (params.size() > 1 ? columns(params) : "");
 }

@@ -67,6 +67,7 @@ void give_setup(Node& node, const TaskPlan& task, size_t t, const GraphSpec& gra
   const Told told(registry, at, task.name);
   Setup setup{clock, graph.directory, options.output, options.seed + t, task.rate, task.offset_ns};
   node.setup(setup);
+  node.end_setup();
   if (node.state() != nullptr) node.size_state();
 }
 
@@ -302,7 +303,6 @@ class Composer {
       sound = sound && (capacity || input == task.node->control());
     }
     if (sound) sound = call_setup(t, error);
-    for (ParamBase* param : task.node->params()) param->end_setup();
     if (options_.exchange != nullptr) {
       for (const size_t port : task.ports) {
         const OutputPort& output = output_of(result_.plan.ports[port]);
@@ -356,7 +356,6 @@ std::unique_ptr<Node> make_again(const GraphSpec& graph, const Registry& registr
     if (const InputPort& before = *task.node->inputs()[i]; before.connected())
       PortAccess::connect(*node->inputs()[i], before.capacity());
   give_setup(*node, task, t, graph, clock, options, registry, spec->position);
-  for (ParamBase* param : node->params()) param->end_setup();
   return node;
 }
 

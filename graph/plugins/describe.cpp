@@ -82,6 +82,7 @@ class Writer {
 
   static Json described(ParamBase& param, const std::string& type) {
     Json json{{"name", param.name()}, {"unit", param.unit()}, {"doc", param.doc()}, {"kind", param.kind()}};
+    if (!param.fixed().empty()) json["fixed"] = param.fixed();
     const std::string range = param.range_text();
     const size_t dots = range.find("..");
     if (const auto* whole = dynamic_cast<const Param<int>*>(&param)) {

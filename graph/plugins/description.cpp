@@ -82,14 +82,17 @@ class DescribedNode final : public Described<Node> {
     if (kind == "text") return param(json, value.get<std::string>());
     std::vector<std::string_view> words;
     for (const Json& word : json.at("words")) words.push_back(word.get_ref<const std::string&>());
-    return std::make_unique<Choice>(this, text(json, "name"), text(json, "value"), std::move(words), text(json, "doc"));
+    return std::make_unique<Choice>(this, text(json, "name"), text(json, "value"), std::move(words), text(json, "doc"),
+                                    fixed(json));
   }
 
   template <class T, class... Ranges>
   std::unique_ptr<ParamBase> param(const Json& json, T value, Ranges... range) {
     return std::make_unique<Param<T>>(this, text(json, "name"), std::move(value), range..., text(json, "unit"),
-                                      text(json, "doc"));
+                                      text(json, "doc"), fixed(json));
   }
+
+  static Fixed fixed(const Json& json) { return json.contains("fixed") ? Fixed{text(json, "fixed")} : Fixed{}; }
 
   std::vector<std::unique_ptr<ParamBase>> params_;
 };

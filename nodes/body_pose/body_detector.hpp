@@ -36,6 +36,14 @@ class BodyDetector {
     bodies_.reserve(static_cast<size_t>(parameters.segmentation.candidates));
   }
 
+  /// From the next run() on, but for what Segmentation::tune() leaves as it was.
+  void tune(const DetectorParameters& parameters) {
+    segmentation_.tune(parameters.segmentation);
+    fitter_.tune(parameters.fit);
+    p_ = parameters;
+    p_.segmentation = segmentation_.parameters();
+  }
+
   /// Bodies, nearest first, as seen from `eye`. Asks may_go_on() before each rotation of each candidate; when that says
   /// no, candidates that were not reached are left out.
   template <class MayGoOn>

@@ -19,19 +19,9 @@ using namespace body_pose;
 class BodyPoseNode final : public Node {
  public:
   void setup(Setup& setup) override {
-    DetectorParameters p;
-    p.segmentation.range_m = range_max_;
-    p.segmentation.voxel_m = voxel_;
-    p.segmentation.floor_m = floor_;
-    p.segmentation.candidates = candidates_;
-    p.fit.rotations = rotations_;
-    p.fit.search_m = search_;
-    p.fit.weight_away = facing_;
-    p.error_max = error_max_;
-    p.links_min = links_min_;
     const uint32_t capacity = cloud_.capacity().count;
     try {
-      detector_.emplace(read_skeleton(setup.directory / skeleton_()), p, capacity);
+      detector_.emplace(read_skeleton(setup.directory / skeleton_()), parameters(), capacity);
     } catch (const SkeletonError& error) {
       throw SetupError(error.what());
     } catch (const std::invalid_argument& problem) {
@@ -40,6 +30,8 @@ class BodyPoseNode final : public Node {
     in_robot_.resize(capacity);
     bodies_.reserve({0, 0, 1, static_cast<uint32_t>(candidates_())});
   }
+
+  void changed() override { detector_->tune(parameters()); }
 
   void run(Job& job) override {
     const PointCloud* cloud = cloud_.newest();
@@ -59,6 +51,20 @@ class BodyPoseNode final : public Node {
   void remember(StateArchive&) override {}
 
  private:
+  DetectorParameters parameters() const {
+    DetectorParameters p;
+    p.segmentation.range_m = range_max_;
+    p.segmentation.voxel_m = voxel_;
+    p.segmentation.floor_m = floor_;
+    p.segmentation.candidates = candidates_;
+    p.fit.rotations = rotations_;
+    p.fit.search_m = search_;
+    p.fit.weight_away = facing_;
+    p.error_max = error_max_;
+    p.links_min = links_min_;
+    return p;
+  }
+
   /// What the cloud says; where it says nothing, what the floor in it says.
   static std::optional<Transform> mount_of(const PointCloud& cloud) {
     const Transform& t = cloud.sensor_in_robot;
@@ -78,10 +84,10 @@ class BodyPoseNode final : public Node {
   Input<PointCloud> cloud_{this, "cloud", "points in the camera frame; the newest one is searched, once"};
   Output<BodyPoses> bodies_{this, "bodies", "people and their joints in the robot frame, nearest first"};
   Param<std::string> skeleton_{this, "skeleton", "skeletons/human.txt", kPath, "what a body is made of"};
-  Param<double> range_max_{this, "range_max", 5.0, {1.0, 10.0}, "m", "farther points are left out"};
+  Param<double> range_max_{this, "range_max", 5.0, {1.0, 10.0}, "m", "farther points are left out", kSizesMemory};
   Param<double> voxel_{this, "voxel", 0.03, {0.01, 0.1}, "m", "the cloud is reduced to one point a voxel"};
   Param<double> floor_{this, "floor", 0.08, {0.0, 0.5}, "m", "lower points are floor"};
-  Param<int> candidates_{this, "candidates", 16, {1, 64}, "", "clusters that are looked at, at most"};
+  Param<int> candidates_{this, "candidates", 16, {1, 64}, "", "clusters that are looked at, at most", kSizesMemory};
   Param<int> rotations_{this, "rotations", 11, {1, 36}, "", "of each typical pose about the vertical"};
   Param<double> search_{this,        "search", DetectorParameters{}.fit.search_m,
                         {0.05, 1.0}, "m",      "a link ends at most so far from where a typical pose has it"};

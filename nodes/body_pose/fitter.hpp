@@ -17,6 +17,8 @@ class Fitter {
  public:
   /// Takes the memory for clusters of up to `most_points`; fit() allocates nothing.
   Fitter(const Skeleton& skeleton, const FitParameters& parameters, size_t most_points);
+  /// From the next fit() on.
+  void tune(const FitParameters& parameters) { p_ = parameters; }
 
   /// The best pose at the best rotation. Asks may_go_on() before each rotation but the first; when that says no, the
   /// best so far, with the share that was tried. At most most_points points.

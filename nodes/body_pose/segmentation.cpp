@@ -68,6 +68,15 @@ Segmentation::Segmentation(size_t capacity, const SegmentationParameters& p)
   candidates_.reserve(static_cast<size_t>(p.candidates));
 }
 
+void Segmentation::tune(SegmentationParameters parameters) {
+  parameters.range_m = p_.range_m;
+  parameters.ceiling_m = p_.ceiling_m;
+  parameters.grow_m = p_.grow_m;
+  parameters.points_max = p_.points_max;
+  parameters.candidates = p_.candidates;
+  p_ = parameters;
+}
+
 std::span<const Candidate> Segmentation::run(std::span<const Point> points) {
   reduce(points);
   sort();

@@ -51,6 +51,8 @@ class Segmentation {
  public:
   /// Takes the memory for clouds of up to `capacity` points (about 200 B a point); run() allocates nothing.
   Segmentation(size_t capacity, const SegmentationParameters& parameters);
+  /// From the next run() on; range_m, ceiling_m, grow_m, points_max and candidates stay as they were.
+  void tune(SegmentationParameters parameters);
 
   /// Nearest to the origin first.
   std::span<const Candidate> run(std::span<const Point> points);

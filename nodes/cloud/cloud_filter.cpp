@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "nodes/cloud/cloud_filter.hpp"
 
+#include <stdexcept>
+#include <string>
+
 namespace takt::cloud {
 
 std::string_view to_string(Step step) {
@@ -21,14 +24,22 @@ CloudFilter::CloudFilter(size_t capacity, const FilterSteps& steps) : steps_(ste
   if (wants(Step::interpolate) || wants(Step::smooth) || wants(Step::reduce)) grid_.emplace(capacity);
 }
 
-bool CloudFilter::wants(Step step) const {
+void CloudFilter::tune(const FilterSteps& steps) {
+  for (const Step step : {Step::outliers, Step::interpolate, Step::smooth, Step::reduce})
+    if (wants(steps, step) && (step == Step::outliers ? !outliers_ : !grid_))
+      throw std::invalid_argument("no memory was taken for the step " + std::string(to_string(step)) +
+                                  ": it was off at the start; start with it");
+  steps_ = steps;
+}
+
+bool CloudFilter::wants(const FilterSteps& steps, Step step) {
   switch (step) {
-    case Step::outliers: return steps_.outliers.radius_m > 0;
-    case Step::interpolate: return steps_.interpolate.edge_m > 0;
-    case Step::smooth: return steps_.smooth.edge_m > 0;
+    case Step::outliers: return steps.outliers.radius_m > 0;
+    case Step::interpolate: return steps.interpolate.edge_m > 0;
+    case Step::smooth: return steps.smooth.edge_m > 0;
     case Step::reduce: break;
   }
-  return steps_.reduce_edge_m > 0;
+  return steps.reduce_edge_m > 0;
 }
 
 size_t CloudFilter::run(Step step, CloudBuffer& cloud) {

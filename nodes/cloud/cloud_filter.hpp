@@ -36,6 +36,8 @@ class CloudFilter {
   /// Takes the memory for clouds of up to `capacity` points: what the steps need, 26 B a point for outliers and 85 for
   /// the others together. run() allocates nothing. Throws std::invalid_argument as VoxelGrid does.
   CloudFilter(size_t capacity, const FilterSteps& steps);
+  /// From the next run() on. Throws std::invalid_argument if a step is wanted that memory was not taken for.
+  void tune(const FilterSteps& steps);
 
   /// Calls told(const StepResult&) after each step. A step that makes points may fill the buffer: what it lost stands
   /// there. cloud.capacity() is at most that of the filter.
@@ -49,7 +51,8 @@ class CloudFilter {
   }
 
  private:
-  bool wants(Step step) const;
+  static bool wants(const FilterSteps& steps, Step step);
+  bool wants(Step step) const { return wants(steps_, step); }
   /// Returns how many points were unusable.
   size_t run(Step step, CloudBuffer& cloud);
 

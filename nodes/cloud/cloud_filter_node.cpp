@@ -35,25 +35,17 @@ class Line {
 class CloudFilterNode final : public Node {
  public:
   void setup(Setup&) override {
-    for (const Param<double>* length : {&outlier_radius_, &interpolate_, &smooth_, &reduce_})
-      if (*length > 0 && *length < kShortest_m)
-        throw SetupError(std::string(length->name()) + " is " + length->value_text() +
-                         " m, must be 0 (none) or at least 0.001 m");
-    FilterSteps steps;
-    steps.outliers = {outlier_radius_, outlier_n_min_};
-    steps.n_min_points = kPointsOfNMin;
-    steps.interpolate = {interpolate_, n_adj_, k_, reach_};
-    steps.smooth = {smooth_, t_occ_};
-    steps.reduce_edge_m = reduce_;
     const uint32_t capacity = std::max(in_.capacity().count, static_cast<uint32_t>(capacity_()));
     try {
-      filter_.emplace(capacity, steps);
+      filter_.emplace(capacity, steps());
     } catch (const std::invalid_argument& problem) {
       throw SetupError(std::string(problem.what()) + ", these clouds may have " + std::to_string(capacity));
     }
     out_.reserve({0, 0, 1, capacity});
     status_.reserve({0, 0, 1, kStatusCharacters});
   }
+
+  void changed() override { filter_->tune(steps()); }
 
   void run(Job& job) override {
     if (!in_.is_new()) return job.no_result();
@@ -87,6 +79,20 @@ class CloudFilterNode final : public Node {
   void remember(StateArchive&) override {}
 
  private:
+  FilterSteps steps() const {
+    for (const Param<double>* length : {&outlier_radius_, &interpolate_, &smooth_, &reduce_})
+      if (*length > 0 && *length < kShortest_m)
+        throw SetupError(std::string(length->name()) + " is " + length->value_text() +
+                         " m, must be 0 (none) or at least 0.001 m");
+    FilterSteps steps;
+    steps.outliers = {outlier_radius_, outlier_n_min_};
+    steps.n_min_points = kPointsOfNMin;
+    steps.interpolate = {interpolate_, n_adj_, k_, reach_};
+    steps.smooth = {smooth_, t_occ_};
+    steps.reduce_edge_m = reduce_;
+    return steps;
+  }
+
   static constexpr size_t kPointsOfNMin = 1'200'000;
   static constexpr double kShortest_m = 1e-3;
   static constexpr uint32_t kStatusCharacters = 160;
@@ -110,7 +116,8 @@ class CloudFilterNode final : public Node {
                        {0.0, 1.0}, "1",     "convolved number of points that a voxel needs to give one"};
   Param<double> reduce_{this, "reduce", 0.0, {0.0, 1.0}, "m", "edge of the voxels that become one point each; 0: none"};
   Param<int> capacity_{this,         "capacity", 0,
-                       {0, 1 << 24}, "",         "points that the result may have; 0: as the clouds that come in"};
+                       {0, 1 << 24}, "",         "points that the result may have; 0: as the clouds that come in",
+                       kSizesMemory};
 
   std::optional<CloudFilter> filter_;
 };

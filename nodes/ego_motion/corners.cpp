@@ -12,6 +12,8 @@
 namespace takt::ego_motion {
 namespace {
 
+constexpr int kSmallestTile_px = 8;
+
 float smaller_eigenvalue(float xx, float xy, float yy) {
   const float half_difference = 0.5f * (xx - yy);
   return 0.5f * (xx + yy) - std::sqrt(half_difference * half_difference + xy * xy);
@@ -30,9 +32,19 @@ CornerDetector::CornerDetector(int width, int height, const CornerParameters& pa
   peaks_.resize(columns);
   candidates_.reserve(pixels / 4 + 1);  // a 3 x 3 peak excludes its neighbours
   taken_.resize(pixels);
-  const int tiles = ((width + p_.tile_px - 1) / p_.tile_px) * ((height + p_.tile_px - 1) / p_.tile_px);
-  in_tile_.resize(static_cast<size_t>(tiles));
+  in_tile_.reserve(tiles(std::min(kSmallestTile_px, p_.tile_px)));
+  in_tile_.resize(tiles(p_.tile_px));
   corners_.reserve(static_cast<size_t>(p_.maximum));
+}
+
+size_t CornerDetector::tiles(int tile_px) const {
+  return static_cast<size_t>((width_ + tile_px - 1) / tile_px) * static_cast<size_t>((height_ + tile_px - 1) / tile_px);
+}
+
+void CornerDetector::tune(const CornerParameters& parameters) {
+  p_ = parameters;
+  p_.maximum = std::min(p_.maximum, static_cast<int>(corners_.capacity()));
+  in_tile_.resize(std::min(tiles(p_.tile_px), in_tile_.capacity()));
 }
 
 /// The largest response.

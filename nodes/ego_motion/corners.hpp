@@ -26,6 +26,8 @@ class CornerDetector {
  public:
   CornerDetector() = default;
   CornerDetector(int width, int height, const CornerParameters& parameters);
+  /// From the next detect() on; at most as many corners as the constructor was told. tile_px 8 or more.
+  void tune(const CornerParameters& parameters);
 
   /// Strongest corners first. A pixel whose `mask` value is negative cannot be a corner (no disparity there); an empty
   /// view admits all. The result is valid until the next call.
@@ -41,6 +43,7 @@ class CornerDetector {
                                               ImageView<const int16_t> mask = {});
 
  private:
+  size_t tiles(int tile_px) const;
   float fill_response(const Plane& image);
   void collect(float largest, ImageView<const int16_t> mask);
   std::span<const Corner> select();
@@ -54,7 +57,7 @@ class CornerDetector {
   std::vector<int32_t> peaks_;
   std::vector<uint64_t> candidates_;  // response bits above, inverted pixel index below: one integer order, no ties
   std::vector<uint8_t> taken_;        // pixels too near to a chosen corner
-  std::vector<int> in_tile_;
+  std::vector<int> in_tile_;          // room for the smallest tiles
   std::vector<Corner> corners_;
 };
 

@@ -55,16 +55,40 @@ std::string Parameters::error() const {
   return {};
 }
 
-void EgoMotion::configure(int width, int height, const Parameters& parameters) {
+void EgoMotion::take(const Parameters& parameters) {
   if (const std::string error = parameters.error(); !error.empty()) throw std::invalid_argument("ego_motion: " + error);
+  p_ = parameters;
+  half_ = p_.n_search / 2;
+  p_.corners.margin_px = std::max(p_.corners.margin_px, half_ + 3);
+}
+
+void EgoMotion::tune(const Parameters& parameters) {
+  if (static_cast<size_t>(std::max(0, parameters.corners.maximum)) > tracked_.capacity())
+    throw std::invalid_argument("ego_motion: memory was taken for " + std::to_string(tracked_.capacity()) + " corners");
+  const bool before = p_.brightness;
+  take(parameters);
+  detector_.tune(p_.corners);
+  flow_filter_.tune(p_.flow);
+  estimator_.tune(p_.estimator);
+  expectation_.tune(p_.expectation);
+  // A block may be larger now than where these were found.
+  const int margin = p_.corners.margin_px;
+  std::erase_if(tracked_, [&](const TrackedCorner& t) {
+    return t.corner.x < margin || t.corner.y < margin || t.corner.x >= width_ - margin ||
+           t.corner.y >= height_ - margin;
+  });
+  if (p_.brightness == before || !has_previous_) return;
+  current_.build(previous_.image().view(), p_.brightness);
+  previous_.swap(current_);
+}
+
+void EgoMotion::configure(int width, int height, const Parameters& parameters) {
+  take(parameters);
   if (width < 128 || height < 128 || width > 16384 || height > 16384)
     throw std::invalid_argument("ego_motion: image of " + std::to_string(width) + " x " + std::to_string(height) +
                                 " px, each side must lie in 128..16384");
-  p_ = parameters;
   width_ = width;
   height_ = height;
-  half_ = p_.n_search / 2;
-  p_.corners.margin_px = std::max(p_.corners.margin_px, half_ + 3);
   const auto capacity = static_cast<size_t>(p_.corners.maximum);
   previous_ = Pyramid(width, height, kLevels);
   current_ = Pyramid(width, height, kLevels);
@@ -102,7 +126,7 @@ void EgoMotion::remember(StateArchive& archive) {
   TAKT_STATE(archive, tracked_, expectation_, has_previous_, resumed_, stamp_ns_, steps_, pose_);
   archive(previous_.image());
   if (!archive.loads() || archive.failed()) return;
-  if (tracked_.size() > static_cast<size_t>(p_.corners.maximum)) return archive.fail();
+  if (tracked_.size() > keep_.size()) return archive.fail();
   current_.build(previous_.image().view(), p_.brightness);
   previous_.swap(current_);
 }

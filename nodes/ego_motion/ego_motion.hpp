@@ -87,6 +87,9 @@ class EgoMotion {
   /// Takes all memory. Throws std::invalid_argument on parameters out of range or images under 128 x 128 px; before
   /// start only.
   void configure(int width, int height, const Parameters& parameters);
+  /// Other parameters from the next step() on; what the frames before left stays. Allocates nothing. Throws
+  /// std::invalid_argument on parameters out of range, and for more corners than configure() took memory for.
+  void tune(const Parameters& parameters);
   /// Motion since the frame of the call before; the first call (and one after reset()) gives a keyframe.
   Result step(const Frame& frame);
   /// Goes on from a pose that an earlier process had reached at that stamp or later: the next call gives it with valid
@@ -107,6 +110,8 @@ class EgoMotion {
     double x = 0, y = 0;
     bool found = false;
   };
+  /// Throws std::invalid_argument.
+  void take(const Parameters& parameters);
   void find_corners(const Frame& frame);
   double measure_disparity(double x, double y, int first, int last) const;
   double current_disparity(const Frame& frame, double x, double y, double previous) const;

@@ -29,10 +29,6 @@ class EgoMotionNode final : public Node {
     if (images.width != map.width || images.height != map.height)
       throw SetupError("pair is " + size(images) + " px but disparity is " + size(map) +
                        " px: connect the rectified pair that the disparity was computed from");
-    if (!odometry_.connected() && predict_() == static_cast<size_t>(Predict::odometry))
-      throw SetupError(
-          "predict is odometry, but the input odometry is not connected: connect it, or choose pyramid, "
-          "constant_velocity or none");
     width_ = static_cast<int>(images.width);
     height_ = static_cast<int>(images.height);
     try {
@@ -40,6 +36,11 @@ class EgoMotionNode final : public Node {
     } catch (const std::invalid_argument& error) {
       throw SetupError(error.what());
     }
+    changed();
+  }
+
+  void changed() override {
+    ego_.tune(parameters());
     mount_ = mapping_3d::camera_mount(camera_x_, camera_y_, camera_height_, 0, camera_tilt_);
   }
 
@@ -121,6 +122,10 @@ class EgoMotionNode final : public Node {
   }
 
   Parameters parameters() const {
+    if (!odometry_.connected() && predict_() == static_cast<size_t>(Predict::odometry))
+      throw SetupError(
+          "predict is odometry, but the input odometry is not connected: connect it, or choose pyramid, "
+          "constant_velocity or none");
     Parameters p;
     p.corners = {corners_, quality_, distance_, 8, tile_};
     p.predict = static_cast<Predict>(predict_());
@@ -153,7 +158,7 @@ class EgoMotionNode final : public Node {
   Output<Motion> motion_{this, "motion", "motion since the previous frame and accumulated pose, camera frame"};
   Output<Pose> pose_{this, "pose", "the accumulated pose, camera in the first camera frame, with its covariance"};
   Output<Pose> robot_motion_{this, "robot_motion", "robot in its frame of the previous pair, with its covariance"};
-  Param<int> corners_{this, "corners", 800, {12, 20000}, "", "most corners per image"};
+  Param<int> corners_{this, "corners", 800, {12, 20000}, "", "most corners per image; in a run not above its start"};
   Param<double> quality_{this,        "quality", 0.005,
                          {0.0, 0.99}, "1",       "least corner response, share of the image's largest"};
   Param<int> distance_{this, "distance", 5, {1, 100}, "px", "least distance of two corners"};

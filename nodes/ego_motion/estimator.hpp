@@ -45,6 +45,8 @@ class MotionEstimator {
  public:
   MotionEstimator() = default;
   MotionEstimator(const EstimatorParameters& parameters, size_t capacity);
+  /// From the next estimate() on.
+  void tune(const EstimatorParameters& parameters) { p_ = parameters; }
   /// `start` is a guess of T, e.g. the motion before.
   Estimate estimate(std::span<const Observation> observations, const Optics& optics, const Rigid& start, uint64_t seed);
 

@@ -22,6 +22,7 @@ class Expectation {
  public:
   Expectation() = default;
   explicit Expectation(const ExpectationParameters& parameters) : p_(parameters) {}
+  void tune(const ExpectationParameters& parameters) { p_ = parameters; }
 
   /// What the last motion would be over `interval_ns`: constant velocity. None before the first one.
   std::optional<Rigid> continued(int64_t interval_ns) const;

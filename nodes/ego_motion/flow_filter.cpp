@@ -18,6 +18,8 @@ float lower_median(std::vector<float>& values) {
   return *middle;
 }
 
+constexpr int kSmallestCell_px = 8;
+
 bool agrees(const Flow& flow, std::vector<float>& dx, std::vector<float>& dy, const FlowFilterParameters& p) {
   if (dx.size() < static_cast<size_t>(std::max(1, p.n_flow))) return false;
   const double ex = static_cast<double>(flow.dx) - lower_median(dx),
@@ -28,18 +30,25 @@ bool agrees(const Flow& flow, std::vector<float>& dx, std::vector<float>& dy, co
 }  // namespace
 
 FlowFilter::FlowFilter(int width, int height, size_t capacity, const FlowFilterParameters& parameters)
-    : p_(parameters) {
-  const int edge = std::max(1, static_cast<int>(std::ceil(p_.r_min_px)));
-  columns_ = width / edge + 1;
-  rows_ = height / edge + 1;
-  start_.resize(static_cast<size_t>(columns_) * static_cast<size_t>(rows_) + 1);
+    : width_(width), height_(height) {
+  start_.reserve(
+      static_cast<size_t>(width / kSmallestCell_px + 1) * static_cast<size_t>(height / kSmallestCell_px + 1) + 1);
+  tune(parameters);
   order_.resize(capacity);
   dx_.reserve(capacity);
   dy_.reserve(capacity);
 }
 
+void FlowFilter::tune(const FlowFilterParameters& parameters) {
+  p_ = parameters;
+  edge_ = std::max(kSmallestCell_px, static_cast<int>(std::ceil(p_.r_min_px)));
+  columns_ = width_ / edge_ + 1;
+  rows_ = height_ / edge_ + 1;
+  start_.resize(static_cast<size_t>(columns_) * static_cast<size_t>(rows_) + 1);
+}
+
 int FlowFilter::cell_of(const Flow& flow) const {
-  const auto edge = static_cast<float>(std::max(1.0, std::ceil(p_.r_min_px)));
+  const auto edge = static_cast<float>(edge_);
   const int cx = std::clamp(static_cast<int>(flow.x / edge), 0, columns_ - 1);
   const int cy = std::clamp(static_cast<int>(flow.y / edge), 0, rows_ - 1);
   return cy * columns_ + cx;

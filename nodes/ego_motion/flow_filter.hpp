@@ -24,6 +24,8 @@ class FlowFilter {
  public:
   FlowFilter() = default;
   FlowFilter(int width, int height, size_t capacity, const FlowFilterParameters& parameters);
+  /// From the next apply() on.
+  void tune(const FlowFilterParameters& parameters);
   void apply(std::span<const Flow> flows, std::span<uint8_t> keep);
 
   /// Slow, obvious version: every flow against every other.
@@ -34,6 +36,7 @@ class FlowFilter {
   int cell_of(const Flow& flow) const;
 
   FlowFilterParameters p_;
+  int width_ = 0, height_ = 0, edge_ = 0;  ///< of the image, and of a cell
   int columns_ = 0, rows_ = 0;
   std::vector<uint32_t> start_, order_;
   std::vector<float> dx_, dy_;

@@ -6,8 +6,13 @@
 
 namespace takt::ground_map {
 
-ConfidenceTable::ConfidenceTable(const DoubtParameters& parameters)
-    : p_(parameters), above_(257 * 256), table_(256 * 256, kSure) {
+ConfidenceTable::ConfidenceTable(const DoubtParameters& parameters) : above_(257 * 256), table_(256 * 256, kSure) {
+  tune(parameters);
+  rebuild(std::vector<uint8_t>(256 * 256).data());
+}
+
+void ConfidenceTable::tune(const DoubtParameters& parameters) {
+  p_ = parameters;
   const auto values = [](double low, double high) {
     return Values{std::clamp(static_cast<int>(std::ceil(low)), 0, 256),
                   std::clamp(static_cast<int>(std::floor(high)) + 1, 0, 256)};
@@ -15,7 +20,6 @@ ConfidenceTable::ConfidenceTable(const DoubtParameters& parameters)
   for (int v = 0; v < 256; ++v)
     other_light_[static_cast<size_t>(v)] = {values(v / p_.shade_faintest, v / p_.shade_deepest),
                                             values(v * p_.shade_deepest, v * p_.shade_faintest)};
-  rebuild(std::vector<uint8_t>(256 * 256).data());
 }
 
 // Whether there is ground in a rectangle of values and saturations: sums along the values, then along the saturations.

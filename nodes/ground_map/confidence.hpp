@@ -25,6 +25,8 @@ struct DoubtParameters {
 class ConfidenceTable {
  public:
   explicit ConfidenceTable(const DoubtParameters& parameters);
+  /// From the next rebuild() on.
+  void tune(const DoubtParameters& parameters);
   /// `is_ground`: 256 x 256 bytes, index 256 v + s, 1 ground, 0 not.
   void rebuild(const uint8_t* is_ground);
   /// 256 x 256 bytes, index 256 v + s. Before the first rebuild nothing is ground.

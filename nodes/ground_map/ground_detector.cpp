@@ -22,6 +22,16 @@ GroundDetector::GroundDetector(int width, int height, const DetectorParameters& 
     plane->resize(static_cast<size_t>(width) * static_cast<size_t>(height));
 }
 
+void GroundDetector::tune(const DetectorParameters& parameters) {
+  t_m_ = parameters.t_m;
+  light_min_ = parameters.light_min;
+  area_.tune(parameters.trapezoid);
+  memory_.tune(parameters.t_w);
+  confidence_.tune(parameters.doubt);
+  confidence_.rebuild(memory_.table());
+  cleaner_.tune(parameters.mean_size);
+}
+
 void GroundDetector::analyse(ImageView<const uint8_t> image) {
   for (int y = 0; y < height_; ++y) {
     uint8_t *s = view(saturation_).row(y), *v = view(value_).row(y);

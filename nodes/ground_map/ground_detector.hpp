@@ -28,6 +28,9 @@ class GroundDetector {
  public:
   GroundDetector(int width, int height, const DetectorParameters& parameters);
 
+  /// From the next analyse() on, with what was learnt; memory_entries stays as it was.
+  void tune(const DetectorParameters& parameters);
+
   /// Takes an image of the constructor's size, BGR or grey (saturation 0), for the two calls below.
   void analyse(ImageView<const uint8_t> image);
   /// Mean value of the reference area of the image analysed last, 0..255.

@@ -44,6 +44,12 @@ struct Window {
 class GroundGrid {
  public:
   GroundGrid(int image_width, const GridParameters& parameters);
+  /// From now on; cells and window stay as they were.
+  void tune(GridParameters parameters) {
+    parameters.cell_m = p_.cell_m;
+    parameters.window_m = p_.window_m;
+    p_ = parameters;
+  }
 
   /// Moves the window by whole cells so that (x, y) lies in its middle cell; what comes in is unknown.
   void centre(const FloorPoint& robot_in_map);

@@ -42,10 +42,6 @@ class GroundMapNode final : public Node {
   void setup(Setup& setup) override {
     const Capacity& image = pair_.capacity();
     detector_.emplace(static_cast<int>(image.width), static_cast<int>(image.height), detector_parameters());
-    if (detector_->area().pixels() == 0)
-      throw SetupError("the reference area is empty: trapezoid_height = " + trapezoid_height_.value_text() +
-                       ", trapezoid_bottom = " + trapezoid_bottom_.value_text() +
-                       ", trapezoid_top = " + trapezoid_top_.value_text());
     if (!calibration_().empty()) read_calibration(setup.directory / calibration_(), image);
     ground_.resize(image.pixels());
     grid_cells_.emplace(static_cast<int>(image.width), grid_parameters());
@@ -55,11 +51,24 @@ class GroundMapNode final : public Node {
     const auto side = static_cast<uint32_t>(grid_cells_->window().cells);
     grid_.reserve({side, side, 1, 0});
     specks_.emplace(grid_cells_->window().cells, speck_);
-    if (speck_ > 0 && !scan_.connected())
-      throw SetupError("speck wants `scan`: it frees only what a scanner sees past");
     if (!terrain_maps_().empty()) read_terrain_maps(setup.directory / terrain_maps_());
     around_cells_.resize(shape_.cells());
     around_.reserve({static_cast<uint32_t>(shape_.columns), static_cast<uint32_t>(shape_.rows), 1, 0});
+    changed();
+  }
+
+  void changed() override {
+    if (speck_ > 0 && !scan_.connected())
+      throw SetupError("speck wants `scan`: it frees only what a scanner sees past");
+    detector_->tune(detector_parameters());
+    if (detector_->area().pixels() == 0)
+      throw SetupError("the reference area is empty: trapezoid_height = " + trapezoid_height_.value_text() +
+                       ", trapezoid_bottom = " + trapezoid_bottom_.value_text() +
+                       ", trapezoid_top = " + trapezoid_top_.value_text());
+    grid_cells_->tune(grid_parameters());
+    specks_->tune(speck_);
+    const TerrainParameters terrain = terrain_parameters();
+    if (classifier_) classifier_->tune(terrain);
     mount_ = mapping_3d::camera_mount(camera_x_, camera_y_, camera_height_, 0, camera_tilt_);
     motion_mount_ =
         mapping_3d::camera_mount(motion_camera_x_, motion_camera_y_, motion_camera_height_, 0, motion_camera_tilt_);
@@ -320,14 +329,8 @@ class GroundMapNode final : public Node {
   }
 
   void read_terrain_maps(const std::filesystem::path& file) {
-    TerrainParameters p;
-    p.centre = terrain_centre_() == 0 ? Centre::undecided : Centre::mean;
-    p.correlation_min = terrain_correlation_;
-    p.crossing_min = terrain_crossing_;
-    p.up = static_cast<int>(std::lround(terrain_up_ * 1000));
-    p.down = static_cast<int>(std::lround(terrain_down_ * 1000));
     try {
-      classifier_.emplace(read_terrain(file).learnt(), p);
+      classifier_.emplace(read_terrain(file).learnt(), terrain_parameters());
     } catch (const TerrainError& error) {
       throw SetupError(error.what());
     }
@@ -338,6 +341,16 @@ class GroundMapNode final : public Node {
     const Transform& t = pair.sensor_in_robot;
     const bool said = t.x != 0 || t.y != 0 || t.z != 0 || t.qx != 0 || t.qy != 0 || t.qz != 0;
     return said ? t : mount_;
+  }
+
+  TerrainParameters terrain_parameters() const {
+    TerrainParameters p;
+    p.centre = terrain_centre_() == 0 ? Centre::undecided : Centre::mean;
+    p.correlation_min = terrain_correlation_;
+    p.crossing_min = terrain_crossing_;
+    p.up = static_cast<int>(std::lround(terrain_up_ * 1000));
+    p.down = static_cast<int>(std::lround(terrain_down_ * 1000));
+    return p;
   }
 
   DetectorParameters detector_parameters() const {
@@ -390,7 +403,7 @@ class GroundMapNode final : public Node {
   Param<double> trapezoid_height_{this, "trapezoid_height", 0.2, {0.0, 1.0}, "1", "reference area, of the height"};
   Param<double> trapezoid_skip_{this, "trapezoid_skip", 0.02, {0.0, 0.9}, "1", "lowest rows left out, of the height"};
   Param<double> t_m_{this, "t_m", 80.0, {0.0, 1e6}, "px", "pixels of a bin that counts, for an area of 24576 px"};
-  Param<int> n_b_{this, "n_b", 500, {1, 10000}, "", "frames remembered; 100 s times the rate"};
+  Param<int> n_b_{this, "n_b", 500, {1, 10000}, "", "frames remembered; 100 s times the rate", kSizesMemory};
   Param<double> t_w_{this, "t_w", 0.9, {0.0, 5000.0}, "1", "sum of weights above which a pixel is ground"};
   Param<int> mean_size_{this, "mean_size", 9, {1, 31}, "px", "edge of the box average, odd"};
   Param<double> light_min_{
@@ -401,8 +414,8 @@ class GroundMapNode final : public Node {
   Param<int> shade_saturation_{
       this, "shade_saturation", 10, {0, 255}, "1", "by how much saturation differs in a shadow"};
   Param<double> doubt_{this, "doubt", 0.25, {0.0, 1.0}, "1", "confidence where it may be blooming or a shadow"};
-  Param<double> cell_{this, "cell", 0.30, {0.05, 1.0}, "m", "edge of a cell"};
-  Param<double> window_{this, "window", 18.0, {1.0, 100.0}, "m", "side of the grid around the robot"};
+  Param<double> cell_{this, "cell", 0.30, {0.05, 1.0}, "m", "edge of a cell", kSizesMemory};
+  Param<double> window_{this, "window", 18.0, {1.0, 100.0}, "m", "side of the grid around the robot", kSizesMemory};
   Param<double> range_max_{this, "range_max", 8.0, {0.5, 50.0}, "m", "farther floor is not looked at"};
   Choice votes_{this, "votes", "columns", {"columns", "pixels"}, "what votes for a cell: image columns or pixels"};
   Param<int> votes_min_{this, "votes_min", 5, {1, 100000}, "", "a cell with fewer votes in an image is not seen"};

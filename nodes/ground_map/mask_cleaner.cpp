@@ -9,16 +9,21 @@ namespace takt::ground_map {
 MaskCleaner::MaskCleaner(int width, int height, int mean_size)
     : width_(width),
       height_(height),
-      radius_(mean_size / 2),
       waiting_ground_(static_cast<size_t>(width) * static_cast<size_t>(height)),
-      columns_(static_cast<size_t>(width + 2 * radius_)),
       sums_(static_cast<size_t>(width)),
       within_(static_cast<size_t>(width)) {
   // Every run is put there once, and a row has at most one run for two pixels.
   runs_.reserve(static_cast<size_t>(height) * (static_cast<size_t>(width) / 2 + 1));
-  for (int x = 0; x < width; ++x)
+  columns_.reserve(static_cast<size_t>(width + 2 * (std::max(kLargest, mean_size) / 2)));
+  tune(mean_size);
+}
+
+void MaskCleaner::tune(int mean_size) {
+  radius_ = mean_size / 2;
+  columns_.resize(static_cast<size_t>(width_ + 2 * radius_));
+  for (int x = 0; x < width_; ++x)
     within_[static_cast<size_t>(x)] =
-        static_cast<int16_t>(std::min(x + radius_, width - 1) - std::max(x - radius_, 0) + 1);
+        static_cast<int16_t>(std::min(x + radius_, width_ - 1) - std::max(x - radius_, 0) + 1);
 }
 
 void MaskCleaner::clean(ImageView<const uint8_t> raw, const ReferenceArea& area, ImageView<uint8_t> mask) {

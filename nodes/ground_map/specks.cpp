@@ -8,7 +8,6 @@
 namespace takt::ground_map {
 
 Specks::Specks(int cells, int most) : most_(most) {
-  if (most_ == 0) return;
   visited_.resize(static_cast<size_t>(cells) * static_cast<size_t>(cells));
   island_.reserve(visited_.size());
 }

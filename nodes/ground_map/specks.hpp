@@ -15,6 +15,7 @@ class Specks {
  public:
   /// For windows of `cells` x `cells`; larger islands than `most` cells stay, with 0 all do.
   Specks(int cells, int most);
+  void tune(int most) { most_ = most; }
 
   /// Sets to kFree what is occupied (above 500) in islands (8-connected) of at most `most` cells, of which every
   /// neighbour is known and every cell `seen_past`. A border of the floor is longer, and what stands on it is seen by a
@@ -26,7 +27,7 @@ class Specks {
   /// Takes the island of that cell into island_. False if there is none, it is too large or touches what is unknown.
   bool grow(ImageView<const int16_t> cells, int first);
 
-  const int most_;
+  int most_;
   std::vector<uint8_t> visited_;
   std::vector<int> island_;  ///< indices of cells
 };

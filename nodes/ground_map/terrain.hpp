@@ -82,6 +82,7 @@ std::optional<double> correlation(std::span<const int16_t> around, std::span<con
 class TerrainClassifier {
  public:
   TerrainClassifier(TerrainMaps maps, const TerrainParameters& parameters);
+  void tune(const TerrainParameters& parameters) { p_ = parameters; }
   const TerrainShape& shape() const { return maps_.shape; }
   /// Takes the cells around the robot: the counter of the kind with the highest correlation rises if that is high
   /// enough, else that of "unknown"; all others fall. The answer is the highest counter; of equal ones the present

@@ -6,16 +6,22 @@
 
 namespace takt::ground_map {
 
-ReferenceArea::ReferenceArea(int width, int height, const TrapezoidShares& shares) {
-  const double bottom_row = height * (1 - shares.skip), top_row = bottom_row - height * shares.height;
-  const int first = std::clamp(static_cast<int>(std::lround(top_row)), 0, height);
-  const int last = std::clamp(static_cast<int>(std::lround(bottom_row)), first, height);
-  spans_.reserve(static_cast<size_t>(last - first));
+ReferenceArea::ReferenceArea(int width, int height, const TrapezoidShares& shares) : width_(width), height_(height) {
+  spans_.reserve(static_cast<size_t>(height));
+  tune(shares);
+}
+
+void ReferenceArea::tune(const TrapezoidShares& shares) {
+  const double bottom_row = height_ * (1 - shares.skip), top_row = bottom_row - height_ * shares.height;
+  const int first = std::clamp(static_cast<int>(std::lround(top_row)), 0, height_);
+  const int last = std::clamp(static_cast<int>(std::lround(bottom_row)), first, height_);
+  spans_.clear();
+  pixels_ = 0;
   for (int y = first; y < last; ++y) {
     const double down = (y + 0.5 - first) / (last - first);
-    const double half = 0.5 * width * (shares.top + (shares.bottom - shares.top) * down), middle = 0.5 * width;
+    const double half = 0.5 * width_ * (shares.top + (shares.bottom - shares.top) * down), middle = 0.5 * width_;
     const RowSpan span{y, std::max(0, static_cast<int>(std::lround(middle - half))),
-                       std::min(width, static_cast<int>(std::lround(middle + half)))};
+                       std::min(width_, static_cast<int>(std::lround(middle + half)))};
     spans_.push_back(span);
     pixels_ += std::max(0, span.last - span.first);
   }
@@ -61,11 +67,15 @@ std::optional<Descriptor> describe(ImageView<const uint8_t> saturation, ImageVie
 }
 
 TextureMemory::TextureMemory(int capacity, double t_w)
-    : ring_(static_cast<size_t>(capacity)),
-      // An integer is above t_w N_b exactly if it is above the integer part of it; 0.9 * 500 may be a bit off 450.
-      limit_(static_cast<int32_t>(std::min(std::floor(t_w * capacity + 1e-9), 1e9))),
-      sums_(kStride * kStride),
-      table_(256 * 256) {}
+    : ring_(static_cast<size_t>(capacity)), sums_(kStride * kStride), table_(256 * 256) {
+  tune(t_w);
+}
+
+// An integer is above t_w N_b exactly if it is above the integer part of it; 0.9 * 500 may be a bit off 450.
+void TextureMemory::tune(double t_w) {
+  limit_ = static_cast<int32_t>(std::min(std::floor(t_w * static_cast<double>(ring_.size()) + 1e-9), 1e9));
+  rebuild();
+}
 
 int TextureMemory::weight(int k) const {
   const int capacity = static_cast<int>(ring_.size());

@@ -25,12 +25,15 @@ struct TrapezoidShares {
 class ReferenceArea {
  public:
   ReferenceArea(int width, int height, const TrapezoidShares& shares);
+  /// Another area of the same image.
+  void tune(const TrapezoidShares& shares);
   std::span<const RowSpan> spans() const { return spans_; }
   int64_t pixels() const { return pixels_; }
   /// Whether a point of the image (px, pixel centres at whole numbers) lies in the area.
   bool contains(double x_px, double y_px) const;
 
  private:
+  int width_, height_;
   std::vector<RowSpan> spans_;  ///< one per row, downwards without a gap
   int64_t pixels_ = 0;
 };
@@ -57,6 +60,8 @@ class TextureMemory {
  public:
   /// capacity in 1..10000, t_w > 0.
   TextureMemory(int capacity, double t_w);
+  /// Another t_w for what is remembered.
+  void tune(double t_w);
   void add(const Descriptor& descriptor);
   int size() const { return filled_; }
 
@@ -88,7 +93,7 @@ class TextureMemory {
 
   std::vector<Descriptor> ring_;
   int newest_ = -1, filled_ = 0;
-  int32_t limit_;
+  int32_t limit_ = 0;
   std::vector<int32_t> sums_;
   std::vector<uint8_t> table_;
 };

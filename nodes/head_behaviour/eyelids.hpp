@@ -22,6 +22,7 @@ class SunGuard {
  public:
   SunGuard() = default;
   explicit SunGuard(const SunParameters& parameters) : parameters_(parameters) {}
+  void tune(const SunParameters& parameters) { parameters_ = parameters; }
   /// An image of that stamp with more than 5 % of its pixels saturated, or not.
   void see(bool saturated, int64_t stamp_ns, int64_t now_ns);
   bool closed(int64_t now_ns) const { return now_ns < open_from_ns_; }
@@ -44,6 +45,8 @@ class Blinker {
   Blinker() = default;
   Blinker(const BlinkParameters& parameters, uint64_t seed)
       : parameters_(parameters), random_(static_cast<std::minstd_rand::result_type>(seed)) {}
+  /// For the blinks after the next one, whose begin is drawn already.
+  void tune(const BlinkParameters& parameters) { parameters_ = parameters; }
   bool closed(bool has_partner, int64_t now_ns);
   void remember(StateArchive& archive) { TAKT_STATE(archive, random_, next_ns_); }
 

@@ -28,6 +28,7 @@ mapping_3d::HeadAngles angles_towards(const Transform& at_rest, const mapping_3d
 class Gaze {
  public:
   explicit Gaze(const GazeParameters& parameters) : parameters_(parameters) {}
+  void tune(const GazeParameters& parameters) { parameters_ = parameters; }
 
   /// Faces in the robot frame as they are seen now. `now_ns` never less than in the call before.
   void see(std::span<const mapping_3d::Position> faces, int64_t now_ns);

@@ -21,16 +21,22 @@ class HeadBehaviourNode final : public Node {
   void setup(Setup& setup) override {
     if (!bodies_.connected() && !person_.connected())
       throw SetupError("connect `bodies` or `person`, or both: the robot looks at people");
+    gaze_.emplace(GazeParameters{});
+    blinker_ = Blinker({}, setup.seed);
+    changed();
+    faces_.reserve(bodies_.capacity().count + 1);
+  }
+
+  void changed() override {
     GazeParameters gaze;
     gaze.pan_max_rad = pan_max_;
     gaze.tilt_max_rad = tilt_max_;
     gaze.near_m = near_;
     gaze.leave_m = near_ + kLeave_m;
     gaze.hold_s = hold_;
-    gaze_.emplace(gaze);
-    sun_ = SunGuard({confirm_, shut_, lift_});
-    blinker_ = Blinker({blink_every_, blink_}, setup.seed);
-    faces_.reserve(bodies_.capacity().count + 1);
+    gaze_->tune(gaze);
+    sun_.tune({confirm_, shut_, lift_});
+    blinker_.tune({blink_every_, blink_});
   }
 
   void run(Job& job) override {

@@ -54,7 +54,7 @@ class LaserCloudNode final : public Node {
   Input<LaserScan> scan_{this, "scan", "sweeps; depth as many as `sweeps`, and a few for those without a pose yet"};
   Input<Odometry> odometry_{this, "odometry", "the robot's poses around the scans' stamps; depth 32", Need::optional};
   Output<PointCloud> cloud_{this, "cloud", "the returns, in the scanner's frame at the newest sweep with a pose"};
-  Param<int> sweeps_{this, "sweeps", 8, {1, 32}, "", "that make one cloud"};
+  Param<int> sweeps_{this, "sweeps", 8, {1, 32}, "", "that make one cloud", kSizesMemory};
   Param<double> range_max_{this, "range_max", 15.0, {0.1, 100.0}, "m", "farther returns are left out"};
 
   PoseTrack track_{InputPort::kMaxDepth, kLongestGapNs};

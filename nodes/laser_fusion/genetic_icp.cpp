@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "nodes/laser_fusion/genetic_icp.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -9,13 +10,29 @@
 
 namespace takt::laser_fusion {
 
-GeneticIcp::GeneticIcp(PoseJudge& judge, const GeneticParameters& parameters)
-    : judge_(&judge), parameters_(parameters) {
+bool all_locked(const Locks& locks) {
+  return std::all_of(locks.begin(), locks.end(), [](bool locked) { return locked; });
+}
+
+GeneticIcp::GeneticIcp(PoseJudge& judge, const GeneticParameters& parameters) : judge_(&judge) {
   if (parameters.population < 2) throw std::invalid_argument("the population of genetic ICP must be at least 2");
+  free_.reserve(parameters.locks.size());
+  take(parameters);
+  population_.reserve(parameters.population);
+}
+
+void GeneticIcp::take(const GeneticParameters& parameters) {
+  if (all_locked(parameters.locks))
+    throw std::invalid_argument("genetic ICP has nothing to vary: all six parameters are locked");
+  parameters_ = parameters;
+  free_.clear();
   for (const Parameter p : {kX, kY, kZ, kYaw, kPitch, kRoll})
     if (!parameters.locks[p]) free_.push_back(p);
-  if (free_.empty()) throw std::invalid_argument("genetic ICP has nothing to vary: all six parameters are locked");
-  population_.reserve(parameters.population);
+}
+
+void GeneticIcp::tune(GeneticParameters parameters) {
+  parameters.population = parameters_.population;
+  take(parameters);
 }
 
 void GeneticIcp::begin(const Rigid& start, uint64_t seed) {

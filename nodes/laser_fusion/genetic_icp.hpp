@@ -22,11 +22,15 @@ struct GeneticParameters {
   uint32_t patience = 0;  ///< after so many generations without a gain it begins anew, the best so far kept; 0: never
 };
 
+bool all_locked(const Locks& locks);
+
 class GeneticIcp {
  public:
   /// Takes its memory. Throws std::invalid_argument if all parameters are locked, or the population is below 2.
   GeneticIcp(PoseJudge& judge, const GeneticParameters& parameters);
 
+  /// From the next begin() on; the population stays as it was. Throws std::invalid_argument as the constructor does.
+  void tune(GeneticParameters parameters);
   /// Begins anew with the clouds that the judge has. The same seed gives the same answer.
   void begin(const Rigid& start, uint64_t seed);
 
@@ -62,6 +66,8 @@ class GeneticIcp {
   static constexpr uint32_t kPortion = 8;
 
  private:
+  /// Throws std::invalid_argument.
+  void take(const GeneticParameters& parameters);
   void next();
   void begin_anew();
   PoseParameters offspring();

@@ -2,6 +2,7 @@
 #include "nodes/laser_fusion/laser_fusion.hpp"
 
 #include <algorithm>
+#include <stdexcept>
 
 namespace takt::laser_fusion {
 namespace {
@@ -14,6 +15,7 @@ constexpr size_t kFusedAtOnce = 512;
 
 LaserFusion::LaserFusion(size_t laser_points, size_t vision_points, const LaserFusionParameters& p)
     : parameters_(p),
+      next_parameters_(p),
       vision_(p.vision_points),
       few_laser_(p.search_points),
       few_vision_(p.search_points),
@@ -29,6 +31,18 @@ LaserFusion::LaserFusion(size_t laser_points, size_t vision_points, const LaserF
   fused_.reserve(laser_points);
 }
 
+void LaserFusion::tune(const LaserFusionParameters& parameters) {
+  if (all_locked(parameters.genetic.locks))
+    throw std::invalid_argument("genetic ICP has nothing to vary: all six parameters are locked");
+  next_parameters_ = parameters;
+}
+
+void LaserFusion::use(const LaserFusionParameters& parameters) {
+  parameters_ = parameters;
+  matcher_.tune(parameters.quality);
+  genetic_.tune(parameters.genetic);
+}
+
 void LaserFusion::begin(std::span<const Point> laser, const cloud::CloudView& vision, const Rigid& vision_in_laser,
                         uint64_t seed, bool coloured) {
   const auto copied = [](const auto& from, auto& into) {
@@ -40,6 +54,7 @@ void LaserFusion::begin(std::span<const Point> laser, const cloud::CloudView& vi
   start_ = vision_in_laser;
   seed_ = seed;
   coloured_ = coloured;
+  use(next_parameters_);
   begin_again();
 }
 
@@ -60,8 +75,11 @@ void LaserFusion::remember(StateArchive& archive) {
     return archive.room(laser_.capacity() * sizeof(Point) + all_vision_.capacity() * (sizeof(Point) + sizeof(Colour)) +
                         sizeof *this);
   }
-  TAKT_STATE(archive, portions, laser_, all_vision_, all_colours_, start_, seed_, coloured_);
+  LaserFusionParameters parameters = parameters_;
+  TAKT_STATE(archive, portions, laser_, all_vision_, all_colours_, start_, seed_, coloured_, parameters);
   if (archive.loads() && !archive.failed()) {
+    if (all_locked(parameters.genetic.locks)) return archive.fail();
+    use(parameters);
     begin_again();
     for (uint32_t i = 0; i < portions[0]; ++i) go_on();
   }

@@ -30,6 +30,9 @@ class LaserFusion {
   LaserFusion(const LaserFusion&) = delete;  // the search refers to the matcher beside it
   LaserFusion& operator=(const LaserFusion&) = delete;
 
+  /// From the next begin() on: a search is one thing. The numbers of points and the population stay as they were.
+  /// Throws std::invalid_argument if all of the pose is locked.
+  void tune(const LaserFusionParameters& parameters);
   /// Takes a pair of clouds, both copied. Without colours the vision points are grey. `coloured`: somebody wants the
   /// laser points with their colours; else all ends with the search.
   void begin(std::span<const Point> laser, const cloud::CloudView& vision, const Rigid& vision_in_laser, uint64_t seed,
@@ -79,6 +82,7 @@ class LaserFusion {
   };
 
   void go_on();
+  void use(const LaserFusionParameters& parameters);
   void begin_again();
   void thin(Stage stage, std::span<const Point> points, std::vector<Point>& out);
   void drop_clusters(Stage stage, std::span<Point> points);
@@ -86,7 +90,7 @@ class LaserFusion {
   void begin_colours();
   void fuse_some();
 
-  LaserFusionParameters parameters_;
+  LaserFusionParameters parameters_, next_parameters_;  ///< of the pair in hand, and of the next one
   Stage stage_ = Stage::idle;
   std::array<uint32_t, 2> portions_{};  ///< of the pair so far: before the search, and after it
   std::vector<Point> laser_, all_vision_, vision_, few_laser_, few_vision_;

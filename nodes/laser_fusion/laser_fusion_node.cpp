@@ -36,27 +36,16 @@ Locks locks_of(const std::string& text) {
 class LaserFusionNode final : public Node {
  public:
   void setup(Setup&) override {
-    LaserFusionParameters p;
-    p.search_points = static_cast<size_t>(points_());
-    p.vision_points = static_cast<size_t>(vision_points_());
-    p.quality.metric = metric_() == 0 ? Metric::truncated : Metric::thesis;
-    p.quality.cut_m = cut_;
-    p.genetic.population = static_cast<size_t>(population_());
-    p.genetic.generations = static_cast<uint32_t>(generations_());
-    p.genetic.patience = static_cast<uint32_t>(patience_());
-    p.genetic.locks = locks_of(locked_);
-    for (const Parameter axis : {kX, kY, kZ}) p.genetic.mutation[axis] = mutation_distance_;
-    for (const Parameter angle : {kYaw, kPitch, kRoll}) p.genetic.mutation[angle] = mutation_angle_;
-    p.clusters = {cluster_link_, static_cast<size_t>(cluster_least_())};
-    p.fusion = {sigma_, confidence_min_};
     try {
-      fusion_.emplace(laser_.capacity().count, vision_.capacity().count, p);
+      fusion_.emplace(laser_.capacity().count, vision_.capacity().count, parameters());
     } catch (const std::invalid_argument& problem) {
       throw SetupError(problem.what());
     }
     fused_.reserve(laser_.capacity());
     match_.reserve(laser_.capacity());
   }
+
+  void changed() override { fusion_->tune(parameters()); }
 
   void run(Job& job) override {
     if (fusion_->idle() && !begin()) return job.no_result();
@@ -77,6 +66,23 @@ class LaserFusionNode final : public Node {
   }
 
  private:
+  LaserFusionParameters parameters() const {
+    LaserFusionParameters p;
+    p.search_points = static_cast<size_t>(points_());
+    p.vision_points = static_cast<size_t>(vision_points_());
+    p.quality.metric = metric_() == 0 ? Metric::truncated : Metric::thesis;
+    p.quality.cut_m = cut_;
+    p.genetic.population = static_cast<size_t>(population_());
+    p.genetic.generations = static_cast<uint32_t>(generations_());
+    p.genetic.patience = static_cast<uint32_t>(patience_());
+    p.genetic.locks = locks_of(locked_);
+    for (const Parameter axis : {kX, kY, kZ}) p.genetic.mutation[axis] = mutation_distance_;
+    for (const Parameter angle : {kYaw, kPitch, kRoll}) p.genetic.mutation[angle] = mutation_angle_;
+    p.clusters = {cluster_link_, static_cast<size_t>(cluster_least_())};
+    p.fusion = {sigma_, confidence_min_};
+    return p;
+  }
+
   /// Takes a pair of clouds of which one is new; false without.
   bool begin() {
     const PointCloud *laser = laser_.newest(), *vision = vision_.newest();
@@ -119,15 +125,17 @@ class LaserFusionNode final : public Node {
                      "the camera in the laser's frame, best so far, from each job; its covariance is not known: 0"};
   Output<PointCloud> fused_{this, "fused", "once the search is done: laser points with colours, in the laser's frame"};
   Output<PointCloud> match_{this, "match", "the same points; green is their match probability in 1/255, red the rest"};
-  Param<int> points_{this, "points", 1000, {50, 20'000}, "", "of each cloud in the search, at most"};
-  Param<int> vision_points_{this, "vision_points", 10'000, {50, 200'000}, "", "that lend their colours, at most"};
+  Param<int> points_{this, "points", 1000, {50, 20'000}, "", "of each cloud in the search, at most", kSizesMemory};
+  Param<int> vision_points_{this,        "vision_points", 10'000, {50, 200'000}, "", "that lend their colours, at most",
+                            kSizesMemory};
   Choice metric_{this,
                  "metric",
                  "truncated",
                  {"truncated", "thesis"},
                  "what is minimised: the mean of min(distance, cut), or Eq. 4.18, which wrong poses can win"};
   Param<double> cut_{this, "cut", 0.25, {0.005, 10.0}, "m", "points at most so far apart are pairs"};
-  Param<int> population_{this, "population", 100, {2, 10'000}, "", "poses that have offspring; 50 to 200 advised"};
+  Param<int> population_{
+      this, "population", 100, {2, 10'000}, "", "poses that have offspring; 50 to 200 advised", kSizesMemory};
   Param<int> generations_{this, "generations", 25'000, {1, 10'000'000}, "", "ICP steps of a search"};
   Param<int> patience_{this, "patience", 1000, {0, 10'000'000}, "", "without a gain it begins anew; 0: never"};
   Param<int> per_job_{this, "per_job", 1000, {8, 1'000'000}, "", "of these, in one job"};

@@ -22,6 +22,8 @@ class Matcher final : public PoseJudge {
   /// The same in portions: nothing may be judged before go_on() has said that it is done.
   void begin(std::span<const Point> fixed, std::span<const Point> moving);
   bool go_on() { return table_.go_on(); }
+  /// From the next clouds on.
+  void tune(const QualityParameters& parameters) { parameters_ = parameters; }
   /// Another cut for the same clouds.
   void set_cut(double cut_m);
 

@@ -103,7 +103,8 @@ class LoadNode final : public Node {
       0,    {0, 1'000'000'000},
       "1",  "first number in a message of `input` whose job ends the process by SIGABRT; 0: none does"};
   Param<int> crash_to_{this, "crash_to", 0, {0, 1'000'000'000}, "1", "last of these numbers"};
-  Param<int> message_size_{this, "message_size", 64, {20, 16'000'000}, "1", "capacity of the output, characters"};
+  Param<int> message_size_{this,        "message_size", 64, {20, 16'000'000}, "1", "capacity of the output, characters",
+                           kSizesMemory};
   Param<bool> flood_{this, "flood", false, "", "fills each message up to the capacity and sends until it is refused"};
 
   bool real_ = true;

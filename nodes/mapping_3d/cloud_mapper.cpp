@@ -19,6 +19,13 @@ CloudMapper::CloudMapper(const MapperParameters& parameters, size_t pixels)
   }
 }
 
+void CloudMapper::tune(MapperParameters parameters) {
+  parameters.views = p_.views;
+  parameters.range_max_m = p_.range_max_m;
+  parameters.map = p_.map;
+  p_ = parameters;
+}
+
 DepthView CloudMapper::Kept::view() {
   return {camera, camera_in_map, std::span(depth_m).first(camera.pixels()),
           std::span(colour).first(coloured ? camera.pixels() : 0)};

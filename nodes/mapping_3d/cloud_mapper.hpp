@@ -37,6 +37,8 @@ struct FusedCloud {
 class CloudMapper {
  public:
   CloudMapper(const MapperParameters& parameters, size_t pixels);
+  /// From the next view on; views, range_max_m and the map's own parameters stay as they were.
+  void tune(MapperParameters parameters);
 
   /// The newest view: it is kept, the oldest of a full window goes, and the view in the middle, which others have seen
   /// from both sides, is fused from all and added to the map. How long that takes depends on the view alone.

@@ -37,18 +37,7 @@ class MappingNode final : public Node {
     for (OutputPort* out : outputs()) out->stamped_by({&cloud_});
   }
   void setup(Setup& setup) override {
-    if (range_min_ >= range_max_)
-      throw SetupError("range_min is " + range_min_.value_text() +
-                       " m, must lie below range_max = " + range_max_.value_text() + " m");
-    obstacle_parameters_.voxel_m = voxel_;
-    obstacle_parameters_.robot_height_m = robot_height_;
-    obstacle_parameters_.z_floor_m = z_floor_;
-    obstacle_parameters_.slope = std::tan(slope_());
-    obstacle_parameters_.share = share_;
-    obstacle_parameters_.n_abs = n_abs_;
-    obstacle_parameters_.range_min_m = range_min_;
-    obstacle_parameters_.range_max_m = range_max_;
-    obstacle_parameters_.evidence = evidence_;
+    obstacle_parameters_ = obstacle_parameters();
     grid_ = ObstacleGrid(obstacle_parameters_);
     const auto side = static_cast<uint32_t>(grid_.shape().cells);
     obstacles_.reserve({side, side, 1, 0});
@@ -60,8 +49,18 @@ class MappingNode final : public Node {
     }
     // Nothing says how views lie to each other without poses.
     if (window_ > 1 && has_poses()) views_.emplace(window_, grid_.shape());
-    mount_ = camera_mount(camera_x_, camera_y_, camera_height_, 0, camera_tilt_);
     set_up_map(setup);
+    changed();
+  }
+
+  void changed() override {
+    if (outlier_radius_ > 0 && !filter_)
+      throw SetupError("outlier_radius was 0 at the start, and no memory was taken for the removal; start with it");
+    obstacle_parameters_ = obstacle_parameters();
+    grid_.tune(obstacle_parameters_);
+    const MapperParameters mapper = mapper_parameters();
+    if (mapper_) mapper_->tune(mapper);
+    mount_ = camera_mount(camera_x_, camera_y_, camera_height_, 0, camera_tilt_);
   }
 
   void start(int64_t) override {
@@ -128,6 +127,36 @@ class MappingNode final : public Node {
   }
 
  private:
+  ObstacleParameters obstacle_parameters() const {
+    if (range_min_ >= range_max_)
+      throw SetupError("range_min is " + range_min_.value_text() +
+                       " m, must lie below range_max = " + range_max_.value_text() + " m");
+    ObstacleParameters p;
+    p.voxel_m = voxel_;
+    p.robot_height_m = robot_height_;
+    p.z_floor_m = z_floor_;
+    p.slope = std::tan(slope_());
+    p.share = share_;
+    p.n_abs = n_abs_;
+    p.range_min_m = range_min_;
+    p.range_max_m = range_max_;
+    p.evidence = evidence_;
+    return p;
+  }
+
+  MapperParameters mapper_parameters() const {
+    MapperParameters p;
+    p.views = static_cast<size_t>(views_fused_());
+    p.range_max_m = range_max_;
+    p.clear = clear_;
+    p.fusion.steps = tolerance_;
+    p.fusion.support = support_;
+    p.map.voxel_m = map_voxel_;
+    p.map.tile_m = tile_;
+    p.map.tiles = static_cast<size_t>(tiles_());
+    return p;
+  }
+
   /// The map is made if somebody wants it.
   void set_up_map(Setup& setup) {
     const auto read = [&](const std::string& file) { return setup.directory / file; };
@@ -139,16 +168,7 @@ class MappingNode final : public Node {
     save_to_ = setup.output / save_();
     if (!fused_cloud_.connected() && !map_.connected() && save_().empty()) return;
     if (cloud_.capacity().count == 0) return;
-    MapperParameters p;
-    p.views = static_cast<size_t>(views_fused_());
-    p.range_max_m = range_max_;
-    p.clear = clear_;
-    p.fusion.steps = tolerance_;
-    p.fusion.support = support_;
-    p.map.voxel_m = map_voxel_;
-    p.map.tile_m = tile_;
-    p.map.tiles = static_cast<size_t>(tiles_());
-    mapper_.emplace(p, cloud_.capacity().count);
+    mapper_.emplace(mapper_parameters(), cloud_.capacity().count);
     if (!load_().empty()) {
       auto cloud = cloud::read_cloud(read(load_));
       if (!cloud) throw SetupError("load: " + cloud.error());
@@ -303,7 +323,7 @@ class MappingNode final : public Node {
   }
 
   std::span<const Point> without_outliers(std::span<const Point> points) {
-    if (!filter_) return points;
+    if (!filter_ || outlier_radius_ <= 0) return points;
     const cloud::OutlierParameters p{outlier_radius_, cloud::scaled_n_min(outlier_n_min_, points.size())};
     const std::span<uint8_t> keep = std::span(keep_).first(points.size());
     filter_->filter(points, p, keep);
@@ -353,8 +373,9 @@ class MappingNode final : public Node {
   Param<int> outlier_n_min_{this, "outlier_n_min",
                             100,  {1, 100000},
                             "",   "others within the radius that a point needs, for a cloud of 1.2 million points"};
-  Param<double> voxel_{this, "voxel", 0.20, {0.05, 1.0}, "m", "edge of a voxel and of a cell"};
-  Param<double> robot_height_{this, "robot_height", 1.78, {0.1, 5.0}, "m", "higher points are no obstacles"};
+  Param<double> voxel_{this, "voxel", 0.20, {0.05, 1.0}, "m", "edge of a voxel and of a cell", kSizesMemory};
+  Param<double> robot_height_{this,        "robot_height", 1.78, {0.1, 5.0}, "m", "higher points are no obstacles",
+                              kSizesMemory};
   Param<double> z_floor_{this, "z_floor", 0.07, {-1.0, 1.0}, "m", "lower points are floor"};
   Param<double> slope_{this,       "slope", 0.1745,
                        {0.0, 1.0}, "rad",   "the floor may be so steep; 0: it is z = 0 everywhere"};
@@ -362,7 +383,7 @@ class MappingNode final : public Node {
                        {0.0, 1.0}, "1",     "points of a blocked voxel, share of a fully covered face"};
   Param<int> n_abs_{this, "n_abs", 5, {0, 100000}, "", "a blocked voxel has more points than this"};
   Param<double> range_min_{this, "range_min", 0.8, {0.0, 100.0}, "m", "nearer cells are not seen"};
-  Param<double> range_max_{this, "range_max", 6.0, {0.5, 50.0}, "m", "farther cells are not seen"};
+  Param<double> range_max_{this, "range_max", 6.0, {0.5, 50.0}, "m", "farther cells are not seen", kSizesMemory};
   Param<double> laser_step_{this,          "laser_step", 0.0087,
                             {0.0005, 0.1}, "rad",        "between two beams, for clouds without a camera"};
   Param<bool> evidence_{this, "evidence", false, "", "a cell is free only if its column holds a point"};
@@ -378,22 +399,26 @@ class MappingNode final : public Node {
   Param<double> camera_tilt_{this,        "camera_tilt", 0.0,
                              {-1.6, 1.6}, "rad",         "camera tilt, up positive, where the cloud does not say"};
 
-  Param<int> window_{this, "window", 5, {1, 16}, "", "clouds that the grid is merged from; without poses always 1"};
-  Param<int> views_fused_{this, "views", 5, {1, 16}, "", "clouds of a camera that are fused into one"};
+  Param<int> window_{
+      this, "window", 5, {1, 16}, "", "clouds that the grid is merged from; without poses always 1", kSizesMemory};
+  Param<int> views_fused_{this, "views", 5, {1, 16}, "", "clouds of a camera that are fused into one", kSizesMemory};
   Param<int> support_{this, "support", 2, {1, 16}, "", "of these, so many must agree on a point"};
   Param<double> tolerance_{this,       "tolerance", 1.0,
                            {0.0, 4.0}, "",          "points agree within so many steps of the disparity"};
-  Param<double> map_voxel_{this,        "map_voxel", 0.05,
-                           {0.01, 1.0}, "m",         "edge of the voxels of which the map keeps one point"};
-  Param<double> tile_{this, "tile", 3.0, {0.5, 50.0}, "m", "the map gets a tile where none was begun so near"};
-  Param<int> tiles_{this, "tiles", 24, {2, 256}, "", "of the map, 0.9 MB each; then the farthest makes room"};
+  Param<double> map_voxel_{
+      this, "map_voxel", 0.05, {0.01, 1.0}, "m", "edge of the voxels of which the map keeps one point", kReadAtStart};
+  Param<double> tile_{this,        "tile", 3.0, {0.5, 50.0}, "m", "the map gets a tile where none was begun so near",
+                      kReadAtStart};
+  Param<int> tiles_{this,        "tiles", 24, {2, 256}, "", "of the map, 0.9 MB each; then the farthest makes room",
+                    kSizesMemory};
   Param<bool> clear_{this, "clear", true, "", "points that later views look through go"};
   Param<double> map_range_{this, "map_range", 10.0, {0.1, 1000.0}, "m", "of the output `map`"};
-  Param<int> map_count_{this, "map_count", 100000, {1, 10000000}, "", "points of the output `map`, at most"};
+  Param<int> map_count_{this,        "map_count", 100000, {1, 10000000}, "", "points of the output `map`, at most",
+                        kSizesMemory};
   Param<double> reserve_{this,       "reserve", 0.005,
                          {0.0, 1.0}, "s",       "with less time left the map is not looked through any further"};
-  Param<std::string> save_{this, "save", "", "",
-                           "folder for map.ply, map.yaml and map.png at the end of a run; empty: none"};
+  Param<std::string> save_{
+      this, "save", "", "", "folder for map.ply, map.yaml and map.png at the end of a run; empty: none", kReadAtStart};
   Param<std::string> load_{this, "load", "", kPath, "PLY or PCD file that the map begins with; empty: none"};
   Param<std::string> load_grid_{this, "load_grid", "", kPath, "YAML file of a grid, for `fused`; empty: none"};
 

@@ -24,7 +24,15 @@ ObstacleGrid::ObstacleGrid(const ObstacleParameters& parameters) : p_(parameters
   blocked_.resize(counts_.size());
   seen_.resize(columns);
   floor_.resize(columns);
-  if (p_.slope > 0) plan_steps();
+  plan_steps();
+}
+
+void ObstacleGrid::tune(ObstacleParameters parameters) {
+  parameters.voxel_m = p_.voxel_m;
+  parameters.robot_height_m = p_.robot_height_m;
+  parameters.range_max_m = p_.range_max_m;
+  parameters.margin_m = p_.margin_m;
+  p_ = parameters;
 }
 
 void ObstacleGrid::plan_steps() {

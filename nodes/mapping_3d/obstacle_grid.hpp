@@ -63,6 +63,8 @@ class ObstacleGrid {
  public:
   ObstacleGrid() = default;
   explicit ObstacleGrid(const ObstacleParameters& parameters);
+  /// From the next fill() on; voxels, range_max_m and robot_height_m stay as they were.
+  void tune(ObstacleParameters parameters);
   GridShape shape() const { return shape_; }
 
   /// Cells of the present cloud alone: kOccupied if a voxel of the column from the floor to the robot's height is

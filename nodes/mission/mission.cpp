@@ -35,8 +35,14 @@ drive_arbiter::VisionState vision_of(State state) {
 }
 
 Mission::Mission(const MissionParameters& parameters, const WayAheadParameters& ways, size_t most_cells)
-    : parameters_(parameters), ways_(most_cells, ways) {
+    : ways_(most_cells, ways) {
+  tune(parameters, ways);
+}
+
+void Mission::tune(const MissionParameters& parameters, const WayAheadParameters& ways) {
+  parameters_ = parameters;
   parameters_.readings = std::clamp<size_t>(parameters_.readings, 1, kMostReadings);
+  ways_.tune(ways);
 }
 
 void Mission::enter(State state) {
@@ -116,7 +122,7 @@ void Mission::seek(const Percept& percept) {
 
 void Mission::read(const Percept& percept) {
   if (percept.pointed_rad) readings_rad_[read_++] = *percept.pointed_rad;
-  if (read_ == parameters_.readings) {
+  if (read_ >= parameters_.readings) {
     direction_rad_ = middle_direction(std::span(readings_rad_).first(read_));
     return turn_to_direction(percept.robot, State::turn);
   }

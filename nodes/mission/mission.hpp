@@ -62,6 +62,8 @@ class Mission {
  public:
   /// For grids of at most so many cells.
   Mission(const MissionParameters& parameters, const WayAheadParameters& ways, size_t most_cells);
+  /// From the next step() on.
+  void tune(const MissionParameters& parameters, const WayAheadParameters& ways);
   /// Tasks are numbered from the one after this on.
   void go_on_after(uint32_t task) { number_ = task; }
 

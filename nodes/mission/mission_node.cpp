@@ -31,17 +31,7 @@ using drive_arbiter::VisionState;
 class MissionNode final : public Node {
  public:
   void setup(Setup&) override {
-    MissionParameters p;
-    p.view_m = view_;
-    p.readings = static_cast<size_t>(readings_());
-    p.stop_before_m = stop_before_;
-    p.cross_least_m = cross_least_;
-    p.patience_s = patience_;
-    p.crossings = crossings_;
-    p.beyond_m = beyond_;
-    WayAheadParameters ways;
-    ways.path.clearance_m = clearance_;
-    mission_.emplace(p, ways, grid_.capacity().pixels());
+    mission_.emplace(parameters(), ways(), grid_.capacity().pixels());
     set_nodes(VisionState::search, search_nodes_);
     set_nodes(VisionState::pose, pose_nodes_);
     set_nodes(VisionState::tracking, tracking_nodes_);
@@ -50,6 +40,8 @@ class MissionNode final : public Node {
          {static_cast<OutputPort*>(&task_), static_cast<OutputPort*>(&wanted_), static_cast<OutputPort*>(&status_)})
       text->reserve({0, 0, 1, kCharacters});
   }
+
+  void changed() override { mission_->tune(parameters(), ways()); }
 
   void start(int64_t) override {
     if (const RobotTask* last = task_.handed_over()) mission_->go_on_after(last->number);
@@ -85,6 +77,24 @@ class MissionNode final : public Node {
     VisionState runs_in;
     Request stop;
   };
+
+  MissionParameters parameters() const {
+    MissionParameters p;
+    p.view_m = view_;
+    p.readings = static_cast<size_t>(readings_());
+    p.stop_before_m = stop_before_;
+    p.cross_least_m = cross_least_;
+    p.patience_s = patience_;
+    p.crossings = crossings_;
+    p.beyond_m = beyond_;
+    return p;
+  }
+
+  WayAheadParameters ways() const {
+    WayAheadParameters ways;
+    ways.path.clearance_m = clearance_;
+    return ways;
+  }
 
   void set_nodes(VisionState vision, const Param<std::string>& nodes) {
     const auto list = semantic::parse_node_list(nodes());
@@ -194,9 +204,11 @@ class MissionNode final : public Node {
   Output<Requests> requests_{this, "requests", "nodes that this state of vision does not need; with every job"};
   Output<TextStatus> status_{this, "status", "one line: state, task or trouble, crossings, direction"};
   Param<std::string> pedestrian_{this, "pedestrian", "human", "", "type of those that can be asked"};
-  Param<std::string> search_nodes_{this, "search_nodes", "", "", "nodes that run in the state search only"};
-  Param<std::string> pose_nodes_{this, "pose_nodes", "", "", "nodes that run in the state pose only"};
-  Param<std::string> tracking_nodes_{this, "tracking_nodes", "", "", "nodes that run in the state tracking only"};
+  Param<std::string> search_nodes_{this,        "search_nodes", "", "", "nodes that run in the state search only",
+                                   kSizesMemory};
+  Param<std::string> pose_nodes_{this, "pose_nodes", "", "", "nodes that run in the state pose only", kSizesMemory};
+  Param<std::string> tracking_nodes_{this,        "tracking_nodes", "", "", "nodes that run in the state tracking only",
+                                     kSizesMemory};
   Param<double> view_{this,       "view", MissionParameters{}.view_m,
                       {0.0, 5.0}, "m",    "from so far off the whole person asked is seen; nearer, it steps back"};
   Param<int> readings_{this, "readings", 8, {1, kMostReadings}, "", "of his arm, until the direction counts"};

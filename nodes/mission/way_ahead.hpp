@@ -21,6 +21,11 @@ class WayAhead {
  public:
   /// For grids of at most so many cells.
   WayAhead(size_t most_cells, const WayAheadParameters& parameters);
+  /// From the next call of next() on.
+  void tune(const WayAheadParameters& parameters) {
+    parameters_ = parameters;
+    planner_.tune(parameters.path);
+  }
 
   /// The known and free place that lies farthest along the direction (from the map's x axis), least beside it and at
   /// most 45 degrees off, to which a way leads over the grid. None: there is no such place, or the grid is larger than

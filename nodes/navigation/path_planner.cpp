@@ -2,6 +2,7 @@
 #include "nodes/navigation/path_planner.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace takt::navigation {
 namespace {
@@ -51,7 +52,8 @@ bool PathPlanner::look(const OccupancyView& grid) {
   const size_t cells = static_cast<size_t>(grid.cells.width) * static_cast<size_t>(grid.cells.height);
   if (cells > apart_.size()) return false;
   grid_ = grid;
-  const double clearance = parameters_.clearance_m / grid.cell_m;
+  looked_m_ = parameters_.clearance_m;
+  const double clearance = looked_m_ / grid.cell_m;
   blocked_ = static_cast<int32_t>(std::ceil(clearance * clearance - kRounding));
   for (int row = 0; row < grid.cells.height; ++row)
     for (int column = 0; column < grid.cells.width; ++column)
@@ -63,8 +65,9 @@ bool PathPlanner::look(const OccupancyView& grid) {
 
 void PathPlanner::remember(StateArchive& archive) {
   OccupancyView grid = grid_;
+  double looked_m = looked_m_;
   TAKT_STATE(archive, grid.cells.width, grid.cells.height, grid.cell_m, grid.origin_x_m, grid.origin_y_m, cost_,
-             expanded_);
+             expanded_, looked_m);
   archive.room(apart_.size() / 4 + 1);
   const auto width = static_cast<size_t>(std::max(0, grid.cells.width)),
              height = static_cast<size_t>(std::max(0, grid.cells.height));
@@ -83,7 +86,9 @@ void PathPlanner::remember(StateArchive& archive) {
   }
   if (!archive.loads() || archive.failed() || cells.empty()) return;
   grid.cells.data = cells.data();
+  const double now_m = std::exchange(parameters_.clearance_m, looked_m);
   look(grid);
+  parameters_.clearance_m = now_m;
 }
 
 /// First along each column, then over the columns as far as the clearance reaches.

@@ -43,6 +43,8 @@ class PathPlanner {
  public:
   /// For grids of at most so many cells.
   PathPlanner(size_t most_cells, const PathParameters& parameters);
+  /// From the next look() on.
+  void tune(const PathParameters& parameters) { parameters_ = parameters; }
 
   /// Looks at the grid anew; the ways before hold no longer. False: the grid is larger than the constructor was told.
   bool look(const OccupancyView& grid);
@@ -105,6 +107,7 @@ class PathPlanner {
 
   PathParameters parameters_;
   OccupancyView grid_;
+  double looked_m_ = 0;  ///< clearance of the newest look
   int32_t blocked_ = 0;  ///< cells that are no farther apart from an occupied one are
   /// From the nearest occupied cell, as far as blocked_: 0 it is that, else 1 + the square of the cells between them.
   std::vector<int32_t> apart_;

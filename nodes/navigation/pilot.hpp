@@ -39,6 +39,11 @@ enum class Behaviour : uint8_t { stand, drive_to, rotate, straight_ahead };
 class Pilot {
  public:
   explicit Pilot(const PilotParameters& parameters);
+  /// From the next step() on; ways stay as long as they could be.
+  void tune(PilotParameters parameters) {
+    parameters.most_places = parameters_.most_places;
+    parameters_ = parameters;
+  }
 
   /// Ends what is going on; the speed falls within its limits.
   void stand() { behaviour_ = Behaviour::stand; }

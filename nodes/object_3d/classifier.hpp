@@ -46,6 +46,8 @@ struct NearestParameters {
 class NearestNeighbour final : public Classifier {
  public:
   NearestNeighbour(const Training& training, const NearestParameters& parameters);
+  /// From the next classify() on.
+  void tune(const NearestParameters& parameters) { parameters_ = parameters; }
   Answer classify(const Attributes& attributes) override;
 
  private:

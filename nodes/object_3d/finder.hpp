@@ -62,6 +62,8 @@ class ObjectFinder {
  public:
   /// For clouds of up to `capacity` points. `classifier` may be null: then all are unknown; it is used, not owned.
   ObjectFinder(size_t capacity, size_t most_objects, const FinderParameters& parameters, Classifier* classifier);
+  /// From the next run() on.
+  void tune(const FinderParameters& parameters) { parameters_ = parameters; }
 
   /// `boxes` are read with SeedSource::boxes alone. `may_go_on()` is asked about
   /// every tenth of a millisecond of growing and before each description; after a no the objects complete so far are

@@ -4,6 +4,7 @@
 #include <numbers>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "nodes/object_3d/finder.hpp"
 #include "rt/msg/ace/detections.hpp"
@@ -49,20 +50,20 @@ Object3d message_of(const FoundObject& found) {
 class Object3dNode final : public Node {
  public:
   void setup(Setup& setup) override {
-    FinderParameters p = parameters();
-    if (p.seeds == SeedSource::boxes && !detections_.connected())
-      throw SetupError("seeds is boxes, which come with `detections`: connect it, or choose standing or colour");
-    if (p.support.low_m >= p.support.high_m)
-      throw SetupError("support_low is " + support_low_.value_text() +
-                       " m, must lie below support_high = " + support_high_.value_text() + " m");
     try {
-      if (!training_().empty()) classifier_ = make_classifier(read_training(setup.directory / training_()));
+      if (!training_().empty()) make_classifier(read_training(setup.directory / training_()));
     } catch (const TrainingError& error) {
       throw SetupError(error.what());
     }
     const auto objects = static_cast<uint32_t>(max_objects_());
-    finder_.emplace(cloud_.capacity().count, objects, p, classifier_.get());
+    finder_.emplace(cloud_.capacity().count, objects, parameters(), classifier_.get());
     objects_.reserve({0, 0, 1, objects});
+  }
+
+  void changed() override {
+    finder_->tune(parameters());
+    const NearestParameters nearest{s_, t_q_, t_p_};
+    if (nearest_ != nullptr) nearest_->tune(nearest);
   }
 
   void run(Job& job) override {
@@ -94,6 +95,11 @@ class Object3dNode final : public Node {
   }
 
   FinderParameters parameters() const {
+    if (seeds_() == static_cast<size_t>(SeedSource::boxes) && !detections_.connected())
+      throw SetupError("seeds is boxes, which come with `detections`: connect it, or choose standing or colour");
+    if (support_low_ >= support_high_)
+      throw SetupError("support_low is " + support_low_.value_text() +
+                       " m, must lie below support_high = " + support_high_.value_text() + " m");
     FinderParameters p;
     p.seeds = static_cast<SeedSource>(seeds_());
     p.colour = {hue_low_ / kDegree, hue_high_ / kDegree, saturation_low_, saturation_high_, value_low_, value_high_};
@@ -110,12 +116,18 @@ class Object3dNode final : public Node {
     return p;
   }
 
-  std::unique_ptr<Classifier> make_classifier(const Training& training) const {
-    if (classifier_kind_() == 0) return std::make_unique<NearestNeighbour>(training, NearestParameters{s_, t_q_, t_p_});
-    const auto scheme = classifier_kind_() == 1 ? SvmScheme::one_vs_rest : SvmScheme::pairwise;
-    return std::make_unique<SupportVectorMachines>(training, SvmParameters{scheme, svm_c_, svm_gamma_});
+  void make_classifier(const Training& training) {
+    if (classifier_kind_() == 0) {
+      auto nearest = std::make_unique<NearestNeighbour>(training, NearestParameters{s_, t_q_, t_p_});
+      nearest_ = nearest.get();
+      classifier_ = std::move(nearest);
+    } else {
+      const auto scheme = classifier_kind_() == 1 ? SvmScheme::one_vs_rest : SvmScheme::pairwise;
+      classifier_ = std::make_unique<SupportVectorMachines>(training, SvmParameters{scheme, svm_c_, svm_gamma_});
+    }
   }
 
+  static constexpr Fixed kTrainedAtStart{"trained at start"};
   static constexpr double kDegree = std::numbers::pi / 180;
 
   Input<PointCloud> cloud_{this, "cloud", "coloured points of a camera; the newest one is searched, once"};
@@ -160,16 +172,20 @@ class Object3dNode final : public Node {
                           "classifier",
                           "nearest",
                           {"nearest", "one_vs_rest", "pairwise"},
-                          "nearest neighbour with rejection, or support vector machines"};
+                          "nearest neighbour with rejection, or support vector machines",
+                          kTrainedAtStart};
   Param<double> s_{this, "s", 1.0, {0.01, 100.0}, "1", "nearest: width of the likeness, in deviations"};
   Param<double> t_q_{this, "t_q", 0.1, {0.0, 1.0}, "1", "nearest: smallest likeness that is no unknown"};
   Param<double> t_p_{this, "t_p", 0.6, {0.0, 1.0}, "1", "nearest: smallest probability that is no unknown"};
-  Param<double> svm_c_{this, "svm_c", 1.0, {1e-3, 1e6}, "1", "machines: price of a sample on the wrong side"};
-  Param<double> svm_gamma_{this, "svm_gamma", 0.0, {0.0, 1e3}, "1", "machines: of exp(-gamma d^2); 0: 1 / attributes"};
-  Param<int> max_objects_{this, "max_objects", 32, {1, 1000}, "", "at most so many"};
+  Param<double> svm_c_{this,           "svm_c", 1.0, {1e-3, 1e6}, "1", "machines: price of a sample on the wrong side",
+                       kTrainedAtStart};
+  Param<double> svm_gamma_{
+      this, "svm_gamma", 0.0, {0.0, 1e3}, "1", "machines: of exp(-gamma d^2); 0: 1 / attributes", kTrainedAtStart};
+  Param<int> max_objects_{this, "max_objects", 32, {1, 1000}, "", "at most so many", kSizesMemory};
   Param<double> reserve_{this, "reserve", 0.001, {0.0, 1.0}, "s", "with less time left than this the search ends"};
 
   std::unique_ptr<Classifier> classifier_;
+  NearestNeighbour* nearest_ = nullptr;  ///< the classifier, if it is that
   std::optional<ObjectFinder> finder_;
 };
 

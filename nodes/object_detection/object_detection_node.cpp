@@ -164,10 +164,15 @@ class ObjectDetectionNode final : public Node {
       this, "roi",
       "one pixel per search window of the first scale, 255 where it passed, or one of another scale around its middle"};
 
+  static constexpr Fixed kLearntAtStart{"learnt at start"};
   Param<std::string> database_{this, "database", "objects", kPath,
                                "folder with objects.txt and the reference views it names"};
-  Param<std::string> scales_{this, "scales", "1", "1",
-                             "of the image at which windows are searched, such as 1+0.7+0.5; falling, 0.5 or more"};
+  Param<std::string> scales_{this,
+                             "scales",
+                             "1",
+                             "1",
+                             "of the image at which windows are searched, such as 1+0.7+0.5; falling, 0.5 or more",
+                             kSizesMemory};
   Param<std::string> revision_{this, "revision", "", "",
                                "of the database, as `takt objects publish` names it; empty: as it was at the start"};
   Choice stages_{this,
@@ -175,26 +180,34 @@ class ObjectDetectionNode final : public Node {
                  "ch+hog+cch",
                  {"ch", "ch+hog", "ch+hog+cch", "ch+hog+cch+layout"},
                  "colours, oriented gradients, colour co-occurrences, and where these are; each looks at what passed "
-                 "the one before"};
-  Choice bins_{this, "bins", "64x64x1", {"64x32x2", "64x64x1"}, "bins of hue x saturation x value"};
-  Choice orientations_{this, "orientations", "360", {"8", "32", "180", "360"}, "bins of the gradient's orientation"};
-  Choice pairs_{this, "pairs", "20x25", {"5x5", "20x5", "5x25", "20x25"}, "colours x distances of co-occurrences"};
-  Param<int> reference_{this, "reference", 48, {4, 254}, "px", "edge of the reference views"};
-  Param<int> window_{this,     "window", 64,
-                     {5, 255}, "px",     "edge of a search window; neighbours overlap by the reference's edge"};
+                 "the one before",
+                 kLearntAtStart};
+  Choice bins_{this, "bins", "64x64x1", {"64x32x2", "64x64x1"}, "bins of hue x saturation x value", kLearntAtStart};
+  Choice orientations_{
+      this, "orientations", "360", {"8", "32", "180", "360"}, "bins of the gradient's orientation", kLearntAtStart};
+  Choice pairs_{
+      this,          "pairs", "20x25", {"5x5", "20x5", "5x25", "20x25"}, "colours x distances of co-occurrences",
+      kLearntAtStart};
+  Param<int> reference_{this, "reference", 48, {4, 254}, "px", "edge of the reference views", kLearntAtStart};
+  Param<int> window_{this,        "window", 64,
+                     {5, 255},    "px",     "edge of a search window; neighbours overlap by the reference's edge",
+                     kSizesMemory};
   Param<double> smallest_{
-      this, "smallest",
-      0.7,  {0.5, 1.0},
-      "1",  "size, of the views' edge, down to which objects are found: views are compared with at that size"};
-  Param<double> tolerance_{
-      this, "tolerance", 0.4, {0.0, 0.75}, "1", "share of an object that may be hidden; added to automatic thresholds"};
+      this,          "smallest",
+      0.7,           {0.5, 1.0},
+      "1",           "size, of the views' edge, down to which objects are found: views are compared with at that size",
+      kLearntAtStart};
+  Param<double> tolerance_{this,          "tolerance",
+                           0.4,           {0.0, 0.75},
+                           "1",           "share of an object that may be hidden; added to automatic thresholds",
+                           kLearntAtStart};
   Param<double> threshold_scale_{
-      this, "threshold_scale", 1.0, {0.05, 4.0}, "1", "factor on the thresholds of the database"};
+      this, "threshold_scale", 1.0, {0.05, 4.0}, "1", "factor on the thresholds of the database", kLearntAtStart};
   Param<double> min_score_{this,       "min_score", 0.3,
                            {0.0, 1.0}, "1",         "smallest score (1 - error) of a detection; roi is not affected"};
   Param<double> reserve_{this,       "reserve", 0.001,
                          {0.0, 1.0}, "s",       "with less time left than this the search ends and its best is sent"};
-  Param<int> max_detections_{this, "max_detections", 32, {1, 1000}, "", "the best are kept"};
+  Param<int> max_detections_{this, "max_detections", 32, {1, 1000}, "", "the best are kept", kSizesMemory};
 
   std::function<std::unique_ptr<Detector>(const std::string&)> build_;
   std::unique_ptr<Detector> detector_;

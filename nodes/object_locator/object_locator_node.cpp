@@ -60,6 +60,8 @@ class ObjectLocatorNode final : public Node {
     reports_.reserve({0, 0, 1, detections_.capacity().count});
   }
 
+  void changed() override { locator_->tune({share_, valid_min_, agree_}); }
+
   void run(Job& job) override {
     const Detections* detections = detections_.newest();
     if (!detections || !detections_.is_new()) return job.no_result();

@@ -27,11 +27,16 @@ class ObstacleStopNode final : public Node {
   ObstacleStopNode() { stop_.stamped_by({&scan_}); }
 
   void setup(Setup&) override {
+    memory_ = SweepMemory(scan_.capacity().count);
+    changed();
+  }
+
+  void changed() override {
     footprint_ = footprint(width_, length_, margin_);
     wide_footprint_ = footprint(width_, length_, std::max<double>(margin_, moving_margin_));
-    memory_ = SweepMemory(scan_.capacity().count, nanoseconds(memory_span_));
-    field_ = FieldState(stop_reason::scan_lost, nanoseconds(release_after_));
-    line_ = LineState(static_cast<uint32_t>(stop_line_()), nanoseconds(hold_));
+    memory_.tune(nanoseconds(memory_span_));
+    field_.tune(nanoseconds(release_after_));
+    line_.tune(static_cast<uint32_t>(stop_line_()), nanoseconds(hold_));
   }
 
   void run(Job& job) override {

@@ -13,6 +13,7 @@ namespace takt::obstacle_stop {
 class FieldState {
  public:
   FieldState(uint32_t initial, int64_t release_after_ns) : held_(initial), release_after_ns_(release_after_ns) {}
+  void tune(int64_t release_after_ns) { release_after_ns_ = release_after_ns; }
   /// `reasons` of this job (bits of stop_reason; 0: the scan shows a free field); returns those in force.
   uint32_t update(uint32_t reasons, int64_t scan_stamp_ns);
   void remember(StateArchive& archive) { TAKT_STATE(archive, held_, free_since_ns_); }
@@ -28,6 +29,8 @@ class FieldState {
 class LineState {
  public:
   LineState(uint32_t line, int64_t hold_ns) : line_(line), hold_ns_(hold_ns) {}
+  /// A stop in force lasts as long as it would have; of another line its next reading tells.
+  void tune(uint32_t line, int64_t hold_ns) { line_ = line, hold_ns_ = hold_ns; }
   /// One reading that was not seen before; bits as in DigitalState.
   void see(uint32_t levels, uint32_t changed, int64_t now_ns);
   bool stops(int64_t now_ns) const { return low_ || (held_until_ns_ && now_ns < *held_until_ns_); }

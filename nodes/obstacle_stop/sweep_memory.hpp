@@ -19,6 +19,8 @@ class SweepMemory {
  public:
   /// For sweeps of at most `beams` beams and looking back for so long; one without beams remembers nothing.
   explicit SweepMemory(size_t beams = 0, int64_t span_ns = 0);
+  /// Looks back for so long from now on; a longer span fills as sweeps come.
+  void tune(int64_t span_ns) { span_ns_ = span_ns; }
 
   /// The ranges of `sweep`, taken by the robot at `robot`, of what has moved in, 0 for all others: returns within
   /// `reach_m` of the robot's centre where an earlier sweep of the last `span_ns` saw farther, in all beams within

@@ -32,6 +32,7 @@ Eigen::Matrix4d process_noise(const FilterParameters& p, double dt_s);
 class PersonFilter {
  public:
   explicit PersonFilter(const FilterParameters& parameters) : p_(parameters) {}
+  void tune(const FilterParameters& parameters) { p_ = parameters; }
   void begin(const Place& first);
   void predict(double dt_s);  ///< dt_s >= 0
   void update(const Place& seen);

@@ -25,6 +25,10 @@ enum class Sight : uint8_t { none, body, shirt };
 class PersonTracker {
  public:
   explicit PersonTracker(const TrackerParameters& parameters) : p_(parameters), filter_(parameters.filter) {}
+  void tune(const TrackerParameters& parameters) {
+    p_ = parameters;
+    filter_.tune(parameters.filter);
+  }
 
   /// One image: the shirts seen in it, the likeliest first, and bodies seen since the last one. Stamps do not fall. A
   /// track begins with the first shirt that is sure.

@@ -29,6 +29,13 @@ class PersonTracking {
   PersonTracking(int width, int height, int channels, const PersonTrackingParameters& parameters)
       : p_(parameters), search_(width, height, channels, parameters.finder), tracker_(parameters.tracker) {}
 
+  /// From the next image on, but for the finder's.
+  void tune(PersonTrackingParameters parameters) {
+    parameters.finder = p_.finder;
+    p_ = parameters;
+    tracker_.tune(parameters.tracker);
+  }
+
   /// Asks may_go_on() before each search of the image but the first; when that says no, with what was found so far.
   template <class MayGoOn>
   void look(const Frame& frame, std::span<const Place> bodies, const MayGoOn& may_go_on) {

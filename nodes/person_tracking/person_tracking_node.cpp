@@ -38,17 +38,12 @@ class PersonTrackingNode final : public Node {
     const Capacity& images = pair_.capacity();
     if (images.channels != 1 && images.channels != 3)
       throw SetupError("`pair` has " + std::to_string(images.channels) + " channels, must have 1 or 3");
-    PersonTrackingParameters p;
-    p.shirt.square_m = square_;
-    p.shirt.range_max_m = range_max_;
-    p.tracker.filter.acceleration = acceleration_;
-    p.tracker.confirm = confirm_;
-    p.tracker.lost_after_s = lost_after_;
-    p.tracker.shirt_within_s = shirt_within_;
     tracking_.emplace(static_cast<int>(images.width), static_cast<int>(images.height),
-                      static_cast<int>(images.channels), p);
+                      static_cast<int>(images.channels), parameters());
     shirts_.reserve({0, 0, 1, ChessboardFinder::kLevels * ChessboardFinder::kMostBoards});
   }
+
+  void changed() override { tracking_->tune(parameters()); }
 
   void run(Job& job) override {
     const StereoPair* pair = pair_.newest();
@@ -69,6 +64,17 @@ class PersonTrackingNode final : public Node {
   void remember(StateArchive& archive) override { TAKT_STATE(archive, tracking_); }
 
  private:
+  PersonTrackingParameters parameters() const {
+    PersonTrackingParameters p;
+    p.shirt.square_m = square_;
+    p.shirt.range_max_m = range_max_;
+    p.tracker.filter.acceleration = acceleration_;
+    p.tracker.confirm = confirm_;
+    p.tracker.lost_after_s = lost_after_;
+    p.tracker.shirt_within_s = shirt_within_;
+    return p;
+  }
+
   static bool is_known(const Transform& t) {
     return t.x != 0 || t.y != 0 || t.z != 0 || t.qx != 0 || t.qy != 0 || t.qz != 0;
   }

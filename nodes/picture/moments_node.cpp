@@ -38,7 +38,7 @@ std::string as_text(std::string_view words) {
 class MomentsNode final : public Node {
  public:
   void setup(Setup& setup) override {
-    directory_ = setup.output / directory_name_();
+    output_ = setup.output;
     moments_.resize(static_cast<size_t>(most_()));
     for (Moment& moment : moments_)
       moment.reserve(size_of(pair_), detections_.connected() ? detections_.capacity().count : 0, size_of(grid_),
@@ -61,18 +61,19 @@ class MomentsNode final : public Node {
 
   void finish() override {
     if (used_ == 0) return;
+    const std::filesystem::path directory = output_ / directory_name_();
     std::error_code ignored;
-    std::filesystem::create_directories(directory_, ignored);  // what is written then says whether it worked
+    std::filesystem::create_directories(directory, ignored);  // what is written then says whether it worked
     std::ostringstream page;
     page << "<!doctype html><meta charset=\"utf-8\"><title>what the robot knew</title>\n"
             "<style>body{font:15px sans-serif;margin:2em}img{max-width:100%;border:1px solid #ccc}</style>\n"
             "<h1>What the robot knew</h1>\n<p>What its camera saw, its map, and the semantic network, whenever the "
             "robot said something or one of the objects had changed.</p>\n";
-    for (size_t i = 0; i < used_; ++i) write(i, page);
+    for (size_t i = 0; i < used_; ++i) write(i, directory, page);
     if (left_out_ > 0)
       page << "<p>" << left_out_ << " more are not shown: the node keeps the first " << moments_.size()
            << " (parameter most).</p>\n";
-    complain(write_file(directory_ / "index.html", page.str()));
+    complain(write_file(directory / "index.html", page.str()));
   }
 
   /// The moments are left out: those of a replay are its own.
@@ -158,10 +159,10 @@ class MomentsNode final : public Node {
       keep_boxes(detections_[*found.boxes], into.boxes);
   }
 
-  void write(size_t i, std::ostream& page) const {
+  void write(size_t i, const std::filesystem::path& directory, std::ostream& page) const {
     const Moment& moment = moments_[i];
     const std::string file = (i < 9 ? "0" : "") + std::to_string(i + 1) + ".png";
-    complain(write_image(directory_ / file, draw_moment(moment)));
+    complain(write_image(directory / file, draw_moment(moment)));
     char at[32];
     std::snprintf(at, sizeof at, "%.1f s", static_cast<double>(moment.at_ns - moments_[0].at_ns) * 1e-9);
     page << "<h2>" << at << (moment.said.empty() ? "" : ": \"" + as_text(moment.said) + "\"") << "</h2>\n<img src=\""
@@ -182,9 +183,9 @@ class MomentsNode final : public Node {
   Input<Detections> detections_{this, "detections", "boxes on the image of their stamp; depth 4", Need::optional};
   Param<std::string> directory_name_{this, "directory", "moments", "",
                                      "where to write, below the run's output directory"};
-  Param<int> most_{this, "most", 24, {1, 1000}, "", "moments kept, the first ones"};
+  Param<int> most_{this, "most", 24, {1, 1000}, "", "moments kept, the first ones", kSizesMemory};
 
-  std::filesystem::path directory_;
+  std::filesystem::path output_;
   std::vector<Moment> moments_;
   size_t used_ = 0, left_out_ = 0;
   Before before_;

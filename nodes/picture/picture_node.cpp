@@ -32,7 +32,7 @@ using namespace picture;
 class PictureNode final : public Node {
  public:
   void setup(Setup& setup) override {
-    directory_ = setup.output / directory_name_();
+    output_ = setup.output;
     left_.reserve(elements_of(pair_));
     ground_left_.reserve(elements_of(ground_pair_));
     mask_kept_.reserve(elements_of(mask_));
@@ -59,6 +59,7 @@ class PictureNode final : public Node {
   }
 
   void finish() override {
+    directory_ = output_ / directory_name_();
     std::error_code ignored;
     std::filesystem::create_directories(directory_, ignored);  // imwrite says whether it worked
     if (!left_.empty()) {
@@ -175,9 +176,10 @@ class PictureNode final : public Node {
   Input<PointCloud> match_{this, "match", "the same, red to green by how well they match: right in laser.png",
                            Need::optional};
   Param<std::string> directory_name_{this, "directory", ".", "", "where to write, below the run's output directory"};
-  Param<int> track_points_{this, "track_points", 20000, {16, 10000000}, "", "points of the path kept in memory"};
+  Param<int> track_points_{this,        "track_points", 20000, {16, 10000000}, "", "points of the path kept in memory",
+                           kSizesMemory};
 
-  std::filesystem::path directory_;
+  std::filesystem::path output_, directory_;
   KeptImage<uint8_t> left_, ground_left_, mask_kept_;
   KeptImage<int16_t> map_, obstacle_cells_, ground_cells_, merged_cells_, traversability_cells_;
   const Drawn grids_[4] = {{&obstacles_, &obstacle_cells_, "obstacles.png"},

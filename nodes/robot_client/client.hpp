@@ -55,6 +55,13 @@ class Client {
  public:
   explicit Client(Knowledge& knowledge, const ClientParameters& parameters);
 
+  /// From the next step() on, but for what its parts leave as it was.
+  void tune(const ClientParameters& parameters) {
+    parameters_ = parameters;
+    driving_.tune(parameters.driving);
+    deliberation_.tune(parameters.deliberation);
+  }
+
   /// The newest grid of the map. False: larger than the constructor was told.
   bool look(const navigation::OccupancyView& grid) { return driving_.look(grid); }
   /// After objects were reported.

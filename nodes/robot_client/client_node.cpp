@@ -46,25 +46,18 @@ class RobotClientNode final : public Node {
     if (!network_().empty())
       if (const auto read = semantic::read_network(setup.directory / network_(), knowledge_->map()); !read)
         throw SetupError(fmt::format("network: {}", fmt::join(read.error(), "\n")));
-    ClientParameters p;
-    p.driving.pilot.limits.speed_m_s = speed_;
-    p.driving.pilot.limits.turn_rad_s = turn_;
-    p.driving.path.clearance_m = obstacle_stop::footprint(width_, length_, margin_).clearance_m();
-    p.driving.most_cells = p.deliberation.most_cells = grid_.connected() ? grid_.capacity().pixels() : 0;
-    p.driving.explore_far_m = explore_far_;
-    p.deliberation.pilot = p.driving.pilot;
-    p.deliberation.reach_m = reach_;
-    p.plans = plans_;
-    p.patience_s = patience_;
-    p.settle_s = settle_;
-    client_.emplace(*knowledge_, p);
-    expansions_ = static_cast<size_t>(expansions_a_job_());
-    reserve_ns_ = std::llround(reserve_() * 1e9);
-    odometry_age_ns_ = std::llround(odometry_age_() * 1e9);
+    client_.emplace(*knowledge_, parameters());
     map_.reserve({0, 0, 1, static_cast<uint32_t>(capacity_())});
     for (OutputPort* text : {static_cast<OutputPort*>(&plan_), static_cast<OutputPort*>(&status_),
                              static_cast<OutputPort*>(&speech_), static_cast<OutputPort*>(&taken_)})
       text->reserve({0, 0, 1, kCharacters});
+  }
+
+  void changed() override {
+    client_->tune(parameters());
+    expansions_ = static_cast<size_t>(expansions_a_job_());
+    reserve_ns_ = std::llround(reserve_() * 1e9);
+    odometry_age_ns_ = std::llround(odometry_age_() * 1e9);
   }
 
   void start(int64_t) override {
@@ -116,6 +109,21 @@ class RobotClientNode final : public Node {
   }
 
  private:
+  ClientParameters parameters() const {
+    ClientParameters p;
+    p.driving.pilot.limits.speed_m_s = speed_;
+    p.driving.pilot.limits.turn_rad_s = turn_;
+    p.driving.path.clearance_m = obstacle_stop::footprint(width_, length_, margin_).clearance_m();
+    p.driving.most_cells = p.deliberation.most_cells = grid_.connected() ? grid_.capacity().pixels() : 0;
+    p.driving.explore_far_m = explore_far_;
+    p.deliberation.pilot = p.driving.pilot;
+    p.deliberation.reach_m = reach_;
+    p.plans = plans_;
+    p.patience_s = patience_;
+    p.settle_s = settle_;
+    return p;
+  }
+
   /// Reports in the robot frame count once the robot's pose is known at their stamp.
   void look(const ObjectReports& reports, int64_t stamp_ns) {
     if (stamp_ns <= looked_ns_) return;
@@ -272,8 +280,7 @@ class RobotClientNode final : public Node {
   Output<ObjectReports> map_{this, "map", "all that it knows of objects; when it changes"};
 
   Param<std::string> network_{this, "network", "", kPath, "predefined network (YAML): types, actions, objects"};
-  Param<std::string> words_{this, "task", "", "",
-                            "a task; live, for `takt robot`: a number before it makes it another"};
+  Param<std::string> words_{this, "task", "", "", "a task, for `takt robot`: a number before it makes it another"};
   Param<double> reach_{this, "reach", 0.78, {0.1, 5.0}, "m", "so near to all objects of an action the robot drives"};
   Param<double> width_{this, "robot_width", obstacle_stop::kRobotWidth_m, {0.1, 5.0}, "m", "as obstacle_stop has it"};
   Param<double> length_{this, "robot_length",           obstacle_stop::kRobotLength_m, {0.1, 5.0},
@@ -291,7 +298,8 @@ class RobotClientNode final : public Node {
   Param<double> odometry_age_{this, "odometry_age", 0.5, {0.05, 10.0}, "s", "an older pose is none"};
   Param<int> expansions_a_job_{this, "expansions", 2000, {10, 1000000}, "", "states that planning looks at in one job"};
   Param<double> reserve_{this, "reserve", 0.002, {0.0, 1.0}, "s", "of a job's time that planning leaves"};
-  Param<int> capacity_{this, "capacity", 500, {50, 20000}, "", "nodes of the network, objects among them"};
+  Param<int> capacity_{this,        "capacity", 500, {50, 20000}, "", "nodes of the network, objects among them",
+                       kSizesMemory};
 
   std::optional<Knowledge> knowledge_;
   std::optional<Client> client_;

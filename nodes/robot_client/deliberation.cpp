@@ -21,6 +21,13 @@ Deliberation::Deliberation(const Knowledge& knowledge, const DeliberationParamet
   way_.reserve(std::max<size_t>(2, parameters.most_cells));
 }
 
+void Deliberation::tune(DeliberationParameters parameters) {
+  parameters.planner = parameters_.planner;
+  parameters.most_cells = parameters_.most_cells;
+  parameters_ = parameters;
+  rehearsal_.tune(parameters.pilot);
+}
+
 tl::expected<void, std::string> Deliberation::begin(std::span<const planner::Goal> goals, const PlanarPose& robot,
                                                     const planner::ActionCosts& costs) {
   planner::DomainParameters parameters;

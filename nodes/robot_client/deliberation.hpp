@@ -31,6 +31,8 @@ struct StandOff {
 class Deliberation {
  public:
   Deliberation(const Knowledge& knowledge, const DeliberationParameters& parameters);
+  /// From the next portion on; the planner's and the size of grids stay as they were.
+  void tune(DeliberationParameters parameters);
 
   /// The error names what cannot be meant. `ways` null: straight lines.
   tl::expected<void, std::string> begin(std::span<const planner::Goal> goals, const PlanarPose& robot,

@@ -20,6 +20,13 @@ Driving::Driving(const DrivingParameters& parameters)
   rest_.reserve(parameters.pilot.most_places + 1);
 }
 
+void Driving::tune(DrivingParameters parameters) {
+  parameters.most_cells = parameters_.most_cells;
+  parameters_ = parameters;
+  planner_.tune(parameters.path);
+  pilot_.tune(parameters.pilot);
+}
+
 bool Driving::look(const navigation::OccupancyView& grid) {
   if (!planner_.look(grid)) return false;
   seen_grid_ = new_grid_ = true;

@@ -34,6 +34,8 @@ enum class Progress : uint8_t {
 class Driving {
  public:
   explicit Driving(const DrivingParameters& parameters);
+  /// From the next step() on, ways from the next look() on; grids stay as large as they could be.
+  void tune(DrivingParameters parameters);
 
   /// The grid, anew. False: it is larger than the constructor was told.
   bool look(const navigation::OccupancyView& grid);

@@ -33,6 +33,7 @@ double direction_to(const Place& from, std::span<const Place> objects);
 class Rehearsal {
  public:
   explicit Rehearsal(const navigation::PilotParameters& parameters) : pilot_(parameters) {}
+  void tune(const navigation::PilotParameters& parameters) { pilot_.tune(parameters); }
 
   /// s from standing at `from` to where the pilot stands at the end of the way; at most kLongest_s.
   double seconds(const PlanarPose& from, std::span<const Place> way, std::optional<double> direction_rad);

@@ -64,6 +64,8 @@ class PoseFilter {
  public:
   /// `history`: measurements that can be gone back over, at least 1.
   explicit PoseFilter(const FilterParameters& parameters, size_t history = 64);
+  /// From the next add() on, also for what is gone back over.
+  void tune(const FilterParameters& parameters) { p_ = parameters; }
 
   /// Before the first measurement: the pose at its beginning.
   void begin_at(const PlanarPose& robot_in_map, const Covariance& covariance);

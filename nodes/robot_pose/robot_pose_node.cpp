@@ -31,13 +31,10 @@ class RobotPoseNode final : public Node {
                        ": connect both of ego_motion, the one tells the interval, the other the covariance");
     if (!odometry_.connected() && !motion_.connected() && !scan_pose_.connected())
       throw SetupError("nothing to join: connect odometry, motion with robot_motion, or scan_pose");
-    FilterParameters p;
-    p.acceleration = acceleration_;
-    p.turn_acceleration = turn_acceleration_;
-    p.slip = slip_;
-    p.gate = gate_;
-    filter_.emplace(p);
+    filter_.emplace(parameters());
   }
+
+  void changed() override { filter_->tune(parameters()); }
 
   void start(int64_t) override {
     const Pose* pose = pose_.handed_over();
@@ -63,6 +60,15 @@ class RobotPoseNode final : public Node {
   }
 
  private:
+  FilterParameters parameters() const {
+    FilterParameters p;
+    p.acceleration = acceleration_;
+    p.turn_acceleration = turn_acceleration_;
+    p.slip = slip_;
+    p.gate = gate_;
+    return p;
+  }
+
   void take(const Measured& measured) {
     if (!filter_->begun() && !resumed_ && measured.source == Source::wheels)
       filter_->begin_at(planar(mapping_3d::robot_in_odometry(*last_wheels_)), Covariance::Zero());

@@ -34,6 +34,13 @@ class LoopCloser {
  public:
   /// For scans of at most `beams` points. `map` says how a scan is compared, with the cells made coarser.
   LoopCloser(size_t beams, const MapParameters& map, const ClosureParameters& parameters);
+  /// From the next step() on; anchors and drift stay as they were.
+  void tune(ClosureParameters parameters) {
+    parameters.anchors = p_.anchors;
+    parameters.drift_m = p_.drift_m;
+    parameters.drift_rad = p_.drift_rad;
+    p_ = parameters;
+  }
 
   /// The robot's next pose, and what it sees from there (robot frame). Where a loop was closed, the scans kept since
   /// that place, or since the last loop, have moved by their share of the error, linear in the way.

@@ -58,6 +58,12 @@ class ScanMatcher {
  public:
   /// For scans of at most `beams` beams.
   ScanMatcher(size_t beams, const Parameters& parameters);
+  /// From the next step() on; map and search stay as they were.
+  void tune(Parameters parameters) {
+    parameters.map = p_.map;
+    parameters.search = p_.search;
+    p_ = parameters;
+  }
 
   /// The next scan, dt_s after the one before. `moved`: the robot in its frame of the scan before, by odometry.
   Match step(const Sweep& sweep, double dt_s, const std::optional<PlanarPose>& moved);

@@ -27,15 +27,16 @@ class ScanMatchingNode final : public Node {
                        " m, must be at most half of map_window = " + map_window_.value_text() + " m");
     const Parameters p = parameters();
     matcher_.emplace(scan_.capacity().count, p);
-    if (correction_.connected()) {
-      ClosureParameters closure;
-      closure.way_m = loop_way_;
-      closure.drift_m = loop_drift_;
-      closer_.emplace(scan_.capacity().count, p.map, closure);
-    }
+    if (correction_.connected()) closer_.emplace(scan_.capacity().count, p.map, closure());
     occupancy_.emplace(OccupancyParameters{map_cell_, map_window_, range_max_});
     const auto side = static_cast<uint32_t>(occupancy_->side());
     map_.reserve({side, side, 1, 0});
+  }
+
+  void changed() override {
+    matcher_->tune(parameters());
+    const ClosureParameters loops = closure();
+    if (closer_) closer_->tune(loops);
   }
 
   void start(int64_t) override {
@@ -150,6 +151,13 @@ class ScanMatchingNode final : public Node {
     return true;
   }
 
+  ClosureParameters closure() const {
+    ClosureParameters p;
+    p.way_m = loop_way_;
+    p.drift_m = loop_drift_;
+    return p;
+  }
+
   Parameters parameters() const {
     Parameters p;
     p.map.keyframes = keyframes_;
@@ -182,14 +190,14 @@ class ScanMatchingNode final : public Node {
                            "with each pose: when the robot's place was known last, and where: at the first scan, or "
                            "where a loop was closed; covariance not known: 0"};
 
-  Param<double> range_max_{this, "range_max", 15.0, {1.0, 80.0}, "m", "farther returns are not used"};
-  Param<int> keyframes_{this, "keyframes", 20, {1, 200}, "", "scans that the next one is matched with"};
+  Param<double> range_max_{this, "range_max", 15.0, {1.0, 80.0}, "m", "farther returns are not used", kSizesMemory};
+  Param<int> keyframes_{this, "keyframes", 20, {1, 200}, "", "scans that the next one is matched with", kSizesMemory};
   Param<double> keyframe_distance_{
       this, "keyframe_distance", 0.3, {0.0, 10.0}, "m", "a scan that far from the last one of them joins them"};
   Param<double> keyframe_turn_{this, "keyframe_turn", 0.2, {0.0, 3.2}, "rad", "or turned by that much"};
   Param<double> search_reach_{
-      this, "search_reach", 0.4, {0.05, 2.0}, "m", "search to each side of where the scan is expected"};
-  Param<double> search_turn_{this, "search_turn", 0.35, {0.02, 3.2}, "rad", "search to each side"};
+      this, "search_reach", 0.4, {0.05, 2.0}, "m", "search to each side of where the scan is expected", kSizesMemory};
+  Param<double> search_turn_{this, "search_turn", 0.35, {0.02, 3.2}, "rad", "search to each side", kSizesMemory};
   Param<double> score_min_{this, "score_min", 0.4, {0.0, 1.0}, "1", "a scan that fits worse is refused; 1: perfect"};
   Param<double> paired_min_{this, "paired_min", 0.3, {0.0, 1.0}, "1", "least share of its points that the map knows"};
   Param<int> refused_most_{this, "refused_most", 5, {1, 1000}, "", "refusals in a row after which the map begins anew"};
@@ -203,11 +211,12 @@ class ScanMatchingNode final : public Node {
                               {0.01, 100.0}, "m/s^2",        "standard deviation, without odometry"};
   Param<double> turn_acceleration_{this,          "turn_acceleration", 2.0,
                                    {0.01, 100.0}, "rad/s^2",           "standard deviation, without odometry"};
-  Param<double> map_cell_{this, "map_cell", 0.10, {0.02, 1.0}, "m", "edge of a cell of the map"};
-  Param<double> map_window_{this, "map_window", 30.0, {1.0, 200.0}, "m", "side of the map"};
+  Param<double> map_cell_{this, "map_cell", 0.10, {0.02, 1.0}, "m", "edge of a cell of the map", kSizesMemory};
+  Param<double> map_window_{this, "map_window", 30.0, {1.0, 200.0}, "m", "side of the map", kSizesMemory};
 
   Param<double> loop_way_{this, "loop_way", 10.0, {1.0, 1000.0}, "m", "driven before a place counts as known again"};
-  Param<double> loop_drift_{this, "loop_drift", 1.5, {0.2, 10.0}, "m", "error that is looked for there, to each side"};
+  Param<double> loop_drift_{
+      this, "loop_drift", 1.5, {0.2, 10.0}, "m", "error that is looked for there, to each side", kSizesMemory};
 
   std::optional<ScanMatcher> matcher_;
   std::optional<LoopCloser> closer_;  ///< if somebody wants to know

@@ -28,6 +28,7 @@ class BoxLocator {
  public:
   /// For disparity maps of at most so many pixels.
   BoxLocator(size_t most_pixels, const BoxLocatorParameters& parameters);
+  void tune(const BoxLocatorParameters& parameters) { parameters_ = parameters; }
 
   /// Z = f B / d with the median of the disparities, X and Y through the middle of the box; camera frame x right, y
   /// down, z forward. With `agree` the median of the nearest ones within 6 % of each other that are so many: a box that

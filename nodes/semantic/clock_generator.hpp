@@ -21,6 +21,12 @@ class ClockGenerator {
   ClockGenerator(std::vector<TimedRequest> script, const std::vector<std::string>& idle, uint8_t idle_every,
                  Needs needs = {}, const std::vector<std::string>& on_request = {});
 
+  /// From the next update() on.
+  void tune(uint8_t idle_every, const NeedParameters& needs) {
+    idle_every_ = idle_every;
+    needs_.tune(needs);
+  }
+
   /// From the next update() on the nodes named run whatever the script says, until another list leaves them out: ids
   /// joined by commas or spaces. Those of no list are not looked for.
   void request(std::string_view ids);

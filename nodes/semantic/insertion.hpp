@@ -42,6 +42,11 @@ struct Look {
 class Insertion {
  public:
   Insertion(SemanticMap& map, const InsertionParameters& parameters);
+  /// From the next observation on.
+  void tune(const InsertionParameters& parameters) {
+    parameters_ = parameters;
+    similarity_.tune(parameters.similarity);
+  }
 
   /// Of equally similar candidates the one with the lower id. What has a name is the object of that name and type, or a
   /// new one; seen farther away than d_max it has been moved, and is where it was seen. Observed values replace older

@@ -45,11 +45,6 @@ class SemanticMapNode final : public Node {
  public:
   void setup(Setup& setup) override {
     if (!things_.connected() && !reports_.connected()) throw SetupError("connect `things` or `reports`, or both");
-    InsertionParameters p;
-    p.merge_min = merge_min_;
-    p.similarity.distance_max_m = distance_max_;
-    p.distinct_in_view = distinct_in_view_;
-    p.misses = static_cast<uint32_t>(misses_());
     MapParameters m;
     m.capacity = {static_cast<size_t>(capacity_()), 3 * static_cast<size_t>(capacity_())};
     map_.emplace(m);
@@ -63,12 +58,14 @@ class SemanticMapNode final : public Node {
                           map_->attribute(node).kind == kMeasured[i].kind;
       measured_[i] = usable ? node : kNoNode;
     }
-    insertion_.emplace(*map_, p);
+    insertion_.emplace(*map_, parameters());
     reader_.emplace(*map_);
     objects_.reserve({0, 0, 1, static_cast<uint32_t>(capacity_())});
     known_.reserve({0, 0, 1, static_cast<uint32_t>(capacity_())});
     decisions_.reserve({0, 0, 1, kCharacters});
   }
+
+  void changed() override { insertion_->tune(parameters()); }
 
   void start(int64_t) override {
     if (const ObjectReports* known = known_.handed_over()) restore(*known);
@@ -102,6 +99,15 @@ class SemanticMapNode final : public Node {
   }
 
  private:
+  InsertionParameters parameters() const {
+    InsertionParameters p;
+    p.merge_min = merge_min_;
+    p.similarity.distance_max_m = distance_max_;
+    p.distinct_in_view = distinct_in_view_;
+    p.misses = static_cast<uint32_t>(misses_());
+    return p;
+  }
+
   void find_types() {
     const auto names = parse_node_list(classes_());
     if (!names) throw SetupError("classes: " + names.error());
@@ -268,14 +274,15 @@ class SemanticMapNode final : public Node {
                                 "what became of each thing and terrain seen, and why; one line each"};
 
   Param<std::string> network_{this, "network", "", kPath, "predefined network (YAML); empty: the classes alone"};
-  Param<std::string> classes_{this, "classes", "", "", "types of `things` by class_id, joined by commas"};
+  Param<std::string> classes_{this, "classes", "", "", "types of `things` by class_id, joined by commas", kReadAtStart};
   Param<double> merge_min_{this, "merge_min", 0.75, {0.5, 1.0}, "", "p from which on two are one"};
   Param<double> distance_max_{this, "distance_max", 2.0, {0.1, 20.0}, "m", "farther apart places say two are not one"};
   Param<bool> distinct_in_view_{this, "distinct_in_view", false, "", "things of one message are never one object"};
   Param<int> misses_{this, "misses", 5, {1, 1000}, "", "looks in a row that see its place free before an object goes"};
   Param<double> view_{this, "view", 1.1519, {0.1, 6.2}, "rad", "angle in which things are seen, about straight ahead"};
   Param<double> range_{this, "range", 3.0, {0.2, 20.0}, "m", "up to which things are seen"};
-  Param<int> capacity_{this, "capacity", 2000, {50, 50000}, "", "nodes of the network, objects among them"};
+  Param<int> capacity_{this,        "capacity", 2000, {50, 50000}, "", "nodes of the network, objects among them",
+                       kSizesMemory};
 
   std::optional<SemanticMap> map_;
   std::optional<Insertion> insertion_;

@@ -30,6 +30,7 @@ class Needs {
  public:
   Needs() = default;
   Needs(std::vector<Rule> rules, const NeedParameters& parameters);
+  void tune(const NeedParameters& parameters) { parameters_ = parameters; }
 
   /// `now_ns` never less than in the call before. Where nobody tells of what a rule asks for, its node is needed: who
   /// does not know saves nothing.

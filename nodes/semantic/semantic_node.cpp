@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <array>
 #include <cmath>
 #include <string>
 
@@ -26,21 +27,16 @@ class SemanticNode final : public Node {
  public:
   void setup(Setup& setup) override {
     offset_ns_ = setup.offset_ns;
-    auto script = parse_script(script_());
-    if (!script) throw SetupError("script: " + script.error());
-    const auto idle = parse_node_list(idle_());
-    if (!idle) throw SetupError("idle: " + idle.error());
-    const auto on_request = parse_node_list(on_request_());
-    if (!on_request) throw SetupError("on_request: " + on_request.error());
-    auto rules = parse_rules(rules_());
-    if (!rules) throw SetupError("rules: " + rules.error());
-    for (const Rule& rule : *rules) check_sources(rule);
-    const NeedParameters need{rule_margin_, std::llround(rule_hold_ * 1e9)};
-    generator_ = ClockGenerator(std::move(*script), *idle, static_cast<uint8_t>(idle_every_()),
-                                Needs(std::move(*rules), need), *on_request);
+    read_texts();
     near_.reserve(reports_.capacity().count + bodies_.capacity().count);
-    requests_.reserve({0, 0, 1, static_cast<uint32_t>(std::max<size_t>(1, generator_.nodes()))});
+    requests_.reserve({0, 0, 1, static_cast<uint32_t>(std::max(kNodes, generator_.nodes()))});
     status_.reserve({0, 0, 1, kStatusCharacters});
+  }
+
+  /// Another script or list is read anew, and the script goes on where it would be by now.
+  void changed() override {
+    if (texts_differ()) read_texts();
+    else generator_.tune(idle_every(), needs());
   }
 
   void start(int64_t epoch_ns) override {
@@ -73,6 +69,33 @@ class SemanticNode final : public Node {
 
  private:
   static constexpr std::string_view kPerson = "person";  ///< what bodies are
+  static constexpr size_t kNodes = 16;                   ///< that may be named in a run, at least
+
+  std::array<std::string, 4> texts() const { return {script_(), idle_(), on_request_(), rules_()}; }
+  bool texts_differ() const {
+    return script_() != texts_[0] || idle_() != texts_[1] || on_request_() != texts_[2] || rules_() != texts_[3];
+  }
+  uint8_t idle_every() const { return static_cast<uint8_t>(idle_every_()); }
+  NeedParameters needs() const { return {rule_margin_, std::llround(rule_hold_ * 1e9)}; }
+
+  void read_texts() {
+    const auto texts = this->texts();
+    auto script = parse_script(texts[0]);
+    if (!script) throw SetupError("script: " + script.error());
+    const auto idle = parse_node_list(texts[1]);
+    if (!idle) throw SetupError("idle: " + idle.error());
+    const auto on_request = parse_node_list(texts[2]);
+    if (!on_request) throw SetupError("on_request: " + on_request.error());
+    auto rules = parse_rules(texts[3]);
+    if (!rules) throw SetupError("rules: " + rules.error());
+    for (const Rule& rule : *rules) check_sources(rule);
+    ClockGenerator generator(std::move(*script), *idle, idle_every(), Needs(std::move(*rules), needs()), *on_request);
+    if (const size_t room = requests_.capacity().count; room > 0 && generator.nodes() > room)
+      throw SetupError("script, idle, on_request and rules name " + std::to_string(generator.nodes()) +
+                       " nodes, and memory was taken for " + std::to_string(room) + "; start with them");
+    generator_ = std::move(generator);
+    texts_ = texts;
+  }
 
   static bool is_fresh(const InputPort& port) { return !port.empty() && !port.stale(); }
 
@@ -151,8 +174,7 @@ class SemanticNode final : public Node {
                          {1, 255}, "",           "idle nodes run at every n-th release while the robot is stopped"};
   Param<std::string> on_request_{this, "on_request", "", "",
                                  "nodes that are stopped until the script starts them or `request` names them"};
-  Param<std::string> request_{this, "request", "", "",
-                              "nodes that run now, whatever the script says. May change during a run"};
+  Param<std::string> request_{this, "request", "", "", "nodes that run now, whatever the script says"};
   Param<std::string> rules_{this, "rules", "", "", "what runs where: \"body_pose when person within 4m else stop\""};
   Param<double> rule_margin_{this,        "rule_margin", NeedParameters{}.margin_m,
                              {0.0, 20.0}, "m",           "so much farther away what is needed still counts"};
@@ -160,6 +182,7 @@ class SemanticNode final : public Node {
   Param<double> strip_{this, "strip", 0.8, {0.1, 5.0}, "m", "width of the way ahead that the status tells of"};
 
   ClockGenerator generator_;
+  std::array<std::string, 4> texts_;  ///< that it was made of
   std::vector<Neighbour> near_;
   int64_t offset_ns_ = 0;
   std::optional<int64_t> first_ns_;

@@ -35,6 +35,7 @@ struct Comparison {
 class Similarity {
  public:
   Similarity(const SemanticMap& map, const SimilarityParameters& parameters);
+  void tune(const SimilarityParameters& parameters) { parameters_ = parameters; }
 
   /// An attribute that only one of the two can have counts 1; one whose value is unknown on a side is left out, and the
   /// weights are those of the rest.

@@ -31,7 +31,14 @@ Aggregator::Aggregator(int width, int height, const MatcherParameters& p)
   aggregated_.assign(edges_.size(), std::vector<CostRow>(static_cast<size_t>(p.n_min), row));
   columns_ = smallest_ = row;
   if (p.aggregation == Aggregation::boundary) arms_.resize(static_cast<size_t>(width) * static_cast<size_t>(height));
+  distance_weight_.reserve(static_cast<size_t>(p.n_square) * static_cast<size_t>(p.n_square));
+  tune(p);
+}
+
+void Aggregator::tune(const MatcherParameters& p) {
+  p_ = p;
   const int m = p.n_square / 2;
+  distance_weight_.clear();
   for (int l = -m; l <= m; ++l)
     for (int k = -m; k <= m; ++k)
       distance_weight_.push_back(static_cast<float>(std::exp(-std::hypot(k, l) / p.gamma_distance)));

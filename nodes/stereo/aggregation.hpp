@@ -16,6 +16,8 @@ using CostRow = std::vector<float>;
 class Aggregator {
  public:
   Aggregator(int width, int height, const MatcherParameters& p);
+  /// From the next start() on; with the windows of the constructor.
+  void tune(const MatcherParameters& p);
 
   /// Before the first row of a pair; `image` guides what depends on it and must outlive the rows.
   void start(const Features& image, int disparities);

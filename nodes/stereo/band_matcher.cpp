@@ -41,7 +41,12 @@ void copy_rows(const std::vector<T>& from, int skip, int width, ImageView<T> to,
 
 BandMatcher::BandMatcher(int width, int height, int channels, const MatcherParameters& parameters, int bands,
                          int patience)
-    : width_(width), channels_(channels), height_(height), patience_(patience), search_(parameters.disparities) {
+    : width_(width),
+      channels_(channels),
+      height_(height),
+      patience_(patience),
+      search_(parameters.disparities),
+      parameters_(parameters) {
   if (const auto wrong = problem(parameters, width, height, channels)) throw std::invalid_argument("stereo: " + *wrong);
   const int most = std::clamp(height / 16, 1, 8);
   if (bands < 1 || bands > most)
@@ -125,6 +130,7 @@ void BandMatcher::ask(const Band& band, ImageView<const uint8_t> left, ImageView
   copy_image(left, helper.left.data());
   copy_image(right, helper.right.data());
   helper.search = search_;
+  helper.parameters = parameters_;
   call(State::asked);
 }
 
@@ -139,6 +145,7 @@ void BandMatcher::serve(const Band& band, const std::stop_token& stop) {
     State asked = State::asked;
     if (!helper.state.compare_exchange_strong(asked, State::busy, std::memory_order_acquire)) continue;
     const int64_t before_ns = thread_cpu_ns();  // replay: counted, and no result depends on it
+    helper.desk.matcher->tune(helper.parameters);
     helper.desk.matcher->limit_search(helper.search);
     run(band, helper.desk, {helper.left.data(), width_, band.height, channels_},
         {helper.right.data(), width_, band.height, channels_});
@@ -176,6 +183,11 @@ bool BandMatcher::match(ImageView<const uint8_t> left, ImageView<const uint8_t> 
     deliver(band, done ? band.helper->desk : band.own, out);
   }
   return true;
+}
+
+void BandMatcher::tune(const MatcherParameters& parameters) {
+  for (Band& band : bands_) band.own.matcher->tune(parameters);
+  parameters_ = parameters;
 }
 
 void BandMatcher::limit_search(int disparities) {

@@ -29,6 +29,7 @@ class BandMatcher final : public Matcher {
   [[nodiscard]] bool match(ImageView<const uint8_t> left, ImageView<const uint8_t> right,
                            const DisparityViews& out) override;
   void limit_search(int disparities) override;
+  void tune(const MatcherParameters& parameters) override;
   const char* target() const override { return bands_.front().own.matcher->target(); }
 
   int64_t helper_cpu_ns() const override { return helper_cpu_ns_.load(std::memory_order_relaxed); }
@@ -46,7 +47,8 @@ class BandMatcher final : public Matcher {
   struct Helper {
     Desk desk;
     std::vector<uint8_t> left, right;
-    int search = 0;          ///< disparities, of what was asked
+    int search = 0;  ///< disparities, of what was asked
+    MatcherParameters parameters;
     bool asked_now = false;  ///< in this call; of the caller
     std::atomic<State> state{State::idle};
     std::atomic<uint32_t> calls{0};  ///< whether to look at `state` again
@@ -73,6 +75,7 @@ class BandMatcher final : public Matcher {
   size_t bytes_of(int rows) const;
 
   int width_, channels_, height_, patience_, search_;
+  MatcherParameters parameters_;
   std::atomic<int64_t> helper_cpu_ns_{0};
   std::vector<Band> bands_;  ///< does not grow once threads run
 };

@@ -48,6 +48,7 @@ struct GeneralMatcher::State {
   void write(int y, const DisparityViews& out) const;
 
   MatcherParameters p;
+  const MatcherParameters made;
   const int most_disparities;
   int width, height, channels;
   Features left, right;
@@ -61,6 +62,7 @@ struct GeneralMatcher::State {
 
 GeneralMatcher::State::State(int width_, int height_, int channels_, const MatcherParameters& parameters)
     : p(parameters),
+      made(parameters),
       most_disparities(parameters.disparities),
       width(width_),
       height(height_),
@@ -212,6 +214,13 @@ GeneralMatcher::GeneralMatcher(int width, int height, int channels, const Matche
   state_ = std::make_unique<State>(width, height, channels, parameters);
 }
 GeneralMatcher::~GeneralMatcher() = default;
+
+void GeneralMatcher::tune(const MatcherParameters& parameters) {
+  const int disparities = state_->p.disparities;
+  state_->p = tuned(state_->made, parameters);
+  state_->p.disparities = disparities;
+  state_->aggregator.tune(state_->p);
+}
 
 void GeneralMatcher::limit_search(int disparities) {
   state_->p.disparities = std::clamp(disparities, 1, state_->most_disparities);

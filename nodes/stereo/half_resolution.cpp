@@ -101,6 +101,10 @@ HalfMatcher::HalfMatcher(int width, int height, int channels, const MatcherParam
       fraction_(pixels(width, height)),
       disparity_(pixels(width, height)) {}
 
+void HalfMatcher::tune(const MatcherParameters& parameters) {
+  matcher_->tune(halved(checked(parameters, width_, height_, channels_)));
+}
+
 bool HalfMatcher::match(ImageView<const uint8_t> left, ImageView<const uint8_t> right, const DisparityViews& out) {
   if (!fit(left, right, out, width_, height_, channels_)) return false;
   const int w = half(width_), h = half(height_);

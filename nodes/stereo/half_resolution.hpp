@@ -34,6 +34,7 @@ class HalfMatcher final : public Matcher {
                            const DisparityViews& out) override;
   /// In px of the full image.
   void limit_search(int disparities) override { matcher_->limit_search((disparities + 1) / 2); }
+  void tune(const MatcherParameters& parameters) override;
   const char* target() const override { return matcher_->target(); }
 
  private:

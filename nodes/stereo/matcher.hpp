@@ -29,6 +29,10 @@ class Matcher {
   /// at construction; the result is that of a matcher made for n. Allocates nothing.
   virtual void limit_search(int disparities) = 0;
 
+  /// From the next match() on parameters that problem() does not object to, as far as tuned() goes; the search stays as
+  /// limit_search() left it. Allocates nothing.
+  virtual void tune(const MatcherParameters& parameters) = 0;
+
   /// From the next match() on only rows first .. last - 1 of the result are wanted, 0 <= first < last <= height; what
   /// the others then hold is undefined. Allocates nothing.
   virtual void want_rows(int /*first*/, int /*last*/) {}

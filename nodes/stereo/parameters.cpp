@@ -78,4 +78,17 @@ std::optional<std::string> problem(const MatcherParameters& p, int width, int he
   return std::nullopt;
 }
 
+MatcherParameters tuned(const MatcherParameters& made, const MatcherParameters& wanted) {
+  MatcherParameters p = made;
+  p.intensity_weight = wanted.intensity_weight;
+  p.combination = wanted.combination;
+  p.edge_threshold = wanted.edge_threshold;
+  p.gamma_distance = wanted.gamma_distance;
+  p.gamma_colour = wanted.gamma_colour;
+  p.p1 = wanted.p1;
+  p.p2 = wanted.p2;
+  p.min_confidence = wanted.min_confidence;
+  return p;
+}
+
 }  // namespace takt::stereo

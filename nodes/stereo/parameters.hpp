@@ -87,6 +87,10 @@ struct MatcherParameters {
 /// Says what is wrong with the parameters for images of that size, if anything.
 std::optional<std::string> problem(const MatcherParameters& p, int width, int height, int channels);
 
+/// `made` with what of `wanted` takes no other memory: min_confidence, prices of steps, weights, the threshold of edges
+/// and how the windows are combined.
+MatcherParameters tuned(const MatcherParameters& made, const MatcherParameters& wanted);
+
 /// Confidence 0..255 of a window sum (thesis Eq. 3.6, corrected): zeta = (c_max N^2 - sum) / (c_max N^2), rounded.
 inline uint8_t confidence_of(int sum, int max_sum) {
   return static_cast<uint8_t>((int64_t{255} * (max_sum - sum) + max_sum / 2) / max_sum);

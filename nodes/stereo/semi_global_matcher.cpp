@@ -15,10 +15,12 @@ namespace takt::stereo {
 struct SemiGlobalMatcher::State {
   State(int width_, int height_, int channels_, const MatcherParameters& parameters);
   void set_range(int disparities);
+  void price_steps();
   void search(const Planes& reference, const Planes& mirrored_other, const Rows<int16_t>& fine);
   void write(int y, const DisparityViews& out) const;
 
   MatcherParameters p;
+  const MatcherParameters made;
   const int most_disparities;
   int width, height, channels, vectors = 0;
   const PathKernels* kernels;
@@ -33,6 +35,7 @@ struct SemiGlobalMatcher::State {
 
 SemiGlobalMatcher::State::State(int width_, int height_, int channels_, const MatcherParameters& parameters)
     : p(parameters),
+      made(parameters),
       most_disparities(parameters.disparities),
       width(width_),
       height(height_),
@@ -55,10 +58,14 @@ SemiGlobalMatcher::State::State(int width_, int height_, int channels_, const Ma
   left_fine = Rows<int16_t>(height, width);
   if (p.left_right_check) right_fine = Rows<int16_t>(height, width);
   if (p.median) smooth = Rows<int16_t>(height, width);
-  const int largest = 3 * (p.truncation() + p.step_twice());
-  for (int sum = 0; sum <= largest; ++sum) confidences[size(sum)] = confidence_of(sum, largest);
+  price_steps();
   least = Rows<uint8_t>(height, width);
   ambiguous = Rows<uint8_t>(height, width);
+}
+
+void SemiGlobalMatcher::State::price_steps() {
+  const int largest = 3 * (p.truncation() + p.step_twice());
+  for (int sum = 0; sum <= largest; ++sum) confidences[static_cast<size_t>(sum)] = confidence_of(sum, largest);
 }
 
 void SemiGlobalMatcher::State::set_range(int disparities) {
@@ -128,6 +135,13 @@ SemiGlobalMatcher::SemiGlobalMatcher(int width, int height, int channels, const 
   state_ = std::make_unique<State>(width, height, channels, parameters);
 }
 SemiGlobalMatcher::~SemiGlobalMatcher() = default;
+
+void SemiGlobalMatcher::tune(const MatcherParameters& parameters) {
+  const int disparities = state_->p.disparities;
+  state_->p = tuned(state_->made, parameters);
+  state_->p.disparities = disparities;
+  state_->price_steps();
+}
 
 void SemiGlobalMatcher::limit_search(int disparities) { state_->set_range(disparities); }
 const char* SemiGlobalMatcher::target() const { return state_->kernels->target; }

@@ -21,6 +21,7 @@ class SemiGlobalMatcher final : public Matcher {
   [[nodiscard]] bool match(ImageView<const uint8_t> left, ImageView<const uint8_t> right,
                            const DisparityViews& out) override;
   void limit_search(int disparities) override;
+  void tune(const MatcherParameters& parameters) override;
   const char* target() const override;
 
  private:

@@ -59,8 +59,19 @@ class StereoNode final : public Node {
     rectified_.reserve({images.width, images.height, static_cast<uint32_t>(channels_), 0});
     monitor_.emplace(width_, height_, disparities_());
     disparity_.reserve({images.width, images.height, 1, 0});
-    const auto step = static_cast<uint32_t>(cloud_step_());
+    least_step_ = cloud_step_;
+    const auto step = static_cast<uint32_t>(least_step_);
     cloud_.reserve({0, 0, 1, ((images.width + step - 1) / step) * ((images.height + step - 1) / step)});
+  }
+
+  void changed() override {
+    if (cloud_step_ < least_step_)
+      throw SetupError("cloud_step is " + cloud_step_.value_text() + " px, and memory was taken for the points of " +
+                       std::to_string(least_step_) + " px; start with it");
+    const MatcherParameters p = parameters(disparities_);
+    if (const auto wrong = problem(p, width_, height_, channels_)) throw SetupError("stereo: " + *wrong);
+    matcher_->tune(p);
+    half_matcher_->tune(p);
   }
 
   int64_t helper_cpu_ns() const override { return matcher_ ? matcher_->helper_cpu_ns() : 0; }
@@ -251,13 +262,18 @@ class StereoNode final : public Node {
        {"half", kHalfCost, "half resolution over the same range; disparities are even"},
        {"half_range", kHalfRangeCost, "half resolution, half of the range: what is nearer gets a wrong one"}}};
 
-  Param<int> disparities_{this, "disparities", 150, {1, 512}, "px", "search range 0 .. disparities - 1"};
-  Param<int> search_{this,     "search", 0,
-                     {0, 512}, "px",     "of that range, how much is searched; 0: all of it. May change during a run"};
-  Choice cost_{
-      this, "cost", "gradient", {"gradient", "ssd", "sad", "census", "rss", "mixed"}, "matching cost of two pixels"};
-  Param<int> c_max_{this,     "c_max", 0,
-                    {0, 255}, "",      "truncation of the cost; 0: 10 for gradient, 24 for census, 50 for the others"};
+  Param<int> disparities_{this, "disparities", 150, {1, 512}, "px", "search range 0 .. disparities - 1", kSizesMemory};
+  Param<int> search_{this, "search", 0, {0, 512}, "px", "of that range, how much is searched; 0: all of it"};
+  Choice cost_{this,
+               "cost",
+               "gradient",
+               {"gradient", "ssd", "sad", "census", "rss", "mixed"},
+               "matching cost of two pixels",
+               kSizesMemory};
+  Param<int> c_max_{this,        "c_max",
+                    0,           {0, 255},
+                    "",          "truncation of the cost; 0: 10 for gradient, 24 for census, 50 for the others",
+                    kSizesMemory};
   Param<double> intensity_weight_{this, "intensity_weight",
                                   1.0,  {0.0, 1.0},
                                   "1",  "w of cost mixed: share of the intensities next to the derivatives"};
@@ -265,10 +281,11 @@ class StereoNode final : public Node {
                       "aggregation",
                       "square",
                       {"square", "adaptive_window", "boundary", "adaptive_weight"},
-                      "which costs around a pixel count; all but square take many times as long"};
+                      "which costs around a pixel count; all but square take many times as long",
+                      kSizesMemory};
   Choice combination_{this, "combination", "min", {"min", "max", "mean"}, "of the three sizes of an adaptive window"};
-  Param<int> n_square_{this, "n_square", 15, {1, 31}, "px", "edge of the summing window, odd"};
-  Param<int> n_min_{this, "n_min", 5, {1, 31}, "px", "edge of the minimum filter, odd, at most n_square"};
+  Param<int> n_square_{this, "n_square", 15, {1, 31}, "px", "edge of the summing window, odd", kSizesMemory};
+  Param<int> n_min_{this, "n_min", 5, {1, 31}, "px", "edge of the minimum filter, odd, at most n_square", kSizesMemory};
   Param<double> edge_threshold_{this, "edge_threshold",
                                 30.0, {0.0, 361.0},
                                 "1",  "gradient magnitude of an edge that bounds a window, grey levels"};
@@ -277,33 +294,44 @@ class StereoNode final : public Node {
   Param<double> gamma_colour_{this, "gamma_colour",
                               20.0, {0.1, 442.0},
                               "1",  "difference of colour at which an adaptive weight has fallen to 1/e"};
-  Choice selection_{this, "selection", "winner", {"winner", "scanline", "semi_global"}, "how costs become a disparity"};
+  Choice selection_{
+      this, "selection", "winner", {"winner", "scanline", "semi_global"}, "how costs become a disparity", kSizesMemory};
   Param<int> p1_{this, "p1", 0, {0, 255}, "", "cost of a step by 1 px along a path; 0: 0.1 c_max, semi_global 14"};
   Param<int> p2_{this, "p2", 0, {0, 255}, "", "cost of a larger step; 0: 0.6 c_max, semi_global 60"};
-  Param<bool> median_{this, "median", false, "", "3 x 3 median filter on the disparities"};
-  Param<bool> subpixel_{this, "subpixel", false, "", "disparities to 1/64 px"};
+  Param<bool> median_{this, "median", false, "", "3 x 3 median filter on the disparities", kSizesMemory};
+  Param<bool> subpixel_{this, "subpixel", false, "", "disparities to 1/64 px", kSizesMemory};
   Param<double> min_confidence_{
       this, "min_confidence", 0.25, {0.0, 1.0}, "1", "smallest confidence of a valid pixel; 0 keeps all"};
-  Param<double> uniqueness_{this,       "uniqueness", 0.0,
-                            {0.0, 1.0}, "1",          "smallest (second - best) / second of a valid pixel; 0: off"};
-  Param<bool> left_right_check_{this, "left_right_check", false, "",
-                                "reject where left and right disagree by over 1 px; doubles the time"};
-  Param<int> bands_{this,   "bands", 1,
-                    {1, 8}, "",      "of rows, each on a thread of its own while a CPU is free (full level)"};
-  Param<int> cloud_step_{this, "cloud_step", 2, {1, 64}, "px", "distance of the pixels that become points"};
+  Param<double> uniqueness_{this,        "uniqueness", 0.0,
+                            {0.0, 1.0},  "1",          "smallest (second - best) / second of a valid pixel; 0: off",
+                            kSizesMemory};
+  Param<bool> left_right_check_{
+      this,        "left_right_check", false, "", "reject where left and right disagree by over 1 px; doubles the time",
+      kSizesMemory};
+  Param<int> bands_{this,
+                    "bands",
+                    1,
+                    {1, 8},
+                    "",
+                    "of rows, each on a thread of its own while a CPU is free (full level)",
+                    Fixed{"starts threads"}};
+  Param<int> cloud_step_{
+      this, "cloud_step", 2, {1, 64}, "px", "distance of the pixels that become points; in a run not below its start"};
   Param<std::string> calibration_{this, "calibration", "", kPath,
                                   "calibration file (M1 D1 M2 D2 R T image_size) for raw pairs"};
   Choice bayer_{this,
                 "bayer",
                 "none",
                 {"none", "rggb", "bggr", "grbg", "gbrg"},
-                "colour filter of raw pairs of one channel, from the upper left corner; they become BGR"};
+                "colour filter of raw pairs of one channel, from the upper left corner; they become BGR",
+                kSizesMemory};
   Param<bool> row_check_{this, "row_check", true, "",
                          "tell where matched points of the rectified pair lie on different rows"};
 
   int width_ = 0, height_ = 0;
   int channels_ = 0, input_channels_ = 0;  ///< of what is matched, of the input; they differ for mosaics
   BayerPattern pattern_ = BayerPattern::none;
+  int least_step_ = 1;        ///< of the cloud that memory was taken for
   int most_ = 0, range_ = 0;  ///< disparities that memory was taken for, that are searched
   int64_t stamp_ = 0;
   CameraModel camera_;

@@ -46,6 +46,7 @@ struct WindowMatcher::State {
   void write(int y, const DisparityViews& out) const;
 
   MatcherParameters p;
+  const MatcherParameters made;
   const int most_disparities;
   RowRange wanted, filtered, decided;  ///< rows of the result, and those that they are made of
   int width, height, channels, planes, lanes, all_groups, block_groups;
@@ -67,6 +68,7 @@ struct WindowMatcher::State {
 
 WindowMatcher::State::State(int width_, int height_, int channels_, const MatcherParameters& parameters)
     : p(parameters),
+      made(parameters),
       most_disparities(parameters.disparities),
       wanted{0, height_},
       filtered{0, height_},
@@ -267,6 +269,12 @@ WindowMatcher::WindowMatcher(int width, int height, int channels, const MatcherP
 WindowMatcher::~WindowMatcher() = default;
 
 void WindowMatcher::limit_search(int disparities) { state_->set_range(disparities); }
+
+void WindowMatcher::tune(const MatcherParameters& parameters) {
+  const int disparities = state_->p.disparities;
+  state_->p = tuned(state_->made, parameters);
+  state_->p.disparities = disparities;
+}
 
 void WindowMatcher::want_rows(int first, int last) { state_->set_rows({first, last}); }
 

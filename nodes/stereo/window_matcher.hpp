@@ -20,6 +20,7 @@ class WindowMatcher final : public Matcher {
   [[nodiscard]] bool match(ImageView<const uint8_t> left, ImageView<const uint8_t> right,
                            const DisparityViews& out) override;
   void limit_search(int disparities) override;
+  void tune(const MatcherParameters& parameters) override;
   void want_rows(int first, int last) override;
   const char* target() const override;
 

@@ -37,6 +37,12 @@ class SignDetector {
   /// Throws std::invalid_argument if a cascade does not fit into the image.
   SignDetector(int width, int height, std::vector<SignModel> signs, const SignDetectorParameters& parameters);
 
+  /// From the next run() on; the scales stay as they were.
+  void tune(SignDetectorParameters parameters) {
+    parameters.scale_factor = parameters_.scale_factor;
+    parameters_ = parameters;
+  }
+
   std::span<const SignModel> signs() const { return signs_; }
 
   /// Searches an 8-bit BGR image; false, and nothing changed, if it has not the size or the channels. `expected`: where

@@ -30,6 +30,8 @@ class Tracks {
     tracks_.reserve(kMost), expected_.reserve(kMost);
   }
 
+  /// From the next image on; what is confirmed stays so.
+  void tune(const TrackParameters& parameters) { parameters_ = parameters; }
   /// Takes the sightings of one image, the strongest first: each goes on with the track of its sign that overlaps it
   /// most, or begins one. `complete`: what was expected was searched, so that not to be seen counts as a miss.
   void update(std::span<const Sighting> sightings, bool complete);

@@ -29,17 +29,21 @@ class TrafficSignsNode final : public Node {
                        " channel(s), must have three: signs are told by their colour first");
     try {
       detector_.emplace(static_cast<int>(images.width), static_cast<int>(images.height),
-                        read_signs(setup.directory / signs_()),
-                        SignDetectorParameters{scale_factor_, least_hits_, least_hits_alone_, least_fit_});
+                        read_signs(setup.directory / signs_()), sign_parameters());
     } catch (const CascadeError& error) {
       throw SetupError(error.what());
     } catch (const std::invalid_argument& error) {
       throw SetupError(error.what());
     }
-    tracks_.emplace(TrackParameters{confirm_, drop_, overlap_});
+    tracks_.emplace(track_parameters());
     const Capacity most{0, 0, 1, Tracks::kMost};
     detections_.reserve(most);
     places_.reserve(most);
+  }
+
+  void changed() override {
+    detector_->tune(sign_parameters());
+    tracks_->tune(track_parameters());
   }
 
   void run(Job& job) override {
@@ -67,6 +71,9 @@ class TrafficSignsNode final : public Node {
   void remember(StateArchive& archive) override { TAKT_STATE(archive, detector_, tracks_, crossing_level_); }
 
  private:
+  SignDetectorParameters sign_parameters() const { return {scale_factor_, least_hits_, least_hits_alone_, least_fit_}; }
+  TrackParameters track_parameters() const { return {confirm_, drop_, overlap_}; }
+
   /// Sightings without those whose size is known and no sign's.
   std::span<const Sighting> plausible(const DisparityMap* map) {
     kept_count_ = 0;
@@ -138,7 +145,7 @@ class TrafficSignsNode final : public Node {
   Output<DigitalState> crossing_{this, "crossing", "line 0: 1 while a confirmed sign is tracked"};
 
   Param<std::string> signs_{this, "signs", "signs", kPath, "folder with signs.txt and the cascades it names"};
-  Param<double> scale_factor_{this, "scale_factor", 1.15, {1.05, 2.0}, "1", "from one scale to the next"};
+  Param<double> scale_factor_{this, "scale_factor", 1.15, {1.05, 2.0}, "1", "from one scale to the next", kSizesMemory};
   Param<int> least_hits_{this, "least_hits", 2, {1, 100}, "", "windows that must agree on a sign with a colour layout"};
   Param<int> least_hits_alone_{this, "least_hits_alone", 5, {1, 100}, "", "windows that must agree on one without"};
   Param<double> least_fit_{this, "least_fit", 0.1, {-1.0, 1.0}, "1", "of a sighting to the sign's colour layout"};

@@ -36,6 +36,12 @@ struct Surface {
 class HeightMap {
  public:
   explicit HeightMap(const HeightParameters& parameters);
+  /// From now on; cells and window stay as they were.
+  void tune(HeightParameters parameters) {
+    parameters.cell_m = p_.cell_m;
+    parameters.window_m = p_.window_m;
+    p_ = parameters;
+  }
 
   /// Moves the window by whole cells so that the place lies in its middle; what comes in is unknown.
   void centre(double x_m, double y_m) { cells_.centre(x_m, y_m); }

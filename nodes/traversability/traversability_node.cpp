@@ -21,20 +21,14 @@ using mapping_3d::Position;
 class TraversabilityNode final : public Node {
  public:
   void setup(Setup&) override {
-    HeightParameters p;
-    p.cell_m = cell_;
-    p.window_m = window_;
-    p.step_m = step_;
-    p.slope = std::tan(slope_());
-    p.robot_height_m = robot_height_;
-    p.points_min = points_min_;
-    p.forget_ns = std::llround(forget_() * 1e9);
-    heights_.emplace(p);
+    heights_.emplace(parameters());
     points_.reserve(scan_.capacity().count);
     const auto side = static_cast<uint32_t>(heights_->side());
     driveable_.reserve({side, side, 1, 0});
     fused_.reserve({side, side, 1, 0});
   }
+
+  void changed() override { heights_->tune(parameters()); }
 
   void run(Job& job) override {
     for (size_t i = 0; i < odometry_.size(); ++i)
@@ -47,6 +41,18 @@ class TraversabilityNode final : public Node {
   void remember(StateArchive& archive) override { TAKT_STATE(archive, heights_, track_, last_stamp_ns_); }
 
  private:
+  HeightParameters parameters() const {
+    HeightParameters p;
+    p.cell_m = cell_;
+    p.window_m = window_;
+    p.step_m = step_;
+    p.slope = std::tan(slope_());
+    p.robot_height_m = robot_height_;
+    p.points_min = points_min_;
+    p.forget_ns = std::llround(forget_() * 1e9);
+    return p;
+  }
+
   /// A scan counts once the odometry is known at its stamp.
   void add(size_t i) {
     if (scan_.stamp_ns(i) <= last_stamp_ns_) return;
@@ -96,8 +102,8 @@ class TraversabilityNode final : public Node {
                           "cells of the map frame around the robot: 0 can be driven on, 1000 not"};
   Output<Grid> fused_{this, "fused", "the same with `grid`: unknown yields to known, otherwise the larger counts"};
 
-  Param<double> cell_{this, "cell", 0.15, {0.05, 1.0}, "m", "edge of a cell"};
-  Param<double> window_{this, "window", 12.0, {1.0, 60.0}, "m", "side of the grid"};
+  Param<double> cell_{this, "cell", 0.15, {0.05, 1.0}, "m", "edge of a cell", kSizesMemory};
+  Param<double> window_{this, "window", 12.0, {1.0, 60.0}, "m", "side of the grid", kSizesMemory};
   Param<double> step_{this, "step", 0.05, {0.005, 1.0}, "m", "higher or deeper steps block"};
   Param<double> slope_{this, "slope", 0.2618, {0.01, 1.5}, "rad", "steeper slopes block"};
   Param<double> robot_height_{this, "robot_height", 1.78, {0.1, 5.0}, "m", "higher points are no obstacles"};

@@ -214,7 +214,7 @@ bool Replayer::run_job(const RecordedJob& record) {
   bool go_on = true;
   clock_.advance_to(record.start_ns);
   for (const RecordedJob::Param& changed : record.params)
-    if (auto done = task.node->params()[changed.param]->set(changed.value); !done)
+    if (auto done = task.node->change(changed.param, changed.value); !done)
       tell(record, kNone, "a parameter of the record is refused: " + done.error());
   if (!restarts_[record.task].failed && fill_inputs(record)) {
     const std::string& mode = record.mode < plan_.modes.size() ? plan_.modes[record.mode].name : plan_.mode;

@@ -101,6 +101,7 @@ bool Replayer::restart(const RecordedEvent& event) {
     if (whole && message != nullptr) PortAccess::hand_over(*task.node->outputs()[output], message->message());
   });
   if (whole) {
+    if (!restart.params.empty()) task.node->changed();
     clock_.advance_to(event.at_ns);
     task.node->start(options_.epoch_ns);
     result_.restarts += counts(event.task) && std::holds_alternative<Restart>(event.what);

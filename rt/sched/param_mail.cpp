@@ -36,12 +36,18 @@ bool post(ParamMail& mail, size_t param, const ParamValue& value, uint32_t by_us
   return true;
 }
 
+std::string fixed_text(const ParamBase& param) {
+  const std::string_view why = param.fixed().empty() ? kReadAtStart.why : param.fixed();
+  return "is fixed while the graph runs (" + std::string(why) +
+         "); give it in the graph's file or with --set, and start again";
+}
+
 bool deliver(ParamMail& mail, Node& node) {
-  ParamBase& param = *node.params()[mail.param];
+  const ParamBase& param = *node.params()[mail.param];
   std::string refusal;
   if (!param.live()) {
-    refusal = "is used only before the start of a run; give it with --set or in the graph";
-  } else if (const auto done = param.set(value_of(mail)); !done) {
+    refusal = fixed_text(param);
+  } else if (const auto done = node.change(mail.param, value_of(mail)); !done) {
     refusal = done.error();
   }
   if (refusal.empty()) return true;
@@ -59,12 +65,16 @@ void keep(KeptParam& kept, const PlainParam& value, int64_t at_ns) {
 }
 
 void take_up(RunBoard& board, size_t task, Node& node) {
+  bool any = false;
   for (size_t p = 0; p < board.param_count(task); ++p) {
     KeptParam& kept = board.kept(task, p);
     const KeptParam::Value* value = kept.newest();
     // The same parameter accepted it before, so it does again.
-    if (value != nullptr && node.params()[p]->set(value_of(*value))) kept.taken_up.fetch_add(1);
+    if (value == nullptr || !node.params()[p]->set(value_of(*value))) continue;
+    kept.taken_up.fetch_add(1);
+    any = true;
   }
+  if (any) node.changed();
 }
 
 }  // namespace takt

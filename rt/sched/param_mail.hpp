@@ -9,6 +9,9 @@ namespace takt {
 /// a text is too long for the mail. Any thread or process, one at a time.
 bool post(ParamMail& mail, size_t param, const ParamValue& value, uint32_t by_user = 0);
 
+/// Why a parameter that is not live cannot be set, and what to do: "is fixed while the graph runs (sizes memory); ...".
+std::string fixed_text(const ParamBase& param);
+
 /// Between two jobs, on the thread that runs the node: sets the parameter; or says in the mail why not, and returns
 /// false. An accepted mail stays posted until all is noted that must outlive this process (Task::take_mail).
 bool deliver(ParamMail& mail, Node& node);

@@ -44,7 +44,7 @@ for line in "${sets[@]}"; do
 done
 expect 0 "" "$takt" set obstacle_stop:beams_min 3 --run $run
 expect 2 "must lie in" "$takt" set semantic.strip 11m --run $run
-expect 2 "only before the start" "$takt" set obstacle_stop.margin 0.6m --run $run
+expect 2 "is fixed while the graph runs (sizes memory)" "$takt" set stereo.disparities 64 --run $run
 all_set ")"
 scan_lost
 for process in devices robot detection people mapping mind; do kill -KILL "$(member $process)"; done
@@ -53,8 +53,8 @@ all_set ", taken up after 1 restart)"
 scan_lost
 expect 0 "" "$takt" get --run $run
 prints "obstacle_stop.beams_min 3 (set at "
-expect 0 "" "$takt" get obstacle_stop.margin --run $run
-prints "(default)"
+expect 0 "" "$takt" get stereo.disparities --run $run
+prints "(file)"
 expect 2 "did you mean \`semantic.strip\`" "$takt" get semantic.stripe --run $run
 expect 0 "" "$takt" top --once --run $run
 prints "semantic.strip 1.1 m (set at "

@@ -240,7 +240,7 @@ TEST_CASE("a value that the node accepted stands in get and top, and with `keep`
   Scene scene;
   setenv("TAKT_STATE_DIR", (scene.folder.path / "state").c_str(), 1);
   const auto node = scene.registry.nodes.find("mapping_3d")->make();
-  for (ParamBase* param : node->params()) param->end_setup();  // nothing was read: all are live
+  node->end_setup();  // nothing was read: all are live
   scene.plan.tasks[0].node = node.get();
   scene.spec.nodes[0].params["share"] = {0.3, {}, graph::ChosenBy::command_line};
   scene.board = std::make_unique<RunBoard>(scene.plan);

@@ -69,7 +69,7 @@ struct Lamps {
     TaskPlan task;
     task.name = id, task.node = &node, task.device = true, task.source.faults = faults;
     plan.tasks.push_back(task);
-    for (ParamBase* param : node.params()) param->end_setup();
+    node.end_setup();
   }
   /// `job`: the node takes what is posted meanwhile, as between two of its jobs.
   Json ask(const Json& question, bool job = false) {

@@ -59,7 +59,7 @@ TEST_CASE("a fault that is switched on strikes the next job, until it is switche
   Setup setup{clock, ".", {}, 1, Rate{20, 1}};
   node.setup(setup);
   ParamBase& fault = fault_of(node);
-  fault.end_setup();
+  node.end_setup();
   CHECK(fault.live());
   node.start(0);
   const auto sends = [&](int64_t ms) {

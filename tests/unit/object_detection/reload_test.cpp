@@ -128,8 +128,7 @@ struct ReloadScene {
     node->setup(setup);
     reader.setup(setup);
     PortAccess::connect(reader.detections, plan.ports[1].capacity);
-    for (const TaskPlan& task : plan.tasks)
-      for (ParamBase* param : task.node->params()) param->end_setup();
+    for (const TaskPlan& task : plan.tasks) task.node->end_setup();
   }
 };
 

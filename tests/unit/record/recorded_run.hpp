@@ -100,7 +100,7 @@ struct SmallGraph {
     Setup setup{clock, {}, {}, 1, std::nullopt, 0};
     for (Node* node : {static_cast<Node*>(&device), static_cast<Node*>(&filter), static_cast<Node*>(&reader)}) {
       node->setup(setup);
-      for (ParamBase* param : node->params()) param->end_setup();
+      node->end_setup();
     }
     for (const TaskPlan& task : plan.tasks)
       for (const EdgePlan& edge : task.edges)

@@ -52,7 +52,7 @@ struct Fixture {
     test::set(*node, "network", (takt::test::graph_folder() / "networks/kitchen.yaml").string());
     for (const char* name : {"odometry", "task", "objects"}) PortAccess::connect(test::input(*node, name), {});
     test::set_up(*node);
-    for (ParamBase* param : node->params()) param->end_setup();
+    node->end_setup();
     taken = std::make_unique<test::BoxWriter<RobotTask>>(output(*node, "taken"));
     status = std::make_unique<test::BoxWriter<TextStatus>>(output(*node, "status"));
     speech = std::make_unique<test::BoxWriter<TextStatus>>(output(*node, "speech"));

@@ -30,7 +30,7 @@ struct Settable final : Node {
   Settable() {
     accept_requests();
     static_cast<void>(size());
-    for (ParamBase* param : params()) param->end_setup();
+    end_setup();
   }
   void setup(Setup&) override {}
   void start(int64_t) override {

@@ -91,7 +91,7 @@ class Bench {
   void setup() {
     Setup setup{clock_, ".", ".", 0, Rate{15, 1}};
     node_->setup(setup);
-    for (ParamBase* param : node_->params()) param->end_setup();
+    node_->end_setup();
     for (OutputPort* out : node_->outputs()) {
       writers_.push_back(std::make_unique<OneChunkWriter>(*out));
       PortAccess::attach(*out, writers_.back().get());
