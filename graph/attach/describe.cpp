@@ -84,6 +84,12 @@ Json chain_json(const Subject& subject, const graph::ChainSpec& chain) {
 void add_range(const ParamBase& param, Json& to) {
   const std::string range = param.range_text();
   to["range"] = range;
+  if (param.kind() == "choice")
+    for (size_t at = 0; at != std::string::npos && at < range.size();) {
+      const size_t end = range.find(" | ", at);
+      to["choices"].push_back(range.substr(at, end == std::string::npos ? end : end - at));
+      at = end == std::string::npos ? end : end + 3;
+    }
   const size_t dots = range.find("..");
   if (dots == std::string::npos) return;
   const auto number = [](std::string_view text) -> Json {
@@ -104,6 +110,8 @@ Json parameters_of(const Subject& subject, const graph::NodeSpec& spec) {
                {"param", param->name()},
                {"unit", param->unit()},
                {"kind", param->kind()},
+               {"live", param->fixed().empty() && param->unit() != kPath},
+               {"fixed", param->fixed()},
                {"help", param->doc()},
                {"default", param->value_text()},
                {"value", param->value_text()}};

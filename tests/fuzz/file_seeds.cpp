@@ -86,6 +86,35 @@ void cloud_seeds(Seeds& seeds) {
       of(pcd + "binary_compressed\n" + raw(static_cast<uint32_t>(packed.size()), uint32_t{32}) + packed));
 }
 
+/// Frames as tests/fuzz/web.cpp reads them.
+void web_seeds(Seeds& seeds) {
+  const auto frames = [](uint8_t who, const std::vector<std::string>& texts, bool binary = false) {
+    std::string all(1, static_cast<char>(who));
+    for (const std::string& text : texts)
+      all += raw(static_cast<uint8_t>(binary), static_cast<uint16_t>(text.size())) + text;
+    return of(all);
+  };
+  const std::vector<std::string> page{
+      R"({"op": "token", "token": "secret"})", R"({"op": "look", "port": "eye.pair", "as": "picture", "most_hz": 15})",
+      R"({"op": "ask", "id": 1, "question": {"do": "set", "param": "eye.gain", "value": "0.2 s", "keep": true}})",
+      R"({"op": "ask", "id": 2, "question": {"do": "fault", "device": "eye", "fault": "silent", "on": true}})",
+      R"({"op": "leave", "port": "eye.pair", "as": "picture"})"};
+  const std::vector<std::string> foxglove{
+      R"({"op": "subscribe", "subscriptions": [{"id": 1, "channelId": 1}, {"id": 2, "channelId": 0}]})",
+      R"({"op": "getParameters", "parameterNames": [], "id": "a"})",
+      R"({"op": "setParameters", "parameters": [{"name": "eye.gain", "value": 0.2}], "id": "b"})",
+      R"({"op": "subscribeParameterUpdates", "parameterNames": ["eye.gain"]})",
+      R"({"op": "subscribeConnectionGraph"})",
+      R"({"op": "unsubscribe", "subscriptionIds": [1]})"};
+  seeds.add_and_spoil(frames(0, page));
+  seeds.add_and_spoil(frames(4, page));
+  for (const uint8_t who : {1, 3}) {
+    seeds.add_and_spoil(frames(who, foxglove));
+    seeds.add_and_spoil(
+        frames(who, {"\2" + raw(uint32_t{0}, uint32_t{9}, uint32_t{4}) + "json{\"mode\": \"rest\"}"}, true));
+  }
+}
+
 void carmen_seeds(Seeds& seeds) {
   const std::string odom = "ODOM 1 2 0.5 0 0 0 1.5 host 1.5\n", pose = " 1 2 0.5 1 2 0.5";
   seeds.add_and_spoil(of("# a log\nPARAM robot_frontlaser_offset 0.1 host 0\n" + odom + "FLASER 3 1 inf 2" + pose +
@@ -172,6 +201,7 @@ size_t file_seeds(const std::filesystem::path& folder) {
   };
   make("mcap", mcap_seeds);
   make("cloud", cloud_seeds);
+  make("web", web_seeds);
   make("carmen", carmen_seeds);
   make("calibration", calibration_seeds);
   make("image", image_seeds);

@@ -65,7 +65,7 @@ class Seeds {
   size_t count_ = 0;
 };
 
-/// Of the readers of files: the folders mcap, cloud, carmen, calibration and image in `folder`.
+/// Of the readers of files: the folders mcap, cloud, web, carmen, calibration and image in `folder`.
 size_t file_seeds(const std::filesystem::path& folder);
 
 }  // namespace takt::fuzz

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// foxglove.mjs ws://HOST:PORT TOKEN SECONDS: follows every channel of takt web with Foxglove's own client and decoders,
+// foxglove.mjs ws://HOST:PORT TOKEN SECONDS PARAM VALUE: follows every channel of takt web with Foxglove's own client and decoders,
 // sets a parameter, calls services. Prints one JSON object: by topic the schema, messages, and of scans and disparities
 // the hash of their numbers by stamp.
 import { createHash } from "node:crypto";
@@ -12,7 +12,7 @@ const { FoxgloveClient } = protocol; // these packages are CommonJS
 const { parse } = rosmsg;
 const { MessageReader } = serialization;
 
-const [url, token, seconds] = process.argv.slice(2);
+const [url, token, seconds, param, value] = process.argv.slice(2);
 const out = { protocols: {}, topics: {}, hashes: {}, problems: [] };
 const wait = (ms) => new Promise((done) => setTimeout(done, ms));
 
@@ -70,7 +70,7 @@ async function followAll() {
   client.getParameters([], "all");
   out.parameters = (await all).parameters.length;
   const set = next(client, "parameterValues", (event) => event.id === "set");
-  client.setParameters([{ name: "cruise.speed", value: 0.21 }], "set");
+  client.setParameters([{ name: param, value: Number(value) }], "set");
   out.set = (await set).parameters;
 
   const byName = Object.fromEntries((await services).map((service) => [service.name, service.id]));
@@ -97,7 +97,7 @@ async function lookOnly() {
   client.subscribe(scan.id);
   await message;
   const refused = next(client, "status");
-  client.setParameters([{ name: "cruise.speed", value: 0.3 }], "set");
+  client.setParameters([{ name: param, value: Number(value) }], "set");
   out.refused = (await refused).message;
   out.protocols["foxglove.websocket.v1"] = true;
   client.close();

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+// drawn.mjs ADDRESS SECONDS: Chromium at the robot's view of takt web. Prints how many frames of each port were received and
+// drawn in that time, and the ages of the newest ones when they were drawn, as one JSON object.
+import { chromium } from "playwright-core";
+
+const [address, seconds] = process.argv.slice(2);
+const flags = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"];
+const browser = await chromium.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", args: flags });
+const page = await (await browser.newContext({ viewport: { width: 1280, height: 800 } })).newPage();
+await page.goto(`${address}&view=robot`);
+await page.waitForFunction(() => Object.keys(window.takt?.drawn ?? {}).length > 0);
+await page.waitForTimeout(2000);
+const look = () => page.evaluate(() => structuredClone({ drawn: window.takt.drawn, received: window.takt.received, at: performance.now() }));
+const before = await look();
+await page.waitForTimeout(Number(seconds) * 1000);
+const after = await look();
+const since = (name) => Object.fromEntries(Object.entries(after[name]).map(([key, count]) => [key, count - (before[name][key] ?? 0)]));
+const latency_ms = await page.evaluate(() => window.takt.latency_ms.slice());
+console.log(JSON.stringify({ seconds: (after.at - before.at) / 1000, drawn: since("drawn"), received: since("received"), latency_ms }));
+await browser.close();
+process.exit(0);
