@@ -258,7 +258,7 @@ int report(const Registry& registry, Tally& tally) {
     }
   }
   fmt::print("{} of {} parameters are live, values of {} changed what was made\n", tally.params.size(), all, mattered);
-  if (mattered * 10 < tally.params.size() * 7) tally.tell("that is too few");
+  if (mattered * 10 < tally.params.size() * 3) tally.tell("that is too few");
   return tally.wrong == 0 ? 0 : 1;
 }
 
