@@ -23,7 +23,7 @@ echo "=== set while the graph runs, recorded, replayed"
 sets=(
   body_pose.rotations=7 body_pose.floor=12cm ego_motion.brightness=false ego_motion.n_search=9 ego_motion.predict=constant_velocity
   ground_map.t_w=0.5 ground_map.mean_size=5 ground_map.trapezoid_height=0.15 ground_map.up=0.3 mapping_3d.z_floor=10cm
-  mapping_3d.outlier_radius=0 mapping_3d.camera_tilt=0.1rad object_3d.d_max=3cm object_detection.min_score=0.5
+  mapping_3d.outlier_radius=0m mapping_3d.camera_tilt=0.1rad object_3d.d_max=3cm object_detection.min_score=0.5
   obstacle_stop.margin=15cm obstacle_stop.memory=1s person_tracking.confirm=2 robot_pose.gate=9 scan_matching.score_min=0.5
   semantic.idle=stereo semantic.strip=1.1m semantic_map.merge_min=0.8 stereo.min_confidence=0.4 stereo.cloud_step=4
   traffic_signs.confirm=1 traversability.slope=0.2rad laser_fusion.generations=500
@@ -36,7 +36,7 @@ expect 2 "memory was taken for the points of 2 px" "$takt" set stereo.cloud_step
 expect 2 "must lie below range_max" "$takt" set mapping_3d.range_min 40m --run $run
 expect 2 "must be odd" "$takt" set ground_map.mean_size 4 --run $run
 expect 0 "" "$takt" get ground_map.mean_size --run $run
-prints "ground_map.mean_size 5 px (set at "
+prints "ground_map.mean_size 5 (set at "
 end_run 0 1
 expect 0 "" "$takt" log info "$work/live.mcap"
 for isolate in none subsystem; do
