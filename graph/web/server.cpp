@@ -45,7 +45,7 @@ class Server::Inside {
         room_{hub, options.token, options.token_to_look, [this](uint64_t session, Json question, Asking::Then then) {
                 asking_.ask(session, std::move(question), std::move(then));
               }} {
-    lws_set_log_level(LLL_ERR, nullptr);
+    lws_set_log_level(0, nullptr);  // what concerns a person is told by main
     lws_context_creation_info info{};
     info.port = options.port;
     info.iface = options.address.c_str();

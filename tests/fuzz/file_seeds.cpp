@@ -108,7 +108,7 @@ void web_seeds(Seeds& seeds) {
       R"({"op": "unsubscribe", "subscriptionIds": [1]})"};
   seeds.add_and_spoil(frames(0, page));
   seeds.add_and_spoil(frames(4, page));
-  for (const uint8_t who : {1, 3}) {
+  for (const uint8_t who : {uint8_t{1}, uint8_t{3}}) {
     seeds.add_and_spoil(frames(who, foxglove));
     seeds.add_and_spoil(
         frames(who, {"\2" + raw(uint32_t{0}, uint32_t{9}, uint32_t{4}) + "json{\"mode\": \"rest\"}"}, true));
