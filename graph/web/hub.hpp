@@ -8,7 +8,6 @@
 //
 // A view is made only while somebody looks at it. Any thread.
 #pragma once
-#include <compare>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -17,7 +16,7 @@
 #include <optional>
 #include <set>
 #include <string>
-#include <string_view>
+#include <tuple>
 #include <vector>
 
 #include "hal/settings/json.hpp"
@@ -33,7 +32,8 @@ inline Frame frame_of(std::string bytes) { return std::make_shared<const std::st
 /// An output, and how it is wanted: a `kind` of the page, or what cdr_view() makes of a topic.
 struct View {
   std::string port, as;
-  auto operator<=>(const View&) const = default;
+  bool operator<(const View& other) const { return std::tie(port, as) < std::tie(other.port, other.as); }
+  bool operator==(const View&) const = default;
 };
 
 /// A topic that Foxglove can subscribe. Several outputs may tell of "/tf".

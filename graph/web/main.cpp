@@ -105,12 +105,12 @@ int run(int argc, char** argv) {
   CLI::App app{"Shows a running graph in a browser and to Foxglove; prints the address to open", "takt web"};
   Options options;
   app.add_option("--run", options.run, "process id of the run; without it the one that there is");
-  app.add_option("--port", options.server.port, "TCP port of page and Foxglove")
-      ->check(CLI::Range(1, 65535))
-      ->capture_default_str();
-  app.add_option("--address", options.server.address,
-                 "address of this machine; any but loopback needs --certificate and --key, and the token for looking")
-      ->capture_default_str();
+  app.add_option("--port", options.server.port, "TCP port of page and Foxglove, 8765 by default")
+      ->check(CLI::Range(1, 65535));
+  app.add_option(
+      "--address", options.server.address,
+      "address of this machine, 127.0.0.1 by default; any but loopback needs --certificate and --key, and the "
+      "token for looking");
   app.add_option("--certificate", options.server.certificate, "PEM file with this server's certificate")
       ->check(CLI::ExistingFile);
   app.add_option("--key", options.server.key, "PEM file with its key")->check(CLI::ExistingFile);
