@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 # takt top in a terminal: each page and key, from 40 to 200 columns; the terminal is given back after q, Ctrl-C, signals,
-# a suspension and the end of the run. Elsewhere it prints what other programs read.
+# a suspension and the end of the run; a run that has let go of it is found again. Elsewhere it prints what other programs read.
 source "$(dirname "$0")/lib.sh" "$@"
 in_terminal() { python3 "$source/tests/integration/top_keys.py" "$takt" "$run" "$1" || fail "in a terminal: $1"; }
 
 start_run main --isolate subsystem --for 0s
-for case in pages narrow plain term hangup suspended; do
+for case in pages narrow plain term hangup suspended held; do
   echo "=== in a terminal: $case"
   in_terminal $case
 done

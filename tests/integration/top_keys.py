@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """takt top in a terminal of its own: pages, keys, sizes, and the terminal as it was before, however it ends.
 
-  top_keys.py TAKT RUN CASE     CASE: pages, narrow, plain, term, hangup, suspended or stopped
+  top_keys.py TAKT RUN CASE     CASE: pages, narrow, plain, term, hangup, suspended, held or stopped
 
 Of `stopped` the run is stopped, by `takt stop`. Exit 1 where something is not as it should be. Nothing is timed: the
 script waits until the screen has what it looks for, up to a minute.
@@ -236,6 +236,32 @@ def suspended(takt, run):
     top.ends(0)
 
 
+def held(takt, run):
+    """The run lets go of one who does not read for long; he comes back by himself."""
+    def sockets():
+        found = set()
+        for fd in os.listdir(f"/proc/{run}/fd"):
+            try:
+                found.add(os.readlink(f"/proc/{run}/fd/{fd}"))
+            except FileNotFoundError:  # closed meanwhile
+                pass
+        return {name for name in found if name.startswith("socket:")}
+
+    before = sockets()
+    top = Top(takt, run)
+    top.shows("[1 nodes]", "· full ·")
+    its_own = sockets() - before
+    assert its_own
+    top.process.send_signal(signal.SIGSTOP)
+    top.until(lambda: not its_own & sockets(), "the run lets go")
+    top.process.send_signal(signal.SIGCONT)
+    top.keys("6")
+    subprocess.run([takt, "mark", "he is back", "--run", run], check=True)
+    top.shows("he is back")
+    top.keys("q")
+    top.ends(0)
+
+
 def stopped(takt, run):
     top = Top(takt, run)
     top.shows("[1 nodes]")
@@ -243,4 +269,4 @@ def stopped(takt, run):
     assert top.ends(0) == "takt: the run has ended\n"
 
 
-{case.__name__: case for case in (pages, narrow, plain, term, hangup, suspended, stopped)}[sys.argv[3]](*sys.argv[1:3])
+{case.__name__: case for case in (pages, narrow, plain, term, hangup, suspended, held, stopped)}[sys.argv[3]](*sys.argv[1:3])

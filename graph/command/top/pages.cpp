@@ -216,7 +216,7 @@ Content help_page(const Fit& fit) {
            "above its bound or proof.",
            "exec, resp, age: of the last job. max: the largest of the run. miss: deadline misses. skip: releases "
            "without "
-           "a job. over: budget overruns. pause: releases during a mode without the node. level: 0 is the best "
+           "a job. over: budget overruns. pause: releases at which nothing asked for the node. level: 0 is the best "
            "quality.",
            "Timeline: the height of a sign is the share of the deadline that the response took. `!` is a job that "
            "ended "

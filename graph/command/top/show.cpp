@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "graph/cli/outcome.hpp"
 #include "graph/command/top/frame.hpp"
@@ -65,6 +66,7 @@ class Show {
   KeyReader reader_;
   View view_;
   Extent extent_;
+  bool quiet_ = false;  ///< the last wait brought nothing
   double heard_s_ = seconds_now();
 };
 
@@ -87,11 +89,12 @@ void Show::draw() {
 }
 
 void Show::wait() {
+  quiet_ = false;
   if (connection_->readable(0)) return;
   std::array<pollfd, 3> sources{{{terminal_.signals(), POLLIN, 0},
                                  {connection_->descriptor(), POLLIN, 0},
                                  {terminal_.keys() ? STDIN_FILENO : -1, POLLIN, 0}}};
-  poll(sources.data(), sources.size(), reader_.waiting() ? kEscapeMs : kIdleMs);
+  quiet_ = poll(sources.data(), sources.size(), reader_.waiting() ? kEscapeMs : kIdleMs) == 0;
   terminal_.heard();
   if ((sources[2].revents & (POLLHUP | POLLERR | POLLNVAL)) != 0) view_.ended = true;  // nobody looks any more
 }
@@ -100,7 +103,9 @@ void Show::take_keys() {
   if (!terminal_.keys()) return;
   char bytes[256];
   const ssize_t count = read(STDIN_FILENO, bytes, sizeof bytes);
-  const auto keys = count > 0 ? reader_.read({bytes, static_cast<size_t>(count)}) : reader_.rest();
+  const auto keys = count > 0 ? reader_.read({bytes, static_cast<size_t>(count)})
+                    : quiet_  ? reader_.rest()
+                              : std::vector<Key>{};
   for (const Key& key : keys) {
     view_ = after(view_, key, extent_);
     if (key.kind == Key::Kind::redraw) frame_.forget();
