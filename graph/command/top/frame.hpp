@@ -7,8 +7,8 @@
 
 namespace takt::top {
 
-/// What the terminal shows at present, so that only lines that changed are sent: a run over ssh costs some hundred
-/// bytes a look.
+/// What the terminal shows at present, so that only lines that changed are sent: less to wait
+/// for over ssh.
 ///
 ///   terminal.write(frame.difference(lines, size, look));
 class Frame {

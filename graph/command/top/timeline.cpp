@@ -18,10 +18,12 @@ struct Stretch {
   double share = 0;  ///< of the deadline that a response took, the largest one
 };
 
-/// `cells` stretches of equal length that end at `now_s`.
+/// `cells` stretches of equal length; `now_s` lies in the last one.
 std::vector<Stretch> stretches(const NodeSeen& node, double now_s, size_t cells) {
   std::vector<Stretch> all(cells);
-  const double begin_s = now_s - kHistory_s, length_s = kHistory_s / static_cast<double>(cells);
+  const double length_s = kHistory_s / static_cast<double>(cells);
+  // Stretches begin at multiples of their length, so that a job keeps its place among others while all move on.
+  const double begin_s = std::ceil(now_s / length_s) * length_s - kHistory_s;
   const auto cell_of = [&](double at_s) {
     const double cell = std::floor((at_s - begin_s) / length_s);
     return static_cast<size_t>(std::clamp(cell, 0.0, static_cast<double>(cells - 1)));
