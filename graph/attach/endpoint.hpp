@@ -34,6 +34,8 @@ class Connection {
   bool readable(int wait_ms) const;
   /// True if the other side has gone. Does not wait.
   bool gone() const;
+  /// To wait for with others in poll(2). What came with an earlier line does not show there: see readable().
+  int descriptor() const { return descriptor_; }
 
  private:
   bool fill();

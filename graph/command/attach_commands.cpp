@@ -16,6 +16,7 @@
 #include "graph/cli/file_option.hpp"
 #include "graph/cli/graph_file.hpp"
 #include "graph/cli/outcome.hpp"
+#include "graph/command/top/show.hpp"
 #include "graph/language/overlay.hpp"
 
 namespace takt::command {
@@ -51,12 +52,11 @@ std::string top_text(const Json& top) {
 int run_top(const AttachOptions& options) {
   auto connection = attached(options.run);
   if (!connection) return kDeviceOrSystem;
-  const bool redraw = isatty(STDOUT_FILENO) != 0 && !options.once && !options.json;
+  if (isatty(STDOUT_FILENO) != 0 && !options.once && !options.json) return top::show(std::move(*connection));
   for (bool first = true;; first = false) {
     if (!connection->write({{"do", "top"}})) return kOk;  // the run has ended, as runs do
     const auto line = connection->read_line();
     if (!line) return first ? refuse("the run does not answer", kDeviceOrSystem) : kOk;
-    if (redraw) std::fputs("\x1b[H\x1b[2J", stdout);
     std::fputs(options.json ? (line->dump() + "\n").c_str() : top_text(*line).c_str(), stdout);
     std::fflush(stdout);
     if (options.once || output_gone()) return kOk;
@@ -236,9 +236,13 @@ int understood(const std::function<int()>& command) {
 
 void add_attach_commands(CLI::App& app, plugin::Plugins& plugins, AttachOptions& o, int& exit_code) {
   CLI::App* top = add(app, "top", "shows what a running graph does", o);
-  top->add_flag("--once", o.once, "shows it once");
+  top->add_flag("--once", o.once, "prints a table once");
   top->add_flag("--json", o.json, "one JSON object a line");
-  top->footer("Example: takt top");
+  top->footer(
+      "Example: takt top\n"
+      "In a terminal it has pages: nodes, chains, timeline, devices, processes, log, parameters. `?` lists the keys, q "
+      "ends it.\n"
+      "Elsewhere it prints a table every half second. NO_COLOR=1 takes the colours away.");
   top->callback([&] { exit_code = understood([&] { return run_top(o); }); });
   CLI::App* echo = add(app, "echo", "shows messages of a running graph", o);
   echo->add_option("port", o.port, "NODE.PORT")->required();

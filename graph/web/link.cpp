@@ -232,7 +232,10 @@ void Link::take_state(const Json& line) {
   Json state = line.at("state");
   std::vector<int> pids;
   for (const Json& process : state.value("processes", Json::array())) pids.push_back(process.value("pid", 0));
-  state.update(use_.look(pids, MonotonicClock().now_ns()));
+  const attach::MachineUse::Use use = use_.look(pids, MonotonicClock().now_ns());
+  state["cpu"] = use.cpu ? Json(*use.cpu) : Json(nullptr);
+  state["memory_mb"] = use.memory_mb;
+  state["host_stall_ms"] = use.host_stall_ms;
   hub_.broadcast({{"state", std::move(state)},
                   {"jobs", line.value("jobs", Json::array())},
                   {"events", line.value("events", Json::array())}});

@@ -8,10 +8,10 @@
 #include <string>
 
 #include "graph/attach/endpoint.hpp"
+#include "graph/attach/machine_use.hpp"
 #include "graph/language/message_types.hpp"
 #include "graph/log/recorded_type.hpp"
 #include "graph/web/hub.hpp"
-#include "graph/web/machine_use.hpp"
 #include "graph/world/encoder.hpp"
 #include "rt/memory/aligned_bytes.hpp"
 #include "rt/own_thread.hpp"
@@ -65,7 +65,7 @@ class Link {
   uint64_t wants_ = 0;
   int64_t epoch_ns_ = 0;
   const world::Encoder encoder_;
-  MachineUse use_;
+  attach::MachineUse use_;
   OwnThread thread_;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "graph/web/machine_use.hpp"
+#include "graph/attach/machine_use.hpp"
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -8,8 +8,9 @@
 #include <fstream>
 #include <sstream>
 #include <string>
+#include <utility>
 
-namespace takt::web {
+namespace takt::attach {
 namespace {
 
 /// User and system time of a process, in ticks; 0: it is gone.
@@ -49,27 +50,34 @@ int64_t stolen_ms() {
 
 }  // namespace
 
-Json MachineUse::look(const std::vector<int>& pids, int64_t now_ns) {
+MachineUse::Use MachineUse::look(const std::vector<int>& pids, int64_t now_ns) {
+  const double page_mb = static_cast<double>(sysconf(_SC_PAGESIZE)) / 1e6;
+  const double seconds = looked_ns_ > 0 ? static_cast<double>(now_ns - looked_ns_) / 1e9 : 0.0;
+  const auto cores = [&](int64_t ticks) {
+    return static_cast<double>(std::max<int64_t>(ticks, 0)) / static_cast<double>(sysconf(_SC_CLK_TCK)) / seconds;
+  };
   std::map<int, int64_t> ticks;
   int64_t used = 0, own = 0, shared = 0;
+  Use use;
   for (const int pid : pids) {
     const int64_t now = ticks[pid] = cpu_ticks(pid);
-    if (const auto before = cpu_ticks_.find(pid); before != cpu_ticks_.end()) used += now - before->second;
     const Pages pages = pages_of(pid);
     own += pages.own;
     shared = std::max(shared, pages.shared);
+    use.processes.push_back({std::nullopt, static_cast<double>(pages.own) * page_mb});
+    const auto before = cpu_ticks_.find(pid);
+    if (before == cpu_ticks_.end()) continue;
+    used += now - before->second;
+    if (seconds > 0) use.processes.back().cpu = cores(now - before->second);
   }
   const int64_t stalled_ms = stolen_ms();
   if (stalled_before_ms_ < 0) stalled_before_ms_ = stalled_ms;
-  const double seconds = static_cast<double>(now_ns - looked_ns_) / 1e9;
-  Json use{{"cpu", looked_ns_ > 0 && seconds > 0 ? Json(static_cast<double>(std::max<int64_t>(used, 0)) /
-                                                        static_cast<double>(sysconf(_SC_CLK_TCK)) / seconds)
-                                                 : Json(nullptr)},
-           {"memory_mb", static_cast<double>((own + shared) * sysconf(_SC_PAGESIZE)) / 1e6},
-           {"host_stall_ms", stalled_ms - stalled_before_ms_}};
+  if (seconds > 0) use.cpu = cores(used);
+  use.memory_mb = static_cast<double>(own + shared) * page_mb;
+  use.host_stall_ms = stalled_ms - stalled_before_ms_;
   cpu_ticks_ = std::move(ticks);
   looked_ns_ = now_ns;
   return use;
 }
 
-}  // namespace takt::web
+}  // namespace takt::attach
