@@ -60,6 +60,10 @@ class DeviceNode : public Node {
   void live_with(std::unique_ptr<DoubleThread> device) { double_ = std::move(device); }
   /// Of its double or simulated device; null: nothing can be made to go wrong with it.
   FaultSwitch* faults() { return double_ ? &double_->faults() : device().faults(); }
+  /// The text parameter that answers of people come in by, where takes_answers().
+  static constexpr std::string_view kAnswer = "answer";
+  /// Whether people answer it from a screen in another process (the question `answer` to a running graph).
+  virtual bool takes_answers() const { return false; }
   /// The bits of these (fault_bits); 0: none.
   uint32_t known_faults();
   /// Before setup: the device is not opened there. Such a node tells its capacities, and never runs.

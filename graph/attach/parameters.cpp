@@ -7,7 +7,7 @@
 
 #include "graph/compose/composition.hpp"
 #include "graph/language/quantity.hpp"
-#include "hal/misbehaviour.hpp"
+#include "hal/device_node.hpp"
 #include "rt/sched/param_mail.hpp"
 
 namespace takt::attach {
@@ -65,7 +65,7 @@ Json parameter_json(const NodeTypes& types, const graph::GraphSpec& graph, const
     entry["value"] = types.find(spec->type)->make()->params()[param]->value_text();
     entry["from"] = "default";
   } else {
-    entry["value"] = to_text(Misbehaviour::none);  // the one parameter of a device
+    entry["value"] = name == FaultParam::kName ? std::string(to_text(Misbehaviour::none)) : "";  // of a device
     entry["from"] = "default";
   }
   return entry;

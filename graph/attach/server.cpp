@@ -159,14 +159,17 @@ bool Server::answer(const Json& question, Connection& connection, uint32_t by_us
     return connection.write(fault.empty() ? faults(device)
                                           : switch_fault(device, fault, question.value("on", true), by_user));
   }
+  if (what == "answer")
+    return connection.write(give_answer(question.value("device", ""), question.value("text", ""), by_user));
   if (what == "forget") return connection.write(forget(question.value("param", "")));
   if (what == "mark") return connection.write(mark(question.value("words", ""), by_user));
   if (what == "stop") {
     subject_.board.stop().raise(now_ns());
     return connection.write({{"ok", true}});
   }
-  return connection.write(wrong("unknown question " + what +
-                                "; known: top, echo, describe, follow, get, set, forget, fault, mark, mode, stop"));
+  return connection.write(
+      wrong("unknown question " + what +
+            "; known: top, echo, describe, follow, get, set, forget, fault, answer, mark, mode, stop"));
 }
 
 Json Server::mark(const std::string& words, uint32_t by_user) {

@@ -13,8 +13,8 @@
 
 namespace takt::attach {
 
-/// Answers top, echo, describe, follow, get, set, forget, fault, mark, mode and stop for one run, from threads of the
-/// default policy that only read the board, hold one message of an output at a time while they copy it, and post
+/// Answers top, echo, describe, follow, get, set, forget, fault, answer, mark, mode and stop for one run, from threads
+/// of the default policy that only read the board, hold one message of an output at a time while they copy it, and post
 /// parameters to be taken between jobs. Its own user and root are heard; of the service its group, too, where the mode
 /// of its folder says so.
 class Server {
@@ -64,6 +64,8 @@ class Server {
   nlohmann::ordered_json switch_fault(const std::string& device, const std::string& fault, bool on, uint32_t by_user);
   /// Why there is nothing to switch: unknown, or not simulated.
   nlohmann::ordered_json not_switchable(const std::string& device) const;
+  /// What somebody answered on the screen of `device`. Comes back once a job of the device has it.
+  nlohmann::ordered_json give_answer(const std::string& device, const std::string& text, uint32_t by_user);
   nlohmann::ordered_json post_and_wait(size_t task, size_t param, const ParamValue& value, uint32_t by_user);
   /// Of a node; "" of a device.
   std::string type_of(const std::string& node) const;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Faults of simulated devices and doubles, switched while the graph runs.
+// What changes a device while the graph runs: faults of simulated devices and doubles, answers on a screen.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -16,12 +16,13 @@ using Json = nlohmann::ordered_json;
 
 Json refusal(const std::string& text) { return {{"error", text}}; }
 
-size_t fault_param(const TaskPlan& task) {
+size_t param_called(const TaskPlan& task, std::string_view name) {
   const auto& params = task.node->params();
-  const auto found =
-      std::find_if(params.begin(), params.end(), [](const ParamBase* p) { return p->name() == FaultParam::kName; });
+  const auto found = std::find_if(params.begin(), params.end(), [&](const ParamBase* p) { return p->name() == name; });
   return static_cast<size_t>(found - params.begin());
 }
+
+size_t fault_param(const TaskPlan& task) { return param_called(task, FaultParam::kName); }
 
 /// What is switched on; "none": nothing.
 std::string switched_on(const RunBoard& board, const Plan& plan, size_t task) {
@@ -77,6 +78,34 @@ Json Server::switch_fault(const std::string& device, const std::string& fault, b
   if (!on && switched_on(subject_.board, subject_.plan, index) != fault) return {{"ok", true}};
   const std::string value(on ? std::string_view(fault) : to_text(Misbehaviour::none));
   return post_and_wait(index, fault_param(*task), value, by_user);
+}
+
+Json Server::give_answer(const std::string& device, const std::string& text, uint32_t by_user) {
+  const auto& tasks = subject_.plan.tasks;
+  const auto task =
+      std::find_if(tasks.begin(), tasks.end(), [&](const TaskPlan& t) { return t.name == device && t.source.answers; });
+  if (task == tasks.end()) {
+    std::vector<std::string> able;
+    for (const TaskPlan& t : tasks)
+      if (t.source.answers) able.push_back(t.name);
+    const auto spec = std::find_if(subject_.graph.devices.begin(), subject_.graph.devices.end(),
+                                   [&](const graph::DeviceSpec& d) { return d.id == device; });
+    if (spec == subject_.graph.devices.end())
+      return refusal(fmt::format("there is no device {}{}", graph::ticked(device),
+                                 graph::alternatives(device, able, "devices that take answers")));
+    return refusal(fmt::format("device {} (kind {}, driver {}) takes no answers: only those with the driver web do{}",
+                               device, spec->kind, spec->driver,
+                               graph::alternatives("", able, "devices that take answers")));
+  }
+  constexpr size_t kMost = sizeof(ParamMail::words.characters) - 1;
+  if (text.empty()) return refusal(fmt::format("an answer to device {} needs words", device));
+  if (text.size() > kMost)
+    return refusal(
+        fmt::format("an answer has at most {} bytes; this one to device {} has {}", kMost, device, text.size()));
+  if (std::any_of(text.begin(), text.end(), [](unsigned char c) { return c < ' ' || c == 0x7f; }))
+    return refusal(fmt::format("an answer is one line of text; this one to device {} has control characters", device));
+  return post_and_wait(static_cast<size_t>(task - tasks.begin()), param_called(*task, DeviceNode::kAnswer), text,
+                       by_user);
 }
 
 }  // namespace takt::attach

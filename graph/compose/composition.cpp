@@ -126,7 +126,8 @@ class Composer {
     TaskPlan& task = result_.plan.tasks[t];
     if (auto* const hardware = dynamic_cast<DeviceNode*>(task.node)) {
       StampLaw law = hardware->stamp_law({task.rate, task.offset_ns});
-      task.source = {law.lag_ns(), law.wait_ns, std::move(law.unknown), hardware->known_faults()};
+      task.source = {law.lag_ns(), law.wait_ns, std::move(law.unknown), hardware->known_faults(),
+                     hardware->takes_answers()};
     }
     if (options_.exchange != nullptr) options_.exchange->tell_source(t, task.source);
   }

@@ -100,13 +100,14 @@ void BoardExchange::tell_source(size_t task, const SourcePlan& source) {
   facts.wait_ns = source.wait_ns;
   facts.unknown = BoundedText<SourceFacts::kLongest>(source.unknown);
   facts.faults = source.faults;
+  facts.answers = source.answers;
   facts.known.store(true, std::memory_order_release);
 }
 
 SourcePlan BoardExchange::wait_for_source(size_t task) {
   const SourceFacts& facts = board_.source_facts(task);
   wait_until([&] { return facts.known.load(std::memory_order_acquire); });
-  return {facts.lag_ns, facts.wait_ns, std::string(facts.unknown.text()), facts.faults};
+  return {facts.lag_ns, facts.wait_ns, std::string(facts.unknown.text()), facts.faults, facts.answers};
 }
 
 bool wait_until(const std::function<bool()>& done, const std::function<bool()>& broken,

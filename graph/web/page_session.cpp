@@ -15,7 +15,7 @@ constexpr size_t kMostLooks = 64;
 constexpr double kScreenHz = 60;
 constexpr std::array<std::string_view, 7> kKinds{"picture", "disparity", "cloud", "scan", "grid", "pose", "value"};
 /// Questions that change the run.
-constexpr std::array<std::string_view, 5> kChanges{"set", "forget", "mode", "mark", "stop"};
+constexpr std::array<std::string_view, 6> kChanges{"set", "forget", "mode", "mark", "stop", "answer"};
 constexpr std::array<std::string_view, 3> kLooks{"get", "top", "fault"};
 
 template <size_t N>

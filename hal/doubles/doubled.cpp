@@ -10,6 +10,8 @@
 #include "hal/driver_parts.hpp"
 #include "hal/gpio/gpio_driver.hpp"
 #include "hal/head/can_head_driver.hpp"
+#include "hal/interaction/make_web.hpp"
+#include "hal/interaction/web_double.hpp"
 #include "hal/laser/lms200/driver.hpp"
 #include "hal/laser/lms200/lms200_double.hpp"
 #include "hal/laser/lms400/driver.hpp"
@@ -156,12 +158,29 @@ Made make_camera(Order& order) {
   return {std::move(device), expose};
 }
 
+Made make_screen(Order& order) {
+  order.doubled.config.driver = "web";
+  order.doubled.driver = [](const DeviceConfig& config, Settings& settings, Devices&, const Clock& clock, Seams seams) {
+    return make_web_screen(config, settings, clock, std::move(seams.fingers));
+  };
+  auto script = parse_task_script(order.settings.text("script", ""));
+  if (!script) {
+    order.settings.fail("`script`: " + script.error(), "correct `script`");
+    return {};
+  }
+  order.doubled.seams.fingers = std::make_shared<AnswerLine>();
+  auto device = std::make_unique<WebDouble>(std::move(*script), order.doubled.seams.fingers);
+  auto begin = [&screen = *device](int64_t epoch_ns) { screen.begin(epoch_ns); };
+  return {std::move(device), begin};
+}
+
 Made make_of_kind(Order& order) {
   const std::string& kind = order.doubled.config.kind;
   if (kind == "laser_scanner") return make_laser(order);
   if (kind == "camera_head") return make_head(order);
   if (kind == "mobile_base") return make_base(order);
   if (kind == "digital_lines") return make_lines(order);
+  if (kind == "interaction") return make_screen(order);
   return make_camera(order);
 }
 

@@ -8,6 +8,7 @@
 #include "hal/devices.hpp"
 #include "hal/double_thread.hpp"
 #include "hal/gpio/line_chip.hpp"
+#include "hal/interaction/web.hpp"
 #include "hal/sim/simulation.hpp"
 
 namespace takt::hal {
@@ -16,6 +17,7 @@ namespace takt::hal {
 struct Seams {
   std::unique_ptr<v4l2::VideoDevice> video;
   std::unique_ptr<gpio::LineChip> chip;
+  std::shared_ptr<AnswerLine> fingers;
 };
 
 /// A double, and how its driver finds it. `config` and `seams` are the driver's; nothing of them may outlive `thread`.

@@ -50,6 +50,9 @@ void register_doubles(DeviceTypes& types) {
                          {"drive", "double", text, false, "path (the world's) or command; path if the world has one"},
                      });
   add("digital_lines", {});
+  add("interaction", {
+                         {"script", "double", text, false, "who presses what when, such as 2s explore; 30s stop"},
+                     });
 }
 
 }  // namespace takt

@@ -27,7 +27,7 @@ class Console final : public Interaction {
   StampLaw stamp_law(const JobTimes&) const override { return {}; }
   InteractionReading read(int64_t wanted_ns) override;
   bool say(std::string_view text) override;
-  void go_on_after(uint32_t number) override { number_ = number; }
+  void go_on_after(uint32_t number, std::string_view) override { number_ = number; }
   DeclaredCalls declared_calls() const override;
 
  private:

@@ -22,8 +22,16 @@ class Interaction : public Device {
   virtual InteractionReading read(int64_t wanted_ns) = 0;
   /// Tells the person; false if that cannot be done now.
   virtual bool say(std::string_view text) = 0;
-  /// Before the first read: tasks up to this number were given before the process was started again.
-  virtual void go_on_after(uint32_t) {}
+  /// Before the first read: tasks up to this number were given before the process was started again; `last` is that one
+  /// in words, empty if nobody knows it any more.
+  virtual void go_on_after(uint32_t number, std::string_view last) {
+    static_cast<void>(number), static_cast<void>(last);
+  }
+  /// Whether answer() means anything to it.
+  virtual bool takes_answers() const { return false; }
+  /// The next task, from a screen in another process. Between two jobs, on their thread. False: read() has not given
+  /// the answer before yet, or this one is longer than a task.
+  virtual bool answer(std::string_view) { return false; }
 };
 
 }  // namespace takt

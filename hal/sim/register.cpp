@@ -9,6 +9,7 @@
 #include "hal/head/head_node.hpp"
 #include "hal/interaction/interaction_node.hpp"
 #include "hal/interaction/script.hpp"
+#include "hal/interaction/speaking.hpp"
 #include "hal/laser/laser_node.hpp"
 #include "hal/object_sensor/object_sensor_node.hpp"
 #include "hal/sim/failing_devices.hpp"
@@ -85,7 +86,7 @@ NodeResult make_sim_object_sensor(const DeviceConfig& config, Settings& settings
   return opened<ObjectSensorNode>(std::move(device), settings);
 }
 
-NodeResult make_script(Settings& settings, sim::Simulation& world) {
+NodeResult make_script(const DeviceConfig& config, Settings& settings, sim::Simulation& world, const Clock& clock) {
   if (settings.has("failures")) settings.fail("a script does not fail", "leave `failures` out");
   auto script = parse_task_script(settings.text("script", ""));
   if (!script) {
@@ -94,6 +95,7 @@ NodeResult make_script(Settings& settings, sim::Simulation& world) {
   }
   std::unique_ptr<Interaction> device = std::make_unique<ScriptedPerson>(
       std::move(*script), [&world](int64_t epoch_ns) { return world.begin(epoch_ns); });
+  device = with_speech(std::move(device), config, settings, clock);
   return opened<InteractionNode>(std::move(device), settings);
 }
 
@@ -103,7 +105,7 @@ NodeResult make_sim(const DeviceConfig& config, Settings& settings, Devices& dev
   if (config.kind == "stereo_camera") return make_sim_camera(config, settings, **world, clock);
   if (config.kind == "laser_scanner") return make_sim_laser(config, settings, **world);
   if (config.kind == "mobile_base") return make_sim_base(config, settings, **world, clock);
-  if (config.kind == "interaction") return make_script(settings, **world);
+  if (config.kind == "interaction") return make_script(config, settings, **world, clock);
   if (config.kind == "camera_head") {
     std::unique_ptr<CameraHead> device = std::make_unique<sim::SimHead>(config.id, **world);
     device = with_failures<sim::FailingHead>(std::move(device), settings);

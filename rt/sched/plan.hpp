@@ -56,10 +56,11 @@ struct EdgePlan {
 
 /// What is known in advance of when a hardware node's data come about (its driver tells it: hal's StampLaw).
 struct SourcePlan {
-  int64_t lag_ns = 0;   ///< a stamp lies at most so long before the release of the job that sends it
-  int64_t wait_ns = 0;  ///< so long after its release the job may sleep until its data have come
-  std::string unknown;  ///< why there is no bound; empty: these are
-  uint32_t faults = 0;  ///< bits of what can be made to go wrong with it while it runs; hal gives them their names
+  int64_t lag_ns = 0;    ///< a stamp lies at most so long before the release of the job that sends it
+  int64_t wait_ns = 0;   ///< so long after its release the job may sleep until its data have come
+  std::string unknown;   ///< why there is no bound; empty: these are
+  uint32_t faults = 0;   ///< bits of what can be made to go wrong with it while it runs; hal gives them their names
+  bool answers = false;  ///< people answer it from a screen in another process
 };
 
 struct TaskPlan {

@@ -110,6 +110,7 @@ struct alignas(kCacheLine) SourceFacts {
   int64_t lag_ns = 0, wait_ns = 0;
   BoundedText<kLongest> unknown;
   uint32_t faults = 0;
+  bool answers = false;
 };
 
 /// What the processes of one run share: statistics, the end of the run, agreement before the start, parameters on their

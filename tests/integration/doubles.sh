@@ -1,6 +1,6 @@
 #!/bin/bash
 # SPDX-License-Identifier: Apache-2.0
-# Every device of a graph is a double at byte level, in one world, each with its real driver; head and base once more as
+# Every device of a graph is a double, those with a line at byte level, in one world, each with its real driver; head and base once more as
 # processes of their own. They misbehave on the way, and what that cost is told. On the real clock: counts, no times.
 . "$(dirname "$0")/lib.sh"
 
@@ -16,6 +16,7 @@ devices:
   floor_laser: {kind: laser_scanner, model: lms400, rate: 15, mount: {y: 0.25m, z: 1.0m, pitch: -34deg}}
   base: {kind: mobile_base, rate: 15}
   lines: {kind: digital_lines, rate: 15}
+  person: {kind: interaction, rate: 15, in: {speech: {from: client.speech, depth: 4}}}
 profiles:
   doubles:
     default: {driver: double, world: $source/graph/worlds/lab.xml}
@@ -23,12 +24,19 @@ profiles:
     camera: {trigger_line: camera_trigger, failures: "flagged 8s..9s"}
     head: {failures: wrong_crc 8s..9s}
     base: {failures: lost_frames 8s..9s}
+    person: {script: "2s tell cup_1.level=full; 9s tell cup_1.level=empty", failures: silent 8s..10s, speech: double, speech_to: $work/speech}
   apart:
     default: {driver: double, world: $source/graph/worlds/lab.xml}
     front_laser: {baud: 500000}
     head: {driver: can, interface: "unix:$work/head"}
     base: {driver: can, interface: "unix:$work/base"}
 subsystems:
+  mind:
+    exports: [client.speech]
+    client:
+      type: robot_client
+      in: {odometry: {from: base.odometry, max_age: 300ms}, task: person.task}
+      params: {network: $source/graph/networks/kitchen.yaml}
   robot:
     obstacle_stop:
       type: obstacle_stop
@@ -48,6 +56,8 @@ nodes:
   floor_laser: {rate: 15, deadline: 40ms}
   base: {rate: 15, deadline: 40ms}
   lines: {rate: 15, deadline: 40ms}
+  person: {rate: 15, deadline: 40ms}
+  client: {rate: 15, deadline: 60ms}
   obstacle_stop: {rate: 15, offset: 20ms, deadline: 60ms, criticality: high}
 YAML
 
@@ -69,12 +79,16 @@ print(sent)
 assert all(d["state"] == "ok" and d["trouble"] == "" for d in devices.values()), devices
 # Host and scanner agree on rate and mode before the first scan: no loss, so the run begins in the mode it is to have.
 assert not [f for f in report["faults"] if f["at_s"] < 5], report["faults"]
-assert all(d["received"] > 50 for n, d in devices.items() if n != "lines")
+assert all(d["received"] > 50 for n, d in devices.items() if n not in ("lines", "person"))
+# The second answer fell into the time in which nothing that is pressed arrives.
+assert devices["person"]["received"] == 1 and devices["person"]["unsent"] == 0
 assert devices["front_laser"]["damaged"] > 0 and devices["front_laser"]["resyncs"] > 0
 assert devices["camera"]["missing"] <= 2 and devices["camera"]["damaged"] > 0 and devices["head"]["damaged"] > 0 and devices["base"]["missing"] > 0
 assert devices["floor_laser"]["damaged"] == devices["floor_laser"]["resyncs"] == 0
-assert all(n["allocations"] == 0 for n in report["nodes"] if n["name"] not in ("camera", "lines"))
+assert all(n["allocations"] == 0 for n in report["nodes"] if n["name"] not in ("camera", "lines", "client"))
 PY
+grep -qE '^2\.[0-9]+ s I believe that cup_1.level=full$' "$work/speech" || fail "the double of the loudspeaker did not say what it heard"
+[ "$(wc -l <"$work/speech")" = 1 ] || fail "it said more: $(cat "$work/speech")"
 grep -q "^device front_laser: [0-9]* received, [0-9]* damaged, [0-9]* resyncs" "$work/run.out" || fail "the summary does not tell what the laser lost"
 compgen -G "${TMPDIR:-/tmp}/takt-doubles-*/front_laser" >/dev/null && fail "lines of doubles were left behind"
 

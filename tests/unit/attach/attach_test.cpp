@@ -227,22 +227,23 @@ TEST_CASE("set refuses what the parameter would refuse, before the node sees it"
     return scene.ask({{"do", "set"}, {"param", param}, {"value", value}}).value("error", "");
   };
   CHECK(error("maps.voxel", "0.2m").find("did you mean `map`") != std::string::npos);
-  CHECK(error("map.voxl", "0.2m").find("did you mean `voxel`") != std::string::npos);
-  CHECK(error("map.voxel", "0.2").find("without a unit") != std::string::npos);
-  CHECK(error("map.voxel", "20m").find("must lie in") != std::string::npos);
-  CHECK(error("mapping:voxel", "0.2m").find("there is no node of type `mapping`; did you mean `mapping_3d`") !=
+  CHECK(error("map.z_flor", "0.2m").find("did you mean `z_floor`") != std::string::npos);
+  CHECK(error("map.z_floor", "0.2").find("without a unit") != std::string::npos);
+  CHECK(error("map.z_floor", "20m").find("must lie in") != std::string::npos);
+  CHECK(error("mapping:z_floor", "0.2m").find("there is no node of type `mapping`; did you mean `mapping_3d`") !=
         std::string::npos);
-  CHECK(error("mapping_3d:voxl", "0.2m").find("node `map` (type `mapping_3d`)") != std::string::npos);
+  CHECK(error("mapping_3d:z_flor", "0.2m").find("node `map` (type `mapping_3d`)") != std::string::npos);
   CHECK(scene.board->mail(0).state.load() == ParamMail::empty);
 }
 
 TEST_CASE("a value that the node accepted stands in get and top, and with `keep` in the graph's overlay") {
   Scene scene;
   setenv("TAKT_STATE_DIR", (scene.folder.path / "state").c_str(), 1);
-  const auto node = scene.registry.nodes.find("mapping_3d")->make();
+  const auto node = scene.registry.nodes.find("cruise")->make();
   node->end_setup();  // nothing was read: all are live
   scene.plan.tasks[0].node = node.get();
-  scene.spec.nodes[0].params["share"] = {0.3, {}, graph::ChosenBy::command_line};
+  scene.spec.nodes[0].type = "cruise";
+  scene.spec.nodes[0].params["turn"] = {0.3, {}, graph::ChosenBy::command_line};
   scene.board = std::make_unique<RunBoard>(scene.plan);
   const attach::Server server({scene.registry, scene.spec, scene.plan, *scene.board, *scene.transport});
   /// Asks, and does meanwhile what a job of the node does.
@@ -257,31 +258,31 @@ TEST_CASE("a value that the node accepted stands in get and top, and with `keep`
     mail.state.store(ParamMail::taken);
     return connection->read_line().value_or(Json());
   };
-  CHECK(set({{"do", "set"}, {"param", "map.voxel"}, {"value", "0.25m"}}) == Json{{"ok", true}});
+  CHECK(set({{"do", "set"}, {"param", "map.speed"}, {"value", "0.25 m/s"}}) == Json{{"ok", true}});
   const auto overlay = graph::overlay_file(scene.folder.path / "state", "test");
   CHECK_FALSE(std::filesystem::exists(overlay));
-  const Json voxel = scene.ask({{"do", "get"}, {"param", "map.voxel"}})["parameters"][0];
-  CHECK(voxel["value"] == 0.25);
-  CHECK(voxel["from"] == "set");
-  CHECK(voxel["at_s"] == 2.5);
-  CHECK(voxel["by_user"] == geteuid());
-  CHECK(attach::parameter_text(voxel) == "map.voxel 0.25 m (set at 2.5 s)");
+  const Json speed = scene.ask({{"do", "get"}, {"param", "map.speed"}})["parameters"][0];
+  CHECK(speed["value"] == 0.25);
+  CHECK(speed["from"] == "set");
+  CHECK(speed["at_s"] == 2.5);
+  CHECK(speed["by_user"] == geteuid());
+  CHECK(attach::parameter_text(speed) == "map.speed 0.25 m/s (set at 2.5 s)");
   const Json all = scene.ask({{"do", "get"}})["parameters"];
   REQUIRE(all.size() == 2);
   CHECK(all == scene.ask({{"do", "top"}})["parameters"]);
-  CHECK(attach::parameter_text(all[1]) == "map.share 0.3 (command line)");
-  CHECK(scene.ask({{"do", "get"}, {"param", "map.slope"}})["parameters"][0]["from"] == "default");
-  CHECK(scene.ask({{"do", "get"}, {"param", "map.slop"}})["error"].get<std::string>().find("`map.slope`") !=
+  CHECK(attach::parameter_text(all[1]) == "map.turn 0.3 rad/s (command line)");
+  CHECK(scene.ask({{"do", "get"}, {"param", "map.from"}})["parameters"][0]["from"] == "default");
+  CHECK(scene.ask({{"do", "get"}, {"param", "map.fro"}})["error"].get<std::string>().find("`map.from`") !=
         std::string::npos);
-  const Json kept = set({{"do", "set"}, {"param", "mapping_3d:voxel"}, {"value", "30cm"}, {"keep", true}});
+  const Json kept = set({{"do", "set"}, {"param", "cruise:speed"}, {"value", "0.3 m/s"}, {"keep", true}});
   CHECK(kept["kept"] == overlay.string());
   std::vector<graph::Problem> problems;
   const graph::Overlay read = graph::read_overlay(overlay, "test", problems);
   REQUIRE(read.values.size() == 1);
-  CHECK(read.values[0].text == "30cm");
-  CHECK(scene.ask({{"do", "forget"}, {"param", "map.voxel"}})["forgotten"] == overlay.string());
-  CHECK(scene.ask({{"do", "forget"}, {"param", "map.voxel"}}).contains("error"));
-  CHECK(scene.ask({{"do", "get"}, {"param", "map.voxel"}})["parameters"][0]["value"] == 0.3);
+  CHECK(read.values[0].text == "0.3 m/s");
+  CHECK(scene.ask({{"do", "forget"}, {"param", "map.speed"}})["forgotten"] == overlay.string());
+  CHECK(scene.ask({{"do", "forget"}, {"param", "map.speed"}}).contains("error"));
+  CHECK(scene.ask({{"do", "get"}, {"param", "map.speed"}})["parameters"][0]["value"] == 0.3);
 }
 
 TEST_CASE("a question of a wrong kind is refused, and the next one answered") {

@@ -96,4 +96,5 @@ TEST_CASE("simulated devices and doubles know their faults; a script has none") 
   CHECK(known_to(registry, "digital_lines", {{"driver", "double"}}) == "unplugged, frozen");
   CHECK(known_to(registry, "mobile_base", {{"driver", "double"}}).find("bus_off") != std::string::npos);
   CHECK(known_to(registry, "interaction", {{"driver", "sim"}}).empty());
+  CHECK(known_to(registry, "interaction", {{"driver", "double"}}) == "silent");
 }

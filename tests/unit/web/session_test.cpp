@@ -101,6 +101,7 @@ TEST_CASE("page: without the token nothing is changed, with it everything may be
                                   {{"do", "mode"}, {"mode", "x"}},
                                   {{"do", "mark"}, {"words", "x"}},
                                   {{"do", "stop"}},
+                                  {{"do", "answer"}, {"device", "person"}, {"text", "yes"}},
                                   {{"do", "fault"}, {"device", "d"}, {"fault", "silent"}},
                                   {{"do", "fault"}, {"device", "d"}, {"fault", 5}}};
   for (const char* token : {"", "the toke", "the token "}) {
@@ -202,7 +203,8 @@ TEST_CASE("page: what is not of the protocol ends the session") {
 
 TEST_CASE("foxglove: channels with schemas, messages with their stamps, events as a log") {
   Scene scene;
-  scene.hub.set_graph(shown_graph(), {{{"eye.pair"}, "eye.pair.left", "foxglove_msgs/msg/CompressedImage", "definition"}});
+  scene.hub.set_graph(shown_graph(),
+                      {{{"eye.pair"}, "eye.pair.left", "foxglove_msgs/msg/CompressedImage", "definition"}});
   scene.foxglove();
   const std::vector<Json> first = scene.texts();
   REQUIRE(first.size() == 3);
