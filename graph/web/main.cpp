@@ -92,10 +92,12 @@ int serve(Options options) {
                   kDeviceOrSystem);
   }
   link = std::make_unique<Link>(hub, types, Link::Options{.run = options.run});
-  signals.watch(*server);
   fmt::print("{}\nFoxglove: ws{}://{}:{}\n", page_address(options.server),
              options.server.certificate.empty() ? "" : "s", options.server.address, options.server.port);
-  std::fflush(stdout);
+  if (std::fflush(stdout) != 0)
+    return refuse("stdout does not take the address that is to be opened\n  fix: room for it, or --token-file",
+                  kDeviceOrSystem);
+  signals.watch(*server);
   server->run();
   link.reset();
   return command::kOk;

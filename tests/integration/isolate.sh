@@ -51,7 +51,7 @@ expect 2 "did you mean \`stereo.disparity\`" "$takt" echo stereo.disparty --run 
 expect 2 "is no picture" "$takt" echo ego_motion.motion --png "$work/x.png" --run $first
 expect 2 "is no point cloud" "$takt" echo ego_motion.motion --ply "$work/x.ply" --run $first
 expect 2 "must lie in" "$takt" set mapping_3d.n_abs 100000000 --run $first
-expect 2 "without a unit" "$takt" set mapping_3d.voxel 0.3 --run $first
+expect 2 "without a unit" "$takt" set mapping_3d.z_floor 0.3 --run $first
 expect 2 "is fixed while the graph runs (sizes memory)" "$takt" set mapping_3d.voxel 0.1m --run $first
 expect 2 "did you mean \`stereo\`" "$takt" set stere.disparities 6 --run $first
 expect 3 "no running graph" "$takt" top --once --run 1
