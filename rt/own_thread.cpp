@@ -38,6 +38,9 @@ OwnThread::OwnThread(Work work, size_t stack_bytes, Stack stack) {
   auto given = std::make_unique<Work>(std::move(work));
   pthread_attr_t attributes;
   pthread_attr_init(&attributes);
+#if defined(TAKT_SANITIZED)  // which keeps records of the stacks that the library makes
+  stack = Stack::resident;
+#endif
   if (stack == Stack::as_used) {
     stack_ = stack_as_used(stack_bytes);
     pthread_attr_setstack(&attributes, stack_.data(), stack_.size());
