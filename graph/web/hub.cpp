@@ -36,7 +36,6 @@ uint64_t Hub::wants() const {
 void Hub::put(const View& view, std::vector<Part> parts) {
   {
     const std::lock_guard lock(mutex_);
-    made_[view] += parts.size();
     const auto slot = slots_.find(view);
     if (slot == slots_.end()) return;  // who looked has left meanwhile
     slot->second.shown = {++versions_, std::move(parts)};
@@ -49,11 +48,6 @@ std::optional<Hub::Shown> Hub::newer(const View& view, uint64_t seen) const {
   const auto slot = slots_.find(view);
   if (slot == slots_.end() || slot->second.shown.version <= seen) return std::nullopt;
   return slot->second.shown;
-}
-
-Hub::Made Hub::made() const {
-  const std::lock_guard lock(mutex_);
-  return made_;
 }
 
 void Hub::set_graph(Json graph, std::vector<Channel> channels, std::string why) {

@@ -61,8 +61,6 @@ class Hub {
     View view;
     double most_hz = 0;  ///< of the one who wants it most often
   };
-  /// Counts since the start: frames of each view that were made, so that a test sees that none is without need.
-  using Made = std::map<View, uint64_t>;
 
   /// `wake`: called after anything new is there, by the thread that brought it.
   explicit Hub(std::function<void()> wake) : wake_(std::move(wake)) {}
@@ -76,7 +74,6 @@ class Hub {
 
   void put(const View& view, std::vector<Part> parts);
   std::optional<Shown> newer(const View& view, uint64_t seen) const;
-  Made made() const;
 
   /// What the run is (attach::describe_json); null: there is none. `why` it ended.
   void set_graph(Json graph, std::vector<Channel> channels, std::string why = "");
@@ -101,7 +98,6 @@ class Hub {
   std::function<void()> wake_;
   mutable std::mutex mutex_;
   std::map<View, Slot> slots_;
-  Made made_;
   uint64_t versions_ = 0, wants_ = 0, graph_version_ = 0;
   Json graph_;
   std::vector<Channel> channels_;

@@ -44,12 +44,15 @@ std::string page_address(const ServerOptions& server) {
                      server.token);
 }
 
-/// Ends the server at SIGINT or SIGTERM, which every thread made after this blocks.
+/// Ends the server at SIGINT, SIGTERM or SIGHUP (not under nohup), which every thread made after this blocks. A flag
+/// that a handler sets would not wake it.
 class EndBySignal {
  public:
   EndBySignal() {
     sigemptyset(&signals_);
-    for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&signals_, signal);
+    for (const int signal : {SIGINT, SIGTERM}) sigaddset(&signals_, signal);
+    struct sigaction hangup {};
+    if (sigaction(SIGHUP, nullptr, &hangup) == 0 && hangup.sa_handler != SIG_IGN) sigaddset(&signals_, SIGHUP);
     pthread_sigmask(SIG_BLOCK, &signals_, nullptr);
     std::signal(SIGPIPE, SIG_IGN);
   }
