@@ -99,8 +99,8 @@ def judge(work, done):
     bad = 0
     left = list(frozen)
     for kind, what in done:
-        match = next((one for one in left if one["kind"] == kind and what is not None and
-                      (what in one["what"] or what in one["subject"])), None)
+        match = next((one for one in left if what is not None and any(
+            cause["kind"] == kind and (what in cause["what"] or what in cause["subject"]) for cause in [one, *one["also"]])), None)
         if match is None:
             print(f"{kind} of {what}: no frozen file names it")
             bad += 1

@@ -31,6 +31,12 @@ std::string name_of_run(const std::string& graph) {
   return fmt::format("{}-{}-{}", graph, at, getpid());
 }
 
+/// With how many causes it stands for.
+std::string sentence_of(const Frozen& frozen) {
+  const uint64_t others = frozen.also.size() + frozen.more;
+  return others == 0 ? frozen.sentence : fmt::format("{}; and {} more", frozen.sentence, others);
+}
+
 }  // namespace
 
 FlightRecorder::FlightRecorder(const graph::GraphSpec& graph, const Plan& plan, const RunBoard& board,
@@ -62,7 +68,7 @@ FlightRecorder::FlightRecorder(const graph::GraphSpec& graph, const Plan& plan, 
     if (memory) memory_ = std::move(*memory);
     else doubts_.push_back("record: no images and clouds are kept: " + memory.error());
   }
-  evidence_ = std::make_unique<Evidence>(graph, plan, board, spec.before_ns + spec.after_ns + kWait_ns);
+  evidence_ = std::make_unique<Evidence>(graph, plan, board, spec.before_ns + 2 * spec.after_ns + kWait_ns);
   freezer_ = std::make_unique<Freezer>(*disk_, memory_.get(), freezing(spec, plan, name));
   const auto note = [this](const std::optional<Cause>& cause) {
     if (cause) freezer_->freeze(*cause);
@@ -154,26 +160,32 @@ void FlightRecorder::tell(const Frozen& frozen) {
   {
     const std::lock_guard lock(mutex_);
     if (sentences_.size() == kSentences) sentences_.erase(sentences_.begin());
-    sentences_.push_back(frozen.file.empty() ? fmt::format("not: {}", frozen.refused) : frozen.sentence);
+    sentences_.push_back(frozen.file.empty() ? fmt::format("not: {}", frozen.refused) : sentence_of(frozen));
   }
   if (!options_.say) return;
   if (frozen.file.empty()) options_.say(fmt::format("not frozen ({}): {}", frozen.cause.what, frozen.refused));
-  else options_.say(fmt::format("frozen: {} ({})", frozen.file.string(), frozen.sentence));
+  else options_.say(fmt::format("frozen: {} ({})", frozen.file.string(), sentence_of(frozen)));
 }
 
 nlohmann::ordered_json FlightRecorder::told() const {
   nlohmann::ordered_json frozen = nlohmann::ordered_json::array();
-  for (const Frozen& one : frozen_)
+  const auto at_s = [&](const Cause& cause) { return static_cast<double>(cause.at_ns - board_.epoch_ns()) / 1e9; };
+  for (const Frozen& one : frozen_) {
+    nlohmann::ordered_json also = nlohmann::ordered_json::array();
+    for (const Cause& cause : one.also)
+      also.push_back({{"kind", cause.kind}, {"subject", cause.subject}, {"what", cause.what}, {"at_s", at_s(cause)}});
     frozen.push_back({{"kind", one.cause.kind},
                       {"subject", one.cause.subject},
                       {"what", one.cause.what},
                       {"sentence", one.sentence},
-                      {"at_s", static_cast<double>(one.cause.at_ns - board_.epoch_ns()) / 1e9},
+                      {"at_s", at_s(one.cause)},
+                      {"also", std::move(also)},
                       {"more", one.more},
                       {"file", one.file.filename().string()},
                       {"mb", static_cast<double>(one.bytes) / 1e6},
                       {"damages", one.damages},
                       {"refused", one.refused}});
+  }
   const auto ring = [](const record::Ring* of, const record::RecordResult& kept) -> nlohmann::ordered_json {
     if (of == nullptr) return nullptr;
     return {{"files", of->files().size()},

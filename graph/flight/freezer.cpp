@@ -20,10 +20,16 @@ namespace fs = std::filesystem;
 
 /// Files are joined by code that is not the runtime's own loops.
 constexpr size_t kStack = 1 << 20;
-constexpr size_t kMostWaiting = 64;
+constexpr size_t kMostWaiting = 64, kMostAlso = 32;
 /// A file of the ring has each message that stood when it began, so a little more than its length is enough.
 constexpr int64_t kStandsFor_ns = 65'000'000'000;
 constexpr auto kLook = std::chrono::milliseconds(100);
+
+std::string also_text(const Frozen& frozen) {
+  std::string text;
+  for (const Cause& cause : frozen.also) text += (text.empty() ? "" : "\n") + cause.what;
+  return text;
+}
 
 }  // namespace
 
@@ -34,17 +40,23 @@ Freezer::~Freezer() {
   if (thread_.joinable()) finish();
 }
 
+/// Takes it into what waits, if it is close enough.
+bool Freezer::joins(const Cause& cause, Frozen& other) const {
+  const int64_t first_ns = std::min(other.first_ns, cause.at_ns), last_ns = std::max(other.last_ns, cause.at_ns);
+  if (other.begun || last_ns - first_ns > options_.after_ns) return false;
+  other.first_ns = first_ns, other.last_ns = last_ns;
+  const auto same = [&](const Cause& known) { return known.kind == cause.kind && known.subject == cause.subject; };
+  const bool known = same(other.cause) || std::any_of(other.also.begin(), other.also.end(), same);
+  if (known || other.also.size() == kMostAlso) ++other.more;
+  else other.also.push_back(cause);
+  return true;
+}
+
 void Freezer::freeze(Cause cause) {
   const std::lock_guard lock(mutex_);
-  const auto same = [&](const Frozen& other) {
-    return other.cause.kind == cause.kind && other.cause.subject == cause.subject &&
-           cause.at_ns < other.cause.at_ns + options_.after_ns;
-  };
-  if (const auto known = std::find_if(waiting_.begin(), waiting_.end(), same); known != waiting_.end()) {
-    ++known->more;
-    return;
-  }
+  if (std::any_of(waiting_.begin(), waiting_.end(), [&](Frozen& other) { return joins(cause, other); })) return;
   Frozen frozen;
+  frozen.first_ns = frozen.last_ns = cause.at_ns;
   frozen.cause = std::move(cause);
   if (waiting_.size() < kMostWaiting) {
     waiting_.push_back(std::move(frozen));
@@ -67,7 +79,7 @@ std::vector<Frozen> Freezer::finish() {
 }
 
 bool Freezer::ready(const Frozen& frozen) {
-  const int64_t to_ns = frozen.cause.at_ns + options_.after_ns;
+  const int64_t to_ns = frozen.last_ns + options_.after_ns;
   const auto has = [&](record::Ring* ring) {
     if (ring == nullptr) return true;
     const auto files = ring->files();
@@ -86,6 +98,7 @@ void Freezer::work() {
   for (;;) {
     changed_.wait_for(lock, kLook, [&] { return ending_; });
     while (!waiting_.empty() && (ending_ || ready(waiting_.front()))) {
+      waiting_.front().begun = true;
       Frozen frozen = waiting_.front();
       const bool too_late = ending_ && std::chrono::steady_clock::now() >= end_by_;
       lock.unlock();
@@ -93,7 +106,6 @@ void Freezer::work() {
         frozen.refused = fmt::format("it was not written within {} s of the run's end", options_.patience.count());
       else write(frozen);
       lock.lock();
-      frozen.more = waiting_.front().more;
       waiting_.pop_front();
       done_.push_back(frozen);
       lock.unlock();
@@ -139,7 +151,7 @@ std::string Freezer::make_room() {
 }
 
 void Freezer::write(Frozen& frozen) {
-  const int64_t from_ns = frozen.cause.at_ns - options_.before_ns, to_ns = frozen.cause.at_ns + options_.after_ns;
+  const int64_t from_ns = frozen.first_ns - options_.before_ns, to_ns = frozen.last_ns + options_.after_ns;
   if (frozen.refused = make_room(); !frozen.refused.empty()) return;
   const fs::path file = options_.folder / fmt::format("{}-{:04}-{}.mcap", options_.name, ++number_, frozen.cause.kind);
   const fs::path part = file.string() + ".part";
@@ -163,6 +175,7 @@ void Freezer::write(Frozen& frozen) {
                           {{"kind", frozen.cause.kind},
                            {"subject", frozen.cause.subject},
                            {"what", frozen.cause.what},
+                           {"also", also_text(frozen)},
                            {"sentence", said.sentence},
                            {"at_ns", std::to_string(frozen.cause.at_ns)},
                            {"from_ns", std::to_string(from_ns)},

@@ -18,19 +18,23 @@
 
 namespace takt::flight {
 
-/// A cause, and what became of it.
+/// Causes that came close to each other, and what became of them.
 struct Frozen {
-  Cause cause;
-  uint64_t more = 0;                 ///< of its kind and subject, within its window
-  std::filesystem::path file;        ///< empty: nothing was written
-  std::string refused;               ///< why not
-  std::string sentence;              ///< as Said has it
-  std::vector<std::string> damages;  ///< of the ring: what of it could not be read
+  Cause cause;                        ///< the first
+  std::vector<Cause> also;            ///< others, each kind and subject once
+  uint64_t more = 0;                  ///< those that are in neither: of a kind and subject that is, or too many
+  int64_t first_ns = 0, last_ns = 0;  ///< instants between which all of them lie
+  bool begun = false;                 ///< it is being written, and takes no further cause
+  std::filesystem::path file;         ///< empty: nothing was written
+  std::string refused;                ///< why not
+  std::string sentence;               ///< as Said has it
+  std::vector<std::string> damages;   ///< of the ring: what of it could not be read
   uint64_t bytes = 0;
 };
 
-/// Writes a file for each cause: what the rings hold from `before_ns` before it to `after_ns` behind it, on a thread
-/// of the lowest priority.
+/// Writes what the rings hold from `before_ns` before a cause to `after_ns` behind it, on a thread of the lowest
+/// priority. Causes within `after_ns` of each other are one file: a storm of misses has one root, and each file is
+/// hundreds of megabytes.
 class Freezer {
  public:
   struct Options {
@@ -57,6 +61,7 @@ class Freezer {
   std::vector<Frozen> finish();
 
  private:
+  bool joins(const Cause& cause, Frozen& other) const;
   void work();
   /// The rings have what a cause needs, in files that nobody writes to any more. Sees to that.
   bool ready(const Frozen& frozen);

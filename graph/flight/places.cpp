@@ -82,7 +82,7 @@ int64_t memory_to_use(const graph::RecordSpec& spec) {
 std::vector<std::string> doubts(const graph::RecordSpec& spec, const Places& places,
                                 const std::filesystem::path& folder) {
   std::vector<std::string> doubts;
-  const double window_s = static_cast<double>(lead_ns(spec) + spec.before_ns + spec.after_ns + kWritten_ns) / 1e9;
+  const double window_s = static_cast<double>(lead_ns(spec) + spec.before_ns + 2 * spec.after_ns + kWritten_ns) / 1e9;
   const auto room = [&](const std::filesystem::path& place, int64_t wanted) {
     std::error_code error;
     const auto space = std::filesystem::space(place, error);

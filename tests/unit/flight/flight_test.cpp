@@ -160,6 +160,33 @@ TEST_CASE("The first message that passes a condition is a cause, and the first a
   CHECK(causes(2, {0, 0, 0, 0}) == "..[messages of reader.seen at least 3: 3].");
 }
 
+TEST_CASE("Causes that come close to each other are one file, which begins before the first and names all of them") {
+  const test::TemporaryFolder folder;
+  test::SmallGraph small;
+  size_t marks = 0;
+  const auto graph = graph_with(kSecond, kSecond);
+  const std::pair<double, const char*> set[] = {
+      {6, "root"}, {6.7, "effect"}, {6.9, "effect"}, {7.5, "later"}, {15, "alone"}};
+  const auto told = fly(graph, small.plan, folder.path, 20, [&](RunBoard& board, int64_t now_ns) {
+    if (marks < std::size(set) && now_ns >= kEpoch + static_cast<int64_t>(set[marks].first * 1e9))
+      board.marks().append({now_ns, 7, BoundedText<200>(set[marks++].second)});
+  });
+  const auto& frozen = told["frozen"];
+  REQUIRE(frozen.size() == 3);
+  CHECK(frozen[0]["what"] == "mark: root");
+  REQUIRE(frozen[0]["also"].size() == 1);
+  CHECK(frozen[0]["also"][0]["what"] == "mark: effect");
+  CHECK(frozen[0]["also"][0]["at_s"].get<double>() == doctest::Approx(6.7).epsilon(0.01));
+  CHECK(frozen[0]["more"] == 1);
+  CHECK(frozen[1]["what"] == "mark: later");
+  CHECK(frozen[2]["what"] == "mark: alone");
+  CHECK(frozen[2]["also"].empty());
+  const record::LogFile log = open(folder.path / "frozen" / frozen[0]["file"].get<std::string>());
+  CHECK(metadata(log, "takt frozen").at("also") == "mark: effect");
+  CHECK(log.jobs().front().published_ns <= kEpoch + 5 * kSecond + 100'000'000);
+  CHECK(log.jobs().back().published_ns >= kEpoch + 7 * kSecond + 700'000'000);
+}
+
 TEST_CASE("A mark freezes the seconds around it") {
   const test::TemporaryFolder folder;
   test::SmallGraph small;
@@ -178,14 +205,15 @@ TEST_CASE("A mark freezes the seconds around it") {
   CHECK(frozen["refused"] == "");
   CHECK(frozen["damages"].empty());
   CHECK(frozen["more"] == 1);
+  CHECK(frozen["also"].empty());
   CHECK(frozen["at_s"].get<double>() == doctest::Approx(10).epsilon(0.01));
   const record::LogFile log = open(folder.path / "frozen" / frozen["file"].get<std::string>());
   CHECK(log.damages().empty());
   CHECK(metadata(log, "takt frozen").at("what") == "mark: it turned left");
-  CHECK(log.jobs().size() == doctest::Approx(5 * (30 + 10 + 10)).epsilon(0.02));
+  CHECK(log.jobs().size() == doctest::Approx(6 * (30 + 10 + 10)).epsilon(0.02));
   for (const record::RecordedJob& job : log.jobs()) {
     CHECK(job.published_ns >= kEpoch + 7 * kSecond);
-    CHECK(job.published_ns < kEpoch + 12 * kSecond + 100'000'000);
+    CHECK(job.published_ns < kEpoch + 13 * kSecond + 100'000'000);
   }
   CHECK(log.events().size() == 2);
 }
@@ -201,7 +229,8 @@ TEST_CASE("Each cause of its own has its file, and the newest files stay") {
     Freezer::Options how;
     how.folder = folder.path / "frozen";
     how.name = "run";
-    how.before_ns = how.after_ns = kSecond;
+    how.before_ns = kSecond;
+    how.after_ns = kSecond / 2;  // so that a second between two is too much for one file
     how.most_bytes = most_bytes;
     how.at_least = at_least;
     Freezer freezer(**ring, nullptr, how);
@@ -229,7 +258,7 @@ TEST_CASE("A run that ends with much to write does not wait for it for ever, and
   std::vector<std::string> told;
   how.told = [&](const Frozen& frozen) { told.push_back(frozen.refused); };
   Freezer freezer(**ring, nullptr, how);
-  for (const char* node : {"a", "b", "c"}) freezer.freeze({"miss", node, "", 5'000'000'000});
+  for (const int64_t at_s : {5, 7, 9}) freezer.freeze({"miss", "node", "", at_s * kSecond});
   const std::vector<Frozen> all = freezer.finish();
   REQUIRE(all.size() == 3);
   for (const Frozen& frozen : all) {
