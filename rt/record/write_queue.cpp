@@ -7,14 +7,23 @@
 namespace takt::record {
 
 std::vector<std::byte> WriteQueue::buffer(size_t expected_bytes) {
-  constexpr size_t kSmall = 4096;
-  const std::lock_guard lock(mutex_);
+  constexpr size_t kSmall = 4096, kStep = 64 << 10;
+  // New ones of equal size, in one piece: a heap that keeps its memory would be left with holes of all sizes.
+  const auto fresh = [&] {
+    std::vector<std::byte> buffer;
+    buffer.reserve(expected_bytes <= kStep ? expected_bytes : (expected_bytes + kStep - 1) / kStep * kStep);
+    return buffer;
+  };
+  std::unique_lock lock(mutex_);
   const auto fits = [&](size_t capacity) {
     return capacity >= expected_bytes && capacity <= 4 * std::max(expected_bytes, kSmall);
   };
   const auto found =
       std::find_if(spare_.begin(), spare_.end(), [&](const auto& spare) { return fits(spare.capacity()); });
-  if (found == spare_.end()) return {};
+  if (found == spare_.end()) {
+    lock.unlock();
+    return fresh();
+  }
   std::swap(*found, spare_.back());
   std::vector<std::byte> buffer = std::move(spare_.back());
   spare_.pop_back();

@@ -18,23 +18,34 @@ std::vector<std::byte> filled(std::vector<std::byte> buffer, size_t bytes) {
 
 TEST_CASE("a message gets the memory of one of its size, not that of an image for a job") {
   WriteQueue queue(1);
-  queue.recycle(filled({}, kImage));
-  CHECK(queue.buffer(kJob).capacity() == 0);
-  CHECK(queue.buffer(2 * kImage).capacity() == 0);
+  std::vector<std::byte> image = filled({}, kImage);
+  const std::byte* const memory = image.data();
+  queue.recycle(std::move(image));
+  CHECK(queue.buffer(kJob).capacity() == kJob);
+  CHECK(queue.buffer(2 * kImage).data() != memory);
   const auto again = queue.buffer(kImage - 1);
-  CHECK(again.capacity() >= kImage);
+  CHECK(again.data() == memory);
   CHECK(again.empty());
-  CHECK(queue.buffer(kImage - 1).capacity() == 0);
+  CHECK(queue.buffer(kImage - 1).data() != memory);
+}
+
+TEST_CASE("new memory holds what is expected, in a few sizes") {
+  WriteQueue queue(1);
+  CHECK(queue.buffer(0).capacity() == 0);
+  CHECK(queue.buffer(kImage).capacity() >= kImage);
+  CHECK(queue.buffer(kImage).capacity() == queue.buffer(kImage + 10'000).capacity());
 }
 
 TEST_CASE("however many messages are popped at once, no more than so much of their memory is kept") {
   WriteQueue queue(1);
   for (int i = 0; i < 40; ++i) queue.recycle(filled({}, kImage));
-  size_t kept = 0;
-  for (auto buffer = queue.buffer(kImage); buffer.capacity() > 0; buffer = queue.buffer(kImage))
+  size_t kept = 0;  // whose capacity is that of the vectors above
+  for (auto buffer = queue.buffer(kImage); buffer.capacity() == kImage; buffer = queue.buffer(kImage))
     kept += buffer.capacity();
   CHECK(kept > 0);
   CHECK(kept <= WriteQueue::kSpareBytes);
-  queue.recycle(filled({}, kJob));
-  CHECK(queue.buffer(kJob).capacity() >= kJob);
+  std::vector<std::byte> job = filled({}, kJob);
+  const std::byte* const memory = job.data();
+  queue.recycle(std::move(job));
+  CHECK(queue.buffer(kJob).data() == memory);
 }
