@@ -64,7 +64,7 @@ class Help:
             value = re.sub(r" ?(Excludes|Needs):.*", "", value)
             said = [meaning[0].rstrip(" :") if meaning else ""]
             for kind, others in notes:
-                said.append(("not with " if kind == "Excludes" else "only with ") + ", ".join(map(code, others.split())))
+                said.append(("not with " if kind == "Excludes" else "only with ") + ", ".join(map(code, sorted(others.split()))))
             yield code(name), value_text(value, said[0]), "; ".join(said)
 
     def choices(self):
