@@ -38,7 +38,7 @@ for path in ("/page.js", "/page.css"): assert get(path)[0] == 200, path
 for path in ("/../etc/passwd", "/page"): assert get(path)[0] == 404, path
 assert get("/", Host="evil.example")[0] == 403
 PY
-start_run main --isolate subsystem --for 0s
+start_run main --isolate subsystem --for 0s --report "$work/report.json"
 
 if command -v node >/dev/null && command -v npm >/dev/null && cp -r "$source/tests/tools/web_client" "$work/client" &&
   (cd "$work/client" && npm install --no-audit --no-fund >"$work/npm.txt" 2>&1); then
@@ -87,6 +87,7 @@ PY
     client page.mjs "$address" "$work/pictures" mapping_3d.share 0.4 >"$work/page.json" || fail "the page"
     cat "$work/page.json"
     "$takt" top --once --json --run $run | grep -q '"value":0.4' || fail "the parameter that the page set"
+    grep -rq "0.4" "$work/state" || fail "the parameter that the page kept"
     [ "$(find "$work/pictures" -size +10k | wc -l)" = 8 ] || fail "eight pictures"
   else
     echo "NOT RUN: the page needs a browser: apt install chromium"
@@ -103,7 +104,23 @@ sleep 1
 after=$("$takt" top --once --json --run $run | python3 -c 'import json, sys; print(sum(n["completed"] for n in json.load(sys.stdin)["nodes"]))')
 [ "$after" -gt "$before" ] || fail "the run stands"
 serve
-end_run 0 1
+if [ -d "$work/pictures" ]; then
+  echo "=== a process that is killed comes back on the page, which stops the run"
+  client end.mjs "$address" people >"$work/end.json" || fail "the end in the page"
+  cat "$work/end.json"
+  wait $run
+  [ $? -le 1 ] || fail "the run: $(tail -n 3 "$work/main.err")"
+  python3 - "$work/end.json" "$work/report.json" <<'PY' || fail "the page's numbers are not the report's"
+import json, sys
+page, report = (json.load(open(name)) for name in sys.argv[1:])
+assert page["restarts"] == sum(fault.get("kind") == "outage" and fault["process"] == "people" for fault in report["faults"]), report["faults"]
+done = {node["name"]: node["completed"] for node in report["nodes"]}
+assert len(page["done"]) >= 3, page
+assert all(done[node] == count for node, count in page["done"].items()), (page, done)
+PY
+else
+  end_run 0 1
+fi
 kill -TERM $web
 wait $web || fail "takt web ended with $?"
 finish

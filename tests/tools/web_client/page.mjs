@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // page.mjs ADDRESS FOLDER [PARAM VALUE]: the page of takt web in Chromium, against a running graph. Opens each view, keeps
-// pictures of them in FOLDER, looks at a port until pictures are drawn, sets a parameter, sets a mark, changes the mode.
+// pictures of them in FOLDER, looks at a port until pictures are drawn, sets and keeps a parameter, sets a mark, changes the mode.
 // Prints one JSON object with what it saw; exit 1 on a console error, a request to elsewhere, or what does not come.
 import { chromium } from "playwright-core";
 
@@ -56,6 +56,7 @@ if (param !== "") {
   await page.locator(`details[data-node="${node}"] summary`).click();
   const row = page.locator(`[data-param="${param}"]`);
   await row.locator(".field").fill(value);
+  await row.locator(".keep input").check();
   await row.getByRole("button", { name: "Set" }).click();
   await until(async () => (await row.evaluate((element) => element.classList.contains("changed"))), "the new value");
   out.value = await row.locator(".value").textContent();

@@ -82,9 +82,9 @@ export class Log implements View {
 function row_of(event: LogEvent): HTMLElement {
   return h(
     "li",
-    { class: `event ${event.kind}` },
+    { class: `event ${event.kind} ${event.level ?? ""}` },
     h("span", { class: "num at" }, `${event.at_s.toFixed(2)} s`),
-    h("span", { class: "event-kind" }, event.kind),
+    h("span", { class: "event-kind" }, event.level ?? event.kind),
     h("span", { class: "event-node" }, event.node ?? ""),
     h("span", { class: "event-text" }, event.text),
   );

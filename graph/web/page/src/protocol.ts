@@ -120,6 +120,8 @@ export interface LogEvent {
   kind: string;
   node: Maybe<string>;
   text: string;
+  /** Of kind "log": debug, info, warning or error. */
+  level?: string;
 }
 
 /** One job: node (index into graph.nodes), release, start and finish in s since the start of the run, CPU. */
