@@ -124,6 +124,8 @@ void add_run(CLI::App& app, plugin::Plugins& plugins, RunOptions& o, int& exit_c
                   "on | off: keeps the newest part of the run in OUTPUT/flight, frozen by misses, losses and marks "
                   "(default: on in real time)")
       ->check(CLI::IsMember({"auto", "on", "off"}));
+  run->add_flag("--web", o.web,
+                "shows the run in a browser and to Foxglove: `takt web` beside it, as the graph's `web` says");
   reads_file(run->add_option("--faults", o.faults,
                              "a scenario: injects its faults and exits 0 exactly if what it expects is met"));
   writes_folder(run->add_option("--output", o.output, "folder for pictures and other results (default out)"));

@@ -6,10 +6,9 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cstdlib>
 #include <cstring>
-#include <sstream>
 
+#include "graph/cli/other_program.hpp"
 #include "graph/cli/outcome.hpp"
 #include "graph/language/words.hpp"
 
@@ -27,29 +26,9 @@ constexpr DeskCommand kDeskCommands[] = {
     {"web", "shows a running graph in a browser and to Foxglove", "takt-web"},
 };
 
-std::vector<std::filesystem::path> program_folders() {
-  std::error_code unreadable;
-  const auto beside = std::filesystem::read_symlink("/proc/self/exe", unreadable).parent_path();
-  std::vector<std::filesystem::path> folders{beside.parent_path() / "libexec/takt", beside};
-  const char* path = std::getenv("PATH");
-  std::istringstream parts(path != nullptr ? path : "");
-  for (std::string part; std::getline(parts, part, ':');) folders.emplace_back(part.empty() ? "." : part);
-  return folders;
-}
-
 }  // namespace
 
 std::span<const DeskCommand> desk_commands() { return kDeskCommands; }
-
-std::filesystem::path other_program(std::string_view name) {
-  if (name.empty() || name.find('/') != std::string_view::npos) return {};
-  for (const auto& folder : program_folders()) {
-    auto program = folder / fmt::format("takt-{}", name);
-    std::error_code ignored;
-    if (std::filesystem::is_regular_file(program, ignored) && access(program.c_str(), X_OK) == 0) return program;
-  }
-  return {};
-}
 
 int become_other_program(char** arguments, std::vector<std::string> own) {
   const std::string name = arguments[1];

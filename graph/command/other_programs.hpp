@@ -5,10 +5,8 @@
 //
 // takt-NAME is looked for in libexec/takt of the installation, then beside this program, then in PATH.
 #pragma once
-#include <filesystem>
 #include <span>
 #include <string>
-#include <string_view>
 #include <vector>
 
 namespace takt::command {
@@ -19,9 +17,6 @@ struct DeskCommand {
 };
 /// For the help; that the program is there is not sure.
 std::span<const DeskCommand> desk_commands();
-
-/// The file of takt-NAME; empty if there is none.
-std::filesystem::path other_program(std::string_view name);
 
 /// Becomes takt-NAME, where NAME is `arguments[1]`, with the arguments behind it. Returns only where that fails: the
 /// exit code, once the error is on stderr. 2: nothing is called NAME; the error names the nearest of `own` and of the

@@ -237,6 +237,16 @@ struct RecordSpec {
   int64_t state_every_ns() const { return recorded ? snapshot_ns : 0; }
 };
 
+/// The part `web` of a graph: where `takt run --web` shows its runs. Empty: as `takt web` has it.
+struct WebSpec {
+  int port = 0;
+  std::string address;
+  std::filesystem::path certificate, key, token_file;
+  std::vector<std::string> hosts, origins;  ///< names of this server; pages of others that may connect
+};
+/// Whether only programs of this machine reach a server at this address.
+bool is_loopback(std::string_view address);
+
 struct GraphSpec {
   std::string name, file, profile, mode = "full";
   std::filesystem::path directory;
@@ -250,6 +260,7 @@ struct GraphSpec {
   std::vector<ModeSpec> modes;
   std::optional<ExpectSpec> expect;
   RecordSpec record;
+  WebSpec web;
   std::vector<ConditionSpec> asked;  ///< LoadOptions::conditions
   ScheduleSpec schedule;
   KeptValues kept;

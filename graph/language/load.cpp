@@ -40,6 +40,7 @@ Loaded Loader::load(const std::filesystem::path& file) {
     check_modes();
     read_expect();
     read_record();
+    read_web();
     read_asked();
     apply_mode();
     tell_what_is_not_enforced();

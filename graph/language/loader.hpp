@@ -153,6 +153,9 @@ class Loader {
   void read_record_size(const nlohmann::json& value, std::string_view key, int64_t least, int64_t& bytes);
   void read_record_port(const std::string& name);
 
+  // read_web.cpp: where runs are shown
+  void read_web();
+
   // check_graph.cpp
   void check_chains();
   void check_modes();

@@ -24,9 +24,11 @@
 #include "graph/run/prepare.hpp"
 #include "graph/run/report.hpp"
 #include "graph/run/rights.hpp"
+#include "graph/run/strikes.hpp"
 #include "graph/run/support.hpp"
 #include "graph/run/trace.hpp"
 #include "graph/run/watchdog.hpp"
+#include "graph/run/web_beside.hpp"
 #include "rt/capability.hpp"
 #include "rt/machine/limits.hpp"
 #include "rt/memory/sanitized.hpp"
@@ -120,6 +122,7 @@ class IsolatedRun {
       if (!proofs) throw Refused{proofs.error()};
       proofs_ = std::move(*proofs);
       tell_bounds(graph_, plan_, proofs_, board_);
+      if (const auto shown = begin_web(options_); !shown) throw Refused{refuse(shown.error(), kDeviceOrSystem)};
     } else {
       proofs_.policy = plan_.policy;
       proofs_.why = "all processes were lost, with what was admitted";
@@ -317,7 +320,7 @@ class IsolatedRun {
     const auto ended = [&] {
       supervisor_->look();
       const int64_t now = clock_.now_ns(), end = board_.stop().end_ns();
-      if (now < end) strike(now);
+      if (now < end) strikes_.strike(now);
       watchdog_->tick(now);
       if (give_up_ns == INT64_MAX && now > end) {
         supervisor_->let_end();
@@ -354,32 +357,6 @@ class IsolatedRun {
     for (size_t p = 0; p < group_.size(); ++p)
       if (group_.pid(p) != 0 && board_.process(p).state.load() != ProcessRecord::finished) return false;
     return true;
-  }
-
-  /// What a scenario has in store for the processes.
-  void strike(int64_t now_ns) {
-    for (const graph::ProcessStrike& strike : faults_.due(now_ns)) {
-      const auto named = std::find(partition_.names.begin(), partition_.names.end(), strike.process);
-      const auto p = static_cast<size_t>(named - partition_.names.begin());
-      if (p == partition_.names.size() || group_.pid(p) == 0) continue;  // away already
-      faults_.count(strike);
-      if (strike.kind == graph::FaultKind::kill_at_step) order(p, strike);
-      else kill(group_.pid(p), strike.kind == graph::FaultKind::kill ? SIGKILL : SIGSTOP);
-      if (strike.kind == graph::FaultKind::stop_process) stopped_.push_back({group_.pid(p), now_ns + strike.for_ns});
-    }
-    std::erase_if(stopped_, [&](const auto& stopped) {
-      return now_ns >= stopped.second && (kill(stopped.first, SIGCONT), true);
-    });
-  }
-
-  /// Orders a process to die when it comes to that step.
-  void order(size_t process, const graph::ProcessStrike& strike) {
-    KillOrder& order = board_.process(process).kill;
-    for (size_t port = 0; port < plan_.ports.size(); ++port)
-      if (plan_.ports[port].node + "." + plan_.ports[port].port == strike.output)
-        order.port.store(static_cast<uint32_t>(port));
-    order.passes.store(strike.passes);
-    order.step.store(strike.step);
   }
 
   MachineUse use_of_all() const {
@@ -436,7 +413,6 @@ class IsolatedRun {
   graph::Proofs proofs_;
   StallLog stalls_;
   nlohmann::ordered_json rights_;
-  std::vector<std::pair<pid_t, int64_t>> stopped_;  ///< processes, and when they go on
   MonotonicClock clock_;
   graph::Composition plan_source_;  ///< shells of all nodes; the plan points into them
   Plan& plan_;
@@ -456,6 +432,7 @@ class IsolatedRun {
   RunRecord record_;                      ///< reads from the transport
   RunTrace trace_;                        ///< speaks to the record
   ProcessGroup group_;                    ///< its members end before what they share
+  Strikes strikes_{faults_, plan_, partition_, board_, group_};
   std::optional<Supervisor> supervisor_;  ///< of the group
   std::optional<RunWatchdog> watchdog_;
 };

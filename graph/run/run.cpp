@@ -10,6 +10,7 @@
 
 #include "graph/attach/server.hpp"
 #include "graph/check/doctor_text.hpp"
+#include "graph/cli/other_program.hpp"
 #include "graph/run/expectations.hpp"
 #include "graph/run/faults.hpp"
 #include "graph/run/isolated_run.hpp"
@@ -22,6 +23,7 @@
 #include "graph/run/support.hpp"
 #include "graph/run/trace.hpp"
 #include "graph/run/watchdog.hpp"
+#include "graph/run/web_beside.hpp"
 #include "graph/run/world_truth.hpp"
 #include "rt/capability.hpp"
 #include "rt/machine/limits.hpp"
@@ -180,6 +182,7 @@ int run_in_one_process(const RunOptions& options, Prepared& prepared, RunFaults&
   adjusted.insert(adjusted.end(), lacks.begin(), lacks.end());
   if (options.witness == nullptr)
     for (const std::string& line : adjusted) std::fprintf(stderr, "takt: adjusted: %s\n", line.c_str());
+  if (const auto shown = begin_web(options); !shown) return refuse(shown.error(), kDeviceOrSystem);
   return execute(options, prepared, faults, expectations, *proofs, std::move(adjusted));
 }
 
@@ -203,6 +206,13 @@ int run_as_asked(const Registry& registry, RunOptions options) {
       return refuse("--require-rt: this machine lacks (see `takt doctor`)\n" + lacks, kDeviceOrSystem);
     if (const std::string note = this_machine().not_preemptible; !note.empty())
       std::fprintf(stderr, "takt: note: %s\n", note.c_str());
+  }
+  if (options.web) {
+    const std::string program = other_program("web").string();
+    if (program.empty())
+      return refuse("--web: takt-web is not there; `./takt web --help` of a checkout builds it (libwebsockets-dev)",
+                    kDeviceOrSystem);
+    options.shown = std::make_shared<WebBeside>(web_arguments(program, prepared.graph->web));
   }
   const bool processes = wanted == "subsystem" && options.clock != "virtual";
   RunFaults faults(registry, options);
@@ -228,6 +238,8 @@ int run_graph(const Registry& registry, const RunOptions& options) {
   if (!options.watchdog.empty() && options.clock == "virtual")
     return refuse("--watchdog: a run in virtual time keeps no deadline that a watchdog could guard; leave one out",
                   kBadInput);
+  if (options.web && options.clock == "virtual")
+    return refuse("--web: virtual time passes too fast to be shown; leave --web or --clock virtual out", kBadInput);
   // Two that reset one machine for different reasons, and only one process can have the device.
   if (const auto systemd = systemd_sink(); !options.watchdog.empty() && systemd && systemd->timeout_ns() > 0)
     return refuse(

@@ -29,6 +29,7 @@ class RunWitness {
 };
 
 struct RunOutputs;  // graph/run/outputs.hpp
+class WebBeside;    // graph/run/web_beside.hpp
 
 struct RunOptions {
   std::filesystem::path graph;  ///< empty: graph/ace.yaml of the project
@@ -44,6 +45,8 @@ struct RunOptions {
   std::vector<std::string> record_ports;  ///< NODE.PORT: with all fields, beside devices and small ones; "all"
   std::string trace_source = "auto";      ///< of preemption: auto (the best there is), tracefs, perf, none
   std::string ring = "auto";              ///< auto (on in real time, unless the graph says no), on, off
+  bool web = false;                       ///< `takt web` beside it, as the graph's `web` has it
+  std::shared_ptr<WebBeside> shown;       ///< that; by run_graph(), begun once the run is admitted
   bool keep_ring = false;                 ///< what that comes to; by run_graph()
   uint64_t seed = 1;
   std::filesystem::path watchdog;       ///< device that resets the machine unless the run is well; empty: none

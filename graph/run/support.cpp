@@ -18,6 +18,7 @@
 
 #include "graph/check/check.hpp"
 #include "graph/check/machine_file.hpp"
+#include "graph/cli/boundary.hpp"
 #include "graph/run/junit.hpp"
 #include "graph/run/machine.hpp"
 #include "graph/run/outputs.hpp"

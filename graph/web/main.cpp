@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <cerrno>
 #include <csignal>
 #include <filesystem>
 #include <memory>
@@ -14,6 +15,7 @@
 #include "graph/attach/socket_folder.hpp"
 #include "graph/cli/boundary.hpp"
 #include "graph/cli/outcome.hpp"
+#include "graph/language/graph.hpp"
 #include "graph/web/link.hpp"
 #include "graph/web/server.hpp"
 #include "rt/capability.hpp"
@@ -27,15 +29,11 @@ using command::kDeviceOrSystem;
 using command::refuse;
 
 struct Options {
-  int run = 0;
+  int run = 0, with_run = 0;
   ServerOptions server;
   std::vector<std::string> hosts, origins;
   std::filesystem::path token_file;
 };
-
-bool loopback(const std::string& address) {
-  return address == "localhost" || address == "::1" || address.starts_with("127.");
-}
 
 /// The address to open, with the token in its fragment, which no browser sends anywhere.
 std::string page_address(const ServerOptions& server) {
@@ -44,11 +42,11 @@ std::string page_address(const ServerOptions& server) {
                      server.token);
 }
 
-/// Ends the server at SIGINT, SIGTERM or SIGHUP (not under nohup), which every thread made after this blocks. A flag
-/// that a handler sets would not wake it.
-class EndBySignal {
+/// Ends the server at SIGINT, SIGTERM or SIGHUP (not under nohup), which every thread made after this blocks: a flag
+/// that a handler sets would not wake it. Ends it with a run, too.
+class EndOfServer {
  public:
-  EndBySignal() {
+  EndOfServer() {
     sigemptyset(&signals_);
     for (const int signal : {SIGINT, SIGTERM}) sigaddset(&signals_, signal);
     struct sigaction hangup {};
@@ -56,11 +54,13 @@ class EndBySignal {
     pthread_sigmask(SIG_BLOCK, &signals_, nullptr);
     std::signal(SIGPIPE, SIG_IGN);
   }
-  void watch(Server& server) {
-    thread_ = OwnThread([this, &server](const std::stop_token& end) {
+  /// `run`: the process that it goes with; 0: none.
+  void watch(Server& server, pid_t run) {
+    thread_ = OwnThread([this, &server, run](const std::stop_token& end) {
       const timespec patience{0, 100'000'000};
+      const auto over = [&] { return run > 0 && kill(run, 0) != 0 && errno == ESRCH; };
       while (!end.stop_requested())
-        if (sigtimedwait(&signals_, nullptr, &patience) > 0) return server.end();
+        if (sigtimedwait(&signals_, nullptr, &patience) > 0 || over()) return server.end();
     });
   }
 
@@ -70,7 +70,7 @@ class EndBySignal {
 };
 
 int serve(Options options) {
-  EndBySignal signals;
+  EndOfServer end;
   keep_rights(Rights::none);
   options.server.token = new_token();
   if (!options.token_file.empty()) {
@@ -94,13 +94,14 @@ int serve(Options options) {
     return refuse(fmt::format("{}\n  fix: another --port, or --address of this machine", problem.what()),
                   kDeviceOrSystem);
   }
-  link = std::make_unique<Link>(hub, types, Link::Options{.run = options.run});
+  link =
+      std::make_unique<Link>(hub, types, Link::Options{.run = options.with_run > 0 ? options.with_run : options.run});
   fmt::print("{}\nFoxglove: ws{}://{}:{}\n", page_address(options.server),
              options.server.certificate.empty() ? "" : "s", options.server.address, options.server.port);
   if (std::fflush(stdout) != 0)
     return refuse("stdout does not take the address that is to be opened\n  fix: room for it, or --token-file",
                   kDeviceOrSystem);
-  signals.watch(*server);
+  end.watch(*server, options.with_run);
   server->run();
   link.reset();
   return command::kOk;
@@ -110,6 +111,8 @@ int run(int argc, char** argv) {
   CLI::App app{"Shows a running graph in a browser and to Foxglove; prints the address to open", "takt web"};
   Options options;
   app.add_option("--run", options.run, "process id of the run; without it the one that there is");
+  app.add_option("--with-run", options.with_run, "process id of a run that may still have to begin; ends with it")
+      ->excludes("--run");
   app.add_option("--port", options.server.port, "TCP port of page and Foxglove, 8765 by default")
       ->check(CLI::Range(1, 65535));
   app.add_option(
@@ -129,7 +132,7 @@ int run(int argc, char** argv) {
   }
   if (options.server.certificate.empty() != options.server.key.empty())
     return refuse("--certificate and --key belong together", kBadInput);
-  if (!loopback(options.server.address)) {
+  if (!graph::is_loopback(options.server.address)) {
     if (options.server.certificate.empty())
       return refuse(fmt::format("--address {} is seen by others: it needs --certificate and --key\n"
                                 "  fix: openssl req -x509 -newkey rsa:2048 -nodes -days 365 -subj /CN=NAME -keyout "
